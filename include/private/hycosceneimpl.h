@@ -144,6 +144,7 @@ struct _p_HycoScene {
   PetscOptions options;                         /* every entry, those of the command line included */
   char *title, *mesh_path, *unit[HYCO_N_UNITS]; /* units: notes, "" where the scene has none */
   DM dm;                                        /* the mesh of a calling program; NULL: mesh_path */
+  PetscBool face_nodes;                         /* rank 0, once the mesh is read: its hex20 cells are read as hex27 */
   PetscInt refine;                              /* how often the mesh's cells are halved */
   HycoFormulation formulation;
   char *folder; /* folder of the entries' relative paths */

@@ -64,6 +64,7 @@ static PetscErrorCode CheckBodies(HycoScene scene, Reader *r, HycoMesh m)
                                                        uniform pressure */
     PetscCall(HycoMshAddFaceNodes(scene->mesh_path, &r->file));
     m->type = HYCO_HEX27;
+    scene->face_nodes = PETSC_TRUE;
   }
   m->nv = HycoCellKinds[m->type].nv;
   m->nf = HycoCellKinds[m->type].nf;

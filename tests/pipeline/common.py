@@ -85,6 +85,16 @@ class Case(unittest.TestCase):
         subprocess.run(['gmsh', '-1', os.path.join(ROPE, 'rope.geo'), '-setnumber', 'n', str(nodes), '-format', 'msh41', '-bin', '1',
                         '-v', '1', '-o', cls.path(name)], check=True, timeout=60 * PATIENCE, stdout=subprocess.DEVNULL)
 
+    @classmethod
+    def drawn(cls, name, dim, geo, scene, *more):
+        """The folder `name` with a scene and the mesh NAME.msh that gmsh makes of its drawing."""
+        os.makedirs(cls.path(name), exist_ok=True)
+        for file, text in ((name + '.geo', geo), ('scene.yaml', scene)):
+            with open(cls.path(name, file), 'w', encoding='ascii') as f:
+                f.write(text)
+        subprocess.run(['gmsh', f'-{dim}', f'{name}.geo', *more, '-format', 'msh41', '-v', '1', '-o', f'{name}.msh'], cwd=cls.path(name), check=True,
+                       timeout=60 * PATIENCE, stdout=subprocess.DEVNULL)
+
     def near(self, found, expected, relative, what=''):
         self.assertLessEqual(abs(found - expected), relative * abs(expected), f'{what}: {found!r} for {expected!r}')
 

@@ -1,13 +1,11 @@
 """A new scene, written from docs/tutorial.md and docs/scenes.md only: plane stress, named constants, gravity, an oblique support, springs on a
 list of groups, a point load, a surface contact under a mapped body beside an obstacle of a single node, outputs, units; meshed, checked, solved,
 trained, predicted, compared."""
-import os
-import subprocess
 import unittest
 
 import h5py
 
-from common import PATIENCE, Case
+from common import Case
 
 GEO = """// A shelf with a slanted end against a wall, over a post, with a stop under its tip. mm.
 Point(1) = {0, 0, 0};
@@ -93,12 +91,7 @@ class Newcomer(Case):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        os.makedirs(cls.path('shelf'))
-        for name, text in (('shelf.geo', GEO), ('scene.yaml', SCENE)):
-            with open(cls.path('shelf', name), 'w', encoding='ascii') as f:
-                f.write(text)
-        subprocess.run(['gmsh', '-2', 'shelf/shelf.geo', '-format', 'msh41', '-v', '1', '-o', 'shelf/shelf.msh'], cwd=cls.folder, check=True,
-                       timeout=60 * PATIENCE, stdout=subprocess.DEVNULL)
+        cls.drawn('shelf', 2, GEO, SCENE)
 
     def test_all(self):
         check = self.hyco('check', '-scene', 'shelf')

@@ -44,6 +44,7 @@ class Plot(Case):
     def test_refused(self):
         for words, *args in (('it has xx, xy', 'solution', 'hertz.h5', '--field', 'stress', '--component', 'q'), ('there is no field heat', 'solution', 'hertz.h5', '--field', 'heat'),
                              ('the times 0 to', 'solution', 'ring.h5', '--step', '7'), ('takes lowest and highest', 'solution', 'hertz.h5', '--zoom', '1,0,0,1'),
+                             ('contact surfaces: 1', 'solution', 'pellet.h5', '--surface', '2'), ('beside an .xdmf', 'solution', 'pellet.vtkhdf'),
                              ('no column hoop', 'study', 'study.csv', '--y', 'hoop'),
                              ('no table', 'study', 'hertz.xdmf')):
             self.assertIn(words, self.plot(*args, '-o', 'no.png', status=1), args)

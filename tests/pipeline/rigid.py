@@ -112,6 +112,8 @@ class Rigid(Case):
         run = self.run_raw(*train, '-scene', self.scene())
         self.assertEqual(run.returncode, 1)
         self.assertIn('no support keeps body tool', run.stderr)
+        self.assertIn('give the master of the rigid body (tip) a soft spring', run.stderr)
+        self.assertEqual(run.stderr.count('\n'), 1, run.stderr)
         self.hyco(*train, '-scene', self.scene(more='spring: {tip: {y: 1e-3}}\n'))
         found, full = (self.hyco(*args, '-mu', '17,9.3')['outputs'] for args in (('predict', '-model', 'c.h5'), ('solve', '-scene', self.scene())))
         self.near(found['push'], -17, 1e-5)

@@ -100,7 +100,8 @@ class Installed(unittest.TestCase):
         with open(os.path.join(SOURCE, 'CMakeLists.txt'), encoding='utf-8') as file:
             version = re.search(r'project\(hyco VERSION (\S+)', file.read()).group(1)
         self.assertEqual(run(os.path.join(self.prefix, 'bin', 'hyco'), '-version').strip(), 'hyco ' + version)
-        for name, pattern in (('CITATION.cff', r'^version: (\S+)'), ('CHANGELOG.md', r'^## (\d\S*)')):
+        for name, pattern in (('CITATION.cff', r'^version: (\S+)'), ('CHANGELOG.md', r'^## (\d\S*)'),
+                              ('packaging/spack/packages/hyco/package.py', r'^    version\("(\S+)"\)')):
             with open(os.path.join(SOURCE, name), encoding='utf-8') as file:
                 self.assertEqual(re.search(pattern, file.read(), flags=re.M).group(1), version, name)
 

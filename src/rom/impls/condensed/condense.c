@@ -308,18 +308,21 @@ static PetscErrorCode CheckFacets(HycoReducer t)
 PetscErrorCode HycoCondensedCheckSupports(HycoReducer t)
 {
   HycoMotions motions;
-  PetscInt free;
+  PetscInt free, rigid = 0;
   char name[HYCO_LINE];
 
   PetscFunctionBegin;
+  while (rigid < t->scene->n_contacts && !t->scene->contact[rigid]->rigid) rigid++;
   PetscCall(HycoFEFreeMotions(HycoComm(t), t->fom->fe, &motions));
   free = motions.n;
   if (free) PetscCall(PetscStrncpy(name, motions.name[0], sizeof(name)));
   PetscCall(HycoMotionsDestroy(&motions));
   HycoCheckModel(!free,
                  "no support keeps %s, only contact does, so that K^-1 does not exist, which a condensed model needs; "
-                 "train a hybrid model",
-                 name);
+                 "train a hybrid model%s%s%s",
+                 name, rigid < t->scene->n_contacts ? ", or give the master of the rigid body (" : "",
+                 rigid < t->scene->n_contacts ? t->scene->contact[rigid]->master : "",
+                 rigid < t->scene->n_contacts ? ") a soft spring" : "");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
