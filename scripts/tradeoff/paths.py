@@ -235,7 +235,8 @@ def headline(mesh, rows):
             f"On one power ramp of a fuel rod whose cladding creeps and yields (`examples/rod`, mesh {mesh}), full order takes {seconds(newton)} by Newton's method, or {seconds(elastic)} if",
             f"the elastic factor is kept; the hybrid model takes {seconds(best['path_s'])}, which is {newton / best['path_s']:.0f} and {elastic / best['path_s']:.0f} times less. On "
             f"{len(case_of(mesh).unseen)} paths that no training has seen, each at its worst time,",
-            f"its errors are at most {', '.join(words[:-1])} and {words[-1]}."]
+            f"its errors are at most {', '.join(words[:-1])} and {words[-1]}. At the edges of the parameters' ranges",
+            "the forces are less accurate ([docs/tradeoff.md](docs/tradeoff.md))."]
 
 
 def plot(mesh, rows, path):
