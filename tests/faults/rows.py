@@ -11,9 +11,9 @@ class Rows:
     def __init__(self, name):
         os.makedirs(FOLDER, exist_ok=True)
         self.path = os.path.abspath(os.path.join(FOLDER, name + '.csv'))
-        with open(self.path, 'w', encoding='utf-8'):
-            pass
+        self.mode = 'w'  # for the first row: other programs may import this one
 
     def add(self, fault, what):
-        with open(self.path, 'a', encoding='utf-8', newline='') as f:
+        mode, self.mode = self.mode, 'a'
+        with open(self.path, mode, encoding='utf-8', newline='') as f:
             csv.writer(f).writerow((fault, what))
