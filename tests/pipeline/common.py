@@ -55,6 +55,16 @@ class Case(unittest.TestCase):
         return os.path.join(cls.folder, *names)
 
     @classmethod
+    def changed(cls, name, text, changes):
+        """The path of a file with the text, in which each (old, new) of the changes is replaced; every old one must be there."""
+        for old, new in changes:
+            assert old in text, old
+            text = text.replace(old, new)
+        with open(cls.path(name), 'w', encoding='utf-8') as f:
+            f.write(text)
+        return cls.path(name)
+
+    @classmethod
     def run_raw(cls, *args, ranks=0, cwd=None, timeout=100):
         """The finished process; ranks 0: without mpiexec."""
         if not cls.newcomer:

@@ -24,13 +24,7 @@ class CondensedPaths(Ring):
     def altered(cls, name, law, history, *changes):
         scene = cls.scene(name, law, history)
         with open(scene, encoding='utf-8') as f:
-            text = f.read()
-        for old, new in changes:
-            assert old in text
-            text = text.replace(old, new)
-        with open(scene, 'w', encoding='utf-8') as f:
-            f.write(text)
-        return scene
+            return cls.changed(scene, f.read(), changes)
 
     def test_training_point(self):
         """Every cell and every mode: the full order's path at a training point, with the gap closing and opening. For creep alone also with few

@@ -29,20 +29,12 @@ class Rigid(Case):
         """A block under the line y = 0, and a cell beside it whose first node is the group tip."""
         grid, axis = Grid(), size * np.linspace(0, 1, n + 1)**grading
         grid.box(kind, [axis, -axis[::-1]], lambda x: x, 'block', {'x0': 'sym', 'y0': 'base', 'y1': 'top'})
-        first = grid.count + 1
-        grid.box(kind, [np.array([1.5, 1.6]) * size, np.array([0, 0.1]) * size], lambda x: x, 'tool', {})
-        grid.elements.append((15, grid._tag('tip', 0), (first,)))
+        grid.tool(kind, [np.array([1.5, 1.6]) * size, np.array([0, 0.1]) * size])
         grid.write(cls.path('mesh.msh'))
 
     @classmethod
     def scene(cls, name='scene.yaml', law=ELASTIC, force='-load', more='', **changes):
-        text = SCENE.replace('LAW', law).replace('FORCE', force) + more
-        for a, b in changes.values():
-            assert a in text
-            text = text.replace(a, b)
-        with open(cls.path(name), 'w', encoding='ascii') as f:
-            f.write(text)
-        return cls.path(name)
+        return cls.changed(name, SCENE.replace('LAW', law).replace('FORCE', force) + more, changes.values())
 
     def test_moved_obstacle(self):
         """The contact has the load, and the solution is that under the obstacle displaced by the body's motion, on any number of ranks."""

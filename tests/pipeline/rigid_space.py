@@ -29,20 +29,12 @@ class RigidSpace(Case):
         """A quarter of a block under the plane z = 0, and a cell beside it whose first node is the group tip."""
         grid, axis = Grid(), 4 * np.linspace(0, 1, 5)**1.5
         grid.box(LINEAR[kind], [axis, axis, np.array([-4, -1.5, 0])], lambda x: x, 'block', {'x0': 'west', 'y0': 'south', 'z0': 'base', 'z1': 'top'})
-        first = grid.count + 1
-        grid.box(LINEAR[kind], [np.array([6., 7.]), np.array([0., 1.]), np.array([0., 1.])], lambda x: x, 'tool', {})
-        grid.elements.append((15, grid._tag('tip', 0), (first,)))
+        grid.tool(LINEAR[kind], [np.array([6., 7.]), np.array([0., 1.]), np.array([0., 1.])])
         msh(cls.path('mesh.msh'), *second(grid, kind))
 
     @classmethod
     def scene(cls, name='scene.yaml', *changes):
-        text = SCENE
-        for a, b in changes:
-            assert a in text
-            text = text.replace(a, b)
-        with open(cls.path(name), 'w', encoding='ascii') as f:
-            f.write(text)
-        return cls.path(name)
+        return cls.changed(name, SCENE, changes)
 
     def test_moved_obstacle(self):
         """With and without a spring on the body; check counts its motion as no mistake, and says which cells were read."""

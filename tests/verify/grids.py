@@ -57,6 +57,12 @@ class Grid:
         for cut in cuts:
             self.elements.extend((GMSH[kind], tag, c) for c in corners[:, cut].tolist())
 
+    def tool(self, kind, axes):
+        """A box of the body tool; its first node is the group tip."""
+        first = self.count + 1
+        self.box(kind, axes, lambda x: x, 'tool', {})
+        self.elements.append((15, self._tag('tip', 0), (first,)))
+
     def write(self, path):
         msh(path, self.nodes, self.elements, self.names)
 
