@@ -177,14 +177,15 @@ class Solids(Case):
             self.near(full[1]['strain_energy'], full[0]['strain_energy'], 1e-10)
             for of in types:
                 with self.subTest(kind=kind, type=of):
-                    trained = self.hyco('train', '-scene', scene, '-grid', '3,3', '-model', f'{kind}.h5', '-hyco_model_type', of, '-hyco_pod_tol', 1e-11,
+                    self.hyco('train', '-scene', scene, '-grid', '3,3', '-model', f'{kind}.h5', '-hyco_model_type', of, '-hyco_pod_tol', 1e-11,
                               *(('-hyco_rid_layers', 1, '-hyco_rid_modes', 'displacement,stress,force,dual') if of == 'hybrid' else ()))
                     found = self.hyco('compare', '-scene', scene, '-model', f'{kind}.h5', '-grid', '1,2', ranks=2)
                     self.assertLess(found['error_u']['max'], 0.02)
                     self.assertLess(found['error_u_h1']['max'], 0.05)
                     if of == 'projection':  # its modes do not change the gaps: zero forces, not random ones
                         self.assertLess(found['error_lambda']['max'], 1 + 1e-9)
-                        self.assertLess(trained['held_out']['lambda']['largest'], 1 + 1e-9)
+                        many = self.hyco('compare', '-scene', scene, '-model', f'{kind}.h5', '-scatter', 20)
+                        self.assertLess(many['error_lambda']['max'], 1 + 1e-9)
                     model = self.hyco('predict', '-model', f'{kind}.h5', '-mu', '0.27,310')
                     for name, value in full[0]['outputs'].items():
                         self.near(model['outputs'][name], value, 0.05, name)
