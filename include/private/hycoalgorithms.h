@@ -36,6 +36,8 @@ PetscErrorCode HycoPOD(SVD svd, Mat S, PetscReal tol, PetscReal noise, PetscInt 
 PetscErrorCode HycoPODMerge(SVD svd, PetscReal loss, Mat *merged, Mat *S);
 /* Copies the columns of the dense X into Y, which has the same rows, from column `at` on. Collective. */
 PetscErrorCode HycoCopyColumns(Mat X, Mat Y, PetscInt at);
+/* Creates [A B] of dense matrices with the same rows on each rank, and destroys both. Collective. */
+PetscErrorCode HycoJoinColumns(Mat *A, Mat *B, Mat *joined);
 
 /* The number l of k singular values that HycoPOD() takes. It sums the tail, so that tol can be tiny. */
 PetscInt HycoPODRank(PetscInt k, const PetscReal sigma[], PetscReal tol, PetscReal noise, PetscInt max_modes);

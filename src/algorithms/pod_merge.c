@@ -37,8 +37,7 @@ PetscErrorCode HycoCopyColumns(Mat X, Mat Y, PetscInt at)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Creates [A B] and frees both. */
-static PetscErrorCode Join(Mat *A, Mat *B, Mat *joined)
+PetscErrorCode HycoJoinColumns(Mat *A, Mat *B, Mat *joined)
 {
   PetscInt N, n[2], rows;
 
@@ -64,7 +63,7 @@ PetscErrorCode HycoPODMerge(SVD svd, PetscReal loss, Mat *merged, Mat *S)
 
   PetscFunctionBegin;
   if (*merged)
-    PetscCall(Join(merged, S, &all));
+    PetscCall(HycoJoinColumns(merged, S, &all));
   else {
     all = *S;
     *S = NULL;

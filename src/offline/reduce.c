@@ -249,7 +249,7 @@ PetscErrorCode HycoPathModesJoin(HycoReducer t, HycoPathModes *modes, PetscInt N
 
 PetscErrorCode HycoReducerReadPath(HycoReducer t, HycoSnapshots store, PetscInt kind, PetscInt j, Mat *path)
 {
-  PetscInt n_par, N, n_rows, n[2];
+  PetscInt n_par, N, n_rows;
   const PetscReal *mu;
   Mat listed, between;
 
@@ -258,18 +258,11 @@ PetscErrorCode HycoReducerReadPath(HycoReducer t, HycoSnapshots store, PetscInt 
   *path = listed;
   if (kind != HYCO_SEED_DISPLACEMENT) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
-  PetscCall(MatGetSize(listed, &N, &n[0]));
+  PetscCall(MatGetSize(listed, &N, NULL));
   PetscCall(MatGetLocalSize(listed, &n_rows, NULL));
   PetscCall(HycoSnapshotsGetBetween(store, mu + j * n_par, n_rows, N, &between));
   PetscCall(RemoveLifting(t, between));
-  PetscCall(MatGetSize(between, NULL, &n[1]));
-  PetscCall(MatCreateDense(HycoComm(t), n_rows, PETSC_DECIDE, N, n[0] + n[1], NULL, path));
-  PetscCall(HycoCopyColumns(listed, *path, 0));
-  PetscCall(HycoCopyColumns(between, *path, n[0]));
-  PetscCall(MatAssemblyBegin(*path, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(*path, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatDestroy(&between));
-  PetscCall(MatDestroy(&listed));
+  PetscCall(HycoJoinColumns(&listed, &between, path));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
