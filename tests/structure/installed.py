@@ -2,6 +2,7 @@
 import glob
 import os
 import re
+import shutil
 import subprocess
 import tempfile
 import unittest
@@ -94,6 +95,26 @@ class Installed(unittest.TestCase):
         for name in LADDER:
             self.assertTrue(os.access(os.path.join(build, name), os.X_OK), name)
         self.predicts(os.path.join(build, 'batch'))
+
+    @unittest.skipUnless(shutil.which('dpkg-shlibdeps'), 'no Debian: there is no dpkg-shlibdeps')
+    def test_package(self):
+        """The Debian package depends on the libraries that hyco links, but not on gmsh's; its command runs from wherever it is unpacked."""
+        made = os.path.join(self.folder.name, 'package')
+        run('cpack', '-B', made, cwd=BUILD)
+        package, = glob.glob(os.path.join(made, '*.deb'))
+        needs = re.split(r'[, |]+', run('dpkg-deb', '-f', package, 'Depends'))
+        for name in ('openmpi-bin', 'libpetsc-real', 'libslepc-real', 'libhdf5-openmpi', 'libmetis', 'libmumps', 'libmuparser', 'libqhull', 'libcjson'):
+            self.assertTrue(any(word.startswith(name) for word in needs), f'{name} is not in {needs}')
+        self.assertFalse([word for word in needs if re.search('gmsh|fltk|x11', word)])
+        root = os.path.join(made, 'root')
+        run('dpkg-deb', '-x', package, root)
+        self.assertEqual(os.listdir(root), ['usr'])
+        library, = glob.glob(os.path.join(root, '**', 'libhyco.so'), recursive=True)
+        paths = os.pathsep.join([os.path.dirname(library), *filter(None, [library_path()])])
+        model = os.path.join(SOURCE, 'tests', 'data', 'rope-hybrid-4-table.h5')
+        said = run(os.path.join(root, 'usr', 'bin', 'hyco'), 'predict', '-model', model, '-mu', '0.07,0.17',
+                   env={**os.environ, 'LD_LIBRARY_PATH': paths})
+        self.assertIn('force', said)
 
     def test_version(self):
         """One version, CMakeLists.txt's."""
