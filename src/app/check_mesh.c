@@ -189,8 +189,8 @@ static PetscErrorCode Use(HycoMesh m, const char key[], const char name[], Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Marks the groups used in the scene: bodies, supports, loads, contacts with the entries of their types, the region
-   of interest. */
+/* Marks the groups used in the scene: bodies, supports, loads, contacts with the entries of their types, outputs, the
+   region of interest. */
 static PetscErrorCode MarkUsed(HycoScene s, HycoMesh m, PetscBool used[])
 {
   char *region[64];
@@ -210,6 +210,9 @@ static PetscErrorCode MarkUsed(HycoScene s, HycoMesh m, PetscBool used[])
 
       if (entry->kind == HYCO_ENTRY_GROUP && entry->text) PetscCall(Use(m, "contact", entry->text, used));
     }
+  }
+  for (PetscInt k = 0; k < s->n_quantities; k++) {
+    if (s->quantity[k].group) PetscCall(Use(m, "output", s->quantity[k].group, used));
   }
   PetscCall(PetscOptionsGetStringArray(s->options, NULL, "-hyco_rid_groups", region, &n, NULL));
   for (PetscInt k = 0; k < n && n < 64; k++) {

@@ -96,7 +96,7 @@ class Installed(unittest.TestCase):
             self.assertTrue(os.access(os.path.join(build, name), os.X_OK), name)
         self.predicts(os.path.join(build, 'batch'))
 
-    @unittest.skipUnless(shutil.which('dpkg-shlibdeps'), 'no Debian: there is no dpkg-shlibdeps')
+    @unittest.skipUnless(shutil.which('dpkg-shlibdeps') and shutil.which('file'), 'cpack requires dpkg-dev and file')
     def test_package(self):
         """The Debian package depends on the libraries that hyco links, but not on gmsh's; its command runs from wherever it is unpacked."""
         made = os.path.join(self.folder.name, 'package')
