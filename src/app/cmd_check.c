@@ -1,12 +1,14 @@
 /* hyco check: reads and assembles a whole scene, solves only on request; reports its contents and its cost. */
 #include "check.h"
 #include <hycomaterialimpl.h>
+#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
 /* Up to this number of parameters all corners of the ranges are checked, above it only the ends of each. */
 #define MOST_CORNERS 4
+#define WIDE         10 /* ratio of a range's ends from which polynomials in its logarithm interpolate better */
 
 void CheckWarn(Check *check, const char format[], ...)
 {
@@ -270,6 +272,13 @@ static PetscErrorCode SayReach(Check *check, PetscInt p, cJSON *reaches)
   PetscCall(Say("%s %s", what, s->parameter[p]));
   if (p < s->n_parameters) PetscCall(Say(" from %g to %g", (double)s->lo[p], (double)s->hi[p]));
   PetscCall(Say(": affects %s\n", words[0] ? words : "nothing"));
+  if (p < s->n_parameters && does[STIFFNESS] && !does[MAPS] && s->lo[p] > 0 && s->hi[p] >= WIDE * s->lo[p]) {
+    cJSON_AddItemToArray(cJSON_GetObjectItem(check->json, "wide_ranges"), cJSON_CreateString(s->parameter[p]));
+    PetscCall(
+        Say("  for a condensed model, let its logarithm be the parameter: q from %.4g to %.4g, and 10^q in place of "
+            "%s\n",
+            log10((double)s->lo[p]), log10((double)s->hi[p]), s->parameter[p]));
+  }
   if (!words[0]) CheckWarn(check, "the %s %s affects nothing: no expression uses it", what, s->parameter[p]);
   if (p < s->n_parameters && s->lo[p] == s->hi[p])
     CheckWarn(check, "the range of the parameter %s is a single value", s->parameter[p]);
@@ -287,6 +296,7 @@ static PetscErrorCode Describe(Check *check)
   CheckContacts(check);
   PetscCall(SayMotions(check));
   reaches = cJSON_AddObjectToObject(check->json, "parameters");
+  cJSON_AddArrayToObject(check->json, "wide_ranges");
   for (PetscInt p = 0; p < s->n_variables; p++) PetscCall(SayReach(check, p, reaches));
   if (s->n_times)
     PetscCall(Say("history of %d times from %g to %g\n", (int)s->n_times, (double)s->times[0],

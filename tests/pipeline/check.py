@@ -177,6 +177,9 @@ class Check(Case):
             self.assertEqual(run.stderr.count('hyco: error'), 1, run.stderr)
             self.assertIn('press = 0.05', run.stderr)
             self.assertFalse(os.path.exists(self.path('none.json')))
+        for value, span, wide in (('100*idle', '1,10', ['idle']), ('100*idle', '1,9', []), ('100*10^idle', '0,3', [])):
+            found = self.hyco('check', '-scene', self.scene(upper=4), '-body_upper_young', value, '-parameter_idle_range', span)
+            self.assertEqual((found['wide_ranges'], found['n_warnings']), (wide, 0))
         self.assertEqual(self.run_raw('check', '-scene', self.scene(), '-fixed_nowhere_x', '0').returncode, 1)
         run = self.run_raw('check', '-scene', self.scene(), '-hyco_rid_groups', 'nowhere')
         self.assertEqual(run.returncode, 1, run.stdout)

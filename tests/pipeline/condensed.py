@@ -105,6 +105,25 @@ class Condensed(Case):
         self.assertGreater(float(said[1]), 1e-7)
         self.refused('give the training points', 'train', '-scene', PELLET, '-model', 'h.h5')
 
+    def test_decades(self):
+        """The foundation's modulus over two decades: eight values of its logarithm give forces to 1e-3, where eight of the modulus give some tens
+        of per cent (the flexibility has poles near the range's lower end)."""
+        found = {}
+        for young, span, at in (('crown', '1e4,1e6', '2e4,6e4,3e5,7e5'), ('10^crown', '4,6', '4.301,4.778,5.477,5.845')):
+            words = ('-scene', BLOCKS, '-body_block_map_y', 'y + 0.05*(x/20)^2*(1 - y/16)', '-body_foundation_young', young, '-parameter_crown_range', span)
+            self.hyco('train', *words, *TYPE, '-grid', '8,3', '-grid_type', 'chebyshev', '-hyco_validation', 0, '-model', 'd.h5', '-hyco_snapshots', young[:2])
+            c = self.hyco('compare', *words, '-model', 'd.h5', '-values_crown', at, '-values_press', '0.03,0.07')
+            found[young] = c['error_lambda']['max']
+        self.assertLess(found['10^crown'], 1e-3)
+        self.assertGreater(found['crown'], 0.1)
+
+    def test_affine(self):
+        """Where loads alone depend on three parameters, the chosen points have three values of each, not five: 27 solutions."""
+        three = ('-scene_parameters', 'crown,press,push', '-parameter_push_range', '0,1', '-body_block_map_y', 'y + 0.05*(x/20)^2*(1 - y/16)',
+                 '-fixed_block_top_y', '0 - press - 0.1*crown - 0.01*push')
+        t = self.train(*three, '-model', 'a.h5', '-hyco_validation', 0, scene=BLOCKS)
+        self.assertEqual((t['n_samples'], t['n_flexibilities']), (27, 1))
+
     def test_ranks_and_resume(self):
         """Two ranks make the same model; after a kill only what is missing is solved and factored again."""
         words = ('-values_radius', '4.02,4.06,4.1', '-values_load', '0.4,1')

@@ -60,19 +60,23 @@ static PetscErrorCode FindGrid(HycoReducer t, HycoCondensed c)
                    t->scene->parameter[p]);
     all *= (PetscReal)c->n[p];
   }
-  HycoCheckModel(all <= (PetscReal)n_s,
-                 "the %d training points do not form a tensor grid, and a condensed model needs every combination of "
-                 "their values (%g points); give them by -grid or -values_NAME",
-                 (int)n_s, (double)all);
+  HycoCheckModel(
+      all <= (PetscReal)n_s,
+      "the %d training points do not form a tensor grid, and a condensed model needs every combination of "
+      "their values (%g points); give them by -grid or -values_NAME, or give no points with -hyco_model_type "
+      "condensed, which then chooses them",
+      (int)n_s, (double)all);
   for (PetscInt p = 0; p < c->dim; p++) nodes *= c->n[p];
   PetscCall(PetscMalloc1(nodes, &c->sample));
   for (PetscInt k = 0; k < nodes; k++) c->sample[k] = -1;
   for (PetscInt k = 0; k < n_s; k++) c->sample[NodeOf(c, mu + k * c->dim)] = k;
   for (PetscInt k = 0; k < nodes; k++)
-    HycoCheckModel(c->sample[k] >= 0,
-                   "the %d training points do not form a tensor grid, and a condensed model needs every combination of "
-                   "their values; give them by -grid or -values_NAME",
-                   (int)n_s);
+    HycoCheckModel(
+        c->sample[k] >= 0,
+        "the %d training points do not form a tensor grid, and a condensed model needs every combination of "
+        "their values; give them by -grid or -values_NAME, or give no points with -hyco_model_type condensed, "
+        "which then chooses them",
+        (int)n_s);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -7,8 +7,10 @@
 */
 #include <hycocondensed.h>
 
-/* If everything is affine in a parameter, two values are exact; the modes need solutions in between. */
+/* If everything is affine in a parameter, two values are exact; the modes need solutions in between, of all such
+   parameters together no more than AFFINE_POINTS. */
 #define AFFINE_VALUES 5
+#define AFFINE_POINTS 32
 #define FIRST_VALUES  3
 #define LEJA_GRID     2000
 #define TIE           1e-6 /* relative: among nearly equal errors the first parameter is refined */
@@ -119,16 +121,28 @@ static PetscBool IsHopeless(HycoReducer t, const History *h, PetscInt p)
                                       BEYOND * (PetscReal)h->most);
 }
 
+/* The number of values of each parameter in which everything is affine. */
+static PetscInt CountAffineValues(HycoScene s, HycoCondensed c)
+{
+  PetscInt n = AFFINE_VALUES;
+  PetscReal dim = 0;
+
+  for (PetscInt p = 0; p < s->n_parameters; p++) dim += c->affine[p] && s->hi[p] > s->lo[p];
+  while (n > 2 && PetscPowReal((PetscReal)n, dim) > AFFINE_POINTS) n--;
+  return n;
+}
+
 PetscErrorCode HycoCondensedChoosePoints(HycoReducer t, HycoSnapshots store, HycoSamples *samples)
 {
   HycoScene s = t->scene;
+  const PetscInt n_affine = CountAffineValues(s, Condensing(t)->condensed);
   PetscInt counts[HYCO_MAX_PARAMETERS], worst = 0;
   History h = {Condensing(t)->max_values, NULL};
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(s->n_parameters * (h.most + 1) + 1, &h.error));
   for (PetscInt p = 0; p < s->n_parameters; p++) {
-    const PetscInt n = Condensing(t)->condensed->affine[p] ? AFFINE_VALUES : FIRST_VALUES;
+    const PetscInt n = Condensing(t)->condensed->affine[p] ? n_affine : FIRST_VALUES;
 
     counts[p] = s->hi[p] > s->lo[p] ? PetscMin(n, Condensing(t)->max_values) : 1;
   }

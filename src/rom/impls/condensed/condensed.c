@@ -458,12 +458,13 @@ static void ReportPoints(HycoReducer t, HycoCondensed c, HycoTraining *r)
              "was requested; raise -hyco_condensed_max_values, which is %d, or -hyco_condensed_tol",
              (double)c->errors[2], (double)Condensing(t)->tol, (int)Condensing(t)->max_values);
   else
-    snprintf(r->missed, sizeof(r->missed),
-             "-hyco_condensed_tol was not reached: with %d values of %s the error of the forces, with one value left "
-             "out, is %.1e and hardly falls as values are added, and %.1e was requested; the stiffness or the contacts "
-             "do not depend smoothly on %s (a jump, or a kink, for example of abs or max): train a hybrid model, or "
-             "raise -hyco_condensed_tol",
-             (int)c->n[c->hopeless], name, (double)c->by_parameter[c->hopeless], (double)Condensing(t)->tol, name);
+    snprintf(
+        r->missed, sizeof(r->missed),
+        "-hyco_condensed_tol was not reached: with %d values of %s the error of the forces, with one value left "
+        "out, is %.1e and falls slowly as values are added, and %.1e was requested; if the stiffness or the contacts "
+        "have a jump or a kink in %s (for example of abs or max), train a hybrid model; if its range covers a "
+        "decade, let its logarithm be the parameter; or raise -hyco_condensed_tol",
+        (int)c->n[c->hopeless], name, (double)c->by_parameter[c->hopeless], (double)Condensing(t)->tol, name);
 }
 
 static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
