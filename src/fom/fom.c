@@ -575,6 +575,23 @@ static PetscErrorCode LargestPart(HycoFOM f, PetscInt largest[3])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The ranks' shares of the searches for masters so far. Collective. */
+static PetscErrorCode ViewSearch(HycoFOM f, PetscViewer viewer)
+{
+  PetscInt64 most = f->team.queries, all = f->team.queries;
+  PetscInt patches[2] = {f->team.patches, f->team.whole};
+
+  PetscFunctionBegin;
+  HycoAllreduce(&most, 1, MPIU_INT64, MPI_MAX, HycoComm(f));
+  HycoAllreduce(&all, 1, MPIU_INT64, MPI_SUM, HycoComm(f));
+  HycoAllreduce(patches, 2, MPIU_INT, MPI_MAX, HycoComm(f));
+  if (all)
+    PetscCall(PetscViewerASCIIPrintf(viewer,
+                                     "a rank: at most %lld of %lld searches for a master, on %d of %d patches\n",
+                                     (long long)most, (long long)all, (int)patches[0], (int)patches[1]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFOMView(HycoFOM f, PetscViewer viewer)
 {
   PetscInt largest[3] = {0, 0, 0};
@@ -590,6 +607,7 @@ PetscErrorCode HycoFOMView(HycoFOM f, PetscViewer viewer)
     PetscCall(LargestPart(f, largest));
     PetscCall(PetscViewerASCIIPrintf(viewer, "a rank: at most %d unknowns of its own, %d of %d others\n",
                                      (int)largest[0], (int)largest[1], (int)largest[2]));
+    PetscCall(ViewSearch(f, viewer));
   }
   PetscCall(HycoSystemView(f->system, viewer));
   PetscCall(HycoSolverView(f->solver, viewer));
