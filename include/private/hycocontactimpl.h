@@ -63,9 +63,38 @@ typedef struct _n_HycoPairs {
   HycoSearch *search; /* by contact of the scene; NULL where room is 0 */
 } HycoPairs;
 
-/* Finds the contacts on the nodes as drawn. Where no map moves the surfaces they are final, and a slave node without
-   a master is an error. */
-PetscErrorCode HycoPairsFind(HycoScene scene, HycoMesh mesh, HycoPairs *pairs);
+/*
+  Ranks that search for masters together. Rank 0, which has the surfaces, divides the slave nodes and sends each rank
+  its part of them, with the part of the master in which their nearest points may lie. Only calls in
+  HycoOnRootWithTeam() may have the team in their HycoFE.
+*/
+typedef struct _n_HycoTeam {
+  MPI_Comm comm;
+  PetscInt64 queries; /* that this rank has answered */
+  PetscInt patches;   /* the most that one of its searches had */
+  PetscInt whole;     /* the same of all ranks' searches, on rank 0 */
+} HycoTeam;
+/* Answers rank 0's searches until it dismisses this rank. Errors are raised on rank 0. Collective, except on rank 0. */
+PetscErrorCode HycoTeamServe(HycoTeam *team);
+/* Rank 0. */
+PetscErrorCode HycoTeamDismiss(HycoTeam *team);
+/* Runs `call` on rank 0, whose searches all ranks answer; its error is raised on every rank. Collective. */
+#define HycoOnRootWithTeam(team, call)                                                                                 \
+  do {                                                                                                                 \
+    char message_[HYCO_LINE];                                                                                          \
+    PetscMPIInt rank_;                                                                                                 \
+    PetscErrorCode caught_;                                                                                            \
+    PetscCallMPI(MPI_Comm_rank((team)->comm, &rank_));                                                                 \
+    PetscCall(HycoCatchBegin());                                                                                       \
+    caught_ = rank_ ? HycoTeamServe(team) : (call);                                                                    \
+    PetscCall(HycoCatchEnd(caught_, message_));                                                                        \
+    if (!rank_) PetscCall(HycoTeamDismiss(team));                                                                      \
+    PetscCall(HycoErrorSync((team)->comm, caught_, message_));                                                         \
+  } while (0)
+
+/* Finds the contacts on the nodes as drawn; team: the ranks that help, or NULL. Where no map moves the surfaces they
+   are final, and a slave node without a master is an error. */
+PetscErrorCode HycoPairsFind(HycoScene scene, HycoMesh mesh, HycoTeam *team, HycoPairs *pairs);
 /* Removes contacts of tied nodes whose masters belong to the same contact: these move with their masters. Fails for
    other tied nodes of contacts. */
 PetscErrorCode HycoPairsDropTied(HycoScene scene, HycoMesh mesh, HycoPairs *pairs);

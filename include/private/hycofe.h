@@ -64,6 +64,7 @@ struct _n_HycoFE {
      all_facets: loads also act on facets whose cell is not in the mesh (2D, 3D) */
   const PetscReal *cell_weight;
   PetscBool all_facets;
+  struct _n_HycoTeam *team; /* ranks that help rank 0 in a search for masters, while they do; else NULL */
   /* kept from one parameter value to the next */
   HycoAssemblyMap places; /* positions of the element entries in K; created by the second assembly */
   PetscInt n_loads;

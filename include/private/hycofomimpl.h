@@ -25,6 +25,7 @@ struct _p_HycoFOM {
   HycoFE fe;         /* on the part */
   HycoFE fe_surface; /* on the surface, rank 0 (the same as fe on one rank); NULL elsewhere */
   HycoPairs pairs;   /* rank 0, of the surface's nodes */
+  HycoTeam team;     /* all ranks, in rank 0's searches for masters */
   HycoSystem system;
   HycoSolver solver;
   Mat K, B, Bt;
@@ -68,7 +69,7 @@ PetscErrorCode HycoComparedDestroy(HycoCompared *compared);
 PetscErrorCode HycoFOMCreateMesh(MPI_Comm comm, HycoScene scene, HycoFOM *fom);
 /* Sets group[g] for the groups with a contact of the scene; leaves the others unchanged. */
 PetscErrorCode HycoMarkContactGroups(HycoScene scene, HycoMesh mesh, PetscBool group[]);
-/* Updates fe and fe_surface to mu. Collective. */
+/* Updates fe and fe_surface to mu; on several ranks also the masters on moved surfaces. Collective. */
 PetscErrorCode HycoFOMSetParameters(HycoFOM fom, const PetscReal mu[]);
 /* K, F, B, D at mu, in the system. Collective. */
 PetscErrorCode HycoFOMAssemble(HycoFOM fom, const PetscReal mu[]);

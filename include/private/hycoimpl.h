@@ -148,6 +148,7 @@ typedef enum {
   HYCO_EVENT_ASSEMBLE, /* K */
   HYCO_EVENT_FORCE,    /* F */
   HYCO_EVENT_CONTACT,  /* B, D */
+  HYCO_EVENT_SEARCH,   /* this process's queries for masters */
   HYCO_EVENT_REDUCE,   /* the reduced system from K, F, B, D of the RID */
   HYCO_EVENT_FACTOR,   /* with the computation of the flexibility */
   HYCO_EVENT_FORCES,   /* the complementarity problem: active set, Lemke, TAO */

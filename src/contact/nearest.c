@@ -4,16 +4,12 @@
 */
 #include "nearest.h"
 #include <hycovector.h>
-#include <stdlib.h>
 
 #define LEAF 4
 /* A smaller weight is round-off of a projection onto an edge or a node. */
 #define SNAP 1e-12
-
-typedef struct {
-  PetscReal centre[3];
-  PetscInt patch;
-} Item;
+/* Share of the coordinates' size: more than the round-off of a distance. */
+#define ROUND_OFF 1e-14
 
 typedef struct {
   PetscReal lo[3], hi[3];
@@ -23,35 +19,52 @@ struct _n_HycoPatches {
   const PetscReal *X, *normal; /* borrowed, like node */
   PetscInt n, nf;
   const PetscInt *node;
-  Item *item; /* in the order of the leaves */
-  Box *box;   /* of tree node t; its children are 2 t + 1 and 2 t + 2 */
+  HycoPoint *item; /* the patches' centres, in the order of the leaves */
+  Box *box;        /* of tree node t; its children are 2 t + 1 and 2 t + 2 */
 };
 
-static int Compare(const Item *p, const Item *q, PetscInt axis)
+/* Whether p comes before q along an axis. */
+static PetscBool Before(const HycoPoint *p, const HycoPoint *q, PetscInt axis)
 {
-  if (p->centre[axis] != q->centre[axis]) return p->centre[axis] < q->centre[axis] ? -1 : 1;
-  return (p->patch > q->patch) - (p->patch < q->patch);
+  return (PetscBool)(p->x[axis] < q->x[axis] || (p->x[axis] == q->x[axis] && p->index < q->index));
 }
 
-static int CompareX(const void *p, const void *q)
+/* The median of the first, the middle and the last point: with it, sorted points are halved. */
+static HycoPoint Pivot(const HycoPoint *first, const HycoPoint *middle, const HycoPoint *last, PetscInt axis)
 {
-  return Compare((const Item *)p, (const Item *)q, 0);
+  const HycoPoint *lo = Before(first, last, axis) ? first : last, *hi = lo == first ? last : first;
+
+  return Before(middle, lo, axis) ? *lo : Before(middle, hi, axis) ? *middle : *hi;
 }
 
-static int CompareY(const void *p, const void *q)
+void HycoPointsSplit(HycoPoint point[], PetscInt lo, PetscInt mid, PetscInt hi, PetscInt axis)
 {
-  return Compare((const Item *)p, (const Item *)q, 1);
-}
+  while (hi - lo > 1 && lo < mid && mid < hi) { /* Hoare's selection */
+    const HycoPoint pivot = Pivot(&point[lo], &point[lo + (hi - lo) / 2], &point[hi - 1], axis);
+    PetscInt i = lo, j = hi - 1;
 
-static int CompareZ(const void *p, const void *q)
-{
-  return Compare((const Item *)p, (const Item *)q, 2);
+    while (i <= j) {
+      while (Before(&point[i], &pivot, axis)) i++;
+      while (Before(&pivot, &point[j], axis)) j--;
+      if (i <= j) {
+        const HycoPoint kept = point[i];
+
+        point[i++] = point[j];
+        point[j--] = kept;
+      }
+    }
+    if (mid <= j)
+      hi = j + 1;
+    else if (mid >= i)
+      lo = i;
+    else
+      return;
+  }
 }
 
 /* Builds box t of the items lo .. hi - 1, split at the median of the centres along its longest side. */
 static void Build(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi)
 {
-  static int (*const by[3])(const void *, const void *) = {CompareX, CompareY, CompareZ};
   Box *b = &s->box[t];
   PetscInt axis = 0;
 
@@ -59,7 +72,7 @@ static void Build(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi)
     b->lo[c] = PETSC_MAX_REAL;
     b->hi[c] = PETSC_MIN_REAL;
     for (PetscInt k = lo * s->nf; k < hi * s->nf; k++) {
-      const PetscReal x = s->X[3 * s->node[s->item[k / s->nf].patch * s->nf + k % s->nf] + c];
+      const PetscReal x = s->X[3 * s->node[s->item[k / s->nf].index * s->nf + k % s->nf] + c];
 
       b->lo[c] = PetscMin(b->lo[c], x);
       b->hi[c] = PetscMax(b->hi[c], x);
@@ -67,7 +80,7 @@ static void Build(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi)
     if (b->hi[c] - b->lo[c] > b->hi[axis] - b->lo[axis]) axis = c;
   }
   if (hi - lo <= LEAF) return;
-  qsort(s->item + lo, (size_t)(hi - lo), sizeof(Item), by[axis]);
+  HycoPointsSplit(s->item, lo, (lo + hi) / 2, hi, axis);
   Build(s, 2 * t + 1, lo, (lo + hi) / 2);
   Build(s, 2 * t + 2, (lo + hi) / 2, hi);
 }
@@ -89,10 +102,10 @@ PetscErrorCode HycoPatchesCreate(const PetscReal X[], PetscInt n, PetscInt nf, c
   PetscCall(PetscMalloc1(n, &s->item));
   PetscCall(PetscMalloc1(boxes, &s->box));
   for (PetscInt k = 0; k < n; k++) {
-    s->item[k].patch = k;
+    s->item[k].index = k;
     for (PetscInt c = 0; c < 3; c++) {
-      s->item[k].centre[c] = 0;
-      for (PetscInt a = 0; a < nf; a++) s->item[k].centre[c] += X[3 * node[k * nf + a] + c] / nf;
+      s->item[k].x[c] = 0;
+      for (PetscInt a = 0; a < nf; a++) s->item[k].x[c] += X[3 * node[k * nf + a] + c] / nf;
     }
   }
   Build(s, 0, 0, n);
@@ -233,41 +246,68 @@ static PetscBool Opposes(HycoPatches s, PetscInt patch, const PetscReal *against
   return (PetscBool)(!against || !n || HycoDot(n, n) == 0 || HycoDot(n, against) <= HYCO_OPPOSED);
 }
 
-/* Updates (best, patch, w) with the nearest of the items lo .. hi - 1 under box t; the nearer child is searched
-   first. */
-static void Search(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi, const PetscReal x[3], const PetscReal *against,
-                   PetscReal *best, PetscInt *patch, PetscReal w[4])
+/* A query, and the nearest point so far: its squared distance, patch and weights. */
+typedef struct {
+  const PetscReal *x, *against;
+  PetscReal round_off, limit; /* limit: of a squared distance that is not larger, whatever the round-off */
+  PetscReal best, w[4];
+  PetscInt patch;
+} Query;
+
+static void SetBest(Query *q, PetscReal best, PetscInt patch, const PetscReal w[4])
+{
+  const PetscReal limit = PetscSqrtReal(best) + q->round_off;
+
+  q->best = best;
+  q->limit = limit * limit;
+  q->patch = patch;
+  for (PetscInt a = 0; a < 4; a++) q->w[a] = w[a];
+}
+
+/* Updates the query with the nearest of the items lo .. hi - 1 under box t; the nearer child is searched first. */
+static void Search(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi, Query *q)
 {
   const PetscInt mid = (lo + hi) / 2;
   PetscBool right;
 
-  if (BoxDistance2(&s->box[t], x) > *best) return;
+  if (BoxDistance2(&s->box[t], q->x) > q->limit) return;
   if (hi - lo > LEAF) {
-    right = (PetscBool)(BoxDistance2(&s->box[2 * t + 2], x) < BoxDistance2(&s->box[2 * t + 1], x));
+    right = (PetscBool)(BoxDistance2(&s->box[2 * t + 2], q->x) < BoxDistance2(&s->box[2 * t + 1], q->x));
     for (PetscInt child = 0; child < 2; child++, right = (PetscBool)!right)
-      Search(s, 2 * t + 1 + right, right ? mid : lo, right ? hi : mid, x, against, best, patch, w);
+      Search(s, 2 * t + 1 + right, right ? mid : lo, right ? hi : mid, q);
     return;
   }
   for (PetscInt k = lo; k < hi; k++) {
     PetscReal trial[4] = {0, 0, 0, 0}, d;
 
-    if (!Opposes(s, s->item[k].patch, against)) continue;
-    d = OnPatch(s, s->item[k].patch, x, trial);
-    if (d > *best || (d == *best && s->item[k].patch > *patch)) continue;
-    *best = d;
-    *patch = s->item[k].patch;
-    for (PetscInt a = 0; a < 4; a++) w[a] = trial[a];
+    if (!Opposes(s, s->item[k].index, q->against)) continue;
+    d = OnPatch(s, s->item[k].index, q->x, trial);
+    if (d < q->best || (d == q->best && s->item[k].index < q->patch)) SetBest(q, d, s->item[k].index, trial);
   }
+}
+
+static PetscReal LargestCoordinate(const PetscReal lo[3], const PetscReal hi[3])
+{
+  PetscReal most = 0;
+
+  for (PetscInt c = 0; c < 3; c++) most = PetscMax(most, PetscMax(PetscAbsReal(lo[c]), PetscAbsReal(hi[c])));
+  return most;
 }
 
 void HycoPatchesProject(HycoPatches s, const PetscReal x[3], const PetscReal against[3], HycoProjection *p)
 {
-  PetscReal best = PETSC_MAX_REAL, w[4] = {0, 0, 0, 0}, sum = 0;
-  PetscInt patch = 0;
+  const PetscReal none[4] = {0, 0, 0, 0}, *w;
+  Query q = {.x = x, .against = against};
+  PetscReal sum = 0;
+  PetscInt patch;
 
-  Search(s, 0, 0, s->n, x, against, &best, &patch, w);
+  q.round_off = ROUND_OFF * (LargestCoordinate(s->box[0].lo, s->box[0].hi) + LargestCoordinate(x, x));
+  SetBest(&q, PETSC_MAX_REAL, 0, none);
+  Search(s, 0, 0, s->n, &q);
+  patch = q.patch;
+  w = q.w;
   p->patch = patch;
-  p->distance = PetscSqrtReal(best);
+  p->distance = PetscSqrtReal(q.best);
   p->n = 0;
   for (PetscInt a = 0; a < s->nf; a++) {
     PetscInt at = p->n;

@@ -13,6 +13,14 @@ typedef struct {
 /* Normals oppose each other if their product is at most this (within 72 degrees). */
 #define HYCO_OPPOSED -0.3
 
+/* A point with a number, which orders points of equal coordinates. */
+typedef struct {
+  PetscReal x[3];
+  PetscInt index;
+} HycoPoint;
+/* Rearranges the points lo .. hi - 1 so that those before `mid` come first along the axis. */
+void HycoPointsSplit(HycoPoint point[], PetscInt lo, PetscInt mid, PetscInt hi, PetscInt axis);
+
 typedef struct _n_HycoPatches *HycoPatches;
 
 /* n patches of nf nodes each: 1 points, 2 segments, 3 triangles, 4 bilinear quadrilaterals; X: coordinates of nodes;
@@ -21,8 +29,8 @@ typedef struct _n_HycoPatches *HycoPatches;
 PetscErrorCode HycoPatchesCreate(const PetscReal X[], PetscInt n, PetscInt nf, const PetscInt node[],
                                  const PetscReal normal[], HycoPatches *patches);
 PetscErrorCode HycoPatchesDestroy(HycoPatches *patches);
-/* The patches' point nearest to x; among equally near ones that of the first patch. against: a unit normal that the
-   patch must oppose, or NULL. */
+/* The patches' point nearest to x; among equally near ones that of the first patch, so that the result is the same
+   with any more patches that are farther away. against: a unit normal that the patch must oppose, or NULL. */
 void HycoPatchesProject(HycoPatches patches, const PetscReal x[3], const PetscReal against[3], HycoProjection *p);
 
 #endif

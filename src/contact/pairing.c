@@ -36,29 +36,6 @@ static int FarthestFirst(const void *a, const void *b)
   return (p->node > q->node) - (p->node < q->node);
 }
 
-PetscErrorCode HycoPartnersJudge(HycoPartners *t, PetscInt slave, PetscReal tolerance, PetscReal small,
-                                 HycoProjection *at, HycoVerdict *why)
-{
-  const PetscReal *out = HycoPartnersOutward(t, slave);
-  PetscReal r[3];
-  PetscBool past = PETSC_FALSE;
-
-  PetscFunctionBegin;
-  *why = HYCO_MET;
-  HycoPartnersProject(t, slave, PETSC_FALSE, at);
-  if (!at->n) {
-    *why = HYCO_TURNED;
-    HycoPartnersProject(t, slave, PETSC_TRUE, at);
-  }
-  if (*why == HYCO_MET && at->distance > tolerance) *why = HYCO_FAR;
-  if (*why != HYCO_MET || !out || at->distance <= small) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoPartnersAcross(t, slave, at, r);
-  if (PetscAbsReal(HycoDot(r, out)) < -HYCO_OPPOSED * at->distance) *why = HYCO_ASKEW;
-  PetscCall(HycoPartnersIsPast(t, slave, at, &past));
-  if (past) *why = HYCO_PAST;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Angle in degrees between a slave's normal and the direction to its master point, or between opposed normals. */
 static PetscReal Angle(const HycoPartners *t, PetscInt slave, HycoVerdict why, const HycoProjection *at)
 {
@@ -99,6 +76,7 @@ static PetscErrorCode Complain(HycoPartners *t, HycoContact c, HycoRemedy remedy
   PetscInt *node;
 
   PetscFunctionBegin;
+  PetscCall(HycoPartnersReady(t));
   qsort(missed, (size_t)n, sizeof(Missed), FarthestFirst);
   for (PetscInt k = 0; k < PetscMin(n, 5); k++) {
     char one[HYCO_LINE / 2];
@@ -161,8 +139,9 @@ static PetscErrorCode AppendMatched(HycoPartners *t, HycoContact c, PetscInt ind
 static PetscErrorCode Match(HycoPartners *t, HycoContact c, PetscInt index, HycoSettle settle, HycoRemedy remedy,
                             HycoMatch *m, HycoPairs *p)
 {
+  HycoQuery query = {.moved = PETSC_FALSE};
   Missed *missed;
-  PetscErrorCode ierr = 0;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   HycoCheck(m->n && t->n, "contact %s: the group %s is empty", c->name, m->n ? c->master : c->slave);
@@ -174,8 +153,9 @@ static PetscErrorCode Match(HycoPartners *t, HycoContact c, PetscInt index, Hyco
   PetscCall(HycoContactGetLength(c, "tolerance", &m->tolerance));
   if (m->tolerance < 0) m->tolerance = m->small;
   PetscCall(PetscMalloc3(m->n, &m->at, m->n, &m->why, m->n, &missed));
-  for (PetscInt k = 0; k < m->n && !ierr; k++)
-    ierr = HycoPartnersJudge(t, m->slave[k], m->tolerance, m->small, &m->at[k], &m->why[k]);
+  query.tolerance = m->tolerance;
+  query.small = m->small;
+  ierr = HycoPartnersSearch(t, &query, m->n, m->slave, m->at, m->why);
   if (!ierr) ierr = (*settle)(t, c, m);
   if (!ierr) ierr = AppendMatched(t, c, index, remedy, m, missed, p);
   PetscCall(PetscFree3(m->at, m->why, missed));

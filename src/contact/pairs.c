@@ -213,7 +213,7 @@ static PetscErrorCode FindAll(HycoFE fe, HycoPairs *pairs)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoPairsFind(HycoScene scene, HycoMesh m, HycoPairs *pairs)
+PetscErrorCode HycoPairsFind(HycoScene scene, HycoMesh m, HycoTeam *team, HycoPairs *pairs)
 {
   HycoFE fe;
   PetscErrorCode ierr;
@@ -223,6 +223,7 @@ PetscErrorCode HycoPairsFind(HycoScene scene, HycoMesh m, HycoPairs *pairs)
   PetscCall(HycoPairsReserve(pairs, 0, 0));
   if (!scene->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoFECreate(scene, m, &fe));
+  fe->team = team;
   ierr = FindAll(fe, pairs);
   PetscCall(HycoFEDestroy(&fe));
   PetscCall(ierr);

@@ -7,8 +7,6 @@
 /* How far past the border a slave node may be, as a share of the facet's shortest edge: its master is then a point
    of the border. */
 #define HYCO_PAST_BORDER 0.1
-/* Share of the same edge: points at a smaller distance coincide. */
-#define HYCO_SAME_POINT 1e-6
 
 /* Patches and their normals: the master's nodes (pair) or facets (surface). */
 static PetscErrorCode FindPatches(HycoPartners *t)
@@ -50,20 +48,37 @@ PetscErrorCode HycoPartnersCreate(HycoFE fe, HycoContact c, PetscBool nodes, Hyc
   PetscCall(PetscMemzero(t, sizeof(*t)));
   t->fe = fe;
   t->nodes = nodes;
+  t->n_nodes = fe->mesh->n_nodes;
+  t->X = fe->X;
   PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->slave, &t->slave));
   PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->master, &t->master));
   PetscCall(FindPatches(t));
-  PetscCall(HycoPatchesCreate(fe->X, t->n, t->nf, t->node, t->normal, &t->patches));
-  PetscCall(PetscCalloc1(3 * fe->mesh->n_nodes, &t->outward));
+  PetscCall(PetscCalloc1(3 * t->n_nodes, &t->outward));
   if (fe->dim > 1) PetscCall(HycoSurfaceNormals(fe, t->slave, t->outward));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPartnersReady(HycoPartners *t)
+{
+  PetscFunctionBegin;
+  if (!t->patches) PetscCall(HycoPatchesCreate(t->X, t->n, t->nf, t->node, t->normal, &t->patches));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPartnersForget(HycoPartners *t)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoPatchesDestroy(&t->patches));
+  HycoFreeAll(&t->border, &t->at_border);
+  t->n_border = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoPartnersDestroy(HycoPartners *t)
 {
   PetscFunctionBegin;
-  PetscCall(HycoPatchesDestroy(&t->patches));
-  HycoFreeAll(&t->node, &t->normal, &t->outward, &t->border, &t->at_border);
+  PetscCall(HycoPartnersForget(t));
+  HycoFreeAll(&t->node, &t->normal, &t->outward);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -81,13 +96,13 @@ static PetscReal ShortestEdge(const HycoPartners *t, PetscInt patch)
   PetscReal shortest = PETSC_MAX_REAL;
 
   for (PetscInt a = 0; a < t->nf; a++)
-    shortest = PetscMin(shortest, HycoDistance(t->fe->X + 3 * node[a], t->fe->X + 3 * node[(a + 1) % t->nf]));
+    shortest = PetscMin(shortest, HycoDistance(t->X + 3 * node[a], t->X + 3 * node[(a + 1) % t->nf]));
   return shortest;
 }
 
 void HycoPartnersProject(const HycoPartners *t, PetscInt slave, PetscBool any_side, HycoProjection *at)
 {
-  const PetscReal *out = HycoPartnersOutward(t, slave), *x = t->fe->X + 3 * slave;
+  const PetscReal *out = HycoPartnersOutward(t, slave), *x = t->X + 3 * slave;
   HycoProjection nearest;
 
   HycoPatchesProject(t->patches, x, NULL, &nearest);
@@ -100,8 +115,8 @@ void HycoPartnersProject(const HycoPartners *t, PetscInt slave, PetscBool any_si
 void HycoPartnersAcross(const HycoPartners *t, PetscInt slave, const HycoProjection *at, PetscReal r[3])
 {
   for (PetscInt c = 0; c < 3; c++) {
-    r[c] = -t->fe->X[3 * slave + c];
-    for (PetscInt a = 0; a < at->n; a++) r[c] += at->weight[a] * t->fe->X[3 * at->node[a] + c];
+    r[c] = -t->X[3 * slave + c];
+    for (PetscInt a = 0; a < at->n; a++) r[c] += at->weight[a] * t->X[3 * at->node[a] + c];
   }
 }
 
@@ -120,7 +135,7 @@ static PetscErrorCode FindBorder(HycoPartners *t)
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(2 * edges, &t->border));
-  PetscCall(PetscCalloc1(t->fe->mesh->n_nodes, &t->at_border));
+  PetscCall(PetscCalloc1(t->n_nodes, &t->at_border));
   for (PetscInt k = 0; k < edges; k++) {
     const PetscInt a = t->node[k], b = nf == 2 ? a : t->node[k / nf * nf + (k + 1) % nf];
 

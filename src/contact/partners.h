@@ -5,16 +5,21 @@
 #include <hycocontactimpl.h>
 #include <hycovector.h>
 
+/* Share of a facet's shortest edge: points at a smaller distance coincide. */
+#define HYCO_SAME_POINT 1e-6
+
 typedef struct {
-  HycoFE fe;                  /* borrowed; its nodes are those of the search */
+  HycoFE fe;                  /* borrowed; its nodes are those of the search; NULL: a part of another process's */
   PetscInt slave, master;     /* groups */
   PetscBool nodes;            /* whether patches are the master's nodes, or its facets */
-  HycoPatches patches;        /* the master's */
+  PetscInt n_nodes;           /* of the search */
+  const PetscReal *X;         /* n_nodes x 3, borrowed */
+  HycoPatches patches;        /* the master's; NULL until HycoPartnersReady() */
   PetscInt n, nf, *node;      /* patches' nodes, n x nf */
   PetscReal *normal;          /* n x 3, of the patches (for a pair: of its nodes); 0: unknown */
-  PetscReal *outward;         /* by node of the mesh x 3, outward normal of the slave's surface; 0: unknown */
+  PetscReal *outward;         /* by node x 3, outward normal of the slave's surface; 0: unknown */
   PetscInt n_border, *border; /* edges (2D: ends) of one facet only, as sorted pairs of nodes; created when needed */
-  PetscBool *at_border;       /* by node of the mesh; NULL: not created */
+  PetscBool *at_border;       /* by node; NULL: not created */
 } HycoPartners;
 
 /* The default tolerance: a tenth of the shortest edge between the corners of the group's facets. */
@@ -22,6 +27,10 @@ PetscReal HycoSurfaceTolerance(HycoMesh mesh, PetscInt group);
 /* Creates the search on fe's nodes. The caller destroys it. */
 PetscErrorCode HycoPartnersCreate(HycoFE fe, HycoContact contact, PetscBool nodes, HycoPartners *partners);
 PetscErrorCode HycoPartnersDestroy(HycoPartners *partners);
+/* Creates the tree of the patches, unless it exists: before the first projection. */
+PetscErrorCode HycoPartnersReady(HycoPartners *partners);
+/* Frees what was created when it was needed: the tree and the border. */
+PetscErrorCode HycoPartnersForget(HycoPartners *partners);
 /* The slave node's outward normal; NULL: unknown, because its group is not a surface. */
 const PetscReal *HycoPartnersOutward(const HycoPartners *partners, PetscInt slave);
 /* The nearest point of the master; n = 0 if its normal does not oppose the slave's, unless any_side. */
@@ -46,6 +55,24 @@ typedef struct {
   HycoProjection *at;
   HycoVerdict *why;
 } HycoMatch;
+
+/* The queries of a search, as drawn or (moved) on surfaces that a map moves: there the verdict is HYCO_MET, and n = 0
+   where the nearest point is farther than the tolerance, turned away or past the border. */
+typedef struct {
+  PetscBool moved;
+  PetscReal tolerance, small; /* as in HycoMatch; small: as drawn */
+} HycoQuery;
+
+/* The masters of n slave nodes. With helpers (fe->team), all ranks answer a part of the queries; the result is the same
+   to the bit. */
+PetscErrorCode HycoPartnersSearch(HycoPartners *partners, const HycoQuery *query, PetscInt n, const PetscInt slave[],
+                                  HycoProjection at[], HycoVerdict why[]);
+/* The same on this process alone. */
+PetscErrorCode HycoPartnersAnswer(HycoPartners *partners, const HycoQuery *query, PetscInt n, const PetscInt slave[],
+                                  HycoProjection at[], HycoVerdict why[]);
+/* The same on all ranks of the team (rank 0; the others are in HycoTeamServe()). */
+PetscErrorCode HycoTeamSearch(HycoTeam *team, HycoPartners *partners, const HycoQuery *query, PetscInt n,
+                              const PetscInt slave[], HycoProjection at[], HycoVerdict why[]);
 
 /* A type's choice of masters from the nearest points. */
 typedef PetscErrorCode (*HycoSettle)(HycoPartners *partners, HycoContact contact, HycoMatch *match);

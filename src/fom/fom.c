@@ -90,7 +90,7 @@ static PetscErrorCode FindTies(HycoFOM f, PetscInt *n, PetscInt **ties)
 
   PetscFunctionBegin;
   *n = 0;
-  PetscCall(HycoPairsFind(f->scene, f->surface, p));
+  PetscCall(HycoPairsFind(f->scene, f->surface, &f->team, p));
   PetscCall(PetscMalloc1(2 * p->n * HycoPairsWidth(p), ties));
   for (PetscInt k = 0; k < p->n; k++) {
     const PetscInt *master;
@@ -128,7 +128,7 @@ static PetscErrorCode Distribute(HycoFOM f, PetscBool *found)
   if (!f->scene->refine) { /* otherwise the contacts are found later */
     HycoOnEach(HycoComm(f), HycoMeshCheckCells(mesh));
     PetscCall(GatherSurface(f, mesh));
-    HycoOnRoot(HycoComm(f), FindTies(f, &n_ties, &ties));
+    HycoOnRootWithTeam(&f->team, FindTies(f, &n_ties, &ties));
     PetscCall(HycoMeshDestroy(&f->surface));
     *found = PETSC_TRUE;
   }
@@ -158,7 +158,8 @@ static PetscErrorCode ReadMesh(HycoFOM f)
     f->n_nodes = f->part->n_whole_nodes;
     f->n_cells = f->part->n_whole_cells;
   }
-  if (!found) HycoOnRoot(HycoComm(f), HycoPairsFind(f->scene, f->surface, &f->pairs));
+  if (f->size == 1) HycoOnRoot(HycoComm(f), HycoPairsFind(f->scene, f->surface, NULL, &f->pairs));
+  if (f->size > 1 && !found) HycoOnRootWithTeam(&f->team, HycoPairsFind(f->scene, f->surface, &f->team, &f->pairs));
   if (f->rank == 0) {
     sizes[0] = f->pairs.n;
     sizes[1] = HycoPairsWidth(&f->pairs);
@@ -286,6 +287,7 @@ static PetscErrorCode Create(MPI_Comm comm, HycoFOM *fom)
   PetscCallMPI(MPI_Comm_size(HycoComm(*fom), &(*fom)->size));
   (*fom)->regularise_tol = 1e-2;
   (*fom)->partition = HYCO_PARTITION_METIS;
+  (*fom)->team.comm = HycoComm(*fom);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -441,6 +443,19 @@ static PetscErrorCode AssembleForce(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Searches for the masters on moved surfaces. Rank 0. */
+static PetscErrorCode Move(HycoFOM f)
+{
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  f->fe_surface->team = &f->team;
+  ierr = HycoPairsMove(f->fe_surface, &f->pairs);
+  f->fe_surface->team = NULL;
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFOMSetParameters(HycoFOM f, const PetscReal mu[])
 {
   PetscFunctionBegin;
@@ -449,6 +464,7 @@ PetscErrorCode HycoFOMSetParameters(HycoFOM f, const PetscReal mu[])
   if (f->fe->contact_changed) PetscCall(HycoFEAgreeOnMirrors(HycoComm(f), f->fe));
   HycoOnRoot(HycoComm(f), HycoFESetParameters(f->fe_surface, mu));
   if (f->rank == 0) PetscCall(PetscArraycpy(f->fe_surface->mirrored, f->fe->mirrored, f->scene->n_bodies));
+  if (f->searches) HycoOnRootWithTeam(&f->team, Move(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -559,6 +575,23 @@ static PetscErrorCode LargestPart(HycoFOM f, PetscInt largest[3])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The ranks' shares of the searches for masters so far. Collective. */
+static PetscErrorCode ViewSearch(HycoFOM f, PetscViewer viewer)
+{
+  PetscInt64 most = f->team.queries, all = f->team.queries;
+  PetscInt patches[2] = {f->team.patches, f->team.whole};
+
+  PetscFunctionBegin;
+  HycoAllreduce(&most, 1, MPIU_INT64, MPI_MAX, HycoComm(f));
+  HycoAllreduce(&all, 1, MPIU_INT64, MPI_SUM, HycoComm(f));
+  HycoAllreduce(patches, 2, MPIU_INT, MPI_MAX, HycoComm(f));
+  if (all)
+    PetscCall(PetscViewerASCIIPrintf(viewer,
+                                     "a rank: at most %lld of %lld searches for a master, on %d of %d patches\n",
+                                     (long long)most, (long long)all, (int)patches[0], (int)patches[1]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFOMView(HycoFOM f, PetscViewer viewer)
 {
   PetscInt largest[3] = {0, 0, 0};
@@ -574,6 +607,7 @@ PetscErrorCode HycoFOMView(HycoFOM f, PetscViewer viewer)
     PetscCall(LargestPart(f, largest));
     PetscCall(PetscViewerASCIIPrintf(viewer, "a rank: at most %d unknowns of its own, %d of %d others\n",
                                      (int)largest[0], (int)largest[1], (int)largest[2]));
+    PetscCall(ViewSearch(f, viewer));
   }
   PetscCall(HycoSystemView(f->system, viewer));
   PetscCall(HycoSolverView(f->solver, viewer));

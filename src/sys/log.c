@@ -2,13 +2,14 @@
 #include <hycoimpl.h>
 
 static const char *const event_names[HYCO_N_EVENTS] = {
-    "HycoMesh",   "HycoAssemble", "HycoForce", "HycoContact", "HycoReduce", "HycoFactor",
-    "HycoForces", "HycoIterate",  "HycoKKT",   "HycoPOD",     "HycoDEIM",   "HycoRID",
-    "HycoROM",    "HycoScan",     "HycoLoad",  "HycoSetUp",   "HycoSolve",  "HycoReconstr"};
+    "HycoMesh",   "HycoAssemble", "HycoForce", "HycoContact", "HycoSearch",  "HycoReduce", "HycoFactor",
+    "HycoForces", "HycoIterate",  "HycoKKT",   "HycoPOD",     "HycoDEIM",    "HycoRID",    "HycoROM",
+    "HycoScan",   "HycoLoad",     "HycoSetUp", "HycoSolve",   "HycoReconstr"};
 static const char *const event_words[HYCO_N_EVENTS] = {"the mesh",
                                                        "assembling the stiffness",
                                                        "assembling the loads",
                                                        "the contacts",
+                                                       "the search for masters",
                                                        "the reduced system",
                                                        "factorisation",
                                                        "contact forces",

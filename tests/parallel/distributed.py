@@ -53,12 +53,13 @@ class Distributed(Case):
                         self.assertTrue(np.array_equal(found[name], value), name)
         return one
 
-    def stack(self):
-        """Three blocks on one another; only contact supports the middle one; its foot and the surface below do not match."""
+    def stack(self, lift=0.0):
+        """Three blocks on one another; only contact supports the middle one; its foot and the surface below do not match. lift: of its foot's
+        left half, as drawn."""
         nodes, elements, names = [], [], {}
         for body, (name, n) in enumerate((('low', 7), ('middle', 10), ('high', 10))):
             first, wide = len(nodes) + 1, n + 1
-            nodes += [(i / n, body + j / n, 0) for j in range(wide) for i in range(wide)]
+            nodes += [(i / n, body + j / n + lift * (body == 1 and j == 0 and 2 * i < n), 0) for j in range(wide) for i in range(wide)]
             at = lambda i, j, first=first, wide=wide: first + i + wide * j
             elements += [(3, 1 + body, (at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1))) for j in range(n) for i in range(n)]
             elements += [(1, 11 + body, (at(i, 0), at(i + 1, 0))) for i in range(n)]
@@ -77,6 +78,29 @@ class Distributed(Case):
     def test_refined(self):
         """Contacts are found after the distribution."""
         self.same(self.stack(), 1, '-scene_refine', 1)
+
+    def test_search(self):
+        """The slave nodes are divided over the ranks, and each searches a part of the master: as drawn, and once more where a map has them."""
+        for scene, mu, searches in (('roller3d', '1.3,0.5,12', 2), ('hertz', '0.05,1,10', 2), ('blocks', '0.05,0.05', 1)):
+            with self.subTest(scene=scene):
+                run = self.run_raw('solve', '-scene', os.path.join(EXAMPLES, scene, 'scene.yaml'), '-mu', mu, '-scene_refine', 1, '-hyco_fom_view', ranks=4)
+                self.assertEqual(run.returncode, 0, run.stderr)
+                contacts = int(re.search(r'(\d+) contacts', run.stdout)[1])
+                most, total, patches, whole = map(int, re.search(r'at most (\d+) of (\d+) searches for a master, on (\d+) of (\d+) patches', run.stdout).groups())
+                self.assertEqual(total, searches * contacts)
+                self.assertLessEqual(most, searches * (contacts / 4 + 2))
+                self.assertLess(patches, 0.9 * whole)
+
+    def test_missed(self):
+        """Slave nodes without a master, which other ranks have searched for, are refused on all ranks in the same words: 5 nodes of the lifted half, and the
+        middles of the 5 edges at them."""
+        said = []
+        for ranks in (0, 2, 3, 4):
+            run = self.run_raw('solve', '-scene', self.stack(0.05), '-mu', 1, '-scene_refine', 1, ranks=ranks)
+            self.assertNotEqual(run.returncode, 0)
+            said.append(next(line for line in run.stderr.splitlines() if 'error: ' in line))
+        self.assertIn('contact first: 10 of the 21 nodes of middle_foot', said[0])
+        self.assertEqual(said[1:], said[:1] * 3)
 
     def test_moved(self):
         self.same(os.path.join(EXAMPLES, 'roller', 'scene.yaml'), '2.3,0.6,12')

@@ -69,6 +69,7 @@ static PetscErrorCode MatchAlong(HycoPartners *t, HycoContact c, HycoMatch *m)
 
   PetscFunctionBegin;
   PetscCall(HycoContactGetLength(c, "tolerance", &stated));
+  PetscCall(HycoPartnersReady(t));
   PetscCall(PetscMalloc2(m->n, &along, m->n, &needs));
   for (PetscInt k = 0; k < m->n; k++) {
     const PetscReal *out = HycoPartnersOutward(t, m->slave[k]);

@@ -54,36 +54,27 @@ static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The master point of one slave node; n = 0: it has none. */
-static PetscErrorCode FindOne(HycoPartners *t, PetscInt slave, PetscReal reach, HycoProjection *at)
-{
-  PetscBool past;
-
-  PetscFunctionBegin;
-  HycoPartnersProject(t, slave, PETSC_FALSE, at);
-  if (at->n && at->distance > reach) at->n = 0;
-  if (!at->n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoPartnersIsPast(t, slave, at, &past));
-  if (past) at->n = 0;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode Find(HycoContact c, HycoFE fe, PetscReal reach, PetscInt n, const PetscInt slave[],
                            PetscInt start[], PetscInt master[], PetscReal weight[])
 {
+  const HycoQuery query = {.moved = PETSC_TRUE, .tolerance = reach};
   HycoPartners t;
+  HycoProjection *at;
+  HycoVerdict *why;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoPartnersCreate(fe, c, PETSC_FALSE, &t));
-  for (PetscInt k = 0; k < n; k++) {
-    HycoProjection at;
-
-    PetscCall(FindOne(&t, slave[k], reach, &at));
-    PetscCall(PetscArraycpy(master + start[k], at.node, at.n));
-    PetscCall(PetscArraycpy(weight + start[k], at.weight, at.n));
-    start[k + 1] = start[k] + at.n;
+  PetscCall(PetscMalloc2(n, &at, n, &why));
+  ierr = HycoPartnersSearch(&t, &query, n, slave, at, why);
+  for (PetscInt k = 0; k < n && !ierr; k++) {
+    PetscCall(PetscArraycpy(master + start[k], at[k].node, at[k].n));
+    PetscCall(PetscArraycpy(weight + start[k], at[k].weight, at[k].n));
+    start[k + 1] = start[k] + at[k].n;
   }
+  PetscCall(PetscFree2(at, why));
   PetscCall(HycoPartnersDestroy(&t));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

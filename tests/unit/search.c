@@ -1,0 +1,236 @@
+/* The search for masters: the answers of several ranks are those of one to the bit, and those without a tree; the work
+   is divided; an error on one rank is raised on all. */
+#include "check.h"
+#include "partners.h"
+
+#define MOST_PATCHES 5000
+#define N_SLAVES     1500
+
+static PetscMPIInt rank, size;
+static unsigned long long state = 7;
+
+/* A master of nf nodes a patch and its slaves. */
+typedef struct {
+  PetscReal X[3 * (2 * MOST_PATCHES + N_SLAVES)], outward[3 * (2 * MOST_PATCHES + N_SLAVES)], normal[3 * MOST_PATCHES];
+  PetscInt node[4 * MOST_PATCHES], slave[N_SLAVES];
+  HycoPartners t;
+} Surfaces;
+
+static PetscInt AddNode(Surfaces *s, PetscReal x, PetscReal y, PetscReal z)
+{
+  PetscReal *X = s->X + 3 * s->t.n_nodes;
+
+  X[0] = x;
+  X[1] = y;
+  X[2] = z;
+  return s->t.n_nodes++;
+}
+
+static void AddPatch(Surfaces *s, PetscInt a, PetscInt b, PetscInt c, PetscInt d, PetscReal up)
+{
+  const PetscInt node[4] = {a, b, c, d};
+
+  for (PetscInt k = 0; k < s->t.nf; k++) s->node[s->t.nf * s->t.n + k] = node[k];
+  s->normal[3 * s->t.n++ + 2] = up;
+}
+
+/* A wavy strip of `along` x across cells, at a height: quadrilaterals, triangles, segments or points. */
+static void AddStrip(Surfaces *s, PetscInt along, PetscInt across, PetscReal height, PetscReal up)
+{
+  const PetscInt first = s->t.n_nodes, wide = across + 1;
+
+  for (PetscInt i = 0; i <= along; i++) {
+    for (PetscInt j = 0; j <= across; j++)
+      AddNode(s, i + 0.2 * Draw(&state), j + 0.2 * Draw(&state), height + 0.3 * Draw(&state));
+  }
+  for (PetscInt i = 0; i < along; i++) {
+    for (PetscInt j = 0; j < across; j++) {
+      const PetscInt a = first + i * wide + j, b = a + wide, c = b + 1, d = a + 1;
+
+      AddPatch(s, a, b, c, d, up);
+      if (s->t.nf == 3) AddPatch(s, a, c, d, d, up);
+    }
+  }
+}
+
+/* Slaves at the strip's nodes, near it and high above, and past its ends; some face away, one in ten has no normal. */
+static void AddSlaves(Surfaces *s, PetscInt n_master, PetscReal along, PetscReal across)
+{
+  for (PetscInt k = 0; k < N_SLAVES; k++) {
+    const PetscReal *at = s->X + 3 * (k * 7 % n_master);
+    const PetscReal x = (0.55 * Draw(&state) + 0.5) * along, y = (0.6 * Draw(&state) + 0.5) * across;
+
+    s->slave[k] = k % 3 ? AddNode(s, x, y, (k % 3 > 1 ? 5 : 0.5) * Draw(&state)) : AddNode(s, at[0], at[1], at[2]);
+    s->outward[3 * s->slave[k] + 2] = k % 10 == 0 ? 0 : k % 10 == 1 ? 1 : -1;
+  }
+}
+
+/* Two strips on each other, of which one faces away, and their slaves. */
+static void Draws(Surfaces *s, PetscInt nf, PetscInt along, PetscInt across)
+{
+  memset(s, 0, sizeof(*s));
+  s->t = (HycoPartners){.nf = nf, .node = s->node, .normal = s->normal, .outward = s->outward, .X = s->X};
+  AddStrip(s, along, across, 0, 1);
+  AddStrip(s, along, across, -0.4, -1);
+  AddSlaves(s, s->t.n_nodes, along, across);
+}
+
+/* The same points, to the bit; where a slave has no master (n = 0) nothing else counts. */
+static PetscBool Same(const HycoProjection *p, const HycoProjection *q)
+{
+  if (p->n != q->n) return PETSC_FALSE;
+  for (PetscInt a = 0; a < p->n; a++) {
+    if (p->node[a] != q->node[a] || p->weight[a] != q->weight[a]) return PETSC_FALSE;
+  }
+  return (PetscBool)(!p->n || (p->patch == q->patch && p->distance == q->distance));
+}
+
+/* The least distance of the patches, one by one. */
+static PetscErrorCode Nearest(const Surfaces *s, const PetscReal x[3], PetscReal *distance)
+{
+  PetscFunctionBegin;
+  *distance = PETSC_MAX_REAL;
+  for (PetscInt k = 0; k < s->t.n; k++) {
+    HycoPatches one;
+    HycoProjection p;
+
+    PetscCall(HycoPatchesCreate(s->X, 1, s->t.nf, s->node + k * s->t.nf, NULL, &one));
+    HycoPatchesProject(one, x, NULL, &p);
+    PetscCall(HycoPatchesDestroy(&one));
+    *distance = PetscMin(*distance, p.distance);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Both kinds of query at n slaves; n_why[]: how often each verdict occurs. */
+static PetscErrorCode Compare(Surfaces *s, PetscInt n, PetscInt n_why[])
+{
+  static HycoProjection one[N_SLAVES], many[N_SLAVES];
+  static HycoVerdict why[N_SLAVES], why_many[N_SLAVES];
+  HycoTeam team = {.comm = PETSC_COMM_WORLD};
+
+  PetscFunctionBegin;
+  for (PetscInt moved = 0; moved < 2; moved++) {
+    const HycoQuery query = {.moved = (PetscBool)moved, .tolerance = 0.3, .small = 1e-3};
+
+    PetscCall(HycoPartnersAnswer(&s->t, &query, n, s->slave, one, why));
+    HycoOnRootWithTeam(&team, HycoTeamSearch(&team, &s->t, &query, n, s->slave, many, why_many));
+    for (PetscInt k = 0; k < n && rank == 0; k++) {
+      CHECK(why[k] == why_many[k] && Same(&one[k], &many[k]),
+            "nf %d, slave %d of %d: verdict %d, distance %.17g; alone %d, %.17g", (int)s->t.nf, (int)k, (int)n,
+            (int)why_many[k], (double)many[k].distance, (int)why[k], (double)one[k].distance);
+      n_why[why[k]]++;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The distance of the nearest point is that without a tree. */
+static PetscErrorCode CompareNearest(Surfaces *s)
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < N_SLAVES; k += 100) {
+    HycoProjection at;
+    PetscReal distance;
+
+    HycoPartnersProject(&s->t, s->slave[k], PETSC_TRUE, &at);
+    PetscCall(Nearest(s, s->X + 3 * s->slave[k], &distance));
+    CHECK(at.distance == distance, "slave %d: %.17g, without a tree %.17g", (int)k, (double)at.distance,
+          (double)distance);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode TestSame(Surfaces *s)
+{
+  PetscInt n_why[HYCO_PAST + 1] = {0};
+
+  PetscFunctionBegin;
+  for (PetscInt nf = 1; nf <= 4; nf++) {
+    for (PetscInt shape = 0; shape < 2; shape++) {
+      Draws(s, nf, shape ? 30 : 200, shape ? 30 : 3);
+      PetscCall(Compare(s, N_SLAVES, n_why));
+      for (PetscInt n = 1; n < 10; n++) PetscCall(Compare(s, n, n_why)); /* a rank's block may be one slave, or none */
+      PetscCall(CompareNearest(s));
+      PetscCall(HycoPartnersForget(&s->t));
+    }
+  }
+  for (PetscInt w = 0; w <= HYCO_PAST; w++) CHECK(rank || n_why[w] > 0, "the verdict %d does not occur", (int)w);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Each rank answers its share of the queries. On a strip cut across, its block is 1 / size of the length, and no
+   slave's nearest point is farther than half of the block's diagonal beyond its ends: 2 / size of the patches, and a
+   little. */
+static PetscErrorCode TestDivided(Surfaces *s)
+{
+  static HycoProjection at[N_SLAVES];
+  static HycoVerdict why[N_SLAVES];
+  const HycoQuery query = {.moved = PETSC_TRUE, .tolerance = 1};
+  HycoTeam team = {.comm = PETSC_COMM_WORLD};
+  PetscInt64 all;
+
+  PetscFunctionBegin;
+  Draws(s, 4, 800, 2);
+  HycoOnRootWithTeam(&team, HycoTeamSearch(&team, &s->t, &query, N_SLAVES, s->slave, at, why));
+  PetscCallMPI(MPI_Allreduce(&team.queries, &all, 1, MPIU_INT64, MPI_SUM, PETSC_COMM_WORLD));
+  CHECK(all == N_SLAVES, "%d queries of %d", (int)all, N_SLAVES);
+  CHECK(team.queries <= N_SLAVES / size + 2, "%d of %d queries on a rank", (int)team.queries, N_SLAVES);
+  CHECK(team.patches <= 2.2 / size * s->t.n, "%d of %d patches", (int)team.patches, (int)s->t.n);
+  CHECK(rank || team.whole == s->t.n, "%d patches, of %d", (int)team.whole, (int)s->t.n);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode (*malloc_of_petsc)(size_t, PetscBool, int, const char[], const char[], void **);
+
+/* Without memory for more than a few kB. */
+static PetscErrorCode Little(size_t bytes, PetscBool clear, int line, const char function[], const char file[],
+                             void **p)
+{
+  if (bytes > 4096) SETERRQ(PETSC_COMM_SELF, PETSC_ERR_MEM, "little memory on one rank");
+  return (*malloc_of_petsc)(bytes, clear, line, function, file, p);
+}
+
+static PetscErrorCode Search(Surfaces *s, HycoTeam *team)
+{
+  static HycoProjection at[N_SLAVES];
+  static HycoVerdict why[N_SLAVES];
+  const HycoQuery query = {.moved = PETSC_TRUE, .tolerance = 1};
+
+  PetscFunctionBegin;
+  HycoOnRootWithTeam(team, HycoTeamSearch(team, &s->t, &query, N_SLAVES, s->slave, at, why));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode TestError(Surfaces *s)
+{
+  HycoTeam team = {.comm = PETSC_COMM_WORLD};
+
+  PetscFunctionBegin;
+  Draws(s, 4, 60, 20);
+  malloc_of_petsc = PetscTrMalloc;
+  for (PetscMPIInt ill = 0; ill < size; ill++) {
+    if (rank == ill) PetscTrMalloc = Little;
+    CHECK_FAILS(Search(s, &team), "little memory on one rank");
+    PetscTrMalloc = malloc_of_petsc;
+    PetscCall(Search(s, &team));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Test(void)
+{
+  Surfaces *s;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
+  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
+  PetscCall(PetscNew(&s));
+  PetscCall(TestSame(s));
+  PetscCall(TestDivided(s));
+  PetscCall(TestError(s));
+  PetscCall(PetscFree(s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+TEST_MAIN
