@@ -433,15 +433,38 @@ static PetscErrorCode BuildOnRoot(HycoReducer t, PetscBool useful, HycoROM *mode
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fetches the snapshots' and modes' rows at the nodes of the model's mesh to rank 0. Collective. */
+/* Fetches the snapshots' rows at the nodes of A to rank 0, by which full-order displacements are judged: not those of
+   the interface and of contacts outside the RID, which are many. Collective. */
+static PetscErrorCode FetchJudged(HycoReducer t, HycoROM m)
+{
+  const HycoROMTraits *traits = &t->prototype->traits;
+  const PetscInt n = m ? m->mesh->n_nodes : 0;
+  PetscInt *node;
+
+  PetscFunctionBegin;
+  HycoFreeAll(&t->U_rid, &t->rid_row);
+  PetscCall(PetscMalloc1(n, &t->rid_row));
+  PetscCall(PetscMalloc1(n, &node));
+  t->n_rid_nodes = 0;
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscBool judged = (PetscBool)(traits->cells || (!traits->whole && m->role[i] == HYCO_ROLE_A));
+
+    t->rid_row[i] = judged ? t->n_rid_nodes : -1;
+    if (judged) node[t->n_rid_nodes++] = m->mesh->node_whole[i];
+  }
+  PetscCall(HycoReducerFetchSnapshots(t, t->n_rid_nodes, node, &t->U_rid));
+  PetscCall(PetscFree(node));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Fetches to rank 0 the rows that the model is made of and judged by. Collective. */
 static PetscErrorCode FetchOnModel(HycoReducer t, HycoROM m)
 {
   const PetscInt n = m ? m->mesh->n_nodes : 0, *node = m ? m->mesh->node_whole : NULL;
 
   PetscFunctionBegin;
-  PetscCall(PetscFree(t->U_rid));
+  PetscCall(FetchJudged(t, m));
   PetscCall(PetscFree(t->V_rid));
-  PetscCall(HycoReducerFetchSnapshots(t, n, node, &t->U_rid));
   PetscCall(PetscMalloc1((size_t)n * (size_t)t->sizes[3] * (size_t)t->l + 1, &t->V_rid));
   PetscCall(HycoReducerFetchRows(t, t->V, t->l, n, node, t->V_rid));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -461,6 +484,7 @@ PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, HycoROM *model,
   if (ierr) (void)!HycoROMDestroy(model);
   PetscCall(ierr);
   HycoOnRoot(HycoComm(t), BuildOnRoot(t, useful, model, report));
+  HycoFreeAll(&t->U_rid, &t->rid_row, &t->V_rid); /* before the other ranks' models, of which rank 0 has one too */
   PetscCall(HycoLogEvent(HYCO_EVENT_MODEL, PETSC_FALSE));
   PetscCallMPI(MPI_Bcast(report, sizeof(*report), MPI_BYTE, 0, HycoComm(t)));
   report->type = report->chosen.settings.type = t->prototype->type; /* set on each rank */
