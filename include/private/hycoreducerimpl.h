@@ -128,7 +128,9 @@ struct _p_HycoReducer {
   HycoJudged *judged; /* rank 0, by sample: results of HycoReducerJudge(); NULL: not called */
   unsigned long long fingerprint;
   PetscInt n_solvers, *solved; /* of the last run, every rank: number of groups of ranks, and of solutions of each */
-  PetscBool *grown;            /* every rank, greedy: cells of its part that belong to the RIDs so far; else NULL */
+  PetscInt unsolved;           /* of the last run, every rank: HycoSnapshotsGetBalance() */
+  PetscReal *written;
+  PetscBool *grown; /* every rank, greedy: cells of its part that belong to the RIDs so far; else NULL */
 };
 
 /* The scene's variables of column k of the snapshots: all of mu (HYCO_MAX_PARAMETERS). */

@@ -433,27 +433,44 @@ static PetscErrorCode BuildOnRoot(HycoReducer t, PetscBool useful, HycoROM *mode
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fetches the snapshots' rows at the nodes of A to rank 0, by which full-order displacements are judged: not those of
-   the interface and of contacts outside the RID, which are many. Collective. */
-static PetscErrorCode FetchJudged(HycoReducer t, HycoROM m)
+/* The nodes of the model's mesh whose displacements may stay full order: of A, and unless all of A is kept on the
+   contacts' surfaces; of a cubature, all. Rank 0. */
+static PetscErrorCode MarkJudged(HycoReducer t, HycoROM m, PetscBool judged[])
 {
   const HycoROMTraits *traits = &t->prototype->traits;
+  const PetscBool all = (PetscBool)(t->hybrid == HYCO_HYBRID_ALL);
+  HycoMesh surface = t->fom->surface;
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < m->mesh->n_nodes; i++) judged[i] = (PetscBool)(traits->cells || all);
+  for (PetscInt i = 0; surface && i < surface->n_nodes; i++) {
+    if (t->surface_node[i] >= 0) judged[t->surface_node[i]] = PETSC_TRUE;
+  }
+  for (PetscInt i = 0; i < m->mesh->n_nodes && !traits->cells; i++)
+    judged[i] = (PetscBool)(judged[i] && !traits->whole && m->role[i] == HYCO_ROLE_A);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Fetches the snapshots' rows at these nodes to rank 0, where full-order displacements are judged: as few as possible,
+   because they are a share of all snapshots on one rank. Collective. */
+static PetscErrorCode FetchJudged(HycoReducer t, HycoROM m)
+{
   const PetscInt n = m ? m->mesh->n_nodes : 0;
+  PetscBool *judged;
   PetscInt *node;
 
   PetscFunctionBegin;
   HycoFreeAll(&t->U_rid, &t->rid_row);
   PetscCall(PetscMalloc1(n, &t->rid_row));
-  PetscCall(PetscMalloc1(n, &node));
+  PetscCall(PetscMalloc2(n, &judged, n, &node));
   t->n_rid_nodes = 0;
+  if (m) PetscCall(MarkJudged(t, m, judged));
   for (PetscInt i = 0; i < n; i++) {
-    const PetscBool judged = (PetscBool)(traits->cells || (!traits->whole && m->role[i] == HYCO_ROLE_A));
-
-    t->rid_row[i] = judged ? t->n_rid_nodes : -1;
-    if (judged) node[t->n_rid_nodes++] = m->mesh->node_whole[i];
+    t->rid_row[i] = judged[i] ? t->n_rid_nodes : -1;
+    if (judged[i]) node[t->n_rid_nodes++] = m->mesh->node_whole[i];
   }
   PetscCall(HycoReducerFetchSnapshots(t, t->n_rid_nodes, node, &t->U_rid));
-  PetscCall(PetscFree(node));
+  PetscCall(PetscFree2(judged, node));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -557,12 +574,16 @@ PetscErrorCode HycoReducerOpen(HycoReducer t, HycoSamples samples, const char pa
 PetscErrorCode HycoReducerClose(HycoReducer t, HycoSnapshots *store)
 {
   const PetscInt *solved;
+  const PetscReal *written;
+  PetscMPIInt size;
 
   PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
   PetscCall(HycoSnapshotsGetSolved(*store, &t->n_solvers, &solved));
-  PetscCall(PetscFree(t->solved));
-  PetscCall(PetscMalloc1(t->n_solvers, &t->solved));
-  PetscCall(PetscArraycpy(t->solved, solved, t->n_solvers));
+  PetscCall(HycoSnapshotsGetBalance(*store, &t->unsolved, &written));
+  HycoFreeAll(&t->solved, &t->written);
+  HycoDuplicate(t->n_solvers, solved, &t->solved);
+  HycoDuplicate(size, written, &t->written);
   t->store = NULL;
   PetscCall(HycoSnapshotsDestroy(store));
   PetscFunctionReturn(PETSC_SUCCESS);

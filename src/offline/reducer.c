@@ -124,7 +124,7 @@ PetscErrorCode HycoReducerDestroy(HycoReducer *reducer)
   PetscCall(EndTraining(t));
   PetscCall(PetscStrArrayDestroy(&t->groups));
   PetscCall(PetscFree(t->region));
-  PetscCall(PetscFree(t->solved));
+  HycoFreeAll(&t->solved, &t->written);
   PetscCall(HycoSceneDestroy(&t->scene));
   PetscCall(PetscHeaderDestroy(reducer));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -137,6 +137,9 @@ HycoDefineMethod(HycoReducerChooses, (HycoReducer t, PetscBool *chooses), t, HYC
 HycoDefineMethod(HycoReducerGetSolved, (HycoReducer t, PetscInt *n_groups, const PetscInt *solved[]), t,
                  HYCO_REDUCER_CLASSID, *n_groups = t->n_solvers;
                  *solved = t->solved)
+HycoDefineMethod(HycoReducerGetBalance, (HycoReducer t, PetscInt *unsolved, const PetscReal *written[]), t,
+                 HYCO_REDUCER_CLASSID, *unsolved = t->unsolved;
+                 *written = t->written)
 HycoDefineMethod(HycoReducerSetProgress, (HycoReducer t, HycoProgress progress, void *ctx), t, HYCO_REDUCER_CLASSID,
                  t->progress = progress;
                  t->progress_ctx = ctx)
