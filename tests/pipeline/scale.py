@@ -20,7 +20,7 @@ class Scale(Case):
             return list(csv.DictReader(file))
 
     def test_training(self):
-        self.bench('training', '--groups', '1:1,4:2', '--loads', '2', '--pod', '1:10:0,4:10:8', '--noise', '1e-6')
+        self.bench('training', '--groups', '1:1,4:2', '--loads', '2', '--pod', 'hybrid:1:10:0,hybrid:4:10:8', '--noise', '1e-6')
         for row in self.rows('groups'):
             self.assertEqual(sum(map(int, row['solved'].split(', '))), 16)
             self.assertLess(int(row['unsolved']), int(row['groups']))
