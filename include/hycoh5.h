@@ -49,6 +49,8 @@ PetscErrorCode HycoH5WriteAttributeInt(HycoH5 file, const char at[], const char 
 
 /* Whether the file has a dataset of that name. */
 PetscBool HycoH5Has(HycoH5 file, const char name[]);
+/* The bytes of numbers and text that this process has written to the file so far, without HDF5's own. */
+PetscReal HycoH5Written(HycoH5 file);
 /* Size of a dataset. */
 PetscErrorCode HycoH5GetSize(HycoH5 file, const char name[], PetscInt *rows, PetscInt *cols);
 /* Reads a dataset whose size must be rows x cols, into the caller's memory; its values must be finite. */

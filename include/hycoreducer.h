@@ -126,6 +126,8 @@ typedef struct {
 /* Gets solved[n_groups]: how many points each group of ranks has solved full order in the last run; those found in the
    snapshot folder are not counted. On every rank. Borrowed until the next run. Not collective. */
 PetscErrorCode HycoReducerGetSolved(HycoReducer reducer, PetscInt *n_groups, const PetscInt *solved[]);
+/* HycoSnapshotsGetBalance() of the last run. written: NULL before the first run. Borrowed until the next run. */
+PetscErrorCode HycoReducerGetBalance(HycoReducer reducer, PetscInt *unsolved, const PetscReal *written[]);
 
 /* Creates a reducer for a scene, to which it holds a reference. Collective on `comm`. The caller owns it. */
 PetscErrorCode HycoReducerCreate(MPI_Comm comm, HycoScene scene, HycoReducer *reducer);

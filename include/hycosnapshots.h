@@ -31,6 +31,11 @@ PetscErrorCode HycoSnapshotsFill(HycoSnapshots snapshots, HycoSamples samples, H
 /* solved[n_groups]: how many samples each group of ranks has solved since the store was opened; those that it had are
    not counted. On every rank. Borrowed until the next HycoSnapshotsFill(). Not collective. */
 PetscErrorCode HycoSnapshotsGetSolved(HycoSnapshots snapshots, PetscInt *n_groups, const PetscInt *solved[]);
+/* The balance of the work since the store was opened. unsolved: how many samples were not solved yet when the first
+   group found none to begin; each was in another group, so that it is smaller than their number (the largest of several
+   fills). written: the bytes of solutions written by each rank of the store's communicator. On every rank. Borrowed
+   until the next HycoSnapshotsFill(). Not collective. */
+PetscErrorCode HycoSnapshotsGetBalance(HycoSnapshots snapshots, PetscInt *unsolved, const PetscReal *written[]);
 
 /* Gets the number of groups of ranks that solve n samples at the same time: -hyco_groups, or as many as fit into half
    of the memory if each factors the stiffness of its own mesh. Collective. */

@@ -28,6 +28,9 @@ PetscErrorCode HycoQueueGetGroup(HycoQueue queue, MPI_Comm *group);
 PetscErrorCode HycoQueueTake(HycoQueue queue, PetscInt *task);
 /* Number of tasks that all groups have done. Not collective, one rank of a group at a time. */
 PetscErrorCode HycoQueueDone(HycoQueue queue, PetscInt *n);
+/* Numbers the events of all groups, from 1, in the order of these calls; and the number of this group, from 0. Not
+   collective, one rank of a group at a time. */
+PetscErrorCode HycoQueueNumber(HycoQueue queue, PetscInt *number, PetscInt *group);
 /* Lets other groups take tasks: to be called within a long task, where the network has no atomic operations of its own.
    Not collective. */
 PetscErrorCode HycoQueueServe(HycoQueue queue);
@@ -40,5 +43,8 @@ PetscErrorCode HycoQueueHear(HycoQueue queue);
 PetscErrorCode HycoQueueEnd(HycoQueue queue, PetscErrorCode error);
 /* Adds to done[n_groups] (room for the ranks of comm) the tasks that each group has done. Collective on comm. */
 PetscErrorCode HycoQueueCount(HycoQueue queue, PetscInt *n_groups, PetscInt done[]);
+/* Number of tasks that were not done when the first group found none to take: each is then in another group, so that it
+   is smaller than the number of groups. 0 after a failure. Collective on comm. */
+PetscErrorCode HycoQueueLeft(HycoQueue queue, PetscInt *n);
 
 #endif

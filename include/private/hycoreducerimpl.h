@@ -105,16 +105,18 @@ struct _p_HycoReducer {
   PetscInt sizes[4];                  /* every rank: nodes, cells, contacts, dim */
   PetscInt n_seeds_node, n_seeds_cell, *seeds_node, *seeds_cell; /* every rank */
   PetscInt counts[HYCO_N_SEEDS];
-  PetscInt l;             /* modes */
-  PetscReal *sigma;       /* every rank: l */
-  Mat V;                  /* every rank: the modes (at least l), rows distributed */
-  Mat S;                  /* every rank: displacements, n_dof x n_s, rows distributed as V's; NULL with pod_memory */
-  PetscReal *U_rid;       /* the rows of S on the model's mesh, column major */
+  PetscInt l;        /* modes */
+  PetscReal *sigma;  /* every rank: l */
+  Mat V;             /* every rank: the modes (at least l), rows distributed */
+  Mat S;             /* every rank: displacements, n_dof x n_s, rows distributed as V's; NULL with pod_memory */
+  PetscInt *rid_row; /* by node of the model's mesh: its row in U_rid, or -1 */
+  PetscReal *U_rid;  /* the rows of S at the nodes whose unknowns may stay full order, column major */
+  PetscInt n_rid_nodes;
   PetscReal *V_rid;       /* the rows of V there */
   PetscInt *surface_node; /* by node of the contacts' surfaces: its node of the model's mesh, or -1 */
   PetscBool *fixed;       /* by unknown of the model's mesh */
   PetscInt *contact_row;  /* by node of the contacts' surfaces: its row in U_contact, or -1 */
-  PetscReal *U_contact;   /* the rows of the contacts' nodes, column major */
+  PetscReal *U_contact;   /* the rows of the contacts' nodes, column major; NULL: not fetched */
   PetscInt n_contact_nodes;
   PetscReal *Lambda;     /* n_contacts x n_s column major */
   PetscReal *VtU;        /* l x n_s column major: V^T of the snapshots minus their lifting */
@@ -126,7 +128,9 @@ struct _p_HycoReducer {
   HycoJudged *judged; /* rank 0, by sample: results of HycoReducerJudge(); NULL: not called */
   unsigned long long fingerprint;
   PetscInt n_solvers, *solved; /* of the last run, every rank: number of groups of ranks, and of solutions of each */
-  PetscBool *grown;            /* every rank, greedy: cells of its part that belong to the RIDs so far; else NULL */
+  PetscInt unsolved;           /* of the last run, every rank: HycoSnapshotsGetBalance() */
+  PetscReal *written;
+  PetscBool *grown; /* every rank, greedy: cells of its part that belong to the RIDs so far; else NULL */
 };
 
 /* The scene's variables of column k of the snapshots: all of mu (HYCO_MAX_PARAMETERS). */
@@ -186,6 +190,9 @@ PetscErrorCode HycoPathModesDestroy(HycoPathModes *modes);
 PetscErrorCode HycoReducerFetchRows(HycoReducer t, Mat S, PetscInt n_columns, PetscInt n, const PetscInt node[],
                                     PetscReal rows[]);
 PetscErrorCode HycoReducerFetchSnapshots(HycoReducer t, PetscInt n, const PetscInt node[], PetscReal **rows);
+/* Sets U_contact, contact_row and n_contact_nodes, unless these snapshots' are there: for types that need them, as
+   they are a share of all snapshots on one rank. Collective. */
+PetscErrorCode HycoReducerFetchContacts(HycoReducer t);
 /* Calls use(t, first, S, ctx) for all displacements, in batches of columns from `first` on: all of them, or with
    pod_memory as many as fit. S must not be changed. Collective. */
 typedef PetscErrorCode (*HycoBatchUse)(HycoReducer t, PetscInt first, Mat S, void *ctx);

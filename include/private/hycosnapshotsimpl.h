@@ -14,6 +14,9 @@ struct _p_HycoSnapshots {
   unsigned long long fingerprint;
   PetscInt n_groups, *solved; /* largest number of groups that have solved at a time; number of solutions of each
                                  (room for every rank) */
+  PetscBool monitor;          /* -hyco_groups_monitor */
+  PetscInt unsolved;          /* see HycoSnapshotsGetBalance() */
+  PetscReal bytes, *written;  /* bytes of solutions written by this rank, and by each */
   HycoH5 last;                /* the file that was read last, checked and open; or NULL */
   char last_path[PETSC_MAX_PATH_LEN]; /* its name */
 };
@@ -23,6 +26,12 @@ struct _p_HycoSnapshots {
    common stiffness, and thus a common factor, are of one kind. Everything is the same on every rank. Collective. */
 PetscErrorCode HycoSnapshotsCreateQueue(MPI_Comm comm, HycoScene scene, PetscInt n_par, const PetscReal mu[],
                                         PetscInt n, const PetscInt list[], PetscInt n_all, HycoQueue *queue);
+
+/* Reads -hyco_groups_monitor; prints a line about this rank's group, with the event's number, on the group's first
+   rank, if it was given. Collective; not collective. */
+PetscErrorCode HycoSnapshotsReadMonitor(HycoSnapshots store);
+PetscErrorCode HycoSnapshotsNote(HycoSnapshots store, HycoQueue queue, const char format[], ...)
+    PETSC_ATTRIBUTE_FORMAT(3, 4);
 
 /* Columns of a sample: 1, or the number of listed times of a history. */
 static inline PetscInt HycoSnapshotsSteps(HycoScene scene)

@@ -433,15 +433,55 @@ static PetscErrorCode BuildOnRoot(HycoReducer t, PetscBool useful, HycoROM *mode
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fetches the snapshots' and modes' rows at the nodes of the model's mesh to rank 0. Collective. */
+/* The nodes of the model's mesh whose displacements may stay full order: of A, and unless all of A is kept on the
+   contacts' surfaces; of a cubature, all. Rank 0. */
+static PetscErrorCode MarkJudged(HycoReducer t, HycoROM m, PetscBool judged[])
+{
+  const HycoROMTraits *traits = &t->prototype->traits;
+  const PetscBool all = (PetscBool)(t->hybrid == HYCO_HYBRID_ALL);
+  HycoMesh surface = t->fom->surface;
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < m->mesh->n_nodes; i++) judged[i] = (PetscBool)(traits->cells || all);
+  for (PetscInt i = 0; surface && i < surface->n_nodes; i++) {
+    if (t->surface_node[i] >= 0) judged[t->surface_node[i]] = PETSC_TRUE;
+  }
+  for (PetscInt i = 0; i < m->mesh->n_nodes && !traits->cells; i++)
+    judged[i] = (PetscBool)(judged[i] && !traits->whole && m->role[i] == HYCO_ROLE_A);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Fetches the snapshots' rows at these nodes to rank 0, where full-order displacements are judged: as few as possible,
+   because they are a share of all snapshots on one rank. Collective. */
+static PetscErrorCode FetchJudged(HycoReducer t, HycoROM m)
+{
+  const PetscInt n = m ? m->mesh->n_nodes : 0;
+  PetscBool *judged;
+  PetscInt *node;
+
+  PetscFunctionBegin;
+  HycoFreeAll(&t->U_rid, &t->rid_row);
+  PetscCall(PetscMalloc1(n, &t->rid_row));
+  PetscCall(PetscMalloc2(n, &judged, n, &node));
+  t->n_rid_nodes = 0;
+  if (m) PetscCall(MarkJudged(t, m, judged));
+  for (PetscInt i = 0; i < n; i++) {
+    t->rid_row[i] = judged[i] ? t->n_rid_nodes : -1;
+    if (judged[i]) node[t->n_rid_nodes++] = m->mesh->node_whole[i];
+  }
+  PetscCall(HycoReducerFetchSnapshots(t, t->n_rid_nodes, node, &t->U_rid));
+  PetscCall(PetscFree2(judged, node));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Fetches to rank 0 the rows that the model is made of and judged by. Collective. */
 static PetscErrorCode FetchOnModel(HycoReducer t, HycoROM m)
 {
   const PetscInt n = m ? m->mesh->n_nodes : 0, *node = m ? m->mesh->node_whole : NULL;
 
   PetscFunctionBegin;
-  PetscCall(PetscFree(t->U_rid));
+  PetscCall(FetchJudged(t, m));
   PetscCall(PetscFree(t->V_rid));
-  PetscCall(HycoReducerFetchSnapshots(t, n, node, &t->U_rid));
   PetscCall(PetscMalloc1((size_t)n * (size_t)t->sizes[3] * (size_t)t->l + 1, &t->V_rid));
   PetscCall(HycoReducerFetchRows(t, t->V, t->l, n, node, t->V_rid));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -461,6 +501,7 @@ PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, HycoROM *model,
   if (ierr) (void)!HycoROMDestroy(model);
   PetscCall(ierr);
   HycoOnRoot(HycoComm(t), BuildOnRoot(t, useful, model, report));
+  HycoFreeAll(&t->U_rid, &t->rid_row, &t->V_rid); /* before the other ranks' models, of which rank 0 has one too */
   PetscCall(HycoLogEvent(HYCO_EVENT_MODEL, PETSC_FALSE));
   PetscCallMPI(MPI_Bcast(report, sizeof(*report), MPI_BYTE, 0, HycoComm(t)));
   report->type = report->chosen.settings.type = t->prototype->type; /* set on each rank */
@@ -533,12 +574,16 @@ PetscErrorCode HycoReducerOpen(HycoReducer t, HycoSamples samples, const char pa
 PetscErrorCode HycoReducerClose(HycoReducer t, HycoSnapshots *store)
 {
   const PetscInt *solved;
+  const PetscReal *written;
+  PetscMPIInt size;
 
   PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
   PetscCall(HycoSnapshotsGetSolved(*store, &t->n_solvers, &solved));
-  PetscCall(PetscFree(t->solved));
-  PetscCall(PetscMalloc1(t->n_solvers, &t->solved));
-  PetscCall(PetscArraycpy(t->solved, solved, t->n_solvers));
+  PetscCall(HycoSnapshotsGetBalance(*store, &t->unsolved, &written));
+  HycoFreeAll(&t->solved, &t->written);
+  HycoDuplicate(t->n_solvers, solved, &t->solved);
+  HycoDuplicate(size, written, &t->written);
   t->store = NULL;
   PetscCall(HycoSnapshotsDestroy(store));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -109,13 +109,16 @@ static PetscErrorCode BuildModel(HycoReducer t, Loop *loop, PetscInt iteration, 
 static PetscErrorCode SpreadSnapshots(HycoReducer t, HycoROM m, PetscReal **U_at)
 {
   const PetscInt n_dof = m->mesh->n_nodes * t->sizes[3];
+  PetscReal *rows;
 
   PetscFunctionBegin;
+  PetscCall(HycoReducerFetchSnapshots(t, t->rank ? 0 : m->mesh->n_nodes, m->mesh->node_whole, &rows));
   PetscCall(PetscMalloc1((size_t)n_dof * (size_t)t->n_s, U_at));
   for (PetscInt i = 0; t->rank == 0 && i < n_dof; i++) {
     for (PetscInt k = 0; k < t->n_s; k++)
-      (*U_at)[(size_t)i * (size_t)t->n_s + (size_t)k] = t->U_rid[(size_t)k * (size_t)n_dof + (size_t)i];
+      (*U_at)[(size_t)i * (size_t)t->n_s + (size_t)k] = rows[(size_t)k * (size_t)n_dof + (size_t)i];
   }
+  PetscCall(PetscFree(rows));
   for (PetscInt i = 0; i < n_dof; i++) /* by rows, because a message's length is an int */
     HycoBcast(*U_at + (size_t)i * (size_t)t->n_s, t->n_s, MPIU_REAL, HycoComm(t));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -8,7 +8,7 @@
 static void SnapshotErrors(HycoReducer t, HycoROM m, PetscInt k, PetscReal *u, PetscReal *lambda)
 {
   const PetscInt dim = t->sizes[3];
-  const PetscReal *U = t->U_rid + (size_t)k * (size_t)(m->mesh->n_nodes * dim),
+  const PetscReal *U = t->U_rid + (size_t)k * (size_t)(t->n_rid_nodes * dim),
                   *L = t->Lambda + (size_t)k * (size_t)t->sizes[2], *c = t->VtU + k * t->l;
   PetscReal sum, lost = 0, size = 0;
 
@@ -16,10 +16,11 @@ static void SnapshotErrors(HycoReducer t, HycoROM m, PetscInt k, PetscReal *u, P
   for (PetscInt j = 0; j < t->l; j++) sum += (m->gamma[j] - c[j]) * (m->gamma[j] - c[j]) - c[j] * c[j];
   for (PetscInt f = 0; f < m->n_fe; f++) {
     const PetscInt dof = m->fe_dof[f];
+    const PetscReal exact = U[t->rid_row[dof / dim] * dim + dof % dim];
     PetscReal by_modes = 0;
 
     for (PetscInt j = 0; j < m->l; j++) by_modes += m->V[dof * m->l + j] * m->gamma[j];
-    sum += (m->U[dof] - U[dof]) * (m->U[dof] - U[dof]) - (by_modes - U[dof]) * (by_modes - U[dof]);
+    sum += (m->U[dof] - exact) * (m->U[dof] - exact) - (by_modes - exact) * (by_modes - exact);
   }
   *u = t->U_norm[k] > 0 ? PetscSqrtReal(PetscMax(sum, 0)) / t->U_norm[k] : 0;
   for (PetscInt j = 0; j < m->m; j++) {

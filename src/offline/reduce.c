@@ -384,8 +384,7 @@ PetscErrorCode HycoReducerFetchSnapshots(HycoReducer t, PetscInt n, const PetscI
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fetches the displacements at contact nodes. */
-static PetscErrorCode FetchContacts(HycoReducer t)
+PetscErrorCode HycoReducerFetchContacts(HycoReducer t)
 {
   HycoMesh surface = t->fom->surface;
   const PetscInt n_nodes = surface ? surface->n_nodes : 0;
@@ -393,8 +392,8 @@ static PetscErrorCode FetchContacts(HycoReducer t)
   PetscBool *contact;
 
   PetscFunctionBegin;
+  if (t->U_contact) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree(t->contact_row));
-  PetscCall(PetscFree(t->U_contact));
   PetscCall(PetscCalloc1(n_nodes, &contact));
   PetscCall(PetscMalloc1(n_nodes, &t->contact_row));
   PetscCall(PetscMalloc1(n_nodes, &node));
@@ -435,7 +434,6 @@ static PetscErrorCode ReduceDisplacements(HycoReducer t, HycoSnapshots store, Pe
 
   PetscFunctionBegin;
   if (!(t->pod_memory > 0)) PetscCall(HycoSnapshotsGetField(store, t->samples, 0, n, "U", t->sizes[3], &t->S));
-  PetscCall(FetchContacts(t));
   PetscCall(FindBasis(t, store, HYCO_SEED_DISPLACEMENT, all));
   HycoCheckModel(basis->l || !(basis->sigma[0] > 0), "-hyco_pod_tol %g leaves no mode; give a smaller value",
                  (double)t->tol[HYCO_SEED_DISPLACEMENT]);

@@ -105,7 +105,7 @@ PetscErrorCode HycoReducerResetBases(HycoReducer t)
     t->basis[k].l = t->basis[k].n_sigma = 0;
   }
   PetscCall(MatDestroy(&t->S));
-  HycoFreeAll(&t->U_rid, &t->V_rid, &t->U_contact, &t->contact_row, &t->Lambda, &t->U_norm, &t->dual_seeds,
+  HycoFreeAll(&t->U_rid, &t->rid_row, &t->V_rid, &t->U_contact, &t->contact_row, &t->Lambda, &t->U_norm, &t->dual_seeds,
               &t->taken_start, &t->taken, &t->judged, &t->judged_held);
   t->n_dual_seeds = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -124,7 +124,7 @@ PetscErrorCode HycoReducerDestroy(HycoReducer *reducer)
   PetscCall(EndTraining(t));
   PetscCall(PetscStrArrayDestroy(&t->groups));
   PetscCall(PetscFree(t->region));
-  PetscCall(PetscFree(t->solved));
+  HycoFreeAll(&t->solved, &t->written);
   PetscCall(HycoSceneDestroy(&t->scene));
   PetscCall(PetscHeaderDestroy(reducer));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -137,6 +137,9 @@ HycoDefineMethod(HycoReducerChooses, (HycoReducer t, PetscBool *chooses), t, HYC
 HycoDefineMethod(HycoReducerGetSolved, (HycoReducer t, PetscInt *n_groups, const PetscInt *solved[]), t,
                  HYCO_REDUCER_CLASSID, *n_groups = t->n_solvers;
                  *solved = t->solved)
+HycoDefineMethod(HycoReducerGetBalance, (HycoReducer t, PetscInt *unsolved, const PetscReal *written[]), t,
+                 HYCO_REDUCER_CLASSID, *unsolved = t->unsolved;
+                 *written = t->written)
 HycoDefineMethod(HycoReducerSetProgress, (HycoReducer t, HycoProgress progress, void *ctx), t, HYCO_REDUCER_CLASSID,
                  t->progress = progress;
                  t->progress_ctx = ctx)

@@ -48,7 +48,7 @@ PetscErrorCode HycoSnapshotsOpen(MPI_Comm comm, HycoScene scene, const char fold
   PetscCall(PetscObjectReference((PetscObject)scene));
   s->scene = scene;
   PetscCallMPI(MPI_Comm_size(comm, &size));
-  PetscCall(PetscCalloc1(size, &s->solved));
+  PetscCall(PetscCalloc2(size, &s->solved, size, &s->written));
   PetscCall(PetscStrncpy(s->folder, folder, sizeof(s->folder)));
   ierr = Begin(s);
   if (ierr) PetscCall(HycoSnapshotsDestroy(&s));
@@ -71,7 +71,7 @@ PetscErrorCode HycoSnapshotsDestroy(HycoSnapshots *snapshots)
   HycoCheckHandle(*snapshots, HYCO_SNAPSHOTS_CLASSID);
   HycoDereference(snapshots);
   PetscCall(CloseSample(*snapshots));
-  PetscCall(PetscFree((*snapshots)->solved));
+  PetscCall(PetscFree2((*snapshots)->solved, (*snapshots)->written));
   PetscCall(HycoSceneDestroy(&(*snapshots)->scene));
   PetscCall(PetscHeaderDestroy(snapshots));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -165,93 +165,6 @@ static PetscErrorCode FindMissing(HycoSnapshots s, PetscInt n, PetscInt n_par, c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode ReadGroups(MPI_Comm comm, PetscOptions options, PetscInt *groups)
-{
-  PetscFunctionBegin;
-  PetscOptionsBegin(comm, NULL, "HycoSnapshots", NULL);
-  PetscOptionsObject->options = options;
-  PetscCall(HycoOptionsInt(
-      "-hyco_groups", "number of groups of ranks that solve snapshots at the same time (0: from the size of the mesh)",
-      0, PETSC_MAX_INT, groups, NULL));
-  PetscOptionsEnd();
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoSnapshotsDeclare(PetscOptions options)
-{
-  PetscInt groups = 0;
-
-  PetscFunctionBegin;
-  PetscCall(ReadGroups(PETSC_COMM_SELF, options, &groups));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoSnapshotsChooseGroups(MPI_Comm comm, HycoScene scene, PetscInt n, PetscInt *groups)
-{
-  PetscMPIInt size;
-  struct stat info;
-
-  PetscFunctionBegin;
-  HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
-  *groups = 0;
-  PetscCallMPI(MPI_Comm_size(comm, &size));
-  PetscCall(ReadGroups(comm, scene->options, groups));
-  HycoCheck(*groups <= size, "-hyco_groups is %d on %d ranks; it can be at most the number of ranks", (int)*groups,
-            (int)size);
-  if (*groups) PetscFunctionReturn(PETSC_SUCCESS);
-  *groups = PetscMax(1, PetscMin((PetscInt)size, n));
-  if (stat(scene->mesh_path, &info) == 0) {
-    const double factor = 400.0 * (double)info.st_size * (double)((size_t)1 << 3 * scene->refine),
-                 memory = (double)sysconf(_SC_PHYS_PAGES) * (double)sysconf(_SC_PAGE_SIZE);
-
-    while (*groups > 1 && *groups * factor > memory / 2) (*groups)--;
-  }
-  PetscCallMPI(MPI_Bcast(groups, 1, MPIU_INT, 0, comm));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* kind[i]: the first of the points list[] (n of them) that shares a stiffness, and thus a factor, with list[i]. */
-static PetscErrorCode FindKinds(HycoScene scene, PetscInt n_par, const PetscReal mu[], PetscInt n,
-                                const PetscInt list[], PetscInt kind[])
-{
-  PetscBool reaches[HYCO_MAX_PARAMETERS];
-  PetscInt *first, n_kinds = 0;
-
-  PetscFunctionBegin;
-  HycoSceneReaches(scene, reaches);
-  PetscCall(PetscMalloc1(n, &first));
-  for (PetscInt i = 0; i < n; i++) {
-    PetscInt k;
-
-    for (k = 0; k < n_kinds; k++) {
-      const PetscReal *a = mu + list[first[k]] * n_par, *b = mu + list[i] * n_par;
-      PetscInt p = 0;
-
-      while (p < n_par && (!reaches[p] || a[p] == b[p])) p++;
-      if (p == n_par) break;
-    }
-    if (k == n_kinds) first[n_kinds++] = i;
-    kind[i] = first[k];
-  }
-  PetscCall(PetscFree(first));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoSnapshotsCreateQueue(MPI_Comm comm, HycoScene scene, PetscInt n_par, const PetscReal mu[],
-                                        PetscInt n, const PetscInt list[], PetscInt n_all, HycoQueue *queue)
-{
-  PetscInt groups, *kind;
-
-  PetscFunctionBegin;
-  PetscCall(HycoSnapshotsChooseGroups(comm, scene, n_all, &groups));
-  PetscCall(PetscMalloc1(n, &kind));
-  HycoOnRoot(comm, FindKinds(scene, n_par, mu, n, list, kind));
-  HycoBcast(kind, n, MPIU_INT, comm);
-  PetscCall(HycoQueueCreate(comm, groups, n, kind, queue));
-  PetscCall(PetscFree(kind));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Writes the data of a solution that are on rank 0. */
 static PetscErrorCode WriteHead(HycoSnapshots s, HycoH5 h, const PetscReal mu[])
 {
@@ -315,6 +228,7 @@ static PetscErrorCode WriteSample(HycoSnapshots s, HycoFOM fom, const PetscReal 
   PetscCall(SamplePath(s, mu, path));
   PetscCall(HycoH5CreateShared(HycoComm(fom), path, &h));
   ierr = WriteFields(s, fom, h, mu, force);
+  s->bytes += HycoH5Written(h);
   failed = HycoH5Close(&h, (PetscBool)!ierr);
   PetscCall(ierr ? ierr : failed);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -428,6 +342,7 @@ static PetscErrorCode SolvePath(HycoSnapshots s, HycoFOM fom, const PetscReal mu
   PetscCall(PetscMalloc1(fom->part->n_cells, &w.inelastic));
   PetscCall(HycoH5CreateShared(HycoComm(fom), path, &w.h));
   ierr = WritePath(&w, fom, mu);
+  s->bytes += HycoH5Written(w.h);
   failed = HycoH5Close(&w.h, (PetscBool)!ierr);
   PetscCall(PetscFree(w.inelastic));
   PetscCall(ierr ? ierr : failed);
@@ -484,6 +399,7 @@ static PetscErrorCode SolveQueued(HycoSnapshots s, HycoQueue queue, const Missin
 {
   PetscInt k, n_stored;
   PetscMPIInt rank;
+  char at[HYCO_LINE];
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_rank(HycoComm(s), &rank));
@@ -494,6 +410,8 @@ static PetscErrorCode SolveQueued(HycoSnapshots s, HycoQueue queue, const Missin
       if (n_stored < m->n) PetscCall(m->progress(m->n_all - m->n + n_stored, m->n_all, m->ctx));
     }
     if (k < 0) PetscFunctionReturn(PETSC_SUCCESS);
+    HycoSceneNamePoint(s->scene, m->mu + m->missing[k] * m->n_par, at);
+    PetscCall(HycoSnapshotsNote(s, queue, "begins %s", at));
     PetscCall(SolveSample(s, fom, m->mu + m->missing[k] * m->n_par, force));
   }
 }
@@ -520,16 +438,40 @@ static PetscErrorCode SolveGroup(HycoSnapshots s, HycoQueue queue, const Missing
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Returns the group's error after the other groups were told of it. */
+static PetscErrorCode SolveAndTell(HycoSnapshots s, HycoQueue queue, const Missing *m)
+{
+  const PetscErrorCode ierr = HycoQueueEnd(queue, SolveGroup(s, queue, m));
+
+  PetscFunctionBegin;
+  PetscCall(HycoSnapshotsNote(s, queue, "%s", ierr ? "fails" : "ends"));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds the counts of a queue whose tasks are done. */
+static PetscErrorCode CountWork(HycoSnapshots s, HycoQueue queue)
+{
+  PetscInt groups, left;
+
+  PetscFunctionBegin;
+  PetscCall(HycoQueueCount(queue, &groups, s->solved));
+  PetscCall(HycoQueueLeft(queue, &left));
+  s->n_groups = PetscMax(s->n_groups, groups);
+  s->unsolved = PetscMax(s->unsolved, left);
+  PetscCallMPI(MPI_Allgather(&s->bytes, 1, MPIU_REAL, s->written, 1, MPIU_REAL, HycoComm(s)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode SolveMissing(HycoSnapshots s, const Missing *m)
 {
-  PetscInt groups;
   HycoQueue queue;
 
   PetscFunctionBegin;
+  PetscCall(HycoSnapshotsReadMonitor(s));
   PetscCall(HycoSnapshotsCreateQueue(HycoComm(s), s->scene, m->n_par, m->mu, m->n, m->missing, m->n_all, &queue));
-  HycoOnEach(HycoComm(s), HycoQueueEnd(queue, SolveGroup(s, queue, m)));
-  PetscCall(HycoQueueCount(queue, &groups, s->solved));
-  s->n_groups = PetscMax(s->n_groups, groups);
+  HycoOnEach(HycoComm(s), SolveAndTell(s, queue, m));
+  PetscCall(CountWork(s, queue));
   PetscCall(HycoQueueDestroy(&queue));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -559,6 +501,9 @@ PetscErrorCode HycoSnapshotsFill(HycoSnapshots s, HycoSamples samples, HycoProgr
 HycoDefineMethod(HycoSnapshotsGetSolved, (HycoSnapshots s, PetscInt *n_groups, const PetscInt *solved[]), s,
                  HYCO_SNAPSHOTS_CLASSID, *n_groups = s->n_groups;
                  *solved = s->solved)
+HycoDefineMethod(HycoSnapshotsGetBalance, (HycoSnapshots s, PetscInt *unsolved, const PetscReal *written[]), s,
+                 HYCO_SNAPSHOTS_CLASSID, *unsolved = s->unsolved;
+                 *written = s->written)
 
 /* Rows lo .. lo + rows - 1 of the n samples at mu. */
 static PetscErrorCode ReadColumns(HycoSnapshots s, PetscInt n, const PetscReal mu[], const char field[], PetscInt lo,

@@ -16,6 +16,7 @@ struct _n_HycoH5 {
   hid_t id, access; /* the file; property list with which datasets are opened */
   HycoFile out;     /* while writing; else NULL */
   size_t size;      /* size of the file that is read */
+  size_t written;   /* bytes of the data that this process has written */
   PetscBool reads;
   char path[PETSC_MAX_PATH_LEN];
   /* data of a file that several processes write */
@@ -383,6 +384,11 @@ PetscErrorCode HycoH5Close(HycoH5 *file, PetscBool commit)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscReal HycoH5Written(HycoH5 f)
+{
+  return (PetscReal)f->written;
+}
+
 /* The number of bytes of a row. */
 static size_t Width(hid_t type, PetscInt cols)
 {
@@ -454,6 +460,7 @@ static PetscErrorCode Write(HycoH5 f, const char name[], hid_t type, PetscInt ro
   H5Dclose(set);
   HycoCheck(failed >= 0, "%s: writing %s failed; check the free memory", f->path, name);
   if (f->shared) PetscCall(HycoFilePut(f->fd, f->path, data, (size_t)n * width, (size_t)place + (size_t)first * width));
+  f->written += (size_t)n * width;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -489,6 +496,7 @@ PetscErrorCode HycoH5WriteRows(HycoH5 f, const char name[], MPI_Datatype type, P
   HycoOnRoot(f->comm, LayOut(f, name, type, rows, cols, &place));
   PetscCallMPI(MPI_Bcast(&place, 1, MPI_LONG_LONG, 0, f->comm));
   HycoOnEach(f->comm, HycoFilePut(f->fd, f->path, data, (size_t)n * width, (size_t)place + (size_t)first * width));
+  f->written += (size_t)n * width;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

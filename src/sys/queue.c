@@ -1,8 +1,9 @@
 /* HycoQueue: counters in an MPI-3 window, updated by atomic operations. */
 #include <hycoqueue.h>
 
-/* The first counters of the window, followed by those of the kinds: groups that failed, tasks done, kinds begun. */
-enum { FAILED, DONE, BEGUN, N_COUNTERS };
+/* The first counters of the window, followed by those of the kinds: groups that failed, tasks done, kinds begun,
+   events. */
+enum { FAILED, DONE, BEGUN, EVENTS, N_COUNTERS };
 
 struct _HycoQueue {
   MPI_Comm comm, group; /* comm borrowed */
@@ -11,6 +12,7 @@ struct _HycoQueue {
   PetscInt *first, *order; /* n_kinds + 1; the tasks, ordered by kind */
   PetscInt kind;           /* the kind whose tasks this group takes; -1: none yet */
   PetscInt n_taken;
+  PetscInt n_left;      /* number of tasks not done when this group found none to take; 0 before, or after a failure */
   PetscBool busy, told; /* busy: a task was taken and is not done; told: another group has failed */
   MPI_Win window;       /* MPI_WIN_NULL: one group, whose ranks all have the same counters */
   PetscInt *counter;    /* N_COUNTERS + n_kinds; with a window only on rank 0 of comm */
@@ -158,6 +160,9 @@ static PetscErrorCode TakeTask(HycoQueue q, PetscInt *task)
     else
       PetscCall(NextKind(q));
   }
+  if (*task >= 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(Add(q, DONE, 0, &done));
+  q->n_left = q->first[q->n_kinds] - done;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -175,6 +180,15 @@ PetscErrorCode HycoQueueDone(HycoQueue q, PetscInt *n)
 {
   PetscFunctionBegin;
   PetscCall(Add(q, DONE, 0, n));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoQueueNumber(HycoQueue q, PetscInt *number, PetscInt *group)
+{
+  PetscFunctionBegin;
+  PetscCall(Add(q, EVENTS, 1, number));
+  ++*number;
+  *group = q->color;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -208,6 +222,13 @@ PetscErrorCode HycoQueueEnd(HycoQueue q, PetscErrorCode error)
   if (!error || q->told) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(Add(q, FAILED, 1, &before));
   PetscCall(error);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoQueueLeft(HycoQueue q, PetscInt *n)
+{
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Allreduce(&q->n_left, n, 1, MPIU_INT, MPI_MAX, q->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

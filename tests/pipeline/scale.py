@@ -1,4 +1,4 @@
-"""scripts/bench-scale on mesh A and a wavy block: its counts on 1 and 2 ranks, and the model fitted to them."""
+"""scripts/bench-scale on mesh A and a wavy block: its counts on 1 and 2 ranks, and the model fitted to them; scripts/bench-training on mesh A."""
 import csv
 import os
 import subprocess
@@ -9,12 +9,33 @@ from common import PATIENCE, SOURCE, Case
 
 
 class Scale(Case):
-    def test_counts(self):
-        run = subprocess.run([sys.executable, os.path.join(SOURCE, 'scripts', 'bench-scale'), '--refine', '0', '--ranks', '1,2', '--wavy', '8', '--timeout',
-                              str(60 * PATIENCE), '--output', self.folder], cwd=SOURCE, capture_output=True, text=True, timeout=120 * PATIENCE)
+    def bench(self, name, *words):
+        run = subprocess.run([sys.executable, os.path.join(SOURCE, 'scripts', 'bench-' + name), '--refine', '0', *words, '--timeout', str(60 * PATIENCE),
+                              '--output', self.folder], cwd=SOURCE, capture_output=True, text=True, timeout=120 * PATIENCE)
         self.assertEqual(run.returncode, 0, run.stdout + run.stderr)
-        with open(self.path('scale.csv'), encoding='utf-8', newline='') as file:
-            one, two, wavy = csv.DictReader(file)
+        return run
+
+    def rows(self, name):
+        with open(self.path(name + '.csv'), encoding='utf-8', newline='') as file:
+            return list(csv.DictReader(file))
+
+    def test_training(self):
+        self.bench('training', '--groups', '1:1,4:2', '--loads', '2', '--pod', 'hybrid:1:10:0,hybrid:4:10:8', '--noise', '1e-6')
+        for row in self.rows('groups'):
+            self.assertEqual(sum(map(int, row['solved'].split(', '))), 16)
+            self.assertLess(int(row['unsolved']), int(row['groups']))
+            self.assertLessEqual(float(row['mb_ratio']), 1.25)
+            self.assertEqual(row['model'], 'equal')
+        whole, streamed = self.rows('pod')
+        self.assertEqual((whole['snapshots'], streamed['snapshots'], streamed['model']), ('80', '80', 'equal'))
+        self.assertLess(float(streamed['sigma_apart']), 1e-10)
+        self.assertLess(float(streamed['modes_apart']), 1e-7)  # a tenth of the noise
+        failed, = self.rows('failure')
+        self.assertEqual((failed['after'], int(failed['begun']) - int(failed['stored'])), ('0', 1))
+
+    def test_counts(self):
+        run = self.bench('scale', '--ranks', '1,2', '--wavy', '8')
+        one, two, wavy = self.rows('scale')
         for row in (one, two):
             self.assertEqual((row['unknowns'], row['contacts']), ('4952', '189'))
             self.assertLessEqual(int(row['most']), 40)

@@ -1,5 +1,5 @@
-/* HycoQueue: each task once, no group idle while one is left, tasks of a kind in one group, failures reported. One
-   rank in each group. */
+/* HycoQueue: each task once, no group idle while one is left, tasks of a kind in one group, failures reported, events
+   numbered. One rank in each group. */
 #include "check.h"
 #include <hycoqueue.h>
 
@@ -24,7 +24,7 @@ static PetscErrorCode EachOnce(void)
 {
   PetscFunctionBegin;
   for (PetscInt groups = 1; groups <= size; groups++) {
-    PetscInt kind[60], once[60] = {0}, n, done, *count, sum = 0;
+    PetscInt kind[60], once[60] = {0}, n, done, left, *count, sum = 0;
     MPI_Comm group;
     PetscMPIInt first;
     HycoQueue queue;
@@ -41,8 +41,10 @@ static PetscErrorCode EachOnce(void)
       CHECK(once[k] == 1, "task %d of %d groups: %d times", (int)k, (int)groups, (int)once[k]);
     PetscCall(HycoQueueCount(queue, &n, count));
     PetscCall(HycoQueueDone(queue, &done));
+    PetscCall(HycoQueueLeft(queue, &left));
     for (PetscInt c = 0; c < n; c++) sum += count[c];
     CHECK(n == groups && sum == 60 && done == 60, "groups %d, tasks %d and %d", (int)n, (int)sum, (int)done);
+    CHECK(left >= 0 && left < groups, "%d tasks are left where one of %d groups is idle", (int)left, (int)groups);
     PetscCall(HycoQueueDestroy(&queue));
     CHECK(!queue, "the handle stays");
     PetscCall(PetscFree(count));
@@ -57,16 +59,20 @@ static PetscErrorCode NoneIdle(void)
 
   PetscFunctionBegin;
   for (PetscMPIInt slow = 0; slow < size && size > 1; slow++) {
-    PetscInt once[40] = {0}, mine = 0, k, done = 0;
+    PetscInt once[40] = {0}, mine = 0, k, done = 0, left;
     HycoQueue queue;
 
     PetscCall(HycoQueueCreate(PETSC_COMM_WORLD, size, n, NULL, &queue));
     if (rank == slow) PetscCall(HycoQueueTake(queue, &k));
     PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
     while (rank == slow && done < n - 1) PetscCall(HycoQueueDone(queue, &done));
-    PetscCall(TakeAll(queue, once));
+    if (rank != slow) PetscCall(TakeAll(queue, once));
+    PetscCallMPI(MPI_Barrier(PETSC_COMM_WORLD));
+    if (rank == slow) PetscCall(TakeAll(queue, once));
     for (k = 0; k < n; k++) mine += once[k];
     if (rank == slow) CHECK(mine == 0, "%d tasks were left for it", (int)mine);
+    PetscCall(HycoQueueLeft(queue, &left));
+    CHECK(left > 0 && left < size, "%d tasks are left where one of %d groups is idle", (int)left, (int)size);
     PetscCall(HycoQueueDestroy(&queue));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -129,6 +135,27 @@ static PetscErrorCode Failure(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The events of all groups have the numbers from 1 on, each once. */
+static PetscErrorCode Events(void)
+{
+  const PetscInt n = 5;
+  PetscInt number, group, last = 0, sum = 0;
+  HycoQueue queue;
+
+  PetscFunctionBegin;
+  PetscCall(HycoQueueCreate(PETSC_COMM_WORLD, size, 1, NULL, &queue));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscCall(HycoQueueNumber(queue, &number, &group));
+    CHECK(group == rank && number > last && number <= n * size, "group %d, event %d", (int)group, (int)number);
+    last = number;
+    sum += number;
+  }
+  HycoAllreduce(&sum, 1, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD);
+  CHECK(sum == n * size * (n * size + 1) / 2, "the numbers' sum is %d", (int)sum);
+  PetscCall(HycoQueueDestroy(&queue));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Test(void)
 {
   PetscFunctionBegin;
@@ -138,6 +165,7 @@ static PetscErrorCode Test(void)
   PetscCall(NoneIdle());
   PetscCall(Kinds());
   PetscCall(Failure());
+  PetscCall(Events());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

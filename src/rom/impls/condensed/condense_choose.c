@@ -76,6 +76,7 @@ static PetscErrorCode Estimate(HycoReducer t, HycoSnapshots store)
   PetscFunctionBegin;
   PetscCall(HycoSnapshotsFill(store, t->samples, t->progress, t->progress_ctx));
   PetscCall(HycoReducerReduce(t, store, PETSC_FALSE));
+  PetscCall(HycoReducerFetchContacts(t));
   PetscCall(HycoCondensedFlexibilities(t, store));
   HycoOnRoot(HycoComm(t), HycoCondensedFillFields(t, PETSC_FALSE));
   HycoOnRoot(HycoComm(t), HycoCondensedLeaveOut(t));

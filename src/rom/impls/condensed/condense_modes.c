@@ -259,6 +259,7 @@ static PetscErrorCode SpreadPatterns(HycoReducer t)
   const PetscInt m = Condensing(t)->condensed->m;
 
   PetscFunctionBegin;
+  PetscCall(HycoReducerFetchContacts(t)); /* for FindPatterns() and the build */
   HycoOnRoot(HycoComm(t), FindPatterns(t));
   PetscCallMPI(MPI_Bcast(&x->q, 1, MPIU_INT, 0, HycoComm(t)));
   if (t->rank) {

@@ -1,0 +1,131 @@
+/* Groups of ranks that solve points: their number, the queue of the points, the lines of -hyco_groups_monitor. */
+#include <hycosnapshotsimpl.h>
+#include <stdarg.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+static PetscErrorCode ReadGroups(MPI_Comm comm, PetscOptions options, PetscInt *groups, PetscBool *monitor)
+{
+  PetscFunctionBegin;
+  PetscOptionsBegin(comm, NULL, "HycoSnapshots", NULL);
+  PetscOptionsObject->options = options;
+  PetscCall(HycoOptionsInt(
+      "-hyco_groups", "number of groups of ranks that solve snapshots at the same time (0: from the size of the mesh)",
+      0, PETSC_MAX_INT, groups, NULL));
+  PetscCall(HycoOptionsFlag("-hyco_groups_monitor",
+                            "print a numbered line when a group of ranks begins a point, fails, or finds none left",
+                            monitor));
+  PetscOptionsEnd();
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSnapshotsDeclare(PetscOptions options)
+{
+  PetscInt groups = 0;
+  PetscBool monitor = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  PetscCall(ReadGroups(PETSC_COMM_SELF, options, &groups, &monitor));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSnapshotsChooseGroups(MPI_Comm comm, HycoScene scene, PetscInt n, PetscInt *groups)
+{
+  PetscMPIInt size;
+  PetscBool monitor = PETSC_FALSE;
+  struct stat info;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
+  *groups = 0;
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  PetscCall(ReadGroups(comm, scene->options, groups, &monitor));
+  HycoCheck(*groups <= size, "-hyco_groups is %d on %d ranks; it can be at most the number of ranks", (int)*groups,
+            (int)size);
+  if (*groups) PetscFunctionReturn(PETSC_SUCCESS);
+  *groups = PetscMax(1, PetscMin((PetscInt)size, n));
+  if (stat(scene->mesh_path, &info) == 0) {
+    const double factor = 400.0 * (double)info.st_size * (double)((size_t)1 << 3 * scene->refine),
+                 memory = (double)sysconf(_SC_PHYS_PAGES) * (double)sysconf(_SC_PAGE_SIZE);
+
+    while (*groups > 1 && *groups * factor > memory / 2) (*groups)--;
+  }
+  PetscCallMPI(MPI_Bcast(groups, 1, MPIU_INT, 0, comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* kind[i]: the first of the points list[] (n of them) that shares a stiffness, and thus a factor, with list[i]. */
+static PetscErrorCode FindKinds(HycoScene scene, PetscInt n_par, const PetscReal mu[], PetscInt n,
+                                const PetscInt list[], PetscInt kind[])
+{
+  PetscBool reaches[HYCO_MAX_PARAMETERS];
+  PetscInt *first, n_kinds = 0;
+
+  PetscFunctionBegin;
+  HycoSceneReaches(scene, reaches);
+  PetscCall(PetscMalloc1(n, &first));
+  for (PetscInt i = 0; i < n; i++) {
+    PetscInt k;
+
+    for (k = 0; k < n_kinds; k++) {
+      const PetscReal *a = mu + list[first[k]] * n_par, *b = mu + list[i] * n_par;
+      PetscInt p = 0;
+
+      while (p < n_par && (!reaches[p] || a[p] == b[p])) p++;
+      if (p == n_par) break;
+    }
+    if (k == n_kinds) first[n_kinds++] = i;
+    kind[i] = first[k];
+  }
+  PetscCall(PetscFree(first));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSnapshotsCreateQueue(MPI_Comm comm, HycoScene scene, PetscInt n_par, const PetscReal mu[],
+                                        PetscInt n, const PetscInt list[], PetscInt n_all, HycoQueue *queue)
+{
+  PetscInt groups, *kind;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSnapshotsChooseGroups(comm, scene, n_all, &groups));
+  PetscCall(PetscMalloc1(n, &kind));
+  HycoOnRoot(comm, FindKinds(scene, n_par, mu, n, list, kind));
+  HycoBcast(kind, n, MPIU_INT, comm);
+  PetscCall(HycoQueueCreate(comm, groups, n, kind, queue));
+  PetscCall(PetscFree(kind));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSnapshotsReadMonitor(HycoSnapshots s)
+{
+  PetscInt groups = 0;
+
+  PetscFunctionBegin;
+  s->monitor = PETSC_FALSE;
+  PetscCall(ReadGroups(HycoComm(s), s->scene->options, &groups, &s->monitor));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSnapshotsNote(HycoSnapshots s, HycoQueue queue, const char format[], ...)
+{
+  PetscInt number, color;
+  PetscMPIInt rank;
+  MPI_Comm group;
+  PetscViewer viewer;
+  char what[HYCO_LINE];
+  va_list args;
+
+  PetscFunctionBegin;
+  if (!s->monitor) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoQueueGetGroup(queue, &group));
+  PetscCallMPI(MPI_Comm_rank(group, &rank));
+  if (rank) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoQueueNumber(queue, &number, &color));
+  va_start(args, format);
+  PetscCall(PetscVSNPrintf(what, sizeof(what), format, NULL, args));
+  va_end(args);
+  PetscCall(PetscViewerASCIIGetStdout(PETSC_COMM_SELF, &viewer));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  event %d: group %d %s\n", (int)number, (int)color, what));
+  PetscCall(PetscViewerFlush(viewer));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
