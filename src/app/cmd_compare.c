@@ -21,6 +21,28 @@ static const char *const columns[N_COLUMNS] = {"error_u",
                                                "seconds_full_order",
                                                "seconds_reduced"};
 
+/* The columns of a table: these, then the absolute error of each output of the scene. */
+typedef struct {
+  PetscInt n, n_outputs;
+  const char *names[N_COLUMNS + HYCO_MAX_QUANTITIES];
+  char error_name[HYCO_MAX_QUANTITIES][DRIVER_LINE];
+} Shape;
+
+static PetscErrorCode ShapeOf(HycoScene scene, Shape *s)
+{
+  const char *names[HYCO_MAX_QUANTITIES];
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetQuantities(scene, &s->n_outputs, names));
+  for (PetscInt c = 0; c < N_COLUMNS; c++) s->names[c] = columns[c];
+  s->n = N_COLUMNS + s->n_outputs;
+  for (PetscInt q = 0; q < s->n_outputs; q++) {
+    PetscCall(PetscSNPrintf(s->error_name[q], DRIVER_LINE, "error_output_%s", names[q]));
+    s->names[N_COLUMNS + q] = s->error_name[q];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* One point on one group: both solutions, and their difference. */
 static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, PetscInt n_par, const PetscReal mu[],
                                    PetscReal v[])
@@ -28,6 +50,7 @@ static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, 
   HycoSummary s;
   HycoPrediction p;
   HycoErrors e = {0};
+  PetscInt n_outputs;
   char words[DRIVER_LINE];
 
   PetscFunctionBegin;
@@ -55,18 +78,21 @@ static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, 
   v[COVERED] = p.covered_force;
   v[SECONDS_FOM] = s.seconds.total;
   v[SECONDS_ROM] = p.seconds.total;
+  PetscCall(HycoSceneGetQuantities(scene, &n_outputs, NULL));
+  for (PetscInt q = 0; q < n_outputs; q++) v[N_COLUMNS + q] = PetscAbsReal(p.quantity[q] - s.quantity[q]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Whether the scene has a history, and the number of values per point. */
 static PetscErrorCode CountColumns(HycoScene scene, PetscBool *paths, PetscInt *n)
 {
-  PetscInt n_times;
+  PetscInt n_times, n_outputs;
 
   PetscFunctionBegin;
   PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
+  PetscCall(HycoSceneGetQuantities(scene, &n_outputs, NULL));
   *paths = (PetscBool)(n_times > 0);
-  *n = *paths ? DriverPathColumns() : N_COLUMNS;
+  *n = *paths ? DriverPathColumns() + 2 * n_outputs : N_COLUMNS + n_outputs;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -147,7 +173,8 @@ static int CompareReal(const void *a, const void *b)
   return (x > y) - (x < y);
 }
 
-static PetscErrorCode Report(HycoScene scene, PetscBool contact, PetscInt n, const PetscReal value[])
+static PetscErrorCode Report(HycoScene scene, PetscBool contact, const Shape *shape, PetscInt n,
+                             const PetscReal value[])
 {
   cJSON *json, *object;
   PetscReal *ratio, mean = 0, kkt = 0, covered[2] = {0, 1};
@@ -156,7 +183,7 @@ static PetscErrorCode Report(HycoScene scene, PetscBool contact, PetscInt n, con
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(n, &ratio));
   for (PetscInt k = 0; k < n; k++) {
-    const PetscReal *v = value + k * N_COLUMNS;
+    const PetscReal *v = value + k * shape->n;
 
     ratio[k] = v[SECONDS_FOM] / PetscMax(v[SECONDS_ROM], 1e-9);
     mean += ratio[k] / n;
@@ -171,7 +198,9 @@ static PetscErrorCode Report(HycoScene scene, PetscBool contact, PetscInt n, con
   cJSON_AddNumberToObject(json, "n_points", n);
   PetscCall(Say("%d point%s\n", (int)n, n == 1 ? "" : "s"));
   for (PetscInt k = 0; k < (contact ? N_ERRORS : E_LAMBDA_RID); k++)
-    ReportError(json, columns[k], n, N_COLUMNS, value, k, CONVERGED, &undefined);
+    ReportError(json, columns[k], n, shape->n, value, k, CONVERGED, &undefined);
+  for (PetscInt c = N_COLUMNS; c < shape->n; c++)
+    ReportOutputError(json, shape->names[c], n, shape->n, value, c, CONVERGED);
   object = cJSON_AddObjectToObject(json, "speedup");
   cJSON_AddNumberToObject(object, "mean", mean);
   cJSON_AddNumberToObject(object, "median", ratio[n / 2]);
@@ -228,6 +257,7 @@ PetscErrorCode CommandCompare(void)
   Points p = {0};
   DriverPiece all;
   DriverRows rows;
+  Shape shape;
   PetscBool given, contact;
   char path[PETSC_MAX_PATH_LEN], file[PETSC_MAX_PATH_LEN], table[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN];
 
@@ -249,10 +279,11 @@ PetscErrorCode CommandCompare(void)
   p.scene = scene;
   p.model = model;
   PetscCall(CompareAll(&p));
-  rows = DriverRowsOfRoot(p.n, N_COLUMNS, p.value, &all);
-  if (table[0] && !p.paths) PetscCall(DriverWriteTable(table, scene, p.mu, columns, &rows));
+  PetscCall(ShapeOf(scene, &shape));
+  rows = DriverRowsOfRoot(p.n, shape.n, p.value, &all);
+  if (table[0] && !p.paths) PetscCall(DriverWriteTable(table, scene, p.mu, shape.names, &rows));
   PetscCall(p.paths ? DriverReportPaths(scene, contact, p.n, p.mu, p.value, table)
-                    : Report(scene, contact, p.n, p.value));
+                    : Report(scene, contact, &shape, p.n, p.value));
   PetscCall(PetscFree(p.value));
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(HycoROMDestroy(&model));

@@ -122,6 +122,9 @@ void ReportVector(cJSON *json, const char name[], PetscInt n, const PetscReal v[
    converged: column numbers. */
 void ReportError(cJSON *json, const char name[], PetscInt n, PetscInt n_columns, const PetscReal value[],
                  PetscInt column, PetscInt converged, PetscInt *all_undefined);
+/* The same of the absolute error of an output of the scene. */
+void ReportOutputError(cJSON *json, const char name[], PetscInt n, PetscInt n_columns, const PetscReal value[],
+                       PetscInt column, PetscInt converged);
 /* Adds memory_mb and the missed targets, writes to -report (if given) on rank 0 and frees. */
 PetscErrorCode ReportWrite(cJSON **json);
 /* Writes text to a file, completely or not at all, or to a device. On this process alone. */
@@ -329,7 +332,7 @@ PetscErrorCode DriverSayEquilibrium(const DriverReducedPath *path);
 
 /* -- compare_history.c -- */
 
-/* The number of values of a point; one point on one group; their statistics, table ("": none) and report, on every
+/* The number of values of a point, for each output of the scene two more; one point on one group; their statistics, table ("": none) and report, on every
    rank; fails if a reduced path did not reach its end. */
 PetscInt DriverPathColumns(void);
 PetscErrorCode DriverComparePath(HycoFOM fom, HycoROM model, PetscBool root, PetscInt n_par, const PetscReal mu[],

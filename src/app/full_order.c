@@ -121,6 +121,7 @@ PetscErrorCode DriverSolveDisplacement(Fallback *f, HycoROM model, PetscInt n, c
   PetscCall(HycoFOMGetSummary(f->fom, &s));
   TakeDisplacement(f, &s, p);
   p->estimated_error_u = p->estimated_error_u_full;
+  for (PetscInt k = 0; k < HYCO_MAX_QUANTITIES; k++) p->estimated_error_quantity[k] = -1; /* of other displacements */
   if (s.reason > 0) p->reason = reason; /* the reason of the forces' solve */
   p->seconds.setup += s.seconds.setup;
   p->seconds.assemble += s.seconds.assemble;
