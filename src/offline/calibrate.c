@@ -59,10 +59,38 @@ static PetscErrorCode Spacing(HycoReducer t, PetscReal *spacing)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The mean of a formula over n rows of X. */
+static PetscReal MeanOf(PetscInt n, const PetscReal X[], const PetscReal law[])
+{
+  const PetscInt p = HYCO_ESTIMATE_FEATURES;
+  PetscReal sum = 0;
+
+  for (PetscInt i = 0; i < n * p; i++) sum += law[i % p] * X[i];
+  return law[p] + sum / n;
+}
+
+/* Replaces a formula by that of the error of u, stress or forces, raised above the errors y in the same way, if its
+   mean is smaller. The error of an output has a sign and passes through zero, so that its logarithm scatters more than
+   that of a norm, and coefficients fitted to it are less certain. */
+static PetscErrorCode Borrow(PetscInt n, const PetscReal X[], const PetscReal y[], const HycoEstimates *estimates,
+                             PetscReal law[])
+{
+  PetscReal other[HYCO_ESTIMATE_FEATURES + 1];
+
+  PetscFunctionBegin;
+  for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++) {
+    if (!estimates->has[e]) continue;
+    PetscCall(PetscArraycpy(other, estimates->law[e], HYCO_ESTIMATE_FEATURES + 1));
+    PetscCall(HycoRaiseBound(n, HYCO_ESTIMATE_FEATURES, X, y, SHARE, other));
+    if (MeanOf(n, X, other) < MeanOf(n, X, law)) PetscCall(PetscArraycpy(law, other, HYCO_ESTIMATE_FEATURES + 1));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Fits the formula for these errors. Those up to `least`, for example of forces without contact, contain no information
    on their size: they come last, and only raise the bound. */
 static PetscErrorCode Fit(PetscInt n, const HycoHeldOut rows[], const PetscReal error[], PetscReal least,
-                          const HycoEstimates *estimates, PetscReal law[])
+                          const HycoEstimates *estimates, PetscBool borrow, PetscReal law[])
 {
   const PetscInt p = HYCO_ESTIMATE_FEATURES;
   PetscReal *X, *y;
@@ -79,6 +107,7 @@ static PetscErrorCode Fit(PetscInt n, const HycoHeldOut rows[], const PetscReal 
     }
   }
   PetscCall(HycoUpperBound(n, telling ? telling : n, p, X, y, SHARE, law));
+  if (borrow) PetscCall(Borrow(n, X, y, estimates, law));
   law[p] += PetscLogReal(MARGIN);
   PetscCall(PetscFree2(X, y));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -98,7 +127,8 @@ static PetscErrorCode FitError(PetscInt n, const HycoHeldOut rows[], HycoEstimat
   }
   PetscCall(Median(n, error, 1, PETSC_SMALL, &median));
   estimates->has[kind] = (PetscBool)(finite && (kind != HYCO_ESTIMATE_LAMBDA || estimates->force > 0));
-  if (estimates->has[kind]) PetscCall(Fit(n, rows, error, NEGLIGIBLE * median, estimates, estimates->law[kind]));
+  if (estimates->has[kind])
+    PetscCall(Fit(n, rows, error, NEGLIGIBLE * median, estimates, PETSC_FALSE, estimates->law[kind]));
   PetscCall(PetscFree(error));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -131,7 +161,7 @@ static PetscErrorCode FitOutput(PetscInt n, const HycoHeldOut rows[], const Hyco
   o->has = (PetscBool)(o->magnitude > 0 && estimates->n);
   PetscCall(Median(n, error, 1, 0, &median));
   least = PetscMax(NEGLIGIBLE * median, HYCO_OUTPUT_ROUND_OFF * o->magnitude);
-  if (o->has) PetscCall(Fit(n, rows, error, least, estimates, o->law));
+  if (o->has) PetscCall(Fit(n, rows, error, least, estimates, PETSC_TRUE, o->law));
   PetscCall(PetscFree2(error, sorted));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
