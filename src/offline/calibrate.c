@@ -4,7 +4,8 @@
   above SHARE of them. Held-out points are distributed like a user's points over the region of training, so that the
   quantile number ceil(SHARE (n + 1)) of the ratios is a bound for SHARE of future points (split conformal prediction:
   Vovk, Gammerman, Shafer, Algorithmic Learning in a Random World, 2005), however accurate the formula is; an accurate
-  formula only makes the bound tighter. The settings were chosen with the same points, for which MARGIN allows.
+  formula only makes the bound tighter. The settings were chosen with the same points, for which MARGIN allows. The
+  scene's outputs have formulas for their absolute errors (judge_outputs.c).
 */
 #include <hycoalgorithms.h>
 #include <hycoreducerimpl.h>
