@@ -21,23 +21,40 @@ static const char *const columns[N_COLUMNS] = {"error_u",
                                                "seconds_full_order",
                                                "seconds_reduced"};
 
-/* The columns of a table: these, then the absolute error of each output of the scene. */
+PetscErrorCode DriverCommonOutputs(HycoScene scene, HycoROM model, DriverOutputs *outputs)
+{
+  const char *names[HYCO_MAX_QUANTITIES];
+  HycoScene other;
+  PetscInt n, at[HYCO_MAX_QUANTITIES];
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMGetScene(model, &other));
+  PetscCall(HycoSceneGetQuantities(scene, &n, names));
+  HycoSceneMatchQuantities(scene, other, at);
+  outputs->n = 0;
+  for (PetscInt q = 0; q < n; q++) {
+    if (at[q] < 0) continue;
+    outputs->full[outputs->n] = q;
+    outputs->reduced[outputs->n] = at[q];
+    outputs->names[outputs->n++] = names[q];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The columns of a table: these, then the absolute error of each output that the scene and the model have. */
 typedef struct {
-  PetscInt n, n_outputs;
+  PetscInt n;
   const char *names[N_COLUMNS + HYCO_MAX_QUANTITIES];
   char error_name[HYCO_MAX_QUANTITIES][DRIVER_LINE];
 } Shape;
 
-static PetscErrorCode ShapeOf(HycoScene scene, Shape *s)
+static PetscErrorCode ShapeOf(const DriverOutputs *outputs, Shape *s)
 {
-  const char *names[HYCO_MAX_QUANTITIES];
-
   PetscFunctionBegin;
-  PetscCall(HycoSceneGetQuantities(scene, &s->n_outputs, names));
   for (PetscInt c = 0; c < N_COLUMNS; c++) s->names[c] = columns[c];
-  s->n = N_COLUMNS + s->n_outputs;
-  for (PetscInt q = 0; q < s->n_outputs; q++) {
-    PetscCall(PetscSNPrintf(s->error_name[q], DRIVER_LINE, "error_output_%s", names[q]));
+  s->n = N_COLUMNS + outputs->n;
+  for (PetscInt q = 0; q < outputs->n; q++) {
+    PetscCall(PetscSNPrintf(s->error_name[q], DRIVER_LINE, "error_output_%s", outputs->names[q]));
     s->names[N_COLUMNS + q] = s->error_name[q];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -45,12 +62,11 @@ static PetscErrorCode ShapeOf(HycoScene scene, Shape *s)
 
 /* One point on one group: both solutions, and their difference. */
 static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, PetscInt n_par, const PetscReal mu[],
-                                   PetscReal v[])
+                                   const DriverOutputs *outputs, PetscReal v[])
 {
   HycoSummary s;
   HycoPrediction p;
   HycoErrors e = {0};
-  PetscInt n_outputs;
   char words[DRIVER_LINE];
 
   PetscFunctionBegin;
@@ -78,21 +94,20 @@ static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, 
   v[COVERED] = p.covered_force;
   v[SECONDS_FOM] = s.seconds.total;
   v[SECONDS_ROM] = p.seconds.total;
-  PetscCall(HycoSceneGetQuantities(scene, &n_outputs, NULL));
-  for (PetscInt q = 0; q < n_outputs; q++) v[N_COLUMNS + q] = PetscAbsReal(p.quantity[q] - s.quantity[q]);
+  for (PetscInt q = 0; q < outputs->n; q++)
+    v[N_COLUMNS + q] = PetscAbsReal(p.quantity[outputs->reduced[q]] - s.quantity[outputs->full[q]]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Whether the scene has a history, and the number of values per point. */
-static PetscErrorCode CountColumns(HycoScene scene, PetscBool *paths, PetscInt *n)
+static PetscErrorCode CountColumns(HycoScene scene, const DriverOutputs *outputs, PetscBool *paths, PetscInt *n)
 {
-  PetscInt n_times, n_outputs;
+  PetscInt n_times;
 
   PetscFunctionBegin;
   PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
-  PetscCall(HycoSceneGetQuantities(scene, &n_outputs, NULL));
   *paths = (PetscBool)(n_times > 0);
-  *n = *paths ? DriverPathColumns() + 2 * n_outputs : N_COLUMNS + n_outputs;
+  *n = *paths ? DriverPathColumns() + 2 * outputs->n : N_COLUMNS + outputs->n;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -105,6 +120,7 @@ typedef struct {
   const PetscReal *mu;
   PetscReal *value;
   PetscBool paths;
+  DriverOutputs outputs;
 } Points;
 
 static PetscErrorCode CompareQueued(const Points *p, HycoFOM fom, PetscBool root, PetscReal unused[])
@@ -125,8 +141,8 @@ static PetscErrorCode CompareQueued(const Points *p, HycoFOM fom, PetscBool root
     }
     if (k < 0) PetscFunctionReturn(PETSC_SUCCESS);
     v = root ? p->value + k * p->n_columns : unused;
-    PetscCall(p->paths ? DriverComparePath(fom, p->model, root, p->n_par, p->mu + k * p->n_par, v)
-                       : ComparePoint(p->scene, fom, p->model, p->n_par, p->mu + k * p->n_par, v));
+    PetscCall(p->paths ? DriverComparePath(fom, p->model, root, p->n_par, p->mu + k * p->n_par, &p->outputs, v)
+                       : ComparePoint(p->scene, fom, p->model, p->n_par, p->mu + k * p->n_par, &p->outputs, v));
   }
 }
 
@@ -158,7 +174,7 @@ static PetscErrorCode CompareAll(Points *p)
   for (PetscInt k = 0; k < p->n; k++) list[k] = k;
   PetscCall(HycoSnapshotsCreateQueue(PETSC_COMM_WORLD, p->scene, p->n_par, p->mu, p->n, list, p->n, &p->queue));
   PetscCall(PetscFree(list));
-  PetscCall(CountColumns(p->scene, &p->paths, &p->n_columns));
+  PetscCall(CountColumns(p->scene, &p->outputs, &p->paths, &p->n_columns));
   PetscCall(PetscCalloc1(p->n * p->n_columns, &p->value));
   HycoOnEach(PETSC_COMM_WORLD, HycoQueueEnd(p->queue, CompareMine(p)));
   HycoAllreduce(p->value, p->n * p->n_columns, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD);
@@ -278,11 +294,12 @@ PetscErrorCode CommandCompare(void)
   PetscCall(HycoSceneHasContact(scene, &contact));
   p.scene = scene;
   p.model = model;
+  PetscCall(DriverCommonOutputs(scene, model, &p.outputs));
   PetscCall(CompareAll(&p));
-  PetscCall(ShapeOf(scene, &shape));
+  PetscCall(ShapeOf(&p.outputs, &shape));
   rows = DriverRowsOfRoot(p.n, shape.n, p.value, &all);
   if (table[0] && !p.paths) PetscCall(DriverWriteTable(table, scene, p.mu, shape.names, &rows));
-  PetscCall(p.paths ? DriverReportPaths(scene, contact, p.n, p.mu, p.value, table)
+  PetscCall(p.paths ? DriverReportPaths(scene, &p.outputs, contact, p.n, p.mu, p.value, table)
                     : Report(scene, contact, &shape, p.n, p.value));
   PetscCall(PetscFree(p.value));
   PetscCall(HycoSamplesDestroy(&samples));

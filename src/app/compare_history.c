@@ -10,8 +10,8 @@ PetscInt DriverPathColumns(void)
   return N_COLUMNS;
 }
 
-/* The errors of the n outputs at the listed times that both paths reached, on the model's process: v as above. */
-static PetscErrorCode CompareOutputs(HycoFOM fom, HycoROM model, PetscInt n, PetscReal v[])
+/* The errors of the outputs at the listed times that both paths reached, on the model's process: v as above. */
+static PetscErrorCode CompareOutputs(HycoFOM fom, HycoROM model, const DriverOutputs *outputs, PetscReal v[])
 {
   HycoHistory full, reduced;
   PetscInt both;
@@ -20,12 +20,12 @@ static PetscErrorCode CompareOutputs(HycoFOM fom, HycoROM model, PetscInt n, Pet
   PetscCall(HycoFOMGetHistory(fom, &full));
   PetscCall(HycoROMGetHistory(model, &reduced));
   both = PetscMin(full.n, reduced.n);
-  for (PetscInt q = 0; q < n; q++) {
-    PetscReal *worst = &v[q], *end = &v[n + q];
+  for (PetscInt q = 0; q < outputs->n; q++) {
+    PetscReal *worst = &v[q], *end = &v[outputs->n + q];
 
     *worst = *end = both ? 0 : PETSC_INFINITY;
     for (PetscInt k = 0; k < both; k++) {
-      *end = PetscAbsReal(full.step[k].quantity[q] - reduced.step[k].quantity[q]);
+      *end = PetscAbsReal(full.step[k].quantity[outputs->full[q]] - reduced.step[k].quantity[outputs->reduced[q]]);
       *worst = *end <= *worst ? *worst : *end;
     }
   }
@@ -34,10 +34,8 @@ static PetscErrorCode CompareOutputs(HycoFOM fom, HycoROM model, PetscInt n, Pet
 
 /* The full-order path and the model's, and their difference; root: the rank that predicts and whose v is used. */
 PetscErrorCode DriverComparePath(HycoFOM fom, HycoROM model, PetscBool root, PetscInt n_par, const PetscReal mu[],
-                                 PetscReal v[])
+                                 const DriverOutputs *outputs, PetscReal v[])
 {
-  HycoScene scene;
-  PetscInt n_outputs;
   HycoSummary s;
   HycoPrediction p = {0};
   HycoPathErrors e = {0};
@@ -56,21 +54,18 @@ PetscErrorCode DriverComparePath(HycoFOM fom, HycoROM model, PetscBool root, Pet
   v[ITERATIONS] = p.iterations;
   v[SECONDS_FOM] = s.seconds.total;
   v[SECONDS_ROM] = p.seconds.total;
-  PetscCall(HycoROMGetScene(model, &scene));
-  PetscCall(HycoSceneGetQuantities(scene, &n_outputs, NULL));
-  if (root && n_outputs) PetscCall(CompareOutputs(fom, model, n_outputs, v + N_COLUMNS));
+  if (root && outputs->n) PetscCall(CompareOutputs(fom, model, outputs, v + N_COLUMNS));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* "worst_u", ..., "end_u", ..., "worst_output_NAME", ..., "end_output_NAME", ... */
-static PetscErrorCode NameColumns(PetscInt n_outputs, const char *const outputs[], char names[][DRIVER_LINE],
-                                  const char *columns[])
+static PetscErrorCode NameColumns(const DriverOutputs *outputs, char names[][DRIVER_LINE], const char *columns[])
 {
   static const char *const rest[] = {"converged",  "times_reached",      "kkt_max",
                                      "iterations", "seconds_full_order", "seconds_reduced"};
 
   PetscFunctionBegin;
-  for (PetscInt c = 0; c < N_COLUMNS + 2 * n_outputs; c++) {
+  for (PetscInt c = 0; c < N_COLUMNS + 2 * outputs->n; c++) {
     const PetscInt q = c - N_COLUMNS;
 
     if (c < CONVERGED)
@@ -79,28 +74,27 @@ static PetscErrorCode NameColumns(PetscInt n_outputs, const char *const outputs[
     else if (c < N_COLUMNS)
       PetscCall(PetscStrncpy(names[c], rest[c - CONVERGED], DRIVER_LINE));
     else
-      PetscCall(PetscSNPrintf(names[c], DRIVER_LINE, "%s_output_%s", q < n_outputs ? "worst" : "end",
-                              outputs[q % n_outputs]));
+      PetscCall(PetscSNPrintf(names[c], DRIVER_LINE, "%s_output_%s", q < outputs->n ? "worst" : "end",
+                              outputs->names[q % outputs->n]));
     columns[c] = names[c];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode DriverReportPaths(HycoScene scene, PetscBool contact, PetscInt n, const PetscReal mu[],
-                                 PetscReal value[], const char table[])
+PetscErrorCode DriverReportPaths(HycoScene scene, const DriverOutputs *outputs, PetscBool contact, PetscInt n,
+                                 const PetscReal mu[], PetscReal value[], const char table[])
 {
   char names[N_COLUMNS + 2 * HYCO_MAX_QUANTITIES][DRIVER_LINE];
-  const char *columns[N_COLUMNS + 2 * HYCO_MAX_QUANTITIES], *outputs[HYCO_MAX_QUANTITIES];
+  const char *columns[N_COLUMNS + 2 * HYCO_MAX_QUANTITIES];
   DriverPiece all;
   DriverRows rows;
   PetscReal seconds[2] = {0, 0}, kkt = 0;
-  PetscInt failed = 0, undefined = 0, n_outputs, width;
+  PetscInt failed = 0, undefined = 0, width;
   cJSON *json;
 
   PetscFunctionBegin;
-  PetscCall(HycoSceneGetQuantities(scene, &n_outputs, outputs));
-  PetscCall(NameColumns(n_outputs, outputs, names, columns));
-  width = N_COLUMNS + 2 * n_outputs;
+  PetscCall(NameColumns(outputs, names, columns));
+  width = N_COLUMNS + 2 * outputs->n;
   rows = DriverRowsOfRoot(n, width, value, &all);
   if (table[0]) PetscCall(DriverWriteTable(table, scene, mu, columns, &rows));
   PetscCall(ReportCreate("compare", scene, NULL, &json));
