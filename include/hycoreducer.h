@@ -101,6 +101,14 @@ typedef struct {
 } HycoFact;
 #define HYCO_MAX_FACTS 4
 
+/* Errors of an output of the scene (HycoSceneGetQuantities()) at the held-out points, in its unit; of a path the
+   largest of its listed times. Points whose prediction did not converge are left out. < 0: not known. */
+typedef struct {
+  PetscReal median, largest;
+  PetscReal magnitude; /* the largest absolute value at full order */
+  PetscBool estimated; /* the model estimates this error */
+} HycoOutputValidation;
+
 /* Results of a training. */
 typedef struct {
   HycoROMType type;              /* borrowed from the library */
@@ -116,10 +124,11 @@ typedef struct {
   PetscReal condition;             /* of the reduced stiffness, the largest over the judged snapshots */
   PetscReal error_u, error_lambda; /* mean relative training errors, 2-norm, displacement and RID contact forces */
   HycoValidation held_out;         /* errors of the written model at held-out points; n 0: none */
-  PetscInt n_held;                 /* held-out predictions that calibrate the estimated errors; 0: none */
-  HycoAttempt chosen;              /* the settings chosen by the search */
-  PetscInt n_added;                /* solutions that were added to meet the targets */
-  HycoScan scan;                   /* singularity inside the parameters' ranges */
+  HycoOutputValidation output[HYCO_MAX_QUANTITIES]; /* of the written model, if held_out.n > 0 */
+  PetscInt n_held;    /* held-out predictions that calibrate the estimated errors; 0: none */
+  HycoAttempt chosen; /* the settings chosen by the search */
+  PetscInt n_added;   /* solutions that were added to meet the targets */
+  HycoScan scan;      /* singularity inside the parameters' ranges */
   PetscReal seconds_snapshots, seconds_reduction;
 } HycoTraining;
 

@@ -55,6 +55,8 @@ typedef struct {
      values) and of all contact forces (2-norm; a force below a tenth of the largest held out in training counts as that
      tenth), calibrated at training on held-out solutions; < 0: the model has none, or the solve did not converge. */
   PetscReal estimated_error_u, estimated_error_sigma, estimated_error_lambda;
+  PetscReal estimated_error_quantity[HYCO_MAX_QUANTITIES]; /* the same for the absolute error of quantity[], in its
+                                                              unit; of a path at all of its listed times */
   PetscReal estimated_error_u_full; /* condensed: of u by HycoFOMSolveForces() with these forces; otherwise < 0 */
   PetscReal beyond;       /* largest distance of a parameter from the region of training, as a share of its range */
   PetscBool gives_forces; /* HycoROMGivesForces() */

@@ -84,6 +84,9 @@ PetscInt HycoNNLSStep(PetscInt k, const PetscInt p[], const PetscReal z[], Petsc
 */
 PetscErrorCode HycoUpperBound(PetscInt n, PetscInt telling, PetscInt p, const PetscReal X[], const PetscReal y[],
                               PetscReal share, PetscReal c[]);
+/* Sets only c[p], for given c_j. */
+PetscErrorCode HycoRaiseBound(PetscInt n, PetscInt p, const PetscReal X[], const PetscReal y[], PetscReal share,
+                              PetscReal c[]);
 
 /*
   Many problems over one S (m x n column major, borrowed): min 1/2 sum_k d_k (S x)_k^2 - h^T S x + shift/2 |x|^2, x >=

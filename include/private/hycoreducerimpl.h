@@ -298,6 +298,17 @@ typedef struct {
    Collective. */
 PetscErrorCode HycoReducerPredictHeldOut(HycoReducer t, HycoROM model, HycoSnapshots store, HycoHeldOutRace *race,
                                          HycoHeldOut rows[]);
+/* Predicts at a held-out point of the store, a path in the steps of full order. */
+PetscErrorCode HycoHeldOutPredict(HycoROM model, HycoSnapshots store, const PetscReal mu[]);
+/* At one held-out point by output of the scene: the absolute error, and the largest absolute value at full order; for a
+   path the largest of its listed times. NaN: not known. */
+typedef struct {
+  PetscReal error[HYCO_MAX_QUANTITIES], size[HYCO_MAX_QUANTITIES];
+} HycoOutputErrors;
+/* Predicts again with the final model where rows[] converged, and sets errors[n], zero before, on rank 0. Nothing if
+   the scene has no outputs. Collective; model, rows and errors are those of rank 0. */
+PetscErrorCode HycoReducerJudgeOutputs(HycoReducer t, HycoROM model, HycoSnapshots store, const HycoHeldOut rows[],
+                                       HycoOutputErrors errors[]);
 /* The largest 2-norm of contact forces; a relative error, where forces below a tenth of that norm are divided by the
    tenth (PETSC_INFINITY: not converged, or x/0); a summary of all. */
 PetscReal HycoHeldOutForce(PetscInt n, const HycoHeldOut rows[]);

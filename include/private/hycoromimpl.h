@@ -28,6 +28,15 @@ typedef struct {
 /* A predicted contact force up to this share of the largest is round-off. */
 #define HYCO_PRESSES 1e-10
 typedef enum { HYCO_ESTIMATE_U, HYCO_ESTIMATE_SIGMA, HYCO_ESTIMATE_LAMBDA, HYCO_N_ESTIMATES } HycoEstimateKind;
+/* Share of the largest absolute value of a quantity: errors up to it are round-off. */
+#define HYCO_OUTPUT_ROUND_OFF 1e-10
+/* Error of a quantity of the scene, in its unit, for a path the largest of its listed times. */
+typedef struct {
+  PetscBool has; /* whether there is an estimate */
+  PetscReal law[HYCO_ESTIMATE_FEATURES + 1];
+  PetscReal magnitude;       /* its largest absolute value at the held-out points; < 0: not known, as the next two */
+  PetscReal median, largest; /* of the errors there */
+} HycoOutputEstimate;
 typedef struct {
   PetscInt n; /* held-out predictions behind the estimates; 0: not calibrated */
   PetscReal floor[HYCO_ESTIMATE_FEATURES];
@@ -38,6 +47,8 @@ typedef struct {
   PetscInt n_held; /* number of held-out predictions by which the model was judged; 0: none */
   PetscReal median[HYCO_N_ESTIMATES],
       largest[HYCO_N_ESTIMATES]; /* their relative errors; very large: not converged, or x/0 */
+  PetscInt n_outputs;            /* 0: not judged (older files) */
+  HycoOutputEstimate output[HYCO_MAX_QUANTITIES];
 } HycoEstimates;
 
 /* The path of the last prediction, for a scene with a history. `room` and `n` count accepted steps; the arrays of
@@ -191,6 +202,17 @@ static inline PetscReal HycoROMAddRow(HycoROM model, PetscInt k, PetscReal start
 PetscErrorCode HycoROMMeasureQuantities(HycoROM model, HycoPrediction *prediction);
 /* For a path: evaluates them in its history's steps; done once. */
 PetscErrorCode HycoROMMeasurePath(HycoROM model);
+/* Sets the model up in training, where it has no whole mesh: the cells that the quantities need, with the numbers of
+   their nodes and cells in the whole mesh, and the modes at their unknowns (n_dof x l, row major). Takes ownership of
+   both. */
+PetscErrorCode HycoROMSetProbe(HycoROM model, HycoMesh mesh, PetscReal V[]);
+/* On that mesh; NULL: the quantities need only results of contacts. Borrowed. */
+HycoFE HycoROMGetProbe(HycoROM model);
+/* The quantities of another solution at the last prediction's parameters, mu[] with the time of a history: u and sigma
+   at the nodes and cells of the probe (NULL: the model has none), Lambda of all contacts. reaction: for a path the
+   supports' forces at these nodes (NULL: not known, NaN); else not needed. */
+PetscErrorCode HycoROMMeasureGiven(HycoROM model, const PetscReal mu[], const PetscReal u[], const PetscReal sigma[],
+                                   const PetscReal reaction[], const PetscReal Lambda[], PetscReal value[]);
 /* Results of each contact of the scene for forces Lambda (of all contacts) at the last prediction's parameters; NULL
    if the model does not have all forces. Borrowed until the next call. */
 PetscErrorCode HycoROMSumContacts(HycoROM model, const PetscReal Lambda[], const HycoContactResult *result[]);

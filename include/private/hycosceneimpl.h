@@ -194,6 +194,8 @@ PetscErrorCode HycoSceneDestroyTies(HycoScene scene);
 /* Reads an entry output_NAME_...; checks all of them. */
 PetscErrorCode HycoSceneReadQuantity(HycoScene scene, PetscInt entry, const char name[], PetscInt field);
 PetscErrorCode HycoSceneCheckQuantities(HycoScene scene);
+/* at[k]: the number in `other` of the scene's quantity k, by name and definition; -1: `other` does not have it. */
+void HycoSceneMatchQuantities(HycoScene scene, HycoScene other, PetscInt at[]);
 /* Whether the scene has a quantity of kind `first`, or of a kind from `first` to `last`. */
 PetscBool HycoSceneAsks(HycoScene scene, HycoQuantityKind first, HycoQuantityKind last);
 static inline PetscBool HycoSceneHasReactions(HycoScene scene)

@@ -41,7 +41,8 @@ static inline PetscInt HycoSnapshotsSteps(HycoScene scene)
 /*
   One field of the n samples from `first` on as a dense matrix, with a column per sample, for a scene with a history one
   per listed time of each, sample after sample: "U" (n_nodes x dim unrolled), "lambda" (n_contacts), "sigma" (n_cells x
-  n_sigma unrolled), "force" (as U); with a history "inelastic" (n_cells, accumulated). Rows in the mesh file's order,
+  n_sigma unrolled), "force" (as U); with a history "inelastic" (n_cells, accumulated) and, if the scene of the first
+  run names one as an output, "reaction" (as U). Rows in the mesh file's order,
   in contiguous blocks over comm; the rows of a node or cell stay on one rank. Collective; the caller owns it. A field
   without rows gives a matrix of zero rows.
 */
@@ -57,6 +58,9 @@ PetscErrorCode HycoSnapshotsGetBetween(HycoSnapshots store, const PetscReal mu[]
    caller's memory. Not collective. */
 PetscErrorCode HycoSnapshotsReadRows(HycoSnapshots store, const PetscReal mu[], PetscInt k, const char field[],
                                      PetscInt first, PetscInt n, PetscReal value[]);
+/* Whether the solution there has a field. Not collective. */
+PetscErrorCode HycoSnapshotsHas(HycoSnapshots store, const PetscReal mu[], PetscInt k, const char field[],
+                                PetscBool *has);
 /* The times of the steps of the path at mu (the caller frees them). Not collective. */
 PetscErrorCode HycoSnapshotsReadTaken(HycoSnapshots store, const PetscReal mu[], PetscInt *n, PetscReal **taken);
 

@@ -30,14 +30,13 @@ static PetscErrorCode Fit(PetscInt n, PetscInt p, const PetscReal X[], const Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoUpperBound(PetscInt n, PetscInt telling, PetscInt p, const PetscReal X[], const PetscReal y[],
-                              PetscReal share, PetscReal c[])
+PetscErrorCode HycoRaiseBound(PetscInt n, PetscInt p, const PetscReal X[], const PetscReal y[], PetscReal share,
+                              PetscReal c[])
 {
   PetscReal *above;
 
   PetscFunctionBegin;
   PetscCheck(n, PETSC_COMM_SELF, PETSC_ERR_PLIB, "there is nothing to bound");
-  PetscCall(Fit(telling, p, X, y, c));
   PetscCall(PetscMalloc1(n, &above));
   for (PetscInt i = 0; i < n; i++) {
     above[i] = y[i];
@@ -46,5 +45,14 @@ PetscErrorCode HycoUpperBound(PetscInt n, PetscInt telling, PetscInt p, const Pe
   PetscCall(PetscSortReal(n, above));
   c[p] = above[PetscMin((PetscInt)PetscCeilReal(share * (PetscReal)(n + 1) * (1 - 1e-12)), n) - 1];
   PetscCall(PetscFree(above));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoUpperBound(PetscInt n, PetscInt telling, PetscInt p, const PetscReal X[], const PetscReal y[],
+                              PetscReal share, PetscReal c[])
+{
+  PetscFunctionBegin;
+  PetscCall(Fit(telling, p, X, y, c));
+  PetscCall(HycoRaiseBound(n, p, X, y, share, c));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -21,9 +21,48 @@ static const char *const columns[N_COLUMNS] = {"error_u",
                                                "seconds_full_order",
                                                "seconds_reduced"};
 
+PetscErrorCode DriverCommonOutputs(HycoScene scene, HycoROM model, DriverOutputs *outputs)
+{
+  const char *names[HYCO_MAX_QUANTITIES];
+  HycoScene other;
+  PetscInt n, at[HYCO_MAX_QUANTITIES];
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMGetScene(model, &other));
+  PetscCall(HycoSceneGetQuantities(scene, &n, names));
+  HycoSceneMatchQuantities(scene, other, at);
+  outputs->n = 0;
+  for (PetscInt q = 0; q < n; q++) {
+    if (at[q] < 0) continue;
+    outputs->full[outputs->n] = q;
+    outputs->reduced[outputs->n] = at[q];
+    outputs->names[outputs->n++] = names[q];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The columns of a table: these, then the absolute error of each output that the scene and the model have. */
+typedef struct {
+  PetscInt n;
+  const char *names[N_COLUMNS + HYCO_MAX_QUANTITIES];
+  char error_name[HYCO_MAX_QUANTITIES][DRIVER_LINE];
+} Shape;
+
+static PetscErrorCode ShapeOf(const DriverOutputs *outputs, Shape *s)
+{
+  PetscFunctionBegin;
+  for (PetscInt c = 0; c < N_COLUMNS; c++) s->names[c] = columns[c];
+  s->n = N_COLUMNS + outputs->n;
+  for (PetscInt q = 0; q < outputs->n; q++) {
+    PetscCall(PetscSNPrintf(s->error_name[q], DRIVER_LINE, "error_output_%s", outputs->names[q]));
+    s->names[N_COLUMNS + q] = s->error_name[q];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* One point on one group: both solutions, and their difference. */
 static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, PetscInt n_par, const PetscReal mu[],
-                                   PetscReal v[])
+                                   const DriverOutputs *outputs, PetscReal v[])
 {
   HycoSummary s;
   HycoPrediction p;
@@ -55,18 +94,20 @@ static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, 
   v[COVERED] = p.covered_force;
   v[SECONDS_FOM] = s.seconds.total;
   v[SECONDS_ROM] = p.seconds.total;
+  for (PetscInt q = 0; q < outputs->n; q++)
+    v[N_COLUMNS + q] = PetscAbsReal(p.quantity[outputs->reduced[q]] - s.quantity[outputs->full[q]]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Whether the scene has a history, and the number of values per point. */
-static PetscErrorCode CountColumns(HycoScene scene, PetscBool *paths, PetscInt *n)
+static PetscErrorCode CountColumns(HycoScene scene, const DriverOutputs *outputs, PetscBool *paths, PetscInt *n)
 {
   PetscInt n_times;
 
   PetscFunctionBegin;
   PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
   *paths = (PetscBool)(n_times > 0);
-  *n = *paths ? DriverPathColumns() : N_COLUMNS;
+  *n = *paths ? DriverPathColumns() + 2 * outputs->n : N_COLUMNS + outputs->n;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -79,6 +120,7 @@ typedef struct {
   const PetscReal *mu;
   PetscReal *value;
   PetscBool paths;
+  DriverOutputs outputs;
 } Points;
 
 static PetscErrorCode CompareQueued(const Points *p, HycoFOM fom, PetscBool root, PetscReal unused[])
@@ -99,8 +141,8 @@ static PetscErrorCode CompareQueued(const Points *p, HycoFOM fom, PetscBool root
     }
     if (k < 0) PetscFunctionReturn(PETSC_SUCCESS);
     v = root ? p->value + k * p->n_columns : unused;
-    PetscCall(p->paths ? DriverComparePath(fom, p->model, root, p->n_par, p->mu + k * p->n_par, v)
-                       : ComparePoint(p->scene, fom, p->model, p->n_par, p->mu + k * p->n_par, v));
+    PetscCall(p->paths ? DriverComparePath(fom, p->model, root, p->n_par, p->mu + k * p->n_par, &p->outputs, v)
+                       : ComparePoint(p->scene, fom, p->model, p->n_par, p->mu + k * p->n_par, &p->outputs, v));
   }
 }
 
@@ -132,7 +174,7 @@ static PetscErrorCode CompareAll(Points *p)
   for (PetscInt k = 0; k < p->n; k++) list[k] = k;
   PetscCall(HycoSnapshotsCreateQueue(PETSC_COMM_WORLD, p->scene, p->n_par, p->mu, p->n, list, p->n, &p->queue));
   PetscCall(PetscFree(list));
-  PetscCall(CountColumns(p->scene, &p->paths, &p->n_columns));
+  PetscCall(CountColumns(p->scene, &p->outputs, &p->paths, &p->n_columns));
   PetscCall(PetscCalloc1(p->n * p->n_columns, &p->value));
   HycoOnEach(PETSC_COMM_WORLD, HycoQueueEnd(p->queue, CompareMine(p)));
   HycoAllreduce(p->value, p->n * p->n_columns, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD);
@@ -147,7 +189,8 @@ static int CompareReal(const void *a, const void *b)
   return (x > y) - (x < y);
 }
 
-static PetscErrorCode Report(HycoScene scene, PetscBool contact, PetscInt n, const PetscReal value[])
+static PetscErrorCode Report(HycoScene scene, PetscBool contact, const Shape *shape, PetscInt n,
+                             const PetscReal value[])
 {
   cJSON *json, *object;
   PetscReal *ratio, mean = 0, kkt = 0, covered[2] = {0, 1};
@@ -156,7 +199,7 @@ static PetscErrorCode Report(HycoScene scene, PetscBool contact, PetscInt n, con
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(n, &ratio));
   for (PetscInt k = 0; k < n; k++) {
-    const PetscReal *v = value + k * N_COLUMNS;
+    const PetscReal *v = value + k * shape->n;
 
     ratio[k] = v[SECONDS_FOM] / PetscMax(v[SECONDS_ROM], 1e-9);
     mean += ratio[k] / n;
@@ -171,7 +214,9 @@ static PetscErrorCode Report(HycoScene scene, PetscBool contact, PetscInt n, con
   cJSON_AddNumberToObject(json, "n_points", n);
   PetscCall(Say("%d point%s\n", (int)n, n == 1 ? "" : "s"));
   for (PetscInt k = 0; k < (contact ? N_ERRORS : E_LAMBDA_RID); k++)
-    ReportError(json, columns[k], n, N_COLUMNS, value, k, CONVERGED, &undefined);
+    ReportError(json, columns[k], n, shape->n, value, k, CONVERGED, &undefined);
+  for (PetscInt c = N_COLUMNS; c < shape->n; c++)
+    ReportOutputError(json, shape->names[c], n, shape->n, value, c, CONVERGED);
   object = cJSON_AddObjectToObject(json, "speedup");
   cJSON_AddNumberToObject(object, "mean", mean);
   cJSON_AddNumberToObject(object, "median", ratio[n / 2]);
@@ -228,6 +273,7 @@ PetscErrorCode CommandCompare(void)
   Points p = {0};
   DriverPiece all;
   DriverRows rows;
+  Shape shape;
   PetscBool given, contact;
   char path[PETSC_MAX_PATH_LEN], file[PETSC_MAX_PATH_LEN], table[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN];
 
@@ -248,11 +294,13 @@ PetscErrorCode CommandCompare(void)
   PetscCall(HycoSceneHasContact(scene, &contact));
   p.scene = scene;
   p.model = model;
+  PetscCall(DriverCommonOutputs(scene, model, &p.outputs));
   PetscCall(CompareAll(&p));
-  rows = DriverRowsOfRoot(p.n, N_COLUMNS, p.value, &all);
-  if (table[0] && !p.paths) PetscCall(DriverWriteTable(table, scene, p.mu, columns, &rows));
-  PetscCall(p.paths ? DriverReportPaths(scene, contact, p.n, p.mu, p.value, table)
-                    : Report(scene, contact, p.n, p.value));
+  PetscCall(ShapeOf(&p.outputs, &shape));
+  rows = DriverRowsOfRoot(p.n, shape.n, p.value, &all);
+  if (table[0] && !p.paths) PetscCall(DriverWriteTable(table, scene, p.mu, shape.names, &rows));
+  PetscCall(p.paths ? DriverReportPaths(scene, &p.outputs, contact, p.n, p.mu, p.value, table)
+                    : Report(scene, contact, &shape, p.n, p.value));
   PetscCall(PetscFree(p.value));
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(HycoROMDestroy(&model));

@@ -17,16 +17,44 @@ static void Estimate(cJSON *json, const char name[], PetscReal estimate)
 }
 
 /* Reports the estimated errors (null: none), and the distance from the region of training. */
-static void ReportEstimates(cJSON *json, const HycoPrediction *p)
+static PetscErrorCode ReportEstimates(cJSON *json, HycoScene scene, const HycoPrediction *p)
 {
+  const char *names[HYCO_MAX_QUANTITIES];
+  cJSON *outputs;
+  PetscInt n;
+
+  PetscFunctionBegin;
   Estimate(json, "estimated_error_u", p->estimated_error_u);
   Estimate(json, "estimated_error_sigma", p->estimated_error_sigma);
   Estimate(json, "estimated_error_lambda", p->estimated_error_lambda);
+  PetscCall(HycoSceneGetQuantities(scene, &n, names));
+  outputs = n ? cJSON_AddObjectToObject(json, "estimated_error_outputs") : NULL;
+  for (PetscInt q = 0; q < n; q++) Estimate(outputs, names[q], p->estimated_error_quantity[q]);
   cJSON_AddBoolToObject(json, "extrapolated", p->beyond > 0);
   cJSON_AddNumberToObject(json, "beyond", p->beyond);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode SayEstimates(const HycoPrediction *p)
+/* "estimated errors of the outputs: peak 0.012, tip none": absolute, in the units of the outputs. */
+static PetscErrorCode SayOutputEstimates(HycoScene scene, const HycoPrediction *p)
+{
+  const char *names[HYCO_MAX_QUANTITIES];
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetQuantities(scene, &n, names));
+  for (PetscInt q = 0; q < n; q++) {
+    PetscCall(Say("%s%s ", q ? ", " : "estimated errors of the outputs: ", names[q]));
+    if (p->estimated_error_quantity[q] >= 0)
+      PetscCall(Say("%.3g", (double)p->estimated_error_quantity[q]));
+    else
+      PetscCall(Say("none"));
+  }
+  if (n) PetscCall(Say("\n"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SayEstimates(HycoScene scene, const HycoPrediction *p)
 {
   const PetscReal estimate[3] = {p->estimated_error_u, p->estimated_error_sigma, p->estimated_error_lambda};
   char words[3][32];
@@ -39,6 +67,7 @@ static PetscErrorCode SayEstimates(const HycoPrediction *p)
       snprintf(words[k], sizeof(words[k]), "none");
   }
   PetscCall(Say("estimated errors: u %s, stress %s, contact forces %s\n", words[0], words[1], words[2]));
+  PetscCall(SayOutputEstimates(scene, p));
   DriverPercent(p->beyond, words[0]);
   if (p->beyond > 0) PetscCall(Say("EXTRAPOLATED: outside the region of training by %s of a range\n", words[0]));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -85,7 +114,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
   PetscCall(ReportContacts(json, p->n_contacts, p->n_facing, p->overlap, p->sliding));
   if (n_carried) PetscCall(DriverReportCarried(json, p->dim, n_carried, carried));
   PetscCall(ReportQuantities(json, scene, p->quantity));
-  ReportEstimates(json, p);
+  PetscCall(ReportEstimates(json, scene, p));
   cJSON_AddBoolToObject(json, "full_order", fallback[0] != '\0');
   if (fallback[0]) cJSON_AddStringToObject(json, "fallback", fallback);
   if (p->gives_forces) {
@@ -162,7 +191,7 @@ static PetscErrorCode One(HycoROM model, HycoScene scene, Fallback *fallback, co
   PetscCall(Say("KKT residuals: stationarity %.1e, penetration %.1e, adhesion %.1e, complementarity %.1e\n",
                 (double)p.kkt.stationarity, (double)p.kkt.penetration, (double)p.kkt.adhesion,
                 (double)p.kkt.complementarity));
-  if (!why[0]) PetscCall(SayEstimates(&p));
+  if (!why[0]) PetscCall(SayEstimates(scene, &p));
   PetscCall(Say("seconds: %.6f set-up, %.6f prediction\n", (double)p.seconds.setup, (double)p.seconds.total));
   if (why[0] || fallback->displacement)
     energy = fallback->strain_energy;
@@ -204,7 +233,7 @@ static PetscErrorCode Path(HycoROM model, HycoScene scene, const char output[])
       Say("%d iterations; KKT residuals: stationarity %.1e, penetration %.1e, adhesion %.1e, complementarity %.1e\n",
           (int)p.iterations, (double)p.kkt.stationarity, (double)p.kkt.penetration, (double)p.kkt.adhesion,
           (double)p.kkt.complementarity));
-  PetscCall(SayEstimates(&p));
+  PetscCall(SayEstimates(scene, &p));
   PetscCall(DriverSayEquilibrium(&path));
   PetscCall(Say("seconds: %.6f set-up, %.6f prediction\n", (double)p.seconds.setup, (double)p.seconds.total));
   HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetStrainEnergy(model, &energy));
@@ -264,10 +293,10 @@ static const char *const columns[N_COLUMNS] = {"total_contact_force",
                                                "contact_residual"};
 
 /* Numbers of columns: own: without the scene's quantities, more for paths; with them; for paths with their extremes
-   too; width: with the results of contacts. */
+   too; with the estimates of their errors; width: with the results of contacts. */
 typedef struct {
-  PetscInt own, with_quantities, with_extremes, width;
-  char path_name[HYCO_MAX_QUANTITIES][DRIVER_LINE];
+  PetscInt own, with_quantities, with_extremes, with_estimates, width;
+  char path_name[HYCO_MAX_QUANTITIES][DRIVER_LINE], estimate_name[HYCO_MAX_QUANTITIES][DRIVER_LINE];
   DriverCarried carried;
   const char **names;
 } Shape;
@@ -283,7 +312,7 @@ static PetscErrorCode ShapeOf(HycoROM model, HycoScene scene, Shape *s)
   PetscCall(HycoROMWantsEquilibrium(model, &residual));
   PetscCall(HycoROMGetSizes(model, NULL, NULL, &dim));
   PetscCall(DriverCarriedColumns(scene, dim, &s->carried));
-  PetscCall(PetscMalloc1(N_COLUMNS + 2 * HYCO_MAX_QUANTITIES + s->carried.n_contacts * s->carried.each, &s->names));
+  PetscCall(PetscMalloc1(N_COLUMNS + 3 * HYCO_MAX_QUANTITIES + s->carried.n_contacts * s->carried.each, &s->names));
   s->own = n_times ? (residual ? N_COLUMNS : RESIDUAL) : PATH_FORCE;
   PetscCall(ReportColumns(scene, s->own, columns, &s->with_quantities, s->names));
   s->with_extremes = s->with_quantities;
@@ -293,7 +322,14 @@ static PetscErrorCode ShapeOf(HycoROM model, HycoScene scene, Shape *s)
     PetscCall(PetscSNPrintf(name, DRIVER_LINE, "path_%s", s->names[c]));
     s->names[s->with_extremes++] = name;
   }
-  s->width = s->with_extremes;
+  s->with_estimates = s->with_extremes;
+  for (PetscInt c = s->own; c < s->with_quantities; c++) {
+    char *name = s->estimate_name[c - s->own];
+
+    PetscCall(PetscSNPrintf(name, DRIVER_LINE, "estimated_error_output_%s", s->names[c]));
+    s->names[s->with_estimates++] = name;
+  }
+  s->width = s->with_estimates;
   for (PetscInt c = 0; c < s->carried.n_contacts * s->carried.each; c++) s->names[s->width++] = s->carried.name[c];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -304,6 +340,12 @@ static PetscErrorCode DestroyShape(Shape *s)
   PetscCall(PetscFree(s->carried.name));
   PetscCall(PetscFree(s->names));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* NaN: how a table marks that there is no estimate. */
+static PetscReal Known(PetscReal estimate)
+{
+  return estimate >= 0 ? estimate : NAN;
 }
 
 static void FillRow(const HycoPrediction *p, PetscInt n_carried, const HycoContactResult carried[], const Shape *s,
@@ -318,9 +360,9 @@ static void FillRow(const HycoPrediction *p, PetscInt n_carried, const HycoConta
   v[CONVERGED] = p->reason > 0;
   v[ITERATIONS] = p->iterations;
   v[SECONDS] = p->seconds.total;
-  v[ESTIMATE_U] = p->estimated_error_u >= 0 ? p->estimated_error_u : NAN; /* how a table marks that there is none */
-  v[ESTIMATE_SIGMA] = p->estimated_error_sigma >= 0 ? p->estimated_error_sigma : NAN;
-  v[ESTIMATE_LAMBDA] = p->estimated_error_lambda >= 0 ? p->estimated_error_lambda : NAN;
+  v[ESTIMATE_U] = Known(p->estimated_error_u);
+  v[ESTIMATE_SIGMA] = Known(p->estimated_error_sigma);
+  v[ESTIMATE_LAMBDA] = Known(p->estimated_error_lambda);
   v[BEYOND] = p->beyond;
   if (s->own > PATH_FORCE) {
     v[PATH_FORCE] = p->path_force;
@@ -333,7 +375,9 @@ static void FillRow(const HycoPrediction *p, PetscInt n_carried, const HycoConta
   }
   for (PetscInt k = s->own; k < s->with_quantities; k++) v[k] = p->quantity[k - s->own];
   for (PetscInt k = s->with_quantities; k < s->with_extremes; k++) v[k] = p->path_quantity[k - s->with_quantities];
-  DriverCarriedFill(&s->carried, n_carried, carried, v + s->with_extremes);
+  for (PetscInt k = s->with_extremes; k < s->with_estimates; k++)
+    v[k] = Known(p->estimated_error_quantity[k - s->with_extremes]);
+  DriverCarriedFill(&s->carried, n_carried, carried, v + s->with_estimates);
 }
 
 /* Data for the rows of a piece. */
@@ -472,6 +516,7 @@ static PetscErrorCode SolveRest(Fallback *fallback, PetscInt n_par, const PetscR
     p.estimated_error_u = v[ESTIMATE_U]; /* the model's estimate, which required full order */
     p.estimated_error_sigma = v[ESTIMATE_SIGMA];
     p.estimated_error_lambda = v[ESTIMATE_LAMBDA];
+    PetscCall(PetscArraycpy(p.estimated_error_quantity, v + s->with_extremes, s->with_estimates - s->with_extremes));
     p.beyond = v[BEYOND];
     FillRow(&p, n_carried, carried, s, v);
     v[U_NORM] = NAN; /* that of the whole mesh, not of an RID */

@@ -1,7 +1,8 @@
 /* hyco compare for a model of paths: the worst listed time and the end of each path, in full order's steps. */
 #include "driver.h"
 
-/* Errors by kind, at the worst time and at the end; then further columns. */
+/* Errors by kind, at the worst time and at the end; then further columns; then the absolute error of each output at its
+   worst time, and of each at the end. */
 enum { CONVERGED = 2 * HYCO_N_ERRORS, REACHED, KKT, ITERATIONS, SECONDS_FOM, SECONDS_ROM, N_COLUMNS };
 
 PetscInt DriverPathColumns(void)
@@ -9,9 +10,31 @@ PetscInt DriverPathColumns(void)
   return N_COLUMNS;
 }
 
+/* The errors of the outputs at the listed times that both paths reached, on the model's process: v as above. */
+static PetscErrorCode CompareOutputs(HycoFOM fom, HycoROM model, const DriverOutputs *outputs, PetscReal v[])
+{
+  HycoHistory full, reduced;
+  PetscInt both;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMGetHistory(fom, &full));
+  PetscCall(HycoROMGetHistory(model, &reduced));
+  both = PetscMin(full.n, reduced.n);
+  for (PetscInt q = 0; q < outputs->n; q++) {
+    PetscReal *worst = &v[q], *end = &v[outputs->n + q];
+
+    *worst = *end = both ? 0 : PETSC_INFINITY;
+    for (PetscInt k = 0; k < both; k++) {
+      *end = PetscAbsReal(full.step[k].quantity[outputs->full[q]] - reduced.step[k].quantity[outputs->reduced[q]]);
+      *worst = *end <= *worst ? *worst : *end;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The full-order path and the model's, and their difference; root: the rank that predicts and whose v is used. */
 PetscErrorCode DriverComparePath(HycoFOM fom, HycoROM model, PetscBool root, PetscInt n_par, const PetscReal mu[],
-                                 PetscReal v[])
+                                 const DriverOutputs *outputs, PetscReal v[])
 {
   HycoSummary s;
   HycoPrediction p = {0};
@@ -31,40 +54,48 @@ PetscErrorCode DriverComparePath(HycoFOM fom, HycoROM model, PetscBool root, Pet
   v[ITERATIONS] = p.iterations;
   v[SECONDS_FOM] = s.seconds.total;
   v[SECONDS_ROM] = p.seconds.total;
+  if (root && outputs->n) PetscCall(CompareOutputs(fom, model, outputs, v + N_COLUMNS));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* "worst_u", ..., "end_u", ... */
-static PetscErrorCode NameColumns(char names[][64], const char *columns[])
+/* "worst_u", ..., "end_u", ..., "worst_output_NAME", ..., "end_output_NAME", ... */
+static PetscErrorCode NameColumns(const DriverOutputs *outputs, char names[][DRIVER_LINE], const char *columns[])
 {
   static const char *const rest[] = {"converged",  "times_reached",      "kkt_max",
                                      "iterations", "seconds_full_order", "seconds_reduced"};
 
   PetscFunctionBegin;
-  for (PetscInt c = 0; c < N_COLUMNS; c++) {
+  for (PetscInt c = 0; c < N_COLUMNS + 2 * outputs->n; c++) {
+    const PetscInt q = c - N_COLUMNS;
+
     if (c < CONVERGED)
-      PetscCall(
-          PetscSNPrintf(names[c], 64, "%s_%s", c < HYCO_N_ERRORS ? "worst" : "end", HycoErrorKinds[c % HYCO_N_ERRORS]));
+      PetscCall(PetscSNPrintf(names[c], DRIVER_LINE, "%s_%s", c < HYCO_N_ERRORS ? "worst" : "end",
+                              HycoErrorKinds[c % HYCO_N_ERRORS]));
+    else if (c < N_COLUMNS)
+      PetscCall(PetscStrncpy(names[c], rest[c - CONVERGED], DRIVER_LINE));
     else
-      PetscCall(PetscStrncpy(names[c], rest[c - CONVERGED], 64));
+      PetscCall(PetscSNPrintf(names[c], DRIVER_LINE, "%s_output_%s", q < outputs->n ? "worst" : "end",
+                              outputs->names[q % outputs->n]));
     columns[c] = names[c];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode DriverReportPaths(HycoScene scene, PetscBool contact, PetscInt n, const PetscReal mu[],
-                                 PetscReal value[], const char table[])
+PetscErrorCode DriverReportPaths(HycoScene scene, const DriverOutputs *outputs, PetscBool contact, PetscInt n,
+                                 const PetscReal mu[], PetscReal value[], const char table[])
 {
-  char names[N_COLUMNS][64];
-  const char *columns[N_COLUMNS];
+  char names[N_COLUMNS + 2 * HYCO_MAX_QUANTITIES][DRIVER_LINE];
+  const char *columns[N_COLUMNS + 2 * HYCO_MAX_QUANTITIES];
   DriverPiece all;
-  const DriverRows rows = DriverRowsOfRoot(n, N_COLUMNS, value, &all);
+  DriverRows rows;
   PetscReal seconds[2] = {0, 0}, kkt = 0;
-  PetscInt failed = 0, undefined = 0;
+  PetscInt failed = 0, undefined = 0, width;
   cJSON *json;
 
   PetscFunctionBegin;
-  PetscCall(NameColumns(names, columns));
+  PetscCall(NameColumns(outputs, names, columns));
+  width = N_COLUMNS + 2 * outputs->n;
+  rows = DriverRowsOfRoot(n, width, value, &all);
   if (table[0]) PetscCall(DriverWriteTable(table, scene, mu, columns, &rows));
   PetscCall(ReportCreate("compare", scene, NULL, &json));
   cJSON_AddNumberToObject(json, "n_points", n);
@@ -73,10 +104,11 @@ PetscErrorCode DriverReportPaths(HycoScene scene, PetscBool contact, PetscInt n,
     const PetscInt kind = c % HYCO_N_ERRORS;
 
     if (contact || (kind != HYCO_ERROR_LAMBDA && kind != HYCO_ERROR_LAMBDA_RID))
-      ReportError(json, names[c], n, N_COLUMNS, value, c, CONVERGED, &undefined);
+      ReportError(json, names[c], n, width, value, c, CONVERGED, &undefined);
   }
+  for (PetscInt c = N_COLUMNS; c < width; c++) ReportOutputError(json, names[c], n, width, value, c, CONVERGED);
   for (PetscInt k = 0; k < n; k++) {
-    const PetscReal *v = value + k * N_COLUMNS;
+    const PetscReal *v = value + k * width;
 
     seconds[0] += v[SECONDS_FOM] / n;
     seconds[1] += v[SECONDS_ROM] / n;

@@ -122,6 +122,9 @@ void ReportVector(cJSON *json, const char name[], PetscInt n, const PetscReal v[
    converged: column numbers. */
 void ReportError(cJSON *json, const char name[], PetscInt n, PetscInt n_columns, const PetscReal value[],
                  PetscInt column, PetscInt converged, PetscInt *all_undefined);
+/* The same of the absolute error of an output of the scene. */
+void ReportOutputError(cJSON *json, const char name[], PetscInt n, PetscInt n_columns, const PetscReal value[],
+                       PetscInt column, PetscInt converged);
 /* Adds memory_mb and the missed targets, writes to -report (if given) on rank 0 and frees. */
 PetscErrorCode ReportWrite(cJSON **json);
 /* Writes text to a file, completely or not at all, or to a device. On this process alone. */
@@ -238,10 +241,11 @@ void DriverReportGreedy(cJSON *json, const GreedyLog *log);
 /* When predict solves full order instead, whether it solves for the displacement only, and the objects for it. */
 typedef struct {
   PetscBool on, displacement;
-  PetscReal target_u, target_lambda; /* 0: none */
-  HycoScene scene;                   /* NULL unless on or displacement */
-  HycoFOM fom;                       /* created by the first solve */
-  PetscReal strain_energy;           /* of the last solve */
+  PetscReal target_u, target_lambda;               /* 0: none */
+  HycoScene scene;                                 /* NULL unless on or displacement */
+  HycoFOM fom;                                     /* created by the first solve */
+  PetscReal strain_energy;                         /* of the last solve */
+  PetscInt n_outputs, output[HYCO_MAX_QUANTITIES]; /* by output of the model: its number in that scene, -1: none */
 } Fallback;
 
 /* -target_KIND: a relative error above 0 and at most 1; 0 when absent. */
@@ -329,13 +333,20 @@ PetscErrorCode DriverSayEquilibrium(const DriverReducedPath *path);
 
 /* -- compare_history.c -- */
 
-/* The number of values of a point; one point on one group; their statistics, table ("": none) and report, on every
-   rank; fails if a reduced path did not reach its end. */
+/* The outputs that the scenes of a full-order solution and of a model have in common, and their numbers in both. */
+typedef struct {
+  PetscInt n, full[HYCO_MAX_QUANTITIES], reduced[HYCO_MAX_QUANTITIES];
+  const char *names[HYCO_MAX_QUANTITIES];
+} DriverOutputs;
+PetscErrorCode DriverCommonOutputs(HycoScene scene, HycoROM model, DriverOutputs *outputs);
+
+/* The number of values of a point, for each of the outputs two more; one point on one group; their statistics, table
+   ("": none) and report, on every rank; fails if a reduced path did not reach its end. */
 PetscInt DriverPathColumns(void);
 PetscErrorCode DriverComparePath(HycoFOM fom, HycoROM model, PetscBool root, PetscInt n_par, const PetscReal mu[],
-                                 PetscReal v[]);
-PetscErrorCode DriverReportPaths(HycoScene scene, PetscBool contact, PetscInt n, const PetscReal mu[],
-                                 PetscReal value[], const char table[]);
+                                 const DriverOutputs *outputs, PetscReal v[]);
+PetscErrorCode DriverReportPaths(HycoScene scene, const DriverOutputs *outputs, PetscBool contact, PetscInt n,
+                                 const PetscReal mu[], PetscReal value[], const char table[]);
 
 PetscErrorCode CommandCheck(void);
 PetscErrorCode CommandSolve(void);

@@ -1,6 +1,8 @@
 /* hyco predict with the scene: -hyco_fallback, full order where the reduced model is not accurate enough;
    -hyco_full_displacement, one full-order solve with a condensed model's forces. */
 #include "driver.h"
+#include <hycosceneimpl.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -32,6 +34,7 @@ PetscErrorCode DriverReadTarget(HycoErrorKind kind, PetscReal *target)
 PetscErrorCode DriverReadFallback(HycoROM model, PetscBool extrapolate, Fallback *f)
 {
   HycoROMType type;
+  HycoScene own;
   PetscBool forces;
   char path[PETSC_MAX_PATH_LEN];
 
@@ -60,6 +63,9 @@ PetscErrorCode DriverReadFallback(HycoROM model, PetscBool extrapolate, Fallback
   PetscCall(HycoSceneRefuseHistory(f->scene, "-hyco_fallback"));
   PetscCall(DriverCheckMesh(f->scene));
   PetscCall(HycoROMCheckScene(model, f->scene));
+  PetscCall(HycoROMGetScene(model, &own));
+  PetscCall(HycoSceneGetQuantities(own, &f->n_outputs, NULL));
+  HycoSceneMatchQuantities(own, f->scene, f->output);
   PetscCall(HycoSceneSetExtrapolate(f->scene, extrapolate));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -101,7 +107,7 @@ static void TakeDisplacement(Fallback *f, const HycoSummary *s, HycoPrediction *
   p->overlap = s->overlap;
   p->sliding = s->sliding;
   f->strain_energy = s->strain_energy;
-  for (PetscInt k = 0; k < HYCO_MAX_QUANTITIES; k++) p->quantity[k] = s->quantity[k];
+  for (PetscInt k = 0; k < f->n_outputs; k++) p->quantity[k] = f->output[k] < 0 ? NAN : s->quantity[f->output[k]];
   for (PetscInt c = 0; c < 3; c++) {
     p->u_min[c] = s->u_min[c];
     p->u_max[c] = s->u_max[c];
@@ -121,6 +127,7 @@ PetscErrorCode DriverSolveDisplacement(Fallback *f, HycoROM model, PetscInt n, c
   PetscCall(HycoFOMGetSummary(f->fom, &s));
   TakeDisplacement(f, &s, p);
   p->estimated_error_u = p->estimated_error_u_full;
+  for (PetscInt k = 0; k < HYCO_MAX_QUANTITIES; k++) p->estimated_error_quantity[k] = -1; /* of other displacements */
   if (s.reason > 0) p->reason = reason; /* the reason of the forces' solve */
   p->seconds.setup += s.seconds.setup;
   p->seconds.assemble += s.seconds.assemble;

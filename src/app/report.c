@@ -5,6 +5,12 @@
 #include <string.h>
 #include <sys/resource.h>
 
+/* A column of a table: over the rows that converged, its mean and largest value, and their number. */
+typedef struct {
+  PetscReal mean, worst;
+  PetscInt used, undefined; /* rows where it is finite, and where it is not */
+} Column;
+
 PetscErrorCode ReportCreate(const char command[], HycoScene scene, const PetscReal mu[], cJSON **json)
 {
   PetscInt n;
@@ -108,34 +114,52 @@ PetscErrorCode DriverWriteText(const char path[], const char text[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void ReportError(cJSON *json, const char name[], PetscInt n, PetscInt n_columns, const PetscReal value[],
-                 PetscInt column, PetscInt converged, PetscInt *all_undefined)
+/* Adds an object with these numbers of a column. */
+static void AddColumn(cJSON *json, const char name[], PetscInt n, PetscInt n_columns, const PetscReal value[],
+                      PetscInt column, PetscInt converged, Column *c)
 {
   cJSON *object = cJSON_AddObjectToObject(json, name);
-  PetscReal sum = 0, worst = 0;
-  PetscInt used = 0, undefined = 0;
 
+  *c = (Column){0};
   for (PetscInt k = 0; k < n; k++) {
     const PetscReal e = value[k * n_columns + column];
 
     if (value[k * n_columns + converged] < 0.5) continue;
-    undefined += e > PETSC_MAX_REAL / 8;
-    if (e > PETSC_MAX_REAL / 8) continue;
-    sum += e;
-    worst = PetscMax(worst, e);
-    used++;
+    c->undefined += !(e <= PETSC_MAX_REAL / 8);
+    if (!(e <= PETSC_MAX_REAL / 8)) continue;
+    c->mean += e;
+    c->worst = PetscMax(c->worst, e);
+    c->used++;
   }
-  *all_undefined += undefined;
-  cJSON_AddNumberToObject(object, "undefined", undefined);
-  if (used) {
-    cJSON_AddNumberToObject(object, "mean", sum / used);
-    cJSON_AddNumberToObject(object, "max", worst);
-    (void)!Say("  %-21s mean %9.4f %%   max %9.4f %%\n", name, 100 * (double)(sum / used), 100 * (double)worst);
+  c->mean /= PetscMax(1, c->used);
+  cJSON_AddNumberToObject(object, "undefined", c->undefined);
+  if (c->used) {
+    cJSON_AddNumberToObject(object, "mean", c->mean);
+    cJSON_AddNumberToObject(object, "max", c->worst);
   } else { /* defined at no point */
     cJSON_AddNullToObject(object, "mean");
     cJSON_AddNullToObject(object, "max");
     (void)!Say("  %-21s undefined at every point\n", name);
   }
+}
+
+void ReportError(cJSON *json, const char name[], PetscInt n, PetscInt n_columns, const PetscReal value[],
+                 PetscInt column, PetscInt converged, PetscInt *all_undefined)
+{
+  Column c;
+
+  AddColumn(json, name, n, n_columns, value, column, converged, &c);
+  *all_undefined += c.undefined;
+  if (c.used) (void)!Say("  %-21s mean %9.4f %%   max %9.4f %%\n", name, 100 * (double)c.mean, 100 * (double)c.worst);
+}
+
+void ReportOutputError(cJSON *json, const char name[], PetscInt n, PetscInt n_columns, const PetscReal value[],
+                       PetscInt column, PetscInt converged)
+{
+  Column c;
+
+  AddColumn(json, name, n, n_columns, value, column, converged, &c);
+  if (c.used) (void)!Say("  %-21s mean %9.4g     max %9.4g\n", name, (double)c.mean, (double)c.worst);
 }
 
 /* The column of a set's table that says whether a point converged. */

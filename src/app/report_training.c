@@ -213,6 +213,28 @@ static PetscErrorCode Misses(const Search *s, const HycoTraining *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A line for each output of the scene: its errors in its own unit, and its size. */
+static PetscErrorCode SayOutputs(const Search *s, const HycoTraining *t)
+{
+  const char *names[HYCO_MAX_QUANTITIES];
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetQuantities(s->scene, &n, names));
+  for (PetscInt q = 0; q < n; q++) {
+    const HycoOutputValidation *o = &t->output[q];
+
+    if (o->magnitude < 0)
+      PetscCall(Say("output %s: its error is not known%s, and not estimated\n", names[q],
+                    IsPath(s) ? " (snapshots from before a reaction was named do not have it)" : ""));
+    else
+      PetscCall(Say("output %s: errors median %.3g, largest %.3g; values up to %.4g%s\n", names[q], (double)o->median,
+                    (double)o->largest, (double)o->magnitude,
+                    o->magnitude > 0 ? "" : "; no estimate: it is zero at all held-out points"));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode DriverJudgeModel(const Search *s, const HycoTraining *t)
 {
   char what[DRIVER_LINE], median[DRIVER_LINE], largest[DRIVER_LINE], end[DRIVER_LINE];
@@ -232,6 +254,7 @@ PetscErrorCode DriverJudgeModel(const Search *s, const HycoTraining *t)
   DescribeErrors(IsPath(s), t->held_out.end, end);
   if (IsPath(s))
     PetscCall(Say("these are the errors at each path's worst listed time; the largest at the end are %s\n", end));
+  PetscCall(SayOutputs(s, t));
   if (!t->n_held)
     PetscCall(Say("the model does not estimate its errors: fewer than 10 predictions of held-out solutions\n"));
   PetscCall(Misses(s, t));
@@ -245,6 +268,27 @@ static void AddFinite(cJSON *object, const char name[], PetscReal value)
     cJSON_AddNullToObject(object, name);
   else
     cJSON_AddNumberToObject(object, name, value);
+}
+
+/* held_out: outputs: {NAME: {median, largest, magnitude, estimated}}, in the outputs' units; null: not known. */
+static void ReportOutputs(cJSON *held, const Search *s, const HycoTraining *t)
+{
+  const char *names[HYCO_MAX_QUANTITIES];
+  PetscInt n = 0;
+  cJSON *outputs;
+
+  (void)!HycoSceneGetQuantities(s->scene, &n, names);
+  outputs = n ? cJSON_AddObjectToObject(held, "outputs") : NULL;
+  for (PetscInt q = 0; q < n; q++) {
+    const HycoOutputValidation *o = &t->output[q];
+    const PetscReal infinite = PETSC_MAX_REAL;
+    cJSON *output = cJSON_AddObjectToObject(outputs, names[q]);
+
+    AddFinite(output, "median", o->magnitude < 0 ? infinite : o->median);
+    AddFinite(output, "largest", o->magnitude < 0 ? infinite : o->largest);
+    AddFinite(output, "magnitude", o->magnitude < 0 ? infinite : o->magnitude);
+    cJSON_AddBoolToObject(output, "estimated", o->estimated);
+  }
 }
 
 void DriverReportModel(cJSON *json, const Search *s, const HycoTraining *t)
@@ -266,6 +310,7 @@ void DriverReportModel(cJSON *json, const Search *s, const HycoTraining *t)
       if (IsPath(s)) AddFinite(error, "end", t->held_out.end[j]);
       if (s->target[j] > 0) cJSON_AddNumberToObject(error, "target", s->target[j]);
     }
+    ReportOutputs(held, s, t);
   } else
     cJSON_AddNullToObject(json, "held_out");
   if (a->number) {

@@ -147,8 +147,7 @@ static PetscErrorCode Compare(Rows *r, const PetscReal mu[], PetscMPIInt of, Hyc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Predicts at one held-out point; a path in the steps of full order. */
-static PetscErrorCode PredictOne(HycoROM m, HycoSnapshots store, const PetscReal mu[])
+PetscErrorCode HycoHeldOutPredict(HycoROM m, HycoSnapshots store, const PetscReal mu[])
 {
   PetscReal *taken = NULL;
   PetscInt n;
@@ -169,7 +168,7 @@ static PetscErrorCode PredictOne(HycoROM m, HycoSnapshots store, const PetscReal
 static PetscErrorCode Predict(HycoROM m, HycoSnapshots store, const PetscReal mu[], PetscInt repeat, HycoHeldOut *row)
 {
   PetscFunctionBegin;
-  PetscCall(PredictOne(m, store, mu));
+  PetscCall(HycoHeldOutPredict(m, store, mu));
   row->seconds[repeat] = m->prediction.seconds.total;
   if (repeat) PetscFunctionReturn(PETSC_SUCCESS);
   row->converged = m->prediction.reason > 0;

@@ -4,7 +4,8 @@
   above SHARE of them. Held-out points are distributed like a user's points over the region of training, so that the
   quantile number ceil(SHARE (n + 1)) of the ratios is a bound for SHARE of future points (split conformal prediction:
   Vovk, Gammerman, Shafer, Algorithmic Learning in a Random World, 2005), however accurate the formula is; an accurate
-  formula only makes the bound tighter. The settings were chosen with the same points, for which MARGIN allows.
+  formula only makes the bound tighter. The settings were chosen with the same points, for which MARGIN allows. The
+  scene's outputs have formulas for their absolute errors (judge_outputs.c).
 */
 #include <hycoalgorithms.h>
 #include <hycoreducerimpl.h>
@@ -59,76 +60,149 @@ static PetscErrorCode Spacing(HycoReducer t, PetscReal *spacing)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fits the formula for one kind of error; none if an error is not finite. Rows without an error, for example forces
-   without contact, contain no information on its size: they come last, and only raise the bound. */
-static PetscErrorCode FitError(PetscInt n, const HycoHeldOut rows[], HycoEstimateKind kind, HycoEstimates *estimates)
+/* The mean of a formula over n rows of X. */
+static PetscReal MeanOf(PetscInt n, const PetscReal X[], const PetscReal law[])
 {
   const PetscInt p = HYCO_ESTIMATE_FEATURES;
-  PetscReal *X, *y, *error, least;
+  PetscReal sum = 0;
+
+  for (PetscInt i = 0; i < n * p; i++) sum += law[i % p] * X[i];
+  return law[p] + sum / n;
+}
+
+/* Replaces a formula by that of the error of u, stress or forces, raised above the errors y in the same way, if its
+   mean is smaller. The error of an output has a sign and passes through zero, so that its logarithm scatters more than
+   that of a norm, and coefficients fitted to it are less certain. */
+static PetscErrorCode Borrow(PetscInt n, const PetscReal X[], const PetscReal y[], const HycoEstimates *estimates,
+                             PetscReal law[])
+{
+  PetscReal other[HYCO_ESTIMATE_FEATURES + 1];
+
+  PetscFunctionBegin;
+  for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++) {
+    if (!estimates->has[e]) continue;
+    PetscCall(PetscArraycpy(other, estimates->law[e], HYCO_ESTIMATE_FEATURES + 1));
+    PetscCall(HycoRaiseBound(n, HYCO_ESTIMATE_FEATURES, X, y, SHARE, other));
+    if (MeanOf(n, X, other) < MeanOf(n, X, law)) PetscCall(PetscArraycpy(law, other, HYCO_ESTIMATE_FEATURES + 1));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Fits the formula for these errors. Those up to `least`, for example of forces without contact, contain no information
+   on their size: they come last, and only raise the bound. */
+static PetscErrorCode Fit(PetscInt n, const HycoHeldOut rows[], const PetscReal error[], PetscReal least,
+                          const HycoEstimates *estimates, PetscBool borrow, PetscReal law[])
+{
+  const PetscInt p = HYCO_ESTIMATE_FEATURES;
+  PetscReal *X, *y;
   PetscInt filled = 0, telling = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(n * p, &X, n, &y));
+  for (PetscInt pass = 0; pass < 2; pass++) {
+    for (PetscInt i = 0; i < n; i++) {
+      if ((error[i] > least) != (pass == 0)) continue;
+      for (PetscInt j = 0; j < p; j++) X[filled * p + j] = PetscLogReal(1 + rows[i].feature[j] / estimates->floor[j]);
+      y[filled++] = PetscLogReal(PetscMax(error[i], least));
+      if (pass == 0) telling = filled;
+    }
+  }
+  PetscCall(HycoUpperBound(n, telling ? telling : n, p, X, y, SHARE, law));
+  if (borrow) PetscCall(Borrow(n, X, y, estimates, law));
+  law[p] += PetscLogReal(MARGIN);
+  PetscCall(PetscFree2(X, y));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One kind of error; no estimate if one is not finite. */
+static PetscErrorCode FitError(PetscInt n, const HycoHeldOut rows[], HycoEstimateKind kind, HycoEstimates *estimates)
+{
+  PetscReal *error, median;
   PetscBool finite = PETSC_TRUE;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc3(n * p, &X, n, &y, n, &error));
+  PetscCall(PetscMalloc1(n, &error));
   for (PetscInt i = 0; i < n; i++) {
     error[i] = HycoHeldOutError(&rows[i], errors[kind], estimates->force);
     finite = (PetscBool)(finite && !PetscIsInfOrNanReal(error[i]));
   }
-  PetscCall(Median(n, error, 1, PETSC_SMALL, &least));
-  for (PetscInt pass = 0; finite && pass < 2; pass++) {
-    for (PetscInt i = 0; i < n; i++) {
-      if ((error[i] > NEGLIGIBLE * least) != (pass == 0)) continue;
-      for (PetscInt j = 0; j < p; j++) X[filled * p + j] = PetscLogReal(1 + rows[i].feature[j] / estimates->floor[j]);
-      y[filled++] = PetscLogReal(PetscMax(error[i], NEGLIGIBLE * least));
-      if (pass == 0) telling = filled;
-    }
-  }
+  PetscCall(Median(n, error, 1, PETSC_SMALL, &median));
   estimates->has[kind] = (PetscBool)(finite && (kind != HYCO_ESTIMATE_LAMBDA || estimates->force > 0));
-  if (estimates->has[kind]) PetscCall(HycoUpperBound(n, telling ? telling : n, p, X, y, SHARE, estimates->law[kind]));
-  estimates->law[kind][p] += PetscLogReal(MARGIN);
-  PetscCall(PetscFree3(X, y, error));
+  if (estimates->has[kind])
+    PetscCall(Fit(n, rows, error, NEGLIGIBLE * median, estimates, PETSC_FALSE, estimates->law[kind]));
+  PetscCall(PetscFree(error));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Predictions that did not converge have no features; online they are reported as not converged. */
-static PetscErrorCode FitAll(HycoReducer t, PetscInt n, HycoHeldOut rows[], HycoEstimates *estimates)
+/* One output of the scene: its errors at the converged points, and the formula for them. Errors up to round-off of the
+   output's largest value are not told apart: relative to the output itself they have no meaning where it is zero, and
+   relative to its spread none where it is constant. No estimate if an error is not known, or if the output is always
+   zero. */
+static PetscErrorCode FitOutput(PetscInt n, const HycoHeldOut rows[], const HycoOutputErrors found[], PetscInt q,
+                                HycoEstimates *estimates)
 {
-  PetscInt converged = 0;
+  HycoOutputEstimate *o = &estimates->output[q];
+  PetscReal *error, *sorted, least, median;
 
   PetscFunctionBegin;
-  estimates->force = HycoHeldOutForce(n, rows);
+  *o = (HycoOutputEstimate){.magnitude = -1, .median = -1, .largest = -1};
   for (PetscInt i = 0; i < n; i++) {
-    if (rows[i].converged > 0.5) rows[converged++] = rows[i];
+    if (PetscIsInfOrNanReal(found[i].error[q]) || PetscIsInfOrNanReal(found[i].size[q]))
+      PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (converged < LEAST) PetscFunctionReturn(PETSC_SUCCESS);
-  estimates->n = converged;
+  if (!n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc2(n, &error, n, &sorted));
+  for (PetscInt i = 0; i < n; i++) {
+    sorted[i] = error[i] = found[i].error[q];
+    o->magnitude = PetscMax(o->magnitude, found[i].size[q]);
+  }
+  PetscCall(PetscSortReal(n, sorted));
+  o->median = sorted[n / 2];
+  o->largest = sorted[n - 1];
+  o->has = (PetscBool)(o->magnitude > 0 && estimates->n);
+  PetscCall(Median(n, error, 1, 0, &median));
+  least = PetscMax(NEGLIGIBLE * median, HYCO_OUTPUT_ROUND_OFF * o->magnitude);
+  if (o->has) PetscCall(Fit(n, rows, error, least, estimates, PETSC_TRUE, o->law));
+  PetscCall(PetscFree2(error, sorted));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Fits the formulas to converged predictions. */
+static PetscErrorCode FitAll(HycoReducer t, PetscInt n, const HycoHeldOut rows[], HycoEstimates *estimates)
+{
+  PetscFunctionBegin;
+  if (n < LEAST) PetscFunctionReturn(PETSC_SUCCESS);
+  estimates->n = n;
   for (PetscInt j = 0; j < HYCO_ESTIMATE_FEATURES; j++) {
-    PetscCall(Median(converged, rows[0].feature + j, (PetscInt)(sizeof(*rows) / sizeof(PetscReal)), 1 / SMALL,
-                     &estimates->floor[j]));
+    PetscCall(
+        Median(n, rows[0].feature + j, (PetscInt)(sizeof(*rows) / sizeof(PetscReal)), 1 / SMALL, &estimates->floor[j]));
     estimates->floor[j] *= SMALL;
   }
   PetscCall(Spacing(t, &estimates->floor[HYCO_ESTIMATE_DISTANCE]));
-  for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++) PetscCall(FitError(converged, rows, (HycoEstimateKind)e, estimates));
+  for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++) PetscCall(FitError(n, rows, (HycoEstimateKind)e, estimates));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fits the formulas, and stores the errors in the model. Rank 0. */
-static PetscErrorCode Conclude(HycoReducer t, HycoHeldOut rows[], HycoROM m, HycoTraining *report)
+/* Moves the points with converged predictions to the front: others have no features, and are reported as not converged
+   online. Returns their number. */
+static PetscInt KeepConverged(PetscInt n, HycoHeldOut rows[], HycoOutputErrors outputs[])
 {
-  const HycoValidation *v = &report->held_out;
-  const HycoAttempt *chosen = &report->chosen;
-  HycoEstimates estimates = {0};
+  PetscInt converged = 0;
+
+  for (PetscInt i = 0; i < n; i++) {
+    if (!(rows[i].converged > 0.5)) continue;
+    rows[converged] = rows[i];
+    outputs[converged++] = outputs[i];
+  }
+  return converged;
+}
+
+/* "  settings number 2 of the 5 that were tried: ...", in the model. */
+static PetscErrorCode NameSettings(const HycoAttempt *chosen, HycoROM m)
+{
   char settings[HYCO_LINE], text[2 * HYCO_LINE];
 
   PetscFunctionBegin;
-  estimates.n_held = v->n;
-  for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++) {
-    estimates.median[e] = v->median[errors[e]];
-    estimates.largest[e] = v->largest[errors[e]];
-  }
-  PetscCall(FitAll(t, v->n, rows, &estimates));
-  report->n_held = estimates.n;
-  m->estimates = estimates;
   if (!chosen->number) PetscFunctionReturn(PETSC_SUCCESS);
   HycoReducerSettingsDescribe(&chosen->settings, sizeof(settings), settings);
   snprintf(text, sizeof(text), "  settings number %d of the %d that were tried: %s\n", (int)chosen->number,
@@ -138,9 +212,40 @@ static PetscErrorCode Conclude(HycoReducer t, HycoHeldOut rows[], HycoROM m, Hyc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Fits the formulas, and stores the errors in the model. Rank 0. */
+static PetscErrorCode Conclude(HycoReducer t, HycoHeldOut rows[], HycoOutputErrors outputs[], HycoROM m,
+                               HycoTraining *report)
+{
+  const HycoValidation *v = &report->held_out;
+  HycoEstimates estimates = {0};
+  PetscInt n;
+
+  PetscFunctionBegin;
+  estimates.n_held = v->n;
+  for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++) {
+    estimates.median[e] = v->median[errors[e]];
+    estimates.largest[e] = v->largest[errors[e]];
+  }
+  estimates.force = HycoHeldOutForce(v->n, rows);
+  n = KeepConverged(v->n, rows, outputs);
+  PetscCall(FitAll(t, n, rows, &estimates));
+  estimates.n_outputs = t->scene->n_quantities;
+  for (PetscInt q = 0; q < estimates.n_outputs; q++) {
+    const HycoOutputEstimate *o = &estimates.output[q];
+
+    PetscCall(FitOutput(n, rows, outputs, q, &estimates));
+    report->output[q] = (HycoOutputValidation){o->median, o->largest, o->magnitude, o->has};
+  }
+  report->n_held = estimates.n;
+  m->estimates = estimates;
+  PetscCall(NameSettings(&report->chosen, m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, HycoROM model, HycoTraining *report)
 {
   HycoHeldOut *rows = t->judged_held;
+  HycoOutputErrors *outputs;
   PetscInt n = 0;
 
   PetscFunctionBegin;
@@ -152,8 +257,12 @@ PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, HycoROM 
     PetscCall(HycoReducerPredictHeldOut(t, model, store, NULL, rows));
   }
   PetscCall(HycoHeldOutSummarise(n, rows, HycoHeldOutForce(n, rows), &report->held_out));
-  HycoOnRoot(HycoComm(t), Conclude(t, rows, model, report));
+  PetscCall(PetscCalloc1(n, &outputs));
+  PetscCall(HycoReducerJudgeOutputs(t, model, store, rows, outputs));
+  HycoOnRoot(HycoComm(t), Conclude(t, rows, outputs, model, report));
   PetscCallMPI(MPI_Bcast(&report->n_held, 1, MPIU_INT, 0, HycoComm(t)));
+  PetscCallMPI(MPI_Bcast(report->output, sizeof(report->output), MPI_BYTE, 0, HycoComm(t)));
+  PetscCall(PetscFree(outputs));
   PetscCall(PetscFree(rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -279,6 +279,20 @@ static PetscErrorCode WriteBetween(HycoFOM fom, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Writes the forces of supports, with which outputs of predicted paths are compared, if the scene names one. They
+   follow from the other fields only without a history. Collective. */
+static PetscErrorCode WriteReactions(HycoFOM fom, HycoH5 h, const char name[], PetscReal reaction[])
+{
+  const HycoFileOrder *rows;
+
+  PetscFunctionBegin;
+  if (!HycoSceneHasReactions(fom->scene)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoFOMGetRows(fom, &rows));
+  PetscCall(HycoFOMReactions(fom, reaction));
+  PetscCall(HycoFieldWrite(h, rows, fom->n_nodes, name, HYCO_ON_NODES, MPIU_REAL, fom->fe->dim, 1, reaction));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* A HycoStepMonitor: writes the fields of a listed time. The forces are the internal forces f_int. */
 static PetscErrorCode WriteStep(HycoFOM fom, const HycoStep *step, void *ctx)
 {
@@ -302,6 +316,8 @@ static PetscErrorCode WriteStep(HycoFOM fom, const HycoStep *step, void *ctx)
   PetscCall(HycoFieldWrite(w->h, rows, fom->n_cells, name, HYCO_ON_CELLS, MPIU_REAL, fom->fe->n_sigma, 1, fom->sigma));
   NameField(w->s, step->index, "force", name);
   PetscCall(HycoFieldWrite(w->h, rows, fom->n_nodes, name, HYCO_ON_NODES, MPIU_REAL, dim, 1, w->force));
+  NameField(w->s, step->index, "reaction", name);
+  PetscCall(WriteReactions(fom, w->h, name, w->force));
   NameField(w->s, step->index, "spring", name);
   PetscCall(WriteSprings(fom, w->h, name));
   NameField(w->s, step->index, "inelastic", name);
@@ -635,6 +651,18 @@ PetscErrorCode HycoSnapshotsReadRows(HycoSnapshots s, const PetscReal mu[], Pets
   PetscCall(OpenSample(s, mu, &h));
   NameField(s, k, field, name);
   PetscCall(HycoH5ReadRows(h, name, first, n, 1, value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSnapshotsHas(HycoSnapshots s, const PetscReal mu[], PetscInt k, const char field[], PetscBool *has)
+{
+  char name[HYCO_LINE];
+  HycoH5 h;
+
+  PetscFunctionBegin;
+  PetscCall(OpenSample(s, mu, &h));
+  NameField(s, k, field, name);
+  *has = HycoH5Has(h, name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

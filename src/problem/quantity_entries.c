@@ -68,6 +68,27 @@ PetscErrorCode HycoSceneReadQuantity(HycoScene s, PetscInt entry, const char nam
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscBool SameText(const char a[], const char b[])
+{
+  return (PetscBool)(a && b ? !strcmp(a, b) : a == b);
+}
+
+void HycoSceneMatchQuantities(HycoScene s, HycoScene other, PetscInt at[])
+{
+  for (PetscInt k = 0; k < s->n_quantities; k++) {
+    const HycoQuantity *q = &s->quantity[k];
+
+    at[k] = -1;
+    for (PetscInt j = 0; j < other->n_quantities; j++) {
+      const HycoQuantity *r = &other->quantity[j];
+
+      if (!strcasecmp(q->name, r->name) && q->kind == r->kind && q->field == r->field && SameText(q->group, r->group) &&
+          SameText(q->contact, r->contact))
+        at[k] = j;
+    }
+  }
+}
+
 PetscBool HycoSceneAsks(HycoScene s, HycoQuantityKind first, HycoQuantityKind last)
 {
   for (PetscInt k = 0; k < s->n_quantities; k++) {

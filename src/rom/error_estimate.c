@@ -12,6 +12,9 @@
   Outside the region of training the estimate is multiplied by (1 + b / d)^2, b the scaled distance from it and d the
   spacing of the training points. K's rows on the interface lack the cells outside the RID, so that no residual can be
   computed there; the misfit measures the disagreement between the two sides of the interface instead.
+
+  The scene's outputs have formulas of their own, for absolute errors: an output may pass through zero. An estimate is
+  at least HYCO_OUTPUT_ROUND_OFF of the largest absolute value of the output at the held-out points.
 */
 #include <hycoalgorithms.h>
 #include <hycoromimpl.h>
@@ -153,31 +156,42 @@ static PetscReal Beyond(HycoROM m, const PetscReal mu[], PetscReal nearest[])
   return most > 1e-12 ? most : 0;
 }
 
-static PetscReal Estimate(const HycoEstimates *t, const PetscReal coefficient[], const PetscReal feature[])
+/* term[j]: log(1 + f_j / floor_j) */
+static PetscReal Estimate(const PetscReal coefficient[], const PetscReal term[])
 {
   PetscReal sum = coefficient[HYCO_ESTIMATE_FEATURES];
 
-  for (PetscInt j = 0; j < HYCO_ESTIMATE_FEATURES; j++)
-    sum += coefficient[j] * PetscLogReal(1 + feature[j] / t->floor[j]);
+  for (PetscInt j = 0; j < HYCO_ESTIMATE_FEATURES; j++) sum += coefficient[j] * term[j];
   return PetscExpReal(PetscMin(sum, 200));
+}
+
+static PetscReal EstimateOutput(const HycoOutputEstimate *o, const PetscReal term[])
+{
+  return PetscMax(Estimate(o->law, term), HYCO_OUTPUT_ROUND_OFF * o->magnitude);
 }
 
 PetscErrorCode HycoEstimatesEvaluate(HycoROM m, HycoPrediction *p)
 {
   const HycoEstimates *t = &m->estimates;
-  PetscReal nearest[HYCO_MAX_PARAMETERS], feature[HYCO_ESTIMATE_FEATURES], outside, estimate[HYCO_N_ESTIMATES];
+  PetscReal nearest[HYCO_MAX_PARAMETERS], term[HYCO_ESTIMATE_FEATURES], outside, estimate[HYCO_N_ESTIMATES];
 
   PetscFunctionBegin;
+  for (PetscInt q = 0; q < HYCO_MAX_QUANTITIES; q++) p->estimated_error_quantity[q] = -1;
   p->estimated_error_u = p->estimated_error_lambda = p->estimated_error_sigma = -1;
   PetscCall(FindReach(m));
   p->beyond = Beyond(m, m->fe->mu, nearest);
   p->estimated_error_u_full = -1;
   if (p->reason > 0) PetscTryTypeMethod(m, estimate, p);
   if (!t->n || p->reason <= 0 || (m->ops->reconstruct && !m->reconstruct)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoEstimatesFeatures(m, feature));
+  PetscCall(HycoEstimatesFeatures(m, term));
+  for (PetscInt j = 0; j < HYCO_ESTIMATE_FEATURES; j++) term[j] = PetscLogReal(1 + term[j] / t->floor[j]);
   outside = 1 + (p->beyond > 0 ? HycoEstimatesDistance(m->scene, m->fe->mu, nearest) / t->floor[DISTANCE] : 0);
   for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++)
-    estimate[e] = t->has[e] ? Estimate(t, t->law[e], feature) * outside * outside : -1;
+    estimate[e] = t->has[e] ? Estimate(t->law[e], term) * outside * outside : -1;
+  for (PetscInt q = 0; q < t->n_outputs; q++) {
+    if (t->output[q].has && !PetscIsInfOrNanReal(p->quantity[q]))
+      p->estimated_error_quantity[q] = EstimateOutput(&t->output[q], term) * outside * outside;
+  }
   p->estimated_error_u = estimate[HYCO_ESTIMATE_U];
   p->estimated_error_sigma = estimate[HYCO_ESTIMATE_SIGMA];
   p->estimated_error_lambda = estimate[HYCO_ESTIMATE_LAMBDA];
@@ -202,6 +216,18 @@ PetscErrorCode HycoEstimatesView(HycoROM m, PetscViewer viewer)
     DescribeErrors(t->largest, largest);
     PetscCall(PetscViewerASCIIPrintf(viewer, "  errors at %d held-out points: median %s; largest %s\n", (int)t->n_held,
                                      median, largest));
+  }
+  for (PetscInt q = 0; q < t->n_outputs; q++) {
+    const HycoOutputEstimate *o = &t->output[q];
+
+    if (o->magnitude >= 0)
+      PetscCall(PetscViewerASCIIPrintf(viewer,
+                                       "    output %s: median %.2g, largest %.2g (values up to %.4g); error %s\n",
+                                       m->scene->quantity[q].name, (double)o->median, (double)o->largest,
+                                       (double)o->magnitude, o->has ? "estimated" : "not estimated"));
+    else
+      PetscCall(
+          PetscViewerASCIIPrintf(viewer, "    output %s: not known, not estimated\n", m->scene->quantity[q].name));
   }
   if (t->n)
     PetscCall(PetscViewerASCIIPrintf(viewer, "  error estimates: calibrated on %d predictions of held-out solutions\n",

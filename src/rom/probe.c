@@ -6,6 +6,7 @@
 #include <hycoinelastic.h>
 #include <hycoquantities.h>
 #include <hycoromimpl.h>
+#include <math.h>
 
 struct _n_HycoProbe {
   HycoMesh mesh; /* with these cells */
@@ -13,7 +14,9 @@ struct _n_HycoProbe {
   PetscReal *V, *u, *sigma; /* n_dof x l; n_dof; n_cells x n_sigma */
   PetscInt *fe_at;          /* by full-order displacement: its index in u; -1: none */
   PetscReal *reaction;      /* n_dof, of supports; NULL: no quantity needs them */
-  PetscBool *touched;       /* by node: belongs to a contact; allocated with reaction */
+  PetscInt *surface_node;   /* by node: its number on `surface`; -1: in no contact. Allocated with reaction */
+  HycoMesh surface;         /* the model's mesh without cells; NULL until needed */
+  HycoFE fe_surface;
 };
 
 PetscErrorCode HycoProbeDestroy(HycoProbe *probe)
@@ -21,14 +24,18 @@ PetscErrorCode HycoProbeDestroy(HycoProbe *probe)
   PetscFunctionBegin;
   if (!*probe) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoFEDestroy(&(*probe)->fe));
+  PetscCall(HycoFEDestroy(&(*probe)->fe_surface));
   PetscCall(HycoMeshDestroy(&(*probe)->mesh));
-  HycoFreeAll(&(*probe)->V, &(*probe)->u, &(*probe)->sigma, &(*probe)->fe_at, &(*probe)->reaction, &(*probe)->touched);
+  HycoFreeAll(&(*probe)->V, &(*probe)->u, &(*probe)->sigma, &(*probe)->fe_at, &(*probe)->reaction,
+              &(*probe)->surface_node, &(*probe)->surface);
   PetscCall(PetscFree(*probe));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Sets mesh and V from the whole mesh. */
 static PetscErrorCode Extract(HycoROM m, HycoProbe p)
 {
+  const PetscInt width = m->whole->dim * m->l;
   PetscBool *needed;
   PetscInt *keep, n = 0;
 
@@ -40,22 +47,45 @@ static PetscErrorCode Extract(HycoROM m, HycoProbe p)
   }
   PetscCall(HycoMeshExtract(m->whole, n, keep, 0, NULL, 0, NULL, &p->mesh));
   PetscCall(PetscFree2(needed, keep));
+  PetscCall(PetscMalloc1(p->mesh->n_nodes * width, &p->V));
+  for (PetscInt i = 0; i < p->mesh->n_nodes; i++)
+    PetscCall(PetscArraycpy(p->V + i * width, m->V_whole + p->mesh->node_whole[i] * width, width));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Allocates reactions, and marks the nodes where contact forces may be part of them. */
+/* Created when contact acts on a support. */
+static PetscErrorCode MakeSurface(HycoROM m, HycoProbe p)
+{
+  PetscFunctionBegin;
+  if (p->fe_surface) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFree(p->surface)); /* of an attempt that failed */
+  PetscCall(PetscNew(&p->surface));
+  *p->surface = *m->mesh;
+  p->surface->n_cells = 0;
+  PetscCall(HycoFECreate(m->scene, p->surface, &p->fe_surface));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Allocates reactions, and finds the nodes where contact forces may be part of them. */
 static PetscErrorCode PrepareReactions(HycoROM m, HycoProbe p)
 {
   PetscBool *in;
+  PetscInt *place;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   if (!HycoSceneHasReactions(m->scene)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(p->fe->n_dof, &p->reaction));
-  PetscCall(PetscMalloc1(p->mesh->n_nodes, &p->touched));
-  PetscCall(PetscCalloc1(m->whole->n_nodes, &in));
-  PetscCall(HycoPairsMarkSurfaces(m->scene, m->whole, &m->whole_pairs, in));
-  for (PetscInt i = 0; i < p->mesh->n_nodes; i++) p->touched[i] = in[p->mesh->node_whole[i]];
+  PetscCall(PetscMalloc1(p->mesh->n_nodes, &p->surface_node));
+  PetscCall(PetscCalloc1(m->mesh->n_nodes, &in));
+  PetscCall(PetscMalloc1(m->whole_nodes, &place));
+  for (PetscInt i = 0; i < m->whole_nodes; i++) place[i] = -1;
+  ierr = HycoPairsMarkSurfaces(m->scene, m->mesh, &m->pairs, in);
+  for (PetscInt i = 0; i < m->mesh->n_nodes; i++) place[m->mesh->node_whole[i]] = in[i] ? i : -1;
+  for (PetscInt i = 0; i < p->mesh->n_nodes; i++) p->surface_node[i] = place[p->mesh->node_whole[i]];
+  PetscCall(PetscFree(place));
   PetscCall(PetscFree(in));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -65,20 +95,23 @@ static PetscErrorCode TakeContact(HycoROM m, HycoProbe p, const PetscReal Lambda
   const PetscInt dim = p->fe->dim;
   PetscBool any = PETSC_FALSE;
   HycoContactFields c;
-  PetscReal *force;
+  PetscReal *force, *u;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < p->fe->n_dof; k++)
-    any = (PetscBool)(any || (HycoFESupports(p->fe, k) && p->touched[k / dim]));
+    any = (PetscBool)(any || (HycoFESupports(p->fe, k) && p->surface_node[k / dim] >= 0));
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoFESetParameters(m->fe_whole, p->fe->mu));
-  ierr = HycoContactFieldsCreate(PETSC_COMM_SELF, m->fe_whole, &m->whole_pairs, m->U_whole, Lambda, &c);
-  PetscCall(PetscMalloc1(p->fe->n_dof, &force));
-  for (PetscInt k = 0; k < p->fe->n_dof; k++) force[k] = ierr ? 0 : c.force[3 * p->mesh->node_whole[k / dim] + k % dim];
+  PetscCall(MakeSurface(m, p));
+  PetscCall(HycoFESetParameters(p->fe_surface, p->fe->mu));
+  PetscCall(PetscCalloc2(p->fe_surface->n_dof, &u, p->fe->n_dof, &force)); /* forces do not depend on u */
+  ierr = HycoContactFieldsCreate(PETSC_COMM_SELF, p->fe_surface, &m->pairs, u, Lambda, &c);
+  for (PetscInt k = 0; !ierr && k < p->fe->n_dof; k++) {
+    if (p->surface_node[k / dim] >= 0) force[k] = c.force[3 * p->surface_node[k / dim] + k % dim];
+  }
   HycoFEGeneralise(p->fe, force);
   for (PetscInt k = 0; k < p->fe->n_dof; k++) p->reaction[k] -= HycoFESupports(p->fe, k) ? force[k] : 0;
-  PetscCall(PetscFree(force));
+  PetscCall(PetscFree2(u, force));
   PetscCall(HycoContactFieldsDestroy(&c));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -94,23 +127,20 @@ static PetscErrorCode React(HycoROM m, HycoProbe p, const PetscReal f_int[], con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Once mesh and V are set. */
 static PetscErrorCode Fill(HycoROM m, HycoProbe p)
 {
-  const PetscInt dim = m->whole->dim;
+  const PetscInt dim = m->mesh->dim;
   PetscInt *place;
 
   PetscFunctionBegin;
-  PetscCall(Extract(m, p));
   PetscCall(HycoFECreate(m->scene, p->mesh, &p->fe));
-  PetscCall(PetscMalloc1(p->fe->n_dof * m->l, &p->V));
   PetscCall(PetscMalloc1(p->fe->n_dof, &p->u));
   PetscCall(PetscMalloc1(p->mesh->n_cells * p->fe->n_sigma, &p->sigma));
   PetscCall(PetscMalloc1(m->n_fe, &p->fe_at));
-  PetscCall(PetscMalloc1(m->whole->n_nodes, &place));
-  for (PetscInt i = 0; i < m->whole->n_nodes; i++) place[i] = -1;
+  PetscCall(PetscMalloc1(m->whole_nodes, &place));
+  for (PetscInt i = 0; i < m->whole_nodes; i++) place[i] = -1;
   for (PetscInt i = 0; i < p->mesh->n_nodes; i++) place[p->mesh->node_whole[i]] = i;
-  for (PetscInt k = 0; k < p->fe->n_dof; k++)
-    PetscCall(PetscArraycpy(p->V + k * m->l, m->V_whole + (p->mesh->node_whole[k / dim] * dim + k % dim) * m->l, m->l));
   for (PetscInt k = 0; k < m->n_fe; k++) {
     const PetscInt i = place[m->mesh->node_whole[m->fe_dof[k] / dim]];
 
@@ -216,6 +246,23 @@ static PetscErrorCode Make(HycoROM m)
   if (m->probe || !HycoSceneAsksFields(m->scene)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoROMLoadWhole(m));
   PetscCall(PetscNew(&m->probe));
+  ierr = Extract(m, m->probe);
+  if (!ierr) ierr = Fill(m, m->probe);
+  if (ierr) PetscCall(HycoProbeDestroy(&m->probe));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMSetProbe(HycoROM m, HycoMesh mesh, PetscReal V[])
+{
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMSetUp(m)); /* which otherwise destroys it */
+  PetscCall(HycoProbeDestroy(&m->probe));
+  PetscCall(PetscNew(&m->probe));
+  m->probe->mesh = mesh;
+  m->probe->V = V;
   ierr = Fill(m, m->probe);
   if (ierr) PetscCall(HycoProbeDestroy(&m->probe));
   PetscCall(ierr);
@@ -270,5 +317,28 @@ PetscErrorCode HycoROMMeasureQuantities(HycoROM m, HycoPrediction *out)
   PetscCall(Make(m));
   if (m->probe) PetscCall(Follow(m, m->probe));
   PetscCall(Measure(m, m->probe, m->Lambda, out->quantity));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+HycoFE HycoROMGetProbe(HycoROM m)
+{
+  return m->probe ? m->probe->fe : NULL;
+}
+
+PetscErrorCode HycoROMMeasureGiven(HycoROM m, const PetscReal mu[], const PetscReal u[], const PetscReal sigma[],
+                                   const PetscReal reaction[], const PetscReal Lambda[], PetscReal value[])
+{
+  HycoProbe p = m->probe;
+
+  PetscFunctionBegin;
+  if (p) {
+    PetscCall(HycoFESetParameters(p->fe, mu));
+    PetscCall(PetscArraycpy(p->u, u, p->fe->n_dof));
+    PetscCall(PetscArraycpy(p->sigma, sigma, p->mesh->n_cells * p->fe->n_sigma));
+    if (!m->trace.n_listed) PetscCall(React(m, p, NULL, Lambda));
+    for (PetscInt k = 0; m->trace.n_listed && p->reaction && k < p->fe->n_dof; k++)
+      p->reaction[k] = reaction ? reaction[k] : NAN;
+  }
+  PetscCall(Measure(m, p, Lambda, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -305,8 +305,8 @@ PetscErrorCode HycoROMGetPrediction(HycoROM m, HycoPrediction *out)
   }
   p->u_norm2 = PetscSqrtReal(p->u_norm2);
   PetscCall(MeasureContacts(m, p));
-  PetscCall(HycoEstimatesEvaluate(m, p));
   PetscCall(HycoROMMeasureQuantities(m, p));
+  PetscCall(HycoEstimatesEvaluate(m, p));
   PetscCall(MeasureEquilibrium(m, p));
   *out = *p;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -163,11 +163,34 @@ static PetscErrorCode LoadType(HycoH5 h, HycoROM m)
 }
 
 /* training/held_out: the number of predictions, medians and largest errors. training/estimates: the number behind them,
-   the largest force, the floors, and for each error whether it has an estimate, the coefficients, the constant. */
+   the largest force, the floors, and for each error whether it has an estimate, the coefficients, the constant.
+   training/outputs: a row for each output of the scene: whether it has an estimate, its largest absolute value, median
+   and largest error, the coefficients, the constant. */
 enum {
   HELD_NUMBERS = 1 + 2 * HYCO_N_ESTIMATES,
+  OUTPUT_NUMBERS = 5 + HYCO_ESTIMATE_FEATURES,
   ESTIMATE_NUMBERS = 2 + HYCO_ESTIMATE_FEATURES + HYCO_N_ESTIMATES * (2 + HYCO_ESTIMATE_FEATURES)
 };
+
+static PetscErrorCode SaveOutputEstimates(HycoH5 h, HycoROM m)
+{
+  const HycoEstimates *t = &m->estimates;
+  PetscReal numbers[HYCO_MAX_QUANTITIES * OUTPUT_NUMBERS], *at = numbers;
+
+  PetscFunctionBegin;
+  if (!t->n_outputs) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt q = 0; q < t->n_outputs; q++) {
+    const HycoOutputEstimate *o = &t->output[q];
+
+    *at++ = o->has;
+    *at++ = o->magnitude;
+    *at++ = o->median;
+    *at++ = o->largest;
+    for (PetscInt j = 0; j <= HYCO_ESTIMATE_FEATURES; j++) *at++ = o->law[j];
+  }
+  PetscCall(HycoH5WriteReal(h, "training/outputs", t->n_outputs, OUTPUT_NUMBERS, numbers));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 static PetscErrorCode SaveEstimates(HycoH5 h, HycoROM m)
 {
@@ -184,6 +207,7 @@ static PetscErrorCode SaveEstimates(HycoH5 h, HycoROM m)
     }
     PetscCall(HycoH5WriteReal(h, "training/held_out", HELD_NUMBERS, 1, numbers));
   }
+  PetscCall(SaveOutputEstimates(h, m));
   if (!t->n) PetscFunctionReturn(PETSC_SUCCESS);
   *at++ = (PetscReal)t->n;
   *at++ = t->force;
@@ -257,6 +281,33 @@ static PetscErrorCode LoadOldEstimates(HycoH5 h, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode LoadOutputEstimates(HycoH5 h, HycoROM m)
+{
+  HycoEstimates *t = &m->estimates;
+  PetscReal *numbers, *at;
+  PetscInt n = m->scene->n_quantities, width = OUTPUT_NUMBERS;
+  PetscBool good = PETSC_TRUE;
+
+  PetscFunctionBegin;
+  if (!HycoH5Has(h, "training/outputs")) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoH5LoadReal(h, "training/outputs", &n, &width, &numbers));
+  at = numbers;
+  t->n_outputs = n;
+  for (PetscInt q = 0; q < n; q++) {
+    HycoOutputEstimate *o = &t->output[q];
+
+    o->has = (PetscBool)(*at++ > 0.5);
+    o->magnitude = *at++;
+    o->median = *at++;
+    o->largest = *at++;
+    for (PetscInt j = 0; j <= HYCO_ESTIMATE_FEATURES; j++) o->law[j] = *at++;
+    good = (PetscBool)(good && (!o->has || (o->magnitude > 0 && t->n)));
+  }
+  PetscCall(PetscFree(numbers));
+  HycoCheck(good, "%s: training/outputs is damaged", m->path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode LoadEstimates(HycoH5 h, HycoROM m)
 {
   HycoEstimates *t = &m->estimates;
@@ -285,6 +336,18 @@ static PetscErrorCode LoadEstimates(HycoH5 h, HycoROM m)
   }
   PetscCall(PetscFree(numbers));
   HycoCheck(good && t->force >= 0, "%s: training/estimates is damaged", m->path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode MoveEstimates(HycoH5 h, HycoROM m)
+{
+  PetscFunctionBegin;
+  if (!HycoH5Reads(h)) {
+    PetscCall(SaveEstimates(h, m));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(LoadEstimates(h, m));
+  PetscCall(LoadOutputEstimates(h, m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -389,7 +452,7 @@ static PetscErrorCode MoveProblem(HycoH5 h, HycoROM m)
   PetscCall(MoveType(h, m));
   PetscCall(HycoH5Real(h, "training/points", &m->n_points, m->scene->n_parameters, &m->points));
   PetscCall(HycoH5Reals(h, "training/numbers", 3, m->numbers));
-  PetscCall(HycoH5Reads(h) ? LoadEstimates(h, m) : SaveEstimates(h, m));
+  PetscCall(MoveEstimates(h, m));
   PetscCall(MoveProvenance(h, m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -160,6 +160,12 @@ static PetscErrorCode TestBound(void)
   for (int i = 0; i < N; i++)
     below += y[i] <= c[3] + c[0] * X[3 * i] + c[1] * X[3 * i + 1] + c[2] * X[3 * i + 2] + 1e-12;
   CHECK(below == 361, "expected 361 of 400 below, the number ceil(0.9 * 401); found %d", (int)below);
+  c[0] = 1; /* given weights */
+  c[1] = 3;
+  PetscCall(HycoRaiseBound(N, 3, X, y, 0.9, c));
+  below = 0;
+  for (int i = 0; i < N; i++) below += y[i] <= c[3] + X[3 * i] + 3 * X[3 * i + 1] + 1e-12;
+  CHECK(below == 361 && c[0] == 1 && c[1] == 3, "expected 361 of 400 below, found %d", (int)below);
   PetscCall(HycoUpperBound(5, 5, 3, X, y, 0.95, c)); /* fewer rows than the quantile needs: the largest */
   below = 0;
   for (int i = 0; i < 5; i++)

@@ -1,0 +1,234 @@
+/*
+  Errors of the scene's outputs at held-out points: those of the final model compared with those of the stored
+  full-order solutions, in the outputs' own units. Rank 0 evaluates both on the cells that the outputs need, by the
+  functions of predict (probe.c). Outputs may pass through zero, so that no error is divided by the output itself.
+*/
+#include <hycoquantities.h>
+#include <hycoreducerimpl.h>
+#include <math.h>
+
+/* The fields of a full-order solution; reactions of paths only, others follow from U. */
+enum { DISPLACEMENT, STRESS, REACTION, N_FIELDS };
+static const char *const fields[N_FIELDS] = {"U", "sigma", "reaction"};
+
+/* Of a full-order solution the nodes and cells from the first to the last that the outputs need. Rank 0. */
+typedef struct {
+  HycoReducer t;
+  HycoROM m;
+  HycoSnapshots store;
+  HycoFE fe; /* of the probe (borrowed); NULL: the outputs need only results of contacts */
+  PetscInt first[N_FIELDS], n[N_FIELDS];
+  PetscReal *rows[N_FIELDS], *value[N_FIELDS]; /* these nodes or cells, then those of the mesh */
+  PetscReal *lambda;
+} Outputs;
+
+/* The cells that the outputs need, with the modes at their nodes, as the model's probe. Collective; m: on rank 0. */
+static PetscErrorCode GatherMesh(HycoReducer t, HycoMesh *mesh)
+{
+  HycoMesh part = t->fom->part, from = part;
+  PetscBool *needed, *group;
+  PetscInt *keep, n = 0;
+
+  PetscFunctionBegin;
+  *mesh = NULL;
+  PetscCall(PetscMalloc1(part->n_cells, &needed));
+  HycoOnEach(HycoComm(t), HycoQuantitiesMarkCells(t->scene, part, needed));
+  if (t->fom->size > 1) {
+    PetscCall(PetscCalloc1(part->n_groups, &group));
+    PetscCall(HycoMeshGather(HycoComm(t), part, group, needed, &from));
+    PetscCall(PetscFree(group));
+  }
+  if (t->rank == 0) {
+    PetscCall(PetscMalloc1(from->n_cells, &keep));
+    for (PetscInt e = 0; e < from->n_cells; e++) {
+      if (from != part || needed[e]) keep[n++] = e;
+    }
+    PetscCall(HycoMeshExtract(from, n, keep, 0, NULL, 0, NULL, mesh));
+    for (PetscInt i = 0; from->node_whole && i < (*mesh)->n_nodes; i++)
+      (*mesh)->node_whole[i] = from->node_whole[(*mesh)->node_whole[i]];
+    for (PetscInt e = 0; from->cell_whole && e < (*mesh)->n_cells; e++)
+      (*mesh)->cell_whole[e] = from->cell_whole[(*mesh)->cell_whole[e]];
+    PetscCall(PetscFree(keep));
+  }
+  if (from != part) PetscCall(HycoMeshDestroy(&from));
+  PetscCall(PetscFree(needed));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode MakeProbe(HycoReducer t, HycoROM m)
+{
+  HycoMesh mesh;
+  PetscReal *columns, *V = NULL;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  if (!HycoSceneAsksFields(t->scene)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(GatherMesh(t, &mesh));
+  n = mesh ? mesh->n_nodes * t->sizes[3] : 0;
+  PetscCall(PetscMalloc1((size_t)n * (size_t)t->l + 1, &columns));
+  PetscCall(HycoReducerFetchRows(t, t->V, t->l, mesh ? mesh->n_nodes : 0, mesh ? mesh->node_whole : NULL, columns));
+  if (mesh) PetscCall(PetscMalloc1((size_t)n * (size_t)t->l + 1, &V));
+  for (PetscInt i = 0; i < n; i++) {
+    for (PetscInt j = 0; j < t->l; j++)
+      V[(size_t)i * (size_t)t->l + (size_t)j] = columns[(size_t)j * (size_t)n + (size_t)i];
+  }
+  PetscCall(PetscFree(columns));
+  HycoOnRoot(HycoComm(t), HycoROMSetProbe(m, mesh, V));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The number of values of a node or cell; the numbers of the mesh's nodes or cells in the whole mesh. */
+static PetscInt Width(const Outputs *o, int k)
+{
+  return k == STRESS ? o->fe->n_sigma : o->fe->dim;
+}
+
+static PetscInt Places(const Outputs *o, int k, const PetscInt **at)
+{
+  *at = k == STRESS ? o->fe->mesh->cell_whole : o->fe->mesh->node_whole;
+  return k == STRESS ? o->fe->mesh->n_cells : o->fe->mesh->n_nodes;
+}
+
+static PetscErrorCode Begin(Outputs *o)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(o->m->pairs.n, &o->lambda));
+  o->fe = HycoROMGetProbe(o->m);
+  for (int k = 0; o->fe && k < N_FIELDS; k++) {
+    const PetscInt *at, n = Places(o, k, &at);
+    PetscInt last = -1;
+
+    o->first[k] = PETSC_MAX_INT;
+    for (PetscInt i = 0; i < n; i++) {
+      o->first[k] = PetscMin(o->first[k], at[i]);
+      last = PetscMax(last, at[i]);
+    }
+    o->n[k] = PetscMax(0, last + 1 - o->first[k]);
+    PetscCall(PetscMalloc2(o->n[k] * Width(o, k), &o->rows[k], n * Width(o, k), &o->value[k]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode End(Outputs *o)
+{
+  PetscFunctionBegin;
+  for (int k = 0; k < N_FIELDS; k++) PetscCall(PetscFree2(o->rows[k], o->value[k]));
+  PetscCall(PetscFree(o->lambda));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Reads a field of the solution at mu; *has: the solution has it. */
+static PetscErrorCode ReadField(Outputs *o, const PetscReal mu[], PetscInt step, int k, PetscBool *has)
+{
+  const PetscInt *at, n = Places(o, k, &at), width = Width(o, k);
+
+  PetscFunctionBegin;
+  *has = PETSC_TRUE;
+  if (k == REACTION) PetscCall(HycoSnapshotsHas(o->store, mu, step, fields[k], has));
+  if (!*has) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoSnapshotsReadRows(o->store, mu, step, fields[k], o->first[k] * width, o->n[k] * width, o->rows[k]));
+  for (PetscInt i = 0; i < n; i++)
+    PetscCall(PetscArraycpy(o->value[k] + i * width, o->rows[k] + (at[i] - o->first[k]) * width, width));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The full-order outputs at mu, at listed time `step` of a history. */
+static PetscErrorCode MeasureStored(Outputs *o, const PetscReal mu[], PetscInt step, PetscReal value[])
+{
+  const HycoScene scene = o->m->scene;
+  PetscReal all[HYCO_MAX_PARAMETERS];
+  PetscBool has[N_FIELDS] = {PETSC_FALSE};
+
+  PetscFunctionBegin;
+  for (int k = 0; o->fe && k < (HycoSceneHasReactions(scene) ? N_FIELDS : REACTION); k++)
+    PetscCall(ReadField(o, mu, step, k, &has[k]));
+  PetscCall(HycoSnapshotsReadRows(o->store, mu, step, "lambda", 0, o->m->pairs.n, o->lambda));
+  HycoSceneSetTime(scene, mu, scene->n_times ? scene->times[step] : 0, all);
+  PetscCall(HycoROMMeasureGiven(o->m, all, o->value[DISPLACEMENT], o->value[STRESS],
+                                has[REACTION] ? o->value[REACTION] : NULL, o->lambda, value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The outputs of a prediction; *known: they can be evaluated. They cannot if a law has no solution along the predicted
+   path, which does not end the training. */
+static PetscErrorCode MeasurePredicted(Outputs *o, const PetscReal mu[], HycoPrediction *p, PetscBool *known)
+{
+  char message[HYCO_LINE];
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoHeldOutPredict(o->m, o->store, mu));
+  PetscCall(HycoCatchBegin());
+  ierr = HycoROMMeasureQuantities(o->m, p);
+  PetscCall(HycoCatchEnd(ierr, message));
+  *known = (PetscBool)!ierr;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The errors at one held-out point: the largest of the listed times of a path; NaN if not known. */
+static PetscErrorCode JudgeOne(Outputs *o, const PetscReal mu[], HycoOutputErrors *e)
+{
+  HycoROM m = o->m;
+  const PetscInt n_times = PetscMax(1, m->scene->n_times), n_q = m->scene->n_quantities;
+  HycoPrediction p;
+  PetscReal value[HYCO_MAX_QUANTITIES];
+  PetscBool known = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  PetscCall(MeasurePredicted(o, mu, &p, &known));
+  for (PetscInt q = 0; !known && q < n_q; q++) e->error[q] = e->size[q] = NAN;
+  if (!known) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt k = 0; k < n_times; k++) {
+    const PetscReal *found = m->scene->n_times ? m->trace.step[k].quantity : p.quantity;
+
+    PetscCall(MeasureStored(o, mu, k, value));
+    for (PetscInt q = 0; q < n_q; q++) {
+      const PetscReal error = PetscAbsReal(found[q] - value[q]), size = PetscAbsReal(value[q]);
+
+      e->error[q] = error > e->error[q] || PetscIsInfOrNanReal(error) ? error : e->error[q];
+      e->size[q] = size > e->size[q] || PetscIsInfOrNanReal(size) ? size : e->size[q];
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* All points with converged predictions. */
+static PetscErrorCode JudgeAll(Outputs *o, const HycoHeldOut rows[], HycoOutputErrors e[])
+{
+  PetscInt n, n_par;
+  const PetscReal *mu;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(o->t->held, &n, &n_par, &mu));
+  for (PetscInt k = 0; k < n; k++) {
+    if (rows[k].converged < 0.5) continue;
+    PetscCall(HycoReducerTell(o->t, "outputs", k, n));
+    PetscCall(JudgeOne(o, mu + k * n_par, &e[k]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode JudgeOnRoot(Outputs *o, const HycoHeldOut rows[], HycoOutputErrors e[])
+{
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  ierr = Begin(o);
+  if (!ierr) ierr = JudgeAll(o, rows, e);
+  PetscCall(End(o));
+  PetscCall(HycoProbeDestroy(&o->m->probe));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerJudgeOutputs(HycoReducer t, HycoROM m, HycoSnapshots store, const HycoHeldOut rows[],
+                                       HycoOutputErrors errors[])
+{
+  Outputs o = {.t = t, .m = m, .store = store};
+
+  PetscFunctionBegin;
+  if (!t->scene->n_quantities) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MakeProbe(t, m));
+  HycoOnRoot(HycoComm(t), JudgeOnRoot(&o, rows, errors));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
