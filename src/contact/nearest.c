@@ -3,6 +3,7 @@
   points find their nearest patch in about n log n steps, whatever the sizes of the patches.
 */
 #include "nearest.h"
+#include "curved.h"
 #include <hycovector.h>
 #include <stdlib.h>
 
@@ -21,7 +22,7 @@ typedef struct {
 
 struct _n_HycoPatches {
   const PetscReal *X, *normal; /* borrowed, like node */
-  PetscInt n, nf;
+  PetscInt n, nf, corners;
   const PetscInt *node;
   Item *item; /* in the order of the leaves */
   Box *box;   /* of tree node t; its children are 2 t + 1 and 2 t + 2 */
@@ -48,6 +49,34 @@ static int CompareZ(const void *p, const void *q)
   return Compare((const Item *)p, (const Item *)q, 2);
 }
 
+static HycoCurved Curved(HycoPatches s, PetscInt patch)
+{
+  HycoCurved facet = {.nf = s->nf, .corners = s->corners};
+
+  for (PetscInt a = 0; a < s->nf; a++) facet.X[a] = s->X + 3 * s->node[patch * s->nf + a];
+  return facet;
+}
+
+/* A box that contains a patch. */
+static void Enclose(HycoPatches s, PetscInt patch, Box *b)
+{
+  const PetscInt *node = s->node + patch * s->nf;
+
+  if (s->corners < s->nf) {
+    const HycoCurved facet = Curved(s, patch);
+
+    HycoCurvedBox(&facet, b->lo, b->hi);
+    return;
+  }
+  for (PetscInt c = 0; c < 3; c++) {
+    b->lo[c] = b->hi[c] = s->X[3 * node[0] + c];
+    for (PetscInt a = 1; a < s->nf; a++) {
+      b->lo[c] = PetscMin(b->lo[c], s->X[3 * node[a] + c]);
+      b->hi[c] = PetscMax(b->hi[c], s->X[3 * node[a] + c]);
+    }
+  }
+}
+
 /* Builds box t of the items lo .. hi - 1, split at the median of the centres along its longest side. */
 static void Build(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi)
 {
@@ -58,21 +87,24 @@ static void Build(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi)
   for (PetscInt c = 0; c < 3; c++) {
     b->lo[c] = PETSC_MAX_REAL;
     b->hi[c] = PETSC_MIN_REAL;
-    for (PetscInt k = lo * s->nf; k < hi * s->nf; k++) {
-      const PetscReal x = s->X[3 * s->node[s->item[k / s->nf].patch * s->nf + k % s->nf] + c];
-
-      b->lo[c] = PetscMin(b->lo[c], x);
-      b->hi[c] = PetscMax(b->hi[c], x);
-    }
-    if (b->hi[c] - b->lo[c] > b->hi[axis] - b->lo[axis]) axis = c;
   }
+  for (PetscInt k = lo; k < hi; k++) {
+    Box one;
+
+    Enclose(s, s->item[k].patch, &one);
+    for (PetscInt c = 0; c < 3; c++) {
+      b->lo[c] = PetscMin(b->lo[c], one.lo[c]);
+      b->hi[c] = PetscMax(b->hi[c], one.hi[c]);
+    }
+  }
+  for (PetscInt c = 1; c < 3; c++) axis = b->hi[c] - b->lo[c] > b->hi[axis] - b->lo[axis] ? c : axis;
   if (hi - lo <= LEAF) return;
   qsort(s->item + lo, (size_t)(hi - lo), sizeof(Item), by[axis]);
   Build(s, 2 * t + 1, lo, (lo + hi) / 2);
   Build(s, 2 * t + 2, (lo + hi) / 2, hi);
 }
 
-PetscErrorCode HycoPatchesCreate(const PetscReal X[], PetscInt n, PetscInt nf, const PetscInt node[],
+PetscErrorCode HycoPatchesCreate(const PetscReal X[], PetscInt n, PetscInt nf, PetscInt corners, const PetscInt node[],
                                  const PetscReal normal[], HycoPatches *patches)
 {
   HycoPatches s;
@@ -84,6 +116,7 @@ PetscErrorCode HycoPatchesCreate(const PetscReal X[], PetscInt n, PetscInt nf, c
   s->normal = normal;
   s->n = n;
   s->nf = nf;
+  s->corners = corners;
   s->node = node;
   for (PetscInt most = n; most > LEAF; most = (most + 1) / 2) boxes = 2 * boxes + 1;
   PetscCall(PetscMalloc1(n, &s->item));
@@ -185,12 +218,17 @@ static PetscBool InQuadrilateral(const PetscReal *const X[], const PetscReal x[3
 }
 
 /* The nearest point of one patch: inside it, or on one of its edges. Returns the squared distance. */
-static PetscReal OnPatch(HycoPatches s, PetscInt patch, const PetscReal x[3], PetscReal w[4])
+static PetscReal OnPatch(HycoPatches s, PetscInt patch, const PetscReal x[3], PetscReal w[])
 {
   const PetscInt nf = s->nf, edges = nf == 2 ? 1 : nf;
   const PetscReal *X[4];
   PetscReal best = PETSC_MAX_REAL;
 
+  if (s->corners < nf) {
+    const HycoCurved facet = Curved(s, patch);
+
+    return HycoCurvedProject(&facet, x, w);
+  }
   for (PetscInt a = 0; a < nf; a++) X[a] = s->X + 3 * s->node[patch * nf + a];
   if ((nf == 3 && InTriangle(X, x, w)) || (nf == 4 && InQuadrilateral(X, x, w))) best = Distance2(nf, X, w, x);
   for (PetscInt k = 0; k < edges; k++) {
@@ -236,7 +274,7 @@ static PetscBool Opposes(HycoPatches s, PetscInt patch, const PetscReal *against
 /* Updates (best, patch, w) with the nearest of the items lo .. hi - 1 under box t; the nearer child is searched
    first. */
 static void Search(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi, const PetscReal x[3], const PetscReal *against,
-                   PetscReal *best, PetscInt *patch, PetscReal w[4])
+                   PetscReal *best, PetscInt *patch, PetscReal w[])
 {
   const PetscInt mid = (lo + hi) / 2;
   PetscBool right;
@@ -249,20 +287,20 @@ static void Search(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi, const Pe
     return;
   }
   for (PetscInt k = lo; k < hi; k++) {
-    PetscReal trial[4] = {0, 0, 0, 0}, d;
+    PetscReal trial[HYCO_FACET_NODES] = {0}, d;
 
     if (!Opposes(s, s->item[k].patch, against)) continue;
     d = OnPatch(s, s->item[k].patch, x, trial);
     if (d > *best || (d == *best && s->item[k].patch > *patch)) continue;
     *best = d;
     *patch = s->item[k].patch;
-    for (PetscInt a = 0; a < 4; a++) w[a] = trial[a];
+    for (PetscInt a = 0; a < s->nf; a++) w[a] = trial[a];
   }
 }
 
 void HycoPatchesProject(HycoPatches s, const PetscReal x[3], const PetscReal against[3], HycoProjection *p)
 {
-  PetscReal best = PETSC_MAX_REAL, w[4] = {0, 0, 0, 0}, sum = 0;
+  PetscReal best = PETSC_MAX_REAL, w[HYCO_FACET_NODES] = {0}, sum = 0;
   PetscInt patch = 0;
 
   Search(s, 0, 0, s->n, x, against, &best, &patch, w);
@@ -272,7 +310,7 @@ void HycoPatchesProject(HycoPatches s, const PetscReal x[3], const PetscReal aga
   for (PetscInt a = 0; a < s->nf; a++) {
     PetscInt at = p->n;
 
-    if (w[a] < SNAP) continue;
+    if (PetscAbsReal(w[a]) < SNAP) continue;
     for (; at > 0 && p->node[at - 1] > s->node[patch * s->nf + a]; at--) {
       p->node[at] = p->node[at - 1];
       p->weight[at] = p->weight[at - 1];

@@ -53,7 +53,7 @@ PetscErrorCode HycoPartnersCreate(HycoFE fe, HycoContact c, PetscBool nodes, Hyc
   PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->slave, &t->slave));
   PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->master, &t->master));
   PetscCall(FindPatches(t));
-  PetscCall(HycoPatchesCreate(fe->X, t->n, t->nf, t->node, t->normal, &t->patches));
+  PetscCall(HycoPatchesCreate(fe->X, t->n, t->nf, t->nf, t->node, t->normal, &t->patches));
   PetscCall(PetscCalloc1(3 * fe->mesh->n_nodes, &t->outward));
   if (fe->dim > 1) PetscCall(HycoSurfaceNormals(fe, t->slave, t->outward));
   PetscFunctionReturn(PETSC_SUCCESS);
