@@ -136,17 +136,16 @@ class TiesQuadratic(Case):
         """Lame's cylinder of two rings: with the same mesh that of one ring; with a finer slave its error, which falls by 2^4 (here 2^3.6)."""
         for kind in KINDS:
             errors = {}
-            for n in (2, 4):
-                for name, parts in (('one', [(2 * n, 2 * n)]), ('same', [(n, 2 * n), (n, 2 * n)]), ('finer', [(n, 2 * n), (n, 4 * n)]), ('other', [(n, 2 * n), (n, 3 * n)])):
-                    scene, energy = self.rings(kind, *parts)
-                    found = self.hyco('solve', '-scene', scene, ranks=2 if name == 'same' and n == 2 else 0)
-                    self.solved(found)
-                    errors[name, n] = found['strain_energy'] / energy - 1
+            for name, n, parts in (('one', 2, [(4, 4)]), ('same', 2, [(2, 4), (2, 4)]), ('finer', 2, [(2, 4), (2, 8)]), ('one', 4, [(8, 8)]), ('finer', 4, [(4, 8), (4, 16)]), ('other', 4, [(4, 8), (4, 12)])):
+                scene, energy = self.rings(kind, *parts)
+                found = self.hyco('solve', '-scene', scene, ranks=2 if name == 'same' else 0)
+                self.solved(found)
+                errors[name, n] = found['strain_energy'] / energy - 1
             with self.subTest(kind=kind):
+                self.assertLess(abs(errors['same', 2] - errors['one', 2]), 1e-12)
+                self.assertLess(abs(errors['other', 4] - errors['one', 4]), 5e-4)
                 for n in (2, 4):
-                    self.assertLess(abs(errors['same', n] - errors['one', n]), 1e-12)
                     self.assertLess(abs(errors['finer', n] / errors['one', n] - 1), 0.02)
-                    self.assertLess(abs(errors['other', n] - errors['one', n]), 5e-4)
                 self.assertGreater(errors['finer', 2] / errors['finer', 4], 12)
 
     def blocks(self, kind, n, m, seat=()):
@@ -197,19 +196,19 @@ class TiesQuadratic(Case):
         for kind, n, m, types in (('tri6', 4, 2, ('hybrid', 'condensed')), ('quad9', 3, 2, ('projection', 'regression')), ('hex20', 3, 2, ('hybrid',)), ('tet10', 2, 1, ('condensed',))):
             last = 'xyz'[KINDS[kind] - 1]
             scene = self.written(MODEL.replace('LAST', last).replace('SIDE', ', side: {y: 0}' if last == 'z' else ''), self.blocks(kind, n, m, seat=2))
-            full = [self.hyco('solve', '-scene', scene, '-mu', '0.27,310', *more, ranks=ranks) for ranks, more in ((0, ()), (2, ()), (3, ()), (2, ('-hyco_linear', 'iterative')))]
+            full = [self.hyco('solve', '-scene', scene, '-mu', '0.27,310', *more, ranks=ranks) for ranks, more in ((0, ()), (3, ()), (2, ('-hyco_linear', 'iterative')))]
             for found in full:
                 self.solved(found)
                 self.assertLess(found['balance'], 1e-9)
                 for name in ('strain_energy', 'total_contact_force', 'lambda_max'):
                     self.near(found[name], full[0][name], 1e-8, name)
             train = ('train', '-scene', scene, '-model', f'{kind}.h5', '-hyco_pod_tol', 1e-11)
-            for of, bound in (*((of, 5e-3) for of in types), ('whole', 1e-10)):
+            for of, bound in (*((of, 0.02) for of in types), ('whole', 1e-10)):
                 with self.subTest(kind=kind, type=of):
                     if of == 'whole':
                         self.hyco(*train, '-grid', '2,2', '-hyco_hybrid', 'all', '-hyco_rid_whole', 'true')
                     else:
-                        self.hyco(*train, '-grid', '4,4', '-hyco_model_type', of, ranks=2 if of == 'hybrid' else 0,
+                        self.hyco(*train, '-grid', '3,3', '-hyco_model_type', of, ranks=2 if of == 'hybrid' else 0,
                                   *(('-hyco_rid_layers', 1, '-hyco_rid_modes', 'displacement,stress,force,dual') if of == 'hybrid' else ()))
                     found = self.hyco('compare', '-scene', scene, '-model', f'{kind}.h5', '-grid', '2,2', ranks=2)
                     for name in ('error_u', 'error_u_h1', 'error_sigma', *(('error_lambda',) if of != 'projection' else ())):
