@@ -89,6 +89,16 @@ class TiesQuadratic(Case):
                 f'fixed: {{left: {{x: 0}}, {held}}}\ntraction: {{right: {{x: {E * k}*y}}}}\ntie: {{glue: {{slave: under, master: over}}}}\n')
         return self.written(text, second(grid, kind)), E * k * k * length / 24
 
+    def test_coarse(self):
+        """check names a tie whose slave is coarser, by the ratio of the facets."""
+        for kind, low, high, warned in (('quad8', 4, 2, 1), ('quad8', 2, 4, 0), ('tet10', 2, 1, 1), ('hex27', 2, 2, 0)):
+            scene, _ = self.pulled(kind, low, high)
+            for ranks in (0, 2):
+                found = self.hyco('check', '-scene', scene, ranks=ranks)
+                with self.subTest(kind=kind, low=low, high=high, ranks=ranks):
+                    self.near(found['ties'][0]['slave_over_master'], low / high, 1e-12)
+                    self.assertEqual(sum('glue' in w and 'under' in w for w in found['warnings']), warned, found['warnings'])
+
     def test_bending(self):
         """Pure bending, whose displacement is quadratic: exact across a cut whose slave divides the master; the error of others is that of the forces."""
         for kind, dim in KINDS.items():
