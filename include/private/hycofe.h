@@ -24,6 +24,10 @@ const HycoElement *HycoElementGetFacet(HycoCellType type);
 /* The same with the nodes as quadrature points, of weight 1; for facets of second order, except those of hex20,
    which contacts do not support; else NULL. */
 const HycoElement *HycoElementGetFacetNodes(HycoCellType type);
+/* The functions and their derivatives of a facet of second order with nf nodes at a point of its reference facet: a
+   line and quadrilaterals on [-1, 1], triangles with the corners (0, 0), (1, 0), (0, 1). */
+void HycoFacetFunctions(PetscInt nf, const PetscReal at[2], PetscReal N[HYCO_FACET_NODES],
+                        PetscReal dN[HYCO_FACET_NODES][3]);
 
 #define HYCO_MAX_CELL_DOFS (3 * HYCO_CELL_NODES)
 /* For a cell with tied nodes: HycoMeshCellNodes(). */
@@ -99,6 +103,8 @@ struct _n_HycoFE {
   PetscReal *tangent;
   PetscInt *tangent_start, *tangent_size;
   HycoSprings springs; /* at mu; NULL: the scene has no springs */
+  PetscReal *room;     /* for element matrices: HycoFEElementRoom() */
+  size_t n_room;
 };
 
 /* Whether the tangents of a cell's body are Lame's lambda and mu, or else n_sigma x n_sigma. */
@@ -161,9 +167,10 @@ void HycoMotionsName(HycoFE fe, const HycoMotions *motions, const PetscReal coef
 
 /* Element stiffness of a cell, row major, nodes outer, components inner. HycoFEBodyStiffness(): of its body only,
    for displacements, nv * dim square. HycoFEElementStiffness(): with its springs, of the unknowns after oblique
-   supports and ties are eliminated, at the nodes that HycoMeshCellNodes() returns (room for HYCO_MAX_CELL_UNKNOWNS
-   square). */
+   supports and ties are eliminated, square over the unknowns at the nodes that HycoMeshCellNodes() returns.
+   HycoFEElementRoom(): room for it, which belongs to fe, until the next call. */
 PetscErrorCode HycoFEBodyStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[]);
+PetscErrorCode HycoFEElementRoom(HycoFE fe, PetscInt cell, PetscReal **Ke);
 PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[]);
 
 /* Creates an empty, preallocated AIJ matrix for K or a norm over the nodes `n_owned` from `first` of the distributed

@@ -45,13 +45,14 @@ typedef struct _n_HycoMesh *HycoMesh;
 typedef struct _n_HycoTies *HycoTies;
 struct _n_HycoTies {
   PetscInt references, n;
+  HycoCellType type;         /* of the mesh's cells: the size of their cones does not tell it */
   PetscInt *slave, *master;  /* tags in the mesh file */
   PetscInt *tie, *body;      /* index of the tie in the scene; the body that moves the master */
   PetscReal *weight, *reach; /* largest distance of the slave from the position given by its masters */
 };
 
 /* Nodes of a cell's unknowns: its own, and the masters of its tied nodes. */
-#define HYCO_MAX_CELL_NODES (8 + 8 * 4) /* cells of second order have no ties */
+#define HYCO_MAX_CELL_NODES (HYCO_CELL_NODES * (1 + HYCO_FACET_NODES))
 
 struct _n_HycoMesh {
   PetscInt dim, nv, nf; /* space dimension; nodes of a cell, of a facet */
@@ -107,6 +108,11 @@ static inline PetscInt HycoMeshCellNodes(HycoMesh m, PetscInt cell, PetscInt nod
     node[n++] = m->follow[k];
   return n;
 }
+/* Their number. */
+static inline PetscInt HycoMeshCellSize(HycoMesh m, PetscInt cell)
+{
+  return m->nv + (m->ties ? m->follow_start[cell + 1] - m->follow_start[cell] : 0);
+}
 /* A tied node's index in mesh->tied, or -1. */
 static inline PetscInt HycoMeshTied(HycoMesh m, PetscInt node)
 {
@@ -159,8 +165,8 @@ PetscInt HycoMeshFacetNumber(HycoMesh mesh, PetscInt facet);
 PetscErrorCode HycoMeshLine(HycoMesh mesh, PetscInt group, PetscInt *n, PetscInt **segment);
 /* Sets the ties of the mesh's nodes, by tag (NULL: none); takes a reference. Nodes and cells must be set. */
 PetscErrorCode HycoMeshSetTies(HycoMesh mesh, HycoTies ties);
-/* Allocates n entries, with one reference; the last HycoTiesDestroy() frees them. */
-PetscErrorCode HycoTiesCreate(PetscInt n, HycoTies *ties);
+/* Allocates n entries for a mesh of these cells, with one reference; the last HycoTiesDestroy() frees them. */
+PetscErrorCode HycoTiesCreate(PetscInt n, HycoCellType type, HycoTies *ties);
 PetscErrorCode HycoTiesDestroy(HycoTies *ties);
 /* Sends rank 0's ties to every rank (NULL: none). Collective. */
 PetscErrorCode HycoTiesBcast(MPI_Comm comm, HycoTies *ties);

@@ -46,6 +46,8 @@ PetscErrorCode CheckGroups(Check *check);
 
 /* Measures the gaps at fe's parameters; *first: also compares facets of slave and master. */
 PetscErrorCode CheckGaps(Check *check, HycoFE fe, PetscBool first);
+/* Compares the facets of a tie's slave and master, for its report. */
+PetscErrorCode CheckTie(Check *check, PetscInt tie, cJSON *report);
 /* Reports the ranges of gaps. */
 void CheckContacts(Check *check);
 

@@ -1,4 +1,4 @@
-/* hyco check: gaps, and whether surfaces face each other. */
+/* hyco check: gaps, whether surfaces face each other, which side of contacts and ties has the finer facets. */
 #include "check.h"
 
 /* Facets of the slave larger than the master's by this factor are reported as coarser. */
@@ -19,27 +19,67 @@ static PetscReal Coarseness(const HycoPairs *p, PetscInt k, PetscInt n_nodes, co
   return master > 0 ? size[p->slave[k]] / master : 0;
 }
 
+/* The facet sizes of two groups: room for 2 reals a node. */
+static PetscErrorCode FacetSizes(HycoFE fe, const char key[], const char slave[], const char master[], PetscReal size[])
+{
+  PetscInt g = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeshFindGroup(fe->mesh, key, slave, &g));
+  HycoSurfaceSizes(fe, g, size);
+  PetscCall(HycoMeshFindGroup(fe->mesh, key, master, &g));
+  HycoSurfaceSizes(fe, g, size + fe->mesh->n_nodes);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The median over the contacts of one entry; for types with a search, whose meshes need not match. */
 static PetscErrorCode CompareFacets(Check *check, HycoFE fe, PetscInt contact)
 {
   const HycoPairs *p = &check->whole->pairs;
   HycoContact c = fe->scene->contact[contact];
   PetscReal *size, *ratio;
-  PetscInt g = 0, n = 0;
+  PetscInt n = 0;
 
   PetscFunctionBegin;
   if (!c->master || !c->ops->find || fe->dim == 1) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc2(2 * fe->mesh->n_nodes, &size, p->n, &ratio));
-  PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->slave, &g));
-  HycoSurfaceSizes(fe, g, size);
-  PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->master, &g));
-  HycoSurfaceSizes(fe, g, size + fe->mesh->n_nodes);
+  PetscCall(FacetSizes(fe, "contact", c->slave, c->master, size));
   for (PetscInt k = 0; k < p->n; k++) {
     if (p->contact[k] == contact && p->master_start[k] < p->master_start[k + 1])
       ratio[n++] = Coarseness(p, k, fe->mesh->n_nodes, size);
   }
   PetscCall(PetscSortReal(n, ratio));
   if (n) check->contact[contact].coarse = ratio[n / 2];
+  PetscCall(PetscFree2(size, ratio));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode CheckTie(Check *check, PetscInt tie, cJSON *report)
+{
+  HycoFE fe = check->whole->fe;
+  HycoMesh m = fe->mesh;
+  const HycoTie *t = &fe->scene->tie[tie];
+  PetscReal *size, *ratio;
+  PetscInt n = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(2 * m->n_nodes, &size, m->n_tied, &ratio));
+  PetscCall(FacetSizes(fe, "tie", t->slave, t->master, size));
+  for (PetscInt k = 0; k < m->n_tied; k++) {
+    PetscReal master = 0;
+
+    for (PetscInt j = m->tied_start[k]; j < m->tied_start[k + 1]; j++)
+      master = PetscMax(master, size[m->n_nodes + m->tied_master[j]]);
+    if (m->ties->tie[m->tied_entry[k]] == tie) ratio[n++] = size[m->tied[k]] / master;
+  }
+  PetscCall(PetscSortReal(n, ratio));
+  if (n) cJSON_AddNumberToObject(report, "slave_over_master", ratio[n / 2]);
+  if (n && ratio[n / 2] > COARSER)
+    CheckWarn(
+        check,
+        "tie %s: the slave's facets (%s) are %.2g times as long as the master's (%s), and the forces between them "
+        "are then inaccurate; the finer side should be the slave",
+        t->name, t->slave, (double)ratio[n / 2], t->master);
   PetscCall(PetscFree2(size, ratio));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -125,6 +125,7 @@ static PetscErrorCode SayTies(Check *check, HycoMesh m, PetscInt *n)
     cJSON_AddStringToObject(one, "name", s->tie[t].name);
     cJSON_AddNumberToObject(one, "n_nodes", nodes);
     cJSON_AddItemToArray(list, one);
+    PetscCall(CheckTie(check, t, one));
     PetscCall(Say("tie %s: %d nodes of %s follow %s\n", s->tie[t].name, (int)nodes, s->tie[t].slave, s->tie[t].master));
     *n += nodes;
   }

@@ -3,6 +3,7 @@
   points find their nearest patch in about n log n steps, whatever the sizes of the patches.
 */
 #include "nearest.h"
+#include "curved.h"
 #include <hycovector.h>
 
 #define LEAF 4
@@ -17,7 +18,7 @@ typedef struct {
 
 struct _n_HycoPatches {
   const PetscReal *X, *normal; /* borrowed, like node */
-  PetscInt n, nf;
+  PetscInt n, nf, corners;
   const PetscInt *node;
   HycoPoint *item; /* the patches' centres, in the order of the leaves */
   Box *box;        /* of tree node t; its children are 2 t + 1 and 2 t + 2 */
@@ -62,6 +63,34 @@ void HycoPointsSplit(HycoPoint point[], PetscInt lo, PetscInt mid, PetscInt hi, 
   }
 }
 
+static HycoCurved Curved(HycoPatches s, PetscInt patch)
+{
+  HycoCurved facet = {.nf = s->nf, .corners = s->corners};
+
+  for (PetscInt a = 0; a < s->nf; a++) facet.X[a] = s->X + 3 * s->node[patch * s->nf + a];
+  return facet;
+}
+
+/* A box that contains a patch. */
+static void Enclose(HycoPatches s, PetscInt patch, Box *b)
+{
+  const PetscInt *node = s->node + patch * s->nf;
+
+  if (s->corners < s->nf) {
+    const HycoCurved facet = Curved(s, patch);
+
+    HycoCurvedBox(&facet, b->lo, b->hi);
+    return;
+  }
+  for (PetscInt c = 0; c < 3; c++) {
+    b->lo[c] = b->hi[c] = s->X[3 * node[0] + c];
+    for (PetscInt a = 1; a < s->nf; a++) {
+      b->lo[c] = PetscMin(b->lo[c], s->X[3 * node[a] + c]);
+      b->hi[c] = PetscMax(b->hi[c], s->X[3 * node[a] + c]);
+    }
+  }
+}
+
 /* Builds box t of the items lo .. hi - 1, split at the median of the centres along its longest side. */
 static void Build(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi)
 {
@@ -71,21 +100,24 @@ static void Build(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi)
   for (PetscInt c = 0; c < 3; c++) {
     b->lo[c] = PETSC_MAX_REAL;
     b->hi[c] = PETSC_MIN_REAL;
-    for (PetscInt k = lo * s->nf; k < hi * s->nf; k++) {
-      const PetscReal x = s->X[3 * s->node[s->item[k / s->nf].index * s->nf + k % s->nf] + c];
-
-      b->lo[c] = PetscMin(b->lo[c], x);
-      b->hi[c] = PetscMax(b->hi[c], x);
-    }
-    if (b->hi[c] - b->lo[c] > b->hi[axis] - b->lo[axis]) axis = c;
   }
+  for (PetscInt k = lo; k < hi; k++) {
+    Box one;
+
+    Enclose(s, s->item[k].index, &one);
+    for (PetscInt c = 0; c < 3; c++) {
+      b->lo[c] = PetscMin(b->lo[c], one.lo[c]);
+      b->hi[c] = PetscMax(b->hi[c], one.hi[c]);
+    }
+  }
+  for (PetscInt c = 1; c < 3; c++) axis = b->hi[c] - b->lo[c] > b->hi[axis] - b->lo[axis] ? c : axis;
   if (hi - lo <= LEAF) return;
   HycoPointsSplit(s->item, lo, (lo + hi) / 2, hi, axis);
   Build(s, 2 * t + 1, lo, (lo + hi) / 2);
   Build(s, 2 * t + 2, (lo + hi) / 2, hi);
 }
 
-PetscErrorCode HycoPatchesCreate(const PetscReal X[], PetscInt n, PetscInt nf, const PetscInt node[],
+PetscErrorCode HycoPatchesCreate(const PetscReal X[], PetscInt n, PetscInt nf, PetscInt corners, const PetscInt node[],
                                  const PetscReal normal[], HycoPatches *patches)
 {
   HycoPatches s;
@@ -97,6 +129,7 @@ PetscErrorCode HycoPatchesCreate(const PetscReal X[], PetscInt n, PetscInt nf, c
   s->normal = normal;
   s->n = n;
   s->nf = nf;
+  s->corners = corners;
   s->node = node;
   for (PetscInt most = n; most > LEAF; most = (most + 1) / 2) boxes = 2 * boxes + 1;
   PetscCall(PetscMalloc1(n, &s->item));
@@ -198,12 +231,17 @@ static PetscBool InQuadrilateral(const PetscReal *const X[], const PetscReal x[3
 }
 
 /* The nearest point of one patch: inside it, or on one of its edges. Returns the squared distance. */
-static PetscReal OnPatch(HycoPatches s, PetscInt patch, const PetscReal x[3], PetscReal w[4])
+static PetscReal OnPatch(HycoPatches s, PetscInt patch, const PetscReal x[3], PetscReal w[])
 {
   const PetscInt nf = s->nf, edges = nf == 2 ? 1 : nf;
   const PetscReal *X[4];
   PetscReal best = PETSC_MAX_REAL;
 
+  if (s->corners < nf) {
+    const HycoCurved facet = Curved(s, patch);
+
+    return HycoCurvedProject(&facet, x, w);
+  }
   for (PetscInt a = 0; a < nf; a++) X[a] = s->X + 3 * s->node[patch * nf + a];
   if ((nf == 3 && InTriangle(X, x, w)) || (nf == 4 && InQuadrilateral(X, x, w))) best = Distance2(nf, X, w, x);
   for (PetscInt k = 0; k < edges; k++) {
@@ -250,18 +288,18 @@ static PetscBool Opposes(HycoPatches s, PetscInt patch, const PetscReal *against
 typedef struct {
   const PetscReal *x, *against;
   PetscReal round_off, limit; /* limit: of a squared distance that is not larger, whatever the round-off */
-  PetscReal best, w[4];
+  PetscReal best, w[HYCO_FACET_NODES];
   PetscInt patch;
 } Query;
 
-static void SetBest(Query *q, PetscReal best, PetscInt patch, const PetscReal w[4])
+static void SetBest(Query *q, PetscReal best, PetscInt patch, const PetscReal w[])
 {
   const PetscReal limit = PetscSqrtReal(best) + q->round_off;
 
   q->best = best;
   q->limit = limit * limit;
   q->patch = patch;
-  for (PetscInt a = 0; a < 4; a++) q->w[a] = w[a];
+  for (PetscInt a = 0; a < HYCO_FACET_NODES; a++) q->w[a] = w[a];
 }
 
 /* Updates the query with the nearest of the items lo .. hi - 1 under box t; the nearer child is searched first. */
@@ -278,7 +316,7 @@ static void Search(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi, Query *q
     return;
   }
   for (PetscInt k = lo; k < hi; k++) {
-    PetscReal trial[4] = {0, 0, 0, 0}, d;
+    PetscReal trial[HYCO_FACET_NODES] = {0}, d;
 
     if (!Opposes(s, s->item[k].index, q->against)) continue;
     d = OnPatch(s, s->item[k].index, q->x, trial);
@@ -296,7 +334,7 @@ static PetscReal LargestCoordinate(const PetscReal lo[3], const PetscReal hi[3])
 
 void HycoPatchesProject(HycoPatches s, const PetscReal x[3], const PetscReal against[3], HycoProjection *p)
 {
-  const PetscReal none[4] = {0, 0, 0, 0}, *w;
+  const PetscReal none[HYCO_FACET_NODES] = {0}, *w;
   Query q = {.x = x, .against = against};
   PetscReal sum = 0;
   PetscInt patch;
@@ -312,7 +350,7 @@ void HycoPatchesProject(HycoPatches s, const PetscReal x[3], const PetscReal aga
   for (PetscInt a = 0; a < s->nf; a++) {
     PetscInt at = p->n;
 
-    if (w[a] < SNAP) continue;
+    if (PetscAbsReal(w[a]) < SNAP) continue;
     for (; at > 0 && p->node[at - 1] > s->node[patch * s->nf + a]; at--) {
       p->node[at] = p->node[at - 1];
       p->weight[at] = p->weight[at - 1];

@@ -3,11 +3,11 @@
 #define HYCO_NEAREST_H
 #include <hycomesh.h>
 
-/* A point of a patch: sum of weight[a] times node[a]. Weights are positive with sum 1; nodes are in ascending order.
-   n = 0: no point. */
+/* A point of a patch: sum of weight[a] times node[a]. Weights have sum 1, and are positive on patches of first order;
+   nodes are in ascending order. n = 0: no point. */
 typedef struct {
-  PetscInt n, node[4], patch;
-  PetscReal weight[4], distance;
+  PetscInt n, node[HYCO_FACET_NODES], patch;
+  PetscReal weight[HYCO_FACET_NODES], distance;
 } HycoProjection;
 
 /* Normals oppose each other if their product is at most this (within 72 degrees). */
@@ -23,10 +23,11 @@ void HycoPointsSplit(HycoPoint point[], PetscInt lo, PetscInt mid, PetscInt hi, 
 
 typedef struct _n_HycoPatches *HycoPatches;
 
-/* n patches of nf nodes each: 1 points, 2 segments, 3 triangles, 4 bilinear quadrilaterals; X: coordinates of nodes;
-   normal (n x 3, of unit length, or 0 where there is none) may be NULL. X, node (n x nf) and normal are borrowed. The
-   caller destroys it. */
-PetscErrorCode HycoPatchesCreate(const PetscReal X[], PetscInt n, PetscInt nf, const PetscInt node[],
+/* n patches of nf nodes each, the first `corners` of them corners: with nf = corners 1 points, 2 segments, 3 triangles,
+   4 bilinear quadrilaterals; else facets of second order (2, 3 or 4 corners). X: coordinates of nodes; normal (n x 3,
+   of unit length, or 0 where there is none) may be NULL. X, node (n x nf) and normal are borrowed. The caller destroys
+   it. */
+PetscErrorCode HycoPatchesCreate(const PetscReal X[], PetscInt n, PetscInt nf, PetscInt corners, const PetscInt node[],
                                  const PetscReal normal[], HycoPatches *patches);
 PetscErrorCode HycoPatchesDestroy(HycoPatches *patches);
 /* The patches' point nearest to x; among equally near ones that of the first patch, so that the result is the same

@@ -9,14 +9,15 @@
 
 PetscReal HycoSurfaceTolerance(HycoMesh m, PetscInt group)
 {
+  const PetscInt corners = HycoCellKinds[m->type].corners;
   PetscReal shortest = PETSC_MAX_REAL;
 
   for (PetscInt f = 0; f < m->n_facets; f++) {
     const PetscInt *node = m->facets + f * m->nf;
 
     if (m->facet_group[f] != group) continue;
-    for (PetscInt v = 0; v < m->nf && m->nf > 1; v++) /* the last edge ends at the first node */
-      shortest = PetscMin(shortest, HycoDistance(m->xyz + 3 * node[v], m->xyz + 3 * node[(v + 1) % m->nf]));
+    for (PetscInt v = 0; v < corners && corners > 1; v++) /* the last edge ends at the first node */
+      shortest = PetscMin(shortest, HycoDistance(m->xyz + 3 * node[v], m->xyz + 3 * node[(v + 1) % corners]));
   }
   return shortest < PETSC_MAX_REAL ? shortest / 10 : 0;
 }
@@ -163,7 +164,18 @@ static PetscErrorCode Match(HycoPartners *t, HycoContact c, PetscInt index, Hyco
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The slave nodes that take contact forces; the caller frees them. */
+/* Whether a node is tied to nodes that take contact forces. */
+static PetscBool Follows(HycoMesh m, PetscInt node, const PetscBool carries[])
+{
+  const PetscInt tied = HycoMeshTied(m, node);
+  PetscBool all = (PetscBool)(tied >= 0);
+
+  for (PetscInt j = all ? m->tied_start[tied] : 0; all && j < m->tied_start[tied + 1]; j++)
+    all = carries[m->tied_master[j]];
+  return all;
+}
+
+/* The slave nodes that take contact forces, without tied nodes that follow others of them; the caller frees them. */
 static PetscErrorCode FindSlaves(const HycoPartners *t, PetscInt *n, PetscInt **slave)
 {
   HycoMesh m = t->fe->mesh;
@@ -175,7 +187,7 @@ static PetscErrorCode FindSlaves(const HycoPartners *t, PetscInt *n, PetscInt **
   PetscCall(PetscMalloc1(m->group_start[t->slave + 1] - m->group_start[t->slave], slave));
   HycoSurfaceCarriers(m, t->slave, carries);
   for (PetscInt k = m->group_start[t->slave]; k < m->group_start[t->slave + 1]; k++) {
-    if (carries[m->group_node[k]]) (*slave)[(*n)++] = m->group_node[k];
+    if (carries[m->group_node[k]] && !Follows(m, m->group_node[k], carries)) (*slave)[(*n)++] = m->group_node[k];
   }
   PetscCall(PetscFree(carries));
   PetscFunctionReturn(PETSC_SUCCESS);

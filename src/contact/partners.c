@@ -61,7 +61,7 @@ PetscErrorCode HycoPartnersCreate(HycoFE fe, HycoContact c, PetscBool nodes, Hyc
 PetscErrorCode HycoPartnersReady(HycoPartners *t)
 {
   PetscFunctionBegin;
-  if (!t->patches) PetscCall(HycoPatchesCreate(t->X, t->n, t->nf, t->node, t->normal, &t->patches));
+  if (!t->patches) PetscCall(HycoPatchesCreate(t->X, t->n, t->nf, t->nf, t->node, t->normal, &t->patches));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -4,15 +4,18 @@
 #include <hycovector.h>
 
 /* Adds the values of tied nodes on a surface, by node and component (v, n_nodes x width), to their masters, which
-   have the contact there. */
+   have the contact there. Vectors, of which only the direction matters, are added by the size of the weights: on cells
+   of second order some are negative, and a sum could have the opposite direction. */
 static void PassTied(HycoMesh m, PetscInt width, PetscReal v[])
 {
   for (PetscInt k = 0; k < m->n_tied; k++) {
     const PetscReal *weight = m->ties->weight + m->tied_entry[k];
 
     for (PetscInt j = m->tied_start[k]; j < m->tied_start[k + 1]; j++) {
+      const PetscReal w = weight[j - m->tied_start[k]];
+
       for (PetscInt c = 0; c < width; c++)
-        v[m->tied_master[j] * width + c] += weight[j - m->tied_start[k]] * v[m->tied[k] * width + c];
+        v[m->tied_master[j] * width + c] += (width > 1 ? PetscAbsReal(w) : w) * v[m->tied[k] * width + c];
     }
   }
 }

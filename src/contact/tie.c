@@ -23,7 +23,7 @@ static PetscErrorCode MakePatches(HycoMesh m, PetscInt group, PetscInt node[], P
     for (PetscInt v = 0; v < m->nf; v++) on[m->facets[f * m->nf + v]] = PETSC_TRUE;
     PetscCall(PetscArraycpy(node + m->nf * n++, m->facets + f * m->nf, m->nf));
   }
-  PetscCall(HycoPatchesCreate(m->xyz, n, m->nf, node, NULL, patches));
+  PetscCall(HycoPatchesCreate(m->xyz, n, m->nf, HycoCellKinds[m->type].corners, node, NULL, patches));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -117,7 +117,7 @@ static PetscErrorCode Find(HycoScene s, HycoMesh m, Found *found, HycoTies *ties
   PetscCall(CheckChains(s, m, found));
   for (PetscInt i = 0; i < m->n_nodes; i++) n += found->tie[i] >= 0 ? found->at[i].n : 0;
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoTiesCreate(n, ties));
+  PetscCall(HycoTiesCreate(n, m->type, ties));
   t = *ties;
   n = 0;
   for (PetscInt i = 0; i < m->n_nodes; i++) {

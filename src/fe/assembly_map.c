@@ -83,11 +83,12 @@ static void Add(HycoFE fe, const PetscInt offset[], PetscInt cell, const PetscRe
 /* Adds the cells that parameters change, or the others. */
 static PetscErrorCode AddCells(HycoFE fe, HycoAssemblyMap p, PetscBool constant, const PetscInt ia[], PetscScalar a[])
 {
-  PetscReal Ke[HYCO_MAX_CELL_UNKNOWNS * HYCO_MAX_CELL_UNKNOWNS];
+  PetscReal *Ke;
 
   PetscFunctionBegin;
   for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
     if (fe->constant[e] != constant) continue;
+    PetscCall(HycoFEElementRoom(fe, e, &Ke));
     PetscCall(HycoFEElementStiffness(fe, e, Ke));
     Add(fe, p->offset + p->start[e], e, Ke, ia, a);
   }

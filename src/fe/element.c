@@ -61,67 +61,74 @@ static PetscReal QuadraticSlope(PetscInt at, PetscReal x)
 /* Three Gauss points. */
 static const PetscReal gauss[3] = {-0.77459666924148337704, 0, 0.77459666924148337704},
                        gauss_weight[3] = {5.0 / 9, 8.0 / 9, 5.0 / 9};
-/* Nodes of quadrilaterals in gmsh's order. */
+/* Nodes of lines and quadrilaterals in gmsh's order. */
+static const PetscInt node3[3] = {-1, 1, 0};
 static const PetscInt node9[9][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}, {0, -1}, {1, 0}, {0, 1}, {-1, 0}, {0, 0}};
 
-/* Nodes: the ends, the middle. */
+/* Functions of a line: the ends, the middle. */
+static void LineAt(PetscReal x, PetscReal N[], PetscReal dN[][3])
+{
+  for (PetscInt a = 0; a < 3; a++) {
+    N[a] = Quadratic(node3[a], x);
+    dN[a][0] = QuadraticSlope(node3[a], x);
+  }
+}
+
 static void Line3(HycoElement *e, PetscBool at_nodes)
 {
-  static const PetscInt node[3] = {-1, 1, 0};
-
   e->dim = 1;
   e->nv = e->nq = 3;
   for (PetscInt q = 0; q < 3; q++) {
-    const PetscReal x = at_nodes ? node[q] : gauss[q];
-
     e->w[q] = at_nodes ? 1 : gauss_weight[q];
-    for (PetscInt a = 0; a < 3; a++) {
-      e->N[q][a] = Quadratic(node[a], x);
-      e->dN[q][a][0] = QuadraticSlope(node[a], x);
-    }
+    LineAt(at_nodes ? node3[q] : gauss[q], e->N[q], e->dN[q]);
   }
 }
 
 /* Products of quadratic functions. With eight nodes (serendipity), the functions of the corners and the sides
    include the middle's, in proportion to their values there. */
+static void QuadAt(PetscInt nv, PetscReal x, PetscReal y, PetscReal N[], PetscReal dN[][3])
+{
+  const PetscReal f[3] = {(1 - x * x) * (1 - y * y), -2 * x * (1 - y * y), -2 * y * (1 - x * x)};
+
+  for (PetscInt a = 0; a < nv; a++) {
+    const PetscInt i = node9[a][0], j = node9[a][1];
+    const PetscReal share = nv == 9 ? 0 : a < 4 ? -1.0 / 4 : 1.0 / 2; /* share of the middle's function in a quad8 */
+
+    N[a] = Quadratic(i, x) * Quadratic(j, y) + share * f[0];
+    dN[a][0] = QuadraticSlope(i, x) * Quadratic(j, y) + share * f[1];
+    dN[a][1] = Quadratic(i, x) * QuadraticSlope(j, y) + share * f[2];
+  }
+}
+
 static void Quad(HycoElement *e, PetscInt nv, PetscBool at_nodes)
 {
   e->dim = 2;
   e->nv = nv;
   e->nq = 9;
   for (PetscInt q = 0; q < 9; q++) {
-    const PetscReal x = at_nodes ? node9[q][0] : gauss[q % 3], y = at_nodes ? node9[q][1] : gauss[q / 3],
-                    f[3] = {(1 - x * x) * (1 - y * y), -2 * x * (1 - y * y), -2 * y * (1 - x * x)};
-
     e->w[q] = at_nodes ? 1 : gauss_weight[q % 3] * gauss_weight[q / 3];
-    for (PetscInt a = 0; a < nv; a++) {
-      const PetscInt i = node9[a][0], j = node9[a][1];
-      const PetscReal share = nv == 9 ? 0 : a < 4 ? -1.0 / 4 : 1.0 / 2; /* share of the middle's function in a quad8 */
-
-      e->N[q][a] = Quadratic(i, x) * Quadratic(j, y) + share * f[0];
-      e->dN[q][a][0] = QuadraticSlope(i, x) * Quadratic(j, y) + share * f[1];
-      e->dN[q][a][1] = Quadratic(i, x) * QuadraticSlope(j, y) + share * f[2];
-    }
+    QuadAt(nv, at_nodes ? node9[q][0] : gauss[q % 3], at_nodes ? node9[q][1] : gauss[q / 3], e->N[q], e->dN[q]);
   }
 }
 
-/* Functions of a quadratic simplex at its next point, with barycentric coordinates L and this weight: L_a (2 L_a -
-   1) for corners, 4 L_a L_b for sides. */
-static void AddSimplexPoint(HycoElement *e, const PetscInt side[][2], const PetscReal L[4], PetscReal weight)
-{
-  const PetscInt q = e->nq++, dim = e->dim;
-  const PetscReal slope[4][3] = {{-1, -1, -1}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+/* The ends of a simplex's sides, of a triangle the first three. */
+static const PetscInt side[6][2] = {{0, 1}, {1, 2}, {2, 0}, {3, 0}, {2, 3}, {1, 3}};
 
-  e->w[q] = weight;
+/* Functions of a quadratic simplex of nv nodes at the point with barycentric coordinates L: L_a (2 L_a - 1) for
+   corners, 4 L_a L_b for sides. */
+static void SimplexAt(PetscInt dim, PetscInt nv, const PetscReal L[4], PetscReal N[], PetscReal dN[][3])
+{
+  static const PetscReal slope[4][3] = {{-1, -1, -1}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+
   for (PetscInt a = 0; a <= dim; a++) {
-    e->N[q][a] = L[a] * (2 * L[a] - 1);
-    for (PetscInt c = 0; c < dim; c++) e->dN[q][a][c] = (4 * L[a] - 1) * slope[a][c];
+    N[a] = L[a] * (2 * L[a] - 1);
+    for (PetscInt c = 0; c < dim; c++) dN[a][c] = (4 * L[a] - 1) * slope[a][c];
   }
-  for (PetscInt k = 0; k < e->nv - dim - 1; k++) {
+  for (PetscInt k = 0; k < nv - dim - 1; k++) {
     const PetscInt a = side[k][0], b = side[k][1], at = dim + 1 + k;
 
-    e->N[q][at] = 4 * L[a] * L[b];
-    for (PetscInt c = 0; c < dim; c++) e->dN[q][at][c] = 4 * (slope[a][c] * L[b] + L[a] * slope[b][c]);
+    N[at] = 4 * L[a] * L[b];
+    for (PetscInt c = 0; c < dim; c++) dN[at][c] = 4 * (slope[a][c] * L[b] + L[a] * slope[b][c]);
   }
 }
 
@@ -130,11 +137,9 @@ static void Tri6(HycoElement *e, PetscBool at_nodes)
 {
   static const PetscReal near[2] = {0.816847572980458513080857, 0.108103018168070227363429},
                          weight[2] = {0.109951743655321867638326, 0.223381589678011465695007};
-  static const PetscInt side[3][2] = {{0, 1}, {1, 2}, {2, 0}};
 
   e->dim = 2;
-  e->nv = 6;
-  e->nq = 0;
+  e->nv = e->nq = 6;
   for (PetscInt q = 0; q < 6; q++) {
     PetscReal L[4] = {0};
 
@@ -144,7 +149,8 @@ static void Tri6(HycoElement *e, PetscBool at_nodes)
       else
         L[a] = a == q % 3 ? near[q / 3] : (1 - near[q / 3]) / 2;
     }
-    AddSimplexPoint(e, side, L, at_nodes ? 1 : weight[q / 3] / 2);
+    e->w[q] = at_nodes ? 1 : weight[q / 3] / 2;
+    SimplexAt(2, 6, L, e->N[q], e->dN[q]);
   }
 }
 
@@ -155,11 +161,10 @@ static void Tet10(HycoElement *e)
   static const PetscReal far[2] = {0.310885919263300609797, 0.0927352503108912264023},
                          weight[3] = {0.112687925718015850799, 0.0734930431163619495437, 0.0425460207770814664381},
                          pair = 0.0455037041256496494919;
-  static const PetscInt side[6][2] = {{0, 1}, {1, 2}, {2, 0}, {3, 0}, {2, 3}, {1, 3}};
 
   e->dim = 3;
   e->nv = 10;
-  e->nq = 0;
+  e->nq = 14;
   for (PetscInt q = 0; q < 14; q++) {
     const PetscInt orbit = PetscMin(q / 4, 2);
     PetscReal L[4];
@@ -170,7 +175,8 @@ static void Tet10(HycoElement *e)
       else
         L[a] = a == side[q - 8][0] || a == side[q - 8][1] ? pair : 0.5 - pair;
     }
-    AddSimplexPoint(e, side, L, weight[orbit] / 6);
+    e->w[q] = weight[orbit] / 6;
+    SimplexAt(3, 10, L, e->N[q], e->dN[q]);
   }
 }
 
@@ -288,4 +294,17 @@ const HycoElement *HycoElementGetFacetNodes(HycoCellType type)
   default:
     return HycoCellKinds[type].dim == 2 && HycoCellKinds[type].quadratic ? &line3_nodes : NULL;
   }
+}
+
+void HycoFacetFunctions(PetscInt nf, const PetscReal at[2], PetscReal N[HYCO_FACET_NODES],
+                        PetscReal dN[HYCO_FACET_NODES][3])
+{
+  if (nf == 3) {
+    LineAt(at[0], N, dN);
+  } else if (nf == 6) {
+    const PetscReal L[4] = {1 - at[0] - at[1], at[0], at[1], 0};
+
+    SimplexAt(2, nf, L, N, dN);
+  } else
+    QuadAt(nf, at[0], at[1], N, dN);
 }

@@ -21,6 +21,7 @@ PetscErrorCode HycoFEDestroy(HycoFE *fe)
   PetscCall(PetscFree((*fe)->pin));
   PetscCall(PetscFree((*fe)->released));
   PetscCall(PetscFree((*fe)->X));
+  PetscCall(PetscFree((*fe)->room));
   PetscCall(PetscFree((*fe)->mirrored));
   PetscCall(PetscFree((*fe)->drawn_sign));
   PetscCall(PetscFree((*fe)->fixed));

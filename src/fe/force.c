@@ -190,7 +190,7 @@ static PetscErrorCode AddLifting(HycoFE fe, PetscInt cell, Into F)
   HycoMesh m = fe->mesh;
   PetscInt node[HYCO_MAX_CELL_NODES];
   const PetscInt n = m->dim * HycoMeshCellNodes(m, cell, node);
-  PetscReal Ke[HYCO_MAX_CELL_UNKNOWNS * HYCO_MAX_CELL_UNKNOWNS], u0[HYCO_MAX_CELL_UNKNOWNS];
+  PetscReal *Ke, u0[HYCO_MAX_CELL_UNKNOWNS];
   PetscBool any = PETSC_FALSE;
 
   PetscFunctionBegin;
@@ -199,6 +199,7 @@ static PetscErrorCode AddLifting(HycoFE fe, PetscInt cell, Into F)
     any = (PetscBool)(any || u0[k] != 0);
   }
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoFEElementRoom(fe, cell, &Ke));
   PetscCall(HycoFEElementStiffness(fe, cell, Ke));
   for (PetscInt k = 0; k < n; k++) {
     const PetscInt i = node[k / m->dim], c = k % m->dim, global = m->node_global ? m->node_global[i] : i;
@@ -363,7 +364,7 @@ PetscErrorCode HycoFELoads(HycoFE fe, PetscReal f[])
 PetscErrorCode HycoFEReactions(HycoFE fe, const PetscReal u[], const PetscReal f_int[], PetscReal r[])
 {
   HycoMesh m = fe->mesh;
-  PetscReal Ke[HYCO_MAX_CELL_UNKNOWNS * HYCO_MAX_CELL_UNKNOWNS];
+  PetscReal *Ke;
 
   PetscFunctionBegin;
   PetscCall(HycoFELoads(fe, r));
@@ -376,6 +377,7 @@ PetscErrorCode HycoFEReactions(HycoFE fe, const PetscReal u[], const PetscReal f
 
     for (PetscInt k = 0; k < n; k++) holds = (PetscBool)(holds || fe->fixed[node[k / m->dim] * m->dim + k % m->dim]);
     if (!holds) continue;
+    PetscCall(HycoFEElementRoom(fe, e, &Ke));
     PetscCall(HycoFEElementStiffness(fe, e, Ke));
     for (PetscInt k = 0; k < n * n; k++) {
       const PetscInt j = node[k % n / m->dim] * m->dim + k % n % m->dim;

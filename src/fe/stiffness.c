@@ -151,6 +151,19 @@ PetscErrorCode HycoFEBodyStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoFEElementRoom(HycoFE fe, PetscInt cell, PetscReal **Ke)
+{
+  const size_t n = (size_t)(HycoMeshCellSize(fe->mesh, cell) * fe->dim);
+
+  PetscFunctionBegin;
+  if (n * n > fe->n_room) {
+    PetscCall(PetscRealloc(n * n * sizeof(PetscReal), &fe->room));
+    fe->n_room = n * n;
+  }
+  *Ke = fe->room;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
 {
   PetscFunctionBegin;
@@ -257,7 +270,7 @@ static PetscErrorCode Finish(Mat A)
 
 static PetscErrorCode AddStiffness(HycoFE fe, Mat K)
 {
-  PetscReal Ke[HYCO_MAX_CELL_UNKNOWNS * HYCO_MAX_CELL_UNKNOWNS];
+  PetscReal *Ke;
   PetscBool done;
 
   PetscFunctionBegin;
@@ -265,6 +278,7 @@ static PetscErrorCode AddStiffness(HycoFE fe, Mat K)
   if (done) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatZeroEntries(K));
   for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
+    PetscCall(HycoFEElementRoom(fe, e, &Ke));
     PetscCall(HycoFEElementStiffness(fe, e, Ke));
     PetscCall(AddElement(fe, e, Ke, K));
   }
@@ -287,12 +301,13 @@ PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M)
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
   const PetscInt dim = fe->dim, n = el->nv * dim;
-  PetscReal Me[HYCO_MAX_CELL_UNKNOWNS * HYCO_MAX_CELL_UNKNOWNS];
+  PetscReal *Me;
 
   PetscFunctionBegin;
   PetscCall(MatSetOption(M, MAT_IGNORE_ZERO_ENTRIES, PETSC_TRUE)); /* the components are not coupled */
   PetscCall(MatZeroEntries(M));
   for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
+    PetscCall(HycoFEElementRoom(fe, e, &Me));
     PetscCall(PetscArrayzero(Me, n * n));
     for (PetscInt q = 0; q < el->nq; q++) {
       PetscReal g[HYCO_CELL_NODES][3], w;

@@ -39,13 +39,14 @@ static PetscErrorCode LiftingWork(HycoFE fe, PetscInt cell, const PetscReal u[],
   HycoMesh m = fe->mesh;
   PetscInt node[HYCO_MAX_CELL_NODES];
   const PetscInt n = m->dim * HycoMeshCellNodes(m, cell, node);
-  PetscReal Ke[HYCO_MAX_CELL_UNKNOWNS * HYCO_MAX_CELL_UNKNOWNS];
+  PetscReal *Ke;
   PetscBool any = PETSC_FALSE;
 
   PetscFunctionBegin;
   *work = 0;
   for (PetscInt k = 0; k < n; k++) any = (PetscBool)(any || fe->u0[node[k / m->dim] * m->dim + k % m->dim] != 0);
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoFEElementRoom(fe, cell, &Ke));
   PetscCall(HycoFEElementStiffness(fe, cell, Ke));
   for (PetscInt k = 0; k < n; k++) {
     const PetscReal u0 = fe->u0[node[k / m->dim] * m->dim + k % m->dim];

@@ -64,7 +64,7 @@ static PetscBool Keeps(const Gather *g, PetscInt cell)
 static PetscErrorCode Pack(Gather *g)
 {
   HycoMesh m = g->part;
-  PetscInt row[16] = {0};
+  PetscInt row[5 + HYCO_CELL_NODES] = {0};
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(m->n_nodes, &g->take));

@@ -106,9 +106,6 @@ static PetscErrorCode CheckSpring(HycoMesh mesh, const HycoSpring *spring)
 static PetscErrorCode CheckTie(HycoMesh mesh, const HycoTie *tie)
 {
   PetscFunctionBegin;
-  HycoCheck(!HycoMeshIsQuadratic(mesh),
-            "tie %s: ties need first-order cells, and the mesh has %s; mesh with gmsh -order 1", tie->name,
-            HycoCellKinds[mesh->type].name);
   HycoCheck(mesh->dim > 1, "tie %s: ties are for 2D and 3D; in 1D let both bodies share the node", tie->name);
   for (PetscInt side = 0; side < 2; side++) {
     const char *name = side ? tie->master : tie->slave;

@@ -82,27 +82,24 @@ PetscErrorCode HycoPlexVertices(DM dm, PetscBool interpolated, HycoCellType type
 }
 
 /* Whether a cone of this size is possible for a type, given DMPlex's type: cells of second order have all their
-   nodes in their cones, those of first order at most these (in DMs with edges and faces the sides), and with ties
-   more. */
-static PetscBool ConeIsOf(HycoCellType type, PetscInt size, PetscBool tied)
+   nodes in their cones, those of first order at most these (in DMs with edges and faces the sides). */
+static PetscBool ConeIsOf(HycoCellType type, PetscInt size)
 {
-  if (HycoCellKinds[type].quadratic) return (PetscBool)(!tied && HycoCellKinds[type].nv == size);
-  return (PetscBool)(tied || size <= HycoCellKinds[type].nv);
+  return (PetscBool)(HycoCellKinds[type].quadratic ? size == HycoCellKinds[type].nv : size <= HycoCellKinds[type].nv);
 }
 
-/* The HycoCellType of this process's cells; -1: there are none. */
+/* The HycoCellType of this process's cells; -1: there are none. With ties, cones have any size. */
 static PetscErrorCode CellType(DM dm, PetscInt *type)
 {
   HycoTies ties;
-  PetscBool tied;
   PetscInt c0, c1, last = -1;
 
   PetscFunctionBegin;
   *type = -1;
   PetscCall(HycoTiesOf(dm, &ties));
-  tied = (PetscBool)(ties != NULL);
   PetscCall(DMPlexGetHeightStratum(dm, 0, &c0, &c1));
-  for (PetscInt c = c0; c < c1; c++) {
+  if (ties && c0 < c1) *type = ties->type;
+  for (PetscInt c = c0; c < c1 && !ties; c++) {
     DMPolytopeType of;
     PetscInt t = 0, size;
 
@@ -110,7 +107,7 @@ static PetscErrorCode CellType(DM dm, PetscInt *type)
     if (size == last) continue;
     last = size;
     PetscCall(DMPlexGetCellType(dm, c, &of));
-    while (t < HYCO_N_CELL_TYPES && (plex_type[t] != of || !ConeIsOf((HycoCellType)t, size, tied))) t++;
+    while (t < HYCO_N_CELL_TYPES && (plex_type[t] != of || !ConeIsOf((HycoCellType)t, size))) t++;
     HycoCheck(t < HYCO_N_CELL_TYPES && (c == c0 || t == *type),
               "the mesh has cells of DMPlex's type %s; hyco supports segments, triangles, quadrilaterals, tetrahedra "
               "or hexahedra, one type per mesh",

@@ -8,7 +8,7 @@
 
 #define TIES "HycoTies"
 
-PetscErrorCode HycoTiesCreate(PetscInt n, HycoTies *ties)
+PetscErrorCode HycoTiesCreate(PetscInt n, HycoCellType type, HycoTies *ties)
 {
   HycoTies t;
 
@@ -17,6 +17,7 @@ PetscErrorCode HycoTiesCreate(PetscInt n, HycoTies *ties)
   t = *ties;
   t->references = 1;
   t->n = n;
+  t->type = type;
   PetscCall(PetscCalloc1(n, &t->slave));
   PetscCall(PetscCalloc1(n, &t->master));
   PetscCall(PetscCalloc1(n, &t->tie));
@@ -40,13 +41,14 @@ PetscErrorCode HycoTiesDestroy(HycoTies *ties)
 
 PetscErrorCode HycoTiesBcast(MPI_Comm comm, HycoTies *ties)
 {
-  PetscInt n = *ties ? (*ties)->n : 0;
+  PetscInt head[2] = {*ties ? (*ties)->n : 0, *ties ? (PetscInt)(*ties)->type : 0}, n;
   HycoTies t;
 
   PetscFunctionBegin;
-  HycoBcast(&n, 1, MPIU_INT, comm);
+  HycoBcast(head, 2, MPIU_INT, comm);
+  n = head[0];
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!*ties) PetscCall(HycoTiesCreate(n, ties));
+  if (!*ties) PetscCall(HycoTiesCreate(n, (HycoCellType)head[1], ties));
   t = *ties;
   HycoBcast(t->slave, n, MPIU_INT, comm);
   HycoBcast(t->master, n, MPIU_INT, comm);

@@ -99,7 +99,7 @@ static PetscErrorCode MoveTies(HycoH5 h, HycoROM m)
   PetscFunctionBegin;
   if (HycoH5Reads(h) ? !HycoH5Has(h, "ties/slave") : !t) PetscFunctionReturn(PETSC_SUCCESS);
   if (HycoH5Reads(h)) {
-    PetscCall(HycoTiesCreate(0, &t));
+    PetscCall(HycoTiesCreate(0, m->mesh->type, &t));
     HycoFreeAll(&t->slave, &t->master, &t->tie, &t->body, &t->weight, &t->reach);
     t->n = -1;
   }

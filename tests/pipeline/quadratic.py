@@ -130,7 +130,7 @@ class Quadratic(Case):
 
     def test_refused(self):
         text = 'scene: {mesh: mesh.msh}\nbody: {block: {young: 200}, seat: {young: 200}}\nfixed: {base: {x: 0, y: 0}, wall: {x: 0}}\n'
-        for more, said in (('contact: {c: {type: surface, slave: under, master: over}}', 'needs first-order cells'), ('tie: {t: {slave: under, master: over}}', 'ties need first-order cells'),
+        for more, said in (('contact: {c: {type: surface, slave: under, master: over}}', 'needs first-order cells'),
                            ('scene_refine: 1', 'needs first-order cells'), ('body_seat_element: bbar', 'is for quad4 and hex8'),
                            ('hyco_mesh_write: m.h5', 'cannot be written as a DMPlex')):
             for ranks in (0, 2):

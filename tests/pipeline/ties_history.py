@@ -5,10 +5,10 @@ import unittest
 
 import numpy as np
 
-from common import SOURCE, Case
+from common import SOURCE, Case, msh
 
 sys.path.insert(0, os.path.join(SOURCE, 'tests', 'verify'))
-from grids import Grid  # noqa: E402
+from grids import LINEAR, Grid, second  # noqa: E402
 
 SCENE = """
 scene: {mesh: MESH, parameters: [push, creep]}
@@ -16,7 +16,7 @@ parameter: {push: {range: [8, 12]}, creep: {range: [0.5, 2]}}
 body: {BODIES}
 fixed: {y0: {y: 0}, y1: {x: 0.001*q}}
 pressure: {bore: push*q}
-contact: {stop: {group: bore, gap: "0.0003 + 0.0005*x"}}
+contact: {stop: {group: bore, gap: "GAP"}}
 history: {times: [0, 1, 3, 6, 7], tables: {q: [[0, 0], [1, 1], [6, 1], [7, -1]]}}
 output: {hold: {reaction: y, group: y0}, wall: {reaction: x, group: y1}, least: {min: u_y}, carried: {force: y}, peak: {max: contact_pressure}}
 """
@@ -26,18 +26,19 @@ COLUMNS = ('total_contact_force', 'n_active', 'inelastic', 'mises', 'stored', 'd
 
 class TiesHistory(Case):
     @classmethod
-    def ring(cls, name, *parts):
+    def ring(cls, name, *parts, kind='quad4'):
         """A quarter of a ring, in parts of so many cells around each."""
-        grid, arc = Grid(), lambda x: np.stack([x[:, 0] * np.cos(x[:, 1]), x[:, 0] * np.sin(x[:, 1])], -1)
+        grid = Grid()
         ends = np.linspace(0, np.pi / 2, len(parts) + 1)
         for k, (n, layers) in enumerate(parts):
             sides = {'y0': 'y0' if k == 0 else 'cut', 'y1': 'y1' if k + 1 == len(parts) else 'end', 'x0': 'bore'}
-            grid.box('quad4', [np.linspace(1, 2, layers + 1), np.linspace(ends[k], ends[k + 1], n + 1)], arc, 'ab'[k], sides)
-        grid.write(cls.path(name + '.msh'))
+            grid.box(LINEAR.get(kind, kind), [np.linspace(1, 2, layers + 1), np.linspace(ends[k], ends[k + 1], n + 1)], lambda x: x, 'ab'[k], sides)
+        nodes, *cells = second(grid, kind) if kind in LINEAR else (grid.nodes, grid.elements, grid.names)
+        msh(cls.path(name + '.msh'), [(r * np.cos(t), r * np.sin(t), z) for r, t, z in nodes], *cells)
 
     @classmethod
-    def scene(cls, name, bodies, tie=''):
-        text = SCENE.replace('MESH', name.split('-')[0] + '.msh').replace('BODIES', bodies)
+    def scene(cls, name, bodies, tie='', gap='0.0003 + 0.0005*x'):
+        text = SCENE.replace('MESH', name.split('-')[0] + '.msh').replace('BODIES', bodies).replace('GAP', gap)
         with open(cls.path(name + '.yaml'), 'w', encoding='ascii') as f:
             f.write(text + tie)
         return cls.path(name + '.yaml')
@@ -79,6 +80,30 @@ class TiesHistory(Case):
         matched = self.histories(self.tied)
         for name in ('stored', 'dissipated'):
             np.testing.assert_allclose(loose[name], matched[name], atol=0.1 * max(matched[name]), err_msg=name)
+
+    def test_quadratic(self):
+        """Cells of second order: halves that match are one ring; where the slave divides the master, nearly. A model of the whole mesh is exact."""
+        gap = '0.00001 + 0.0001*x'
+        for kind in ('tri6', 'quad8'):
+            self.ring(f'{kind}one', (4, 2), kind=kind)
+            self.ring(f'{kind}two', (2, 2), (2, 2), kind=kind)
+            self.ring(f'{kind}finer', (2, 2), (2, 4), kind=kind)
+            one = self.histories(self.scene(f'{kind}one', f'a: {NORTON}', gap=gap))
+            self.assertGreater(max(one['n_active']), 0)
+            tie = 'tie: {glue: {slave: cut, master: end}}\n'
+            scene = self.scene(f'{kind}two', f'a: {NORTON}, b: {NORTON}', tie, gap)
+            with self.subTest(kind=kind):
+                for args, ranks in (((), 0), ((), 2), (('-tie_glue_slave', 'end', '-tie_glue_master', 'cut'), 3)):
+                    self.alike(self.histories(scene, *args, ranks=ranks), one, 1e-7)
+                scene = self.scene(f'{kind}finer', f'a: {NORTON}, b: {NORTON}', tie, gap)
+                finer = self.histories(scene)
+                for name in ('stored', 'dissipated'):
+                    np.testing.assert_allclose(finer[name], one[name], atol=0.01 * max(one[name]), err_msg=name)
+                self.hyco('train', '-scene', scene, '-model', f'{kind}.h5', '-grid', '1,1', '-hyco_rid_whole', '-hyco_hybrid', 'all')
+                found = self.hyco('predict', '-model', f'{kind}.h5', '-mu', '10,1.2', '-hyco_residual')
+                self.assertLess(found['equilibrium']['worst'], 1e-7)
+                for name, values in finer['outputs'].items():
+                    np.testing.assert_allclose(found['history']['outputs'][name], values, atol=1e-7 * np.abs(values).max(), err_msg=name)
 
     def test_models(self):
         """Of the whole mesh exact; on an RID, by projection and by regression nearly; their fields and residual by replay."""

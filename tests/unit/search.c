@@ -94,7 +94,7 @@ static PetscErrorCode Nearest(const Surfaces *s, const PetscReal x[3], PetscReal
     HycoPatches one;
     HycoProjection p;
 
-    PetscCall(HycoPatchesCreate(s->X, 1, s->t.nf, s->node + k * s->t.nf, NULL, &one));
+    PetscCall(HycoPatchesCreate(s->X, 1, s->t.nf, s->t.nf, s->node + k * s->t.nf, NULL, &one));
     HycoPatchesProject(one, x, NULL, &p);
     PetscCall(HycoPatchesDestroy(&one));
     *distance = PetscMin(*distance, p.distance);
