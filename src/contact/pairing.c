@@ -12,11 +12,11 @@ PetscReal HycoSurfaceTolerance(HycoMesh m, PetscInt group)
   PetscReal shortest = PETSC_MAX_REAL;
 
   for (PetscInt f = 0; f < m->n_facets; f++) {
-    const PetscInt *node = m->facets + f * m->nf;
+    const PetscInt *node = m->facets + f * m->nf, corners = HycoFacetCorners(m->nf, node);
 
     if (m->facet_group[f] != group) continue;
-    for (PetscInt v = 0; v < m->nf && m->nf > 1; v++) /* the last edge ends at the first node */
-      shortest = PetscMin(shortest, HycoDistance(m->xyz + 3 * node[v], m->xyz + 3 * node[(v + 1) % m->nf]));
+    for (PetscInt v = 0; v < corners && corners > 1; v++) /* the last edge ends at the first node */
+      shortest = PetscMin(shortest, HycoDistance(m->xyz + 3 * node[v], m->xyz + 3 * node[(v + 1) % corners]));
   }
   return shortest < PETSC_MAX_REAL ? shortest / 10 : 0;
 }
