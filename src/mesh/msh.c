@@ -343,6 +343,7 @@ static PetscErrorCode AddElement(Msh *m, HycoMshGroup *g, long long tag, long lo
             "%s: group \"%s\" has elements of gmsh type %lld (%s); " TAKES, m->path, GroupName(m, g), type,
             TypeName(type));
   PetscCall(PetscArraycpy(node, of, nv));
+  g->shapes |= (PetscInt)1 << HycoMshType(g->dim, nv);
   if (g->n && g->nv != nv) PetscCall(Match(m, g, nv, node));
   if (!g->n) g->nv = nv;
   nv = g->nv;

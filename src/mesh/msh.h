@@ -7,10 +7,11 @@
 /* The elements of one physical group. */
 typedef struct {
   int dim, tag;
-  char name[256]; /* as in the file, or group_DIM_TAG */
-  PetscInt n, nv; /* number of elements, and of nodes of each */
-  PetscInt *id;   /* n tags */
-  PetscInt *node; /* n x nv, indices of the file's nodes */
+  char name[256];  /* as in the file, or group_DIM_TAG */
+  PetscInt n, nv;  /* number of elements, and of nodes of each */
+  PetscInt shapes; /* of the elements, bits 1 << HycoCellType */
+  PetscInt *id;    /* n tags */
+  PetscInt *node;  /* n x nv, indices of the file's nodes */
   PetscInt room;
   PetscInt body;  /* used by the caller */
   PetscInt inner; /* used by the caller */

@@ -71,7 +71,7 @@ static PetscErrorCode CheckBodies(HycoScene scene, Reader *r, HycoMesh m)
         HycoCheck(shape < HYCO_N_CELL_TYPES,
                   "%s: cells of dimension %d with %d nodes are of no type that hyco supports", scene->mesh_path,
                   (int)m->dim, (int)r->group[k].nv);
-        shapes |= (PetscInt)1 << shape;
+        shapes |= r->group[k].shapes;
         HycoCheck(HycoShapesType(shapes) < HYCO_N_CELL_TYPES,
                   "%s mixes cells of %d and %d nodes; only first-order cells may be of several types: mesh with gmsh "
                   "-order 1, or recombine all surfaces, or none",

@@ -319,11 +319,56 @@ static PetscErrorCode CheckShapes(DM dm)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* On one process, numbers the cells by type, as DMPlexTransform needs them; distribution does so on several. */
+static PetscErrorCode SortByType(DM *dm)
+{
+  PetscInt c0, c1, last, next, n, *place, *new_tag;
+  const PetscInt *tag;
+  DMPolytopeType before = DM_POLYTOPE_POINT, of;
+  PetscBool sorted = PETSC_TRUE;
+  IS tags, order;
+  PetscMPIInt size;
+  DM by_type;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)*dm), &size));
+  PetscCall(DMPlexGetHeightStratum(*dm, 0, &c0, &c1));
+  for (PetscInt c = c0; c < c1; c++, before = of) {
+    PetscCall(DMPlexGetCellType(*dm, c, &of));
+    sorted = (PetscBool)(sorted && of >= before);
+  }
+  if (sorted || size > 1) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscObjectQuery((PetscObject)*dm, HYCO_TAGS, (PetscObject *)&tags));
+  PetscCall(DMPlexGetChart(*dm, NULL, &last));
+  PetscCall(ISGetLocalSize(tags, &n));
+  PetscCall(PetscMalloc1(last, &place));
+  PetscCall(PetscMalloc1(n, &new_tag));
+  for (PetscInt p = 0; p < last; p++) place[p] = p;
+  next = c0;
+  for (int type = 0; type < DM_NUM_POLYTOPES; type++) {
+    for (PetscInt c = c0; c < c1; c++) {
+      PetscCall(DMPlexGetCellType(*dm, c, &of));
+      if ((int)of == type) place[c] = next++;
+    }
+  }
+  PetscCall(ISGetIndices(tags, &tag));
+  for (PetscInt p = 0; p < n; p++) new_tag[place[p]] = tag[p];
+  PetscCall(ISRestoreIndices(tags, &tag));
+  PetscCall(ISCreateGeneral(PETSC_COMM_SELF, last, place, PETSC_OWN_POINTER, &order));
+  PetscCall(DMPlexPermute(*dm, order, &by_type));
+  PetscCall(ISDestroy(&order));
+  PetscCall(HycoPlexSetTags(by_type, new_tag));
+  PetscCall(DMDestroy(dm));
+  *dm = by_type;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoPlexRefine(DM *dm, HycoScene scene, PetscInt times)
 {
   PetscFunctionBegin;
   if (!times) PetscFunctionReturn(PETSC_SUCCESS);
   HycoOnEach(PetscObjectComm((PetscObject)*dm), CheckShapes(*dm));
+  PetscCall(SortByType(dm));
   PetscCall(Interpolate(dm, scene));
   for (PetscInt k = 0; k < times; k++) PetscCall(RefineOnce(dm));
   PetscFunctionReturn(PETSC_SUCCESS);
