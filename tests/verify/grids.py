@@ -112,8 +112,10 @@ def pieces(cell, corner, cut, bounds):
     for base in SIDES['hex8']:
         if apex in base:
             continue
-        nodes = [corner[v] for v in base]
+        side, up, far = (np.subtract(CORNERS[v], CORNERS[base[0]]) for v in (base[1], base[3], apex))
+        nodes = [corner[v] for v in (base if np.cross(side, up) @ far > 0 else base[::-1])]
         if cut == 'tet4' and bounds(nodes):
+            nodes = nodes[nodes.index(min(nodes)):] + nodes[:nodes.index(min(nodes))]  # the same diagonal on opposite faces
             out += [('tet4', [*(nodes[v] for v in half), corner[apex]]) for half in ((0, 1, 2), (0, 2, 3))]
         else:
             out.append(('pyramid5', [*nodes, corner[apex]]))
