@@ -40,9 +40,21 @@ PetscErrorCode HycoFieldsWriteMesh(HycoH5 h, const char group[], const HycoFileO
    of one body; where bodies share nodes, of the first one. Valid at the nodes that the process owns, all of whose
    cells it has. As tensors in XDMF's order (n_nodes x 6), with von Mises stress (n_nodes). */
 PetscErrorCode HycoNodalStress(HycoFE fe, const PetscReal sigma[], PetscReal tensor[], PetscReal mises[]);
-/* Writes only the cells, as a dataset of cols columns. */
+/* Writes only the cells: nv columns, in which collapsed cells have repeated nodes. */
 PetscErrorCode HycoFieldsWriteCells(HycoH5 h, const char name[], const HycoFileOrder *order, HycoMesh mesh,
-                                    PetscBool vtk, PetscInt cols);
+                                    PetscBool vtk);
+/* This rank's cells in the file's order, by shape: item[start[e] .. start[e + 1]) are the distinct nodes of its e-th
+   cell, in VTK's order, after the code of its shape unless `code` is NULL. Of the `all` items of all ranks its own are
+   those from `first` on. Create is collective with an order; the caller destroys the list. */
+typedef struct {
+  PetscInt n, first, all, *start, *item;
+  unsigned char *shape; /* n, HycoCellType */
+} HycoCellList;
+PetscErrorCode HycoCellListCreate(const HycoFileOrder *order, HycoMesh mesh, const unsigned char code[],
+                                  HycoCellList *list);
+/* Writes the items as a dataset of one dimension. */
+PetscErrorCode HycoCellListWrite(HycoH5 h, const char name[], const HycoCellList *list);
+PetscErrorCode HycoCellListDestroy(HycoCellList *list);
 /* The fields of a solution's contacts by node of their mesh (vector on slaves, negative on masters), gaps and
    slaves' tags by contact; filled on rank 0, where the contacts are (surface NULL elsewhere). Collective; must be
    destroyed after an error too. */
@@ -73,6 +85,7 @@ struct _n_HycoFieldFile {
   PetscBool vtk;
   PetscInt most, n;           /* times: at most, written so far */
   PetscBool points;           /* each with a mesh and parameters of its own */
+  PetscInt n_items;           /* length of mesh/topology, the mixed cells in the .h5 */
   PetscReal *t, *mu;          /* mu: n_parameters, for each point */
   const HycoFileOrder *order; /* NULL: this process has all */
   HycoMesh mesh;

@@ -21,6 +21,9 @@ typedef enum {
   HYCO_TET10,
   HYCO_HEX20,
   HYCO_HEX27,
+  HYCO_N_MESH_TYPES, /* the types of meshes; the others are only shapes of single cells in meshes of hex8 */
+  HYCO_PYRAMID5 = HYCO_N_MESH_TYPES,
+  HYCO_PRISM6,
   HYCO_N_CELL_TYPES
 } HycoCellType;
 
@@ -40,6 +43,24 @@ extern const HycoCellKind HycoCellKinds[HYCO_N_CELL_TYPES];
 
 typedef struct _n_HycoMesh *HycoMesh;
 
+/*
+  Shapes (shapes.c): a mesh of several types of first order, or of prisms or pyramids, has the type quad4 or hex8. Its
+  smaller cells are collapsed: a node at several places of the cell, next to each other. The map of the wider type then
+  reproduces the smaller one's functions: those of a repeated node add up. So is a triangle among a mesh's
+  quadrilateral facets, whose last two nodes are the same.
+*/
+/* The type of a mesh with cells of these shapes, bits 1 << HycoCellType; HYCO_N_CELL_TYPES: there is none. */
+HycoCellType HycoShapesType(PetscInt shapes);
+/* Converts the nodes of a cell of this shape, or of a facet, to nv nodes (room for them). */
+void HycoShapeWiden(HycoCellType shape, PetscInt nv, PetscInt node[]);
+/* The shape of a cell in a mesh of a type. */
+HycoCellType HycoShapeOf(HycoCellType type, const PetscInt node[]);
+/* The number of corners of a facet with nf nodes of first order. */
+static inline PetscInt HycoFacetCorners(PetscInt nf, const PetscInt node[])
+{
+  return nf == 4 && node[2] == node[3] ? 3 : nf;
+}
+
 /* The scene's ties on the whole mesh, the same on all ranks: slave nodes with their masters, u_slave = sum of weight
    times u_master. Entries of a slave are contiguous; slaves and masters are in ascending order. Reference-counted. */
 typedef struct _n_HycoTies *HycoTies;
@@ -57,6 +78,7 @@ struct _n_HycoTies {
 struct _n_HycoMesh {
   PetscInt dim, nv, nf; /* space dimension; nodes of a cell, of a facet */
   HycoCellType type;
+  PetscBool mixed; /* whether the whole mesh has collapsed cells */
   /* nodes, ascending by tag; in a part first those of its cells, then the others */
   PetscInt n_nodes;
   PetscReal *xyz;          /* n_nodes x 3, as in the file (not moved) */
@@ -98,17 +120,28 @@ struct _n_HycoMesh {
   PetscInt *follow_start, *follow;
 };
 
-/* The nodes of a cell's unknowns (room for HYCO_MAX_CELL_NODES); returns their number. */
+/* The distinct nodes of a cell (room for nv), in the order of its shape; returns their number. */
+static inline PetscInt HycoMeshOwnNodes(HycoMesh m, PetscInt cell, PetscInt node[])
+{
+  const PetscInt *all = m->cells + cell * m->nv;
+  PetscInt n = 0;
+
+  for (PetscInt v = 0; v < m->nv; v++) {
+    if (!v || all[v] != all[v - 1]) node[n++] = all[v];
+  }
+  return n;
+}
+/* The nodes of a cell's unknowns (room for HYCO_MAX_CELL_NODES): its own, then masters of tied nodes; returns their
+   number. */
 static inline PetscInt HycoMeshCellNodes(HycoMesh m, PetscInt cell, PetscInt node[])
 {
-  PetscInt n = m->nv;
+  PetscInt n = HycoMeshOwnNodes(m, cell, node);
 
-  for (PetscInt v = 0; v < m->nv; v++) node[v] = m->cells[cell * m->nv + v];
   for (PetscInt k = m->ties ? m->follow_start[cell] : 0; m->ties && k < m->follow_start[cell + 1]; k++)
     node[n++] = m->follow[k];
   return n;
 }
-/* Their number. */
+/* Their number, with the repeated nodes of a collapsed cell. */
 static inline PetscInt HycoMeshCellSize(HycoMesh m, PetscInt cell)
 {
   return m->nv + (m->ties ? m->follow_start[cell + 1] - m->follow_start[cell] : 0);
@@ -117,6 +150,12 @@ static inline PetscInt HycoMeshCellSize(HycoMesh m, PetscInt cell)
 static inline PetscInt HycoMeshTied(HycoMesh m, PetscInt node)
 {
   return m->ties ? m->tied_at[node] : -1;
+}
+
+/* The shape of a cell. */
+static inline HycoCellType HycoMeshShape(HycoMesh m, PetscInt cell)
+{
+  return HycoShapeOf(m->type, m->cells + cell * m->nv);
 }
 
 PetscErrorCode HycoMeshDestroy(HycoMesh *mesh);

@@ -22,20 +22,42 @@ static void ToRegular(PetscInt dim, PetscReal J[3][3])
   }
 }
 
+/* The map from the regular pyramid or prism at its axis. */
+static void FromAxis(HycoCellType shape, const PetscInt node[], const PetscReal X[], PetscReal J[3][3])
+{
+  for (PetscInt c = 0; c < 3; c++) {
+    PetscReal x[6];
+
+    for (PetscInt a = 0; a < HycoCellKinds[shape].nv; a++) x[a] = X[3 * node[a] + c];
+    if (shape == HYCO_PYRAMID5) {
+      J[c][0] = (x[1] - x[0] + x[2] - x[3]) / 2;
+      J[c][1] = (x[3] - x[0] + x[2] - x[1]) / 2;
+      J[c][2] = PetscSqrtReal(2) * (x[4] - (x[0] + x[1] + x[2] + x[3]) / 4); /* sides are 1, the height 1 / sqrt(2) */
+    } else {
+      J[c][0] = (x[1] - x[0] + x[4] - x[3]) / 2;
+      J[c][1] = (x[2] - x[0] + x[5] - x[3]) / 2;
+      J[c][1] = (2 * J[c][1] - J[c][0]) / PetscSqrtReal(3);
+      J[c][2] = (x[3] + x[4] + x[5] - x[0] - x[1] - x[2]) / 3;
+    }
+  }
+}
+
 /* Aspect ratio of a cell at a quadrature point, 1 if it is regular there: k + sqrt(k^2 - 1) with the condition
    number k = |J| |J^-1| / dim in the Frobenius norm of the map from the regular cell. Exact for rectangles. */
-static PetscReal Stretch(const HycoElement *el, const PetscInt node[], const PetscReal X[], PetscInt q)
+static PetscReal Stretch(HycoCellType shape, const PetscInt node[], const PetscReal X[], PetscInt q)
 {
-  const PetscInt dim = el->dim;
+  const HycoElement *el = HycoElementGet(shape);
+  const PetscInt dim = HycoCellKinds[shape].dim;
   PetscReal J[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, norm = 0, inverse = 0, det = 0, k;
 
-  for (PetscInt c = 0; c < dim; c++) {
+  if (shape >= HYCO_N_MESH_TYPES) FromAxis(shape, node, X, J);
+  for (PetscInt c = 0; c < dim && shape < HYCO_N_MESH_TYPES; c++) {
     for (PetscInt d = 0; d < dim; d++) {
       J[c][d] = 0;
       for (PetscInt a = 0; a < el->nv; a++) J[c][d] += X[3 * node[a] + c] * el->dN[q][a][d];
     }
   }
-  if (el->nv == dim + 1) ToRegular(dim, J);
+  if (shape < HYCO_N_MESH_TYPES && el->nv == dim + 1) ToRegular(dim, J);
   for (PetscInt c = 0; c < dim; c++) {
     for (PetscInt d = 0; d < dim; d++) {
       const PetscInt c1 = (c + 1) % 3, c2 = (c + 2) % 3, d1 = (d + 1) % 3, d2 = (d + 2) % 3;
@@ -54,13 +76,15 @@ static PetscReal Stretch(const HycoElement *el, const PetscInt node[], const Pet
 void CheckCells(Check *check, HycoFE fe)
 {
   HycoMesh m = fe->mesh;
-  const HycoElement *el = HycoElementGet(m->type);
 
   for (PetscInt e = 0; e < m->n_cells && m->dim > 1; e++) {
     const PetscInt b = m->cell_body[e];
+    const HycoCellType shape = HycoMeshShape(m, e);
+    PetscInt node[HYCO_CELL_NODES];
+    const PetscInt n = HycoMeshOwnNodes(m, e, node);
 
-    for (PetscInt q = 0; q < (m->nv == m->dim + 1 ? 1 : el->nq); q++) {
-      const PetscReal stretch = Stretch(el, m->cells + e * m->nv, fe->X, q);
+    for (PetscInt q = 0; q < (shape >= HYCO_N_MESH_TYPES || n == m->dim + 1 ? 1 : HycoElementGet(shape)->nq); q++) {
+      const PetscReal stretch = Stretch(shape, node, fe->X, q);
 
       if (stretch <= check->stretch[b] * (1 + 1e-6)) continue; /* round-off, whose root remains for a square */
       check->stretch[b] = stretch;

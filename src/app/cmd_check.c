@@ -132,18 +132,43 @@ static PetscErrorCode SayTies(Check *check, HycoMesh m, PetscInt *n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The cells by type, "quad4 (24), tri3 (12)", and with their numbers to the report; of a mesh of one type only its
+ * name.
+ */
+static PetscErrorCode NameCells(Check *check, char name[HYCO_LINE])
+{
+  HycoMesh m = check->whole->part;
+  cJSON *types = cJSON_AddObjectToObject(check->json, "cell_types");
+  PetscInt n[HYCO_N_CELL_TYPES] = {0};
+
+  PetscFunctionBegin;
+  name[0] = '\0';
+  for (PetscInt e = 0; e < m->n_cells; e++) n[HycoMeshShape(m, e)]++;
+  for (int t = 0; t < HYCO_N_CELL_TYPES; t++) {
+    char one[HYCO_LINE];
+
+    if (!n[t]) continue;
+    cJSON_AddNumberToObject(types, HycoCellKinds[t].name, n[t]);
+    HycoFormat(one, n[t] < m->n_cells ? "%s (%d)" : "%s", HycoCellKinds[t].name, (int)n[t]);
+    PetscCall(HycoListAdd(name, ", ", one));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode SayMesh(Check *check)
 {
   HycoFOM f = check->fom;
   HycoMesh m = f->part;
   const char *title;
+  char cells[HYCO_LINE];
   PetscInt n_fixed = f->n_nodes * m->dim - f->n_free, n_tied;
 
   PetscFunctionBegin;
   PetscCall(HycoSceneGetTitle(f->scene, &title));
   PetscCall(Say("scene: %s\n", title[0] ? title : "(no title)"));
+  PetscCall(NameCells(check, cells));
   PetscCall(Say("mesh %s: %dD, %s%s, %d nodes, %d cells; %d free unknowns, and %d fixed by supports%s\n",
-                f->scene->dm ? "of the program" : f->scene->mesh_path, (int)m->dim, HycoCellKinds[m->type].name,
+                f->scene->dm ? "of the program" : f->scene->mesh_path, (int)m->dim, cells,
                 f->scene->face_nodes ? " (the file's hex20 cells with nodes on faces and inside, for contact)" : "",
                 (int)f->n_nodes, (int)f->n_cells, (int)f->n_free, (int)n_fixed, f->scene->n_ties ? " and ties" : ""));
   PetscCall(SayTies(check, m, &n_tied));

@@ -233,16 +233,16 @@ static PetscBool InQuadrilateral(const PetscReal *const X[], const PetscReal x[3
 /* The nearest point of one patch: inside it, or on one of its edges. Returns the squared distance. */
 static PetscReal OnPatch(HycoPatches s, PetscInt patch, const PetscReal x[3], PetscReal w[])
 {
-  const PetscInt nf = s->nf, edges = nf == 2 ? 1 : nf;
+  const PetscInt nf = HycoFacetCorners(s->nf, s->node + patch * s->nf), edges = nf == 2 ? 1 : nf;
   const PetscReal *X[4];
   PetscReal best = PETSC_MAX_REAL;
 
-  if (s->corners < nf) {
+  if (s->corners < s->nf) {
     const HycoCurved facet = Curved(s, patch);
 
     return HycoCurvedProject(&facet, x, w);
   }
-  for (PetscInt a = 0; a < nf; a++) X[a] = s->X + 3 * s->node[patch * nf + a];
+  for (PetscInt a = 0; a < nf; a++) X[a] = s->X + 3 * s->node[patch * s->nf + a];
   if ((nf == 3 && InTriangle(X, x, w)) || (nf == 4 && InQuadrilateral(X, x, w))) best = Distance2(nf, X, w, x);
   for (PetscInt k = 0; k < edges; k++) {
     const PetscInt l = (k + 1) % nf;

@@ -13,11 +13,11 @@ PetscReal HycoSurfaceTolerance(HycoMesh m, PetscInt group)
   PetscReal shortest = PETSC_MAX_REAL;
 
   for (PetscInt f = 0; f < m->n_facets; f++) {
-    const PetscInt *node = m->facets + f * m->nf;
+    const PetscInt *node = m->facets + f * m->nf, n = HycoFacetCorners(corners, node);
 
     if (m->facet_group[f] != group) continue;
-    for (PetscInt v = 0; v < corners && corners > 1; v++) /* the last edge ends at the first node */
-      shortest = PetscMin(shortest, HycoDistance(m->xyz + 3 * node[v], m->xyz + 3 * node[(v + 1) % corners]));
+    for (PetscInt v = 0; v < n && n > 1; v++) /* the last edge ends at the first node */
+      shortest = PetscMin(shortest, HycoDistance(m->xyz + 3 * node[v], m->xyz + 3 * node[(v + 1) % n]));
   }
   return shortest < PETSC_MAX_REAL ? shortest / 10 : 0;
 }

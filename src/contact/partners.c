@@ -92,11 +92,11 @@ const PetscReal *HycoPartnersOutward(const HycoPartners *t, PetscInt slave)
 /* The shortest edge of a patch. */
 static PetscReal ShortestEdge(const HycoPartners *t, PetscInt patch)
 {
-  const PetscInt *node = t->node + patch * t->nf;
+  const PetscInt *node = t->node + patch * t->nf, corners = HycoFacetCorners(t->nf, node);
   PetscReal shortest = PETSC_MAX_REAL;
 
-  for (PetscInt a = 0; a < t->nf; a++)
-    shortest = PetscMin(shortest, HycoDistance(t->X + 3 * node[a], t->X + 3 * node[(a + 1) % t->nf]));
+  for (PetscInt a = 0; a < corners; a++)
+    shortest = PetscMin(shortest, HycoDistance(t->X + 3 * node[a], t->X + 3 * node[(a + 1) % corners]));
   return shortest;
 }
 
@@ -145,7 +145,7 @@ static PetscErrorCode FindBorder(HycoPartners *t)
   if (edges) qsort(t->border, (size_t)edges, 2 * sizeof(PetscInt), CompareEdges);
   for (PetscInt k = 0, next; k < edges; k = next) {
     for (next = k + 1; next < edges && !CompareEdges(t->border + 2 * k, t->border + 2 * next);) next++;
-    if (next > k + 1) continue;
+    if (next > k + 1 || (nf > 2 && t->border[2 * k] == t->border[2 * k + 1])) continue; /* or a triangle's last side */
     for (PetscInt j = 0; j < 2; j++) {
       t->at_border[t->border[2 * k + j]] = PETSC_TRUE;
       t->border[2 * t->n_border + j] = t->border[2 * k + j];

@@ -13,10 +13,10 @@
 /* Deviation of a plane due to the rounding of coordinates in a mesh file. */
 #define FLAT 1e-6
 
-/* The weight of a facet's normal at its corner v, from the next and the previous corner. */
-static PetscReal Weight(HycoFE fe, const PetscInt node[], PetscInt v)
+/* The weight of the normal of a facet with nf corners at its corner v, from the next and the previous corner. */
+static PetscReal Weight(HycoFE fe, PetscInt nf, const PetscInt node[], PetscInt v)
 {
-  const PetscInt nf = fe->mesh->nf, next = node[(v + 1) % nf], last = node[(v + nf - 1) % nf];
+  const PetscInt next = node[(v + 1) % nf], last = node[(v + nf - 1) % nf];
   const PetscReal *x = fe->X + 3 * node[v];
   const PetscReal a = HycoDistance(fe->X + 3 * next, x), b = HycoDistance(fe->X + 3 * last, x),
                   c = HycoDistance(fe->X + 3 * next, fe->X + 3 * last);
@@ -37,22 +37,22 @@ static PetscErrorCode AddFacets(HycoFE fe, PetscInt group, Surface *s)
 
   PetscFunctionBegin;
   for (PetscInt f = 0; f < m->n_facets; f++) {
-    const PetscInt *node = m->facets + f * m->nf;
+    const PetscInt *node = m->facets + f * m->nf, corners = HycoFacetCorners(m->nf, node);
     PetscReal n[3], unit[3];
 
     if (m->facet_group[f] != group) continue;
     PetscCall(HycoFacetVector(fe, f, n));
     for (PetscInt c = 0; c < 3; c++) unit[c] = n[c];
     HycoNormalise(unit);
-    for (PetscInt v = 0; v < m->nf; v++) {
-      const PetscReal weight = Weight(fe, node, v);
+    for (PetscInt v = 0; v < corners; v++) {
+      const PetscReal weight = Weight(fe, corners, node, v);
 
       for (PetscInt c = 0; c < 3; c++) {
         s->exact[3 * node[v] + c] += weight * unit[c];
         s->mean[3 * node[v] + c] += n[c];
       }
       /* each neighbour occurs once as the next and once as the previous, except at a border */
-      s->fan[node[v]] += m->nf == 2 ? (v ? 1 : -1) : node[(v + 1) % m->nf] - node[(v + m->nf - 1) % m->nf];
+      s->fan[node[v]] += corners == 2 ? (v ? 1 : -1) : node[(v + 1) % corners] - node[(v + corners - 1) % corners];
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -164,11 +164,30 @@ PetscErrorCode HycoFEElementRoom(HycoFE fe, PetscInt cell, PetscReal **Ke)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Adds up the rows and columns of the repeated nodes of a collapsed cell. */
+static void SumRepeated(HycoMesh m, PetscInt cell, PetscReal Ke[])
+{
+  const PetscInt *node = m->cells + cell * m->nv, n = m->nv * m->dim;
+  PetscInt own[HYCO_CELL_NODES], row[HYCO_MAX_CELL_DOFS];
+  const PetscInt size = HycoMeshOwnNodes(m, cell, own) * m->dim;
+  PetscReal sum[HYCO_MAX_CELL_DOFS * HYCO_MAX_CELL_DOFS];
+
+  if (size == n) return;
+  for (PetscInt r = 0, at = 0; r < n; r++) {
+    at += r && r % m->dim == 0 && node[r / m->dim] != node[r / m->dim - 1];
+    row[r] = at * m->dim + r % m->dim;
+  }
+  for (PetscInt k = 0; k < size * size; k++) sum[k] = 0;
+  for (PetscInt k = 0; k < n * n; k++) sum[row[k / n] * size + row[k % n]] += Ke[k];
+  for (PetscInt k = 0; k < size * size; k++) Ke[k] = sum[k];
+}
+
 PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
 {
   PetscFunctionBegin;
   PetscCall(HycoFEBodyStiffness(fe, cell, Ke));
   HycoSpringsAddStiffness(fe, cell, Ke);
+  SumRepeated(fe->mesh, cell, Ke);
   HycoTiedStiffness(fe, cell, Ke);
   HycoObliqueStiffness(fe, cell, Ke);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -325,6 +344,7 @@ PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M)
         }
       }
     }
+    SumRepeated(fe->mesh, e, Me);
     HycoTiedStiffness(fe, e, Me);
     HycoObliqueStiffness(fe, e, Me);
     PetscCall(AddElement(fe, e, Me, M));

@@ -102,12 +102,13 @@ void HycoTiedStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
 {
   HycoMesh m = fe->mesh;
   const PetscInt dim = fe->dim;
-  PetscInt node[HYCO_MAX_CELL_NODES], n;
+  PetscInt node[HYCO_MAX_CELL_NODES], n, own;
 
   if (!m->ties) return;
+  own = HycoMeshOwnNodes(m, cell, node);
   n = HycoMeshCellNodes(m, cell, node);
-  if (n > m->nv) Grow(m->nv * dim, n * dim, Ke);
-  for (PetscInt a = 0; a < m->nv && !fe->plain; a++) {
+  if (n > own) Grow(own * dim, n * dim, Ke);
+  for (PetscInt a = 0; a < own && !fe->plain; a++) {
     const PetscInt k = HycoMeshTied(m, node[a]), size = n * dim;
 
     for (PetscInt j = k < 0 ? 0 : m->tied_start[k]; k >= 0 && j < m->tied_start[k + 1]; j++) {

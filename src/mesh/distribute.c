@@ -40,7 +40,7 @@ PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, Petsc
                                   HycoPartitioner by, const char write[])
 {
   PetscPartitioner partitioner;
-  PetscBool done;
+  PetscBool done, mixed;
   PetscInt overlap, type;
   PetscSF sf;
   DM next;
@@ -60,7 +60,7 @@ PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, Petsc
   HycoCheck(!write[0] || !scene->n_ties, "hyco_mesh_write: a mesh with ties (%s) cannot be written as a DMPlex",
             scene->tie[0].name);
   if (write[0]) {
-    PetscCall(HycoPlexType(*dm, &type));
+    PetscCall(HycoPlexType(*dm, &type, &mixed));
     HycoCheck(!HycoCellKinds[PetscMax(type, 0)].quadratic,
               "hyco_mesh_write: a mesh of %s cannot be written as a DMPlex; keep its gmsh file",
               HycoCellKinds[PetscMax(type, 0)].name);

@@ -242,6 +242,7 @@ PetscErrorCode HycoMeshGather(MPI_Comm comm, HycoMesh part, const PetscBool in[]
     m->nv = part->nv;
     m->nf = part->nf;
     m->type = part->type;
+    m->mixed = part->mixed;
     m->n_owned = m->n_whole_nodes = part->n_whole_nodes; /* rank 0 owns all */
     m->n_whole_cells = part->n_whole_cells;
     m->whole_length = part->whole_length;

@@ -42,6 +42,7 @@ static PetscErrorCode FindEdges(HycoMesh m, const PetscBool in[], PetscInt *n, E
   for (PetscInt k = 0; k < m->n_cells * sides; k++) {
     const Edge e = EdgeOf(m, k / sides, k % sides / corners, k % corners);
 
+    if (e.key / m->n_nodes == e.key % m->n_nodes) continue; /* a side of a collapsed cell */
     if (!in[e.key / m->n_nodes] || !in[e.key % m->n_nodes] || (e.middle >= 0 && !in[e.middle])) continue;
     if (count == room) {
       room = 2 * room + 64;

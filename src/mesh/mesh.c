@@ -3,10 +3,11 @@
 #include <string.h>
 
 const HycoCellKind HycoCellKinds[HYCO_N_CELL_TYPES] = {
-    {"line2", 1, 2, 1, 1, PETSC_FALSE}, {"tri3", 2, 3, 2, 2, PETSC_FALSE}, {"quad4", 2, 4, 2, 2, PETSC_FALSE},
-    {"tet4", 3, 4, 3, 3, PETSC_FALSE},  {"hex8", 3, 8, 4, 4, PETSC_FALSE}, {"tri6", 2, 6, 3, 2, PETSC_TRUE},
-    {"quad8", 2, 8, 3, 2, PETSC_TRUE},  {"quad9", 2, 9, 3, 2, PETSC_TRUE}, {"tet10", 3, 10, 6, 3, PETSC_TRUE},
-    {"hex20", 3, 20, 8, 4, PETSC_TRUE}, {"hex27", 3, 27, 9, 4, PETSC_TRUE}};
+    {"line2", 1, 2, 1, 1, PETSC_FALSE}, {"tri3", 2, 3, 2, 2, PETSC_FALSE},  {"quad4", 2, 4, 2, 2, PETSC_FALSE},
+    {"tet4", 3, 4, 3, 3, PETSC_FALSE},  {"hex8", 3, 8, 4, 4, PETSC_FALSE},  {"tri6", 2, 6, 3, 2, PETSC_TRUE},
+    {"quad8", 2, 8, 3, 2, PETSC_TRUE},  {"quad9", 2, 9, 3, 2, PETSC_TRUE},  {"tet10", 3, 10, 6, 3, PETSC_TRUE},
+    {"hex20", 3, 20, 8, 4, PETSC_TRUE}, {"hex27", 3, 27, 9, 4, PETSC_TRUE}, {"pyramid5", 3, 5, 4, 4, PETSC_FALSE},
+    {"prism6", 3, 6, 4, 4, PETSC_FALSE}};
 
 PetscErrorCode HycoMeshDestroy(HycoMesh *mesh)
 {
@@ -403,6 +404,7 @@ PetscErrorCode HycoMeshExtract(HycoMesh whole, PetscInt n_keep, const PetscInt k
   m->nv = whole->nv;
   m->nf = whole->nf;
   m->type = whole->type;
+  m->mixed = whole->mixed;
   PetscCall(PetscMalloc2(whole->n_nodes, &index, whole->n_cells, &cell_index));
   PetscCall(SelectNodes(whole, n_keep, keep, n_extra, extra, n_all, all_facets, m, index));
   PetscCall(SelectCells(whole, n_keep, keep, index, m, cell_index));

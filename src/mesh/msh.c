@@ -297,36 +297,56 @@ static const char *GroupName(Msh *m, HycoMshGroup *g)
 }
 
 #define TAKES                                                                                                          \
-  "hyco supports line2, tri3, quad4, tet4 and hex8, and of second order tri6, quad8, quad9, tet10, hex20 and hex27: "  \
-  "mesh the bodies with one of these"
+  "hyco supports line2, tri3, quad4, tet4, pyramid5, prism6 and hex8, and of second order tri6, quad8, quad9, tet10, " \
+  "hex20 and hex27: mesh the bodies with these"
 
 /* Names of types that are refused. */
 static const char *TypeName(long long type)
 {
   switch (type) {
-  case 6:
-    return "prisms";
-  case 7:
-    return "pyramids";
+  case 13:
+  case 18:
+    return "prisms of second order";
+  case 14:
+  case 19:
+    return "pyramids of second order";
   default:
     return "not known here";
   }
 }
 
-/* Appends an element to a group. */
-static PetscErrorCode AddElement(Msh *m, HycoMshGroup *g, long long tag, long long type, const PetscInt node[])
+/* Widens a group, or an element of nv nodes that is to be added, so that both have the same number. */
+static PetscErrorCode Match(Msh *m, HycoMshGroup *g, PetscInt nv, PetscInt node[])
 {
-  const PetscInt nv = type_nodes[type];
+  const HycoCellType has = HycoMshType(g->dim, g->nv), own = HycoMshType(g->dim, nv);
+  const HycoCellType both = has < HYCO_N_CELL_TYPES && own < HYCO_N_CELL_TYPES
+                                ? HycoShapesType((PetscInt)1 << has | (PetscInt)1 << own)
+                                : HYCO_N_CELL_TYPES;
 
   PetscFunctionBegin;
-  HycoCheck(type <= 5 || (type >= 8 && type <= 12) || (type >= 15 && type <= 17),
+  HycoCheck(both < HYCO_N_CELL_TYPES,
+            "%s: group \"%s\" mixes elements of %d and %d nodes; only first-order cells may be of several types: mesh "
+            "with gmsh -order 1, or recombine all surfaces, or none",
+            m->path, GroupName(m, g), (int)g->nv, (int)nv);
+  PetscCall(HycoMshWiden(g, HycoCellKinds[both].nv));
+  HycoShapeWiden(own, g->nv, node);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Appends an element to a group. */
+static PetscErrorCode AddElement(Msh *m, HycoMshGroup *g, long long tag, long long type, const PetscInt of[])
+{
+  PetscInt nv = type_nodes[type], node[64];
+
+  PetscFunctionBegin;
+  HycoCheck(type <= 7 || (type >= 8 && type <= 12) || (type >= 15 && type <= 17),
             "%s: group \"%s\" has elements of gmsh type %lld (%s); " TAKES, m->path, GroupName(m, g), type,
             TypeName(type));
-  HycoCheck(!g->n || g->nv == nv,
-            "%s: group \"%s\" mixes elements of %d and %d nodes; hyco supports one type per mesh: recombine all "
-            "surfaces in gmsh, or none",
-            m->path, GroupName(m, g), (int)g->nv, (int)nv);
-  g->nv = nv;
+  PetscCall(PetscArraycpy(node, of, nv));
+  g->shapes |= (PetscInt)1 << HycoMshType(g->dim, nv);
+  if (g->n && g->nv != nv) PetscCall(Match(m, g, nv, node));
+  if (!g->n) g->nv = nv;
+  nv = g->nv;
   if (g->n == g->room) {
     HycoCheck(g->n < PETSC_MAX_INT / 16, "%s: group \"%s\" has too many elements", m->path, GroupName(m, g));
     g->room = PetscMax(64, 2 * g->room);
@@ -339,9 +359,12 @@ static PetscErrorCode AddElement(Msh *m, HycoMshGroup *g, long long tag, long lo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads the tag and the nodes of one element of a known type. */
-static PetscErrorCode ReadElement(Msh *m, size_t bytes, long long tag, long long type, PetscInt node[])
+/* Reads the tag and the nodes of one element of a known type; changes the type of one with repeated nodes. */
+static PetscErrorCode ReadElement(Msh *m, size_t bytes, long long tag, long long *of, PetscInt node[])
 {
+  const long long type = *of;
+  PetscBool repeated = PETSC_FALSE;
+
   PetscFunctionBegin;
   HycoCheck(!m->failed && tag > 0 && tag < PETSC_MAX_INT, "the mesh %s is damaged: it has an element of the tag %lld",
             m->path, tag);
@@ -351,6 +374,15 @@ static PetscErrorCode ReadElement(Msh *m, size_t bytes, long long tag, long long
     HycoCheck(!m->failed, "the mesh %s is damaged: it ends among its elements", m->path);
     node[v] = FindNode(m->mesh, name);
     HycoCheck(node[v] >= 0, "%s: element %lld refers to node %lld, which the file does not define", m->path, tag, name);
+    for (int w = 0; w < v; w++) repeated = (PetscBool)(repeated || node[w] == node[v]);
+  }
+  if (repeated) {
+    *of = HycoMshReduce(type, node);
+    HycoCheck(
+        *of,
+        "%s: element %lld has a node twice, and is no quad4 or hex8 that is collapsed to a triangle, tetrahedron, "
+        "pyramid or prism; check the mesh",
+        m->path, tag);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -397,14 +429,15 @@ static PetscErrorCode ReadElements2(Msh *m)
     HycoCheck(follow > 0 && (size_t)follow <= n - k, "the mesh %s is damaged: a block of %lld elements", m->path,
               follow);
     for (long long e = 0; e < follow; e++) {
+      long long own = type;
       PetscInt node[64], at;
 
       if (m->binary) tag = ReadInt(m, 4);
       PetscCall(ReadTags2(m, n_tags, &group));
-      PetscCall(ReadElement(m, 4, tag, type, node));
+      PetscCall(ReadElement(m, 4, tag, &own, node));
       if (!group) continue;
       PetscCall(FindGroup(m->mesh, type_dim[type], (int)group, &at));
-      PetscCall(AddElement(m, &m->mesh->group[at], tag, type, node));
+      PetscCall(AddElement(m, &m->mesh->group[at], tag, own, node));
     }
     k += (size_t)follow;
   }
@@ -422,9 +455,10 @@ static PetscErrorCode ReadBlock4(Msh *m, long long dim, long long entity, long l
   for (last = first; last < m->n_members && m->member[last].dim == dim && m->member[last].entity == entity;) last++;
   for (size_t k = 0; k < n; k++) {
     const long long tag = ReadInt(m, 8);
+    long long own = type;
     PetscInt node[64];
 
-    PetscCall(ReadElement(m, 8, tag, type, node));
+    PetscCall(ReadElement(m, 8, tag, &own, node));
     HycoCheck(tag >= least && tag <= most,
               "the mesh %s is damaged: element %lld lies outside its range of tags, %lld to %lld", m->path, tag, least,
               most);
@@ -432,7 +466,7 @@ static PetscErrorCode ReadBlock4(Msh *m, long long dim, long long entity, long l
       PetscInt at;
 
       PetscCall(FindGroup(m->mesh, (int)dim, m->member[g].group, &at));
-      PetscCall(AddElement(m, &m->mesh->group[at], tag, type, node));
+      PetscCall(AddElement(m, &m->mesh->group[at], tag, own, node));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -9,63 +9,54 @@
 
 /* The positions of gmsh's nodes in DMPlex's cone of a cell; the permutation is its own inverse. Cells of second
    order keep gmsh's order. */
-static const signed char cone_place[][8] = {{0, 1}, {0, 1, 2}, {0, 1, 2, 3}, {1, 0, 2, 3}, {0, 3, 2, 1, 4, 5, 6, 7}};
-static const PetscInt n_faces[HYCO_N_CELL_TYPES] = {2, 3, 4, 4, 6, 3, 4, 4, 4, 6, 6};
+static const signed char cone_place[HYCO_N_CELL_TYPES][8] = {
+    [HYCO_LINE2] = {0, 1},
+    [HYCO_TRI3] = {0, 1, 2},
+    [HYCO_QUAD4] = {0, 1, 2, 3},
+    [HYCO_TET4] = {1, 0, 2, 3},
+    [HYCO_HEX8] = {0, 3, 2, 1, 4, 5, 6, 7},
+    [HYCO_PYRAMID5] = {0, 3, 2, 1, 4},
+    [HYCO_PRISM6] = {0, 2, 1, 3, 4, 5},
+};
 static const DMPolytopeType plex_type[HYCO_N_CELL_TYPES] = {
     DM_POLYTOPE_SEGMENT,     DM_POLYTOPE_TRIANGLE,   DM_POLYTOPE_QUADRILATERAL, DM_POLYTOPE_TETRAHEDRON,
     DM_POLYTOPE_HEXAHEDRON,  DM_POLYTOPE_TRIANGLE,   DM_POLYTOPE_QUADRILATERAL, DM_POLYTOPE_QUADRILATERAL,
-    DM_POLYTOPE_TETRAHEDRON, DM_POLYTOPE_HEXAHEDRON, DM_POLYTOPE_HEXAHEDRON};
-/* The nodes of a cell's facets, in gmsh's order of the cell's nodes. */
-static const signed char face[HYCO_N_CELL_TYPES][6][HYCO_FACET_NODES] = {
-    {{0}, {1}},
-    {{0, 1}, {1, 2}, {2, 0}},
-    {{0, 1}, {1, 2}, {2, 3}, {3, 0}},
-    {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}},
-    {{0, 3, 2, 1}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}, {4, 5, 6, 7}},
-    {{0, 1, 3}, {1, 2, 4}, {2, 0, 5}},
-    {{0, 1, 4}, {1, 2, 5}, {2, 3, 6}, {3, 0, 7}},
-    {{0, 1, 4}, {1, 2, 5}, {2, 3, 6}, {3, 0, 7}},
-    {{0, 2, 1, 6, 5, 4}, {0, 1, 3, 4, 9, 7}, {0, 3, 2, 7, 8, 6}, {1, 2, 3, 5, 8, 9}},
-    {{0, 3, 2, 1, 9, 13, 11, 8},
-     {0, 1, 5, 4, 8, 12, 16, 10},
-     {1, 2, 6, 5, 11, 14, 18, 12},
-     {2, 3, 7, 6, 13, 15, 19, 14},
-     {3, 0, 4, 7, 9, 10, 17, 15},
-     {4, 5, 6, 7, 16, 18, 19, 17}},
-    {{0, 3, 2, 1, 9, 13, 11, 8, 20},
-     {0, 1, 5, 4, 8, 12, 16, 10, 21},
-     {1, 2, 6, 5, 11, 14, 18, 12, 23},
-     {2, 3, 7, 6, 13, 15, 19, 14, 24},
-     {3, 0, 4, 7, 9, 10, 17, 15, 22},
-     {4, 5, 6, 7, 16, 18, 19, 17, 25}}};
-
-/* The position of a node of a cell in its cone; type HYCO_N_CELL_TYPES: for points that are not cells. */
-static PetscInt ConePlace(HycoCellType type, PetscInt node)
+    DM_POLYTOPE_TETRAHEDRON, DM_POLYTOPE_HEXAHEDRON, DM_POLYTOPE_HEXAHEDRON,    DM_POLYTOPE_PYRAMID,
+    DM_POLYTOPE_TRI_PRISM};
+/* The position of a node of a cell in its cone; shape HYCO_N_CELL_TYPES: for points that are not cells. */
+static PetscInt ConePlace(HycoCellType shape, PetscInt node)
 {
-  return type < HYCO_N_CELL_TYPES && !HycoCellKinds[type].quadratic ? cone_place[type][node] : node;
+  return shape < HYCO_N_CELL_TYPES && !HycoCellKinds[shape].quadratic ? cone_place[shape][node] : node;
 }
 
-PetscInt HycoFacetCount(HycoCellType type)
+PetscErrorCode HycoPlexShape(DM dm, HycoCellType type, PetscInt cell, HycoCellType *shape)
 {
-  return n_faces[type];
-}
+  DMPolytopeType of;
 
-const signed char *HycoFacetNodes(HycoCellType type, PetscInt number)
-{
-  return face[type][number];
+  PetscFunctionBegin;
+  *shape = type;
+  if (type != HYCO_QUAD4 && type != HYCO_HEX8) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(DMPlexGetCellType(dm, cell, &of));
+  for (int t = 0; t < HYCO_N_CELL_TYPES; t++) {
+    if (plex_type[t] == of && !HycoCellKinds[t].quadratic) *shape = (HycoCellType)t;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoPlexVertices(DM dm, PetscBool interpolated, HycoCellType type, PetscInt p, PetscInt n,
                                 PetscInt vertex[])
 {
   PetscInt *closure = NULL, size, at = 0, v0, v1;
+  HycoCellType shape;
 
   PetscFunctionBegin;
+  PetscCall(HycoPlexShape(dm, type, p, &shape));
   if (!interpolated) {
-    const PetscInt *cone;
+    const PetscInt *cone, own = shape < HYCO_N_CELL_TYPES ? HycoCellKinds[shape].nv : n;
 
     PetscCall(DMPlexGetCone(dm, p, &cone));
-    for (PetscInt k = 0; k < n; k++) vertex[k] = cone[ConePlace(type, k)];
+    for (PetscInt k = 0; k < PetscMin(n, own); k++) vertex[k] = cone[ConePlace(shape, k)];
+    if (own < n) HycoShapeWiden(shape, n, vertex);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(DMPlexGetDepthStratum(dm, 0, &v0, &v1));
@@ -74,10 +65,11 @@ PetscErrorCode HycoPlexVertices(DM dm, PetscBool interpolated, HycoCellType type
     const PetscInt v = closure[2 * k];
 
     if (v < v0 || v >= v1) continue;
-    vertex[ConePlace(type, at)] = v;
+    vertex[ConePlace(shape, at)] = v;
     at++;
   }
   PetscCall(DMPlexRestoreTransitiveClosure(dm, p, PETSC_TRUE, &size, &closure));
+  if (at < n) HycoShapeWiden(shape < HYCO_N_CELL_TYPES ? shape : HYCO_TRI3, n, vertex);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -88,42 +80,54 @@ static PetscBool ConeIsOf(HycoCellType type, PetscInt size)
   return (PetscBool)(HycoCellKinds[type].quadratic ? size == HycoCellKinds[type].nv : size <= HycoCellKinds[type].nv);
 }
 
-/* The HycoCellType of this process's cells; -1: there are none. With ties, cones have any size. */
-static PetscErrorCode CellType(DM dm, PetscInt *type)
+/* Whether a cell may be of a type, given DMPlex's type and the size of its cone. With ties, cones have any size, and
+   the ties have the type of the mesh. */
+static PetscBool IsOf(HycoCellType type, DMPolytopeType of, PetscInt size, HycoTies ties)
+{
+  if (plex_type[type] != of) return PETSC_FALSE;
+  if (!ties) return ConeIsOf(type, size);
+  return (PetscBool)(HycoCellKinds[ties->type].quadratic ? type == (HycoCellType)ties->type
+                                                         : !HycoCellKinds[type].quadratic);
+}
+
+/* The shapes of this process's cells, bits 1 << HycoCellType. */
+static PetscErrorCode FindShapes(DM dm, PetscInt *shapes)
 {
   HycoTies ties;
-  PetscInt c0, c1, last = -1;
+  PetscInt c0, c1;
 
   PetscFunctionBegin;
-  *type = -1;
+  *shapes = 0;
   PetscCall(HycoTiesOf(dm, &ties));
   PetscCall(DMPlexGetHeightStratum(dm, 0, &c0, &c1));
-  if (ties && c0 < c1) *type = ties->type;
-  for (PetscInt c = c0; c < c1 && !ties; c++) {
+  for (PetscInt c = c0; c < c1; c++) {
     DMPolytopeType of;
     PetscInt t = 0, size;
 
-    PetscCall(DMPlexGetConeSize(dm, c, &size)); /* unique in each dimension for these types */
-    if (size == last) continue;
-    last = size;
+    PetscCall(DMPlexGetConeSize(dm, c, &size));
     PetscCall(DMPlexGetCellType(dm, c, &of));
-    while (t < HYCO_N_CELL_TYPES && (plex_type[t] != of || !ConeIsOf((HycoCellType)t, size))) t++;
-    HycoCheck(t < HYCO_N_CELL_TYPES && (c == c0 || t == *type),
-              "the mesh has cells of DMPlex's type %s; hyco supports segments, triangles, quadrilaterals, tetrahedra "
-              "or hexahedra, one type per mesh",
+    while (t < HYCO_N_CELL_TYPES && !IsOf((HycoCellType)t, of, size, ties)) t++;
+    HycoCheck(t < HYCO_N_CELL_TYPES,
+              "the mesh has cells of DMPlex's type %s; hyco supports segments, triangles, quadrilaterals, tetrahedra, "
+              "pyramids, prisms (tri_prism) and hexahedra",
               DMPolytopeTypes[of]);
-    *type = t;
+    *shapes |= (PetscInt)1 << t;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoPlexType(DM dm, PetscInt *type)
+PetscErrorCode HycoPlexType(DM dm, PetscInt *type, PetscBool *mixed)
 {
   const MPI_Comm comm = PetscObjectComm((PetscObject)dm);
+  PetscInt shapes = 0;
 
   PetscFunctionBegin;
-  HycoOnEach(comm, CellType(dm, type));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, type, 1, MPIU_INT, MPI_MAX, comm));
+  HycoOnEach(comm, FindShapes(dm, &shapes));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &shapes, 1, MPIU_INT, MPI_BOR, comm));
+  *type = shapes ? (PetscInt)HycoShapesType(shapes) : -1;
+  *mixed = (PetscBool)(shapes && shapes != (PetscInt)1 << *type);
+  HycoCheck(*type < HYCO_N_CELL_TYPES,
+            "the DM has cells of second order and of other types; only first-order cells may be of several types");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -155,24 +159,6 @@ static PetscErrorCode SetStratum(DMLabel label, PetscInt value, PetscInt n, cons
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscInt HycoMeshFacetNumber(HycoMesh m, PetscInt facet)
-{
-  const PetscInt *cell = m->cells + m->facet_cell[facet] * m->nv, *node = m->facets + facet * m->nf;
-
-  for (PetscInt f = 0; f < n_faces[m->type]; f++) {
-    PetscInt found = 0;
-
-    for (PetscInt v = 0; v < m->nf; v++) {
-      PetscBool here = PETSC_FALSE;
-
-      for (PetscInt w = 0; w < m->nf; w++) here = (PetscBool)(here || cell[face[m->type][f][w]] == node[v]);
-      found += here;
-    }
-    if (found == m->nf) return f;
-  }
-  return -1;
-}
-
 /* Vertices and cells of a group have the value 1 + its dimension. */
 static PetscErrorCode FillLabel(DMLabel label, HycoMesh m, PetscInt g)
 {
@@ -187,7 +173,7 @@ static PetscErrorCode FillLabel(DMLabel label, HycoMesh m, PetscInt g)
   PetscCall(SetStratum(label, value, n_cell + n_node, point));
   for (PetscInt f = 0; f < m->n_facets; f++)
     in_face[f] = m->facet_group[f] == g && m->dim > 1 ? HycoMeshFacetNumber(m, f) : -1;
-  for (PetscInt k = 0; k < n_faces[m->type]; k++) {
+  for (PetscInt k = 0; k < HycoFacetCount(m->type); k++) {
     PetscInt n = 0;
 
     for (PetscInt f = 0; f < m->n_facets; f++) {
@@ -246,17 +232,18 @@ static PetscErrorCode SetCones(DM dm, HycoMesh m)
   for (PetscInt e = 0; m && e < m->n_cells; e++) PetscCall(DMPlexSetConeSize(dm, e, HycoMeshCellNodes(m, e, node)));
   PetscCall(DMSetUp(dm));
   for (PetscInt e = 0; m && e < m->n_cells; e++) {
-    const PetscInt n = HycoMeshCellNodes(m, e, node);
+    const HycoCellType shape = HycoMeshShape(m, e);
+    const PetscInt n = HycoMeshCellNodes(m, e, node), own = HycoCellKinds[shape].nv;
 
-    for (PetscInt k = 0; k < n; k++) cone[k < m->nv ? ConePlace(m->type, k) : k] = m->n_cells + node[k];
+    for (PetscInt k = 0; k < n; k++) cone[k < own ? ConePlace(shape, k) : k] = m->n_cells + node[k];
     PetscCall(DMPlexSetCone(dm, e, cone));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Creates the DM of a mesh with ties, or of second order. With the masters in a cell's cone, every query for the
-   cells around a node finds it: for shared nodes, the overlap, an RID. The types of the cells are set, because
-   DMPlex would derive them from the size of the cones. */
+/* Creates the DM of a mesh with ties, of second order, or of several types. With the masters in a cell's cone, every
+   query for the cells around a node finds it: for shared nodes, the overlap, an RID. The types of the cells are set,
+   because DMPlex would derive them from the size of the cones. */
 static PetscErrorCode FromCones(MPI_Comm comm, PetscInt dim, HycoMesh m, DM *dm)
 {
   PetscFunctionBegin;
@@ -267,14 +254,14 @@ static PetscErrorCode FromCones(MPI_Comm comm, PetscInt dim, HycoMesh m, DM *dm)
   PetscCall(DMPlexStratify(*dm));
   PetscCall(DMCreateLabel(*dm, "celltype"));
   for (PetscInt p = 0; m && p < m->n_cells + m->n_nodes; p++)
-    PetscCall(DMPlexSetCellType(*dm, p, p < m->n_cells ? plex_type[m->type] : DM_POLYTOPE_POINT));
+    PetscCall(DMPlexSetCellType(*dm, p, p < m->n_cells ? plex_type[HycoMeshShape(m, p)] : DM_POLYTOPE_POINT));
   PetscCall(DMPlexBuildCoordinatesFromCellList(*dm, 3, m ? m->xyz : NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoPlexFromMesh(MPI_Comm comm, HycoMesh m, DM *dm)
 {
-  PetscInt head[3] = {m ? m->dim : 0, m ? m->nv : 0, m ? HycoMeshIsQuadratic(m) : 0}, *cone = NULL, *tag;
+  PetscInt head[3] = {m ? m->dim : 0, m ? m->nv : 0, m ? HycoMeshIsQuadratic(m) || m->mixed : 0}, *cone = NULL, *tag;
   HycoTies ties = m ? m->ties : NULL;
 
   PetscFunctionBegin;
@@ -323,13 +310,14 @@ typedef struct {
   Facet *facet; /* of the current group */
 } Builder;
 
+/* The same on all processes. */
 static PetscErrorCode FindType(Builder *b)
 {
   HycoMesh m = b->m;
   PetscInt type;
 
   PetscFunctionBegin;
-  PetscCall(CellType(b->dm, &type));
+  PetscCall(HycoPlexType(b->dm, &type, &m->mixed));
   m->type = (HycoCellType)PetscMax(type, 0);
   m->nv = HycoCellKinds[m->type].nv;
   m->nf = HycoCellKinds[m->type].nf;
@@ -372,11 +360,14 @@ static PetscErrorCode FindOwned(Builder *b)
 /* The masters of a cell's tied nodes: with ties, the end of its cone. */
 static PetscErrorCode FollowedVertices(const Builder *b, PetscInt cell, PetscInt *n, const PetscInt *vertex[])
 {
+  HycoCellType shape;
+
   PetscFunctionBegin;
+  PetscCall(HycoPlexShape(b->dm, b->m->type, cell, &shape));
   PetscCall(DMPlexGetConeSize(b->dm, cell, n));
   PetscCall(DMPlexGetCone(b->dm, cell, vertex));
-  *n -= b->m->nv;
-  *vertex += b->m->nv;
+  *n -= HycoCellKinds[shape].nv;
+  *vertex += HycoCellKinds[shape].nv;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -589,7 +580,7 @@ static PetscErrorCode AddFacetPoint(Builder *b, PetscInt group, PetscInt p, cons
   if (n != 1) PetscFunctionReturn(PETSC_SUCCESS);
   cell = b->cell[support[0] - b->c0];
   PetscCall(DMPlexGetCone(b->dm, support[0], &cone));
-  while (number < n_faces[m->type] && cone[number] != p) number++;
+  while (number < HycoFacetCount(m->type) && cone[number] != p) number++;
   for (PetscInt v = 0; v < m->nf; v++) cell = node[v] < 0 ? -1 : cell;
   if (cell >= 0) PetscCall(AddFacet(b, cell, number, node));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -609,7 +600,7 @@ static PetscErrorCode AddPoint(Builder *b, PetscInt group, PetscInt value, Petsc
       of = m->dim;
       if (e >= 0) PetscCall(AddCell(b, group, e));
     } else if (e >= 0) {
-      for (PetscInt v = 0; v < m->nf; v++) node[v] = m->cells[e * m->nv + face[m->type][value - HYCO_FACET][v]];
+      (void)HycoMeshFace(m, e, value - HYCO_FACET, node);
       PetscCall(AddFacet(b, e, value - HYCO_FACET, node));
     }
   } else {
@@ -652,6 +643,7 @@ static PetscErrorCode PlaceFacets(Builder *b, PetscInt group)
 
     PetscCall(PetscArraycpy(facet, b->facet[k].node, m->nf));
     TurnOutward(m, b->facet[k].cell, facet);
+    HycoFacetRepeatLast(m->nf, facet);
     m->facet_group[m->n_facets] = group;
     m->facet_cell[m->n_facets++] = b->facet[k].cell;
   }
@@ -759,7 +751,6 @@ static PetscErrorCode MakeTables(Builder *b)
   PetscCall(PetscObjectQuery((PetscObject)b->dm, HYCO_TAGS, (PetscObject *)&tags));
   PetscCall(ISGetIndices(tags, &b->tag));
   PetscCall(HycoTiesOf(b->dm, &b->ties));
-  PetscCall(FindType(b));
   PetscCall(FindOwned(b));
   PetscCall(TakeCells(b));
   PetscCall(TakeNodes(b));
@@ -802,21 +793,16 @@ static PetscErrorCode Number(Builder *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Makes consistent on all ranks: the whole mesh's length; the cell type, and the dimensions of groups, which a
-   process without their points does not know. */
+/* Makes consistent on all ranks: the whole mesh's length, and the dimensions of groups, which a process without their
+   points does not know. */
 static PetscErrorCode AgreeOnGroups(MPI_Comm comm, HycoMesh m)
 {
-  PetscInt head[3] = {m->n_cells ? (PetscInt)m->type : -1, m->nv, m->nf};
   PetscReal ends[6];
 
   PetscFunctionBegin;
   HycoMeshEnds(m, ends);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ends, 6, MPIU_REAL, MPI_MAX, comm));
   for (PetscInt c = 0; c < 3; c++) m->whole_length = PetscMax(m->whole_length, ends[c] + ends[3 + c]);
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, head, 3, MPIU_INT, MPI_MAX, comm));
-  m->type = (HycoCellType)head[0];
-  m->nv = head[1];
-  m->nf = head[2];
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, m->group_dim, (PetscMPIInt)m->n_groups, MPIU_INT, MPI_MAX, comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -853,6 +839,7 @@ PetscErrorCode HycoPlexToMesh(DM dm, HycoScene scene, HycoMesh *mesh)
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_size(comm, &size));
   PetscCall(PetscNew(&b.m));
+  PetscCall(FindType(&b));
   HycoOnEach(comm, MakeTables(&b));
   if (size == 1) b.m->n_owned = b.m->n_nodes;
   if (size > 1) PetscCall(AgreeOnGroups(comm, b.m));

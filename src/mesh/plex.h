@@ -26,14 +26,23 @@ PetscErrorCode HycoPlexRefine(DM *dm, HycoScene scene, PetscInt times);
    `interpolated`: edges and faces are points of the DM. */
 PetscErrorCode HycoPlexVertices(DM dm, PetscBool interpolated, HycoCellType type, PetscInt point, PetscInt n,
                                 PetscInt vertex[]);
-/* The HycoCellType of the cells. Collective. */
-PetscErrorCode HycoPlexType(DM dm, PetscInt *type);
+/* The HycoCellType of the mesh (-1: it has no cells), and whether it has collapsed cells. Collective. */
+PetscErrorCode HycoPlexType(DM dm, PetscInt *type, PetscBool *mixed);
+/* The shape of a cell. */
+PetscErrorCode HycoPlexShape(DM dm, HycoCellType type, PetscInt cell, HycoCellType *shape);
 /* Whether a label of this name is DMPlex's own. */
 PetscBool HycoPlexOwnLabel(const char name[]);
 /* The number of facets of a cell; the nodes of facet `number`, in gmsh's order: corners, middles of the sides,
    middle of the face. */
 PetscInt HycoFacetCount(HycoCellType type);
 const signed char *HycoFacetNodes(HycoCellType type, PetscInt number);
+/* Turns a triangle of four nodes so that the last two are the repeated one. */
+void HycoFacetRepeatLast(PetscInt nf, PetscInt node[]);
+/* The nodes of a cell's face (nf; a triangle's last two are the same); returns the number of distinct ones, which for
+   a face of a collapsed cell may be 1 or 2. */
+PetscInt HycoMeshFace(HycoMesh mesh, PetscInt cell, PetscInt number, PetscInt node[]);
+/* The number of the cell's face with exactly these nodes (nf, some may be repeated); -1: there is none. */
+PetscInt HycoCellFace(HycoMesh mesh, PetscInt cell, const PetscInt node[]);
 
 /* The registered PetscPartitioner type HYCO_PARTITIONER, for a mesh (this process's; NULL: no cells) with contacts,
    pairs of node indices. Both are borrowed until the partitioner has finished. */

@@ -1,8 +1,8 @@
 /*
-  Checks a mesh file against the scene and converts it to tables on one process: cells of one type, each in one body,
-  facets that bound exactly one cell.
+  Checks a mesh file against the scene and converts it to tables on one process: cells of one type, smaller ones
+  collapsed, each in one body; facets that bound exactly one cell.
 */
-#include <hycomesh.h>
+#include "plex.h"
 #include "msh.h"
 #include <string.h>
 
@@ -17,10 +17,34 @@ typedef struct {
   PetscInt *start, *around; /* the cells around each node */
 } Reader;
 
-/* Every body is a group of cells, all of one type; other groups may have any lower dimension. */
+/* Chooses the mesh's type for cells of these shapes, and widens the groups of cells and facets to it. */
+static PetscErrorCode ChooseType(HycoScene scene, Reader *r, HycoMesh m, PetscInt shapes)
+{
+  PetscFunctionBegin;
+  m->type = HycoShapesType(shapes);
+  m->mixed = (PetscBool)(shapes != (PetscInt)1 << m->type);
+  if (m->type == HYCO_HEX20 && scene->n_contacts) { /* the corners of quad8 would have negative forces under a
+                                                       uniform pressure */
+    PetscCall(HycoMshAddFaceNodes(scene->mesh_path, &r->file));
+    m->type = HYCO_HEX27;
+    scene->face_nodes = PETSC_TRUE;
+  }
+  m->nv = HycoCellKinds[m->type].nv;
+  m->nf = HycoCellKinds[m->type].nf;
+  for (PetscInt k = 0; k < r->n_groups && m->mixed; k++) {
+    Group *g = &r->group[k];
+    const PetscInt nv = g->dim == m->dim ? m->nv : g->dim == 2 ? m->nf : g->nv;
+    const HycoCellType shape = HycoMshType(g->dim, g->nv);
+
+    if (g->n && shape < HYCO_N_CELL_TYPES && !HycoCellKinds[shape].quadratic) PetscCall(HycoMshWiden(g, nv));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Every body is a group of cells, of types that can be in one mesh; other groups may have any lower dimension. */
 static PetscErrorCode CheckBodies(HycoScene scene, Reader *r, HycoMesh m)
 {
-  PetscInt cells = 0, nv = 0;
+  PetscInt cells = 0, shapes = 0, nv = 0;
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < r->n_groups; k++) {
@@ -34,6 +58,7 @@ static PetscErrorCode CheckBodies(HycoScene scene, Reader *r, HycoMesh m)
   }
   for (PetscInt b = 0; b < scene->n_bodies; b++) {
     char list[HYCO_LINE] = "";
+    HycoCellType shape;
     PetscInt n = 0;
 
     for (PetscInt k = 0; k < r->n_groups; k++) {
@@ -42,9 +67,14 @@ static PetscErrorCode CheckBodies(HycoScene scene, Reader *r, HycoMesh m)
         n += r->group[k].n;
         HycoCheck(r->group[k].dim == m->dim, "body %s is a group of dimension %d; the other bodies have dimension %d",
                   r->group[k].name, r->group[k].dim, (int)m->dim);
-        HycoCheck(!nv || nv == r->group[k].nv,
-                  "%s mixes cells of %d and %d nodes; hyco supports one cell type per mesh: recombine all surfaces in "
-                  "gmsh, or none",
+        shape = HycoMshType(m->dim, r->group[k].nv);
+        HycoCheck(shape < HYCO_N_CELL_TYPES,
+                  "%s: cells of dimension %d with %d nodes are of no type that hyco supports", scene->mesh_path,
+                  (int)m->dim, (int)r->group[k].nv);
+        shapes |= r->group[k].shapes;
+        HycoCheck(HycoShapesType(shapes) < HYCO_N_CELL_TYPES,
+                  "%s mixes cells of %d and %d nodes; only first-order cells may be of several types: mesh with gmsh "
+                  "-order 1, or recombine all surfaces, or none",
                   scene->mesh_path, (int)nv, (int)r->group[k].nv);
         nv = r->group[k].nv;
       }
@@ -54,21 +84,8 @@ static PetscErrorCode CheckBodies(HycoScene scene, Reader *r, HycoMesh m)
               list[0] ? list : "(none)");
     cells += n;
   }
-  for (int t = 0; t < HYCO_N_CELL_TYPES; t++) {
-    if (HycoCellKinds[t].dim == m->dim && HycoCellKinds[t].nv == nv) m->type = (HycoCellType)t;
-  }
-  HycoCheck(HycoCellKinds[m->type].dim == m->dim && HycoCellKinds[m->type].nv == nv,
-            "%s: cells of dimension %d with %d nodes are of no type that hyco supports", scene->mesh_path, (int)m->dim,
-            (int)nv);
-  if (m->type == HYCO_HEX20 && scene->n_contacts) { /* the corners of quad8 would have negative forces under a
-                                                       uniform pressure */
-    PetscCall(HycoMshAddFaceNodes(scene->mesh_path, &r->file));
-    m->type = HYCO_HEX27;
-    scene->face_nodes = PETSC_TRUE;
-  }
-  m->nv = HycoCellKinds[m->type].nv;
-  m->nf = HycoCellKinds[m->type].nf;
   m->n_cells = cells;
+  PetscCall(ChooseType(scene, r, m, shapes));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -175,7 +192,7 @@ static PetscErrorCode AddFacets(HycoScene scene, Reader *r, HycoMesh m, Group *g
       missing = (PetscBool)(missing || facet[v] < 0);
     }
     for (PetscInt k = missing ? 0 : start[facet[0]]; k < (missing ? 0 : start[facet[0] + 1]); k++) {
-      if (CellHas(m, around[k], m->nf, facet)) {
+      if (CellHas(m, around[k], m->nf, facet) && HycoCellFace(m, around[k], facet) >= 0) {
         cell = around[k];
         n++;
       }
@@ -215,7 +232,7 @@ static PetscErrorCode AddMembers(Reader *r, HycoMesh m, Group *g, PetscInt group
     *n_node = first + n;
   }
   m->group_start[group + 1] = *n_node;
-  for (PetscInt e = 0; g->dim == m->dim && e < g->n; e++) {
+  for (PetscInt e = 0; g->dim == m->dim && g->nv == m->nv && e < g->n; e++) {
     PetscInt cell = -1, node[HYCO_CELL_NODES];
 
     for (PetscInt v = 0; v < m->nv; v++) node[v] = r->index[g->node[e * m->nv + v]];
@@ -260,6 +277,25 @@ static PetscErrorCode CollectGroups(HycoScene scene, Reader *r, HycoMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The triangles of smaller cells must not be a part of a neighbour's quadrilateral: displacements would be
+   discontinuous there. */
+static PetscErrorCode CheckConforming(HycoScene scene, HycoMesh m, const PetscInt start[], const PetscInt around[])
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < m->n_cells * HycoFacetCount(m->type) && m->mixed && m->dim == 3; k++) {
+    const PetscInt e = k / HycoFacetCount(m->type);
+    PetscInt facet[HYCO_FACET_NODES];
+
+    if (HycoMeshFace(m, e, k % HycoFacetCount(m->type), facet) != 3) continue;
+    for (PetscInt j = start[facet[0]]; j < start[facet[0] + 1]; j++)
+      HycoCheck(!CellHas(m, around[j], m->nf, facet) || HycoCellFace(m, around[j], facet) >= 0,
+                "%s: the cells %d and %d share three of the four nodes of a face; between quadrilateral and triangular "
+                "faces a mesh needs pyramids (gmsh makes them beside extruded, recombined volumes)",
+                scene->mesh_path, (int)m->cell_id[e], (int)m->cell_id[around[j]]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* A load must act on a boundary, not between two cells, and so must a surface of springs. */
 static PetscErrorCode CheckLoads(HycoScene scene, Reader *r)
 {
@@ -281,7 +317,8 @@ static PetscErrorCode CheckLoads(HycoScene scene, Reader *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Detects two cells with the same nodes: format 2.2 stores a cell once for each of its groups. */
+/* Detects two cells with the same nodes: format 2.2 stores a cell once for each of its groups; and a cell within the
+   nodes of another one. */
 static PetscErrorCode CheckTwins(HycoScene scene, HycoMesh m, const PetscInt start[], const PetscInt around[])
 {
   PetscFunctionBegin;
@@ -289,10 +326,16 @@ static PetscErrorCode CheckTwins(HycoScene scene, HycoMesh m, const PetscInt sta
     const PetscInt *cell = m->cells + e * m->nv;
 
     for (PetscInt k = start[cell[0]]; k < start[cell[0] + 1]; k++) {
-      HycoCheck(around[k] >= e || !CellHas(m, around[k], m->nv, cell),
+      const PetscInt other = around[k];
+      const PetscBool alike = (PetscBool)(HycoMeshShape(m, e) == HycoMeshShape(m, other));
+
+      if (other == e || (alike && other > e) || !CellHas(m, other, m->nv, cell)) continue;
+      HycoCheck(!alike,
                 "%s: cells %d and %d have the same nodes; a cell must belong to one body (format 2.2 repeats a cell "
                 "for each of its groups: save as 4.1)",
-                scene->mesh_path, (int)m->cell_id[around[k]], (int)m->cell_id[e]);
+                scene->mesh_path, (int)m->cell_id[other], (int)m->cell_id[e]);
+      HycoFail("%s: cell %d has only nodes of cell %d, so that they overlap; remove one of them", scene->mesh_path,
+               (int)m->cell_id[e], (int)m->cell_id[other]);
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -309,6 +352,7 @@ static PetscErrorCode MakeTables(HycoScene scene, Reader *r, HycoMesh m)
   PetscCall(CollectNodes(r, m));
   PetscCall(HycoMeshNodeCells(m, &r->start, &r->around));
   PetscCall(CheckTwins(scene, m, r->start, r->around));
+  PetscCall(CheckConforming(scene, m, r->start, r->around));
   PetscCall(CollectGroups(scene, r, m));
   PetscCall(CheckLoads(scene, r));
   PetscCall(HycoMeshSetNodeBodies(scene, m));

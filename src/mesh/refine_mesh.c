@@ -21,13 +21,20 @@ static PetscErrorCode FacetPoint(DM dm, HycoCellType type, PetscInt nv, PetscInt
   PetscCall(DMPlexGetCone(dm, cell, &cone));
   *facet = -1;
   for (PetscInt k = 0; k < n && *facet < 0; k++) {
-    PetscInt mine[4], found = 0;
+    PetscInt mine[4];
+    PetscBool same = PETSC_TRUE;
 
     PetscCall(HycoPlexVertices(dm, PETSC_TRUE, HYCO_N_CELL_TYPES, cone[k], nf, mine));
-    for (PetscInt v = 0; v < nf; v++) {
-      for (PetscInt w = 0; w < nf; w++) found += mine[v] == vertex[of[w]];
+    for (PetscInt v = 0; v < nf; v++) { /* as sets: a triangle of a hex8 mesh has a node twice */
+      PetscBool has[2] = {PETSC_FALSE, PETSC_FALSE};
+
+      for (PetscInt w = 0; w < nf; w++) {
+        has[0] = (PetscBool)(has[0] || mine[v] == vertex[of[w]]);
+        has[1] = (PetscBool)(has[1] || mine[w] == vertex[of[v]]);
+      }
+      same = (PetscBool)(same && has[0] && has[1]);
     }
-    if (found == nf) *facet = cone[k];
+    if (same) *facet = cone[k];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -122,6 +129,7 @@ static PetscErrorCode Interpolate(DM *dm, HycoScene scene)
 {
   const MPI_Comm comm = PetscObjectComm((PetscObject)*dm);
   PetscInt n, last, *tag, dim, depth, type;
+  PetscBool mixed;
   const PetscInt *had;
   IS tags;
   DM full;
@@ -131,7 +139,7 @@ static PetscErrorCode Interpolate(DM *dm, HycoScene scene)
   PetscCall(DMPlexGetDepth(*dm, &depth));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &depth, 1, MPIU_INT, MPI_MAX, comm));
   if (depth == dim) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoPlexType(*dm, &type));
+  PetscCall(HycoPlexType(*dm, &type, &mixed));
   HycoCheck(!HycoCellKinds[PetscMax(type, 0)].quadratic,
             "scene_refine needs first-order cells, and the mesh has %s; refine the file (gmsh -refine)",
             HycoCellKinds[PetscMax(type, 0)].name);
@@ -294,10 +302,73 @@ static PetscErrorCode RefineOnce(DM *dm)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Pyramids would be divided into cells of two types, whose tags would not follow from their parents'. */
+static PetscErrorCode CheckShapes(DM dm)
+{
+  PetscInt c0, c1;
+
+  PetscFunctionBegin;
+  PetscCall(DMPlexGetHeightStratum(dm, 0, &c0, &c1));
+  for (PetscInt c = c0; c < c1; c++) {
+    DMPolytopeType of;
+
+    PetscCall(DMPlexGetCellType(dm, c, &of));
+    HycoCheck(of != DM_POLYTOPE_PYRAMID,
+              "scene_refine: the mesh has pyramids, which are not refined; refine the file (gmsh -refine)");
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* On one process, numbers the cells by type, as DMPlexTransform needs them; distribution does so on several. */
+static PetscErrorCode SortByType(DM *dm)
+{
+  PetscInt c0, c1, last, next, n, *place, *new_tag;
+  const PetscInt *tag;
+  DMPolytopeType before = DM_POLYTOPE_POINT, of;
+  PetscBool sorted = PETSC_TRUE;
+  IS tags, order;
+  PetscMPIInt size;
+  DM by_type;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)*dm), &size));
+  PetscCall(DMPlexGetHeightStratum(*dm, 0, &c0, &c1));
+  for (PetscInt c = c0; c < c1; c++, before = of) {
+    PetscCall(DMPlexGetCellType(*dm, c, &of));
+    sorted = (PetscBool)(sorted && of >= before);
+  }
+  if (sorted || size > 1) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscObjectQuery((PetscObject)*dm, HYCO_TAGS, (PetscObject *)&tags));
+  PetscCall(DMPlexGetChart(*dm, NULL, &last));
+  PetscCall(ISGetLocalSize(tags, &n));
+  PetscCall(PetscMalloc1(last, &place));
+  PetscCall(PetscMalloc1(n, &new_tag));
+  for (PetscInt p = 0; p < last; p++) place[p] = p;
+  next = c0;
+  for (int type = 0; type < DM_NUM_POLYTOPES; type++) {
+    for (PetscInt c = c0; c < c1; c++) {
+      PetscCall(DMPlexGetCellType(*dm, c, &of));
+      if ((int)of == type) place[c] = next++;
+    }
+  }
+  PetscCall(ISGetIndices(tags, &tag));
+  for (PetscInt p = 0; p < n; p++) new_tag[place[p]] = tag[p];
+  PetscCall(ISRestoreIndices(tags, &tag));
+  PetscCall(ISCreateGeneral(PETSC_COMM_SELF, last, place, PETSC_OWN_POINTER, &order));
+  PetscCall(DMPlexPermute(*dm, order, &by_type));
+  PetscCall(ISDestroy(&order));
+  PetscCall(HycoPlexSetTags(by_type, new_tag));
+  PetscCall(DMDestroy(dm));
+  *dm = by_type;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoPlexRefine(DM *dm, HycoScene scene, PetscInt times)
 {
   PetscFunctionBegin;
   if (!times) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoOnEach(PetscObjectComm((PetscObject)*dm), CheckShapes(*dm));
+  PetscCall(SortByType(dm));
   PetscCall(Interpolate(dm, scene));
   for (PetscInt k = 0; k < times; k++) PetscCall(RefineOnce(dm));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -211,6 +211,12 @@ static PetscErrorCode FindNear(HycoFOM f, const HycoPairs *pairs, PetscReal d, c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The number of nodes of a cell's smallest facet: smaller cells have triangles beside quadrilaterals. */
+static PetscInt SmallestFacet(HycoMesh m, PetscInt cell)
+{
+  return HycoMeshShape(m, cell) == m->type ? m->nf : PetscMin(m->nf, 3);
+}
+
 /* Section 7.2: adds cells on Gamma^C with a node closer than d to a node of Gamma^C in Omega_A. */
 static PetscErrorCode ExtendContact(Rid *r, const HycoPairs *pairs, PetscReal d)
 {
@@ -227,10 +233,11 @@ static PetscErrorCode ExtendContact(Rid *r, const HycoPairs *pairs, PetscReal d)
   PetscCall(FromSurface(r, near_on, near));
   for (PetscInt i = 0; i < m->n_nodes; i++) {
     for (PetscInt j = r->start[i]; near[i] == 1 && j < r->start[i + 1]; j++) {
-      PetscInt on = 0;
+      PetscInt on = 0, of[HYCO_CELL_NODES];
+      const PetscInt n = HycoMeshOwnNodes(m, r->around[j], of);
 
-      for (PetscInt v = 0; v < m->nv; v++) on += near[m->cells[r->around[j] * m->nv + v]] > 0;
-      if (on >= m->nf - HycoMeshFirstCarrier(m)) PetscCall(Add(r, r->around[j]));
+      for (PetscInt v = 0; v < n; v++) on += near[of[v]] > 0;
+      if (on >= SmallestFacet(m, r->around[j]) - HycoMeshFirstCarrier(m)) PetscCall(Add(r, r->around[j]));
     }
   }
   PetscCall(PetscFree4(node, in, near_on, near));
@@ -272,10 +279,11 @@ static PetscErrorCode AddBehind(Rid *r, const PetscInt master[])
     if (node[n] < 0) PetscFunctionReturn(PETSC_SUCCESS);
   }
   for (PetscInt j = r->start[node[0]]; j < r->start[node[0] + 1]; j++) {
-    PetscInt has = 0;
+    PetscInt has = 0, of[HYCO_CELL_NODES];
+    const PetscInt own = HycoMeshOwnNodes(m, r->around[j], of);
 
-    for (PetscInt v = 0; v < m->nv; v++) {
-      for (PetscInt i = 0; i < n; i++) has += m->cells[r->around[j] * m->nv + v] == node[i];
+    for (PetscInt v = 0; v < own; v++) {
+      for (PetscInt i = 0; i < n; i++) has += of[v] == node[i];
     }
     if (has == n) PetscCall(Add(r, r->around[j]));
   }

@@ -124,7 +124,6 @@ static PetscReal EdgeLength(HycoMesh m, PetscInt a, PetscInt b)
 static PetscErrorCode SurfaceEdge(HycoReducer t, PetscReal *mean)
 {
   const HycoMesh m = t->fom->surface;
-  const PetscInt corners = HycoCellKinds[m->type].corners;
   PetscReal sum = 0;
   PetscInt n = 0;
 
@@ -134,7 +133,8 @@ static PetscErrorCode SurfaceEdge(HycoReducer t, PetscReal *mean)
 
     PetscCall(HycoMeshFindGroup(m, "contact", t->scene->contact[k]->slave, &g));
     for (PetscInt f = 0; f < m->n_facets; f++) {
-      const PetscInt *node = m->facets + f * m->nf;
+      const PetscInt *node = m->facets + f * m->nf,
+                     corners = HycoMeshIsQuadratic(m) ? HycoCellKinds[m->type].corners : HycoFacetCorners(m->nf, node);
 
       if (m->facet_group[f] != g || m->nf < 2) continue;
       for (PetscInt j = 0; j < corners; j++) sum += EdgeLength(m, node[j], node[(j + 1) % corners]);

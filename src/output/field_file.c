@@ -9,9 +9,22 @@
 #include <string.h>
 #include <sys/stat.h>
 
-static const char *const topology[HYCO_N_CELL_TYPES] = {
-    "Polyline",        "Triangle",        "Quadrilateral",  "Tetrahedron",   "Hexahedron",   "Triangle_6",
-    "Quadrilateral_8", "Quadrilateral_9", "Tetrahedron_10", "Hexahedron_20", "Hexahedron_27"};
+static const char *const topology[HYCO_N_CELL_TYPES] = {"Polyline",
+                                                        "Triangle",
+                                                        "Quadrilateral",
+                                                        "Tetrahedron",
+                                                        "Hexahedron",
+                                                        "Triangle_6",
+                                                        "Quadrilateral_8",
+                                                        "Quadrilateral_9",
+                                                        "Tetrahedron_10",
+                                                        "Hexahedron_20",
+                                                        "Hexahedron_27",
+                                                        NULL,
+                                                        NULL};
+/* XDMF's codes of the shapes in a mixed topology. */
+static const unsigned char code[HYCO_N_CELL_TYPES] = {
+    [HYCO_TRI3] = 4, [HYCO_QUAD4] = 5, [HYCO_TET4] = 6, [HYCO_PYRAMID5] = 7, [HYCO_PRISM6] = 8, [HYCO_HEX8] = 9};
 
 /* The length of the ending .vtkhdf or .xdmf of a path; 0: another ending. */
 static size_t Ending(const char path[])
@@ -93,6 +106,21 @@ static PetscErrorCode WriteHead(HycoFieldFile f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A mixed mesh's cells by shape, for the .xdmf. Collective with an order. */
+static PetscErrorCode WriteTopology(HycoFieldFile f)
+{
+  HycoCellList cells;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoCellListCreate(f->order, f->mesh, code, &cells));
+  f->n_items = cells.all;
+  ierr = HycoCellListWrite(f->h, "mesh/topology", &cells);
+  PetscCall(HycoCellListDestroy(&cells));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFieldFileOpen(HycoFieldFile f, const HycoFileOrder *order, HycoMesh mesh, HycoScene scene,
                                  const PetscReal X[], const PetscReal mu[])
 {
@@ -112,6 +140,7 @@ PetscErrorCode HycoFieldFileOpen(HycoFieldFile f, const HycoFileOrder *order, Hy
   }
   HycoOnRoot(f->comm, WriteHead(f));
   PetscCall(HycoFieldsWriteMesh(f->h, "mesh", order, mesh, X, PETSC_TRUE));
+  if (mesh->mixed) PetscCall(WriteTopology(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -247,10 +276,12 @@ static void Escape(const char name[], char out[6 * PETSC_MAX_PATH_LEN])
   *out = '\0';
 }
 
+/* cols 0: a dataset of one dimension. */
 static void WriteItem(FILE *out, const char kind[], PetscInt rows, PetscInt cols, const char h5[], const char name[])
 {
-  fprintf(out, "    <DataItem Format=\"HDF\" %s Dimensions=\"%ld %ld\">%s:/%s</DataItem>\n", kind, (long)rows,
-          (long)cols, h5, name);
+  fprintf(out, "    <DataItem Format=\"HDF\" %s Dimensions=\"%ld", kind, (long)rows);
+  if (cols) fprintf(out, " %ld", (long)cols);
+  fprintf(out, "\">%s:/%s</DataItem>\n", h5, name);
 }
 
 /* The mesh, whose cells are common to all times, and the fields of one. */
@@ -262,10 +293,13 @@ static void WriteGrid(HycoFieldFile f, FILE *out, const char h5[], PetscInt k)
 
   fprintf(out, "  <Grid Name=\"mesh\" GridType=\"Uniform\">\n");
   if (f->most) fprintf(out, "   <Time Value=\"%.17g\"/>\n", (double)f->t[k]);
-  fprintf(out, "   <Topology TopologyType=\"%s\" NumberOfElements=\"%ld\"%s>\n", topology[type], (long)n_cells,
-          type == HYCO_LINE2 ? " NodesPerElement=\"2\"" : "");
+  fprintf(out, "   <Topology TopologyType=\"%s\" NumberOfElements=\"%ld\"%s>\n",
+          f->mesh->mixed ? "Mixed" : topology[type], (long)n_cells, type == HYCO_LINE2 ? " NodesPerElement=\"2\"" : "");
   snprintf(kind, sizeof(kind), "NumberType=\"Int\" Precision=\"%d\"", (int)sizeof(PetscInt));
-  WriteItem(out, kind, n_cells, f->mesh->nv, h5, "mesh/cells");
+  if (f->mesh->mixed)
+    WriteItem(out, kind, f->n_items, 0, h5, "mesh/topology");
+  else
+    WriteItem(out, kind, n_cells, f->mesh->nv, h5, "mesh/cells");
   fprintf(out, "   </Topology>\n   <Geometry GeometryType=\"XYZ\">\n");
   HycoFormat(name, f->points ? "step-%04d/xyz" : "mesh/xyz", (int)k);
   WriteItem(out, "Precision=\"8\"", HycoFieldFileCount(f, HYCO_ON_NODES), 3, h5, name);

@@ -56,34 +56,6 @@ PetscErrorCode HycoFieldWriteData(HycoH5 h, const HycoFileOrder *order, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The gmsh node of a cell that is VTK's k-th. */
-static PetscInt FromGmsh(HycoCellType type, PetscInt k)
-{
-  static const signed char tet10[10] = {0, 1, 2, 3, 4, 5, 6, 7, 9, 8},
-                           hex27[27] = {0,  1,  2,  3,  4,  5,  6,  7,  8,  11, 13, 9,  16, 18,
-                                        19, 17, 10, 12, 14, 15, 22, 23, 21, 24, 20, 25, 26};
-
-  if (type == HYCO_TET10) return tet10[k];
-  return type == HYCO_HEX20 || type == HYCO_HEX27 ? hex27[k] : k;
-}
-
-PetscErrorCode HycoFieldsWriteCells(HycoH5 h, const char name[], const HycoFileOrder *order, HycoMesh m, PetscBool vtk,
-                                    PetscInt cols)
-{
-  PetscInt *cells;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1(m->n_cells * m->nv, &cells));
-  for (PetscInt k = 0; k < m->n_cells * m->nv; k++) {
-    const PetscInt node = m->cells[k - k % m->nv + (vtk ? FromGmsh(m->type, k % m->nv) : k % m->nv)];
-
-    cells[k] = order ? m->node_whole[node] : node;
-  }
-  PetscCall(HycoFieldWrite(h, order, m->n_cells, name, HYCO_ON_CELLS, MPIU_INT, m->nv, cols, cells));
-  PetscCall(PetscFree(cells));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode HycoFieldsWriteMesh(HycoH5 h, const char folder[], const HycoFileOrder *order, HycoMesh m,
                                    const PetscReal X[], PetscBool vtk)
 {
@@ -93,7 +65,7 @@ PetscErrorCode HycoFieldsWriteMesh(HycoH5 h, const char folder[], const HycoFile
   PetscFunctionBegin;
   for (int k = 0; k < 4; k++) PetscCall(PetscSNPrintf(name[k], HYCO_LINE, "%s/%s", folder, of[k]));
   PetscCall(HycoFieldWrite(h, order, m->n_nodes, name[0], HYCO_ON_NODES, MPIU_REAL, 3, 3, X));
-  PetscCall(HycoFieldsWriteCells(h, name[1], order, m, vtk, m->nv));
+  PetscCall(HycoFieldsWriteCells(h, name[1], order, m, vtk));
   PetscCall(HycoFieldWrite(h, order, m->n_nodes, name[2], HYCO_ON_NODES, MPIU_INT, 1, 1, m->node_id));
   PetscCall(HycoFieldWrite(h, order, m->n_cells, name[3], HYCO_ON_CELLS, MPIU_INT, 1, 1, m->cell_id));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -232,7 +204,7 @@ PetscErrorCode HycoNodalStress(HycoFE fe, const PetscReal sigma[], PetscReal ten
   for (PetscInt k = 0; k < m->n_cells * m->nv; k++) {
     const PetscInt i = m->cells[k], e = k / m->nv;
 
-    if (m->cell_body[e] != body[i]) continue;
+    if (m->cell_body[e] != body[i] || (k % m->nv && i == m->cells[k - 1])) continue; /* or a repeated node */
     weight[i] += volume[e];
     for (PetscInt c = 0; c < ns; c++) mean[i * ns + c] += volume[e] * sigma[e * ns + c];
   }

@@ -113,9 +113,12 @@ static PetscErrorCode OfCell(HycoFE fe, PetscInt field, const PetscReal sigma[],
   PetscCall(PetscArraycpy(s, sigma + cell * fe->n_sigma, fe->n_sigma)); /* xx, yy, zz, xy, yz, xz */
   if (field >= XX && field <= XZ) *value = s[field - XX];
   if (field == RR || field == TT) {
-    for (PetscInt v = 0; v < m->nv; v++) {
-      x += fe->X[3 * m->cells[cell * m->nv + v]];
-      y += fe->X[3 * m->cells[cell * m->nv + v] + 1];
+    PetscInt node[HYCO_CELL_NODES];
+    const PetscInt n = HycoMeshOwnNodes(m, cell, node);
+
+    for (PetscInt v = 0; v < n; v++) {
+      x += fe->X[3 * node[v]];
+      y += fe->X[3 * node[v] + 1];
     }
     r = PetscSqrtReal(x * x + y * y);
     if (r > 0) x /= r, y /= r;

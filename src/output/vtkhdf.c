@@ -7,7 +7,7 @@
 #define ROOT "VTKHDF/"
 
 /* VTK's numbers of the cell types. */
-static const unsigned char vtk_type[HYCO_N_CELL_TYPES] = {3, 5, 9, 10, 12, 22, 23, 28, 24, 25, 29};
+static const unsigned char vtk_type[HYCO_N_CELL_TYPES] = {3, 5, 9, 10, 12, 22, 23, 28, 24, 25, 29, 14, 13};
 
 /* Writes a one-dimensional dataset of n integers, value, value + step, ... On one process. */
 static PetscErrorCode WriteSequence(HycoH5 h, const char name[], PetscInt n, PetscInt value, PetscInt step)
@@ -25,7 +25,7 @@ static PetscErrorCode WriteSequence(HycoH5 h, const char name[], PetscInt n, Pet
 }
 
 /* On one process. */
-static PetscErrorCode WriteHead(HycoFieldFile f)
+static PetscErrorCode WriteHead(HycoFieldFile f, const HycoCellList *cells)
 {
   static const PetscInt version[2] = {2, 0};
   const PetscInt n_cells = HycoFieldFileCount(f, HYCO_ON_CELLS);
@@ -33,7 +33,7 @@ static PetscErrorCode WriteHead(HycoFieldFile f)
   PetscFunctionBegin;
   PetscCall(WriteSequence(f->h, ROOT "NumberOfPoints", 1, HycoFieldFileCount(f, HYCO_ON_NODES), 0));
   PetscCall(WriteSequence(f->h, ROOT "NumberOfCells", 1, n_cells, 0));
-  PetscCall(WriteSequence(f->h, ROOT "NumberOfConnectivityIds", 1, n_cells * f->mesh->nv, 0));
+  PetscCall(WriteSequence(f->h, ROOT "NumberOfConnectivityIds", 1, cells->all, 0));
   PetscCall(HycoH5WriteAttributeInt(f->h, "VTKHDF", "Version", 2, version));
   PetscCall(HycoH5WriteAttribute(f->h, "VTKHDF", "Type", "UnstructuredGrid"));
   PetscCall(HycoH5WriteAttribute(f->h, "VTKHDF", "title", f->scene->title));
@@ -57,7 +57,7 @@ static PetscErrorCode WriteRows(HycoFieldFile f, const char set[], HycoPlace pla
 
 /* Writes the cells' types, and the offset of each cell's nodes: one more than cells, written by the process of the
    last. */
-static PetscErrorCode WriteTypes(HycoFieldFile f)
+static PetscErrorCode WriteTypes(HycoFieldFile f, const HycoCellList *cells)
 {
   const HycoFileOrder *order = f->order;
   const PetscInt all = HycoFieldFileCount(f, HYCO_ON_CELLS), first = order ? order->first[HYCO_ON_CELLS] : 0,
@@ -68,8 +68,8 @@ static PetscErrorCode WriteTypes(HycoFieldFile f)
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(begins, &start, own, &type));
-  for (PetscInt k = 0; k < begins; k++) start[k] = (first + k) * f->mesh->nv;
-  for (PetscInt k = 0; k < own; k++) type[k] = vtk_type[f->mesh->type];
+  for (PetscInt k = 0; k < begins; k++) start[k] = cells->first + cells->start[k];
+  for (PetscInt k = 0; k < own; k++) type[k] = vtk_type[cells->shape[k]];
   ierr = HycoH5WriteRows(f->h, ROOT "Offsets", MPIU_INT, all + 1, HYCO_H5_LINE, first, begins, start);
   if (!ierr) ierr = HycoH5WriteRows(f->h, ROOT "Types", MPI_UNSIGNED_CHAR, all, HYCO_H5_LINE, first, own, type);
   PetscCall(PetscFree2(start, type));
@@ -77,16 +77,28 @@ static PetscErrorCode WriteTypes(HycoFieldFile f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode WriteCells(HycoFieldFile f, const HycoCellList *cells)
+{
+  PetscFunctionBegin;
+  HycoOnRoot(f->comm, WriteHead(f, cells));
+  PetscCall(HycoCellListWrite(f->h, ROOT "Connectivity", cells));
+  PetscCall(WriteTypes(f, cells));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoVTKWriteMesh(HycoFieldFile f, const PetscReal X[])
 {
   HycoMesh m = f->mesh;
+  HycoCellList cells;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  HycoOnRoot(f->comm, WriteHead(f));
+  PetscCall(HycoCellListCreate(f->order, m, NULL, &cells));
+  ierr = WriteCells(f, &cells);
+  PetscCall(HycoCellListDestroy(&cells));
+  PetscCall(ierr);
   if (!f->points)
     PetscCall(HycoFieldWrite(f->h, f->order, m->n_nodes, ROOT "Points", HYCO_ON_NODES, MPIU_REAL, 3, 3, X));
-  PetscCall(HycoFieldsWriteCells(f->h, ROOT "Connectivity", f->order, m, PETSC_TRUE, HYCO_H5_LINE));
-  PetscCall(WriteTypes(f));
   PetscCall(HycoFieldWrite(f->h, f->order, m->n_nodes, ROOT "PointData/node_id", HYCO_ON_NODES, MPIU_INT, 1,
                            HYCO_H5_LINE, m->node_id));
   PetscCall(HycoFieldWrite(f->h, f->order, m->n_cells, ROOT "CellData/cell_id", HYCO_ON_CELLS, MPIU_INT, 1,

@@ -65,7 +65,7 @@ static PetscErrorCode MoveMesh(HycoH5 h, const char prefix[], PetscInt n_bodies,
   m = *mesh;
   head[0] = (PetscInt)m->type;
   head[1] = m->dim;
-  PetscCall(HycoH5Ints(h, At(prefix, "head", path), 0, HYCO_N_CELL_TYPES - 1, 2, head));
+  PetscCall(HycoH5Ints(h, At(prefix, "head", path), 0, HYCO_N_MESH_TYPES - 1, 2, head));
   m->type = (HycoCellType)head[0];
   m->dim = HycoElementGet(m->type)->dim;
   m->nv = HycoElementGet(m->type)->nv;
@@ -85,6 +85,7 @@ static PetscErrorCode MoveMesh(HycoH5 h, const char prefix[], PetscInt n_bodies,
   PetscCall(HycoH5Int(h, At(prefix, "facet_group", path), 0, m->n_groups - 1, &m->n_facets, 1, &m->facet_group));
   PetscCall(HycoH5Int(h, At(prefix, "facet_cell", path), -1, m->n_cells - 1, &m->n_facets, 1, &m->facet_cell));
   if (!HycoH5Reads(h)) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt e = 0; e < m->n_cells; e++) m->mixed = (PetscBool)(m->mixed || HycoMeshShape(m, e) != m->type);
   PetscCall(PetscCalloc1(m->n_groups + 1, &m->group_cell_start));
   PetscCall(PetscMalloc1(1, &m->group_cell));
   PetscFunctionReturn(PETSC_SUCCESS);

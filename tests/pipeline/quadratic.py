@@ -141,25 +141,32 @@ class Quadratic(Case):
                     self.assertIn(said, run.stderr)
 
     def test_other_cells(self):
-        """Cells that hyco does not support, and mixed ones: one line with the remedy."""
+        """Second-order cells that hyco does not support, or of two types: one line with the remedy."""
+        drawing = ('Point(1) = {0,0,0,1}; Point(2) = {1,0,0,1}; Point(3) = {0,1,0,1}; Line(1) = {1,2}; Line(2) = {2,3}; Line(3) = {3,1}; Curve Loop(1) = {1,2,3};'
+                   'Plane Surface(1) = {1}; e[] = Extrude {0,0,1} {Surface{1}; Layers{1}; Recombine;}; Physical Volume("block") = {e[1]};\n')
         with open(self.path('b.geo'), 'w', encoding='ascii') as f:
-            f.write('Point(1) = {0,0,0,1}; Point(2) = {1,0,0,1}; Point(3) = {0,1,0,1}; Line(1) = {1,2}; Line(2) = {2,3}; Line(3) = {3,1}; Curve Loop(1) = {1,2,3};'
-                    'Plane Surface(1) = {1}; e[] = Extrude {0,0,1} {Surface{1}; Layers{1}; Recombine;}; Physical Volume("block") = {e[1]};\n')
-        subprocess.run(['gmsh', '-3', self.path('b.geo'), '-v', '1', '-format', 'msh41', '-o', self.path('mesh.msh')], check=True, timeout=60 * PATIENCE)
+            f.write(drawing)
+        subprocess.run(['gmsh', '-3', self.path('b.geo'), '-order', '2', '-v', '1', '-format', 'msh41', '-o', self.path('mesh.msh')], check=True, timeout=60 * PATIENCE)
         for ranks in (0, 2):
             run = self.run_raw('check', '-scene', self.written('scene: {mesh: mesh.msh}\nbody: {block: {young: 200}}\n'), ranks=ranks)
             with self.subTest(ranks=ranks):
                 self.assertEqual(run.returncode, 1)
                 self.assertEqual(run.stderr.count('hyco: error'), 1, run.stderr)
-                self.assertIn('prisms', run.stderr)
-                self.assertIn('mesh the bodies with one of these', run.stderr)
-        mixed = Grid()
-        mixed.box('quad4', [np.linspace(0, 1, 3)] * 2, lambda x: x, 'block', {})
-        mixed.box('tri3', [np.linspace(1, 2, 3)] * 2, lambda x: x, 'block', {})
-        mixed.write(self.path('mesh.msh'))
-        run = self.run_raw('check', '-scene', self.written('scene: {mesh: mesh.msh}\nbody: {block: {young: 200}}\n'))
-        self.assertEqual(run.returncode, 1)
-        self.assertIn('hyco supports one type per mesh', run.stderr)
+                self.assertIn('prisms of second order', run.stderr)
+                self.assertIn('mesh the bodies with these', run.stderr)
+        for bodies in (('block', 'block'), ('block', 'seat')):
+            parts = []
+            for kind, body, lo in (('quad8', bodies[0], 0), ('tri6', bodies[1], 1)):
+                grid = Grid()
+                grid.box(LINEAR[kind], [np.linspace(lo, lo + 1, 3)] * 2, lambda x: x, body, {})
+                parts.append(second(grid, kind))
+            (nodes, elements, names), (more, others, _) = parts
+            tag = 1 if bodies[0] == bodies[1] else 2
+            msh(self.path('mesh.msh'), nodes + more, elements + [(k, tag, [len(nodes) + v for v in c]) for k, _, c in others],
+                {tag: (2, bodies[1]), **names})
+            run = self.run_raw('check', '-scene', self.written('scene: {mesh: mesh.msh}\nbody: {block: {young: 200}%s}\n' % (', seat: {young: 1}' * (tag > 1))))
+            self.assertEqual(run.returncode, 1)
+            self.assertIn('only first-order cells may be of several types', run.stderr)
 
 
 if __name__ == '__main__':

@@ -161,7 +161,7 @@ static PetscErrorCode TestEnergy(HycoFE fe)
 static PetscErrorCode TestMeanDilatation(void)
 {
   PetscFunctionBegin;
-  for (int type = 0; type < HYCO_N_CELL_TYPES; type++) {
+  for (int type = 0; type < HYCO_N_MESH_TYPES; type++) {
     HycoScene scene = NULL;
     HycoMesh mesh = NULL;
     HycoFE fe = NULL;
@@ -192,7 +192,7 @@ static PetscErrorCode Test(void)
   PetscFunctionBegin;
   PatchesComplete();
   PetscCall(TestMeanDilatation());
-  for (int type = 0; type < HYCO_N_CELL_TYPES; type++) {
+  for (int type = 0; type < HYCO_N_MESH_TYPES; type++) {
     HycoScene scene;
     HycoMesh mesh = NULL;
     HycoFE fe;

@@ -133,7 +133,7 @@ static PetscErrorCode Test(void)
 {
   PetscFunctionBegin;
   PatchesComplete();
-  for (int type = 0; type < HYCO_N_CELL_TYPES; type++) {
+  for (int type = 0; type < HYCO_N_MESH_TYPES; type++) {
     const int before = check_failures;
 
     PetscCall(TestPressure(&patches[type]));

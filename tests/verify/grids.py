@@ -3,7 +3,7 @@ import numpy as np
 
 from common import msh
 
-GMSH = {'point': 15, 'line2': 1, 'tri3': 2, 'quad4': 3, 'tet4': 4, 'hex8': 5}
+GMSH = {'point': 15, 'line2': 1, 'tri3': 2, 'quad4': 3, 'tet4': 4, 'hex8': 5, 'prism6': 6, 'pyramid5': 7}
 KUHN = ((0, 1, 2, 6), (0, 5, 1, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 4, 5, 6), (0, 7, 4, 6))  # a cube along its diagonal
 PARTS = {'line2': ('line2', ((0, 1),)), 'quad4': ('quad4', ((0, 1, 2, 3),)), 'tri3': ('tri3', ((0, 1, 2), (0, 2, 3))),
          'hex8': ('hex8', (tuple(range(8)),)), 'tet4': ('tet4', KUHN)}
@@ -42,6 +42,32 @@ class Grid:
                 at, group = at[(slice(group[1] + 1),) * at.ndim], group[0]
             self._cells(FACETS[kind], at, self._tag(group, dim - 1))
 
+    def mixed(self, axes, bend, body, faces, cut):
+        """A box whose cell at the place (i, j) or (i, j, k) is cut as cut(place) says: 'whole' (quad4, hex8), 'halves' (tri3; prism6,
+        along z), 'pyramid5' (three, whose apex is the corner at an odd place of each axis, so that neighbours that are cut so too fit)
+        or 'tet4' (the same, each pyramid with its base on the boundary in two)."""
+        dim, shape = len(axes), tuple(len(a) for a in axes)
+        place = np.zeros((int(np.prod(shape)), 3))
+        place[:, :dim] = bend(np.stack(np.meshgrid(*axes, indexing='ij'), -1).reshape(-1, dim))
+        number = self.count + 1 + np.arange(len(place)).reshape(shape)
+        self.count += len(place)
+        self.nodes.extend(place.tolist())
+        at = dict(zip(number.ravel().tolist(), np.ndindex(shape)))
+        outer = {f'{"xyz"[c]}{end}': (c, end * (shape[c] - 1)) for c in range(dim) for end in (0, 1)}
+        bounds = lambda nodes: [face for face, (c, end) in outer.items() if all(at[n][c] == end for n in nodes)]
+        tag, found = self._tag(body, dim), {}
+        for cell in np.ndindex(*(n - 1 for n in shape)):
+            corner = [int(number[tuple(cell[c] + r[c] for c in range(dim))]) for r in CORNERS[:2**dim]]
+            for kind, c in pieces(cell, corner, cut(cell), bounds):
+                self.elements.append((GMSH[kind], tag, c))
+                for face in SIDES[kind]:
+                    nodes = [c[v] for v in face]
+                    found.setdefault(frozenset(nodes), []).append(nodes)
+        for nodes in (alike[0] for alike in found.values() if len(alike) == 1):
+            for face in bounds(nodes):
+                if face in faces:
+                    self.elements.append((len(nodes) - 1, self._tag(faces[face], dim - 1), nodes))
+
     def _cells(self, parts, number, tag):
         """The grid's cells, each cut in parts; corners in gmsh's order."""
         kind, cuts = parts
@@ -65,6 +91,35 @@ class Grid:
 
     def write(self, path):
         msh(path, self.nodes, self.elements, self.names)
+
+
+CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
+SIDES = {'tri3': ((0, 1), (1, 2), (2, 0)), 'quad4': ((0, 1), (1, 2), (2, 3), (3, 0)), 'tet4': ((0, 1, 2), (0, 1, 3), (1, 2, 3), (0, 2, 3)),
+         'pyramid5': ((0, 1, 2, 3), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
+         'prism6': ((0, 1, 2), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
+         'hex8': ((0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))}
+
+
+def pieces(cell, corner, cut, bounds):
+    """The cells, a kind and its nodes each, that a cell with these corners is cut into: Grid.mixed."""
+    flat = len(corner) == 4
+    if cut == 'whole':
+        return [('quad4' if flat else 'hex8', corner)]
+    if cut == 'halves':
+        parts = ((0, 1, 2), (0, 2, 3)) if flat else ((0, 1, 2, 4, 5, 6), (0, 2, 3, 4, 6, 7))
+        return [('tri3' if flat else 'prism6', [corner[v] for v in p]) for p in parts]
+    apex, out = CORNERS.index(tuple(1 - p % 2 for p in cell)), []
+    for base in SIDES['hex8']:
+        if apex in base:
+            continue
+        side, up, far = (np.subtract(CORNERS[v], CORNERS[base[0]]) for v in (base[1], base[3], apex))
+        nodes = [corner[v] for v in (base if np.cross(side, up) @ far > 0 else base[::-1])]
+        if cut == 'tet4' and bounds(nodes):
+            nodes = nodes[nodes.index(min(nodes)):] + nodes[:nodes.index(min(nodes))]  # the same diagonal on opposite faces
+            out += [('tet4', [*(nodes[v] for v in half), corner[apex]]) for half in ((0, 1, 2), (0, 2, 3))]
+        else:
+            out.append(('pyramid5', [*nodes, corner[apex]]))
+    return out
 
 
 def graded(fine, zone, end, ratio):

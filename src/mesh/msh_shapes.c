@@ -1,0 +1,54 @@
+/* Groups of a mesh file with cells of several shapes. */
+#include "msh.h"
+
+HycoCellType HycoMshType(int dim, PetscInt nv)
+{
+  int t = 0;
+
+  while (t < HYCO_N_CELL_TYPES && (HycoCellKinds[t].dim != dim || HycoCellKinds[t].nv != nv)) t++;
+  return (HycoCellType)t;
+}
+
+PetscErrorCode HycoMshWiden(HycoMshGroup *g, PetscInt nv)
+{
+  const HycoCellType shape = HycoMshType(g->dim, g->nv);
+  PetscInt *node;
+
+  PetscFunctionBegin;
+  if (nv == g->nv) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(g->room * nv, &node));
+  for (PetscInt e = 0; e < g->n; e++) {
+    PetscCall(PetscArraycpy(node + e * nv, g->node + e * g->nv, g->nv));
+    HycoShapeWiden(shape, nv, node + e * nv);
+  }
+  PetscCall(PetscFree(g->node));
+  g->node = node;
+  g->nv = nv;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+int HycoMshReduce(long long type, PetscInt node[])
+{
+  const PetscInt nv = type == 3 ? 4 : 8;
+  HycoCellType shape = HYCO_TRI3;
+  PetscInt own[8], wide[8], n = 0;
+
+  if (type != 3 && type != 5) return 0;
+  if (type == 5) shape = HycoShapeOf(HYCO_HEX8, node);
+  for (PetscInt v = 0; v < nv; v++) {
+    if (node[v] != node[(v + nv - 1) % nv]) own[n++] = node[v];
+  }
+  if (n != HycoCellKinds[shape].nv) return 0;
+  for (PetscInt v = 0; v < n; v++) {
+    for (PetscInt w = 0; w < v; w++) {
+      if (own[w] == own[v]) return 0;
+    }
+    wide[v] = own[v];
+  }
+  HycoShapeWiden(shape, nv, wide);
+  for (PetscInt v = 0; v < nv && type == 5; v++) {
+    if (wide[v] != node[v]) return 0;
+  }
+  for (PetscInt v = 0; v < n; v++) node[v] = own[v];
+  return shape == HYCO_TRI3 ? 2 : shape == HYCO_TET4 ? 4 : shape == HYCO_PRISM6 ? 6 : 7;
+}
