@@ -433,8 +433,8 @@ static PetscErrorCode BuildOnRoot(HycoReducer t, PetscBool useful, HycoROM *mode
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The nodes of the model's mesh whose displacements may stay full order: of A, and unless all of A is kept on the
-   contacts' surfaces; of a cubature, all. Rank 0. */
+/* The nodes of the model's mesh whose displacements may stay full order: for types with settings of an RID those of A,
+   and unless all of A is kept on the contacts' surfaces; for a cubature all; for other types none. Rank 0. */
 static PetscErrorCode MarkJudged(HycoReducer t, HycoROM m, PetscBool judged[])
 {
   const HycoROMTraits *traits = &t->prototype->traits;
@@ -447,7 +447,7 @@ static PetscErrorCode MarkJudged(HycoReducer t, HycoROM m, PetscBool judged[])
     if (t->surface_node[i] >= 0) judged[t->surface_node[i]] = PETSC_TRUE;
   }
   for (PetscInt i = 0; i < m->mesh->n_nodes && !traits->cells; i++)
-    judged[i] = (PetscBool)(judged[i] && !traits->whole && m->role[i] == HYCO_ROLE_A);
+    judged[i] = (PetscBool)(judged[i] && traits->settings == HYCO_SETTINGS_RID && m->role[i] == HYCO_ROLE_A);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
