@@ -22,7 +22,7 @@ typedef struct {
   PetscReal *lambda;
 } Outputs;
 
-/* The cells that the outputs need, with the modes at their nodes, as the model's probe. Collective; m: on rank 0. */
+/* The cells that the outputs need, on rank 0; elsewhere NULL. Collective. */
 static PetscErrorCode GatherMesh(HycoReducer t, HycoMesh *mesh)
 {
   HycoMesh part = t->fom->part, from = part;
@@ -55,6 +55,7 @@ static PetscErrorCode GatherMesh(HycoReducer t, HycoMesh *mesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Makes the model's probe of these cells and the modes at their nodes. Collective; m: on rank 0. */
 static PetscErrorCode MakeProbe(HycoReducer t, HycoROM m)
 {
   HycoMesh mesh;
@@ -77,12 +78,13 @@ static PetscErrorCode MakeProbe(HycoReducer t, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The number of values of a node or cell; the numbers of the mesh's nodes or cells in the whole mesh. */
+/* The number of values of a node or cell. */
 static PetscInt Width(const Outputs *o, int k)
 {
   return k == STRESS ? o->fe->n_sigma : o->fe->dim;
 }
 
+/* The number of the mesh's nodes or cells, and their numbers in the whole mesh. */
 static PetscInt Places(const Outputs *o, int k, const PetscInt **at)
 {
   *at = k == STRESS ? o->fe->mesh->cell_whole : o->fe->mesh->node_whole;

@@ -258,12 +258,12 @@ PetscErrorCode HycoROMSetProbe(HycoROM m, HycoMesh mesh, PetscReal V[])
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(HycoROMSetUp(m)); /* which otherwise destroys it */
+  ierr = HycoROMSetUp(m); /* which otherwise destroys the probe */
   PetscCall(HycoProbeDestroy(&m->probe));
   PetscCall(PetscNew(&m->probe));
   m->probe->mesh = mesh;
   m->probe->V = V;
-  ierr = Fill(m, m->probe);
+  if (!ierr) ierr = Fill(m, m->probe);
   if (ierr) PetscCall(HycoProbeDestroy(&m->probe));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
