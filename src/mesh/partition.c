@@ -19,14 +19,21 @@ const char *const HycoPartitioners[] = {"metis", "ptscotch", NULL};
 /* The cell graph: cells sharing a facet, plus cells on the two sides of a contact. */
 static PetscErrorCode CellGraph(HycoMesh m, PetscInt n_pairs, const PetscInt pairs[], Graph *graph)
 {
-  idx_t ne = (idx_t)m->n_cells, nn = (idx_t)m->n_nodes, ncommon = (idx_t)m->nf, zero = 0, *eptr, *eind, *x, *a;
+  idx_t ne = (idx_t)m->n_cells, nn = (idx_t)m->n_nodes, zero = 0, *eptr, *eind, *x, *a;
+  idx_t ncommon = (idx_t)(m->mixed ? m->dim : m->nf); /* in a mixed mesh the nodes of the smallest facets */
   PetscInt *start, *around, *extra_of, n_extra = 0;
   idx_t *tie;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(ne + 1, &eptr, m->n_cells * m->nv, &eind));
-  for (idx_t e = 0; e <= ne; e++) eptr[e] = e * (idx_t)m->nv;
-  for (PetscInt k = 0; k < m->n_cells * m->nv; k++) eind[k] = (idx_t)m->cells[k];
+  eptr[0] = 0;
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    PetscInt node[HYCO_CELL_NODES];
+    const PetscInt n = HycoMeshOwnNodes(m, e, node);
+
+    for (PetscInt v = 0; v < n; v++) eind[eptr[e] + v] = (idx_t)node[v];
+    eptr[e + 1] = eptr[e] + (idx_t)n;
+  }
   PetscCheck(METIS_MeshToDual(&ne, &nn, eptr, eind, &ncommon, &zero, &x, &a) == METIS_OK, PETSC_COMM_SELF,
              PETSC_ERR_LIB, "METIS_MeshToDual failed");
   PetscCall(PetscFree2(eptr, eind));

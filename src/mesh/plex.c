@@ -109,7 +109,7 @@ static PetscErrorCode FindShapes(DM dm, PetscInt *shapes)
     while (t < HYCO_N_CELL_TYPES && !IsOf((HycoCellType)t, of, size, ties)) t++;
     HycoCheck(t < HYCO_N_CELL_TYPES,
               "the mesh has cells of DMPlex's type %s; hyco supports segments, triangles, quadrilaterals, tetrahedra, "
-              "pyramids, prisms (tri_prism) and hexahedra",
+              "pyramids, prisms (triangular_prism) and hexahedra",
               DMPolytopeTypes[of]);
     *shapes |= (PetscInt)1 << t;
   }

@@ -5,7 +5,12 @@ import subprocess
 import sys
 import unittest
 
+import numpy as np
+
 from common import PATIENCE, SOURCE, Case
+
+sys.path.insert(0, os.path.join(SOURCE, 'tests', 'verify'))
+from grids import Grid  # noqa: E402
 
 READ = r'''
 import json, sys
@@ -53,6 +58,13 @@ m.cell_tags = {-1: ['soft', 'all'], -2: ['stiff', 'all'], -3: ['foot']}
 m.point_tags = {}
 m.write('m.med')
 """
+MIXED = r"""
+import json, meshio, numpy as np, pyvista
+def of(g):
+    size = np.asarray(g.compute_cell_sizes().cell_data['Volume'])
+    return [{str(t): int(n) for t, n in zip(*np.unique(g.celltypes, return_counts=True))}, float(size.sum()), float(size.min())]
+print(json.dumps({'vtkhdf': of(pyvista.read('m.vtkhdf')), 'xdmf': of(pyvista.from_meshio(meshio.read('m.xdmf')))}))
+"""
 ONE = {'pellet': '4.06,1', 'blocks': '0.05,0.05'}
 
 
@@ -90,6 +102,23 @@ class Ecosystem(Case):
         self.near(ring['vtkhdf'][-1], path['u_norm2'], 1e-9, 'displacement at the end')
         self.near(ring['pyvista_xdmf'], ring['vtkhdf'][-1], 1e-9, 'displacement at the end, XDMF by pyvista')
 
+
+    def test_mixed(self):
+        """A block of hexahedra, prisms, pyramids and tetrahedra: each program reads every cell with its own type, and the block's volume."""
+        grid = Grid()
+        grid.mixed([np.linspace(0, 1, 5), np.linspace(0, 1, 5), np.linspace(0, 2, 3)], lambda x: x, 'block', {'z0': 'foot', 'z1': 'top'},
+                   lambda c: 'tet4' if max(c) < 2 else 'halves' if min(c[:2]) >= 2 else 'whole')
+        grid.write(self.path('m.msh'))
+        with open(self.path('m.yaml'), 'w', encoding='ascii') as f:
+            f.write('scene: {mesh: m.msh, parameters: [p]}\nparameter: {p: {range: [1, 2]}}\nbody: {block: {young: 1}}\nfixed: {foot: {x: 0, y: 0, z: 0}}\npressure: {top: p}\n')
+        for ending in ('xdmf', 'vtkhdf'):
+            self.hyco('solve', '-scene', 'm.yaml', '-mu', '1', '-output', f'm.{ending}', ranks=2)
+        run = subprocess.run([self.python, '-c', MIXED], cwd=self.folder, capture_output=True, text=True, timeout=100 * PATIENCE)
+        self.assertEqual(run.returncode, 0, run.stderr)
+        for name, (counts, volume, least) in json.loads(run.stdout.splitlines()[-1]).items():
+            self.assertEqual(counts, {'10': 32, '12': 16, '13': 16, '14': 8}, name)
+            self.near(volume, 2, 1e-12, name)
+            self.assertGreater(least, 0, name)
 
     def convert(self, name, *args):
         """The report of scripts/convert on a mesh written by meshio: {group: (count, kind)}."""

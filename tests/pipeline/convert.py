@@ -176,6 +176,27 @@ class Convert(Case):
                     for c in range(3):
                         self.assertAlmostEqual(report['loads']['force'][c], push[c] + (6 * volume if c == 0 else 0), places=12)
 
+    def test_several_types(self):
+        """A prism and a pyramid in Abaqus's order: pressure on each side S1, S2, ... has the resultant of that side, gravity that of the volume; quadrilaterals
+        and triangles in one set."""
+        prism, pyramid = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (0, 1, 1)], [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (.5, .5, 1)]
+        for kind, places, volume, pushes in (('C3D6', prism, 1 / 2, ((0, 0, .5), (0, 0, -.5), (0, 1, 0), (-1, -1, 0), (1, 0, 0))),
+                                             ('C3D5', pyramid, 1 / 3, ((0, 0, 1), (0, .5, -.25), (-.5, 0, -.25), (0, -.5, -.25), (.5, 0, -.25)))):
+            text = '*Node\n' + ''.join(f'{k}, {x}, {y}, {z}\n' for k, (x, y, z) in enumerate(places, 1))
+            text += f'*Element, type={kind}, elset=body\n1, {", ".join(str(k + 1) for k in range(len(places)))}\n'
+            text += ''.join(f'*Surface, type=ELEMENT, name=side{k}\n1, S{k}\n' for k in range(1, 6)) + '*Nset, nset=foot\n1, 2, 3\n'
+            self.assertEqual(self.convert('one.inp', text)['BODY'], (1, {'C3D6': 'prism6', 'C3D5': 'pyramid5'}[kind]))
+            for k, push in enumerate(pushes, 1):
+                with open(self.path('scene.yaml'), 'w', encoding='ascii') as f:
+                    f.write(f'scene: {{mesh: m.msh}}\nbody: {{BODY: {{young: 100, density: 3}}}}\nfixed: {{FOOT: {{x: 0, y: 0, z: 0}}}}\ngravity: {{x: 2}}\npressure: {{SIDE{k}: 1}}\n')
+                report = self.hyco('solve', '-scene', 'scene.yaml')
+                with self.subTest(kind=kind, side=k):
+                    for c in range(3):
+                        self.assertAlmostEqual(report['loads']['force'][c], push[c] + (6 * volume if c == 0 else 0), places=12)
+        self.convert('flat.inp', FLAT.replace('2, 2, 3, 6, 5', '*Element, type=CPE3\n2, 2, 3, 6\n3, 2, 6, 5').replace('1, 2, 1\n', '1, 3, 1\n'))
+        report = self.checked('scene: {mesh: m.msh}\nbody: {ALL: {young: 100}}\nfixed: {FOOT: {x: 0, y: 0}}\n')
+        self.assertEqual(report['cell_types'], {'tri3': 2, 'quad4': 1})
+
     def test_refused(self):
         for name, text, words in (('a.inp', FLAT.replace('CPE4', 'C3D15'), 'elements of type C3D15'), ('g.inp', FLAT.replace('CPE4', 'CPE8R'), 'element 1 of type CPE8R has 4 nodes; 8 are expected'), ('b.inp', '*Heading\n', 'has no cells'),
                                   ('c.inp', FLAT.replace('1, 1, 2, 5, 4', '1, 1, 2, 5, 44'), 'is not as such a file should be'),
