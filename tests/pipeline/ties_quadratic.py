@@ -89,6 +89,20 @@ class TiesQuadratic(Case):
                 f'fixed: {{left: {{x: 0}}, {held}}}\ntraction: {{right: {{x: {E * k}*y}}}}\ntie: {{glue: {{slave: under, master: over}}}}\n')
         return self.written(text, second(grid, kind)), E * k * k * length / 24
 
+    def test_tolerance(self):
+        """The default is a tenth of the shortest edge between corners: bodies that are 0.09 of it apart are tied, at 0.11 the distance is named."""
+        for kind, dim in KINDS.items():
+            last = 'xyz'[dim - 1]
+            for apart in (0.09, 0.11):
+                grid, cut = Grid(), np.linspace(0, 1, 3)
+                grid.box(LINEAR[kind], [cut] * dim, lambda x: x, 'low', {f'{last}0': 'base', f'{last}1': 'over'})
+                grid.box(LINEAR[kind], [cut] * (dim - 1) + [1 + 0.5 * apart + cut], lambda x: x, 'high', {f'{last}0': 'under', f'{last}1': 'top'})
+                text = f'scene: {{mesh: mesh.msh}}\nbody: {{low: {{young: {E}}}, high: {{young: {E}}}}}\nfixed: {{base: {{x: 0, y: 0{", z: 0" if dim == 3 else ""}}}}}\npressure: {{top: 1}}\n'
+                run = self.run_raw('solve', '-scene', self.written(text + GLUE.replace('SLAVE', 'under').replace('MASTER', 'over'), second(grid, kind)))
+                with self.subTest(kind=kind, apart=apart):
+                    self.assertEqual(run.returncode, int(apart > 0.1), run.stderr)
+                    self.assertEqual('0.055 away' in run.stderr, apart > 0.1, run.stderr)
+
     def test_coarse(self):
         """check names a tie whose slave is coarser, by the ratio of the facets."""
         for kind, low, high, warned in (('quad8', 4, 2, 1), ('quad8', 2, 4, 0), ('tet10', 2, 1, 1), ('hex27', 2, 2, 0)):
