@@ -172,6 +172,22 @@ class TiesQuadratic(Case):
                     self.assertLess(abs(errors['finer', n] / errors['one', n] - 1), 0.02)
                 self.assertGreater(errors['finer', 2] / errors['finer', 4], 12)
 
+    def test_rigid(self):
+        """Rings that their meshes cut differently: held at the bore, a turn moves both without strain, because tied nodes are moved onto the facets."""
+        for kind, dim in KINDS.items():
+            self.rings(kind, (2, 3), (2, 4))
+            text = (f'scene: {{mesh: mesh.msh}}\nbody: {{a: {{young: {E}}}, b: {{young: {E}}}}}\nfixed: {{bore: {{x: 0.1 - 0.02*y, y: 0.02*x{", z: 0.3" if dim == 3 else ""}}}}}\n'
+                    + GLUE.replace('SLAVE', 'in').replace('MASTER', 'out'))
+            with open(self.path('scene.yaml'), 'w', encoding='utf-8') as f:
+                f.write(text)
+            found = self.hyco('solve', '-scene', self.folder, '-output', 'out.xdmf', ranks=2 if dim == 2 else 3)
+            with self.subTest(kind=kind):
+                self.assertLess(found['strain_energy'], 1e-23)
+                x, u = self.fields('mesh/xyz', 'nodes/displacement')
+                rim = np.hypot(x[:, 0], x[:, 1]) > 2.9
+                self.assertGreater(rim.sum(), 8)
+                np.testing.assert_allclose(u[rim, :2], np.stack([0.1 - 0.02 * x[rim, 1], 0.02 * x[rim, 0]], -1), atol=1e-12)
+
     def blocks(self, kind, n, m, seat=()):
         """Two boxes side by side, n cells (left) and m cells (right) on their common side; with the lines of a mesh below them."""
         dim, grid = KINDS[kind], Grid()
