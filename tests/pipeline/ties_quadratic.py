@@ -89,6 +89,20 @@ class TiesQuadratic(Case):
                 f'fixed: {{left: {{x: 0}}, {held}}}\ntraction: {{right: {{x: {E * k}*y}}}}\ntie: {{glue: {{slave: under, master: over}}}}\n')
         return self.written(text, second(grid, kind)), E * k * k * length / 24
 
+    def test_tolerance(self):
+        """The default is a tenth of the shortest edge between corners: bodies that are 0.09 of it apart are tied, at 0.11 the distance is named."""
+        for kind, dim in KINDS.items():
+            last = 'xyz'[dim - 1]
+            for apart in (0.09, 0.11):
+                grid, cut = Grid(), np.linspace(0, 1, 3)
+                grid.box(LINEAR[kind], [cut] * dim, lambda x: x, 'low', {f'{last}0': 'base', f'{last}1': 'over'})
+                grid.box(LINEAR[kind], [cut] * (dim - 1) + [1 + 0.5 * apart + cut], lambda x: x, 'high', {f'{last}0': 'under', f'{last}1': 'top'})
+                text = f'scene: {{mesh: mesh.msh}}\nbody: {{low: {{young: {E}}}, high: {{young: {E}}}}}\nfixed: {{base: {{x: 0, y: 0{", z: 0" if dim == 3 else ""}}}}}\npressure: {{top: 1}}\n'
+                run = self.run_raw('solve', '-scene', self.written(text + GLUE.replace('SLAVE', 'under').replace('MASTER', 'over'), second(grid, kind)))
+                with self.subTest(kind=kind, apart=apart):
+                    self.assertEqual(run.returncode, int(apart > 0.1), run.stderr)
+                    self.assertEqual('0.055 away' in run.stderr, apart > 0.1, run.stderr)
+
     def test_coarse(self):
         """check names a tie whose slave is coarser, by the ratio of the facets."""
         for kind, low, high, warned in (('quad8', 4, 2, 1), ('quad8', 2, 4, 0), ('tet10', 2, 1, 1), ('hex27', 2, 2, 0)):
@@ -157,6 +171,22 @@ class TiesQuadratic(Case):
                 for n in (2, 4):
                     self.assertLess(abs(errors['finer', n] / errors['one', n] - 1), 0.02)
                 self.assertGreater(errors['finer', 2] / errors['finer', 4], 12)
+
+    def test_rigid(self):
+        """Rings that their meshes cut differently: held at the bore, a turn moves both without strain, because tied nodes are moved onto the facets."""
+        for kind, dim in KINDS.items():
+            self.rings(kind, (2, 3), (2, 4))
+            text = (f'scene: {{mesh: mesh.msh}}\nbody: {{a: {{young: {E}}}, b: {{young: {E}}}}}\nfixed: {{bore: {{x: 0.1 - 0.02*y, y: 0.02*x{", z: 0.3" if dim == 3 else ""}}}}}\n'
+                    + GLUE.replace('SLAVE', 'in').replace('MASTER', 'out'))
+            with open(self.path('scene.yaml'), 'w', encoding='utf-8') as f:
+                f.write(text)
+            found = self.hyco('solve', '-scene', self.folder, '-output', 'out.xdmf', ranks=2 if dim == 2 else 3)
+            with self.subTest(kind=kind):
+                self.assertLess(found['strain_energy'], 1e-23)
+                x, u = self.fields('mesh/xyz', 'nodes/displacement')
+                rim = np.hypot(x[:, 0], x[:, 1]) > 2.9
+                self.assertGreater(rim.sum(), 8)
+                np.testing.assert_allclose(u[rim, :2], np.stack([0.1 - 0.02 * x[rim, 1], 0.02 * x[rim, 0]], -1), atol=1e-12)
 
     def blocks(self, kind, n, m, seat=()):
         """Two boxes side by side, n cells (left) and m cells (right) on their common side; with the lines of a mesh below them."""
