@@ -6,23 +6,10 @@
 #include "curved.h"
 #include <hycovector.h>
 
-#define LEAF 4
 /* A smaller weight is round-off of a projection onto an edge or a node. */
 #define SNAP 1e-12
 /* Share of the coordinates' size: more than the round-off of a distance. */
 #define ROUND_OFF 1e-14
-
-typedef struct {
-  PetscReal lo[3], hi[3];
-} Box;
-
-struct _n_HycoPatches {
-  const PetscReal *X, *normal; /* borrowed, like node */
-  PetscInt n, nf, corners;
-  const PetscInt *node;
-  HycoPoint *item; /* the patches' centres, in the order of the leaves */
-  Box *box;        /* of tree node t; its children are 2 t + 1 and 2 t + 2 */
-};
 
 /* Whether p comes before q along an axis. */
 static PetscBool Before(const HycoPoint *p, const HycoPoint *q, PetscInt axis)
@@ -72,7 +59,7 @@ static HycoCurved Curved(HycoPatches s, PetscInt patch)
 }
 
 /* A box that contains a patch. */
-static void Enclose(HycoPatches s, PetscInt patch, Box *b)
+static void Enclose(HycoPatches s, PetscInt patch, HycoBox *b)
 {
   const PetscInt *node = s->node + patch * s->nf;
 
@@ -91,10 +78,26 @@ static void Enclose(HycoPatches s, PetscInt patch, Box *b)
   }
 }
 
+/* The box of the vectors v of the points item[0 .. n). */
+static HycoBox VectorBox(PetscInt n, const HycoPoint item[], const PetscReal v[])
+{
+  HycoBox b;
+
+  for (PetscInt c = 0; c < 3; c++) {
+    b.lo[c] = PETSC_MAX_REAL;
+    b.hi[c] = PETSC_MIN_REAL;
+    for (PetscInt k = 0; k < n; k++) {
+      b.lo[c] = PetscMin(b.lo[c], v[3 * item[k].index + c]);
+      b.hi[c] = PetscMax(b.hi[c], v[3 * item[k].index + c]);
+    }
+  }
+  return b;
+}
+
 /* Builds box t of the items lo .. hi - 1, split at the median of the centres along its longest side. */
 static void Build(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi)
 {
-  Box *b = &s->box[t];
+  HycoBox *b = &s->box[t];
   PetscInt axis = 0;
 
   for (PetscInt c = 0; c < 3; c++) {
@@ -102,7 +105,7 @@ static void Build(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi)
     b->hi[c] = PETSC_MIN_REAL;
   }
   for (PetscInt k = lo; k < hi; k++) {
-    Box one;
+    HycoBox one;
 
     Enclose(s, s->item[k].index, &one);
     for (PetscInt c = 0; c < 3; c++) {
@@ -111,7 +114,8 @@ static void Build(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi)
     }
   }
   for (PetscInt c = 1; c < 3; c++) axis = b->hi[c] - b->lo[c] > b->hi[axis] - b->lo[axis] ? c : axis;
-  if (hi - lo <= LEAF) return;
+  if (s->turn) s->turn[t] = VectorBox(hi - lo, s->item + lo, s->normal);
+  if (hi - lo <= HYCO_LEAF) return;
   HycoPointsSplit(s->item, lo, (lo + hi) / 2, hi, axis);
   Build(s, 2 * t + 1, lo, (lo + hi) / 2);
   Build(s, 2 * t + 2, (lo + hi) / 2, hi);
@@ -131,9 +135,10 @@ PetscErrorCode HycoPatchesCreate(const PetscReal X[], PetscInt n, PetscInt nf, P
   s->nf = nf;
   s->corners = corners;
   s->node = node;
-  for (PetscInt most = n; most > LEAF; most = (most + 1) / 2) boxes = 2 * boxes + 1;
+  for (PetscInt most = n; most > HYCO_LEAF; most = (most + 1) / 2) boxes = 2 * boxes + 1;
   PetscCall(PetscMalloc1(n, &s->item));
   PetscCall(PetscMalloc1(boxes, &s->box));
+  if (nf == 1 && normal) PetscCall(PetscMalloc1(boxes, &s->turn));
   for (PetscInt k = 0; k < n; k++) {
     s->item[k].index = k;
     for (PetscInt c = 0; c < 3; c++) {
@@ -152,6 +157,7 @@ PetscErrorCode HycoPatchesDestroy(HycoPatches *patches)
   if (!*patches) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree((*patches)->item));
   PetscCall(PetscFree((*patches)->box));
+  PetscCall(PetscFree((*patches)->turn));
   PetscCall(PetscFree(*patches));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -264,7 +270,7 @@ static PetscReal OnPatch(HycoPatches s, PetscInt patch, const PetscReal x[3], Pe
   return best;
 }
 
-static PetscReal BoxDistance2(const Box *b, const PetscReal x[3])
+static PetscReal BoxDistance2(const HycoBox *b, const PetscReal x[3])
 {
   PetscReal sum = 0;
 
@@ -309,7 +315,7 @@ static void Search(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi, Query *q
   PetscBool right;
 
   if (BoxDistance2(&s->box[t], q->x) > q->limit) return;
-  if (hi - lo > LEAF) {
+  if (hi - lo > HYCO_LEAF) {
     right = (PetscBool)(BoxDistance2(&s->box[2 * t + 2], q->x) < BoxDistance2(&s->box[2 * t + 1], q->x));
     for (PetscInt child = 0; child < 2; child++, right = (PetscBool)!right)
       Search(s, 2 * t + 1 + right, right ? mid : lo, right ? hi : mid, q);

@@ -21,7 +21,20 @@ typedef struct {
 /* Rearranges the points lo .. hi - 1 so that those before `mid` come first along the axis. */
 void HycoPointsSplit(HycoPoint point[], PetscInt lo, PetscInt mid, PetscInt hi, PetscInt axis);
 
+/* The tree of the patches: its nodes are boxes; those of at most HYCO_LEAF patches have no children. */
+#define HYCO_LEAF 4
+typedef struct {
+  PetscReal lo[3], hi[3];
+} HycoBox;
 typedef struct _n_HycoPatches *HycoPatches;
+struct _n_HycoPatches {
+  const PetscReal *X, *normal; /* borrowed, like node */
+  PetscInt n, nf, corners;
+  const PetscInt *node;
+  HycoPoint *item; /* the patches' centres, in the order of the leaves */
+  HycoBox *box;    /* of tree node t; its children are 2 t + 1 and 2 t + 2 */
+  HycoBox *turn;   /* the normals of its points; NULL: no points with normals */
+};
 
 /* n patches of nf nodes each, the first `corners` of them corners: with nf = corners 1 points, 2 segments, 3 triangles,
    4 bilinear quadrilaterals; else facets of second order (2, 3 or 4 corners). X: coordinates of nodes; normal (n x 3,
@@ -33,5 +46,10 @@ PetscErrorCode HycoPatchesDestroy(HycoPatches *patches);
 /* The patches' point nearest to x; among equally near ones that of the first patch, so that the result is the same
    with any more patches that are farther away. against: a unit normal that the patch must oppose, or NULL. */
 void HycoPatchesProject(HycoPatches patches, const PetscReal x[3], const PetscReal against[3], HycoProjection *p);
+/* For points (nf = 1) with normals: the one closest to the line through x along the mean of the unit normal `out` and
+   of its own reversed; among equally close ones the nearest to x, then the first. n = 0 if none is within `small` of
+   its line; points without a normal, or with nearly the same one, have no line. */
+void HycoPatchesAlong(HycoPatches patches, const PetscReal x[3], const PetscReal out[3], PetscReal small,
+                      HycoProjection *p);
 
 #endif

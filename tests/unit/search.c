@@ -1,7 +1,8 @@
 /* The search for masters: the answers of several ranks are those of one to the bit, and those without a tree; the work
-   is divided; an error on one rank is raised on all. */
+   is divided; an error on one rank is raised on all. Pairs along the normals. */
 #include "check.h"
 #include "partners.h"
+#include <hycovector.h>
 
 #define MOST_PATCHES 5000
 #define N_SLAVES     1500
@@ -181,6 +182,60 @@ static PetscErrorCode TestDivided(Surfaces *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Of all points, the one closest to the line along the mean of both normals. */
+static PetscInt FindAlong(const Surfaces *s, const PetscReal x[3], const PetscReal out[3], PetscReal small)
+{
+  PetscReal least = small * small;
+  PetscInt found = -1;
+
+  for (PetscInt k = 0; k < s->t.n; k++) {
+    const PetscReal *n = s->normal + 3 * k, *X = s->X + 3 * s->node[k];
+    const PetscReal r[3] = {X[0] - x[0], X[1] - x[1], X[2] - x[2]};
+    const PetscReal mean[3] = {out[0] - n[0], out[1] - n[1], out[2] - n[2]};
+    const PetscReal along = HycoDot(r, mean), mm = HycoDot(mean, mean);
+    const PetscReal off = PetscMax(HycoDot(r, r) - along * along / mm, 0);
+
+    if (mm < 1e-2 || off > least) continue;
+    least = off;
+    found = k;
+  }
+  return found;
+}
+
+/* Pairs along the normals of two tubes, whatever their distance: as without a tree. */
+static PetscErrorCode TestAlong(Surfaces *s)
+{
+  HycoPatches tube;
+  PetscInt n_found = 0;
+
+  PetscFunctionBegin;
+  memset(s, 0, sizeof(*s));
+  s->t = (HycoPartners){.nf = 1};
+  for (PetscInt k = 0; k < MOST_PATCHES; k++) {
+    const PetscReal turn = 3 * Draw(&state), n[3] = {PetscCosReal(turn), PetscSinReal(turn), 0.1 * Draw(&state)};
+
+    AddNode(s, 5 * n[0] + 0.1 * Draw(&state), 5 * n[1], 20 * Draw(&state));
+    AddPatch(s, k, 0, 0, 0, 0);
+    for (PetscInt c = 0; c < 3; c++) s->normal[3 * k + c] = -n[c];
+    HycoNormalise(s->normal + 3 * k);
+  }
+  PetscCall(HycoPatchesCreate(s->X, s->t.n, 1, 1, s->node, s->normal, &tube));
+  for (PetscInt k = 0; k < 300; k++) {
+    const PetscReal turn = 3 * Draw(&state), out[3] = {PetscCosReal(turn), PetscSinReal(turn), 0};
+    const PetscReal x[3] = {4 * out[0], 4 * out[1], 20 * Draw(&state)};
+    const PetscInt right = FindAlong(s, x, out, 0.2);
+    HycoProjection at;
+
+    HycoPatchesAlong(tube, x, out, 0.2, &at);
+    CHECK(at.n == (right >= 0) && (!at.n || at.patch == right), "point %d, without a tree %d", (int)at.patch,
+          (int)right);
+    n_found += at.n;
+  }
+  CHECK(n_found > 100 && n_found < 300, "%d of 300 have a point", (int)n_found);
+  PetscCall(HycoPatchesDestroy(&tube));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode (*malloc_of_petsc)(size_t, PetscBool, int, const char[], const char[], void **);
 
 /* Without memory for more than a few kB. */
@@ -228,6 +283,7 @@ static PetscErrorCode Test(void)
   PetscCall(PetscNew(&s));
   PetscCall(TestSame(s));
   PetscCall(TestDivided(s));
+  PetscCall(TestAlong(s));
   PetscCall(TestError(s));
   PetscCall(PetscFree(s));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -23,32 +23,6 @@ static PetscErrorCode AreMatched(HycoMesh m, PetscInt n, const HycoProjection at
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The master node closest to the line through a slave node along the mean of both normals: this matches mirrored
-   surfaces at any distance. n = 0 if it is farther than `small` from that line. */
-static void ProjectAlong(const HycoPartners *t, PetscInt slave, PetscReal small, HycoProjection *at)
-{
-  const PetscReal *out = HycoPartnersOutward(t, slave);
-  PetscReal best = small * small;
-
-  at->n = 0;
-  for (PetscInt j = 0; out && j < t->n; j++) {
-    const PetscReal *n = t->normal + 3 * j;
-    const HycoProjection here = {1, {t->node[j]}, j, {1}, 0};
-    PetscReal r[3], mean[3], rr, mm, off;
-
-    for (PetscInt c = 0; c < 3; c++) mean[c] = out[c] - n[c];
-    mm = HycoDot(mean, mean);
-    if (HycoDot(n, n) == 0 || mm < 1e-2) continue; /* no direction */
-    HycoPartnersAcross(t, slave, &here, r);
-    rr = HycoDot(r, r);
-    off = PetscMax(rr - HycoDot(r, mean) * HycoDot(r, mean) / mm, 0);
-    if (off > best || (off == best && at->n && rr >= at->distance * at->distance)) continue;
-    best = off;
-    *at = here;
-    at->distance = PetscSqrtReal(rr);
-  }
-}
-
 /* The largest distance of a pair's nodes along their normals: as given; else any, if the surfaces touch somewhere. */
 static PetscReal Farthest(PetscReal stated, const HycoMatch *m)
 {
@@ -75,7 +49,8 @@ static PetscErrorCode MatchAlong(HycoPartners *t, HycoContact c, HycoMatch *m)
     const PetscReal *out = HycoPartnersOutward(t, m->slave[k]);
     HycoProjection nearest;
 
-    ProjectAlong(t, m->slave[k], m->small, &along[k]);
+    along[k].n = 0; /* this matches mirrored surfaces at any distance */
+    if (out) HycoPatchesAlong(t->patches, t->X + 3 * m->slave[k], out, m->small, &along[k]);
     HycoPartnersProject(t, m->slave[k], PETSC_TRUE, &nearest);
     needs[k] = (PetscBool)(!out || HycoDot(out, t->normal + 3 * nearest.patch) <= HYCO_OPPOSED);
   }
