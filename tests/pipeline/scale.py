@@ -1,4 +1,4 @@
-"""scripts/bench-scale on mesh A and a wavy block: its counts on 1 and 2 ranks, and the model fitted to them; scripts/bench-training on mesh A."""
+"""scripts/bench-scale on mesh A, a wavy block and two blocks: its counts on several ranks, and the model fitted to them; scripts/bench-training on mesh A."""
 import csv
 import os
 import subprocess
@@ -48,6 +48,19 @@ class Scale(Case):
         self.assertLessEqual(int(wavy['most']), 20)
         self.assertLessEqual(int(wavy['sets']), 12)
         self.assertIn('Model, fitted', run.stdout)
+
+    def test_search(self):
+        """Each rank has an equal share of the searches for masters, one a node and position (as drawn, as moved), and on four ranks not the whole master;
+        the iterations are those of one rank. The upper block has 10 x 10 cells, cut into 20 x 20."""
+        self.bench('scale', '--two', '8', '--ranks', '1,4')
+        one, four = self.rows('search')
+        self.assertEqual((one['contacts'], four['contacts'], four['searches']), ('441', '441', '882'))
+        self.assertLessEqual(int(four['searches_rank']), 882 // 4 + 2)
+        self.assertLess(int(four['facets_rank']), int(four['facets']))
+        self.assertEqual(int(four['facets']), 16 * 16)
+        self.assertEqual(one['sets'], four['sets'])
+        self.assertLessEqual(int(four['most']), 20)
+        self.assertLessEqual(float(four['mb_ratio']), 1.25)
 
 
 if __name__ == '__main__':
