@@ -55,6 +55,17 @@ class Case(unittest.TestCase):
         return os.path.join(cls.folder, *names)
 
     @classmethod
+    def written(cls, text, mesh=None):
+        """The folder, with the scene and its mesh.msh (a Grid, or the arguments of msh() after the path)."""
+        if hasattr(mesh, 'write'):
+            mesh.write(cls.path('mesh.msh'))
+        elif mesh:
+            msh(cls.path('mesh.msh'), *mesh)
+        with open(cls.path('scene.yaml'), 'w', encoding='utf-8') as f:
+            f.write(text)
+        return cls.folder
+
+    @classmethod
     def changed(cls, name, text, changes):
         """The path of a file with the text, in which each (old, new) of the changes is replaced; every old one must be there."""
         for old, new in changes:

@@ -12,11 +12,6 @@ class Constants(Case):
         with open(os.path.join(BLOCKS, 'scene.yaml'), encoding='utf-8') as f:
             self.text = f.read().replace('mesh: blocks.msh', f'mesh: {BLOCKS}/blocks.msh')
 
-    def written(self, text):
-        with open(self.path('scene.yaml'), 'w', encoding='utf-8') as f:
-            f.write(text)
-        return self.folder
-
     def named(self):
         text = self.text.replace('young: 2e5', 'young: 2*soft').replace('young: 1e5', 'young: soft').replace('{y: -press}', '{y: -down}')
         text = text.replace('  block_sym: {x: 0}\n', '').replace('foundation_sym: {x: 0}', '"block_sym,foundation_sym": {x: 0}')

@@ -34,11 +34,6 @@ class Corners(Case):
         grid.box(kind, [np.linspace(0, 1, n + 1)] * dim, lambda x: x @ turn, 'block', {f'{a}{e}': f'{a}{e}' for a in 'xyz'[:dim] for e in '01'})
         grid.write(self.path('mesh.msh'))
 
-    def written(self, text):
-        with open(self.path('scene.yaml'), 'w', encoding='utf-8') as f:
-            f.write(text)
-        return self.folder
-
     def test_uniform(self):
         """Pressed on the other faces: the contacts have these pressures, the corner node its share of each face."""
         n = 4

@@ -35,13 +35,6 @@ def turning(dim, degrees):
 
 
 class Oblique(Case):
-    def written(self, text, grid=None):
-        if grid:
-            grid.write(self.path('mesh.msh'))
-        with open(self.path('scene.yaml'), 'w', encoding='utf-8') as f:
-            f.write(text)
-        return self.folder
-
     def box(self, kind, turn, heights=(0, 2), names=('block',)):
         dim, grid = KINDS[kind], Grid()
         for lo, name in zip(heights, names):

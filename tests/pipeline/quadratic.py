@@ -26,13 +26,6 @@ output: {hold: {reaction: y, group: base}, low: {min: u_y}}
 
 
 class Quadratic(Case):
-    def written(self, text, mesh=None):
-        if mesh:
-            msh(self.path('mesh.msh'), *mesh)
-        with open(self.path('scene.yaml'), 'w', encoding='utf-8') as f:
-            f.write(text)
-        return self.folder
-
     def displaced(self):
         with h5py.File(self.path('out.h5')) as f:
             return f['mesh/xyz'][()], f['nodes/displacement'][()]

@@ -30,11 +30,6 @@ class Revolution(Case):
             grid.box('quad4', [r, np.linspace(0, 4, 17)], lambda x: x, body, {**faces, 'y0': 'middle'})
         grid.write(cls.path('mesh.msh'))
 
-    def written(self, text):
-        with open(self.path('scene.yaml'), 'w', encoding='utf-8') as f:
-            f.write(text)
-        return self.folder
-
     def test_models(self):
         """Every type of model, compared with full order at points that were not used for training."""
         scene = self.written(SCENE)

@@ -27,13 +27,6 @@ output: {hold: {reaction: y, group: base}, wall: {reaction: x, group: west}, low
 
 
 class Ties(Case):
-    def written(self, text, grid=None):
-        if grid:
-            grid.write(self.path('mesh.msh'))
-        with open(self.path('scene.yaml'), 'w', encoding='utf-8') as f:
-            f.write(text)
-        return self.folder
-
     def column(self, kind, n, m, bend=lambda x: x):
         """Two unit boxes, one on the other, n and m cells each way."""
         dim, grid = KINDS[kind], Grid()

@@ -6,7 +6,7 @@ import unittest
 import h5py
 import numpy as np
 
-from common import SOURCE, Case, msh
+from common import SOURCE, Case
 
 sys.path.insert(0, os.path.join(SOURCE, 'tests', 'verify'))
 from grids import LINEAR, Grid, second  # noqa: E402
@@ -33,12 +33,6 @@ def polar(nodes):
 
 
 class TiesQuadratic(Case):
-    def written(self, text, mesh):
-        msh(self.path('mesh.msh'), *mesh)
-        with open(self.path('scene.yaml'), 'w', encoding='utf-8') as f:
-            f.write(text)
-        return self.folder
-
     def fields(self, *names):
         with h5py.File(self.path('out.h5')) as f:
             return [f[name][()] for name in names]
