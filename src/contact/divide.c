@@ -116,10 +116,9 @@ static void Halve(HycoTeamPlan *p, PetscInt first, PetscInt mid, PetscInt last)
   HycoPointsSplit(p->slave, first, mid, last, axis);
 }
 
-/* Marks those of n patches (owned) that may contain nearest points of the slaves first .. last - 1, in so many blocks.
- */
+/* Marks those of n patches that may contain nearest points of the slaves first .. last - 1, divided into blocks. */
 static PetscErrorCode MarkNear(HycoTeamPlan *p, PetscInt blocks, PetscInt first, PetscInt last, PetscInt n,
-                               PetscInt *patch)
+                               const PetscInt patch[])
 {
   const PetscInt ends[3] = {first, (first + last) / 2, last};
 
@@ -128,38 +127,40 @@ static PetscErrorCode MarkNear(HycoTeamPlan *p, PetscInt blocks, PetscInt first,
   if (blocks > 1) Halve(p, first, ends[1], last);
   for (PetscInt half = 0; half < 2 && blocks > 1; half++) {
     PetscInt n_near, *near;
+    PetscErrorCode ierr;
 
     PetscCall(FindNear(p, ends[half], ends[half + 1], n, patch, &n_near, &near));
-    PetscCall(MarkNear(p, blocks / 2, ends[half], ends[half + 1], n_near, near));
+    ierr = MarkNear(p, blocks / 2, ends[half], ends[half + 1], n_near, near);
+    PetscCall(PetscFree(near));
+    PetscCall(ierr);
   }
-  PetscCall(PetscFree(patch));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Gives the slaves first .. last - 1 to a rank, with those of n patches (owned) that they may meet. */
+/* Gives the slaves first .. last - 1 to a rank, with those of n patches that they may meet. */
 static PetscErrorCode Assign(HycoTeamPlan *p, PetscMPIInt rank, PetscInt first, PetscInt last, PetscInt n,
-                             PetscInt *patch)
+                             const PetscInt patch[])
 {
-  PetscInt *size = p->size + HYCO_TEAM_SIZES * rank, *list, n_list = 0;
+  PetscInt *size = p->size + HYCO_TEAM_SIZES * rank, n_near = 0;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(n, &list));
-  p->patch[rank] = list;
-  PetscCall(PetscArraycpy(list, patch, n));
   PetscCall(MarkNear(p, BLOCKS, first, last, n, patch));
-  for (PetscInt k = 0; k < n; k++) {
-    if (p->near[list[k]]) list[n_list++] = list[k];
-  }
-  for (PetscInt k = 0; k < n_list; k++) p->near[list[k]] = PETSC_FALSE;
+  for (PetscInt k = 0; k < n; k++) n_near += p->near[patch[k]];
+  PetscCall(PetscMalloc1(n_near, &p->patch[rank]));
   p->first[rank + 1] = last;
   size[0] = last - first;
-  size[1] = n_list;
+  size[1] = n_near;
+  n_near = 0;
+  for (PetscInt k = 0; k < n; k++) {
+    if (p->near[patch[k]]) p->patch[rank][n_near++] = patch[k];
+    p->near[patch[k]] = PETSC_FALSE;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Divides the slaves first .. last - 1, near n patches (owned), over the ranks from .. to - 1. */
+/* Divides the slaves first .. last - 1, near n patches, over the ranks from .. to - 1. */
 static PetscErrorCode Divide(HycoTeamPlan *p, PetscMPIInt from, PetscMPIInt to, PetscInt first, PetscInt last,
-                             PetscInt n, PetscInt *patch)
+                             PetscInt n, const PetscInt patch[])
 {
   const PetscMPIInt ranks[3] = {from, from + (to - from) / 2, to};
   const PetscInt ends[3] = {first, first + (PetscInt)((PetscInt64)(last - first) * (ranks[1] - from) / (to - from)),
@@ -173,11 +174,13 @@ static PetscErrorCode Divide(HycoTeamPlan *p, PetscMPIInt from, PetscMPIInt to, 
   Halve(p, first, ends[1], last);
   for (PetscInt half = 0; half < 2; half++) {
     PetscInt n_near, *near;
+    PetscErrorCode ierr;
 
     PetscCall(FindNear(p, ends[half], ends[half + 1], n, patch, &n_near, &near));
-    PetscCall(Divide(p, ranks[half], ranks[half + 1], ends[half], ends[half + 1], n_near, near));
+    ierr = Divide(p, ranks[half], ranks[half + 1], ends[half], ends[half + 1], n_near, near);
+    PetscCall(PetscFree(near));
+    PetscCall(ierr);
   }
-  PetscCall(PetscFree(patch));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -205,6 +208,7 @@ PetscErrorCode HycoTeamPlanCreate(const HycoPartners *t, PetscInt n, const Petsc
                                   HycoTeamPlan *p)
 {
   PetscInt *all;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   p->t = t;
@@ -225,7 +229,9 @@ PetscErrorCode HycoTeamPlanCreate(const HycoPartners *t, PetscInt n, const Petsc
   }
   for (PetscInt k = 0; k < t->n; k++) all[k] = k;
   SetBalls(p);
-  PetscCall(Divide(p, 0, ranks, 0, n, t->n, all));
+  ierr = Divide(p, 0, ranks, 0, n, t->n, all);
+  PetscCall(PetscFree(all));
+  PetscCall(ierr);
   for (PetscMPIInt r = 0; r < ranks; r++) PetscCall(ListNodes(p, r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

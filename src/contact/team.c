@@ -147,6 +147,23 @@ static PetscErrorCode Help(HycoTeam *team, const Job *job)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Plans a search, divides it, and sorts its answers. */
+static PetscErrorCode Lead(HycoTeam *team, const Job *job, const HycoPartners *t, PetscInt n, const PetscInt slave[],
+                           HycoTeamPlan *plan, Room *room, HycoProjection at[], HycoVerdict why[])
+{
+  PetscMPIInt ranks;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_size(team->comm, &ranks));
+  HycoOnEach(team->comm, HycoTeamPlanCreate(t, n, slave, ranks, plan));
+  PetscCall(Work(team, job, plan, room));
+  for (PetscInt k = 0; k < n; k++) {
+    at[plan->slave[k].index] = room->all[k].at;
+    why[plan->slave[k].index] = room->all[k].why;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoTeamSearch(HycoTeam *team, HycoPartners *t, const HycoQuery *query, PetscInt n,
                               const PetscInt slave[], HycoProjection at[], HycoVerdict why[])
 {
@@ -163,12 +180,7 @@ PetscErrorCode HycoTeamSearch(HycoTeam *team, HycoPartners *t, const HycoQuery *
   job.query = *query;
   team->whole = PetscMax(team->whole, t->n);
   PetscCallMPI(MPI_Bcast(&job, sizeof(job), MPI_BYTE, 0, team->comm));
-  HycoOnEach(team->comm, HycoTeamPlanCreate(t, n, slave, ranks, &plan));
-  ierr = Work(team, &job, &plan, &room);
-  for (PetscInt k = 0; k < n && !ierr; k++) {
-    at[plan.slave[k].index] = room.all[k].at;
-    why[plan.slave[k].index] = room.all[k].why;
-  }
+  ierr = Lead(team, &job, t, n, slave, &plan, &room, at, why);
   PetscCall(HycoTeamPlanDestroy(&plan, ranks));
   PetscCall(RoomDestroy(&room));
   PetscCall(ierr);
