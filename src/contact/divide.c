@@ -23,10 +23,10 @@ void HycoTeamPartSet(HycoTeamPart *p, const PetscInt size[HYCO_TEAM_SIZES], Pets
   p->normal = p->outward + 3 * p->n_slaves;
 }
 
-PetscErrorCode HycoTeamPlanDestroy(HycoTeamPlan *p, PetscMPIInt ranks)
+PetscErrorCode HycoTeamPlanDestroy(HycoTeamPlan *p)
 {
   PetscFunctionBegin;
-  for (PetscMPIInt r = 0; r < ranks && p->patch; r++) {
+  for (PetscMPIInt r = 0; r < p->ranks && p->patch; r++) {
     PetscCall(PetscFree(p->patch[r]));
     PetscCall(PetscFree(p->global[r]));
   }
@@ -212,6 +212,7 @@ PetscErrorCode HycoTeamPlanCreate(const HycoPartners *t, PetscInt n, const Petsc
 
   PetscFunctionBegin;
   p->t = t;
+  p->ranks = ranks;
   p->node = slave;
   PetscCall(PetscCalloc1(HYCO_TEAM_SIZES * ranks, &p->size));
   PetscCall(PetscMalloc1(n, &p->slave));

@@ -25,6 +25,7 @@ static inline PetscInt HycoTeamReals(const PetscInt size[HYCO_TEAM_SIZES])
 /* On rank 0: the division of a search. */
 typedef struct {
   const HycoPartners *t;
+  PetscMPIInt ranks;
   const PetscInt *node;                 /* of the slaves, by their numbers in the search */
   HycoPoint *slave;                     /* the slaves in the order of the ranks */
   PetscReal *centre, *radius, at_least; /* balls around the patches; how far beyond its bound a block searches */
@@ -38,7 +39,7 @@ typedef struct {
 /* Divides n slaves over the ranks. The caller destroys the plan, also after an error. */
 PetscErrorCode HycoTeamPlanCreate(const HycoPartners *t, PetscInt n, const PetscInt slave[], PetscMPIInt ranks,
                                   HycoTeamPlan *p);
-PetscErrorCode HycoTeamPlanDestroy(HycoTeamPlan *p, PetscMPIInt ranks);
+PetscErrorCode HycoTeamPlanDestroy(HycoTeamPlan *p);
 /* A part in the two arrays in which it is sent. */
 void HycoTeamPartSet(HycoTeamPart *p, const PetscInt size[HYCO_TEAM_SIZES], PetscInt integer[], PetscReal real[]);
 /* Fills the arrays of a rank's part; p->seen[] then has the part's number of each of its nodes. */

@@ -51,14 +51,14 @@ typedef struct {
   PetscMPIInt *count, *offset; /* of the answers by rank */
 } Room;
 
-static PetscErrorCode RoomCreate(const Job *job, const HycoTeamPlan *plan, PetscMPIInt ranks, Room *r)
+static PetscErrorCode RoomCreate(const Job *job, const HycoTeamPlan *plan, Room *r)
 {
   PetscInt integers = HycoTeamIntegers(r->size, job->nf), reals = HycoTeamReals(r->size);
 
   PetscFunctionBegin;
-  if (plan) PetscCall(PetscMalloc1(plan->first[ranks], &r->all));
-  if (plan) PetscCall(PetscCalloc2(ranks, &r->count, ranks, &r->offset));
-  for (PetscMPIInt k = 0; plan && k < ranks; k++) {
+  if (plan) PetscCall(PetscMalloc1(plan->first[plan->ranks], &r->all));
+  if (plan) PetscCall(PetscCalloc2(plan->ranks, &r->count, plan->ranks, &r->offset));
+  for (PetscMPIInt k = 0; plan && k < plan->ranks; k++) {
     const PetscInt *size = plan->size + HYCO_TEAM_SIZES * k;
 
     integers = PetscMax(integers, HycoTeamIntegers(size, job->nf));
@@ -83,10 +83,10 @@ static PetscErrorCode RoomDestroy(Room *r)
 }
 
 /* Sends each rank its part; rank 0's own comes last, because all pass through the same arrays. Allocates nothing. */
-static PetscErrorCode Distribute(MPI_Comm comm, const Job *job, HycoTeamPlan *plan, PetscMPIInt ranks, Room *r)
+static PetscErrorCode Distribute(MPI_Comm comm, const Job *job, HycoTeamPlan *plan, Room *r)
 {
   PetscFunctionBegin;
-  for (PetscMPIInt k = ranks - 1; plan && k >= 0; k--) {
+  for (PetscMPIInt k = plan ? plan->ranks - 1 : -1; k >= 0; k--) {
     const PetscInt *size = plan->size + HYCO_TEAM_SIZES * k;
 
     HycoTeamPlanFill(plan, k, r->integer, r->real);
@@ -116,15 +116,13 @@ static PetscErrorCode Collect(MPI_Comm comm, const Room *r)
 /* Divides one search and answers it; plan: on rank 0, else NULL. On an error all ranks return. Collective. */
 static PetscErrorCode Work(HycoTeam *team, const Job *job, HycoTeamPlan *plan, Room *r)
 {
-  PetscMPIInt ranks;
   HycoTeamPart part;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(team->comm, &ranks));
   PetscCallMPI(MPI_Scatter(plan ? plan->size : NULL, HYCO_TEAM_SIZES, MPIU_INT, r->size, HYCO_TEAM_SIZES, MPIU_INT, 0,
                            team->comm));
-  HycoOnEach(team->comm, RoomCreate(job, plan, ranks, r));
-  PetscCall(Distribute(team->comm, job, plan, ranks, r));
+  HycoOnEach(team->comm, RoomCreate(job, plan, r));
+  PetscCall(Distribute(team->comm, job, plan, r));
   HycoTeamPartSet(&part, r->size, r->integer, r->real);
   team->queries += part.n_slaves;
   team->patches = PetscMax(team->patches, part.n_patches);
@@ -170,18 +168,16 @@ PetscErrorCode HycoTeamSearch(HycoTeam *team, HycoPartners *t, const HycoQuery *
   Job job;
   HycoTeamPlan plan = {.t = NULL};
   Room room = {.integer = NULL};
-  PetscMPIInt ranks;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(team->comm, &ranks));
   PetscCall(PetscMemzero(&job, sizeof(job)));
   job.nf = t->nf;
   job.query = *query;
   team->whole = PetscMax(team->whole, t->n);
   PetscCallMPI(MPI_Bcast(&job, sizeof(job), MPI_BYTE, 0, team->comm));
   ierr = Lead(team, &job, t, n, slave, &plan, &room, at, why);
-  PetscCall(HycoTeamPlanDestroy(&plan, ranks));
+  PetscCall(HycoTeamPlanDestroy(&plan));
   PetscCall(RoomDestroy(&room));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -123,6 +123,16 @@ class Convert(Case):
             f.write(scene)
         return self.hyco('check', '-scene', 'scene.yaml')
 
+    def pushed(self, kind, volume, pushes):
+        """A cell with the sides SIDE1, SIDE2, ...: a pressure on each has its resultant, gravity on a density that of the volume."""
+        for k, push in enumerate(pushes, 1):
+            with open(self.path('scene.yaml'), 'w', encoding='ascii') as f:
+                f.write(f'scene: {{mesh: m.msh}}\nbody: {{BODY: {{young: 100, density: 3}}}}\nfixed: {{FOOT: {{x: 0, y: 0, z: 0}}}}\ngravity: {{x: 2}}\npressure: {{SIDE{k}: 1}}\n')
+            report = self.hyco('solve', '-scene', 'scene.yaml')
+            with self.subTest(kind=kind, side=k):
+                for c in range(3):
+                    self.assertAlmostEqual(report['loads']['force'][c], push[c] + (6 * volume if c == 0 else 0), places=12)
+
     def test_flat(self):
         self.assertEqual(self.convert('flat.inp', FLAT),
                          {'ALL': (2, 'quad4'), 'FIRST': (1, 'quad4'), 'FOOT': (2, 'line2'), 'TOP': (2, 'line2'), '_OUTER_SKIN_': (6, 'line2'),
@@ -168,13 +178,7 @@ class Convert(Case):
             text += ''.join(f'*Surface, type=ELEMENT, name=side{k}\n1, S{k}\n' for k in range(1, len(pushes) + 1)) + '*Nset, nset=foot\n1, 2, 3\n'
             groups = self.convert('second.inp', text)
             self.assertEqual(groups['BODY'], (1, {'C3D20R': 'hex20', 'C3D10': 'tet10'}[kind]))
-            for k, push in enumerate(pushes, 1):
-                with open(self.path('scene.yaml'), 'w', encoding='ascii') as f:
-                    f.write(f'scene: {{mesh: m.msh}}\nbody: {{BODY: {{young: 100, density: 3}}}}\nfixed: {{FOOT: {{x: 0, y: 0, z: 0}}}}\ngravity: {{x: 2}}\npressure: {{SIDE{k}: 1}}\n')
-                report = self.hyco('solve', '-scene', 'scene.yaml')
-                with self.subTest(kind=kind, side=k):
-                    for c in range(3):
-                        self.assertAlmostEqual(report['loads']['force'][c], push[c] + (6 * volume if c == 0 else 0), places=12)
+            self.pushed(kind, volume, pushes)
 
     def test_several_types(self):
         """A prism and a pyramid in Abaqus's order: pressure on each side S1, S2, ... has the resultant of that side, gravity that of the volume; quadrilaterals
@@ -186,13 +190,7 @@ class Convert(Case):
             text += f'*Element, type={kind}, elset=body\n1, {", ".join(str(k + 1) for k in range(len(places)))}\n'
             text += ''.join(f'*Surface, type=ELEMENT, name=side{k}\n1, S{k}\n' for k in range(1, 6)) + '*Nset, nset=foot\n1, 2, 3\n'
             self.assertEqual(self.convert('one.inp', text)['BODY'], (1, {'C3D6': 'prism6', 'C3D5': 'pyramid5'}[kind]))
-            for k, push in enumerate(pushes, 1):
-                with open(self.path('scene.yaml'), 'w', encoding='ascii') as f:
-                    f.write(f'scene: {{mesh: m.msh}}\nbody: {{BODY: {{young: 100, density: 3}}}}\nfixed: {{FOOT: {{x: 0, y: 0, z: 0}}}}\ngravity: {{x: 2}}\npressure: {{SIDE{k}: 1}}\n')
-                report = self.hyco('solve', '-scene', 'scene.yaml')
-                with self.subTest(kind=kind, side=k):
-                    for c in range(3):
-                        self.assertAlmostEqual(report['loads']['force'][c], push[c] + (6 * volume if c == 0 else 0), places=12)
+            self.pushed(kind, volume, pushes)
         self.convert('flat.inp', FLAT.replace('2, 2, 3, 6, 5', '*Element, type=CPE3\n2, 2, 3, 6\n3, 2, 6, 5').replace('1, 2, 1\n', '1, 3, 1\n'))
         report = self.checked('scene: {mesh: m.msh}\nbody: {ALL: {young: 100}}\nfixed: {FOOT: {x: 0, y: 0}}\n')
         self.assertEqual(report['cell_types'], {'tri3': 2, 'quad4': 1})

@@ -7,6 +7,7 @@ import h5py
 import numpy as np
 
 from common import SOURCE, Case
+from ties import pulled_evenly
 
 sys.path.insert(0, os.path.join(SOURCE, 'tests', 'verify'))
 from grids import LINEAR, Grid, second  # noqa: E402
@@ -62,13 +63,7 @@ class TiesQuadratic(Case):
             for low, high, ranks in ((2, 2, 2), (1, 3, 0), (2, 4 if kind == 'tet10' else (0, 0.3, 0.5, 0.6, 1), 3)):
                 scene, energy = self.pulled(kind, low, high)
                 with self.subTest(kind=kind, low=low, high=high):
-                    found = self.hyco('solve', '-scene', scene, '-output', 'out.xdmf', ranks=ranks)
-                    self.solved(found)
-                    self.assertLess(found['balance'], 1e-12)
-                    self.near(found['strain_energy'], energy, 1e-12)
-                    self.near(found['outputs']['pull'], 1.5, 1e-12)
-                    x, u = self.fields('mesh/xyz', 'nodes/displacement')
-                    np.testing.assert_allclose(u[:, dim - 1], -1.5 / E * x[:, dim - 1], atol=1e-13)
+                    pulled_evenly(self, scene, energy, dim, ranks, 1e-13)
 
     def beam(self, kind, low, high, k=0.01, length=3):
         """A beam in pure bending that is cut across; low, high: cells in its height on both sides of the cut. Its strain energy."""
