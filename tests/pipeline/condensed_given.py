@@ -192,6 +192,19 @@ class Given(Case):
         self.bounded(self.beam(), ('height', 'modulus', 'push'), ((0.8, 1.2), (1, 3), (1, 2)), '-values_height',
                      '0.8,0.9,1,1.1,1.2', '-values_modulus', '1,1.4,1.9,2.4,3', '-values_push', '1,2')
 
+    def test_held_out(self):
+        """Where no parameter affects the stiffness, the responses are evaluated once, and are those of the model as it is set up again to judge
+        it and to predict: u at held-out points as the parameters' exact sums give it, to the modes' tolerance."""
+        scene = self.write('held.yaml', BEAM.replace('height, modulus, push', 'modulus, push').replace('*modulus*', '*1.7*').replace('/modulus', '/1.7')
+                           .replace('  height: {range: [0.8, 1.2]}\n', '').replace(', map: {y: y*height}', '').replace('+ 0.005', '+ 0.002*modulus'))
+        self.beam()
+        run = self.run_raw('train', '-scene', scene, *TYPE, '-values_modulus', '1,3', '-values_push', '1,2', '-hyco_validation', 4, '-hyco_search',
+                           'true', '-model', 'held.h5')
+        self.assertEqual(run.returncode, 0, run.stderr)
+        self.assertIn('flexibility at 1 points', run.stdout)
+        largest = re.search(r'held-out points: .* largest u ([-+.\de]+) %', run.stdout)
+        self.assertLess(float(largest[1]), 1e-4, run.stdout)
+
     def test_no_estimate(self):
         """Two values of a parameter that affects the stiffness give no information on what is between: no estimate, not a
         number."""

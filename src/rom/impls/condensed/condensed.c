@@ -74,6 +74,7 @@ PetscErrorCode HycoCondensedPrepare(HycoCondensed c)
   c->gap_size = 0;
   for (size_t k = 0; k < (size_t)HycoTensorSize(&gap->tensor) * m; k++)
     c->gap_size = PetscMax(c->gap_size, PetscAbsReal(gap->data[k]));
+  c->current = PETSC_FALSE; /* H is allocated anew */
   PetscCall(PetscFree(c->H));
   PetscCall(PetscFree(c->a));
   PetscCall(PetscMalloc1(c->l * c->m + 1, &c->H));
