@@ -172,6 +172,9 @@ void HycoMotionsName(HycoFE fe, const HycoMotions *motions, const PetscReal coef
 PetscErrorCode HycoFEBodyStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[]);
 PetscErrorCode HycoFEElementRoom(HycoFE fe, PetscInt cell, PetscReal **Ke);
 PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[]);
+/* The terms of HycoFEElementStiffness() that this process counts, for sums over all processes: of the body if it owns
+   the cell's first node, and its springs. */
+PetscErrorCode HycoFECountedStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[]);
 
 /* Creates an empty, preallocated AIJ matrix for K or a norm over the nodes `n_owned` from `first` of the distributed
    numbering. */

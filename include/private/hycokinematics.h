@@ -47,11 +47,11 @@ PetscErrorCode HycoTiedCheckOblique(HycoFE fe, const HycoFixed *fixed, PetscInt 
 void HycoTiedStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[]);
 void HycoTiedComplete(HycoFE fe, PetscReal u[]);
 void HycoTiedGeneralise(HycoFE fe, PetscReal f[]);
-/* Finds the springs of fe's mesh; evaluates their matrices at fe's nodes and mu; adds those of a cell to its
-   stiffness. The first and the last are NULL-safe. */
+/* Finds the springs of fe's mesh; evaluates their matrices at fe's nodes and mu; adds those of a cell (counted: that
+   this process counts) to its stiffness. The first and the last are NULL-safe. */
 PetscErrorCode HycoSpringsCreate(HycoFE fe);
 PetscErrorCode HycoSpringsSet(HycoFE fe);
-void HycoSpringsAddStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[]);
+void HycoSpringsAddStiffness(HycoFE fe, PetscInt cell, PetscBool counted, PetscReal Ke[]);
 /* Removes from fe->constant the cells whose springs change with the parameters p with changed[p]. */
 void HycoSpringsMarkVarying(HycoFE fe, const PetscBool changed[]);
 PetscErrorCode HycoSpringsDestroy(HycoSprings *springs);

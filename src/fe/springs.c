@@ -199,7 +199,18 @@ PetscErrorCode HycoSpringsSet(HycoFE fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void HycoSpringsAddStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
+/* Whether this process counts spring k: it owns the spring's node with the smallest tag. A part has all facets with a
+   node that it owns, but not all facets of its cells. */
+static PetscBool IsOwn(HycoFE fe, PetscInt k)
+{
+  const PetscInt *node, n = Nodes(fe->mesh, fe->springs, k, &node);
+  PetscInt least = node[0];
+
+  for (PetscInt a = 1; a < n; a++) least = PetscMin(least, node[a]);
+  return (PetscBool)(HycoMeshOwned(fe->mesh, least) >= 0);
+}
+
+void HycoSpringsAddStiffness(HycoFE fe, PetscInt cell, PetscBool counted, PetscReal Ke[])
 {
   HycoMesh m = fe->mesh;
   const HycoSprings s = fe->springs;
@@ -211,6 +222,7 @@ void HycoSpringsAddStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
     const PetscInt n_nodes = Nodes(m, s, k, &node), size = n_nodes * dim;
     PetscInt at[HYCO_FACET_NODES];
 
+    if (counted && !IsOwn(fe, k)) continue;
     for (PetscInt a = 0; a < n_nodes; a++) {
       for (at[a] = 0; corner[at[a]] != node[a];) at[a]++;
     }
@@ -250,14 +262,6 @@ static PetscReal Pull(HycoFE fe, PetscInt k, const PetscReal u[], PetscReal forc
   return energy;
 }
 
-/* Whether this process counts spring k. */
-static PetscBool IsOwn(HycoFE fe, PetscInt cell, PetscInt k)
-{
-  const PetscInt node = fe->springs->facet[k] < 0 ? fe->springs->node[k] : fe->mesh->cells[cell * fe->mesh->nv];
-
-  return (PetscBool)(HycoMeshOwned(fe->mesh, node) >= 0);
-}
-
 void HycoSpringsAddForces(HycoFE fe, PetscReal scale, const PetscReal u[], PetscReal f[])
 {
   for (PetscInt k = 0; fe->springs && k < fe->springs->n; k++) {
@@ -273,10 +277,8 @@ PetscReal HycoSpringsEnergy(HycoFE fe, const PetscReal u[])
 {
   PetscReal sum = 0, force[MAX_FACET_DOFS];
 
-  for (PetscInt e = 0; fe->springs && e < fe->mesh->n_cells; e++) {
-    for (PetscInt k = fe->springs->start[e]; k < fe->springs->start[e + 1]; k++) {
-      if (IsOwn(fe, e, k)) sum += Pull(fe, k, u, force);
-    }
+  for (PetscInt k = 0; fe->springs && k < fe->springs->n; k++) {
+    if (IsOwn(fe, k)) sum += Pull(fe, k, u, force);
   }
   return sum;
 }
@@ -286,12 +288,10 @@ PetscErrorCode HycoSpringsVisit(HycoFE fe, HycoSpringVisit visit, void *ctx)
   const HycoSprings s = fe->springs;
 
   PetscFunctionBegin;
-  for (PetscInt e = 0; s && e < fe->mesh->n_cells; e++) {
-    for (PetscInt k = s->start[e]; k < s->start[e + 1]; k++) {
-      const PetscInt *node, n = Nodes(fe->mesh, s, k, &node);
+  for (PetscInt k = 0; s && k < s->n; k++) {
+    const PetscInt *node, n = Nodes(fe->mesh, s, k, &node);
 
-      if (IsOwn(fe, e, k)) PetscCall((*visit)(fe, s->spring[k], n, node, s->K + k * s->size, ctx));
-    }
+    if (IsOwn(fe, k)) PetscCall((*visit)(fe, s->spring[k], n, node, s->K + k * s->size, ctx));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -182,14 +182,33 @@ static void SumRepeated(HycoMesh m, PetscInt cell, PetscReal Ke[])
   for (PetscInt k = 0; k < size * size; k++) Ke[k] = sum[k];
 }
 
+/* From the body's matrix: adds the springs (counted: those that this process counts), eliminates unknowns. */
+static void OfUnknowns(HycoFE fe, PetscInt cell, PetscBool counted, PetscReal Ke[])
+{
+  HycoSpringsAddStiffness(fe, cell, counted, Ke);
+  SumRepeated(fe->mesh, cell, Ke);
+  HycoTiedStiffness(fe, cell, Ke);
+  HycoObliqueStiffness(fe, cell, Ke);
+}
+
 PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
 {
   PetscFunctionBegin;
   PetscCall(HycoFEBodyStiffness(fe, cell, Ke));
-  HycoSpringsAddStiffness(fe, cell, Ke);
-  SumRepeated(fe->mesh, cell, Ke);
-  HycoTiedStiffness(fe, cell, Ke);
-  HycoObliqueStiffness(fe, cell, Ke);
+  OfUnknowns(fe, cell, PETSC_FALSE, Ke);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFECountedStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
+{
+  const PetscInt n = fe->mesh->nv * fe->dim;
+
+  PetscFunctionBegin;
+  if (HycoMeshOwned(fe->mesh, fe->mesh->cells[cell * fe->mesh->nv]) >= 0)
+    PetscCall(HycoFEBodyStiffness(fe, cell, Ke));
+  else
+    PetscCall(PetscArrayzero(Ke, n * n));
+  OfUnknowns(fe, cell, PETSC_TRUE, Ke);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -33,7 +33,7 @@ static PetscErrorCode FreeWork(HycoFOM f, PetscReal *work)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* u0.K (2 u - u0) of one cell: u0.K (u - u0), removed from F.U by the lifting, and the elastic part u0.K u of R.u0. */
+/* u0.K (2 u - u0) of one cell, as far as this rank counts it: u0.K (u - u0), removed from F.U by the lifting, and the elastic part u0.K u of R.u0. */
 static PetscErrorCode LiftingWork(HycoFE fe, PetscInt cell, const PetscReal u[], PetscReal *work)
 {
   HycoMesh m = fe->mesh;
@@ -47,7 +47,7 @@ static PetscErrorCode LiftingWork(HycoFE fe, PetscInt cell, const PetscReal u[],
   for (PetscInt k = 0; k < n; k++) any = (PetscBool)(any || fe->u0[node[k / m->dim] * m->dim + k % m->dim] != 0);
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoFEElementRoom(fe, cell, &Ke));
-  PetscCall(HycoFEElementStiffness(fe, cell, Ke));
+  PetscCall(HycoFECountedStiffness(fe, cell, Ke));
   for (PetscInt k = 0; k < n; k++) {
     const PetscReal u0 = fe->u0[node[k / m->dim] * m->dim + k % m->dim];
 
@@ -60,8 +60,8 @@ static PetscErrorCode LiftingWork(HycoFE fe, PetscInt cell, const PetscReal u[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sums strain energy, lifting and thermal work over this rank's cells: a cell counts on the rank that owns its first
-   node. */
+/* Sums strain energy, lifting and thermal work over what this rank counts: the cells whose first node it owns, its
+   springs. */
 static PetscErrorCode CellSums(HycoFOM f, PetscReal *strain, PetscReal *lifting)
 {
   const PetscScalar *u;
@@ -78,10 +78,10 @@ static PetscErrorCode CellSums(HycoFOM f, PetscReal *strain, PetscReal *lifting)
     PetscCall(HycoFEHeatWork(f->fe, u, heat));
   }
   for (PetscInt e = 0; e < f->part->n_cells; e++) {
-    if (HycoMeshOwned(f->part, f->part->cells[e * f->part->nv]) < 0) continue;
     PetscCall(LiftingWork(f->fe, e, u, &one));
-    *strain += each[e];
     *lifting += one;
+    if (HycoMeshOwned(f->part, f->part->cells[e * f->part->nv]) < 0) continue;
+    *strain += each[e];
     if (heat) *lifting += heat[e];
   }
   PetscCall(PetscFree(heat));

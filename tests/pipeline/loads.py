@@ -99,6 +99,32 @@ class Loads(Case):
                 self.near(np.hypot(pull[0], pull[2]), 0, 1e-12)
                 self.assertLess(pull[1], 0)  # it is pushed along y
 
+    def test_ranks(self):
+        """Springs are the only supports of a body whose nodes have random numbers: forces, energy and the identity of energies are the same on
+        1 to 4 ranks. In the second scene a side with springs is also displaced, so that the springs take part in the lifting."""
+        for kind, refine in (('quad4', 0), ('tri3', 1), ('hex8', 0), ('tet4', 0)):
+            axes = 'xyz'[:KINDS[kind]]
+            grid = column(kind, n=6, points={'corner': lambda x: (x == x.max(axis=0)).all(axis=1)})
+            place = np.random.default_rng(3).permutation(len(grid.nodes))
+            grid.nodes = [grid.nodes[i] for i in place]
+            number = np.argsort(place) + 1
+            grid.elements = [(of, tag, [int(number[n - 1]) for n in nodes]) for of, tag, nodes in grid.elements]
+            springs = ', '.join(f'{c}{end}: {{normal: {20 + i}, x: {3 + end}}}' for i, c in enumerate(axes) for end in (0, 1))
+            for fixed in ('', f'fixed: {{x1: {{{axes[-1]}: 0.02}}, corner: {{x: 0.01}}}}\n'):
+                text = (f'scene: {{mesh: mesh.msh, refine: {refine}}}\nbody: {{block: {{young: 200, poisson: 0.3}}}}\n{fixed}'
+                        f'spring: {{{springs}, corner: {{x: 7, y: 2}}}}\npressure: {{{axes[-1]}1: 1.5*(1 + x)}}\n')
+                scene = self.written(text, grid)
+                alone = self.hyco('solve', '-scene', scene)
+                for ranks in (0, 2, 3, 4):
+                    with self.subTest(kind=kind, fixed=fixed, ranks=ranks):
+                        found = self.hyco('solve', '-scene', scene, ranks=ranks) if ranks else alone
+                        self.balanced(found)
+                        self.near(found['strain_energy'], alone['strain_energy'], 1e-9)
+                        size = np.abs(alone['loads']['force']).max()
+                        for name, spring in alone['springs'].items():
+                            for of, value in spring.items():
+                                np.testing.assert_allclose(found['springs'][name][of], value, rtol=1e-9, atol=1e-9 * size)
+
     def test_point_in_1d(self):
         """A bar held by a spring at its middle, pulled at its end."""
         grid = column('line2', points={'middle': lambda x: x[:, 0] == 1, 'end': lambda x: x[:, 0] == 2})
