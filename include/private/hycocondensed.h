@@ -78,12 +78,12 @@ typedef struct _n_HycoCondensed {
 /* Snapshots and responses from which the modes are computed (condense_modes.c). Responses are K^-1 B^T P to patterns
    P of forces at each node of the stiffness. On rank 0, except r, q, Q and scale. */
 typedef struct {
-  PetscInt r, n_columns, q; /* number of modes above the noise; of snapshots and responses, which these span; of
-                               patterns */
-  PetscReal *Q, *scale;     /* orthonormal patterns, m x q column major; column j of P is Q_j scale_j */
-  PetscReal *C;             /* r x n_columns: V^T of the columns, the snapshots' first, then node by node */
-  PetscReal missed;         /* the part of held-out sampled forces outside the span, 95 % quantile, relative to the
-                               displacement of the nearest snapshot */
+  PetscInt r, q, sampled; /* number of modes above the noise; of patterns; of those, the first, that were sampled, and
+                             whose responses the modes span */
+  PetscReal *Q, *scale;   /* orthonormal patterns, m x q column major; column j of P is Q_j scale_j */
+  PetscReal *C;           /* V^T of the snapshots, then of the q responses node by node, r rows */
+  PetscReal missed;       /* the part of held-out sampled forces outside the span, 95 % quantile, relative to the
+                             displacement of the nearest snapshot */
 } HycoResponses;
 
 /* The contacts' nodes and facets only, where D is evaluated. */
@@ -126,11 +126,12 @@ PetscErrorCode HycoCondensedFindModes(HycoReducer reducer, HycoSnapshots store);
 PetscErrorCode HycoCondensedBuild(HycoROM model, HycoReducer reducer);
 /* G at all its nodes. Collective. */
 PetscErrorCode HycoCondensedFlexibilities(HycoReducer reducer, HycoSnapshots store);
-/* Responses to q patterns P of forces (m x q column major, on every rank) at these nodes, into the columns of S (n_dof
-   x
-   ..., dense) from `first` on. Collective. */
-PetscErrorCode HycoCondensedResponses(HycoReducer reducer, HycoSnapshots store, PetscInt q, const PetscReal P[], Mat S,
-                                      PetscInt first);
+/* Solves for the responses to q patterns P of forces (m x q column major, on every rank) at all nodes, unless a file
+   has them; then reads n of those of a node, from `first` on, into the columns of S (n_dof x ..., dense) from `at` on.
+   Collective. */
+PetscErrorCode HycoCondensedRespond(HycoReducer reducer, HycoSnapshots store, PetscInt q, const PetscReal P[]);
+PetscErrorCode HycoCondensedReadResponses(HycoReducer reducer, HycoSnapshots store, PetscInt q, const PetscReal P[],
+                                          PetscInt node, PetscInt first, PetscInt n, Mat S, PetscInt at);
 /* Fills its fields and degrees, for all modes or none; and the errors with values left out. Rank 0. */
 PetscErrorCode HycoCondensedFillFields(HycoReducer reducer, PetscBool modes);
 PetscErrorCode HycoCondensedLeaveOut(HycoReducer reducer);

@@ -183,7 +183,7 @@ static PetscReal ModesError(HycoReducer t, HycoCondensed c, Work *w)
     cut = PetscMax(
         cut, Relative(Norm(r - t->l, x->C + (size_t)s * (size_t)r + t->l, NULL), t->U_norm[s], SMALL * w->largest_u));
   }
-  for (PetscInt j = x->q - 1 - x->q / LAST; j >= 0 && j < x->q; j++) {
+  for (PetscInt j = x->sampled - 1 - x->sampled / LAST; j >= 0 && j < x->sampled; j++) {
     for (PetscInt k = 0; k < nodes; k++) {
       const PetscReal *column = x->C + (size_t)(t->n_s + k * x->q + j) * (size_t)r;
 

@@ -5,6 +5,12 @@
   displacements under a force of one node at the next node. Therefore, the forces are sampled over the region of
   training, where a sample costs only a complementarity problem; POD gives a few patterns of them; the responses to
   these are computed at each node; and the modes are a POD of snapshots and responses together.
+
+  A contact that closes between the samples only has no force in them. Contacts that come near to closing in some sample
+  are therefore patterns of their own. The coefficients H of the modes must be right for any forces, also for those that
+  are in no pattern: otherwise the displacement lacks the whole response to them, with the rigid motion that it
+  contains. The responses to a basis of all forces give them, where these are not too many numbers; they do not enter
+  the POD.
 */
 #include <hycoalgorithms.h>
 #include <hycocondensed.h>
@@ -23,6 +29,8 @@
 #define LEAST_STEP     0x1p-11 /* share of the training values' box: shorter segments are not bisected */
 #define MOST_RESPONSES 5e7     /* numbers in all responses: 400 MB */
 #define SMALL          1e-2
+#define NEAR           0.1  /* a contact may close if its gap falls in some sample to this share of its range */
+#define INDEPENDENT    1e-6 /* smaller parts of a unit force are round-off */
 
 /* Tolerance for the modes: stresses lose digits by the derivative, and forces need more. */
 static PetscReal Tolerance(HycoReducer t)
@@ -58,8 +66,28 @@ static PetscBool Held(HycoCondensed c, PetscInt number)
   return (PetscBool)(number >= Corners(c) && number % HELD == 0);
 }
 
+/* By contact, the smallest and the largest remaining gap of the samples. */
+typedef struct {
+  PetscReal *least, *most;
+} Gaps;
+
+/* Takes the gaps w = g + G L of a sample. */
+static void TakeGaps(HycoCondensed c, const PetscReal L[], Gaps *gaps)
+{
+  const PetscInt m = c->m;
+
+  for (PetscInt i = 0; i < m; i++) {
+    const PetscReal *row = c->M + (size_t)i * (size_t)m;
+    PetscReal w = c->g[i];
+
+    for (PetscInt j = 0; j < m; j++) w += row[j] * L[j];
+    gaps->least[i] = PetscMin(gaps->least[i], w);
+    gaps->most[i] = PetscMax(gaps->most[i], w);
+  }
+}
+
 /* The forces at mu from the interpolated problem; zero if it is not solved. */
-static PetscErrorCode SampleForces(HycoCondensed c, const PetscReal mu[], PetscReal L[])
+static PetscErrorCode SampleForces(HycoCondensed c, const PetscReal mu[], PetscReal L[], Gaps *gaps)
 {
   const PetscReal *nearest = c->Lambda + (size_t)HycoCondensedNearest(c, mu, NULL) * (size_t)c->m;
   PetscBool definite, solved = PETSC_FALSE;
@@ -69,7 +97,10 @@ static PetscErrorCode SampleForces(HycoCondensed c, const PetscReal mu[], PetscR
   PetscCall(HycoCondensedFreeGap(c, mu, -1, -1));
   for (PetscInt i = 0; i < c->m; i++) c->active[i] = (PetscBool)(nearest[i] > 0);
   if (definite) PetscCall(HycoCondensedSolveForces(c, L, &solved));
-  if (!solved) PetscCall(PetscArrayzero(L, c->m));
+  if (solved)
+    TakeGaps(c, L, gaps);
+  else
+    PetscCall(PetscArrayzero(L, c->m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -131,7 +162,7 @@ static PetscReal Largest(HycoReducer t)
 }
 
 /* n samples: their points (n x dim) and forces (m x n). */
-static PetscErrorCode SampleAll(HycoReducer t, PetscInt n, PetscReal mu[], PetscReal L[])
+static PetscErrorCode SampleAll(HycoReducer t, PetscInt n, PetscReal mu[], PetscReal L[], Gaps *gaps)
 {
   HycoCondensed c = Condensing(t)->condensed;
   const PetscInt dim = c->dim, m = c->m;
@@ -146,7 +177,7 @@ static PetscErrorCode SampleAll(HycoReducer t, PetscInt n, PetscReal mu[], Petsc
       SamplePoint(t, k, mu + k * dim);
     else
       PointBetween(t, k, way, &n_ways, mu);
-    PetscCall(SampleForces(c, mu + k * dim, L + (size_t)k * (size_t)m));
+    PetscCall(SampleForces(c, mu + k * dim, L + (size_t)k * (size_t)m, gaps));
     if (k && k <= WAYS && k < n / 2) way[n_ways++] = (Way){k - 1, k, 0};
     for (PetscInt j = 0; j < n_ways; j++) {
       const PetscInt from = way[j].from, to = way[j].to;
@@ -167,10 +198,11 @@ static PetscReal Missed(const HycoResponses *x, PetscInt m, PetscReal L[])
   PetscReal rest = 0;
 
   for (PetscInt j = 0; j < x->q; j++) {
+    const PetscReal *Q = x->Q + (size_t)j * (size_t)m;
     PetscReal dot = 0;
 
-    for (PetscInt i = 0; i < m; i++) dot += x->Q[j * m + i] * L[i];
-    for (PetscInt i = 0; i < m; i++) L[i] -= dot * x->Q[j * m + i];
+    for (PetscInt i = 0; i < m; i++) dot += Q[i] * L[i];
+    for (PetscInt i = 0; i < m; i++) L[i] -= dot * Q[i];
   }
   for (PetscInt i = 0; i < m; i++) rest += L[i] * L[i];
   return PetscSqrtReal(rest);
@@ -192,8 +224,8 @@ static PetscErrorCode Decompose(HycoReducer t, PetscInt n, PetscReal L[])
   PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, m, n, L, &F));
   PetscCall(HycoReducerPOD(t, F, Tolerance(t), PetscMax(1, (PetscInt)PetscMin(most, 1e6)), &Q, &x->q, sigma));
   PetscCall(MatDestroy(&F));
-  PetscCall(PetscMalloc1((size_t)m * (size_t)x->q + 1, &x->Q));
-  PetscCall(PetscMalloc1(x->q + 1, &x->scale));
+  PetscCall(PetscMalloc1((size_t)m * (size_t)m + 1, &x->Q));
+  PetscCall(PetscMalloc1(m + 1, &x->scale));
   for (PetscInt j = 0; j < x->q; j++) x->scale[j] = sigma[j] * PetscSqrtReal((PetscReal)t->n_s / (PetscReal)n);
   if (x->q) {
     PetscCall(MatDenseGetArrayRead(Q, &v));
@@ -203,6 +235,54 @@ static PetscErrorCode Decompose(HycoReducer t, PetscInt n, PetscReal L[])
   }
   PetscCall(PetscFree(sigma));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds the unit force of contact k, without its part in the patterns so far. */
+static void AddContact(HycoResponses *x, PetscInt m, PetscInt k, PetscReal scale)
+{
+  PetscReal *e = x->Q + (size_t)x->q * (size_t)m, norm = 0;
+
+  if (x->q == m) return;
+  for (PetscInt i = 0; i < m; i++) e[i] = i == k;
+  for (int twice = 0; twice < 2; twice++) norm = Missed(x, m, e);
+  if (norm < INDEPENDENT) return;
+  for (PetscInt i = 0; i < m; i++) e[i] /= norm;
+  x->scale[x->q++] = scale;
+}
+
+/* Whether contact k has a force in some pattern. */
+static PetscBool HasForce(const HycoResponses *x, PetscInt m, PetscInt k)
+{
+  for (PetscInt j = 0; j < x->q; j++) {
+    if (PetscAbsReal(x->Q[(size_t)j * (size_t)m + (size_t)k]) > INDEPENDENT) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
+/* Contacts without a force in any sample that may close between them: each with the weight of one of n samples. */
+static void AddNear(HycoReducer t, PetscInt n, const Gaps *gaps)
+{
+  HycoResponses *x = &Condensing(t)->responses;
+  const PetscInt m = Condensing(t)->condensed->m;
+  PetscReal sum = 0;
+
+  for (PetscInt j = 0; j < x->q; j++) sum += x->scale[j] * x->scale[j];
+  for (PetscInt k = 0; k < m && sum > 0; k++) {
+    if (gaps->least[k] <= NEAR * (gaps->most[k] - gaps->least[k]) && !HasForce(x, m, k))
+      AddContact(x, m, k, PetscSqrtReal(sum / (PetscReal)n));
+  }
+}
+
+/* The rest of a basis of all forces, if the responses to it have not too many numbers. */
+static void AddRest(HycoReducer t)
+{
+  HycoResponses *x = &Condensing(t)->responses;
+  const PetscInt m = Condensing(t)->condensed->m,
+                 nodes = HycoTensorSize(&Condensing(t)->condensed->field[HYCO_FIELD_G].tensor);
+
+  x->sampled = x->q;
+  if ((PetscReal)(t->sizes[0] * t->sizes[3]) * (PetscReal)nodes * (PetscReal)m > MOST_RESPONSES) return;
+  for (PetscInt k = 0; k < m && x->q; k++) AddContact(x, m, k, x->scale[0]);
 }
 
 /* The error of the patterns on the held-out samples, over the displacement of the nearest snapshot or a hundredth of
@@ -237,18 +317,26 @@ static PetscErrorCode FindPatterns(HycoReducer t)
   const PetscInt n = c->m <= FREE_CONTACTS ? SAMPLES : PetscMax(LEAST_SAMPLES, (PetscInt)(share * SAMPLES));
   PetscReal *mu, *L, *used;
   PetscInt n_used = t->n_s;
+  Gaps gaps;
 
   PetscFunctionBegin;
   PetscCall(HycoCondensedFillFields(t, PETSC_FALSE));
-  PetscCall(PetscMalloc3(n * c->dim, &mu, m * (size_t)n, &L, m * (size_t)(t->n_s + n), &used));
-  PetscCall(SampleAll(t, n, mu, L));
+  PetscCall(
+      PetscMalloc5(n * c->dim, &mu, m * (size_t)n, &L, m * (size_t)(t->n_s + n), &used, m, &gaps.least, m, &gaps.most));
+  for (PetscInt i = 0; i < c->m; i++) {
+    gaps.least[i] = PETSC_MAX_REAL;
+    gaps.most[i] = -PETSC_MAX_REAL;
+  }
+  PetscCall(SampleAll(t, n, mu, L, &gaps));
   PetscCall(PetscArraycpy(used, t->Lambda, m * (size_t)t->n_s));
   for (PetscInt k = 0; k < n; k++) {
     if (!Held(c, k)) PetscCall(PetscArraycpy(used + m * (size_t)(n_used++), L + m * (size_t)k, m));
   }
   PetscCall(Decompose(t, n_used, used));
+  AddNear(t, n_used, &gaps);
   PetscCall(JudgePatterns(t, n, mu, L));
-  PetscCall(PetscFree3(mu, L, used));
+  AddRest(t);
+  PetscCall(PetscFree5(mu, L, used, gaps.least, gaps.most));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -262,6 +350,7 @@ static PetscErrorCode SpreadPatterns(HycoReducer t)
   PetscCall(HycoReducerFetchContacts(t)); /* for FindPatterns() and the build */
   HycoOnRoot(HycoComm(t), FindPatterns(t));
   PetscCallMPI(MPI_Bcast(&x->q, 1, MPIU_INT, 0, HycoComm(t)));
+  PetscCallMPI(MPI_Bcast(&x->sampled, 1, MPIU_INT, 0, HycoComm(t)));
   if (t->rank) {
     PetscCall(PetscMalloc1(m * x->q + 1, &x->Q));
     PetscCall(PetscMalloc1(x->q + 1, &x->scale));
@@ -271,40 +360,73 @@ static PetscErrorCode SpreadPatterns(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Snapshots and responses as columns of one matrix. */
-static PetscErrorCode Columns(HycoReducer t, HycoSnapshots store, Mat *columns)
+/* Solves for the responses to all patterns at all nodes. */
+static PetscErrorCode Respond(HycoReducer t, HycoSnapshots store, PetscReal **P)
 {
-  HycoResponses *x = &Condensing(t)->responses;
-  const PetscInt m = Condensing(t)->condensed->m,
-                 nodes = HycoTensorSize(&Condensing(t)->condensed->field[HYCO_FIELD_G].tensor);
-  PetscInt n_own, lda[2];
-  PetscReal *P;
-  const PetscScalar *from;
-  PetscScalar *to;
+  const HycoResponses *x = &Condensing(t)->responses;
+  const PetscInt m = Condensing(t)->condensed->m;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1((size_t)m * (size_t)x->q + 1, P));
+  for (PetscInt j = 0; j < x->q; j++) {
+    for (PetscInt i = 0; i < m; i++) (*P)[j * m + i] = x->scale[j] * x->Q[j * m + i];
+  }
+  PetscCall(HycoCondensedRespond(t, store, x->q, *P));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Snapshots and, node by node, the responses to the sampled patterns, as columns of one matrix. */
+static PetscErrorCode Columns(HycoReducer t, HycoSnapshots store, const PetscReal P[], Mat *columns)
+{
+  const HycoResponses *x = &Condensing(t)->responses;
+  const PetscInt nodes = HycoTensorSize(&Condensing(t)->condensed->field[HYCO_FIELD_G].tensor);
+  PetscInt n_own;
   Mat S;
 
   PetscFunctionBegin;
-  x->n_columns = t->n_s + nodes * x->q;
   PetscCall(HycoReducerGetDisplacements(t, store, &S));
   PetscCall(MatGetLocalSize(S, &n_own, NULL));
-  PetscCall(MatCreateDense(HycoComm(t), n_own, PETSC_DECIDE, t->sizes[0] * t->sizes[3], x->n_columns, NULL, columns));
-  PetscCall(MatDenseGetLDA(S, &lda[0]));
-  PetscCall(MatDenseGetLDA(*columns, &lda[1]));
-  PetscCall(MatDenseGetArrayRead(S, &from));
-  PetscCall(MatDenseGetArray(*columns, &to));
-  for (PetscInt k = 0; k < t->n_s; k++)
-    PetscCall(PetscArraycpy(to + (size_t)k * (size_t)lda[1], from + (size_t)k * (size_t)lda[0], n_own));
-  PetscCall(MatDenseRestoreArray(*columns, &to));
-  PetscCall(MatDenseRestoreArrayRead(S, &from));
+  PetscCall(MatCreateDense(HycoComm(t), n_own, PETSC_DECIDE, t->sizes[0] * t->sizes[3], t->n_s + nodes * x->sampled,
+                           NULL, columns));
+  PetscCall(HycoCopyColumns(S, *columns, 0));
   PetscCall(MatDestroy(&S));
-  PetscCall(PetscMalloc1((size_t)m * (size_t)x->q + 1, &P));
-  for (PetscInt j = 0; j < x->q; j++) {
-    for (PetscInt i = 0; i < m; i++) P[j * m + i] = x->scale[j] * x->Q[j * m + i];
-  }
-  PetscCall(HycoCondensedResponses(t, store, x->q, P, *columns, t->n_s));
-  PetscCall(PetscFree(P));
+  for (PetscInt k = 0; k < nodes; k++)
+    PetscCall(HycoCondensedReadResponses(t, store, x->q, P, k, 0, x->sampled, *columns, t->n_s + k * x->sampled));
   PetscCall(MatAssemblyBegin(*columns, MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(*columns, MAT_FINAL_ASSEMBLY));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The coefficients of the snapshots and of the responses to all patterns in the modes V: those of S and of the
+   responses that it does not contain. */
+static PetscErrorCode Coefficients(HycoReducer t, HycoSnapshots store, const PetscReal P[], Mat V, Mat S)
+{
+  HycoResponses *x = &Condensing(t)->responses;
+  const PetscInt nodes = HycoTensorSize(&Condensing(t)->condensed->field[HYCO_FIELD_G].tensor),
+                 rest = x->q - x->sampled;
+  const size_t r = (size_t)x->r;
+  PetscReal *C;
+  PetscInt n_own, N;
+  Mat R;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(r * (size_t)(t->n_s + nodes * x->q) + 1, &x->C));
+  PetscCall(PetscMalloc1(r * (size_t)(t->n_s + nodes * x->sampled) + 1, &C));
+  PetscCall(HycoReducerMultiply(t, V, S, C));
+  PetscCall(PetscArraycpy(x->C, C, r * (size_t)t->n_s));
+  PetscCall(MatGetLocalSize(S, &n_own, NULL));
+  PetscCall(MatGetSize(S, &N, NULL));
+  PetscCall(MatCreateDense(HycoComm(t), n_own, PETSC_DECIDE, N, rest, NULL, &R));
+  for (PetscInt k = 0; k < nodes; k++) {
+    PetscReal *to = x->C + r * (size_t)(t->n_s + k * x->q);
+
+    PetscCall(PetscArraycpy(to, C + r * (size_t)(t->n_s + k * x->sampled), r * (size_t)x->sampled));
+    if (!rest) continue;
+    PetscCall(HycoCondensedReadResponses(t, store, x->q, P, k, x->sampled, rest, R, 0));
+    PetscCall(HycoReducerMultiply(t, V, R, to + r * (size_t)x->sampled));
+  }
+  PetscCall(MatDestroy(&R));
+  PetscCall(PetscFree(C));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -331,18 +453,22 @@ static PetscErrorCode TakeModes(HycoReducer t, Mat V, PetscInt n_sigma, PetscRea
 PetscErrorCode HycoCondensedFindModes(HycoReducer t, HycoSnapshots store)
 {
   HycoResponses *x = &Condensing(t)->responses;
-  PetscReal *sigma;
+  PetscReal *sigma, *P;
+  PetscInt n_sigma, n;
   Mat S, V;
 
   PetscFunctionBegin;
   PetscCall(HycoCondensedFlexibilities(t, store));
   PetscCall(SpreadPatterns(t));
-  PetscCall(Columns(t, store, &S));
-  PetscCall(PetscMalloc1(x->n_columns + 1, &sigma));
+  PetscCall(Respond(t, store, &P));
+  PetscCall(Columns(t, store, P, &S));
+  PetscCall(MatGetSize(S, &n_sigma, &n));
+  n_sigma = PetscMin(n_sigma, n);
+  PetscCall(PetscMalloc1(n + 1, &sigma));
   PetscCall(HycoReducerPOD(t, S, 0, 0, &V, &x->r, sigma));
-  PetscCall(PetscMalloc1((size_t)x->r * (size_t)x->n_columns, &x->C));
-  PetscCall(HycoReducerMultiply(t, V, S, x->C));
-  PetscCall(TakeModes(t, V, PetscMin(t->sizes[0] * t->sizes[3], x->n_columns), sigma));
+  PetscCall(Coefficients(t, store, P, V, S));
+  PetscCall(TakeModes(t, V, n_sigma, sigma));
+  PetscCall(PetscFree(P));
   PetscCall(MatDestroy(&V));
   PetscCall(MatDestroy(&S));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -233,10 +233,11 @@ PetscErrorCode HycoCondensedFlexibilities(HycoReducer t, HycoSnapshots store)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads the columns of S from `first` on, this rank's rows of each node's file. */
-static PetscErrorCode ReadResponses(HycoReducer t, HycoSnapshots store, const Task *task, Mat S, PetscInt first)
+/* Reads n columns of node k's responses, from `first` on, into those of S from `at` on: this rank's rows. */
+static PetscErrorCode ReadResponses(HycoReducer t, HycoSnapshots store, const Task *task, PetscInt k, PetscInt first,
+                                    PetscInt n, Mat S, PetscInt at)
 {
-  const PetscInt n = HycoTensorSize(&Condensing(t)->condensed->field[HYCO_FIELD_G].tensor), q = task->q;
+  const size_t q = (size_t)task->q;
   PetscInt lo, hi, lda;
   PetscScalar *s;
   PetscReal *rows;
@@ -245,30 +246,35 @@ static PetscErrorCode ReadResponses(HycoReducer t, HycoSnapshots store, const Ta
   PetscFunctionBegin;
   PetscCall(MatGetOwnershipRange(S, &lo, &hi));
   PetscCall(MatDenseGetLDA(S, &lda));
-  PetscCall(PetscMalloc1((size_t)(hi - lo) * (size_t)q + 1, &rows));
+  PetscCall(PetscMalloc1((size_t)(hi - lo) * q + 1, &rows));
   PetscCall(MatDenseGetArray(S, &s));
-  for (PetscInt k = 0; k < n; k++) {
-    PetscCall(Path(t, store, k, task, path));
-    PetscCall(ReadOne(store, path, "X", lo, hi - lo, q, rows));
-    for (PetscInt j = 0; j < q; j++) {
-      PetscScalar *column = s + (size_t)(first + k * q + j) * (size_t)lda;
+  PetscCall(Path(t, store, k, task, path));
+  PetscCall(ReadOne(store, path, "X", lo, hi - lo, task->q, rows));
+  for (PetscInt j = 0; j < n; j++) {
+    PetscScalar *column = s + (size_t)(at + j) * (size_t)lda;
 
-      for (PetscInt i = 0; i < hi - lo; i++) column[i] = rows[(size_t)i * (size_t)q + (size_t)j];
-    }
+    for (PetscInt i = 0; i < hi - lo; i++) column[i] = rows[(size_t)i * q + (size_t)(first + j)];
   }
   PetscCall(MatDenseRestoreArray(S, &s));
   PetscCall(PetscFree(rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoCondensedResponses(HycoReducer t, HycoSnapshots store, PetscInt q, const PetscReal P[], Mat S,
-                                      PetscInt first)
+PetscErrorCode HycoCondensedRespond(HycoReducer t, HycoSnapshots store, PetscInt q, const PetscReal P[])
 {
   const Task task = {q, P};
 
   PetscFunctionBegin;
-  if (!q) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(SolveMissing(t, store, &task));
-  HycoOnEach(HycoComm(t), ReadResponses(t, store, &task, S, first));
+  if (q) PetscCall(SolveMissing(t, store, &task));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoCondensedReadResponses(HycoReducer t, HycoSnapshots store, PetscInt q, const PetscReal P[],
+                                          PetscInt node, PetscInt first, PetscInt n, Mat S, PetscInt at)
+{
+  const Task task = {q, P};
+
+  PetscFunctionBegin;
+  if (n) HycoOnEach(HycoComm(t), ReadResponses(t, store, &task, node, first, n, S, at));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
