@@ -29,6 +29,9 @@ typedef enum {
 } HycoHybrid;
 extern const char *const HycoHybrids[]; /* their names; ends with NULL */
 
+#define HYCO_UNSEEN 3 /* HycoPrediction.unseen above it: another regime than at the held-out points */
+extern const char *const HycoFeatureNames[];
+
 /* Summary of a prediction, in scene units. For a projection-based model the RID is the whole mesh. */
 typedef struct {
   char type[32], title[64]; /* the type and its title; arrays, so that ranks can send the struct */
@@ -58,6 +61,16 @@ typedef struct {
   PetscReal estimated_error_quantity[HYCO_MAX_QUANTITIES]; /* the same for the absolute error of quantity[], in its
                                                               unit; of a path at all of its listed times */
   PetscReal estimated_error_u_full; /* condensed: of u by HycoFOMSolveForces() with these forces; otherwise < 0 */
+  /* What the displacement misses at contacts with a force: |B u - D|, weighted by the forces, relative to the largest
+     displacement of the contacts' surfaces; < 0: not known. inconsistent: it is larger than at the held-out points by
+     more than HYCO_UNSEEN, so that displacements, stresses and reactions do not follow the forces. */
+  PetscReal inconsistency;
+  PetscBool inconsistent;
+  /* How much larger than at all held-out points an indicator of the errors is, at least 1, and its index in
+     HycoFeatureNames (-1: none is). Above HYCO_UNSEEN the prediction is in a regime by which the model was not judged;
+     the estimates are multiplied by it, up to 100. */
+  PetscReal unseen;
+  PetscInt unseen_feature;
   PetscReal beyond;       /* largest distance of a parameter from the region of training, as a share of its range */
   PetscBool gives_forces; /* HycoROMGivesForces() */
   PetscReal interpolation_error; /* condensed: of the forces, relative, one training value left out, more outside

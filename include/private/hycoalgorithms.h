@@ -78,15 +78,17 @@ PetscErrorCode HycoNNLS(PetscInt m, PetscInt n, const PetscReal A[], const Petsc
 PetscInt HycoNNLSStep(PetscInt k, const PetscInt p[], const PetscReal z[], PetscReal x[]);
 
 /*
-  Fits c such that y <= sum_j c_j X_j + c[p] for `share` of the n > 0 rows (the quantile number ceil(share (n + 1)), at
-  most the largest); c_j >= 0 by regularised least squares over the first `telling` rows. X: n x p row major; c: p + 1.
-  Not collective.
+  Fits c such that y <= sum_j c_j X_j + c[p] for `share` of rows like these n > 0; c_j >= 0 by regularised least squares
+  over the first `telling` rows. c[p] is the quantile number ceil(share (n + 1)), at most the largest, of what the rows
+  have above a formula fitted without their group; if groups are few, at least the upper tolerance limit of normal
+  values (confidence 0.9). Rows with the same number group[i] depend on each other. X: n x p row major; c: p + 1. Not
+  collective.
 */
-PetscErrorCode HycoUpperBound(PetscInt n, PetscInt telling, PetscInt p, const PetscReal X[], const PetscReal y[],
-                              PetscReal share, PetscReal c[]);
+PetscErrorCode HycoUpperBound(PetscInt n, PetscInt telling, const PetscInt group[], PetscInt p, const PetscReal X[],
+                              const PetscReal y[], PetscReal share, PetscReal c[]);
 /* Sets only c[p], for given c_j. */
-PetscErrorCode HycoRaiseBound(PetscInt n, PetscInt p, const PetscReal X[], const PetscReal y[], PetscReal share,
-                              PetscReal c[]);
+PetscErrorCode HycoRaiseBound(PetscInt n, const PetscInt group[], PetscInt p, const PetscReal X[], const PetscReal y[],
+                              PetscReal share, PetscReal c[]);
 
 /*
   Many problems over one S (m x n column major, borrowed): min 1/2 sum_k d_k (S x)_k^2 - h^T S x + shift/2 |x|^2, x >=

@@ -263,11 +263,11 @@ PetscErrorCode HycoReducerUnitRows(HycoReducer t, Mat X, Mat *scaled);
 PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, HycoROM model, HycoTraining *report);
 
 /* Result of a model at one held-out point, all PetscReal: errors (those of forces before division), for a path at
-   its worst time, and at its end; the forces' norms, whether it converged, the features of the estimates, the time
-   of some repetitions. */
+   its worst time, and at its end; the forces' norms, whether it converged, the number of its group (calibrate.c), the
+   features of the estimates, the time of some repetitions. */
 #define HYCO_HELD_REPEATS 3
 typedef struct _n_HycoHeldOut {
-  PetscReal error[HYCO_N_ERRORS], end[HYCO_N_ERRORS], size, rid_size, converged, feature[HYCO_ESTIMATE_FEATURES],
+  PetscReal error[HYCO_N_ERRORS], end[HYCO_N_ERRORS], size, rid_size, converged, group, feature[HYCO_FEATURES],
       seconds[HYCO_HELD_REPEATS];
 } HycoHeldOut;
 /* By HycoErrorKind, the norm of the error of a prediction, and that of the reference. */

@@ -23,6 +23,7 @@ typedef struct {
    constant. */
 #define HYCO_ESTIMATE_FEATURES 5
 #define HYCO_ESTIMATE_DISTANCE 3 /* index of the distance among the features */
+#define HYCO_FEATURES          9 /* the same and further ones, by which regimes unlike the held-out ones are noticed */
 /* A contact force below this share of the largest of a set is replaced by that share where errors are divided by it. */
 #define HYCO_SMALL_FORCE 0.1
 /* A predicted contact force up to this share of the largest is round-off. */
@@ -40,7 +41,8 @@ typedef struct {
 typedef struct {
   PetscInt n; /* held-out predictions behind the estimates; 0: not calibrated */
   PetscReal floor[HYCO_ESTIMATE_FEATURES];
-  PetscBool has[HYCO_N_ESTIMATES];                             /* whether there is an estimate of this error */
+  PetscReal reached[HYCO_FEATURES]; /* the features' largest values at the held-out points; < 0: not known */
+  PetscBool has[HYCO_N_ESTIMATES];  /* whether there is an estimate of this error */
   PetscReal law[HYCO_N_ESTIMATES][HYCO_ESTIMATE_FEATURES + 1]; /* coefficients >= 0, then the constant */
   PetscReal force; /* 2-norm of the largest held-out contact forces: errors of forces below a tenth of it are divided
                       by that tenth */
@@ -78,6 +80,7 @@ struct _p_HycoROM {
   HycoPairs pairs;         /* all N_lambda contacts, node indices of mesh */
   PetscInt *role;          /* by node of mesh */
   PetscInt *in_rid;        /* by contact: in A_lambda */
+  PetscInt *closed;        /* by contact: has a force in some training solution; NULL: not known (older files) */
   PetscReal *master_reach; /* moved surfaces: largest distance of a master point, by contact of the scene; NULL: none
                               is moved, or the file is older than this search */
   PetscInt l;              /* POD modes */
@@ -124,6 +127,7 @@ struct _p_HycoROM {
   PetscBool beyond_current; /* U on all nodes of mesh and the rows of all contacts are current: HycoROMComplete() was
                                called */
   PetscBool spread;         /* Lambda may be nonzero outside A_lambda */
+  PetscReal remainder;      /* of (41): the relative difference of the forces in the RID; of a path the largest */
   HycoRows rows;            /* of B over dofs of mesh, all contacts; current after HycoROMComplete() */
   HycoSolver solver;
   PetscReal *gamma, *U, *Lambda, *stress;
@@ -221,8 +225,8 @@ PetscErrorCode HycoCarriedDestroy(HycoCarried *carried);
 PetscErrorCode HycoProbeDestroy(HycoProbe *probe);
 PetscErrorCode HycoBalanceDestroy(HycoBalance *balance);
 
-/* Features that indicate the last prediction's error without a full-order solution: feature[HYCO_ESTIMATE_FEATURES],
-   all >= 0. */
+/* Features that indicate the last prediction's error without a full-order solution: feature[HYCO_FEATURES], all >= 0.
+ */
 PetscErrorCode HycoEstimatesFeatures(HycoROM model, PetscReal feature[]);
 /* The estimated errors of the last prediction, and how far outside the ranges it lies. */
 PetscErrorCode HycoEstimatesEvaluate(HycoROM model, HycoPrediction *prediction);

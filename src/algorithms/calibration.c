@@ -3,7 +3,12 @@
 #include <hycoalgorithms.h>
 #include <petscsys.h>
 
-#define RIDGE 1e-1 /* relative to the square sum of a column: correlated features share the weight */
+#define RIDGE    1e-1 /* relative to the square sum of a column: correlated features share the weight */
+#define CONSTANT 1e-2 /* a column that varies less says nothing: its differences may be round-off */
+#define CONFIDENCE                                                                                                     \
+  0.9 /* of the tolerance limit, which is used unless this number of values lies above the quantile:                   \
+       */
+#define MANY_ABOVE 5
 
 /* c >= 0 that minimises |X c - y|^2 about the means, regularised. */
 static PetscErrorCode Fit(PetscInt n, PetscInt p, const PetscReal X[], const PetscReal y[], PetscReal c[])
@@ -23,6 +28,7 @@ static PetscErrorCode Fit(PetscInt n, PetscInt p, const PetscReal X[], const Pet
       A[j * rows + i] = X[i * p + j] - at;
       square += A[j * rows + i] * A[j * rows + i];
     }
+    if (square < CONSTANT * CONSTANT * n) PetscCall(PetscArrayzero(A + j * rows, n));
     A[j * rows + n + j] = PetscSqrtReal(RIDGE * square);
   }
   PetscCall(HycoNNLS(rows, p, A, b, c, &residual));
@@ -30,29 +36,110 @@ static PetscErrorCode Fit(PetscInt n, PetscInt p, const PetscReal X[], const Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoRaiseBound(PetscInt n, PetscInt p, const PetscReal X[], const PetscReal y[], PetscReal share,
-                              PetscReal c[])
+/* The standard normal quantile (Abramowitz and Stegun 26.2.23; its error is below 5e-4). */
+static PetscReal NormalQuantile(PetscReal share)
+{
+  const PetscReal t = PetscSqrtReal(-2 * PetscLogReal(share > 0.5 ? 1 - share : share)),
+                  z = t -
+                      (2.515517 + t * (0.802853 + t * 0.010328)) / (1 + t * (1.432788 + t * (0.189269 + t * 0.001308)));
+
+  return share > 0.5 ? z : -z;
+}
+
+/* An upper tolerance limit of a normal sample of n independent values, with CONFIDENCE: the mean plus this many
+   standard deviations (Natrella's approximation). */
+static PetscReal ToleranceFactor(PetscInt n, PetscReal share)
+{
+  const PetscReal z = NormalQuantile(share), m = (PetscReal)PetscMax(n, 2);
+
+  return z + NormalQuantile(CONFIDENCE) * PetscSqrtReal(1 / m + z * z / (2 * (m - 1)));
+}
+
+/* The limit that `share` of values like these n do not exceed. Among few values the quantile is their largest, which
+   later ones exceed too often: the tolerance limit then counts, too. */
+static PetscErrorCode Limit(PetscInt n, PetscInt independent, PetscReal value[], PetscReal share, PetscReal *limit)
+{
+  PetscReal mean = 0, square = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscSortReal(n, value));
+  *limit = value[PetscMin((PetscInt)PetscCeilReal(share * (PetscReal)(n + 1) * (1 - 1e-12)), n) - 1];
+  if (n < 2 || (PetscReal)independent * (1 - share) >= MANY_ABOVE) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt i = 0; i < n; i++) mean += value[i] / n;
+  for (PetscInt i = 0; i < n; i++) square += PetscSqr(value[i] - mean) / (n - 1);
+  *limit = PetscMax(*limit, mean + ToleranceFactor(independent, share) * PetscSqrtReal(square));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscReal Above(PetscInt p, const PetscReal X[], PetscReal y, const PetscReal c[])
+{
+  for (PetscInt j = 0; j < p; j++) y -= c[j] * X[j];
+  return y;
+}
+
+static PetscInt CountGroups(PetscInt n, const PetscInt group[])
+{
+  PetscInt count = 0;
+
+  for (PetscInt i = 0; i < n; i++) {
+    PetscInt k = 0;
+
+    while (k < i && group[k] != group[i]) k++;
+    count += k == i;
+  }
+  return count;
+}
+
+PetscErrorCode HycoRaiseBound(PetscInt n, const PetscInt group[], PetscInt p, const PetscReal X[], const PetscReal y[],
+                              PetscReal share, PetscReal c[])
 {
   PetscReal *above;
 
   PetscFunctionBegin;
   PetscCheck(n, PETSC_COMM_SELF, PETSC_ERR_PLIB, "there is nothing to bound");
   PetscCall(PetscMalloc1(n, &above));
-  for (PetscInt i = 0; i < n; i++) {
-    above[i] = y[i];
-    for (PetscInt j = 0; j < p; j++) above[i] -= c[j] * X[i * p + j];
-  }
-  PetscCall(PetscSortReal(n, above));
-  c[p] = above[PetscMin((PetscInt)PetscCeilReal(share * (PetscReal)(n + 1) * (1 - 1e-12)), n) - 1];
+  for (PetscInt i = 0; i < n; i++) above[i] = Above(p, X + i * p, y[i], c);
+  PetscCall(Limit(n, CountGroups(n, group), above, share, &c[p]));
   PetscCall(PetscFree(above));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoUpperBound(PetscInt n, PetscInt telling, PetscInt p, const PetscReal X[], const PetscReal y[],
-                              PetscReal share, PetscReal c[])
+/* above[]: by row, y minus the formula that is fitted without the rows of its group: a formula follows the rows to
+   which it was fitted more closely than others. */
+static PetscErrorCode LeaveOut(PetscInt n, PetscInt telling, const PetscInt group[], PetscInt p, const PetscReal X[],
+                               const PetscReal y[], PetscReal above[])
 {
+  PetscReal *rest, *z, *c;
+
   PetscFunctionBegin;
+  PetscCall(PetscMalloc3(n * p, &rest, n, &z, p + 1, &c));
+  for (PetscInt i = 0; i < n; i++) {
+    PetscInt kept = 0;
+
+    for (PetscInt k = 0; k < telling; k++) {
+      if (group[k] == group[i]) continue;
+      PetscCall(PetscArraycpy(rest + kept * p, X + k * p, p));
+      z[kept++] = y[k];
+    }
+    PetscCall(PetscArrayzero(c, p));
+    if (kept) PetscCall(Fit(kept, p, rest, z, c));
+    above[i] = Above(p, X + i * p, y[i], c);
+  }
+  PetscCall(PetscFree3(rest, z, c));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoUpperBound(PetscInt n, PetscInt telling, const PetscInt group[], PetscInt p, const PetscReal X[],
+                              const PetscReal y[], PetscReal share, PetscReal c[])
+{
+  PetscReal *above;
+
+  PetscFunctionBegin;
+  PetscCheck(n, PETSC_COMM_SELF, PETSC_ERR_PLIB, "there is nothing to bound");
   PetscCall(Fit(telling, p, X, y, c));
-  PetscCall(HycoRaiseBound(n, p, X, y, share, c));
+  PetscCall(PetscMalloc1(n, &above));
+  PetscCall(LeaveOut(n, telling, group, p, X, y, above));
+  PetscCall(Limit(n, CountGroups(n, group), above, share, &c[p]));
+  PetscCall(PetscFree(above));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -30,6 +30,9 @@ static PetscErrorCode ReportEstimates(cJSON *json, HycoScene scene, const HycoPr
   PetscCall(HycoSceneGetQuantities(scene, &n, names));
   outputs = n ? cJSON_AddObjectToObject(json, "estimated_error_outputs") : NULL;
   for (PetscInt q = 0; q < n; q++) Estimate(outputs, names[q], p->estimated_error_quantity[q]);
+  Estimate(json, "inconsistency", p->inconsistency);
+  cJSON_AddNumberToObject(json, "unseen", p->unseen);
+  if (p->unseen > HYCO_UNSEEN) cJSON_AddStringToObject(json, "unseen_feature", HycoFeatureNames[p->unseen_feature]);
   cJSON_AddBoolToObject(json, "extrapolated", p->beyond > 0);
   cJSON_AddNumberToObject(json, "beyond", p->beyond);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -70,6 +73,16 @@ static PetscErrorCode SayEstimates(HycoScene scene, const HycoPrediction *p)
   PetscCall(SayOutputEstimates(scene, p));
   DriverPercent(p->beyond, words[0]);
   if (p->beyond > 0) PetscCall(Say("EXTRAPOLATED: outside the region of training by %s of a range\n", words[0]));
+  if (p->unseen > HYCO_UNSEEN)
+    PetscCall(
+        Say("UNSEEN REGIME: the %s is %.3g times the largest at the held-out points; the estimates are multiplied "
+            "by it (up to 100), and are not tested\n",
+            HycoFeatureNames[p->unseen_feature], (double)p->unseen));
+  if (p->inconsistent)
+    PetscCall(
+        DriverMissed("the displacements do not follow the contact forces: at closed contacts they miss the gaps by "
+                     "%.2g of the largest displacement there; add training points, or use -hyco_fallback%s",
+                     (double)p->inconsistency, p->gives_forces ? " or -hyco_full_displacement" : ""));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -264,6 +277,8 @@ enum {
   ESTIMATE_SIGMA,
   ESTIMATE_LAMBDA,
   BEYOND,
+  UNSEEN,
+  INCONSISTENCY,
   FULL_ORDER,
   PATH_FORCE, /* only for paths */
   PATH_MISES,
@@ -285,6 +300,8 @@ static const char *const columns[N_COLUMNS] = {"total_contact_force",
                                                "estimated_error_sigma",
                                                "estimated_error_lambda",
                                                "beyond",
+                                               "unseen",
+                                               "inconsistency",
                                                "full_order",
                                                "largest_contact_force",
                                                "largest_rid_mises",
@@ -364,6 +381,8 @@ static void FillRow(const HycoPrediction *p, PetscInt n_carried, const HycoConta
   v[ESTIMATE_SIGMA] = Known(p->estimated_error_sigma);
   v[ESTIMATE_LAMBDA] = Known(p->estimated_error_lambda);
   v[BEYOND] = p->beyond;
+  v[UNSEEN] = p->unseen;
+  v[INCONSISTENCY] = Known(p->inconsistency);
   if (s->own > PATH_FORCE) {
     v[PATH_FORCE] = p->path_force;
     v[PATH_MISES] = p->path_mises;
@@ -386,11 +405,12 @@ typedef struct {
   const Shape *shape;
   HycoQueue queue;
   PetscReal *value; /* of the piece */
+  PetscInt n_unseen, n_inconsistent;
 } Taken;
 
 static PetscErrorCode TakePoint(HycoROM model, PetscInt k, void *ctx)
 {
-  const Taken *t = (const Taken *)ctx;
+  Taken *t = (Taken *)ctx;
   PetscReal *v = t->value + (size_t)k * (size_t)t->shape->width;
   const HycoContactResult *carried;
   HycoPrediction p;
@@ -404,6 +424,8 @@ static PetscErrorCode TakePoint(HycoROM model, PetscInt k, void *ctx)
   FillRow(&p, n, carried, t->shape, v);
   DriverWantsFullOrder(t->fallback, &p, why);
   v[FULL_ORDER] = why[0] != '\0'; /* required; SolveRest() solves it */
+  t->n_unseen += !why[0] && p.unseen > HYCO_UNSEEN;
+  t->n_inconsistent += !why[0] && p.inconsistent;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -439,6 +461,24 @@ static PetscErrorCode PredictQueued(HycoROM model, PetscInt each, PetscInt n_par
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Reports the points of all ranks at which the model's estimates or displacements are in doubt. */
+static PetscErrorCode SayDoubts(PetscInt n, const Taken *t)
+{
+  PetscInt count[2] = {t->n_unseen, t->n_inconsistent};
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, 2, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
+  if (count[0])
+    PetscCall(
+        Say("UNSEEN REGIME at %d of %d points: column unseen is above %d, and the estimates are not tested there\n",
+            (int)count[0], (int)n, HYCO_UNSEEN));
+  if (count[1])
+    PetscCall(DriverMissed("the displacements do not follow the contact forces at %d of %d points (column "
+                           "inconsistency); add training points, or use -hyco_fallback",
+                           (int)count[1], (int)n));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Predicts all points; each rank keeps the rows of those that it took. */
 static PetscErrorCode PredictAll(HycoROM model, const Fallback *fallback, PetscInt n_par, const PetscReal mu[],
                                  const Shape *s, DriverRows *rows)
@@ -453,6 +493,7 @@ static PetscErrorCode PredictAll(HycoROM model, const Fallback *fallback, PetscI
   PetscCall(HycoQueueCreate(PETSC_COMM_WORLD, size, (rows->n + each - 1) / each, NULL, &taken.queue));
   HycoOnEach(PETSC_COMM_WORLD, HycoQueueEnd(taken.queue, PredictQueued(model, each, n_par, mu, &taken, rows)));
   PetscCall(HycoQueueDestroy(&taken.queue));
+  PetscCall(SayDoubts(rows->n, &taken));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -518,6 +559,8 @@ static PetscErrorCode SolveRest(Fallback *fallback, PetscInt n_par, const PetscR
     p.estimated_error_lambda = v[ESTIMATE_LAMBDA];
     PetscCall(PetscArraycpy(p.estimated_error_quantity, v + s->with_extremes, s->with_estimates - s->with_extremes));
     p.beyond = v[BEYOND];
+    p.unseen = v[UNSEEN];
+    p.inconsistency = v[INCONSISTENCY];
     FillRow(&p, n_carried, carried, s, v);
     v[U_NORM] = NAN; /* that of the whole mesh, not of an RID */
   }

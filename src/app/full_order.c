@@ -84,6 +84,12 @@ void DriverWantsFullOrder(const Fallback *f, const HycoPrediction *p, char why[D
   if (!f->on) return;
   if (p->reason <= 0)
     snprintf(why, DRIVER_LINE, "the reduced solve did not converge");
+  else if (p->inconsistent)
+    snprintf(why, DRIVER_LINE, "the displacements do not follow the contact forces (%.2g of their size)",
+             (double)p->inconsistency);
+  else if (p->unseen > HYCO_UNSEEN)
+    snprintf(why, DRIVER_LINE, "the %s is %.2g times that at any held-out point", HycoFeatureNames[p->unseen_feature],
+             (double)p->unseen);
   else if (!(f->target_u > 0) && !(f->target_lambda > 0))
     return;
   else if ((f->target_u > 0 && p->estimated_error_u < 0) || (f->target_lambda > 0 && p->estimated_error_lambda < 0))

@@ -394,12 +394,31 @@ static PetscErrorCode CheckUseful(HycoReducer t, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Notes the contacts that have a force in some training solution. */
+static PetscErrorCode TakeClosed(HycoReducer t, HycoROM m)
+{
+  const PetscInt N = m->pairs.n;
+
+  PetscFunctionBegin;
+  PetscCall(PetscFree(m->closed));
+  PetscCall(PetscCalloc1(N, &m->closed));
+  for (PetscInt k = 0; k < t->n_s; k++) {
+    const PetscReal *L = t->Lambda + (size_t)k * (size_t)N;
+    PetscReal most = 0;
+
+    for (PetscInt i = 0; i < N; i++) most = PetscMax(most, L[i]);
+    for (PetscInt i = 0; i < N; i++) m->closed[i] = m->closed[i] || L[i] > HYCO_PRESSES * most;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Rank 0: builds the model on its RID, without online data. */
 static PetscErrorCode BuildModel(HycoReducer t, PetscBool useful, HycoROM m, HycoTraining *report)
 {
   PetscFunctionBegin;
   PetscCall(FillModel(t, m));
   PetscCall((*m->ops->build)(m, t));
+  PetscCall(TakeClosed(t, m));
   if (useful) PetscCall(CheckUseful(t, m));
   PetscCall(Report(t, m, report));
   PetscCall(HycoROMReset(m));

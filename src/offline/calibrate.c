@@ -1,20 +1,21 @@
 /*
   The accuracy of a model: compares its predictions at held-out points with their full-order solutions, and calibrates
   the online error estimates with the result (error_estimate.c). A log-linear formula is fitted to the errors and raised
-  above SHARE of them. Held-out points are distributed like a user's points over the region of training, so that the
-  quantile number ceil(SHARE (n + 1)) of the ratios is a bound for SHARE of future points (split conformal prediction:
-  Vovk, Gammerman, Shafer, Algorithmic Learning in a Random World, 2005), however accurate the formula is; an accurate
-  formula only makes the bound tighter. The settings were chosen with the same points, for which MARGIN allows. The
-  scene's outputs have formulas for their absolute errors (judge_outputs.c).
+  above SHARE of them, each compared with a formula fitted without it. Held-out points are distributed like a user's
+  points over the region of training, so that the quantile number ceil(SHARE (n + 1)) of the ratios is a bound for SHARE
+  of future points (split conformal prediction: Vovk, Gammerman, Shafer, Algorithmic Learning in a Random World, 2005),
+  however accurate the formula is; an accurate formula only makes the bound tighter. The settings were chosen with the
+  same points, for which MARGIN allows. The scene's outputs have formulas for their absolute errors (judge_outputs.c).
 */
 #include <hycoalgorithms.h>
 #include <hycoreducerimpl.h>
 #include <stdio.h>
 
-#define SHARE      0.95
-#define MARGIN     1.25
-#define LEAST      10   /* smallest number of predictions for an estimate */
-#define SMALL      1e-2 /* share of a feature's median: its floor */
+#define SHARE  0.95
+#define MARGIN 1.25
+#define LEAST  10 /* smallest number of predictions for an estimate */
+#define SMALL                                                                                                          \
+  0.3 /* share of a feature's median: its floor, below which a smaller feature is no sign of a smaller error */
 #define NEGLIGIBLE 1e-3 /* share of the errors' median: least error that is distinguished */
 
 /* The estimated errors, in the order of HycoEstimateKind. */
@@ -73,8 +74,8 @@ static PetscReal MeanOf(PetscInt n, const PetscReal X[], const PetscReal law[])
 /* Replaces a formula by that of the error of u, stress or forces, raised above the errors y in the same way, if its
    mean is smaller. The error of an output has a sign and passes through zero, so that its logarithm scatters more than
    that of a norm, and coefficients fitted to it are less certain. */
-static PetscErrorCode Borrow(PetscInt n, const PetscReal X[], const PetscReal y[], const HycoEstimates *estimates,
-                             PetscReal law[])
+static PetscErrorCode Borrow(PetscInt n, const PetscInt group[], const PetscReal X[], const PetscReal y[],
+                             const HycoEstimates *estimates, PetscReal law[])
 {
   PetscReal other[HYCO_ESTIMATE_FEATURES + 1];
 
@@ -82,7 +83,7 @@ static PetscErrorCode Borrow(PetscInt n, const PetscReal X[], const PetscReal y[
   for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++) {
     if (!estimates->has[e]) continue;
     PetscCall(PetscArraycpy(other, estimates->law[e], HYCO_ESTIMATE_FEATURES + 1));
-    PetscCall(HycoRaiseBound(n, HYCO_ESTIMATE_FEATURES, X, y, SHARE, other));
+    PetscCall(HycoRaiseBound(n, group, HYCO_ESTIMATE_FEATURES, X, y, SHARE, other));
     if (MeanOf(n, X, other) < MeanOf(n, X, law)) PetscCall(PetscArraycpy(law, other, HYCO_ESTIMATE_FEATURES + 1));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -95,22 +96,23 @@ static PetscErrorCode Fit(PetscInt n, const HycoHeldOut rows[], const PetscReal 
 {
   const PetscInt p = HYCO_ESTIMATE_FEATURES;
   PetscReal *X, *y;
-  PetscInt filled = 0, telling = 0;
+  PetscInt filled = 0, telling = 0, *group;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc2(n * p, &X, n, &y));
+  PetscCall(PetscMalloc3(n * p, &X, n, &y, n, &group));
   for (PetscInt pass = 0; pass < 2; pass++) {
     for (PetscInt i = 0; i < n; i++) {
       if ((error[i] > least) != (pass == 0)) continue;
       for (PetscInt j = 0; j < p; j++) X[filled * p + j] = PetscLogReal(1 + rows[i].feature[j] / estimates->floor[j]);
+      group[filled] = (PetscInt)rows[i].group;
       y[filled++] = PetscLogReal(PetscMax(error[i], least));
       if (pass == 0) telling = filled;
     }
   }
-  PetscCall(HycoUpperBound(n, telling ? telling : n, p, X, y, SHARE, law));
-  if (borrow) PetscCall(Borrow(n, X, y, estimates, law));
+  PetscCall(HycoUpperBound(n, telling ? telling : n, group, p, X, y, SHARE, law));
+  if (borrow) PetscCall(Borrow(n, group, X, y, estimates, law));
   law[p] += PetscLogReal(MARGIN);
-  PetscCall(PetscFree2(X, y));
+  PetscCall(PetscFree3(X, y, group));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -183,6 +185,41 @@ static PetscErrorCode FitAll(HycoReducer t, PetscInt n, const HycoHeldOut rows[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The largest values of the features. */
+static void Reach(PetscInt n, const HycoHeldOut rows[], PetscReal reached[])
+{
+  for (PetscInt j = 0; j < HYCO_FEATURES; j++) {
+    reached[j] = n >= LEAST ? 0 : -1;
+    for (PetscInt i = 0; i < n && n >= LEAST; i++) reached[j] = PetscMax(reached[j], rows[i].feature[j]);
+  }
+}
+
+/* Numbers the points' groups: those of one stiffness, if not all parameters affect it, are not independent. */
+static PetscErrorCode Group(HycoReducer t, PetscInt n, HycoHeldOut rows[])
+{
+  PetscBool reaches[HYCO_MAX_PARAMETERS];
+  PetscInt n_par, n_stiff = 0;
+  const PetscReal *mu;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(t->held, NULL, &n_par, &mu));
+  HycoSceneReaches(t->scene, reaches);
+  for (PetscInt p = 0; p < n_par; p++) n_stiff += reaches[p];
+  for (PetscInt i = 0; i < n; i++) {
+    PetscInt k = i;
+
+    for (PetscInt j = i - 1; j >= 0 && n_stiff; j--) {
+      PetscBool same = PETSC_TRUE;
+
+      for (PetscInt p = 0; p < n_par; p++)
+        same = (PetscBool)(same && (!reaches[p] || mu[i * n_par + p] == mu[j * n_par + p]));
+      if (same) k = (PetscInt)rows[j].group;
+    }
+    rows[i].group = (PetscReal)k;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Moves the points with converged predictions to the front: others have no features, and are reported as not converged
    online. Returns their number. */
 static PetscInt KeepConverged(PetscInt n, HycoHeldOut rows[], HycoOutputErrors outputs[])
@@ -227,7 +264,9 @@ static PetscErrorCode Conclude(HycoReducer t, HycoHeldOut rows[], HycoOutputErro
     estimates.largest[e] = v->largest[errors[e]];
   }
   estimates.force = HycoHeldOutForce(v->n, rows);
+  PetscCall(Group(t, v->n, rows));
   n = KeepConverged(v->n, rows, outputs);
+  Reach(n, rows, estimates.reached);
   PetscCall(FitAll(t, n, rows, &estimates));
   estimates.n_outputs = t->scene->n_quantities;
   for (PetscInt q = 0; q < estimates.n_outputs; q++) {

@@ -13,6 +13,18 @@
   spacing of the training points. K's rows on the interface lack the cells outside the RID, so that no residual can be
   computed there; the misfit measures the disagreement between the two sides of the interface instead.
 
+  Held-out points do not have every regime that a prediction may meet. Where a feature is larger than at all held-out
+  points, the estimates are multiplied by the ratio, and a ratio above HYCO_UNSEEN is reported. Features 1, 2 and, of
+  these only for this purpose:
+
+    5  inconsistency  |B u - D| of the closed contacts, weighted by their forces, relative to the largest displacement
+  of the contacts' surfaces: what the displacement misses of the response to the forces 6  new contacts   share of the
+  force at contacts that no training solution closes 7  outside        share of the force outside the RID 8  remainder
+  of the reconstruction (41), relative to the forces in the RID
+
+  6 to 8 do not concern models that give accurate forces of all contacts. A displacement that does not follow its forces
+  is a failure of the prediction.
+
   The scene's outputs have formulas of their own, for absolute errors: an output may pass through zero. An estimate is
   at least HYCO_OUTPUT_ROUND_OFF of the largest absolute value of the output at the held-out points.
 */
@@ -21,7 +33,32 @@
 #include <petscviewer.h>
 #include <stdio.h>
 
-enum { MISFIT, PENETRATION, ADHESION, DISTANCE = HYCO_ESTIMATE_DISTANCE, TAIL };
+enum {
+  MISFIT,
+  PENETRATION,
+  ADHESION,
+  DISTANCE = HYCO_ESTIMATE_DISTANCE,
+  TAIL,
+  INCONSISTENCY = HYCO_ESTIMATE_FEATURES,
+  NEW_CONTACTS,
+  OUTSIDE,
+  REMAINDER
+};
+const char *const HycoFeatureNames[] = {"misfit of the full-order displacements",
+                                        "penetration",
+                                        "adhesion",
+                                        "distance",
+                                        "tail",
+                                        "difference between displacements and gaps at closed contacts",
+                                        "share of the force at contacts that no training solution closes",
+                                        "share of the force outside the RID",
+                                        "remainder of the reconstructed forces"};
+
+/* Values of the features up to which no regime is new; 0: not used for this purpose. */
+static const PetscReal slight[HYCO_FEATURES] = {1e-6, 1e-6, 1e-3, 0, 0, 1e-7, 0.02, 0.02, 0.02};
+#define MOST_FACTOR  100  /* of the estimates in a new regime */
+#define INCONSISTENT 1e-3 /* smaller differences are none in practice; */
+#define UNJUDGED     1e-2 /* likewise in a model without held-out points */
 
 static PetscReal Quotient(PetscReal part2, PetscReal size2)
 {
@@ -60,6 +97,39 @@ static void Contacts(HycoROM m, PetscReal *penetration, PetscReal *adhesion)
   }
   *penetration = Quotient(in, moved);
   *adhesion = Quotient(stuck, force);
+}
+
+/* What the displacement misses of the gaps at contacts with a force. */
+static PetscReal Inconsistency(HycoROM m)
+{
+  PetscReal lost = 0, force = 0, size = 0;
+
+  for (PetscInt k = 0; k < m->pairs.n; k++) {
+    for (PetscInt j = m->rows.start[k]; j < m->rows.start[k + 1]; j++)
+      size = PetscMax(size, PetscAbsReal(m->U[m->rows.dof[j]]));
+    if (!(m->Lambda[k] > 0)) continue;
+    lost += m->Lambda[k] * PetscSqr(HycoROMAddRow(m, k, -m->rows.gap[k]));
+    force += m->Lambda[k];
+  }
+  return Quotient(force > 0 ? lost / force : 0, size * size);
+}
+
+/* Shares of the force that indicate a regime: at contacts without a force in training, and outside the RID. */
+static void Shares(HycoROM m, PetscReal *fresh, PetscReal *outside)
+{
+  PetscReal sum = 0;
+
+  *fresh = *outside = 0;
+  for (PetscInt k = 0; k < m->pairs.n; k++) {
+    const PetscReal force = PetscMax(m->Lambda[k], 0);
+
+    sum += force;
+    if (m->closed && !m->closed[k]) *fresh += force;
+    if (!m->in_rid[k]) *outside += force;
+  }
+  if (!(sum > 0)) return;
+  *fresh /= sum;
+  *outside /= sum;
 }
 
 PetscReal HycoEstimatesDistance(HycoScene s, const PetscReal a[], const PetscReal b[])
@@ -101,6 +171,12 @@ static PetscErrorCode MeasureOne(HycoROM m, PetscReal feature[])
     feature[MISFIT] = Misfit(m);
     Contacts(m, &feature[PENETRATION], &feature[ADHESION]);
   }
+  feature[INCONSISTENCY] = Inconsistency(m);
+  feature[NEW_CONTACTS] = feature[OUTSIDE] = feature[REMAINDER] = 0;
+  if (!m->traits.forces) {
+    Shares(m, &feature[NEW_CONTACTS], &feature[OUTSIDE]);
+    feature[REMAINDER] = m->remainder;
+  }
   feature[TAIL] = Tail(m);
   feature[DISTANCE] = m->n_points && n_par ? PETSC_MAX_REAL : 0;
   for (PetscInt k = 0; n_par && k < m->n_points; k++)
@@ -112,18 +188,18 @@ static PetscErrorCode MeasureOne(HycoROM m, PetscReal feature[])
 PetscErrorCode HycoEstimatesFeatures(HycoROM m, PetscReal feature[])
 {
   const PetscInt shown = m->trace.shown;
-  PetscReal one[HYCO_ESTIMATE_FEATURES];
+  PetscReal one[HYCO_FEATURES];
 
   PetscFunctionBegin;
   if (!m->trace.n_listed) {
     PetscCall(MeasureOne(m, feature));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(PetscArrayzero(feature, HYCO_ESTIMATE_FEATURES));
+  PetscCall(PetscArrayzero(feature, HYCO_FEATURES));
   for (PetscInt k = 0; k < m->trace.n_listed; k++) {
     PetscCall(HycoROMSetStep(m, k));
     PetscCall(MeasureOne(m, one));
-    for (PetscInt j = 0; j < HYCO_ESTIMATE_FEATURES; j++) feature[j] = PetscMax(feature[j], one[j]);
+    for (PetscInt j = 0; j < HYCO_FEATURES; j++) feature[j] = PetscMax(feature[j], one[j]);
   }
   PetscCall(HycoROMSetStep(m, shown));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -170,31 +246,78 @@ static PetscReal EstimateOutput(const HycoOutputEstimate *o, const PetscReal ter
   return PetscMax(Estimate(o->law, term), HYCO_OUTPUT_ROUND_OFF * o->magnitude);
 }
 
-PetscErrorCode HycoEstimatesEvaluate(HycoROM m, HycoPrediction *p)
+/* The largest ratio of a feature to that at the held-out points; 1: none is larger. */
+static PetscReal Unseen(HycoROM m, const PetscReal feature[], PetscInt *which)
+{
+  PetscReal most = 1;
+
+  *which = -1;
+  for (PetscInt j = 0; j < HYCO_FEATURES; j++) {
+    const PetscReal reached = m->estimates.reached[j];
+
+    if (!(slight[j] > 0) || reached < 0 || (j <= PENETRATION && m->ops->features)) continue;
+    if (!(feature[j] > most * PetscMax(reached, slight[j]))) continue;
+    most = feature[j] / PetscMax(reached, slight[j]);
+    *which = j;
+  }
+  return most;
+}
+
+/* Whether the displacement follows the forces; in models without held-out points only if their forces are accurate. */
+static PetscBool IsInconsistent(HycoROM m, PetscReal inconsistency)
 {
   const HycoEstimates *t = &m->estimates;
-  PetscReal nearest[HYCO_MAX_PARAMETERS], term[HYCO_ESTIMATE_FEATURES], outside, estimate[HYCO_N_ESTIMATES];
 
-  PetscFunctionBegin;
-  for (PetscInt q = 0; q < HYCO_MAX_QUANTITIES; q++) p->estimated_error_quantity[q] = -1;
-  p->estimated_error_u = p->estimated_error_lambda = p->estimated_error_sigma = -1;
-  PetscCall(FindReach(m));
-  p->beyond = Beyond(m, m->fe->mu, nearest);
-  p->estimated_error_u_full = -1;
-  if (p->reason > 0) PetscTryTypeMethod(m, estimate, p);
-  if (!t->n || p->reason <= 0 || (m->ops->reconstruct && !m->reconstruct)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoEstimatesFeatures(m, term));
-  for (PetscInt j = 0; j < HYCO_ESTIMATE_FEATURES; j++) term[j] = PetscLogReal(1 + term[j] / t->floor[j]);
-  outside = 1 + (p->beyond > 0 ? HycoEstimatesDistance(m->scene, m->fe->mu, nearest) / t->floor[DISTANCE] : 0);
-  for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++)
-    estimate[e] = t->has[e] ? Estimate(t->law[e], term) * outside * outside : -1;
+  if (!t->n || t->reached[INCONSISTENCY] < 0) return (PetscBool)(m->traits.forces && inconsistency > UNJUDGED);
+  return (PetscBool)(inconsistency > PetscMax(INCONSISTENT, HYCO_UNSEEN * t->reached[INCONSISTENCY]));
+}
+
+/* The estimates of the calibrated formulas, times `factor`. */
+static void EvaluateFormulas(HycoROM m, const PetscReal feature[], PetscReal factor, HycoPrediction *p)
+{
+  const HycoEstimates *t = &m->estimates;
+  PetscReal term[HYCO_ESTIMATE_FEATURES], estimate[HYCO_N_ESTIMATES];
+
+  for (PetscInt j = 0; j < HYCO_ESTIMATE_FEATURES; j++) term[j] = PetscLogReal(1 + feature[j] / t->floor[j]);
+  for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++) estimate[e] = t->has[e] ? Estimate(t->law[e], term) * factor : -1;
   for (PetscInt q = 0; q < t->n_outputs; q++) {
     if (t->output[q].has && !PetscIsInfOrNanReal(p->quantity[q]))
-      p->estimated_error_quantity[q] = EstimateOutput(&t->output[q], term) * outside * outside;
+      p->estimated_error_quantity[q] = EstimateOutput(&t->output[q], term) * factor;
   }
   p->estimated_error_u = estimate[HYCO_ESTIMATE_U];
   p->estimated_error_sigma = estimate[HYCO_ESTIMATE_SIGMA];
   p->estimated_error_lambda = estimate[HYCO_ESTIMATE_LAMBDA];
+}
+
+PetscErrorCode HycoEstimatesEvaluate(HycoROM m, HycoPrediction *p)
+{
+  const HycoEstimates *t = &m->estimates;
+  PetscReal nearest[HYCO_MAX_PARAMETERS], feature[HYCO_FEATURES], outside;
+
+  PetscFunctionBegin;
+  for (PetscInt q = 0; q < HYCO_MAX_QUANTITIES; q++) p->estimated_error_quantity[q] = -1;
+  p->estimated_error_u = p->estimated_error_lambda = p->estimated_error_sigma = -1;
+  p->inconsistency = -1;
+  p->inconsistent = PETSC_FALSE;
+  p->unseen = 1;
+  p->unseen_feature = -1;
+  PetscCall(FindReach(m));
+  p->beyond = Beyond(m, m->fe->mu, nearest);
+  p->estimated_error_u_full = -1;
+  if (p->reason > 0) PetscTryTypeMethod(m, estimate, p);
+  if (p->reason <= 0 || (m->ops->reconstruct && !m->reconstruct)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoEstimatesFeatures(m, feature));
+  p->inconsistency = feature[INCONSISTENCY];
+  p->inconsistent = IsInconsistent(m, p->inconsistency);
+  if (t->n) {
+    p->unseen = Unseen(m, feature, &p->unseen_feature);
+    outside = 1 + (p->beyond > 0 ? HycoEstimatesDistance(m->scene, m->fe->mu, nearest) / t->floor[DISTANCE] : 0);
+    EvaluateFormulas(m, feature, outside * outside * PetscMin(p->unseen, MOST_FACTOR), p);
+  }
+  if (p->inconsistent && p->estimated_error_u >= 0)
+    p->estimated_error_u = PetscMax(p->estimated_error_u, p->inconsistency);
+  if (p->inconsistent && p->estimated_error_sigma >= 0)
+    p->estimated_error_sigma = PetscMax(p->estimated_error_sigma, p->inconsistency);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -57,6 +57,7 @@ PetscErrorCode HycoROMPredict(HycoROM m, PetscInt n, const PetscReal mu[])
   HycoLogged(HYCO_EVENT_SETUP, HycoROMSetUp(m));
   p->seconds.setup = HycoNow() - begin;
   begin = HycoNow();
+  m->remainder = 0;
   PetscUseTypeMethod(m, solve, mu);
   if (m->ops->reconstruct && m->reconstruct && p->reason > 0 && !m->scene->n_times) /* a path is reconstructed at its
                                                                                        listed times */

@@ -115,7 +115,7 @@ PetscErrorCode HycoROMDestroy(HycoROM *model)
   PetscCall(HycoPairsDestroy(&m->pairs));
   PetscCall(HycoMeshDestroy(&m->mesh));
   PetscCall(HycoSceneDestroy(&m->scene));
-  HycoFreeAll(&m->role, &m->master_reach, &m->in_rid, &m->V, &m->sigma, &m->fe_dof, &m->points, &m->reach,
+  HycoFreeAll(&m->role, &m->master_reach, &m->in_rid, &m->closed, &m->V, &m->sigma, &m->fe_dof, &m->points, &m->reach,
               &m->provenance, &m->search);
   PetscCall(PetscHeaderDestroy(model));
   PetscFunctionReturn(PETSC_SUCCESS);

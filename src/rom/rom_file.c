@@ -163,10 +163,11 @@ static PetscErrorCode LoadType(HycoH5 h, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* training/held_out: the number of predictions, medians and largest errors. training/estimates: the number behind them,
-   the largest force, the floors, and for each error whether it has an estimate, the coefficients, the constant.
-   training/outputs: a row for each output of the scene: whether it has an estimate, its largest absolute value, median
-   and largest error, the coefficients, the constant. */
+/* training/reached: the features' largest values at the held-out points; training/closed: by contact, whether a
+   training solution closes it. training/held_out: the number of predictions, medians and largest errors.
+   training/estimates: the number behind them, the largest force, the floors, and for each error whether it has an
+   estimate, the coefficients, the constant. training/outputs: a row for each output of the scene: whether it has an
+   estimate, its largest absolute value, median and largest error, the coefficients, the constant. */
 enum {
   HELD_NUMBERS = 1 + 2 * HYCO_N_ESTIMATES,
   OUTPUT_NUMBERS = 5 + HYCO_ESTIMATE_FEATURES,
@@ -218,6 +219,7 @@ static PetscErrorCode SaveEstimates(HycoH5 h, HycoROM m)
     for (PetscInt j = 0; j <= HYCO_ESTIMATE_FEATURES; j++) *at++ = t->law[e][j];
   }
   PetscCall(HycoH5WriteReal(h, "training/estimates", ESTIMATE_NUMBERS, 1, numbers));
+  PetscCall(HycoH5WriteReal(h, "training/reached", HYCO_FEATURES, 1, t->reached));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -245,6 +247,26 @@ static PetscErrorCode LoadHeldOut(HycoH5 h, HycoROM m)
   }
   PetscCall(PetscFree(numbers));
   HycoCheck(good, "%s: training/held_out is damaged", m->path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Older files have none of this. */
+static PetscErrorCode LoadReached(HycoH5 h, HycoROM m)
+{
+  PetscReal *numbers;
+  PetscInt n = HYCO_FEATURES, one = 1;
+  PetscBool good = PETSC_TRUE;
+
+  PetscFunctionBegin;
+  for (PetscInt j = 0; j < HYCO_FEATURES; j++) m->estimates.reached[j] = -1;
+  if (!HycoH5Has(h, "training/reached")) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoH5LoadReal(h, "training/reached", &n, &one, &numbers));
+  for (PetscInt j = 0; j < HYCO_FEATURES; j++) {
+    m->estimates.reached[j] = numbers[j];
+    good = (PetscBool)(good && numbers[j] >= 0);
+  }
+  PetscCall(PetscFree(numbers));
+  HycoCheck(good, "%s: training/reached is damaged", m->path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -319,6 +341,7 @@ static PetscErrorCode LoadEstimates(HycoH5 h, HycoROM m)
   PetscFunctionBegin;
   if (HycoH5Has(h, "training/search")) PetscCall(HycoH5LoadText(h, "training/search", &m->search));
   PetscCall(LoadHeldOut(h, m));
+  PetscCall(LoadReached(h, m));
   if (HycoH5Has(h, "training/trust")) PetscCall(LoadOldEstimates(h, m));
   if (!HycoH5Has(h, "training/estimates")) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoH5LoadReal(h, "training/estimates", &n, &one, &numbers));
@@ -453,6 +476,8 @@ static PetscErrorCode MoveProblem(HycoH5 h, HycoROM m)
   PetscCall(MoveType(h, m));
   PetscCall(HycoH5Real(h, "training/points", &m->n_points, m->scene->n_parameters, &m->points));
   PetscCall(HycoH5Reals(h, "training/numbers", 3, m->numbers));
+  if (HycoH5Reads(h) ? HycoH5Has(h, "training/closed") : m->closed != NULL)
+    PetscCall(HycoH5Int(h, "training/closed", 0, 1, &m->pairs.n, 1, &m->closed));
   PetscCall(MoveEstimates(h, m));
   PetscCall(MoveProvenance(h, m));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -142,18 +142,19 @@ static PetscErrorCode TestBound(void)
 {
   enum { N = 400 };
   PetscReal X[3 * N], y[N], c[4];
-  PetscInt below = 0;
+  PetscInt below = 0, own[N];
 
   PetscFunctionBegin;
   for (int i = 0; i < N; i++) {
     const PetscReal noise = (i * 37 % 101) / 101.;
 
+    own[i] = i;
     X[3 * i] = i / 100.;
     X[3 * i + 1] = i % 2;
     X[3 * i + 2] = (i * 17 % 29) / 29.;
     y[i] = 2 * X[3 * i] - X[3 * i + 2] + noise;
   }
-  PetscCall(HycoUpperBound(N, N, 3, X, y, 0.9, c));
+  PetscCall(HycoUpperBound(N, N, own, 3, X, y, 0.9, c));
   CHECK_NEAR(c[0], 2 / 1.1, 0.05); /* the ridge is a tenth of the column's square */
   CHECK(c[1] >= 0 && c[1] < 0.1, "x_1 says nothing, its weight is %g", (double)c[1]);
   CHECK_NEAR(c[2], 0, 0);
@@ -162,11 +163,11 @@ static PetscErrorCode TestBound(void)
   CHECK(below == 361, "expected 361 of 400 below, the number ceil(0.9 * 401); found %d", (int)below);
   c[0] = 1; /* given weights */
   c[1] = 3;
-  PetscCall(HycoRaiseBound(N, 3, X, y, 0.9, c));
+  PetscCall(HycoRaiseBound(N, own, 3, X, y, 0.9, c));
   below = 0;
   for (int i = 0; i < N; i++) below += y[i] <= c[3] + X[3 * i] + 3 * X[3 * i + 1] + 1e-12;
   CHECK(below == 361 && c[0] == 1 && c[1] == 3, "expected 361 of 400 below, found %d", (int)below);
-  PetscCall(HycoUpperBound(5, 5, 3, X, y, 0.95, c)); /* fewer rows than the quantile needs: the largest */
+  PetscCall(HycoUpperBound(5, 5, own, 3, X, y, 0.95, c)); /* fewer rows than the quantile needs: the largest */
   below = 0;
   for (int i = 0; i < 5; i++)
     below += y[i] <= c[3] + c[0] * X[3 * i] + c[1] * X[3 * i + 1] + c[2] * X[3 * i + 2] + 1e-12;

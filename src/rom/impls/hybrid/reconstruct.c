@@ -116,6 +116,23 @@ static PetscErrorCode SolveWrittenOut(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The difference of the combination's forces in the RID from the multipliers there, relative to these. */
+static PetscReal Remainder(HycoROM m, const HycoReconstruction r, PetscInt n_dual)
+{
+  PetscReal lost = 0, size = 0;
+
+  for (PetscInt i = 0; i < r->n; i++) {
+    const PetscReal force = m->Lambda[r->contact[i]];
+    PetscReal rest = force;
+
+    if (!m->in_rid[r->contact[i]]) continue;
+    for (PetscInt j = 0; j < n_dual; j++) rest -= r->c[j] * r->S[(size_t)j * (size_t)r->n + (size_t)i];
+    lost += rest * rest;
+    size += force * force;
+  }
+  return size > 0 ? PetscSqrtReal(lost / size) : 0;
+}
+
 PetscErrorCode HycoHybridReconstruct(HycoROM m)
 {
   HycoHybridROM h = (HycoHybridROM)m->data;
@@ -140,6 +157,7 @@ PetscErrorCode HycoHybridReconstruct(HycoROM m)
   if (h->reconstruct_solver != SOLVER_TAO && r->scale > 0)
     PetscCall(HycoWeightedNNLS(r->weighted, r->d, r->h, RTOL, r->c, &solved));
   if (!solved) PetscCall(SolveWrittenOut(m));
+  m->remainder = PetscMax(m->remainder, Remainder(m, r, h->n_dual));
   for (PetscInt j = 0; j < h->n_dual; j++) {
     const PetscReal *s = r->S + (size_t)j * (size_t)r->n;
 
