@@ -196,6 +196,10 @@ PetscErrorCode HycoFEFindUnconstrained(HycoFE fe, HycoPairs *pairs, const HycoMo
 void HycoSurfaceSizes(HycoFE fe, PetscInt group, PetscReal size[]);
 /* Tributary area (length in 2D, 1 in 1D) of each contact's slave node; 0 if its group is no surface. */
 PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, PetscReal area[]);
+/* The pressure of contact k: its force over its area. A node without area, on the axis of an axisymmetric scene with
+   cells of second order, has the mean pressure of itself and the middle of its facet. */
+PetscReal HycoContactPressure(HycoFE fe, const HycoPairs *pairs, PetscInt k, const PetscReal area[],
+                              const PetscReal lambda[]);
 /* Results of each contact of the scene (result: room for all; names borrowed from the scene) at fe's mu, from the
    normals, areas and forces (pairs->n) of its potential contacts; a force of at most `least` counts as zero. */
 void HycoContactResults(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], const PetscReal area[],

@@ -62,6 +62,11 @@ PetscErrorCode HycoFESetTangents(HycoFE fe, PetscBool all);
 /* Outward normal times area weight (n dS, of the full circle in an axisymmetric scene) at point q of a facet of the
    moved body; in 1D the sign of the direction away from its cell. */
 PetscErrorCode HycoFacetNormal(HycoFE fe, const HycoElement *el, PetscInt facet, PetscInt q, PetscReal n[3]);
+/* The same without the factor 2 pi r of an axisymmetric scene, which is 0 on the axis. */
+PetscErrorCode HycoFacetDirection(HycoFE fe, const HycoElement *el, PetscInt facet, PetscInt q, PetscReal n[3]);
+/* Whether a node has no share in the areas of its facets: on cells of second order, a node on the axis of an
+   axisymmetric scene, where the integral of its function times r over a facet is 0. */
+PetscBool HycoNodeHasNoArea(HycoFE fe, PetscInt node);
 /* Computes the signs of the cells' volumes as drawn, and allocates fe->mirrored; computes fe->mirrored at fe's
    nodes. Fails if a map folds a body (turns only some of its cells inside out) or mirrors one of two bodies that
    share nodes. */

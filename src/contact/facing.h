@@ -3,7 +3,7 @@
 #define HYCO_FACING_H
 #include <hycocontactimpl.h>
 
-/* Sum of n dS over the facets of `group` around each node (n_nodes x 3). */
+/* Sum of n dS over the facets of `group` around each node (n_nodes x 3), of which the direction matters. */
 PetscErrorCode HycoSurfaceVectors(HycoFE fe, PetscInt group, PetscReal vector[]);
 /* The same, scaled to unit length; 0 if a node has no facet. */
 PetscErrorCode HycoSurfaceNormals(HycoFE fe, PetscInt group, PetscReal normal[]);

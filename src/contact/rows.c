@@ -20,6 +20,15 @@ static void PassTied(HycoMesh m, PetscInt width, PetscReal v[])
   }
 }
 
+/* Adds n dS at a point of a facet to its node a, by the node's function N. Where a node has no area, on the axis, the
+   sum would be round-off: it is then weighted by N^2, and along the axis, by symmetry. */
+static void AddVector(HycoFE fe, PetscInt node, PetscReal N, const PetscReal n[3], PetscReal vector[3])
+{
+  const PetscBool none = HycoNodeHasNoArea(fe, node);
+
+  for (PetscInt c = none; c < 3; c++) vector[c] += (none ? N * N : N) * n[c];
+}
+
 PetscErrorCode HycoSurfaceVectors(HycoFE fe, PetscInt group, PetscReal vector[])
 {
   HycoMesh m = fe->mesh;
@@ -34,7 +43,9 @@ PetscErrorCode HycoSurfaceVectors(HycoFE fe, PetscInt group, PetscReal vector[])
 
       PetscCall(HycoFacetNormal(fe, el, f, q, n));
       for (PetscInt a = 0; a < m->nf; a++) {
-        for (PetscInt c = 0; c < 3; c++) vector[3 * m->facets[f * m->nf + a] + c] += el->N[q][a] * n[c];
+        const PetscInt node = m->facets[f * m->nf + a];
+
+        AddVector(fe, node, el->N[q][a], n, vector + 3 * node);
       }
     }
   }
@@ -286,8 +297,11 @@ static PetscErrorCode Shares(HycoFE fe, PetscInt group, PetscReal share[])
       PetscReal n[3];
 
       PetscCall(HycoFacetNormal(fe, el, f, q, n));
-      for (PetscInt a = 0; a < m->nf; a++)
-        share[m->facets[f * m->nf + a]] += el->N[q][a] * PetscSqrtReal(HycoDot(n, n));
+      for (PetscInt a = 0; a < m->nf; a++) {
+        const PetscInt node = m->facets[f * m->nf + a];
+
+        if (!HycoNodeHasNoArea(fe, node)) share[node] += el->N[q][a] * PetscSqrtReal(HycoDot(n, n));
+      }
     }
   }
   PassTied(m, 1, share);

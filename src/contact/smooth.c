@@ -65,7 +65,7 @@ static PetscErrorCode NormalAt(HycoFE fe, PetscInt facet, PetscInt v, PetscReal 
 
   PetscFunctionBegin;
   if (nodes)
-    PetscCall(HycoFacetNormal(fe, nodes, facet, v, n));
+    PetscCall(HycoFacetDirection(fe, nodes, facet, v, n));
   else
     PetscCall(HycoFacetVector(fe, facet, n));
   HycoNormalise(n);

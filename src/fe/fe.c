@@ -182,6 +182,11 @@ static PetscBool OnAxis(HycoFE fe, PetscInt node)
                      PetscAbsReal(fe->mesh->xyz[3 * node]) <= 1e-9 * HycoMeshLength(fe->mesh));
 }
 
+PetscBool HycoNodeHasNoArea(HycoFE fe, PetscInt node)
+{
+  return (PetscBool)(HycoMeshIsQuadratic(fe->mesh) && OnAxis(fe, node));
+}
+
 /* In an axisymmetric scene: checks that no node crosses the axis, and that those on it stay there. */
 static PetscErrorCode CheckAxis(HycoFE fe)
 {

@@ -164,7 +164,7 @@ PetscErrorCode HycoMeanGradients(HycoFE fe, const HycoElement *el, PetscInt cell
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFacetNormal(HycoFE fe, const HycoElement *el, PetscInt facet, PetscInt q, PetscReal n[3])
+PetscErrorCode HycoFacetDirection(HycoFE fe, const HycoElement *el, PetscInt facet, PetscInt q, PetscReal n[3])
 {
   HycoMesh m = fe->mesh;
   const PetscInt *node = m->facets + facet * m->nf;
@@ -193,8 +193,18 @@ PetscErrorCode HycoFacetNormal(HycoFE fe, const HycoElement *el, PetscInt facet,
     const PetscInt d = (c + 1) % 3, e = (c + 2) % 3;
 
     n[c] = side * el->w[q] * (t[0][d] * t[1][e] - t[0][e] * t[1][d]);
-    if (fe->formulation == HYCO_AXISYMMETRIC) n[c] *= 2 * PETSC_PI * Radius(fe, el->nv, node, el->N[q]);
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFacetNormal(HycoFE fe, const HycoElement *el, PetscInt facet, PetscInt q, PetscReal n[3])
+{
+  const PetscInt *node = fe->mesh->facets + facet * fe->mesh->nf;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFacetDirection(fe, el, facet, q, n));
+  for (PetscInt c = 0; fe->formulation == HYCO_AXISYMMETRIC && c < 3; c++)
+    n[c] *= 2 * PETSC_PI * Radius(fe, el->nv, node, el->N[q]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

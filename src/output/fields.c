@@ -153,7 +153,7 @@ static PetscErrorCode FillContacts(HycoFE fe, HycoPairs *pairs, const PetscReal 
       }
     }
     /* for a node in several contacts the largest and the smallest */
-    if (f->area[k] > 0) f->pressure[s] = PetscMax(f->pressure[s], lambda[k] / f->area[k]);
+    f->pressure[s] = PetscMax(f->pressure[s], HycoContactPressure(fe, pairs, k, f->area, lambda));
     if (HycoPairsAlone(fe->scene, pairs, k)) f->gap[k] = NAN;
     if (!(f->gap_node[s] <= f->gap[k])) f->gap_node[s] = f->gap[k];
   }

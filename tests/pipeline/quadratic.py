@@ -10,7 +10,7 @@ import numpy as np
 from common import PATIENCE, SOURCE, Case, msh
 
 sys.path.insert(0, os.path.join(SOURCE, 'tests', 'verify'))
-from grids import LINEAR, Grid, second  # noqa: E402
+from grids import LINEAR, Grid, graded, second  # noqa: E402
 
 KINDS = ('tri6', 'quad8', 'quad9')
 MODEL = """
@@ -103,6 +103,62 @@ class Quadratic(Case):
                         active = np.isfinite(gap[:, 0]) & (pressure[:, 0] > 0)
                         self.assertEqual(np.sum(active), 9)
                         np.testing.assert_allclose(pressure[active, 0], 1.5, rtol=1e-10)
+
+    def on_axis(self, kind, along, deep, lift):
+        """Two cylinders of revolution, the upper one's lower side raised by lift(x): the mesh."""
+        grid = Grid()
+        grid.box(LINEAR[kind], [along, -deep[::-1]], lambda x: x, 'seat', {'y0': 'base', 'y1': 'over'})
+        grid.box(LINEAR[kind], [along, deep], lambda x: x, 'block', {'y0': 'under', 'y1': 'top'})
+        nodes, elements, names = second(grid, kind)
+        block = next(tag for tag, name in names.items() if name[1] == 'block')
+        for i in {n - 1 for _, tag, cell in elements if tag == block for n in cell}:
+            nodes[i] = (nodes[i][0], nodes[i][1] + (1 - nodes[i][1] / deep[-1]) * lift(nodes[i][0]), 0)
+        return nodes, elements, names
+
+    def axis_fields(self):
+        """Of the slave nodes by radius: radius, force, pressure, gap, the force's axial component in space."""
+        with h5py.File(self.path('out.h5')) as f:
+            x, tag, slave, force = (f[name][()] for name in ('mesh/xyz', 'mesh/node_id', 'contact/node_id', 'contact/lambda'))
+            at = np.searchsorted(tag[:, 0], slave[:, 0])
+            order = np.argsort(x[at, 0])
+            at = at[order]
+            return (x[at, 0], force[order, 0], *(f['nodes/' + name][()][at, 0] for name in ('contact_pressure', 'gap')), f['nodes/contact_force'][()][at, 1])
+
+    def test_axis(self):
+        """A node on the axis has no share of its facet's area (the integral of N r is 0). It is held off the other body all the same, along the axis, and
+        has the pressure of the facet around it: p0 = 3 F / (2 pi a^2), a^3 = 3 F R / (4 E*) of Hertz; a uniform pressure exactly."""
+        E, nu, R, a = 200, 0.3, 10, 0.5
+        body = f'body: {{seat: {{young: {E}, poisson: {nu}}}, block: {{young: {E}, poisson: {nu}}}}}\n'
+        joint = 'contact: {joint: {type: pair, slave: under, master: over, tolerance: 4}}\noutput: {peak: {max: contact_pressure, contact: joint}}\n'
+        for kind in KINDS:
+            grid = self.on_axis(kind, np.linspace(0, 2, 5), np.linspace(0, 1, 4), lambda x: 0)
+            text = f'scene: {{mesh: mesh.msh, formulation: axisymmetric}}\n{body}fixed: {{base: {{y: 0}}}}\npressure: {{top: 1.5}}\n{joint}'
+            found = self.hyco('solve', '-scene', self.written(text, grid), '-output', 'out.xdmf')
+            self.solved(found)
+            self.near(found['contacts']['joint']['area'], 4 * np.pi, 1e-12)
+            self.near(found['outputs']['peak'], 1.5, 1e-9)
+            np.testing.assert_allclose(self.axis_fields()[2], 1.5, rtol=1e-9)
+            along = graded(a / 6, 1.5 * a, 8, 1.25)
+            grid = self.on_axis(kind, along, along, lambda x: (x * x if x < 3 else 6 * x - 9) / 2 / R)  # a cone from x = 3 on
+            text = text.replace('pressure: {top: 1.5}\n', '').replace('base: {y: 0}', f'base: {{y: 0}}, top: {{y: -{1.1 * a * a / R}}}')
+            for ranks in (0, 2):
+                found = self.hyco('solve', '-scene', self.written(text, grid), '-output', 'out.xdmf', ranks=ranks)
+                with self.subTest(kind=kind, ranks=ranks):
+                    self.solved(found)
+                    self.assertLess(found['balance'], 1e-10)
+                    r, force, pressure, gap, push = self.axis_fields()
+                    total = found['contacts']['joint']['force'][1]
+                    self.near(-found['supports']['top']['force'][1], total, 1e-9)
+                    width = np.cbrt(3 * total * R / 4 / (E / (1 - nu**2) / 2))
+                    p0 = 3 * total / 2 / np.pi / width**2
+                    self.assertEqual(r[0], 0)
+                    self.assertGreaterEqual(np.min(force), 0)
+                    self.assertGreaterEqual(np.min(push), 0)  # on the upper body: upwards
+                    self.assertGreater(np.min(gap), -1e-12)
+                    self.near(pressure[0], p0, 0.005)
+                    self.near(found['outputs']['peak'], p0, 0.005)
+                    self.assertEqual(found['outputs']['peak'], found['contacts']['joint']['pressure_max'])
+                    self.assertEqual(np.argmax(pressure), 0)
 
     def test_models(self):
         """Every type of model against full order, on one and two ranks."""
