@@ -138,13 +138,19 @@ static void Warn(Check *check, HycoContact c, const ContactRange *r)
               c->name, c->slave, (double)r->coarse, c->master);
 }
 
-static void Print(const HycoContact c, const ContactRange *r)
+static void Print(const Check *check, PetscInt contact, const ContactRange *r)
 {
+  const HycoContact c = check->fom->scene->contact[contact];
+  PetscReal stated;
+
+  PetscCallVoid(HycoContactGetLength(c, "tolerance", &stated));
   PetscCallVoid(Say("contact %s, %s: %d nodes of %s", c->name, ((PetscObject)c)->type_name, (int)r->n, c->slave));
   if (c->master) PetscCallVoid(Say(" against %s", c->master));
   if (r->facing_max && c->master)
     PetscCallVoid(r->facing_min == r->n ? Say(", all of which face it")
                                         : Say(", %d to %d of which face it", (int)r->facing_min, (int)r->facing_max));
+  if (r->facing_max && r->facing_min < r->n && stated >= 0 && !HycoPairsFollows(&check->whole->pairs, contact))
+    PetscCallVoid(Say("; %d face nothing within the tolerance of %g", (int)(r->n - r->facing_max), (double)stated));
   if (r->facing_max) PetscCallVoid(Say("; gaps from %.4g to %.4g", (double)r->gap_min, (double)r->gap_max));
   if (r->facing_max && r->gap_min < 0) PetscCallVoid(Say(" (below 0 the bodies overlap before any load)"));
   PetscCallVoid(Say("\n"));
@@ -168,7 +174,7 @@ void CheckContacts(Check *check)
     if (r->facing_max) cJSON_AddNumberToObject(contact, "gap_min", r->gap_min);
     if (r->facing_max) cJSON_AddNumberToObject(contact, "gap_max", r->gap_max);
     if (r->coarse > 0) cJSON_AddNumberToObject(contact, "slave_over_master", r->coarse);
-    Print(s->contact[k], r);
+    Print(check, k, r);
     Warn(check, s->contact[k], r);
   }
   cJSON_AddNumberToObject(check->json, "n_without_effect", check->n_without);

@@ -112,6 +112,31 @@ static PetscErrorCode CheckApart(const HycoPartners *t, HycoContact c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Fails if no slave node has a master: with the distance of the nearest one that faces it, if any does. */
+static PetscErrorCode RefuseAll(HycoPartners *t, HycoContact c, const HycoMatch *m)
+{
+  PetscReal nearest = PETSC_MAX_REAL;
+  PetscInt node = -1;
+
+  PetscFunctionBegin;
+  PetscCall(HycoPartnersReady(t));
+  for (PetscInt k = 0; k < m->n; k++) {
+    HycoProjection at;
+    HycoVerdict why;
+
+    PetscCall(HycoPartnersJudge(t, m->slave[k], PETSC_MAX_REAL, 0, &at, &why));
+    if (why != HYCO_MET || at.distance >= nearest) continue;
+    nearest = at.distance;
+    node = m->slave[k];
+  }
+  HycoCheck(node >= 0, "contact %s: no node of %s faces %s within %g; check that these are the surfaces in contact",
+            c->name, c->slave, c->master, (double)m->tolerance);
+  HycoFail("contact %s: no node of %s is within contact_%s_tolerance %g of %s; the nearest that faces it, node %d, is "
+           "%.4g away: give a larger tolerance, or remove the contact",
+           c->name, c->slave, c->name, (double)m->tolerance, c->master, (int)t->fe->mesh->node_id[node],
+           (double)nearest);
+}
+
 /* Adds each slave node with its master, or fails for those without one. */
 static PetscErrorCode AppendMatched(HycoPartners *t, HycoContact c, PetscInt index, HycoRemedy remedy,
                                     const HycoMatch *m, Missed missed[], HycoPairs *p)
@@ -130,9 +155,7 @@ static PetscErrorCode AppendMatched(HycoPartners *t, HycoContact c, PetscInt ind
     HycoPairsAppend(p, index, m->slave[k], m->at[k].n, m->at[k].node, m->at[k].weight);
   }
   if (n_missed) PetscCall(Complain(t, c, remedy, n_missed, missed, m));
-  HycoCheck(n_alone < m->n,
-            "contact %s: no node of %s faces %s within %g; check that these are the surfaces in contact", c->name,
-            c->slave, c->master, (double)m->tolerance);
+  if (n_alone == m->n) PetscCall(RefuseAll(t, c, m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -67,7 +67,15 @@ class Facing(Case):
         self.near(self.force()['total_contact_force'], right['total_contact_force'], 1e-12)
         self.scene('surface', ', tolerance: 1000')
         self.near(self.force()['total_contact_force'], right['total_contact_force'], 1e-12)
-        arcs(self.path('arcs.msh'), 20, gap=2)
+        self.scene('surface', ', tolerance: 1.5')  # fewer nodes face it than lie on half of the arc
+        fewer = self.force()
+        self.assertTrue(0 < fewer['n_facing'] < right['n_facing'], fewer['n_facing'])
+        self.near(fewer['total_contact_force'], right['total_contact_force'], 1e-12)
+        found = self.hyco('check', '-scene', 'arcs.yaml')
+        self.assertEqual(found['contacts'][0]['n_facing_max'], fewer['n_facing'])
+        self.assertIn(f"{right['n_contacts'] - fewer['n_facing']} face nothing within the tolerance of 1.5", self.run_raw('check', '-scene', 'arcs.yaml').stdout)
+        arcs(self.path('arcs.msh'), 20, gap=2)  # 4 apart: one line with the tolerance and the distance
+        self.refused('no node of over is within contact_c_tolerance 1.5 of under', 'is 4 away')
         self.scene('pair')
         self.refused('have no node of under within', 'use matching meshes, or type: surface')
         self.scene('pair', ', tolerance: 6')

@@ -107,12 +107,17 @@ static PetscErrorCode Settle(HycoPartners *t, HycoContact c, HycoMatch *m)
 
 static PetscErrorCode Remedy(HycoPartners *t, HycoContact c, PetscInt n, const PetscInt missed[], char text[HYCO_LINE])
 {
+  PetscReal stated;
+
   PetscFunctionBegin;
   (void)t;
-  (void)c;
   (void)n;
   (void)missed;
-  HycoFormat(text, "use matching meshes, or type: surface");
+  PetscCall(HycoContactGetLength(c, "tolerance", &stated));
+  if (stated >= 0)
+    HycoFormat(text, "use matching meshes, a larger contact_%s_tolerance, or type: surface", c->name);
+  else
+    HycoFormat(text, "use matching meshes, or type: surface");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

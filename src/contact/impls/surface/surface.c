@@ -5,7 +5,7 @@
 */
 #include "../../partners.h"
 
-/* If the scene gives a largest distance of masters, a node that faces none has no contact. */
+/* If the scene gives a largest distance of masters, a node that faces none within it has no contact. */
 static PetscErrorCode Settle(HycoPartners *t, HycoContact c, HycoMatch *m)
 {
   PetscReal stated;
@@ -14,7 +14,7 @@ static PetscErrorCode Settle(HycoPartners *t, HycoContact c, HycoMatch *m)
   (void)t;
   PetscCall(HycoContactGetLength(c, "tolerance", &stated));
   for (PetscInt k = 0; k < m->n && stated >= 0; k++) {
-    if (m->why[k] == HYCO_MET || m->why[k] == HYCO_FAR) continue;
+    if (m->why[k] == HYCO_MET) continue;
     m->at[k].n = 0;
     m->why[k] = HYCO_MET;
   }
