@@ -12,5 +12,11 @@ PetscErrorCode HycoQuantitiesMeasure(MPI_Comm comm, HycoFE fe, const PetscReal u
                                      const PetscReal reaction[], const HycoContactResult contact[], PetscReal value[]);
 /* Marks the cells (n_cells) that the scene's quantities need. */
 PetscErrorCode HycoQuantitiesMarkCells(HycoScene scene, HycoMesh mesh, PetscBool needed[]);
+/* Which reactions follow from balance (balance.c): balanced[k * n_bodies + b], for each quantity k the bodies b of
+   whose loads and contact forces it is minus the sum; for no body: it does not follow. mesh: whole, or the processes'
+   parts. Collective. */
+PetscErrorCode HycoQuantitiesBalance(MPI_Comm comm, HycoScene scene, HycoMesh mesh, PetscBool balanced[]);
+/* Marks the cells (n_cells) with the loads of these bodies. */
+PetscErrorCode HycoQuantitiesMarkLoads(HycoScene scene, HycoMesh mesh, const PetscBool balanced[], PetscBool needed[]);
 
 #endif

@@ -11,6 +11,7 @@
 
 typedef struct _n_HycoProbe *HycoProbe;
 typedef struct _n_HycoCarried *HycoCarried;
+typedef struct _n_HycoResultants *HycoResultants;
 typedef struct _n_HycoBalance *HycoBalance;
 
 /* Rows of B in CSR over dofs of a mesh, and D, as in HycoContactRows(). */
@@ -207,9 +208,10 @@ PetscErrorCode HycoROMMeasureQuantities(HycoROM model, HycoPrediction *predictio
 /* For a path: evaluates them in its history's steps; done once. */
 PetscErrorCode HycoROMMeasurePath(HycoROM model);
 /* Sets the model up in training, where it has no whole mesh: the cells that the quantities need, with the numbers of
-   their nodes and cells in the whole mesh, and the modes at their unknowns (n_dof x l, row major). Takes ownership of
-   both. */
-PetscErrorCode HycoROMSetProbe(HycoROM model, HycoMesh mesh, PetscReal V[]);
+   their nodes and cells in the whole mesh, and the modes at their unknowns (n_dof x l, row major); the reactions that
+   follow from balance, and the cells with the loads of their bodies (NULL, NULL: there are no reactions). Takes
+   ownership of all. */
+PetscErrorCode HycoROMSetProbe(HycoROM model, HycoMesh mesh, PetscReal V[], PetscBool balanced[], HycoMesh loaded);
 /* On that mesh; NULL: the quantities need only results of contacts. Borrowed. */
 HycoFE HycoROMGetProbe(HycoROM model);
 /* The quantities of another solution at the last prediction's parameters, mu[] with the time of a history: u and sigma
@@ -220,6 +222,23 @@ PetscErrorCode HycoROMMeasureGiven(HycoROM model, const PetscReal mu[], const Pe
 /* Results of each contact of the scene for forces Lambda (of all contacts) at the last prediction's parameters; NULL
    if the model does not have all forces. Borrowed until the next call. */
 PetscErrorCode HycoROMSumContacts(HycoROM model, const PetscReal Lambda[], const HycoContactResult *result[]);
+/* Whether the model has the forces of all contacts. */
+PetscBool HycoROMHasAllForces(HycoROM model);
+/* The sum of the same contact forces on the bodies of[b] of the scene along an axis; if it has all. */
+PetscErrorCode HycoROMPushBodies(HycoROM model, const PetscReal Lambda[], const PetscBool of[], PetscInt axis,
+                                 PetscReal *force);
+
+/* The reactions that follow from balance (resultants.c): balanced[] by HycoQuantitiesBalance(), the mesh of the cells
+   marked by HycoQuantitiesMarkLoads(); takes ownership of both, after an error too. */
+PetscErrorCode HycoResultantsCreate(HycoROM model, PetscBool balanced[], HycoMesh loaded, HycoResultants *resultants);
+/* From the model's whole mesh. */
+PetscErrorCode HycoResultantsFind(HycoROM model, HycoResultants *resultants);
+/* Whether all reactions of a prediction follow. */
+PetscBool HycoResultantsSuffice(HycoROM model, HycoResultants resultants);
+/* Sets the quantities that follow from forces Lambda of a prediction and the loads at mu[]. NULL-safe. */
+PetscErrorCode HycoResultantsSet(HycoROM model, HycoResultants resultants, const PetscReal mu[],
+                                 const PetscReal Lambda[], PetscReal value[]);
+PetscErrorCode HycoResultantsDestroy(HycoResultants *resultants);
 /* NULL-safe. */
 PetscErrorCode HycoCarriedDestroy(HycoCarried *carried);
 PetscErrorCode HycoProbeDestroy(HycoProbe *probe);

@@ -22,17 +22,15 @@ typedef struct {
   PetscReal *lambda;
 } Outputs;
 
-/* The cells that the outputs need, on rank 0; elsewhere NULL. Collective. */
-static PetscErrorCode GatherMesh(HycoReducer t, HycoMesh *mesh)
+/* The marked cells, on rank 0; elsewhere NULL. Collective. */
+static PetscErrorCode GatherMesh(HycoReducer t, const PetscBool needed[], HycoMesh *mesh)
 {
   HycoMesh part = t->fom->part, from = part;
-  PetscBool *needed, *group;
+  PetscBool *group;
   PetscInt *keep, n = 0;
 
   PetscFunctionBegin;
   *mesh = NULL;
-  PetscCall(PetscMalloc1(part->n_cells, &needed));
-  HycoOnEach(HycoComm(t), HycoQuantitiesMarkCells(t->scene, part, needed));
   if (t->fom->size > 1) {
     PetscCall(PetscCalloc1(part->n_groups, &group));
     PetscCall(HycoMeshGather(HycoComm(t), part, group, needed, &from));
@@ -51,6 +49,28 @@ static PetscErrorCode GatherMesh(HycoReducer t, HycoMesh *mesh)
     PetscCall(PetscFree(keep));
   }
   if (from != part) PetscCall(HycoMeshDestroy(&from));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The cells that the outputs need; the reactions that follow from balance, with the cells of their loads (NULL: there
+   are no reactions). The meshes are on rank 0. Collective. */
+static PetscErrorCode GatherCells(HycoReducer t, HycoMesh *mesh, PetscBool **balanced, HycoMesh *loaded)
+{
+  HycoMesh part = t->fom->part;
+  PetscBool *needed;
+
+  PetscFunctionBegin;
+  *balanced = NULL;
+  *loaded = NULL;
+  PetscCall(PetscMalloc1(part->n_cells, &needed));
+  HycoOnEach(HycoComm(t), HycoQuantitiesMarkCells(t->scene, part, needed));
+  PetscCall(GatherMesh(t, needed, mesh));
+  if (HycoSceneHasReactions(t->scene)) {
+    PetscCall(PetscCalloc1(t->scene->n_quantities * t->scene->n_bodies, balanced));
+    PetscCall(HycoQuantitiesBalance(HycoComm(t), t->scene, part, *balanced));
+    HycoOnEach(HycoComm(t), HycoQuantitiesMarkLoads(t->scene, part, *balanced, needed));
+    PetscCall(GatherMesh(t, needed, loaded));
+  }
   PetscCall(PetscFree(needed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -58,13 +78,14 @@ static PetscErrorCode GatherMesh(HycoReducer t, HycoMesh *mesh)
 /* Makes the model's probe of these cells and the modes at their nodes. Collective; m: on rank 0. */
 static PetscErrorCode MakeProbe(HycoReducer t, HycoROM m)
 {
-  HycoMesh mesh;
+  HycoMesh mesh, loaded;
   PetscReal *columns, *V = NULL;
+  PetscBool *balanced;
   PetscInt n;
 
   PetscFunctionBegin;
   if (!HycoSceneAsksFields(t->scene)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(GatherMesh(t, &mesh));
+  PetscCall(GatherCells(t, &mesh, &balanced, &loaded));
   n = mesh ? mesh->n_nodes * t->sizes[3] : 0;
   PetscCall(PetscMalloc1((size_t)n * (size_t)t->l + 1, &columns));
   PetscCall(HycoReducerFetchRows(t, t->V, t->l, mesh ? mesh->n_nodes : 0, mesh ? mesh->node_whole : NULL, columns));
@@ -74,7 +95,8 @@ static PetscErrorCode MakeProbe(HycoReducer t, HycoROM m)
       V[(size_t)i * (size_t)t->l + (size_t)j] = columns[(size_t)j * (size_t)n + (size_t)i];
   }
   PetscCall(PetscFree(columns));
-  HycoOnRoot(HycoComm(t), HycoROMSetProbe(m, mesh, V));
+  HycoOnRoot(HycoComm(t), HycoROMSetProbe(m, mesh, V, balanced, loaded));
+  if (t->rank) PetscCall(PetscFree(balanced));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

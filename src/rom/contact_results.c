@@ -56,27 +56,59 @@ static PetscErrorCode Bring(HycoROM m, HycoFE fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether Lambda has the forces of all contacts. */
-static PetscBool HasAll(HycoROM m)
+PetscBool HycoROMHasAllForces(HycoROM m)
 {
   return (PetscBool)(!m->ops->reconstruct || m->reconstruct || m->m == m->pairs.n);
 }
 
-PetscErrorCode HycoROMSumContacts(HycoROM m, const PetscReal Lambda[], const HycoContactResult *result[])
+/* Creates and updates the geometry; *least: a force up to it counts as zero. */
+static PetscErrorCode Prepare(HycoROM m, const PetscReal Lambda[], HycoFE *fe, PetscReal *least)
 {
   PetscReal most = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMBringContacts(m, fe));
+  PetscCall(Make(m));
+  PetscCall(Bring(m, *fe));
+  for (PetscInt k = 0; k < m->pairs.n; k++) most = PetscMax(most, Lambda[k]);
+  *least = HYCO_PRESSES * most;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMSumContacts(HycoROM m, const PetscReal Lambda[], const HycoContactResult *result[])
+{
+  PetscReal least;
   HycoFE fe;
 
   PetscFunctionBegin;
   *result = NULL;
-  if (!HasAll(m)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoROMBringContacts(m, &fe));
-  PetscCall(Make(m));
-  PetscCall(Bring(m, fe));
-  for (PetscInt k = 0; k < m->pairs.n; k++) most = PetscMax(most, Lambda[k]);
-  HycoContactResults(fe, &m->pairs, m->carried->normal, m->carried->area, Lambda, HYCO_PRESSES * most,
-                     m->carried->result);
+  if (!HycoROMHasAllForces(m)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(Prepare(m, Lambda, &fe, &least));
+  HycoContactResults(fe, &m->pairs, m->carried->normal, m->carried->area, Lambda, least, m->carried->result);
   *result = m->carried->result;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMPushBodies(HycoROM m, const PetscReal Lambda[], const PetscBool of[], PetscInt axis,
+                                 PetscReal *force)
+{
+  const PetscInt *body = m->mesh->node_body, *master;
+  const PetscReal *weight;
+  PetscReal least;
+  PetscInt n;
+  HycoFE fe;
+
+  PetscFunctionBegin;
+  PetscCall(Prepare(m, Lambda, &fe, &least));
+  *force = 0;
+  for (PetscInt k = 0; k < m->pairs.n; k++) {
+    const PetscReal along = Lambda[k] * m->carried->normal[3 * k + axis];
+
+    if (Lambda[k] <= least || HycoPairsAlone(m->scene, &m->pairs, k)) continue;
+    if (of[body[m->pairs.slave[k]]]) *force -= along;
+    HycoPairsMasters(&m->pairs, k, &n, &master, &weight);
+    for (PetscInt j = 0; j < n; j++) *force += of[body[master[j]]] ? weight[j] * along : 0;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

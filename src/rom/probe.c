@@ -17,6 +17,7 @@ struct _n_HycoProbe {
   PetscInt *surface_node;   /* by node: its number on `surface`; -1: in no contact. Allocated with reaction */
   HycoMesh surface;         /* the model's mesh without cells; NULL until needed */
   HycoFE fe_surface;
+  HycoResultants resultants; /* of the reactions that follow from balance; NULL: there are no reactions */
 };
 
 PetscErrorCode HycoProbeDestroy(HycoProbe *probe)
@@ -25,6 +26,7 @@ PetscErrorCode HycoProbeDestroy(HycoProbe *probe)
   if (!*probe) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoFEDestroy(&(*probe)->fe));
   PetscCall(HycoFEDestroy(&(*probe)->fe_surface));
+  PetscCall(HycoResultantsDestroy(&(*probe)->resultants));
   PetscCall(HycoMeshDestroy(&(*probe)->mesh));
   HycoFreeAll(&(*probe)->V, &(*probe)->u, &(*probe)->sigma, &(*probe)->fe_at, &(*probe)->reaction,
               &(*probe)->surface_node, &(*probe)->surface);
@@ -127,6 +129,18 @@ static PetscErrorCode React(HycoROM m, HycoProbe p, const PetscReal f_int[], con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Those of a prediction, unless all that the quantities need follow from balance. */
+static PetscErrorCode ReactPredicted(HycoROM m, HycoProbe p, const PetscReal f_int[], const PetscReal Lambda[])
+{
+  PetscFunctionBegin;
+  if (!p->reaction) PetscFunctionReturn(PETSC_SUCCESS);
+  if (HycoResultantsSuffice(m, p->resultants))
+    PetscCall(PetscArrayzero(p->reaction, p->fe->n_dof));
+  else
+    PetscCall(React(m, p, f_int, Lambda));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Once mesh and V are set. */
 static PetscErrorCode Fill(HycoROM m, HycoProbe p)
 {
@@ -182,6 +196,15 @@ static const PetscReal *ForcesAt(HycoROM m, PetscInt listed)
   return m->trace.Lambda + (size_t)listed * (size_t)m->pairs.n;
 }
 
+/* Those of a prediction: reactions that follow from balance are set from the loads and the contact forces. */
+static PetscErrorCode MeasurePredicted(HycoROM m, HycoProbe p, const PetscReal Lambda[], PetscReal value[])
+{
+  PetscFunctionBegin;
+  PetscCall(Measure(m, p, Lambda, value));
+  if (p) PetscCall(HycoResultantsSet(m, p->resultants, p->fe->mu, Lambda, value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Replays the laws from the first time to the last, and evaluates the quantities at the listed ones. */
 static PetscErrorCode March(HycoProbe p, HycoReplay *r)
 {
@@ -195,8 +218,8 @@ static PetscErrorCode March(HycoProbe p, HycoReplay *r)
     PetscCall(HycoReplayStep(r, k, p->u));
     if (j == trace->n_listed || trace->at[j] != k) continue;
     PetscCall(HycoFEStateFields(p->fe, r->march.state, p->sigma, NULL, NULL, NULL));
-    PetscCall(React(m, p, r->march.f_int, ForcesAt(m, j)));
-    PetscCall(Measure(m, p, ForcesAt(m, j), trace->step[j].quantity));
+    PetscCall(ReactPredicted(m, p, r->march.f_int, ForcesAt(m, j)));
+    PetscCall(MeasurePredicted(m, p, ForcesAt(m, j), trace->step[j].quantity));
     j++;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -233,7 +256,7 @@ static PetscErrorCode Follow(HycoROM m, HycoProbe p)
   Displace(m, p, m->gamma, U_fe);
   PetscCall(PetscFree(U_fe));
   PetscCall(HycoFEStress(p->fe, p->u, p->sigma));
-  PetscCall(React(m, p, NULL, m->Lambda));
+  PetscCall(ReactPredicted(m, p, NULL, m->Lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -248,14 +271,15 @@ static PetscErrorCode Make(HycoROM m)
   PetscCall(PetscNew(&m->probe));
   ierr = Extract(m, m->probe);
   if (!ierr) ierr = Fill(m, m->probe);
+  if (!ierr && HycoSceneHasReactions(m->scene)) ierr = HycoResultantsFind(m, &m->probe->resultants);
   if (ierr) PetscCall(HycoProbeDestroy(&m->probe));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMSetProbe(HycoROM m, HycoMesh mesh, PetscReal V[])
+PetscErrorCode HycoROMSetProbe(HycoROM m, HycoMesh mesh, PetscReal V[], PetscBool balanced[], HycoMesh loaded)
 {
-  PetscErrorCode ierr;
+  PetscErrorCode ierr, taken = PETSC_SUCCESS;
 
   PetscFunctionBegin;
   ierr = HycoROMSetUp(m); /* which otherwise destroys the probe */
@@ -264,8 +288,10 @@ PetscErrorCode HycoROMSetProbe(HycoROM m, HycoMesh mesh, PetscReal V[])
   m->probe->mesh = mesh;
   m->probe->V = V;
   if (!ierr) ierr = Fill(m, m->probe);
-  if (ierr) PetscCall(HycoProbeDestroy(&m->probe));
+  if (balanced) taken = HycoResultantsCreate(m, balanced, loaded, &m->probe->resultants);
+  if (ierr || taken) PetscCall(HycoProbeDestroy(&m->probe));
   PetscCall(ierr);
+  PetscCall(taken);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -278,7 +304,7 @@ static PetscErrorCode MeasureTimes(HycoROM m)
   PetscFunctionBegin;
   if (!m->probe) { /* only results of contacts */
     for (PetscInt j = 0; j < m->trace.n_listed; j++)
-      PetscCall(Measure(m, NULL, ForcesAt(m, j), m->trace.step[j].quantity));
+      PetscCall(MeasurePredicted(m, NULL, ForcesAt(m, j), m->trace.step[j].quantity));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   ierr = HycoReplayBegin(m, m->probe->fe, &r);
@@ -316,7 +342,7 @@ PetscErrorCode HycoROMMeasureQuantities(HycoROM m, HycoPrediction *out)
   }
   PetscCall(Make(m));
   if (m->probe) PetscCall(Follow(m, m->probe));
-  PetscCall(Measure(m, m->probe, m->Lambda, out->quantity));
+  PetscCall(MeasurePredicted(m, m->probe, m->Lambda, out->quantity));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

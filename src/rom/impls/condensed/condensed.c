@@ -505,8 +505,11 @@ static PetscBool Offers(HycoReducer t, PetscBool targets)
 
 PetscErrorCode HycoROMCreate_Condensed(HycoROM m)
 {
-  static const HycoROMTraits traits = {
-      .title = "condensed", .settings = HYCO_SETTINGS_NONE, .constrains = PETSC_TRUE, .forces = PETSC_TRUE};
+  static const HycoROMTraits traits = {.title = "condensed",
+                                       .settings = HYCO_SETTINGS_NONE,
+                                       .constrains = PETSC_TRUE,
+                                       .forces = PETSC_TRUE,
+                                       .resultants = PETSC_TRUE};
   static const HycoROMOps ops = {.setfromoptions = HycoCondensedSetFromOptions,
                                  .resettraining = HycoCondensedResetTraining,
                                  .begin = HycoCondensedBegin,

@@ -341,6 +341,7 @@ PetscErrorCode HycoCondensedTakePath(HycoROM m)
                                        .stiffness = PETSC_TRUE,
                                        .constrains = PETSC_TRUE,
                                        .history = PETSC_TRUE,
+                                       .resultants = PETSC_TRUE,
                                        .cells = PETSC_TRUE};
   static const HycoROMOps ops = {.setfromoptions = HycoCondensedSetFromOptions,
                                  .resettraining = HycoCondensedResetTraining,

@@ -1,0 +1,190 @@
+/*
+  Reactions that follow from balance: the forces of all supports, loads and contacts on connected bodies sum to zero
+  along an axis. Where a quantity's group has every support of such bodies along its axis, and no spring acts there, the
+  reaction is minus the sum of the loads and of the contact forces on these bodies, whatever the displacements are.
+*/
+#include <hycoquantities.h>
+
+/* part[b]: the first of the bodies that share nodes with body b or are tied to it, directly or by others. Collective.
+ */
+static PetscErrorCode JoinBodies(MPI_Comm comm, HycoScene scene, HycoMesh m, PetscInt part[])
+{
+  const PetscInt n = scene->n_bodies;
+  PetscBool *joined, change = PETSC_TRUE;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(n * n, &joined));
+  for (PetscInt k = 0; k < m->n_cells * m->nv; k++)
+    joined[m->cell_body[k / m->nv] * n + m->node_body[m->cells[k]]] = PETSC_TRUE;
+  for (PetscInt k = 0; k < m->n_tied; k++) {
+    for (PetscInt j = m->tied_start[k]; j < m->tied_start[k + 1]; j++)
+      joined[m->node_body[m->tied[k]] * n + m->node_body[m->tied_master[j]]] = PETSC_TRUE;
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, joined, (PetscMPIInt)(n * n), HYCO_MPI_BOOL, MPI_LOR, comm));
+  for (PetscInt b = 0; b < n; b++) part[b] = b;
+  while (change) {
+    change = PETSC_FALSE;
+    for (PetscInt k = 0; k < n * n; k++) {
+      const PetscInt a = k / n, b = k % n, least = PetscMin(part[a], part[b]);
+
+      if (!joined[k] || part[a] == part[b]) continue;
+      part[a] = part[b] = least;
+      change = PETSC_TRUE;
+    }
+  }
+  PetscCall(PetscFree(joined));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether a support can have a force along an axis. */
+static PetscErrorCode SupportActs(const HycoFixed *fixed, PetscInt axis, PetscBool *acts)
+{
+  const PetscReal mu[HYCO_MAX_PARAMETERS] = {0}, x[3] = {0, 0, 0}; /* a direction does not change with parameters */
+  HycoExpr direction = fixed->direction[axis];
+  PetscReal value = 1;
+
+  PetscFunctionBegin;
+  if (direction && !HycoExprInSpace(direction)) PetscCall(HycoExprEval(direction, mu, 1, x, &value));
+  *acts = (PetscBool)(fixed->value[axis] || (direction && value != 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Marks the parts of a group's nodes, on which a support or (in: NULL) a spring acts: inside[] of the nodes with in[],
+   outside[] of the others. */
+static PetscErrorCode MarkGroup(HycoMesh m, const char key[], const char name[], const PetscInt part[],
+                                const PetscBool in[], PetscBool inside[], PetscBool outside[])
+{
+  PetscInt g = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeshFindGroup(m, key, name, &g));
+  for (PetscInt k = m->group_start[g]; k < m->group_start[g + 1]; k++) {
+    const PetscInt i = m->group_node[k];
+
+    if (in && HycoMeshTied(m, i) >= 0) continue; /* its masters have the support */
+    (in && in[i] ? inside : outside)[part[m->node_body[i]]] = PETSC_TRUE;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Marks the parts that supports of the quantity's group hold along its axis, and those that something else holds. */
+static PetscErrorCode MarkHeld(HycoScene scene, HycoMesh m, const HycoQuantity *q, const PetscInt part[],
+                               const PetscBool in[], PetscBool inside[], PetscBool outside[])
+{
+  PetscFunctionBegin;
+  for (PetscInt s = 0; s < scene->n_fixed; s++) {
+    PetscBool acts = PETSC_FALSE;
+
+    PetscCall(SupportActs(&scene->fixed[s], q->field, &acts));
+    if (acts) PetscCall(MarkGroup(m, "fixed", scene->fixed[s].group, part, in, inside, outside));
+  }
+  for (PetscInt s = 0; s < scene->n_springs; s++) {
+    const HycoSpring *spring = &scene->spring[s];
+
+    if (spring->stiffness[q->field] || spring->stiffness[3])
+      PetscCall(MarkGroup(m, "spring", spring->group, part, NULL, inside, outside));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* in[n_nodes]: marks the group of a quantity; without one all nodes. */
+static PetscErrorCode MarkNodes(HycoMesh m, const HycoQuantity *q, PetscBool in[])
+{
+  PetscInt g = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < m->n_nodes; i++) in[i] = (PetscBool)!q->group;
+  if (!q->group) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoMeshFindGroup(m, "output", q->group, &g));
+  for (PetscInt k = m->group_start[g]; k < m->group_start[g + 1]; k++) in[m->group_node[k]] = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* held: 2 x n_bodies for each quantity: inside its group, outside it. */
+static PetscErrorCode MarkAll(HycoScene scene, HycoMesh m, const PetscInt part[], PetscBool held[])
+{
+  const PetscInt n = scene->n_bodies;
+  PetscBool *in;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(m->n_nodes, &in));
+  for (PetscInt k = 0; k < scene->n_quantities; k++) {
+    const HycoQuantity *q = &scene->quantity[k];
+
+    if (q->kind != HYCO_QUANTITY_REACTION) continue;
+    PetscCall(MarkNodes(m, q, in));
+    PetscCall(MarkHeld(scene, m, q, part, in, held + 2 * k * n, held + (2 * k + 1) * n));
+  }
+  PetscCall(PetscFree(in));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoQuantitiesBalance(MPI_Comm comm, HycoScene scene, HycoMesh m, PetscBool balanced[])
+{
+  const PetscInt n = scene->n_bodies;
+  PetscBool *held;
+  PetscInt *part;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n, &part));
+  PetscCall(PetscCalloc1(2 * scene->n_quantities * n, &held));
+  PetscCall(JoinBodies(comm, scene, m, part));
+  HycoOnEach(comm, MarkAll(scene, m, part, held));
+  PetscCallMPI(
+      MPI_Allreduce(MPI_IN_PLACE, held, (PetscMPIInt)(2 * scene->n_quantities * n), HYCO_MPI_BOOL, MPI_LOR, comm));
+  for (PetscInt k = 0; k < scene->n_quantities; k++) {
+    const PetscBool *inside = held + 2 * k * n, *outside = inside + n;
+    PetscBool follows = PETSC_TRUE;
+
+    for (PetscInt b = 0; b < n; b++) follows = (PetscBool)(follows && !(inside[b] && outside[b]));
+    for (PetscInt b = 0; b < n; b++) balanced[k * n + b] = (PetscBool)(follows && inside[part[b]]);
+  }
+  PetscCall(PetscFree(held));
+  PetscCall(PetscFree(part));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Marks the cells around the points and lines of a load. */
+static PetscErrorCode MarkPoints(HycoMesh m, const HycoPointLoad *load, PetscBool node[], PetscBool needed[])
+{
+  PetscInt g = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeshFindGroup(m, "force", load->group, &g));
+  PetscCall(PetscArrayzero(node, m->n_nodes));
+  for (PetscInt k = m->group_start[g]; k < m->group_start[g + 1]; k++) node[m->group_node[k]] = PETSC_TRUE;
+  for (PetscInt k = 0; k < m->n_cells * m->nv; k++) {
+    if (node[m->cells[k]]) needed[k / m->nv] = PETSC_TRUE;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoQuantitiesMarkLoads(HycoScene scene, HycoMesh m, const PetscBool balanced[], PetscBool needed[])
+{
+  const PetscInt n = scene->n_bodies;
+  PetscBool *node;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(needed, m->n_cells));
+  PetscCall(PetscMalloc1(m->n_nodes, &node));
+  for (PetscInt s = 0; s < scene->n_loads; s++) {
+    PetscInt g = 0;
+
+    PetscCall(HycoMeshFindGroup(m, "load", scene->load[s].group, &g));
+    for (PetscInt f = 0; f < m->n_facets; f++) {
+      if (m->facet_group[f] == g && m->facet_cell[f] >= 0) needed[m->facet_cell[f]] = PETSC_TRUE;
+    }
+  }
+  for (PetscInt s = 0; s < scene->n_point_loads; s++) PetscCall(MarkPoints(m, &scene->point_load[s], node, needed));
+  PetscCall(PetscFree(node));
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    const HycoBody *body = &scene->body[m->cell_body[e]];
+    PetscBool any = PETSC_FALSE;
+
+    for (PetscInt k = 0; k < scene->n_quantities; k++) any = (PetscBool)(any || balanced[k * n + m->cell_body[e]]);
+    if (body->force[0] || body->force[1] || body->force[2] || HycoSceneHasInertia(scene, body, NULL))
+      needed[e] = PETSC_TRUE;
+    needed[e] = (PetscBool)(needed[e] && any);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,157 @@
+/*
+  Reactions of a prediction that follow from balance: minus the sum of the loads and of the contact forces on bodies
+  that only the supports of a quantity's group hold along its axis. Loads and normals are exact, so that the error is
+  that of the contact forces. A type that computes these itself has smaller errors there than in its displacements; of
+  other types the reactions from displacements are closer than the sums of contact forces, so that balance serves only
+  where contact does not act on the bodies, or acts between them.
+*/
+#include <hycoquantities.h>
+#include <hycoromimpl.h>
+
+struct _n_HycoResultants {
+  PetscBool *balanced;                   /* n_quantities x n_bodies */
+  PetscBool pushed[HYCO_MAX_QUANTITIES]; /* contact acts on these bodies from outside */
+  HycoMesh mesh;                         /* the cells with the loads of these bodies */
+  HycoFE fe;
+  PetscReal *load; /* n_dof: on the nodes */
+};
+
+PetscErrorCode HycoResultantsDestroy(HycoResultants *resultants)
+{
+  PetscFunctionBegin;
+  if (!*resultants) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoFEDestroy(&(*resultants)->fe));
+  PetscCall(HycoMeshDestroy(&(*resultants)->mesh));
+  HycoFreeAll(&(*resultants)->balanced, &(*resultants)->load);
+  PetscCall(PetscFree(*resultants));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Marks the bodies with nodes of a contact's group. */
+static PetscErrorCode MarkBodies(HycoROM m, const char group[], PetscBool body[])
+{
+  HycoMesh mesh = m->mesh;
+  PetscInt g = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeshFindGroup(mesh, "contact", group, &g));
+  for (PetscInt k = mesh->group_start[g]; k < mesh->group_start[g + 1]; k++)
+    body[mesh->node_body[mesh->group_node[k]]] = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Sets pushed[]: a contact has bodies of a quantity on one side only. */
+static PetscErrorCode FindPushed(HycoROM m, HycoResultants r)
+{
+  const HycoScene scene = m->scene;
+  PetscBool *body;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(scene->n_bodies, &body));
+  for (PetscInt c = 0; c < scene->n_contacts; c++) {
+    const HycoContact contact = scene->contact[c];
+
+    PetscCall(PetscArrayzero(body, scene->n_bodies));
+    PetscCall(MarkBodies(m, contact->slave, body));
+    if (contact->master) PetscCall(MarkBodies(m, contact->master, body));
+    for (PetscInt q = 0; q < scene->n_quantities; q++) {
+      PetscBool in = PETSC_FALSE, out = (PetscBool)!contact->master;
+
+      for (PetscInt b = 0; b < scene->n_bodies; b++) {
+        in = (PetscBool)(in || (body[b] && r->balanced[q * scene->n_bodies + b]));
+        out = (PetscBool)(out || (body[b] && !r->balanced[q * scene->n_bodies + b]));
+      }
+      r->pushed[q] = (PetscBool)(r->pushed[q] || (in && out));
+    }
+  }
+  PetscCall(PetscFree(body));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoResultantsCreate(HycoROM m, PetscBool balanced[], HycoMesh loaded, HycoResultants *resultants)
+{
+  HycoResultants r;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(resultants));
+  r = *resultants;
+  r->balanced = balanced;
+  r->mesh = loaded;
+  ierr = HycoFECreate(m->scene, loaded, &r->fe);
+  if (!ierr) PetscCall(PetscMalloc1(r->fe->n_dof, &r->load));
+  if (!ierr) ierr = FindPushed(m, r);
+  if (ierr) PetscCall(HycoResultantsDestroy(resultants));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoResultantsFind(HycoROM m, HycoResultants *resultants)
+{
+  PetscBool *balanced, *needed;
+  PetscInt *keep, n = 0;
+  HycoMesh loaded;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(m->scene->n_quantities * m->scene->n_bodies, &balanced));
+  PetscCall(PetscMalloc2(m->whole->n_cells, &needed, m->whole->n_cells, &keep));
+  PetscCall(HycoQuantitiesBalance(PETSC_COMM_SELF, m->scene, m->whole, balanced));
+  PetscCall(HycoQuantitiesMarkLoads(m->scene, m->whole, balanced, needed));
+  for (PetscInt e = 0; e < m->whole->n_cells; e++) {
+    if (needed[e]) keep[n++] = e;
+  }
+  PetscCall(HycoMeshExtract(m->whole, n, keep, 0, NULL, 0, NULL, &loaded));
+  PetscCall(PetscFree2(needed, keep));
+  PetscCall(HycoResultantsCreate(m, balanced, loaded, resultants));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The bodies from whose balance quantity q follows; NULL: it does not. */
+static const PetscBool *Bodies(HycoROM m, HycoResultants r, PetscInt q)
+{
+  const PetscBool *of = r->balanced + q * m->scene->n_bodies;
+
+  if (r->pushed[q] && !(m->traits.resultants && HycoROMHasAllForces(m))) return NULL;
+  for (PetscInt b = 0; b < m->scene->n_bodies; b++) {
+    if (of[b]) return of;
+  }
+  return NULL;
+}
+
+PetscBool HycoResultantsSuffice(HycoROM m, HycoResultants r)
+{
+  for (PetscInt q = 0; q < m->scene->n_quantities; q++) {
+    if (m->scene->quantity[q].kind == HYCO_QUANTITY_REACTION && !Bodies(m, r, q)) return PETSC_FALSE;
+  }
+  return PETSC_TRUE;
+}
+
+/* The loads on the bodies of[b] along an axis. */
+static PetscReal Load(HycoResultants r, const PetscBool of[], PetscInt axis)
+{
+  PetscReal sum = 0;
+
+  for (PetscInt i = 0; i < r->mesh->n_nodes; i++) sum += of[r->mesh->node_body[i]] ? r->load[i * r->fe->dim + axis] : 0;
+  return sum;
+}
+
+PetscErrorCode HycoResultantsSet(HycoROM m, HycoResultants r, const PetscReal mu[], const PetscReal Lambda[],
+                                 PetscReal value[])
+{
+  PetscBool first = PETSC_TRUE;
+
+  PetscFunctionBegin;
+  for (PetscInt q = 0; r && q < m->scene->n_quantities; q++) {
+    const PetscInt axis = m->scene->quantity[q].field;
+    const PetscBool *of = Bodies(m, r, q);
+    PetscReal push = 0;
+
+    if (!of) continue;
+    if (first) PetscCall(HycoFESetParameters(r->fe, mu));
+    if (first) PetscCall(HycoFELoads(r->fe, r->load));
+    first = PETSC_FALSE;
+    if (r->pushed[q]) PetscCall(HycoROMPushBodies(m, Lambda, of, axis, &push));
+    value[q] = 0 - push - Load(r, of, axis);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
