@@ -27,6 +27,7 @@ typedef struct {
   PetscInt n_dependent; /* closed contacts whose rows depend on those of others; if > 0, Lambda is not unique (U is) */
   PetscInt iterations, dim;
   PetscReal total_contact_force, lambda_max, lambda_norm2, u_norm2, u_min[3], u_max[3];
+  PetscReal u_relative; /* the largest displacement, over the extent of the mesh or the largest prescribed one */
   PetscReal quantity[HYCO_MAX_QUANTITIES]; /* those of HycoSceneGetQuantities() */
   PetscInt n_facing;          /* contacts that may close: on moved surfaces the slave nodes that face a master */
   PetscReal overlap, sliding; /* largest initial overlap (length); largest motion of a closed contact along its
@@ -36,7 +37,7 @@ typedef struct {
   HycoReason reason;
   HycoSeconds seconds;
   char regularised[512]; /* unconstrained motions that -hyco_regularise removed, separated by "; " */
-  char free_motion[128]; /* a motion that only contact prevents: "body block from moving along (0, 1, 0)"; "": none */
+  char why[512];         /* not converged: the reason in words, with the body or the number that shows it; else "" */
 } HycoSummary;
 
 /* Forces on the bodies: of the supports of a group, of the springs of a group, of all loads, of all contacts (between

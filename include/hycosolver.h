@@ -48,7 +48,9 @@ typedef enum {
   HYCO_DIVERGED_SINGULAR = -3,         /* K (or its active saddle point) is singular */
   HYCO_DIVERGED_FLOATING = -4,         /* the load lifts a body off the contacts, which alone hold it */
   HYCO_DIVERGED_NO_CONTACT_BASIS = -5, /* a reduced model without any contact force, where bodies penetrate */
-  HYCO_DIVERGED_STEP = -6              /* a history: its time steps became too small */
+  HYCO_DIVERGED_STEP = -6,             /* a history: its time steps became too small */
+  HYCO_DIVERGED_DISPLACEMENT = -7,     /* full order: displacements of more than 1e6 times the mesh's extent */
+  HYCO_DIVERGED_ENERGY = -8            /* full order: strain energy and work differ */
 } HycoReason;
 
 /* Collective. The caller owns it. */

@@ -20,12 +20,18 @@ typedef struct _p_HycoSystem *HycoSystem;
 
 /*
   The four Karush-Kuhn-Tucker residuals, relative (dimensionless), recomputed from K, Bt, B, F, D:
-    stationarity     |r|_2 / max(|K x|_2, |Bt L|_2, |F|_2), r = K x + Bt L - F without the entries up to the effect of
-  rounding x to double precision, 16 eps (|K_ii x_i| + |F_i|) penetration      max_i [B x - D]_i^+ / d       d =
-  max(|D|_inf, |B|_inf |x|_inf), a gap of the scene's size adhesion         max_i [-L_i]^+ / |L|_inf complementarity
-  max_i |L_i (D - B x)_i| / (|L|_inf d) A quotient 0/0 is 0. `rounding` is the stationarity of the entries left out. It
-  grows with the square of the number of unknowns along a body (1e-11 on a rope of 1e3 nodes, 1e-5 on one of 1e6), and
-  no solution in double precision has a smaller residual.
+
+    stationarity     |r|_2 / f, r = K x + Bt L - F without the entries up to the effect of rounding x to double
+                     precision, 16 eps (|K_ii x_i| + |F_i|); f = max(|Bt L|_2, |F|_2), or |K x|_2 if that is more, but
+                     at most the sum of the two. With a null space of K also the work of F - Bt L on it, relative to
+                     the sum of its terms' sizes: K x has no part in it, however large x is
+    penetration      max_i [B x - D]_i^+ / d, d = max(|D|_inf, |B|_inf |x|_inf), a gap of the scene's size
+    adhesion         max_i [-L_i]^+ / |L|_inf
+    complementarity  max_i |L_i (D - B x)_i| / (|L|_inf d)
+
+  A quotient 0/0 is 0. `rounding` is the stationarity of the entries left out. It grows with the square of the number of
+  unknowns along a body (1e-11 on a rope of 1e3 nodes, 1e-5 on one of 1e6), and no solution in double precision has a
+  smaller residual.
 */
 typedef struct {
   PetscReal stationarity, penetration, adhesion, complementarity, rounding;

@@ -104,6 +104,13 @@ PetscErrorCode HycoFOMTakeOutReleased(HycoFOM fom, Vec u);
 /* Number of closed contacts of the last solution whose rows of B depend on the others; if it is not 0, the contact
    forces are not unique. Rank 0. */
 PetscErrorCode HycoFOMCountDependent(HycoFOM fom, PetscInt *dependent);
+/* Creates distributed vectors of the motions; VecDestroyVecs() destroys them. Collective. */
+PetscErrorCode HycoFOMMotionVectors(HycoFOM fom, const HycoMotions *motions, Vec **v);
+/* Changes the reason of a solution u (of the part's unknowns) whose displacements or energies are impossible.
+   relative: the largest displacement, over the extent of the mesh. why: the reason in words, with the body or the
+   number that shows it, for the contact forces L (NULL: none); empty if the solution is accepted. Collective. */
+PetscErrorCode HycoFOMJudge(HycoFOM fom, const PetscReal u[], Vec L, PetscReal energy_defect, HycoReason *reason,
+                            PetscReal *relative, char why[HYCO_LINE]);
 /* Attaches to K the rigid motions that only contact prevents. Collective. */
 PetscErrorCode HycoFOMSetMotions(HycoFOM fom);
 /* The forces of supports in the last solution, at the part's unknowns (valid at the nodes it owns), 0 where nothing

@@ -45,6 +45,13 @@ PetscErrorCode HycoDirectSolve(HycoDirect direct, Vec r, Vec x);
 PetscErrorCode HycoKernelSize(Mat K, PetscInt *n);
 /* That many unknowns, ascending, without which K is regular; the same on every rank. Collective. */
 PetscErrorCode HycoKernelPins(MPI_Comm comm, Mat K, PetscInt n, PetscInt pinned[]);
+/*
+  The work of the forces F - b (b: NULL for 0) on K's null space, which no K x balances: the largest |z.(F - b)| of its
+  vectors z, relative to |z|.(|F| + |b|), or to 1e-2 |z| max(|F|, |b|) if that is more; 0 without a null space. Left out
+  is what the rounding of x adds to forces that are computed from K x, 16 eps |z|.|K_ii x_i|, but at most 1e-2.
+  Collective.
+*/
+PetscErrorCode HycoKernelWork(Mat K, Vec x, Vec F, Vec b, PetscReal *share);
 
 /* place[i] on rank 0: position of unknown i (of n) in a fill-reducing order of K. Collective. */
 PetscErrorCode HycoDissection(MPI_Comm comm, Mat K, PetscInt place[]);

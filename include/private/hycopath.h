@@ -50,6 +50,9 @@ typedef struct {
   PetscErrorCode (*stiffness)(HycoPath);
   /* Adds the effect of supports that have moved since the last accepted time. */
   PetscErrorCode (*moves)(HycoPath, Vec rhs);
+  /* Says why a contact system has no solution, for its reason, or why a converged step is not accepted; why is empty if
+     it is. */
+  PetscErrorCode (*judge)(HycoPath, HycoReason reason, char why[HYCO_LINE]);
   PetscErrorCode (*accept)(HycoPath, const HycoStepAttempt *); /* the attempt becomes the state at t */
   PetscErrorCode (*record)(HycoPath); /* at a listed time, or at the last time reached: sets `now` */
   PetscErrorCode (*save)(HycoPath);   /* writes the checkpoint */

@@ -71,8 +71,7 @@ PetscErrorCode CheckSolve(Check *check, const PetscReal mu[], Cost *cost)
   PetscFunctionBegin;
   PetscCall(HycoFOMSolve(check->fom, check->fom->scene->n_parameters, mu));
   PetscCall(HycoFOMGetSummary(check->fom, &s));
-  HycoCheck(s.reason > 0, "the solve at the centre of the ranges: %s%s%s", HycoReasonName(s.reason),
-            s.free_motion[0] ? "; no support keeps " : "", s.free_motion);
+  HycoCheck(s.reason > 0, "the solve at the centre of the ranges: %s", s.why);
   cost->solved = PETSC_TRUE;
   cost->first = s.seconds.total;
   cost->next = s.seconds.solve;
@@ -80,6 +79,11 @@ PetscErrorCode CheckSolve(Check *check, const PetscReal mu[], Cost *cost)
                 (int)s.n_contacts, (double)s.total_contact_force));
   cJSON_AddNumberToObject(check->json, "n_active", s.n_active);
   cJSON_AddNumberToObject(check->json, "total_contact_force", s.total_contact_force);
+  if (s.u_relative > 1 && check->warnings)
+    CheckWarn(
+        check,
+        "the displacements at the centre of the ranges are %.1e times the extent of the mesh; are the units right?",
+        (double)s.u_relative);
   if (s.n_contacts && !s.n_active && check->warnings) CheckWarn(check, "no contact closes at the centre of the ranges");
   PetscFunctionReturn(PETSC_SUCCESS);
 }

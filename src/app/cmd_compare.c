@@ -74,7 +74,7 @@ static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, 
   PetscCall(HycoFOMGetSummary(fom, &s));
   if (s.reason < 0) {
     PetscCall(DriverFormatPoint(scene, mu, words, NULL));
-    HycoFail("the full-order solution at %s failed: %s; no comparison is possible", words, HycoReasonName(s.reason));
+    HycoFail("the full-order solution at %s failed: %s; no comparison is possible", words, s.why);
   }
   PetscCall(HycoROMPredict(model, n_par, mu));
   PetscCall(HycoROMGetPrediction(model, &p));

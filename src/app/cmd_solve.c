@@ -16,6 +16,16 @@ static PetscErrorCode Remarks(const HycoSummary *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Prints a warning of displacements that are hardly meant. */
+static PetscErrorCode WarnOfUnits(PetscReal u_relative)
+{
+  PetscFunctionBegin;
+  if (u_relative > 1)
+    PetscCall(
+        Say("warning: displacements of %.1e times the extent of the mesh; are the units right?\n", (double)u_relative));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Reports the reactions, and the imbalance of all forces. */
 static PetscErrorCode SayReactions(cJSON *json, HycoFOM fom, PetscInt dim)
 {
@@ -74,6 +84,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
   cJSON_AddNumberToObject(json, "u_norm2", s->u_norm2);
   ReportVector(json, "u_min", s->dim, s->u_min);
   ReportVector(json, "u_max", s->dim, s->u_max);
+  cJSON_AddNumberToObject(json, "u_relative", s->u_relative);
   cJSON_AddNumberToObject(json, "strain_energy", s->strain_energy);
   cJSON_AddNumberToObject(json, "external_work", s->external_work);
   cJSON_AddNumberToObject(json, "gap_work", s->gap_work);
@@ -86,6 +97,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
   PetscCall(Say("%d unknowns, %d contacts, %d active after %d iterations (%s)\n", (int)s->n_dof, (int)s->n_contacts,
                 (int)s->n_active, (int)s->iterations, method));
   PetscCall(Remarks(s));
+  PetscCall(WarnOfUnits(s->u_relative));
   PetscCall(Say("total contact force %.10g, largest %.6g; strain energy %.10g, identity to %.1e\n",
                 (double)s->total_contact_force, (double)s->lambda_max, (double)s->strain_energy,
                 (double)s->energy_defect));
@@ -135,8 +147,7 @@ static PetscErrorCode One(HycoFOM fom, HycoScene scene, const PetscReal mu[], co
   PetscCall(HycoFOMSolve(fom, n, mu));
   PetscCall(HycoFOMGetSummary(fom, &summary));
   PetscCall(DriverCheckLeft());
-  HycoCheck(summary.reason > 0, "%s%s%s (KKT residuals: %.1e, %.1e, %.1e, %.1e); nothing was written",
-            HycoReasonName(summary.reason), summary.free_motion[0] ? "; no support keeps " : "", summary.free_motion,
+  HycoCheck(summary.reason > 0, "%s (KKT residuals: %.1e, %.1e, %.1e, %.1e); nothing was written", summary.why,
             (double)summary.kkt.stationarity, (double)summary.kkt.penetration, (double)summary.kkt.adhesion,
             (double)summary.kkt.complementarity);
   if (output[0]) PetscCall(HycoFOMWrite(fom, output));
@@ -210,7 +221,7 @@ static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, co
   Table t = {0};
   DriverPiece all;
   DriverRows rows;
-  PetscReal begin;
+  PetscReal begin, u_relative = 0;
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
@@ -225,10 +236,12 @@ static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, co
     if (k == 0) PetscCall(Remarks(&s));
     if (k == 0) PetscCall(CreateTable(scene, s.dim, n, &t));
     PetscCall(FillRow(fom, &s, &t, t.value + k * t.width));
+    if (s.reason > 0) u_relative = PetscMax(u_relative, s.u_relative);
     if (output[0]) PetscCall(HycoFOMWriteAdd(fom));
     PetscCall(DriverSetPhase(k + 1, n));
   }
   if (output[0]) PetscCall(HycoFOMWriteEnd(fom));
+  PetscCall(WarnOfUnits(u_relative));
   rows = DriverRowsOfRoot(n, t.width, t.value, &all);
   PetscCall(ReportSet("solve", table, scene, samples, t.names, &rows, HycoNow() - begin));
   PetscCall(DestroyTable(&t));

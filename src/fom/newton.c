@@ -146,6 +146,7 @@ static PetscErrorCode SolveSystem(HycoPath p, PetscBool first, const Progress *n
   a->seconds_factor += factor;
   a->seconds_solve += solve;
   if (reason < 0) HycoFormat(a->why, "%s", HycoReasonName(reason));
+  if (reason < 0 && p->ops->judge) PetscCall((*p->ops->judge)(p, reason, a->why));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -378,7 +379,9 @@ static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoNewton
     if (k && now.residual[2] <= PetscMax(p->rtol * now.size, now.floor)) {
       PetscCall(Judge(p, &now, a, &worst));
       a->converged = (PetscBool)(worst <= 1e-8);
-      if (a->converged) break;
+      if (a->converged && p->ops->judge) PetscCall((*p->ops->judge)(p, HYCO_CONVERGED, a->why));
+      a->converged = (PetscBool)(a->converged && !a->why[0]);
+      if (a->converged || a->why[0]) break;
     }
     if (k) least = PetscMin(least, now.residual[2] / (now.size > 0 ? now.size : 1));
     if (k == most || !(now.residual[2] <= 1e4 * PetscMax(now.size, now.floor))) {

@@ -215,6 +215,19 @@ static PetscErrorCode AddWork(HycoFOM f, const HycoFEStepReport *law, PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode JudgeStep(HycoPath p, HycoReason reason, char why[HYCO_LINE])
+{
+  HycoFOM f = (HycoFOM)p->ctx;
+  PetscReal relative;
+  const PetscScalar *u;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetArrayRead(f->U_local, &u));
+  PetscCall(HycoFOMJudge(f, u, p->L_new, 0, &reason, &relative, why));
+  PetscCall(VecRestoreArrayRead(f->U_local, &u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
 {
   PetscReal defect = 0;
@@ -314,6 +327,7 @@ PetscErrorCode HycoFOMPathCreate(HycoFOM f)
                                   .step = Step,
                                   .stiffness = Stiffness,
                                   .moves = Moves,
+                                  .judge = JudgeStep,
                                   .accept = Accept,
                                   .record = Record,
                                   .save = Save};

@@ -11,8 +11,7 @@
 #include <limits.h>
 #include <string.h>
 
-/* Creates distributed vectors of the motions. */
-static PetscErrorCode CreateVectors(HycoFOM f, const HycoMotions *motions, Vec **v)
+PetscErrorCode HycoFOMMotionVectors(HycoFOM f, const HycoMotions *motions, Vec **v)
 {
   const PetscInt dim = f->fe->dim;
 
@@ -138,7 +137,7 @@ static PetscErrorCode FindReleased(HycoFOM f, const HycoMotions *free)
   Vec *motion;
 
   PetscFunctionBegin;
-  PetscCall(CreateVectors(f, free, &motion));
+  PetscCall(HycoFOMMotionVectors(f, free, &motion));
   PetscCall(ToSurface(f, free->n, motion, &at_surface.motion));
   ierr = BroadcastUnconstrained(f, &at_surface, &z);
   if (!ierr) PetscCall(PetscMalloc1(z.n + z.n_alike, &f->released));
@@ -390,10 +389,8 @@ static PetscErrorCode SetKernel(HycoFOM f)
 
   PetscFunctionBegin;
   PetscCall(HycoFEFreeMotions(HycoComm(f), f->fe, &motions));
-  f->summary.free_motion[0] = '\0';
   if (motions.n) {
-    PetscCall(PetscStrncpy(f->summary.free_motion, motions.name[0], sizeof(f->summary.free_motion)));
-    PetscCall(CreateVectors(f, &motions, &v));
+    PetscCall(HycoFOMMotionVectors(f, &motions, &v));
     PetscCall(MatNullSpaceCreate(HycoComm(f), PETSC_FALSE, motions.n, v, &kernel));
     PetscCall(MatSetNullSpace(f->K, kernel));
     PetscCall(MatNullSpaceDestroy(&kernel));

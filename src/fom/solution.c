@@ -147,6 +147,8 @@ PetscErrorCode HycoFOMMeasureQuantities(HycoFOM f, PetscReal value[])
 PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
 {
   HycoSummary *s;
+  PetscReal defect;
+  char why[HYCO_LINE];
 
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
@@ -164,6 +166,10 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
   else
     PetscCall(HycoFOMEnergy(f, s));
   PetscCall(MeasureDisplacements(f, s));
+  /* forces of another solution do not satisfy the identity, and rounding of U changes it as it does the residual */
+  defect = f->path || f->given || s->energy_defect <= s->kkt.rounding ? 0 : s->energy_defect;
+  PetscCall(HycoFOMJudge(f, f->u, f->n_contacts ? f->Lambda : NULL, defect, &s->reason, &s->u_relative, why));
+  PetscCall(PetscStrncpy(s->why, why, sizeof(s->why)));
   HycoOnRoot(HycoComm(f), MeasureContacts(f, s));
   if (s->reason > 0 && f->n_contacts) HycoOnRoot(HycoComm(f), HycoFOMCountDependent(f, &s->n_dependent));
   PetscCall(HycoFOMMeasureQuantities(f, s->quantity));

@@ -89,3 +89,52 @@ PetscErrorCode HycoKernelPins(MPI_Comm comm, Mat K, PetscInt n, PetscInt pinned[
   PetscCall(PetscFree(unit));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+/* |z.(F - b)| without the round-off of K x, relative to the forces; least: of |z|. */
+static PetscErrorCode WorkOn(Vec z, Vec F, Vec b, Vec Kx, PetscReal least, Vec work, PetscReal *share)
+{
+  const Vec force[2] = {F, b};
+  PetscReal on[2] = {0, 0}, all[2] = {0, 0}, norm, size, rounding;
+
+  PetscFunctionBegin;
+  for (PetscInt j = 0; j < 2 && force[j]; j++) {
+    PetscCall(VecPointwiseMult(work, force[j], z));
+    PetscCall(VecSum(work, &on[j]));
+    PetscCall(VecNorm(work, NORM_1, &all[j]));
+  }
+  PetscCall(VecPointwiseMult(work, Kx, z));
+  PetscCall(VecNorm(work, NORM_1, &rounding));
+  PetscCall(VecNorm(z, NORM_2, &norm));
+  size = PetscMax(all[0] + all[1], least * norm);
+  rounding = PetscMin(16 * PETSC_MACHINE_EPSILON * rounding, 1e-2 * size);
+  *share = size > 0 ? PetscMax(PetscAbsReal(on[0] - on[1]) - rounding, 0) / size : 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoKernelWork(Mat K, Vec x, Vec F, Vec b, PetscReal *share)
+{
+  MatNullSpace kernel = NULL;
+  PetscReal norm[2] = {0, 0}, one = 0;
+  const Vec *z;
+  PetscInt n = 0;
+  Vec work, Kx;
+
+  PetscFunctionBegin;
+  *share = 0;
+  PetscCall(MatGetNullSpace(K, &kernel));
+  if (kernel) PetscCall(MatNullSpaceGetVecs(kernel, NULL, &n, &z));
+  if (!n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecDuplicate(F, &work));
+  PetscCall(VecDuplicate(F, &Kx));
+  PetscCall(MatGetDiagonal(K, Kx));
+  PetscCall(VecPointwiseMult(Kx, Kx, x));
+  PetscCall(VecNorm(F, NORM_2, &norm[0]));
+  if (b) PetscCall(VecNorm(b, NORM_2, &norm[1]));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscCall(WorkOn(z[k], F, b, Kx, 1e-2 * PetscMax(norm[0], norm[1]), work, &one));
+    *share = PetscMax(*share, one);
+  }
+  PetscCall(VecDestroy(&work));
+  PetscCall(VecDestroy(&Kx));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

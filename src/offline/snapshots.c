@@ -385,8 +385,7 @@ static PetscErrorCode SolveSample(HycoSnapshots s, HycoFOM fom, const PetscReal 
     char at[HYCO_LINE];
 
     HycoSceneNamePoint(s->scene, mu, at);
-    SETERRQ(HycoComm(fom), PETSC_ERR_USER, "the snapshot at %s: %s%s%s", at, HycoReasonName(summary.reason),
-            summary.free_motion[0] ? "; no support keeps " : "", summary.free_motion);
+    SETERRQ(HycoComm(fom), PETSC_ERR_USER, "the snapshot at %s: %s", at, summary.why);
   }
   PetscCall(HycoFOMStress(fom));
   PetscCall(HycoFOMGetForces(fom, force));

@@ -346,11 +346,33 @@ static PetscErrorCode Attempt(HycoSolver s, HycoSolverForm form, Vec x, Vec L)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Floating bodies: of the forms, only the dual finds a solution where contact does not determine all rigid motions, and
+   decides whether there is one. */
+static PetscErrorCode DecideByForces(HycoSolver s, Vec x, Vec L)
+{
+  const HycoSolverForm dual = HycoSolverFindForm(s, "dual");
+  char why[HYCO_LINE], before[sizeof(s->method)];
+  PetscReal cost = -1;
+  PetscInt n_free = 0;
+
+  PetscFunctionBegin;
+  if (s->system->K) PetscCall(HycoKernelSize(s->system->K, &n_free));
+  if (!n_free || !s->system->m || !s->fallback || s->form == dual) PetscFunctionReturn(PETSC_SUCCESS);
+  s->falling_back = PETSC_TRUE;
+  PetscCall(SetMethod(s, 0));
+  PetscCall(Accepts(s, dual, &cost, why));
+  if (cost < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscStrncpy(before, s->method, sizeof(before)));
+  PetscCall(Attempt(s, dual, x, L));
+  PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "%s, then dual", before));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Tries attempts in order, from the chosen method on, until one converges. */
 static PetscErrorCode Attempts(HycoSolver s, Vec x, Vec L)
 {
   PetscInt k = 0;
-  PetscBool fell_back = PETSC_FALSE, better = PETSC_FALSE;
+  PetscBool better = PETSC_FALSE;
 
   PetscFunctionBegin;
   while (order[k] != s->type) k++;
@@ -369,12 +391,12 @@ static PetscErrorCode Attempts(HycoSolver s, Vec x, Vec L)
     if (s->reason < 0 && s->refine && form->ops->refine) PetscCall(form->ops->refine(s, form, &better));
     if (s->reason < 0 && better) PetscCall(Attempt(s, form, x, L));
     better = PETSC_FALSE;
-    fell_back = s->falling_back;
-    if (fell_back) PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "%s, then %s", before, s->now.word));
+    if (s->falling_back) PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "%s, then %s", before, s->now.word));
     if (s->reason > 0 || s->reason == HYCO_DIVERGED_SINGULAR || !s->fallback || !s->system->m) break;
     s->falling_back = PETSC_TRUE;
   }
-  if (fell_back && s->reason == HYCO_CONVERGED) s->reason = HYCO_CONVERGED_FALLBACK;
+  if (s->reason < 0) PetscCall(DecideByForces(s, x, L));
+  if (s->falling_back && s->reason == HYCO_CONVERGED) s->reason = HYCO_CONVERGED_FALLBACK;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -395,7 +417,7 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
   for (PetscInt k = 0; k < s->n_forms; k++) {
     if (s->forms[k]->ops->reset) PetscCall(s->forms[k]->ops->reset(s, s->forms[k]));
   }
-  if (s->reason < 0 && s->system->K) PetscCall(HycoKernelSize(s->system->K, &n_free));
+  if (s->reason < 0 && s->system->K && s->kkt.stationarity > s->rtol) PetscCall(HycoKernelSize(s->system->K, &n_free));
   if (n_free) s->reason = HYCO_DIVERGED_FLOATING;
   s->free = NULL;
   s->start_set = NULL;
@@ -493,6 +515,11 @@ const char *HycoReasonName(HycoReason reason)
     return "not converged: the model has no contact forces, and bodies penetrate here; train on solutions with contact";
   case HYCO_DIVERGED_STEP:
     return "not converged: the history cannot continue, because its steps became too small";
+  case HYCO_DIVERGED_DISPLACEMENT:
+    return "not converged: the displacements are beyond any meaning; check the units of loads, densities and moduli, "
+           "and the supports";
+  case HYCO_DIVERGED_ENERGY:
+    return "not converged: strain energy and work differ; stiffnesses differ by too much for double precision";
   case HYCO_DIVERGED_ITERATIONS:
     return "not converged: limit of iterations reached, or a cycle";
   default:

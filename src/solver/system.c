@@ -188,26 +188,31 @@ static PetscErrorCode DropRounding(HycoSystem s, Vec x, Vec r, Vec diagonal, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* |K x + Bt L - F|, and the part of F - Bt L that no x balances if K is singular: it is computed from the forces only,
+   because K x has the round-off of x, which is unlimited there. Relative to the forces: where |K x| is above their sum,
+   it is round-off too. */
 static PetscErrorCode Stationarity(HycoSystem s, Vec x, Vec L, PetscReal *value, PetscReal *rounding)
 {
   Vec Kx = s->work_x[0], BtL = s->work_x[1];
-  PetscReal nK, nB = 0, nF, nr, dropped = 0;
+  PetscReal nK, nB = 0, nF, nr, size, dropped = 0, free_work;
 
   PetscFunctionBegin;
-  PetscCall(MatMult(s->K, x, Kx));
-  PetscCall(VecNorm(Kx, NORM_2, &nK));
   PetscCall(VecNorm(s->F, NORM_2, &nF));
   if (s->m) {
     PetscCall(MatMult(s->Bt, L, BtL));
     PetscCall(VecNorm(BtL, NORM_2, &nB));
-    PetscCall(VecAXPY(Kx, 1, BtL));
   }
+  PetscCall(HycoKernelWork(s->K, x, s->F, s->m ? BtL : NULL, &free_work));
+  PetscCall(MatMult(s->K, x, Kx));
+  PetscCall(VecNorm(Kx, NORM_2, &nK));
+  if (s->m) PetscCall(VecAXPY(Kx, 1, BtL));
   PetscCall(VecAXPY(Kx, -1, s->F));
   PetscCall(DropRounding(s, x, Kx, BtL, &dropped));
   PetscCall(VecNorm(Kx, NORM_2, &nr));
+  size = PetscMax(PetscMin(nK, nB + nF), PetscMax(nB, nF));
   s->residual = nr;
-  *value = Quotient(nr, PetscMax(nK, PetscMax(nB, nF)));
-  *rounding = Quotient(dropped, PetscMax(nK, PetscMax(nB, nF)));
+  *value = PetscMax(Quotient(nr, size), free_work);
+  *rounding = Quotient(dropped, size);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -125,6 +125,33 @@ class Rigid(Case):
         np.testing.assert_allclose(model['push'], full['push'], rtol=1e-6)
         np.testing.assert_allclose(model['depth'], full['depth'], rtol=2e-2)
 
+    def test_pulled_away(self):
+        """A load that lifts it off, or a normal of the wrong sign: no equilibrium, by either form, in tables, trainings and histories."""
+        self.mesh()
+        signs = {'both': ('load: {range: [5, 30]}', 'load: {range: [-30, 30]}')}
+        scene, what = self.scene(**signs), 'no support keeps body tool from moving along (0, 1, 0)'
+        wrong = self.scene('wrong.yaml', turned=('gap: x^2', 'normal: {y: -1}, gap: x^2'))
+        creep = self.scene('creep.yaml', NORTON, '-load*q', 'history: {times: [0, 1, 2], tables: {q: [[0, 0.1], [1, 1], [2, -1]]}}\n', **signs)
+        for name, point, more, ranks, says in ((scene, '-20,10', (), 0, 'nothing was written'), (scene, '-20,10', (), 2, 'nothing was written'), (wrong, '20,10', (), 0, 'nothing was written'),
+                                               (scene, '-20,10', ('-hyco_solver_form', 'primal'), 0, 'nothing was written'), (creep, '-20,10', (), 0, 'at the first time'),
+                                               (creep, '20,10', (), 0, 'the history ends at t = 1.5')):  # q is 0 there
+            run = self.run_raw('solve', '-scene', name, '-mu', point, *more, ranks=ranks)
+            with self.subTest(scene=os.path.basename(name), point=point, more=more, ranks=ranks):
+                self.assertEqual((run.returncode, run.stderr.count('hyco: error')), (1, 1), run.stdout + run.stderr)
+                self.assertIn(what, run.stderr)
+                self.assertIn(says, run.stderr)
+        run = self.run_raw('solve', '-scene', scene, '-values_load', '-20,10,20', '-values_radius', 10, '-table', 'lifted.csv')
+        self.assertEqual(run.returncode, 1)
+        with open(self.path('lifted.csv'), encoding='ascii') as f:
+            head, *rows = (line.strip().split(',') for line in f)
+        self.assertEqual([row[head.index('converged')] for row in rows], ['0', '1', '1'])
+        run = self.run_raw('train', '-scene', scene, '-values_load', '-20,10,20', '-values_radius', '9,10', '-model', 'lifted.h5')
+        self.assertEqual(run.returncode, 1)
+        self.assertIn('the snapshot at load = -20, radius = 9: not converged: a body is held by contact only', run.stderr)
+        still = self.hyco('solve', '-scene', scene, '-mu', '0,10')  # nothing holds it, and nothing moves it
+        self.solved(still)
+        self.assertEqual(still['outputs']['depth'], 0)
+
     def test_refused(self):
         for changes, said in (({'many': ('slave: top, master: tip', 'slave: top, master: sym')}, 'is the one node'),
                               ({'own': ('slave: top, master: tip', 'slave: tool, master: tip, normal: {y: 1}')}, 'has the node that the rigid body moves with'),

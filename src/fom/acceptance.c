@@ -1,0 +1,84 @@
+/*
+  Whether a solution of the contact system is one of the problem, and why not. Small-strain theory is linear: it has a
+  solution for any load, however large the displacements. Beyond HYCO_MOST of the mesh's extent they are the result of a
+  wrong unit, of a missing support, or of round-off where nothing but a small difference of forces holds a body.
+*/
+#include <hycopath.h>
+
+/* A density in kg/m^3 where the stresses are in MPa is too large by 1e12, and strains under weight are about 1e-6. */
+#define HYCO_MOST 1e6
+/* Of the energies, which are computed from stresses, loads and contact forces. Solutions have 1e-9 and less. */
+#define HYCO_MOST_DEFECT 1e-3
+
+/* The largest displacement relative to the mesh's longest side, or to the largest prescribed displacement if that is
+   more. Collective. */
+static PetscErrorCode Relative(HycoFOM f, const PetscReal u[], PetscReal *relative)
+{
+  const PetscInt dim = f->fe->dim;
+  PetscReal most[8], extent; /* of the coordinates, of their negatives, prescribed, found */
+
+  PetscFunctionBegin;
+  for (PetscInt c = 0; c < 6; c++) most[c] = PETSC_MIN_REAL;
+  most[6] = most[7] = 0;
+  for (PetscInt i = 0; i < f->part->n_nodes; i++) {
+    for (PetscInt c = 0; c < dim; c++) {
+      most[c] = PetscMax(most[c], f->fe->X[3 * i + c]);
+      most[3 + c] = PetscMax(most[3 + c], -f->fe->X[3 * i + c]);
+      most[6] = PetscMax(most[6], PetscAbsReal(f->fe->u0[i * dim + c]));
+      most[7] = PetscMax(most[7], PetscAbsReal(u[i * dim + c]));
+    }
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, most, 8, MPIU_REAL, MPI_MAX, HycoComm(f)));
+  extent = most[6];
+  for (PetscInt c = 0; c < dim; c++) extent = PetscMax(extent, most[c] + most[3 + c]);
+  *relative = most[7] / extent;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The motion on which F - B^T L has work; "" if it has none. Collective. */
+static PetscErrorCode NameLifted(HycoFOM f, Vec L, char name[HYCO_LINE])
+{
+  PetscReal *coefficient, work = 0;
+  HycoMotions motions;
+  Vec rest, *v;
+
+  PetscFunctionBegin;
+  name[0] = '\0';
+  PetscCall(HycoFEFreeMotions(HycoComm(f), f->fe, &motions));
+  PetscCall(HycoFOMMotionVectors(f, &motions, &v));
+  PetscCall(VecDuplicate(f->F, &rest));
+  PetscCall(VecCopy(f->F, rest));
+  if (L) PetscCall(MatMult(f->Bt, L, rest));
+  if (L) PetscCall(VecAYPX(rest, -1, f->F));
+  PetscCall(PetscMalloc1(motions.n, &coefficient));
+  PetscCall(VecMDot(rest, motions.n, v, coefficient));
+  for (PetscInt k = 0; k < motions.n; k++) work = PetscMax(work, PetscAbsReal(coefficient[k]));
+  if (work > 0) HycoMotionsName(f->fe, &motions, coefficient, name);
+  PetscCall(PetscFree(coefficient));
+  PetscCall(VecDestroy(&rest));
+  PetscCall(VecDestroyVecs(motions.n, &v));
+  PetscCall(HycoMotionsDestroy(&motions));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMJudge(HycoFOM f, const PetscReal u[], Vec L, PetscReal energy_defect, HycoReason *reason,
+                            PetscReal *relative, char why[HYCO_LINE])
+{
+  char name[HYCO_LINE];
+
+  PetscFunctionBegin;
+  PetscCall(Relative(f, u, relative));
+  if (*reason > 0 && !(*relative <= HYCO_MOST))
+    *reason = HYCO_DIVERGED_DISPLACEMENT;
+  else if (*reason > 0 && !(energy_defect <= HYCO_MOST_DEFECT))
+    *reason = HYCO_DIVERGED_ENERGY;
+  HycoFormat(why, "%s", *reason < 0 ? HycoReasonName(*reason) : "");
+  if (*reason == HYCO_DIVERGED_FLOATING) PetscCall(NameLifted(f, L, name));
+  if (*reason == HYCO_DIVERGED_FLOATING && name[0])
+    HycoFormat(why, "%s; no support keeps %s", HycoReasonName(*reason), name);
+  if (*reason == HYCO_DIVERGED_DISPLACEMENT)
+    HycoFormat(why, "%s (%.1e times the mesh's extent)", HycoReasonName(*reason), (double)*relative);
+  if (*reason == HYCO_DIVERGED_ENERGY)
+    HycoFormat(why, "%s (identity to %.1e)", HycoReasonName(*reason), (double)energy_defect);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
