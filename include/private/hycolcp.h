@@ -79,6 +79,10 @@ PetscErrorCode HycoLCPActiveSet(const HycoLCP *lcp, PetscBool active[], PetscRea
 /* The same with p > 0 free unknowns. */
 PetscErrorCode HycoLCPSemidefinite(const HycoLCP *lcp, PetscBool active[], PetscReal z[], PetscInt *its,
                                    HycoLCPStatus *status);
+/* The same by the proximal point method, M symmetric, from the set `active`; adds to *its. RAY: no contact forces
+   balance the load; L is then a best approximation. */
+PetscErrorCode HycoLCPProximal(const HycoLCP *lcp, PetscBool active[], PetscReal z[], PetscInt *its,
+                               HycoLCPStatus *status);
 /*
   z with M_aa z_a = -q_a on the set a[0..*k), 0 elsewhere. Members that depend on others are removed from a (their z is
   0), and *k decreases. *singular: the remaining set could not be solved either. `factor` as in HycoLCPActiveSet().

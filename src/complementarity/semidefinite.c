@@ -5,7 +5,8 @@
     [ -A^T  S ] [ L ] + [ g ] = [w],     0 <= w complementary to L >= 0
 
   by the active set method. It starts with every contact closed, so that contact prevents rigid motions if it can, and
-  opens those under tension.
+  opens those under tension. Where a set does not determine L and x_p (contacts that repeat others, motions that no
+  closed contact prevents), or no set is reached, the proximal point method continues (proximal.c).
 */
 #include <hycolcp.h>
 #include <petscblaslapack.h>
@@ -16,7 +17,18 @@ typedef struct {
   PetscReal flexibility; /* a typical S_ii as scale: L = L' / flexibility and K' flexibility are of order one like A */
   PetscInt k, *a;        /* the set: pinned unknowns, then active contacts */
   PetscReal *z, *w;
+  PetscBool *idle; /* contacts without a row: slaves that face nothing, or whose unknowns are all fixed */
 } Floating;
+
+static void FindIdle(Floating *h)
+{
+  for (PetscInt j = 0; j < h->m; j++) {
+    const PetscReal *column = h->M + (size_t)(h->p + j) * (size_t)h->n;
+
+    h->idle[j] = (PetscBool)(column[h->p + j] == 0);
+    for (PetscInt i = 0; i < h->p; i++) h->idle[j] = (PetscBool)(h->idle[j] && column[i] == 0);
+  }
+}
 
 static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singular)
 {
@@ -28,6 +40,7 @@ static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singu
   PetscFunctionBegin;
   for (h->k = 0; h->k < h->p; h->k++) h->a[h->k] = h->k;
   for (PetscInt i = 0; i < h->m; i++) {
+    active[i] = (PetscBool)(active[i] && !h->idle[i]);
     if (active[i]) h->a[h->k++] = h->p + i;
   }
   k = (size_t)h->k;
@@ -46,7 +59,7 @@ static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singu
     least = PetscMin(least, PetscAbsReal(A[j * k + j]));
     most = PetscMax(most, PetscAbsReal(A[j * k + j]));
   }
-  *singular = (PetscBool)(info != 0 || !(least > 1e-13 * most));
+  *singular = (PetscBool)(info != 0 || !(least > 1e-13 * PetscMax(most, 1)));
   PetscCall(PetscArrayzero(h->z, h->n));
   if (!*singular) {
     LAPACKgetrs_("N", &n, &one, A, &n, ipiv, x, &n, &info);
@@ -83,7 +96,32 @@ static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool 
   PetscFunctionBegin;
   for (PetscInt i = h->p; i < h->n; i++) size_z = PetscMax(size_z, PetscAbsReal(h->z[i]));
   for (PetscInt i = 0; i < h->m; i++)
-    violates[i] = (PetscBool)(active[i] ? h->z[h->p + i] < -1e-12 * size_z : h->w[h->p + i] < -1e-12 * size_w);
+    violates[i] =
+        (PetscBool)(!h->idle[i] && (active[i] ? h->z[h->p + i] < -1e-12 * size_z : h->w[h->p + i] < -1e-12 * size_w));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The proximal method, and from its set the exact solution, if the set determines it. */
+static PetscErrorCode Continue(const HycoActiveSet *e, const HycoLCP *lcp, PetscBool active[], PetscReal z[],
+                               PetscInt *its, HycoLCPStatus *status)
+{
+  Floating *h = (Floating *)e->ctx;
+  PetscReal *found;
+  PetscBool *set, *violates, exact;
+
+  PetscFunctionBegin;
+  PetscCall(HycoLCPProximal(lcp, active, z, its, status));
+  if (*status != HYCO_LCP_SOLVED) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoDuplicate((size_t)h->n, z, &found);
+  HycoDuplicate((size_t)h->m, active, &set);
+  PetscCall(PetscMalloc1(h->m, &violates));
+  PetscCall(SolveOnSet(h, active, &exact));
+  exact = (PetscBool)!exact;
+  if (exact) PetscCall(Violations(h, active, violates));
+  for (PetscInt i = 0; exact && i < h->m; i++) exact = (PetscBool)!violates[i];
+  if (!exact) PetscCall(PetscArraycpy(z, found, h->n));
+  if (!exact) PetscCall(PetscArraycpy(active, set, h->m));
+  HycoFreeAll(&found, &set, &violates);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -91,7 +129,7 @@ PetscErrorCode HycoLCPSemidefinite(const HycoLCP *lcp, PetscBool active[], Petsc
                                    HycoLCPStatus *status)
 {
   const PetscInt n = lcp->p + lcp->n;
-  Floating h = {lcp->p, lcp->n, n, lcp->M, lcp->q, 0, 0, NULL, z, NULL};
+  Floating h = {.p = lcp->p, .m = lcp->n, .n = n, .M = lcp->M, .q = lcp->q, .z = z};
   const HycoActiveSet e = {.comm = MPI_COMM_NULL,
                            .n = lcp->n,
                            .max_its = lcp->max_its ? lcp->max_its : 50 + 4 * lcp->n,
@@ -103,11 +141,13 @@ PetscErrorCode HycoLCPSemidefinite(const HycoLCP *lcp, PetscBool active[], Petsc
                            .monitor_ctx = lcp->monitor_ctx};
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc2(n, &h.a, n, &h.w));
+  PetscCall(PetscMalloc3(n, &h.a, n, &h.w, lcp->n, &h.idle));
   for (PetscInt i = lcp->p; i < n; i++)
     h.flexibility = PetscMax(h.flexibility, PetscAbsReal(lcp->M[(size_t)i * (size_t)n + (size_t)i]));
   if (h.flexibility == 0) h.flexibility = 1;
+  FindIdle(&h);
   PetscCall(HycoActiveSetRun(&e, active, its, status));
-  PetscCall(PetscFree2(h.a, h.w));
+  if (*status != HYCO_LCP_SOLVED && lcp->symmetric) PetscCall(Continue(&e, lcp, active, z, its, status));
+  PetscCall(PetscFree3(h.a, h.w, h.idle));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,12 +1,16 @@
 """Floating bodies, and unconstrained bodies: K is singular, the contact problem of the former is not."""
 import os
 import subprocess
+import sys
 import unittest
 
 import h5py
 import numpy as np
 
 from common import PATIENCE, PELLET, SOURCE, Case
+
+sys.path.insert(0, os.path.join(SOURCE, 'tests', 'verify'))
+from grids import Grid  # noqa: E402
 
 BLOCK = """
 scene: {title: block on a foundation, mesh: %s, parameters: [crown, press]}
@@ -69,6 +73,60 @@ class Block(Case):
             run = self.run_raw('solve', '-scene', self.scene(OBSTACLE), '-mu', '0.04,100', ranks=ranks)
             self.assertNotEqual(run.returncode, 0)
             self.assertIn('no support and no contact keeps body block from moving along (0, 1, 0)', run.stderr)
+
+
+class Overhang(Case):
+    """A block on a foundation twice as wide; the nodes of the foundation beside the block face nothing."""
+
+    def test_half_faces(self):
+        """The contact has the load by each form; on a side of the block it is pushed down a slope of one in one, and stays."""
+        grid, axis = Grid(), np.linspace(0, 1, 7)
+        grid.box('quad4', [2 * np.linspace(0, 1, 13), axis - 1], lambda x: x, 'base', {'y1': 'seat', 'y0': 'ground'})
+        grid.box('quad4', [axis, axis], lambda x: x, 'block', {'y0': 'under', 'y1': 'top', 'x0': 'sym'})
+        scene = ('scene: {mesh: mesh.msh, parameters: [load]}\nparameter: {load: {range: [0, 9]}}\nbody: {base: {young: 1000}, block: {young: 1000}}\n'
+                 'fixed: {ground: {x: 0, y: 0}, sym: {x: 0}}\npressure: {top: load}\ncontact: {c: {type: surface, slave: seat, master: under, tolerance: 2}}\n')
+        self.written(scene, grid)
+        for more in ((), ('-hyco_solver_form', 'dual'), ('-hyco_solver_form', 'primal')):
+            for ranks in (0, 2):
+                found = self.hyco('solve', '-scene', 'scene.yaml', '-mu', 6, *more, ranks=ranks)
+                self.solved(found)
+                self.assertLess(found['n_facing'], found['n_contacts'])
+                self.near(found['contacts']['c']['force'][1], -6, 1e-9)
+
+    def test_free_in_a_gap(self):
+        """A block pressed on a table between two walls that it does not touch: it stays where it is drawn, and the table has the load."""
+        grid, axis = Grid(), np.linspace(0, 1, 5)
+        grid.box('quad4', [axis, axis], lambda x: x, 'block', {'y0': 'under', 'y1': 'top', 'x0': 'left', 'x1': 'right'})
+        scene = ('scene: {mesh: mesh.msh, parameters: [side]}\nparameter: {side: {range: [-9, 9]}}\nbody: {block: {young: 1000, poisson: 0}}\n'
+                 'pressure: {top: 6}\ntraction: {top: {x: side}}\ncontact:\n  table: {type: obstacle, group: under, normal: {y: -1}, gap: 0}\n'
+                 '  left: {type: obstacle, group: left, normal: {x: -1}, gap: 0.1}\n  right: {type: obstacle, group: right, normal: {x: 1}, gap: 0.1}\n'
+                 'output: {u: {mean: u_x, group: block}, push: {force: x, contact: right}}\n')
+        self.written(scene, grid)
+        for side, push in ((0, 0), (1, -1)):
+            found = self.hyco('solve', '-scene', 'scene.yaml', '-mu', side)
+            self.solved(found)
+            self.near(found['contacts']['table']['force'][1], 6, 1e-9)
+            self.assertAlmostEqual(found['outputs']['push'], push, 8)
+            self.assertLess(abs(found['outputs']['u'] - 0.1 * side), 0.01)
+
+
+class Units(Case):
+    """A column under its weight: rho g h^2 / (2 E) is the displacement of its top."""
+
+    def test_displacements(self):
+        grid = Grid()
+        grid.box('quad4', [np.linspace(0, 1, 3), np.linspace(0, 4, 9)], lambda x: x, 'column', {'y0': 'base', 'y1': 'top'})
+        self.written('scene: {mesh: mesh.msh, parameters: [rho]}\nparameter: {rho: {range: [0, 1e12]}}\nbody: {column: {young: 100, poisson: 0, density: rho}}\n'
+                     'fixed: {base: {x: 0, y: 0}}\ngravity: {y: -10}\noutput: {u: {mean: u_y, group: top}}\n', grid)
+        for rho, says in ((1, ''), (100, 'warning: displacements of 2.0e+01 times the extent of the mesh')):
+            run = self.run_raw('solve', '-scene', 'scene.yaml', '-mu', rho)
+            self.assertEqual(run.returncode, 0, run.stderr)
+            self.assertIn(says, run.stdout)
+            self.assertEqual(run.stdout.count('warning'), int(bool(says)))
+            self.near(self.hyco('solve', '-scene', 'scene.yaml', '-mu', rho)['outputs']['u'], -rho * 10 * 4**2 / 2 / 100, 1e-9)
+        run = self.run_raw('solve', '-scene', 'scene.yaml', '-mu', 1e9)  # 2e8 times
+        self.assertEqual((run.returncode, run.stderr.count('hyco: error')), (1, 1), run.stderr)
+        self.assertIn("(2.0e+08 times the mesh's extent)", run.stderr)
 
 
 class Pellet(Case):

@@ -1,0 +1,203 @@
+/*
+  Floating bodies by the proximal point method (R. T. Rockafellar, SIAM J. Control Optim. 14 (1976) 877-898). Springs of
+  stiffness kappa hold the pinned unknowns x at a centre: with r = f' - A L, which the springs carry,
+
+    x = centre + r / kappa,   w = g - A^T x + S L = g - A^T (centre + f' / kappa) + (S + A^T A / kappa) L
+
+  is a problem in the forces only, with a solution for any set of contacts. Then x becomes the centre. If there is an
+  equilibrium, r tends to 0, also where contact leaves x free; x is then a nearest solution. There is none if r is a
+  motion that closes no contact and on which the load has positive work (Farkas' lemma).
+*/
+#include <hycolcp.h>
+#include <petscblaslapack.h>
+
+#define SOFT     1e-4  /* kappa relative to the contacts' stiffness: the rate of convergence */
+#define BALANCED 1e-11 /* what the springs may carry in the end, as a share of load and contact forces */
+#define TANGENT  1e-10 /* cosine up to which a motion closes no contact */
+#define MOST_ITS 200
+
+typedef struct {
+  const HycoLCP *lcp;
+  PetscInt p, m;
+  PetscReal *S;                      /* m x m: S + A^T A / kappa */
+  PetscReal *kappa, *centre, *x, *r; /* p */
+  PetscReal *gap;                    /* m: w for L = 0 */
+} Proximal;
+
+/* Column j of (A; S). */
+static const PetscReal *Column(const Proximal *h, PetscInt j)
+{
+  return h->lcp->M + (size_t)(h->p + j) * (size_t)(h->p + h->m);
+}
+
+/* A^T v */
+static PetscReal Closing(const Proximal *h, PetscInt j, const PetscReal v[])
+{
+  const PetscReal *A = Column(h, j);
+  PetscReal sum = 0;
+
+  for (PetscInt i = 0; i < h->p; i++) sum += A[i] * v[i];
+  return sum;
+}
+
+/* Springs that are soft compared with the contacts that move their unknown. */
+static void SetSprings(Proximal *h)
+{
+  PetscReal most = 0;
+
+  for (PetscInt i = 0; i < h->p; i++) {
+    for (PetscInt j = 0; j < h->m; j++) {
+      const PetscReal *A = Column(h, j), *S = A + h->p;
+
+      if (S[j] > 0) h->kappa[i] = PetscMax(h->kappa[i], SOFT * A[i] * A[i] / S[j]);
+    }
+    most = PetscMax(most, h->kappa[i]);
+  }
+  for (PetscInt i = 0; i < h->p; i++) {
+    if (h->kappa[i] == 0) h->kappa[i] = most > 0 ? most : 1;
+  }
+}
+
+/* S + A^T A / kappa */
+static PetscErrorCode AddSprings(Proximal *h)
+{
+  const size_t p = (size_t)h->p, m = (size_t)h->m;
+  const PetscReal one = 1;
+  PetscReal *A;
+  PetscBLASInt rows, cols;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(p * m, &A));
+  PetscCall(PetscBLASIntCast(h->p, &rows));
+  PetscCall(PetscBLASIntCast(h->m, &cols));
+  for (size_t j = 0; j < m; j++) {
+    const PetscReal *column = Column(h, (PetscInt)j);
+
+    for (size_t i = 0; i < p; i++) A[j * p + i] = column[i] / PetscSqrtReal(h->kappa[i]);
+    PetscCall(PetscArraycpy(h->S + j * m, column + p, m));
+  }
+  BLASgemm_("T", "N", &cols, &cols, &rows, &one, A, &rows, A, &rows, &one, h->S, &cols);
+  PetscCall(PetscFree(A));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* r and x for the forces L; NULL: for none. */
+static void Place(Proximal *h, const PetscReal L[])
+{
+  for (PetscInt i = 0; i < h->p; i++) h->r[i] = -h->lcp->q[i];
+  for (PetscInt j = 0; L && j < h->m; j++) {
+    const PetscReal *A = Column(h, j);
+
+    for (PetscInt i = 0; i < h->p && L[j] != 0; i++) h->r[i] -= A[i] * L[j];
+  }
+  for (PetscInt i = 0; i < h->p; i++) h->x[i] = h->centre[i] + h->r[i] / h->kappa[i];
+}
+
+/* L, r and x for the present centre. */
+static PetscErrorCode SolveForces(Proximal *h, PetscBool active[], PetscReal L[], PetscInt *its, HycoLCPStatus *status)
+{
+  const HycoLCP held = {.n = h->m,
+                        .M = h->S,
+                        .q = h->gap,
+                        .symmetric = PETSC_TRUE,
+                        .max_its = h->lcp->max_its,
+                        .monitor = h->lcp->monitor,
+                        .monitor_ctx = h->lcp->monitor_ctx};
+  PetscInt more;
+
+  PetscFunctionBegin;
+  Place(h, NULL);
+  for (PetscInt j = 0; j < h->m; j++) {
+    h->gap[j] = h->lcp->q[h->p + j] - Closing(h, j, h->x);
+    if (h->S[(size_t)j * (size_t)h->m + (size_t)j] == 0) h->gap[j] = 0; /* a contact without a row */
+  }
+  PetscCall(HycoLCPActiveSet(&held, active, L, &more, status));
+  *its += more;
+  if (*status != HYCO_LCP_SOLVED) {
+    PetscCall(HycoLCPLemke(h->m, h->S, h->gap, 50 * (h->m + 10), L, &more, status));
+    *its += more;
+  }
+  for (PetscInt j = 0; j < h->m; j++) {
+    L[j] = PetscMax(L[j], 0);
+    active[j] = (PetscBool)(L[j] > 0);
+  }
+  Place(h, L);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the springs carry nothing but round-off. */
+static PetscBool Balanced(const Proximal *h, const PetscReal L[])
+{
+  PetscReal most = 0;
+  PetscBool all = PETSC_TRUE;
+
+  for (PetscInt pass = 0; pass < 2; pass++) {
+    for (PetscInt i = 0; i < h->p; i++) {
+      PetscReal size = PetscAbsReal(h->lcp->q[i]);
+
+      for (PetscInt j = 0; j < h->m; j++) size += PetscAbsReal(Column(h, j)[i]) * L[j];
+      if (pass) all = (PetscBool)(all && PetscAbsReal(h->r[i]) <= BALANCED * PetscMax(size, 1e-3 * most));
+      most = PetscMax(most, size);
+    }
+  }
+  return all;
+}
+
+/* Whether r is a motion that closes no contact and on which the load has work. If not, *far: how many times r the
+   bodies may move until an open contact closes; 0 if r closes a contact further. */
+static PetscBool Escapes(const Proximal *h, const PetscReal L[], PetscReal *far)
+{
+  PetscReal size = 0, work = 0;
+  PetscBool none = PETSC_TRUE;
+
+  *far = PETSC_MAX_REAL;
+  for (PetscInt i = 0; i < h->p; i++) {
+    size += h->r[i] * h->r[i];
+    work -= h->lcp->q[i] * h->r[i];
+  }
+  for (PetscInt j = 0; j < h->m; j++) {
+    const PetscReal closing = Closing(h, j, h->r), *A = Column(h, j), *S = A + h->p;
+    PetscReal row = 0, w = h->lcp->q[h->p + j] - Closing(h, j, h->x);
+
+    for (PetscInt i = 0; i < h->p; i++) row += A[i] * A[i];
+    if (closing <= TANGENT * PetscSqrtReal(row * size)) continue;
+    none = PETSC_FALSE;
+    for (PetscInt k = 0; k < h->m; k++) w += S[k] * L[k];
+    *far = L[j] > 0 ? 0 : PetscMin(*far, PetscMax(w, 0) / closing);
+  }
+  if (none) *far = 0;
+  return (PetscBool)(none && work > 0);
+}
+
+static PetscErrorCode Iterate(Proximal *h, PetscBool active[], PetscReal L[], PetscInt *its, HycoLCPStatus *status)
+{
+  PetscReal far;
+
+  PetscFunctionBegin;
+  SetSprings(h);
+  PetscCall(AddSprings(h));
+  for (PetscInt k = 0; k < MOST_ITS; k++) {
+    PetscCall(SolveForces(h, active, L, its, status));
+    if (*status != HYCO_LCP_SOLVED || Balanced(h, L)) PetscFunctionReturn(PETSC_SUCCESS);
+    *status = Escapes(h, L, &far) ? HYCO_LCP_RAY : HYCO_LCP_LIMIT;
+    if (*status == HYCO_LCP_RAY) PetscFunctionReturn(PETSC_SUCCESS);
+    for (PetscInt i = 0; i < h->p; i++) h->centre[i] = h->x[i] + far * h->r[i];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoLCPProximal(const HycoLCP *lcp, PetscBool active[], PetscReal z[], PetscInt *its,
+                               HycoLCPStatus *status)
+{
+  const PetscInt p = lcp->p, m = lcp->n;
+  Proximal h = {.lcp = lcp, .p = p, .m = m};
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2((size_t)m * (size_t)m, &h.S, m, &h.gap));
+  PetscCall(PetscCalloc4(p, &h.kappa, p, &h.centre, p, &h.x, p, &h.r));
+  PetscCall(Iterate(&h, active, z + p, its, status));
+  PetscCall(PetscArraycpy(z, h.x, p));
+  PetscCall(PetscFree2(h.S, h.gap));
+  PetscCall(PetscFree4(h.kappa, h.centre, h.x, h.r));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
