@@ -21,10 +21,11 @@ typedef struct {
   PetscReal *doubt[N_SENSES], *bend[N_SENSES]; /* m */
 } Shapes;
 
+/* A slave that faces nothing meets no resistance. */
 static void Relative(Shapes *s, const HycoMotions *motions)
 {
   for (PetscInt i = 0; i < s->m; i++) {
-    for (PetscInt a = 0; a < s->k; a++)
+    for (PetscInt a = 0; a < s->k && !HycoPairsAlone(s->fe->scene, s->pairs, i); a++)
       HycoPairsJump(s->pairs, i, s->fe->dim, motions->motion + (size_t)a * (size_t)s->fe->n_dof,
                     s->d + ((size_t)i * (size_t)s->k + (size_t)a) * 3);
   }
@@ -115,6 +116,7 @@ static PetscErrorCode Spectrum(const Shapes *s, const PetscInt sense[], const Pe
     const PetscInt t = sense[s->pairs->contact[i]];
     const PetscReal *d = s->d + (size_t)i * (size_t)k * 3;
 
+    if (HycoPairsAlone(s->fe->scene, s->pairs, i)) continue;
     for (PetscInt a = 0; a < k; a++) {
       for (PetscInt b = 0; b < k; b++) {
         A[a * k + b] += weight[i] * HycoDot(s->normal[t] + 3 * i, d + 3 * a) *
@@ -200,23 +202,29 @@ static void Join(PetscInt k, const PetscReal z[], PetscReal basis[], PetscInt *n
   (*n)++;
 }
 
+/* Whether all slaves of the contact that face something have a normal in that sense. */
+static PetscBool HasSense(const Shapes *s, PetscInt contact, PetscInt sense)
+{
+  for (PetscInt i = 0; i < s->m; i++) {
+    const PetscReal *n = s->normal[sense] + 3 * i;
+
+    if (s->pairs->contact[i] != contact || HycoPairsAlone(s->fe->scene, s->pairs, i)) continue;
+    if (!(HycoDot(n, n) > 0)) return PETSC_FALSE;
+  }
+  return PETSC_TRUE;
+}
+
 /* The normals of choice number `code`; *possible: each contact has them. */
 static void Senses(const Shapes *s, PetscInt code, PetscInt sense[], PetscBool *possible)
 {
+  const PetscBool common = (PetscBool)(s->fe->scene->n_contacts > MOST_CONTACTS); /* as far as available */
+
   *possible = PETSC_TRUE;
   for (PetscInt c = 0, rest = code; c < s->fe->scene->n_contacts; c++) {
-    sense[c] = s->fe->scene->n_contacts > MOST_CONTACTS ? code : rest % N_SENSES;
+    sense[c] = common ? code : rest % N_SENSES;
     rest /= N_SENSES;
-  }
-  for (PetscInt i = 0; i < s->m && *possible; i++) {
-    PetscInt *t = &sense[s->pairs->contact[i]];
-    const PetscReal *n = s->normal[*t] + 3 * i;
-
-    if (HycoDot(n, n) > 0) continue;
-    if (s->fe->scene->n_contacts <= MOST_CONTACTS)
-      *possible = PETSC_FALSE;
-    else
-      *t = *t == GIVEN ? SLAVE : GIVEN; /* a common choice, as far as available */
+    if (common && !HasSense(s, c, sense[c])) sense[c] = HasSense(s, c, GIVEN) ? GIVEN : SLAVE;
+    *possible = (PetscBool)(*possible && HasSense(s, c, sense[c]));
   }
 }
 
@@ -309,7 +317,7 @@ PetscErrorCode HycoFEFindUnconstrained(HycoFE fe, HycoPairs *pairs, const HycoMo
   *n_unconstrained = *n_alike = 0;
   PetscCall(PetscCalloc1((s.k + 1) * s.k, unconstrained));
   PetscCall(PetscCalloc1((s.k + 1) * s.k, alike));
-  PetscCall(PetscMalloc1((size_t)s.m * (size_t)s.k * 3, &s.d));
+  PetscCall(PetscCalloc1((size_t)s.m * (size_t)s.k * 3, &s.d));
   for (PetscInt t = 0; t < N_SENSES; t++)
     PetscCall(PetscCalloc3(3 * s.m, &s.normal[t], s.m, &s.doubt[t], s.m, &s.bend[t]));
   Relative(&s, motions);
