@@ -3,7 +3,7 @@ its bound or a test left none. With --write-doc they go into docs/limits/extreme
 
     (cd build/tests && /usr/bin/python3 ../../tests/extremes/table.py --write-doc)
 
-Those want some hundreds of random scenes too: battery.py SEED COUNT in the same folder, as docs/limits.md says.
+Those want some hundreds of random scenes too: battery.py SEED COUNT and equilibrium.py SEED COUNT in the same folder, as docs/limits.md says.
 """
 import csv
 import glob
@@ -22,6 +22,7 @@ TABLES = {
     'parameters': 'Parameters',
     'paths': 'Paths of bodies that flow',
     'battery': 'Random scenes',
+    'equilibrium': 'Equilibrium of floating bodies',
 }
 HEAD = '''# Numerical extremes: every case
 
@@ -46,8 +47,8 @@ def tables(write):
         more = sorted(glob.glob(os.path.join(FOLDER, name + '_[0-9]*.csv')))
         for path in more:
             rows += read(os.path.basename(path).removesuffix('.csv'))
-        if write and name == 'battery' and not more:
-            problems.append('run some hundreds of random scenes first: battery.py SEED COUNT')
+        if write and name in ('battery', 'equilibrium') and not more:
+            problems.append(f'run some hundreds of random scenes first: {name}.py SEED COUNT')
         if not rows:
             problems.append(f'{name} left no rows: run it first (ctest -L extremes)')
         problems += [f'{name}: {row[0]}, {row[1]} is out of its bound' for row in rows if row[-1] == 'OUT']
