@@ -73,7 +73,7 @@ class Oblique(Case):
                      lambda x: np.stack([x[:, 0] * np.cos(x[:, 1]), x[:, 0] * np.sin(x[:, 1])], -1), 'ring', {'x0': 'bore', 'y0': 'y0', 'y1': 'y1'})
             a = np.radians(degrees)
             text = ('scene: {mesh: mesh.msh}\nbody: {ring: {young: 200, poisson: 0.3}}\npressure: {bore: 1 + x^2 + y^2}\n'
-                    f'fixed: {{y0: {{y: 0}}, y1: {{normal: 0, direction: {{x: {-np.sin(a)!r}, y: {np.cos(a)!r}}}}}}}\n')
+                    f'fixed: {{y0: {{y: 0}}, y1: {{normal: 0, direction: {{x: {float(-np.sin(a))!r}, y: {float(np.cos(a))!r}}}}}}}\n')
             for ranks in (0, 2):
                 found = self.hyco('solve', '-scene', self.written(text, grid), ranks=ranks)
                 self.solved(found)

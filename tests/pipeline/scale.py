@@ -43,7 +43,9 @@ class Scale(Case):
             self.assertLessEqual(float(row['mb_ratio']), 1.25)
         self.assertEqual((one['neighbours'], two['neighbours']), ('0', '1'))
         self.assertLessEqual(int(two['iterations']), 1.3 * int(one['iterations']))
-        self.assertLess(float(two['kb_largest']), 1e-3 * 8 * 20 * int(two['ghosts']))  # what the other rank needs, some twenty times: no gathering
+        # what the other rank needs, some twenty times, by the number of exchanges in an iteration of this PETSc (20.0 of 3.18, 20.1 of 3.22), with room of
+        # 10 %; a vector of all unknowns, gathered once, would add 40 kB to the 51
+        self.assertLess(float(two['kb_largest']), 1.1 * 1e-3 * 8 * 20 * int(two['ghosts']))
         self.assertEqual((wavy['contacts'], wavy['ranks']), ('1089', '1'))
         self.assertLessEqual(int(wavy['most']), 20)
         self.assertLessEqual(int(wavy['sets']), 12)
