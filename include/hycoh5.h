@@ -17,6 +17,8 @@ PetscErrorCode HycoH5Create(const char path[], HycoH5 *file);
    below that are not collective are called on rank 0. On one rank this is HycoH5Create(). Collective; HycoH5Close() is
    then collective too. */
 PetscErrorCode HycoH5CreateShared(MPI_Comm comm, const char path[], HycoH5 *file);
+/* The same for a table, whose datasets are its columns and nothing else. */
+PetscErrorCode HycoH5CreateTable(MPI_Comm comm, const char path[], HycoH5 *file);
 /* Creates an image in memory without a file. HycoH5GetImage() returns its bytes (the caller frees them by PetscFree());
    HycoH5OpenImage() opens such bytes, which must outlive it. `name` is used in messages. */
 PetscErrorCode HycoH5CreateImage(const char name[], HycoH5 *file);

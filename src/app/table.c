@@ -1,4 +1,5 @@
-/* Tables of results whose rows lie on several ranks: CSV, or HDF5 with one dataset for each column. */
+/* Tables of results whose rows lie on several ranks: CSV, or HDF5 with one dataset of one
+   dimension for each column. */
 #include "driver.h"
 #include <hycofile.h>
 #include <hycoh5.h>
@@ -138,8 +139,8 @@ static PetscErrorCode WriteColumn(HycoH5 file, const Table *t, PetscInt rounds, 
     for (PetscInt k = 0; k < p->n; k++)
       column[k] =
           par < 0 ? p->value[(size_t)k * (size_t)rows->width + (size_t)c] : t->mu[(p->first + k) * t->n_par + par];
-    PetscCall(
-        HycoH5WriteRows(file, par < 0 ? t->names[c] : t->par[par], MPIU_REAL, rows->n, 1, p->first, p->n, column));
+    PetscCall(HycoH5WriteRows(file, par < 0 ? t->names[c] : t->par[par], MPIU_REAL, rows->n, HYCO_H5_LINE, p->first,
+                              p->n, column));
     PetscCall(PetscFree(column));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -153,7 +154,7 @@ static PetscErrorCode WriteColumns(const char path[], const Table *t)
 
   PetscFunctionBegin;
   HycoAllreduce(&rounds, 1, MPIU_INT, MPI_MAX, PETSC_COMM_WORLD);
-  PetscCall(HycoH5CreateShared(PETSC_COMM_WORLD, path, &file));
+  PetscCall(HycoH5CreateTable(PETSC_COMM_WORLD, path, &file));
   for (PetscInt p = 0; p < t->n_par && !ierr; p++) ierr = WriteColumn(file, t, rounds, p, 0);
   for (PetscInt c = 0; c < t->rows->width && !ierr; c++) ierr = WriteColumn(file, t, rounds, -1, c);
   if (ierr) PetscCall(HycoH5Close(&file, PETSC_FALSE));

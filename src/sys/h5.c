@@ -17,7 +17,7 @@ struct _n_HycoH5 {
   HycoFile out;     /* while writing; else NULL */
   size_t size;      /* size of the file that is read */
   size_t written;   /* bytes of the data that this process has written */
-  PetscBool reads;
+  PetscBool reads, table;
   char path[PETSC_MAX_PATH_LEN];
   /* data of a file that several processes write */
   PetscBool shared;
@@ -29,7 +29,8 @@ struct _n_HycoH5 {
 /* Upper bounds for the bytes of a dataset's description, and of the file's first one. */
 #define ROOM 4096
 
-/* A dataset stating that the file ends with a seal: a file that has lost its seal is then damaged, not old. */
+/* A dataset, in a table an attribute of the file, stating that the file ends with a seal: a file that has lost its seal
+   is then damaged, not old. */
 #define HYCO_H5_SEALED "sealed"
 #define NATIVE_INT     (sizeof(PetscInt) == 8 ? H5T_NATIVE_INT64 : H5T_NATIVE_INT32)
 
@@ -84,31 +85,55 @@ static hid_t InMemory(void)
   return access;
 }
 
-PetscErrorCode HycoH5CreateImage(const char name[], HycoH5 *file)
+static PetscErrorCode MarkSealed(HycoH5 f)
 {
   const PetscInt yes = 1;
+
+  PetscFunctionBegin;
+  PetscCall(f->table ? HycoH5WriteAttributeInt(f, "/", HYCO_H5_SEALED, 1, &yes)
+                     : HycoH5WriteInt(f, HYCO_H5_SEALED, 1, 1, &yes));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode CreateImage(const char name[], PetscBool table, HycoH5 *file)
+{
   hid_t access;
   HycoH5 f;
 
   PetscFunctionBegin;
   PetscCall(New(name, &f));
+  f->table = table;
   access = InMemory();
   f->id = H5Fcreate(f->path, H5F_ACC_TRUNC, H5P_DEFAULT, access);
   H5Pclose(access);
   PetscCheck(f->id >= 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "HDF5 cannot create a file in memory");
   *file = f;
-  PetscCall(HycoH5WriteInt(f, HYCO_H5_SEALED, 1, 1, &yes));
+  PetscCall(MarkSealed(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoH5Create(const char path[], HycoH5 *file)
+PetscErrorCode HycoH5CreateImage(const char name[], HycoH5 *file)
+{
+  PetscFunctionBegin;
+  PetscCall(CreateImage(name, PETSC_FALSE, file));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Create(const char path[], PetscBool table, HycoH5 *file)
 {
   HycoFile out;
 
   PetscFunctionBegin;
   PetscCall(HycoFileCreate(path, HYCO_FILE_NUMBERS, &out));
-  PetscCall(HycoH5CreateImage(path, file));
+  PetscCall(CreateImage(path, table, file));
   (*file)->out = out;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5Create(const char path[], HycoH5 *file)
+{
+  PetscFunctionBegin;
+  PetscCall(Create(path, PETSC_FALSE, file));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -129,7 +154,6 @@ static PetscErrorCode MakeRoom(HycoH5 f, size_t bytes)
 /* On rank 0. */
 static PetscErrorCode BeginShared(HycoH5 f)
 {
-  const PetscInt yes = 1;
   PetscBool direct;
   hid_t access;
 
@@ -141,7 +165,7 @@ static PetscErrorCode BeginShared(HycoH5 f)
   f->id = H5Fcreate(f->scratch, H5F_ACC_TRUNC, H5P_DEFAULT, access);
   H5Pclose(access);
   PetscCheck(f->id >= 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "HDF5 cannot create the file %s", f->scratch);
-  PetscCall(HycoH5WriteInt(f, HYCO_H5_SEALED, 1, 1, &yes));
+  PetscCall(MarkSealed(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -163,7 +187,7 @@ static PetscErrorCode OpenShared(HycoH5 f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoH5CreateShared(MPI_Comm comm, const char path[], HycoH5 *file)
+static PetscErrorCode CreateShared(MPI_Comm comm, const char path[], PetscBool table, HycoH5 *file)
 {
   PetscErrorCode ierr;
   PetscMPIInt size;
@@ -172,11 +196,12 @@ PetscErrorCode HycoH5CreateShared(MPI_Comm comm, const char path[], HycoH5 *file
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_size(comm, &size));
   if (size == 1) {
-    PetscCall(HycoH5Create(path, file));
+    PetscCall(Create(path, table, file));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(New(path, &f));
   f->shared = PETSC_TRUE;
+  f->table = table;
   f->comm = comm;
   f->fd = -1;
   f->id = H5I_INVALID_HID;
@@ -185,6 +210,20 @@ PetscErrorCode HycoH5CreateShared(MPI_Comm comm, const char path[], HycoH5 *file
   if (ierr) PetscCall(HycoH5Close(&f, PETSC_FALSE));
   PetscCall(ierr);
   *file = f;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5CreateShared(MPI_Comm comm, const char path[], HycoH5 *file)
+{
+  PetscFunctionBegin;
+  PetscCall(CreateShared(comm, path, PETSC_FALSE, file));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoH5CreateTable(MPI_Comm comm, const char path[], HycoH5 *file)
+{
+  PetscFunctionBegin;
+  PetscCall(CreateShared(comm, path, PETSC_TRUE, file));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -225,7 +264,7 @@ PetscErrorCode HycoH5Open(const char path[], HycoH5 *file)
     PetscCall(Free(&f));
     HycoFail("%s is not an HDF5 file, or it is damaged", path);
   }
-  if (!sealed && HycoH5Has(f, HYCO_H5_SEALED)) {
+  if (!sealed && (HycoH5Has(f, HYCO_H5_SEALED) || H5Aexists_by_name(f->id, "/", HYCO_H5_SEALED, H5P_DEFAULT) > 0)) {
     PetscCall(HycoH5Close(&f, PETSC_FALSE));
     HycoFail("%s is damaged: its end is missing", path);
   }

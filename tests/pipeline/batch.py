@@ -45,9 +45,10 @@ class Batch(Case):
                 self.assertEqual((report['n_points'], report['not_converged']), (1000, 0))
                 self.near(report['points_per_second'] * report['seconds_total'], 1000, 1e-9)
                 with h5py.File(self.path('t.h5')) as file:
+                    self.assertEqual({name: column.shape for name, column in file.items()}, {name: (1000,) for name in rows[0]})
                     for name in rows[0]:
                         if name != 'seconds':
-                            np.testing.assert_allclose(file[name][:].ravel(), [float(row[name]) for row in rows], rtol=1e-6, atol=1e-12, err_msg=name)
+                            np.testing.assert_allclose(file[name][:], [float(row[name]) for row in rows], rtol=1e-6, atol=1e-12, err_msg=name)
         run = self.run_raw(*predict, '-table', 'r.h5')
         self.assertEqual(run.returncode, 1)
         self.assertTrue(os.path.exists(self.path('r.h5')))
