@@ -59,13 +59,16 @@ static PetscErrorCode ReadTimes(HycoScene s, const char key[], const char text[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds a variable for the scene's expressions. */
+/* Adds a variable for the scene's expressions: a table, or the time, which comes before them. Expressions distinguish
+   upper and lower case, options do not; the time t is no option, so that a parameter or a table may be T. */
 static PetscErrorCode AddVariable(HycoScene s, const char key[], const char name[])
 {
+  const PetscBool time = (PetscBool)(s->n_variables == s->n_parameters);
+
   PetscFunctionBegin;
   for (PetscInt p = 0; p < s->n_variables; p++)
-    HycoCheck(strcasecmp(s->parameter[p], name), "%s: %s is already the name of %s; give each variable its own name",
-              key, name,
+    HycoCheck((time || p == s->n_parameters ? strcmp : strcasecmp)(s->parameter[p], name),
+              "%s: %s is already the name of %s; give each variable its own name", key, name,
               p < s->n_parameters    ? "a parameter"
               : p == s->n_parameters ? "the time"
                                      : "a table");

@@ -1,6 +1,7 @@
 """Scenes with a history: their path, on any number of ranks, by either kind of iteration, interrupted or not."""
 import csv
 import os
+import re
 import signal
 import subprocess
 import time
@@ -83,6 +84,19 @@ class History(Case):
         self.assertLess(max(history['kkt_max']), 1e-8)
         self.assertLess(max(history['energy_defect']), 1e-8)
         self.near(history['total_contact_force'][-1], reference['history']['total_contact_force'][-1], 1e-9)
+
+    def test_names(self):
+        """The time is t; a table or a parameter may be T, as temperatures are, and is not the time."""
+        with open(os.path.join(RING, 'scene.yaml'), encoding='utf-8') as f:
+            text = f.read().replace('ring.msh', os.path.join(RING, 'ring.msh'))
+        text = text.replace('2e-6*creep', '2e-6*creep*heat').replace('times: [', 'tables: {heat: [[0, 1], [20, 2]]}\n  times: [')
+        found = []
+        for old, new in (('heat', 'heat'), ('heat', 'T'), ('creep', 'T')):
+            scene = self.changed('names.yaml', re.sub(rf'\b{old}\b', new, text), [])
+            found.append(self.hyco('solve', '-scene', scene, '-mu', '0.01,1', '-history_times', '0,1,3')['history']['total_contact_force'])
+        self.assertEqual(found[1:], found[:1] * 2)
+        scene = self.changed('names.yaml', text, [('heat', 't')])
+        self.assertIn('t is already the name of the time', self.run_raw('solve', '-scene', scene, '-mu', '0.01,1').stderr)
 
     def test_rod_on_ranks(self):
         """The ramp in 3D, pellet A, to its top: 2 and 4 ranks against 1."""
