@@ -4,6 +4,7 @@
   formats".)
 */
 #include "msh.h"
+#include <ctype.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -613,6 +614,39 @@ static PetscErrorCode ReadNames(Msh *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The format of a file that is not gmsh's, by its content, or else by its name; NULL: unknown. */
+static const char *OtherFormat(const Msh *m)
+{
+  static const char *const names[][2] = {
+      {"inp", "Abaqus"},  {"unv", "I-DEAS (.unv)"}, {"med", "MED"},  {"vtu", "VTK"},     {"vtk", "VTK"},
+      {"cgns", "CGNS"},   {"exo", "Exodus"},        {"e", "Exodus"}, {"bdf", "Nastran"}, {"nas", "Nastran"},
+      {"fem", "Nastran"}, {"mesh", "Medit"},        {"xdmf", "XDMF"}};
+  const char *dot = strrchr(m->path, '.'), *text = m->text + strspn(m->text, " \t\r\n");
+
+  if (strncmp(text, "$NOD", 4) == 0) return "gmsh (format 1)";
+  if (text[0] == '*' && (text[1] == '*' || isalpha((unsigned char)text[1]))) return "Abaqus";
+  if (strncmp(text, "-1", 2) == 0 && strchr("\r\n", text[2])) return "I-DEAS (.unv)";
+  if (strncmp(text, "<VTKFile", 8) == 0 || strncmp(text, "# vtk", 5) == 0) return "VTK";
+  for (size_t k = 0; dot && k < sizeof(names) / sizeof(names[0]); k++) {
+    if (strcasecmp(dot + 1, names[k][0]) == 0) return names[k][1];
+  }
+  return NULL;
+}
+
+static PetscErrorCode RefuseOther(const Msh *m)
+{
+  const char *other = OtherFormat(m);
+
+  PetscFunctionBegin;
+  HycoCheck(!other || strncmp(other, "gmsh", 4),
+            "the mesh %s has gmsh's format 1; hyco reads 2.2 and 4.1: convert it by gmsh -save -format msh41 %s -o "
+            "NEW.msh",
+            m->path, m->path);
+  HycoCheck(!other, "the mesh %s is a file of %s, not of gmsh; convert it by scripts/convert %s NEW.msh", m->path,
+            other, m->path);
+  HycoFail("%s is not a gmsh mesh: it does not begin with $MeshFormat", m->path);
+}
+
 static PetscErrorCode ReadFormat(Msh *m)
 {
   const char *line = NextLine(m);
@@ -622,7 +656,7 @@ static PetscErrorCode ReadFormat(Msh *m)
 
   PetscFunctionBegin;
   line = line && strncmp(line, "$MeshFormat", 11) == 0 ? NextLine(m) : NULL;
-  HycoCheck(line, "%s is not a gmsh mesh: it does not begin with $MeshFormat", m->path);
+  if (!line) PetscCall(RefuseOther(m));
   version = HycoNumber(line, &end);
   binary = strtol(end, &end, 10);
   size = strtol(end, &end, 10);
