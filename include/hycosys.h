@@ -19,7 +19,7 @@ typedef struct {
   const char *initial; /* the default, as text */
   const char *meaning; /* one line */
   const char *owner;   /* the class whose objects read it: "HycoReducer" */
-  const char *only;    /* the types that read it: "hybrid or condensed"; "": all */
+  const char *only;    /* the types that read it, "hybrid or condensed", or for what: "full order"; "": all */
 } HycoOption;
 
 /* hyco's classes are PETSc objects, with reference counts, names, options prefixes, composed data and
@@ -58,7 +58,7 @@ PetscErrorCode HycoGetOptionTable(PetscInt *n, const HycoOption *table[]);
   - String: length: of value
   - List: words separated by commas: n of them and NULL, which the caller frees by PetscStrArrayDestroy(); "none": 0
   - Name: an option that another function reads: PetscObjectViewFromOptions()
-  - For: the types that read the following options: HycoOption.only
+  - For: the types that read the following options, or for what: HycoOption.only
 */
 #if PETSC_VERSION_LT(3, 23, 0)
 typedef PetscOptionItems *HycoOptionItems;

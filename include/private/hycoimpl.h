@@ -52,6 +52,8 @@ PetscErrorCode HycoCatchNoModel(PetscErrorCode caught, const char message[]);
     PetscCall(HycoErrorSync((comm), caught_, message_));                                                               \
   } while (0)
 
+/* Replaces bytes that are no printable characters in UTF-8: blanks by a blank, others by ?. */
+void HycoMakePrintable(char text[]);
 /* Formats a line like printf; truncated to HYCO_LINE. */
 void HycoFormat(char line[HYCO_LINE], const char format[], ...) PETSC_ATTRIBUTE_FORMAT(2, 3);
 

@@ -85,23 +85,25 @@ static PetscErrorCode Unknown(const Command *command, const HycoOptionList *own,
   HycoFail("hyco %s has no option -%s (hyco %s -help lists them)", command->name, name, command->name);
 }
 
-/* The commands whose objects read an option of the library, in words; NULL: any. Only train creates a reducer. */
-static const char *ReadersOf(const HycoOption *option)
+/* Whether an object of the command reads an option of the library. Of a model's, some are read by one command only. */
+static PetscBool Reads(const Command *command, const HycoOption *option)
 {
-  if (strcmp(option->owner, "HycoReducer") == 0) return "train";
-  if (strcmp(option->owner, "HycoROM") == 0) return option->only[0] ? option->only : "train, predict, compare";
-  return NULL;
+  if (!strstr(command->classes, option->owner)) return PETSC_FALSE;
+  return (PetscBool)(strcmp(option->owner, "HycoROM") || !option->only[0] || strstr(option->only, command->name));
 }
 
 /* Fails for an option of the library that no object of the command reads. */
 static PetscErrorCode CheckReaders(const Command *command, const HycoOption *option)
 {
-  const char *readers = ReadersOf(option);
+  char readers[DRIVER_LINE] = "";
 
   PetscFunctionBegin;
-  HycoCheck(!readers || strstr(readers, command->name), "hyco %s does not use -%s; these commands do: hyco %s%s",
-            command->name, option->name, readers, strcmp(readers, "train") ? "" : " (it sets the model in training)");
-  PetscFunctionReturn(PETSC_SUCCESS);
+  if (Reads(command, option)) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt c = 0; commands[c].name; c++) {
+    if (Reads(&commands[c], option)) PetscCall(HycoListAdd(readers, ", ", commands[c].name));
+  }
+  HycoFail("hyco %s does not use -%s; these commands do: hyco %s%s", command->name, option->name, readers,
+           strcmp(readers, "train") ? "" : " (it sets the model in training)");
 }
 
 static PetscBool IsKey(const char word[])
@@ -144,6 +146,21 @@ PetscErrorCode DriverCheckArguments(const Command *command, int argc, char **arg
     if (k + 1 < argc && !IsKey(argv[k + 1])) k++;
   }
   PetscCall(HycoOptionListDestroy(&own));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverRefuseOnly(const char only[], const char reason[])
+{
+  int argc;
+  char **argv;
+
+  PetscFunctionBegin;
+  PetscCall(PetscGetArgs(&argc, &argv));
+  for (int k = 2; k < argc; k++) {
+    const HycoOption *option = IsKey(argv[k]) ? HycoOptionFind(argv[k] + (argv[k][1] == '-' ? 2 : 1)) : NULL;
+
+    HycoCheck(!option || strcmp(option->only, only), "-%s has no effect here: %s; remove it", option->name, reason);
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -256,9 +273,7 @@ PetscErrorCode DriverHelp(const Command *command)
   printf("\nOptions of the method (a scene may set them too, in its hyco: section without the prefix)\n");
   PetscCall(HycoGetOptionTable(&n, &table));
   for (PetscInt k = 0; k < n; k++) {
-    const char *readers = ReadersOf(&table[k]);
-
-    if (!command || !readers || strstr(readers, command->name)) HelpLine(&table[k]);
+    if (!command || Reads(command, &table[k])) HelpLine(&table[k]);
   }
   printf("\nPETSc's options work too: -log_view, -info, -hyco_mumps_icntl_14 100 (MUMPS, solver of K), "
          "-hyco_primal_..., -hyco_tao_monitor, -hyco_pod_svd_view.\n");

@@ -646,6 +646,7 @@ PetscErrorCode CommandPredict(void)
   PetscCall(HycoROMGetScene(model, &scene));
   PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
   PetscCall(DriverReadFallback(model, extrapolate, &fallback));
+  if (!n_times) PetscCall(DriverRefuseOnly("history", "it is for scenes with a history, and the model's has none"));
   PetscCall(HycoROMWantsEquilibrium(model, &residual));
   HycoCheck(!residual || n_times,
             "-hyco_residual needs a model of paths, and the scene of %s has no history; remove it", path);

@@ -16,6 +16,7 @@ typedef struct {
   PetscErrorCode (*declare)(
       PetscOptions); /* declares its own options: calls all functions that read options (HycoOptionsRecord()) */
   const char *usage, *meaning;
+  const char *classes; /* those whose objects read their options in it */
 } Command;
 
 extern const Command commands[]; /* ends with name NULL */
@@ -29,6 +30,8 @@ PetscErrorCode DriverCheckArguments(const Command *command, int argc, char **arg
 PetscErrorCode DriverCheckLeft(void);
 /* The same before the solvers have run: their options (-hyco_mumps_..., -hyco_tao_... with that type) are accepted. */
 PetscErrorCode DriverCheckLeftEarly(void);
+/* Fails for an option on the command line that only such objects read (HycoOption.only), with the reason. */
+PetscErrorCode DriverRefuseOnly(const char only[], const char reason[]);
 /* Declares -name and reads its value, "" if absent; `text` as in HycoOptionsString(). */
 PetscErrorCode DriverGet(const char name[], const char text[], char value[PETSC_MAX_PATH_LEN]);
 /* Reads -scene, -model, -output, -report, -table, common to several commands; NULL: not read. */
@@ -84,6 +87,10 @@ void DriverNoteLaunch(void);
 /* Settings of MPI for a process without a launcher; to be called before MPI begins. Variables of the environment
    take precedence. */
 void DriverStartAlone(void);
+/* Prints an error found before MPI begins, once for all ranks. Returns false. */
+PetscBool DriverRefuseEarly(const char text[]);
+/* Raises the limit of the stack if it is too low; false, with a line on stderr: it cannot be raised. */
+PetscBool DriverHasStack(void);
 /* Fails if a launcher of another MPI has started several processes, each of which would do all the work and write
    the same files. Collective. */
 PetscErrorCode DriverCheckLaunch(void);
@@ -97,6 +104,9 @@ void DriverOneThread(void);
 
 /* -- sources.c -- */
 
+/* Before PETSc reads them: whether option files, and those that they name, come to an end and are YAML where they are
+   to be; false, with a line on stderr: not. */
+PetscBool DriverSourcesEnd(int argc, char **argv);
 /* "options_from" in the report: the options in PETSC_OPTIONS, the files .petscrc and -options_file, by name; nothing
    if there are none. On this process alone. */
 PetscErrorCode DriverReportSources(cJSON *json);

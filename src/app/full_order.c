@@ -55,7 +55,11 @@ PetscErrorCode DriverReadFallback(HycoROM model, PetscBool extrapolate, Fallback
             "hyco predict uses -scene only with -hyco_fallback, which solves full order on it%s; remove -scene, or add "
             "the option",
             forces ? ", or -hyco_full_displacement" : "");
-  if (!f->on && !f->displacement) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!f->on && !f->displacement) {
+    PetscCall(DriverRefuseOnly("full order", "it is for full order, which predict solves only with -hyco_fallback or "
+                                             "-hyco_full_displacement"));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   HycoCheck(path[0], "%s: give its -scene too",
             f->on ? "-hyco_fallback solves full order where the reduced model is not accurate enough"
                   : "-hyco_full_displacement solves full order with the predicted forces");

@@ -4,6 +4,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
+#include <time.h>
 #include <unistd.h>
 
 /* Environment variables in which launchers store the number of ranks. */
@@ -23,6 +25,23 @@ void DriverNoteLaunch(void)
     if (value && atol(value) > 1) snprintf(launched, sizeof(launched), "%s=%s", sizes[k], value);
   }
   if (!launched[0] && rank && atol(rank) > 0) snprintf(launched, sizeof(launched), "PMIX_RANK=%s", rank);
+}
+
+PetscBool DriverRefuseEarly(const char text[])
+{
+  static const char *const ranks[] = {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", NULL};
+  const struct timespec nap = {1, 0};
+
+  for (int k = 0; ranks[k]; k++) {
+    const char *rank = getenv(ranks[k]);
+
+    if (!rank || atol(rank) <= 0) continue;
+    nanosleep(&nap, NULL); /* a launcher ends all ranks when one has failed */
+    return PETSC_FALSE;
+  }
+  fprintf(stderr, "hyco: error: %s\n", text);
+  fflush(stderr);
+  return PETSC_FALSE;
 }
 
 /* Whether a folder can be created in this one. */
@@ -49,6 +68,26 @@ static void ChooseTemporary(void)
     setenv("TMPDIR", others[k], 1);
     return;
   }
+}
+
+/* A cell's matrix has up to 52 kB, there may be several of them on the stack, and MPI needs some 100 kB. */
+#define STACK ((rlim_t)512 * 1024)
+#define USUAL ((rlim_t)8 * 1024 * 1024)
+
+PetscBool DriverHasStack(void)
+{
+  struct rlimit limit;
+  char text[DRIVER_LINE];
+
+  if (getrlimit(RLIMIT_STACK, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY || limit.rlim_cur >= STACK)
+    return PETSC_TRUE;
+  if (limit.rlim_max == RLIM_INFINITY || limit.rlim_max >= STACK) {
+    limit.rlim_cur = limit.rlim_max == RLIM_INFINITY || limit.rlim_max > USUAL ? USUAL : limit.rlim_max;
+    if (setrlimit(RLIMIT_STACK, &limit) == 0) return PETSC_TRUE; /* the stack of a running process grows up to it */
+  }
+  snprintf(text, sizeof(text), "the stack is limited to %ld kB, and %ld kB are needed; raise the limit: ulimit -s 8192",
+           (long)(limit.rlim_cur / 1024), (long)(STACK / 1024));
+  return DriverRefuseEarly(text);
 }
 
 void DriverStartAlone(void)

@@ -9,23 +9,27 @@
 const Command commands[] = {
     {"check", CommandCheck, DeclareCheck, "hyco check -scene FOLDER [-check_solve] [-report R.json]",
      "read a scene and assemble it at the corners of its ranges: report its contents, likely mistakes, and the cost of "
-     "a solve and of a training (-grid N,N,...)"},
+     "a solve and of a training (-grid N,N,...)",
+     "HycoFOM HycoSolver"},
     {"solve", CommandSolve, DeclareSolve, "hyco solve -scene FOLDER -mu V,V,... [-output F.xdmf] [-report R.json]",
-     "solve full order, for one point or for a set of points (-table T.csv)"},
+     "solve full order, for one point or for a set of points (-table T.csv)", "HycoFOM HycoSolver"},
     {"train", CommandTrain, DeclareTrain,
      "hyco train -scene FOLDER -grid N,N,... | -greedy -training_grid N,N,... -model M.h5 [-report R.json]",
      "solve a set of points at full order (resumable), or choose the points one by one; reduce, and write the model; "
-     "with -target_u 1e-2 -target_lambda 5e-2 ... the cheapest model of this accuracy"},
+     "with -target_u 1e-2 -target_lambda 5e-2 ... the cheapest model of this accuracy",
+     "HycoFOM HycoSolver HycoSnapshots HycoReducer HycoROM"},
     {"predict", CommandPredict, DeclarePredict,
      "hyco predict -model M.h5 -mu V,V,... [-output F.xdmf] [-report R.json]",
      "solve the reduced model, for one point or for a set of points (-table T.csv), and estimate its errors; reads "
-     "only the model file, except with -hyco_fallback or -hyco_full_displacement, which need -scene FOLDER"},
+     "only the model file, except with -hyco_fallback or -hyco_full_displacement, which need -scene FOLDER",
+     "HycoFOM HycoSolver HycoROM"},
     {"compare", CommandCompare, DeclareCompare,
      "hyco compare -scene FOLDER -model M.h5 -mu V,V,... | -grid N,N,... [-report R.json] [-table T.csv]",
-     "errors and speed-up of the reduced model, relative to full order, over a set of points"},
+     "errors and speed-up of the reduced model, relative to full order, over a set of points",
+     "HycoFOM HycoSolver HycoROM"},
     {"view", CommandView, DeclareView, "hyco view -model M.h5 | -scene FOLDER",
-     "describe the contents of a model or a scene"},
-    {NULL, NULL, NULL, NULL, NULL},
+     "describe the contents of a model or a scene", ""},
+    {NULL, NULL, NULL, NULL, NULL, NULL},
 };
 
 static char message[DRIVER_LINE];
@@ -41,6 +45,7 @@ static PetscErrorCode KeepMessage(MPI_Comm comm, int line, const char *function,
     else
       snprintf(message, sizeof(message), "internal error %d in %s (%s:%d): %s", (int)code, function ? function : "?",
                file ? file : "?", line, text ? text : "");
+    HycoMakePrintable(message);
   }
   return code;
 }
@@ -147,15 +152,18 @@ static PetscErrorCode PrintNothing(const char format[], ...)
   return 0;
 }
 
-/* PETSc reads the option files and the options; an error is printed as one line instead of PETSc's trace. */
+/* PETSc reads the option files and the options; an error is printed as one line instead of PETSc's trace. Output to a
+   closed pipe ("hyco ... | head") is no error, and PETSc must not abort at its signal. */
 static PetscErrorCode Start(int *argc, char ***argv)
 {
   PetscErrorCode (*const printf_of_petsc)(const char[], ...) = PetscErrorPrintf;
   PetscErrorCode ierr;
   HycoErrorText said = NULL;
 
+  if (!DriverHasStack() || !DriverSourcesEnd(*argc, *argv)) return PETSC_ERR_USER;
   PetscErrorPrintf = PrintNothing;
   ierr = HycoInitialize(argc, argv);
+  signal(SIGPIPE, SIG_IGN);
   if (PetscErrorPrintf == PrintNothing) PetscErrorPrintf = printf_of_petsc;
   if (!ierr) return 0;
   stopped = 1;
@@ -179,6 +187,7 @@ static int Help(char **argv)
     if (!command && argv[1] && argv[2]) command = FindCommand(argv[2]); /* hyco help COMMAND */
     ierr = DriverHelp(command);
   }
+  fflush(stdout); /* PETSc gives the signal of a closed pipe back at its end */
   return HycoFinalize() || ierr ? DRIVER_FAILED : DRIVER_DONE;
 }
 
@@ -203,12 +212,12 @@ int main(int argc, char **argv)
   if (Start(&argc, &argv)) return 1;
   PetscPushErrorHandler(KeepMessage, NULL); /* after PetscInitialize(), where PETSc's memory log (-malloc_dump)
                                                begins */
-  signal(SIGPIPE, SIG_IGN);                 /* "hyco ... | head" is not an error */
   signal(SIGXFSZ, SIG_IGN);                 /* a file beyond the size limit is reported as a failed write */
   ierr = Run(FindCommand(argv[1]), argc, argv);
   DriverBeatEnd();
   PetscPopErrorHandler();
   if (ierr) Stop();
+  fflush(stdout);
   PetscOptionsSetValue(NULL, "-options_left", "0"); /* unread options have been checked before */
   status = DriverEndStatus(ierr);
   return HycoFinalize() ? DRIVER_FAILED : status;

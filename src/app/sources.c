@@ -1,8 +1,84 @@
-/* Sources of options other than the command line, for the report. */
+/* Sources of options other than the command line: their check before PETSc reads them, and the report. */
 #include "driver.h"
+#include <hycoyaml.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+
+#define DEEPEST 16 /* files that name each other */
+
+static PetscBool Follow(const char path[], PetscBool yaml, int depth, char problem[HYCO_LINE]);
+
+/* Follows the option files that a line of options names; a quoted name is not followed. */
+static PetscBool FollowLine(char line[], int depth, char problem[HYCO_LINE])
+{
+  const char *before = "";
+  char *word, *rest;
+
+  for (word = strtok_r(line, " \t\r\n", &rest); word; word = strtok_r(NULL, " \t\r\n", &rest)) {
+    const PetscBool yaml = (PetscBool)(strcasecmp(before, "-options_file_yaml") == 0);
+
+    if ((yaml || strcasecmp(before, "-options_file") == 0) && !Follow(word, yaml, depth, problem)) return PETSC_FALSE;
+    before = word;
+  }
+  return PETSC_TRUE;
+}
+
+/* Whether PETSc can read an option file, if it exists, and those that it names; PETSc itself never ends if a file names
+   itself, and gives no line of an error. */
+static PetscBool Follow(const char path[], PetscBool yaml, int depth, char problem[HYCO_LINE])
+{
+  struct stat info; /* a pipe can be read only once */
+  FILE *file = depth < DEEPEST && stat(path, &info) == 0 && S_ISREG(info.st_mode) ? fopen(path, "r") : NULL;
+  char *line = NULL, wrong[HYCO_LINE];
+  size_t room = 0;
+  PetscBool good = PETSC_TRUE;
+
+  if (depth == DEEPEST)
+    snprintf(
+        problem, HYCO_LINE,
+        "the option file %.200s names itself, or files name each other more than %d times; remove an -options_file",
+        path, DEEPEST);
+  if (!file) return (PetscBool)(depth < DEEPEST);
+  if (yaml) {
+    if (getdelim(&line, &room, '\0', file) > 0 && HycoYAMLHasProblem(line, wrong)) {
+      snprintf(problem, HYCO_LINE, "the option file %.200s is not valid YAML: %.700s", path, wrong);
+      good = PETSC_FALSE;
+    }
+  } else
+    while (good && getline(&line, &room, file) > 0) {
+      if (!strchr("#%!", line[strspn(line, " \t")])) good = FollowLine(line, depth + 1, problem);
+    }
+  free(line);
+  fclose(file);
+  return good;
+}
+
+PetscBool DriverSourcesEnd(int argc, char **argv)
+{
+  static const char *const files[] = {".petscrc", "petscrc"};
+  const char *home = getenv("HOME"), *environment = getenv("PETSC_OPTIONS");
+  char path[PETSC_MAX_PATH_LEN], problem[HYCO_LINE];
+  PetscBool good = PETSC_TRUE, skip = PETSC_FALSE;
+
+  for (int k = 1; k < argc; k++) skip = (PetscBool)(skip || strcmp(argv[k], "-skip_petscrc") == 0);
+  snprintf(path, sizeof(path), "%s/.petscrc", home ? home : "");
+  if (!skip && home) good = Follow(path, PETSC_FALSE, 0, problem);
+  for (int k = 0; good && !skip && k < 2; k++) good = Follow(files[k], PETSC_FALSE, 0, problem);
+  if (good && environment) {
+    char *line = strdup(environment);
+
+    good = (PetscBool)(!line || FollowLine(line, 0, problem));
+    free(line);
+  }
+  for (int k = 1; good && k < argc - 1; k++) {
+    const PetscBool yaml = (PetscBool)(strcasecmp(argv[k], "-options_file_yaml") == 0);
+
+    if (yaml || strcasecmp(argv[k], "-options_file") == 0) good = Follow(argv[k + 1], yaml, 0, problem);
+  }
+  return good ? good : DriverRefuseEarly(problem);
+}
 
 /* "NAME": the options in the file, if it exists and has any. */
 static void AddFile(cJSON *object, const char path[])

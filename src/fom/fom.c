@@ -258,6 +258,7 @@ static PetscErrorCode SetFromOptions(HycoFOM f)
 {
   PetscFunctionBegin;
   PetscObjectOptionsBegin((PetscObject)f);
+  PetscCall(HycoOptionsFor("full order"));
   PetscCall(HycoOptionsBool(
       "-hyco_regularise", "full order: rigid motions that neither supports nor contact hold are taken out, not refused",
       &f->regularise, NULL));
@@ -269,11 +270,13 @@ static PetscErrorCode SetFromOptions(HycoFOM f)
   PetscCall(HycoOptionsString(
       "-hyco_mesh_write", "<file.h5> write the mesh, with the scene's refinement, in PETSc's HDF5 format of a DMPlex",
       f->mesh_write, sizeof(f->mesh_write), NULL));
+  PetscCall(HycoOptionsName("-hyco_fom_view", "print sizes, system and solver after each full-order solve"));
+  PetscCall(HycoOptionsFor("history"));
   if (!f->scene || f->scene->n_times > 0)
     PetscCall(ReadPath(f, PetscOptionsObject));
   else
     PetscCall(HycoPathRefuseOptions(f));
-  PetscCall(HycoOptionsName("-hyco_fom_view", "print sizes, system and solver after each full-order solve"));
+  PetscCall(HycoOptionsFor(""));
   PetscOptionsEnd();
   PetscFunctionReturn(PETSC_SUCCESS);
 }

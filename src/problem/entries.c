@@ -207,25 +207,24 @@ static PetscErrorCode Insert(PetscOptions options, const char file[], char text[
 
 static PetscErrorCode ReadYAML(PetscOptions options, const char file[])
 {
-  char message[HYCO_LINE], *text, *copy;
-  PetscErrorCode caught, ierr = 0;
+  char message[HYCO_LINE], *text;
+  PetscErrorCode caught, ierr;
 
   PetscFunctionBegin;
   HycoCheck(IsText(file), "%s is not valid YAML for hyco: it contains a zero byte, or cannot be read", file);
   PetscCall(ReadText(file, &text));
-  PetscCall(PetscStrallocpy(text, &copy));
+  ierr = text ? HycoEntriesCheck(text, file) : PETSC_SUCCESS;
+  if (ierr) PetscCall(PetscFree(text));
+  PetscCall(ierr);
   PetscCall(HycoCatchBegin());
   caught = Insert(options, file, text);
   PetscCall(HycoCatchEnd(caught, message));
   PetscCall(PetscFree(text));
-  if (!caught && copy) ierr = HycoEntriesCheckTwice(copy, file);
-  PetscCall(PetscFree(copy));
   HycoCheck(!caught || !strstr(message, "max number of options"),
             "%s has more than 512 entries, the limit of this PETSc (%d.%d); combine entries into one expression, or "
             "use a newer PETSc",
             file, PETSC_VERSION_MAJOR, PETSC_VERSION_MINOR);
   HycoCheck(!caught, "%s is not valid YAML for hyco: %s", file, message);
-  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

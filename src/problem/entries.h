@@ -6,8 +6,9 @@
 /* Reads the scene's file into `*options`, overridden by the command line's entries. Collective. */
 PetscErrorCode HycoEntriesRead(MPI_Comm comm, const char path[], PetscOptions *options,
                                char folder[PETSC_MAX_PATH_LEN]);
-/* Fails if a key occurs twice in `text`, which is YAML; `file` is its name in the message. */
-PetscErrorCode HycoEntriesCheckTwice(const char text[], const char file[]);
+/* Fails, with the line, if the text is no YAML, is none that PETSc can read, or has a key twice; `file` is its name in
+   the message. */
+PetscErrorCode HycoEntriesCheck(const char text[], const char file[]);
 /* Converts nested lists in YAML into lists of scalars, with the numbers of a row separated by blanks; false: there
    are none. */
 PetscBool HycoEntriesFlatten(char text[]);

@@ -80,6 +80,24 @@ static PetscErrorCode FindVariables(HycoExpr e, PetscInt n, const char *const na
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* muParser takes minutes for many brackets inside each other. */
+#define DEEPEST 100
+static PetscErrorCode CheckNesting(HycoExpr e)
+{
+  PetscInt depth = 0, most = 0;
+  char text[SHORT];
+
+  PetscFunctionBegin;
+  for (const char *c = e->text; *c; c++) {
+    depth += (*c == '(') - (*c == ')');
+    most = PetscMax(most, depth);
+  }
+  Shorten(e->text, text);
+  HycoCheck(most <= DEEPEST, "%s: \"%s\" has %d brackets inside each other; at most %d are possible", e->key, text,
+            (int)most, DEEPEST);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Parse(HycoExpr e, PetscInt n, const char *const names[])
 {
   static const char *const axis[3] = {"x", "y", "z"};
@@ -91,6 +109,7 @@ static PetscErrorCode Parse(HycoExpr e, PetscInt n, const char *const names[])
   while (*end == ' ') end++;
   if (end != e->text && *end == '\0' && strpbrk(e->text, "0123456789")) PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheck(e->text[strspn(e->text, " \t")] != '\0', "%s is empty; give a number or an expression", e->key);
+  PetscCall(CheckNesting(e));
   e->parser = mupCreate(muBASETYPE_FLOAT);
   mupSetErrorHandler(e->parser, Quiet);
   mupDefineConst(e->parser, "pi", PETSC_PI); /* muParser's own _pi has 12 digits */

@@ -184,6 +184,7 @@ PetscErrorCode HycoSolverSetFromOptions(HycoSolver s)
                       "method for every contact problem (for a model active_set is used if a TAO type needs symmetry)",
                       HycoSolverTypes, &s->type, NULL));
   PetscCall(ReadTaoType(s, PetscOptionsObject));
+  PetscCall(HycoOptionsFor("full order"));
   PetscCall(ReadForm(s, PetscOptionsObject));
   PetscCall(HycoOptionsWord("-hyco_linear",
                             "solve with the stiffness by a factor (MUMPS), or by conjugate gradients with multigrid",
@@ -191,6 +192,11 @@ PetscErrorCode HycoSolverSetFromOptions(HycoSolver s)
   PetscCall(HycoOptionsReal(
       "-hyco_memory", "<GB> memory of a factor above which the iterative solver is used (0: most of the free memory)",
       0, 1e9, &gigabytes, NULL));
+  for (PetscInt k = 0; k < s->n_forms; k++) {
+    if (s->forms[k]->ops->setfromoptions)
+      PetscCall(s->forms[k]->ops->setfromoptions(s, s->forms[k], PetscOptionsObject));
+  }
+  PetscCall(HycoOptionsFor(""));
   PetscCall(HycoOptionsReal("-hyco_solver_rtol", "largest relative KKT residual that counts as solved", 1e-15, 0.1,
                             &s->rtol, NULL));
   PetscCall(
@@ -201,10 +207,6 @@ PetscErrorCode HycoSolverSetFromOptions(HycoSolver s)
                             "if a method fails, try the next: tao, then active_set, then lemke", &s->fallback, NULL));
   PetscCall(HycoOptionsBool("-hyco_solver_warm_start", "full order: start from the last solution's active contacts",
                             &s->warm, NULL));
-  for (PetscInt k = 0; k < s->n_forms; k++) {
-    if (s->forms[k]->ops->setfromoptions)
-      PetscCall(s->forms[k]->ops->setfromoptions(s, s->forms[k], PetscOptionsObject));
-  }
   PetscCall(HycoOptionsName("-hyco_solver_view", "print form, method, tolerances and residuals after each solve"));
   PetscOptionsEnd();
   s->linear = (HycoLinear)linear;

@@ -1,6 +1,7 @@
 /* Errors are caught as one line of text and synchronised over all ranks, so that no rank waits for a failed one. */
 #include <hycoimpl.h>
 #include <stdarg.h>
+#include <string.h>
 #include <time.h>
 
 static char caught_line[HYCO_LINE];
@@ -17,6 +18,29 @@ static PetscErrorCode CatchHandler(MPI_Comm comm, int line, const char *function
     }
   }
   return code;
+}
+
+/* The number of bytes of the character at `c` if it can be printed, in UTF-8 without control characters; 0: it cannot.
+ */
+static size_t Printable(const unsigned char *c)
+{
+  const size_t n = c[0] < 0x80 ? 1 : c[0] >= 0xc2 && c[0] < 0xe0 ? 2 : (c[0] & 0xf0) == 0xe0 ? 3 : c[0] < 0xf5 ? 4 : 0;
+
+  if (c[0] < ' ' || c[0] == 0x7f || (c[0] >= 0x80 && c[0] < 0xc2)) return 0;
+  for (size_t k = 1; k < n; k++) {
+    if ((c[k] & 0xc0) != 0x80) return 0;
+  }
+  return c[0] == 0xc2 && c[1] < 0xa0 ? 0 : n;
+}
+
+void HycoMakePrintable(char text[])
+{
+  for (char *c = text; *c;) {
+    const size_t n = Printable((const unsigned char *)c);
+
+    if (!n) *c = strchr(" \t\r\n", *c) ? ' ' : '?';
+    c += n ? n : 1;
+  }
 }
 
 void HycoFormat(char line[HYCO_LINE], const char format[], ...)

@@ -17,19 +17,22 @@ PetscBool HycoWantsTrace(void)
 
 /* Prints hyco's own message, or PETSc's with its location. On rank 0 of the object with the error. */
 static void Tell(MPI_Comm comm, int line, const char function[], const char file[], PetscErrorCode code,
-                 const char text[])
+                 const char message[])
 {
   const PetscBool own = (PetscBool)(code == PETSC_ERR_USER || code == PETSC_ERR_ORDER || code == HYCO_ERR_NO_MODEL ||
                                     code == PETSC_ERR_ARG_NULL || code == PETSC_ERR_ARG_WRONG);
+  char text[HYCO_LINE];
   PetscMPIInt rank = 0;
 
   MPI_Comm_rank(comm, &rank);
   if (rank) return;
-  if (own && text && text[0])
+  snprintf(text, sizeof(text), "%s", message ? message : "");
+  HycoMakePrintable(text);
+  if (own && text[0])
     fprintf(stderr, "hyco: error: %s\n", text);
   else
     fprintf(stderr, "hyco: error: %s (PETSc error %d in %s(), %s:%d; HYCO_TRACE=1 shows the calls)\n",
-            text && text[0] ? text : "failed", (int)code, function ? function : "?", file ? file : "?", line);
+            text[0] ? text : "failed", (int)code, function ? function : "?", file ? file : "?", line);
   fflush(stderr);
 }
 

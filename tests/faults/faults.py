@@ -1,6 +1,7 @@
 """User errors: one clear line on stderr, a status that is not 0, soon, and no file left."""
 import glob
 import os
+import resource
 import shlex
 import shutil
 import subprocess
@@ -33,6 +34,9 @@ CASES = [
     (['solve', '-scene', ROPE], 'the scene has 2 parameters (mu1 from 0.05 to 0.25, mu2 from -0.05 to 0.5); give -mu'),
     (['solve', *R, '-options_file', 'none.opt'], 'PETSc cannot be initialised: '),
     (['solve', *R, '-options_file', 'text.h5'], 'PETSc cannot be initialised: '),
+    (['solve', *R, '-options_file', 'itself.opt'], 'itself.opt names itself'),
+    (['solve', *R, '-options_file', 'round.opt'], 'round.opt names itself, or files name each other'),
+    (['solve', *R, '-options_file_yaml', 'broken.yaml'], 'the option file broken.yaml is not valid YAML: line 3: '),
     (['solve', *R, '-options_file', 'unknown.opt'], 'the option -hyco_solver_typ has no effect'),
     (['solve', *R, '-options_file', 'wrong.opt'], '-hyco_solver_type is "newton"; it must be one of'),
     (['solve', *R, '-options_file', 'stray.opt'], 'stray.opt line 2: stray'),
@@ -77,7 +81,9 @@ CASES = [
     # the scene
     (['solve', '-scene', 'nowhere', '-mu', '1'], 'the scene nowhere does not exist'),
     (['solve', '-scene', 'empty', '-mu', '1'], 'the folder empty has no scene.yaml'),
-    (['solve', '-scene', 'broken.yaml', '-mu', '1'], 'broken.yaml is not valid YAML for hyco'),
+    (['solve', '-scene', 'broken.yaml', '-mu', '1'], 'broken.yaml is not valid YAML for hyco: line 3: '),
+    (['solve', '-scene', 'deep.yaml', '-mu', '1'], 'deep.yaml is not valid YAML for hyco: line 2: brackets and entries are nested deeper than 64 levels'),
+    (['solve', *R, '-body_rope_young', 101 * '(' + '1' + 101 * ')'], 'has 101 brackets inside each other; at most 100 are possible'),
     (['solve', *R, '-body_rope_yung', '3'], "the scene's entry body_rope_yung is unknown"),
     (['solve', *R, '-body_rope_yung', '3'], 'did you mean young?'),
     (['solve', *R, '-fixed_end_x', '0'], 'the mesh has no group "end"; its groups are: ends, rope; did you mean ends?'),
@@ -105,6 +111,10 @@ CASES = [
     # the mesh
     (['solve', *R, '-scene_mesh', 'none.msh'], 'the mesh none.msh cannot be opened'),
     (['solve', *R, '-scene_mesh', 'text.msh'], 'text.msh is not a gmsh mesh'),
+    (['solve', *R, '-scene_mesh', 'job.txt'], 'a file of Abaqus, not of gmsh; convert it by scripts/convert job.txt NEW.msh'),
+    (['solve', *R, '-scene_mesh', 'ideas.txt'], 'a file of I-DEAS (.unv), not of gmsh; convert it by scripts/convert ideas.txt'),
+    (['solve', *R, '-scene_mesh', 'text.med'], 'a file of MED, not of gmsh; convert it by scripts/convert text.med'),
+    (['solve', *R, '-scene_mesh', 'one.msh'], "one.msh has gmsh's format 1; hyco reads 2.2 and 4.1: convert it by gmsh -save"),
     (['solve', *P, '-scene_mesh', 'cut.msh'], 'the mesh cut.msh is damaged'),
     (['solve', *R, '-scene_mesh', os.path.join(PELLET, 'A.msh')], 'body "rope" has no cells'),
     (['solve', *P, '-contact_gap_master', 'clad_outer_low'], 'no node of contact_pellet faces clad_outer_low'),
@@ -196,12 +206,19 @@ CASES = [
     (['predict', '-model', 'rope.h5', '-mu', '0.1,0.1', '-hyco_reconstruct_solver', 'foo'],
      'it must be one of: auto, nnls, tao'),
     (['predict', '-model', 'rope.h5', '-mu', '0.1,0.1', '-hyco_scan', '5'], 'does not use -hyco_scan'),
+    (['predict', '-model', 'rope.h5', '-mu', '0.1,0.1', '-hyco_linear', 'iterative'], '-hyco_linear has no effect here: it is for full order'),
+    (['predict', '-model', 'rope.h5', '-mu', '0.1,0.1', '-hyco_solver_form', 'dual'], '-hyco_solver_form has no effect here: it is for full order'),
+    (['predict', '-model', 'rope.h5', '-mu', '0.1,0.1', '-hyco_newton', 'elastic'], '-hyco_newton has no effect here: it is for scenes with a history'),
+    (['view', '-scene', ROPE, '-hyco_newton', 'elastic'], 'hyco view does not use -hyco_newton; these commands do: hyco check, solve, train, predict, compare'),
+    (['view', '-model', 'rope.h5', '-hyco_solver_rtol', '1e-3'], 'hyco view does not use -hyco_solver_rtol'),
+    (['solve', *R, '-hyco_groups', '1'], 'hyco solve does not use -hyco_groups; these commands do: hyco train'),
+    (['compare', '-scene', ROPE, '-model', 'rope.h5', *N, '-hyco_fallback'], 'hyco compare does not use -hyco_fallback; these commands do: hyco predict'),
     (['train', *T, *N, '-hyco_pod_tol', 'abc'], '-hyco_pod_tol is "abc"'),
     (['train', *T, *N, '-hyco_groups', '9'], '-hyco_groups is 9 on'),
     (['train', *T, *N, '-force_rope_x', '0'], 'so that there are no modes'),
 ]
 # on two ranks: errors found by one rank, by all, or while files are written
-TWO = ('body_rope_young: "2*(x"', 'text.h5 is not an HDF5 file', 'must be positive', 'none.msh cannot', 'mu1 = 0.04', 'cut.h5', 'contact_clad', 'not valid YAML',
+TWO = ('itself.opt', 'body_rope_young: "2*(x"', 'text.h5 is not an HDF5 file', 'must be positive', 'none.msh cannot', 'mu1 = 0.04', 'cut.h5', 'contact_clad', 'not valid YAML',
        'has no option -zzz', 'none/out.h5', '-hyco_rid_region', '-hyco_rid_groups', 'none/r.json', 'there are no modes', 'leaves no equation for the modes', 'faces clad_outer_low', 'z = 0, mu1 = 0.1', 'KKT residuals')
 # rank 0 runs $1 ... unchanged; the others in the folder $OTHER_FOLDER, with $OTHER_ARGUMENTS appended
 APART = '''if [ "${OMPI_COMM_WORLD_RANK:-${PMIX_RANK:-${PMI_RANK:-0}}}" -gt 0 ]; then
@@ -218,7 +235,10 @@ class Faults(Case):
         cls.hyco('train', '-scene', ROPE, '-grid', '4,4', '-model', 'rope.h5')
         cls.hyco('solve', *R, '-output', 'fields.xdmf')
         os.mkdir(cls.path('empty'))
-        for name, text in (('broken.yaml', 'scene:\n  mesh: [a\nbody: {x\n'), ('text.msh', 'hello\n'),
+        for name, text in (('broken.yaml', 'scene:\n  mesh: [a\nbody: {x\n'), ('text.msh', 'hello\n'), ('text.med', 'hello\n'),
+                           ('job.txt', '** CAE\n*NODE\n1, 0., 0.\n'), ('ideas.txt', '    -1\n  2411\n'), ('one.msh', '$NOD\n1\n1 0 0 0\n$ENDNOD\n'),
+                           ('deep.yaml', 'scene:\n  title: ' + 200000 * '[' + '\n'), ('itself.opt', '# again\n-options_file itself.opt\n'),
+                           ('round.opt', '-hyco_linear auto -options_file trip.opt\n'), ('trip.opt', '-options_file round.opt\n'),
                            ('text.h5', 'hello\n'), ('p.csv', 'mu1,mu2\n0.1,0.1\n'), ('header.csv', 'mu1,mu2\n'),
                            ('semicolon.csv', 'mu1,mu2\n0.1;0.2\n'), ('outside.csv', 'mu1,mu2\n0.1,0.2\n0.3,0.2\n'),
                            ('other.csv', 'mu1,mu3\n0.1,0.2\n'), ('twice.csv', 'mu1,mu1\n0.1,0.2\n'),
@@ -306,6 +326,37 @@ class Faults(Case):
                     self.check(['predict', '-model', 'half.h5', '-extrapolate', '-values_mu1', values, '-values_mu2', '0.1',
                                 '-table', 'out.csv'], '"sqrt(0.3-mu1)+x" is not finite at', ranks)
         ROWS.add('a point of a set at which the scene has no value, on one rank (3), on 2 and 3 ranks', 'one line, status 1, no rank left waiting')
+
+    def test_stack(self):
+        """A limit of the stack below 512 kB is raised, or refused in one line if the system forbids it."""
+        args = [HYCO, 'solve', *R]
+        soft, hard = 64 * 1024, resource.getrlimit(resource.RLIMIT_STACK)[1]
+        run = subprocess.run(args, cwd=self.folder, capture_output=True, text=True, timeout=30 * PATIENCE, check=False,
+                             preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_STACK, (soft, hard)))
+        self.assertEqual(run.returncode, 0, run.stderr)
+        for ranks in (0, 2):
+            limited = ['sh', '-c', 'ulimit -s 64; exec "$@"', 'sh', *args]
+            run = subprocess.run([*MPIRUN, str(ranks), *limited] if ranks else limited, cwd=self.folder, capture_output=True, text=True,
+                                 timeout=30 * PATIENCE, check=False)
+            self.assertEqual((run.returncode, said(run)), (1, ['hyco: error: the stack is limited to 64 kB, and 512 kB are needed; raise the limit: '
+                                                              'ulimit -s 8192']), run.stderr)
+        ROWS.add('a stack of 64 kB, on 1 and 2 ranks', 'the limit is raised, or one line')
+
+    def test_closed_pipe(self):
+        """Who reads the output has left: no message, and no error."""
+        for args in (['help'], ['solve', '-help'], ['view', '-model', 'rope.h5']):
+            read, write = os.pipe()
+            os.close(read)
+            run = subprocess.run([HYCO, *args], cwd=self.folder, stdout=write, stderr=subprocess.PIPE, text=True, timeout=30 * PATIENCE, check=False)
+            os.close(write)
+            self.assertEqual((run.returncode, run.stderr), (0, ''), args)
+
+    def test_printable(self):
+        """Bytes that could change a terminal are not in messages; letters of any language are."""
+        args = [HYCO.encode(), b'solve', b'-scene', ROPE.encode(), b'-mu', b'0.1,0.1', b'-body_rope_young', 'é\u009b'.encode() + b'\x1b[31m\xff\x07']
+        run = subprocess.run(args, cwd=self.folder, capture_output=True, timeout=30 * PATIENCE, check=False)
+        self.assertEqual(run.returncode, 1)
+        self.assertIn('"é???[31m??"'.encode(), run.stderr)
 
     def apart(self, text, *args, other=(), folder='.'):
         """Rank 0 is correct; ranks 1 and 2 are in another folder or have other arguments: one line, status 1, soon."""
