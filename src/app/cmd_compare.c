@@ -1,10 +1,21 @@
 /* hyco compare: compares the reduced model with full order over a set of points. */
 #include "driver.h"
 #include <hycosnapshotsimpl.h>
+#include <math.h>
 #include <stdlib.h>
 
 enum { E_U, E_U_H1, E_U_RID, E_SIGMA, E_SIGMA_11, E_LAMBDA_RID, E_LAMBDA_RID_DUAL, E_LAMBDA, E_LAMBDA_DUAL, N_ERRORS };
-enum { CONVERGED = N_ERRORS, FALLBACK, KKT, COVERED, SECONDS_FOM, SECONDS_ROM, N_COLUMNS };
+enum {
+  CONVERGED = N_ERRORS,
+  FALLBACK,
+  KKT,
+  COVERED,
+  SECONDS_FOM,
+  SECONDS_ROM,
+  LAMBDA_NORM, /* of full order */
+  ESTIMATES,   /* of u, stress, forces, and the unseen regime */
+  N_COLUMNS = ESTIMATES + DRIVER_JUDGED
+};
 static const char *const columns[N_COLUMNS] = {"error_u",
                                                "error_u_h1",
                                                "error_u_rid",
@@ -19,7 +30,91 @@ static const char *const columns[N_COLUMNS] = {"error_u",
                                                "kkt_max",
                                                "covered_force",
                                                "seconds_full_order",
-                                               "seconds_reduced"};
+                                               "seconds_reduced",
+                                               "lambda_norm2",
+                                               "estimated_error_u",
+                                               "estimated_error_sigma",
+                                               "estimated_error_lambda",
+                                               "unseen"};
+
+void DriverTakeEstimates(const HycoPrediction *p, PetscReal v[DRIVER_JUDGED])
+{
+  const PetscReal estimate[] = {p->estimated_error_u, p->estimated_error_sigma, p->estimated_error_lambda};
+
+  for (PetscInt k = 0; k < DRIVER_JUDGED - 1; k++) v[k] = estimate[k] >= 0 ? estimate[k] : NAN;
+  v[DRIVER_JUDGED - 1] = p->unseen;
+}
+
+static int CompareReal(const void *a, const void *b)
+{
+  const PetscReal x = *(const PetscReal *)a, y = *(const PetscReal *)b;
+
+  return (x > y) - (x < y);
+}
+
+PetscErrorCode DriverJudgeEstimates(cJSON *json, PetscInt n, PetscInt width, const PetscReal value[], PetscInt first,
+                                    const PetscReal *const error[DRIVER_JUDGED - 1])
+{
+  static const char *const words[] = {"u", "stress", "contact forces"};
+  static const char *const keys[] = {"u", "sigma", "lambda"};
+  cJSON *all = cJSON_AddObjectToObject(json, "estimates");
+  PetscReal *ratio;
+  PetscInt unseen = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n, &ratio));
+  for (PetscInt e = 0; e < DRIVER_JUDGED - 1; e++) {
+    PetscInt m = 0, bounded = 0;
+    PetscReal worst = 0;
+    cJSON *object;
+
+    for (PetscInt k = 0; k < n && error[e]; k++) {
+      const PetscReal estimate = value[k * width + first + e], true_error = error[e][k];
+
+      if (isnan(estimate) || !isfinite(true_error)) continue;
+      bounded += true_error <= estimate;
+      worst = PetscMax(worst, true_error / PetscMax(estimate, PETSC_SMALL));
+      ratio[m++] = estimate / PetscMax(true_error, PETSC_SMALL);
+    }
+    if (!m) continue;
+    qsort(ratio, (size_t)m, sizeof(*ratio), CompareReal);
+    object = cJSON_AddObjectToObject(all, keys[e]);
+    cJSON_AddNumberToObject(object, "bounded", (PetscReal)bounded / m);
+    cJSON_AddNumberToObject(object, "median_ratio", ratio[m / 2]);
+    cJSON_AddNumberToObject(object, "worst_error_over_estimate", worst);
+    PetscCall(Say("estimates of %s: at least the error at %.1f %% of the points; estimate / error %.3g in the median, "
+                  "error / estimate at most %.3g\n",
+                  words[e], 100. * bounded / m, (double)ratio[m / 2], (double)worst));
+  }
+  for (PetscInt k = 0; k < n; k++) unseen += value[k * width + first + DRIVER_JUDGED - 1] > HYCO_UNSEEN;
+  cJSON_AddNumberToObject(all, "unseen", unseen);
+  if (unseen) PetscCall(Say("unseen regime at %d of %d points\n", (int)unseen, (int)n));
+  PetscCall(PetscFree(ratio));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The same, where the errors of forces below a tenth of the set's largest are divided by this tenth, as in the
+   estimates. */
+static PetscErrorCode JudgeEstimates(cJSON *json, PetscInt n, PetscInt width, const PetscReal value[])
+{
+  const PetscReal *error[DRIVER_JUDGED - 1];
+  PetscReal *of[DRIVER_JUDGED - 1], largest = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc3(n, &of[0], n, &of[1], n, &of[2]));
+  for (PetscInt k = 0; k < n; k++) largest = PetscMax(largest, value[k * width + LAMBDA_NORM]);
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscReal *v = value + k * width, size = v[LAMBDA_NORM];
+
+    of[0][k] = v[E_U];
+    of[1][k] = v[E_SIGMA];
+    of[2][k] = size > 0 ? v[E_LAMBDA] * size / PetscMax(size, 0.1 * largest) : v[E_LAMBDA];
+  }
+  for (PetscInt e = 0; e < DRIVER_JUDGED - 1; e++) error[e] = of[e];
+  PetscCall(DriverJudgeEstimates(json, n, width, value, ESTIMATES, error));
+  PetscCall(PetscFree3(of[0], of[1], of[2]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 PetscErrorCode DriverCommonOutputs(HycoScene scene, HycoROM model, DriverOutputs *outputs)
 {
@@ -94,6 +189,8 @@ static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, 
   v[COVERED] = p.covered_force;
   v[SECONDS_FOM] = s.seconds.total;
   v[SECONDS_ROM] = p.seconds.total;
+  v[LAMBDA_NORM] = s.lambda_norm2;
+  DriverTakeEstimates(&p, v + ESTIMATES);
   for (PetscInt q = 0; q < outputs->n; q++)
     v[N_COLUMNS + q] = PetscAbsReal(p.quantity[outputs->reduced[q]] - s.quantity[outputs->full[q]]);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -182,13 +279,6 @@ static PetscErrorCode CompareAll(Points *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static int CompareReal(const void *a, const void *b)
-{
-  const PetscReal x = *(const PetscReal *)a, y = *(const PetscReal *)b;
-
-  return (x > y) - (x < y);
-}
-
 static PetscErrorCode Report(HycoScene scene, PetscBool contact, const Shape *shape, PetscInt n,
                              const PetscReal value[])
 {
@@ -217,6 +307,7 @@ static PetscErrorCode Report(HycoScene scene, PetscBool contact, const Shape *sh
     ReportError(json, columns[k], n, shape->n, value, k, CONVERGED, &undefined);
   for (PetscInt c = N_COLUMNS; c < shape->n; c++)
     ReportOutputError(json, shape->names[c], n, shape->n, value, c, CONVERGED);
+  PetscCall(JudgeEstimates(json, n, shape->n, value));
   object = cJSON_AddObjectToObject(json, "speedup");
   cJSON_AddNumberToObject(object, "mean", mean);
   cJSON_AddNumberToObject(object, "median", ratio[n / 2]);

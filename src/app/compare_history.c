@@ -3,7 +3,16 @@
 
 /* Errors by kind, at the worst time and at the end; then further columns; then the absolute error of each output at its
    worst time, and of each at the end. */
-enum { CONVERGED = 2 * HYCO_N_ERRORS, REACHED, KKT, ITERATIONS, SECONDS_FOM, SECONDS_ROM, N_COLUMNS };
+enum {
+  CONVERGED = 2 * HYCO_N_ERRORS,
+  REACHED,
+  KKT,
+  ITERATIONS,
+  SECONDS_FOM,
+  SECONDS_ROM,
+  ESTIMATES,
+  N_COLUMNS = ESTIMATES + DRIVER_JUDGED
+};
 
 PetscInt DriverPathColumns(void)
 {
@@ -54,6 +63,7 @@ PetscErrorCode DriverComparePath(HycoFOM fom, HycoROM model, PetscBool root, Pet
   v[ITERATIONS] = p.iterations;
   v[SECONDS_FOM] = s.seconds.total;
   v[SECONDS_ROM] = p.seconds.total;
+  DriverTakeEstimates(&p, v + ESTIMATES);
   if (root && outputs->n) PetscCall(CompareOutputs(fom, model, outputs, v + N_COLUMNS));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -61,8 +71,16 @@ PetscErrorCode DriverComparePath(HycoFOM fom, HycoROM model, PetscBool root, Pet
 /* "worst_u", ..., "end_u", ..., "worst_output_NAME", ..., "end_output_NAME", ... */
 static PetscErrorCode NameColumns(const DriverOutputs *outputs, char names[][DRIVER_LINE], const char *columns[])
 {
-  static const char *const rest[] = {"converged",  "times_reached",      "kkt_max",
-                                     "iterations", "seconds_full_order", "seconds_reduced"};
+  static const char *const rest[] = {"converged",
+                                     "times_reached",
+                                     "kkt_max",
+                                     "iterations",
+                                     "seconds_full_order",
+                                     "seconds_reduced",
+                                     "estimated_error_u",
+                                     "estimated_error_sigma",
+                                     "estimated_error_lambda",
+                                     "unseen"};
 
   PetscFunctionBegin;
   for (PetscInt c = 0; c < N_COLUMNS + 2 * outputs->n; c++) {
@@ -78,6 +96,23 @@ static PetscErrorCode NameColumns(const DriverOutputs *outputs, char names[][DRI
                               outputs->names[q % outputs->n]));
     columns[c] = names[c];
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode JudgeEstimates(cJSON *json, PetscInt n, PetscInt width, const PetscReal value[])
+{
+  static const HycoErrorKind kinds[] = {HYCO_ERROR_U, HYCO_ERROR_SIGMA, HYCO_ERROR_LAMBDA};
+  const PetscReal *error[DRIVER_JUDGED - 1];
+  PetscReal *of;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n * (DRIVER_JUDGED - 1), &of));
+  for (PetscInt e = 0; e < DRIVER_JUDGED - 1; e++) {
+    for (PetscInt k = 0; k < n; k++) of[e * n + k] = value[k * width + kinds[e]];
+    error[e] = of + e * n;
+  }
+  PetscCall(DriverJudgeEstimates(json, n, width, value, ESTIMATES, error));
+  PetscCall(PetscFree(of));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -107,6 +142,7 @@ PetscErrorCode DriverReportPaths(HycoScene scene, const DriverOutputs *outputs, 
       ReportError(json, names[c], n, width, value, c, CONVERGED, &undefined);
   }
   for (PetscInt c = N_COLUMNS; c < width; c++) ReportOutputError(json, names[c], n, width, value, c, CONVERGED);
+  PetscCall(JudgeEstimates(json, n, width, value));
   for (PetscInt k = 0; k < n; k++) {
     const PetscReal *v = value + k * width;
 

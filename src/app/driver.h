@@ -352,6 +352,13 @@ PetscErrorCode DriverCommonOutputs(HycoScene scene, HycoROM model, DriverOutputs
 
 /* The number of values of a point, for each of the outputs two more; one point on one group; their statistics, table
    ("": none) and report, on every rank; fails if a reduced path did not reach its end. */
+/* Columns of a comparison for the model's estimates: of u, stress and forces (NaN: none), and HycoPrediction.unseen.
+   DriverJudgeEstimates() compares them, from column `first` of n rows on, with the errors (n each; NULL: none): prints
+   and reports the share of the points that they bound, and the ratios. */
+#define DRIVER_JUDGED 4
+void DriverTakeEstimates(const HycoPrediction *prediction, PetscReal columns[DRIVER_JUDGED]);
+PetscErrorCode DriverJudgeEstimates(cJSON *json, PetscInt n, PetscInt width, const PetscReal value[], PetscInt first,
+                                    const PetscReal *const error[DRIVER_JUDGED - 1]);
 PetscInt DriverPathColumns(void);
 PetscErrorCode DriverComparePath(HycoFOM fom, HycoROM model, PetscBool root, PetscInt n_par, const PetscReal mu[],
                                  const DriverOutputs *outputs, PetscReal v[]);
