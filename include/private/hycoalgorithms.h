@@ -81,7 +81,7 @@ PetscInt HycoNNLSStep(PetscInt k, const PetscInt p[], const PetscReal z[], Petsc
   Fits c such that y <= sum_j c_j X_j + c[p] for `share` of rows like these n > 0; c_j >= 0 by regularised least squares
   over the first `telling` rows. c[p] is the quantile number ceil(share (n + 1)), at most the largest, of what the rows
   have above a formula fitted without their group; if groups are few, at least the upper tolerance limit of normal
-  values (confidence 0.9). Rows with the same number group[i] depend on each other. X: n x p row major; c: p + 1. Not
+  values (confidence 0.75). Rows with the same number group[i] depend on each other. X: n x p row major; c: p + 1. Not
   collective.
 */
 PetscErrorCode HycoUpperBound(PetscInt n, PetscInt telling, const PetscInt group[], PetscInt p, const PetscReal X[],

@@ -3,12 +3,10 @@
 #include <hycoalgorithms.h>
 #include <petscsys.h>
 
-#define RIDGE    1e-1 /* relative to the square sum of a column: correlated features share the weight */
-#define CONSTANT 1e-2 /* a column that varies less says nothing: its differences may be round-off */
-#define CONFIDENCE                                                                                                     \
-  0.9 /* of the tolerance limit, which is used unless this number of values lies above the quantile:                   \
-       */
-#define MANY_ABOVE 5
+#define RIDGE      1e-1 /* relative to the square sum of a column: correlated features share the weight */
+#define CONSTANT   1e-2 /* a column that varies less says nothing: its differences may be round-off */
+#define CONFIDENCE 0.75 /* of the tolerance limit, */
+#define MANY_ABOVE 1    /* which counts if fewer values than this are expected above the quantile */
 
 /* c >= 0 that minimises |X c - y|^2 about the means, regularised. */
 static PetscErrorCode Fit(PetscInt n, PetscInt p, const PetscReal X[], const PetscReal y[], PetscReal c[])

@@ -11,11 +11,10 @@
 #include <hycoreducerimpl.h>
 #include <stdio.h>
 
-#define SHARE  0.95
-#define MARGIN 1.25
-#define LEAST  10 /* smallest number of predictions for an estimate */
-#define SMALL                                                                                                          \
-  0.3 /* share of a feature's median: its floor, below which a smaller feature is no sign of a smaller error */
+#define SHARE      0.95
+#define MARGIN     1.2
+#define LEAST      10   /* smallest number of predictions for an estimate */
+#define SMALL      0.3  /* share of a feature's median, its floor: a smaller feature is no sign of a smaller error */
 #define NEGLIGIBLE 1e-3 /* share of the errors' median: least error that is distinguished */
 
 /* The estimated errors, in the order of HycoEstimateKind. */

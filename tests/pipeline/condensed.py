@@ -54,8 +54,15 @@ class Condensed(Case):
         self.assertEqual((p['interpolation_error'], p['covered_force']), (p['estimated_error_lambda'], 1))
         self.assertLess(p['interpolation_error'], estimate)  # of all values, and at this point
         self.train('-values_radius', '4.04,4.05,4.06', '-values_load', '0.4,1', '-model', 'narrow.h5', '-hyco_snapshots', 'p')
-        inside, outside = (self.hyco('predict', '-model', 'narrow.h5', '-mu', mu)['interpolation_error']
-                           for mu in ('4.055,1', '4.1,1'))
+        inside, outside = (self.hyco('predict', '-model', 'narrow.h5', '-mu', mu, status=status)['interpolation_error']
+                           for mu, status in (('4.055,1', 0), ('4.1,1', 3)))  # there the modes follow the forces no more
+        run = self.run_raw('predict', '-model', 'narrow.h5', '-mu', '4.1,1', cwd=self.folder)
+        self.assertRegex(run.stderr, 'hyco: missed: the displacements do not follow the contact forces')
+        run = self.run_raw('predict', '-model', 'narrow.h5', '-values_radius', '4.05,4.1', '-values_load', '1', cwd=self.folder)
+        self.assertEqual(run.returncode, 3)
+        self.assertRegex(run.stderr, r'at 1 of 2 points \(column inconsistency\)')
+        full = self.hyco('predict', '-model', 'narrow.h5', '-mu', '4.1,1', '-hyco_fallback', '-scene', PELLET)
+        self.assertIn('do not follow the contact forces', full['fallback'])
         product = [abs((r - 4.04) * (r - 4.05) * (r - 4.06)) for r in (4.1, 4.055)]
         inside, outside = inside - 1e-10, outside - 1e-10  # the floor of every estimate
         self.near(outside / inside, product[0] / product[1], 2e-2)  # as the polynomial's remainder grows

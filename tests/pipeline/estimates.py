@@ -29,7 +29,7 @@ class Estimates(Case):
         with open(self.path(name), encoding='utf-8') as f:
             return [{k: float(v) for k, v in row.items()} for row in csv.DictReader(f)]
 
-    def bounds(self, scene, model, grid, share=0.9, ratio=8):
+    def bounds(self, scene, model, grid, share=0.9, ratio=12):
         """The estimates at unseen points: at least the error at nine of ten, and in the median not many times as large."""
         self.hyco('predict', '-model', model, '-grid', grid, '-table', 'p.csv')
         self.hyco('compare', '-scene', scene, '-model', model, '-grid', grid, '-table', 'c.csv')

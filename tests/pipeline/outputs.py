@@ -47,8 +47,8 @@ class Outputs(Case):
 
     def bounds(self, scene, model, ranges, outputs, loose=()):
         """The estimates at 40 unseen points bound the errors at nine of ten, and are in the median not many times as large, except `loose` ones. The
-        error of an output has a sign: a bound of 95 % of normally distributed errors is 2.9 times their median, and 3.6 times with the margin of a
-        quarter."""
+        error of an output has a sign: a bound of 95 % of normally distributed errors is 2.9 times their median, and 3.5 times with the margin of a
+        fifth; the largest of 20 ratios, each to a formula fitted without it, is several times that."""
         self.points('unseen.csv', ranges, 40, 7)
         self.hyco('predict', '-model', model, '-points', 'unseen.csv', '-table', 'p.csv')
         self.hyco('compare', '-scene', scene, '-model', model, '-points', 'unseen.csv', '-table', 'c.csv')
@@ -59,7 +59,7 @@ class Outputs(Case):
             if name in loose:
                 continue
             ratio = statistics.median(e / true for e, true in pairs if true > 0)
-            self.assertTrue(1 <= ratio <= 10, (name, ratio))
+            self.assertTrue(1 <= ratio <= 16, (name, ratio))
 
     def test_bounds_the_error(self):
         """On blocks in 2D and on the rope."""

@@ -1,0 +1,20 @@
+// A bolt and the flange that it clamps, above the joint's plane y = 0; x is the radius of the bolt. mm.
+Geometry.AutoCoherence = 0;
+Point(1) = {0,0,0}; Point(2) = {4,0,0}; Point(3) = {4,10,0}; Point(4) = {5,10,0}; Point(5) = {8,10,0}; Point(6) = {8,15,0}; Point(7) = {5,15,0}; Point(8) = {4,15,0}; Point(9) = {0,15,0}; Point(10) = {0,10,0};
+Line(1) = {1,2}; Line(2) = {2,3}; Line(3) = {3,10}; Line(4) = {10,1};
+Line(5) = {3,4}; Line(6) = {4,5}; Line(7) = {5,6}; Line(8) = {6,7}; Line(9) = {7,8}; Line(10) = {8,9}; Line(11) = {9,10};
+Line(12) = {3,8}; Line(13) = {4,7};
+Curve Loop(1) = {1,2,3,4}; Plane Surface(1) = {1};
+Curve Loop(2) = {-3,12,10,11}; Plane Surface(2) = {2};
+Curve Loop(3) = {5,13,9,-12}; Plane Surface(3) = {3};
+Curve Loop(4) = {6,7,8,-13}; Plane Surface(4) = {4};
+Point(21) = {5,0,0}; Point(22) = {8,0,0}; Point(23) = {14,0,0}; Point(24) = {14,10,0}; Point(25) = {8,10,0}; Point(26) = {5,10,0};
+Line(21) = {21,22}; Line(22) = {22,23}; Line(23) = {23,24}; Line(24) = {24,25}; Line(25) = {25,26}; Line(26) = {26,21}; Line(27) = {22,25};
+Curve Loop(5) = {21,27,25,26}; Plane Surface(5) = {5};
+Curve Loop(6) = {22,23,24,-27}; Plane Surface(6) = {6};
+Transfinite Curve {1,3,10} = 7; Transfinite Curve {2,4,23,26,27} = 11; Transfinite Curve {5,9} = 3; Transfinite Curve {6,8,21,25} = 7;
+Transfinite Curve {7,11,12,13} = 6; Transfinite Curve {22,24} = 8;
+Transfinite Surface {1:6}; Recombine Surface {1:6};
+Physical Surface("bolt") = {1:4}; Physical Surface("flange") = {5,6};
+Physical Curve("shank_base") = {1}; Physical Curve("head_under") = {6}; Physical Curve("seat") = {25}; Physical Curve("joint") = {21,22}; Physical Curve("rim") = {24};
+Physical Curve("head_top") = {8,9,10};

@@ -1,0 +1,70 @@
+"""Predictions agree with themselves: displacements that follow the contact forces wherever a contact closes, and what is said where they do not."""
+import csv
+import os
+import unittest
+
+from common import SOURCE, Case
+
+ROLLER = os.path.join(SOURCE, 'examples', 'roller')
+
+# A cantilever of quad8 cells over a round bump that stands anywhere below it: one or two of its 241 nodes touch, each in a small part of the range
+ARM = """
+Point(1) = {0, 0, 0}; Point(2) = {24, 0, 0}; Point(3) = {24, 2, 0}; Point(4) = {0, 2, 0};
+Line(1) = {1, 2}; Line(2) = {2, 3}; Line(3) = {3, 4}; Line(4) = {4, 1};
+Curve Loop(1) = {1:4}; Plane Surface(1) = {1};
+Transfinite Curve {1, 3} = 121; Transfinite Curve {2, 4} = 4; Transfinite Surface {1}; Recombine Surface {1};
+Mesh.SecondOrderIncomplete = 1;
+Physical Surface("arm") = {1}; Physical Curve("root") = {4}; Physical Curve("under") = {1}; Physical Curve("tip") = {2};
+"""
+SCENE = """
+scene: {title: arm over a bump, mesh: arm.msh, parameters: [place, thick]}
+parameter: {place: {range: [11, 22]}, thick: {range: [1.6, 2.4]}}
+body: {arm: {young: 2500, poisson: 0.35, map: {y: y*thick/2}}}
+fixed: {root: {x: 0, y: 0}}
+contact: {ride: {type: obstacle, group: under, normal: {y: -1}, gap: "(x-place)^2/36 - 0.3"}}
+output: {push: {force: y, contact: ride}, tip: {mean: u_y, group: tip}}
+"""
+
+
+class Follows(Case):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.drawn('arm', 2, ARM, SCENE, '-order', '2')
+        cls.train('arm.h5')
+
+    @classmethod
+    def train(cls, model, *more):
+        cls.hyco('train', '-scene', cls.path('arm'), '-grid', '5,3', '-hyco_model_type', 'condensed', '-hyco_snapshots', cls.path('s'),
+                 '-model', cls.path(model), *more)
+
+    def rows(self, name):
+        with open(self.path(name), encoding='utf-8') as f:
+            return [{k: float(v) for k, v in row.items()} for row in csv.DictReader(f)]
+
+    def test_every_contact(self):
+        """Wherever the bump stands, the displacement meets the gap at the closed nodes, and the tip is where full order has it. A model whose
+        modes know only forces of sampled points has points here that miss the gap altogether."""
+        self.hyco('predict', '-model', self.path('arm.h5'), '-scatter', 500, '-table', self.path('p.csv'))
+        worst = max(row['inconsistency'] for row in self.rows('p.csv'))
+        self.assertLess(worst, 5e-3)  # three values of the thickness: the flexibility's interpolation; else 1 where a node is missed
+        c = self.hyco('compare', '-scene', self.path('arm'), '-model', self.path('arm.h5'), '-scatter', 60)
+        self.assertLess(c['error_u']['max'], 2e-2)
+
+
+class Regime(Case):
+    newcomer = True
+
+    def test_new_contacts(self):
+        """A hybrid model of a roller that was trained at one end of its way and is asked at the other, where contacts close that no training
+        solution closes: it says so, multiplies the estimates, and the fallback solves full order. Where it was trained it says nothing."""
+        train = self.run_raw('train', '-scene', ROLLER, '-values_place', '-5,-4,-3,-2', '-values_press', '0.3,0.6', '-values_modulus', '8,16', '-model', 'm.h5',
+                             '-hyco_model_type', 'hybrid', '-hyco_search', 'false', '-hyco_hybrid', 'contact', '-hyco_rid_layers', 1, cwd=self.folder)
+        self.assertIn(train.returncode, (0, 3), train.stderr)
+        here, there = (self.run_raw('predict', '-model', 'm.h5', '-mu', mu, cwd=self.folder) for mu in ('-3.4,0.5,10', '4,0.5,10'))
+        self.assertNotIn('UNSEEN', here.stdout)
+        self.assertIn('UNSEEN REGIME', there.stdout)
+
+
+if __name__ == '__main__':
+    unittest.main()
