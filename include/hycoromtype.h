@@ -30,8 +30,7 @@ typedef struct {
   PetscBool forces;      /* it gives accurate forces of all contacts, for HycoFOMSolveForces() */
   PetscBool force_basis; /* it supports -hyco_dual nnmf and snapshots */
   PetscBool history;     /* it supports the paths of scenes with a history */
-  PetscBool resultants;  /* its contact forces have smaller errors than its displacements: reactions are those in
-                            balance with them */
+  PetscBool resultants;  /* its contact forces are multipliers of contacts: reactions are those in balance with them */
   PetscBool cells; /* its mesh consists of the cells that its modes choose, and of the surfaces of contacts and loads */
 } HycoROMTraits;
 

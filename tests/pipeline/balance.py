@@ -77,8 +77,8 @@ class Balance(Case):
                     full, model = self.hyco('solve', '-scene', scene, *at)['outputs'], self.hyco('predict', '-model', 'm.h5', *at)['outputs']
                     self.assertGreater(full['carry'], 0.5 * load)
                     self.sums(full, space, load)
-                    self.sums(model, space, load, ('both',) if kind == 'hybrid' else ('hold', 'push', 'both'))
-                    for name in ('both',) if kind == 'hybrid' else ('hold', 'push', 'both'):
+                    self.sums(model, space, load, ('hold', 'push', 'both'))
+                    for name in ('hold', 'push', 'both'):
                         wrong = 0 if name == 'both' else abs(model['carry'] - full['carry'])
                         self.assertLess(abs(model[name] - full[name]), wrong + 1e-8 * load, name)
 
@@ -100,7 +100,7 @@ class Balance(Case):
                 for name, share in {**less, 'both': sum(less.values())}.items():
                     at[name] += 1.7 * share
                 with self.subTest(kind=kind, t=t):
-                    self.sums(at, 'plane', 1.7, ('both',) if kind == 'hybrid' else ('hold', 'push', 'both'))
+                    self.sums(at, 'plane', 1.7, ('hold', 'push', 'both'))
             self.assertGreater(found['outputs']['carry'][-1], 1)
 
     def test_training(self):

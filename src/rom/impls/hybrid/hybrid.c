@@ -107,6 +107,7 @@ PetscErrorCode HycoROMCreate_Hybrid(HycoROM m)
                                        .settings = HYCO_SETTINGS_RID,
                                        .stiffness = PETSC_TRUE,
                                        .constrains = PETSC_TRUE,
+                                       .resultants = PETSC_TRUE,
                                        .history = PETSC_TRUE};
   static const HycoROMOps ops = {.setfromoptions = HycoHybridSetFromOptions,
                                  .build = HycoHybridBuild,
