@@ -4,8 +4,6 @@
 
 /* Share of a slave's facet: largest overlap of surfaces before any load. */
 #define HYCO_OVERLAP_SHARE 0.5
-/* Share of the mesh's length: a smaller overlap is round-off. */
-#define HYCO_ROUNDING 1e-12
 
 /* The size of facets around a node, of one surface at a time: the slave's or the master's of a contact of the scene. */
 typedef struct {
@@ -44,7 +42,7 @@ static PetscErrorCode AllowedOverlap(HycoFE fe, const HycoPairs *p, PetscInt k, 
     PetscCall(SizeAt(fe, c->slave, p->slave[k], sizes, &size));
     *allowed = size > 0 ? HYCO_OVERLAP_SHARE * size : PETSC_MAX_REAL;
   }
-  *deep = (PetscBool)(-gap > *allowed);
+  *deep = (PetscBool)(-gap > *allowed + HYCO_ROUNDING * HycoMeshLength(fe->mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

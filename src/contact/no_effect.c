@@ -16,7 +16,8 @@ static PetscReal Largest(const PetscReal v[], PetscInt n)
 PetscErrorCode HycoContactCheckStill(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscReal gap, PetscReal *left)
 {
   const PetscInt slave = pairs->slave[k], dim = fe->dim;
-  PetscReal size = PetscAbsReal(gap) + Largest(fe->X + 3 * slave, 3) + Largest(fe->u0 + slave * dim, dim);
+  PetscReal size = PetscMax(PetscAbsReal(gap) + Largest(fe->X + 3 * slave, 3) + Largest(fe->u0 + slave * dim, dim),
+                            HycoMeshLength(fe->mesh));
 
   PetscFunctionBegin;
   for (PetscInt j = pairs->master_start[k]; j < pairs->master_start[k + 1]; j++) {
@@ -24,7 +25,7 @@ PetscErrorCode HycoContactCheckStill(HycoFE fe, const HycoPairs *pairs, PetscInt
 
     size = PetscMax(size, Largest(fe->X + 3 * i, 3) + Largest(fe->u0 + i * dim, dim));
   }
-  HycoCheck(*left >= -1e-12 * size,
+  HycoCheck(*left >= -HYCO_ROUNDING * size,
             "contact %s: node %d is fixed%s, and its prescribed displacement penetrates by %g, so that no solution "
             "exists; change the support or the gap",
             fe->scene->contact[pairs->contact[k]]->name, (int)fe->mesh->node_id[slave],

@@ -176,6 +176,42 @@ static PetscBool HasTwin(const Reader *r, HycoMesh m, PetscInt cell, PetscInt gr
   return PETSC_FALSE;
 }
 
+/* Whether a cell of the group has all of these nodes of the file. */
+static PetscBool GroupHas(const Group *g, PetscInt n, const PetscInt node[])
+{
+  for (PetscInt e = 0; e < g->n; e++) {
+    PetscInt found = 0;
+
+    for (PetscInt k = 0; k < n; k++) {
+      PetscInt v = 0;
+
+      while (v < g->nv && g->node[e * g->nv + v] != node[k]) v++;
+      found += v < g->nv;
+    }
+    if (found == n) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
+/* Fails for facet f of a group, which bounds no cell of a body: with the group of cells that has it, if there is one. */
+static PetscErrorCode RefuseFacet(HycoScene scene, const Reader *r, HycoMesh m, const Group *g, PetscInt f)
+{
+  const char *name = NULL;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < r->n_groups && !name; k++) {
+    const Group *cells = &r->group[k];
+
+    if (cells->dim == m->dim && cells->body < 0 && GroupHas(cells, g->nv, g->node + f * g->nv)) name = cells->name;
+  }
+  HycoCheck(!name,
+            "%s: the group \"%s\" is on the cells of \"%s\", which is no body of the scene (facet %ld); add the entry "
+            "body: {%s: {young: ...}}",
+            scene->mesh_path, g->name, name, (long)g->id[f], name);
+  HycoFail("%s: facet %ld of group \"%s\" is not a facet of any cell of a body", scene->mesh_path, (long)g->id[f],
+           g->name);
+}
+
 static PetscErrorCode AddFacets(HycoScene scene, Reader *r, HycoMesh m, Group *g, PetscInt group,
                                 const PetscInt start[], const PetscInt around[])
 {
@@ -197,8 +233,7 @@ static PetscErrorCode AddFacets(HycoScene scene, Reader *r, HycoMesh m, Group *g
         n++;
       }
     }
-    HycoCheck(n > 0, "%s: facet %ld of group \"%s\" is not a facet of any cell of a body", scene->mesh_path,
-              (long)g->id[f], g->name);
+    if (!n) PetscCall(RefuseFacet(scene, r, m, g, f));
     if (n > 1) { /* between two cells: not a boundary, but its nodes are in the group */
       g->inner++;
       continue;

@@ -103,28 +103,46 @@ static PetscReal OfNode(HycoFE fe, PetscInt field, const PetscReal u[], PetscInt
   return PetscSqrtReal(sum);
 }
 
-/* Value in a cell; r and t: about z in 2D and 3D, in an axisymmetric scene about its axis. */
+/* The direction from the z axis to the centroid of a cell, which is not the mean of its nodes if it is a pyramid; 0 if
+   the centroid is on the axis. */
+static void AwayFromZ(HycoFE fe, PetscInt cell, PetscReal out[2])
+{
+  const HycoElement *el = HycoElementGet(fe->mesh->type);
+  PetscReal r, farthest = 0, volume = 0;
+
+  out[0] = out[1] = 0;
+  for (PetscInt q = 0; q < el->nq; q++) {
+    const PetscReal w = el->w[q] * PetscAbsReal(HycoDeterminant(el, fe->mesh->cells + cell * el->nv, fe->X, q));
+    PetscReal x[3];
+
+    HycoPointPlace(fe, el, cell, q, x);
+    for (PetscInt c = 0; c < 2; c++) out[c] += w * x[c];
+    farthest = PetscMax(farthest, PetscSqrtReal(x[0] * x[0] + x[1] * x[1]));
+    volume += w;
+  }
+  r = PetscSqrtReal(out[0] * out[0] + out[1] * out[1]);
+  for (PetscInt c = 0; c < 2; c++) out[c] = r > 1e-9 * volume * farthest ? out[c] / r : 0;
+}
+
+/* Value in a cell; r and t: about z in 2D and 3D, in an axisymmetric scene about its axis. A cell around the z axis has
+   the mean over the directions. */
 static PetscErrorCode OfCell(HycoFE fe, PetscInt field, const PetscReal sigma[], PetscInt cell, PetscReal *value)
 {
-  HycoMesh m = fe->mesh;
-  PetscReal s[6] = {0}, x = 0, y = 0, r, mises, principal[3];
+  PetscReal s[6] = {0}, n[2], mises, principal[3];
 
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(s, sigma + cell * fe->n_sigma, fe->n_sigma)); /* xx, yy, zz, xy, yz, xz */
   if (field >= XX && field <= XZ) *value = s[field - XX];
-  if (field == RR || field == TT) {
-    PetscInt node[HYCO_CELL_NODES];
-    const PetscInt n = HycoMeshOwnNodes(m, cell, node);
-
-    for (PetscInt v = 0; v < n; v++) {
-      x += fe->X[3 * node[v]];
-      y += fe->X[3 * node[v] + 1];
-    }
-    r = PetscSqrtReal(x * x + y * y);
-    if (r > 0) x /= r, y /= r;
-    if (field == RR) *value = x * x * s[0] + y * y * s[1] + 2 * x * y * s[3];
-    if (field == TT) *value = y * y * s[0] + x * x * s[1] - 2 * x * y * s[3];
-    if (fe->formulation == HYCO_AXISYMMETRIC) *value = field == RR ? s[0] : s[2];
+  if ((field == RR || field == TT) && fe->formulation == HYCO_AXISYMMETRIC) {
+    *value = field == RR ? s[0] : s[2];
+  } else if (field == RR || field == TT) {
+    AwayFromZ(fe, cell, n);
+    if (n[0] == 0 && n[1] == 0)
+      *value = (s[0] + s[1]) / 2;
+    else if (field == RR)
+      *value = n[0] * n[0] * s[0] + n[1] * n[1] * s[1] + 2 * n[0] * n[1] * s[3];
+    else
+      *value = n[1] * n[1] * s[0] + n[0] * n[0] * s[1] - 2 * n[0] * n[1] * s[3];
   }
   if (field >= MISES) {
     PetscCall(HycoStressInvariants(1, fe->dim, s, &mises, principal));

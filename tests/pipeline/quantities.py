@@ -1,12 +1,16 @@
 """Outputs that a scene names: numbers of each solution, full order and predicted, in reports and tables."""
 import csv
 import os
+import sys
 import unittest
 
 import h5py
 import numpy as np
 
 from common import PELLET, SOURCE, Case
+
+sys.path.insert(0, os.path.join(SOURCE, 'tests', 'verify'))
+from grids import GMSH, Grid  # noqa: E402
 
 BLOCKS = os.path.join(SOURCE, 'examples', 'blocks')
 OUTPUTS = """
@@ -95,6 +99,28 @@ class Quantities(Case):
         self.assertEqual(len([name for name in before if name.endswith('.h5')]), 9)
         self.hyco('train', '-scene', self.scene, '-grid', '3,3', '-model', 'again.h5', '-hyco_pod_tol', 1e-9)
         self.assertEqual({name: os.stat(os.path.join(folder, name)).st_mtime_ns for name in os.listdir(folder)}, before)
+
+    def test_polar_centroids(self):
+        """A uniform stress sigma_xx = 1: the radial stress of a cell is that at its centroid (x, y), x^2/(x^2 + y^2), for every shape; of a cell
+        around the axis it is the mean over the directions, 1/2."""
+        centroid = {GMSH['pyramid5']: (3 / 16,) * 4 + (1 / 4,), GMSH['hex8']: (1 / 8,) * 8, GMSH['prism6']: (1 / 6,) * 6}
+        for kind, low, n in (('whole', 1, 2), ('halves', 1, 2), ('pyramid5', 1, 2), ('whole', -2, 1)):
+            grid = Grid()
+            grid.mixed([np.linspace(low, 2, n + 1), np.linspace(low, 2, n + 1), np.linspace(0, 1, n + 1)], lambda x: x, 'cube',
+                       {'x0': 'x0', 'x1': 'x1', 'y0': 'y0', 'z0': 'z0'}, lambda place, kind=kind: kind)
+            os.makedirs(self.path('cube'), exist_ok=True)
+            grid.write(self.path('cube', 'mesh.msh'))
+            with open(self.path('cube', 'scene.yaml'), 'w', encoding='utf-8') as f:
+                f.write('scene: {mesh: mesh.msh}\nbody: {cube: {young: 200, poisson: 0.3}}\nfixed: {x0: {x: 0}, y0: {y: 0}, z0: {z: 0}}\n'
+                        'pressure: {x1: -1}\noutput: {most: {max: sigma_rr}, least: {min: sigma_rr}, hoop: {max: sigma_tt}}\n')
+            place = np.array(grid.nodes)
+            x, y = np.transpose([np.array(centroid[of]) @ place[np.array(nodes) - 1, :2] for of, _, nodes in grid.elements if of in centroid])
+            radial = np.full(1, 0.5) if low < 0 else x**2 / (x**2 + y**2)
+            found = self.hyco('solve', '-scene', self.path('cube'))['outputs']
+            with self.subTest(kind=kind, low=low):
+                self.near(found['most'], radial.max(), 1e-9)
+                self.near(found['least'], radial.min(), 1e-9)
+                self.near(found['hoop'], 1 - radial.min(), 1e-9)
 
     def test_refused(self):
         for outputs, said in (('output: {peak: {max: mises, min: u}}\n', 'one of max, min, mean'), ('output: {peak: {max: stress}}\n', 'must be one of'),

@@ -53,6 +53,23 @@ class Still(Case):
             for word in ('between', 'node 5', '0.01'):
                 self.assertIn(word, run.stderr)
 
+    def test_no_overlap_allowed(self):
+        """With overlap: 0 an overlap of round-off (the drawn one) is allowed as well, and one of 1e-6 is refused."""
+        for ranks in (0, 2):
+            held = 'lower_foot: {x: 0, y: 0}, upper_foot: {x: 0}, upper_head: {x: 0, y: -0.01*press}'
+            scene = self.scene(held, PAIR + ', overlap: 0')
+            self.assertEqual(self.hyco('solve', '-scene', scene, '-mu', 1, ranks=ranks)['n_active'], 2)
+            run = self.run_raw('solve', '-scene', scene, '-mu', 1, '-body_upper_map_y', 'y-1e-6', ranks=ranks)
+            self.assertEqual(run.returncode, 1)
+            self.assertIn('contact_between_overlap', run.stderr)
+
+    def test_origin(self):
+        """A fixed node at the origin whose gap is round-off of the scene's numbers."""
+        for gap, status in (("x/10 + 0.3 - (0.1 + 0.2)", 0), ('x/10 - 1e-6', 1)):
+            floor = f"type: obstacle, group: lower_foot, normal: {{y: -1}}, gap: '{gap}'"
+            scene = self.scene('lower_foot: {x: 0, y: 0}, lower_head: {x: 0}, upper_foot: {x: 0, y: 0}', floor)
+            self.assertEqual(self.run_raw('solve', '-scene', scene, '-mu', 1).returncode, status, gap)
+
     def test_obstacle(self):
         """An obstacle's completely fixed nodes are not contacts; they must not penetrate it."""
         held = 'lower_foot: {x: 0, y: 0}, upper_foot: {x: 0, y: -0.02*press}, upper_head: {x: 0}'
