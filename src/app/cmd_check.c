@@ -227,7 +227,7 @@ static PetscErrorCode SayMotions(Check *check)
   if (loose)
     CheckWarn(check,
               "%d rigid motion%s prevented only by contact: full order can solve this if the loads press the bodies "
-              "together; a reduced model needs supports",
+              "together, and so can hybrid and projection-based models; a condensed model needs a support or a soft spring",
               (int)loose, loose > 1 ? "s are" : " is");
   PetscCall(HycoMotionsDestroy(&free));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -94,7 +94,9 @@ static PetscErrorCode ChooseElements(HycoScene scene, HycoMesh mesh, PetscBool b
     HycoCheck(!body->bbar || has_mean,
               "body_%s_element is bbar, which is for quad4 and hex8; in this mesh's cells (%s) the dilatation %s",
               body->name, HycoCellKinds[mesh->type].name,
-              HycoMeshIsQuadratic(mesh) ? "is free enough" : "is constant already");
+              HycoMeshIsQuadratic(mesh)                 ? "is free enough"
+              : scene->formulation == HYCO_AXISYMMETRIC ? "would be too stiff as a mean over the cell, too"
+                                                        : "is constant already");
     HycoCheck(!body->bbar || scene->formulation != HYCO_PLANE_STRESS,
               "body_%s_element is bbar, against volumetric locking, which does not occur under plane_stress; remove it",
               body->name);

@@ -84,6 +84,8 @@ fixed: {f: {x: 0, y: 0, z: 0}}
 TOGETHER = [
     ('a load between two cells', lambda n, e, g: (n, e + [(1, 7, [4, 5])], {**g, 7: (1, 'mid')}),
      lambda s: s.replace('body:\n', 'pressure: {mid: 1}\nbody:\n'), 'the load on mid: 1 of its facets lie between two cells'),
+    ('a body without an entry', lambda n, e, g: (n, e, g), lambda s: s.replace('  up: {young: 2, poisson: 0.3}\n', ''),
+     'on the cells of "up", which is no body of the scene (facet 15); add the entry body: {up: {young: ...}}'),
     ('a master between two cells', lambda n, e, g: (n, e + [(1, 7, [4, 5])], {**g, 7: (1, 'mid')}),
      lambda s: s.replace('type: pair', 'type: surface').replace('master: under', 'master: mid'), 'contact c: the group mid is empty'),
     ('bodies that share nodes', lambda n, e, g: (n, [(k, t, [{10: 7, 11: 8, 12: 9}.get(v, v) for v in of]) for k, t, of in e], g),
