@@ -89,8 +89,9 @@ void DriverNoteLaunch(void);
 void DriverStartAlone(void);
 /* Prints an error found before MPI begins, once for all ranks. Returns false. */
 PetscBool DriverRefuseEarly(const char text[]);
-/* Raises the limit of the stack if it is too low; false, with a line on stderr: it cannot be raised. */
-PetscBool DriverHasStack(void);
+/* Raises the limit of the stack if it is too low, and starts the program again; false, with a line on stderr: it cannot
+ * be raised. */
+PetscBool DriverHasStack(char **argv);
 /* Fails if a launcher of another MPI has started several processes, each of which would do all the work and write
    the same files. Collective. */
 PetscErrorCode DriverCheckLaunch(void);

@@ -74,7 +74,7 @@ static void ChooseTemporary(void)
 #define STACK ((rlim_t)512 * 1024)
 #define USUAL ((rlim_t)8 * 1024 * 1024)
 
-PetscBool DriverHasStack(void)
+PetscBool DriverHasStack(char **argv)
 {
   struct rlimit limit;
   char text[DRIVER_LINE];
@@ -83,7 +83,10 @@ PetscBool DriverHasStack(void)
     return PETSC_TRUE;
   if (limit.rlim_max == RLIM_INFINITY || limit.rlim_max >= STACK) {
     limit.rlim_cur = limit.rlim_max == RLIM_INFINITY || limit.rlim_max > USUAL ? USUAL : limit.rlim_max;
-    if (setrlimit(RLIMIT_STACK, &limit) == 0) return PETSC_TRUE; /* the stack of a running process grows up to it */
+    if (setrlimit(RLIMIT_STACK, &limit) == 0) { /* started again, because threads keep the limit of the start */
+      execv("/proc/self/exe", argv);
+      return PETSC_TRUE;
+    }
   }
   snprintf(text, sizeof(text), "the stack is limited to %ld kB, and %ld kB are needed; raise the limit: ulimit -s 8192",
            (long)(limit.rlim_cur / 1024), (long)(STACK / 1024));

@@ -160,7 +160,7 @@ static PetscErrorCode Start(int *argc, char ***argv)
   PetscErrorCode ierr;
   HycoErrorText said = NULL;
 
-  if (!DriverHasStack() || !DriverSourcesEnd(*argc, *argv)) return PETSC_ERR_USER;
+  if (!DriverHasStack(*argv) || !DriverSourcesEnd(*argc, *argv)) return PETSC_ERR_USER;
   PetscErrorPrintf = PrintNothing;
   ierr = HycoInitialize(argc, argv);
   signal(SIGPIPE, SIG_IGN);
