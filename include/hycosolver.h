@@ -50,7 +50,8 @@ typedef enum {
   HYCO_DIVERGED_NO_CONTACT_BASIS = -5, /* a reduced model without any contact force, where bodies penetrate */
   HYCO_DIVERGED_STEP = -6,             /* a history: its time steps became too small */
   HYCO_DIVERGED_DISPLACEMENT = -7,     /* full order: displacements of more than 1e6 times the mesh's extent */
-  HYCO_DIVERGED_ENERGY = -8            /* full order: strain energy and work differ */
+  HYCO_DIVERGED_ENERGY = -8,           /* full order: strain energy and work differ */
+  HYCO_DIVERGED_HELD = -9              /* contact alone holds a body, can balance the load, and the method failed */
 } HycoReason;
 
 /* Collective. The caller owns it. */

@@ -5,23 +5,23 @@
     x = centre + r / kappa,   w = g - A^T x + S L = g - A^T (centre + f' / kappa) + (S + A^T A / kappa) L
 
   is a problem in the forces only, with a solution for any set of contacts. Then x becomes the centre. If there is an
-  equilibrium, r tends to 0, also where contact leaves x free; x is then a nearest solution. There is none if r is a
-  motion that closes no contact and on which the load has positive work (Farkas' lemma).
+  equilibrium, r tends to 0, also where contact leaves x free; x is then a nearest solution. There is none if the step
+  r / kappa is a motion that closes no contact and on which the load has positive work (Farkas' lemma).
 */
 #include <hycolcp.h>
 #include <petscblaslapack.h>
 
 #define SOFT     1e-4  /* kappa relative to the contacts' stiffness: the rate of convergence */
 #define BALANCED 1e-11 /* what the springs may carry in the end, as a share of load and contact forces */
-#define TANGENT  1e-10 /* cosine up to which a motion closes no contact */
+#define TANGENT  1e-10 /* of the largest closing of a contact: up to there a motion closes none */
 #define MOST_ITS 200
 
 typedef struct {
   const HycoLCP *lcp;
   PetscInt p, m;
-  PetscReal *S;                      /* m x m: S + A^T A / kappa */
-  PetscReal *kappa, *centre, *x, *r; /* p */
-  PetscReal *gap;                    /* m: w for L = 0 */
+  PetscReal *S;                             /* m x m: S + A^T A / kappa */
+  PetscReal *kappa, *centre, *x, *r, *step; /* p; step: r / kappa */
+  PetscReal *gap;                           /* m: w for L = 0 */
 } Proximal;
 
 /* Column j of (A; S). */
@@ -143,24 +143,29 @@ static PetscBool Balanced(const Proximal *h, const PetscReal L[])
   return all;
 }
 
-/* Whether r is a motion that closes no contact and on which the load has work. If not, *far: how many times r the
-   bodies may move until an open contact closes; 0 if r closes a contact further. */
-static PetscBool Escapes(const Proximal *h, const PetscReal L[], PetscReal *far)
+/* Whether the step r / kappa is a motion that closes no contact and on which the load has work. If not, *far: how many
+   such steps the bodies may move until an open contact closes; 0 if the step closes a contact further. */
+static PetscBool Escapes(Proximal *h, const PetscReal L[], PetscReal *far)
 {
   PetscReal size = 0, work = 0;
   PetscBool none = PETSC_TRUE;
 
   *far = PETSC_MAX_REAL;
   for (PetscInt i = 0; i < h->p; i++) {
-    size += h->r[i] * h->r[i];
-    work -= h->lcp->q[i] * h->r[i];
+    h->step[i] = h->r[i] / h->kappa[i];
+    work -= h->lcp->q[i] * h->step[i];
   }
   for (PetscInt j = 0; j < h->m; j++) {
-    const PetscReal closing = Closing(h, j, h->r), *A = Column(h, j), *S = A + h->p;
-    PetscReal row = 0, w = h->lcp->q[h->p + j] - Closing(h, j, h->x);
+    PetscReal sum = 0;
 
-    for (PetscInt i = 0; i < h->p; i++) row += A[i] * A[i];
-    if (closing <= TANGENT * PetscSqrtReal(row * size)) continue;
+    for (PetscInt i = 0; i < h->p; i++) sum += PetscAbsReal(Column(h, j)[i] * h->step[i]);
+    size = PetscMax(size, sum);
+  }
+  for (PetscInt j = 0; j < h->m; j++) {
+    const PetscReal closing = Closing(h, j, h->step), *S = Column(h, j) + h->p;
+    PetscReal w = h->lcp->q[h->p + j] - Closing(h, j, h->x);
+
+    if (closing <= TANGENT * size) continue;
     none = PETSC_FALSE;
     for (PetscInt k = 0; k < h->m; k++) w += S[k] * L[k];
     *far = L[j] > 0 ? 0 : PetscMin(*far, PetscMax(w, 0) / closing);
@@ -181,7 +186,7 @@ static PetscErrorCode Iterate(Proximal *h, PetscBool active[], PetscReal L[], Pe
     if (*status != HYCO_LCP_SOLVED || Balanced(h, L)) PetscFunctionReturn(PETSC_SUCCESS);
     *status = Escapes(h, L, &far) ? HYCO_LCP_RAY : HYCO_LCP_LIMIT;
     if (*status == HYCO_LCP_RAY) PetscFunctionReturn(PETSC_SUCCESS);
-    for (PetscInt i = 0; i < h->p; i++) h->centre[i] = h->x[i] + far * h->r[i];
+    for (PetscInt i = 0; i < h->p; i++) h->centre[i] = h->x[i] + far * h->step[i];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -194,10 +199,10 @@ PetscErrorCode HycoLCPProximal(const HycoLCP *lcp, PetscBool active[], PetscReal
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc2((size_t)m * (size_t)m, &h.S, m, &h.gap));
-  PetscCall(PetscCalloc4(p, &h.kappa, p, &h.centre, p, &h.x, p, &h.r));
+  PetscCall(PetscCalloc5(p, &h.kappa, p, &h.centre, p, &h.x, p, &h.r, p, &h.step));
   PetscCall(Iterate(&h, active, z + p, its, status));
   PetscCall(PetscArraycpy(z, h.x, p));
   PetscCall(PetscFree2(h.S, h.gap));
-  PetscCall(PetscFree4(h.kappa, h.centre, h.x, h.r));
+  PetscCall(PetscFree5(h.kappa, h.centre, h.x, h.r, h.step));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -406,6 +406,7 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
 {
   PetscInt n_free = 0;
   PetscReal begin = HycoNow();
+  PetscBool lifts = PETSC_FALSE;
 
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
@@ -419,8 +420,9 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
   for (PetscInt k = 0; k < s->n_forms; k++) {
     if (s->forms[k]->ops->reset) PetscCall(s->forms[k]->ops->reset(s, s->forms[k]));
   }
-  if (s->reason < 0 && s->system->K && s->kkt.stationarity > s->rtol) PetscCall(HycoKernelSize(s->system->K, &n_free));
-  if (n_free) s->reason = HYCO_DIVERGED_FLOATING;
+  if (s->reason < 0 && s->system->K) PetscCall(HycoKernelSize(s->system->K, &n_free));
+  if (n_free) PetscCall(HycoSolverLifts(s, &lifts));
+  if (n_free) s->reason = lifts ? HYCO_DIVERGED_FLOATING : HYCO_DIVERGED_HELD;
   s->free = NULL;
   s->start_set = NULL;
   s->target = 0;
@@ -513,6 +515,9 @@ const char *HycoReasonName(HycoReason reason)
     return "not converged: a KKT residual is above the tolerance";
   case HYCO_DIVERGED_FLOATING:
     return "not converged: a body is held by contact only, and this load lifts it off";
+  case HYCO_DIVERGED_HELD:
+    return "not converged: a body is held by contact only, and its equilibrium was not found, although contact forces "
+           "can balance this load; use -hyco_linear direct, or add a support or a soft spring";
   case HYCO_DIVERGED_NO_CONTACT_BASIS:
     return "not converged: the model has no contact forces, and bodies penetrate here; train on solutions with contact";
   case HYCO_DIVERGED_STEP:

@@ -108,6 +108,9 @@ class Overhang(Case):
             self.near(found['contacts']['table']['force'][1], 6, 1e-9)
             self.assertAlmostEqual(found['outputs']['push'], push, 8)
             self.assertLess(abs(found['outputs']['u'] - 0.1 * side), 0.01)
+        run = self.run_raw('solve', '-scene', 'scene.yaml', '-mu', 0, '-hyco_solver_form', 'primal', '-hyco_solver_fallback', 'false')
+        self.assertEqual((run.returncode, run.stderr.count('hyco: error')), (1, 1), run.stdout + run.stderr)
+        self.assertIn('contact forces can balance this load', run.stderr)  # not: lifts it off
 
 
 class Units(Case):

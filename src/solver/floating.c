@@ -1,0 +1,73 @@
+/*
+  Whether any contact forces balance the load on the rigid motions z that contact alone prevents:
+
+    z_i.F = sum over contacts of (B z_i)_j L_j,   L >= 0
+
+  The proximal point method decides it with a unit flexibility in place of S, so that no factor of K is needed.
+*/
+#include <hycosolverimpl.h>
+
+/* The matrix of the problem is dense. */
+#define HYCO_MOST_CONTACTS 3000
+
+/* M = [0 A; -A^T I] and q = (-f', 0), with the motions z in place of pinned unknowns. */
+static PetscErrorCode Fill(HycoSystem y, PetscInt p, const Vec z[], PetscReal M[], PetscReal q[])
+{
+  const size_t n = (size_t)(p + y->m);
+  VecScatter scatter;
+  Vec all;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSystemWork(y));
+  PetscCall(VecScatterCreateToAll(y->work_L, &scatter, &all));
+  for (PetscInt i = 0; i < p; i++) {
+    const PetscScalar *row;
+
+    PetscCall(VecDot(y->F, z[i], &q[i]));
+    q[i] = -q[i];
+    PetscCall(MatMult(y->B, z[i], y->work_L));
+    PetscCall(VecScatterBegin(scatter, y->work_L, all, INSERT_VALUES, SCATTER_FORWARD));
+    PetscCall(VecScatterEnd(scatter, y->work_L, all, INSERT_VALUES, SCATTER_FORWARD));
+    PetscCall(VecGetArrayRead(all, &row));
+    for (PetscInt j = 0; j < y->m; j++) {
+      M[(size_t)(p + j) * n + (size_t)i] = row[j];
+      M[(size_t)i * n + (size_t)(p + j)] = -row[j];
+    }
+    PetscCall(VecRestoreArrayRead(all, &row));
+  }
+  for (size_t j = (size_t)p; j < n; j++) M[j * n + j] = 1;
+  PetscCall(VecScatterDestroy(&scatter));
+  PetscCall(VecDestroy(&all));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverLifts(HycoSolver s, PetscBool *lifts)
+{
+  HycoSystem y = s->system;
+  MatNullSpace kernel = NULL;
+  HycoLCP lcp = {.n = y->m, .symmetric = PETSC_TRUE};
+  HycoLCPStatus status;
+  PetscInt its = 0, n;
+  PetscReal *M, *q, *z;
+  PetscBool *active;
+  const Vec *motion;
+
+  PetscFunctionBegin;
+  *lifts = PETSC_FALSE;
+  if (!y->K) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatGetNullSpace(y->K, &kernel));
+  if (kernel) PetscCall(MatNullSpaceGetVecs(kernel, NULL, &lcp.p, &motion));
+  *lifts = (PetscBool)(lcp.p > 0 && s->kkt.stationarity > s->rtol);
+  if (!lcp.p || !y->m || y->m > HYCO_MOST_CONTACTS) PetscFunctionReturn(PETSC_SUCCESS);
+  n = lcp.p + y->m;
+  PetscCall(PetscCalloc1((size_t)n * (size_t)n, &M));
+  PetscCall(PetscCalloc3(n, &q, n, &z, y->m, &active));
+  PetscCall(Fill(y, lcp.p, motion, M, q));
+  lcp.M = M;
+  lcp.q = q;
+  PetscCall(HycoLCPProximal(&lcp, active, z, &its, &status));
+  *lifts = (PetscBool)(status == HYCO_LCP_RAY);
+  PetscCall(PetscFree(M));
+  PetscCall(PetscFree3(q, z, active));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
