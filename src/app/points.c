@@ -304,8 +304,8 @@ PetscErrorCode DriverGetSamples(HycoScene scene, HycoSamples *samples, PetscBool
   PetscCall(DriverGet(
       "points", "<file.csv> a set of points: a header with the parameters' names, then a point per line", points));
   PetscCall(DriverGet("scatter",
-                      "<n> a set of points: n points of Halton's sequence over the ranges, with n values of each "
-                      "parameter; for training with 3 parameters or more",
+                      "<n> a set of points: n points spread over the ranges, corners and faces included, with many "
+                      "values of each parameter; for training with 3 parameters or more",
                       scatter));
   if (!scene) PetscFunctionReturn(PETSC_SUCCESS);
   n_sets += (grid[0] != '\0') + (points[0] != '\0') + (scatter[0] != '\0');

@@ -1,10 +1,109 @@
 /*
-  HycoSamples: unseen points by which a model is judged. They are distributed over the region covered by a set of
-  training points, by an additive recurrence: coordinate j of point k is the fractional part of 1/2 + k phi^-(j+1), with
-  phi the root of phi^(d+1) = phi + 1 (M. Roberts' generalisation of the golden ratio to d dimensions). Every part of
-  the sequence is evenly distributed, and it can be continued.
+  HycoSamples: points spread over a box. Inside they follow a sequence that fills it evenly; a share of them lies at its
+  corners and on its faces, where models fail in ways that no point inside shows.
+
+  Scattered points follow Halton's sequence over the parameters' ranges. Unseen points, by which a model is judged, are
+  distributed over the region covered by a set of training points, by an additive recurrence: coordinate j of point k is
+  the fractional part of 1/2 + k phi^-(j+1), with phi the root of phi^(d+1) = phi + 1 (M. Roberts' generalisation of the
+  golden ratio to d dimensions). Every part of this sequence is evenly distributed, and it can be continued.
 */
+#include <hycoalgorithms.h>
 #include <hycosceneimpl.h>
+
+#define FEW     3       /* parameters of which scattered points have the corners twice as soon */
+#define MOST    15      /* more dimensions have too many corners to count */
+#define BETWEEN 1000003 /* distance of the parts of a sequence that are used for different places */
+
+/* The places of successive points or groups; with few parameters, scattered points have corners AGAIN, else inside. */
+typedef enum { INSIDE, CORNER, FACE, AGAIN, N_PLACES } Place;
+
+/* Dimensions of the box: those with a range; the first n_lead are shared by a group of points. */
+typedef struct {
+  PetscInt n, n_lead, of[HYCO_MAX_PARAMETERS];
+} Axes;
+
+/* Those of shared[] first (NULL: every one is); if they are all or none, every point is a group of its own. */
+static void FindAxes(PetscInt n_par, const PetscReal lo[], const PetscReal hi[], const PetscBool shared[], Axes *axes)
+{
+  *axes = (Axes){0};
+  for (PetscInt pass = 0; pass < 2; pass++) {
+    for (PetscInt p = 0; p < n_par; p++) {
+      if (lo[p] < hi[p] && (shared && shared[p]) == (pass == 0)) axes->of[axes->n++] = p;
+    }
+    if (pass == 0) axes->n_lead = axes->n;
+  }
+  if (!axes->n_lead) axes->n_lead = axes->n;
+}
+
+/* The number of corners of dim dimensions. */
+static PetscInt Corners(PetscInt dim)
+{
+  return (PetscInt)1 << PetscMin(dim, MOST);
+}
+
+/* Corner k of dim dimensions, a bit for each, in an order that spreads them: each even one is followed by its
+   opposite. */
+static PetscInt Corner(PetscInt dim, PetscInt k)
+{
+  const PetscInt half = PetscMax(Corners(dim) / 2, 1), step = (PetscInt)(0.618 * (PetscReal)half) | 1,
+                 pair = k / 2 * step % half;
+
+  return k % 2 ? 2 * half - 1 - pair : pair;
+}
+
+/* Moves the point to corner k of the axes from .. to-1. */
+static void PutAtCorner(const Axes *axes, PetscInt from, PetscInt to, PetscInt k, const PetscReal lo[],
+                        const PetscReal hi[], PetscReal point[])
+{
+  const PetscInt bits = Corner(to - from, k % Corners(to - from));
+
+  for (PetscInt j = from; j < to; j++) {
+    const PetscInt p = axes->of[j];
+
+    point[p] = bits >> (j - from) % MOST & 1 ? hi[p] : lo[p];
+  }
+}
+
+/* Moves the point to face k, of which successive ones belong to different axes; within a group to both ends of an axis
+   that the group does not share. */
+static void PutOnFace(const Axes *axes, PetscInt k, PetscInt member, const PetscReal lo[], const PetscReal hi[],
+                      PetscReal point[])
+{
+  const PetscInt j = k % axes->n, p = axes->of[j], end = k / axes->n + (j >= axes->n_lead ? member : 0);
+
+  point[p] = end % 2 ? hi[p] : lo[p];
+}
+
+PetscErrorCode HycoSamplesAddScattered(HycoSamples samples, PetscInt count)
+{
+  PetscReal mu[HYCO_MAX_PARAMETERS];
+  PetscInt n_par, n_inside = 0, n_corners = 0, n_faces = 0;
+  HycoScene s;
+  Axes axes;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(samples, NULL, &n_par, NULL));
+  PetscCall(HycoSamplesGetScene(samples, &s));
+  HycoCheck(count >= 1 && count <= 100000000, "%d scattered points; 1 to 100 million are expected", (int)count);
+  FindAxes(n_par, s->lo, s->hi, NULL, &axes);
+  for (PetscInt k = 0; k < count; k++) {
+    const Place place = (Place)(k % N_PLACES);
+    const PetscBool face = (PetscBool)(place == FACE && axes.n > 1),
+                    corner = (PetscBool)((place == CORNER || (place == AGAIN && axes.n <= FEW)) &&
+                                         n_corners < Corners(axes.n));
+    const PetscInt faces = 2 * axes.n, number = face ? n_faces / faces + n_faces % faces * BETWEEN : n_inside;
+
+    for (PetscInt p = 0; p < n_par; p++) mu[p] = s->lo[p] + (s->hi[p] - s->lo[p]) * HycoHalton(1 + number, p);
+    if (corner)
+      PutAtCorner(&axes, 0, axes.n, n_corners++, s->lo, s->hi, mu);
+    else if (face)
+      PutOnFace(&axes, n_faces++, 0, s->lo, s->hi, mu);
+    else
+      n_inside++;
+    PetscCall(HycoSamplesAddPoint(samples, mu));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 PetscErrorCode HycoSamplesReach(HycoScene s, PetscInt n, const PetscReal mu[], PetscReal lo[], PetscReal hi[])
 {
@@ -52,27 +151,129 @@ static PetscErrorCode Has(PetscInt n, PetscInt n_par, const PetscReal mu[], cons
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Unseen points as they are drawn. */
+typedef struct {
+  HycoSamples seen, drawn;
+  PetscReal lo[HYCO_MAX_PARAMETERS], hi[HYCO_MAX_PARAMETERS];
+  Axes axes;
+  PetscInt n_par, together, corner; /* corner: that of the group's shared axes; -1: none is left */
+} Drawing;
+
+/* Whether training has the point, or it was drawn already. */
+static PetscErrorCode IsTaken(const Drawing *d, const PetscReal point[], PetscBool *taken)
+{
+  PetscInt n, m;
+  const PetscReal *mu, *nu;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(d->seen, &n, NULL, &mu));
+  PetscCall(HycoSamplesGet(d->drawn, &m, NULL, &nu));
+  PetscCall(Has(n, d->n_par, mu, point, taken));
+  if (!*taken) PetscCall(Has(m, d->n_par, nu, point, taken));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Moves the axes that a group does not share to the first of their corners that is not taken. */
+static PetscErrorCode SeekCorner(const Drawing *d, PetscReal point[], PetscBool *found)
+{
+  const Axes *axes = &d->axes;
+  PetscBool taken = PETSC_TRUE;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < Corners(axes->n - axes->n_lead) && taken; k++) {
+    PutAtCorner(axes, axes->n_lead, axes->n, k, d->lo, d->hi, point);
+    PetscCall(IsTaken(d, point, &taken));
+  }
+  *found = (PetscBool)!taken;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Finds a corner of the shared axes, from number `first` on, that has one which is not taken. */
+static PetscErrorCode SeekGroupCorner(Drawing *d, PetscInt first)
+{
+  const PetscInt n = Corners(d->axes.n_lead);
+  PetscReal point[HYCO_MAX_PARAMETERS];
+  PetscBool found = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArraycpy(point, d->lo, d->n_par));
+  d->corner = -1;
+  for (PetscInt k = 0; k < n && !found; k++) {
+    PutAtCorner(&d->axes, 0, d->axes.n_lead, (first + k) % n, d->lo, d->hi, point);
+    PetscCall(SeekCorner(d, point, &found));
+    if (found) d->corner = (first + k) % n;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Point k of the sequence inside the part for its place, after `turn` points that were taken. */
+static void Recur(const Drawing *d, PetscInt k, PetscInt turn, PetscReal point[])
+{
+  const PetscInt group = k / d->together, place = group % N_PLACES, round = group / N_PLACES, faces = 2 * d->axes.n;
+  const PetscInt number = place == INSIDE   ? 2 * round
+                          : place == AGAIN  ? 2 * round + 1
+                          : place == CORNER ? BETWEEN + round
+                                            : (2 + round % faces) * BETWEEN + round / faces; /* a part for each face */
+
+  for (PetscInt p = 0; p < d->n_par; p++) point[p] = d->lo[p];
+  for (PetscInt j = 0; j < d->axes.n; j++) {
+    const PetscInt p = d->axes.of[j], n = j < d->axes.n_lead ? number : number * d->together + k % d->together;
+    const PetscInt later = j < d->axes.n_lead && d->axes.n_lead < d->axes.n ? 0 : 3 * turn * BETWEEN;
+
+    point[p] = d->lo[p] + (d->hi[p] - d->lo[p]) * Coordinate(d->n_par, p, 1 + n + later);
+  }
+}
+
+/* Draws point k. */
+static PetscErrorCode Draw(const Drawing *d, PetscInt k, PetscReal point[])
+{
+  const PetscInt group = k / d->together, place = group % N_PLACES;
+  const PetscBool corner = (PetscBool)(place == CORNER && d->corner >= 0),
+                  face = (PetscBool)(place == FACE && d->axes.n > 1);
+  PetscBool taken = PETSC_TRUE;
+
+  PetscFunctionBegin;
+  if (corner) {
+    PetscBool found;
+
+    Recur(d, k, 0, point);
+    PutAtCorner(&d->axes, 0, d->axes.n_lead, d->corner, d->lo, d->hi, point);
+    PetscCall(SeekCorner(d, point, &found));
+    if (found) PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  for (PetscInt turn = 0; taken; turn++) {
+    Recur(d, k, turn, point);
+    if (corner) PutAtCorner(&d->axes, 0, d->axes.n_lead, d->corner, d->lo, d->hi, point);
+    if (face) PutOnFace(&d->axes, group / N_PLACES, k % d->together, d->lo, d->hi, point);
+    PetscCall(IsTaken(d, point, &taken));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoSamplesUnseen(HycoSamples samples, PetscInt first, PetscInt count, PetscInt together,
                                  const PetscBool slow[], HycoSamples *unseen)
 {
-  PetscReal lo[HYCO_MAX_PARAMETERS], hi[HYCO_MAX_PARAMETERS], point[HYCO_MAX_PARAMETERS];
-  PetscInt n, n_par, n_slow = 0;
+  Drawing d = {.seen = samples, .together = together, .corner = -1};
+  PetscReal point[HYCO_MAX_PARAMETERS];
+  PetscInt n;
   const PetscReal *mu;
   HycoScene scene;
-  PetscBool seen;
 
   PetscFunctionBegin;
-  PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
+  PetscCall(HycoSamplesGet(samples, &n, &d.n_par, &mu));
   PetscCall(HycoSamplesGetScene(samples, &scene));
-  PetscCall(HycoSamplesReach(scene, n, mu, lo, hi));
+  PetscCall(HycoSamplesReach(scene, n, mu, d.lo, d.hi));
   PetscCall(HycoSamplesCreate(scene, unseen));
-  for (PetscInt p = 0; p < n_par; p++) n_slow += slow && slow[p];
-  if (!n_slow || n_slow == n_par) together = 1;
-  for (PetscInt k = first; n_par && k < first + count; k++) {
-    for (PetscInt p = 0; p < n_par; p++)
-      point[p] = lo[p] + (hi[p] - lo[p]) * Coordinate(n_par, p, 1 + (slow && slow[p] ? k / together : k));
-    PetscCall(Has(n, n_par, mu, point, &seen));
-    if (!seen) PetscCall(HycoSamplesAddPoint(*unseen, point));
+  d.drawn = *unseen;
+  FindAxes(d.n_par, d.lo, d.hi, slow, &d.axes);
+  if (d.axes.n_lead == d.axes.n) d.together = 1;
+  for (PetscInt k = first; d.axes.n && k < first + count; k++) {
+    const PetscInt group = k / d.together;
+
+    if (group % N_PLACES == CORNER && (k % d.together == 0 || k == first))
+      PetscCall(SeekGroupCorner(&d, group / N_PLACES));
+    PetscCall(Draw(&d, k, point));
+    PetscCall(HycoSamplesAddPoint(*unseen, point));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

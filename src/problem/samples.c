@@ -138,22 +138,6 @@ PetscErrorCode HycoSamplesAddChebyshev(HycoSamples s, const PetscInt counts[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSamplesAddScattered(HycoSamples s, PetscInt count)
-{
-  PetscReal mu[HYCO_MAX_PARAMETERS];
-
-  PetscFunctionBegin;
-  HycoCheckHandle(s, HYCO_SAMPLES_CLASSID);
-  HycoCheckHandle(s->scene, HYCO_SCENE_CLASSID);
-  HycoCheck(count >= 1 && count <= 100000000, "%d scattered points; 1 to 100 million are expected", (int)count);
-  for (PetscInt k = 1; k <= count; k++) {
-    for (PetscInt p = 0; p < s->scene->n_parameters; p++)
-      mu[p] = s->scene->lo[p] + (s->scene->hi[p] - s->scene->lo[p]) * HycoHalton(k, p);
-    PetscCall(HycoSamplesAddPoint(s, mu));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The header's columns: column[c] = parameter of column c. */
 static PetscErrorCode ReadHeader(HycoSamples s, const char path[], char *line, PetscInt column[])
 {

@@ -15,7 +15,10 @@ static PetscErrorCode TestGrids(HycoScene scene)
   /* cell centres lo + (k + 1/2) (hi - lo) / n, the last parameter fastest */
   const PetscReal centred[8][2] = {{0.25, -0.5}, {0.25, 0.5}, {0.25, 1.5}, {0.25, 2.5},
                                    {0.75, -0.5}, {0.75, 0.5}, {0.75, 1.5}, {0.75, 2.5}};
-  const PetscReal scattered[3][2] = {{0.5, 1. / 3}, {0.25, 5. / 3}, {0.75, -1 + 4. / 9}};
+  /* Halton's halves, quarters of a and thirds of b; the corners; b = -1 where a has digits of 1 + BETWEEN, tested below
+   */
+  const PetscReal scattered[8][2] = {{0.5, 1. / 3},  {0, -1}, {0, 1. / 3}, {1, 3},
+                                     {0.25, 5. / 3}, {1, -1}, {-1, -1},    {0, 3}};
   HycoSamples samples;
   PetscInt n, p;
   const PetscReal *mu;
@@ -35,10 +38,13 @@ static PetscErrorCode TestGrids(HycoScene scene)
   CHECK_NEAR(mu[32], 0.5, 0);
   CHECK_NEAR(mu[33], 2, 0);
   CHECK_NEAR(mu[35], -1, 0);
-  PetscCall(HycoSamplesAddScattered(samples, 3)); /* halves, quarters of the first; thirds of the second */
+  PetscCall(HycoSamplesAddScattered(samples, 8));
   PetscCall(HycoSamplesGet(samples, &n, NULL, &mu));
-  CHECK(n == 21, "expected 21 points, found %d", (int)n);
-  for (int k = 0; k < 6; k++) CHECK_NEAR(mu[36 + k], scattered[k / 2][k % 2], 1e-15);
+  CHECK(n == 26, "expected 26 points, found %d", (int)n);
+  CHECK(mu[48] > 0 && mu[48] < 1, "a = %g on the face b = -1", (double)mu[48]);
+  for (int k = 0; k < 16; k++) {
+    if (k != 12) CHECK_NEAR(mu[36 + k], scattered[k / 2][k % 2], 1e-15);
+  }
   CHECK_FAILS(HycoSamplesAddScattered(samples, 0), "0 scattered points; 1 to 100 million are expected");
   CHECK_FAILS(HycoSamplesAddPoint(samples, outside), "b = 3.01 lies outside its range [-1");
   CHECK_FAILS(HycoSamplesAddGrid(samples, one, PETSC_TRUE), "the grid has 1 points for a; at least 2 are needed");
@@ -150,15 +156,20 @@ static PetscErrorCode TestTwins(HycoScene scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The number of coordinates at an end of the ranges. */
+static int Ends(const PetscReal mu[2])
+{
+  return (mu[0] == 0 || mu[0] == 1) + (mu[1] == -1 || mu[1] == 3);
+}
+
 /* Unseen points: within the region of the set (cell centres of the ranges cover these), none of them in it, evenly
-   distributed (each quarter of the box has its share), three on each value of an expensive parameter; more points
-   continue the sequence. */
+   distributed (each quarter of the box has its share). Of 40, a quarter lies on faces, 10 / 4 on average on each, and
+   all 4 corners are there; more points continue the sequence and have the corners again. */
 static PetscErrorCode TestUnseen(HycoScene scene)
 {
   const PetscInt counts[2] = {3, 4};
-  const PetscBool slow[2] = {PETSC_TRUE, PETSC_FALSE};
   HycoSamples samples, unseen, more, rest;
-  PetscInt n, m, quarter[4] = {0};
+  PetscInt n, m, quarter[4] = {0}, ends[3] = {0}, face[4] = {0}, same = 0;
   const PetscReal *mu, *nu;
 
   PetscFunctionBegin;
@@ -168,23 +179,81 @@ static PetscErrorCode TestUnseen(HycoScene scene)
   PetscCall(HycoSamplesGet(unseen, &n, NULL, &mu));
   CHECK(n == 40, "expected 40 unseen points, found %d", (int)n);
   for (PetscInt k = 0; k < n; k++) {
-    CHECK(mu[2 * k] > 0 && mu[2 * k] < 1 && mu[2 * k + 1] > -1 && mu[2 * k + 1] < 3, "point %d lies outside", (int)k);
-    quarter[2 * (mu[2 * k] > 0.5) + (mu[2 * k + 1] > 1)]++;
+    const PetscReal a = mu[2 * k], b = mu[2 * k + 1];
+
+    CHECK(a >= 0 && a <= 1 && b >= -1 && b <= 3, "point %d lies outside", (int)k);
+    quarter[2 * (a > 0.5) + (b > 1)]++;
+    ends[Ends(mu + 2 * k)]++;
+    if (Ends(mu + 2 * k) == 1) face[a == 0 ? 0 : a == 1 ? 1 : b == -1 ? 2 : 3]++;
   }
   for (int q = 0; q < 4; q++) CHECK(quarter[q] >= 8 && quarter[q] <= 12, "quarter %d has %d of 40", q, (int)quarter[q]);
-  PetscCall(HycoSamplesUnseen(samples, 30, 10, 3, NULL, &more));
+  for (int q = 0; q < 4; q++) CHECK(face[q] == 2 || face[q] == 3, "face %d has %d of 10", q, (int)face[q]);
+  CHECK(ends[0] == 26 && ends[1] == 10 && ends[2] == 4, "expected 26 inside, 10 on faces, 4 corners, found %d, %d, %d",
+        (int)ends[0], (int)ends[1], (int)ends[2]);
+  PetscCall(HycoSamplesUnseen(samples, 24, 16, 3, NULL, &more));
   PetscCall(HycoSamplesGet(more, &m, NULL, &nu));
-  CHECK(m == 10, "expected 10 more, found %d", (int)m);
-  for (PetscInt k = 0; k < 20; k++) CHECK_NEAR(nu[k], mu[60 + k], 0);
+  CHECK(m == 16, "expected 16 more, found %d", (int)m);
+  for (PetscInt k = 0; k < m; k++)
+    same += nu[2 * k] == mu[48 + 2 * k] && nu[2 * k + 1] == mu[49 + 2 * k] && Ends(nu + 2 * k) < 2;
+  CHECK(same == 12, "expected 12 points that continue the sequence beside 4 corners, found %d", (int)same);
   PetscCall(HycoSamplesExcept(unseen, more, &rest));
   PetscCall(HycoSamplesGet(rest, &n, NULL, NULL));
-  CHECK(n == 30, "expected 30 that are not among the 10, found %d", (int)n);
+  CHECK(n == 24, "expected 24 that are not among the 16, found %d", (int)n);
   PetscCall(HycoSamplesDestroy(&rest));
   PetscCall(HycoSamplesDestroy(&more));
   PetscCall(HycoSamplesDestroy(&unseen));
-  PetscCall(HycoSamplesUnseen(samples, 0, 12, 3, slow, &unseen));
+  PetscCall(HycoSamplesDestroy(&samples));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Training at three corners: the fourth is the only corner of the 12 unseen points; 3 are on faces, none of them a
+   training point, though those are on the faces too. */
+static PetscErrorCode TestSeenCorners(HycoScene scene)
+{
+  const PetscReal corner[3][2] = {{0, -1}, {1, 3}, {1, -1}};
+  HycoSamples samples, unseen, rest;
+  PetscInt n, ends[3] = {0};
+  const PetscReal *mu;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesCreate(scene, &samples));
+  for (int k = 0; k < 3; k++) PetscCall(HycoSamplesAddPoint(samples, corner[k]));
+  PetscCall(HycoSamplesUnseen(samples, 0, 12, 1, NULL, &unseen));
+  PetscCall(HycoSamplesExcept(unseen, samples, &rest));
+  PetscCall(HycoSamplesGet(rest, &n, NULL, &mu));
+  CHECK(n == 12, "expected 12 unseen points, found %d", (int)n);
+  for (PetscInt k = 0; k < n; k++) {
+    ends[Ends(mu + 2 * k)]++;
+    if (Ends(mu + 2 * k) == 2) CHECK(mu[2 * k] == 0 && mu[2 * k + 1] == 3, "point %d is a corner of training", (int)k);
+  }
+  CHECK(ends[0] == 8 && ends[1] == 3 && ends[2] == 1, "expected 8 inside, 3 on faces, 1 corner, found %d, %d, %d",
+        (int)ends[0], (int)ends[1], (int)ends[2]);
+  PetscCall(HycoSamplesDestroy(&rest));
+  PetscCall(HycoSamplesDestroy(&unseen));
+  PetscCall(HycoSamplesDestroy(&samples));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Three points on each value of the expensive parameter a; a group at an end of a has both ends of b. */
+static PetscErrorCode TestGroups(HycoScene scene)
+{
+  const PetscInt counts[2] = {3, 4};
+  const PetscBool slow[2] = {PETSC_TRUE, PETSC_FALSE};
+  HycoSamples samples, unseen;
+  PetscInt n, corners = 0;
+  const PetscReal *mu;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesCreate(scene, &samples));
+  PetscCall(HycoSamplesAddGrid(samples, counts, PETSC_FALSE));
+  PetscCall(HycoSamplesUnseen(samples, 0, 20, 3, slow, &unseen));
   PetscCall(HycoSamplesGet(unseen, &n, NULL, &mu));
-  for (PetscInt k = 0; k < n; k++) CHECK_NEAR(mu[2 * k], mu[2 * (k - k % 3)], 0);
+  CHECK(n == 20, "expected 20 unseen points, found %d", (int)n);
+  for (PetscInt k = 0; k < n; k++) {
+    CHECK_NEAR(mu[2 * k], mu[2 * (k - k % 3)], 0);
+    corners += Ends(mu + 2 * k) == 2;
+  }
+  CHECK(corners == 4, "expected the 4 corners, found %d", (int)corners);
   CHECK(mu[0] != mu[6] && mu[1] != mu[3], "values that nothing shares are shared");
   PetscCall(HycoSamplesDestroy(&unseen));
   PetscCall(HycoSamplesDestroy(&samples));
@@ -229,6 +298,8 @@ static PetscErrorCode Test(void)
   PetscCall(TestScene(scene));
   PetscCall(TestTwins(scene));
   PetscCall(TestUnseen(scene));
+  PetscCall(TestSeenCorners(scene));
+  PetscCall(TestGroups(scene));
   PetscCall(TestExtrapolate(scene));
   PetscCall(TestNearest());
   PetscCall(HycoSceneDestroy(&scene));
