@@ -90,8 +90,9 @@ typedef struct {
 } HycoAttempt;
 /* Called on rank 0 after each attempt. */
 typedef PetscErrorCode (*HycoAttemptMonitor)(const HycoAttempt *attempt, void *ctx);
-/* Called on rank 0 before n solutions are added; `parameter` is the one whose values are too far apart, or -1. */
-typedef PetscErrorCode (*HycoAddedMonitor)(PetscInt n, PetscInt parameter, void *ctx);
+/* Called on rank 0 before n solutions are added; `parameter` is the one whose values are too far apart, or -1. former:
+   they are former held-out points, because the targets are missed at fresh ones. */
+typedef PetscErrorCode (*HycoAddedMonitor)(PetscInt n, PetscInt parameter, PetscBool former, void *ctx);
 
 /* A quantity that a type of model reports about its training, with its name in reports. */
 typedef struct {
@@ -127,7 +128,9 @@ typedef struct {
   HycoOutputValidation output[HYCO_MAX_QUANTITIES]; /* of the written model, if held_out.n > 0 */
   PetscInt n_held;    /* held-out predictions that calibrate the estimated errors; 0: none */
   HycoAttempt chosen; /* the settings chosen by the search */
-  PetscInt n_added;   /* solutions that were added to meet the targets */
+  PetscInt n_added;   /* solutions that were added to meet the targets, */
+  PetscInt n_former;  /* n_former of them former held-out points */
+  PetscInt n_fresh;   /* of the held-out points those drawn after solutions were added near others; 0: none was added */
   HycoScan scan;      /* singularity inside the parameters' ranges */
   PetscReal seconds_snapshots, seconds_reduction;
 } HycoTraining;
@@ -175,7 +178,8 @@ PetscErrorCode HycoReducerSetSearch(HycoReducer reducer, PetscBool search);
 PetscErrorCode HycoReducerSetAttemptMonitor(HycoReducer reducer, HycoAttemptMonitor attempt, HycoAddedMonitor added,
                                             void *ctx);
 /* Sets the largest errors allowed at the held-out points (HYCO_N_ERRORS of them; 0: no target). If no settings meet
-   them, solutions are added near the worst points, at most `budget` of them (< 0: as many as there were at first). */
+   them, solutions are added near the worst points, at most `budget` of them (< 0: as many as there were at first), and
+   fresh held-out points judge the model; if it misses the targets there, the former ones are used for training too. */
 PetscErrorCode HycoReducerSetTargets(HycoReducer reducer, const PetscReal target[], PetscInt budget);
 
 /* -- greedy training (section 5.4) -- */

@@ -34,6 +34,8 @@ PetscErrorCode HycoSamplesAddScattered(HycoSamples samples, PetscInt count);
 PetscErrorCode HycoSamplesAddProduct(HycoSamples samples, const PetscInt counts[], const PetscReal *const values[]);
 /* Appends one point (length = number of parameters); fails outside the range. */
 PetscErrorCode HycoSamplesAddPoint(HycoSamples samples, const PetscReal mu[]);
+/* Appends the points of another set over the same parameters. */
+PetscErrorCode HycoSamplesAddSet(HycoSamples samples, HycoSamples other);
 /* Appends the points of a CSV file: a header with the parameters' names in any order, then a point per line.
    Fails for a file without a point. Collective on the scene's communicator. */
 PetscErrorCode HycoSamplesAddFile(HycoSamples samples, const char path[]);

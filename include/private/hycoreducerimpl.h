@@ -220,6 +220,10 @@ PetscErrorCode HycoReducerReduce(HycoReducer t, HycoSnapshots store, PetscBool a
 PetscErrorCode HycoReducerTakeBases(HycoReducer t);
 /* Draws or takes the held-out points, and solves them: t->held, NULL if there are none. Collective. */
 PetscErrorCode HycoReducerHoldOut(HycoReducer t, HycoSnapshots store);
+/* Replaces the held-out points by fresh ones, as many, and solves these; the user's own points stay, and fresh ones join
+   them. Corners that training does not have are held out again. former: the points that no longer are (the caller owns
+   it); n_fresh: the number of those that were not before. Collective. */
+PetscErrorCode HycoReducerHoldOutFresh(HycoReducer t, HycoSnapshots store, HycoSamples *former, PetscInt *n_fresh);
 /* From the solutions in the store to a model: bases, and of the settings that the options leave open those with the
    least online cost whose errors at the held-out points meet the targets (defaults if none are given), or else with
    the least errors. Sets report->chosen, its number 0 if there was no choice. *grown: the training points with those

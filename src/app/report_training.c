@@ -160,7 +160,7 @@ static PetscErrorCode Attempted(const HycoAttempt *a, void *ctx)
 }
 
 /* A HycoAddedMonitor. */
-static PetscErrorCode Added(PetscInt n, PetscInt parameter, void *ctx)
+static PetscErrorCode Added(PetscInt n, PetscInt parameter, PetscBool former, void *ctx)
 {
   Search *s = (Search *)ctx;
   const char *const *names;
@@ -168,6 +168,12 @@ static PetscErrorCode Added(PetscInt n, PetscInt parameter, void *ctx)
   PetscFunctionBegin;
   PetscCall(HycoSceneGetParameters(s->scene, NULL, &names, NULL, NULL));
   s->n_points += n;
+  if (former) {
+    PetscCall(Say("fresh held-out points judge a model with added solutions, and the targets are missed: the %d former "
+                  "held-out points become training points\n",
+                  (int)n));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(Say("no settings meet the targets: %d solutions are added where the errors are largest%s%s\n", (int)n,
                 parameter < 0 ? "" : "; the training values are too far apart in ",
                 parameter < 0 ? "" : names[parameter]));
@@ -237,7 +243,7 @@ static PetscErrorCode SayOutputs(const Search *s, const HycoTraining *t)
 
 PetscErrorCode DriverJudgeModel(const Search *s, const HycoTraining *t)
 {
-  char what[DRIVER_LINE], median[DRIVER_LINE], largest[DRIVER_LINE], end[DRIVER_LINE];
+  char what[DRIVER_LINE], median[DRIVER_LINE], largest[DRIVER_LINE], end[DRIVER_LINE], fresh[DRIVER_LINE] = "";
 
   PetscFunctionBegin;
   if (t->chosen.number) {
@@ -250,7 +256,9 @@ PetscErrorCode DriverJudgeModel(const Search *s, const HycoTraining *t)
   }
   DescribeErrors(IsPath(s), t->held_out.median, median);
   DescribeErrors(IsPath(s), t->held_out.largest, largest);
-  PetscCall(Say("errors at %d held-out points: median %s; largest %s\n", (int)t->held_out.n, median, largest));
+  if (t->n_fresh)
+    snprintf(fresh, sizeof(fresh), ", %d of them fresh (no solution was added near them)", (int)t->n_fresh);
+  PetscCall(Say("errors at %d held-out points%s: median %s; largest %s\n", (int)t->held_out.n, fresh, median, largest));
   DescribeErrors(IsPath(s), t->held_out.end, end);
   if (IsPath(s))
     PetscCall(Say("these are the errors at each path's worst listed time; the largest at the end are %s\n", end));
@@ -299,6 +307,7 @@ void DriverReportModel(cJSON *json, const Search *s, const HycoTraining *t)
   if (t->held_out.n) {
     held = cJSON_AddObjectToObject(json, "held_out");
     cJSON_AddNumberToObject(held, "n", t->held_out.n);
+    cJSON_AddNumberToObject(held, "fresh", t->n_fresh);
     cJSON_AddNumberToObject(held, "not_converged", t->held_out.not_converged);
     cJSON_AddNumberToObject(held, "online_seconds", t->held_out.seconds);
     for (PetscInt j = 0; j < CountKinds(s); j++) {
@@ -319,6 +328,7 @@ void DriverReportModel(cJSON *json, const Search *s, const HycoTraining *t)
     cJSON_AddNumberToObject(search, "attempts", s->n);
     cJSON_AddNumberToObject(search, "chosen", s->n - a->of + a->number);
     cJSON_AddNumberToObject(search, "added", t->n_added);
+    cJSON_AddNumberToObject(search, "former_held_out", t->n_former);
     cJSON_AddStringToObject(search, "model_type", a->settings.type);
     cJSON_AddNumberToObject(search, "pod_tol", a->settings.pod_tol);
     cJSON_AddNumberToObject(search, "rid_layers", a->settings.layers);

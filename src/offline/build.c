@@ -612,11 +612,12 @@ PetscErrorCode HycoReducerClose(HycoReducer t, HycoSnapshots *store)
    justify their cost. */
 #define LEAST_HELD 20
 #define MOST_HELD  30
-#define TOGETHER   3 /* that share a stiffness, if loads or gaps are parameters too */
+#define TOGETHER   3              /* that share a stiffness, if loads or gaps are parameters too */
+#define CYCLE      (4 * TOGETHER) /* after as many points of the sequence the places inside, at corners, on faces repeat */
 
-static PetscErrorCode DrawHeld(HycoReducer t, HycoSamples *held)
+static PetscErrorCode DrawHeld(HycoReducer t, PetscInt count, HycoSamples *held)
 {
-  PetscInt n, n_par, count = t->n_validation, slow[HYCO_MAX_PARAMETERS];
+  PetscInt n, n_par, slow[HYCO_MAX_PARAMETERS];
   PetscBool reaches[HYCO_MAX_PARAMETERS];
 
   PetscFunctionBegin;
@@ -626,6 +627,7 @@ static PetscErrorCode DrawHeld(HycoReducer t, HycoSamples *held)
   for (PetscInt p = 0; p < n_par; p++) slow[p] = t->rank == 0 && reaches[p];
   HycoBcast(slow, n_par, MPIU_INT, HycoComm(t));
   for (PetscInt p = 0; p < n_par; p++) reaches[p] = (PetscBool)slow[p];
+  t->drawn = (t->drawn + CYCLE - 1) / CYCLE * CYCLE;
   PetscCall(HycoSamplesUnseen(t->samples, t->drawn, count, TOGETHER, reaches, held));
   t->drawn += count;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -644,9 +646,35 @@ PetscErrorCode HycoReducerHoldOut(HycoReducer t, HycoSnapshots store)
     PetscCall(HycoSamplesGet(t->held, &m, NULL, NULL));
     HycoCheck(m, "each of the %d held-out points is also a training point; give other held-out points", (int)n);
   } else if (t->n_validation && t->scene->n_parameters)
-    PetscCall(DrawHeld(t, &t->held));
+    PetscCall(DrawHeld(t, t->n_validation, &t->held));
   else
     PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoSnapshotsFill(store, t->held, t->progress, t->progress_ctx));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerHoldOutFresh(HycoReducer t, HycoSnapshots store, HycoSamples *former, PetscInt *n_fresh)
+{
+  HycoSamples fresh, held, others, last = t->held;
+  PetscInt n, m = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(last, &n, NULL, NULL));
+  if (t->validation) {
+    PetscCall(HycoSamplesExcept(t->validation, t->samples, &held));
+    PetscCall(HycoSamplesGet(held, &m, NULL, NULL));
+  } else
+    PetscCall(HycoSamplesCreate(t->scene, &held));
+  PetscCall(DrawHeld(t, n > m ? n - m : -1, &fresh));
+  PetscCall(HycoSamplesAddSet(held, fresh));
+  PetscCall(HycoSamplesDropTwins(held, NULL));
+  PetscCall(HycoSamplesExcept(held, last, &others));
+  PetscCall(HycoSamplesGet(others, n_fresh, NULL, NULL));
+  PetscCall(HycoSamplesExcept(last, held, former));
+  t->held = held;
+  PetscCall(HycoSamplesDestroy(&others));
+  PetscCall(HycoSamplesDestroy(&fresh));
+  PetscCall(HycoSamplesDestroy(&last));
   PetscCall(HycoSnapshotsFill(store, t->held, t->progress, t->progress_ctx));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

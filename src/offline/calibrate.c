@@ -233,16 +233,20 @@ static PetscInt KeepConverged(PetscInt n, HycoHeldOut rows[], HycoOutputErrors o
   return converged;
 }
 
-/* "  settings number 2 of the 5 that were tried: ...", in the model. */
-static PetscErrorCode NameSettings(const HycoAttempt *chosen, HycoROM m)
+/* "  settings number 2 of the 5 that were tried: ...", and how many held-out points are fresh, in the model. */
+static PetscErrorCode NameSettings(const HycoTraining *report, HycoROM m)
 {
-  char settings[HYCO_LINE], text[2 * HYCO_LINE];
+  const HycoAttempt *chosen = &report->chosen;
+  char settings[HYCO_LINE], fresh[HYCO_LINE] = "", text[3 * HYCO_LINE];
 
   PetscFunctionBegin;
   if (!chosen->number) PetscFunctionReturn(PETSC_SUCCESS);
   HycoReducerSettingsDescribe(&chosen->settings, sizeof(settings), settings);
-  snprintf(text, sizeof(text), "  settings number %d of the %d that were tried: %s\n", (int)chosen->number,
-           (int)chosen->of, settings);
+  if (report->n_fresh)
+    HycoFormat(fresh, "  training added %d solutions; near %d of the held-out points, fresh ones, it added none\n",
+               (int)report->n_added, (int)report->n_fresh);
+  snprintf(text, sizeof(text), "  settings number %d of the %d that were tried: %s\n%s", (int)chosen->number,
+           (int)chosen->of, settings, fresh);
   PetscCall(PetscFree(m->search));
   PetscCall(PetscStrallocpy(text, &m->search));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -276,7 +280,7 @@ static PetscErrorCode Conclude(HycoReducer t, HycoHeldOut rows[], HycoOutputErro
   }
   report->n_held = estimates.n;
   m->estimates = estimates;
-  PetscCall(NameSettings(&report->chosen, m));
+  PetscCall(NameSettings(report, m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -8,7 +8,9 @@
   same on any machine and number of ranks.
 
   If no settings meet the user's targets, solutions are added where the best model has the largest errors, and the
-  search starts again.
+  search starts again. Next to an added solution the model is more accurate than elsewhere, so that its errors at those
+  held-out points no longer show how accurate it is: fresh ones judge it. If it misses the targets there, the former
+  held-out points become training points, and the search starts again with the fresh ones.
 */
 #include <hycoreducerimpl.h>
 #include <stdio.h>
@@ -55,6 +57,8 @@ typedef struct {
   PetscReal extension;       /* of the settings that extend the contact */
   const char *plane;         /* plane of symmetry; NULL: none */
   PetscBool targets;         /* given by the user */
+  PetscInt first;            /* number of training points that were given */
+  PetscBool near;            /* solutions were added near the held-out points */
   PetscReal target[HYCO_N_ERRORS];
   PetscInt n;
   HycoAttempt attempt[MAX_ATTEMPTS];
@@ -566,7 +570,7 @@ static PetscReal Correlation(const Search *s, PetscInt n, const PetscReal held[]
 
 /* Adds unseen points, each near one of the held-out points with the largest errors, which stay unseen; and finds the
    parameter whose training values are too far apart (-1: none in particular). */
-static PetscErrorCode AddPoints(Search *s, HycoSamples samples, PetscInt n_add, PetscInt *by)
+static PetscErrorCode AddPoints(Search *s, HycoSamples samples, PetscInt n_add, PetscInt *added, PetscInt *by)
 {
   HycoReducer t = s->t;
   const PetscInt n_par = t->scene->n_parameters, among = 8 * n_add;
@@ -574,9 +578,10 @@ static PetscErrorCode AddPoints(Search *s, HycoSamples samples, PetscInt n_add, 
   const PetscReal *held, *train, *mu;
   PetscReal *key, largest = TELLING;
   PetscBool *used;
-  HycoSamples unseen;
+  HycoSamples drawn, unseen;
 
   PetscFunctionBegin;
+  *added = 0;
   PetscCall(HycoSamplesGet(t->held, &n, NULL, &held));
   PetscCall(HycoSamplesGet(samples, &n_train, NULL, &train));
   *by = -1;
@@ -588,8 +593,10 @@ static PetscErrorCode AddPoints(Search *s, HycoSamples samples, PetscInt n_add, 
       *by = p;
     }
   }
-  PetscCall(HycoSamplesUnseen(samples, t->drawn, among, 1, NULL, &unseen));
+  PetscCall(HycoSamplesUnseen(samples, t->drawn, among, 1, NULL, &drawn));
   t->drawn += among;
+  PetscCall(HycoSamplesExcept(drawn, t->held, &unseen));
+  PetscCall(HycoSamplesDestroy(&drawn));
   PetscCall(HycoSamplesGet(unseen, &m, NULL, &mu));
   PetscCall(PetscMalloc2(n, &key, n, &order));
   PetscCall(PetscCalloc1(m, &used));
@@ -605,13 +612,14 @@ static PetscErrorCode AddPoints(Search *s, HycoSamples samples, PetscInt n_add, 
     for (PetscInt j = 0; j < m; j++) {
       const PetscReal d = HycoEstimatesDistance(t->scene, held + order[k] * n_par, mu + j * n_par);
 
-      if (used[j] || d == 0 || d >= least) continue;
+      if (used[j] || d >= least) continue;
       least = d;
       at = j;
     }
     if (at < 0) break;
     used[at] = PETSC_TRUE;
     PetscCall(HycoSamplesAddPoint(samples, mu + at * n_par));
+    ++*added;
   }
   PetscCall(PetscFree2(key, order));
   PetscCall(PetscFree(used));
@@ -647,38 +655,52 @@ static PetscErrorCode Attempts(Search *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Begins *grown with the first training points, unless it has begun. The caller owns it. */
+static PetscErrorCode BeginGrown(Search *s, HycoSamples *grown)
+{
+  PetscFunctionBegin;
+  if (*grown) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoSamplesCreate(s->t->scene, grown));
+  PetscCall(HycoSamplesAddSet(*grown, s->t->samples));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Trains on these points from now on; solves those that are not solved. */
+static PetscErrorCode TrainOn(Search *s, HycoSamples grown)
+{
+  HycoReducer t = s->t;
+
+  PetscFunctionBegin;
+  t->samples = grown;
+  PetscCall(HycoReducerCount(t));
+  PetscCall(HycoReducerResetBases(t));
+  HycoStaged(HYCO_STAGE_FULL_ORDER, HycoSnapshotsFill(s->store, grown, t->progress, t->progress_ctx));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Attempts, and solutions added until the targets are met or the budget is used up: in *grown, with the first ones
    (NULL: none was added; the caller owns it). */
 static PetscErrorCode Rounds(Search *s, HycoSamples *grown, HycoTraining *report)
 {
   HycoReducer t = s->t;
-  PetscInt first, by = -1, budget;
+  const PetscInt budget = t->budget < 0 ? s->first : t->budget;
+  PetscInt by = -1, n;
 
   PetscFunctionBegin;
-  *grown = NULL;
-  PetscCall(HycoSamplesGet(t->samples, &first, NULL, NULL));
-  budget = t->budget < 0 ? first : t->budget;
   for (;;) {
-    const PetscInt n_add = PetscMin(PetscMax(2, first / ROUND), budget - report->n_added);
+    const PetscInt left = budget - (report->n_added - report->n_former),
+                   n_add = PetscMin(PetscMax(2, s->first / ROUND), left);
 
     PetscCall(HycoReducerReduce(t, s->store, PETSC_TRUE));
     PetscCall(Attempts(s));
     if (!s->targets || s->least <= 1 || n_add < 1 || !t->scene->n_parameters) break;
-    if (!*grown) {
-      PetscInt n_par;
-      const PetscReal *mu;
-
-      PetscCall(HycoSamplesCreate(t->scene, grown));
-      PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
-      for (PetscInt k = 0; k < first; k++) PetscCall(HycoSamplesAddPoint(*grown, mu + k * n_par));
-    }
-    PetscCall(AddPoints(s, *grown, n_add, &by));
-    report->n_added += n_add;
-    if (t->added) HycoOnRoot(HycoComm(t), t->added(n_add, by, t->attempt_ctx));
-    t->samples = *grown;
-    PetscCall(HycoReducerCount(t));
-    PetscCall(HycoReducerResetBases(t));
-    HycoStaged(HYCO_STAGE_FULL_ORDER, HycoSnapshotsFill(s->store, *grown, t->progress, t->progress_ctx));
+    PetscCall(BeginGrown(s, grown));
+    PetscCall(AddPoints(s, *grown, n_add, &n, &by));
+    if (!n) break;
+    report->n_added += n;
+    s->near = PETSC_TRUE;
+    if (t->added) HycoOnRoot(HycoComm(t), t->added(n, by, PETSC_FALSE, t->attempt_ctx));
+    PetscCall(TrainOn(s, *grown));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -709,6 +731,8 @@ static PetscErrorCode BuildBest(Search *s, HycoROM *model, HycoTraining *report)
       continue;
     }
     built.n_added = report->n_added;
+    built.n_former = report->n_former;
+    built.n_fresh = report->n_fresh;
     *report = built;
     report->chosen = *best;
     report->chosen.of = s->n;
@@ -723,10 +747,59 @@ static PetscErrorCode BuildBest(Search *s, HycoROM *model, HycoTraining *report)
            (best ? best : &s->attempt[0])->failure);
 }
 
+/* Judges the model at fresh held-out points. met: at these and at the former ones it meets the targets. */
+static PetscErrorCode JudgeFresh(Search *s, HycoROM model, HycoSamples *former, HycoTraining *report, PetscBool *met)
+{
+  HycoReducer t = s->t;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  HycoStaged(HYCO_STAGE_FULL_ORDER, HycoReducerHoldOutFresh(t, s->store, former, &report->n_fresh));
+  s->near = PETSC_FALSE;
+  PetscCall(PetscFree(t->judged_held));
+  PetscCall(HycoSamplesGet(t->held, &n, NULL, NULL));
+  PetscCall(PetscMalloc1(n, &t->judged_held));
+  PetscCall(HycoReducerPredictHeldOut(t, model, s->store, NULL, t->judged_held));
+  s->force = HycoHeldOutForce(n, t->judged_held);
+  *met = (PetscBool)(s->least <= 1);
+  for (PetscInt k = 0; k < n; k++) *met = (PetscBool)(*met && Quotient(s, &t->judged_held[k]) <= 1);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Builds the best model. If solutions were added near its held-out points, and it misses the targets at fresh ones, or
+   missed them at the former, these become training points: *again. */
+static PetscErrorCode Conclude(Search *s, HycoROM *model, HycoSamples *grown, HycoTraining *report, PetscBool *again)
+{
+  HycoReducer t = s->t;
+  HycoSamples former;
+  PetscBool met = PETSC_FALSE;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  *again = PETSC_FALSE;
+  PetscCall(BuildBest(s, model, report));
+  if (!s->near) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(JudgeFresh(s, *model, &former, report, &met));
+  if (!met) {
+    *again = PETSC_TRUE;
+    PetscCall(PetscFree(t->judged_held));
+    PetscCall(HycoROMDestroy(model));
+    PetscCall(HycoSamplesGet(former, &n, NULL, NULL));
+    report->n_added += n;
+    report->n_former += n;
+    if (t->added) HycoOnRoot(HycoComm(t), t->added(n, -1, PETSC_TRUE, t->attempt_ctx));
+    PetscCall(HycoSamplesAddSet(*grown, former));
+    PetscCall(TrainOn(s, *grown));
+  }
+  PetscCall(HycoSamplesDestroy(&former));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Learn(Search *s, HycoROM *model, HycoSamples *grown, HycoTraining *report)
 {
   HycoReducer t = s->t;
   PetscReal edge = 0;
+  PetscBool again = PETSC_TRUE;
 
   PetscFunctionBegin;
   HycoReducerGetSettings(t, &s->given);
@@ -736,8 +809,11 @@ static PetscErrorCode Learn(Search *s, HycoROM *model, HycoSamples *grown, HycoT
   PetscCall(HycoReducerFindPlane(t, &s->plane));
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) s->targets = (PetscBool)(s->targets || t->target[j] > 0);
   PetscCall(PetscArraycpy(s->target, s->targets ? t->target : usual, HYCO_N_ERRORS));
-  PetscCall(Rounds(s, grown, report));
-  PetscCall(BuildBest(s, model, report));
+  PetscCall(HycoSamplesGet(t->samples, &s->first, NULL, NULL));
+  while (again) {
+    PetscCall(Rounds(s, grown, report));
+    PetscCall(Conclude(s, model, grown, report, &again));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -244,7 +244,8 @@ static PetscErrorCode Draw(const Drawing *d, PetscInt k, PetscReal point[])
   for (PetscInt turn = 0; taken; turn++) {
     Recur(d, k, turn, point);
     if (corner) PutAtCorner(&d->axes, 0, d->axes.n_lead, d->corner, d->lo, d->hi, point);
-    if (face) PutOnFace(&d->axes, group / N_PLACES, k % d->together, d->lo, d->hi, point);
+    if (face && (!turn || group / N_PLACES % d->axes.n < d->axes.n_lead)) /* else its value is the only free one */
+      PutOnFace(&d->axes, group / N_PLACES, k % d->together, d->lo, d->hi, point);
     PetscCall(IsTaken(d, point, &taken));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -275,6 +276,17 @@ PetscErrorCode HycoSamplesUnseen(HycoSamples samples, PetscInt first, PetscInt c
     PetscCall(Draw(&d, k, point));
     PetscCall(HycoSamplesAddPoint(*unseen, point));
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSamplesAddSet(HycoSamples samples, HycoSamples other)
+{
+  PetscInt n, n_par;
+  const PetscReal *mu;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(other, &n, &n_par, &mu));
+  for (PetscInt k = 0; k < n; k++) PetscCall(HycoSamplesAddPoint(samples, mu + k * n_par));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
