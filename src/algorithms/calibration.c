@@ -7,6 +7,8 @@
 #define CONSTANT   1e-2 /* a column that varies less says nothing: its differences may be round-off */
 #define CONFIDENCE 0.75 /* of the tolerance limit, */
 #define MANY_ABOVE 1    /* which counts if fewer values than this are expected above the quantile */
+#define LEVERAGE   1.4  /* a factor of 4 */
+#define FAR        1.4  /* no value lies above the limit by more: logarithms, a factor of 4 */
 
 /* c >= 0 that minimises |X c - y|^2 about the means, regularised. */
 static PetscErrorCode Fit(PetscInt n, PetscInt p, const PetscReal X[], const PetscReal y[], PetscReal c[])
@@ -62,6 +64,7 @@ static PetscErrorCode Limit(PetscInt n, PetscInt independent, PetscReal value[],
   PetscFunctionBegin;
   PetscCall(PetscSortReal(n, value));
   *limit = value[PetscMin((PetscInt)PetscCeilReal(share * (PetscReal)(n + 1) * (1 - 1e-12)), n) - 1];
+  *limit = PetscMax(*limit, value[n - 1] - FAR);
   if (n < 2 || (PetscReal)independent * (1 - share) >= MANY_ABOVE) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt i = 0; i < n; i++) mean += value[i] / n;
   for (PetscInt i = 0; i < n; i++) square += PetscSqr(value[i] - mean) / (n - 1);
@@ -121,7 +124,7 @@ static PetscErrorCode LeaveOut(PetscInt n, PetscInt telling, const PetscInt grou
     }
     PetscCall(PetscArrayzero(c, p));
     if (kept) PetscCall(Fit(kept, p, rest, z, c));
-    above[i] = Above(p, X + i * p, y[i], c);
+    above[i] = PetscMin(Above(p, X + i * p, y[i], c), above[i] + LEVERAGE);
   }
   PetscCall(PetscFree3(rest, z, c));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -136,6 +139,7 @@ PetscErrorCode HycoUpperBound(PetscInt n, PetscInt telling, const PetscInt group
   PetscCheck(n, PETSC_COMM_SELF, PETSC_ERR_PLIB, "there is nothing to bound");
   PetscCall(Fit(telling, p, X, y, c));
   PetscCall(PetscMalloc1(n, &above));
+  for (PetscInt i = 0; i < n; i++) above[i] = Above(p, X + i * p, y[i], c);
   PetscCall(LeaveOut(n, telling, group, p, X, y, above));
   PetscCall(Limit(n, CountGroups(n, group), above, share, &c[p]));
   PetscCall(PetscFree(above));

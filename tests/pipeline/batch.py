@@ -17,7 +17,7 @@ class Batch(Case):
 
     def test_pieces(self):
         """Rows that several ranks hold and write, whatever pieces they took: the CSV of one rank, also where full order replaces some."""
-        self.run_raw('train', '-scene', ROPE, '-grid', '3,4', '-hyco_validation', 12, '-model', 'p.h5')  # may miss the default target
+        self.run_raw('train', '-scene', ROPE, '-grid', '3,4', '-hyco_validation', 12, '-hyco_model_type', 'hybrid', '-model', 'p.h5')  # misses the default target
         predict = ('predict', '-model', 'p.h5', '-scatter', 300)
         self.hyco(*predict, '-table', 'one.csv')
         estimates = sorted(float(row['estimated_error_u']) for row in self.rows('one.csv'))
@@ -25,7 +25,8 @@ class Batch(Case):
         self.hyco(*predict, '-table', 'one.csv')
         one = self.rows('one.csv')
         full = [k for k, row in enumerate(one) if row['full_order'] == '1']
-        self.assertEqual(len(full), 29)
+        self.assertGreaterEqual(len(full), 29)  # those above the target, and any in a regime that no held-out point had
+        self.assertLess(len(full), 150)
         for ranks in (2, 3):
             with self.subTest(ranks=ranks):
                 self.hyco(*predict, '-table', 'many.csv', ranks=ranks)

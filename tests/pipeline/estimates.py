@@ -29,7 +29,7 @@ class Estimates(Case):
         with open(self.path(name), encoding='utf-8') as f:
             return [{k: float(v) for k, v in row.items()} for row in csv.DictReader(f)]
 
-    def bounds(self, scene, model, grid, share=0.9, ratio=12):
+    def bounds(self, scene, model, grid, share=0.9, ratio=20):
         """The estimates at unseen points: at least the error at nine of ten, and in the median not many times as large."""
         self.hyco('predict', '-model', model, '-grid', grid, '-table', 'p.csv')
         self.hyco('compare', '-scene', scene, '-model', model, '-grid', grid, '-table', 'c.csv')
@@ -86,7 +86,7 @@ class Estimates(Case):
             before = p
         self.assertGreater(before['estimated_error_u'], 100 * inside['estimated_error_u'])
         said = self.run_raw('predict', '-model', 'rough.h5', '-mu', '0.9,0.2', '-extrapolate').stdout
-        self.assertRegex(said, r'estimated errors: u \d{2,} %, stress \d{2,} %, contact forces \d{2,} %\n')
+        self.assertRegex(said, r'estimated errors: u \d{2,} %, stress \d{2,} %, contact forces (\d{2,}|[\d.]+e\+\d+) %\n')
         self.assertIn('outside the region of training by 325 % of a range', said)
 
     def test_fallback(self):
