@@ -220,9 +220,9 @@ PetscErrorCode HycoReducerReduce(HycoReducer t, HycoSnapshots store, PetscBool a
 PetscErrorCode HycoReducerTakeBases(HycoReducer t);
 /* Draws or takes the held-out points, and solves them: t->held, NULL if there are none. Collective. */
 PetscErrorCode HycoReducerHoldOut(HycoReducer t, HycoSnapshots store);
-/* Replaces the held-out points by fresh ones, as many, and solves these; the user's own points stay, and fresh ones join
-   them. Corners that training does not have are held out again. former: the points that no longer are (the caller owns
-   it); n_fresh: the number of those that were not before. Collective. */
+/* Replaces the held-out points by fresh ones, as many, and solves these; the user's own points stay, and fresh ones
+   join them. Corners that training does not have are held out again. former: the points that no longer are (the caller
+   owns it); n_fresh: the number of those that were not before. Collective. */
 PetscErrorCode HycoReducerHoldOutFresh(HycoReducer t, HycoSnapshots store, HycoSamples *former, PetscInt *n_fresh);
 /* From the solutions in the store to a model: bases, and of the settings that the options leave open those with the
    least online cost whose errors at the held-out points meet the targets (defaults if none are given), or else with
@@ -267,11 +267,11 @@ PetscErrorCode HycoReducerUnitRows(HycoReducer t, Mat X, Mat *scaled);
 PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, HycoROM model, HycoTraining *report);
 
 /* Result of a model at one held-out point, all PetscReal: errors (those of forces before division), for a path at
-   its worst time, and at its end; the forces' norms, whether it converged, the number of its group (calibrate.c), the
-   features of the estimates, the time of some repetitions. */
+   its worst time, and at its end; the norms of forces and stress, whether it converged, the number of its group
+   (calibrate.c), the features of the estimates, the time of some repetitions. */
 #define HYCO_HELD_REPEATS 3
 typedef struct _n_HycoHeldOut {
-  PetscReal error[HYCO_N_ERRORS], end[HYCO_N_ERRORS], size, rid_size, converged, group, feature[HYCO_FEATURES],
+  PetscReal error[HYCO_N_ERRORS], end[HYCO_N_ERRORS], size, rid_size, stress, converged, group, feature[HYCO_FEATURES],
       seconds[HYCO_HELD_REPEATS];
 } HycoHeldOut;
 /* By HycoErrorKind, the norm of the error of a prediction, and that of the reference. */

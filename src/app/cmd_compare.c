@@ -13,7 +13,8 @@ enum {
   SECONDS_FOM,
   SECONDS_ROM,
   LAMBDA_NORM, /* of full order */
-  ESTIMATES,   /* of u, stress, forces, and the unseen regime */
+  SIGMA_NORM,
+  ESTIMATES, /* of u, stress, forces, and the unseen regime */
   N_COLUMNS = ESTIMATES + DRIVER_JUDGED
 };
 static const char *const columns[N_COLUMNS] = {"error_u",
@@ -32,6 +33,7 @@ static const char *const columns[N_COLUMNS] = {"error_u",
                                                "seconds_full_order",
                                                "seconds_reduced",
                                                "lambda_norm2",
+                                               "sigma_norm2",
                                                "estimated_error_u",
                                                "estimated_error_sigma",
                                                "estimated_error_lambda",
@@ -93,22 +95,31 @@ PetscErrorCode DriverJudgeEstimates(cJSON *json, PetscInt n, PetscInt width, con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same, where the errors of forces below a tenth of the set's largest are divided by this tenth, as in the
-   estimates. */
+/* A relative error of a quantity with this norm, for the estimates: norms below a tenth of the set's largest count as
+   this tenth. */
+static PetscReal Guarded(PetscReal error, PetscReal size, PetscReal largest)
+{
+  return size > 0 ? error * size / PetscMax(size, 0.1 * largest) : error;
+}
+
+/* The same with the errors of stresses and forces as in the estimates. */
 static PetscErrorCode JudgeEstimates(cJSON *json, PetscInt n, PetscInt width, const PetscReal value[])
 {
   const PetscReal *error[DRIVER_JUDGED - 1];
-  PetscReal *of[DRIVER_JUDGED - 1], largest = 0;
+  PetscReal *of[DRIVER_JUDGED - 1], largest[2] = {0, 0};
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc3(n, &of[0], n, &of[1], n, &of[2]));
-  for (PetscInt k = 0; k < n; k++) largest = PetscMax(largest, value[k * width + LAMBDA_NORM]);
   for (PetscInt k = 0; k < n; k++) {
-    const PetscReal *v = value + k * width, size = v[LAMBDA_NORM];
+    largest[0] = PetscMax(largest[0], value[k * width + SIGMA_NORM]);
+    largest[1] = PetscMax(largest[1], value[k * width + LAMBDA_NORM]);
+  }
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscReal *v = value + k * width;
 
     of[0][k] = v[E_U];
-    of[1][k] = v[E_SIGMA];
-    of[2][k] = size > 0 ? v[E_LAMBDA] * size / PetscMax(size, 0.1 * largest) : v[E_LAMBDA];
+    of[1][k] = Guarded(v[E_SIGMA], v[SIGMA_NORM], largest[0]);
+    of[2][k] = Guarded(v[E_LAMBDA], v[LAMBDA_NORM], largest[1]);
   }
   for (PetscInt e = 0; e < DRIVER_JUDGED - 1; e++) error[e] = of[e];
   PetscCall(DriverJudgeEstimates(json, n, width, value, ESTIMATES, error));
@@ -190,6 +201,7 @@ static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, 
   v[SECONDS_FOM] = s.seconds.total;
   v[SECONDS_ROM] = p.seconds.total;
   v[LAMBDA_NORM] = s.lambda_norm2;
+  v[SIGMA_NORM] = e.sigma_norm2;
   DriverTakeEstimates(&p, v + ESTIMATES);
   for (PetscInt q = 0; q < outputs->n; q++)
     v[N_COLUMNS + q] = PetscAbsReal(p.quantity[outputs->reduced[q]] - s.quantity[outputs->full[q]]);

@@ -56,6 +56,7 @@ PetscErrorCode HycoROMCompareRID(HycoROM m, const PetscReal u[], const PetscReal
   PetscCall(HycoROMMeasureRID(m, u, sigma, NULL, lambda, lost));
   e->u_rid = HycoRelative(lost[HYCO_ERROR_U_RID].lost, lost[HYCO_ERROR_U_RID].size);
   e->sigma = HycoRelative(lost[HYCO_ERROR_SIGMA].lost, lost[HYCO_ERROR_SIGMA].size);
+  e->sigma_norm2 = lost[HYCO_ERROR_SIGMA].size;
   e->sigma_11 = HycoRelative(lost[HYCO_ERROR_SIGMA_11].lost, lost[HYCO_ERROR_SIGMA_11].size);
   e->lambda_rid = HycoRelative(lr->lost, lr->size);
   e->lambda = HycoRelative(l->lost, l->size);

@@ -3,7 +3,7 @@ import csv
 import os
 import unittest
 
-from common import SOURCE, Case
+from common import SOURCE, Case, square
 
 ROLLER = os.path.join(SOURCE, 'examples', 'roller')
 
@@ -64,6 +64,18 @@ class Regime(Case):
         here, there = (self.run_raw('predict', '-model', 'm.h5', '-mu', mu, cwd=self.folder) for mu in ('-3.4,0.5,10', '4,0.5,10'))
         self.assertNotIn('UNSEEN', here.stdout)
         self.assertIn('UNSEEN REGIME', there.stdout)
+
+
+    def test_rigid_motion(self):
+        """A block that its support moves against a wall, or short of it, where its stress is round-off: errors of stress stay errors, at the
+        held-out points and in the ratios that compare prints."""
+        scene = self.written('scene: {title: push, mesh: mesh.msh, parameters: [push]}\nparameter: {push: {range: [-0.02, 0.06]}}\n'
+                             'body: {block: {young: 1000, poisson: 0.3}}\nfixed: {low: {x: 0, y: push}}\n'
+                             'contact: {wall: {type: obstacle, group: high, normal: {y: 1}, gap: 0.011}}\n', square(4))
+        train = self.hyco('train', '-scene', scene, '-grid', 9, '-hyco_model_type', 'hybrid', '-model', self.path('w.h5'), status=None)
+        self.assertLess(train['held_out']['sigma']['largest'], 1)
+        compare = self.hyco('compare', '-scene', scene, '-model', self.path('w.h5'), '-scatter', 40)
+        self.assertLess(compare['estimates']['sigma']['worst_error_over_estimate'], 5)
 
 
 if __name__ == '__main__':
