@@ -76,6 +76,7 @@ typedef struct {
   PetscInt number, of; /* number, from 1 (0: no search); for the chosen settings also the total */
   HycoReducerSettings settings;
   PetscInt n_modes, n_fe_dofs, n_flexibilities, rid_nodes, rid_elements, rid_contacts;
+  PetscInt n_unknowns; /* hybrid: displacements in A that are not fixed */
   PetscReal rid_fraction;
   PetscReal cost;          /* operations of an online solve at a new stiffness, estimated */
   PetscReal ratio;         /* the largest quotient of an error and its target; at most 1 if all targets are met */
@@ -84,7 +85,8 @@ typedef struct {
   PetscInt n_held;         /* number of held-out points. For paths, settings are dropped at the first of them that the
                               model does not bring to its end, or whose error excludes their choice */
   PetscInt dropped_at;     /* that point; -1: it was judged at all */
-  PetscInt beaten_by;      /* number of the settings that are chosen instead; 0: none, or the path has no end */
+  PetscInt beaten_by;      /* number of the settings that are chosen instead; 0: none, or the path has no end. If
+                              dropped_at is -1, for their cost: it was not judged at any point */
   PetscBool reopened;      /* those settings were refused later: a later attempt has all points */
   char failure[512];       /* reason why there is no model; "": there is one */
 } HycoAttempt;
@@ -93,6 +95,12 @@ typedef PetscErrorCode (*HycoAttemptMonitor)(const HycoAttempt *attempt, void *c
 /* Called on rank 0 before n solutions are added; `parameter` is the one whose values are too far apart, or -1. former:
    they are former held-out points, because the targets are missed at fresh ones. */
 typedef PetscErrorCode (*HycoAddedMonitor)(PetscInt n, PetscInt parameter, PetscBool former, void *ctx);
+
+/* Types or settings that the search did not try, and the reason. */
+typedef struct {
+  char what[64], why[512];
+} HycoLeftOut;
+#define HYCO_MAX_LEFT_OUT 8
 
 /* A quantity that a type of model reports about its training, with its name in reports. */
 typedef struct {
@@ -126,12 +134,16 @@ typedef struct {
   PetscReal error_u, error_lambda; /* mean relative training errors, 2-norm, displacement and RID contact forces */
   HycoValidation held_out;         /* errors of the written model at held-out points; n 0: none */
   HycoOutputValidation output[HYCO_MAX_QUANTITIES]; /* of the written model, if held_out.n > 0 */
-  PetscInt n_held;    /* held-out predictions that calibrate the estimated errors; 0: none */
-  HycoAttempt chosen; /* the settings chosen by the search */
-  PetscInt n_added;   /* solutions that were added to meet the targets, */
-  PetscInt n_former;  /* n_former of them former held-out points */
-  PetscInt n_fresh;   /* of the held-out points those drawn after solutions were added near others; 0: none was added */
-  HycoScan scan;      /* singularity inside the parameters' ranges */
+  PetscInt n_held;                         /* held-out predictions that calibrate the estimated errors; 0: none */
+  HycoAttempt chosen;                      /* the settings chosen by the search */
+  HycoLeftOut left_out[HYCO_MAX_LEFT_OUT]; /* n_left_out: what the search did not try */
+  PetscInt n_left_out;
+  char next[1024]; /* what would help if the errors are too large, beside more points; "": nothing in particular */
+  PetscReal search_operations, solution_operations; /* estimated numbers, of all attempts and all solutions */
+  PetscInt n_added;                                 /* solutions that were added to meet the targets, */
+  PetscInt n_former;                                /* n_former of them former held-out points */
+  PetscInt n_fresh; /* of the held-out points those drawn after solutions were added near others; 0: none was added */
+  HycoScan scan;    /* singularity inside the parameters' ranges */
   PetscReal seconds_snapshots, seconds_reduction;
 } HycoTraining;
 

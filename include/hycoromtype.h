@@ -57,8 +57,10 @@ typedef struct _HycoROMOps {
                            HycoTraining *); /* checks over the ranges; may change the model, on rank 0. Collective */
   PetscErrorCode (*report)(HycoReducer, HycoROM, HycoTraining *); /* summary and facts. Rank 0 */
   PetscReal (*cost)(HycoReducer, const HycoAttempt *);            /* operations of an online solve at a new stiffness */
-  PetscBool (*offers)(HycoReducer,
-                      PetscBool targets); /* whether a search tries it by default, with or without -target_... */
+  PetscBool (*offers)(HycoReducer, PetscBool targets, size_t length,
+                      char why[]); /* whether a search tries it by default, with or without -target_...; if not,
+                                      `why` may get a reason for the user */
+  PetscReal (*work)(HycoReducer);  /* operations of making a model, if they are many, from the sizes of the scene */
   /* -- online -- */
   PetscErrorCode (*options)(HycoROM);                     /* its options of a model */
   PetscErrorCode (*setup)(HycoROM);                       /* default: HycoROMSetUpDefault() */

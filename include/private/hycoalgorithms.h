@@ -73,6 +73,10 @@ PetscReal HycoHalton(PetscInt k, PetscInt j);
  * Not collective. */
 PetscErrorCode HycoNNLS(PetscInt m, PetscInt n, const PetscReal A[], const PetscReal b[], PetscReal x[],
                         PetscReal *residual);
+/* The same; monitor(ctx, k, most) is called with each set of k columns, of `most` at most. */
+PetscErrorCode HycoNNLSMonitored(PetscInt m, PetscInt n, const PetscReal A[], const PetscReal b[],
+                                 PetscErrorCode (*monitor)(void *ctx, PetscInt k, PetscInt most), void *ctx,
+                                 PetscReal x[], PetscReal *residual);
 /* Moves the k passive entries x[p[j]] towards z[j] until one of them becomes 0: returns its j, or -1 if z itself is
    reached. */
 PetscInt HycoNNLSStep(PetscInt k, const PetscInt p[], const PetscReal z[], PetscReal x[]);

@@ -117,6 +117,11 @@ static inline HycoCondensing Condensing(HycoReducer t)
 PetscErrorCode HycoCondensedSetFromOptions(HycoReducer reducer);
 PetscErrorCode HycoCondensedResetTraining(HycoReducer reducer);
 PetscErrorCode HycoCondensedBegin(HycoReducer reducer);
+/* Number of samples of the forces of m contacts. */
+PetscInt HycoCondensedSamples(PetscInt m);
+/* Whether a search tries it, and its operations (condense_offer.c). */
+PetscBool HycoCondensedOffers(HycoReducer reducer, PetscBool targets, size_t length, char why[]);
+PetscReal HycoCondensedWork(HycoReducer reducer);
 /* Checks that apply with a history and without, among them for a support that lets a body move. Collective. */
 PetscErrorCode HycoCondensedCheckContacts(HycoReducer reducer);
 PetscErrorCode HycoCondensedCheckSupports(HycoReducer reducer);

@@ -42,6 +42,6 @@ PetscErrorCode HycoProjectionBuild(HycoROM model, HycoReducer reducer);
 PetscErrorCode HycoProjectionMakeBasis(HycoROM model, HycoReducer reducer);
 PetscErrorCode HycoProjectionJudge(HycoROM model, HycoReducer reducer);
 PetscErrorCode HycoProjectionReport(HycoReducer reducer, HycoROM model, HycoTraining *report);
-PetscBool HycoProjectionOffers(HycoReducer reducer, PetscBool targets);
+PetscBool HycoProjectionOffers(HycoReducer reducer, PetscBool targets, size_t length, char why[]);
 
 #endif

@@ -64,6 +64,11 @@ struct _p_HycoReducer {
                        chosen */
   PetscBool trying; /* an attempt of the search: a model that is not reported */
   PetscBool exhaustive;
+  PetscReal search_budget;  /* operations of a search as a multiple of those of the solutions */
+  PetscInt n_judged;        /* of an attempt, on rank 0: number of predictions at training points (with no solution
+                              HYCO_UNSOLVED_WORK each), */
+  PetscInt n_unknowns;      /* and of displacements in A that are not fixed */
+  char remedy[HYCO_LINE];   /* of an attempt that gave no model: what else the user may do, of the type; "": nothing */
   char doing[HYCO_LINE];    /* of the search, for the monitor of phases: the settings of the attempt */
   PetscInt most_full_order; /* hybrid all: largest number of full-order displacements; 0: no limit */
   PetscInt scan;            /* points per parameter; 0: chosen by the library */
@@ -230,6 +235,18 @@ PetscErrorCode HycoReducerHoldOutFresh(HycoReducer t, HycoSnapshots store, HycoS
    that were added to meet the targets, or NULL; the caller destroys it. Collective. */
 PetscErrorCode HycoReducerLearn(HycoReducer t, HycoSnapshots store, HycoROM *model, HycoSamples *grown,
                                 HycoTraining *report);
+/*
+  Estimated operations (search_work.c): of all solutions of the run; of a factor of K, and of a solve with it; of a
+  search at most (PETSC_INFINITY: all attempts). HycoReducerSolvesOf(): the number of solves of a point, of a path in
+  all of its steps. HycoReducerCountStiffnesses(): how many different stiffnesses or contact rows
+  the points have; in_order: how often they change from one point to the next, with the first.
+*/
+PetscErrorCode HycoReducerSolutionsWork(HycoReducer t, PetscReal *operations);
+PetscReal HycoReducerFactorWork(HycoReducer t);
+PetscReal HycoReducerSolveWork(HycoReducer t);
+PetscReal HycoReducerSolvesOf(HycoReducer t);
+PetscErrorCode HycoReducerSearchBudget(HycoReducer t, PetscReal *operations);
+PetscErrorCode HycoReducerCountStiffnesses(HycoReducer t, HycoSamples samples, PetscBool in_order, PetscInt *count);
 /* For paths in 3D: the group of the support that is most probably a plane of symmetry across the contacts, whose
    cells are then the first RID; else NULL. Borrowed from the scene. Collective. */
 PetscErrorCode HycoReducerFindPlane(HycoReducer t, const char **group);
@@ -320,17 +337,19 @@ PetscReal HycoHeldOutError(const HycoHeldOut *row, HycoErrorKind kind, PetscReal
 PetscErrorCode HycoHeldOutSummarise(PetscInt n, const HycoHeldOut rows[], PetscReal force, HycoValidation *validation);
 
 /* Sets numbers[] of the current model: condition and mean training errors; or only the errors, where a prediction
-   that did not converge or is meaningless counts as HYCO_JUDGED_WORST. Rank 0. */
-#define HYCO_JUDGED_WORST 10.0
+   that did not converge or is meaningless counts as HYCO_JUDGED_WORST. `most`: a mean error of u above it is of no
+   interest, and both are then HYCO_JUDGED_WORST. Rank 0. */
+#define HYCO_JUDGED_WORST  10.0
+#define HYCO_UNSOLVED_WORK 30 /* a prediction without a solution tries all methods: so many times the operations */
 PetscErrorCode HycoReducerJudge(HycoReducer t, HycoROM model);
-PetscErrorCode HycoReducerJudgeMeans(HycoReducer t, HycoROM model, PetscReal *u, PetscReal *lambda);
+PetscErrorCode HycoReducerJudgeMeans(HycoReducer t, HycoROM model, PetscReal most, PetscReal *u, PetscReal *lambda);
 /* The same for paths, to compare settings early: `best` (a row per sample) are the results of the best settings so
    far; samples where these were worst come first, and `lost` is set when the mean error of u cannot become smaller,
    or, after some paths, is not smaller so far. best NULL: lost when the mean reaches `most`. judged: all rows,
    unless lost. Rank 0. */
 PetscErrorCode HycoReducerJudgeRace(HycoReducer t, HycoROM model, const HycoJudged best[], PetscReal most,
                                     HycoJudged judged[], PetscReal *u, PetscBool *lost);
-/* To the monitor of phases: what the search does with the settings it tries, `done` of n. */
+/* To the monitor of phases, on rank 0: what is done, `done` of n, in a search with the settings that it tries. */
 PetscErrorCode HycoReducerTell(HycoReducer t, const char what[], PetscInt done, PetscInt n);
 /* After HycoReducerJudge(): which training solutions that model does not reach, and which have the largest errors.
    Rank 0. */

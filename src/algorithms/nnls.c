@@ -112,6 +112,15 @@ static void Gradient(const Passive *f, const PetscReal A[], const PetscReal b[],
 PetscErrorCode HycoNNLS(PetscInt m, PetscInt n, const PetscReal A[], const PetscReal b[], PetscReal x[],
                         PetscReal *residual)
 {
+  PetscFunctionBegin;
+  PetscCall(HycoNNLSMonitored(m, n, A, b, NULL, NULL, x, residual));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoNNLSMonitored(PetscInt m, PetscInt n, const PetscReal A[], const PetscReal b[],
+                                 PetscErrorCode (*monitor)(void *ctx, PetscInt k, PetscInt most), void *ctx,
+                                 PetscReal x[], PetscReal *residual)
+{
   const PetscInt most = PetscMin(m, n);
   Passive f = {m, n, 0, NULL, NULL, NULL, NULL};
   PetscReal *r, *w, *z, tol = 0;
@@ -143,6 +152,7 @@ PetscErrorCode HycoNNLS(PetscInt m, PetscInt n, const PetscReal A[], const Petsc
     while (!MoveTowards(&f, A, b, z, x, passive)) BackSolve(&f, z);
     PetscCall(PetscArrayzero(banned, n));
     Gradient(&f, A, b, r, w);
+    if (monitor) PetscCall((*monitor)(ctx, f.k, most));
   }
   if (residual) {
     *residual = 0;

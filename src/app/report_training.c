@@ -93,6 +93,7 @@ static PetscErrorCode AppendRow(Search *s, const HycoAttempt *a)
 {
   char row[4 * DRIVER_LINE], number[32];
   const HycoReducerSettings *r = &a->settings;
+  PetscBool none;
   size_t at;
 
   PetscFunctionBegin;
@@ -106,16 +107,17 @@ static PetscErrorCode AppendRow(Search *s, const HycoAttempt *a)
     }
     PetscCall(Append(s, ",not_converged,seconds,operations,meets,failure\n"));
   }
+  none = (PetscBool)(a->failure[0] || !a->held_out.n);
   at = (size_t)snprintf(row, sizeof(row), "%d,%d,%s,%g,%d,%g,%s,%d,%d,%d,%.6g,%d", (int)++s->n, (int)s->n_points,
                         r->type, (double)r->pod_tol, (int)r->layers, (double)r->contact_extension,
                         HycoHybrids[r->hybrid], (int)r->whole, (int)a->n_modes, (int)a->rid_elements,
                         (double)a->rid_fraction, a->failure[0] ? 0 : (int)a->held_out.n);
   for (PetscInt j = 0; j < 2 * CountKinds(s); j++) {
-    Number(a->failure[0] ? (PetscReal)NAN : (j % 2 ? a->held_out.median : a->held_out.largest)[j / 2], number);
+    Number(none ? (PetscReal)NAN : (j % 2 ? a->held_out.median : a->held_out.largest)[j / 2], number);
     at += (size_t)snprintf(row + at, sizeof(row) - at, ",%s", number);
   }
   at += (size_t)snprintf(row + at, sizeof(row) - at, ",%d,%.6g,%.6g,%d,\"", (int)a->held_out.not_converged,
-                         a->failure[0] ? NAN : (double)a->held_out.seconds, (double)a->cost, a->ratio <= 1);
+                         none ? NAN : (double)a->held_out.seconds, (double)a->cost, a->ratio <= 1);
   for (const char *c = a->failure; *c && at + 4 < sizeof(row); c++) row[at++] = *c == '"' ? '\'' : *c;
   snprintf(row + at, sizeof(row) - at, "\"\n");
   PetscCall(Append(s, row));
@@ -133,7 +135,9 @@ static PetscErrorCode DescribeEnd(const HycoAttempt *a, char text[DRIVER_LINE])
   if (a->dropped_at >= 0 && !a->beaten_by)
     snprintf(text, DRIVER_LINE, "; dropped at held-out path %d of %d, which does not reach its end", (int)a->held_out.n,
              (int)a->n_held);
-  if (a->beaten_by)
+  if (a->beaten_by && a->dropped_at < 0)
+    snprintf(text, DRIVER_LINE, "; not judged: settings %d meet the targets and cost less", (int)a->beaten_by);
+  else if (a->beaten_by)
     snprintf(text, DRIVER_LINE, "; dropped at held-out path %d of %d: settings %d are better", (int)a->held_out.n,
              (int)a->n_held, (int)a->beaten_by);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -152,6 +156,9 @@ static PetscErrorCode Attempted(const HycoAttempt *a, void *ctx)
   PetscCall(DescribeEnd(a, end));
   if (a->failure[0])
     PetscCall(Say("  %2d %s: no model: %s\n", (int)a->number, what, a->failure));
+  else if (!a->held_out.n)
+    PetscCall(Say("  %2d %s: %d modes, RID %.1f %%%s\n", (int)a->number, what, (int)a->n_modes,
+                  100 * (double)a->rid_fraction, end));
   else
     PetscCall(Say("  %2d %s: %d modes, RID %.1f %%; %s; %.3g ms%s\n", (int)a->number, what, (int)a->n_modes,
                   100 * (double)a->rid_fraction, errors, 1e3 * (double)a->held_out.seconds, end));
@@ -203,19 +210,29 @@ static PetscErrorCode Misses(const Search *s, const HycoTraining *t)
     if (!(limit[j] > 0) || t->held_out.largest[j] <= limit[j]) continue;
     DriverPercent(t->held_out.largest[j], reached);
     DriverPercent(limit[j], asked);
-    PetscCall(
-        DriverMissed("the error of %s is %s at the worst of %d held-out points, and %s %s; the model is written; %s%s",
-                     j == HYCO_ERROR_U           ? "u"
-                     : j == HYCO_ERROR_LAMBDA    ? "the contact forces"
-                     : j == HYCO_ERROR_INELASTIC ? "the inelastic strain"
-                                                 : HycoErrorKinds[j],
-                     t->held_out.largest[j] > PETSC_MAX_REAL / 8 ? "infinite" : reached, (int)t->held_out.n,
-                     s->on ? "the target is" : "without a target it should stay below", asked,
-                     s->on ? "give more training points, a larger -target_max_added, or a looser target"
-                           : "give more training points, let training add them (-target_u 5e-3 -target_lambda 3e-2), "
-                             "or set looser targets",
-                     hybrid ? "; or try -hyco_model_type cubature (docs/models.md)" : ""));
+    PetscCall(DriverMissed(
+        "the error of %s is %s at the worst of %d held-out points, and %s %s; the model is written; %s%s%s%s",
+        j == HYCO_ERROR_U           ? "u"
+        : j == HYCO_ERROR_LAMBDA    ? "the contact forces"
+        : j == HYCO_ERROR_INELASTIC ? "the inelastic strain"
+                                    : HycoErrorKinds[j],
+        t->held_out.largest[j] > PETSC_MAX_REAL / 8 ? "infinite" : reached, (int)t->held_out.n,
+        s->on ? "the target is" : "without a target it should stay below", asked, t->next, t->next[0] ? "; or " : "",
+        s->on ? "give more training points, a larger -target_max_added, or a looser target"
+              : "give more training points, let training add them (-target_u 5e-3 -target_lambda 3e-2), "
+                "or set looser targets",
+        hybrid ? "; or try -hyco_model_type cubature (docs/models.md)" : ""));
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What the search did not try, in one line. */
+static PetscErrorCode SayLeftOut(const HycoTraining *t)
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < t->n_left_out; k++)
+    PetscCall(Say("%s%s (%s)%s", k ? "; " : "not tried: ", t->left_out[k].what, t->left_out[k].why,
+                  k + 1 < t->n_left_out ? "" : "\n"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -249,6 +266,7 @@ PetscErrorCode DriverJudgeModel(const Search *s, const HycoTraining *t)
   if (t->chosen.number) {
     HycoReducerSettingsDescribe(&t->chosen.settings, sizeof(what), what);
     PetscCall(Say("chosen: settings %d of %d: %s\n", (int)t->chosen.number, (int)t->chosen.of, what));
+    PetscCall(SayLeftOut(t));
   }
   if (!t->held_out.n) {
     PetscCall(Say("no held-out points: the errors of this model are not known, and it cannot estimate them\n"));
@@ -323,7 +341,7 @@ void DriverReportModel(cJSON *json, const Search *s, const HycoTraining *t)
   } else
     cJSON_AddNullToObject(json, "held_out");
   if (a->number) {
-    cJSON *search = cJSON_AddObjectToObject(json, "search");
+    cJSON *search = cJSON_AddObjectToObject(json, "search"), *left_out;
 
     cJSON_AddNumberToObject(search, "attempts", s->n);
     cJSON_AddNumberToObject(search, "chosen", s->n - a->of + a->number);
@@ -335,5 +353,10 @@ void DriverReportModel(cJSON *json, const Search *s, const HycoTraining *t)
     cJSON_AddNumberToObject(search, "rid_contact_extension", a->settings.contact_extension);
     cJSON_AddStringToObject(search, "hybrid", HycoHybrids[a->settings.hybrid]);
     cJSON_AddBoolToObject(search, "rid_whole", a->settings.whole);
+    cJSON_AddNumberToObject(search, "operations", t->search_operations);
+    cJSON_AddNumberToObject(search, "operations_of_solutions", t->solution_operations);
+    left_out = cJSON_AddObjectToObject(search, "not_tried");
+    for (PetscInt k = 0; k < t->n_left_out; k++)
+      cJSON_AddStringToObject(left_out, t->left_out[k].what, t->left_out[k].why);
   }
 }

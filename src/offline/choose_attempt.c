@@ -3,7 +3,8 @@
   and its target; for an attempt that was dropped, a lower bound of it. The choice is the cheapest attempt whose ratio
   is at most max(1, LITTLE times the least ratio). This bound only decreases with further attempts: settings that exceed
   it are excluded for good. So are settings whose ratio exceeds 1 and the ratio of settings that are not more expensive:
-  if those are excluded, so are these.
+  if those are excluded, so are these; and settings that cost no less than
+  others that meet the targets, whatever their errors, which are then not computed.
 */
 #include <hycoreducerimpl.h>
 
@@ -57,6 +58,15 @@ PetscReal HycoAttemptsLimit(PetscInt n, const HycoAttempt attempt[], PetscReal c
   return limit * TIE;
 }
 
+/* Whether an attempt that is not more expensive meets the targets. */
+static PetscBool IsMet(PetscInt n, const HycoAttempt attempt[], PetscReal cost)
+{
+  for (PetscInt k = 0; k < n; k++) {
+    if (Complete(&attempt[k]) && attempt[k].ratio <= 1 && attempt[k].cost <= cost) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
 HycoAttempt *HycoAttemptsReopen(PetscInt n, HycoAttempt attempt[])
 {
   PetscInt beaten;
@@ -64,7 +74,9 @@ HycoAttempt *HycoAttemptsReopen(PetscInt n, HycoAttempt attempt[])
   for (PetscInt k = 0; k < n; k++) {
     HycoAttempt *a = &attempt[k];
 
-    if (a->beaten_by && !a->reopened && !(a->ratio > HycoAttemptsLimit(n, attempt, a->cost, &beaten))) return a;
+    if (a->beaten_by && !a->reopened && !IsMet(n, attempt, a->cost) &&
+        !(a->ratio > HycoAttemptsLimit(n, attempt, a->cost, &beaten)))
+      return a;
   }
   return NULL;
 }

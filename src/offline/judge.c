@@ -74,14 +74,17 @@ static PetscErrorCode JudgeSample(HycoReducer t, HycoROM m, PetscInt k, const Pe
   else
     SnapshotErrors(t, m, k, &j->u, &j->lambda);
   j->solved = (PetscBool)(m->prediction.reason >= 0);
+  t->n_judged += j->solved ? 1 : HYCO_UNSOLVED_WORK;
   j->t = m->trace.history.t;
   if (!j->solved || !(j->u < HYCO_JUDGED_WORST)) j->u = HYCO_JUDGED_WORST;
   if (!j->solved || !(j->lambda < HYCO_JUDGED_WORST)) j->lambda = HYCO_JUDGED_WORST;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Means over the samples; the errors of each in judged (NULL: not needed). */
-static PetscErrorCode JudgeAll(HycoReducer t, HycoROM m, HycoJudged judged[], PetscReal *u, PetscReal *lambda)
+/* Means over the samples; the errors of each in judged (NULL: not needed). Ends when the mean error of u exceeds
+   `most`: the means are then HYCO_JUDGED_WORST. */
+static PetscErrorCode JudgeAll(HycoReducer t, HycoROM m, PetscReal most, HycoJudged judged[], PetscReal *u,
+                               PetscReal *lambda)
 {
   PetscInt n, n_par;
   const PetscReal *mu;
@@ -90,14 +93,16 @@ static PetscErrorCode JudgeAll(HycoReducer t, HycoROM m, HycoJudged judged[], Pe
   PetscCall(HycoSamplesGet(t->samples, &n, &n_par, &mu));
   m->reconstruct = PETSC_FALSE;
   *u = *lambda = 0;
-  for (PetscInt k = 0; k < n; k++) {
+  for (PetscInt k = 0; k < n && *u <= most; k++) {
     HycoJudged j;
 
+    if (judged) PetscCall(HycoReducerTell(t, "training points", k, n));
     PetscCall(JudgeSample(t, m, k, mu + k * n_par, &j));
     *u += j.u / n;
     *lambda += j.lambda / n;
     if (judged) judged[k] = j;
   }
+  if (*u > most) *u = *lambda = HYCO_JUDGED_WORST;
   if (m->scene->n_times) PetscCall(HycoROMSetSteps(m, 0, NULL));
   m->reconstruct = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -153,11 +158,10 @@ PetscErrorCode HycoReducerJudgeRace(HycoReducer t, HycoROM m, const HycoJudged b
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Mean training errors of the current model. */
-PetscErrorCode HycoReducerJudgeMeans(HycoReducer t, HycoROM m, PetscReal *u, PetscReal *lambda)
+PetscErrorCode HycoReducerJudgeMeans(HycoReducer t, HycoROM m, PetscReal most, PetscReal *u, PetscReal *lambda)
 {
   PetscFunctionBegin;
-  PetscCall(JudgeAll(t, m, NULL, u, lambda));
+  PetscCall(JudgeAll(t, m, most, NULL, u, lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -170,7 +174,7 @@ PetscErrorCode HycoReducerJudge(HycoReducer t, HycoROM m)
   PetscCall(HycoSamplesGet(t->samples, &n, NULL, NULL));
   PetscCall(PetscFree(t->judged));
   PetscCall(PetscMalloc1(n, &t->judged));
-  PetscCall(JudgeAll(t, m, t->judged, &m->numbers[1], &m->numbers[2]));
+  PetscCall(JudgeAll(t, m, PETSC_INFINITY, t->judged, &m->numbers[1], &m->numbers[2]));
   m->numbers[0] = 0;
   PetscTryTypeMethod(m, condition, &m->numbers[0]);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -181,8 +185,8 @@ PetscErrorCode HycoReducerTell(HycoReducer t, const char what[], PetscInt done, 
   char phase[2 * HYCO_LINE];
 
   PetscFunctionBegin;
-  if (!t->phase || !t->doing[0] || t->rank) PetscFunctionReturn(PETSC_SUCCESS);
-  snprintf(phase, sizeof(phase), "%s: %s", t->doing, what);
+  if (!t->phase || t->rank) PetscFunctionReturn(PETSC_SUCCESS);
+  snprintf(phase, sizeof(phase), "%s%s%s", t->doing, t->doing[0] ? ": " : "", what);
   PetscCall((*t->phase)(phase, done, n, t->phase_ctx));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

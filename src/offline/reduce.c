@@ -453,6 +453,12 @@ static PetscErrorCode ReduceField(HycoReducer t, HycoSnapshots store, PetscInt k
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether a basis seeds the RID of the current type. */
+static PetscBool Seeds(HycoReducer t, PetscInt kind)
+{
+  return (PetscBool)(t->seed[kind] && !t->prototype->traits.cells);
+}
+
 /* DEIM on the modes taken from a basis. */
 static PetscErrorCode SeedFrom(HycoReducer t, Mat V, PetscInt l, PetscInt kind, PetscInt divide, PetscInt *n_seeds,
                                PetscInt **seeds)
@@ -460,7 +466,7 @@ static PetscErrorCode SeedFrom(HycoReducer t, Mat V, PetscInt l, PetscInt kind, 
   PetscInt *index;
 
   PetscFunctionBegin;
-  if (!l || !t->seed[kind]) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!l || !Seeds(t, kind)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(l, &index));
   HycoLogged(HYCO_EVENT_DEIM, Points(t, V, index));
   PetscCall(AddSeeds(l, index, divide, n_seeds, seeds));
@@ -493,7 +499,7 @@ static PetscErrorCode TakeField(HycoReducer t, PetscInt kind, PetscInt divide, P
   PetscInt l;
 
   PetscFunctionBegin;
-  if (!t->seed[kind] || t->plane) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!Seeds(t, kind) || t->plane) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(CutBasis(t, kind, &V, &l));
   PetscCall(SeedFrom(t, V, l, kind, divide, n_seeds, seeds));
   PetscCall(MatDestroy(&V));
@@ -724,7 +730,8 @@ PetscErrorCode HycoReducerTakeBases(HycoReducer t)
   PetscCall(TakeField(t, HYCO_SEED_FORCE, dim, &t->n_seeds_node, &t->seeds_node));
   PetscCall(TakeField(t, HYCO_SEED_SPRING, dim, &t->n_seeds_node, &t->seeds_node));
   PetscCall(TakeField(t, HYCO_SEED_INELASTIC, 1, &t->n_seeds_cell, &t->seeds_cell));
-  if (t->seed[HYCO_SEED_DUAL]) PetscCall(AddSeeds(t->n_dual_seeds, t->dual_seeds, 1, &t->n_seeds_node, &t->seeds_node));
+  if (Seeds(t, HYCO_SEED_DUAL))
+    PetscCall(AddSeeds(t->n_dual_seeds, t->dual_seeds, 1, &t->n_seeds_node, &t->seeds_node));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

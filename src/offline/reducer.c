@@ -19,6 +19,7 @@ static PetscErrorCode Create(MPI_Comm comm, HycoReducer *reducer)
   t->greedy.target = 1e-3;
   t->n_validation = -1;
   t->search = PETSC_TRUE;
+  t->search_budget = 1;
   t->budget = -1;
   t->ridge = -1;
   for (PetscInt k = 0; k < HYCO_N_SEEDS; k++) t->tol[k] = k == HYCO_SEED_DUAL ? 1e-1 : 1e-7;
@@ -267,9 +268,14 @@ static PetscErrorCode ReadTraining(HycoReducer t)
       "-hyco_search",
       "choose model_type, pod_tol, rid_layers, rid_contact_extension and hybrid by the held-out errors, unless given",
       &t->search, NULL));
-  PetscCall(HycoOptionsBool("-hyco_search_exhaustive",
-                            "of paths: judge all settings at all held-out points, also those that cannot be chosen",
-                            &t->exhaustive, NULL));
+  PetscCall(HycoOptionsReal("-hyco_search_budget",
+                            "estimated operations of the search as a multiple of those of the full-order solutions; "
+                            "two models, and searches of seconds, are always tried",
+                            0, 1e9, &t->search_budget, NULL));
+  PetscCall(HycoOptionsBool(
+      "-hyco_search_exhaustive",
+      "try all settings, whatever they cost, and judge them at all held-out points, also those that cannot be chosen",
+      &t->exhaustive, NULL));
   PetscCall(HycoOptionsName("-hyco_reducer_view", "print the settings of the training before it begins"));
   PetscCall(HycoOptionsFor("greedy"));
   PetscCall(HycoOptionsWord("-hyco_greedy_indicator",

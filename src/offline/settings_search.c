@@ -4,8 +4,9 @@
   RID and the model on it and predicts the held-out points.
 
   Only settings that no option fixes are varied. The settings of a kind are tried in the order of their cost, and the
-  first that meet the targets end their kind. The cost is a count of operations, not a time, so that the choice is the
-  same on any machine and number of ranks.
+  first that meet the targets end their kind; if they meet them with a margin, they end the search. So do attempts that
+  need more operations than the solutions (search_work.c). Costs are counts of operations, not times, so that the choice
+  is the same on any machine and number of ranks. What is left out is listed with its reason.
 
   If no settings meet the user's targets, solutions are added where the best model has the largest errors, and the
   search starts again. Next to an added solution the model is more accurate than elsewhere, so that its errors at those
@@ -26,8 +27,11 @@ static const PetscReal usual[HYCO_N_ERRORS] = {
   3 /* attempts without progress that end a kind: a larger RID does not help if the basis lacks                        \
        solutions */
 #define PROGRESS     0.95
-#define WILD         50  /* multiple of the target: above it no attempt so far gives a useful model */
-#define FEW_UNKNOWNS 300 /* a dense matrix of this size is cheap */
+#define NO_EFFECT    0.05 /* relative change of the ratio that counts as none */
+#define MARGIN       0.1  /* ratio of settings that end the search */
+#define LEAST        2    /* models that are tried whatever they cost */
+#define WILD         50   /* multiple of the target: above it no attempt so far gives a useful model */
+#define FEW_UNKNOWNS 300  /* a dense matrix of this size is cheap */
 #define MAX_ATTEMPTS 64
 #define ROUND        4   /* share of the training points that is added at a time, as a divisor */
 #define TELLING      0.3 /* correlation above which a parameter explains the errors */
@@ -67,7 +71,27 @@ typedef struct {
   PetscReal force;                 /* HycoHeldOutForce() of the held-out points */
   PetscInt *order;                 /* held-out points, those with the largest errors in the last attempts first */
   PetscReal least, *ratio;         /* least ratio so far; ratios of the best model at its held-out points */
+  PetscReal spent, last, budget;   /* operations of all attempts, and of the last one; the largest number of them */
+  PetscInt n_models;               /* attempts with these bases that gave a model */
+  PetscBool ended;                 /* by the budget */
+  HycoLeftOut left_out[HYCO_MAX_LEFT_OUT];
+  PetscInt n_left_out;
+  char remedy[HYCO_LINE]; /* of a type that gave no model: HycoReducer's remedy */
 } Search;
+
+/* Notes what the search does not try; the first reason counts. */
+static void LeaveOut(Search *s, const char what[], const char why[])
+{
+  HycoLeftOut *next = &s->left_out[s->n_left_out];
+
+  for (PetscInt k = 0; k < s->n_left_out; k++) {
+    if (strcmp(s->left_out[k].what, what) == 0) return;
+  }
+  if (s->n_left_out == HYCO_MAX_LEFT_OUT) return;
+  (void)!PetscStrncpy(next->what, what, sizeof(next->what));
+  (void)!PetscStrncpy(next->why, why, sizeof(next->why));
+  s->n_left_out++;
+}
 
 void HycoReducerSettingsDescribe(const HycoReducerSettings *r, size_t length, char text[])
 {
@@ -219,6 +243,7 @@ static PetscErrorCode Judge(Search *s, HycoROM model, PetscBool all, HycoAttempt
       .order = s->order, .target = s->target, .force = s->force, .all = (PetscBool)(all || t->exhaustive)};
 
   PetscFunctionBegin;
+  a->ratio = PETSC_INFINITY;
   race.most = HycoAttemptsLimit(s->n - 1, s->attempt, a->cost, &beaten);
   PetscCall(PetscCalloc1(n, &rows));
   s->rows[s->n - 1] = rows;
@@ -250,7 +275,19 @@ static PetscErrorCode TakeModes(HycoReducer t, HycoSnapshots store)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Makes bases, RID and model for the current settings, and judges the model. */
+/* The number of settings that meet the targets at no more than this cost, so that others of this cost are not chosen;
+   0: none. */
+static PetscInt MetFor(const Search *s, PetscReal cost)
+{
+  for (PetscInt k = 0; k < s->n - 1; k++) {
+    const HycoAttempt *a = &s->attempt[k];
+
+    if (!a->failure[0] && !a->beaten_by && a->ratio <= 1 && a->cost <= cost) return a->number;
+  }
+  return 0;
+}
+
+/* Makes bases, RID and model for the current settings, and judges the model unless its cost excludes it. */
 static PetscErrorCode BuildAndJudge(Search *s, PetscBool all, HycoAttempt *a)
 {
   HycoReducer t = s->t;
@@ -271,34 +308,82 @@ static PetscErrorCode BuildAndJudge(Search *s, PetscBool all, HycoAttempt *a)
   a->cost = t->prototype->ops->cost ? (*t->prototype->ops->cost)(t, a) : 0;
   PetscCallMPI(MPI_Bcast(&t->ridge, 1, MPIU_REAL, 0, HycoComm(t)));
   a->settings.ridge = t->ridge;
-  ierr = Judge(s, model, all, a); /* a model may refuse to predict */
+  a->beaten_by = all || t->exhaustive ? 0 : MetFor(s, a->cost);
+  ierr = a->beaten_by ? PETSC_SUCCESS : Judge(s, model, all, a); /* a model may refuse to predict */
   PetscCall(HycoROMDestroy(&model));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Builds a model with these settings and judges it, at all held-out points or as far as necessary; an error becomes
-   a failed attempt. Collective. */
-static PetscErrorCode Try(Search *s, const HycoReducerSettings *settings, PetscBool all)
+/* Whether the budget has room for an attempt like the last one. */
+static PetscBool Affords(Search *s, const HycoReducerSettings *settings)
+{
+  char why[HYCO_LINE];
+
+  if (s->n_models < LEAST || s->spent + s->last <= s->budget) return PETSC_TRUE;
+  snprintf(why, sizeof(why),
+           "%d settings took %.1e operations of %.1e; -hyco_search_budget sets their number, which is %g times that of "
+           "the solutions, and -hyco_search_exhaustive tries all",
+           (int)s->n, (double)s->spent, (double)s->budget, (double)s->t->search_budget);
+  LeaveOut(s, settings->rid ? "further settings" : settings->type, why);
+  s->ended = PETSC_TRUE;
+  return PETSC_FALSE;
+}
+
+/* Operations of n predictions at training or held-out points: the cost of an attempt is that at a new stiffness. */
+static PetscErrorCode Predictions(HycoReducer t, HycoSamples points, PetscReal n, const HycoAttempt *a, PetscReal *work)
+{
+  const PetscReal unknowns = (PetscReal)a->n_modes + (PetscReal)a->n_fe_dofs;
+  PetscInt n_points, stiffnesses;
+  PetscReal share = 1;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(points, &n_points, NULL, NULL));
+  PetscCall(HycoReducerCountStiffnesses(t, points, PETSC_TRUE, &stiffnesses));
+  if (!t->scene->n_times) share = (PetscReal)stiffnesses / (PetscReal)PetscMax(n_points, 1);
+  *work = n * HycoReducerSolvesOf(t) * (share * a->cost + 2 * unknowns * unknowns);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds the operations of an attempt: the type's own, predictions at training and held-out points, and their comparison
+   on the whole mesh. */
+static PetscErrorCode Count(Search *s, HycoAttempt *a)
 {
   HycoReducer t = s->t;
-  HycoAttempt *a = &s->attempt[s->n];
+  const PetscReal whole = 2 * (PetscReal)t->sizes[0] * t->sizes[3] * a->n_modes + 100 * (PetscReal)t->sizes[1];
+  const PetscReal held = a->held_out.n + (HYCO_UNSOLVED_WORK - 1) * (PetscReal)a->held_out.not_converged,
+                  repeats = t->scene->n_times ? 1 : HYCO_HELD_REPEATS;
+  PetscInt numbers[2] = {t->n_judged, t->n_unknowns};
+  PetscReal judging, testing;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Bcast(numbers, 2, MPIU_INT, 0, HycoComm(t)));
+  a->n_unknowns = numbers[1];
+  PetscCall(Predictions(t, t->samples, numbers[0], a, &judging));
+  PetscCall(Predictions(t, t->held, repeats * held, a, &testing));
+  s->last = judging + testing + whole * ((PetscReal)t->n_s + held * (PetscReal)HycoSnapshotsSteps(t->scene));
+  if (t->prototype->ops->work && !a->failure[0]) s->last += (*t->prototype->ops->work)(t);
+  s->spent += s->last;
+  s->n_models += !a->failure[0];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Builds a model with these settings and judges it, at all held-out points or as far as necessary; an error becomes
+   a failed attempt. Collective. */
+static PetscErrorCode Make(Search *s, const HycoReducerSettings *settings, PetscBool all, HycoAttempt *a)
+{
+  HycoReducer t = s->t;
   PetscErrorCode ierr;
   char message[HYCO_LINE], what[HYCO_LINE];
 
   PetscFunctionBegin;
-  if (s->n == MAX_ATTEMPTS) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMemzero(a, sizeof(*a)));
-  a->number = ++s->n;
-  a->settings = *settings;
-  a->ratio = PETSC_INFINITY;
-  a->dropped_at = -1;
-  PetscCall(HycoSamplesGet(t->held, &a->n_held, NULL, NULL));
   HycoReducerSettingsDescribe(settings, sizeof(what), what);
   HycoFormat(t->doing, "settings %d, %s", (int)a->number, what);
   t->most_full_order =
       t->pinned[HYCO_CHOICE_HYBRID] || settings->hybrid != HYCO_HYBRID_ALL || settings->plane ? 0 : MANY_UNKNOWNS;
   PetscCall(SetSettings(t, settings));
+  t->n_judged = t->n_unknowns = 0;
+  t->remedy[0] = '\0';
   PetscCall(HycoCatchBegin());
   t->trying = PETSC_TRUE;
   ierr = BuildAndJudge(s, all, a);
@@ -308,7 +393,29 @@ static PetscErrorCode Try(Search *s, const HycoReducerSettings *settings, PetscB
   t->most_full_order = 0;
   PetscCall(HycoCatchNoModel(ierr, message));
   if (message[0]) a->ratio = PETSC_INFINITY;
+  if (message[0] && t->remedy[0]) PetscCall(PetscStrncpy(s->remedy, t->remedy, sizeof(s->remedy)));
   PetscCall(PetscStrncpy(a->failure, message, sizeof(a->failure)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The next attempt; none if the budget is used up. Collective. */
+static PetscErrorCode Try(Search *s, const HycoReducerSettings *settings, PetscBool all)
+{
+  HycoReducer t = s->t;
+  HycoAttempt *a = &s->attempt[s->n];
+
+  PetscFunctionBegin;
+  if (s->n == MAX_ATTEMPTS || (!all && !Affords(s, settings))) {
+    s->ended = PETSC_TRUE;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(PetscMemzero(a, sizeof(*a)));
+  a->number = ++s->n;
+  a->settings = *settings;
+  a->dropped_at = -1;
+  PetscCall(HycoSamplesGet(t->held, &a->n_held, NULL, NULL));
+  PetscCall(Make(s, settings, all, a));
+  PetscCall(Count(s, a));
   if (t->attempt) HycoOnRoot(HycoComm(t), t->attempt(a, t->attempt_ctx));
   if (t->phase) HycoOnRoot(HycoComm(t), t->phase("settings tried", s->n, 0, t->phase_ctx));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -343,33 +450,87 @@ static PetscBool WholeIsSmall(HycoReducer t, HycoHybrid hybrid)
   return (PetscBool)(!all || t->sizes[0] * t->sizes[3] <= FEW_UNKNOWNS);
 }
 
-/* Tries the sizes in order until one meets the targets, without those that do not differ in the settings that the
-   type reads. Dropped attempts on paths do not show whether there is progress: all sizes are tried. */
+/* Whether an RID at least as large as one with too many unknowns would keep all of them full order. */
+static PetscBool IsTooLarge(Search *s, const HycoReducerSettings *r)
+{
+  char why[HYCO_LINE];
+
+  if (r->hybrid != HYCO_HYBRID_ALL || s->t->pinned[HYCO_CHOICE_HYBRID] || s->t->exhaustive) return PETSC_FALSE;
+  for (PetscInt k = 0; k < s->n; k++) {
+    const HycoAttempt *a = &s->attempt[k];
+    const HycoReducerSettings *b = &a->settings;
+
+    if (strcmp(b->type, r->type) || a->n_unknowns <= MANY_UNKNOWNS || b->plane || r->pod_tol > b->pod_tol ||
+        r->layers < b->layers || r->contact_extension < b->contact_extension || (b->whole && !r->whole))
+      continue;
+    snprintf(why, sizeof(why), "its RID has %d unknowns, and with more than %d the dense matrix is too expensive",
+             (int)a->n_unknowns, MANY_UNKNOWNS);
+    LeaveOut(s, "hybrid all", why);
+    return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
+/* Whether the last of the attempts from `first` on has the errors of the one before it. */
+static PetscBool HasNoEffect(const Search *s, PetscInt first)
+{
+  const HycoAttempt *a = &s->attempt[s->n - 1], *b = a - 1;
+
+  if (s->n < first + 2 || !(a->ratio < PETSC_INFINITY) || !(b->ratio < PETSC_INFINITY)) return PETSC_FALSE;
+  return (PetscBool)(a->dropped_at == b->dropped_at && PetscAbsReal(a->ratio - b->ratio) <= NO_EFFECT * b->ratio);
+}
+
+/* The number of attempts in a row, up to the last one, without progress. With large errors, and for paths, whose
+   dropped attempts do not show it, only those without an effect count. */
+static PetscInt CountStale(const Search *s, PetscInt first, PetscReal least, PetscInt stale)
+{
+  const PetscBool slow = (PetscBool)(least <= WILD && !s->t->scene->n_times);
+
+  if (s->attempt[s->n - 1].ratio < PROGRESS * least) return 0;
+  return slow || HasNoEffect(s, first) ? stale + 1 : 0;
+}
+
+/* The settings of a kind for a size. */
+static HycoReducerSettings KindFor(const Search *s, const HycoROM type, HycoHybrid hybrid, const Size *size)
+{
+  HycoReducerSettings r = SettingsFor(s, size);
+
+  r.type = type->type;
+  r.rid = (PetscBool)(type->traits.settings == HYCO_SETTINGS_RID);
+  r.hybrid = s->t->pinned[HYCO_CHOICE_HYBRID] ? s->given.hybrid : hybrid;
+  if (r.rid) return r;
+  r.layers = s->given.layers;
+  r.contact_extension = s->given.contact_extension;
+  r.whole = s->given.whole;
+  return r;
+}
+
+/* Tries the sizes in order until one meets the targets, or costs more than settings that do, without those that do not
+   differ in the settings that the type reads. */
 static PetscErrorCode TrySizes(Search *s, const HycoROM type, HycoHybrid hybrid, PetscBool *met)
 {
-  const PetscInt first = s->n;
+  const PetscInt first = s->n, most = s->t->exhaustive ? N_SIZES : STALE;
   PetscReal least = PETSC_INFINITY;
+  PetscInt stale = 0;
 
   PetscFunctionBegin;
   *met = PETSC_FALSE;
-  for (PetscInt k = s->targets ? 0 : FIRST_USUAL, stale = 0; k < N_SIZES && stale < STALE && !*met; k++) {
-    HycoReducerSettings r = SettingsFor(s, &sizes[k]);
+  for (PetscInt k = s->targets ? 0 : FIRST_USUAL; k < N_SIZES && stale < most && !*met; k++) {
+    const HycoReducerSettings r = KindFor(s, type, hybrid, &sizes[k]);
     PetscBool done = PETSC_FALSE;
 
-    r.type = type->type;
-    r.rid = (PetscBool)(type->traits.settings == HYCO_SETTINGS_RID);
-    r.hybrid = s->t->pinned[HYCO_CHOICE_HYBRID] ? s->given.hybrid : hybrid;
-    if (!r.rid) {
-      r.layers = s->given.layers;
-      r.contact_extension = s->given.contact_extension;
-      r.whole = s->given.whole;
-    }
     for (PetscInt j = first; j < s->n; j++) done = (PetscBool)(done || Same(&r, &s->attempt[j].settings));
-    if (done || (r.whole && !s->given.whole && !WholeIsSmall(s->t, hybrid))) continue;
+    if (done || (r.whole && !s->given.whole && !WholeIsSmall(s->t, hybrid)) || IsTooLarge(s, &r)) continue;
     PetscCall(Try(s, &r, PETSC_FALSE));
-    stale = least > WILD || s->attempt[s->n - 1].ratio < PROGRESS * least || s->t->scene->n_times ? 0 : stale + 1;
-    least = PetscMin(least, s->attempt[s->n - 1].ratio);
-    *met = (PetscBool)(least <= 1);
+    if (s->ended) break;
+    stale = CountStale(s, first, least, stale);
+    if (!s->attempt[s->n - 1].beaten_by || s->attempt[s->n - 1].dropped_at >= 0)
+      least = PetscMin(least, s->attempt[s->n - 1].ratio);
+    else
+      *met = PETSC_TRUE;
+    *met = (PetscBool)(*met || least <= 1);
+    if (stale == most && k + 1 < N_SIZES)
+      LeaveOut(s, r.rid ? "larger RIDs and more modes" : "more modes", "they did not lower the errors");
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -456,6 +617,7 @@ static PetscErrorCode TryPlanes(Search *s, const HycoROM type, PetscBool *met)
     r.plane = s->plane;
     if (k && pinned[HYCO_CHOICE_TOLERANCE]) break;
     PetscCall(Try(s, &r, PETSC_FALSE));
+    if (s->ended) break;
     *met = (PetscBool)(s->attempt[s->n - 1].ratio <= 1);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -468,9 +630,10 @@ static PetscErrorCode TryHybrids(Search *s, const HycoROM type)
 
   PetscFunctionBegin;
   if (strcmp(type->type, HYCO_ROM_HYBRID) == 0) PetscCall(TryPlanes(s, type, &met));
-  if (met) PetscFunctionReturn(PETSC_SUCCESS);
+  if (met || s->ended) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(TrySizes(s, type, HYCO_HYBRID_AUTO, &met));
-  if (!met && !s->t->pinned[HYCO_CHOICE_HYBRID] && s->t->sizes[2]) PetscCall(TrySizes(s, type, HYCO_HYBRID_ALL, &met));
+  if (!met && !s->ended && !s->t->pinned[HYCO_CHOICE_HYBRID] && s->t->sizes[2])
+    PetscCall(TrySizes(s, type, HYCO_HYBRID_ALL, &met));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -483,24 +646,46 @@ static PetscErrorCode TryOne(Search *s, const HycoROM type)
   PetscFunctionBegin;
   r.type = type->type;
   r.rid = PETSC_FALSE;
+  if (s->t->scene->n_times) r.layers = s->given.layers; /* its mesh consists of the cells of its modes */
   PetscCall(Try(s, &r, PETSC_FALSE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether a type is tried; otherwise, if the user should know, it is noted with the reason. */
+static PetscErrorCode Wants(Search *s, const HycoROM type, PetscBool *wanted)
+{
+  HycoReducer t = s->t;
+  const HycoAttempt *best = HycoAttemptsChoose(s->n, s->attempt);
+  PetscReal work = 0;
+  char why[HYCO_LINE] = "";
+
+  PetscFunctionBegin;
+  *wanted = (PetscBool)(strcmp(type->type, s->given.type) == 0);
+  if (t->pinned[HYCO_CHOICE_TYPE]) PetscFunctionReturn(PETSC_SUCCESS);
+  *wanted = (PetscBool)(type->ops->offers && (type->traits.history || !t->scene->n_times) &&
+                        (*type->ops->offers)(t, s->targets, sizeof(why), why));
+  if (*wanted && type->ops->work) work = (*type->ops->work)(t);
+  if (*wanted && work > s->budget)
+    snprintf(why, sizeof(why),
+             "its training would take %.1e operations, and the search may take %.1e; -hyco_search_budget sets their "
+             "number, which is %g times that of the solutions",
+             (double)work, (double)s->budget, (double)t->search_budget);
+  if (*wanted && best && best->ratio <= MARGIN && !t->exhaustive)
+    snprintf(why, sizeof(why), "settings %d meet the targets with a margin", (int)best->number);
+  if (why[0]) LeaveOut(s, type->type, why);
+  *wanted = (PetscBool)(*wanted && !why[0]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode TryType(Search *s, const char name[])
 {
-  HycoReducer t = s->t;
   HycoROM type;
   PetscBool met, wanted;
 
   PetscFunctionBegin;
   PetscCall(HycoROMCreate(&type));
   PetscCall(HycoROMSetType(type, name));
-  if (t->pinned[HYCO_CHOICE_TYPE])
-    wanted = (PetscBool)(strcmp(name, s->given.type) == 0);
-  else
-    wanted = type->ops->offers && (type->traits.history || !t->scene->n_times) ? (*type->ops->offers)(t, s->targets)
-                                                                               : PETSC_FALSE;
+  PetscCall(Wants(s, type, &wanted));
   if (wanted && type->traits.settings == HYCO_SETTINGS_NONE) PetscCall(TryOne(s, type));
   if (wanted && type->traits.settings == HYCO_SETTINGS_RID) PetscCall(TryHybrids(s, type));
   if (wanted && type->traits.settings == HYCO_SETTINGS_MODES) PetscCall(TrySizes(s, type, HYCO_HYBRID_AUTO, &met));
@@ -512,7 +697,7 @@ static PetscErrorCode TryType(Search *s, const char name[])
 static PetscErrorCode TryAll(Search *s)
 {
   PetscFunctionBegin;
-  for (PetscInt k = 0; s->types[k]; k++) PetscCall(TryType(s, s->types[k]));
+  for (PetscInt k = 0; s->types[k] && !s->ended; k++) PetscCall(TryType(s, s->types[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -568,24 +753,18 @@ static PetscReal Correlation(const Search *s, PetscInt n, const PetscReal held[]
   return square[0] > 0 && square[1] > 0 ? both / PetscSqrtReal(square[0] * square[1]) : 0;
 }
 
-/* Adds unseen points, each near one of the held-out points with the largest errors, which stay unseen; and finds the
-   parameter whose training values are too far apart (-1: none in particular). */
-static PetscErrorCode AddPoints(Search *s, HycoSamples samples, PetscInt n_add, PetscInt *added, PetscInt *by)
+/* The parameter whose training values are too far apart (-1: none in particular). */
+static PetscErrorCode FindTelling(Search *s, HycoSamples samples, PetscInt *by)
 {
-  HycoReducer t = s->t;
-  const PetscInt n_par = t->scene->n_parameters, among = 8 * n_add;
-  PetscInt n, n_train, m, *order;
-  const PetscReal *held, *train, *mu;
-  PetscReal *key, largest = TELLING;
-  PetscBool *used;
-  HycoSamples drawn, unseen;
+  PetscInt n, n_train;
+  const PetscReal *held, *train;
+  PetscReal largest = TELLING;
 
   PetscFunctionBegin;
-  *added = 0;
-  PetscCall(HycoSamplesGet(t->held, &n, NULL, &held));
+  PetscCall(HycoSamplesGet(s->t->held, &n, NULL, &held));
   PetscCall(HycoSamplesGet(samples, &n_train, NULL, &train));
   *by = -1;
-  for (PetscInt p = 0; p < n_par; p++) {
+  for (PetscInt p = 0; p < s->t->scene->n_parameters; p++) {
     const PetscReal c = Correlation(s, n, held, n_train, train, p);
 
     if (c > largest) {
@@ -593,6 +772,25 @@ static PetscErrorCode AddPoints(Search *s, HycoSamples samples, PetscInt n_add, 
       *by = p;
     }
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds unseen points, each near one of the held-out points with the largest errors, which stay unseen; and finds the
+   parameter whose training values are too far apart. */
+static PetscErrorCode AddPoints(Search *s, HycoSamples samples, PetscInt n_add, PetscInt *added, PetscInt *by)
+{
+  HycoReducer t = s->t;
+  const PetscInt n_par = t->scene->n_parameters, among = 8 * n_add;
+  PetscInt n, m, *order;
+  const PetscReal *held, *mu;
+  PetscReal *key;
+  PetscBool *used;
+  HycoSamples drawn, unseen;
+
+  PetscFunctionBegin;
+  *added = 0;
+  PetscCall(HycoSamplesGet(t->held, &n, NULL, &held));
+  PetscCall(FindTelling(s, samples, by));
   PetscCall(HycoSamplesUnseen(samples, t->drawn, among, 1, NULL, &drawn));
   t->drawn += among;
   PetscCall(HycoSamplesExcept(drawn, t->held, &unseen));
@@ -650,6 +848,10 @@ static PetscErrorCode Attempts(Search *s)
     s->order[k] = k;
   }
   s->least = PETSC_INFINITY;
+  s->n_models = s->n_left_out = 0;
+  s->ended = PETSC_FALSE;
+  s->remedy[0] = '\0';
+  PetscCall(HycoReducerSearchBudget(s->t, &s->budget));
   PetscCall(TryAll(s));
   if (s->t->phase) HycoOnRoot(HycoComm(s->t), s->t->phase("settings tried", s->n, s->n, s->t->phase_ctx));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -705,6 +907,50 @@ static PetscErrorCode Rounds(Search *s, HycoSamples *grown, HycoTraining *report
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What would help next if the errors are too large, beside more points. */
+static PetscErrorCode Advise(Search *s, HycoTraining *report)
+{
+  HycoReducer t = s->t;
+  PetscInt by;
+  char values[HYCO_LINE / 4] = "", *next = report->next;
+
+  PetscFunctionBegin;
+  PetscCall(FindTelling(s, t->samples, &by));
+  if (by >= 0)
+    snprintf(values, sizeof(values), "give more values of %s, whose training values are too far apart",
+             t->scene->parameter[by]);
+  next[0] = '\0';
+  for (PetscInt k = 0; k < s->n_left_out && !next[0]; k++) {
+    for (PetscInt j = 0; s->types[j]; j++) {
+      if (strcmp(s->left_out[k].what, s->types[j]) == 0)
+        snprintf(next, sizeof(report->next), "try -hyco_model_type %s, which the search left out (%s)", s->types[j],
+                 s->left_out[k].why);
+    }
+  }
+  if (s->remedy[0]) snprintf(next, sizeof(report->next), "%s", s->remedy);
+  if (!next[0] && s->ended)
+    snprintf(next, sizeof(report->next), "let the search go on (-hyco_search_budget, -hyco_search_exhaustive)");
+  if (values[0] && strlen(next) + strlen(values) + 5 < sizeof(report->next)) {
+    if (next[0]) strcat(next, "; or ");
+    strcat(next, values);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Puts into the report what the search has done. */
+static PetscErrorCode Tell(Search *s, const HycoAttempt *best, HycoTraining *report)
+{
+  PetscFunctionBegin;
+  report->chosen = *best;
+  report->chosen.of = s->n;
+  report->search_operations = s->spent;
+  PetscCall(HycoReducerSolutionsWork(s->t, &report->solution_operations));
+  report->n_left_out = s->n_left_out;
+  PetscCall(PetscArraycpy(report->left_out, s->left_out, s->n_left_out));
+  PetscCall(Advise(s, report));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Builds the model with the best settings; if the scan of the ranges or its own training solutions refuse it, the
    next one. */
 static PetscErrorCode BuildBest(Search *s, HycoROM *model, HycoTraining *report)
@@ -734,8 +980,7 @@ static PetscErrorCode BuildBest(Search *s, HycoROM *model, HycoTraining *report)
     built.n_former = report->n_former;
     built.n_fresh = report->n_fresh;
     *report = built;
-    report->chosen = *best;
-    report->chosen.of = s->n;
+    PetscCall(Tell(s, best, report));
     t->judged_held = s->rows[best->number - 1];
     s->rows[best->number - 1] = NULL;
     PetscFunctionReturn(PETSC_SUCCESS);

@@ -3,8 +3,9 @@ import os
 import re
 import unittest
 
-from common import PELLET, ROPE, Case
+from common import PELLET, ROPE, SOURCE, Case
 
+BLOCKS = os.path.join(SOURCE, 'examples', 'blocks')
 DOING = re.compile(r'^after \d+ s: (the mesh|assembling|the contacts|factorisation|contact forces|full order|solving|residuals|modes|the reduced|reduction)')
 
 
@@ -12,7 +13,7 @@ class Progress(Case):
     def lines(self, *args, **options):
         run = self.run_raw(*args, **options)
         self.assertEqual(run.returncode, 0, run.stderr)
-        return [line for line in run.stderr.splitlines() if re.match(r'after |\w[\w ]*: \d', line)]
+        return [line for line in run.stderr.splitlines() if re.match(r'after |\w[\w -]*: \d', line)]
 
     def test_long_step(self):
         """A solve of one point has nothing to count: its steps are named."""
@@ -43,6 +44,13 @@ class Progress(Case):
         self.assertIn(run.returncode, (0, 3), run.stderr)
         lines = run.stderr.splitlines()
         self.assertTrue(any(line.startswith('settings tried: ') for line in lines), lines)
+
+    def test_types(self):
+        """The choice of full-order displacements, and of the cells of a cubature, show a count: they may take most of the time."""
+        for scene, grid, settings, words in ((ROPE, '6,6', ('-hyco_hybrid', 'rank', '-hyco_hybrid_trials', 200), r'choices of full-order displacements: \d+ of 200'),
+                                             (BLOCKS, '4,4', ('-hyco_model_type', 'cubature'), r'(cells of the cubature|internal forces of training points): \d+ of \d+')):
+            lines = self.lines('train', '-scene', scene, '-grid', grid, *settings, '-hyco_search', 'false', '-model', 'm.h5', '-progress', '0.01')
+            self.assertTrue(any(re.match(words, line) for line in lines), lines)
 
     def test_wrong(self):
         run = self.run_raw('solve', '-scene', ROPE, '-mu', '0.1,0.1', '-progress', '0')

@@ -60,6 +60,7 @@ static PetscErrorCode FindGrid(HycoReducer t, HycoCondensed c)
                    t->scene->parameter[p]);
     all *= (PetscReal)c->n[p];
   }
+  HycoFormat(t->remedy, "let a condensed model choose its points: -hyco_model_type condensed, and no points");
   HycoCheckModel(
       all <= (PetscReal)n_s,
       "the %d training points do not form a tensor grid, and a condensed model needs every combination of "
@@ -77,6 +78,7 @@ static PetscErrorCode FindGrid(HycoReducer t, HycoCondensed c)
         "their values; give them by -grid or -values_NAME, or give no points with -hyco_model_type condensed, "
         "which then chooses them",
         (int)n_s);
+  t->remedy[0] = '\0';
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -330,13 +332,12 @@ PetscErrorCode HycoCondensedCheckSupports(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Finds what each parameter affects, and checks that the scene is suitable for this model. Collective. */
+/* Finds what each parameter affects. Collective. */
 static PetscErrorCode Inspect(HycoReducer t, HycoCondensed c)
 {
   PetscBool reaches[HYCO_MAX_PARAMETERS];
 
   PetscFunctionBegin;
-  HycoOnRoot(HycoComm(t), CheckFacets(t));
   HycoSceneReaches(t->scene, reaches);
   for (PetscInt p = 0; p < c->dim; p++) c->stiff[p] = reaches[p] && t->scene->hi[p] > t->scene->lo[p];
   PetscCall(HycoCondensedAllocate(c));
@@ -349,7 +350,6 @@ static PetscErrorCode Inspect(HycoReducer t, HycoCondensed c)
     for (PetscInt k = 0; affine && !c->exact_loads && k < 2; k++) PetscCall(AffineAt(t, p, k ? 0.71 : 0.38, &affine));
     c->affine[p] = affine;
   }
-  PetscCall(HycoCondensedCheckSupports(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -392,6 +392,8 @@ PetscErrorCode HycoCondensedBegin(HycoReducer t)
   PetscCall(HycoCondensedCreate(t->scene->n_parameters, m, 0, &c));
   Condensing(t)->condensed = c;
   c->scene = t->scene;
+  HycoOnRoot(HycoComm(t), CheckFacets(t));
+  PetscCall(HycoCondensedCheckSupports(t));
   PetscCall(FindGrid(t, c));
   PetscCall(Inspect(t, c));
   HycoCheckModel((PetscReal)c->field[HYCO_FIELD_G].rows * (PetscReal)HycoTensorSize(&c->field[HYCO_FIELD_G].tensor) <=

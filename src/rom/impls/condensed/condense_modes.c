@@ -309,12 +309,18 @@ static PetscErrorCode JudgePatterns(HycoReducer t, PetscInt n, const PetscReal m
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscInt HycoCondensedSamples(PetscInt m)
+{
+  const PetscReal share = PetscSqr((PetscReal)FREE_CONTACTS / (PetscReal)m);
+
+  return m <= FREE_CONTACTS ? SAMPLES : PetscMax(LEAST_SAMPLES, (PetscInt)(share * SAMPLES));
+}
+
 static PetscErrorCode FindPatterns(HycoReducer t)
 {
   HycoCondensed c = Condensing(t)->condensed;
   const size_t m = (size_t)c->m;
-  const PetscReal share = PetscSqr((PetscReal)FREE_CONTACTS / (PetscReal)m);
-  const PetscInt n = c->m <= FREE_CONTACTS ? SAMPLES : PetscMax(LEAST_SAMPLES, (PetscInt)(share * SAMPLES));
+  const PetscInt n = HycoCondensedSamples(c->m);
   PetscReal *mu, *L, *used;
   PetscInt n_used = t->n_s;
   Gaps gaps;

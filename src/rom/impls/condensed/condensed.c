@@ -13,8 +13,7 @@
 const char *const HycoGridFieldNames[] = {"G", "g", "H", "a"};
 
 /* An eigenvalue of G less negative than this share of its largest diagonal entry is round-off. */
-#define SEMIDEFINITE  1e-12
-#define MANY_CONTACTS 600
+#define SEMIDEFINITE 1e-12
 
 PetscErrorCode HycoCondensedCreate(PetscInt dim, PetscInt m, PetscInt l, HycoCondensed *condensed)
 {
@@ -495,21 +494,14 @@ static PetscReal Cost(HycoReducer t, const HycoAttempt *a)
   return m * m * ((PetscReal)a->n_flexibilities + m / 6.0) + 2 * (PetscReal)a->n_modes * (PetscReal)a->rid_contacts;
 }
 
-/* With many contacts its samples need much disk space, and its POD holds all columns in memory: then it must be
-   requested. */
-static PetscBool Offers(HycoReducer t, PetscBool targets)
-{
-  (void)targets;
-  return (PetscBool)(t->sizes[2] > 0 && t->sizes[2] <= MANY_CONTACTS && !(t->pod_memory > 0));
-}
-
 PetscErrorCode HycoROMCreate_Condensed(HycoROM m)
 {
   static const HycoROMTraits traits = {.title = "condensed",
                                        .settings = HYCO_SETTINGS_NONE,
                                        .constrains = PETSC_TRUE,
                                        .forces = PETSC_TRUE,
-                                       .resultants = PETSC_TRUE};
+                                       .resultants = PETSC_TRUE,
+                                       .history = PETSC_TRUE};
   static const HycoROMOps ops = {.setfromoptions = HycoCondensedSetFromOptions,
                                  .resettraining = HycoCondensedResetTraining,
                                  .begin = HycoCondensedBegin,
@@ -519,7 +511,8 @@ PetscErrorCode HycoROMCreate_Condensed(HycoROM m)
                                  .build = HycoCondensedBuild,
                                  .report = Report,
                                  .cost = Cost,
-                                 .offers = Offers,
+                                 .offers = HycoCondensedOffers,
+                                 .work = HycoCondensedWork,
                                  .setup = SetUp,
                                  .reset = Reset,
                                  .solve = Solve,

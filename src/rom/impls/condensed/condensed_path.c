@@ -351,6 +351,8 @@ PetscErrorCode HycoCondensedTakePath(HycoROM m)
                                  .finish = HycoGalerkinFinish,
                                  .report = Report,
                                  .cost = HycoGalerkinCost,
+                                 .offers = HycoCondensedOffers,
+                                 .work = HycoCondensedWork,
                                  .setup = SetUp,
                                  .reset = Reset,
                                  .solve = HycoGalerkinSolve,

@@ -224,6 +224,7 @@ static PetscErrorCode Join(Sampler *s, HycoSnapshots store, PetscReal tol, Mat *
   PetscCall(HycoSamplesGet(t->samples, &points, NULL, NULL));
   PetscCall(PetscCalloc2(points, &W, points, &n));
   for (PetscInt k = 0; k < points; k++) {
+    PetscCall(HycoReducerTell(t, "internal forces of training points", k, points));
     PetscCall(SamplePoint(s, store, k, tol, &W[k], &n[k]));
     all += n[k];
   }

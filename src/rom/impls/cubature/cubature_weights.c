@@ -137,6 +137,13 @@ static void Measure(PetscInt n_cells, PetscInt n, const PetscReal vectors[], con
   }
 }
 
+static PetscErrorCode ShowCells(void *ctx, PetscInt k, PetscInt most)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoReducerTell((HycoReducer)ctx, "cells of the cubature", k, most));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Finds the weights of all cells. On rank 0. */
 static PetscErrorCode FindWeights(HycoReducer t, PetscInt n, const PetscReal vectors[], const PetscReal sigma[],
                                   const PetscReal notes[], PetscReal w[])
@@ -150,7 +157,7 @@ static PetscErrorCode FindWeights(HycoReducer t, PetscInt n, const PetscReal vec
   PetscFunctionBegin;
   PetscCall(PetscMalloc2((size_t)m * (size_t)n_cells, &A, m, &b));
   FillSystem(n_cells, leading, vectors, n_bodies, volume, body, A, b);
-  PetscCall(HycoNNLS(m, n_cells, A, b, w, NULL));
+  PetscCall(HycoNNLSMonitored(m, n_cells, A, b, ShowCells, t, w, NULL));
   PetscCall(PetscFree2(A, b));
   for (PetscInt e = 0; e < n_cells; e++) w[e] = near[e] > 0 ? 1 : w[e];
   Measure(n_cells, n, vectors, sigma, n_bodies, volume, body, w, c->error);

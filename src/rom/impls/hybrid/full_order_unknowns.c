@@ -200,21 +200,24 @@ typedef struct {
   PetscReal u, lambda, rank;
 } Verdict;
 
-static PetscErrorCode JudgeSet(HycoReducer t, HycoROM m, PetscInt n, const PetscInt dof[], Verdict *v)
+#define SAME 1e-6 /* relative difference of equal errors */
+
+/* most: a mean error of u above it is of no interest. */
+static PetscErrorCode JudgeSet(HycoReducer t, HycoROM m, PetscInt n, const PetscInt dof[], PetscReal most, Verdict *v)
 {
   PetscFunctionBegin;
   PetscCall(HycoROMSetFE(m, HYCO_HYBRID_RANK, n, dof));
   PetscCall(Assembled(t, m));
   PetscCall(RowRank(m, &v->rank));
   v->u = v->lambda = WORST;
-  if (v->rank > 1e-10) PetscCall(HycoReducerJudgeMeans(t, m, &v->u, &v->lambda));
+  if (v->rank > 1e-10) PetscCall(HycoReducerJudgeMeans(t, m, most, &v->u, &v->lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscBool Better(const Verdict *a, const Verdict *b)
 {
-  if (a->u < b->u * (1 - 1e-6)) return PETSC_TRUE;
-  return (PetscBool)(a->u <= b->u * (1 + 1e-6) && a->rank > b->rank * (1 + 1e-6));
+  if (a->u < b->u * (1 - SAME)) return PETSC_TRUE;
+  return (PetscBool)(a->u <= b->u * (1 + SAME) && a->rank > b->rank * (1 + SAME));
 }
 
 /* Exchanges one full-order unknown for one candidate while the error decreases. chosen[k]: candidate k is full
@@ -253,8 +256,9 @@ static PetscErrorCode Exchange(HycoReducer t, HycoROM m, PetscInt n, const Petsc
         }
         if (!past) {
           seen[n_seen++] = hash;
+          PetscCall(HycoReducerTell(t, "choices of full-order displacements", trials, limit));
           trials++;
-          PetscCall(JudgeSet(t, m, n, dof, &verdict));
+          PetscCall(JudgeSet(t, m, n, dof, round.u * (1 + SAME), &verdict));
           if (Better(&verdict, &round)) {
             round = verdict;
             out = i;
@@ -300,7 +304,7 @@ static PetscErrorCode SearchFrom(HycoReducer t, HycoROM m, PetscInt start, Petsc
       if (chosen[k]) dof[(*n)++] = candidate[k];
     }
     if (pass) break;
-    PetscCall(JudgeSet(t, m, *n, dof, verdict));
+    PetscCall(JudgeSet(t, m, *n, dof, PETSC_INFINITY, verdict));
     if (*n && *n < N) PetscCall(Exchange(t, m, *n, candidate, chosen, verdict));
   }
   PetscCall(PetscFree3(candidate, pivot, chosen));
@@ -402,16 +406,20 @@ static PetscErrorCode RaceRidges(HycoReducer t, HycoROM m, PetscReal *strength)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+#define RIDGES 10
+
 /* The ridge with the least mean training error. */
 static PetscErrorCode TryRidges(HycoReducer t, HycoROM m, PetscReal *strength)
 {
   PetscReal least = PETSC_MAX_REAL, u, lambda;
+  PetscInt tried = 0;
 
   PetscFunctionBegin;
   *strength = 0;
   for (PetscReal ridge = 1e-14; ridge < 1e-5; ridge *= 10) {
+    PetscCall(HycoReducerTell(t, "ridges", tried++, RIDGES));
     PetscCall(HycoGalerkinSetRidge(m, ridge));
-    PetscCall(HycoReducerJudgeMeans(t, m, &u, &lambda));
+    PetscCall(HycoReducerJudgeMeans(t, m, least, &u, &lambda));
     if (!(u < least)) continue;
     least = u;
     *strength = ridge;
@@ -448,6 +456,7 @@ static PetscErrorCode ChooseUnknowns(HycoReducer t, HycoROM m)
   PetscCall(PetscMalloc2(m->mesh->n_nodes * m->mesh->dim, &all, m->mesh->n_nodes * m->mesh->dim, &contact));
   PetscCall(FreeUnknowns(t, m, PETSC_FALSE, &n_all, all));
   PetscCall(FreeUnknowns(t, m, PETSC_TRUE, &n_contact, contact));
+  t->n_unknowns = n_all;
   HycoCheckModel(n_all, "the RID has no interior node; enlarge it: -hyco_rid_layers 1, or smaller tolerances");
   if (!n_contact && kind != HYCO_HYBRID_ALL)
     kind = HYCO_HYBRID_CONTACT; /* no contact in the RID: plain hyper-reduction (31) */

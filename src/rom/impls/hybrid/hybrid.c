@@ -5,9 +5,9 @@
 #include <petscviewer.h>
 
 /* The default type. */
-static PetscBool Offers(HycoReducer t, PetscBool targets)
+static PetscBool Offers(HycoReducer t, PetscBool targets, size_t length, char why[])
 {
-  (void)t, (void)targets;
+  (void)t, (void)targets, (void)length, (void)why;
   return PETSC_TRUE;
 }
 

@@ -49,9 +49,9 @@ PetscErrorCode HycoProjectionSetFromOptions(HycoReducer t)
 }
 
 /* Offered as a last resort if targets are given. */
-PetscBool HycoProjectionOffers(HycoReducer t, PetscBool targets)
+PetscBool HycoProjectionOffers(HycoReducer t, PetscBool targets, size_t length, char why[])
 {
-  (void)t;
+  (void)t, (void)length, (void)why;
   return targets;
 }
 

@@ -1,0 +1,93 @@
+/*
+  Operations of a search beside those of the full-order solutions. They are counted from the sizes of the scene, not
+  measured, so that a search ends at the same attempt on any machine and number of ranks. Factors and solves are those
+  of a nested dissection (George, SIAM J. Numer. Anal. 10 (1973) 345-363), in d unknowns per node; constants are orders
+  of magnitude.
+*/
+#include <hycoreducerimpl.h>
+
+#define FEW        5e10 /* operations that take seconds: a search with no more is not limited */
+#define LAW        20   /* operations for an entry of a cell's stiffness or tangent */
+#define SUBSTEPS   2    /* time steps of a path for each listed time, */
+#define ITERATIONS 2    /* and iterations of a step */
+
+PetscReal HycoReducerFactorWork(HycoReducer t)
+{
+  const PetscReal n = t->sizes[0];
+
+  if (t->sizes[3] == 1) return 10 * n;
+  return t->sizes[3] == 2 ? 80 * n * PetscSqrtReal(n) : 500 * n * n;
+}
+
+PetscReal HycoReducerSolveWork(HycoReducer t)
+{
+  const PetscReal n = t->sizes[0];
+
+  if (t->sizes[3] == 1) return 10 * n;
+  return t->sizes[3] == 2 ? 120 * n * PetscLog2Real(n + 1) : 180 * n * PetscPowReal(n, 1. / 3);
+}
+
+PetscReal HycoReducerSolvesOf(HycoReducer t)
+{
+  return t->scene->n_times ? (PetscReal)t->scene->n_times * SUBSTEPS * ITERATIONS : 1;
+}
+
+/* Whether two points have the same stiffness. */
+static PetscBool Alike(HycoScene s, const PetscBool reaches[], const PetscReal a[], const PetscReal b[])
+{
+  for (PetscInt p = 0; p < s->n_parameters; p++) {
+    if (reaches[p] && a[p] != b[p]) return PETSC_FALSE;
+  }
+  return PETSC_TRUE;
+}
+
+PetscErrorCode HycoReducerCountStiffnesses(HycoReducer t, HycoSamples samples, PetscBool in_order, PetscInt *count)
+{
+  PetscBool reaches[HYCO_MAX_PARAMETERS];
+  const PetscReal *mu;
+  PetscInt n, n_par;
+
+  PetscFunctionBegin;
+  HycoSceneReaches(t->scene, reaches);
+  PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
+  *count = 0;
+  for (PetscInt k = 0; k < n; k++) {
+    PetscBool seen = PETSC_FALSE;
+
+    for (PetscInt j = in_order ? PetscMax(k - 1, 0) : 0; j < k && !seen; j++)
+      seen = Alike(t->scene, reaches, mu + j * n_par, mu + k * n_par);
+    *count += !seen;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerSolutionsWork(HycoReducer t, PetscReal *work)
+{
+  const PetscReal dim = t->sizes[3],
+                  cell = dim == 1   ? 2
+                         : dim == 2 ? 8
+                                    : 24,
+                  assembly = LAW * (PetscReal)t->sizes[1] * cell * cell;
+  HycoSamples sets[2] = {t->samples, t->held};
+
+  PetscFunctionBegin;
+  *work = 0;
+  for (int k = 0; k < 2; k++) {
+    PetscInt n, factors;
+
+    PetscCall(HycoSamplesGet(sets[k], &n, NULL, NULL));
+    PetscCall(HycoReducerCountStiffnesses(t, sets[k], PETSC_FALSE, &factors));
+    if (t->scene->n_times) factors = n;
+    *work += HycoReducerSolvesOf(t) * ((PetscReal)factors * (HycoReducerFactorWork(t) + assembly) +
+                                       (PetscReal)n * HycoReducerSolveWork(t) * (1 + (PetscReal)t->sizes[2] / 4));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerSearchBudget(HycoReducer t, PetscReal *operations)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoReducerSolutionsWork(t, operations));
+  *operations = t->exhaustive ? PETSC_INFINITY : PetscMax(FEW, *operations) * t->search_budget;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,90 @@
+"""What a search leaves out, and what it says about it: types beside a model that meets the targets with a margin, RIDs known to be too large, settings
+beyond its budget of operations; condensed models by their cost."""
+import csv
+import os
+import unittest
+
+from baselines import Ring
+from common import PELLET, ROPE, SOURCE
+
+BLOCKS = os.path.join(SOURCE, 'examples', 'blocks')
+STRIP = """scene:
+  title: a strip with many contacts over a bump
+  mesh: strip.msh
+  parameters: [load, height]
+parameter:
+  load: {range: [0.5, 2]}
+  height: {range: [0, 0.02]}
+body:
+  strip: {young: 100, poisson: 0.3}
+fixed:
+  left: {x: 0, y: 0}
+  right: {x: 0, y: 0}
+pressure: {top: load}
+contact:
+  ground: {type: obstacle, group: bottom, normal_y: -1, gap: "0.02 - height*exp(-(x-5)^2)"}
+"""
+GEO = """Point(1) = {0, 0, 0}; Point(2) = {10, 0, 0}; Point(3) = {10, 0.5, 0}; Point(4) = {0, 0.5, 0};
+Line(1) = {1, 2}; Line(2) = {2, 3}; Line(3) = {3, 4}; Line(4) = {4, 1}; Curve Loop(1) = {1:4}; Plane Surface(1) = {1};
+Transfinite Curve{1, 3} = 801; Transfinite Curve{2, 4} = 4; Transfinite Surface{1}; Recombine Surface{1};
+Physical Surface("strip") = {1}; Physical Curve("bottom") = {1}; Physical Curve("right") = {2}; Physical Curve("top") = {3};
+Physical Curve("left") = {4};
+"""
+
+
+class SearchLimits(Ring):
+    newcomer = True
+
+    def search(self, scene, name, *args, **options):
+        """The report, and the table's rows."""
+        report = self.hyco('train', '-scene', scene, '-model', self.path(name + '.h5'), '-table', self.path(name + '.csv'), *args, **options)
+        with open(self.path(name + '.csv'), newline='', encoding='utf-8') as f:
+            return report, list(csv.DictReader(f))
+
+    def test_margin(self):
+        """A condensed model a thousand times more accurate than the targets: no hybrid is tried, and the report says why."""
+        report, rows = self.search(BLOCKS, 'blocks', '-grid', '5,5')
+        self.assertEqual([r['model_type'] for r in rows], ['condensed'])
+        self.assertRegex(report['search']['not_tried']['hybrid'], 'settings 1 meet the targets with a margin')
+        self.assertEqual(len(self.search(BLOCKS, 'every', '-grid', '5,5', '-hyco_search_exhaustive')[1]) > 1, True)
+
+    def test_too_large(self):
+        """All of A full order: an RID that an earlier attempt has shown to be too large is not built again."""
+        report, rows = self.search(PELLET, 'pellet', '-grid', '2,2', '-hyco_search_budget', 100, '-hyco_model_type', 'hybrid', '-target_sigma', 1e-9, '-target_max_added', 0, '-hyco_rid_layers',
+                                   4, status=3)
+        self.assertEqual([r['failure'] for r in rows if 'too many' in r['failure']], [])
+        self.assertIn('more than 600', report['search']['not_tried']['hybrid all'])
+
+    def test_budget(self):
+        """Without a budget two models, on one rank and on two; a line names what would let the search go on."""
+        args = ('-grid', '3,3', '-hyco_model_type', 'hybrid', '-target_u', 1e-15, '-target_max_added', 0)
+        for ranks in (0, 2):
+            report, rows = self.search(ROPE, 'few', *args, '-hyco_search_budget', 0, status=3, ranks=ranks)
+            self.assertEqual([r['failure'] for r in rows], ['', ''])
+            self.assertIn('-hyco_search_budget', report['search']['not_tried']['further settings'])
+            self.assertIn('-hyco_search_exhaustive', report['missed'][0])
+        report, rows = self.search(ROPE, 'usual', *args, status=3)
+        self.assertGreater(len(rows), 4)
+        self.assertGreater(report['search']['operations'], 0)
+
+    def test_many_contacts(self):
+        """801 contacts, gaps and loads as parameters: one factor. A condensed model is tried and chosen; its forces are those of full order."""
+        self.drawn('strip', 2, GEO, STRIP)
+        report, rows = self.search('strip', 'many', '-grid', '3,3')
+        self.assertEqual((rows[0]['model_type'], report['model_type']), ('condensed', 'condensed'))
+        self.assertLess(report['held_out']['lambda']['largest'], 1e-6)
+
+    def test_scattered(self):
+        """Scattered points exclude a condensed model: if the hybrid misses, the message names one that chooses its points."""
+        report, _ = self.search(ROPE, 'scattered', '-scatter', 5, '-target_lambda', 1e-15, '-target_max_added', 0, status=3)
+        self.assertNotEqual(report['model_type'], 'condensed')
+        self.assertRegex(report['missed'][0], 'let a condensed model choose its points: -hyco_model_type condensed')
+
+    def test_paths(self):
+        """Paths with a constant stiffness: the condensed model is tried first."""
+        _, rows = self.search(self.norton, 'paths', '-grid', '2,2', '-hyco_snapshots', self.path('store'), status=None)
+        self.assertEqual((rows[0]['model_type'], rows[0]['failure']), ('condensed', ''))
+
+
+if __name__ == '__main__':
+    unittest.main()
