@@ -24,7 +24,7 @@ class SettingsSearch(Case):
 
     def test_hertz(self):
         """Surfaces that do not match and move, three parameters: a hybrid model is chosen from several settings."""
-        t = self.hyco('train', '-scene', HERTZ, '-grid', '4,4,3', '-model', 'h.h5', '-table', 'h.csv', timeout=300)
+        t = self.hyco('train', '-scene', HERTZ, '-grid', '9,4,3', '-model', 'h.h5', '-table', 'h.csv', timeout=300)
         self.assertEqual(t['model_type'], 'hybrid')
         self.assertEqual(t['held_out']['n'], 30)
         self.assertLess(t['held_out']['lambda']['largest'], 0.03)
