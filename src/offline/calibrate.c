@@ -11,7 +11,7 @@
 #include <hycoreducerimpl.h>
 #include <stdio.h>
 
-#define SHARE      0.9
+#define SHARE      0.93
 #define MARGIN     1.2
 #define LEAST      10   /* smallest number of predictions for an estimate */
 #define SMALL      0.3  /* share of a feature's median, its floor: a smaller feature is no sign of a smaller error */
