@@ -171,7 +171,7 @@ class Scenes(Case):
         for name, value in outputs.items():
             self.near(full['outputs'][name], value, 1e-9, name)
         self.assertEqual((self.plot('full.h5', '--surface', '3'), 'contact surfaces: 3' in self.plot('full.h5', '--surface', '4')), ('', True))
-        self.assertNotIn('missed', self.hyco('train', '-scene', 'plate', '-grid', '3,3,3', '-hyco_model_type', 'condensed', '-model', 'plate.h5'))
+        self.assertNotIn('missed', self.hyco('train', '-scene', 'plate', '-grid', '3,3,3', '-grid_type', 'closed', '-hyco_model_type', 'condensed', '-model', 'plate.h5'))
         self.hyco('predict', '-model', 'plate.h5', '-values_load', '0,2000', '-values_radius', '60', '-values_bed', '2', '-table', 'study.csv', '-output', 'study.xdmf')
         with open(self.path('study.csv'), encoding='ascii') as f:
             rest, low = csv.DictReader(f)
