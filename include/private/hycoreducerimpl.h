@@ -172,6 +172,10 @@ PetscErrorCode HycoReducerCreateSVD(HycoReducer t, MPI_Comm comm, SVD *svd);
    of accuracy. Collective on S; not collective. */
 PetscErrorCode HycoReducerPOD(HycoReducer t, Mat S, PetscReal tol, PetscInt max_modes, Mat *V, PetscInt *l,
                               PetscReal sigma[]);
+/* The same; leading modes that dominate the energy by far, in a scene with springs, come first, and the others are a
+   POD of what is behind them. Collective on S. */
+PetscErrorCode HycoReducerDisplacementPOD(HycoReducer t, Mat S, PetscReal tol, PetscInt max_modes, Mat *V, PetscInt *l,
+                                          PetscReal sigma[]);
 PetscErrorCode HycoReducerPODRank(HycoReducer t, PetscInt n_sigma, const PetscReal sigma[], PetscReal tol,
                                   PetscInt max_modes, PetscInt found, PetscInt *l);
 /*

@@ -135,11 +135,77 @@ PetscErrorCode HycoReducerPOD(HycoReducer t, Mat S, PetscReal tol, PetscInt max_
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+#define DOMINANT  100   /* ratio of successive singular values */
+#define ROUND_OFF 1e-13 /* share of the first: smaller ones may be round-off */
+
+/* The number of leading modes that dominate the energy. A body on a soft spring moves rigidly by much more than it
+   deforms: the energy is that of rigid motions, and a small share of it, or of its round-off, is all deformation. */
+static PetscInt CountDominant(const HycoScene scene, PetscInt n, const PetscReal sigma[])
+{
+  const PetscInt most = PetscMin(6 * scene->n_bodies, n - 1);
+  PetscInt first = 0;
+
+  for (PetscInt j = 0; scene->n_springs && j < most; j++) {
+    if (sigma[j] > DOMINANT * sigma[j + 1] && sigma[j + 1] > ROUND_OFF * sigma[0]) first = j + 1;
+  }
+  return first;
+}
+
+/* The part of S orthogonal to the columns of V. */
+static PetscErrorCode Deflate(Mat V, Mat S, Mat *rest)
+{
+  Mat C, part;
+
+  PetscFunctionBegin;
+  PetscCall(MatDuplicate(S, MAT_COPY_VALUES, rest));
+  for (int twice = 0; twice < 2; twice++) {
+    PetscCall(MatTransposeMatMult(V, *rest, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &C));
+    PetscCall(MatMatMult(V, C, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &part));
+    PetscCall(MatAXPY(*rest, -1, part, SAME_NONZERO_PATTERN));
+    PetscCall(MatDestroy(&C));
+    PetscCall(MatDestroy(&part));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerDisplacementPOD(HycoReducer t, Mat S, PetscReal tol, PetscInt max_modes, Mat *V, PetscInt *l,
+                                          PetscReal sigma[])
+{
+  PetscInt first, more, N, n;
+  PetscReal *behind;
+  Mat part, rest, W;
+
+  PetscFunctionBegin;
+  /* with springs all modes, because the tolerance applies to what is behind the dominant ones */
+  PetscCall(HycoReducerPOD(t, S, t->scene->n_springs ? 0 : tol, max_modes, V, l, sigma));
+  PetscCall(MatGetSize(S, &N, &n));
+  first = PetscMin(CountDominant(t->scene, PetscMin(N, n), sigma), *l);
+  if (!first || first == max_modes) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatDenseGetSubMatrix(*V, PETSC_DECIDE, PETSC_DECIDE, 0, first, &part));
+  PetscCall(MatDuplicate(part, MAT_COPY_VALUES, &W));
+  PetscCall(MatDenseRestoreSubMatrix(*V, &part));
+  PetscCall(MatDestroy(V));
+  PetscCall(Deflate(W, S, &rest));
+  PetscCall(PetscCalloc1(n + 1, &behind));
+  PetscCall(HycoReducerPOD(t, rest, tol, PetscMax(0, max_modes - first), V, &more, behind));
+  PetscCall(PetscArraycpy(sigma + first, behind, PetscMin(N, n) - first));
+  PetscCall(PetscFree(behind));
+  PetscCall(MatDestroy(&rest));
+  if (more) PetscCall(HycoJoinColumns(&W, V, &part));
+  *V = more ? part : W;
+  *l = first + more;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoReducerPODRank(HycoReducer t, PetscInt n_sigma, const PetscReal sigma[], PetscReal tol,
                                   PetscInt max_modes, PetscInt found, PetscInt *l)
 {
+  PetscInt first;
+
   PetscFunctionBegin;
-  *l = HycoPODRank(n_sigma, sigma, tol, t->noise, max_modes);
+  first = CountDominant(t->scene, n_sigma, sigma);
+  *l = first + HycoPODRank(n_sigma - first, sigma + first, tol, t->noise, 0);
+  if (max_modes > 0) *l = PetscMin(*l, max_modes);
   HycoCheckModel(*l <= found || tol == 0,
                  "-hyco_pod_svd_type %s finds only %d accurate modes, which leave out more than %g of the snapshots' "
                  "energy; use tsqr, or a larger -hyco_pod_tol",
@@ -230,7 +296,7 @@ PetscErrorCode HycoReducerTakeBasis(HycoReducer t, Mat S, PetscReal tol, PetscIn
   PetscCall(MatGetSize(S, &N, &n));
   PetscCall(PetscCalloc1(PetscMax(t->n_s, n) + 1, &basis->sigma));
   basis->n_sigma = PetscMin(N, n);
-  PetscCall(HycoReducerPOD(t, S, tol, most, &basis->V, &basis->l, basis->sigma));
+  PetscCall(HycoReducerDisplacementPOD(t, S, tol, most, &basis->V, &basis->l, basis->sigma));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

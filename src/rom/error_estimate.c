@@ -272,6 +272,15 @@ static PetscBool IsInconsistent(HycoROM m, PetscReal inconsistency)
   return (PetscBool)(inconsistency > PetscMax(INCONSISTENT, HYCO_UNSEEN * t->reached[INCONSISTENCY]));
 }
 
+/* A formula fitted to few points may grow without measure between them: in regimes that held-out points had, no more
+   than this multiple of their largest error. */
+#define MOST_OVER 3
+
+static PetscReal Capped(PetscReal estimate, PetscReal largest)
+{
+  return largest > 0 ? PetscMin(estimate, MOST_OVER * largest) : estimate;
+}
+
 /* The estimates of the calibrated formulas, times `factor`. */
 static void EvaluateFormulas(HycoROM m, const PetscReal feature[], PetscReal factor, HycoPrediction *p)
 {
@@ -279,10 +288,11 @@ static void EvaluateFormulas(HycoROM m, const PetscReal feature[], PetscReal fac
   PetscReal term[HYCO_ESTIMATE_FEATURES], estimate[HYCO_N_ESTIMATES];
 
   for (PetscInt j = 0; j < HYCO_ESTIMATE_FEATURES; j++) term[j] = PetscLogReal(1 + feature[j] / t->floor[j]);
-  for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++) estimate[e] = t->has[e] ? Estimate(t->law[e], term) * factor : -1;
+  for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++)
+    estimate[e] = t->has[e] ? Capped(Estimate(t->law[e], term), t->largest[e]) * factor : -1;
   for (PetscInt q = 0; q < t->n_outputs; q++) {
     if (t->output[q].has && !PetscIsInfOrNanReal(p->quantity[q]))
-      p->estimated_error_quantity[q] = EstimateOutput(&t->output[q], term) * factor;
+      p->estimated_error_quantity[q] = Capped(EstimateOutput(&t->output[q], term), t->output[q].largest) * factor;
   }
   p->estimated_error_u = estimate[HYCO_ESTIMATE_U];
   p->estimated_error_sigma = estimate[HYCO_ESTIMATE_SIGMA];

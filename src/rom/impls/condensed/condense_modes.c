@@ -471,7 +471,7 @@ PetscErrorCode HycoCondensedFindModes(HycoReducer t, HycoSnapshots store)
   PetscCall(MatGetSize(S, &n_sigma, &n));
   n_sigma = PetscMin(n_sigma, n);
   PetscCall(PetscMalloc1(n + 1, &sigma));
-  PetscCall(HycoReducerPOD(t, S, 0, 0, &V, &x->r, sigma));
+  PetscCall(HycoReducerDisplacementPOD(t, S, 0, 0, &V, &x->r, sigma));
   PetscCall(Coefficients(t, store, P, V, S));
   PetscCall(TakeModes(t, V, n_sigma, sigma));
   PetscCall(PetscFree(P));
