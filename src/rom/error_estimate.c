@@ -272,13 +272,14 @@ static PetscBool IsInconsistent(HycoROM m, PetscReal inconsistency)
   return (PetscBool)(inconsistency > PetscMax(INCONSISTENT, HYCO_UNSEEN * t->reached[INCONSISTENCY]));
 }
 
-/* A formula fitted to few points may grow without measure between them: in regimes that held-out points had, no more
-   than this multiple of their largest error. */
-#define MOST_OVER 3
+/* A formula fitted to few points may grow or fall without measure between them: in regimes that held-out points had, no
+   more than a multiple of their largest error, and no less than a share of it. */
+#define MOST_OVER  3
+#define MOST_UNDER 30
 
-static PetscReal Capped(PetscReal estimate, PetscReal largest)
+static PetscReal Clamped(PetscReal estimate, PetscReal largest)
 {
-  return largest > 0 ? PetscMin(estimate, MOST_OVER * largest) : estimate;
+  return largest > 0 ? PetscMax(PetscMin(estimate, MOST_OVER * largest), largest / MOST_UNDER) : estimate;
 }
 
 /* The estimates of the calibrated formulas, times `factor`. */
@@ -289,10 +290,10 @@ static void EvaluateFormulas(HycoROM m, const PetscReal feature[], PetscReal fac
 
   for (PetscInt j = 0; j < HYCO_ESTIMATE_FEATURES; j++) term[j] = PetscLogReal(1 + feature[j] / t->floor[j]);
   for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++)
-    estimate[e] = t->has[e] ? Capped(Estimate(t->law[e], term), t->largest[e]) * factor : -1;
+    estimate[e] = t->has[e] ? Clamped(Estimate(t->law[e], term), t->largest[e]) * factor : -1;
   for (PetscInt q = 0; q < t->n_outputs; q++) {
     if (t->output[q].has && !PetscIsInfOrNanReal(p->quantity[q]))
-      p->estimated_error_quantity[q] = Capped(EstimateOutput(&t->output[q], term), t->output[q].largest) * factor;
+      p->estimated_error_quantity[q] = Clamped(EstimateOutput(&t->output[q], term), t->output[q].largest) * factor;
   }
   p->estimated_error_u = estimate[HYCO_ESTIMATE_U];
   p->estimated_error_sigma = estimate[HYCO_ESTIMATE_SIGMA];
