@@ -176,8 +176,8 @@ static PetscErrorCode Added(PetscInt n, PetscInt parameter, PetscBool former, vo
   PetscCall(HycoSceneGetParameters(s->scene, NULL, &names, NULL, NULL));
   s->n_points += n;
   if (former) {
-    PetscCall(Say("fresh held-out points judge a model with added solutions, and the targets are missed: the %d former "
-                  "held-out points become training points\n",
+    PetscCall(Say("the targets are missed, at the held-out points or at fresh ones away from the added solutions: the "
+                  "search goes on with the fresh ones, and %d former ones become training points\n",
                   (int)n));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
