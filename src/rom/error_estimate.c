@@ -241,11 +241,6 @@ static PetscReal Estimate(const PetscReal coefficient[], const PetscReal term[])
   return PetscExpReal(PetscMin(sum, 200));
 }
 
-static PetscReal EstimateOutput(const HycoOutputEstimate *o, const PetscReal term[])
-{
-  return PetscMax(Estimate(o->law, term), HYCO_OUTPUT_ROUND_OFF * o->magnitude);
-}
-
 /* The largest ratio of a feature to that at the held-out points; 1: none is larger. */
 static PetscReal Unseen(HycoROM m, const PetscReal feature[], PetscInt *which)
 {
@@ -282,6 +277,11 @@ static PetscReal Clamped(PetscReal estimate, PetscReal largest)
   return largest > 0 ? PetscMax(PetscMin(estimate, MOST_OVER * largest), largest / MOST_UNDER) : estimate;
 }
 
+static PetscReal EstimateOutput(const HycoOutputEstimate *o, const PetscReal term[])
+{
+  return PetscMax(Clamped(Estimate(o->law, term), o->largest), HYCO_OUTPUT_ROUND_OFF * o->magnitude);
+}
+
 /* The estimates of the calibrated formulas, times `factor`. */
 static void EvaluateFormulas(HycoROM m, const PetscReal feature[], PetscReal factor, HycoPrediction *p)
 {
@@ -293,7 +293,7 @@ static void EvaluateFormulas(HycoROM m, const PetscReal feature[], PetscReal fac
     estimate[e] = t->has[e] ? Clamped(Estimate(t->law[e], term), t->largest[e]) * factor : -1;
   for (PetscInt q = 0; q < t->n_outputs; q++) {
     if (t->output[q].has && !PetscIsInfOrNanReal(p->quantity[q]))
-      p->estimated_error_quantity[q] = Clamped(EstimateOutput(&t->output[q], term), t->output[q].largest) * factor;
+      p->estimated_error_quantity[q] = EstimateOutput(&t->output[q], term) * factor;
   }
   p->estimated_error_u = estimate[HYCO_ESTIMATE_U];
   p->estimated_error_sigma = estimate[HYCO_ESTIMATE_SIGMA];

@@ -25,7 +25,7 @@ class Batch(Case):
         self.hyco(*predict, '-table', 'one.csv')
         one = self.rows('one.csv')
         full = [k for k, row in enumerate(one) if row['full_order'] == '1']
-        self.assertGreaterEqual(len(full), 29)  # those above the target, and any in a regime that no held-out point had
+        self.assertGreaterEqual(len(full), 10)  # those above the target (the largest estimates may be equal), and any in a regime that no held-out point had
         self.assertLess(len(full), 150)
         for ranks in (2, 3):
             with self.subTest(ranks=ranks):
