@@ -180,7 +180,8 @@ class Judged(Ring):
 
     def test_held_out(self):
         for settings, kind, limit in ((CUBATURE, 'u', 0.01), ([*CUBATURE, '-hyco_dual', 'nnmf'], 'u', 0.1), (REGRESSION, 'lambda', 0.3)):
-            trained = self.train('judged.h5', *settings, '-hyco_pod_tol', '1e-8', '-hyco_validation', '12', '-hyco_search', 'false', status=None)
+            trained = self.train('judged.h5', *settings, '-grid_type', 'closed', '-hyco_pod_tol', '1e-8', '-hyco_validation', '12', '-hyco_search', 'false',
+                                 store='closed', status=None)  # with the corners, at which held-out points lie too
             self.assertEqual((trained['held_out']['n'], trained['held_out']['not_converged']), (12, 0))
             self.assertLess(trained['held_out'][kind]['largest'], limit)
             self.assertGreater(self.predict('judged.h5')['estimated_error_u'], 0)
