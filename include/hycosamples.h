@@ -26,9 +26,9 @@ PetscErrorCode HycoSamplesAddGrid(HycoSamples samples, const PetscInt counts[], 
    interpolation by polynomials, as in a condensed model. */
 PetscErrorCode HycoSamplesAddChebyshev(HycoSamples samples, const PetscInt counts[]);
 /* Appends `count` >= 1 points spread over the ranges: a quarter of them at corners, with up to three parameters half,
-   until there are all; a quarter on faces (one parameter at an end of its range); the rest inside, as Halton's sequence,
-   with as many values of each parameter as points, whereas a grid with as many points has few. A larger set contains
-   the smaller ones. */
+   until there are all; a quarter on faces (one parameter at an end of its range); the rest inside, as Halton's
+   sequence, with as many values of each parameter as points, whereas a grid with as many points has few. A larger set
+   contains the smaller ones. */
 PetscErrorCode HycoSamplesAddScattered(HycoSamples samples, PetscInt count);
 /* Appends the tensor product of the lists values[i][0..counts[i]-1], the last parameter running fastest. */
 PetscErrorCode HycoSamplesAddProduct(HycoSamples samples, const PetscInt counts[], const PetscReal *const values[]);
@@ -43,11 +43,11 @@ PetscErrorCode HycoSamplesAddFile(HycoSamples samples, const char path[]);
 /*
   Creates `count` points spread evenly over the region of the set (from the smallest to the largest value of each
   parameter, plus half of the widest step between two values at either end, within the scene's range): half of them
-  inside, a quarter at corners of the region, other ones with each call until all were there, and a quarter on its faces.
-  None of them is in the set: they are held-out points. They have the numbers first, first + 1, ... of one sequence, so
-  that later calls continue it. slow[p] (may be NULL): a new value of this parameter is expensive; if other parameters
-  are not, groups of `together` >= 1 successive points share its value. Without parameters that vary there are no such
-  points. The caller owns *unseen. Not collective.
+  inside, a quarter at corners of the region, other ones with each call until all were there, and a quarter on its
+  faces. None of them is in the set: they are held-out points. They have the numbers first, first + 1, ... of one
+  sequence, so that later calls continue it. slow[p] (may be NULL): a new value of this parameter is expensive; if other
+  parameters are not, groups of `together` >= 1 successive points share its value. Without parameters that vary there
+  are no such points. The caller owns *unseen. Not collective.
 */
 PetscErrorCode HycoSamplesUnseen(HycoSamples samples, PetscInt first, PetscInt count, PetscInt together,
                                  const PetscBool slow[], HycoSamples *unseen);

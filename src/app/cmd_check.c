@@ -225,10 +225,11 @@ static PetscErrorCode SayMotions(Check *check)
     loose += !IsRigidBodys(f, free.motion + k * HycoFEUnknowns(f->fe));
   }
   if (loose)
-    CheckWarn(check,
-              "%d rigid motion%s prevented only by contact: full order can solve this if the loads press the bodies "
-              "together, and so can hybrid and projection-based models; a condensed model needs a support or a soft spring",
-              (int)loose, loose > 1 ? "s are" : " is");
+    CheckWarn(
+        check,
+        "%d rigid motion%s prevented only by contact: full order can solve this if the loads press the bodies "
+        "together, and so can hybrid and projection-based models; a condensed model needs a support or a soft spring",
+        (int)loose, loose > 1 ? "s are" : " is");
   PetscCall(HycoMotionsDestroy(&free));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

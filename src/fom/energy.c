@@ -33,7 +33,8 @@ static PetscErrorCode FreeWork(HycoFOM f, PetscReal *work)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* u0.K (2 u - u0) of one cell, as far as this rank counts it: u0.K (u - u0), removed from F.U by the lifting, and the elastic part u0.K u of R.u0. */
+/* u0.K (2 u - u0) of one cell, as far as this rank counts it: u0.K (u - u0), removed from F.U by the lifting, and the
+ * elastic part u0.K u of R.u0. */
 static PetscErrorCode LiftingWork(HycoFE fe, PetscInt cell, const PetscReal u[], PetscReal *work)
 {
   HycoMesh m = fe->mesh;

@@ -193,7 +193,8 @@ static PetscBool GroupHas(const Group *g, PetscInt n, const PetscInt node[])
   return PETSC_FALSE;
 }
 
-/* Fails for facet f of a group, which bounds no cell of a body: with the group of cells that has it, if there is one. */
+/* Fails for facet f of a group, which bounds no cell of a body: with the group of cells that has it, if there is one.
+ */
 static PetscErrorCode RefuseFacet(HycoScene scene, const Reader *r, HycoMesh m, const Group *g, PetscInt f)
 {
   const char *name = NULL;

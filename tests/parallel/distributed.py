@@ -92,15 +92,16 @@ class Distributed(Case):
                 self.assertLess(patches, 0.9 * whole)
 
     def test_missed(self):
-        """Slave nodes without a master, which other ranks have searched for, are refused on all ranks in the same words: 5 nodes of the lifted half, and the
-        middles of the 5 edges at them."""
-        said = []
+        """Slave nodes beyond the stated tolerance have no master, which other ranks have searched for: the same nodes on any number of ranks (the
+        lifted half has 5, and the middles of the 5 edges at them, of 21), and the same forces on the others."""
+        found = []
         for ranks in (0, 2, 3, 4):
-            run = self.run_raw('solve', '-scene', self.stack(0.05), '-mu', 1, '-scene_refine', 1, ranks=ranks)
-            self.assertNotEqual(run.returncode, 0)
-            said.append(next(line for line in run.stderr.splitlines() if 'error: ' in line))
-        self.assertIn('contact first: 10 of the 21 nodes of middle_foot', said[0])
-        self.assertEqual(said[1:], said[:1] * 3)
+            report = self.hyco('solve', '-scene', self.stack(0.05), '-mu', 1, '-scene_refine', 1, ranks=ranks)
+            found.append((report['n_contacts'], report['n_active']))
+            if ranks:
+                self.near(report['total_contact_force'], force, 1e-9)
+            force = report['total_contact_force']
+        self.assertEqual(found[1:], found[:1] * 3)
 
     def test_moved(self):
         self.same(os.path.join(EXAMPLES, 'roller', 'scene.yaml'), '2.3,0.6,12')
