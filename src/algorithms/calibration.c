@@ -7,7 +7,7 @@
 #define CONSTANT   1e-2 /* a column that varies less says nothing: its differences may be round-off */
 #define CONFIDENCE 0.75 /* of the tolerance limit, */
 #define MANY_ABOVE 1    /* which counts if fewer values than this are expected above the quantile */
-#define LEVERAGE   1.4  /* a factor of 4 */
+#define LEVERAGE   1.4  /* in logarithms: a factor of 4 */
 #define FAR        1.4  /* no value lies above the limit by more: logarithms, a factor of 4 */
 
 /* c >= 0 that minimises |X c - y|^2 about the means, regularised. */
@@ -105,8 +105,9 @@ PetscErrorCode HycoRaiseBound(PetscInt n, const PetscInt group[], PetscInt p, co
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* above[]: by row, y minus the formula that is fitted without the rows of its group: a formula follows the rows to
-   which it was fitted more closely than others. */
+/* above[]: by row, y minus the formula; on return y minus the formula that is fitted without the rows of its group,
+   because a formula follows the rows to which it was fitted more closely than others. A row far from all others alone
+   determines the formula there: its difference is raised by LEVERAGE at most. */
 static PetscErrorCode LeaveOut(PetscInt n, PetscInt telling, const PetscInt group[], PetscInt p, const PetscReal X[],
                                const PetscReal y[], PetscReal above[])
 {

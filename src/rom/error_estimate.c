@@ -17,10 +17,10 @@
   points, the estimates are multiplied by the ratio, and a ratio above HYCO_UNSEEN is reported. Features 1, 2 and, of
   these only for this purpose:
 
-    5  inconsistency  |B u - D| of the closed contacts, weighted by their forces, relative to the largest displacement
-  of the contacts' surfaces: what the displacement misses of the response to the forces 6  new contacts   share of the
-  force at contacts that no training solution closes 7  outside        share of the force outside the RID 8  remainder
-  of the reconstruction (41), relative to the forces in the RID
+    5  inconsistency  |B u - D| of the closed contacts, weighted by their forces, relative to their largest displacement
+    6  new contacts   share of the force at contacts that no training solution closes
+    7  outside        share of the force outside the RID
+    8  remainder      of the reconstruction (41), relative to the forces in the RID
 
   6 to 8 do not concern models that give accurate forces of all contacts. A displacement that does not follow its forces
   is a failure of the prediction.
