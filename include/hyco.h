@@ -9,7 +9,7 @@
   Conventions, unless a docstring states otherwise:
   - Create and Load own what they return; Set references or copies; Get borrows.
   - Handles are PETSc objects. PetscObjectReference() and Destroy count references, and an object holds references to
-  the objects that it uses. Destroy sets the handle to NULL. NULL and objects of another class are refused by name.
+    the objects that it uses. Destroy sets the handle to NULL. NULL and objects of another class are refused by name.
   - Every function returns a PetscErrorCode; 0 is success. Messages are one line.
   - Functions on an object are collective on the object's communicator.
   - Lengths, forces and stresses are in the consistent units of the scene.
@@ -22,6 +22,7 @@
 #include <hycomaterial.h>
 #include <hycocontact.h>
 #include <hycosamples.h>
+#include <hycocone.h>
 #include <hycosystem.h>
 #include <hycosolver.h>
 #include <hycofom.h>

@@ -36,6 +36,8 @@ typedef struct {
   HycoKKT kkt;
   HycoReason reason;
   HycoSeconds seconds;
+  char loose[512];       /* a motion of a body that contact alone may hold, where no contact has a force: its position
+                            is arbitrary; "": none */
   char regularised[512]; /* unconstrained motions that -hyco_regularise removed, separated by "; " */
   char why[512];         /* not converged: the reason in words, with the body or the number that shows it; else "" */
 } HycoSummary;
@@ -132,9 +134,12 @@ PetscErrorCode HycoFOMGetContacts(HycoFOM fom, PetscInt *n, const HycoContactRes
 PetscErrorCode HycoFOMGetReactions(HycoFOM fom, PetscInt *n, const HycoReaction *result[], PetscReal *balance);
 /*
   Gets the last solution on rank 0 (empty on other ranks), in the mesh file's order (ascending tags). Collective.
-  Borrowed until the next solve: U       n_nodes x dim, displacement Lambda  n_contacts, contact forces (nodal forces,
-  compression positive) sigma   n_cells x n_sigma, stress averaged over each cell: (xx) | (xx, yy, zz, xy) | (xx, yy,
-  zz, xy, yz, xz)
+  Borrowed until the next solve.
+
+    U       n_nodes x dim, displacement
+    Lambda  n_contacts, contact forces (nodal forces, compression positive)
+    sigma   n_cells x n_sigma, stress averaged over each cell: (xx) in 1D, (xx, yy, zz, xy) in 2D,
+            (xx, yy, zz, xy, yz, xz) in 3D
 */
 PetscErrorCode HycoFOMGetSolution(HycoFOM fom, PetscInt *n_nodes, const PetscReal *U[], PetscInt *n_contacts,
                                   const PetscReal *Lambda[], PetscInt *n_cells, const PetscReal *sigma[]);

@@ -132,7 +132,9 @@ typedef struct {
   PetscReal rid_fraction;                                                 /* share of the elements */
   PetscReal condition;             /* of the reduced stiffness, the largest over the judged snapshots */
   PetscReal error_u, error_lambda; /* mean relative training errors, 2-norm, displacement and RID contact forces */
-  HycoValidation held_out;         /* errors of the written model at held-out points; n 0: none */
+  HycoValidation held_out;         /* errors of the written model at held-out points; n 0: none. The largest also at
+                                      n_corners training points at corners of the ranges */
+  PetscInt n_corners;
   HycoOutputValidation output[HYCO_MAX_QUANTITIES]; /* of the written model, if held_out.n > 0 */
   PetscInt n_held;                         /* held-out predictions that calibrate the estimated errors; 0: none */
   HycoAttempt chosen;                      /* the settings chosen by the search */

@@ -19,6 +19,7 @@ typedef const char *HycoROMType;
 #define HYCO_ROM_CONDENSED  "condensed"
 #define HYCO_ROM_CUBATURE   "cubature"
 #define HYCO_ROM_REGRESSION "regression"
+#define HYCO_ROM_BODIES     "bodies"
 
 /* Which displacements of a hybrid model are full order: -hyco_hybrid. */
 typedef enum {
@@ -36,10 +37,11 @@ extern const char *const HycoFeatureNames[];
 typedef struct {
   char type[32], title[64]; /* the type and its title; arrays, so that ranks can send the struct */
   PetscInt n_multipliers;   /* force unknowns: n_contacts, or the force vectors of a projection-based model */
-  PetscInt n_dof, n_contacts, n_modes, n_fe_dofs;  /* reduced unknowns (modes + FE unknowns), contacts in the RID */
-  PetscInt n_facing;                               /* contacts of the RID that may close, as in HycoSummary */
-  PetscReal overlap, sliding;                      /* the same, of the RID's contacts */
-  PetscInt n_all_contacts, n_active, n_rid_active; /* on the whole surface; those with a force, there and in the RID */
+  /* Reduced unknowns (modes + FE unknowns); contacts in the RID, and those of them that may close, as in HycoSummary. */
+  PetscInt n_dof, n_contacts, n_modes, n_fe_dofs, n_facing;
+  PetscReal overlap, sliding; /* as in HycoSummary, of the RID's contacts */
+  /* Contacts on the whole surface; those with a force, there and in the RID. */
+  PetscInt n_all_contacts, n_active, n_rid_active;
   PetscInt iterations, rid_nodes, rid_elements, dim;
   PetscReal rid_fraction;  /* share of the mesh's elements in the RID */
   PetscReal covered_force; /* share of the total contact force that the RID's own multipliers carry; 1 without force */
@@ -47,13 +49,12 @@ typedef struct {
   PetscReal lambda_max, lambda_norm2, u_norm2, u_min[3], u_max[3]; /* Lambda everywhere; u over the RID */
   PetscReal quantity[HYCO_MAX_QUANTITIES];                         /* those of HycoSceneGetQuantities() */
   PetscReal condition;                                             /* 1-norm estimate of the reduced stiffness */
-  PetscReal
-      path_quantity[HYCO_MAX_QUANTITIES]; /* of a path: the largest over its listed times, for `min` the smallest */
-  PetscReal path_force, path_mises,
-      path_inelastic; /* of a path the largest of its listed times: total contact force, von
-                         Mises stress and accumulated inelastic strain of the RID; else 0 */
-  PetscReal residual,
-      contact_residual; /* -hyco_residual: worst and worst_contact of HycoROMGetEquilibrium(); else -1 */
+  /* Of a path, the largest over its listed times (else 0): the quantities (for `min` the smallest), the total contact
+     force, the von Mises stress and the accumulated inelastic strain of the RID. */
+  PetscReal path_quantity[HYCO_MAX_QUANTITIES];
+  PetscReal path_force, path_mises, path_inelastic;
+  /* -hyco_residual: worst and worst_contact of HycoROMGetEquilibrium(); else -1. */
+  PetscReal residual, contact_residual;
   /* An upper estimate of the relative errors of u (whole mesh, 2-norm), of the stress (RID, 2-norm of the cells'
      values) and of all contact forces (2-norm; a force below a tenth of the largest held out in training counts as that
      tenth), calibrated at training on held-out solutions; < 0: the model has none, or the solve did not converge. */
@@ -92,8 +93,16 @@ typedef struct {
 /* Opens a model file on this process alone; the whole-mesh part stays in the file. Not collective: every process that
    calls it opens the file for reading. The caller owns it. Errors: not a model, damaged, of another version. */
 PetscErrorCode HycoROMLoad(const char path[], HycoROM *model);
-/* Frees; sets the handle to NULL; NULL-safe. */
+/* Frees; sets the handle to NULL; NULL-safe. What handles share is freed with the last of them. */
 PetscErrorCode HycoROMDestroy(HycoROM *model);
+/*
+  Creates another handle on the same model, as DMClone() does for meshes: what the file holds exists once, and each
+  handle has its own options, last prediction and work space, so that several predictions live side by side; each is
+  bitwise that of a model that was loaded alone. The caller owns it, and may destroy the two in any order. Not
+  collective. The scene is shared too, so that HycoROMSetExtrapolate() is for all of them. Not for several threads, of which
+  the scene's expressions and Debian's PETSc know nothing: use processes.
+*/
+PetscErrorCode HycoROMClone(HycoROM model, HycoROM *clone);
 /* Borrowed from the library. */
 PetscErrorCode HycoROMGetType(HycoROM model, HycoROMType *type);
 /* Whether the model gives accurate forces of all contacts, as HycoFOMSolveForces() needs them. */

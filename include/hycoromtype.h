@@ -23,6 +23,7 @@ typedef enum {
 /* Properties of a type. */
 typedef struct {
   const char *title; /* "hybrid hyper-reduced" */
+  size_t work;       /* bytes of HycoROMGetWork() */
   HycoSettings settings;
   PetscBool whole;       /* the RID is the whole mesh, so that it has no seeds */
   PetscBool stiffness;   /* there is a reduced stiffness, whose condition is reported */
@@ -31,14 +32,15 @@ typedef struct {
   PetscBool force_basis; /* it supports -hyco_dual nnmf and snapshots */
   PetscBool history;     /* it supports the paths of scenes with a history */
   PetscBool resultants;  /* its contact forces are multipliers of contacts: reactions are those in balance with them */
+  PetscBool surfaces;    /* the displacements of the contacts' surfaces are its own, beside those of the modes */
   PetscBool cells; /* its mesh consists of the cells that its modes choose, and of the surfaces of contacts and loads */
 } HycoROMTraits;
 
 /* The system on the RID before reduction, for the indicator (43). Borrowed. */
 typedef struct {
-  Mat K, B; /* over the unknowns of the RID's mesh; B: the contacts of A_lambda */
+  Mat K, B; /* over the unknowns of the RID's mesh; B: all contacts, with the rows of those in A_lambda */
   Vec F, D;
-  IS is_A, is_I;
+  IS is_A, is_I, is_A_lambda;
 } HycoLocal;
 
 /* An operation that a type does not have is NULL. Not collective, unless stated. */
@@ -85,6 +87,9 @@ PetscErrorCode HycoROMRegister(const char name[], PetscErrorCode (*create)(HycoR
  */
 PetscErrorCode HycoROMSetOps(HycoROM model, const HycoROMOps *ops, const HycoROMTraits *traits, void *data);
 PetscErrorCode HycoROMGetData(HycoROM model, void *data);
+/* What setup and solve of the type change: traits.work bytes, zeros before setup and NULL without it; freed after reset.
+   The data do not change after build and load: other handles on the model (HycoROMClone()) use the same. */
+PetscErrorCode HycoROMGetWork(HycoROM model, void *work);
 /* Sets the type of a model that has none yet. Fails for an unknown type, with the registered names. */
 PetscErrorCode HycoROMSetType(HycoROM model, HycoROMType type);
 /* Gets the numbers of modes and contacts of a model that is in training or loaded. Any output may be NULL. */

@@ -22,6 +22,8 @@ PetscErrorCode HycoSamplesDestroy(HycoSamples *samples);
   closed = PETSC_TRUE: both ends included (counts[i] >= 2).
 */
 PetscErrorCode HycoSamplesAddGrid(HycoSamples samples, const PetscInt counts[], PetscBool closed);
+/* Appends the closed grid, the default of hyco train; of a parameter with counts[i] = 1 the middle of its range. */
+PetscErrorCode HycoSamplesAddTrainingGrid(HycoSamples samples, const PetscInt counts[]);
 /* Appends the tensor grid of the roots of Chebyshev polynomials over each range, counts[i] >= 1 of them: nodes for
    interpolation by polynomials, as in a condensed model. */
 PetscErrorCode HycoSamplesAddChebyshev(HycoSamples samples, const PetscInt counts[]);

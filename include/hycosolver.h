@@ -14,6 +14,7 @@ typedef const char *HycoSolverType;
 #define HYCO_SOLVER_ACTIVE_SET "active_set" /* primal-dual active set, the paper's section 6.2 */
 #define HYCO_SOLVER_TAO        "tao"        /* a solver of TAO on the same problem (HycoSolverSetTaoType()) */
 #define HYCO_SOLVER_LEMKE      "lemke"      /* Lemke's complementary pivoting on the dense dual problem */
+#define HYCO_SOLVER_SEMISMOOTH "semismooth" /* semismooth Newton on the dense dual problem, for blocks of any cone */
 
 /* The unknowns of the complementarity problem. */
 typedef enum {
@@ -60,7 +61,8 @@ PetscErrorCode HycoSolverCreate(MPI_Comm comm, HycoSolver *solver);
 PetscErrorCode HycoSolverDestroy(HycoSolver *solver);
 /* Sets (references) the system. */
 PetscErrorCode HycoSolverSetSystem(HycoSolver solver, HycoSystem system);
-/* -hyco_solver_type */
+/* -hyco_solver_type. A solve of a system with other cones than forces >= 0 (HycoSystemSetBlocks()) refuses each type but
+   semismooth, which has no fallback there, and each form but dual and that of a given flexibility. */
 PetscErrorCode HycoSolverSetType(HycoSolver solver, HycoSolverType type);
 /*
   -hyco_tao_type: for the type tao. Bound-constrained (symmetric systems): gpcg, tron, bntr, bnls, bntl, blmvm, bncg,
@@ -77,7 +79,8 @@ PetscErrorCode HycoSolverSetForm(HycoSolver solver, HycoForm form);
 PetscErrorCode HycoSolverSetLinear(HycoSolver solver, HycoLinear linear, PetscReal gigabytes);
 /* -hyco_solver_rtol: the largest relative KKT residual that counts as solved (default 1e-8). */
 PetscErrorCode HycoSolverSetTolerance(HycoSolver solver, PetscReal rtol);
-/* -hyco_solver_max_its: of the active set or TAO (0: chosen from the number of contacts; TAO 2000). */
+/* -hyco_solver_max_its: of the active set or TAO (0: chosen from the number of contacts; TAO 2000), or of semismooth from
+   each of its starts (0: 100). */
 PetscErrorCode HycoSolverSetMaxIts(HycoSolver solver, PetscInt max_its);
 /* -hyco_solver_warm_start: start from the last solution's active set (default) or without contact. */
 PetscErrorCode HycoSolverSetWarmStart(HycoSolver solver, PetscBool warm);
@@ -85,8 +88,9 @@ PetscErrorCode HycoSolverSetWarmStart(HycoSolver solver, PetscBool warm);
    have one sign (a rope, a membrane), start from the active set of coarser problems (default). */
 PetscErrorCode HycoSolverSetMultilevel(HycoSolver solver, PetscBool multilevel);
 /*
-  -hyco_solver_fallback: if the residuals of the chosen method are too large, try the next of TAO, active set, and
-  Lemke's method on the dense dual (default). Otherwise such a solve does not converge.
+  -hyco_solver_fallback: if the residuals of the chosen method are too large, try the next (default): the active set,
+  Lemke's method, TAO's gpcg and tron (for a nonsymmetric system ssils); Lemke's method after TAO's types if the form has
+  no dense problem. Otherwise such a solve does not converge.
 */
 PetscErrorCode HycoSolverSetFallback(HycoSolver solver, PetscBool fallback);
 /* Sets the prefix of its options: with "other_", -other_hyco_solver_rtol. */

@@ -26,12 +26,26 @@ typedef struct {
    PetscObjectView(). */
 PETSC_EXTERN PetscClassId HYCO_SCENE_CLASSID, HYCO_SAMPLES_CLASSID, HYCO_SYSTEM_CLASSID, HYCO_SOLVER_CLASSID,
     HYCO_FOM_CLASSID, HYCO_SNAPSHOTS_CLASSID, HYCO_REDUCER_CLASSID, HYCO_ROM_CLASSID, HYCO_MATERIAL_CLASSID,
-    HYCO_CONTACT_CLASSID;
+    HYCO_CONTACT_CLASSID, HYCO_CONE_CLASSID;
 
-/* Registers the classes. Every function that creates an object calls it. Not collective. */
+/* Registers the classes, their types, and hyco's types of Tao: what HycoInitialize() does after PETSc's and SLEPc's own
+   initialisation, for a program that has called those. Without it no object can be created. Not collective. */
 PetscErrorCode HycoInitializePackage(void);
 
-/* Initialises PETSc (if needed) and SLEPc for hyco. Collective on all processes. `argc`, `argv` may be NULL. If it
+/*
+  hyco's types of Tao, for any program: TaoSetType(tao, HYCO_TAO_ACTIVE_SET) or -tao_type. They minimise f(x), lo <= x <=
+  hi (TaoSetVariableBounds()), by TaoSetObjectiveAndGradient() and TaoSetHessian(), on any number of ranks; a quadratic f
+  exactly, others by Newton's method with a line search. The iterations are sets (pivots). Without an objective the
+  gradient may be any function with H as Jacobian, so that H need not be symmetric.
+  - active set: H may be indefinite only outside the free unknowns' blocks, whose factor is that of TaoGetKSP()
+    (-tao_ksp_type, -tao_pc_type): LU, by MUMPS on several ranks; conjugate gradients for a matrix without entries
+  - lemke: H is gathered on every rank as a dense matrix; each lo is finite, each hi infinite
+  examples/ladder/obstacle.c is a program.
+*/
+#define HYCO_TAO_ACTIVE_SET "hyco_active_set"
+#define HYCO_TAO_LEMKE      "hyco_lemke"
+
+/* Initialises PETSc (if needed), SLEPc and hyco's package. Collective on all processes. `argc`, `argv` may be NULL. If it
    initialises PETSc, errors are printed as one line on stderr, "hyco: error: ...". HYCO_TRACE=1 in the environment, or
    PetscPushErrorHandler(PetscTraceBackErrorHandler, NULL), adds PETSc's call stack. */
 PetscErrorCode HycoInitialize(int *argc, char ***argv);

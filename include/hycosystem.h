@@ -4,12 +4,13 @@
       K x + Bt L = F,     0 <= L  complementary to  D - B x >= 0
 
   full order (16), hybrid hyper-reduced (38), projection-based (44) and local indicator (43). They differ in the code
-  that builds K, Bt, B, F and D, not in the problem.
+  that builds K, Bt, B, F and D, not in the problem. A program may divide the rows into blocks, each with the law of a
+  cone in place of the second condition (HycoSystemSetBlocks(), hycocone.h).
 */
 #ifndef HYCOSYSTEM_H
 #define HYCOSYSTEM_H
 
-#include <hycosys.h>
+#include <hycocone.h>
 #include <petscmat.h>
 
 #if defined(__cplusplus)
@@ -28,6 +29,10 @@ typedef struct _p_HycoSystem *HycoSystem;
     penetration      max_i [B x - D]_i^+ / d, d = max(|D|_inf, |B|_inf |x|_inf), a gap of the scene's size
     adhesion         max_i [-L_i]^+ / |L|_inf
     complementarity  max_i |L_i (D - B x)_i| / (|L|_inf d)
+
+  With blocks the last three are those of the natural map, z = P(L - (l/d) (D - B x)), l = |L|_inf (without forces
+  |F|_inf/|B|_inf, with a given flexibility |g|_inf/max G_ii): penetration max [z_n - L_n]^+ / l, adhesion
+  |L - P(L)|_inf / l, complementarity |z - L|_inf / l. For forces >= 0 they are 0 at the same states.
 
   A quotient 0/0 is 0. `rounding` is the stationarity of the entries left out. It grows with the square of the number of
   unknowns along a body (1e-11 on a rope of 1e3 nodes, 1e-5 on one of 1e6), and no solution in double precision has a
@@ -55,13 +60,27 @@ PetscErrorCode HycoSystemSetMatrices(HycoSystem system, Mat K, Mat Bt, Mat B, Pe
 PetscErrorCode HycoSystemGetMatrices(HycoSystem system, Mat *K, Mat *Bt, Mat *B);
 /* Sets (references) F of length n and D of length m (NULL without contact). */
 PetscErrorCode HycoSystemSetVectors(HycoSystem system, Vec F, Vec D);
+/* The vectors; each output may be NULL. Not collective. Borrowed. */
+PetscErrorCode HycoSystemGetVectors(HycoSystem system, Vec *F, Vec *D);
 /*
-  Sets (references) a flexibility instead of K: w = g + G L >= 0 complementary to L >= 0, G = B
-  K^-1 Bt m x m, dense, on one process, symmetric positive semidefinite, g = D - B K^-1 F. Such a system has no
+  Sets (references) a flexibility instead of K: w = g + G L >= 0 complementary to L >= 0, G = B K^-1 Bt m x m, dense, on one process, symmetric positive semidefinite, g = D - B K^-1 F. Such a system has no
   displacements (x is NULL in a solve) and no stationarity. Replaces the matrices, and is replaced by
   HycoSystemSetMatrices().
 */
 PetscErrorCode HycoSystemSetFlexibility(HycoSystem system, Mat G, Vec g);
+/*
+  Divides the rows of B (of G) into blocks, in their order on each rank: block k < n_blocks has the components and the
+  law of cones[cone_of[k]] (cone_of NULL: of cones[0]), and the data of its type, data[] block after block (NULL if no
+  cone has any). No block is divided between ranks. `cones` is the same on every rank; references are held, and the
+  arrays copied: set them again when data change. n_cones 0, the default, and cones that are all "nonnegative": each row
+  is a force >= 0, for which all methods and forms apply. Fails unless the blocks have as many components as this rank
+  has rows; a solve fails if the matrices were replaced by others with other rows since. Collective.
+
+  In a block of several components, w = D - B x is (gap, slip): a row of B for each direction, slave minus master, and D
+  the initial gap and, with the opposite sign, the tangential displacement from which slip is counted (0: from rest).
+*/
+PetscErrorCode HycoSystemSetBlocks(HycoSystem system, PetscInt n_cones, const HycoCone cones[], PetscInt n_blocks,
+                                   const PetscInt cone_of[], const PetscReal data[]);
 /* The largest of the four residuals of `kkt`. Not collective. */
 PetscReal HycoKKTMax(const HycoKKT *kkt);
 /* Recomputes the residuals at x (length n), L (length m, or NULL without contact). Collective. */

@@ -19,7 +19,7 @@ static PetscErrorCode Train(HycoScene scene, const char file[])
 
   PetscFunctionBeginUser;
   PetscCall(HycoSamplesCreate(scene, &samples));
-  PetscCall(HycoSamplesAddGrid(samples, grid, PETSC_FALSE));
+  PetscCall(HycoSamplesAddGrid(samples, grid, PETSC_TRUE));
   PetscCall(HycoReducerCreate(PETSC_COMM_WORLD, scene, &reducer));
   PetscCall(HycoReducerSetFromOptions(reducer));
   PetscCall(HycoReducerRun(reducer, samples, file, &t));

@@ -7,6 +7,11 @@
 
 #include <petscsys.h>
 
+/* Since 3.22 a type of Tao sets the defaults of its tolerances and limits itself. */
+#if PETSC_VERSION_LT(3, 22, 0)
+#define TaoParametersInitialize(tao) ((void)(tao), PETSC_SUCCESS)
+#endif
+
 #if PETSC_VERSION_LT(3, 21, 0)
 #define TaoMonitorCancel TaoCancelMonitors
 #define HYCO_EDGE_WEIGHTS_ARGUMENT

@@ -26,10 +26,14 @@ typedef struct {
                                     tested by V */
 } HycoCondensedTable;
 
+typedef struct {
+  struct _n_HycoGalerkinModel galerkin;
+  HycoCondensedTable table;
+} * HycoCondensedPathModel;
+
 typedef struct _n_HycoCondensedPath {
   struct _n_HycoGalerkin galerkin;
-  HycoCondensedTable table;
-  /* online data */
+  const HycoCondensedTable *table;
   PetscReal *Ke, *heat; /* by cell: elastic stiffness (nv dim square); force of its thermal strains (nv dim) */
   PetscReal *weight;    /* by cell: 2-norm of its columns of the inelastic forces */
 } * HycoCondensedPath;

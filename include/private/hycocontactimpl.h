@@ -13,6 +13,7 @@ struct _p_HycoContact {
   /* entries that the library reads, set after HycoContactComplete(); borrowed */
   const char *name, *slave, *master; /* slave, master: groups; master NULL: no masters */
   HycoExpr normal[3], gap;           /* NULL: not given */
+  PetscBool matched;                 /* set by the type: no two contacts have the same master node */
   PetscBool rigid; /* set by the type: the master is a node that moves with a rigid body, whose surface is given by
                       the normals and gaps at the slaves; its equilibrium sums the forces of all of the contact's
                       nodes */
@@ -36,7 +37,8 @@ PetscErrorCode HycoContactCreate_Rigid(HycoContact contact);
    master, and for a master node that is itself tied. NULL: none. The caller destroys them. */
 PetscErrorCode HycoTiesFind(HycoScene scene, HycoMesh mesh, HycoTies *ties);
 
-/* -- potential contacts: all on one process, on a mesh that has every contact node -- */
+/* -- potential contacts: all on one process, on a mesh that has every contact node; or those of a rank's own slaves, on
+   a mesh with the facets around these and around the masters that they may meet (HycoMeshRings()) -- */
 
 /*
   N_lambda contacts in the order of the scene's contacts, then of the slave's tag. A contact's master point is the sum
@@ -51,6 +53,12 @@ typedef struct {
   PetscReal reach; /* largest distance of a master point from its slave on moved surfaces; PETSC_MAX_REAL: any */
 } HycoSearch;
 
+/* What a rank's part of a contact's surfaces does not show of the whole ones. */
+typedef struct {
+  PetscBool moved; /* a map may move them */
+  PetscReal small; /* a tenth of the shortest edge of the slave's facets; 0: it has none */
+} HycoSurfaceFacts;
+
 typedef struct _n_HycoPairs {
   PetscInt n;
   PetscInt *slave;   /* node indices */
@@ -61,40 +69,37 @@ typedef struct _n_HycoPairs {
   PetscInt place; /* place number (HycoFE) of the nodes at the last search */
   PetscInt n_searches;
   HycoSearch *search; /* by contact of the scene; NULL where room is 0 */
+  PetscInt *number;   /* of a rank's contacts: their numbers among those of all ranks; NULL: their own indices */
+  PetscInt64 queries; /* searches for a master so far */
+  const HycoSurfaceFacts *facts; /* while the contacts of a rank's slaves are found (borrowed); else NULL */
 } HycoPairs;
+/* The number of contact k among those of all ranks. */
+static inline PetscInt HycoPairsNumber(const HycoPairs *pairs, PetscInt k)
+{
+  return pairs->number ? pairs->number[k] : k;
+}
 
-/*
-  Ranks that search for masters together. Rank 0, which has the surfaces, divides the slave nodes and sends each rank
-  its part of them, with the part of the master in which their nearest points may lie. Only calls in
-  HycoOnRootWithTeam() may have the team in their HycoFE.
-*/
-typedef struct _n_HycoTeam {
-  MPI_Comm comm;
-  PetscInt64 queries; /* that this rank has answered */
-  PetscInt patches;   /* the most that one of its searches had */
-  PetscInt whole;     /* the same of all ranks' searches, on rank 0 */
-} HycoTeam;
-/* Answers rank 0's searches until it dismisses this rank. Errors are raised on rank 0. Collective, except on rank 0. */
-PetscErrorCode HycoTeamServe(HycoTeam *team);
-/* Rank 0. */
-PetscErrorCode HycoTeamDismiss(HycoTeam *team);
-/* Runs `call` on rank 0, whose searches all ranks answer; its error is raised on every rank. Collective. */
-#define HycoOnRootWithTeam(team, call)                                                                                 \
-  do {                                                                                                                 \
-    char message_[HYCO_LINE];                                                                                          \
-    PetscMPIInt rank_;                                                                                                 \
-    PetscErrorCode caught_;                                                                                            \
-    PetscCallMPI(MPI_Comm_rank((team)->comm, &rank_));                                                                 \
-    PetscCall(HycoCatchBegin());                                                                                       \
-    caught_ = rank_ ? HycoTeamServe(team) : (call);                                                                    \
-    PetscCall(HycoCatchEnd(caught_, message_));                                                                        \
-    if (!rank_) PetscCall(HycoTeamDismiss(team));                                                                      \
-    PetscCall(HycoErrorSync((team)->comm, caught_, message_));                                                         \
-  } while (0)
-
-/* Finds the contacts on the nodes as drawn; team: the ranks that help, or NULL. Where no map moves the surfaces they
-   are final, and a slave node without a master is an error. */
-PetscErrorCode HycoPairsFind(HycoScene scene, HycoMesh mesh, HycoTeam *team, HycoPairs *pairs);
+/* Finds the contacts on the nodes as drawn. Where no map moves the surfaces they are final, and a slave node without a
+   master is an error. facts: of each contact of the scene, for the contacts of the slaves that this rank owns on its part
+   of the surfaces; what all ranks must decide together is then left to HycoContactsAgree(), and what this rank alone
+   cannot decide is an error. NULL: the mesh has the whole surfaces. */
+PetscErrorCode HycoPairsFind(HycoScene scene, HycoMesh mesh, const HycoSurfaceFacts facts[], HycoPairs *pairs);
+/* The facts about the surfaces of each contact of the scene (facts: scene->n_contacts). Collective. */
+PetscErrorCode HycoContactsFacts(MPI_Comm comm, HycoScene scene, HycoMesh part, HycoSurfaceFacts facts[]);
+/* The masters' nodes (numbers in the distributed vectors, perhaps repeated) that this rank's slaves may meet at the
+   positions of fe, each rank's part of the mesh: with the facets around them a search has the result that it has on the
+   whole surfaces. slack: by how many radii of the widest facet the nodes may move without further ones. The caller
+   frees them. Collective. */
+PetscErrorCode HycoContactsCandidates(MPI_Comm comm, HycoFE fe, PetscReal slack, PetscInt *n, PetscInt **node);
+/* For each slave node the nearest node of the master, without any condition: pairs (n x 2), which a partition should
+   leave together. The body of a rigid contact is in no pair: otherwise all of its surface would be on one rank. The
+   caller frees them. */
+PetscErrorCode HycoContactsNeighbours(HycoScene scene, HycoMesh mesh, PetscInt *n, PetscInt **pairs);
+/* Whether the contacts that the ranks have found are those of the whole surfaces: each contact of the scene has some, of
+   which not all are without a master, and nodes that must be matched are. If not, the whole surfaces give the contacts
+   or the error. Collective. */
+PetscErrorCode HycoContactsAgree(MPI_Comm comm, HycoScene scene, HycoMesh part, HycoMesh surface,
+                                 const HycoPairs *pairs, PetscBool *agreed);
 /* Removes contacts of tied nodes whose masters belong to the same contact: these move with their masters. Fails for
    other tied nodes of contacts. */
 PetscErrorCode HycoPairsDropTied(HycoScene scene, HycoMesh mesh, HycoPairs *pairs);
@@ -103,7 +108,8 @@ PetscErrorCode HycoPairsDestroy(HycoPairs *pairs);
    the pairs' nodes and all facets that may be masters. Functions that use the contacts at fe's parameters call it
    themselves. */
 PetscErrorCode HycoPairsMove(HycoFE fe, HycoPairs *pairs);
-/* Creates the pairs' search if a map moves surfaces, on a mesh that has all of their nodes; does nothing otherwise. */
+/* Creates the pairs' search if a map moves surfaces, on a mesh that has all of their nodes, or from pairs->facts; does
+   nothing otherwise. */
 PetscErrorCode HycoPairsSetSearch(HycoScene scene, HycoMesh mesh, HycoPairs *pairs);
 /* Whether a map moves the surfaces of contact number `contact` of the scene; whether it moves those of contact k. */
 static inline PetscBool HycoPairsFollows(const HycoPairs *pairs, PetscInt contact)
@@ -148,7 +154,7 @@ void HycoPairsJump(const HycoPairs *pairs, PetscInt k, PetscInt dim, const Petsc
 PetscErrorCode HycoPairsReserve(HycoPairs *pairs, PetscInt n, PetscInt width);
 void HycoPairsAppend(HycoPairs *pairs, PetscInt contact, PetscInt slave, PetscInt n, const PetscInt node[],
                      const PetscReal weight[]);
-/* The contacts which[0..n), ascending, with node i renumbered as index[i] (NULL: unchanged), and their search. The
+/* The contacts which[0..n) with node i renumbered as index[i] (NULL: unchanged), and their search and numbers. The
    caller destroys it. */
 PetscErrorCode HycoPairsSelect(const HycoPairs *pairs, PetscInt n, const PetscInt which[], const PetscInt index[],
                                HycoPairs *out);
@@ -187,23 +193,25 @@ PetscErrorCode HycoContactMeasure(HycoFE fe, HycoPairs *pairs, const PetscReal u
   motion is tangential at every contact, to within the faceting error, to a normal, the slave's surface, the master's,
   or the plane of the given normal. unconstrained: coefficients (n x motions->n, orthonormal) of all of them; names by
   HycoMotionsName() of each. alike: those of the largest set that is tangential in the same sense, which turned normals
-  can release. The caller frees both.
+  can release. The caller frees both. wide: on several ranks the surface with all facets around all nodes of fe's mesh, of
+  which node i is node index[i] there (NULL: the same). The results are the same on all ranks. Collective.
 */
-PetscErrorCode HycoFEFindUnconstrained(HycoFE fe, HycoPairs *pairs, const HycoMotions *motions,
-                                       PetscInt *n_unconstrained, PetscReal **unconstrained, PetscInt *n_alike,
-                                       PetscReal **alike);
+PetscErrorCode HycoFEFindUnconstrained(MPI_Comm comm, HycoFE fe, HycoFE wide, const PetscInt index[], HycoPairs *pairs,
+                                       const HycoMotions *motions, PetscInt *n_unconstrained, PetscReal **unconstrained,
+                                       PetscInt *n_alike, PetscReal **alike);
 /* The longest edge around each node (n_nodes) of the facets of `group`; 0 where it has none. */
 void HycoSurfaceSizes(HycoFE fe, PetscInt group, PetscReal size[]);
 /* Tributary area (length in 2D, 1 in 1D) of each contact's slave node; 0 if its group is no surface. */
 PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, PetscReal area[]);
-/* The pressure of contact k: its force over its area. A node without area, on the axis of an axisymmetric scene with
-   cells of second order, has the mean pressure of itself and the middle of its facet. */
-PetscReal HycoContactPressure(HycoFE fe, const HycoPairs *pairs, PetscInt k, const PetscReal area[],
-                              const PetscReal lambda[]);
+/* The pressures of a process's contacts: forces over areas. A node without area, on the axis of an axisymmetric scene with
+   cells of second order, has the mean pressure of itself and the middle of its facet. Collective. */
+PetscErrorCode HycoContactPressures(MPI_Comm comm, HycoFE fe, const HycoPairs *pairs, const PetscReal area[],
+                                    const PetscReal lambda[], PetscReal pressure[]);
 /* Results of each contact of the scene (result: room for all; names borrowed from the scene) at fe's mu, from the
-   normals, areas and forces (pairs->n) of its potential contacts; a force of at most `least` counts as zero. */
+   normals, areas, forces and pressures (pairs->n) of its potential contacts; a force of at most `least` counts as zero. */
 void HycoContactResults(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], const PetscReal area[],
-                        const PetscReal lambda[], PetscReal least, HycoContactResult result[]);
+                        const PetscReal lambda[], const PetscReal pressure[], PetscReal least,
+                        HycoContactResult result[]);
 /* Marks the nodes of the contacts and, where masters lie between nodes, all of the master's group. */
 PetscErrorCode HycoPairsMarkSurfaces(HycoScene scene, HycoMesh mesh, const HycoPairs *pairs, PetscBool node[]);
 

@@ -11,7 +11,7 @@ typedef struct {
   PetscReal *weight;  /* by cell of mesh, > 0 */
   PetscReal error[2]; /* relative 2-norm errors of the training's reduced internal forces and of the bodies' volumes,
                          the largest */
-} * HycoCubatureROM;
+} * HycoCubatureModel;
 
 /* Training options, and the data of a run. */
 typedef struct {

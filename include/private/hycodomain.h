@@ -48,18 +48,12 @@ PetscErrorCode HycoMovedGroups(HycoScene scene, HycoMesh mesh, const HycoPairs *
 #define HYCO_RID 1
 PetscErrorCode HycoRIDBuild(HycoFOM mesh, const HycoPairs *pairs, const HycoRIDSettings *settings, DMLabel *rid);
 
-/* The role of a node in the reduced problem. */
-enum {
-  HYCO_ROLE_OUTSIDE,   /* no cell in Omega_A */
-  HYCO_ROLE_INTERFACE, /* in Omega_A, and in Omega_B or on Gamma_I^C: the set I, (32) */
-  HYCO_ROLE_A          /* in Omega_A only: the set A, (33) */
-};
-
-/* Changes the roles of the n nodes of the reduced mesh from those given by the cells to those with contact, and sets
-   in_rid[k]: whether contact k of pairs belongs to A_lambda (36). fe, pairs: on the contacts' surfaces, whose node i
-   is index[i] of the reduced mesh. rows: the masters that the contacts meet, and `of`, the contact of each row
-   (HycoMet); if no surface is moved, the pairs themselves and NULL. On one process. */
+/* The sets of the n nodes of the reduced mesh, by node their number: 0 outside Omega_A, 1 in the set I, (32), 2 in the
+   set A, (33). On entry I has the nodes that Omega_B shares, on return also those on Gamma_I^C. Sets in_rid[k]: whether
+   contact k of pairs belongs to A_lambda (36). fe, pairs: on the contacts' surfaces, whose node i is index[i] of the
+   reduced mesh. rows: the masters that the contacts meet, and `of`, the contact of each row (HycoMet); if no surface is
+   moved, the pairs themselves and NULL. On one process. */
 PetscErrorCode HycoRIDSets(HycoFE fe, HycoPairs *pairs, const HycoPairs *rows, const PetscInt of[],
-                           const PetscInt index[], PetscInt n, PetscInt role[], PetscInt in_rid[]);
+                           const PetscInt index[], PetscInt n, PetscInt sets[], PetscInt in_rid[]);
 
 #endif

@@ -68,7 +68,6 @@ struct _n_HycoFE {
      all_facets: loads also act on facets whose cell is not in the mesh (2D, 3D) */
   const PetscReal *cell_weight;
   PetscBool all_facets;
-  struct _n_HycoTeam *team; /* ranks that help rank 0 in a search for masters, while they do; else NULL */
   /* kept from one parameter value to the next */
   HycoAssemblyMap places; /* positions of the element entries in K; created by the second assembly */
   PetscInt n_loads;
@@ -154,7 +153,11 @@ typedef struct {
   char (*name)[HYCO_LINE]; /* "body pellet from moving along (0, 0, 1)", "... from turning about (0, 0, 1) through (0,
                               10)" */
   HycoRigid *rigid;        /* n */
+  PetscInt *part;          /* by node: the connected part that it is in, numbered over all processes */
 } HycoMotions;
+
+/* Component c of a rigid motion at x. */
+PetscReal HycoRigidAt(const HycoRigid *rigid, PetscInt dim, const PetscReal x[3], PetscInt c);
 
 /* Fixes the unknowns `component` of the nodes with these tags (those that this mesh has) in addition to the scene's
    supports, and replaces the previous ones; n = 0: none. */

@@ -7,17 +7,16 @@
 
 typedef struct {
   const char *name;
-  HycoPlace place;     /* if one process has the mesh, a surface's nodes are its nodes */
+  HycoPlace place;
   PetscInt components; /* 1, 3 (vector) or 6 (symmetric tensor xx, xy, xz, yy, yz, zz) */
   const PetscReal *data;
-  PetscReal missing; /* for a surface: value at the nodes that are not on it */
 } HycoField;
 
-/* Converts values by node or cell (n, of `components` numbers each) to this rank's rows in the file's order,
-   `missing` where no process has a value. Without an order, returns `value` itself; otherwise the caller frees them
+/* Converts values by node or cell (n, of `components` numbers each) to this rank's rows in the file's order, 0 where no
+   process has a value. Without an order, returns `value` itself; otherwise the caller frees them
    by PetscFree(). Collective. */
 PetscErrorCode HycoFieldRows(const HycoFileOrder *order, PetscInt n, HycoPlace place, MPI_Datatype type,
-                             PetscInt components, const void *value, PetscReal missing, void **rows);
+                             PetscInt components, const void *value, void **rows);
 /* Writes `components` numbers, of type MPIU_REAL or MPIU_INT, of each node or cell in the file's order, as a dataset
    of cols columns. Collective with an order; without one this process has all n of them. */
 PetscErrorCode HycoFieldWrite(HycoH5 h, const HycoFileOrder *order, PetscInt n, const char name[], HycoPlace place,
@@ -56,15 +55,22 @@ PetscErrorCode HycoCellListCreate(const HycoFileOrder *order, HycoMesh mesh, con
 PetscErrorCode HycoCellListWrite(HycoH5 h, const char name[], const HycoCellList *list);
 PetscErrorCode HycoCellListDestroy(HycoCellList *list);
 /* The fields of a solution's contacts by node of their mesh (vector on slaves, negative on masters), gaps and
-   slaves' tags by contact; filled on rank 0, where the contacts are (surface NULL elsewhere). Collective; must be
-   destroyed after an error too. */
+   slaves' tags by contact: each rank's of its own contacts. Collective; must be destroyed after an error too. */
 typedef struct {
-  PetscReal *force, *pressure, *gap_node, *gap, *normal, *area;
+  PetscReal *force, *pressure, *gap_node, *gap, *normal, *area, *pressure_of; /* pressure_of: by contact */
   PetscInt *slave_id;
 } HycoContactFields;
 PetscErrorCode HycoContactFieldsCreate(MPI_Comm comm, HycoFE surface, HycoPairs *pairs, const PetscReal u[],
                                        const PetscReal lambda[], HycoContactFields *fields);
+/* Turns the fields by node of the surface into those by node of fe's mesh, the rank's part, from the contacts of all
+   ranks (nothing to do where the two are the same mesh); corners of six-node facets then have a pressure too.
+   Collective. */
+PetscErrorCode HycoContactFieldsToPart(MPI_Comm comm, HycoFE fe, HycoMesh surface, HycoContactFields *fields);
 PetscErrorCode HycoContactFieldsDestroy(HycoContactFields *fields);
+/* Writes a value of each contact (MPIU_INT or MPIU_REAL; value: of the process's own) as a dataset in the order of all n
+   contacts. Collective. */
+PetscErrorCode HycoContactsWrite(MPI_Comm comm, HycoH5 h, const char name[], const HycoPairs *pairs, PetscInt n,
+                                 MPI_Datatype type, const void *value);
 /* The file of an output that has the numbers: PATH.h5 for PATH.xdmf, PATH.vtkhdf itself; fails for other endings. */
 PetscErrorCode HycoFieldsNumbers(const char path[], char numbers[PETSC_MAX_PATH_LEN]);
 /* Fails for other endings, and if a model or a snapshot would be overwritten. On this process alone. */
@@ -119,9 +125,8 @@ PetscErrorCode HycoVTKWriteField(HycoFieldFile file, const HycoField *field, con
                                  char set[HYCO_LINE]);
 PetscErrorCode HycoVTKWriteTimes(HycoFieldFile file);
 
-/* A solution: u on fe, u_surface on the mesh of the pairs. With an order, u is that of this rank's part, and the
-   surface is on rank 0 (elsewhere `surface` is NULL); order NULL: this process has everything. rid: marks cells, or
-   NULL. Borrowed. */
+/* A solution: u on fe, u_surface on the mesh of the pairs. With an order, these are this rank's part, and the contacts of
+   its slaves; order NULL: this process has everything. rid: marks cells, or NULL. Borrowed. */
 typedef struct {
   const HycoFileOrder *order;
   HycoFE fe, surface;

@@ -4,6 +4,7 @@
 
 #include <hycocontactimpl.h>
 #include <hycofom.h>
+#include <hycoh5.h>
 #include <hycosolverimpl.h>
 
 /* The most rigid motions that -hyco_regularise releases. */
@@ -19,26 +20,29 @@ struct _p_HycoFOM {
   /* owned */
   DM dm; /* over the ranks */
   char mesh_write[PETSC_MAX_PATH_LEN];
-  HycoMesh part;     /* each rank's cells */
-  HycoMesh surface;  /* rank 0: nodes and facets of the contacts' groups (of a 1D mesh all); on one rank the part
-                        itself */
-  HycoFE fe;         /* on the part */
-  HycoFE fe_surface; /* on the surface, rank 0 (the same as fe on one rank); NULL elsewhere */
-  HycoPairs pairs;   /* rank 0, of the surface's nodes */
-  HycoTeam team;     /* all ranks, in rank 0's searches for masters */
+  HycoMesh part;    /* each rank's cells */
+  HycoMesh surface; /* each rank's contacts: facets around its slaves and the masters' nodes that these may meet; on one
+                        rank the part itself */
+  HycoFE fe;        /* on the part */
+  HycoFE fe_surface;  /* on the surface; on one rank fe */
+  HycoPairs pairs;    /* of the slaves that the rank owns, on the surface's nodes */
+  PetscBool gathered; /* for training: rank 0 has all contacts on the whole surfaces, others none (surface NULL) */
+  PetscInt n_needed, *needed, place; /* nodes around which the surface has all facets; the positions they are for */
+  PetscInt patches[2];               /* the most facets of a contact's master: on this surface, on all of the mesh */
+  PetscReal contact_cpu;             /* CPU seconds of this process so far in contacts: search, rows, B */
   HycoSystem system;
   HycoSolver solver;
   Mat K, B, Bt;
-  Vec U, Lambda, F, D;
-  PetscInt n_nodes, n_cells, n_contacts, n_free;   /* of the whole mesh, on every rank */
-  PetscInt width;                                  /* most nodes of a contact, on every rank */
-  PetscBool searches;                              /* the scene has moved surfaces, whose masters are searched anew */
-  VecScatter to_local, to_surface, lambda_to_root; /* to_surface: NULL on one rank */
-  Vec U_local, U_surface, lambda_root;
+  Vec U, Lambda, F, D; /* a rank's rows of B, Lambda and D are its contacts, in the order of its pairs */
+  PetscInt n_nodes, n_cells, n_contacts, n_free; /* of the whole mesh, on every rank */
+  PetscInt width;                                /* most nodes of a contact, of all ranks */
+  PetscBool searches;                            /* the scene has moved surfaces, whose masters are searched anew */
+  VecScatter to_local, to_surface;               /* to_surface: NULL on one rank */
+  Vec U_local, U_surface;
   HycoFileOrder *rows; /* NULL on one rank, and until it is first used */
-  /* the last solution: displacements at the part's nodes and at the surface's (rank 0), without released motions;
-     stresses of the part's cells, on request; on rank 0 the forces and gaps */
-  PetscReal *u, *u_surface, *sigma, *lambda, *gap;
+  /* the last solution: displacements at the part's nodes and at the surface's, without released motions; stresses of the
+     part's cells, on request; forces and gaps of the rank's contacts; on rank 0 the forces of all, on request */
+  PetscReal *u, *u_surface, *sigma, *lambda, *gap, *lambda_all;
   struct _n_HycoFieldFile *set;      /* HycoFOMWriteBegin() */
   HycoContactResult *contact_result; /* by contact of the scene, on request */
   HycoReaction *reaction;            /* HycoFOMGetReactions() */
@@ -69,13 +73,36 @@ PetscErrorCode HycoComparedDestroy(HycoCompared *compared);
 PetscErrorCode HycoFOMCreateMesh(MPI_Comm comm, HycoScene scene, HycoFOM *fom);
 /* Sets group[g] for the groups with a contact of the scene; leaves the others unchanged. */
 PetscErrorCode HycoMarkContactGroups(HycoScene scene, HycoMesh mesh, PetscBool group[]);
+/* Finds the contacts of each rank's slaves on the nodes as drawn; on the ranks' fe. Collective. */
+PetscErrorCode HycoFOMFindContacts(HycoFOM fom);
+/* After fe's nodes have moved: fetches further facets of masters, if slaves may meet them. Collective. */
+PetscErrorCode HycoFOMFetchMasters(HycoFOM fom);
+/* Creates fe_surface, and the scatter to its nodes. Collective. */
+PetscErrorCode HycoFOMSetUpSurface(HycoFOM fom);
+/* The contacts of all ranks in their order, on the whole surfaces, on rank 0 (elsewhere none, mesh NULL); they are
+   destroyed by the caller. For errors, and for training, which replaces each rank's by them. Collective. */
+PetscErrorCode HycoFOMGatherContacts(HycoFOM fom, HycoMesh *mesh, HycoPairs *pairs);
+PetscErrorCode HycoFOMGatherSurface(HycoFOM fom, HycoMesh *mesh);
+PetscErrorCode HycoFOMKeepOnRoot(HycoFOM fom);
+/* This rank's surface with all facets around all of its nodes, at fe's parameters, and the nodes' places there. The
+   caller destroys all three. Collective. */
+PetscErrorCode HycoFOMWiden(HycoFOM fom, HycoMesh *mesh, HycoFE *fe, PetscInt **index);
+/* On several ranks: the number of each row of B among all contacts, on rank 0 (elsewhere NULL). The caller frees it.
+   Collective. */
+PetscErrorCode HycoFOMGetNumbers(HycoFOM fom, PetscInt **number);
+/* The forces of all contacts on rank 0, in their order. Borrowed; NULL elsewhere. Collective. */
+PetscErrorCode HycoFOMGetLambda(HycoFOM fom, const PetscReal *lambda[]);
+/* Sets Lambda from the forces of all contacts on rank 0 (elsewhere not read). Collective. */
+PetscErrorCode HycoFOMSetLambda(HycoFOM fom, const PetscReal lambda[]);
+/* Writes the forces of all contacts as a dataset, each rank its rows of Lambda. Collective. */
+PetscErrorCode HycoFOMWriteForces(HycoFOM fom, HycoH5 h5, const char name[]);
 /* Updates fe and fe_surface to mu; on several ranks also the masters on moved surfaces. Collective. */
 PetscErrorCode HycoFOMSetParameters(HycoFOM fom, const PetscReal mu[]);
 /* K, F, B, D at mu, in the system. Collective. */
 PetscErrorCode HycoFOMAssemble(HycoFOM fom, const PetscReal mu[]);
 /* After a solve: u, u_surface and lambda of U and Lambda. Collective. */
 PetscErrorCode HycoFOMGather(HycoFOM fom);
-/* A vector's values at the part's nodes; at the surface's nodes, on rank 0. Collective. */
+/* A vector's values at the part's nodes; at the surface's nodes. Collective. */
 PetscErrorCode HycoFOMToLocal(HycoFOM fom, Vec v, PetscReal value[]);
 PetscErrorCode HycoFOMToSurface(HycoFOM fom, Vec v, PetscReal value[]);
 /* Computes the stresses of the last solution in sigma. Collective. */
@@ -102,10 +129,13 @@ PetscErrorCode HycoFOMCheckContactBalance(HycoFOM fom);
 /* Removes from u the released motions for which the contacts' normals are turned. Collective. */
 PetscErrorCode HycoFOMTakeOutReleased(HycoFOM fom, Vec u);
 /* Number of closed contacts of the last solution whose rows of B depend on the others; if it is not 0, the contact
-   forces are not unique. Rank 0. */
+   forces are not unique. Collective. */
 PetscErrorCode HycoFOMCountDependent(HycoFOM fom, PetscInt *dependent);
 /* Creates distributed vectors of the motions; VecDestroyVecs() destroys them. Collective. */
 PetscErrorCode HycoFOMMotionVectors(HycoFOM fom, const HycoMotions *motions, Vec **v);
+/* name: a rigid motion, left free by supports and springs, on which no contact force of the solution acts; "": none.
+   Collective. */
+PetscErrorCode HycoFOMNameLoose(HycoFOM fom, char name[HYCO_LINE]);
 /* Changes the reason of a solution u (of the part's unknowns) whose displacements or energies are impossible.
    relative: the largest displacement, over the extent of the mesh. why: the reason in words, with the body or the
    number that shows it, for the contact forces L (NULL: none); empty if the solution is accepted. Collective. */

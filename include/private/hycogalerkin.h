@@ -1,6 +1,7 @@
 /*
-  Common data of hybrid and projection-based models: a reduced system made from K, F, B and D on the RID by the modes,
-  which a HycoSolver solves. It is the first part of the `data` of both. All on one process.
+  Common to hybrid, projection-based, cubature models and to the condensed ones of paths: a reduced system made from K, F,
+  B and D on the RID by the modes, which a HycoSolver solves. What is constant is the first part of their `data`, what a
+  prediction changes of their `work`. All on one process.
 */
 #ifndef HYCOGALERKIN_H
 #define HYCOGALERKIN_H
@@ -12,11 +13,12 @@ typedef struct _n_HycoLoads *HycoLoads;
 typedef struct _n_HycoTable *HycoTable;
 typedef struct _n_HycoGalerkinPath *HycoGalerkinPath;
 
-/* The sets of (21)-(22), (32)-(37): unknowns of the model's own mesh that are not fixed, and contacts. */
+/* The sets of (21)-(22), (32)-(37): contacts, and unknowns of the model's own mesh that are not fixed, once fe is at
+   parameters. */
 typedef struct {
-  IS is_A, is_I;       /* unknowns inside the RID, on its interface */
   IS is_A_lambda;      /* contacts: indices in pairs */
-  IS is_Ac, is_Ac_all; /* A_c: unknowns of A on which these contacts act; A'_c: with those on the interface. From
+  IS is_A, is_I;       /* unknowns inside the RID, on its interface */
+  IS is_Ac, is_Ac_all; /* A_c: unknowns of A at the nodes of these contacts; A'_c: with those on the interface. From
                           HycoGalerkinContactMatrix() */
 } HycoIndexSets;
 
@@ -27,7 +29,8 @@ typedef struct {
   PetscReal *sign, *ratio;
 } HycoWatch;
 
-typedef struct _n_HycoGalerkin {
+/* Constant: what training makes and a file holds. */
+typedef struct _n_HycoGalerkinModel {
   /* functions of the type: Br and Btr, and Dr, from own_rows; Lambda from L. NULL: each contact of A_lambda has a
      multiplier */
   PetscErrorCode (*contact)(HycoROM), (*gap)(HycoROM), (*expand)(HycoROM);
@@ -36,17 +39,18 @@ typedef struct _n_HycoGalerkin {
   PetscErrorCode (*stiffness)(HycoROM), (*add_loads)(HycoROM),
       (*forces)(HycoROM, HycoFEState, Vec f_int, PetscReal *summands);
   PetscBool symmetric;
-  /* as in the file */
   PetscReal *G;    /* l x n_fe row major (hybrid all), else NULL */
   PetscReal ridge; /* of G, relative to sigma_1^2 */
   HycoTable table; /* Kr's entries as polynomials of the parameters; NULL: Kr is assembled */
   HycoScan scan;
-  /* online data */
+} * HycoGalerkinModel;
+
+/* Of a prediction: rom->work begins with it. */
+typedef struct _n_HycoGalerkin {
+  HycoGalerkinModel model;
   PetscInt n_free;       /* number of modes that are unknowns */
   PetscBool bordered;    /* hybrid all, large: gamma is an unknown beside U[A], with gamma = G U[A], and Kr is sparse */
-  PetscInt *fe_at;       /* by dof of mesh: index in fe_dof, or -1 */
-  PetscReal *Vp;         /* V with zero rows at full-order and fixed unknowns */
-  HycoReduced reduced;   /* how K is reduced to Kr, and its constant parts; created by the first assembly */
+  HycoReduced reduced;   /* submatrices, bases and products by which K and B are reduced; created when needed */
   HycoLoads loads;       /* solutions without contact shared by all loads; NULL: Kr is dense, or no parameter is of
                             this kind */
   HycoGalerkinPath path; /* of a scene with a history */
@@ -58,8 +62,9 @@ typedef struct _n_HycoGalerkin {
   HycoPairs own_pairs; /* the m contacts of A_lambda */
   HycoRows own_rows;   /* their rows, at fe's parameters */
   HycoSystem system;
-  Mat B; /* B[A_lambda, :] and D[A_lambda], for the indicator */
-  Vec D;
+  Mat B;               /* all contacts' rows over the unknowns of fe's mesh, those outside A_lambda empty */
+  PetscBool current_B; /* it is at fe's parameters */
+  Vec D;               /* their gaps, for the indicator */
 } * HycoGalerkin;
 
 /* Common implementations of ops. */
@@ -71,7 +76,7 @@ PetscErrorCode HycoGalerkinCondition(HycoROM model, PetscReal *condition);
 PetscErrorCode HycoGalerkinView(HycoROM model, PetscViewer viewer);
 PetscErrorCode HycoGalerkinMove(HycoROM model, HycoH5 file);
 /* Parts that are not fields of the ops; NULL-safe. */
-PetscErrorCode HycoGalerkinDestroy(HycoGalerkin galerkin);
+PetscErrorCode HycoGalerkinDestroy(HycoGalerkinModel galerkin);
 /* Scans the ranges for a singular reduced stiffness, with the points distributed over the ranks: the result is
    stored in the model, or the model is refused; then makes the table. `model` on every rank; changed on rank 0.
    Collective. */
@@ -88,9 +93,8 @@ PetscErrorCode HycoGalerkinSetRidge(HycoROM model, PetscReal ridge);
    is not. */
 PetscErrorCode HycoGalerkinAssemble(HycoROM model, const PetscReal mu[]);
 
-/* The reduced system (38) from K, F, the contacts' rows and gaps on the RID (reduced_system.c): a sparse Kr without
-   entries; Kr; Br and Btr; Fr and Dr. HycoReducedDestroy() is NULL-safe. */
-PetscErrorCode HycoReducedCreateSparse(HycoROM model);
+/* The reduced system (38) from K, F, the contacts' rows and gaps on the RID (reduced_system.c): Kr; Br and Btr; Fr and
+   Dr. HycoReducedDestroy() is NULL-safe. */
 PetscErrorCode HycoReducedFillStiffness(HycoROM model);
 PetscErrorCode HycoReducedFillContact(HycoROM model);
 PetscErrorCode HycoReducedFillVectors(HycoROM model);
@@ -100,7 +104,7 @@ PetscErrorCode HycoReducedDestroy(HycoReduced *reduced);
 /* Kr's entries in storage order, borrowed while Kr exists; the row of each. */
 PetscErrorCode HycoReducedEntries(HycoROM model, PetscInt *n, PetscScalar *a[]);
 PetscErrorCode HycoReducedRows(HycoROM model, PetscInt row[]);
-/* Creates galerkin->reduced if a table fills Kr. */
+/* Creates galerkin->reduced, if it does not exist: in place of HycoReducedFillStiffness(), where a table fills Kr. */
 PetscErrorCode HycoReducedPrepare(HycoROM model);
 
 /* The path of a scene with a history (galerkin_path.c): create in setup, solve, destroy (NULL-safe).
@@ -125,15 +129,15 @@ PetscErrorCode HycoGalerkinCheckContactBasis(HycoROM model);
 
 /* Creates the part of the model's mesh that the reduced problem uses, and its contacts (reduced_mesh.c): the nodes
    of cells and of A_lambda, and those needed for measured normals there. A prediction without reconstruction
-   evaluates nothing else. HycoGalerkinCreateSets(): once fe is on it. */
+   evaluates nothing else. HycoGalerkinCreateSets(): the sets of unknowns, if they do not exist; fe is at parameters,
+   from which its supports are known. */
 PetscErrorCode HycoGalerkinCreateOwn(HycoROM model);
 PetscErrorCode HycoGalerkinDestroyOwn(HycoGalerkin galerkin);
 PetscErrorCode HycoGalerkinCreateSets(HycoROM model);
 /* The rows of A_lambda's contacts at fe's parameters. On moved surfaces, a contact that acts on no free unknown of A
    gets an empty row: no equation of (38) would balance its force. */
 PetscErrorCode HycoGalerkinOwnRows(HycoROM model);
-/* B[A_lambda, :] at fe's parameters as a matrix over the unknowns of fe's mesh (the caller destroys it), with the
-   sets A_c and A'_c of its rows. */
-PetscErrorCode HycoGalerkinContactMatrix(HycoROM model, Mat *B);
+/* Updates B to fe's parameters, and the sets A_c and A'_c of its rows. */
+PetscErrorCode HycoGalerkinContactMatrix(HycoROM model);
 
 #endif

@@ -7,12 +7,16 @@
 typedef struct _n_HycoReconstruction *HycoReconstruction;
 
 typedef struct {
+  struct _n_HycoGalerkinModel galerkin;
+  PetscInt n_dual;             /* number of dual snapshots that are not zero */
+  PetscReal *S_lambda;         /* N_lambda x n_dual column major */
+  PetscInt reconstruct_solver; /* of (41), index in HycoReconstructSolvers */
+} * HycoHybridModel;
+
+typedef struct {
   struct _n_HycoGalerkin galerkin;
-  PetscInt n_dual;                   /* number of dual snapshots that are not zero */
-  PetscReal *S_lambda;               /* N_lambda x n_dual column major */
-  PetscInt reconstruct_solver;       /* of (41), index in HycoReconstructSolvers */
   HycoReconstruction reconstruction; /* data that (41) keeps between calls, created by the first */
-} * HycoHybridROM;
+} * HycoHybridWork;
 
 /* (41): forces of all contacts from those of A_lambda (in model->Lambda) and the displacement. */
 PetscErrorCode HycoHybridReconstruct(HycoROM model);

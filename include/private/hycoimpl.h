@@ -87,9 +87,16 @@ PetscErrorCode HycoListAdd(char list[HYCO_LINE], const char between[], const cha
 /* Fails for NULL and for an object of another class. Not collective. `classid` is one of HYCO_..._CLASSID. */
 PetscErrorCode HycoHandleCheck(const void *handle, const PetscClassId *classid, const char function[]);
 #define HycoCheckHandle(handle, classid) PetscCall(HycoHandleCheck((handle), &(classid), PETSC_FUNCTION_NAME))
-/* Begins a View: *viewer becomes stdout if it is NULL; on an ASCII viewer prints the object's class and name, and
-   pushes a tab, which the caller pops. */
-PetscErrorCode HycoViewBegin(PetscObject object, PetscViewer *viewer, PetscBool *ascii);
+/* Begins a View: checks the object; `viewer` becomes stdout if it is NULL; on an ASCII viewer prints the object's class
+   and name, and pushes a tab, which the caller pops; with another viewer returns from the calling function. */
+#define HycoViewBegin(object, classid, viewer)                                                                         \
+  do {                                                                                                                 \
+    PetscBool ascii_;                                                                                                  \
+    HycoCheckHandle(object, classid);                                                                                  \
+    PetscCall(HycoViewBegin_Private((PetscObject)(object), &(viewer), &ascii_));                                       \
+    if (!ascii_) PetscFunctionReturn(PETSC_SUCCESS);                                                                   \
+  } while (0)
+PetscErrorCode HycoViewBegin_Private(PetscObject object, PetscViewer *viewer, PetscBool *ascii);
 /* Defines XViewFromOptions() of a class. */
 #define HycoDefineViewFromOptions(Class, classid)                                                                      \
   PetscErrorCode Class##ViewFromOptions(Class object, PetscObject owner, const char option[])                          \
@@ -110,10 +117,12 @@ PetscErrorCode HycoViewBegin(PetscObject object, PetscViewer *viewer, PetscBool 
   }
 /* The communicator of an object of any class. */
 #define HycoComm(object) PetscObjectComm((PetscObject)(object))
-/* Removes one reference from `*object` and sets it to NULL; returns from the calling function unless that was the
-   last. */
-#define HycoDereference(object)                                                                                        \
+/* Begins a Destroy: returns from the calling function for NULL; checks the object, removes one reference and, unless that
+   was the last, sets `*object` to NULL and returns. */
+#define HycoDestroyBegin(object, classid)                                                                              \
   do {                                                                                                                 \
+    if (!(object) || !*(object)) PetscFunctionReturn(PETSC_SUCCESS);                                                   \
+    HycoCheckHandle(*(object), classid);                                                                               \
     if (--((PetscObject) * (object))->refct > 0) {                                                                     \
       *(object) = NULL;                                                                                                \
       PetscFunctionReturn(PETSC_SUCCESS);                                                                              \
@@ -124,6 +133,10 @@ PetscErrorCode HycoViewBegin(PetscObject object, PetscViewer *viewer, PetscBool 
  *n_all 0); the caller frees it by PetscFree(). Collective. */
 PetscErrorCode HycoConcatenate(MPI_Comm comm, PetscInt n, const void *mine, MPI_Datatype type, size_t size,
                                PetscInt *n_all, void *all);
+/* Sends n rows of `size` bytes, row k to rank to[k]; *got: the *n_got rows that arrive, by the rank that sent them and
+   then in its order. The caller frees it by PetscFree(). Collective. */
+PetscErrorCode HycoSendRows(MPI_Comm comm, PetscInt n, const PetscMPIInt to[], size_t size, const void *row,
+                            PetscInt *n_got, void *got);
 
 /* MPI_Bcast() from rank 0 and MPI_Allreduce() in place, with a PetscInt count: a count too large for MPI is an
    error. */
@@ -218,6 +231,8 @@ static inline PetscReal HycoRelative(PetscReal lost, PetscReal size)
 
 /* Seconds since the first call, on this rank's clock. */
 PetscReal HycoNow(void);
+/* CPU seconds of this process. */
+PetscReal HycoCPU(void);
 
 /* Recorded declarations; the strings of an option are one allocation, at its name. */
 typedef struct {
@@ -231,8 +246,16 @@ PetscErrorCode HycoOptionListDestroy(HycoOptionList *list);
 PetscErrorCode HycoOptionsForgetTable(void);
 /* The option of this name (without dash; the entry mu_ matches mu_radius), or NULL. Borrowed. */
 const HycoOption *HycoOptionListFind(const HycoOptionList *list, const char name[]);
-/* Creates an object of each class and calls its SetFromOptions with `options`. */
+/* Creates an object of each class and calls its SetFromOptions with `options` (src/package): the declaration pass of
+   the table. */
 PetscErrorCode HycoDeclareClasses(PetscOptions options);
+void HycoOptionsSetDeclare(PetscErrorCode (*declare)(PetscOptions));
+/* Registers the ids of all classes; sets them to 0, after PetscFinalize(); fails before the first. Not collective. */
+PetscErrorCode HycoClassesRegister(void);
+PetscErrorCode HycoClassesForget(void);
+PetscErrorCode HycoPackageCheck(void);
+/* Registers hyco's methods as types of Tao, beside TAO's. */
+PetscErrorCode HycoTaoRegisterAll(void);
 PetscErrorCode HycoSolverDeclare(PetscOptions options);
 PetscErrorCode HycoFOMDeclare(PetscOptions options);
 PetscErrorCode HycoSnapshotsDeclare(PetscOptions options);

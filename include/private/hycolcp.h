@@ -3,6 +3,7 @@
 #ifndef HYCOLCP_H
 #define HYCOLCP_H
 
+#include <hycoconeimpl.h>
 #include <hycoimpl.h>
 
 /* Called after each iteration of an active set, on every rank: its number, active contacts, changes made. */
@@ -57,14 +58,16 @@ PetscErrorCode HycoSetFactorSolve(HycoSetFactor factor, const PetscReal M[], con
 /*
   A dense problem: M column major, n x n. `symmetric`: M is positive semidefinite; then `factor` may be that of M's last
   set, or one after HycoSetFactorForget(); NULL: each set is factored anew. With p free unknowns before the n contacts
-  (floating bodies) z = (x_pinned, L), M and q as returned by HycoDirectFactor() and HycoDirectReduce(). All is
-  borrowed.
+  (floating bodies) z = (x_pinned, L), M and q as returned by HycoDirectFactor() and HycoDirectReduce(). `blocks`: the
+  laws of z and w, for HYCO_TAO_CONES types only; NULL: z, w >= 0. All is borrowed.
 */
 typedef struct {
   PetscInt n, p;
   const PetscReal *M, *q;
   PetscBool symmetric;
   HycoSetFactor factor;
+  const HycoBlocks *blocks;
+  PetscBool warm;   /* HYCO_TAO_CONES types start from the last solution of their Tao */
   PetscInt max_its; /* iterations of the active set; 0: 50 + 4 n */
   HycoLCPMonitor monitor;
   void *monitor_ctx;
@@ -92,16 +95,17 @@ PetscErrorCode HycoLCPSolveOnSet(PetscInt n, const PetscReal M[], const PetscRea
 /* The rank of a symmetric positive semidefinite matrix (k x k, overwritten), scaled to a unit diagonal, with
    tolerance 1e-12. */
 PetscErrorCode HycoGramRank(PetscInt k, PetscReal A[], PetscInt *rank);
+/* Semismooth Newton's method for blocks of any cone, z = P(z - rho w), w = q + M z, from the forces z; p = 0. */
+PetscErrorCode HycoLCPSemismooth(const HycoLCP *lcp, PetscReal z[], PetscInt *its, HycoLCPStatus *status);
 /* Lemke's complementary pivoting. */
 PetscErrorCode HycoLCPLemke(PetscInt n, const PetscReal M[], const PetscReal q[], PetscInt max_its, PetscReal z[],
                             PetscInt *its, HycoLCPStatus *status);
 
 /* -- problems solved by a Tao -- */
 
-#define HYCO_TAO_NAME       64
-#define HYCO_TAO_ACTIVE_SET "hyco_active_set"
-#define HYCO_TAO_LEMKE      "hyco_lemke"
-#define HYCO_TAO_BNLS       "bnls"
+#define HYCO_TAO_NAME              64
+#define HYCO_TAO_BNLS              "bnls"
+#define HYCO_TAO_SEMISMOOTH_NEWTON "hyco_semismooth"
 
 /* Properties and requirements of a Tao type; 0: one that a program has registered. */
 enum {
@@ -111,13 +115,12 @@ enum {
   HYCO_TAO_SEMISMOOTH = 8, /* solves the complementarity problem of z and w */
   HYCO_TAO_NEWTON = 16,    /* converges quadratically */
   HYCO_TAO_RESTARTS = 32,  /* may succeed from a second start after it has stalled */
-  HYCO_TAO_OWN = 64        /* one of hyco's types: takes the problem unscaled */
+  HYCO_TAO_OWN = 64,       /* one of hyco's types: takes the problem unscaled */
+  HYCO_TAO_CONES = 128     /* solves with blocks of any cone; the others know z >= 0 only */
 };
 int HycoTaoTraits(const char type[]);
 /* The type's registered name, empty for an unknown one; list: TAO's types that are suitable for contact. */
 PetscErrorCode HycoTaoFindType(const char type[], char name[HYCO_TAO_NAME], char list[HYCO_LINE]);
-/* Registers hyco's types beside TAO's. */
-PetscErrorCode HycoTaoRegisterAll(void);
 
 /* A Tao, kept from one problem to the next; its options are -hyco_tao_..., after the prefix of its owner. */
 typedef struct _n_HycoTao *HycoTao;

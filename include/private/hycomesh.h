@@ -76,6 +76,7 @@ struct _n_HycoTies {
 #define HYCO_MAX_CELL_NODES (HYCO_CELL_NODES * (1 + HYCO_FACET_NODES))
 
 struct _n_HycoMesh {
+  DM dm;                /* whose tables these are; NULL: they were read from a file */
   PetscInt dim, nv, nf; /* space dimension; nodes of a cell, of a facet */
   HycoCellType type;
   PetscBool mixed; /* whether the whole mesh has collapsed cells */
@@ -108,6 +109,7 @@ struct _n_HycoMesh {
   PetscInt *facets;      /* n_facets x nf */
   PetscInt *facet_group; /* index of the group; a facet in two groups occurs twice */
   PetscInt *facet_cell;  /* the cell that it bounds; -1: not in this mesh */
+  PetscInt *facet_point; /* of a submesh: the point of the DM that is a facet without its cell, else -1; or NULL */
   /* cell groups that are no body (regions): cells of group g as CSR over groups */
   PetscInt *group_cell_start, *group_cell;
   /* ties (ties.c); NULL if the scene has none. The tied nodes of this mesh, ascending; their masters, all of which
@@ -175,12 +177,18 @@ PetscErrorCode HycoMeshSetNodeBodies(HycoScene scene, HycoMesh mesh);
 PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene);
 
 /*
-  The part of a whole mesh with the cells keep[0..n_keep) (ascending) and, after their nodes, extra[0..n_extra). A facet
-  is kept, with its nodes, if its cell is, or if its group is in all_facets[0..n_all). node_whole and cell_whole are the
-  numbers in the whole mesh. The caller owns it.
+  The submesh of `of` with the cells keep[0..n_keep) (ascending) and, after their nodes, extra[0..n_extra), as a DM on
+  this process and its tables. A facet is kept, with its nodes, if its cell is, or if its group is in
+  all_facets[0..n_all); so are the masters of tied nodes. node_whole and cell_whole are the numbers in the whole mesh.
+  The caller owns it; not collective.
 */
-PetscErrorCode HycoMeshExtract(HycoMesh whole, PetscInt n_keep, const PetscInt keep[], PetscInt n_extra,
-                               const PetscInt extra[], PetscInt n_all, const PetscInt all_facets[], HycoMesh *part);
+PetscErrorCode HycoSubmesh(HycoScene scene, HycoMesh of, PetscInt n_keep, const PetscInt keep[], PetscInt n_extra,
+                           const PetscInt extra[], PetscInt n_all, const PetscInt all_facets[], HycoMesh *sub);
+/* The subpoint IS of a submesh's DM (borrowed; NULL: it is none): the points of the other DM, of a facet without its
+   cell that cell. */
+PetscErrorCode HycoSubmeshGetPoints(DM sub, IS *points);
+/* node[i]: the node of `of` that is node i of its submesh. */
+PetscErrorCode HycoSubmeshNodes(HycoMesh sub, HycoMesh of, PetscInt node[]);
 
 /* Sorts a[0..*n), unless it is sorted, and removes repeated entries. */
 PetscErrorCode HycoSortUnique(PetscInt *n, PetscInt a[]);
@@ -232,11 +240,20 @@ PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, Petsc
 /* Tables of each process's part: the cells that touch a node that it owns. On one process node_global, node_whole
    and cell_whole stay NULL. Collective. */
 PetscErrorCode HycoPlexToMesh(DM dm, HycoScene scene, HycoMesh *mesh);
-/* Gathers on rank 0 (elsewhere NULL) all of the parts, or with `in` (by group) the nodes and facets of these groups
-   and the cells with cell[e] (by cell of the part; NULL: none), with their nodes and facets; with the parts'
-   node_global, node_whole and cell_whole. The caller owns it. Collective. */
-PetscErrorCode HycoMeshGather(MPI_Comm comm, HycoMesh part, const PetscBool in[], const PetscBool cell[],
+/* The submesh on rank 0 (elsewhere NULL) of a distributed mesh with the nodes and facets of groups (in: by group) and
+   the cells with cell[e] (by cell of the part; NULL: none), with the parts' node_global, node_whole and cell_whole; its
+   subpoint IS numbers the points of all processes, those of rank 0 first. The caller owns it. Collective. */
+PetscErrorCode HycoMeshGather(HycoScene scene, HycoMesh part, const PetscBool in[], const PetscBool cell[],
                               HycoMesh *mesh);
+/* The nodes node[0..n) (numbers in the distributed vectors, of any ranks, perhaps repeated) with all facets of the
+   groups in[] around them, the nodes of these, and the masters of tied ones, as a mesh of this process; around a node
+   are also the facets of nodes that are tied to it. The mesh has no cells (1D: those of the facets), knows to which
+   rank each node belongs (HycoMeshOwned()), and has all groups with its own nodes of them. The caller owns it.
+   Collective. */
+PetscErrorCode HycoMeshRings(MPI_Comm comm, HycoMesh part, const PetscBool in[], PetscInt n, const PetscInt node[],
+                             HycoMesh *mesh);
+/* The ranks that own nodes (numbers in the distributed vectors). Collective. */
+PetscErrorCode HycoMeshOwners(MPI_Comm comm, HycoMesh part, PetscInt n, const PetscInt global[], PetscMPIInt owner[]);
 /* place[k]: the number of different keys of all processes that are smaller than key[k] >= 0. Collective. */
 PetscErrorCode HycoRankInts(MPI_Comm comm, PetscInt n, const PetscInt key[], PetscInt place[], PetscInt *total);
 PetscErrorCode HycoRankKeys(MPI_Comm comm, PetscInt n, const PetscInt64 key[], PetscInt place[], PetscInt *total);
@@ -249,18 +266,16 @@ PetscErrorCode HycoMeshNodeSF(MPI_Comm comm, HycoMesh part, PetscInt n, const Pe
 PetscErrorCode HycoSFBcast(PetscSF sf, MPI_Datatype type, PetscInt width, const void *root, void *leaf);
 PetscErrorCode HycoSFSend(PetscSF sf, MPI_Datatype type, PetscInt width, const void *leaf, void *root);
 
-/* The order of the file: the nodes and cells that a part owns (it owns the cells whose first node it owns) and rank
-   0's nodes of a surface are leaves of star forests, whose roots are the rows of each process, n[] from first[]. */
-typedef enum { HYCO_ON_NODES, HYCO_ON_CELLS, HYCO_ON_SURFACE, HYCO_N_PLACES } HycoPlace;
+/* The order of the file: the nodes and cells that a part owns (it owns the cells whose first node it owns) are leaves of
+   star forests, whose roots are the rows of each process, n[] from first[]. */
+typedef enum { HYCO_ON_NODES, HYCO_ON_CELLS, HYCO_N_PLACES } HycoPlace;
 typedef struct {
   MPI_Comm comm;
   PetscInt all[HYCO_N_PLACES], n[HYCO_N_PLACES], first[HYCO_N_PLACES];
   PetscSF sf[HYCO_N_PLACES];
 } HycoFileOrder;
-/* surface: on rank 0, NULL elsewhere. root: rank 0 has all rows, else all processes have about the same number.
-   Collective. */
-PetscErrorCode HycoFileOrderCreate(MPI_Comm comm, HycoMesh part, HycoMesh surface, PetscBool root,
-                                   HycoFileOrder **order);
+/* root: rank 0 has all rows, else all processes have about the same number. Collective. */
+PetscErrorCode HycoFileOrderCreate(MPI_Comm comm, HycoMesh part, PetscBool root, HycoFileOrder **order);
 PetscErrorCode HycoFileOrderDestroy(HycoFileOrder **order);
 /* Sends values (by node, cell or surface node, `components` of a type each) to the rows; rows without a value are
    unchanged. Collective. */

@@ -171,7 +171,7 @@ PetscErrorCode HycoSeriesRestore(HycoFOM fom);
 PetscErrorCode HycoSeriesEnd(HycoFOM fom);
 PetscErrorCode HycoSeriesDestroy(HycoSeries *series);
 /* The fields of a series at one time, for full order and reduced models: a HycoFE of each rank with the state of its
-   cells, u on it, and on rank 0 the contacts' surface with displacements and forces. Borrowed. */
+   cells, u on it, and the surface of the rank's contacts with displacements and forces. Borrowed. */
 typedef struct {
   MPI_Comm comm;
   HycoFE fe;

@@ -11,12 +11,12 @@ extern const char *const HycoDuals[]; /* their names in options and files; NULL 
 /* The whole mesh is the RID; no full-order unknown, no dual snapshot. Also the first part of the data of the
    cubature model. */
 typedef struct _n_HycoProjection {
-  struct _n_HycoGalerkin galerkin;
+  struct _n_HycoGalerkinModel galerkin;
   HycoDual dual;
   PetscInt l_lambda;
   PetscReal *V_lambda;   /* N_lambda x l_lambda column major, no entry negative, columns of unit 2-norm */
   PetscReal dual_misfit; /* |S_lambda - V_lambda H|^2 / |S_lambda|^2 with the best H >= 0 of the training */
-} * HycoProjectionROM;
+} * HycoProjectionModel;
 
 /* Training options and data of a run; the first part of t->training. */
 typedef struct _n_HycoForceBasis {
@@ -26,7 +26,7 @@ typedef struct _n_HycoForceBasis {
 } * HycoForceBasis;
 
 /* In create: sets how forces enter the reduced system. */
-void HycoProjectionInit(HycoProjectionROM projection);
+void HycoProjectionInit(HycoProjectionModel projection);
 PetscErrorCode HycoProjectionSetUp(HycoROM model);
 PetscErrorCode HycoProjectionMove(HycoROM model, HycoH5 file);
 PetscErrorCode HycoProjectionViewForces(HycoROM model, PetscViewer viewer);

@@ -16,7 +16,10 @@ PetscErrorCode HycoQuantitiesMarkCells(HycoScene scene, HycoMesh mesh, PetscBool
    whose loads and contact forces it is minus the sum; for no body: it does not follow. mesh: whole, or the processes'
    parts. Collective. */
 PetscErrorCode HycoQuantitiesBalance(MPI_Comm comm, HycoScene scene, HycoMesh mesh, PetscBool balanced[]);
-/* Marks the cells (n_cells) with the loads of these bodies. */
+/* Marks the cells (n_cells) with the loads of the bodies of[b], and those of all loads on facets, points and lines,
+   which may be shared with other bodies. */
+PetscErrorCode HycoMarkLoads(HycoScene scene, HycoMesh mesh, const PetscBool of[], PetscBool needed[]);
+/* The same for the bodies in a balanced[]. */
 PetscErrorCode HycoQuantitiesMarkLoads(HycoScene scene, HycoMesh mesh, const PetscBool balanced[], PetscBool needed[]);
 
 #endif

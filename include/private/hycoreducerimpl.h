@@ -194,6 +194,11 @@ PetscErrorCode HycoPathModesAdd(HycoReducer t, Mat path, PetscReal tol, HycoPath
 PetscErrorCode HycoPathModesJoin(HycoReducer t, HycoPathModes *modes, PetscInt N, PetscInt n_rows, PetscReal tol,
                                  PetscInt max_modes, HycoBasis *basis);
 PetscErrorCode HycoPathModesDestroy(HycoPathModes *modes);
+/* The marked cells of the mesh (by cell of the process's part) as a mesh on rank 0; elsewhere NULL. The caller owns it.
+   Collective. */
+PetscErrorCode HycoReducerGatherMesh(HycoReducer t, const PetscBool needed[], HycoMesh *mesh);
+/* Sets the bodies that contact alone holds in the model, which is on rank 0 (free_bodies.c). Collective. */
+PetscErrorCode HycoReducerFindFloating(HycoReducer t, HycoROM model);
 /* On rank 0 (column major; empty elsewhere) the first n_columns of S, a matrix of displacements, at nodes that rank
    0 gives by their numbers in the whole mesh; or of all snapshots. The caller frees it. Collective. */
 PetscErrorCode HycoReducerFetchRows(HycoReducer t, Mat S, PetscInt n_columns, PetscInt n, const PetscInt node[],
@@ -318,11 +323,11 @@ typedef struct {
   PetscBool lost;          /* and whether the last of them stopped it */
 } HycoHeldOutRace;
 
-/* Predicts with the last model built at each held-out point, whose solution must be in the store; rows[n] on every
+/* Predicts with the last model built at each of n points, whose solutions must be in the store; rows[n] on every
    rank. The ranks share the points, and each compares its rows of the whole mesh. race: for paths; NULL: all points.
    Collective. */
-PetscErrorCode HycoReducerPredictHeldOut(HycoReducer t, HycoROM model, HycoSnapshots store, HycoHeldOutRace *race,
-                                         HycoHeldOut rows[]);
+PetscErrorCode HycoReducerPredictHeldOut(HycoReducer t, HycoSamples points, HycoROM model, HycoSnapshots store,
+                                         HycoHeldOutRace *race, HycoHeldOut rows[]);
 /* Predicts at a held-out point of the store, a path in the steps of full order. */
 PetscErrorCode HycoHeldOutPredict(HycoROM model, HycoSnapshots store, const PetscReal mu[]);
 /* At one held-out point by output of the scene: the absolute error, and the largest absolute value at full order; for a
@@ -330,10 +335,10 @@ PetscErrorCode HycoHeldOutPredict(HycoROM model, HycoSnapshots store, const Pets
 typedef struct {
   PetscReal error[HYCO_MAX_QUANTITIES], size[HYCO_MAX_QUANTITIES];
 } HycoOutputErrors;
-/* Predicts again with the final model where rows[] converged, and sets errors[n], zero before, on rank 0. Nothing if
+/* Predicts again with the final model at those of n points where rows[] converged, and sets errors[n], zero before, on rank 0. Nothing if
    the scene has no outputs. Collective; model, rows and errors are those of rank 0. */
-PetscErrorCode HycoReducerJudgeOutputs(HycoReducer t, HycoROM model, HycoSnapshots store, const HycoHeldOut rows[],
-                                       HycoOutputErrors errors[]);
+PetscErrorCode HycoReducerJudgeOutputs(HycoReducer t, HycoSamples points, HycoROM model, HycoSnapshots store,
+                                       const HycoHeldOut rows[], HycoOutputErrors errors[]);
 /* The largest 2-norm of contact forces; a relative error, where forces below a tenth of that norm are divided by the
    tenth (PETSC_INFINITY: not converged, or x/0); a summary of all. */
 PetscReal HycoHeldOutForce(PetscInt n, const HycoHeldOut rows[]);

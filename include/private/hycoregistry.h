@@ -6,23 +6,29 @@
 
 typedef void HycoVoidFn(void); /* any function, cast back when called */
 
-/* A static variable with its first two members set; emptied by PetscFinalize(). */
+/* A static variable with its first member set; filled by src/package and by programs, emptied by PetscFinalize(). */
 typedef struct _n_HycoRegistry HycoRegistry;
 struct _n_HycoRegistry {
-  PetscErrorCode (*add_own)(void); /* adds the library's types, at the first use */
-  PetscBool sorted;                /* names in alphabetical order; else in the order of registration */
+  PetscBool sorted; /* names in alphabetical order; else in the order of registration */
   /* state */
-  PetscBool begun, adding_own;
+  PetscBool begun;
   PetscInt n;
   char **name; /* n entries, then NULL */
-  HycoVoidFn **create;
+  PetscFunctionList create;
   HycoRegistry *next; /* list of all registries in use */
 };
 
 /* Adds a type, or replaces one of the same name. The options of a program's type are then listed too: an earlier
    result of HycoGetOptionTable() is invalid. Not collective. */
-#define HycoRegistryAdd(registry, name, create) HycoRegistryAdd_Private(registry, name, (HycoVoidFn *)(create))
-PetscErrorCode HycoRegistryAdd_Private(HycoRegistry *registry, const char name[], HycoVoidFn *create);
+PetscErrorCode HycoRegistryAdd(HycoRegistry *registry, const char name[], HycoVoidFn *create);
+/* Defines XRegister() of a class: function(name, create). */
+#define HycoDefineRegister(function, registry, creator)                                                                \
+  PetscErrorCode function(const char name[], creator)                                                                  \
+  {                                                                                                                    \
+    PetscFunctionBegin;                                                                                                \
+    PetscCall(HycoRegistryAdd(&registry, name, (HycoVoidFn *)create));                                                 \
+    PetscFunctionReturn(PETSC_SUCCESS);                                                                                \
+  }
 /* The function that creates a type, in *create: NULL if there is no type of this name. Not collective. */
 #define HycoRegistryFind(registry, name, create) HycoRegistryFind_Private(registry, name, (HycoVoidFn **)(create))
 PetscErrorCode HycoRegistryFind_Private(HycoRegistry *registry, const char name[], HycoVoidFn **create);

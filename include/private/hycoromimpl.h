@@ -12,6 +12,7 @@
 typedef struct _n_HycoProbe *HycoProbe;
 typedef struct _n_HycoCarried *HycoCarried;
 typedef struct _n_HycoResultants *HycoResultants;
+typedef struct _n_HycoFloating *HycoFloating;
 typedef struct _n_HycoBalance *HycoBalance;
 
 /* Rows of B in CSR over dofs of a mesh, and D, as in HycoContactRows(). */
@@ -69,17 +70,18 @@ typedef struct {
   HycoStep *step; /* n_listed: its steps with the scene's quantities; NULL: not evaluated yet, or there are none */
 } HycoTrace;
 
-/* Data of all types of reduced model; a type's own data is in `data`. */
-struct _p_HycoROM {
-  PETSCHEADER(HycoROMOps);
+/* What a file holds: constant once training or loading has ended, and shared by the HycoROMs that HycoROMClone() makes.
+   A type's own is in `data`. */
+typedef struct _n_HycoModel *HycoModel;
+struct _n_HycoModel {
+  PetscInt references;
   HycoROMType type; /* the registry's string */
   HycoROMTraits traits;
   char path[PETSC_MAX_PATH_LEN]; /* "": was never in a file */
-  /* the description, as in the file */
   HycoScene scene;
   HycoMesh mesh;           /* cells of Omega_A; its nodes and those of every contact */
   HycoPairs pairs;         /* all N_lambda contacts, node indices of mesh */
-  PetscInt *role;          /* by node of mesh */
+  IS rid, inside;          /* nodes of mesh: those of Omega_A; of them the set A (33), the others are the set I (32) */
   PetscInt *in_rid;        /* by contact: in A_lambda */
   PetscInt *closed;        /* by contact: has a force in some training solution; NULL: not known (older files) */
   PetscReal *master_reach; /* moved surfaces: largest distance of a master point, by contact of the scene; NULL: none
@@ -89,6 +91,7 @@ struct _p_HycoROM {
   PetscReal *sigma;        /* l singular values */
   HycoHybrid hybrid;
   PetscInt n_fe, *fe_dof; /* full-order displacements: dofs of mesh, ascending; hybrid models only */
+  HycoFloating floating;  /* the bodies that contact alone holds (floating.c); NULL: there are none, or an older file */
   PetscInt n_points;
   PetscReal *points; /* training points, n_points x n_parameters */
   PetscReal *reach;  /* least, then largest parameter values of the region of training (error_estimate.c); created
@@ -102,39 +105,53 @@ struct _p_HycoROM {
   char *search;         /* how train -target_... chose the settings, in words; NULL: it did not */
   PetscReal numbers[3]; /* condition number of the reduced stiffness (0: not known, or none), training errors of u and
                            lambda */
-  /* the whole mesh, on demand */
+  /* the whole mesh, read when needed */
   HycoMesh whole;
-  PetscReal *V_whole, *U_whole;
-  HycoFE fe_whole;
+  PetscReal *V_whole;
   HycoPairs whole_pairs;
-  HycoBalance balance; /* data kept by HycoROMGetEquilibrium(); NULL: not called */
-  PetscBool balanced;  /* it belongs to the last prediction */
-  HycoProbe probe;     /* of the scene's quantities; created by the first prediction that needs it */
-  HycoCarried carried; /* results of the contacts (contact_results.c); created when needed */
-  HycoPointMonitor point_monitor;
-  void *point_ctx;
-  /* online data */
+  void *data;
+};
+
+/* A model, with its last prediction and what is allocated to make one. */
+struct _p_HycoROM {
+  PETSCHEADER(HycoROMOps);
+  HycoModel model;
+  /* options and callbacks */
   PetscBool full_order, full_displacement; /* full-order actions requested from the caller, who has the scene:
                                               HycoROMGetFallback() */
   PetscBool wants_equilibrium;             /* -hyco_residual: each prediction computes the residual */
-  PetscBool ready, reconstruct, solved, whole_current;
-  HycoFE fe;                /* on mesh, or on a mesh of its first nodes (galerkin) */
-  PetscInt n, n_L;          /* numbers of unknowns and multipliers of the reduced problem */
-  PetscInt m, *contact;     /* the contacts of A_lambda: index in pairs */
-  HycoPairs *of_fe;         /* the same contacts on fe's mesh */
-  PetscInt *slave_id;       /* mesh-file tag of each contact's slave */
-  HycoMesh beyond;          /* mesh without cells; NULL until needed */
-  HycoFE fe_beyond;         /* on it */
+  PetscBool reconstruct;
+  HycoPointMonitor point_monitor;
+  void *point_ctx;
+  /* what setup allocates */
+  PetscBool ready;
+  HycoFE fe;            /* on mesh, or on a mesh of its first nodes (galerkin) */
+  PetscInt n, n_L;      /* numbers of unknowns and multipliers of the reduced problem */
+  PetscInt m, *contact; /* the contacts of A_lambda: index in pairs */
+  HycoPairs *of_fe;     /* the same contacts on fe's mesh */
+  PetscInt *slave_id;   /* mesh-file tag of each contact's slave */
+  PetscBool spread;     /* Lambda may be nonzero outside A_lambda */
+  HycoSolver solver;
+  void *work; /* the type's */
+  /* created when needed */
+  HycoMesh beyond;     /* mesh without cells */
+  HycoFE fe_beyond;    /* on it */
+  HycoFE fe_whole;     /* on whole */
+  HycoFE fe_floating;  /* on the loaded cells of the bodies that contact alone holds */
+  HycoProbe probe;     /* of the scene's quantities */
+  HycoCarried carried; /* results of the contacts (contact_results.c) */
+  HycoBalance balance; /* data kept by HycoROMGetEquilibrium() */
+  HycoRows rows;       /* of B over dofs of mesh, all contacts; current after HycoROMComplete() */
+  /* the last prediction */
+  PetscBool solved;
   PetscBool beyond_current; /* U on all nodes of mesh and the rows of all contacts are current: HycoROMComplete() was
                                called */
-  PetscBool spread;         /* Lambda may be nonzero outside A_lambda */
+  PetscBool whole_current;  /* U_whole is current */
+  PetscBool balanced;       /* balance belongs to it */
   PetscReal remainder;      /* of (41): the relative difference of the forces in the RID; of a path the largest */
-  HycoRows rows;            /* of B over dofs of mesh, all contacts; current after HycoROMComplete() */
-  HycoSolver solver;
-  PetscReal *gamma, *U, *Lambda, *stress;
+  PetscReal *gamma, *U, *Lambda, *stress, *U_whole;
   HycoTrace trace; /* of a scene with a history */
   HycoPrediction prediction;
-  void *data;
 };
 
 PetscErrorCode HycoROMCreate(HycoROM *model);
@@ -145,7 +162,7 @@ PetscErrorCode HycoTraceBegin(HycoROM model);
 PetscErrorCode HycoTraceAdd(HycoROM model, PetscReal t);
 PetscErrorCode HycoTraceList(HycoROM model, PetscReal **sigma, PetscReal **inelastic);
 /* For that listed time, once m->Lambda has all contacts: its forces, and the norm of U in the RID. */
-void HycoTraceMeasure(HycoROM model, HycoStep *step);
+PetscErrorCode HycoTraceMeasure(HycoROM model, HycoStep *step);
 PetscErrorCode HycoTraceFree(HycoROM model);
 /* HycoROMSetSteps() for a path that training judges: it ends if too many of these steps are halved. */
 PetscErrorCode HycoROMSetJudgedSteps(HycoROM model, PetscInt n, const PetscReal t[]);
@@ -184,6 +201,10 @@ PetscErrorCode HycoROMBringRows(HycoROM model, const PetscReal mu[]);
 PetscErrorCode HycoROMExpand(HycoROM model);
 /* The number of modes with a singular value: those of a POD. */
 PetscInt HycoROMCountPOD(HycoROM model);
+/* Creates the sets of nodes from their number at each node of mesh: 0, 1 (on the interface I), or 2 (in A); NULL: all
+   are in A. HycoROMGetDomain(): these numbers. */
+PetscErrorCode HycoROMSetDomain(HycoROM model, const PetscInt sets[]);
+PetscErrorCode HycoROMGetDomain(HycoROM model, PetscInt sets[]);
 /* Sets the full-order unknowns (dofs of mesh, any order). */
 PetscErrorCode HycoROMSetFE(HycoROM model, HycoHybrid hybrid, PetscInt n, const PetscInt dof[]);
 
@@ -227,6 +248,22 @@ PetscBool HycoROMHasAllForces(HycoROM model);
 /* The sum of the same contact forces on the bodies of[b] of the scene along an axis; if it has all. */
 PetscErrorCode HycoROMPushBodies(HycoROM model, const PetscReal Lambda[], const PetscBool of[], PetscInt axis,
                                  PetscReal *force);
+
+/*
+  Equilibrium of bodies that contact alone holds (floating.c). HycoFloatingCreate(): n rigid motions that no support or
+  spring prevents, the bodies of[n x n_bodies] that each moves, the mesh of the cells with their loads (NULL: none);
+  takes ownership of the mesh, after an error too. HycoFloatingMove(): writes it to the model file or reads it.
+  HycoFloatingBalance(): at the last prediction's parameters, scales the positive forces in Lambda, each by the
+  exponential of a linear combination of its works on the motions, so that the forces' work on each motion is that of
+  the loads; forces that cannot do that stay as they are. After HycoROMSetUp(). All are NULL-safe.
+*/
+PetscErrorCode HycoFloatingCreate(PetscInt n, const HycoRigid rigid[], PetscInt n_bodies, const PetscInt of[],
+                                  HycoMesh loaded, HycoFloating *floating);
+PetscErrorCode HycoFloatingMove(HycoH5 file, HycoROM model);
+PetscErrorCode HycoFloatingBalance(HycoROM model);
+PetscErrorCode HycoFloatingDestroy(HycoFloating *floating);
+/* Writes a mesh below prefix/, or reads it and creates *mesh. */
+PetscErrorCode HycoMeshMove(HycoH5 file, const char prefix[], PetscInt n_bodies, HycoMesh *mesh);
 
 /* The reactions that follow from balance (resultants.c): balanced[] by HycoQuantitiesBalance(), the mesh of the cells
    marked by HycoQuantitiesMarkLoads(); takes ownership of both, after an error too. */

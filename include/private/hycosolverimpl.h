@@ -12,7 +12,8 @@ struct _p_HycoSystem {
   Mat G;        /* referenced: the flexibility B K^-1 Bt, dense; NULL if K is given */
   Vec F, D;     /* referenced; D: if G is given, the gap without forces */
   PetscBool symmetric;
-  PetscInt n, m; /* numbers of unknowns, contacts */
+  PetscInt n, m;      /* numbers of unknowns, and of rows: of contacts if these have one component each */
+  HycoBlocks *blocks; /* of this rank's rows; NULL: each row is a force >= 0 */
   /* work vectors of the residuals, created by the first */
   Vec work_x[2], work_L; /* like F, like D */
   PetscReal size_B;      /* its largest row sum, valid while B is unchanged */
@@ -20,6 +21,8 @@ struct _p_HycoSystem {
   HycoOperatorState seen_B;
 };
 
+/* Fails on every rank if the blocks are not those of the rows. Collective. */
+PetscErrorCode HycoSystemCheckBlocks(HycoSystem system);
 /* Creates the work vectors of a system whose vectors are set. */
 PetscErrorCode HycoSystemWork(HycoSystem system);
 
@@ -47,6 +50,7 @@ struct _HycoSolverFormOps {
 };
 struct _n_HycoSolverForm {
   char name[32];
+  PetscBool cones; /* trait: takes blocks of any cone; false: forces >= 0 only */
   struct _HycoSolverFormOps ops[1];
   void *data;
 };
@@ -108,7 +112,7 @@ struct _p_HycoSolver {
   PetscReal seconds_factor, seconds_solve, seconds_before; /* before: time of a factor computed ahead of the solve */
 };
 
-extern const char *const HycoSolverTypes[]; /* active_set, tao, lemke, NULL */
+extern const char *const HycoSolverTypes[]; /* active_set, tao, lemke, semismooth, NULL */
 extern const char *const HycoLinearNames[];
 
 /* One of each registered form. */

@@ -1,4 +1,5 @@
-/* Internal to complementarity/: the Tao that solves the problems, and the data that hyco's own types read from it. */
+/* Internal to complementarity/: the Tao that solves HycoSolver's problems, and the data that it attaches to hyco's own
+   types. */
 #ifndef HYCOTAO_H
 #define HYCOTAO_H
 
@@ -23,6 +24,8 @@ struct _n_HycoTao {
   PetscBool *active;
   PetscInt its;
   HycoLCPStatus status;
+  PetscReal *last; /* n_last forces of the last solution by a type for any cone */
+  PetscInt n_last;
   HycoLCPMonitor monitor;
   void *monitor_ctx;
   Vec placed; /* z, because a Tao must have a solution vector */
@@ -34,5 +37,9 @@ struct _n_HycoTao {
   Mat dense;        /* H of a dense problem */
   Vec f, lo, hi, y;
 };
+
+/* Minimises the Tao's f within its bounds by its Hessian and gradient; the quadratic models by Lemke's method, or by
+   the active set. Collective. */
+PetscErrorCode HycoTaoNewton(Tao tao, PetscBool lemke);
 
 #endif

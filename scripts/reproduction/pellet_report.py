@@ -74,7 +74,7 @@ def numbers(found):
 
 
 def refused(entry):
-    return ["", "", "refused: " + entry["train"]["refused"].split(":")[0], "", "", "", ""]
+    return ["", "", "refused: " + entry["train"]["refused"].split(":")[0].split(" (")[0], "", "", "", ""]
 
 
 def measured(entry, contact):
@@ -120,7 +120,6 @@ def report(runs, size, found, folder):
     values = {"folder": folder, "mesh": size.mesh, "numbers": table(*numbers(found)), "bounds": table(*bound_rows(found)),
               "first": np.flatnonzero(contact)[0] + 1, "contacts": contact.sum(), "second": f"{second:.0e}",
               "touching": touching, "dimension": b["dimension"], "five": radii_of("5 radii"), "nine": radii_of("9 radii"),
-              "refusals": refusals(found), "without": effects(found, "no extension"), "layers": effects(found, "no layer"),
               "fine_u": one(fine["error_u_rid"]), "fine_sigma": one(fine["error_sigma_11"]), "ms": f"{fine['ms']:.3g}",
               "full_ms": f"{fine['full_ms']:.3g}", "ramp": f"{fine['ramp']:.2g}",
               "force": f"{found['ramp']['total_contact_force'][-1]:.1f}",
@@ -139,30 +138,6 @@ def bound_values(b):
 
 def radii_of(name):
     return ", ".join(f"{r:g}" for r in pellet.RADII[name])
-
-
-def refusals(found):
-    """The messages with which hyco refused models."""
-    lines = [f"- {', '.join(m)}: {e['train']['refused']}" for m, e in found["entries"].items() if "compare" not in e]
-    return ("Refused, in hyco's words:\n\n" + "\n".join(lines) + "\n\n") if lines else ""
-
-
-def effects(found, variant):
-    """For each training set that was run both ways: errors with the whole RID, and without a part of it."""
-    told = []
-    for m, entry in found["entries"].items():
-        whole = found["entries"].get((*m[:2], "paper"))
-        if m[2] != variant or not whole or "compare" not in whole:
-            continue
-        told.append([m[0], m[1], said(whole, found["contact"]),
-                     "refused" if "compare" not in entry else said(entry, found["contact"])])
-    return table(["trained on", "energy left", "with", "without"], told)
-
-
-def said(entry, contact):
-    w = pellet.worst(entry, contact)
-    note = f" ({w['failed']} steps not converged)" if w["failed"] else ""
-    return f"{one(w['error_u_rid'])} and {one(w['error_sigma_11'])}{note}"
 
 
 def part_values(found):

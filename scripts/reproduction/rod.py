@@ -42,7 +42,7 @@ def run(runs, size):
     """Runs everything; returns the reports, and the file of the study's points."""
     name = f"rod-{size.mesh or 'slice'}"
     model, mu = runs.path(f"{name}.h5"), ",".join(map(str, POINT))
-    found = {"name": name, "train": runs.hyco(f"{name}-train", "train", *size.scene, "-grid", size.training, "-model", model,
+    found = {"name": name, "train": runs.hyco(f"{name}-train", "train", *size.scene, "-grid", size.training, "-grid_type", "centred", "-model", model,
                                               "-hyco_snapshots", runs.path(f"{name}.snapshots"))}
     found["full"] = runs.hyco(f"{name}-full", "solve", *size.scene, "-mu", mu, "-output", runs.path(f"{name}-full.xdmf"))
     found["reduced"] = runs.hyco(f"{name}-reduced", "predict", "-model", model, "-mu", mu, "-output", runs.path(f"{name}-reduced.xdmf"))

@@ -41,7 +41,7 @@ class Size:
 
 
 def train_regular(runs, name):
-    return runs.hyco(f"{name}-train", "train", *SCENE, "-grid", "10,12", "-hyco_snapshots", runs.path("grid.snapshots"),
+    return runs.hyco(f"{name}-train", "train", *SCENE, "-grid", "10,12", "-grid_type", "centred", "-hyco_snapshots", runs.path("grid.snapshots"),
                      "-model", runs.path(f"{name}.h5"), *REGULAR[name])
 
 
@@ -96,7 +96,7 @@ def left_by_pod(rows):
 
 def left_by_nnmf(runs, k, its):
     name = f"nnmf-{its}-{k}"
-    report = runs.hyco(name, "train", *SCENE, "-grid", "10,12", "-hyco_snapshots", runs.path("grid.snapshots"), "-model",
+    report = runs.hyco(name, "train", *SCENE, "-grid", "10,12", "-grid_type", "centred", "-hyco_snapshots", runs.path("grid.snapshots"), "-model",
                        runs.path(f"{name}.h5"), *PROJECTION, "-hyco_nnmf_vectors", k, "-hyco_nnmf_max_its", its)
     return k, report["dual_misfit"]
 

@@ -1,4 +1,5 @@
-"""Sections of a document that scripts write: between `<!-- NAME: written by ... -->` and `<!-- end NAME -->`."""
+"""Sections of a document that scripts write: between `<!-- NAME: written by ... -->` and `<!-- end NAME -->`, and all rows behind them, in .csv files."""
+import csv
 import os
 import re
 
@@ -17,3 +18,11 @@ def write_section(path, name, lines):
         raise SystemExit(f"{path} has no section {name}")
     with open(path, "w", encoding="utf-8") as file:
         file.write(found.sub(lambda m: m[1] + "\n" + "\n".join(lines) + "\n\n" + m[2], text))
+
+
+def write_rows(page, name, head, rows):
+    """All columns of a page's table, in NAME.csv in the folder of the page's name."""
+    folder = os.path.splitext(page)[0]
+    os.makedirs(folder, exist_ok=True)
+    with open(os.path.join(folder, name + ".csv"), "w", encoding="utf-8", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows([head, *rows])

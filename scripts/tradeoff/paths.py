@@ -14,7 +14,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from cases import Setting
 from page import machine
-from report import COLORS, MARKS, percent, seconds, table
+from report import COLORS, MARKS, percent, seconds, speedup, table
 from timing import timed
 
 NAMES = ["gap", "q2", "creep"]
@@ -63,7 +63,7 @@ TIMED, ENOUGH = (8, 64, 512), 0.5  # paths of a batch, in turn; until their CPU 
 
 def case_of(mesh):
     if mesh == "slice":
-        return Case("rod, a slice", ["-scene", "examples/rod"], TRAINING | {"grid 5,2,2": ["-grid", "5,2,2"]}, SLICE,
+        return Case("rod, a slice", ["-scene", "examples/rod"], TRAINING | {"grid 5,2,2": ["-grid", "5,2,2", "-grid_type", "centred"]}, SLICE,
                     [SEARCHED, Setting("hybrid", "grid 5,2,2", (*TIGHT, *LAYER)), Setting("hybrid", "", (("pod_tol", "1e-9"), *LAYER)), Setting("hybrid", "", (*TIGHT, *LAYER)), *BASELINES,
                      *CONDENSED, Setting("regression", "", (*TIGHT, ("rid_layers", 1)))], SLICE[::7])
     scene = ["-scene", "examples/rod/3d.yaml", "-scene_mesh", f"examples/pellet/{mesh}.msh"]
@@ -71,8 +71,8 @@ def case_of(mesh):
     if mesh == "C":  # half an hour for the references, ten minutes for each setting
         scene += ["-history_times", ",".join(map(str, CLOSE))]
         planes = [Setting("hybrid", "", (("pod_tol", tol), *PLANE, LOOSE)) for tol in ("1e-10", "1e-12", "1e-14")]
-        return Case("rod, mesh C", scene, TRAINING | {"grid 3,2,2": ["-grid", "3,2,2"]}, SOLID, [*planes, cubature("1e-4", RANK)], SOLID[1:2])
-    return Case(f"rod, mesh {mesh}", scene, TRAINING | {"grid 3,2,2": ["-grid", "3,2,2"]}, SOLID,
+        return Case("rod, mesh C", scene, TRAINING | {"grid 3,2,2": ["-grid", "3,2,2", "-grid_type", "centred"]}, SOLID, [*planes, cubature("1e-4", RANK)], SOLID[1:2])
+    return Case(f"rod, mesh {mesh}", scene, TRAINING | {"grid 3,2,2": ["-grid", "3,2,2", "-grid_type", "centred"]}, SOLID,
                 [SEARCHED, *planes, Setting("hybrid", "grid 3,2,2", (*TIGHT, *PLANE)), Setting("hybrid", "", (*TIGHT, *PLANE, ("rid_layers", 1))), *BASELINES[:4], BASELINES[5],
                  *CONDENSED, Setting("regression", "", (*TIGHT, PLANE[0], PLANE[2]))], SOLID[:3])
 
@@ -161,8 +161,8 @@ class Bench:
 
 def full_orders(bench, arguments):
     """Their rows; `status` says where and how all was measured."""
-    words = (f"On {machine()}, {time.strftime('%Y-%m-%d')}; CPU seconds, one core; other programs on the machine add tens of per cent. The models are trained on 12 scattered paths (`-scatter 12`) unless a grid is named, and judged on {len(bench.case.unseen)} "
-             "paths that no training has seen." + (" The times of full order are those of `scripts/bench history`, at the listed times of the scene." if arguments.full_order else ""))
+    words = (f"{machine()}, {time.strftime('%Y-%m-%d')}; CPU seconds of one core, other programs add tens of per cent; trained on `-scatter 12` unless a grid is named, "
+             f"judged on {len(bench.case.unseen)} unseen paths." + (" Full order: `scripts/bench history`, at the scene's listed times." if arguments.full_order else ""))
     known = map(float, arguments.full_order.split(",")) if arguments.full_order else map(bench.full_order, ("tangent", "elastic"))
     return [{"id": 0, "type": "full", "label": name, "status": words, "path_s": cpu}
             for name, cpu in zip(("full order, Newton", "full order, the elastic factor kept"), known)]
@@ -199,36 +199,37 @@ def within(row, limits):
     return all(row.get(f"{kind}_max", float("inf")) <= limit for kind, limit in limits.items())
 
 
-def say(limits):
-    return ", ".join(f"{KINDS[kind]} {100 * limit:g} %" for kind, limit in limits.items())
+def line_of(words, row, full):
+    errors = [percent(row[k + "_max"]) if k + "_max" in row else "" for k in KINDS]
+    return [words, f"{row['id']}: {row['label'] if words else row['type']}", f"{100 * row['rid_fraction']:.1f}", *errors, seconds(row["path_s"]),
+            *(speedup(f["path_s"] / row["path_s"]) for f in full)]
 
 
-def line_of(row, full):
-    errors = [f"{percent(row[k + '_median'])} / {percent(row[k + '_max'])}" if k + "_max" in row else "" for k in KINDS]
-    return [row["id"], row["label"], row["modes"], f"{100 * row['rid_fraction']:.1f}", *errors, seconds(row["path_s"]),
-            *(f"{f['path_s'] / row['path_s']:.3g}" for f in full), f"{row['memory_mb']:.0f}", seconds(row["train_s"])]
+def accurate(rows):
+    """Of rows, that with the smallest errors."""
+    return min(rows, key=lambda r: sum(r.get(k + "_median", 1) for k in KINDS))
 
 
 def section(mesh, rows, picture):
     ok, failed, full = split(rows)
-    lines = [full[0]["status"], "", f"![error against online time, {case_of(mesh).name}]({picture})", "",
-             *table(["full order", "a path"], [[f["label"], seconds(f["path_s"])] for f in full]), "",
-             "Errors are median / largest over the paths, each path at its worst listed time.", "",
-             *table(["", "setting", "modes", "cells %", *(f"{words} %" for words in KINDS.values()), "a path", *EXTRA, "MB", "training, solutions known"],
-                    [line_of(r, full) for r in sorted(ok, key=lambda r: r["path_s"])]), ""]
-    for limits in LIMITS:
+    lines = [line_of("", accurate([r for r in ok if r["type"] == kind]), full) for kind in dict.fromkeys(r["type"] for r in ok)]
+    for limits in reversed(LIMITS):
+        words = "cheapest within " + ", ".join(f"{100 * limit:g}" for limit in limits.values())
         best = min((r for r in ok if within(r, limits)), key=lambda r: r["path_s"], default=None)
-        lines.append(f"- The cheapest setting whose largest errors are within {say(limits)}: " + (f"number {best['id']}, {line_of(best, full)[-4]} times faster than Newton's method "
-                     f"and {line_of(best, full)[-3]} times faster than the elastic factor kept." if best else "none."))
-    lines += [f"- Of the estimates of number {r['id']}, for displacement, stress and forces, {100 * r['bounded']:.0f} % bound the error; the median of estimate / error is {r['ratio']:.2g}." for r in ok if "bounded" in r]
-    lines += [f"- No model, or a path that does not reach its end: {r['label']}: {r['status']}" for r in failed]
-    return lines
+        lines.append(line_of(words, best, full) if best else [words, "none", *[""] * (len(KINDS) + 4)])
+    notes = [f"- Estimates of number {r['id']}: {100 * r['bounded']:.0f} % bound the error; median of estimate / error {r['ratio']:.2g}." for r in ok if "bounded" in r]
+    notes += [f"- No model, or a path that does not reach its end: {r['label']}: {r['status']}" for r in failed]
+    return [full[0]["status"], "", f"![error against online time, {case_of(mesh).name}]({picture})", "",
+            f"Full order takes {' and '.join(seconds(f['path_s']) for f in full)} ({', '.join(f['label'].removeprefix('full order, ') for f in full)}) for a path. "
+            f"Of {len(ok) + len(failed)} settings ([csv]({picture.removesuffix('.png')}.csv)) the most accurate of each type, and the cheapest within limits of these errors, with their largest errors, each path at its worst listed time:", "",
+            *table(["", "setting", "cells %", *(f"{words.split(' of the')[0].split(' on the')[0]} %" for words in KINDS.values()), "a path", *EXTRA], lines),
+            *([""] if notes else []), *notes]
 
 
 def headline(mesh, rows):
     """The README's picture, mesh B's with all types, and sentence: what the most accurate hybrid model gains."""
     ok, _, full = split(rows)
-    best = min((r for r in ok if r["type"] == "hybrid"), key=lambda r: sum(r[k + "_median"] for k in KINDS))
+    best = accurate([r for r in ok if r["type"] == "hybrid"])
     newton, elastic = (f["path_s"] for f in full)
     words = [f"{percent(best[k + '_max'])} % in {word.split(' of the')[0].split(' on the')[0]}" for k, word in KINDS.items()]
     return ["![error against online time for each type of model, a power ramp on a fuel rod](docs/tradeoff/rod-B.png)", "",

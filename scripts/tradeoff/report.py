@@ -10,7 +10,9 @@ QUANTITIES = [("u", "displacement"), ("sigma", "stress of the RID's cells"), ("l
               ("lambda", "all contact forces")]
 COLORS = {"hybrid": "#2c5aa0", "projection": "#c8352c", "condensed": "#3a9a4e"}
 MARKS = {"hybrid": "o", "projection": "s", "condensed": "^"}
-TIMES = {"batch_s": "seconds a solve, as a set", "single_s": "seconds of a single solve"}
+PUBLISHED = ["id", "label", "type", "modes", "rid_fraction", "offline_s", "train_s", "model_bytes", "memory_mb", "path_s",
+             *(f"{name}_s{end}" for name in ("batch", "single") for end in ("", "_min", "_max")), "ramp_s", "ramp_n",
+             *(f"{name}_{which}" for name in ("u", "sigma", "inelastic", "lambda_rid", "lambda") for which in ("mean", "median", "max")), "bounded", "ratio", "status"]
 
 
 def good(rows):
@@ -68,43 +70,39 @@ def table(head, lines):
     return ["| " + " | ".join(head) + " |", "|" + "---|" * len(head), *("| " + " | ".join(map(str, line)) + " |" for line in lines)]
 
 
+def speedup(value):
+    return f"{value:.0f}" if value >= 100 else f"{value:.3g}"
+
+
 def answer(rows, full):
-    """The cheapest settings of each type for each accuracy, with their speed-ups over the warm full order."""
+    """The speed-ups over the warm full order of the cheapest setting of each type for each accuracy."""
     found = recommended(rows)
     lines = []
     for q, words in QUANTITIES:
-        for kind in COLORS:
-            each = [found[q, kind, level] for level in LEVELS]
-            lines.append([words, kind, *(f"{r['id']}: {seconds(r['batch_s'])}, {full['batch_s'] / r['batch_s']:.3g}x" if r else "none"
-                                         for r in each)])
-    return table(["largest error of", "type", *(f"{100 * level:g} %" for level in LEVELS)], lines)
-
-
-def times(row, name):
-    spread = f" ({seconds(row[name + '_min'])}..{seconds(row[name + '_max'])})" if name + "_min" in row else ""
-    return seconds(row[name]) + spread
+        each = [[found[q, kind, level] for kind in COLORS] for level in LEVELS]
+        lines.append([words, *(", ".join(speedup(full["batch_s"] / r["batch_s"]) if r else "-" for r in cell) for cell in each)])
+    return table(["largest error of", *(f"{100 * level:g} %" for level in LEVELS)], lines)
 
 
 def wanted(case, rows, full):
-    """The cheapest row of each type that meets several bounds at once: speed-ups over both full orders."""
+    """The cheapest row of each type that meets several bounds at once: times and, in brackets, speed-ups over warm full order; the last over the other."""
     lines = []
+
+    def cell(row, name):
+        return f"{seconds(row[name])} ({speedup(full['warm'][name] / row[name])})"
+
+    names = ["batch_s", "single_s", *(["ramp_s"] if case.ramp else [])]
     for words, bounds in case.wanted:
         for kind in COLORS:
             r = joint(rows, bounds, kind)
             if r:
-                lines.append([words, f"{r['id']}: {kind}", seconds(r["batch_s"]), f"{full['warm']['batch_s'] / r['batch_s']:.3g}",
-                              seconds(r["single_s"]), f"{full['warm']['single_s'] / r['single_s']:.3g}",
-                              f"{full[PLAIN]['single_s'] / r['single_s']:.3g}", *ramp(r, full)])
+                lines.append(["" if words in (line[0] for line in lines) else words, f"{kind} {r['id']}", *(cell(r, n) for n in names), speedup(full[PLAIN]["single_s"] / r["single_s"])])
         if not joint(rows, bounds):
-            lines.append([words, "none", *[""] * (7 if case.ramp else 5)])
-    return table(["asked", "cheapest of its type", "a solve of the set", "times faster than warm full order", "a single solve",
-                  "times faster than full order", f"than {PLAIN}",
-                  *([f"a ramp of {full['warm']['ramp_n']:.0f} solves at a new {case.ramp[0]}", "times faster"] if case.ramp else [])],
-                 lines)
-
-
-def ramp(row, full):
-    return [seconds(row["ramp_s"]), f"{full['warm']['ramp_s'] / row['ramp_s']:.3g}"] if "ramp_s" in row else []
+            lines.append([words, "none", *[""] * (len(names) + 1)])
+    for name, r in full.items():
+        lines.append(["full order", name, *(seconds(r[n]) if n in r else "" for n in names), ""])
+    return table(["required accuracy", "cheapest setting", "a solve of a set", "a single solve",
+                  *([f"a ramp of {full['warm']['ramp_n']:.0f} solves at a new {case.ramp[0]}"] if case.ramp else []), f"speed-up over {PLAIN}"], lines)
 
 
 def headline(case, rows, full):
@@ -128,22 +126,9 @@ def headline(case, rows, full):
     return [f"{case.name}; {words}:", "", *table(columns, lines)]
 
 
-def settings(rows):
-    lines = []
-    for r in sorted(rows, key=lambda r: r["batch_s"]):
-        lines.append([r["id"], r["label"], r["modes"], f"{100 * r['rid_fraction']:.1f}", seconds(r["offline_s"]),
-                      f"{r['model_bytes'] / 1e6:.2g}",
-                      times(r, "batch_s"), times(r, "single_s"),
-                      *(f"{percent(r[q + '_mean'])} / {percent(r[q + '_max'])}" for q, _ in QUANTITIES)])
-    return table(["", "setting", "modes", "RID %", "offline", "MB", "a solve of a set", "a single solve", "u %", "sigma %",
-                  "forces, RID %", "forces %"], lines)
-
-
-def full_orders(full):
-    ramps = "ramp_s" in full["warm"]
-    lines = [[name, seconds(r["batch_s"]), seconds(r["single_s"]), f"{r['memory_mb']:.0f}",
-              *([seconds(r["ramp_s"]) if "ramp_s" in r else ""] if ramps else [])] for name, r in full.items()]
-    return table(["full order", "a solve of the set", "a single solve", "MB", *(["the ramp"] if ramps else [])], lines)
+def published(rows):
+    """The columns of docs/tradeoff/*.csv, with the digits that the measurement has."""
+    return [{name: f"{r[name]:.3g}" if isinstance(r[name], float) else r[name] for name in PUBLISHED if name in r} for r in rows]
 
 
 def plot(case, rows, full, path):
@@ -174,13 +159,8 @@ def plot(case, rows, full, path):
 
 def section(case, rows, full, words, picture):
     """The text of docs/tradeoff.md for one case."""
-    warm = full["warm"]
     failed = [r for r in rows if r["status"] != "ok"]
-    lines = [words, "", f"![error against online time, {case.name}]({picture})", "",
-             f"**The cheapest of {len(rows)} settings that is accurate enough** at all unseen points: its number in the table below, the time of a "
-             "solve in a set, and the speed-up over warm full order:", "", *answer(rows, warm), "", *wanted(case, rows, full), "", *full_orders(full), "",
-             *settings(finalists(case, rows))]
-    if failed:
-        lines += ["", f"{len(failed)} settings gave no model or no converged solution:", "",
-                  *(f"- {r['label']}: {r['status']}" for r in failed)]
-    return lines
+    return [words, "", f"![error against online time, {case.name}]({picture})", "",
+            f"{len(rows)} settings ([csv]({picture.removesuffix('.png')}.csv)" + (f"; {len(failed)} of them gave no model or no converged solution" if failed else "")
+            + f"). Speed-up, in a set, of the cheapest {', '.join(COLORS)} setting that is accurate enough at all unseen points:", "",
+            *answer(rows, full["warm"]), "", "In brackets the speed-up over warm full order:", "", *wanted(case, rows, full)]

@@ -168,9 +168,7 @@ void CheckContacts(Check *check)
     cJSON_AddItemToArray(contacts, contact);
     cJSON_AddStringToObject(contact, "name", s->contact[k]->name);
     cJSON_AddStringToObject(contact, "type", ((PetscObject)s->contact[k])->type_name);
-    cJSON_AddNumberToObject(contact, "n", r->n);
-    cJSON_AddNumberToObject(contact, "n_facing_min", r->facing_min);
-    cJSON_AddNumberToObject(contact, "n_facing_max", r->facing_max);
+    ReportNumbers(contact, {"n", r->n}, {"n_facing_min", r->facing_min}, {"n_facing_max", r->facing_max});
     if (r->facing_max) cJSON_AddNumberToObject(contact, "gap_min", r->gap_min);
     if (r->facing_max) cJSON_AddNumberToObject(contact, "gap_max", r->gap_max);
     if (r->coarse > 0) cJSON_AddNumberToObject(contact, "slave_over_master", r->coarse);

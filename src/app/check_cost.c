@@ -77,8 +77,7 @@ PetscErrorCode CheckSolve(Check *check, const PetscReal mu[], Cost *cost)
   cost->next = s.seconds.solve;
   PetscCall(Say("solved at the centre: %d of %d contacts closed, total contact force %.10g\n", (int)s.n_active,
                 (int)s.n_contacts, (double)s.total_contact_force));
-  cJSON_AddNumberToObject(check->json, "n_active", s.n_active);
-  cJSON_AddNumberToObject(check->json, "total_contact_force", s.total_contact_force);
+  ReportNumbers(check->json, {"n_active", s.n_active}, {"total_contact_force", s.total_contact_force});
   if (s.u_relative > 1 && check->warnings)
     CheckWarn(
         check,
@@ -139,10 +138,8 @@ static PetscErrorCode SayTraining(Check *check, const Cost *cost, PetscBool give
   PetscCall(Say("a training on %s%d solutions, including held-out ones: about %s of full-order solves, and %.3g MB of "
                 "solutions; the reduction is not included\n",
                 given ? "" : "for example ", (int)cost->n_training, all, 1e-6 * (double)snapshots));
-  cJSON_AddNumberToObject(object, "n_training", cost->n_training);
-  cJSON_AddNumberToObject(object, "n_stiffness", cost->n_stiff);
-  cJSON_AddNumberToObject(object, "seconds_training", training);
-  cJSON_AddNumberToObject(object, "snapshots_mb", 1e-6 * snapshots);
+  ReportNumbers(object, {"n_training", cost->n_training}, {"n_stiffness", cost->n_stiff},
+                {"seconds_training", training}, {"snapshots_mb", 1e-6 * snapshots});
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -164,10 +161,8 @@ PetscErrorCode CheckSayCost(Check *check, const Cost *cost, PetscBool given)
   PetscCall(Say("; %.3g MB, of which %.3g MB for the factor\n", 1e-6 * (double)(cost->resident + cost->bytes),
                 1e-6 * (double)cost->bytes));
   cJSON_AddBoolToObject(object, "measured", cost->solved);
-  cJSON_AddNumberToObject(object, "factor_mb", 1e-6 * cost->bytes);
-  cJSON_AddNumberToObject(object, "solve_mb", 1e-6 * (cost->resident + cost->bytes));
-  cJSON_AddNumberToObject(object, "seconds_first", cost->first);
-  cJSON_AddNumberToObject(object, "seconds_next", cost->next);
+  ReportNumbers(object, {"factor_mb", 1e-6 * cost->bytes}, {"solve_mb", 1e-6 * (cost->resident + cost->bytes)},
+                {"seconds_first", cost->first}, {"seconds_next", cost->next});
   if (!n_times) PetscCall(SayTraining(check, cost, given, object)); /* train refuses histories */
   PetscFunctionReturn(PETSC_SUCCESS);
 }

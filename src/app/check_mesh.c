@@ -145,10 +145,8 @@ PetscErrorCode CheckBodies(Check *check)
     for (PetscInt e = 0; e < m->n_cells; e++) cells += m->cell_body[e] == b;
     cJSON_AddItemToArray(bodies, body);
     cJSON_AddStringToObject(body, "name", s->body[b].name);
-    cJSON_AddNumberToObject(body, "n_cells", cells);
-    cJSON_AddNumberToObject(body, "n_parts", parts[b]);
-    cJSON_AddNumberToObject(body, "stretch", check->stretch[b]);
-    cJSON_AddNumberToObject(body, "stretched_cell", check->stretched[b]);
+    ReportNumbers(body, {"n_cells", cells}, {"n_parts", parts[b]}, {"stretch", check->stretch[b]},
+                  {"stretched_cell", check->stretched[b]});
     PetscCall(Say("body %s: %d cells", s->body[b].name, (int)cells));
     if (m->dim > 1)
       PetscCall(Say("; the most stretched one, %d, is %.3g times as long as wide", (int)check->stretched[b],

@@ -1,5 +1,7 @@
 /* hyco check: reads and assembles a whole scene, solves only on request; reports its contents and its cost. */
 #include "check.h"
+#include <hycobodies.h>
+#include <hycoquantities.h>
 #include <hycomaterialimpl.h>
 #include <math.h>
 #include <stdarg.h>
@@ -175,12 +177,9 @@ static PetscErrorCode SayMesh(Check *check)
   cJSON_AddNumberToObject(check->json, "dimension", m->dim);
   cJSON_AddStringToObject(check->json, "cell_type", HycoCellKinds[m->type].name);
   cJSON_AddBoolToObject(check->json, "hex20_as_hex27", f->scene->face_nodes);
-  cJSON_AddNumberToObject(check->json, "n_nodes", f->n_nodes);
-  cJSON_AddNumberToObject(check->json, "n_cells", f->n_cells);
-  cJSON_AddNumberToObject(check->json, "n_dof", f->n_free);
-  cJSON_AddNumberToObject(check->json, "n_fixed", n_fixed - n_tied * m->dim);
-  cJSON_AddNumberToObject(check->json, "n_contacts", f->n_contacts);
-  cJSON_AddNumberToObject(check->json, "points_checked", check->n_points);
+  ReportNumbers(check->json, {"n_nodes", f->n_nodes}, {"n_cells", f->n_cells}, {"n_dof", f->n_free},
+                {"n_fixed", n_fixed - n_tied * m->dim}, {"n_contacts", f->n_contacts},
+                {"points_checked", check->n_points});
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -203,13 +202,29 @@ static PetscBool IsRigidBodys(HycoFOM f, const PetscReal motion[])
   return (PetscBool)(at > 1e-6 * most);
 }
 
+/* Evaluates the outputs of a body at rest: refuses groups and components that solve would refuse. */
+static PetscErrorCode CheckOutputs(Check *check)
+{
+  HycoFE fe = check->whole->fe;
+  PetscReal *u, *sigma, *reaction, value[HYCO_MAX_QUANTITIES];
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  if (!fe->scene->n_quantities) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscCalloc3(fe->n_dof, &u, fe->mesh->n_cells * fe->n_sigma, &sigma, fe->n_dof, &reaction));
+  ierr = HycoQuantitiesMeasure(HycoComm(check->whole), fe, u, sigma, reaction, NULL, value);
+  PetscCall(PetscFree3(u, sigma, reaction));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Reports motions that the supports leave free: contact prevents them, or -hyco_regularise removes them; others are
    an error of the assembly. */
 static PetscErrorCode SayMotions(Check *check)
 {
   HycoFOM f = check->whole;
   cJSON *list = cJSON_AddArrayToObject(check->json, "free_motions");
-  HycoMotions free = {0, NULL, NULL, NULL};
+  HycoMotions free = {0, NULL, NULL, NULL, NULL};
   PetscInt loose = 0;
 
   PetscFunctionBegin;
@@ -322,6 +337,7 @@ static PetscErrorCode Describe(Check *check)
   PetscCall(CheckBodies(check));
   CheckContacts(check);
   PetscCall(SayMotions(check));
+  PetscCall(CheckOutputs(check));
   reaches = cJSON_AddObjectToObject(check->json, "parameters");
   cJSON_AddArrayToObject(check->json, "wide_ranges");
   for (PetscInt p = 0; p < s->n_variables; p++) PetscCall(SayReach(check, p, reaches));
@@ -335,6 +351,24 @@ static PetscErrorCode Describe(Check *check)
                 : s->n_parameters              ? ": the centre and the corners"
                                                : "",
                 s->n_times ? ", each at the first and the last time" : ""));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* How the parameters enter the bodies, with changes from the point mu; of scenes with contact whose bodies are all
+   linear. Collective. */
+static PetscErrorCode SayBodies(Check *check, const PetscReal mu[])
+{
+  HycoFOM f = check->fom;
+  HycoBodyParts parts;
+  char text[HYCO_LINE];
+
+  PetscFunctionBegin;
+  if (!f->n_contacts || !f->scene->n_parameters || f->scene->n_times) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoBodyPartsFind(f, mu, &parts));
+  PetscCall(HycoBodyPartsDescribe(f->scene, &parts, text));
+  PetscCall(HycoBodyPartsDestroy(&parts));
+  PetscCall(Say("%s\n", text));
+  if (check->json) cJSON_AddStringToObject(check->json, "bodies_by_parameter", text);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -358,7 +392,7 @@ PetscErrorCode DeclareCheck(PetscOptions options)
   PetscFunctionBegin;
   (void)options;
   PetscCall(DriverReadFiles(path, NULL, NULL, path, NULL));
-  PetscCall(DriverGetSamples(NULL, NULL, NULL));
+  PetscCall(DriverGetSamples(NULL, PETSC_FALSE, NULL, NULL));
   PetscCall(ReadSolve(&solve));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -414,6 +448,7 @@ static PetscErrorCode Visit(Check *check, PetscBool solve, Cost *cost)
   begin = HycoNow() - begin;
   PetscCall(CheckEstimate(check, begin, cost));
   HycoOnRoot(HycoComm(check->fom), Describe(check));
+  PetscCall(SayBodies(check, mu));
   if (solve) PetscCall(CheckSolve(check, mu, cost));
   PetscCall(PetscFree(mu));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -435,7 +470,7 @@ PetscErrorCode CommandCheck(void)
   PetscCall(ReadSolve(&solve));
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
   PetscCall(DriverCheckMesh(scene));
-  PetscCall(DriverGetSamples(scene, &samples, &given));
+  PetscCall(DriverGetSamples(scene, PETSC_FALSE, &samples, &given));
   PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom));
   PetscCall(DriverCheckLeftEarly());
   check.whole = fom;

@@ -1,133 +1,15 @@
-/* hyco compare: compares the reduced model with full order over a set of points. */
+/* hyco compare: compares the reduced model with full order over a set of points, or of paths in full order's steps. */
 #include "driver.h"
 #include <hycosnapshotsimpl.h>
 #include <math.h>
-#include <stdlib.h>
 
-enum { E_U, E_U_H1, E_U_RID, E_SIGMA, E_SIGMA_11, E_LAMBDA_RID, E_LAMBDA_RID_DUAL, E_LAMBDA, E_LAMBDA_DUAL, N_ERRORS };
-enum {
-  CONVERGED = N_ERRORS,
-  FALLBACK,
-  KKT,
-  COVERED,
-  SECONDS_FOM,
-  SECONDS_ROM,
-  LAMBDA_NORM, /* of full order */
-  SIGMA_NORM,
-  ESTIMATES, /* of u, stress, forces, and the unseen regime */
-  N_COLUMNS = ESTIMATES + DRIVER_JUDGED
-};
-static const char *const columns[N_COLUMNS] = {"error_u",
-                                               "error_u_h1",
-                                               "error_u_rid",
-                                               "error_sigma",
-                                               "error_sigma_11",
-                                               "error_lambda_rid",
-                                               "error_lambda_rid_dual",
-                                               "error_lambda",
-                                               "error_lambda_dual",
-                                               "converged",
-                                               "fallback",
-                                               "kkt_max",
-                                               "covered_force",
-                                               "seconds_full_order",
-                                               "seconds_reduced",
-                                               "lambda_norm2",
-                                               "sigma_norm2",
-                                               "estimated_error_u",
-                                               "estimated_error_sigma",
-                                               "estimated_error_lambda",
-                                               "unseen"};
+/* The outputs that the scenes of a full-order solution and of a model have in common, and their numbers in both. */
+typedef struct {
+  PetscInt n, full[HYCO_MAX_QUANTITIES], reduced[HYCO_MAX_QUANTITIES];
+  const char *names[HYCO_MAX_QUANTITIES];
+} Outputs;
 
-void DriverTakeEstimates(const HycoPrediction *p, PetscReal v[DRIVER_JUDGED])
-{
-  const PetscReal estimate[] = {p->estimated_error_u, p->estimated_error_sigma, p->estimated_error_lambda};
-
-  for (PetscInt k = 0; k < DRIVER_JUDGED - 1; k++) v[k] = estimate[k] >= 0 ? estimate[k] : NAN;
-  v[DRIVER_JUDGED - 1] = p->unseen;
-}
-
-static int CompareReal(const void *a, const void *b)
-{
-  const PetscReal x = *(const PetscReal *)a, y = *(const PetscReal *)b;
-
-  return (x > y) - (x < y);
-}
-
-PetscErrorCode DriverJudgeEstimates(cJSON *json, PetscInt n, PetscInt width, const PetscReal value[], PetscInt first,
-                                    const PetscReal *const error[DRIVER_JUDGED - 1])
-{
-  static const char *const words[] = {"u", "stress", "contact forces"};
-  static const char *const keys[] = {"u", "sigma", "lambda"};
-  cJSON *all = cJSON_AddObjectToObject(json, "estimates");
-  PetscReal *ratio;
-  PetscInt unseen = 0;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1(n, &ratio));
-  for (PetscInt e = 0; e < DRIVER_JUDGED - 1; e++) {
-    PetscInt m = 0, bounded = 0;
-    PetscReal worst = 0;
-    cJSON *object;
-
-    for (PetscInt k = 0; k < n && error[e]; k++) {
-      const PetscReal estimate = value[k * width + first + e], true_error = error[e][k];
-
-      if (isnan(estimate) || !isfinite(true_error)) continue;
-      bounded += true_error <= estimate;
-      worst = PetscMax(worst, true_error / PetscMax(estimate, PETSC_SMALL));
-      ratio[m++] = estimate / PetscMax(true_error, PETSC_SMALL);
-    }
-    if (!m) continue;
-    qsort(ratio, (size_t)m, sizeof(*ratio), CompareReal);
-    object = cJSON_AddObjectToObject(all, keys[e]);
-    cJSON_AddNumberToObject(object, "bounded", (PetscReal)bounded / m);
-    cJSON_AddNumberToObject(object, "median_ratio", ratio[m / 2]);
-    cJSON_AddNumberToObject(object, "worst_error_over_estimate", worst);
-    PetscCall(Say("estimates of %s: at least the error at %.1f %% of the points; estimate / error %.3g in the median, "
-                  "error / estimate at most %.3g\n",
-                  words[e], 100. * bounded / m, (double)ratio[m / 2], (double)worst));
-  }
-  for (PetscInt k = 0; k < n; k++) unseen += value[k * width + first + DRIVER_JUDGED - 1] > HYCO_UNSEEN;
-  cJSON_AddNumberToObject(all, "unseen", unseen);
-  if (unseen) PetscCall(Say("unseen regime at %d of %d points\n", (int)unseen, (int)n));
-  PetscCall(PetscFree(ratio));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* A relative error of a quantity with this norm, for the estimates: norms below a tenth of the set's largest count as
-   this tenth. */
-static PetscReal Guarded(PetscReal error, PetscReal size, PetscReal largest)
-{
-  return size > 0 ? error * size / PetscMax(size, 0.1 * largest) : error;
-}
-
-/* The same with the errors of stresses and forces as in the estimates. */
-static PetscErrorCode JudgeEstimates(cJSON *json, PetscInt n, PetscInt width, const PetscReal value[])
-{
-  const PetscReal *error[DRIVER_JUDGED - 1];
-  PetscReal *of[DRIVER_JUDGED - 1], largest[2] = {0, 0};
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc3(n, &of[0], n, &of[1], n, &of[2]));
-  for (PetscInt k = 0; k < n; k++) {
-    largest[0] = PetscMax(largest[0], value[k * width + SIGMA_NORM]);
-    largest[1] = PetscMax(largest[1], value[k * width + LAMBDA_NORM]);
-  }
-  for (PetscInt k = 0; k < n; k++) {
-    const PetscReal *v = value + k * width;
-
-    of[0][k] = v[E_U];
-    of[1][k] = Guarded(v[E_SIGMA], v[SIGMA_NORM], largest[0]);
-    of[2][k] = Guarded(v[E_LAMBDA], v[LAMBDA_NORM], largest[1]);
-  }
-  for (PetscInt e = 0; e < DRIVER_JUDGED - 1; e++) error[e] = of[e];
-  PetscCall(DriverJudgeEstimates(json, n, width, value, ESTIMATES, error));
-  PetscCall(PetscFree3(of[0], of[1], of[2]));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode DriverCommonOutputs(HycoScene scene, HycoROM model, DriverOutputs *outputs)
+static PetscErrorCode CommonOutputs(HycoScene scene, HycoROM model, Outputs *outputs)
 {
   const char *names[HYCO_MAX_QUANTITIES];
   HycoScene other;
@@ -147,28 +29,23 @@ PetscErrorCode DriverCommonOutputs(HycoScene scene, HycoROM model, DriverOutputs
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The columns of a table: these, then the absolute error of each output that the scene and the model have. */
-typedef struct {
-  PetscInt n;
-  const char *names[N_COLUMNS + HYCO_MAX_QUANTITIES];
-  char error_name[HYCO_MAX_QUANTITIES][DRIVER_LINE];
-} Shape;
-
-static PetscErrorCode ShapeOf(const DriverOutputs *outputs, Shape *s)
+/* The columns that points and paths have in common. */
+static void FillCommon(const DriverColumns *c, const HycoSummary *s, const HycoPrediction *p, PetscReal row[])
 {
-  PetscFunctionBegin;
-  for (PetscInt c = 0; c < N_COLUMNS; c++) s->names[c] = columns[c];
-  s->n = N_COLUMNS + outputs->n;
-  for (PetscInt q = 0; q < outputs->n; q++) {
-    PetscCall(PetscSNPrintf(s->error_name[q], DRIVER_LINE, "error_output_%s", outputs->names[q]));
-    s->names[N_COLUMNS + q] = s->error_name[q];
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
+  const PetscReal estimate[] = {p->estimated_error_u, p->estimated_error_sigma, p->estimated_error_lambda};
+  PetscReal *v = row + c->n_errors, *judged = row + c->estimates;
+
+  v[DRIVER_CONVERGED] = p->reason > 0;
+  v[DRIVER_KKT] = HycoKKTMax(&p->kkt);
+  v[DRIVER_SECONDS_FOM] = s->seconds.total;
+  v[DRIVER_SECONDS_ROM] = p->seconds.total;
+  for (PetscInt k = 0; k < DRIVER_ESTIMATES; k++) judged[k] = estimate[k] >= 0 ? estimate[k] : NAN;
+  judged[DRIVER_ESTIMATES] = p->unseen;
 }
 
 /* One point on one group: both solutions, and their difference. */
 static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, PetscInt n_par, const PetscReal mu[],
-                                   const DriverOutputs *outputs, PetscReal v[])
+                                   const Outputs *outputs, const DriverColumns *c, PetscReal v[])
 {
   HycoSummary s;
   HycoPrediction p;
@@ -185,38 +62,67 @@ static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, 
   PetscCall(HycoROMPredict(model, n_par, mu));
   PetscCall(HycoROMGetPrediction(model, &p));
   PetscCall(HycoROMCompare(model, fom, &e));
-  v[E_U] = e.u;
-  v[E_U_H1] = e.u_h1;
-  v[E_U_RID] = e.u_rid;
-  v[E_SIGMA] = e.sigma;
-  v[E_SIGMA_11] = e.sigma_11;
-  v[E_LAMBDA_RID] = e.lambda_rid;
-  v[E_LAMBDA_RID_DUAL] = e.lambda_rid_dual;
-  v[E_LAMBDA] = e.lambda;
-  v[E_LAMBDA_DUAL] = e.lambda_dual;
-  v[CONVERGED] = p.reason > 0;
-  v[FALLBACK] = p.reason == HYCO_CONVERGED_FALLBACK;
-  v[KKT] = HycoKKTMax(&p.kkt);
-  v[COVERED] = p.covered_force;
-  v[SECONDS_FOM] = s.seconds.total;
-  v[SECONDS_ROM] = p.seconds.total;
-  v[LAMBDA_NORM] = s.lambda_norm2;
-  v[SIGMA_NORM] = e.sigma_norm2;
-  DriverTakeEstimates(&p, v + ESTIMATES);
+  v[DRIVER_U] = e.u;
+  v[DRIVER_U_H1] = e.u_h1;
+  v[DRIVER_U_RID] = e.u_rid;
+  v[DRIVER_SIGMA] = e.sigma;
+  v[DRIVER_SIGMA_11] = e.sigma_11;
+  v[DRIVER_LAMBDA_RID] = e.lambda_rid;
+  v[DRIVER_LAMBDA_RID_DUAL] = e.lambda_rid_dual;
+  v[DRIVER_LAMBDA] = e.lambda;
+  v[DRIVER_LAMBDA_DUAL] = e.lambda_dual;
+  FillCommon(c, &s, &p, v);
+  v[c->n_errors + DRIVER_FALLBACK] = p.reason == HYCO_CONVERGED_FALLBACK;
+  v[c->n_errors + DRIVER_COVERED] = p.covered_force;
+  v[c->n_errors + DRIVER_LAMBDA_NORM] = s.lambda_norm2;
+  v[c->n_errors + DRIVER_SIGMA_NORM] = e.sigma_norm2;
   for (PetscInt q = 0; q < outputs->n; q++)
-    v[N_COLUMNS + q] = PetscAbsReal(p.quantity[outputs->reduced[q]] - s.quantity[outputs->full[q]]);
+    v[c->outputs + q] = PetscAbsReal(p.quantity[outputs->reduced[q]] - s.quantity[outputs->full[q]]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the scene has a history, and the number of values per point. */
-static PetscErrorCode CountColumns(HycoScene scene, const DriverOutputs *outputs, PetscBool *paths, PetscInt *n)
+/* The errors of the outputs at the listed times that both paths reached, on the model's process: v: at their worst time, and at the end. */
+static PetscErrorCode CompareOutputs(HycoFOM fom, HycoROM model, const Outputs *outputs, PetscReal v[])
 {
-  PetscInt n_times;
+  HycoHistory full, reduced;
+  PetscInt both;
 
   PetscFunctionBegin;
-  PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
-  *paths = (PetscBool)(n_times > 0);
-  *n = *paths ? DriverPathColumns() + 2 * outputs->n : N_COLUMNS + outputs->n;
+  PetscCall(HycoFOMGetHistory(fom, &full));
+  PetscCall(HycoROMGetHistory(model, &reduced));
+  both = PetscMin(full.n, reduced.n);
+  for (PetscInt q = 0; q < outputs->n; q++) {
+    PetscReal *worst = &v[q], *end = &v[outputs->n + q];
+
+    *worst = *end = both ? 0 : PETSC_INFINITY;
+    for (PetscInt k = 0; k < both; k++) {
+      *end = PetscAbsReal(full.step[k].quantity[outputs->full[q]] - reduced.step[k].quantity[outputs->reduced[q]]);
+      *worst = *end <= *worst ? *worst : *end;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The full-order path and the model's, and their difference; root: the rank that predicts and whose v is used. */
+static PetscErrorCode ComparePath(HycoFOM fom, HycoROM model, PetscBool root, PetscInt n_par, const PetscReal mu[],
+                                  const Outputs *outputs, const DriverColumns *c, PetscReal v[])
+{
+  HycoSummary s;
+  HycoPrediction p = {0};
+  HycoPathErrors e = {0};
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMComparePath(model, fom, n_par, mu, &e));
+  PetscCall(HycoFOMGetSummary(fom, &s));
+  if (root) PetscCall(HycoROMGetPrediction(model, &p));
+  for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
+    v[j] = e.worst[j];
+    v[HYCO_N_ERRORS + j] = e.end[j];
+  }
+  FillCommon(c, &s, &p, v);
+  v[c->n_errors + DRIVER_REACHED] = e.n;
+  v[c->n_errors + DRIVER_ITERATIONS] = p.iterations;
+  if (root && outputs->n) PetscCall(CompareOutputs(fom, model, outputs, v + c->outputs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -225,11 +131,11 @@ typedef struct {
   HycoScene scene;
   HycoROM model;
   HycoQueue queue;
-  PetscInt n, n_par, n_columns;
+  PetscInt n, n_par;
   const PetscReal *mu;
   PetscReal *value;
-  PetscBool paths;
-  DriverOutputs outputs;
+  Outputs outputs;
+  DriverColumns columns;
 } Points;
 
 static PetscErrorCode CompareQueued(const Points *p, HycoFOM fom, PetscBool root, PetscReal unused[])
@@ -249,9 +155,10 @@ static PetscErrorCode CompareQueued(const Points *p, HycoFOM fom, PetscBool root
       PetscCall(DriverProgress(n_done, p->n, word));
     }
     if (k < 0) PetscFunctionReturn(PETSC_SUCCESS);
-    v = root ? p->value + k * p->n_columns : unused;
-    PetscCall(p->paths ? DriverComparePath(fom, p->model, root, p->n_par, p->mu + k * p->n_par, &p->outputs, v)
-                       : ComparePoint(p->scene, fom, p->model, p->n_par, p->mu + k * p->n_par, &p->outputs, v));
+    v = root ? p->value + k * p->columns.n : unused;
+    PetscCall(p->columns.paths
+                  ? ComparePath(fom, p->model, root, p->n_par, p->mu + k * p->n_par, &p->outputs, &p->columns, v)
+                  : ComparePoint(p->scene, fom, p->model, p->n_par, p->mu + k * p->n_par, &p->outputs, &p->columns, v));
   }
 }
 
@@ -263,7 +170,7 @@ static PetscErrorCode CompareMine(const Points *p)
   PetscReal *unused;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(p->n_columns, &unused));
+  PetscCall(PetscMalloc1(p->columns.n, &unused));
   PetscCall(HycoQueueGetGroup(p->queue, &group));
   PetscCall(HycoFOMCreate(group, p->scene, &fom));
   PetscCallMPI(MPI_Comm_rank(group, &rank));
@@ -283,63 +190,10 @@ static PetscErrorCode CompareAll(Points *p)
   for (PetscInt k = 0; k < p->n; k++) list[k] = k;
   PetscCall(HycoSnapshotsCreateQueue(PETSC_COMM_WORLD, p->scene, p->n_par, p->mu, p->n, list, p->n, &p->queue));
   PetscCall(PetscFree(list));
-  PetscCall(CountColumns(p->scene, &p->outputs, &p->paths, &p->n_columns));
-  PetscCall(PetscCalloc1(p->n * p->n_columns, &p->value));
+  PetscCall(PetscCalloc1(p->n * p->columns.n, &p->value));
   HycoOnEach(PETSC_COMM_WORLD, HycoQueueEnd(p->queue, CompareMine(p)));
-  HycoAllreduce(p->value, p->n * p->n_columns, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD);
+  HycoAllreduce(p->value, p->n * p->columns.n, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD);
   PetscCall(HycoQueueDestroy(&p->queue));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode Report(HycoScene scene, PetscBool contact, const Shape *shape, PetscInt n,
-                             const PetscReal value[])
-{
-  cJSON *json, *object;
-  PetscReal *ratio, mean = 0, kkt = 0, covered[2] = {0, 1};
-  PetscInt undefined = 0, failed = 0, fallback = 0;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1(n, &ratio));
-  for (PetscInt k = 0; k < n; k++) {
-    const PetscReal *v = value + k * shape->n;
-
-    ratio[k] = v[SECONDS_FOM] / PetscMax(v[SECONDS_ROM], 1e-9);
-    mean += ratio[k] / n;
-    kkt = PetscMax(kkt, v[KKT]);
-    failed += v[CONVERGED] < 0.5;
-    fallback += v[FALLBACK] > 0.5;
-    covered[0] += v[COVERED] / n;
-    covered[1] = PetscMin(covered[1], v[COVERED]);
-  }
-  qsort(ratio, (size_t)n, sizeof(*ratio), CompareReal);
-  PetscCall(ReportCreate("compare", scene, NULL, &json));
-  cJSON_AddNumberToObject(json, "n_points", n);
-  PetscCall(Say("%d point%s\n", (int)n, n == 1 ? "" : "s"));
-  for (PetscInt k = 0; k < (contact ? N_ERRORS : E_LAMBDA_RID); k++)
-    ReportError(json, columns[k], n, shape->n, value, k, CONVERGED, &undefined);
-  for (PetscInt c = N_COLUMNS; c < shape->n; c++)
-    ReportOutputError(json, shape->names[c], n, shape->n, value, c, CONVERGED);
-  PetscCall(JudgeEstimates(json, n, shape->n, value));
-  object = cJSON_AddObjectToObject(json, "speedup");
-  cJSON_AddNumberToObject(object, "mean", mean);
-  cJSON_AddNumberToObject(object, "median", ratio[n / 2]);
-  PetscCall(Say("speed-up: mean %.3g, median %.3g\n", (double)mean, (double)ratio[n / 2]));
-  if (contact) {
-    object = cJSON_AddObjectToObject(json, "covered_force");
-    cJSON_AddNumberToObject(object, "mean", covered[0]);
-    cJSON_AddNumberToObject(object, "min", covered[1]);
-    PetscCall(Say("contact force in the RID: mean %.1f %%, least %.1f %%\n", 100 * (double)covered[0],
-                  100 * (double)covered[1]));
-  }
-  cJSON_AddNumberToObject(json, "undefined", undefined);
-  cJSON_AddNumberToObject(json, "not_converged", failed);
-  cJSON_AddNumberToObject(json, "fallback", fallback);
-  cJSON_AddNumberToObject(json, "kkt_max", kkt);
-  PetscCall(Say("%d not converged, %d by the fallback solver, %d errors undefined (x/0); largest KKT residual %.1e\n",
-                (int)failed, (int)fallback, (int)undefined, (double)kkt));
-  PetscCall(PetscFree(ratio));
-  PetscCall(ReportWrite(&json));
-  HycoCheck(!failed, "%d of the %d predictions did not converge; the errors do not include them", (int)failed, (int)n);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -364,7 +218,7 @@ PetscErrorCode DeclareCompare(PetscOptions options)
   (void)options;
   PetscCall(DriverReadFiles(path, path, NULL, path, path));
   PetscCall(DriverGetPoint(NULL, NULL));
-  PetscCall(DriverGetSamples(NULL, NULL, NULL));
+  PetscCall(DriverGetSamples(NULL, PETSC_FALSE, NULL, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -376,8 +230,8 @@ PetscErrorCode CommandCompare(void)
   Points p = {0};
   DriverPiece all;
   DriverRows rows;
-  Shape shape;
   PetscBool given, contact;
+  PetscInt n_times;
   char path[PETSC_MAX_PATH_LEN], file[PETSC_MAX_PATH_LEN], table[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBegin;
@@ -388,7 +242,7 @@ PetscErrorCode CommandCompare(void)
   PetscCall(DriverCheckMesh(scene));
   HycoOnEach(PETSC_COMM_WORLD, HycoROMLoad(file, &model));
   PetscCall(HycoROMCheckScene(model, scene));
-  PetscCall(DriverGetSamples(scene, &samples, &given));
+  PetscCall(DriverGetSamples(scene, PETSC_FALSE, &samples, &given));
   if (!given) PetscCall(AddOnePoint(scene, samples, &given));
   HycoCheck(given, "give the test points: -mu V,V,... for one, or -grid N,N,..., or -values_NAME V,V,... for each "
                    "parameter, or -points FILE.csv");
@@ -397,13 +251,13 @@ PetscErrorCode CommandCompare(void)
   PetscCall(HycoSceneHasContact(scene, &contact));
   p.scene = scene;
   p.model = model;
-  PetscCall(DriverCommonOutputs(scene, model, &p.outputs));
+  PetscCall(CommonOutputs(scene, model, &p.outputs));
+  PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
+  PetscCall(DriverCompareColumns((PetscBool)(n_times > 0), p.outputs.n, p.outputs.names, &p.columns));
   PetscCall(CompareAll(&p));
-  PetscCall(ShapeOf(&p.outputs, &shape));
-  rows = DriverRowsOfRoot(p.n, shape.n, p.value, &all);
-  if (table[0] && !p.paths) PetscCall(DriverWriteTable(table, scene, p.mu, shape.names, &rows));
-  PetscCall(p.paths ? DriverReportPaths(scene, &p.outputs, contact, p.n, p.mu, p.value, table)
-                    : Report(scene, contact, &shape, p.n, p.value));
+  rows = DriverRowsOfRoot(p.n, p.columns.n, p.value, &all);
+  if (table[0]) PetscCall(DriverWriteTable(table, scene, p.mu, p.columns.names, &rows));
+  PetscCall(DriverReportComparison(scene, contact, &p.columns, p.n, p.value));
   PetscCall(PetscFree(p.value));
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(HycoROMDestroy(&model));

@@ -88,11 +88,8 @@ static PetscErrorCode SayEstimates(HycoScene scene, const HycoPrediction *p)
 
 static void ReportRID(cJSON *json, const HycoPrediction *p)
 {
-  cJSON_AddNumberToObject(json, "rid_nodes", p->rid_nodes);
-  cJSON_AddNumberToObject(json, "rid_elements", p->rid_elements);
-  cJSON_AddNumberToObject(json, "rid_fraction", p->rid_fraction);
-  cJSON_AddNumberToObject(json, "rid_contacts", p->n_contacts);
-  cJSON_AddNumberToObject(json, "rid_active", p->n_rid_active);
+  ReportNumbers(json, {"rid_nodes", p->rid_nodes}, {"rid_elements", p->rid_elements}, {"rid_fraction", p->rid_fraction},
+                {"rid_contacts", p->n_contacts}, {"rid_active", p->n_rid_active});
 }
 
 /* carried: results of the contacts (n_carried; 0: not known). fallback: the reason for full order; "": not used.
@@ -106,21 +103,16 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
   PetscFunctionBegin;
   PetscCall(ReportCreate("predict", scene, mu, &json));
   cJSON_AddStringToObject(json, "model_type", p->type);
-  cJSON_AddNumberToObject(json, "n_dof", p->n_dof);
-  cJSON_AddNumberToObject(json, "n_multipliers", p->n_multipliers);
+  ReportNumbers(json, {"n_dof", p->n_dof}, {"n_multipliers", p->n_multipliers});
   cJSON_AddNumberToObject(json, "n_contacts", p->n_all_contacts); /* counted as in hyco solve */
-  cJSON_AddNumberToObject(json, "n_active", p->n_active);
-  cJSON_AddNumberToObject(json, "active_set_iterations", p->iterations);
+  ReportNumbers(json, {"n_active", p->n_active}, {"active_set_iterations", p->iterations});
   cJSON_AddStringToObject(json, "solver", p->method);
   cJSON_AddBoolToObject(json, "converged", p->reason > 0);
-  cJSON_AddNumberToObject(json, "n_modes", p->n_modes);
-  cJSON_AddNumberToObject(json, "n_fe_dofs", p->n_fe_dofs);
+  ReportNumbers(json, {"n_modes", p->n_modes}, {"n_fe_dofs", p->n_fe_dofs});
   if (!fallback[0]) ReportRID(json, p);
-  cJSON_AddNumberToObject(json, "covered_force", p->covered_force);
-  cJSON_AddNumberToObject(json, "total_contact_force", p->total_contact_force);
-  cJSON_AddNumberToObject(json, "lambda_max", p->lambda_max);
-  cJSON_AddNumberToObject(json, "lambda_norm2", p->lambda_norm2);
-  cJSON_AddNumberToObject(json, whole ? "u_norm2" : "rid_u_norm2", p->u_norm2);
+  ReportNumbers(json, {"covered_force", p->covered_force}, {"total_contact_force", p->total_contact_force},
+                {"lambda_max", p->lambda_max}, {"lambda_norm2", p->lambda_norm2},
+                {whole ? "u_norm2" : "rid_u_norm2", p->u_norm2});
   ReportVector(json, whole ? "u_min" : "rid_u_min", p->dim, p->u_min);
   ReportVector(json, whole ? "u_max" : "rid_u_max", p->dim, p->u_max);
   cJSON_AddNumberToObject(json, whole ? "strain_energy" : "rid_strain_energy", energy);
@@ -618,7 +610,7 @@ PetscErrorCode DeclarePredict(PetscOptions options)
   (void)options;
   PetscCall(DriverReadFiles(path, path, path, path, path));
   PetscCall(DriverGetPoint(NULL, NULL));
-  PetscCall(DriverGetSamples(NULL, NULL, NULL));
+  PetscCall(DriverGetSamples(NULL, PETSC_FALSE, NULL, NULL));
   PetscCall(ReadExtrapolate(&flag));
   PetscCall(DriverReadTarget(HYCO_ERROR_U, &target));
   PetscCall(DriverReadTarget(HYCO_ERROR_LAMBDA, &target));
@@ -659,7 +651,7 @@ PetscErrorCode CommandPredict(void)
               "-output of a set of points works without -hyco_fallback only; remove it, or give a single point (-mu)");
     HycoCheck(!fallback.displacement,
               "-hyco_full_displacement needs a single point (-mu); a set of points has only a -table, without fields");
-    PetscCall(DriverGetSamples(scene, &samples, &set));
+    PetscCall(DriverGetSamples(scene, PETSC_FALSE, &samples, &set));
     HycoStaged(HYCO_STAGE_ONLINE, Many(model, scene, &fallback, samples, output));
   } else {
     HycoStaged(HYCO_STAGE_ONLINE, n_times ? Path(model, scene, output) : One(model, scene, &fallback, output));

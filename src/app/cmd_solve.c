@@ -6,6 +6,7 @@ static PetscErrorCode Remarks(const HycoSummary *s)
 {
   PetscFunctionBegin;
   if (s->regularised[0]) PetscCall(Say("regularised: neither supports nor contact keep %s\n", s->regularised));
+  if (s->loose[0]) PetscCall(Say("warning: no contact force keeps %s: its position is arbitrary\n", s->loose));
   if (s->n_still)
     PetscCall(Say("%d contact%s between fixed displacements: without effect\n", (int)s->n_still,
                   s->n_still > 1 ? "s lie" : " lies"));
@@ -67,28 +68,22 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
   PetscCall(HycoFOMGetSolver(fom, &solver));
   PetscCall(HycoSolverGetMethod(solver, &method));
   PetscCall(HycoSolverGetLinear(solver, &linear));
-  cJSON_AddNumberToObject(json, "n_dof", s->n_dof);
-  cJSON_AddNumberToObject(json, "n_contacts", s->n_contacts);
-  cJSON_AddNumberToObject(json, "n_active", s->n_active);
-  cJSON_AddNumberToObject(json, "n_without_effect", s->n_still);
+  ReportNumbers(json, {"n_dof", s->n_dof}, {"n_contacts", s->n_contacts}, {"n_active", s->n_active},
+                {"n_without_effect", s->n_still});
   cJSON_AddBoolToObject(json, "forces_unique", s->n_dependent == 0);
   cJSON_AddNumberToObject(json, "n_dependent", s->n_dependent);
   cJSON_AddStringToObject(json, "regularised", s->regularised);
+  cJSON_AddStringToObject(json, "loose", s->loose);
   cJSON_AddNumberToObject(json, "active_set_iterations", s->iterations);
   cJSON_AddStringToObject(json, "solver", method);
   cJSON_AddStringToObject(json, "linear", linear);
   cJSON_AddBoolToObject(json, "converged", s->reason > 0);
-  cJSON_AddNumberToObject(json, "total_contact_force", s->total_contact_force);
-  cJSON_AddNumberToObject(json, "lambda_max", s->lambda_max);
-  cJSON_AddNumberToObject(json, "lambda_norm2", s->lambda_norm2);
-  cJSON_AddNumberToObject(json, "u_norm2", s->u_norm2);
+  ReportNumbers(json, {"total_contact_force", s->total_contact_force}, {"lambda_max", s->lambda_max},
+                {"lambda_norm2", s->lambda_norm2}, {"u_norm2", s->u_norm2});
   ReportVector(json, "u_min", s->dim, s->u_min);
   ReportVector(json, "u_max", s->dim, s->u_max);
-  cJSON_AddNumberToObject(json, "u_relative", s->u_relative);
-  cJSON_AddNumberToObject(json, "strain_energy", s->strain_energy);
-  cJSON_AddNumberToObject(json, "external_work", s->external_work);
-  cJSON_AddNumberToObject(json, "gap_work", s->gap_work);
-  cJSON_AddNumberToObject(json, "energy_defect", s->energy_defect);
+  ReportNumbers(json, {"u_relative", s->u_relative}, {"strain_energy", s->strain_energy},
+                {"external_work", s->external_work}, {"gap_work", s->gap_work}, {"energy_defect", s->energy_defect});
   ReportKKT(json, &s->kkt);
   cJSON_AddNumberToObject(json, "rounding", s->kkt.rounding);
   ReportSeconds(json, &s->seconds);
@@ -257,7 +252,7 @@ PetscErrorCode DeclareSolve(PetscOptions options)
   (void)options;
   PetscCall(DriverReadFiles(path, NULL, path, path, path));
   PetscCall(DriverGetPoint(NULL, NULL));
-  PetscCall(DriverGetSamples(NULL, NULL, NULL));
+  PetscCall(DriverGetSamples(NULL, PETSC_FALSE, NULL, NULL));
   PetscCall(DriverReadMonitor(&monitor));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -283,7 +278,7 @@ PetscErrorCode CommandSolve(void)
   PetscCall(DriverHasSamples(scene, &set));
   if (set) PetscCall(HycoSceneRefuseHistory(scene, "a set of points"));
   if (set) {
-    PetscCall(DriverGetSamples(scene, &samples, &set));
+    PetscCall(DriverGetSamples(scene, PETSC_FALSE, &samples, &set));
   } else
     PetscCall(DriverGetPoint(scene, mu));
   if (set || n_times) PetscCall(DriverReadFiles(NULL, NULL, NULL, NULL, table));

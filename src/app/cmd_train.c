@@ -12,9 +12,8 @@ static void ReportScan(cJSON *json, const HycoScan *s, PetscInt n_par)
     return;
   }
   object = cJSON_AddObjectToObject(json, "scan");
-  cJSON_AddNumberToObject(object, "points", s->n);
-  cJSON_AddNumberToObject(object, "points_of_other_sign", s->n_singular);
-  cJSON_AddNumberToObject(object, "smallest_singular_value", s->smallest);
+  ReportNumbers(object, {"points", s->n}, {"points_of_other_sign", s->n_singular},
+                {"smallest_singular_value", s->smallest});
   ReportVector(object, "at", n_par, s->at);
 }
 
@@ -39,6 +38,28 @@ static PetscErrorCode ReportGroups(cJSON *json, HycoReducer reducer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+#define HARDLY 3 /* a gain below it is hardly worth a training */
+
+/* The time of a prediction beside that of a full-order solution, if this run has solved any; one group of ranks solves
+   one at a time. */
+static PetscErrorCode SayGain(HycoReducer reducer, const HycoTraining *t)
+{
+  PetscInt n, solved = 0;
+  const PetscInt *of;
+  PetscReal each;
+
+  PetscFunctionBegin;
+  PetscCall(HycoReducerGetSolved(reducer, &n, &of));
+  for (PetscInt k = 0; k < n; k++) solved += of[k];
+  if (!solved || !t->held_out.n || !(t->held_out.seconds > 0)) PetscFunctionReturn(PETSC_SUCCESS);
+  each = n * t->seconds_snapshots / solved;
+  PetscCall(Say("a prediction takes %.3g ms, a full-order solution took %.3g ms%s\n", 1e3 * (double)t->held_out.seconds,
+                1e3 * (double)each,
+                each < HARDLY * t->held_out.seconds ? ": this model gains little, looser targets may give a faster one"
+                                                    : ""));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Report(HycoScene scene, HycoReducer reducer, const HycoTraining *t, const GreedyLog *log,
                              const Search *search)
 {
@@ -50,22 +71,15 @@ static PetscErrorCode Report(HycoScene scene, HycoReducer reducer, const HycoTra
   cJSON_AddStringToObject(json, "model_type", t->type);
   cJSON_AddNumberToObject(json, "n_samples", t->n_samples);
   PetscCall(ReportGroups(json, reducer));
-  cJSON_AddNumberToObject(json, "n_modes", t->n_modes);
-  cJSON_AddNumberToObject(json, "n_dual_modes", t->n_dual_modes);
-  cJSON_AddNumberToObject(json, "n_stress_modes", t->n_stress_modes);
-  cJSON_AddNumberToObject(json, "n_force_modes", t->n_force_modes);
-  cJSON_AddNumberToObject(json, "n_fe_dofs", t->n_fe_dofs);
-  cJSON_AddNumberToObject(json, "rid_nodes", t->rid_nodes);
-  cJSON_AddNumberToObject(json, "rid_a_nodes", t->rid_a_nodes);
-  cJSON_AddNumberToObject(json, "rid_elements", t->rid_elements);
-  cJSON_AddNumberToObject(json, "rid_contacts", t->rid_contacts);
-  cJSON_AddNumberToObject(json, "rid_fraction", t->rid_fraction);
+  ReportNumbers(json, {"n_modes", t->n_modes}, {"n_dual_modes", t->n_dual_modes}, {"n_stress_modes", t->n_stress_modes},
+                {"n_force_modes", t->n_force_modes}, {"n_fe_dofs", t->n_fe_dofs}, {"rid_nodes", t->rid_nodes},
+                {"rid_a_nodes", t->rid_a_nodes}, {"rid_elements", t->rid_elements}, {"rid_contacts", t->rid_contacts},
+                {"rid_fraction", t->rid_fraction});
   if (t->stiffness) cJSON_AddNumberToObject(json, "condition", t->condition);
   PetscCall(HycoSceneGetParameters(scene, &n_par, NULL, NULL, NULL));
   ReportScan(json, &t->scan, n_par);
-  cJSON_AddNumberToObject(json, "training_error_u", t->error_u);
-  cJSON_AddNumberToObject(json, "training_error_lambda_rid", t->error_lambda);
-  cJSON_AddNumberToObject(json, "held_out_predictions", t->n_held);
+  ReportNumbers(json, {"training_error_u", t->error_u}, {"training_error_lambda_rid", t->error_lambda},
+                {"held_out_predictions", t->n_held});
   for (PetscInt k = 0; k < t->n_facts; k++) {
     if (t->fact[k].n > 1)
       ReportVector(json, t->fact[k].name, t->fact[k].n, t->fact[k].value);
@@ -74,10 +88,9 @@ static PetscErrorCode Report(HycoScene scene, HycoReducer reducer, const HycoTra
   }
   if (log->scene) DriverReportGreedy(json, log);
   DriverReportModel(json, search, t);
-  seconds = cJSON_AddObjectToObject(json, "seconds");
-  cJSON_AddNumberToObject(seconds, "snapshots", t->seconds_snapshots); /* of the final model */
-  cJSON_AddNumberToObject(seconds, "reduction", t->seconds_reduction);
-  cJSON_AddNumberToObject(seconds, "total", t->seconds_snapshots + t->seconds_reduction);
+  seconds = cJSON_AddObjectToObject(json, "seconds"); /* of the final model */
+  ReportNumbers(seconds, {"snapshots", t->seconds_snapshots}, {"reduction", t->seconds_reduction},
+                {"total", t->seconds_snapshots + t->seconds_reduction});
   PetscCall(ReportWrite(&json));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -161,7 +174,7 @@ PetscErrorCode DeclareTrain(PetscOptions options)
   PetscFunctionBegin;
   (void)options;
   PetscCall(DriverReadFiles(path, path, NULL, path, path));
-  PetscCall(DriverGetSamples(NULL, NULL, NULL));
+  PetscCall(DriverGetSamples(NULL, PETSC_TRUE, NULL, NULL));
   PetscCall(ReadGreedy(&greedy));
   PetscCall(DriverReadGreedy(NULL, NULL, &none, &log));
   PetscCall(DriverReadTargets(&search));
@@ -189,7 +202,7 @@ PetscErrorCode CommandTrain(void)
   PetscCall(DriverRequire("model", model));
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
   PetscCall(DriverCheckMesh(scene));
-  PetscCall(DriverGetSamples(scene, &samples, &given));
+  PetscCall(DriverGetSamples(scene, PETSC_TRUE, &samples, &given));
   PetscCall(ReadGreedy(&greedy));
   PetscCall(DriverReadTargets(&search));
   PetscCall(DriverGetValidation(scene, &validation));
@@ -226,6 +239,7 @@ PetscErrorCode CommandTrain(void)
     PetscCall(Say("scan of the ranges: %d points, smallest singular value %.1e of the largest%s\n", (int)t.scan.n,
                   (double)t.scan.smallest, t.scan.n_singular ? "; SINGULAR inside, kept by -hyco_keep_singular" : ""));
   PetscCall(DriverJudgeModel(&search, &t));
+  PetscCall(SayGain(reducer, &t));
   PetscCall(Say("seconds: %.2f snapshots, %.2f reduction; model in %s\n", (double)t.seconds_snapshots,
                 (double)t.seconds_reduction, model));
   if (greedy) PetscCall(DriverJudgeGreedy(&log));

@@ -10,13 +10,11 @@ PetscErrorCode DriverReportCarried(cJSON *json, PetscInt dim, PetscInt n, const 
   for (PetscInt k = 0; k < n; k++) {
     cJSON *one = cJSON_AddObjectToObject(all, r[k].name);
 
-    cJSON_AddNumberToObject(one, "n", r[k].n);
-    cJSON_AddNumberToObject(one, "n_active", r[k].n_active);
+    ReportNumbers(one, {"n", r[k].n}, {"n_active", r[k].n_active});
     ReportVector(one, "force", dim, r[k].force);
     if (dim == 2) ReportVector(one, "moment", 1, r[k].moment + 2);
     if (dim == 3) ReportVector(one, "moment", 3, r[k].moment);
-    cJSON_AddNumberToObject(one, "area", r[k].area);
-    cJSON_AddNumberToObject(one, "pressure_max", r[k].pressure);
+    ReportNumbers(one, {"area", r[k].area}, {"pressure_max", r[k].pressure});
     if (n > 1)
       PetscCall(Say("contact %s: %d of %d active, force on the slave (%.6g, %.6g, %.6g), largest pressure %.6g\n",
                     r[k].name, (int)r[k].n_active, (int)r[k].n, (double)r[k].force[0], (double)r[k].force[1],

@@ -55,8 +55,9 @@ PetscErrorCode DriverCheckMesh(HycoScene scene);
 PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[]);
 /* Whether -mu or a -mu_NAME was given. */
 PetscErrorCode DriverHasPoint(HycoScene scene, PetscBool *given);
-/* A set of points: -grid (with -grid_type), -values_NAME, or -points. *given: whether any was. */
-PetscErrorCode DriverGetSamples(HycoScene scene, HycoSamples *samples, PetscBool *given);
+/* A set of points: -grid (closed: by default with the ends of the ranges), -values_NAME, -points or -scatter. *given:
+   whether any was. */
+PetscErrorCode DriverGetSamples(HycoScene scene, PetscBool closed, HycoSamples *samples, PetscBool *given);
 /* Whether any point-set option was given. */
 PetscErrorCode DriverHasSamples(HycoScene scene, PetscBool *given);
 /* The points from which a greedy training chooses: -training_grid, closed unless -grid_type is given. */
@@ -125,6 +126,15 @@ PetscErrorCode ReportQuantities(cJSON *json, HycoScene scene, const PetscReal va
 /* A table's columns: `n` of them, then the scene's quantities; names: room for HYCO_MAX_QUANTITIES more. */
 PetscErrorCode ReportColumns(HycoScene scene, PetscInt n, const char *const columns[], PetscInt *n_all,
                              const char *names[]);
+/* Adds numbers in this order: ReportNumbers(json, {"n_dof", n}, {"seconds", t}). */
+#define ReportNumbers(json, ...)                                                                                       \
+  ReportNumbers_Private(json, (PetscInt)(sizeof((ReportNumber[]){__VA_ARGS__}) / sizeof(ReportNumber)),                \
+                        (const ReportNumber[]){__VA_ARGS__})
+typedef struct {
+  const char *name;
+  double value;
+} ReportNumber;
+void ReportNumbers_Private(cJSON *json, PetscInt n, const ReportNumber number[]);
 void ReportKKT(cJSON *json, const HycoKKT *kkt);
 void ReportSeconds(cJSON *json, const HycoSeconds *seconds);
 void ReportVector(cJSON *json, const char name[], PetscInt n, const PetscReal v[]);
@@ -342,29 +352,48 @@ PetscErrorCode DriverReportReducedPath(cJSON *json, HycoScene scene, const Drive
 /* Prints its residual of equilibrium, if requested. */
 PetscErrorCode DriverSayEquilibrium(const DriverReducedPath *path);
 
-/* -- compare_history.c -- */
+/* -- compare_report.c: the columns of compare's table, and its report -- */
 
-/* The outputs that the scenes of a full-order solution and of a model have in common, and their numbers in both. */
+/* The errors of a point, in this order; those of a path are the HYCO_N_ERRORS at its worst listed time, then as many at
+   its end. */
+enum {
+  DRIVER_U,
+  DRIVER_U_H1,
+  DRIVER_U_RID,
+  DRIVER_SIGMA,
+  DRIVER_SIGMA_11,
+  DRIVER_LAMBDA_RID,
+  DRIVER_LAMBDA_RID_DUAL,
+  DRIVER_LAMBDA,
+  DRIVER_LAMBDA_DUAL
+};
+/* The columns that follow the errors, of a point or of a path. */
+enum {
+  DRIVER_CONVERGED,
+  DRIVER_FALLBACK,
+  DRIVER_REACHED = DRIVER_FALLBACK,
+  DRIVER_KKT,
+  DRIVER_COVERED,
+  DRIVER_ITERATIONS = DRIVER_COVERED,
+  DRIVER_SECONDS_FOM,
+  DRIVER_SECONDS_ROM,
+  DRIVER_LAMBDA_NORM, /* of full order, of points alone */
+  DRIVER_SIGMA_NORM
+};
+#define DRIVER_ESTIMATES 3 /* of u, stress and forces (NaN: none); HycoPrediction.unseen follows */
+/* From column n_errors on those above, from `estimates` on the estimates, from `outputs` on the absolute error of each
+   output; of a path at its worst time, then of each at the end. */
 typedef struct {
-  PetscInt n, full[HYCO_MAX_QUANTITIES], reduced[HYCO_MAX_QUANTITIES];
-  const char *names[HYCO_MAX_QUANTITIES];
-} DriverOutputs;
-PetscErrorCode DriverCommonOutputs(HycoScene scene, HycoROM model, DriverOutputs *outputs);
-
-/* The number of values of a point, for each of the outputs two more; one point on one group; their statistics, table
-   ("": none) and report, on every rank; fails if a reduced path did not reach its end. */
-/* Columns of a comparison for the model's estimates: of u, stress and forces (NaN: none), and HycoPrediction.unseen.
-   DriverJudgeEstimates() compares them, from column `first` of n rows on, with the errors (n each; NULL: none): prints
-   and reports the share of the points that they bound, and the ratios. */
-#define DRIVER_JUDGED 4
-void DriverTakeEstimates(const HycoPrediction *prediction, PetscReal columns[DRIVER_JUDGED]);
-PetscErrorCode DriverJudgeEstimates(cJSON *json, PetscInt n, PetscInt width, const PetscReal value[], PetscInt first,
-                                    const PetscReal *const error[DRIVER_JUDGED - 1]);
-PetscInt DriverPathColumns(void);
-PetscErrorCode DriverComparePath(HycoFOM fom, HycoROM model, PetscBool root, PetscInt n_par, const PetscReal mu[],
-                                 const DriverOutputs *outputs, PetscReal v[]);
-PetscErrorCode DriverReportPaths(HycoScene scene, const DriverOutputs *outputs, PetscBool contact, PetscInt n,
-                                 const PetscReal mu[], PetscReal value[], const char table[]);
+  PetscBool paths;
+  PetscInt n_errors, estimates, outputs, n;
+  const char *names[3 * (HYCO_MAX_QUANTITIES + HYCO_N_ERRORS)];
+  char text[3 * (HYCO_MAX_QUANTITIES + HYCO_N_ERRORS)][DRIVER_LINE];
+} DriverColumns;
+PetscErrorCode DriverCompareColumns(PetscBool paths, PetscInt n_outputs, const char *const outputs[],
+                                    DriverColumns *columns);
+/* value: n rows, on every rank; fails if a prediction did not converge. */
+PetscErrorCode DriverReportComparison(HycoScene scene, PetscBool contact, const DriverColumns *columns, PetscInt n,
+                                      const PetscReal value[]);
 
 PetscErrorCode CommandCheck(void);
 PetscErrorCode CommandSolve(void);

@@ -76,18 +76,24 @@ static PetscErrorCode ListRanges(HycoScene scene, char list[DRIVER_LINE])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -grid_type: 0 centred, 1 closed, 2 Chebyshev. */
+/* The positions of a grid's values. TRAINING: the default of training, closed, with the middle for one value. */
+enum { CENTRED, CLOSED, CHEBYSHEV, TRAINING };
+
+/* Sets *type if -grid_type is given. */
 static PetscErrorCode ReadGridType(PetscInt *type)
 {
   static const char *const types[] = {"centred", "closed", "chebyshev", NULL};
+  PetscInt word = *type == TRAINING ? CLOSED : *type;
+  PetscBool given;
 
   PetscFunctionBegin;
   PetscOptionsBegin(PETSC_COMM_WORLD, NULL, "hyco", NULL);
   PetscCall(HycoOptionsWord("-grid_type",
-                            "positions of the values: cell centres; with both ends of the ranges; or roots of "
-                            "Chebyshev polynomials (for a condensed model)",
-                            types, type, NULL));
+                            "positions of the values: cell centres; with both ends of the ranges, the default of "
+                            "training; or roots of Chebyshev polynomials (for a condensed model)",
+                            types, &word, &given));
   PetscOptionsEnd();
+  if (given) *type = word;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -191,8 +197,7 @@ PetscErrorCode DriverHasSamples(HycoScene scene, PetscBool *given)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The grid that the option `name` gives as `text`; `type` applies unless -grid_type is given: 0 centred, 1 closed, 2
-   Chebyshev. */
+/* The grid that the option `name` gives as `text`; `type` applies unless -grid_type is given. */
 static PetscErrorCode AddGrid(HycoScene scene, HycoSamples samples, const char name[], PetscInt type, const char text[])
 {
   PetscInt n, m, counts[64];
@@ -212,10 +217,12 @@ static PetscErrorCode AddGrid(HycoScene scene, HycoSamples samples, const char n
     counts[p] = (PetscInt)values[p];
   }
   PetscCall(PetscFree(values));
-  if (type == 2)
+  if (type == CHEBYSHEV)
     PetscCall(HycoSamplesAddChebyshev(samples, counts));
+  else if (type == TRAINING)
+    PetscCall(HycoSamplesAddTrainingGrid(samples, counts));
   else
-    PetscCall(HycoSamplesAddGrid(samples, counts, (PetscBool)(type == 1)));
+    PetscCall(HycoSamplesAddGrid(samples, counts, (PetscBool)(type == CLOSED)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -229,7 +236,7 @@ PetscErrorCode DriverGetTrainingGrid(HycoScene scene, HycoSamples *samples)
   if (!scene) PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheck(text[0], "a greedy training needs candidate points; give -training_grid N,N,...");
   PetscCall(HycoSamplesCreate(scene, samples));
-  PetscCall(AddGrid(scene, *samples, "training_grid", 1, text));
+  PetscCall(AddGrid(scene, *samples, "training_grid", CLOSED, text));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -249,7 +256,7 @@ PetscErrorCode DriverGetValidation(HycoScene scene, HycoSamples *samples)
   if (!grid[0] && !points[0]) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoSamplesCreate(scene, samples));
   if (grid[0])
-    PetscCall(AddGrid(scene, *samples, "validation_grid", 1, grid));
+    PetscCall(AddGrid(scene, *samples, "validation_grid", CLOSED, grid));
   else
     PetscCall(HycoSamplesAddFile(*samples, points));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -291,10 +298,10 @@ static PetscErrorCode AddScattered(HycoSamples samples, const char text[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode DriverGetSamples(HycoScene scene, HycoSamples *samples, PetscBool *given)
+PetscErrorCode DriverGetSamples(HycoScene scene, PetscBool closed, HycoSamples *samples, PetscBool *given)
 {
   char grid[PETSC_MAX_PATH_LEN], points[PETSC_MAX_PATH_LEN], scatter[PETSC_MAX_PATH_LEN];
-  PetscInt n_sets = 0, n, type = 0;
+  PetscInt n_sets = 0, n, type = CENTRED;
 
   PetscFunctionBegin;
   PetscCall(DriverGet("grid", "<n,n,...> a set of points: a grid with n values per parameter", grid));
@@ -313,7 +320,7 @@ PetscErrorCode DriverGetSamples(HycoScene scene, HycoSamples *samples, PetscBool
             "there are several sets of points; give only one of -grid, -values_NAME, -points and -scatter");
   PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
   if (grid[0])
-    PetscCall(AddGrid(scene, *samples, "grid", 0, grid));
+    PetscCall(AddGrid(scene, *samples, "grid", closed ? TRAINING : CENTRED, grid));
   else if (points[0])
     PetscCall(HycoSamplesAddFile(*samples, points));
   else if (scatter[0])

@@ -65,9 +65,7 @@ static void ReportEquilibrium(cJSON *json, const DriverReducedPath *path)
     return;
   }
   object = cJSON_AddObjectToObject(json, "equilibrium");
-  cJSON_AddNumberToObject(object, "worst", e->worst);
-  cJSON_AddNumberToObject(object, "t", path->step[e->at].t);
-  cJSON_AddNumberToObject(object, "worst_contact", e->worst_contact);
+  ReportNumbers(object, {"worst", e->worst}, {"t", path->step[e->at].t}, {"worst_contact", e->worst_contact});
   ReportVector(object, "residual", e->n, e->residual);
   ReportVector(object, "contact", e->n, e->contact);
 }

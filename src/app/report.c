@@ -33,12 +33,15 @@ PetscErrorCode ReportCreate(const char command[], HycoScene scene, const PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+void ReportNumbers_Private(cJSON *json, PetscInt n, const ReportNumber number[])
+{
+  for (PetscInt k = 0; k < n; k++) cJSON_AddNumberToObject(json, number[k].name, number[k].value);
+}
+
 PetscErrorCode ReportContacts(cJSON *json, PetscInt n_contacts, PetscInt n_facing, PetscReal overlap, PetscReal sliding)
 {
   PetscFunctionBegin;
-  cJSON_AddNumberToObject(json, "n_facing", n_facing);
-  cJSON_AddNumberToObject(json, "overlap", overlap);
-  cJSON_AddNumberToObject(json, "sliding", sliding);
+  ReportNumbers(json, {"n_facing", n_facing}, {"overlap", overlap}, {"sliding", sliding});
   if (n_contacts && !n_facing) PetscCall(Say("NO CONTACT: no slave node faces a master at these parameter values\n"));
   if (overlap > 0) PetscCall(Say("largest initial overlap %.4g\n", (double)overlap));
   if (sliding > 1)
@@ -79,21 +82,16 @@ void ReportKKT(cJSON *json, const HycoKKT *kkt)
 {
   cJSON *object = cJSON_AddObjectToObject(json, "kkt");
 
-  cJSON_AddNumberToObject(object, "stationarity", kkt->stationarity);
-  cJSON_AddNumberToObject(object, "penetration", kkt->penetration);
-  cJSON_AddNumberToObject(object, "adhesion", kkt->adhesion);
-  cJSON_AddNumberToObject(object, "complementarity", kkt->complementarity);
+  ReportNumbers(object, {"stationarity", kkt->stationarity}, {"penetration", kkt->penetration},
+                {"adhesion", kkt->adhesion}, {"complementarity", kkt->complementarity});
 }
 
 void ReportSeconds(cJSON *json, const HycoSeconds *seconds)
 {
   cJSON *object = cJSON_AddObjectToObject(json, "seconds");
 
-  cJSON_AddNumberToObject(object, "setup", seconds->setup);
-  cJSON_AddNumberToObject(object, "assemble", seconds->assemble);
-  cJSON_AddNumberToObject(object, "factor", seconds->factor);
-  cJSON_AddNumberToObject(object, "solve", seconds->solve);
-  cJSON_AddNumberToObject(object, "total", seconds->total);
+  ReportNumbers(object, {"setup", seconds->setup}, {"assemble", seconds->assemble}, {"factor", seconds->factor},
+                {"solve", seconds->solve}, {"total", seconds->total});
 }
 
 void ReportVector(cJSON *json, const char name[], PetscInt n, const PetscReal v[])
@@ -134,8 +132,7 @@ static void AddColumn(cJSON *json, const char name[], PetscInt n, PetscInt n_col
   c->mean /= PetscMax(1, c->used);
   cJSON_AddNumberToObject(object, "undefined", c->undefined);
   if (c->used) {
-    cJSON_AddNumberToObject(object, "mean", c->mean);
-    cJSON_AddNumberToObject(object, "max", c->worst);
+    ReportNumbers(object, {"mean", c->mean}, {"max", c->worst});
   } else { /* defined at no point */
     cJSON_AddNullToObject(object, "mean");
     cJSON_AddNullToObject(object, "max");
@@ -191,9 +188,7 @@ PetscErrorCode ReportSet(const char command[], const char table[], HycoScene sce
                 seconds > 0 ? (double)(n / seconds) : 0., (int)failed,
                 table[0] ? "" : "; -table FILE.csv writes their results"));
   PetscCall(ReportCreate(command, scene, NULL, &json));
-  cJSON_AddNumberToObject(json, "n_points", n);
-  cJSON_AddNumberToObject(json, "not_converged", failed);
-  cJSON_AddNumberToObject(json, "seconds_total", seconds);
+  ReportNumbers(json, {"n_points", n}, {"not_converged", failed}, {"seconds_total", seconds});
   if (seconds > 0) cJSON_AddNumberToObject(json, "points_per_second", n / seconds);
   PetscCall(ReportWrite(&json));
   HycoCheck(!failed, "%d of the %d points did not converge; the column converged of %s says which", (int)failed, (int)n,
@@ -212,8 +207,7 @@ PetscErrorCode ReportWrite(cJSON **json)
   mine = (PetscReal)usage.ru_maxrss / 1024;
   PetscCallMPI(MPI_Allreduce(&mine, &all, 1, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD));
   PetscCallMPI(MPI_Allreduce(&mine, &largest, 1, MPIU_REAL, MPI_MAX, PETSC_COMM_WORLD));
-  cJSON_AddNumberToObject(*json, "memory_mb", all);
-  cJSON_AddNumberToObject(*json, "memory_mb_largest_rank", largest);
+  ReportNumbers(*json, {"memory_mb", all}, {"memory_mb_largest_rank", largest});
   DriverReportMissed(*json);
   PetscCall(DriverReadFiles(NULL, NULL, NULL, path, NULL));
   if (path[0]) {

@@ -201,7 +201,7 @@ PetscErrorCode DriverSetSearch(Search *s, HycoScene scene, HycoReducer reducer, 
 static PetscErrorCode Misses(const Search *s, const HycoTraining *t)
 {
   const PetscReal *limit = s->on ? s->target : bar;
-  const PetscBool hybrid = (PetscBool)(IsPath(s) && strcmp(t->type, HYCO_ROM_HYBRID) == 0);
+  const PetscBool hybrid = (PetscBool)(IsPath(s) && t->chosen.settings.rid);
 
   PetscFunctionBegin;
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
@@ -218,11 +218,10 @@ static PetscErrorCode Misses(const Search *s, const HycoTraining *t)
                                     : HycoErrorKinds[j],
         t->held_out.largest[j] > PETSC_MAX_REAL / 8 ? "infinite" : reached, (int)t->held_out.n,
         s->on ? "the target is" : "without a target it should stay below", asked, t->next, t->next[0] ? "; or " : "",
-        s->on
-            ? "give more training points, a larger -target_max_added, or a looser target"
-            : "give more training points, with the ends of the ranges among them (-grid_type closed), let training add "
-              "them (-target_u 5e-3 -target_lambda 3e-2), "
-              "or set looser targets",
+        s->on ? "give more training points, a larger -target_max_added, or a looser target"
+              : "give more training points, with the ends of the ranges among them, let training add them (-target_u "
+                "5e-3 "
+                "-target_lambda 3e-2), or set looser targets",
         hybrid ? "; or try -hyco_model_type cubature (docs/models.md)" : ""));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -278,7 +277,8 @@ PetscErrorCode DriverJudgeModel(const Search *s, const HycoTraining *t)
   DescribeErrors(IsPath(s), t->held_out.largest, largest);
   if (t->n_fresh)
     snprintf(fresh, sizeof(fresh), ", %d of them fresh (no solution was added near them)", (int)t->n_fresh);
-  PetscCall(Say("errors at %d held-out points%s: median %s; largest %s\n", (int)t->held_out.n, fresh, median, largest));
+  PetscCall(Say("errors at %d held-out points%s: median %s; largest%s %s\n", (int)t->held_out.n, fresh, median,
+                t->n_corners ? ", also at corners of the training," : "", largest));
   DescribeErrors(IsPath(s), t->held_out.end, end);
   if (IsPath(s))
     PetscCall(Say("these are the errors at each path's worst listed time; the largest at the end are %s\n", end));
@@ -326,10 +326,8 @@ void DriverReportModel(cJSON *json, const Search *s, const HycoTraining *t)
 
   if (t->held_out.n) {
     held = cJSON_AddObjectToObject(json, "held_out");
-    cJSON_AddNumberToObject(held, "n", t->held_out.n);
-    cJSON_AddNumberToObject(held, "fresh", t->n_fresh);
-    cJSON_AddNumberToObject(held, "not_converged", t->held_out.not_converged);
-    cJSON_AddNumberToObject(held, "online_seconds", t->held_out.seconds);
+    ReportNumbers(held, {"n", t->held_out.n}, {"fresh", t->n_fresh}, {"not_converged", t->held_out.not_converged},
+                  {"online_seconds", t->held_out.seconds});
     for (PetscInt j = 0; j < CountKinds(s); j++) {
       cJSON *error = cJSON_AddObjectToObject(held, HycoErrorKinds[j]);
 
@@ -345,18 +343,14 @@ void DriverReportModel(cJSON *json, const Search *s, const HycoTraining *t)
   if (a->number) {
     cJSON *search = cJSON_AddObjectToObject(json, "search"), *left_out;
 
-    cJSON_AddNumberToObject(search, "attempts", s->n);
-    cJSON_AddNumberToObject(search, "chosen", s->n - a->of + a->number);
-    cJSON_AddNumberToObject(search, "added", t->n_added);
-    cJSON_AddNumberToObject(search, "former_held_out", t->n_former);
+    ReportNumbers(search, {"attempts", s->n}, {"chosen", s->n - a->of + a->number}, {"added", t->n_added},
+                  {"former_held_out", t->n_former});
     cJSON_AddStringToObject(search, "model_type", a->settings.type);
-    cJSON_AddNumberToObject(search, "pod_tol", a->settings.pod_tol);
-    cJSON_AddNumberToObject(search, "rid_layers", a->settings.layers);
-    cJSON_AddNumberToObject(search, "rid_contact_extension", a->settings.contact_extension);
+    ReportNumbers(search, {"pod_tol", a->settings.pod_tol}, {"rid_layers", a->settings.layers},
+                  {"rid_contact_extension", a->settings.contact_extension});
     cJSON_AddStringToObject(search, "hybrid", HycoHybrids[a->settings.hybrid]);
     cJSON_AddBoolToObject(search, "rid_whole", a->settings.whole);
-    cJSON_AddNumberToObject(search, "operations", t->search_operations);
-    cJSON_AddNumberToObject(search, "operations_of_solutions", t->solution_operations);
+    ReportNumbers(search, {"operations", t->search_operations}, {"operations_of_solutions", t->solution_operations});
     left_out = cJSON_AddObjectToObject(search, "not_tried");
     for (PetscInt k = 0; k < t->n_left_out; k++)
       cJSON_AddStringToObject(left_out, t->left_out[k].what, t->left_out[k].why);

@@ -22,18 +22,15 @@ PetscErrorCode DriverReportHistory(cJSON *json, HycoScene scene, const HycoHisto
   cJSON_AddBoolToObject(history, "ended", h->ended);
   cJSON_AddNumberToObject(history, "t_end", h->t);
   cJSON_AddStringToObject(history, "newton", h->newton);
-  cJSON_AddNumberToObject(history, "factor_in_solves", h->factor_cost);
-  cJSON_AddNumberToObject(history, "newton_order", h->order);
-  cJSON_AddNumberToObject(history, "newton_orders", h->n_orders);
+  ReportNumbers(history, {"factor_in_solves", h->factor_cost}, {"newton_order", h->order},
+                {"newton_orders", h->n_orders});
   PetscCall(DriverReportSteps(history, scene, PETSC_FALSE, h->n, h->step));
   for (PetscInt k = 0; k < h->n; k++) {
     seconds[0] += h->step[k].seconds_factor;
     seconds[1] += h->step[k].seconds_solve;
     seconds[2] += h->step[k].seconds_law;
   }
-  cJSON_AddNumberToObject(history, "seconds_factor", seconds[0]);
-  cJSON_AddNumberToObject(history, "seconds_solve", seconds[1]);
-  cJSON_AddNumberToObject(history, "seconds_law", seconds[2]);
+  ReportNumbers(history, {"seconds_factor", seconds[0]}, {"seconds_solve", seconds[1]}, {"seconds_law", seconds[2]});
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -7,7 +7,7 @@
   Fischer-Burmeister function (T. S. Munson et al., INFORMS J. Comput. 13 (2001) 294-311). Both have absolute stopping
   criteria, so that the problem is scaled first: unit diagonal, right-hand side of size one. A type that a program
   registers gets the same: solution, bounds, Hessian, objective and its gradient H y - f. hyco's own types (tao_types.c)
-  get the unscaled problem. TAO's convergence flag is not relied on: the caller recomputes the residuals. A PETSc error
+  get the unscaled problem as data. TAO's convergence flag is not relied on: the caller recomputes the residuals. A PETSc error
   inside TAO is caught: it counts as not solved, like an iteration limit.
 */
 #include <hycotao.h>
@@ -17,6 +17,7 @@ static const struct {
   int traits;
 } known[] = {{HYCO_TAO_ACTIVE_SET, HYCO_TAO_OWN}, /* checked first */
              {HYCO_TAO_LEMKE, HYCO_TAO_OWN | HYCO_TAO_DENSE},
+             {HYCO_TAO_SEMISMOOTH_NEWTON, HYCO_TAO_OWN | HYCO_TAO_DENSE | HYCO_TAO_CONES},
              {"gpcg", HYCO_TAO_SYMMETRIC | HYCO_TAO_NEWTON | HYCO_TAO_RESTARTS},
              {"tron", HYCO_TAO_SYMMETRIC | HYCO_TAO_NEWTON | HYCO_TAO_RESTARTS},
              {"bntr", HYCO_TAO_SYMMETRIC | HYCO_TAO_NEWTON | HYCO_TAO_RESTARTS},
@@ -64,7 +65,7 @@ PetscErrorCode HycoTaoCreate(MPI_Comm comm, PetscObject owner, HycoTao *t)
   PetscMPIInt rank = 0, size;
 
   PetscFunctionBegin;
-  PetscCall(HycoTaoRegisterAll());
+  PetscCall(HycoPackageCheck());
   PetscCall(PetscNew(t));
   (*t)->comm = comm;
   PetscCallMPI(MPI_Comm_size(comm, &size));
@@ -104,6 +105,7 @@ PetscErrorCode HycoTaoDestroy(HycoTao *t)
   PetscCall(Reset(*t));
   PetscCall(ResetDense(*t));
   PetscCall(VecDestroy(&(*t)->placed));
+  PetscCall(PetscFree((*t)->last));
   PetscCall(PetscFree(*t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -139,7 +141,10 @@ static PetscErrorCode Prepare(HycoTao t, Vec y, PetscInt max_its, PetscBool *mad
   if (t->owner) PetscCall(PetscObjectGetOptionsPrefix(t->owner, &prefix));
   PetscCall(PetscSNPrintf(t->prefix, sizeof(t->prefix), "%shyco_", prefix ? prefix : ""));
   PetscCall(TaoSetOptionsPrefix(t->tao, t->prefix));
-  PetscCall(TaoSetApplicationContext(t->tao, t));
+  if (t->traits & HYCO_TAO_OWN) { /* the form has its own solver on a set */
+    t->tao->data = t;
+    PetscCall(KSPDestroy(&t->tao->ksp));
+  }
   PetscCall(TaoSetMaximumIterations(t->tao, max_its));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

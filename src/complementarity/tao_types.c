@@ -1,18 +1,11 @@
 /*
-  hyco's complementarity methods as Tao types: HYCO_TAO_ACTIVE_SET and HYCO_TAO_LEMKE. They read the unscaled problem
-  from the HycoTao. Their monitor shows the number of active contacts as the function value and the number of changes as
-  the residual.
+  hyco's complementarity methods as Tao types: HYCO_TAO_ACTIVE_SET and HYCO_TAO_LEMKE, and HYCO_TAO_SEMISMOOTH_NEWTON
+  for the blocks of contact systems. In any program the first two solve the problem of the Tao (tao_newton.c). A form of HycoSolver knows more than a Hessian says: how to solve on a set with a
+  factor, multigrid or coarser problems that it keeps. It therefore attaches a HycoTao as the type's data, whose
+  functions take the place of the general ones; its problem is unscaled, and its monitor shows the number of active
+  contacts as the function value and the number of changes as the residual.
 */
 #include <hycotao.h>
-
-static PetscErrorCode GetProblem(Tao tao, HycoTao *t)
-{
-  PetscFunctionBegin;
-  PetscCall(TaoGetApplicationContext(tao, t));
-  PetscCheck(*t && (*t)->tao == tao, PetscObjectComm((PetscObject)tao), PETSC_ERR_ARG_WRONGSTATE,
-             "hyco's types of Tao work inside HycoSolver only; use -hyco_solver_type");
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* Passes an iteration of the active set to TAO's monitors and the user's. */
 static PetscErrorCode Monitor(PetscInt its, PetscInt n_active, PetscInt changes, void *ctx)
@@ -37,11 +30,14 @@ static void SetReason(const HycoTao t)
 
 static PetscErrorCode SolveActiveSet(Tao tao)
 {
-  HycoTao t;
+  const HycoTao t = (HycoTao)tao->data;
   PetscBool watched;
 
   PetscFunctionBegin;
-  PetscCall(GetProblem(tao, &t));
+  if (!t) {
+    PetscCall(HycoTaoNewton(tao, PETSC_FALSE));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   watched = (PetscBool)(t->monitor || tao->numbermonitors || tao->hist_max);
   if (t->lcp) {
     HycoLCP lcp = *t->lcp;
@@ -64,10 +60,13 @@ static PetscErrorCode SolveActiveSet(Tao tao)
 
 static PetscErrorCode SolveLemke(Tao tao)
 {
-  HycoTao t;
+  const HycoTao t = (HycoTao)tao->data;
 
   PetscFunctionBegin;
-  PetscCall(GetProblem(tao, &t));
+  if (!t) {
+    PetscCall(HycoTaoNewton(tao, PETSC_TRUE));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCheck(t->lcp && !t->lcp->p, PetscObjectComm((PetscObject)tao), PETSC_ERR_SUP,
              "Lemke's method needs a dense matrix, and no free unknowns");
   PetscCall(HycoLCPLemke(t->lcp->n, t->lcp->M, t->lcp->q, tao->max_it, t->z, &t->its, &t->status));
@@ -75,29 +74,92 @@ static PetscErrorCode SolveLemke(Tao tao)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Starts from the forces of the last solution, or from none; the new ones are kept. */
+static PetscErrorCode RunSemismooth(HycoTao t, const HycoLCP *lcp)
+{
+  PetscFunctionBegin;
+  if (lcp->warm && t->n_last == lcp->n && t->last)
+    PetscCall(PetscArraycpy(t->z, t->last, lcp->n));
+  else
+    PetscCall(PetscArrayzero(t->z, lcp->n));
+  PetscCall(HycoLCPSemismooth(lcp, t->z, &t->its, &t->status));
+  if (t->status != HYCO_LCP_SOLVED) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFree(t->last));
+  HycoDuplicate(lcp->n, t->z, &t->last);
+  t->n_last = lcp->n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SolveSemismooth(Tao tao)
+{
+  const HycoTao t = (HycoTao)tao->data;
+  HycoLCP lcp;
+
+  PetscFunctionBegin;
+  PetscCheck(t && t->lcp && !t->lcp->p, PetscObjectComm((PetscObject)tao), PETSC_ERR_SUP,
+             HYCO_TAO_SEMISMOOTH_NEWTON " solves contact systems of a HycoSolver; for bounds use " HYCO_TAO_ACTIVE_SET);
+  lcp = *t->lcp;
+  lcp.max_its = t->max_its;
+  lcp.monitor = t->monitor || tao->numbermonitors || tao->hist_max ? Monitor : NULL;
+  lcp.monitor_ctx = t;
+  PetscCall(RunSemismooth(t, &lcp));
+  SetReason(t);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The solver of the free unknowns' block: a factor, or -tao_ksp_type, -tao_pc_type. */
+static PetscErrorCode CreateKSP(Tao tao)
+{
+  PetscMPIInt size;
+  PC pc;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)tao), &size));
+  PetscCall(KSPCreate(PetscObjectComm((PetscObject)tao), &tao->ksp));
+  PetscCall(PetscObjectIncrementTabLevel((PetscObject)tao->ksp, (PetscObject)tao, 1));
+  PetscCall(KSPSetOptionsPrefix(tao->ksp, ((PetscObject)tao)->prefix));
+  PetscCall(KSPAppendOptionsPrefix(tao->ksp, "tao_"));
+  PetscCall(KSPSetType(tao->ksp, KSPPREONLY));
+  PetscCall(KSPGetPC(tao->ksp, &pc));
+  PetscCall(PCSetType(pc, PCLU));
+  if (size > 1) PetscCall(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode CreateActiveSet(Tao tao)
 {
   PetscFunctionBegin;
+  PetscCall(TaoParametersInitialize(tao));
   tao->ops->solve = SolveActiveSet;
+  tao->data = NULL;
+  PetscCall(CreateKSP(tao));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode CreateLemke(Tao tao)
 {
   PetscFunctionBegin;
+  PetscCall(TaoParametersInitialize(tao));
   tao->ops->solve = SolveLemke;
+  tao->data = NULL;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode CreateSemismooth(Tao tao)
+{
+  PetscFunctionBegin;
+  PetscCall(TaoParametersInitialize(tao));
+  tao->ops->solve = SolveSemismooth;
+  tao->data = NULL;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoTaoRegisterAll(void)
 {
-  PetscErrorCode (*create)(Tao);
-
   PetscFunctionBegin;
   PetscCall(TaoInitializePackage());
-  PetscCall(PetscFunctionListFind(TaoList, HYCO_TAO_LEMKE, &create));
-  if (create) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(TaoRegister(HYCO_TAO_ACTIVE_SET, CreateActiveSet));
   PetscCall(TaoRegister(HYCO_TAO_LEMKE, CreateLemke));
+  PetscCall(TaoRegister(HYCO_TAO_SEMISMOOTH_NEWTON, CreateSemismooth));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

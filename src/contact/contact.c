@@ -3,30 +3,14 @@
 #include <hycoregistry.h>
 #include <string.h>
 
-static PetscErrorCode AddOwn(void);
-static HycoRegistry types = {.add_own = AddOwn, .sorted = PETSC_TRUE};
+static HycoRegistry types = {.sorted = PETSC_TRUE};
 
-static PetscErrorCode AddOwn(void)
-{
-  PetscFunctionBegin;
-  PetscCall(HycoRegistryAdd(&types, HYCO_CONTACT_OBSTACLE, HycoContactCreate_Obstacle));
-  PetscCall(HycoRegistryAdd(&types, HYCO_CONTACT_PAIR, HycoContactCreate_Pair));
-  PetscCall(HycoRegistryAdd(&types, HYCO_CONTACT_SURFACE, HycoContactCreate_Surface));
-  PetscCall(HycoRegistryAdd(&types, HYCO_CONTACT_RIGID, HycoContactCreate_Rigid));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoContactRegister(const char name[], PetscErrorCode (*create)(HycoContact))
-{
-  PetscFunctionBegin;
-  PetscCall(HycoRegistryAdd(&types, name, create));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineRegister(HycoContactRegister, types, PetscErrorCode (*create)(HycoContact))
 
 PetscErrorCode HycoContactCreate(MPI_Comm comm, HycoContact *contact)
 {
   PetscFunctionBegin;
-  PetscCall(HycoInitializePackage());
+  PetscCall(HycoPackageCheck());
   PetscCall(PetscHeaderCreate(*contact, HYCO_CONTACT_CLASSID, "HycoContact", "Contact discretisation", "Hyco", comm,
                               HycoContactDestroy, HycoContactView));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -35,9 +19,7 @@ PetscErrorCode HycoContactCreate(MPI_Comm comm, HycoContact *contact)
 PetscErrorCode HycoContactDestroy(HycoContact *contact)
 {
   PetscFunctionBegin;
-  if (!contact || !*contact) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheckHandle(*contact, HYCO_CONTACT_CLASSID);
-  HycoDereference(contact);
+  HycoDestroyBegin(contact, HYCO_CONTACT_CLASSID);
   if ((*contact)->ops->destroy) PetscCall((*(*contact)->ops->destroy)(*contact));
   PetscCall(HycoDeclaredDestroy(&(*contact)->entries));
   PetscCall(PetscHeaderDestroy(contact));
@@ -68,12 +50,8 @@ HycoDefineMethod(HycoContactGetType, (HycoContact contact, HycoContactType *type
 
 PetscErrorCode HycoContactView(HycoContact contact, PetscViewer viewer)
 {
-  PetscBool ascii;
-
   PetscFunctionBegin;
-  HycoCheckHandle(contact, HYCO_CONTACT_CLASSID);
-  PetscCall(HycoViewBegin((PetscObject)contact, &viewer, &ascii));
-  if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoViewBegin(contact, HYCO_CONTACT_CLASSID, viewer);
   PetscCall(HycoDeclaredView(&contact->entries, viewer));
   if (contact->ops->view) PetscCall((*contact->ops->view)(contact, viewer));
   PetscCall(PetscViewerASCIIPopTab(viewer));

@@ -155,7 +155,7 @@ static PetscErrorCode AppendMatched(HycoPartners *t, HycoContact c, PetscInt ind
     HycoPairsAppend(p, index, m->slave[k], m->at[k].n, m->at[k].node, m->at[k].weight);
   }
   if (n_missed) PetscCall(Complain(t, c, remedy, n_missed, missed, m));
-  if (n_alone == m->n) PetscCall(RefuseAll(t, c, m));
+  if (n_alone == m->n && !m->part) PetscCall(RefuseAll(t, c, m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -168,17 +168,20 @@ static PetscErrorCode Match(HycoPartners *t, HycoContact c, PetscInt index, Hyco
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
+  m->part = (PetscBool)(p->facts != NULL);
+  if (m->part && !m->n) PetscFunctionReturn(PETSC_SUCCESS); /* no slave of this rank */
   HycoCheck(m->n && t->n, "contact %s: the group %s is empty", c->name, m->n ? c->master : c->slave);
   PetscCall(HycoPairsReserve(p, m->n, t->nf));
   PetscCall(CheckApart(t, c));
   for (PetscInt k = 0; k < m->n && !settle; k++) HycoPairsAppend(p, index, m->slave[k], 0, NULL, NULL);
   if (!settle) PetscFunctionReturn(PETSC_SUCCESS);
-  m->small = HycoSurfaceTolerance(t->fe->mesh, t->slave);
+  m->small = m->part ? p->facts[index].small : HycoSurfaceTolerance(t->fe->mesh, t->slave);
   PetscCall(HycoContactGetLength(c, "tolerance", &m->tolerance));
   if (m->tolerance < 0) m->tolerance = m->small;
   PetscCall(PetscMalloc3(m->n, &m->at, m->n, &m->why, m->n, &missed));
   query.tolerance = m->tolerance;
   query.small = m->small;
+  p->queries += m->n;
   ierr = HycoPartnersSearch(t, &query, m->n, m->slave, m->at, m->why);
   if (!ierr) ierr = (*settle)(t, c, m);
   if (!ierr) ierr = AppendMatched(t, c, index, remedy, m, missed, p);
@@ -198,7 +201,8 @@ static PetscBool Follows(HycoMesh m, PetscInt node, const PetscBool carries[])
   return all;
 }
 
-/* The slave nodes that take contact forces, without tied nodes that follow others of them; the caller frees them. */
+/* The slave nodes that take contact forces, without tied nodes that follow others of them and without those of other
+   ranks; the caller frees them. */
 static PetscErrorCode FindSlaves(const HycoPartners *t, PetscInt *n, PetscInt **slave)
 {
   HycoMesh m = t->fe->mesh;
@@ -210,7 +214,9 @@ static PetscErrorCode FindSlaves(const HycoPartners *t, PetscInt *n, PetscInt **
   PetscCall(PetscMalloc1(m->group_start[t->slave + 1] - m->group_start[t->slave], slave));
   HycoSurfaceCarriers(m, t->slave, carries);
   for (PetscInt k = m->group_start[t->slave]; k < m->group_start[t->slave + 1]; k++) {
-    if (carries[m->group_node[k]] && !Follows(m, m->group_node[k], carries)) (*slave)[(*n)++] = m->group_node[k];
+    const PetscInt i = m->group_node[k];
+
+    if (carries[i] && HycoMeshOwned(m, i) >= 0 && !Follows(m, i, carries)) (*slave)[(*n)++] = i;
   }
   PetscCall(PetscFree(carries));
   PetscFunctionReturn(PETSC_SUCCESS);

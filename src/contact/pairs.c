@@ -3,6 +3,7 @@
   surfaces that a map moves, masters are searched again whenever the nodes have moved.
 */
 #include "facing.h"
+#include "partners.h"
 #include <hycokinematics.h>
 
 PetscErrorCode HycoPairsReserve(HycoPairs *p, PetscInt contacts, PetscInt width)
@@ -48,6 +49,36 @@ static PetscErrorCode IsMoved(HycoScene scene, HycoMesh m, const char group[], P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether a map moves a surface of a contact. */
+static PetscErrorCode IsSurfaceMoved(HycoScene scene, HycoMesh m, HycoContact c, PetscBool *moved)
+{
+  PetscFunctionBegin;
+  PetscCall(IsMoved(scene, m, c->slave, moved));
+  PetscCall(IsMoved(scene, m, c->master, moved));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactsFacts(MPI_Comm comm, HycoScene scene, HycoMesh part, HycoSurfaceFacts facts[])
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < scene->n_contacts; k++) {
+    HycoContact c = scene->contact[k];
+    PetscReal least[2] = {PETSC_MAX_REAL, 0}; /* the tolerance, minus whether it is moved */
+    PetscBool moved = PETSC_FALSE;
+    PetscInt g = 0;
+
+    PetscCall(HycoMeshFindGroup(part, "contact", c->slave, &g));
+    least[0] = HycoSurfaceTolerance(part, g);
+    if (least[0] == 0) least[0] = PETSC_MAX_REAL; /* no facets here */
+    if (c->ops->find) PetscCall(IsSurfaceMoved(scene, part, c, &moved));
+    least[1] = moved ? -1 : 0;
+    HycoAllreduce(least, 2, MPIU_REAL, MPI_MIN, comm);
+    facts[k].small = least[0] < PETSC_MAX_REAL ? least[0] : 0;
+    facts[k].moved = (PetscBool)(least[1] < 0);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoPairsSetSearch(HycoScene scene, HycoMesh m, HycoPairs *pairs)
 {
   PetscFunctionBegin;
@@ -61,8 +92,10 @@ PetscErrorCode HycoPairsSetSearch(HycoScene scene, HycoMesh m, HycoPairs *pairs)
 
     search->reach = PETSC_MAX_REAL;
     if (!c->ops->find) continue;
-    PetscCall(IsMoved(scene, m, c->slave, &search->moved));
-    PetscCall(IsMoved(scene, m, c->master, &search->moved));
+    if (pairs->facts)
+      search->moved = pairs->facts[k].moved;
+    else
+      PetscCall(IsSurfaceMoved(scene, m, c, &search->moved));
     if (search->moved) pairs->room = m->nf;
   }
   if (!pairs->room) PetscCall(PetscFree(pairs->search));
@@ -92,6 +125,7 @@ PetscErrorCode HycoPairsMove(HycoFE fe, HycoPairs *p)
     next = k + 1;
     if (HycoPairsMoved(p, k)) {
       next = HycoPairsRun(p, k);
+      p->queries += next - k;
       PetscCall((*fe->scene->contact[p->contact[k]]->ops->find)(fe->scene->contact[p->contact[k]], fe,
                                                                 p->search[p->contact[k]].reach, next - k, p->slave + k,
                                                                 start + k, master, weight));
@@ -175,7 +209,8 @@ static PetscErrorCode AppendNodes(HycoFE fe, PetscInt index, const PetscInt held
 
   PetscFunctionBegin;
   PetscCall(HycoMeshFindGroup(m, "contact", c->slave, &g));
-  HycoCheck(m->group_start[g + 1] > m->group_start[g], "contact %s: the group %s is empty", c->name, m->group_name[g]);
+  HycoCheck(p->facts || m->group_start[g + 1] > m->group_start[g], "contact %s: the group %s is empty", c->name,
+            m->group_name[g]);
   PetscCall(HycoPairsReserve(p, m->group_start[g + 1] - m->group_start[g], 0));
   PetscCall(PetscMalloc1(m->n_nodes, &carries));
   HycoSurfaceCarriers(m, g, carries);
@@ -185,6 +220,26 @@ static PetscErrorCode AppendNodes(HycoFE fe, PetscInt index, const PetscInt held
     if (carries[i] && held[i] < m->dim) HycoPairsAppend(p, index, i, 0, NULL, NULL);
   }
   PetscCall(PetscFree(carries));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Keeps the contacts of the slaves that this rank owns. */
+static PetscErrorCode KeepOwned(HycoMesh m, HycoPairs *p)
+{
+  PetscInt *which, n = 0;
+  HycoPairs kept;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(p->n, &which));
+  for (PetscInt k = 0; k < p->n; k++) {
+    if (HycoMeshOwned(m, p->slave[k]) >= 0) which[n++] = k;
+  }
+  if (n < p->n) {
+    PetscCall(HycoPairsSelect(p, n, which, NULL, &kept));
+    PetscCall(HycoPairsDestroy(p));
+    *p = kept;
+  }
+  PetscCall(PetscFree(which));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -209,11 +264,12 @@ static PetscErrorCode FindAll(HycoFE fe, HycoPairs *pairs)
   if (!ierr) ierr = CheckSlaves(scene, fe->mesh, held, pairs);
   PetscCall(PetscFree(held));
   PetscCall(ierr);
+  if (pairs->facts) PetscCall(KeepOwned(fe->mesh, pairs));
   PetscCall(HycoPairsMove(fe, pairs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoPairsFind(HycoScene scene, HycoMesh m, HycoTeam *team, HycoPairs *pairs)
+PetscErrorCode HycoPairsFind(HycoScene scene, HycoMesh m, const HycoSurfaceFacts facts[], HycoPairs *pairs)
 {
   HycoFE fe;
   PetscErrorCode ierr;
@@ -223,8 +279,9 @@ PetscErrorCode HycoPairsFind(HycoScene scene, HycoMesh m, HycoTeam *team, HycoPa
   PetscCall(HycoPairsReserve(pairs, 0, 0));
   if (!scene->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoFECreate(scene, m, &fe));
-  fe->team = team;
+  pairs->facts = facts;
   ierr = FindAll(fe, pairs);
+  pairs->facts = NULL;
   PetscCall(HycoFEDestroy(&fe));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -233,7 +290,8 @@ PetscErrorCode HycoPairsFind(HycoScene scene, HycoMesh m, HycoTeam *team, HycoPa
 PetscErrorCode HycoPairsDestroy(HycoPairs *pairs)
 {
   PetscFunctionBegin;
-  HycoFreeAll(&pairs->slave, &pairs->contact, &pairs->master_start, &pairs->master, &pairs->weight, &pairs->search);
+  HycoFreeAll(&pairs->slave, &pairs->contact, &pairs->master_start, &pairs->master, &pairs->weight, &pairs->search,
+              &pairs->number);
   pairs->n = pairs->room = pairs->place = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -257,6 +315,10 @@ PetscErrorCode HycoPairsSelect(const HycoPairs *all, PetscInt n, const PetscInt 
   }
   for (PetscInt i = 0; index && i < n; i++) out->slave[i] = index[out->slave[i]];
   for (PetscInt j = 0; index && j < masters; j++) out->master[j] = index[out->master[j]];
+  if (all->number) PetscCall(PetscMalloc1(n + 1, &out->number));
+  for (PetscInt i = 0; all->number && i < n; i++) out->number[i] = all->number[which[i]];
+  out->facts = all->facts;
+  out->queries = all->queries;
   out->room = all->room;
   out->n_searches = all->n_searches;
   if (all->search) HycoDuplicate(all->n_searches, all->search, &out->search);

@@ -9,7 +9,7 @@
 #define HYCO_SAME_POINT 1e-6
 
 typedef struct {
-  HycoFE fe;                  /* borrowed; its nodes are those of the search; NULL: a part of another process's */
+  HycoFE fe;                  /* borrowed; its nodes are those of the search */
   PetscInt slave, master;     /* groups */
   PetscBool nodes;            /* whether patches are the master's nodes, or its facets */
   PetscInt n_nodes;           /* of the search */
@@ -54,6 +54,7 @@ typedef struct {
   PetscReal tolerance, small;
   HycoProjection *at;
   HycoVerdict *why;
+  PetscBool part; /* they are those of this rank, of whose master only a part is here */
 } HycoMatch;
 
 /* The queries of a search, as drawn or (moved) on surfaces that a map moves: there the verdict is HYCO_MET, and n = 0
@@ -63,17 +64,9 @@ typedef struct {
   PetscReal tolerance, small; /* as in HycoMatch; small: as drawn */
 } HycoQuery;
 
-/* The masters of n slave nodes. With helpers (fe->team), all ranks answer a part of the queries; the result is the same
-   to the bit. */
+/* The masters of n slave nodes. */
 PetscErrorCode HycoPartnersSearch(HycoPartners *partners, const HycoQuery *query, PetscInt n, const PetscInt slave[],
                                   HycoProjection at[], HycoVerdict why[]);
-/* The same on this process alone. */
-PetscErrorCode HycoPartnersAnswer(HycoPartners *partners, const HycoQuery *query, PetscInt n, const PetscInt slave[],
-                                  HycoProjection at[], HycoVerdict why[]);
-/* The same on all ranks of the team (rank 0; the others are in HycoTeamServe()). */
-PetscErrorCode HycoTeamSearch(HycoTeam *team, HycoPartners *partners, const HycoQuery *query, PetscInt n,
-                              const PetscInt slave[], HycoProjection at[], HycoVerdict why[]);
-
 /* A type's choice of masters from the nearest points. */
 typedef PetscErrorCode (*HycoSettle)(HycoPartners *partners, HycoContact contact, HycoMatch *match);
 /* What to do about n slave nodes without a master, as the end of a message. */

@@ -3,33 +3,73 @@
 #include <hycokinematics.h>
 #include <string.h>
 
-/* Adds the area and the force of the contacts of k's contact at the middle of k's facets, whose ends include k's slave
-   node. */
-static void AddMiddles(HycoFE fe, const HycoPairs *pairs, PetscInt k, const PetscReal area[], const PetscReal lambda[],
-                       PetscReal *size, PetscReal *force)
+/* Sums of all ranks' values by node of the surface. */
+static PetscErrorCode SumByNode(PetscSF sf, HycoMesh m, PetscReal value[])
+{
+  PetscReal *owned;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(m->n_owned, &owned));
+  PetscCall(PetscSFReduceBegin(sf, MPIU_REAL, value, owned, MPI_SUM));
+  PetscCall(PetscSFReduceEnd(sf, MPIU_REAL, value, owned, MPI_SUM));
+  PetscCall(HycoSFBcast(sf, MPIU_REAL, 1, owned, value));
+  PetscCall(PetscFree(owned));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The pressures of one contact of the scene at nodes without area: with the middles of their facets, which may be slaves
+   of other ranks. size, force: of the contact's nodes. */
+static void AddMiddles(HycoFE fe, const HycoPairs *pairs, PetscInt c, const PetscReal size[], const PetscReal force[],
+                       PetscReal pressure[])
 {
   HycoMesh m = fe->mesh;
 
-  for (PetscInt f = 0; f < m->n_facets; f++) {
-    const PetscInt *node = m->facets + f * m->nf, group = m->facet_group[f];
+  for (PetscInt k = 0; k < pairs->n; k++) {
+    const PetscInt slave = pairs->slave[k];
+    PetscReal all[2] = {size[slave], force[slave]};
 
-    if (node[0] != pairs->slave[k] && node[1] != pairs->slave[k]) continue;
-    if (strcmp(m->group_name[group], fe->scene->contact[pairs->contact[k]]->slave)) continue;
-    for (PetscInt j = 0; j < pairs->n; j++) {
-      if (pairs->contact[j] != pairs->contact[k] || pairs->slave[j] != node[2]) continue;
-      *size += area[j];
-      *force += lambda[j];
+    if (pairs->contact[k] != c || !HycoNodeHasNoArea(fe, slave)) continue;
+    for (PetscInt f = 0; f < m->n_facets; f++) {
+      const PetscInt *node = m->facets + f * m->nf;
+
+      if (node[0] != slave && node[1] != slave) continue;
+      if (strcmp(m->group_name[m->facet_group[f]], fe->scene->contact[c]->slave)) continue;
+      all[0] += size[node[2]];
+      all[1] += force[node[2]];
     }
+    pressure[k] = all[0] > 0 ? all[1] / all[0] : 0;
   }
 }
 
-PetscReal HycoContactPressure(HycoFE fe, const HycoPairs *pairs, PetscInt k, const PetscReal area[],
-                              const PetscReal lambda[])
+PetscErrorCode HycoContactPressures(MPI_Comm comm, HycoFE fe, const HycoPairs *pairs, const PetscReal area[],
+                                    const PetscReal lambda[], PetscReal pressure[])
 {
-  PetscReal size = area[k], force = lambda[k];
+  HycoMesh m = fe->mesh;
+  PetscReal *size, *force;
+  PetscMPIInt ranks;
+  PetscSF sf = NULL;
 
-  if (HycoNodeHasNoArea(fe, pairs->slave[k])) AddMiddles(fe, pairs, k, area, lambda, &size, &force);
-  return size > 0 ? force / size : 0;
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < pairs->n; k++) pressure[k] = area[k] > 0 ? lambda[k] / area[k] : 0;
+  if (fe->formulation != HYCO_AXISYMMETRIC || !HycoMeshIsQuadratic(m)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCallMPI(MPI_Comm_size(comm, &ranks));
+  if (ranks > 1) PetscCall(HycoMeshNodeSF(comm, m, m->n_nodes, m->node_global, &sf));
+  PetscCall(PetscMalloc2(m->n_nodes, &size, m->n_nodes, &force));
+  for (PetscInt c = 0; c < fe->scene->n_contacts; c++) {
+    PetscCall(PetscArrayzero(size, m->n_nodes));
+    PetscCall(PetscArrayzero(force, m->n_nodes));
+    for (PetscInt k = 0; k < pairs->n; k++) {
+      if (pairs->contact[k] != c) continue;
+      size[pairs->slave[k]] = area[k];
+      force[pairs->slave[k]] = lambda[k];
+    }
+    if (sf) PetscCall(SumByNode(sf, m, size));
+    if (sf) PetscCall(SumByNode(sf, m, force));
+    AddMiddles(fe, pairs, c, size, force, pressure);
+  }
+  PetscCall(PetscFree2(size, force));
+  PetscCall(PetscSFDestroy(&sf));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Adds the contribution of potential contact k. */
@@ -53,7 +93,8 @@ static void Add(HycoFE fe, const PetscReal x[3], const PetscReal normal[3], Pets
 }
 
 void HycoContactResults(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], const PetscReal area[],
-                        const PetscReal lambda[], PetscReal least, HycoContactResult result[])
+                        const PetscReal lambda[], const PetscReal pressure[], PetscReal least,
+                        HycoContactResult result[])
 {
   for (PetscInt c = 0; c < fe->scene->n_contacts; c++)
     result[c] = (HycoContactResult){.name = fe->scene->contact[c]->name};
@@ -61,8 +102,6 @@ void HycoContactResults(HycoFE fe, const HycoPairs *pairs, const PetscReal norma
     HycoContactResult *r = &result[pairs->contact[k]];
 
     r->n++;
-    if (lambda[k] > least)
-      Add(fe, fe->X + 3 * pairs->slave[k], normal + 3 * k, area[k], lambda[k],
-          HycoContactPressure(fe, pairs, k, area, lambda), r);
+    if (lambda[k] > least) Add(fe, fe->X + 3 * pairs->slave[k], normal + 3 * k, area[k], lambda[k], pressure[k], r);
   }
 }

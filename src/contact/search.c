@@ -1,6 +1,5 @@
 /*
-  The queries of a search for masters: the projection of each slave node, and its position relative to the master. On
-  one process they are answered one after the other; on several ranks each answers a part of them (team.c).
+  The queries of a search for masters: the projection of each slave node, and its position relative to the master.
 */
 #include "partners.h"
 
@@ -56,7 +55,7 @@ static PetscErrorCode AnswerAll(HycoPartners *t, const HycoQuery *q, PetscInt n,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoPartnersAnswer(HycoPartners *t, const HycoQuery *q, PetscInt n, const PetscInt slave[],
+PetscErrorCode HycoPartnersSearch(HycoPartners *t, const HycoQuery *q, PetscInt n, const PetscInt slave[],
                                   HycoProjection at[], HycoVerdict why[])
 {
   PetscFunctionBegin;
@@ -64,13 +63,43 @@ PetscErrorCode HycoPartnersAnswer(HycoPartners *t, const HycoQuery *q, PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoPartnersSearch(HycoPartners *t, const HycoQuery *q, PetscInt n, const PetscInt slave[],
-                                  HycoProjection at[], HycoVerdict why[])
+/* Adds the pairs of one contact. */
+static PetscErrorCode AddNeighbours(HycoMesh m, PetscInt slave, PetscInt master, PetscInt *n, PetscInt pairs[])
 {
+  const PetscInt lo = m->group_start[master], n_masters = m->group_start[master + 1] - lo;
+  HycoPatches patches;
+
   PetscFunctionBegin;
-  if (t->fe->team)
-    PetscCall(HycoTeamSearch(t->fe->team, t, q, n, slave, at, why));
-  else
-    PetscCall(HycoPartnersAnswer(t, q, n, slave, at, why));
+  if (!n_masters) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoPatchesCreate(m->xyz, n_masters, 1, 1, m->group_node + lo, NULL, &patches));
+  for (PetscInt k = m->group_start[slave]; k < m->group_start[slave + 1]; k++, (*n)++) {
+    HycoProjection at;
+
+    HycoPatchesProject(patches, m->xyz + 3 * m->group_node[k], NULL, &at);
+    pairs[2 * *n] = m->group_node[k];
+    pairs[2 * *n + 1] = at.node[0];
+  }
+  PetscCall(HycoPatchesDestroy(&patches));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactsNeighbours(HycoScene scene, HycoMesh m, PetscInt *n, PetscInt **pairs)
+{
+  PetscInt g[2] = {0, 0}, room = 0;
+
+  PetscFunctionBegin;
+  *n = 0;
+  for (PetscInt pass = 0; pass < 2; pass++) {
+    if (pass) PetscCall(PetscMalloc1(2 * room, pairs));
+    for (PetscInt k = 0; k < scene->n_contacts; k++) {
+      HycoContact c = scene->contact[k];
+
+      if (!c->master || c->rigid) continue;
+      PetscCall(HycoMeshFindGroup(m, "contact", c->slave, &g[0]));
+      PetscCall(HycoMeshFindGroup(m, "contact", c->master, &g[1]));
+      room += m->group_start[g[0] + 1] - m->group_start[g[0]];
+      if (pass) PetscCall(AddNeighbours(m, g[0], g[1], n, *pairs));
+    }
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

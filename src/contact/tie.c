@@ -195,6 +195,7 @@ static PetscErrorCode Choose(HycoScene s, HycoMesh m, const HycoPairs *p, PetscI
       const PetscInt tied = HycoMeshTied(m, p->slave[j]);
 
       if (tied < 0) which[(*n)++] = j;
+      if (HycoMeshOwned(m, p->slave[j]) < 0) continue; /* of another rank */
       HycoCheck(tied < 0 || Followed(m, tied, p->contact[k], has),
                 "contact %s: node %d is a slave of the tie %s, and its master nodes do not have this contact; exchange "
                 "slave and master of the tie, or remove the node from the contact",

@@ -13,9 +13,11 @@ enum { GIVEN, SLAVE, MASTER, N_SENSES };
 #define MOST_CONTACTS 3 /* contacts whose normals are chosen independently; more have a common choice */
 
 typedef struct {
-  HycoFE fe;
+  MPI_Comm comm;
+  HycoFE fe, wide;       /* of this rank's contacts; with all facets around their neighbours */
+  const PetscInt *index; /* of fe's nodes in wide; NULL: the same */
   HycoPairs *pairs;
-  PetscInt k, m;                               /* numbers of motions, contacts */
+  PetscInt k, m, all;                          /* numbers of motions, contacts, contacts of all ranks */
   PetscReal *d;                                /* m x k x 3: relative displacement of slave and master */
   PetscReal *normal[N_SENSES];                 /* m x 3; zero: not available */
   PetscReal *doubt[N_SENSES], *bend[N_SENSES]; /* m */
@@ -36,7 +38,8 @@ static PetscErrorCode SurfaceSenses(Shapes *s, PetscInt contact, PetscReal work[
 {
   HycoContact c = s->fe->scene->contact[contact];
   const HycoPairs *p = s->pairs;
-  PetscReal *normal = work, *doubt = work + 3 * s->fe->mesh->n_nodes, *bend = work + 4 * s->fe->mesh->n_nodes;
+  const PetscInt n_nodes = s->wide->mesh->n_nodes;
+  PetscReal *normal = work, *doubt = work + 3 * n_nodes, *bend = work + 4 * n_nodes;
 
   PetscFunctionBegin;
   for (PetscInt side = SLAVE; side <= MASTER; side++) {
@@ -44,14 +47,14 @@ static PetscErrorCode SurfaceSenses(Shapes *s, PetscInt contact, PetscReal work[
     PetscInt g = 0;
 
     if (!group) continue;
-    PetscCall(HycoMeshFindGroup(s->fe->mesh, "contact", group, &g));
-    PetscCall(HycoSmoothNormals(s->fe, g, normal, doubt, bend));
+    PetscCall(HycoMeshFindGroup(s->wide->mesh, "contact", group, &g));
+    PetscCall(HycoSmoothNormals(s->wide, g, normal, doubt, bend));
     for (PetscInt i = 0; i < s->m; i++) {
       const PetscInt lo = side == SLAVE ? 0 : p->master_start[i], hi = side == SLAVE ? 1 : p->master_start[i + 1];
 
       if (p->contact[i] != contact) continue;
       for (PetscInt j = lo; j < hi; j++) {
-        const PetscInt node = side == SLAVE ? p->slave[i] : p->master[j];
+        const PetscInt here = side == SLAVE ? p->slave[i] : p->master[j], node = s->index ? s->index[here] : here;
 
         for (PetscInt d = 0; d < 3; d++)
           s->normal[side][3 * i + d] += side == SLAVE ? normal[3 * node + d] : -p->weight[j] * normal[3 * node + d];
@@ -69,7 +72,7 @@ static PetscErrorCode FindSenses(Shapes *s)
   PetscReal *work, *gap;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc2(5 * s->fe->mesh->n_nodes, &work, s->m, &gap));
+  PetscCall(PetscMalloc2(5 * s->wide->mesh->n_nodes, &work, s->m, &gap));
   PetscCall(HycoContactGeometry(s->fe, s->pairs, s->normal[GIVEN], gap));
   for (PetscInt c = 0; c < scene->n_contacts && s->fe->dim > 1; c++) PetscCall(SurfaceSenses(s, c, work));
   for (PetscInt i = 0; i < s->m; i++) {
@@ -83,6 +86,14 @@ static PetscErrorCode FindSenses(Shapes *s)
       s->normal[GIVEN][3 * i + d] = 0;
   }
   PetscCall(PetscFree2(work, gap));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The same on all ranks, or an error on all. */
+static PetscErrorCode FindAllSenses(Shapes *s)
+{
+  PetscFunctionBegin;
+  HycoOnEach(s->comm, FindSenses(s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -101,6 +112,7 @@ static PetscErrorCode Spectrum(const Shapes *s, const PetscInt sense[], const Pe
 {
   const PetscInt k = s->k;
   PetscBLASInt n, one = 1, lwork, info;
+  PetscMPIInt rank;
   PetscReal *work;
 
   PetscFunctionBegin;
@@ -109,9 +121,10 @@ static PetscErrorCode Spectrum(const Shapes *s, const PetscInt sense[], const Pe
   PetscCall(PetscMalloc1(lwork, &work));
   PetscCall(PetscArrayzero(A, k * k));
   PetscCall(PetscArrayzero(M, k * k));
-  for (PetscInt a = 0; a < k; a++)
-    M[a * k + a] = 1e-3 * (PetscReal)(s->m + 1) / HycoFEUnknowns(s->fe); /* bodies that move together have no
-                                                                            relative displacement */
+  PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
+  for (PetscInt a = 0; a < k && rank == 0; a++)
+    M[a * k + a] = 1e-3 * (PetscReal)(s->all + 1) / HycoFEUnknowns(s->fe); /* bodies that move together have no
+                                                                              relative displacement */
   for (PetscInt i = 0; i < s->m; i++) {
     const PetscInt t = sense[s->pairs->contact[i]];
     const PetscReal *d = s->d + (size_t)i * (size_t)k * 3;
@@ -125,6 +138,8 @@ static PetscErrorCode Spectrum(const Shapes *s, const PetscInt sense[], const Pe
       }
     }
   }
+  HycoAllreduce(A, k * k, MPIU_REAL, MPI_SUM, s->comm);
+  HycoAllreduce(M, k * k, MPIU_REAL, MPI_SUM, s->comm);
   LAPACKsygv_(&one, "V", "U", &n, A, &n, M, &n, values, work, &lwork, &info);
   PetscCheck(info == 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "LAPACK sygv: %d", (int)info);
   PetscCall(PetscFree(work));
@@ -132,12 +147,14 @@ static PetscErrorCode Spectrum(const Shapes *s, const PetscInt sense[], const Pe
 }
 
 /* Whether the combination z is tangential at every contact; raises the weights of the contacts where it is not. */
-static PetscBool Tangential(const Shapes *s, const PetscInt sense[], const PetscReal z[], PetscReal weight[])
+static PetscErrorCode Tangential(const Shapes *s, const PetscInt sense[], const PetscReal z[], PetscReal weight[],
+                                 PetscBool *tangential)
 {
   const PetscReal noise = 1e-9 / PetscSqrtReal((PetscReal)HycoFEUnknowns(s->fe));
   PetscReal norm = 0;
-  PetscBool all = PETSC_TRUE;
 
+  PetscFunctionBegin;
+  *tangential = PETSC_TRUE;
   for (PetscInt a = 0; a < s->k; a++) norm += z[a] * z[a];
   for (PetscInt i = 0; i < s->m; i++) {
     const PetscInt t = sense[s->pairs->contact[i]];
@@ -148,9 +165,10 @@ static PetscBool Tangential(const Shapes *s, const PetscInt sense[], const Petsc
         PetscMax(2 * s->doubt[t][i], s->bend[t][i]) * PetscSqrtReal(HycoDot(d, d)) + noise * PetscSqrtReal(norm))
       continue;
     weight[i] *= 100;
-    all = PETSC_FALSE;
+    *tangential = PETSC_FALSE;
   }
-  return all;
+  HycoAllreduce(tangential, 1, HYCO_MPI_BOOL, MPI_LAND, s->comm);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The combinations that are tangential for these normals: z (room k x k, rows of length 1), *n of them. */
@@ -168,9 +186,10 @@ static PetscErrorCode Null(const Shapes *s, const PetscInt sense[], PetscReal z[
     all = PETSC_TRUE;
     *n = 0;
     for (PetscInt a = 0; a < k && values[a] <= 1; a++) {
-      const PetscBool good = Tangential(s, sense, A + a * k, weight);
+      PetscBool good;
       PetscReal norm = 0;
 
+      PetscCall(Tangential(s, sense, A + a * k, weight, &good));
       all = (PetscBool)(all && good);
       if (!good) continue;
       for (PetscInt b = 0; b < k; b++) norm += A[a * k + b] * A[a * k + b];
@@ -203,29 +222,41 @@ static void Join(PetscInt k, const PetscReal z[], PetscReal basis[], PetscInt *n
 }
 
 /* Whether all slaves of the contact that face something have a normal in that sense. */
-static PetscBool HasSense(const Shapes *s, PetscInt contact, PetscInt sense)
+static PetscErrorCode HasSense(const Shapes *s, PetscInt contact, PetscInt sense, PetscBool *has)
 {
+  PetscFunctionBegin;
+  *has = PETSC_TRUE;
   for (PetscInt i = 0; i < s->m; i++) {
     const PetscReal *n = s->normal[sense] + 3 * i;
 
     if (s->pairs->contact[i] != contact || HycoPairsAlone(s->fe->scene, s->pairs, i)) continue;
-    if (!(HycoDot(n, n) > 0)) return PETSC_FALSE;
+    if (!(HycoDot(n, n) > 0)) *has = PETSC_FALSE;
   }
-  return PETSC_TRUE;
+  HycoAllreduce(has, 1, HYCO_MPI_BOOL, MPI_LAND, s->comm);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The normals of choice number `code`; *possible: each contact has them. */
-static void Senses(const Shapes *s, PetscInt code, PetscInt sense[], PetscBool *possible)
+static PetscErrorCode Senses(const Shapes *s, PetscInt code, PetscInt sense[], PetscBool *possible)
 {
   const PetscBool common = (PetscBool)(s->fe->scene->n_contacts > MOST_CONTACTS); /* as far as available */
 
+  PetscFunctionBegin;
   *possible = PETSC_TRUE;
   for (PetscInt c = 0, rest = code; c < s->fe->scene->n_contacts; c++) {
+    PetscBool has, given;
+
     sense[c] = common ? code : rest % N_SENSES;
     rest /= N_SENSES;
-    if (common && !HasSense(s, c, sense[c])) sense[c] = HasSense(s, c, GIVEN) ? GIVEN : SLAVE;
-    *possible = (PetscBool)(*possible && HasSense(s, c, sense[c]));
+    PetscCall(HasSense(s, c, sense[c], &has));
+    if (common && !has) {
+      PetscCall(HasSense(s, c, GIVEN, &given));
+      sense[c] = given ? GIVEN : SLAVE;
+      PetscCall(HasSense(s, c, sense[c], &has));
+    }
+    *possible = (PetscBool)(*possible && has);
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode Search(const Shapes *s, PetscInt *n_unconstrained, PetscReal unconstrained[], PetscInt *n_alike,
@@ -242,7 +273,7 @@ static PetscErrorCode Search(const Shapes *s, PetscInt *n_unconstrained, PetscRe
     PetscBool possible;
     PetscInt n = 0, before = 0;
 
-    Senses(s, code, sense, &possible);
+    PetscCall(Senses(s, code, sense, &possible));
     if (!possible) continue;
     PetscCall(Null(s, sense, z, &n));
     if (n > *n_alike) {
@@ -306,14 +337,16 @@ static void Reduce(const HycoMotions *motions, PetscInt dim, PetscInt n, PetscRe
   }
 }
 
-PetscErrorCode HycoFEFindUnconstrained(HycoFE fe, HycoPairs *pairs, const HycoMotions *motions,
-                                       PetscInt *n_unconstrained, PetscReal **unconstrained, PetscInt *n_alike,
-                                       PetscReal **alike)
+PetscErrorCode HycoFEFindUnconstrained(MPI_Comm comm, HycoFE fe, HycoFE wide, const PetscInt index[], HycoPairs *pairs,
+                                       const HycoMotions *motions, PetscInt *n_unconstrained, PetscReal **unconstrained,
+                                       PetscInt *n_alike, PetscReal **alike)
 {
-  Shapes s = {fe, pairs, motions->n, pairs->n, NULL, {NULL}, {NULL}, {NULL}};
+  Shapes s = {.comm = comm, .fe = fe, .wide = wide, .index = index, .pairs = pairs, .k = motions->n, .m = pairs->n};
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
+  s.all = s.m;
+  HycoAllreduce(&s.all, 1, MPIU_INT, MPI_SUM, comm);
   *n_unconstrained = *n_alike = 0;
   PetscCall(PetscCalloc1((s.k + 1) * s.k, unconstrained));
   PetscCall(PetscCalloc1((s.k + 1) * s.k, alike));
@@ -321,7 +354,7 @@ PetscErrorCode HycoFEFindUnconstrained(HycoFE fe, HycoPairs *pairs, const HycoMo
   for (PetscInt t = 0; t < N_SENSES; t++)
     PetscCall(PetscCalloc3(3 * s.m, &s.normal[t], s.m, &s.doubt[t], s.m, &s.bend[t]));
   Relative(&s, motions);
-  ierr = FindSenses(&s);
+  ierr = FindAllSenses(&s);
   if (!ierr) ierr = Search(&s, n_unconstrained, *unconstrained, n_alike, *alike);
   if (!ierr) Reduce(motions, fe->dim, *n_unconstrained, *unconstrained);
   for (PetscInt t = 0; t < N_SENSES; t++) PetscCall(PetscFree3(s.normal[t], s.doubt[t], s.bend[t]));

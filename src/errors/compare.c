@@ -19,24 +19,30 @@ PetscErrorCode HycoROMMeasureRID(HycoROM m, const PetscReal u[], const PetscReal
                                  const PetscReal lambda[], HycoLost lost[])
 {
   const PetscReal *stress, *flow = NULL;
-  const PetscInt dim = m->mesh->dim, ns = m->fe->n_sigma;
+  const PetscInt dim = m->model->mesh->dim, ns = m->fe->n_sigma, *node;
+  PetscInt n_nodes;
   Norms rid = {0}, s = {0}, s11 = {0}, lr = {0}, l = {0}, p = {0};
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < m->mesh->n_nodes * dim; k++) {
-    if (m->role[k / dim] != HYCO_ROLE_OUTSIDE) Add(&rid, m->U[k], u[k]);
+  PetscCall(ISGetLocalSize(m->model->rid, &n_nodes));
+  PetscCall(ISGetIndices(m->model->rid, &node));
+  for (PetscInt k = 0; k < n_nodes * dim; k++) {
+    const PetscInt i = node[k / dim] * dim + k % dim;
+
+    Add(&rid, m->U[i], u[i]);
   }
+  PetscCall(ISRestoreIndices(m->model->rid, &node));
   PetscCall(HycoROMGetRID(m, NULL, NULL, NULL, NULL, NULL, &stress));
-  for (PetscInt k = 0; sigma && k < m->mesh->n_cells * ns; k++) {
+  for (PetscInt k = 0; sigma && k < m->model->mesh->n_cells * ns; k++) {
     Add(&s, stress[k], sigma[k]);
     if (k % ns == 0) Add(&s11, stress[k], sigma[k]);
   }
-  for (PetscInt k = 0; k < m->pairs.n; k++) {
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) {
     Add(&l, m->Lambda[k], lambda[k]);
-    if (m->in_rid[k]) Add(&lr, m->Lambda[k], lambda[k]);
+    if (m->model->in_rid[k]) Add(&lr, m->Lambda[k], lambda[k]);
   }
   if (inelastic) PetscCall(HycoROMGetInelastic(m, NULL, &flow));
-  for (PetscInt k = 0; inelastic && k < m->mesh->n_cells; k++) Add(&p, flow[k], inelastic[k]);
+  for (PetscInt k = 0; inelastic && k < m->model->mesh->n_cells; k++) Add(&p, flow[k], inelastic[k]);
   lost[HYCO_ERROR_U_RID] = (HycoLost){rid.lost, rid.size};
   lost[HYCO_ERROR_SIGMA] = (HycoLost){PetscSqrtReal(s.lost2), PetscSqrtReal(s.size2)};
   lost[HYCO_ERROR_SIGMA_11] = (HycoLost){s11.lost, s11.size};
@@ -113,7 +119,7 @@ static PetscErrorCode Fill(HycoROM m, HycoFOM f, HycoCompared k)
 
   PetscFunctionBegin;
   PetscCall(HycoComparisonCreate(f, m, &k->rows));
-  if (f->rank == 0) PetscCall(PetscStrncpy(path, m->path, sizeof(path)));
+  if (f->rank == 0) PetscCall(PetscStrncpy(path, m->model->path, sizeof(path)));
   PetscCallMPI(MPI_Bcast(path, sizeof(path), MPI_CHAR, 0, HycoComm(f)));
   HycoOnEach(HycoComm(f), ReadModes(k, path));
   PetscCall(HycoNormsCreate(f, &k->norms));
@@ -144,16 +150,17 @@ static PetscErrorCode Check(HycoROM m, HycoFOM f)
 {
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
-  HycoCheck(m->whole_nodes == f->n_nodes && m->whole_cells == f->n_cells && m->pairs.n == f->n_contacts,
+  HycoCheck(m->model->whole_nodes == f->n_nodes && m->model->whole_cells == f->n_cells &&
+                m->model->pairs.n == f->n_contacts,
             "the model was trained on a mesh of %d nodes and %d cells, and the scene's mesh has %d and %d; compare on "
             "the training mesh",
-            (int)m->whole_nodes, (int)m->whole_cells, (int)f->n_nodes, (int)f->n_cells);
+            (int)m->model->whole_nodes, (int)m->model->whole_cells, (int)f->n_nodes, (int)f->n_cells);
   PetscCheck(m->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoROMPredict() before HycoROMCompare()");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The errors in H1 and its dual. Collective. */
-static PetscErrorCode CompareH1(HycoROM m, HycoFOM f, HycoCompared k, HycoErrors *e)
+static PetscErrorCode CompareH1(HycoROM m, const PetscReal lambda[], HycoCompared k, HycoErrors *e)
 {
   PetscReal lost, size;
 
@@ -162,8 +169,8 @@ static PetscErrorCode CompareH1(HycoROM m, HycoFOM f, HycoCompared k, HycoErrors
   PetscCall(HycoNormH1(k->norms, k->rows.value[0], NULL, &size));
   e->u_h1 = HycoRelative(lost, size);
   for (int rid = 0; rid < 2; rid++) {
-    PetscCall(HycoNormDual(k->norms, m, (PetscBool)rid, m ? m->Lambda : NULL, f->lambda, &lost));
-    PetscCall(HycoNormDual(k->norms, m, (PetscBool)rid, f->lambda, NULL, &size));
+    PetscCall(HycoNormDual(k->norms, m, (PetscBool)rid, m ? m->Lambda : NULL, lambda, &lost));
+    PetscCall(HycoNormDual(k->norms, m, (PetscBool)rid, lambda, NULL, &size));
     *(rid ? &e->lambda_rid_dual : &e->lambda_dual) = HycoRelative(lost, size);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -174,6 +181,7 @@ PetscErrorCode HycoROMCompare(HycoROM m, HycoFOM f, HycoErrors *e)
   HycoErrors found = {0};
   HycoCompared k;
   PetscReal square[2];
+  const PetscReal *lambda;
 
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
@@ -182,14 +190,15 @@ PetscErrorCode HycoROMCompare(HycoROM m, HycoFOM f, HycoErrors *e)
   PetscCall(Keep(m, f));
   k = f->compared;
   PetscCall(HycoFOMStress(f));
+  PetscCall(HycoFOMGetLambda(f, &lambda));
   PetscCall(HycoFOMToRows(f, HYCO_ON_NODES, MPIU_REAL, k->rows.width[0], f->u, k->rows.value[0]));
   PetscCall(HycoFOMToRows(f, HYCO_ON_CELLS, MPIU_REAL, k->rows.width[1], f->sigma, k->rows.value[1]));
   PetscCall(HycoComparisonBring(&k->rows));
   PetscCall(HycoComparisonPredict(&k->rows, m, 0, k->V, k->rows.n[0] * k->rows.width[0]));
-  HycoOnRoot(HycoComm(f), HycoROMCompareRID(m, k->rows.rid[0], k->rows.rid[1], f->lambda, &found, NULL));
+  HycoOnRoot(HycoComm(f), HycoROMCompareRID(m, k->rows.rid[0], k->rows.rid[1], lambda, &found, NULL));
   PetscCall(HycoComparisonSquares(&k->rows, square));
   found.u = HycoRelative(PetscSqrtReal(square[0]), PetscSqrtReal(square[1]));
-  PetscCall(CompareH1(m, f, k, &found));
+  PetscCall(CompareH1(m, lambda, k, &found));
   if (f->rank == 0) *e = found;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -40,23 +40,23 @@ static PetscReal *At(const Kept *kept, PetscInt k)
 static PetscErrorCode Keep(HycoFOM f, const HycoStep *step, void *ctx)
 {
   Kept *kept = (Kept *)ctx;
-  const PetscReal *u, *sigma;
+  const PetscReal *u, *sigma, *lambda;
   PetscReal *to = f->rank ? NULL : At(kept, step->index), *mine;
   HycoFileOrder *all;
 
   PetscFunctionBegin;
-  PetscCall(HycoFOMGetSolution(f, NULL, &u, NULL, NULL, NULL, &sigma));
+  PetscCall(HycoFOMGetSolution(f, NULL, &u, NULL, &lambda, NULL, &sigma));
   PetscCall(PetscMalloc1(f->part->n_cells, &mine));
   PetscCall(HycoFEStateFields(f->fe, f->path->begin, NULL, NULL, mine, NULL));
   if (f->rank == 0) {
     PetscCall(PetscArraycpy(to, u, kept->n_dof));
     PetscCall(PetscArraycpy(to + kept->n_dof, sigma, kept->n_sigma));
-    PetscCall(PetscArraycpy(to + kept->n_dof + kept->n_sigma + kept->n_cells, f->lambda, kept->n_contacts));
+    PetscCall(PetscArraycpy(to + kept->n_dof + kept->n_sigma + kept->n_cells, lambda, kept->n_contacts));
   }
   if (f->size == 1)
     PetscCall(PetscArraycpy(to + kept->n_dof + kept->n_sigma, mine, kept->n_cells));
   else {
-    PetscCall(HycoFileOrderCreate(HycoComm(f), f->part, f->surface, PETSC_TRUE, &all));
+    PetscCall(HycoFileOrderCreate(HycoComm(f), f->part, PETSC_TRUE, &all));
     PetscCall(HycoFileOrderSend(all, HYCO_ON_CELLS, MPIU_REAL, 1, mine, to ? to + kept->n_dof + kept->n_sigma : NULL));
     PetscCall(HycoFileOrderDestroy(&all));
   }
@@ -68,7 +68,7 @@ static PetscErrorCode Keep(HycoFOM f, const HycoStep *step, void *ctx)
 /* The errors of the model at listed time k: U on the whole mesh, the others on the RID and the contacts. */
 static PetscErrorCode Measure(HycoROM m, const Kept *kept, PetscInt k, HycoLost lost[])
 {
-  const PetscInt dim = m->mesh->dim, ns = m->fe->n_sigma;
+  const PetscInt dim = m->model->mesh->dim, ns = m->fe->n_sigma;
   const PetscReal *u = At(kept, k), *sigma = u + kept->n_dof, *inelastic = sigma + kept->n_sigma,
                   *lambda = inelastic + kept->n_cells, *found;
   PetscReal *u_rid, *sigma_rid, *inelastic_rid, square[2] = {0, 0};
@@ -80,13 +80,13 @@ static PetscErrorCode Measure(HycoROM m, const Kept *kept, PetscInt k, HycoLost 
     square[0] += (found[i] - u[i]) * (found[i] - u[i]);
     square[1] += u[i] * u[i];
   }
-  PetscCall(PetscMalloc3(m->mesh->n_nodes * dim, &u_rid, m->mesh->n_cells * ns, &sigma_rid, m->mesh->n_cells,
-                         &inelastic_rid));
-  for (PetscInt i = 0; i < m->mesh->n_nodes; i++)
-    PetscCall(PetscArraycpy(u_rid + i * dim, u + m->mesh->node_whole[i] * dim, dim));
-  for (PetscInt e = 0; e < m->mesh->n_cells; e++) {
-    PetscCall(PetscArraycpy(sigma_rid + e * ns, sigma + m->mesh->cell_whole[e] * ns, ns));
-    inelastic_rid[e] = inelastic[m->mesh->cell_whole[e]];
+  PetscCall(PetscMalloc3(m->model->mesh->n_nodes * dim, &u_rid, m->model->mesh->n_cells * ns, &sigma_rid,
+                         m->model->mesh->n_cells, &inelastic_rid));
+  for (PetscInt i = 0; i < m->model->mesh->n_nodes; i++)
+    PetscCall(PetscArraycpy(u_rid + i * dim, u + m->model->mesh->node_whole[i] * dim, dim));
+  for (PetscInt e = 0; e < m->model->mesh->n_cells; e++) {
+    PetscCall(PetscArraycpy(sigma_rid + e * ns, sigma + m->model->mesh->cell_whole[e] * ns, ns));
+    inelastic_rid[e] = inelastic[m->model->mesh->cell_whole[e]];
   }
   PetscCall(HycoROMMeasureRID(m, u_rid, sigma_rid, inelastic_rid, lambda, lost));
   lost[HYCO_ERROR_U] = (HycoLost){PetscSqrtReal(square[0]), PetscSqrtReal(square[1])};
@@ -104,11 +104,11 @@ static PetscErrorCode Compare(HycoROM m, PetscInt n, const PetscReal mu[], const
 
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
-  HycoCheck(m->whole_nodes * m->mesh->dim == kept->n_dof && m->whole_cells == kept->n_cells &&
-                m->pairs.n == kept->n_contacts,
+  HycoCheck(m->model->whole_nodes * m->model->mesh->dim == kept->n_dof && m->model->whole_cells == kept->n_cells &&
+                m->model->pairs.n == kept->n_contacts,
             "the model was trained on a mesh of %d nodes and %d cells, and the scene's mesh has %d cells; compare on "
             "the training mesh",
-            (int)m->whole_nodes, (int)m->whole_cells, (int)kept->n_cells);
+            (int)m->model->whole_nodes, (int)m->model->whole_cells, (int)kept->n_cells);
   PetscCall(HycoROMSetSteps(m, h->n_taken, h->taken));
   ierr = HycoROMPredict(m, n, mu);
   PetscCall(HycoROMSetSteps(m, 0, NULL));

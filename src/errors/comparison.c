@@ -4,7 +4,7 @@
 PetscErrorCode HycoComparisonCreate(HycoFOM f, HycoROM m, HycoComparison *c)
 {
   const PetscInt all[HYCO_COMPARED] = {f->n_nodes, f->n_cells, f->n_cells}, dim = f->part->dim;
-  PetscInt head[2] = {m ? m->l : 0, m ? m->n_fe : 0};
+  PetscInt head[2] = {m ? m->model->l : 0, m ? m->model->n_fe : 0};
 
   PetscFunctionBegin;
   PetscCall(PetscMemzero(c, sizeof(*c)));
@@ -14,7 +14,7 @@ PetscErrorCode HycoComparisonCreate(HycoFOM f, HycoROM m, HycoComparison *c)
   c->width[2] = 1;
   c->n_fields = f->scene->n_times ? HYCO_COMPARED : HYCO_COMPARED - 1;
   for (PetscInt k = 0; k < c->n_fields; k++) {
-    const PetscInt n_rid = !m ? 0 : k ? m->mesh->n_cells : m->mesh->n_nodes;
+    const PetscInt n_rid = !m ? 0 : k ? m->model->mesh->n_cells : m->model->mesh->n_nodes;
     PetscLayout layout;
 
     PetscCall(PetscLayoutCreateFromSizes(HycoComm(f), PETSC_DECIDE, all[k], 1, &layout));
@@ -24,8 +24,8 @@ PetscErrorCode HycoComparisonCreate(HycoFOM f, HycoROM m, HycoComparison *c)
     PetscCall(PetscSFCreate(HycoComm(f), &c->sf[k]));
     PetscCall(PetscSFSetGraphLayout(c->sf[k], layout, n_rid, NULL, PETSC_COPY_VALUES,
                                     !m  ? NULL
-                                    : k ? m->mesh->cell_whole
-                                        : m->mesh->node_whole));
+                                    : k ? m->model->mesh->cell_whole
+                                        : m->model->mesh->node_whole));
     PetscCall(PetscLayoutDestroy(&layout));
   }
   PetscCallMPI(MPI_Bcast(head, 2, MPIU_INT, 0, HycoComm(f)));
@@ -33,7 +33,7 @@ PetscErrorCode HycoComparisonCreate(HycoFOM f, HycoROM m, HycoComparison *c)
   c->n_fe = head[1];
   PetscCall(PetscMalloc1(c->n_fe, &c->fe_dof));
   for (PetscInt k = 0; m && k < c->n_fe; k++)
-    c->fe_dof[k] = m->mesh->node_whole[m->fe_dof[k] / dim] * dim + m->fe_dof[k] % dim;
+    c->fe_dof[k] = m->model->mesh->node_whole[m->model->fe_dof[k] / dim] * dim + m->model->fe_dof[k] % dim;
   HycoBcast(c->fe_dof, c->n_fe, MPIU_INT, HycoComm(f));
   PetscCall(PetscMalloc2(c->l + c->n_fe, &c->coefficient, c->n[0] * dim, &c->U));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -86,7 +86,7 @@ PetscErrorCode HycoComparisonPredict(HycoComparison *c, HycoROM m, PetscMPIInt o
   PetscFunctionBegin;
   if (c->f->rank == of) {
     PetscCall(PetscArraycpy(c->coefficient, m->gamma, c->l));
-    for (PetscInt k = 0; k < c->n_fe; k++) c->coefficient[c->l + k] = m->U[m->fe_dof[k]];
+    for (PetscInt k = 0; k < c->n_fe; k++) c->coefficient[c->l + k] = m->U[m->model->fe_dof[k]];
   }
   PetscCall(PetscMPIIntCast(c->l + c->n_fe, &count));
   PetscCallMPI(MPI_Bcast(c->coefficient, count, MPIU_REAL, of, HycoComm(c->f)));

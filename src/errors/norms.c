@@ -74,20 +74,16 @@ static PetscErrorCode Root(HycoNorms h, PetscReal *norm)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoNormH1(HycoNorms h, const PetscReal u[], const PetscReal minus[], PetscReal *norm)
+/* Sets x from values by node in the file's order, of which this rank has its rows. */
+static PetscErrorCode SetFromRows(HycoNorms h, const PetscReal rows[])
 {
   HycoMesh part = h->f->part;
   const PetscInt dim = part->dim;
-  const HycoFileOrder *order;
-  PetscInt n;
   PetscScalar *x;
-  PetscReal *rows, *value;
+  PetscReal *value;
 
   PetscFunctionBegin;
-  PetscCall(HycoFOMGetRows(h->f, &order));
-  n = dim * (order ? order->n[HYCO_ON_NODES] : part->n_nodes);
-  PetscCall(PetscMalloc2(n, &rows, part->n_nodes * dim, &value));
-  for (PetscInt i = 0; i < n; i++) rows[i] = minus ? u[i] - minus[i] : u[i];
+  PetscCall(PetscMalloc1(part->n_nodes * dim, &value));
   PetscCall(HycoFOMFromRows(h->f, HYCO_ON_NODES, dim, rows, value));
   PetscCall(VecGetArray(h->x, &x));
   for (PetscInt i = 0; i < part->n_nodes; i++) {
@@ -96,35 +92,47 @@ PetscErrorCode HycoNormH1(HycoNorms h, const PetscReal u[], const PetscReal minu
     if (place >= 0) PetscCall(PetscArraycpy(x + place * dim, value + i * dim, dim));
   }
   PetscCall(VecRestoreArray(h->x, &x));
-  PetscCall(PetscFree2(rows, value));
+  PetscCall(PetscFree(value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoNormH1(HycoNorms h, const PetscReal u[], const PetscReal minus[], PetscReal *norm)
+{
+  HycoMesh part = h->f->part;
+  const HycoFileOrder *order;
+  PetscInt n;
+  PetscReal *rows;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMGetRows(h->f, &order));
+  n = part->dim * (order ? order->n[HYCO_ON_NODES] : part->n_nodes);
+  PetscCall(PetscMalloc1(n, &rows));
+  for (PetscInt i = 0; i < n; i++) rows[i] = minus ? u[i] - minus[i] : u[i];
+  PetscCall(SetFromRows(h, rows));
+  PetscCall(PetscFree(rows));
   PetscCall(MatMult(h->H, h->x, h->y));
   PetscCall(Root(h, norm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* B^T (L - minus) in x; the contacts' nodes are among those of the surfaces. Rank 0. */
+/* Adds B^T (L - minus) to a vector in the file's order. Rank 0. */
 static PetscErrorCode AddForces(HycoNorms h, HycoROM m, PetscBool rid_only, const PetscReal L[],
-                                const PetscReal minus[], PetscBool *any)
+                                const PetscReal minus[], Vec file, PetscBool *any)
 {
-  HycoMesh surface = h->f->surface;
   const PetscInt dim = h->f->part->dim;
 
   PetscFunctionBegin;
   PetscCall(HycoROMComplete(m));
-  for (PetscInt k = 0; k < m->pairs.n; k++) {
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) {
     const PetscReal force = minus ? L[k] - minus[k] : L[k];
 
-    if (force == 0 || (rid_only && !m->in_rid[k])) continue;
+    if (force == 0 || (rid_only && !m->model->in_rid[k])) continue;
     *any = PETSC_TRUE;
     for (PetscInt j = m->rows.start[k]; j < m->rows.start[k + 1]; j++) {
       const PetscInt dof = m->rows.dof[j];
-      PetscInt node = m->mesh->node_whole[dof / dim];
 
-      if (surface->node_global) {
-        PetscCall(PetscFindInt(node, surface->n_nodes, surface->node_whole, &node));
-        node = surface->node_global[node];
-      }
-      PetscCall(VecSetValue(h->x, node * dim + dof % dim, m->rows.value[j] * force, ADD_VALUES));
+      PetscCall(VecSetValue(file, m->model->mesh->node_whole[dof / dim] * dim + dof % dim, m->rows.value[j] * force,
+                            ADD_VALUES));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -133,14 +141,24 @@ static PetscErrorCode AddForces(HycoNorms h, HycoROM m, PetscBool rid_only, cons
 PetscErrorCode HycoNormDual(HycoNorms h, HycoROM m, PetscBool rid_only, const PetscReal L[], const PetscReal minus[],
                             PetscReal *norm)
 {
+  const PetscInt dim = h->f->part->dim;
+  const PetscScalar *rows;
+  const HycoFileOrder *order;
   PetscBool any = PETSC_FALSE;
+  Vec file;
 
   PetscFunctionBegin;
   *norm = 0;
-  PetscCall(VecSet(h->x, 0));
-  HycoOnRoot(HycoComm(h->f), AddForces(h, m, rid_only, L, minus, &any));
-  PetscCall(VecAssemblyBegin(h->x));
-  PetscCall(VecAssemblyEnd(h->x));
+  PetscCall(HycoFOMGetRows(h->f, &order));
+  PetscCall(VecCreateMPI(HycoComm(h->f), dim * (order ? order->n[HYCO_ON_NODES] : h->f->part->n_nodes), PETSC_DETERMINE,
+                         &file));
+  HycoOnRoot(HycoComm(h->f), AddForces(h, m, rid_only, L, minus, file, &any));
+  PetscCall(VecAssemblyBegin(file));
+  PetscCall(VecAssemblyEnd(file));
+  PetscCall(VecGetArrayRead(file, &rows));
+  PetscCall(SetFromRows(h, rows));
+  PetscCall(VecRestoreArrayRead(file, &rows));
+  PetscCall(VecDestroy(&file));
   PetscCallMPI(MPI_Bcast(&any, 1, HYCO_MPI_BOOL, 0, HycoComm(h->f)));
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(KSPSolve(h->ksp, h->x, h->y));

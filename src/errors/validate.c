@@ -10,6 +10,7 @@ const char *const HycoErrorKinds[] = {"u", "u_rid", "sigma", "sigma_11", "lambda
 
 typedef struct {
   HycoReducer t;
+  HycoSamples points;
   HycoROM m;
   HycoSnapshots store;
   HycoComparison c;
@@ -38,8 +39,8 @@ static PetscErrorCode CompareRID(Rows *r, const PetscReal mu[], HycoHeldOut *row
   HycoForceErrors f;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(m->pairs.n, &lambda));
-  PetscCall(HycoSnapshotsReadRows(r->store, mu, 0, "lambda", 0, m->pairs.n, lambda));
+  PetscCall(PetscMalloc1(m->model->pairs.n, &lambda));
+  PetscCall(HycoSnapshotsReadRows(r->store, mu, 0, "lambda", 0, m->model->pairs.n, lambda));
   PetscCall(HycoROMCompareRID(m, r->c.rid[0], r->c.rid[1], lambda, &e, &f));
   row->error[HYCO_ERROR_U_RID] = e.u_rid;
   row->error[HYCO_ERROR_SIGMA] = e.sigma;
@@ -83,8 +84,8 @@ static PetscErrorCode MeasureStep(Rows *r, const PetscReal mu[], PetscInt step, 
   PetscReal *lambda;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(r->m->pairs.n, &lambda));
-  PetscCall(HycoSnapshotsReadRows(r->store, mu, step, "lambda", 0, r->m->pairs.n, lambda));
+  PetscCall(PetscMalloc1(r->m->model->pairs.n, &lambda));
+  PetscCall(HycoSnapshotsReadRows(r->store, mu, step, "lambda", 0, r->m->model->pairs.n, lambda));
   PetscCall(HycoROMMeasureRID(r->m, r->c.rid[0], r->c.rid[1], r->c.rid[2], lambda, lost));
   lost[HYCO_ERROR_U] = (HycoLost){PetscSqrtReal(square[0]), PetscSqrtReal(square[1])};
   PetscCall(PetscFree(lambda));
@@ -155,11 +156,11 @@ PetscErrorCode HycoHeldOutPredict(HycoROM m, HycoSnapshots store, const PetscRea
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  if (m->scene->n_times) {
+  if (m->model->scene->n_times) {
     PetscCall(HycoSnapshotsReadTaken(store, mu, &n, &taken));
     PetscCall(HycoROMSetJudgedSteps(m, n, taken));
   }
-  ierr = HycoROMPredict(m, m->scene->n_parameters, mu);
+  ierr = HycoROMPredict(m, m->model->scene->n_parameters, mu);
   if (taken) PetscCall(HycoROMSetSteps(m, 0, NULL));
   PetscCall(PetscFree(taken));
   PetscCall(ierr);
@@ -184,7 +185,8 @@ static PetscErrorCode PredictAgain(HycoROM m, HycoSnapshots store, PetscInt firs
 {
   PetscFunctionBegin;
   for (PetscInt r = 1; r < HYCO_HELD_REPEATS; r++) {
-    for (PetscInt k = first; k < last; k++) PetscCall(Predict(m, store, mu + k * m->scene->n_parameters, r, &rows[k]));
+    for (PetscInt k = first; k < last; k++)
+      PetscCall(Predict(m, store, mu + k * m->model->scene->n_parameters, r, &rows[k]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -211,7 +213,7 @@ static PetscErrorCode PredictPoints(Rows *r, HycoHeldOut rows[])
   PetscMPIInt size, count;
 
   PetscFunctionBegin;
-  PetscCall(HycoSamplesGet(t->held, &n, &n_par, &mu));
+  PetscCall(HycoSamplesGet(r->points, &n, &n_par, &mu));
   PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
   PetscCall(PetscMPIIntCast(n * (PetscInt)(sizeof(*rows) / sizeof(PetscReal)), &count));
   first = t->rank * n / size;
@@ -253,7 +255,7 @@ static PetscErrorCode PredictPaths(Rows *r, HycoHeldOutRace *race, HycoHeldOut r
   PetscMPIInt size;
 
   PetscFunctionBegin;
-  PetscCall(HycoSamplesGet(t->held, &n, &n_par, &mu));
+  PetscCall(HycoSamplesGet(r->points, &n, &n_par, &mu));
   PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
   while (race->n < n && !race->lost) {
     const PetscInt here = PetscMin(size, n - race->n), *point = race->order + race->n,
@@ -292,14 +294,14 @@ static PetscErrorCode PredictAllPaths(Rows *r, PetscInt n, HycoHeldOut rows[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerPredictHeldOut(HycoReducer t, HycoROM m, HycoSnapshots store, HycoHeldOutRace *race,
-                                         HycoHeldOut rows[])
+PetscErrorCode HycoReducerPredictHeldOut(HycoReducer t, HycoSamples points, HycoROM m, HycoSnapshots store,
+                                         HycoHeldOutRace *race, HycoHeldOut rows[])
 {
-  Rows r = {t, m, store, {0}};
+  Rows r = {t, points, m, store, {0}};
   PetscInt n;
 
   PetscFunctionBegin;
-  PetscCall(HycoSamplesGet(t->held, &n, NULL, NULL));
+  PetscCall(HycoSamplesGet(points, &n, NULL, NULL));
   PetscCall(PetscArrayzero(rows, n));
   PetscCall(HycoComparisonCreate(t->fom, m, &r.c));
   if (!t->scene->n_times)

@@ -153,6 +153,17 @@ static PetscInt RigidRow(PetscInt dim, const PetscReal x[3], PetscInt c, PetscRe
   return n;
 }
 
+PetscReal HycoRigidAt(const HycoRigid *r, PetscInt dim, const PetscReal x[3], PetscInt c)
+{
+  PetscReal at[3], row[6], sum = 0;
+  PetscInt n;
+
+  for (PetscInt d = 0; d < 3; d++) at[d] = (x[d] - r->centre[d]) / r->size;
+  n = RigidRow(dim, at, c, row);
+  for (PetscInt j = 0; j < n; j++) sum += row[j] * r->rigid[j];
+  return sum;
+}
+
 /* "body pellet from moving along (0, 0, 1)", or from turning about an axis through a point; a motion whose axis is
    twenty lengths away is named as a translation. `others`: bodies that move with it. */
 static void Name(HycoFE fe, const HycoRigid *r, const char others[], char name[HYCO_LINE])
@@ -416,12 +427,12 @@ PetscErrorCode HycoFEFreeMotions(MPI_Comm comm, HycoFE fe, HycoMotions *motions)
   PetscFunctionBegin;
   PetscCall(PetscMemzero(motions, sizeof(*motions)));
   PetscCall(PetscMalloc1(m->n_nodes, &part));
+  motions->part = part;
   PetscCall(FindParts(comm, m, part, &n_parts));
   PetscCall(PetscCalloc1(n_parts, &parts));
   PetscCall(PlaceParts(comm, fe, part, n_parts, parts));
   PetscCall(MeasureParts(comm, fe, part, n_parts, parts));
   for (PetscInt p = 0; p < n_parts; p++) PetscCall(PartMotions(comm, fe, part, p, &parts[p], motions));
-  PetscCall(PetscFree(part));
   PetscCall(PetscFree(parts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -429,9 +440,7 @@ PetscErrorCode HycoFEFreeMotions(MPI_Comm comm, HycoFE fe, HycoMotions *motions)
 PetscErrorCode HycoMotionsDestroy(HycoMotions *motions)
 {
   PetscFunctionBegin;
-  PetscCall(PetscFree(motions->motion));
-  PetscCall(PetscFree(motions->name));
-  PetscCall(PetscFree(motions->rigid));
+  HycoFreeAll(&motions->motion, &motions->name, &motions->rigid, &motions->part);
   motions->n = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

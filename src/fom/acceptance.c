@@ -4,6 +4,7 @@
   wrong unit, of a missing support, or of round-off where nothing but a small difference of forces holds a body.
 */
 #include <hycopath.h>
+#include <petscblaslapack.h>
 
 /* A density in kg/m^3 where the stresses are in MPa is too large by 1e12, and strains under weight are about 1e-6. */
 #define HYCO_MOST 1e6
@@ -58,6 +59,65 @@ static PetscErrorCode NameLifted(HycoFOM f, Vec L, char name[HYCO_LINE])
   PetscCall(VecDestroy(&rest));
   PetscCall(VecDestroyVecs(motions.n, &v));
   PetscCall(HycoMotionsDestroy(&motions));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* gram (p x p): of the rows of B with a force, times the motions v; *size: the largest square of a B v with all rows. */
+static PetscErrorCode HeldBy(HycoFOM f, PetscInt p, const Vec v[], PetscReal gram[], PetscReal *size)
+{
+  const PetscScalar *force;
+  PetscReal most, square;
+  PetscInt n;
+  Vec *w;
+
+  PetscFunctionBegin;
+  *size = 0;
+  PetscCall(VecDuplicateVecs(f->Lambda, p, &w));
+  PetscCall(VecNorm(f->Lambda, NORM_INFINITY, &most));
+  PetscCall(VecGetLocalSize(f->Lambda, &n));
+  PetscCall(VecGetArrayRead(f->Lambda, &force));
+  for (PetscInt k = 0; k < p; k++) {
+    PetscScalar *own;
+
+    PetscCall(MatMult(f->B, v[k], w[k]));
+    PetscCall(VecDot(w[k], w[k], &square));
+    *size = PetscMax(*size, square);
+    PetscCall(VecGetArray(w[k], &own));
+    for (PetscInt i = 0; i < n; i++) own[i] = most > 0 && force[i] > 1e-12 * most ? own[i] : 0;
+    PetscCall(VecRestoreArray(w[k], &own));
+  }
+  PetscCall(VecRestoreArrayRead(f->Lambda, &force));
+  for (PetscInt k = 0; k < p; k++) PetscCall(VecMDot(w[k], p, w, gram + k * p));
+  PetscCall(VecDestroyVecs(p, &w));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMNameLoose(HycoFOM f, char name[HYCO_LINE])
+{
+  MatNullSpace kernel = NULL;
+  HycoMotions motions;
+  PetscReal *gram, *value, *work, size;
+  PetscBLASInt n, lwork, info;
+  PetscInt p = 0;
+  const Vec *v;
+
+  PetscFunctionBegin;
+  name[0] = '\0';
+  if (f->n_contacts && f->K) PetscCall(MatGetNullSpace(f->K, &kernel));
+  if (kernel) PetscCall(MatNullSpaceGetVecs(kernel, NULL, &p, &v));
+  if (!p) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscBLASIntCast(p, &n));
+  lwork = 8 * n;
+  PetscCall(PetscMalloc3(p * p, &gram, p, &value, 8 * p, &work));
+  PetscCall(HeldBy(f, p, v, gram, &size));
+  LAPACKsyev_("V", "U", &n, gram, &n, value, work, &lwork, &info);
+  PetscCheck(info == 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "LAPACK syev: %d", (int)info);
+  if (value[0] <= 1e-14 * size) {
+    PetscCall(HycoFEFreeMotions(HycoComm(f), f->fe, &motions));
+    if (motions.n == p) HycoMotionsName(f->fe, &motions, gram, name);
+    PetscCall(HycoMotionsDestroy(&motions));
+  }
+  PetscCall(PetscFree3(gram, value, work));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -202,7 +202,6 @@ static PetscErrorCode WriteContent(HycoFOM f, HycoH5 h, const Content *c, const 
   PetscCall(HycoH5WriteReal(h, "head", N_HEAD, 1, c->head));
   PetscCall(HycoH5WriteReal(h, "steps", c->n_steps + 1, STEP_COLS(f), c->steps));
   if (c->n_orders) PetscCall(HycoH5WriteReal(h, "orders", c->n_orders, 1, c->orders));
-  if (f->n_contacts) PetscCall(HycoH5WriteReal(h, "lambda", f->n_contacts, 1, c->lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -232,29 +231,8 @@ static PetscErrorCode WriteAll(HycoFOM f, HycoH5 h, const Content *c, const char
 {
   PetscFunctionBegin;
   HycoOnRoot(HycoComm(f), WriteContent(f, h, c, key));
+  if (f->n_contacts) PetscCall(HycoFOMWriteForces(f, h, "lambda"));
   PetscCall(WriteItems(f, h));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Copies Lambda in the contacts' order to or from rank 0. */
-static PetscErrorCode MoveForces(HycoFOM f, PetscBool out, PetscReal lambda[])
-{
-  const ScatterMode mode = out ? SCATTER_FORWARD : SCATTER_REVERSE;
-  Vec from = out ? f->Lambda : f->lambda_root, to = out ? f->lambda_root : f->Lambda;
-  PetscScalar *v;
-
-  PetscFunctionBegin;
-  if (!f->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt pass = 0; pass < 2; pass++) {
-    if (pass == (out ? 0 : 1)) {
-      PetscCall(VecScatterBegin(f->lambda_to_root, from, to, INSERT_VALUES, mode));
-      PetscCall(VecScatterEnd(f->lambda_to_root, from, to, INSERT_VALUES, mode));
-    } else {
-      PetscCall(VecGetArray(f->lambda_root, &v));
-      if (f->rank == 0) PetscCall(PetscArraycpy(out ? lambda : v, out ? v : lambda, f->n_contacts));
-      PetscCall(VecRestoreArray(f->lambda_root, &v));
-    }
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -300,8 +278,6 @@ PetscErrorCode HycoPathSave(HycoFOM f)
   PetscFunctionBegin;
   if (!p->checkpoint[0]) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(Identify(f, key));
-  PetscCall(PetscCalloc1(f->n_contacts + 1, &c.lambda));
-  PetscCall(MoveForces(f, PETSC_TRUE, c.lambda));
   PetscCall(PetscMalloc1(N_HEAD, &c.head));
   MoveHead(p, PETSC_TRUE, c.head);
   PetscCall(PetscMalloc1((p->n_steps + 1) * STEP_COLS(f), &c.steps));
@@ -459,7 +435,7 @@ static PetscErrorCode TakeContent(HycoFOM f, const Content *c)
   PetscCall(ReadItems(f, "cell", HYCO_ON_CELLS, cols, mine));
   PetscCall(MoveState(f, PETSC_FALSE, cols, mine));
   PetscCall(PetscFree(mine));
-  PetscCall(MoveForces(f, PETSC_FALSE, c->lambda));
+  PetscCall(HycoFOMSetLambda(f, c->lambda));
   MoveHead(p, PETSC_FALSE, c->head);
   for (PetscInt k = 0; k < c->n_steps; k++) RealsToStep(f, c->steps + k * STEP_COLS(f), &p->steps[k]);
   RealsToStep(f, c->steps + c->n_steps * STEP_COLS(f), &p->now);

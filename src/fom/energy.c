@@ -91,7 +91,7 @@ static PetscErrorCode CellSums(HycoFOM f, PetscReal *strain, PetscReal *lifting)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On rank 0: L.D with the gap as drawn, and the work of contacts on fixed unknowns, L.(B u0) over those. */
+/* Of this rank's contacts: L.D with the gap as drawn, and the work of contacts on fixed unknowns, L.(B u0) over those. */
 static PetscErrorCode ContactSums(HycoFOM f, PetscReal *gap_work, PetscReal *fixed_work)
 {
   PetscReal *normal, *gap;
@@ -129,7 +129,7 @@ PetscErrorCode HycoFOMEnergy(HycoFOM f, HycoSummary *s)
   PetscFunctionBegin;
   PetscCall(FreeWork(f, &free_work));
   PetscCall(CellSums(f, &mine[0], &lifting));
-  if (f->rank == 0) PetscCall(ContactSums(f, &mine[2], &mine[3]));
+  HycoOnEach(HycoComm(f), ContactSums(f, &mine[2], &mine[3]));
   mine[1] = free_work + lifting;
   PetscCallMPI(MPI_Allreduce(mine, all, 4, MPIU_REAL, MPI_SUM, HycoComm(f)));
   s->strain_energy = all[0];

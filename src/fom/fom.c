@@ -7,9 +7,7 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
   HycoFOM f;
 
   PetscFunctionBegin;
-  if (!fom || !*fom) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheckHandle(*fom, HYCO_FOM_CLASSID);
-  HycoDereference(fom);
+  HycoDestroyBegin(fom, HYCO_FOM_CLASSID);
   f = *fom;
   PetscCall(HycoComparedDestroy(&f->compared));
   PetscCall(HycoPathFree(&f->path));
@@ -27,10 +25,8 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
   PetscCall(VecDestroy(&f->D));
   PetscCall(VecScatterDestroy(&f->to_local));
   PetscCall(VecScatterDestroy(&f->to_surface));
-  PetscCall(VecScatterDestroy(&f->lambda_to_root));
   PetscCall(VecDestroy(&f->U_local));
   PetscCall(VecDestroy(&f->U_surface));
-  PetscCall(VecDestroy(&f->lambda_root));
   if (f->fe_surface != f->fe) PetscCall(HycoFEDestroy(&f->fe_surface));
   PetscCall(HycoFEDestroy(&f->fe));
   if (f->surface != f->part) PetscCall(HycoMeshDestroy(&f->surface));
@@ -48,6 +44,8 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
   PetscCall(PetscFree(f->contact_result));
   PetscCall(PetscFree(f->reaction));
   PetscCall(PetscFree(f->lambda));
+  PetscCall(PetscFree(f->lambda_all));
+  PetscCall(PetscFree(f->needed));
   PetscCall(PetscFree(f->sigma));
   PetscCall(PetscFree(f->gap));
   PetscCall(HycoSceneDestroy(&f->scene));
@@ -69,54 +67,15 @@ PetscErrorCode HycoMarkContactGroups(HycoScene scene, HycoMesh mesh, PetscBool g
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Gathers the contacts' surfaces on rank 0 (in 1D all of the mesh: its facets need their cells). */
-static PetscErrorCode GatherSurface(HycoFOM f, HycoMesh part)
-{
-  PetscBool *in;
-
-  PetscFunctionBegin;
-  PetscCall(PetscCalloc1(part->n_groups, &in));
-  PetscCall(HycoMarkContactGroups(f->scene, part, in));
-  PetscCall(HycoMeshGather(HycoComm(f), part, part->dim > 1 ? in : NULL, NULL, &f->surface));
-  PetscCall(PetscFree(in));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Finds the contacts, and the pairs of their nodes for the partitioner, as indices in the whole mesh; the node of a
-   rigid body is in no pair, otherwise all of its contact's surface would be on one rank. Rank 0. */
-static PetscErrorCode FindTies(HycoFOM f, PetscInt *n, PetscInt **ties)
-{
-  HycoPairs *p = &f->pairs;
-
-  PetscFunctionBegin;
-  *n = 0;
-  PetscCall(HycoPairsFind(f->scene, f->surface, &f->team, p));
-  PetscCall(PetscMalloc1(2 * p->n * HycoPairsWidth(p), ties));
-  for (PetscInt k = 0; k < p->n; k++) {
-    const PetscInt *master;
-    const PetscReal *weight;
-    PetscInt masters;
-
-    HycoPairsMasters(p, k, &masters, &master, &weight);
-    if (f->scene->contact[p->contact[k]]->rigid) continue;
-    for (PetscInt j = 0; j < masters; j++, (*n)++) {
-      (*ties)[2 * *n] = f->surface->node_whole[HycoPairsSlave(p, k)];
-      (*ties)[2 * *n + 1] = f->surface->node_whole[master[j]];
-    }
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Partitions the DM so that no contact is cut, if the contacts can be found before; *found: they were. */
-static PetscErrorCode Distribute(HycoFOM f, PetscBool *found)
+/* Partitions the DM so that few contacts are cut. */
+static PetscErrorCode Distribute(HycoFOM f)
 {
   const HycoPartitioner cut = (HycoPartitioner)f->partition;
-  PetscInt n_ties = 0, *ties = NULL;
+  PetscInt n = 0, *pairs = NULL;
   HycoMesh mesh;
   PetscBool done;
 
   PetscFunctionBegin;
-  *found = PETSC_FALSE;
   PetscCall(DMPlexIsDistributed(f->dm, &done));
   if (f->size == 1 || done) {
     PetscCall(HycoMeshDistribute(&f->dm, f->scene, NULL, 0, NULL, cut, f->mesh_write));
@@ -125,86 +84,69 @@ static PetscErrorCode Distribute(HycoFOM f, PetscBool *found)
   PetscCall(HycoPlexToMesh(f->dm, f->scene, &mesh));
   PetscCheck(mesh->n_whole_cells >= f->size, HycoComm(f), PETSC_ERR_USER,
              "the mesh has %d cells; use at most as many ranks", (int)mesh->n_whole_cells);
-  if (!f->scene->refine) { /* otherwise the contacts are found later */
-    HycoOnEach(HycoComm(f), HycoMeshCheckCells(mesh));
-    PetscCall(GatherSurface(f, mesh));
-    HycoOnRootWithTeam(&f->team, FindTies(f, &n_ties, &ties));
-    PetscCall(HycoMeshDestroy(&f->surface));
-    *found = PETSC_TRUE;
-  }
-  PetscCall(HycoMeshDistribute(&f->dm, f->scene, mesh, mesh->n_cells ? n_ties : 0, ties, cut, f->mesh_write));
-  PetscCall(PetscFree(ties));
+  /* the file's first bad cell is named; refined cells are checked later */
+  if (!f->scene->refine) HycoOnEach(HycoComm(f), HycoMeshCheckCells(mesh));
+  if (mesh->n_cells) PetscCall(HycoContactsNeighbours(f->scene, mesh, &n, &pairs));
+  PetscCall(DMDestroy(&mesh->dm)); /* so that it does not live beside the distributed one */
+  PetscCall(HycoMeshDistribute(&f->dm, f->scene, mesh, n, pairs, cut, f->mesh_write));
+  PetscCall(PetscFree(pairs));
   PetscCall(HycoMeshDestroy(&mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMSetUpSurface(HycoFOM f)
+{
+  const PetscInt dim = f->part->dim;
+  IS is;
+
+  PetscFunctionBegin;
+  HycoOnEach(HycoComm(f), f->surface ? HycoFECreate(f->scene, f->surface, &f->fe_surface) : PETSC_SUCCESS);
+  if (f->gathered) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecScatterDestroy(&f->to_surface));
+  PetscCall(VecDestroy(&f->U_surface));
+  PetscCall(VecCreateSeq(PETSC_COMM_SELF, f->fe_surface->n_dof, &f->U_surface));
+  PetscCall(ISCreateBlock(PETSC_COMM_SELF, dim, f->surface->n_nodes, f->surface->node_global, PETSC_COPY_VALUES, &is));
+  PetscCall(VecScatterCreate(f->U, is, f->U_surface, NULL, &f->to_surface));
+  PetscCall(ISDestroy(&is));
+  PetscCall(PetscFree(f->u_surface));
+  PetscCall(PetscCalloc1(f->fe_surface->n_dof, &f->u_surface));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Reads the mesh, and makes its parts and its contacts. */
 static PetscErrorCode ReadMesh(HycoFOM f)
 {
-  PetscInt sizes[3] = {0, 0, 0};
-  PetscBool found;
-
   PetscFunctionBegin;
   PetscCall(HycoMeshLoad(HycoComm(f), f->scene, &f->dm));
-  PetscCall(Distribute(f, &found));
+  PetscCall(Distribute(f));
   PetscCall(HycoPlexToMesh(f->dm, f->scene, &f->part));
-  if (f->size == 1) {
-    f->surface = f->part;
-    f->n_nodes = f->part->n_nodes;
-    f->n_cells = f->part->n_cells;
-  } else {
-    if (!found) HycoOnEach(HycoComm(f), HycoMeshCheckCells(f->part));
-    PetscCall(GatherSurface(f, f->part));
-    f->n_nodes = f->part->n_whole_nodes;
-    f->n_cells = f->part->n_whole_cells;
-  }
-  if (f->size == 1) HycoOnRoot(HycoComm(f), HycoPairsFind(f->scene, f->surface, NULL, &f->pairs));
-  if (f->size > 1 && !found) HycoOnRootWithTeam(&f->team, HycoPairsFind(f->scene, f->surface, &f->team, &f->pairs));
-  if (f->rank == 0) {
-    sizes[0] = f->pairs.n;
-    sizes[1] = HycoPairsWidth(&f->pairs);
-    sizes[2] = f->pairs.room > 0;
-  }
-  PetscCallMPI(MPI_Bcast(sizes, 3, MPIU_INT, 0, HycoComm(f)));
-  f->n_contacts = sizes[0];
-  f->width = sizes[1];
-  f->searches = (PetscBool)(sizes[2] != 0);
+  f->n_nodes = f->size == 1 ? f->part->n_nodes : f->part->n_whole_nodes;
+  f->n_cells = f->size == 1 ? f->part->n_cells : f->part->n_whole_cells;
+  if (f->size > 1) HycoOnEach(HycoComm(f), HycoMeshCheckCells(f->part));
+  if (f->size > 1) HycoOnEach(HycoComm(f), HycoFECreate(f->scene, f->part, &f->fe));
+  f->contact_cpu -= HycoCPU();
+  PetscCall(HycoFOMFindContacts(f));
+  f->contact_cpu += HycoCPU();
+  if (f->size > 1) PetscFunctionReturn(PETSC_SUCCESS);
   HycoOnEach(HycoComm(f), HycoFECreate(f->scene, f->part, &f->fe));
-  if (f->size == 1)
-    f->fe_surface = f->fe;
-  else
-    HycoOnRoot(HycoComm(f), HycoFECreate(f->scene, f->surface, &f->fe_surface));
+  f->fe_surface = f->fe;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Creates the scatters of U to each rank's part and to the surfaces on rank 0, and of Lambda to rank 0. */
-static PetscErrorCode CreateScatters(HycoFOM f)
+/* Creates the scatter of U to each rank's part. */
+static PetscErrorCode CreateScatter(HycoFOM f)
 {
-  const PetscInt dim = f->part->dim, m_root = f->rank == 0 ? f->n_contacts : 0;
-  const PetscInt n_surface = f->surface ? f->surface->n_nodes : 0;
+  const PetscInt dim = f->part->dim;
   IS is;
 
   PetscFunctionBegin;
   PetscCall(VecCreateSeq(PETSC_COMM_SELF, f->part->n_nodes * dim, &f->U_local));
-  PetscCall(VecCreateSeq(PETSC_COMM_SELF, m_root, &f->lambda_root));
   if (f->part->node_global)
     PetscCall(ISCreateBlock(PETSC_COMM_SELF, dim, f->part->n_nodes, f->part->node_global, PETSC_COPY_VALUES, &is));
   else
     PetscCall(ISCreateStride(PETSC_COMM_SELF, f->part->n_nodes * dim, 0, 1, &is));
   PetscCall(VecScatterCreate(f->U, is, f->U_local, NULL, &f->to_local));
   PetscCall(ISDestroy(&is));
-  if (f->size > 1) {
-    PetscCall(VecCreateSeq(PETSC_COMM_SELF, n_surface * dim, &f->U_surface));
-    PetscCall(ISCreateBlock(PETSC_COMM_SELF, dim, n_surface, f->surface ? f->surface->node_global : NULL,
-                            PETSC_COPY_VALUES, &is));
-    PetscCall(VecScatterCreate(f->U, is, f->U_surface, NULL, &f->to_surface));
-    PetscCall(ISDestroy(&is));
-  }
-  if (f->n_contacts) {
-    PetscCall(ISCreateStride(PETSC_COMM_SELF, m_root, 0, 1, &is));
-    PetscCall(VecScatterCreate(f->Lambda, is, f->lambda_root, NULL, &f->lambda_to_root));
-    PetscCall(ISDestroy(&is));
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -216,31 +158,33 @@ static PetscInt GlobalNode(HycoFOM f, PetscInt node)
 /* Composes B with the slaves of its rows, which do not change. Collective. */
 static PetscErrorCode TellSlaves(HycoFOM f)
 {
+  PetscScalar *slave;
   Vec slaves;
 
   PetscFunctionBegin;
   PetscCall(MatCreateVecs(f->B, NULL, &slaves));
-  for (PetscInt k = 0; f->rank == 0 && k < f->pairs.n; k++)
-    PetscCall(VecSetValue(slaves, k, GlobalNode(f, HycoPairsSlave(&f->pairs, k)) * f->part->dim, INSERT_VALUES));
-  PetscCall(VecAssemblyBegin(slaves));
-  PetscCall(VecAssemblyEnd(slaves));
+  PetscCall(VecGetArray(slaves, &slave));
+  for (PetscInt k = 0; k < f->pairs.n; k++) slave[k] = GlobalNode(f, HycoPairsSlave(&f->pairs, k)) * f->part->dim;
+  PetscCall(VecRestoreArray(slaves, &slave));
   PetscCall(PetscObjectCompose((PetscObject)f->B, HYCO_SLAVES, (PetscObject)slaves));
   PetscCall(VecDestroy(&slaves));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Creates B and Bt with the pattern for any parameters: all components of a contact's nodes. */
+/* Creates B and Bt with the pattern for any parameters: all components of a contact's nodes. Each rank has the rows of its
+   contacts. */
 static PetscErrorCode CreateB(HycoFOM f)
 {
   const PetscInt dim = f->part->dim, entries = f->width * dim;
 
   PetscFunctionBegin;
   PetscCall(MatCreate(HycoComm(f), &f->B));
-  PetscCall(MatSetSizes(f->B, PETSC_DECIDE, f->part->n_owned * dim, f->n_contacts, f->n_nodes * dim));
+  PetscCall(MatSetSizes(f->B, f->pairs.n, f->part->n_owned * dim, f->n_contacts, f->n_nodes * dim));
   PetscCall(MatSetType(f->B, MATAIJ));
   PetscCall(MatSeqAIJSetPreallocation(f->B, entries, NULL));
   PetscCall(MatMPIAIJSetPreallocation(f->B, entries, NULL, entries, NULL));
   PetscCall(MatSetOption(f->B, MAT_NEW_NONZERO_LOCATION_ERR, PETSC_FALSE));
+  PetscCall(MatSetOption(f->B, MAT_NO_OFF_PROC_ENTRIES, PETSC_TRUE));
   PetscCall(TellSlaves(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -290,7 +234,6 @@ static PetscErrorCode Create(MPI_Comm comm, HycoFOM *fom)
   PetscCallMPI(MPI_Comm_size(HycoComm(*fom), &(*fom)->size));
   (*fom)->regularise_tol = 1e-2;
   (*fom)->partition = HYCO_PARTITION_METIS;
-  (*fom)->team.comm = HycoComm(*fom);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -318,18 +261,16 @@ static PetscErrorCode SetUp(HycoFOM f)
     PetscCall(MatCreateVecs(f->B, NULL, &f->Lambda));
     PetscCall(VecDuplicate(f->Lambda, &f->D));
   }
-  PetscCall(CreateScatters(f));
+  PetscCall(CreateScatter(f));
+  if (f->size > 1) PetscCall(HycoFOMSetUpSurface(f));
   PetscCall(HycoSystemCreate(HycoComm(f), &f->system));
   PetscCall(HycoSolverCreate(HycoComm(f), &f->solver));
   PetscCall(PetscObjectSetOptions((PetscObject)f->solver, f->scene->options));
   PetscCall(HycoSolverSetFromOptions(f->solver));
   PetscCall(PetscMalloc1(f->fe->n_dof, &f->u));
-  f->u_surface = f->u;
-  if (f->size > 1) PetscCall(PetscMalloc1(f->fe_surface ? f->fe_surface->n_dof : 0, &f->u_surface));
-  if (f->rank == 0) {
-    PetscCall(PetscCalloc1(f->n_contacts + 1, &f->lambda));
-    PetscCall(PetscCalloc1(f->n_contacts + 1, &f->gap));
-  }
+  if (f->size == 1) f->u_surface = f->u;
+  PetscCall(PetscCalloc1(f->pairs.n + 1, &f->lambda));
+  PetscCall(PetscCalloc1(f->pairs.n + 1, &f->gap));
   if (f->path) PetscCall(HycoFOMPathCreate(f));
   f->summary.seconds.setup += HycoNow();
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -362,6 +303,8 @@ PetscErrorCode HycoFOMCreateMesh(MPI_Comm comm, HycoScene scene, HycoFOM *fom)
   PetscCall(SetFromOptions(*fom));
   (*fom)->mesh_write[0] = '\0'; /* only for solves */
   ierr = ReadMesh(*fom);
+  if (!ierr && (*fom)->size > 1) ierr = HycoFOMKeepOnRoot(*fom);
+  if (!ierr && (*fom)->size > 1) ierr = HycoFOMSetUpSurface(*fom);
   if (ierr) PetscCall(HycoFOMDestroy(fom));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -375,44 +318,127 @@ PetscErrorCode HycoFOMGetSolver(HycoFOM f, HycoSolver *solver)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets B (if the parameters that it depends on have changed) and D, from rank 0. */
-static PetscErrorCode FillContact(HycoFOM f, PetscBool rows_changed)
-{
-  PetscErrorCode ierr;
-  const PetscInt m = f->pairs.n, dim = f->part->dim, entries = f->width * dim * m;
+/* Rows of B of one process. */
+typedef struct {
   PetscInt *start, *dof;
   PetscReal *value;
+} Rows;
+
+/* The rows and gaps of a process's contacts, and how many have no effect. The caller frees the rows, also after an
+   error. */
+static PetscErrorCode ComputeRows(HycoFE fe, HycoPairs *pairs, PetscInt width, Rows *r, PetscReal gap[],
+                                  PetscInt *n_still)
+{
+  const PetscInt entries = width * fe->dim * pairs->n;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc3(m + 1, &start, entries, &dof, entries, &value));
-  ierr = HycoContactRows(f->fe_surface, &f->pairs, start, dof, value, f->gap);
-  if (!ierr) ierr = HycoContactCountStill(f->fe_surface, &f->pairs, start, &f->summary.n_still);
-  for (PetscInt k = 0; !ierr && k < m; k++) {
-    PetscCall(VecSetValue(f->D, k, f->gap[k], INSERT_VALUES));
-    for (PetscInt j = start[k]; rows_changed && j < start[k + 1]; j++)
-      PetscCall(MatSetValue(f->B, k, GlobalNode(f, dof[j] / dim) * dim + dof[j] % dim, value[j], INSERT_VALUES));
-  }
-  PetscCall(PetscFree3(start, dof, value));
+  PetscCall(PetscMalloc3(pairs->n + 1, &r->start, entries, &r->dof, entries, &r->value));
+  PetscCall(HycoContactRows(fe, pairs, r->start, r->dof, r->value, gap));
+  PetscCall(HycoContactCountStill(fe, pairs, r->start, n_still));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The same for all contacts on rank 0, for the error of the first of them. */
+static PetscErrorCode ComputeWhole(HycoFOM f, HycoMesh mesh, HycoPairs *pairs)
+{
+  Rows r = {NULL, NULL, NULL};
+  PetscReal *gap;
+  PetscInt n_still;
+  HycoFE fe;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFECreate(f->scene, mesh, &fe));
+  PetscCall(PetscMalloc1(pairs->n, &gap));
+  ierr = HycoFESetParameters(fe, f->fe->mu);
+  if (!ierr) ierr = PetscArraycpy(fe->mirrored, f->fe->mirrored, f->scene->n_bodies);
+  if (!ierr) ierr = ComputeRows(fe, pairs, f->width, &r, gap, &n_still);
+  PetscCall(PetscFree3(r.start, r.dof, r.value));
+  PetscCall(PetscFree(gap));
+  PetscCall(HycoFEDestroy(&fe));
   PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Raises the error that the whole surfaces have, which is the same on any number of ranks. */
+static PetscErrorCode RaiseWhole(HycoFOM f)
+{
+  HycoPairs pairs;
+  HycoMesh mesh;
+  PetscErrorCode ierr = 0;
+  char message[HYCO_LINE] = "";
+
+  PetscFunctionBegin;
+  if (f->n_turned || f->size == 1) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoFOMGatherContacts(f, &mesh, &pairs));
+  PetscCall(HycoCatchBegin());
+  if (mesh) ierr = ComputeWhole(f, mesh, &pairs);
+  PetscCall(HycoCatchEnd(ierr, message));
+  PetscCall(HycoPairsDestroy(&pairs));
+  PetscCall(HycoMeshDestroy(&mesh));
+  PetscCall(HycoErrorSync(HycoComm(f), ierr, message));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Computes each rank's rows; an error of any is raised on all. */
+static PetscErrorCode AllRows(HycoFOM f, Rows *r)
+{
+  char message[HYCO_LINE] = "";
+  PetscBool failed;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoCatchBegin());
+  ierr = ComputeRows(f->fe_surface, &f->pairs, f->width, r, f->gap, &f->summary.n_still);
+  PetscCall(HycoCatchEnd(ierr, message));
+  failed = (PetscBool)(message[0] != '\0');
+  HycoAllreduce(&failed, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(f));
+  if (failed) PetscCall(RaiseWhole(f));
+  PetscCall(HycoErrorSync(HycoComm(f), ierr, message));
+  HycoAllreduce(&f->summary.n_still, 1, MPIU_INT, MPI_SUM, HycoComm(f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Sets D and, if the parameters that it depends on have changed, B. */
+static PetscErrorCode Insert(HycoFOM f, PetscBool rows_changed, const Rows *r)
+{
+  const PetscInt dim = f->part->dim;
+  PetscInt *column, first;
+  PetscScalar *D;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetArray(f->D, &D));
+  PetscCall(PetscArraycpy(D, f->gap, f->pairs.n));
+  PetscCall(VecRestoreArray(f->D, &D));
+  if (!rows_changed) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatGetOwnershipRange(f->B, &first, NULL));
+  PetscCall(PetscMalloc1(f->width * dim, &column));
+  for (PetscInt k = 0; k < f->pairs.n; k++) {
+    const PetscInt row = first + k, lo = r->start[k], n = r->start[k + 1] - lo;
+
+    for (PetscInt j = 0; j < n; j++) column[j] = GlobalNode(f, r->dof[lo + j] / dim) * dim + r->dof[lo + j] % dim;
+    PetscCall(MatSetValues(f->B, 1, &row, n, column, r->value + lo, INSERT_VALUES));
+  }
+  PetscCall(PetscFree(column));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode AssembleContact(HycoFOM f, PetscBool rows_changed)
 {
+  Rows r = {NULL, NULL, NULL};
+  PetscErrorCode ierr;
+
   PetscFunctionBegin;
-  if (!f->n_contacts) { /* there may be obstacles whose nodes are all fixed */
-    HycoOnRoot(HycoComm(f), HycoContactCountStill(f->fe_surface, &f->pairs, NULL, &f->summary.n_still));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  if (rows_changed && f->Bt && f->searches) { /* removes entries of former masters */
+  if (f->n_contacts && rows_changed && f->Bt && f->searches) { /* removes entries of former masters */
     PetscCall(MatDestroy(&f->B));
     PetscCall(CreateB(f));
-  } else if (rows_changed && f->Bt)
+  } else if (f->n_contacts && rows_changed && f->Bt)
     PetscCall(MatZeroEntries(f->B));
-  HycoOnRoot(HycoComm(f), FillContact(f, rows_changed));
-  PetscCall(VecAssemblyBegin(f->D));
-  PetscCall(VecAssemblyEnd(f->D));
-  if (!rows_changed) PetscFunctionReturn(PETSC_SUCCESS);
+  ierr = AllRows(f, &r); /* without contacts there may be obstacles whose nodes are all fixed */
+  if (!ierr && f->n_contacts) ierr = Insert(f, rows_changed, &r);
+  PetscCall(PetscFree3(r.start, r.dof, r.value));
+  PetscCall(ierr);
+  if (!f->n_contacts || !rows_changed) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatAssemblyBegin(f->B, MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(f->B, MAT_FINAL_ASSEMBLY));
   PetscCall(MatDestroy(&f->Bt)); /* a rotated normal may have added an entry to B */
@@ -446,16 +472,14 @@ static PetscErrorCode AssembleForce(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Searches for the masters on moved surfaces. Rank 0. */
-static PetscErrorCode Move(HycoFOM f)
+/* Moves this rank's surfaces, and searches for the masters on them. */
+static PetscErrorCode MoveSurface(HycoFOM f, const PetscReal mu[])
 {
-  PetscErrorCode ierr;
-
   PetscFunctionBegin;
-  f->fe_surface->team = &f->team;
-  ierr = HycoPairsMove(f->fe_surface, &f->pairs);
-  f->fe_surface->team = NULL;
-  PetscCall(ierr);
+  if (!f->fe_surface) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoFESetParameters(f->fe_surface, mu));
+  PetscCall(PetscArraycpy(f->fe_surface->mirrored, f->fe->mirrored, f->scene->n_bodies));
+  if (f->searches) PetscCall(HycoPairsMove(f->fe_surface, &f->pairs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -465,9 +489,10 @@ PetscErrorCode HycoFOMSetParameters(HycoFOM f, const PetscReal mu[])
   HycoOnEach(HycoComm(f), HycoFESetParameters(f->fe, mu));
   if (f->size == 1) PetscFunctionReturn(PETSC_SUCCESS);
   if (f->fe->contact_changed) PetscCall(HycoFEAgreeOnMirrors(HycoComm(f), f->fe));
-  HycoOnRoot(HycoComm(f), HycoFESetParameters(f->fe_surface, mu));
-  if (f->rank == 0) PetscCall(PetscArraycpy(f->fe_surface->mirrored, f->fe->mirrored, f->scene->n_bodies));
-  if (f->searches) HycoOnRootWithTeam(&f->team, Move(f));
+  f->contact_cpu -= HycoCPU();
+  PetscCall(HycoFOMFetchMasters(f));
+  HycoOnEach(HycoComm(f), MoveSurface(f, mu));
+  f->contact_cpu += HycoCPU();
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -489,7 +514,9 @@ PetscErrorCode HycoFOMAssemble(HycoFOM f, const PetscReal mu[])
   PetscCall(HycoLogEvent(HYCO_EVENT_FORCE, PETSC_TRUE));
   PetscCall(AssembleForce(f));
   PetscCall(HycoLogEvent(HYCO_EVENT_FORCE, PETSC_FALSE));
+  f->contact_cpu -= HycoCPU();
   HycoLogged(HYCO_EVENT_CONTACT, AssembleContact(f, f->fe->contact_changed));
+  f->contact_cpu += HycoCPU();
   PetscCall(HycoSystemSetMatrices(f->system, f->K, f->Bt, f->B, PETSC_TRUE));
   PetscCall(HycoSystemSetVectors(f->system, f->F, f->D));
   f->fe->ready = PETSC_TRUE;
@@ -578,13 +605,19 @@ static PetscErrorCode LargestPart(HycoFOM f, PetscInt largest[3])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The ranks' shares of the searches for masters so far. Collective. */
-static PetscErrorCode ViewSearch(HycoFOM f, PetscViewer viewer)
+/* The ranks' shares of the searches for masters so far, and the time of all that contacts need before a solve. */
+static PetscErrorCode ViewContacts(HycoFOM f, PetscViewer viewer)
 {
-  PetscInt64 most = f->team.queries, all = f->team.queries;
-  PetscInt patches[2] = {f->team.patches, f->team.whole};
+  PetscInt64 most = f->pairs.queries, all = f->pairs.queries;
+  PetscInt patches[2] = {f->patches[0], f->patches[1]};
+  PetscReal cpu = f->contact_cpu, sum = cpu;
 
   PetscFunctionBegin;
+  HycoAllreduce(&cpu, 1, MPIU_REAL, MPI_MAX, HycoComm(f));
+  HycoAllreduce(&sum, 1, MPIU_REAL, MPI_SUM, HycoComm(f));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "contacts: %.4g s of CPU on a rank at most, %.4g s on all\n", (double)cpu,
+                                   (double)sum));
+  if (f->size == 1) PetscFunctionReturn(PETSC_SUCCESS);
   HycoAllreduce(&most, 1, MPIU_INT64, MPI_MAX, HycoComm(f));
   HycoAllreduce(&all, 1, MPIU_INT64, MPI_SUM, HycoComm(f));
   HycoAllreduce(patches, 2, MPIU_INT, MPI_MAX, HycoComm(f));
@@ -598,20 +631,17 @@ static PetscErrorCode ViewSearch(HycoFOM f, PetscViewer viewer)
 PetscErrorCode HycoFOMView(HycoFOM f, PetscViewer viewer)
 {
   PetscInt largest[3] = {0, 0, 0};
-  PetscBool ascii;
 
   PetscFunctionBegin;
-  HycoCheckHandle(f, HYCO_FOM_CLASSID);
-  PetscCall(HycoViewBegin((PetscObject)f, &viewer, &ascii));
-  if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoViewBegin(f, HYCO_FOM_CLASSID, viewer);
   PetscCall(PetscViewerASCIIPrintf(viewer, "%d nodes, %d cells, %d contacts, on %d ranks\n", (int)f->n_nodes,
                                    (int)f->n_cells, (int)f->n_contacts, (int)f->size));
   if (f->size > 1) {
     PetscCall(LargestPart(f, largest));
     PetscCall(PetscViewerASCIIPrintf(viewer, "a rank: at most %d unknowns of its own, %d of %d others\n",
                                      (int)largest[0], (int)largest[1], (int)largest[2]));
-    PetscCall(ViewSearch(f, viewer));
   }
+  if (f->n_contacts) PetscCall(ViewContacts(f, viewer));
   PetscCall(HycoSystemView(f->system, viewer));
   PetscCall(HycoSolverView(f->solver, viewer));
   PetscCall(PetscViewerASCIIPopTab(viewer));

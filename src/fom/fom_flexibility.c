@@ -4,7 +4,7 @@
 PetscErrorCode HycoFOMFlexibility(HycoFOM f, const PetscReal mu[], PetscReal G[])
 {
   const PetscReal *S;
-  PetscInt m;
+  PetscInt m, *number = NULL, *row;
   size_t at = 0;
 
   PetscFunctionBegin;
@@ -13,9 +13,14 @@ PetscErrorCode HycoFOMFlexibility(HycoFOM f, const PetscReal mu[], PetscReal G[]
   PetscCall(HycoSolverSetForm(f->solver, HYCO_FORM_DUAL));
   PetscCall(HycoFOMSolve(f, f->scene->n_parameters, mu));
   PetscCall(HycoSolverGetFlexibility(f->solver, &m, &S));
+  if (f->size > 1) PetscCall(HycoFOMGetNumbers(f, &number));
+  PetscCall(PetscMalloc1(m, &row));
+  for (PetscInt k = 0; k < m && f->rank == 0; k++) row[number ? number[k] : k] = k;
   for (PetscInt j = 0; j < m && f->rank == 0; j++) {
-    PetscCall(PetscArraycpy(G + at, S + (size_t)j * (size_t)(m + 1), m - j));
-    at += (size_t)(m - j);
+    for (PetscInt i = j; i < m; i++)
+      G[at++] = S[(size_t)PetscMin(row[i], row[j]) * (size_t)m + (size_t)PetscMax(row[i], row[j])];
   }
+  PetscCall(PetscFree(number));
+  PetscCall(PetscFree(row));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -12,10 +12,11 @@ typedef struct {
 } Rows;
 
 /* Marks contacts whose gap is closed, and that have an unknown. */
-static void MarkClosed(HycoFOM f, const Rows *r, PetscBool in[])
+static PetscErrorCode MarkClosed(HycoFOM f, const Rows *r, PetscBool in[])
 {
   PetscReal scale = 0;
 
+  PetscFunctionBegin;
   for (PetscInt pass = 0; pass < 2; pass++) {
     for (PetscInt k = 0; k < r->m; k++) {
       PetscReal left = r->gap[k], size = PetscAbsReal(r->gap[k]);
@@ -27,20 +28,39 @@ static void MarkClosed(HycoFOM f, const Rows *r, PetscBool in[])
       scale = PetscMax(scale, size);
       in[k] = (PetscBool)(r->start[k + 1] > r->start[k] && (f->lambda[k] > 0 || left <= 1e-9 * scale));
     }
+    if (!pass) HycoAllreduce(&scale, 1, MPIU_REAL, MPI_MAX, HycoComm(f));
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Removes repeatedly the rows with an unknown that occurs in no other row: they are independent. */
-static PetscErrorCode Peel(const Rows *r, PetscInt n_dof, PetscBool in[])
+/* In how many of all ranks' rows each unknown of the surface occurs. Collective. */
+static PetscErrorCode CountRows(HycoFOM f, const Rows *r, const PetscBool in[], PetscReal count[])
 {
-  PetscInt *count;
-  PetscBool change = PETSC_TRUE;
+  const PetscInt n_dof = f->fe_surface->n_dof;
+  Vec all, mine;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc1(n_dof, &count));
+  PetscCall(PetscArrayzero(count, n_dof));
   for (PetscInt k = 0; k < r->m; k++) {
     for (PetscInt j = r->start[k]; in[k] && j < r->start[k + 1]; j++) count[r->dof[j]]++;
   }
+  if (!f->to_surface) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecDuplicate(f->U, &all));
+  PetscCall(VecSet(all, 0));
+  PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, n_dof, count, &mine));
+  PetscCall(VecScatterBegin(f->to_surface, mine, all, ADD_VALUES, SCATTER_REVERSE));
+  PetscCall(VecScatterEnd(f->to_surface, mine, all, ADD_VALUES, SCATTER_REVERSE));
+  PetscCall(VecDestroy(&mine));
+  PetscCall(HycoFOMToSurface(f, all, count));
+  PetscCall(VecDestroy(&all));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Removes this rank's rows with an unknown that occurs in no other row, until there are none. */
+static PetscBool PeelOwn(const Rows *r, PetscReal count[], PetscBool in[])
+{
+  PetscBool change = PETSC_TRUE, any = PETSC_FALSE;
+
   while (change) {
     change = PETSC_FALSE;
     for (PetscInt k = 0; k < r->m; k++) {
@@ -52,62 +72,130 @@ static PetscErrorCode Peel(const Rows *r, PetscInt n_dof, PetscBool in[])
       if (!own) continue;
       for (PetscInt j = r->start[k]; j < r->start[k + 1]; j++) count[r->dof[j]]--;
       in[k] = PETSC_FALSE;
-      change = PETSC_TRUE;
+      change = any = PETSC_TRUE;
     }
+  }
+  return any;
+}
+
+/* Removes repeatedly the rows with an unknown that occurs in no other row: they are independent. */
+static PetscErrorCode Peel(HycoFOM f, const Rows *r, PetscBool in[])
+{
+  PetscReal *count;
+  PetscBool change = PETSC_TRUE;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(f->fe_surface->n_dof, &count));
+  while (change) {
+    PetscCall(CountRows(f, r, in, count));
+    change = PeelOwn(r, count, in);
+    HycoAllreduce(&change, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(f));
   }
   PetscCall(PetscFree(count));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* n minus the rank of the remaining rows. */
-static PetscErrorCode Dependent(const Rows *r, PetscInt n_dof, PetscInt n, const PetscBool in[], PetscInt *dependent)
+/* The remaining rows of all ranks, with unknowns by their numbers in the distributed vectors, on rank 0. Collective; the
+   caller frees them. */
+static PetscErrorCode GatherRest(HycoFOM f, const Rows *r, const PetscBool in[], Rows *rest)
 {
-  PetscReal *G, *full;
-  PetscInt *row, rank, i = 0;
+  const PetscInt dim = f->fe->dim, *global = f->surface->node_global;
+  PetscInt n = 0, *end, *dof, n_values, m = 0;
+  PetscReal *value;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc1(n_dof, &full));
-  PetscCall(PetscMalloc2((size_t)n * (size_t)n, &G, n, &row));
+  PetscCall(PetscMalloc3(r->m, &end, r->start[r->m], &dof, r->start[r->m], &value));
   for (PetscInt k = 0; k < r->m; k++) {
-    if (in[k]) row[i++] = k;
+    if (in[k]) end[m++] = r->start[k + 1] - r->start[k];
+    for (PetscInt j = r->start[k]; in[k] && j < r->start[k + 1]; j++, n++) {
+      dof[n] = global ? global[r->dof[j] / dim] * dim + r->dof[j] % dim : r->dof[j];
+      value[n] = r->value[j];
+    }
   }
+  PetscCall(HycoConcatenate(HycoComm(f), n, dof, MPIU_INT, sizeof(PetscInt), &n_values, &rest->dof));
+  PetscCall(HycoConcatenate(HycoComm(f), n, value, MPIU_REAL, sizeof(PetscReal), &n_values, &rest->value));
+  PetscCall(HycoConcatenate(HycoComm(f), m, end, MPIU_INT, sizeof(PetscInt), &rest->m, &rest->start));
+  PetscCall(PetscFree3(end, dof, value));
+  for (PetscInt k = 0, next = 0; k <= rest->m && rest->start; k++) { /* from lengths to starts */
+    const PetscInt here = next;
+
+    next += k < rest->m ? rest->start[k] : 0;
+    rest->start[k] = here;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The number of rows minus their rank; the unknowns are numbered anew, those that occur. Rank 0. */
+static PetscErrorCode Dependent(const Rows *r, PetscInt *dependent)
+{
+  const PetscInt n = r->m, n_values = r->start[n];
+  PetscReal *G, *full;
+  PetscInt *dof, *at, n_dof = n_values, rank;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(n_values, &dof, n_values, &at));
+  PetscCall(PetscArraycpy(dof, r->dof, n_values));
+  PetscCall(HycoSortUnique(&n_dof, dof));
+  for (PetscInt j = 0; j < n_values; j++) PetscCall(PetscFindInt(r->dof[j], n_dof, dof, &at[j]));
+  PetscCall(PetscCalloc1(n_dof, &full));
+  PetscCall(PetscMalloc1((size_t)n * (size_t)n, &G));
   for (PetscInt a = 0; a < n; a++) {
-    for (PetscInt j = r->start[row[a]]; j < r->start[row[a] + 1]; j++) full[r->dof[j]] = r->value[j];
+    for (PetscInt j = r->start[a]; j < r->start[a + 1]; j++) full[at[j]] = r->value[j];
     for (PetscInt b = 0; b < n; b++) {
       PetscReal sum = 0;
 
-      for (PetscInt j = r->start[row[b]]; j < r->start[row[b] + 1]; j++) sum += r->value[j] * full[r->dof[j]];
+      for (PetscInt j = r->start[b]; j < r->start[b + 1]; j++) sum += r->value[j] * full[at[j]];
       G[(size_t)a * (size_t)n + (size_t)b] = sum;
     }
-    for (PetscInt j = r->start[row[a]]; j < r->start[row[a] + 1]; j++) full[r->dof[j]] = 0;
+    for (PetscInt j = r->start[a]; j < r->start[a + 1]; j++) full[at[j]] = 0;
   }
   PetscCall(HycoGramRank(n, G, &rank));
   *dependent = n - rank;
+  PetscCall(PetscFree2(dof, at));
   PetscCall(PetscFree(full));
-  PetscCall(PetscFree2(G, row));
+  PetscCall(PetscFree(G));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The same for the rows that are marked, on all ranks. */
+static PetscErrorCode CountRest(HycoFOM f, const Rows *r, const PetscBool in[], PetscInt *dependent)
+{
+  Rows rest = {0, NULL, NULL, NULL, NULL};
+  PetscBool pressed = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  *dependent = 0;
+  for (PetscInt k = 0; k < r->m; k++) pressed = (PetscBool)(pressed || (in[k] && f->lambda[k] > 0));
+  HycoAllreduce(&pressed, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(f));
+  if (!pressed) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(GatherRest(f, r, in, &rest));
+  HycoOnRoot(HycoComm(f), Dependent(&rest, dependent));
+  HycoFreeAll(&rest.start, &rest.dof, &rest.value);
+  HycoBcast(dependent, 1, MPIU_INT, HycoComm(f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Count(HycoFOM f, Rows *r, PetscBool in[], PetscInt *dependent)
+{
+  PetscFunctionBegin;
+  HycoOnEach(HycoComm(f), HycoContactRows(f->fe_surface, &f->pairs, r->start, r->dof, r->value, r->gap));
+  PetscCall(MarkClosed(f, r, in));
+  PetscCall(Peel(f, r, in));
+  PetscCall(CountRest(f, r, in, dependent));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoFOMCountDependent(HycoFOM f, PetscInt *dependent)
 {
-  const PetscInt m = f->pairs.n, n_dof = f->fe_surface->n_dof;
+  const PetscInt m = f->pairs.n;
   const size_t entries = (size_t)HycoPairsWidth(&f->pairs) * (size_t)f->fe->dim * (size_t)m;
   Rows r = {m, NULL, NULL, NULL, NULL};
-  PetscBool *in, pressed = PETSC_FALSE;
-  PetscInt n = 0;
+  PetscBool *in;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  *dependent = 0;
   PetscCall(PetscMalloc5(m + 1, &r.start, entries, &r.dof, entries, &r.value, m, &r.gap, m, &in));
-  ierr = HycoContactRows(f->fe_surface, &f->pairs, r.start, r.dof, r.value, r.gap);
-  if (!ierr) MarkClosed(f, &r, in);
-  if (!ierr) ierr = Peel(&r, n_dof, in);
-  for (PetscInt k = 0; k < m && !ierr; k++) {
-    n += in[k];
-    pressed = (PetscBool)(pressed || (in[k] && f->lambda[k] > 0));
-  }
-  if (pressed) ierr = Dependent(&r, n_dof, n, in, dependent);
+  ierr = Count(f, &r, in, dependent);
   PetscCall(PetscFree5(r.start, r.dof, r.value, r.gap, in));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -9,7 +9,7 @@
 #include <hycofields.h>
 #include <hycopath.h>
 
-/* -B^T L at all unknowns of the part, fixed ones too, from the contacts of rank 0. Collective. */
+/* -B^T L at all unknowns of the part, fixed ones too, from the contacts of all ranks. Collective. */
 static PetscErrorCode ContactForces(HycoFOM f, PetscReal force[])
 {
   const PetscInt dim = f->fe->dim;
@@ -26,7 +26,7 @@ static PetscErrorCode ContactForces(HycoFOM f, PetscReal force[])
   PetscCall(VecSet(all, 0));
   at = f->to_surface ? f->U_surface : all;
   PetscCall(VecGetArray(at, &v));
-  for (PetscInt k = 0; f->rank == 0 && k < f->fe_surface->n_dof; k++) v[k] = c.force[3 * (k / dim) + k % dim];
+  for (PetscInt k = 0; k < f->fe_surface->n_dof; k++) v[k] = c.force[3 * (k / dim) + k % dim];
   PetscCall(VecRestoreArray(at, &v));
   PetscCall(HycoContactFieldsDestroy(&c));
   if (f->to_surface) {

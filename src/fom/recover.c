@@ -22,20 +22,6 @@ static PetscErrorCode SetUp(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets Lambda from rank 0, in the file's order. */
-static PetscErrorCode PutForces(HycoFOM f, const PetscReal Lambda[])
-{
-  PetscScalar *root;
-
-  PetscFunctionBegin;
-  PetscCall(VecGetArray(f->lambda_root, &root));
-  if (f->rank == 0) PetscCall(PetscArraycpy(root, Lambda, f->n_contacts));
-  PetscCall(VecRestoreArray(f->lambda_root, &root));
-  PetscCall(VecScatterBegin(f->lambda_to_root, f->lambda_root, f->Lambda, INSERT_VALUES, SCATTER_REVERSE));
-  PetscCall(VecScatterEnd(f->lambda_to_root, f->lambda_root, f->Lambda, INSERT_VALUES, SCATTER_REVERSE));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* K U = given_F */
 static PetscErrorCode SolveGiven(HycoFOM f)
 {
@@ -61,7 +47,7 @@ PetscErrorCode HycoFOMSolveForces(HycoFOM f, PetscInt n, const PetscReal mu[], c
   PetscCall(HycoFOMAssemble(f, mu));
   PetscCall(VecCopy(f->F, f->given_F));
   if (f->n_contacts) {
-    PetscCall(PutForces(f, Lambda));
+    PetscCall(HycoFOMSetLambda(f, Lambda));
     PetscCall(MatMult(f->Bt, f->Lambda, f->given_F));
     PetscCall(VecAYPX(f->given_F, -1, f->F));
   }
@@ -86,7 +72,7 @@ static PetscErrorCode RespondBlock(HycoFOM f, PetscInt n, const PetscReal P[], P
   for (PetscInt j = 0; j < n; j++) {
     PetscCall(VecDuplicate(f->U, &r[j]));
     PetscCall(VecDuplicate(f->U, &x[j]));
-    PetscCall(PutForces(f, P + (f->rank ? 0 : j * f->n_contacts)));
+    PetscCall(HycoFOMSetLambda(f, P + (f->rank ? 0 : j * f->n_contacts)));
     PetscCall(MatMult(f->Bt, f->Lambda, r[j]));
   }
   PetscCall(HycoSolverApplyInverse(f->given_solver, n, r, x));

@@ -32,13 +32,12 @@ PetscErrorCode HycoFOMMotionVectors(HycoFOM f, const HycoMotions *motions, Vec *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Their values at the contacts' nodes, on rank 0 (n x n_dof of fe_surface). */
+/* Their values at the nodes of this rank's contacts (n x n_dof of fe_surface). */
 static PetscErrorCode ToSurface(HycoFOM f, PetscInt n, const Vec v[], PetscReal **values)
 {
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(f->fe_surface ? n * f->fe_surface->n_dof : 0, values));
-  for (PetscInt k = 0; k < n; k++)
-    PetscCall(HycoFOMToSurface(f, v[k], *values + (f->fe_surface ? k * f->fe_surface->n_dof : 0)));
+  PetscCall(PetscMalloc1(n * f->fe_surface->n_dof, values));
+  for (PetscInt k = 0; k < n; k++) PetscCall(HycoFOMToSurface(f, v[k], *values + k * f->fe_surface->n_dof));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -92,38 +91,38 @@ typedef struct {
   PetscReal *all, *alike;
 } Unconstrained;
 
-/* Finds them (rank 0), and refuses them unless they are to be released. */
-static PetscErrorCode FindUnconstrained(HycoFOM f, const HycoMotions *free, Unconstrained *z)
+/* Names them, and refuses them unless they are to be released. Rank 0, whose sums decide. */
+static PetscErrorCode NameUnconstrained(HycoFOM f, const HycoMotions *free, const Unconstrained *z)
 {
   char list[HYCO_LINE / 2];
 
   PetscFunctionBegin;
-  PetscCall(HycoFEFindUnconstrained(f->fe_surface, &f->pairs, free, &z->n, &z->all, &z->n_alike, &z->alike));
   Names(f, free, z->n, z->all, "; nor ", sizeof(list), list);
   Names(f, free, z->n, z->all, "; ", sizeof(f->summary.regularised), f->summary.regularised);
   HycoCheck(!z->n || f->regularise,
             "no support%s keeps %s; fix a component on one of its groups, or -hyco_regularise solves without %s",
-            f->pairs.n ? " and no contact" : "", list, z->n > 1 ? "these motions" : "that motion");
+            f->n_contacts ? " and no contact" : "", list, z->n > 1 ? "these motions" : "that motion");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same from rank 0 to all. */
-static PetscErrorCode BroadcastUnconstrained(HycoFOM f, const HycoMotions *free, Unconstrained *z)
+/* Finds the combinations that no contact prevents. The normals of the smooth surface need the facets around the
+   neighbours of each contact's nodes too. */
+static PetscErrorCode FindUnconstrained(HycoFOM f, const HycoMotions *free, Unconstrained *z)
 {
-  const PetscInt k = free->n;
-  PetscInt n[2];
+  HycoFE wide = f->fe_surface;
+  HycoMesh mesh = NULL;
+  PetscInt *index = NULL;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  HycoOnRoot(HycoComm(f), FindUnconstrained(f, free, z));
-  n[0] = z->n;
-  n[1] = z->n_alike;
-  PetscCallMPI(MPI_Bcast(n, 2, MPIU_INT, 0, HycoComm(f)));
-  z->n = n[0];
-  z->n_alike = n[1];
-  if (f->rank) PetscCall(PetscMalloc1(z->n * k, &z->all));
-  if (f->rank) PetscCall(PetscMalloc1(z->n_alike * k, &z->alike));
-  PetscCallMPI(MPI_Bcast(z->all, (PetscMPIInt)(z->n * k), MPIU_REAL, 0, HycoComm(f)));
-  PetscCallMPI(MPI_Bcast(z->alike, (PetscMPIInt)(z->n_alike * k), MPIU_REAL, 0, HycoComm(f)));
+  if (f->size > 1) PetscCall(HycoFOMWiden(f, &mesh, &wide, &index));
+  ierr = HycoFEFindUnconstrained(HycoComm(f), f->fe_surface, wide, index, &f->pairs, free, &z->n, &z->all, &z->n_alike,
+                                 &z->alike);
+  if (f->size > 1) PetscCall(HycoFEDestroy(&wide));
+  PetscCall(HycoMeshDestroy(&mesh));
+  PetscCall(PetscFree(index));
+  PetscCall(ierr);
+  HycoOnRoot(HycoComm(f), NameUnconstrained(f, free, z));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -139,7 +138,7 @@ static PetscErrorCode FindReleased(HycoFOM f, const HycoMotions *free)
   PetscFunctionBegin;
   PetscCall(HycoFOMMotionVectors(f, free, &motion));
   PetscCall(ToSurface(f, free->n, motion, &at_surface.motion));
-  ierr = BroadcastUnconstrained(f, &at_surface, &z);
+  ierr = FindUnconstrained(f, &at_surface, &z);
   if (!ierr) PetscCall(PetscMalloc1(z.n + z.n_alike, &f->released));
   for (PetscInt k = 0; !ierr && k < z.n_alike && z.n; k++)
     PetscCall(AddReleased(f, free->n, motion, z.alike + k * free->n));
@@ -159,23 +158,20 @@ static PetscErrorCode ReleasedRows(HycoFOM f, PetscReal row[])
   const PetscInt n = f->n_released, n_own = f->part->n_owned * f->fe->dim;
   PetscScalar *mark;
   const PetscScalar *v;
+  PetscBool *node;
   Vec contact;
 
   PetscFunctionBegin;
   PetscCall(VecDuplicate(f->U, &contact));
   PetscCall(VecSet(contact, 0));
-  if (f->rank == 0) {
-    PetscBool *node;
+  PetscCall(PetscCalloc1(f->surface->n_nodes, &node));
+  HycoPairsMark(&f->pairs, node);
+  for (PetscInt i = 0; i < f->surface->n_nodes; i++) {
+    const PetscInt at = f->surface->node_global ? f->surface->node_global[i] : i;
 
-    PetscCall(PetscCalloc1(f->surface->n_nodes, &node));
-    HycoPairsMark(&f->pairs, node);
-    for (PetscInt i = 0; i < f->surface->n_nodes; i++) {
-      const PetscInt at = f->surface->node_global ? f->surface->node_global[i] : i;
-
-      if (node[i]) PetscCall(VecSetValue(contact, at * f->fe->dim, 1, INSERT_VALUES));
-    }
-    PetscCall(PetscFree(node));
+    if (node[i]) PetscCall(VecSetValue(contact, at * f->fe->dim, 1, INSERT_VALUES));
   }
+  PetscCall(PetscFree(node));
   PetscCall(VecAssemblyBegin(contact));
   PetscCall(VecAssemblyEnd(contact));
   PetscCall(VecGetArray(contact, &mark));
@@ -261,10 +257,8 @@ static PetscErrorCode SetPins(HycoFOM f, PetscInt n)
 
   PetscFunctionBegin;
   if (n || f->fe->n_pins) PetscCall(HycoFESetPins(f->fe, n, f->pin_tag, f->pin_component));
-  if (fe && fe != f->fe) PetscCall(HycoFESetPins(fe, n, f->pin_tag, f->pin_component));
+  if (fe != f->fe) PetscCall(HycoFESetPins(fe, n, f->pin_tag, f->pin_component));
   PetscCall(ToSurface(f, n ? f->n_turned : 0, f->released, &released));
-  if (!fe) PetscCall(PetscFree(released));
-  if (!fe) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree(fe->released));
   fe->released = released;
   fe->n_turned = n ? f->n_turned : 0;

@@ -14,25 +14,17 @@ struct _n_HycoSeries {
   HycoH5 part; /* file of this time beside the checkpoint; NULL: none */
 };
 
-/* Writes a field of this time; missing: value at nodes off its surface. */
-static PetscErrorCode AddPartial(HycoSeries s, const char name[], HycoPlace place, PetscInt components,
-                                 const PetscReal value[], PetscReal missing)
+/* Writes a field of this time. */
+static PetscErrorCode AddField(HycoSeries s, const char name[], HycoPlace place, PetscInt components,
+                               const PetscReal value[])
 {
-  const HycoField field = {name, place, components, value, missing};
+  const HycoField field = {name, place, components, value};
   char set[HYCO_LINE];
 
   PetscFunctionBegin;
   PetscCall(HycoFieldFileAdd(s->file, &field));
   HycoFieldName(&field, s->file->n, set);
   if (s->part) PetscCall(HycoFieldWriteData(s->part, s->from.rows, HycoFieldFileCount(s->file, place), set, &field));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode AddField(HycoSeries s, const char name[], HycoPlace place, PetscInt components,
-                               const PetscReal value[])
-{
-  PetscFunctionBegin;
-  PetscCall(AddPartial(s, name, place, components, value, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -92,9 +84,10 @@ static PetscErrorCode AddContacts(HycoSeries s)
   PetscFunctionBegin;
   if (!f->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
   ierr = HycoContactFieldsCreate(f->comm, f->fe_surface, f->pairs, f->u_surface, f->lambda, &c);
-  if (!ierr) ierr = AddField(s, "contact_force", HYCO_ON_SURFACE, 3, c.force);
-  if (!ierr) ierr = AddField(s, "contact_pressure", HYCO_ON_SURFACE, 1, c.pressure);
-  if (!ierr) ierr = AddPartial(s, "gap", HYCO_ON_SURFACE, 1, c.gap_node, NAN);
+  if (!ierr) ierr = HycoContactFieldsToPart(f->comm, f->fe, f->fe_surface->mesh, &c);
+  if (!ierr) ierr = AddField(s, "contact_force", HYCO_ON_NODES, 3, c.force);
+  if (!ierr) ierr = AddField(s, "contact_pressure", HYCO_ON_NODES, 1, c.pressure);
+  if (!ierr) ierr = AddField(s, "gap", HYCO_ON_NODES, 1, c.gap_node);
   PetscCall(HycoContactFieldsDestroy(&c));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -203,7 +196,7 @@ static PetscErrorCode ReadField(HycoFOM f, HycoH5 h, const HycoFileOrder *order,
 
 static PetscErrorCode CopyField(HycoFOM f, HycoSeries s, HycoH5 h, const char name[], PetscInt k)
 {
-  HycoField field = {name, HYCO_ON_NODES, 0, NULL, 0};
+  HycoField field = {name, HYCO_ON_NODES, 0, NULL};
   const HycoFileOrder *order;
   PetscReal *rows = NULL;
   PetscInt n_rows;

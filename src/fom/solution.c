@@ -26,7 +26,7 @@ PetscErrorCode HycoFOMToSurface(HycoFOM f, Vec v, PetscReal value[])
     PetscCall(VecScatterEnd(f->to_surface, v, at, INSERT_VALUES, SCATTER_FORWARD));
   }
   PetscCall(VecGetArrayRead(at, &from));
-  if (f->rank == 0) PetscCall(PetscArraycpy(value, from, f->fe_surface->n_dof));
+  PetscCall(PetscArraycpy(value, from, f->fe_surface->n_dof));
   PetscCall(VecRestoreArrayRead(at, &from));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -51,36 +51,99 @@ PetscErrorCode HycoFOMGather(HycoFOM f)
   PetscCall(HycoFOMToLocal(f, shown, f->u));
   HycoFEComplete(f->fe, f->u);
   if (f->to_surface) PetscCall(HycoFOMToSurface(f, shown, f->u_surface));
-  if (f->to_surface && f->rank == 0) HycoFEComplete(f->fe_surface, f->u_surface);
+  if (f->to_surface) HycoFEComplete(f->fe_surface, f->u_surface);
   if (f->n_turned) PetscCall(VecDestroy(&shown));
   if (!f->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecScatterBegin(f->lambda_to_root, f->Lambda, f->lambda_root, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecScatterEnd(f->lambda_to_root, f->Lambda, f->lambda_root, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecGetArrayRead(f->lambda_root, &v));
-  if (f->rank == 0) PetscCall(PetscArraycpy(f->lambda, v, f->n_contacts));
-  PetscCall(VecRestoreArrayRead(f->lambda_root, &v));
+  PetscCall(VecGetArrayRead(f->Lambda, &v));
+  PetscCall(PetscArraycpy(f->lambda, v, f->pairs.n));
+  PetscCall(VecRestoreArrayRead(f->Lambda, &v));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On rank 0. */
+PetscErrorCode HycoFOMGetNumbers(HycoFOM f, PetscInt **number)
+{
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCall(HycoConcatenate(HycoComm(f), f->pairs.n, f->pairs.number, MPIU_INT, sizeof(PetscInt), &n, number));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMGetLambda(HycoFOM f, const PetscReal *lambda[])
+{
+  PetscInt n, *number;
+  const PetscScalar *mine;
+  PetscReal *all;
+
+  PetscFunctionBegin;
+  *lambda = f->lambda;
+  if (f->size == 1 || !f->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoFOMGetNumbers(f, &number));
+  PetscCall(VecGetArrayRead(f->Lambda, &mine));
+  PetscCall(HycoConcatenate(HycoComm(f), f->pairs.n, mine, MPIU_REAL, sizeof(PetscReal), &n, &all));
+  PetscCall(VecRestoreArrayRead(f->Lambda, &mine));
+  if (f->rank == 0 && !f->lambda_all) PetscCall(PetscMalloc1(f->n_contacts, &f->lambda_all));
+  for (PetscInt k = 0; k < n; k++) f->lambda_all[number[k]] = all[k];
+  HycoFreeAll(&number, &all);
+  *lambda = f->lambda_all;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMSetLambda(HycoFOM f, const PetscReal lambda[])
+{
+  PetscInt *number = NULL;
+
+  PetscFunctionBegin;
+  if (!f->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
+  if (f->size > 1) PetscCall(HycoFOMGetNumbers(f, &number));
+  for (PetscInt k = 0; f->rank == 0 && k < f->n_contacts; k++)
+    PetscCall(VecSetValue(f->Lambda, k, lambda[number ? number[k] : k], INSERT_VALUES));
+  PetscCall(VecAssemblyBegin(f->Lambda));
+  PetscCall(VecAssemblyEnd(f->Lambda));
+  PetscCall(PetscFree(number));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMWriteForces(HycoFOM f, HycoH5 h, const char name[])
+{
+  const PetscScalar *lambda = NULL;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  if (f->n_contacts) PetscCall(VecGetArrayRead(f->Lambda, &lambda));
+  ierr = HycoContactsWrite(HycoComm(f), h, name, &f->pairs, f->n_contacts, MPIU_REAL, lambda);
+  if (f->n_contacts) PetscCall(VecRestoreArrayRead(f->Lambda, &lambda));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode MeasureContacts(HycoFOM f, HycoSummary *s)
 {
+  PetscReal sum[2] = {0, 0}, most[3] = {0, 0, 0};
+  PetscInt n[2] = {0, 0};
   HycoContactState state;
 
   PetscFunctionBegin;
-  PetscCall(HycoContactMeasure(f->fe_surface, &f->pairs, f->u_surface, f->lambda, NULL, &state));
-  s->n_facing = state.n_facing;
-  s->overlap = state.overlap;
-  s->sliding = state.sliding;
-  s->n_active = 0;
-  s->total_contact_force = s->lambda_max = s->lambda_norm2 = 0;
-  for (PetscInt k = 0; k < f->n_contacts; k++) {
-    s->n_active += f->lambda[k] > 0;
-    s->total_contact_force += f->lambda[k];
-    s->lambda_max = PetscMax(s->lambda_max, f->lambda[k]);
-    s->lambda_norm2 += f->lambda[k] * f->lambda[k];
+  HycoOnEach(HycoComm(f), HycoContactMeasure(f->fe_surface, &f->pairs, f->u_surface, f->lambda, NULL, &state));
+  n[0] = state.n_facing;
+  most[0] = state.overlap;
+  most[1] = state.sliding;
+  for (PetscInt k = 0; k < f->pairs.n; k++) {
+    n[1] += f->lambda[k] > 0;
+    sum[0] += f->lambda[k];
+    most[2] = PetscMax(most[2], f->lambda[k]);
+    sum[1] += f->lambda[k] * f->lambda[k];
   }
-  s->lambda_norm2 = PetscSqrtReal(s->lambda_norm2);
+  HycoAllreduce(n, 2, MPIU_INT, MPI_SUM, HycoComm(f));
+  HycoAllreduce(sum, 2, MPIU_REAL, MPI_SUM, HycoComm(f));
+  HycoAllreduce(most, 3, MPIU_REAL, MPI_MAX, HycoComm(f));
+  s->n_facing = n[0];
+  s->n_active = n[1];
+  s->overlap = most[0];
+  s->sliding = most[1];
+  s->lambda_max = most[2];
+  s->total_contact_force = sum[0];
+  s->lambda_norm2 = PetscSqrtReal(sum[1]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -107,6 +170,27 @@ static PetscErrorCode MeasureDisplacements(HycoFOM f, HycoSummary *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Of all ranks. */
+static PetscErrorCode SumResult(HycoFOM f, HycoContactResult *r)
+{
+  PetscReal sum[7];
+  PetscInt n[2] = {r->n, r->n_active};
+
+  PetscFunctionBegin;
+  PetscCall(PetscArraycpy(sum, r->force, 3));
+  PetscCall(PetscArraycpy(sum + 3, r->moment, 3));
+  sum[6] = r->area;
+  HycoAllreduce(n, 2, MPIU_INT, MPI_SUM, HycoComm(f));
+  HycoAllreduce(sum, 7, MPIU_REAL, MPI_SUM, HycoComm(f));
+  HycoAllreduce(&r->pressure, 1, MPIU_REAL, MPI_MAX, HycoComm(f));
+  PetscCall(PetscArraycpy(r->force, sum, 3));
+  PetscCall(PetscArraycpy(r->moment, sum + 3, 3));
+  r->area = sum[6];
+  r->n = n[0];
+  r->n_active = n[1];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Collective. */
 static PetscErrorCode SumContacts(HycoFOM f)
 {
@@ -117,13 +201,11 @@ static PetscErrorCode SumContacts(HycoFOM f)
   PetscFunctionBegin;
   if (!f->contact_result) PetscCall(PetscMalloc1(n, &f->contact_result));
   ierr = HycoContactFieldsCreate(HycoComm(f), f->fe_surface, &f->pairs, f->u_surface, f->lambda, &c);
-  if (!ierr && f->rank == 0)
-    HycoContactResults(f->fe_surface, &f->pairs, c.normal, c.area, f->lambda, 0, f->contact_result);
+  if (!ierr)
+    HycoContactResults(f->fe_surface, &f->pairs, c.normal, c.area, f->lambda, c.pressure_of, 0, f->contact_result);
   PetscCall(HycoContactFieldsDestroy(&c));
   PetscCall(ierr);
-  PetscCallMPI(
-      MPI_Bcast(f->contact_result, (PetscMPIInt)((size_t)n * sizeof(*f->contact_result)), MPI_BYTE, 0, HycoComm(f)));
-  for (PetscInt k = 0; k < n; k++) f->contact_result[k].name = f->scene->contact[k]->name;
+  for (PetscInt k = 0; k < n; k++) PetscCall(SumResult(f, &f->contact_result[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -170,8 +252,11 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
   defect = f->path || f->given || s->energy_defect <= s->kkt.rounding ? 0 : s->energy_defect;
   PetscCall(HycoFOMJudge(f, f->u, f->n_contacts ? f->Lambda : NULL, defect, &s->reason, &s->u_relative, why));
   PetscCall(PetscStrncpy(s->why, why, sizeof(s->why)));
-  HycoOnRoot(HycoComm(f), MeasureContacts(f, s));
-  if (s->reason > 0 && f->n_contacts) HycoOnRoot(HycoComm(f), HycoFOMCountDependent(f, &s->n_dependent));
+  why[0] = '\0';
+  if (s->reason > 0 && !f->path && !f->given) PetscCall(HycoFOMNameLoose(f, why));
+  PetscCall(PetscStrncpy(s->loose, why, sizeof(s->loose)));
+  PetscCall(MeasureContacts(f, s));
+  if (s->reason > 0 && f->n_contacts) PetscCall(HycoFOMCountDependent(f, &s->n_dependent));
   PetscCall(HycoFOMMeasureQuantities(f, s->quantity));
   PetscCallMPI(MPI_Bcast(s, sizeof(*s), MPI_BYTE, 0, HycoComm(f)));
   *out = *s;
@@ -216,7 +301,7 @@ static PetscErrorCode BringTogether(HycoFOM f)
   if (f->size == 1 || f->all_ready) PetscFunctionReturn(PETSC_SUCCESS);
   if (f->rank == 0 && !f->u_all) PetscCall(PetscMalloc1(f->n_nodes * f->fe->dim, &f->u_all));
   if (f->rank == 0 && !f->sigma_all) PetscCall(PetscMalloc1(f->n_cells * f->fe->n_sigma, &f->sigma_all));
-  PetscCall(HycoFileOrderCreate(HycoComm(f), f->part, f->surface, PETSC_TRUE, &all));
+  PetscCall(HycoFileOrderCreate(HycoComm(f), f->part, PETSC_TRUE, &all));
   PetscCall(HycoFileOrderSend(all, HYCO_ON_NODES, MPIU_REAL, f->fe->dim, f->u, f->u_all));
   PetscCall(HycoFileOrderSend(all, HYCO_ON_CELLS, MPIU_REAL, f->fe->n_sigma, f->sigma, f->sigma_all));
   PetscCall(HycoFileOrderDestroy(&all));
@@ -227,6 +312,8 @@ static PetscErrorCode BringTogether(HycoFOM f)
 PetscErrorCode HycoFOMGetSolution(HycoFOM f, PetscInt *n_nodes, const PetscReal *U[], PetscInt *n_contacts,
                                   const PetscReal *Lambda[], PetscInt *n_cells, const PetscReal *sigma[])
 {
+  const PetscReal *lambda;
+
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
   PetscCheck(f->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoFOMSolve() before HycoFOMGetSolution()");
@@ -234,7 +321,8 @@ PetscErrorCode HycoFOMGetSolution(HycoFOM f, PetscInt *n_nodes, const PetscReal 
   if (n_nodes) *n_nodes = f->rank ? 0 : f->n_nodes;
   if (U) *U = f->size > 1 ? f->u_all : f->u;
   if (n_contacts) *n_contacts = f->rank ? 0 : f->n_contacts;
-  if (Lambda) *Lambda = f->lambda;
+  PetscCall(HycoFOMGetLambda(f, &lambda));
+  if (Lambda) *Lambda = f->rank ? NULL : lambda;
   if (n_cells) *n_cells = f->rank ? 0 : f->n_cells;
   if (sigma) *sigma = f->size > 1 ? f->sigma_all : f->sigma;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -260,7 +348,7 @@ PetscErrorCode HycoFOMGetForces(HycoFOM f, PetscReal forces[])
 PetscErrorCode HycoFOMGetRows(HycoFOM f, const HycoFileOrder **rows)
 {
   PetscFunctionBegin;
-  if (f->size > 1 && !f->rows) PetscCall(HycoFileOrderCreate(HycoComm(f), f->part, f->surface, PETSC_FALSE, &f->rows));
+  if (f->size > 1 && !f->rows) PetscCall(HycoFileOrderCreate(HycoComm(f), f->part, PETSC_FALSE, &f->rows));
   *rows = f->rows;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

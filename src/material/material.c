@@ -2,32 +2,14 @@
 #include <hycomaterialimpl.h>
 #include <hycoregistry.h>
 
-static PetscErrorCode AddOwn(void);
-static HycoRegistry laws = {.add_own = AddOwn, .sorted = PETSC_TRUE};
+static HycoRegistry laws = {.sorted = PETSC_TRUE};
 
-static PetscErrorCode AddOwn(void)
-{
-  PetscFunctionBegin;
-  PetscCall(HycoRegistryAdd(&laws, HYCO_MATERIAL_ELASTIC, HycoMaterialCreate_Elastic));
-  PetscCall(HycoRegistryAdd(&laws, HYCO_MATERIAL_J2, HycoMaterialCreate_J2));
-  PetscCall(HycoRegistryAdd(&laws, HYCO_MATERIAL_NORTON, HycoMaterialCreate_Norton));
-  PetscCall(HycoRegistryAdd(&laws, HYCO_MATERIAL_STRAIN_HARDENING, HycoMaterialCreate_StrainHardening));
-  PetscCall(HycoRegistryAdd(&laws, HYCO_MATERIAL_LIMBACK_ANDERSSON, HycoMaterialCreate_LimbackAndersson));
-  PetscCall(HycoRegistryAdd(&laws, HYCO_MATERIAL_MFRONT, HycoMaterialCreate_MFront));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoMaterialRegister(const char name[], PetscErrorCode (*create)(HycoMaterial))
-{
-  PetscFunctionBegin;
-  PetscCall(HycoRegistryAdd(&laws, name, create));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineRegister(HycoMaterialRegister, laws, PetscErrorCode (*create)(HycoMaterial))
 
 PetscErrorCode HycoMaterialCreate(MPI_Comm comm, HycoMaterial *material)
 {
   PetscFunctionBegin;
-  PetscCall(HycoInitializePackage());
+  PetscCall(HycoPackageCheck());
   PetscCall(PetscHeaderCreate(*material, HYCO_MATERIAL_CLASSID, "HycoMaterial", "Material law", "Hyco", comm,
                               HycoMaterialDestroy, HycoMaterialView));
   (*material)->linear = PETSC_TRUE;
@@ -37,9 +19,7 @@ PetscErrorCode HycoMaterialCreate(MPI_Comm comm, HycoMaterial *material)
 PetscErrorCode HycoMaterialDestroy(HycoMaterial *material)
 {
   PetscFunctionBegin;
-  if (!material || !*material) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheckHandle(*material, HYCO_MATERIAL_CLASSID);
-  HycoDereference(material);
+  HycoDestroyBegin(material, HYCO_MATERIAL_CLASSID);
   if ((*material)->ops->destroy) PetscCall((*(*material)->ops->destroy)(*material));
   PetscCall(HycoMaterialSetStateSize(*material, 0));
   PetscCall(HycoDeclaredDestroy(&(*material)->constants));
@@ -76,12 +56,8 @@ PetscErrorCode HycoMaterialGetType(HycoMaterial material, HycoMaterialType *type
 
 PetscErrorCode HycoMaterialView(HycoMaterial material, PetscViewer viewer)
 {
-  PetscBool ascii;
-
   PetscFunctionBegin;
-  HycoCheckHandle(material, HYCO_MATERIAL_CLASSID);
-  PetscCall(HycoViewBegin((PetscObject)material, &viewer, &ascii));
-  if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoViewBegin(material, HYCO_MATERIAL_CLASSID, viewer);
   PetscCall(HycoDeclaredView(&material->constants, viewer));
   PetscCall(PetscViewerASCIIPrintf(viewer, "%s, %d state variables\n", material->linear ? "linear" : "nonlinear",
                                    (int)material->n_state));

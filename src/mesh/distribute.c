@@ -36,6 +36,24 @@ static PetscErrorCode Replace(DM *dm, PetscSF sf, DM by)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Refuses a refined mesh of which a rank has no cell: PETSc's overlap of such a mesh reads memory that is not its own
+   (3.18). Collective. */
+static PetscErrorCode CheckParts(DM dm)
+{
+  PetscInt start, end, least, all;
+  PetscMPIInt size;
+
+  PetscFunctionBegin;
+  PetscCall(DMPlexGetHeightStratum(dm, 0, &start, &end));
+  least = all = end - start;
+  PetscCallMPI(MPI_Comm_size(HycoComm(dm), &size));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &least, 1, MPIU_INT, MPI_MIN, HycoComm(dm)));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &all, 1, MPIU_INT, MPI_SUM, HycoComm(dm)));
+  HycoCheck(least, "scene_refine: %d cells leave one of the %d ranks without any; use fewer ranks", (int)all,
+            (int)size);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, PetscInt n_pairs, const PetscInt pairs[],
                                   HycoPartitioner by, const char write[])
 {
@@ -55,6 +73,7 @@ PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, Petsc
     PetscCall(DMPlexDistribute(*dm, 0, &sf, &next));
     PetscCall(Replace(dm, sf, next));
   }
+  if (scene->refine) PetscCall(CheckParts(*dm));
   PetscCall(HycoPlexRefine(dm, scene, scene->refine));
   if (overlap) PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheck(!write[0] || !scene->n_ties, "hyco_mesh_write: a mesh with ties (%s) cannot be written as a DMPlex",

@@ -22,7 +22,7 @@ static PetscErrorCode CreateSF(HycoFileOrder *o, HycoPlace place, PetscInt n, co
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFileOrderCreate(MPI_Comm comm, HycoMesh m, HycoMesh surface, PetscBool root, HycoFileOrder **order)
+PetscErrorCode HycoFileOrderCreate(MPI_Comm comm, HycoMesh m, PetscBool root, HycoFileOrder **order)
 {
   PetscInt *leaf, *row;
   HycoFileOrder *o;
@@ -30,7 +30,7 @@ PetscErrorCode HycoFileOrderCreate(MPI_Comm comm, HycoMesh m, HycoMesh surface, 
   PetscFunctionBegin;
   PetscCall(PetscNew(&o));
   o->comm = comm;
-  o->all[HYCO_ON_NODES] = o->all[HYCO_ON_SURFACE] = m->n_whole_nodes;
+  o->all[HYCO_ON_NODES] = m->n_whole_nodes;
   o->all[HYCO_ON_CELLS] = m->n_whole_cells;
   PetscCall(PetscMalloc2(PetscMax(m->n_nodes, m->n_cells), &leaf, PetscMax(m->n_nodes, m->n_cells), &row));
   for (PetscInt on_cells = 0; on_cells < 2; on_cells++) {
@@ -44,8 +44,6 @@ PetscErrorCode HycoFileOrderCreate(MPI_Comm comm, HycoMesh m, HycoMesh surface, 
     }
     PetscCall(CreateSF(o, on_cells ? HYCO_ON_CELLS : HYCO_ON_NODES, n, leaf, row, root));
   }
-  PetscCall(
-      CreateSF(o, HYCO_ON_SURFACE, surface ? surface->n_nodes : 0, NULL, surface ? surface->node_whole : NULL, root));
   PetscCall(PetscFree2(leaf, row));
   *order = o;
   PetscFunctionReturn(PETSC_SUCCESS);

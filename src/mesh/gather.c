@@ -1,269 +1,323 @@
-/* Gathers a distributed mesh on rank 0: all of it, or the surfaces of some groups. */
-#include <hycomesh.h>
-#include <stdlib.h>
-#include <string.h>
+/*
+  Gathers chosen cells, facets and nodes of a distributed mesh on rank 0. Each rank cuts the DM of its share, whose points
+  migrate to rank 0 (DMPlexMigrate()); the submesh is made of them. A share has the cells of facets too, since a facet is
+  a label's value of its cell. To migrate from the whole DM would cost its size for every label.
+*/
+#include "plex.h"
 
-/* Rows of integers that one rank sends; on rank 0 all rows, sorted by their first entries. */
-typedef struct {
-  PetscInt width, n, room, n_all;
-  PetscInt *mine, *all;
-} Rows;
-
-static PetscErrorCode AddRow(Rows *r, const PetscInt row[])
-{
-  PetscFunctionBegin;
-  if (r->n == r->room) {
-    r->room = 2 * r->room + 64;
-    PetscCall(PetscRealloc((size_t)(r->room * r->width) * sizeof(PetscInt), &r->mine));
-  }
-  PetscCall(PetscArraycpy(r->mine + r->n++ * r->width, row, r->width));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static int CompareThree(const void *a, const void *b)
-{
-  const PetscInt *x = (const PetscInt *)a, *y = (const PetscInt *)b;
-
-  for (PetscInt k = 0; k < 3; k++) {
-    if (x[k] != y[k]) return x[k] < y[k] ? -1 : 1;
-  }
-  return 0;
-}
-
-static PetscErrorCode GatherRows(MPI_Comm comm, Rows *r)
-{
-  PetscFunctionBegin;
-  PetscCall(HycoConcatenate(comm, r->n * r->width, r->mine, MPIU_INT, sizeof(PetscInt), &r->n_all, &r->all));
-  PetscCall(PetscFree(r->mine));
-  r->n_all /= r->width;
-  if (r->n_all) qsort(r->all, (size_t)r->n_all, (size_t)r->width * sizeof(PetscInt), CompareThree);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+/* What a point has in the distributed mesh: whether it is chosen, or needed for another; its numbers. */
+enum { KIND, GLOBAL, WHOLE, NUMBER, N_COLUMNS };
+enum { NEEDED = 1, CHOSEN };
 
 typedef struct {
+  MPI_Comm comm;
+  PetscMPIInt rank;
+  HycoScene scene;
   HycoMesh part;
-  const PetscBool *in;   /* by group; NULL: all of the mesh */
-  const PetscBool *keep; /* by cell, in addition to the groups; NULL: none */
-  PetscBool *take;       /* by node of the part */
-  Rows node, cell, facet, member, region;
+  const PetscBool *in;     /* by group; NULL: all of the mesh */
+  const PetscBool *cell;   /* by cell, in addition to the groups; NULL: none */
+  PetscInt n, *kind;       /* points of the part's DM; of each what it is */
+  DM share, root;          /* this rank's; the gathered points, on rank 0 */
+  PetscInt *of[N_COLUMNS]; /* by point of root */
 } Gather;
 
-static PetscBool Owns(const Gather *g, PetscInt node)
+/* Combines the values of a point on all ranks that have it. */
+static PetscErrorCode Agree(const Gather *g, MPI_Op op, PetscInt value[])
 {
-  return (PetscBool)(HycoMeshOwned(g->part, node) >= 0);
+  PetscInt n_roots;
+  PetscSF sf;
+
+  PetscFunctionBegin;
+  PetscCall(DMGetPointSF(g->part->dm, &sf));
+  PetscCall(PetscSFGetGraph(sf, &n_roots, NULL, NULL, NULL));
+  if (n_roots < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscSFReduceBegin(sf, MPIU_INT, value, value, op));
+  PetscCall(PetscSFReduceEnd(sf, MPIU_INT, value, value, op));
+  PetscCall(PetscSFBcastBegin(sf, MPIU_INT, value, value, MPI_REPLACE));
+  PetscCall(PetscSFBcastEnd(sf, MPIU_INT, value, value, MPI_REPLACE));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscBool Keeps(const Gather *g, PetscInt cell)
-{
-  return (PetscBool)(!g->in || (g->keep && g->keep[cell]));
-}
-
-/* The row of a node: tag, 0, 0, body, numbers in the distributed vectors and in the whole mesh; of a cell, which
-   belongs to the rank of its first node: tag, 0, 0, body, number in the whole mesh, nodes' tags; of a facet: group,
-   tag of its cell, index among this rank's, nodes' tags. */
-static PetscErrorCode Pack(Gather *g)
+/* Finds what each point of the part is. */
+static PetscErrorCode Choose(Gather *g)
 {
   HycoMesh m = g->part;
-  PetscInt row[5 + HYCO_CELL_NODES] = {0};
+  PetscInt *kind, node[HYCO_MAX_CELL_NODES];
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(m->n_nodes, &g->take));
-  for (PetscInt i = 0; i < m->n_nodes; i++) g->take[i] = (PetscBool)!g->in;
+  PetscCall(DMPlexGetChart(m->dm, NULL, &g->n));
+  PetscCall(PetscCalloc1(g->n, &g->kind));
+  kind = g->kind;
+  for (PetscInt f = 0; f < m->n_facets; f++) {
+    if (g->in && g->in[m->facet_group[f]]) kind[m->cell_point[m->facet_cell[f]]] = NEEDED;
+  }
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    if (!g->in || (g->cell && g->cell[e])) kind[m->cell_point[e]] = CHOSEN;
+  }
   for (PetscInt k = 0; k < m->n_groups; k++) {
     for (PetscInt j = m->group_start[k]; g->in && g->in[k] && j < m->group_start[k + 1]; j++)
-      g->take[m->group_node[j]] = PETSC_TRUE;
+      kind[m->node_point[m->group_node[j]]] = CHOSEN;
   }
-  for (PetscInt e = 0; g->keep && e < m->n_cells; e++) {
-    PetscInt node[HYCO_MAX_CELL_NODES];
-    const PetscInt n = HycoMeshCellNodes(m, e, node);
+  PetscCall(Agree(g, MPI_MAX, kind));
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    const PetscInt n = HycoMeshCellNodes(m, e, node), of = kind[m->cell_point[e]];
 
-    for (PetscInt v = 0; v < n && g->keep[e]; v++) g->take[node[v]] = PETSC_TRUE;
+    for (PetscInt v = 0; v < n; v++) kind[m->node_point[node[v]]] = PetscMax(kind[m->node_point[node[v]]], of);
   }
-  for (PetscInt k = 0; k < m->n_tied; k++) { /* and the masters of tied nodes */
-    for (PetscInt j = m->tied_start[k]; j < m->tied_start[k + 1]; j++)
-      g->take[m->tied_master[j]] = (PetscBool)(g->take[m->tied_master[j]] || g->take[m->tied[k]]);
+  for (PetscInt k = 0; k < m->n_tied; k++) { /* the masters of tied nodes */
+    for (PetscInt j = m->tied_start[k]; j < m->tied_start[k + 1]; j++) {
+      PetscInt *master = &kind[m->node_point[m->tied_master[j]]];
+
+      *master = PetscMax(*master, kind[m->node_point[m->tied[k]]]);
+    }
+  }
+  PetscCall(Agree(g, MPI_MAX, kind));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Cuts this rank's share: the cells whose first node it owns, their nodes, and those that it owns. */
+static PetscErrorCode CutShare(Gather *g)
+{
+  HycoMesh m = g->part;
+  PetscInt *keep, *extra, n_keep = 0, n_extra = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(m->n_cells, &keep, m->n_nodes, &extra));
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    if (g->kind[m->cell_point[e]] && HycoMeshOwned(m, m->cells[e * m->nv]) >= 0) keep[n_keep++] = e;
   }
   for (PetscInt i = 0; i < m->n_nodes; i++) {
-    const PetscInt node[6] = {m->node_id[i], 0, 0, m->node_body[i], m->node_global[i], m->node_whole[i]};
+    if (g->kind[m->node_point[i]] && HycoMeshOwned(m, i) >= 0) extra[n_extra++] = i;
+  }
+  PetscCall(HycoPlexCut(g->comm, g->scene, m, n_keep, keep, n_extra, extra, 0, NULL, &g->share));
+  PetscCall(PetscFree2(keep, extra));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
-    g->take[i] = (PetscBool)(g->take[i] && Owns(g, i));
-    if (g->take[i]) PetscCall(AddRow(&g->node, node));
+/* Adds the facets of the share's cells that are in the tables of other ranks, which own one of their nodes. */
+static PetscErrorCode AddFacets(const Gather *g, PetscInt n, const PetscInt point[])
+{
+  HycoMesh m = g->part;
+  PetscInt *facets; /* by cell, a bit for each facet in the group */
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(g->n, &facets));
+  for (PetscInt k = 0; k < m->n_groups; k++) {
+    DMLabel label;
+
+    if (m->group_dim[k] != m->dim - 1) continue;
+    PetscCall(PetscArrayzero(facets, g->n));
+    for (PetscInt f = 0; f < m->n_facets; f++) {
+      if (m->facet_group[f] == k) facets[m->cell_point[m->facet_cell[f]]] |= 1 << HycoMeshFacetNumber(m, f);
+    }
+    PetscCall(Agree(g, MPI_BOR, facets));
+    PetscCall(HycoPlexGroupLabel(g->share, m->group_name[k], &label));
+    for (PetscInt c = 0; c < n; c++) {
+      for (PetscInt number = 0; facets[point[c]] >> number; number++) {
+        if (facets[point[c]] >> number & 1) PetscCall(DMLabelSetValue(label, c, HYCO_FACET + number));
+      }
+    }
+  }
+  PetscCall(PetscFree(facets));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Sets the point star forest of the shares, from that of the mesh: nodes of other ranks' are leaves. own[]: the others. */
+static PetscErrorCode SetPointSF(const Gather *g, PetscInt n, const PetscInt point[], PetscBool own[])
+{
+  PetscInt *at, *leaf, n_roots, n_leaves, n_mine = 0, v0;
+  const PetscInt *local;
+  const PetscSFNode *to;
+  PetscSFNode *remote;
+  PetscSF sf, mine;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < n; k++) own[k] = PETSC_TRUE;
+  PetscCall(DMGetPointSF(g->part->dm, &sf));
+  PetscCall(PetscSFGetGraph(sf, &n_roots, &n_leaves, &local, &to));
+  if (n_roots < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(DMPlexGetDepthStratum(g->share, 0, &v0, NULL));
+  PetscCall(PetscMalloc2(g->n, &at, n, &leaf));
+  PetscCall(PetscMalloc1(n, &remote));
+  for (PetscInt p = 0; p < g->n; p++) at[p] = -1;
+  for (PetscInt k = 0; k < n; k++) at[point[k]] = k;
+  for (PetscInt j = 0; j < n_leaves; j++) {
+    const PetscInt p = local ? local[j] : j;
+
+    if (at[p] < v0) continue; /* a cell is sent by one rank */
+    own[at[p]] = PETSC_FALSE;
+    leaf[n_mine] = at[p];
+    remote[n_mine++].rank = to[j].rank;
+  }
+  PetscCall(PetscSFBcastBegin(sf, MPIU_INT, at, at, MPI_REPLACE));
+  PetscCall(PetscSFBcastEnd(sf, MPIU_INT, at, at, MPI_REPLACE));
+  for (PetscInt j = 0; j < n_mine; j++) remote[j].index = at[point[leaf[j]]];
+  PetscCall(PetscSFCreate(g->comm, &mine));
+  PetscCall(PetscSFSetGraph(mine, n, n_mine, leaf, PETSC_COPY_VALUES, remote, PETSC_OWN_POINTER));
+  PetscCall(DMSetPointSF(g->share, mine));
+  PetscCall(PetscSFDestroy(&mine));
+  PetscCall(PetscFree2(at, leaf));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The star forest from rank 0's points, cells before nodes, to those of the shares. */
+static PetscErrorCode CreateSF(const Gather *g, PetscInt n, const PetscBool own[], PetscSF *sf)
+{
+  PetscInt v0, n_all[2], n_mine;
+  PetscSFNode *mine, *all[2], *remote = NULL;
+
+  PetscFunctionBegin;
+  PetscCall(DMPlexGetDepthStratum(g->share, 0, &v0, NULL));
+  PetscCall(PetscMalloc1(n, &mine));
+  for (PetscInt k = 0; k < 2; k++) {
+    n_mine = 0;
+    for (PetscInt p = k ? v0 : 0; p < (k ? n : v0); p++) {
+      if (own[p]) mine[n_mine++] = (PetscSFNode){g->rank, p};
+    }
+    PetscCall(HycoConcatenate(g->comm, 2 * n_mine, mine, MPIU_INT, sizeof(PetscInt), &n_all[k], &all[k]));
+    n_all[k] = g->rank ? 0 : n_all[k] / 2;
+  }
+  PetscCall(PetscMalloc1(n_all[0] + n_all[1], &remote));
+  for (PetscInt k = 0; k < 2; k++) {
+    if (n_all[k]) PetscCall(PetscArraycpy(remote + (k ? n_all[0] : 0), all[k], n_all[k]));
+    PetscCall(PetscFree(all[k]));
+  }
+  PetscCall(PetscFree(mine));
+  PetscCall(PetscSFCreate(g->comm, sf));
+  PetscCall(PetscSFSetGraph(*sf, n, n_all[0] + n_all[1], NULL, PETSC_OWN_POINTER, remote, PETSC_OWN_POINTER));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Sends what a share's points have in the distributed mesh; its own points are numbered rank after rank. */
+static PetscErrorCode SendColumns(Gather *g, PetscSF sf, PetscInt n, const PetscInt point[])
+{
+  HycoMesh m = g->part;
+  PetscInt *value[N_COLUMNS], *mine, n_root, first = 0;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Exscan(&g->n, &first, 1, MPIU_INT, MPI_SUM, g->comm));
+  PetscCall(PetscMalloc3(g->n, &value[GLOBAL], g->n, &value[WHOLE], n, &mine));
+  for (PetscInt i = 0; i < m->n_nodes; i++) {
+    value[GLOBAL][m->node_point[i]] = m->node_global[i];
+    value[WHOLE][m->node_point[i]] = m->node_whole[i];
   }
   for (PetscInt e = 0; e < m->n_cells; e++) {
-    if (!Keeps(g, e) || !Owns(g, m->cells[e * m->nv])) continue;
-    row[0] = m->cell_id[e];
-    row[1] = row[2] = 0;
-    row[3] = m->cell_body[e];
-    row[4] = m->cell_whole[e];
-    for (PetscInt v = 0; v < m->nv; v++) row[5 + v] = m->node_id[m->cells[e * m->nv + v]];
-    PetscCall(AddRow(&g->cell, row));
+    value[GLOBAL][m->cell_point[e]] = -1;
+    value[WHOLE][m->cell_point[e]] = m->cell_whole[e];
   }
-  for (PetscInt f = 0; f < m->n_facets; f++) {
-    PetscInt least = m->facets[f * m->nf]; /* a facet belongs to the rank of its node with the smallest tag */
+  value[KIND] = g->kind;
+  PetscCall(DMPlexGetChart(g->root, NULL, &n_root));
+  for (PetscInt c = 0; c < N_COLUMNS; c++) {
+    for (PetscInt k = 0; k < n; k++) mine[k] = c == NUMBER ? first + point[k] : value[c][point[k]];
+    PetscCall(PetscMalloc1(n_root, &g->of[c]));
+    PetscCall(HycoSFBcast(sf, MPIU_INT, 1, mine, g->of[c]));
+  }
+  PetscCall(PetscFree3(value[GLOBAL], value[WHOLE], mine));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
-    for (PetscInt v = 1; v < m->nf; v++) least = PetscMin(least, m->facets[f * m->nf + v]);
-    if (!Owns(g, least) || (g->in && !g->in[m->facet_group[f]] && !Keeps(g, m->facet_cell[f]))) continue;
-    row[0] = m->facet_group[f];
-    row[1] = m->cell_id[m->facet_cell[f]];
-    row[2] = f;
-    for (PetscInt v = 0; v < m->nf; v++) row[3 + v] = m->node_id[m->facets[f * m->nf + v]];
-    PetscCall(AddRow(&g->facet, row));
+/* Sends the points of the shares, with tags and ties. */
+static PetscErrorCode Migrate(Gather *g)
+{
+  PetscBool *own;
+  PetscInt n;
+  const PetscInt *point;
+  HycoTies ties;
+  IS points;
+  PetscSF sf;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSubmeshGetPoints(g->share, &points));
+  PetscCall(ISGetLocalSize(points, &n));
+  PetscCall(ISGetIndices(points, &point));
+  PetscCall(PetscMalloc1(n, &own));
+  PetscCall(AddFacets(g, n, point));
+  PetscCall(SetPointSF(g, n, point, own));
+  PetscCall(CreateSF(g, n, own, &sf));
+  PetscCall(DMPlexCreate(g->comm, &g->root));
+  PetscCall(DMPlexMigrate(g->share, sf, g->root));
+  PetscCall(HycoPlexSendTags(g->share, sf, g->root));
+  PetscCall(SendColumns(g, sf, n, point));
+  PetscCall(HycoTiesOf(g->share, &ties));
+  PetscCall(HycoTiesAttach(g->root, ties));
+  PetscCall(HycoPlexSetType(g->root, g->part->type, g->part->mixed));
+  PetscCall(ISRestoreIndices(points, &point));
+  PetscCall(PetscSFDestroy(&sf));
+  PetscCall(PetscFree(own));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds the numbers in the distributed mesh: rank 0 has all nodes. */
+static PetscErrorCode Number(const Gather *g, HycoMesh sub)
+{
+  HycoMesh m = g->part;
+  const PetscInt *point;
+  PetscInt n, *number;
+  IS points;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSubmeshGetPoints(sub->dm, &points));
+  PetscCall(ISGetLocalSize(points, &n));
+  PetscCall(ISGetIndices(points, &point));
+  PetscCall(PetscMalloc1(n, &number));
+  PetscCall(PetscMalloc1(sub->n_nodes, &sub->node_global));
+  for (PetscInt k = 0; k < n; k++) number[k] = g->of[NUMBER][point[k]];
+  for (PetscInt i = 0; i < sub->n_nodes; i++) {
+    sub->node_global[i] = g->of[GLOBAL][point[sub->node_point[i]]];
+    sub->node_whole[i] = g->of[WHOLE][point[sub->node_point[i]]];
+  }
+  for (PetscInt e = 0; e < sub->n_cells; e++) sub->cell_whole[e] = g->of[WHOLE][point[sub->cell_point[e]]];
+  PetscCall(ISRestoreIndices(points, &point));
+  PetscCall(HycoSubmeshSetPoints(sub->dm, n, number));
+  sub->n_owned = sub->n_whole_nodes = m->n_whole_nodes;
+  sub->n_whole_cells = m->n_whole_cells;
+  sub->whole_length = m->whole_length;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Makes the submesh. Rank 0. */
+static PetscErrorCode MakeSubmesh(const Gather *g, HycoMesh *sub)
+{
+  PetscInt *keep, *extra, *all, n_keep = 0, n_extra = 0, n_all = 0;
+  HycoMesh m;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoPlexToTables(g->root, PETSC_COMM_SELF, g->scene, &m));
+  PetscCall(PetscMalloc3(m->n_cells, &keep, m->n_nodes, &extra, m->n_groups, &all));
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    if (g->of[KIND][m->cell_point[e]] == CHOSEN) keep[n_keep++] = e;
+  }
+  for (PetscInt i = 0; i < m->n_nodes; i++) {
+    if (g->of[KIND][m->node_point[i]] == CHOSEN) extra[n_extra++] = i;
   }
   for (PetscInt k = 0; k < m->n_groups; k++) {
-    const PetscInt group[3] = {k, 0, 0};
-
-    PetscCall(PetscArraycpy(row, group, 3));
-    for (PetscInt j = m->group_start[k]; j < m->group_start[k + 1]; j++) {
-      row[1] = m->node_id[m->group_node[j]];
-      if (g->take[m->group_node[j]]) PetscCall(AddRow(&g->member, row));
-    }
-    for (PetscInt j = m->group_cell_start[k]; j < m->group_cell_start[k + 1]; j++) {
-      const PetscInt e = m->group_cell[j];
-
-      row[1] = m->cell_id[e];
-      if (Keeps(g, e) && Owns(g, m->cells[e * m->nv])) PetscCall(AddRow(&g->region, row));
-    }
+    m->group_dim[k] = g->part->group_dim[k]; /* also of groups without points here */
+    if (g->in && g->in[k]) all[n_all++] = k;
   }
+  ierr = HycoSubmesh(g->scene, m, n_keep, keep, n_extra, extra, n_all, all, sub);
+  PetscCall(PetscFree3(keep, extra, all));
+  PetscCall(HycoMeshDestroy(&m));
+  PetscCall(ierr);
+  PetscCall(Number(g, *sub));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Index of a tag, or -1. */
-static PetscInt Find(PetscInt n, const PetscInt tag[], PetscInt value)
-{
-  PetscInt at = -1;
-
-  (void)PetscFindInt(value, n, tag, &at);
-  return at < 0 ? -1 : at;
-}
-
-/* Sets the coordinates of the nodes in the order of their tags; they arrive in the order of the ranks, with tags
-   `sent`. */
-static PetscErrorCode PlaceNodes(Gather *g, HycoMesh m, PetscInt n, const PetscInt sent[], const PetscReal xyz[])
-{
-  PetscFunctionBegin;
-  m->n_nodes = n;
-  PetscCall(PetscMalloc1(n, &m->node_id));
-  PetscCall(PetscMalloc1(n, &m->node_body));
-  PetscCall(PetscMalloc1(n, &m->node_global));
-  PetscCall(PetscMalloc1(n, &m->node_whole));
-  PetscCall(PetscMalloc1(3 * n, &m->xyz));
-  for (PetscInt i = 0; i < n; i++) {
-    const PetscInt *row = g->node.all + i * g->node.width;
-
-    m->node_id[i] = row[0];
-    m->node_body[i] = row[3];
-    m->node_global[i] = row[4];
-    m->node_whole[i] = row[5];
-  }
-  for (PetscInt k = 0; k < n; k++) PetscCall(PetscArraycpy(m->xyz + 3 * Find(n, m->node_id, sent[k]), xyz + 3 * k, 3));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode PlaceCells(Gather *g, HycoMesh m)
-{
-  const PetscInt width = g->cell.width;
-
-  PetscFunctionBegin;
-  m->n_cells = g->cell.n_all;
-  PetscCall(PetscMalloc1(m->n_cells, &m->cell_id));
-  PetscCall(PetscMalloc1(m->n_cells, &m->cell_body));
-  PetscCall(PetscMalloc1(m->n_cells, &m->cell_whole));
-  PetscCall(PetscMalloc1(m->n_cells * m->nv, &m->cells));
-  for (PetscInt e = 0; e < m->n_cells; e++) {
-    m->cell_id[e] = g->cell.all[e * width];
-    m->cell_body[e] = g->cell.all[e * width + 3];
-    m->cell_whole[e] = g->cell.all[e * width + 4];
-    for (PetscInt v = 0; v < m->nv; v++)
-      m->cells[e * m->nv + v] = Find(m->n_nodes, m->node_id, g->cell.all[e * width + 5 + v]);
-  }
-  m->n_facets = g->facet.n_all;
-  PetscCall(PetscMalloc1(m->n_facets, &m->facet_group));
-  PetscCall(PetscMalloc1(m->n_facets, &m->facet_cell));
-  PetscCall(PetscMalloc1(m->n_facets * m->nf, &m->facets));
-  for (PetscInt f = 0; f < m->n_facets; f++) {
-    const PetscInt *row = g->facet.all + f * g->facet.width;
-
-    m->facet_group[f] = row[0];
-    m->facet_cell[f] = Find(m->n_cells, m->cell_id, row[1]);
-    for (PetscInt v = 0; v < m->nf; v++) m->facets[f * m->nf + v] = Find(m->n_nodes, m->node_id, row[3 + v]);
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* CSR lists over the groups from rows (group, tag, 0). */
-static PetscErrorCode PlaceMembers(PetscInt n_groups, const Rows *r, PetscInt n, const PetscInt tag[], PetscInt **start,
-                                   PetscInt **member)
-{
-  PetscFunctionBegin;
-  PetscCall(PetscCalloc1(n_groups + 1, start));
-  PetscCall(PetscMalloc1(r->n_all, member));
-  for (PetscInt k = 0; k < r->n_all; k++) {
-    (*start)[r->all[3 * k] + 1]++;
-    (*member)[k] = Find(n, tag, r->all[3 * k + 1]);
-  }
-  for (PetscInt g = 0; g < n_groups; g++) (*start)[g + 1] += (*start)[g];
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoMeshGather(MPI_Comm comm, HycoMesh part, const PetscBool in[], const PetscBool cell[],
+PetscErrorCode HycoMeshGather(HycoScene scene, HycoMesh part, const PetscBool in[], const PetscBool cell[],
                               HycoMesh *mesh)
 {
-  Gather g = {.part = part, .in = in, .keep = cell};
-  PetscMPIInt rank;
-  PetscReal *xyz, *all;
-  PetscInt *tag, *sent, n, k = 0;
-  HycoMesh m;
+  Gather g = {.comm = HycoComm(part->dm), .scene = scene, .part = part, .in = in, .cell = cell};
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  g.node.width = 6;
-  g.cell.width = 5 + part->nv;
-  g.facet.width = 3 + part->nf;
-  g.member.width = g.region.width = 3;
-  PetscCall(Pack(&g));
-  PetscCall(PetscMalloc2(3 * g.node.n, &xyz, g.node.n, &tag));
-  for (PetscInt i = 0; i < part->n_nodes; i++) {
-    if (!g.take[i]) continue;
-    tag[k] = part->node_id[i];
-    PetscCall(PetscArraycpy(xyz + 3 * k++, part->xyz + 3 * i, 3));
-  }
-  PetscCall(HycoConcatenate(comm, 3 * k, xyz, MPIU_REAL, sizeof(PetscReal), &n, &all));
-  PetscCall(HycoConcatenate(comm, k, tag, MPIU_INT, sizeof(PetscInt), &n, &sent));
-  PetscCall(PetscFree2(xyz, tag));
-  PetscCall(GatherRows(comm, &g.node));
-  PetscCall(GatherRows(comm, &g.cell));
-  PetscCall(GatherRows(comm, &g.facet));
-  PetscCall(GatherRows(comm, &g.member));
-  PetscCall(GatherRows(comm, &g.region));
   *mesh = NULL;
-  if (rank == 0) {
-    PetscCall(PetscNew(&m));
-    m->dim = part->dim;
-    m->nv = part->nv;
-    m->nf = part->nf;
-    m->type = part->type;
-    m->mixed = part->mixed;
-    m->n_owned = m->n_whole_nodes = part->n_whole_nodes; /* rank 0 owns all */
-    m->n_whole_cells = part->n_whole_cells;
-    m->whole_length = part->whole_length;
-    m->n_groups = part->n_groups;
-    PetscCall(PetscMalloc1(m->n_groups, &m->group_name));
-    for (PetscInt j = 0; j < m->n_groups; j++) PetscCall(PetscStrallocpy(part->group_name[j], &m->group_name[j]));
-    HycoDuplicate(m->n_groups, part->group_dim, &m->group_dim);
-    PetscCall(PlaceNodes(&g, m, n, sent, all));
-    PetscCall(PlaceCells(&g, m));
-    PetscCall(PlaceMembers(m->n_groups, &g.member, m->n_nodes, m->node_id, &m->group_start, &m->group_node));
-    PetscCall(HycoMeshSetTies(m, part->ties));
-    PetscCall(PlaceMembers(m->n_groups, &g.region, m->n_cells, m->cell_id, &m->group_cell_start, &m->group_cell));
-    *mesh = m;
-  }
-  PetscCall(PetscFree(all));
-  PetscCall(PetscFree(sent));
-  PetscCall(PetscFree(g.take));
-  PetscCall(PetscFree(g.node.all));
-  PetscCall(PetscFree(g.cell.all));
-  PetscCall(PetscFree(g.facet.all));
-  PetscCall(PetscFree(g.member.all));
-  PetscCall(PetscFree(g.region.all));
+  PetscCallMPI(MPI_Comm_rank(g.comm, &g.rank));
+  PetscCall(Choose(&g));
+  PetscCall(CutShare(&g));
+  PetscCall(Migrate(&g));
+  HycoOnRoot(g.comm, MakeSubmesh(&g, mesh));
+  for (PetscInt c = 0; c < N_COLUMNS; c++) PetscCall(PetscFree(g.of[c]));
+  PetscCall(PetscFree(g.kind));
+  PetscCall(DMDestroy(&g.share));
+  PetscCall(DMDestroy(&g.root));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

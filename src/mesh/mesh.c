@@ -1,4 +1,4 @@
-/* HycoMesh: groups, extraction of parts, adjacency. */
+/* HycoMesh: groups, adjacency. */
 #include <hycocontactimpl.h>
 #include <string.h>
 
@@ -37,7 +37,9 @@ PetscErrorCode HycoMeshDestroy(HycoMesh *mesh)
   PetscCall(PetscFree(m->facets));
   PetscCall(PetscFree(m->facet_group));
   PetscCall(PetscFree(m->facet_cell));
+  PetscCall(PetscFree(m->facet_point));
   PetscCall(HycoMeshSetTies(m, NULL));
+  PetscCall(DMDestroy(&m->dm));
   PetscCall(PetscFree(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -251,6 +253,22 @@ PetscErrorCode HycoMeshNodeSF(MPI_Comm comm, HycoMesh part, PetscInt n, const Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoMeshOwners(MPI_Comm comm, HycoMesh part, PetscInt n, const PetscInt global[], PetscMPIInt owner[])
+{
+  PetscLayout layout;
+  PetscMPIInt last = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscLayoutCreateFromSizes(comm, part->n_owned, PETSC_DETERMINE, 1, &layout));
+  for (PetscInt k = 0; k < n; k++) {
+    if (global[k] < layout->range[last] || global[k] >= layout->range[last + 1])
+      PetscCall(PetscLayoutFindOwner(layout, global[k], &last));
+    owner[k] = last;
+  }
+  PetscCall(PetscLayoutDestroy(&layout));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoMeshNodeCells(HycoMesh m, PetscInt **start, PetscInt **cell)
 {
   PetscInt *next, node[HYCO_MAX_CELL_NODES];
@@ -272,152 +290,5 @@ PetscErrorCode HycoMeshNodeCells(HycoMesh m, PetscInt **start, PetscInt **cell)
     for (PetscInt v = 0; v < n; v++) (*cell)[next[node[v]]++] = e;
   }
   PetscCall(PetscFree(next));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* index[i]: index in the part of node i of the whole mesh, or -1; nodes of cells come before the others. Fills
-   part->node_whole. */
-static PetscErrorCode SelectNodes(HycoMesh whole, PetscInt n_keep, const PetscInt keep[], PetscInt n_extra,
-                                  const PetscInt extra[], PetscInt n_all, const PetscInt all_facets[], HycoMesh part,
-                                  PetscInt index[])
-{
-  PetscFunctionBegin;
-  for (PetscInt i = 0; i < whole->n_nodes; i++) index[i] = -1;
-  for (PetscInt k = 0; k < n_keep; k++) {
-    PetscInt node[HYCO_MAX_CELL_NODES];
-    const PetscInt n = HycoMeshCellNodes(whole, keep[k], node);
-
-    for (PetscInt v = 0; v < n; v++) index[node[v]] = 0;
-  }
-  for (PetscInt k = 0; k < n_extra; k++) {
-    if (index[extra[k]] < 0) index[extra[k]] = -2;
-  }
-  for (PetscInt f = 0; f < whole->n_facets * whole->nf; f++) { /* facets kept because of their group */
-    PetscInt *node = &index[whole->facets[f]];
-
-    for (PetscInt k = 0; k < n_all && *node == -1; k++)
-      *node = whole->facet_group[f / whole->nf] == all_facets[k] ? -2 : -1;
-  }
-  for (PetscInt k = 0; k < whole->n_tied; k++) { /* masters of tied nodes */
-    for (PetscInt j = whole->tied_start[k]; j < whole->tied_start[k + 1]; j++) {
-      PetscInt *master = &index[whole->tied_master[j]];
-
-      if (index[whole->tied[k]] != -1 && *master == -1) *master = -2;
-    }
-  }
-  for (PetscInt pass = 0; pass > -3; pass -= 2) {
-    for (PetscInt i = 0; i < whole->n_nodes; i++) {
-      if (index[i] == pass) index[i] = -3 - part->n_nodes++; /* differs from the value of every pass */
-    }
-  }
-  for (PetscInt i = 0; i < whole->n_nodes; i++) index[i] = index[i] < -2 ? -3 - index[i] : -1;
-  PetscCall(PetscMalloc1(part->n_nodes, &part->node_whole));
-  PetscCall(PetscMalloc1(part->n_nodes * 3, &part->xyz));
-  PetscCall(PetscMalloc1(part->n_nodes, &part->node_id));
-  PetscCall(PetscMalloc1(part->n_nodes, &part->node_body));
-  for (PetscInt i = 0; i < whole->n_nodes; i++) {
-    const PetscInt p = index[i];
-
-    if (p < 0) continue;
-    part->node_whole[p] = i;
-    part->node_id[p] = whole->node_id[i];
-    part->node_body[p] = whole->node_body[i];
-    for (PetscInt c = 0; c < 3; c++) part->xyz[3 * p + c] = whole->xyz[3 * i + c];
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode SelectCells(HycoMesh whole, PetscInt n_keep, const PetscInt keep[], const PetscInt index[],
-                                  HycoMesh part, PetscInt cell_index[])
-{
-  const PetscInt nv = whole->nv;
-
-  PetscFunctionBegin;
-  part->n_cells = n_keep;
-  PetscCall(PetscMalloc1(n_keep * nv, &part->cells));
-  PetscCall(PetscMalloc1(n_keep, &part->cell_id));
-  PetscCall(PetscMalloc1(n_keep, &part->cell_body));
-  PetscCall(PetscMalloc1(n_keep, &part->cell_whole));
-  for (PetscInt e = 0; e < whole->n_cells; e++) cell_index[e] = -1;
-  for (PetscInt k = 0; k < n_keep; k++) {
-    cell_index[keep[k]] = k;
-    part->cell_whole[k] = keep[k];
-    part->cell_id[k] = whole->cell_id[keep[k]];
-    part->cell_body[k] = whole->cell_body[keep[k]];
-    for (PetscInt v = 0; v < nv; v++) part->cells[k * nv + v] = index[whole->cells[keep[k] * nv + v]];
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode SelectFacets(HycoMesh whole, PetscInt n_all, const PetscInt all_facets[], const PetscInt index[],
-                                   const PetscInt cell_index[], HycoMesh part)
-{
-  const PetscInt nf = whole->nf;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1(whole->n_facets * nf, &part->facets));
-  PetscCall(PetscMalloc1(whole->n_facets, &part->facet_group));
-  PetscCall(PetscMalloc1(whole->n_facets, &part->facet_cell));
-  for (PetscInt f = 0; f < whole->n_facets; f++) {
-    const PetscInt cell = whole->facet_cell[f] < 0 ? -1 : cell_index[whole->facet_cell[f]];
-    PetscBool take = (PetscBool)(cell >= 0);
-
-    for (PetscInt k = 0; k < n_all; k++) take = (PetscBool)(take || whole->facet_group[f] == all_facets[k]);
-    if (!take) continue;
-    for (PetscInt v = 0; v < nf; v++) part->facets[part->n_facets * nf + v] = index[whole->facets[f * nf + v]];
-    part->facet_group[part->n_facets] = whole->facet_group[f];
-    part->facet_cell[part->n_facets] = cell;
-    part->n_facets++;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* CSR lists of the members of groups that are kept, renumbered. */
-static PetscErrorCode SelectGroups(PetscInt n_groups, const PetscInt start[], const PetscInt member[],
-                                   const PetscInt index[], PetscInt **new_start, PetscInt **new_member)
-{
-  PetscInt n = 0;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1(n_groups + 1, new_start));
-  PetscCall(PetscMalloc1(start[n_groups], new_member));
-  (*new_start)[0] = 0;
-  for (PetscInt g = 0; g < n_groups; g++) {
-    for (PetscInt k = start[g]; k < start[g + 1]; k++) {
-      if (index[member[k]] >= 0) (*new_member)[n++] = index[member[k]];
-    }
-    PetscCall(PetscSortInt(n - (*new_start)[g], *new_member + (*new_start)[g]));
-    (*new_start)[g + 1] = n;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoMeshExtract(HycoMesh whole, PetscInt n_keep, const PetscInt keep[], PetscInt n_extra,
-                               const PetscInt extra[], PetscInt n_all, const PetscInt all_facets[], HycoMesh *part)
-{
-  HycoMesh m;
-  PetscInt *index, *cell_index;
-
-  PetscFunctionBegin;
-  PetscCall(PetscNew(&m));
-  m->dim = whole->dim;
-  m->nv = whole->nv;
-  m->nf = whole->nf;
-  m->type = whole->type;
-  m->mixed = whole->mixed;
-  PetscCall(PetscMalloc2(whole->n_nodes, &index, whole->n_cells, &cell_index));
-  PetscCall(SelectNodes(whole, n_keep, keep, n_extra, extra, n_all, all_facets, m, index));
-  PetscCall(SelectCells(whole, n_keep, keep, index, m, cell_index));
-  PetscCall(SelectFacets(whole, n_all, all_facets, index, cell_index, m));
-  m->n_groups = whole->n_groups;
-  PetscCall(PetscMalloc1(m->n_groups, &m->group_name));
-  for (PetscInt g = 0; g < m->n_groups; g++) PetscCall(PetscStrallocpy(whole->group_name[g], &m->group_name[g]));
-  HycoDuplicate(m->n_groups, whole->group_dim, &m->group_dim);
-  PetscCall(SelectGroups(m->n_groups, whole->group_start, whole->group_node, index, &m->group_start, &m->group_node));
-  PetscCall(SelectGroups(m->n_groups, whole->group_cell_start, whole->group_cell, cell_index, &m->group_cell_start,
-                         &m->group_cell));
-  PetscCall(PetscFree2(index, cell_index));
-  PetscCall(HycoMeshSetTies(m, whole->ties));
-  *part = m;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

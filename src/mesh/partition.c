@@ -123,6 +123,30 @@ static PetscErrorCode ByScotch(PetscInt n, const Graph *g, PetscInt n_parts, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Gives each part that has no cell one of the largest part, while that has two: METIS leaves parts of a few cells empty,
+   and a rank without cells works for nothing. */
+static PetscErrorCode FillParts(PetscInt n, PetscInt n_parts, PetscInt part[])
+{
+  PetscInt *size;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(n_parts, &size));
+  for (PetscInt c = 0; c < n; c++) size[part[c]]++;
+  for (PetscInt p = 0; p < n_parts; p++) {
+    PetscInt largest = 0;
+
+    for (PetscInt k = 1; k < n_parts; k++) {
+      if (size[k] > size[largest]) largest = k;
+    }
+    if (size[p] || size[largest] < 2) continue;
+    for (PetscInt c = n - 1; !size[p]; c--) {
+      if (part[c] == largest) part[c] = p, size[p] = 1, size[largest]--;
+    }
+  }
+  PetscCall(PetscFree(size));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Data that DMPlexDistribute() does not pass on: the mesh and its contacts. Borrowed. */
 typedef struct {
   HycoMesh mesh; /* NULL if there are no cells */
@@ -157,7 +181,10 @@ static PetscErrorCode Partition(PetscPartitioner partitioner, PetscInt n_parts, 
   PetscFunctionBegin;
   (void)start, (void)adjacent, (void)weights, (void)targets;
   PetscCall(PetscMalloc1(n, &part));
-  if (n && d->mesh) PetscCall(Cut(d, n_parts, part));
+  if (n && d->mesh) {
+    PetscCall(Cut(d, n_parts, part));
+    PetscCall(FillParts(n, n_parts, part));
+  }
   for (PetscInt c = 0; c < n; c++) PetscCall(PetscSectionAddDof(sizes, part[c], 1));
   PetscCall(PetscMalloc1(n, &cells));
   for (PetscInt p = 0; p < n_parts; p++) {

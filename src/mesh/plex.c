@@ -18,13 +18,13 @@ static const signed char cone_place[HYCO_N_CELL_TYPES][8] = {
     [HYCO_PYRAMID5] = {0, 3, 2, 1, 4},
     [HYCO_PRISM6] = {0, 2, 1, 3, 4, 5},
 };
-static const DMPolytopeType plex_type[HYCO_N_CELL_TYPES] = {
+const DMPolytopeType HycoPlexTypes[HYCO_N_CELL_TYPES] = {
     DM_POLYTOPE_SEGMENT,     DM_POLYTOPE_TRIANGLE,   DM_POLYTOPE_QUADRILATERAL, DM_POLYTOPE_TETRAHEDRON,
     DM_POLYTOPE_HEXAHEDRON,  DM_POLYTOPE_TRIANGLE,   DM_POLYTOPE_QUADRILATERAL, DM_POLYTOPE_QUADRILATERAL,
     DM_POLYTOPE_TETRAHEDRON, DM_POLYTOPE_HEXAHEDRON, DM_POLYTOPE_HEXAHEDRON,    DM_POLYTOPE_PYRAMID,
     DM_POLYTOPE_TRI_PRISM};
 /* The position of a node of a cell in its cone; shape HYCO_N_CELL_TYPES: for points that are not cells. */
-static PetscInt ConePlace(HycoCellType shape, PetscInt node)
+PetscInt HycoConePlace(HycoCellType shape, PetscInt node)
 {
   return shape < HYCO_N_CELL_TYPES && !HycoCellKinds[shape].quadratic ? cone_place[shape][node] : node;
 }
@@ -38,7 +38,7 @@ PetscErrorCode HycoPlexShape(DM dm, HycoCellType type, PetscInt cell, HycoCellTy
   if (type != HYCO_QUAD4 && type != HYCO_HEX8) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(DMPlexGetCellType(dm, cell, &of));
   for (int t = 0; t < HYCO_N_CELL_TYPES; t++) {
-    if (plex_type[t] == of && !HycoCellKinds[t].quadratic) *shape = (HycoCellType)t;
+    if (HycoPlexTypes[t] == of && !HycoCellKinds[t].quadratic) *shape = (HycoCellType)t;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -55,7 +55,7 @@ PetscErrorCode HycoPlexVertices(DM dm, PetscBool interpolated, HycoCellType type
     const PetscInt *cone, own = shape < HYCO_N_CELL_TYPES ? HycoCellKinds[shape].nv : n;
 
     PetscCall(DMPlexGetCone(dm, p, &cone));
-    for (PetscInt k = 0; k < PetscMin(n, own); k++) vertex[k] = cone[ConePlace(shape, k)];
+    for (PetscInt k = 0; k < PetscMin(n, own); k++) vertex[k] = cone[HycoConePlace(shape, k)];
     if (own < n) HycoShapeWiden(shape, n, vertex);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -65,7 +65,7 @@ PetscErrorCode HycoPlexVertices(DM dm, PetscBool interpolated, HycoCellType type
     const PetscInt v = closure[2 * k];
 
     if (v < v0 || v >= v1) continue;
-    vertex[ConePlace(shape, at)] = v;
+    vertex[HycoConePlace(shape, at)] = v;
     at++;
   }
   PetscCall(DMPlexRestoreTransitiveClosure(dm, p, PETSC_TRUE, &size, &closure));
@@ -84,7 +84,7 @@ static PetscBool ConeIsOf(HycoCellType type, PetscInt size)
    the ties have the type of the mesh. */
 static PetscBool IsOf(HycoCellType type, DMPolytopeType of, PetscInt size, HycoTies ties)
 {
-  if (plex_type[type] != of) return PETSC_FALSE;
+  if (HycoPlexTypes[type] != of) return PETSC_FALSE;
   if (!ties) return ConeIsOf(type, size);
   return (PetscBool)(HycoCellKinds[ties->type].quadratic ? type == (HycoCellType)ties->type
                                                          : !HycoCellKinds[type].quadratic);
@@ -116,12 +116,36 @@ static PetscErrorCode FindShapes(DM dm, PetscInt *shapes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+#define TYPE "HycoType"
+
+PetscErrorCode HycoPlexSetType(DM dm, HycoCellType type, PetscBool mixed)
+{
+  const PetscInt value[2] = {(PetscInt)type, mixed};
+  IS is;
+
+  PetscFunctionBegin;
+  PetscCall(ISCreateGeneral(PETSC_COMM_SELF, 2, value, PETSC_COPY_VALUES, &is));
+  PetscCall(PetscObjectCompose((PetscObject)dm, TYPE, (PetscObject)is));
+  PetscCall(ISDestroy(&is));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoPlexType(DM dm, PetscInt *type, PetscBool *mixed)
 {
   const MPI_Comm comm = PetscObjectComm((PetscObject)dm);
   PetscInt shapes = 0;
+  const PetscInt *of;
+  IS set;
 
   PetscFunctionBegin;
+  PetscCall(PetscObjectQuery((PetscObject)dm, TYPE, (PetscObject *)&set));
+  if (set) { /* of the mesh of which this is a part */
+    PetscCall(ISGetIndices(set, &of));
+    *type = of[0];
+    *mixed = (PetscBool)of[1];
+    PetscCall(ISRestoreIndices(set, &of));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   HycoOnEach(comm, FindShapes(dm, &shapes));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &shapes, 1, MPIU_INT, MPI_BOR, comm));
   *type = shapes ? (PetscInt)HycoShapesType(shapes) : -1;
@@ -131,7 +155,7 @@ PetscErrorCode HycoPlexType(DM dm, PetscInt *type, PetscBool *mixed)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -- from tables to a DM -- */
+/* -- labels, tags, types -- */
 
 /* Names of DMPlex's own labels are reserved. */
 PetscBool HycoPlexOwnLabel(const char name[])
@@ -139,73 +163,20 @@ PetscBool HycoPlexOwnLabel(const char name[])
   return (PetscBool)(!strcmp(name, "depth") || !strcmp(name, "celltype") || !strcmp(name, "marker"));
 }
 
-static PetscErrorCode LabelName(const char group[], size_t room, char name[])
+PetscErrorCode HycoPlexLabelName(const char group[], size_t room, char name[])
 {
   PetscFunctionBegin;
   PetscCall(PetscSNPrintf(name, room, "%s%s", HycoPlexOwnLabel(group) ? "group " : "", group));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode SetStratum(DMLabel label, PetscInt value, PetscInt n, const PetscInt point[])
+PetscErrorCode HycoPlexGroupLabel(DM dm, const char group[], DMLabel *label)
 {
-  IS is;
+  char name[HYCO_LINE];
 
   PetscFunctionBegin;
-  if (!n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(ISCreateGeneral(PETSC_COMM_SELF, n, point, PETSC_COPY_VALUES, &is));
-  PetscCall(ISSort(is));
-  PetscCall(DMLabelSetStratumIS(label, value, is));
-  PetscCall(ISDestroy(&is));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Vertices and cells of a group have the value 1 + its dimension. */
-static PetscErrorCode FillLabel(DMLabel label, HycoMesh m, PetscInt g)
-{
-  const PetscInt value = 1 + m->group_dim[g], n_cell = m->group_cell_start[g + 1] - m->group_cell_start[g],
-                 n_node = m->group_start[g + 1] - m->group_start[g];
-  PetscInt *point, *in_face;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc2(PetscMax(n_cell + n_node, m->n_facets), &point, m->n_facets, &in_face));
-  PetscCall(PetscArraycpy(point, m->group_cell + m->group_cell_start[g], n_cell));
-  for (PetscInt k = 0; k < n_node; k++) point[n_cell + k] = m->n_cells + m->group_node[m->group_start[g] + k];
-  PetscCall(SetStratum(label, value, n_cell + n_node, point));
-  for (PetscInt f = 0; f < m->n_facets; f++)
-    in_face[f] = m->facet_group[f] == g && m->dim > 1 ? HycoMeshFacetNumber(m, f) : -1;
-  for (PetscInt k = 0; k < HycoFacetCount(m->type); k++) {
-    PetscInt n = 0;
-
-    for (PetscInt f = 0; f < m->n_facets; f++) {
-      if (in_face[f] == k) point[n++] = m->facet_cell[f];
-    }
-    PetscCall(SetStratum(label, HYCO_FACET + k, n, point));
-  }
-  PetscCall(PetscFree2(point, in_face));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* A label for each group, on every process. */
-static PetscErrorCode AddLabels(DM dm, HycoMesh m)
-{
-  const MPI_Comm comm = PetscObjectComm((PetscObject)dm);
-  PetscInt n = m ? m->n_groups : 0;
-
-  PetscFunctionBegin;
-  PetscCallMPI(MPI_Bcast(&n, 1, MPIU_INT, 0, comm));
-  for (PetscInt g = 0; g < n; g++) {
-    char name[HYCO_LINE] = "";
-    PetscBool has;
-    DMLabel label;
-
-    if (m) PetscCall(LabelName(m->group_name[g], sizeof(name), name));
-    PetscCallMPI(MPI_Bcast(name, sizeof(name), MPI_CHAR, 0, comm));
-    PetscCall(DMHasLabel(dm, name, &has));
-    if (has) continue; /* of groups with the same name the first is used */
-    PetscCall(DMCreateLabel(dm, name));
-    PetscCall(DMGetLabel(dm, name, &label));
-    if (m) PetscCall(FillLabel(label, m, g));
-  }
+  PetscCall(HycoPlexLabelName(group, sizeof(name), name));
+  PetscCall(DMGetLabel(dm, name, label));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -222,78 +193,11 @@ PetscErrorCode HycoPlexSetTags(DM dm, PetscInt tag[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets the cones of the cells: their nodes, then the masters of their tied nodes. */
-static PetscErrorCode SetCones(DM dm, HycoMesh m)
-{
-  PetscInt node[HYCO_MAX_CELL_NODES], cone[HYCO_MAX_CELL_NODES];
-
-  PetscFunctionBegin;
-  PetscCall(DMPlexSetChart(dm, 0, m ? m->n_cells + m->n_nodes : 0));
-  for (PetscInt e = 0; m && e < m->n_cells; e++) PetscCall(DMPlexSetConeSize(dm, e, HycoMeshCellNodes(m, e, node)));
-  PetscCall(DMSetUp(dm));
-  for (PetscInt e = 0; m && e < m->n_cells; e++) {
-    const HycoCellType shape = HycoMeshShape(m, e);
-    const PetscInt n = HycoMeshCellNodes(m, e, node), own = HycoCellKinds[shape].nv;
-
-    for (PetscInt k = 0; k < n; k++) cone[k < own ? ConePlace(shape, k) : k] = m->n_cells + node[k];
-    PetscCall(DMPlexSetCone(dm, e, cone));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Creates the DM of a mesh with ties, of second order, or of several types. With the masters in a cell's cone, every
-   query for the cells around a node finds it: for shared nodes, the overlap, an RID. The types of the cells are set,
-   because DMPlex would derive them from the size of the cones. */
-static PetscErrorCode FromCones(MPI_Comm comm, PetscInt dim, HycoMesh m, DM *dm)
-{
-  PetscFunctionBegin;
-  PetscCall(DMPlexCreate(comm, dm));
-  PetscCall(DMSetDimension(*dm, dim));
-  PetscCall(SetCones(*dm, m));
-  PetscCall(DMPlexSymmetrize(*dm));
-  PetscCall(DMPlexStratify(*dm));
-  PetscCall(DMCreateLabel(*dm, "celltype"));
-  for (PetscInt p = 0; m && p < m->n_cells + m->n_nodes; p++)
-    PetscCall(DMPlexSetCellType(*dm, p, p < m->n_cells ? plex_type[HycoMeshShape(m, p)] : DM_POLYTOPE_POINT));
-  PetscCall(DMPlexBuildCoordinatesFromCellList(*dm, 3, m ? m->xyz : NULL));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoPlexFromMesh(MPI_Comm comm, HycoMesh m, DM *dm)
-{
-  PetscInt head[3] = {m ? m->dim : 0, m ? m->nv : 0, m ? HycoMeshIsQuadratic(m) || m->mixed : 0}, *cone = NULL, *tag;
-  HycoTies ties = m ? m->ties : NULL;
-
-  PetscFunctionBegin;
-  PetscCallMPI(MPI_Bcast(head, 3, MPIU_INT, 0, comm));
-  PetscCall(HycoTiesBcast(comm, &ties));
-  if (m && !ties && !head[2]) {
-    PetscCall(PetscMalloc1(m->n_cells * m->nv, &cone));
-    for (PetscInt k = 0; k < m->n_cells * m->nv; k++)
-      cone[k / m->nv * m->nv + ConePlace(m->type, k % m->nv)] = m->cells[k];
-  }
-  if (ties || head[2])
-    PetscCall(FromCones(comm, head[0], m, dm));
-  else
-    PetscCall(DMPlexCreateFromCellListPetsc(comm, head[0], m ? m->n_cells : 0, m ? m->n_nodes : 0, head[1], PETSC_FALSE,
-                                            cone, 3, m ? m->xyz : NULL, dm));
-  PetscCall(PetscFree(cone));
-  PetscCall(HycoTiesAttach(*dm, ties));
-  if (!m) PetscCall(HycoTiesDestroy(&ties));
-  PetscCall(PetscMalloc1(m ? m->n_cells + m->n_nodes : 0, &tag));
-  if (m) {
-    PetscCall(PetscArraycpy(tag, m->cell_id, m->n_cells));
-    PetscCall(PetscArraycpy(tag + m->n_cells, m->node_id, m->n_nodes));
-  }
-  PetscCall(AddLabels(*dm, m));
-  PetscCall(HycoPlexSetTags(*dm, tag));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* -- from a DM to tables -- */
 
 typedef struct {
-  PetscInt node[HYCO_FACET_NODES], cell, number;
+  PetscInt node[HYCO_FACET_NODES], cell, point; /* point: of a facet without its cell */
+  PetscInt tag, number;                         /* of its cell, in its cell */
 } Facet;
 
 typedef struct {
@@ -302,6 +206,8 @@ typedef struct {
   HycoMesh m;
   PetscInt c0, c1, v0, v1;     /* ranges of cells and vertices */
   PetscBool facets_are_points; /* the DM is interpolated */
+  PetscBool sub;               /* a submesh: in the order of its points, with facets without their cells */
+  PetscBool part;              /* of another mesh, with its type: nodes need not have cells */
   const PetscInt *tag;         /* by point */
   PetscBool *owned, all_owned; /* by vertex */
   HycoTies ties;               /* borrowed; NULL: none */
@@ -324,15 +230,15 @@ static PetscErrorCode FindType(Builder *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* place[k]: the index of the k-th smallest key. */
-static PetscErrorCode Order(PetscInt n, const PetscInt key[], PetscInt place[])
+/* place[k]: the index of the k-th smallest tag; a submesh is in order. */
+static PetscErrorCode Order(const Builder *b, PetscInt n, const PetscInt key[], PetscInt place[])
 {
   PetscBool sorted;
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < n; k++) place[k] = k;
   PetscCall(PetscSortedInt(n, key, &sorted));
-  if (!sorted) PetscCall(PetscSortIntWithPermutation(n, key, place));
+  if (!sorted && !b->sub) PetscCall(PetscSortIntWithPermutation(n, key, place));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -396,7 +302,7 @@ static PetscErrorCode TakeCells(Builder *b)
     key[n] = b->tag[c];
     keep[n++] = c;
   }
-  PetscCall(Order(n, key, place));
+  PetscCall(Order(b, n, key, place));
   m->n_cells = n;
   PetscCall(PetscMalloc1(n, &b->m->cell_point));
   PetscCall(PetscMalloc1(n, &m->cell_id));
@@ -422,7 +328,7 @@ static PetscErrorCode TakeNodes(Builder *b)
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(b->v1 - b->v0, &b->node));
-  for (PetscInt v = b->v0; v < b->v1; v++) b->node[v - b->v0] = -1;
+  for (PetscInt v = b->v0; v < b->v1; v++) b->node[v - b->v0] = b->part ? 0 : -1;
   for (PetscInt k = 0; k < m->n_cells * m->nv; k++) b->node[m->cells[k] - b->v0] = 0;
   for (PetscInt e = 0; e < m->n_cells && b->ties; e++) {
     const PetscInt *followed;
@@ -437,7 +343,7 @@ static PetscErrorCode TakeNodes(Builder *b)
     key[n] = b->tag[v];
     keep[n++] = v;
   }
-  PetscCall(Order(n, key, place));
+  PetscCall(Order(b, n, key, place));
   m->n_nodes = n;
   PetscCall(PetscMalloc1(n, &b->m->node_point));
   PetscCall(PetscMalloc1(n, &m->node_id));
@@ -506,8 +412,9 @@ static void TurnOutward(HycoMesh m, PetscInt cell, PetscInt facet[])
   if (out < 0) Reverse(m->type, facet);
 }
 
-/* Adds a facet with a node that this process owns; `number` is its number in its cell. */
-static PetscErrorCode AddFacet(Builder *b, PetscInt cell, PetscInt number, const PetscInt node[])
+/* Adds a facet with a node that this process owns, of a cell or of a point without its cell (cell -1); `number` is its
+   number in its cell. */
+static PetscErrorCode AddFacet(Builder *b, PetscInt cell, PetscInt point, PetscInt number, const PetscInt node[])
 {
   HycoMesh m = b->m;
   PetscBool mine = PETSC_FALSE;
@@ -520,13 +427,15 @@ static PetscErrorCode AddFacet(Builder *b, PetscInt cell, PetscInt number, const
     for (PetscInt j = tied < 0 ? 0 : m->tied_start[tied]; tied >= 0 && j < m->tied_start[tied + 1]; j++)
       mine = (PetscBool)(mine || b->owned[m->node_point[m->tied_master[j]] - b->v0]);
   }
-  if (!mine || cell < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!mine) PetscFunctionReturn(PETSC_SUCCESS);
   if (b->n_facets == b->room) {
     b->room = 2 * b->room + 64;
     PetscCall(PetscRealloc((size_t)b->room * sizeof(*b->facet), &b->facet));
   }
   PetscCall(PetscArraycpy(b->facet[b->n_facets].node, node, m->nf));
   b->facet[b->n_facets].cell = cell;
+  b->facet[b->n_facets].point = point;
+  b->facet[b->n_facets].tag = cell < 0 ? b->tag[point] : m->cell_id[cell];
   b->facet[b->n_facets++].number = number;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -582,7 +491,7 @@ static PetscErrorCode AddFacetPoint(Builder *b, PetscInt group, PetscInt p, cons
   PetscCall(DMPlexGetCone(b->dm, support[0], &cone));
   while (number < HycoFacetCount(m->type) && cone[number] != p) number++;
   for (PetscInt v = 0; v < m->nf; v++) cell = node[v] < 0 ? -1 : cell;
-  if (cell >= 0) PetscCall(AddFacet(b, cell, number, node));
+  if (cell >= 0) PetscCall(AddFacet(b, cell, -1, number, node));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -601,8 +510,16 @@ static PetscErrorCode AddPoint(Builder *b, PetscInt group, PetscInt value, Petsc
       if (e >= 0) PetscCall(AddCell(b, group, e));
     } else if (e >= 0) {
       (void)HycoMeshFace(m, e, value - HYCO_FACET, node);
-      PetscCall(AddFacet(b, e, value - HYCO_FACET, node));
+      PetscCall(AddFacet(b, e, -1, value - HYCO_FACET, node));
     }
+  } else if (b->sub && p < b->v0) { /* a facet without its cell */
+    const PetscInt *cone;
+    PetscInt n;
+
+    PetscCall(DMPlexGetConeSize(b->dm, p, &n));
+    PetscCall(DMPlexGetCone(b->dm, p, &cone));
+    for (PetscInt v = 0; v < m->nf; v++) node[v] = b->node[cone[PetscMin(v, n - 1)] - b->v0];
+    PetscCall(AddFacet(b, -1, p, value - HYCO_FACET, node));
   } else {
     if (p < b->v0 || p >= b->v1)
       PetscCall(DMPlexGetPointDepth(b->dm, p, &depth));
@@ -623,11 +540,11 @@ static int CompareFacets(const void *a, const void *b)
 {
   const Facet *x = (const Facet *)a, *y = (const Facet *)b;
 
-  if (x->cell != y->cell) return x->cell < y->cell ? -1 : 1;
+  if (x->tag != y->tag) return x->tag < y->tag ? -1 : 1;
   return (x->number > y->number) - (x->number < y->number);
 }
 
-/* The facets of a group, in the order of their cells. */
+/* The facets of a group, in the order of their cells; those without their cell have their orientation. */
 static PetscErrorCode PlaceFacets(Builder *b, PetscInt group)
 {
   HycoMesh m = b->m;
@@ -638,13 +555,15 @@ static PetscErrorCode PlaceFacets(Builder *b, PetscInt group)
   PetscCall(PetscRealloc((size_t)(n * m->nf + 1) * sizeof(PetscInt), &m->facets));
   PetscCall(PetscRealloc((size_t)(n + 1) * sizeof(PetscInt), &m->facet_group));
   PetscCall(PetscRealloc((size_t)(n + 1) * sizeof(PetscInt), &m->facet_cell));
+  if (b->sub) PetscCall(PetscRealloc((size_t)(n + 1) * sizeof(PetscInt), &m->facet_point));
   for (PetscInt k = 0; k < b->n_facets; k++) {
     PetscInt *facet = m->facets + m->n_facets * m->nf;
 
     PetscCall(PetscArraycpy(facet, b->facet[k].node, m->nf));
-    TurnOutward(m, b->facet[k].cell, facet);
+    if (b->facet[k].cell >= 0) TurnOutward(m, b->facet[k].cell, facet);
     HycoFacetRepeatLast(m->nf, facet);
     m->facet_group[m->n_facets] = group;
+    if (b->sub) m->facet_point[m->n_facets] = b->facet[k].point;
     m->facet_cell[m->n_facets++] = b->facet[k].cell;
   }
   b->n_facets = 0;
@@ -665,6 +584,7 @@ static PetscErrorCode TakeGroup(Builder *b, PetscInt group, DMLabel label)
   PetscCall(ISGetLocalSize(values, &n_values));
   PetscCall(ISGetIndices(values, &value));
   for (PetscInt k = 0; k < n_values; k++) {
+    if (b->sub && value[k] < HYCO_FACET) m->group_dim[group] = value[k] - 1; /* also without points */
     PetscCall(DMLabelGetStratumIS(label, value[k], &points));
     if (!points) continue;
     PetscCall(ISGetLocalSize(points, &n));
@@ -736,18 +656,58 @@ static PetscErrorCode TakeBodies(Builder *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The cells and nodes of a submesh: facets without their cells are between them. */
+static PetscErrorCode FindStrata(Builder *b)
+{
+  const PetscInt dim = b->m->dim;
+  PetscInt depth;
+  PetscObject type;
+  IS points;
+
+  PetscFunctionBegin;
+  PetscCall(DMPlexGetDepth(b->dm, &depth));
+  PetscCall(DMPlexGetHeightStratum(b->dm, 0, &b->c0, &b->c1));
+  PetscCall(DMPlexGetDepthStratum(b->dm, 0, &b->v0, &b->v1));
+  PetscCall(HycoSubmeshGetPoints(b->dm, &points));
+  b->sub = (PetscBool)(points != NULL);
+  PetscCall(PetscObjectQuery((PetscObject)b->dm, TYPE, (PetscObject *)&type));
+  b->part = (PetscBool)(type != NULL);
+  b->facets_are_points = (PetscBool)(depth == dim && !b->part);
+  for (PetscInt end = b->c1, first = b->c0; b->sub && first < end;) {
+    DMPolytopeType of;
+
+    PetscCall(DMPlexGetCellType(b->dm, (first + end) / 2, &of));
+    if (DMPolytopeTypeGetDim(of) == dim)
+      first = (first + end) / 2 + 1;
+    else
+      end = b->c1 = (first + end) / 2;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Each node of a submesh, with or without cells, belongs to the first of the bodies in whose group it is. */
+static PetscErrorCode TakeNodeBodies(Builder *b)
+{
+  HycoMesh m = b->m;
+
+  PetscFunctionBegin;
+  for (PetscInt k = b->sub ? b->scene->n_bodies - 1 : -1; k >= 0; k--) {
+    PetscInt g = 0;
+
+    PetscCall(HycoMeshFindGroup(m, "body", b->scene->body[k].name, &g));
+    for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) m->node_body[m->group_node[j]] = k;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Makes the tables of this process's part, without the data that needs communication. */
 static PetscErrorCode MakeTables(Builder *b)
 {
   IS tags;
-  PetscInt depth;
 
   PetscFunctionBegin;
   PetscCall(DMGetDimension(b->dm, &b->m->dim));
-  PetscCall(DMPlexGetDepth(b->dm, &depth));
-  PetscCall(DMPlexGetHeightStratum(b->dm, 0, &b->c0, &b->c1));
-  PetscCall(DMPlexGetDepthStratum(b->dm, 0, &b->v0, &b->v1));
-  b->facets_are_points = (PetscBool)(depth == b->m->dim);
+  PetscCall(FindStrata(b));
   PetscCall(PetscObjectQuery((PetscObject)b->dm, HYCO_TAGS, (PetscObject *)&tags));
   PetscCall(ISGetIndices(tags, &b->tag));
   PetscCall(HycoTiesOf(b->dm, &b->ties));
@@ -758,6 +718,7 @@ static PetscErrorCode MakeTables(Builder *b)
   PetscCall(TakeGroups(b));
   PetscCall(TakeBodies(b));
   PetscCall(HycoMeshSetNodeBodies(b->scene, b->m));
+  PetscCall(TakeNodeBodies(b));
   PetscCall(ISRestoreIndices(tags, &b->tag));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -816,6 +777,7 @@ static void DropInnerFacets(HycoMesh m)
     if (m->group_dim[m->facet_group[f]] == m->dim) continue;
     memmove(m->facets + n * m->nf, m->facets + f * m->nf, (size_t)m->nf * sizeof(PetscInt));
     m->facet_group[n] = m->facet_group[f];
+    if (m->facet_point) m->facet_point[n] = m->facet_point[f];
     m->facet_cell[n++] = m->facet_cell[f];
   }
   m->n_facets = n;
@@ -828,9 +790,8 @@ static PetscErrorCode CheckGroups(MPI_Comm comm, HycoMesh m, HycoScene scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoPlexToMesh(DM dm, HycoScene scene, HycoMesh *mesh)
+PetscErrorCode HycoPlexToTables(DM dm, MPI_Comm comm, HycoScene scene, HycoMesh *mesh)
 {
-  const MPI_Comm comm = PetscObjectComm((PetscObject)dm);
   Builder b = {.dm = dm, .scene = scene};
   PetscMPIInt size;
   PetscErrorCode ierr = 0;
@@ -845,7 +806,7 @@ PetscErrorCode HycoPlexToMesh(DM dm, HycoScene scene, HycoMesh *mesh)
   if (size > 1) PetscCall(AgreeOnGroups(comm, b.m));
   DropInnerFacets(b.m);
   PetscCall(PetscStrlen(scene->mesh_path, &length));
-  if (scene->dm || (length > 3 && strcmp(scene->mesh_path + length - 3, ".h5") == 0)) /* no reader has checked it */
+  if (!b.part && (scene->dm || (length > 3 && strcmp(scene->mesh_path + length - 3, ".h5") == 0))) /* not yet checked */
     ierr = CheckGroups(comm, b.m, scene);
   if (size > 1 && !ierr) ierr = Number(&b);
   PetscCall(PetscFree(b.owned));
@@ -853,6 +814,15 @@ PetscErrorCode HycoPlexToMesh(DM dm, HycoScene scene, HycoMesh *mesh)
   PetscCall(PetscFree(b.cell));
   PetscCall(PetscFree(b.facet));
   PetscCall(ierr);
+  PetscCall(PetscObjectReference((PetscObject)dm));
+  b.m->dm = dm;
   *mesh = b.m;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPlexToMesh(DM dm, HycoScene scene, HycoMesh *mesh)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoPlexToTables(dm, PetscObjectComm((PetscObject)dm), scene, mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -28,10 +28,27 @@ PetscErrorCode HycoPlexVertices(DM dm, PetscBool interpolated, HycoCellType type
                                 PetscInt vertex[]);
 /* The HycoCellType of the mesh (-1: it has no cells), and whether it has collapsed cells. Collective. */
 PetscErrorCode HycoPlexType(DM dm, PetscInt *type, PetscBool *mixed);
+/* Sets them for a part, which need not have cells of all shapes, nor cells at all nodes. */
+PetscErrorCode HycoPlexSetType(DM dm, HycoCellType type, PetscBool mixed);
+/* As HycoPlexToMesh(), for the processes of comm; PETSC_COMM_SELF for a DM with points on one alone. */
+PetscErrorCode HycoPlexToTables(DM dm, MPI_Comm comm, HycoScene scene, HycoMesh *mesh);
+/* DMPlex's types of cells; the position of a node of a cell in its cone (shape HYCO_N_CELL_TYPES: for points that are
+   not cells). */
+extern const DMPolytopeType HycoPlexTypes[HYCO_N_CELL_TYPES];
+PetscInt HycoConePlace(HycoCellType shape, PetscInt node);
 /* The shape of a cell. */
 PetscErrorCode HycoPlexShape(DM dm, HycoCellType type, PetscInt cell, HycoCellType *shape);
 /* Whether a label of this name is DMPlex's own. */
 PetscBool HycoPlexOwnLabel(const char name[]);
+/* The DM alone of a submesh, of each process's part as in HycoSubmesh(). Collective. */
+PetscErrorCode HycoPlexCut(MPI_Comm comm, HycoScene scene, HycoMesh of, PetscInt n_keep, const PetscInt keep[],
+                           PetscInt n_extra, const PetscInt extra[], PetscInt n_all, const PetscInt all_facets[],
+                           DM *dm);
+/* Sets the subpoint IS of a submesh; takes ownership of point[n]. */
+PetscErrorCode HycoSubmeshSetPoints(DM sub, PetscInt n, PetscInt point[]);
+/* The name of a group's label, and the label. */
+PetscErrorCode HycoPlexLabelName(const char group[], size_t room, char name[]);
+PetscErrorCode HycoPlexGroupLabel(DM dm, const char group[], DMLabel *label);
 /* The number of facets of a cell; the nodes of facet `number`, in gmsh's order: corners, middles of the sides,
    middle of the face. */
 PetscInt HycoFacetCount(HycoCellType type);

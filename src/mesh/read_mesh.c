@@ -65,6 +65,8 @@ static PetscErrorCode CheckBodies(HycoScene scene, Reader *r, HycoMesh m)
       if (r->group[k].dim == 0) continue;
       if (r->group[k].body == b) {
         n += r->group[k].n;
+        HycoCheck(r->group[k].n, "body \"%s\" is a group of dimension %d without cells in %s; mesh with gmsh -%d",
+                  r->group[k].name, r->group[k].dim, scene->mesh_path, r->group[k].dim);
         HycoCheck(r->group[k].dim == m->dim, "body %s is a group of dimension %d; the other bodies have dimension %d",
                   r->group[k].name, r->group[k].dim, (int)m->dim);
         shape = HycoMshType(m->dim, r->group[k].nv);
@@ -161,17 +163,14 @@ static PetscBool CellHas(HycoMesh m, PetscInt cell, PetscInt n, const PetscInt n
   return PETSC_TRUE;
 }
 
-/* Whether the facet is already in the group: a file may list it several times, and it counts once. */
+/* Whether the facet is already in the group: a file may list it several times, and it counts once. Facets are compared
+   by their number in the cell, because those of collapsed cells repeat a node. */
 static PetscBool HasTwin(const Reader *r, HycoMesh m, PetscInt cell, PetscInt group, const PetscInt facet[])
 {
-  for (PetscInt f = r->last[cell]; f >= 0; f = r->before[f]) {
-    const PetscInt *other = m->facets + f * m->nf;
-    PetscInt same = 0;
+  const PetscInt number = HycoCellFace(m, cell, facet);
 
-    for (PetscInt v = 0; v < m->nf; v++) {
-      for (PetscInt w = 0; w < m->nf; w++) same += facet[v] == other[w];
-    }
-    if (m->facet_group[f] == group && same == m->nf) return PETSC_TRUE;
+  for (PetscInt f = r->last[cell]; f >= 0; f = r->before[f]) {
+    if (m->facet_group[f] == group && HycoMeshFacetNumber(m, f) == number) return PETSC_TRUE;
   }
   return PETSC_FALSE;
 }

@@ -43,9 +43,9 @@ static PetscErrorCode Meet(HycoReducer t, HycoROM m)
   if (!f->searches) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoSamplesGet(t->samples, &n, NULL, &mu));
   PetscCall(HycoMetDestroy(&t->met));
-  PetscCall(PetscMalloc1(t->scene->n_contacts, &m->master_reach));
-  PetscCall(HycoMetReach(t->scene, f->surface, &f->pairs, n, mu, t->Lambda, m->master_reach));
-  PetscCall(HycoMetFind(t->scene, f->surface, &f->pairs, n, mu, m->master_reach, &t->met));
+  PetscCall(PetscMalloc1(t->scene->n_contacts, &m->model->master_reach));
+  PetscCall(HycoMetReach(t->scene, f->surface, &f->pairs, n, mu, t->Lambda, m->model->master_reach));
+  PetscCall(HycoMetFind(t->scene, f->surface, &f->pairs, n, mu, m->model->master_reach, &t->met));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -72,7 +72,7 @@ static PetscErrorCode FindCells(HycoReducer t, PetscBool in[])
 {
   const HycoRIDSettings settings = {t->n_seeds_node, t->n_seeds_cell, t->seeds_node, t->seeds_cell,
                                     t->layers,       t->extension,    t->n_groups,   t->groups,
-                                    t->plane,        t->region,       t->whole_rid,  t->prototype->traits.cells};
+                                    t->plane,        t->region,       t->whole_rid,  t->prototype->model->traits.cells};
   HycoMesh part = t->fom->part;
   DMLabel rid;
 
@@ -95,64 +95,68 @@ static PetscErrorCode GatherCells(HycoReducer t, const PetscBool in[], HycoMesh 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(part->n_groups, &group));
   PetscCall(HycoMarkContactGroups(t->scene, part, group));
-  for (PetscInt k = 0; t->prototype->traits.cells && k < t->scene->n_loads; k++) {
+  for (PetscInt k = 0; t->prototype->model->traits.cells && k < t->scene->n_loads; k++) {
     PetscInt g = 0;
 
     PetscCall(HycoMeshFindGroup(part, "load", t->scene->load[k].group, &g));
     group[g] = PETSC_TRUE;
   }
-  PetscCall(HycoMeshGather(HycoComm(t), part, group, in, mesh));
+  PetscCall(HycoMeshGather(t->scene, part, group, in, mesh));
   PetscCall(PetscFree(group));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* node[i]: the node of m that is node i of the contacts' surfaces, or -1. Rank 0. */
+static PetscErrorCode FindSurface(HycoMesh surface, HycoMesh m, PetscInt node[])
+{
+  PetscInt *whole, *at;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(m->n_nodes, &whole, m->n_nodes, &at));
+  for (PetscInt i = 0; i < m->n_nodes; i++) {
+    whole[i] = m->node_whole ? m->node_whole[i] : i;
+    at[i] = i;
+  }
+  PetscCall(PetscSortIntWithArray(m->n_nodes, whole, at));
+  for (PetscInt i = 0; i < surface->n_nodes; i++) {
+    PetscCall(PetscFindInt(surface->node_whole ? surface->node_whole[i] : i, m->n_nodes, whole, &node[i]));
+    node[i] = node[i] < 0 ? -1 : at[node[i]];
+  }
+  PetscCall(PetscFree2(whole, at));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The model's mesh of the cells in[] (NULL: all) of `from`: these, their nodes, the nodes and surfaces of every
    contact; its nodes' numbers in the distributed vectors; for each node of the surfaces its node of that mesh (-1:
    none). Rank 0. */
-static PetscErrorCode ExtractMesh(HycoReducer t, HycoMesh from, const PetscBool in[], HycoROM m, PetscInt **global)
+static PetscErrorCode CutMesh(HycoReducer t, HycoMesh from, const PetscBool in[], HycoROM m, PetscInt **global)
 {
   HycoMesh surface = t->fom->surface;
   PetscBool *contact;
-  PetscInt *keep, *extra, *all, *node, *at, n_keep = 0, n_extra = 0, n_all = 0, n;
+  PetscInt *keep, *extra, *all, n_keep = 0, n_extra = 0, n_all = 0;
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(surface->n_nodes, &contact));
   PetscCall(PetscMalloc1(3 * t->scene->n_contacts + t->scene->n_loads, &all));
   PetscCall(PetscMalloc2(from->n_cells, &keep, surface->n_nodes, &extra));
   PetscCall(SurfacesOf(t, contact, &n_all, all));
-  for (PetscInt k = 0; t->prototype->traits.cells && k < t->scene->n_loads; k++)
+  for (PetscInt k = 0; t->prototype->model->traits.cells && k < t->scene->n_loads; k++)
     PetscCall(HycoMeshFindGroup(from, "load", t->scene->load[k].group, &all[n_all++]));
   for (PetscInt e = 0; e < from->n_cells; e++) {
     if (!in || in[e]) keep[n_keep++] = e;
   }
+  PetscCall(FindSurface(surface, from, extra));
   for (PetscInt i = 0; i < surface->n_nodes; i++) {
-    extra[n_extra] = i;
-    if (from->node_whole)
-      PetscCall(PetscFindInt(surface->node_whole[i], from->n_nodes, from->node_whole, extra + n_extra));
-    n_extra += contact[i];
+    if (contact[i]) extra[n_extra++] = extra[i];
   }
-  PetscCall(HycoMeshExtract(from, n_keep, keep, n_extra, extra, n_all, all, &m->mesh));
-  n = m->mesh->n_nodes;
-  HycoDuplicate(n, m->mesh->node_whole, global);
-  for (PetscInt i = 0; i < n && from->node_whole; i++) {
-    (*global)[i] = from->node_global[m->mesh->node_whole[i]];
-    m->mesh->node_whole[i] = from->node_whole[m->mesh->node_whole[i]];
-  }
-  for (PetscInt e = 0; e < m->mesh->n_cells && from->cell_whole; e++)
-    m->mesh->cell_whole[e] = from->cell_whole[m->mesh->cell_whole[e]];
+  PetscCall(HycoSubmesh(t->scene, from, n_keep, keep, n_extra, extra, n_all, all, &m->model->mesh));
+  PetscCall(PetscMalloc1(m->model->mesh->n_nodes, global));
+  PetscCall(HycoSubmeshNodes(m->model->mesh, from, *global));
+  for (PetscInt i = 0; i < m->model->mesh->n_nodes && from->node_global; i++)
+    (*global)[i] = from->node_global[(*global)[i]];
   PetscCall(PetscFree(t->surface_node));
   PetscCall(PetscMalloc1(surface->n_nodes, &t->surface_node));
-  PetscCall(PetscMalloc2(n, &node, n, &at));
-  for (PetscInt i = 0; i < n; i++) at[i] = i;
-  PetscCall(PetscArraycpy(node, m->mesh->node_whole, n));
-  PetscCall(PetscSortIntWithArray(n, node, at));
-  for (PetscInt i = 0; i < surface->n_nodes; i++) {
-    PetscInt place;
-
-    PetscCall(PetscFindInt(surface->node_whole ? surface->node_whole[i] : i, n, node, &place));
-    t->surface_node[i] = place < 0 ? -1 : at[place];
-  }
-  PetscCall(PetscFree2(node, at));
+  PetscCall(FindSurface(surface, m->model->mesh, t->surface_node));
   PetscCall(PetscFree2(keep, extra));
   PetscCall(PetscFree(all));
   PetscCall(PetscFree(contact));
@@ -192,25 +196,26 @@ static PetscErrorCode FetchNotes(HycoReducer t, const PetscBool in[], PetscInt n
 static PetscErrorCode TakeSets(HycoReducer t, HycoROM m, const PetscInt note[])
 {
   HycoFOM f = t->fom;
-  const PetscInt n = m->mesh->n_nodes, dim = m->mesh->dim;
+  const PetscInt n = m->model->mesh->n_nodes, dim = m->model->mesh->dim;
+  PetscInt *sets;
 
   PetscFunctionBegin;
   PetscCall(PetscFree(t->fixed));
   PetscCall(PetscMalloc1(n * dim, &t->fixed));
   for (PetscInt k = 0; k < n * dim; k++) t->fixed[k] = (PetscBool)((note[k / dim] >> k % dim & 1) != 0);
-  PetscCall(PetscMalloc1(n, &m->role));
-  for (PetscInt i = 0; i < n; i++) m->role[i] = HYCO_ROLE_OUTSIDE;
-  for (PetscInt e = 0; e < m->mesh->n_cells; e++) { /* whether connected to Omega_B */
+  PetscCall(PetscCalloc1(n, &sets));
+  for (PetscInt e = 0; e < m->model->mesh->n_cells; e++) { /* whether connected to Omega_B */
     PetscInt node[HYCO_MAX_CELL_NODES];
-    const PetscInt n_nodes = HycoMeshCellNodes(m->mesh, e, node);
+    const PetscInt n_nodes = HycoMeshCellNodes(m->model->mesh, e, node);
 
-    for (PetscInt v = 0; v < n_nodes; v++)
-      m->role[node[v]] = note[node[v]] & BESIDE ? HYCO_ROLE_INTERFACE : HYCO_ROLE_A;
+    for (PetscInt v = 0; v < n_nodes; v++) sets[node[v]] = note[node[v]] & BESIDE ? 1 : 2;
   }
-  PetscCall(PetscMalloc1(f->n_contacts, &m->in_rid));
+  PetscCall(PetscMalloc1(f->n_contacts, &m->model->in_rid));
   PetscCall(HycoRIDSets(f->fe_surface, &f->pairs, f->searches ? &t->met.rows : &f->pairs,
-                        f->searches ? t->met.of : NULL, t->surface_node, n, m->role, m->in_rid));
-  PetscCall(HycoPairsRenumber(&f->pairs, t->surface_node, &m->pairs));
+                        f->searches ? t->met.of : NULL, t->surface_node, n, sets, m->model->in_rid));
+  PetscCall(HycoROMSetDomain(m, sets));
+  PetscCall(PetscFree(sets));
+  PetscCall(HycoPairsRenumber(&f->pairs, t->surface_node, &m->model->pairs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -225,13 +230,13 @@ static PetscErrorCode CutDomain(HycoReducer t, HycoROM m)
   PetscCall(PetscMalloc1(t->fom->part->n_cells, &in));
   PetscCall(FindCells(t, in));
   if (t->fom->size == 1)
-    PetscCall(ExtractMesh(t, t->fom->part, in, m, &global));
+    PetscCall(CutMesh(t, t->fom->part, in, m, &global));
   else {
     PetscCall(GatherCells(t, in, &gathered));
-    HycoOnRoot(HycoComm(t), ExtractMesh(t, gathered, NULL, m, &global));
+    HycoOnRoot(HycoComm(t), CutMesh(t, gathered, NULL, m, &global));
     PetscCall(HycoMeshDestroy(&gathered));
   }
-  if (m) n = m->mesh->n_nodes;
+  if (m) n = m->model->mesh->n_nodes;
   PetscCall(PetscMalloc1(n, &note));
   PetscCall(FetchNotes(t, in, n, global, note));
   HycoOnRoot(HycoComm(t), TakeSets(t, m, note));
@@ -285,12 +290,17 @@ PetscErrorCode HycoTrainingAddFact(HycoTraining *r, const char name[], PetscReal
 /* Greedy: with more modes than unknowns in A, some would have no equation. Collective; m: on rank 0. */
 static PetscErrorCode LimitModes(HycoReducer t, HycoROM m)
 {
-  const PetscInt dim = t->sizes[3], l = t->l;
-  PetscInt n_A = 0;
+  const PetscInt dim = t->sizes[3], l = t->l, *node;
+  PetscInt n, n_A = 0;
 
   PetscFunctionBegin;
   if (!t->grown) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt i = 0; m && i < m->mesh->n_nodes * dim; i++) n_A += m->role[i / dim] == HYCO_ROLE_A && !t->fixed[i];
+  if (m) {
+    PetscCall(ISGetLocalSize(m->model->inside, &n));
+    PetscCall(ISGetIndices(m->model->inside, &node));
+    for (PetscInt k = 0; k < n * dim; k++) n_A += !t->fixed[node[k / dim] * dim + k % dim];
+    PetscCall(ISRestoreIndices(m->model->inside, &node));
+  }
   PetscCallMPI(MPI_Bcast(&n_A, 1, MPIU_INT, 0, HycoComm(t)));
   if (n_A >= l || !n_A) PetscFunctionReturn(PETSC_SUCCESS);
   t->l = n_A;
@@ -301,33 +311,33 @@ static PetscErrorCode LimitModes(HycoReducer t, HycoROM m)
 /* Stores the modes on the reduced mesh, the training points, and the origin of the data. */
 static PetscErrorCode FillModel(HycoReducer t, HycoROM m)
 {
-  const PetscInt n_dof = m->mesh->n_nodes * t->sizes[3];
+  const PetscInt n_dof = m->model->mesh->n_nodes * t->sizes[3];
   PetscInt n_par;
   const PetscReal *mu;
   char *text;
   char line[2 * HYCO_LINE];
 
   PetscFunctionBegin;
-  PetscCall(HycoSamplesGet(t->samples, &m->n_points, &n_par, &mu));
-  m->l = t->l;
-  HycoDuplicate(t->l, t->sigma, &m->sigma);
-  PetscCall(PetscMalloc1(n_dof * m->l, &m->V));
+  PetscCall(HycoSamplesGet(t->samples, &m->model->n_points, &n_par, &mu));
+  m->model->l = t->l;
+  HycoDuplicate(t->l, t->sigma, &m->model->sigma);
+  PetscCall(PetscMalloc1(n_dof * m->model->l, &m->model->V));
   for (PetscInt i = 0; i < n_dof; i++) {
-    for (PetscInt j = 0; j < m->l; j++) m->V[i * m->l + j] = t->V_rid[j * n_dof + i];
+    for (PetscInt j = 0; j < m->model->l; j++) m->model->V[i * m->model->l + j] = t->V_rid[j * n_dof + i];
   }
-  HycoDuplicate(m->n_points * n_par, mu, &m->points);
-  m->whole_nodes = t->sizes[0];
-  m->whole_cells = t->sizes[1];
-  m->counts[0] = t->counts[HYCO_SEED_DUAL];
-  m->counts[1] = t->counts[HYCO_SEED_STRESS];
-  m->counts[2] = t->counts[HYCO_SEED_FORCE];
+  HycoDuplicate(m->model->n_points * n_par, mu, &m->model->points);
+  m->model->whole_nodes = t->sizes[0];
+  m->model->whole_cells = t->sizes[1];
+  m->model->counts[0] = t->counts[HYCO_SEED_DUAL];
+  m->model->counts[1] = t->counts[HYCO_SEED_STRESS];
+  m->model->counts[2] = t->counts[HYCO_SEED_FORCE];
   snprintf(line, sizeof(line), "  written by hyco %s with PETSc %d.%d.%d\n", HycoVersion(), PETSC_VERSION_MAJOR,
            PETSC_VERSION_MINOR, PETSC_VERSION_SUBMINOR);
-  PetscCall(PetscStrallocpy(line, &m->provenance));
-  snprintf(m->fingerprint, sizeof(m->fingerprint), "%016llx", t->fingerprint);
+  PetscCall(PetscStrallocpy(line, &m->model->provenance));
+  snprintf(m->model->fingerprint, sizeof(m->model->fingerprint), "%016llx", t->fingerprint);
   /* the model has its own scene, read from the text stored in its file */
   PetscCall(HycoSceneToText(t->scene, &text));
-  PetscCall(HycoSceneFromText(PETSC_COMM_SELF, text, &m->scene));
+  PetscCall(HycoSceneFromText(PETSC_COMM_SELF, text, &m->model->scene));
   PetscCall(PetscFree(text));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -336,25 +346,23 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
 {
   PetscFunctionBegin;
   r->n_facts = 0; /* of the previous iteration */
-  r->stiffness = m->traits.stiffness;
-  r->chosen.settings.rid = (PetscBool)(m->traits.settings == HYCO_SETTINGS_RID);
-  r->n_samples = m->n_points;
+  r->stiffness = m->model->traits.stiffness;
+  r->chosen.settings.rid = (PetscBool)(m->model->traits.settings == HYCO_SETTINGS_RID);
+  r->n_samples = m->model->n_points;
   r->n_modes = t->l;
   r->n_dual_modes = t->counts[HYCO_SEED_DUAL];
   r->n_stress_modes = t->counts[HYCO_SEED_STRESS];
   r->n_force_modes = t->counts[HYCO_SEED_FORCE];
-  r->n_fe_dofs = m->n_fe;
-  r->rid_nodes = r->rid_a_nodes = r->rid_contacts = 0;
-  for (PetscInt i = 0; i < m->mesh->n_nodes; i++) {
-    r->rid_nodes += m->role[i] != HYCO_ROLE_OUTSIDE;
-    r->rid_a_nodes += m->role[i] == HYCO_ROLE_A;
-  }
-  for (PetscInt k = 0; k < m->pairs.n; k++) r->rid_contacts += m->in_rid[k];
-  r->rid_elements = m->mesh->n_cells;
-  r->rid_fraction = (PetscReal)m->mesh->n_cells / m->whole_cells;
-  r->condition = m->numbers[0];
-  r->error_u = m->numbers[1];
-  r->error_lambda = m->numbers[2];
+  r->n_fe_dofs = m->model->n_fe;
+  r->rid_contacts = 0;
+  PetscCall(ISGetLocalSize(m->model->rid, &r->rid_nodes));
+  PetscCall(ISGetLocalSize(m->model->inside, &r->rid_a_nodes));
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) r->rid_contacts += m->model->in_rid[k];
+  r->rid_elements = m->model->mesh->n_cells;
+  r->rid_fraction = (PetscReal)m->model->mesh->n_cells / m->model->whole_cells;
+  r->condition = m->model->numbers[0];
+  r->error_u = m->model->numbers[1];
+  r->error_lambda = m->model->numbers[2];
   if (m->ops->report) PetscCall((*m->ops->report)(t, m, r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -368,8 +376,8 @@ static PetscErrorCode CheckForces(HycoReducer t, HycoROM m)
   PetscFunctionBegin;
   PetscCall(PetscObjectSetOptions((PetscObject)t->prototype, t->scene->options));
   PetscCall(HycoROMSetFromOptions(t->prototype)); /* as for the model's predictions */
-  for (PetscInt k = 0; k < m->pairs.n; k++) kept = (PetscBool)(kept || m->in_rid[k]);
-  for (PetscInt k = 0; k < t->n_s * m->pairs.n; k++) presses = (PetscBool)(presses || t->Lambda[k] > 0);
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) kept = (PetscBool)(kept || m->model->in_rid[k]);
+  for (PetscInt k = 0; k < t->n_s * m->model->pairs.n; k++) presses = (PetscBool)(presses || t->Lambda[k] > 0);
   HycoCheckModel(!m->ops->reconstruct || !t->prototype->reconstruct || kept || !presses,
                  "the RID has no contact, and the training solutions have contact forces, so that the model would give "
                  "none; extend the RID to the contact (-hyco_rid_modes displacement,dual or -hyco_rid_groups GROUP), "
@@ -383,13 +391,13 @@ static PetscErrorCode CheckUseful(HycoReducer t, HycoROM m)
   char worst[HYCO_LINE] = "";
 
   PetscFunctionBegin;
-  if (!(m->numbers[1] < 0.5)) HycoReducerNameWorst(t, worst);
-  HycoCheckModel(m->numbers[1] < 0.5,
+  if (!(m->model->numbers[1] < 0.5)) HycoReducerNameWorst(t, worst);
+  HycoCheckModel(m->model->numbers[1] < 0.5,
                  "the model misses its own training displacements by %.0f %% on average (RID %d elements, %d modes, "
                  "condition %.0e)%s: enlarge the RID (-hyco_rid_layers 1, -hyco_rid_contact_extension LENGTH), or use "
                  "fewer modes (-hyco_pod_tol)%s",
-                 100 * (double)m->numbers[1], (int)m->mesh->n_cells, (int)m->l, (double)m->numbers[0], worst,
-                 m->scene->n_times ? ", or -hyco_model_type cubature" : "");
+                 100 * (double)m->model->numbers[1], (int)m->model->mesh->n_cells, (int)m->model->l,
+                 (double)m->model->numbers[0], worst, m->model->scene->n_times ? ", or -hyco_model_type cubature" : "");
   PetscCall(CheckForces(t, m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -397,17 +405,17 @@ static PetscErrorCode CheckUseful(HycoReducer t, HycoROM m)
 /* Notes the contacts that have a force in some training solution. */
 static PetscErrorCode TakeClosed(HycoReducer t, HycoROM m)
 {
-  const PetscInt N = m->pairs.n;
+  const PetscInt N = m->model->pairs.n;
 
   PetscFunctionBegin;
-  PetscCall(PetscFree(m->closed));
-  PetscCall(PetscCalloc1(N, &m->closed));
+  PetscCall(PetscFree(m->model->closed));
+  PetscCall(PetscCalloc1(N, &m->model->closed));
   for (PetscInt k = 0; k < t->n_s; k++) {
     const PetscReal *L = t->Lambda + (size_t)k * (size_t)N;
     PetscReal most = 0;
 
     for (PetscInt i = 0; i < N; i++) most = PetscMax(most, L[i]);
-    for (PetscInt i = 0; i < N; i++) m->closed[i] = m->closed[i] || L[i] > HYCO_PRESSES * most;
+    for (PetscInt i = 0; i < N; i++) m->model->closed[i] = m->model->closed[i] || L[i] > HYCO_PRESSES * most;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -422,7 +430,7 @@ static PetscErrorCode BuildModel(HycoReducer t, PetscBool useful, HycoROM m, Hyc
   if (useful) PetscCall(CheckUseful(t, m));
   PetscCall(Report(t, m, report));
   PetscCall(HycoROMReset(m));
-  PetscCall(PetscObjectSetOptions((PetscObject)m, m->scene->options));
+  PetscCall(PetscObjectSetOptions((PetscObject)m, m->model->scene->options));
   PetscCall(HycoROMSetFromOptions(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -434,7 +442,7 @@ static PetscErrorCode BeginOnRoot(HycoReducer t, HycoROM *model)
 
   PetscFunctionBegin;
   PetscCall(HycoROMCreate(model));
-  ierr = HycoROMSetType(*model, t->prototype->type);
+  ierr = HycoROMSetType(*model, t->prototype->model->type);
   if (!ierr) ierr = Meet(t, *model);
   if (ierr) (void)!HycoROMDestroy(model);
   PetscCall(ierr);
@@ -456,17 +464,22 @@ static PetscErrorCode BuildOnRoot(HycoReducer t, PetscBool useful, HycoROM *mode
    and unless all of A is kept on the contacts' surfaces; for a cubature all; for other types none. Rank 0. */
 static PetscErrorCode MarkJudged(HycoReducer t, HycoROM m, PetscBool judged[])
 {
-  const HycoROMTraits *traits = &t->prototype->traits;
+  const HycoROMTraits *traits = &t->prototype->model->traits;
   const PetscBool all = (PetscBool)(t->hybrid == HYCO_HYBRID_ALL);
   HycoMesh surface = t->fom->surface;
+  PetscInt *sets;
 
   PetscFunctionBegin;
-  for (PetscInt i = 0; i < m->mesh->n_nodes; i++) judged[i] = (PetscBool)(traits->cells || all);
+  for (PetscInt i = 0; i < m->model->mesh->n_nodes; i++) judged[i] = (PetscBool)(traits->cells || all);
   for (PetscInt i = 0; surface && i < surface->n_nodes; i++) {
     if (t->surface_node[i] >= 0) judged[t->surface_node[i]] = PETSC_TRUE;
   }
-  for (PetscInt i = 0; i < m->mesh->n_nodes && !traits->cells; i++)
-    judged[i] = (PetscBool)(judged[i] && traits->settings == HYCO_SETTINGS_RID && m->role[i] == HYCO_ROLE_A);
+  if (traits->cells) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(m->model->mesh->n_nodes, &sets));
+  PetscCall(HycoROMGetDomain(m, sets));
+  for (PetscInt i = 0; i < m->model->mesh->n_nodes; i++)
+    judged[i] = (PetscBool)(judged[i] && (traits->surfaces || (traits->settings == HYCO_SETTINGS_RID && sets[i] == 2)));
+  PetscCall(PetscFree(sets));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -474,7 +487,7 @@ static PetscErrorCode MarkJudged(HycoReducer t, HycoROM m, PetscBool judged[])
    because they are a share of all snapshots on one rank. Collective. */
 static PetscErrorCode FetchJudged(HycoReducer t, HycoROM m)
 {
-  const PetscInt n = m ? m->mesh->n_nodes : 0;
+  const PetscInt n = m ? m->model->mesh->n_nodes : 0;
   PetscBool *judged;
   PetscInt *node;
 
@@ -486,7 +499,7 @@ static PetscErrorCode FetchJudged(HycoReducer t, HycoROM m)
   if (m) PetscCall(MarkJudged(t, m, judged));
   for (PetscInt i = 0; i < n; i++) {
     t->rid_row[i] = judged[i] ? t->n_rid_nodes : -1;
-    if (judged[i]) node[t->n_rid_nodes++] = m->mesh->node_whole[i];
+    if (judged[i]) node[t->n_rid_nodes++] = m->model->mesh->node_whole[i];
   }
   PetscCall(HycoReducerFetchSnapshots(t, t->n_rid_nodes, node, &t->U_rid));
   PetscCall(PetscFree2(judged, node));
@@ -496,7 +509,7 @@ static PetscErrorCode FetchJudged(HycoReducer t, HycoROM m)
 /* Fetches to rank 0 the rows that the model is made of and judged by. Collective. */
 static PetscErrorCode FetchOnModel(HycoReducer t, HycoROM m)
 {
-  const PetscInt n = m ? m->mesh->n_nodes : 0, *node = m ? m->mesh->node_whole : NULL;
+  const PetscInt n = m ? m->model->mesh->n_nodes : 0, *node = m ? m->model->mesh->node_whole : NULL;
 
   PetscFunctionBegin;
   PetscCall(FetchJudged(t, m));
@@ -517,13 +530,14 @@ PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, HycoROM *model,
   ierr = CutDomain(t, *model);
   if (!ierr) ierr = LimitModes(t, *model);
   if (!ierr) ierr = FetchOnModel(t, *model);
+  if (!ierr) ierr = HycoReducerFindFloating(t, *model);
   if (ierr) (void)!HycoROMDestroy(model);
   PetscCall(ierr);
   HycoOnRoot(HycoComm(t), BuildOnRoot(t, useful, model, report));
   HycoFreeAll(&t->U_rid, &t->rid_row, &t->V_rid); /* before the other ranks' models, of which rank 0 has one too */
   PetscCall(HycoLogEvent(HYCO_EVENT_MODEL, PETSC_FALSE));
   PetscCallMPI(MPI_Bcast(report, sizeof(*report), MPI_BYTE, 0, HycoComm(t)));
-  report->type = report->chosen.settings.type = t->prototype->type; /* set on each rank */
+  report->type = report->chosen.settings.type = t->prototype->model->type; /* set on each rank */
   PetscCall(HycoROMBroadcast(HycoComm(t), model));
   if (!useful || !t->prototype->ops->finish) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoLogEvent(HYCO_EVENT_SCAN, PETSC_TRUE));

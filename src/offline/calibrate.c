@@ -194,14 +194,14 @@ static void Reach(PetscInt n, const HycoHeldOut rows[], PetscReal reached[])
 }
 
 /* Numbers the points' groups: those of one stiffness, if not all parameters affect it, are not independent. */
-static PetscErrorCode Group(HycoReducer t, PetscInt n, HycoHeldOut rows[])
+static PetscErrorCode Group(HycoReducer t, HycoSamples points, PetscInt n, HycoHeldOut rows[])
 {
   PetscBool reaches[HYCO_MAX_PARAMETERS];
   PetscInt n_par, n_stiff = 0;
   const PetscReal *mu;
 
   PetscFunctionBegin;
-  PetscCall(HycoSamplesGet(t->held, NULL, &n_par, &mu));
+  PetscCall(HycoSamplesGet(points, NULL, &n_par, &mu));
   HycoSceneReaches(t->scene, reaches);
   for (PetscInt p = 0; p < n_par; p++) n_stiff += reaches[p];
   for (PetscInt i = 0; i < n; i++) {
@@ -247,18 +247,17 @@ static PetscErrorCode NameSettings(const HycoTraining *report, HycoROM m)
                (int)report->n_added, (int)report->n_fresh);
   snprintf(text, sizeof(text), "  settings number %d of the %d that were tried: %s\n%s", (int)chosen->number,
            (int)chosen->of, settings, fresh);
-  PetscCall(PetscFree(m->search));
-  PetscCall(PetscStrallocpy(text, &m->search));
+  PetscCall(PetscFree(m->model->search));
+  PetscCall(PetscStrallocpy(text, &m->model->search));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Fits the formulas, and stores the errors in the model. Rank 0. */
-static PetscErrorCode Conclude(HycoReducer t, HycoHeldOut rows[], HycoOutputErrors outputs[], HycoROM m,
-                               HycoTraining *report)
+static PetscErrorCode Conclude(HycoReducer t, HycoSamples points, PetscInt n, HycoHeldOut rows[],
+                               HycoOutputErrors outputs[], HycoROM m, HycoTraining *report)
 {
   const HycoValidation *v = &report->held_out;
   HycoEstimates estimates = {0};
-  PetscInt n;
 
   PetscFunctionBegin;
   estimates.n_held = v->n;
@@ -266,9 +265,9 @@ static PetscErrorCode Conclude(HycoReducer t, HycoHeldOut rows[], HycoOutputErro
     estimates.median[e] = v->median[errors[e]];
     estimates.largest[e] = v->largest[errors[e]];
   }
-  estimates.force = HycoHeldOutForce(v->n, rows);
-  PetscCall(Group(t, v->n, rows));
-  n = KeepConverged(v->n, rows, outputs);
+  estimates.force = HycoHeldOutForce(n, rows);
+  PetscCall(Group(t, points, n, rows));
+  n = KeepConverged(n, rows, outputs);
   Reach(n, rows, estimates.reached);
   PetscCall(FitAll(t, n, rows, &estimates));
   estimates.n_outputs = t->scene->n_quantities;
@@ -278,33 +277,99 @@ static PetscErrorCode Conclude(HycoReducer t, HycoHeldOut rows[], HycoOutputErro
     PetscCall(FitOutput(n, rows, outputs, q, &estimates));
     report->output[q] = (HycoOutputValidation){o->median, o->largest, o->magnitude, o->has};
   }
-  report->n_held = estimates.n;
-  m->estimates = estimates;
+  report->n_held = PetscMin(estimates.n, v->n);
+  m->model->estimates = estimates;
   PetscCall(NameSettings(report, m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+#define CORNERS 3 /* held-out points for each corner that judges too */
+
+/* The training points at corners of the ranges, at most `most`, spread over them. The held-out points of a training on
+   a closed grid have no corner, where errors may be larger than inside although the corner was trained on. */
+static PetscErrorCode TrainingCorners(HycoReducer t, PetscInt most, HycoSamples *corners)
+{
+  const HycoScene scene = t->scene;
+  PetscInt n, n_par, found = 0, *at;
+  const PetscReal *mu;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesCreate(scene, corners));
+  PetscCall(HycoSamplesGet(t->samples, &n, &n_par, &mu));
+  PetscCall(PetscMalloc1(n, &at));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscBool corner = PETSC_TRUE;
+
+    for (PetscInt p = 0; p < n_par; p++)
+      corner = (PetscBool)(corner && (mu[k * n_par + p] == scene->lo[p] || mu[k * n_par + p] == scene->hi[p]));
+    if (corner) at[found++] = k;
+  }
+  most = PetscMin(most, found);
+  for (PetscInt k = 0; k < most; k++) PetscCall(HycoSamplesAddPoint(*corners, mu + at[k * found / most] * n_par));
+  PetscCall(PetscFree(at));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Judges at n_corners corners too: their rows follow those of the held-out points. */
+static PetscErrorCode JudgeCorners(HycoReducer t, HycoSamples corners, PetscInt n, PetscInt n_corners, HycoROM model,
+                                   HycoSnapshots store, HycoHeldOut rows[], HycoValidation *held_out)
+{
+  HycoValidation there = {0};
+
+  PetscFunctionBegin;
+  if (!n_corners) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoReducerPredictHeldOut(t, corners, model, store, NULL, rows + n));
+  PetscCall(HycoHeldOutSummarise(n_corners, rows + n, HycoHeldOutForce(n + n_corners, rows), &there));
+  for (PetscInt e = 0; e < HYCO_N_ERRORS; e++) {
+    held_out->largest[e] = PetscMax(held_out->largest[e], there.largest[e]);
+    held_out->end[e] = PetscMax(held_out->end[e], there.end[e]);
+  }
+  held_out->not_converged += there.not_converged;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Fits the estimates to the errors at `points`, which are those of the n rows. */
+static PetscErrorCode Learn(HycoReducer t, HycoSamples points, PetscInt n, HycoHeldOut rows[], HycoROM model,
+                            HycoSnapshots store, HycoTraining *report)
+{
+  HycoOutputErrors *outputs;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(n, &outputs));
+  PetscCall(HycoReducerJudgeOutputs(t, points, model, store, rows, outputs));
+  HycoOnRoot(HycoComm(t), Conclude(t, points, n, rows, outputs, model, report));
+  PetscCallMPI(MPI_Bcast(&report->n_held, 1, MPIU_INT, 0, HycoComm(t)));
+  PetscCallMPI(MPI_Bcast(report->output, sizeof(report->output), MPI_BYTE, 0, HycoComm(t)));
+  PetscCall(PetscFree(outputs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, HycoROM model, HycoTraining *report)
 {
   HycoHeldOut *rows = t->judged_held;
-  HycoOutputErrors *outputs;
-  PetscInt n = 0;
+  HycoSamples corners, all;
+  PetscInt n = 0, n_corners;
 
   PetscFunctionBegin;
   t->judged_held = NULL;
   if (t->held) PetscCall(HycoSamplesGet(t->held, &n, NULL, NULL));
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(TrainingCorners(t, t->validation || n < LEAST ? 0 : n / CORNERS, &corners));
+  PetscCall(HycoSamplesGet(corners, &n_corners, NULL, NULL));
   if (!rows) {
     PetscCall(PetscMalloc1(n, &rows));
-    PetscCall(HycoReducerPredictHeldOut(t, model, store, NULL, rows));
+    PetscCall(HycoReducerPredictHeldOut(t, t->held, model, store, NULL, rows));
   }
+  PetscCall(PetscRealloc((size_t)(n + n_corners) * sizeof(*rows), &rows));
   PetscCall(HycoHeldOutSummarise(n, rows, HycoHeldOutForce(n, rows), &report->held_out));
-  PetscCall(PetscCalloc1(n, &outputs));
-  PetscCall(HycoReducerJudgeOutputs(t, model, store, rows, outputs));
-  HycoOnRoot(HycoComm(t), Conclude(t, rows, outputs, model, report));
-  PetscCallMPI(MPI_Bcast(&report->n_held, 1, MPIU_INT, 0, HycoComm(t)));
-  PetscCallMPI(MPI_Bcast(report->output, sizeof(report->output), MPI_BYTE, 0, HycoComm(t)));
-  PetscCall(PetscFree(outputs));
+  PetscCall(JudgeCorners(t, corners, n, n_corners, model, store, rows, &report->held_out));
+  report->n_corners = n_corners;
+  PetscCall(HycoSamplesCreate(t->scene, &all));
+  PetscCall(HycoSamplesAddSet(all, t->held));
+  PetscCall(HycoSamplesAddSet(all, corners));
+  PetscCall(Learn(t, all, n + n_corners, rows, model, store, report));
+  PetscCall(HycoSamplesDestroy(&all));
+  PetscCall(HycoSamplesDestroy(&corners));
   PetscCall(PetscFree(rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -108,11 +108,11 @@ static PetscErrorCode BuildModel(HycoReducer t, Loop *loop, PetscInt iteration, 
 /* The solutions on the unknowns of the model's mesh, n_dof x n_s row major, on every rank. Collective. */
 static PetscErrorCode SpreadSnapshots(HycoReducer t, HycoROM m, PetscReal **U_at)
 {
-  const PetscInt n_dof = m->mesh->n_nodes * t->sizes[3];
+  const PetscInt n_dof = m->model->mesh->n_nodes * t->sizes[3];
   PetscReal *rows;
 
   PetscFunctionBegin;
-  PetscCall(HycoReducerFetchSnapshots(t, t->rank ? 0 : m->mesh->n_nodes, m->mesh->node_whole, &rows));
+  PetscCall(HycoReducerFetchSnapshots(t, t->rank ? 0 : m->model->mesh->n_nodes, m->model->mesh->node_whole, &rows));
   PetscCall(PetscMalloc1((size_t)n_dof * (size_t)t->n_s, U_at));
   for (PetscInt i = 0; t->rank == 0 && i < n_dof; i++) {
     for (PetscInt k = 0; k < t->n_s; k++)
@@ -184,7 +184,7 @@ static PetscErrorCode EvaluateModel(HycoReducer t, Loop *loop, PetscInt iteratio
   PetscFunctionBegin;
   PetscCall(PetscSNPrintf(path, sizeof(path), "%s/greedy-%03d.h5", loop->store->folder, (int)iteration));
   if (t->greedy.keep || whole) PetscCall(HycoROMSave(loop->model, t->fom, t->l, t->V, path));
-  if (whole) PetscCall(PetscStrncpy(loop->model->path, path, sizeof(loop->model->path)));
+  if (whole) PetscCall(PetscStrncpy(loop->model->model->path, path, sizeof(loop->model->model->path)));
   ierr = Evaluate(t, loop);
   if (whole && !t->greedy.keep && t->rank == 0) remove(path);
   PetscCall(ierr);
@@ -311,12 +311,11 @@ static PetscErrorCode SetSettings(HycoReducer t)
 
   PetscFunctionBegin;
   t->plane = NULL;
-  if (!t->search || t->prototype->traits.settings != HYCO_SETTINGS_RID) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!t->search || t->prototype->model->traits.settings != HYCO_SETTINGS_RID) PetscFunctionReturn(PETSC_SUCCESS);
   if (!pinned[HYCO_CHOICE_TOLERANCE])
     t->tol[HYCO_SEED_DISPLACEMENT] = t->tol[HYCO_SEED_STRESS] = t->tol[HYCO_SEED_FORCE] = t->tol[HYCO_SEED_INELASTIC] =
         ACCURATE;
-  if (strcmp(t->prototype->type, HYCO_ROM_HYBRID) == 0 && !pinned[HYCO_CHOICE_HYBRID] && !pinned[HYCO_CHOICE_LAYERS] &&
-      !t->whole_rid)
+  if (!pinned[HYCO_CHOICE_HYBRID] && !pinned[HYCO_CHOICE_LAYERS] && !t->whole_rid)
     PetscCall(HycoReducerFindPlane(t, &t->plane));
   if (t->plane)
     t->hybrid = HYCO_HYBRID_ALL;
@@ -364,10 +363,10 @@ PetscErrorCode HycoReducerRunGreedy(HycoReducer t, HycoSamples start, HycoSample
   PetscCall(CheckIndicator(t));
   HycoCheck(!t->prototype->ops->choosepoints, "a condensed model needs a tensor grid of training points, which -greedy "
                                               "does not make; use -grid or -values_NAME");
-  HycoCheck(!t->prototype->traits.cells,
+  HycoCheck(!t->prototype->model->traits.cells,
             "train -greedy adds cells to the previous RID, and a %s model chooses all of its cells anew; train it on a "
             "grid or on points",
-            t->prototype->traits.title);
+            t->prototype->model->traits.title);
   loop.begin = HycoNow();
   PetscCall(TakeTraining(training, &loop));
   PetscCall(Start(t, start, &loop.samples));

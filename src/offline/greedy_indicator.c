@@ -29,11 +29,10 @@ struct _n_HycoIndicator {
   PetscReal *weight; /* n */
   /* the local problem, created by the first evaluation */
   HycoLocal local;        /* that of the model's last prediction */
-  IS contacts;            /* all of its rows of B */
   HycoOperatorState seen; /* operators from which K and B below were made */
   Mat K, B, Bt, M, M_A;
   Vec interface, F_A, D, x, L, work, solution;
-  Vec whole; /* n_dof */
+  Vec whole, gap; /* n_dof; of all contacts */
   KSP norm;
   unsigned long long geometry; /* hash of the nodes for which M was assembled */
   HycoSystem system;
@@ -66,7 +65,7 @@ PetscErrorCode HycoIndicatorCreate(HycoROM model, HycoIndicatorKind kind, PetscI
   PetscCall(HycoROMSetReconstruct(model, (PetscBool)(kind == HYCO_INDICATOR_RESIDUAL)));
   if (!HycoIndicatorInterpolates(kind)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(n, &d->weight));
-  PetscCall(HycoInterpolantCreate(model->scene->n_parameters, n, points, &d->interpolant));
+  PetscCall(HycoInterpolantCreate(model->model->scene->n_parameters, n, points, &d->interpolant));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -86,7 +85,7 @@ PetscErrorCode HycoIndicatorDestroy(HycoIndicator *indicator)
   PetscCall(MatDestroy(&d->Bt));
   PetscCall(MatDestroy(&d->M));
   PetscCall(MatDestroy(&d->M_A));
-  PetscCall(ISDestroy(&d->contacts));
+  PetscCall(VecDestroy(&d->gap));
   PetscCall(VecDestroy(&d->interface));
   PetscCall(VecDestroy(&d->whole));
   PetscCall(VecDestroy(&d->F_A));
@@ -117,12 +116,12 @@ static PetscErrorCode SetUp(HycoIndicator d)
   if (m->m) {
     PetscCall(VecCreateSeq(PETSC_COMM_SELF, m->m, &d->L));
     PetscCall(VecDuplicate(d->L, &d->D));
-    PetscCall(ISCreateStride(PETSC_COMM_SELF, m->m, 0, 1, &d->contacts));
+    PetscCall(VecDuplicate(d->local.D, &d->gap));
   }
   PetscCall(HycoFECreateMatrix(m->fe, PETSC_COMM_SELF, m->fe->mesh->n_nodes, 0, &d->M));
   PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &d->system));
   PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &d->solver));
-  PetscCall(PetscObjectSetOptions((PetscObject)d->solver, m->scene->options));
+  PetscCall(PetscObjectSetOptions((PetscObject)d->solver, m->model->scene->options));
   PetscCall(HycoSolverSetFromOptions(d->solver));
   PetscCall(HycoSolverSetWarmStart(d->solver, PETSC_FALSE)); /* no warm start, because the ranks share the points */
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -184,15 +183,16 @@ static PetscErrorCode SolveLocal(HycoIndicator d, HycoReason *reason)
     PetscCall(MatSetOption(d->K, MAT_SPD, PETSC_TRUE));
   }
   if (m->m && !same) {
-    PetscCall(MatCreateSubMatrix(y->B, d->contacts, y->is_A, MAT_INITIAL_MATRIX, &d->B));
+    PetscCall(MatCreateSubMatrix(y->B, y->is_A_lambda, y->is_A, MAT_INITIAL_MATRIX, &d->B));
     PetscCall(MatTranspose(d->B, MAT_INITIAL_MATRIX, &d->Bt));
   }
   PetscCall(MatMult(y->K, d->interface, d->whole)); /* F[A] - K[A,I] U_I, D - B[:,I] U_I */
   PetscCall(VecAYPX(d->whole, -1, y->F));
   PetscCall(VecISCopy(d->whole, y->is_A, SCATTER_REVERSE, d->F_A));
   if (m->m) {
-    PetscCall(MatMult(y->B, d->interface, d->D));
-    PetscCall(VecAYPX(d->D, -1, y->D));
+    PetscCall(MatMult(y->B, d->interface, d->gap));
+    PetscCall(VecAYPX(d->gap, -1, y->D));
+    PetscCall(VecISCopy(d->gap, y->is_A_lambda, SCATTER_REVERSE, d->D));
   }
   PetscCall(HycoSystemSetMatrices(d->system, d->K, d->Bt, d->B, PETSC_TRUE));
   PetscCall(HycoSystemSetVectors(d->system, d->F_A, d->D));
@@ -266,7 +266,7 @@ static PetscReal Penetration(HycoROM m)
 {
   PetscReal sum = 0;
 
-  for (PetscInt k = 0; k < m->pairs.n; k++) {
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) {
     const PetscReal deep = HycoROMAddRow(m, k, -m->rows.gap[k]);
 
     if (deep > 0) sum += deep * deep;
@@ -282,7 +282,7 @@ static PetscErrorCode EvaluateLocal(HycoIndicator d, const PetscReal mu[], HycoR
   PetscFunctionBegin;
   HycoCheck(m->ops->local,
             "-hyco_greedy_indicator local needs the system on the RID, which a %s model does not have; use penetration",
-            m->type);
+            m->model->type);
   PetscUseTypeMethod(m, local, &d->local);
   if (!d->system) PetscCall(SetUp(d));
   PetscCall(AssembleNorm(d));
@@ -311,7 +311,7 @@ PetscErrorCode HycoIndicatorEvaluate(HycoIndicator d, const PetscReal mu[], Hyco
   HycoReason reason = HYCO_CONVERGED;
 
   PetscFunctionBegin;
-  PetscCall(HycoROMPredict(m, m->scene->n_parameters, mu));
+  PetscCall(HycoROMPredict(m, m->model->scene->n_parameters, mu));
   if (d->kind == HYCO_INDICATOR_PENETRATION) {
     PetscCall(HycoROMComplete(m));
     v->eta = v->eta_u = v->size = Penetration(m);

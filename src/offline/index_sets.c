@@ -1,11 +1,11 @@
 /* The sets A, I and A_lambda of an RID, by node and by contact: (21)-(22), (32)-(37). */
 #include <hycodomain.h>
 
-/* The contacts with their nodes' roles. */
+/* The contacts with their nodes' sets. */
 typedef struct {
   const HycoPairs *pairs;
   const PetscInt *index; /* by node of the pairs: its node of the reduced mesh */
-  PetscInt n, *role;     /* of the reduced mesh */
+  PetscInt n, *sets;     /* of the reduced mesh, as in HycoRIDSets() */
 } Sets;
 
 /* The nodes of contact k: j = -1 the slave, then its masters. */
@@ -19,9 +19,9 @@ static PetscInt CountMasters(const HycoPairs *pairs, PetscInt k)
   return pairs->master_start[k + 1] - pairs->master_start[k];
 }
 
-static PetscInt *Role(const Sets *s, PetscInt k, PetscInt j)
+static PetscInt *SetsOf(const Sets *s, PetscInt k, PetscInt j)
 {
-  return &s->role[s->index[ContactNode(s->pairs, k, j)]];
+  return &s->sets[s->index[ContactNode(s->pairs, k, j)]];
 }
 
 /* Gamma_I^C, (32): if a contact lacks a node, neither its gap nor the force on its other nodes can be computed. */
@@ -31,9 +31,9 @@ static void CloseIncomplete(const Sets *s)
     const PetscInt masters = CountMasters(s->pairs, k);
     PetscBool missing = PETSC_FALSE;
 
-    for (PetscInt j = -1; j < masters; j++) missing = (PetscBool)(missing || *Role(s, k, j) == HYCO_ROLE_OUTSIDE);
+    for (PetscInt j = -1; j < masters; j++) missing = (PetscBool)(missing || *SetsOf(s, k, j) == 0);
     for (PetscInt j = -1; missing && j < masters; j++) {
-      if (*Role(s, k, j) == HYCO_ROLE_A) *Role(s, k, j) = HYCO_ROLE_INTERFACE;
+      if (*SetsOf(s, k, j) == 2) *SetsOf(s, k, j) = 1;
     }
   }
 }
@@ -53,22 +53,21 @@ static PetscErrorCode CloseDependent(const Sets *s, PetscInt *lost)
   *lost = 0;
   PetscCall(PetscCalloc2(s->n, &taken, s->n, &close));
   for (PetscInt k = 0; k < s->pairs->n; k++) {
-    if (*Role(s, k, -1) == HYCO_ROLE_A) taken[Role(s, k, -1) - s->role] = PETSC_TRUE;
+    if (*SetsOf(s, k, -1) == 2) taken[SetsOf(s, k, -1) - s->sets] = PETSC_TRUE;
   }
   for (PetscInt k = 0; k < s->pairs->n; k++) {
     const PetscInt masters = CountMasters(s->pairs, k);
 
-    if (*Role(s, k, -1) == HYCO_ROLE_A || !masters) continue;
-    if (masters == 1 && !taken[Role(s, k, 0) - s->role] && !HycoPairsMoved(s->pairs, k))
-      taken[Role(s, k, 0) - s->role] = PETSC_TRUE;
+    if (*SetsOf(s, k, -1) == 2 || !masters) continue;
+    if (masters == 1 && !taken[SetsOf(s, k, 0) - s->sets] && !HycoPairsMoved(s->pairs, k))
+      taken[SetsOf(s, k, 0) - s->sets] = PETSC_TRUE;
     else {
-      for (PetscInt j = 0; j < masters; j++)
-        close[Role(s, k, j) - s->role] = (PetscBool)(*Role(s, k, j) == HYCO_ROLE_A);
+      for (PetscInt j = 0; j < masters; j++) close[SetsOf(s, k, j) - s->sets] = (PetscBool)(*SetsOf(s, k, j) == 2);
     }
   }
   for (PetscInt i = 0; i < s->n; i++) {
     if (!close[i]) continue;
-    s->role[i] = HYCO_ROLE_INTERFACE;
+    s->sets[i] = 1;
     (*lost)++;
   }
   PetscCall(PetscFree2(taken, close));
@@ -86,8 +85,7 @@ static PetscErrorCode FindContacts(HycoFE fe, HycoPairs *pairs, const Sets *s, P
   PetscCall(PetscMalloc4(n + 1, &start, entries, &dof, entries, &value, n, &gap));
   PetscCall(HycoContactRows(fe, pairs, start, dof, value, gap));
   for (PetscInt k = 0; k < n; k++) {
-    for (PetscInt j = start[k]; j < start[k + 1]; j++)
-      in_rid[k] = in_rid[k] || s->role[s->index[dof[j] / dim]] == HYCO_ROLE_A;
+    for (PetscInt j = start[k]; j < start[k + 1]; j++) in_rid[k] = in_rid[k] || s->sets[s->index[dof[j] / dim]] == 2;
   }
   PetscCall(PetscFree4(start, dof, value, gap));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -101,16 +99,16 @@ static void FindMovedContacts(HycoFE fe, const Sets *s, const PetscInt of[], Pet
     for (PetscInt j = -1; j < CountMasters(s->pairs, r); j++) {
       const PetscInt i = ContactNode(s->pairs, r, j);
 
-      for (PetscInt c = 0; c < fe->dim && *Role(s, r, j) == HYCO_ROLE_A; c++)
+      for (PetscInt c = 0; c < fe->dim && *SetsOf(s, r, j) == 2; c++)
         in_rid[of[r]] = in_rid[of[r]] || !fe->fixed[i * fe->dim + c];
     }
   }
 }
 
 PetscErrorCode HycoRIDSets(HycoFE fe, HycoPairs *pairs, const HycoPairs *rows, const PetscInt of[],
-                           const PetscInt index[], PetscInt n, PetscInt role[], PetscInt in_rid[])
+                           const PetscInt index[], PetscInt n, PetscInt sets[], PetscInt in_rid[])
 {
-  const Sets s = {rows, index, n, role};
+  const Sets s = {rows, index, n, sets};
   PetscInt lost = 1;
 
   PetscFunctionBegin;

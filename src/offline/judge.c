@@ -14,12 +14,12 @@ static void SnapshotErrors(HycoReducer t, HycoROM m, PetscInt k, PetscReal *u, P
 
   sum = t->U_norm[k] * t->U_norm[k];
   for (PetscInt j = 0; j < t->l; j++) sum += (m->gamma[j] - c[j]) * (m->gamma[j] - c[j]) - c[j] * c[j];
-  for (PetscInt f = 0; f < m->n_fe; f++) {
-    const PetscInt dof = m->fe_dof[f];
+  for (PetscInt f = 0; f < m->model->n_fe; f++) {
+    const PetscInt dof = m->model->fe_dof[f];
     const PetscReal exact = U[t->rid_row[dof / dim] * dim + dof % dim];
     PetscReal by_modes = 0;
 
-    for (PetscInt j = 0; j < m->l; j++) by_modes += m->V[dof * m->l + j] * m->gamma[j];
+    for (PetscInt j = 0; j < m->model->l; j++) by_modes += m->model->V[dof * m->model->l + j] * m->gamma[j];
     sum += (m->U[dof] - exact) * (m->U[dof] - exact) - (by_modes - exact) * (by_modes - exact);
   }
   *u = t->U_norm[k] > 0 ? PetscSqrtReal(PetscMax(sum, 0)) / t->U_norm[k] : 0;
@@ -34,7 +34,7 @@ static void SnapshotErrors(HycoReducer t, HycoROM m, PetscInt k, PetscReal *u, P
    the path's largest are divided by that tenth. */
 static PetscErrorCode PathErrors(HycoReducer t, HycoROM m, PetscInt k, PetscReal *u, PetscReal *lambda)
 {
-  const PetscInt n = m->scene->n_times, first = k * n;
+  const PetscInt n = m->model->scene->n_times, first = k * n;
   PetscReal size[2] = {0, 0}, eu, el;
   PetscReal *force;
 
@@ -63,12 +63,12 @@ static PetscErrorCode PathErrors(HycoReducer t, HycoROM m, PetscInt k, PetscReal
 /* Evaluates the current model at training point k. */
 static PetscErrorCode JudgeSample(HycoReducer t, HycoROM m, PetscInt k, const PetscReal mu[], HycoJudged *j)
 {
-  const PetscBool path = (PetscBool)(m->scene->n_times > 0);
+  const PetscBool path = (PetscBool)(m->model->scene->n_times > 0);
 
   PetscFunctionBegin;
   if (path)
     PetscCall(HycoROMSetJudgedSteps(m, t->taken_start[k + 1] - t->taken_start[k], t->taken + t->taken_start[k]));
-  PetscCall(HycoROMPredict(m, m->scene->n_parameters, mu));
+  PetscCall(HycoROMPredict(m, m->model->scene->n_parameters, mu));
   if (path)
     PetscCall(PathErrors(t, m, k, &j->u, &j->lambda));
   else
@@ -103,7 +103,7 @@ static PetscErrorCode JudgeAll(HycoReducer t, HycoROM m, PetscReal most, HycoJud
     if (judged) judged[k] = j;
   }
   if (*u > most) *u = *lambda = HYCO_JUDGED_WORST;
-  if (m->scene->n_times) PetscCall(HycoROMSetSteps(m, 0, NULL));
+  if (m->model->scene->n_times) PetscCall(HycoROMSetSteps(m, 0, NULL));
   m->reconstruct = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -174,9 +174,9 @@ PetscErrorCode HycoReducerJudge(HycoReducer t, HycoROM m)
   PetscCall(HycoSamplesGet(t->samples, &n, NULL, NULL));
   PetscCall(PetscFree(t->judged));
   PetscCall(PetscMalloc1(n, &t->judged));
-  PetscCall(JudgeAll(t, m, PETSC_INFINITY, t->judged, &m->numbers[1], &m->numbers[2]));
-  m->numbers[0] = 0;
-  PetscTryTypeMethod(m, condition, &m->numbers[0]);
+  PetscCall(JudgeAll(t, m, PETSC_INFINITY, t->judged, &m->model->numbers[1], &m->model->numbers[2]));
+  m->model->numbers[0] = 0;
+  PetscTryTypeMethod(m, condition, &m->model->numbers[0]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

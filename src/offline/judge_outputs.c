@@ -14,6 +14,7 @@ static const char *const fields[N_FIELDS] = {"U", "sigma", "reaction"};
 /* Of a full-order solution the nodes and cells from the first to the last that the outputs need. Rank 0. */
 typedef struct {
   HycoReducer t;
+  HycoSamples points;
   HycoROM m;
   HycoSnapshots store;
   HycoFE fe; /* of the probe (borrowed); NULL: the outputs need only results of contacts */
@@ -21,36 +22,6 @@ typedef struct {
   PetscReal *rows[N_FIELDS], *value[N_FIELDS]; /* these nodes or cells, then those of the mesh */
   PetscReal *lambda;
 } Outputs;
-
-/* The marked cells, on rank 0; elsewhere NULL. Collective. */
-static PetscErrorCode GatherMesh(HycoReducer t, const PetscBool needed[], HycoMesh *mesh)
-{
-  HycoMesh part = t->fom->part, from = part;
-  PetscBool *group;
-  PetscInt *keep, n = 0;
-
-  PetscFunctionBegin;
-  *mesh = NULL;
-  if (t->fom->size > 1) {
-    PetscCall(PetscCalloc1(part->n_groups, &group));
-    PetscCall(HycoMeshGather(HycoComm(t), part, group, needed, &from));
-    PetscCall(PetscFree(group));
-  }
-  if (t->rank == 0) {
-    PetscCall(PetscMalloc1(from->n_cells, &keep));
-    for (PetscInt e = 0; e < from->n_cells; e++) {
-      if (from != part || needed[e]) keep[n++] = e;
-    }
-    PetscCall(HycoMeshExtract(from, n, keep, 0, NULL, 0, NULL, mesh));
-    for (PetscInt i = 0; from->node_whole && i < (*mesh)->n_nodes; i++)
-      (*mesh)->node_whole[i] = from->node_whole[(*mesh)->node_whole[i]];
-    for (PetscInt e = 0; from->cell_whole && e < (*mesh)->n_cells; e++)
-      (*mesh)->cell_whole[e] = from->cell_whole[(*mesh)->cell_whole[e]];
-    PetscCall(PetscFree(keep));
-  }
-  if (from != part) PetscCall(HycoMeshDestroy(&from));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* The cells that the outputs need; the reactions that follow from balance, with the cells of their loads (NULL: there
    are no reactions). The meshes are on rank 0. Collective. */
@@ -64,12 +35,12 @@ static PetscErrorCode GatherCells(HycoReducer t, HycoMesh *mesh, PetscBool **bal
   *loaded = NULL;
   PetscCall(PetscMalloc1(part->n_cells, &needed));
   HycoOnEach(HycoComm(t), HycoQuantitiesMarkCells(t->scene, part, needed));
-  PetscCall(GatherMesh(t, needed, mesh));
+  PetscCall(HycoReducerGatherMesh(t, needed, mesh));
   if (HycoSceneHasReactions(t->scene)) {
     PetscCall(PetscCalloc1(t->scene->n_quantities * t->scene->n_bodies, balanced));
     PetscCall(HycoQuantitiesBalance(HycoComm(t), t->scene, part, *balanced));
     HycoOnEach(HycoComm(t), HycoQuantitiesMarkLoads(t->scene, part, *balanced, needed));
-    PetscCall(GatherMesh(t, needed, loaded));
+    PetscCall(HycoReducerGatherMesh(t, needed, loaded));
   }
   PetscCall(PetscFree(needed));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -116,7 +87,7 @@ static PetscInt Places(const Outputs *o, int k, const PetscInt **at)
 static PetscErrorCode Begin(Outputs *o)
 {
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(o->m->pairs.n, &o->lambda));
+  PetscCall(PetscMalloc1(o->m->model->pairs.n, &o->lambda));
   o->fe = HycoROMGetProbe(o->m);
   for (int k = 0; o->fe && k < N_FIELDS; k++) {
     const PetscInt *at, n = Places(o, k, &at);
@@ -159,14 +130,14 @@ static PetscErrorCode ReadField(Outputs *o, const PetscReal mu[], PetscInt step,
 /* The full-order outputs at mu, at listed time `step` of a history. */
 static PetscErrorCode MeasureStored(Outputs *o, const PetscReal mu[], PetscInt step, PetscReal value[])
 {
-  const HycoScene scene = o->m->scene;
+  const HycoScene scene = o->m->model->scene;
   PetscReal all[HYCO_MAX_PARAMETERS];
   PetscBool has[N_FIELDS] = {PETSC_FALSE};
 
   PetscFunctionBegin;
   for (int k = 0; o->fe && k < (HycoSceneHasReactions(scene) ? N_FIELDS : REACTION); k++)
     PetscCall(ReadField(o, mu, step, k, &has[k]));
-  PetscCall(HycoSnapshotsReadRows(o->store, mu, step, "lambda", 0, o->m->pairs.n, o->lambda));
+  PetscCall(HycoSnapshotsReadRows(o->store, mu, step, "lambda", 0, o->m->model->pairs.n, o->lambda));
   HycoSceneSetTime(scene, mu, scene->n_times ? scene->times[step] : 0, all);
   PetscCall(HycoROMMeasureGiven(o->m, all, o->value[DISPLACEMENT], o->value[STRESS],
                                 has[REACTION] ? o->value[REACTION] : NULL, o->lambda, value));
@@ -193,7 +164,7 @@ static PetscErrorCode MeasurePredicted(Outputs *o, const PetscReal mu[], HycoPre
 static PetscErrorCode JudgeOne(Outputs *o, const PetscReal mu[], HycoOutputErrors *e)
 {
   HycoROM m = o->m;
-  const PetscInt n_times = PetscMax(1, m->scene->n_times), n_q = m->scene->n_quantities;
+  const PetscInt n_times = PetscMax(1, m->model->scene->n_times), n_q = m->model->scene->n_quantities;
   HycoPrediction p;
   PetscReal value[HYCO_MAX_QUANTITIES];
   PetscBool known = PETSC_FALSE;
@@ -203,7 +174,7 @@ static PetscErrorCode JudgeOne(Outputs *o, const PetscReal mu[], HycoOutputError
   for (PetscInt q = 0; !known && q < n_q; q++) e->error[q] = e->size[q] = NAN;
   if (!known) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt k = 0; k < n_times; k++) {
-    const PetscReal *found = m->scene->n_times ? m->trace.step[k].quantity : p.quantity;
+    const PetscReal *found = m->model->scene->n_times ? m->trace.step[k].quantity : p.quantity;
 
     PetscCall(MeasureStored(o, mu, k, value));
     for (PetscInt q = 0; q < n_q; q++) {
@@ -223,7 +194,7 @@ static PetscErrorCode JudgeAll(Outputs *o, const HycoHeldOut rows[], HycoOutputE
   const PetscReal *mu;
 
   PetscFunctionBegin;
-  PetscCall(HycoSamplesGet(o->t->held, &n, &n_par, &mu));
+  PetscCall(HycoSamplesGet(o->points, &n, &n_par, &mu));
   for (PetscInt k = 0; k < n; k++) {
     if (rows[k].converged < 0.5) continue;
     PetscCall(HycoReducerTell(o->t, "outputs", k, n));
@@ -245,10 +216,10 @@ static PetscErrorCode JudgeOnRoot(Outputs *o, const HycoHeldOut rows[], HycoOutp
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerJudgeOutputs(HycoReducer t, HycoROM m, HycoSnapshots store, const HycoHeldOut rows[],
-                                       HycoOutputErrors errors[])
+PetscErrorCode HycoReducerJudgeOutputs(HycoReducer t, HycoSamples points, HycoROM m, HycoSnapshots store,
+                                       const HycoHeldOut rows[], HycoOutputErrors errors[])
 {
-  Outputs o = {.t = t, .m = m, .store = store};
+  Outputs o = {.t = t, .points = points, .m = m, .store = store};
 
   PetscFunctionBegin;
   if (!t->scene->n_quantities) PetscFunctionReturn(PETSC_SUCCESS);

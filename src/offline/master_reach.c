@@ -18,7 +18,8 @@ typedef struct {
   HycoMesh mesh;
   HycoFE fe;
   HycoPairs pairs;
-  PetscInt *of; /* contact of each of pairs */
+  PetscInt *node; /* their nodes in the mesh from which they are cut */
+  PetscInt *of;   /* contact of each of pairs */
 } Surfaces;
 
 static PetscErrorCode SurfacesDestroy(Surfaces *s)
@@ -27,7 +28,7 @@ static PetscErrorCode SurfacesDestroy(Surfaces *s)
   PetscCall(HycoPairsDestroy(&s->pairs));
   PetscCall(HycoFEDestroy(&s->fe));
   if (s->mesh) PetscCall(HycoMeshDestroy(&s->mesh));
-  PetscCall(PetscFree(s->of));
+  HycoFreeAll(&s->of, &s->node);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -59,7 +60,7 @@ static PetscErrorCode CutSurfaces(HycoScene scene, HycoMesh whole, const HycoPai
   for (PetscInt i = 0; i < whole->n_nodes; i++) {
     if (on[i]) extra[n_extra++] = i;
   }
-  PetscCall(HycoMeshExtract(whole, 0, NULL, n_extra, extra, n_groups, group, mesh));
+  PetscCall(HycoSubmesh(scene, whole, 0, NULL, n_extra, extra, n_groups, group, mesh));
   PetscCall(PetscFree(on));
   PetscCall(PetscFree2(group, extra));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -73,8 +74,10 @@ static PetscErrorCode SurfacesCreate(HycoScene scene, HycoMesh whole, const Hyco
   PetscCall(PetscMemzero(s, sizeof(*s)));
   PetscCall(CutSurfaces(scene, whole, all, &s->mesh));
   PetscCall(HycoFECreate(scene, s->mesh, &s->fe));
+  PetscCall(PetscMalloc1(s->mesh->n_nodes, &s->node));
+  PetscCall(HycoSubmeshNodes(s->mesh, whole, s->node));
   PetscCall(PetscMalloc1(whole->n_nodes, &index));
-  for (PetscInt i = 0; i < s->mesh->n_nodes; i++) index[s->mesh->node_whole[i]] = i;
+  for (PetscInt i = 0; i < s->mesh->n_nodes; i++) index[s->node[i]] = i;
   PetscCall(PetscMalloc1(all->n, &s->of));
   for (PetscInt k = 0; k < all->n; k++) {
     if (HycoPairsMoved(all, k)) s->of[n++] = k;
@@ -244,7 +247,7 @@ static PetscErrorCode Collect(const Surfaces *s, const HycoPairs *pairs, const L
       const PetscReal share = 1 / (PetscReal)l->row[r].n, shares[4] = {share, share, share, share};
       PetscInt node[4];
 
-      for (PetscInt a = 0; a < l->row[r].n; a++) node[a] = s->mesh->node_whole[l->row[r].node[a]];
+      for (PetscInt a = 0; a < l->row[r].n; a++) node[a] = s->node[l->row[r].node[a]];
       met->of[out->n] = k;
       HycoPairsAppend(out, pairs->contact[k], pairs->slave[k], l->row[r].n, node, shares);
     }

@@ -522,7 +522,7 @@ static PetscErrorCode ReduceField(HycoReducer t, HycoSnapshots store, PetscInt k
 /* Whether a basis seeds the RID of the current type. */
 static PetscBool Seeds(HycoReducer t, PetscInt kind)
 {
-  return (PetscBool)(t->seed[kind] && !t->prototype->traits.cells);
+  return (PetscBool)(t->seed[kind] && !t->prototype->model->traits.cells);
 }
 
 /* DEIM on the modes taken from a basis. */

@@ -117,9 +117,7 @@ PetscErrorCode HycoReducerDestroy(HycoReducer *reducer)
   HycoReducer t;
 
   PetscFunctionBegin;
-  if (!reducer || !*reducer) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheckHandle(*reducer, HYCO_REDUCER_CLASSID);
-  HycoDereference(reducer);
+  HycoDestroyBegin(reducer, HYCO_REDUCER_CLASSID);
   t = *reducer;
   PetscCall(HycoReducerReset(t));
   PetscCall(EndTraining(t));
@@ -239,16 +237,17 @@ static PetscErrorCode ReadTraining(HycoReducer t)
 
   PetscFunctionBegin;
   PetscCall(HycoROMTypeNames(&types));
-  while (types[type] && strcmp(types[type], t->prototype ? t->prototype->type : HYCO_ROM_HYBRID)) type++;
+  while (types[type] && strcmp(types[type], t->prototype ? t->prototype->model->type : HYCO_ROM_HYBRID)) type++;
   PetscObjectOptionsBegin((PetscObject)t);
   PetscCall(HycoOptionsFor(""));
   PetscCall(HycoOptionsString("-hyco_snapshots", "<folder> where full-order solutions are stored [MODEL.snapshots]",
                               t->folder, sizeof(t->folder), NULL));
-  PetscCall(
-      HycoOptionsWord("-hyco_model_type",
-                      "hybrid hyper-reduced (38) on an RID; projection-based (44) on the whole mesh, or with a "
-                      "cubature on some of its cells; condensed on the contact forces; regression without a solve",
-                      types, &type, &t->pinned[HYCO_CHOICE_TYPE]));
+  PetscCall(HycoOptionsWord(
+      "-hyco_model_type",
+      "hybrid hyper-reduced (38) on an RID; projection-based (44) on the whole mesh, or with a "
+      "cubature on some of its cells; condensed on the contact forces; bodies condensed to their surfaces; "
+      "regression without a solve",
+      types, &type, &t->pinned[HYCO_CHOICE_TYPE]));
   PetscCall(HycoOptionsReal("-hyco_pod_tol", "energy left out of the displacement basis, epsilon of (18)", 0, 1,
                             &t->tol[HYCO_SEED_DISPLACEMENT], &t->pinned[HYCO_CHOICE_TOLERANCE]));
   PetscCall(HycoOptionsReal("-hyco_pod_noise", "singular values below this share of the first are treated as round-off",
@@ -401,15 +400,15 @@ static PetscErrorCode CheckType(HycoReducer t)
 
   PetscFunctionBegin;
   PetscCall(PetscOptionsGetString(((PetscObject)t)->options, NULL, "-hyco_dual", dual, sizeof(dual), NULL));
-  HycoCheckModel(t->prototype->traits.force_basis || strcmp(dual, "fe") == 0,
+  HycoCheckModel(t->prototype->model->traits.force_basis || strcmp(dual, "fe") == 0,
                  "-hyco_dual %s is for -hyco_model_type projection and cubature; the other models have no vectors of "
                  "forces",
                  dual);
-  HycoCheckModel(t->prototype->traits.history || !t->scene || !t->scene->n_times,
+  HycoCheckModel(t->prototype->model->traits.history || !t->scene || !t->scene->n_times,
                  "the scene has a history (history_times), and -hyco_model_type %s does not support paths; use hybrid",
-                 t->prototype->type);
-  if (!t->prototype->traits.whole && !t->prototype->traits.cells) PetscFunctionReturn(PETSC_SUCCESS);
-  t->whole_rid = t->prototype->traits.whole;
+                 t->prototype->model->type);
+  if (!t->prototype->model->traits.whole && !t->prototype->model->traits.cells) PetscFunctionReturn(PETSC_SUCCESS);
+  t->whole_rid = t->prototype->model->traits.whole;
   for (PetscInt k = 0; k < HYCO_N_SEEDS; k++) t->seed[k] = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -455,18 +454,15 @@ PetscErrorCode HycoReducerDeclare(PetscOptions options)
 }
 
 HycoDefineMethod(HycoReducerGetType, (HycoReducer t, HycoROMType *type), t, HYCO_REDUCER_CLASSID,
-                 *type = t->prototype->type)
+                 *type = t->prototype->model->type)
 
 PetscErrorCode HycoReducerView(HycoReducer t, PetscViewer viewer)
 {
   HycoReducerSettings settings;
   char text[HYCO_LINE];
-  PetscBool ascii;
 
   PetscFunctionBegin;
-  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
-  PetscCall(HycoViewBegin((PetscObject)t, &viewer, &ascii));
-  if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoViewBegin(t, HYCO_REDUCER_CLASSID, viewer);
   HycoReducerGetSettings(t, &settings);
   HycoReducerSettingsDescribe(&settings, sizeof(text), text);
   PetscCall(PetscViewerASCIIPrintf(viewer, "settings: %s%s\n", text, t->search ? "; searched if not given" : ""));

@@ -30,6 +30,7 @@ static const PetscReal usual[HYCO_N_ERRORS] = {
 #define NO_EFFECT    0.05 /* relative change of the ratio that counts as none */
 #define MARGIN       0.1  /* ratio of settings that end the search */
 #define LEAST        2    /* models that are tried whatever they cost */
+#define USELESS      0.5  /* a larger error of u is that of no model: the budget does not end the search there */
 #define WILD         50   /* multiple of the target: above it no attempt so far gives a useful model */
 #define FEW_UNKNOWNS 300  /* a dense matrix of this size is cheap */
 #define MAX_ATTEMPTS 64
@@ -72,7 +73,7 @@ typedef struct {
   PetscInt *order;                 /* held-out points, those with the largest errors in the last attempts first */
   PetscReal least, *ratio;         /* least ratio so far; ratios of the best model at its held-out points */
   PetscReal spent, last, budget;   /* operations of all attempts, and of the last one; the largest number of them */
-  PetscInt n_models;               /* attempts with these bases that gave a model */
+  PetscInt n_models;               /* attempts with these bases that gave a model of any use */
   PetscBool ended;                 /* by the budget */
   HycoLeftOut left_out[HYCO_MAX_LEFT_OUT];
   PetscInt n_left_out;
@@ -109,8 +110,8 @@ void HycoReducerSettingsDescribe(const HycoReducerSettings *r, size_t length, ch
 
 void HycoReducerGetSettings(HycoReducer t, HycoReducerSettings *r)
 {
-  *r = (HycoReducerSettings){.type = t->prototype->type,
-                             .rid = (PetscBool)(t->prototype->traits.settings == HYCO_SETTINGS_RID),
+  *r = (HycoReducerSettings){.type = t->prototype->model->type,
+                             .rid = (PetscBool)(t->prototype->model->traits.settings == HYCO_SETTINGS_RID),
                              .pod_tol = t->tol[HYCO_SEED_DISPLACEMENT],
                              .contact_extension = t->extension,
                              .layers = t->layers,
@@ -133,7 +134,7 @@ static PetscErrorCode SetSettings(HycoReducer t, const HycoReducerSettings *r)
   t->extension = r->contact_extension;
   t->layers = r->layers;
   t->hybrid = r->hybrid;
-  t->whole_rid = (PetscBool)(r->whole || t->prototype->traits.whole);
+  t->whole_rid = (PetscBool)(r->whole || t->prototype->model->traits.whole);
   t->plane = r->plane;
   t->ridge = r->ridge;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -247,7 +248,7 @@ static PetscErrorCode Judge(Search *s, HycoROM model, PetscBool all, HycoAttempt
   race.most = HycoAttemptsLimit(s->n - 1, s->attempt, a->cost, &beaten);
   PetscCall(PetscCalloc1(n, &rows));
   s->rows[s->n - 1] = rows;
-  PetscCall(HycoReducerPredictHeldOut(t, model, s->store, t->scene->n_times ? &race : NULL, rows));
+  PetscCall(HycoReducerPredictHeldOut(t, t->held, model, s->store, t->scene->n_times ? &race : NULL, rows));
   if (!t->scene->n_times) race.n = n;
   PetscCall(Summarise(s, &race, rows, a));
   if (race.lost) {
@@ -364,7 +365,7 @@ static PetscErrorCode Count(Search *s, HycoAttempt *a)
   s->last = judging + testing + whole * ((PetscReal)t->n_s + held * (PetscReal)HycoSnapshotsSteps(t->scene));
   if (t->prototype->ops->work && !a->failure[0]) s->last += (*t->prototype->ops->work)(t);
   s->spent += s->last;
-  s->n_models += !a->failure[0];
+  s->n_models += !a->failure[0] && (a->beaten_by || a->held_out.largest[HYCO_ERROR_U] < USELESS);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -495,8 +496,8 @@ static HycoReducerSettings KindFor(const Search *s, const HycoROM type, HycoHybr
 {
   HycoReducerSettings r = SettingsFor(s, size);
 
-  r.type = type->type;
-  r.rid = (PetscBool)(type->traits.settings == HYCO_SETTINGS_RID);
+  r.type = type->model->type;
+  r.rid = (PetscBool)(type->model->traits.settings == HYCO_SETTINGS_RID);
   r.hybrid = s->t->pinned[HYCO_CHOICE_HYBRID] ? s->given.hybrid : hybrid;
   if (r.rid) return r;
   r.layers = s->given.layers;
@@ -611,7 +612,7 @@ static PetscErrorCode TryPlanes(Search *s, const HycoROM type, PetscBool *met)
     const Size size = {plane_tol[k], 0, PETSC_FALSE};
     HycoReducerSettings r = SettingsFor(s, &size);
 
-    r.type = type->type;
+    r.type = type->model->type;
     r.rid = PETSC_TRUE;
     r.hybrid = HYCO_HYBRID_ALL;
     r.plane = s->plane;
@@ -629,7 +630,7 @@ static PetscErrorCode TryHybrids(Search *s, const HycoROM type)
   PetscBool met = PETSC_FALSE;
 
   PetscFunctionBegin;
-  if (strcmp(type->type, HYCO_ROM_HYBRID) == 0) PetscCall(TryPlanes(s, type, &met));
+  PetscCall(TryPlanes(s, type, &met));
   if (met || s->ended) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(TrySizes(s, type, HYCO_HYBRID_AUTO, &met));
   if (!met && !s->ended && !s->t->pinned[HYCO_CHOICE_HYBRID] && s->t->sizes[2])
@@ -644,7 +645,7 @@ static PetscErrorCode TryOne(Search *s, const HycoROM type)
   HycoReducerSettings r = SettingsFor(s, &size);
 
   PetscFunctionBegin;
-  r.type = type->type;
+  r.type = type->model->type;
   r.rid = PETSC_FALSE;
   if (s->t->scene->n_times) r.layers = s->given.layers; /* its mesh consists of the cells of its modes */
   PetscCall(Try(s, &r, PETSC_FALSE));
@@ -660,9 +661,9 @@ static PetscErrorCode Wants(Search *s, const HycoROM type, PetscBool *wanted)
   char why[HYCO_LINE] = "";
 
   PetscFunctionBegin;
-  *wanted = (PetscBool)(strcmp(type->type, s->given.type) == 0);
+  *wanted = (PetscBool)(strcmp(type->model->type, s->given.type) == 0);
   if (t->pinned[HYCO_CHOICE_TYPE]) PetscFunctionReturn(PETSC_SUCCESS);
-  *wanted = (PetscBool)(type->ops->offers && (type->traits.history || !t->scene->n_times) &&
+  *wanted = (PetscBool)(type->ops->offers && (type->model->traits.history || !t->scene->n_times) &&
                         (*type->ops->offers)(t, s->targets, sizeof(why), why));
   if (*wanted && type->ops->work) work = (*type->ops->work)(t);
   if (*wanted && work > s->budget)
@@ -672,7 +673,7 @@ static PetscErrorCode Wants(Search *s, const HycoROM type, PetscBool *wanted)
              (double)work, (double)s->budget, (double)t->search_budget);
   if (*wanted && best && best->ratio <= MARGIN && !t->exhaustive)
     snprintf(why, sizeof(why), "settings %d meet the targets with a margin", (int)best->number);
-  if (why[0]) LeaveOut(s, type->type, why);
+  if (why[0]) LeaveOut(s, type->model->type, why);
   *wanted = (PetscBool)(*wanted && !why[0]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -686,9 +687,10 @@ static PetscErrorCode TryType(Search *s, const char name[])
   PetscCall(HycoROMCreate(&type));
   PetscCall(HycoROMSetType(type, name));
   PetscCall(Wants(s, type, &wanted));
-  if (wanted && type->traits.settings == HYCO_SETTINGS_NONE) PetscCall(TryOne(s, type));
-  if (wanted && type->traits.settings == HYCO_SETTINGS_RID) PetscCall(TryHybrids(s, type));
-  if (wanted && type->traits.settings == HYCO_SETTINGS_MODES) PetscCall(TrySizes(s, type, HYCO_HYBRID_AUTO, &met));
+  if (wanted && type->model->traits.settings == HYCO_SETTINGS_NONE) PetscCall(TryOne(s, type));
+  if (wanted && type->model->traits.settings == HYCO_SETTINGS_RID) PetscCall(TryHybrids(s, type));
+  if (wanted && type->model->traits.settings == HYCO_SETTINGS_MODES)
+    PetscCall(TrySizes(s, type, HYCO_HYBRID_AUTO, &met));
   PetscCall(HycoROMDestroy(&type));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -723,7 +725,7 @@ static PetscBool Settled(HycoReducer t)
   PetscBool open = PETSC_FALSE;
 
   for (PetscInt k = 0; k < HYCO_CHOICE_WHOLE; k++) open = (PetscBool)(open || !t->pinned[k]);
-  if (t->pinned[HYCO_CHOICE_TYPE] && t->prototype->traits.settings == HYCO_SETTINGS_NONE) open = PETSC_FALSE;
+  if (t->pinned[HYCO_CHOICE_TYPE] && t->prototype->model->traits.settings == HYCO_SETTINGS_NONE) open = PETSC_FALSE;
   return (PetscBool)(!t->search || !t->held || !open);
 }
 
@@ -1004,7 +1006,7 @@ static PetscErrorCode JudgeFresh(Search *s, HycoROM model, HycoSamples *former, 
   PetscCall(PetscFree(t->judged_held));
   PetscCall(HycoSamplesGet(t->held, &n, NULL, NULL));
   PetscCall(PetscMalloc1(n, &t->judged_held));
-  PetscCall(HycoReducerPredictHeldOut(t, model, s->store, NULL, t->judged_held));
+  PetscCall(HycoReducerPredictHeldOut(t, t->held, model, s->store, NULL, t->judged_held));
   s->force = HycoHeldOutForce(n, t->judged_held);
   *met = (PetscBool)(s->least <= 1);
   for (PetscInt k = 0; k < n; k++) *met = (PetscBool)(*met && Quotient(s, &t->judged_held[k]) <= 1);

@@ -67,9 +67,7 @@ static PetscErrorCode CloseSample(HycoSnapshots s)
 PetscErrorCode HycoSnapshotsDestroy(HycoSnapshots *snapshots)
 {
   PetscFunctionBegin;
-  if (!snapshots || !*snapshots) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheckHandle(*snapshots, HYCO_SNAPSHOTS_CLASSID);
-  HycoDereference(snapshots);
+  HycoDestroyBegin(snapshots, HYCO_SNAPSHOTS_CLASSID);
   PetscCall(CloseSample(*snapshots));
   PetscCall(PetscFree2((*snapshots)->solved, (*snapshots)->written));
   PetscCall(HycoSceneDestroy(&(*snapshots)->scene));
@@ -208,7 +206,7 @@ static PetscErrorCode WriteFields(HycoSnapshots s, HycoFOM fom, HycoH5 h, const 
 
   PetscFunctionBegin;
   HycoOnRoot(HycoComm(fom), WriteHead(s, h, mu));
-  HycoOnRoot(HycoComm(fom), HycoH5WriteReal(h, "lambda", fom->n_contacts, 1, fom->lambda));
+  PetscCall(HycoFOMWriteForces(fom, h, "lambda"));
   PetscCall(HycoFOMGetRows(fom, &rows));
   PetscCall(HycoFieldWrite(h, rows, fom->n_nodes, "U", HYCO_ON_NODES, MPIU_REAL, dim, 1, fom->u));
   PetscCall(HycoFieldWrite(h, rows, fom->n_cells, "sigma", HYCO_ON_CELLS, MPIU_REAL, fom->fe->n_sigma, 1, fom->sigma));
@@ -309,7 +307,7 @@ static PetscErrorCode WriteStep(HycoFOM fom, const HycoStep *step, void *ctx)
   HycoSpringsAddForces(fom->fe, 1, fom->u, w->force); /* the forces of springs are a field of their own */
   for (PetscInt k = 0; k < fom->fe->n_dof; k++) w->force[k] = fom->fe->fixed[k] ? 0 : w->force[k];
   NameField(w->s, step->index, "lambda", name);
-  HycoOnRoot(HycoComm(fom), HycoH5WriteReal(w->h, name, fom->n_contacts, 1, fom->lambda));
+  PetscCall(HycoFOMWriteForces(fom, w->h, name));
   NameField(w->s, step->index, "U", name);
   PetscCall(HycoFieldWrite(w->h, rows, fom->n_nodes, name, HYCO_ON_NODES, MPIU_REAL, dim, 1, fom->u));
   NameField(w->s, step->index, "sigma", name);
@@ -679,12 +677,8 @@ PetscErrorCode HycoSnapshotsReadTaken(HycoSnapshots s, const PetscReal mu[], Pet
 
 PetscErrorCode HycoSnapshotsView(HycoSnapshots s, PetscViewer viewer)
 {
-  PetscBool ascii;
-
   PetscFunctionBegin;
-  HycoCheckHandle(s, HYCO_SNAPSHOTS_CLASSID);
-  PetscCall(HycoViewBegin((PetscObject)s, &viewer, &ascii));
-  if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoViewBegin(s, HYCO_SNAPSHOTS_CLASSID, viewer);
   PetscCall(PetscViewerASCIIPrintf(viewer, "folder: %s\n", s->folder));
   PetscCall(PetscViewerASCIIPrintf(viewer, "of the scene and mesh with fingerprint %016llx\n", s->fingerprint));
   PetscCall(PetscViewerASCIIPopTab(viewer));

@@ -159,9 +159,8 @@ static PetscErrorCode MarkPoints(HycoMesh m, const HycoPointLoad *load, PetscBoo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoQuantitiesMarkLoads(HycoScene scene, HycoMesh m, const PetscBool balanced[], PetscBool needed[])
+PetscErrorCode HycoMarkLoads(HycoScene scene, HycoMesh m, const PetscBool of[], PetscBool needed[])
 {
-  const PetscInt n = scene->n_bodies;
   PetscBool *node;
 
   PetscFunctionBegin;
@@ -179,12 +178,25 @@ PetscErrorCode HycoQuantitiesMarkLoads(HycoScene scene, HycoMesh m, const PetscB
   PetscCall(PetscFree(node));
   for (PetscInt e = 0; e < m->n_cells; e++) {
     const HycoBody *body = &scene->body[m->cell_body[e]];
-    PetscBool any = PETSC_FALSE;
 
-    for (PetscInt k = 0; k < scene->n_quantities; k++) any = (PetscBool)(any || balanced[k * n + m->cell_body[e]]);
+    if (!of[m->cell_body[e]]) continue;
     if (body->force[0] || body->force[1] || body->force[2] || HycoSceneHasInertia(scene, body, NULL))
       needed[e] = PETSC_TRUE;
-    needed[e] = (PetscBool)(needed[e] && any);
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoQuantitiesMarkLoads(HycoScene scene, HycoMesh m, const PetscBool balanced[], PetscBool needed[])
+{
+  PetscBool *of;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(scene->n_bodies, &of));
+  for (PetscInt k = 0; k < scene->n_quantities * scene->n_bodies; k++)
+    of[k % scene->n_bodies] = (PetscBool)(of[k % scene->n_bodies] || balanced[k]);
+  ierr = HycoMarkLoads(scene, m, of, needed);
+  PetscCall(PetscFree(of));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

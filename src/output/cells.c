@@ -67,7 +67,7 @@ PetscErrorCode HycoCellListCreate(const HycoFileOrder *order, HycoMesh m, const 
   PetscFunctionBegin;
   PetscCall(PetscMemzero(l, sizeof(*l)));
   PetscCall(Nodes(order, m, PETSC_TRUE, &cells));
-  PetscCall(HycoFieldRows(order, m->n_cells, HYCO_ON_CELLS, MPIU_INT, m->nv, cells, 0, &rows));
+  PetscCall(HycoFieldRows(order, m->n_cells, HYCO_ON_CELLS, MPIU_INT, m->nv, cells, &rows));
   PetscCall(ListRows(m, code, order ? order->n[HYCO_ON_CELLS] : m->n_cells, (const PetscInt *)rows, l));
   if (rows != cells) PetscCall(PetscFree(rows));
   PetscCall(PetscFree(cells));

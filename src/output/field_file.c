@@ -216,7 +216,7 @@ PetscErrorCode HycoFieldFileAdd(HycoFieldFile f, const HycoField *field)
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(HycoFieldRows(f->order, n, field->place, MPIU_REAL, field->components, field->data, field->missing, &rows));
+  PetscCall(HycoFieldRows(f->order, n, field->place, MPIU_REAL, field->components, field->data, &rows));
   ierr = HycoFieldFileAddRows(f, field, (const PetscReal *)rows);
   if (rows != field->data) PetscCall(PetscFree(rows));
   PetscCall(ierr);

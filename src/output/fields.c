@@ -5,26 +5,21 @@
 #include <petscblaslapack.h>
 
 PetscErrorCode HycoFieldRows(const HycoFileOrder *order, PetscInt n, HycoPlace place, MPI_Datatype type,
-                             PetscInt components, const void *value, PetscReal missing, void **rows)
+                             PetscInt components, const void *value, void **rows)
 {
   const PetscInt count = (order ? order->n[place] : n) * components;
   const size_t size = type == MPIU_INT ? sizeof(PetscInt) : sizeof(PetscReal);
-  PetscReal *reals;
 
   PetscFunctionBegin;
   *rows = (void *)value;
   if (!order) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscCalloc1((size_t)count * size, (char **)rows));
-  reals = (PetscReal *)*rows;
-  for (PetscInt k = 0; missing != 0 && k < count; k++) reals[k] = missing;
   PetscCall(HycoFileOrderSend(order, place, type, components, value, *rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* missing: value of rows for which no process has a value. */
-static PetscErrorCode WriteRows(HycoH5 h, const HycoFileOrder *order, PetscInt n, const char name[], HycoPlace place,
-                                MPI_Datatype type, PetscInt components, PetscInt cols, const void *value,
-                                PetscReal missing)
+PetscErrorCode HycoFieldWrite(HycoH5 h, const HycoFileOrder *order, PetscInt n, const char name[], HycoPlace place,
+                              MPI_Datatype type, PetscInt components, PetscInt cols, const void *value)
 {
   const PetscInt all = order ? order->all[place] : n, own = order ? order->n[place] : n,
                  first = order ? order->first[place] : 0, lines = components / PetscAbsInt(cols);
@@ -32,18 +27,10 @@ static PetscErrorCode WriteRows(HycoH5 h, const HycoFileOrder *order, PetscInt n
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(HycoFieldRows(order, n, place, type, components, value, missing, &rows));
+  PetscCall(HycoFieldRows(order, n, place, type, components, value, &rows));
   ierr = HycoH5WriteRows(h, name, type, all * lines, cols, first * lines, own * lines, rows);
   if (order) PetscCall(PetscFree(rows));
   PetscCall(ierr);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoFieldWrite(HycoH5 h, const HycoFileOrder *order, PetscInt n, const char name[], HycoPlace place,
-                              MPI_Datatype type, PetscInt components, PetscInt cols, const void *value)
-{
-  PetscFunctionBegin;
-  PetscCall(WriteRows(h, order, n, name, place, type, components, cols, value, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -51,8 +38,8 @@ PetscErrorCode HycoFieldWriteData(HycoH5 h, const HycoFileOrder *order, PetscInt
                                   const HycoField *field)
 {
   PetscFunctionBegin;
-  PetscCall(WriteRows(h, order, n, name, field->place, MPIU_REAL, field->components, field->components, field->data,
-                      field->missing));
+  PetscCall(
+      HycoFieldWrite(h, order, n, name, field->place, MPIU_REAL, field->components, field->components, field->data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -127,7 +114,7 @@ static PetscErrorCode FillCorners(HycoFE fe, PetscReal sum[], PetscReal pressure
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On the process that has the contacts. */
+/* Of this process's contacts. */
 static PetscErrorCode FillContacts(HycoFE fe, HycoPairs *pairs, const PetscReal u[], const PetscReal lambda[],
                                    HycoContactFields *f)
 {
@@ -152,17 +139,9 @@ static PetscErrorCode FillContacts(HycoFE fe, HycoPairs *pairs, const PetscReal 
         f->gap[k] += weight[j] * n * u[master[j] * fe->dim + c];
       }
     }
-    /* for a node in several contacts the largest and the smallest */
-    f->pressure[s] = PetscMax(f->pressure[s], HycoContactPressure(fe, pairs, k, f->area, lambda));
     if (HycoPairsAlone(fe->scene, pairs, k)) f->gap[k] = NAN;
-    if (!(f->gap_node[s] <= f->gap[k])) f->gap_node[s] = f->gap[k];
-  }
-  if (fe->mesh->type == HYCO_TET10) {
-    PetscReal *sum;
-
-    PetscCall(PetscMalloc1(2 * fe->mesh->n_nodes, &sum));
-    PetscCall(FillCorners(fe, sum, f->pressure));
-    PetscCall(PetscFree(sum));
+    if (!(f->gap_node[s] <= f->gap[k])) /* for a node in several contacts the smallest */
+      f->gap_node[s] = f->gap[k];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -170,12 +149,81 @@ static PetscErrorCode FillContacts(HycoFE fe, HycoPairs *pairs, const PetscReal 
 PetscErrorCode HycoContactFieldsCreate(MPI_Comm comm, HycoFE surface, HycoPairs *pairs, const PetscReal u[],
                                        const PetscReal lambda[], HycoContactFields *f)
 {
-  const PetscInt n = surface ? surface->mesh->n_nodes : 0;
+  const PetscInt n = surface->mesh->n_nodes;
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc3(3 * n, &f->force, n, &f->pressure, n, &f->gap_node));
   PetscCall(PetscCalloc4(pairs->n, &f->gap, 3 * pairs->n, &f->normal, pairs->n, &f->area, pairs->n, &f->slave_id));
-  HycoOnRoot(comm, FillContacts(surface, pairs, u, lambda, f));
+  PetscCall(PetscMalloc1(pairs->n, &f->pressure_of));
+  HycoOnEach(comm, FillContacts(surface, pairs, u, lambda, f));
+  PetscCall(HycoContactPressures(comm, surface, pairs, f->area, lambda, f->pressure_of));
+  for (PetscInt k = 0; k < pairs->n; k++) { /* for a node in several contacts the largest */
+    const PetscInt s = HycoPairsSlave(pairs, k);
+
+    f->pressure[s] = PetscMax(f->pressure[s], f->pressure_of[k]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Combines values, `width` at each node of a surface, over the ranks, from `start` on, at the nodes of each rank's
+   part: one component at a time, as PETSc's star forests add up no vectors. */
+static PetscErrorCode Combine(PetscSF to_owner, PetscSF to_part, HycoMesh part, PetscInt n, PetscInt width, MPI_Op op,
+                              PetscReal start, const PetscReal value[], PetscReal at_part[])
+{
+  PetscReal *owned, *one, *mine;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc3(part->n_owned, &owned, n, &one, part->n_nodes, &mine));
+  for (PetscInt c = 0; c < width; c++) {
+    for (PetscInt i = 0; i < n; i++) one[i] = value[i * width + c];
+    for (PetscInt i = 0; i < part->n_owned; i++) owned[i] = start;
+    PetscCall(PetscSFReduceBegin(to_owner, MPIU_REAL, one, owned, op));
+    PetscCall(PetscSFReduceEnd(to_owner, MPIU_REAL, one, owned, op));
+    PetscCall(HycoSFBcast(to_part, MPIU_REAL, 1, owned, mine));
+    for (PetscInt i = 0; i < part->n_nodes; i++) at_part[i * width + c] = mine[i];
+  }
+  PetscCall(PetscFree3(owned, one, mine));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* From the nodes of each rank's surface to those of its part: a node may be in contacts of several ranks. */
+static PetscErrorCode ToPart(MPI_Comm comm, HycoMesh part, HycoMesh surface, HycoContactFields *f)
+{
+  PetscReal *force, *pressure, *gap;
+  PetscSF to_owner, to_part;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc3(3 * part->n_nodes, &force, part->n_nodes, &pressure, part->n_nodes, &gap));
+  PetscCall(HycoMeshNodeSF(comm, part, surface->n_nodes, surface->node_global, &to_owner));
+  PetscCall(HycoMeshNodeSF(comm, part, part->n_nodes, part->node_global, &to_part));
+  for (PetscInt i = 0; i < surface->n_nodes; i++) { /* not a number cannot be compared */
+    if (!(PetscAbsReal(f->gap_node[i]) < PETSC_MAX_REAL)) f->gap_node[i] = PETSC_MAX_REAL;
+  }
+  PetscCall(Combine(to_owner, to_part, part, surface->n_nodes, 3, MPI_SUM, 0, f->force, force));
+  PetscCall(Combine(to_owner, to_part, part, surface->n_nodes, 1, MPI_MAX, 0, f->pressure, pressure));
+  PetscCall(Combine(to_owner, to_part, part, surface->n_nodes, 1, MPI_MIN, PETSC_MAX_REAL, f->gap_node, gap));
+  for (PetscInt i = 0; i < part->n_nodes; i++) {
+    if (gap[i] >= PETSC_MAX_REAL) gap[i] = NAN;
+  }
+  PetscCall(PetscSFDestroy(&to_owner));
+  PetscCall(PetscSFDestroy(&to_part));
+  PetscCall(PetscFree3(f->force, f->pressure, f->gap_node));
+  f->force = force;
+  f->pressure = pressure;
+  f->gap_node = gap;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactFieldsToPart(MPI_Comm comm, HycoFE fe, HycoMesh surface, HycoContactFields *f)
+{
+  PetscReal *sum;
+
+  PetscFunctionBegin;
+  if (fe->mesh->node_global) PetscCall(ToPart(comm, fe->mesh, surface, f));
+  if (fe->mesh->type != HYCO_TET10) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(2 * fe->mesh->n_nodes, &sum));
+  PetscCall(FillCorners(fe, sum, f->pressure));
+  PetscCall(PetscFree(sum));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -184,6 +232,7 @@ PetscErrorCode HycoContactFieldsDestroy(HycoContactFields *f)
   PetscFunctionBegin;
   PetscCall(PetscFree3(f->force, f->pressure, f->gap_node));
   PetscCall(PetscFree4(f->gap, f->normal, f->area, f->slave_id));
+  PetscCall(PetscFree(f->pressure_of));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -233,13 +282,13 @@ static PetscErrorCode AddBodies(HycoFieldFile file, HycoFE fe, const PetscReal u
   PetscCall(HycoStressInvariants(m->n_cells, fe->dim, sigma, mises, principal));
   PetscCall(HycoNodalStress(fe, sigma, nodal, nodal_mises));
   for (PetscInt e = 0; e < m->n_cells; e++) body[e] = m->cell_body[e];
-  const HycoField field[] = {{"displacement", HYCO_ON_NODES, 3, u3, 0},
-                             {"stress", HYCO_ON_CELLS, 6, tensor, 0},
-                             {"mises", HYCO_ON_CELLS, 1, mises, 0},
-                             {"principal_stress", HYCO_ON_CELLS, 3, principal, 0},
-                             {"body", HYCO_ON_CELLS, 1, body, 0},
-                             {"nodal_stress", HYCO_ON_NODES, 6, nodal, 0},
-                             {"nodal_mises", HYCO_ON_NODES, 1, nodal_mises, 0}};
+  const HycoField field[] = {{"displacement", HYCO_ON_NODES, 3, u3},
+                             {"stress", HYCO_ON_CELLS, 6, tensor},
+                             {"mises", HYCO_ON_CELLS, 1, mises},
+                             {"principal_stress", HYCO_ON_CELLS, 3, principal},
+                             {"body", HYCO_ON_CELLS, 1, body},
+                             {"nodal_stress", HYCO_ON_NODES, 6, nodal},
+                             {"nodal_mises", HYCO_ON_NODES, 1, nodal_mises}};
 
   for (size_t k = 0; !ierr && k < sizeof(field) / sizeof(field[0]); k++) ierr = HycoFieldFileAdd(file, &field[k]);
   PetscCall(PetscFree5(sigma, tensor, mises, principal, body));
@@ -248,27 +297,56 @@ static PetscErrorCode AddBodies(HycoFieldFile file, HycoFE fe, const PetscReal u
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The table of the contacts by slave node. On one process. */
-static PetscErrorCode WriteContacts(HycoH5 h, PetscInt n, const PetscInt node_id[], const PetscReal lambda[],
-                                    const PetscReal gap[])
+PetscErrorCode HycoContactsWrite(MPI_Comm comm, HycoH5 h, const char name[], const HycoPairs *pairs, PetscInt n,
+                                 MPI_Datatype type, const void *value)
 {
+  const size_t size = type == MPIU_INT ? sizeof(PetscInt) : sizeof(PetscReal);
+  PetscLayout rows;
+  PetscSF sf;
+  char *row;
+  PetscErrorCode ierr;
+
   PetscFunctionBegin;
-  if (!n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoH5WriteInt(h, "contact/node_id", n, 1, node_id));
-  PetscCall(HycoH5WriteReal(h, "contact/lambda", n, 1, lambda));
-  PetscCall(HycoH5WriteReal(h, "contact/gap", n, 1, gap));
+  if (!pairs->number || !n) { /* one process has all */
+    HycoOnRoot(comm, type == MPIU_INT ? HycoH5WriteInt(h, name, n, 1, value) : HycoH5WriteReal(h, name, n, 1, value));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(PetscLayoutCreateFromSizes(comm, PETSC_DECIDE, n, 1, &rows));
+  PetscCall(PetscSFCreate(comm, &sf));
+  PetscCall(PetscSFSetGraphLayout(sf, rows, pairs->n, NULL, PETSC_OWN_POINTER, pairs->number));
+  PetscCall(PetscCalloc1((size_t)(rows->rend - rows->rstart) * size, &row));
+  PetscCall(HycoSFSend(sf, type, 1, value, row));
+  PetscCall(PetscSFDestroy(&sf));
+  ierr = HycoH5WriteRows(h, name, type, n, 1, rows->rstart, rows->rend - rows->rstart, row);
+  PetscCall(PetscFree(row));
+  PetscCall(PetscLayoutDestroy(&rows));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode AddContactFields(HycoFieldFile file, const HycoSolution *s, const HycoContactFields *f)
+/* The table of the contacts by slave node, in their order. Collective. */
+static PetscErrorCode WriteContacts(HycoFieldFile file, const HycoSolution *s, const HycoContactFields *f)
 {
-  const HycoField field[3] = {{"contact_force", HYCO_ON_SURFACE, 3, f->force, 0},
-                              {"contact_pressure", HYCO_ON_SURFACE, 1, f->pressure, 0},
-                              {"gap", HYCO_ON_SURFACE, 1, f->gap_node, NAN}};
+  const char *const name[3] = {"contact/node_id", "contact/lambda", "contact/gap"};
+  const void *const value[3] = {f->slave_id, s->lambda, f->gap};
+  PetscInt n = s->pairs->n;
 
   PetscFunctionBegin;
-  if (!file->vtk && !file->most)
-    HycoOnRoot(file->comm, WriteContacts(file->h, s->pairs->n, f->slave_id, s->lambda, f->gap));
+  HycoAllreduce(&n, 1, MPIU_INT, MPI_SUM, file->comm);
+  for (PetscInt k = 0; k < 3 && n; k++)
+    PetscCall(HycoContactsWrite(file->comm, file->h, name[k], s->pairs, n, k ? MPIU_REAL : MPIU_INT, value[k]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* f: at the part's nodes. */
+static PetscErrorCode AddContactFields(HycoFieldFile file, const HycoSolution *s, const HycoContactFields *f)
+{
+  const HycoField field[3] = {{"contact_force", HYCO_ON_NODES, 3, f->force},
+                              {"contact_pressure", HYCO_ON_NODES, 1, f->pressure},
+                              {"gap", HYCO_ON_NODES, 1, f->gap_node}};
+
+  PetscFunctionBegin;
+  if (!file->vtk && !file->most) PetscCall(WriteContacts(file, s, f));
   for (PetscInt k = 0; k < 3; k++) PetscCall(HycoFieldFileAdd(file, &field[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -280,6 +358,7 @@ static PetscErrorCode AddContacts(HycoFieldFile file, const HycoSolution *s)
 
   PetscFunctionBegin;
   ierr = HycoContactFieldsCreate(file->comm, s->surface, s->pairs, s->u_surface, s->lambda, &f);
+  if (!ierr) ierr = HycoContactFieldsToPart(file->comm, s->fe, s->surface->mesh, &f);
   if (!ierr) ierr = AddContactFields(file, s, &f);
   PetscCall(HycoContactFieldsDestroy(&f));
   PetscCall(ierr);
@@ -288,7 +367,7 @@ static PetscErrorCode AddContacts(HycoFieldFile file, const HycoSolution *s)
 
 static PetscErrorCode AddFields(HycoFieldFile file, const HycoSolution *s)
 {
-  const HycoField rid = {"rid", HYCO_ON_CELLS, 1, s->rid, 0};
+  const HycoField rid = {"rid", HYCO_ON_CELLS, 1, s->rid};
 
   PetscFunctionBegin;
   PetscCall(AddBodies(file, s->fe, s->u));

@@ -112,7 +112,7 @@ PetscErrorCode HycoVTKWritePoints(HycoFieldFile f, const PetscReal X[])
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(HycoFieldRows(f->order, f->mesh->n_nodes, HYCO_ON_NODES, MPIU_REAL, 3, X, 0, &rows));
+  PetscCall(HycoFieldRows(f->order, f->mesh->n_nodes, HYCO_ON_NODES, MPIU_REAL, 3, X, &rows));
   ierr = WriteRows(f, ROOT "Points", HYCO_ON_NODES, 3, (const PetscReal *)rows);
   if (f->order) PetscCall(PetscFree(rows));
   PetscCall(ierr);

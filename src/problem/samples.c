@@ -16,7 +16,7 @@ PetscErrorCode HycoSamplesCreate(HycoScene scene, HycoSamples *samples)
 {
   PetscFunctionBegin;
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
-  PetscCall(HycoInitializePackage());
+  PetscCall(HycoPackageCheck());
   PetscCall(PetscHeaderCreate(*samples, HYCO_SAMPLES_CLASSID, "HycoSamples", "Points of the parameter space", "Hyco",
                               HycoComm(scene), HycoSamplesDestroy, HycoSamplesView));
   PetscCall(PetscObjectReference((PetscObject)scene));
@@ -27,9 +27,7 @@ PetscErrorCode HycoSamplesCreate(HycoScene scene, HycoSamples *samples)
 PetscErrorCode HycoSamplesDestroy(HycoSamples *samples)
 {
   PetscFunctionBegin;
-  if (!samples || !*samples) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheckHandle(*samples, HYCO_SAMPLES_CLASSID);
-  HycoDereference(samples);
+  HycoDestroyBegin(samples, HYCO_SAMPLES_CLASSID);
   PetscCall(HycoSceneDestroy(&(*samples)->scene));
   PetscCall(PetscFree((*samples)->mu));
   PetscCall(PetscHeaderDestroy(samples));
@@ -93,7 +91,8 @@ static PetscErrorCode TakeProduct(HycoSamples s, const PetscInt counts[], PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoSamplesAddGrid(HycoSamples s, const PetscInt counts[], PetscBool closed)
+/* The tensor grid with at least `least` values of each parameter that has a range; of one value the middle. */
+static PetscErrorCode AddGrid(HycoSamples s, const PetscInt counts[], PetscBool closed, PetscInt least)
 {
   PetscReal *values[HYCO_MAX_PARAMETERS];
 
@@ -101,21 +100,36 @@ PetscErrorCode HycoSamplesAddGrid(HycoSamples s, const PetscInt counts[], PetscB
   HycoCheckHandle(s, HYCO_SAMPLES_CLASSID);
   HycoCheckHandle(s->scene, HYCO_SCENE_CLASSID);
   for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
-    const PetscInt least = closed && s->scene->lo[p] < s->scene->hi[p] ? 2 : 1;
+    const PetscInt needed = s->scene->lo[p] < s->scene->hi[p] ? least : 1;
 
-    HycoCheck(counts[p] >= least && counts[p] <= 100000000, "the grid has %d points for %s; at least %d are needed",
-              (int)counts[p], s->scene->parameter[p], (int)least);
+    HycoCheck(counts[p] >= needed && counts[p] <= 100000000, "the grid has %d points for %s; at least %d are needed",
+              (int)counts[p], s->scene->parameter[p], (int)needed);
   }
   for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
     const PetscReal lo = s->scene->lo[p], hi = s->scene->hi[p];
     const PetscInt n = counts[p];
+    const PetscBool ends = (PetscBool)(closed && n > 1);
 
     PetscCall(PetscMalloc1(n, &values[p]));
     for (PetscInt k = 0; k < n; k++) {
-      values[p][k] = closed ? (k == n - 1 ? hi : lo + k * (hi - lo) / (n - 1)) : lo + (k + 0.5) * (hi - lo) / n;
+      values[p][k] = ends ? (k == n - 1 ? hi : lo + k * (hi - lo) / (n - 1)) : lo + (k + 0.5) * (hi - lo) / n;
     }
   }
   PetscCall(TakeProduct(s, counts, values));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSamplesAddGrid(HycoSamples s, const PetscInt counts[], PetscBool closed)
+{
+  PetscFunctionBegin;
+  PetscCall(AddGrid(s, counts, closed, closed ? 2 : 1));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSamplesAddTrainingGrid(HycoSamples s, const PetscInt counts[])
+{
+  PetscFunctionBegin;
+  PetscCall(AddGrid(s, counts, PETSC_TRUE, 1));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -281,12 +295,8 @@ PetscErrorCode HycoSamplesGet(HycoSamples s, PetscInt *n_points, PetscInt *n_par
 
 PetscErrorCode HycoSamplesView(HycoSamples s, PetscViewer viewer)
 {
-  PetscBool ascii;
-
   PetscFunctionBegin;
-  HycoCheckHandle(s, HYCO_SAMPLES_CLASSID);
-  PetscCall(HycoViewBegin((PetscObject)s, &viewer, &ascii));
-  if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoViewBegin(s, HYCO_SAMPLES_CLASSID, viewer);
   PetscCall(PetscViewerASCIIPrintf(viewer, "%d points of %d parameters\n", (int)s->n, (int)s->scene->n_parameters));
   for (PetscInt k = 0; k < s->n; k++) {
     char line[HYCO_LINE] = "", value[64];

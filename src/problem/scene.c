@@ -732,7 +732,7 @@ PetscErrorCode HycoSceneLoad(MPI_Comm comm, const char path[], HycoScene *scene)
   PetscFunctionBegin;
   PetscCheck(path && scene, PETSC_COMM_SELF, PETSC_ERR_ARG_NULL,
              "HycoSceneLoad: the path or the handle's address is NULL");
-  PetscCall(HycoInitializePackage());
+  PetscCall(HycoPackageCheck());
   PetscCall(PetscHeaderCreate(*scene, HYCO_SCENE_CLASSID, "HycoScene", "Scene of bodies in contact", "Hyco", comm,
                               HycoSceneDestroy, HycoSceneView));
   ierr = LoadInto(*scene, path);
@@ -765,7 +765,7 @@ PetscErrorCode HycoSceneFromEntries(MPI_Comm comm, PetscInt n, char *const key[]
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(HycoInitializePackage());
+  PetscCall(HycoPackageCheck());
   PetscCall(PetscHeaderCreate(*scene, HYCO_SCENE_CLASSID, "HycoScene", "Scene of bodies in contact", "Hyco", comm,
                               HycoSceneDestroy, HycoSceneView));
   ierr = FillFromEntries(*scene, n, key, value, folder);
@@ -835,9 +835,7 @@ PetscErrorCode HycoSceneDestroy(HycoScene *scene)
   HycoScene s;
 
   PetscFunctionBegin;
-  if (!scene || !*scene) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheckHandle(*scene, HYCO_SCENE_CLASSID);
-  HycoDereference(scene);
+  HycoDestroyBegin(scene, HYCO_SCENE_CLASSID);
   s = *scene;
   *scene = NULL;
   for (PetscInt k = 0; k < s->n_bodies; k++) {

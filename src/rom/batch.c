@@ -23,7 +23,7 @@ static int Compare(const void *a, const void *b)
 
 static PetscErrorCode Sort(HycoROM m, PetscInt n, const PetscReal mu[], PetscInt order[], Point point[])
 {
-  const PetscInt n_par = m->scene->n_parameters;
+  const PetscInt n_par = m->model->scene->n_parameters;
   PetscBool reaches[HYCO_MAX_PARAMETERS];
   PetscInt count = 0;
 
@@ -47,9 +47,9 @@ PetscErrorCode HycoROMGetSizes(HycoROM m, PetscInt *n_contacts, PetscInt *n_node
 {
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
-  if (n_contacts) *n_contacts = m->pairs.n;
-  if (n_nodes) *n_nodes = m->mesh->n_nodes;
-  if (dim) *dim = m->mesh->dim;
+  if (n_contacts) *n_contacts = m->model->pairs.n;
+  if (n_nodes) *n_nodes = m->model->mesh->n_nodes;
+  if (dim) *dim = m->model->mesh->dim;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -59,12 +59,12 @@ static PetscErrorCode SolveEach(HycoROM m, PetscInt n, const Point point[], Hyco
 {
   PetscFunctionBegin;
   for (PetscInt k = 0; k < n; k++) {
-    const size_t at = (size_t)point[k].at, n_dof = (size_t)(m->mesh->n_nodes * m->mesh->dim);
+    const size_t at = (size_t)point[k].at, n_dof = (size_t)(m->model->mesh->n_nodes * m->model->mesh->dim);
 
-    PetscCall(HycoROMPredict(m, m->scene->n_parameters, point[k].mu));
+    PetscCall(HycoROMPredict(m, m->model->scene->n_parameters, point[k].mu));
     if (m->point_monitor) PetscCall((*m->point_monitor)(m, point[k].at, m->point_ctx));
     if (prediction) PetscCall(HycoROMGetPrediction(m, &prediction[at]));
-    if (Lambda) PetscCall(PetscArraycpy(Lambda + at * (size_t)m->pairs.n, m->Lambda, m->pairs.n));
+    if (Lambda) PetscCall(PetscArraycpy(Lambda + at * (size_t)m->model->pairs.n, m->Lambda, m->model->pairs.n));
     if (U) PetscCall(HycoROMComplete(m));
     if (U) PetscCall(PetscArraycpy(U + at * n_dof, m->U, n_dof));
   }
@@ -80,7 +80,8 @@ PetscErrorCode HycoROMSolveMany(HycoROM m, PetscInt n, PetscInt n_parameters, co
 
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
-  for (PetscInt k = 0; k < n; k++) PetscCall(HycoSceneCheckParameters(m->scene, n_parameters, mu + k * n_parameters));
+  for (PetscInt k = 0; k < n; k++)
+    PetscCall(HycoSceneCheckParameters(m->model->scene, n_parameters, mu + k * n_parameters));
   PetscCall(HycoROMSetUp(m));
   PetscCall(PetscMalloc1(n, &point));
   ierr = Sort(m, n, mu, order, point);

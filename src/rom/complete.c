@@ -26,10 +26,10 @@ static PetscErrorCode CreateBeyond(HycoROM m)
 {
   PetscFunctionBegin;
   PetscCall(PetscNew(&m->beyond));
-  *m->beyond = *m->mesh;
+  *m->beyond = *m->model->mesh;
   m->beyond->n_cells = 0;
-  PetscCall(HycoFECreate(m->scene, m->beyond, &m->fe_beyond));
-  PetscCall(HycoRowsCreate(&m->pairs, m->mesh->dim, &m->rows));
+  PetscCall(HycoFECreate(m->model->scene, m->beyond, &m->fe_beyond));
+  PetscCall(HycoRowsCreate(&m->model->pairs, m->model->mesh->dim, &m->rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -40,7 +40,7 @@ static PetscErrorCode BringRows(HycoROM m, HycoFE fe, const PetscReal mu[])
   PetscCall(HycoFESetParameters(fe, mu));
   if (!fe->contact_changed && !fe->gap_changed) PetscFunctionReturn(PETSC_SUCCESS);
   fe->ready = PETSC_FALSE; /* until its rows are computed */
-  PetscCall(HycoContactRows(fe, &m->pairs, m->rows.start, m->rows.dof, m->rows.value, m->rows.gap));
+  PetscCall(HycoContactRows(fe, &m->model->pairs, m->rows.start, m->rows.dof, m->rows.value, m->rows.gap));
   fe->ready = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -55,10 +55,10 @@ PetscErrorCode HycoROMBringRows(HycoROM m, const PetscReal mu[])
 /* U = u0 + V gamma on the nodes of fe from the first unknown on. */
 static void Expand(HycoROM m, HycoFE fe, PetscInt first)
 {
-  const PetscInt l = m->l;
+  const PetscInt l = m->model->l;
 
   for (PetscInt i = first; i < fe->n_dof; i++) {
-    const PetscReal *v = m->V + (size_t)i * (size_t)l;
+    const PetscReal *v = m->model->V + (size_t)i * (size_t)l;
 
     m->U[i] = fe->u0[i];
     for (PetscInt j = 0; j < l; j++) m->U[i] += v[j] * m->gamma[j];
@@ -77,7 +77,7 @@ PetscErrorCode HycoROMBringContacts(HycoROM m, HycoFE *fe)
 {
   PetscFunctionBegin;
   *fe = m->fe;
-  if (m->fe->mesh == m->mesh) PetscFunctionReturn(PETSC_SUCCESS);
+  if (m->fe->mesh == m->model->mesh) PetscFunctionReturn(PETSC_SUCCESS);
   if (!m->beyond) PetscCall(CreateBeyond(m));
   if (!m->beyond_current) PetscCall(BringRows(m, m->fe_beyond, m->fe->mu));
   *fe = m->fe_beyond;
@@ -89,7 +89,7 @@ PetscErrorCode HycoROMComplete(HycoROM m)
   HycoFE fe;
 
   PetscFunctionBegin;
-  if (m->fe->mesh == m->mesh || m->beyond_current) PetscFunctionReturn(PETSC_SUCCESS);
+  if (m->fe->mesh == m->model->mesh || m->beyond_current) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoROMBringContacts(m, &fe));
   Expand(m, fe, m->fe->n_dof);
   m->beyond_current = PETSC_TRUE;

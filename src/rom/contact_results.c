@@ -30,10 +30,10 @@ static PetscErrorCode Make(HycoROM m)
   if (m->carried) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscNew(&c));
   m->carried = c;
-  PetscCall(PetscMalloc1(3 * m->pairs.n, &c->normal));
-  PetscCall(PetscMalloc1(m->pairs.n, &c->gap));
-  PetscCall(PetscMalloc1(m->pairs.n, &c->area));
-  PetscCall(PetscMalloc1(m->scene->n_contacts, &c->result));
+  PetscCall(PetscMalloc1(3 * m->model->pairs.n, &c->normal));
+  PetscCall(PetscMalloc1(m->model->pairs.n, &c->gap));
+  PetscCall(PetscMalloc1(m->model->pairs.n, &c->area));
+  PetscCall(PetscMalloc1(m->model->scene->n_contacts, &c->result));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -45,20 +45,21 @@ static PetscErrorCode Bring(HycoROM m, HycoFE fe)
   HycoChanges changes;
 
   PetscFunctionBegin;
-  for (PetscInt p = 0; p < m->scene->n_variables; p++) changed[p] = (PetscBool)(!c->ready || fe->mu[p] != c->mu[p]);
-  changes = HycoSceneChanges(m->scene, changed);
+  for (PetscInt p = 0; p < m->model->scene->n_variables; p++)
+    changed[p] = (PetscBool)(!c->ready || fe->mu[p] != c->mu[p]);
+  changes = HycoSceneChanges(m->model->scene, changed);
   if (c->ready && !changes.nodes && !changes.rows) PetscFunctionReturn(PETSC_SUCCESS);
   c->ready = PETSC_FALSE;
-  PetscCall(HycoContactGeometry(fe, &m->pairs, c->normal, c->gap));
-  PetscCall(HycoContactAreas(fe, &m->pairs, c->area));
-  PetscCall(PetscArraycpy(c->mu, fe->mu, m->scene->n_variables));
+  PetscCall(HycoContactGeometry(fe, &m->model->pairs, c->normal, c->gap));
+  PetscCall(HycoContactAreas(fe, &m->model->pairs, c->area));
+  PetscCall(PetscArraycpy(c->mu, fe->mu, m->model->scene->n_variables));
   c->ready = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscBool HycoROMHasAllForces(HycoROM m)
 {
-  return (PetscBool)(!m->ops->reconstruct || m->reconstruct || m->m == m->pairs.n);
+  return (PetscBool)(!m->ops->reconstruct || m->reconstruct || m->m == m->model->pairs.n);
 }
 
 /* Creates and updates the geometry; *least: a force up to it counts as zero. */
@@ -70,21 +71,25 @@ static PetscErrorCode Prepare(HycoROM m, const PetscReal Lambda[], HycoFE *fe, P
   PetscCall(HycoROMBringContacts(m, fe));
   PetscCall(Make(m));
   PetscCall(Bring(m, *fe));
-  for (PetscInt k = 0; k < m->pairs.n; k++) most = PetscMax(most, Lambda[k]);
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) most = PetscMax(most, Lambda[k]);
   *least = HYCO_PRESSES * most;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoROMSumContacts(HycoROM m, const PetscReal Lambda[], const HycoContactResult *result[])
 {
-  PetscReal least;
+  PetscReal least, *pressure;
   HycoFE fe;
 
   PetscFunctionBegin;
   *result = NULL;
   if (!HycoROMHasAllForces(m)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(Prepare(m, Lambda, &fe, &least));
-  HycoContactResults(fe, &m->pairs, m->carried->normal, m->carried->area, Lambda, least, m->carried->result);
+  PetscCall(PetscMalloc1(m->model->pairs.n, &pressure));
+  PetscCall(HycoContactPressures(PETSC_COMM_SELF, fe, &m->model->pairs, m->carried->area, Lambda, pressure));
+  HycoContactResults(fe, &m->model->pairs, m->carried->normal, m->carried->area, Lambda, pressure, least,
+                     m->carried->result);
+  PetscCall(PetscFree(pressure));
   *result = m->carried->result;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -92,7 +97,7 @@ PetscErrorCode HycoROMSumContacts(HycoROM m, const PetscReal Lambda[], const Hyc
 PetscErrorCode HycoROMPushBodies(HycoROM m, const PetscReal Lambda[], const PetscBool of[], PetscInt axis,
                                  PetscReal *force)
 {
-  const PetscInt *body = m->mesh->node_body, *master;
+  const PetscInt *body = m->model->mesh->node_body, *master;
   const PetscReal *weight;
   PetscReal least;
   PetscInt n;
@@ -101,12 +106,12 @@ PetscErrorCode HycoROMPushBodies(HycoROM m, const PetscReal Lambda[], const Pets
   PetscFunctionBegin;
   PetscCall(Prepare(m, Lambda, &fe, &least));
   *force = 0;
-  for (PetscInt k = 0; k < m->pairs.n; k++) {
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) {
     const PetscReal along = Lambda[k] * m->carried->normal[3 * k + axis];
 
-    if (Lambda[k] <= least || HycoPairsAlone(m->scene, &m->pairs, k)) continue;
-    if (of[body[m->pairs.slave[k]]]) *force -= along;
-    HycoPairsMasters(&m->pairs, k, &n, &master, &weight);
+    if (Lambda[k] <= least || HycoPairsAlone(m->model->scene, &m->model->pairs, k)) continue;
+    if (of[body[m->model->pairs.slave[k]]]) *force -= along;
+    HycoPairsMasters(&m->model->pairs, k, &n, &master, &weight);
     for (PetscInt j = 0; j < n; j++) *force += of[body[master[j]]] ? weight[j] * along : 0;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -118,6 +123,6 @@ PetscErrorCode HycoROMGetContacts(HycoROM m, PetscInt *n, const HycoContactResul
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
   PetscCheck(m->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoROMPredict() before HycoROMGetContacts()");
   PetscCall(HycoROMSumContacts(m, m->Lambda, result));
-  *n = *result ? m->scene->n_contacts : 0;
+  *n = *result ? m->model->scene->n_contacts : 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

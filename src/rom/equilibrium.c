@@ -43,15 +43,15 @@ PetscErrorCode HycoBalanceDestroy(HycoBalance *balance)
 static PetscErrorCode Create(HycoROM m, HycoBalance b)
 {
   const HycoFE fe = m->fe_whole;
-  const PetscInt n_times = m->scene->n_times + 1; /* one more: the end of a path that ends early */
+  const PetscInt n_times = m->model->scene->n_times + 1; /* one more: the end of a path that ends early */
 
   PetscFunctionBegin;
   PetscCall(HycoFECreateMatrix(fe, PETSC_COMM_SELF, fe->mesh->n_nodes, 0, &b->K));
   PetscCall(MatCreateVecs(b->K, &b->x, &b->r));
-  PetscCall(HycoRowsCreate(&m->whole_pairs, fe->dim, &b->rows));
+  PetscCall(HycoRowsCreate(&m->model->whole_pairs, fe->dim, &b->rows));
   PetscCall(PetscMalloc1(fe->n_dof, &b->load));
   PetscCall(PetscMalloc1(fe->mesh->n_cells, &b->energy));
-  PetscCall(PetscMalloc1((size_t)n_times * (size_t)m->pairs.n + 1, &b->gap));
+  PetscCall(PetscMalloc1((size_t)n_times * (size_t)m->model->pairs.n + 1, &b->gap));
   PetscCall(PetscMalloc1(n_times, &b->size));
   PetscCall(PetscMalloc1(n_times, &b->approach));
   PetscCall(PetscMalloc1(n_times, &b->residual));
@@ -89,15 +89,15 @@ static PetscErrorCode Factor(HycoROM m, HycoBalance b)
   HycoChanges reached;
 
   PetscFunctionBegin;
-  for (PetscInt p = 0; p < m->scene->n_variables; p++) changed[p] = (PetscBool)(b->mu[p] != fe->mu[p]);
-  reached = HycoSceneChanges(m->scene, changed);
+  for (PetscInt p = 0; p < m->model->scene->n_variables; p++) changed[p] = (PetscBool)(b->mu[p] != fe->mu[p]);
+  reached = HycoSceneChanges(m->model->scene, changed);
   if (b->factored && !reached.nodes && !reached.stiffness) PetscFunctionReturn(PETSC_SUCCESS);
   b->factored = PETSC_FALSE;
   PetscCall(KSPDestroy(&b->ksp));
   PetscCall(HycoFEAssembleStiffness(fe, b->K));
   PetscCall(HoldFloating(fe, b->K));
   HycoLogged(HYCO_EVENT_FACTOR, HycoDefiniteSolver(b->K, "the elastic stiffness of the whole mesh", &b->ksp));
-  PetscCall(PetscArraycpy(b->mu, fe->mu, m->scene->n_variables));
+  PetscCall(PetscArraycpy(b->mu, fe->mu, m->model->scene->n_variables));
   b->factored = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -106,7 +106,7 @@ static PetscErrorCode Factor(HycoROM m, HycoBalance b)
 static void AddContact(HycoROM m, HycoBalance b, PetscInt j, PetscReal f[])
 {
   const HycoRows *B = &b->rows;
-  const PetscInt n = m->pairs.n;
+  const PetscInt n = m->model->pairs.n;
   const PetscReal *L = m->trace.Lambda + (size_t)j * (size_t)n;
 
   b->approach[j] = 0;
@@ -131,7 +131,7 @@ static PetscErrorCode MeasureTime(HycoROM m, HycoBalance b, HycoReplay *replay, 
   PetscScalar *r, square;
 
   PetscFunctionBegin;
-  PetscCall(HycoContactRows(fe, &m->whole_pairs, b->rows.start, b->rows.dof, b->rows.value, b->rows.gap));
+  PetscCall(HycoContactRows(fe, &m->model->whole_pairs, b->rows.start, b->rows.dof, b->rows.value, b->rows.gap));
   PetscCall(HycoFELoads(fe, b->load));
   HycoFEGeneralise(fe, b->load);
   PetscCall(VecGetArray(b->r, &r));
@@ -181,7 +181,7 @@ static PetscReal Largest(PetscInt n, const PetscReal value[])
 /* |min(g, c L)| at listed time j. */
 static PetscReal ContactResidual(HycoROM m, const HycoBalance b, PetscInt j, PetscReal c)
 {
-  const PetscInt n = m->pairs.n;
+  const PetscInt n = m->model->pairs.n;
   PetscReal sum = 0;
 
   for (PetscInt k = 0; k < n; k++) {
@@ -198,7 +198,7 @@ static void Summarise(HycoROM m, HycoBalance b, HycoEquilibrium *e)
 {
   const PetscInt n = m->trace.n_listed;
   const PetscReal size = Largest(n, b->size), approach = Largest(n, b->approach),
-                  force = Largest(n * m->pairs.n, m->trace.Lambda);
+                  force = Largest(n * m->model->pairs.n, m->trace.Lambda);
 
   *e = (HycoEquilibrium){.n = n, .residual = b->residual, .contact = b->contact};
   for (PetscInt j = 0; j < n; j++) {
@@ -237,7 +237,7 @@ PetscErrorCode HycoROMGetEquilibrium(HycoROM m, HycoEquilibrium *e)
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
   PetscCheck(m->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoROMPredict() before HycoROMGetEquilibrium()");
-  HycoCheck(m->scene->n_times, "HycoROMGetEquilibrium: the model's scene has no history");
+  HycoCheck(m->model->scene->n_times, "HycoROMGetEquilibrium: the model's scene has no history");
   PetscCall(HycoROMLoadWhole(m));
   if (!m->balance) PetscCall(PetscNew(&m->balance));
   ierr = m->balanced ? PETSC_SUCCESS : Measure(m, m->balance, &m->balance->last);

@@ -69,11 +69,12 @@ static PetscReal Misfit(HycoROM m)
 {
   PetscReal lost = 0, size = 0;
 
-  for (PetscInt f = 0; f < m->n_fe; f++) {
-    const PetscInt dof = m->fe_dof[f];
+  for (PetscInt f = 0; f < m->model->n_fe; f++) {
+    const PetscInt dof = m->model->fe_dof[f];
     PetscReal by_modes = m->fe->u0[dof];
 
-    for (PetscInt j = 0; j < m->l; j++) by_modes += m->V[(size_t)dof * (size_t)m->l + (size_t)j] * m->gamma[j];
+    for (PetscInt j = 0; j < m->model->l; j++)
+      by_modes += m->model->V[(size_t)dof * (size_t)m->model->l + (size_t)j] * m->gamma[j];
     lost += (m->U[dof] - by_modes) * (m->U[dof] - by_modes);
     size += m->U[dof] * m->U[dof];
   }
@@ -84,12 +85,12 @@ static void Contacts(HycoROM m, PetscReal *penetration, PetscReal *adhesion)
 {
   PetscReal in = 0, moved = 0, stuck = 0, force = 0;
 
-  for (PetscInt k = 0; k < m->pairs.n; k++) {
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) {
     const PetscReal bu = HycoROMAddRow(m, k, 0);
 
     moved += bu * bu;
     force += m->Lambda[k] * m->Lambda[k];
-    if (m->in_rid[k] && m->traits.constrains) continue;
+    if (m->model->in_rid[k] && m->model->traits.constrains) continue;
     if (bu > m->rows.gap[k])
       in += (bu - m->rows.gap[k]) * (bu - m->rows.gap[k]);
     else if (bu < m->rows.gap[k])
@@ -104,7 +105,7 @@ static PetscReal Inconsistency(HycoROM m)
 {
   PetscReal lost = 0, force = 0, size = 0;
 
-  for (PetscInt k = 0; k < m->pairs.n; k++) {
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) {
     for (PetscInt j = m->rows.start[k]; j < m->rows.start[k + 1]; j++)
       size = PetscMax(size, PetscAbsReal(m->U[m->rows.dof[j]]));
     if (!(m->Lambda[k] > 0)) continue;
@@ -120,12 +121,12 @@ static void Shares(HycoROM m, PetscReal *fresh, PetscReal *outside)
   PetscReal sum = 0;
 
   *fresh = *outside = 0;
-  for (PetscInt k = 0; k < m->pairs.n; k++) {
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) {
     const PetscReal force = PetscMax(m->Lambda[k], 0);
 
     sum += force;
-    if (m->closed && !m->closed[k]) *fresh += force;
-    if (!m->in_rid[k]) *outside += force;
+    if (m->model->closed && !m->model->closed[k]) *fresh += force;
+    if (!m->model->in_rid[k]) *outside += force;
   }
   if (!(sum > 0)) return;
   *fresh /= sum;
@@ -160,7 +161,7 @@ static PetscReal Tail(HycoROM m)
 /* For the current solution; for a path at the listed time that is selected. */
 static PetscErrorCode MeasureOne(HycoROM m, PetscReal feature[])
 {
-  const PetscInt n_par = m->scene->n_parameters;
+  const PetscInt n_par = m->model->scene->n_parameters;
 
   PetscFunctionBegin;
   PetscCall(HycoROMComplete(m));
@@ -173,14 +174,15 @@ static PetscErrorCode MeasureOne(HycoROM m, PetscReal feature[])
   }
   feature[INCONSISTENCY] = Inconsistency(m);
   feature[NEW_CONTACTS] = feature[OUTSIDE] = feature[REMAINDER] = 0;
-  if (!m->traits.forces) {
+  if (!m->model->traits.forces) {
     Shares(m, &feature[NEW_CONTACTS], &feature[OUTSIDE]);
     feature[REMAINDER] = m->remainder;
   }
   feature[TAIL] = Tail(m);
-  feature[DISTANCE] = m->n_points && n_par ? PETSC_MAX_REAL : 0;
-  for (PetscInt k = 0; n_par && k < m->n_points; k++)
-    feature[DISTANCE] = PetscMin(feature[DISTANCE], HycoEstimatesDistance(m->scene, m->fe->mu, m->points + k * n_par));
+  feature[DISTANCE] = m->model->n_points && n_par ? PETSC_MAX_REAL : 0;
+  for (PetscInt k = 0; n_par && k < m->model->n_points; k++)
+    feature[DISTANCE] =
+        PetscMin(feature[DISTANCE], HycoEstimatesDistance(m->model->scene, m->fe->mu, m->model->points + k * n_par));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -208,25 +210,26 @@ PetscErrorCode HycoEstimatesFeatures(HycoROM m, PetscReal feature[])
 /* The range of each parameter covered by training. */
 static PetscErrorCode FindReach(HycoROM m)
 {
-  const PetscInt n_par = m->scene->n_parameters;
+  const PetscInt n_par = m->model->scene->n_parameters;
 
   PetscFunctionBegin;
-  if (m->reach) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc1(2 * n_par + 1, &m->reach));
-  PetscCall(HycoSamplesReach(m->scene, m->n_points, m->points, m->reach, m->reach + n_par));
+  if (m->model->reach) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(2 * n_par + 1, &m->model->reach));
+  PetscCall(HycoSamplesReach(m->model->scene, m->model->n_points, m->model->points, m->model->reach,
+                             m->model->reach + n_par));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The nearest point of the region of training, and the distance of mu from it. */
 static PetscReal Beyond(HycoROM m, const PetscReal mu[], PetscReal nearest[])
 {
-  const HycoScene s = m->scene;
+  const HycoScene s = m->model->scene;
   PetscReal most = 0;
 
   for (PetscInt p = 0; p < s->n_parameters; p++) {
     const PetscReal width = s->hi[p] > s->lo[p] ? s->hi[p] - s->lo[p] : 1;
 
-    nearest[p] = PetscMin(PetscMax(mu[p], m->reach[p]), m->reach[s->n_parameters + p]);
+    nearest[p] = PetscMin(PetscMax(mu[p], m->model->reach[p]), m->model->reach[s->n_parameters + p]);
     most = PetscMax(most, PetscAbsReal(mu[p] - nearest[p]) / width);
   }
   return most > 1e-12 ? most : 0;
@@ -248,7 +251,7 @@ static PetscReal Unseen(HycoROM m, const PetscReal feature[], PetscInt *which)
 
   *which = -1;
   for (PetscInt j = 0; j < HYCO_FEATURES; j++) {
-    const PetscReal reached = m->estimates.reached[j];
+    const PetscReal reached = m->model->estimates.reached[j];
 
     if (!(slight[j] > 0) || reached < 0 || (j <= PENETRATION && m->ops->features)) continue;
     if (!(feature[j] > most * PetscMax(reached, slight[j]))) continue;
@@ -261,9 +264,9 @@ static PetscReal Unseen(HycoROM m, const PetscReal feature[], PetscInt *which)
 /* Whether the displacement follows the forces; in models without held-out points only if their forces are accurate. */
 static PetscBool IsInconsistent(HycoROM m, PetscReal inconsistency)
 {
-  const HycoEstimates *t = &m->estimates;
+  const HycoEstimates *t = &m->model->estimates;
 
-  if (!t->n || t->reached[INCONSISTENCY] < 0) return (PetscBool)(m->traits.forces && inconsistency > UNJUDGED);
+  if (!t->n || t->reached[INCONSISTENCY] < 0) return (PetscBool)(m->model->traits.forces && inconsistency > UNJUDGED);
   return (PetscBool)(inconsistency > PetscMax(INCONSISTENT, HYCO_UNSEEN * t->reached[INCONSISTENCY]));
 }
 
@@ -285,7 +288,7 @@ static PetscReal EstimateOutput(const HycoOutputEstimate *o, const PetscReal ter
 /* The estimates of the calibrated formulas, times `factor`. */
 static void EvaluateFormulas(HycoROM m, const PetscReal feature[], PetscReal factor, HycoPrediction *p)
 {
-  const HycoEstimates *t = &m->estimates;
+  const HycoEstimates *t = &m->model->estimates;
   PetscReal term[HYCO_ESTIMATE_FEATURES], estimate[HYCO_N_ESTIMATES];
 
   for (PetscInt j = 0; j < HYCO_ESTIMATE_FEATURES; j++) term[j] = PetscLogReal(1 + feature[j] / t->floor[j]);
@@ -302,7 +305,7 @@ static void EvaluateFormulas(HycoROM m, const PetscReal feature[], PetscReal fac
 
 PetscErrorCode HycoEstimatesEvaluate(HycoROM m, HycoPrediction *p)
 {
-  const HycoEstimates *t = &m->estimates;
+  const HycoEstimates *t = &m->model->estimates;
   PetscReal nearest[HYCO_MAX_PARAMETERS], feature[HYCO_FEATURES], outside;
 
   PetscFunctionBegin;
@@ -322,7 +325,7 @@ PetscErrorCode HycoEstimatesEvaluate(HycoROM m, HycoPrediction *p)
   p->inconsistent = IsInconsistent(m, p->inconsistency);
   if (t->n) {
     p->unseen = Unseen(m, feature, &p->unseen_feature);
-    outside = 1 + (p->beyond > 0 ? HycoEstimatesDistance(m->scene, m->fe->mu, nearest) / t->floor[DISTANCE] : 0);
+    outside = 1 + (p->beyond > 0 ? HycoEstimatesDistance(m->model->scene, m->fe->mu, nearest) / t->floor[DISTANCE] : 0);
     EvaluateFormulas(m, feature, outside * outside * PetscMin(p->unseen, MOST_FACTOR), p);
   }
   if (p->inconsistent && p->estimated_error_u >= 0)
@@ -341,7 +344,7 @@ static void DescribeErrors(const PetscReal error[], char text[HYCO_LINE])
 
 PetscErrorCode HycoEstimatesView(HycoROM m, PetscViewer viewer)
 {
-  const HycoEstimates *t = &m->estimates;
+  const HycoEstimates *t = &m->model->estimates;
   char median[HYCO_LINE], largest[HYCO_LINE];
 
   PetscFunctionBegin;
@@ -357,17 +360,17 @@ PetscErrorCode HycoEstimatesView(HycoROM m, PetscViewer viewer)
     if (o->magnitude >= 0)
       PetscCall(PetscViewerASCIIPrintf(viewer,
                                        "    output %s: median %.2g, largest %.2g (values up to %.4g); error %s\n",
-                                       m->scene->quantity[q].name, (double)o->median, (double)o->largest,
+                                       m->model->scene->quantity[q].name, (double)o->median, (double)o->largest,
                                        (double)o->magnitude, o->has ? "estimated" : "not estimated"));
     else
-      PetscCall(
-          PetscViewerASCIIPrintf(viewer, "    output %s: not known, not estimated\n", m->scene->quantity[q].name));
+      PetscCall(PetscViewerASCIIPrintf(viewer, "    output %s: not known, not estimated\n",
+                                       m->model->scene->quantity[q].name));
   }
   if (t->n)
     PetscCall(PetscViewerASCIIPrintf(viewer, "  error estimates: calibrated on %d predictions of held-out solutions\n",
                                      (int)t->n));
   else if (!m->ops->estimate)
     PetscCall(PetscViewerASCIIPrintf(viewer, "  error estimates: none, not calibrated\n"));
-  if (m->search) PetscCall(PetscViewerASCIIPrintf(viewer, "%s", m->search));
+  if (m->model->search) PetscCall(PetscViewerASCIIPrintf(viewer, "%s", m->model->search));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -4,14 +4,14 @@
 PetscErrorCode HycoROMSetUpFields(HycoROM m)
 {
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(m->pairs.n, &m->slave_id));
-  for (PetscInt k = 0; k < m->pairs.n; k++) m->slave_id[k] = m->mesh->node_id[m->pairs.slave[k]];
-  PetscCall(PetscCalloc1(m->l, &m->gamma));
-  PetscCall(PetscCalloc1(m->mesh->n_nodes * m->mesh->dim, &m->U));
-  PetscCall(PetscCalloc1(m->pairs.n, &m->Lambda));
-  PetscCall(PetscMalloc1(m->mesh->n_cells * m->fe->n_sigma, &m->stress));
+  PetscCall(PetscMalloc1(m->model->pairs.n, &m->slave_id));
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) m->slave_id[k] = m->model->mesh->node_id[m->model->pairs.slave[k]];
+  PetscCall(PetscCalloc1(m->model->l, &m->gamma));
+  PetscCall(PetscCalloc1(m->model->mesh->n_nodes * m->model->mesh->dim, &m->U));
+  PetscCall(PetscCalloc1(m->model->pairs.n, &m->Lambda));
+  PetscCall(PetscMalloc1(m->model->mesh->n_cells * m->fe->n_sigma, &m->stress));
   PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &m->solver));
-  PetscCall(PetscObjectSetOptions((PetscObject)m->solver, m->scene->options));
+  PetscCall(PetscObjectSetOptions((PetscObject)m->solver, m->model->scene->options));
   PetscCall(HycoSolverSetFromOptions(m->solver));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -19,14 +19,14 @@ PetscErrorCode HycoROMSetUpFields(HycoROM m)
 PetscErrorCode HycoROMSetUpDefault(HycoROM m)
 {
   PetscFunctionBegin;
-  PetscCall(HycoFECreate(m->scene, m->mesh, &m->fe));
-  m->n = m->l;
-  m->m = m->n_L = m->pairs.n;
+  PetscCall(HycoFECreate(m->model->scene, m->model->mesh, &m->fe));
+  m->n = m->model->l;
+  m->m = m->n_L = m->model->pairs.n;
   m->spread = PETSC_TRUE;
-  m->of_fe = &m->pairs;
+  m->of_fe = &m->model->pairs;
   PetscCall(PetscMalloc1(m->m, &m->contact));
   for (PetscInt k = 0; k < m->m; k++) m->contact[k] = k;
-  PetscCall(HycoRowsCreate(&m->pairs, m->mesh->dim, &m->rows));
+  PetscCall(HycoRowsCreate(&m->model->pairs, m->model->mesh->dim, &m->rows));
   PetscCall(HycoROMSetUpFields(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -36,6 +36,7 @@ PetscErrorCode HycoROMSetUp(HycoROM m)
   PetscFunctionBegin;
   if (m->ready) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoROMReset(m)); /* removes incomplete data after a refusal */
+  if (m->model->traits.work) PetscCall(PetscCalloc1(m->model->traits.work, (char **)&m->work));
   if (m->ops->setup)
     PetscUseTypeMethod(m, setup);
   else
@@ -52,16 +53,18 @@ PetscErrorCode HycoROMPredict(HycoROM m, PetscInt n, const PetscReal mu[])
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
   p = &m->prediction;
-  PetscCall(HycoSceneCheckParameters(m->scene, n, mu));
+  PetscCall(HycoSceneCheckParameters(m->model->scene, n, mu));
   m->solved = m->whole_current = m->balanced = PETSC_FALSE;
   HycoLogged(HYCO_EVENT_SETUP, HycoROMSetUp(m));
   p->seconds.setup = HycoNow() - begin;
   begin = HycoNow();
   m->remainder = 0;
   PetscUseTypeMethod(m, solve, mu);
-  if (m->ops->reconstruct && m->reconstruct && p->reason > 0 && !m->scene->n_times) /* a path is reconstructed at its
+  if (m->ops->reconstruct && m->reconstruct && p->reason > 0 &&
+      !m->model->scene->n_times) /* a path is reconstructed at its
                                                                                        listed times */
     HycoLogged(HYCO_EVENT_RECONSTRUCT, (*m->ops->reconstruct)(m));
+  if (p->reason > 0 && !m->model->scene->n_times) PetscCall(HycoFloatingBalance(m));
   p->seconds.total = HycoNow() - begin;
   m->solved = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -72,7 +75,7 @@ static void MeasureContacts(HycoROM m, HycoKKT *kkt)
 {
   PetscReal size = 0, most = 0, in = 0, pulls = 0, both = 0;
 
-  for (PetscInt k = 0; k < m->pairs.n; k++) {
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) {
     const PetscReal bu = HycoROMAddRow(m, k, 0);
 
     most = PetscMax(most, PetscAbsReal(m->Lambda[k]));
@@ -93,15 +96,15 @@ PetscErrorCode HycoROMSetSolution(HycoROM m, const PetscReal mu[], const PetscRe
   PetscReal sum = 0;
 
   PetscFunctionBegin;
-  if (gamma) PetscCall(PetscArraycpy(m->gamma, gamma, m->l));
-  if (Lambda) PetscCall(PetscArraycpy(m->Lambda, Lambda, m->pairs.n));
+  if (gamma) PetscCall(PetscArraycpy(m->gamma, gamma, m->model->l));
+  if (Lambda) PetscCall(PetscArraycpy(m->Lambda, Lambda, m->model->pairs.n));
   PetscCall(HycoROMBringRows(m, mu));
   PetscCall(HycoROMExpand(m));
-  for (PetscInt j = 0; j < m->l; j++) sum += m->gamma[j];
-  for (PetscInt k = 0; k < m->pairs.n; k++) sum += m->Lambda[k];
+  for (PetscInt j = 0; j < m->model->l; j++) sum += m->gamma[j];
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) sum += m->Lambda[k];
   MeasureContacts(m, &p->kkt);
   p->iterations = 0;
   p->reason = PetscIsInfOrNanReal(sum) ? HYCO_DIVERGED_RESIDUAL : HYCO_CONVERGED;
-  PetscCall(PetscStrncpy(p->method, m->type, sizeof(p->method)));
+  PetscCall(PetscStrncpy(p->method, m->model->type, sizeof(p->method)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -37,21 +37,21 @@ PetscErrorCode HycoProbeDestroy(HycoProbe *probe)
 /* Sets mesh and V from the whole mesh. */
 static PetscErrorCode Extract(HycoROM m, HycoProbe p)
 {
-  const PetscInt width = m->whole->dim * m->l;
+  const PetscInt width = m->model->whole->dim * m->model->l;
   PetscBool *needed;
   PetscInt *keep, n = 0;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc2(m->whole->n_cells, &needed, m->whole->n_cells, &keep));
-  PetscCall(HycoQuantitiesMarkCells(m->scene, m->whole, needed));
-  for (PetscInt e = 0; e < m->whole->n_cells; e++) {
+  PetscCall(PetscMalloc2(m->model->whole->n_cells, &needed, m->model->whole->n_cells, &keep));
+  PetscCall(HycoQuantitiesMarkCells(m->model->scene, m->model->whole, needed));
+  for (PetscInt e = 0; e < m->model->whole->n_cells; e++) {
     if (needed[e]) keep[n++] = e;
   }
-  PetscCall(HycoMeshExtract(m->whole, n, keep, 0, NULL, 0, NULL, &p->mesh));
+  PetscCall(HycoSubmesh(m->model->scene, m->model->whole, n, keep, 0, NULL, 0, NULL, &p->mesh));
   PetscCall(PetscFree2(needed, keep));
   PetscCall(PetscMalloc1(p->mesh->n_nodes * width, &p->V));
   for (PetscInt i = 0; i < p->mesh->n_nodes; i++)
-    PetscCall(PetscArraycpy(p->V + i * width, m->V_whole + p->mesh->node_whole[i] * width, width));
+    PetscCall(PetscArraycpy(p->V + i * width, m->model->V_whole + p->mesh->node_whole[i] * width, width));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -62,9 +62,9 @@ static PetscErrorCode MakeSurface(HycoROM m, HycoProbe p)
   if (p->fe_surface) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree(p->surface)); /* of an attempt that failed */
   PetscCall(PetscNew(&p->surface));
-  *p->surface = *m->mesh;
+  *p->surface = *m->model->mesh;
   p->surface->n_cells = 0;
-  PetscCall(HycoFECreate(m->scene, p->surface, &p->fe_surface));
+  PetscCall(HycoFECreate(m->model->scene, p->surface, &p->fe_surface));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -76,14 +76,14 @@ static PetscErrorCode PrepareReactions(HycoROM m, HycoProbe p)
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  if (!HycoSceneHasReactions(m->scene)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!HycoSceneHasReactions(m->model->scene)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(p->fe->n_dof, &p->reaction));
   PetscCall(PetscMalloc1(p->mesh->n_nodes, &p->surface_node));
-  PetscCall(PetscCalloc1(m->mesh->n_nodes, &in));
-  PetscCall(PetscMalloc1(m->whole_nodes, &place));
-  for (PetscInt i = 0; i < m->whole_nodes; i++) place[i] = -1;
-  ierr = HycoPairsMarkSurfaces(m->scene, m->mesh, &m->pairs, in);
-  for (PetscInt i = 0; i < m->mesh->n_nodes; i++) place[m->mesh->node_whole[i]] = in[i] ? i : -1;
+  PetscCall(PetscCalloc1(m->model->mesh->n_nodes, &in));
+  PetscCall(PetscMalloc1(m->model->whole_nodes, &place));
+  for (PetscInt i = 0; i < m->model->whole_nodes; i++) place[i] = -1;
+  ierr = HycoPairsMarkSurfaces(m->model->scene, m->model->mesh, &m->model->pairs, in);
+  for (PetscInt i = 0; i < m->model->mesh->n_nodes; i++) place[m->model->mesh->node_whole[i]] = in[i] ? i : -1;
   for (PetscInt i = 0; i < p->mesh->n_nodes; i++) p->surface_node[i] = place[p->mesh->node_whole[i]];
   PetscCall(PetscFree(place));
   PetscCall(PetscFree(in));
@@ -107,7 +107,7 @@ static PetscErrorCode TakeContact(HycoROM m, HycoProbe p, const PetscReal Lambda
   PetscCall(MakeSurface(m, p));
   PetscCall(HycoFESetParameters(p->fe_surface, p->fe->mu));
   PetscCall(PetscCalloc2(p->fe_surface->n_dof, &u, p->fe->n_dof, &force)); /* forces do not depend on u */
-  ierr = HycoContactFieldsCreate(PETSC_COMM_SELF, p->fe_surface, &m->pairs, u, Lambda, &c);
+  ierr = HycoContactFieldsCreate(PETSC_COMM_SELF, p->fe_surface, &m->model->pairs, u, Lambda, &c);
   for (PetscInt k = 0; !ierr && k < p->fe->n_dof; k++) {
     if (p->surface_node[k / dim] >= 0) force[k] = c.force[3 * p->surface_node[k / dim] + k % dim];
   }
@@ -144,21 +144,21 @@ static PetscErrorCode ReactPredicted(HycoROM m, HycoProbe p, const PetscReal f_i
 /* Once mesh and V are set. */
 static PetscErrorCode Fill(HycoROM m, HycoProbe p)
 {
-  const PetscInt dim = m->mesh->dim;
+  const PetscInt dim = m->model->mesh->dim;
   PetscInt *place;
 
   PetscFunctionBegin;
-  PetscCall(HycoFECreate(m->scene, p->mesh, &p->fe));
+  PetscCall(HycoFECreate(m->model->scene, p->mesh, &p->fe));
   PetscCall(PetscMalloc1(p->fe->n_dof, &p->u));
   PetscCall(PetscMalloc1(p->mesh->n_cells * p->fe->n_sigma, &p->sigma));
-  PetscCall(PetscMalloc1(m->n_fe, &p->fe_at));
-  PetscCall(PetscMalloc1(m->whole_nodes, &place));
-  for (PetscInt i = 0; i < m->whole_nodes; i++) place[i] = -1;
+  PetscCall(PetscMalloc1(m->model->n_fe, &p->fe_at));
+  PetscCall(PetscMalloc1(m->model->whole_nodes, &place));
+  for (PetscInt i = 0; i < m->model->whole_nodes; i++) place[i] = -1;
   for (PetscInt i = 0; i < p->mesh->n_nodes; i++) place[p->mesh->node_whole[i]] = i;
-  for (PetscInt k = 0; k < m->n_fe; k++) {
-    const PetscInt i = place[m->mesh->node_whole[m->fe_dof[k] / dim]];
+  for (PetscInt k = 0; k < m->model->n_fe; k++) {
+    const PetscInt i = place[m->model->mesh->node_whole[m->model->fe_dof[k] / dim]];
 
-    p->fe_at[k] = i < 0 ? -1 : i * dim + m->fe_dof[k] % dim;
+    p->fe_at[k] = i < 0 ? -1 : i * dim + m->model->fe_dof[k] % dim;
   }
   PetscCall(PetscFree(place));
   PetscCall(PrepareReactions(m, p));
@@ -170,9 +170,9 @@ static void Displace(HycoROM m, HycoProbe p, const PetscReal gamma[], const Pets
 {
   for (PetscInt k = 0; k < p->fe->n_dof; k++) {
     p->u[k] = p->fe->u0[k];
-    for (PetscInt j = 0; j < m->l; j++) p->u[k] += p->V[k * m->l + j] * gamma[j];
+    for (PetscInt j = 0; j < m->model->l; j++) p->u[k] += p->V[k * m->model->l + j] * gamma[j];
   }
-  for (PetscInt k = 0; k < m->n_fe; k++) {
+  for (PetscInt k = 0; k < m->model->n_fe; k++) {
     if (p->fe_at[k] >= 0) p->u[p->fe_at[k]] = U_fe[k];
   }
   HycoFEComplete(p->fe, p->u);
@@ -184,7 +184,7 @@ static PetscErrorCode Measure(HycoROM m, HycoProbe p, const PetscReal Lambda[], 
   const HycoContactResult *contact = NULL;
 
   PetscFunctionBegin;
-  if (HycoSceneAsksContacts(m->scene)) PetscCall(HycoROMSumContacts(m, Lambda, &contact));
+  if (HycoSceneAsksContacts(m->model->scene)) PetscCall(HycoROMSumContacts(m, Lambda, &contact));
   PetscCall(HycoQuantitiesMeasure(PETSC_COMM_SELF, p ? p->fe : m->fe, p ? p->u : NULL, p ? p->sigma : NULL,
                                   p ? p->reaction : NULL, contact, value));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -193,7 +193,7 @@ static PetscErrorCode Measure(HycoROM m, HycoProbe p, const PetscReal Lambda[], 
 /* Forces of all contacts at a listed time of the path. */
 static const PetscReal *ForcesAt(HycoROM m, PetscInt listed)
 {
-  return m->trace.Lambda + (size_t)listed * (size_t)m->pairs.n;
+  return m->trace.Lambda + (size_t)listed * (size_t)m->model->pairs.n;
 }
 
 /* Those of a prediction: reactions that follow from balance are set from the loads and the contact forces. */
@@ -214,7 +214,7 @@ static PetscErrorCode March(HycoProbe p, HycoReplay *r)
   PetscFunctionBegin;
   for (PetscInt k = 0, j = 0; k < trace->n; k++) {
     PetscCall(HycoReplayMove(r, k));
-    Displace(m, p, trace->gamma + (size_t)k * (size_t)m->l, trace->U_fe + (size_t)k * (size_t)m->n_fe);
+    Displace(m, p, trace->gamma + (size_t)k * (size_t)m->model->l, trace->U_fe + (size_t)k * (size_t)m->model->n_fe);
     PetscCall(HycoReplayStep(r, k, p->u));
     if (j == trace->n_listed || trace->at[j] != k) continue;
     PetscCall(HycoFEStateFields(p->fe, r->march.state, p->sigma, NULL, NULL, NULL));
@@ -230,8 +230,8 @@ static void CollectPath(HycoROM m, HycoPrediction *out)
 {
   const HycoTrace *trace = &m->trace;
 
-  for (PetscInt q = 0; q < m->scene->n_quantities; q++) {
-    const PetscBool least = (PetscBool)(m->scene->quantity[q].kind == HYCO_QUANTITY_MIN);
+  for (PetscInt q = 0; q < m->model->scene->n_quantities; q++) {
+    const PetscBool least = (PetscBool)(m->model->scene->quantity[q].kind == HYCO_QUANTITY_MIN);
     PetscReal *most = &out->path_quantity[q];
 
     out->quantity[q] = trace->step[trace->shown].quantity[q];
@@ -250,8 +250,8 @@ static PetscErrorCode Follow(HycoROM m, HycoProbe p)
   PetscReal *U_fe;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(m->n_fe, &U_fe));
-  for (PetscInt k = 0; k < m->n_fe; k++) U_fe[k] = m->U[m->fe_dof[k]];
+  PetscCall(PetscMalloc1(m->model->n_fe, &U_fe));
+  for (PetscInt k = 0; k < m->model->n_fe; k++) U_fe[k] = m->U[m->model->fe_dof[k]];
   PetscCall(HycoFESetParameters(p->fe, m->fe->mu));
   Displace(m, p, m->gamma, U_fe);
   PetscCall(PetscFree(U_fe));
@@ -266,12 +266,12 @@ static PetscErrorCode Make(HycoROM m)
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  if (m->probe || !HycoSceneAsksFields(m->scene)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (m->probe || !HycoSceneAsksFields(m->model->scene)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoROMLoadWhole(m));
   PetscCall(PetscNew(&m->probe));
   ierr = Extract(m, m->probe);
   if (!ierr) ierr = Fill(m, m->probe);
-  if (!ierr && HycoSceneHasReactions(m->scene)) ierr = HycoResultantsFind(m, &m->probe->resultants);
+  if (!ierr && HycoSceneHasReactions(m->model->scene)) ierr = HycoResultantsFind(m, &m->probe->resultants);
   if (ierr) PetscCall(HycoProbeDestroy(&m->probe));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -320,7 +320,7 @@ PetscErrorCode HycoROMMeasurePath(HycoROM m)
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  if (!m->scene->n_quantities || !trace->n_listed || trace->step) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!m->model->scene->n_quantities || !trace->n_listed || trace->step) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(Make(m));
   PetscCall(PetscMalloc1(trace->n_listed, &trace->step));
   PetscCall(PetscArraycpy(trace->step, trace->history.step, trace->n_listed));
@@ -334,7 +334,7 @@ PetscErrorCode HycoROMMeasurePath(HycoROM m)
 PetscErrorCode HycoROMMeasureQuantities(HycoROM m, HycoPrediction *out)
 {
   PetscFunctionBegin;
-  if (!m->scene->n_quantities) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!m->model->scene->n_quantities) PetscFunctionReturn(PETSC_SUCCESS);
   if (m->trace.n_listed) {
     PetscCall(HycoROMMeasurePath(m));
     CollectPath(m, out);

@@ -10,7 +10,7 @@ PetscErrorCode HycoReplayMove(HycoReplay *r, PetscInt k)
   PetscReal mu[HYCO_MAX_PARAMETERS];
 
   PetscFunctionBegin;
-  HycoSceneSetTime(r->m->scene, r->m->fe->mu, r->m->trace.t[k], mu);
+  HycoSceneSetTime(r->m->model->scene, r->m->fe->mu, r->m->trace.t[k], mu);
   PetscCall(HycoFESetParameters(r->march.fe, mu));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -59,13 +59,13 @@ static HycoSeriesSource Look(const HycoReplay *r, PetscInt j)
                                  .fe = m->fe_whole,
                                  .state = r->march.state,
                                  .fe_surface = m->fe_whole,
-                                 .pairs = &m->whole_pairs,
-                                 .n_nodes = m->whole->n_nodes,
-                                 .n_cells = m->whole->n_cells,
-                                 .n_contacts = m->pairs.n,
+                                 .pairs = &m->model->whole_pairs,
+                                 .n_nodes = m->model->whole->n_nodes,
+                                 .n_cells = m->model->whole->n_cells,
+                                 .n_contacts = m->model->pairs.n,
                                  .u = m->U_whole,
                                  .u_surface = m->U_whole,
-                                 .lambda = m->trace.Lambda + (size_t)j * (size_t)m->pairs.n,
+                                 .lambda = m->trace.Lambda + (size_t)j * (size_t)m->model->pairs.n,
                                  .mu = m->fe->mu,
                                  .t = m->trace.t[m->trace.at[j]]};
 

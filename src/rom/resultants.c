@@ -30,7 +30,7 @@ PetscErrorCode HycoResultantsDestroy(HycoResultants *resultants)
 /* Marks the bodies with nodes of a contact's group. */
 static PetscErrorCode MarkBodies(HycoROM m, const char group[], PetscBool body[])
 {
-  HycoMesh mesh = m->mesh;
+  HycoMesh mesh = m->model->mesh;
   PetscInt g = 0;
 
   PetscFunctionBegin;
@@ -43,7 +43,7 @@ static PetscErrorCode MarkBodies(HycoROM m, const char group[], PetscBool body[]
 /* Sets pushed[]: a contact has bodies of a quantity on one side only. */
 static PetscErrorCode FindPushed(HycoROM m, HycoResultants r)
 {
-  const HycoScene scene = m->scene;
+  const HycoScene scene = m->model->scene;
   PetscBool *body;
 
   PetscFunctionBegin;
@@ -78,7 +78,7 @@ PetscErrorCode HycoResultantsCreate(HycoROM m, PetscBool balanced[], HycoMesh lo
   r = *resultants;
   r->balanced = balanced;
   r->mesh = loaded;
-  ierr = HycoFECreate(m->scene, loaded, &r->fe);
+  ierr = HycoFECreate(m->model->scene, loaded, &r->fe);
   if (!ierr) PetscCall(PetscMalloc1(r->fe->n_dof, &r->load));
   if (!ierr) ierr = FindPushed(m, r);
   if (ierr) PetscCall(HycoResultantsDestroy(resultants));
@@ -93,14 +93,14 @@ PetscErrorCode HycoResultantsFind(HycoROM m, HycoResultants *resultants)
   HycoMesh loaded;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc1(m->scene->n_quantities * m->scene->n_bodies, &balanced));
-  PetscCall(PetscMalloc2(m->whole->n_cells, &needed, m->whole->n_cells, &keep));
-  PetscCall(HycoQuantitiesBalance(PETSC_COMM_SELF, m->scene, m->whole, balanced));
-  PetscCall(HycoQuantitiesMarkLoads(m->scene, m->whole, balanced, needed));
-  for (PetscInt e = 0; e < m->whole->n_cells; e++) {
+  PetscCall(PetscCalloc1(m->model->scene->n_quantities * m->model->scene->n_bodies, &balanced));
+  PetscCall(PetscMalloc2(m->model->whole->n_cells, &needed, m->model->whole->n_cells, &keep));
+  PetscCall(HycoQuantitiesBalance(PETSC_COMM_SELF, m->model->scene, m->model->whole, balanced));
+  PetscCall(HycoQuantitiesMarkLoads(m->model->scene, m->model->whole, balanced, needed));
+  for (PetscInt e = 0; e < m->model->whole->n_cells; e++) {
     if (needed[e]) keep[n++] = e;
   }
-  PetscCall(HycoMeshExtract(m->whole, n, keep, 0, NULL, 0, NULL, &loaded));
+  PetscCall(HycoSubmesh(m->model->scene, m->model->whole, n, keep, 0, NULL, 0, NULL, &loaded));
   PetscCall(PetscFree2(needed, keep));
   PetscCall(HycoResultantsCreate(m, balanced, loaded, resultants));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -109,10 +109,10 @@ PetscErrorCode HycoResultantsFind(HycoROM m, HycoResultants *resultants)
 /* The bodies from whose balance quantity q follows; NULL: it does not. */
 static const PetscBool *Bodies(HycoROM m, HycoResultants r, PetscInt q)
 {
-  const PetscBool *of = r->balanced + q * m->scene->n_bodies;
+  const PetscBool *of = r->balanced + q * m->model->scene->n_bodies;
 
-  if (r->pushed[q] && !(m->traits.resultants && HycoROMHasAllForces(m))) return NULL;
-  for (PetscInt b = 0; b < m->scene->n_bodies; b++) {
+  if (r->pushed[q] && !(m->model->traits.resultants && HycoROMHasAllForces(m))) return NULL;
+  for (PetscInt b = 0; b < m->model->scene->n_bodies; b++) {
     if (of[b]) return of;
   }
   return NULL;
@@ -120,8 +120,8 @@ static const PetscBool *Bodies(HycoROM m, HycoResultants r, PetscInt q)
 
 PetscBool HycoResultantsSuffice(HycoROM m, HycoResultants r)
 {
-  for (PetscInt q = 0; q < m->scene->n_quantities; q++) {
-    if (m->scene->quantity[q].kind == HYCO_QUANTITY_REACTION && !Bodies(m, r, q)) return PETSC_FALSE;
+  for (PetscInt q = 0; q < m->model->scene->n_quantities; q++) {
+    if (m->model->scene->quantity[q].kind == HYCO_QUANTITY_REACTION && !Bodies(m, r, q)) return PETSC_FALSE;
   }
   return PETSC_TRUE;
 }
@@ -141,8 +141,8 @@ PetscErrorCode HycoResultantsSet(HycoROM m, HycoResultants r, const PetscReal mu
   PetscBool first = PETSC_TRUE;
 
   PetscFunctionBegin;
-  for (PetscInt q = 0; r && q < m->scene->n_quantities; q++) {
-    const PetscInt axis = m->scene->quantity[q].field;
+  for (PetscInt q = 0; r && q < m->model->scene->n_quantities; q++) {
+    const PetscInt axis = m->model->scene->quantity[q].field;
     const PetscBool *of = Bodies(m, r, q);
     PetscReal push = 0;
 

@@ -6,13 +6,42 @@
 #include <stdio.h>
 #include <string.h>
 
-PetscErrorCode HycoROMCreate(HycoROM *model)
+/* A handle without a model. */
+static PetscErrorCode CreateHandle(HycoROM *rom)
 {
   PetscFunctionBegin;
-  PetscCall(HycoInitializePackage());
-  PetscCall(PetscHeaderCreate(*model, HYCO_ROM_CLASSID, "HycoROM", "Reduced model", "Hyco", PETSC_COMM_SELF,
+  PetscCall(HycoPackageCheck());
+  PetscCall(PetscHeaderCreate(*rom, HYCO_ROM_CLASSID, "HycoROM", "Reduced model", "Hyco", PETSC_COMM_SELF,
                               HycoROMDestroy, HycoROMView));
-  (*model)->reconstruct = PETSC_TRUE;
+  (*rom)->reconstruct = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMCreate(HycoROM *rom)
+{
+  PetscFunctionBegin;
+  PetscCall(CreateHandle(rom));
+  PetscCall(PetscNew(&(*rom)->model));
+  (*rom)->model->references = 1;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMClone(HycoROM m, HycoROM *clone)
+{
+  HycoROM c;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  PetscCall(CreateHandle(&c));
+  c->model = m->model;
+  c->model->references++;
+  *c->ops = *m->ops;
+  PetscCall(PetscObjectSetOptions((PetscObject)c, ((PetscObject)m)->options));
+  c->full_order = m->full_order;
+  c->full_displacement = m->full_displacement;
+  c->wants_equilibrium = m->wants_equilibrium;
+  c->reconstruct = m->reconstruct;
+  *clone = c;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -86,9 +115,11 @@ PetscErrorCode HycoROMReset(HycoROM m)
 {
   PetscFunctionBegin;
   m->ready = m->solved = m->whole_current = m->beyond_current = PETSC_FALSE;
-  PetscTryTypeMethod(m, reset);
+  if (m->work || !m->model->traits.work) PetscTryTypeMethod(m, reset);
+  PetscCall(PetscFree(m->work));
   PetscCall(HycoProbeDestroy(&m->probe));
   PetscCall(HycoCarriedDestroy(&m->carried));
+  PetscCall(HycoFEDestroy(&m->fe_floating));
   PetscCall(HycoSolverDestroy(&m->solver));
   PetscCall(HycoFEDestroy(&m->fe_beyond));
   PetscCall(PetscFree(m->beyond));
@@ -100,36 +131,91 @@ PetscErrorCode HycoROMReset(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMDestroy(HycoROM *model)
+/* The last handle frees the model. */
+static PetscErrorCode DestroyModel(HycoROM rom)
 {
-  HycoROM m;
+  HycoModel m = rom->model;
 
   PetscFunctionBegin;
-  if (!model || !*model) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheckHandle(*model, HYCO_ROM_CLASSID);
-  HycoDereference(model);
-  m = *model;
-  PetscCall(HycoROMReset(m));
-  PetscTryTypeMethod(m, destroy);
-  PetscCall(HycoROMFreeWhole(m));
+  if (--m->references) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscTryTypeMethod(rom, destroy);
+  PetscCall(HycoFloatingDestroy(&m->floating));
+  PetscCall(HycoPairsDestroy(&m->whole_pairs));
+  PetscCall(HycoMeshDestroy(&m->whole));
   PetscCall(HycoPairsDestroy(&m->pairs));
   PetscCall(HycoMeshDestroy(&m->mesh));
   PetscCall(HycoSceneDestroy(&m->scene));
-  HycoFreeAll(&m->role, &m->master_reach, &m->in_rid, &m->closed, &m->V, &m->sigma, &m->fe_dof, &m->points, &m->reach,
-              &m->provenance, &m->search);
+  PetscCall(ISDestroy(&m->rid));
+  PetscCall(ISDestroy(&m->inside));
+  HycoFreeAll(&m->master_reach, &m->in_rid, &m->closed, &m->V, &m->V_whole, &m->sigma, &m->fe_dof, &m->points,
+              &m->reach, &m->provenance, &m->search);
+  PetscCall(PetscFree(rom->model));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMDestroy(HycoROM *model)
+{
+  PetscFunctionBegin;
+  HycoDestroyBegin(model, HYCO_ROM_CLASSID);
+  PetscCall(HycoROMReset(*model));
+  PetscCall(HycoROMFreeWhole(*model));
+  PetscCall(DestroyModel(*model));
   PetscCall(PetscHeaderDestroy(model));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-HycoDefineMethod(HycoROMGetType, (HycoROM m, HycoROMType *type), m, HYCO_ROM_CLASSID, *type = m->type)
-HycoDefineMethod(HycoROMGivesForces, (HycoROM m, PetscBool *gives), m, HYCO_ROM_CLASSID, *gives = m->traits.forces)
+HycoDefineMethod(HycoROMGetType, (HycoROM m, HycoROMType *type), m, HYCO_ROM_CLASSID, *type = m->model->type)
+HycoDefineMethod(HycoROMGivesForces, (HycoROM m, PetscBool *gives), m, HYCO_ROM_CLASSID,
+                 *gives = m->model->traits.forces)
 
 PetscErrorCode HycoROMGetDimensions(HycoROM m, PetscInt *n_modes, PetscInt *n_contacts)
 {
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
-  if (n_modes) *n_modes = m->l;
-  if (n_contacts) *n_contacts = m->pairs.n;
+  if (n_modes) *n_modes = m->model->l;
+  if (n_contacts) *n_contacts = m->model->pairs.n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The nodes in at least `least` sets; sets NULL: all. */
+static PetscErrorCode CreateNodes(PetscInt n, const PetscInt sets[], PetscInt least, IS *nodes)
+{
+  PetscInt count = 0, *list;
+
+  PetscFunctionBegin;
+  PetscCall(ISDestroy(nodes));
+  PetscCall(PetscMalloc1(n, &list));
+  for (PetscInt i = 0; i < n; i++) {
+    if (!sets || sets[i] >= least) list[count++] = i;
+  }
+  PetscCall(ISCreateGeneral(PETSC_COMM_SELF, count, list, PETSC_COPY_VALUES, nodes));
+  PetscCall(PetscFree(list));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMSetDomain(HycoROM m, const PetscInt sets[])
+{
+  PetscFunctionBegin;
+  PetscCall(CreateNodes(m->model->mesh->n_nodes, sets, 1, &m->model->rid));
+  PetscCall(CreateNodes(m->model->mesh->n_nodes, sets, 2, &m->model->inside));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMGetDomain(HycoROM m, PetscInt sets[])
+{
+  const IS each[2] = {m->model->rid, m->model->inside};
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(sets, m->model->mesh->n_nodes));
+  for (PetscInt s = 0; s < 2; s++) {
+    const PetscInt *node;
+    PetscInt n;
+
+    PetscCall(ISGetLocalSize(each[s], &n));
+    PetscCall(ISGetIndices(each[s], &node));
+    for (PetscInt k = 0; k < n; k++) sets[node[k]]++;
+    PetscCall(ISRestoreIndices(each[s], &node));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -137,15 +223,15 @@ PetscErrorCode HycoROMSetFE(HycoROM m, HycoHybrid hybrid, PetscInt n, const Pets
 {
   PetscFunctionBegin;
   PetscCall(HycoROMReset(m));
-  PetscCall(PetscFree(m->fe_dof));
-  HycoDuplicate(n, dof, &m->fe_dof);
-  PetscCall(PetscSortInt(n, m->fe_dof));
-  m->n_fe = n;
-  m->hybrid = hybrid;
+  PetscCall(PetscFree(m->model->fe_dof));
+  HycoDuplicate(n, dof, &m->model->fe_dof);
+  PetscCall(PetscSortInt(n, m->model->fe_dof));
+  m->model->n_fe = n;
+  m->model->hybrid = hybrid;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-HycoDefineMethod(HycoROMGetScene, (HycoROM m, HycoScene *scene), m, HYCO_ROM_CLASSID, *scene = m->scene)
+HycoDefineMethod(HycoROMGetScene, (HycoROM m, HycoScene *scene), m, HYCO_ROM_CLASSID, *scene = m->model->scene)
 
 PetscErrorCode HycoROMCheckScene(HycoROM m, HycoScene scene)
 {
@@ -158,13 +244,13 @@ PetscErrorCode HycoROMCheckScene(HycoROM m, HycoScene scene)
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
   PetscCall(HycoSceneFingerprint(scene, &hash));
   snprintf(text, sizeof(text), "%016llx", hash);
-  PetscCall(HycoSceneWriteHistory(m->scene, &history));
-  ierr = HycoSceneCompareHistory(scene, history, m->path);
+  PetscCall(HycoSceneWriteHistory(m->model->scene, &history));
+  ierr = HycoSceneCompareHistory(scene, history, m->model->path);
   PetscCall(PetscFree(history));
   PetscCall(ierr);
-  HycoCheck(strcmp(text, m->fingerprint) == 0,
+  HycoCheck(strcmp(text, m->model->fingerprint) == 0,
             "%s was trained on another scene or mesh; give the scene, the mesh and the entries of its training",
-            m->path);
+            m->model->path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -174,7 +260,7 @@ HycoDefineMethod(HycoROMSetPointMonitor, (HycoROM m, HycoPointMonitor monitor, v
                  m->point_monitor = monitor;
                  m->point_ctx = ctx)
 HycoDefineMethod(HycoROMSetExtrapolate, (HycoROM m, PetscBool extrapolate), m, HYCO_ROM_CLASSID,
-                 PetscCall(HycoSceneSetExtrapolate(m->scene, extrapolate)))
+                 PetscCall(HycoSceneSetExtrapolate(m->model->scene, extrapolate)))
 
 PetscErrorCode HycoROMSetMonitor(HycoROM m, HycoMonitor monitor, void *ctx)
 {
@@ -207,9 +293,9 @@ PetscErrorCode HycoROMGetStrainEnergy(HycoROM m, PetscReal *energy)
   PetscTryTypeMethod(m, energy, energy, &known);
   if (known) PetscFunctionReturn(PETSC_SUCCESS);
   *energy = 0;
-  PetscCall(PetscMalloc1(m->mesh->n_cells, &each));
+  PetscCall(PetscMalloc1(m->model->mesh->n_cells, &each));
   PetscCall(HycoFEEnergy(m->fe, m->U, each));
-  for (PetscInt e = 0; e < m->mesh->n_cells; e++) *energy += each[e];
+  for (PetscInt e = 0; e < m->model->mesh->n_cells; e++) *energy += each[e];
   *energy += HycoSpringsEnergy(m->fe, m->U);
   PetscCall(PetscFree(each));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -218,7 +304,7 @@ PetscErrorCode HycoROMGetStrainEnergy(HycoROM m, PetscReal *energy)
 /* Sums over the contacts that may have a force. */
 static void SumForces(HycoROM m, HycoPrediction *p)
 {
-  const PetscInt n = m->spread ? m->pairs.n : m->m;
+  const PetscInt n = m->spread ? m->model->pairs.n : m->m;
 
   p->n_active = p->n_rid_active = 0;
   p->total_contact_force = p->lambda_max = p->lambda_norm2 = p->covered_force = 0;
@@ -226,7 +312,7 @@ static void SumForces(HycoROM m, HycoPrediction *p)
     const PetscInt k = m->spread ? i : m->contact[i];
 
     p->total_contact_force += m->Lambda[k];
-    if (m->in_rid[k]) p->covered_force += m->Lambda[k];
+    if (m->model->in_rid[k]) p->covered_force += m->Lambda[k];
     p->lambda_max = PetscMax(p->lambda_max, m->Lambda[k]);
     p->lambda_norm2 += m->Lambda[k] * m->Lambda[k];
   }
@@ -234,10 +320,35 @@ static void SumForces(HycoROM m, HycoPrediction *p)
     const PetscInt k = m->spread ? i : m->contact[i], presses = m->Lambda[k] > HYCO_PRESSES * p->lambda_max;
 
     p->n_active += presses;
-    if (m->in_rid[k]) p->n_rid_active += presses;
+    if (m->model->in_rid[k]) p->n_rid_active += presses;
   }
   p->covered_force = p->total_contact_force > 0 ? p->covered_force / p->total_contact_force : 1;
   p->lambda_norm2 = PetscSqrtReal(p->lambda_norm2);
+}
+
+/* The norm and the ranges of the displacements of the RID's nodes. */
+static PetscErrorCode MeasureDisplacements(HycoROM m, HycoPrediction *p)
+{
+  const PetscInt *node;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  p->u_norm2 = 0;
+  for (PetscInt c = 0; c < 3; c++) p->u_min[c] = p->u_max[c] = 0;
+  PetscCall(ISGetLocalSize(m->model->rid, &n));
+  PetscCall(ISGetIndices(m->model->rid, &node));
+  for (PetscInt k = 0; k < n; k++) {
+    for (PetscInt c = 0; c < p->dim; c++) {
+      const PetscReal u = m->U[node[k] * p->dim + c];
+
+      p->u_min[c] = k ? PetscMin(p->u_min[c], u) : u;
+      p->u_max[c] = k ? PetscMax(p->u_max[c], u) : u;
+      p->u_norm2 += u * u;
+    }
+  }
+  PetscCall(ISRestoreIndices(m->model->rid, &node));
+  p->u_norm2 = PetscSqrtReal(p->u_norm2);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode MeasureContacts(HycoROM m, HycoPrediction *p)
@@ -276,34 +387,21 @@ PetscErrorCode HycoROMGetPrediction(HycoROM m, HycoPrediction *out)
   p = &m->prediction;
   p->dim = m->fe->dim;
   p->n_dof = m->n;
-  PetscCall(PetscStrncpy(p->type, m->type, sizeof(p->type)));
-  PetscCall(PetscStrncpy(p->title, m->traits.title, sizeof(p->title)));
-  p->gives_forces = m->traits.forces;
+  PetscCall(PetscStrncpy(p->type, m->model->type, sizeof(p->type)));
+  PetscCall(PetscStrncpy(p->title, m->model->traits.title, sizeof(p->title)));
+  p->gives_forces = m->model->traits.forces;
   p->n_multipliers = m->n_L;
   p->n_contacts = m->m;
-  p->n_all_contacts = m->pairs.n;
-  p->n_modes = m->l;
-  p->n_fe_dofs = m->n_fe;
-  p->rid_nodes = 0;
-  for (PetscInt i = 0; i < m->fe->mesh->n_nodes; i++) p->rid_nodes += m->role[i] != HYCO_ROLE_OUTSIDE;
-  p->rid_elements = m->mesh->n_cells;
-  p->rid_fraction = (PetscReal)m->mesh->n_cells / m->whole_cells;
-  p->condition = m->numbers[0];
+  p->n_all_contacts = m->model->pairs.n;
+  p->n_modes = m->model->l;
+  p->n_fe_dofs = m->model->n_fe;
+  PetscCall(ISGetLocalSize(m->model->rid, &p->rid_nodes));
+  p->rid_elements = m->model->mesh->n_cells;
+  p->rid_fraction = (PetscReal)m->model->mesh->n_cells / m->model->whole_cells;
+  p->condition = m->model->numbers[0];
   SumForces(m, p);
   HycoTraceSummary(m, p);
-  p->u_norm2 = 0;
-  for (PetscInt c = 0; c < 3; c++) p->u_min[c] = p->u_max[c] = 0;
-  for (PetscInt k = 0, first = 1; k < m->fe->n_dof; k++) {
-    const PetscInt c = k % p->dim;
-
-    if (m->role[k / p->dim] == HYCO_ROLE_OUTSIDE) continue;
-    if (first) p->u_min[c] = p->u_max[c] = m->U[k];
-    if (c == p->dim - 1) first = 0;
-    p->u_min[c] = PetscMin(p->u_min[c], m->U[k]);
-    p->u_max[c] = PetscMax(p->u_max[c], m->U[k]);
-    p->u_norm2 += m->U[k] * m->U[k];
-  }
-  p->u_norm2 = PetscSqrtReal(p->u_norm2);
+  PetscCall(MeasureDisplacements(m, p));
   PetscCall(MeasureContacts(m, p));
   PetscCall(HycoROMMeasureQuantities(m, p));
   PetscCall(HycoEstimatesEvaluate(m, p));
@@ -317,14 +415,14 @@ PetscErrorCode HycoROMGetRID(HycoROM m, PetscInt *n_nodes, const PetscInt *node_
 {
   PetscFunctionBegin;
   PetscCall(CheckSolved(m));
-  if (n_nodes) *n_nodes = m->mesh->n_nodes;
-  if (node_ids) *node_ids = m->mesh->node_id;
+  if (n_nodes) *n_nodes = m->model->mesh->n_nodes;
+  if (node_ids) *node_ids = m->model->mesh->node_id;
   if (U) PetscCall(HycoROMComplete(m));
   if (U) *U = m->U;
-  if (n_cells) *n_cells = m->mesh->n_cells;
-  if (cell_ids) *cell_ids = m->mesh->cell_id;
+  if (n_cells) *n_cells = m->model->mesh->n_cells;
+  if (cell_ids) *cell_ids = m->model->mesh->cell_id;
   if (sigma && m->trace.n_listed)
-    *sigma = m->trace.sigma + (size_t)m->trace.shown * (size_t)(m->mesh->n_cells * m->fe->n_sigma);
+    *sigma = m->trace.sigma + (size_t)m->trace.shown * (size_t)(m->model->mesh->n_cells * m->fe->n_sigma);
   else if (sigma) {
     PetscCall(HycoFEStress(m->fe, m->U, m->stress));
     *sigma = m->stress;
@@ -337,10 +435,10 @@ PetscErrorCode HycoROMGetLambda(HycoROM m, PetscInt *n_contacts, const PetscReal
 {
   PetscFunctionBegin;
   PetscCall(CheckSolved(m));
-  if (n_contacts) *n_contacts = m->pairs.n;
+  if (n_contacts) *n_contacts = m->model->pairs.n;
   if (Lambda) *Lambda = m->Lambda;
   if (node_ids) *node_ids = m->slave_id;
-  if (in_rid) *in_rid = m->in_rid;
+  if (in_rid) *in_rid = m->model->in_rid;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -357,15 +455,16 @@ PetscErrorCode HycoROMGetWholeU(HycoROM m, PetscInt *n_nodes, const PetscReal *U
     for (PetscInt k = 0; k < m->fe_whole->n_dof; k++) {
       PetscReal sum = m->fe_whole->u0[k];
 
-      for (PetscInt j = 0; j < m->l; j++) sum += m->V_whole[k * m->l + j] * m->gamma[j];
+      for (PetscInt j = 0; j < m->model->l; j++) sum += m->model->V_whole[k * m->model->l + j] * m->gamma[j];
       m->U_whole[k] = sum;
     }
-    for (PetscInt k = 0; k < m->n_fe; k++)
-      m->U_whole[m->mesh->node_whole[m->fe_dof[k] / dim] * dim + m->fe_dof[k] % dim] = m->U[m->fe_dof[k]];
+    for (PetscInt k = 0; k < m->model->n_fe; k++)
+      m->U_whole[m->model->mesh->node_whole[m->model->fe_dof[k] / dim] * dim + m->model->fe_dof[k] % dim] =
+          m->U[m->model->fe_dof[k]];
     HycoFEComplete(m->fe_whole, m->U_whole);
     m->whole_current = PETSC_TRUE;
   }
-  if (n_nodes) *n_nodes = m->whole->n_nodes;
+  if (n_nodes) *n_nodes = m->model->whole->n_nodes;
   if (U) *U = m->U_whole;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -377,11 +476,11 @@ static PetscErrorCode Look(HycoROM m, HycoSolution *solution, PetscReal **rid)
 
   PetscFunctionBegin;
   PetscCall(HycoROMGetWholeU(m, NULL, &U));
-  PetscCall(PetscCalloc1(m->whole->n_cells, rid));
-  for (PetscInt e = 0; e < m->mesh->n_cells; e++) (*rid)[m->mesh->cell_whole[e]] = 1;
+  PetscCall(PetscCalloc1(m->model->whole->n_cells, rid));
+  for (PetscInt e = 0; e < m->model->mesh->n_cells; e++) (*rid)[m->model->mesh->cell_whole[e]] = 1;
   *solution = (HycoSolution){.fe = m->fe_whole,
                              .surface = m->fe_whole,
-                             .pairs = &m->whole_pairs,
+                             .pairs = &m->model->whole_pairs,
                              .u = U,
                              .u_surface = U,
                              .lambda = m->Lambda,
@@ -397,7 +496,7 @@ PetscErrorCode HycoROMWrite(HycoROM m, const char path[])
 
   PetscFunctionBegin;
   PetscCall(CheckSolved(m));
-  if (m->scene->n_times) {
+  if (m->model->scene->n_times) {
     PetscCall(HycoTraceWrite(m, path));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -415,7 +514,7 @@ static PetscErrorCode WritePoint(HycoROM m, const PetscReal mu[], HycoFieldFile 
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(HycoROMPredict(m, m->scene->n_parameters, mu));
+  PetscCall(HycoROMPredict(m, m->model->scene->n_parameters, mu));
   PetscCall(Look(m, &solution, &rid));
   ierr = HycoSolutionAdd(file, &solution);
   PetscCall(PetscFree(rid));
@@ -430,8 +529,9 @@ PetscErrorCode HycoROMWriteMany(HycoROM m, PetscInt n, PetscInt n_parameters, co
 
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
-  HycoCheck(!m->scene->n_times, "HycoROMWriteMany: the scene has a history; HycoROMWrite() writes a path");
-  for (PetscInt k = 0; k < n; k++) PetscCall(HycoSceneCheckParameters(m->scene, n_parameters, mu + k * n_parameters));
+  HycoCheck(!m->model->scene->n_times, "HycoROMWriteMany: the scene has a history; HycoROMWrite() writes a path");
+  for (PetscInt k = 0; k < n; k++)
+    PetscCall(HycoSceneCheckParameters(m->model->scene, n_parameters, mu + k * n_parameters));
   PetscCall(HycoFieldFileCreate(PETSC_COMM_SELF, path, n, PETSC_TRUE, &file));
   for (PetscInt k = 0; k < n && !ierr; k++) ierr = WritePoint(m, mu + k * n_parameters, file);
   if (!ierr && n) ierr = HycoFieldFileCommit(file);
@@ -442,9 +542,9 @@ PetscErrorCode HycoROMWriteMany(HycoROM m, PetscInt n, PetscInt n_parameters, co
 
 PetscInt HycoROMCountPOD(HycoROM m)
 {
-  PetscInt l = m->l;
+  PetscInt l = m->model->l;
 
-  while (l > 0 && !(m->sigma[l - 1] > 0)) l--;
+  while (l > 0 && !(m->model->sigma[l - 1] > 0)) l--;
   return l;
 }
 
@@ -455,20 +555,23 @@ PetscErrorCode HycoROMView(HycoROM m, PetscViewer viewer)
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
   pod = HycoROMCountPOD(m);
-  PetscCall(PetscViewerASCIIPrintf(viewer, "%s model\n", m->traits.title));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "%s model\n", m->model->traits.title));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  trained on %d points; mean training errors: u %.2e, %sforces %.2e\n",
-                                   (int)m->n_points, (double)m->numbers[1],
-                                   m->traits.settings == HYCO_SETTINGS_RID ? "RID " : "", (double)m->numbers[2]));
-  if (m->scene->n_times)
-    PetscCall(PetscViewerASCIIPrintf(viewer, "  paths: %d listed times from t = %g to %g%s\n", (int)m->scene->n_times,
-                                     (double)m->scene->times[0], (double)m->scene->times[m->scene->n_times - 1],
-                                     m->traits.stiffness ? ", solved step by step" : ""));
+                                   (int)m->model->n_points, (double)m->model->numbers[1],
+                                   m->model->traits.settings == HYCO_SETTINGS_RID ? "RID " : "",
+                                   (double)m->model->numbers[2]));
+  if (m->model->scene->n_times)
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  paths: %d listed times from t = %g to %g%s\n",
+                                     (int)m->model->scene->n_times, (double)m->model->scene->times[0],
+                                     (double)m->model->scene->times[m->model->scene->n_times - 1],
+                                     m->model->traits.stiffness ? ", solved step by step" : ""));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  displacement modes: %d (first singular value %.4g, last %.4g)\n",
-                                   (int)pod, pod ? (double)m->sigma[0] : 0., pod ? (double)m->sigma[pod - 1] : 0.));
+                                   (int)pod, pod ? (double)m->model->sigma[0] : 0.,
+                                   pod ? (double)m->model->sigma[pod - 1] : 0.));
   PetscTryTypeMethod(m, view, viewer);
   PetscCall(HycoEstimatesView(m, viewer));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "%s", m->provenance));
-  PetscCall(HycoSceneView(m->scene, viewer));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "%s", m->model->provenance));
+  PetscCall(HycoSceneView(m->model->scene, viewer));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

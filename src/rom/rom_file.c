@@ -50,8 +50,7 @@ static const char *At(const char prefix[], const char name[], char path[128])
   return path;
 }
 
-/* Writes a mesh, or reads it and creates *mesh. */
-static PetscErrorCode MoveMesh(HycoH5 h, const char prefix[], PetscInt n_bodies, HycoMesh *mesh)
+PetscErrorCode HycoMeshMove(HycoH5 h, const char prefix[], PetscInt n_bodies, HycoMesh *mesh)
 {
   HycoMesh m;
   PetscInt head[2], last;
@@ -94,24 +93,24 @@ static PetscErrorCode MoveMesh(HycoH5 h, const char prefix[], PetscInt n_bodies,
 /* Moves the ties of the whole mesh, if there are any; sets them in the model's meshes. */
 static PetscErrorCode MoveTies(HycoH5 h, HycoROM m)
 {
-  HycoTies t = m->mesh->ties;
+  HycoTies t = m->model->mesh->ties;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
   if (HycoH5Reads(h) ? !HycoH5Has(h, "ties/slave") : !t) PetscFunctionReturn(PETSC_SUCCESS);
   if (HycoH5Reads(h)) {
-    PetscCall(HycoTiesCreate(0, m->mesh->type, &t));
+    PetscCall(HycoTiesCreate(0, m->model->mesh->type, &t));
     HycoFreeAll(&t->slave, &t->master, &t->tie, &t->body, &t->weight, &t->reach);
     t->n = -1;
   }
   PetscCall(HycoH5Int(h, "ties/slave", 0, PETSC_MAX_INT, &t->n, 1, &t->slave));
   PetscCall(HycoH5Int(h, "ties/master", 0, PETSC_MAX_INT, &t->n, 1, &t->master));
-  PetscCall(HycoH5Int(h, "ties/tie", 0, m->scene->n_ties - 1, &t->n, 1, &t->tie));
-  PetscCall(HycoH5Int(h, "ties/body", 0, m->scene->n_bodies - 1, &t->n, 1, &t->body));
+  PetscCall(HycoH5Int(h, "ties/tie", 0, m->model->scene->n_ties - 1, &t->n, 1, &t->tie));
+  PetscCall(HycoH5Int(h, "ties/body", 0, m->model->scene->n_bodies - 1, &t->n, 1, &t->body));
   PetscCall(HycoH5Real(h, "ties/weight", &t->n, 1, &t->weight));
   PetscCall(HycoH5Real(h, "ties/reach", &t->n, 1, &t->reach));
   if (!HycoH5Reads(h)) PetscFunctionReturn(PETSC_SUCCESS);
-  ierr = HycoMeshSetTies(m->mesh, t);
+  ierr = HycoMeshSetTies(m->model->mesh, t);
   PetscCall(HycoTiesDestroy(&t));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -141,7 +140,7 @@ PetscErrorCode HycoROMLoadWord(HycoROM m, HycoH5 h, const char name[], const cha
   for (*index = 0; words[*index] && strcmp(text, words[*index]); (*index)++)
     ;
   PetscCall(PetscFree(text));
-  HycoCheck(words[*index], "%s: %s is damaged", m->path, name);
+  HycoCheck(words[*index], "%s: %s is damaged", m->model->path, name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -176,7 +175,7 @@ enum {
 
 static PetscErrorCode SaveOutputEstimates(HycoH5 h, HycoROM m)
 {
-  const HycoEstimates *t = &m->estimates;
+  const HycoEstimates *t = &m->model->estimates;
   PetscReal numbers[HYCO_MAX_QUANTITIES * OUTPUT_NUMBERS], *at = numbers;
 
   PetscFunctionBegin;
@@ -196,11 +195,11 @@ static PetscErrorCode SaveOutputEstimates(HycoH5 h, HycoROM m)
 
 static PetscErrorCode SaveEstimates(HycoH5 h, HycoROM m)
 {
-  const HycoEstimates *t = &m->estimates;
+  const HycoEstimates *t = &m->model->estimates;
   PetscReal numbers[ESTIMATE_NUMBERS], *at = numbers;
 
   PetscFunctionBegin;
-  if (m->search) PetscCall(HycoH5WriteText(h, "training/search", m->search));
+  if (m->model->search) PetscCall(HycoH5WriteText(h, "training/search", m->model->search));
   if (t->n_held) {
     numbers[0] = (PetscReal)t->n_held;
     for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++) {
@@ -230,7 +229,7 @@ static PetscBool IsCount(PetscReal x)
 
 static PetscErrorCode LoadHeldOut(HycoH5 h, HycoROM m)
 {
-  HycoEstimates *t = &m->estimates;
+  HycoEstimates *t = &m->model->estimates;
   PetscReal *numbers;
   PetscInt n = HELD_NUMBERS, one = 1;
   PetscBool good;
@@ -246,7 +245,7 @@ static PetscErrorCode LoadHeldOut(HycoH5 h, HycoROM m)
     good = (PetscBool)(good && t->median[e] >= 0 && t->largest[e] >= t->median[e]);
   }
   PetscCall(PetscFree(numbers));
-  HycoCheck(good, "%s: training/held_out is damaged", m->path);
+  HycoCheck(good, "%s: training/held_out is damaged", m->model->path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -258,15 +257,15 @@ static PetscErrorCode LoadReached(HycoH5 h, HycoROM m)
   PetscBool good = PETSC_TRUE;
 
   PetscFunctionBegin;
-  for (PetscInt j = 0; j < HYCO_FEATURES; j++) m->estimates.reached[j] = -1;
+  for (PetscInt j = 0; j < HYCO_FEATURES; j++) m->model->estimates.reached[j] = -1;
   if (!HycoH5Has(h, "training/reached")) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoH5LoadReal(h, "training/reached", &n, &one, &numbers));
   for (PetscInt j = 0; j < HYCO_FEATURES; j++) {
-    m->estimates.reached[j] = numbers[j];
+    m->model->estimates.reached[j] = numbers[j];
     good = (PetscBool)(good && numbers[j] >= 0);
   }
   PetscCall(PetscFree(numbers));
-  HycoCheck(good, "%s: training/reached is damaged", m->path);
+  HycoCheck(good, "%s: training/reached is damaged", m->model->path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -274,7 +273,7 @@ static PetscErrorCode LoadReached(HycoH5 h, HycoROM m)
 static PetscErrorCode LoadOldEstimates(HycoH5 h, HycoROM m)
 {
   const PetscInt features = HYCO_ESTIMATE_FEATURES - 1;
-  HycoEstimates *t = &m->estimates;
+  HycoEstimates *t = &m->model->estimates;
   PetscReal *numbers, *at;
   PetscInt n = 2 + features + 2 * (features + 1), one = 1;
   PetscBool good;
@@ -300,15 +299,15 @@ static PetscErrorCode LoadOldEstimates(HycoH5 h, HycoROM m)
   t->has[HYCO_ESTIMATE_U] = PETSC_TRUE;
   t->has[HYCO_ESTIMATE_LAMBDA] = (PetscBool)(t->force > 0); /* without a force nothing was calibrated */
   PetscCall(PetscFree(numbers));
-  HycoCheck(good && t->force >= 0, "%s: training/trust is damaged", m->path);
+  HycoCheck(good && t->force >= 0, "%s: training/trust is damaged", m->model->path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode LoadOutputEstimates(HycoH5 h, HycoROM m)
 {
-  HycoEstimates *t = &m->estimates;
+  HycoEstimates *t = &m->model->estimates;
   PetscReal *numbers, *at;
-  PetscInt n = m->scene->n_quantities, width = OUTPUT_NUMBERS;
+  PetscInt n = m->model->scene->n_quantities, width = OUTPUT_NUMBERS;
   PetscBool good = PETSC_TRUE;
 
   PetscFunctionBegin;
@@ -327,19 +326,19 @@ static PetscErrorCode LoadOutputEstimates(HycoH5 h, HycoROM m)
     good = (PetscBool)(good && (!o->has || (o->magnitude > 0 && t->n)));
   }
   PetscCall(PetscFree(numbers));
-  HycoCheck(good, "%s: training/outputs is damaged", m->path);
+  HycoCheck(good, "%s: training/outputs is damaged", m->model->path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode LoadEstimates(HycoH5 h, HycoROM m)
 {
-  HycoEstimates *t = &m->estimates;
+  HycoEstimates *t = &m->model->estimates;
   PetscReal *numbers, *at;
   PetscInt n = ESTIMATE_NUMBERS, one = 1;
   PetscBool good;
 
   PetscFunctionBegin;
-  if (HycoH5Has(h, "training/search")) PetscCall(HycoH5LoadText(h, "training/search", &m->search));
+  if (HycoH5Has(h, "training/search")) PetscCall(HycoH5LoadText(h, "training/search", &m->model->search));
   PetscCall(LoadHeldOut(h, m));
   PetscCall(LoadReached(h, m));
   if (HycoH5Has(h, "training/trust")) PetscCall(LoadOldEstimates(h, m));
@@ -359,7 +358,7 @@ static PetscErrorCode LoadEstimates(HycoH5 h, HycoROM m)
     for (PetscInt j = 0; j <= HYCO_ESTIMATE_FEATURES; j++) t->law[e][j] = *at++;
   }
   PetscCall(PetscFree(numbers));
-  HycoCheck(good && t->force >= 0, "%s: training/estimates is damaged", m->path);
+  HycoCheck(good && t->force >= 0, "%s: training/estimates is damaged", m->model->path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -377,16 +376,17 @@ static PetscErrorCode MoveEstimates(HycoH5 h, HycoROM m)
 
 static PetscErrorCode MoveSizes(HycoH5 h, HycoROM m)
 {
-  PetscInt sizes[6] = {m->whole_nodes, m->whole_cells, (PetscInt)m->hybrid, m->counts[0], m->counts[1], m->counts[2]};
+  PetscInt sizes[6] = {m->model->whole_nodes, m->model->whole_cells, (PetscInt)m->model->hybrid,
+                       m->model->counts[0],   m->model->counts[1],   m->model->counts[2]};
 
   PetscFunctionBegin;
   PetscCall(HycoH5Ints(h, "problem/sizes", 0, PETSC_MAX_INT, 6, sizes));
-  m->whole_nodes = sizes[0];
-  m->whole_cells = sizes[1];
-  m->hybrid = (HycoHybrid)sizes[2];
-  for (PetscInt k = 0; k < 3; k++) m->counts[k] = sizes[3 + k];
-  HycoCheck(sizes[2] <= HYCO_HYBRID_ALL && m->whole_nodes > 0 && m->whole_cells > 0, "%s: problem/sizes is damaged",
-            m->path);
+  m->model->whole_nodes = sizes[0];
+  m->model->whole_cells = sizes[1];
+  m->model->hybrid = (HycoHybrid)sizes[2];
+  for (PetscInt k = 0; k < 3; k++) m->model->counts[k] = sizes[3 + k];
+  HycoCheck(sizes[2] <= HYCO_HYBRID_ALL && m->model->whole_nodes > 0 && m->model->whole_cells > 0,
+            "%s: problem/sizes is damaged", m->model->path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -394,12 +394,12 @@ static PetscErrorCode MoveSizes(HycoH5 h, HycoROM m)
 static PetscErrorCode MoveReach(HycoH5 h, HycoROM m)
 {
   PetscFunctionBegin;
-  if (HycoH5Reads(h) ? !HycoH5Has(h, "problem/reach") : !m->pairs.room) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoH5Real(h, "problem/reach", &m->scene->n_contacts, 1, &m->master_reach));
+  if (HycoH5Reads(h) ? !HycoH5Has(h, "problem/reach") : !m->model->pairs.room) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoH5Real(h, "problem/reach", &m->model->scene->n_contacts, 1, &m->model->master_reach));
   if (!HycoH5Reads(h)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoPairsSetSearch(m->scene, m->mesh, &m->pairs));
-  for (PetscInt c = 0; c < m->scene->n_contacts; c++)
-    HycoCheck(m->pairs.room && m->master_reach[c] >= 0, "%s: problem/reach is damaged", m->path);
+  PetscCall(HycoPairsSetSearch(m->model->scene, m->model->mesh, &m->model->pairs));
+  for (PetscInt c = 0; c < m->model->scene->n_contacts; c++)
+    HycoCheck(m->model->pairs.room && m->model->master_reach[c] >= 0, "%s: problem/reach is damaged", m->model->path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -409,9 +409,9 @@ static PetscErrorCode MoveScene(HycoH5 h, HycoROM m)
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(HycoH5Reads(h) ? HycoH5LoadText(h, "problem/scene", &text) : HycoSceneToText(m->scene, &text));
-  ierr =
-      HycoH5Reads(h) ? HycoSceneFromText(PETSC_COMM_SELF, text, &m->scene) : HycoH5WriteText(h, "problem/scene", text);
+  PetscCall(HycoH5Reads(h) ? HycoH5LoadText(h, "problem/scene", &text) : HycoSceneToText(m->model->scene, &text));
+  ierr = HycoH5Reads(h) ? HycoSceneFromText(PETSC_COMM_SELF, text, &m->model->scene)
+                        : HycoH5WriteText(h, "problem/scene", text);
   PetscCall(PetscFree(text));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -425,10 +425,10 @@ static PetscErrorCode MoveType(HycoH5 h, HycoROM m)
     PetscCall(LoadType(h, m));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(HycoH5WriteText(h, "problem/type", m->type));
+  PetscCall(HycoH5WriteText(h, "problem/type", m->model->type));
   PetscTryTypeMethod(m, save, h);
   if (!HycoH5Has(h, "reconstruction")) /* older readers require it for every type */
-    PetscCall(HycoH5WriteReal(h, "reconstruction/S_lambda", 0, m->pairs.n, NULL));
+    PetscCall(HycoH5WriteReal(h, "reconstruction/S_lambda", 0, m->model->pairs.n, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -438,14 +438,31 @@ static PetscErrorCode MoveProvenance(HycoH5 h, HycoROM m)
 
   PetscFunctionBegin;
   if (!HycoH5Reads(h)) {
-    PetscCall(HycoH5WriteText(h, "training/provenance", m->provenance));
-    PetscCall(HycoH5WriteText(h, "training/fingerprint", m->fingerprint));
+    PetscCall(HycoH5WriteText(h, "training/provenance", m->model->provenance));
+    PetscCall(HycoH5WriteText(h, "training/fingerprint", m->model->fingerprint));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(HycoH5LoadText(h, "training/provenance", &m->provenance));
+  PetscCall(HycoH5LoadText(h, "training/provenance", &m->model->provenance));
   PetscCall(HycoH5LoadText(h, "training/fingerprint", &text));
-  PetscCall(PetscStrncpy(m->fingerprint, text, sizeof(m->fingerprint)));
+  PetscCall(PetscStrncpy(m->model->fingerprint, text, sizeof(m->model->fingerprint)));
   PetscCall(PetscFree(text));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode MoveDomain(HycoH5 h, HycoROM m)
+{
+  PetscInt *sets = NULL;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  if (!HycoH5Reads(h)) {
+    PetscCall(PetscMalloc1(m->model->mesh->n_nodes, &sets));
+    PetscCall(HycoROMGetDomain(m, sets));
+  }
+  ierr = HycoH5Int(h, "problem/role", 0, 2, &m->model->mesh->n_nodes, 1, &sets);
+  if (!ierr && HycoH5Reads(h)) ierr = HycoROMSetDomain(m, sets);
+  PetscCall(PetscFree(sets));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -456,51 +473,56 @@ static PetscErrorCode MoveProblem(HycoH5 h, HycoROM m)
 
   PetscFunctionBegin;
   PetscCall(MoveScene(h, m));
-  PetscCall(MoveMesh(h, "mesh", m->scene->n_bodies, &m->mesh));
+  PetscCall(HycoMeshMove(h, "mesh", m->model->scene->n_bodies, &m->model->mesh));
   PetscCall(MoveTies(h, m));
   PetscCall(MoveSizes(h, m));
-  nodes = &m->mesh->n_nodes;
-  n_dof = *nodes * m->mesh->dim;
-  PetscCall(HycoH5Int(h, "mesh/node_whole", 0, m->whole_nodes - 1, nodes, 1, &m->mesh->node_whole));
-  PetscCall(HycoH5Int(h, "mesh/cell_whole", 0, m->whole_cells - 1, &m->mesh->n_cells, 1, &m->mesh->cell_whole));
-  PetscCall(HycoH5Int(h, "problem/role", 0, HYCO_ROLE_A, nodes, 1, &m->role));
-  PetscCall(MovePairs(h, *nodes, m->scene->n_contacts, &m->pairs));
-  PetscCall(HycoH5Int(h, "problem/in_rid", 0, 1, &m->pairs.n, 1, &m->in_rid));
+  nodes = &m->model->mesh->n_nodes;
+  n_dof = *nodes * m->model->mesh->dim;
+  PetscCall(HycoH5Int(h, "mesh/node_whole", 0, m->model->whole_nodes - 1, nodes, 1, &m->model->mesh->node_whole));
+  PetscCall(HycoH5Int(h, "mesh/cell_whole", 0, m->model->whole_cells - 1, &m->model->mesh->n_cells, 1,
+                      &m->model->mesh->cell_whole));
+  PetscCall(MoveDomain(h, m));
+  PetscCall(MovePairs(h, *nodes, m->model->scene->n_contacts, &m->model->pairs));
+  PetscCall(HycoH5Int(h, "problem/in_rid", 0, 1, &m->model->pairs.n, 1, &m->model->in_rid));
   PetscCall(MoveReach(h, m));
-  if (HycoH5Reads(h)) m->l = m->n_fe = m->n_points = -1;
-  PetscCall(HycoH5Real(h, "problem/singular_values", &m->l, 1, &m->sigma));
-  PetscCall(HycoH5Real(h, "problem/V", &n_dof, m->l, &m->V));
-  PetscCall(HycoH5Int(h, "problem/fe_dof", 0, n_dof - 1, &m->n_fe, 1, &m->fe_dof));
-  for (PetscInt k = 1; k < m->n_fe; k++)
-    HycoCheck(m->fe_dof[k] > m->fe_dof[k - 1], "%s: problem/fe_dof is damaged", m->path);
+  PetscCall(HycoFloatingMove(h, m));
+  if (HycoH5Reads(h)) m->model->l = m->model->n_fe = m->model->n_points = -1;
+  PetscCall(HycoH5Real(h, "problem/singular_values", &m->model->l, 1, &m->model->sigma));
+  PetscCall(HycoH5Real(h, "problem/V", &n_dof, m->model->l, &m->model->V));
+  PetscCall(HycoH5Int(h, "problem/fe_dof", 0, n_dof - 1, &m->model->n_fe, 1, &m->model->fe_dof));
+  for (PetscInt k = 1; k < m->model->n_fe; k++)
+    HycoCheck(m->model->fe_dof[k] > m->model->fe_dof[k - 1], "%s: problem/fe_dof is damaged", m->model->path);
   PetscCall(MoveType(h, m));
-  PetscCall(HycoH5Real(h, "training/points", &m->n_points, m->scene->n_parameters, &m->points));
-  PetscCall(HycoH5Reals(h, "training/numbers", 3, m->numbers));
-  if (HycoH5Reads(h) ? HycoH5Has(h, "training/closed") : m->closed != NULL)
-    PetscCall(HycoH5Int(h, "training/closed", 0, 1, &m->pairs.n, 1, &m->closed));
+  PetscCall(HycoH5Real(h, "training/points", &m->model->n_points, m->model->scene->n_parameters, &m->model->points));
+  PetscCall(HycoH5Reals(h, "training/numbers", 3, m->model->numbers));
+  if (HycoH5Reads(h) ? HycoH5Has(h, "training/closed") : m->model->closed != NULL)
+    PetscCall(HycoH5Int(h, "training/closed", 0, 1, &m->model->pairs.n, 1, &m->model->closed));
   PetscCall(MoveEstimates(h, m));
   PetscCall(MoveProvenance(h, m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads the whole mesh and the modes on it. */
-static PetscErrorCode LoadWholeMesh(HycoH5 h, HycoROM m)
+/* Reads the whole mesh and the modes on it; the contacts get its numbers of nodes. */
+static PetscErrorCode LoadWholeMesh(HycoH5 h, HycoModel m, HycoMesh *whole)
 {
   PetscInt n_dof;
 
   PetscFunctionBegin;
-  PetscCall(MoveMesh(h, "whole", m->scene->n_bodies, &m->whole));
-  PetscCall(HycoMeshSetTies(m->whole, m->mesh->ties));
-  n_dof = m->whole->n_nodes * m->whole->dim;
+  PetscCall(HycoMeshMove(h, "whole", m->scene->n_bodies, whole));
+  PetscCall(HycoMeshSetTies(*whole, m->mesh->ties));
+  n_dof = (*whole)->n_nodes * (*whole)->dim;
   PetscCall(HycoH5Real(h, "whole/V", &n_dof, m->l, &m->V_whole));
-  HycoCheck(m->whole->n_nodes == m->whole_nodes && m->whole->n_cells == m->whole_cells, "%s: the whole mesh is damaged",
+  HycoCheck((*whole)->n_nodes == m->whole_nodes && (*whole)->n_cells == m->whole_cells, "%s: the whole mesh is damaged",
             m->path);
+  PetscCall(HycoPairsRenumber(&m->pairs, m->mesh->node_whole, &m->whole_pairs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Opens the whole-mesh part in the file or image of the model. */
-static PetscErrorCode OpenWhole(HycoROM m)
+/* Opens the whole-mesh part in the file or image of the model: all of it, or nothing, so that the next attempt starts
+   anew. */
+static PetscErrorCode OpenWhole(HycoModel m)
 {
+  HycoMesh whole = NULL;
   HycoH5 h;
   PetscErrorCode ierr;
 
@@ -508,8 +530,14 @@ static PetscErrorCode OpenWhole(HycoROM m)
   if (m->whole) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCheck(m->path[0], PETSC_COMM_SELF, PETSC_ERR_PLIB, "a model in training has no whole mesh");
   PetscCall(HycoH5OpenOr(m->path, "train the model again", &h));
-  ierr = LoadWholeMesh(h, m);
+  ierr = LoadWholeMesh(h, m, &whole);
   PetscCall(HycoH5Close(&h, PETSC_FALSE));
+  if (!ierr) {
+    m->whole = whole;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (whole) PetscCall(HycoMeshDestroy(&whole));
+  PetscCall(PetscFree(m->V_whole));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -517,13 +545,13 @@ static PetscErrorCode OpenWhole(HycoROM m)
 /* Writes everything except the whole mesh. */
 static PetscErrorCode SaveProblem(HycoH5 h, HycoROM m)
 {
-  PetscInt format = m->pairs.room ? HYCO_ROM_MOVED : HYCO_ROM_STILL;
+  PetscInt format = m->model->pairs.room ? HYCO_ROM_MOVED : HYCO_ROM_STILL;
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < m->pairs.n; k++) {
-    if (HycoPairsAlone(m->scene, &m->pairs, k)) format = HYCO_ROM_MOVED;
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) {
+    if (HycoPairsAlone(m->model->scene, &m->model->pairs, k)) format = HYCO_ROM_MOVED;
   }
-  if (m->scene->n_times) format = HYCO_ROM_FORMAT;
+  if (m->model->scene->n_times) format = HYCO_ROM_FORMAT;
   PetscCall(HycoH5WriteText(h, "kind", HYCO_ROM_KIND));
   PetscCall(HycoH5WriteInt(h, "format", 1, 1, &format));
   PetscCall(MoveProblem(h, m));
@@ -582,13 +610,13 @@ static PetscErrorCode Load(HycoH5 *h, const char path[], HycoROM *model)
   PetscFunctionBegin;
   *model = NULL;
   PetscCall(HycoROMCreate(&m));
-  PetscCall(PetscStrncpy(m->path, path, sizeof(m->path)));
+  PetscCall(PetscStrncpy(m->model->path, path, sizeof(m->model->path)));
   PetscCall(HycoLogEvent(HYCO_EVENT_LOAD, PETSC_TRUE));
-  ierr = CheckKind(*h, m->path);
+  ierr = CheckKind(*h, m->model->path);
   if (!ierr) ierr = MoveProblem(*h, m);
   PetscCall(HycoLogEvent(HYCO_EVENT_LOAD, PETSC_FALSE));
   PetscCall(HycoH5Close(h, PETSC_FALSE));
-  if (!ierr) ierr = PetscObjectSetOptions((PetscObject)m, m->scene->options);
+  if (!ierr) ierr = PetscObjectSetOptions((PetscObject)m, m->model->scene->options);
   if (!ierr) ierr = HycoROMSetFromOptions(m);
   if (ierr) (void)!HycoROMDestroy(&m);
   PetscCall(ierr);
@@ -672,33 +700,17 @@ PetscErrorCode HycoROMFreeWhole(HycoROM m)
   PetscFunctionBegin;
   PetscCall(HycoBalanceDestroy(&m->balance));
   PetscCall(HycoFEDestroy(&m->fe_whole));
-  PetscCall(HycoPairsDestroy(&m->whole_pairs));
   PetscCall(PetscFree(m->U_whole));
-  if (m->whole) PetscCall(HycoMeshDestroy(&m->whole));
-  PetscCall(PetscFree(m->V_whole));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode LoadWhole(HycoROM m)
-{
-  PetscFunctionBegin;
-  PetscCall(OpenWhole(m));
-  PetscCall(HycoFECreate(m->scene, m->whole, &m->fe_whole));
-  PetscCall(PetscMalloc1((size_t)m->whole->n_nodes * (size_t)m->whole->dim, &m->U_whole));
-  /* the contacts with the node numbers of the whole mesh */
-  PetscCall(HycoPairsRenumber(&m->pairs, m->mesh->node_whole, &m->whole_pairs));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* All of the whole-mesh part, or nothing, so that the next attempt starts anew. */
 PetscErrorCode HycoROMLoadWhole(HycoROM m)
 {
-  PetscErrorCode ierr;
-
   PetscFunctionBegin;
   if (m->U_whole) PetscFunctionReturn(PETSC_SUCCESS);
-  ierr = LoadWhole(m);
-  if (ierr) PetscCall(HycoROMFreeWhole(m));
-  PetscCall(ierr);
+  PetscCall(OpenWhole(m->model));
+  PetscCall(HycoROMFreeWhole(m)); /* what a failed attempt has left */
+  PetscCall(HycoFECreate(m->model->scene, m->model->whole, &m->fe_whole));
+  PetscCall(PetscMalloc1((size_t)m->model->whole->n_nodes * (size_t)m->model->whole->dim, &m->U_whole));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

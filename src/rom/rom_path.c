@@ -15,7 +15,7 @@ PetscErrorCode HycoTraceFree(HycoROM m)
 
 PetscErrorCode HycoTraceBegin(HycoROM m)
 {
-  const PetscInt n_times = m->scene->n_times;
+  const PetscInt n_times = m->model->scene->n_times;
   HycoTrace *r = &m->trace;
 
   PetscFunctionBegin;
@@ -24,15 +24,15 @@ PetscErrorCode HycoTraceBegin(HycoROM m)
   PetscCall(PetscFree(r->step));
   if (r->at) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(n_times + 1, &r->at)); /* one more: the end of a path that ends early */
-  PetscCall(PetscMalloc1((size_t)(n_times + 1) * (size_t)m->pairs.n + 1, &r->Lambda));
-  PetscCall(PetscMalloc1((size_t)(n_times + 1) * (size_t)(m->mesh->n_cells * m->fe->n_sigma) + 1, &r->sigma));
-  PetscCall(PetscMalloc1((size_t)(n_times + 1) * (size_t)m->mesh->n_cells + 1, &r->inelastic));
+  PetscCall(PetscMalloc1((size_t)(n_times + 1) * (size_t)m->model->pairs.n + 1, &r->Lambda));
+  PetscCall(PetscMalloc1((size_t)(n_times + 1) * (size_t)(m->model->mesh->n_cells * m->fe->n_sigma) + 1, &r->sigma));
+  PetscCall(PetscMalloc1((size_t)(n_times + 1) * (size_t)m->model->mesh->n_cells + 1, &r->inelastic));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoTraceAdd(HycoROM m, PetscReal t)
 {
-  const size_t l = (size_t)m->l, n_fe = (size_t)m->n_fe;
+  const size_t l = (size_t)m->model->l, n_fe = (size_t)m->model->n_fe;
   HycoTrace *r = &m->trace;
 
   PetscFunctionBegin;
@@ -44,7 +44,7 @@ PetscErrorCode HycoTraceAdd(HycoROM m, PetscReal t)
   }
   r->t[r->n] = t;
   PetscCall(PetscArraycpy(r->gamma + (size_t)r->n * l, m->gamma, l));
-  for (size_t k = 0; k < n_fe; k++) r->U_fe[(size_t)r->n * n_fe + k] = m->U[m->fe_dof[k]];
+  for (size_t k = 0; k < n_fe; k++) r->U_fe[(size_t)r->n * n_fe + k] = m->U[m->model->fe_dof[k]];
   r->n++;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -52,44 +52,51 @@ PetscErrorCode HycoTraceAdd(HycoROM m, PetscReal t)
 PetscErrorCode HycoTraceList(HycoROM m, PetscReal **sigma, PetscReal **inelastic)
 {
   HycoTrace *r = &m->trace;
-  const size_t k = (size_t)r->n_listed, n_cells = (size_t)m->mesh->n_cells;
+  const size_t k = (size_t)r->n_listed, n_cells = (size_t)m->model->mesh->n_cells;
 
   PetscFunctionBegin;
   r->at[r->n_listed] = r->n - 1;
   r->shown = r->n_listed++;
-  PetscCall(PetscArraycpy(r->Lambda + k * (size_t)m->pairs.n, m->Lambda, m->pairs.n));
+  PetscCall(PetscArraycpy(r->Lambda + k * (size_t)m->model->pairs.n, m->Lambda, m->model->pairs.n));
   *sigma = r->sigma + k * n_cells * (size_t)m->fe->n_sigma;
   *inelastic = r->inelastic + k * n_cells;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void HycoTraceMeasure(HycoROM m, HycoStep *s)
+PetscErrorCode HycoTraceMeasure(HycoROM m, HycoStep *s)
 {
-  for (PetscInt k = 0; k < m->pairs.n; k++) {
+  const PetscInt dim = m->fe->dim, *node;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) {
     s->total_contact_force += m->Lambda[k];
     s->lambda_max = PetscMax(s->lambda_max, m->Lambda[k]);
   }
-  for (PetscInt k = 0; k < m->pairs.n; k++) s->n_active += m->Lambda[k] > HYCO_PRESSES * s->lambda_max;
-  for (PetscInt k = 0; k < m->fe->n_dof; k++) {
-    if (m->role[k / m->fe->dim] != HYCO_ROLE_OUTSIDE) s->u_norm2 += m->U[k] * m->U[k];
-  }
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) s->n_active += m->Lambda[k] > HYCO_PRESSES * s->lambda_max;
+  PetscCall(ISGetLocalSize(m->model->rid, &n));
+  PetscCall(ISGetIndices(m->model->rid, &node));
+  for (PetscInt k = 0; k < n * dim; k++) s->u_norm2 += PetscSqr(m->U[node[k / dim] * dim + k % dim]);
+  PetscCall(ISRestoreIndices(m->model->rid, &node));
   s->u_norm2 = PetscSqrtReal(s->u_norm2);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 void HycoTraceWholeU(HycoROM m, PetscInt k, PetscReal U[])
 {
   const HycoTrace *r = &m->trace;
-  const PetscInt dim = m->mesh->dim;
-  const PetscReal *gamma = r->gamma + (size_t)k * (size_t)m->l, *U_fe = r->U_fe + (size_t)k * (size_t)m->n_fe;
+  const PetscInt dim = m->model->mesh->dim;
+  const PetscReal *gamma = r->gamma + (size_t)k * (size_t)m->model->l,
+                  *U_fe = r->U_fe + (size_t)k * (size_t)m->model->n_fe;
 
   for (PetscInt i = 0; i < m->fe_whole->n_dof; i++) {
-    const PetscReal *v = m->V_whole + (size_t)i * (size_t)m->l;
+    const PetscReal *v = m->model->V_whole + (size_t)i * (size_t)m->model->l;
 
     U[i] = m->fe_whole->u0[i];
-    for (PetscInt j = 0; j < m->l; j++) U[i] += v[j] * gamma[j];
+    for (PetscInt j = 0; j < m->model->l; j++) U[i] += v[j] * gamma[j];
   }
-  for (PetscInt f = 0; f < m->n_fe; f++)
-    U[m->mesh->node_whole[m->fe_dof[f] / dim] * dim + m->fe_dof[f] % dim] = U_fe[f];
+  for (PetscInt f = 0; f < m->model->n_fe; f++)
+    U[m->model->mesh->node_whole[m->model->fe_dof[f] / dim] * dim + m->model->fe_dof[f] % dim] = U_fe[f];
   HycoFEComplete(m->fe_whole, U);
 }
 
@@ -133,15 +140,16 @@ PetscErrorCode HycoROMSetStep(HycoROM m, PetscInt k)
   PetscCheck(k >= 0 && k < r->n_listed, PETSC_COMM_SELF, PETSC_ERR_ARG_OUTOFRANGE,
              "HycoROMSetStep: %d is not a listed time that the path reached; there are %d", (int)k, (int)r->n_listed);
   at = r->at[k];
-  HycoSceneSetTime(m->scene, m->fe->mu, r->t[at], mu);
-  if (m->fe->mesh == m->mesh)
+  HycoSceneSetTime(m->model->scene, m->fe->mu, r->t[at], mu);
+  if (m->fe->mesh == m->model->mesh)
     PetscCall(HycoROMBringRows(m, mu));
   else
     PetscCall(HycoFESetParameters(m->fe, mu));
-  PetscCall(PetscArraycpy(m->gamma, r->gamma + (size_t)at * (size_t)m->l, m->l));
-  PetscCall(PetscArraycpy(m->Lambda, r->Lambda + (size_t)k * (size_t)m->pairs.n, m->pairs.n));
+  PetscCall(PetscArraycpy(m->gamma, r->gamma + (size_t)at * (size_t)m->model->l, m->model->l));
+  PetscCall(PetscArraycpy(m->Lambda, r->Lambda + (size_t)k * (size_t)m->model->pairs.n, m->model->pairs.n));
   PetscCall(HycoROMExpand(m));
-  for (PetscInt f = 0; f < m->n_fe; f++) m->U[m->fe_dof[f]] = r->U_fe[(size_t)at * (size_t)m->n_fe + (size_t)f];
+  for (PetscInt f = 0; f < m->model->n_fe; f++)
+    m->U[m->model->fe_dof[f]] = r->U_fe[(size_t)at * (size_t)m->model->n_fe + (size_t)f];
   m->spread = PETSC_TRUE;
   m->whole_current = m->beyond_current = PETSC_FALSE;
   r->shown = k;
@@ -152,7 +160,8 @@ PetscErrorCode HycoROMSetSteps(HycoROM m, PetscInt n, const PetscReal t[])
 {
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
-  HycoCheck(m->scene->n_times, "HycoROMSetSteps: the model's scene has no history, and its solution has no steps");
+  HycoCheck(m->model->scene->n_times,
+            "HycoROMSetSteps: the model's scene has no history, and its solution has no steps");
   m->trace.n_given = t ? n : 0;
   m->trace.given = t;
   m->trace.most_cuts = 0;
@@ -175,9 +184,9 @@ PetscErrorCode HycoROMGetInelastic(HycoROM m, PetscInt *n_cells, const PetscReal
 {
   PetscFunctionBegin;
   PetscCall(CheckPath(m, "HycoROMGetInelastic()"));
-  HycoCheck(m->scene->n_times,
+  HycoCheck(m->model->scene->n_times,
             "HycoROMGetInelastic: the model's scene has no history, and its bodies have no inelastic strain");
-  if (n_cells) *n_cells = m->mesh->n_cells;
-  *inelastic = m->trace.inelastic + (size_t)m->trace.shown * (size_t)m->mesh->n_cells;
+  if (n_cells) *n_cells = m->model->mesh->n_cells;
+  *inelastic = m->trace.inelastic + (size_t)m->trace.shown * (size_t)m->model->mesh->n_cells;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

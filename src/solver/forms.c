@@ -3,27 +3,9 @@
 #include <hycosolverimpl.h>
 #include <string.h>
 
-static PetscErrorCode AddOwn(void);
-static HycoRegistry forms = {.add_own = AddOwn}; /* searched in the order of registration */
+static HycoRegistry forms = {.sorted = PETSC_FALSE}; /* searched in the order of registration */
 
-static PetscErrorCode AddOwn(void)
-{
-  PetscFunctionBegin;
-  PetscCall(HycoRegistryAdd(&forms, "dual", HycoSolverFormCreate_Dual));
-  PetscCall(HycoRegistryAdd(&forms, "primal", HycoSolverFormCreate_Primal));
-  PetscCall(HycoRegistryAdd(&forms, "dual_free", HycoSolverFormCreate_Shell));
-  PetscCall(HycoRegistryAdd(&forms, "projected", HycoSolverFormCreate_Projected));
-  PetscCall(HycoRegistryAdd(&forms, "linear", HycoSolverFormCreate_Linear));
-  PetscCall(HycoRegistryAdd(&forms, "condensed", HycoSolverFormCreate_Flexibility));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoSolverRegister(const char name[], HycoSolverFormCreate create)
-{
-  PetscFunctionBegin;
-  PetscCall(HycoRegistryAdd(&forms, name, create));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+HycoDefineRegister(HycoSolverRegister, forms, HycoSolverFormCreate create)
 
 PetscErrorCode HycoSolverCreateForms(HycoSolver s)
 {

@@ -2,12 +2,32 @@
 #include <hycosolverimpl.h>
 #include <string.h>
 
-/* In the order of `methods`, where an empty Tao type means the user's. */
-const char *const HycoSolverTypes[] = {HYCO_SOLVER_ACTIVE_SET, HYCO_SOLVER_TAO, HYCO_SOLVER_LEMKE, NULL};
-static const char *const methods[] = {HYCO_TAO_ACTIVE_SET, "", HYCO_TAO_LEMKE};
-/* The order in which methods are tried after a failure. */
-static const PetscInt order[] = {1, 0, 2};
-#define N_METHODS ((PetscInt)(sizeof(order) / sizeof(order[0])))
+enum { ACTIVE_SET, TAO, LEMKE, SEMISMOOTH };
+const char *const HycoSolverTypes[] = {HYCO_SOLVER_ACTIVE_SET, HYCO_SOLVER_TAO, HYCO_SOLVER_LEMKE,
+                                       HYCO_SOLVER_SEMISMOOTH, NULL};
+
+/*
+  The order in which methods are tried after a failure, from the chosen one on, and for which systems. An empty Tao type
+  means the user's. Where a form has the dense problem, Lemke's method comes before TAO's types: it is faster and exact
+  to round-off (docs/solvers.md). Elsewhere it needs the dual form with a factor, and comes after them. For systems with
+  other cones than forces >= 0, those that have not the trait HYCO_TAO_CONES are left out.
+*/
+typedef struct {
+  PetscInt type;
+  const char *tao;
+  PetscBool symmetric, nonsymmetric;
+  PetscBool stays; /* only if the form of the last attempt accepts it */
+} Candidate;
+static const Candidate order[] = {{TAO, "", PETSC_TRUE, PETSC_TRUE, PETSC_FALSE},
+                                  {SEMISMOOTH, HYCO_TAO_SEMISMOOTH_NEWTON, PETSC_FALSE, PETSC_FALSE, PETSC_FALSE},
+                                  {ACTIVE_SET, HYCO_TAO_ACTIVE_SET, PETSC_TRUE, PETSC_TRUE, PETSC_FALSE},
+                                  {LEMKE, HYCO_TAO_LEMKE, PETSC_TRUE, PETSC_TRUE, PETSC_TRUE},
+                                  {TAO, "gpcg", PETSC_TRUE, PETSC_FALSE, PETSC_FALSE},
+                                  {TAO, "tron", PETSC_TRUE, PETSC_FALSE, PETSC_FALSE},
+                                  {LEMKE, HYCO_TAO_LEMKE, PETSC_TRUE, PETSC_TRUE, PETSC_FALSE},
+                                  {TAO, "ssils", PETSC_FALSE, PETSC_TRUE, PETSC_FALSE}};
+static const Candidate *const by_default = &order[2];
+#define N_CANDIDATES ((int)(sizeof(order) / sizeof(order[0])))
 
 /* The names of the forms, by the values of HycoForm. */
 static const char *const form_names[] = {"", "dual", "primal", "dual_free"};
@@ -15,7 +35,7 @@ static const char *const form_names[] = {"", "dual", "primal", "dual_free"};
 PetscErrorCode HycoSolverCreate(MPI_Comm comm, HycoSolver *solver)
 {
   PetscFunctionBegin;
-  PetscCall(HycoInitializePackage());
+  PetscCall(HycoPackageCheck());
   PetscCall(PetscHeaderCreate(*solver, HYCO_SOLVER_CLASSID, "HycoSolver", "Solver of contact systems", "Hyco", comm,
                               HycoSolverDestroy, HycoSolverView));
   (*solver)->rtol = 1e-8;
@@ -32,9 +52,7 @@ PetscErrorCode HycoSolverDestroy(HycoSolver *solver)
   HycoSolver s;
 
   PetscFunctionBegin;
-  if (!solver || !*solver) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheckHandle(*solver, HYCO_SOLVER_CLASSID);
-  HycoDereference(solver);
+  HycoDestroyBegin(solver, HYCO_SOLVER_CLASSID);
   s = *solver;
   PetscCall(HycoSystemDestroy(&s->system));
   for (PetscInt k = 0; k < s->n_forms; k++) {
@@ -71,7 +89,7 @@ PetscErrorCode HycoSolverSetType(HycoSolver s, HycoSolverType type)
       PetscFunctionReturn(PETSC_SUCCESS);
     }
   }
-  HycoFail("the solver type \"%s\" is unknown; types are active_set, tao and lemke", type);
+  HycoFail("the solver type \"%s\" is unknown; types are active_set, tao, lemke and semismooth", type);
 }
 
 PetscErrorCode HycoSolverSetTaoType(HycoSolver s, const char type[])
@@ -157,7 +175,7 @@ static PetscErrorCode ReadTaoType(HycoSolver s, HycoOptionItems PetscOptionsObje
                               "sets its own options) [gpcg; ssils if nonsymmetric]",
                               type, sizeof(type), &given));
   if (!given) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheck(!methods[s->type][0],
+  HycoCheck(s->type == TAO,
             "-hyco_tao_type has no effect here, because the solver type is %s; give -hyco_solver_type tao",
             HycoSolverTypes[s->type]);
   PetscCall(HycoTaoFindType(type, s->tao_type, list));
@@ -204,7 +222,9 @@ PetscErrorCode HycoSolverSetFromOptions(HycoSolver s)
                      "largest number of iterations (0: of the active set from the number of contacts; of TAO 2000)", 0,
                      PETSC_MAX_INT, &s->max_its, NULL));
   PetscCall(HycoOptionsBool("-hyco_solver_fallback",
-                            "if a method fails, try the next: tao, then active_set, then lemke", &s->fallback, NULL));
+                            "if a method fails, try the next: active_set, then TAO's gpcg and tron, then lemke (lemke, "
+                            "then ssils if nonsymmetric)",
+                            &s->fallback, NULL));
   PetscCall(HycoOptionsBool("-hyco_solver_warm_start", "full order: start from the last solution's active contacts",
                             &s->warm, NULL));
   PetscCall(HycoOptionsName("-hyco_solver_view", "print form, method, tolerances and residuals after each solve"));
@@ -226,7 +246,7 @@ PetscErrorCode HycoSolverDeclare(PetscOptions options)
 
 PetscBool HycoSolverNeedsSymmetry(HycoSolver s)
 {
-  return (PetscBool)(!methods[s->type][0] && HycoTaoTraits(s->tao_type) & HYCO_TAO_SYMMETRIC);
+  return (PetscBool)(s->type == TAO && HycoTaoTraits(s->tao_type) & HYCO_TAO_SYMMETRIC);
 }
 
 PetscErrorCode HycoSolverNameMethod(HycoSolver s, const char form[])
@@ -249,22 +269,30 @@ PetscErrorCode HycoSolverGiveUp(HycoSolver s, Vec x, Vec L)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets the method of that number for this system. */
-static PetscErrorCode SetMethod(HycoSolver s, PetscInt type)
+/* Sets the method for this system. */
+static PetscErrorCode SetMethod(HycoSolver s, const Candidate *c)
 {
-  const char *tao = methods[type];
+  const char *tao = c->tao;
 
   PetscFunctionBegin;
   if (!tao[0]) tao = s->tao_type[0] ? s->tao_type : s->system->symmetric ? "gpcg" : "ssils";
-  s->now.word = HycoSolverTypes[type];
+  s->now.word = HycoSolverTypes[c->type];
   PetscCall(PetscStrncpy(s->now.type, tao, sizeof(s->now.type)));
   s->now.traits = HycoTaoTraits(tao);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Asks the form; the reason of a form that could take the cones is kept. */
 static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscReal *cost, char why[HYCO_LINE])
 {
   PetscFunctionBegin;
+  if (s->system->blocks && s->system->m && !form->cones) {
+    *cost = -1;
+    if (!why[0])
+      HycoFormat(why, "the form %s takes contact forces >= 0 only, and this system has other cones; use dual",
+                 form->name);
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(form->ops->accepts(s, form, (PetscBool)(strcmp(form->name, s->form_name) == 0), cost, why));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -304,6 +332,10 @@ static PetscErrorCode FirstForm(HycoSolver s, HycoSolverForm *form)
   char why[HYCO_LINE];
 
   PetscFunctionBegin;
+  HycoCheck(!s->system->blocks || s->now.traits & HYCO_TAO_CONES,
+            "%s solves systems with contact forces >= 0 only, and this one has other cones; use -hyco_solver_type "
+            "semismooth",
+            s->now.traits & HYCO_TAO_OWN ? s->now.word : s->now.type);
   HycoCheck(s->system->symmetric || !s->system->m || !(s->now.traits & HYCO_TAO_SYMMETRIC),
             "TAO's %s needs a symmetric system, and this one is not symmetric; use -hyco_tao_type ssils, asils, ssfls "
             "or asfls",
@@ -353,15 +385,16 @@ static PetscErrorCode Attempt(HycoSolver s, HycoSolverForm form, Vec x, Vec L)
 static PetscErrorCode DecideByForces(HycoSolver s, Vec x, Vec L)
 {
   const HycoSolverForm dual = HycoSolverFindForm(s, "dual");
-  char why[HYCO_LINE], before[sizeof(s->method)];
+  char why[HYCO_LINE] = "", before[sizeof(s->method)];
   PetscReal cost = -1;
   PetscInt n_free = 0;
 
   PetscFunctionBegin;
   if (s->system->K) PetscCall(HycoKernelSize(s->system->K, &n_free));
-  if (!n_free || !s->system->m || !s->fallback || s->form == dual) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!n_free || !s->system->m || s->system->blocks || !s->fallback || s->form == dual)
+    PetscFunctionReturn(PETSC_SUCCESS);
   s->falling_back = PETSC_TRUE;
-  PetscCall(SetMethod(s, 0));
+  PetscCall(SetMethod(s, by_default));
   PetscCall(Accepts(s, dual, &cost, why));
   if (cost < 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscStrncpy(before, s->method, sizeof(before)));
@@ -370,30 +403,75 @@ static PetscErrorCode DecideByForces(HycoSolver s, Vec x, Vec L)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Tries attempts in order, from the chosen method on, until one converges. */
-static PetscErrorCode Attempts(HycoSolver s, Vec x, Vec L)
+/* Appends the fallback method to the name of those before it. */
+static PetscErrorCode NameFallback(HycoSolver s, const char before[])
 {
-  PetscInt k = 0;
-  PetscBool better = PETSC_FALSE;
+  const PetscBool own = (PetscBool)(s->now.traits & HYCO_TAO_OWN);
 
   PetscFunctionBegin;
-  while (order[k] != s->type) k++;
-  for (; k < N_METHODS; k++) {
-    char why[HYCO_LINE], before[sizeof(s->method)];
-    HycoSolverForm form;
+  PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "%s, then %s%s%s", before, s->now.word, own ? "" : " ",
+                          own ? "" : s->now.type));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
-    PetscCall(SetMethod(s, order[k]));
-    if (s->falling_back)
-      PetscCall(HycoSolverAcceptingForm(s, s->form, &form, why));
-    else
-      PetscCall(FirstForm(s, &form));
-    if (!form) continue;
-    PetscCall(PetscStrncpy(before, s->method, sizeof(before)));
-    PetscCall(Attempt(s, form, x, L));
-    if (s->reason < 0 && s->refine && form->ops->refine) PetscCall(form->ops->refine(s, form, &better));
-    if (s->reason < 0 && better) PetscCall(Attempt(s, form, x, L));
-    better = PETSC_FALSE;
-    if (s->falling_back) PetscCall(PetscSNPrintf(s->method, sizeof(s->method), "%s, then %s", before, s->now.word));
+/* The form for a candidate; NULL: none accepts it. */
+static PetscErrorCode FormOf(HycoSolver s, const Candidate *c, HycoSolverForm *form)
+{
+  char why[HYCO_LINE];
+
+  PetscFunctionBegin;
+  if (!s->falling_back)
+    PetscCall(FirstForm(s, form));
+  else
+    PetscCall(HycoSolverAcceptingForm(s, s->form, form, why));
+  if (s->falling_back && c->stays && *form != s->form) *form = NULL;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Solves with one method; again if its form can solve with less round-off. *tried: a form accepts it. */
+static PetscErrorCode Try(HycoSolver s, const Candidate *c, Vec x, Vec L, PetscBool *tried)
+{
+  char before[sizeof(s->method)];
+  PetscBool better = PETSC_FALSE;
+  HycoSolverForm form;
+
+  PetscFunctionBegin;
+  PetscCall(SetMethod(s, c));
+  PetscCall(FormOf(s, c, &form));
+  *tried = (PetscBool)(form != NULL);
+  if (!form) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscStrncpy(before, s->method, sizeof(before)));
+  PetscCall(Attempt(s, form, x, L));
+  if (s->reason < 0 && s->refine && form->ops->refine) PetscCall(form->ops->refine(s, form, &better));
+  if (s->reason < 0 && better) PetscCall(Attempt(s, form, x, L));
+  if (s->falling_back) PetscCall(NameFallback(s, before));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether candidate k is next: the chosen method, or after it one that this system accepts and that was not tried. */
+static PetscBool IsNext(HycoSolver s, int k, const PetscBool tried[], const char chosen[])
+{
+  if (!chosen[0]) return (PetscBool)(order[k].type == s->type);
+  if (!(s->system->symmetric ? order[k].symmetric : order[k].nonsymmetric)) return PETSC_FALSE;
+  if (s->system->blocks && !(HycoTaoTraits(order[k].tao) & HYCO_TAO_CONES)) return PETSC_FALSE;
+  for (int j = 0; j < k; j++) {
+    if (tried[j] && strcmp(order[j].tao, order[k].tao) == 0) return PETSC_FALSE;
+  }
+  return (PetscBool)(strcmp(order[k].tao, chosen) != 0);
+}
+
+/* Tries methods in order, from the chosen one on, until one converges. */
+static PetscErrorCode Attempts(HycoSolver s, Vec x, Vec L)
+{
+  char chosen[HYCO_TAO_NAME] = "";
+  PetscBool tried[N_CANDIDATES] = {PETSC_FALSE};
+
+  PetscFunctionBegin;
+  for (int k = 0; k < N_CANDIDATES; k++) {
+    if (!IsNext(s, k, tried, chosen)) continue;
+    PetscCall(Try(s, &order[k], x, L, &tried[k]));
+    if (!chosen[0]) PetscCall(PetscStrncpy(chosen, s->now.type, sizeof(chosen)));
+    if (!tried[k]) continue;
     if (s->reason > 0 || s->reason == HYCO_DIVERGED_SINGULAR || !s->fallback || !s->system->m) break;
     s->falling_back = PETSC_TRUE;
   }
@@ -413,6 +491,7 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
   if (s->system) HycoCheckHandle(s->system, HYCO_SYSTEM_CLASSID);
   PetscCheck(s->system && (s->system->F || s->system->G), PETSC_COMM_SELF, PETSC_ERR_ORDER,
              "call HycoSolverSetSystem(), with a system whose matrices and vectors are set, before HycoSolverSolve()");
+  PetscCall(HycoSystemCheckBlocks(s->system));
   s->seconds_factor = s->seconds_before;
   s->its = s->linear_its = s->linear_solves = s->linear_most = 0;
   s->falling_back = PETSC_FALSE;
@@ -536,18 +615,13 @@ const char *HycoReasonName(HycoReason reason)
 
 PetscErrorCode HycoSolverView(HycoSolver s, PetscViewer viewer)
 {
-  PetscBool ascii;
+  const char *tao = "";
 
   PetscFunctionBegin;
-  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
-  PetscCall(HycoViewBegin((PetscObject)s, &viewer, &ascii));
-  if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscViewerASCIIPrintf(viewer, "type: %s%s%s; form: %s\n", HycoSolverTypes[s->type],
-                                   methods[s->type][0] ? "" : ", ",
-                                   methods[s->type][0] ? ""
-                                   : s->tao_type[0]    ? s->tao_type
-                                                       : "by the system",
-                                   s->form_name[0] ? s->form_name : "auto"));
+  HycoViewBegin(s, HYCO_SOLVER_CLASSID, viewer);
+  if (s->type == TAO) tao = s->tao_type[0] ? s->tao_type : "by the system";
+  PetscCall(PetscViewerASCIIPrintf(viewer, "type: %s%s%s; form: %s\n", HycoSolverTypes[s->type], tao[0] ? ", " : "",
+                                   tao, s->form_name[0] ? s->form_name : "auto"));
   PetscCall(PetscViewerASCIIPrintf(viewer, "tolerance of the KKT residuals: %g; iterations: at most %d%s\n",
                                    (double)s->rtol, (int)s->max_its, s->max_its ? "" : " (by the number of contacts)"));
   PetscCall(PetscViewerASCIIPrintf(viewer, "solves with K: %s\n",

@@ -4,7 +4,7 @@
 PetscErrorCode HycoSystemCreate(MPI_Comm comm, HycoSystem *system)
 {
   PetscFunctionBegin;
-  PetscCall(HycoInitializePackage());
+  PetscCall(HycoPackageCheck());
   PetscCall(PetscHeaderCreate(*system, HYCO_SYSTEM_CLASSID, "HycoSystem", "Contact system", "Hyco", comm,
                               HycoSystemDestroy, HycoSystemView));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -35,9 +35,7 @@ PetscErrorCode HycoSystemDestroy(HycoSystem *system)
   HycoSystem s;
 
   PetscFunctionBegin;
-  if (!system || !*system) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheckHandle(*system, HYCO_SYSTEM_CLASSID);
-  HycoDereference(system);
+  HycoDestroyBegin(system, HYCO_SYSTEM_CLASSID);
   s = *system;
   PetscCall(MatDestroy(&s->K));
   PetscCall(MatDestroy(&s->Bt));
@@ -45,6 +43,7 @@ PetscErrorCode HycoSystemDestroy(HycoSystem *system)
   PetscCall(MatDestroy(&s->G));
   PetscCall(VecDestroy(&s->F));
   PetscCall(VecDestroy(&s->D));
+  PetscCall(HycoBlocksDestroy(&s->blocks));
   PetscCall(FreeWork(s));
   PetscCall(PetscHeaderDestroy(system));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -115,6 +114,15 @@ PetscErrorCode HycoSystemSetVectors(HycoSystem s, Vec F, Vec D)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoSystemGetVectors(HycoSystem s, Vec *F, Vec *D)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(s, HYCO_SYSTEM_CLASSID);
+  if (F) *F = s->F;
+  if (D) *D = s->D;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoSystemSetFlexibility(HycoSystem s, Mat G, Vec g)
 {
   PetscInt rows, cols, m, lda = 0;
@@ -143,6 +151,66 @@ PetscErrorCode HycoSystemSetFlexibility(HycoSystem s, Mat G, Vec g)
   s->symmetric = PETSC_TRUE;
   s->n = 0;
   s->m = m;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Fails unless the blocks cover these rows. */
+static PetscErrorCode CheckCover(PetscInt n_cones, const HycoCone cones[], PetscInt n, const PetscInt cone_of[],
+                                 const PetscReal data[], PetscInt rows)
+{
+  HycoBlocks *blocks;
+  PetscInt covered;
+
+  PetscFunctionBegin;
+  PetscCall(HycoBlocksCreate(n_cones, cones, n, cone_of, data, &blocks));
+  covered = blocks->row[n];
+  PetscCall(HycoBlocksDestroy(&blocks));
+  PetscCheck(covered == rows, PETSC_COMM_SELF, PETSC_ERR_ARG_SIZ,
+             "the blocks have %d components, and the system has %d rows on this rank; they must be as many",
+             (int)covered, (int)rows);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The number of rows on this rank. */
+static PetscErrorCode CountRows(HycoSystem s, PetscInt *rows)
+{
+  PetscFunctionBegin;
+  *rows = 0;
+  if (s->G || s->B) PetscCall(MatGetLocalSize(s->G ? s->G : s->B, rows, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSystemSetBlocks(HycoSystem s, PetscInt n_cones, const HycoCone cones[], PetscInt n_blocks,
+                                   const PetscInt cone_of[], const PetscReal data[])
+{
+  PetscInt rows;
+  PetscBool other = PETSC_FALSE; /* a law that is not each row's force >= 0 */
+
+  PetscFunctionBegin;
+  HycoCheckHandle(s, HYCO_SYSTEM_CLASSID);
+  PetscCheck(!n_cones || s->K || s->G, PETSC_COMM_SELF, PETSC_ERR_ORDER,
+             "call HycoSystemSetMatrices() or HycoSystemSetFlexibility() before HycoSystemSetBlocks()");
+  PetscCall(CountRows(s, &rows));
+  if (n_cones) HycoOnEach(HycoComm(s), CheckCover(n_cones, cones, n_blocks, cone_of, data, rows));
+  for (PetscInt c = 0; c < n_cones; c++) other = (PetscBool)(other || !cones[c]->nonnegative);
+  PetscCall(HycoBlocksDestroy(&s->blocks));
+  if (other) PetscCall(HycoBlocksCreate(n_cones, cones, n_blocks, cone_of, data, &s->blocks));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The matrices may have been replaced since the blocks were set. */
+PetscErrorCode HycoSystemCheckBlocks(HycoSystem s)
+{
+  PetscInt rows;
+  int fits, all;
+
+  PetscFunctionBegin;
+  if (!s->blocks) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(CountRows(s, &rows));
+  fits = s->blocks->row[s->blocks->n] == rows;
+  PetscCallMPI(MPI_Allreduce(&fits, &all, 1, MPI_INT, MPI_MIN, HycoComm(s)));
+  PetscCheck(all, HycoComm(s), PETSC_ERR_ORDER,
+             "the matrices have other rows than the blocks; call HycoSystemSetBlocks() after them");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -216,11 +284,30 @@ static PetscErrorCode Stationarity(HycoSystem s, Vec x, Vec L, PetscReal *value,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The residuals of the blocks' laws with the gaps w of the size size_w; size_L: that of the forces, `instead` if it is
+   0. */
+static PetscErrorCode BlockKKT(HycoSystem s, const PetscReal w[], const PetscReal l[], PetscReal size_w,
+                               PetscReal size_L, PetscReal instead, HycoKKT *kkt)
+{
+  const PetscReal force = size_L > 0 ? size_L : instead > 0 ? instead : 1;
+  HycoNaturalMap map;
+  PetscReal local[3], worst[3];
+
+  PetscFunctionBegin;
+  PetscCall(HycoBlocksNaturalMap(s->blocks, size_w > 0 ? force / size_w : 1, l, w, &map));
+  local[0] = map.missing, local[1] = map.outside, local[2] = map.map;
+  PetscCallMPI(MPI_Allreduce(local, worst, 3, MPIU_REAL, MPI_MAX, HycoComm(s)));
+  kkt->penetration = Quotient(worst[0], force);
+  kkt->adhesion = Quotient(worst[1], force);
+  kkt->complementarity = Quotient(worst[2], force);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The residuals of w = g + G L. Equilibrium has no residual here: it is satisfied by the definition of G. */
 static PetscErrorCode FlexibilityKKT(HycoSystem s, Vec L, HycoKKT *kkt)
 {
   const PetscInt m = s->m;
-  PetscReal size = 0, most = 0, worst[3] = {0, 0, 0};
+  PetscReal size = 0, most = 0, stiffest = 0, worst[3] = {0, 0, 0};
   const PetscScalar *G, *g, *l;
   PetscScalar *w;
 
@@ -249,13 +336,31 @@ static PetscErrorCode FlexibilityKKT(HycoSystem s, Vec L, HycoKKT *kkt)
     if (l[i] != 0 && size > 0)
       worst[2] = PetscMax(worst[2], PetscAbsReal(w[i] / size * (l[i] / most))); /* avoids overflow */
   }
+  kkt->penetration = worst[0] > 0 ? worst[0] / size : 0;
+  kkt->adhesion = worst[1] > 0 ? worst[1] / most : 0;
+  kkt->complementarity = worst[2];
+  for (PetscInt i = 0; s->blocks && i < m; i++) stiffest = PetscMax(stiffest, G[(size_t)i * (size_t)m + (size_t)i]);
+  if (s->blocks) PetscCall(BlockKKT(s, w, l, size, most, Quotient(size, stiffest), kkt));
   PetscCall(VecRestoreArray(s->work_L, &w));
   PetscCall(VecRestoreArrayRead(L, &l));
   PetscCall(VecRestoreArrayRead(s->D, &g));
   PetscCall(MatDenseRestoreArrayRead(s->G, &G));
-  kkt->penetration = worst[0] > 0 ? worst[0] / size : 0;
-  kkt->adhesion = worst[1] > 0 ? worst[1] / most : 0;
-  kkt->complementarity = worst[2];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The blocks' residuals with the gaps in `gap`; where there are no forces, the loads give their size. */
+static PetscErrorCode GapKKT(HycoSystem s, Vec gap, Vec L, PetscReal size_gap, PetscReal size_L, HycoKKT *kkt)
+{
+  PetscReal load;
+  const PetscScalar *w, *l;
+
+  PetscFunctionBegin;
+  PetscCall(VecNorm(s->F, NORM_INFINITY, &load));
+  PetscCall(VecGetArrayRead(gap, &w));
+  PetscCall(VecGetArrayRead(L, &l));
+  PetscCall(BlockKKT(s, w, l, size_gap, size_L, s->size_B > 0 ? load / s->size_B : 0, kkt));
+  PetscCall(VecRestoreArrayRead(gap, &w));
+  PetscCall(VecRestoreArrayRead(L, &l));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -270,6 +375,7 @@ PetscErrorCode HycoSystemComputeKKT(HycoSystem s, Vec x, Vec L, HycoKKT *kkt)
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SYSTEM_CLASSID);
   PetscCall(PetscMemzero(kkt, sizeof(*kkt)));
+  PetscCall(HycoSystemCheckBlocks(s));
   if (s->G) {
     PetscCall(FlexibilityKKT(s, L, kkt));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -288,6 +394,10 @@ PetscErrorCode HycoSystemComputeKKT(HycoSystem s, Vec x, Vec L, HycoKKT *kkt)
   PetscCall(VecNorm(s->D, NORM_INFINITY, &size_D));
   PetscCall(VecNorm(L, NORM_INFINITY, &size_L));
   size_gap = PetscMax(size_D, s->size_B * size_x);
+  if (s->blocks) {
+    PetscCall(GapKKT(s, gap, L, size_gap, size_L, kkt));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(VecGetLocalSize(gap, &m));
   PetscCall(VecGetArrayRead(gap, &w));
   PetscCall(VecGetArrayRead(L, &l));
@@ -307,14 +417,13 @@ PetscErrorCode HycoSystemComputeKKT(HycoSystem s, Vec x, Vec L, HycoKKT *kkt)
 
 PetscErrorCode HycoSystemView(HycoSystem s, PetscViewer viewer)
 {
-  PetscBool ascii;
-
   PetscFunctionBegin;
-  HycoCheckHandle(s, HYCO_SYSTEM_CLASSID);
-  PetscCall(HycoViewBegin((PetscObject)s, &viewer, &ascii));
-  if (!ascii) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoViewBegin(s, HYCO_SYSTEM_CLASSID, viewer);
   PetscCall(PetscViewerASCIIPrintf(viewer, "%d unknowns, %d contacts, %s\n", (int)s->n, (int)s->m,
                                    s->symmetric ? "symmetric" : "not symmetric"));
+  for (PetscInt c = 0; s->blocks && c < s->blocks->n_cones; c++)
+    PetscCall(PetscViewerASCIIPrintf(viewer, "cone: %s, %d components\n", ((PetscObject)s->blocks->cone[c])->type_name,
+                                     (int)s->blocks->cone[c]->size));
   PetscCall(PetscViewerPushFormat(viewer, PETSC_VIEWER_ASCII_INFO));
   if (s->K) PetscCall(MatView(s->K, viewer));
   if (s->B && s->m) PetscCall(MatView(s->B, viewer));

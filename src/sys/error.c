@@ -1,8 +1,16 @@
 /* Errors are caught as one line of text and synchronised over all ranks, so that no rank waits for a failed one. */
 #include <hycoimpl.h>
+#include <stdlib.h>
 #include <stdarg.h>
 #include <string.h>
 #include <time.h>
+
+PetscBool HycoWantsTrace(void)
+{
+  const char *trace = getenv("HYCO_TRACE");
+
+  return (PetscBool)(trace && trace[0] && strcmp(trace, "0") != 0);
+}
 
 static char caught_line[HYCO_LINE];
 
@@ -115,6 +123,14 @@ unsigned long long HycoHash(unsigned long long hash, const void *data, size_t by
 
   for (size_t k = 0; k < bytes; k++) hash = (hash ^ byte[k]) * 1099511628211ULL;
   return hash;
+}
+
+PetscReal HycoCPU(void)
+{
+  struct timespec now;
+
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return (PetscReal)now.tv_sec + 1e-9 * (PetscReal)now.tv_nsec;
 }
 
 PetscReal HycoNow(void)

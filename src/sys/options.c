@@ -22,6 +22,7 @@ static HycoOptionList table;      /* the library's options, once recorded */
 static HycoOptionList told;       /* options that -help has printed */
 static HycoOptionList *recording; /* list that receives declarations instead of reading them; NULL: options are read */
 static const char *readers = "";  /* HycoOptionsFor() */
+static PetscErrorCode (*declare_all)(PetscOptions) = NULL;
 
 static PetscErrorCode ForgetTable(void)
 {
@@ -66,11 +67,17 @@ PetscErrorCode HycoOptionsForgetTable(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+void HycoOptionsSetDeclare(PetscErrorCode (*declare)(PetscOptions))
+{
+  declare_all = declare;
+}
+
 PetscErrorCode HycoGetOptionTable(PetscInt *n, const HycoOption *options[])
 {
   PetscFunctionBegin;
   if (!table.n) {
-    PetscCall(HycoOptionsRecord(&table, HycoDeclareClasses));
+    PetscCall(HycoPackageCheck());
+    PetscCall(HycoOptionsRecord(&table, declare_all));
     PetscCall(PetscRegisterFinalize(ForgetTable));
   }
   if (n) *n = table.n;

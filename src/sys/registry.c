@@ -1,4 +1,4 @@
-/* Registries of types. */
+/* Registries of types: a PetscFunctionList each, and the names in a fixed order, which such a list need not keep. */
 #include <hycoregistry.h>
 #include <string.h>
 
@@ -9,9 +9,8 @@ static PetscErrorCode ForgetAll(void)
 {
   PetscFunctionBegin;
   for (HycoRegistry *r = all; r; r = r->next) {
-    for (PetscInt k = 0; k < r->n; k++) PetscCall(PetscFree(r->name[k]));
-    PetscCall(PetscFree(r->name));
-    PetscCall(PetscFree(r->create));
+    PetscCall(PetscFunctionListDestroy(&r->create));
+    PetscCall(PetscStrArrayDestroy(&r->name));
     r->n = 0;
     r->begun = PETSC_FALSE;
   }
@@ -19,59 +18,48 @@ static PetscErrorCode ForgetAll(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode Add(HycoRegistry *r, const char name[], HycoVoidFn *create)
+{
+  HycoVoidFn *former;
+  PetscInt k;
+
+  PetscFunctionBegin;
+  PetscCall(PetscFunctionListFind(r->create, name, &former));
+  PetscCall(PetscFunctionListAdd(&r->create, name, create));
+  if (former) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscRealloc((size_t)(r->n + 2) * sizeof(*r->name), &r->name));
+  for (k = r->n; k > 0 && r->sorted && strcmp(r->name[k - 1], name) > 0; k--) r->name[k] = r->name[k - 1];
+  PetscCall(PetscStrallocpy(name, &r->name[k]));
+  r->name[++r->n] = NULL;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Begin(HycoRegistry *r)
 {
   PetscFunctionBegin;
   if (r->begun) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoInitializePackage());
+  PetscCall(HycoPackageCheck());
   if (!all) PetscCall(PetscRegisterFinalize(ForgetAll));
-  r->begun = r->adding_own = PETSC_TRUE;
+  r->begun = PETSC_TRUE;
   r->next = all;
   all = r;
-  PetscCall(r->add_own());
-  r->adding_own = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The index of a name; -1: not found. */
-static PetscInt Place(const HycoRegistry *r, const char name[])
+PetscErrorCode HycoRegistryAdd(HycoRegistry *r, const char name[], HycoVoidFn *create)
 {
-  for (PetscInt k = 0; k < r->n; k++) {
-    if (strcmp(r->name[k], name) == 0) return k;
-  }
-  return -1;
-}
-
-PetscErrorCode HycoRegistryAdd_Private(HycoRegistry *r, const char name[], HycoVoidFn *create)
-{
-  PetscInt k;
-
   PetscFunctionBegin;
   PetscCall(Begin(r));
-  k = Place(r, name);
-  if (k < 0) {
-    PetscCall(PetscRealloc((size_t)(r->n + 2) * sizeof(*r->name), &r->name));
-    PetscCall(PetscRealloc((size_t)(r->n + 1) * sizeof(*r->create), &r->create));
-    for (k = r->n; k > 0 && r->sorted && strcmp(r->name[k - 1], name) > 0; k--) {
-      r->name[k] = r->name[k - 1];
-      r->create[k] = r->create[k - 1];
-    }
-    PetscCall(PetscStrallocpy(name, &r->name[k]));
-    r->name[++r->n] = NULL;
-  }
-  r->create[k] = create;
-  if (!r->adding_own) PetscCall(HycoOptionsForgetTable());
+  PetscCall(Add(r, name, create));
+  PetscCall(HycoOptionsForgetTable());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoRegistryFind_Private(HycoRegistry *r, const char name[], HycoVoidFn **create)
 {
-  PetscInt k;
-
   PetscFunctionBegin;
   PetscCall(Begin(r));
-  k = Place(r, name);
-  *create = k < 0 ? NULL : r->create[k];
+  PetscCall(PetscFunctionListFind(r->create, name, create));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

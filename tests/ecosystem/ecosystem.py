@@ -77,6 +77,7 @@ class Ecosystem(Case):
         subprocess.run([cls.python, '-m', 'pip', 'install', '-q', 'pyvista', 'meshio', 'h5py'], check=True, timeout=300 * PATIENCE)
 
     def test_all(self):
+        """pyvista and meshio read .xdmf and .vtkhdf of full order, with the extremes of the report."""
         reports = {}
         for name, mu in ONE.items():
             for ending in ('.xdmf', '.vtkhdf'):
@@ -129,6 +130,7 @@ class Ecosystem(Case):
         return {row[0][:-1]: (int(row[1]), row[2]) for row in rows}
 
     def test_convert(self):
+        """scripts/convert turns meshio's .vtu, .med and others into meshes with groups."""
         subprocess.run([self.python, '-c', MESHES], cwd=self.folder, check=True, timeout=100 * PATIENCE)
         self.assertEqual(self.convert('m.vtu', '--groups', 'material,foot'), {'material_1': (1, 'quad4'), 'material_2': (1, 'quad4'), 'foot_1': (2, 'line2')})
         self.assertEqual(self.convert('m.med'), {'soft': (1, 'quad4'), 'stiff': (1, 'quad4'), 'foot': (1, 'line2'), 'all': (2, 'quad4')})

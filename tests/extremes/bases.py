@@ -25,6 +25,7 @@ class Bases(Extreme):
         self.row(case, 'condensed: error of the forces', self.compare(scene, *test)['error_lambda']['max'] or 0, bound)
 
     def test_tolerance(self):
+        """POD tolerances from 1 to 1e-16: no modes are refused, many are accurate."""
         scene = self.scene(*blocks(crown=0.1, n=(6, 6)))
         for tol in ('0.5', '1e-16'):
             self.forces(f'POD tolerance {tol}, between training points', scene, TRAIN, UNSEEN, '-hyco_pod_tol', tol)

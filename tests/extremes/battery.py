@@ -36,6 +36,7 @@ class Battery(Extreme):
         return what, blocks(kind, (n, other), **options), train, test
 
     def test_battery(self):
+        """Random scenes: KKT residuals at full order, errors of each type of model."""
         worst = {'full order: worst KKT residual': 0, 'hybrid, whole domain: error': 0,
                  'condensed: error of the forces': 0, 'projection, at a training point: error': 0}
         active, done = [], 0

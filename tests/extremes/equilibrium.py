@@ -224,6 +224,7 @@ class Equilibrium(Extreme):
     seed, count = SEED, COUNT
 
     def test_equilibrium(self):
+        """Random scenes with floating bodies are solved if an equilibrium exists, and refused otherwise."""
         found = {(verdict, end): 0 for verdict in ('yes', 'no', 'either') for end in ('solved', 'refused')}
         for seed in range(self.seed, self.seed + self.count):
             what, d, verdict = draw(seed)

@@ -1,7 +1,7 @@
 """Common code of the tests of extremes: two stacked blocks of any cell type, a scene written from a dictionary, the models
 of one scene, and rows of tables.
 
-A row is written to extremes/TEST.csv under the folder where the test runs; table.py makes the tables of docs/limits.md
+A row is written to extremes/TEST.csv under the folder where the test runs; table.py makes docs/limits/extremes.csv
 from them."""
 import csv
 import json

@@ -82,6 +82,7 @@ class Locking(Extreme):
             self.models(case, scene, TRAIN, SEEN, UNSEEN)
 
     def test_refused(self):
+        """element: bbar on triangles and Poisson's ratio 0.5 are refused."""
         scene = self.scene(*blocks('tri3', (4, 4), element='bbar'))
         self.refused('tri3, element: bbar', 'solve', '-scene', scene, '-mu', '0.05,0.01', says='is for quad4 and hex8')
         scene = self.scene(*blocks('quad4', (4, 4), poisson=(0.5, 0.3)))

@@ -12,6 +12,7 @@ class Parameters(Extreme):
     name = 'parameters'
 
     def test_ends(self):
+        """At the ends of the parameters' ranges: each model is accurate; beyond them it is refused."""
         scene = self.scene(*blocks(crown=0.1))
         commands = [('full order', ('solve', '-scene', scene))]
         for model, more in (('hybrid', ALL), ('projection', PROJECTION), ('condensed', CONDENSED)):
@@ -71,6 +72,7 @@ class Parameters(Extreme):
         scene['contact']['seam']['gap'] = 'gap + crown*x^2'
 
     def test_six(self):
+        """Six parameters: models trained on a grid, at seen and unseen points."""
         grid, scene = blocks(crown=0.1)
         self.six(scene)
         scene = self.scene(grid, scene)
@@ -90,6 +92,7 @@ class Parameters(Extreme):
                  self.compare(scene, *between)['error_lambda']['max'], 0.1)
 
     def test_six_greedy(self):
+        """Six parameters: a model of greedily chosen points."""
         grid, scene = blocks(crown=0.1, n=(2, 2))
         self.six(scene)
         scene = self.scene(grid, scene)

@@ -102,6 +102,7 @@ class Paths(Extreme):
         self.say('training that never flowed, where bodies flow', 'hybrid: extrapolated', f"by {far['beyond']:.2g} of the ranges")
 
     def test_six_parameters(self):
+        """Paths with six parameters, four of them in the law."""
         grid, scene = flowing(J2, (0, 0.5, 1, 2), [[0, 0], [1, 1], [2, 0.3]], crown=0.1)
         more = {'young': [80, 120], 'poisson': [0.25, 0.35], 'yield': [0.25, 0.35], 'hardening': [1, 3]}
         scene['scene']['parameters'] += ['e', 'n', 'f', 'h']

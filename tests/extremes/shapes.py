@@ -11,6 +11,7 @@ class Shapes(Extreme):
     name = 'shapes'
 
     def test_aspect(self):
+        """Elements 1e4 times as wide as high, or as high as wide: the pressure's closed form."""
         for kind in ('quad4', 'tri3', 'hex8', 'tet4'):
             for aspect in (1e-4, 1e-2, 1e2, 1e4) if kind == 'quad4' else (1e-4, 1e4):
                 case = f'{kind}, elements {aspect:g} times as wide as high'

@@ -52,6 +52,7 @@ class Units(Extreme):
         return out
 
     def test_scales(self):
+        """Scaled lengths and stresses: results scale to the bit, or to round-off."""
         for kind in ('line2', 'quad4', 'hex8'):
             base = self.answers(kind, 1, 1)
             for factors, bound in ((TWO, 0), (TEN, 1e-10)):

@@ -10,7 +10,7 @@
 
 static char geo[PETSC_MAX_PATH_LEN], data[PETSC_MAX_PATH_LEN], rope[PETSC_MAX_PATH_LEN], hybrid[PETSC_MAX_PATH_LEN],
     blocks[PETSC_MAX_PATH_LEN], projection[PETSC_MAX_PATH_LEN];
-static FILE *rows; /* faults/api.csv: rows that table.py puts into docs/limits.md */
+static FILE *rows; /* faults/api.csv: rows that table.py puts into docs/limits/faults.csv */
 static const PetscReal inside[2] = {0.07, 0.17}, outside[2] = {0.04, 0.17};
 
 /* A handle that was destroyed is NULL, and NULL is refused by name. */
@@ -343,6 +343,7 @@ static PetscErrorCode OnceRefused(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Memory does not grow in a thousand repetitions. */
 static PetscErrorCode TestGrowth(const char what[], PetscErrorCode (*once)(void), long most)
 {
   long before, after;

@@ -1,7 +1,7 @@
 /*
   Files truncated at many lengths and with seeded flipped bits, in one process with limited address space: a sealed file
   is refused whatever bit changed; a file of format 3, without a seal, is refused if truncated; with a flipped bit it is
-  refused or read, without a crash and without a huge allocation. Prints the counts for docs/limits.md.
+  refused or read, without a crash and without a huge allocation. Prints the counts for docs/limits/faults.csv.
 */
 #include "../unit/check.h"
 #include <hyco.h>
@@ -12,7 +12,7 @@
 #include <unistd.h>
 
 static char path[128];
-static FILE *rows; /* faults/damage.csv: rows that table.py puts into docs/limits.md */
+static FILE *rows; /* faults/damage.csv: rows that table.py puts into docs/limits/faults.csv */
 
 typedef struct {
   unsigned char *bytes;
@@ -63,6 +63,7 @@ static PetscErrorCode Try(PetscBool *refused, PetscReal *force)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A model file that is cut anywhere is refused. */
 static PetscErrorCode TestCuts(const char what[], const Bytes *b, size_t step)
 {
   PetscInt n = 0, loaded = 0;
@@ -83,6 +84,7 @@ static PetscErrorCode TestCuts(const char what[], const Bytes *b, size_t step)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A model file with flipped bits is refused, or gives the right force. */
 static PetscErrorCode TestFlips(const char what[], const Bytes *b, PetscInt n, PetscBool sealed)
 {
   unsigned long long state = 6;

@@ -62,6 +62,7 @@ class Queue(Case):
         self.assertEqual(len(self.solutions(model)), N)
 
     def test_held_up(self):
+        """A group that is held up does not stop the other one."""
         self.check_held_up(1)
 
     def test_held_up_counter(self):

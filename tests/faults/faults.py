@@ -59,9 +59,9 @@ CASES = [
     (['solve', *R, '-hyco_solver_type', 'tao', '-hyco_tao_type', 'ssils', '-hyco_solver_form', 'primal'], "TAO's ssils needs the matrix"),
     (['train', *T, *N, '-hyco_pod_tol', '1'], '-hyco_pod_tol 1 leaves no mode; give a smaller value'),
     (['train', *T, *N, '-hyco_pod_tol', '1', '-hyco_model_type', 'condensed'], '-hyco_pod_tol 1 leaves no mode; give a smaller value'),
-    (['train', *T, '-grid', '4,4', '-hyco_pod_tol', '1e-16', '-hyco_hybrid', 'all', '-hyco_hybrid_ridge', '0', '-hyco_rid_layers', '0',
+    (['train', *T, '-grid', '4,4', '-grid_type', 'centred', '-hyco_pod_tol', '1e-16', '-hyco_hybrid', 'all', '-hyco_hybrid_ridge', '0', '-hyco_rid_layers', '0',
       '-hyco_rid_modes', 'dual'], '-hyco_hybrid_ridge 0: the 16 modes are not linearly independent on the 1 unknowns of A'),
-    (['train', *T, '-grid', '3,9', '-hyco_model_type', 'projection', '-hyco_pod_tol', '0.5', '-contact_ground_gap', '10', '-force_rope_x',
+    (['train', *T, '-grid', '3,9', '-grid_type', 'centred', '-hyco_model_type', 'projection', '-hyco_pod_tol', '0.5', '-contact_ground_gap', '10', '-force_rope_x',
       '-(mu2 > 0.3 ? sin(pi*x) : mu2 > 0.1 ? sin(2*pi*x) : sin(3*pi*x))'], 'the projection-based model misses its own training displacements by 68 %'),
     (['solve', *R, *N, '-table', 'out.csv'], 'the option -mu has no effect'),
     (['predict', '-model', 'rope.h5', *N, '-table', 'out.csv', '-output', 'out.xdmf', '-hyco_fallback', '-scene', ROPE, '-target_u', '1e-2'],
@@ -306,11 +306,13 @@ class Faults(Case):
         self.assertEqual(left, set())
 
     def test_one_process(self):
+        """Wrong commands, options, values and files on one process."""
         for args, text in CASES:
             with self.subTest(args=' '.join(args), text=text):
                 self.check(list(args), text, 0)
 
     def test_two_ranks(self):
+        """Some of the wrong commands, options and files on two ranks: still one line."""
         for args, text in CASES:
             if any(part in text or part in args for part in TWO):
                 with self.subTest(args=' '.join(args), text=text, ranks=2):

@@ -27,14 +27,14 @@ KEPT = {
     'rope-condensed-4-modes.h5': ('condensed', 0.3205963650921275, 14),
 }
 ROWS = Rows('files')
-CONDENSED = ['train', '-scene', ROPE, '-grid', '2,3', '-hyco_model_type', 'condensed', '-model', 'c.h5']
+CONDENSED = ['train', '-scene', ROPE, '-grid', '2,3', '-grid_type', 'centred', '-hyco_model_type', 'condensed', '-model', 'c.h5']
 
 
 class Files(Case):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        cls.hyco('train', '-scene', ROPE, '-grid', '4,4', '-model', 'good.h5')
+        cls.hyco('train', '-scene', ROPE, '-grid', '4,4', '-grid_type', 'centred', '-model', 'good.h5')
         cls.hyco('train', '-scene', ROPE, '-grid', '4,4', '-model', 'held.h5', '-hyco_validation', 12, status=None)
         cls.hyco(*CONDENSED)
 
@@ -59,7 +59,7 @@ class Files(Case):
 
     def test_same_bytes(self):
         """The same training twice: the same bytes."""
-        self.hyco('train', '-scene', ROPE, '-grid', '4,4', '-model', 'again.h5')
+        self.hyco('train', '-scene', ROPE, '-grid', '4,4', '-grid_type', 'centred', '-model', 'again.h5')
         with open(self.path('good.h5'), 'rb') as a, open(self.path('again.h5'), 'rb') as b:
             self.assertEqual(a.read(), b.read())
 
@@ -194,6 +194,7 @@ class Files(Case):
         self.refused(self.edited(put('problem/sizes', (4, 0), 9), 'p.h5'), 'problem/dual is damaged')
 
     def test_other_scene(self):
+        """A model of one scene is not compared on another."""
         self.refused('good.h5', 'was trained on another scene', 'compare', '-scene', PELLET, '-grid', '2,2')
 
     def damaged(self, path, tries, draw, train):
@@ -220,7 +221,7 @@ class Files(Case):
     def test_snapshots(self):
         """Each byte of a snapshot, a flexibility and its responses counts."""
         draw = random.Random(6)
-        rope = ['train', '-scene', ROPE, '-grid', '4,4', '-model', 'good.h5']
+        rope = ['train', '-scene', ROPE, '-grid', '4,4', '-grid_type', 'centred', '-model', 'good.h5']
         self.damaged(sorted(glob.glob(self.path('good.h5.snapshots', '*.h5')))[2], 16, draw, rope)
         for kind in ('flexibility', 'responses'):
             self.damaged(glob.glob(self.path('c.h5.snapshots', kind + '-*.h5'))[0], 10, draw, CONDENSED)
@@ -248,7 +249,7 @@ class Files(Case):
                 change(path, name, rows)
                 for ranks in (0, 2):
                     with self.subTest(path=path, name=name, ranks=ranks):
-                        run = self.run_raw('train', '-scene', ROPE, '-grid', '4,4', '-model', 'good.h5', ranks=ranks, timeout=60)
+                        run = self.run_raw('train', '-scene', ROPE, '-grid', '4,4', '-grid_type', 'centred', '-model', 'good.h5', ranks=ranks, timeout=60)
                         self.assertEqual(run.returncode, 1)
                         self.assertRegex(run.stderr, text)
                         self.assertEqual(run.stderr.count('hyco: error'), 1, run.stderr)

@@ -21,6 +21,7 @@ class Faults(Case):
         self.fails('solve', '-scene', RING, '-mu', '0.01,1', *args, words=words, ranks=ranks)
 
     def test_times(self):
+        """history: times that go back, repeat, or are no numbers are refused."""
         self.ring('-history_times', '0', words=['history_times', 'two'])
         self.ring('-history_times', '0,2,1', words=['history_times', 'back in time'], ranks=2)
         self.ring('-history_times', '0,1,1', words=['history_times', '1 follows 1'])
@@ -28,6 +29,7 @@ class Faults(Case):
         self.ring('-history_when', '0,1', words=['history_when', 'times'])
 
     def test_tables(self):
+        """history: tables must have rows of two numbers, ascending in time, and other names than parameters."""
         self.ring('-history_tables_q', '0 1,2 2,1 3', words=['history_tables_q', 'back in time'])
         self.ring('-history_tables_q', '0,1', words=['history_tables_q', 'rows of two'])
         self.ring('-history_tables_q', '0 1 2', words=['history_tables_q', 'rows of two'])
@@ -37,6 +39,7 @@ class Faults(Case):
         self.fails('solve', '-scene', ROPE, '-mu', '0.07,0.17', '-history_tables_q', '0 1', words=['history_tables_q', 'times'])
 
     def test_lists_of_lists(self):
+        """history: nested YAML lists of a wrong depth or length are refused."""
         for name, table, word in (('deep', '[[0, [1]]]', 'YAML'), ('odd', '[[0, 1], [2]]', 'rows of two')):
             with open(os.path.join(RING, 'scene.yaml'), encoding='utf-8') as f:
                 text = f.read().replace('mesh: ring.msh', f'mesh: {RING}/ring.msh')
@@ -46,6 +49,7 @@ class Faults(Case):
             self.fails('solve', '-scene', path, '-mu', '0.01,1', words=[word])
 
     def test_what_must_not_change(self):
+        """Maps, normals and rates that depend on time or are negative are refused."""
         self.ring('-body_ring_map_x', 'x*(1+t)', words=['body_ring_map_x', 'time'])
         self.ring('-contact_fit_normal_x', 'x+t', words=['fit', 'normal'])
         self.ring('-body_ring_rate', '-1', words=['rate'])
@@ -55,6 +59,7 @@ class Faults(Case):
         self.ring('-body_ring_young', '1e5-4e4*t', words=['body_ring_young', 't = '], ranks=2)
 
     def test_law_without_history(self):
+        """A law with a state needs a history; the message names body, law and entry."""
         with open(os.path.join(RING, 'scene.yaml'), encoding='utf-8') as f:
             text = f.read().replace('mesh: ring.msh', f'mesh: {RING}/ring.msh')
         path = self.path('none.yaml')
@@ -76,6 +81,7 @@ class Faults(Case):
         self.assertEqual(glob.glob(os.path.join(model + '.snapshots', '*')), [])
 
     def test_options(self):
+        """-hyco_newton without a history or with an unknown value, and -hyco_resume without a checkpoint are refused."""
         self.fails('solve', '-scene', PELLET, '-mu', '4.06,1', '-hyco_newton', 'tangent', words=['hyco_newton'])
         self.ring('-hyco_newton', 'secant', words=['hyco_newton', 'secant'])
         self.ring('-hyco_resume', words=['hyco_checkpoint'])
@@ -84,6 +90,7 @@ class Faults(Case):
         self.ring('-hyco_resume', '-hyco_checkpoint', self.path('not.h5'), words=['not.h5'])
 
     def test_checkpoint_of_another_point(self):
+        """A checkpoint of another point is not resumed."""
         keep = ['-hyco_checkpoint', self.path('c.h5'), '-history_times', '0,1']
         self.hyco('solve', '-scene', RING, '-mu', '0.01,1', *keep)
         self.fails('solve', '-scene', RING, '-mu', '0.011,1', *keep, '-hyco_resume', words=['c.h5', 'another'], ranks=2)

@@ -113,6 +113,7 @@ class Kill(Case):
                  'was incomplete, and writes the same model, byte for byte')
 
     def test_one_rank(self):
+        """Kills on one process: the next run continues to the same model."""
         self.check_kills(1)
 
     def test_two_ranks(self):

@@ -57,10 +57,12 @@ class Memory(FlowingRing):
         self.model('gaps', self.block(False), 'condensed', '0.021,1.7', '-values_push', '0.015,0.03', '-values_waves', '1,3', '-hyco_validation', 2)
 
     def test_types(self):
+        """Every type of model of a block: trained, predicts."""
         for kind in KINDS:
             self.model('types', self.block(True), kind, '0.021,1.7', '-values_push', '0.015,0.03', '-values_modulus', '1,2,3', '-hyco_validation', 2)
 
     def test_paths(self):
+        """Every type of model of a path: trained, predicts."""
         for kind in KINDS:
             more = {'hybrid': ['-hyco_rid_layers', 1, '-hyco_keep_singular'], 'projection': ['-hyco_keep_singular']}.get(kind, [])
             self.model('paths', self.scene('ring.yaml', NORTON, HISTORY), kind, '0.0055,0.91', '-hyco_pod_tol', '1e-8', *more,

@@ -286,6 +286,7 @@ class Meshes(Case):
         self.assertEqual({f for f in os.listdir(self.folder) if f in ('r.json', 'o.xdmf', 'o.h5') or 'partial' in f}, set(), 'a file is left')
 
     def test_meshes(self):
+        """Broken nodes, elements and groups of a mesh: each is refused in one line."""
         for what, change, text in MESHES:
             with self.subTest(what=what):
                 msh(self.path('bad.msh'), *change(self.nodes, self.elements, NAMES))
@@ -310,6 +311,7 @@ class Meshes(Case):
         ROWS.add(f'the same meshes in training ({len(broken)}), on 2 ranks', 'one line, status 1, no model')
 
     def test_together(self):
+        """Meshes and scenes that do not match each other are refused."""
         for what, mesh, scene, text in TOGETHER:
             with self.subTest(what=what):
                 msh(self.path('bad.msh'), *mesh(self.nodes, self.elements, NAMES))
@@ -318,6 +320,7 @@ class Meshes(Case):
         ROWS.add(f'meshes and scenes that are inconsistent ({len(TOGETHER)})', 'one line, status 1, no file left; every third one also on 2 or 3 ranks')
 
     def test_texts_41(self):
+        """Broken text of a mesh file of format 4.1 is refused."""
         subprocess.run(['gmsh', '-save', '-format', 'msh41', self.path('two.msh'), '-o', self.path('good.msh'), '-v', '1'], check=True,
                        timeout=30 * PATIENCE)
         with open(self.path('good.msh'), encoding='ascii') as f:
@@ -330,6 +333,7 @@ class Meshes(Case):
         ROWS.add(f'broken mesh files of format 4.1 ({len(TEXTS_41)})', 'one line, status 1, no file left; every twelfth one also on 2 or 3 ranks')
 
     def test_texts(self):
+        """Broken text of a mesh file of format 2.2 is refused."""
         with open(self.path('two.msh'), encoding='ascii') as f:
             good = f.read()
         for what, change, text in TEXTS:
@@ -340,6 +344,7 @@ class Meshes(Case):
         ROWS.add(f'broken mesh files ({len(TEXTS)})', 'one line, status 1, no file left; every third one also on 2 or 3 ranks')
 
     def test_scenes(self):
+        """Broken entries of a scene are refused."""
         for (old, new), text in SCENES:
             with self.subTest(new=new):
                 self.assertIn(old, SCENE)
@@ -348,6 +353,7 @@ class Meshes(Case):
         ROWS.add(f'broken scenes ({len(SCENES)})', 'one line, status 1, no file left; every third one also on 2 or 3 ranks')
 
     def test_one_rank_only(self):
+        """Errors that one rank alone meets end all ranks with one line."""
         runs = []
         for k, ((old, new), text) in enumerate(ONE_RANK):
             self.write(f'one{k}.yaml', SCENE.replace(old, new, 1))

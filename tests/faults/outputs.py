@@ -59,6 +59,7 @@ class Outputs(Case):
         self.assertEqual(self.content(), self.before)
 
     def test_device(self):
+        """A report and a table may be written to a device, which stays one."""
         device = self.node('null', 3)
         for command in (('predict', '-model', 'model.h5'), ('solve', '-scene', ROPE)):
             for ranks in (0, 2):
@@ -74,11 +75,13 @@ class Outputs(Case):
         self.refused(self.predict('-output', 'o.xdmf'), 'o.h5 is not a file')
 
     def test_full_device(self):
+        """A full device: the system's own words, and the device stays one."""
         device = self.node('full', 7)
         self.refused(self.predict('-report', device), 'full could not be written completely (No space left on device)')
         self.assertTrue(stat.S_ISCHR(os.stat(self.path(device)).st_mode))
 
     def test_pipe(self):
+        """A report may be written to a named pipe."""
         os.mkfifo(self.path('pipe'))
         self.addCleanup(os.remove, self.path('pipe'))
         said = []
@@ -153,6 +156,7 @@ class Outputs(Case):
         self.refused(self.predict('-options_file', 'options', '-report', './options'), '-options_file', one)
 
     def test_each_other(self):
+        """Two outputs with one file are refused, whatever the spelling of its path."""
         for options, words in ((('-output', 'o.xdmf', '-report', 'o.h5'), ('the .h5 file of -output', 'o.h5')),
                                (('-output', 'o.xdmf', '-report', './o.xdmf'), ('-output', 'are the same file'))):
             self.refused(self.predict(*options), *words)

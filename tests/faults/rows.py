@@ -1,4 +1,4 @@
-"""Rows of the table in docs/limits.md: a test leaves faults/NAME.csv under the folder where it runs; table.py reads them."""
+"""Rows of docs/limits/faults.csv: a test leaves faults/NAME.csv under the folder where it runs; table.py reads them."""
 import csv
 import os
 

@@ -1,5 +1,5 @@
-"""The table of the faults: the rows written by the tests, printed and written to faults.md; fails if the rows of a test are missing. With
---write-doc it is written into docs/limits.md, between the markers of that section:
+"""The table of the faults: the rows written by the tests, printed and written to faults.csv; fails if the rows of a test are missing. With
+--write-doc it is written into docs/limits/faults.csv:
 
   (cd build/tests && /usr/bin/python3 ../../tests/faults/table.py --write-doc)
 
@@ -12,7 +12,7 @@ import tarfile
 
 SOURCE = os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..')
 TESTS = ('kill.py', 'damage.c', 'files.py', 'meshes.py', 'faults.py', 'api.c')
-BEGIN, END = '<!-- faults: written by tests/faults/table.py --write-doc -->\n', '<!-- end of faults -->\n'
+HEAD = ('fault', 'what happens', 'test')
 
 
 def rows():
@@ -22,7 +22,7 @@ def rows():
         mine = []
         if os.path.exists(path):
             with open(path, encoding='utf-8', newline='') as f:
-                mine = [row + [f'`{test}`'] for row in csv.reader(f)]
+                mine = [row + [test] for row in csv.reader(f)]
         if not mine:
             problems.append(f'{test} left no rows: run it first (ctest -L faults)')
         found += mine
@@ -36,31 +36,29 @@ def rows():
             learned = sum(m.isfile() and m.name.startswith(f'corpus/{name}/') for m in f)
         found.append([f'fuzzing: {name}, {seconds} s, {runs} inputs',
                       f'{len(crashes)} crashes, leaks or hangs; {len(kept)} inputs are kept for every test run, which generates thousands from them; '
-                      f'{learned} for the next fuzzing run', '`scripts/fuzz`'])
+                      f'{learned} for the next fuzzing run', 'scripts/fuzz'])
     path = os.path.join(SOURCE, 'build-sanitize', 'summary')
     if os.path.exists(path):
         with open(path, encoding='ascii') as f:
             tests, verdict = f.read().strip().split(',')
         found.append([f'all tests under AddressSanitizer, UndefinedBehaviorSanitizer, LeakSanitizer: {tests}', verdict,
-                      '`scripts/sanitize`'])
+                      'scripts/sanitize'])
     return found, problems
+
+
+def write(path, found):
+    with open(path, 'w', encoding='utf-8', newline='') as f:
+        csv.writer(f, lineterminator='\n').writerows([HEAD, *found])
 
 
 def main():
     found, problems = rows()
-    text = '| fault | what happens | test |\n|---|---|---|\n'
-    text += ''.join('| ' + ' | '.join(cell.replace('|', '/') for cell in row) + ' |\n' for row in found)
-    with open('faults.md', 'w', encoding='utf-8') as f:
-        f.write(text)
-    print(text)
+    write('faults.csv', found)
+    print('\n'.join(' | '.join(row) for row in found))
     if problems:
         sys.exit('\n'.join(problems))
     if '--write-doc' in sys.argv:
-        page = os.path.join(SOURCE, 'docs', 'limits.md')
-        with open(page, encoding='utf-8') as f:
-            before, rest = f.read().split(BEGIN)
-        with open(page, 'w', encoding='utf-8') as f:
-            f.write(before + BEGIN + text + END + rest.split(END)[1])
+        write(os.path.join(SOURCE, 'docs', 'limits', 'faults.csv'), found)
 
 
 if __name__ == '__main__':

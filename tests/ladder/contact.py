@@ -43,6 +43,7 @@ class Contact(Program):
         self.assertEqual(self.disk(SPHERE.replace('radius: 0.8', 'radius: 0.7'))[0], 0)
 
     def test_refused(self):
+        """Wrong entries of the registered contact: the message names the entry and the nearest known name."""
         for contact, *words in (
                 (SPHERE.replace('type: sphere', 'type: spere'), 'contact disk', 'obstacle, pair, rigid, sphere or surface', 'did you mean sphere?'),
                 (SPHERE + ', gap: 1', 'contact_disk_gap', 'centre_x'),

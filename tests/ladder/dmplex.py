@@ -28,6 +28,7 @@ class DMPlex(Program):
         return numbers
 
     def test_as_a_file(self):
+        """A program's DMPlex, distributed or not, gives the numbers of the file on 1 to 3 ranks."""
         msh(self.path('square.msh'), *square(8))
         expected = self.hyco('solve', '-scene', self.box(', mesh: square.msh'))
         scene = self.box()
@@ -51,6 +52,7 @@ class DMPlex(Program):
         self.near(three[2], alone[2], 1e-9)
 
     def test_refused(self):
+        """A group that the DMPlex does not have is named."""
         for ranks in (0, 2):
             self.refused(['no group "lift"'], self.box(), '-dm_plex_dim', '2', '-dm_plex_simplex', '0', '-dm_plex_box_faces', '4,4',
                          '-fixed_lift_x', '0', ranks=ranks)

@@ -16,6 +16,7 @@ class Errors(Case):
         return subprocess.run(command, cwd=self.folder, env={**os.environ, **environment}, capture_output=True, text=True, timeout=60 * PATIENCE)
 
     def test_one_line(self):
+        """Each error of a program is one line."""
         for what, words in ERRORS.items():
             run = self.run_program(what)
             self.assertEqual(run.returncode, 1, what)
@@ -34,6 +35,7 @@ class Errors(Case):
             self.assertNotIn('PETSC ERROR', run.stderr)
 
     def test_trace(self):
+        """HYCO_TRACE=1 prints PETSc's trace with the line of the error."""
         run = self.run_program('range', HYCO_TRACE='1')
         self.assertNotEqual(run.returncode, 0)
         self.assertIn('HycoFOMSolve() at ', run.stderr)
@@ -44,6 +46,7 @@ class Errors(Case):
         self.assertEqual([line for line in done.stderr.splitlines() if line.startswith('hyco: ')][0].count(ERRORS['range']), 1)
 
     def test_fine(self):
+        """A program without an error ends with status 0."""
         self.assertEqual(self.run_program('nothing').returncode, 0)
 
 

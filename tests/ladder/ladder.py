@@ -44,6 +44,7 @@ class Ladder(Case):
                     self.fail(f'{name}: an unchecked call: {line}')
 
     def test_solve(self):
+        """solve.c: the numbers of hyco solve."""
         report = self.hyco('solve', '-scene', ROPE, '-mu', '0.07,0.17')
         said = self.step('solve', '-scene', ROPE, '-mu', '0.07,0.17')
         self.assertIn(f'converged: {report["n_active"]} of {report["n_contacts"]} contacts closed', said)
@@ -57,6 +58,7 @@ class Ladder(Case):
         self.assertEqual(said.count(line), 1, said)
 
     def test_train(self):
+        """train.c: the numbers of hyco train and predict."""
         said = self.step('train', '-scene', ROPE, '-model', 'c.h5', '-mu', '0.07,0.17')
         trained = self.hyco('train', '-scene', ROPE, '-grid', '6,6', '-model', 'm.h5', status=None)
         report = self.hyco('predict', '-model', 'm.h5', '-mu', '0.07,0.17')
@@ -66,6 +68,7 @@ class Ladder(Case):
         self.assertAlmostEqual(self.number(said, 'estimated error of u'), report['estimated_error_u'], delta=1e-12 + 0.06 * report['estimated_error_u'])
 
     def test_batch(self):
+        """batch.c: the forces of single predictions."""
         model = os.path.join(SOURCE, 'tests', 'data', 'rope-hybrid-4.h5')
         said = self.step('batch', '-model', model, '-points', 5)
         rows = re.findall(r'^(\S+),(\S+): converged, force (\S+), largest (\S+)$', said, flags=re.M)
@@ -78,7 +81,24 @@ class Ladder(Case):
                 self.near(float(force), float(row['total_contact_force']), 1e-6)
                 self.near(float(largest), float(row['lambda_max']), 1e-6)
 
+    def test_sensitivity(self):
+        """sensitivity.c: the derivatives are the differences of single predictions."""
+        model = os.path.join(SOURCE, 'tests', 'data', 'rope-hybrid-4.h5')
+        said = self.step('sensitivity', '-model', model, '-mu', '0.1,0.1')
+        ranges = {'mu1': 0.2, 'mu2': 0.55}
+        points = [(0.1, 0.1)]
+        for k, width in enumerate(ranges.values()):
+            points += [tuple(0.1 + sign * 1e-3 * width * (j == k) for j in range(2)) for sign in (-1, 1)]
+        force = [self.hyco('predict', '-model', model, '-mu', f'{a!r},{b!r}')['total_contact_force'] for a, b in points]
+        self.near(self.number(said, 'force'), force[0], 1e-9)
+        for k, (name, width) in enumerate(ranges.items()):
+            derivative = (force[2 + 2 * k] - force[1 + 2 * k]) / (2e-3 * width)
+            self.assertGreater(abs(derivative), 1e-3)
+            self.assertAlmostEqual(self.number(said, f'{name}: derivative'), derivative, delta=1e-6)
+        self.assertEqual(len(re.findall(r'most at node \d+$', said, flags=re.M)), 2, said)
+
     def test_distributed(self):
+        """distributed.c: each rank's share, and the numbers of one rank."""
         report = self.hyco('solve', '-scene', PELLET, '-mu', '4.06,1')
         said = self.step('distributed', '-scene', PELLET, '-mu', '4.06,1', ranks=2)
         owned = [(int(a), int(b)) for a, b in re.findall(r'rows (\d+) to (\d+)', said)]

@@ -73,6 +73,7 @@ class Material(Program):
                 self.assertLess(abs(a - b), 1e-9 * max(map(abs, elastic)))
 
     def test_refused(self):
+        """Wrong entries of the registered law: the message names the entry and the nearest known name."""
         for body, *words in (
                 ('law: cubc, c11: 1', 'block', 'cubc', 'cubic, elastic', 'did you mean cubic?'),
                 ('law: cubic, c11: 1, c12: 0.1, young: 3', 'body_block_young', 'c11, c12, c44'),

@@ -19,6 +19,7 @@ class Method(Program):
         return reason, method, force
 
     def test_against_the_others(self):
+        """The registered method gives the forces of the default one, on 1 and 2 ranks."""
         _, _, force = self.step()
         for ranks in (0, 2):
             reason, method, its_force = self.step(*PROJECTED, ranks=ranks)
@@ -26,6 +27,7 @@ class Method(Program):
             self.assertLess(abs(its_force - force), 1e-9 * force)
 
     def test_falling_back(self):
+        """A registered method that does not converge is followed by the active set."""
         reason, method, _ = self.step(*PROJECTED, '-hyco_tao_max_it', '1')
         self.assertEqual((reason, method), ('converged by the fallback solver', 'tao projected dual, then active_set'))
 
@@ -44,6 +46,7 @@ class Method(Program):
                     self.assertRegex(out, r'Residual: ')
 
     def test_what_the_program_does_not_register(self):
+        """An unknown type of Tao is named."""
         self.refused(['projectd'], '-scene', BLOCKS, '-mu', '0.05,0.06', '-hyco_solver_type', 'tao', '-hyco_tao_type', 'projectd')
 
 

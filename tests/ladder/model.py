@@ -14,6 +14,7 @@ class Model(Program):
         return self.solve(ROPE, self.path('nearest.h5'), *mu, ranks=ranks)
 
     def test_model(self):
+        """The registered type of model is trained, saved, loaded and predicts."""
         first = self.nearest(0.07, 0.17)
         force, complementarity, adhesion, u, sigma, forces, estimated = first
         self.assertGreater(force, 0)
@@ -30,6 +31,7 @@ class Model(Program):
         self.assertLess(at[3], u)
 
     def test_refused(self):
+        """The command refuses a model of a type that only the program registers."""
         self.nearest(0.07, 0.17)
         run = self.run_raw('predict', '-model', self.path('nearest.h5'), '-mu', '0.07,0.17')
         self.assertNotEqual(run.returncode, 0)

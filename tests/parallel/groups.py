@@ -48,6 +48,7 @@ class Groups(Case):
                 self.assertLess(max(mine), 1.25 * sum(mine) / each)
 
     def test_monitor(self):
+        """-hyco_groups_monitor prints the points of each group, as the report counts them."""
         run = self.run_raw('train', '-scene', PELLET, *POINTS, '-hyco_groups', 2, '-hyco_groups_monitor', '-model', 'm.h5', ranks=2)
         self.assertEqual(run.returncode, 0, run.stderr)
         found = self.events(run.stdout)

@@ -31,6 +31,7 @@ class Models(Case):
                 self.same(f'{tag}_{kind}', scene, mu, '-hyco_model_type', kind, *points, snapshots=tag)
 
     def test_pellet(self):
+        """Every type of model on the pellet."""
         self.types('pellet', PELLET, '4.07,0.9', '-values_radius', '4.02,4.06,4.1', '-values_load', '0.4,1')
 
     def test_pellet_from_nothing(self):
@@ -41,9 +42,11 @@ class Models(Case):
                   '0,0.25,0.5,0.75,1', others=(2, 3))
 
     def test_rope(self):
+        """Every type of model on the rope."""
         self.types('rope', ROPE, '0.07,0.17', '-grid', '4,4')
 
     def test_blocks(self):
+        """Every type of model on the blocks."""
         self.types('blocks', BLOCKS, '0.055,0.06', '-grid', '3,3')
 
 

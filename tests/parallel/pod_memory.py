@@ -53,6 +53,7 @@ class PodMemory(Case):
         self.same(self.train('rings.h5', 0, *ring, store='paths'), self.train('streamed.h5', 0.5, *ring, store='paths'))
 
     def test_too_little(self):
+        """A limit too small for one solution, or with a type that needs all columns, is refused."""
         for words in (('-hyco_pod_memory', 1), ('-hyco_pod_memory', 50, '-hyco_pod_svd_type', 'cross')):
             run = self.run_raw('train', *POINTS, *words, '-hyco_snapshots', 'store', '-model', 'no.h5', ranks=2)
             self.assertEqual(run.returncode, 1, run.stderr)

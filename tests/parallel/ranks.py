@@ -25,9 +25,11 @@ class Ranks(Case):
                 self.solved(r)
 
     def test_solve_rope(self):
+        """Full order on the rope."""
         self.same_solve(ROPE, '0.07,0.17')
 
     def test_solve_pellet(self):
+        """Full order on the pellet."""
         self.same_solve(PELLET, '4.06,1')
 
     def test_fields(self):
@@ -58,13 +60,16 @@ class Ranks(Case):
                     self.assertTrue(np.array_equal(array[name], arrays[0][name]), name)
 
     def test_train_rope(self):
+        """Training on the rope, by several groups of ranks."""
         self.same_training(ROPE, ('-grid', '6,8'), '0.07,0.17', [(1, 0), (2, 0), (3, 0), (4, 0), (2, 1), (4, 2)])
 
     def test_train_pellet(self):
+        """Training on the pellet, by several groups of ranks."""
         self.same_training(PELLET, ('-values_radius', '4.03,4.05,4.08', '-values_load', '0.4,0.7,1'), '4.06,1',
                            [(1, 0), (2, 0), (3, 0), (4, 0), (2, 1), (4, 1)])
 
     def test_compare(self):
+        """hyco compare on 1 and 3 ranks."""
         self.hyco('train', '-scene', ROPE, '-grid', '5,6', '-model', 'c.h5')
         a, b = (self.hyco('compare', '-scene', ROPE, '-model', 'c.h5', '-grid', '7,5', ranks=r) for r in (1, 3))
         for key in ('error_u', 'error_lambda', 'error_sigma'):

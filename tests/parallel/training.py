@@ -40,6 +40,7 @@ class Training(Case):
         self.same('near', BLOCKS, '-grid', '3,3', '-hyco_validation', 0, '-hyco_rid_contact_extension', 4, '-hyco_rid_layers', 2)
 
     def test_moved(self):
+        """Training on moved bodies."""
         self.same('roller', os.path.join(EXAMPLES, 'roller'), '-values_place', '-1,0.1,0.7', '-values_press', '0.5', '-values_modulus', '10',
                   '-hyco_validation', 2, '-hyco_keep_singular', '-hyco_rid_layers', 1)
 

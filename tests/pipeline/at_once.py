@@ -63,9 +63,11 @@ class AtOnce(Case):
             self.assertEqual((self.content('a.h5'), self.content('b.h5')), alone)
 
     def test_search(self):
+        """Two searches for settings at once that share their solutions."""
         self.both((*TARGETS, '-model', 'm.h5'), (*TARGETS, '-model', 'm.h5'))
 
     def test_one_report(self):
+        """Two predictions at once into the same report and output."""
         self.hyco(*TRAIN, '-model', 'm.h5')
         predict = ('predict', '-model', 'm.h5', '-mu', '0.07,0.17', '-report', 'r.json', '-output', 'o.xdmf')
         for _ in range(3):

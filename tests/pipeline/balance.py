@@ -1,6 +1,7 @@
 """Reactions of models that follow from balance: with the contact forces and the loads of their bodies they sum to zero, as those of full order do; of
 types other than condensed, if contact acts only between the bodies."""
 import os
+import subprocess
 import sys
 import unittest
 
@@ -69,7 +70,7 @@ class Balance(Case):
         """At unseen points, in the plane, around an axis and in space; the error is that of the contact force."""
         for space, kind in (('plane', 'hybrid'), ('plane', 'condensed'), ('ring', 'hybrid'), ('ring', 'condensed'), ('space', 'hybrid'), ('space', 'condensed')):
             scene = self.scene(space)
-            self.hyco('train', '-scene', scene, '-grid', '3,3', '-model', 'm.h5', '-hyco_model_type', kind, '-hyco_snapshots', space,
+            self.hyco('train', '-scene', scene, '-grid', '3,3', '-grid_type', 'centred', '-model', 'm.h5', '-hyco_model_type', kind, '-hyco_snapshots', space,
                       *(('-hyco_pod_tol', 1e-4, '-hyco_rid_layers', 1) if kind == 'hybrid' else ()))
             for press, load in ((0.033, 1.7), (0.055, 2.6)):
                 with self.subTest(space=space, kind=kind, press=press):
@@ -123,7 +124,7 @@ class Balance(Case):
                                 (('fixed: {', 'fixed: {corner: {normal: 0, direction: {x: 1, y: 0}}, '), ('push', 'both', 'hold')))):
             with self.subTest(change=change[1]):
                 scene = self.scene('plane', [change])
-                self.hyco('train', '-scene', scene, '-grid', '3,3', '-model', f'{k}.h5', '-hyco_model_type', 'condensed')
+                self.hyco('train', '-scene', scene, '-grid', '3,3', '-grid_type', 'centred', '-model', f'{k}.h5', '-hyco_model_type', 'condensed')
                 at = ('-mu', '0.033,1.7')
                 full, model = self.hyco('solve', '-scene', scene, *at)['outputs'], self.hyco('predict', '-model', f'{k}.h5', *at)['outputs']
                 for name in ('hold', 'push', 'both'):
@@ -133,6 +134,31 @@ class Balance(Case):
         part = self.hyco('predict', '-model', 'part.h5', *at, '-hyco_reconstruct', 'false')['outputs']
         self.assertIsNone(part['carry'])
         self.near(part['both'], full['both'], 1e-9)
+
+    def test_floating(self):
+        """A key between two bodies that hold it by contact alone, with a shaft and a hub that move: the contact forces on it carry its load, and sum to
+        zero along the free direction, whatever the errors of the model are; without the forces outside the RID nothing is balanced."""
+        drawn = os.path.join(SOURCE, 'tests', 'drawn', 'keyway')
+        os.makedirs(self.path('key'), exist_ok=True)
+        with open(os.path.join(drawn, 'scene.yaml'), encoding='utf-8') as f, open(self.path('key/scene.yaml'), 'w', encoding='utf-8') as g:
+            g.write(f.read() + ''.join(f'  {name}_x: {{force: x, contact: {name}}}\n' for name in ('shaft_r', 'shaft_l', 'hub_r', 'hub_l')))
+        subprocess.run(['gmsh', '-2', os.path.join(drawn, 'keyway.geo'), '-format', 'msh41', '-v', '1', '-o', self.path('key/keyway.msh')], check=True)
+        for ranks in (0, 2):  # without a load and a shift nothing determines the position of the key
+            run = self.run_raw('solve', '-scene', 'key', '-mu', '0,0.01,0.01,0', '-parameter_shift_range', '0,0.2', ranks=ranks)
+            self.assertEqual(run.returncode, 0, run.stderr)
+            self.assertIn('warning: no contact force keeps body key from', run.stdout)
+            self.assertEqual(self.hyco('solve', '-scene', 'key', '-mu', '0.1,0.004,0.004,700', ranks=ranks)['loose'], '')
+        for kind, settings, ranks in (('hybrid', ('-hyco_pod_tol', 1e-4, '-hyco_rid_layers', 1), 0),
+                                      ('hybrid', ('-hyco_pod_tol', 1e-4, '-hyco_rid_layers', 1), 2), ('regression', (), 0)):
+            self.hyco('train', '-scene', 'key', '-grid', '2,2,1,3', '-model', 'key.h5', '-hyco_model_type', kind, '-hyco_validation', 0,
+                      '-hyco_snapshots', 'key.snapshots', *settings, ranks=ranks)
+            for mu in ('0.1,0.004,0.004,700', '0.19,0.001,0.009,1400', '0.07,0.009,0.002,100'):
+                with self.subTest(kind=kind, ranks=ranks, mu=mu):
+                    at = self.hyco('predict', '-model', 'key.h5', '-mu', mu)
+                    found, force = at['outputs'], at['total_contact_force']
+                    self.assertGreater(force, 10)
+                    self.near(found['floor_y'] + found['ceiling_y'], float(mu.split(',')[3]), 1e-9)
+                    self.assertLess(abs(sum(found[name + '_x'] for name in ('shaft_r', 'shaft_l', 'hub_r', 'hub_l'))), 1e-9 * force)
 
 
 if __name__ == '__main__':

@@ -17,7 +17,7 @@ class Batch(Case):
 
     def test_pieces(self):
         """Rows that several ranks hold and write, whatever pieces they took: the CSV of one rank, also where full order replaces some."""
-        self.run_raw('train', '-scene', ROPE, '-grid', '3,4', '-hyco_validation', 12, '-hyco_model_type', 'hybrid', '-model', 'p.h5')  # misses the default target
+        self.run_raw('train', '-scene', ROPE, '-grid', '3,4', '-grid_type', 'centred', '-hyco_validation', 12, '-hyco_model_type', 'hybrid', '-model', 'p.h5')  # misses the default target
         predict = ('predict', '-model', 'p.h5', '-scatter', 300)
         self.hyco(*predict, '-table', 'one.csv')
         estimates = sorted(float(row['estimated_error_u']) for row in self.rows('one.csv'))
@@ -35,6 +35,7 @@ class Batch(Case):
                         np.testing.assert_allclose(float(here[name]), float(value), rtol=1e-6, atol=1e-8, err_msg=f'{name} of row {k}')
 
     def test_table(self):
+        """The table of a grid is the same on any number of ranks, and in HDF5."""
         self.hyco('train', '-scene', ROPE, '-grid', '3,4', '-model', 'r.h5')
         predict = ('predict', '-model', 'r.h5', '-grid', '40,25')
         self.hyco(*predict, '-table', 't.csv')

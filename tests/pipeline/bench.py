@@ -1,4 +1,4 @@
-"""scripts/bench-full-order and scripts/bench-history on mesh A: the CSV, the picture, the problem passed to other solvers, and the behaviour when
+"""scripts/bench-full-order, bench-history and bench-solvers: the CSV, the picture, the problem passed to other solvers, and the behaviour when
 a command fails or takes too long."""
 import csv
 import importlib.machinery
@@ -28,6 +28,7 @@ def load(script=SCRIPT):
 
 class Bench(Case):
     def test_mesh_a(self):
+        """scripts/bench-full-order on mesh A: its rows, picture and document."""
         run = subprocess.run([sys.executable, SCRIPT, '--meshes', 'A', '--others', 'A', '--repeat', '1',
                               '--timeout', str(60 * PATIENCE), '--output', self.folder], cwd=SOURCE, capture_output=True, text=True, timeout=180 * PATIENCE)
         self.assertEqual(run.returncode, 0, run.stdout + run.stderr)
@@ -47,6 +48,18 @@ class Bench(Case):
         with open(self.path('full-order.png'), 'rb') as file:
             self.assertEqual(file.read(8), b'\x89PNG\r\n\x1a\n')
         self.assertIn('mesh A: hyco factor per iteration takes', run.stdout)
+
+    def test_solvers(self):
+        """scripts/bench-solvers on a sparse and a redundant system: a row each, which every method for symmetric systems solves."""
+        run = subprocess.run([sys.executable, os.path.join(SOURCE, 'scripts', 'bench-solvers'), '--only', 'blocks,dependent rows'],
+                             capture_output=True, text=True, timeout=180 * PATIENCE)
+        self.assertEqual(run.returncode, 0, run.stdout + run.stderr)
+        rows = [line.strip('|').split(' | ') for line in run.stdout.splitlines() if line.startswith('|')]
+        self.assertEqual([row[0].split(':')[0].strip() for row in rows[2:5]], ['blocks', 'dependent rows', 'solved'])
+        for row in rows[2:4]:
+            for method, cell in zip(rows[0][2:7], row[2:7]):  # the first-order and semismooth types are not promised on every machine
+                self.assertLess(float(cell.split(', ')[2]), 1e-8, (row[0], method))
+        self.assertEqual(rows[4][2], '2 of 2')
 
     def test_problem(self):
         """Sums of the loads for other solvers: pressure times the projected area of the cladding, or the top's polygon."""
@@ -88,6 +101,7 @@ class Bench(Case):
         self.assertEqual(lines.count('*STEP') + lines.count('*STEP, INC=61'), 2)
 
     def test_failures(self):
+        """Runs that take too long or fail are rows of the table, with the reason."""
         bench = load()
         bench.timed.folder = self.folder
         begin = time.monotonic()

@@ -142,6 +142,7 @@ class Carried(Case):
         self.assertTrue(np.isnan(table['under.force_y']).all())
 
     def test_refused(self):
+        """Outputs with a wrong contact, group or quantity: the message lists the valid ones."""
         for outputs, said in (('{a: {force: y, contact: roof}}', 'the contacts of the scene are: '), ('{a: {force: y, group: low}}', 'write contact: NAME'),
                               ('{a: {max: mises, contact: wall}}', 'give a group instead'), ('{a: {force: z}}', 'no force along z'), ('{a: {moment: x}}', 'use z'),
                               ('{a: {min: contact_pressure}}', 'only the largest'), ('{a: {force: up}}', 'one of x, y and z'), ('{a: {contact: wall}}', 'has no field')):

@@ -39,7 +39,7 @@ class Choices(Case):
 
     @classmethod
     def train(cls, model, *options):
-        return cls.hyco('train', '-scene', ROPE, '-grid', '10,12', '-model', model, *SNAPSHOTS, *options)
+        return cls.hyco('train', '-scene', ROPE, '-grid', '10,12', '-grid_type', 'centred', '-model', model, *SNAPSHOTS, *options)
 
     def cells(self, model):
         with h5py.File(self.path(model)) as f:
@@ -138,7 +138,7 @@ class Choices(Case):
     def check_scan(self, *options):
         """What the scan reports is what numpy finds at its points; only a model that is regular on them is written."""
         options = (*options, '-hyco_scan', 51)
-        run = self.run_raw('train', '-scene', ROPE, '-grid', '10,12', *SNAPSHOTS, *options, '-model', 'h.h5')
+        run = self.run_raw('train', '-scene', ROPE, '-grid', '10,12', '-grid_type', 'centred', *SNAPSHOTS, *options, '-model', 'h.h5')
         t = self.train('kept.h5', *options, '-hyco_keep_singular')
         mu1 = np.linspace(0.05, 0.25, 51)
         sign, ratio = np.array([self.scanned('kept.h5', v) for v in mu1]).T
@@ -158,6 +158,7 @@ class Choices(Case):
         return t, others
 
     def test_scan(self):
+        """The scan for full-order unknowns, for each kind of hybrid."""
         for hybrid in ('all', 'rank'):
             self.assertEqual(self.check_scan('-hyco_hybrid', hybrid, '-hyco_hybrid_trials', 20)[1], 0)
 

@@ -165,6 +165,7 @@ class Condensed(Case):
         self.assertEqual(*tables)
 
     def test_refused(self):
+        """Scenes and options that condensed models do not support are refused."""
         with open(self.path('points.csv'), 'w', encoding='utf-8') as f:
             f.write('radius,load\n4.02,0.5\n4.05,1\n4.1,0.5\n')
         train = ('train', *TYPE, '-model', 'no.h5', '-scene')

@@ -184,11 +184,13 @@ class Given(Case):
         return sum(e >= t for e, t in pairs) / len(pairs), statistics.median(e / t for e, t in pairs)
 
     def test_estimates_3d(self):
+        """Error estimates of a brick in 3D bound its errors."""
         self.bounded(self.brick(), ('place', 'depth', 'soft', 'fill'), ((0.6, 1.4), (0.01, 0.05), (0.3, 3), (0.1, 0.4)),
                      '-values_place', '0.6,1.4', '-values_depth', '0.01,0.05', '-values_soft', '0.3,0.6,1.2,2,3', '-values_fill',
                      '0.1,0.2,0.3,0.4')
 
     def test_estimates_2d(self):
+        """Error estimates of a beam in 2D bound its errors."""
         self.bounded(self.beam(), ('height', 'modulus', 'push'), ((0.8, 1.2), (1, 3), (1, 2)), '-values_height',
                      '0.8,0.9,1,1.1,1.2', '-values_modulus', '1,1.4,1.9,2.4,3', '-values_push', '1,2')
 

@@ -98,7 +98,7 @@ class CondensedPaths(Ring):
 
     def test_refused(self):
         """Unsupported features are refused in one line."""
-        line = ['train', '-model', self.path('no.h5'), '-grid', '3,1', *CONDENSED, '-hyco_snapshots']
+        line = ['train', '-model', self.path('no.h5'), '-grid', '3,1', '-grid_type', 'centred', *CONDENSED, '-hyco_snapshots']
         yields = self.scene('yields.yaml', J2)
         stiff = self.altered('stiff.yaml', NORTON, HISTORY, ('core: {young: 1e5', 'core: {young: 1e5*push'))
         aging = self.altered('aging.yaml', NORTON, HISTORY, ('core: {young: 1e5', 'core: {young: 1e5*(1 + 0.01*t)'))

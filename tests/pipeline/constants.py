@@ -32,6 +32,7 @@ class Constants(Case):
         self.near(changed['strain_energy'], 2 * found[0][0], 1e-9, 'energy')
 
     def test_refused(self):
+        """Circular constants, and those with the name of a parameter or a variable, are refused."""
         for old, new, text in (('thousand: 10^3', 'thousand: soft', 'must not be circular'), ('one: "x < 1e9 ? 1 : 2"', 'press: 1', 'name of a parameter'),
                                ('one: "x < 1e9 ? 1 : 2"', 'one: y*nothing', 'nothing, which is unknown'), ('thousand: 10^3', 'x: 3', 'cannot name a constant'),
                                ('foundation_base: {y: 0}', 'foundation_base: {y: 0}\n  "foundation_base,block_top": {y: 0}', 'remove one of them')):

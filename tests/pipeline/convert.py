@@ -134,6 +134,7 @@ class Convert(Case):
                     self.assertAlmostEqual(report['loads']['force'][c], push[c] + (6 * volume if c == 0 else 0), places=12)
 
     def test_flat(self):
+        """An Abaqus .inp in 2D: its sets as groups."""
         self.assertEqual(self.convert('flat.inp', FLAT),
                          {'ALL': (2, 'quad4'), 'FIRST': (1, 'quad4'), 'FOOT': (2, 'line2'), 'TOP': (2, 'line2'), '_OUTER_SKIN_': (6, 'line2'),
                           'CORNER': (1, 'point1'), 'TWO': (1, 'line2'), 'SOME': (2, 'point1')})
@@ -154,6 +155,7 @@ class Convert(Case):
         self.near(report['u_min'][1], -0.02, 1e-10, 'the top')
 
     def test_unv(self):
+        """A .unv in 3D, scaled: its groups, and the volume of the scene."""
         self.assertEqual(self.convert('cube.unv', UNV, '--scale', '10'),
                          {'the_cube': (1, 'hex8'), 'floor': (1, 'quad4'), 'right': (1, 'quad4'), 'roof': (3, 'point1')})
         report = self.checked('scene: {mesh: m.msh, parameters: [p]}\nparameter: {p: {range: [1, 2]}}\nbody: {the_cube: {young: 7}}\n'
@@ -196,6 +198,7 @@ class Convert(Case):
         self.assertEqual(report['cell_types'], {'tri3': 2, 'quad4': 1})
 
     def test_refused(self):
+        """Elements and files that cannot be converted are named."""
         for name, text, words in (('a.inp', FLAT.replace('CPE4', 'C3D15'), 'elements of type C3D15'), ('g.inp', FLAT.replace('CPE4', 'CPE8R'), 'element 1 of type CPE8R has 4 nodes; 8 are expected'), ('b.inp', '*Heading\n', 'has no cells'),
                                   ('c.inp', FLAT.replace('1, 1, 2, 5, 4', '1, 1, 2, 5, 44'), 'is not as such a file should be'),
                                   ('d.inp', PARTS.replace(' 0., 1.', ' 0., 1.\n 0,0,0,0,0,1,90'), 'is rotated'),
@@ -206,6 +209,7 @@ class Convert(Case):
 
     @unittest.skipIf(importlib.util.find_spec('meshio'), 'meshio is here: tests/ecosystem reads by it')
     def test_without_meshio(self):
+        """Without meshio the message says how to install it."""
         self.assertIn('pip install meshio', self.convert('a.vtu', '<VTKFile/>', status=1))
 
 

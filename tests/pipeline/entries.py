@@ -61,6 +61,7 @@ class Entries(Case):
             self.assertEqual(self.run_raw('view', '-scene', os.path.join(SOURCE, 'examples', example)).returncode, 0)
 
     def test_too_many(self):
+        """More parameters or loads than a scene may have are refused."""
         names = [f'p{k}' for k in range(33)]
         self.write(self.text.replace('[crown, press]', f'[{", ".join(names)}]'))
         self.refused('lists 33 parameters; a scene has at most 32')

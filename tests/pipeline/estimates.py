@@ -143,6 +143,7 @@ class Estimates(Case):
         self.assertTrue(p['full_order'])
 
     def test_complaints(self):
+        """Options of targets and fallback that lack another one are refused."""
         for args, words in ((('-target_u', 0.1), 'give -hyco_fallback too'), (('-hyco_fallback',), 'give its -scene'),
                             (('-hyco_fallback', '-scene', ROPE, '-target_u', 0), 'a relative error above 0 and at most 1'),
                             (('-hyco_fallback', '-scene', ROPE, '-target_lambda', 2), 'a relative error above 0 and at most 1'),

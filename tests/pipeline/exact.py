@@ -21,6 +21,7 @@ class Exact(Case):
         self.same(ROPE, 'r.h5', '-grid', '4,5')
 
     def test_pellet_all(self):
+        """The pellet with the whole mesh as RID and all contact unknowns: the full order."""
         t = self.hyco('train', '-scene', PELLET, '-values_radius', '4.02,4.10', '-values_load', '0.5,1', '-model',
                       'p.h5', '-hyco_hybrid', 'all', *WHOLE)
         self.assertEqual(t['rid_fraction'], 1)

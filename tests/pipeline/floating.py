@@ -57,6 +57,7 @@ class Block(Case):
         self.near(r['total_contact_force'], WIDTH * 100, 1e-10)
 
     def test_taken_away(self):
+        """A load that lifts a floating body is refused, and no file is left."""
         run = self.run_raw('solve', '-scene', self.scene(PAIR), '-mu', '0.04,-1', '-output', 'no.xdmf')
         self.assertEqual(run.returncode, 1)
         self.assertIn('a body is held by contact only, and this load lifts it off; no support keeps body block from moving '
@@ -64,11 +65,13 @@ class Block(Case):
         self.assertFalse(os.path.exists(self.path('no.h5')))
 
     def test_other_types(self):
+        """Methods that cannot solve for floating bodies name the one that can."""
         run = self.run_raw('solve', '-scene', self.scene(PAIR), '-mu', '0.04,100', '-hyco_solver_type', 'lemke')
         self.assertEqual(run.returncode, 1)
         self.assertIn('use -hyco_solver_type active_set', run.stderr)
 
     def test_held_by_nothing(self):
+        """A body with neither support nor contact is named."""
         for ranks in (1, 2):
             run = self.run_raw('solve', '-scene', self.scene(OBSTACLE), '-mu', '0.04,100', ranks=ranks)
             self.assertNotEqual(run.returncode, 0)
@@ -117,6 +120,7 @@ class Units(Case):
     """A column under its weight: rho g h^2 / (2 E) is the displacement of its top."""
 
     def test_displacements(self):
+        """Displacements of a body under its weight do not depend on the units."""
         grid = Grid()
         grid.box('quad4', [np.linspace(0, 1, 3), np.linspace(0, 4, 9)], lambda x: x, 'column', {'y0': 'base', 'y1': 'top'})
         self.written('scene: {mesh: mesh.msh, parameters: [rho]}\nparameter: {rho: {range: [0, 1e12]}}\nbody: {column: {young: 100, poisson: 0, density: rho}}\n'
@@ -136,6 +140,7 @@ class Pellet(Case):
     """The pellet without its z-symmetry condition, on a table instead; its cladding keeps the condition."""
 
     def test_table(self):
+        """The pellet on a table, held by contact alone."""
         geo, mesh = self.path('table.geo'), self.path('table.msh')
         with open(os.path.join(PELLET, 'pellet.geo'), encoding='ascii') as file:
             text = file.read()

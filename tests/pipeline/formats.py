@@ -44,9 +44,11 @@ class Formats(Case):
                 self.near(r['u_min'][1], -0.15, 1e-12)
 
     def test_rope(self):
+        """The rope's mesh in each format."""
         self.same(ROPE, os.path.join(ROPE, 'rope.msh'), '0.07,0.17')
 
     def test_pellet(self):
+        """The pellet's mesh in each format."""
         self.same(PELLET, os.path.join(PELLET, 'A.msh'), '4.06,1')
 
 

@@ -112,6 +112,7 @@ class History(Case):
             self.near(report['total_contact_force'], found[0][0]['total_contact_force'], 1e-9)
 
     def test_series_and_table(self):
+        """The series of fields of a path and its table have the report's numbers."""
         report, fields = self.ring('series', '-table', self.path('t.csv'))
         grids = ET.parse(self.path('series.xdmf')).getroot().findall('.//Grid[@CollectionType="Temporal"]/Grid')
         self.assertEqual([float(g.find('Time').get('Value')) for g in grids], [0, 1, 3, 8])

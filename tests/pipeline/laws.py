@@ -81,6 +81,7 @@ class Laws(Case):
             self.refused(*words, body=MFRONT, options=('-body_block_law_library', name))
 
     def test_behaviours(self):
+        """Shared libraries without the behaviour, of another version or hypothesis are refused."""
         for name, word in (('Nothing', 'Nothing_mfront_interface'), ('Old', 'version 0'), ('Other', 'Cyrano')):
             self.refused('block', word, body=MFRONT, options=('-body_block_law_behaviour', name))
         self.refused('the rate is negative', body=MFRONT, options=('-body_block_law_A', '-1'))
@@ -88,6 +89,7 @@ class Laws(Case):
         self.refused('body_block_law_B', 'A', body=MFRONT, options=('-body_block_law_B', '1'))
 
     def test_refused(self):
+        """Laws without a history, with wrong constants, or without a temperature are refused."""
         self.refused('block', 'norton', 'history', body=NORTON, history='', options=('-traction_x1_x', '1',
                                                                                       '-traction_y1_x', '1'))
         self.refused('body_block_law_rate', 'negative', body=NORTON, options=('-body_block_law_rate', '1e-6*(1 - t)'))
@@ -107,6 +109,7 @@ class Laws(Case):
         self.fields(BOTH + ', element: standard', kind='tri3')
 
     def test_ranks(self):
+        """Bodies with laws on 2 and 4 ranks: the fields of one."""
         one = self.fields(BOTH, 'hex8', 3, n=4)
         for ranks in (2, 4):
             self.same(one[1:], self.fields(BOTH, 'hex8', 3, n=4, ranks=ranks)[1:], 1e-9)

@@ -192,7 +192,7 @@ output: {wall: {reaction: x, group: side}, low: {min: u_y}}
         scene = self.written(self.CONTACT, self.pair())
         for kind, bound in (('hybrid', 0.02), ('projection', 0.01), ('condensed', 5e-3)):
             with self.subTest(kind=kind):
-                self.hyco('train', '-scene', scene, '-grid', '5,4', '-model', 'm.h5', '-hyco_model_type', kind, '-hyco_pod_tol', 1e-11,
+                self.hyco('train', '-scene', scene, '-grid', '5,4', '-grid_type', 'centred', '-model', 'm.h5', '-hyco_model_type', kind, '-hyco_pod_tol', 1e-11,
                           *(('-hyco_rid_layers', 1, '-hyco_rid_modes', 'displacement,stress,force,dual') if kind == 'hybrid' else ()))
                 found = self.hyco('compare', '-scene', scene, '-model', 'm.h5', '-grid', '3,4')
                 self.assertLess(found['error_u']['max'], bound)
@@ -262,6 +262,7 @@ output: {low: {min: u_y}, wall: {reaction: x}}
             self.assertLess(abs(model['outputs']['wall'] - full['outputs']['wall']), 0.02)
 
     def test_refused(self):
+        """Springs, forces and gravity on wrong groups or components are refused."""
         base = 'body: {block: {young: 200}}\nfixed: {x0: {x: 0, y: 0}}\n'
         grid = column('quad4', points={'corner': lambda x: (x[:, 0] == 1) & (x[:, 1] == 2)})
         for text, said in (('spring: {y0: {y: -1}}', "spring_y0_y is -1"), ('spring: {corner: {normal: 1}}', 'has no normal'),

@@ -33,12 +33,15 @@ class MeshHDF5(Case):
                         np.testing.assert_allclose(found[name], value, rtol=0, atol=1e-9 * np.nanmax(abs(value)), err_msg=name)
 
     def test_as_read(self):
+        """The mesh as it is read."""
         self.same(PELLET, '4.06,1', '-scene_mesh', os.path.join(PELLET, 'A.msh'))
 
     def test_refined(self):
+        """The refined mesh."""
         self.same(BLOCKS, '0.05,0.06', '-scene_refine', '1')
 
     def test_refused(self):
+        """Files that are missing or are no HDF5 are refused, on 1 and 2 ranks."""
         with open(self.path('text.h5'), 'w', encoding='ascii') as file:
             file.write('no mesh')
         for name in ('text.h5', 'missing.h5'):

@@ -39,6 +39,7 @@ class Missed(Case):
                 self.assertNotIn('missed', report)
 
     def test_help(self):
+        """hyco -help states the exit status."""
         self.assertIn('Exit status: 0 success; 1 an error, in one line; 3 ', self.run_raw('-help').stdout)
 
 

@@ -113,6 +113,7 @@ class HalfDisk(Case):
                     self.assertLess(np.abs(np.array(at) - (0, 10, 0)).max(), 0.01)
 
     def test_free_to_slide_too(self):
+        """Without supports, sliding is named beside turning, on every mesh."""
         for n, m, ratio, width in MESHES:
             self.mesh(n, m, ratio, width)
             said = self.refused('solve', '-scene', self.scene(fixed=''), '-mu', 10)
@@ -158,6 +159,7 @@ class HalfDisk(Case):
         self.refused('solve', '-scene', slight, '-mu', 10, '-hyco_regularise', '-hyco_regularise_tol', 1e-4)
 
     def test_in_the_scene(self):
+        """regularise: true in the scene is the option, and the report names the motion."""
         self.mesh(12, 17, 1, 6)
         scene = self.scene()
         with open(scene, 'a', encoding='ascii') as file:
@@ -186,6 +188,7 @@ class HalfBall(Case):
     """In 3D, tetrahedra of no pattern: three rotations about one point."""
 
     def test_named_and_regularised(self):
+        """A half ball in 3D: its three rotations are named, and regularised."""
         with open(self.path('ball.geo'), 'w', encoding='ascii') as file:
             file.write(BALL)
         with open(self.path('scene.yaml'), 'w', encoding='ascii') as file:
@@ -267,6 +270,7 @@ class Unique(Case):
             self.near(r['total_contact_force'], 1, 1e-9)
 
     def test_elastic(self):
+        """Forces of elastic columns are reported as unique."""
         run = self.hyco('solve', '-scene', self.columns(False))
         self.assertEqual((run['forces_unique'], run['n_dependent']), (True, 0))
 

@@ -63,6 +63,7 @@ class FullOrder(Moved):
         self.near(self.solve('by2.yaml', 0)['total_contact_force'], self.solve('moved.yaml', 2)['total_contact_force'], 1e-12)
 
     def test_ranks(self):
+        """Full order on moved bodies on 2 to 4 ranks: the numbers of one."""
         for yaml in ('moved.yaml', 'three.yaml'):
             alone = self.solve(yaml, 2.3)
             for ranks in (2, 3, 4):

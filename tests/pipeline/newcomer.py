@@ -94,6 +94,7 @@ class Newcomer(Case):
         cls.drawn('shelf', 2, GEO, SCENE)
 
     def test_all(self):
+        """The shelf: checked, solved, trained and predicted."""
         check = self.hyco('check', '-scene', 'shelf')
         self.assertEqual(check['n_warnings'], 0)
         point = ['-mu', f'{LOAD},0.1,{THICKNESS}']

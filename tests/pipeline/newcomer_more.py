@@ -149,6 +149,7 @@ class Scenes(Case):
         return run.stderr
 
     def test_plate(self):
+        """The plate in 3D: checked, solved, trained and predicted."""
         self.drawn('plate', 3, PLATE, PLATE_SCENE, '-order', '2')
         self.assertEqual(self.hyco('check', '-scene', 'plate')['n_warnings'], 0)
         point = ['-mu', '2000,60,2']
@@ -183,6 +184,7 @@ class Scenes(Case):
             self.assertTrue(all(f[step]['nodes/contact_pressure'][:].min() >= 0 for step in f if step.startswith('step-')))
 
     def test_fuel(self):
+        """Fuel with a history: checked, solved, trained and predicted."""
         self.drawn('fuel', 2, FUEL, FUEL_SCENE)
         self.assertEqual(self.hyco('check', '-scene', 'fuel')['n_warnings'], 0)
         full = self.hyco('solve', '-scene', 'fuel', '-mu', '700,1', '-output', 'full.xdmf')
@@ -207,6 +209,69 @@ class Scenes(Case):
         errors = self.hyco('compare', '-scene', 'fuel', '-model', 'fuel.h5', '-grid', '2,1')
         self.assertLess(errors['worst_u']['max'], 5e-3)
         self.assertLess(errors['worst_lambda']['max'], 3e-2)
+
+
+class DiscOverStop(Case):
+    """A clamped disc over a stop that it may not reach: tests/drawn/discstop."""
+    newcomer = True
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.drawn = os.path.join(SOURCE, 'tests', 'drawn', 'discstop')
+        with open(os.path.join(cls.drawn, 'scene.yaml'), encoding='utf-8') as f:
+            cls.text = f.read()
+        cls.write(cls.text)
+        cls.mesh('-2', 'discstop.msh')
+
+    @classmethod
+    def write(cls, text):
+        with open(cls.path('scene.yaml'), 'w', encoding='utf-8') as f:
+            f.write(text)
+
+    @classmethod
+    def mesh(cls, dim, name):
+        subprocess.run(['gmsh', dim, os.path.join(cls.drawn, 'discstop.geo'), '-format', 'msh41', '-v', '1', '-o', cls.path(name)], check=True)
+
+    def test_check(self):
+        """check refuses the outputs that solve refuses, and a mesh without the bodies' cells."""
+        for entry, words in (('{reaction: z, group: rim}', 'no reaction along z'), ('{reaction: x, group: rim}', 'sums to zero; use y'),
+                             ('{reaction: y, group: disc_mid}', 'no support fixes y on disc_mid')):
+            self.write(self.text.replace('{reaction: y, group: rim}', entry))
+            for command in (('check',), ('solve', '-mu', '1,0.02')):
+                run = self.run_raw(*command, '-scene', 'scene.yaml')
+                self.assertEqual(run.returncode, 1, (entry, command))
+                self.assertIn(words, run.stderr)
+        self.write(self.text)
+        self.mesh('-1', 'lines.msh')
+        run = self.run_raw('check', '-scene', 'scene.yaml', '-scene_mesh', 'lines.msh')
+        self.assertEqual(run.returncode, 1)
+        self.assertRegex(run.stderr, 'disc.* has no cells|mesh with gmsh -2')
+
+    def test_grid(self):
+        """The default grid of training has the ends of the ranges, with one value the middle; that of the other commands has cell centres."""
+        self.write(self.text)
+        self.hyco('train', '-scene', 'scene.yaml', '-grid', '1,3', '-hyco_validation', 0, '-hyco_model_type', 'regression', '-model', 'g.h5')
+        with h5py.File(self.path('g.h5')) as f:
+            np.testing.assert_allclose(f['training/points'][:], [[1.75, 0.01], [1.75, 0.025], [1.75, 0.04]], rtol=1e-12)
+        self.hyco('predict', '-model', 'g.h5', '-grid', '1,2', '-table', 'p.csv')
+        with open(self.path('p.csv'), encoding='utf-8') as f:
+            rows = list(csv.DictReader(f))
+        np.testing.assert_allclose([float(r['clearance']) for r in rows], [0.0175, 0.0325], rtol=1e-7)
+
+    def test_judged(self):
+        """Errors of the size of round-off: the quotients of errors and estimates agree with the share that is bounded. The largest errors are also those
+        of corners among the training points."""
+        self.write(self.text)
+        trained = self.run_raw('train', '-scene', 'scene.yaml', '-grid', '8,6', '-model', 'm.h5')
+        self.assertEqual(trained.returncode, 0, trained.stderr)
+        self.assertIn('largest, also at corners of the training, u', trained.stdout)
+        report = self.hyco('compare', '-scene', 'scene.yaml', '-model', 'm.h5', '-scatter', 60)
+        for kind in ('u', 'sigma', 'lambda'):
+            found = report['estimates'][kind]
+            self.assertLess(report['error_' + kind]['max'], 1e-9)
+            self.assertEqual(found['bounded'] == 1, found['worst_error_over_estimate'] <= 1)
+            self.assertEqual(found['bounded'] > 0.5, found['median_ratio'] >= 1)
 
 
 if __name__ == '__main__':

@@ -117,6 +117,7 @@ class Oblique(Case):
                 np.testing.assert_allclose(u[abs(x[:, 1]) < 1e-9, 1], 0.011, rtol=1e-9)
 
     def test_refused(self):
+        """Directions of supports that vanish, vary or conflict are refused."""
         grid = self.box('quad4', np.eye(2))
         base = 'scene: {mesh: mesh.msh, parameters: [a]}\nparameter: {a: {range: [0, 1]}}\nbody: {block: {young: 200}}\n'
         for text, said in (('fixed: {y0: {normal: 0}}', 'has no direction'), ('fixed: {y0: {direction: {x: 1}}}', 'a direction without a support'),

@@ -45,6 +45,7 @@ class Orientation(Case):
         self.near(self.force('solve', '-scene', swapped, '-mu', '0.05,0.06'), 3115.574406, 1e-8)
 
     def test_pressures(self):
+        """The pressure on a mirrored pellet at full order, on 1 and 2 ranks."""
         for ranks in (0, 2):
             self.near(self.force('solve', '-scene', PELLET, '-mu', '4.06,1', *UPSIDE, ranks=ranks), 1409.705324, 1e-8)
 
@@ -69,6 +70,7 @@ class Orientation(Case):
                 self.near(found[1], found[0], 1e-7)
 
     def test_pressures_reduced(self):
+        """The pressure on a mirrored pellet in a reduced model."""
         found = []
         for turned in ((), UPSIDE):
             model = self.path(f'pellet{len(turned)}.h5')
@@ -79,6 +81,7 @@ class Orientation(Case):
         self.near(found[1], found[0], 1e-7)
 
     def test_hertz(self):
+        """The contact of two mirrored cylinders."""
         drawn = self.force('solve', '-scene', HERTZ, '-mu', '0.06,1,10')
         turned = ('-body_upper_map_x', ' -x', '-body_lower_map_x', ' -x')
         self.near(self.force('solve', '-scene', HERTZ, '-mu', '0.06,1,10', *turned), drawn, 1e-9)

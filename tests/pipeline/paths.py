@@ -151,7 +151,7 @@ class Paths(FlowingRing):
     def test_projection(self):
         """The projection-based model has paths too: on the whole mesh, with nonnegative force vectors."""
         for dual, limit in (('nnmf', 0.15), ('snapshots', 0.15)):
-            self.train(self.norton, 'projection.h5', '-grid', '3,3', '-hyco_model_type', 'projection', '-hyco_dual', dual, '-hyco_pod_tol', '1e-8',
+            self.train(self.norton, 'projection.h5', '-grid', '3,3', '-grid_type', 'centred', '-hyco_model_type', 'projection', '-hyco_dual', dual, '-hyco_pod_tol', '1e-8',
                        '-hyco_snapshots', self.path('projection'))
             report = self.compare(self.norton, 'projection.h5', '0.0055,0.91')
             for kind, bound in zip(KINDS, (0.03, 0.03, limit, 0.03)):
@@ -212,7 +212,7 @@ class Paths(FlowingRing):
 
     def test_steps_between_listed_times(self):
         """Full order's steps between listed times are kept, at most five of an interval, and join the modes; a store of older versions has none."""
-        arguments = ['-grid', '2,2', '-hyco_pod_tol', '1e-10', '-hyco_model_type', 'projection', '-hyco_snapshots']
+        arguments = ['-grid', '2,2', '-grid_type', 'centred', '-hyco_pod_tol', '1e-10', '-hyco_model_type', 'projection', '-hyco_snapshots']
         self.train(self.norton, 'between.h5', *arguments, self.path('steps'))
         os.mkdir(self.path('without'))
         for name in os.listdir(self.path('steps')):

@@ -118,6 +118,7 @@ class Greedy(Ring):
         self.assertGreater(abs(float(rows[1][at['gap']]) - 0.004), 1e-3)
 
     def test_refused(self):
+        """-greedy with an indicator or a type of model that paths do not have is refused."""
         for args, words in (((*GREEDY, '-hyco_greedy_indicator', 'local'), ('-hyco_greedy_indicator residual', 'history')),
                             ((*GREEDY[:3], '-hyco_model_type', 'cubature'), ('-greedy', 'cubature')),
                             ((*GREEDY, '-max_snapshots', 3), ('-max_snapshots is 3', '4 corners'))):

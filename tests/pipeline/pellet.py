@@ -17,6 +17,7 @@ class Pellet(Case):
     force = 1409.70532353
 
     def test_prediction(self):
+        """The errors at the unseen radius are below their limits, and the force is that of full order."""
         t = self.hyco('train', '-scene', PELLET, '-values_radius', RADII, '-values_load', STEPS, '-model', 'm.h5',
                       *EXTRA, timeout=self.timeout)
         self.assertEqual(t['n_samples'], 225)

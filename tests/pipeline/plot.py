@@ -29,6 +29,7 @@ class Plot(Case):
         return run.stderr
 
     def test_pictures(self):
+        """Every kind of picture is drawn."""
         from PIL import Image
         for k, args in enumerate((['solution', 'hertz.h5'], ['solution', 'hertz.h5', '--zoom', 'contact', '--field', 'nodal_mises'],
                                   ['solution', 'pellet.h5'], ['solution', 'pellet.h5', '--zoom', 'contact', '--field', 'principal_stress', '--component', '3'],
@@ -42,6 +43,7 @@ class Plot(Case):
                 self.assertGreater(len(picture.convert('RGB').getcolors(1 << 24)), 20, args)
 
     def test_refused(self):
+        """Fields, components and times that a file does not have are named."""
         for words, *args in (('it has xx, xy', 'solution', 'hertz.h5', '--field', 'stress', '--component', 'q'), ('there is no field heat', 'solution', 'hertz.h5', '--field', 'heat'),
                              ('the times 0 to', 'solution', 'ring.h5', '--step', '7'), ('takes lowest and highest', 'solution', 'hertz.h5', '--zoom', '1,0,0,1'),
                              ('contact surfaces: 1', 'solution', 'pellet.h5', '--surface', '2'), ('beside an .xdmf', 'solution', 'pellet.vtkhdf'),

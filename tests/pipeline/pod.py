@@ -12,7 +12,7 @@ TYPES = ('trlanczos', 'cross', 'cyclic', 'lapack', 'randomized')
 class Pod(Case):
     @classmethod
     def train(cls, *options, **how):
-        return cls.run_raw('train', '-scene', ROPE, '-grid', '6,8', '-model', 'm.h5', '-hyco_snapshots', 'snapshots', *options, **how)
+        return cls.run_raw('train', '-scene', ROPE, '-grid', '6,8', '-grid_type', 'centred', '-model', 'm.h5', '-hyco_snapshots', 'snapshots', *options, **how)
 
     def model(self, *options, **how):
         """The singular values of the modes and, if there is one, the places of the RID, of a training that goes well; what it printed."""
@@ -29,6 +29,7 @@ class Pod(Case):
         return lines[0]
 
     def test_types(self):
+        """Each type gives the same singular values and cells, on 1 and 2 ranks."""
         sigma, cells, _ = self.model()
         for kind in ('tsqr', *TYPES):
             for ranks in (0, 2):
@@ -39,6 +40,7 @@ class Pod(Case):
                     np.testing.assert_array_equal(of, cells)
 
     def test_condensed(self):
+        """Condensed models by another type have the same singular values."""
         sigma, _, _ = self.model('-hyco_model_type', 'condensed')
         found, _, _ = self.model('-hyco_model_type', 'condensed', '-hyco_pod_svd_type', 'trlanczos', ranks=2)
         np.testing.assert_allclose(found, sigma, rtol=1e-6)
@@ -51,6 +53,7 @@ class Pod(Case):
         self.assertIn('-hyco_pod_tol', self.refused('-hyco_pod_svd_type', 'trlanczos', '-hyco_pod_svd_nsv', '2', '-hyco_pod_tol', '1e-10'))
 
     def test_options(self):
+        """An unknown type is refused with the list of types."""
         line = self.refused('-hyco_pod_svd_type', 'gesvd')
         self.assertIn('-hyco_pod_svd_type is "gesvd"', line)
         for kind in ('tsqr', *TYPES):

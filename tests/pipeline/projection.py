@@ -35,7 +35,7 @@ class Rope(Case):
 
     @classmethod
     def train(cls, model, *more, **options):
-        return cls.hyco('train', '-scene', ROPE, '-grid', '10,12', '-model', model, *SAME, *TYPE, *more, **options)
+        return cls.hyco('train', '-scene', ROPE, '-grid', '10,12', '-grid_type', 'centred', '-model', model, *SAME, *TYPE, *more, **options)
 
     def test_sizes(self):
         """As many force vectors as modes, 9 at 1e-7 (6.6.1), on the whole mesh; nonnegative, of unit length."""
@@ -150,7 +150,7 @@ class Rope(Case):
         """The same commands, and the same C functions (examples/embed.c), train, load and use each of the three models."""
         found = set()
         for name, options in (('hybrid', ()), ('nnmf', TYPE), ('snapshots', (*TYPE, '-hyco_dual', 'snapshots'))):
-            t = self.hyco('train', '-scene', ROPE, '-grid', '10,12', '-model', 'three.h5', *SAME, *options)
+            t = self.hyco('train', '-scene', ROPE, '-grid', '10,12', '-grid_type', 'centred', '-model', 'three.h5', *SAME, *options)
             p = self.hyco('predict', '-model', 'three.h5', '-mu', '0.07,0.17')
             c = self.hyco('compare', '-scene', ROPE, '-model', 'three.h5', '-grid', '2,3')
             self.solved(p)
@@ -181,7 +181,7 @@ class Rope(Case):
 
     def test_files(self):
         """A model of format 2 says no type and is hybrid; a type that does not exist is damage."""
-        self.hyco('train', '-scene', ROPE, '-grid', '10,12', '-model', 'old.h5', *SAME)
+        self.hyco('train', '-scene', ROPE, '-grid', '10,12', '-grid_type', 'centred', '-model', 'old.h5', *SAME)
         new = self.hyco('predict', '-model', 'old.h5', '-mu', '0.07,0.17')
         with h5py.File(self.path('old.h5'), 'r+') as f:
             f['format'][...] = 2
@@ -197,9 +197,10 @@ class Rope(Case):
         self.assertIn('problem/type is damaged', run.stderr)
 
     def test_bad_options(self):
+        """Options of the dual basis that do not fit the type of model are refused."""
         for words, line in ((('-hyco_dual', 'snapshots'), '-hyco_dual snapshots is for -hyco_model_type projection'),
                             ((*TYPE, '-hyco_dual', 'fe'), 'use nnmf or snapshots'),
-                            (('-hyco_model_type', 'galerkin'), 'it must be one of: condensed, cubature, hybrid, projection, regression'),
+                            (('-hyco_model_type', 'galerkin'), 'it must be one of: bodies, condensed, cubature, hybrid, projection, regression'),
                             ((*TYPE, '-hyco_nnmf_max_its', '0'), 'it must be a whole number, at least 1')):
             run = self.run_raw('train', '-scene', ROPE, '-grid', '2,2', '-model', 'no.h5', *words)
             self.assertNotEqual(run.returncode, 0)
@@ -213,6 +214,7 @@ class Pellet(Case):
     full order has 1409.705 N."""
 
     def test_pellet(self):
+        """The pellet with either dual basis: the errors at the unseen radius."""
         radii = ('-values_radius', '4.02,4.03,4.04,4.05,4.055,4.07,4.08,4.09,4.1')
         for dual, u, forces in (('nnmf', 0.1e-2, 0.2), ('snapshots', 0.03e-2, 0.02)):
             t = self.hyco('train', '-scene', PELLET, *radii, '-values_load', '0.2,0.4,0.6,0.7,0.8,0.9,1', '-model', 'm.h5',

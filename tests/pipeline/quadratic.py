@@ -168,7 +168,7 @@ class Quadratic(Case):
             self.near(full[1]['strain_energy'], full[0]['strain_energy'], 1e-10)
             for of in types:
                 with self.subTest(kind=kind, type=of):
-                    self.hyco('train', '-scene', scene, '-grid', '3,3', '-model', f'{kind}.h5', '-hyco_model_type', of, '-hyco_pod_tol', 1e-11,
+                    self.hyco('train', '-scene', scene, '-grid', '3,3', '-grid_type', 'centred', '-model', f'{kind}.h5', '-hyco_model_type', of, '-hyco_pod_tol', 1e-11,
                               *(('-hyco_rid_layers', 1, '-hyco_rid_modes', 'displacement,stress,force,dual') if of == 'hybrid' else ()))
                     found = self.hyco('compare', '-scene', scene, '-model', f'{kind}.h5', '-grid', '2,2', ranks=2)
                     self.assertLess(found['error_u']['max'], 0.02)
@@ -178,6 +178,7 @@ class Quadratic(Case):
                         self.near(model['outputs'][name], value, 0.05, name)
 
     def test_refused(self):
+        """Surfaces that do not match, refinement, bbar and writing as HDF5 are refused."""
         text = 'scene: {mesh: mesh.msh}\nbody: {block: {young: 200}, seat: {young: 200}}\nfixed: {base: {x: 0, y: 0}, wall: {x: 0}}\n'
         for more, said in (('contact: {c: {type: surface, slave: under, master: over}}', 'needs first-order cells'),
                            ('scene_refine: 1', 'needs first-order cells'), ('body_seat_element: bbar', 'is for quad4 and hex8'),

@@ -171,7 +171,7 @@ class Solids(Case):
             self.near(full[1]['strain_energy'], full[0]['strain_energy'], 1e-10)
             for of in types:
                 with self.subTest(kind=kind, type=of):
-                    self.hyco('train', '-scene', scene, '-grid', '3,3', '-model', f'{kind}.h5', '-hyco_model_type', of, '-hyco_pod_tol', 1e-11,
+                    self.hyco('train', '-scene', scene, '-grid', '3,3', '-grid_type', 'centred', '-model', f'{kind}.h5', '-hyco_model_type', of, '-hyco_pod_tol', 1e-11,
                               *(('-hyco_rid_layers', 1, '-hyco_rid_modes', 'displacement,stress,force,dual') if of == 'hybrid' else ()))
                     found = self.hyco('compare', '-scene', scene, '-model', f'{kind}.h5', '-grid', '1,2', ranks=2)
                     self.assertLess(found['error_u']['max'], 0.02)
@@ -199,6 +199,7 @@ class Solids(Case):
                 self.assertLess(found[0], found[1])
 
     def test_refused(self):
+        """In 3D: surfaces that do not match, refinement and bbar are refused."""
         text = 'scene: {mesh: mesh.msh}\nbody: {block: {young: 200}, seat: {young: 200}}\nfixed: {base: {x: 0, y: 0, z: 0}, wall: {x: 0}}\n'
         for more, said in (('contact: {c: {type: surface, slave: under, master: over}}', 'needs first-order cells'),
                            ('scene_refine: 1', 'needs first-order cells'), ('body_seat_element: bbar', 'is for quad4 and hex8')):

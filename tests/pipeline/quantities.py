@@ -123,6 +123,7 @@ class Quantities(Case):
                 self.near(found['hoop'], 1 - radial.min(), 1e-9)
 
     def test_refused(self):
+        """Outputs with an unknown quantity, component or group: the message lists the valid ones."""
         for outputs, said in (('output: {peak: {max: mises, min: u}}\n', 'one of max, min, mean'), ('output: {peak: {max: stress}}\n', 'must be one of'),
                               ('output: {peak: {max: u_z}}\n', 'no u_z'), ('output: {peak: {group: block}}\n', 'has no field'),
                               ('output: {peak: {max: u, group: blok}}\n', 'blok'), ('output: {press: {max: u}}\n', 'name of a parameter'), ('output: {peak: {largest: u}}\n', 'max, min, mean, reaction, force, moment, group, contact')):

@@ -19,12 +19,14 @@ def reproduce(*args, hyco=HYCO):
 
 class Reproduce(Case):
     def test_help(self):
+        """--help names the cases and options."""
         run = reproduce('--help')
         self.assertEqual(run.returncode, 0, run.stderr)
         for word in ('rope', 'pellet', 'all', '--output', '--docs', '--quick'):
             self.assertIn(word, run.stdout)
 
     def test_refusals(self):
+        """Unknown cases, --quick on the documents, and a missing hyco are refused."""
         for args, hyco, line in ((('stick',), HYCO, "invalid choice: 'stick'"), (('--quick',), HYCO, 'another folder with --docs'),
                                  ((), '/nowhere/hyco', 'run scripts/build first')):
             run = reproduce(*args, hyco=hyco)
@@ -32,6 +34,7 @@ class Reproduce(Case):
             self.assertIn(line, run.stderr)
 
     def test_quick(self):
+        """--quick writes tables, pictures and documents with the runs' numbers."""
         out, docs = self.path('out'), self.path('docs')
         run = reproduce('rope', '--quick', '--output', out, '--docs', docs)
         self.assertEqual(run.returncode, 0, run.stderr)

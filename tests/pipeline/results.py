@@ -36,6 +36,7 @@ class Results(Case):
                 self.near(largest, out['nodes/contact_pressure'].max(), 1e-10, 'pressure')
 
     def test_stress(self):
+        """Von Mises and principal stresses are those of numpy from the stress."""
         for args in (('-scene', PELLET, '-mu', '4.06,1'), ('-scene', BLOCKS, '-mu', '0.05,0.05')):
             out = self.solve(*args)[1]
             s = out['cells/stress'][:, [0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(-1, 3, 3)

@@ -66,6 +66,7 @@ class Revolution(Case):
             self.assertIn(said, run.stderr)
 
     def test_refused(self):
+        """Unknown formulations, bodies across the axis or moved off it, and bbar where it locks are refused."""
         self.refused(SCENE.replace('axisymmetric', 'axial'), 'plane_strain, plane_stress or axisymmetric')
         self.refused(SCENE.replace('core: {', 'core: {map: {x: x - 0.1}, '), 'must be drawn at x >= 0')
         self.refused(SCENE.replace('core: {', 'core: {map: {x: x + 0.1}, '), 'nodes on the axis')

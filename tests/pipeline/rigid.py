@@ -153,6 +153,7 @@ class Rigid(Case):
         self.assertEqual(still['outputs']['depth'], 0)
 
     def test_refused(self):
+        """Rigid bodies with a wrong master, without a gap, or free to move otherwise are refused."""
         for changes, said in (({'many': ('slave: top, master: tip', 'slave: top, master: sym')}, 'is the one node'),
                               ({'own': ('slave: top, master: tip', 'slave: tool, master: tip, normal: {y: 1}')}, 'has the node that the rigid body moves with'),
                               ({'no_gap': (', gap: x^2/(2*radius)', '')}, 'has no gap'), ({'loose': (', tool: {x: 0}', '')}, 'keeps body tool from')):

@@ -12,7 +12,7 @@ class Reduced(Case):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        cls.training = cls.hyco('train', '-scene', ROPE, '-grid', '10,12', '-model', 'rope.h5')
+        cls.training = cls.hyco('train', '-scene', ROPE, '-grid', '10,12', '-grid_type', 'centred', '-model', 'rope.h5')
 
     def test_sizes(self):
         """The paper: 9 modes; RID of 28 nodes, 14 of them in A; one dual mode."""
@@ -104,7 +104,7 @@ class Reduced(Case):
 
     def test_rank(self):
         """-hyco_hybrid rank: 14 contacts and 9 modes leave 5 full-order displacements, as in the paper."""
-        t = self.hyco('train', '-scene', ROPE, '-grid', '10,12', '-model', 'rank.h5', '-hyco_snapshots',
+        t = self.hyco('train', '-scene', ROPE, '-grid', '10,12', '-grid_type', 'centred', '-model', 'rank.h5', '-hyco_snapshots',
                       'rope.h5.snapshots', '-hyco_hybrid', 'rank', '-hyco_hybrid_trials', 300)
         self.assertEqual((t['n_fe_dofs'], t['rid_nodes'], t['n_modes']), (5, 28, 9))
         c = self.hyco('compare', '-scene', ROPE, '-model', 'rank.h5', '-grid', '10,12')

@@ -10,7 +10,7 @@ class Fine(Case):
     def test_errors(self):
         """Required: u 0.1 % on average and 0.5 % at worst, contact forces 3 and 15 (the paper, 28 nodes: 0.34, 1.13; 24,
         148)."""
-        t = self.hyco('train', '-scene', ROPE, '-grid', '10,12', '-model', 'fine.h5', *SETTINGS)
+        t = self.hyco('train', '-scene', ROPE, '-grid', '10,12', '-grid_type', 'centred', '-model', 'fine.h5', *SETTINGS)
         self.assertLessEqual(t['rid_nodes'], 50)
         self.assertEqual(t['n_modes'], 27)  # singular values of snapshots, far above round-off
         self.assertEqual(t['scan']['points_of_other_sign'], 0)

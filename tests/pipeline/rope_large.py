@@ -36,6 +36,7 @@ class RopeLarge(Case):
             return f['mesh/xyz'][:, 0][order], f['nodes/displacement'][:, 0][order], force
 
     def test_iterations(self):
+        """The iterations of the active set do not grow with the mesh."""
         for n in SIZES:
             for mu in POINTS:
                 with self.subTest(nodes=n, mu=mu):
@@ -99,6 +100,7 @@ class RopeLarge(Case):
                     self.assertEqual(alone['n_active'], int(row['n_active']))
 
     def test_ranks(self):
+        """The large rope on 2 ranks: the fields of one."""
         for n in SIZES[1:3]:
             with self.subTest(nodes=n):
                 one = self.rope(n, '0.07,0.17', '-output', 'one.xdmf')

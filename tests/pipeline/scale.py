@@ -20,6 +20,7 @@ class Scale(Case):
             return list(csv.DictReader(file))
 
     def test_training(self):
+        """scripts/bench-training: groups divide the points, the POD has its counts."""
         self.bench('training', '--groups', '1:1,4:2', '--loads', '2', '--pod', 'hybrid:1:10:0,hybrid:4:10:8', '--noise', '1e-6')
         for row in self.rows('groups'):
             self.assertEqual(sum(map(int, row['solved'].split(', '))), 16)
@@ -34,6 +35,7 @@ class Scale(Case):
         self.assertEqual((failed['after'], int(failed['begun']) - int(failed['stored'])), ('0', 1))
 
     def test_counts(self):
+        """scripts/bench-scale: unknowns and contacts on 1 and 2 ranks."""
         run = self.bench('scale', '--ranks', '1,2', '--wavy', '8')
         one, two, wavy = self.rows('scale')
         for row in (one, two):
@@ -49,16 +51,16 @@ class Scale(Case):
         self.assertEqual((wavy['contacts'], wavy['ranks']), ('1089', '1'))
         self.assertLessEqual(int(wavy['most']), 20)
         self.assertLessEqual(int(wavy['sets']), 12)
-        self.assertIn('Model, fitted', run.stdout)
+        self.assertRegex(run.stdout, r'an efficiency of \d+% with 1e4 unknowns a rank')
 
     def test_search(self):
-        """Each rank has an equal share of the searches for masters, one a node and position (as drawn, as moved), and on four ranks not the whole master;
+        """Each rank searches for the masters of its slave nodes, one a node and position (as drawn, as moved), and on four ranks not on the whole master;
         the iterations are those of one rank. The upper block has 10 x 10 cells, cut into 20 x 20."""
         self.bench('scale', '--two', '8', '--ranks', '1,4')
         one, four = self.rows('search')
         self.assertEqual((one['contacts'], four['contacts'], four['searches']), ('441', '441', '882'))
-        self.assertLessEqual(int(four['searches_rank']), 882 // 4 + 2)
-        self.assertLess(int(four['facets_rank']), 0.6 * int(four['facets']))  # the smaller the blocks in which they are found, the fewer
+        self.assertLessEqual(int(four['searches_rank']), 0.35 * 882)
+        self.assertLess(int(four['facets_rank']), 0.8 * int(four['facets']))  # the finer the mesh, the fewer
         self.assertEqual(int(four['facets']), 16 * 16)
         self.assertEqual(one['sets'], four['sets'])
         self.assertLessEqual(int(four['most']), 20)

@@ -27,6 +27,7 @@ class SideBySide(Case):
         return run.stdout.splitlines()[:-1]
 
     def test_eight_at_once(self):
+        """Sixty runs, eight at a time, have the same answer."""
         expected = self.answer(self.ask())
         with concurrent.futures.ThreadPoolExecutor(8) as pool:
             runs = list(pool.map(lambda _: self.ask(), range(60)))

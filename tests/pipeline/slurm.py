@@ -75,6 +75,7 @@ class Slurm(Case):
         process.send_signal(signal.SIGUSR1)
 
     def test_rope(self):
+        """In a plain shell: trained, with the report and all solutions."""
         out = self.finish(self.start('-scene', ROPE, '-grid', '5,6', '-report', self.path('r.json')))
         self.assertIn('2 ranks, 0 solutions so far', out)
         self.assertEqual(len(self.solutions()), 30)
@@ -82,6 +83,7 @@ class Slurm(Case):
             self.assertEqual(json.load(file)['n_samples'], 30)
 
     def test_goes_on(self):
+        """An interrupted training continues with its solutions."""
         first = self.start(*LONG)
         self.interrupt(first)
         self.assertIn('the same command continues', self.finish(first, 75))
@@ -94,6 +96,7 @@ class Slurm(Case):
         self.assertEqual({path: os.stat(path).st_mtime_ns for path in before}, before, 'solved again')
 
     def test_queue(self):
+        """Under Slurm an interrupted job is requeued."""
         job = {'SLURM_JOB_ID': '17', 'SLURM_NTASKS': '2'}
         first = self.start(*LONG, **job)
         self.interrupt(first)
@@ -121,6 +124,7 @@ class Slurm(Case):
         self.assertEqual(self.noted('scontrol'), '')
 
     def test_model_missing(self):
+        """Without -model the script stops and names it."""
         run = subprocess.run(['bash', SCRIPT, '-scene', ROPE], capture_output=True, text=True, timeout=20 * PATIENCE)
         self.assertEqual(run.returncode, 2)
         self.assertIn('-model', run.stderr)

@@ -14,6 +14,7 @@ METHODS = [('active_set', 'dual'), ('active_set', 'primal'), ('tao', 'dual'), ('
 
 class Rope(Case):
     def test_methods(self):
+        """The rope by every method and form."""
         for kind, form in METHODS:
             with self.subTest(type=kind, form=form):
                 r = self.hyco('solve', '-scene', ROPE, '-mu', '0.07,0.17', '-hyco_solver_type', kind,
@@ -55,6 +56,7 @@ class Rope(Case):
         self.assertLess(abs(gap * force).max(), 1e-14)
 
     def test_named_values(self):
+        """-mu_NAME sets a parameter by its name."""
         r = self.hyco('solve', '-scene', ROPE, '-mu_mu2', '0.17', '-mu_mu1', '0.07')
         self.near(r['total_contact_force'], 0.3502256293, 1e-9)
 
@@ -69,6 +71,7 @@ class Rope(Case):
 
 class Pellet(Case):
     def test_methods(self):
+        """The pellet by every method and form."""
         for kind, form in [m for m in METHODS if m != ('tao', 'primal')]:
             with self.subTest(type=kind, form=form):
                 r = self.hyco('solve', '-scene', PELLET, '-mu', '4.06,1', '-hyco_solver_type', kind,
@@ -107,6 +110,7 @@ class Pellet(Case):
 
     @unittest.skipUnless(os.environ.get('HYCO_PTSCOTCH', '1') == '1', 'this PETSc was built without PT-Scotch')
     def test_partition(self):
+        """The pellet partitioned by PT-Scotch on 2 to 4 ranks."""
         for ranks in (2, 3, 4):
             r = self.hyco('solve', '-scene', PELLET, '-mu', '4.06,1', '-hyco_partition', 'ptscotch', ranks=ranks)
             self.near(r['total_contact_force'], 1409.70532353, 1e-9)
@@ -128,6 +132,7 @@ class Pellet(Case):
         self.assertIn('-hyco_linear iterative works with the forms primal', run.stderr)
 
     def test_no_contact_at_no_load(self):
+        """No load: no contact, no force, no energy."""
         r = self.hyco('solve', '-scene', PELLET, '-mu', '4.06,0')
         self.assertEqual((r['n_active'], r['total_contact_force'], r['strain_energy']), (0, 0, 0))
 

@@ -114,10 +114,12 @@ class Solvers(Case):
         return expected
 
     def test_rope_100(self):
+        """The rope of 100 nodes."""
         self.near(self.every('rope 100', ['-scene', ROPE, '-mu', '0.07,0.17'], tao(QUASI, ('dual', 'primal'))),
                   0.3502256293, 1e-9)
 
     def test_rope_2000(self):
+        """The rope of 2000 nodes."""
         n = 2000
         mesh = self.path('rope2000.msh')
         msh(mesh, [(i / (n - 1), 0, 0) for i in range(n)],
@@ -127,9 +129,11 @@ class Solvers(Case):
         self.every('rope 2000', ['-scene', ROPE, '-scene_mesh', mesh, '-mu', '0.07,0.17'], without=SEMISMOOTH)
 
     def test_blocks(self):
+        """Two blocks."""
         self.every('blocks', ['-scene', BLOCKS, '-mu', '0.05,0.05'])
 
     def test_pellet(self):
+        """The pellet on mesh A."""
         self.near(self.every('pellet A', ['-scene', PELLET, '-mu', '4.06,1']), 1409.70532353, 1e-8)
 
     def test_fallback(self):
@@ -140,6 +144,19 @@ class Solvers(Case):
             self.solved(r)
             self.assertEqual(r['solver'], f'tao tron {form}, then active_set')
             self.near(r['total_contact_force'], 0.3502256293, 1e-9)
+
+    def test_fallback_of_the_default(self):
+        """TAO's types follow the default: within 8 iterations the active set fails (from no contact it needs more), and gpcg solves."""
+        default = ['solve', '-scene', ROPE, '-mu', '0.07,0.17', '-hyco_solver_form', 'primal', '-hyco_solver_multilevel', 'false',
+                   '-hyco_solver_max_its', '8']
+        for ranks in (1, 2):
+            r = self.hyco(*default, ranks=ranks)
+            self.solved(r)  # the KKT residuals, recomputed from K, B, F, D
+            self.assertEqual(r['solver'], 'active_set primal, then tao gpcg')
+            self.near(r['total_contact_force'], 0.3502256293, 1e-9)
+        run = self.run_raw(*default, '-hyco_solver_fallback', 'false')
+        self.assertEqual(run.returncode, 1)
+        self.assertIn('not converged', run.stderr)
 
 
 if __name__ == '__main__':

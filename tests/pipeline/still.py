@@ -96,6 +96,7 @@ class Still(Case):
         self.assertNotEqual(self.run_raw('solve', '-scene', scene, '-values_press', '0.4,0.6').returncode, 0)
 
     def test_train(self):
+        """An impossible contact between fixed displacements ends a training; the message names its node."""
         held = 'lower_foot: {x: 0, y: 0}, upper_foot: {x: 0, y: -0.02*press}, upper_head: {x: 0}'
         scene = self.scene(held, FLOOR % '0.01')
         run = self.run_raw('train', '-scene', scene, '-values_press', '0.4,0.6', '-model', 'm.h5')
@@ -104,6 +105,7 @@ class Still(Case):
         self.assertFalse(os.path.exists(self.path('m.h5')))
 
     def test_free_contacts_are_not_counted(self):
+        """Contacts with a free side are not counted among those without effect."""
         held = 'lower_foot: {x: 0, y: 0}, upper_head: {x: 0, y: -0.02*press}'
         r = self.hyco('solve', '-scene', self.scene(held, PAIR), '-mu', 1)
         self.assertEqual((r['n_without_effect'], r['n_active']), (0, 2))

@@ -85,6 +85,7 @@ class Table(Case):
         self.assertEqual(c['not_converged'], 0)
 
     def test_affine_load(self):
+        """A load that is affine in the parameters is read from its table."""
         self.loads('l1.h5')
 
     def test_other_load(self):

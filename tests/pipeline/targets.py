@@ -69,7 +69,7 @@ class Targets(Case):
 
     def test_adds_points(self):
         """Too few training points: solutions are added where the errors are largest, until the targets are met."""
-        run = self.run_raw('train', '-scene', ROPE, '-grid', '3,3', '-model', 'a.h5', '-table', 'a.csv', '-hyco_model_type', 'hybrid', '-target_u', 0.004,
+        run = self.run_raw('train', '-scene', ROPE, '-grid', '3,3', '-grid_type', 'centred', '-model', 'a.h5', '-table', 'a.csv', '-hyco_model_type', 'hybrid', '-target_u', 0.004,
                            '-target_max_added', 40, '-report', 'a.json')
         self.assertEqual(run.returncode, 0, run.stderr)
         self.assertRegex(run.stdout, r'no settings meet the targets: \d+ solutions are added where the errors are largest')
@@ -93,7 +93,7 @@ class Targets(Case):
         self.scattered('others.csv', 60)
         for most, former in ((40, 0), (4, 16)):
             with self.subTest(most=most):
-                args = ('-scene', ROPE, '-grid', '3,3', '-model', f'f{most}.h5', '-hyco_model_type', 'hybrid', '-target_u', 0.004, '-target_max_added', most)
+                args = ('-scene', ROPE, '-grid', '3,3', '-grid_type', 'centred', '-model', f'f{most}.h5', '-hyco_model_type', 'hybrid', '-target_u', 0.004, '-target_max_added', most)
                 t = self.hyco('train', *args)
                 added = t['search']['added']
                 self.assertEqual((t['held_out']['n'], t['held_out']['fresh'], t['search']['former_held_out']), (20, 16, former))
@@ -138,6 +138,7 @@ class Targets(Case):
         self.assertEqual((rows[0]['model_type'], rows[0]['meets']), ('condensed', '0'))
 
     def test_complaints(self):
+        """Targets outside (0, 1], and with options that they exclude, are refused."""
         for args, words in ((('-target_u', 0), 'a relative error above 0 and at most 1'), (('-target_sigma', -0.1), 'a relative error above 0 and at most 1'),
                             (('-target_lambda', 1.5), 'a relative error above 0 and at most 1'), (('-target_u', 'small'), 'a relative error above 0 and at most 1'),
                             (('-target_stress', 0.1), 'has no option -target_stress'),

@@ -114,7 +114,7 @@ class Ties(Case):
                 self.near(found[name], full[0][name], 1e-8, name)
         for kind, bound in (('hybrid', 0.01), ('projection', 0.01), ('condensed', 1e-3), ('regression', 0.02)):
             with self.subTest(kind=kind):
-                self.hyco('train', '-scene', scene, '-grid', '4,4', '-model', 'm.h5', '-hyco_model_type', kind, '-hyco_pod_tol', 1e-11,
+                self.hyco('train', '-scene', scene, '-grid', '4,4', '-grid_type', 'centred', '-model', 'm.h5', '-hyco_model_type', kind, '-hyco_pod_tol', 1e-11,
                           *(('-hyco_rid_layers', 1, '-hyco_rid_modes', 'displacement,stress,force,dual') if kind == 'hybrid' else ()))
                 found = [self.hyco('compare', '-scene', scene, '-model', 'm.h5', '-grid', '3,3', ranks=ranks) for ranks in (0, 2)]
                 for report in found:
@@ -163,6 +163,7 @@ class Ties(Case):
         self.near(3 * energy[30], energy[90], 1e-9)
 
     def test_refused(self):
+        """Ties with wrong groups, bodies or distances are refused."""
         base = ('scene: {mesh: mesh.msh}\nbody: {low: {young: 200}, high: {young: 200}}\nfixed: {base: {x: 0, y: 0}}\n')
         tie = 'tie: {glue: {slave: under, master: over}}\n'
         for text, said in (('tie: {glue: {slave: under}}', 'tie glue has no master'), ('tie: {glue: {slave: under, master: under}}', 'are the same group'),

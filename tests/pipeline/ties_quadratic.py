@@ -262,6 +262,7 @@ class TiesQuadratic(Case):
             self.near(energy['tied'], energy['one'], 1e-4, kind)
 
     def test_refused(self):
+        """Refinement, chains of ties, and contacts or supports on one side of a tie alone are refused."""
         text = 'scene: {mesh: mesh.msh}\nbody: {left: {young: 200}, right: {young: 200}}\nfixed: {wall: {x: 0, y: 0, z: 0}}\ntie: {glue: {slave: seam, master: edge}}\n'
         for kind, n, more, said in (('hex27', 2, 'scene_refine: 1', 'cannot refine a mesh with ties'), ('tet10', 2, 'tie_back_slave: edge\ntie_back_master: seam', 'is itself a slave of the tie'),
                                     ('tet10', 4, 'contact: {stop: {group: under, normal: {z: -1}, gap: 0}}', 'do not have this contact'),

@@ -28,6 +28,7 @@ class Tolerance(Case):
         return self.path('scene.yaml')
 
     def test_every_edge_counts(self):
+        """The shortest edge of a facet counts, whichever of its edges it is."""
         for turn in range(4):
             with self.subTest(turn=turn):
                 self.assertEqual(self.hyco('solve', '-scene', self.wedges(0.019, turn))['n_contacts'], 4)

@@ -29,6 +29,7 @@ class Tradeoff(Case):
         return rows
 
     def test_rope(self):
+        """The table of the rope has a row for each setting."""
         words = self.bench('tradeoff', 'rope', '--quick', '--repeat', '1')
         rows = self.rows('rope-100')
         self.assertEqual([r['type'] for r in rows], ['hybrid', 'hybrid', 'projection', 'condensed', 'full', 'full'])
@@ -38,7 +39,7 @@ class Tradeoff(Case):
             self.assertGreater(float(row['single_s']), 0)
         self.assertLess(float(rows[1]['u_mean']), float(rows[0]['u_mean']))
         self.assertLess(float(rows[3]['lambda_max']), 1e-4)  # condensed: forces as full order's
-        self.assertIn("| all contact forces | condensed |", words)
+        self.assertRegex(words, r"\| all contact forces \| [\d.-]+, [\d.-]+, [\d.]+ \|")  # condensed: accurate
 
     def test_rod(self):
         """One setting, one unseen path: the errors are those of a model that was judged, the times those of both full orders."""
@@ -48,10 +49,11 @@ class Tradeoff(Case):
         for kind in paths.KINDS:
             self.assertTrue(0 < float(hybrid[kind + '_max']) < 0.05, hybrid)
         self.assertLess(float(hybrid['path_s']), float(newton['path_s']))
-        self.assertIn('times faster than Newton', words)
+        self.assertIn('|  | 4: hybrid | ', words)
         self.assertTrue(words.endswith(self.bench('tradeoff', 'rod', '--mesh', 'slice', '--redraw')), 'the same page from the table')
 
     def test_growth(self):
+        """The table of growing meshes has a row for each mesh."""
         self.bench('growth', '--rope', '100,1000', '--pellet', '')
         rows = self.rows('growth')
         self.assertEqual([(r['unknowns'], r['status']) for r in rows], [('98', 'ok'), ('998', 'ok')])
@@ -66,6 +68,7 @@ class Tradeoff(Case):
         self.assertIsNone(report.cheapest(rows, 'u_mean', 1e-4))
 
     def test_page(self):
+        """A section of a page is replaced between its marks, and a missing one is an error."""
         path = self.path('page.md')
         text = 'before\n<!-- a: written by b -->\nold\n<!-- end a -->\nafter\n'
         with open(path, 'w', encoding='utf-8') as file:

@@ -27,6 +27,7 @@ class Documents(unittest.TestCase):
             self.assertGreaterEqual(document.run(os.path.join(DOCS, name), folder, environment, skip), commands)
 
     def test_tutorial(self):
+        """The tutorial with an installed hyco."""
         with tempfile.TemporaryDirectory(prefix='hyco-installed-') as prefix:
             subprocess.run(['cmake', '--install', BUILD, '--prefix', prefix], check=True, timeout=100 * PATIENCE, stdout=subprocess.DEVNULL)
             library, = glob.glob(os.path.join(prefix, '**', 'libhyco.so'), recursive=True) or [None]
@@ -36,6 +37,7 @@ class Documents(unittest.TestCase):
             self.run_page('tutorial.md', 12, PKG_CONFIG_PATH=':'.join(p for p in paths if p), LD_LIBRARY_PATH=library_path(os.path.dirname(library)))
 
     def test_faq(self):
+        """The questions and answers."""
         self.run_page('faq.md', 8)
 
     def test_pictures(self):

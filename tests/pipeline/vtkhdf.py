@@ -55,6 +55,7 @@ class VTKHDF(Case):
                     np.testing.assert_allclose(found, expected, atol=1e-9 * max(np.nanmax(abs(expected)), 1e-3), err_msg=f'{name} at {k}')
 
     def test_solution(self):
+        """The file of a solution has the mesh, fields and parameters of the .h5, on 1 and 2 ranks."""
         for ranks in (0, 2):
             h, v, steps, report = self.both([*PELLET, *UNITS], f's{ranks}', ranks=ranks)
             self.mesh(h, v, 12)
@@ -64,6 +65,7 @@ class VTKHDF(Case):
             self.near(np.linalg.norm(v['PointData/displacement'][:]), report['u_norm2'], 1e-10, 'u')
 
     def test_attributes(self):
+        """Fields have their units and components as attributes."""
         h, v = self.both([*PELLET, *UNITS], 's2', ranks=2)[:2]
         for file, nodes, cells in ((h, 'nodes', 'cells'), (v, 'PointData', 'CellData')):
             self.assertEqual(dict(file[nodes]['displacement'].attrs), {'unit': b'mm', 'components': b'x y z'})
@@ -76,6 +78,7 @@ class VTKHDF(Case):
         self.assertEqual(v['CellData/stress'].attrs['components'], b'xx yy zz xy yz xz')
 
     def test_history(self):
+        """The file of a path has its steps, times and fields."""
         for ranks in (0, 2):
             h, v, steps, _ = self.both(RING, f'h{ranks}', ranks=ranks)
             self.mesh(h, v, 9)

@@ -1,8 +1,13 @@
 """The documents: links are valid, named files exist, the theory has each equation, the glossary each required term, the README is short."""
+import csv
 import glob
 import os
 import re
+import subprocess
+import sys
 import unittest
+
+from common import PATIENCE
 
 SOURCE = os.path.dirname(os.path.realpath(os.path.join(os.environ['HYCO_SOURCE'], 'CMakeLists.txt')))
 PAGES = [os.path.join(SOURCE, 'README.md'), *sorted(glob.glob(os.path.join(SOURCE, 'docs', '*.md')))]
@@ -21,6 +26,7 @@ def anchors(page):
 
 class Docs(unittest.TestCase):
     def test_links(self):
+        """Links of the documents lead to files and headings that exist."""
         for path in PAGES:
             for target in re.findall(r'\]\(([^)\s]+)\)', text(path)):
                 if target.startswith(('http:', 'https:', 'mailto:')):
@@ -44,6 +50,7 @@ class Docs(unittest.TestCase):
         self.assertEqual(sorted(set(stated)), list(range(1, 46)))
 
     def test_glossary(self):
+        """The glossary has each required term."""
         page = text('docs', 'glossary.md')
         for word in ('POD', 'DEIM', 'Q-DEIM', 'NNMF', 'NNLS', 'RID', 'KKT', 'LCP', 'SPD', 'slave, master', 'held-out', 'conformal', 'snapshot'):
             self.assertRegex(page, rf'(?m)^\| \*\*{re.escape(word)}')
@@ -56,7 +63,26 @@ class Docs(unittest.TestCase):
             for name in re.findall(r'(?<=[ `(])-(hyco_\w+|check_\w+|validation\w*)', body):
                 self.assertTrue(re.search(rf'"-?{name}"', known) or name.startswith('hyco_mumps_'), f'{page}: -{name}')
 
+    def test_index_of_tests(self):
+        """docs/tests.csv is what scripts/tests-index writes; every test has a sentence of its own or of its file."""
+        made = subprocess.run([sys.executable, os.path.join(SOURCE, 'scripts', 'tests-index'), '-'], capture_output=True,
+                              text=True, check=True, timeout=50 * PATIENCE).stdout
+        self.assertEqual(text('docs', 'tests.csv'), made, 'run scripts/tests-index')
+        for row in csv.DictReader(made.splitlines()):
+            self.assertGreater(len(row['checks']), 8, row)
+
+    def test_calls(self):
+        """docs/architecture.md: each call of PETSc, TAO and SLEPc is in the file that the page names."""
+        table = text('docs', 'architecture.md').split('## Where PETSc')[1].split('##')[0]
+        rows = [row.split('|')[2:4] for row in table.splitlines() if '`src/' in row]
+        self.assertGreaterEqual(len(rows), 9)
+        for files, calls in rows:
+            sources = ''.join(text(name) for name in re.findall(r'`(src/[^`]*)`', files))
+            for call in re.findall(r'`(\w+\()\)`', calls):
+                self.assertIn(call, sources, files)
+
     def test_readme(self):
+        """The README is short."""
         self.assertLessEqual(text('README.md').count('\n'), 90)
 
 

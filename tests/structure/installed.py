@@ -44,6 +44,7 @@ class Installed(unittest.TestCase):
         self.assertIn('force', run(program, '-model', model, '-points', '3'))
 
     def test_files(self):
+        """Command, headers, manual pages, documents and scripts are installed."""
         for pattern in ('bin/hyco', 'include/hyco.h', 'share/man/man1/hyco.1', 'share/man/man1/hyco-predict.1',
                         'share/bash-completion/completions/hyco', 'share/doc/hyco/LICENSE', 'share/doc/hyco/docs/scenes.md',
                         'share/doc/hyco/docs/tutorial/solution.png', 'share/doc/hyco/scripts/plot', 'share/doc/hyco/scripts/convert',
@@ -79,6 +80,7 @@ class Installed(unittest.TestCase):
         self.assertEqual(words.split(), ['-model'])
 
     def test_pkg_config(self):
+        """The ladder builds by make and pkg-config from the installed files."""
         ladder = os.path.join(self.folder.name, 'make')
         run('cp', '-r', os.path.join(self.prefix, 'share', 'doc', 'hyco', 'examples', 'ladder'), ladder)
         path = os.path.join(os.path.dirname(self.library), 'pkgconfig') + ':' + os.environ.get('PKG_CONFIG_PATH', '')
@@ -88,6 +90,7 @@ class Installed(unittest.TestCase):
         self.predicts(os.path.join(ladder, 'batch'))
 
     def test_cmake(self):
+        """The ladder builds by CMake from the installed files."""
         build = os.path.join(self.folder.name, 'cmake')
         run('cmake', '-S', os.path.join(self.prefix, 'share', 'doc', 'hyco', 'examples', 'ladder'), '-B', build,
             '-DCMAKE_PREFIX_PATH=' + self.prefix)

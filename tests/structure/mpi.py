@@ -23,6 +23,7 @@ OTHER = """#include_next <mpi.h>
 
 class OtherMPI(unittest.TestCase):
     def test_refused(self):
+        """CMake refuses the other MPI and names its compiler wrapper."""
         with tempfile.TemporaryDirectory(prefix='hyco-mpi-') as folder:
             wrapper = os.path.join(folder, 'mpicc')
             for path, text in ((wrapper, WRAPPER.format(folder=folder)), (os.path.join(folder, 'mpi.h'), OTHER)):

@@ -34,6 +34,7 @@ class Setup(unittest.TestCase):
             return run.returncode, run.stdout + run.stderr, os.path.exists(called)
 
     def test_missing(self):
+        """Missing packages are listed with the command; those for tests alone are no error."""
         for missing, status in (('', 0), ('python3-matplotlib', 0), ('strace', 0), ('libpetsc-real-dev', 1), ('openmpi-bin strace', 1)):
             with self.subTest(missing=missing):
                 code, text, called = self.run_setup(missing)
@@ -42,6 +43,7 @@ class Setup(unittest.TestCase):
                     self.assertRegex(text, rf'apt-get install --no-install-recommends.* {name}\b')
 
     def test_groups(self):
+        """A group of packages alone is checked; an unknown one is refused."""
         self.assertEqual(self.run_setup('strace python3-matplotlib', 'run', 'build'), (0, '', False))
         code, text, _ = self.run_setup('', 'tests')
         self.assertEqual(code, 2)

@@ -38,7 +38,7 @@ class Sources(unittest.TestCase):
             for path in sources(folder):
                 self.assertNotRegex(text(path), r'#include\s*[<"](hycosystem|hycosolver|hycosolverimpl)\.h', path)
         for path in sources():
-            if os.sep + 'app' + os.sep in path or path.endswith(os.path.join('sys', 'init.c')):
+            if os.sep + 'app' + os.sep in path or path.endswith(os.path.join('package', 'init.c')):
                 continue
             self.assertEqual(word.findall(code(path)), [], path)
 
@@ -59,8 +59,11 @@ class Sources(unittest.TestCase):
             self.assertEqual([n for n in names if n in above], [], name)
 
     def test_types(self):
-        """Laws and discretisations of contact are named only in their own folders; a scene names the default one."""
+        """Laws and discretisations of contact are named only in their own folders and in the package, which registers all types; a scene
+        names the default one."""
         for path in sources():
+            if os.sep + 'package' + os.sep in path:
+                continue
             if os.sep + 'material' + os.sep not in path:
                 self.assertNotRegex(code(path), r'\b(young|poisson)\b', path)
             if os.sep + 'contact' + os.sep not in path:
@@ -73,7 +76,20 @@ class Sources(unittest.TestCase):
             if os.sep + 'impls' + os.sep in path:
                 continue
             self.assertNotRegex(text(path), own, path)
-            self.assertNotRegex(code(path), r'[=!]=\s*HYCO_ROM_(HYBRID|PROJECTION|CONDENSED)|strcmp\([^;]*HYCO_ROM_(PROJECTION|CONDENSED)', path)
+            self.assertNotRegex(code(path), r'[=!]=\s*HYCO_ROM_[A-Z]+|str(case)?cmp\([^;]*HYCO_ROM_(HYBRID|PROJECTION|CONDENSED|CUBATURE|REGRESSION)\)\s*[=!]', path)
+
+    def test_registration(self):
+        """Only the package, which registers all types, and its own file name the function that creates a type; nothing calls the package."""
+        create = re.compile(r'\bHyco(?:Material|Contact|Cone|ROM|SolverForm)Create_\w+')
+        own = {}
+        for path in sources():
+            if os.sep + 'package' + os.sep in path:
+                continue
+            for name in create.findall(code(path)):
+                own.setdefault(name, set()).add(os.path.relpath(path, SOURCE))
+            self.assertNotRegex(code(path), r'\bHycoInitializePackage\b', path)
+        self.assertGreater(len(own), 15)
+        self.assertEqual({name: paths for name, paths in own.items() if len(paths) > 1}, {})
 
     def test_options(self):
         """hyco -help lists the declarations of the code, once each; options queried by name elsewhere are declared."""
@@ -107,6 +123,7 @@ class Sources(unittest.TestCase):
             self.assertEqual(run.returncode, 0, f'{compiler[0]}: {run.stderr}')
 
     def test_public_headers_hide(self):
+        """Public headers include no private one, and compile in C++."""
         for path in glob.glob(os.path.join(SOURCE, 'include', '*.h')):
             self.assertNotIn('impl.h', text(path), path)
             if not path.endswith('hyco.h'):

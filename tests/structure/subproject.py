@@ -29,6 +29,7 @@ int main(int argc, char **argv)
 class Subproject(unittest.TestCase):
     @unittest.skipIf(os.environ.get('HYCO_SANITIZE') == '1', 'its flags are those of the other project')
     def test_static(self):
+        """A project in a folder with a blank builds and runs with the static library."""
         with tempfile.TemporaryDirectory(prefix='a b ') as folder:  # and a path with a blank
             for name, text in (('CMakeLists.txt', PROJECT.format(source='"' + os.path.dirname(SOURCE) + '"')), ('other.c', PROGRAM)):
                 with open(os.path.join(folder, name), 'w', encoding='ascii') as file:

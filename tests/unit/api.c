@@ -2,6 +2,7 @@
 #include "check.h"
 #include <hyco.h>
 
+/* NULL objects and arguments are refused by name. */
 static PetscErrorCode TestNull(void)
 {
   HycoSummary summary;
@@ -50,6 +51,7 @@ static PetscErrorCode TestNull(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A solver without a system, and queries before Solve, are refused. */
 static PetscErrorCode TestSolverOrder(void)
 {
   HycoSystem system;

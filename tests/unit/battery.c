@@ -2,7 +2,7 @@
   Every complementarity method through HycoSolver on every class of problems. The table `rules` defines which method is
   suitable for which class: a suitable one must find the known solution alone, to the tolerance; an unsuitable one must
   report this (a refusal, or not converged), and never return another result. The results are written as a table:
-  battery.md, one column for each class.
+  battery.csv, one column for each class.
 */
 #include "check.h"
 #include <fnmatch.h>
@@ -639,6 +639,69 @@ static PetscErrorCode Write(const char path[], int n_methods, const Method metho
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* -- measurements for scripts/bench-solvers -- */
+
+static int Ascending(const void *a, const void *b)
+{
+  return *(const PetscReal *)a > *(const PetscReal *)b ? 1 : -1;
+}
+
+/* A method on the form that hyco chooses for it, alone: a line of class, unknowns, contacts, method, reason,
+   iterations, median of five times (without the factor) and recomputed residual. */
+static PetscErrorCode MeasureOne(Problem *p, HycoSolver solver, const Class *c, const char name[])
+{
+  const PetscBool own = (PetscBool)(!strcmp(name, HYCO_SOLVER_ACTIVE_SET) || !strcmp(name, HYCO_SOLVER_LEMKE));
+  const Method m = {"", own ? name : HYCO_SOLVER_TAO, HYCO_FORM_AUTO, own ? NULL : name, PETSC_FALSE};
+  PetscReal seconds[5];
+  PetscInt n, contacts;
+  Outcome o = {.refused = PETSC_FALSE};
+
+  PetscFunctionBegin;
+  for (int k = 0; k < 5 && !o.refused; k++) {
+    PetscCall(Solve(p, solver, &m, PETSC_FALSE, &o));
+    seconds[k] = o.seconds;
+  }
+  qsort(seconds, 5, sizeof(seconds[0]), Ascending);
+  PetscCall(VecGetSize(p->F, &n));
+  PetscCall(VecGetSize(p->D, &contacts));
+  if (o.refused)
+    printf("%s,%d,%d,%s,refused,,,\n", c->name, (int)n, (int)contacts, name);
+  else
+    printf("%s,%d,%d,%s,%s,%d,%.3g,%.1e\n", c->name, (int)n, (int)contacts, name, o.reason > 0 ? "converged" : "failed",
+           (int)o.its, (double)seconds[2], (double)o.kkt);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -measure CLASS,... -methods NAME,... on problems of size -largest. */
+static PetscErrorCode Measure(char *list[], PetscInt n, PetscInt size)
+{
+  char *methods[16];
+  PetscInt n_methods = 16;
+  PetscBool given;
+
+  PetscFunctionBegin;
+  PetscCall(PetscOptionsGetStringArray(NULL, NULL, "-methods", methods, &n_methods, &given));
+  for (PetscInt k = 0; k < n; k++) {
+    const Class *c = classes;
+    Problem p = {.known = PETSC_FALSE};
+    HycoSolver solver;
+
+    while (c < classes + N_CLASSES && strcmp(c->name, list[k])) c++;
+    PetscCheck(c < classes + N_CLASSES, PETSC_COMM_SELF, PETSC_ERR_USER, "no class %s", list[k]);
+    p.comm = PETSC_COMM_SELF;
+    PetscCall(c->make(size, &p));
+    PetscCall(HycoSolverCreate(p.comm, &solver));
+    PetscCall(HycoSolverSetSystem(solver, p.system));
+    PetscCall(HycoSolverSetWarmStart(solver, PETSC_FALSE));
+    for (PetscInt m = 0; given && m < n_methods; m++) PetscCall(MeasureOne(&p, solver, c, methods[m]));
+    PetscCall(HycoSolverDestroy(&solver));
+    PetscCall(ProblemDestroy(&p));
+    PetscCall(PetscFree(list[k]));
+  }
+  for (PetscInt m = 0; given && m < n_methods; m++) PetscCall(PetscFree(methods[m]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Test(void)
 {
   Method methods[64];
@@ -646,13 +709,20 @@ static PetscErrorCode Test(void)
   Cell *cells;
   PetscInt largest = PETSC_MAX_INT; /* -largest N: no larger problems */
   PetscMPIInt size, rank;
-  char path[32];
+  char path[32], *measured[16];
+  PetscInt n_measured = 16;
+  PetscBool measure;
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   if (size > 1) largest = 200; /* MUMPS and communication take the time */
   PetscCall(PetscOptionsGetInt(NULL, NULL, "-largest", &largest, NULL));
+  PetscCall(PetscOptionsGetStringArray(NULL, NULL, "-measure", measured, &n_measured, &measure));
+  if (measure) {
+    PetscCall(Measure(measured, n_measured, largest));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(PetscCalloc1(N_CLASSES * n, &cells));
   for (int c = 0; c < N_CLASSES; c++) {
     const PetscReal begin = HycoNow();

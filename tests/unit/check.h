@@ -46,16 +46,33 @@ static inline double Draw(unsigned long long *state)
   return 2 * ((double)*state / (double)(1ULL << 48)) - 1;
 }
 
-/* main: runs Test() under hyco; 0 if every check passed. */
-#define TEST_MAIN                                                                                                      \
-  int main(int argc, char **argv)                                                                                      \
-  {                                                                                                                    \
+/* Runs Test() under hyco; 0 if every check passed. */
+#define TEST_RUN(argc, argv)                                                                                           \
+  do {                                                                                                                 \
     PetscErrorCode code;                                                                                               \
-    if (HycoInitialize(&argc, &argv)) return 2;                                                                        \
+    if (HycoInitialize(&(argc), &(argv))) return 2;                                                                    \
     code = Test();                                                                                                     \
     if (code) fprintf(stderr, "the test itself ended with error %d\n", (int)code);                                     \
     if (HycoFinalize()) return 2;                                                                                      \
     return code || check_failures ? 1 : 0;                                                                             \
+  } while (0)
+
+#define TEST_MAIN                                                                                                      \
+  int main(int argc, char **argv)                                                                                      \
+  {                                                                                                                    \
+    TEST_RUN(argc, argv);                                                                                              \
+  }
+
+/* The same for a test that reads PetscMallocGetCurrentUsage(): PETSc records its memory only if this is requested before
+   it starts. */
+#define TEST_MAIN_MEMORY                                                                                               \
+  int main(int argc, char **argv)                                                                                      \
+  {                                                                                                                    \
+    static char books[] = "-malloc_debug";                                                                             \
+    char *mine[3] = {argv[0], books, NULL}, **given = mine;                                                            \
+    int n = 2;                                                                                                         \
+    (void)argc;                                                                                                        \
+    TEST_RUN(n, given);                                                                                                \
   }
 
 #endif

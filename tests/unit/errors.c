@@ -1,4 +1,4 @@
-/* Errors: HYCO_ERR_NO_MODEL is distinguished from all others, on every rank. */
+/* HYCO_ERR_NO_MODEL is distinguished from all other errors, on every rank. */
 #include "check.h"
 #include <string.h>
 

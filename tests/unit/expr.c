@@ -82,6 +82,7 @@ static PetscErrorCode TestDependence(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Expressions that cannot be parsed, or are not finite, are refused. */
 static PetscErrorCode TestRefusals(void)
 {
   PetscReal value;

@@ -96,9 +96,10 @@ static PetscErrorCode TestRegistered(void)
     HycoForm form;
     HycoReason reason;
     const char *method;
-  } cases[] = {{1, HYCO_FORM_AUTO, HYCO_CONVERGED, "active_set mine"},
-               {3, HYCO_FORM_AUTO, HYCO_CONVERGED_FALLBACK, "active_set mine, then lemke"},
-               {3, HYCO_FORM_DUAL, HYCO_CONVERGED, "active_set dual"}};
+  } cases[] = {
+      {1, HYCO_FORM_AUTO, HYCO_CONVERGED, "active_set mine"},
+      {3, HYCO_FORM_AUTO, HYCO_CONVERGED_FALLBACK, "active_set mine, then tao gpcg, then tao tron, then lemke"},
+      {3, HYCO_FORM_DUAL, HYCO_CONVERGED, "active_set dual"}};
   Mat K;
   Vec F, D, x, L;
   HycoSystem system;

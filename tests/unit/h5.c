@@ -36,6 +36,7 @@ static PetscErrorCode Write(PetscBool commit)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Written data are read back; without a commit no file is left. */
 static PetscErrorCode TestRoundTrip(void)
 {
   HycoH5 file;
@@ -150,6 +151,7 @@ static PetscErrorCode Begin(size_t before, HycoFile *file, char name[HYCO_FILE_N
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Temporary names differ and tell their file; those of processes that have ended are removed. */
 static PetscErrorCode TestTemporary(void)
 {
   char mine[HYCO_FILE_NAME], other[HYCO_FILE_NAME], owner[HYCO_FILE_NAME], dead[2 * HYCO_FILE_NAME];

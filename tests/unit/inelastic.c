@@ -216,6 +216,7 @@ static PetscErrorCode CreateMaxwell(HycoMaterial law)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A law that this program registers, in one step of a bar: its stress in closed form. */
 static PetscErrorCode TestProgram(void)
 {
   static char *const names[] = {"scene_mesh", "body_block_law", "body_block_young", "body_block_rate", "history_times"};

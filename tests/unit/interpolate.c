@@ -115,6 +115,7 @@ static PetscErrorCode TestGrid(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Points outside the samples get the weights at the nearest end; samples in a line and twice the same. */
 static PetscErrorCode TestOutside(void)
 {
   const PetscReal line[3] = {1, 3, 2}, square[8] = {0, 0, 1, 0, 0, 1, 1, 1}, triangle[6] = {0, 0, 1, 0, 0, 1};

@@ -112,8 +112,9 @@ static PetscErrorCode TestRandom(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* K. G. Murty, Math. Programming Study 7 (1978) 61-73: triangular with 2s, hard for pivoting. With q = -e the solution
-   of the lower triangular one is z = (1, 0, ..., 0) (forward substitution), of the upper one z = (0, ..., 0, 1). */
+/* Murty's triangular matrices with 2s, hard for pivoting: with q = -e the solution of the lower triangular one is
+   z = (1, 0, ..., 0) (forward substitution), of the upper one z = (0, ..., 0, 1). K. G. Murty, Math. Programming Study 7
+   (1978) 61-73. */
 static PetscErrorCode TestMurty(void)
 {
   PetscFunctionBegin;
@@ -137,8 +138,8 @@ static PetscErrorCode TestMurty(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* I. Ben Gharbia, J. C. Gilbert, Math. Programming 134 (2012) 349-364: on this P-matrix the active set cycles from {1}:
-   {1}, {1,3}, {2,3}, {1,2}, {1,3}. The solution is z = e / 3, by symmetry. */
+/* Ben Gharbia and Gilbert's P-matrix, on which the active set cycles from {1}: {1}, {1,3}, {2,3}, {1,2}, {1,3}; the
+   solution is z = e / 3, by symmetry. I. Ben Gharbia, J. C. Gilbert, Math. Programming 134 (2012) 349-364. */
 static PetscErrorCode TestCycle(void)
 {
   const PetscReal M[9] = {1, 2, 0, 0, 1, 2, 2, 0, 1}, q[3] = {-1, -1, -1}; /* columns of [1 0 2; 2 1 0; 0 2 1] */

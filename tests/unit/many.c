@@ -97,6 +97,7 @@ static PetscErrorCode Unsorted(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A batch of points, and again after errors in the middle of it: the same forces. */
 static PetscErrorCode TestMany(HycoROMType type)
 {
   const PetscReal mu[8] = {0.1, 0.1, 0.2, 0.3, 0.35, 0.1, 0.4, 0.1};
@@ -168,18 +169,4 @@ static PetscErrorCode Test(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* PETSc records its memory only if this is requested before it starts. */
-int main(int argc, char **argv)
-{
-  static char books[] = "-malloc_debug";
-  char *mine[3] = {argv[0], books, NULL}, **given = mine;
-  int n = 2;
-  PetscErrorCode code;
-
-  (void)argc;
-  if (HycoInitialize(&n, &given)) return 2;
-  code = Test();
-  if (code) fprintf(stderr, "the test itself ended with error %d\n", (int)code);
-  if (HycoFinalize()) return 2;
-  return code || check_failures ? 1 : 0;
-}
+TEST_MAIN_MEMORY

@@ -42,6 +42,7 @@ static PetscErrorCode CreateMaxwell(HycoMaterial law)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Maxwell's law over several steps: stress, tangent and the factor of the next step. */
 static PetscErrorCode TestMemory(void)
 {
   const PetscReal young[2] = {100, 200}, rate[2] = {1e-3, 2e-3}, shift[2] = {0, 0}, strain[2] = {0.01, 0.02};
@@ -75,6 +76,7 @@ static PetscErrorCode TestMemory(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Hooke's law: stress and tangent by Lame's constants. */
 static PetscErrorCode TestElastic(PetscInt dim)
 {
   const PetscReal young = 210, poisson = 0.3, lambda = young * poisson / ((1 + poisson) * (1 - 2 * poisson)),

@@ -39,6 +39,7 @@ static PetscErrorCode CheckKKT(PetscInt m, PetscInt n, const PetscReal A[], cons
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Random problems: the conditions of optimality. */
 static PetscErrorCode TestRandom(void)
 {
   const PetscInt sizes[][2] = {{1, 1}, {5, 3}, {10, 10}, {40, 25}, {15, 40}, {98, 120}};

@@ -73,11 +73,12 @@ static PetscErrorCode TestLate(void)
   CHECK(n == before + 1, "%d options, %d before the type was registered", (int)n, (int)before);
   CHECK(HycoOptionFind("hyco_late"), "-hyco_late is not there");
   types = HycoOptionFind("hyco_model_type");
-  CHECK(types && strcmp(types->value, "<condensed|cubature|hybrid|late|projection|regression>") == 0,
+  CHECK(types && strcmp(types->value, "<bodies|condensed|cubature|hybrid|late|projection|regression>") == 0,
         "the types are %s", types->value);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A solver with a prefix reads its own options only. */
 static PetscErrorCode TestPrefix(void)
 {
   HycoSolver plain, other;
@@ -127,6 +128,7 @@ static char told[1 << 16];
     remove("view.txt");                                                                                                \
   } while (0)
 
+/* The views of all classes print their settings. */
 static PetscErrorCode TestViews(void)
 {
   const char *source = getenv("HYCO_SOURCE");

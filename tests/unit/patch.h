@@ -10,7 +10,7 @@ typedef struct {
   const char *name;
   int dim, nv, nf, gmsh_cell, gmsh_facet, n_nodes, n_cells, n_facets, first_inner; /* inner nodes: the last ones */
   double xyz[96][3];
-  int cell[12][27], facet[12][9];
+  int cell[12][27], facet[14][9];
   double volume; /* of the whole patch: 1 */
 } Patch;
 

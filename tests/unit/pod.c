@@ -120,6 +120,7 @@ static PetscErrorCode TestCriterion(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Columns of zeros have no mode, columns of one direction have one. */
 static PetscErrorCode TestZeroAndOne(void)
 {
   const PetscReal zero = 0, one = 7;
@@ -269,6 +270,7 @@ static PetscErrorCode TestMerged(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Merging columns of zeros gives no modes. */
 static PetscErrorCode TestMergedZeros(void)
 {
   const PetscReal zero = 0;

@@ -29,6 +29,7 @@ static PetscErrorCode TestHilbert(PetscBLASInt n, PetscReal common, PetscReal lo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The sum of products in twice the precision. */
 static PetscErrorCode TestProduct(void)
 {
   PetscReal sum[2] = {0, 0};

@@ -7,6 +7,7 @@ static char *const keys[] = {"scene_parameters", "parameter_a_range", "parameter
                              "scene_mesh"};
 static char *const values[] = {"a,b", "0,1", "-1,3", "a + 2*b", "none.msh"};
 
+/* Points of each kind of grid. */
 static PetscErrorCode TestGrids(HycoScene scene)
 {
   const PetscInt counts[2] = {2, 4}, lists[2] = {1, 2}, one[2] = {1, 1};
@@ -79,6 +80,7 @@ static PetscErrorCode FromFile(HycoScene scene, const char text[], PetscInt *n, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Points of a CSV file, columns in any order; wrong files are refused. */
 static PetscErrorCode TestFile(HycoScene scene)
 {
   PetscInt n;
@@ -261,6 +263,7 @@ static PetscErrorCode TestGroups(HycoScene scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Points outside their ranges are refused unless extrapolation is allowed. */
 static PetscErrorCode TestExtrapolate(HycoScene scene)
 {
   const PetscReal outside[2] = {0.5, 3.01};
@@ -276,6 +279,7 @@ static PetscErrorCode TestExtrapolate(HycoScene scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The known name that is nearest to a misspelled one. */
 static PetscErrorCode TestNearest(void)
 {
   const char *const names[] = {"young", "poisson", "map_x"};

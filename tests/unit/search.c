@@ -1,5 +1,5 @@
-/* The search for masters: the answers of several ranks are those of one to the bit, and those without a tree; the work
-   is divided; an error on one rank is raised on all. Pairs along the normals. */
+/* The search for masters: its points are those without a tree, and those with fewer patches that contain them; pairs along
+   the normals. */
 #include "check.h"
 #include "partners.h"
 #include <hycovector.h>
@@ -7,7 +7,6 @@
 #define MOST_PATCHES 5000
 #define N_SLAVES     1500
 
-static PetscMPIInt rank, size;
 static unsigned long long state = 7;
 
 /* A master of nf nodes a patch and its slaves. */
@@ -103,24 +102,48 @@ static PetscErrorCode Nearest(const Surfaces *s, const PetscReal x[3], PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Both kinds of query at n slaves; n_why[]: how often each verdict occurs. */
-static PetscErrorCode Compare(Surfaces *s, PetscInt n, PetscInt n_why[])
+/* Both kinds of query at all slaves, and at each alone on the patches that are not farther from it than its nearest
+   point; n_why[]: how often each verdict occurs. */
+static PetscErrorCode Compare(Surfaces *s, PetscInt n_why[])
 {
-  static HycoProjection one[N_SLAVES], many[N_SLAVES];
-  static HycoVerdict why[N_SLAVES], why_many[N_SLAVES];
-  HycoTeam team = {.comm = PETSC_COMM_WORLD};
+  static HycoProjection all[N_SLAVES];
+  static HycoVerdict why[N_SLAVES];
+  static PetscInt node[4 * MOST_PATCHES], number[MOST_PATCHES];
+  static PetscReal normal[3 * MOST_PATCHES];
 
   PetscFunctionBegin;
   for (PetscInt moved = 0; moved < 2; moved++) {
     const HycoQuery query = {.moved = (PetscBool)moved, .tolerance = 0.3, .small = 1e-3};
 
-    PetscCall(HycoPartnersAnswer(&s->t, &query, n, s->slave, one, why));
-    HycoOnRootWithTeam(&team, HycoTeamSearch(&team, &s->t, &query, n, s->slave, many, why_many));
-    for (PetscInt k = 0; k < n && rank == 0; k++) {
-      CHECK(why[k] == why_many[k] && Same(&one[k], &many[k]),
-            "nf %d, slave %d of %d: verdict %d, distance %.17g; alone %d, %.17g", (int)s->t.nf, (int)k, (int)n,
-            (int)why_many[k], (double)many[k].distance, (int)why[k], (double)one[k].distance);
+    PetscCall(HycoPartnersSearch(&s->t, &query, N_SLAVES, s->slave, all, why));
+    for (PetscInt k = 0; k < N_SLAVES; k++) {
+      HycoPartners few = s->t;
+      HycoProjection at, any;
+      HycoVerdict here;
+
       n_why[why[k]]++;
+      if (k % 30) continue;
+      HycoPartnersProject(&s->t, s->slave[k], PETSC_TRUE, &any);
+      few.patches = NULL;
+      few.node = node;
+      few.normal = normal;
+      few.n = few.n_border = 0;
+      few.border = NULL;
+      few.at_border = NULL;
+      for (PetscInt f = 0; f < s->t.n; f++) { /* not farther: by the distances of its nodes and their spread */
+        const PetscReal *x = s->X + 3 * s->slave[k], *first = s->X + 3 * s->node[f * s->t.nf];
+
+        if (HycoDistance(x, first) > any.distance + 3) continue;
+        number[few.n] = f;
+        PetscCall(PetscArraycpy(node + few.n * s->t.nf, s->node + f * s->t.nf, s->t.nf));
+        PetscCall(PetscArraycpy(normal + 3 * few.n++, s->normal + 3 * f, 3));
+      }
+      PetscCall(HycoPartnersSearch(&few, &query, 1, &s->slave[k], &at, &here));
+      at.patch = at.n ? number[at.patch] : 0;
+      CHECK(here == why[k] && Same(&all[k], &at),
+            "nf %d, slave %d: verdict %d, distance %.17g; of all patches %d, %.17g", (int)s->t.nf, (int)k, (int)here,
+            (double)at.distance, (int)why[k], (double)all[k].distance);
+      PetscCall(HycoPartnersForget(&few));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -142,6 +165,7 @@ static PetscErrorCode CompareNearest(Surfaces *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The points are those of fewer patches, and those without a tree. */
 static PetscErrorCode TestSame(Surfaces *s)
 {
   PetscInt n_why[HYCO_PAST + 1] = {0};
@@ -150,35 +174,12 @@ static PetscErrorCode TestSame(Surfaces *s)
   for (PetscInt nf = 1; nf <= 4; nf++) {
     for (PetscInt shape = 0; shape < 2; shape++) {
       Draws(s, nf, shape ? 30 : 200, shape ? 30 : 3);
-      PetscCall(Compare(s, N_SLAVES, n_why));
-      for (PetscInt n = 1; n < 10; n++) PetscCall(Compare(s, n, n_why)); /* a rank's block may be one slave, or none */
+      PetscCall(Compare(s, n_why));
       PetscCall(CompareNearest(s));
       PetscCall(HycoPartnersForget(&s->t));
     }
   }
-  for (PetscInt w = 0; w <= HYCO_PAST; w++) CHECK(rank || n_why[w] > 0, "the verdict %d does not occur", (int)w);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Each rank answers its share of the queries. On a strip cut across, its block is 1 / size of the length, and no
-   slave's nearest point is farther than half of the block's diagonal beyond its ends: 2 / size of the patches, and a
-   little. */
-static PetscErrorCode TestDivided(Surfaces *s)
-{
-  static HycoProjection at[N_SLAVES];
-  static HycoVerdict why[N_SLAVES];
-  const HycoQuery query = {.moved = PETSC_TRUE, .tolerance = 1};
-  HycoTeam team = {.comm = PETSC_COMM_WORLD};
-  PetscInt64 all;
-
-  PetscFunctionBegin;
-  Draws(s, 4, 800, 2);
-  HycoOnRootWithTeam(&team, HycoTeamSearch(&team, &s->t, &query, N_SLAVES, s->slave, at, why));
-  PetscCallMPI(MPI_Allreduce(&team.queries, &all, 1, MPIU_INT64, MPI_SUM, PETSC_COMM_WORLD));
-  CHECK(all == N_SLAVES, "%d queries of %d", (int)all, N_SLAVES);
-  CHECK(team.queries <= N_SLAVES / size + 2, "%d of %d queries on a rank", (int)team.queries, N_SLAVES);
-  CHECK(team.patches <= 2.2 / size * s->t.n, "%d of %d patches", (int)team.patches, (int)s->t.n);
-  CHECK(rank || team.whole == s->t.n, "%d patches, of %d", (int)team.whole, (int)s->t.n);
+  for (PetscInt w = 0; w <= HYCO_PAST; w++) CHECK(n_why[w] > 0, "the verdict %d does not occur", (int)w);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -236,55 +237,14 @@ static PetscErrorCode TestAlong(Surfaces *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode (*malloc_of_petsc)(size_t, PetscBool, int, const char[], const char[], void **);
-
-/* Without memory for more than a few kB. */
-static PetscErrorCode Little(size_t bytes, PetscBool clear, int line, const char function[], const char file[],
-                             void **p)
-{
-  if (bytes > 4096) SETERRQ(PETSC_COMM_SELF, PETSC_ERR_MEM, "little memory on one rank");
-  return (*malloc_of_petsc)(bytes, clear, line, function, file, p);
-}
-
-static PetscErrorCode Search(Surfaces *s, HycoTeam *team)
-{
-  static HycoProjection at[N_SLAVES];
-  static HycoVerdict why[N_SLAVES];
-  const HycoQuery query = {.moved = PETSC_TRUE, .tolerance = 1};
-
-  PetscFunctionBegin;
-  HycoOnRootWithTeam(team, HycoTeamSearch(team, &s->t, &query, N_SLAVES, s->slave, at, why));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode TestError(Surfaces *s)
-{
-  HycoTeam team = {.comm = PETSC_COMM_WORLD};
-
-  PetscFunctionBegin;
-  Draws(s, 4, 60, 20);
-  malloc_of_petsc = PetscTrMalloc;
-  for (PetscMPIInt ill = 0; ill < size; ill++) {
-    if (rank == ill) PetscTrMalloc = Little;
-    CHECK_FAILS(Search(s, &team), "little memory on one rank");
-    PetscTrMalloc = malloc_of_petsc;
-    PetscCall(Search(s, &team));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode Test(void)
 {
   Surfaces *s;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(PetscNew(&s));
   PetscCall(TestSame(s));
-  PetscCall(TestDivided(s));
   PetscCall(TestAlong(s));
-  PetscCall(TestError(s));
   PetscCall(PetscFree(s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

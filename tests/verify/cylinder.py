@@ -54,6 +54,7 @@ class Cylinder(Verify):
         return float(np.mean(np.einsum('ij,ij->i', out['nodes/displacement'][on, :2], x[on, :2]) / b))
 
     def test_perfectly_plastic(self):
+        """Perfectly plastic: displacement at given pressures."""
         exact = {100: .0577778, 140: .087287, 180: .154016, 190: .205348}
         h, out = self.path_of(self.tube(100, 200, 48), 'law: j2, young: 210000, poisson: 0.3, yield: 240',
                               [0, *exact], '[0, 0], [200, 200]', '-hyco_substeps', '20', '-hyco_newton', 'tangent')
@@ -63,6 +64,7 @@ class Cylinder(Verify):
         self.assertLessEqual(max(h['most_iterations']), 8)
 
     def test_steady_creep(self):
+        """Steady creep by Norton's law: rate of the displacement, stresses."""
         a, b, p, rate = 1, 2, 1e-3, 1.0
         for n, A in ((3, 1e6), (5, 1e12)):
             D = (b / a)**(2 / n) - 1
@@ -77,6 +79,7 @@ class Cylinder(Verify):
             self.row(f'steady creep, n = {n}: order', order(1 / np.array(sizes), abs(np.array(found) - exact)), 2, 10)
 
     def test_maxwell(self):
+        """A Maxwell material: displacement and stresses in time."""
         _, out = self.path_of(self.tube(1, 2, 32), 'law: norton, young: 1, poisson: 0.3, rate: 1, exponent: 1',
                               [0, 0.9], '[0, 1e-3]', '-hyco_substeps', '200')
         self.row('SSNA104: displacement of the outer surface', self.outside(out[1], 2), 2.14498e-3, 0.1)

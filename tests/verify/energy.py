@@ -43,6 +43,7 @@ class Energy(Verify):
         self.row(f'{title}, radius {radius}, 25 steps: largest defect', table[:, 4].max(), 0, 1e-10)
 
     def test_pellet(self):
+        """The energy identity of the pellet, for several radii and meshes."""
         for radius in (4.02, 4.06, 4.1):
             self.ramp('pellet A', radius)
         self.ramp('pellet B', 4.06, '-scene_mesh', os.path.join(PELLET, 'B.msh'))

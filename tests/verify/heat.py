@@ -70,6 +70,7 @@ class Heat(Verify):
             self.row(f'held, {kind} {element}: stress', stress[np.argmax(abs(stress - exact))], exact, 1e-9)
 
     def test_ranks(self):
+        """Thermal strain on 3 ranks: the fields of one."""
         one = self.run_box('hex8', 3, 'bbar', '0', temperature='hot*(1 + x*y)')[1]
         three = self.run_box('hex8', 3, 'bbar', '0', temperature='hot*(1 + x*y)', ranks=3)[1]
         for name in ('nodes/displacement', 'cells/stress'):

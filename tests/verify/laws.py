@@ -15,6 +15,7 @@ class Laws(Verify):
     name = 'laws'
 
     def test_points(self):
+        """Every law at a point against its closed form."""
         run = subprocess.run([PROGRAM], capture_output=True, text=True, timeout=100 * PATIENCE, check=False)
         self.assertEqual(run.returncode, 0, run.stderr)
         rows = [line.split('\t') for line in run.stdout.splitlines()]

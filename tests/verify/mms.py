@@ -137,6 +137,7 @@ class Manufactured(Verify):
     name = 'mms'
 
     def test_orders(self):
+        """Orders of the error in L2 and H1 on each type of cell."""
         for kind, sizes in SIZES.items():
             found = []
             for n in sizes:

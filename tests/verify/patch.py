@@ -155,6 +155,7 @@ class Patch(Held):
         return m['lambda']
 
     def test_matching(self):
+        """Matching meshes, pair and surface: uniform, equal pressure on each type of cell."""
         for kind, dim in KINDS.items():
             with self.subTest(kind=kind):
                 forces = []
@@ -278,6 +279,7 @@ class Crowned(Held):
             self.assertLess(max(e.values()), 1e-9)
 
     def test_methods(self):
+        """A crowned block by several methods: equal forces."""
         for kind in ('quad4', 'tet4'):
             scene = self.crowned(kind, 5, 6)
             forces = []

@@ -38,6 +38,7 @@ class Punch(Verify):
             return [float(row['total_contact_force']) for row in csv.DictReader(f)][-2:]
 
     def test_limit(self):
+        """The mean pressure is the limit, and does not grow any more."""
         for fine, bound in ((0.05, 3), (0.025, 2)):
             before, last = self.pressures(fine, '')
             self.row(f'mean pressure, bbar, elements of {fine} at the edge', last, LIMIT, bound)

@@ -12,6 +12,7 @@ class Ranks(Verify):
     name = 'ranks'
 
     def test_solutions(self):
+        """Every example on 2 to 4 ranks."""
         for scene, mu in POINTS.items():
             args = (os.path.join(SOURCE, 'examples', scene), '-mu', mu)
             one = self.solve(*args)[1]

@@ -51,6 +51,7 @@ class Refine(Verify):
             self.row(f'{kind} order in H1, refined', order([1, 0.5], h1), 1, 5)
 
     def test_refusals(self):
+        """Values of -scene_refine that are no number from 0 to 12 are refused."""
         dim, grid = straight('quad4', 2)
         folder = self.scene(scene(dim), grid)
         for value in ('-1', 'a', '99'):

@@ -86,6 +86,7 @@ class Revolution(Verify):
         return self.solve(self.scene(text, grid))
 
     def test_fit(self):
+        """A shrink fit, axisymmetric and in plane stress: pressure and order of the error."""
         sizes = (8, 16, 32)
         held = lame.pressure(1, 2, 3, (2e5, 0.25), (1e5, 0.35), 1e-3)
         free = 1e-3 / (2 * ((13 / 5 + 0.35) / 1e5 + (5 / 3 - 0.25) / 2e5))
@@ -171,6 +172,7 @@ class Revolution(Verify):
         self.row('pellet: end of the closed gap, to a layer', max(fields['at'][fields['lambda'] > 0][:, 2]), closed, 100 * 0.17 / closed)
 
     def test_hot(self):
+        """A hot disc: the stresses of Timoshenko and Goodier."""
         grid = Grid()
         n = 24
         grid.box('quad4', [np.linspace(0.03, 3, n + 1), np.linspace(0, np.pi / 2, 2 * n + 1)], lame.polar, 'disc', {'y0': 'y0', 'y1': 'x0'})

@@ -123,6 +123,7 @@ class Ring(Paths):
     name = 'ring'
 
     def test_shrink_fit(self):
+        """A shrink fit that relaxes: pressure in time, order in the time step."""
         self.judge_order('shrink fit', [self.path_of(4, k, 0, -0.01, 8, '-hyco_step_inelastic', 1)[1] for k in (40, 80, 160)])
         t, p, _ = self.path_of(8, 640, 0, -0.01, 8)
         self.row('shrink fit: p at t = 0', p[0], relaxing(0), 0.1)
@@ -130,6 +131,7 @@ class Ring(Paths):
             self.row(f'shrink fit: p at t = {t[k]:g}', p[k], relaxing(t[k]), 0.2)
 
     def test_closing(self):
+        """A gap that closes by creep."""
         self.judge_closing('closing', self.path_of(8, 1280, 50, 0.02, 6), (3, 4, 6))
 
     def test_pellet(self):
@@ -140,6 +142,7 @@ class Ring(Paths):
                 self.row(f'pellet {mesh}, z held: p at t = {t[k]:g}', p[k], relaxing(t[k]), bound)
 
     def test_pellet_closing(self):
+        """The gap of the pellet's meshes, all z held, closes by creep."""
         begin = [self.judge_closing(f'pellet {mesh}, z held, closing', self.pellet_path(self.two_layers(mesh), steps, 50, 0.02, end), at,
                                     off, bound)
                  for mesh, steps, end, at, off, bound in (('A', 80, 2, (), 2, 0), ('B', 80, 2, (), 0.5, 0), ('C', 240, 12, (12,), 0.5, 0.3))]

@@ -128,6 +128,7 @@ class Rope(Verify):
     name = 'rope'
 
     def test_convergence(self):
+        """Displacement, force and contact zone converge to the exact ones."""
         exact, found = Exact(), []
         for n in NODES:
             grid = Grid()

@@ -84,6 +84,7 @@ class Sphere(Spheres):
     name = 'sphere'
 
     def test_section(self):
+        """The axisymmetric section of the sphere."""
         at = (20, 40, 60, 80)
         self.judge('axisymmetric', self.forces(24, at, 8, False), at)
 

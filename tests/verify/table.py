@@ -1,4 +1,4 @@
-"""The table of the verification: every test's rows, aligned, printed and written to verify.md; fails if a row is out
+"""The table of the verification: every test's rows, aligned and printed, and written to verify.csv; fails if a row is out
 of its bound or a test's rows are missing. Its output is also stored in verify/new, for the end of ctest's output."""
 import csv
 import os
@@ -26,9 +26,10 @@ def main():
     lines = ['| ' + ' | '.join(cell.ljust(w) for cell, w in zip(row, width)) + ' |' for row in (HEAD, *rows)]
     lines.insert(1, '|' + '|'.join('-' * (w + 2) for w in width) + '|')
     text = '\n'.join(lines) + '\n'
-    for path in ('verify.md', os.path.join(FOLDER, 'new')):
-        with open(path, 'w', encoding='utf-8') as f:
-            f.write(text)
+    with open('verify.csv', 'w', encoding='utf-8', newline='') as f:
+        csv.writer(f, lineterminator='\n').writerows((HEAD, *rows))
+    with open(os.path.join(FOLDER, 'new'), 'w', encoding='utf-8') as f:
+        f.write(text)
     print(text)
     sys.exit('\n'.join(problems) or 0)
 

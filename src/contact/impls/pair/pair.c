@@ -100,6 +100,7 @@ static PetscErrorCode Settle(HycoPartners *t, HycoContact c, HycoMatch *m)
   PetscFunctionBegin;
   PetscCall(AreMatched(t->fe->mesh, m->n, m->at, NULL, PetscMin(m->small, m->tolerance), &matched));
   for (PetscInt k = 0; k < m->n; k++) matched = (PetscBool)(matched && m->why[k] == HYCO_MET);
+  HycoCheck(matched || !m->part, "contact %s: its nodes are not matched as drawn", c->name);
   if (!matched) PetscCall(MatchAlong(t, c, m));
   PetscCall(CheckMasters(t->fe->mesh, c, m));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -170,5 +171,6 @@ PetscErrorCode HycoContactCreate_Pair(HycoContact contact)
   PetscFunctionBegin;
   PetscCall(HycoPartnersDeclare(contact));
   PetscCall(HycoContactSetOps(contact, &ops));
+  contact->matched = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -13,6 +13,8 @@ static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs 
 
   PetscFunctionBegin;
   PetscCall(HycoMeshFindGroup(m, "contact", c->master, &g));
+  if (pairs->facts && m->group_start[g + 1] == m->group_start[g])
+    PetscFunctionReturn(PETSC_SUCCESS); /* no slaves here */
   HycoCheck(m->group_start[g + 1] == m->group_start[g] + 1,
             "contact %s: its master is the one node that the rigid body moves with, and %s has %d nodes; give a group "
             "of one point",

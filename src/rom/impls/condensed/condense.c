@@ -276,8 +276,9 @@ static PetscErrorCode TakeSurfaces(HycoReducer t, HycoCondensed c)
   }
   for (PetscInt k = 0; k < t->scene->n_contacts; k++)
     PetscCall(HycoMeshFindGroup(surface, "contact", t->scene->contact[k]->slave, &all[k]));
-  PetscCall(HycoMeshExtract(surface, 0, NULL, n_extra, extra, t->scene->n_contacts, all, &s->mesh));
-  for (PetscInt i = 0; i < s->mesh->n_nodes; i++) index[s->mesh->node_whole[i]] = i;
+  PetscCall(HycoSubmesh(t->scene, surface, 0, NULL, n_extra, extra, t->scene->n_contacts, all, &s->mesh));
+  PetscCall(HycoSubmeshNodes(s->mesh, surface, extra));
+  for (PetscInt i = 0; i < s->mesh->n_nodes; i++) index[extra[i]] = i;
   PetscCall(HycoPairsRenumber(&t->fom->pairs, index, &s->pairs));
   PetscCall(HycoFECreate(t->scene, s->mesh, &s->fe));
   PetscCall(HycoRowsCreate(&t->fom->pairs, surface->dim, &s->rows));
@@ -559,7 +560,7 @@ static PetscErrorCode CutModes(HycoCondensed c, PetscInt l)
 
 PetscErrorCode HycoCondensedBuild(HycoROM m, HycoReducer t)
 {
-  HycoCondensed c = Condensing(t)->condensed, none = (HycoCondensed)m->data;
+  HycoCondensed c = Condensing(t)->condensed, none = (HycoCondensed)m->model->data;
 
   PetscFunctionBegin;
   if (t->scene->n_times) {
@@ -572,9 +573,9 @@ PetscErrorCode HycoCondensedBuild(HycoROM m, HycoReducer t)
   PetscCall(HycoCondensedResetSystem(c));
   PetscCall(CutModes(c, t->l));
   PetscCall(HycoCondensedFree(&none));
-  m->data = c;
+  m->model->data = c;
   Condensing(t)->condensed = NULL;
-  for (PetscInt k = 0; k < m->pairs.n; k++) m->in_rid[k] = 1;
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) m->model->in_rid[k] = 1;
   PetscCall(HycoROMSetFE(m, HYCO_HYBRID_CONTACT, 0, NULL));
   PetscCall(HycoReducerJudge(t, m));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -29,6 +29,16 @@ PetscErrorCode HycoCondensedCreate(PetscInt dim, PetscInt m, PetscInt l, HycoCon
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Frees what HycoCondensedPrepare() and the solves have allocated. */
+static PetscErrorCode FreeWork(HycoCondensed c)
+{
+  PetscFunctionBegin;
+  HycoFreeAll(&c->inverse, &c->theta_scale, &c->node_stiff, &c->node_load, &c->packed, &c->M, &c->work, &c->g, &c->H,
+              &c->a, &c->active);
+  PetscCall(HycoCondensedResetSystem(c));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoCondensedFree(HycoCondensed *condensed)
 {
   HycoCondensed c = *condensed;
@@ -37,9 +47,8 @@ PetscErrorCode HycoCondensedFree(HycoCondensed *condensed)
   if (!c) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt p = 0; p < c->dim; p++) PetscCall(PetscFree(c->x[p]));
   for (PetscInt f = 0; f < HYCO_N_FIELDS; f++) PetscCall(PetscFree(c->field[f].data));
-  HycoFreeAll(&c->Lambda, &c->bounds, &c->law, &c->flat, &c->sample, &c->probe, &c->inverse, &c->theta_scale,
-              &c->node_stiff, &c->node_load, &c->packed, &c->M, &c->work, &c->g, &c->H, &c->a, &c->active);
-  PetscCall(HycoCondensedResetSystem(c));
+  HycoFreeAll(&c->Lambda, &c->bounds, &c->law, &c->flat, &c->sample, &c->probe);
+  PetscCall(FreeWork(c));
   PetscCall(PetscFree(*condensed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -224,7 +233,7 @@ PetscErrorCode HycoCondensedFlexibility(HycoCondensed c, const PetscReal mu[], P
 /* Updates G and H, unless their parameters are unchanged. */
 static PetscErrorCode BringStiffness(HycoROM m, const PetscReal mu[])
 {
-  HycoCondensed c = (HycoCondensed)m->data;
+  HycoCondensed c = (HycoCondensed)m->work;
   PetscBool same = c->current, definite;
 
   PetscFunctionBegin;
@@ -280,7 +289,7 @@ static void StartSet(HycoCondensed c, const PetscReal mu[])
 /* The result is in model->Lambda. */
 static PetscErrorCode SolveForces(HycoROM m, const PetscReal mu[])
 {
-  HycoCondensed c = (HycoCondensed)m->data;
+  HycoCondensed c = (HycoCondensed)m->work;
   HycoPrediction *p = &m->prediction;
   const char *method;
 
@@ -301,8 +310,8 @@ static PetscErrorCode SolveForces(HycoROM m, const PetscReal mu[])
 /* gamma = a - H L, and U = u0 + V gamma on the nodes of the reduced mesh. */
 static PetscErrorCode Displacements(HycoROM m, const PetscReal mu[])
 {
-  HycoCondensed c = (HycoCondensed)m->data;
-  const PetscInt l = m->l;
+  HycoCondensed c = (HycoCondensed)m->work;
+  const PetscInt l = m->model->l;
 
   PetscFunctionBegin;
   PetscCall(HycoCondensedEvaluate(c, HYCO_FIELD_FREE, mu, -1, -1, c->a));
@@ -317,7 +326,7 @@ static PetscErrorCode Displacements(HycoROM m, const PetscReal mu[])
 
 static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
 {
-  HycoCondensed c = (HycoCondensed)m->data;
+  HycoCondensed c = (HycoCondensed)m->work;
   HycoPrediction *p = &m->prediction;
   PetscReal begin = HycoNow(), solve;
 
@@ -391,13 +400,22 @@ PetscErrorCode HycoCondensedSolveForces(HycoCondensed c, PetscReal forces[], Pet
 
 static PetscErrorCode SetUp(HycoROM m)
 {
-  HycoCondensed c = (HycoCondensed)m->data;
+  HycoCondensed c = (HycoCondensed)m->work;
 
   PetscFunctionBegin;
   PetscCall(HycoROMSetUpDefault(m));
+  *c = *(HycoCondensed)m->model->data; /* the fields stay the model's */
+  c->inverse = c->theta_scale = c->packed = c->M = c->work = c->g = c->H = c->a = NULL;
+  c->node_stiff = c->node_load = NULL;
+  c->active = NULL;
+  c->solver = NULL;
+  c->system = NULL;
+  c->flexibility = NULL;
+  c->forces = NULL;
+  c->current = c->solved = PETSC_FALSE;
   PetscCall(HycoCondensedPrepare(c));
-  c->given = (HycoGapSource){m->fe, &m->pairs, m->rows};
-  c->scene = m->scene;
+  c->given = (HycoGapSource){m->fe, &m->model->pairs, m->rows};
+  c->scene = m->model->scene;
   if (c->exact_loads) PetscCall(HycoCondensedPrepareLoads(c));
   PetscCall(CreateSystem(c, m->Lambda, m->solver));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -405,25 +423,25 @@ static PetscErrorCode SetUp(HycoROM m)
 
 static PetscErrorCode View(HycoROM m, PetscViewer viewer)
 {
-  HycoCondensed c = (HycoCondensed)m->data;
+  HycoCondensed c = (HycoCondensed)m->model->data;
 
   PetscFunctionBegin;
   PetscCall(PetscViewerASCIIPrintf(viewer, "  contacts: %d; flexibility at %d points, gap without forces at %d\n",
                                    (int)c->m, (int)HycoTensorSize(&c->field[HYCO_FIELD_G].tensor),
                                    (int)HycoTensorSize(&c->field[HYCO_FIELD_GAP].tensor)));
   for (PetscInt p = 0; p < c->dim; p++)
-    PetscCall(PetscViewerASCIIPrintf(viewer, "  %s: %d values; degree %d of the flexibility, %d of the gap%s\n",
-                                     m->scene->parameter[p], (int)c->n[p], (int)c->field[HYCO_FIELD_G].tensor.degree[p],
-                                     (int)c->field[HYCO_FIELD_GAP].tensor.degree[p],
-                                     c->affine[p] ? " (affine: exact)" : ""));
+    PetscCall(PetscViewerASCIIPrintf(
+        viewer, "  %s: %d values; degree %d of the flexibility, %d of the gap%s\n", m->model->scene->parameter[p],
+        (int)c->n[p], (int)c->field[HYCO_FIELD_G].tensor.degree[p], (int)c->field[HYCO_FIELD_GAP].tensor.degree[p],
+        c->affine[p] ? " (affine: exact)" : ""));
   if (c->exact_gap)
     PetscCall(PetscViewerASCIIPrintf(viewer, "  from the scene itself: gaps%s\n", c->exact_loads ? ", loads" : ""));
   PetscCall(PetscViewerASCIIPrintf(
       viewer, "  relative errors with one value left out: flexibility %.1e, gap %.1e, forces %.1e\n",
       (double)c->errors[0], (double)c->errors[1], (double)c->errors[2]));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  fields and stresses on %d of %d elements, or the whole mesh\n",
-                                   (int)m->mesh->n_cells, (int)m->whole_cells));
-  if (!m->estimates.n)
+                                   (int)m->model->mesh->n_cells, (int)m->model->whole_cells));
+  if (!m->model->estimates.n)
     PetscCall(PetscViewerASCIIPrintf(viewer, "  error estimates: from values left out%s\n",
                                      !c->law && c->errors_u[0] < 0 ? ", none of u (an older file)" : ""));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -432,17 +450,17 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
 static PetscErrorCode Reset(HycoROM m)
 {
   PetscFunctionBegin;
-  PetscCall(HycoCondensedResetSystem((HycoCondensed)m->data));
+  PetscCall(FreeWork((HycoCondensed)m->work));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode Destroy(HycoROM m)
 {
-  HycoCondensed c = (HycoCondensed)m->data;
+  HycoCondensed c = (HycoCondensed)m->model->data;
 
   PetscFunctionBegin;
   PetscCall(HycoCondensedFree(&c));
-  m->data = NULL;
+  m->model->data = NULL;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -469,7 +487,7 @@ static void ReportPoints(HycoReducer t, HycoCondensed c, HycoTraining *r)
 
 static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
 {
-  HycoCondensed c = (HycoCondensed)m->data;
+  HycoCondensed c = (HycoCondensed)m->model->data;
   const PetscInt n = HycoTensorSize(&c->field[HYCO_FIELD_G].tensor);
 
   PetscFunctionBegin;
@@ -497,6 +515,7 @@ static PetscReal Cost(HycoReducer t, const HycoAttempt *a)
 PetscErrorCode HycoROMCreate_Condensed(HycoROM m)
 {
   static const HycoROMTraits traits = {.title = "condensed",
+                                       .work = sizeof(*(HycoCondensed)NULL),
                                        .settings = HYCO_SETTINGS_NONE,
                                        .constrains = PETSC_TRUE,
                                        .forces = PETSC_TRUE,

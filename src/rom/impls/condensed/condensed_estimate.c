@@ -29,7 +29,7 @@ PetscErrorCode HycoCondensedFeatures(HycoROM m, PetscReal misfit[2])
   PetscReal law[HYCO_N_LAWS];
 
   PetscFunctionBegin;
-  Law((HycoCondensed)m->data, m->fe->mu, law);
+  Law((HycoCondensed)m->work, m->fe->mu, law);
   misfit[0] = PetscMax(0, law[HYCO_LAW_LAMBDA]);
   misfit[1] = PetscMax(0, law[HYCO_LAW_U]);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -37,7 +37,7 @@ PetscErrorCode HycoCondensedFeatures(HycoROM m, PetscReal misfit[2])
 
 PetscErrorCode HycoCondensedEstimate(HycoROM m, HycoPrediction *p)
 {
-  const HycoCondensed c = (HycoCondensed)m->data;
+  const HycoCondensed c = (HycoCondensed)m->work;
   PetscReal growth = 1, law[HYCO_N_LAWS];
 
   PetscFunctionBegin;

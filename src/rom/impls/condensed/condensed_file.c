@@ -27,15 +27,16 @@ static PetscErrorCode MoveGiven(HycoH5 h, HycoCondensed c)
 /* The values of parameter p: ascending. */
 static PetscErrorCode MoveValues(HycoH5 h, HycoROM m, PetscInt p)
 {
-  HycoCondensed c = (HycoCondensed)m->data;
+  HycoCondensed c = (HycoCondensed)m->model->data;
   char path[64];
 
   PetscFunctionBegin;
   PetscCall(PetscSNPrintf(path, sizeof(path), "condensed/values_%d", (int)p));
   if (HycoH5Reads(h)) c->n[p] = -1;
   PetscCall(HycoH5Real(h, path, &c->n[p], 1, &c->x[p]));
-  HycoCheck(c->n[p] > 0, "%s: %s is damaged", m->path, path);
-  for (PetscInt k = 1; k < c->n[p]; k++) HycoCheck(c->x[p][k] > c->x[p][k - 1], "%s: %s is damaged", m->path, path);
+  HycoCheck(c->n[p] > 0, "%s: %s is damaged", m->model->path, path);
+  for (PetscInt k = 1; k < c->n[p]; k++)
+    HycoCheck(c->x[p][k] > c->x[p][k - 1], "%s: %s is damaged", m->model->path, path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -52,7 +53,7 @@ static PetscErrorCode MoveLaw(HycoH5 h, HycoCondensed c)
 
 static PetscErrorCode MoveField(HycoH5 h, HycoROM m, PetscInt f)
 {
-  HycoCondensed c = (HycoCondensed)m->data;
+  HycoCondensed c = (HycoCondensed)m->model->data;
   HycoGridField *field = &c->field[f];
   PetscInt n = HycoTensorSize(&field->tensor);
   char path[64];
@@ -61,7 +62,7 @@ static PetscErrorCode MoveField(HycoH5 h, HycoROM m, PetscInt f)
   PetscCall(PetscSNPrintf(path, sizeof(path), "condensed/degree_%s", HycoGridFieldNames[f]));
   PetscCall(HycoH5Ints(h, path, 0, PETSC_MAX_INT, c->dim, field->tensor.degree));
   for (PetscInt p = 0; p < c->dim; p++)
-    HycoCheck(field->tensor.degree[p] < field->tensor.n[p], "%s: %s is damaged", m->path, path);
+    HycoCheck(field->tensor.degree[p] < field->tensor.n[p], "%s: %s is damaged", m->model->path, path);
   Dataset(c, f, path);
   PetscCall(HycoH5Real(h, path, &n, field->rows, &field->data));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -69,18 +70,18 @@ static PetscErrorCode MoveField(HycoH5 h, HycoROM m, PetscInt f)
 
 PetscErrorCode HycoCondensedMove(HycoROM m, HycoH5 h)
 {
-  HycoCondensed c = (HycoCondensed)m->data;
+  HycoCondensed c = (HycoCondensed)m->model->data;
   PetscInt n;
 
   PetscFunctionBegin;
-  if (m->scene->n_times) { /* already read: a model of paths has its own */
+  if (m->model->scene->n_times) { /* already read: a model of paths has its own */
     PetscCall(HycoCondensedTakePath(m));
     PetscCall((*m->ops->load)(m, h));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  c->dim = m->scene->n_parameters;
-  c->m = m->pairs.n;
-  c->l = m->l;
+  c->dim = m->model->scene->n_parameters;
+  c->m = m->model->pairs.n;
+  c->l = m->model->l;
   for (PetscInt p = 0; p < c->dim; p++) PetscCall(MoveValues(h, m, p));
   PetscCall(HycoH5Ints(h, "condensed/stiff", 0, 1, c->dim, c->stiff));
   PetscCall(HycoH5Ints(h, "condensed/affine", 0, 1, c->dim, c->affine));
@@ -96,7 +97,7 @@ PetscErrorCode HycoCondensedMove(HycoROM m, HycoH5 h)
   PetscCall(HycoH5Real(h, "condensed/bounds", &n, 2, &c->bounds));
   for (PetscInt k = 0; k < n; k++)
     HycoCheck(c->bounds[2 * k] >= 0 && c->bounds[2 * k + 1] >= c->bounds[2 * k], "%s: condensed/bounds is damaged",
-              m->path);
+              m->model->path);
   for (PetscInt f = 0; f < HYCO_N_FIELDS; f++) PetscCall(MoveField(h, m, f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

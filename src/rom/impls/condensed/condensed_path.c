@@ -70,9 +70,9 @@ PetscErrorCode HycoCondensedCellForce(HycoFE fe, PetscInt e, const PetscReal Ke[
 /* kr -= R_e lost V_e, `lost` is the reduction of the stiffness of cell e. */
 static PetscErrorCode Soften(HycoROM m, PetscInt e, const PetscReal lost[], PetscScalar kr[])
 {
-  HycoCondensedPath c = (HycoCondensedPath)m->data;
-  const PetscInt n = m->mesh->nv * m->mesh->dim;
-  const size_t size = (size_t)m->l;
+  HycoCondensedPath c = (HycoCondensedPath)m->work;
+  const PetscInt n = m->model->mesh->nv * m->model->mesh->dim;
+  const size_t size = (size_t)m->model->l;
   const PetscReal minus = -1, one = 1;
   PetscBLASInt l, columns;
   PetscReal *product; /* its transpose, l x n */
@@ -81,14 +81,14 @@ static PetscErrorCode Soften(HycoROM m, PetscInt e, const PetscReal lost[], Pets
   PetscCall(PetscCalloc1(size * (size_t)n, &product));
   for (PetscInt i = 0; i < n; i++) {
     for (PetscInt j = 0; j < n; j++) {
-      const PetscReal *v = c->galerkin.Vp + (size_t)CellUnknown(m->mesh, e, j) * size;
+      const PetscReal *v = m->model->V + (size_t)CellUnknown(m->model->mesh, e, j) * size;
 
       for (size_t k = 0; k < size; k++) product[(size_t)i * size + k] += lost[i * n + j] * v[k];
     }
   }
-  PetscCall(PetscBLASIntCast(m->l, &l));
+  PetscCall(PetscBLASIntCast(m->model->l, &l));
   PetscCall(PetscBLASIntCast(n, &columns));
-  BLASgemm_("N", "T", &l, &l, &columns, &minus, c->table.inelastic + (size_t)(e * n) * size, &l, product, &l, &one, kr,
+  BLASgemm_("N", "T", &l, &l, &columns, &minus, c->table->inelastic + (size_t)(e * n) * size, &l, product, &l, &one, kr,
             &l);
   PetscCall(PetscFree(product));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -97,9 +97,9 @@ static PetscErrorCode Soften(HycoROM m, PetscInt e, const PetscReal lost[], Pets
 /* Kr: V^T K V minus the reduction of the stiffness by the tangents of the chosen cells. */
 static PetscErrorCode Stiffness(HycoROM m)
 {
-  HycoCondensedPath c = (HycoCondensedPath)m->data;
-  HycoMesh mesh = m->mesh;
-  const PetscInt l = m->l, n = mesh->nv * mesh->dim;
+  HycoCondensedPath c = (HycoCondensedPath)m->work;
+  HycoMesh mesh = m->model->mesh;
+  const PetscInt l = m->model->l, n = mesh->nv * mesh->dim;
   const PetscBool first = (PetscBool)!c->Ke;
   PetscReal Kt[HYCO_MAX_CELL_DOFS * HYCO_MAX_CELL_DOFS];
   PetscScalar *kr;
@@ -108,7 +108,7 @@ static PetscErrorCode Stiffness(HycoROM m)
   if (first) PetscCall(PetscMalloc1((size_t)mesh->n_cells * (size_t)(n * n) + 1, &c->Ke));
   PetscCall(HycoReducedPrepare(m));
   PetscCall(MatDenseGetArrayWrite(c->galerkin.Kr, &kr));
-  PetscCall(PetscArraycpy(kr, c->table.K, (size_t)l * (size_t)l));
+  PetscCall(PetscArraycpy(kr, c->table->K, (size_t)l * (size_t)l));
   for (PetscInt e = 0; e < mesh->n_cells; e++) {
     PetscReal *Ke = c->Ke + (size_t)e * (size_t)(n * n);
 
@@ -127,7 +127,7 @@ static PetscErrorCode Stiffness(HycoROM m)
 /* f -= R_e force. */
 static void Subtract(HycoROM m, PetscInt e, const PetscReal R[], const PetscReal force[], PetscReal f[])
 {
-  const size_t l = (size_t)m->l, n = (size_t)(m->mesh->nv * m->mesh->dim);
+  const size_t l = (size_t)m->model->l, n = (size_t)(m->model->mesh->nv * m->model->mesh->dim);
 
   for (size_t i = 0; i < n; i++) {
     const PetscReal *column = R + ((size_t)e * n + i) * l;
@@ -139,9 +139,9 @@ static void Subtract(HycoROM m, PetscInt e, const PetscReal R[], const PetscReal
 /* Fr has surface loads, and the body forces of the chosen cells as if there were no others. */
 static PetscErrorCode AddLoads(HycoROM m)
 {
-  HycoCondensedPath c = (HycoCondensedPath)m->data;
-  HycoMesh mesh = m->mesh;
-  const PetscInt l = m->l, n = mesh->nv * mesh->dim;
+  HycoCondensedPath c = (HycoCondensedPath)m->work;
+  HycoMesh mesh = m->model->mesh;
+  const PetscInt l = m->model->l, n = mesh->nv * mesh->dim;
   PetscScalar *f;
 
   PetscFunctionBegin;
@@ -154,12 +154,12 @@ static PetscErrorCode AddLoads(HycoROM m)
     PetscCall(HycoCondensedCellLoad(m->fe, e, load, c->heat + e * n));
     PetscCall(HycoFEBodyForce(m->fe, e, body));
     for (PetscInt i = 0; i < n; i++) {
-      const PetscReal *v = c->galerkin.Vp + (size_t)CellUnknown(mesh, e, i) * (size_t)l;
+      const PetscReal *v = m->model->V + (size_t)CellUnknown(mesh, e, i) * (size_t)l;
 
       load[i] -= body[i];
       for (PetscInt j = 0; j < l && body[i] != 0; j++) f[j] -= v[j] * body[i];
     }
-    Subtract(m, e, c->table.loads, load, f);
+    Subtract(m, e, c->table->loads, load, f);
   }
   PetscCall(VecRestoreArray(c->galerkin.Fr, &f));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -168,8 +168,8 @@ static PetscErrorCode AddLoads(HycoROM m)
 /* f_int = V^T K V x - sum of R_e q_e */
 static PetscErrorCode Forces(HycoROM m, HycoFEState state, Vec f_int, PetscReal *summands)
 {
-  HycoCondensedPath c = (HycoCondensedPath)m->data;
-  const PetscInt n = m->mesh->nv * m->mesh->dim;
+  HycoCondensedPath c = (HycoCondensedPath)m->work;
+  const PetscInt n = m->model->mesh->nv * m->model->mesh->dim;
   const PetscReal one = 1, zero = 0;
   const PetscScalar *x;
   PetscScalar *f;
@@ -177,17 +177,17 @@ static PetscErrorCode Forces(HycoROM m, HycoFEState state, Vec f_int, PetscReal 
 
   PetscFunctionBegin;
   *summands = 0;
-  PetscCall(PetscBLASIntCast(m->l, &l));
+  PetscCall(PetscBLASIntCast(m->model->l, &l));
   PetscCall(VecGetArrayRead(c->galerkin.x, &x));
   PetscCall(VecGetArray(f_int, &f));
-  BLASgemv_("N", &l, &l, &one, c->table.K, &l, x, &inc, &zero, f, &inc);
-  for (PetscInt e = 0; e < m->mesh->n_cells; e++) {
+  BLASgemv_("N", &l, &l, &one, c->table->K, &l, x, &inc, &zero, f, &inc);
+  for (PetscInt e = 0; e < m->model->mesh->n_cells; e++) {
     PetscReal q[HYCO_MAX_CELL_DOFS], size;
 
     if (!HycoCondensedFlows(m->fe, e)) continue;
     PetscCall(
         HycoCondensedCellForce(m->fe, e, c->Ke + (size_t)e * (size_t)(n * n), c->heat + e * n, m->U, state, q, &size));
-    Subtract(m, e, c->table.inelastic, q, f);
+    Subtract(m, e, c->table->inelastic, q, f);
     *summands += PetscSqr(c->weight[e] * size);
   }
   *summands = PetscSqrtReal(*summands);
@@ -198,15 +198,16 @@ static PetscErrorCode Forces(HycoROM m, HycoFEState state, Vec f_int, PetscReal 
 
 static PetscErrorCode SetUp(HycoROM m)
 {
-  HycoCondensedPath c = (HycoCondensedPath)m->data;
-  const size_t size = (size_t)m->l * (size_t)(m->mesh->nv * m->mesh->dim);
+  HycoCondensedPath c = (HycoCondensedPath)m->work;
+  const size_t size = (size_t)m->model->l * (size_t)(m->model->mesh->nv * m->model->mesh->dim);
 
   PetscFunctionBegin;
+  c->table = &((HycoCondensedPathModel)m->model->data)->table;
   PetscCall(HycoGalerkinSetUp(m));
   m->fe->all_facets = PETSC_TRUE;
-  PetscCall(PetscCalloc1(m->mesh->n_cells + 1, &c->weight));
-  for (PetscInt e = 0; e < m->mesh->n_cells; e++) {
-    for (size_t k = 0; k < size; k++) c->weight[e] += PetscSqr(c->table.inelastic[(size_t)e * size + k]);
+  PetscCall(PetscCalloc1(m->model->mesh->n_cells + 1, &c->weight));
+  for (PetscInt e = 0; e < m->model->mesh->n_cells; e++) {
+    for (size_t k = 0; k < size; k++) c->weight[e] += PetscSqr(c->table->inelastic[(size_t)e * size + k]);
     c->weight[e] = PetscSqrtReal(c->weight[e]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -214,7 +215,7 @@ static PetscErrorCode SetUp(HycoROM m)
 
 static PetscErrorCode Reset(HycoROM m)
 {
-  HycoCondensedPath c = (HycoCondensedPath)m->data;
+  HycoCondensedPath c = (HycoCondensedPath)m->work;
 
   PetscFunctionBegin;
   PetscCall(HycoGalerkinReset(m));
@@ -227,14 +228,14 @@ static PetscErrorCode Reset(HycoROM m)
 /* The chosen cells' columns in the order of the model's mesh. */
 static PetscErrorCode TakeColumns(HycoROM m, HycoReducer t, const PetscReal from[], PetscReal **to)
 {
-  const size_t size = (size_t)m->l * (size_t)(m->mesh->nv * m->mesh->dim);
+  const size_t size = (size_t)m->model->l * (size_t)(m->model->mesh->nv * m->model->mesh->dim);
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1((size_t)m->mesh->n_cells * size + 1, to));
-  for (PetscInt e = 0; e < m->mesh->n_cells; e++) {
+  PetscCall(PetscMalloc1((size_t)m->model->mesh->n_cells * size + 1, to));
+  for (PetscInt e = 0; e < m->model->mesh->n_cells; e++) {
     PetscInt at = -1;
 
-    PetscCall(PetscFindInt(m->mesh->cell_whole[e], t->n_seeds_cell, t->seeds_cell, &at));
+    PetscCall(PetscFindInt(m->model->mesh->cell_whole[e], t->n_seeds_cell, t->seeds_cell, &at));
     PetscCheck(at >= 0, PETSC_COMM_SELF, PETSC_ERR_PLIB, "a cell of the model is not among the chosen cells");
     PetscCall(PetscArraycpy(*to + (size_t)e * size, from + (size_t)at * size, size));
   }
@@ -245,30 +246,30 @@ static PetscErrorCode TakeColumns(HycoROM m, HycoReducer t, const PetscReal from
 static PetscErrorCode Build(HycoROM m, HycoReducer t)
 {
   const HycoCondensedTable *from = &Condensing(t)->path.table;
-  HycoCondensedTable *to = &((HycoCondensedPath)m->data)->table;
+  HycoCondensedTable *to = &((HycoCondensedPathModel)m->model->data)->table;
   char worst[HYCO_LINE] = "";
 
   PetscFunctionBegin;
-  for (PetscInt i = 0; i < m->mesh->n_nodes; i++) m->role[i] = HYCO_ROLE_A;
-  for (PetscInt k = 0; k < m->pairs.n; k++) m->in_rid[k] = 1;
+  PetscCall(HycoROMSetDomain(m, NULL));
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) m->model->in_rid[k] = 1;
   *to = *from;
-  HycoDuplicate((size_t)m->l * (size_t)m->l, from->K, &to->K);
+  HycoDuplicate((size_t)m->model->l * (size_t)m->model->l, from->K, &to->K);
   PetscCall(TakeColumns(m, t, from->inelastic, &to->inelastic));
   PetscCall(TakeColumns(m, t, from->loads, &to->loads));
   PetscCall(HycoROMSetFE(m, HYCO_HYBRID_CONTACT, 0, NULL));
   PetscCall(HycoReducerJudge(t, m));
-  if (!(m->numbers[1] < 0.5)) HycoReducerNameWorst(t, worst);
-  HycoCheckModel(m->numbers[1] < 0.5,
+  if (!(m->model->numbers[1] < 0.5)) HycoReducerNameWorst(t, worst);
+  HycoCheckModel(m->model->numbers[1] < 0.5,
                  "the condensed model misses its own training displacements by %.0f %% on average (%d inelastic modes, "
                  "%d cells)%s: use more cells (-hyco_condensed_cells; 0: all), fewer modes "
                  "(-hyco_condensed_inelastic_tol), or train a cubature model",
-                 100 * (double)m->numbers[1], (int)to->n_inelastic, (int)m->mesh->n_cells, worst);
+                 100 * (double)m->model->numbers[1], (int)to->n_inelastic, (int)m->model->mesh->n_cells, worst);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
 {
-  const HycoCondensedTable *c = &((HycoCondensedPath)m->data)->table;
+  const HycoCondensedTable *c = &((HycoCondensedPathModel)m->model->data)->table;
 
   PetscFunctionBegin;
   (void)t;
@@ -278,21 +279,22 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
   snprintf(r->summary, sizeof(r->summary),
            "condensed: %d snapshots; %d displacement modes for %d contacts, %d inelastic modes and the loads; laws in "
            "%d of %d elements (%.1f %%)\n",
-           (int)r->n_samples, (int)r->n_modes, (int)m->pairs.n, (int)c->n_inelastic, (int)m->mesh->n_cells,
-           (int)m->whole_cells, 100 * (double)r->rid_fraction);
+           (int)r->n_samples, (int)r->n_modes, (int)m->model->pairs.n, (int)c->n_inelastic,
+           (int)m->model->mesh->n_cells, (int)m->model->whole_cells, 100 * (double)r->rid_fraction);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode View(HycoROM m, PetscViewer viewer)
 {
-  const HycoCondensedTable *c = &((HycoCondensedPath)m->data)->table;
+  const HycoCondensedTable *c = &((HycoCondensedPathModel)m->model->data)->table;
 
   PetscFunctionBegin;
   PetscCall(PetscViewerASCIIPrintf(viewer,
                                    "  contacts: %d; inelastic modes: %d, loads inside the bodies: %d\n  laws in %d of "
                                    "%d elements (%.1f %%); an error of the modes is amplified up to %.3g times\n",
-                                   (int)m->pairs.n, (int)c->n_inelastic, (int)c->n_loads, (int)m->mesh->n_cells,
-                                   (int)m->whole_cells, 100. * (double)m->mesh->n_cells / (double)m->whole_cells,
+                                   (int)m->model->pairs.n, (int)c->n_inelastic, (int)c->n_loads,
+                                   (int)m->model->mesh->n_cells, (int)m->model->whole_cells,
+                                   100. * (double)m->model->mesh->n_cells / (double)m->model->whole_cells,
                                    (double)c->amplification));
   PetscCall(HycoGalerkinView(m, viewer));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -301,8 +303,9 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
 /* Writes to the model file, or reads from it. */
 static PetscErrorCode Move(HycoROM m, HycoH5 h)
 {
-  HycoCondensedTable *c = &((HycoCondensedPath)m->data)->table;
-  PetscInt modes[2] = {c->n_inelastic, c->n_loads}, columns = m->mesh->n_cells * m->mesh->nv * m->mesh->dim;
+  HycoCondensedTable *c = &((HycoCondensedPathModel)m->model->data)->table;
+  PetscInt modes[2] = {c->n_inelastic, c->n_loads},
+           columns = m->model->mesh->n_cells * m->model->mesh->nv * m->model->mesh->dim;
 
   PetscFunctionBegin;
   PetscCall(HycoGalerkinMove(m, h));
@@ -310,9 +313,9 @@ static PetscErrorCode Move(HycoROM m, HycoH5 h)
   c->n_inelastic = modes[0];
   c->n_loads = modes[1];
   PetscCall(HycoH5Reals(h, "condensed/amplification", 1, &c->amplification));
-  PetscCall(HycoH5Real(h, "condensed/K", &m->l, m->l, &c->K));
-  PetscCall(HycoH5Real(h, "condensed/inelastic", &columns, m->l, &c->inelastic));
-  PetscCall(HycoH5Real(h, "condensed/loads", &columns, m->l, &c->loads));
+  PetscCall(HycoH5Real(h, "condensed/K", &m->model->l, m->model->l, &c->K));
+  PetscCall(HycoH5Real(h, "condensed/inelastic", &columns, m->model->l, &c->inelastic));
+  PetscCall(HycoH5Real(h, "condensed/loads", &columns, m->model->l, &c->loads));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -325,18 +328,19 @@ PetscErrorCode HycoCondensedTableFree(HycoCondensedTable *c)
 
 static PetscErrorCode Destroy(HycoROM m)
 {
-  HycoCondensedPath c = (HycoCondensedPath)m->data;
+  HycoCondensedPathModel c = (HycoCondensedPathModel)m->model->data;
 
   PetscFunctionBegin;
   PetscCall(HycoGalerkinDestroy(&c->galerkin));
   PetscCall(HycoCondensedTableFree(&c->table));
-  PetscCall(PetscFree(m->data));
+  PetscCall(PetscFree(m->model->data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoCondensedTakePath(HycoROM m)
 {
   static const HycoROMTraits traits = {.title = "condensed",
+                                       .work = sizeof(struct _n_HycoCondensedPath),
                                        .settings = HYCO_SETTINGS_NONE,
                                        .stiffness = PETSC_TRUE,
                                        .constrains = PETSC_TRUE,
@@ -361,8 +365,8 @@ PetscErrorCode HycoCondensedTakePath(HycoROM m)
                                  .save = Move,
                                  .load = Move,
                                  .destroy = Destroy};
-  HycoCondensed none = (HycoCondensed)m->data;
-  HycoCondensedPath c;
+  HycoCondensed none = (HycoCondensed)m->model->data;
+  HycoCondensedPathModel c;
 
   PetscFunctionBegin;
   PetscCall(HycoCondensedFree(&none));

@@ -88,27 +88,27 @@ static PetscErrorCode Modes(HycoReducer t, HycoSnapshots store)
 /* With finite-element multipliers the functions of force vectors are not used. */
 static void TakeContact(HycoROM m)
 {
-  HycoProjectionROM p = (HycoProjectionROM)m->data;
+  HycoProjectionModel p = (HycoProjectionModel)m->model->data;
 
   if (p->dual != HYCO_DUAL_FE) return;
   p->galerkin.contact = p->galerkin.gap = p->galerkin.expand = NULL;
-  m->traits.constrains = PETSC_TRUE;
+  m->model->traits.constrains = PETSC_TRUE;
 }
 
 /* Every node is in A, and every contact belongs to the model; sets the cells' weights. */
 static PetscErrorCode Build(HycoROM m, HycoReducer t)
 {
   const HycoCubatureTraining c = (HycoCubatureTraining)t->training;
-  HycoCubatureROM r = (HycoCubatureROM)m->data;
+  HycoCubatureModel r = (HycoCubatureModel)m->model->data;
 
   PetscFunctionBegin;
-  for (PetscInt i = 0; i < m->mesh->n_nodes; i++) m->role[i] = HYCO_ROLE_A;
-  for (PetscInt k = 0; k < m->pairs.n; k++) m->in_rid[k] = 1;
-  PetscCall(PetscMalloc1(m->mesh->n_cells, &r->weight));
-  for (PetscInt e = 0; e < m->mesh->n_cells; e++) {
+  PetscCall(HycoROMSetDomain(m, NULL));
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) m->model->in_rid[k] = 1;
+  PetscCall(PetscMalloc1(m->model->mesh->n_cells, &r->weight));
+  for (PetscInt e = 0; e < m->model->mesh->n_cells; e++) {
     PetscInt at = -1;
 
-    PetscCall(PetscFindInt(m->mesh->cell_whole[e], c->n, t->seeds_cell, &at));
+    PetscCall(PetscFindInt(m->model->mesh->cell_whole[e], c->n, t->seeds_cell, &at));
     PetscCheck(at >= 0, PETSC_COMM_SELF, PETSC_ERR_PLIB, "a cell of the model has no weight");
     r->weight[e] = c->weight[at];
   }
@@ -125,17 +125,18 @@ static PetscErrorCode Build(HycoROM m, HycoReducer t)
 /* "33 contacts with 128 full-order displacements", or "8 force vectors for 33 contacts" */
 static void DescribeContact(HycoROM m, char text[WORDS])
 {
-  const HycoProjectionROM p = (HycoProjectionROM)m->data;
+  const HycoProjectionModel p = (HycoProjectionModel)m->model->data;
 
   if (p->dual == HYCO_DUAL_FE)
-    (void)snprintf(text, WORDS, "%d contacts with %d full-order displacements", (int)m->pairs.n, (int)m->n_fe);
+    (void)snprintf(text, WORDS, "%d contacts with %d full-order displacements", (int)m->model->pairs.n,
+                   (int)m->model->n_fe);
   else
-    (void)snprintf(text, WORDS, "%d force vectors for %d contacts", (int)p->l_lambda, (int)m->pairs.n);
+    (void)snprintf(text, WORDS, "%d force vectors for %d contacts", (int)p->l_lambda, (int)m->model->pairs.n);
 }
 
 static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
 {
-  const HycoCubatureROM c = (HycoCubatureROM)m->data;
+  const HycoCubatureModel c = (HycoCubatureModel)m->model->data;
   char contact[WORDS];
 
   PetscFunctionBegin;
@@ -145,7 +146,7 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
   snprintf(r->summary, sizeof(r->summary),
            "%d snapshots; %d displacement modes; %s; cubature on %d of %d elements (%.1f %%), with an error of %.1e in "
            "the internal forces of training\n",
-           (int)r->n_samples, (int)r->n_modes, contact, (int)m->mesh->n_cells, (int)m->whole_cells,
+           (int)r->n_samples, (int)r->n_modes, contact, (int)m->model->mesh->n_cells, (int)m->model->whole_cells,
            100 * (double)r->rid_fraction, (double)c->error[0]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -154,28 +155,28 @@ static PetscErrorCode SetUp(HycoROM m)
 {
   PetscFunctionBegin;
   PetscCall(HycoProjectionSetUp(m));
-  m->fe->cell_weight = ((HycoCubatureROM)m->data)->weight;
+  m->fe->cell_weight = ((HycoCubatureModel)m->model->data)->weight;
   m->fe->all_facets = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode View(HycoROM m, PetscViewer viewer)
 {
-  const HycoCubatureROM c = (HycoCubatureROM)m->data;
+  const HycoCubatureModel c = (HycoCubatureModel)m->model->data;
   PetscReal least = PETSC_MAX_REAL, most = 0;
   char contact[WORDS];
 
   PetscFunctionBegin;
-  for (PetscInt e = 0; e < m->mesh->n_cells; e++) {
+  for (PetscInt e = 0; e < m->model->mesh->n_cells; e++) {
     least = PetscMin(least, c->weight[e]);
     most = PetscMax(most, c->weight[e]);
   }
   PetscCall(PetscViewerASCIIPrintf(viewer,
                                    "  cubature: %d of %d elements (%.1f %%), weights from %.3g to %.3g; error of the "
                                    "internal forces of training: %.1e; %d contacts\n",
-                                   (int)m->mesh->n_cells, (int)m->whole_cells,
-                                   100. * (double)m->mesh->n_cells / (double)m->whole_cells, (double)least,
-                                   (double)most, (double)c->error[0], (int)m->pairs.n));
+                                   (int)m->model->mesh->n_cells, (int)m->model->whole_cells,
+                                   100. * (double)m->model->mesh->n_cells / (double)m->model->whole_cells,
+                                   (double)least, (double)most, (double)c->error[0], (int)m->model->pairs.n));
   DescribeContact(m, contact);
   PetscCall(PetscViewerASCIIPrintf(viewer, "  %s\n", contact));
   PetscCall(c->projection.dual == HYCO_DUAL_FE ? HycoGalerkinView(m, viewer) : HycoProjectionViewForces(m, viewer));
@@ -185,22 +186,22 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
 /* Writes to the model file, or reads from it. */
 static PetscErrorCode Move(HycoROM m, HycoH5 h)
 {
-  HycoCubatureROM c = (HycoCubatureROM)m->data;
+  HycoCubatureModel c = (HycoCubatureModel)m->model->data;
 
   PetscFunctionBegin;
   PetscCall(HycoProjectionMove(m, h));
   TakeContact(m);
-  PetscCall(HycoH5Real(h, "cubature/weight", &m->mesh->n_cells, 1, &c->weight));
+  PetscCall(HycoH5Real(h, "cubature/weight", &m->model->mesh->n_cells, 1, &c->weight));
   PetscCall(HycoH5Reals(h, "cubature/error", 2, c->error));
-  for (PetscInt e = 0; e < m->mesh->n_cells; e++)
-    HycoCheck(c->weight[e] > 0, "%s: cubature/weight is damaged", m->path);
+  for (PetscInt e = 0; e < m->model->mesh->n_cells; e++)
+    HycoCheck(c->weight[e] > 0, "%s: cubature/weight is damaged", m->model->path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode Destroy(HycoROM m)
 {
   PetscFunctionBegin;
-  PetscCall(PetscFree(((HycoCubatureROM)m->data)->weight));
+  PetscCall(PetscFree(((HycoCubatureModel)m->model->data)->weight));
   PetscCall(HycoProjectionDestroy(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -208,6 +209,7 @@ static PetscErrorCode Destroy(HycoROM m)
 PetscErrorCode HycoROMCreate_Cubature(HycoROM m)
 {
   static const HycoROMTraits traits = {.title = "cubature",
+                                       .work = sizeof(struct _n_HycoGalerkin),
                                        .settings = HYCO_SETTINGS_MODES,
                                        .stiffness = PETSC_TRUE,
                                        .force_basis = PETSC_TRUE,
@@ -230,7 +232,7 @@ PetscErrorCode HycoROMCreate_Cubature(HycoROM m)
                                  .save = Move,
                                  .load = Move,
                                  .destroy = Destroy};
-  HycoCubatureROM c;
+  HycoCubatureModel c;
 
   PetscFunctionBegin;
   PetscCall(PetscNew(&c));

@@ -142,7 +142,7 @@ PetscErrorCode HycoCubatureFindContacts(HycoReducer t)
 PetscErrorCode HycoCubatureSetFullOrder(HycoROM m, HycoReducer t)
 {
   const HycoCubatureTraining c = (HycoCubatureTraining)t->training;
-  const PetscInt dim = m->mesh->dim;
+  const PetscInt dim = m->model->mesh->dim;
   PetscInt *dof;
 
   PetscFunctionBegin;

@@ -44,7 +44,7 @@ PetscErrorCode HycoTableDestroy(HycoTable *table)
 
 PetscErrorCode HycoTableKeepPattern(HycoROM m, HycoTable t)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   const PetscInt *start, *column;
   PetscInt n;
   PetscBool dense, done;
@@ -62,12 +62,12 @@ PetscErrorCode HycoTableKeepPattern(HycoROM m, HycoTable t)
 
 PetscErrorCode HycoTableCreateSparse(HycoROM m)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
-  const HycoTable t = g->table;
+  HycoGalerkin g = (HycoGalerkin)m->work;
+  const HycoTable t = g->model->table;
 
   PetscFunctionBegin;
   HycoCheck(t->n == m->n, "%s: the table of the reduced stiffness has %d rows, the matrix %d: train the model again",
-            m->path, (int)t->n, (int)m->n);
+            m->model->path, (int)t->n, (int)m->n);
   PetscCall(MatCreate(PETSC_COMM_SELF, &g->Kr));
   PetscCall(MatSetSizes(g->Kr, m->n, m->n, m->n, m->n));
   PetscCall(MatSetType(g->Kr, MATSEQAIJ));
@@ -77,16 +77,16 @@ PetscErrorCode HycoTableCreateSparse(HycoROM m)
 
 PetscErrorCode HycoTableFill(HycoROM m, const PetscReal mu[])
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   PetscInt n;
   PetscScalar *a;
 
   PetscFunctionBegin;
   PetscCall(HycoReducedEntries(m, &n, &a));
-  HycoCheck(n == g->table->values.rows,
-            "%s: the table of the reduced stiffness has %d entries, the matrix %d: train the model again", m->path,
-            (int)g->table->values.rows, (int)n);
-  PetscCall(HycoGridFieldEvaluate(&g->table->values, mu, -1, -1, a));
+  HycoCheck(n == g->model->table->values.rows,
+            "%s: the table of the reduced stiffness has %d entries, the matrix %d: train the model again",
+            m->model->path, (int)g->model->table->values.rows, (int)n);
+  PetscCall(HycoGridFieldEvaluate(&g->model->table->values, mu, -1, -1, a));
   PetscCall(PetscObjectStateIncrease((PetscObject)g->Kr));
   PetscCall(MatAssemblyBegin(g->Kr, MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(g->Kr, MAT_FINAL_ASSEMBLY));
@@ -95,15 +95,15 @@ PetscErrorCode HycoTableFill(HycoROM m, const PetscReal mu[])
 
 PetscErrorCode HycoTableView(HycoROM m, PetscViewer viewer)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkinModel g = (HycoGalerkinModel)m->model->data;
   const HycoTensor *t = &g->table->values.tensor;
 
   PetscFunctionBegin;
   PetscCall(PetscViewerASCIIPrintf(viewer, "  the reduced stiffness is a polynomial, tabulated at"));
   for (PetscInt p = 0, n = 0; p < t->dim; p++) {
     if (t->n[p] > 1)
-      PetscCall(
-          PetscViewerASCIIPrintf(viewer, "%s %d values of %s", n++ ? " x" : "", (int)t->n[p], m->scene->parameter[p]));
+      PetscCall(PetscViewerASCIIPrintf(viewer, "%s %d values of %s", n++ ? " x" : "", (int)t->n[p],
+                                       m->model->scene->parameter[p]));
   }
   PetscCall(PetscViewerASCIIPrintf(viewer, "\n"));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -111,7 +111,7 @@ PetscErrorCode HycoTableView(HycoROM m, PetscViewer viewer)
 
 PetscErrorCode HycoTableSave(HycoROM m, HycoH5 h)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkinModel g = (HycoGalerkinModel)m->model->data;
   const HycoTable t = g->table;
   const HycoTensor *tensor = &t->values.tensor;
   PetscReal *x;
@@ -137,9 +137,9 @@ PetscErrorCode HycoTableSave(HycoROM m, HycoH5 h)
 static PetscErrorCode CheckParameters(HycoROM m, const PetscInt count[], const PetscReal x[])
 {
   PetscFunctionBegin;
-  for (PetscInt p = 0; p < m->scene->n_parameters; p++) {
+  for (PetscInt p = 0; p < m->model->scene->n_parameters; p++) {
     for (PetscInt k = 0; k < count[p]; k++, x++)
-      HycoCheck(!k || *x > x[-1], "%s: table/parameters is damaged", m->path);
+      HycoCheck(!k || *x > x[-1], "%s: table/parameters is damaged", m->model->path);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -147,7 +147,7 @@ static PetscErrorCode CheckParameters(HycoROM m, const PetscInt count[], const P
 /* Reads and checks the rows of a sparse matrix: contiguous, with ascending columns. */
 static PetscErrorCode LoadPattern(HycoROM m, HycoH5 h)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkinModel g = (HycoGalerkinModel)m->model->data;
   const HycoTable t = g->table;
   PetscInt one = 1, n = -1, *entries = &t->values.rows;
   PetscBool good;
@@ -162,15 +162,15 @@ static PetscErrorCode LoadPattern(HycoROM m, HycoH5 h)
     for (PetscInt k = t->start[i] + 1; k < t->start[i + 1] && good; k++)
       good = (PetscBool)(t->column[k] > t->column[k - 1]);
   }
-  HycoCheck(good, "%s: table/start is damaged", m->path);
+  HycoCheck(good, "%s: table/start is damaged", m->model->path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Reads the table, without a sparse matrix's rows; the caller frees the arrays, also after a refused file. */
 static PetscErrorCode LoadValues(HycoROM m, HycoH5 h, PetscInt **count, PetscReal **x, PetscReal **data)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
-  PetscInt dim = m->scene->n_parameters, one = 1, all = 0, nodes = 1, rows = -1;
+  HycoGalerkinModel g = (HycoGalerkinModel)m->model->data;
+  PetscInt dim = m->model->scene->n_parameters, one = 1, all = 0, nodes = 1, rows = -1;
   PetscReal *of[HYCO_MAX_PARAMETERS];
 
   PetscFunctionBegin;
@@ -178,7 +178,7 @@ static PetscErrorCode LoadValues(HycoROM m, HycoH5 h, PetscInt **count, PetscRea
   for (PetscInt p = 0; p < dim; p++) {
     all += (*count)[p];
     nodes *= (*count)[p];
-    HycoCheck(nodes <= HYCO_TABLE_NODES, "%s: table/counts is damaged", m->path);
+    HycoCheck(nodes <= HYCO_TABLE_NODES, "%s: table/counts is damaged", m->model->path);
   }
   PetscCall(HycoH5LoadReal(h, "table/parameters", &all, &one, x));
   PetscCall(CheckParameters(m, *count, *x));

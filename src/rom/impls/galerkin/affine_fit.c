@@ -67,7 +67,7 @@ static PetscErrorCode FillTable(HycoROM m, HycoTable t)
 static PetscErrorCode Try(HycoROM m, const PetscInt n[], PetscInt entries, PetscInt varied, HycoTable *table,
                           PetscBool *holds)
 {
-  const HycoScene s = m->scene;
+  const HycoScene s = m->model->scene;
   PetscReal *x[HYCO_MAX_PARAMETERS], mu[HYCO_MAX_PARAMETERS];
 
   PetscFunctionBegin;
@@ -97,7 +97,7 @@ static PetscErrorCode CountValues(HycoROM m, PetscInt p, PetscInt entries, Petsc
   PetscBool holds = PETSC_FALSE;
 
   PetscFunctionBegin;
-  for (PetscInt q = 0; q < m->scene->n_parameters; q++) n[q] = 1;
+  for (PetscInt q = 0; q < m->model->scene->n_parameters; q++) n[q] = 1;
   for (n[p] = 2; n[p] <= MOST && !holds; n[p]++) {
     HycoTable table;
 
@@ -111,8 +111,8 @@ static PetscErrorCode CountValues(HycoROM m, PetscInt p, PetscInt entries, Petsc
 
 PetscErrorCode HycoGalerkinTabulate(HycoROM m, const PetscBool reaches[])
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
-  const HycoScene s = m->scene;
+  HycoGalerkinModel g = (HycoGalerkinModel)m->model->data;
+  const HycoScene s = m->model->scene;
   PetscInt n[HYCO_MAX_PARAMETERS], nodes = 1, entries, varying = 0;
   PetscScalar *a;
   PetscReal mu[HYCO_MAX_PARAMETERS];

@@ -19,8 +19,8 @@
 
 PetscErrorCode HycoGalerkinSetRidge(HycoROM m, PetscReal ridge)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
-  const PetscInt l = m->l, n = m->n_fe;
+  HycoGalerkinModel g = (HycoGalerkinModel)m->model->data;
+  const PetscInt l = m->model->l, n = m->model->n_fe;
   PetscReal *X, *N, *weight;
   PetscBLASInt lb, nb, info;
 
@@ -31,9 +31,9 @@ PetscErrorCode HycoGalerkinSetRidge(HycoROM m, PetscReal ridge)
   PetscCall(
       PetscMalloc1(l * n, &g->G)); /* row major l x n is column major n x l: solve N Z = X^T, l x n column major */
   PetscCall(PetscMalloc3(l * n, &X, l * l, &N, l, &weight));
-  for (PetscInt j = 0; j < l; j++) weight[j] = ridge > 0 ? m->sigma[j] / m->sigma[0] : 1;
+  for (PetscInt j = 0; j < l; j++) weight[j] = ridge > 0 ? m->model->sigma[j] / m->model->sigma[0] : 1;
   for (PetscInt k = 0; k < n; k++) {
-    for (PetscInt j = 0; j < l; j++) X[k * l + j] = m->V[m->fe_dof[k] * l + j] * weight[j];
+    for (PetscInt j = 0; j < l; j++) X[k * l + j] = m->model->V[m->model->fe_dof[k] * l + j] * weight[j];
   }
   for (PetscInt i = 0; i < l; i++) {
     for (PetscInt j = 0; j < l; j++) {
@@ -55,31 +55,23 @@ PetscErrorCode HycoGalerkinSetRidge(HycoROM m, PetscReal ridge)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Indices of the full-order unknowns; the modes are set to zero on them. */
-static PetscErrorCode SetUpBasis(HycoROM m)
+/* The numbers of unknowns. */
+static PetscErrorCode CountUnknowns(HycoROM m)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
-  const PetscInt n_dof = m->fe->n_dof, l = m->l;
+  HycoGalerkin g = (HycoGalerkin)m->work;
+  const PetscInt l = m->model->l;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(n_dof, &g->fe_at));
-  HycoDuplicate(n_dof * l, m->V, &g->Vp);
-  for (PetscInt k = 0; k < n_dof; k++) g->fe_at[k] = -1;
-  for (PetscInt k = 0; k < m->n_fe; k++) {
-    g->fe_at[m->fe_dof[k]] = k;
-    PetscCall(PetscArrayzero(g->Vp + m->fe_dof[k] * l, l));
-  }
-  g->bordered = (PetscBool)(g->G && m->scene->n_times && l + m->n_fe > BORDERED_MIN);
-  g->n_free = m->hybrid == HYCO_HYBRID_ALL && !g->bordered ? 0 : l;
-  m->n = g->n_free + m->n_fe;
-  if (!g->contact) m->n_L = m->m; /* otherwise set by the type */
+  g->bordered = (PetscBool)(g->model->G && m->model->scene->n_times && l + m->model->n_fe > BORDERED_MIN);
+  g->n_free = m->model->hybrid == HYCO_HYBRID_ALL && !g->bordered ? 0 : l;
+  m->n = g->n_free + m->model->n_fe;
+  if (!g->model->contact) m->n_L = m->m; /* otherwise set by the type */
   HycoCheckModel(m->n > 0, "the model has no unknowns, because every training solution is zero; check the loads");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode CreateReduced(HycoROM m, PetscInt rows, PetscInt cols, PetscBool dense, Mat *A)
+static PetscErrorCode CreateReduced(PetscInt rows, PetscInt cols, PetscBool dense, PetscInt per_row, Mat *A)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
   PetscFunctionBegin;
   if (dense)
     PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, rows, cols, NULL, A));
@@ -87,7 +79,7 @@ static PetscErrorCode CreateReduced(HycoROM m, PetscInt rows, PetscInt cols, Pet
     PetscCall(MatCreate(PETSC_COMM_SELF, A));
     PetscCall(MatSetSizes(*A, rows, cols, rows, cols));
     PetscCall(MatSetType(*A, MATSEQAIJ));
-    PetscCall(MatSeqAIJSetPreallocation(*A, g->n_free + 15, NULL));
+    PetscCall(MatSeqAIJSetPreallocation(*A, per_row, NULL));
     PetscCall(MatSetOption(*A, MAT_NEW_NONZERO_ALLOCATION_ERR, PETSC_FALSE));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -95,29 +87,25 @@ static PetscErrorCode CreateReduced(HycoROM m, PetscInt rows, PetscInt cols, Pet
 
 PetscErrorCode HycoGalerkinSetUp(HycoROM m)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   PetscBool dense;
-  PetscInt n_I;
 
   PetscFunctionBegin;
+  g->model = (HycoGalerkinModel)m->model->data;
   PetscCall(HycoGalerkinCreateOwn(m));
-  PetscCall(HycoFECreate(m->scene, g->own, &m->fe));
-  PetscCall(SetUpBasis(m));
-  PetscCall(HycoGalerkinCreateSets(m));
-  PetscCall(ISGetLocalSize(g->sets.is_I, &n_I));
-  dense = (PetscBool)((m->n <= HYCO_DENSE_MAX && !g->bordered) || ((g->symmetric || g->stiffness) && !m->n_fe) ||
-                      (m->hybrid == HYCO_HYBRID_ALL && n_I && !g->bordered));
-  if (!g->table) PetscCall(HycoFECreateMatrix(m->fe, PETSC_COMM_SELF, g->own->n_nodes, 0, &g->K));
+  PetscCall(HycoFECreate(m->model->scene, g->own, &m->fe));
+  PetscCall(CountUnknowns(m));
+  dense =
+      (PetscBool)((m->n <= HYCO_DENSE_MAX && !g->bordered) ||
+                  ((g->model->symmetric || g->model->stiffness) && !m->model->n_fe) || (g->model->G && !g->bordered));
+  if (!g->model->table) PetscCall(HycoFECreateMatrix(m->fe, PETSC_COMM_SELF, g->own->n_nodes, 0, &g->K));
   PetscCall(VecCreateSeq(PETSC_COMM_SELF, m->fe->n_dof, &g->F));
-  if (dense)
-    PetscCall(CreateReduced(m, m->n, m->n, PETSC_TRUE, &g->Kr));
-  else
-    PetscCall(g->table ? HycoTableCreateSparse(m) : HycoReducedCreateSparse(m));
+  PetscCall(g->model->table && !dense ? HycoTableCreateSparse(m) : CreateReduced(m->n, m->n, dense, 0, &g->Kr));
   PetscCall(MatCreateVecs(g->Kr, &g->x, &g->Fr));
-  if (!dense && !m->scene->n_times) PetscCall(HycoLoadsCreate(m));
+  if (!dense && !m->model->scene->n_times) PetscCall(HycoLoadsCreate(m));
   if (m->n_L) {
-    PetscCall(CreateReduced(m, m->n_L, m->n, dense, &g->Br));
-    PetscCall(CreateReduced(m, m->n, m->n_L, dense, &g->Btr));
+    PetscCall(CreateReduced(m->n_L, m->n, dense, g->n_free + 15, &g->Br));
+    PetscCall(CreateReduced(m->n, m->n_L, dense, g->n_free + 15, &g->Btr));
     PetscCall(MatCreateVecs(g->Br, NULL, &g->L));
     PetscCall(VecDuplicate(g->L, &g->Dr));
   }
@@ -128,13 +116,13 @@ PetscErrorCode HycoGalerkinSetUp(HycoROM m)
   PetscCall(HycoSolverSetForm(m->solver, HYCO_FORM_DUAL));
   PetscCall(HycoSolverSetWarmStart(m->solver, PETSC_FALSE));
   if (HycoSolverNeedsSymmetry(m->solver)) PetscCall(HycoSolverSetType(m->solver, HYCO_SOLVER_ACTIVE_SET));
-  if (m->scene->n_times) PetscCall(HycoGalerkinPathCreate(m));
+  if (m->model->scene->n_times) PetscCall(HycoGalerkinPathCreate(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoGalerkinReset(HycoROM m)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
 
   PetscFunctionBegin;
   PetscCall(HycoReducedDestroy(&g->reduced));
@@ -143,6 +131,7 @@ PetscErrorCode HycoGalerkinReset(HycoROM m)
   PetscCall(HycoSystemDestroy(&g->system));
   PetscCall(MatDestroy(&g->K));
   PetscCall(MatDestroy(&g->B));
+  g->current_B = PETSC_FALSE;
   PetscCall(MatDestroy(&g->Kr));
   PetscCall(MatDestroy(&g->Br));
   PetscCall(MatDestroy(&g->Btr));
@@ -153,12 +142,10 @@ PetscErrorCode HycoGalerkinReset(HycoROM m)
   PetscCall(VecDestroy(&g->x));
   PetscCall(VecDestroy(&g->L));
   PetscCall(HycoGalerkinDestroyOwn(g));
-  PetscCall(PetscFree(g->fe_at));
-  PetscCall(PetscFree(g->Vp));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoGalerkinDestroy(HycoGalerkin g)
+PetscErrorCode HycoGalerkinDestroy(HycoGalerkinModel g)
 {
   PetscFunctionBegin;
   PetscCall(HycoTableDestroy(&g->table));
@@ -168,16 +155,17 @@ PetscErrorCode HycoGalerkinDestroy(HycoGalerkin g)
 
 static PetscErrorCode Assemble(HycoROM m, const PetscReal mu[])
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   PetscBool first = PETSC_FALSE;
 
   PetscFunctionBegin;
   m->beyond_current = PETSC_FALSE;
   first = (PetscBool)!g->system->K;
   PetscCall(HycoFESetParameters(m->fe, mu));
+  PetscCall(HycoGalerkinCreateSets(m));
   m->fe->ready = PETSC_FALSE; /* until everything that depends on it is assembled */
   if (m->fe->stiffness_changed) HycoLoadsForget(g->loads);
-  if (m->fe->stiffness_changed && g->table) {
+  if (m->fe->stiffness_changed && g->model->table) {
     PetscCall(HycoReducedPrepare(m));
     HycoLogged(HYCO_EVENT_REDUCE, HycoTableFill(m, mu));
   } else if (m->fe->stiffness_changed) {
@@ -187,13 +175,13 @@ static PetscErrorCode Assemble(HycoROM m, const PetscReal mu[])
     HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillStiffness(m));
   }
   HycoLogged(HYCO_EVENT_FORCE, HycoFEAssembleForce(m->fe, g->F));
-  if (m->fe->contact_changed) PetscCall(MatDestroy(&g->B));
+  if (m->fe->contact_changed) g->current_B = PETSC_FALSE;
   if (m->fe->contact_changed || m->fe->gap_changed) HycoLogged(HYCO_EVENT_CONTACT, HycoGalerkinOwnRows(m));
   if (m->n_L && m->fe->contact_changed) HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillContact(m));
   HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillVectors(m));
   m->fe->ready = PETSC_TRUE;
   if (first) {
-    PetscCall(HycoSystemSetMatrices(g->system, g->Kr, g->Btr, g->Br, g->symmetric));
+    PetscCall(HycoSystemSetMatrices(g->system, g->Kr, g->Btr, g->Br, g->model->symmetric));
     PetscCall(HycoSystemSetVectors(g->system, g->Fr, g->Dr));
     PetscCall(HycoSolverSetSystem(m->solver, g->system));
   }
@@ -212,22 +200,23 @@ PetscErrorCode HycoGalerkinAssemble(HycoROM m, const PetscReal mu[])
 /* Sets gamma, and U on the nodes of fe's mesh. */
 PetscErrorCode HycoGalerkinExpand(HycoROM m)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   const PetscScalar *x;
   const PetscReal one = 1;
   PetscBLASInt l, n_dof, inc = 1;
 
   PetscFunctionBegin;
   PetscCall(VecGetArrayRead(g->x, &x));
-  for (PetscInt j = 0; j < m->l; j++) {
-    m->gamma[j] = g->n_free && !g->G ? x[j] : 0;
-    for (PetscInt f = 0; g->G && f < m->n_fe; f++) m->gamma[j] += g->G[j * m->n_fe + f] * x[g->n_free + f];
+  for (PetscInt j = 0; j < m->model->l; j++) {
+    m->gamma[j] = g->n_free && !g->model->G ? x[j] : 0;
+    for (PetscInt f = 0; g->model->G && f < m->model->n_fe; f++)
+      m->gamma[j] += g->model->G[j * m->model->n_fe + f] * x[g->n_free + f];
   }
   PetscCall(PetscArraycpy(m->U, m->fe->u0, m->fe->n_dof));
-  PetscCall(PetscBLASIntCast(m->l, &l));
+  PetscCall(PetscBLASIntCast(m->model->l, &l));
   PetscCall(PetscBLASIntCast(m->fe->n_dof, &n_dof));
-  if (l) BLASgemv_("T", &l, &n_dof, &one, g->Vp, &l, m->gamma, &inc, &one, m->U, &inc);
-  for (PetscInt f = 0; f < m->n_fe; f++) m->U[m->fe_dof[f]] = x[g->n_free + f];
+  if (l) BLASgemv_("T", &l, &n_dof, &one, m->model->V, &l, m->gamma, &inc, &one, m->U, &inc);
+  for (PetscInt f = 0; f < m->model->n_fe; f++) m->U[m->model->fe_dof[f]] = x[g->n_free + f];
   HycoFEComplete(m->fe, m->U);
   PetscCall(VecRestoreArrayRead(g->x, &x));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -236,16 +225,16 @@ PetscErrorCode HycoGalerkinExpand(HycoROM m)
 /* Sets gamma, U on the nodes of mesh, Lambda on A_lambda. */
 PetscErrorCode HycoGalerkinUnpack(HycoROM m)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   const PetscScalar *L;
 
   PetscFunctionBegin;
   PetscCall(HycoGalerkinExpand(m));
-  if (m->spread) PetscCall(PetscArrayzero(m->Lambda, m->pairs.n));
+  if (m->spread) PetscCall(PetscArrayzero(m->Lambda, m->model->pairs.n));
   m->spread = PETSC_FALSE;
   if (!m->n_L) PetscFunctionReturn(PETSC_SUCCESS);
-  if (g->expand) {
-    PetscCall(g->expand(m));
+  if (g->model->expand) {
+    PetscCall(g->model->expand(m));
     m->spread = PETSC_TRUE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -257,7 +246,7 @@ PetscErrorCode HycoGalerkinUnpack(HycoROM m)
 
 PetscErrorCode HycoGalerkinSolve(HycoROM m, const PetscReal mu[])
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   HycoPrediction *p = &m->prediction;
   const char *method;
   PetscReal begin = HycoNow();
@@ -284,7 +273,7 @@ PetscErrorCode HycoGalerkinSolve(HycoROM m, const PetscReal mu[])
 
 PetscErrorCode HycoGalerkinCondition(HycoROM m, PetscReal *condition)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   Mat dense;
   PetscScalar *a;
   PetscReal smallest, largest;
@@ -304,7 +293,7 @@ PetscErrorCode HycoGalerkinCondition(HycoROM m, PetscReal *condition)
 /* u^T K u / 2 over the free unknowns, and the same without K's couplings, to which round-off is relative. */
 static PetscErrorCode QuadraticForm(HycoROM m, PetscReal *energy, PetscReal *size)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   const PetscInt *ia, *ja;
   const PetscScalar *a;
   PetscInt n;
@@ -333,12 +322,13 @@ static PetscErrorCode QuadraticForm(HycoROM m, PetscReal *energy, PetscReal *siz
    ratio of 1e5 fewer than ten digits would be accurate. */
 PetscErrorCode HycoGalerkinEnergy(HycoROM m, PetscReal *energy, PetscBool *known)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   PetscReal size = 0;
 
   PetscFunctionBegin;
   *known = PETSC_FALSE;
-  if (!g->K || g->table || m->fe->lifted || m->fe->n_oblique || m->fe->mesh->n_tied) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!g->K || g->model->table || m->fe->lifted || m->fe->n_oblique || m->fe->mesh->n_tied)
+    PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(QuadraticForm(m, energy, &size));
   *known = (PetscBool)(*energy >= 1e-5 * size);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -346,17 +336,17 @@ PetscErrorCode HycoGalerkinEnergy(HycoROM m, PetscReal *energy, PetscBool *known
 
 PetscErrorCode HycoGalerkinLocal(HycoROM m, HycoLocal *local)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   PetscScalar *gap;
 
   PetscFunctionBegin;
-  if (m->m && !g->B) PetscCall(HycoGalerkinContactMatrix(m, &g->B));
+  if (m->m) PetscCall(HycoGalerkinContactMatrix(m));
   if (m->m && !g->D) PetscCall(MatCreateVecs(g->B, NULL, &g->D));
   if (m->m) {
     PetscCall(VecGetArrayWrite(g->D, &gap));
-    PetscCall(PetscArraycpy(gap, g->own_rows.gap, m->m));
+    for (PetscInt k = 0; k < m->m; k++) gap[m->contact[k]] = g->own_rows.gap[k];
     PetscCall(VecRestoreArrayWrite(g->D, &gap));
   }
-  *local = (HycoLocal){g->K, g->B, g->F, g->D, g->sets.is_A, g->sets.is_I};
+  *local = (HycoLocal){g->K, g->B, g->F, g->D, g->sets.is_A, g->sets.is_I, g->sets.is_A_lambda};
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -4,7 +4,7 @@
 
 static PetscErrorCode MoveScan(HycoROM m, HycoH5 h)
 {
-  HycoScan *scan = &((HycoGalerkin)m->data)->scan;
+  HycoScan *scan = &((HycoGalerkinModel)m->model->data)->scan;
   PetscInt counts[2] = {scan->n, scan->n_singular};
 
   PetscFunctionBegin;
@@ -13,17 +13,17 @@ static PetscErrorCode MoveScan(HycoROM m, HycoH5 h)
   scan->n = counts[0];
   scan->n_singular = counts[1];
   PetscCall(HycoH5Reals(h, "training/scan_smallest", 1, &scan->smallest));
-  PetscCall(HycoH5Reals(h, "training/scan_at", m->scene->n_parameters, scan->at));
+  PetscCall(HycoH5Reals(h, "training/scan_at", m->model->scene->n_parameters, scan->at));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoGalerkinMove(HycoROM m, HycoH5 h)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkinModel g = (HycoGalerkinModel)m->model->data;
 
   PetscFunctionBegin;
   if (HycoH5Reads(h) ? HycoH5Has(h, "problem/G") : g->G != NULL) {
-    PetscCall(HycoH5Real(h, "problem/G", &m->l, m->n_fe, &g->G));
+    PetscCall(HycoH5Real(h, "problem/G", &m->model->l, m->model->n_fe, &g->G));
     PetscCall(HycoH5Reals(h, "problem/ridge", 1, &g->ridge));
   }
   PetscCall(MoveScan(m, h));
@@ -34,7 +34,7 @@ PetscErrorCode HycoGalerkinMove(HycoROM m, HycoH5 h)
 
 static PetscErrorCode ViewScan(HycoROM m, PetscViewer viewer)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkinModel g = (HycoGalerkinModel)m->model->data;
 
   PetscFunctionBegin;
   if (!g->scan.n) {
@@ -43,9 +43,9 @@ static PetscErrorCode ViewScan(HycoROM m, PetscViewer viewer)
   }
   PetscCall(PetscViewerASCIIPrintf(viewer, "  scanned at %d points: smallest singular value %.2e of the largest",
                                    (int)g->scan.n, (double)g->scan.smallest));
-  for (PetscInt p = 0; p < m->scene->n_parameters; p++)
-    PetscCall(
-        PetscViewerASCIIPrintf(viewer, "%s %s = %.6g", p ? "," : " at", m->scene->parameter[p], (double)g->scan.at[p]));
+  for (PetscInt p = 0; p < m->model->scene->n_parameters; p++)
+    PetscCall(PetscViewerASCIIPrintf(viewer, "%s %s = %.6g", p ? "," : " at", m->model->scene->parameter[p],
+                                     (double)g->scan.at[p]));
   if (g->scan.n_singular)
     PetscCall(PetscViewerASCIIPrintf(viewer, "; SINGULAR inside the ranges: the determinant has the other sign at %d",
                                      (int)g->scan.n_singular));
@@ -55,11 +55,12 @@ static PetscErrorCode ViewScan(HycoROM m, PetscViewer viewer)
 
 PetscErrorCode HycoGalerkinView(HycoROM m, PetscViewer viewer)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkinModel g = (HycoGalerkinModel)m->model->data;
 
   PetscFunctionBegin;
-  if (m->numbers[0] > 0) /* otherwise not computed, because the matrix is too large */
-    PetscCall(PetscViewerASCIIPrintf(viewer, "  condition of the reduced stiffness: %.2e\n", (double)m->numbers[0]));
+  if (m->model->numbers[0] > 0) /* otherwise not computed, because the matrix is too large */
+    PetscCall(
+        PetscViewerASCIIPrintf(viewer, "  condition of the reduced stiffness: %.2e\n", (double)m->model->numbers[0]));
   if (g->table) PetscCall(HycoTableView(m, viewer));
   if (!g->symmetric) PetscCall(ViewScan(m, viewer));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -25,11 +25,11 @@ struct _n_HycoGalerkinPath {
 static PetscErrorCode Stiffness(HycoPath p)
 {
   HycoROM m = (HycoROM)p->ctx;
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
 
   PetscFunctionBegin;
-  if (g->stiffness) {
-    HycoLogged(HYCO_EVENT_REDUCE, (*g->stiffness)(m));
+  if (g->model->stiffness) {
+    HycoLogged(HYCO_EVENT_REDUCE, (*g->model->stiffness)(m));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(HycoFEAssembleStiffness(m->fe, g->K));
@@ -42,7 +42,7 @@ static PetscErrorCode Stiffness(HycoPath p)
 static PetscErrorCode Loads(HycoPath p)
 {
   HycoROM m = (HycoROM)p->ctx;
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   const PetscBool lifted = m->fe->lifted;
 
   PetscFunctionBegin;
@@ -50,7 +50,7 @@ static PetscErrorCode Loads(HycoPath p)
   HycoLogged(HYCO_EVENT_FORCE, HycoFEAssembleForce(m->fe, g->F));
   m->fe->lifted = lifted;
   HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillVectors(m));
-  if (g->add_loads) HycoLogged(HYCO_EVENT_REDUCE, (*g->add_loads)(m));
+  if (g->model->add_loads) HycoLogged(HYCO_EVENT_REDUCE, (*g->model->add_loads)(m));
   PetscCall(VecCopy(g->Fr, p->F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -58,22 +58,23 @@ static PetscErrorCode Loads(HycoPath p)
 static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elastic)
 {
   HycoROM m = (HycoROM)p->ctx;
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   HycoFE fe = m->fe;
 
   PetscFunctionBegin;
   PetscCall(HycoFESetParameters(fe, mu));
-  fe->ready = PETSC_FALSE;                         /* until everything that depends on it is assembled */
-  g->path->moved = (PetscBool)(g->forces != NULL); /* their loads include all effects of supports */
+  PetscCall(HycoGalerkinCreateSets(m));
+  fe->ready = PETSC_FALSE;                                /* until everything that depends on it is assembled */
+  g->path->moved = (PetscBool)(g->model->forces != NULL); /* their loads include all effects of supports */
   m->beyond_current = PETSC_FALSE;
   if (fe->stiffness_changed && (elastic || !p->n_taken)) PetscCall(Stiffness(p)); /* the first is the elastic one */
-  if (!g->forces) PetscCall(HycoLinearForceSet(g->path->linear, fe->stiffness_changed));
-  if (fe->contact_changed) PetscCall(MatDestroy(&g->B));
+  if (!g->model->forces) PetscCall(HycoLinearForceSet(g->path->linear, fe->stiffness_changed));
+  if (fe->contact_changed) g->current_B = PETSC_FALSE;
   if (fe->contact_changed || fe->gap_changed) HycoLogged(HYCO_EVENT_CONTACT, HycoGalerkinOwnRows(m));
   if (m->n_L && fe->contact_changed) HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillContact(m));
   PetscCall(Loads(p));
   fe->ready = PETSC_TRUE;
-  if (!g->system->K) PetscCall(HycoSystemSetMatrices(g->system, g->Kr, g->Btr, g->Br, g->symmetric));
+  if (!g->system->K) PetscCall(HycoSystemSetMatrices(g->system, g->Kr, g->Btr, g->Br, g->model->symmetric));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -81,7 +82,7 @@ static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elast
    system of the step has moved them. */
 static PetscErrorCode Displace(HycoROM m)
 {
-  HycoGalerkinPath q = ((HycoGalerkin)m->data)->path;
+  HycoGalerkinPath q = ((HycoGalerkin)m->work)->path;
 
   PetscFunctionBegin;
   PetscCall(HycoGalerkinExpand(m));
@@ -96,7 +97,7 @@ static PetscErrorCode Displace(HycoROM m)
 static PetscErrorCode Step(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tangent, HycoFEStepReport *report)
 {
   HycoROM m = (HycoROM)p->ctx;
-  HycoGalerkinPath q = ((HycoGalerkin)m->data)->path;
+  HycoGalerkinPath q = ((HycoGalerkin)m->work)->path;
 
   PetscFunctionBegin;
   PetscCall(Displace(m));
@@ -104,8 +105,8 @@ static PetscErrorCode Step(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tan
   PetscCall(HycoFEStepBodies(m->fe, HYCO_BODIES_FLOWING, q->u, t0, t1, p->begin, p->end, p->f_local, tangent, report));
   report->has_potential = PETSC_FALSE;
   if (report->failed) PetscFunctionReturn(PETSC_SUCCESS);
-  if (((HycoGalerkin)m->data)->forces)
-    PetscCall((*((HycoGalerkin)m->data)->forces)(m, p->end, p->f_int, &p->summands));
+  if (((HycoGalerkin)m->work)->model->forces)
+    PetscCall((*((HycoGalerkin)m->work)->model->forces)(m, p->end, p->f_int, &p->summands));
   else {
     HycoLinearForceAdd(q->linear, q->u, p->f_local);
     HycoFEPassTied(m->fe, p->f_local);
@@ -118,12 +119,12 @@ static PetscErrorCode Step(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tan
 static PetscErrorCode Moves(HycoPath p, Vec rhs)
 {
   HycoROM m = (HycoROM)p->ctx;
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   const PetscScalar *F;
   PetscBool moved;
 
   PetscFunctionBegin;
-  if (g->forces) PetscFunctionReturn(PETSC_SUCCESS);
+  if (g->model->forces) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoPathMoves(p, g->path->u, g->F, &moved));
   g->path->moved = PETSC_TRUE;
   if (!moved) PetscFunctionReturn(PETSC_SUCCESS);
@@ -140,7 +141,7 @@ static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
   HycoROM m = (HycoROM)p->ctx;
 
   PetscFunctionBegin;
-  PetscCall(PetscArraycpy(((HycoGalerkin)m->data)->path->held, m->fe->u0, m->fe->n_dof));
+  PetscCall(PetscArraycpy(((HycoGalerkin)m->work)->path->held, m->fe->u0, m->fe->n_dof));
   PetscCall(HycoGalerkinExpand(m));
   PetscCall(HycoTraceAdd(m, p->t));
   p->now.stored = a->law.stored;
@@ -166,21 +167,21 @@ static PetscErrorCode Measure(HycoROM m, HycoFEState state, HycoStep *s)
 
   PetscFunctionBegin;
   PetscCall(HycoTraceList(m, &sigma, &inelastic));
-  PetscCall(PetscMalloc1(m->mesh->n_cells, &mises));
+  PetscCall(PetscMalloc1(m->model->mesh->n_cells, &mises));
   PetscCall(HycoFEStateFields(m->fe, state, sigma, mises, inelastic, NULL));
-  for (PetscInt e = 0; e < m->mesh->n_cells; e++) {
+  for (PetscInt e = 0; e < m->model->mesh->n_cells; e++) {
     s->mises = PetscMax(s->mises, mises[e]);
     s->inelastic = PetscMax(s->inelastic, inelastic[e]);
   }
   PetscCall(PetscFree(mises));
-  HycoTraceMeasure(m, s);
+  PetscCall(HycoTraceMeasure(m, s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Called before listed time k: if its tangent is monitored, it must be the current one. */
 static void Expect(HycoROM m, PetscInt k)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   const PetscBool watched = (PetscBool)(g->watch.stride && k % g->watch.stride == 0);
 
   g->path->path->method = watched ? HYCO_NEWTON_TANGENT : g->path->method;
@@ -189,7 +190,7 @@ static void Expect(HycoROM m, PetscInt k)
 /* Monitors the last tangent: whether the path comes close to a singular one. */
 static PetscErrorCode Watch(HycoROM m, PetscInt k)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   Mat dense;
   PetscScalar *a;
   PetscInt sign;
@@ -216,6 +217,7 @@ static PetscErrorCode Record(HycoPath p)
   PetscCall(HycoGalerkinCheckContactBasis(m));
   PetscCall(CompleteState(m, p));
   if (m->ops->reconstruct && m->reconstruct) HycoLogged(HYCO_EVENT_RECONSTRUCT, (*m->ops->reconstruct)(m));
+  PetscCall(HycoFloatingBalance(m));
   PetscCall(Measure(m, p->begin, &p->now));
   p->steps[p->n_steps++] = p->now;
   PetscCall(PetscMemzero(&p->now, sizeof(p->now)));
@@ -236,16 +238,18 @@ static PetscErrorCode ReadOptions(HycoROM m, HycoPath p)
 static PetscErrorCode CreateLinear(HycoROM m)
 {
   HycoMesh mesh = m->fe->mesh;
+  PetscInt *sets;
   PetscBool *inside;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(mesh->n_nodes, &inside));
-  for (PetscInt i = 0; i < mesh->n_nodes; i++) inside[i] = (PetscBool)(m->role[i] == HYCO_ROLE_A);
+  PetscCall(PetscMalloc2(m->model->mesh->n_nodes, &inside, m->model->mesh->n_nodes, &sets));
+  PetscCall(HycoROMGetDomain(m, sets));
+  for (PetscInt i = 0; i < mesh->n_nodes; i++) inside[i] = (PetscBool)(sets[i] == 2);
   for (PetscInt k = 0; k < mesh->n_tied; k++)
     inside[mesh->tied[k]] = PETSC_TRUE; /* whose forces are added to the
                                            masters */
-  PetscCall(HycoLinearForceCreate(m->fe, inside, &((HycoGalerkin)m->data)->path->linear));
-  PetscCall(PetscFree(inside));
+  PetscCall(HycoLinearForceCreate(m->fe, inside, &((HycoGalerkin)m->work)->path->linear));
+  PetscCall(PetscFree2(inside, sets));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -253,12 +257,12 @@ PetscErrorCode HycoGalerkinPathCreate(HycoROM m)
 {
   static const HycoPathOps ops = {
       .assemble = Assemble, .step = Step, .stiffness = Stiffness, .moves = Moves, .accept = Accept, .record = Record};
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   HycoPath p;
 
   PetscFunctionBegin;
   PetscCall(PetscNew(&g->path));
-  PetscCall(HycoPathNew(PETSC_COMM_SELF, m->scene, &p));
+  PetscCall(HycoPathNew(PETSC_COMM_SELF, m->model->scene, &p));
   g->path->path = p;
   PetscCall(ReadOptions(m, p));
   if (p->method == HYCO_NEWTON_AUTO) p->method = HYCO_NEWTON_MODIFIED; /* a tangent costs more than the laws */
@@ -280,7 +284,7 @@ PetscErrorCode HycoGalerkinPathCreate(HycoROM m)
   PetscCall(HycoPathSetUp(p));
   PetscCall(HycoSolverSetRefine(m->solver, PETSC_FALSE));
   PetscCall(PetscMalloc2(m->fe->n_dof, &g->path->held, m->fe->n_dof, &g->path->u));
-  if (!g->forces) PetscCall(CreateLinear(m));
+  if (!g->model->forces) PetscCall(CreateLinear(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -309,7 +313,7 @@ static void Summarise(HycoPath p, HycoPrediction *out)
 
 PetscErrorCode HycoGalerkinPathSolve(HycoROM m, const PetscReal mu[])
 {
-  HycoGalerkinPath q = ((HycoGalerkin)m->data)->path;
+  HycoGalerkinPath q = ((HycoGalerkin)m->work)->path;
   HycoPath p = q->path;
   HycoPrediction *out = &m->prediction;
   const char *method;

@@ -38,8 +38,8 @@ PetscErrorCode HycoLoadsDestroy(HycoLoads *loads)
 
 PetscErrorCode HycoLoadsCreate(HycoROM m)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
-  const HycoScene s = m->scene;
+  HycoGalerkin g = (HycoGalerkin)m->work;
+  const HycoScene s = m->model->scene;
   PetscBool reaches[HYCO_MAX_PARAMETERS];
   PetscInt n = 0, parameter[HYCO_MAX_PARAMETERS];
   HycoLoads p;
@@ -80,21 +80,21 @@ static PetscErrorCode Sum(HycoLoads p, const Vec v[], const PetscReal t[], Vec y
 
 static void Coordinates(HycoROM m, const PetscReal mu[], PetscReal t[])
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   const HycoLoads p = g->loads;
 
   t[0] = 1;
   for (PetscInt j = 0; j < p->n; j++) {
     const PetscInt q = p->parameter[j];
 
-    t[j + 1] = (mu[q] - m->scene->lo[q]) / (m->scene->hi[q] - m->scene->lo[q]);
+    t[j + 1] = (mu[q] - m->model->scene->lo[q]) / (m->model->scene->hi[q] - m->model->scene->lo[q]);
   }
 }
 
 /* Whether m->Fr, assembled at mu, is the sum. */
 static PetscErrorCode IsSum(HycoROM m, const PetscReal t[], PetscBool *is)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   const HycoLoads p = g->loads;
   PetscReal size, apart;
 
@@ -110,7 +110,7 @@ static PetscErrorCode IsSum(HycoROM m, const PetscReal t[], PetscBool *is)
 /* m->Fr at the parameters mu, which differ from the current ones only in loads. */
 static PetscErrorCode ForceAt(HycoROM m, const PetscReal mu[])
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   PetscFunctionBegin;
   PetscCall(HycoFESetParameters(m->fe, mu));
   PetscCall(HycoFEAssembleForce(m->fe, g->F));
@@ -121,26 +121,26 @@ static PetscErrorCode ForceAt(HycoROM m, const PetscReal mu[])
 /* Samples the vectors F, and checks whether that at the middle of the ranges is their sum. */
 static PetscErrorCode SampleForces(HycoROM m, const PetscReal mu[])
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   const HycoLoads p = g->loads;
   PetscReal at[HYCO_MAX_PARAMETERS], t[1 + MAX_LOADS];
 
   PetscFunctionBegin;
-  PetscCall(PetscArraycpy(at, mu, m->scene->n_parameters));
-  for (PetscInt j = 0; j < p->n; j++) at[p->parameter[j]] = m->scene->lo[p->parameter[j]];
+  PetscCall(PetscArraycpy(at, mu, m->model->scene->n_parameters));
+  for (PetscInt j = 0; j < p->n; j++) at[p->parameter[j]] = m->model->scene->lo[p->parameter[j]];
   for (PetscInt j = 0; j <= p->n; j++) {
     PetscReal size;
 
-    if (j) at[p->parameter[j - 1]] = m->scene->hi[p->parameter[j - 1]];
+    if (j) at[p->parameter[j - 1]] = m->model->scene->hi[p->parameter[j - 1]];
     PetscCall(ForceAt(m, at));
-    if (j) at[p->parameter[j - 1]] = m->scene->lo[p->parameter[j - 1]];
+    if (j) at[p->parameter[j - 1]] = m->model->scene->lo[p->parameter[j - 1]];
     PetscCall(VecCopy(g->Fr, p->F[j]));
     if (j) PetscCall(VecAXPY(p->F[j], -1, p->F[0]));
     PetscCall(VecNorm(p->F[j], NORM_INFINITY, &size));
     p->given[j] = (PetscBool)(size > 0);
   }
   for (PetscInt j = 0; j < p->n; j++)
-    at[p->parameter[j]] = 0.5 * m->scene->lo[p->parameter[j]] + 0.5 * m->scene->hi[p->parameter[j]];
+    at[p->parameter[j]] = 0.5 * m->model->scene->lo[p->parameter[j]] + 0.5 * m->model->scene->hi[p->parameter[j]];
   PetscCall(ForceAt(m, at));
   Coordinates(m, at, t);
   PetscCall(IsSum(m, t, &p->affine));
@@ -150,7 +150,7 @@ static PetscErrorCode SampleForces(HycoROM m, const PetscReal mu[])
 
 static PetscErrorCode Renew(HycoROM m, const PetscReal mu[])
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   const HycoLoads p = g->loads;
   PetscBool singular;
   PetscErrorCode ierr;
@@ -173,7 +173,7 @@ static PetscErrorCode Renew(HycoROM m, const PetscReal mu[])
 
 PetscErrorCode HycoLoadsSetFree(HycoROM m, const PetscReal mu[])
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   const HycoLoads p = g->loads;
   PetscReal t[1 + MAX_LOADS];
   PetscBool is;

@@ -12,7 +12,7 @@ PetscErrorCode HycoGalerkinCheckContactBasis(HycoROM m)
   PetscFunctionBegin;
   if (m->n_L || p->reason <= 0 || (m->ops->reconstruct && !m->reconstruct)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoROMComplete(m));
-  for (PetscInt k = 0; k < m->pairs.n; k++) {
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) {
     const PetscReal bu = HycoROMAddRow(m, k, 0);
 
     in = PetscMax(in, bu - m->rows.gap[k]);

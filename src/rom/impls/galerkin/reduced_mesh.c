@@ -9,9 +9,9 @@
    normal is needed there. */
 static PetscErrorCode CountNodes(HycoROM m, PetscInt *n)
 {
-  HycoMesh mesh = m->mesh;
+  HycoMesh mesh = m->model->mesh;
   PetscBool *slave;
-  PetscInt node[HYCO_MAX_CELL_NODES];
+  PetscInt node[HYCO_MAX_CELL_NODES], last;
 
   PetscFunctionBegin;
   *n = 0;
@@ -20,14 +20,16 @@ static PetscErrorCode CountNodes(HycoROM m, PetscInt *n)
 
     for (PetscInt v = 0; v < n_nodes; v++) *n = PetscMax(*n, node[v] + 1);
   }
-  for (PetscInt i = *n; i < mesh->n_nodes; i++) *n = m->role[i] == HYCO_ROLE_A ? i + 1 : *n;
+  PetscCall(ISGetMinMax(m->model->rid, NULL, &last));
+  *n = PetscMax(*n, last + 1);                    /* an empty set has the least integer as its largest node */
   PetscCall(PetscCalloc1(mesh->n_nodes, &slave)); /* with a measured normal */
-  for (PetscInt k = 0; k < m->pairs.n; k++) {
-    if (!m->in_rid[k]) continue;
-    *n = PetscMax(*n, m->pairs.slave[k] + 1);
-    for (PetscInt j = m->pairs.master_start[k]; j < m->pairs.master_start[k + 1]; j++)
-      *n = PetscMax(*n, m->pairs.master[j] + 1);
-    if (HycoContactAverages(m->scene->contact[m->pairs.contact[k]])) slave[m->pairs.slave[k]] = PETSC_TRUE;
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) {
+    if (!m->model->in_rid[k]) continue;
+    *n = PetscMax(*n, m->model->pairs.slave[k] + 1);
+    for (PetscInt j = m->model->pairs.master_start[k]; j < m->model->pairs.master_start[k + 1]; j++)
+      *n = PetscMax(*n, m->model->pairs.master[j] + 1);
+    if (HycoContactAverages(m->model->scene->contact[m->model->pairs.contact[k]]))
+      slave[m->model->pairs.slave[k]] = PETSC_TRUE;
   }
   for (PetscInt f = 0; f < mesh->n_facets; f++) {
     PetscBool any = PETSC_FALSE;
@@ -54,6 +56,8 @@ static PetscErrorCode ViewMesh(HycoMesh mesh, PetscInt n, HycoMesh *own)
   o = *own;
   *o = *mesh;
   o->n_nodes = n;
+  o->dm = NULL; /* which has other facets */
+  o->facet_point = NULL;
   while (o->n_tied && o->tied[o->n_tied - 1] >= n) o->n_tied--;
   o->n_facets = 0;
   PetscCall(PetscMalloc1(mesh->n_facets * mesh->nf, &o->facets));
@@ -83,99 +87,133 @@ static PetscErrorCode ViewMesh(HycoMesh mesh, PetscInt n, HycoMesh *own)
 /* Selects the contacts of A_lambda, in the order of all. */
 static PetscErrorCode SelectPairs(HycoROM m)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
-  const HycoPairs *all = &m->pairs;
+  HycoGalerkin g = (HycoGalerkin)m->work;
+  const HycoPairs *all = &m->model->pairs;
 
   PetscFunctionBegin;
   m->m = 0;
   PetscCall(PetscMalloc1(all->n, &m->contact));
   for (PetscInt k = 0; k < all->n; k++) {
-    if (m->in_rid[k]) m->contact[m->m++] = k;
+    if (m->model->in_rid[k]) m->contact[m->m++] = k;
   }
+  PetscCall(ISCreateGeneral(PETSC_COMM_SELF, m->m, m->contact, PETSC_COPY_VALUES, &g->sets.is_A_lambda));
   PetscCall(HycoPairsSelect(all, m->m, m->contact, NULL, &g->own_pairs));
-  HycoPairsSetReach(&g->own_pairs, m->master_reach);
+  HycoPairsSetReach(&g->own_pairs, m->model->master_reach);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoGalerkinCreateOwn(HycoROM m)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   PetscInt n;
 
   PetscFunctionBegin;
   PetscCall(CountNodes(m, &n));
-  PetscCall(ViewMesh(m->mesh, n, &g->own));
+  PetscCall(ViewMesh(m->model->mesh, n, &g->own));
   PetscCall(SelectPairs(m));
-  PetscCall(HycoRowsCreate(&g->own_pairs, m->mesh->dim, &g->own_rows));
+  PetscCall(HycoRowsCreate(&g->own_pairs, m->model->mesh->dim, &g->own_rows));
   m->of_fe = &g->own_pairs;
   m->spread = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Free unknowns of fe's mesh with a role. */
-static PetscErrorCode CreateUnknowns(HycoROM m, PetscInt role, IS *is)
+/* The free unknowns of a set of nodes. */
+static PetscErrorCode CreateUnknowns(HycoFE fe, IS nodes, IS *unknowns)
 {
-  PetscInt n = 0, *dof;
+  const PetscInt *node;
+  PetscInt n_nodes, n = 0, *dof;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(m->fe->n_dof, &dof));
-  for (PetscInt i = 0; i < m->fe->n_dof; i++) {
-    if (m->role[i / m->mesh->dim] == role && !m->fe->fixed[i]) dof[n++] = i;
+  PetscCall(ISGetLocalSize(nodes, &n_nodes));
+  PetscCall(ISGetIndices(nodes, &node));
+  PetscCall(PetscMalloc1(n_nodes * fe->dim, &dof));
+  for (PetscInt k = 0; k < n_nodes * fe->dim; k++) {
+    const PetscInt i = node[k / fe->dim] * fe->dim + k % fe->dim;
+
+    if (!fe->fixed[i]) dof[n++] = i;
   }
-  PetscCall(ISCreateGeneral(PETSC_COMM_SELF, n, dof, PETSC_COPY_VALUES, is));
+  PetscCall(ISRestoreIndices(nodes, &node));
+  PetscCall(ISCreateGeneral(PETSC_COMM_SELF, n, dof, PETSC_COPY_VALUES, unknowns));
   PetscCall(PetscFree(dof));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoGalerkinCreateSets(HycoROM m)
 {
-  HycoIndexSets *s = &((HycoGalerkin)m->data)->sets;
+  HycoIndexSets *s = &((HycoGalerkin)m->work)->sets;
+  IS interface;
 
   PetscFunctionBegin;
-  PetscCall(CreateUnknowns(m, HYCO_ROLE_A, &s->is_A));
-  PetscCall(CreateUnknowns(m, HYCO_ROLE_INTERFACE, &s->is_I));
-  PetscCall(ISCreateGeneral(PETSC_COMM_SELF, m->m, m->contact, PETSC_COPY_VALUES, &s->is_A_lambda));
+  if (s->is_A) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(CreateUnknowns(m->fe, m->model->inside, &s->is_A));
+  PetscCall(ISDifference(m->model->rid, m->model->inside, &interface));
+  PetscCall(CreateUnknowns(m->fe, interface, &s->is_I));
+  PetscCall(ISDestroy(&interface));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A'_c, the unknowns on which the rows act, and A_c, those of them in A. */
+/* A'_c, the unknowns on which B's rows act, and A_c, those of them in A. */
 static PetscErrorCode CreateContactSets(HycoROM m)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
-  PetscInt n = 0, *dof;
-  PetscBool *acts;
+  HycoGalerkin g = (HycoGalerkin)m->work;
+  const PetscInt *start, *column;
+  PetscInt n, n_old = -1, n_rows, *dof;
+  PetscBool done;
 
   PetscFunctionBegin;
+  if (g->sets.is_Ac_all) PetscCall(ISGetLocalSize(g->sets.is_Ac_all, &n_old));
+  PetscCall(MatGetRowIJ(g->B, 0, PETSC_FALSE, PETSC_FALSE, &n_rows, &start, &column, &done));
+  n = start[n_rows];
+  HycoDuplicate(n, column, &dof);
+  PetscCall(MatRestoreRowIJ(g->B, 0, PETSC_FALSE, PETSC_FALSE, &n_rows, &start, &column, &done));
+  PetscCall(PetscSortRemoveDupsInt(&n, dof));
+  if (n == n_old) { /* B's pattern grows, and the set with it */
+    PetscCall(PetscFree(dof));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(ISDestroy(&g->sets.is_Ac));
   PetscCall(ISDestroy(&g->sets.is_Ac_all));
-  PetscCall(PetscCalloc1(m->fe->n_dof, &acts));
-  PetscCall(PetscMalloc1(m->fe->n_dof, &dof));
-  for (PetscInt t = 0; t < g->own_rows.start[m->m]; t++) acts[g->own_rows.dof[t]] = PETSC_TRUE;
-  for (PetscInt i = 0; i < m->fe->n_dof; i++) {
-    if (acts[i]) dof[n++] = i;
-  }
-  PetscCall(ISCreateGeneral(PETSC_COMM_SELF, n, dof, PETSC_COPY_VALUES, &g->sets.is_Ac_all));
+  PetscCall(ISCreateGeneral(PETSC_COMM_SELF, n, dof, PETSC_OWN_POINTER, &g->sets.is_Ac_all));
   PetscCall(ISIntersect(g->sets.is_Ac_all, g->sets.is_A, &g->sets.is_Ac));
-  PetscCall(PetscFree(dof));
-  PetscCall(PetscFree(acts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoGalerkinContactMatrix(HycoROM m, Mat *B)
+static PetscErrorCode CreateContactMatrix(HycoROM m, Mat *B)
 {
-  const HycoRows *rows = &((HycoGalerkin)m->data)->own_rows;
+  const PetscInt width = HycoPairsWidth(&((HycoGalerkin)m->work)->own_pairs) * m->fe->dim;
+  PetscInt *entries;
 
   PetscFunctionBegin;
-  PetscCall(CreateContactSets(m));
-  PetscCall(MatCreate(PETSC_COMM_SELF, B));
-  PetscCall(MatSetSizes(*B, m->m, m->fe->n_dof, m->m, m->fe->n_dof));
-  PetscCall(MatSetType(*B, MATSEQAIJ));
-  PetscCall(MatSeqAIJSetPreallocation(*B, HycoPairsWidth(&m->pairs) * m->mesh->dim, NULL));
+  PetscCall(PetscCalloc1(m->model->pairs.n, &entries));
+  for (PetscInt k = 0; k < m->m; k++) entries[m->contact[k]] = width;
+  PetscCall(MatCreateSeqAIJ(PETSC_COMM_SELF, m->model->pairs.n, m->fe->n_dof, 0, entries, B));
+  PetscCall(MatSetOption(*B, MAT_NEW_NONZERO_ALLOCATION_ERR, PETSC_FALSE));
+  PetscCall(PetscFree(entries));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Entries that are not in B's pattern so far, as normals turn and masters change on moved surfaces, stay in it. */
+PetscErrorCode HycoGalerkinContactMatrix(HycoROM m)
+{
+  HycoGalerkin g = (HycoGalerkin)m->work;
+  const HycoRows *rows = &g->own_rows;
+  PetscObjectState before, after;
+
+  PetscFunctionBegin;
+  if (g->current_B) PetscFunctionReturn(PETSC_SUCCESS);
+  if (g->B)
+    PetscCall(MatZeroEntries(g->B));
+  else
+    PetscCall(CreateContactMatrix(m, &g->B));
+  PetscCall(MatGetNonzeroState(g->B, &before));
   for (PetscInt k = 0; k < m->m; k++)
-    PetscCall(MatSetValues(*B, 1, &k, rows->start[k + 1] - rows->start[k], rows->dof + rows->start[k],
-                           rows->value + rows->start[k], INSERT_VALUES));
-  PetscCall(MatAssemblyBegin(*B, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(*B, MAT_FINAL_ASSEMBLY));
+    PetscCall(MatSetValues(g->B, 1, &m->contact[k], rows->start[k + 1] - rows->start[k], rows->dof + rows->start[k],
+                           rows->value + rows->start[k], ADD_VALUES));
+  PetscCall(MatAssemblyBegin(g->B, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(g->B, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatGetNonzeroState(g->B, &after));
+  if (!g->sets.is_Ac || after != before) PetscCall(CreateContactSets(m));
+  g->current_B = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -208,11 +246,10 @@ PetscErrorCode HycoGalerkinDestroyOwn(HycoGalerkin g)
 
 PetscErrorCode HycoGalerkinOwnRows(HycoROM m)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   HycoRows *rows = &g->own_rows;
-  const PetscInt dim = m->mesh->dim;
   const PetscReal none = g->own_pairs.room ? HycoContactNoGap(m->fe) : 0;
-  PetscInt n = 0, lo = 0;
+  PetscInt n = 0, lo = 0, at;
 
   PetscFunctionBegin;
   PetscCall(HycoContactRows(m->fe, &g->own_pairs, rows->start, rows->dof, rows->value, rows->gap));
@@ -221,7 +258,10 @@ PetscErrorCode HycoGalerkinOwnRows(HycoROM m)
     const PetscInt hi = rows->start[k + 1];
     PetscBool tested = (PetscBool)!HycoPairsMoved(&g->own_pairs, k);
 
-    for (PetscInt t = lo; t < hi; t++) tested = (PetscBool)(tested || m->role[rows->dof[t] / dim] == HYCO_ROLE_A);
+    for (PetscInt t = lo; t < hi && !tested; t++) {
+      PetscCall(ISLocate(g->sets.is_A, rows->dof[t], &at));
+      tested = (PetscBool)(at >= 0);
+    }
     for (PetscInt t = lo; tested && t < hi; t++, n++) {
       rows->dof[n] = rows->dof[t];
       rows->value[n] = rows->value[t];

@@ -1,39 +1,62 @@
 /*
-  The reduced system's matrices and vectors from those on the RID. Row i of K is used once: y = K[i,:] Vp gives its part
-  on the modes, its entries on full-order unknowns the rest. Rows that no parameter changes are summed once and stored.
+  The reduced system (38) from K[A, A+I] and B[A_lambda, A'_c], which are submatrices on the model's index sets, and
+  products of them with the modes. With x = (gamma, U_f), the unknowns of the RID are P x, P = [V | E], where V has zero
+  rows at the full-order unknowns f and E is the identity there; the test space is P[A, :]. In blocks, with A = m + f:
+
+    Kr = | V[m]^T K[m,:] V   (K[f,A] V[A])^T |     since K is symmetric
+         |              K[f,:] P             |
+
+  hybrid all, dense: gamma = G U[A], so that Kr = (K[A,:] V) G + K[A,A]. Rows of K that no parameter changes contribute
+  once. Submatrices of K have every unknown as a column, one stride, which PETSc copies 3 times faster than a general
+  set: columns outside A + I belong to fixed unknowns, where K has no couplings and V is zero.
 */
 #include <hycogalerkin.h>
-#include <petsc/private/petscimpl.h> /* PetscObjectStateIncrease() */
-#include <petscblaslapack.h>
+
+/* Rows of K[A, :] and their products. Of an empty set there are none. */
+typedef struct {
+  PetscInt n_full, *row; /* the row of Kr of each full-order unknown */
+  IS tested, full;       /* m, f */
+  Mat K_m, V_m, KV, M;   /* K[m,:], V[m], K[m,:] V, V[m]^T K[m,:] V */
+  Mat K_f, U, F;         /* K[f,:], K[f,A] V[A], K[f,:] P */
+} Rows;
+
+/* For a set of unknowns: B[A_lambda, set], P[set, :], their product. */
+typedef struct {
+  Mat B, P, BP;
+} ContactProduct;
 
 struct _n_HycoReduced {
-  PetscInt n_rows, n_constant, *row; /* free unknowns of A: first those that no parameter changes */
-  PetscBool dense;                   /* whether Kr is dense */
-  PetscScalar *constant;             /* contribution of the first n_constant rows to Kr; NULL: there is none */
-  PetscReal *y, *value, *modes, *Y;  /* l; a row; n_free x n row major; hybrid all: n_fe x l row major */
-  PetscInt *index;
+  IS all;                            /* every unknown of fe's mesh */
+  Mat V, V_A, P;                     /* n_dof rows; V_A: zero outside A; P: with the modes that are unknowns */
+  Rows varying;                      /* rows that a parameter changes; hybrid all, dense: all rows */
+  Mat constant;                      /* M of the others */
+  Mat KV, G;                         /* hybrid all, dense: K[A,:] V; G, l x n_fe */
+  PetscScalar *modes;                /* Kr's rows of the modes, n_free x n row major */
+  PetscInt *index;                   /* 0, 1, ..., n - 1 */
+  PetscBool dense, filled, all_full; /* Kr is dense; has been filled; its unknowns are U[A], and gamma = G U[A] */
+  Vec u, gamma;                      /* without arrays of their own */
+  ContactProduct all_c, Ac;          /* for A'_c and A_c */
+  PetscObjectState pattern;          /* of B, for which these are */
 };
 
-PetscErrorCode HycoReducedCreateSparse(HycoROM m)
+static PetscErrorCode DestroyRows(Rows *s)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
-  PetscInt *nnz;
-  const PetscInt *ia, *ja;
-  PetscInt n;
-  PetscBool done;
+  Mat *const each[] = {&s->K_m, &s->V_m, &s->KV, &s->M, &s->K_f, &s->U, &s->F};
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(m->n, &nnz));
-  PetscCall(MatGetRowIJ(g->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
-  for (PetscInt k = 0; k < g->n_free; k++) nnz[k] = m->n;
-  for (PetscInt k = 0; k < m->n_fe; k++) nnz[g->n_free + k] = g->n_free + ia[m->fe_dof[k] + 1] - ia[m->fe_dof[k]];
-  PetscCall(MatRestoreRowIJ(g->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
-  PetscCall(MatCreate(PETSC_COMM_SELF, &g->Kr));
-  PetscCall(MatSetSizes(g->Kr, m->n, m->n, m->n, m->n));
-  PetscCall(MatSetType(g->Kr, MATSEQAIJ));
-  for (PetscInt k = 0; k < m->n; k++) nnz[k] = PetscMin(nnz[k], m->n);
-  PetscCall(MatSeqAIJSetPreallocation(g->Kr, 0, nnz));
-  PetscCall(PetscFree(nnz));
+  for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(each); k++) PetscCall(MatDestroy(each[k]));
+  PetscCall(ISDestroy(&s->tested));
+  PetscCall(ISDestroy(&s->full));
+  PetscCall(PetscFree(s->row));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode DestroyContact(ContactProduct *c)
+{
+  PetscFunctionBegin;
+  PetscCall(MatDestroy(&c->B));
+  PetscCall(MatDestroy(&c->P));
+  PetscCall(MatDestroy(&c->BP));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -43,236 +66,378 @@ PetscErrorCode HycoReducedDestroy(HycoReduced *reduced)
 
   PetscFunctionBegin;
   if (!r) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscFree(r->row));
-  PetscCall(PetscFree(r->constant));
-  PetscCall(PetscFree5(r->y, r->value, r->index, r->modes, r->Y));
+  PetscCall(DestroyRows(&r->varying));
+  PetscCall(DestroyContact(&r->all_c));
+  PetscCall(DestroyContact(&r->Ac));
+  PetscCall(ISDestroy(&r->all));
+  PetscCall(MatDestroy(&r->V));
+  PetscCall(MatDestroy(&r->V_A));
+  PetscCall(MatDestroy(&r->P));
+  PetscCall(MatDestroy(&r->constant));
+  PetscCall(MatDestroy(&r->KV));
+  PetscCall(MatDestroy(&r->G));
+  PetscCall(PetscFree2(r->modes, r->index));
+  PetscCall(VecDestroy(&r->u));
+  PetscCall(VecDestroy(&r->gamma));
   PetscCall(PetscFree(*reduced));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rows of A, those whose cells are all constant first. */
-static PetscErrorCode ListRows(HycoROM m, HycoReduced r)
+/* -- the bases -- */
+
+/* A matrix that is stored row major. */
+static PetscErrorCode CreateRowMajor(PetscInt rows, PetscInt columns, PetscReal a[], Mat *A)
 {
-  const PetscInt dim = m->fe->dim;
+  Mat At;
+
+  PetscFunctionBegin;
+  PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, columns, rows, a, &At));
+  PetscCall(MatTranspose(At, MAT_INITIAL_MATRIX, A));
+  PetscCall(MatDestroy(&At));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* V and V_A; if only fixed unknowns, where V is zero, are outside A, they are the same. */
+static PetscErrorCode CreateModes(HycoROM m, HycoReduced r)
+{
+  HycoGalerkin g = (HycoGalerkin)m->work;
+  PetscInt n_A;
+  IS rest;
+
+  PetscFunctionBegin;
+  PetscCall(CreateRowMajor(m->fe->n_dof, m->model->l, m->model->V, &r->V));
+  PetscCall(MatZeroRows(r->V, m->model->n_fe, m->model->fe_dof, 0, NULL, NULL));
+  PetscCall(ISGetLocalSize(g->sets.is_A, &n_A));
+  for (PetscInt i = 0; i < m->fe->n_dof; i++) n_A += m->fe->fixed[i];
+  if (n_A == m->fe->n_dof) {
+    PetscCall(PetscObjectReference((PetscObject)r->V));
+    r->V_A = r->V;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(MatDuplicate(r->V, MAT_COPY_VALUES, &r->V_A));
+  PetscCall(ISComplement(g->sets.is_A, 0, m->fe->n_dof, &rest));
+  PetscCall(MatZeroRowsIS(r->V_A, rest, 0, NULL, NULL));
+  PetscCall(ISDestroy(&rest));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* P[unknowns, :]: of a full-order unknown its unit vector; of others V, or with gamma = G U[A] V G. */
+static PetscErrorCode CreateP(HycoROM m, IS unknowns, PetscBool with_G, Mat *P)
+{
+  HycoGalerkin g = (HycoGalerkin)m->work;
+  const PetscInt n_modes = with_G ? m->n : g->n_free, *dof;
+  const PetscScalar one = 1;
+  PetscScalar *v;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCall(ISGetLocalSize(unknowns, &n));
+  PetscCall(ISGetIndices(unknowns, &dof));
+  PetscCall(PetscMalloc1(m->n, &v));
+  PetscCall(MatCreateSeqAIJ(PETSC_COMM_SELF, n, m->n, PetscMax(1, n_modes), NULL, P));
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscReal *modes = m->model->V + (size_t)dof[i] * (size_t)m->model->l;
+    PetscInt at;
+
+    PetscCall(PetscFindInt(dof[i], m->model->n_fe, m->model->fe_dof, &at));
+    if (at >= 0) {
+      at += g->n_free;
+      PetscCall(MatSetValues(*P, 1, &i, 1, &at, &one, INSERT_VALUES));
+      continue;
+    }
+    for (PetscInt j = 0; j < n_modes; j++) {
+      v[j] = with_G ? 0 : modes[j];
+      for (PetscInt k = 0; with_G && k < m->model->l; k++) v[j] += modes[k] * g->model->G[k * m->n + j];
+    }
+    if (!m->fe->fixed[dof[i]]) PetscCall(MatSetValues(*P, 1, &i, n_modes, g->reduced->index, v, INSERT_VALUES));
+  }
+  PetscCall(MatAssemblyBegin(*P, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(*P, MAT_FINAL_ASSEMBLY));
+  PetscCall(PetscFree(v));
+  PetscCall(ISRestoreIndices(unknowns, &dof));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducedPrepare(HycoROM m)
+{
+  HycoGalerkin g = (HycoGalerkin)m->work;
+  HycoReduced r;
+
+  PetscFunctionBegin;
+  if (g->reduced) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscNew(&g->reduced));
+  r = g->reduced;
+  r->all_full = (PetscBool)(g->model->G && !g->bordered);
+  PetscCall(PetscObjectTypeCompare((PetscObject)g->Kr, MATSEQDENSE, &r->dense));
+  PetscCall(ISCreateStride(PETSC_COMM_SELF, m->fe->n_dof, 0, 1, &r->all));
+  PetscCall(PetscCalloc2(g->n_free * m->n, &r->modes, m->n, &r->index));
+  for (PetscInt k = 0; k < m->n; k++) r->index[k] = k;
+  PetscCall(CreateModes(m, r));
+  PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, m->fe->n_dof, NULL, &r->u));
+  PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, m->model->l, NULL, &r->gamma));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- the stiffness -- */
+
+/* The unknowns of cells that a parameter changes. */
+static PetscErrorCode CreateVarying(HycoROM m, IS *unknowns)
+{
+  PetscInt n = 0, *dof;
   PetscBool *varies;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc1(m->mesh->n_nodes, &varies));
-  for (PetscInt e = 0; e < m->mesh->n_cells; e++) {
+  PetscCall(PetscCalloc1(m->model->mesh->n_nodes, &varies));
+  PetscCall(PetscMalloc1(m->fe->n_dof, &dof));
+  for (PetscInt e = 0; e < m->model->mesh->n_cells; e++) {
     PetscInt node[HYCO_MAX_CELL_NODES];
-    const PetscInt n = HycoMeshCellNodes(m->mesh, e, node);
+    const PetscInt n_nodes = m->fe->constant[e] ? 0 : HycoMeshCellNodes(m->model->mesh, e, node);
 
-    for (PetscInt v = 0; v < n && !m->fe->constant[e]; v++) varies[node[v]] = PETSC_TRUE;
+    for (PetscInt v = 0; v < n_nodes; v++) varies[node[v]] = PETSC_TRUE;
   }
-  PetscCall(PetscMalloc1(m->fe->n_dof, &r->row));
-  for (PetscInt pass = 0; pass < 2; pass++) {
-    for (PetscInt i = 0; i < m->fe->n_dof; i++) {
-      if (m->role[i / dim] == HYCO_ROLE_A && !m->fe->fixed[i] && varies[i / dim] == (pass ? PETSC_TRUE : PETSC_FALSE))
-        r->row[r->n_rows++] = i;
-    }
-    if (!pass) r->n_constant = r->n_rows;
+  for (PetscInt i = 0; i < m->fe->n_dof; i++) {
+    if (varies[i / m->fe->dim]) dof[n++] = i;
   }
+  PetscCall(ISCreateGeneral(PETSC_COMM_SELF, n, dof, PETSC_COPY_VALUES, unknowns));
+  PetscCall(PetscFree(dof));
   PetscCall(PetscFree(varies));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* y = K[i,:] Vp over the modes. */
-static void RowTimesModes(HycoROM m, PetscInt n, const PetscInt col[], const PetscScalar val[], PetscReal y[])
+/* The rows of K[A, :] in a set (ISIntersect()) or not in it (ISDifference()). Where these are all of K's rows but those
+   of fixed unknowns, the submatrix is K itself: MatCreateSubMatrix() returns it if rows and columns are the same
+   stride. */
+static PetscErrorCode CreateRows(HycoROM m, IS in, PetscErrorCode (*of)(IS, IS, IS *), Rows *s)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
-  const PetscInt l = m->l;
+  HycoGalerkin g = (HycoGalerkin)m->work;
+  HycoReduced r = g->reduced;
+  const PetscInt *dof;
+  PetscInt n_tested, n_A;
+  IS fe, tested, columns;
 
-  for (PetscInt j = 0; j < l; j++) y[j] = 0;
-  for (PetscInt k = 0; k < n; k++) {
-    const PetscReal *v = g->Vp + (size_t)col[k] * (size_t)l;
-
-    for (PetscInt j = 0; j < l; j++) y[j] += val[k] * v[j];
+  PetscFunctionBegin;
+  PetscCall(ISCreateGeneral(PETSC_COMM_SELF, m->model->n_fe, m->model->fe_dof, PETSC_COPY_VALUES, &fe));
+  PetscCall(ISDifference(g->sets.is_A, fe, &tested));
+  PetscCall((*of)(fe, in, &s->full));
+  PetscCall((*of)(tested, in, &s->tested));
+  PetscCall(ISDestroy(&tested));
+  PetscCall(ISDestroy(&fe));
+  PetscCall(ISGetLocalSize(s->full, &s->n_full));
+  PetscCall(PetscMalloc1(s->n_full, &s->row));
+  PetscCall(ISGetIndices(s->full, &dof));
+  for (PetscInt k = 0; k < s->n_full; k++) {
+    PetscCall(PetscFindInt(dof[k], m->model->n_fe, m->model->fe_dof, &s->row[k]));
+    s->row[k] += g->n_free;
   }
+  PetscCall(ISRestoreIndices(s->full, &dof));
+  PetscCall(ISGetLocalSize(s->tested, &n_tested));
+  PetscCall(ISGetLocalSize(g->sets.is_A, &n_A));
+  if (!n_tested || !g->n_free)
+    PetscCall(ISDestroy(&s->tested));
+  else if (n_tested == n_A && r->V_A == r->V) {
+    PetscCall(ISDestroy(&s->tested));
+    PetscCall(PetscObjectReference((PetscObject)r->all));
+    s->tested = r->all;
+  }
+  if (!s->tested) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(ISCreateStride(PETSC_COMM_SELF, m->model->l, 0, 1, &columns));
+  PetscCall(MatCreateSubMatrix(r->V, s->tested, columns, MAT_INITIAL_MATRIX, &s->V_m));
+  PetscCall(ISDestroy(&columns));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The part of row i of A on each unknown: `index`, `value`; returns their number. Modes first, all of them. */
-static PetscInt ReducedRow(HycoROM m, PetscInt n, const PetscInt col[], const PetscScalar val[], PetscReal y[],
-                           PetscInt index[], PetscReal value[])
+/* The submatrices of K on these rows, and their products. */
+static PetscErrorCode Multiply(HycoROM m, MatReuse reuse, Rows *s)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
-  PetscInt count = 0;
-
-  RowTimesModes(m, n, col, val, y);
-  if (g->G && !g->bordered) {
-    for (PetscInt f = 0; f < m->n_fe; f++) {
-      PetscReal sum = 0;
-
-      for (PetscInt j = 0; j < m->l; j++) sum += y[j] * g->G[j * m->n_fe + f];
-      index[f] = f;
-      value[f] = sum;
-    }
-    for (PetscInt k = 0; k < n; k++) {
-      if (g->fe_at[col[k]] >= 0) value[g->fe_at[col[k]]] += val[k];
-    }
-    return m->n_fe;
-  }
-  for (; count < g->n_free; count++) {
-    index[count] = count;
-    value[count] = y[count];
-  }
-  for (PetscInt k = 0; k < n; k++) {
-    if (g->fe_at[col[k]] < 0) continue;
-    index[count] = g->n_free + g->fe_at[col[k]];
-    value[count++] = val[k];
-  }
-  return count;
-}
-
-/* The pattern of a sparse Kr: full rows of the modes; the modes and the neighbours in the others. */
-static PetscErrorCode SetPattern(HycoROM m, const PetscInt ia[], const PetscInt ja[], const PetscScalar a[])
-{
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   HycoReduced r = g->reduced;
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < m->n; k++) {
-    r->index[k] = k;
-    r->value[k] = 0;
+  if (s->tested) {
+    PetscCall(MatCreateSubMatrix(g->K, s->tested, r->all, reuse, &s->K_m));
+    PetscCall(MatMatMult(s->K_m, r->V, reuse, PETSC_DETERMINE, &s->KV));
+    PetscCall(MatTransposeMatMult(s->V_m, s->KV, reuse, PETSC_DETERMINE, &s->M));
   }
-  for (PetscInt j = 0; j < g->n_free; j++)
-    PetscCall(MatSetValues(g->Kr, 1, &j, m->n, r->index, r->value, INSERT_VALUES));
-  for (PetscInt k = 0; k < r->n_rows; k++) {
-    const PetscInt i = r->row[k], row = g->n_free + g->fe_at[i];
-    PetscInt count;
+  if (!s->n_full) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatCreateSubMatrix(g->K, s->full, r->all, reuse, &s->K_f));
+  PetscCall(MatMatMult(s->K_f, r->P, reuse, PETSC_DETERMINE, &s->F));
+  if (g->n_free && !g->bordered) PetscCall(MatMatMult(s->K_f, r->V_A, reuse, PETSC_DETERMINE, &s->U));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
-    if (g->fe_at[i] < 0) continue;
-    count = ReducedRow(m, ia[i + 1] - ia[i], ja + ia[i], a + ia[i], r->y, r->index, r->value);
-    PetscCall(MatSetValues(g->Kr, 1, &row, count, r->index, r->value, INSERT_VALUES));
+/* A row of Kr. A sparse one has its pattern from the first time on. */
+static PetscErrorCode PutRow(HycoROM m, PetscInt row, PetscInt n, const PetscInt column[], const PetscScalar value[])
+{
+  HycoGalerkin g = (HycoGalerkin)m->work;
+
+  PetscFunctionBegin;
+  if (g->reduced->filled && !g->reduced->dense)
+    PetscCall(MatSetValuesRow(g->Kr, row, value));
+  else
+    PetscCall(MatSetValues(g->Kr, 1, &row, n, column, value, INSERT_VALUES));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Rows of full-order unknowns, and their columns in the rows of the modes. */
+static PetscErrorCode PutFull(HycoROM m, const Rows *s)
+{
+  const PetscScalar *u;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < s->n_full; k++) {
+    const PetscInt *column;
+    const PetscScalar *value;
+    PetscInt n;
+
+    PetscCall(MatGetRow(s->F, k, &n, &column, &value));
+    PetscCall(PutRow(m, s->row[k], n, column, value));
+    PetscCall(MatRestoreRow(s->F, k, &n, &column, &value));
   }
+  if (!s->U) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatDenseGetArrayRead(s->U, &u));
+  for (PetscInt j = 0; j < m->model->l; j++) {
+    for (PetscInt k = 0; k < s->n_full; k++)
+      ((HycoGalerkin)m->work)->reduced->modes[j * m->n + s->row[k]] = u[j * s->n_full + k];
+  }
+  PetscCall(MatDenseRestoreArrayRead(s->U, &u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds M, l x l, to the modes' part of their rows. */
+static PetscErrorCode AddModes(HycoROM m, Mat M)
+{
+  const PetscScalar *a;
+
+  PetscFunctionBegin;
+  if (!M) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatDenseGetArrayRead(M, &a));
+  for (PetscInt i = 0; i < m->model->l; i++) {
+    for (PetscInt j = 0; j < m->model->l; j++)
+      ((HycoGalerkin)m->work)->reduced->modes[i * m->n + j] += a[j * m->model->l + i];
+  }
+  PetscCall(MatDenseRestoreArrayRead(M, &a));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The rows of the modes; of a bordered system gamma - G U[A] = 0, which stay. */
+static PetscErrorCode PutModes(HycoROM m)
+{
+  HycoGalerkin g = (HycoGalerkin)m->work;
+  HycoReduced r = g->reduced;
+
+  PetscFunctionBegin;
+  if (g->bordered && r->filled) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt i = 0; i < g->n_free; i++) {
+    PetscScalar *row = r->modes + i * m->n;
+
+    PetscCall(PetscArrayzero(row, m->model->l));
+    if (g->bordered) row[i] = 1;
+    for (PetscInt f = 0; g->bordered && f < m->model->n_fe; f++)
+      row[m->model->l + f] = -g->model->G[i * m->model->n_fe + f];
+  }
+  PetscCall(AddModes(m, r->constant));
+  PetscCall(AddModes(m, r->varying.M));
+  for (PetscInt i = 0; i < g->n_free; i++) PetscCall(PutRow(m, i, m->n, r->index, r->modes + i * m->n));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Room for a sparse Kr: full rows of the modes; the modes and the neighbours in the others. */
+static PetscErrorCode Preallocate(HycoROM m)
+{
+  HycoGalerkin g = (HycoGalerkin)m->work;
+  PetscInt *n;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(m->n, &n));
+  for (PetscInt j = 0; j < g->n_free; j++) n[j] = m->n;
+  for (PetscInt k = 0; k < m->model->n_fe; k++) {
+    PetscCall(MatGetRow(g->K, m->model->fe_dof[k], &n[g->n_free + k], NULL, NULL));
+    PetscCall(MatRestoreRow(g->K, m->model->fe_dof[k], NULL, NULL, NULL));
+    n[g->n_free + k] = PetscMin(m->n, g->n_free + n[g->n_free + k]);
+  }
+  PetscCall(MatSeqAIJSetPreallocation(g->Kr, 0, n));
+  PetscCall(PetscFree(n));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The first time: the rows, and what those that no parameter changes contribute to Kr. */
+static PetscErrorCode Start(HycoROM m)
+{
+  HycoGalerkin g = (HycoGalerkin)m->work;
+  HycoReduced r = g->reduced;
+  Rows constant = {0};
+  PetscInt n;
+  IS varying;
+
+  PetscFunctionBegin;
+  if (m->model->n_fe) PetscCall(CreateP(m, r->all, PETSC_FALSE, &r->P));
+  PetscCall(CreateVarying(m, &varying));
+  PetscCall(ISGetLocalSize(varying, &n));
+  if (r->all_full ||
+      (!m->model->n_fe && r->V_A == r->V && 3 * n >= m->fe->n_dof)) { /* K itself is faster than a copy */
+    PetscCall(ISDestroy(&varying));
+    PetscCall(CreateRows(m, r->all, ISIntersect, &r->varying));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (!r->dense) PetscCall(Preallocate(m));
+  PetscCall(CreateRows(m, varying, ISIntersect, &r->varying));
+  PetscCall(CreateRows(m, varying, ISDifference, &constant));
+  PetscCall(ISDestroy(&varying));
+  PetscCall(Multiply(m, MAT_INITIAL_MATRIX, &constant));
+  PetscCall(PutFull(m, &constant));
+  r->constant = constant.M;
+  constant.M = NULL;
+  PetscCall(DestroyRows(&constant));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* hybrid all, dense: (K[A,:] V) G + K[A,A] */
+static PetscErrorCode PutAll(HycoROM m)
+{
+  HycoGalerkin g = (HycoGalerkin)m->work;
+  HycoReduced r = g->reduced;
+
+  PetscFunctionBegin;
+  if (r->filled)
+    PetscCall(MatMatMult(r->varying.K_f, r->V, MAT_REUSE_MATRIX, PETSC_DETERMINE, &r->KV));
+  else {
+    PetscCall(MatMatMult(r->varying.K_f, r->V, MAT_INITIAL_MATRIX, PETSC_DETERMINE, &r->KV));
+    PetscCall(CreateRowMajor(m->model->l, m->model->n_fe, g->model->G, &r->G));
+    PetscCall(MatProductCreateWithMat(r->KV, r->G, NULL, g->Kr));
+    PetscCall(MatProductSetType(g->Kr, MATPRODUCT_AB));
+    PetscCall(MatProductSetFromOptions(g->Kr));
+    PetscCall(MatProductSymbolic(g->Kr));
+  }
+  PetscCall(MatProductNumeric(g->Kr));
+  PetscCall(MatAXPY(g->Kr, 1, r->varying.F, SUBSET_NONZERO_PATTERN));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducedFillStiffness(HycoROM m)
+{
+  HycoGalerkin g = (HycoGalerkin)m->work;
+  HycoReduced r;
+
+  PetscFunctionBegin;
+  PetscCall(HycoReducedPrepare(m));
+  r = g->reduced;
+  if (!r->filled) PetscCall(Start(m));
+  PetscCall(Multiply(m, r->filled ? MAT_REUSE_MATRIX : MAT_INITIAL_MATRIX, &r->varying));
+  if (r->all_full)
+    PetscCall(PutAll(m));
+  else {
+    PetscCall(PutFull(m, &r->varying));
+    PetscCall(PutModes(m));
+  }
+  r->filled = PETSC_TRUE;
   PetscCall(MatAssemblyBegin(g->Kr, MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(g->Kr, MAT_FINAL_ASSEMBLY));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rows first .. last - 1 of the list. Those of full-order unknowns are stored in kr (start: Kr's rows, when sparse),
-   the others are tested by the modes: modes += Vp_i^T (y, entries). */
-static void AddRows(HycoROM m, PetscInt first, PetscInt last, const PetscInt ia[], const PetscInt ja[],
-                    const PetscScalar a[], const PetscInt start[], PetscScalar kr[])
-{
-  HycoGalerkin g = (HycoGalerkin)m->data;
-  HycoReduced r = g->reduced;
-
-  for (PetscInt t = first; t < last; t++) {
-    const PetscInt i = r->row[t], row = g->n_free + g->fe_at[i];
-    const PetscInt count = ReducedRow(m, ia[i + 1] - ia[i], ja + ia[i], a + ia[i], r->y, r->index, r->value);
-    const PetscReal *v = g->Vp + (size_t)i * (size_t)m->l;
-
-    if (g->fe_at[i] < 0) {
-      for (PetscInt j = 0; j < g->n_free; j++) {
-        PetscReal *to = r->modes + (size_t)j * (size_t)m->n;
-
-        for (PetscInt k = 0; k < g->n_free; k++) to[k] += v[j] * r->value[k];
-        for (PetscInt k = g->n_free; k < count; k++) to[r->index[k]] += v[j] * r->value[k];
-      }
-    } else if (start)
-      for (PetscInt k = 0; k < count; k++) kr[start[row] + k] = r->value[k];
-    else
-      for (PetscInt k = 0; k < count; k++) kr[(size_t)r->index[k] * (size_t)m->n + (size_t)row] = r->value[k];
-  }
-}
-
-/* Stores the rows of the modes, which come before the others. */
-static void PutModes(HycoROM m, const PetscInt start[], PetscScalar kr[])
-{
-  HycoGalerkin g = (HycoGalerkin)m->data;
-  const size_t n = (size_t)m->n;
-
-  for (size_t j = 0; j < (size_t)g->n_free; j++) {
-    for (size_t k = 0; k < n; k++) kr[start ? (size_t)start[j] + k : k * n + j] += g->reduced->modes[j * n + k];
-  }
-}
-
-/* The rows gamma - G U[A] = 0 of a sparse Kr. */
-static void PutBorder(HycoROM m, const PetscInt start[], PetscScalar kr[])
-{
-  HycoGalerkin g = (HycoGalerkin)m->data;
-
-  for (PetscInt j = 0; j < g->n_free; j++) {
-    PetscScalar *row = kr + start[j];
-
-    for (PetscInt k = 0; k < g->n_free; k++) row[k] = k == j;
-    for (PetscInt f = 0; f < m->n_fe; f++) row[g->n_free + f] = -g->G[j * m->n_fe + f];
-  }
-}
-
-/* hybrid all: Kr = (K Vp) G + K[A,A], a dense product. */
-static PetscErrorCode FillAll(HycoROM m, const PetscInt ia[], const PetscInt ja[], const PetscScalar a[],
-                              PetscScalar kr[])
-{
-  HycoGalerkin g = (HycoGalerkin)m->data;
-  HycoReduced r = g->reduced;
-  PetscBLASInt n, l;
-  const PetscReal one = 1, zero = 0;
-
-  PetscFunctionBegin;
-  PetscCall(PetscBLASIntCast(m->n_fe, &n));
-  PetscCall(PetscBLASIntCast(m->l, &l));
-  for (PetscInt t = 0; t < r->n_rows; t++) {
-    const PetscInt i = r->row[t];
-
-    RowTimesModes(m, ia[i + 1] - ia[i], ja + ia[i], a + ia[i], r->Y + (size_t)g->fe_at[i] * (size_t)m->l);
-  }
-  BLASgemm_("T", "T", &n, &n, &l, &one, r->Y, &l, g->G, &n, &zero, kr, &n);
-  for (PetscInt t = 0; t < r->n_rows; t++) {
-    const PetscInt i = r->row[t];
-
-    for (PetscInt k = ia[i]; k < ia[i + 1]; k++) {
-      if (g->fe_at[ja[k]] >= 0) kr[(size_t)g->fe_at[ja[k]] * (size_t)m->n + (size_t)g->fe_at[i]] += a[k];
-    }
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode Create(HycoROM m, const PetscInt ia[], const PetscInt ja[], const PetscScalar a[])
-{
-  HycoGalerkin g = (HycoGalerkin)m->data;
-  HycoReduced r;
-
-  PetscFunctionBegin;
-  PetscCall(PetscNew(&g->reduced));
-  r = g->reduced;
-  PetscCall(PetscObjectTypeCompare((PetscObject)g->Kr, MATSEQDENSE, &r->dense));
-  PetscCall(ListRows(m, r));
-  PetscCall(PetscMalloc5(m->l, &r->y, m->n + 100, &r->value, m->n + 100, &r->index, g->n_free * m->n, &r->modes,
-                         g->G && !g->bordered ? m->n_fe * m->l : 0, &r->Y));
-  if (!r->dense && ia) PetscCall(SetPattern(m, ia, ja, a)); /* otherwise set from the table */
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Fills Kr's n values; those of the constant rows are kept from the first time on. */
-static PetscErrorCode FillRows(HycoROM m, const PetscInt ia[], const PetscInt ja[], const PetscScalar a[],
-                               const PetscInt start[], PetscScalar kr[])
-{
-  HycoGalerkin g = (HycoGalerkin)m->data;
-  HycoReduced r = g->reduced;
-  const size_t n = start ? (size_t)start[m->n] : (size_t)m->n * (size_t)m->n;
-
-  PetscFunctionBegin;
-  if (!r->constant && r->n_constant) {
-    PetscCall(PetscCalloc1(n, &r->constant));
-    PetscCall(PetscArrayzero(r->modes, g->n_free * m->n));
-    AddRows(m, 0, r->n_constant, ia, ja, a, start, r->constant);
-    PutModes(m, start, r->constant);
-  }
-  if (r->constant)
-    PetscCall(PetscArraycpy(kr, r->constant, n));
-  else
-    PetscCall(PetscArrayzero(kr, n));
-  PetscCall(PetscArrayzero(r->modes, g->n_free * m->n));
-  AddRows(m, r->n_constant, r->n_rows, ia, ja, a, start, kr);
-  PutModes(m, start, kr);
-  if (g->bordered) PutBorder(m, start, kr);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode HycoReducedEntries(HycoROM m, PetscInt *n, PetscScalar *a[])
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   const PetscInt *start, *columns;
   PetscScalar *all;
   PetscInt rows;
@@ -298,7 +463,7 @@ PetscErrorCode HycoReducedEntries(HycoROM m, PetscInt *n, PetscScalar *a[])
 
 PetscErrorCode HycoReducedRows(HycoROM m, PetscInt row[])
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   const PetscInt *start, *columns;
   PetscInt n;
   PetscBool dense, done;
@@ -317,114 +482,109 @@ PetscErrorCode HycoReducedRows(HycoROM m, PetscInt row[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducedPrepare(HycoROM m)
-{
-  HycoGalerkin g = (HycoGalerkin)m->data;
-  PetscFunctionBegin;
-  if (!g->reduced) PetscCall(Create(m, NULL, NULL, NULL));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+/* -- the contacts -- */
 
-PetscErrorCode HycoReducedFillStiffness(HycoROM m)
+/* A product, or its transpose, as a matrix of the system. */
+static PetscErrorCode PutProduct(Mat product, PetscBool transposed, Mat to)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
-  const PetscInt *ia, *ja, *start = NULL, *columns;
-  const PetscScalar *a;
-  PetscScalar *kr;
-  PetscInt n;
-  PetscBool done;
+  PetscInt rows;
 
   PetscFunctionBegin;
-  PetscCall(MatGetRowIJ(g->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
-  PetscCall(MatSeqAIJGetArrayRead(g->K, &a));
-  if (!g->reduced) PetscCall(Create(m, ia, ja, a));
-  if (g->reduced->dense) {
-    PetscCall(MatDenseGetArrayWrite(g->Kr, &kr));
-    PetscCall(g->G ? FillAll(m, ia, ja, a, kr) : FillRows(m, ia, ja, a, NULL, kr));
-    PetscCall(MatDenseRestoreArrayWrite(g->Kr, &kr));
-  } else {
-    PetscCall(MatGetRowIJ(g->Kr, 0, PETSC_FALSE, PETSC_FALSE, &n, &start, &columns, &done));
-    PetscCall(MatSeqAIJGetArrayWrite(g->Kr, &kr));
-    PetscCall(FillRows(m, ia, ja, a, start, kr));
-    PetscCall(MatSeqAIJRestoreArrayWrite(g->Kr, &kr));
-    PetscCall(MatRestoreRowIJ(g->Kr, 0, PETSC_FALSE, PETSC_FALSE, &n, &start, &columns, &done));
+  PetscCall(MatGetSize(product, &rows, NULL));
+  PetscCall(MatZeroEntries(to));
+  for (PetscInt k = 0; k < rows; k++) {
+    const PetscInt *column;
+    const PetscScalar *value;
+    PetscInt n;
+
+    PetscCall(MatGetRow(product, k, &n, &column, &value));
+    if (transposed)
+      PetscCall(MatSetValues(to, n, column, 1, &k, value, INSERT_VALUES));
+    else
+      PetscCall(MatSetValues(to, 1, &k, n, column, value, INSERT_VALUES));
+    PetscCall(MatRestoreRow(product, k, &n, &column, &value));
   }
-  PetscCall(PetscObjectStateIncrease((PetscObject)g->Kr));
-  PetscCall(MatAssemblyBegin(g->Kr, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(g->Kr, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatSeqAIJRestoreArrayRead(g->K, &a));
-  PetscCall(MatRestoreRowIJ(g->K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
+  PetscCall(MatAssemblyBegin(to, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(to, MAT_FINAL_ASSEMBLY));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* B[A_lambda, A'_c] Vbar[A'_c,:] and Vbar[A_c,:]^T B[A_lambda, A_c]^T */
+/* B[A_lambda, set] P[set, :], made again if B's pattern has grown, and P if the set has. */
+static PetscErrorCode MultiplyContact(HycoROM m, IS set, PetscBool grown, ContactProduct *c)
+{
+  HycoGalerkin g = (HycoGalerkin)m->work;
+  PetscInt n, n_P = -1;
+
+  PetscFunctionBegin;
+  PetscCall(ISGetLocalSize(set, &n));
+  if (c->P) PetscCall(MatGetSize(c->P, &n_P, NULL));
+  if (grown) {
+    PetscCall(MatDestroy(&c->BP));
+    PetscCall(MatDestroy(&c->B));
+  }
+  if (n != n_P) {
+    PetscCall(MatDestroy(&c->P));
+    PetscCall(CreateP(m, set, g->reduced->all_full, &c->P));
+  }
+  PetscCall(MatCreateSubMatrix(g->B, g->sets.is_A_lambda, set, grown ? MAT_INITIAL_MATRIX : MAT_REUSE_MATRIX, &c->B));
+  PetscCall(MatMatMult(c->B, c->P, grown ? MAT_INITIAL_MATRIX : MAT_REUSE_MATRIX, PETSC_DETERMINE, &c->BP));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Br = B[A_lambda, A'_c] P[A'_c, :] and Btr = P[A_c, :]^T B[A_lambda, A_c]^T, from one product if A_c is A'_c. */
 PetscErrorCode HycoReducedFillContact(HycoROM m)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
-  const HycoRows *rows = &g->own_rows;
-  PetscReal *value;
-  PetscInt *index, dim = m->fe->dim;
+  HycoGalerkin g = (HycoGalerkin)m->work;
+  HycoReduced r;
+  PetscInt n_Ac, n_all;
+  PetscObjectState pattern;
+  PetscBool grown;
 
   PetscFunctionBegin;
-  if (g->contact) {
-    PetscCall(g->contact(m));
+  if (g->model->contact) {
+    PetscCall(g->model->contact(m));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  value = g->reduced->value;
-  index = g->reduced->index;
-  PetscCall(MatZeroEntries(g->Br));
-  PetscCall(MatZeroEntries(g->Btr));
-  for (PetscInt k = 0; k < m->m; k++) {
-    const PetscInt lo = rows->start[k], hi = rows->start[k + 1];
-    PetscInt count = ReducedRow(m, hi - lo, rows->dof + lo, rows->value + lo, g->reduced->y, index, value);
-
-    PetscCall(MatSetValues(g->Br, 1, &k, count, index, value, INSERT_VALUES));
-    for (PetscInt j = 0; j < g->n_free; j++) {
-      value[j] = 0;
-      index[j] = j;
-    }
-    count = g->n_free;
-    for (PetscInt t = lo; t < hi; t++) {
-      const PetscInt i = rows->dof[t];
-
-      if (m->role[i / dim] != HYCO_ROLE_A) continue;
-      for (PetscInt j = 0; j < g->n_free; j++) value[j] += rows->value[t] * g->Vp[(size_t)i * (size_t)m->l + (size_t)j];
-      if (g->fe_at[i] < 0) continue;
-      index[count] = g->n_free + g->fe_at[i];
-      value[count++] = rows->value[t];
-    }
-    PetscCall(MatSetValues(g->Btr, count, index, 1, &k, value, INSERT_VALUES));
-  }
-  PetscCall(MatAssemblyBegin(g->Br, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(g->Br, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyBegin(g->Btr, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(g->Btr, MAT_FINAL_ASSEMBLY));
+  PetscCall(HycoReducedPrepare(m));
+  PetscCall(HycoGalerkinContactMatrix(m));
+  r = g->reduced;
+  PetscCall(MatGetNonzeroState(g->B, &pattern));
+  grown = (PetscBool)(!r->all_c.BP || pattern != r->pattern);
+  r->pattern = pattern;
+  PetscCall(MultiplyContact(m, g->sets.is_Ac_all, grown, &r->all_c));
+  PetscCall(PutProduct(r->all_c.BP, PETSC_FALSE, g->Br));
+  PetscCall(ISGetLocalSize(g->sets.is_Ac, &n_Ac));
+  PetscCall(ISGetLocalSize(g->sets.is_Ac_all, &n_all));
+  if (n_Ac < n_all) PetscCall(MultiplyContact(m, g->sets.is_Ac, (PetscBool)(grown || !r->Ac.BP), &r->Ac));
+  PetscCall(PutProduct(n_Ac < n_all ? r->Ac.BP : r->all_c.BP, PETSC_TRUE, g->Btr));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoReducedTest(HycoROM m, const PetscScalar F[], Vec Fr)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
+  HycoReduced r = g->reduced;
   PetscScalar *f;
 
   PetscFunctionBegin;
-  PetscCall(VecSet(Fr, 0));
-  PetscCall(VecGetArray(Fr, &f));
-  for (PetscInt r = 0; r < g->reduced->n_rows; r++) {
-    const PetscInt i = g->reduced->row[r];
-
-    if (F[i] == 0) continue;
-    if (g->fe_at[i] >= 0) f[g->n_free + g->fe_at[i]] += F[i];
-    for (PetscInt j = 0; j < g->n_free; j++) f[j] += g->Vp[(size_t)i * (size_t)m->l + (size_t)j] * F[i];
-  }
-  PetscCall(VecRestoreArray(Fr, &f));
+  PetscCall(VecGetArrayWrite(Fr, &f));
+  if (g->n_free && !g->bordered) {
+    PetscCall(VecPlaceArray(r->u, F));
+    PetscCall(VecPlaceArray(r->gamma, f));
+    PetscCall(MatMultTranspose(r->V_A, r->u, r->gamma));
+    PetscCall(VecResetArray(r->gamma));
+    PetscCall(VecResetArray(r->u));
+  } else
+    PetscCall(PetscArrayzero(f, g->n_free));
+  for (PetscInt k = 0; k < m->model->n_fe; k++) f[g->n_free + k] = F[m->model->fe_dof[k]];
+  PetscCall(VecRestoreArrayWrite(Fr, &f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Vbar[A,:]^T F[A] and D[A_lambda] */
 PetscErrorCode HycoReducedFillVectors(HycoROM m)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   const PetscScalar *F;
   PetscScalar *d;
 
@@ -433,8 +593,8 @@ PetscErrorCode HycoReducedFillVectors(HycoROM m)
   PetscCall(HycoReducedTest(m, F, g->Fr));
   PetscCall(VecRestoreArrayRead(g->F, &F));
   if (!m->n_L) PetscFunctionReturn(PETSC_SUCCESS);
-  if (g->gap) {
-    PetscCall(g->gap(m));
+  if (g->model->gap) {
+    PetscCall(g->model->gap(m));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(VecGetArray(g->Dr, &d));

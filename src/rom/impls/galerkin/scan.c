@@ -13,7 +13,7 @@
 /* The parameters over whose ranges the reduced stiffness is scanned. */
 static PetscErrorCode FindParameters(HycoROM m, PetscBool reaches[])
 {
-  const HycoScene s = m->scene;
+  const HycoScene s = m->model->scene;
 
   PetscFunctionBegin;
   PetscCall(HycoROMSetUp(m));
@@ -57,7 +57,6 @@ static void GridPoint(HycoScene s, const PetscBool reaches[], PetscInt each, Pet
 static PetscErrorCode ScanMine(HycoROM m, const PetscBool reaches[], PetscInt each, PetscInt first, PetscInt last,
                                PetscReal sign[], PetscReal ratio[])
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
   PetscReal mu[HYCO_MAX_PARAMETERS];
 
   PetscFunctionBegin;
@@ -66,9 +65,9 @@ static PetscErrorCode ScanMine(HycoROM m, const PetscBool reaches[], PetscInt ea
     PetscScalar *a;
     PetscInt s;
 
-    GridPoint(m->scene, reaches, each, k, mu);
+    GridPoint(m->model->scene, reaches, each, k, mu);
     PetscCall(HycoGalerkinAssemble(m, mu));
-    PetscCall(MatConvert(g->Kr, MATSEQDENSE, MAT_INITIAL_MATRIX, &dense));
+    PetscCall(MatConvert(((HycoGalerkin)m->work)->Kr, MATSEQDENSE, MAT_INITIAL_MATRIX, &dense));
     PetscCall(MatDenseGetArray(dense, &a));
     PetscCall(HycoSingularity(m->n, a, &s, &ratio[k]));
     PetscCall(MatDenseRestoreArray(dense, &a));
@@ -92,7 +91,7 @@ static void Say(HycoScene s, const PetscReal mu[], char text[HYCO_LINE])
 static PetscErrorCode Conclude(HycoReducer t, HycoROM m, const PetscBool reaches[], PetscInt each,
                                const PetscReal sign[], const PetscReal ratio[])
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkinModel g = (HycoGalerkinModel)m->model->data;
   HycoScan *s = &g->scan;
   PetscInt positive = 0, worst = 0, change = 0;
   PetscReal mu[HYCO_MAX_PARAMETERS];
@@ -106,12 +105,12 @@ static PetscErrorCode Conclude(HycoReducer t, HycoROM m, const PetscBool reaches
   }
   s->n_singular = PetscMin(positive, s->n - positive);
   s->smallest = ratio[worst];
-  GridPoint(m->scene, reaches, each, worst, s->at);
+  GridPoint(m->model->scene, reaches, each, worst, s->at);
   if (t->keep_singular || (!change && ratio[worst] > 0)) PetscFunctionReturn(PETSC_SUCCESS);
-  GridPoint(m->scene, reaches, each, PetscMax(change - 1, 0), mu);
-  Say(m->scene, mu, here);
-  GridPoint(m->scene, reaches, each, change, mu);
-  Say(m->scene, mu, there);
+  GridPoint(m->model->scene, reaches, each, PetscMax(change - 1, 0), mu);
+  Say(m->model->scene, mu, here);
+  GridPoint(m->model->scene, reaches, each, change, mu);
+  Say(m->model->scene, mu, there);
   HycoFailNoModel(
       "the reduced stiffness is singular inside the parameters' ranges: between %s and %s its determinant "
       "changes sign, and predictions near there are arbitrary; enlarge the RID (-hyco_rid_layers 1), change "
@@ -123,7 +122,7 @@ static PetscErrorCode Conclude(HycoReducer t, HycoROM m, const PetscBool reaches
 static PetscErrorCode ScanMyPaths(HycoReducer t, HycoROM m, PetscInt first, PetscInt last, PetscInt each,
                                   PetscInt stride, PetscReal sign[], PetscReal ratio[])
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   PetscInt n_par;
   const PetscReal *mu;
   PetscErrorCode ierr = PETSC_SUCCESS;
@@ -145,7 +144,7 @@ static PetscErrorCode ScanMyPaths(HycoReducer t, HycoROM m, PetscInt first, Pets
 static PetscErrorCode ConcludePaths(HycoReducer t, HycoROM m, PetscInt n, PetscInt each, const PetscReal sign[],
                                     const PetscReal ratio[])
 {
-  HycoScan *s = &((HycoGalerkin)m->data)->scan;
+  HycoScan *s = &((HycoGalerkinModel)m->model->data)->scan;
   PetscInt positive = 0, worst = 0, change = -1, n_par;
   const PetscReal *mu;
   char here[HYCO_LINE];
@@ -164,12 +163,12 @@ static PetscErrorCode ConcludePaths(HycoReducer t, HycoROM m, PetscInt n, PetscI
   s->smallest = ratio[worst];
   PetscCall(PetscArraycpy(s->at, mu + worst / each * n_par, n_par));
   if (t->keep_singular || !s->n_singular) PetscFunctionReturn(PETSC_SUCCESS);
-  Say(m->scene, mu + change / each * n_par, here);
+  Say(m->model->scene, mu + change / each * n_par, here);
   HycoFailNoModel(
       "the reduced tangent becomes singular along the training path at %s: its determinant changes sign at %d "
       "of %d times, and predictions near there are arbitrary; %s, or keep the model: -hyco_keep_singular",
       here, (int)s->n_singular, (int)s->n,
-      ((HycoGalerkin)m->data)->forces
+      ((HycoGalerkinModel)m->model->data)->forces
           ? "use more cells (-hyco_condensed_cells; 0: all) or fewer modes (-hyco_condensed_inelastic_tol)"
           : "enlarge the RID (-hyco_rid_layers 1), change the modes (-hyco_pod_tol)");
 }
@@ -199,7 +198,7 @@ static PetscErrorCode ScanPaths(HycoReducer t, HycoROM m)
 
 static PetscErrorCode Scan(HycoReducer t, HycoROM m, PetscBool reaches[])
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkinModel g = (HycoGalerkinModel)m->model->data;
   PetscInt each = 0;
   PetscReal *sign, *ratio;
   PetscMPIInt size;
@@ -208,7 +207,7 @@ static PetscErrorCode Scan(HycoReducer t, HycoROM m, PetscBool reaches[])
   PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
   HycoOnEach(HycoComm(t), FindParameters(m, reaches));
   if (m->n > LARGEST) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(ChooseGrid(t->scan, m->n, m->scene->n_parameters, reaches, &each, &g->scan.n));
+  PetscCall(ChooseGrid(t->scan, m->n, m->model->scene->n_parameters, reaches, &each, &g->scan.n));
   PetscCall(PetscCalloc2(g->scan.n, &sign, g->scan.n, &ratio));
   HycoOnEach(HycoComm(t),
              ScanMine(m, reaches, each, t->rank * g->scan.n / size, (t->rank + 1) * g->scan.n / size, sign, ratio));
@@ -230,7 +229,7 @@ PetscErrorCode HycoGalerkinFinish(HycoReducer t, HycoROM m, HycoTraining *report
     PetscCall(Scan(t, m, reaches));
     HycoOnRoot(HycoComm(t), HycoGalerkinTabulate(m, reaches));
   }
-  report->scan = ((HycoGalerkin)m->data)->scan;
+  report->scan = ((HycoGalerkinModel)m->model->data)->scan;
   PetscCallMPI(MPI_Bcast(&report->scan, sizeof(report->scan), MPI_BYTE, 0, HycoComm(t)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

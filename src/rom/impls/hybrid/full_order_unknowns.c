@@ -43,23 +43,25 @@ PetscErrorCode HycoHybridSetFromOptions(HycoReducer t)
 /* The unknown of each contact of A_lambda that may be full order: its largest entry in A not taken by another. */
 static PetscErrorCode Candidates(HycoROM m, PetscInt candidate[])
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
-  const PetscInt dim = m->mesh->dim;
+  HycoGalerkin g = (HycoGalerkin)m->work;
+  const PetscInt dim = m->model->mesh->dim;
+  PetscInt *sets;
   PetscBool *taken;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc1(m->mesh->n_nodes * dim, &taken));
+  PetscCall(PetscCalloc2(m->model->mesh->n_nodes * dim, &taken, m->model->mesh->n_nodes, &sets));
+  PetscCall(HycoROMGetDomain(m, sets));
   for (PetscInt k = 0; k < m->m; k++) candidate[k] = -1;
   for (PetscInt pass = 0; pass < 2; pass++) { /* first those with slave in A: the others have only shared masters */
     for (PetscInt k = 0; k < m->m; k++) {
-      const PetscInt slave = HycoPairsSlave(&m->pairs, m->contact[k]);
+      const PetscInt slave = HycoPairsSlave(&m->model->pairs, m->contact[k]);
       PetscReal best = 0;
 
-      if ((m->role[slave] == HYCO_ROLE_A) != (pass == 0)) continue;
+      if ((sets[slave] == 2) != (pass == 0)) continue;
       for (PetscInt t = g->own_rows.start[k]; t < g->own_rows.start[k + 1]; t++) {
         const PetscInt dof = g->own_rows.dof[t];
 
-        if (taken[dof] || m->role[dof / dim] != HYCO_ROLE_A) continue;
+        if (taken[dof] || sets[dof / dim] < 2) continue;
         if (PetscAbsReal(g->own_rows.value[t]) <= best * (1 + 1e-12)) continue;
         best = PetscAbsReal(g->own_rows.value[t]);
         candidate[k] = dof;
@@ -67,7 +69,7 @@ static PetscErrorCode Candidates(HycoROM m, PetscInt candidate[])
       if (candidate[k] >= 0) taken[candidate[k]] = PETSC_TRUE;
     }
   }
-  PetscCall(PetscFree(taken));
+  PetscCall(PetscFree2(taken, sets));
   for (PetscInt k = 0; k < m->m; k++)
     HycoCheckModel(candidate[k] >= 0,
                    "the contact of node %d has no displacement of its own in A that could stay full order; use "
@@ -79,7 +81,7 @@ static PetscErrorCode Candidates(HycoROM m, PetscInt candidate[])
 /* Smallest singular value of B[A_lambda, A_c] Vbar[A_c,:] over its largest, for the current choice. */
 static PetscErrorCode RowRank(HycoROM m, PetscReal *ratio)
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   Mat dense;
   PetscScalar *b;
   PetscReal smallest, largest;
@@ -121,16 +123,16 @@ static PetscErrorCode TimesModes(HycoROM m, Mat A, IS rows, IS columns, PetscRea
   PetscInt n;
 
   PetscFunctionBegin;
-  PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, m->l, m->fe->n_dof, m->V, &Vt));
+  PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, m->model->l, m->fe->n_dof, m->model->V, &Vt));
   PetscCall(MatTranspose(Vt, MAT_INITIAL_MATRIX, &V));
-  PetscCall(ISCreateStride(PETSC_COMM_SELF, m->l, 0, 1, &all));
+  PetscCall(ISCreateStride(PETSC_COMM_SELF, m->model->l, 0, 1, &all));
   PetscCall(MatCreateSubMatrix(A, rows, columns, MAT_INITIAL_MATRIX, &part));
   PetscCall(MatCreateSubMatrix(V, columns, all, MAT_INITIAL_MATRIX, &modes));
   PetscCall(MatMatMult(part, modes, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &product));
   PetscCall(ISGetLocalSize(rows, &n));
   PetscCall(MatDenseGetArrayRead(product, &p));
   for (PetscInt k = 0; k < n; k++) {
-    for (PetscInt j = 0; j < m->l; j++) P[k * m->l + j] = p[j * n + k];
+    for (PetscInt j = 0; j < m->model->l; j++) P[k * m->model->l + j] = p[j * n + k];
   }
   PetscCall(MatDenseRestoreArrayRead(product, &p));
   PetscCall(MatDestroy(&product));
@@ -145,21 +147,17 @@ static PetscErrorCode TimesModes(HycoROM m, Mat A, IS rows, IS columns, PetscRea
 /* B[A_lambda, A_c] V[A_c,:], and the candidates' rows of K V. */
 static PetscErrorCode ContactRows(HycoROM m, const PetscInt candidate[], PetscReal BV[], PetscReal KV[])
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
-  Mat B;
-  IS contacts, candidates, unknowns;
+  HycoGalerkin g = (HycoGalerkin)m->work;
+  IS candidates, unknowns;
 
   PetscFunctionBegin;
-  PetscCall(HycoGalerkinContactMatrix(m, &B));
-  PetscCall(ISCreateStride(PETSC_COMM_SELF, m->m, 0, 1, &contacts));
+  PetscCall(HycoGalerkinContactMatrix(m));
   PetscCall(ISCreateStride(PETSC_COMM_SELF, m->fe->n_dof, 0, 1, &unknowns));
   PetscCall(ISCreateGeneral(PETSC_COMM_SELF, m->m, candidate, PETSC_COPY_VALUES, &candidates));
-  PetscCall(TimesModes(m, B, contacts, g->sets.is_Ac, BV));
+  PetscCall(TimesModes(m, g->B, g->sets.is_A_lambda, g->sets.is_Ac, BV));
   PetscCall(TimesModes(m, g->K, candidates, unknowns, KV));
   PetscCall(ISDestroy(&candidates));
   PetscCall(ISDestroy(&unknowns));
-  PetscCall(ISDestroy(&contacts));
-  PetscCall(MatDestroy(&B));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -168,7 +166,7 @@ static PetscErrorCode ContactRows(HycoROM m, const PetscInt candidate[], PetscRe
 static PetscErrorCode ResolvedContacts(HycoROM m, const PetscInt candidate[], PetscBool balance, PetscInt *rank,
                                        PetscInt pivot[])
 {
-  const PetscInt l = m->l;
+  const PetscInt l = m->model->l;
   PetscReal *BV, *KV;
 
   PetscFunctionBegin;
@@ -189,7 +187,7 @@ static PetscErrorCode ResolvedContacts(HycoROM m, const PetscInt candidate[], Pe
       PetscCall(PetscFree(first));
     }
   }
-  for (PetscInt k = 0; k < m->m * l; k++) BV[k] *= m->sigma[k % l] / m->sigma[0];
+  for (PetscInt k = 0; k < m->m * l; k++) BV[k] *= m->model->sigma[k % l] / m->model->sigma[0];
   PetscCall(HycoPivotColumns(l, m->m, balance ? KV : BV, *rank, pivot));
   PetscCall(PetscFree2(BV, KV));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -314,7 +312,7 @@ static PetscErrorCode SearchFrom(HycoReducer t, HycoROM m, PetscInt start, Petsc
 /* The best result of several starts; of one if a trial is expensive. */
 static PetscErrorCode ChooseRank(HycoReducer t, HycoROM m, Verdict *best)
 {
-  const PetscInt room = m->pairs.n, starts = (PetscReal)t->n_s * (PetscReal)m->l < 1e4 ? 5 : 1;
+  const PetscInt room = m->model->pairs.n, starts = (PetscReal)t->n_s * (PetscReal)m->model->l < 1e4 ? 5 : 1;
   PetscInt n = 0, other = 0, *dof, *trial;
   Verdict verdict;
 
@@ -340,7 +338,7 @@ static PetscErrorCode MarkContact(HycoReducer t, HycoROM m, PetscBool contact[])
 
   PetscFunctionBegin;
   if (!t->fom->searches) {
-    HycoPairsMark(&m->pairs, contact);
+    HycoPairsMark(&m->model->pairs, contact);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(PetscCalloc1(n, &met));
@@ -355,17 +353,22 @@ static PetscErrorCode MarkContact(HycoReducer t, HycoROM m, PetscBool contact[])
 /* The free unknowns of the nodes of A: all, or those of contact nodes. */
 static PetscErrorCode FreeUnknowns(HycoReducer t, HycoROM m, PetscBool contact_only, PetscInt *n, PetscInt dof[])
 {
-  const PetscInt dim = m->mesh->dim;
+  const PetscInt dim = m->model->mesh->dim, *node;
+  PetscInt n_A;
   PetscBool *contact;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc1(m->mesh->n_nodes, &contact));
+  PetscCall(PetscCalloc1(m->model->mesh->n_nodes, &contact));
   PetscCall(MarkContact(t, m, contact));
   *n = 0;
-  for (PetscInt i = 0; i < m->mesh->n_nodes * dim; i++) {
-    if (m->role[i / dim] != HYCO_ROLE_A || t->fixed[i]) continue;
-    if (contact[i / dim] || !contact_only) dof[(*n)++] = i;
+  PetscCall(ISGetLocalSize(m->model->inside, &n_A));
+  PetscCall(ISGetIndices(m->model->inside, &node));
+  for (PetscInt k = 0; k < n_A * dim; k++) {
+    const PetscInt i = node[k / dim] * dim + k % dim;
+
+    if (!t->fixed[i] && (contact[i / dim] || !contact_only)) dof[(*n)++] = i;
   }
+  PetscCall(ISRestoreIndices(m->model->inside, &node));
   PetscCall(PetscFree(contact));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -432,13 +435,13 @@ static PetscErrorCode ChooseAll(HycoReducer t, HycoROM m, PetscInt n, const Pets
 {
   const PetscReal given = ((Training)t->training)->ridge;
   PetscReal strength = given >= 0 ? given : t->ridge;
-  PetscBool interface = PETSC_FALSE;
+  PetscInt n_rid, n_A;
 
   PetscFunctionBegin;
   PetscCall(HycoROMSetFE(m, HYCO_HYBRID_ALL, n, dof));
-  for (PetscInt i = 0; i < m->mesh->n_nodes; i++)
-    interface = (PetscBool)(interface || m->role[i] == HYCO_ROLE_INTERFACE);
-  if (!interface) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(ISGetLocalSize(m->model->rid, &n_rid));
+  PetscCall(ISGetLocalSize(m->model->inside, &n_A));
+  if (n_rid == n_A) PetscFunctionReturn(PETSC_SUCCESS);
   if (strength < 0) PetscCall(t->scene->n_times ? RaceRidges(t, m, &strength) : TryRidges(t, m, &strength));
   PetscCall(HycoGalerkinSetRidge(m, strength));
   if (t->trying) t->ridge = strength;
@@ -453,7 +456,8 @@ static PetscErrorCode ChooseUnknowns(HycoReducer t, HycoROM m)
   Verdict v = {0, 0, 1};
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc2(m->mesh->n_nodes * m->mesh->dim, &all, m->mesh->n_nodes * m->mesh->dim, &contact));
+  PetscCall(PetscMalloc2(m->model->mesh->n_nodes * m->model->mesh->dim, &all,
+                         m->model->mesh->n_nodes * m->model->mesh->dim, &contact));
   PetscCall(FreeUnknowns(t, m, PETSC_FALSE, &n_all, all));
   PetscCall(FreeUnknowns(t, m, PETSC_TRUE, &n_contact, contact));
   t->n_unknowns = n_all;
@@ -479,7 +483,7 @@ static PetscErrorCode ChooseUnknowns(HycoReducer t, HycoROM m)
 
 PetscErrorCode HycoHybridBuild(HycoROM m, HycoReducer t)
 {
-  HycoHybridROM h = (HycoHybridROM)m->data;
+  HycoHybridModel h = (HycoHybridModel)m->model->data;
 
   PetscFunctionBegin;
   PetscCall(HycoReducerDualSnapshots(t, &h->n_dual, &h->S_lambda));

@@ -26,7 +26,7 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
 
 static PetscErrorCode SetFromOptions(HycoROM m)
 {
-  HycoHybridROM h = (HycoHybridROM)m->data;
+  HycoHybridModel h = (HycoHybridModel)m->model->data;
 
   PetscFunctionBegin;
   PetscObjectOptionsBegin((PetscObject)m);
@@ -42,7 +42,7 @@ static PetscErrorCode SetFromOptions(HycoROM m)
 static PetscErrorCode Reset(HycoROM m)
 {
   PetscFunctionBegin;
-  PetscCall(HycoReconstructionDestroy(&((HycoHybridROM)m->data)->reconstruction));
+  PetscCall(HycoReconstructionDestroy(&((HycoHybridWork)m->work)->reconstruction));
   PetscCall(HycoGalerkinReset(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -53,24 +53,24 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
   static const char *const words[] = {"auto", "rank: the fewest that give full row rank",
                                       "contact: all on the contact surfaces of the RID",
                                       "all of A, interface by ridge regression on the modes"};
-  const HycoHybridROM h = (HycoHybridROM)m->data;
-  PetscInt nodes = 0, a = 0, in = 0;
+  const HycoHybridModel h = (HycoHybridModel)m->model->data;
+  PetscInt nodes, a, in = 0;
 
   PetscFunctionBegin;
-  for (PetscInt i = 0; i < m->mesh->n_nodes; i++) {
-    nodes += m->role[i] != HYCO_ROLE_OUTSIDE;
-    a += m->role[i] == HYCO_ROLE_A;
-  }
-  for (PetscInt k = 0; k < m->pairs.n; k++) in += m->in_rid[k];
+  PetscCall(ISGetLocalSize(m->model->rid, &nodes));
+  PetscCall(ISGetLocalSize(m->model->inside, &a));
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) in += m->model->in_rid[k];
   PetscCall(PetscViewerASCIIPrintf(viewer, "  other modes that seeded the RID: %d dual, %d stress, %d force\n",
-                                   (int)m->counts[0], (int)m->counts[1], (int)m->counts[2]));
-  PetscCall(PetscViewerASCIIPrintf(
-      viewer, "  RID: %d of %d elements (%.1f %%), %d of %d nodes, %d in A; %d of %d contacts\n", (int)m->mesh->n_cells,
-      (int)m->whole_cells, 100. * (double)m->mesh->n_cells / (double)m->whole_cells, (int)nodes, (int)m->whole_nodes,
-      (int)a, (int)in, (int)m->pairs.n));
-  if (m->pairs.n)
-    PetscCall(PetscViewerASCIIPrintf(viewer, "  full-order displacements: %d (%s)\n", (int)m->n_fe, words[m->hybrid]));
-  if (m->hybrid == HYCO_HYBRID_ALL && h->galerkin.G)
+                                   (int)m->model->counts[0], (int)m->model->counts[1], (int)m->model->counts[2]));
+  PetscCall(PetscViewerASCIIPrintf(viewer,
+                                   "  RID: %d of %d elements (%.1f %%), %d of %d nodes, %d in A; %d of %d contacts\n",
+                                   (int)m->model->mesh->n_cells, (int)m->model->whole_cells,
+                                   100. * (double)m->model->mesh->n_cells / (double)m->model->whole_cells, (int)nodes,
+                                   (int)m->model->whole_nodes, (int)a, (int)in, (int)m->model->pairs.n));
+  if (m->model->pairs.n)
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  full-order displacements: %d (%s)\n", (int)m->model->n_fe,
+                                     words[m->model->hybrid]));
+  if (m->model->hybrid == HYCO_HYBRID_ALL && h->galerkin.G)
     PetscCall(PetscViewerASCIIPrintf(viewer, "  ridge: %.0e of the first squared singular value\n",
                                      (double)h->galerkin.ridge));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  dual snapshots for the reconstruction: %d\n", (int)h->n_dual));
@@ -81,29 +81,30 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
 /* Writes to the model file, or reads from it. */
 static PetscErrorCode Move(HycoROM m, HycoH5 file)
 {
-  HycoHybridROM h = (HycoHybridROM)m->data;
+  HycoHybridModel h = (HycoHybridModel)m->model->data;
 
   PetscFunctionBegin;
   PetscCall(HycoGalerkinMove(m, file));
   if (HycoH5Reads(file)) h->n_dual = -1;
-  PetscCall(HycoH5Real(file, "reconstruction/S_lambda", &h->n_dual, m->pairs.n, &h->S_lambda));
+  PetscCall(HycoH5Real(file, "reconstruction/S_lambda", &h->n_dual, m->model->pairs.n, &h->S_lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode Destroy(HycoROM m)
 {
-  HycoHybridROM h = (HycoHybridROM)m->data;
+  HycoHybridModel h = (HycoHybridModel)m->model->data;
 
   PetscFunctionBegin;
   PetscCall(HycoGalerkinDestroy(&h->galerkin));
   PetscCall(PetscFree(h->S_lambda));
-  PetscCall(PetscFree(m->data));
+  PetscCall(PetscFree(m->model->data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoROMCreate_Hybrid(HycoROM m)
 {
   static const HycoROMTraits traits = {.title = "hybrid hyper-reduced",
+                                       .work = sizeof(*(HycoHybridWork)NULL),
                                        .settings = HYCO_SETTINGS_RID,
                                        .stiffness = PETSC_TRUE,
                                        .constrains = PETSC_TRUE,
@@ -127,7 +128,7 @@ PetscErrorCode HycoROMCreate_Hybrid(HycoROM m)
                                  .save = Move,
                                  .load = Move,
                                  .destroy = Destroy};
-  HycoHybridROM h;
+  HycoHybridModel h;
 
   PetscFunctionBegin;
   PetscCall(PetscNew(&h));

@@ -42,13 +42,13 @@ struct _n_HycoReconstruction {
 
 static PetscErrorCode SetUp(HycoROM m)
 {
-  HycoHybridROM h = (HycoHybridROM)m->data;
-  const PetscInt N = m->pairs.n;
+  const HycoHybridModel h = (HycoHybridModel)m->model->data;
+  const PetscInt N = m->model->pairs.n;
   HycoReconstruction r;
 
   PetscFunctionBegin;
   PetscCall(PetscNew(&r));
-  h->reconstruction = r;
+  ((HycoHybridWork)m->work)->reconstruction = r;
   PetscCall(PetscMalloc1(N, &r->contact));
   for (PetscInt k = 0; k < N; k++) {
     PetscBool any = PETSC_FALSE;
@@ -57,7 +57,7 @@ static PetscErrorCode SetUp(HycoROM m)
       const PetscReal force = h->S_lambda[(size_t)j * (size_t)N + (size_t)k];
 
       any = (PetscBool)(any || force != 0);
-      if (m->in_rid[k]) r->scale = PetscMax(r->scale, force);
+      if (m->model->in_rid[k]) r->scale = PetscMax(r->scale, force);
     }
     if (any) r->contact[r->n++] = k;
   }
@@ -88,14 +88,14 @@ PetscErrorCode HycoReconstructionDestroy(HycoReconstruction *reconstruction)
 /* (41) as explicit least squares: A has a row for each contact of the RID, each open contact and each coefficient. */
 static PetscErrorCode SolveWrittenOut(HycoROM m)
 {
-  HycoHybridROM h = (HycoHybridROM)m->data;
-  HycoReconstruction r = h->reconstruction;
+  const HycoHybridModel h = (HycoHybridModel)m->model->data;
+  HycoReconstruction r = ((HycoHybridWork)m->work)->reconstruction;
   const PetscInt n = h->n_dual;
   PetscInt rows = n;
   PetscReal *A, *b;
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < r->n; k++) rows += m->in_rid[r->contact[k]] + (r->open[k] < 0);
+  for (PetscInt k = 0; k < r->n; k++) rows += m->model->in_rid[r->contact[k]] + (r->open[k] < 0);
   PetscCall(PetscCalloc2((size_t)rows * (size_t)n, &A, rows, &b));
   for (PetscInt j = 0; j < n; j++) {
     const PetscReal *s = r->S + (size_t)j * (size_t)r->n;
@@ -103,7 +103,7 @@ static PetscErrorCode SolveWrittenOut(HycoROM m)
     PetscInt row = 0;
 
     for (PetscInt k = 0; k < r->n; k++) {
-      if (m->in_rid[r->contact[k]]) {
+      if (m->model->in_rid[r->contact[k]]) {
         b[row] = m->Lambda[r->contact[k]];
         a[row++] = s[k];
       }
@@ -125,7 +125,7 @@ static PetscReal Remainder(HycoROM m, const HycoReconstruction r, PetscInt n_dua
     const PetscReal force = m->Lambda[r->contact[i]];
     PetscReal rest = force;
 
-    if (!m->in_rid[r->contact[i]]) continue;
+    if (!m->model->in_rid[r->contact[i]]) continue;
     for (PetscInt j = 0; j < n_dual; j++) rest -= r->c[j] * r->S[(size_t)j * (size_t)r->n + (size_t)i];
     lost += rest * rest;
     size += force * force;
@@ -135,8 +135,8 @@ static PetscReal Remainder(HycoROM m, const HycoReconstruction r, PetscInt n_dua
 
 PetscErrorCode HycoHybridReconstruct(HycoROM m)
 {
-  HycoHybridROM h = (HycoHybridROM)m->data;
-  const PetscInt N = m->pairs.n;
+  const HycoHybridModel h = (HycoHybridModel)m->model->data;
+  const PetscInt N = m->model->pairs.n;
   HycoReconstruction r;
   PetscReal force = 0;
   PetscBool solved = PETSC_FALSE;
@@ -144,15 +144,15 @@ PetscErrorCode HycoHybridReconstruct(HycoROM m)
   PetscFunctionBegin;
   for (PetscInt k = 0; k < m->m; k++) force += m->Lambda[m->contact[k]];
   if (m->m == N || !h->n_dual || !m->m || force == 0) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!h->reconstruction) PetscCall(SetUp(m));
+  if (!((HycoHybridWork)m->work)->reconstruction) PetscCall(SetUp(m));
   PetscCall(HycoROMComplete(m));
-  r = h->reconstruction;
+  r = ((HycoHybridWork)m->work)->reconstruction;
   for (PetscInt i = 0; i < r->n; i++) {
     const PetscInt k = r->contact[i];
 
     r->open[i] = HycoROMAddRow(m, k, -m->rows.gap[k]);
-    r->d[i] = (m->in_rid[k] ? 1 : 0) + (r->open[i] < 0 ? r->open[i] * r->open[i] : 0);
-    r->h[i] = m->in_rid[k] ? m->Lambda[k] : 0;
+    r->d[i] = (m->model->in_rid[k] ? 1 : 0) + (r->open[i] < 0 ? r->open[i] * r->open[i] : 0);
+    r->h[i] = m->model->in_rid[k] ? m->Lambda[k] : 0;
   }
   if (h->reconstruct_solver != SOLVER_TAO && r->scale > 0)
     PetscCall(HycoWeightedNNLS(r->weighted, r->d, r->h, RTOL, r->c, &solved));
@@ -164,7 +164,7 @@ PetscErrorCode HycoHybridReconstruct(HycoROM m)
     if (r->c[j] == 0) continue;
     m->spread = PETSC_TRUE;
     for (PetscInt i = 0; i < r->n; i++) {
-      if (!m->in_rid[r->contact[i]] && !HycoPairsAlone(m->scene, &m->pairs, r->contact[i]))
+      if (!m->model->in_rid[r->contact[i]] && !HycoPairsAlone(m->model->scene, &m->model->pairs, r->contact[i]))
         m->Lambda[r->contact[i]] += r->c[j] * s[i];
     }
   }

@@ -203,8 +203,8 @@ PetscErrorCode HycoProjectionModes(HycoReducer t, HycoSnapshots store)
 /* The n snapshots S, each scaled to unit 2-norm. */
 static PetscErrorCode FromSnapshots(HycoROM m, PetscInt n, const PetscReal S[])
 {
-  HycoProjectionROM p = (HycoProjectionROM)m->data;
-  const PetscInt N = m->pairs.n;
+  HycoProjectionModel p = (HycoProjectionModel)m->model->data;
+  const PetscInt N = m->model->pairs.n;
 
   PetscFunctionBegin;
   p->l_lambda = n;
@@ -219,16 +219,16 @@ static PetscErrorCode FromSnapshots(HycoROM m, PetscInt n, const PetscReal S[])
 
 PetscErrorCode HycoProjectionMakeBasis(HycoROM m, HycoReducer t)
 {
-  HycoProjectionROM p = (HycoProjectionROM)m->data;
+  HycoProjectionModel p = (HycoProjectionModel)m->model->data;
   const HycoForceBasis s = (HycoForceBasis)t->training;
-  const PetscInt N = m->pairs.n;
+  const PetscInt N = m->model->pairs.n;
   PetscInt n, k;
   PetscReal *S;
 
   PetscFunctionBegin;
   p->dual = s->dual;
   PetscCall(HycoReducerDualSnapshots(t, &n, &S));
-  k = s->vectors ? PetscMin(s->vectors, PetscMin(N, n)) : m->l;
+  k = s->vectors ? PetscMin(s->vectors, PetscMin(N, n)) : m->model->l;
   for (PetscInt i = 0; i < N * n; i++) S[i] = PetscMax(S[i], 0); /* negative by round-off of iterative solves */
   PetscCall(PetscMalloc1(N * PetscMax(n, k) + 1, &p->V_lambda));
   if (p->dual == HYCO_DUAL_SNAPSHOTS)
@@ -236,24 +236,25 @@ PetscErrorCode HycoProjectionMakeBasis(HycoROM m, HycoReducer t)
   else if (n && p->dual == HYCO_DUAL_NNMF)
     PetscCall(HycoNNMF(N, n, S, k, s->max_its, p->V_lambda, &p->l_lambda, &p->dual_misfit));
   PetscCall(PetscFree(S));
-  m->counts[1] = s->n_supremizers;
-  m->counts[0] = t->counts[HYCO_SEED_DUAL] = p->l_lambda;
+  m->model->counts[1] = s->n_supremizers;
+  m->model->counts[0] = t->counts[HYCO_SEED_DUAL] = p->l_lambda;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoProjectionJudge(HycoROM m, HycoReducer t)
 {
-  const HycoProjectionROM p = (HycoProjectionROM)m->data;
+  const HycoProjectionModel p = (HycoProjectionModel)m->model->data;
   char worst[HYCO_LINE] = "";
 
   PetscFunctionBegin;
   PetscCall(HycoReducerJudge(t, m));
-  if (!(m->numbers[1] < 0.5)) HycoReducerNameWorst(t, worst);
-  HycoCheckModel(m->numbers[1] < 0.5,
+  if (!(m->model->numbers[1] < 0.5)) HycoReducerNameWorst(t, worst);
+  HycoCheckModel(m->model->numbers[1] < 0.5,
                  "the %s model misses its own training displacements by %.0f %% on average (%d modes, %d force "
                  "vectors, condition %.0e)%s: use more modes (a smaller -hyco_pod_tol)%s",
-                 m->traits.title, 100 * (double)m->numbers[1], (int)m->l, (int)p->l_lambda, (double)m->numbers[0],
-                 worst, m->traits.cells ? ", or more cells (a smaller -hyco_cubature_tol)" : "");
+                 m->model->traits.title, 100 * (double)m->model->numbers[1], (int)m->model->l, (int)p->l_lambda,
+                 (double)m->model->numbers[0], worst,
+                 m->model->traits.cells ? ", or more cells (a smaller -hyco_cubature_tol)" : "");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -268,7 +269,7 @@ PetscErrorCode HycoProjectionBuild(HycoROM m, HycoReducer t)
 
 PetscErrorCode HycoProjectionReport(HycoReducer t, HycoROM m, HycoTraining *r)
 {
-  const HycoProjectionROM p = (HycoProjectionROM)m->data;
+  const HycoProjectionModel p = (HycoProjectionModel)m->model->data;
   const PetscInt n = ((HycoForceBasis)t->training)->n_supremizers;
 
   PetscFunctionBegin;

@@ -22,13 +22,14 @@ const char *const HycoDuals[] = {"fe", "nnmf", "snapshots", NULL};
    forces. */
 static void DropRoundoff(HycoROM m, const PetscReal largest[], PetscScalar b[])
 {
-  const HycoProjectionROM p = (HycoProjectionROM)m->data;
+  const HycoProjectionModel p = (HycoProjectionModel)m->model->data;
 
   for (PetscInt i = 0; i < p->l_lambda; i++) {
     PetscReal sum = 0;
 
-    for (PetscInt c = 0; c < m->m; c++) sum += p->V_lambda[(size_t)i * (size_t)m->pairs.n + (size_t)m->contact[c]];
-    for (PetscInt j = 0; j < m->l; j++) {
+    for (PetscInt c = 0; c < m->m; c++)
+      sum += p->V_lambda[(size_t)i * (size_t)m->model->pairs.n + (size_t)m->contact[c]];
+    for (PetscInt j = 0; j < m->model->l; j++) {
       if (PetscAbsScalar(b[j * p->l_lambda + i]) <= ROUNDOFF * sum * largest[j]) b[j * p->l_lambda + i] = 0;
     }
   }
@@ -37,9 +38,9 @@ static void DropRoundoff(HycoROM m, const PetscReal largest[], PetscScalar b[])
 /* V_lambda^T B V and its transpose. */
 static PetscErrorCode FillContact(HycoROM m)
 {
-  HycoProjectionROM p = (HycoProjectionROM)m->data;
-  HycoGalerkin g = (HycoGalerkin)m->data;
-  const PetscInt l = m->l, n = p->l_lambda;
+  HycoProjectionModel p = (HycoProjectionModel)m->model->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
+  const PetscInt l = m->model->l, n = p->l_lambda;
   const HycoRows *rows = &g->own_rows;
   PetscReal *BV, *size, *largest; /* for each contact: B V, the sums of absolute terms in it, and the largest of
                                      these sums */
@@ -57,7 +58,7 @@ static PetscErrorCode FillContact(HycoROM m)
     PetscCall(PetscArrayzero(size, l));
     for (PetscInt t = rows->start[c]; t < rows->start[c + 1]; t++) {
       for (PetscInt j = 0; j < l; j++) {
-        const PetscReal term = rows->value[t] * g->Vp[(size_t)rows->dof[t] * (size_t)l + (size_t)j];
+        const PetscReal term = rows->value[t] * m->model->V[(size_t)rows->dof[t] * (size_t)l + (size_t)j];
 
         BV[j] += term;
         size[j] += PetscAbsReal(term);
@@ -65,7 +66,8 @@ static PetscErrorCode FillContact(HycoROM m)
     }
     for (PetscInt j = 0; j < l; j++) {
       largest[j] = PetscMax(largest[j], size[j]);
-      for (PetscInt i = 0; i < n; i++) b[j * n + i] += p->V_lambda[(size_t)i * (size_t)m->pairs.n + (size_t)k] * BV[j];
+      for (PetscInt i = 0; i < n; i++)
+        b[j * n + i] += p->V_lambda[(size_t)i * (size_t)m->model->pairs.n + (size_t)k] * BV[j];
     }
   }
   DropRoundoff(m, largest, b);
@@ -81,8 +83,8 @@ static PetscErrorCode FillContact(HycoROM m)
 /* If no mode changes the gap of a row, the gap is set open: no force can satisfy or violate it. */
 static PetscErrorCode OpenUnmoved(HycoROM m, PetscScalar d[])
 {
-  HycoGalerkin g = (HycoGalerkin)m->data;
-  const PetscInt n = ((HycoProjectionROM)m->data)->l_lambda;
+  HycoGalerkin g = (HycoGalerkin)m->work;
+  const PetscInt n = ((HycoProjectionModel)m->model->data)->l_lambda;
   const PetscScalar *b;
   PetscReal largest = 0;
 
@@ -92,8 +94,8 @@ static PetscErrorCode OpenUnmoved(HycoROM m, PetscScalar d[])
   for (PetscInt i = 0; i < n; i++) {
     PetscInt j = 0;
 
-    while (j < m->l && b[j * n + i] == 0) j++;
-    if (j == m->l) d[i] = largest > 0 ? largest : 1;
+    while (j < m->model->l && b[j * n + i] == 0) j++;
+    if (j == m->model->l) d[i] = largest > 0 ? largest : 1;
   }
   PetscCall(MatDenseRestoreArrayRead(g->Br, &b));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -102,14 +104,14 @@ static PetscErrorCode OpenUnmoved(HycoROM m, PetscScalar d[])
 /* V_lambda^T D */
 static PetscErrorCode FillGap(HycoROM m)
 {
-  HycoProjectionROM p = (HycoProjectionROM)m->data;
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoProjectionModel p = (HycoProjectionModel)m->model->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   PetscScalar *d;
 
   PetscFunctionBegin;
   PetscCall(VecGetArray(g->Dr, &d));
   for (PetscInt i = 0; i < p->l_lambda; i++) {
-    const PetscReal *v = p->V_lambda + (size_t)i * (size_t)m->pairs.n;
+    const PetscReal *v = p->V_lambda + (size_t)i * (size_t)m->model->pairs.n;
 
     d[i] = 0;
     for (PetscInt c = 0; c < m->m; c++) d[i] += v[m->contact[c]] * g->own_rows.gap[c];
@@ -122,14 +124,14 @@ static PetscErrorCode FillGap(HycoROM m)
 /* Lambda = V_lambda Lambda_r */
 static PetscErrorCode Expand(HycoROM m)
 {
-  HycoProjectionROM p = (HycoProjectionROM)m->data;
-  HycoGalerkin g = (HycoGalerkin)m->data;
+  HycoProjectionModel p = (HycoProjectionModel)m->model->data;
+  HycoGalerkin g = (HycoGalerkin)m->work;
   const PetscScalar *L;
 
   PetscFunctionBegin;
   PetscCall(VecGetArrayRead(g->L, &L));
   for (PetscInt i = 0; i < p->l_lambda; i++) {
-    const PetscReal *v = p->V_lambda + (size_t)i * (size_t)m->pairs.n;
+    const PetscReal *v = p->V_lambda + (size_t)i * (size_t)m->model->pairs.n;
 
     for (PetscInt c = 0; c < m->m; c++) m->Lambda[m->contact[c]] += L[i] * v[m->contact[c]];
   }
@@ -139,12 +141,12 @@ static PetscErrorCode Expand(HycoROM m)
 
 PetscErrorCode HycoProjectionViewForces(HycoROM m, PetscViewer viewer)
 {
-  HycoProjectionROM p = (HycoProjectionROM)m->data;
+  HycoProjectionModel p = (HycoProjectionModel)m->model->data;
 
   PetscFunctionBegin;
-  if (m->counts[1])
-    PetscCall(
-        PetscViewerASCIIPrintf(viewer, "  supremizers of the dual snapshots among the modes: %d\n", (int)m->counts[1]));
+  if (m->model->counts[1])
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  supremizers of the dual snapshots among the modes: %d\n",
+                                     (int)m->model->counts[1]));
   PetscCall(PetscViewerASCIIPrintf(
       viewer, "  force vectors: %d (%s); energy of the training forces that they leave out: %.2e\n", (int)p->l_lambda,
       p->dual == HYCO_DUAL_NNMF ? "nonnegative factorisation of the dual snapshots" : "the dual snapshots",
@@ -157,7 +159,7 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
 {
   PetscFunctionBegin;
   PetscCall(PetscViewerASCIIPrintf(viewer, "  on the whole mesh: %d elements, %d nodes, %d contacts\n",
-                                   (int)m->whole_cells, (int)m->whole_nodes, (int)m->pairs.n));
+                                   (int)m->model->whole_cells, (int)m->model->whole_nodes, (int)m->model->pairs.n));
   PetscCall(HycoProjectionViewForces(m, viewer));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -165,7 +167,7 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
 PetscErrorCode HycoProjectionSetUp(HycoROM m)
 {
   PetscFunctionBegin;
-  m->n_L = ((HycoProjectionROM)m->data)->l_lambda;
+  m->n_L = ((HycoProjectionModel)m->model->data)->l_lambda;
   PetscCall(HycoGalerkinSetUp(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -173,7 +175,7 @@ PetscErrorCode HycoProjectionSetUp(HycoROM m)
 /* Writes to the model file, or reads from it. */
 PetscErrorCode HycoProjectionMove(HycoROM m, HycoH5 h)
 {
-  HycoProjectionROM p = (HycoProjectionROM)m->data;
+  HycoProjectionModel p = (HycoProjectionModel)m->model->data;
   PetscInt word = p->dual;
 
   PetscFunctionBegin;
@@ -182,11 +184,11 @@ PetscErrorCode HycoProjectionMove(HycoROM m, HycoH5 h)
     PetscCall(HycoROMLoadWord(m, h, "problem/dual", HycoDuals, &word));
     p->dual = (HycoDual)word;
     p->l_lambda = -1;
-    HycoCheck((p->dual == HYCO_DUAL_FE || m->n_fe == 0) && m->counts[1] <= m->l, "%s: problem/dual is damaged",
-              m->path);
+    HycoCheck((p->dual == HYCO_DUAL_FE || m->model->n_fe == 0) && m->model->counts[1] <= m->model->l,
+              "%s: problem/dual is damaged", m->model->path);
   } else
     PetscCall(HycoH5WriteText(h, "problem/dual", HycoDuals[p->dual]));
-  PetscCall(HycoH5Real(h, "problem/V_lambda", &p->l_lambda, m->pairs.n, &p->V_lambda));
+  PetscCall(HycoH5Real(h, "problem/V_lambda", &p->l_lambda, m->model->pairs.n, &p->V_lambda));
   PetscCall(HycoH5Reals(h, "training/dual_misfit", 1, &p->dual_misfit));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -195,22 +197,22 @@ static PetscErrorCode Load(HycoROM m, HycoH5 h)
 {
   PetscFunctionBegin;
   PetscCall(HycoProjectionMove(m, h));
-  HycoCheck(((HycoProjectionROM)m->data)->dual != HYCO_DUAL_FE, "%s: problem/dual is damaged", m->path);
+  HycoCheck(((HycoProjectionModel)m->model->data)->dual != HYCO_DUAL_FE, "%s: problem/dual is damaged", m->model->path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoProjectionDestroy(HycoROM m)
 {
-  HycoProjectionROM p = (HycoProjectionROM)m->data;
+  HycoProjectionModel p = (HycoProjectionModel)m->model->data;
 
   PetscFunctionBegin;
   PetscCall(HycoGalerkinDestroy(&p->galerkin));
   PetscCall(PetscFree(p->V_lambda));
-  PetscCall(PetscFree(m->data));
+  PetscCall(PetscFree(m->model->data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void HycoProjectionInit(HycoProjectionROM p)
+void HycoProjectionInit(HycoProjectionModel p)
 {
   p->galerkin.contact = FillContact;
   p->galerkin.gap = FillGap;
@@ -221,6 +223,7 @@ void HycoProjectionInit(HycoProjectionROM p)
 PetscErrorCode HycoROMCreate_Projection(HycoROM m)
 {
   static const HycoROMTraits traits = {.title = "projection-based",
+                                       .work = sizeof(struct _n_HycoGalerkin),
                                        .settings = HYCO_SETTINGS_MODES,
                                        .whole = PETSC_TRUE,
                                        .stiffness = PETSC_TRUE,
@@ -243,7 +246,7 @@ PetscErrorCode HycoROMCreate_Projection(HycoROM m)
                                  .save = HycoProjectionMove,
                                  .load = Load,
                                  .destroy = HycoProjectionDestroy};
-  HycoProjectionROM p;
+  HycoProjectionModel p;
 
   PetscFunctionBegin;
   PetscCall(PetscNew(&p));

@@ -28,11 +28,14 @@ typedef struct {
   PetscInt kernel, n_columns;
   PetscReal *gamma, *Lambda;    /* l, N_lambda rows */
   PetscReal *sigma, *inelastic; /* with a history: n_cells x n_sigma, n_cells rows */
-  PetscReal *inverse;           /* online: inverse of the system for c, a, b (symmetric) */
-  PetscReal *right, *weight;    /* its right-hand side; the points' weights, followed by those of a, b */
-  PetscReal largest;            /* largest contact force in training */
-  HycoStep *step;               /* by listed time */
 } * Regression;
+
+typedef struct {
+  PetscReal *inverse;        /* of the system for c, a, b (symmetric) */
+  PetscReal *right, *weight; /* its right-hand side; the points' weights, followed by those of a, b */
+  PetscReal largest;         /* largest contact force in training */
+  HycoStep *step;            /* by listed time */
+} * Work;
 
 /* -- training -- */
 
@@ -63,7 +66,7 @@ static PetscErrorCode Modes(HycoReducer t, HycoSnapshots store)
 static PetscErrorCode ReadCells(HycoReducer t, HycoROM m, const char field[], PetscInt width, PetscReal value[])
 {
   const HycoSnapshots store = ((Training)t->training)->store;
-  const PetscInt steps = HycoSnapshotsSteps(t->scene), n_cells = m->mesh->n_cells;
+  const PetscInt steps = HycoSnapshotsSteps(t->scene), n_cells = m->model->mesh->n_cells;
   const PetscReal *mu;
   PetscReal *all;
   PetscInt n_par;
@@ -74,8 +77,8 @@ static PetscErrorCode ReadCells(HycoReducer t, HycoROM m, const char field[], Pe
   for (PetscInt k = 0; k < t->n_s; k++) {
     PetscCall(HycoSnapshotsReadRows(store, mu + k / steps * n_par, k % steps, field, 0, t->sizes[1] * width, all));
     for (PetscInt e = 0; e < n_cells; e++)
-      PetscCall(PetscArraycpy(value + (size_t)(k * n_cells + e) * (size_t)width, all + m->mesh->cell_whole[e] * width,
-                              width));
+      PetscCall(PetscArraycpy(value + (size_t)(k * n_cells + e) * (size_t)width,
+                              all + m->model->mesh->cell_whole[e] * width, width));
   }
   PetscCall(PetscFree(all));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -83,15 +86,15 @@ static PetscErrorCode ReadCells(HycoReducer t, HycoROM m, const char field[], Pe
 
 static PetscErrorCode Build(HycoROM m, HycoReducer t)
 {
-  Regression r = (Regression)m->data;
+  Regression r = (Regression)m->model->data;
   const PetscInt n_sigma = t->fom->fe->n_sigma;
-  const size_t n_s = (size_t)t->n_s, cells = n_s * (size_t)m->mesh->n_cells;
+  const size_t n_s = (size_t)t->n_s, cells = n_s * (size_t)m->model->mesh->n_cells;
 
   PetscFunctionBegin;
   r->kernel = ((Training)t->training)->kernel;
   r->n_columns = t->n_s;
-  HycoDuplicate(n_s * (size_t)m->l, t->VtU, &r->gamma);
-  HycoDuplicate(n_s * (size_t)m->pairs.n, t->Lambda, &r->Lambda);
+  HycoDuplicate(n_s * (size_t)m->model->l, t->VtU, &r->gamma);
+  HycoDuplicate(n_s * (size_t)m->model->pairs.n, t->Lambda, &r->Lambda);
   if (t->scene->n_times) {
     PetscCall(PetscMalloc1(cells * (size_t)n_sigma + 1, &r->sigma));
     PetscCall(PetscMalloc1(cells + 1, &r->inelastic));
@@ -109,7 +112,7 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *out)
   (void)t;
   snprintf(out->summary, sizeof(out->summary),
            "regression: %d snapshots; %d displacement modes, %d contact forces; stresses in %d elements (%.1f %%)\n",
-           (int)out->n_samples, (int)out->n_modes, (int)m->pairs.n, (int)m->mesh->n_cells,
+           (int)out->n_samples, (int)out->n_modes, (int)m->model->pairs.n, (int)m->model->mesh->n_cells,
            100 * (double)out->rid_fraction);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -126,11 +129,12 @@ static PetscReal Kernel(PetscInt kernel, PetscReal r)
 /* The system's column of a point: kernels at the training points, 1, the scaled parameters. */
 static void Column(HycoROM m, const PetscReal mu[], PetscReal column[])
 {
-  const HycoScene s = m->scene;
-  const PetscInt n = m->n_points, n_par = s->n_parameters;
+  const HycoScene s = m->model->scene;
+  const PetscInt n = m->model->n_points, n_par = s->n_parameters;
 
   for (PetscInt k = 0; k < n; k++)
-    column[k] = Kernel(((Regression)m->data)->kernel, HycoEstimatesDistance(s, mu, m->points + k * n_par));
+    column[k] =
+        Kernel(((Regression)m->model->data)->kernel, HycoEstimatesDistance(s, mu, m->model->points + k * n_par));
   column[n] = 1;
   for (PetscInt p = 0; p < n_par; p++)
     column[n + 1 + p] = (mu[p] - s->lo[p]) / (s->hi[p] > s->lo[p] ? s->hi[p] - s->lo[p] : 1);
@@ -141,60 +145,62 @@ static void Column(HycoROM m, const PetscReal mu[], PetscReal column[])
 /* The inverse of the system, with the polynomial's columns beside and below the kernels'. */
 static PetscErrorCode Invert(HycoROM m)
 {
-  Regression r = (Regression)m->data;
-  const PetscInt n = m->n_points, size = n + 1 + m->scene->n_parameters;
+  const Work w = (Work)m->work;
+  const PetscInt n = m->model->n_points, size = n + 1 + m->model->scene->n_parameters;
   PetscReal *A;
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1((size_t)size * (size_t)size, &A));
-  PetscCall(PetscMalloc1((size_t)size * (size_t)size, &r->inverse));
+  PetscCall(PetscMalloc1((size_t)size * (size_t)size, &w->inverse));
   for (PetscInt k = 0; k < n; k++) {
     PetscReal *column = A + (size_t)k * (size_t)size;
 
-    Column(m, m->points + k * m->scene->n_parameters, column);
+    Column(m, m->model->points + k * m->model->scene->n_parameters, column);
     for (PetscInt i = n; i < size; i++) A[(size_t)i * (size_t)size + (size_t)k] = column[i];
   }
-  PetscCall(HycoPseudoInverse(size, size, A, SINGULAR, r->inverse));
+  PetscCall(HycoPseudoInverse(size, size, A, SINGULAR, w->inverse));
   PetscCall(PetscFree(A));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode SetUp(HycoROM m)
 {
-  Regression r = (Regression)m->data;
-  const PetscInt size = m->n_points + 1 + m->scene->n_parameters;
+  Regression r = (Regression)m->model->data;
+  const Work w = (Work)m->work;
+  const PetscInt size = m->model->n_points + 1 + m->model->scene->n_parameters;
 
   PetscFunctionBegin;
-  HycoCheck(r->n_columns == m->n_points * HycoSnapshotsSteps(m->scene), "%s: regression/gamma is damaged", m->path);
+  HycoCheck(r->n_columns == m->model->n_points * HycoSnapshotsSteps(m->model->scene), "%s: regression/gamma is damaged",
+            m->model->path);
   PetscCall(HycoROMSetUpDefault(m));
-  PetscCall(PetscMalloc1(size, &r->right));
-  PetscCall(PetscMalloc1(size, &r->weight));
-  PetscCall(PetscCalloc1(PetscMax(1, m->scene->n_times), &r->step));
-  r->largest = 0;
-  for (PetscInt k = 0; k < r->n_columns * m->pairs.n; k++) r->largest = PetscMax(r->largest, r->Lambda[k]);
+  PetscCall(PetscMalloc1(size, &w->right));
+  PetscCall(PetscMalloc1(size, &w->weight));
+  PetscCall(PetscCalloc1(PetscMax(1, m->model->scene->n_times), &w->step));
+  w->largest = 0;
+  for (PetscInt k = 0; k < r->n_columns * m->model->pairs.n; k++) w->largest = PetscMax(w->largest, r->Lambda[k]);
   PetscCall(Invert(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode Reset(HycoROM m)
 {
-  Regression r = (Regression)m->data;
+  const Work w = (Work)m->work;
 
   PetscFunctionBegin;
-  HycoFreeAll(&r->inverse, &r->right, &r->weight, &r->step);
+  HycoFreeAll(&w->inverse, &w->right, &w->weight, &w->step);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The training points' weights at mu. */
 static void Weigh(HycoROM m, const PetscReal mu[])
 {
-  Regression r = (Regression)m->data;
-  const PetscInt n = m->n_points, size = n + 1 + m->scene->n_parameters;
+  const Work w = (Work)m->work;
+  const PetscInt n = m->model->n_points, size = n + 1 + m->model->scene->n_parameters;
 
-  Column(m, mu, r->right);
+  Column(m, mu, w->right);
   for (PetscInt k = 0; k < n; k++) {
-    r->weight[k] = 0;
-    for (PetscInt i = 0; i < size; i++) r->weight[k] += r->inverse[(size_t)k * (size_t)size + (size_t)i] * r->right[i];
+    w->weight[k] = 0;
+    for (PetscInt i = 0; i < size; i++) w->weight[k] += w->inverse[(size_t)k * (size_t)size + (size_t)i] * w->right[i];
   }
 }
 
@@ -202,14 +208,14 @@ static void Weigh(HycoROM m, const PetscReal mu[])
    raised to it. */
 static void Sum(HycoROM m, PetscInt step, PetscInt rows, const PetscReal data[], PetscReal least, PetscReal value[])
 {
-  const Regression r = (Regression)m->data;
-  const PetscInt steps = HycoSnapshotsSteps(m->scene);
+  const Work w = (Work)m->work;
+  const PetscInt steps = HycoSnapshotsSteps(m->model->scene);
 
   for (PetscInt i = 0; i < rows; i++) value[i] = 0;
-  for (PetscInt k = 0; k < m->n_points; k++) {
+  for (PetscInt k = 0; k < m->model->n_points; k++) {
     const PetscReal *column = data + (size_t)(k * steps + step) * (size_t)rows;
 
-    for (PetscInt i = 0; i < rows; i++) value[i] += r->weight[k] * column[i];
+    for (PetscInt i = 0; i < rows; i++) value[i] += w->weight[k] * column[i];
   }
   for (PetscInt i = 0; i < rows; i++) value[i] = PetscMax(value[i], least);
 }
@@ -219,12 +225,14 @@ static void Sum(HycoROM m, PetscInt step, PetscInt rows, const PetscReal data[],
 /* Displacement and forces at mu (all variables), with a history at listed time `step`. */
 static PetscErrorCode Evaluate(HycoROM m, PetscInt step, const PetscReal mu[])
 {
-  const Regression r = (Regression)m->data;
+  const Regression r = (Regression)m->model->data;
+  const Work w = (Work)m->work;
 
   PetscFunctionBegin;
-  Sum(m, step, m->l, r->gamma, PETSC_MIN_REAL, m->gamma);
-  Sum(m, step, m->pairs.n, r->Lambda, 0, m->Lambda);
-  for (PetscInt k = 0; k < m->pairs.n; k++) m->Lambda[k] = m->Lambda[k] > NO_FORCE * r->largest ? m->Lambda[k] : 0;
+  Sum(m, step, m->model->l, r->gamma, PETSC_MIN_REAL, m->gamma);
+  Sum(m, step, m->model->pairs.n, r->Lambda, 0, m->Lambda);
+  for (PetscInt k = 0; k < m->model->pairs.n; k++)
+    m->Lambda[k] = m->Lambda[k] > NO_FORCE * w->largest ? m->Lambda[k] : 0;
   PetscCall(HycoROMSetSolution(m, mu, NULL, NULL));
   m->beyond_current = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -233,9 +241,10 @@ static PetscErrorCode Evaluate(HycoROM m, PetscInt step, const PetscReal mu[])
 /* Adds the current listed time, with the fields of its cells. */
 static PetscErrorCode List(HycoROM m, PetscInt step, PetscReal t)
 {
-  const Regression r = (Regression)m->data;
-  const PetscInt n_cells = m->mesh->n_cells, ns = m->fe->n_sigma;
-  HycoStep *s = &r->step[step];
+  const Regression r = (Regression)m->model->data;
+  const Work w = (Work)m->work;
+  const PetscInt n_cells = m->model->mesh->n_cells, ns = m->fe->n_sigma;
+  HycoStep *s = &w->step[step];
   PetscReal *sigma, *inelastic;
 
   PetscFunctionBegin;
@@ -259,8 +268,8 @@ static PetscErrorCode List(HycoROM m, PetscInt step, PetscReal t)
 /* All listed times; the residuals are the largest of them. */
 static PetscErrorCode Path(HycoROM m, const PetscReal mu[])
 {
-  const HycoScene s = m->scene;
-  const Regression r = (Regression)m->data;
+  const HycoScene s = m->model->scene;
+  const Work w = (Work)m->work;
   HycoPrediction *p = &m->prediction;
   HycoReason reason = HYCO_CONVERGED;
   HycoKKT worst = {0};
@@ -281,7 +290,7 @@ static PetscErrorCode Path(HycoROM m, const PetscReal mu[])
   p->kkt = worst;
   p->reason = reason;
   m->trace.history = (HycoHistory){.n = s->n_times,
-                                   .step = r->step,
+                                   .step = w->step,
                                    .ended = PETSC_TRUE,
                                    .t = s->times[s->n_times - 1],
                                    .why = "",
@@ -297,11 +306,11 @@ static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
 
   PetscFunctionBegin;
   Weigh(m, mu);
-  if (m->scene->n_times) {
+  if (m->model->scene->n_times) {
     PetscCall(Path(m, mu));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  HycoSceneSetTime(m->scene, mu, 0, all);
+  HycoSceneSetTime(m->model->scene, mu, 0, all);
   PetscCall(Evaluate(m, 0, all));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -311,8 +320,8 @@ static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
 /* Writes to the model file, or reads from it. */
 static PetscErrorCode Move(HycoROM m, HycoH5 h)
 {
-  Regression r = (Regression)m->data;
-  const PetscInt n_sigma = HycoStrainSize(m->mesh->dim);
+  Regression r = (Regression)m->model->data;
+  const PetscInt n_sigma = HycoStrainSize(m->model->mesh->dim);
 
   PetscFunctionBegin;
   if (HycoH5Reads(h)) {
@@ -320,40 +329,41 @@ static PetscErrorCode Move(HycoROM m, HycoH5 h)
     r->n_columns = -1;
   } else
     PetscCall(HycoH5WriteText(h, "regression/kernel", kernels[r->kernel]));
-  PetscCall(HycoH5Real(h, "regression/gamma", &r->n_columns, m->l, &r->gamma));
-  PetscCall(HycoH5Real(h, "regression/Lambda", &r->n_columns, m->pairs.n, &r->Lambda));
-  if (!m->scene->n_times) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoH5Real(h, "regression/sigma", &r->n_columns, m->mesh->n_cells * n_sigma, &r->sigma));
-  PetscCall(HycoH5Real(h, "regression/inelastic", &r->n_columns, m->mesh->n_cells, &r->inelastic));
+  PetscCall(HycoH5Real(h, "regression/gamma", &r->n_columns, m->model->l, &r->gamma));
+  PetscCall(HycoH5Real(h, "regression/Lambda", &r->n_columns, m->model->pairs.n, &r->Lambda));
+  if (!m->model->scene->n_times) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoH5Real(h, "regression/sigma", &r->n_columns, m->model->mesh->n_cells * n_sigma, &r->sigma));
+  PetscCall(HycoH5Real(h, "regression/inelastic", &r->n_columns, m->model->mesh->n_cells, &r->inelastic));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode View(HycoROM m, PetscViewer viewer)
 {
-  const Regression r = (Regression)m->data;
+  const Regression r = (Regression)m->model->data;
 
   PetscFunctionBegin;
   PetscCall(PetscViewerASCIIPrintf(viewer,
                                    "  regression: %s radial basis functions and a linear polynomial of %d parameters, "
                                    "from %d solutions; %d contact forces, stresses in %d of %d elements\n",
-                                   kernels[r->kernel], (int)m->scene->n_parameters, (int)r->n_columns, (int)m->pairs.n,
-                                   (int)m->mesh->n_cells, (int)m->whole_cells));
+                                   kernels[r->kernel], (int)m->model->scene->n_parameters, (int)r->n_columns,
+                                   (int)m->model->pairs.n, (int)m->model->mesh->n_cells, (int)m->model->whole_cells));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode Destroy(HycoROM m)
 {
-  Regression r = (Regression)m->data;
+  Regression r = (Regression)m->model->data;
 
   PetscFunctionBegin;
   HycoFreeAll(&r->gamma, &r->Lambda, &r->sigma, &r->inelastic);
-  PetscCall(PetscFree(m->data));
+  PetscCall(PetscFree(m->model->data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoROMCreate_Regression(HycoROM m)
 {
-  static const HycoROMTraits traits = {.title = "regression", .settings = HYCO_SETTINGS_NONE, .history = PETSC_TRUE};
+  static const HycoROMTraits traits = {
+      .title = "regression", .work = sizeof(*(Work)NULL), .settings = HYCO_SETTINGS_NONE, .history = PETSC_TRUE};
   static const HycoROMOps ops = {.setfromoptions = SetFromOptions,
                                  .modes = Modes,
                                  .build = Build,

@@ -29,8 +29,8 @@ static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked
   if (!y->K || !y->m || s->iterative) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoKernelSize(y->K, &p));
   if (p && strcmp(s->now.type, HYCO_TAO_ACTIVE_SET)) {
-    HycoFormat(why, "a body is held by contact only, which %s cannot solve; use -hyco_solver_type active_set",
-               s->now.word);
+    HycoFormat(why, "a body is held by contact only, which %s cannot solve; %s", s->now.word,
+               y->blocks ? "add a support or a soft spring" : "use -hyco_solver_type active_set");
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (s->falling_back && y->m > HYCO_FALLBACK_MAX && (s->form != form || s->now.traits & HYCO_TAO_DENSE))
@@ -143,13 +143,15 @@ static PetscErrorCode FreeGap(HycoSolver s, const Dual *d, Vec x)
 /* Solves the dense problem by the current method. Floating bodies start with every contact closed. */
 static PetscErrorCode SolveForces(HycoSolver s, Dual *d, PetscBool *solved)
 {
-  const HycoLCP lcp = {.n = d->m,
-                       .p = d->p,
-                       .M = d->S,
-                       .q = d->g,
-                       .symmetric = s->system->symmetric,
-                       .monitor = s->monitor,
-                       .monitor_ctx = s->monitor_ctx};
+  HycoBlocks *blocks = NULL;
+  HycoLCP lcp = {.n = d->m,
+                 .p = d->p,
+                 .M = d->S,
+                 .q = d->g,
+                 .symmetric = s->system->symmetric,
+                 .warm = s->warm,
+                 .monitor = s->monitor,
+                 .monitor_ctx = s->monitor_ctx};
   char name[HYCO_LINE] = "dual";
 
   PetscFunctionBegin;
@@ -157,14 +159,18 @@ static PetscErrorCode SolveForces(HycoSolver s, Dual *d, PetscBool *solved)
   PetscCall(HycoSolverNameMethod(s, name));
   for (PetscInt i = 0; i < d->m && (!s->warm || !d->started); i++) d->active[i] = (PetscBool)(d->p > 0);
   PetscCall(HycoTaoSetType(d->tao, s->now.type, s->max_its));
+  if (s->system->blocks) PetscCall(HycoBlocksGather(HycoComm(s), s->system->blocks, &blocks));
+  lcp.blocks = blocks;
   PetscCall(HycoTaoSolveLCP(d->tao, &lcp, d->active, d->L, &s->its, solved));
-  for (PetscInt i = 0; i < d->m; i++) { /* negative by round-off; the residuals are recomputed */
+  if (blocks) PetscCall(HycoBlocksAdmit(blocks, d->L)); /* inadmissible by round-off; the residuals are recomputed */
+  for (PetscInt i = 0; i < d->m && !blocks; i++) {
     PetscReal *L = d->L + d->p + i;
 
     *L = d->p && !d->active[i] ? 0 : PetscMax(*L, 0);
     if (!d->p) d->active[i] = (PetscBool)(*L > 0);
   }
-  d->started = *solved;
+  d->started = (PetscBool)(*solved && !blocks);
+  PetscCall(HycoBlocksDestroy(&blocks));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -328,7 +334,8 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   HycoLogged(HYCO_EVENT_FORCES, SolveForces(s, d, solved));
   PetscCall(SetForces(d, L));
   PetscCall(Recover(s, d, x, L));
-  if (s->stiffness.lu && !d->p && *solved && s->now.traits & HYCO_TAO_OWN) PetscCall(CloseGaps(s, d, x, L));
+  if (s->stiffness.lu && !d->p && *solved && s->now.traits & HYCO_TAO_OWN && !s->system->blocks)
+    PetscCall(CloseGaps(s, d, x, L));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -350,6 +357,7 @@ PetscErrorCode HycoSolverFormCreate_Dual(HycoSolver s, HycoSolverForm form)
   PetscCall(PetscNew(&d));
   PetscCall(HycoTaoCreate(PETSC_COMM_SELF, (PetscObject)s, &d->tao));
   form->data = d;
+  form->cones = PETSC_TRUE;
   *form->ops = (struct _HycoSolverFormOps){.accepts = Accepts,
                                            .estimate = EstimateFactor,
                                            .setup = SetUp,

@@ -46,7 +46,12 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
 {
   Flexibility *f = (Flexibility *)form->data;
   HycoSystem y = s->system;
-  HycoLCP lcp = {.n = y->m, .symmetric = PETSC_TRUE, .monitor = s->monitor, .monitor_ctx = s->monitor_ctx};
+  HycoLCP lcp = {.n = y->m,
+                 .symmetric = PETSC_TRUE,
+                 .blocks = y->blocks,
+                 .warm = s->warm,
+                 .monitor = s->monitor,
+                 .monitor_ctx = s->monitor_ctx};
   PetscScalar *l;
   PetscBool singular;
 
@@ -64,13 +69,12 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   PetscCall(VecGetArray(L, &l));
   PetscCall(HycoTaoSetType(f->tao, s->now.type, s->max_its));
   PetscCall(HycoTaoSolveLCP(f->tao, &lcp, f->active, l, &s->its, solved));
-  for (PetscInt i = 0; i < f->m; i++)
-    l[i] = PetscMax(l[i], 0); /* negative by round-off; the residuals are
-                                 recomputed */
+  if (y->blocks) PetscCall(HycoBlocksAdmit(y->blocks, l)); /* inadmissible by round-off; residuals are recomputed */
+  for (PetscInt i = 0; i < f->m && !y->blocks; i++) l[i] = PetscMax(l[i], 0);
   PetscCall(VecRestoreArray(L, &l));
   PetscCall(VecRestoreArrayRead(y->D, &lcp.q));
   PetscCall(MatDenseRestoreArrayRead(y->G, &lcp.M));
-  f->started = *solved;
+  f->started = (PetscBool)(*solved && !y->blocks);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -94,6 +98,7 @@ PetscErrorCode HycoSolverFormCreate_Flexibility(HycoSolver s, HycoSolverForm for
   PetscCall(PetscNew(&f));
   PetscCall(HycoTaoCreate(PETSC_COMM_SELF, (PetscObject)s, &f->tao));
   form->data = f;
+  form->cones = PETSC_TRUE;
   *form->ops = (struct _HycoSolverFormOps){.accepts = Accepts, .setup = SetUp, .solve = Solve, .destroy = Destroy};
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,0 +1,213 @@
+/*
+  The model of bodies as substructures. Bodies (connected parts of the mesh; ties connect) touch only through their
+  surfaces. In the axes of a body at one point of the parameters, on the unknowns of the surfaces that may touch,
+
+      C_b = N_b K_b^-1 N_b^T,   R_b = N_b K_b^-1 F_b,
+
+  and at mu, where the body is turned by Q, scaled, and stiffer by the factor kappa (Q^T K(mu) Q = kappa K),
+
+      u_b = Q (kappa^-1 (R_b c - C_b f) + Z_b x),   f = Q^T B_b^T L,   W = sum_b B_b Q C_b Q^T B_b^T / kappa
+
+  with the rigid motions Z_b of a body that contact alone holds. The parameters theta that change a body otherwise, its
+  shape or the ratio of its moduli, have samples, between which the entries of its blocks are interpolated.
+*/
+#ifndef HYCOBODIES_H
+#define HYCOBODIES_H
+
+#include <hycoalgorithms.h>
+#include <hycolcp.h>
+#include <hycolinear.h>
+#include <hycoreducerimpl.h>
+
+/* How a parameter enters a body: the sum of these. */
+enum {
+  HYCO_ENTERS_LOADS = 1,  /* loads, prescribed displacements */
+  HYCO_ENTERS_FACTOR = 2, /* one factor of the stiffness */
+  HYCO_ENTERS_PLACE = 4,  /* a rigid motion or a mirror */
+  HYCO_ENTERS_SIZE = 8,   /* a uniform scaling */
+  HYCO_ENTERS_SHAPE = 16  /* anything else that changes the stiffness */
+};
+
+/* The bodies of a mesh, and how each parameter enters each; on every rank. */
+typedef struct {
+  PetscInt n, n_parameters;
+  char (*name)[64];    /* of the scene's bodies in it: "block", "block + plate" */
+  PetscInt *of;        /* by node of the process's part: its body */
+  PetscInt *enters;    /* n x n_parameters */
+  PetscBool *together; /* by body: similar to itself where all other parameters change at once */
+} HycoBodyParts;
+
+/* Finds them by evaluation at points of the ranges, with changes from the point mu; leaves fom's element loop without
+   parameters. Collective. */
+PetscErrorCode HycoBodyPartsFind(HycoFOM fom, const PetscReal mu[], HycoBodyParts *parts);
+PetscErrorCode HycoBodyPartsDestroy(HycoBodyParts *parts);
+/* "place: moves body cylinder rigidly; modulus: scales body block; nothing needs a sample" */
+PetscErrorCode HycoBodyPartsDescribe(HycoScene scene, const HycoBodyParts *parts, char text[HYCO_LINE]);
+/* The number of parameters that change the shape of some body (of body b; b < 0: of any), and which. */
+PetscInt HycoBodyPartsShapes(const HycoBodyParts *parts, PetscInt b, PetscInt parameter[]);
+/* The first body that is not similar to itself at the same values of these; -1: none. */
+PetscInt HycoBodyPartsFail(const HycoBodyParts *parts);
+
+/* Where a body is, relative to its nodes at another point: x = s Q X + t. */
+typedef struct {
+  PetscReal Q[9], s;  /* Q row major, orthogonal */
+  PetscReal residual; /* relative distance of the nodes from this map */
+} HycoPose;
+/* The nodes' sums over each body of fom's part, with those of X0 (3 a node): pose[n]. Collective. */
+PetscErrorCode HycoBodyPoses(HycoFOM fom, const HycoBodyParts *parts, const PetscReal X0[], HycoPose pose[]);
+/* The pose from n points x of their reference X. */
+void HycoPoseFit(PetscInt dim, PetscInt n, const PetscReal X[], const PetscReal x[], HycoPose *pose);
+/* The exponent p with which the stiffness of a body scales: s^p. */
+PetscInt HycoPosePower(HycoFE fe);
+/* out = Q v, or Q^T v, for dim components. */
+static inline void HycoPoseTurn(const PetscReal Q[9], PetscInt dim, PetscBool back, const PetscReal v[],
+                                PetscReal out[])
+{
+  for (PetscInt c = 0; c < dim; c++) {
+    out[c] = 0;
+    for (PetscInt d = 0; d < dim; d++) out[c] += (back ? Q[3 * d + c] : Q[3 * c + d]) * v[d];
+  }
+}
+
+/* Where contacts are: a mesh with all of their surfaces, and its rows of B and gaps at its parameters. Borrowed. */
+typedef struct {
+  HycoFE fe;
+  HycoPairs *pairs;
+  HycoRows *rows;
+} HycoBodiesSurface;
+
+/* One body: its blocks at each of its samples (tensor), one sample after the other. All row major, except C. */
+typedef struct {
+  HycoTensor tensor;           /* over the parameters theta; one node along those that do not change its shape */
+  PetscInt n_samples, n, l;    /* n: unknowns of its surfaces; l: modes */
+  PetscReal *C, *R, *Z, *work; /* n x n; n x r; n x p; p x r, the work of the loads on the rigid motions */
+  PetscReal *H, *a, *g;        /* by turn: l x n, l x r, l x p */
+  PetscReal *gram;             /* r x r: of the errors of R at held-out samples in the norm of C^-1, summed; 0 */
+  PetscReal *w;                /* online: weights of the samples */
+} HycoSubstructure;
+
+typedef struct _n_HycoSubstructures {
+  PetscInt dim, n; /* bodies */
+  PetscInt n_parameters;
+  PetscReal *first; /* the parameters at which the bodies' axes are those of the scene, with those in theta as
+                              they are */
+  PetscInt n_theta, *theta, *logarithm, *n_nodes; /* the parameters that change the shape of a body; whether their
+                                                     logarithm is interpolated; values of each */
+  PetscReal *node;  /* the values, one parameter after the other, ascending (their logarithms) */
+  PetscReal forces; /* HycoBodiesBound(), the largest at the sampled points of the ranges; forces below a tenth of the
+                       largest relative to that tenth */
+  PetscReal bound;  /* of |C~ - C| relative to C at held-out samples; 0: nothing is interpolated */
+  HycoSubstructure *body;
+  PetscInt ns, *start, *dof; /* unknowns of the surfaces, body after body: start[n + 1]; node of the whole mesh times
+                                dim plus component, n_s */
+  PetscInt p;                /* rigid motions that contact alone prevents */
+  /* loads: c = A (the turned loads at r unknowns of the cells of `probe`) */
+  HycoMesh probe;
+  PetscInt *cell; /* by body: a cell of `probe`, whose nodes and moduli show where and how stiff the body is */
+  PetscInt r, *at, *at_body; /* r: the unknown of `probe`, and its body */
+  PetscReal *A;              /* r x r row major */
+  /* fields: gamma = sum over turns j of the body, Q = sum q_j G_j, of q_j ((a c - H f) / kappa + g x) */
+  PetscInt l, *mode_start;       /* modes by body: n + 1 */
+  PetscInt n_turns, *turn_start; /* by body: n + 1 */
+  PetscReal *G;                  /* n_turns x 9, orthonormal */
+  /* online */
+  HycoFE fe;          /* on probe */
+  PetscReal *X0, *E0; /* by body: nodes of its cell and the largest entry of its tangents in its own axes */
+  PetscInt *E_at;     /* which entry */
+  HycoPose *pose;
+  PetscReal *kappa, *c, *free, *u, *f,
+      *x;                       /* n, r, ns (x 3: without contact, with it, forces; in the bodies' axes), p */
+  PetscReal *Z, *work;          /* ns x p, p x r row major: of all bodies, interpolated */
+  PetscInt n_loc, *loc;         /* by unknown of the surface's mesh: its place, or -1 */
+  PetscInt *row_start, *row_at; /* the rows of B in the bodies' axes */
+  PetscReal *row;
+  PetscReal *w;      /* by contact: gap without the forces */
+  PetscBool *active; /* of the contacts in the problem */
+  HycoTao tao;
+  PetscInt its, n_problem; /* iterations of the last solve; contacts in its problem */
+} * HycoSubstructures;
+
+PetscErrorCode HycoBodiesCreate(HycoSubstructures *bodies);
+/* NULL-safe; HycoBodiesReset() frees the online data. */
+PetscErrorCode HycoBodiesReset(HycoSubstructures bodies);
+PetscErrorCode HycoBodiesDestroy(HycoSubstructures *bodies);
+/* Points the bodies' tensors to the values of theta; the parameters at which the axes are those of the scene. */
+void HycoBodiesSetTensors(HycoSubstructures bodies);
+void HycoBodiesReference(HycoSubstructures bodies, const PetscReal mu[], PetscReal reference[]);
+/* The weights of the bodies' samples at mu. */
+PetscErrorCode HycoBodiesWeights(HycoSubstructures bodies, const PetscReal mu[]);
+/* A copy for solves beside others: its blocks stay those of `bodies`. HycoBodiesReset() and PetscFree() of its `body`
+   free it. */
+PetscErrorCode HycoBodiesBorrow(HycoSubstructures bodies, HycoSubstructures copy);
+/* Prepares solves with contacts on this mesh, whose nodes have their numbers in the whole mesh. */
+PetscErrorCode HycoBodiesSetUp(HycoSubstructures bodies, HycoScene scene, const HycoBodiesSurface *surface);
+/* The forces of all contacts at mu, where the surface's rows are; u, f, x, c and poses are set. *solved: the
+   complementarity problem is. */
+PetscErrorCode HycoBodiesSolve(HycoSubstructures bodies, const HycoBodiesSurface *surface, const PetscReal mu[],
+                               PetscReal Lambda[], PetscBool *solved);
+/* Sets the surfaces' displacements in U (by unknown of the surface's mesh) without prescribed ones. */
+void HycoBodiesMove(HycoSubstructures bodies, const HycoBodiesSurface *surface, PetscReal U[]);
+/* After a solve: a bound of |L~ - L|_W relative to *norm = |L~|_W, from the errors of flexibilities and loads at held-out
+   samples of the bodies; 0 without forces. */
+PetscReal HycoBodiesBound(HycoSubstructures bodies, PetscReal *norm);
+/* The coefficients of the modes. */
+void HycoBodiesCoefficients(HycoSubstructures bodies, PetscReal gamma[]);
+/* Reads from or writes to the model's file. */
+PetscErrorCode HycoBodiesFile(HycoROM model, HycoH5 file);
+
+/* K condensed at a point of theta: the blocks of all bodies, in their order. Rank 0. */
+typedef struct {
+  PetscReal *theta;            /* n_theta, on every rank */
+  PetscReal *C, *R, *Z, *work; /* n x n by body; ns x r; ns x p; p x r */
+} HycoBodiesRecord;
+
+/* Training: options and the data of a run. */
+typedef struct {
+  PetscReal pod_tol, tol;
+  PetscInt samples, most_samples;
+  HycoBodyParts parts;
+  HycoSubstructures bodies; /* complete on rank 0 */
+} * HycoBodiesTraining;
+
+static inline HycoBodiesTraining HycoTrainingOfBodies(HycoReducer t)
+{
+  return (HycoBodiesTraining)t->training;
+}
+
+/* The factor of K at a point of theta with the unknowns of the surfaces last. Every rank. */
+typedef struct {
+  HycoFOM fom;
+  Mat N; /* selects them */
+  HycoDirect direct;
+  PetscReal *theta;    /* of the factor */
+  PetscInt *pins;      /* of the first factor */
+  PetscReal *zero, *z; /* ns, p + ns */
+  PetscInt n_basis;
+  Vec *basis; /* of the turned loads, orthonormal */
+  PetscInt n_records;
+  HycoBodiesRecord *record;
+} HycoBodiesFactor;
+
+PetscErrorCode HycoBodiesBegin(HycoReducer reducer);
+PetscErrorCode HycoBodiesModes(HycoReducer reducer, HycoSnapshots store);
+/* Factors K at theta, unless it is the present factor. Collective. */
+PetscErrorCode HycoBodiesRefactor(HycoReducer reducer, HycoBodiesFactor *factor, const PetscReal theta[]);
+/* The number of the record at theta, condensed if there is none. Collective. */
+PetscErrorCode HycoBodiesCondense(HycoReducer reducer, HycoBodiesFactor *factor, const PetscReal theta[],
+                                  PetscInt *record);
+/* The basis of the loads and the cells by which they are evaluated. Collective. */
+PetscErrorCode HycoBodiesLoads(HycoReducer reducer, HycoBodiesFactor *factor);
+/* The values of theta and the bodies' samples there. Collective. */
+PetscErrorCode HycoBodiesSample(HycoReducer reducer, HycoBodiesFactor *factor);
+/* The modes, as t->V, and H, a, g. Collective. */
+PetscErrorCode HycoBodiesFields(HycoReducer reducer, HycoSnapshots store, HycoBodiesFactor *factor);
+/* For loads F: the displacements of the surfaces without contact (ns), and the work on the motions (p). Collective. */
+PetscErrorCode HycoBodiesReduce(HycoSubstructures bodies, HycoBodiesFactor *factor, Vec F, PetscReal u[],
+                                PetscReal work[]);
+/* theta of node k of the grid of all values, exactly as it was condensed. */
+void HycoBodiesPoint(HycoReducer reducer, PetscInt k, PetscReal theta[]);
+/* theta of node k of the grid of all values; the number of nodes; which sample of a body that is, -1: none. */
+PetscInt HycoBodiesGrid(HycoSubstructures bodies, PetscInt k, PetscReal theta[]);
+PetscInt HycoBodiesSampleOf(HycoSubstructures bodies, PetscInt body, PetscInt k);
+
+#endif

@@ -1,0 +1,199 @@
+/* hyco compare: the columns of its table, and its report. */
+#include "driver.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static PetscErrorCode Add(DriverColumns *c, PetscInt n, const char before[], const char *const names[])
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < n; k++, c->n++) {
+    PetscCall(PetscSNPrintf(c->text[c->n], sizeof(c->text[c->n]), "%s%s", before, names[k]));
+    c->names[c->n] = c->text[c->n];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverCompareColumns(PetscBool paths, PetscInt n_outputs, const char *const outputs[], DriverColumns *c)
+{
+  static const char *const errors[] = {
+      "u", "u_h1", "u_rid", "sigma", "sigma_11", "lambda_rid", "lambda_rid_dual", "lambda", "lambda_dual"};
+  static const char *const point[] = {"converged",          "fallback",        "kkt_max",      "covered_force",
+                                      "seconds_full_order", "seconds_reduced", "lambda_norm2", "sigma_norm2"};
+  static const char *const path[] = {"converged",  "times_reached",      "kkt_max",
+                                     "iterations", "seconds_full_order", "seconds_reduced"};
+  static const char *const judged[] = {"estimated_error_u", "estimated_error_sigma", "estimated_error_lambda",
+                                       "unseen"};
+
+  PetscFunctionBegin;
+  c->paths = paths;
+  c->n = 0;
+  PetscCall(paths ? Add(c, HYCO_N_ERRORS, "worst_", HycoErrorKinds) : Add(c, DRIVER_LAMBDA_DUAL + 1, "error_", errors));
+  if (paths) PetscCall(Add(c, HYCO_N_ERRORS, "end_", HycoErrorKinds));
+  c->n_errors = c->n;
+  PetscCall(paths ? Add(c, DRIVER_SECONDS_ROM + 1, "", path) : Add(c, DRIVER_SIGMA_NORM + 1, "", point));
+  c->estimates = c->n;
+  PetscCall(Add(c, DRIVER_ESTIMATES + 1, "", judged));
+  c->outputs = c->n;
+  PetscCall(Add(c, n_outputs, paths ? "worst_output_" : "error_output_", outputs));
+  if (paths) PetscCall(Add(c, n_outputs, "end_output_", outputs));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static int CompareReal(const void *a, const void *b)
+{
+  const PetscReal x = *(const PetscReal *)a, y = *(const PetscReal *)b;
+
+  return (x > y) - (x < y);
+}
+
+/* A relative error of a quantity with this norm, for the estimates: norms below a tenth of the set's largest count as
+   this tenth. */
+static PetscReal Guarded(PetscReal error, PetscReal size, PetscReal largest)
+{
+  return size > 0 ? error * size / PetscMax(size, 0.1 * largest) : error;
+}
+
+/* The errors to which an estimate is compared: of a path at its worst time; of a point guarded, as in the estimates. */
+static void TrueErrors(const DriverColumns *c, PetscInt kind, PetscInt n, const PetscReal value[], PetscReal error[])
+{
+  static const PetscInt of_path[] = {HYCO_ERROR_U, HYCO_ERROR_SIGMA, HYCO_ERROR_LAMBDA};
+  static const PetscInt of_point[] = {DRIVER_U, DRIVER_SIGMA, DRIVER_LAMBDA},
+                        norm[] = {0, DRIVER_SIGMA_NORM, DRIVER_LAMBDA_NORM};
+  const PetscBool guarded = (PetscBool)(!c->paths && kind > 0);
+  const PetscReal *size = value + c->n_errors + norm[kind];
+  PetscReal largest = 0;
+
+  for (PetscInt k = 0; guarded && k < n; k++) largest = PetscMax(largest, size[k * c->n]);
+  for (PetscInt k = 0; k < n; k++) {
+    error[k] = value[k * c->n + (c->paths ? of_path : of_point)[kind]];
+    if (guarded) error[k] = Guarded(error[k], size[k * c->n], largest);
+  }
+}
+
+/* The share of the points at which each estimate is at least the error, and the ratios of the two. */
+static PetscErrorCode JudgeEstimates(cJSON *json, const DriverColumns *c, PetscInt n, const PetscReal value[])
+{
+  static const char *const words[] = {"u", "stress", "contact forces"};
+  static const char *const keys[] = {"u", "sigma", "lambda"};
+  cJSON *all = cJSON_AddObjectToObject(json, "estimates");
+  PetscReal *ratio, *error;
+  PetscInt unseen = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(n, &ratio, n, &error));
+  for (PetscInt e = 0; e < DRIVER_ESTIMATES; e++) {
+    PetscInt m = 0, bounded = 0;
+    PetscReal worst = 0;
+
+    TrueErrors(c, e, n, value, error);
+    for (PetscInt k = 0; k < n; k++) {
+      const PetscReal estimate = value[k * c->n + c->estimates + e];
+
+      if (isnan(estimate) || !isfinite(error[k])) continue;
+      bounded += error[k] <= estimate;
+      worst = PetscMax(worst, error[k] / PetscMax(estimate, PETSC_MIN_REAL));
+      ratio[m++] = estimate / PetscMax(error[k], PETSC_MIN_REAL);
+    }
+    if (!m) continue;
+    qsort(ratio, (size_t)m, sizeof(*ratio), CompareReal);
+    ReportNumbers(cJSON_AddObjectToObject(all, keys[e]), {"bounded", (PetscReal)bounded / m},
+                  {"median_ratio", ratio[m / 2]}, {"worst_error_over_estimate", worst});
+    PetscCall(Say("estimates of %s: at least the error at %.1f %% of the points; estimate / error %.3g in the median, "
+                  "error / estimate at most %.3g\n",
+                  words[e], 100. * bounded / m, (double)ratio[m / 2], (double)worst));
+  }
+  for (PetscInt k = 0; k < n; k++) unseen += value[k * c->n + c->estimates + DRIVER_ESTIMATES] > HYCO_UNSEEN;
+  cJSON_AddNumberToObject(all, "unseen", unseen);
+  if (unseen) PetscCall(Say("unseen regime at %d of %d points\n", (int)unseen, (int)n));
+  PetscCall(PetscFree2(ratio, error));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Statistics of the rows. */
+typedef struct {
+  PetscReal seconds[2], speedup, median, kkt,
+      covered[2]; /* means of full order and reduced, of their ratio; its median; mean and least */
+  PetscInt undefined, failed, fallback;
+} Totals;
+
+static PetscErrorCode Sum(const DriverColumns *c, PetscInt n, const PetscReal value[], Totals *t)
+{
+  PetscReal *ratio;
+
+  PetscFunctionBegin;
+  *t = (Totals){.covered = {0, 1}};
+  PetscCall(PetscMalloc1(n, &ratio));
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscReal *v = value + k * c->n + c->n_errors;
+
+    ratio[k] = v[DRIVER_SECONDS_FOM] / PetscMax(v[DRIVER_SECONDS_ROM], 1e-9);
+    t->speedup += ratio[k] / n;
+    t->seconds[0] += v[DRIVER_SECONDS_FOM] / n;
+    t->seconds[1] += v[DRIVER_SECONDS_ROM] / n;
+    t->kkt = PetscMax(t->kkt, v[DRIVER_KKT]);
+    t->failed += v[DRIVER_CONVERGED] < 0.5;
+    if (c->paths) continue;
+    t->fallback += v[DRIVER_FALLBACK] > 0.5;
+    t->covered[0] += v[DRIVER_COVERED] / n;
+    t->covered[1] = PetscMin(t->covered[1], v[DRIVER_COVERED]);
+  }
+  qsort(ratio, (size_t)n, sizeof(*ratio), CompareReal);
+  t->median = ratio[n / 2];
+  PetscCall(PetscFree(ratio));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ReportPoints(cJSON *json, PetscBool contact, const Totals *t)
+{
+  PetscFunctionBegin;
+  ReportNumbers(cJSON_AddObjectToObject(json, "speedup"), {"mean", t->speedup}, {"median", t->median});
+  PetscCall(Say("speed-up: mean %.3g, median %.3g\n", (double)t->speedup, (double)t->median));
+  if (contact) {
+    ReportNumbers(cJSON_AddObjectToObject(json, "covered_force"), {"mean", t->covered[0]}, {"min", t->covered[1]});
+    PetscCall(Say("contact force in the RID: mean %.1f %%, least %.1f %%\n", 100 * (double)t->covered[0],
+                  100 * (double)t->covered[1]));
+  }
+  ReportNumbers(json, {"undefined", t->undefined}, {"not_converged", t->failed}, {"fallback", t->fallback},
+                {"kkt_max", t->kkt});
+  PetscCall(Say("%d not converged, %d by the fallback solver, %d errors undefined (x/0); largest KKT residual %.1e\n",
+                (int)t->failed, (int)t->fallback, (int)t->undefined, (double)t->kkt));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ReportPaths(cJSON *json, const Totals *t)
+{
+  PetscFunctionBegin;
+  ReportNumbers(json, {"seconds_full_order", t->seconds[0]}, {"seconds_reduced", t->seconds[1]},
+                {"undefined", t->undefined}, {"not_converged", t->failed}, {"kkt_max", t->kkt});
+  PetscCall(Say(
+      "mean seconds of a path: full order %.3g, reduced %.3g; %d did not reach their end; largest KKT residual %.1e\n",
+      (double)t->seconds[0], (double)t->seconds[1], (int)t->failed, (double)t->kkt));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverReportComparison(HycoScene scene, PetscBool contact, const DriverColumns *c, PetscInt n,
+                                      const PetscReal value[])
+{
+  const PetscInt converged = c->n_errors + DRIVER_CONVERGED;
+  Totals t;
+  cJSON *json;
+
+  PetscFunctionBegin;
+  PetscCall(Sum(c, n, value, &t));
+  PetscCall(ReportCreate("compare", scene, NULL, &json));
+  cJSON_AddNumberToObject(json, "n_points", n);
+  PetscCall(Say("%d %s%s%s\n", (int)n, c->paths ? "path" : "point", n == 1 ? "" : "s",
+                c->paths ? ", each at its worst listed time and at its end" : ""));
+  for (PetscInt k = 0; k < c->n_errors; k++) {
+    if (contact || !strstr(c->names[k], "lambda"))
+      ReportError(json, c->names[k], n, c->n, value, k, converged, &t.undefined);
+  }
+  for (PetscInt k = c->outputs; k < c->n; k++) ReportOutputError(json, c->names[k], n, c->n, value, k, converged);
+  PetscCall(JudgeEstimates(json, c, n, value));
+  PetscCall(c->paths ? ReportPaths(json, &t) : ReportPoints(json, contact, &t));
+  PetscCall(ReportWrite(&json));
+  HycoCheck(!t.failed, "%d of the %d %s; the errors do not include them", (int)t.failed, (int)n,
+            c->paths ? "reduced paths did not reach their end" : "predictions did not converge");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

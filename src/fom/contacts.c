@@ -1,0 +1,461 @@
+/*
+  The contacts of a full-order model on several ranks. Each rank has those of the slave nodes that it owns, on a mesh of
+  the facets around these and around the masters' nodes that they may meet; it searches for their masters, and computes
+  their rows, gaps and results. Ranks exchange these facets once for each set of positions that needs further ones.
+
+  What a rank cannot decide alone (an error, whose text depends on all slaves, and nodes that are matched along normals)
+  is found on rank 0 from the whole surfaces, as on one rank.
+*/
+#include <hycofomimpl.h>
+
+/* The radii of the widest facet by which masters may move before further facets are fetched. */
+#define SLACK 2
+
+/* Adds to the nodes that this rank's contacts need; they stay sorted and different. */
+static PetscErrorCode AddNeeded(HycoFOM f, PetscInt n, const PetscInt node[])
+{
+  PetscFunctionBegin;
+  PetscCall(PetscRealloc((size_t)(f->n_needed + n + 1) * sizeof(PetscInt), &f->needed));
+  PetscCall(PetscArraycpy(f->needed + f->n_needed, node, n));
+  f->n_needed += n;
+  PetscCall(HycoSortUnique(&f->n_needed, f->needed));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds the slave nodes that this rank owns, and the masters of those that are tied. */
+static PetscErrorCode AddSlaves(HycoFOM f)
+{
+  HycoMesh m = f->part;
+  PetscInt n = 0, *node, room = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < f->scene->n_contacts; k++) {
+    PetscInt g = 0;
+
+    PetscCall(HycoMeshFindGroup(m, "contact", f->scene->contact[k]->slave, &g));
+    room += m->group_start[g + 1] - m->group_start[g];
+  }
+  PetscCall(PetscMalloc1(room * (1 + HYCO_FACET_NODES), &node));
+  for (PetscInt k = 0; k < f->scene->n_contacts; k++) {
+    PetscInt g = 0;
+
+    PetscCall(HycoMeshFindGroup(m, "contact", f->scene->contact[k]->slave, &g));
+    for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) {
+      const PetscInt i = m->group_node[j], tied = HycoMeshTied(m, i);
+
+      if (HycoMeshOwned(m, i) < 0) continue;
+      node[n++] = m->node_global[i];
+      for (PetscInt t = tied < 0 ? 0 : m->tied_start[tied]; tied >= 0 && t < m->tied_start[tied + 1]; t++)
+        node[n++] = m->node_global[m->tied_master[t]];
+    }
+  }
+  PetscCall(AddNeeded(f, n, node));
+  PetscCall(PetscFree(node));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Fetches the facets around the needed nodes. */
+static PetscErrorCode FetchSurface(HycoFOM f, HycoMesh *surface)
+{
+  PetscBool *in;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(f->part->n_groups, &in));
+  PetscCall(HycoMarkContactGroups(f->scene, f->part, in));
+  PetscCall(HycoMeshRings(HycoComm(f), f->part, in, f->n_needed, f->needed, surface));
+  PetscCall(PetscFree(in));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One contact as it is sent: nodes by their numbers in the distributed vectors. */
+typedef struct {
+  PetscInt contact, slave, n, master[HYCO_FACET_NODES];
+  PetscReal weight[HYCO_FACET_NODES];
+} Sent;
+
+static PetscErrorCode PackContacts(HycoMesh m, const HycoPairs *p, Sent sent[])
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < p->n; k++) {
+    Sent *s = &sent[k];
+    const PetscInt lo = p->master_start[k];
+
+    PetscCall(PetscMemzero(s, sizeof(*s)));
+    s->contact = p->contact[k];
+    s->slave = m->node_global[p->slave[k]];
+    s->n = p->master_start[k + 1] - lo;
+    for (PetscInt j = 0; j < s->n; j++) {
+      s->master[j] = m->node_global[p->master[lo + j]];
+      s->weight[j] = p->weight[lo + j];
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A mesh's nodes by their numbers in the distributed vectors. */
+typedef struct {
+  PetscInt n, *global, *node;
+} Places;
+
+static PetscErrorCode PlacesCreate(HycoMesh m, Places *p)
+{
+  PetscFunctionBegin;
+  p->n = m->n_nodes;
+  PetscCall(PetscMalloc2(p->n, &p->global, p->n, &p->node));
+  for (PetscInt i = 0; i < p->n; i++) {
+    p->global[i] = m->node_global[i];
+    p->node[i] = i;
+  }
+  PetscCall(PetscSortIntWithArray(p->n, p->global, p->node));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscInt PlaceOf(const Places *p, PetscInt global)
+{
+  PetscInt at = -1;
+
+  (void)PetscFindInt(global, p->n, p->global, &at);
+  return at < 0 ? -1 : p->node[at];
+}
+
+/* Appends contacts whose nodes are all on the mesh. */
+static PetscErrorCode UnpackContacts(HycoMesh m, PetscInt n, const Sent sent[], HycoPairs *p)
+{
+  Places places;
+
+  PetscFunctionBegin;
+  PetscCall(PlacesCreate(m, &places));
+  PetscCall(HycoPairsReserve(p, n, HYCO_FACET_NODES));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscInt master[HYCO_FACET_NODES];
+
+    for (PetscInt j = 0; j < sent[k].n; j++) master[j] = PlaceOf(&places, sent[k].master[j]);
+    HycoPairsAppend(p, sent[k].contact, PlaceOf(&places, sent[k].slave), sent[k].n, master, sent[k].weight);
+  }
+  PetscCall(PetscFree2(places.global, places.node));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMGatherSurface(HycoFOM f, HycoMesh *mesh)
+{
+  PetscBool *in;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(f->part->n_groups, &in));
+  PetscCall(HycoMarkContactGroups(f->scene, f->part, in));
+  PetscCall(HycoMeshGather(f->scene, f->part, f->part->dim > 1 ? in : NULL, NULL, mesh));
+  PetscCall(PetscFree(in));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Sorts contacts by their numbers and makes them those of the whole surfaces. Rank 0. */
+static PetscErrorCode PlaceGathered(HycoFOM f, HycoMesh mesh, PetscInt n, const PetscInt number[], const Sent sent[],
+                                    HycoPairs *p)
+{
+  Sent *sorted;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n, &sorted));
+  for (PetscInt k = 0; k < n; k++) sorted[number[k]] = sent[k];
+  PetscCall(UnpackContacts(mesh, n, sorted, p));
+  PetscCall(PetscFree(sorted));
+  PetscCall(HycoPairsSetSearch(f->scene, mesh, p));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMGatherContacts(HycoFOM f, HycoMesh *mesh, HycoPairs *pairs)
+{
+  const HycoPairs *p = &f->pairs;
+  MPI_Datatype type;
+  Sent *mine, *all;
+  PetscInt n, *number;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMemzero(pairs, sizeof(*pairs)));
+  PetscCall(HycoFOMGatherSurface(f, mesh));
+  PetscCall(PetscMalloc1(p->n, &mine));
+  PetscCall(PackContacts(f->surface, p, mine));
+  PetscCallMPI(MPI_Type_contiguous((PetscMPIInt)sizeof(Sent), MPI_BYTE, &type));
+  PetscCallMPI(MPI_Type_commit(&type));
+  PetscCall(HycoConcatenate(HycoComm(f), p->n, mine, type, sizeof(Sent), &n, &all));
+  PetscCall(HycoConcatenate(HycoComm(f), p->n, p->number, MPIU_INT, sizeof(PetscInt), &n, &number));
+  PetscCallMPI(MPI_Type_free(&type));
+  PetscCall(PetscFree(mine));
+  HycoOnRoot(HycoComm(f), PlaceGathered(f, *mesh, n, number, all, pairs));
+  HycoFreeAll(&all, &number);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Sends contacts of rank 0 to the ranks of their slaves. */
+static PetscErrorCode SendContacts(HycoFOM f, HycoMesh mesh, const HycoPairs *whole, PetscInt *n_got, Sent **got)
+{
+  const PetscInt n = whole->n;
+  PetscInt *slave;
+  PetscMPIInt *to;
+  Sent *sent;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc3(n, &sent, n, &slave, n, &to));
+  if (n) PetscCall(PackContacts(mesh, whole, sent));
+  for (PetscInt k = 0; k < n; k++) slave[k] = sent[k].slave;
+  PetscCall(HycoMeshOwners(HycoComm(f), f->part, n, slave, to));
+  PetscCall(HycoSendRows(HycoComm(f), n, to, sizeof(Sent), sent, n_got, got));
+  PetscCall(PetscFree3(sent, slave, to));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Finds the contacts on rank 0, or their error, and sends each to the rank of its slave. */
+static PetscErrorCode FindWhole(HycoFOM f, HycoMesh mesh, HycoPairs *whole, PetscInt *n_got, Sent **got)
+{
+  PetscFunctionBegin;
+  HycoOnRoot(HycoComm(f), HycoPairsFind(f->scene, mesh, NULL, whole));
+  PetscCall(SendContacts(f, mesh, whole, n_got, got));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode FindOnRoot(HycoFOM f, const HycoSurfaceFacts facts[])
+{
+  HycoPairs whole;
+  HycoMesh mesh;
+  Sent *got;
+  PetscInt n_got, n = 0, *master;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMemzero(&whole, sizeof(whole)));
+  PetscCall(HycoPairsDestroy(&f->pairs));
+  PetscCall(HycoFOMGatherSurface(f, &mesh));
+  ierr = FindWhole(f, mesh, &whole, &n_got, &got);
+  PetscCall(HycoPairsDestroy(&whole));
+  PetscCall(HycoMeshDestroy(&mesh));
+  PetscCall(ierr);
+  PetscCall(PetscMalloc1(n_got * HYCO_FACET_NODES, &master));
+  for (PetscInt k = 0; k < n_got; k++) {
+    PetscCall(PetscArraycpy(master + n, got[k].master, got[k].n));
+    n += got[k].n;
+  }
+  PetscCall(AddNeeded(f, n, master));
+  PetscCall(PetscFree(master));
+  PetscCall(HycoMeshDestroy(&f->surface));
+  PetscCall(FetchSurface(f, &f->surface));
+  PetscCall(UnpackContacts(f->surface, n_got, got, &f->pairs));
+  f->pairs.facts = facts;
+  PetscCall(HycoPairsSetSearch(f->scene, f->surface, &f->pairs));
+  f->pairs.facts = NULL;
+  f->pairs.queries = n_got;
+  PetscCall(PetscFree(got));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The numbers of the contacts in the order of the scene's contacts, then of the slaves' tags. */
+static PetscErrorCode NumberContacts(HycoFOM f)
+{
+  HycoPairs *p = &f->pairs;
+  PetscInt64 *key;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(p->n, &key));
+  PetscCall(PetscFree(p->number));
+  PetscCall(PetscMalloc1(p->n + 1, &p->number));
+  for (PetscInt k = 0; k < p->n; k++)
+    key[k] = (PetscInt64)p->contact[k] * f->part->n_whole_nodes + f->surface->node_whole[p->slave[k]];
+  PetscCall(HycoRankKeys(HycoComm(f), p->n, key, p->number, &f->n_contacts));
+  PetscCall(PetscFree(key));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Searches on this rank, and notes whether it has found its contacts. */
+static PetscErrorCode Try(HycoFOM f, const HycoSurfaceFacts facts[], PetscBool *found)
+{
+  char message[HYCO_LINE];
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoCatchBegin());
+  ierr = HycoPairsFind(f->scene, f->surface, facts, &f->pairs);
+  PetscCall(HycoCatchEnd(ierr, message));
+  *found = (PetscBool)!ierr;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Finds the contacts with the facets that the drawn positions need. */
+static PetscErrorCode Search(HycoFOM f, HycoSurfaceFacts facts[])
+{
+  PetscInt n, *near;
+  PetscBool found, agreed = PETSC_FALSE, moved = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  PetscCall(HycoContactsFacts(HycoComm(f), f->scene, f->part, facts));
+  for (PetscInt k = 0; k < f->scene->n_contacts; k++) moved = (PetscBool)(moved || facts[k].moved);
+  PetscCall(HycoContactsCandidates(HycoComm(f), f->fe, moved ? SLACK : 0, &n, &near));
+  PetscCall(AddSlaves(f));
+  PetscCall(AddNeeded(f, n, near));
+  PetscCall(PetscFree(near));
+  PetscCall(FetchSurface(f, &f->surface));
+  PetscCall(Try(f, facts, &found));
+  HycoAllreduce(&found, 1, HYCO_MPI_BOOL, MPI_LAND, HycoComm(f));
+  if (found) PetscCall(HycoContactsAgree(HycoComm(f), f->scene, f->part, f->surface, &f->pairs, &agreed));
+  if (!agreed) PetscCall(FindOnRoot(f, facts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The facets of the masters on this rank's surfaces, at most of one contact, and of all ranks. */
+static PetscErrorCode CountPatches(HycoFOM f)
+{
+  PetscFunctionBegin;
+  f->patches[0] = f->patches[1] = 0;
+  for (PetscInt k = 0; k < f->scene->n_contacts; k++) {
+    HycoContact c = f->scene->contact[k];
+    PetscInt g = 0, here = 0, whole = 0;
+
+    if (!c->master || c->rigid) continue;
+    PetscCall(HycoMeshFindGroup(f->part, "contact", c->master, &g));
+    for (PetscInt i = 0; i < f->surface->n_facets; i++) here += f->surface->facet_group[i] == g;
+    for (PetscInt i = 0; i < f->part->n_facets;
+         i++) { /* a facet is counted by the rank that has its cell's first node */
+      const PetscInt *cell = f->part->cells + f->part->facet_cell[i] * f->part->nv;
+
+      whole += f->part->facet_group[i] == g && HycoMeshOwned(f->part, cell[0]) >= 0;
+    }
+    HycoAllreduce(&whole, 1, MPIU_INT, MPI_SUM, HycoComm(f));
+    f->patches[0] = PetscMax(f->patches[0], here);
+    f->patches[1] = PetscMax(f->patches[1], whole);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode FindContacts(HycoFOM f)
+{
+  HycoSurfaceFacts *facts;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFESetDrawn(f->fe));
+  PetscCall(PetscMalloc1(f->scene->n_contacts, &facts));
+  PetscCall(HycoLogEvent(HYCO_EVENT_SEARCH, PETSC_TRUE));
+  ierr = Search(f, facts);
+  PetscCall(HycoLogEvent(HYCO_EVENT_SEARCH, PETSC_FALSE));
+  PetscCall(PetscFree(facts));
+  PetscCall(ierr);
+  PetscCall(NumberContacts(f));
+  PetscCall(CountPatches(f));
+  f->width = HycoPairsWidth(&f->pairs);
+  HycoAllreduce(&f->width, 1, MPIU_INT, MPI_MAX, HycoComm(f));
+  f->searches = (PetscBool)(f->pairs.room > 0);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMFindContacts(HycoFOM f)
+{
+  PetscFunctionBegin;
+  if (f->size == 1) {
+    f->surface = f->part;
+    HycoOnRoot(HycoComm(f), HycoPairsFind(f->scene, f->part, NULL, &f->pairs));
+    f->n_contacts = f->pairs.n;
+    f->width = HycoPairsWidth(&f->pairs);
+    f->searches = (PetscBool)(f->pairs.room > 0);
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(FindContacts(f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether all of the sorted nodes are among the needed ones. */
+static PetscBool HasNeeded(HycoFOM f, PetscInt n, const PetscInt node[])
+{
+  for (PetscInt k = 0, at = 0; k < n; k++) {
+    while (at < f->n_needed && f->needed[at] < node[k]) at++;
+    if (at == f->n_needed || f->needed[at] != node[k]) return PETSC_FALSE;
+  }
+  return PETSC_TRUE;
+}
+
+/* Replaces the surfaces by those with more facets, and what depends on their nodes. */
+static PetscErrorCode Renew(HycoFOM f)
+{
+  HycoMesh before = f->surface;
+  HycoPairs renumbered;
+  Places places;
+  PetscInt *index;
+
+  PetscFunctionBegin;
+  PetscCall(FetchSurface(f, &f->surface));
+  PetscCall(PlacesCreate(f->surface, &places));
+  PetscCall(PetscMalloc1(before->n_nodes, &index));
+  for (PetscInt i = 0; i < before->n_nodes; i++) index[i] = PlaceOf(&places, before->node_global[i]);
+  PetscCall(PetscFree2(places.global, places.node));
+  PetscCall(HycoPairsRenumber(&f->pairs, index, &renumbered));
+  PetscCall(PetscFree(index));
+  PetscCall(HycoPairsDestroy(&f->pairs));
+  f->pairs = renumbered;
+  PetscCall(HycoFEDestroy(&f->fe_surface));
+  PetscCall(HycoMeshDestroy(&before));
+  PetscCall(CountPatches(f));
+  PetscCall(HycoFOMSetUpSurface(f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode FetchMasters(HycoFOM f)
+{
+  PetscInt n, *near;
+  PetscBool has;
+
+  PetscFunctionBegin;
+  f->place = f->fe->place;
+  PetscCall(HycoContactsCandidates(HycoComm(f), f->fe, 0, &n, &near));
+  PetscCall(HycoSortUnique(&n, near));
+  has = HasNeeded(f, n, near);
+  PetscCall(PetscFree(near));
+  HycoAllreduce(&has, 1, HYCO_MPI_BOOL, MPI_LAND, HycoComm(f));
+  if (has) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoContactsCandidates(HycoComm(f), f->fe, SLACK, &n, &near));
+  PetscCall(AddNeeded(f, n, near));
+  PetscCall(PetscFree(near));
+  PetscCall(Renew(f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMFetchMasters(HycoFOM f)
+{
+  PetscFunctionBegin;
+  if (!f->searches || f->gathered || f->place == f->fe->place) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoLogged(HYCO_EVENT_SEARCH, FetchMasters(f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMWiden(HycoFOM f, HycoMesh *mesh, HycoFE *fe, PetscInt **index)
+{
+  HycoMesh m = f->surface;
+  PetscBool *in;
+  Places places;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(f->part->n_groups, &in));
+  PetscCall(HycoMarkContactGroups(f->scene, f->part, in));
+  PetscCall(HycoMeshRings(HycoComm(f), f->part, in, m->n_nodes, m->node_global, mesh));
+  PetscCall(PetscFree(in));
+  PetscCall(HycoFECreate(f->scene, *mesh, fe));
+  PetscCall(HycoFESetParameters(*fe, f->fe->mu));
+  PetscCall(PetscArraycpy((*fe)->mirrored, f->fe->mirrored, f->scene->n_bodies));
+  PetscCall(PlacesCreate(*mesh, &places));
+  PetscCall(PetscMalloc1(m->n_nodes, index));
+  for (PetscInt i = 0; i < m->n_nodes; i++) (*index)[i] = PlaceOf(&places, m->node_global[i]);
+  PetscCall(PetscFree2(places.global, places.node));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Replaces this rank's contacts by those of all ranks, on rank 0. */
+PetscErrorCode HycoFOMKeepOnRoot(HycoFOM f)
+{
+  HycoPairs pairs;
+  HycoMesh mesh;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMGatherContacts(f, &mesh, &pairs));
+  PetscCall(HycoPairsDestroy(&f->pairs));
+  PetscCall(HycoMeshDestroy(&f->surface));
+  f->pairs = pairs;
+  f->surface = mesh;
+  f->gathered = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

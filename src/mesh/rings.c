@@ -1,0 +1,340 @@
+/*
+  The facets around given nodes, wherever these are: the rank that owns a node has all cells around it, and sends the
+  facets around it, with their nodes, to each rank that asks. What arrives becomes a mesh without cells (1D: with those
+  of the facets, whose normals need them), in the order of the tags, so that sums over facets do not depend on the
+  partition.
+*/
+#include <hycomesh.h>
+#include <stdlib.h>
+
+/* Rows of `width` integers for other ranks. */
+typedef struct {
+  PetscInt width, n, room, *row;
+  PetscMPIInt *to;
+} Rows;
+
+/* A new row for a rank. */
+static PetscErrorCode NextRow(Rows *r, PetscMPIInt to, PetscInt **row)
+{
+  PetscFunctionBegin;
+  if (r->n == r->room) {
+    r->room = 2 * r->room + 256;
+    PetscCall(PetscRealloc((size_t)(r->room * r->width) * sizeof(PetscInt), &r->row));
+    PetscCall(PetscRealloc((size_t)r->room * sizeof(PetscMPIInt), &r->to));
+  }
+  r->to[r->n] = to;
+  *row = r->row + r->n++ * r->width;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static int CompareThree(const void *a, const void *b)
+{
+  const PetscInt *x = (const PetscInt *)a, *y = (const PetscInt *)b;
+
+  for (PetscInt k = 0; k < 3; k++) {
+    if (x[k] != y[k]) return x[k] < y[k] ? -1 : 1;
+  }
+  return 0;
+}
+
+/* Replaces the rows by those that this rank receives, sorted by their first three entries, each once. */
+static PetscErrorCode Exchange(MPI_Comm comm, Rows *r)
+{
+  PetscInt *got, n = 0, n_got;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSendRows(comm, r->n, r->to, (size_t)r->width * sizeof(PetscInt), r->row, &n_got, &got));
+  if (n_got) qsort(got, (size_t)n_got, (size_t)r->width * sizeof(PetscInt), CompareThree);
+  for (PetscInt k = 0; k < n_got; k++) {
+    if (n && !CompareThree(got + k * r->width, got + (n - 1) * r->width)) continue;
+    PetscCall(PetscArraymove(got + n++ * r->width, got + k * r->width, r->width));
+  }
+  HycoFreeAll(&r->row, &r->to);
+  r->row = got;
+  r->n = r->room = n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Items by node of the part in CSR. */
+typedef struct {
+  PetscInt *start, *item;
+} List;
+
+/* Counts (item NULL) or lists an item at a node. */
+static void Note(List *list, PetscInt node, PetscInt item)
+{
+  if (!list->item)
+    list->start[node + 1]++;
+  else
+    list->item[list->start[node]++] = item;
+}
+
+typedef struct {
+  HycoMesh part;
+  const PetscBool *in;  /* by group */
+  List facets, groups;  /* by node: facets of these groups around it; all groups that it is in */
+  PetscMPIInt *took[2]; /* by node, by facet: the last rank, plus 1, for which it is packed */
+  PetscInt *at;         /* by place of an owned node: its index */
+  Rows node, member, facet, cell;
+} Packing;
+
+/* The facets around each node: also around the masters of its tied nodes, to which these pass their part. */
+static void NoteFacets(Packing *p)
+{
+  HycoMesh m = p->part;
+
+  for (PetscInt k = 0; k < m->n_facets * m->nf; k++) {
+    const PetscInt i = m->facets[k], tied = HycoMeshTied(m, i);
+
+    if (!p->in[m->facet_group[k / m->nf]]) continue;
+    Note(&p->facets, i, k / m->nf);
+    for (PetscInt j = tied < 0 ? 0 : m->tied_start[tied]; tied >= 0 && j < m->tied_start[tied + 1]; j++)
+      Note(&p->facets, m->tied_master[j], k / m->nf);
+  }
+}
+
+static void NoteGroups(Packing *p)
+{
+  HycoMesh m = p->part;
+
+  for (PetscInt g = 0; g < m->n_groups; g++) {
+    for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) Note(&p->groups, m->group_node[j], g);
+  }
+}
+
+/* Makes a list by counting first. */
+static PetscErrorCode MakeList(Packing *p, List *list, void (*note)(Packing *))
+{
+  const PetscInt n = p->part->n_nodes;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(n + 1, &list->start));
+  note(p);
+  for (PetscInt i = 0; i < n; i++) list->start[i + 1] += list->start[i];
+  PetscCall(PetscMalloc1(list->start[n] + 1, &list->item));
+  note(p); /* start[i] advances to the end of i's items */
+  for (PetscInt i = n; i > 0; i--) list->start[i] = list->start[i - 1];
+  list->start[0] = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Packs a node, once for each rank, with its groups and, if it is tied, its masters. */
+static PetscErrorCode PackNode(Packing *p, PetscMPIInt to, PetscInt i)
+{
+  HycoMesh m = p->part;
+  const PetscInt tied = HycoMeshTied(m, i);
+  PetscInt *row;
+
+  PetscFunctionBegin;
+  if (p->took[0][i] == to + 1) PetscFunctionReturn(PETSC_SUCCESS);
+  p->took[0][i] = to + 1;
+  PetscCall(NextRow(&p->node, to, &row));
+  row[0] = m->node_id[i];
+  row[1] = row[2] = 0;
+  row[3] = m->node_body[i];
+  row[4] = m->node_global[i];
+  row[5] = m->node_whole[i];
+  PetscCall(PetscMemcpy(row + 6, m->xyz + 3 * i, 3 * sizeof(PetscReal)));
+  for (PetscInt k = p->groups.start[i]; k < p->groups.start[i + 1]; k++) {
+    PetscCall(NextRow(&p->member, to, &row));
+    row[0] = p->groups.item[k];
+    row[1] = m->node_id[i];
+    row[2] = 0;
+  }
+  for (PetscInt j = tied < 0 ? 0 : m->tied_start[tied]; tied >= 0 && j < m->tied_start[tied + 1]; j++)
+    PetscCall(PackNode(p, to, m->tied_master[j]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The rows of a facet, with its nodes, and in 1D of its cell. */
+static PetscErrorCode PackFacet(Packing *p, PetscMPIInt to, PetscInt f)
+{
+  HycoMesh m = p->part;
+  const PetscInt e = m->facet_cell[f];
+  PetscInt *row;
+
+  PetscFunctionBegin;
+  if (p->took[1][f] == to + 1) PetscFunctionReturn(PETSC_SUCCESS);
+  p->took[1][f] = to + 1;
+  PetscCall(NextRow(&p->facet, to, &row));
+  row[0] = m->facet_group[f];
+  row[1] = m->cell_id[e];
+  row[2] = HycoMeshFacetNumber(m, f);
+  for (PetscInt v = 0; v < m->nf; v++) row[3 + v] = m->node_id[m->facets[f * m->nf + v]];
+  for (PetscInt v = 0; v < m->nf; v++) PetscCall(PackNode(p, to, m->facets[f * m->nf + v]));
+  if (m->dim > 1) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(NextRow(&p->cell, to, &row));
+  row[0] = m->cell_id[e];
+  row[1] = row[2] = 0;
+  row[3] = m->cell_body[e];
+  row[4] = m->cell_whole[e];
+  for (PetscInt v = 0; v < m->nv; v++) row[5 + v] = m->node_id[m->cells[e * m->nv + v]];
+  for (PetscInt v = 0; v < m->nv; v++) PetscCall(PackNode(p, to, m->cells[e * m->nv + v]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Packs the answer to the requests (rank, number of a node in the distributed vectors), in the order of the ranks. */
+static PetscErrorCode Pack(Packing *p, PetscInt n, const PetscInt request[])
+{
+  HycoMesh m = p->part;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc3(m->n_nodes, &p->took[0], m->n_facets, &p->took[1], m->n_owned, &p->at));
+  PetscCall(MakeList(p, &p->facets, NoteFacets));
+  PetscCall(MakeList(p, &p->groups, NoteGroups));
+  for (PetscInt i = 0; i < m->n_nodes; i++) {
+    if (HycoMeshOwned(m, i) >= 0) p->at[HycoMeshOwned(m, i)] = i;
+  }
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscInt i = p->at[request[2 * k + 1] - m->first];
+
+    PetscCall(PackNode(p, (PetscMPIInt)request[2 * k], i));
+    for (PetscInt j = p->facets.start[i]; j < p->facets.start[i + 1]; j++)
+      PetscCall(PackFacet(p, (PetscMPIInt)request[2 * k], p->facets.item[j]));
+  }
+  HycoFreeAll(&p->facets.start, &p->facets.item, &p->groups.start, &p->groups.item);
+  PetscCall(PetscFree3(p->took[0], p->took[1], p->at));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscInt Find(HycoMesh m, PetscInt tag)
+{
+  PetscInt at = -1;
+
+  (void)PetscFindInt(tag, m->n_nodes, m->node_id, &at);
+  return at;
+}
+
+static PetscErrorCode PlaceNodes(HycoMesh m, const Rows *r)
+{
+  PetscFunctionBegin;
+  m->n_nodes = r->n;
+  PetscCall(PetscMalloc1(r->n, &m->node_id));
+  PetscCall(PetscMalloc1(r->n, &m->node_body));
+  PetscCall(PetscMalloc1(r->n, &m->node_global));
+  PetscCall(PetscMalloc1(r->n, &m->node_whole));
+  PetscCall(PetscMalloc1(3 * r->n, &m->xyz));
+  for (PetscInt i = 0; i < r->n; i++) {
+    const PetscInt *row = r->row + i * r->width;
+
+    m->node_id[i] = row[0];
+    m->node_body[i] = row[3];
+    m->node_global[i] = row[4];
+    m->node_whole[i] = row[5];
+    PetscCall(PetscMemcpy(m->xyz + 3 * i, row + 6, 3 * sizeof(PetscReal)));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode PlaceCells(HycoMesh m, const Rows *r)
+{
+  PetscFunctionBegin;
+  m->n_cells = r->n;
+  PetscCall(PetscMalloc1(r->n, &m->cell_id));
+  PetscCall(PetscMalloc1(r->n, &m->cell_body));
+  PetscCall(PetscMalloc1(r->n, &m->cell_whole));
+  PetscCall(PetscMalloc1(r->n * m->nv, &m->cells));
+  for (PetscInt e = 0; e < r->n; e++) {
+    const PetscInt *row = r->row + e * r->width;
+
+    m->cell_id[e] = row[0];
+    m->cell_body[e] = row[3];
+    m->cell_whole[e] = row[4];
+    for (PetscInt v = 0; v < m->nv; v++) m->cells[e * m->nv + v] = Find(m, row[5 + v]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode PlaceFacets(HycoMesh m, const Rows *r)
+{
+  PetscFunctionBegin;
+  m->n_facets = r->n;
+  PetscCall(PetscMalloc1(r->n, &m->facet_group));
+  PetscCall(PetscMalloc1(r->n, &m->facet_cell));
+  PetscCall(PetscMalloc1(r->n * m->nf, &m->facets));
+  for (PetscInt f = 0; f < r->n; f++) {
+    const PetscInt *row = r->row + f * r->width;
+
+    m->facet_group[f] = row[0];
+    m->facet_cell[f] = -1;
+    if (m->n_cells) PetscCall(PetscFindInt(row[1], m->n_cells, m->cell_id, &m->facet_cell[f]));
+    for (PetscInt v = 0; v < m->nf; v++) m->facets[f * m->nf + v] = Find(m, row[3 + v]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode PlaceGroups(HycoMesh m, HycoMesh part, const Rows *r)
+{
+  PetscFunctionBegin;
+  m->n_groups = part->n_groups;
+  PetscCall(PetscMalloc1(m->n_groups, &m->group_name));
+  for (PetscInt g = 0; g < m->n_groups; g++) PetscCall(PetscStrallocpy(part->group_name[g], &m->group_name[g]));
+  HycoDuplicate(m->n_groups, part->group_dim, &m->group_dim);
+  PetscCall(PetscCalloc1(m->n_groups + 1, &m->group_start));
+  PetscCall(PetscCalloc1(m->n_groups + 1, &m->group_cell_start));
+  PetscCall(PetscMalloc1(r->n, &m->group_node));
+  for (PetscInt k = 0; k < r->n; k++) {
+    m->group_start[r->row[k * r->width] + 1]++;
+    m->group_node[k] = Find(m, r->row[k * r->width + 1]);
+  }
+  for (PetscInt g = 0; g < m->n_groups; g++) m->group_start[g + 1] += m->group_start[g];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The mesh of what has arrived. */
+static PetscErrorCode MakeMesh(const Packing *p, HycoMesh *mesh)
+{
+  HycoMesh part = p->part, m;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(mesh));
+  m = *mesh;
+  m->dim = part->dim;
+  m->nv = part->nv;
+  m->nf = part->nf;
+  m->type = part->type;
+  m->mixed = part->mixed;
+  m->n_owned = part->n_owned;
+  m->first = part->first;
+  m->n_whole_nodes = part->n_whole_nodes;
+  m->n_whole_cells = part->n_whole_cells;
+  m->whole_length = part->whole_length;
+  PetscCall(PlaceNodes(m, &p->node));
+  PetscCall(PlaceCells(m, &p->cell));
+  PetscCall(PlaceFacets(m, &p->facet));
+  PetscCall(PlaceGroups(m, part, &p->member));
+  PetscCall(HycoMeshSetTies(m, part->ties));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMeshRings(MPI_Comm comm, HycoMesh part, const PetscBool in[], PetscInt n, const PetscInt node[],
+                             HycoMesh *mesh)
+{
+  Packing p = {.part = part, .in = in};
+  PetscMPIInt rank, *to;
+  PetscInt *ask, *asked, n_asked;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  PetscCall(PetscMalloc2(n, &to, 2 * n, &ask));
+  PetscCall(HycoMeshOwners(comm, part, n, node, to));
+  for (PetscInt k = 0; k < n; k++) {
+    ask[2 * k] = rank;
+    ask[2 * k + 1] = node[k];
+  }
+  PetscCall(HycoSendRows(comm, n, to, 2 * sizeof(PetscInt), ask, &n_asked, &asked));
+  PetscCall(PetscFree2(to, ask));
+  p.node.width = 6 + (PetscInt)((3 * sizeof(PetscReal) + sizeof(PetscInt) - 1) / sizeof(PetscInt));
+  p.member.width = 3;
+  p.facet.width = 3 + part->nf;
+  p.cell.width = 5 + part->nv;
+  PetscCall(Pack(&p, n_asked, asked));
+  PetscCall(PetscFree(asked));
+  PetscCall(Exchange(comm, &p.node));
+  PetscCall(Exchange(comm, &p.member));
+  PetscCall(Exchange(comm, &p.facet));
+  PetscCall(Exchange(comm, &p.cell));
+  PetscCall(MakeMesh(&p, mesh));
+  HycoFreeAll(&p.node.row, &p.node.to, &p.member.row, &p.member.to, &p.facet.row, &p.facet.to, &p.cell.row, &p.cell.to);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,76 @@
+/* Start and end of the package, and the error handler of a program started by it: one line per error. */
+#include <hycoimpl.h>
+#include <slepcsys.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+static PetscBool began_petsc = PETSC_FALSE, handles = PETSC_FALSE;
+
+/* Prints hyco's own message, or PETSc's with its location. On rank 0 of the object with the error. */
+static void Tell(MPI_Comm comm, int line, const char function[], const char file[], PetscErrorCode code,
+                 const char message[])
+{
+  const PetscBool own = (PetscBool)(code == PETSC_ERR_USER || code == PETSC_ERR_ORDER || code == HYCO_ERR_NO_MODEL ||
+                                    code == PETSC_ERR_ARG_NULL || code == PETSC_ERR_ARG_WRONG);
+  char text[HYCO_LINE];
+  PetscMPIInt rank = 0;
+
+  MPI_Comm_rank(comm, &rank);
+  if (rank) return;
+  snprintf(text, sizeof(text), "%s", message ? message : "");
+  HycoMakePrintable(text);
+  if (own && text[0])
+    fprintf(stderr, "hyco: error: %s\n", text);
+  else
+    fprintf(stderr, "hyco: error: %s (PETSc error %d in %s(), %s:%d; HYCO_TRACE=1 shows the calls)\n",
+            text[0] ? text : "failed", (int)code, function ? function : "?", file ? file : "?", line);
+  fflush(stderr);
+}
+
+/* Replaces PETSc's error handler, which prints a call trace. In main() PETSc aborts by MPI; a process that runs
+   alone exits without the messages that launchers add to an abort. */
+static PetscErrorCode OneLine(MPI_Comm comm, int line, const char *function, const char *file, PetscErrorCode code,
+                              PetscErrorType type, const char *text, void *ctx)
+{
+  PetscMPIInt size = 0;
+
+  (void)ctx;
+  if (type == PETSC_ERROR_INITIAL) Tell(comm, line, function, file, code, text);
+  MPI_Comm_size(PETSC_COMM_WORLD, &size);
+  if (size == 1 && function && strcmp(function, "main") == 0) {
+    fflush(NULL);
+    _exit(1);
+  }
+  return code;
+}
+
+PetscErrorCode HycoInitialize(int *argc, char ***argv)
+{
+  PetscBool petsc, slepc;
+  PetscErrorCode ierr;
+
+  ierr = PetscInitialized(&petsc);
+  if (ierr) return ierr;
+  if (!petsc) {
+    ierr = PetscInitialize(argc, argv, NULL, NULL);
+    if (ierr) return ierr;
+    began_petsc = PETSC_TRUE;
+    handles = (PetscBool)(!HycoWantsTrace() && PetscPushErrorHandler(OneLine, NULL) == 0);
+  }
+  ierr = SlepcInitialized(&slepc);
+  if (!ierr && !slepc) ierr = SlepcInitialize(argc, argv, NULL, NULL);
+  return ierr ? ierr : HycoInitializePackage();
+}
+
+PetscErrorCode HycoFinalize(void)
+{
+  PetscErrorCode ierr = SlepcFinalize();
+
+  if (ierr) return ierr;
+  if (handles) ierr = PetscPopErrorHandler();
+  handles = PETSC_FALSE;
+  if (ierr) return ierr;
+  return began_petsc ? PetscFinalize() : 0;
+}

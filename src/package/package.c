@@ -1,0 +1,96 @@
+/*
+  The package: the one file that knows every class and every type of the library. It registers them at the start, so
+  that no class needs to know its types, nor the readers of options the classes.
+*/
+#include <hycoconeimpl.h>
+#include <hycocontactimpl.h>
+#include <hycomaterialimpl.h>
+#include <hycoromtypes.h>
+#include <hycosolverimpl.h>
+#include <hycosnapshots.h>
+
+static PetscBool initialized = PETSC_FALSE;
+
+/* PETSc assigns class ids anew after PetscFinalize(). */
+static PetscErrorCode Forget(void)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoClassesForget());
+  initialized = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoDeclareClasses(PetscOptions options)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoSolverDeclare(options));
+  PetscCall(HycoFOMDeclare(options));
+  PetscCall(HycoSnapshotsDeclare(options));
+  PetscCall(HycoReducerDeclare(options));
+  PetscCall(HycoROMDeclare(options));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode RegisterLaws(void)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoMaterialRegister(HYCO_MATERIAL_ELASTIC, HycoMaterialCreate_Elastic));
+  PetscCall(HycoMaterialRegister(HYCO_MATERIAL_J2, HycoMaterialCreate_J2));
+  PetscCall(HycoMaterialRegister(HYCO_MATERIAL_NORTON, HycoMaterialCreate_Norton));
+  PetscCall(HycoMaterialRegister(HYCO_MATERIAL_STRAIN_HARDENING, HycoMaterialCreate_StrainHardening));
+  PetscCall(HycoMaterialRegister(HYCO_MATERIAL_LIMBACK_ANDERSSON, HycoMaterialCreate_LimbackAndersson));
+  PetscCall(HycoMaterialRegister(HYCO_MATERIAL_MFRONT, HycoMaterialCreate_MFront));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode RegisterContacts(void)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoContactRegister(HYCO_CONTACT_OBSTACLE, HycoContactCreate_Obstacle));
+  PetscCall(HycoContactRegister(HYCO_CONTACT_PAIR, HycoContactCreate_Pair));
+  PetscCall(HycoContactRegister(HYCO_CONTACT_SURFACE, HycoContactCreate_Surface));
+  PetscCall(HycoContactRegister(HYCO_CONTACT_RIGID, HycoContactCreate_Rigid));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A solver searches the forms in this order. */
+static PetscErrorCode RegisterForms(void)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoSolverRegister("dual", HycoSolverFormCreate_Dual));
+  PetscCall(HycoSolverRegister("primal", HycoSolverFormCreate_Primal));
+  PetscCall(HycoSolverRegister("dual_free", HycoSolverFormCreate_Shell));
+  PetscCall(HycoSolverRegister("projected", HycoSolverFormCreate_Projected));
+  PetscCall(HycoSolverRegister("linear", HycoSolverFormCreate_Linear));
+  PetscCall(HycoSolverRegister("condensed", HycoSolverFormCreate_Flexibility));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode RegisterModels(void)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoROMRegister(HYCO_ROM_HYBRID, HycoROMCreate_Hybrid));
+  PetscCall(HycoROMRegister(HYCO_ROM_PROJECTION, HycoROMCreate_Projection));
+  PetscCall(HycoROMRegister(HYCO_ROM_CONDENSED, HycoROMCreate_Condensed));
+  PetscCall(HycoROMRegister(HYCO_ROM_CUBATURE, HycoROMCreate_Cubature));
+  PetscCall(HycoROMRegister(HYCO_ROM_REGRESSION, HycoROMCreate_Regression));
+  PetscCall(HycoROMRegister(HYCO_ROM_BODIES, HycoROMCreate_Bodies));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoInitializePackage(void)
+{
+  PetscFunctionBegin;
+  if (initialized) PetscFunctionReturn(PETSC_SUCCESS);
+  initialized = PETSC_TRUE;
+  PetscCall(HycoClassesRegister());
+  PetscCall(PetscRegisterFinalize(Forget));
+  PetscCall(HycoTaoRegisterAll());
+  PetscCall(HycoConeRegister(HYCO_CONE_NONNEGATIVE, HycoConeCreate_Nonnegative));
+  PetscCall(RegisterLaws());
+  PetscCall(RegisterContacts());
+  PetscCall(RegisterForms());
+  PetscCall(RegisterModels());
+  HycoOptionsSetDeclare(HycoDeclareClasses);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,234 @@
+/*
+  Equilibrium of the bodies that contact alone holds. Their rigid motions z are in the null space of K, so that at full
+  order the contact forces do the work of the loads on each, z^T B^T Lambda = z^T F. A reduced model tests equilibrium
+  in its RID or with its modes, and reconstructs forces (41), which misses this by its error. The forces nearest to its
+  own in the sense of the relative entropy sum Lambda' log(Lambda' / Lambda) - Lambda' + Lambda with the works of the
+  loads are Lambda'_k = Lambda_k exp(sum_j c_j (B z_j)_k): they stay positive, and those that are zero stay zero. c
+  minimises the convex dual function sum_k Lambda'_k - sum_j c_j z_j^T F, by Newton's method with a line search.
+*/
+#include <hycoalgorithms.h>
+#include <hycoquantities.h>
+#include <hycoromimpl.h>
+
+struct _n_HycoFloating {
+  PetscInt n; /* rigid motions */
+  HycoRigid *rigid;
+  PetscInt n_bodies, *of; /* n x n_bodies: whether a motion moves a body */
+  HycoMesh mesh;          /* the cells with the loads of these bodies; NULL: there are none */
+};
+
+PetscErrorCode HycoFloatingDestroy(HycoFloating *floating)
+{
+  HycoFloating f = *floating;
+
+  PetscFunctionBegin;
+  if (!f) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoMeshDestroy(&f->mesh));
+  HycoFreeAll(&f->rigid, &f->of);
+  PetscCall(PetscFree(*floating));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFloatingCreate(PetscInt n, const HycoRigid rigid[], PetscInt n_bodies, const PetscInt of[],
+                                  HycoMesh loaded, HycoFloating *floating)
+{
+  HycoFloating f;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(floating));
+  f = *floating;
+  f->mesh = loaded;
+  f->n = n;
+  f->n_bodies = n_bodies;
+  HycoDuplicate(n, rigid, &f->rigid);
+  HycoDuplicate(n * n_bodies, of, &f->of);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+enum { NUMBERS = 3 + 1 + 6 }; /* of a motion in the file: centre, size, coefficients */
+
+PetscErrorCode HycoFloatingMove(HycoH5 h, HycoROM m)
+{
+  const PetscBool reads = HycoH5Reads(h);
+  HycoFloating f = m->model->floating;
+  PetscReal *number = NULL;
+
+  PetscFunctionBegin;
+  if (reads ? !HycoH5Has(h, "floating/motions") : !f) PetscFunctionReturn(PETSC_SUCCESS);
+  if (reads) PetscCall(PetscNew(&m->model->floating));
+  f = m->model->floating;
+  if (reads) f->n = -1;
+  if (!reads) PetscCall(PetscMalloc1(NUMBERS * f->n, &number));
+  for (PetscInt k = 0; !reads && k < f->n; k++) {
+    PetscCall(PetscArraycpy(number + NUMBERS * k, f->rigid[k].centre, 3));
+    number[NUMBERS * k + 3] = f->rigid[k].size;
+    PetscCall(PetscArraycpy(number + NUMBERS * k + 4, f->rigid[k].rigid, 6));
+  }
+  PetscCall(HycoH5Real(h, "floating/motions", &f->n, NUMBERS, &number));
+  if (reads) PetscCall(PetscCalloc1(f->n, &f->rigid));
+  for (PetscInt k = 0; reads && k < f->n; k++) {
+    PetscCall(PetscArraycpy(f->rigid[k].centre, number + NUMBERS * k, 3));
+    f->rigid[k].size = number[NUMBERS * k + 3];
+    PetscCall(PetscArraycpy(f->rigid[k].rigid, number + NUMBERS * k + 4, 6));
+  }
+  PetscCall(PetscFree(number));
+  f->n_bodies = m->model->scene->n_bodies;
+  PetscCall(HycoH5Int(h, "floating/bodies", 0, 1, &f->n, f->n_bodies, &f->of));
+  if (reads ? !HycoH5Has(h, "floating/mesh/head") : !f->mesh) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoMeshMove(h, "floating/mesh", f->n_bodies, &f->mesh));
+  if (reads) PetscCall(HycoMeshSetTies(f->mesh, m->model->mesh->ties));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Component c of motion j at node i of fe's mesh, in the unknowns there: zero where one is fixed. */
+static PetscReal At(HycoFloating f, HycoFE fe, PetscInt j, PetscInt i, PetscInt c)
+{
+  if (fe->fixed[i * fe->dim + c] || !f->of[j * f->n_bodies + fe->mesh->node_body[i]]) return 0;
+  return HycoRigidAt(&f->rigid[j], fe->dim, fe->X + 3 * i, c);
+}
+
+/* work[n]: of the loads at mu. */
+static PetscErrorCode LoadWork(HycoROM m, HycoFloating f, const PetscReal mu[], PetscReal work[])
+{
+  PetscReal *load;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(work, f->n));
+  if (!f->mesh) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!m->fe_floating) PetscCall(HycoFECreate(m->model->scene, f->mesh, &m->fe_floating));
+  PetscCall(HycoFESetParameters(m->fe_floating, mu));
+  PetscCall(PetscMalloc1(m->fe_floating->n_dof, &load));
+  ierr = HycoFELoads(m->fe_floating, load);
+  if (!ierr) HycoFEGeneralise(m->fe_floating, load);
+  for (PetscInt k = 0; !ierr && k < m->fe_floating->n_dof; k++) {
+    for (PetscInt j = 0; load[k] != 0 && j < f->n; j++)
+      work[j] += load[k] * At(f, m->fe_floating, j, k / m->fe_floating->dim, k % m->fe_floating->dim);
+  }
+  PetscCall(PetscFree(load));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The contacts with a force, and their works per force on the motions. */
+typedef struct {
+  PetscInt n, p, *contact; /* p motions */
+  PetscReal *work;         /* n x p */
+  const PetscReal *force, *load;
+} Dual;
+
+static PetscErrorCode FillDual(HycoROM m, HycoFloating f, HycoFE fe, Dual *d)
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) {
+    PetscReal *work = d->work + d->n * d->p;
+
+    if (!(m->Lambda[k] > 0) || HycoPairsAlone(m->model->scene, &m->model->pairs, k)) continue;
+    PetscCall(PetscArrayzero(work, d->p));
+    for (PetscInt e = m->rows.start[k]; e < m->rows.start[k + 1]; e++) {
+      for (PetscInt j = 0; j < d->p; j++)
+        work[j] += m->rows.value[e] * At(f, fe, j, m->rows.dof[e] / fe->dim, m->rows.dof[e] % fe->dim);
+    }
+    d->contact[d->n++] = k;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The dual function at c, its gradient and its Hessian (p x p) there; the size of the terms of the gradient. */
+static PetscReal Evaluate(const Dual *d, const PetscReal c[], PetscReal gradient[], PetscReal hessian[],
+                          PetscReal *size)
+{
+  const PetscInt p = d->p;
+  PetscReal value = 0;
+
+  *size = 0;
+  for (PetscInt i = 0; i < p; i++) {
+    gradient[i] = -d->load[i];
+    value -= c[i] * d->load[i];
+    *size = PetscMax(*size, PetscAbsReal(d->load[i]));
+    for (PetscInt j = 0; j < p; j++) hessian[i * p + j] = 0;
+  }
+  for (PetscInt k = 0; k < d->n; k++) {
+    const PetscReal *w = d->work + k * p;
+    PetscReal power = 0, force;
+
+    for (PetscInt i = 0; i < p; i++) power += c[i] * w[i];
+    force = d->force[d->contact[k]] * PetscExpReal(power);
+    value += force;
+    for (PetscInt i = 0; i < p; i++) {
+      gradient[i] += force * w[i];
+      *size = PetscMax(*size, PetscAbsReal(force * w[i]));
+      for (PetscInt j = 0; j < p; j++) hessian[i * p + j] += force * w[i] * w[j];
+    }
+  }
+  return value;
+}
+
+#define ITERATIONS 30
+#define BALANCED   1e-12 /* relative to the largest work */
+#define ACTS       1e-10 /* directions of c with less curvature, relative, are those in which no contact acts */
+
+/* Minimises the dual function from c = 0. *met: the works agree. */
+static PetscErrorCode Minimise(const Dual *d, PetscReal c[], PetscBool *met)
+{
+  const PetscInt p = d->p;
+  PetscReal *gradient, *hessian, *inverse, *step, *trial, size, value;
+
+  PetscFunctionBegin;
+  *met = PETSC_FALSE;
+  PetscCall(PetscArrayzero(c, p));
+  PetscCall(PetscMalloc5(p, &gradient, p * p, &hessian, p * p, &inverse, p, &step, p, &trial));
+  value = Evaluate(d, c, gradient, hessian, &size);
+  for (PetscInt its = 0; its < ITERATIONS; its++) {
+    PetscReal most = 0, slope = 0, t = 1, next;
+
+    for (PetscInt i = 0; i < p; i++) most = PetscMax(most, PetscAbsReal(gradient[i]));
+    *met = (PetscBool)(most <= BALANCED * size);
+    if (*met) break;
+    PetscCall(HycoPseudoInverse(p, p, hessian, ACTS, inverse));
+    for (PetscInt i = 0; i < p; i++) {
+      step[i] = 0;
+      for (PetscInt j = 0; j < p; j++) step[i] -= inverse[j * p + i] * gradient[j];
+      slope += gradient[i] * step[i];
+    }
+    do {
+      for (PetscInt i = 0; i < p; i++) trial[i] = c[i] + t * step[i];
+      next = Evaluate(d, trial, gradient, hessian, &size);
+      t /= 2;
+    } while (!(next <= value + 1e-4 * 2 * t * slope + 1e-14 * PetscAbsReal(value)) && t > 1e-6);
+    if (!(t > 1e-6)) break;
+    PetscCall(PetscArraycpy(c, trial, p));
+    value = next;
+  }
+  PetscCall(PetscFree5(gradient, hessian, inverse, step, trial));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFloatingBalance(HycoROM m)
+{
+  HycoFloating f = m->model->floating;
+  Dual d = {0};
+  HycoFE fe;
+  PetscReal *load, *c;
+  PetscBool met = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  if (!f || !HycoROMHasAllForces(m)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoROMBringContacts(m, &fe));
+  PetscCall(PetscMalloc4(f->n, &load, f->n, &c, m->model->pairs.n, &d.contact, (size_t)m->model->pairs.n * (size_t)f->n,
+                         &d.work));
+  d.p = f->n;
+  d.force = m->Lambda;
+  d.load = load;
+  PetscCall(LoadWork(m, f, m->fe->mu, load));
+  PetscCall(FillDual(m, f, fe, &d));
+  if (d.n) PetscCall(Minimise(&d, c, &met));
+  for (PetscInt k = 0; met && k < d.n; k++) {
+    PetscReal power = 0;
+
+    for (PetscInt j = 0; j < d.p; j++) power += c[j] * d.work[k * d.p + j];
+    m->Lambda[d.contact[k]] *= PetscExpReal(power);
+  }
+  PetscCall(PetscFree4(load, c, d.contact, d.work));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

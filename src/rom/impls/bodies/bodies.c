@@ -1,0 +1,301 @@
+/*
+  The model of bodies as substructures (hycobodies.h): linear elastic bodies whose stiffness changes only by rigid
+  motions, uniform scaling and a factor. The contact search is that of full order, on the bodies' surfaces at mu;
+  nothing is interpolated, so that forces and surface displacements are those of full order.
+*/
+#include <hycobodies.h>
+#include <hycoromtypes.h>
+#include <petscviewer.h>
+
+#define ACCEPTED 1e-8 /* largest residual of a prediction */
+#define ACTIVE   0.3  /* assumed share of closed contacts, and entries of a row of B, for costs */
+#define ENTRIES  15
+
+static HycoBodiesSurface SurfaceOf(HycoROM m)
+{
+  return (HycoBodiesSurface){m->fe, &m->model->pairs, &m->rows};
+}
+
+static PetscErrorCode SetUp(HycoROM m)
+{
+  HycoSubstructures b = (HycoSubstructures)m->work;
+  HycoBodiesSurface s;
+
+  PetscFunctionBegin;
+  PetscCall(HycoBodiesBorrow((HycoSubstructures)m->model->data, b)); /* the blocks stay the model's */
+  PetscCall(HycoROMSetUpDefault(m));
+  s = SurfaceOf(m);
+  PetscCall(HycoBodiesSetUp(b, m->model->scene, &s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Reset(HycoROM m)
+{
+  HycoSubstructures b = (HycoSubstructures)m->work;
+
+  PetscFunctionBegin;
+  PetscCall(HycoBodiesReset(b));
+  if (b) PetscCall(PetscFree(b->body));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Destroy(HycoROM m)
+{
+  HycoSubstructures b = (HycoSubstructures)m->model->data;
+
+  PetscFunctionBegin;
+  PetscCall(HycoBodiesDestroy(&b));
+  m->model->data = NULL;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The residual of equilibrium along the rigid motions that contact alone prevents, relative to the terms of each. */
+static PetscReal Unbalanced(HycoSubstructures b)
+{
+  PetscReal most = 0;
+
+  for (PetscInt i = 0; i < b->p; i++) {
+    PetscReal sum = 0, size = 0;
+
+    for (PetscInt j = 0; j < b->r; j++) sum += b->work[i * b->r + j] * b->c[j];
+    size = PetscAbsReal(sum);
+    for (PetscInt k = 0; k < b->ns; k++) {
+      sum -= b->Z[k * b->p + i] * b->f[k];
+      size += PetscAbsReal(b->Z[k * b->p + i] * b->f[k]);
+    }
+    if (size > 0) most = PetscMax(most, PetscAbsReal(sum) / size);
+  }
+  return most;
+}
+
+/* The residuals of HycoKKT, recomputed from U and the forces at the contacts. */
+static void Measure(HycoROM m, HycoKKT *kkt)
+{
+  PetscReal gaps = 0, u = 0, most = 0, in = 0, pulls = 0, both = 0;
+
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) {
+    const PetscReal left = m->rows.gap[k] - HycoROMAddRow(m, k, 0);
+    PetscReal sum = 0;
+
+    if (m->rows.start[k] == m->rows.start[k + 1]) continue;
+    for (PetscInt j = m->rows.start[k]; j < m->rows.start[k + 1]; j++)
+      sum += PetscAbsReal(m->rows.value[j] * m->U[m->rows.dof[j]]);
+    u = PetscMax(u, sum);
+    gaps = PetscMax(gaps, PetscAbsReal(m->rows.gap[k]));
+    most = PetscMax(most, PetscAbsReal(m->Lambda[k]));
+    in = PetscMax(in, -left);
+    pulls = PetscMax(pulls, -m->Lambda[k]);
+    both = PetscMax(both, PetscAbsReal(left * m->Lambda[k]));
+  }
+  gaps = PetscMax(gaps, u);
+  kkt->rounding = 0;
+  kkt->stationarity = Unbalanced((HycoSubstructures)m->work);
+  kkt->penetration = gaps > 0 ? in / gaps : 0;
+  kkt->adhesion = most > 0 ? pulls / most : 0;
+  kkt->complementarity = gaps > 0 && most > 0 ? both / (gaps * most) : 0;
+}
+
+static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
+{
+  HycoSubstructures b = (HycoSubstructures)m->work;
+  HycoPrediction *p = &m->prediction;
+  const HycoBodiesSurface s = SurfaceOf(m);
+  PetscReal begin = HycoNow(), solve, norm;
+  PetscBool solved;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMBringRows(m, mu));
+  solve = HycoNow();
+  p->seconds.factor = 0;
+  p->seconds.assemble = solve - begin;
+  PetscCall(HycoBodiesSolve(b, &s, mu, m->Lambda, &solved));
+  HycoBodiesCoefficients(b, m->gamma);
+  PetscCall(HycoROMExpand(m));
+  HycoBodiesMove(b, &s, m->U);
+  HycoFEComplete(m->fe, m->U);
+  Measure(m, &p->kkt);
+  p->interpolation_error = HycoBodiesBound(b, &norm);
+  p->iterations = b->its;
+  p->reason = solved && HycoKKTMax(&p->kkt) <= ACCEPTED ? HYCO_CONVERGED : HYCO_DIVERGED_RESIDUAL;
+  PetscCall(PetscStrncpy(p->method, HYCO_TAO_ACTIVE_SET, sizeof(p->method)));
+  p->seconds.solve = HycoNow() - solve;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The bound of the forces; nothing indicates errors of displacements, which are as accurate as the modes everywhere. */
+static PetscErrorCode Features(HycoROM m, PetscReal misfit[2])
+{
+  PetscFunctionBegin;
+  misfit[0] = m->prediction.interpolation_error;
+  misfit[1] = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Without held-out solutions the forces have the bound, and displacements no estimate. */
+static PetscErrorCode Estimate(HycoROM m, HycoPrediction *p)
+{
+  PetscFunctionBegin;
+  (void)m;
+  p->estimated_error_lambda = PetscMax(p->interpolation_error, 1e-10); /* round-off of the solutions */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode View(HycoROM m, PetscViewer viewer)
+{
+  HycoSubstructures b = (HycoSubstructures)m->model->data;
+
+  PetscFunctionBegin;
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  %d bodies; unknowns of the surfaces that may touch:", (int)b->n));
+  for (PetscInt k = 0; k < b->n; k++)
+    PetscCall(PetscViewerASCIIPrintf(viewer, "%s %d", k ? "," : "", (int)(b->start[k + 1] - b->start[k])));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "\n  contacts: %d; loads: %d vectors; rigid motions held by contact: %d\n",
+                                   (int)m->model->pairs.n, (int)b->r, (int)b->p));
+  if (b->n_theta)
+    PetscCall(PetscViewerASCIIPrintf(viewer,
+                                     "  contact forces within %.1e (bound at held-out samples of the bodies, %d "
+                                     "samples)\n",
+                                     (double)b->forces, (int)HycoBodiesGrid(b, 0, NULL)));
+  else
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  nothing is interpolated: forces are those of full order\n"));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  fields and stresses on %d of %d elements, or the whole mesh\n",
+                                   (int)m->model->mesh->n_cells, (int)m->model->whole_cells));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- training -- */
+
+static PetscErrorCode SetFromOptions(HycoReducer t)
+{
+  HycoBodiesTraining s;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&s));
+  t->training = s;
+  s->pod_tol = 1e-13;
+  s->samples = 120;
+  s->tol = 1e-5;
+  s->most_samples = 60;
+  PetscObjectOptionsBegin((PetscObject)t);
+  PetscCall(HycoOptionsFor("bodies"));
+  PetscCall(HycoOptionsReal("-hyco_bodies_pod_tol", "bodies: energy left out of the displacement modes of each body", 0,
+                            1, &s->pod_tol, NULL));
+  PetscCall(HycoOptionsInt(
+      "-hyco_bodies_samples",
+      "bodies: contact problems on the surfaces alone whose displacements give the modes; twice as many, up to three "
+      "times, while a body has more modes than half of them",
+      1, 100000, &s->samples, NULL));
+  PetscCall(HycoOptionsReal("-hyco_bodies_tol",
+                            "bodies: samples of bodies whose shape or ratio of moduli changes are added until the "
+                            "relative error of their flexibility at held-out samples is no larger",
+                            0, 1, &s->tol, NULL));
+  PetscCall(HycoOptionsInt("-hyco_bodies_max_samples", "bodies: largest number of these samples", 1, 100000,
+                           &s->most_samples, NULL));
+  PetscOptionsEnd();
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ResetTraining(HycoReducer t)
+{
+  HycoBodiesTraining s = (HycoBodiesTraining)t->training;
+
+  PetscFunctionBegin;
+  PetscCall(HycoBodyPartsDestroy(&s->parts));
+  PetscCall(HycoBodiesDestroy(&s->bodies));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The unknowns of the model's mesh that are displacements of the surfaces. */
+static PetscErrorCode TakeSurface(HycoROM m, HycoSubstructures b)
+{
+  HycoMesh mesh = m->model->mesh;
+  PetscInt *sorted, *dof, n = 0;
+
+  PetscFunctionBegin;
+  HycoDuplicate(b->ns + 1, b->dof, &sorted);
+  PetscCall(PetscSortInt(b->ns, sorted));
+  PetscCall(PetscMalloc1(mesh->n_nodes * mesh->dim + 1, &dof));
+  for (PetscInt i = 0; i < mesh->n_nodes * mesh->dim; i++) {
+    PetscInt at;
+
+    PetscCall(PetscFindInt(mesh->node_whole[i / mesh->dim] * mesh->dim + i % mesh->dim, b->ns, sorted, &at));
+    if (at >= 0) dof[n++] = i;
+  }
+  PetscCall(HycoROMSetFE(m, HYCO_HYBRID_CONTACT, n, dof));
+  PetscCall(PetscFree(dof));
+  PetscCall(PetscFree(sorted));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Build(HycoROM m, HycoReducer t)
+{
+  HycoBodiesTraining s = (HycoBodiesTraining)t->training;
+  HycoSubstructures none = (HycoSubstructures)m->model->data;
+
+  PetscFunctionBegin;
+  PetscCall(HycoBodiesDestroy(&none));
+  m->model->data = s->bodies;
+  s->bodies = NULL;
+  PetscCall(HycoFloatingDestroy(&m->model->floating)); /* their equilibrium is an equation of the model */
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) m->model->in_rid[k] = 1;
+  PetscCall(TakeSurface(m, (HycoSubstructures)m->model->data));
+  PetscCall(HycoReducerJudge(t, m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
+{
+  HycoSubstructures b = (HycoSubstructures)m->model->data;
+
+  PetscFunctionBegin;
+  (void)t;
+  PetscCall(HycoTrainingAddFact(r, "n_bodies", (PetscReal)b->n));
+  PetscCall(HycoTrainingAddFact(r, "n_surface_unknowns", (PetscReal)b->ns));
+  PetscCall(HycoTrainingAddFact(r, "n_body_samples", (PetscReal)HycoBodiesGrid(b, 0, NULL)));
+  PetscCall(HycoTrainingAddFact(r, "force_bound", b->forces));
+  snprintf(
+      r->summary, sizeof(r->summary),
+      "bodies: %d, with %d unknowns on the surfaces that may touch; %d samples, forces within %.1e (bound at held-out "
+      "samples of the bodies); %d vectors of loads; %d displacement modes\n",
+      (int)b->n, (int)b->ns, (int)HycoBodiesGrid(b, 0, NULL), (double)b->forces, (int)b->r, (int)r->n_modes);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscReal Cost(HycoReducer t, const HycoAttempt *a)
+{
+  const PetscReal active = ACTIVE * (PetscReal)t->sizes[2], row = ENTRIES * active;
+
+  return row * row + active * active * active / 3 + 2 * (PetscReal)a->n_modes * (PetscReal)a->rid_nodes * t->sizes[3];
+}
+
+PetscErrorCode HycoROMCreate_Bodies(HycoROM m)
+{
+  static const HycoROMTraits traits = {.title = "substructured",
+                                       .settings = HYCO_SETTINGS_NONE,
+                                       .constrains = PETSC_TRUE,
+                                       .forces = PETSC_TRUE,
+                                       .surfaces = PETSC_TRUE,
+                                       .work = sizeof(*(HycoSubstructures)NULL),
+                                       .resultants = PETSC_TRUE};
+  static const HycoROMOps ops = {.setfromoptions = SetFromOptions,
+                                 .resettraining = ResetTraining,
+                                 .begin = HycoBodiesBegin,
+                                 .modes = HycoBodiesModes,
+                                 .build = Build,
+                                 .report = Report,
+                                 .cost = Cost,
+                                 .setup = SetUp,
+                                 .reset = Reset,
+                                 .solve = Solve,
+                                 .features = Features,
+                                 .estimate = Estimate,
+                                 .view = View,
+                                 .save = HycoBodiesFile,
+                                 .load = HycoBodiesFile,
+                                 .destroy = Destroy};
+  HycoSubstructures b;
+
+  PetscFunctionBegin;
+  PetscCall(HycoBodiesCreate(&b));
+  PetscCall(HycoROMSetOps(m, &ops, &traits, b));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,112 @@
+/* The part of the model of bodies in the model file. */
+#include <hycobodies.h>
+
+/* Sizes, by body. */
+static PetscErrorCode MoveSizes(HycoH5 h, HycoROM m, HycoSubstructures b)
+{
+  PetscInt head[5] = {b->n, b->p, b->r, b->n_turns, b->n_theta};
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5Ints(h, "bodies/head", 0, PETSC_MAX_INT, 5, head));
+  b->n = head[0];
+  b->p = head[1];
+  b->r = head[2];
+  b->n_turns = head[3];
+  b->n_theta = head[4];
+  b->dim = m->model->mesh->dim;
+  b->l = m->model->l;
+  b->n_parameters = m->model->scene->n_parameters;
+  HycoCheck(b->n > 0 && b->n_theta <= HYCO_TENSOR_MAX_DIM, "%s: bodies/head is damaged", m->model->path);
+  PetscCall(HycoH5Starts(h, "bodies/start", b->n, &b->start));
+  PetscCall(HycoH5Starts(h, "bodies/mode_start", b->n, &b->mode_start));
+  PetscCall(HycoH5Starts(h, "bodies/turn_start", b->n, &b->turn_start));
+  b->ns = b->start[b->n];
+  HycoCheck(b->mode_start[b->n] == b->l && b->turn_start[b->n] == b->n_turns, "%s: the sizes of bodies/ are damaged",
+            m->model->path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* theta, its values, and which bodies they change. */
+static PetscErrorCode MoveTheta(HycoH5 h, HycoROM m, HycoSubstructures b)
+{
+  PetscInt nodes = 0, *axes, n;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5Reals(h, "bodies/bound", 1, &b->bound));
+  PetscCall(HycoH5Reals(h, "bodies/forces", 1, &b->forces));
+  if (HycoH5Reads(h)) PetscCall(PetscCalloc1(b->n, &b->body));
+  PetscCall(HycoH5Int(h, "bodies/theta", 0, b->n_parameters - 1, &b->n_theta, 1, &b->theta));
+  PetscCall(HycoH5Int(h, "bodies/logarithm", 0, 1, &b->n_theta, 1, &b->logarithm));
+  PetscCall(HycoH5Int(h, "bodies/n_nodes", 1, PETSC_MAX_INT / 64, &b->n_theta, 1, &b->n_nodes));
+  for (PetscInt p = 0; p < b->n_theta; p++) nodes += b->n_nodes[p];
+  PetscCall(HycoH5Real(h, "bodies/node", &nodes, 1, &b->node));
+  n = b->n * b->n_theta;
+  PetscCall(PetscCalloc1(n + 1, &axes));
+  for (PetscInt i = 0; i < n && !HycoH5Reads(h); i++) axes[i] = b->body[i / b->n_theta].tensor.n[i % b->n_theta] > 1;
+  PetscCall(HycoH5Ints(h, "bodies/axes", 0, 1, n, axes));
+  for (PetscInt i = 0; i < n && HycoH5Reads(h); i++)
+    b->body[i / b->n_theta].tensor.n[i % b->n_theta] = axes[i] ? b->n_nodes[i % b->n_theta] : 1;
+  PetscCall(PetscFree(axes));
+  for (PetscInt k = 1; k < nodes; k++)
+    HycoCheck(b->node[k] == b->node[k], "%s: bodies/node is damaged", m->model->path);
+  HycoBodiesSetTensors(b);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where and how stiff the bodies are, and their loads. */
+static PetscErrorCode MoveProbe(HycoH5 h, HycoROM m, HycoSubstructures b)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoMeshMove(h, "bodies/mesh", m->model->scene->n_bodies, &b->probe));
+  if (HycoH5Reads(h)) PetscCall(HycoMeshSetTies(b->probe, m->model->mesh->ties));
+  PetscCall(HycoH5Int(h, "bodies/cell", 0, b->probe->n_cells - 1, &b->n, 1, &b->cell));
+  PetscCall(HycoH5Real(h, "bodies/first", &b->n_parameters, 1, &b->first));
+  PetscCall(HycoH5Int(h, "bodies/at", 0, b->probe->n_nodes * b->dim - 1, &b->r, 1, &b->at));
+  PetscCall(HycoH5Int(h, "bodies/at_body", 0, b->n - 1, &b->r, 1, &b->at_body));
+  PetscCall(HycoH5Real(h, "bodies/A", &b->r, b->r, &b->A));
+  PetscCall(HycoH5Int(h, "bodies/dof", 0, m->model->whole_nodes * b->dim - 1, &b->ns, 1, &b->dof));
+  PetscCall(HycoH5Real(h, "bodies/G", &b->n_turns, 9, &b->G));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static const char *At(PetscInt k, const char name[], char path[64])
+{
+  (void)snprintf(path, 64, "bodies/body_%d/%s", (int)k, name);
+  return path;
+}
+
+/* The blocks of body k. */
+static PetscErrorCode MoveBody(HycoH5 h, HycoSubstructures b, PetscInt k)
+{
+  HycoSubstructure *s = &b->body[k];
+  PetscInt rows, columns;
+  char path[64];
+
+  PetscFunctionBegin;
+  s->n = b->start[k + 1] - b->start[k];
+  s->l = b->mode_start[k + 1] - b->mode_start[k];
+  rows = s->n_samples * s->n;
+  columns = s->n_samples * b->p;
+  PetscCall(HycoH5Real(h, At(k, "C", path), &rows, s->n, &s->C));
+  PetscCall(HycoH5Real(h, At(k, "R", path), &rows, b->r, &s->R));
+  PetscCall(HycoH5Real(h, At(k, "Z", path), &rows, b->p, &s->Z));
+  PetscCall(HycoH5Real(h, At(k, "work", path), &columns, b->r, &s->work));
+  PetscCall(HycoH5Real(h, At(k, "gram", path), &b->r, b->r, &s->gram));
+  rows = s->n_samples * (b->turn_start[k + 1] - b->turn_start[k]) * s->l;
+  PetscCall(HycoH5Real(h, At(k, "H", path), &rows, s->n, &s->H));
+  PetscCall(HycoH5Real(h, At(k, "a", path), &rows, b->r, &s->a));
+  PetscCall(HycoH5Real(h, At(k, "g", path), &rows, b->p, &s->g));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBodiesFile(HycoROM m, HycoH5 h)
+{
+  HycoSubstructures b = (HycoSubstructures)m->model->data;
+
+  PetscFunctionBegin;
+  PetscCall(MoveSizes(h, m, b));
+  PetscCall(MoveTheta(h, m, b));
+  PetscCall(MoveProbe(h, m, b));
+  for (PetscInt k = 0; k < b->n; k++) PetscCall(MoveBody(h, b, k));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,475 @@
+/*
+  Displacements inside the bodies: modes of their own solutions. The contact problem is solved on the surfaces at points
+  of the ranges, which costs no full-order solution; the displacements of each body under these forces and loads, in all
+  its turns, give its modes by POD; their coefficients are exact for any forces and loads, because H = N K^-1 V comes
+  from a solve for each mode. On the surfaces the model has the displacements themselves.
+*/
+#include <hycoalgorithms.h>
+#include <hycobodies.h>
+
+#define MOST_NUMBERS 6e7  /* entries of the sampled displacements on all ranks */
+#define LEAST        20   /* samples */
+#define FULL         0.5  /* modes for each sample: with more of them the samples do not show all displacements */
+#define DOUBLINGS    3    /* of the samples then */
+#define SPREAD       3    /* nodes of theta at which the displacements of each are computed */
+#define SMALL        1e-7 /* of the largest sample: smaller ones count as much as this */
+
+/* Samples: the loads' coefficients and the surfaces' forces, a column each. */
+typedef struct {
+  PetscInt n;
+  PetscReal *c, *f; /* r x n, ns x n column major */
+} Sampled;
+
+/* -- forces -- */
+
+/* One point: *solved if its contact problem is. Rank 0. */
+static PetscErrorCode SolveOne(HycoSubstructures b, const HycoBodiesSurface *s, const PetscReal mu[],
+                               PetscReal Lambda[], PetscBool *solved)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoFESetParameters(s->fe, mu));
+  PetscCall(HycoContactRows(s->fe, s->pairs, s->rows->start, s->rows->dof, s->rows->value, s->rows->gap));
+  PetscCall(HycoBodiesSolve(b, s, mu, Lambda, solved));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SolvePoints(HycoReducer t, HycoSubstructures b, const HycoBodiesSurface *s, HycoSamples points,
+                                  Sampled *sampled)
+{
+  const PetscInt p = t->scene->n_parameters;
+  PetscReal *Lambda, *bound, *norm, most = 0;
+  const PetscReal *mu;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(points, &n, NULL, &mu));
+  PetscCall(PetscMalloc3(s->pairs->n + 1, &Lambda, n, &bound, n, &norm));
+  for (PetscInt k = 0; k < n; k++) {
+    char message[HYCO_LINE];
+    PetscBool solved = PETSC_FALSE;
+    PetscErrorCode ierr;
+
+    PetscCall(HycoCatchBegin()); /* points that full order would refuse, too */
+    ierr = SolveOne(b, s, mu + k * p, Lambda, &solved);
+    PetscCall(HycoCatchEnd(ierr, message));
+    if (ierr || !solved) continue;
+    PetscCall(PetscArraycpy(sampled->c + sampled->n * b->r, b->c, b->r));
+    PetscCall(PetscArraycpy(sampled->f + sampled->n * b->ns, b->f, b->ns));
+    bound[sampled->n] = HycoBodiesBound(b, &norm[sampled->n]);
+    most = PetscMax(most, norm[sampled->n]);
+    sampled->n++;
+  }
+  b->forces = 0;
+  for (PetscInt k = 0; k < sampled->n && most > 0; k++)
+    b->forces = PetscMax(b->forces, bound[k] * norm[k] / PetscMax(norm[k], HYCO_SMALL_FORCE * most));
+  PetscCall(PetscFree3(Lambda, bound, norm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Rank 0. */
+static PetscErrorCode SampleForces(HycoReducer t, HycoFOM f, HycoSamples points, Sampled *sampled)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  HycoRows rows;
+  const HycoBodiesSurface s = {f->fe_surface, &f->pairs, &rows};
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoRowsCreate(&f->pairs, b->dim, &rows));
+  ierr = HycoBodiesSetUp(b, t->scene, &s);
+  if (!ierr) ierr = SolvePoints(t, b, &s, points, sampled);
+  PetscCall(HycoBodiesReset(b));
+  PetscCall(HycoRowsDestroy(&rows));
+  f->fe_surface->ready = PETSC_FALSE;
+  PetscCall(ierr);
+  HycoCheckModel(sampled->n, "the contact problem of the bodies is solved at none of the points of the ranges");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The samples on every rank, at `wanted` points or as many as there is room for: *all. Collective. */
+static PetscErrorCode Sample(HycoReducer t, HycoFOM f, PetscInt wanted, PetscBool *all, Sampled *sampled)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  const PetscInt nodes = PetscMin(SPREAD, HycoBodiesGrid(b, 0, NULL));
+  const PetscReal most = MOST_NUMBERS / ((PetscReal)t->sizes[0] * t->sizes[3] * nodes);
+  HycoSamples points;
+  PetscInt n = PetscMax(LEAST, PetscMin(wanted, (PetscInt)PetscMin(most, 1e6)));
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  *all = (PetscBool)(n >= wanted && t->scene->n_parameters);
+  PetscCall(HycoSamplesCreate(t->scene, &points));
+  if (t->scene->n_parameters) PetscCall(HycoSamplesAddScattered(points, n));
+  PetscCall(HycoSamplesAddPoint(points, b->first));
+  PetscCall(HycoSamplesGet(points, &n, NULL, NULL));
+  PetscCall(PetscCalloc1((size_t)n * (size_t)b->r + 1, &sampled->c));
+  PetscCall(PetscCalloc1((size_t)n * (size_t)b->ns + 1, &sampled->f));
+  {
+    char message[HYCO_LINE] = "";
+    PetscErrorCode caught = PETSC_SUCCESS;
+
+    PetscCall(HycoCatchBegin());
+    if (f->rank == 0) caught = SampleForces(t, t->fom, points, sampled);
+    PetscCall(HycoCatchEnd(caught, message));
+    ierr = HycoErrorSync(HycoComm(t), caught, message);
+  }
+  PetscCall(HycoSamplesDestroy(&points));
+  PetscCall(ierr);
+  PetscCallMPI(MPI_Bcast(&sampled->n, 1, MPIU_INT, 0, HycoComm(t)));
+  HycoBcast(sampled->c, sampled->n * b->r, MPIU_REAL, HycoComm(t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- displacements -- */
+
+/* The displacements of this rank's part for loads with coefficients c and the z of the dense problem. Collective. */
+static PetscErrorCode Expand(HycoSubstructures b, HycoBodiesFactor *factor, const PetscReal c[], const PetscReal z[],
+                             PetscReal u[])
+{
+  HycoFOM f = factor->fom;
+  PetscReal *free, *work;
+  Vec F, x;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(b->ns + 1, &free, b->p + 1, &work));
+  PetscCall(VecDuplicate(f->F, &F));
+  PetscCall(VecDuplicate(f->F, &x));
+  PetscCall(VecZeroEntries(F));
+  for (PetscInt k = 0; c && k < b->r; k++) PetscCall(VecAXPY(F, c[k], factor->basis[k]));
+  PetscCall(HycoBodiesReduce(b, factor, F, free, work));
+  PetscCall(HycoDirectExpand(factor->direct, z, x));
+  PetscCall(HycoFOMToLocal(f, x, u));
+  for (PetscInt i = 0; i < f->fe->n_dof; i++) u[i] = f->fe->fixed[i] ? 0 : u[i];
+  PetscCall(VecDestroy(&F));
+  PetscCall(VecDestroy(&x));
+  PetscCall(PetscFree2(free, work));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the displacements of sample k are computed at node j of n. */
+static PetscBool Visits(PetscInt k, PetscInt j, PetscInt n)
+{
+  return (PetscBool)(n <= SPREAD || (j + k) % (n / SPREAD) == 0);
+}
+
+static PetscInt CountVisits(PetscInt n_samples, PetscInt n)
+{
+  PetscInt count = 0;
+
+  for (PetscInt i = 0; i < n_samples * n; i++) count += Visits(i / n, i % n, n);
+  return count;
+}
+
+/* U: the displacements (n_dof of this rank's part) of the samples at the nodes of theta, with the rigid motions there.
+   The forces are those of any theta, so that there are all patterns. Collective. */
+static PetscErrorCode ExpandAll(HycoReducer t, HycoBodiesFactor *factor, const Sampled *sampled, PetscReal U[])
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  const size_t n_dof = (size_t)factor->fom->fe->n_dof;
+  const PetscInt nodes = HycoBodiesGrid(b, 0, NULL);
+
+  PetscFunctionBegin;
+  for (PetscInt j = 0; j < nodes; j++) {
+    PetscReal theta[HYCO_MAX_PARAMETERS];
+
+    HycoBodiesPoint(t, j, theta);
+    PetscCall(HycoBodiesRefactor(t, factor, theta));
+    for (PetscInt k = 0; k < sampled->n; k++) {
+      if (!Visits(k, j, nodes)) continue;
+      PetscCall(PetscArrayzero(factor->z, b->p));
+      PetscCall(PetscArraycpy(factor->z + b->p, sampled->f + (size_t)k * (size_t)b->ns, b->ns));
+      PetscCall(Expand(b, factor, sampled->c + k * b->r, factor->z, U));
+      U += n_dof;
+    }
+    PetscCall(PetscArrayzero(factor->z, b->p + b->ns));
+    for (PetscInt k = 0; k < b->p; k++, U += n_dof) {
+      factor->z[k] = 1;
+      PetscCall(Expand(b, factor, NULL, factor->z, U));
+      factor->z[k] = 0;
+    }
+    PetscCall(HycoReducerTell(t, "displacements of the bodies", j + 1, nodes));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* value = G u at the nodes of a body, else 0. */
+static void TurnField(HycoReducer t, HycoFOM f, PetscInt body, const PetscReal G[], PetscBool back, const PetscReal u[],
+                      PetscReal value[])
+{
+  const PetscInt dim = f->fe->dim;
+
+  for (PetscInt i = 0; i < f->part->n_nodes; i++) {
+    PetscReal turned[3] = {0, 0, 0};
+
+    if (HycoTrainingOfBodies(t)->parts.of[i] == body) HycoPoseTurn(G, dim, back, u + i * dim, turned);
+    for (PetscInt c = 0; c < dim; c++) value[i * dim + c] = f->fe->fixed[i * dim + c] ? 0 : turned[c];
+  }
+}
+
+/* An empty dense matrix with n columns in the file's order. */
+static PetscErrorCode CreateColumns(HycoReducer t, HycoFOM f, PetscInt n, Mat *S)
+{
+  const PetscInt dim = t->sizes[3];
+  const HycoFileOrder *order;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMGetRows(f, &order));
+  PetscCall(MatCreateDense(HycoComm(t), dim * (order ? order->n[HYCO_ON_NODES] : f->part->n_nodes), PETSC_DECIDE,
+                           t->sizes[0] * dim, n, NULL, S));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The columns of one body in all of its turns, of length 1 if they are not small. Collective. */
+static PetscErrorCode BodyColumns(HycoReducer t, HycoFOM f, PetscInt body, PetscInt n, const PetscReal U[], Mat *S)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  const PetscInt first = b->turn_start[body], turns = b->turn_start[body + 1] - first;
+  PetscReal *value, *norm, most = 0;
+  PetscScalar *s;
+  PetscInt lda, rows;
+
+  PetscFunctionBegin;
+  PetscCall(CreateColumns(t, f, n * turns, S));
+  PetscCall(MatDenseGetLDA(*S, &lda));
+  PetscCall(MatGetLocalSize(*S, &rows, NULL));
+  PetscCall(PetscMalloc2(f->fe->n_dof + 1, &value, n * turns + 1, &norm));
+  PetscCall(MatDenseGetArray(*S, &s));
+  for (PetscInt k = 0; k < n * turns; k++) {
+    TurnField(t, f, body, b->G + 9 * (first + k % turns), PETSC_FALSE, U + (size_t)(k / turns) * (size_t)f->fe->n_dof,
+              value);
+    PetscCall(HycoFOMToRows(f, HYCO_ON_NODES, MPIU_REAL, b->dim, value, s + (size_t)k * (size_t)lda));
+  }
+  PetscCall(MatDenseRestoreArray(*S, &s));
+  PetscCall(MatGetColumnNorms(*S, NORM_2, norm));
+  for (PetscInt k = 0; k < n * turns; k++) most = PetscMax(most, norm[k]);
+  PetscCall(MatDenseGetArray(*S, &s));
+  for (PetscInt k = 0; k < n * turns; k++) {
+    const PetscReal scale = most > 0 ? 1 / PetscMax(norm[k], SMALL * most) : 0;
+
+    for (PetscInt i = 0; i < rows; i++) s[(size_t)k * (size_t)lda + (size_t)i] *= scale;
+  }
+  PetscCall(MatDenseRestoreArray(*S, &s));
+  PetscCall(PetscFree2(value, norm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The modes of all bodies in V, and their singular values in sigma. Collective. */
+static PetscErrorCode FindModes(HycoReducer t, HycoFOM f, PetscInt n, const PetscReal U[], Mat *V, PetscReal **sigma)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+
+  PetscFunctionBegin;
+  *V = NULL;
+  *sigma = NULL;
+  PetscCall(PetscCalloc1(b->n + 1, &b->mode_start));
+  for (PetscInt k = 0; k < b->n; k++) {
+    const PetscInt columns = n * (b->turn_start[k + 1] - b->turn_start[k]);
+    PetscReal *own, norm;
+    PetscInt l = 0;
+    Mat S, W = NULL, joined;
+
+    PetscCall(BodyColumns(t, f, k, n, U, &S));
+    PetscCall(MatNorm(S, NORM_FROBENIUS, &norm));
+    PetscCall(PetscCalloc1(columns + 1, &own));
+    if (norm > 0) PetscCall(HycoReducerPOD(t, S, HycoTrainingOfBodies(t)->pod_tol, t->max_modes, &W, &l, own));
+    PetscCall(MatDestroy(&S));
+    b->mode_start[k + 1] = b->mode_start[k] + l;
+    PetscCall(PetscRealloc((size_t)(b->mode_start[k + 1] + 1) * sizeof(PetscReal), sigma));
+    PetscCall(PetscArraycpy(*sigma + b->mode_start[k], own, l));
+    PetscCall(PetscFree(own));
+    if (!l) PetscCall(MatDestroy(&W));
+    if (!l) continue;
+    if (*V) {
+      PetscCall(HycoJoinColumns(V, &W, &joined));
+      *V = joined;
+    } else
+      *V = W;
+  }
+  b->l = b->mode_start[b->n];
+  HycoCheckModel(b->l, "the bodies have no displacement at any point of the ranges; check the loads");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- coefficients -- */
+
+/* The displacements K^-1 F of the basis of the loads. Collective. */
+static PetscErrorCode LoadFields(HycoSubstructures b, HycoBodiesFactor *factor, Vec x[])
+{
+  PetscReal *u, *work;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(b->ns + 1, &u, b->p + 1, &work));
+  PetscCall(PetscArrayzero(factor->z, b->p + b->ns));
+  for (PetscInt k = 0; k < b->r; k++) {
+    PetscCall(VecDuplicate(factor->fom->F, &x[k]));
+    PetscCall(HycoBodiesReduce(b, factor, factor->basis[k], u, work));
+    PetscCall(HycoDirectExpand(factor->direct, factor->z, x[k]));
+  }
+  PetscCall(PetscFree2(u, work));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The turned mode back in the body's axes, as a load: v = G^T V_i. Collective. */
+static PetscErrorCode TurnMode(HycoReducer t, HycoFOM f, PetscInt body, PetscInt turn, const PetscScalar column[],
+                               Vec v)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  PetscReal *local, *turned;
+  PetscScalar *a;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(f->fe->n_dof + 1, &local, f->fe->n_dof + 1, &turned));
+  PetscCall(HycoFOMFromRows(f, HYCO_ON_NODES, b->dim, column, local));
+  TurnField(t, f, body, b->G + 9 * turn, PETSC_TRUE, local, turned);
+  PetscCall(VecGetArray(v, &a));
+  for (PetscInt i = 0; i < f->fe->n_dof; i++) {
+    const PetscInt own = HycoMeshOwned(f->part, i / b->dim);
+
+    if (own >= 0) a[own * b->dim + i % b->dim] = turned[i];
+  }
+  PetscCall(VecRestoreArray(v, &a));
+  PetscCall(PetscFree2(local, turned));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Allocates H, a and g. */
+static PetscErrorCode AllocateCoefficients(HycoSubstructures b)
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < b->n; k++) {
+    HycoSubstructure *s = &b->body[k];
+    size_t rows;
+
+    s->l = b->mode_start[k + 1] - b->mode_start[k];
+    rows = (size_t)s->n_samples * (size_t)(b->turn_start[k + 1] - b->turn_start[k]) * (size_t)s->l;
+    PetscCall(PetscCalloc1(rows * (size_t)s->n + 1, &s->H));
+    PetscCall(PetscCalloc1(rows * (size_t)b->r + 1, &s->a));
+    PetscCall(PetscCalloc1(rows * (size_t)b->p + 1, &s->g));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* H, a and g of a body at one of its samples, where the factor is. x: the loads' displacements. Collective. */
+static PetscErrorCode BodyCoefficients(HycoReducer t, HycoBodiesFactor *factor, PetscInt k, PetscInt sample, Mat V,
+                                       const Vec x[])
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  HycoSubstructure *s = &b->body[k];
+  const PetscInt turns = b->turn_start[k + 1] - b->turn_start[k];
+  PetscReal *u, *g;
+  const PetscScalar *columns;
+  PetscInt lda;
+  Vec v;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(b->ns + 1, &u, b->p + 1, &g));
+  PetscCall(VecDuplicate(factor->fom->F, &v));
+  PetscCall(MatDenseGetLDA(V, &lda));
+  PetscCall(MatDenseGetArrayRead(V, &columns));
+  for (PetscInt i = 0; i < turns * s->l; i++) {
+    const size_t row = (size_t)(sample * turns * s->l + i);
+
+    PetscCall(TurnMode(t, factor->fom, k, b->turn_start[k] + i / s->l,
+                       columns + (size_t)(b->mode_start[k] + i % s->l) * (size_t)lda, v));
+    PetscCall(HycoBodiesReduce(b, factor, v, u, g));
+    PetscCall(PetscArraycpy(s->H + row * (size_t)s->n, u + b->start[k], s->n));
+    PetscCall(PetscArraycpy(s->g + row * (size_t)b->p, g, b->p));
+    for (PetscInt d = 0; d < b->r; d++) PetscCall(VecDot(v, x[d], &s->a[row * (size_t)b->r + (size_t)d]));
+  }
+  PetscCall(MatDenseRestoreArrayRead(V, &columns));
+  PetscCall(VecDestroy(&v));
+  PetscCall(PetscFree2(u, g));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Coefficients(HycoReducer t, HycoBodiesFactor *factor, Mat V)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  const PetscInt nodes = HycoBodiesGrid(b, 0, NULL);
+  Vec *x;
+
+  PetscFunctionBegin;
+  PetscCall(AllocateCoefficients(b));
+  PetscCall(PetscMalloc1(b->r + 1, &x));
+  for (PetscInt j = nodes - 1; j >= 0; j--) { /* the last factor is there */
+    PetscReal theta[HYCO_MAX_PARAMETERS];
+
+    HycoBodiesPoint(t, j, theta);
+    PetscCall(HycoBodiesRefactor(t, factor, theta));
+    PetscCall(LoadFields(b, factor, x));
+    for (PetscInt k = 0; k < b->n; k++) {
+      const PetscInt sample = HycoBodiesSampleOf(b, k, j);
+
+      if (sample >= 0) PetscCall(BodyCoefficients(t, factor, k, sample, V, x));
+    }
+    for (PetscInt d = 0; d < b->r; d++) PetscCall(VecDestroy(&x[d]));
+    PetscCall(HycoReducerTell(t, "coefficients of the modes", nodes - j, nodes));
+  }
+  PetscCall(PetscFree(x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Replaces the modes of the training solutions. Collective. */
+static PetscErrorCode TakeModes(HycoReducer t, HycoSnapshots store, Mat V, PetscReal sigma[])
+{
+  Mat S;
+
+  PetscFunctionBegin;
+  t->l = HycoTrainingOfBodies(t)->bodies->l;
+  PetscCall(PetscFree(t->sigma));
+  t->sigma = sigma;
+  PetscCall(PetscFree(t->VtU));
+  PetscCall(PetscMalloc1(t->l * t->n_s, &t->VtU));
+  PetscCall(HycoReducerGetDisplacements(t, store, &S));
+  PetscCall(HycoReducerMultiply(t, V, S, t->VtU));
+  PetscCall(MatDestroy(&S));
+  PetscCall(MatDestroy(&t->V));
+  t->V = V;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The modes of `wanted` samples; *enough: the samples are many more than the modes of any body, or there is no room for
+   more. Collective. */
+static PetscErrorCode ModesOf(HycoReducer t, HycoBodiesFactor *factor, PetscInt wanted, Mat *V, PetscReal **sigma,
+                              PetscBool *enough)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  Sampled sampled = {0};
+  PetscReal *U;
+  PetscInt n;
+  PetscBool all;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(Sample(t, factor->fom, wanted, &all, &sampled));
+  n = CountVisits(sampled.n, HycoBodiesGrid(b, 0, NULL)) + b->p * HycoBodiesGrid(b, 0, NULL);
+  PetscCall(PetscMalloc1((size_t)factor->fom->fe->n_dof * (size_t)n + 1, &U));
+  PetscCall(ExpandAll(t, factor, &sampled, U));
+  HycoFreeAll(&sampled.c, &sampled.f);
+  PetscCall(PetscFree(b->mode_start));
+  ierr = FindModes(t, factor->fom, n, U, V, sigma);
+  PetscCall(PetscFree(U));
+  PetscCall(ierr);
+  *enough = PETSC_TRUE;
+  for (PetscInt k = 0; k < b->n; k++)
+    *enough = (PetscBool)(*enough && b->mode_start[k + 1] - b->mode_start[k] <= FULL * sampled.n);
+  *enough = (PetscBool)(*enough || !all);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBodiesFields(HycoReducer t, HycoSnapshots store, HycoBodiesFactor *factor)
+{
+  PetscReal *sigma = NULL;
+  Mat V = NULL;
+  PetscBool enough = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  for (PetscInt n = HycoTrainingOfBodies(t)->samples, k = 0; !enough && k <= DOUBLINGS; n *= 2, k++) {
+    PetscCall(MatDestroy(&V));
+    PetscCall(PetscFree(sigma));
+    PetscCall(ModesOf(t, factor, n, &V, &sigma, &enough));
+  }
+  PetscCall(Coefficients(t, factor, V));
+  PetscCall(TakeModes(t, store, V, sigma));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,21 @@
+// A pad in a V-groove, pressed down by a clamped arm. mm. y = x - 10 is the right flank.
+R = 60; yc = 10 - Sqrt(R^2 - 100); top = yc + R;
+h = 1; hg = 1.3; hb = 4; ha = 1.5; hc = 3;
+Point(1) = {-10, 0, 0, h}; Point(2) = {-4, -6, 0, h}; Point(3) = {4, -6, 0, h}; Point(4) = {10, 0, 0, h};
+Point(5) = {10, 10, 0, h}; Point(6) = {-10, 10, 0, h}; Point(7) = {0, yc, 0, h};
+Line(1) = {1, 2}; Line(2) = {2, 3}; Line(3) = {3, 4}; Line(4) = {4, 5}; Circle(5) = {5, 7, 6}; Line(6) = {6, 1};
+Curve Loop(1) = {1:6}; Plane Surface(1) = {1};
+Point(11) = {-22, -18, 0, hb}; Point(12) = {22, -18, 0, hb}; Point(13) = {22, 1, 0, hb}; Point(14) = {11, 1, 0, hg};
+Point(15) = {3, -7, 0, hg}; Point(16) = {-3, -7, 0, hg}; Point(17) = {-11, 1, 0, hg}; Point(18) = {-22, 1, 0, hb};
+Line(11) = {11, 12}; Line(12) = {12, 13}; Line(13) = {13, 14}; Line(14) = {14, 15}; Line(15) = {15, 16};
+Line(16) = {16, 17}; Line(17) = {17, 18}; Line(18) = {18, 11};
+Curve Loop(2) = {11:18}; Plane Surface(2) = {2};
+Point(21) = {-40, top, 0, hc}; Point(22) = {-12, top, 0, ha}; Point(23) = {12, top, 0, ha}; Point(24) = {25, top, 0, hc};
+Point(25) = {25, top + 12, 0, hc}; Point(26) = {10, top + 12, 0, hc}; Point(27) = {-40, top + 12, 0, hc};
+Line(21) = {21, 22}; Line(22) = {22, 23}; Line(23) = {23, 24}; Line(24) = {24, 25}; Line(25) = {25, 26}; Line(26) = {26, 27}; Line(27) = {27, 21};
+Curve Loop(3) = {21:27}; Plane Surface(3) = {3};
+Recombine Surface {1, 2, 3};
+Physical Surface("pad") = {1}; Physical Surface("vee") = {2}; Physical Surface("arm") = {3};
+Physical Curve("pad_left") = {1}; Physical Curve("pad_right") = {3}; Physical Curve("pad_top") = {5};
+Physical Curve("vee_left") = {16}; Physical Curve("vee_right") = {14}; Physical Curve("vee_base") = {11};
+Physical Curve("arm_under") = {22}; Physical Curve("arm_clamp") = {27}; Physical Curve("arm_load") = {25};

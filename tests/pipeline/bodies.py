@@ -1,0 +1,188 @@
+"""Models of bodies as substructures: forces, surfaces and resultants are those of full order where contacts travel, bodies turn, grow, soften or
+float; where a body's shape changes, they follow the number of its samples and stay within the bound; check says how parameters enter the bodies."""
+import os
+import re
+import unittest
+
+import h5py
+import numpy as np
+
+from common import SOURCE, Case
+
+MESH = os.path.join(SOURCE, 'examples', '{0}', '{0}.msh')
+TYPE = ('-hyco_model_type', 'bodies')
+ROLLER = os.path.join(SOURCE, 'examples', 'roller')
+HERTZ = os.path.join(SOURCE, 'examples', 'hertz')
+TURNED = f"""
+scene: {{title: a turned and enlarged cylinder on a block, mesh: {MESH.format('roller')}, parameters: [place, press, modulus, turn, size]}}
+parameter: {{place: {{range: [-4, 4]}}, press: {{range: [0.2, 1]}}, modulus: {{range: [5, 20]}}, turn: {{range: [-15, 15]}}, size: {{range: [0.9, 1.1]}}}}
+body:
+  block: {{young: modulus, poisson: 0.4}}
+  cylinder:
+    young: 100
+    poisson: 0.3
+    map:
+      x: "size*(x*cos(turn*pi/180) - (y - 10)*sin(turn*pi/180)) + place"
+      y: "10*size + size*(x*sin(turn*pi/180) + (y - 10)*cos(turn*pi/180))"
+fixed: {{block_base: {{x: 0, y: 0}}, cylinder_top: {{x: 0, y: -press}}}}
+contact: {{under: {{type: surface, slave: cylinder_round, master: block_top}}}}
+"""
+FLOATING = f"""
+scene: {{title: a block that a foundation alone holds, mesh: {MESH.format('blocks')}, parameters: [soft, press, tip]}}
+parameter: {{soft: {{range: [1, 4]}}, press: {{range: [50, 400]}}, tip: {{range: [-0.5, 0.5]}}}}
+body:
+  block: {{young: 2e5, poisson: 0.3}}
+  foundation: {{young: 1e5/soft, poisson: 0.3}}
+fixed: {{block_sym: {{x: 0}}, foundation_sym: {{x: 0}}, foundation_base: {{y: 0}}}}
+pressure: {{block_top: press*(1 + tip*x/20)}}
+contact: {{under: {{type: surface, slave: block_under, master: foundation_top, tolerance: 0.3}}}}
+"""
+OBSTACLE = f"""
+scene: {{title: a block on springs under a bump that moves, mesh: {MESH.format('roller')}, parameters: [at, depth, modulus]}}
+parameter: {{at: {{range: [-6, 6]}}, depth: {{range: [0.05, 0.3]}}, modulus: {{range: [5, 20]}}}}
+body:
+  block: {{young: modulus, poisson: 0.3}}
+  cylinder: {{young: 100, poisson: 0.3}}
+fixed: {{block_base: {{x: 0}}, cylinder_top: {{x: 0, y: 1}}}}
+spring: {{block_base: {{y: 2*modulus}}}}
+contact: {{bump: {{type: obstacle, group: block_top, normal: {{y: 1}}, gap: 0.02*(x - at)^2 - depth}}}}
+"""
+STIFF = f"""
+scene: {{title: a block on a foundation whose springs do not soften with it, mesh: {MESH.format('blocks')}, parameters: [soft, press]}}
+parameter: {{soft: {{range: [0.5, 5]}}, press: {{range: [0.02, 0.06]}}}}
+body:
+  block: {{young: 2e5, poisson: 0.3, map: {{y: "y + 0.04*(x/20)^2*(1 - y/16)"}}}}
+  foundation: {{young: 1e5*soft, poisson: 0.3}}
+spring: {{foundation_base: {{y: 2e4}}}}
+fixed: {{block_sym: {{x: 0}}, foundation_sym: {{x: 0}}, block_top: {{y: -press}}}}
+contact: {{under: {{type: pair, slave: block_under, master: foundation_top, tolerance: 0.1}}}}
+"""
+
+
+class Bodies(Case):
+    @classmethod
+    def write(cls, name, text):
+        with open(cls.path(name), 'w', encoding='ascii') as f:
+            f.write(text)
+        return cls.path(name)
+
+    def judge(self, scene, points, train=('-scatter', '2'), forces=1e-10, u=1e-4, options=()):
+        """A model from these points is compared with full order at others; returns the report of the comparison."""
+        self.hyco('train', '-scene', scene, *TYPE, *train, '-model', 'm.h5', *options)
+        c = self.hyco('compare', '-scene', scene, '-model', 'm.h5', *points)
+        self.assertEqual((c['not_converged'], c['undefined']), (0, 0))
+        self.assertLess(c['error_lambda']['max'], forces)
+        self.assertLess(c['error_u']['max'], u)
+        self.assertLess(c['kkt_max'], 1e-12)
+        return c
+
+    def test_travels(self):
+        """A cylinder that is moved along a block by three quarters of its width: two training points, which give only the first one's
+        stiffness, and forces to round-off."""
+        self.judge(ROLLER, ('-values_place', '-4.3,-0.7,3.1', '-values_press', '0.23,0.9', '-values_modulus', '6,17'))
+
+    def test_surface(self):
+        """Displacements of the contact's nodes are those of full order, closed contacts have no gap, and resultants balance."""
+        self.hyco('train', '-scene', ROLLER, *TYPE, '-scatter', '2', '-model', 's.h5')
+        point = '1.37,0.71,8.3'
+        self.hyco('predict', '-model', 's.h5', '-mu', point, '-output', 'p.xdmf')
+        self.hyco('solve', '-scene', ROLLER, '-mu', point, '-output', 'f.xdmf')
+        with h5py.File(self.path('p.h5')) as p, h5py.File(self.path('f.h5')) as f:
+            gap, force, u = (np.array([g['nodes/' + name][:] for g in (p, f)]) for name in ('gap', 'contact_force', 'displacement'))
+        on = np.isfinite(gap[1]).ravel()
+        self.assertGreater(on.sum(), 40)
+        self.assertLess(np.abs(gap[0].ravel()[on] - gap[1].ravel()[on]).max(), 1e-12)
+        self.assertLess(np.abs(u[0][on] - u[1][on]).max(), 1e-12 * np.abs(u[1]).max())
+        self.assertLess(np.abs(force[0].sum(axis=0)).max(), 1e-12 * np.abs(force[0]).sum())  # both sides of the pair
+
+    def test_turned(self):
+        """A body that is turned and enlarged about a point, in any combination with the others."""
+        scene = self.write('turned.yaml', TURNED)
+        self.judge(scene, ('-values_place', '-2.3,3.1', '-values_press', '0.4,0.9', '-values_modulus', '7', '-values_turn', '-11,6.5', '-values_size',
+                           '0.93,1.07'))
+
+    def test_floating(self):
+        """A body that contact alone holds: its rigid motion is an unknown, and contact has its whole load."""
+        scene = self.write('floating.yaml', FLOATING)
+        self.judge(scene, ('-values_soft', '1.3,3.7', '-values_press', '77,333', '-values_tip', '-0.41,0.27'))
+        r = self.hyco('predict', '-model', 'm.h5', '-mu', '2.2,123,0.3')
+        s = self.hyco('solve', '-scene', scene, '-mu', '2.2,123,0.3')
+        self.near(r['total_contact_force'], s['total_contact_force'], 1e-11)
+
+    def test_obstacle(self):
+        """One body under an obstacle that moves, on springs that soften with it."""
+        scene = self.write('obstacle.yaml', OBSTACLE)
+        self.judge(scene, ('-values_at', '-5.1,0.3,4.4', '-values_depth', '0.07,0.28', '-values_modulus', '6,17'))
+
+    def test_shape(self):
+        """A radius: more samples reduce the errors of the forces, which stay within the bound; points between the samples."""
+        with open(os.path.join(HERTZ, 'scene.yaml'), encoding='ascii') as f:
+            ranges = {k: [float(v) for v in re.search(k + r': \{range: \[(.*?)\]', text)[1].split(',')]
+                      for text in [f.read()] for k in ('press', 'stiffness', 'radius')}
+        points = [w for k, share in (('press', (0.31, 0.87)), ('stiffness', (0.43,)), ('radius', (0.09, 0.37, 0.83)))
+                  for w in ('-values_' + k, ','.join(f'{ranges[k][0] + s * (ranges[k][1] - ranges[k][0])!r}' for s in share))]
+        errors, bounds = [], []
+        for tol in ('0.1', '1e-5', '1e-9'):
+            c = self.judge(HERTZ, points, forces=1e-2, u=1e-2, options=('-hyco_bodies_tol', tol))
+            errors.append(c['error_lambda']['max'])
+            found = re.search(r'contact forces within (\S+) \(bound at held-out samples of the bodies, (\d+) samples\)',
+                              self.run_raw('view', '-model', 'm.h5').stdout)
+            bounds.append(float(found[1]))
+            self.assertLess(errors[-1], max(bounds[-1], 1e-10))
+        self.assertLess(errors[1], errors[0] / 10)
+        self.assertLess(errors[2], errors[1] / 10)
+        self.assertLess(bounds[2], 1e-8)
+
+    def test_ratio(self):
+        """A modulus whose ratio to the stiffness of springs changes over a decade: samples over its logarithm."""
+        scene = self.write('stiff.yaml', STIFF)
+        self.assertIn('soft: changes the shape or the material of body foundation',
+                      self.hyco('check', '-scene', scene)['bodies_by_parameter'])
+        self.judge(scene, ('-values_soft', '0.61,1.7,4.4', '-values_press', '0.03,0.05'), forces=1e-5)
+
+    def test_check(self):
+        """How each parameter enters each body, found by evaluation."""
+        self.assertEqual(self.hyco('check', '-scene', ROLLER)['bodies_by_parameter'],
+                         'place: moves body cylinder rigidly; press: changes loads or given displacements of body cylinder; '
+                         'modulus: scales the stiffness of body block; nothing needs a sample')
+        said = self.hyco('check', '-scene', self.write('turned.yaml', TURNED))['bodies_by_parameter']
+        self.assertIn('size: enlarges body cylinder uniformly', said)
+        self.assertIn('turn: moves body cylinder rigidly', said)
+        half = self.write('half.yaml', TURNED.replace('cylinder_top: {x: 0,', 'cylinder_top: {') + 'spring: {cylinder_top: {x: 9}}\n')
+        self.assertIn('turn: changes the shape or the material of body cylinder', self.hyco('check', '-scene', half)['bodies_by_parameter'],
+                      'a spring along one component does not turn with the body')
+        said = self.hyco('check', '-scene', HERTZ)['bodies_by_parameter']
+        self.assertIn('radius: changes the shape or the material of body upper, which needs samples', said)
+
+    def test_ranks(self):
+        """The same forces from a training on one, two and three ranks, with samples and with a floating body."""
+        for name, text, point in (('floating.yaml', FLOATING, '2.2,123,0.3'), ('stiff.yaml', STIFF, '1.9,0.041')):
+            scene = self.write(name, text)
+            forces = []
+            for ranks in (1, 2, 3):
+                self.hyco('train', '-scene', scene, *TYPE, '-scatter', '2', '-model', 'r.h5', '-hyco_snapshots', 'snapshots', ranks=ranks)
+                r = self.hyco('predict', '-model', 'r.h5', '-mu', point)
+                forces.append((r['total_contact_force'], r['lambda_max']))
+            for other in forces[1:]:
+                np.testing.assert_allclose(other, forces[0], rtol=1e-9)
+
+    def refused(self, scene, *words):
+        run = self.run_raw('train', '-scene', scene, *TYPE, '-scatter', '2', '-model', 'no.h5')
+        self.assertEqual(run.returncode, 1)
+        for word in words:
+            self.assertIn(word, run.stderr)
+        self.assertEqual(len([line for line in run.stderr.splitlines() if line.startswith('hyco: error')]), 1, run.stderr)
+        self.assertFalse(os.path.exists(self.path('no.h5')))
+
+    def test_refused(self):
+        """What the model does not represent is named in one line: four parameters of the shape, mirrors, bodies without contact, a history."""
+        four = TURNED.replace('size*(x*cos(', 'size*(1 + place*y/99 + press*y/99 + modulus*y^2/999)*(x*cos(')
+        self.refused(self.write('four.yaml', four), 'and a model of bodies samples at most 3')
+        mirrored = TURNED.replace('size*(x*cos(', '(size > 1 ? -1 : 1)*size*(x*cos(').replace('range: [-15, 15]', 'range: [0, 0]')
+        self.refused(self.write('mirrored.yaml', mirrored), 'the map of body cylinder mirrors it')
+        alone = re.sub(r'contact: .*', '', TURNED)
+        self.refused(self.write('alone.yaml', alone), 'the scene has no contact')
+
+
+if __name__ == '__main__':
+    unittest.main()
