@@ -22,11 +22,10 @@ struct _p_HycoContact {
 /* After the scene's entries are read: fails if a required one is missing. */
 PetscErrorCode HycoContactComplete(HycoContact contact);
 /* Whether normals are averaged from the slave's facets. */
-PetscBool HycoContactAverages(HycoContact contact);
-/* Whether the rows of B, and the gaps, change with the parameters p with changed[p]; adds to *rows, *gaps. */
-void HycoContactChanges(HycoContact contact, const PetscBool changed[], PetscBool *rows, PetscBool *gaps);
-/* Checks that the contact's groups are in the mesh, and that they are surfaces where required. */
-PetscErrorCode HycoContactCheckGroups(HycoContact contact, HycoMesh mesh);
+static inline PetscBool HycoContactAverages(HycoContact contact)
+{
+  return (PetscBool)(!contact->ops->normal && !contact->normal[0] && !contact->normal[1] && !contact->normal[2]);
+}
 
 PetscErrorCode HycoContactCreate_Obstacle(HycoContact contact);
 PetscErrorCode HycoContactCreate_Pair(HycoContact contact);

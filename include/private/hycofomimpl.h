@@ -11,7 +11,6 @@
 #define HYCO_MAX_PINS 12
 
 typedef struct _n_HycoPath *HycoPath;
-typedef struct _n_HycoCompared *HycoCompared;
 
 struct _p_HycoFOM {
   PETSCHEADER(int);
@@ -62,13 +61,10 @@ struct _p_HycoFOM {
   PetscInt n_pins, n_released, pin_tag[HYCO_MAX_PINS], pin_component[HYCO_MAX_PINS];
   PetscInt n_turned; /* number of released motions for which the contacts' normals are turned */
   Vec *released;
-  HycoPath path;         /* of a scene with a history, else NULL */
-  HycoCompared compared; /* data kept by comparisons with a reduced model (errors/compare.c); NULL: none yet */
+  HycoPath path; /* of a scene with a history, else NULL */
   HycoSummary summary;
 };
 
-/* NULL-safe. */
-PetscErrorCode HycoComparedDestroy(HycoCompared *compared);
 /* A model that has only its mesh, contacts and tables: for training, which reads stored solutions. Collective. */
 PetscErrorCode HycoFOMCreateMesh(MPI_Comm comm, HycoScene scene, HycoFOM *fom);
 /* Sets group[g] for the groups with a contact of the scene; leaves the others unchanged. */

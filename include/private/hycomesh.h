@@ -228,13 +228,24 @@ PetscErrorCode HycoMeshNodeCells(HycoMesh mesh, PetscInt **start, PetscInt **cel
 typedef enum { HYCO_PARTITION_METIS, HYCO_PARTITION_PTSCOTCH } HycoPartitioner;
 extern const char *const HycoPartitioners[];
 
-/*
-  The scene's mesh as a DMPlex (src/mesh/plex.c), read on rank 0. Collective.
-  HycoMeshDistribute() distributes it: the cells by METIS, those on the two sides of a contact on one rank where
-  possible (pairs: n_pairs x 2 node indices of rank 0's tables `whole`); refines it as given in the scene; writes it to
-  `write` in PETSc's HDF5 format, unless that is empty; and adds to each rank the cells that touch its own.
-*/
+/* The scene's mesh as a DMPlex, read on rank 0. Collective. */
 PetscErrorCode HycoMeshLoad(MPI_Comm comm, HycoScene scene, DM *dm);
+/* Creates a DM from rank 0's tables (NULL elsewhere), not distributed. Collective. */
+PetscErrorCode HycoPlexFromMesh(MPI_Comm comm, HycoMesh mesh, DM *dm);
+/* Reads PETSc's HDF5 format. Collective. */
+PetscErrorCode HycoPlexRead(MPI_Comm comm, const char path[], DM *dm);
+/* For a DM that was not made from a mesh file: tags, and labels with the closure of their points on every process.
+   Collective. */
+PetscErrorCode HycoPlexComplete(DM dm);
+/* Halves all cells `times` times. New vertices get tags above the existing ones, in the order of their parents'. The
+   DM must have no overlap. Groups are refined too; fails for one of the scene's whose lines or facets the DM does
+   not know. Collective. */
+PetscErrorCode HycoPlexRefine(DM *dm, HycoScene scene, PetscInt times);
+/*
+  Distributes it: the cells by METIS, those on the two sides of a contact on one rank where possible (pairs: n_pairs x 2
+  node indices of rank 0's tables `whole`); refines it as given in the scene; writes it to `write` in PETSc's HDF5
+  format, unless that is empty; and adds to each rank the cells that touch its own. Collective.
+*/
 PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, PetscInt n_pairs, const PetscInt pairs[],
                                   HycoPartitioner by, const char write[]);
 /* Tables of each process's part: the cells that touch a node that it owns. On one process node_global, node_whole

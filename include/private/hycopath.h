@@ -188,7 +188,5 @@ PetscErrorCode HycoSeriesCreate(MPI_Comm comm, const char path[], PetscInt most,
 PetscErrorCode HycoSeriesOpen(HycoSeries series, const HycoSeriesSource *from);
 PetscErrorCode HycoSeriesAddTime(HycoSeries series, const HycoSeriesSource *from);
 PetscErrorCode HycoSeriesClose(HycoSeries series);
-/* Energies of a path, in place of those of the linear identity. */
-void HycoPathSummary(HycoFOM fom, HycoSummary *summary);
 
 #endif

@@ -56,6 +56,9 @@ PetscErrorCode HycoDeclaredAdd(HycoDeclared *declared, const char name[], const 
 HycoEntry *HycoDeclaredFind(HycoDeclared *declared, const char name[]);
 /* Reads the scene's entry `key`. */
 PetscErrorCode HycoDeclaredRead(HycoScene scene, const char key[], const char text[], HycoEntry *entry);
+/* Whether an expression other than that of the entry `except` (NULL: any) changes with the parameters p with
+   changed[p]. */
+PetscBool HycoDeclaredChanges(const HycoDeclared *declared, const char except[], const PetscBool changed[]);
 PetscErrorCode HycoDeclaredView(const HycoDeclared *declared, PetscViewer viewer);
 PetscErrorCode HycoDeclaredDestroy(HycoDeclared *declared);
 
@@ -198,19 +201,10 @@ PetscErrorCode HycoSceneCheckQuantities(HycoScene scene);
 void HycoSceneMatchQuantities(HycoScene scene, HycoScene other, PetscInt at[]);
 /* Whether the scene has a quantity of kind `first`, or of a kind from `first` to `last`. */
 PetscBool HycoSceneAsks(HycoScene scene, HycoQuantityKind first, HycoQuantityKind last);
-static inline PetscBool HycoSceneHasReactions(HycoScene scene)
-{
-  return HycoSceneAsks(scene, HYCO_QUANTITY_REACTION, HYCO_QUANTITY_REACTION);
-}
+PetscBool HycoSceneHasReactions(HycoScene scene);
 /* Whether the quantities need the bodies' fields; the results of contacts. */
-static inline PetscBool HycoSceneAsksFields(HycoScene scene)
-{
-  return HycoSceneAsks(scene, HYCO_QUANTITY_MAX, HYCO_QUANTITY_REACTION);
-}
-static inline PetscBool HycoSceneAsksContacts(HycoScene scene)
-{
-  return HycoSceneAsks(scene, HYCO_QUANTITY_FORCE, HYCO_QUANTITY_PRESSURE);
-}
+PetscBool HycoSceneAsksFields(HycoScene scene);
+PetscBool HycoSceneAsksContacts(HycoScene scene);
 /* Reads the history's entries, once the parameters are read. */
 PetscErrorCode HycoSceneReadHistory(HycoScene scene);
 /* Fails if time changes what must be constant: the bodies' places, the rows of B. */

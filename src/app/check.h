@@ -24,7 +24,7 @@ typedef struct {
 } Check;
 
 /* Adds a warning to the report; it is printed at the end. On rank 0. */
-void CheckWarn(Check *check, const char format[], ...) PETSC_ATTRIBUTE_FORMAT(2, 3);
+void CheckReportWarning(Check *check, const char format[], ...) PETSC_ATTRIBUTE_FORMAT(2, 3);
 
 typedef struct {
   PetscBool solved;             /* measured by a solve at the centre, else estimated */
@@ -37,30 +37,30 @@ typedef struct {
 /* -- check_mesh.c, on rank 0 -- */
 
 /* Finds the most stretched cell of each body at fe's nodes. */
-void CheckCells(Check *check, HycoFE fe);
+void CheckReportCells(Check *check, HycoFE fe);
 /* Reports bodies that consist of several parts, the description of each body; groups. */
-PetscErrorCode CheckBodies(Check *check);
-PetscErrorCode CheckGroups(Check *check);
+PetscErrorCode CheckReportBodies(Check *check);
+PetscErrorCode CheckReportGroups(Check *check);
 
 /* -- check_contact.c, on rank 0 -- */
 
 /* Measures the gaps at fe's parameters; *first: also compares facets of slave and master. */
-PetscErrorCode CheckGaps(Check *check, HycoFE fe, PetscBool first);
+PetscErrorCode CheckReportGaps(Check *check, HycoFE fe, PetscBool first);
 /* Compares the facets of a tie's slave and master, for its report. */
-PetscErrorCode CheckTie(Check *check, PetscInt tie, cJSON *report);
+PetscErrorCode CheckReportTie(Check *check, PetscInt tie, cJSON *report);
 /* Reports the ranges of gaps. */
-void CheckContacts(Check *check);
+void CheckReportContacts(Check *check);
 
 /* -- check_cost.c; collective -- */
 
 /* For the assembled system, which took `assembly` seconds: the factor's memory by MUMPS's analysis of the stiffness
    with the contacts, seconds from its count of operations. */
-PetscErrorCode CheckEstimate(Check *check, PetscReal assembly, Cost *cost);
+PetscErrorCode CheckReportEstimate(Check *check, PetscReal assembly, Cost *cost);
 /* Seconds from a solve at mu; fails if it does not converge. */
-PetscErrorCode CheckSolve(Check *check, const PetscReal mu[], Cost *cost);
+PetscErrorCode CheckReportSolve(Check *check, const PetscReal mu[], Cost *cost);
 /* The number of solutions of the training and of the stiffnesses among them: for the given points, or a typical
    number. */
-PetscErrorCode CheckCountTraining(HycoScene scene, HycoSamples samples, PetscBool given, Cost *cost);
-PetscErrorCode CheckSayCost(Check *check, const Cost *cost, PetscBool given);
+PetscErrorCode CheckReportCountTraining(HycoScene scene, HycoSamples samples, PetscBool given, Cost *cost);
+PetscErrorCode CheckReportCost(Check *check, const Cost *cost, PetscBool given);
 
 #endif

@@ -54,7 +54,7 @@ static PetscErrorCode CompareFacets(Check *check, HycoFE fe, PetscInt contact)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode CheckTie(Check *check, PetscInt tie, cJSON *report)
+PetscErrorCode CheckReportTie(Check *check, PetscInt tie, cJSON *report)
 {
   HycoFE fe = check->whole->fe;
   HycoMesh m = fe->mesh;
@@ -75,7 +75,7 @@ PetscErrorCode CheckTie(Check *check, PetscInt tie, cJSON *report)
   PetscCall(PetscSortReal(n, ratio));
   if (n) cJSON_AddNumberToObject(report, "slave_over_master", ratio[n / 2]);
   if (n && ratio[n / 2] > COARSER)
-    CheckWarn(
+    CheckReportWarning(
         check,
         "tie %s: the slave's facets (%s) are %.2g times as long as the master's (%s), and the forces between them "
         "are then inaccurate; the finer side should be the slave",
@@ -84,7 +84,7 @@ PetscErrorCode CheckTie(Check *check, PetscInt tie, cJSON *report)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode CheckGaps(Check *check, HycoFE fe, PetscBool first)
+PetscErrorCode CheckReportGaps(Check *check, HycoFE fe, PetscBool first)
 {
   HycoPairs *p = &check->whole->pairs;
   HycoScene s = fe->scene;
@@ -122,20 +122,22 @@ static void Warn(Check *check, HycoContact c, const ContactRange *r)
   const PetscReal length = HycoMeshLength(check->whole->part);
 
   if (!r->n)
-    CheckWarn(check, "contact %s has no effect: all displacements of every node of %s are fixed", c->name, c->slave);
+    CheckReportWarning(check, "contact %s has no effect: all displacements of every node of %s are fixed", c->name,
+                       c->slave);
   else if (!r->facing_max)
-    CheckWarn(check,
-              "contact %s never faces its master: no node of %s faces %s at any of the points that were assembled",
-              c->name, c->slave, c->master);
+    CheckReportWarning(
+        check, "contact %s never faces its master: no node of %s faces %s at any of the points that were assembled",
+        c->name, c->slave, c->master);
   else if (c->master && r->gap_min > FAR * length)
-    CheckWarn(check,
-              "contact %s: the smallest gap is %.3g, %.2g of the mesh's extent; small displacements cannot close it",
-              c->name, (double)r->gap_min, (double)(r->gap_min / length));
+    CheckReportWarning(
+        check, "contact %s: the smallest gap is %.3g, %.2g of the mesh's extent; small displacements cannot close it",
+        c->name, (double)r->gap_min, (double)(r->gap_min / length));
   if (r->coarse > COARSER)
-    CheckWarn(check,
-              "contact %s: the slave's facets (%s) are %.2g times as long as the master's (%s); the finer side should "
-              "be the slave",
-              c->name, c->slave, (double)r->coarse, c->master);
+    CheckReportWarning(
+        check,
+        "contact %s: the slave's facets (%s) are %.2g times as long as the master's (%s); the finer side should "
+        "be the slave",
+        c->name, c->slave, (double)r->coarse, c->master);
 }
 
 static void Print(const Check *check, PetscInt contact, const ContactRange *r)
@@ -156,7 +158,7 @@ static void Print(const Check *check, PetscInt contact, const ContactRange *r)
   PetscCallVoid(Say("\n"));
 }
 
-void CheckContacts(Check *check)
+void CheckReportContacts(Check *check)
 {
   HycoScene s = check->fom->scene;
   cJSON *contacts = cJSON_AddArrayToObject(check->json, "contacts");

@@ -43,7 +43,7 @@ static PetscErrorCode Speed(PetscReal *flops)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode CheckEstimate(Check *check, PetscReal assembly, Cost *cost)
+PetscErrorCode CheckReportEstimate(Check *check, PetscReal assembly, Cost *cost)
 {
   HycoFOM f = check->fom;
   HycoDirect probe;
@@ -64,7 +64,7 @@ PetscErrorCode CheckEstimate(Check *check, PetscReal assembly, Cost *cost)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode CheckSolve(Check *check, const PetscReal mu[], Cost *cost)
+PetscErrorCode CheckReportSolve(Check *check, const PetscReal mu[], Cost *cost)
 {
   HycoSummary s;
 
@@ -79,15 +79,16 @@ PetscErrorCode CheckSolve(Check *check, const PetscReal mu[], Cost *cost)
                 (int)s.n_contacts, (double)s.total_contact_force));
   ReportNumbers(check->json, {"n_active", s.n_active}, {"total_contact_force", s.total_contact_force});
   if (s.u_relative > 1 && check->warnings)
-    CheckWarn(
+    CheckReportWarning(
         check,
         "the displacements at the centre of the ranges are %.1e times the extent of the mesh; are the units right?",
         (double)s.u_relative);
-  if (s.n_contacts && !s.n_active && check->warnings) CheckWarn(check, "no contact closes at the centre of the ranges");
+  if (s.n_contacts && !s.n_active && check->warnings)
+    CheckReportWarning(check, "no contact closes at the centre of the ranges");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode CheckCountTraining(HycoScene s, HycoSamples samples, PetscBool given, Cost *cost)
+PetscErrorCode CheckReportCountTraining(HycoScene s, HycoSamples samples, PetscBool given, Cost *cost)
 {
   PetscBool reaches[HYCO_MAX_PARAMETERS], any = PETSC_FALSE;
   PetscInt n = TYPICAL_TRAINING, held;
@@ -143,7 +144,7 @@ static PetscErrorCode SayTraining(Check *check, const Cost *cost, PetscBool give
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode CheckSayCost(Check *check, const Cost *cost, PetscBool given)
+PetscErrorCode CheckReportCost(Check *check, const Cost *cost, PetscBool given)
 {
   const PetscInt n_times = check->fom->scene->n_times;
   char first[32], next[32];

@@ -73,7 +73,7 @@ static PetscReal Stretch(HycoCellType shape, const PetscInt node[], const PetscR
   return k + PetscSqrtReal(k * k - 1);
 }
 
-void CheckCells(Check *check, HycoFE fe)
+void CheckReportCells(Check *check, HycoFE fe)
 {
   HycoMesh m = fe->mesh;
 
@@ -128,7 +128,7 @@ static PetscErrorCode CountParts(HycoMesh m, PetscInt n_bodies, PetscInt n[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode CheckBodies(Check *check)
+PetscErrorCode CheckReportBodies(Check *check)
 {
   HycoMesh m = check->whole->part;
   HycoScene s = check->fom->scene;
@@ -153,13 +153,14 @@ PetscErrorCode CheckBodies(Check *check)
                     (double)check->stretch[b]));
     PetscCall(Say("\n"));
     if (parts[b] > 1)
-      CheckWarn(check,
-                "body %s consists of %d parts that share no node; if it should be one piece, the mesh has duplicate "
-                "nodes (gmsh: Coherence, or BooleanFragments)",
-                s->body[b].name, (int)parts[b]);
+      CheckReportWarning(
+          check,
+          "body %s consists of %d parts that share no node; if it should be one piece, the mesh has duplicate "
+          "nodes (gmsh: Coherence, or BooleanFragments)",
+          s->body[b].name, (int)parts[b]);
     if (check->stretch[b] > LONG_CELL)
-      CheckWarn(check, "body %s: cell %d is %.3g times as long as wide", s->body[b].name, (int)check->stretched[b],
-                (double)check->stretch[b]);
+      CheckReportWarning(check, "body %s: cell %d is %.3g times as long as wide", s->body[b].name,
+                         (int)check->stretched[b], (double)check->stretch[b]);
   }
   PetscCall(PetscFree(parts));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -185,17 +186,17 @@ static void CheckTwins(Check *check, HycoMesh m)
       PetscInt common;
 
       if (strcasecmp(m->group_name[g], m->group_name[h]) == 0)
-        CheckWarn(
+        CheckReportWarning(
             check,
             "the groups %s and %s differ only in upper and lower case, which options do not distinguish; rename one",
             m->group_name[h], m->group_name[g]);
       if (m->group_dim[g] != m->group_dim[h] || !n || PetscMin(n, k) < ALIKE * PetscMax(n, k)) continue;
       common = Common(m, g, h);
       if (common == n && common == k)
-        CheckWarn(check, "the groups %s and %s have the same nodes", m->group_name[h], m->group_name[g]);
+        CheckReportWarning(check, "the groups %s and %s have the same nodes", m->group_name[h], m->group_name[g]);
       else if (common >= ALIKE * PetscMax(n, k))
-        CheckWarn(check, "the groups %s (%d nodes) and %s (%d) have %d nodes in common", m->group_name[h], (int)k,
-                  m->group_name[g], (int)n, (int)common);
+        CheckReportWarning(check, "the groups %s (%d nodes) and %s (%d) have %d nodes in common", m->group_name[h],
+                           (int)k, m->group_name[g], (int)n, (int)common);
     }
   }
 }
@@ -244,7 +245,7 @@ static PetscErrorCode MarkUsed(HycoScene s, HycoMesh m, PetscBool used[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode CheckGroups(Check *check)
+PetscErrorCode CheckReportGroups(Check *check)
 {
   HycoMesh m = check->whole->part;
   cJSON *unused = cJSON_AddArrayToObject(check->json, "unused_groups");
@@ -257,12 +258,12 @@ PetscErrorCode CheckGroups(Check *check)
   PetscCall(MarkUsed(check->fom->scene, m, used));
   for (PetscInt g = 0; g < m->n_groups; g++) {
     if (used[g] && m->group_start[g] == m->group_start[g + 1])
-      CheckWarn(check, "the group %s has no nodes of a body", m->group_name[g]);
+      CheckReportWarning(check, "the group %s has no nodes of a body", m->group_name[g]);
     if (used[g]) continue;
     cJSON_AddItemToArray(unused, cJSON_CreateString(m->group_name[g]));
     PetscCall(HycoListAdd(list, ", ", m->group_name[g]));
   }
-  if (list[0]) CheckWarn(check, "no entry of the scene uses these groups of the mesh: %s", list);
+  if (list[0]) CheckReportWarning(check, "no entry of the scene uses these groups of the mesh: %s", list);
   PetscCall(PetscFree(used));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -12,7 +12,7 @@
 #define MOST_CORNERS 4
 #define WIDE         10 /* ratio of a range's ends from which polynomials in its logarithm interpolate better */
 
-void CheckWarn(Check *check, const char format[], ...)
+void CheckReportWarning(Check *check, const char format[], ...)
 {
   char line[HYCO_LINE];
   va_list args;
@@ -51,8 +51,8 @@ static PetscErrorCode Measure(Check *check, const PetscReal mu[], PetscBool firs
 
   PetscFunctionBegin;
   if (check->whole != check->fom) PetscCall(HycoFOMAssemble(check->whole, mu));
-  CheckCells(check, fe);
-  PetscCall(CheckGaps(check, fe, first));
+  CheckReportCells(check, fe);
+  PetscCall(CheckReportGaps(check, fe, first));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -127,7 +127,7 @@ static PetscErrorCode SayTies(Check *check, HycoMesh m, PetscInt *n)
     cJSON_AddStringToObject(one, "name", s->tie[t].name);
     cJSON_AddNumberToObject(one, "n_nodes", nodes);
     cJSON_AddItemToArray(list, one);
-    PetscCall(CheckTie(check, t, one));
+    PetscCall(CheckReportTie(check, t, one));
     PetscCall(Say("tie %s: %d nodes of %s follow %s\n", s->tie[t].name, (int)nodes, s->tie[t].slave, s->tie[t].master));
     *n += nodes;
   }
@@ -240,7 +240,7 @@ static PetscErrorCode SayMotions(Check *check)
     loose += !IsRigidBodys(f, free.motion + k * HycoFEUnknowns(f->fe));
   }
   if (loose)
-    CheckWarn(
+    CheckReportWarning(
         check,
         "%d rigid motion%s prevented only by contact: full order can solve this if the loads press the bodies "
         "together, and so can hybrid and projection-based models; a condensed model needs a support or a soft spring",
@@ -321,9 +321,9 @@ static PetscErrorCode SayReach(Check *check, PetscInt p, cJSON *reaches)
             "%s\n",
             log10((double)s->lo[p]), log10((double)s->hi[p]), s->parameter[p]));
   }
-  if (!words[0]) CheckWarn(check, "the %s %s affects nothing: no expression uses it", what, s->parameter[p]);
+  if (!words[0]) CheckReportWarning(check, "the %s %s affects nothing: no expression uses it", what, s->parameter[p]);
   if (p < s->n_parameters && s->lo[p] == s->hi[p])
-    CheckWarn(check, "the range of the parameter %s is a single value", s->parameter[p]);
+    CheckReportWarning(check, "the range of the parameter %s is a single value", s->parameter[p]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -334,8 +334,8 @@ static PetscErrorCode Describe(Check *check)
 
   PetscFunctionBegin;
   PetscCall(SayMesh(check));
-  PetscCall(CheckBodies(check));
-  CheckContacts(check);
+  PetscCall(CheckReportBodies(check));
+  CheckReportContacts(check);
   PetscCall(SayMotions(check));
   PetscCall(CheckOutputs(check));
   reaches = cJSON_AddObjectToObject(check->json, "parameters");
@@ -345,7 +345,7 @@ static PetscErrorCode Describe(Check *check)
     PetscCall(Say("history of %d times from %g to %g\n", (int)s->n_times, (double)s->times[0],
                   (double)s->times[s->n_times - 1]));
   cJSON_AddNumberToObject(check->json, "n_times", s->n_times);
-  PetscCall(CheckGroups(check));
+  PetscCall(CheckReportGroups(check));
   PetscCall(Say("%d point%s of the ranges assembled%s%s\n", (int)check->n_points, check->n_points > 1 ? "s" : "",
                 s->n_parameters > MOST_CORNERS ? ": the centre and the ends of each parameter"
                 : s->n_parameters              ? ": the centre and the corners"
@@ -446,10 +446,10 @@ static PetscErrorCode Visit(Check *check, PetscBool solve, Cost *cost)
   begin = HycoNow();
   PetscCall(CheckPoint(check, mu, (PetscBool)(check->n_points == 1)));
   begin = HycoNow() - begin;
-  PetscCall(CheckEstimate(check, begin, cost));
+  PetscCall(CheckReportEstimate(check, begin, cost));
   HycoOnRoot(HycoComm(check->fom), Describe(check));
   PetscCall(SayBodies(check, mu));
-  if (solve) PetscCall(CheckSolve(check, mu, cost));
+  if (solve) PetscCall(CheckReportSolve(check, mu, cost));
   PetscCall(PetscFree(mu));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -477,8 +477,8 @@ PetscErrorCode CommandCheck(void)
   if (fom->size > 1) HycoOnRoot(PETSC_COMM_WORLD, HycoFOMCreate(PETSC_COMM_SELF, scene, &check.whole));
   PetscCall(Create(fom, &check));
   HycoStaged(HYCO_STAGE_FULL_ORDER, Visit(&check, solve, &cost));
-  PetscCall(CheckCountTraining(scene, samples, given, &cost));
-  PetscCall(CheckSayCost(&check, &cost, given));
+  PetscCall(CheckReportCountTraining(scene, samples, given, &cost));
+  PetscCall(CheckReportCost(&check, &cost, given));
   PetscCall(Finish(&check));
   if (fom->size > 1 && fom->rank == 0) PetscCall(HycoFOMDestroy(&check.whole));
   PetscCall(HycoFOMDestroy(&fom));

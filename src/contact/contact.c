@@ -132,36 +132,3 @@ PetscErrorCode HycoContactComplete(HycoContact contact)
              "the contact type %s declares neither group nor slave as required", ((PetscObject)contact)->type_name);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-PetscBool HycoContactAverages(HycoContact contact)
-{
-  return (PetscBool)(!contact->ops->normal && !contact->normal[0] && !contact->normal[1] && !contact->normal[2]);
-}
-
-void HycoContactChanges(HycoContact contact, const PetscBool changed[], PetscBool *rows, PetscBool *gaps)
-{
-  for (PetscInt j = 0; j < contact->entries.n; j++) {
-    const HycoEntry *e = &contact->entries.entry[j];
-
-    if (!HycoExprChanges(e->expr, changed)) continue;
-    if (strcmp(e->name, "gap")) *rows = PETSC_TRUE;
-    *gaps = PETSC_TRUE;
-  }
-}
-
-PetscErrorCode HycoContactCheckGroups(HycoContact contact, HycoMesh mesh)
-{
-  PetscInt group;
-
-  PetscFunctionBegin;
-  PetscCall(HycoMeshFindGroup(mesh, "contact", contact->slave, &group));
-  HycoCheck(!HycoContactAverages(contact) || mesh->group_dim[group] == mesh->dim - 1,
-            "contact %s: the group %s is not a surface and has no normal; give normal: {x: ..., ...}", contact->name,
-            contact->slave);
-  if (!contact->master) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoMeshFindGroup(mesh, "contact", contact->master, &group));
-  HycoCheck(!contact->ops->find || mesh->group_dim[group] == mesh->dim - 1,
-            "contact %s: the master group %s has dimension %d; a group of dimension %d is needed", contact->name,
-            contact->master, (int)mesh->group_dim[group], (int)mesh->dim - 1);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}

@@ -1,4 +1,4 @@
-/* Normals and sizes of surfaces on moved nodes. */
+/* Normals, sizes and areas of surfaces on moved nodes. */
 #include "facing.h"
 #include <hycocarriers.h>
 #include <hycokinematics.h>
@@ -53,4 +53,114 @@ void HycoSurfaceSizes(HycoFE fe, PetscInt group, PetscReal size[])
       if (w == corners + v || w == 2 * corners) size[node[w]] = PetscMax(size[node[w]], length);
     }
   }
+}
+
+/* Adds the values of tied nodes on a surface, by node and component (v, n_nodes x width), to their masters, which
+   have the contact there. Vectors, of which only the direction matters, are added by the size of the weights: on cells
+   of second order some are negative, and a sum could have the opposite direction. */
+static void PassTied(HycoMesh m, PetscInt width, PetscReal v[])
+{
+  for (PetscInt k = 0; k < m->n_tied; k++) {
+    const PetscReal *weight = m->ties->weight + m->tied_entry[k];
+
+    for (PetscInt j = m->tied_start[k]; j < m->tied_start[k + 1]; j++) {
+      const PetscReal w = weight[j - m->tied_start[k]];
+
+      for (PetscInt c = 0; c < width; c++)
+        v[m->tied_master[j] * width + c] += (width > 1 ? PetscAbsReal(w) : w) * v[m->tied[k] * width + c];
+    }
+  }
+}
+
+/* Adds n dS at a point of a facet to its node a, by the node's function N. Where a node has no area, on the axis, the
+   sum would be round-off: it is then weighted by N^2, and along the axis, by symmetry. */
+static void AddVector(HycoFE fe, PetscInt node, PetscReal N, const PetscReal n[3], PetscReal vector[3])
+{
+  const PetscBool none = HycoNodeHasNoArea(fe, node);
+
+  for (PetscInt c = none; c < 3; c++) vector[c] += (none ? N * N : N) * n[c];
+}
+
+PetscErrorCode HycoSurfaceVectors(HycoFE fe, PetscInt group, PetscReal vector[])
+{
+  HycoMesh m = fe->mesh;
+  const HycoElement *el = HycoElementGetFacet(m->type);
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(vector, 3 * m->n_nodes));
+  for (PetscInt f = 0; f < m->n_facets; f++) {
+    if (m->facet_group[f] != group) continue;
+    for (PetscInt q = 0; q < el->nq; q++) {
+      PetscReal n[3];
+
+      PetscCall(HycoFacetNormal(fe, el, f, q, n));
+      for (PetscInt a = 0; a < m->nf; a++) {
+        const PetscInt node = m->facets[f * m->nf + a];
+
+        AddVector(fe, node, el->N[q][a], n, vector + 3 * node);
+      }
+    }
+  }
+  PassTied(m, 3, vector);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The part of each node (share, n_nodes) in the area of the surface `group`. */
+static PetscErrorCode Shares(HycoFE fe, PetscInt group, PetscReal share[])
+{
+  HycoMesh m = fe->mesh;
+  const HycoElement *el = HycoElementGetFacet(m->type);
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(share, m->n_nodes));
+  for (PetscInt f = 0; f < m->n_facets; f++) {
+    for (PetscInt q = 0; m->facet_group[f] == group && q < el->nq; q++) {
+      PetscReal n[3];
+
+      PetscCall(HycoFacetNormal(fe, el, f, q, n));
+      for (PetscInt a = 0; a < m->nf; a++) {
+        const PetscInt node = m->facets[f * m->nf + a];
+
+        if (!HycoNodeHasNoArea(fe, node)) share[node] += el->N[q][a] * PetscSqrtReal(HycoDot(n, n));
+      }
+    }
+  }
+  PassTied(m, 1, share);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, PetscReal area[])
+{
+  PetscReal *share;
+  PetscInt last = -1;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(fe->mesh->n_nodes, &share));
+  for (PetscInt k = 0; k < pairs->n; k++) {
+    if (last != pairs->contact[k]) {
+      PetscInt g = 0;
+
+      last = pairs->contact[k];
+      PetscCall(HycoMeshFindGroup(fe->mesh, "contact", fe->scene->contact[last]->slave, &g));
+      PetscCall(Shares(fe, g, share));
+    }
+    area[k] = share[pairs->slave[k]];
+  }
+  PetscCall(PetscFree(share));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscReal HycoSurfaceTolerance(HycoMesh m, PetscInt group)
+{
+  const PetscInt corners = HycoCellKinds[m->type].corners;
+  PetscReal shortest = PETSC_MAX_REAL;
+
+  for (PetscInt f = 0; f < m->n_facets; f++) {
+    const PetscInt *node = m->facets + f * m->nf, n = HycoFacetCorners(corners, node);
+
+    if (m->facet_group[f] != group) continue;
+    for (PetscInt v = 0; v < n && n > 1; v++) /* the last edge ends at the first node */
+      shortest = PetscMin(shortest, HycoDistance(m->xyz + 3 * node[v], m->xyz + 3 * node[(v + 1) % n]));
+  }
+  return shortest < PETSC_MAX_REAL ? shortest / 10 : 0;
 }

@@ -1,4 +1,4 @@
-/* Normals and sizes of surfaces on moved nodes: private to contact/. */
+/* Normals, sizes and areas of surfaces on moved nodes: private to contact/. */
 #ifndef HYCO_FACING_H
 #define HYCO_FACING_H
 #include <hycocontactimpl.h>
@@ -14,6 +14,8 @@ PetscErrorCode HycoSurfaceNormals(HycoFE fe, PetscInt group, PetscReal normal[])
 PetscErrorCode HycoFacetVector(HycoFE fe, PetscInt facet, PetscReal vector[3]);
 /* Whether each node of a contact's group takes contact forces (carries: n_nodes; the others are PETSC_FALSE). */
 void HycoSurfaceCarriers(HycoMesh mesh, PetscInt group, PetscBool carries[]);
+/* The default tolerance of a search: a tenth of the shortest edge between the corners of the group's facets. */
+PetscReal HycoSurfaceTolerance(HycoMesh mesh, PetscInt group);
 /* Fails if measured gaps overlap more than the scene allows, or if a map has moved a pair's nodes apart along the
    surface. normal and gap as computed by HycoContactGeometry(). */
 PetscErrorCode HycoContactCheck(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], const PetscReal gap[]);

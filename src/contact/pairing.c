@@ -7,21 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-PetscReal HycoSurfaceTolerance(HycoMesh m, PetscInt group)
-{
-  const PetscInt corners = HycoCellKinds[m->type].corners;
-  PetscReal shortest = PETSC_MAX_REAL;
-
-  for (PetscInt f = 0; f < m->n_facets; f++) {
-    const PetscInt *node = m->facets + f * m->nf, n = HycoFacetCorners(corners, node);
-
-    if (m->facet_group[f] != group) continue;
-    for (PetscInt v = 0; v < n && n > 1; v++) /* the last edge ends at the first node */
-      shortest = PetscMin(shortest, HycoDistance(m->xyz + 3 * node[v], m->xyz + 3 * node[(v + 1) % n]));
-  }
-  return shortest < PETSC_MAX_REAL ? shortest / 10 : 0;
-}
-
 /* A slave node without a master. */
 typedef struct {
   PetscReal distance;

@@ -22,8 +22,6 @@ typedef struct {
   PetscBool *at_border;       /* by node; NULL: not created */
 } HycoPartners;
 
-/* The default tolerance: a tenth of the shortest edge between the corners of the group's facets. */
-PetscReal HycoSurfaceTolerance(HycoMesh mesh, PetscInt group);
 /* Creates the search on fe's nodes. The caller destroys it. */
 PetscErrorCode HycoPartnersCreate(HycoFE fe, HycoContact contact, PetscBool nodes, HycoPartners *partners);
 PetscErrorCode HycoPartnersDestroy(HycoPartners *partners);

@@ -2,8 +2,8 @@
   The search for ties: the masters of a slave node are those of the nearest point of the master's facets. Also contacts
   on tied nodes, which have no displacement of their own.
 */
+#include "facing.h"
 #include "nearest.h"
-#include "partners.h"
 
 /* By node of the mesh: the tie of which it is a slave (-1: none), the point that it follows. */
 typedef struct {

@@ -362,32 +362,3 @@ PetscErrorCode HycoFEFindUnconstrained(MPI_Comm comm, HycoFE fe, HycoFE wide, co
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-void HycoTurnNormal(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscReal n[3])
-{
-  PetscReal unit[3][3], length;
-  PetscInt n_units = 0;
-
-  for (PetscInt a = 0; a < fe->n_turned && n_units + 1 < fe->dim; a++) {
-    PetscReal *d = unit[n_units], before;
-
-    HycoPairsJump(pairs, k, fe->dim, fe->released + (size_t)a * (size_t)fe->n_dof, d);
-    before = HycoDot(d, d);
-    for (PetscInt b = 0; b < n_units; b++) {
-      const PetscReal dot = HycoDot(d, unit[b]);
-
-      for (PetscInt c = 0; c < 3; c++) d[c] -= dot * unit[b][c];
-    }
-    length = PetscSqrtReal(HycoDot(d, d));
-    if (length <= 1e-9 / PetscSqrtReal((PetscReal)HycoFEUnknowns(fe)) || length * length < 0.01 * before) continue;
-    for (PetscInt c = 0; c < 3; c++) d[c] /= length;
-    n_units++;
-  }
-  for (PetscInt b = 0; b < n_units; b++) {
-    const PetscReal dot = HycoDot(n, unit[b]);
-
-    for (PetscInt c = 0; c < 3; c++) n[c] -= dot * unit[b][c];
-  }
-  length = PetscSqrtReal(HycoDot(n, n));
-  for (PetscInt c = 0; c < 3 && length > 0; c++) n[c] /= length;
-}

@@ -71,23 +71,24 @@ PetscErrorCode HycoROMCompareRID(HycoROM m, const PetscReal u[], const PetscReal
 }
 
 /* Modes, norms and star forests of the last model with which a full-order model was compared. */
-struct _n_HycoCompared {
+typedef struct {
   PetscObjectId id; /* the model's, on rank 0 */
   HycoComparison rows;
   HycoNorms norms;
   PetscReal *V; /* the modes in these rows, column major */
-};
+} * HycoCompared;
 
-PetscErrorCode HycoComparedDestroy(HycoCompared *compared)
+#define COMPARED "HycoCompared" /* they are composed with the full-order model */
+
+static PetscErrorCode DestroyCompared(HycoContained contained)
 {
-  HycoCompared k = *compared;
+  HycoCompared k = (HycoCompared)HycoContainedContext(contained);
 
   PetscFunctionBegin;
-  if (!k) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoComparisonDestroy(&k->rows));
   PetscCall(HycoNormsDestroy(&k->norms));
   PetscCall(PetscFree(k->V));
-  PetscCall(PetscFree(*compared));
+  PetscCall(PetscFree(k));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -126,21 +127,30 @@ static PetscErrorCode Fill(HycoROM m, HycoFOM f, HycoCompared k)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets f->compared for this model. Collective. */
-static PetscErrorCode Keep(HycoROM m, HycoFOM f)
+/* Those for this model. Collective. */
+static PetscErrorCode Keep(HycoROM m, HycoFOM f, HycoCompared *k)
 {
   PetscObjectId id = 0;
+  PetscContainer container;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
   if (f->rank == 0) PetscCall(PetscObjectGetId((PetscObject)m, &id));
   PetscCallMPI(MPI_Bcast(&id, 1, MPIU_INT64, 0, HycoComm(f)));
-  if (f->compared && f->compared->id == id) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoComparedDestroy(&f->compared));
-  PetscCall(PetscNew(&f->compared));
-  f->compared->id = id;
-  ierr = Fill(m, f, f->compared);
-  if (ierr) PetscCall(HycoComparedDestroy(&f->compared));
+  PetscCall(PetscObjectQuery((PetscObject)f, COMPARED, (PetscObject *)&container));
+  if (container) {
+    PetscCall(PetscContainerGetPointer(container, (void **)k));
+    if ((*k)->id == id) PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(PetscObjectCompose((PetscObject)f, COMPARED, NULL));
+  PetscCall(PetscNew(k));
+  (*k)->id = id;
+  PetscCall(PetscContainerCreate(PETSC_COMM_SELF, &container));
+  PetscCall(PetscContainerSetPointer(container, *k));
+  PetscCall(PetscContainerSetCtxDestroy(container, DestroyCompared));
+  ierr = Fill(m, f, *k);
+  if (!ierr) ierr = PetscObjectCompose((PetscObject)f, COMPARED, (PetscObject)container);
+  PetscCall(PetscContainerDestroy(&container));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -187,8 +197,7 @@ PetscErrorCode HycoROMCompare(HycoROM m, HycoFOM f, HycoErrors *e)
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
   PetscCheck(f->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoFOMSolve() before HycoROMCompare()");
   HycoOnRoot(HycoComm(f), Check(m, f));
-  PetscCall(Keep(m, f));
-  k = f->compared;
+  PetscCall(Keep(m, f, &k));
   PetscCall(HycoFOMStress(f));
   PetscCall(HycoFOMGetLambda(f, &lambda));
   PetscCall(HycoFOMToRows(f, HYCO_ON_NODES, MPIU_REAL, k->rows.width[0], f->u, k->rows.value[0]));

@@ -323,7 +323,10 @@ HycoChanges HycoSceneChanges(HycoScene s, const PetscBool changed[])
     c.stiffness = (PetscBool)(c.stiffness || HycoMaterialChanges(s->body[b].law, changed));
   for (PetscInt k = 0; k < 4 * s->n_springs; k++)
     c.stiffness = (PetscBool)(c.stiffness || HycoExprChanges(s->spring[k / 4].stiffness[k % 4], changed));
-  for (PetscInt k = 0; k < s->n_contacts; k++) HycoContactChanges(s->contact[k], changed, &c.rows, &c.gaps);
+  for (PetscInt k = 0; k < s->n_contacts; k++) {
+    c.rows = (PetscBool)(c.rows || HycoDeclaredChanges(&s->contact[k]->entries, "gap", changed));
+    c.gaps = (PetscBool)(c.gaps || HycoDeclaredChanges(&s->contact[k]->entries, NULL, changed));
+  }
   return c;
 }
 

@@ -459,3 +459,36 @@ PetscErrorCode HycoFOMKeepOnRoot(HycoFOM f)
   f->gathered = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode HycoMarkContactGroups(HycoScene scene, HycoMesh mesh, PetscBool group[])
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < 2 * scene->n_contacts; k++) {
+    HycoContact c = scene->contact[k / 2];
+    PetscInt g = 0;
+
+    if (k % 2 && !c->master) continue;
+    PetscCall(HycoMeshFindGroup(mesh, "contact", k % 2 ? c->master : c->slave, &g));
+    group[g] = PETSC_TRUE;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFOMSetUpSurface(HycoFOM f)
+{
+  const PetscInt dim = f->part->dim;
+  IS is;
+
+  PetscFunctionBegin;
+  HycoOnEach(HycoComm(f), f->surface ? HycoFECreate(f->scene, f->surface, &f->fe_surface) : PETSC_SUCCESS);
+  if (f->gathered) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecScatterDestroy(&f->to_surface));
+  PetscCall(VecDestroy(&f->U_surface));
+  PetscCall(VecCreateSeq(PETSC_COMM_SELF, f->fe_surface->n_dof, &f->U_surface));
+  PetscCall(ISCreateBlock(PETSC_COMM_SELF, dim, f->surface->n_nodes, f->surface->node_global, PETSC_COPY_VALUES, &is));
+  PetscCall(VecScatterCreate(f->U, is, f->U_surface, NULL, &f->to_surface));
+  PetscCall(ISDestroy(&is));
+  PetscCall(PetscFree(f->u_surface));
+  PetscCall(PetscCalloc1(f->fe_surface->n_dof, &f->u_surface));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

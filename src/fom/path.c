@@ -372,25 +372,6 @@ PetscErrorCode HycoPathSolve(HycoFOM f, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void HycoPathSummary(HycoFOM f, HycoSummary *s)
-{
-  const HycoPath p = f->path;
-
-  s->iterations = 0;
-  s->seconds.factor = s->seconds.solve = 0;
-  for (PetscInt k = 0; k < p->n_steps; k++) {
-    s->iterations += p->steps[k].iterations;
-    s->seconds.factor += p->steps[k].seconds_factor;
-    s->seconds.solve += p->steps[k].seconds_solve;
-  }
-  s->kkt = p->kkt;
-  s->reason = p->ended ? HYCO_CONVERGED : HYCO_DIVERGED_STEP;
-  s->strain_energy = p->work_done.stored;
-  s->external_work = p->work_done.loads + p->work_done.supports;
-  s->gap_work = p->work_done.contact;
-  s->energy_defect = p->work_done.defect;
-}
-
 PetscErrorCode HycoFOMGetHistory(HycoFOM f, HycoHistory *h)
 {
   PetscFunctionBegin;

@@ -3,120 +3,6 @@
 #include <hycoquantities.h>
 #include <hycopath.h>
 
-PetscErrorCode HycoFOMToLocal(HycoFOM f, Vec v, PetscReal value[])
-{
-  Vec local;
-
-  PetscFunctionBegin;
-  PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, f->fe->n_dof, value, &local));
-  PetscCall(VecScatterBegin(f->to_local, v, local, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecScatterEnd(f->to_local, v, local, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecDestroy(&local));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoFOMToSurface(HycoFOM f, Vec v, PetscReal value[])
-{
-  const PetscScalar *from;
-  Vec at = f->to_surface ? f->U_surface : v;
-
-  PetscFunctionBegin;
-  if (f->to_surface) {
-    PetscCall(VecScatterBegin(f->to_surface, v, at, INSERT_VALUES, SCATTER_FORWARD));
-    PetscCall(VecScatterEnd(f->to_surface, v, at, INSERT_VALUES, SCATTER_FORWARD));
-  }
-  PetscCall(VecGetArrayRead(at, &from));
-  PetscCall(PetscArraycpy(value, from, f->fe_surface->n_dof));
-  PetscCall(VecRestoreArrayRead(at, &from));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoFOMGather(HycoFOM f)
-{
-  const PetscScalar *v;
-  PetscScalar *local;
-  Vec shown = f->U;
-
-  PetscFunctionBegin;
-  PetscCall(VecScatterBegin(f->to_local, f->U, f->U_local, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecScatterEnd(f->to_local, f->U, f->U_local, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecGetArray(f->U_local, &local));
-  HycoFEComplete(f->fe, local);
-  PetscCall(VecRestoreArray(f->U_local, &local));
-  if (f->n_turned) {
-    PetscCall(VecDuplicate(f->U, &shown));
-    PetscCall(VecCopy(f->U, shown));
-    PetscCall(HycoFOMTakeOutReleased(f, shown));
-  }
-  PetscCall(HycoFOMToLocal(f, shown, f->u));
-  HycoFEComplete(f->fe, f->u);
-  if (f->to_surface) PetscCall(HycoFOMToSurface(f, shown, f->u_surface));
-  if (f->to_surface) HycoFEComplete(f->fe_surface, f->u_surface);
-  if (f->n_turned) PetscCall(VecDestroy(&shown));
-  if (!f->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecGetArrayRead(f->Lambda, &v));
-  PetscCall(PetscArraycpy(f->lambda, v, f->pairs.n));
-  PetscCall(VecRestoreArrayRead(f->Lambda, &v));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoFOMGetNumbers(HycoFOM f, PetscInt **number)
-{
-  PetscInt n;
-
-  PetscFunctionBegin;
-  PetscCall(HycoConcatenate(HycoComm(f), f->pairs.n, f->pairs.number, MPIU_INT, sizeof(PetscInt), &n, number));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoFOMGetLambda(HycoFOM f, const PetscReal *lambda[])
-{
-  PetscInt n, *number;
-  const PetscScalar *mine;
-  PetscReal *all;
-
-  PetscFunctionBegin;
-  *lambda = f->lambda;
-  if (f->size == 1 || !f->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoFOMGetNumbers(f, &number));
-  PetscCall(VecGetArrayRead(f->Lambda, &mine));
-  PetscCall(HycoConcatenate(HycoComm(f), f->pairs.n, mine, MPIU_REAL, sizeof(PetscReal), &n, &all));
-  PetscCall(VecRestoreArrayRead(f->Lambda, &mine));
-  if (f->rank == 0 && !f->lambda_all) PetscCall(PetscMalloc1(f->n_contacts, &f->lambda_all));
-  for (PetscInt k = 0; k < n; k++) f->lambda_all[number[k]] = all[k];
-  HycoFreeAll(&number, &all);
-  *lambda = f->lambda_all;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoFOMSetLambda(HycoFOM f, const PetscReal lambda[])
-{
-  PetscInt *number = NULL;
-
-  PetscFunctionBegin;
-  if (!f->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
-  if (f->size > 1) PetscCall(HycoFOMGetNumbers(f, &number));
-  for (PetscInt k = 0; f->rank == 0 && k < f->n_contacts; k++)
-    PetscCall(VecSetValue(f->Lambda, k, lambda[number ? number[k] : k], INSERT_VALUES));
-  PetscCall(VecAssemblyBegin(f->Lambda));
-  PetscCall(VecAssemblyEnd(f->Lambda));
-  PetscCall(PetscFree(number));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoFOMWriteForces(HycoFOM f, HycoH5 h, const char name[])
-{
-  const PetscScalar *lambda = NULL;
-  PetscErrorCode ierr;
-
-  PetscFunctionBegin;
-  if (f->n_contacts) PetscCall(VecGetArrayRead(f->Lambda, &lambda));
-  ierr = HycoContactsWrite(HycoComm(f), h, name, &f->pairs, f->n_contacts, MPIU_REAL, lambda);
-  if (f->n_contacts) PetscCall(VecRestoreArrayRead(f->Lambda, &lambda));
-  PetscCall(ierr);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode MeasureContacts(HycoFOM f, HycoSummary *s)
 {
   PetscReal sum[2] = {0, 0}, most[3] = {0, 0, 0};
@@ -226,6 +112,26 @@ PetscErrorCode HycoFOMMeasureQuantities(HycoFOM f, PetscReal value[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The sums over the steps of a path. */
+static void SumPath(HycoFOM f, HycoSummary *s)
+{
+  const HycoPath p = f->path;
+
+  s->iterations = 0;
+  s->seconds.factor = s->seconds.solve = 0;
+  for (PetscInt k = 0; k < p->n_steps; k++) {
+    s->iterations += p->steps[k].iterations;
+    s->seconds.factor += p->steps[k].seconds_factor;
+    s->seconds.solve += p->steps[k].seconds_solve;
+  }
+  s->kkt = p->kkt;
+  s->reason = p->ended ? HYCO_CONVERGED : HYCO_DIVERGED_STEP;
+  s->strain_energy = p->work_done.stored;
+  s->external_work = p->work_done.loads + p->work_done.supports;
+  s->gap_work = p->work_done.contact;
+  s->energy_defect = p->work_done.defect;
+}
+
 PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
 {
   HycoSummary *s;
@@ -244,7 +150,7 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
   PetscCall(HycoSolverGetReason(f->given ? f->given_solver : f->solver, &s->reason));
   if (f->given) s->kkt = f->given_kkt;
   if (f->path)
-    HycoPathSummary(f, s);
+    SumPath(f, s);
   else
     PetscCall(HycoFOMEnergy(f, s));
   PetscCall(MeasureDisplacements(f, s));
@@ -342,47 +248,6 @@ PetscErrorCode HycoFOMGetForces(HycoFOM f, PetscReal forces[])
   PetscCall(HycoFOMToLocal(f, work, forces));
   for (PetscInt k = 0; k < f->fe->n_dof; k++) forces[k] = f->fe->fixed[k] ? 0 : forces[k];
   PetscCall(VecDestroy(&work));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoFOMGetRows(HycoFOM f, const HycoFileOrder **rows)
-{
-  PetscFunctionBegin;
-  if (f->size > 1 && !f->rows) PetscCall(HycoFileOrderCreate(HycoComm(f), f->part, PETSC_FALSE, &f->rows));
-  *rows = f->rows;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoFOMFromRows(HycoFOM f, HycoPlace place, PetscInt components, const PetscReal rows[],
-                               PetscReal value[])
-{
-  const PetscInt n = place == HYCO_ON_CELLS ? f->part->n_cells : f->part->n_nodes;
-  const HycoFileOrder *order;
-
-  PetscFunctionBegin;
-  PetscCall(HycoFOMGetRows(f, &order));
-  if (order)
-    PetscCall(HycoFileOrderFetch(order, f->part, place, components, rows, value));
-  else
-    PetscCall(PetscArraycpy(value, rows, n * components));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoFOMToRows(HycoFOM f, HycoPlace place, MPI_Datatype type, PetscInt components, const void *value,
-                             void *rows)
-{
-  const HycoFileOrder *order;
-  const PetscInt n = place == HYCO_ON_CELLS ? f->part->n_cells : f->part->n_nodes;
-  PetscMPIInt size;
-
-  PetscFunctionBegin;
-  PetscCall(HycoFOMGetRows(f, &order));
-  if (order) {
-    PetscCall(HycoFileOrderSend(order, place, type, components, value, rows));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCallMPI(MPI_Type_size(type, &size));
-  PetscCall(PetscMemcpy(rows, value, (size_t)(n * components) * (size_t)size));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

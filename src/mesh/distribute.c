@@ -1,6 +1,5 @@
 /* Distributes the mesh over the ranks: DMPlexDistribute() with this library's partitioner; the tags are sent along. */
 #include "plex.h"
-#include <hycocontactimpl.h>
 #include <string.h>
 
 PetscErrorCode HycoPlexSendTags(DM from, PetscSF sf, DM to)
@@ -119,8 +118,7 @@ static PetscErrorCode NumberPoints(DM dm)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* For a DM that was not made from a mesh file: tags, and labels with the closure of their points on every process. */
-static PetscErrorCode Complete(DM dm)
+PetscErrorCode HycoPlexComplete(DM dm)
 {
   PetscInt n, dim, depth;
   PetscObject tags;
@@ -145,78 +143,5 @@ static PetscErrorCode Complete(DM dm)
     PetscCall(DMGetLabel(dm, name, &label));
     PetscCall(DMPlexLabelComplete(dm, label));
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Ties must be found in the mesh file, before it is refined or distributed. */
-static PetscErrorCode CheckTies(HycoScene scene)
-{
-  size_t length;
-
-  PetscFunctionBegin;
-  if (!scene->n_ties) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscStrlen(scene->mesh_path, &length));
-  HycoCheck(!scene->dm && (length < 3 || strcmp(scene->mesh_path + length - 3, ".h5")),
-            "tie %s: ties need the mesh as a gmsh file, not as a DMPlex", scene->tie[0].name);
-  HycoCheck(!scene->refine, "tie %s: scene_refine cannot refine a mesh with ties; refine the file (gmsh -refine)",
-            scene->tie[0].name);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode ReadMesh(HycoScene scene, HycoMesh *mesh)
-{
-  HycoTies ties = NULL;
-  PetscErrorCode ierr;
-
-  PetscFunctionBegin;
-  PetscCall(HycoMeshRead(scene, mesh));
-  if (!scene->n_ties) PetscFunctionReturn(PETSC_SUCCESS);
-  ierr = HycoMeshCheckCells(*mesh);
-  if (!ierr) ierr = HycoTiesFind(scene, *mesh, &ties);
-  if (!ierr) ierr = HycoMeshSetTies(*mesh, ties);
-  PetscCall(HycoTiesDestroy(&ties));
-  if (ierr) PetscCall(HycoMeshDestroy(mesh));
-  PetscCall(ierr);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoMeshLoad(MPI_Comm comm, HycoScene scene, DM *dm)
-{
-  HycoMesh mesh = NULL;
-  size_t length;
-
-  PetscFunctionBegin;
-  PetscCall(CheckTies(scene));
-  if (scene->dm) {
-    int same;
-
-    PetscCallMPI(MPI_Comm_compare(comm, HycoComm(scene->dm), &same));
-    HycoCheck(same == MPI_IDENT || same == MPI_CONGRUENT,
-              "the scene's DM lives on other processes than the model; for training give -hyco_groups 1");
-    PetscCall(DMClone(scene->dm, dm));
-    PetscCall(Complete(*dm));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCall(PetscStrlen(scene->mesh_path, &length));
-  if (length > 3 && strcmp(scene->mesh_path + length - 3, ".h5") == 0) {
-    PetscCall(HycoPlexRead(comm, scene->mesh_path, dm));
-    PetscCall(Complete(*dm));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  HycoOnRoot(comm, ReadMesh(scene, &mesh));
-  PetscCall(HycoPlexFromMesh(comm, mesh, dm));
-  if (mesh) PetscCall(HycoMeshDestroy(&mesh));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoMeshCreate(MPI_Comm comm, HycoScene scene, HycoMesh *mesh)
-{
-  DM dm;
-
-  PetscFunctionBegin;
-  PetscCall(HycoMeshLoad(comm, scene, &dm));
-  PetscCall(HycoPlexRefine(&dm, scene, scene->refine));
-  PetscCall(HycoPlexToMesh(dm, scene, mesh));
-  PetscCall(DMDestroy(&dm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -122,6 +122,24 @@ static PetscErrorCode CheckTie(HycoMesh mesh, const HycoTie *tie)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* That the contact's groups are in the mesh, and surfaces where required. */
+static PetscErrorCode CheckContact(HycoMesh mesh, HycoContact contact)
+{
+  PetscInt group;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeshFindGroup(mesh, "contact", contact->slave, &group));
+  HycoCheck(!HycoContactAverages(contact) || mesh->group_dim[group] == mesh->dim - 1,
+            "contact %s: the group %s is not a surface and has no normal; give normal: {x: ..., ...}", contact->name,
+            contact->slave);
+  if (!contact->master) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoMeshFindGroup(mesh, "contact", contact->master, &group));
+  HycoCheck(!contact->ops->find || mesh->group_dim[group] == mesh->dim - 1,
+            "contact %s: the master group %s has dimension %d; a group of dimension %d is needed", contact->name,
+            contact->master, (int)mesh->group_dim[group], (int)mesh->dim - 1);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene)
 {
   PetscInt group;
@@ -145,7 +163,7 @@ PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene)
   }
   for (PetscInt k = 0; k < scene->n_point_loads; k++) PetscCall(CheckPointLoad(mesh, &scene->point_load[k]));
   for (PetscInt k = 0; k < scene->n_springs; k++) PetscCall(CheckSpring(mesh, &scene->spring[k]));
-  for (PetscInt k = 0; k < scene->n_contacts; k++) PetscCall(HycoContactCheckGroups(scene->contact[k], mesh));
+  for (PetscInt k = 0; k < scene->n_contacts; k++) PetscCall(CheckContact(mesh, scene->contact[k]));
   for (PetscInt k = 0; k < scene->n_ties; k++) PetscCall(CheckTie(mesh, &scene->tie[k]));
   HycoCheck(!scene->n_contacts || mesh->type != HYCO_HEX20,
             "contact %s: the mesh has hex20 cells, at whose corners a uniform pressure would give tensile forces; use "

@@ -14,14 +14,8 @@
 #define HYCO_TAGS "HycoTags"
 /* Attaches the file's tags of all points of this process; takes ownership. */
 PetscErrorCode HycoPlexSetTags(DM dm, PetscInt tag[]);
-/* Creates a DM from rank 0's tables (NULL elsewhere), not distributed. Collective. */
-PetscErrorCode HycoPlexFromMesh(MPI_Comm comm, HycoMesh mesh, DM *dm);
 /* Sends the tags of a DM's points along the star forest of their distribution to another DM. Collective. */
 PetscErrorCode HycoPlexSendTags(DM from, PetscSF sf, DM to);
-/* Halves all cells `times` times. New vertices get tags above the existing ones, in the order of their parents'. The
-   DM must have no overlap. Groups are refined too; fails for one of the scene's whose lines or facets the DM does
-   not know. Collective. */
-PetscErrorCode HycoPlexRefine(DM *dm, HycoScene scene, PetscInt times);
 /* The vertices of a point; of a cell in gmsh's order (type: HYCO_N_CELL_TYPES for points that are not cells).
    `interpolated`: edges and faces are points of the DM. */
 PetscErrorCode HycoPlexVertices(DM dm, PetscBool interpolated, HycoCellType type, PetscInt point, PetscInt n,
@@ -69,6 +63,5 @@ PetscErrorCode HycoPartitionerSetMesh(PetscPartitioner partitioner, HycoMesh mes
 
 /* Writes PETSc's HDF5 format, with the tags. The DM must have no overlap. Collective. */
 PetscErrorCode HycoPlexWrite(DM dm, const char path[]);
-PetscErrorCode HycoPlexRead(MPI_Comm comm, const char path[], DM *dm);
 
 #endif

@@ -1,5 +1,5 @@
 /* The history of a scene: its listed times, its tables, and the variables for expressions. */
-#include "entries.h"
+#include <hycoentries.h>
 #include <hycocontactimpl.h>
 #include <string.h>
 
@@ -129,7 +129,7 @@ PetscErrorCode HycoSceneReadHistory(HycoScene s)
 
 PetscErrorCode HycoSceneCheckHistory(HycoScene s)
 {
-  PetscBool in_time[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, rows = PETSC_FALSE, gaps;
+  PetscBool in_time[HYCO_MAX_PARAMETERS] = {PETSC_FALSE};
 
   PetscFunctionBegin;
   for (PetscInt p = s->n_parameters; p < s->n_variables; p++) in_time[p] = PETSC_TRUE;
@@ -147,8 +147,8 @@ PetscErrorCode HycoSceneCheckHistory(HycoScene s)
               "%s changes in time; the stiffness of a spring must be constant in time", HycoExprKey(stiffness));
   }
   for (PetscInt k = 0; k < s->n_contacts; k++) {
-    HycoContactChanges(s->contact[k], in_time, &rows, &gaps);
-    HycoCheck(!rows, "contact %s: its normal changes in time; only the gap may change in time",
+    HycoCheck(!HycoDeclaredChanges(&s->contact[k]->entries, "gap", in_time),
+              "contact %s: its normal changes in time; only the gap may change in time",
               ((PetscObject)s->contact[k])->name);
   }
   PetscFunctionReturn(PETSC_SUCCESS);

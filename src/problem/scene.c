@@ -1,5 +1,5 @@
 /* HycoScene: from entries to bodies, supports, loads, contacts and parameters. */
-#include "entries.h"
+#include <hycoentries.h>
 #include <hycocontactimpl.h>
 #include <hycomaterialimpl.h>
 #include <ctype.h>
@@ -141,20 +141,6 @@ static PetscErrorCode ReadRange(HycoScene s, PetscInt p)
   s->lo[p] = range[0];
   s->hi[p] = range[1];
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscBool HycoIsVariableName(const char word[])
-{
-  static const char *const taken[] = {"x", "y", "z", "pi"};
-
-  for (size_t k = 0; k < sizeof(taken) / sizeof(taken[0]); k++) {
-    if (strcmp(word, taken[k]) == 0) return PETSC_FALSE;
-  }
-  if (!isalpha((unsigned char)word[0])) return PETSC_FALSE;
-  for (; *word; word++) {
-    if (!isalnum((unsigned char)*word) && *word != '_') return PETSC_FALSE;
-  }
-  return PETSC_TRUE;
 }
 
 static PetscErrorCode ReadParameters(HycoScene s)

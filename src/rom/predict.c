@@ -108,3 +108,23 @@ PetscErrorCode HycoROMSetSolution(HycoROM m, const PetscReal mu[], const PetscRe
   PetscCall(PetscStrncpy(p->method, m->model->type, sizeof(p->method)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode HycoROMReset(HycoROM m)
+{
+  PetscFunctionBegin;
+  m->ready = m->solved = m->whole_current = m->beyond_current = PETSC_FALSE;
+  if (m->work || !m->model->traits.work) PetscTryTypeMethod(m, reset);
+  PetscCall(PetscFree(m->work));
+  PetscCall(HycoProbeDestroy(&m->probe));
+  PetscCall(HycoCarriedDestroy(&m->carried));
+  PetscCall(HycoFEDestroy(&m->fe_floating));
+  PetscCall(HycoSolverDestroy(&m->solver));
+  PetscCall(HycoFEDestroy(&m->fe_beyond));
+  PetscCall(PetscFree(m->beyond));
+  PetscCall(HycoRowsDestroy(&m->rows));
+  PetscCall(HycoFEDestroy(&m->fe));
+  m->of_fe = NULL;
+  PetscCall(HycoTraceFree(m));
+  HycoFreeAll(&m->contact, &m->gamma, &m->U, &m->Lambda, &m->stress, &m->slave_id);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

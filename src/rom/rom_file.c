@@ -17,79 +17,6 @@
 #define HYCO_ROM_OLDEST 2
 #define HYCO_ROM_KIND   "hyco hybrid model"
 
-/* The groups' names, one on each line. */
-PetscErrorCode HycoMeshMoveGroupNames(HycoH5 h, const char name[], HycoMesh m)
-{
-  char *names, *word, *rest;
-  size_t length = 1;
-  PetscInt g = 0;
-
-  PetscFunctionBegin;
-  if (!HycoH5Reads(h)) {
-    for (g = 0; g < m->n_groups; g++) length += strlen(m->group_name[g]) + 1;
-    PetscCall(PetscCalloc1(length, &names));
-    for (g = 0; g < m->n_groups; g++) {
-      PetscCall(PetscStrlcat(names, m->group_name[g], length));
-      PetscCall(PetscStrlcat(names, "\n", length));
-    }
-    PetscCall(HycoH5WriteText(h, name, names));
-  } else {
-    PetscCall(PetscCalloc1(m->n_groups + 1, &m->group_name));
-    PetscCall(HycoH5LoadText(h, name, &names));
-    for (word = strtok_r(names, "\n", &rest); word && g < m->n_groups; word = strtok_r(NULL, "\n", &rest))
-      PetscCall(PetscStrallocpy(word, &m->group_name[g++]));
-  }
-  PetscCall(PetscFree(names));
-  HycoCheck(g == m->n_groups, "the model's group names are damaged");
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static const char *At(const char prefix[], const char name[], char path[128])
-{
-  (void)snprintf(path, 128, "%s/%s", prefix, name);
-  return path;
-}
-
-PetscErrorCode HycoMeshMove(HycoH5 h, const char prefix[], PetscInt n_bodies, HycoMesh *mesh)
-{
-  HycoMesh m;
-  PetscInt head[2], last;
-  char path[128];
-
-  PetscFunctionBegin;
-  if (HycoH5Reads(h)) {
-    PetscCall(PetscNew(mesh));
-    (*mesh)->n_nodes = (*mesh)->n_cells = (*mesh)->n_facets = (*mesh)->n_groups = -1;
-  }
-  m = *mesh;
-  head[0] = (PetscInt)m->type;
-  head[1] = m->dim;
-  PetscCall(HycoH5Ints(h, At(prefix, "head", path), 0, HYCO_N_MESH_TYPES - 1, 2, head));
-  m->type = (HycoCellType)head[0];
-  m->dim = HycoElementGet(m->type)->dim;
-  m->nv = HycoElementGet(m->type)->nv;
-  m->nf = HycoElementGetFacet(m->type)->nv;
-  PetscCall(HycoH5Real(h, At(prefix, "xyz", path), &m->n_nodes, 3, &m->xyz));
-  last = m->n_nodes - 1;
-  PetscCall(HycoH5Int(h, At(prefix, "node_id", path), 0, PETSC_MAX_INT, &m->n_nodes, 1, &m->node_id));
-  PetscCall(HycoH5Int(h, At(prefix, "node_body", path), 0, n_bodies - 1, &m->n_nodes, 1, &m->node_body));
-  PetscCall(HycoH5Int(h, At(prefix, "cells", path), 0, last, &m->n_cells, m->nv, &m->cells));
-  PetscCall(HycoH5Int(h, At(prefix, "cell_id", path), 0, PETSC_MAX_INT, &m->n_cells, 1, &m->cell_id));
-  PetscCall(HycoH5Int(h, At(prefix, "cell_body", path), 0, n_bodies - 1, &m->n_cells, 1, &m->cell_body));
-  PetscCall(HycoH5Int(h, At(prefix, "facets", path), 0, last, &m->n_facets, m->nf, &m->facets));
-  PetscCall(HycoH5Int(h, At(prefix, "group_dim", path), 0, 3, &m->n_groups, 1, &m->group_dim));
-  PetscCall(HycoMeshMoveGroupNames(h, At(prefix, "group_name", path), m));
-  PetscCall(HycoH5Starts(h, At(prefix, "group_start", path), m->n_groups, &m->group_start));
-  PetscCall(HycoH5Int(h, At(prefix, "group_node", path), 0, last, &m->group_start[m->n_groups], 1, &m->group_node));
-  PetscCall(HycoH5Int(h, At(prefix, "facet_group", path), 0, m->n_groups - 1, &m->n_facets, 1, &m->facet_group));
-  PetscCall(HycoH5Int(h, At(prefix, "facet_cell", path), -1, m->n_cells - 1, &m->n_facets, 1, &m->facet_cell));
-  if (!HycoH5Reads(h)) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt e = 0; e < m->n_cells; e++) m->mixed = (PetscBool)(m->mixed || HycoMeshShape(m, e) != m->type);
-  PetscCall(PetscCalloc1(m->n_groups + 1, &m->group_cell_start));
-  PetscCall(PetscMalloc1(1, &m->group_cell));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Moves the ties of the whole mesh, if there are any; sets them in the model's meshes. */
 static PetscErrorCode MoveTies(HycoH5 h, HycoROM m)
 {
@@ -502,46 +429,6 @@ static PetscErrorCode MoveProblem(HycoH5 h, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads the whole mesh and the modes on it; the contacts get its numbers of nodes. */
-static PetscErrorCode LoadWholeMesh(HycoH5 h, HycoModel m, HycoMesh *whole)
-{
-  PetscInt n_dof;
-
-  PetscFunctionBegin;
-  PetscCall(HycoMeshMove(h, "whole", m->scene->n_bodies, whole));
-  PetscCall(HycoMeshSetTies(*whole, m->mesh->ties));
-  n_dof = (*whole)->n_nodes * (*whole)->dim;
-  PetscCall(HycoH5Real(h, "whole/V", &n_dof, m->l, &m->V_whole));
-  HycoCheck((*whole)->n_nodes == m->whole_nodes && (*whole)->n_cells == m->whole_cells, "%s: the whole mesh is damaged",
-            m->path);
-  PetscCall(HycoPairsRenumber(&m->pairs, m->mesh->node_whole, &m->whole_pairs));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Opens the whole-mesh part in the file or image of the model: all of it, or nothing, so that the next attempt starts
-   anew. */
-static PetscErrorCode OpenWhole(HycoModel m)
-{
-  HycoMesh whole = NULL;
-  HycoH5 h;
-  PetscErrorCode ierr;
-
-  PetscFunctionBegin;
-  if (m->whole) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCheck(m->path[0], PETSC_COMM_SELF, PETSC_ERR_PLIB, "a model in training has no whole mesh");
-  PetscCall(HycoH5OpenOr(m->path, "train the model again", &h));
-  ierr = LoadWholeMesh(h, m, &whole);
-  PetscCall(HycoH5Close(&h, PETSC_FALSE));
-  if (!ierr) {
-    m->whole = whole;
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  if (whole) PetscCall(HycoMeshDestroy(&whole));
-  PetscCall(PetscFree(m->V_whole));
-  PetscCall(ierr);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Writes everything except the whole mesh. */
 static PetscErrorCode SaveProblem(HycoH5 h, HycoROM m)
 {
@@ -692,25 +579,5 @@ PetscErrorCode HycoROMBroadcast(MPI_Comm comm, HycoROM *model)
   PetscCall(HycoCatchEnd(ierr, message));
   PetscCall(PetscFree(image));
   PetscCall(HycoErrorSync(comm, ierr, message));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoROMFreeWhole(HycoROM m)
-{
-  PetscFunctionBegin;
-  PetscCall(HycoBalanceDestroy(&m->balance));
-  PetscCall(HycoFEDestroy(&m->fe_whole));
-  PetscCall(PetscFree(m->U_whole));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoROMLoadWhole(HycoROM m)
-{
-  PetscFunctionBegin;
-  if (m->U_whole) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(OpenWhole(m->model));
-  PetscCall(HycoROMFreeWhole(m)); /* what a failed attempt has left */
-  PetscCall(HycoFECreate(m->model->scene, m->model->whole, &m->fe_whole));
-  PetscCall(PetscMalloc1((size_t)m->model->whole->n_nodes * (size_t)m->model->whole->dim, &m->U_whole));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,5 +1,5 @@
-/* The whole-mesh part of a model file, written by rows from all ranks: the mesh in the file's order, and the modes
-   on it. */
+/* The whole-mesh part of a model file: the mesh in the file's order and the modes on it, written by rows from all
+   ranks, read when a field on the whole mesh is asked for. */
 #include <hycofields.h>
 #include <hycoromimpl.h>
 #include <string.h>
@@ -140,5 +140,64 @@ PetscErrorCode HycoROMWriteWhole(HycoH5 h, HycoFOM f, PetscInt l, Mat V)
   PetscCall(WriteGroupNodes(HycoComm(f), h, m, f->n_nodes));
   PetscCall(WriteFacets(HycoComm(f), h, m, f->n_cells));
   PetscCall(WriteModes(h, l, V));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Reads the whole mesh and the modes on it; the contacts get its numbers of nodes. */
+static PetscErrorCode LoadWholeMesh(HycoH5 h, HycoModel m, HycoMesh *whole)
+{
+  PetscInt n_dof;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeshMove(h, "whole", m->scene->n_bodies, whole));
+  PetscCall(HycoMeshSetTies(*whole, m->mesh->ties));
+  n_dof = (*whole)->n_nodes * (*whole)->dim;
+  PetscCall(HycoH5Real(h, "whole/V", &n_dof, m->l, &m->V_whole));
+  HycoCheck((*whole)->n_nodes == m->whole_nodes && (*whole)->n_cells == m->whole_cells, "%s: the whole mesh is damaged",
+            m->path);
+  PetscCall(HycoPairsRenumber(&m->pairs, m->mesh->node_whole, &m->whole_pairs));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Opens the whole-mesh part in the file or image of the model: all of it, or nothing, so that the next attempt starts
+   anew. */
+static PetscErrorCode OpenWhole(HycoModel m)
+{
+  HycoMesh whole = NULL;
+  HycoH5 h;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  if (m->whole) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCheck(m->path[0], PETSC_COMM_SELF, PETSC_ERR_PLIB, "a model in training has no whole mesh");
+  PetscCall(HycoH5OpenOr(m->path, "train the model again", &h));
+  ierr = LoadWholeMesh(h, m, &whole);
+  PetscCall(HycoH5Close(&h, PETSC_FALSE));
+  if (!ierr) {
+    m->whole = whole;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (whole) PetscCall(HycoMeshDestroy(&whole));
+  PetscCall(PetscFree(m->V_whole));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMFreeWhole(HycoROM m)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoFEDestroy(&m->fe_whole));
+  PetscCall(PetscFree(m->U_whole));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMLoadWhole(HycoROM m)
+{
+  PetscFunctionBegin;
+  if (m->U_whole) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(OpenWhole(m->model));
+  PetscCall(HycoROMFreeWhole(m)); /* what a failed attempt has left */
+  PetscCall(HycoFECreate(m->model->scene, m->model->whole, &m->fe_whole));
+  PetscCall(PetscMalloc1((size_t)m->model->whole->n_nodes * (size_t)m->model->whole->dim, &m->U_whole));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

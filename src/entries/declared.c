@@ -54,6 +54,14 @@ PetscErrorCode HycoDeclaredRead(HycoScene s, const char key[], const char text[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscBool HycoDeclaredChanges(const HycoDeclared *d, const char except[], const PetscBool changed[])
+{
+  for (PetscInt j = 0; j < d->n; j++) {
+    if (HycoExprChanges(d->entry[j].expr, changed) && (!except || strcmp(d->entry[j].name, except))) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
 PetscErrorCode HycoDeclaredView(const HycoDeclared *d, PetscViewer viewer)
 {
   PetscFunctionBegin;

@@ -1,6 +1,6 @@
-/* Entries of a scene: private to problem/. */
-#ifndef HYCO_ENTRIES_H
-#define HYCO_ENTRIES_H
+/* Entries of a scene: the text of a scene, shared by entries/ and problem/. */
+#ifndef HYCOENTRIES_H
+#define HYCOENTRIES_H
 #include <hycosceneimpl.h>
 
 /* Reads the scene's file into `*options`, overridden by the command line's entries. Collective. */

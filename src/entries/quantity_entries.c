@@ -97,6 +97,21 @@ PetscBool HycoSceneAsks(HycoScene s, HycoQuantityKind first, HycoQuantityKind la
   return PETSC_FALSE;
 }
 
+PetscBool HycoSceneHasReactions(HycoScene s)
+{
+  return HycoSceneAsks(s, HYCO_QUANTITY_REACTION, HYCO_QUANTITY_REACTION);
+}
+
+PetscBool HycoSceneAsksFields(HycoScene s)
+{
+  return HycoSceneAsks(s, HYCO_QUANTITY_MAX, HYCO_QUANTITY_REACTION);
+}
+
+PetscBool HycoSceneAsksContacts(HycoScene s)
+{
+  return HycoSceneAsks(s, HYCO_QUANTITY_FORCE, HYCO_QUANTITY_PRESSURE);
+}
+
 /* A quantity of contacts has a contact of the scene or none, and no group; one of a field has no contact. */
 static PetscErrorCode CheckContact(HycoScene s, const HycoQuantity *q)
 {

@@ -2,7 +2,7 @@
   Nested lists in a scene's YAML, which PETSc cannot read: [[0, 1], [10, 2.5]] becomes [ 0 1 , 10 2.5 ], a list of the
   scalars "0 1" and "10 2.5". All characters keep their positions, so that messages have the right line numbers.
 */
-#include "entries.h"
+#include <hycoentries.h>
 #include <string.h>
 
 /* The position after a quoted scalar. */

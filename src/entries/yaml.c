@@ -2,7 +2,7 @@
   Checks a scene's YAML before PETSc reads it, by libyaml's events, which have lines: the syntax; lists and mappings
   that PETSc cannot read; and repeated keys, of which PETSc takes the last without a message.
 */
-#include "entries.h"
+#include <hycoentries.h>
 #include <hycoyaml.h>
 #include <stdlib.h>
 #include <string.h>

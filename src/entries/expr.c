@@ -1,6 +1,7 @@
 /* Expressions of a scene, parsed by muParser. */
 #include <hycosceneimpl.h>
 #include <muParserDLL.h>
+#include <ctype.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -231,4 +232,18 @@ PetscBool HycoExprChanges(HycoExpr e, const PetscBool changed[])
 const char *HycoExprKey(HycoExpr e)
 {
   return e->key;
+}
+
+PetscBool HycoIsVariableName(const char word[])
+{
+  static const char *const taken[] = {"x", "y", "z", "pi"};
+
+  for (size_t k = 0; k < sizeof(taken) / sizeof(taken[0]); k++) {
+    if (strcmp(word, taken[k]) == 0) return PETSC_FALSE;
+  }
+  if (!isalpha((unsigned char)word[0])) return PETSC_FALSE;
+  for (; *word; word++) {
+    if (!isalnum((unsigned char)*word) && *word != '_') return PETSC_FALSE;
+  }
+  return PETSC_TRUE;
 }

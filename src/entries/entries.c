@@ -3,7 +3,7 @@
   key. Known entries have the form SECTION_NAME_FIELD: body_pellet_young, fixed_sym_x0_x.
 */
 #include <hycosceneimpl.h>
-#include "entries.h"
+#include <hycoentries.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>

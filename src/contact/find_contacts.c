@@ -1,0 +1,260 @@
+/*
+  Potential contacts: each of the scene's contacts adds its slave nodes with their masters, on the mesh as drawn; on
+  surfaces that a map moves, masters are searched again whenever the nodes have moved.
+*/
+#include "facing.h"
+#include "partners.h"
+#include <hycokinematics.h>
+
+/* Whether a map moves a node of a group. */
+static PetscErrorCode IsMoved(HycoScene scene, HycoMesh m, const char group[], PetscBool *moved)
+{
+  PetscInt g = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeshFindGroup(m, "contact", group, &g));
+  for (PetscInt k = m->group_start[g]; k < m->group_start[g + 1] && !*moved; k++) {
+    const HycoBody *body = &scene->body[m->node_body[m->group_node[k]]];
+
+    *moved = (PetscBool)(body->map[0] || body->map[1] || body->map[2]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether a map moves a surface of a contact. */
+static PetscErrorCode IsSurfaceMoved(HycoScene scene, HycoMesh m, HycoContact c, PetscBool *moved)
+{
+  PetscFunctionBegin;
+  PetscCall(IsMoved(scene, m, c->slave, moved));
+  PetscCall(IsMoved(scene, m, c->master, moved));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactsFacts(MPI_Comm comm, HycoScene scene, HycoMesh part, HycoSurfaceFacts facts[])
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < scene->n_contacts; k++) {
+    HycoContact c = scene->contact[k];
+    PetscReal least[2] = {PETSC_MAX_REAL, 0}; /* the tolerance, minus whether it is moved */
+    PetscBool moved = PETSC_FALSE;
+    PetscInt g = 0;
+
+    PetscCall(HycoMeshFindGroup(part, "contact", c->slave, &g));
+    least[0] = HycoSurfaceTolerance(part, g);
+    if (least[0] == 0) least[0] = PETSC_MAX_REAL; /* no facets here */
+    if (c->ops->find) PetscCall(IsSurfaceMoved(scene, part, c, &moved));
+    least[1] = moved ? -1 : 0;
+    HycoAllreduce(least, 2, MPIU_REAL, MPI_MIN, comm);
+    facts[k].small = least[0] < PETSC_MAX_REAL ? least[0] : 0;
+    facts[k].moved = (PetscBool)(least[1] < 0);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPairsSetSearch(HycoScene scene, HycoMesh m, HycoPairs *pairs)
+{
+  PetscFunctionBegin;
+  pairs->room = 0;
+  pairs->n_searches = scene->n_contacts;
+  PetscCall(PetscFree(pairs->search));
+  PetscCall(PetscCalloc1(scene->n_contacts, &pairs->search));
+  for (PetscInt k = 0; k < scene->n_contacts; k++) {
+    HycoContact c = scene->contact[k];
+    HycoSearch *search = &pairs->search[k];
+
+    search->reach = PETSC_MAX_REAL;
+    if (!c->ops->find) continue;
+    if (pairs->facts)
+      search->moved = pairs->facts[k].moved;
+    else
+      PetscCall(IsSurfaceMoved(scene, m, c, &search->moved));
+    if (search->moved) pairs->room = m->nf;
+  }
+  if (!pairs->room) PetscCall(PetscFree(pairs->search));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void HycoPairsSetReach(HycoPairs *pairs, const PetscReal reach[])
+{
+  for (PetscInt c = 0; reach && pairs->search && c < pairs->n_searches; c++) pairs->search[c].reach = reach[c];
+}
+
+PetscErrorCode HycoPairsMove(HycoFE fe, HycoPairs *p)
+{
+  PetscInt *start, *master, kept;
+  PetscReal *weight;
+
+  PetscFunctionBegin;
+  if (!p->room || p->place == fe->place) PetscFunctionReturn(PETSC_SUCCESS);
+  kept = p->master_start[p->n];
+  PetscCall(PetscMalloc1(p->n + 1, &start));
+  PetscCall(PetscMalloc1(kept + p->n * p->room, &master));
+  PetscCall(PetscMalloc1(kept + p->n * p->room, &weight));
+  start[0] = 0;
+  for (PetscInt k = 0, next; k < p->n; k = next) {
+    const PetscInt lo = p->master_start[k], n = p->master_start[k + 1] - lo;
+
+    next = k + 1;
+    if (HycoPairsMoved(p, k)) {
+      next = HycoPairsRun(p, k);
+      p->queries += next - k;
+      PetscCall((*fe->scene->contact[p->contact[k]]->ops->find)(fe->scene->contact[p->contact[k]], fe,
+                                                                p->search[p->contact[k]].reach, next - k, p->slave + k,
+                                                                start + k, master, weight));
+      continue;
+    }
+    if (n) PetscCall(PetscArraycpy(master + start[k], p->master + lo, n));
+    if (n) PetscCall(PetscArraycpy(weight + start[k], p->weight + lo, n));
+    start[k + 1] = start[k] + n;
+  }
+  PetscCall(PetscFree(p->master_start));
+  PetscCall(PetscFree(p->master));
+  PetscCall(PetscFree(p->weight));
+  p->master_start = start;
+  p->master = master;
+  p->weight = weight;
+  p->place = fe->place;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Number of fixed components of each node. */
+static PetscErrorCode CountHeld(HycoScene scene, HycoMesh m, PetscInt held[])
+{
+  PetscBool *fixed;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(m->n_nodes * m->dim, &fixed));
+  for (PetscInt k = 0; k < scene->n_fixed; k++) {
+    PetscInt g = 0;
+
+    PetscCall(HycoMeshFindGroup(m, "fixed", scene->fixed[k].group, &g));
+    for (PetscInt c = 0; c < m->dim; c++) {
+      for (PetscInt j = m->group_start[g]; scene->fixed[k].value[c] && j < m->group_start[g + 1]; j++)
+        fixed[m->group_node[j] * m->dim + c] = PETSC_TRUE;
+    }
+  }
+  for (PetscInt i = 0; i < m->n_nodes; i++) {
+    held[i] = 0;
+    for (PetscInt c = 0; c < m->dim; c++) held[i] += fixed[i * m->dim + c];
+  }
+  for (PetscInt k = 0; k < scene->n_fixed; k++) { /* along other directions */
+    PetscInt g = 0;
+
+    if (!scene->fixed[k].normal) continue;
+    PetscCall(HycoMeshFindGroup(m, "fixed", scene->fixed[k].group, &g));
+    for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++)
+      held[m->group_node[j]] = PetscMin(held[m->group_node[j]] + 1, m->dim);
+  }
+  PetscCall(PetscFree(fixed));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A node may be the slave of at most as many contacts as it has free displacements: otherwise their forces are not
+   unique. A rigid tool's nodes have none, and their contacts act on the masters. */
+static PetscErrorCode CheckSlaves(HycoScene scene, HycoMesh m, const PetscInt held[], const HycoPairs *p)
+{
+  PetscInt *count, *first;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc2(m->n_nodes, &count, m->n_nodes, &first));
+  for (PetscInt k = 0; k < p->n; k++) {
+    const PetscInt i = p->slave[k], free = m->dim - held[i];
+
+    if (!count[i]++) first[i] = p->contact[k];
+    HycoCheck(!free || count[i] <= free,
+              "node %d is a slave of %d contacts, among them %s and %s, and has %d free displacement%s, so that the "
+              "forces would not be unique; remove it from one contact",
+              (int)m->node_id[i], (int)count[i], scene->contact[first[i]]->name, scene->contact[p->contact[k]]->name,
+              (int)free, free == 1 ? "" : "s");
+  }
+  PetscCall(PetscFree2(count, first));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds the nodes of a contact without masters, except completely fixed ones, which cannot touch anything. */
+static PetscErrorCode AppendNodes(HycoFE fe, PetscInt index, const PetscInt held[], HycoPairs *p)
+{
+  HycoMesh m = fe->mesh;
+  HycoContact c = fe->scene->contact[index];
+  PetscBool *carries;
+  PetscInt g = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeshFindGroup(m, "contact", c->slave, &g));
+  HycoCheck(p->facts || m->group_start[g + 1] > m->group_start[g], "contact %s: the group %s is empty", c->name,
+            m->group_name[g]);
+  PetscCall(HycoPairsReserve(p, m->group_start[g + 1] - m->group_start[g], 0));
+  PetscCall(PetscMalloc1(m->n_nodes, &carries));
+  HycoSurfaceCarriers(m, g, carries);
+  for (PetscInt k = m->group_start[g]; k < m->group_start[g + 1]; k++) {
+    const PetscInt i = m->group_node[k];
+
+    if (carries[i] && held[i] < m->dim) HycoPairsAppend(p, index, i, 0, NULL, NULL);
+  }
+  PetscCall(PetscFree(carries));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Keeps the contacts of the slaves that this rank owns. */
+static PetscErrorCode KeepOwned(HycoMesh m, HycoPairs *p)
+{
+  PetscInt *which, n = 0;
+  HycoPairs kept;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(p->n, &which));
+  for (PetscInt k = 0; k < p->n; k++) {
+    if (HycoMeshOwned(m, p->slave[k]) >= 0) which[n++] = k;
+  }
+  if (n < p->n) {
+    PetscCall(HycoPairsSelect(p, n, which, NULL, &kept));
+    PetscCall(HycoPairsDestroy(p));
+    *p = kept;
+  }
+  PetscCall(PetscFree(which));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode FindAll(HycoFE fe, HycoPairs *pairs)
+{
+  HycoScene scene = fe->scene;
+  PetscInt *held;
+  PetscErrorCode ierr = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFESetDrawn(fe));
+  PetscCall(HycoMeshCheckCells(fe->mesh)); /* a degenerate cell would cause misleading messages about its facets */
+  PetscCall(HycoPairsSetSearch(scene, fe->mesh, pairs));
+  PetscCall(PetscMalloc1(fe->mesh->n_nodes, &held));
+  PetscCall(CountHeld(scene, fe->mesh, held));
+  for (PetscInt k = 0; k < scene->n_contacts && !ierr; k++) {
+    HycoContact c = scene->contact[k];
+
+    ierr = c->ops->setup ? (*c->ops->setup)(c, fe, k, pairs) : AppendNodes(fe, k, held, pairs);
+  }
+  if (!ierr) ierr = HycoPairsDropTied(scene, fe->mesh, pairs);
+  if (!ierr) ierr = CheckSlaves(scene, fe->mesh, held, pairs);
+  PetscCall(PetscFree(held));
+  PetscCall(ierr);
+  if (pairs->facts) PetscCall(KeepOwned(fe->mesh, pairs));
+  PetscCall(HycoPairsMove(fe, pairs));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoPairsFind(HycoScene scene, HycoMesh m, const HycoSurfaceFacts facts[], HycoPairs *pairs)
+{
+  HycoFE fe;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMemzero(pairs, sizeof(*pairs)));
+  PetscCall(HycoPairsReserve(pairs, 0, 0));
+  if (!scene->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoFECreate(scene, m, &fe));
+  pairs->facts = facts;
+  ierr = FindAll(fe, pairs);
+  pairs->facts = NULL;
+  PetscCall(HycoFEDestroy(&fe));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

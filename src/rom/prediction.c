@@ -1,0 +1,301 @@
+/* What a prediction gives: results, files, the view of its model. */
+#include <hycofields.h>
+#include <hycoromimpl.h>
+#include <petscviewer.h>
+#include <string.h>
+
+static PetscErrorCode CheckSolved(HycoROM m)
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  PetscCheck(m->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoROMPredict() before getting its results");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMGetStrainEnergy(HycoROM m, PetscReal *energy)
+{
+  PetscReal *each;
+  PetscBool known = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  PetscCall(CheckSolved(m));
+  if (m->trace.n_listed) {
+    *energy = m->trace.history.step[m->trace.shown].stored;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscTryTypeMethod(m, energy, energy, &known);
+  if (known) PetscFunctionReturn(PETSC_SUCCESS);
+  *energy = 0;
+  PetscCall(PetscMalloc1(m->model->mesh->n_cells, &each));
+  PetscCall(HycoFEEnergy(m->fe, m->U, each));
+  for (PetscInt e = 0; e < m->model->mesh->n_cells; e++) *energy += each[e];
+  *energy += HycoSpringsEnergy(m->fe, m->U);
+  PetscCall(PetscFree(each));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Sums over the contacts that may have a force. */
+static void SumForces(HycoROM m, HycoPrediction *p)
+{
+  const PetscInt n = m->spread ? m->model->pairs.n : m->m;
+
+  p->n_active = p->n_rid_active = 0;
+  p->total_contact_force = p->lambda_max = p->lambda_norm2 = p->covered_force = 0;
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt k = m->spread ? i : m->contact[i];
+
+    p->total_contact_force += m->Lambda[k];
+    if (m->model->in_rid[k]) p->covered_force += m->Lambda[k];
+    p->lambda_max = PetscMax(p->lambda_max, m->Lambda[k]);
+    p->lambda_norm2 += m->Lambda[k] * m->Lambda[k];
+  }
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt k = m->spread ? i : m->contact[i], presses = m->Lambda[k] > HYCO_PRESSES * p->lambda_max;
+
+    p->n_active += presses;
+    if (m->model->in_rid[k]) p->n_rid_active += presses;
+  }
+  p->covered_force = p->total_contact_force > 0 ? p->covered_force / p->total_contact_force : 1;
+  p->lambda_norm2 = PetscSqrtReal(p->lambda_norm2);
+}
+
+/* The norm and the ranges of the displacements of the RID's nodes. */
+static PetscErrorCode MeasureDisplacements(HycoROM m, HycoPrediction *p)
+{
+  const PetscInt *node;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  p->u_norm2 = 0;
+  for (PetscInt c = 0; c < 3; c++) p->u_min[c] = p->u_max[c] = 0;
+  PetscCall(ISGetLocalSize(m->model->rid, &n));
+  PetscCall(ISGetIndices(m->model->rid, &node));
+  for (PetscInt k = 0; k < n; k++) {
+    for (PetscInt c = 0; c < p->dim; c++) {
+      const PetscReal u = m->U[node[k] * p->dim + c];
+
+      p->u_min[c] = k ? PetscMin(p->u_min[c], u) : u;
+      p->u_max[c] = k ? PetscMax(p->u_max[c], u) : u;
+      p->u_norm2 += u * u;
+    }
+  }
+  PetscCall(ISRestoreIndices(m->model->rid, &node));
+  p->u_norm2 = PetscSqrtReal(p->u_norm2);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode MeasureContacts(HycoROM m, HycoPrediction *p)
+{
+  HycoContactState state;
+
+  PetscFunctionBegin;
+  PetscCall(HycoContactMeasure(m->fe, m->of_fe, m->U, m->Lambda, m->contact, &state));
+  p->n_facing = state.n_facing;
+  p->overlap = state.overlap;
+  p->sliding = state.sliding;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* If requested; else -1. */
+static PetscErrorCode MeasureEquilibrium(HycoROM m, HycoPrediction *p)
+{
+  HycoEquilibrium e;
+
+  PetscFunctionBegin;
+  p->residual = p->contact_residual = -1;
+  if (!m->wants_equilibrium || !m->trace.n_listed) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoROMGetEquilibrium(m, &e));
+  p->residual = e.worst;
+  p->contact_residual = e.worst_contact;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Completes the stresses of the RID's cells and the results that need them or the reconstruction. */
+PetscErrorCode HycoROMGetPrediction(HycoROM m, HycoPrediction *out)
+{
+  HycoPrediction *p;
+
+  PetscFunctionBegin;
+  PetscCall(CheckSolved(m));
+  p = &m->prediction;
+  p->dim = m->fe->dim;
+  p->n_dof = m->n;
+  PetscCall(PetscStrncpy(p->type, m->model->type, sizeof(p->type)));
+  PetscCall(PetscStrncpy(p->title, m->model->traits.title, sizeof(p->title)));
+  p->gives_forces = m->model->traits.forces;
+  p->n_multipliers = m->n_L;
+  p->n_contacts = m->m;
+  p->n_all_contacts = m->model->pairs.n;
+  p->n_modes = m->model->l;
+  p->n_fe_dofs = m->model->n_fe;
+  PetscCall(ISGetLocalSize(m->model->rid, &p->rid_nodes));
+  p->rid_elements = m->model->mesh->n_cells;
+  p->rid_fraction = (PetscReal)m->model->mesh->n_cells / m->model->whole_cells;
+  p->condition = m->model->numbers[0];
+  SumForces(m, p);
+  HycoTraceSummary(m, p);
+  PetscCall(MeasureDisplacements(m, p));
+  PetscCall(MeasureContacts(m, p));
+  PetscCall(HycoROMMeasureQuantities(m, p));
+  PetscCall(HycoEstimatesEvaluate(m, p));
+  PetscCall(MeasureEquilibrium(m, p));
+  *out = *p;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMGetRID(HycoROM m, PetscInt *n_nodes, const PetscInt *node_ids[], const PetscReal *U[],
+                             PetscInt *n_cells, const PetscInt *cell_ids[], const PetscReal *sigma[])
+{
+  PetscFunctionBegin;
+  PetscCall(CheckSolved(m));
+  if (n_nodes) *n_nodes = m->model->mesh->n_nodes;
+  if (node_ids) *node_ids = m->model->mesh->node_id;
+  if (U) PetscCall(HycoROMComplete(m));
+  if (U) *U = m->U;
+  if (n_cells) *n_cells = m->model->mesh->n_cells;
+  if (cell_ids) *cell_ids = m->model->mesh->cell_id;
+  if (sigma && m->trace.n_listed)
+    *sigma = m->trace.sigma + (size_t)m->trace.shown * (size_t)(m->model->mesh->n_cells * m->fe->n_sigma);
+  else if (sigma) {
+    PetscCall(HycoFEStress(m->fe, m->U, m->stress));
+    *sigma = m->stress;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMGetLambda(HycoROM m, PetscInt *n_contacts, const PetscReal *Lambda[], const PetscInt *node_ids[],
+                                const PetscInt *in_rid[])
+{
+  PetscFunctionBegin;
+  PetscCall(CheckSolved(m));
+  if (n_contacts) *n_contacts = m->model->pairs.n;
+  if (Lambda) *Lambda = m->Lambda;
+  if (node_ids) *node_ids = m->slave_id;
+  if (in_rid) *in_rid = m->model->in_rid;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* U = r(u0) + V gamma (30), with the full-order values if there are any. */
+PetscErrorCode HycoROMGetWholeU(HycoROM m, PetscInt *n_nodes, const PetscReal *U[])
+{
+  PetscFunctionBegin;
+  PetscCall(CheckSolved(m));
+  PetscCall(HycoROMLoadWhole(m));
+  if (!m->whole_current) {
+    const PetscInt dim = m->fe->dim;
+
+    PetscCall(HycoFESetParameters(m->fe_whole, m->fe->mu));
+    for (PetscInt k = 0; k < m->fe_whole->n_dof; k++) {
+      PetscReal sum = m->fe_whole->u0[k];
+
+      for (PetscInt j = 0; j < m->model->l; j++) sum += m->model->V_whole[k * m->model->l + j] * m->gamma[j];
+      m->U_whole[k] = sum;
+    }
+    for (PetscInt k = 0; k < m->model->n_fe; k++)
+      m->U_whole[m->model->mesh->node_whole[m->model->fe_dof[k] / dim] * dim + m->model->fe_dof[k] % dim] =
+          m->U[m->model->fe_dof[k]];
+    HycoFEComplete(m->fe_whole, m->U_whole);
+    m->whole_current = PETSC_TRUE;
+  }
+  if (n_nodes) *n_nodes = m->model->whole->n_nodes;
+  if (U) *U = m->U_whole;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The last prediction in the form for output. The caller frees `rid`. */
+static PetscErrorCode Look(HycoROM m, HycoSolution *solution, PetscReal **rid)
+{
+  const PetscReal *U;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMGetWholeU(m, NULL, &U));
+  PetscCall(PetscCalloc1(m->model->whole->n_cells, rid));
+  for (PetscInt e = 0; e < m->model->mesh->n_cells; e++) (*rid)[m->model->mesh->cell_whole[e]] = 1;
+  *solution = (HycoSolution){.fe = m->fe_whole,
+                             .surface = m->fe_whole,
+                             .pairs = &m->model->whole_pairs,
+                             .u = U,
+                             .u_surface = U,
+                             .lambda = m->Lambda,
+                             .rid = *rid};
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMWrite(HycoROM m, const char path[])
+{
+  HycoSolution solution;
+  PetscReal *rid;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(CheckSolved(m));
+  if (m->model->scene->n_times) {
+    PetscCall(HycoTraceWrite(m, path));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(Look(m, &solution, &rid));
+  ierr = HycoSolutionWrite(path, &solution);
+  PetscCall(PetscFree(rid));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode WritePoint(HycoROM m, const PetscReal mu[], HycoFieldFile file)
+{
+  HycoSolution solution;
+  PetscReal *rid;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMPredict(m, m->model->scene->n_parameters, mu));
+  PetscCall(Look(m, &solution, &rid));
+  ierr = HycoSolutionAdd(file, &solution);
+  PetscCall(PetscFree(rid));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMWriteMany(HycoROM m, PetscInt n, PetscInt n_parameters, const PetscReal mu[], const char path[])
+{
+  HycoFieldFile file;
+  PetscErrorCode ierr = 0;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  HycoCheck(!m->model->scene->n_times, "HycoROMWriteMany: the scene has a history; HycoROMWrite() writes a path");
+  for (PetscInt k = 0; k < n; k++)
+    PetscCall(HycoSceneCheckParameters(m->model->scene, n_parameters, mu + k * n_parameters));
+  PetscCall(HycoFieldFileCreate(PETSC_COMM_SELF, path, n, PETSC_TRUE, &file));
+  for (PetscInt k = 0; k < n && !ierr; k++) ierr = WritePoint(m, mu + k * n_parameters, file);
+  if (!ierr && n) ierr = HycoFieldFileCommit(file);
+  PetscCall(HycoFieldFileDestroy(&file));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMView(HycoROM m, PetscViewer viewer)
+{
+  PetscInt pod;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  pod = HycoROMCountPOD(m);
+  PetscCall(PetscViewerASCIIPrintf(viewer, "%s model\n", m->model->traits.title));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  trained on %d points; mean training errors: u %.2e, %sforces %.2e\n",
+                                   (int)m->model->n_points, (double)m->model->numbers[1],
+                                   m->model->traits.settings == HYCO_SETTINGS_RID ? "RID " : "",
+                                   (double)m->model->numbers[2]));
+  if (m->model->scene->n_times)
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  paths: %d listed times from t = %g to %g%s\n",
+                                     (int)m->model->scene->n_times, (double)m->model->scene->times[0],
+                                     (double)m->model->scene->times[m->model->scene->n_times - 1],
+                                     m->model->traits.stiffness ? ", solved step by step" : ""));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "  displacement modes: %d (first singular value %.4g, last %.4g)\n",
+                                   (int)pod, pod ? (double)m->model->sigma[0] : 0.,
+                                   pod ? (double)m->model->sigma[pod - 1] : 0.));
+  PetscTryTypeMethod(m, view, viewer);
+  PetscCall(HycoEstimatesView(m, viewer));
+  PetscCall(PetscViewerASCIIPrintf(viewer, "%s", m->model->provenance));
+  PetscCall(HycoSceneView(m->model->scene, viewer));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
