@@ -148,6 +148,11 @@ PetscErrorCode HycoCondensedFree(HycoCondensed *condensed);
 PetscErrorCode HycoCondensedAllocate(HycoCondensed condensed);
 /* Allocates the online data. */
 PetscErrorCode HycoCondensedPrepare(HycoCondensed condensed);
+/* The width of the range of an interpolated parameter. */
+PetscReal HycoCondensedWidth(HycoCondensed condensed, PetscInt p);
+/* The system that forces[] solves; frees what the online phase has allocated. */
+PetscErrorCode HycoCondensedCreateSystem(HycoCondensed condensed, PetscReal forces[], HycoSolver solver);
+PetscErrorCode HycoCondensedFreeWork(HycoCondensed condensed);
 /* Destroys the system of M and g. */
 PetscErrorCode HycoCondensedResetSystem(HycoCondensed condensed);
 /* In training: the forces for the current M and g, from the given active contacts; *solved: the residuals are small. */

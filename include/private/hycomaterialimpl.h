@@ -56,6 +56,5 @@ PetscErrorCode HycoMaterialCreate_J2(HycoMaterial material);
 PetscErrorCode HycoMaterialCreate_Norton(HycoMaterial material);
 PetscErrorCode HycoMaterialCreate_StrainHardening(HycoMaterial material);
 PetscErrorCode HycoMaterialCreate_LimbackAndersson(HycoMaterial material);
-PetscErrorCode HycoMaterialCreate_MFront(HycoMaterial material);
 
 #endif

@@ -472,3 +472,29 @@ PetscErrorCode HycoReducerView(HycoReducer t, PetscViewer viewer)
 }
 
 HycoDefineViewFromOptions(HycoReducer, HYCO_REDUCER_CLASSID)
+
+void HycoReducerSettingsDescribe(const HycoReducerSettings *r, size_t length, char text[])
+{
+  const char *kind = HycoHybrids[r->hybrid];
+
+  if (!r->rid)
+    snprintf(text, length, "%s, pod_tol %g", r->type, (double)r->pod_tol);
+  else if (r->whole)
+    snprintf(text, length, "%s, pod_tol %g, hybrid %s, the whole mesh as RID", r->type, (double)r->pod_tol, kind);
+  else
+    snprintf(text, length, "%s, pod_tol %g, hybrid %s, layers %d, contact extension %.3g%s%s", r->type,
+             (double)r->pod_tol, kind, (int)r->layers, (double)r->contact_extension, r->plane ? ", at " : "",
+             r->plane ? r->plane : "");
+}
+
+void HycoReducerGetSettings(HycoReducer t, HycoReducerSettings *r)
+{
+  *r = (HycoReducerSettings){.type = t->prototype->model->type,
+                             .rid = (PetscBool)(t->prototype->model->traits.settings == HYCO_SETTINGS_RID),
+                             .pod_tol = t->tol[HYCO_SEED_DISPLACEMENT],
+                             .contact_extension = t->extension,
+                             .layers = t->layers,
+                             .hybrid = t->hybrid,
+                             .whole = t->whole_rid,
+                             .ridge = -1};
+}

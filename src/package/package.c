@@ -4,6 +4,7 @@
 */
 #include <hycoconeimpl.h>
 #include <hycocontactimpl.h>
+#include <hycoextensions.h>
 #include <hycomaterialimpl.h>
 #include <hycoromtypes.h>
 #include <hycosolverimpl.h>
@@ -39,7 +40,6 @@ static PetscErrorCode RegisterLaws(void)
   PetscCall(HycoMaterialRegister(HYCO_MATERIAL_NORTON, HycoMaterialCreate_Norton));
   PetscCall(HycoMaterialRegister(HYCO_MATERIAL_STRAIN_HARDENING, HycoMaterialCreate_StrainHardening));
   PetscCall(HycoMaterialRegister(HYCO_MATERIAL_LIMBACK_ANDERSSON, HycoMaterialCreate_LimbackAndersson));
-  PetscCall(HycoMaterialRegister(HYCO_MATERIAL_MFRONT, HycoMaterialCreate_MFront));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -72,8 +72,6 @@ static PetscErrorCode RegisterModels(void)
   PetscCall(HycoROMRegister(HYCO_ROM_HYBRID, HycoROMCreate_Hybrid));
   PetscCall(HycoROMRegister(HYCO_ROM_PROJECTION, HycoROMCreate_Projection));
   PetscCall(HycoROMRegister(HYCO_ROM_CONDENSED, HycoROMCreate_Condensed));
-  PetscCall(HycoROMRegister(HYCO_ROM_CUBATURE, HycoROMCreate_Cubature));
-  PetscCall(HycoROMRegister(HYCO_ROM_REGRESSION, HycoROMCreate_Regression));
   PetscCall(HycoROMRegister(HYCO_ROM_BODIES, HycoROMCreate_Bodies));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -91,6 +89,7 @@ PetscErrorCode HycoInitializePackage(void)
   PetscCall(RegisterContacts());
   PetscCall(RegisterForms());
   PetscCall(RegisterModels());
+  PetscCall(HycoExtensionsRegister());
   HycoOptionsSetDeclare(HycoDeclareClasses);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

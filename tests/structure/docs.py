@@ -57,7 +57,8 @@ class Docs(unittest.TestCase):
 
     def test_options(self):
         """Options that the new pages name are options."""
-        known = ''.join(text(name) for name in glob.glob(os.path.join(SOURCE, 'src', '*', '**', '*.c'), recursive=True))
+        known = ''.join(text(name) for name in glob.glob(os.path.join(SOURCE, 'src', '*', '**', '*.c'), recursive=True) +
+                        glob.glob(os.path.join(SOURCE, 'extensions', '*', '*.c')))
         for page in ('theory.md', 'glossary.md', 'models.md', 'faq.md', 'tutorial.md'):
             body = re.sub(r'(?ms)^```sh status 1$.*?^```$', '', text('docs', page))  # what must fail may say anything
             for name in re.findall(r'(?<=[ `(])-(hyco_\w+|check_\w+|validation\w*)', body):

@@ -24,8 +24,51 @@ def code(path):
 
 def sources(folder='*'):
     found = sorted(glob.glob(os.path.join(SOURCE, 'src', folder, '*.[ch]')) +
-                   glob.glob(os.path.join(SOURCE, 'src', folder, 'impls', '*', '*.[ch]')))
+                   glob.glob(os.path.join(SOURCE, 'src', folder, 'impls', '*', '*.[ch]')) +
+                   (extensions() if folder == '*' else []))
     assert found, folder
+    return found
+
+
+def extensions():
+    return sorted(glob.glob(os.path.join(SOURCE, 'extensions', '*', '*.[ch]')))
+
+
+def calls():
+    """By file of the library: the files whose functions or data with external linkage it names."""
+    head = re.compile(r'^(?!static|extern|typedef|return|else|struct|#)[A-Za-z_][\w \*]*?\b(Hyco\w+)\s*(?:\((?:[^;{}]|\n)*?\)\s*\{|\[[^;]*?=|=)', re.M)
+    macro = re.compile(r'^HycoDefineMethod\((Hyco\w+),', re.M)
+    of, body = {}, {}
+    for path in sources():
+        if path.endswith('.c') and os.sep + 'app' + os.sep not in path:
+            body[path] = code(path)
+            for name in head.findall(body[path]) + macro.findall(body[path]):
+                of[name] = path
+    assert len(of) > 1000, len(of)
+    return {path: {of[word] for word in set(re.findall(r'\bHyco\w+', text)) if of.get(word, path) != path} for path, text in body.items()}
+
+
+def circles(graph):
+    """The sets of nodes that reach each other (Tarjan), those of more than one."""
+    number, least, stack, found = {}, {}, [], []
+
+    def visit(node):
+        number[node] = least[node] = len(number)
+        stack.append(node)
+        for other in graph[node]:
+            if other not in number:
+                visit(other)
+            if other in stack:
+                least[node] = min(least[node], least[other])
+        if least[node] == number[node]:
+            at = stack.index(node)
+            if len(stack) - at > 1:
+                found.append(sorted(stack[at:]))
+            del stack[at:]
+
+    for node in graph:
+        if node not in number:
+            visit(node)
     return found
 
 
@@ -58,13 +101,27 @@ class Sources(unittest.TestCase):
             names = re.findall(r'#include\s*[<"](\w+)\.h[>"]', text(path))
             self.assertEqual([n for n in names if n in above], [], name)
 
+    def test_circles(self):
+        """Folders call each other in no circle, files in circles of at most five; only the package calls extensions."""
+        graph = calls()
+        folder = {path: os.path.dirname(os.path.relpath(path, SOURCE)) for path in graph}
+        rooms = {room: set() for room in folder.values()}
+        for path, others in graph.items():
+            rooms[folder[path]] |= {folder[other] for other in others} - {folder[path]}
+        self.assertEqual(circles(rooms), [])
+        self.assertEqual([circle for circle in circles(graph) if len(circle) > 5], [])
+        for path, others in graph.items():
+            for other in others:
+                if 'extensions' in os.path.relpath(other, SOURCE):
+                    self.assertEqual(os.path.dirname(other), os.path.dirname(path), path)
+
     def test_types(self):
         """Laws and discretisations of contact are named only in their own folders and in the package, which registers all types; a scene
         names the default one."""
         for path in sources():
             if os.sep + 'package' + os.sep in path:
                 continue
-            if os.sep + 'material' + os.sep not in path:
+            if os.sep + 'material' + os.sep not in path and path not in extensions():
                 self.assertNotRegex(code(path), r'\b(young|poisson)\b', path)
             if os.sep + 'contact' + os.sep not in path:
                 self.assertNotRegex(code(path), r'\bHYCO_CONTACT_(PAIR|SURFACE)\b', path)
@@ -73,7 +130,7 @@ class Sources(unittest.TestCase):
         """A type of reduced model is named only in its own folder, and no code queries a type by name."""
         own = re.compile(r'#include\s*[<"](hycohybrid|hycoprojection|hycocondensed|hycogalerkin|hycotable)\.h')
         for path in sources():
-            if os.sep + 'impls' + os.sep in path:
+            if os.sep + 'impls' + os.sep in path or path in extensions():
                 continue
             self.assertNotRegex(text(path), own, path)
             self.assertNotRegex(code(path), r'[=!]=\s*HYCO_ROM_[A-Z]+|str(case)?cmp\([^;]*HYCO_ROM_(HYBRID|PROJECTION|CONDENSED|CUBATURE|REGRESSION)\)\s*[=!]', path)

@@ -11,8 +11,9 @@
   projection-based model, nonnegative force vectors (44): with all cells of weight 1 it is then that model. Loads on
   surfaces are those of the whole mesh.
 */
-#include <hycocubature.h>
-#include <hycoromtypes.h>
+#include "cubature.h"
+#include <hycoextensions.h>
+#include <hycoromtype.h>
 #include <petscviewer.h>
 
 static PetscErrorCode SetFromOptions(HycoReducer t)
@@ -206,7 +207,7 @@ static PetscErrorCode Destroy(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMCreate_Cubature(HycoROM m)
+static PetscErrorCode Create(HycoROM m)
 {
   static const HycoROMTraits traits = {.title = "cubature",
                                        .work = sizeof(struct _n_HycoGalerkin),
@@ -240,3 +241,5 @@ PetscErrorCode HycoROMCreate_Cubature(HycoROM m)
   PetscCall(HycoROMSetOps(m, &ops, &traits, c));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+HycoDefineExtension(cubature, HycoROMRegister(HYCO_ROM_CUBATURE, Create))

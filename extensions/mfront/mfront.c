@@ -7,6 +7,7 @@
   Small strain: a strain is the input and a stress the output; symmetric tensors as xx, yy, zz, xy, xz, yz with shear
   times sqrt(2).
 */
+#include <hycoextensions.h>
 #include <hycomaterialimpl.h>
 #include <dlfcn.h>
 #include <setjmp.h>
@@ -331,7 +332,7 @@ static PetscErrorCode Destroy(HycoMaterial law)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoMaterialCreate_MFront(HycoMaterial law)
+static PetscErrorCode Create(HycoMaterial law)
 {
   static const struct _HycoMaterialOps ops = {.declare = Declare, .setup = SetUp, .update = Update, .destroy = Destroy};
   MFront *m;
@@ -345,3 +346,5 @@ PetscErrorCode HycoMaterialCreate_MFront(HycoMaterial law)
   PetscCall(HycoMaterialSetOps(law, &ops));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+HycoDefineExtension(mfront, HycoMaterialRegister(HYCO_MATERIAL_MFRONT, Create))

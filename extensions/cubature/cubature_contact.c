@@ -5,7 +5,7 @@
   equations are the finite elements', so that the cells around them have weight 1, as do those with springs and point
   loads.
 */
-#include <hycocubature.h>
+#include "cubature.h"
 
 /* Takes all of the contacts' nodes. */
 static PetscErrorCode TakeAll(HycoReducer t, PetscBool take[])

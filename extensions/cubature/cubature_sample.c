@@ -6,7 +6,7 @@
   with the columns of a time divided by their size, as in the errors. The singular vectors are computed for each path,
   then of these.
 */
-#include <hycocubature.h>
+#include "cubature.h"
 
 #define SHARE 1e-2 /* share of the energy tolerance for the truncation of the vectors */
 

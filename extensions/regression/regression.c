@@ -12,7 +12,8 @@
 #include <hycoalgorithms.h>
 #include <hycomaterialimpl.h>
 #include <hycoreducerimpl.h>
-#include <hycoromtypes.h>
+#include <hycoextensions.h>
+#include <hycoromtype.h>
 #include <petscviewer.h>
 
 enum { KERNEL_CUBIC, KERNEL_THIN_PLATE, KERNEL_LINEAR };
@@ -360,7 +361,7 @@ static PetscErrorCode Destroy(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMCreate_Regression(HycoROM m)
+static PetscErrorCode Create(HycoROM m)
 {
   static const HycoROMTraits traits = {
       .title = "regression", .work = sizeof(*(Work)NULL), .settings = HYCO_SETTINGS_NONE, .history = PETSC_TRUE};
@@ -382,3 +383,5 @@ PetscErrorCode HycoROMCreate_Regression(HycoROM m)
   PetscCall(HycoROMSetOps(m, &ops, &traits, r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+HycoDefineExtension(regression, HycoROMRegister(HYCO_ROM_REGRESSION, Create))

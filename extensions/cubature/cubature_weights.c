@@ -10,7 +10,7 @@
   displacements have w = 1 and are not in these equations.
 */
 #include <hycoalgorithms.h>
-#include <hycocubature.h>
+#include "cubature.h"
 
 /* Gathers column j of A (rows distributed) on rank 0. Collective. */
 static PetscErrorCode GatherColumn(Mat A, PetscInt j, PetscReal column[])
