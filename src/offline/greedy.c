@@ -4,7 +4,7 @@
   was killed repeats them.
 */
 #include <hycoalgorithms.h>
-#include <hycogreedy.h>
+#include "greedy.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

@@ -16,7 +16,7 @@
   times would depend on how densely they are listed.
 */
 #include <hycoalgorithms.h>
-#include <hycogreedy.h>
+#include "greedy.h"
 #include <hycolinear.h>
 
 struct _n_HycoIndicator {

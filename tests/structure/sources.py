@@ -128,7 +128,7 @@ class Sources(unittest.TestCase):
 
     def test_model_types(self):
         """A type of reduced model is named only in its own folder, and no code queries a type by name."""
-        own = re.compile(r'#include\s*[<"](hycohybrid|hycoprojection|hycocondensed|hycogalerkin|hycotable)\.h')
+        own = re.compile(r'#include\s*[<"](hybrid|hycoprojection|hycocondensed|hycogalerkin|table)\.h')
         for path in sources():
             if os.sep + 'impls' + os.sep in path or path in extensions():
                 continue

@@ -1,5 +1,5 @@
 /* The data of hybrid and projection-based models in the model file, and their description. */
-#include <hycotable.h>
+#include "table.h"
 #include <petscviewer.h>
 
 static PetscErrorCode MoveScan(HycoROM m, HycoH5 h)

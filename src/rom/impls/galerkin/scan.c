@@ -6,7 +6,7 @@
   neighbouring points are not detected; a finer grid detects them.
 */
 #include <hycoalgorithms.h>
-#include <hycotable.h>
+#include "table.h"
 
 #define LARGEST 2500 /* number of unknowns above which a dense factor at every point takes minutes */
 

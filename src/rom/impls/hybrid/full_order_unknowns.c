@@ -8,7 +8,7 @@
   modes' coefficients follow from U[A] by ridge regression, whose ridge is chosen by the same error.
 */
 #include <hycoalgorithms.h>
-#include <hycohybrid.h>
+#include "hybrid.h"
 
 #define WORST HYCO_JUDGED_WORST
 

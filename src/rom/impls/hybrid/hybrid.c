@@ -1,6 +1,6 @@
 /* The hybrid hyper-reduced model (38)-(41): the reduced system with the finite-element multipliers of the RID's
    contacts. */
-#include <hycohybrid.h>
+#include "hybrid.h"
 #include <hycoromtypes.h>
 #include <petscviewer.h>
 

@@ -5,7 +5,7 @@
   selects one close to the least norm.
 */
 #include <hycoalgorithms.h>
-#include <hycohybrid.h>
+#include "hybrid.h"
 
 const char *const HycoReconstructSolvers[] = {"auto", "nnls", "tao", NULL};
 enum { SOLVER_AUTO, SOLVER_NNLS, SOLVER_TAO };

@@ -1,6 +1,6 @@
 /* The hybrid hyper-reduced model (38)-(41): its data and its training. */
-#ifndef HYCOHYBRID_H
-#define HYCOHYBRID_H
+#ifndef HYBRID_H
+#define HYBRID_H
 
 #include <hycogalerkin.h>
 

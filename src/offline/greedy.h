@@ -1,6 +1,6 @@
 /* Greedy training (section 5.4): the indicator of a model at a parameter value. All on one process. */
-#ifndef HYCOGREEDY_H
-#define HYCOGREEDY_H
+#ifndef GREEDY_H
+#define GREEDY_H
 
 #include <hycoreducerimpl.h>
 
