@@ -248,6 +248,17 @@ class Choices(Case):
         self.assertEqual(sum(c[n]['undefined'] for n in names), c['undefined'])
         self.assertEqual([c[n]['undefined'] for n in ('error_u', 'error_u_h1', 'error_sigma', 'error_lambda')], [0] * 4)
 
+    def test_vanishing(self):
+        """Where forces nearly vanish, the report divides their error by a tenth of the set's largest, the table by themselves."""
+        self.hyco('train', '-scene', PELLET, '-values_radius', '4.02,4.10', '-values_load', '0.5,1', '-hyco_model_type', 'projection',
+                  '-hyco_search', 'false', '-hyco_validation', 0, '-model', 'v.h5')
+        c = self.hyco('compare', '-scene', PELLET, '-model', 'v.h5', '-values_radius', '4.03,4.08', '-values_load', '0.25,0.3,1', '-table', 'v.csv')
+        table = np.genfromtxt(self.path('v.csv'), delimiter=',', names=True)
+        for error, size in (('error_lambda', 'lambda_norm2'), ('error_sigma', 'sigma_norm2')):
+            guarded = table[error] * table[size] / np.maximum(table[size], 0.1 * table[size].max())
+            self.near(c[error]['max'], guarded.max(), 1e-6, error)
+        self.assertLess(c['error_lambda']['max'], 0.99 * table['error_lambda'].max())
+
 
 if __name__ == '__main__':
     unittest.main()
