@@ -33,7 +33,8 @@ typedef struct {
   PetscBool history;     /* it supports the paths of scenes with a history */
   PetscBool resultants;  /* its contact forces are multipliers of contacts: reactions are those in balance with them */
   PetscBool surfaces;    /* the displacements of the contacts' surfaces are its own, beside those of the modes */
-  PetscBool cells; /* its mesh consists of the cells that its modes choose, and of the surfaces of contacts and loads */
+  PetscBool cells;       /* its mesh consists of the cells that it chooses, and of the surfaces of contacts and, without
+                      `surfaces`, loads */
 } HycoROMTraits;
 
 /* The system on the RID before reduction, for the indicator (43). Borrowed. */

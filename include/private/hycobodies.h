@@ -80,8 +80,9 @@ typedef struct {
 typedef struct {
   HycoTensor tensor;           /* over the parameters theta; one node along those that do not change its shape */
   PetscInt n_samples, n, l;    /* n: unknowns of its surfaces; l: modes */
+  PetscInt m;                  /* unknowns inside whose displacements are exact */
   PetscReal *C, *R, *Z, *work; /* n x n; n x r; n x p; p x r, the work of the loads on the rigid motions */
-  PetscReal *H, *a, *g;        /* by turn: l x n, l x r, l x p */
+  PetscReal *H, *a, *g;        /* l rows for each turn, then m rows: of n, of r, of p */
   PetscReal *gram;             /* r x r: of the errors of R at held-out samples in the norm of C^-1, summed; 0 */
   PetscReal *w;                /* online: weights of the samples */
 } HycoSubstructure;
@@ -100,7 +101,9 @@ typedef struct _n_HycoSubstructures {
   HycoSubstructure *body;
   PetscInt ns, *start, *dof; /* unknowns of the surfaces, body after body: start[n + 1]; node of the whole mesh times
                                 dim plus component, n_s */
-  PetscInt p;                /* rigid motions that contact alone prevents */
+  PetscInt ni, *inner_start, *inner; /* the same for the unknowns inside: those of the cells that the scene's outputs
+                                        need, if they are few, and of the cells with the largest stresses */
+  PetscInt p;                        /* rigid motions that contact alone prevents */
   /* loads: c = A (the turned loads at r unknowns of the cells of `probe`) */
   HycoMesh probe;
   PetscInt *cell; /* by body: a cell of `probe`, whose nodes and moduli show where and how stiff the body is */
@@ -116,9 +119,9 @@ typedef struct _n_HycoSubstructures {
   PetscInt *E_at;     /* which entry */
   HycoPose *pose;
   PetscReal *kappa, *c, *free, *u, *f,
-      *x;                       /* n, r, ns (x 3: without contact, with it, forces; in the bodies' axes), p */
+      *x;                       /* n, r, ns (without contact), ns + ni (with it), ns (forces; in the bodies' axes), p */
   PetscReal *Z, *work;          /* ns x p, p x r row major: of all bodies, interpolated */
-  PetscInt n_loc, *loc;         /* by unknown of the surface's mesh: its place, or -1 */
+  PetscInt n_loc, *loc;         /* by unknown of the surface's mesh: its place, with ns added inside; or -1 */
   PetscInt *row_start, *row_at; /* the rows of B in the bodies' axes */
   PetscReal *row;
   PetscReal *w;      /* by contact: gap without the forces */
@@ -145,13 +148,14 @@ PetscErrorCode HycoBodiesSetUp(HycoSubstructures bodies, HycoScene scene, const 
    complementarity problem is. */
 PetscErrorCode HycoBodiesSolve(HycoSubstructures bodies, const HycoBodiesSurface *surface, const PetscReal mu[],
                                PetscReal Lambda[], PetscBool *solved);
-/* Sets the surfaces' displacements in U (by unknown of the surface's mesh) without prescribed ones. */
+/* Sets the displacements of the surfaces and, after HycoBodiesExpand(), of the unknowns inside in U (by unknown of the
+   surface's mesh) without prescribed ones. */
 void HycoBodiesMove(HycoSubstructures bodies, const HycoBodiesSurface *surface, PetscReal U[]);
 /* After a solve: a bound of |L~ - L|_W relative to *norm = |L~|_W, from the errors of flexibilities and loads at held-out
    samples of the bodies; 0 without forces. */
 PetscReal HycoBodiesBound(HycoSubstructures bodies, PetscReal *norm);
-/* The coefficients of the modes. */
-void HycoBodiesCoefficients(HycoSubstructures bodies, PetscReal gamma[]);
+/* The coefficients of the modes, and the displacements of the unknowns inside. */
+PetscErrorCode HycoBodiesExpand(HycoSubstructures bodies, PetscReal gamma[]);
 /* Reads from or writes to the model's file. */
 PetscErrorCode HycoBodiesFile(HycoROM model, HycoH5 file);
 
@@ -167,6 +171,7 @@ typedef struct {
   PetscInt samples, most_samples;
   HycoBodyParts parts;
   HycoSubstructures bodies; /* complete on rank 0 */
+  PetscBool filled;         /* modes are still many for the largest number of samples */
 } * HycoBodiesTraining;
 
 static inline HycoBodiesTraining HycoTrainingOfBodies(HycoReducer t)
@@ -186,6 +191,9 @@ typedef struct {
   Vec *basis; /* of the turned loads, orthonormal */
   PetscInt n_records;
   HycoBodiesRecord *record;
+  PetscReal *score; /* by cell of the part */
+  PetscBool *known; /* by unknown of the part: on the surfaces or inside, so that no mode has it */
+  PetscInt *row;    /* of the unknowns inside in the distributed vectors */
 } HycoBodiesFactor;
 
 PetscErrorCode HycoBodiesBegin(HycoReducer reducer);
@@ -199,6 +207,11 @@ PetscErrorCode HycoBodiesCondense(HycoReducer reducer, HycoBodiesFactor *factor,
 PetscErrorCode HycoBodiesLoads(HycoReducer reducer, HycoBodiesFactor *factor);
 /* The values of theta and the bodies' samples there. Collective. */
 PetscErrorCode HycoBodiesSample(HycoReducer reducer, HycoBodiesFactor *factor);
+/* Raises factor->score by the stresses of the displacements u (n_dof of the part, without prescribed ones) relative to
+   the largest in their body. Collective. */
+PetscErrorCode HycoBodiesAddScores(HycoReducer reducer, HycoBodiesFactor *factor, const PetscReal u[]);
+/* The cells whose displacements are exact: t->seeds_cell, the unknowns inside, factor->known and row. Collective. */
+PetscErrorCode HycoBodiesChooseCells(HycoReducer reducer, HycoBodiesFactor *factor);
 /* The modes, as t->V, and H, a, g. Collective. */
 PetscErrorCode HycoBodiesFields(HycoReducer reducer, HycoSnapshots store, HycoBodiesFactor *factor);
 /* For loads F: the displacements of the surfaces without contact (ns), and the work on the motions (p). Collective. */

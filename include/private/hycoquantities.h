@@ -10,7 +10,8 @@
    NULL: not known (NaN). Fails if a group is empty, or for a component that the mesh does not have. Collective. */
 PetscErrorCode HycoQuantitiesMeasure(MPI_Comm comm, HycoFE fe, const PetscReal u[], const PetscReal sigma[],
                                      const PetscReal reaction[], const HycoContactResult contact[], PetscReal value[]);
-/* Marks the cells (n_cells) that the scene's quantities need. */
+/* Marks the cells (n_cells) that quantity k of the scene needs, or all quantities. */
+PetscErrorCode HycoQuantityMarkCells(HycoScene scene, HycoMesh mesh, PetscInt k, PetscBool needed[]);
 PetscErrorCode HycoQuantitiesMarkCells(HycoScene scene, HycoMesh mesh, PetscBool needed[]);
 /* Which reactions follow from balance (balance.c): balanced[k * n_bodies + b], for each quantity k the bodies b of
    whose loads and contact forces it is minus the sum; for no body: it does not follow. mesh: whole, or the processes'

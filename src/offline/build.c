@@ -86,6 +86,12 @@ static PetscErrorCode FindCells(HycoReducer t, PetscBool in[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether the model's mesh has the surfaces of loads. */
+static PetscBool LoadedSurfaces(HycoReducer t)
+{
+  return (PetscBool)(t->prototype->model->traits.cells && !t->prototype->model->traits.surfaces);
+}
+
 /* Gathers the RID's cells and the contacts' surfaces on rank 0; elsewhere NULL. */
 static PetscErrorCode GatherCells(HycoReducer t, const PetscBool in[], HycoMesh *mesh)
 {
@@ -95,7 +101,7 @@ static PetscErrorCode GatherCells(HycoReducer t, const PetscBool in[], HycoMesh 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(part->n_groups, &group));
   PetscCall(HycoMarkContactGroups(t->scene, part, group));
-  for (PetscInt k = 0; t->prototype->model->traits.cells && k < t->scene->n_loads; k++) {
+  for (PetscInt k = 0; LoadedSurfaces(t) && k < t->scene->n_loads; k++) {
     PetscInt g = 0;
 
     PetscCall(HycoMeshFindGroup(part, "load", t->scene->load[k].group, &g));
@@ -140,7 +146,7 @@ static PetscErrorCode CutMesh(HycoReducer t, HycoMesh from, const PetscBool in[]
   PetscCall(PetscMalloc1(3 * t->scene->n_contacts + t->scene->n_loads, &all));
   PetscCall(PetscMalloc2(from->n_cells, &keep, surface->n_nodes, &extra));
   PetscCall(SurfacesOf(t, contact, &n_all, all));
-  for (PetscInt k = 0; t->prototype->model->traits.cells && k < t->scene->n_loads; k++)
+  for (PetscInt k = 0; LoadedSurfaces(t) && k < t->scene->n_loads; k++)
     PetscCall(HycoMeshFindGroup(from, "load", t->scene->load[k].group, &all[n_all++]));
   for (PetscInt e = 0; e < from->n_cells; e++) {
     if (!in || in[e]) keep[n_keep++] = e;

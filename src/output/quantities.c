@@ -65,6 +65,28 @@ static PetscErrorCode MarkAround(HycoMesh m, const Place *p, PetscBool in[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoQuantityMarkCells(HycoScene scene, HycoMesh m, PetscInt k, PetscBool in[])
+{
+  const HycoQuantity *q = &scene->quantity[k];
+  Place p;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(in, m->n_cells));
+  if (q->kind >= HYCO_QUANTITY_FORCE) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(FindPlace(scene, m, q, &p));
+  if (q->kind == HYCO_QUANTITY_REACTION && p.group >= 0) {
+    PetscCall(MarkAround(m, &p, in));
+    p.dim = -1;
+  } else if (p.dim == m->dim)
+    MarkCells(m, &p, in);
+  else if (p.dim < m->dim - 1)
+    PetscCall(MarkAround(m, &p, in));
+  for (PetscInt f = 0; f < m->n_facets && p.dim == m->dim - 1; f++) {
+    if (m->facet_group[f] == p.group && m->facet_cell[f] >= 0) in[m->facet_cell[f]] = PETSC_TRUE;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoQuantitiesMarkCells(HycoScene scene, HycoMesh m, PetscBool needed[])
 {
   PetscBool *in;
@@ -73,21 +95,7 @@ PetscErrorCode HycoQuantitiesMarkCells(HycoScene scene, HycoMesh m, PetscBool ne
   PetscCall(PetscMalloc1(m->n_cells, &in));
   for (PetscInt e = 0; e < m->n_cells; e++) needed[e] = PETSC_FALSE;
   for (PetscInt k = 0; k < scene->n_quantities; k++) {
-    Place p;
-
-    if (scene->quantity[k].kind >= HYCO_QUANTITY_FORCE) continue;
-    PetscCall(FindPlace(scene, m, &scene->quantity[k], &p));
-    PetscCall(PetscArrayzero(in, m->n_cells));
-    if (scene->quantity[k].kind == HYCO_QUANTITY_REACTION && p.group >= 0) {
-      PetscCall(MarkAround(m, &p, in));
-      p.dim = -1;
-    } else if (p.dim == m->dim)
-      MarkCells(m, &p, in);
-    else if (p.dim < m->dim - 1)
-      PetscCall(MarkAround(m, &p, in));
-    for (PetscInt f = 0; f < m->n_facets && p.dim == m->dim - 1; f++) {
-      if (m->facet_group[f] == p.group && m->facet_cell[f] >= 0) in[m->facet_cell[f]] = PETSC_TRUE;
-    }
+    PetscCall(HycoQuantityMarkCells(scene, m, k, in));
     for (PetscInt e = 0; e < m->n_cells; e++) needed[e] = (PetscBool)(needed[e] || in[e]);
   }
   PetscCall(PetscFree(in));

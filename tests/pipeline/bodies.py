@@ -95,6 +95,26 @@ class Bodies(Case):
         self.assertLess(np.abs(u[0][on] - u[1][on]).max(), 1e-12 * np.abs(u[1]).max())
         self.assertLess(np.abs(force[0].sum(axis=0)).max(), 1e-12 * np.abs(force[0]).sum())  # both sides of the pair
 
+    def test_outputs(self):
+        """Outputs on surfaces, at points, of the hottest cell, and of supports beside a spring are those of full order; so are stresses."""
+        outputs = '''output:
+  lean: {mean: u_x, group: block_top}
+  sink: {min: u_y, group: block_top}
+  hot: {max: mises}
+  most: {max: sigma_xx, group: cylinder}
+  grip: {reaction: x, group: block_base}
+  tip: {reaction: y, group: block_base}
+'''
+        with open(os.path.join(ROLLER, 'scene.yaml'), encoding='ascii') as f:
+            text = f.read().replace('mesh: roller.msh', 'mesh: ' + MESH.format('roller'))
+        scene = self.write('outputs.yaml', text + outputs + 'spring: {block_top: {x: 0.3*modulus}}\n')
+        c = self.judge(scene, ('-values_place', '-4.3,3.1', '-values_press', '0.9', '-values_modulus', '17'))
+        self.assertLess(c['error_sigma']['max'], 1e-9)
+        for point in ('1.37,0.71,8.3', '-3.9,0.33,19'):
+            p, s = (self.hyco(*run, '-mu', point) for run in (('predict', '-model', 'm.h5'), ('solve', '-scene', scene)))
+            for name in ('lean', 'sink', 'hot', 'most', 'grip', 'tip'):
+                self.assertLess(abs(p['outputs'][name] - s['outputs'][name]), 1e-9 * max(1e-3, abs(s['outputs'][name])), name)
+
     def test_turned(self):
         """A body that is turned and enlarged about a point, in any combination with the others."""
         scene = self.write('turned.yaml', TURNED)

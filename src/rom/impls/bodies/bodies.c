@@ -95,6 +95,18 @@ static void Measure(HycoROM m, HycoKKT *kkt)
   kkt->complementarity = gaps > 0 && most > 0 ? both / (gaps * most) : 0;
 }
 
+/* The modes where displacements are not exact. */
+static void Expand(HycoROM m, HycoSubstructures b)
+{
+  const PetscInt l = m->model->l;
+
+  for (PetscInt i = 0; i < m->fe->n_dof; i++) {
+    m->U[i] = m->fe->u0[i];
+    for (PetscInt j = 0; j < l && b->loc[i] < 0 && !m->fe->fixed[i]; j++)
+      m->U[i] += m->model->V[(size_t)i * (size_t)l + (size_t)j] * m->gamma[j];
+  }
+}
+
 static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
 {
   HycoSubstructures b = (HycoSubstructures)m->work;
@@ -109,8 +121,8 @@ static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
   p->seconds.factor = 0;
   p->seconds.assemble = solve - begin;
   PetscCall(HycoBodiesSolve(b, &s, mu, m->Lambda, &solved));
-  HycoBodiesCoefficients(b, m->gamma);
-  PetscCall(HycoROMExpand(m));
+  PetscCall(HycoBodiesExpand(b, m->gamma));
+  Expand(m, b);
   HycoBodiesMove(b, &s, m->U);
   HycoFEComplete(m->fe, m->U);
   Measure(m, &p->kkt);
@@ -204,20 +216,22 @@ static PetscErrorCode ResetTraining(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The unknowns of the model's mesh that are displacements of the surfaces. */
-static PetscErrorCode TakeSurface(HycoROM m, HycoSubstructures b)
+/* The unknowns of the model's mesh whose displacements are exact. */
+static PetscErrorCode TakeExact(HycoROM m, HycoSubstructures b)
 {
   HycoMesh mesh = m->model->mesh;
   PetscInt *sorted, *dof, n = 0;
 
   PetscFunctionBegin;
-  HycoDuplicate(b->ns + 1, b->dof, &sorted);
-  PetscCall(PetscSortInt(b->ns, sorted));
+  PetscCall(PetscMalloc1(b->ns + b->ni, &sorted));
+  PetscCall(PetscArraycpy(sorted, b->dof, b->ns));
+  PetscCall(PetscArraycpy(sorted + b->ns, b->inner, b->ni));
+  PetscCall(PetscSortInt(b->ns + b->ni, sorted));
   PetscCall(PetscMalloc1(mesh->n_nodes * mesh->dim + 1, &dof));
   for (PetscInt i = 0; i < mesh->n_nodes * mesh->dim; i++) {
     PetscInt at;
 
-    PetscCall(PetscFindInt(mesh->node_whole[i / mesh->dim] * mesh->dim + i % mesh->dim, b->ns, sorted, &at));
+    PetscCall(PetscFindInt(mesh->node_whole[i / mesh->dim] * mesh->dim + i % mesh->dim, b->ns + b->ni, sorted, &at));
     if (at >= 0) dof[n++] = i;
   }
   PetscCall(HycoROMSetFE(m, HYCO_HYBRID_CONTACT, n, dof));
@@ -237,7 +251,7 @@ static PetscErrorCode Build(HycoROM m, HycoReducer t)
   s->bodies = NULL;
   PetscCall(HycoFloatingDestroy(&m->model->floating)); /* their equilibrium is an equation of the model */
   for (PetscInt k = 0; k < m->model->pairs.n; k++) m->model->in_rid[k] = 1;
-  PetscCall(TakeSurface(m, (HycoSubstructures)m->model->data));
+  PetscCall(TakeExact(m, (HycoSubstructures)m->model->data));
   PetscCall(HycoReducerJudge(t, m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -274,6 +288,7 @@ PetscErrorCode HycoROMCreate_Bodies(HycoROM m)
                                        .constrains = PETSC_TRUE,
                                        .forces = PETSC_TRUE,
                                        .surfaces = PETSC_TRUE,
+                                       .cells = PETSC_TRUE,
                                        .work = sizeof(*(HycoSubstructures)NULL),
                                        .resultants = PETSC_TRUE};
   static const HycoROMOps ops = {.setfromoptions = SetFromOptions,

@@ -18,9 +18,11 @@ static PetscErrorCode MoveSizes(HycoH5 h, HycoROM m, HycoSubstructures b)
   b->n_parameters = m->model->scene->n_parameters;
   HycoCheck(b->n > 0 && b->n_theta <= HYCO_TENSOR_MAX_DIM, "%s: bodies/head is damaged", m->model->path);
   PetscCall(HycoH5Starts(h, "bodies/start", b->n, &b->start));
+  PetscCall(HycoH5Starts(h, "bodies/inner_start", b->n, &b->inner_start));
   PetscCall(HycoH5Starts(h, "bodies/mode_start", b->n, &b->mode_start));
   PetscCall(HycoH5Starts(h, "bodies/turn_start", b->n, &b->turn_start));
   b->ns = b->start[b->n];
+  b->ni = b->inner_start[b->n];
   HycoCheck(b->mode_start[b->n] == b->l && b->turn_start[b->n] == b->n_turns, "%s: the sizes of bodies/ are damaged",
             m->model->path);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -65,6 +67,7 @@ static PetscErrorCode MoveProbe(HycoH5 h, HycoROM m, HycoSubstructures b)
   PetscCall(HycoH5Int(h, "bodies/at_body", 0, b->n - 1, &b->r, 1, &b->at_body));
   PetscCall(HycoH5Real(h, "bodies/A", &b->r, b->r, &b->A));
   PetscCall(HycoH5Int(h, "bodies/dof", 0, m->model->whole_nodes * b->dim - 1, &b->ns, 1, &b->dof));
+  PetscCall(HycoH5Int(h, "bodies/inner", 0, m->model->whole_nodes * b->dim - 1, &b->ni, 1, &b->inner));
   PetscCall(HycoH5Real(h, "bodies/G", &b->n_turns, 9, &b->G));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -85,6 +88,7 @@ static PetscErrorCode MoveBody(HycoH5 h, HycoSubstructures b, PetscInt k)
   PetscFunctionBegin;
   s->n = b->start[k + 1] - b->start[k];
   s->l = b->mode_start[k + 1] - b->mode_start[k];
+  s->m = b->inner_start[k + 1] - b->inner_start[k];
   rows = s->n_samples * s->n;
   columns = s->n_samples * b->p;
   PetscCall(HycoH5Real(h, At(k, "C", path), &rows, s->n, &s->C));
@@ -92,7 +96,7 @@ static PetscErrorCode MoveBody(HycoH5 h, HycoSubstructures b, PetscInt k)
   PetscCall(HycoH5Real(h, At(k, "Z", path), &rows, b->p, &s->Z));
   PetscCall(HycoH5Real(h, At(k, "work", path), &columns, b->r, &s->work));
   PetscCall(HycoH5Real(h, At(k, "gram", path), &b->r, b->r, &s->gram));
-  rows = s->n_samples * (b->turn_start[k + 1] - b->turn_start[k]) * s->l;
+  rows = s->n_samples * ((b->turn_start[k + 1] - b->turn_start[k]) * s->l + s->m);
   PetscCall(HycoH5Real(h, At(k, "H", path), &rows, s->n, &s->H));
   PetscCall(HycoH5Real(h, At(k, "a", path), &rows, b->r, &s->a));
   PetscCall(HycoH5Real(h, At(k, "g", path), &rows, b->p, &s->g));

@@ -58,8 +58,8 @@ PetscErrorCode HycoBodiesDestroy(HycoSubstructures *bodies)
 
     HycoFreeAll(&s->C, &s->R, &s->Z, &s->work, &s->H, &s->a, &s->g, &s->gram, &s->w);
   }
-  HycoFreeAll(&b->first, &b->theta, &b->logarithm, &b->n_nodes, &b->node, &b->body, &b->start, &b->dof, &b->cell,
-              &b->at, &b->at_body, &b->A, &b->mode_start, &b->turn_start, &b->G);
+  HycoFreeAll(&b->first, &b->theta, &b->logarithm, &b->n_nodes, &b->node, &b->body, &b->start, &b->dof, &b->inner_start,
+              &b->inner, &b->cell, &b->at, &b->at_body, &b->A, &b->mode_start, &b->turn_start, &b->G);
   PetscCall(PetscFree(*bodies));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -113,23 +113,26 @@ static void Blend(const HycoSubstructure *s, PetscInt n, const PetscReal data[],
 
 /* -- set-up -- */
 
-/* The places of the surface mesh's unknowns. */
+/* The places of the mesh's unknowns. */
 static PetscErrorCode FindPlaces(HycoSubstructures b, HycoMesh m)
 {
+  const PetscInt n = b->ns + b->ni;
   PetscInt *sorted, *place;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc2(b->ns, &sorted, b->ns, &place));
-  for (PetscInt k = 0; k < b->ns; k++) place[k] = k;
-  PetscCall(PetscArraycpy(sorted, b->dof, b->ns));
-  PetscCall(PetscSortIntWithArray(b->ns, sorted, place));
+  PetscCall(PetscMalloc2(n, &sorted, n, &place));
+  for (PetscInt k = 0; k < n; k++) {
+    place[k] = k;
+    sorted[k] = k < b->ns ? b->dof[k] : b->inner[k - b->ns];
+  }
+  PetscCall(PetscSortIntWithArray(n, sorted, place));
   b->n_loc = m->n_nodes * b->dim;
   PetscCall(PetscMalloc1(b->n_loc, &b->loc));
   for (PetscInt i = 0; i < b->n_loc; i++) {
     const PetscInt node = m->node_whole ? m->node_whole[i / b->dim] : i / b->dim;
     PetscInt at;
 
-    PetscCall(PetscFindInt(node * b->dim + i % b->dim, b->ns, sorted, &at));
+    PetscCall(PetscFindInt(node * b->dim + i % b->dim, n, sorted, &at));
     b->loc[i] = at < 0 ? -1 : place[at];
   }
   PetscCall(PetscFree2(sorted, place));
@@ -177,7 +180,7 @@ PetscErrorCode HycoBodiesSetUp(HycoSubstructures b, HycoScene scene, const HycoB
   PetscCall(PetscCalloc1(b->ns * b->p + 1, &b->Z));
   PetscCall(PetscCalloc1(b->p * b->r + 1, &b->work));
   PetscCall(PetscCalloc1(b->ns + 1, &b->free));
-  PetscCall(PetscCalloc1(b->ns + 1, &b->u));
+  PetscCall(PetscCalloc1(b->ns + b->ni + 1, &b->u));
   PetscCall(PetscCalloc1(b->ns + 1, &b->f));
   PetscCall(PetscMalloc1(m + 1, &b->row_start));
   PetscCall(PetscMalloc1(entries * b->dim + 1, &b->row_at));
@@ -276,9 +279,11 @@ static PetscErrorCode BlendMotions(HycoSubstructures b)
 /* The body of a place. */
 static PetscInt BodyOf(HycoSubstructures b, PetscInt place)
 {
+  const PetscInt *start = place < b->ns ? b->start : b->inner_start;
   PetscInt k = 0;
 
-  while (place >= b->start[k + 1]) k++;
+  if (place >= b->ns) place -= b->ns;
+  while (place >= start[k + 1]) k++;
   return k;
 }
 
@@ -308,7 +313,8 @@ static PetscErrorCode TurnRows(HycoSubstructures b, const HycoBodiesSurface *s)
       const PetscInt place = b->loc[rows->dof[e]], node = rows->dof[e] / dim, c = rows->dof[e] % dim;
       PetscInt body;
 
-      HycoCheck(place >= 0, "contact %s: node %d is not among the surfaces on which the model of bodies was trained",
+      HycoCheck(place >= 0 && place < b->ns,
+                "contact %s: node %d is not among the surfaces on which the model of bodies was trained",
                 s->fe->scene->contact[s->pairs->contact[k]]->name, (int)s->fe->mesh->node_id[node]);
       body = BodyOf(b, place);
       for (PetscInt d = 0; d < dim; d++) {
@@ -593,37 +599,64 @@ void HycoBodiesMove(HycoSubstructures b, const HycoBodiesSurface *s, PetscReal U
   }
 }
 
-/* gamma += share times the coefficients of one turn of a body from one of its samples. */
-static void AddCoefficients(HycoSubstructures b, PetscInt k, PetscReal share, const PetscReal H[], const PetscReal a[],
-                            const PetscReal g[], PetscReal gamma[])
+/* The forces of a body that are not zero, and their places in it. */
+typedef struct {
+  PetscInt n, *at;
+  PetscReal *value;
+} Forces;
+
+/* to += share times the rows of n displacements of a body, at one of its samples. */
+static void AddRows(HycoSubstructures b, PetscInt k, const Forces *f, PetscReal share, PetscInt n, size_t row,
+                    PetscReal to[])
 {
   const HycoSubstructure *own = &b->body[k];
-  const PetscReal *f = b->f + b->start[k];
+  const PetscReal *H = own->H + row * (size_t)own->n, *a = own->a + row * (size_t)b->r,
+                  *g = own->g + row * (size_t)b->p;
 
-  for (PetscInt i = 0; i < own->l; i++, H += own->n, a += b->r, g += b->p) {
+  for (PetscInt i = 0; i < n; i++, H += own->n, a += b->r, g += b->p) {
     PetscReal elastic = 0, rigid = 0;
 
     for (PetscInt d = 0; d < b->r; d++) elastic += a[d] * b->c[d];
-    for (PetscInt d = 0; d < own->n; d++) elastic -= H[d] * f[d];
+    for (PetscInt d = 0; d < f->n; d++) elastic -= H[f->at[d]] * f->value[d];
     for (PetscInt d = 0; d < b->p; d++) rigid += g[d] * b->x[d];
-    gamma[i] += share * (elastic / b->kappa[k] + rigid);
+    to[i] += share * (elastic / b->kappa[k] + rigid);
   }
 }
 
-void HycoBodiesCoefficients(HycoSubstructures b, PetscReal gamma[])
+/* Of body k, whose forces have room in f. */
+static void ExpandBody(HycoSubstructures b, PetscInt k, Forces *f, PetscReal gamma[])
 {
-  PetscCallVoid(PetscArrayzero(gamma, b->l));
-  for (PetscInt k = 0; k < b->n; k++) {
-    const HycoSubstructure *own = &b->body[k];
-    const PetscInt turns = b->turn_start[k + 1] - b->turn_start[k];
+  const HycoSubstructure *own = &b->body[k];
+  const PetscInt turns = b->turn_start[k + 1] - b->turn_start[k];
 
-    for (PetscInt j = 0; j < own->n_samples * turns; j++) {
-      const size_t rows = (size_t)j * (size_t)own->l;
+  f->n = 0;
+  for (PetscInt i = 0; i < own->n; i++) {
+    if (b->f[b->start[k] + i] == 0) continue;
+    f->at[f->n] = i;
+    f->value[f->n++] = b->f[b->start[k] + i];
+  }
+  for (PetscInt s = 0; s < own->n_samples; s++) {
+    const size_t row = (size_t)s * (size_t)(turns * own->l + own->m);
+
+    for (PetscInt j = 0; j < turns; j++) {
       PetscReal share = 0;
 
-      for (PetscInt d = 0; d < 9; d++) share += b->G[9 * (b->turn_start[k] + j % turns) + d] * b->pose[k].Q[d];
-      AddCoefficients(b, k, share * own->w[j / turns], own->H + rows * (size_t)own->n, own->a + rows * (size_t)b->r,
-                      own->g + rows * (size_t)b->p, gamma + b->mode_start[k]);
+      for (PetscInt d = 0; d < 9; d++) share += b->G[9 * (b->turn_start[k] + j) + d] * b->pose[k].Q[d];
+      AddRows(b, k, f, share * own->w[s], own->l, row + (size_t)(j * own->l), gamma + b->mode_start[k]);
     }
+    AddRows(b, k, f, own->w[s], own->m, row + (size_t)(turns * own->l), b->u + b->ns + b->inner_start[k]);
   }
+}
+
+PetscErrorCode HycoBodiesExpand(HycoSubstructures b, PetscReal gamma[])
+{
+  Forces f;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(gamma, b->l));
+  PetscCall(PetscArrayzero(b->u + b->ns, b->ni));
+  PetscCall(PetscMalloc2(b->ns + 1, &f.at, b->ns + 1, &f.value));
+  for (PetscInt k = 0; k < b->n; k++) ExpandBody(b, k, &f, gamma);
+  PetscCall(PetscFree2(f.at, f.value));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -179,6 +179,7 @@ static PetscErrorCode ExpandAll(HycoReducer t, HycoBodiesFactor *factor, const S
       PetscCall(PetscArrayzero(factor->z, b->p));
       PetscCall(PetscArraycpy(factor->z + b->p, sampled->f + (size_t)k * (size_t)b->ns, b->ns));
       PetscCall(Expand(b, factor, sampled->c + k * b->r, factor->z, U));
+      PetscCall(HycoBodiesAddScores(t, factor, U));
       U += n_dof;
     }
     PetscCall(PetscArrayzero(factor->z, b->p + b->ns));
@@ -192,17 +193,19 @@ static PetscErrorCode ExpandAll(HycoReducer t, HycoBodiesFactor *factor, const S
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* value = G u at the nodes of a body, else 0. */
-static void TurnField(HycoReducer t, HycoFOM f, PetscInt body, const PetscReal G[], PetscBool back, const PetscReal u[],
-                      PetscReal value[])
+/* value = G u at the unknowns of a body that are not known, else 0. */
+static void TurnField(HycoReducer t, const HycoBodiesFactor *factor, PetscInt body, const PetscReal G[], PetscBool back,
+                      const PetscReal u[], PetscReal value[])
 {
+  HycoFOM f = factor->fom;
   const PetscInt dim = f->fe->dim;
 
   for (PetscInt i = 0; i < f->part->n_nodes; i++) {
     PetscReal turned[3] = {0, 0, 0};
 
     if (HycoTrainingOfBodies(t)->parts.of[i] == body) HycoPoseTurn(G, dim, back, u + i * dim, turned);
-    for (PetscInt c = 0; c < dim; c++) value[i * dim + c] = f->fe->fixed[i * dim + c] ? 0 : turned[c];
+    for (PetscInt c = 0; c < dim; c++)
+      value[i * dim + c] = f->fe->fixed[i * dim + c] || factor->known[i * dim + c] ? 0 : turned[c];
   }
 }
 
@@ -220,8 +223,10 @@ static PetscErrorCode CreateColumns(HycoReducer t, HycoFOM f, PetscInt n, Mat *S
 }
 
 /* The columns of one body in all of its turns, of length 1 if they are not small. Collective. */
-static PetscErrorCode BodyColumns(HycoReducer t, HycoFOM f, PetscInt body, PetscInt n, const PetscReal U[], Mat *S)
+static PetscErrorCode BodyColumns(HycoReducer t, const HycoBodiesFactor *factor, PetscInt body, PetscInt n,
+                                  const PetscReal U[], Mat *S)
 {
+  HycoFOM f = factor->fom;
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   const PetscInt first = b->turn_start[body], turns = b->turn_start[body + 1] - first;
   PetscReal *value, *norm, most = 0;
@@ -235,8 +240,8 @@ static PetscErrorCode BodyColumns(HycoReducer t, HycoFOM f, PetscInt body, Petsc
   PetscCall(PetscMalloc2(f->fe->n_dof + 1, &value, n * turns + 1, &norm));
   PetscCall(MatDenseGetArray(*S, &s));
   for (PetscInt k = 0; k < n * turns; k++) {
-    TurnField(t, f, body, b->G + 9 * (first + k % turns), PETSC_FALSE, U + (size_t)(k / turns) * (size_t)f->fe->n_dof,
-              value);
+    TurnField(t, factor, body, b->G + 9 * (first + k % turns), PETSC_FALSE,
+              U + (size_t)(k / turns) * (size_t)f->fe->n_dof, value);
     PetscCall(HycoFOMToRows(f, HYCO_ON_NODES, MPIU_REAL, b->dim, value, s + (size_t)k * (size_t)lda));
   }
   PetscCall(MatDenseRestoreArray(*S, &s));
@@ -254,7 +259,8 @@ static PetscErrorCode BodyColumns(HycoReducer t, HycoFOM f, PetscInt body, Petsc
 }
 
 /* The modes of all bodies in V, and their singular values in sigma. Collective. */
-static PetscErrorCode FindModes(HycoReducer t, HycoFOM f, PetscInt n, const PetscReal U[], Mat *V, PetscReal **sigma)
+static PetscErrorCode FindModes(HycoReducer t, const HycoBodiesFactor *factor, PetscInt n, const PetscReal U[], Mat *V,
+                                PetscReal **sigma)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
 
@@ -268,7 +274,7 @@ static PetscErrorCode FindModes(HycoReducer t, HycoFOM f, PetscInt n, const Pets
     PetscInt l = 0;
     Mat S, W = NULL, joined;
 
-    PetscCall(BodyColumns(t, f, k, n, U, &S));
+    PetscCall(BodyColumns(t, factor, k, n, U, &S));
     PetscCall(MatNorm(S, NORM_FROBENIUS, &norm));
     PetscCall(PetscCalloc1(columns + 1, &own));
     if (norm > 0) PetscCall(HycoReducerPOD(t, S, HycoTrainingOfBodies(t)->pod_tol, t->max_modes, &W, &l, own));
@@ -310,9 +316,10 @@ static PetscErrorCode LoadFields(HycoSubstructures b, HycoBodiesFactor *factor, 
 }
 
 /* The turned mode back in the body's axes, as a load: v = G^T V_i. Collective. */
-static PetscErrorCode TurnMode(HycoReducer t, HycoFOM f, PetscInt body, PetscInt turn, const PetscScalar column[],
-                               Vec v)
+static PetscErrorCode TurnMode(HycoReducer t, const HycoBodiesFactor *factor, PetscInt body, PetscInt turn,
+                               const PetscScalar column[], Vec v)
 {
+  HycoFOM f = factor->fom;
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   PetscReal *local, *turned;
   PetscScalar *a;
@@ -320,7 +327,7 @@ static PetscErrorCode TurnMode(HycoReducer t, HycoFOM f, PetscInt body, PetscInt
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(f->fe->n_dof + 1, &local, f->fe->n_dof + 1, &turned));
   PetscCall(HycoFOMFromRows(f, HYCO_ON_NODES, b->dim, column, local));
-  TurnField(t, f, body, b->G + 9 * turn, PETSC_TRUE, local, turned);
+  TurnField(t, factor, body, b->G + 9 * turn, PETSC_TRUE, local, turned);
   PetscCall(VecGetArray(v, &a));
   for (PetscInt i = 0; i < f->fe->n_dof; i++) {
     const PetscInt own = HycoMeshOwned(f->part, i / b->dim);
@@ -329,6 +336,21 @@ static PetscErrorCode TurnMode(HycoReducer t, HycoFOM f, PetscInt body, PetscInt
   }
   PetscCall(VecRestoreArray(v, &a));
   PetscCall(PetscFree2(local, turned));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* v = 1 at an unknown, else 0. */
+static PetscErrorCode SetUnit(PetscInt row, Vec v)
+{
+  PetscInt lo, hi;
+  PetscScalar *a;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetOwnershipRange(v, &lo, &hi));
+  PetscCall(VecZeroEntries(v));
+  PetscCall(VecGetArray(v, &a));
+  if (row >= lo && row < hi) a[row - lo] = 1;
+  PetscCall(VecRestoreArray(v, &a));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -341,7 +363,7 @@ static PetscErrorCode AllocateCoefficients(HycoSubstructures b)
     size_t rows;
 
     s->l = b->mode_start[k + 1] - b->mode_start[k];
-    rows = (size_t)s->n_samples * (size_t)(b->turn_start[k + 1] - b->turn_start[k]) * (size_t)s->l;
+    rows = (size_t)s->n_samples * (size_t)((b->turn_start[k + 1] - b->turn_start[k]) * s->l + s->m);
     PetscCall(PetscCalloc1(rows * (size_t)s->n + 1, &s->H));
     PetscCall(PetscCalloc1(rows * (size_t)b->r + 1, &s->a));
     PetscCall(PetscCalloc1(rows * (size_t)b->p + 1, &s->g));
@@ -366,11 +388,14 @@ static PetscErrorCode BodyCoefficients(HycoReducer t, HycoBodiesFactor *factor, 
   PetscCall(VecDuplicate(factor->fom->F, &v));
   PetscCall(MatDenseGetLDA(V, &lda));
   PetscCall(MatDenseGetArrayRead(V, &columns));
-  for (PetscInt i = 0; i < turns * s->l; i++) {
-    const size_t row = (size_t)(sample * turns * s->l + i);
+  for (PetscInt i = 0; i < turns * s->l + s->m; i++) {
+    const size_t row = (size_t)(sample * (turns * s->l + s->m) + i);
 
-    PetscCall(TurnMode(t, factor->fom, k, b->turn_start[k] + i / s->l,
-                       columns + (size_t)(b->mode_start[k] + i % s->l) * (size_t)lda, v));
+    if (i < turns * s->l)
+      PetscCall(TurnMode(t, factor, k, b->turn_start[k] + i / s->l,
+                         columns + (size_t)(b->mode_start[k] + i % s->l) * (size_t)lda, v));
+    else
+      PetscCall(SetUnit(factor->row[b->inner_start[k] + i - turns * s->l], v));
     PetscCall(HycoBodiesReduce(b, factor, v, u, g));
     PetscCall(PetscArraycpy(s->H + row * (size_t)s->n, u + b->start[k], s->n));
     PetscCall(PetscArraycpy(s->g + row * (size_t)b->p, g, b->p));
@@ -445,9 +470,10 @@ static PetscErrorCode ModesOf(HycoReducer t, HycoBodiesFactor *factor, PetscInt 
   n = CountVisits(sampled.n, HycoBodiesGrid(b, 0, NULL)) + b->p * HycoBodiesGrid(b, 0, NULL);
   PetscCall(PetscMalloc1((size_t)factor->fom->fe->n_dof * (size_t)n + 1, &U));
   PetscCall(ExpandAll(t, factor, &sampled, U));
+  PetscCall(HycoBodiesChooseCells(t, factor));
   HycoFreeAll(&sampled.c, &sampled.f);
   PetscCall(PetscFree(b->mode_start));
-  ierr = FindModes(t, factor->fom, n, U, V, sigma);
+  ierr = FindModes(t, factor, n, U, V, sigma);
   PetscCall(PetscFree(U));
   PetscCall(ierr);
   *enough = PETSC_TRUE;
@@ -464,6 +490,8 @@ PetscErrorCode HycoBodiesFields(HycoReducer t, HycoSnapshots store, HycoBodiesFa
   PetscBool enough = PETSC_FALSE;
 
   PetscFunctionBegin;
+  PetscCall(PetscCalloc1(factor->fom->part->n_cells + 1, &factor->score));
+  PetscCall(PetscCalloc1(factor->fom->fe->n_dof + 1, &factor->known));
   for (PetscInt n = HycoTrainingOfBodies(t)->samples, k = 0; !enough && k <= DOUBLINGS; n *= 2, k++) {
     PetscCall(MatDestroy(&V));
     PetscCall(PetscFree(sigma));

@@ -142,6 +142,9 @@ static PetscErrorCode Select(HycoFOM f, const HycoBodyParts *parts, HycoSubstruc
   HycoOnRoot(HycoComm(f), List(f, of, b, global));
   HycoBcast(b->start, b->n + 1, MPIU_INT, HycoComm(f));
   b->ns = b->start[b->n];
+  if (f->rank) PetscCall(PetscFree(b->dof));
+  if (f->rank) PetscCall(PetscMalloc1(b->ns + 1, &b->dof));
+  HycoBcast(b->dof, b->ns, MPIU_INT, HycoComm(f));
   PetscCall(CheckSizes(parts, b));
   PetscCall(MatCreateAIJ(HycoComm(f), PETSC_DECIDE, f->part->n_owned * b->dim, b->ns, f->n_nodes * b->dim, 1, NULL, 1,
                          NULL, N));
@@ -355,7 +358,8 @@ static PetscErrorCode Release(HycoBodiesFactor *factor)
 
     HycoFreeAll(&r->theta, &r->C, &r->R, &r->Z, &r->work);
   }
-  HycoFreeAll(&factor->basis, &factor->record, &factor->theta, &factor->pins);
+  HycoFreeAll(&factor->basis, &factor->record, &factor->theta, &factor->pins, &factor->score, &factor->known,
+              &factor->row);
   PetscCall(PetscFree2(factor->zero, factor->z));
   PetscCall(HycoFOMDestroy(&factor->fom));
   PetscFunctionReturn(PETSC_SUCCESS);
