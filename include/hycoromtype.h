@@ -33,7 +33,9 @@ typedef struct {
   PetscBool history;     /* it supports the paths of scenes with a history */
   PetscBool resultants;  /* its contact forces are multipliers of contacts: reactions are those in balance with them */
   PetscBool surfaces;    /* the displacements of the contacts' surfaces are its own, beside those of the modes */
-  PetscBool cells;       /* its mesh consists of the cells that it chooses, and of the surfaces of contacts and, without
+  PetscBool uniform; /* its errors do not follow the features: the estimates are a multiple of their largest at held-out
+                        points, and no less than those of ops->estimate */
+  PetscBool cells;   /* its mesh consists of the cells that it chooses, and of the surfaces of contacts and, without
                       `surfaces`, loads */
 } HycoROMTraits;
 

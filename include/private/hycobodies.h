@@ -98,6 +98,7 @@ typedef struct _n_HycoSubstructures {
   PetscReal forces; /* HycoBodiesBound(), the largest at the sampled points of the ranges; forces below a tenth of the
                        largest relative to that tenth */
   PetscReal bound;  /* of |C~ - C| relative to C at held-out samples; 0: nothing is interpolated */
+  PetscReal left;   /* by the modes, of displacements at points of the ranges of which they were not made, relative */
   HycoSubstructure *body;
   PetscInt ns, *start, *dof; /* unknowns of the surfaces, body after body: start[n + 1]; node of the whole mesh times
                                 dim plus component, n_s */
@@ -192,6 +193,7 @@ typedef struct {
   PetscInt n_records;
   HycoBodiesRecord *record;
   PetscReal *score; /* by cell of the part */
+  PetscReal *moved; /* by unknown of the part: largest sampled displacement */
   PetscBool *known; /* by unknown of the part: on the surfaces or inside, so that no mode has it */
   PetscInt *row;    /* of the unknowns inside in the distributed vectors */
 } HycoBodiesFactor;

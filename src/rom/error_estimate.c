@@ -280,27 +280,32 @@ static PetscReal Clamped(PetscReal estimate, PetscReal largest)
   return largest > 0 ? PetscMax(PetscMin(estimate, MOST_OVER * largest), largest / MOST_UNDER) : estimate;
 }
 
-static PetscReal EstimateOutput(const HycoOutputEstimate *o, const PetscReal term[])
+/* From a formula, or for a type whose errors do not follow the features from their largest. */
+static PetscReal EstimateError(HycoROM m, const PetscReal law[], const PetscReal term[], PetscReal largest)
 {
-  return PetscMax(Clamped(Estimate(o->law, term), o->largest), HYCO_OUTPUT_ROUND_OFF * o->magnitude);
+  return m->model->traits.uniform ? MOST_OVER * largest : Clamped(Estimate(law, term), largest);
 }
 
 /* The estimates of the calibrated formulas, times `factor`. */
 static void EvaluateFormulas(HycoROM m, const PetscReal feature[], PetscReal factor, HycoPrediction *p)
 {
   const HycoEstimates *t = &m->model->estimates;
+  PetscReal *const own[HYCO_N_ESTIMATES] = {&p->estimated_error_u, &p->estimated_error_sigma,
+                                            &p->estimated_error_lambda};
   PetscReal term[HYCO_ESTIMATE_FEATURES], estimate[HYCO_N_ESTIMATES];
 
   for (PetscInt j = 0; j < HYCO_ESTIMATE_FEATURES; j++) term[j] = PetscLogReal(1 + feature[j] / t->floor[j]);
   for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++)
-    estimate[e] = t->has[e] ? Clamped(Estimate(t->law[e], term), t->largest[e]) * factor : -1;
+    estimate[e] = t->has[e] ? EstimateError(m, t->law[e], term, t->largest[e]) * factor : -1;
   for (PetscInt q = 0; q < t->n_outputs; q++) {
-    if (t->output[q].has && !PetscIsInfOrNanReal(p->quantity[q]))
-      p->estimated_error_quantity[q] = EstimateOutput(&t->output[q], term) * factor;
+    const HycoOutputEstimate *o = &t->output[q];
+
+    if (o->has && !PetscIsInfOrNanReal(p->quantity[q]))
+      p->estimated_error_quantity[q] =
+          PetscMax(EstimateError(m, o->law, term, o->largest), HYCO_OUTPUT_ROUND_OFF * o->magnitude) * factor;
   }
-  p->estimated_error_u = estimate[HYCO_ESTIMATE_U];
-  p->estimated_error_sigma = estimate[HYCO_ESTIMATE_SIGMA];
-  p->estimated_error_lambda = estimate[HYCO_ESTIMATE_LAMBDA];
+  for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++) /* a type's own estimates are least values, or replaced */
+    *own[e] = m->model->traits.uniform ? PetscMax(estimate[e], *own[e]) : estimate[e];
 }
 
 PetscErrorCode HycoEstimatesEvaluate(HycoROM m, HycoPrediction *p)

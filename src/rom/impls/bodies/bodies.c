@@ -7,8 +7,9 @@
 #include <hycoromtypes.h>
 #include <petscviewer.h>
 
-#define ACCEPTED 1e-8 /* largest residual of a prediction */
-#define ACTIVE   0.3  /* assumed share of closed contacts, and entries of a row of B, for costs */
+#define ACCEPTED 1e-8  /* largest residual of a prediction */
+#define ROUNDING 1e-10 /* relative, of exact results */
+#define ACTIVE   0.3   /* assumed share of closed contacts, and entries of a row of B, for costs */
 #define ENTRIES  15
 
 static HycoBodiesSurface SurfaceOf(HycoROM m)
@@ -143,12 +144,17 @@ static PetscErrorCode Features(HycoROM m, PetscReal misfit[2])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Without held-out solutions the forces have the bound, and displacements no estimate. */
+/* The forces have the bound, displacements the error of the modes. Where nothing is interpolated, stresses in cells
+   without modes have that of round-off. */
 static PetscErrorCode Estimate(HycoROM m, HycoPrediction *p)
 {
+  const HycoSubstructures b = (HycoSubstructures)m->work;
+
   PetscFunctionBegin;
-  (void)m;
-  p->estimated_error_lambda = PetscMax(p->interpolation_error, 1e-10); /* round-off of the solutions */
+  p->estimated_error_lambda = PetscMax(p->interpolation_error, ROUNDING);
+  if (b->n_theta) PetscFunctionReturn(PETSC_SUCCESS); /* errors of interpolated displacements are not known */
+  p->estimated_error_u = PetscMax(3 * b->left, ROUNDING);
+  if (b->ni) p->estimated_error_sigma = ROUNDING;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -259,18 +265,21 @@ static PetscErrorCode Build(HycoROM m, HycoReducer t)
 static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
 {
   HycoSubstructures b = (HycoSubstructures)m->model->data;
+  const char *filled =
+      "; with eight times the samples their displacements still need as many modes as half of them, so "
+      "that displacements away from the contact are less accurate";
 
   PetscFunctionBegin;
-  (void)t;
   PetscCall(HycoTrainingAddFact(r, "n_bodies", (PetscReal)b->n));
   PetscCall(HycoTrainingAddFact(r, "n_surface_unknowns", (PetscReal)b->ns));
   PetscCall(HycoTrainingAddFact(r, "n_body_samples", (PetscReal)HycoBodiesGrid(b, 0, NULL)));
   PetscCall(HycoTrainingAddFact(r, "force_bound", b->forces));
   snprintf(
       r->summary, sizeof(r->summary),
-      "bodies: %d, with %d unknowns on the surfaces that may touch; %d samples, forces within %.1e (bound at held-out "
-      "samples of the bodies); %d vectors of loads; %d displacement modes\n",
-      (int)b->n, (int)b->ns, (int)HycoBodiesGrid(b, 0, NULL), (double)b->forces, (int)b->r, (int)r->n_modes);
+      "bodies: %d, with %d unknowns on the surfaces that may touch and %d exact ones inside; %d samples, forces within "
+      "%.1e (bound at held-out samples of the bodies); %d vectors of loads; %d displacement modes%s\n",
+      (int)b->n, (int)b->ns, (int)b->ni, (int)HycoBodiesGrid(b, 0, NULL), (double)b->forces, (int)b->r, (int)r->n_modes,
+      HycoTrainingOfBodies(t)->filled ? filled : "");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -289,6 +298,7 @@ PetscErrorCode HycoROMCreate_Bodies(HycoROM m)
                                        .forces = PETSC_TRUE,
                                        .surfaces = PETSC_TRUE,
                                        .cells = PETSC_TRUE,
+                                       .uniform = PETSC_TRUE,
                                        .work = sizeof(*(HycoSubstructures)NULL),
                                        .resultants = PETSC_TRUE};
   static const HycoROMOps ops = {.setfromoptions = SetFromOptions,

@@ -36,6 +36,7 @@ static PetscErrorCode MoveTheta(HycoH5 h, HycoROM m, HycoSubstructures b)
   PetscFunctionBegin;
   PetscCall(HycoH5Reals(h, "bodies/bound", 1, &b->bound));
   PetscCall(HycoH5Reals(h, "bodies/forces", 1, &b->forces));
+  PetscCall(HycoH5Reals(h, "bodies/left", 1, &b->left));
   if (HycoH5Reads(h)) PetscCall(PetscCalloc1(b->n, &b->body));
   PetscCall(HycoH5Int(h, "bodies/theta", 0, b->n_parameters - 1, &b->n_theta, 1, &b->theta));
   PetscCall(HycoH5Int(h, "bodies/logarithm", 0, 1, &b->n_theta, 1, &b->logarithm));

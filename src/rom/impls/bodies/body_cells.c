@@ -21,7 +21,10 @@ PetscErrorCode HycoBodiesAddScores(HycoReducer t, HycoBodiesFactor *factor, cons
   PetscFunctionBegin;
   PetscCall(PetscMalloc5(fe->n_dof, &all, m->n_cells * fe->n_sigma, &sigma, m->n_cells, &mises, 3 * m->n_cells,
                          &principal, parts->n, &most));
-  for (PetscInt i = 0; i < fe->n_dof; i++) all[i] = fe->fixed[i] ? fe->u0[i] : u[i];
+  for (PetscInt i = 0; i < fe->n_dof; i++) {
+    all[i] = fe->fixed[i] ? fe->u0[i] : u[i];
+    factor->moved[i] = PetscMax(factor->moved[i], PetscAbsReal(u[i]));
+  }
   HycoFEComplete(fe, all);
   HycoOnEach(HycoComm(t), HycoFEStress(fe, all, sigma));
   PetscCall(HycoStressInvariants(m->n_cells, fe->dim, sigma, mises, principal));
@@ -230,10 +233,33 @@ static PetscErrorCode AnyLeft(HycoReducer t, HycoFE fe, const PetscBool known[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Leaves a node to the modes, of which a model has one at least: that which moves most. It is exact too, because its
+   modes are all of its displacements. *released: there is one. Collective. */
+static PetscErrorCode Release(HycoReducer t, HycoBodiesFactor *factor, PetscBool inner[], PetscBool *released)
+{
+  HycoMesh m = factor->fom->part;
+  const PetscInt dim = factor->fom->fe->dim;
+  PetscReal most = 0;
+  PetscInt node = PETSC_MAX_INT;
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < m->n_nodes * dim; i++) most = PetscMax(most, inner[i] ? factor->moved[i] : 0);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_REAL, MPI_MAX, HycoComm(t)));
+  for (PetscInt i = 0; i < m->n_nodes * dim && most > 0; i++) {
+    if (inner[i] && factor->moved[i] >= most * (1 - 1e-6))
+      node = PetscMin(node, m->node_whole ? m->node_whole[i / dim] : i / dim);
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &node, 1, MPIU_INT, MPI_MIN, HycoComm(t)));
+  for (PetscInt i = 0; i < m->n_nodes * dim; i++)
+    inner[i] = (PetscBool)(inner[i] && (m->node_whole ? m->node_whole[i / dim] : i / dim) != node);
+  *released = (PetscBool)(node < PETSC_MAX_INT);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoBodiesChooseCells(HycoReducer t, HycoBodiesFactor *factor)
 {
   HycoFE fe = factor->fom->fe;
-  PetscBool *in, *inner, fits, left;
+  PetscBool *in, *inner, fits, left, released = PETSC_TRUE;
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(factor->fom->part->n_cells + 1, &in));
@@ -243,8 +269,9 @@ PetscErrorCode HycoBodiesChooseCells(HycoReducer t, HycoBodiesFactor *factor)
   PetscCall(ShareCells(t, factor->fom->part, in));
   PetscCall(MarkInner(t, factor, in, inner, &fits));
   PetscCall(AnyLeft(t, fe, factor->known, inner, &left));
-  if (!fits || !left) PetscCall(PetscArrayzero(inner, fe->n_dof)); /* only a cell that stands for none; or a model */
-  if (!left) PetscCall(PetscArrayzero(factor->known, fe->n_dof));  /* needs a mode */
+  if (!fits) PetscCall(PetscArrayzero(inner, fe->n_dof)); /* of the cell that stands for none */
+  if (fits && !left) PetscCall(Release(t, factor, inner, &released));
+  if (!released) PetscCall(PetscArrayzero(factor->known, fe->n_dof));
   PetscCall(List(t, factor, inner));
   for (PetscInt i = 0; i < fe->n_dof; i++) factor->known[i] = (PetscBool)(factor->known[i] || inner[i]);
   PetscCall(PetscFree(inner));

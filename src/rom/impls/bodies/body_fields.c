@@ -6,6 +6,7 @@
 */
 #include <hycoalgorithms.h>
 #include <hycobodies.h>
+#include <petscblaslapack.h>
 
 #define MOST_NUMBERS 6e7  /* entries of the sampled displacements on all ranks */
 #define LEAST        20   /* samples */
@@ -13,10 +14,11 @@
 #define DOUBLINGS    3    /* of the samples then */
 #define SPREAD       3    /* nodes of theta at which the displacements of each are computed */
 #define SMALL        1e-7 /* of the largest sample: smaller ones count as much as this */
+#define CHECKS       32   /* points at which the displacements that the modes miss are measured, no samples */
 
-/* Samples: the loads' coefficients and the surfaces' forces, a column each. */
+/* Samples: the loads' coefficients and the surfaces' forces, a column each; the last n_checks are checks. */
 typedef struct {
-  PetscInt n;
+  PetscInt n, n_checks;
   PetscReal *c, *f; /* r x n, ns x n column major */
 } Sampled;
 
@@ -58,6 +60,7 @@ static PetscErrorCode SolvePoints(HycoReducer t, HycoSubstructures b, const Hyco
     bound[sampled->n] = HycoBodiesBound(b, &norm[sampled->n]);
     most = PetscMax(most, norm[sampled->n]);
     sampled->n++;
+    sampled->n_checks += p && k >= n - CHECKS;
   }
   b->forces = 0;
   for (PetscInt k = 0; k < sampled->n && most > 0; k++)
@@ -82,7 +85,8 @@ static PetscErrorCode SampleForces(HycoReducer t, HycoFOM f, HycoSamples points,
   PetscCall(HycoRowsDestroy(&rows));
   f->fe_surface->ready = PETSC_FALSE;
   PetscCall(ierr);
-  HycoCheckModel(sampled->n, "the contact problem of the bodies is solved at none of the points of the ranges");
+  HycoCheckModel(sampled->n > sampled->n_checks,
+                 "the contact problem of the bodies is solved at none of the points of the ranges");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -99,8 +103,8 @@ static PetscErrorCode Sample(HycoReducer t, HycoFOM f, PetscInt wanted, PetscBoo
   PetscFunctionBegin;
   *all = (PetscBool)(n >= wanted && t->scene->n_parameters);
   PetscCall(HycoSamplesCreate(t->scene, &points));
-  if (t->scene->n_parameters) PetscCall(HycoSamplesAddScattered(points, n));
   PetscCall(HycoSamplesAddPoint(points, b->first));
+  if (t->scene->n_parameters) PetscCall(HycoSamplesAddScattered(points, n + CHECKS));
   PetscCall(HycoSamplesGet(points, &n, NULL, NULL));
   PetscCall(PetscCalloc1((size_t)n * (size_t)b->r + 1, &sampled->c));
   PetscCall(PetscCalloc1((size_t)n * (size_t)b->ns + 1, &sampled->f));
@@ -116,6 +120,7 @@ static PetscErrorCode Sample(HycoReducer t, HycoFOM f, PetscInt wanted, PetscBoo
   PetscCall(HycoSamplesDestroy(&points));
   PetscCall(ierr);
   PetscCallMPI(MPI_Bcast(&sampled->n, 1, MPIU_INT, 0, HycoComm(t)));
+  PetscCallMPI(MPI_Bcast(&sampled->n_checks, 1, MPIU_INT, 0, HycoComm(t)));
   HycoBcast(sampled->c, sampled->n * b->r, MPIU_REAL, HycoComm(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -160,6 +165,17 @@ static PetscInt CountVisits(PetscInt n_samples, PetscInt n)
   return count;
 }
 
+/* The displacements of sample k, where the factor is. Collective. */
+static PetscErrorCode ExpandSample(HycoSubstructures b, HycoBodiesFactor *factor, const Sampled *sampled, PetscInt k,
+                                   PetscReal u[])
+{
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(factor->z, b->p));
+  PetscCall(PetscArraycpy(factor->z + b->p, sampled->f + (size_t)k * (size_t)b->ns, b->ns));
+  PetscCall(Expand(b, factor, sampled->c + k * b->r, factor->z, u));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* U: the displacements (n_dof of this rank's part) of the samples at the nodes of theta, with the rigid motions there.
    The forces are those of any theta, so that there are all patterns. Collective. */
 static PetscErrorCode ExpandAll(HycoReducer t, HycoBodiesFactor *factor, const Sampled *sampled, PetscReal U[])
@@ -174,11 +190,9 @@ static PetscErrorCode ExpandAll(HycoReducer t, HycoBodiesFactor *factor, const S
 
     HycoBodiesPoint(t, j, theta);
     PetscCall(HycoBodiesRefactor(t, factor, theta));
-    for (PetscInt k = 0; k < sampled->n; k++) {
+    for (PetscInt k = 0; k < sampled->n - sampled->n_checks; k++) {
       if (!Visits(k, j, nodes)) continue;
-      PetscCall(PetscArrayzero(factor->z, b->p));
-      PetscCall(PetscArraycpy(factor->z + b->p, sampled->f + (size_t)k * (size_t)b->ns, b->ns));
-      PetscCall(Expand(b, factor, sampled->c + k * b->r, factor->z, U));
+      PetscCall(ExpandSample(b, factor, sampled, k, U));
       PetscCall(HycoBodiesAddScores(t, factor, U));
       U += n_dof;
     }
@@ -222,22 +236,21 @@ static PetscErrorCode CreateColumns(HycoReducer t, HycoFOM f, PetscInt n, Mat *S
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The columns of one body in all of its turns, of length 1 if they are not small. Collective. */
+/* The columns of one body in all of its turns. Collective. */
 static PetscErrorCode BodyColumns(HycoReducer t, const HycoBodiesFactor *factor, PetscInt body, PetscInt n,
                                   const PetscReal U[], Mat *S)
 {
   HycoFOM f = factor->fom;
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   const PetscInt first = b->turn_start[body], turns = b->turn_start[body + 1] - first;
-  PetscReal *value, *norm, most = 0;
+  PetscReal *value;
   PetscScalar *s;
-  PetscInt lda, rows;
+  PetscInt lda;
 
   PetscFunctionBegin;
   PetscCall(CreateColumns(t, f, n * turns, S));
   PetscCall(MatDenseGetLDA(*S, &lda));
-  PetscCall(MatGetLocalSize(*S, &rows, NULL));
-  PetscCall(PetscMalloc2(f->fe->n_dof + 1, &value, n * turns + 1, &norm));
+  PetscCall(PetscMalloc1(f->fe->n_dof + 1, &value));
   PetscCall(MatDenseGetArray(*S, &s));
   for (PetscInt k = 0; k < n * turns; k++) {
     TurnField(t, factor, body, b->G + 9 * (first + k % turns), PETSC_FALSE,
@@ -245,16 +258,32 @@ static PetscErrorCode BodyColumns(HycoReducer t, const HycoBodiesFactor *factor,
     PetscCall(HycoFOMToRows(f, HYCO_ON_NODES, MPIU_REAL, b->dim, value, s + (size_t)k * (size_t)lda));
   }
   PetscCall(MatDenseRestoreArray(*S, &s));
-  PetscCall(MatGetColumnNorms(*S, NORM_2, norm));
-  for (PetscInt k = 0; k < n * turns; k++) most = PetscMax(most, norm[k]);
-  PetscCall(MatDenseGetArray(*S, &s));
-  for (PetscInt k = 0; k < n * turns; k++) {
+  PetscCall(PetscFree(value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Scales the columns to length 1 if they are not small. Collective. */
+static PetscErrorCode ScaleColumns(Mat S)
+{
+  PetscReal *norm, most = 0;
+  PetscScalar *s;
+  PetscInt n, lda, rows;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetSize(S, NULL, &n));
+  PetscCall(MatDenseGetLDA(S, &lda));
+  PetscCall(MatGetLocalSize(S, &rows, NULL));
+  PetscCall(PetscMalloc1(n + 1, &norm));
+  PetscCall(MatGetColumnNorms(S, NORM_2, norm));
+  for (PetscInt k = 0; k < n; k++) most = PetscMax(most, norm[k]);
+  PetscCall(MatDenseGetArray(S, &s));
+  for (PetscInt k = 0; k < n; k++) {
     const PetscReal scale = most > 0 ? 1 / PetscMax(norm[k], SMALL * most) : 0;
 
     for (PetscInt i = 0; i < rows; i++) s[(size_t)k * (size_t)lda + (size_t)i] *= scale;
   }
-  PetscCall(MatDenseRestoreArray(*S, &s));
-  PetscCall(PetscFree2(value, norm));
+  PetscCall(MatDenseRestoreArray(S, &s));
+  PetscCall(PetscFree(norm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -275,6 +304,7 @@ static PetscErrorCode FindModes(HycoReducer t, const HycoBodiesFactor *factor, P
     Mat S, W = NULL, joined;
 
     PetscCall(BodyColumns(t, factor, k, n, U, &S));
+    PetscCall(ScaleColumns(S));
     PetscCall(MatNorm(S, NORM_FROBENIUS, &norm));
     PetscCall(PetscCalloc1(columns + 1, &own));
     if (norm > 0) PetscCall(HycoReducerPOD(t, S, HycoTrainingOfBodies(t)->pod_tol, t->max_modes, &W, &l, own));
@@ -293,6 +323,83 @@ static PetscErrorCode FindModes(HycoReducer t, const HycoBodiesFactor *factor, P
   }
   b->l = b->mode_start[b->n];
   HycoCheckModel(b->l, "the bodies have no displacement at any point of the ranges; check the loads");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* norm: of the columns of S that the modes V miss. Collective. */
+static PetscErrorCode Miss(HycoReducer t, Mat V, Mat S, PetscReal norm[])
+{
+  PetscBLASInt m, l, n, ld[2];
+  const PetscReal one = 1, minus = -1;
+  const PetscScalar *v;
+  PetscScalar *s;
+  PetscReal *c;
+  PetscInt rows, modes, columns, lda[2];
+
+  PetscFunctionBegin;
+  PetscCall(MatGetLocalSize(V, &rows, NULL));
+  PetscCall(MatGetSize(V, NULL, &modes));
+  PetscCall(MatGetSize(S, NULL, &columns));
+  PetscCall(PetscMalloc1((size_t)modes * (size_t)columns + 1, &c));
+  PetscCall(HycoReducerMultiply(t, V, S, c));
+  PetscCall(MatDenseGetLDA(V, &lda[0]));
+  PetscCall(MatDenseGetLDA(S, &lda[1]));
+  PetscCall(PetscBLASIntCast(rows, &m));
+  PetscCall(PetscBLASIntCast(modes, &l));
+  PetscCall(PetscBLASIntCast(columns, &n));
+  for (int k = 0; k < 2; k++) PetscCall(PetscBLASIntCast(PetscMax(1, lda[k]), &ld[k]));
+  PetscCall(MatDenseGetArrayRead(V, &v));
+  PetscCall(MatDenseGetArray(S, &s));
+  if (rows) BLASgemm_("N", "N", &m, &n, &l, &minus, v, &ld[0], c, &l, &one, s, &ld[1]);
+  PetscCall(MatDenseRestoreArray(S, &s));
+  PetscCall(MatDenseRestoreArrayRead(V, &v));
+  PetscCall(MatGetColumnNorms(S, NORM_2, norm));
+  PetscCall(PetscFree(c));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* square[n]: of the displacements U (n_dof x n) of all ranks. Collective. */
+static PetscErrorCode Squares(HycoFOM f, PetscInt n, const PetscReal U[], PetscReal square[])
+{
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(square, n));
+  for (PetscInt i = 0; i < f->fe->n_dof; i++) {
+    if (HycoMeshOwned(f->part, i / f->fe->dim) < 0) continue;
+    for (PetscInt k = 0; k < n; k++) square[k] += PetscSqr(U[(size_t)k * (size_t)f->fe->n_dof + (size_t)i]);
+  }
+  HycoAllreduce(square, n, MPIU_REAL, MPI_SUM, HycoComm(f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* b->left at the checks. A turned field is the sum of q_j G_j u with |q|^2 = dim. Collective. */
+static PetscErrorCode MeasureLeft(HycoReducer t, HycoBodiesFactor *factor, const Sampled *sampled, Mat V)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  const PetscInt n = sampled->n_checks;
+  const size_t n_dof = (size_t)factor->fom->fe->n_dof;
+  PetscReal *U, *all, *lost, *norm;
+
+  PetscFunctionBegin;
+  b->left = 0;
+  PetscCall(PetscMalloc3(n_dof * (size_t)n + 1, &U, n, &all, b->dim * b->dim * n, &norm));
+  PetscCall(PetscCalloc1(n, &lost));
+  for (PetscInt k = 0; k < n; k++)
+    PetscCall(ExpandSample(b, factor, sampled, sampled->n - n + k, U + (size_t)k * n_dof));
+  PetscCall(Squares(factor->fom, n, U, all));
+  for (PetscInt k = 0; k < b->n && n; k++) {
+    const PetscInt turns = b->turn_start[k + 1] - b->turn_start[k];
+    Mat S;
+
+    PetscCall(BodyColumns(t, factor, k, n, U, &S));
+    PetscCall(Miss(t, V, S, norm));
+    PetscCall(MatDestroy(&S));
+    for (PetscInt i = 0; i < n * turns; i++) lost[i / turns] += (turns > 1 ? b->dim : 1) * PetscSqr(norm[i]);
+  }
+  for (PetscInt k = 0; k < n; k++) {
+    if (all[k] > 0) b->left = PetscMax(b->left, PetscSqrtReal(lost[k] / all[k]));
+  }
+  PetscCall(PetscFree(lost));
+  PetscCall(PetscFree3(U, all, norm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -467,18 +574,20 @@ static PetscErrorCode ModesOf(HycoReducer t, HycoBodiesFactor *factor, PetscInt 
 
   PetscFunctionBegin;
   PetscCall(Sample(t, factor->fom, wanted, &all, &sampled));
-  n = CountVisits(sampled.n, HycoBodiesGrid(b, 0, NULL)) + b->p * HycoBodiesGrid(b, 0, NULL);
+  n = CountVisits(sampled.n - sampled.n_checks, HycoBodiesGrid(b, 0, NULL)) + b->p * HycoBodiesGrid(b, 0, NULL);
   PetscCall(PetscMalloc1((size_t)factor->fom->fe->n_dof * (size_t)n + 1, &U));
   PetscCall(ExpandAll(t, factor, &sampled, U));
   PetscCall(HycoBodiesChooseCells(t, factor));
-  HycoFreeAll(&sampled.c, &sampled.f);
   PetscCall(PetscFree(b->mode_start));
   ierr = FindModes(t, factor, n, U, V, sigma);
   PetscCall(PetscFree(U));
+  if (!ierr && !b->n_theta) ierr = MeasureLeft(t, factor, &sampled, *V);
+  HycoFreeAll(&sampled.c, &sampled.f);
   PetscCall(ierr);
   *enough = PETSC_TRUE;
   for (PetscInt k = 0; k < b->n; k++)
-    *enough = (PetscBool)(*enough && b->mode_start[k + 1] - b->mode_start[k] <= FULL * sampled.n);
+    *enough = (PetscBool)(*enough && b->mode_start[k + 1] - b->mode_start[k] <= FULL * (sampled.n - sampled.n_checks));
+  HycoTrainingOfBodies(t)->filled = (PetscBool) !*enough;
   *enough = (PetscBool)(*enough || !all);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -492,6 +601,7 @@ PetscErrorCode HycoBodiesFields(HycoReducer t, HycoSnapshots store, HycoBodiesFa
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(factor->fom->part->n_cells + 1, &factor->score));
   PetscCall(PetscCalloc1(factor->fom->fe->n_dof + 1, &factor->known));
+  PetscCall(PetscCalloc1(factor->fom->fe->n_dof + 1, &factor->moved));
   for (PetscInt n = HycoTrainingOfBodies(t)->samples, k = 0; !enough && k <= DOUBLINGS; n *= 2, k++) {
     PetscCall(MatDestroy(&V));
     PetscCall(PetscFree(sigma));

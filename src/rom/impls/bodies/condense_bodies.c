@@ -358,8 +358,8 @@ static PetscErrorCode Release(HycoBodiesFactor *factor)
 
     HycoFreeAll(&r->theta, &r->C, &r->R, &r->Z, &r->work);
   }
-  HycoFreeAll(&factor->basis, &factor->record, &factor->theta, &factor->pins, &factor->score, &factor->known,
-              &factor->row);
+  HycoFreeAll(&factor->basis, &factor->record, &factor->theta, &factor->pins, &factor->score, &factor->moved,
+              &factor->known, &factor->row);
   PetscCall(PetscFree2(factor->zero, factor->z));
   PetscCall(HycoFOMDestroy(&factor->fom));
   PetscFunctionReturn(PETSC_SUCCESS);
