@@ -18,6 +18,7 @@
 #include <hycolcp.h>
 #include <hycolinear.h>
 #include <hycoreducerimpl.h>
+#include <hycosolver.h>
 
 /* How a parameter enters a body: the sum of these. */
 enum {
@@ -84,7 +85,6 @@ typedef struct {
   PetscReal *C, *R, *Z, *work; /* n x n; n x r; n x p; p x r, the work of the loads on the rigid motions */
   PetscReal *H, *a, *g;        /* l rows for each turn, then m rows: of n, of r, of p */
   PetscReal *gram;             /* r x r: of the errors of R at held-out samples in the norm of C^-1, summed; 0 */
-  PetscReal *w;                /* online: weights of the samples */
 } HycoSubstructure;
 
 typedef struct _n_HycoSubstructures {
@@ -114,49 +114,58 @@ typedef struct _n_HycoSubstructures {
   PetscInt l, *mode_start;       /* modes by body: n + 1 */
   PetscInt n_turns, *turn_start; /* by body: n + 1 */
   PetscReal *G;                  /* n_turns x 9, orthonormal */
-  /* online */
-  HycoFE fe;          /* on probe */
-  PetscReal *X0, *E0; /* by body: nodes of its cell and the largest entry of its tangents in its own axes */
-  PetscInt *E_at;     /* which entry */
+} * HycoSubstructures;
+
+/* What solves change. In the bodies' axes: c of the loads (r); displacements of the surfaces without contact (free, ns)
+   and with it, then of the unknowns inside (u, ns + ni); forces on the surfaces (f, ns); x (p). */
+typedef struct _n_HycoBodiesWork {
+  HycoSubstructures bodies; /* borrowed */
+  PetscReal **weight;       /* by body: of its samples */
+  HycoFE fe;                /* on probe */
+  PetscReal *X0, *E0;       /* by body: nodes of its cell and the largest entry of its tangents in its own axes */
+  PetscInt *E_at;           /* which entry */
   HycoPose *pose;
-  PetscReal *kappa, *c, *free, *u, *f,
-      *x;                       /* n, r, ns (without contact), ns + ni (with it), ns (forces; in the bodies' axes), p */
+  PetscReal *kappa, *c, *free, *u, *f, *x;
   PetscReal *Z, *work;          /* ns x p, p x r row major: of all bodies, interpolated */
   PetscInt n_loc, *loc;         /* by unknown of the surface's mesh: its place, with ns added inside; or -1 */
   PetscInt *row_start, *row_at; /* the rows of B in the bodies' axes */
   PetscReal *row;
-  PetscReal *w;      /* by contact: gap without the forces */
+  PetscReal *gap;    /* by contact: without the forces */
   PetscBool *active; /* of the contacts in the problem */
-  HycoTao tao;
-  PetscInt its, n_problem; /* iterations of the last solve; contacts in its problem */
-} * HycoSubstructures;
+  HycoTao tao;       /* the active set; if it fails, or another method is asked for: */
+  HycoSolver solver; /* borrowed, or `own` */
+  HycoSolver own;
+  HycoReason reason; /* of the last solve; its iterations, and contacts in its problem */
+  PetscInt its, n_problem;
+  char method[64];
+} * HycoBodiesWork;
 
 PetscErrorCode HycoBodiesCreate(HycoSubstructures *bodies);
-/* NULL-safe; HycoBodiesReset() frees the online data. */
-PetscErrorCode HycoBodiesReset(HycoSubstructures bodies);
+/* NULL-safe. */
 PetscErrorCode HycoBodiesDestroy(HycoSubstructures *bodies);
 /* Points the bodies' tensors to the values of theta; the parameters at which the axes are those of the scene. */
 void HycoBodiesSetTensors(HycoSubstructures bodies);
 void HycoBodiesReference(HycoSubstructures bodies, const PetscReal mu[], PetscReal reference[]);
-/* The weights of the bodies' samples at mu. */
-PetscErrorCode HycoBodiesWeights(HycoSubstructures bodies, const PetscReal mu[]);
-/* A copy for solves beside others: its blocks stay those of `bodies`. HycoBodiesReset() and PetscFree() of its `body`
-   free it. */
-PetscErrorCode HycoBodiesBorrow(HycoSubstructures bodies, HycoSubstructures copy);
-/* Prepares solves with contacts on this mesh, whose nodes have their numbers in the whole mesh. */
-PetscErrorCode HycoBodiesSetUp(HycoSubstructures bodies, HycoScene scene, const HycoBodiesSurface *surface);
+/* weight[n_samples]: of the samples of body k at mu. */
+PetscErrorCode HycoBodiesWeights(HycoSubstructures bodies, PetscInt k, const PetscReal mu[], PetscReal weight[]);
+/* Prepares solves with contacts on this mesh, whose nodes have their numbers in the whole mesh. *work is all zero;
+   HycoBodiesReset() frees it, after an error too. solver: its type, tolerance and limits apply (borrowed); NULL: the
+   defaults. */
+PetscErrorCode HycoBodiesSetUp(HycoBodiesWork work, HycoSubstructures bodies, HycoScene scene,
+                               const HycoBodiesSurface *surface, HycoSolver solver);
+PetscErrorCode HycoBodiesReset(HycoBodiesWork work);
 /* The forces of all contacts at mu, where the surface's rows are; u, f, x, c and poses are set. *solved: the
    complementarity problem is. */
-PetscErrorCode HycoBodiesSolve(HycoSubstructures bodies, const HycoBodiesSurface *surface, const PetscReal mu[],
+PetscErrorCode HycoBodiesSolve(HycoBodiesWork work, const HycoBodiesSurface *surface, const PetscReal mu[],
                                PetscReal Lambda[], PetscBool *solved);
 /* Sets the displacements of the surfaces and, after HycoBodiesExpand(), of the unknowns inside in U (by unknown of the
    surface's mesh) without prescribed ones. */
-void HycoBodiesMove(HycoSubstructures bodies, const HycoBodiesSurface *surface, PetscReal U[]);
+void HycoBodiesMove(HycoBodiesWork work, const HycoBodiesSurface *surface, PetscReal U[]);
 /* After a solve: a bound of |L~ - L|_W relative to *norm = |L~|_W, from the errors of flexibilities and loads at held-out
    samples of the bodies; 0 without forces. */
-PetscReal HycoBodiesBound(HycoSubstructures bodies, PetscReal *norm);
+PetscReal HycoBodiesBound(HycoBodiesWork work, PetscReal *norm);
 /* The coefficients of the modes, and the displacements of the unknowns inside. */
-PetscErrorCode HycoBodiesExpand(HycoSubstructures bodies, PetscReal gamma[]);
+PetscErrorCode HycoBodiesExpand(HycoBodiesWork work, PetscReal gamma[]);
 /* Reads from or writes to the model's file. */
 PetscErrorCode HycoBodiesFile(HycoROM model, HycoH5 file);
 

@@ -7,7 +7,6 @@
 #include <hycoromtypes.h>
 #include <petscviewer.h>
 
-#define ACCEPTED 1e-8  /* largest residual of a prediction */
 #define ROUNDING 1e-10 /* relative, of exact results */
 #define ACTIVE   0.3   /* assumed share of closed contacts, and entries of a row of B, for costs */
 #define ENTRIES  15
@@ -19,24 +18,20 @@ static HycoBodiesSurface SurfaceOf(HycoROM m)
 
 static PetscErrorCode SetUp(HycoROM m)
 {
-  HycoSubstructures b = (HycoSubstructures)m->work;
   HycoBodiesSurface s;
 
   PetscFunctionBegin;
-  PetscCall(HycoBodiesBorrow((HycoSubstructures)m->model->data, b)); /* the blocks stay the model's */
   PetscCall(HycoROMSetUpDefault(m));
   s = SurfaceOf(m);
-  PetscCall(HycoBodiesSetUp(b, m->model->scene, &s));
+  PetscCall(
+      HycoBodiesSetUp((HycoBodiesWork)m->work, (HycoSubstructures)m->model->data, m->model->scene, &s, m->solver));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode Reset(HycoROM m)
 {
-  HycoSubstructures b = (HycoSubstructures)m->work;
-
   PetscFunctionBegin;
-  PetscCall(HycoBodiesReset(b));
-  if (b) PetscCall(PetscFree(b->body));
+  PetscCall(HycoBodiesReset((HycoBodiesWork)m->work));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -51,18 +46,19 @@ static PetscErrorCode Destroy(HycoROM m)
 }
 
 /* The residual of equilibrium along the rigid motions that contact alone prevents, relative to the terms of each. */
-static PetscReal Unbalanced(HycoSubstructures b)
+static PetscReal Unbalanced(HycoBodiesWork o)
 {
+  const HycoSubstructures b = o->bodies;
   PetscReal most = 0;
 
   for (PetscInt i = 0; i < b->p; i++) {
     PetscReal sum = 0, size = 0;
 
-    for (PetscInt j = 0; j < b->r; j++) sum += b->work[i * b->r + j] * b->c[j];
+    for (PetscInt j = 0; j < b->r; j++) sum += o->work[i * b->r + j] * o->c[j];
     size = PetscAbsReal(sum);
     for (PetscInt k = 0; k < b->ns; k++) {
-      sum -= b->Z[k * b->p + i] * b->f[k];
-      size += PetscAbsReal(b->Z[k * b->p + i] * b->f[k]);
+      sum -= o->Z[k * b->p + i] * o->f[k];
+      size += PetscAbsReal(o->Z[k * b->p + i] * o->f[k]);
     }
     if (size > 0) most = PetscMax(most, PetscAbsReal(sum) / size);
   }
@@ -90,27 +86,27 @@ static void Measure(HycoROM m, HycoKKT *kkt)
   }
   gaps = PetscMax(gaps, u);
   kkt->rounding = 0;
-  kkt->stationarity = Unbalanced((HycoSubstructures)m->work);
+  kkt->stationarity = Unbalanced((HycoBodiesWork)m->work);
   kkt->penetration = gaps > 0 ? in / gaps : 0;
   kkt->adhesion = most > 0 ? pulls / most : 0;
   kkt->complementarity = gaps > 0 && most > 0 ? both / (gaps * most) : 0;
 }
 
 /* The modes where displacements are not exact. */
-static void Expand(HycoROM m, HycoSubstructures b)
+static void Expand(HycoROM m, const PetscInt loc[])
 {
   const PetscInt l = m->model->l;
 
   for (PetscInt i = 0; i < m->fe->n_dof; i++) {
     m->U[i] = m->fe->u0[i];
-    for (PetscInt j = 0; j < l && b->loc[i] < 0 && !m->fe->fixed[i]; j++)
+    for (PetscInt j = 0; j < l && loc[i] < 0 && !m->fe->fixed[i]; j++)
       m->U[i] += m->model->V[(size_t)i * (size_t)l + (size_t)j] * m->gamma[j];
   }
 }
 
 static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
 {
-  HycoSubstructures b = (HycoSubstructures)m->work;
+  HycoBodiesWork o = (HycoBodiesWork)m->work;
   HycoPrediction *p = &m->prediction;
   const HycoBodiesSurface s = SurfaceOf(m);
   PetscReal begin = HycoNow(), solve, norm;
@@ -121,16 +117,16 @@ static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
   solve = HycoNow();
   p->seconds.factor = 0;
   p->seconds.assemble = solve - begin;
-  PetscCall(HycoBodiesSolve(b, &s, mu, m->Lambda, &solved));
-  PetscCall(HycoBodiesExpand(b, m->gamma));
-  Expand(m, b);
-  HycoBodiesMove(b, &s, m->U);
+  PetscCall(HycoBodiesSolve(o, &s, mu, m->Lambda, &solved));
+  PetscCall(HycoBodiesExpand(o, m->gamma));
+  Expand(m, o->loc);
+  HycoBodiesMove(o, &s, m->U);
   HycoFEComplete(m->fe, m->U);
   Measure(m, &p->kkt);
-  p->interpolation_error = HycoBodiesBound(b, &norm);
-  p->iterations = b->its;
-  p->reason = solved && HycoKKTMax(&p->kkt) <= ACCEPTED ? HYCO_CONVERGED : HYCO_DIVERGED_RESIDUAL;
-  PetscCall(PetscStrncpy(p->method, HYCO_TAO_ACTIVE_SET, sizeof(p->method)));
+  p->interpolation_error = HycoBodiesBound(o, &norm);
+  p->iterations = o->its;
+  p->reason = solved && HycoKKTMax(&p->kkt) > m->solver->rtol ? HYCO_DIVERGED_RESIDUAL : o->reason;
+  PetscCall(PetscStrncpy(p->method, o->method, sizeof(p->method)));
   p->seconds.solve = HycoNow() - solve;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -148,7 +144,7 @@ static PetscErrorCode Features(HycoROM m, PetscReal misfit[2])
    without modes have that of round-off. */
 static PetscErrorCode Estimate(HycoROM m, HycoPrediction *p)
 {
-  const HycoSubstructures b = (HycoSubstructures)m->work;
+  const HycoSubstructures b = (HycoSubstructures)m->model->data;
 
   PetscFunctionBegin;
   p->estimated_error_lambda = PetscMax(p->interpolation_error, ROUNDING);
@@ -299,7 +295,7 @@ PetscErrorCode HycoROMCreate_Bodies(HycoROM m)
                                        .surfaces = PETSC_TRUE,
                                        .cells = PETSC_TRUE,
                                        .uniform = PETSC_TRUE,
-                                       .work = sizeof(*(HycoSubstructures)NULL),
+                                       .work = sizeof(*(HycoBodiesWork)NULL),
                                        .resultants = PETSC_TRUE};
   static const HycoROMOps ops = {.setfromoptions = SetFromOptions,
                                  .resettraining = ResetTraining,

@@ -25,19 +25,20 @@ typedef struct {
 /* -- forces -- */
 
 /* One point: *solved if its contact problem is. Rank 0. */
-static PetscErrorCode SolveOne(HycoSubstructures b, const HycoBodiesSurface *s, const PetscReal mu[],
-                               PetscReal Lambda[], PetscBool *solved)
+static PetscErrorCode SolveOne(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal mu[], PetscReal Lambda[],
+                               PetscBool *solved)
 {
   PetscFunctionBegin;
   PetscCall(HycoFESetParameters(s->fe, mu));
   PetscCall(HycoContactRows(s->fe, s->pairs, s->rows->start, s->rows->dof, s->rows->value, s->rows->gap));
-  PetscCall(HycoBodiesSolve(b, s, mu, Lambda, solved));
+  PetscCall(HycoBodiesSolve(o, s, mu, Lambda, solved));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode SolvePoints(HycoReducer t, HycoSubstructures b, const HycoBodiesSurface *s, HycoSamples points,
+static PetscErrorCode SolvePoints(HycoReducer t, HycoBodiesWork o, const HycoBodiesSurface *s, HycoSamples points,
                                   Sampled *sampled)
 {
+  const HycoSubstructures b = o->bodies;
   const PetscInt p = t->scene->n_parameters;
   PetscReal *Lambda, *bound, *norm, most = 0;
   const PetscReal *mu;
@@ -52,12 +53,12 @@ static PetscErrorCode SolvePoints(HycoReducer t, HycoSubstructures b, const Hyco
     PetscErrorCode ierr;
 
     PetscCall(HycoCatchBegin()); /* points that full order would refuse, too */
-    ierr = SolveOne(b, s, mu + k * p, Lambda, &solved);
+    ierr = SolveOne(o, s, mu + k * p, Lambda, &solved);
     PetscCall(HycoCatchEnd(ierr, message));
     if (ierr || !solved) continue;
-    PetscCall(PetscArraycpy(sampled->c + sampled->n * b->r, b->c, b->r));
-    PetscCall(PetscArraycpy(sampled->f + sampled->n * b->ns, b->f, b->ns));
-    bound[sampled->n] = HycoBodiesBound(b, &norm[sampled->n]);
+    PetscCall(PetscArraycpy(sampled->c + sampled->n * b->r, o->c, b->r));
+    PetscCall(PetscArraycpy(sampled->f + sampled->n * b->ns, o->f, b->ns));
+    bound[sampled->n] = HycoBodiesBound(o, &norm[sampled->n]);
     most = PetscMax(most, norm[sampled->n]);
     sampled->n++;
     sampled->n_checks += p && k >= n - CHECKS;
@@ -73,15 +74,16 @@ static PetscErrorCode SolvePoints(HycoReducer t, HycoSubstructures b, const Hyco
 static PetscErrorCode SampleForces(HycoReducer t, HycoFOM f, HycoSamples points, Sampled *sampled)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  struct _n_HycoBodiesWork work = {0};
   HycoRows rows;
   const HycoBodiesSurface s = {f->fe_surface, &f->pairs, &rows};
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoRowsCreate(&f->pairs, b->dim, &rows));
-  ierr = HycoBodiesSetUp(b, t->scene, &s);
-  if (!ierr) ierr = SolvePoints(t, b, &s, points, sampled);
-  PetscCall(HycoBodiesReset(b));
+  ierr = HycoBodiesSetUp(&work, b, t->scene, &s, NULL);
+  if (!ierr) ierr = SolvePoints(t, &work, &s, points, sampled);
+  PetscCall(HycoBodiesReset(&work));
   PetscCall(HycoRowsDestroy(&rows));
   f->fe_surface->ready = PETSC_FALSE;
   PetscCall(ierr);

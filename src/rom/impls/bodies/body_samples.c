@@ -89,7 +89,6 @@ static PetscErrorCode SetGrid(HycoReducer t, HycoSubstructures b)
     }
   }
   PetscCall(FindAxes(t, b));
-  for (PetscInt k = 0; k < b->n; k++) PetscCall(PetscFree(b->body[k].w));
   HycoBodiesSetTensors(b);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -196,7 +195,8 @@ static PetscErrorCode Largest(PetscInt n, const PetscReal L[], const PetscReal D
 }
 
 /* Adds the products of the columns of R~ - R (R: n x r row major) in the norm of C^-1, C = L L^T. */
-static PetscErrorCode AddGram(const HycoSubstructure *s, PetscInt r, const PetscReal L[], const PetscReal R[])
+static PetscErrorCode AddGram(const HycoSubstructure *s, const PetscReal weight[], PetscInt r, const PetscReal L[],
+                              const PetscReal R[])
 {
   PetscBLASInt m, columns;
   const PetscReal unit = 1;
@@ -210,7 +210,7 @@ static PetscErrorCode AddGram(const HycoSubstructure *s, PetscInt r, const Petsc
     PetscReal *d = D + i % r * s->n + i / r;
 
     *d = -R[i];
-    for (PetscInt q = 0; q < s->n_samples; q++) *d += s->w[q] * s->R[(size_t)q * (size_t)(s->n * r) + (size_t)i];
+    for (PetscInt q = 0; q < s->n_samples; q++) *d += weight[q] * s->R[(size_t)q * (size_t)(s->n * r) + (size_t)i];
   }
   if (r) BLAStrsm_("L", "L", "N", "N", &m, &columns, &unit, L, &m, D, &m);
   for (PetscInt i = 0; i < r * r; i++) {
@@ -225,24 +225,24 @@ static PetscErrorCode Bound(HycoSubstructures b, const PetscReal mu[], const Hyc
 {
   PetscFunctionBegin;
   *e = 0;
-  PetscCall(HycoBodiesWeights(b, mu));
   for (PetscInt k = 0; k < b->n; k++) {
     const HycoSubstructure *s = &b->body[k];
     const size_t n = (size_t)PetscSqr(s->n);
-    PetscReal *C, *D, own;
+    PetscReal *C, *D, *weight, own;
 
     if (s->n_samples == 1 || !s->n) continue;
-    PetscCall(PetscMalloc2(n + 1, &C, n + 1, &D));
+    PetscCall(PetscMalloc3(n + 1, &C, n + 1, &D, s->n_samples, &weight));
+    PetscCall(HycoBodiesWeights(b, k, mu, weight));
     PetscCall(PetscArraycpy(C, record->C + BlockAt(b, k), n));
     for (size_t i = 0; i < n; i++) {
       D[i] = -C[i];
-      for (PetscInt q = 0; q < s->n_samples; q++) D[i] += s->w[q] * s->C[(size_t)q * n + i];
+      for (PetscInt q = 0; q < s->n_samples; q++) D[i] += weight[q] * s->C[(size_t)q * n + i];
     }
     PetscCall(Factor(s->n, C));
     PetscCall(Largest(s->n, C, D, &own));
-    PetscCall(AddGram(s, b->r, C, record->R + b->start[k] * b->r));
+    PetscCall(AddGram(s, weight, b->r, C, record->R + b->start[k] * b->r));
     *e = PetscMax(*e, own);
-    PetscCall(PetscFree2(C, D));
+    PetscCall(PetscFree3(C, D, weight));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
