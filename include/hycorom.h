@@ -80,6 +80,7 @@ typedef struct {
   char method[64]; /* name of the method */
   HycoReason reason;
   HycoSeconds seconds;
+  PetscInt n_dependent; /* bodies: as in HycoSummary; else -1 */
 } HycoPrediction;
 
 /* Result of the scan for a singular reduced stiffness in the parameters' ranges. */

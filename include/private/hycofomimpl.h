@@ -127,6 +127,10 @@ PetscErrorCode HycoFOMTakeOutReleased(HycoFOM fom, Vec u);
 /* Number of closed contacts of the last solution whose rows of B depend on the others; if it is not 0, the contact
    forces are not unique. Collective. */
 PetscErrorCode HycoFOMCountDependent(HycoFOM fom, PetscInt *dependent);
+/* The same for the rows and gaps of m contacts on one process, displacements u (n_dof) and forces lambda. */
+PetscErrorCode HycoRowsCountDependent(PetscInt m, PetscInt start[], PetscInt dof[], PetscReal value[], PetscReal gap[],
+                                      PetscInt n_dof, const PetscReal u[], const PetscReal lambda[],
+                                      PetscInt *dependent);
 /* Creates distributed vectors of the motions; VecDestroyVecs() destroys them. Collective. */
 PetscErrorCode HycoFOMMotionVectors(HycoFOM fom, const HycoMotions *motions, Vec **v);
 /* name: a rigid motion, left free by supports and springs, on which no contact force of the solution acts; "": none.

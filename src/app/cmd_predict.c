@@ -108,6 +108,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
   ReportNumbers(json, {"n_active", p->n_active}, {"active_set_iterations", p->iterations});
   cJSON_AddStringToObject(json, "solver", p->method);
   cJSON_AddBoolToObject(json, "converged", p->reason > 0);
+  if (p->n_dependent >= 0) cJSON_AddBoolToObject(json, "forces_unique", p->n_dependent == 0);
   ReportNumbers(json, {"n_modes", p->n_modes}, {"n_fe_dofs", p->n_fe_dofs});
   if (!fallback[0]) ReportRID(json, p);
   ReportNumbers(json, {"covered_force", p->covered_force}, {"total_contact_force", p->total_contact_force},

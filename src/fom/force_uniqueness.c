@@ -12,7 +12,8 @@ typedef struct {
 } Rows;
 
 /* Marks contacts whose gap is closed, and that have an unknown. */
-static PetscErrorCode MarkClosed(HycoFOM f, const Rows *r, PetscBool in[])
+static PetscErrorCode MarkClosed(MPI_Comm comm, const Rows *r, const PetscReal u[], const PetscReal lambda[],
+                                 PetscBool in[])
 {
   PetscReal scale = 0;
 
@@ -22,13 +23,13 @@ static PetscErrorCode MarkClosed(HycoFOM f, const Rows *r, PetscBool in[])
       PetscReal left = r->gap[k], size = PetscAbsReal(r->gap[k]);
 
       for (PetscInt j = r->start[k]; j < r->start[k + 1]; j++) {
-        left -= r->value[j] * f->u_surface[r->dof[j]];
-        size += PetscAbsReal(r->value[j] * f->u_surface[r->dof[j]]);
+        left -= r->value[j] * u[r->dof[j]];
+        size += PetscAbsReal(r->value[j] * u[r->dof[j]]);
       }
       scale = PetscMax(scale, size);
-      in[k] = (PetscBool)(r->start[k + 1] > r->start[k] && (f->lambda[k] > 0 || left <= 1e-9 * scale));
+      in[k] = (PetscBool)(r->start[k + 1] > r->start[k] && (lambda[k] > 0 || left <= 1e-9 * scale));
     }
-    if (!pass) HycoAllreduce(&scale, 1, MPIU_REAL, MPI_MAX, HycoComm(f));
+    if (!pass) HycoAllreduce(&scale, 1, MPIU_REAL, MPI_MAX, comm);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -179,7 +180,7 @@ static PetscErrorCode Count(HycoFOM f, Rows *r, PetscBool in[], PetscInt *depend
 {
   PetscFunctionBegin;
   HycoOnEach(HycoComm(f), HycoContactRows(f->fe_surface, &f->pairs, r->start, r->dof, r->value, r->gap));
-  PetscCall(MarkClosed(f, r, in));
+  PetscCall(MarkClosed(HycoComm(f), r, f->u_surface, f->lambda, in));
   PetscCall(Peel(f, r, in));
   PetscCall(CountRest(f, r, in, dependent));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -198,5 +199,53 @@ PetscErrorCode HycoFOMCountDependent(HycoFOM f, PetscInt *dependent)
   ierr = Count(f, &r, in, dependent);
   PetscCall(PetscFree5(r.start, r.dof, r.value, r.gap, in));
   PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The marked rows, which the caller frees. */
+static PetscErrorCode TakeRest(const Rows *r, const PetscBool in[], Rows *rest)
+{
+  PetscInt n = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(r->m + 1, &rest->start));
+  PetscCall(PetscMalloc1(r->start[r->m] + 1, &rest->dof));
+  PetscCall(PetscMalloc1(r->start[r->m] + 1, &rest->value));
+  rest->start[0] = 0;
+  for (PetscInt k = 0; k < r->m; k++) {
+    for (PetscInt j = r->start[k]; in[k] && j < r->start[k + 1]; j++) {
+      rest->dof[n] = r->dof[j];
+      rest->value[n++] = r->value[j];
+    }
+    if (in[k]) rest->start[++rest->m] = n;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoRowsCountDependent(PetscInt m, PetscInt start[], PetscInt dof[], PetscReal value[], PetscReal gap[],
+                                      PetscInt n_dof, const PetscReal u[], const PetscReal lambda[],
+                                      PetscInt *dependent)
+{
+  Rows r = {m, start, dof, value, gap}, rest = {0, NULL, NULL, NULL, NULL};
+  PetscReal *count;
+  PetscBool *in, pressed = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  *dependent = 0;
+  PetscCall(PetscMalloc1(m + 1, &in));
+  PetscCall(PetscCalloc1(n_dof + 1, &count));
+  PetscCall(MarkClosed(PETSC_COMM_SELF, &r, u, lambda, in));
+  for (PetscInt k = 0; k < m; k++) {
+    for (PetscInt j = start[k]; in[k] && j < start[k + 1]; j++) count[dof[j]]++;
+  }
+  (void)PeelOwn(&r, count, in);
+  for (PetscInt k = 0; k < m; k++) pressed = (PetscBool)(pressed || (in[k] && lambda[k] > 0));
+  if (pressed) {
+    PetscCall(TakeRest(&r, in, &rest));
+    PetscCall(Dependent(&rest, dependent));
+  }
+  HycoFreeAll(&rest.start, &rest.dof, &rest.value);
+  PetscCall(PetscFree(in));
+  PetscCall(PetscFree(count));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -93,6 +93,10 @@ static PetscErrorCode MeasureContacts(HycoROM m, HycoPrediction *p)
   p->n_facing = state.n_facing;
   p->overlap = state.overlap;
   p->sliding = state.sliding;
+  p->n_dependent = -1;
+  if (m->model->traits.surfaces && p->reason > 0)
+    PetscCall(HycoRowsCountDependent(m->model->pairs.n, m->rows.start, m->rows.dof, m->rows.value, m->rows.gap,
+                                     m->fe->n_dof, m->U, m->Lambda, &p->n_dependent));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

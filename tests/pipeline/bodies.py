@@ -7,6 +7,7 @@ import unittest
 import h5py
 import numpy as np
 
+import motions
 from common import SOURCE, Case
 
 MESH = os.path.join(SOURCE, 'examples', '{0}', '{0}.msh')
@@ -187,6 +188,35 @@ class Bodies(Case):
                       'a spring along one component does not turn with the body')
         said = self.hyco('check', '-scene', HERTZ)['bodies_by_parameter']
         self.assertIn('radius: changes the shape or the material of body upper, which needs samples', said)
+
+    def test_solvers(self):
+        """Every method that is asked for solves the contact problem of a prediction, and is named; it is refused with floating bodies; tolerance and
+        fallback act."""
+        self.hyco('train', '-scene', ROLLER, *TYPE, '-scatter', '2', '-model', 'v.h5')
+        at = ('-model', 'v.h5', '-mu', '1.3,0.7,9')
+        force = self.hyco('predict', *at)['total_contact_force']
+        for name in ('lemke', 'semismooth', 'tao'):
+            r = self.hyco('predict', *at, '-hyco_solver_type', name)
+            self.assertIn(name, r['solver'])
+            self.near(r['total_contact_force'], force, 1e-10)
+        self.hyco('predict', *at, '-hyco_solver_max_its', '1')
+        run = self.run_raw('predict', *at, '-hyco_solver_max_its', '1', '-hyco_solver_fallback', 'false')
+        self.assertEqual(run.returncode, 1, run.stdout)
+        self.hyco('train', '-scene', self.write('floating.yaml', FLOATING), *TYPE, '-scatter', '2', '-model', 'w.h5')
+        run = self.run_raw('predict', '-model', 'w.h5', '-mu', '2.2,123,0.3', '-hyco_solver_type', 'lemke')
+        self.assertIn('-hyco_solver_type', run.stderr)
+        self.assertEqual((run.returncode, len(run.stderr.splitlines())), (1, 1), run.stderr)
+
+    def test_unique(self):
+        """A rigid tool with more closed slaves than its masters have unknowns: the forces are not unique, as full order says, but their sum is."""
+        for tool in (True, False):
+            with open(motions.Unique.columns(self, tool), encoding='ascii') as f:
+                text = f.read().replace('mesh: columns.msh', 'mesh: columns.msh, parameters: [press]').replace('y: -0.01', 'y: -press')
+            scene = self.write('unique.yaml', text + 'parameter: {press: {range: [0.005, 0.02]}}\n')
+            self.hyco('train', '-scene', scene, *TYPE, '-scatter', '2', '-model', f'q{tool}.h5')
+            p, s = (self.hyco(*run, '-mu', '0.013') for run in (('predict', '-model', f'q{tool}.h5'), ('solve', '-scene', scene)))
+            self.assertEqual((p['forces_unique'], s['forces_unique']), (not tool, not tool))
+            self.near(p['total_contact_force'], s['total_contact_force'], 1e-10)
 
     def test_ranks(self):
         """The same forces from a training on one, two and three ranks, with samples and with a floating body."""
