@@ -59,6 +59,7 @@ typedef struct {
 /* The settings that determine a model for given solutions; they are the options of the same names. */
 typedef struct {
   HycoROMType type;                     /* borrowed from the library */
+  PetscBool pod;                        /* pod_tol applies to this type */
   PetscBool rid;                        /* layers, extension, hybrid and whole apply to this type */
   PetscReal pod_tol, contact_extension; /* energy left out of the displacement basis; a length */
   PetscInt layers;
@@ -99,6 +100,7 @@ typedef PetscErrorCode (*HycoAddedMonitor)(PetscInt n, PetscInt parameter, Petsc
 /* Types or settings that the search did not try, and the reason. */
 typedef struct {
   char what[64], why[512];
+  PetscBool possible; /* by naming it */
 } HycoLeftOut;
 #define HYCO_MAX_LEFT_OUT 8
 
@@ -131,7 +133,8 @@ typedef struct {
   PetscInt n_fe_dofs, rid_nodes, rid_elements, rid_a_nodes, rid_contacts; /* FE unknowns, RID, nodes of A, |A_lambda| */
   PetscReal rid_fraction;                                                 /* share of the elements */
   PetscReal condition;             /* of the reduced stiffness, the largest over the judged snapshots */
-  PetscReal error_u, error_lambda; /* mean relative training errors, 2-norm, displacement and RID contact forces */
+  PetscReal error_u, error_lambda; /* mean relative training errors, 2-norm, displacement and RID contact forces; < 0:
+                                      there is no training solution */
   HycoValidation held_out;         /* errors of the written model at held-out points; n 0: none. The largest also at
                                       n_corners training points at corners of the ranges */
   PetscInt n_corners;
@@ -163,6 +166,9 @@ PetscErrorCode HycoReducerDestroy(HycoReducer *reducer);
 PetscErrorCode HycoReducerSetFromOptions(HycoReducer reducer);
 /* Gets the type of model that the options set (-hyco_model_type); a search may choose another. */
 PetscErrorCode HycoReducerGetType(HycoReducer reducer, HycoROMType *type);
+/* Whether the training may give a model of a type that a text names ("hybrid or cubature"): that of
+   HycoReducerGetType(), or one that a search of the type tries. Not collective. */
+PetscErrorCode HycoReducerTries(HycoReducer reducer, const char types[], PetscBool *tries);
 /* Sets the folder of the snapshots (default: the model's name with .snapshots appended). */
 PetscErrorCode HycoReducerSetSnapshotFolder(HycoReducer reducer, const char folder[]);
 /* Whether HycoReducerRun() chooses the points itself when it is given none: for a condensed model. */
@@ -173,7 +179,8 @@ PetscErrorCode HycoReducerSetProgress(HycoReducer reducer, HycoProgress progress
    n, where n is 0 if it is not known. */
 typedef PetscErrorCode (*HycoPhaseMonitor)(const char phase[], PetscInt done, PetscInt n, void *ctx);
 PetscErrorCode HycoReducerSetPhaseMonitor(HycoReducer reducer, HycoPhaseMonitor monitor, void *ctx);
-/* Solves the missing samples and the held-out points (HycoReducerSetValidation()), reduces, and writes the model to
+/* Solves the held-out points (HycoReducerSetValidation()) and, unless a type is accurate without them, the missing
+   samples, reduces, and writes the model to
    `path` (under a temporary name, then renamed). Collective. `training` may be NULL. `samples` may be NULL for a
    condensed model, which then chooses points until its estimate of the forces' error is below -hyco_condensed_tol; if
    that is not reached, `missed` says so. Fails if the errors of the model on its training solutions reach one half and,
@@ -195,6 +202,9 @@ PetscErrorCode HycoReducerSetAttemptMonitor(HycoReducer reducer, HycoAttemptMoni
    them, solutions are added near the worst points, at most `budget` of them (< 0: as many as there were at first), and
    fresh held-out points judge the model; if it misses the targets there, the former ones are used for training too. */
 PetscErrorCode HycoReducerSetTargets(HycoReducer reducer, const PetscReal target[], PetscInt budget);
+/* Gets the errors at which a search calls a model accurate enough, and those above which a model misses, by kind (0:
+   none): the targets that were set, or else defaults. Either may be NULL. */
+PetscErrorCode HycoReducerGetTargets(HycoReducer reducer, PetscReal target[], PetscReal limit[]);
 
 /* -- greedy training (section 5.4) -- */
 

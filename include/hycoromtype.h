@@ -35,6 +35,8 @@ typedef struct {
   PetscBool surfaces;    /* the displacements of the contacts' surfaces are its own, beside those of the modes */
   PetscBool uniform; /* its errors do not follow the features: the estimates are a multiple of their largest at held-out
                         points, and no less than those of ops->estimate */
+  PetscBool own_modes; /* its modes are displacements of its own: solutions choose only the cells of its mesh, for which
+                            those at held-out points serve, and a search tries it before the training points are solved */
   PetscBool cells;   /* its mesh consists of the cells that it chooses, and of the surfaces of contacts and, without
                       `surfaces`, loads */
 } HycoROMTraits;
@@ -64,7 +66,8 @@ typedef struct _HycoROMOps {
   PetscReal (*cost)(HycoReducer, const HycoAttempt *);            /* operations of an online solve at a new stiffness */
   PetscBool (*offers)(HycoReducer, PetscBool targets, size_t length,
                       char why[]); /* whether a search tries it by default, with or without -target_...; if not,
-                                      `why` may get a reason for the user */
+                                      `why` may get a reason for the user. Of types with own_modes `begin` is called
+                                      before, and its refusal is the reason */
   PetscReal (*work)(HycoReducer);  /* operations of making a model, if they are many, from the sizes of the scene */
   /* -- online -- */
   PetscErrorCode (*options)(HycoROM);                     /* its options of a model */

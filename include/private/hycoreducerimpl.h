@@ -97,7 +97,9 @@ struct _p_HycoReducer {
   } greedy;
   /* state of a run, on rank 0 unless stated otherwise */
   HycoSnapshots store;    /* borrowed, every rank */
-  HycoSamples samples;    /* borrowed, every rank */
+  HycoSamples samples;    /* the training points; borrowed, every rank */
+  HycoSamples columns;    /* those whose solutions the bases are made of: the training points, or for types with modes
+                             of their own the held-out points; borrowed, every rank */
   HycoSamples validation; /* given by the user (borrowed; NULL: none). Every rank */
   HycoSamples held;       /* of this run; NULL: none. Every rank */
   struct _n_HycoHeldOut
@@ -135,13 +137,17 @@ struct _p_HycoReducer {
   PetscInt n_solvers, *solved; /* of the last run, every rank: number of groups of ranks, and of solutions of each */
   PetscInt unsolved;           /* of the last run, every rank: HycoSnapshotsGetBalance() */
   PetscReal *written;
-  PetscBool *grown; /* every rank, greedy: cells of its part that belong to the RIDs so far; else NULL */
+  PetscReal solving; /* seconds of its full-order solutions */
+  PetscBool late;    /* the training points are solved when a type needs them; every rank */
+  PetscBool *grown;  /* every rank, greedy: cells of its part that belong to the RIDs so far; else NULL */
 };
 
 /* The scene's variables of column k of the snapshots: all of mu (HYCO_MAX_PARAMETERS). */
 PetscErrorCode HycoReducerColumn(HycoReducer t, PetscInt k, PetscReal mu[]);
-/* Sets t->n_s from the samples. */
-PetscErrorCode HycoReducerCount(HycoReducer t);
+/* Sets t->columns, and t->n_s from it. */
+PetscErrorCode HycoReducerSetColumns(HycoReducer t, HycoSamples columns);
+/* Solves points that are not in the store, and counts the time. Collective. */
+PetscErrorCode HycoReducerSolve(HycoReducer t, HycoSnapshots store, HycoSamples points);
 /* Frees the data of one run. */
 PetscErrorCode HycoReducerReset(HycoReducer t);
 /* Sets a registered type, with its options; the present one may stay. */
@@ -313,14 +319,14 @@ PetscErrorCode HycoROMMeasureRID(HycoROM model, const PetscReal u[], const Petsc
 void HycoPathErrorsJudge(PetscInt n, const HycoLost lost[], HycoPathErrors *errors);
 
 /* Stops the predictions of held-out paths early: at the first one, in the order of `order`, that does not reach its
-   end or has an error above `most` times its target. */
+   end or has an error whose HycoAttemptsQuotient() is above `most`. */
 typedef struct {
-  PetscInt *order;         /* all held-out points */
-  const PetscReal *target; /* by HycoErrorKind; 0: none */
-  PetscReal most, force;   /* most: PETSC_INFINITY: any; force: HycoHeldOutForce() of all points */
-  PetscBool all;           /* do not stop early */
-  PetscInt n;              /* result: the number of paths predicted, */
-  PetscBool lost;          /* and whether the last of them stopped it */
+  PetscInt *order;                 /* all held-out points */
+  const PetscReal *target, *limit; /* HycoReducerGetTargets() */
+  PetscReal most, force;           /* most: PETSC_INFINITY: any; force: HycoHeldOutForce() of all points */
+  PetscBool all;                   /* do not stop early */
+  PetscInt n;                      /* result: the number of paths predicted, */
+  PetscBool lost;                  /* and whether the last of them stopped it */
 } HycoHeldOutRace;
 
 /* Predicts with the last model built at each of n points, whose solutions must be in the store; rows[n] on every
@@ -374,6 +380,10 @@ void HycoReducerGetSettings(HycoReducer t, HycoReducerSettings *settings);
   it (0: none, and the limit is PETSC_INFINITY). HycoAttemptsReopen(): an attempt that was dropped, and may be chosen
   now that others were refused; NULL: none.
 */
+/* Of an error and its target (> 0), at most 1 if it meets it; the largest quotient of a model is above HYCO_MISSES if and
+   only if an error is above its limit (0: it has none). */
+#define HYCO_MISSES 3
+PetscReal HycoAttemptsQuotient(PetscReal target, PetscReal limit, PetscReal error);
 HycoAttempt *HycoAttemptsChoose(PetscInt n, HycoAttempt attempt[]);
 PetscReal HycoAttemptsLimit(PetscInt n, const HycoAttempt attempt[], PetscReal cost, PetscInt *beaten);
 HycoAttempt *HycoAttemptsReopen(PetscInt n, HycoAttempt attempt[]);

@@ -78,8 +78,9 @@ static PetscErrorCode Report(HycoScene scene, HycoReducer reducer, const HycoTra
   if (t->stiffness) cJSON_AddNumberToObject(json, "condition", t->condition);
   PetscCall(HycoSceneGetParameters(scene, &n_par, NULL, NULL, NULL));
   ReportScan(json, &t->scan, n_par);
-  ReportNumbers(json, {"training_error_u", t->error_u}, {"training_error_lambda_rid", t->error_lambda},
-                {"held_out_predictions", t->n_held});
+  if (t->error_u >= 0)
+    ReportNumbers(json, {"training_error_u", t->error_u}, {"training_error_lambda_rid", t->error_lambda});
+  ReportNumbers(json, {"held_out_predictions", t->n_held});
   for (PetscInt k = 0; k < t->n_facts; k++) {
     if (t->fact[k].n > 1)
       ReportVector(json, t->fact[k].name, t->fact[k].n, t->fact[k].value);
@@ -118,7 +119,7 @@ static PetscErrorCode CheckRead(HycoReducer reducer, PetscBool given, PetscBool 
   for (PetscInt k = 0; k < n; k++) {
     const char *only = table[k].only, *where = strstr(only, " where");
     char dashed[DRIVER_LINE];
-    PetscBool set;
+    PetscBool set, read;
 
     if (!only[0] || strcmp(table[k].owner, "HycoReducer")) continue;
     PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-%s", table[k].name));
@@ -128,7 +129,8 @@ static PetscErrorCode CheckRead(HycoReducer reducer, PetscBool given, PetscBool 
       HycoCheck(greedy, "%s has no effect without -greedy; remove it", dashed);
       continue;
     }
-    HycoCheck(strstr(only, type), "%s has no effect here: it is for -hyco_model_type %.*s, and the model is %s", dashed,
+    PetscCall(HycoReducerTries(reducer, only, &read));
+    HycoCheck(read, "%s has no effect here: it is for -hyco_model_type %.*s, and the model is %s", dashed,
               where ? (int)(where - only) : (int)strlen(only), only, type);
     HycoCheck(!given || !where, "%s has no effect here: it chooses points only if none are given", dashed);
   }
@@ -231,10 +233,12 @@ PetscErrorCode CommandTrain(void)
     PetscCall(HycoReducerRun(reducer, given ? samples : NULL, model, &t));
   PetscCall(Say("%s", t.summary));
   if (t.missed[0]) PetscCall(DriverMissed("%s", t.missed));
-  PetscCall(Say("mean training errors: u %.2e, %sforces %.2e", (double)t.error_u, t.chosen.settings.rid ? "RID " : "",
-                (double)t.error_lambda));
-  if (t.condition > 0) PetscCall(Say("; condition of the reduced stiffness %.1e", (double)t.condition));
-  PetscCall(Say("\n"));
+  if (t.error_u >= 0) {
+    PetscCall(Say("mean training errors: u %.2e, %sforces %.2e", (double)t.error_u, t.chosen.settings.rid ? "RID " : "",
+                  (double)t.error_lambda));
+    if (t.condition > 0) PetscCall(Say("; condition of the reduced stiffness %.1e", (double)t.condition));
+    PetscCall(Say("\n"));
+  }
   if (t.scan.n)
     PetscCall(Say("scan of the ranges: %d points, smallest singular value %.1e of the largest%s\n", (int)t.scan.n,
                   (double)t.scan.smallest, t.scan.n_singular ? "; SINGULAR inside, kept by -hyco_keep_singular" : ""));

@@ -287,13 +287,14 @@ PetscErrorCode DriverSolveDisplacement(Fallback *fallback, HycoROM model, PetscI
 /* -- report_training.c: the attempts of train, and the errors of the model -- */
 
 typedef struct {
-  PetscBool on;                    /* a target was given */
-  PetscReal target[HYCO_N_ERRORS]; /* 0: none */
-  PetscInt budget;                 /* of solutions added to meet them; < 0: the default */
-  HycoScene scene;                 /* borrowed */
-  PetscInt n_points, n;            /* training points, including added ones; number of attempts */
-  char table[PETSC_MAX_PATH_LEN];  /* "": none */
-  char *text;                      /* the table; PetscFree() it */
+  PetscBool on;                                       /* a target was given */
+  PetscReal target[HYCO_N_ERRORS];                    /* 0: none */
+  PetscReal aim[HYCO_N_ERRORS], limit[HYCO_N_ERRORS]; /* HycoReducerGetTargets() */
+  PetscInt budget;                                    /* of solutions added to meet them; < 0: the default */
+  HycoScene scene;                                    /* borrowed */
+  PetscInt n_points, n;                               /* training points, including added ones; number of attempts */
+  char table[PETSC_MAX_PATH_LEN];                     /* "": none */
+  char *text;                                         /* the table; PetscFree() it */
   size_t length, room;
 } Search;
 

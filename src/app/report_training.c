@@ -8,9 +8,6 @@
 #include <stdio.h>
 #include <string.h>
 
-/* The default limits if no target is given. */
-static const PetscReal bar[HYCO_N_ERRORS] = {[HYCO_ERROR_U] = 5e-3, [HYCO_ERROR_LAMBDA] = 3e-2};
-
 PetscErrorCode DriverReadBudget(PetscInt *budget)
 {
   PetscFunctionBegin;
@@ -125,21 +122,35 @@ static PetscErrorCode AppendRow(Search *s, const HycoAttempt *a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* "; meets the targets", or where and why the attempt was dropped: " at 2 of 20 points, and dropped beside settings
+/* "; meets the targets" or "; accurate enough", or where and why the attempt was dropped: " at 2 of 20 points, and dropped beside settings
    1: ...". */
-static PetscErrorCode DescribeEnd(const HycoAttempt *a, char text[DRIVER_LINE])
+static PetscErrorCode DescribeEnd(const Search *s, const HycoAttempt *a, char text[DRIVER_LINE])
 {
   PetscFunctionBegin;
   text[0] = '\0';
-  if (a->ratio <= 1) snprintf(text, DRIVER_LINE, "; meets the targets");
+  if (a->ratio <= 1) snprintf(text, DRIVER_LINE, s->on ? "; meets the targets" : "; accurate enough");
   if (a->dropped_at >= 0 && !a->beaten_by)
     snprintf(text, DRIVER_LINE, "; dropped at held-out path %d of %d, which does not reach its end", (int)a->held_out.n,
              (int)a->n_held);
   if (a->beaten_by && a->dropped_at < 0)
-    snprintf(text, DRIVER_LINE, "; not judged: settings %d meet the targets and cost less", (int)a->beaten_by);
+    snprintf(text, DRIVER_LINE, "; not judged: settings %d are accurate enough and cost less", (int)a->beaten_by);
   else if (a->beaten_by)
     snprintf(text, DRIVER_LINE, "; dropped at held-out path %d of %d: settings %d are better", (int)a->held_out.n,
              (int)a->n_held, (int)a->beaten_by);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The title of the lines of the attempts. */
+static PetscErrorCode SayAim(const Search *s, PetscInt n_held)
+{
+  char aim[DRIVER_LINE];
+
+  PetscFunctionBegin;
+  DescribeErrors(IsPath(s), s->aim, aim);
+  if (s->on)
+    PetscCall(Say("settings, each judged at %d held-out points (largest errors):\n", (int)n_held));
+  else
+    PetscCall(Say("settings, each judged at %d held-out points (largest errors; enough are %s):\n", (int)n_held, aim));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -150,10 +161,10 @@ static PetscErrorCode Attempted(const HycoAttempt *a, void *ctx)
   char what[DRIVER_LINE], errors[DRIVER_LINE], end[DRIVER_LINE];
 
   PetscFunctionBegin;
-  if (a->number == 1) PetscCall(Say("settings, each judged at %d held-out points (largest errors):\n", (int)a->n_held));
+  if (a->number == 1) PetscCall(SayAim(s, a->n_held));
   HycoReducerSettingsDescribe(&a->settings, sizeof(what), what);
   DescribeErrors(IsPath(s), a->held_out.largest, errors);
-  PetscCall(DescribeEnd(a, end));
+  PetscCall(DescribeEnd(s, a, end));
   if (a->failure[0])
     PetscCall(Say("  %2d %s: no model: %s\n", (int)a->number, what, a->failure));
   else if (!a->held_out.n)
@@ -193,6 +204,7 @@ PetscErrorCode DriverSetSearch(Search *s, HycoScene scene, HycoReducer reducer, 
   s->scene = scene;
   s->n_points = n_points;
   PetscCall(HycoReducerSetTargets(reducer, s->target, s->budget));
+  PetscCall(HycoReducerGetTargets(reducer, s->aim, s->limit));
   PetscCall(HycoReducerSetAttemptMonitor(reducer, Attempted, Added, s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -200,7 +212,7 @@ PetscErrorCode DriverSetSearch(Search *s, HycoScene scene, HycoReducer reducer, 
 /* Reports targets that are not met: a line and the exit status of a miss. */
 static PetscErrorCode Misses(const Search *s, const HycoTraining *t)
 {
-  const PetscReal *limit = s->on ? s->target : bar;
+  const PetscReal *limit = s->limit;
   const PetscBool hybrid = (PetscBool)(IsPath(s) && t->chosen.settings.rid);
 
   PetscFunctionBegin;
@@ -227,13 +239,20 @@ static PetscErrorCode Misses(const Search *s, const HycoTraining *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What the search did not try, in one line. */
+/* What the search did not try, in one line; several with the same reason together. */
 static PetscErrorCode SayLeftOut(const HycoTraining *t)
 {
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < t->n_left_out; k++)
-    PetscCall(Say("%s%s (%s)%s", k ? "; " : "not tried: ", t->left_out[k].what, t->left_out[k].why,
-                  k + 1 < t->n_left_out ? "" : "\n"));
+  for (PetscInt k = 0; k < t->n_left_out; k++) {
+    const PetscBool last = (PetscBool)(k + 1 == t->n_left_out),
+                    same = (PetscBool)(!last && strcmp(t->left_out[k].why, t->left_out[k + 1].why) == 0);
+
+    PetscCall(Say("%s%s", k ? "" : "not tried: ", t->left_out[k].what));
+    if (same)
+      PetscCall(Say(", "));
+    else
+      PetscCall(Say(" (%s)%s", t->left_out[k].why, last ? "\n" : "; "));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

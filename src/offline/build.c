@@ -41,7 +41,7 @@ static PetscErrorCode Meet(HycoReducer t, HycoROM m)
 
   PetscFunctionBegin;
   if (!f->searches) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoSamplesGet(t->samples, &n, NULL, &mu));
+  PetscCall(HycoSamplesGet(t->columns, &n, NULL, &mu));
   PetscCall(HycoMetDestroy(&t->met));
   PetscCall(PetscMalloc1(t->scene->n_contacts, &m->model->master_reach));
   PetscCall(HycoMetReach(t->scene, f->surface, &f->pairs, n, mu, t->Lambda, m->model->master_reach));
@@ -274,7 +274,7 @@ PetscErrorCode HycoReducerGetSolutions(HycoReducer t, PetscInt *n, const PetscRe
 {
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
-  PetscCall(HycoSamplesGet(t->samples, n, NULL, mu));
+  PetscCall(HycoSamplesGet(t->columns, n, NULL, mu));
   if (Lambda) *Lambda = t->Lambda;
   if (gamma) *gamma = t->VtU;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -354,7 +354,7 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
   r->n_facts = 0; /* of the previous iteration */
   r->stiffness = m->model->traits.stiffness;
   r->chosen.settings.rid = (PetscBool)(m->model->traits.settings == HYCO_SETTINGS_RID);
-  r->n_samples = m->model->n_points;
+  r->n_samples = t->columns == t->samples ? m->model->n_points : 0;
   r->n_modes = t->l;
   r->n_dual_modes = t->counts[HYCO_SEED_DUAL];
   r->n_stress_modes = t->counts[HYCO_SEED_STRESS];
@@ -595,7 +595,9 @@ PetscErrorCode HycoReducerOpen(HycoReducer t, HycoSamples samples, const char pa
   PetscFunctionBegin;
   PetscCall(HycoReducerReset(t));
   t->samples = samples;
-  PetscCall(HycoReducerCount(t));
+  PetscCall(HycoReducerSetColumns(t, samples));
+  t->solving = 0;
+  t->late = PETSC_FALSE;
   PetscCheck(t->n_s > 0, HycoComm(t), PETSC_ERR_USER, "the set of training points is empty");
   HycoOnRoot(HycoComm(t), CheckWritable(path));
   PetscCall(ReadMesh(t));
@@ -625,6 +627,16 @@ PetscErrorCode HycoReducerClose(HycoReducer t, HycoSnapshots *store)
   HycoDuplicate(size, written, &t->written);
   t->store = NULL;
   PetscCall(HycoSnapshotsDestroy(store));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerSolve(HycoReducer t, HycoSnapshots store, HycoSamples points)
+{
+  const PetscReal begin = HycoNow();
+
+  PetscFunctionBegin;
+  HycoStaged(HYCO_STAGE_FULL_ORDER, HycoSnapshotsFill(store, points, t->progress, t->progress_ctx));
+  t->solving += HycoNow() - begin;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -669,7 +681,7 @@ PetscErrorCode HycoReducerHoldOut(HycoReducer t, HycoSnapshots store)
     PetscCall(DrawHeld(t, t->n_validation, &t->held));
   else
     PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoSnapshotsFill(store, t->held, t->progress, t->progress_ctx));
+  PetscCall(HycoReducerSolve(t, store, t->held));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -695,7 +707,30 @@ PetscErrorCode HycoReducerHoldOutFresh(HycoReducer t, HycoSnapshots store, HycoS
   PetscCall(HycoSamplesDestroy(&others));
   PetscCall(HycoSamplesDestroy(&fresh));
   PetscCall(HycoSamplesDestroy(&last));
-  PetscCall(HycoSnapshotsFill(store, t->held, t->progress, t->progress_ctx));
+  PetscCall(HycoReducerSolve(t, store, t->held));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the training points are solved only when a type needs them: one that does not may be tried first, and judged
+   by held-out points. */
+static PetscErrorCode DecideLate(HycoReducer t)
+{
+  const char *const *types;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMTypeNames(&types));
+  t->late = PETSC_FALSE;
+  for (PetscInt k = 0; types[k] && t->scene->n_parameters && (t->validation || t->n_validation); k++) {
+    HycoROM type;
+    PetscBool tries;
+
+    PetscCall(HycoReducerTries(t, types[k], &tries));
+    PetscCall(HycoROMCreate(&type));
+    PetscCall(HycoROMSetType(type, types[k]));
+    if (tries && type->model->traits.own_modes && (type->model->traits.history || !t->scene->n_times))
+      t->late = PETSC_TRUE;
+    PetscCall(HycoROMDestroy(&type));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -722,16 +757,17 @@ PetscErrorCode HycoReducerRun(HycoReducer t, HycoSamples samples, const char pat
   if (choose)
     HycoStaged(HYCO_STAGE_FULL_ORDER, (*t->prototype->ops->choosepoints)(t, store, &chosen));
   else
-    HycoStaged(HYCO_STAGE_FULL_ORDER, HycoSnapshotsFill(store, samples, t->progress, t->progress_ctx));
-  HycoStaged(HYCO_STAGE_FULL_ORDER, HycoReducerHoldOut(t, store));
-  solved = HycoNow();
+    PetscCall(DecideLate(t));
+  if (!choose && !t->late) PetscCall(HycoReducerSolve(t, store, samples));
+  PetscCall(HycoReducerHoldOut(t, store));
+  solved = HycoNow() - t->solving;
   if (choose && t->prototype->ops->modes) HycoStaged(HYCO_STAGE_FULL_ORDER, (*t->prototype->ops->modes)(t, store));
   HycoStaged(HYCO_STAGE_REDUCTION, HycoReducerFinish(t, store, path, (PetscBool)!choose, &report));
   PetscCall(HycoReducerReset(t));
   PetscCall(HycoReducerClose(t, &store));
   PetscCall(HycoSamplesDestroy(&chosen));
-  report.seconds_snapshots = solved - begin;
-  report.seconds_reduction = HycoNow() - solved;
+  report.seconds_snapshots = solved - begin + t->solving;
+  report.seconds_reduction = HycoNow() - solved - t->solving;
   if (training) *training = report;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

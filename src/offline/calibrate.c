@@ -356,6 +356,7 @@ PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, HycoROM 
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(TrainingCorners(t, t->validation || n < LEAST ? 0 : n / CORNERS, &corners));
   PetscCall(HycoSamplesGet(corners, &n_corners, NULL, NULL));
+  if (t->late && n_corners) PetscCall(HycoReducerSolve(t, store, corners));
   if (!rows) {
     PetscCall(PetscMalloc1(n, &rows));
     PetscCall(HycoReducerPredictHeldOut(t, t->held, model, store, NULL, rows));

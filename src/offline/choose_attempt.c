@@ -1,7 +1,7 @@
 /*
   Which settings of a search are chosen, and which can no longer be chosen. `ratio` is the largest quotient of an error
   and its target; for an attempt that was dropped, a lower bound of it. The choice is the cheapest attempt whose ratio
-  is at most max(1, LITTLE times the least ratio). This bound only decreases with further attempts: settings that exceed
+  is at most max(1, LITTLE times the least ratio), but does not miss a limit if another does not. This bound only decreases with further attempts: settings that exceed
   it are excluded for good. So are settings whose ratio exceeds 1 and the ratio of settings that are not more expensive:
   if those are excluded, so are these; and settings that cost no less than
   others that meet the targets, whatever their errors, which are then not computed.
@@ -26,7 +26,18 @@ static PetscReal Bound(PetscInt n, const HycoAttempt attempt[], const HycoAttemp
   for (PetscInt k = 0; k < n; k++) {
     if (Complete(&attempt[k]) && (!*best || attempt[k].ratio < (*best)->ratio)) *best = &attempt[k];
   }
-  return *best ? PetscMax(1, LITTLE * (*best)->ratio) : PETSC_INFINITY;
+  if (!*best) return PETSC_INFINITY;
+  return (*best)->ratio <= HYCO_MISSES ? PetscMin(HYCO_MISSES, PetscMax(1, LITTLE * (*best)->ratio))
+                                       : LITTLE * (*best)->ratio;
+}
+
+PetscReal HycoAttemptsQuotient(PetscReal target, PetscReal limit, PetscReal error)
+{
+  const PetscReal q = error / target, most = limit / target;
+
+  if (q <= 1) return q;
+  if (!(limit > 0)) return 1 + (HYCO_MISSES - 1) * (1 - 1 / q);
+  return q <= most ? 1 + (HYCO_MISSES - 1) * (q - 1) / (most - 1) : HYCO_MISSES * q / most;
 }
 
 HycoAttempt *HycoAttemptsChoose(PetscInt n, HycoAttempt attempt[])

@@ -96,7 +96,7 @@ static PetscErrorCode CheckStart(HycoReducer t, PetscBool corners, HycoSamples s
 static PetscErrorCode BuildModel(HycoReducer t, Loop *loop, PetscInt iteration, HycoTraining *report)
 {
   PetscFunctionBegin;
-  PetscCall(HycoReducerCount(t));
+  PetscCall(HycoReducerSetColumns(t, t->samples));
   PetscCall(HycoSnapshotsFill(loop->store, loop->samples, iteration ? NULL : t->progress, t->progress_ctx));
   PetscCall(HycoReducerResetBases(t));
   PetscCall(HycoReducerReduce(t, loop->store, PETSC_FALSE));

@@ -239,7 +239,8 @@ static PetscBool Loses(const HycoHeldOutRace *race, const HycoHeldOut *row)
 {
   if (race->all) return PETSC_FALSE;
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
-    if (race->target[j] > 0 && HycoHeldOutError(row, (HycoErrorKind)j, race->force) > race->most * race->target[j])
+    if (race->target[j] > 0 && HycoAttemptsQuotient(race->target[j], race->limit[j],
+                                                    HycoHeldOutError(row, (HycoErrorKind)j, race->force)) > race->most)
       return PETSC_TRUE;
   }
   return (PetscBool)(row->converged < 0.5);

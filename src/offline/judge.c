@@ -90,7 +90,7 @@ static PetscErrorCode JudgeAll(HycoReducer t, HycoROM m, PetscReal most, HycoJud
   const PetscReal *mu;
 
   PetscFunctionBegin;
-  PetscCall(HycoSamplesGet(t->samples, &n, &n_par, &mu));
+  PetscCall(HycoSamplesGet(t->columns, &n, &n_par, &mu));
   m->reconstruct = PETSC_FALSE;
   *u = *lambda = 0;
   for (PetscInt k = 0; k < n && *u <= most; k++) {
@@ -119,7 +119,7 @@ static PetscErrorCode Race(HycoReducer t, HycoROM m, PetscInt n, const PetscInt 
   PetscReal mine = 0, its = 0, all = n * most;
 
   PetscFunctionBegin;
-  PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
+  PetscCall(HycoSamplesGet(t->columns, NULL, &n_par, &mu));
   for (PetscInt k = 0; k < n && best; k++) all = (k ? all : 0) + best[k].u;
   *lost = PETSC_FALSE;
   for (PetscInt k = 0; k < n && !*lost; k++) {
@@ -141,7 +141,7 @@ PetscErrorCode HycoReducerJudgeRace(HycoReducer t, HycoROM m, const HycoJudged b
   PetscReal *key;
 
   PetscFunctionBegin;
-  PetscCall(HycoSamplesGet(t->samples, &n, NULL, NULL));
+  PetscCall(HycoSamplesGet(t->columns, &n, NULL, NULL));
   PetscCall(PetscMalloc2(n, &order, n, &key));
   for (PetscInt k = 0; k < n; k++) {
     order[k] = k;
@@ -170,8 +170,13 @@ PetscErrorCode HycoReducerJudge(HycoReducer t, HycoROM m)
   PetscInt n;
 
   PetscFunctionBegin;
+  if (t->columns != t->samples) { /* there is no training solution */
+    m->model->numbers[0] = 0;
+    m->model->numbers[1] = m->model->numbers[2] = -1;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   if (t->trying) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoSamplesGet(t->samples, &n, NULL, NULL));
+  PetscCall(HycoSamplesGet(t->columns, &n, NULL, NULL));
   PetscCall(PetscFree(t->judged));
   PetscCall(PetscMalloc1(n, &t->judged));
   PetscCall(JudgeAll(t, m, PETSC_INFINITY, t->judged, &m->model->numbers[1], &m->model->numbers[2]));
@@ -226,7 +231,7 @@ void HycoReducerNameWorst(HycoReducer t, char text[HYCO_LINE])
   size_t length;
 
   text[0] = '\0';
-  if (!t->judged || HycoSamplesGet(t->samples, &n, &n_par, &mu)) return;
+  if (!t->judged || HycoSamplesGet(t->columns, &n, &n_par, &mu)) return;
   missing = NameUnsolved(t, n, mu, text);
   for (PetscInt k = 0; k < n; k++) {
     if (t->judged[k].solved && (worst < 0 || t->judged[k].u > t->judged[worst].u)) worst = k;

@@ -8,10 +8,11 @@
 
 const char *const HycoSeedFields[HYCO_N_SEEDS] = {"U", "sigma", "force", "lambda", "inelastic", "spring"};
 
-PetscErrorCode HycoReducerCount(HycoReducer t)
+PetscErrorCode HycoReducerSetColumns(HycoReducer t, HycoSamples columns)
 {
   PetscFunctionBegin;
-  PetscCall(HycoSamplesGet(t->samples, &t->n_s, NULL, NULL));
+  t->columns = columns;
+  PetscCall(HycoSamplesGet(columns, &t->n_s, NULL, NULL));
   t->n_s *= HycoSnapshotsSteps(t->scene);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -23,7 +24,7 @@ PetscErrorCode HycoReducerColumn(HycoReducer t, PetscInt k, PetscReal mu[])
   PetscInt n_par;
 
   PetscFunctionBegin;
-  PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &all));
+  PetscCall(HycoSamplesGet(t->columns, NULL, &n_par, &all));
   HycoSceneSetTime(t->scene, all + k / n_steps * n_par, t->scene->n_times ? t->scene->times[k % n_steps] : 0, mu);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -98,7 +99,7 @@ PetscErrorCode HycoReducerReadField(HycoReducer t, HycoSnapshots store, PetscInt
   const PetscBool moves = (PetscBool)(kind == HYCO_SEED_DISPLACEMENT);
 
   PetscFunctionBegin;
-  PetscCall(HycoSnapshotsGetField(store, t->samples, first, n, HycoSeedFields[kind], moves ? t->sizes[3] : 1, S));
+  PetscCall(HycoSnapshotsGetField(store, t->columns, first, n, HycoSeedFields[kind], moves ? t->sizes[3] : 1, S));
   if (moves) PetscCall(RemoveLifting(t, *S));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -323,7 +324,7 @@ PetscErrorCode HycoReducerReadPath(HycoReducer t, HycoSnapshots store, PetscInt 
   PetscCall(HycoReducerReadField(t, store, kind, j, 1, &listed));
   *path = listed;
   if (kind != HYCO_SEED_DISPLACEMENT) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
+  PetscCall(HycoSamplesGet(t->columns, NULL, &n_par, &mu));
   PetscCall(MatGetSize(listed, &N, NULL));
   PetscCall(MatGetLocalSize(listed, &n_rows, NULL));
   PetscCall(HycoSnapshotsGetBetween(store, mu + j * n_par, n_rows, N, &between));
@@ -499,7 +500,7 @@ static PetscErrorCode ReduceDisplacements(HycoReducer t, HycoSnapshots store, Pe
   const PetscInt n = t->n_s / HycoSnapshotsSteps(t->scene);
 
   PetscFunctionBegin;
-  if (!(t->pod_memory > 0)) PetscCall(HycoSnapshotsGetField(store, t->samples, 0, n, "U", t->sizes[3], &t->S));
+  if (!(t->pod_memory > 0)) PetscCall(HycoSnapshotsGetField(store, t->columns, 0, n, "U", t->sizes[3], &t->S));
   PetscCall(FindBasis(t, store, HYCO_SEED_DISPLACEMENT, all));
   HycoCheckModel(basis->l || !(basis->sigma[0] > 0), "-hyco_pod_tol %g leaves no mode; give a smaller value",
                  (double)t->tol[HYCO_SEED_DISPLACEMENT]);
@@ -766,7 +767,7 @@ static PetscErrorCode ReadForces(HycoReducer t, HycoSnapshots store)
   const PetscReal *mu;
 
   PetscFunctionBegin;
-  PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
+  PetscCall(HycoSamplesGet(t->columns, NULL, &n_par, &mu));
   PetscCall(PetscMalloc1((size_t)m * (size_t)t->n_s + 1, &t->Lambda));
   for (PetscInt k = 0; k < t->n_s; k++)
     PetscCall(HycoSnapshotsReadRows(store, mu + k / steps * n_par, k % steps, HycoSeedFields[HYCO_SEED_DUAL], 0, m,
@@ -808,7 +809,7 @@ static PetscErrorCode ReadTaken(HycoReducer t, HycoSnapshots store)
   const PetscReal *mu;
 
   PetscFunctionBegin;
-  PetscCall(HycoSamplesGet(t->samples, &n, &n_par, &mu));
+  PetscCall(HycoSamplesGet(t->columns, &n, &n_par, &mu));
   PetscCall(PetscCalloc1(n + 1, &t->taken_start));
   for (PetscInt k = 0; k < n; k++) {
     PetscReal *taken;

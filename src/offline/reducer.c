@@ -155,6 +155,23 @@ HycoDefineMethod(HycoReducerSetAttemptMonitor,
                  HYCO_REDUCER_CLASSID, t->attempt = attempt;
                  t->added = added; t->attempt_ctx = ctx)
 
+/* Default targets: errors that most studies can ignore; and limits. */
+static const PetscReal usual[HYCO_N_ERRORS] = {
+    [HYCO_ERROR_U] = 2e-3, [HYCO_ERROR_SIGMA] = 2e-2, [HYCO_ERROR_LAMBDA] = 1e-2, [HYCO_ERROR_INELASTIC] = 2e-2};
+static const PetscReal limits[HYCO_N_ERRORS] = {[HYCO_ERROR_U] = 5e-3, [HYCO_ERROR_LAMBDA] = 3e-2};
+
+PetscErrorCode HycoReducerGetTargets(HycoReducer t, PetscReal target[], PetscReal limit[])
+{
+  PetscBool given = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
+  for (PetscInt e = 0; e < HYCO_N_ERRORS; e++) given = (PetscBool)(given || t->target[e] > 0);
+  if (target) PetscCall(PetscArraycpy(target, given ? t->target : usual, HYCO_N_ERRORS));
+  if (limit) PetscCall(PetscArraycpy(limit, given ? t->target : limits, HYCO_N_ERRORS));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoReducerSetTargets(HycoReducer t, const PetscReal target[], PetscInt budget)
 {
   PetscFunctionBegin;
@@ -456,6 +473,28 @@ PetscErrorCode HycoReducerDeclare(PetscOptions options)
 HycoDefineMethod(HycoReducerGetType, (HycoReducer t, HycoROMType *type), t, HYCO_REDUCER_CLASSID,
                  *type = t->prototype->model->type)
 
+PetscErrorCode HycoReducerTries(HycoReducer t, const char types[], PetscBool *tries)
+{
+  const PetscBool searches =
+      (PetscBool)(t->search && !t->pinned[HYCO_CHOICE_TYPE] && (t->validation || t->n_validation));
+  const char *const *names;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
+  *tries = (PetscBool)(strstr(types, t->prototype->model->type) != NULL);
+  PetscCall(HycoROMTypeNames(&names));
+  for (PetscInt k = 0; names[k] && searches && !*tries; k++) {
+    HycoROM type;
+
+    if (!strstr(types, names[k])) continue;
+    PetscCall(HycoROMCreate(&type));
+    PetscCall(HycoROMSetType(type, names[k]));
+    *tries = (PetscBool)(type->ops->offers != NULL);
+    PetscCall(HycoROMDestroy(&type));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoReducerView(HycoReducer t, PetscViewer viewer)
 {
   HycoReducerSettings settings;
@@ -477,7 +516,9 @@ void HycoReducerSettingsDescribe(const HycoReducerSettings *r, size_t length, ch
 {
   const char *kind = HycoHybrids[r->hybrid];
 
-  if (!r->rid)
+  if (!r->pod)
+    snprintf(text, length, "%s", r->type);
+  else if (!r->rid)
     snprintf(text, length, "%s, pod_tol %g", r->type, (double)r->pod_tol);
   else if (r->whole)
     snprintf(text, length, "%s, pod_tol %g, hybrid %s, the whole mesh as RID", r->type, (double)r->pod_tol, kind);
@@ -490,6 +531,7 @@ void HycoReducerSettingsDescribe(const HycoReducerSettings *r, size_t length, ch
 void HycoReducerGetSettings(HycoReducer t, HycoReducerSettings *r)
 {
   *r = (HycoReducerSettings){.type = t->prototype->model->type,
+                             .pod = (PetscBool)!t->prototype->model->traits.own_modes,
                              .rid = (PetscBool)(t->prototype->model->traits.settings == HYCO_SETTINGS_RID),
                              .pod_tol = t->tol[HYCO_SEED_DISPLACEMENT],
                              .contact_extension = t->extension,

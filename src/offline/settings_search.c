@@ -17,10 +17,6 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Default targets: errors that most studies can ignore. */
-static const PetscReal usual[HYCO_N_ERRORS] = {
-    [HYCO_ERROR_U] = 2e-3, [HYCO_ERROR_SIGMA] = 2e-2, [HYCO_ERROR_LAMBDA] = 1e-2, [HYCO_ERROR_INELASTIC] = 2e-2};
-
 #define EXTENSION     2.5 /* edges of the contact surface's facets */
 #define MANY_UNKNOWNS 600 /* largest RID for which "all" is tried automatically: its reduced matrix is dense */
 #define STALE                                                                                                          \
@@ -37,6 +33,7 @@ static const PetscReal usual[HYCO_N_ERRORS] = {
 #define ROUND        4   /* share of the training points that is added at a time, as a divisor */
 #define TELLING      0.3 /* correlation above which a parameter explains the errors */
 #define WHOLE        -1
+#define FEWEST       10 /* held-out solutions that may serve instead of training solutions */
 
 /* Sizes of RIDs and bases, the cheapest first; layers WHOLE: the whole mesh. */
 typedef struct {
@@ -64,7 +61,7 @@ typedef struct {
   PetscBool targets;         /* given by the user */
   PetscInt first;            /* number of training points that were given */
   PetscBool near;            /* solutions were added near the held-out points */
-  PetscReal target[HYCO_N_ERRORS];
+  PetscReal target[HYCO_N_ERRORS], limit[HYCO_N_ERRORS];
   PetscInt n;
   HycoAttempt attempt[MAX_ATTEMPTS];
   HycoHeldOut *rows[MAX_ATTEMPTS]; /* for paths: results of each attempt that was judged at all held-out points; else
@@ -75,13 +72,16 @@ typedef struct {
   PetscReal spent, last, budget;   /* operations of all attempts, and of the last one; the largest number of them */
   PetscInt n_models;               /* attempts with these bases that gave a model of any use */
   PetscBool ended;                 /* by the budget */
+  PetscBool reduced;               /* the bases are those of the columns */
+  HycoROM kept;                    /* the model of the last attempt, if it can be taken as it is; else NULL */
+  HycoTraining kept_report;
   HycoLeftOut left_out[HYCO_MAX_LEFT_OUT];
   PetscInt n_left_out;
   char remedy[HYCO_LINE]; /* of a type that gave no model: HycoReducer's remedy */
 } Search;
 
 /* Notes what the search does not try; the first reason counts. */
-static void LeaveOut(Search *s, const char what[], const char why[])
+static void LeaveOut(Search *s, const char what[], PetscBool possible, const char why[])
 {
   HycoLeftOut *next = &s->left_out[s->n_left_out];
 
@@ -91,6 +91,7 @@ static void LeaveOut(Search *s, const char what[], const char why[])
   if (s->n_left_out == HYCO_MAX_LEFT_OUT) return;
   (void)!PetscStrncpy(next->what, what, sizeof(next->what));
   (void)!PetscStrncpy(next->why, why, sizeof(next->why));
+  next->possible = possible;
   s->n_left_out++;
 }
 
@@ -148,14 +149,19 @@ static PetscErrorCode SurfaceEdge(HycoReducer t, PetscReal *mean)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The largest quotient of an error and its target at a held-out point. */
+/* The quotient of an error and its target; 0 without a target. */
+static PetscReal QuotientOf(const Search *s, PetscInt kind, PetscReal error)
+{
+  return s->target[kind] > 0 ? HycoAttemptsQuotient(s->target[kind], s->limit[kind], error) : 0;
+}
+
+/* The largest at a held-out point. */
 static PetscReal Quotient(const Search *s, const HycoHeldOut *row)
 {
   PetscReal ratio = 0;
 
-  for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
-    if (s->target[j] > 0) ratio = PetscMax(ratio, HycoHeldOutError(row, (HycoErrorKind)j, s->force) / s->target[j]);
-  }
+  for (PetscInt j = 0; j < HYCO_N_ERRORS; j++)
+    ratio = PetscMax(ratio, QuotientOf(s, j, HycoHeldOutError(row, (HycoErrorKind)j, s->force)));
   return ratio;
 }
 
@@ -174,8 +180,10 @@ static PetscErrorCode Summarise(Search *s, const HycoHeldOutRace *race, const Hy
   if (race->n == a->n_held && !a->held_out.not_converged) s->force = force;
   a->ratio = 0;
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
-    if (!(s->target[j] > 0) || a->held_out.largest[j] / s->target[j] <= a->ratio) continue;
-    a->ratio = a->held_out.largest[j] / s->target[j];
+    const PetscReal ratio = QuotientOf(s, j, a->held_out.largest[j]);
+
+    if (ratio <= a->ratio) continue;
+    a->ratio = ratio;
     a->worst = (HycoErrorKind)j;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -214,8 +222,11 @@ static PetscErrorCode Judge(Search *s, HycoROM model, PetscBool all, HycoAttempt
   const PetscInt n = a->n_held;
   PetscInt beaten;
   HycoHeldOut *rows;
-  HycoHeldOutRace race = {
-      .order = s->order, .target = s->target, .force = s->force, .all = (PetscBool)(all || t->exhaustive)};
+  HycoHeldOutRace race = {.order = s->order,
+                          .target = s->target,
+                          .limit = s->limit,
+                          .force = s->force,
+                          .all = (PetscBool)(all || t->exhaustive)};
 
   PetscFunctionBegin;
   a->ratio = PETSC_INFINITY;
@@ -262,30 +273,54 @@ static PetscInt MetFor(const Search *s, PetscReal cost)
   return 0;
 }
 
-/* Makes bases, RID and model for the current settings, and judges the model unless its cost excludes it. */
+/* The bases of the columns' solutions, unless they are there. */
+static PetscErrorCode Reduce(Search *s)
+{
+  PetscFunctionBegin;
+  if (s->reduced) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoReducerResetBases(s->t));
+  PetscCall(HycoReducerReduce(s->t, s->store, PETSC_TRUE));
+  s->reduced = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The sizes and the cost of an attempt's model. */
+static void TakeSizes(HycoReducer t, const HycoTraining *report, HycoAttempt *a)
+{
+  a->n_modes = report->n_modes;
+  a->n_fe_dofs = report->n_fe_dofs;
+  a->n_flexibilities = report->n_flexibilities;
+  a->rid_nodes = report->rid_nodes;
+  a->rid_elements = report->rid_elements;
+  a->rid_contacts = report->rid_contacts;
+  a->rid_fraction = report->rid_fraction;
+  a->cost = t->prototype->ops->cost ? (*t->prototype->ops->cost)(t, a) : 0;
+}
+
+/* Makes bases, RID and model for the current settings, and judges the model unless its cost excludes it. Without
+   training solutions the model is the final one: it is kept, as it takes as long to make as the search. */
 static PetscErrorCode BuildAndJudge(Search *s, PetscBool all, HycoAttempt *a)
 {
   HycoReducer t = s->t;
+  const PetscBool final = (PetscBool)(t->columns != t->samples);
   HycoTraining report = {0};
   HycoROM model;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
+  PetscCall(Reduce(s));
   PetscCall(TakeModes(t, s->store));
-  PetscCall(HycoReducerBuild(t, PETSC_FALSE, &model, &report));
-  a->n_modes = report.n_modes;
-  a->n_fe_dofs = report.n_fe_dofs;
-  a->n_flexibilities = report.n_flexibilities;
-  a->rid_nodes = report.rid_nodes;
-  a->rid_elements = report.rid_elements;
-  a->rid_contacts = report.rid_contacts;
-  a->rid_fraction = report.rid_fraction;
-  a->cost = t->prototype->ops->cost ? (*t->prototype->ops->cost)(t, a) : 0;
+  PetscCall(HycoReducerBuild(t, final, &model, &report));
+  TakeSizes(t, &report, a);
   PetscCallMPI(MPI_Bcast(&t->ridge, 1, MPIU_REAL, 0, HycoComm(t)));
   a->settings.ridge = t->ridge;
   a->beaten_by = all || t->exhaustive ? 0 : MetFor(s, a->cost);
   ierr = a->beaten_by ? PETSC_SUCCESS : Judge(s, model, all, a); /* a model may refuse to predict */
-  PetscCall(HycoROMDestroy(&model));
+  if (final && !ierr) {
+    s->kept = model;
+    s->kept_report = report;
+  } else
+    (void)!HycoROMDestroy(&model);
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -297,10 +332,10 @@ static PetscBool Affords(Search *s, const HycoReducerSettings *settings)
 
   if (s->n_models < LEAST || s->spent + s->last <= s->budget) return PETSC_TRUE;
   snprintf(why, sizeof(why),
-           "%d settings took %.1e operations of %.1e; -hyco_search_budget sets their number, which is %g times that of "
-           "the solutions, and -hyco_search_exhaustive tries all",
-           (int)s->n, (double)s->spent, (double)s->budget, (double)s->t->search_budget);
-  LeaveOut(s, settings->rid ? "further settings" : settings->type, why);
+           "%d settings took %.1e of the %.1e operations that the search may take; -hyco_search_budget %g allows twice "
+           "as many, -hyco_search_exhaustive all",
+           (int)s->n, (double)s->spent, (double)s->budget, 2 * (double)s->t->search_budget);
+  LeaveOut(s, settings->rid ? "further settings" : settings->type, PETSC_TRUE, why);
   s->ended = PETSC_TRUE;
   return PETSC_FALSE;
 }
@@ -384,6 +419,7 @@ static PetscErrorCode Try(Search *s, const HycoReducerSettings *settings, PetscB
     s->ended = PETSC_TRUE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+  PetscCall(HycoROMDestroy(&s->kept));
   PetscCall(PetscMemzero(a, sizeof(*a)));
   a->number = ++s->n;
   a->settings = *settings;
@@ -440,7 +476,7 @@ static PetscBool IsTooLarge(Search *s, const HycoReducerSettings *r)
       continue;
     snprintf(why, sizeof(why), "its RID has %d unknowns, and with more than %d the dense matrix is too expensive",
              (int)a->n_unknowns, MANY_UNKNOWNS);
-    LeaveOut(s, "hybrid all", why);
+    LeaveOut(s, "hybrid all", PETSC_TRUE, why);
     return PETSC_TRUE;
   }
   return PETSC_FALSE;
@@ -472,6 +508,7 @@ static HycoReducerSettings KindFor(const Search *s, const HycoROM type, HycoHybr
 
   r.type = type->model->type;
   r.rid = (PetscBool)(type->model->traits.settings == HYCO_SETTINGS_RID);
+  r.pod = (PetscBool)!type->model->traits.own_modes;
   r.hybrid = s->t->pinned[HYCO_CHOICE_HYBRID] ? s->given.hybrid : hybrid;
   if (r.rid) return r;
   r.layers = s->given.layers;
@@ -505,7 +542,7 @@ static PetscErrorCode TrySizes(Search *s, const HycoROM type, HycoHybrid hybrid,
       *met = PETSC_TRUE;
     *met = (PetscBool)(*met || least <= 1);
     if (stale == most && k + 1 < N_SIZES)
-      LeaveOut(s, r.rid ? "larger RIDs and more modes" : "more modes", "they did not lower the errors");
+      LeaveOut(s, r.rid ? "larger RIDs and more modes" : "more modes", PETSC_TRUE, "they did not lower the errors");
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -587,7 +624,7 @@ static PetscErrorCode TryPlanes(Search *s, const HycoROM type, PetscBool *met)
     HycoReducerSettings r = SettingsFor(s, &size);
 
     r.type = type->model->type;
-    r.rid = PETSC_TRUE;
+    r.rid = r.pod = PETSC_TRUE;
     r.hybrid = HYCO_HYBRID_ALL;
     r.plane = s->plane;
     if (k && pinned[HYCO_CHOICE_TOLERANCE]) break;
@@ -621,8 +658,52 @@ static PetscErrorCode TryOne(Search *s, const HycoROM type)
   PetscFunctionBegin;
   r.type = type->model->type;
   r.rid = PETSC_FALSE;
+  r.pod = (PetscBool)!type->model->traits.own_modes;
   if (s->t->scene->n_times) r.layers = s->given.layers; /* its mesh consists of the cells of its modes */
   PetscCall(Try(s, &r, PETSC_FALSE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether these settings end the search. */
+static PetscBool Ends(const Search *s, const HycoAttempt *best)
+{
+  return (PetscBool)(best && best->ratio <= MARGIN && !s->t->exhaustive);
+}
+
+/* Lets a type with modes of its own refuse the scene: why. Collective. */
+static PetscErrorCode Refuse(HycoReducer t, const HycoROM type, char why[HYCO_LINE])
+{
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  if (!type->model->traits.own_modes || !type->ops->begin) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoReducerSetType(t, type->model->type));
+  PetscCall(HycoCatchBegin());
+  ierr = (*type->ops->begin)(t);
+  PetscCall(HycoCatchEnd(ierr, why));
+  PetscCall(HycoCatchNoModel(ierr, why));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether a type offers a model of the scene, within the operations that the search may take; otherwise why may be
+   set. Collective. */
+static PetscErrorCode Offers(Search *s, const HycoROM type, PetscBool *offered, PetscBool *possible,
+                             char why[HYCO_LINE])
+{
+  HycoReducer t = s->t;
+  PetscReal work = 0;
+
+  PetscFunctionBegin;
+  PetscCall(Refuse(t, type, why));
+  *possible = (PetscBool)!why[0];
+  if (why[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  *offered = (*type->ops->offers)(t, s->targets, HYCO_LINE, why);
+  if (*offered && type->ops->work) work = (*type->ops->work)(t);
+  if (work > s->budget)
+    HycoFormat(why,
+               "its training would take %.1e operations, and the search may take %.1e; -hyco_search_budget %.2g allows "
+               "it",
+               (double)work, (double)s->budget, (double)(t->search_budget * work / s->budget) * 1.1);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -631,28 +712,25 @@ static PetscErrorCode Wants(Search *s, const HycoROM type, PetscBool *wanted)
 {
   HycoReducer t = s->t;
   const HycoAttempt *best = HycoAttemptsChoose(s->n, s->attempt);
-  PetscReal work = 0;
   char why[HYCO_LINE] = "";
+  PetscBool possible = PETSC_TRUE;
 
   PetscFunctionBegin;
   *wanted = (PetscBool)(strcmp(type->model->type, s->given.type) == 0);
   if (t->pinned[HYCO_CHOICE_TYPE]) PetscFunctionReturn(PETSC_SUCCESS);
-  *wanted = (PetscBool)(type->ops->offers && (type->model->traits.history || !t->scene->n_times) &&
-                        (*type->ops->offers)(t, s->targets, sizeof(why), why));
-  if (*wanted && type->ops->work) work = (*type->ops->work)(t);
-  if (*wanted && work > s->budget)
-    snprintf(why, sizeof(why),
-             "its training would take %.1e operations, and the search may take %.1e; -hyco_search_budget sets their "
-             "number, which is %g times that of the solutions",
-             (double)work, (double)s->budget, (double)t->search_budget);
-  if (*wanted && best && best->ratio <= MARGIN && !t->exhaustive)
-    snprintf(why, sizeof(why), "settings %d meet the targets with a margin", (int)best->number);
-  if (why[0]) LeaveOut(s, type->model->type, why);
+  *wanted = (PetscBool)(type->ops->offers != NULL);
+  if (*wanted && !type->model->traits.history && t->scene->n_times) {
+    *wanted = possible = PETSC_FALSE;
+    if (type->model->traits.own_modes) HycoFormat(why, "it does not support scenes with a history");
+  }
+  if (*wanted && !(type->model->traits.own_modes && Ends(s, best))) PetscCall(Offers(s, type, wanted, &possible, why));
+  if (*wanted && Ends(s, best)) snprintf(why, sizeof(why), "settings %d are accurate by a margin", (int)best->number);
+  if (why[0]) LeaveOut(s, type->model->type, possible, why);
   *wanted = (PetscBool)(*wanted && !why[0]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode TryType(Search *s, const char name[])
+static PetscErrorCode TryType(Search *s, const char name[], PetscBool own)
 {
   HycoROM type;
   PetscBool met, wanted;
@@ -660,7 +738,8 @@ static PetscErrorCode TryType(Search *s, const char name[])
   PetscFunctionBegin;
   PetscCall(HycoROMCreate(&type));
   PetscCall(HycoROMSetType(type, name));
-  PetscCall(Wants(s, type, &wanted));
+  wanted = PETSC_FALSE;
+  if (type->model->traits.own_modes == own) PetscCall(Wants(s, type, &wanted));
   if (wanted && type->model->traits.settings == HYCO_SETTINGS_NONE) PetscCall(TryOne(s, type));
   if (wanted && type->model->traits.settings == HYCO_SETTINGS_RID) PetscCall(TryHybrids(s, type));
   if (wanted && type->model->traits.settings == HYCO_SETTINGS_MODES)
@@ -669,11 +748,29 @@ static PetscErrorCode TryType(Search *s, const char name[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Tries all types in the order of their names. */
-static PetscErrorCode TryAll(Search *s)
+/* Tries the types with modes of their own, or the others, in the order of their names. */
+static PetscErrorCode TryAll(Search *s, PetscBool own)
 {
   PetscFunctionBegin;
-  for (PetscInt k = 0; s->types[k] && !s->ended; k++) PetscCall(TryType(s, s->types[k]));
+  for (PetscInt k = 0; s->types[k] && !s->ended; k++) PetscCall(TryType(s, s->types[k], own));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The solutions of the bases: those at the training points, which are solved now if they were not; for types with modes
+   of their own those at the held-out points, if there are enough and training points are not solved. */
+static PetscErrorCode TakeColumns(HycoReducer t, HycoSnapshots store, PetscBool own)
+{
+  PetscInt n = 0;
+
+  PetscFunctionBegin;
+  if (t->held) PetscCall(HycoSamplesGet(t->held, &n, NULL, NULL));
+  if (t->late && own && n >= FEWEST) {
+    PetscCall(HycoReducerSetColumns(t, t->held));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (t->late) PetscCall(HycoReducerSolve(t, store, t->samples));
+  t->late = PETSC_FALSE;
+  PetscCall(HycoReducerSetColumns(t, t->samples));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -810,7 +907,13 @@ static void Forget(Search *s)
   s->force = 0;
 }
 
-/* Tries all settings that are not fixed, with the present bases. */
+/* Whether the options set a type with modes of its own: further solutions do not change its models. */
+static PetscBool IsOwn(HycoReducer t)
+{
+  return (PetscBool)(t->pinned[HYCO_CHOICE_TYPE] && t->prototype->model->traits.own_modes);
+}
+
+/* Tries all settings that are not fixed. */
 static PetscErrorCode Attempts(Search *s)
 {
   PetscInt n;
@@ -828,7 +931,16 @@ static PetscErrorCode Attempts(Search *s)
   s->ended = PETSC_FALSE;
   s->remedy[0] = '\0';
   PetscCall(HycoReducerSearchBudget(s->t, &s->budget));
-  PetscCall(TryAll(s));
+  PetscCall(TakeColumns(s->t, s->store, PETSC_TRUE));
+  PetscCall(TryAll(s, PETSC_TRUE));
+  if (!Ends(s, HycoAttemptsChoose(s->n, s->attempt)) && !IsOwn(s->t)) {
+    const HycoSamples before = s->t->columns;
+
+    PetscCall(TakeColumns(s->t, s->store, PETSC_FALSE));
+    s->reduced = (PetscBool)(s->reduced && s->t->columns == before);
+    PetscCall(Reduce(s));
+  }
+  PetscCall(TryAll(s, PETSC_FALSE));
   if (s->t->phase) HycoOnRoot(HycoComm(s->t), s->t->phase("settings tried", s->n, s->n, s->t->phase_ctx));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -850,9 +962,9 @@ static PetscErrorCode TrainOn(Search *s, HycoSamples grown)
 
   PetscFunctionBegin;
   t->samples = grown;
-  PetscCall(HycoReducerCount(t));
-  PetscCall(HycoReducerResetBases(t));
-  HycoStaged(HYCO_STAGE_FULL_ORDER, HycoSnapshotsFill(s->store, grown, t->progress, t->progress_ctx));
+  s->reduced = PETSC_FALSE;
+  PetscCall(HycoReducerSetColumns(t, grown));
+  PetscCall(HycoReducerSolve(t, s->store, grown));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -869,9 +981,8 @@ static PetscErrorCode Rounds(Search *s, HycoSamples *grown, HycoTraining *report
     const PetscInt left = budget - (report->n_added - report->n_former),
                    n_add = PetscMin(PetscMax(2, s->first / ROUND), left);
 
-    PetscCall(HycoReducerReduce(t, s->store, PETSC_TRUE));
     PetscCall(Attempts(s));
-    if (!s->targets || s->least <= 1 || n_add < 1 || !t->scene->n_parameters) break;
+    if (!s->targets || s->least <= 1 || n_add < 1 || !t->scene->n_parameters || IsOwn(t)) break;
     PetscCall(BeginGrown(s, grown));
     PetscCall(AddPoints(s, *grown, n_add, &n, &by));
     if (!n) break;
@@ -898,7 +1009,7 @@ static PetscErrorCode Advise(Search *s, HycoTraining *report)
   next[0] = '\0';
   for (PetscInt k = 0; k < s->n_left_out && !next[0]; k++) {
     for (PetscInt j = 0; s->types[j]; j++) {
-      if (strcmp(s->left_out[k].what, s->types[j]) == 0)
+      if (s->left_out[k].possible && strcmp(s->left_out[k].what, s->types[j]) == 0)
         snprintf(next, sizeof(report->next), "try -hyco_model_type %s, which the search left out (%s)", s->types[j],
                  s->left_out[k].why);
     }
@@ -927,6 +1038,22 @@ static PetscErrorCode Tell(Search *s, const HycoAttempt *best, HycoTraining *rep
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The model with the settings that are set: that of the attempt, if it was kept. */
+static PetscErrorCode BuildChosen(Search *s, const HycoAttempt *best, HycoROM *model, HycoTraining *built)
+{
+  PetscFunctionBegin;
+  if (s->kept && best->number == s->n) {
+    *model = s->kept;
+    *built = s->kept_report;
+    s->kept = NULL;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(Reduce(s));
+  PetscCall(TakeModes(s->t, s->store));
+  PetscCall(HycoReducerBuild(s->t, PETSC_TRUE, model, built));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Builds the model with the best settings; if the scan of the ranges or its own training solutions refuse it, the
    next one. */
 static PetscErrorCode BuildBest(Search *s, HycoROM *model, HycoTraining *report)
@@ -943,9 +1070,8 @@ static PetscErrorCode BuildBest(Search *s, HycoROM *model, HycoTraining *report)
     PetscCall(Choose(s, &best));
     if (!best) break;
     PetscCall(SetSettings(t, &best->settings));
-    PetscCall(TakeModes(t, s->store));
     PetscCall(HycoCatchBegin());
-    ierr = HycoReducerBuild(t, PETSC_TRUE, model, &built);
+    ierr = BuildChosen(s, best, model, &built);
     PetscCall(HycoCatchEnd(ierr, message));
     PetscCall(HycoCatchNoModel(ierr, message));
     if (message[0]) {
@@ -975,7 +1101,7 @@ static PetscErrorCode JudgeFresh(Search *s, HycoROM model, HycoSamples *former, 
   PetscInt n;
 
   PetscFunctionBegin;
-  HycoStaged(HYCO_STAGE_FULL_ORDER, HycoReducerHoldOutFresh(t, s->store, former, &report->n_fresh));
+  PetscCall(HycoReducerHoldOutFresh(t, s->store, former, &report->n_fresh));
   s->near = PETSC_FALSE;
   PetscCall(PetscFree(t->judged_held));
   PetscCall(HycoSamplesGet(t->held, &n, NULL, NULL));
@@ -1029,7 +1155,7 @@ static PetscErrorCode Learn(Search *s, HycoROM *model, HycoSamples *grown, HycoT
   s->extension = EXTENSION * edge;
   PetscCall(HycoReducerFindPlane(t, &s->plane));
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) s->targets = (PetscBool)(s->targets || t->target[j] > 0);
-  PetscCall(PetscArraycpy(s->target, s->targets ? t->target : usual, HYCO_N_ERRORS));
+  PetscCall(HycoReducerGetTargets(t, s->target, s->limit));
   PetscCall(HycoSamplesGet(t->samples, &s->first, NULL, NULL));
   while (again) {
     PetscCall(Rounds(s, grown, report));
@@ -1048,6 +1174,7 @@ PetscErrorCode HycoReducerLearn(HycoReducer t, HycoSnapshots store, HycoROM *mod
   *grown = NULL;
   t->plane = NULL;
   if (Settled(t)) {
+    PetscCall(TakeColumns(t, store, t->prototype->model->traits.own_modes));
     PetscCall(HycoReducerReduce(t, store, PETSC_FALSE));
     PetscCall(TakeModes(t, store));
     PetscCall(HycoReducerBuild(t, PETSC_TRUE, model, report));
@@ -1060,6 +1187,7 @@ PetscErrorCode HycoReducerLearn(HycoReducer t, HycoSnapshots store, HycoROM *mod
   PetscCall(HycoROMTypeNames(&s->types));
   ierr = Learn(s, model, grown, report);
   Forget(s);
+  (void)!HycoROMDestroy(&s->kept);
   PetscCall(PetscFree(s));
   t->ridge = -1;
   PetscCall(ierr);

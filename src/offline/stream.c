@@ -30,7 +30,7 @@ PetscErrorCode HycoReducerEachBatch(HycoReducer t, HycoBatchUse use, void *ctx)
   for (PetscInt first = 0; first < n; first += most) {
     Mat S;
 
-    PetscCall(HycoSnapshotsGetField(t->store, t->samples, first, PetscMin(most, n - first),
+    PetscCall(HycoSnapshotsGetField(t->store, t->columns, first, PetscMin(most, n - first),
                                     HycoSeedFields[HYCO_SEED_DISPLACEMENT], t->sizes[3], &S));
     PetscCall((*use)(t, first * n_steps, S, ctx));
     PetscCall(MatDestroy(&S));
@@ -159,7 +159,7 @@ PetscErrorCode HycoReducerStreamBasis(HycoReducer t, HycoSnapshots store, PetscI
   HycoCheck(strcmp(t->svd_type, HYCO_SVD_TSQR) == 0,
             "-hyco_pod_memory computes PODs by the SVD type %s, and -hyco_pod_svd_type is %s; leave one of the two out",
             HYCO_SVD_TSQR, t->svd_type);
-  PetscCall(HycoSnapshotsGetRows(store, t->samples, HycoSeedFields[kind], &s.N));
+  PetscCall(HycoSnapshotsGetRows(store, t->columns, HycoSeedFields[kind], &s.N));
   s.room = Room(t, s.N);
   PetscCall(HycoReducerCreateSVD(t, HycoComm(t), &s.svd));
   PetscCall(t->scene->n_times ? MergePaths(&s, store, tol) : MergePoints(&s, store));

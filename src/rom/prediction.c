@@ -285,10 +285,14 @@ PetscErrorCode HycoROMView(HycoROM m, PetscViewer viewer)
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
   pod = HycoROMCountPOD(m);
   PetscCall(PetscViewerASCIIPrintf(viewer, "%s model\n", m->model->traits.title));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "  trained on %d points; mean training errors: u %.2e, %sforces %.2e\n",
-                                   (int)m->model->n_points, (double)m->model->numbers[1],
-                                   m->model->traits.settings == HYCO_SETTINGS_RID ? "RID " : "",
-                                   (double)m->model->numbers[2]));
+  if (m->model->numbers[1] < 0)
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  trained without solutions, for the region of %d points\n",
+                                     (int)m->model->n_points));
+  else
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  trained on %d points; mean training errors: u %.2e, %sforces %.2e\n",
+                                     (int)m->model->n_points, (double)m->model->numbers[1],
+                                     m->model->traits.settings == HYCO_SETTINGS_RID ? "RID " : "",
+                                     (double)m->model->numbers[2]));
   if (m->model->scene->n_times)
     PetscCall(PetscViewerASCIIPrintf(viewer, "  paths: %d listed times from t = %g to %g%s\n",
                                      (int)m->model->scene->n_times, (double)m->model->scene->times[0],

@@ -162,7 +162,8 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
   PetscCall(PetscViewerASCIIPrintf(viewer, "  %d bodies; unknowns of the surfaces that may touch:", (int)b->n));
   for (PetscInt k = 0; k < b->n; k++)
     PetscCall(PetscViewerASCIIPrintf(viewer, "%s %d", k ? "," : "", (int)(b->start[k + 1] - b->start[k])));
-  PetscCall(PetscViewerASCIIPrintf(viewer, "\n  contacts: %d; loads: %d vectors; rigid motions held by contact: %d\n",
+  PetscCall(PetscViewerASCIIPrintf(viewer,
+                                   "\n  contacts: %d; independent loads: %d; rigid motions held by contact: %d\n",
                                    (int)m->model->pairs.n, (int)b->r, (int)b->p));
   if (b->n_theta)
     PetscCall(PetscViewerASCIIPrintf(viewer,
@@ -264,17 +265,25 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
   const char *filled =
       "; with eight times the samples their displacements still need as many modes as half of them, so "
       "that displacements away from the contact are less accurate";
+  char bound[HYCO_LINE / 4];
 
   PetscFunctionBegin;
   PetscCall(HycoTrainingAddFact(r, "n_bodies", (PetscReal)b->n));
   PetscCall(HycoTrainingAddFact(r, "n_surface_unknowns", (PetscReal)b->ns));
   PetscCall(HycoTrainingAddFact(r, "n_body_samples", (PetscReal)HycoBodiesGrid(b, 0, NULL)));
   PetscCall(HycoTrainingAddFact(r, "force_bound", b->forces));
+  if (b->n_theta)
+    snprintf(bound, sizeof(bound),
+             "%d samples of their shapes and stiffnesses, contact forces within %.2g %% (bound at "
+             "held-out samples)",
+             (int)HycoBodiesGrid(b, 0, NULL), 100 * (double)b->forces);
+  else
+    snprintf(bound, sizeof(bound), "nothing is interpolated, contact forces are exact");
   snprintf(
       r->summary, sizeof(r->summary),
-      "bodies: %d, with %d unknowns on the surfaces that may touch and %d exact ones inside; %d samples, forces within "
-      "%.1e (bound at held-out samples of the bodies); %d vectors of loads; %d displacement modes%s\n",
-      (int)b->n, (int)b->ns, (int)b->ni, (int)HycoBodiesGrid(b, 0, NULL), (double)b->forces, (int)b->r, (int)r->n_modes,
+      "%d bodies, with %d unknowns on the surfaces that may touch and %d exact ones inside; %s; %d independent loads, %d "
+      "displacement modes%s\n",
+      (int)b->n, (int)b->ns, (int)b->ni, bound, (int)b->r, (int)r->n_modes,
       HycoTrainingOfBodies(t)->filled ? filled : "");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -288,10 +297,11 @@ static PetscReal Cost(HycoReducer t, const HycoAttempt *a)
 
 PetscErrorCode HycoROMCreate_Bodies(HycoROM m)
 {
-  static const HycoROMTraits traits = {.title = "substructured",
+  static const HycoROMTraits traits = {.title = "condensed bodies",
                                        .settings = HYCO_SETTINGS_NONE,
                                        .constrains = PETSC_TRUE,
                                        .forces = PETSC_TRUE,
+                                       .own_modes = PETSC_TRUE,
                                        .surfaces = PETSC_TRUE,
                                        .cells = PETSC_TRUE,
                                        .uniform = PETSC_TRUE,
@@ -304,6 +314,8 @@ PetscErrorCode HycoROMCreate_Bodies(HycoROM m)
                                  .build = Build,
                                  .report = Report,
                                  .cost = Cost,
+                                 .offers = HycoBodiesOffers,
+                                 .work = HycoBodiesWork,
                                  .setup = SetUp,
                                  .reset = Reset,
                                  .solve = Solve,

@@ -40,8 +40,8 @@ static PetscErrorCode CheckScene(HycoReducer t)
   PetscBool regularise = PETSC_FALSE;
 
   PetscFunctionBegin;
-  HycoCheck(!t->scan && !t->keep_singular, "-hyco_scan and -hyco_keep_singular have no effect on -hyco_model_type "
-                                           "bodies; remove them");
+  HycoCheckModel(!t->scan && !t->keep_singular, "-hyco_scan and -hyco_keep_singular have no effect on "
+                                                "-hyco_model_type bodies; remove them");
   HycoCheckModel(t->sizes[2] > 0, "the scene has no contact, and a model of bodies represents the surfaces that touch; "
                                   "train a hybrid model");
   for (PetscInt k = 0; k < t->scene->n_contacts; k++)
@@ -59,11 +59,35 @@ PetscErrorCode HycoBodiesBegin(HycoReducer t)
 
   PetscFunctionBegin;
   PetscCall(CheckScene(t));
-  PetscCall(HycoBodyPartsDestroy(&HycoTrainingOfBodies(t)->parts));
+  if (HycoTrainingOfBodies(t)->parts.n) PetscFunctionReturn(PETSC_SUCCESS); /* they do not depend on the solutions */
   PetscCall(HycoReducerColumn(t, 0, mu));
   PetscCall(HycoBodyPartsFind(t->fom, mu, &HycoTrainingOfBodies(t)->parts));
   PetscCall(CheckParts(t));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+#define SAMPLES 9  /* assumed nodes along each axis of theta */
+#define SOLVES  12 /* assumed solves for each load, mode and sample of the fields */
+
+PetscReal HycoBodiesWork(HycoReducer t)
+{
+  HycoBodiesTraining s = HycoTrainingOfBodies(t);
+  PetscInt shape[HYCO_MAX_PARAMETERS];
+  const PetscInt n = HycoBodyPartsShapes(&s->parts, -1, shape);
+  const PetscReal unknowns = 2 * (PetscReal)t->sizes[2] * t->sizes[3], /* slaves and about as many masters */
+      samples = PetscMin(PetscPowRealInt(SAMPLES, n), (PetscReal)s->most_samples);
+
+  return samples * (HycoReducerFactorWork(t) + unknowns * unknowns * unknowns / 3) +
+         SOLVES * (PetscReal)s->samples * HycoReducerSolveWork(t);
+}
+
+PetscBool HycoBodiesOffers(HycoReducer t, PetscBool targets, size_t length, char why[])
+{
+  (void)targets;
+  if (t->pod_memory > 0)
+    snprintf(why, length,
+             "its columns are not read in batches, and -hyco_pod_memory is given; name the type to train it");
+  return (PetscBool)!why[0];
 }
 
 /* -- the surfaces' unknowns -- */

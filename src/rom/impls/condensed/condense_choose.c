@@ -63,7 +63,7 @@ static PetscErrorCode TakeSamples(HycoReducer t, const PetscInt counts[], HycoSa
   PetscCall(HycoSamplesDestroy(samples));
   PetscCall(MakeSamples(t->scene, counts, samples));
   t->samples = *samples;
-  PetscCall(HycoSamplesGet(*samples, &t->n_s, NULL, NULL));
+  PetscCall(HycoReducerSetColumns(t, *samples));
   PetscCall(HycoCondensedBegin(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
