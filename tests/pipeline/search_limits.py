@@ -1,5 +1,5 @@
-"""What a search leaves out, and what it says about it: types beside a model that meets the targets with a margin, RIDs known to be too large, settings
-beyond its budget of operations; condensed models by their cost."""
+"""What a search leaves out, and what it says about it: types beside a model that is accurate by a margin, bodies that it cannot condense, RIDs known to be
+too large, settings beyond its budget of operations; full-order solutions that it does not need."""
 import csv
 import os
 import unittest
@@ -7,7 +7,7 @@ import unittest
 from baselines import Ring
 from common import PELLET, ROPE, SOURCE
 
-BLOCKS = os.path.join(SOURCE, 'examples', 'blocks')
+BLOCKS, PLATE = (os.path.join(SOURCE, 'examples', name) for name in ('blocks', 'plate'))
 STRIP = """scene:
   title: a strip with many contacts over a bump
   mesh: strip.msh
@@ -42,11 +42,34 @@ class SearchLimits(Ring):
             return report, list(csv.DictReader(f))
 
     def test_margin(self):
-        """A condensed model a thousand times more accurate than the targets: no hybrid is tried, and the report says why."""
+        """A model of bodies a thousand times more accurate than the targets: no other type is tried, and the report says why; no training point is
+        solved. With all settings tried they are, and the model of bodies is still chosen, or one with fewer operations."""
         report, rows = self.search(BLOCKS, 'blocks', '-grid', '5,5')
-        self.assertEqual([r['model_type'] for r in rows], ['condensed'])
-        self.assertRegex(report['search']['not_tried']['hybrid'], 'settings 1 meet the targets with a margin')
-        self.assertEqual(len(self.search(BLOCKS, 'every', '-grid', '5,5', '-hyco_search_exhaustive')[1]) > 1, True)
+        self.assertEqual([r['model_type'] for r in rows], ['bodies'])
+        self.assertEqual(set(report['search']['not_tried']), {'condensed', 'hybrid'})
+        for why in report['search']['not_tried'].values():
+            self.assertIn('settings 1 are accurate by a margin', why)
+        self.assertEqual((sum(report['solved_by_group']), report['n_samples']), (25 + 4, 0))  # held-out points, the corners of the training among them
+        report, rows = self.search(BLOCKS, 'every', '-grid', '5,5', '-hyco_search_exhaustive')
+        self.assertEqual({r['model_type'] for r in rows}, {'bodies', 'condensed', 'hybrid'})
+        self.assertEqual(sum(report['solved_by_group']), 25 + 25)
+        self.assertLess(report['held_out']['lambda']['largest'], 1e-2)
+
+    def test_not_recognised(self):
+        """A body with too many parameters of its shape, and a scene without contact: not tried, with the body or the reason; the search goes on. Options of a
+        type that the search may choose are accepted, those of others refused."""
+        with open(os.path.join(BLOCKS, 'scene.yaml'), encoding='ascii') as f:
+            text = f.read().replace('mesh: blocks.msh', 'mesh: ' + os.path.join(BLOCKS, 'blocks.msh'))
+        scene = self.changed('many.yaml', text, (('map: {y:', 'map: {x: "x*(1 + (a*y + b*y^2 + c*y^3)/500)", y:'), ('parameters: [', 'parameters: [a, b, c, '),
+                                                 ('parameter:\n', 'parameter:\n' + ''.join(f'  {p}: {{range: [0, 0.01]}}\n' for p in 'abc'))))
+        report, rows = self.search(scene, 'many', '-scatter', 12, '-hyco_validation', 10, '-hyco_bodies_samples', 60, status=None)
+        self.assertNotIn('bodies', [r['model_type'] for r in rows])
+        self.assertRegex(report['search']['not_tried']['bodies'], 'body block: 4 parameters .*a, b, c, crown')
+        report, _ = self.search(PLATE, 'plate', '-grid', '3,3')
+        self.assertIn('no contact', report['search']['not_tried']['bodies'])
+        run = self.run_raw('train', '-scene', BLOCKS, '-grid', '3,3', '-model', self.path('no.h5'), '-hyco_regression_kernel', 'linear')
+        self.assertEqual(run.returncode, 1)
+        self.assertIn('-hyco_regression_kernel', run.stderr)
 
     def test_too_large(self):
         """All of A full order: an RID that an earlier attempt has shown to be too large is not built again."""
@@ -68,10 +91,10 @@ class SearchLimits(Ring):
         self.assertGreater(report['search']['operations'], 0)
 
     def test_many_contacts(self):
-        """801 contacts, gaps and loads as parameters: one factor. A condensed model is tried and chosen; its forces are those of full order."""
+        """801 contacts, gaps and loads as parameters: one factor. A model of bodies is tried and chosen; its forces are those of full order."""
         self.drawn('strip', 2, GEO, STRIP)
         report, rows = self.search('strip', 'many', '-grid', '3,3')
-        self.assertEqual((rows[0]['model_type'], report['model_type']), ('condensed', 'condensed'))
+        self.assertEqual((rows[0]['model_type'], report['model_type']), ('bodies', 'bodies'))
         self.assertLess(report['held_out']['lambda']['largest'], 1e-6)
 
     def test_scattered(self):

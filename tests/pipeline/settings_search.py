@@ -23,8 +23,11 @@ class SettingsSearch(Case):
             self.assertLessEqual(c['error_lambda']['mean'], force)
 
     def test_hertz(self):
-        """Surfaces that do not match and move, three parameters: a hybrid model is chosen from several settings."""
-        t = self.hyco('train', '-scene', HERTZ, '-grid', '9,4,3', '-model', 'h.h5', '-table', 'h.csv', timeout=300)
+        """Surfaces that do not match and move, three parameters: a model of bodies. By name, a hybrid one is chosen from several settings."""
+        t = self.hyco('train', '-scene', HERTZ, '-grid', '9,4,3', '-model', 'b.h5', timeout=300)
+        self.assertEqual((t['model_type'], t['search']['attempts']), ('bodies', 1))
+        self.judged(HERTZ, 'b.h5', '2,3,2', 1e-4, 1e-4)
+        t = self.hyco('train', '-scene', HERTZ, '-grid', '9,4,3', '-model', 'h.h5', '-table', 'h.csv', '-hyco_model_type', 'hybrid', timeout=300)
         self.assertEqual(t['model_type'], 'hybrid')
         self.assertEqual(t['held_out']['n'], 30)
         self.assertLess(t['held_out']['lambda']['largest'], 0.03)
@@ -32,8 +35,20 @@ class SettingsSearch(Case):
         with open(self.path('h.csv'), encoding='utf-8') as file:
             rows = list(csv.DictReader(file))
         self.assertEqual(len(rows), t['search']['attempts'])
-        self.assertIn('changes the facet', rows[0]['failure'])  # condensed: no polynomial follows slaves from facet to facet
         self.judged(HERTZ, 'h.h5', '2,3,2', 0.005, 0.03)
+
+    def test_every_type(self):
+        """All settings: the condensed type gives no model of surfaces that move past each other, bodies and hybrid do; the choice is the accurate model with
+        the fewest operations."""
+        t = self.hyco('train', '-scene', HERTZ, '-grid', '4,3,2', '-model', 'e.h5', '-table', 'e.csv', '-hyco_search_exhaustive', timeout=300)
+        with open(self.path('e.csv'), encoding='utf-8') as file:
+            rows = list(csv.DictReader(file))
+        by_type = {r['model_type']: r for r in reversed(rows)}
+        self.assertEqual(set(by_type), {'bodies', 'condensed', 'hybrid'})
+        self.assertIn('changes the facet', by_type['condensed']['failure'])  # no polynomial follows slaves from facet to facet
+        self.assertEqual((by_type['bodies']['failure'], by_type['bodies']['meets']), ('', '1'))
+        least = min((float(r['operations']), r['model_type']) for r in rows if r['meets'] == '1')
+        self.assertEqual(t['model_type'], least[1])
 
     def test_rope_and_blocks(self):
         """Settings found on the rope and the blocks are accurate at unseen points."""

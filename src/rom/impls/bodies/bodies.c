@@ -281,10 +281,10 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
     snprintf(bound, sizeof(bound), "nothing is interpolated, contact forces are exact");
   snprintf(
       r->summary, sizeof(r->summary),
-      "%d bodies, with %d unknowns on the surfaces that may touch and %d exact ones inside; %s; %d independent loads, %d "
+      "%d bod%s with %d unknowns on the surfaces that may touch and %d exact ones inside; %s; %d independent load%s, %d "
       "displacement modes%s\n",
-      (int)b->n, (int)b->ns, (int)b->ni, bound, (int)b->r, (int)r->n_modes,
-      HycoTrainingOfBodies(t)->filled ? filled : "");
+      (int)b->n, b->n == 1 ? "y" : "ies", (int)b->ns, (int)b->ni, bound, (int)b->r, b->r == 1 ? "" : "s",
+      (int)r->n_modes, HycoTrainingOfBodies(t)->filled ? filled : "");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

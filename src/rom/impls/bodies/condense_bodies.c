@@ -17,7 +17,7 @@ static PetscErrorCode CheckParts(HycoReducer t)
   const HycoBodyParts *parts = &HycoTrainingOfBodies(t)->parts;
   const PetscInt fail = HycoBodyPartsFail(parts);
   PetscInt shape[HYCO_MAX_PARAMETERS];
-  char list[HYCO_LINE] = "";
+  char list[HYCO_LINE] = "", bodies[HYCO_LINE] = "";
   const PetscInt n = HycoBodyPartsShapes(parts, -1, shape);
 
   PetscFunctionBegin;
@@ -27,10 +27,15 @@ static PetscErrorCode CheckParts(HycoReducer t)
                  "hybrid model",
                  fail < 0 ? "" : parts->name[fail]);
   for (PetscInt p = 0; p < n; p++) PetscCall(HycoListAdd(list, ", ", t->scene->parameter[shape[p]]));
+  for (PetscInt k = 0; k < parts->n; k++) {
+    PetscInt own[HYCO_MAX_PARAMETERS];
+
+    if (HycoBodyPartsShapes(parts, k, own)) PetscCall(HycoListAdd(bodies, ", ", parts->name[k]));
+  }
   HycoCheckModel(n <= MOST_THETA,
-                 "%d parameters change the shape of bodies or the ratio of their moduli (%s), and a model of bodies "
-                 "samples at most %d; train a hybrid model",
-                 (int)n, list, MOST_THETA);
+                 "body %s: %d parameters change shapes or ratios of moduli (%s), and a model of bodies samples at most "
+                 "%d; train a hybrid model",
+                 bodies, (int)n, list, MOST_THETA);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
