@@ -664,10 +664,10 @@ static PetscErrorCode TryOne(Search *s, const HycoROM type)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether these settings end the search. */
+/* Whether these settings end the search: by their errors, with a margin unless that saves the training solutions. */
 static PetscBool Ends(const Search *s, const HycoAttempt *best)
 {
-  return (PetscBool)(best && best->ratio <= MARGIN && !s->t->exhaustive);
+  return (PetscBool)(best && best->ratio <= (s->t->late ? 1 : MARGIN) && !s->t->exhaustive);
 }
 
 /* Lets a type with modes of its own refuse the scene: why. Collective. */
@@ -691,7 +691,7 @@ static PetscErrorCode Offers(Search *s, const HycoROM type, PetscBool *offered, 
                              char why[HYCO_LINE])
 {
   HycoReducer t = s->t;
-  PetscReal work = 0;
+  PetscReal work = 0, most = s->budget;
 
   PetscFunctionBegin;
   PetscCall(Refuse(t, type, why));
@@ -699,11 +699,12 @@ static PetscErrorCode Offers(Search *s, const HycoROM type, PetscBool *offered, 
   if (why[0]) PetscFunctionReturn(PETSC_SUCCESS);
   *offered = (*type->ops->offers)(t, s->targets, HYCO_LINE, why);
   if (*offered && type->ops->work) work = (*type->ops->work)(t);
-  if (work > s->budget)
+  if (t->late) most *= 2; /* for it may save the training solutions */
+  if (work > most)
     HycoFormat(why,
                "its training would take %.1e operations, and the search may take %.1e; -hyco_search_budget %.2g allows "
                "it",
-               (double)work, (double)s->budget, (double)(t->search_budget * work / s->budget) * 1.1);
+               (double)work, (double)most, (double)(t->search_budget * work / most) * 1.1);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -724,7 +725,11 @@ static PetscErrorCode Wants(Search *s, const HycoROM type, PetscBool *wanted)
     if (type->model->traits.own_modes) HycoFormat(why, "it does not support scenes with a history");
   }
   if (*wanted && !(type->model->traits.own_modes && Ends(s, best))) PetscCall(Offers(s, type, wanted, &possible, why));
-  if (*wanted && Ends(s, best)) snprintf(why, sizeof(why), "settings %d are accurate by a margin", (int)best->number);
+  if (*wanted && Ends(s, best))
+    snprintf(why, sizeof(why),
+             t->late ? "settings %d are accurate enough, without training solutions"
+                     : "settings %d are accurate by a margin",
+             (int)best->number);
   if (why[0]) LeaveOut(s, type->model->type, possible, why);
   *wanted = (PetscBool)(*wanted && !why[0]);
   PetscFunctionReturn(PETSC_SUCCESS);

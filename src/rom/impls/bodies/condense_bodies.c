@@ -71,7 +71,7 @@ PetscErrorCode HycoBodiesBegin(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-#define SAMPLES 9  /* assumed nodes along each axis of theta */
+#define SAMPLES 5  /* assumed nodes along each axis of theta */
 #define SOLVES  12 /* assumed solves for each load, mode and sample of the fields */
 
 PetscReal HycoBodiesWork(HycoReducer t)
