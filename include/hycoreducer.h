@@ -123,7 +123,7 @@ typedef struct {
 /* Results of a training. */
 typedef struct {
   HycoROMType type;              /* borrowed from the library */
-  char summary[512];             /* text of the type about bases and RID; "": none */
+  char summary[1024];            /* text of the type about bases and RID; "": none */
   HycoFact fact[HYCO_MAX_FACTS]; /* quantities of the type */
   PetscInt n_facts;
   PetscBool stiffness;      /* whether there is a reduced stiffness, with a condition */

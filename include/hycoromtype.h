@@ -37,7 +37,7 @@ typedef struct {
                         points, and no less than those of ops->estimate */
   PetscBool own_modes; /* its modes are displacements of its own: solutions choose only the cells of its mesh, for which
                             those at held-out points serve, and a search tries it before the training points are solved */
-  PetscBool cells;   /* its mesh consists of the cells that it chooses, and of the surfaces of contacts and, without
+  PetscBool cells;     /* its mesh consists of the cells that it chooses, and of the surfaces of contacts and, without
                       `surfaces`, loads */
 } HycoROMTraits;
 

@@ -210,7 +210,7 @@ typedef struct {
 PetscErrorCode HycoBodiesBegin(HycoReducer reducer);
 PetscErrorCode HycoBodiesModes(HycoReducer reducer, HycoSnapshots store);
 /* Operations of the training, after HycoBodiesBegin(); whether a search tries the type. */
-PetscReal HycoBodiesWork(HycoReducer reducer);
+PetscReal HycoBodiesOperations(HycoReducer reducer);
 PetscBool HycoBodiesOffers(HycoReducer reducer, PetscBool targets, size_t length, char why[]);
 /* Factors K at theta, unless it is the present factor. Collective. */
 PetscErrorCode HycoBodiesRefactor(HycoReducer reducer, HycoBodiesFactor *factor, const PetscReal theta[]);

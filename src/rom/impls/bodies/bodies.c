@@ -279,12 +279,12 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
              (int)HycoBodiesGrid(b, 0, NULL), 100 * (double)b->forces);
   else
     snprintf(bound, sizeof(bound), "nothing is interpolated, contact forces are exact");
-  snprintf(
-      r->summary, sizeof(r->summary),
-      "%d bod%s with %d unknowns on the surfaces that may touch and %d exact ones inside; %s; %d independent load%s, %d "
-      "displacement modes%s\n",
-      (int)b->n, b->n == 1 ? "y" : "ies", (int)b->ns, (int)b->ni, bound, (int)b->r, b->r == 1 ? "" : "s",
-      (int)r->n_modes, HycoTrainingOfBodies(t)->filled ? filled : "");
+  HycoFormat(r->summary,
+             "%d bod%s with %d unknowns on the surfaces that may touch and %d exact ones inside; %s; %d independent "
+             "load%s, %d "
+             "displacement modes%s\n",
+             (int)b->n, b->n == 1 ? "y" : "ies", (int)b->ns, (int)b->ni, bound, (int)b->r, b->r == 1 ? "" : "s",
+             (int)r->n_modes, HycoTrainingOfBodies(t)->filled ? filled : "");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -315,7 +315,7 @@ PetscErrorCode HycoROMCreate_Bodies(HycoROM m)
                                  .report = Report,
                                  .cost = Cost,
                                  .offers = HycoBodiesOffers,
-                                 .work = HycoBodiesWork,
+                                 .work = HycoBodiesOperations,
                                  .setup = SetUp,
                                  .reset = Reset,
                                  .solve = Solve,

@@ -74,7 +74,7 @@ PetscErrorCode HycoBodiesBegin(HycoReducer t)
 #define SAMPLES 5  /* assumed nodes along each axis of theta */
 #define SOLVES  12 /* assumed solves for each load, mode and sample of the fields */
 
-PetscReal HycoBodiesWork(HycoReducer t)
+PetscReal HycoBodiesOperations(HycoReducer t)
 {
   HycoBodiesTraining s = HycoTrainingOfBodies(t);
   PetscInt shape[HYCO_MAX_PARAMETERS];
