@@ -1,6 +1,7 @@
 """Models of bodies as substructures: forces, surfaces and resultants are those of full order where contacts travel, bodies turn, grow, soften or
 float; where a body's shape changes, they follow the number of its samples and stay within the bound; check says how parameters enter the bodies."""
 import os
+import shutil
 import re
 import unittest
 
@@ -69,6 +70,7 @@ class Bodies(Case):
 
     def judge(self, scene, points, train=('-scatter', '2'), forces=1e-10, u=1e-4, options=()):
         """A model from these points is compared with full order at others; returns the report of the comparison."""
+        shutil.rmtree(self.path('m.h5.snapshots'), ignore_errors=True)
         self.hyco('train', '-scene', scene, *TYPE, *train, '-model', 'm.h5', *options)
         c = self.hyco('compare', '-scene', scene, '-model', 'm.h5', *points)
         self.assertEqual((c['not_converged'], c['undefined']), (0, 0))
