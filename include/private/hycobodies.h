@@ -194,9 +194,9 @@ typedef struct {
   HycoFOM fom;
   Mat N; /* selects them */
   HycoDirect direct;
-  PetscReal *theta;    /* of the factor */
-  PetscInt *pins;      /* of the first factor */
-  PetscReal *zero, *z; /* ns, p + ns */
+  PetscReal *theta; /* of the factor */
+  PetscInt *pins;   /* of the first factor */
+  PetscReal *z;     /* p + ns */
   PetscInt n_basis;
   Vec *basis; /* of the turned loads, orthonormal */
   PetscInt n_records;
@@ -228,9 +228,10 @@ PetscErrorCode HycoBodiesAddScores(HycoReducer reducer, HycoBodiesFactor *factor
 PetscErrorCode HycoBodiesChooseCells(HycoReducer reducer, HycoBodiesFactor *factor);
 /* The modes, as t->V, and H, a, g. Collective. */
 PetscErrorCode HycoBodiesFields(HycoReducer reducer, HycoSnapshots store, HycoBodiesFactor *factor);
-/* For loads F: the displacements of the surfaces without contact (ns), and the work on the motions (p). Collective. */
-PetscErrorCode HycoBodiesReduce(HycoSubstructures bodies, HycoBodiesFactor *factor, Vec F, PetscReal u[],
-                                PetscReal work[]);
+/* For n loads F: the displacements of the surfaces without contact (ns x n), and the work on the motions (p x n).
+   Collective. */
+PetscErrorCode HycoBodiesReduce(HycoSubstructures bodies, HycoBodiesFactor *factor, PetscInt n, const Vec F[],
+                                PetscReal u[], PetscReal work[]);
 /* theta of node k of the grid of all values, exactly as it was condensed. */
 void HycoBodiesPoint(HycoReducer reducer, PetscInt k, PetscReal theta[]);
 /* theta of node k of the grid of all values; the number of nodes; which sample of a body that is, -1: none. */

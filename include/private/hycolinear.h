@@ -34,6 +34,9 @@ PetscErrorCode HycoDirectFactor(HycoDirect direct, Mat K, Mat Bt, Mat B, PetscRe
 PetscErrorCode HycoDirectReduce(HycoDirect direct, Vec F, const PetscReal D[], PetscReal g[]);
 /* x = K^-1 (F - Bt L) with the F of the last HycoDirectReduce(); L (length m) is read on rank 0. */
 PetscErrorCode HycoDirectExpand(HycoDirect direct, const PetscReal L[], Vec x);
+/* The same for k right-hand sides, D = 0: g and L are m x k column major. */
+PetscErrorCode HycoDirectReduceMany(HycoDirect direct, PetscInt k, const Vec F[], PetscReal g[]);
+PetscErrorCode HycoDirectExpandMany(HycoDirect direct, PetscInt k, const Vec F[], const PetscReal L[], Vec x[]);
 /* x[j] = K^-1 r[j] for k right-hand sides at once, which read the factor once; K without a null space. */
 PetscErrorCode HycoDirectSolveMany(HycoDirect direct, PetscInt k, Vec r[], Vec x[]);
 /* x = K^-1 r */

@@ -140,6 +140,9 @@ PetscBool HycoSolverNeedsSymmetry(HycoSolver s);
 
 /* Chooses between a factor and iterations (s->iterative); may change the form. */
 PetscErrorCode HycoChooseLinear(HycoSolver s, HycoSolverForm *form);
+/* The memory for factors in bytes: -hyco_memory, or four fifths of the free memory of all machines of the ranks, the
+   same on every rank. Collective. */
+PetscErrorCode HycoSolverMemory(HycoSolver solver, PetscReal *bytes);
 /* Says in linear_method what solves with K: `ksp`, or (NULL) the factor of a HycoDirect. */
 PetscErrorCode HycoNameLinear(HycoSolver s, KSP ksp);
 /* Adds the iterations of a solve by conjugate gradients to the counts. */

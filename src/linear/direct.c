@@ -435,6 +435,60 @@ PetscErrorCode HycoDirectExpand(HycoDirect d, const PetscReal z[], Vec x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The condensation (ICNTL(26) = 1) of k right-hand sides F, with room for k reduced ones. Collective. */
+static PetscErrorCode CondenseMany(HycoDirect d, PetscInt k, const Vec F[], PetscReal **all, PetscReal **reduced)
+{
+  const size_t rows = (size_t)(d->n + d->m);
+
+  PetscFunctionBegin;
+  *all = *reduced = NULL;
+  if (d->rank == 0) PetscCall(PetscCalloc1(rows * (size_t)k + 1, all));
+  if (d->rank == 0) PetscCall(PetscCalloc1((size_t)d->n_schur * (size_t)k + 1, reduced));
+  for (PetscInt j = 0; j < k; j++) {
+    PetscCall(Fetch(d, F[j]));
+    if (d->rank == 0) PetscCall(PetscArraycpy(*all + rows * (size_t)j, d->rhs, d->n));
+  }
+  d->id.rhs = *all;
+  d->id.redrhs = *reduced;
+  d->id.nrhs = (MUMPS_INT)k;
+  PetscCall(Run(d, 1));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoDirectReduceMany(HycoDirect d, PetscInt k, const Vec F[], PetscReal q[])
+{
+  PetscReal *all, *reduced;
+
+  PetscFunctionBegin;
+  if (!k) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(CondenseMany(d, k, F, &all, &reduced));
+  for (PetscInt i = 0; i < k * d->n_schur && d->rank == 0; i++)
+    q[i] = i % d->n_schur < d->n_pinned ? -reduced[i] : reduced[i];
+  PetscCall(PetscFree(all));
+  PetscCall(PetscFree(reduced));
+  HycoBcast(q, k * d->n_schur, MPIU_REAL, d->comm);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoDirectExpandMany(HycoDirect d, PetscInt k, const Vec F[], const PetscReal z[], Vec x[])
+{
+  const size_t rows = (size_t)(d->n + d->m);
+  PetscReal *all, *reduced;
+
+  PetscFunctionBegin;
+  if (!k) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(CondenseMany(d, k, F, &all, &reduced));
+  if (d->rank == 0) PetscCall(PetscArraycpy(reduced, z, (size_t)d->n_schur * (size_t)k));
+  PetscCall(Run(d, 2));
+  for (PetscInt j = 0; j < k; j++) {
+    if (d->rank == 0) PetscCall(PetscArraycpy(d->rhs, all + rows * (size_t)j, d->n));
+    PetscCall(Deliver(d, x[j]));
+  }
+  PetscCall(PetscFree(all));
+  PetscCall(PetscFree(reduced));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoDirectSolveMany(HycoDirect d, PetscInt k, Vec r[], Vec x[])
 {
   const size_t rows = (size_t)(d->n + d->m);

@@ -23,8 +23,7 @@ static PetscReal Available(void)
   return kb > 0 ? 1024 * kb : (PetscReal)sysconf(_SC_PHYS_PAGES) * (PetscReal)sysconf(_SC_PAGESIZE) / 2;
 }
 
-/* Four fifths of the free memory of all machines of the ranks, the same on every rank. */
-static PetscErrorCode Limit(HycoSolver s, PetscReal *bytes)
+PetscErrorCode HycoSolverMemory(HycoSolver s, PetscReal *bytes)
 {
   MPI_Comm node;
   PetscMPIInt rank;
@@ -97,7 +96,7 @@ static PetscErrorCode DecideByMemory(HycoSolver s, HycoSolverForm *form)
   if (info.nz_used <= HYCO_PLANE_ROW * (PetscReal)s->system->n || !s->system->symmetric)
     PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(Estimate(s, *form, &bytes));
-  PetscCall(Limit(s, &limit));
+  PetscCall(HycoSolverMemory(s, &limit));
   if (bytes > limit) PetscCall(TakeIterative(s, form));
   if (s->iterative)
     PetscCall(PetscSNPrintf(s->why_iterative, sizeof(s->why_iterative),

@@ -68,11 +68,11 @@ class Bodies(Case):
             f.write(text)
         return cls.path(name)
 
-    def judge(self, scene, points, train=('-scatter', '2'), forces=1e-10, u=1e-4, options=()):
+    def judge(self, scene, points, train=('-scatter', '2'), forces=1e-10, u=1e-4, options=(), model='m.h5'):
         """A model from these points is compared with full order at others; returns the report of the comparison."""
-        shutil.rmtree(self.path('m.h5.snapshots'), ignore_errors=True)
-        self.hyco('train', '-scene', scene, *TYPE, *train, '-model', 'm.h5', *options)
-        c = self.hyco('compare', '-scene', scene, '-model', 'm.h5', *points)
+        shutil.rmtree(self.path(model + '.snapshots'), ignore_errors=True)
+        self.hyco('train', '-scene', scene, *TYPE, *train, '-model', model, *options)
+        c = self.hyco('compare', '-scene', scene, '-model', model, *points)
         self.assertEqual((c['not_converged'], c['undefined']), (0, 0))
         self.assertLess(c['error_lambda']['max'], forces)
         self.assertLess(c['error_u']['max'], u)
@@ -112,10 +112,10 @@ class Bodies(Case):
             text = f.read().replace('mesh: roller.msh', 'mesh: ' + MESH.format('roller'))
         scene = self.write('outputs.yaml', text + outputs + 'spring: {block_top: {x: 0.3*modulus}}\n')
         c = self.judge(scene, ('-values_place', '-4.3,3.1', '-values_press', '0.9', '-values_modulus', '17'), u=0.1,
-                       options=('-hyco_bodies_pod_tol', '1e-4'))
+                       options=('-hyco_bodies_pod_tol', '1e-4'), model='o.h5')
         self.assertLess(c['error_sigma']['max'], 1e-9)
         for point in ('1.37,0.71,8.3', '-3.9,0.33,19'):
-            p, s = (self.hyco(*run, '-mu', point) for run in (('predict', '-model', 'm.h5'), ('solve', '-scene', scene)))
+            p, s = (self.hyco(*run, '-mu', point) for run in (('predict', '-model', 'o.h5'), ('solve', '-scene', scene)))
             for name in ('lean', 'sink', 'hot', 'most', 'grip', 'tip'):
                 self.assertLess(abs(p['outputs'][name] - s['outputs'][name]), 1e-9 * max(1e-3, abs(s['outputs'][name])), name)
 
@@ -232,8 +232,8 @@ class Bodies(Case):
             for other in forces[1:]:
                 np.testing.assert_allclose(other, forces[0], rtol=1e-9)
 
-    def refused(self, scene, *words):
-        run = self.run_raw('train', '-scene', scene, *TYPE, '-scatter', '2', '-model', 'no.h5')
+    def refused(self, scene, *words, options=()):
+        run = self.run_raw('train', '-scene', scene, *TYPE, '-scatter', '2', '-model', 'no.h5', *options)
         self.assertEqual(run.returncode, 1)
         for word in words:
             self.assertIn(word, run.stderr)
@@ -241,11 +241,13 @@ class Bodies(Case):
         self.assertFalse(os.path.exists(self.path('no.h5')))
 
     def test_refused(self):
-        """What the model does not represent is named in one line: four parameters of the shape, mirrors, bodies without contact, a history."""
+        """What the model does not represent is named in one line: four parameters of the shape, mirrors, bodies without contact, too
+        little memory."""
         four = TURNED.replace('size*(x*cos(', 'size*(1 + place*y/99 + press*y/99 + modulus*y^2/999)*(x*cos(')
         self.refused(self.write('four.yaml', four), 'and a model of bodies samples at most 3')
         mirrored = TURNED.replace('size*(x*cos(', '(size > 1 ? -1 : 1)*size*(x*cos(').replace('range: [-15, 15]', 'range: [0, 0]')
         self.refused(self.write('mirrored.yaml', mirrored), 'the map of body cylinder mirrors it')
+        self.refused(ROLLER, 'GB to be made (the factor', '-hyco_memory', options=('-hyco_memory', '0.001', '-hyco_linear', 'direct'))
         alone = re.sub(r'contact: .*', '', TURNED)
         self.refused(self.write('alone.yaml', alone), 'the scene has no contact')
 

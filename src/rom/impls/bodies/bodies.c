@@ -262,9 +262,8 @@ static PetscErrorCode Build(HycoROM m, HycoReducer t)
 static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
 {
   HycoSubstructures b = (HycoSubstructures)m->model->data;
-  const char *filled =
-      "; with eight times the samples their displacements still need as many modes as half of them, so "
-      "that displacements away from the contact are less accurate";
+  const char *filled = "; displacements still need more modes than half of the samples, so that those away from the "
+                       "contact are less accurate (-hyco_bodies_samples)";
   char bound[HYCO_LINE / 4];
 
   PetscFunctionBegin;

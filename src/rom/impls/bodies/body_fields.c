@@ -14,12 +14,18 @@
 #define DOUBLINGS    3    /* of the samples then */
 #define SPREAD       3    /* nodes of theta at which the displacements of each are computed */
 #define SMALL        1e-7 /* of the largest sample: smaller ones count as much as this */
+#define SCORED       40   /* displacements at a node of theta whose stresses show which cells matter */
+#define MANY         64   /* right-hand sides at once */
 #define CHECKS       32   /* points at which the displacements that the modes miss are measured, no samples */
 
-/* Samples: the loads' coefficients and the surfaces' forces, a column each; the last n_checks are checks. */
+/* Samples: the loads' coefficients and the surfaces' forces, a column each; the last n_checks are
+   checks. */
 typedef struct {
   PetscInt n, n_checks;
-  PetscReal *c, *f; /* r x n, ns x n column major */
+  PetscReal *c, *f;       /* r x n, ns x n column major */
+  PetscInt tried;         /* points, solved or not: a larger set begins with them */
+  PetscInt expanded, n_U; /* samples whose displacements U has, n_U columns of this rank's part */
+  PetscReal *U;
 } Sampled;
 
 /* -- forces -- */
@@ -46,8 +52,9 @@ static PetscErrorCode SolvePoints(HycoReducer t, HycoBodiesWork o, const HycoBod
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(points, &n, NULL, &mu));
+  if (n > sampled->tried) sampled->n_checks = 0;
   PetscCall(PetscMalloc3(s->pairs->n + 1, &Lambda, n, &bound, n, &norm));
-  for (PetscInt k = 0; k < n; k++) {
+  for (PetscInt k = sampled->tried; k < n; k++) {
     char message[HYCO_LINE];
     PetscBool solved = PETSC_FALSE;
     PetscErrorCode ierr;
@@ -55,17 +62,19 @@ static PetscErrorCode SolvePoints(HycoReducer t, HycoBodiesWork o, const HycoBod
     PetscCall(HycoCatchBegin()); /* points that full order would refuse, too */
     ierr = SolveOne(o, s, mu + k * p, Lambda, &solved);
     PetscCall(HycoCatchEnd(ierr, message));
+    bound[k] = norm[k] = 0;
     if (ierr || !solved) continue;
     PetscCall(PetscArraycpy(sampled->c + sampled->n * b->r, o->c, b->r));
     PetscCall(PetscArraycpy(sampled->f + sampled->n * b->ns, o->f, b->ns));
-    bound[sampled->n] = HycoBodiesBound(o, &norm[sampled->n]);
-    most = PetscMax(most, norm[sampled->n]);
+    bound[k] = HycoBodiesBound(o, &norm[k]);
+    most = PetscMax(most, norm[k]);
     sampled->n++;
     sampled->n_checks += p && k >= n - CHECKS;
   }
-  b->forces = 0;
-  for (PetscInt k = 0; k < sampled->n && most > 0; k++)
+  if (!sampled->tried) b->forces = 0;
+  for (PetscInt k = sampled->tried; k < n && most > 0; k++)
     b->forces = PetscMax(b->forces, bound[k] * norm[k] / PetscMax(norm[k], HYCO_SMALL_FORCE * most));
+  sampled->tried = n;
   PetscCall(PetscFree3(Lambda, bound, norm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -108,8 +117,8 @@ static PetscErrorCode Sample(HycoReducer t, HycoFOM f, PetscInt wanted, PetscBoo
   PetscCall(HycoSamplesAddPoint(points, b->first));
   if (t->scene->n_parameters) PetscCall(HycoSamplesAddScattered(points, n + CHECKS));
   PetscCall(HycoSamplesGet(points, &n, NULL, NULL));
-  PetscCall(PetscCalloc1((size_t)n * (size_t)b->r + 1, &sampled->c));
-  PetscCall(PetscCalloc1((size_t)n * (size_t)b->ns + 1, &sampled->f));
+  PetscCall(PetscRealloc(((size_t)n * (size_t)b->r + 1) * sizeof(PetscReal), &sampled->c));
+  PetscCall(PetscRealloc(((size_t)n * (size_t)b->ns + 1) * sizeof(PetscReal), &sampled->f));
   {
     char message[HYCO_LINE] = "";
     PetscErrorCode caught = PETSC_SUCCESS;
@@ -129,27 +138,43 @@ static PetscErrorCode Sample(HycoReducer t, HycoFOM f, PetscInt wanted, PetscBoo
 
 /* -- displacements -- */
 
-/* The displacements of this rank's part for loads with coefficients c and the z of the dense problem. Collective. */
-static PetscErrorCode Expand(HycoSubstructures b, HycoBodiesFactor *factor, const PetscReal c[], const PetscReal z[],
-                             PetscReal u[])
+/* n vectors like the loads. */
+static PetscErrorCode CreateVectors(HycoBodiesFactor *factor, PetscInt n, Vec v[])
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < n; k++) PetscCall(VecDuplicate(factor->fom->F, &v[k]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode DestroyVectors(PetscInt n, Vec v[])
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < n; k++) PetscCall(VecDestroy(&v[k]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The displacements of this rank's part, n columns, at most MANY, for loads with coefficients c (r x n; NULL: none) and
+   the z of the dense problem (p + ns, n columns; read on rank 0). Collective. */
+static PetscErrorCode Expand(HycoSubstructures b, HycoBodiesFactor *factor, PetscInt n, const PetscReal c[],
+                             const PetscReal z[], PetscReal u[])
 {
   HycoFOM f = factor->fom;
-  PetscReal *free, *work;
-  Vec F, x;
+  Vec F[MANY], x[MANY];
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc2(b->ns + 1, &free, b->p + 1, &work));
-  PetscCall(VecDuplicate(f->F, &F));
-  PetscCall(VecDuplicate(f->F, &x));
-  PetscCall(VecZeroEntries(F));
-  for (PetscInt k = 0; c && k < b->r; k++) PetscCall(VecAXPY(F, c[k], factor->basis[k]));
-  PetscCall(HycoBodiesReduce(b, factor, F, free, work));
-  PetscCall(HycoDirectExpand(factor->direct, z, x));
-  PetscCall(HycoFOMToLocal(f, x, u));
-  for (PetscInt i = 0; i < f->fe->n_dof; i++) u[i] = f->fe->fixed[i] ? 0 : u[i];
-  PetscCall(VecDestroy(&F));
-  PetscCall(VecDestroy(&x));
-  PetscCall(PetscFree2(free, work));
+  PetscCall(CreateVectors(factor, n, F));
+  PetscCall(CreateVectors(factor, n, x));
+  for (PetscInt j = 0; j < n; j++) {
+    PetscCall(VecZeroEntries(F[j]));
+    for (PetscInt k = 0; c && k < b->r; k++) PetscCall(VecAXPY(F[j], c[j * b->r + k], factor->basis[k]));
+  }
+  PetscCall(HycoDirectExpandMany(factor->direct, n, F, z, x));
+  for (PetscInt j = 0; j < n; j++, u += f->fe->n_dof) {
+    PetscCall(HycoFOMToLocal(f, x[j], u));
+    for (PetscInt i = 0; i < f->fe->n_dof; i++) u[i] = f->fe->fixed[i] ? 0 : u[i];
+  }
+  PetscCall(DestroyVectors(n, F));
+  PetscCall(DestroyVectors(n, x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -159,53 +184,84 @@ static PetscBool Visits(PetscInt k, PetscInt j, PetscInt n)
   return (PetscBool)(n <= SPREAD || (j + k) % (n / SPREAD) == 0);
 }
 
-static PetscInt CountVisits(PetscInt n_samples, PetscInt n)
+/* The displacements of these samples, where the factor is, n columns. Collective. */
+static PetscErrorCode ExpandSamples(HycoSubstructures b, HycoBodiesFactor *factor, const Sampled *sampled, PetscInt n,
+                                    const PetscInt sample[], PetscReal u[])
 {
-  PetscInt count = 0;
+  const PetscInt n_z = b->p + b->ns;
+  PetscReal *c, *z;
 
-  for (PetscInt i = 0; i < n_samples * n; i++) count += Visits(i / n, i % n, n);
-  return count;
-}
-
-/* The displacements of sample k, where the factor is. Collective. */
-static PetscErrorCode ExpandSample(HycoSubstructures b, HycoBodiesFactor *factor, const Sampled *sampled, PetscInt k,
-                                   PetscReal u[])
-{
   PetscFunctionBegin;
-  PetscCall(PetscArrayzero(factor->z, b->p));
-  PetscCall(PetscArraycpy(factor->z + b->p, sampled->f + (size_t)k * (size_t)b->ns, b->ns));
-  PetscCall(Expand(b, factor, sampled->c + k * b->r, factor->z, u));
+  PetscCall(PetscCalloc2(MANY * b->r + 1, &c, (size_t)MANY * (size_t)n_z + 1, &z)); /* z of motions: 0 */
+  for (PetscInt first = 0; first < n; first += MANY) {
+    const PetscInt many = PetscMin(MANY, n - first);
+
+    for (PetscInt j = 0; j < many; j++) {
+      const size_t k = (size_t)sample[first + j];
+
+      PetscCall(PetscArraycpy(c + j * b->r, sampled->c + k * (size_t)b->r, b->r));
+      PetscCall(PetscArraycpy(z + (size_t)j * (size_t)n_z + b->p, sampled->f + k * (size_t)b->ns, b->ns));
+    }
+    PetscCall(Expand(b, factor, many, c, z, u + (size_t)first * (size_t)factor->fom->fe->n_dof));
+  }
+  PetscCall(PetscFree2(c, z));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* U: the displacements (n_dof of this rank's part) of the samples at the nodes of theta, with the rigid motions there.
-   The forces are those of any theta, so that there are all patterns. Collective. */
-static PetscErrorCode ExpandAll(HycoReducer t, HycoBodiesFactor *factor, const Sampled *sampled, PetscReal U[])
+/* The rigid motions at the present factor. Collective. */
+static PetscErrorCode ExpandMotions(HycoSubstructures b, HycoBodiesFactor *factor, PetscReal u[])
+{
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(factor->z, b->p + b->ns));
+  for (PetscInt k = 0; k < b->p; k++, u += factor->fom->fe->n_dof) {
+    factor->z[k] = 1;
+    PetscCall(Expand(b, factor, 1, NULL, factor->z, u));
+    factor->z[k] = 0;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds to sampled->U the displacements of the samples that it has not at node j, and at first the rigid motions there.
+   Collective. */
+static PetscErrorCode ExpandNode(HycoReducer t, HycoBodiesFactor *factor, PetscInt j, Sampled *sampled)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   const size_t n_dof = (size_t)factor->fom->fe->n_dof;
-  const PetscInt nodes = HycoBodiesGrid(b, 0, NULL);
+  const PetscInt last = sampled->n - sampled->n_checks, nodes = HycoBodiesGrid(b, 0, NULL);
+  PetscReal theta[HYCO_MAX_PARAMETERS], *U;
+  PetscInt *sample, n = 0;
+
+  PetscFunctionBegin;
+  HycoBodiesPoint(t, j, theta);
+  PetscCall(HycoBodiesRefactor(t, factor, theta));
+  PetscCall(PetscMalloc1(sampled->n + 1, &sample));
+  for (PetscInt k = sampled->expanded; k < last; k++) {
+    if (Visits(k, j, nodes)) sample[n++] = k;
+  }
+  PetscCall(PetscRealloc((n_dof * (size_t)(sampled->n_U + n + b->p) + 1) * sizeof(PetscReal), &sampled->U));
+  U = sampled->U + n_dof * (size_t)sampled->n_U;
+  PetscCall(ExpandSamples(b, factor, sampled, n, sample, U));
+  for (PetscInt k = 0; k < n; k += 1 + n / SCORED) PetscCall(HycoBodiesAddScores(t, factor, U + n_dof * (size_t)k));
+  sampled->n_U += n;
+  if (!sampled->expanded) {
+    PetscCall(ExpandMotions(b, factor, U + n_dof * (size_t)n));
+    sampled->n_U += b->p;
+  }
+  PetscCall(PetscFree(sample));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The forces are those of any theta, so that there are all patterns. Collective. */
+static PetscErrorCode ExpandAll(HycoReducer t, HycoBodiesFactor *factor, Sampled *sampled)
+{
+  const PetscInt nodes = HycoBodiesGrid(HycoTrainingOfBodies(t)->bodies, 0, NULL);
 
   PetscFunctionBegin;
   for (PetscInt j = 0; j < nodes; j++) {
-    PetscReal theta[HYCO_MAX_PARAMETERS];
-
-    HycoBodiesPoint(t, j, theta);
-    PetscCall(HycoBodiesRefactor(t, factor, theta));
-    for (PetscInt k = 0; k < sampled->n - sampled->n_checks; k++) {
-      if (!Visits(k, j, nodes)) continue;
-      PetscCall(ExpandSample(b, factor, sampled, k, U));
-      PetscCall(HycoBodiesAddScores(t, factor, U));
-      U += n_dof;
-    }
-    PetscCall(PetscArrayzero(factor->z, b->p + b->ns));
-    for (PetscInt k = 0; k < b->p; k++, U += n_dof) {
-      factor->z[k] = 1;
-      PetscCall(Expand(b, factor, NULL, factor->z, U));
-      factor->z[k] = 0;
-    }
+    PetscCall(ExpandNode(t, factor, j, sampled));
     PetscCall(HycoReducerTell(t, "displacements of the bodies", j + 1, nodes));
   }
+  sampled->expanded = sampled->n - sampled->n_checks;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -380,13 +436,16 @@ static PetscErrorCode MeasureLeft(HycoReducer t, HycoBodiesFactor *factor, const
   const PetscInt n = sampled->n_checks;
   const size_t n_dof = (size_t)factor->fom->fe->n_dof;
   PetscReal *U, *all, *lost, *norm;
+  PetscInt *sample;
 
   PetscFunctionBegin;
   b->left = 0;
   PetscCall(PetscMalloc3(n_dof * (size_t)n + 1, &U, n, &all, b->dim * b->dim * n, &norm));
   PetscCall(PetscCalloc1(n, &lost));
-  for (PetscInt k = 0; k < n; k++)
-    PetscCall(ExpandSample(b, factor, sampled, sampled->n - n + k, U + (size_t)k * n_dof));
+  PetscCall(PetscMalloc1(n + 1, &sample));
+  for (PetscInt k = 0; k < n; k++) sample[k] = sampled->n - n + k;
+  PetscCall(ExpandSamples(b, factor, sampled, n, sample, U));
+  PetscCall(PetscFree(sample));
   PetscCall(Squares(factor->fom, n, U, all));
   for (PetscInt k = 0; k < b->n && n; k++) {
     const PetscInt turns = b->turn_start[k + 1] - b->turn_start[k];
@@ -410,17 +469,13 @@ static PetscErrorCode MeasureLeft(HycoReducer t, HycoBodiesFactor *factor, const
 /* The displacements K^-1 F of the basis of the loads. Collective. */
 static PetscErrorCode LoadFields(HycoSubstructures b, HycoBodiesFactor *factor, Vec x[])
 {
-  PetscReal *u, *work;
+  PetscReal *z;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc2(b->ns + 1, &u, b->p + 1, &work));
-  PetscCall(PetscArrayzero(factor->z, b->p + b->ns));
-  for (PetscInt k = 0; k < b->r; k++) {
-    PetscCall(VecDuplicate(factor->fom->F, &x[k]));
-    PetscCall(HycoBodiesReduce(b, factor, factor->basis[k], u, work));
-    PetscCall(HycoDirectExpand(factor->direct, factor->z, x[k]));
-  }
-  PetscCall(PetscFree2(u, work));
+  PetscCall(PetscCalloc1((size_t)(b->p + b->ns) * (size_t)b->r + 1, &z));
+  PetscCall(CreateVectors(factor, b->r, x));
+  PetscCall(HycoDirectExpandMany(factor->direct, b->r, factor->basis, z, x));
+  PetscCall(PetscFree(z));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -480,38 +535,54 @@ static PetscErrorCode AllocateCoefficients(HycoSubstructures b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Row i of a body as a load: one of its modes in one of its turns, or an unknown inside. Collective. */
+static PetscErrorCode SetRow(HycoReducer t, HycoBodiesFactor *factor, PetscInt k, PetscInt i, Mat V, Vec v)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  const PetscInt l = b->body[k].l, turned = l * (b->turn_start[k + 1] - b->turn_start[k]);
+  const PetscScalar *columns;
+  PetscInt lda;
+
+  PetscFunctionBegin;
+  if (i >= turned) {
+    PetscCall(SetUnit(factor->row[b->inner_start[k] + i - turned], v));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(MatDenseGetLDA(V, &lda));
+  PetscCall(MatDenseGetArrayRead(V, &columns));
+  PetscCall(
+      TurnMode(t, factor, k, b->turn_start[k] + i / l, columns + (size_t)(b->mode_start[k] + i % l) * (size_t)lda, v));
+  PetscCall(MatDenseRestoreArrayRead(V, &columns));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* H, a and g of a body at one of its samples, where the factor is. x: the loads' displacements. Collective. */
 static PetscErrorCode BodyCoefficients(HycoReducer t, HycoBodiesFactor *factor, PetscInt k, PetscInt sample, Mat V,
                                        const Vec x[])
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   HycoSubstructure *s = &b->body[k];
-  const PetscInt turns = b->turn_start[k + 1] - b->turn_start[k];
+  const PetscInt rows = s->l * (b->turn_start[k + 1] - b->turn_start[k]) + s->m;
   PetscReal *u, *g;
-  const PetscScalar *columns;
-  PetscInt lda;
-  Vec v;
+  Vec v[MANY];
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc2(b->ns + 1, &u, b->p + 1, &g));
-  PetscCall(VecDuplicate(factor->fom->F, &v));
-  PetscCall(MatDenseGetLDA(V, &lda));
-  PetscCall(MatDenseGetArrayRead(V, &columns));
-  for (PetscInt i = 0; i < turns * s->l + s->m; i++) {
-    const size_t row = (size_t)(sample * (turns * s->l + s->m) + i);
+  PetscCall(PetscMalloc2(MANY * b->ns + 1, &u, MANY * b->p + 1, &g));
+  PetscCall(CreateVectors(factor, MANY, v));
+  for (PetscInt first = 0; first < rows; first += MANY) {
+    const PetscInt many = PetscMin(MANY, rows - first);
 
-    if (i < turns * s->l)
-      PetscCall(TurnMode(t, factor, k, b->turn_start[k] + i / s->l,
-                         columns + (size_t)(b->mode_start[k] + i % s->l) * (size_t)lda, v));
-    else
-      PetscCall(SetUnit(factor->row[b->inner_start[k] + i - turns * s->l], v));
-    PetscCall(HycoBodiesReduce(b, factor, v, u, g));
-    PetscCall(PetscArraycpy(s->H + row * (size_t)s->n, u + b->start[k], s->n));
-    PetscCall(PetscArraycpy(s->g + row * (size_t)b->p, g, b->p));
-    for (PetscInt d = 0; d < b->r; d++) PetscCall(VecDot(v, x[d], &s->a[row * (size_t)b->r + (size_t)d]));
+    for (PetscInt j = 0; j < many; j++) PetscCall(SetRow(t, factor, k, first + j, V, v[j]));
+    PetscCall(HycoBodiesReduce(b, factor, many, v, u, g));
+    for (PetscInt j = 0; j < many; j++) {
+      const size_t row = (size_t)(sample * rows + first + j);
+
+      PetscCall(PetscArraycpy(s->H + row * (size_t)s->n, u + j * b->ns + b->start[k], s->n));
+      PetscCall(PetscArraycpy(s->g + row * (size_t)b->p, g + j * b->p, b->p));
+      for (PetscInt d = 0; d < b->r; d++) PetscCall(VecDot(v[j], x[d], &s->a[row * (size_t)b->r + (size_t)d]));
+    }
   }
-  PetscCall(MatDenseRestoreArrayRead(V, &columns));
-  PetscCall(VecDestroy(&v));
+  PetscCall(DestroyVectors(MANY, v));
   PetscCall(PetscFree2(u, g));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -564,31 +635,22 @@ static PetscErrorCode TakeModes(HycoReducer t, HycoSnapshots store, Mat V, Petsc
 
 /* The modes of `wanted` samples; *enough: the samples are many more than the modes of any body, or there is no room for
    more. Collective. */
-static PetscErrorCode ModesOf(HycoReducer t, HycoBodiesFactor *factor, PetscInt wanted, Mat *V, PetscReal **sigma,
-                              PetscBool *enough)
+static PetscErrorCode ModesOf(HycoReducer t, HycoBodiesFactor *factor, PetscInt wanted, Sampled *sampled, Mat *V,
+                              PetscReal **sigma, PetscBool *enough)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
-  Sampled sampled = {0};
-  PetscReal *U;
-  PetscInt n;
   PetscBool all;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(Sample(t, factor->fom, wanted, &all, &sampled));
-  n = CountVisits(sampled.n - sampled.n_checks, HycoBodiesGrid(b, 0, NULL)) + b->p * HycoBodiesGrid(b, 0, NULL);
-  PetscCall(PetscMalloc1((size_t)factor->fom->fe->n_dof * (size_t)n + 1, &U));
-  PetscCall(ExpandAll(t, factor, &sampled, U));
+  PetscCall(Sample(t, factor->fom, wanted, &all, sampled));
+  PetscCall(ExpandAll(t, factor, sampled));
   PetscCall(HycoBodiesChooseCells(t, factor));
   PetscCall(PetscFree(b->mode_start));
-  ierr = FindModes(t, factor, n, U, V, sigma);
-  PetscCall(PetscFree(U));
-  if (!ierr && !b->n_theta) ierr = MeasureLeft(t, factor, &sampled, *V);
-  HycoFreeAll(&sampled.c, &sampled.f);
-  PetscCall(ierr);
+  PetscCall(FindModes(t, factor, sampled->n_U, sampled->U, V, sigma));
+  if (!b->n_theta) PetscCall(MeasureLeft(t, factor, sampled, *V));
   *enough = PETSC_TRUE;
   for (PetscInt k = 0; k < b->n; k++)
-    *enough = (PetscBool)(*enough && b->mode_start[k + 1] - b->mode_start[k] <= FULL * (sampled.n - sampled.n_checks));
+    *enough = (PetscBool)(*enough && b->mode_start[k + 1] - b->mode_start[k] <= FULL * sampled->expanded);
   HycoTrainingOfBodies(t)->filled = (PetscBool) !*enough;
   *enough = (PetscBool)(*enough || !all);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -598,17 +660,21 @@ PetscErrorCode HycoBodiesFields(HycoReducer t, HycoSnapshots store, HycoBodiesFa
 {
   PetscReal *sigma = NULL;
   Mat V = NULL;
+  Sampled sampled = {0};
   PetscBool enough = PETSC_FALSE;
+  PetscErrorCode ierr = PETSC_SUCCESS;
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(factor->fom->part->n_cells + 1, &factor->score));
   PetscCall(PetscCalloc1(factor->fom->fe->n_dof + 1, &factor->known));
   PetscCall(PetscCalloc1(factor->fom->fe->n_dof + 1, &factor->moved));
-  for (PetscInt n = HycoTrainingOfBodies(t)->samples, k = 0; !enough && k <= DOUBLINGS; n *= 2, k++) {
+  for (PetscInt n = HycoTrainingOfBodies(t)->samples, k = 0; !ierr && !enough && k <= DOUBLINGS; n *= 2, k++) {
     PetscCall(MatDestroy(&V));
     PetscCall(PetscFree(sigma));
-    PetscCall(ModesOf(t, factor, n, &V, &sigma, &enough));
+    ierr = ModesOf(t, factor, n, &sampled, &V, &sigma, &enough);
   }
+  HycoFreeAll(&sampled.c, &sampled.f, &sampled.U);
+  PetscCall(ierr);
   PetscCall(Coefficients(t, factor, V));
   PetscCall(TakeModes(t, store, V, sigma));
   PetscFunctionReturn(PETSC_SUCCESS);

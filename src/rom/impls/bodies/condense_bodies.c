@@ -230,6 +230,30 @@ static PetscErrorCode CheckPins(HycoReducer t, HycoSubstructures b, HycoBodiesFa
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Refuses bodies that need more memory than there is: the factor, of which the analysis has the size, the Schur
+   complement on every rank, the flexibilities at the first samples and at those beside them, and the sampled
+   displacements. Collective. */
+static PetscErrorCode CheckMemory(HycoReducer t, HycoBodiesFactor *factor, PetscReal bytes)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  const PetscReal n = b->p + b->ns, samples = PetscPowReal(3, (PetscReal)b->n_theta) + 2 * b->n_theta;
+  PetscReal limit, all, flexibilities = 0;
+  HycoSolver solver;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < b->n; k++) flexibilities += samples * PetscSqr((PetscReal)b->body[k].n);
+  all = bytes + 8 * (n * n * factor->fom->size + flexibilities +
+                     (PetscReal)t->sizes[0] * b->dim * HycoTrainingOfBodies(t)->samples);
+  PetscCall(HycoFOMGetSolver(factor->fom, &solver));
+  PetscCall(HycoSolverMemory(solver, &limit));
+  HycoCheckModel(all <= limit,
+                 "a model of bodies needs %.3g GB to be made (the factor %.3g GB, flexibilities of %d unknowns on "
+                 "surfaces %.3g GB), and %.3g GB are available (-hyco_memory); train a hybrid model",
+                 (double)(1e-9 * all), (double)(1e-9 * bytes), (int)b->ns, (double)(8e-9 * flexibilities),
+                 (double)(1e-9 * limit));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* record: takes the blocks; NULL: they are not needed. Collective. */
 static PetscErrorCode Factor(HycoReducer t, HycoBodiesFactor *factor, const PetscReal theta[], HycoBodiesRecord *record)
 {
@@ -255,6 +279,7 @@ static PetscErrorCode Factor(HycoReducer t, HycoBodiesFactor *factor, const Pets
   if (!factor->direct) PetscCall(HycoDirectCreate(HycoComm(f), &factor->direct));
   PetscCall(HycoDirectPinKernel(factor->direct, f->K));
   PetscCall(HycoDirectAnalyse(factor->direct, f->K, NULL, factor->N, PETSC_TRUE, &bytes));
+  if (!factor->z) PetscCall(CheckMemory(t, factor, bytes)); /* before the first factor */
   n = (size_t)(b->p + b->ns);
   PetscCall(PetscCalloc1(n * n + 1, &M));
   ierr = HycoDirectFactor(factor->direct, f->K, NULL, factor->N, M, &singular);
@@ -262,7 +287,7 @@ static PetscErrorCode Factor(HycoReducer t, HycoBodiesFactor *factor, const Pets
   PetscCall(PetscFree(M));
   PetscCall(ierr);
   HycoCheckModel(!singular, "the stiffness of the bodies is singular; check supports and springs");
-  if (!factor->zero) PetscCall(PetscCalloc2(b->ns + 1, &factor->zero, b->p + b->ns + 1, &factor->z));
+  if (!factor->z) PetscCall(PetscCalloc1(b->p + b->ns + 1, &factor->z));
   HycoDuplicate(b->n_theta + 1, theta, &factor->theta);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -284,15 +309,19 @@ PetscErrorCode HycoBodiesRefactor(HycoReducer t, HycoBodiesFactor *factor, const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoBodiesReduce(HycoSubstructures b, HycoBodiesFactor *factor, Vec F, PetscReal u[], PetscReal work[])
+PetscErrorCode HycoBodiesReduce(HycoSubstructures b, HycoBodiesFactor *factor, PetscInt n, const Vec F[], PetscReal u[],
+                                PetscReal work[])
 {
+  const PetscInt n_q = b->p + b->ns;
   PetscReal *q;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(b->p + b->ns + 1, &q));
-  PetscCall(HycoDirectReduce(factor->direct, F, factor->zero, q));
-  for (PetscInt i = 0; i < b->p; i++) work[i] = -q[i];
-  for (PetscInt k = 0; k < b->ns; k++) u[k] = -q[b->p + k];
+  PetscCall(PetscMalloc1((size_t)n_q * (size_t)n + 1, &q));
+  PetscCall(HycoDirectReduceMany(factor->direct, n, F, q));
+  for (PetscInt j = 0; j < n; j++) {
+    for (PetscInt i = 0; i < b->p; i++) work[j * b->p + i] = -q[j * n_q + i];
+    for (PetscInt k = 0; k < b->ns; k++) u[j * b->ns + k] = -q[j * n_q + b->p + k];
+  }
   PetscCall(PetscFree(q));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -303,13 +332,13 @@ static PetscErrorCode Respond(HycoSubstructures b, HycoBodiesFactor *factor, Hyc
   PetscReal *u, *work;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc2(b->ns + 1, &u, b->p + 1, &work));
+  PetscCall(PetscMalloc2(b->ns * b->r + 1, &u, b->p * b->r + 1, &work));
   PetscCall(PetscMalloc1((size_t)b->ns * (size_t)b->r + 1, &record->R));
   PetscCall(PetscMalloc1(b->p * b->r + 1, &record->work));
+  PetscCall(HycoBodiesReduce(b, factor, b->r, factor->basis, u, work));
   for (PetscInt k = 0; k < b->r; k++) {
-    PetscCall(HycoBodiesReduce(b, factor, factor->basis[k], u, work));
-    for (PetscInt i = 0; i < b->ns; i++) record->R[i * b->r + k] = u[i];
-    for (PetscInt i = 0; i < b->p; i++) record->work[i * b->r + k] = work[i];
+    for (PetscInt i = 0; i < b->ns; i++) record->R[i * b->r + k] = u[k * b->ns + i];
+    for (PetscInt i = 0; i < b->p; i++) record->work[i * b->r + k] = work[k * b->p + i];
   }
   PetscCall(PetscFree2(u, work));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -389,7 +418,7 @@ static PetscErrorCode Release(HycoBodiesFactor *factor)
   }
   HycoFreeAll(&factor->basis, &factor->record, &factor->theta, &factor->pins, &factor->score, &factor->moved,
               &factor->known, &factor->row);
-  PetscCall(PetscFree2(factor->zero, factor->z));
+  PetscCall(PetscFree(factor->z));
   PetscCall(HycoFOMDestroy(&factor->fom));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
