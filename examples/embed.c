@@ -23,7 +23,7 @@ static PetscErrorCode Run(const char *folder, const char *file, PetscInt n, cons
   PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom)); /* full order */
   PetscCall(HycoFOMSolve(fom, n, mu));
   PetscCall(HycoFOMGetSummary(fom, &full));
-  PetscCall(HycoSamplesCreate(scene, &samples)); /* train on 36 solutions */
+  PetscCall(HycoSamplesCreate(scene, &samples)); /* the region of the model */
   PetscCall(HycoSamplesAddGrid(samples, grid, PETSC_FALSE));
   PetscCall(HycoReducerCreate(PETSC_COMM_WORLD, scene, &reducer));
   PetscCall(HycoReducerSetFromOptions(reducer));
