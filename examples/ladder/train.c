@@ -23,9 +23,9 @@ static PetscErrorCode Train(HycoScene scene, const char file[])
   PetscCall(HycoReducerCreate(PETSC_COMM_WORLD, scene, &reducer));
   PetscCall(HycoReducerSetFromOptions(reducer));
   PetscCall(HycoReducerRun(reducer, samples, file, &t));
-  PetscCall(PetscPrintf(PETSC_COMM_WORLD, "%d training solutions, %d modes, RID of %d elements; held-out error of u %.2e\n",
-                        (int)t.n_samples, (int)t.n_modes, (int)t.rid_elements,
-                        (double)t.held_out.largest[HYCO_ERROR_U]));
+  PetscCall(
+      PetscPrintf(PETSC_COMM_WORLD, "%d training solutions, %d modes, RID of %d elements; held-out error of u %.2e\n",
+                  (int)t.n_samples, (int)t.n_modes, (int)t.rid_elements, (double)t.held_out.largest[HYCO_ERROR_U]));
   PetscCall(HycoReducerDestroy(&reducer));
   PetscCall(HycoSamplesDestroy(&samples));
   PetscFunctionReturn(0);
