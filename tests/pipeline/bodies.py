@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 
 import motions
+import rigid
 from common import SOURCE, Case
 
 MESH = os.path.join(SOURCE, 'examples', '{0}', '{0}.msh')
@@ -138,6 +139,23 @@ class Bodies(Case):
         self.judge(scene, ('-values_place', '-2.3,3.1', '-values_press', '0.4,0.9', '-values_modulus', '7', '-values_turn', '-11,6.5', '-values_size',
                            '0.93,1.07'))
 
+    def test_mirrored(self):
+        """A map that mirrors a body at one end of its range, enlarged on the way: outer sides, normals and displacements are those of full order."""
+        text = TURNED.replace('size*(x*cos(', '(size > 1 ? -1 : 1)*size*((x + 0.3)*cos(').replace('range: [-15, 15]', 'range: [0, 0]')
+        scene = self.write('mirrored.yaml', text)
+        self.judge(scene, ('-values_place', '-2.3,3.1', '-values_press', '0.4,0.9', '-values_modulus', '7', '-values_turn', '0', '-values_size', '0.93,1.07'),
+                   model='mirrored.h5')
+
+    def test_rigid(self):
+        """A rigid punch under a given load, on an axisymmetric block whose rim it may reach: motion, forces and displacements are those of full order."""
+        rigid.Rigid.mesh.__func__(type(self))
+        text = rigid.SCENE.replace('LAW', rigid.ELASTIC).replace('FORCE', '-load').replace('mesh: mesh.msh', 'mesh: mesh.msh, formulation: axisymmetric')
+        scene = self.write('rigid.yaml', text)
+        self.judge(scene, ('-values_load', '7,29', '-values_radius', '8.3,11.9'), model='rigid.h5')
+        p, s = (self.hyco(*run, '-mu', '17,9.3') for run in (('predict', '-model', 'rigid.h5'), ('solve', '-scene', scene)))
+        self.near(p['outputs']['push'], -17, 1e-10)
+        self.near(p['outputs']['depth'], s['outputs']['depth'], 1e-9)
+
     def test_floating(self):
         """A body that contact alone holds: its rigid motion is an unknown, and contact has its whole load."""
         scene = self.write('floating.yaml', FLOATING)
@@ -241,12 +259,10 @@ class Bodies(Case):
         self.assertFalse(os.path.exists(self.path('no.h5')))
 
     def test_refused(self):
-        """What the model does not represent is named in one line: four parameters of the shape, mirrors, bodies without contact, too
+        """What the model does not represent is named in one line: four parameters of the shape, bodies without contact, too
         little memory."""
         four = TURNED.replace('size*(x*cos(', 'size*(1 + place*y/99 + press*y/99 + modulus*y^2/999)*(x*cos(')
         self.refused(self.write('four.yaml', four), 'and a model of bodies samples at most 3')
-        mirrored = TURNED.replace('size*(x*cos(', '(size > 1 ? -1 : 1)*size*(x*cos(').replace('range: [-15, 15]', 'range: [0, 0]')
-        self.refused(self.write('mirrored.yaml', mirrored), 'the map of body cylinder mirrors it')
         self.refused(ROLLER, 'GB to be made (the factor', '-hyco_memory', options=('-hyco_memory', '0.001', '-hyco_linear', 'direct'))
         alone = re.sub(r'contact: .*', '', TURNED)
         self.refused(self.write('alone.yaml', alone), 'the scene has no contact')

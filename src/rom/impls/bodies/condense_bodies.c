@@ -49,10 +49,6 @@ static PetscErrorCode CheckScene(HycoReducer t)
                                                 "-hyco_model_type bodies; remove them");
   HycoCheckModel(t->sizes[2] > 0, "the scene has no contact, and a model of bodies represents the surfaces that touch; "
                                   "train a hybrid model");
-  for (PetscInt k = 0; k < t->scene->n_contacts; k++)
-    HycoCheckModel(!t->scene->contact[k]->rigid,
-                   "contact %s is of type rigid, which a model of bodies does not support; train a hybrid model",
-                   t->scene->contact[k]->name);
   PetscCall(PetscOptionsGetBool(t->scene->options, NULL, "-hyco_regularise", &regularise, NULL));
   HycoCheckModel(!regularise, "-hyco_regularise is not supported by a model of bodies; train a hybrid model");
   PetscFunctionReturn(PETSC_SUCCESS);

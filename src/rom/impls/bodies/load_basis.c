@@ -85,11 +85,6 @@ typedef struct {
   HycoPose *pose;
 } Survey;
 
-static PetscReal Determinant(const PetscReal Q[9])
-{
-  return Q[0] * (Q[4] * Q[8] - Q[5] * Q[7]) - Q[1] * (Q[3] * Q[8] - Q[5] * Q[6]) + Q[2] * (Q[3] * Q[7] - Q[4] * Q[6]);
-}
-
 /* Adds the load at mu to the basis, if it is not in its span; check: refuses it then. Collective. */
 static PetscErrorCode AddPoint(HycoReducer t, HycoBodiesFactor *factor, Survey *s, const PetscReal mu[],
                                PetscBool check)
@@ -107,10 +102,6 @@ static PetscErrorCode AddPoint(HycoReducer t, HycoBodiesFactor *factor, Survey *
   }
   PetscCall(VecDuplicate(factor->fom->F, &F));
   PetscCall(TurnedLoad(t, factor->fom, s->X0, mu, s->pose, F));
-  for (PetscInt k = 0; k < n; k++) /* online the surfaces have no cells that show their outer side */
-    HycoCheckModel(Determinant(s->pose[k].Q) > 0,
-                   "the map of body %s mirrors it, which a model of bodies does not support; train a hybrid model",
-                   HycoTrainingOfBodies(t)->parts.name[k]);
   for (PetscInt k = 0; k < n; k++) PetscCall(AddTurn(factor->fom->fe->dim, &s->pose[k], &s->turns[k], s->G + 81 * k));
   PetscCall(VecNorm(F, NORM_2, &norm));
   s->size = PetscMax(s->size, norm);
