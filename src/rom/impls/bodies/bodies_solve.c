@@ -486,8 +486,9 @@ static PetscErrorCode SolveProblem(HycoBodiesWork o, Problem *p, PetscReal Lambd
   const PetscBool set = (PetscBool)!strcmp(HycoSolverTypes[o->solver->type], HYCO_SOLVER_ACTIVE_SET);
 
   PetscFunctionBegin;
-  HycoCheck(set || !b->p,
-            "-hyco_solver_type: contact alone holds a body, and a model of bodies solves such problems by active_set");
+  HycoCheckModel(
+      set || !b->p,
+      "-hyco_solver_type: contact alone holds a body, and a model of bodies solves such problems by active_set");
   PetscCall(Fill(o, p));
   for (PetscInt k = 0; k < p->n; k++) o->active[k] = PETSC_TRUE;
   *solved = PETSC_FALSE;
