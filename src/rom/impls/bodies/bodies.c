@@ -186,7 +186,7 @@ static PetscErrorCode SetFromOptions(HycoReducer t)
   PetscFunctionBegin;
   PetscCall(PetscNew(&s));
   t->training = s;
-  s->pod_tol = 1e-11;
+  s->pod_tol = 1e-12;
   s->samples = 120;
   s->tol = 1e-5;
   s->most_samples = 60;
