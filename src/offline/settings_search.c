@@ -3,6 +3,9 @@
   points are small enough. The snapshots are read and their bases made once; an attempt truncates the bases, builds the
   RID and the model on it and predicts the held-out points.
 
+  Types with modes of their own (HycoROMTraits.own_modes) come first, judged by the held-out solutions before any training
+  point is solved. If one of them is accurate enough, that ends the search, and its model is the one of the attempt.
+
   Only settings that no option fixes are varied. The settings of a kind are tried in the order of their cost, and the
   first that meet the targets end their kind; if they meet them with a margin, they end the search. So do attempts that
   need more operations than the solutions (search_work.c). Costs are counts of operations, not times, so that the choice
