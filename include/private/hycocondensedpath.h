@@ -14,7 +14,7 @@
 #define HYCOCONDENSEDPATH_H
 
 #include <hycogalerkin.h>
-#include <hycomaterialimpl.h>
+#include <hycoinelasticmodes.h>
 
 /* The tabulated operators. Columns: the unknowns of the n chosen cells, one cell after the other. */
 typedef struct {
@@ -44,19 +44,6 @@ typedef struct {
   PetscInt cells;           /* chosen for each mode; 0: all cells */
   HycoCondensedTable table; /* ordered as t->seeds_cell, ascending; every rank */
 } HycoCondensingPath;
-
-/* Whether a cell's body may deform inelastically. */
-static inline PetscBool HycoCondensedFlows(HycoFE fe, PetscInt cell)
-{
-  return (PetscBool)!fe->scene->body[fe->mesh->cell_body[cell]].law->linear;
-}
-/* The load of a cell from its supports and heat, K_e u0_e - heat_e, with fe's elastic tangents (load: nv x dim);
-   heat_e (NULL: not wanted). */
-PetscErrorCode HycoCondensedCellLoad(HycoFE fe, PetscInt cell, PetscReal load[], PetscReal heat[]);
-/* The inelastic force of a cell in a state at u (q: nv x dim), 0 where it is round-off; Ke, heat: of the cell; the
-   largest sum of magnitudes of the terms it is the difference of (NULL: not wanted). */
-PetscErrorCode HycoCondensedCellForce(HycoFE fe, PetscInt cell, const PetscReal Ke[], const PetscReal heat[],
-                                      const PetscReal u[], HycoFEState state, PetscReal q[], PetscReal *summands);
 
 /* Turns a model of type condensed into one of paths: its ops, traits and data; training: a prototype. */
 PetscErrorCode HycoCondensedTakePath(HycoROM model);

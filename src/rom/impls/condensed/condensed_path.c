@@ -6,65 +6,6 @@
 #include <petscblaslapack.h>
 #include <petscviewer.h>
 
-#define ROUNDING 256 /* units of round-off in sums of a cell's forces */
-
-/* -- a cell's forces -- */
-
-static inline PetscInt CellUnknown(HycoMesh m, PetscInt e, PetscInt i)
-{
-  return m->cells[e * m->nv + i / m->dim] * m->dim + i % m->dim;
-}
-
-PetscErrorCode HycoCondensedCellLoad(HycoFE fe, PetscInt e, PetscReal load[], PetscReal heat[])
-{
-  HycoMesh m = fe->mesh;
-  const PetscInt n = m->nv * m->dim;
-  PetscReal Ke[HYCO_MAX_CELL_DOFS * HYCO_MAX_CELL_DOFS], push[HYCO_MAX_CELL_DOFS] = {0}, u0[HYCO_MAX_CELL_DOFS];
-  PetscBool lifted = PETSC_FALSE;
-
-  PetscFunctionBegin;
-  if (fe->scene->body[m->cell_body[e]].expansion) PetscCall(HycoCellHeat(fe, e, push));
-  for (PetscInt k = 0; k < n; k++) {
-    u0[k] = fe->u0[CellUnknown(m, e, k)];
-    lifted = (PetscBool)(lifted || u0[k] != 0);
-    load[k] = -push[k];
-    if (heat) heat[k] = push[k];
-  }
-  if (!lifted) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoFEBodyStiffness(fe, e, Ke));
-  for (PetscInt i = 0; i < n; i++) {
-    for (PetscInt j = 0; j < n; j++) load[i] += Ke[i * n + j] * u0[j];
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoCondensedCellForce(HycoFE fe, PetscInt e, const PetscReal Ke[], const PetscReal heat[],
-                                      const PetscReal u[], HycoFEState state, PetscReal q[], PetscReal *summands)
-{
-  HycoMesh m = fe->mesh;
-  const PetscInt n = m->nv * m->dim;
-  PetscReal f[HYCO_MAX_CELL_DOFS], most = 0, size = 0;
-
-  PetscFunctionBegin;
-  PetscCall(HycoFEStateForce(fe, state, e, f));
-  for (PetscInt i = 0; i < n; i++) {
-    PetscReal sum = PetscAbsReal(heat[i]);
-
-    q[i] = -heat[i] - f[i];
-    for (PetscInt j = 0; j < n; j++) {
-      const PetscReal part = Ke[i * n + j] * u[CellUnknown(m, e, j)];
-
-      q[i] += part;
-      sum += PetscAbsReal(part);
-    }
-    most = PetscMax(most, PetscAbsReal(q[i]));
-    size = PetscMax(size, sum);
-  }
-  if (most <= ROUNDING * PETSC_MACHINE_EPSILON * size) PetscCall(PetscArrayzero(q, n));
-  if (summands) *summands = size;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* -- online: operations of the path -- */
 
 /* kr -= R_e lost V_e, `lost` is the reduction of the stiffness of cell e. */
@@ -81,7 +22,7 @@ static PetscErrorCode Soften(HycoROM m, PetscInt e, const PetscReal lost[], Pets
   PetscCall(PetscCalloc1(size * (size_t)n, &product));
   for (PetscInt i = 0; i < n; i++) {
     for (PetscInt j = 0; j < n; j++) {
-      const PetscReal *v = m->model->V + (size_t)CellUnknown(m->model->mesh, e, j) * size;
+      const PetscReal *v = m->model->V + (size_t)HycoCellUnknown(m->model->mesh, e, j) * size;
 
       for (size_t k = 0; k < size; k++) product[(size_t)i * size + k] += lost[i * n + j] * v[k];
     }
@@ -113,7 +54,7 @@ static PetscErrorCode Stiffness(HycoROM m)
     PetscReal *Ke = c->Ke + (size_t)e * (size_t)(n * n);
 
     if (first) PetscCall(HycoFEBodyStiffness(m->fe, e, Ke)); /* the tangents are elastic */
-    if (first || !HycoCondensedFlows(m->fe, e)) continue;
+    if (first || !HycoInelasticFlows(m->fe, e)) continue;
     PetscCall(HycoFEBodyStiffness(m->fe, e, Kt));
     for (PetscInt i = 0; i < n * n; i++) Kt[i] = Ke[i] - Kt[i];
     PetscCall(Soften(m, e, Kt, kr));
@@ -151,10 +92,10 @@ static PetscErrorCode AddLoads(HycoROM m)
   for (PetscInt e = 0; e < mesh->n_cells; e++) {
     PetscReal load[HYCO_MAX_CELL_DOFS], body[HYCO_MAX_CELL_DOFS] = {0};
 
-    PetscCall(HycoCondensedCellLoad(m->fe, e, load, c->heat + e * n));
+    PetscCall(HycoInelasticCellLoad(m->fe, e, load, c->heat + e * n));
     PetscCall(HycoFEBodyForce(m->fe, e, body));
     for (PetscInt i = 0; i < n; i++) {
-      const PetscReal *v = m->model->V + (size_t)CellUnknown(mesh, e, i) * (size_t)l;
+      const PetscReal *v = m->model->V + (size_t)HycoCellUnknown(mesh, e, i) * (size_t)l;
 
       load[i] -= body[i];
       for (PetscInt j = 0; j < l && body[i] != 0; j++) f[j] -= v[j] * body[i];
@@ -184,9 +125,9 @@ static PetscErrorCode Forces(HycoROM m, HycoFEState state, Vec f_int, PetscReal 
   for (PetscInt e = 0; e < m->model->mesh->n_cells; e++) {
     PetscReal q[HYCO_MAX_CELL_DOFS], size;
 
-    if (!HycoCondensedFlows(m->fe, e)) continue;
+    if (!HycoInelasticFlows(m->fe, e)) continue;
     PetscCall(
-        HycoCondensedCellForce(m->fe, e, c->Ke + (size_t)e * (size_t)(n * n), c->heat + e * n, m->U, state, q, &size));
+        HycoInelasticCellForce(m->fe, e, c->Ke + (size_t)e * (size_t)(n * n), c->heat + e * n, m->U, state, q, &size));
     Subtract(m, e, c->table->inelastic, q, f);
     *summands += PetscSqr(c->weight[e] * size);
   }
