@@ -53,6 +53,9 @@ typedef struct {
   /* Says why a contact system has no solution, for its reason, or why a converged step is not accepted; why is empty if
      it is. */
   PetscErrorCode (*judge)(HycoPath, HycoReason reason, char why[HYCO_LINE]);
+  /* Replaces Newton's method on K, B and the solver: from U and Lambda at t0, with everything assembled at t1, to those
+     at t1, `end` and kkt. */
+  PetscErrorCode (*iterate)(HycoPath, PetscReal t0, PetscReal t1, HycoStepAttempt *);
   PetscErrorCode (*accept)(HycoPath, const HycoStepAttempt *); /* the attempt becomes the state at t */
   PetscErrorCode (*record)(HycoPath); /* at a listed time, or at the last time reached: sets `now` */
   PetscErrorCode (*save)(HycoPath);   /* writes the checkpoint */

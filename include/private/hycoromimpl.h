@@ -163,6 +163,12 @@ PetscErrorCode HycoTraceAdd(HycoROM model, PetscReal t);
 PetscErrorCode HycoTraceList(HycoROM model, PetscReal **sigma, PetscReal **inelastic);
 /* For that listed time, once m->Lambda has all contacts: its forces, and the norm of U in the RID. */
 PetscErrorCode HycoTraceMeasure(HycoROM model, HycoStep *step);
+/* In a type that steps along paths: reads the options of paths; solves the path at mu, and sets the prediction; at a
+   listed time, its results over the model's cells and all contacts, with U and Lambda set. */
+struct _n_HycoPath;
+PetscErrorCode HycoTraceOptions(HycoROM model, struct _n_HycoPath *path);
+PetscErrorCode HycoTraceFollow(HycoROM model, struct _n_HycoPath *path, const PetscReal mu[]);
+PetscErrorCode HycoTraceRecord(HycoROM model, HycoFEState state, HycoStep *step);
 PetscErrorCode HycoTraceFree(HycoROM model);
 /* HycoROMSetSteps() for a path that training judges: it ends if too many of these steps are halved. */
 PetscErrorCode HycoROMSetJudgedSteps(HycoROM model, PetscInt n, const PetscReal t[]);

@@ -445,6 +445,12 @@ PetscErrorCode HycoPathAttempt(HycoPath p, PetscReal t0, PetscReal t1, HycoStepA
   PetscCall(VecCopy(p->U, p->U_old));
   if (p->n_contacts) PetscCall(VecCopy(p->Lambda, p->L_old));
   PetscCall(HycoPathAssemble(p, t1));
+  if (p->ops->iterate) {
+    PetscCall((*p->ops->iterate)(p, t0, t1, a));
+    a->easy = (PetscBool)(a->iterations <= usual_its[HYCO_NEWTON_TANGENT] / 2);
+    if (!a->converged) PetscCall(HycoPathRestore(p));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   method = HycoPathMethod(p);
   if (p->tangent && method == HYCO_NEWTON_ELASTIC) {
     PetscCall(HycoFEElasticTangent(p->fe));

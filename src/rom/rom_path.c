@@ -1,5 +1,6 @@
 /* Data that a model of paths keeps of the last prediction: displacements at all accepted times, further results at
    the listed ones. */
+#include <hycopath.h>
 #include <hycoromimpl.h>
 
 PetscErrorCode HycoTraceFree(HycoROM m)
@@ -79,6 +80,66 @@ PetscErrorCode HycoTraceMeasure(HycoROM m, HycoStep *s)
   for (PetscInt k = 0; k < n * dim; k++) s->u_norm2 += PetscSqr(m->U[node[k / dim] * dim + k % dim]);
   PetscCall(ISRestoreIndices(m->model->rid, &node));
   s->u_norm2 = PetscSqrtReal(s->u_norm2);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTraceRecord(HycoROM m, HycoFEState state, HycoStep *s)
+{
+  PetscReal *sigma, *inelastic, *mises;
+
+  PetscFunctionBegin;
+  PetscCall(HycoTraceList(m, &sigma, &inelastic));
+  PetscCall(PetscMalloc1(m->model->mesh->n_cells, &mises));
+  PetscCall(HycoFEStateFields(m->fe, state, sigma, mises, inelastic, NULL));
+  for (PetscInt e = 0; e < m->model->mesh->n_cells; e++) {
+    s->mises = PetscMax(s->mises, mises[e]);
+    s->inelastic = PetscMax(s->inelastic, inelastic[e]);
+  }
+  PetscCall(PetscFree(mises));
+  PetscCall(HycoTraceMeasure(m, s));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTraceOptions(HycoROM m, HycoPath p)
+{
+  PetscFunctionBegin;
+  PetscObjectOptionsBegin((PetscObject)m);
+  PetscCall(HycoPathSetFromOptions(p, PetscOptionsObject));
+  PetscOptionsEnd();
+  HycoCheck(!p->checkpoint[0] && !p->resume,
+            "-hyco_checkpoint and -hyco_resume are for hyco solve; a reduced path takes seconds");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Sets the results of the whole path. */
+static void Summarise(HycoPath p, HycoPrediction *out)
+{
+  out->kkt = p->kkt;
+  if (out->reason > 0) out->reason = p->ended ? HYCO_CONVERGED : HYCO_DIVERGED_STEP;
+  for (PetscInt k = 0; k < p->n_steps; k++) {
+    out->iterations += p->steps[k].iterations;
+    out->seconds.factor += p->steps[k].seconds_factor;
+    out->seconds.solve += p->steps[k].seconds_solve;
+  }
+}
+
+PetscErrorCode HycoTraceFollow(HycoROM m, HycoPath p, const PetscReal mu[])
+{
+  HycoPrediction *out = &m->prediction;
+
+  PetscFunctionBegin;
+  out->iterations = 0;
+  out->seconds.assemble = out->seconds.factor = out->seconds.solve = 0;
+  out->reason = HYCO_CONVERGED; /* unless a listed time changes it */
+  p->n_given = m->trace.n_given;
+  p->given = m->trace.given;
+  p->most_cuts = m->trace.most_cuts;
+  p->cold = PETSC_TRUE;
+  PetscCall(HycoTraceBegin(m));
+  PetscCall(HycoPathBegin(p, mu));
+  PetscCall(HycoPathRun(p));
+  HycoPathGetHistory(p, &m->trace.history);
+  Summarise(p, out);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

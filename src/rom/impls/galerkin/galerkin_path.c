@@ -160,24 +160,6 @@ static PetscErrorCode CompleteState(HycoROM m, HycoPath p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Results at a listed time, over the RID and all contacts. */
-static PetscErrorCode Measure(HycoROM m, HycoFEState state, HycoStep *s)
-{
-  PetscReal *sigma, *inelastic, *mises;
-
-  PetscFunctionBegin;
-  PetscCall(HycoTraceList(m, &sigma, &inelastic));
-  PetscCall(PetscMalloc1(m->model->mesh->n_cells, &mises));
-  PetscCall(HycoFEStateFields(m->fe, state, sigma, mises, inelastic, NULL));
-  for (PetscInt e = 0; e < m->model->mesh->n_cells; e++) {
-    s->mises = PetscMax(s->mises, mises[e]);
-    s->inelastic = PetscMax(s->inelastic, inelastic[e]);
-  }
-  PetscCall(PetscFree(mises));
-  PetscCall(HycoTraceMeasure(m, s));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Called before listed time k: if its tangent is monitored, it must be the current one. */
 static void Expect(HycoROM m, PetscInt k)
 {
@@ -218,20 +200,9 @@ static PetscErrorCode Record(HycoPath p)
   PetscCall(CompleteState(m, p));
   if (m->ops->reconstruct && m->reconstruct) HycoLogged(HYCO_EVENT_RECONSTRUCT, (*m->ops->reconstruct)(m));
   PetscCall(HycoFloatingBalance(m));
-  PetscCall(Measure(m, p->begin, &p->now));
+  PetscCall(HycoTraceRecord(m, p->begin, &p->now));
   p->steps[p->n_steps++] = p->now;
   PetscCall(PetscMemzero(&p->now, sizeof(p->now)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode ReadOptions(HycoROM m, HycoPath p)
-{
-  PetscFunctionBegin;
-  PetscObjectOptionsBegin((PetscObject)m);
-  PetscCall(HycoPathSetFromOptions(p, PetscOptionsObject));
-  PetscOptionsEnd();
-  HycoCheck(!p->checkpoint[0] && !p->resume,
-            "-hyco_checkpoint and -hyco_resume are for hyco solve; a reduced path takes seconds");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -264,7 +235,7 @@ PetscErrorCode HycoGalerkinPathCreate(HycoROM m)
   PetscCall(PetscNew(&g->path));
   PetscCall(HycoPathNew(PETSC_COMM_SELF, m->model->scene, &p));
   g->path->path = p;
-  PetscCall(ReadOptions(m, p));
+  PetscCall(HycoTraceOptions(m, p));
   if (p->method == HYCO_NEWTON_AUTO) p->method = HYCO_NEWTON_MODIFIED; /* a tangent costs more than the laws */
   g->path->method = (HycoNewton)p->method;
   p->ops = &ops;
@@ -299,41 +270,16 @@ PetscErrorCode HycoGalerkinPathDestroy(HycoGalerkinPath *path)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets the results of the whole path. */
-static void Summarise(HycoPath p, HycoPrediction *out)
-{
-  out->kkt = p->kkt;
-  if (out->reason > 0) out->reason = p->ended ? HYCO_CONVERGED : HYCO_DIVERGED_STEP;
-  for (PetscInt k = 0; k < p->n_steps; k++) {
-    out->iterations += p->steps[k].iterations;
-    out->seconds.factor += p->steps[k].seconds_factor;
-    out->seconds.solve += p->steps[k].seconds_solve;
-  }
-}
-
 PetscErrorCode HycoGalerkinPathSolve(HycoROM m, const PetscReal mu[])
 {
   HycoGalerkinPath q = ((HycoGalerkin)m->work)->path;
-  HycoPath p = q->path;
-  HycoPrediction *out = &m->prediction;
   const char *method;
 
   PetscFunctionBegin;
-  out->iterations = 0;
-  out->seconds.assemble = out->seconds.factor = out->seconds.solve = 0;
-  out->reason = HYCO_CONVERGED; /* unless a listed time changes it */
-  p->n_given = m->trace.n_given;
-  p->given = m->trace.given;
-  p->most_cuts = m->trace.most_cuts;
-  p->cold = PETSC_TRUE;
   Expect(m, 0);
   PetscCall(PetscArrayzero(q->held, m->fe->n_dof));
-  PetscCall(HycoTraceBegin(m));
-  PetscCall(HycoPathBegin(p, mu));
-  PetscCall(HycoPathRun(p));
-  HycoPathGetHistory(p, &m->trace.history);
-  Summarise(p, out);
+  PetscCall(HycoTraceFollow(m, q->path, mu));
   PetscCall(HycoSolverGetMethod(m->solver, &method));
-  PetscCall(PetscStrncpy(out->method, method, sizeof(out->method)));
+  PetscCall(PetscStrncpy(m->prediction.method, method, sizeof(m->prediction.method)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
