@@ -87,10 +87,24 @@ typedef struct {
   PetscReal *gram;             /* r x r: of the errors of R at held-out samples in the norm of C^-1, summed; 0 */
 } HycoSubstructure;
 
+/* What is inelastic: u = ... + P alpha / kappa, alpha = T q, with the inelastic forces q of the cells of the model. */
+typedef struct {
+  PetscInt m, n_cells;      /* modes of the nodal forces of inelastic strains; cells in which the laws are evaluated */
+  PetscReal amplification;  /* 2-norm of the inverse of the modes in these cells; 1 with a cubature */
+  PetscBool weighted;       /* a cubature, otherwise interpolation */
+  PetscReal *T, *there;     /* (n_cells nv dim) x m row major, cells in the order of the model's mesh: the coefficients
+                              are T^T q; the modes there */
+  PetscReal *P;             /* ns x m: surfaces */
+  PetscReal *fields;        /* modes of displacement, by body, sample and turn, x m */
+  PetscInt nd, *dof, *body; /* the cells' free unknowns (node of the whole mesh times dim plus component, ascending);
+                               their bodies */
+  PetscReal *C, *R, *A;     /* their displacements: nd x ns, nd x r, nd x m */
+} * HycoBodiesInelastic;
+
 typedef struct _n_HycoSubstructures {
-  PetscInt dim, n; /* bodies */
-  PetscInt n_parameters;
-  PetscReal *first; /* the parameters at which the bodies' axes are those of the scene, with those in theta as
+  PetscInt dim, n;      /* bodies */
+  PetscInt n_variables; /* of the scene: its parameters, the time and tables of a history */
+  PetscReal *first;     /* the parameters at which the bodies' axes are those of the scene, with those in theta as
                               they are */
   PetscInt n_theta, *theta, *logarithm, *n_nodes; /* the parameters that change the shape of a body; whether their
                                                      logarithm is interpolated; values of each */
@@ -114,6 +128,7 @@ typedef struct _n_HycoSubstructures {
   PetscInt l, *mode_start;       /* modes by body: n + 1 */
   PetscInt n_turns, *turn_start; /* by body: n + 1 */
   PetscReal *G;                  /* n_turns x 9, orthonormal */
+  HycoBodiesInelastic inelastic; /* NULL: no history */
 } * HycoSubstructures;
 
 /* What solves change. In the bodies' axes: c of the loads (r); displacements of the surfaces without contact (free, ns)
@@ -125,8 +140,8 @@ typedef struct _n_HycoBodiesWork {
   PetscReal *X0, *E0;       /* by body: nodes of its cell and the largest entry of its tangents in its own axes */
   PetscInt *E_at;           /* which entry */
   HycoPose *pose;
-  PetscReal *kappa, *c, *free, *u, *f, *x;
-  PetscReal *Z, *work;          /* ns x p, p x r row major: of all bodies, interpolated */
+  PetscReal *kappa, *c, *elastic, *free, *u, *f, *x; /* elastic: free, without inelastic strains */
+  PetscReal *Z, *work;                               /* ns x p, p x r row major: of all bodies, interpolated */
   PetscInt n_loc, *loc;         /* by unknown of the surface's mesh: its place, with ns added inside; or -1 */
   PetscInt *row_start, *row_at; /* the rows of B in the bodies' axes */
   PetscReal *row;
@@ -158,6 +173,13 @@ PetscErrorCode HycoBodiesReset(HycoBodiesWork work);
    complementarity problem is. */
 PetscErrorCode HycoBodiesSolve(HycoBodiesWork work, const HycoBodiesSurface *surface, const PetscReal mu[],
                                PetscReal Lambda[], PetscBool *solved);
+/* The parts of HycoBodiesSolve(): the bodies, loads and rows at mu; the gaps without forces for inelastic strains alpha
+   (NULL: none); the forces then. HycoBodiesGiven(): f and u for given forces. */
+PetscErrorCode HycoBodiesPrepare(HycoBodiesWork work, const HycoBodiesSurface *surface, const PetscReal mu[]);
+PetscErrorCode HycoBodiesStrain(HycoBodiesWork work, const HycoBodiesSurface *surface, const PetscReal alpha[]);
+PetscErrorCode HycoBodiesContact(HycoBodiesWork work, const HycoBodiesSurface *surface, PetscReal Lambda[],
+                                 PetscBool *solved);
+void HycoBodiesGiven(HycoBodiesWork work, const HycoBodiesSurface *surface, const PetscReal Lambda[]);
 /* Sets the displacements of the surfaces and, after HycoBodiesExpand(), of the unknowns inside in U (by unknown of the
    surface's mesh) without prescribed ones. */
 void HycoBodiesMove(HycoBodiesWork work, const HycoBodiesSurface *surface, PetscReal U[]);
@@ -166,8 +188,21 @@ void HycoBodiesMove(HycoBodiesWork work, const HycoBodiesSurface *surface, Petsc
 PetscReal HycoBodiesBound(HycoBodiesWork work, PetscReal *norm);
 /* The coefficients of the modes, and the displacements of the unknowns inside. */
 PetscErrorCode HycoBodiesExpand(HycoBodiesWork work, PetscReal gamma[]);
+/* Adds those of inelastic strains to gamma. */
+void HycoBodiesAddStrains(HycoBodiesWork work, const PetscReal alpha[], PetscReal gamma[]);
 /* Reads from or writes to the model's file. */
 PetscErrorCode HycoBodiesFile(HycoROM model, HycoH5 file);
+PetscErrorCode HycoBodiesInelasticFile(HycoROM model, HycoH5 file);
+/* Makes the model one of paths (bodies_path.c). */
+PetscErrorCode HycoBodiesTakePath(HycoROM model);
+/* Ops of both kinds of models. */
+PetscErrorCode HycoBodiesOptions(HycoReducer reducer);
+PetscErrorCode HycoBodiesResetTraining(HycoReducer reducer);
+PetscErrorCode HycoBodiesBuild(HycoROM model, HycoReducer reducer);
+PetscErrorCode HycoBodiesView(HycoROM model, PetscViewer viewer);
+PetscErrorCode HycoBodiesDestroyModel(HycoROM model);
+/* The residuals at the contacts, recomputed from U and the forces; `stationarity` is that of floating bodies. */
+void HycoBodiesMeasure(HycoROM model, HycoKKT *kkt);
 
 /* K condensed at a point of theta: the blocks of all bodies, in their order. Rank 0. */
 typedef struct {
@@ -175,10 +210,14 @@ typedef struct {
   PetscReal *C, *R, *Z, *work; /* n x n by body; ns x r; ns x p; p x r */
 } HycoBodiesRecord;
 
+/* How laws in few cells give the coefficients of the inelastic forces. */
+enum { HYCO_BODIES_AUTO, HYCO_BODIES_INTERPOLATION, HYCO_BODIES_CUBATURE };
+
 /* Training: options and the data of a run. */
 typedef struct {
-  PetscReal pod_tol, tol;
-  PetscInt samples, most_samples;
+  PetscReal pod_tol, tol, inelastic_tol, cubature_tol;
+  PetscInt samples, most_samples, cells, laws; /* laws: how they are evaluated in few cells */
+  HycoBasis strains;                           /* modes of the inelastic forces; V is NULL without a history */
   HycoBodyParts parts;
   HycoSubstructures bodies; /* complete on rank 0 */
   PetscBool filled;         /* modes are still many for the largest number of samples */
@@ -199,6 +238,8 @@ typedef struct {
   PetscReal *z;     /* p + ns */
   PetscInt n_basis;
   Vec *basis; /* of the turned loads, orthonormal */
+  PetscInt n_strains;
+  Vec *strain; /* K^-1 times the modes of the inelastic forces */
   PetscInt n_records;
   HycoBodiesRecord *record;
   PetscReal *score; /* by cell of the part */
@@ -232,6 +273,12 @@ PetscErrorCode HycoBodiesFields(HycoReducer reducer, HycoSnapshots store, HycoBo
    Collective. */
 PetscErrorCode HycoBodiesReduce(HycoSubstructures bodies, HycoBodiesFactor *factor, PetscInt n, const Vec F[],
                                 PetscReal u[], PetscReal work[]);
+/* Before the factor: modes of inelastic forces. After the samples: the cells of the model, and what the modes displace.
+   Collective. */
+PetscErrorCode HycoBodiesStrainModes(HycoReducer reducer, HycoSnapshots store);
+PetscErrorCode HycoBodiesStrains(HycoReducer reducer, HycoBodiesFactor *factor);
+/* Refuses scenes with a history that the model does not represent. Collective. */
+PetscErrorCode HycoBodiesCheckPath(HycoReducer reducer);
 /* theta of node k of the grid of all values, exactly as it was condensed. */
 void HycoBodiesPoint(HycoReducer reducer, PetscInt k, PetscReal theta[]);
 /* theta of node k of the grid of all values; the number of nodes; which sample of a body that is, -1: none. */

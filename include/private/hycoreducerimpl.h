@@ -152,6 +152,11 @@ PetscErrorCode HycoReducerSolve(HycoReducer t, HycoSnapshots store, HycoSamples 
 PetscErrorCode HycoReducerReset(HycoReducer t);
 /* Sets a registered type, with its options; the present one may stay. */
 PetscErrorCode HycoReducerSetType(HycoReducer t, HycoROMType type);
+/* Empirical cubature (cubature_weights.c): from the left singular vectors W (n_cells x n, rows in the file's order) and
+   singular values of the cells' contributions. The weights of all cells of the whole mesh (w: n_cells, on rank 0; `fixed` in the cells of the part that are `near`,
+   which are in no equation) for the leading vectors, up to a share `tol`; the errors as in the model. Collective. */
+PetscErrorCode HycoCubatureFind(HycoReducer reducer, const PetscBool near[], PetscReal fixed, PetscReal tol, Mat W,
+                                PetscInt n, const PetscReal sigma[], PetscReal w[], PetscReal error[2]);
 /* The nonzero dual snapshots (n_contacts x n column major, the caller owns them). Rank 0. */
 PetscErrorCode HycoReducerDualSnapshots(HycoReducer t, PetscInt *n, PetscReal **S);
 /* Adds a number that the type reports. */

@@ -447,7 +447,7 @@ PetscErrorCode HycoPathAttempt(HycoPath p, PetscReal t0, PetscReal t1, HycoStepA
   PetscCall(HycoPathAssemble(p, t1));
   if (p->ops->iterate) {
     PetscCall((*p->ops->iterate)(p, t0, t1, a));
-    a->easy = (PetscBool)(a->iterations <= usual_its[HYCO_NEWTON_TANGENT] / 2);
+    a->easy = (PetscBool)(a->iterations <= usual_its[HycoPathMethod(p)] / 2);
     if (!a->converged) PetscCall(HycoPathRestore(p));
     PetscFunctionReturn(PETSC_SUCCESS);
   }

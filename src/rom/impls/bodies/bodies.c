@@ -35,7 +35,7 @@ static PetscErrorCode Reset(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Destroy(HycoROM m)
+PetscErrorCode HycoBodiesDestroyModel(HycoROM m)
 {
   HycoSubstructures b = (HycoSubstructures)m->model->data;
 
@@ -65,8 +65,7 @@ static PetscReal Unbalanced(HycoBodiesWork o)
   return most;
 }
 
-/* The residuals of HycoKKT, recomputed from U and the forces at the contacts. */
-static void Measure(HycoROM m, HycoKKT *kkt)
+void HycoBodiesMeasure(HycoROM m, HycoKKT *kkt)
 {
   PetscReal gaps = 0, u = 0, most = 0, in = 0, pulls = 0, both = 0;
 
@@ -122,7 +121,7 @@ static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
   Expand(m, o->loc);
   HycoBodiesMove(o, &s, m->U);
   HycoFEComplete(m->fe, m->U);
-  Measure(m, &p->kkt);
+  HycoBodiesMeasure(m, &p->kkt);
   p->interpolation_error = HycoBodiesBound(o, &norm);
   p->iterations = o->its;
   p->reason = solved && HycoKKTMax(&p->kkt) > m->solver->rtol ? HYCO_DIVERGED_RESIDUAL : o->reason;
@@ -154,7 +153,7 @@ static PetscErrorCode Estimate(HycoROM m, HycoPrediction *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode View(HycoROM m, PetscViewer viewer)
+PetscErrorCode HycoBodiesView(HycoROM m, PetscViewer viewer)
 {
   HycoSubstructures b = (HycoSubstructures)m->model->data;
 
@@ -179,15 +178,22 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
 
 /* -- training -- */
 
-static PetscErrorCode SetFromOptions(HycoReducer t)
+PetscErrorCode HycoBodiesOptions(HycoReducer t)
 {
+  static const char *const laws[] = {"auto", "interpolation", "cubature", NULL};
+  static const char *const of_history[] = {"-hyco_bodies_inelastic_tol", "-hyco_bodies_cells", "-hyco_bodies_laws",
+                                           "-hyco_bodies_cubature_tol"};
   HycoBodiesTraining s;
+  PetscBool set[4] = {PETSC_FALSE, PETSC_FALSE, PETSC_FALSE, PETSC_FALSE};
 
   PetscFunctionBegin;
   PetscCall(PetscNew(&s));
   t->training = s;
   s->pod_tol = 1e-12;
   s->samples = 120;
+  s->inelastic_tol = 1e-10;
+  s->cells = 2;
+  s->cubature_tol = 1e-4;
   s->tol = 1e-5;
   s->most_samples = 60;
   PetscObjectOptionsBegin((PetscObject)t);
@@ -205,16 +211,36 @@ static PetscErrorCode SetFromOptions(HycoReducer t)
                             0, 1, &s->tol, NULL));
   PetscCall(HycoOptionsInt("-hyco_bodies_max_samples", "bodies: largest number of these samples", 1, 100000,
                            &s->most_samples, NULL));
+  PetscCall(HycoOptionsFor("bodies, of a history"));
+  PetscCall(HycoOptionsReal("-hyco_bodies_inelastic_tol",
+                            "bodies, with a history: energy left out of the modes of the inelastic strain", 0, 1,
+                            &s->inelastic_tol, &set[0]));
+  PetscCall(HycoOptionsInt("-hyco_bodies_cells",
+                           "bodies, with a history: number of cells with laws for each mode of the inelastic strain", 1,
+                           1000000, &s->cells, &set[1]));
+  PetscCall(HycoOptionsWord("-hyco_bodies_laws",
+                            "bodies, with a history: coefficients of the inelastic modes by interpolation in the cells "
+                            "with laws, or by Galerkin's method with a cubature (auto: where a law yields)",
+                            laws, &s->laws, &set[2]));
+  PetscCall(HycoOptionsReal("-hyco_bodies_cubature_tol",
+                            "bodies, with a history: relative error of the cubature in training", 1e-12, 1,
+                            &s->cubature_tol, &set[3]));
   PetscOptionsEnd();
+  for (int k = 0; k < 4; k++)
+    HycoCheck(!set[k] || !t->scene || t->scene->n_times,
+              "%s is for scenes with a history, and this scene has none; remove it", of_history[k]);
+  if (t->scene && t->scene->n_times) PetscCall(HycoBodiesTakePath(t->prototype));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode ResetTraining(HycoReducer t)
+PetscErrorCode HycoBodiesResetTraining(HycoReducer t)
 {
   HycoBodiesTraining s = (HycoBodiesTraining)t->training;
 
   PetscFunctionBegin;
   PetscCall(HycoBodyPartsDestroy(&s->parts));
+  PetscCall(MatDestroy(&s->strains.V));
+  PetscCall(PetscFree(s->strains.sigma));
   PetscCall(HycoBodiesDestroy(&s->bodies));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -223,18 +249,20 @@ static PetscErrorCode ResetTraining(HycoReducer t)
 static PetscErrorCode TakeExact(HycoROM m, HycoSubstructures b)
 {
   HycoMesh mesh = m->model->mesh;
-  PetscInt *sorted, *dof, n = 0;
+  const PetscInt cells = b->inelastic ? b->inelastic->nd : 0;
+  PetscInt *sorted, *dof, n = 0, all = b->ns + b->ni + cells;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(b->ns + b->ni, &sorted));
+  PetscCall(PetscMalloc1(all + 1, &sorted));
   PetscCall(PetscArraycpy(sorted, b->dof, b->ns));
   PetscCall(PetscArraycpy(sorted + b->ns, b->inner, b->ni));
-  PetscCall(PetscSortInt(b->ns + b->ni, sorted));
+  if (cells) PetscCall(PetscArraycpy(sorted + b->ns + b->ni, b->inelastic->dof, cells));
+  PetscCall(PetscSortRemoveDupsInt(&all, sorted));
   PetscCall(PetscMalloc1(mesh->n_nodes * mesh->dim + 1, &dof));
   for (PetscInt i = 0; i < mesh->n_nodes * mesh->dim; i++) {
     PetscInt at;
 
-    PetscCall(PetscFindInt(mesh->node_whole[i / mesh->dim] * mesh->dim + i % mesh->dim, b->ns + b->ni, sorted, &at));
+    PetscCall(PetscFindInt(mesh->node_whole[i / mesh->dim] * mesh->dim + i % mesh->dim, all, sorted, &at));
     if (at >= 0) dof[n++] = i;
   }
   PetscCall(HycoROMSetFE(m, HYCO_HYBRID_CONTACT, n, dof));
@@ -243,7 +271,30 @@ static PetscErrorCode TakeExact(HycoROM m, HycoSubstructures b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Build(HycoROM m, HycoReducer t)
+/* The chosen cells' columns of the table in the order of the model's mesh. */
+static PetscErrorCode TakeColumns(HycoROM m, HycoReducer t, HycoBodiesInelastic in)
+{
+  const size_t size = (size_t)in->m * (size_t)(m->model->mesh->nv * m->model->mesh->dim);
+  PetscReal *T, *there;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1((size_t)in->n_cells * size + 1, &T));
+  PetscCall(PetscMalloc1((size_t)in->n_cells * size + 1, &there));
+  for (PetscInt e = 0; e < m->model->mesh->n_cells; e++) {
+    PetscInt at = -1;
+
+    PetscCall(PetscFindInt(m->model->mesh->cell_whole[e], t->n_seeds_cell, t->seeds_cell, &at));
+    PetscCheck(at >= 0, PETSC_COMM_SELF, PETSC_ERR_PLIB, "a cell of the model is not among the chosen cells");
+    PetscCall(PetscArraycpy(T + (size_t)e * size, in->T + (size_t)at * size, size));
+    PetscCall(PetscArraycpy(there + (size_t)e * size, in->there + (size_t)at * size, size));
+  }
+  HycoFreeAll(&in->T, &in->there);
+  in->T = T;
+  in->there = there;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBodiesBuild(HycoROM m, HycoReducer t)
 {
   HycoBodiesTraining s = (HycoBodiesTraining)t->training;
   HycoSubstructures none = (HycoSubstructures)m->model->data;
@@ -255,7 +306,22 @@ static PetscErrorCode Build(HycoROM m, HycoReducer t)
   PetscCall(HycoFloatingDestroy(&m->model->floating)); /* their equilibrium is an equation of the model */
   for (PetscInt k = 0; k < m->model->pairs.n; k++) m->model->in_rid[k] = 1;
   PetscCall(TakeExact(m, (HycoSubstructures)m->model->data));
+  if (t->scene->n_times) {
+    PetscCall(HycoROMSetDomain(m, NULL));
+    PetscCall(TakeColumns(m, t, ((HycoSubstructures)m->model->data)->inelastic));
+  }
   PetscCall(HycoReducerJudge(t, m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Build(HycoROM m, HycoReducer t)
+{
+  PetscFunctionBegin;
+  if (t->scene->n_times) { /* a model of paths has its own */
+    PetscCall(HycoBodiesTakePath(m));
+    PetscCall((*m->ops->build)(m, t));
+  } else
+    PetscCall(HycoBodiesBuild(m, t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -302,12 +368,13 @@ PetscErrorCode HycoROMCreate_Bodies(HycoROM m)
                                        .forces = PETSC_TRUE,
                                        .own_modes = PETSC_TRUE,
                                        .surfaces = PETSC_TRUE,
+                                       .history = PETSC_TRUE,
                                        .cells = PETSC_TRUE,
                                        .uniform = PETSC_TRUE,
                                        .work = sizeof(*(HycoBodiesWork)NULL),
                                        .resultants = PETSC_TRUE};
-  static const HycoROMOps ops = {.setfromoptions = SetFromOptions,
-                                 .resettraining = ResetTraining,
+  static const HycoROMOps ops = {.setfromoptions = HycoBodiesOptions,
+                                 .resettraining = HycoBodiesResetTraining,
                                  .begin = HycoBodiesBegin,
                                  .modes = HycoBodiesModes,
                                  .build = Build,
@@ -320,10 +387,10 @@ PetscErrorCode HycoROMCreate_Bodies(HycoROM m)
                                  .solve = Solve,
                                  .features = Features,
                                  .estimate = Estimate,
-                                 .view = View,
+                                 .view = HycoBodiesView,
                                  .save = HycoBodiesFile,
                                  .load = HycoBodiesFile,
-                                 .destroy = Destroy};
+                                 .destroy = HycoBodiesDestroyModel};
   HycoSubstructures b;
 
   PetscFunctionBegin;

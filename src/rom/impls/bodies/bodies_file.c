@@ -15,7 +15,7 @@ static PetscErrorCode MoveSizes(HycoH5 h, HycoROM m, HycoSubstructures b)
   b->n_theta = head[4];
   b->dim = m->model->mesh->dim;
   b->l = m->model->l;
-  b->n_parameters = m->model->scene->n_parameters;
+  b->n_variables = m->model->scene->n_variables;
   HycoCheck(b->n > 0 && b->n_theta <= HYCO_TENSOR_MAX_DIM, "%s: bodies/head is damaged", m->model->path);
   PetscCall(HycoH5Starts(h, "bodies/start", b->n, &b->start));
   PetscCall(HycoH5Starts(h, "bodies/inner_start", b->n, &b->inner_start));
@@ -38,7 +38,7 @@ static PetscErrorCode MoveTheta(HycoH5 h, HycoROM m, HycoSubstructures b)
   PetscCall(HycoH5Reals(h, "bodies/forces", 1, &b->forces));
   PetscCall(HycoH5Reals(h, "bodies/left", 1, &b->left));
   if (HycoH5Reads(h)) PetscCall(PetscCalloc1(b->n, &b->body));
-  PetscCall(HycoH5Int(h, "bodies/theta", 0, b->n_parameters - 1, &b->n_theta, 1, &b->theta));
+  PetscCall(HycoH5Int(h, "bodies/theta", 0, m->model->scene->n_parameters - 1, &b->n_theta, 1, &b->theta));
   PetscCall(HycoH5Int(h, "bodies/logarithm", 0, 1, &b->n_theta, 1, &b->logarithm));
   PetscCall(HycoH5Int(h, "bodies/n_nodes", 1, PETSC_MAX_INT / 64, &b->n_theta, 1, &b->n_nodes));
   for (PetscInt p = 0; p < b->n_theta; p++) nodes += b->n_nodes[p];
@@ -63,7 +63,7 @@ static PetscErrorCode MoveProbe(HycoH5 h, HycoROM m, HycoSubstructures b)
   PetscCall(HycoMeshMove(h, "bodies/mesh", m->model->scene->n_bodies, &b->probe));
   if (HycoH5Reads(h)) PetscCall(HycoMeshSetTies(b->probe, m->model->mesh->ties));
   PetscCall(HycoH5Int(h, "bodies/cell", 0, b->probe->n_cells - 1, &b->n, 1, &b->cell));
-  PetscCall(HycoH5Real(h, "bodies/first", &b->n_parameters, 1, &b->first));
+  PetscCall(HycoH5Real(h, "bodies/first", &b->n_variables, 1, &b->first));
   PetscCall(HycoH5Int(h, "bodies/at", 0, b->probe->n_nodes * b->dim - 1, &b->r, 1, &b->at));
   PetscCall(HycoH5Int(h, "bodies/at_body", 0, b->n - 1, &b->r, 1, &b->at_body));
   PetscCall(HycoH5Real(h, "bodies/A", &b->r, b->r, &b->A));
@@ -109,9 +109,11 @@ PetscErrorCode HycoBodiesFile(HycoROM m, HycoH5 h)
   HycoSubstructures b = (HycoSubstructures)m->model->data;
 
   PetscFunctionBegin;
+  if (m->model->scene->n_times && HycoH5Reads(h)) PetscCall(HycoBodiesTakePath(m));
   PetscCall(MoveSizes(h, m, b));
   PetscCall(MoveTheta(h, m, b));
   PetscCall(MoveProbe(h, m, b));
   for (PetscInt k = 0; k < b->n; k++) PetscCall(MoveBody(h, b, k));
+  if (m->model->scene->n_times) PetscCall(HycoBodiesInelasticFile(m, h));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

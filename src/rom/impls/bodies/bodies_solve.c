@@ -25,8 +25,8 @@ PetscErrorCode HycoBodiesReset(HycoBodiesWork o)
   PetscCall(HycoTaoDestroy(&o->tao));
   PetscCall(HycoSolverDestroy(&o->own));
   for (PetscInt k = 0; o->weight && k < o->bodies->n; k++) PetscCall(PetscFree(o->weight[k]));
-  HycoFreeAll(&o->weight, &o->X0, &o->E0, &o->E_at, &o->pose, &o->kappa, &o->c, &o->free, &o->u, &o->f, &o->x, &o->loc,
-              &o->row_start, &o->row_at, &o->row, &o->gap, &o->active, &o->Z, &o->work);
+  HycoFreeAll(&o->weight, &o->X0, &o->E0, &o->E_at, &o->pose, &o->kappa, &o->c, &o->elastic, &o->free, &o->u, &o->f,
+              &o->x, &o->loc, &o->row_start, &o->row_at, &o->row, &o->gap, &o->active, &o->Z, &o->work);
   PetscCall(PetscMemzero(o, sizeof(*o)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -45,6 +45,11 @@ PetscErrorCode HycoBodiesDestroy(HycoSubstructures *bodies)
   }
   HycoFreeAll(&b->first, &b->theta, &b->logarithm, &b->n_nodes, &b->node, &b->body, &b->start, &b->dof, &b->inner_start,
               &b->inner, &b->cell, &b->at, &b->at_body, &b->A, &b->mode_start, &b->turn_start, &b->G);
+  if (b->inelastic) {
+    HycoBodiesInelastic s = b->inelastic;
+
+    HycoFreeAll(&s->T, &s->there, &s->P, &s->fields, &s->dof, &s->body, &s->C, &s->R, &s->A, &b->inelastic);
+  }
   PetscCall(PetscFree(*bodies));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -69,7 +74,7 @@ void HycoBodiesSetTensors(HycoSubstructures b)
 
 void HycoBodiesReference(HycoSubstructures b, const PetscReal mu[], PetscReal reference[])
 {
-  for (PetscInt p = 0; p < b->n_parameters; p++) reference[p] = b->first[p];
+  for (PetscInt p = 0; p < b->n_variables; p++) reference[p] = b->first[p];
   for (PetscInt p = 0; p < b->n_theta; p++) reference[b->theta[p]] = mu[b->theta[p]];
 }
 
@@ -168,6 +173,7 @@ PetscErrorCode HycoBodiesSetUp(HycoBodiesWork o, HycoSubstructures b, HycoScene 
   PetscCall(PetscCalloc1(b->p + 1, &o->x));
   PetscCall(PetscCalloc1(b->ns * b->p + 1, &o->Z));
   PetscCall(PetscCalloc1(b->p * b->r + 1, &o->work));
+  PetscCall(PetscCalloc1(b->ns + 1, &o->elastic));
   PetscCall(PetscCalloc1(b->ns + 1, &o->free));
   PetscCall(PetscCalloc1(b->ns + b->ni + 1, &o->u));
   PetscCall(PetscCalloc1(b->ns + 1, &o->f));
@@ -214,7 +220,7 @@ static PetscErrorCode Load(HycoBodiesWork o)
   Vec all;
 
   PetscFunctionBegin;
-  PetscCall(PetscArrayzero(o->free, b->ns));
+  PetscCall(PetscArrayzero(o->elastic, b->ns));
   if (!b->r) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(b->r, &value));
   PetscCall(VecCreateSeq(PETSC_COMM_SELF, o->fe->n_dof, &all));
@@ -237,7 +243,7 @@ static PetscErrorCode Load(HycoBodiesWork o)
   PetscCall(PetscFree(value));
   for (PetscInt k = 0; k < b->n; k++) {
     const HycoSubstructure *own = &b->body[k];
-    PetscReal *u = o->free + b->start[k];
+    PetscReal *u = o->elastic + b->start[k];
 
     for (PetscInt i = 0; i < own->n_samples * own->n; i++) {
       const PetscReal weight = o->weight[k][i / own->n] / o->kappa[k];
@@ -581,8 +587,45 @@ static PetscErrorCode SolveRounds(HycoBodiesWork o, const HycoBodiesSurface *s, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoBodiesSolve(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal mu[], PetscReal Lambda[],
-                               PetscBool *solved)
+PetscErrorCode HycoBodiesPrepare(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal mu[])
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < o->bodies->n; k++) PetscCall(HycoBodiesWeights(o->bodies, k, mu, o->weight[k]));
+  PetscCall(Place(o, mu));
+  PetscCall(Load(o));
+  PetscCall(BlendMotions(o));
+  PetscCall(TurnRows(o, s));
+  PetscCall(HycoBodiesStrain(o, s, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBodiesStrain(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal alpha[])
+{
+  const HycoSubstructures b = o->bodies;
+  const PetscInt m = alpha ? b->inelastic->m : 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArraycpy(o->free, o->elastic, b->ns));
+  for (PetscInt k = 0; k < b->n && m; k++) {
+    for (PetscInt i = b->start[k]; i < b->start[k + 1]; i++) {
+      const PetscReal *P = b->inelastic->P + (size_t)i * (size_t)m;
+
+      for (PetscInt j = 0; j < m; j++) o->free[i] += P[j] * alpha[j] / o->kappa[k];
+    }
+  }
+  for (PetscInt k = 0; k < s->pairs->n; k++) {
+    o->gap[k] = s->rows->gap[k];
+    for (PetscInt j = o->row_start[k]; j < o->row_start[k + 1]; j++) o->gap[k] -= o->row[j] * o->free[o->row_at[j]];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void HycoBodiesGiven(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal Lambda[])
+{
+  Displace(o, s, Lambda);
+}
+
+PetscErrorCode HycoBodiesContact(HycoBodiesWork o, const HycoBodiesSurface *s, PetscReal Lambda[], PetscBool *solved)
 {
   Problem p = {0};
   PetscBool *in;
@@ -591,16 +634,20 @@ PetscErrorCode HycoBodiesSolve(HycoBodiesWork o, const HycoBodiesSurface *s, con
   o->its = 0;
   o->reason = HYCO_CONVERGED;
   PetscCall(PetscStrncpy(o->method, HYCO_SOLVER_ACTIVE_SET, sizeof(o->method)));
-  for (PetscInt k = 0; k < o->bodies->n; k++) PetscCall(HycoBodiesWeights(o->bodies, k, mu, o->weight[k]));
-  PetscCall(Place(o, mu));
-  PetscCall(Load(o));
-  PetscCall(BlendMotions(o));
-  PetscCall(TurnRows(o, s));
   PetscCall(PetscArrayzero(Lambda, s->pairs->n));
   PetscCall(PetscMalloc2(s->pairs->n + 1, &in, s->pairs->n + 1, &p.contact));
   PetscCall(SolveRounds(o, s, &p, in, Lambda, solved));
   o->n_problem = p.n;
   PetscCall(PetscFree2(in, p.contact));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBodiesSolve(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal mu[], PetscReal Lambda[],
+                               PetscBool *solved)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoBodiesPrepare(o, s, mu));
+  PetscCall(HycoBodiesContact(o, s, Lambda, solved));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -711,4 +758,32 @@ PetscErrorCode HycoBodiesExpand(HycoBodiesWork o, PetscReal gamma[])
   for (PetscInt k = 0; k < b->n; k++) ExpandBody(o, k, &f, gamma);
   PetscCall(PetscFree2(f.at, f.value));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* gamma += share times F alpha, l rows of m. */
+static void AddProduct(PetscInt l, PetscInt m, const PetscReal F[], const PetscReal alpha[], PetscReal share,
+                       PetscReal gamma[])
+{
+  for (PetscInt i = 0; i < l; i++, F += m) {
+    for (PetscInt k = 0; k < m; k++) gamma[i] += share * F[k] * alpha[k];
+  }
+}
+
+void HycoBodiesAddStrains(HycoBodiesWork o, const PetscReal alpha[], PetscReal gamma[])
+{
+  const HycoSubstructures b = o->bodies;
+  const PetscInt m = b->inelastic->m;
+  const PetscReal *F = b->inelastic->fields;
+
+  for (PetscInt k = 0; k < b->n; k++) {
+    const HycoSubstructure *own = &b->body[k];
+    const PetscInt turns = b->turn_start[k + 1] - b->turn_start[k];
+
+    for (PetscInt j = 0; j < own->n_samples * turns; j++, F += (size_t)own->l * (size_t)m) {
+      PetscReal share = 0;
+
+      for (PetscInt d = 0; d < 9; d++) share += b->G[9 * (b->turn_start[k] + j % turns) + d] * o->pose[k].Q[d];
+      AddProduct(own->l, m, F, alpha, share * o->weight[k][j / turns] / o->kappa[k], gamma + b->mode_start[k]);
+    }
+  }
 }

@@ -10,6 +10,7 @@
 
 #define MOST_NUMBERS 6e7  /* entries of the sampled displacements on all ranks */
 #define LEAST        20   /* samples */
+#define MOST_COLUMNS 600  /* of training paths */
 #define FULL         0.5  /* modes for each sample: with more of them the samples do not show all displacements */
 #define DOUBLINGS    3    /* of the samples then */
 #define SPREAD       3    /* nodes of theta at which the displacements of each are computed */
@@ -41,6 +42,15 @@ static PetscErrorCode SolveOne(HycoBodiesWork o, const HycoBodiesSurface *s, con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A time of the history for point k of a sequence: irregular, and any. */
+static PetscReal SomeTime(HycoScene s, PetscInt k)
+{
+  const PetscReal share = (k + 1) * 0.6180339887;
+
+  if (!s->n_times) return 0;
+  return s->times[0] + (share - (PetscInt)share) * (s->times[s->n_times - 1] - s->times[0]);
+}
+
 static PetscErrorCode SolvePoints(HycoReducer t, HycoBodiesWork o, const HycoBodiesSurface *s, HycoSamples points,
                                   Sampled *sampled)
 {
@@ -56,11 +66,13 @@ static PetscErrorCode SolvePoints(HycoReducer t, HycoBodiesWork o, const HycoBod
   PetscCall(PetscMalloc3(s->pairs->n + 1, &Lambda, n, &bound, n, &norm));
   for (PetscInt k = sampled->tried; k < n; k++) {
     char message[HYCO_LINE];
+    PetscReal all[HYCO_MAX_PARAMETERS];
     PetscBool solved = PETSC_FALSE;
     PetscErrorCode ierr;
 
+    HycoSceneSetTime(t->scene, mu + k * p, SomeTime(t->scene, k), all);
     PetscCall(HycoCatchBegin()); /* points that full order would refuse, too */
-    ierr = SolveOne(o, s, mu + k * p, Lambda, &solved);
+    ierr = SolveOne(o, s, all, Lambda, &solved);
     PetscCall(HycoCatchEnd(ierr, message));
     bound[k] = norm[k] = 0;
     if (ierr || !solved) continue;
@@ -69,13 +81,41 @@ static PetscErrorCode SolvePoints(HycoReducer t, HycoBodiesWork o, const HycoBod
     bound[k] = HycoBodiesBound(o, &norm[k]);
     most = PetscMax(most, norm[k]);
     sampled->n++;
-    sampled->n_checks += p && k >= n - CHECKS;
+    sampled->n_checks += p && !t->scene->n_times && k >= n - CHECKS;
   }
   if (!sampled->tried) b->forces = 0;
   for (PetscInt k = sampled->tried; k < n && most > 0; k++)
     b->forces = PetscMax(b->forces, bound[k] * norm[k] / PetscMax(norm[k], HYCO_SMALL_FORCE * most));
   sampled->tried = n;
   PetscCall(PetscFree3(Lambda, bound, norm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One of so many columns of the training paths is taken. */
+static PetscInt PathStride(HycoReducer t)
+{
+  return 1 + (t->n_s - 1) / MOST_COLUMNS;
+}
+
+/* Adds the elastic part of the training paths: their loads and contact forces at the listed times. */
+static PetscErrorCode TakePaths(HycoReducer t, HycoBodiesWork o, const HycoBodiesSurface *s, PetscInt every,
+                                Sampled *sampled)
+{
+  const HycoSubstructures b = o->bodies;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < t->n_s; k += every) {
+    PetscReal mu[HYCO_MAX_PARAMETERS];
+
+    PetscCall(HycoReducerColumn(t, k, mu));
+    PetscCall(HycoFESetParameters(s->fe, mu));
+    PetscCall(HycoContactRows(s->fe, s->pairs, s->rows->start, s->rows->dof, s->rows->value, s->rows->gap));
+    PetscCall(HycoBodiesPrepare(o, s, mu));
+    HycoBodiesGiven(o, s, t->Lambda + (size_t)k * (size_t)s->pairs->n);
+    PetscCall(PetscArraycpy(sampled->c + sampled->n * b->r, o->c, b->r));
+    PetscCall(PetscArraycpy(sampled->f + sampled->n * b->ns, o->f, b->ns));
+    sampled->n++;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -92,6 +132,7 @@ static PetscErrorCode SampleForces(HycoReducer t, HycoFOM f, HycoSamples points,
   PetscCall(HycoRowsCreate(&f->pairs, b->dim, &rows));
   ierr = HycoBodiesSetUp(&work, b, t->scene, &s, NULL);
   if (!ierr) ierr = SolvePoints(t, &work, &s, points, sampled);
+  if (!ierr && t->scene->n_times && !sampled->expanded) ierr = TakePaths(t, &work, &s, PathStride(t), sampled);
   PetscCall(HycoBodiesReset(&work));
   PetscCall(HycoRowsDestroy(&rows));
   f->fe_surface->ready = PETSC_FALSE;
@@ -117,6 +158,7 @@ static PetscErrorCode Sample(HycoReducer t, HycoFOM f, PetscInt wanted, PetscBoo
   PetscCall(HycoSamplesAddPoint(points, b->first));
   if (t->scene->n_parameters) PetscCall(HycoSamplesAddScattered(points, n + CHECKS));
   PetscCall(HycoSamplesGet(points, &n, NULL, NULL));
+  if (t->scene->n_times) n += 1 + t->n_s / PathStride(t);
   PetscCall(PetscRealloc(((size_t)n * (size_t)b->r + 1) * sizeof(PetscReal), &sampled->c));
   PetscCall(PetscRealloc(((size_t)n * (size_t)b->ns + 1) * sizeof(PetscReal), &sampled->f));
   {
@@ -241,13 +283,26 @@ static PetscErrorCode ExpandNode(HycoReducer t, HycoBodiesFactor *factor, PetscI
   PetscCall(PetscRealloc((n_dof * (size_t)(sampled->n_U + n + b->p) + 1) * sizeof(PetscReal), &sampled->U));
   U = sampled->U + n_dof * (size_t)sampled->n_U;
   PetscCall(ExpandSamples(b, factor, sampled, n, sample, U));
-  for (PetscInt k = 0; k < n; k += 1 + n / SCORED) PetscCall(HycoBodiesAddScores(t, factor, U + n_dof * (size_t)k));
+  for (PetscInt k = 0; k < n && !t->scene->n_times; k += 1 + n / SCORED)
+    PetscCall(HycoBodiesAddScores(t, factor, U + n_dof * (size_t)k));
   sampled->n_U += n;
   if (!sampled->expanded) {
     PetscCall(ExpandMotions(b, factor, U + n_dof * (size_t)n));
     sampled->n_U += b->p;
   }
   PetscCall(PetscFree(sample));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds the displacements of the modes of inelastic forces. */
+static PetscErrorCode ExpandStrains(HycoBodiesFactor *factor, Sampled *sampled)
+{
+  const size_t n_dof = (size_t)factor->fom->fe->n_dof;
+
+  PetscFunctionBegin;
+  PetscCall(PetscRealloc((n_dof * (size_t)(sampled->n_U + factor->n_strains) + 1) * sizeof(PetscReal), &sampled->U));
+  for (PetscInt k = 0; k < factor->n_strains; k++)
+    PetscCall(HycoFOMToLocal(factor->fom, factor->strain[k], sampled->U + n_dof * (size_t)sampled->n_U++));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -261,6 +316,7 @@ static PetscErrorCode ExpandAll(HycoReducer t, HycoBodiesFactor *factor, Sampled
     PetscCall(ExpandNode(t, factor, j, sampled));
     PetscCall(HycoReducerTell(t, "displacements of the bodies", j + 1, nodes));
   }
+  if (!sampled->expanded) PetscCall(ExpandStrains(factor, sampled));
   sampled->expanded = sampled->n - sampled->n_checks;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -535,6 +591,16 @@ static PetscErrorCode AllocateCoefficients(HycoSubstructures b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The first row of a body among those of the inelastic fields. */
+static size_t StrainRows(HycoSubstructures b, PetscInt body)
+{
+  size_t rows = 0;
+
+  for (PetscInt k = 0; k < body; k++)
+    rows += (size_t)b->body[k].n_samples * (size_t)(b->turn_start[k + 1] - b->turn_start[k]) * (size_t)b->body[k].l;
+  return rows;
+}
+
 /* Row i of a body as a load: one of its modes in one of its turns, or an unknown inside. Collective. */
 static PetscErrorCode SetRow(HycoReducer t, HycoBodiesFactor *factor, PetscInt k, PetscInt i, Mat V, Vec v)
 {
@@ -580,6 +646,9 @@ static PetscErrorCode BodyCoefficients(HycoReducer t, HycoBodiesFactor *factor, 
       PetscCall(PetscArraycpy(s->H + row * (size_t)s->n, u + j * b->ns + b->start[k], s->n));
       PetscCall(PetscArraycpy(s->g + row * (size_t)b->p, g + j * b->p, b->p));
       for (PetscInt d = 0; d < b->r; d++) PetscCall(VecDot(v[j], x[d], &s->a[row * (size_t)b->r + (size_t)d]));
+      for (PetscInt d = 0; d < factor->n_strains; d++)
+        PetscCall(VecDot(v[j], factor->strain[d],
+                         &b->inelastic->fields[(StrainRows(b, k) + row) * (size_t)factor->n_strains + (size_t)d]));
     }
   }
   PetscCall(DestroyVectors(MANY, v));
@@ -595,6 +664,7 @@ static PetscErrorCode Coefficients(HycoReducer t, HycoBodiesFactor *factor, Mat 
 
   PetscFunctionBegin;
   PetscCall(AllocateCoefficients(b));
+  if (b->inelastic) PetscCall(PetscCalloc1(StrainRows(b, b->n) * (size_t)factor->n_strains + 1, &b->inelastic->fields));
   PetscCall(PetscMalloc1(b->r + 1, &x));
   for (PetscInt j = nodes - 1; j >= 0; j--) { /* the last factor is there */
     PetscReal theta[HYCO_MAX_PARAMETERS];
@@ -644,10 +714,10 @@ static PetscErrorCode ModesOf(HycoReducer t, HycoBodiesFactor *factor, PetscInt 
   PetscFunctionBegin;
   PetscCall(Sample(t, factor->fom, wanted, &all, sampled));
   PetscCall(ExpandAll(t, factor, sampled));
-  PetscCall(HycoBodiesChooseCells(t, factor));
+  if (!t->scene->n_times) PetscCall(HycoBodiesChooseCells(t, factor)); /* else those with laws are chosen */
   PetscCall(PetscFree(b->mode_start));
   PetscCall(FindModes(t, factor, sampled->n_U, sampled->U, V, sigma));
-  if (!b->n_theta) PetscCall(MeasureLeft(t, factor, sampled, *V));
+  if (!b->n_theta && !t->scene->n_times) PetscCall(MeasureLeft(t, factor, sampled, *V));
   *enough = PETSC_TRUE;
   for (PetscInt k = 0; k < b->n; k++)
     *enough = (PetscBool)(*enough && b->mode_start[k + 1] - b->mode_start[k] <= FULL * sampled->expanded);
@@ -658,6 +728,7 @@ static PetscErrorCode ModesOf(HycoReducer t, HycoBodiesFactor *factor, PetscInt 
 
 PetscErrorCode HycoBodiesFields(HycoReducer t, HycoSnapshots store, HycoBodiesFactor *factor)
 {
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   PetscReal *sigma = NULL;
   Mat V = NULL;
   Sampled sampled = {0};
@@ -665,6 +736,10 @@ PetscErrorCode HycoBodiesFields(HycoReducer t, HycoSnapshots store, HycoBodiesFa
   PetscErrorCode ierr = PETSC_SUCCESS;
 
   PetscFunctionBegin;
+  if (t->scene->n_times) {
+    PetscCall(PetscFree(b->inner_start));
+    PetscCall(PetscCalloc1(b->n + 1, &b->inner_start));
+  }
   PetscCall(PetscCalloc1(factor->fom->part->n_cells + 1, &factor->score));
   PetscCall(PetscCalloc1(factor->fom->fe->n_dof + 1, &factor->known));
   PetscCall(PetscCalloc1(factor->fom->fe->n_dof + 1, &factor->moved));

@@ -64,6 +64,7 @@ PetscErrorCode HycoBodiesBegin(HycoReducer t)
   PetscCall(HycoReducerColumn(t, 0, mu));
   PetscCall(HycoBodyPartsFind(t->fom, mu, &HycoTrainingOfBodies(t)->parts));
   PetscCall(CheckParts(t));
+  if (t->scene->n_times) PetscCall(HycoBodiesCheckPath(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -85,6 +86,7 @@ PetscReal HycoBodiesOperations(HycoReducer t)
 PetscBool HycoBodiesOffers(HycoReducer t, PetscBool targets, size_t length, char why[])
 {
   (void)targets;
+  if (t->scene->n_times) snprintf(why, length, "the scene has a history; name the type to train it");
   if (t->pod_memory > 0)
     snprintf(why, length,
              "its columns are not read in batches, and -hyco_pod_memory is given; name the type to train it");
@@ -262,7 +264,7 @@ static PetscErrorCode Factor(HycoReducer t, HycoBodiesFactor *factor, const Pets
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(PetscArraycpy(mu, b->first, b->n_parameters));
+  PetscCall(PetscArraycpy(mu, b->first, b->n_variables));
   for (PetscInt p = 0; p < b->n_theta; p++) mu[b->theta[p]] = theta[p];
   PetscCall(PetscFree(factor->theta));
   f->fe->ready = PETSC_FALSE;
@@ -397,6 +399,7 @@ static PetscErrorCode Condense(HycoReducer t, HycoSnapshots store, HycoBodiesFac
   for (PetscInt k = 0; k < b->n; k++) b->body[k].n = b->start[k + 1] - b->start[k];
   PetscCall(HycoBodiesLoads(t, factor));
   PetscCall(HycoBodiesSample(t, factor));
+  if (t->scene->n_times) PetscCall(HycoBodiesStrains(t, factor));
   PetscCall(HycoBodiesFields(t, store, factor));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -407,6 +410,7 @@ static PetscErrorCode Release(HycoBodiesFactor *factor)
   PetscCall(HycoDirectDestroy(&factor->direct));
   PetscCall(MatDestroy(&factor->N));
   for (PetscInt k = 0; k < factor->n_basis; k++) PetscCall(VecDestroy(&factor->basis[k]));
+  for (PetscInt k = 0; k < factor->n_strains; k++) PetscCall(VecDestroy(&factor->strain[k]));
   for (PetscInt k = 0; k < factor->n_records; k++) {
     HycoBodiesRecord *r = &factor->record[k];
 
@@ -432,10 +436,11 @@ PetscErrorCode HycoBodiesModes(HycoReducer t, HycoSnapshots store)
   HycoTrainingOfBodies(t)->bodies = b;
   b->dim = t->sizes[3];
   b->n = HycoTrainingOfBodies(t)->parts.n;
-  b->n_parameters = t->scene->n_parameters;
+  b->n_variables = t->scene->n_variables;
   PetscCall(HycoReducerColumn(t, 0, mu));
-  HycoDuplicate(b->n_parameters + 1, mu, &b->first);
+  HycoDuplicate(b->n_variables + 1, mu, &b->first);
   PetscCall(TakeTheta(t, b));
+  if (t->scene->n_times) PetscCall(HycoBodiesStrainModes(t, store));
   PetscCall(HycoFOMCreate(HycoComm(t), t->scene, &factor.fom));
   ierr = Condense(t, store, &factor);
   PetscCall(Release(&factor));

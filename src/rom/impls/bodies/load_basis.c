@@ -6,6 +6,7 @@
 */
 #include <hycoalgorithms.h>
 #include <hycobodies.h>
+#include <hycoinelasticmodes.h>
 
 #define MOST_VECTORS 60    /* of the basis */
 #define INDEPENDENT  1e-12 /* share of the largest load: a smaller part outside the basis is round-off */
@@ -85,6 +86,31 @@ typedef struct {
   HycoPose *pose;
 } Survey;
 
+/* Laws and their forces are not turned. */
+static PetscErrorCode CheckTurns(HycoReducer t, const HycoPose pose[])
+{
+  HycoMesh m = t->fom->part;
+  PetscBool *flows;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(HycoTrainingOfBodies(t)->parts.n, &flows));
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    if (HycoInelasticFlows(t->fom->fe, e)) flows[HycoTrainingOfBodies(t)->parts.of[m->cells[e * m->nv]]] = PETSC_TRUE;
+  }
+  HycoAllreduce(flows, HycoTrainingOfBodies(t)->parts.n, HYCO_MPI_BOOL, MPI_LOR, HycoComm(t));
+  for (PetscInt k = 0; k < HycoTrainingOfBodies(t)->parts.n; k++) {
+    PetscReal turned = 0;
+
+    for (PetscInt d = 0; d < 9; d++) turned = PetscMax(turned, PetscAbsReal(pose[k].Q[d] - (d % 4 == 0)));
+    HycoCheckModel(!flows[k] || turned < 1e-9,
+                   "body %s deforms inelastically, and its map turns it, which a model of bodies does not support; "
+                   "train a hybrid model",
+                   HycoTrainingOfBodies(t)->parts.name[k]);
+  }
+  PetscCall(PetscFree(flows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Adds the load at mu to the basis, if it is not in its span; check: refuses it then. Collective. */
 static PetscErrorCode AddPoint(HycoReducer t, HycoBodiesFactor *factor, Survey *s, const PetscReal mu[],
                                PetscBool check)
@@ -102,6 +128,7 @@ static PetscErrorCode AddPoint(HycoReducer t, HycoBodiesFactor *factor, Survey *
   }
   PetscCall(VecDuplicate(factor->fom->F, &F));
   PetscCall(TurnedLoad(t, factor->fom, s->X0, mu, s->pose, F));
+  if (t->scene->n_times) PetscCall(CheckTurns(t, s->pose));
   for (PetscInt k = 0; k < n; k++) PetscCall(AddTurn(factor->fom->fe->dim, &s->pose[k], &s->turns[k], s->G + 81 * k));
   PetscCall(VecNorm(F, NORM_2, &norm));
   s->size = PetscMax(s->size, norm);
@@ -121,6 +148,23 @@ static PetscErrorCode AddPoint(HycoReducer t, HycoBodiesFactor *factor, Survey *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The loads at parameters mu; of a history at its listed times and between them. Collective. */
+static PetscErrorCode AddPath(HycoReducer t, HycoBodiesFactor *factor, Survey *s, const PetscReal mu[], PetscBool check)
+{
+  const HycoScene scene = t->scene;
+  const PetscInt n = scene->n_times ? 2 * scene->n_times - 1 : 1;
+  PetscReal all[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  for (PetscInt j = 0; j < n; j++) {
+    const PetscReal now = scene->n_times ? scene->times[j / 2] : 0, next = j % 2 ? scene->times[j / 2 + 1] : now;
+
+    HycoSceneSetTime(scene, mu, now + 0.618 * (next - now), all);
+    PetscCall(AddPoint(t, factor, s, all, check));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode SurveyPoints(HycoReducer t, HycoBodiesFactor *factor, Survey *s)
 {
   const PetscInt p = t->scene->n_parameters;
@@ -130,12 +174,12 @@ static PetscErrorCode SurveyPoints(HycoReducer t, HycoBodiesFactor *factor, Surv
   PetscErrorCode ierr = PETSC_SUCCESS;
 
   PetscFunctionBegin;
-  PetscCall(AddPoint(t, factor, s, HycoTrainingOfBodies(t)->bodies->first, PETSC_FALSE));
+  PetscCall(AddPath(t, factor, s, HycoTrainingOfBodies(t)->bodies->first, PETSC_FALSE));
   if (!p) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoSamplesCreate(t->scene, &points));
   PetscCall(HycoSamplesAddScattered(points, POINTS(p, HycoTrainingOfBodies(t)->bodies->n_theta) + MORE));
   PetscCall(HycoSamplesGet(points, &n, NULL, &mu));
-  for (PetscInt k = 0; k < n && !ierr; k++) ierr = AddPoint(t, factor, s, mu + k * p, (PetscBool)(k >= n - MORE));
+  for (PetscInt k = 0; k < n && !ierr; k++) ierr = AddPath(t, factor, s, mu + k * p, (PetscBool)(k >= n - MORE));
   PetscCall(HycoSamplesDestroy(&points));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

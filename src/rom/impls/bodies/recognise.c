@@ -402,10 +402,11 @@ static PetscErrorCode VisitTogether(Compared *c, const PetscReal first[])
 
   PetscFunctionBegin;
   for (PetscInt q = 0; s->n_parameters > 1 && q < JOINT; q++) {
+    PetscCall(PetscArraycpy(from, first, s->n_variables));
+    PetscCall(PetscArraycpy(mu, first, s->n_variables));
     for (PetscInt p = 0; p < s->n_parameters; p++) {
       const PetscReal at = (q + 1) * 0.6180339887 + p * 0.7548776662;
 
-      from[p] = first[p];
       mu[p] = s->lo[p] + (at - (PetscInt)at) * (s->hi[p] - s->lo[p]);
     }
     for (PetscInt k = 0; k < n; k++) from[shape[k]] = mu[shape[k]];
@@ -431,7 +432,7 @@ static PetscErrorCode Visit(Compared *c, const PetscReal first[])
     const PetscInt p = q / 2;
 
     if (!(s->hi[p] > s->lo[p])) continue;
-    PetscCall(PetscArraycpy(mu, first, s->n_parameters));
+    PetscCall(PetscArraycpy(mu, first, s->n_variables));
     mu[p] = s->lo[p] + share[q % 2] * (s->hi[p] - s->lo[p]);
     PetscCall(Compare(c, mu));
     PetscCall(Shifted(c, moved));

@@ -10,7 +10,7 @@
   displacements have w = 1 and are not in these equations.
 */
 #include <hycoalgorithms.h>
-#include "cubature.h"
+#include <hycoreducerimpl.h>
 
 /* Gathers column j of A (rows distributed) on rank 0. Collective. */
 static PetscErrorCode GatherColumn(Mat A, PetscInt j, PetscReal column[])
@@ -59,7 +59,7 @@ static PetscErrorCode FillNotes(HycoFE fe, const PetscBool near[], PetscReal val
 }
 
 /* These data, a column each, rows in the file's order. Collective. */
-static PetscErrorCode Notes(HycoReducer t, PetscInt n_rows, Mat *X)
+static PetscErrorCode Notes(HycoReducer t, const PetscBool near[], PetscInt n_rows, Mat *X)
 {
   HycoFE fe = t->fom->fe;
   PetscReal *value, *rows;
@@ -68,7 +68,7 @@ static PetscErrorCode Notes(HycoReducer t, PetscInt n_rows, Mat *X)
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(N_NOTES * fe->mesh->n_cells, &value, N_NOTES * n_rows, &rows));
-  HycoOnEach(HycoComm(t), FillNotes(fe, ((HycoCubatureTraining)t->training)->near, value));
+  HycoOnEach(HycoComm(t), FillNotes(fe, near, value));
   PetscCall(HycoFOMToRows(t->fom, HYCO_ON_CELLS, MPIU_REAL, N_NOTES, value, rows));
   PetscCall(MatCreateDense(HycoComm(t), n_rows, PETSC_DECIDE, t->sizes[1], N_NOTES, NULL, X));
   PetscCall(MatDenseGetLDA(*X, &lda));
@@ -145,13 +145,12 @@ static PetscErrorCode ShowCells(void *ctx, PetscInt k, PetscInt most)
 }
 
 /* Finds the weights of all cells. On rank 0. */
-static PetscErrorCode FindWeights(HycoReducer t, PetscInt n, const PetscReal vectors[], const PetscReal sigma[],
-                                  const PetscReal notes[], PetscReal w[])
+static PetscErrorCode FindWeights(HycoReducer t, PetscReal fixed, PetscReal tol, PetscInt n, const PetscReal vectors[],
+                                  const PetscReal sigma[], const PetscReal notes[], PetscReal w[], PetscReal error[2])
 {
-  HycoCubatureTraining c = (HycoCubatureTraining)t->training;
   const PetscInt n_cells = t->sizes[1], n_bodies = t->scene->n_bodies;
   const PetscReal *volume = notes, *body = notes + n_cells, *near = notes + 2 * n_cells;
-  const PetscInt leading = HycoPODRank(n, sigma, c->tol * c->tol, t->noise, 0), m = leading + n_bodies;
+  const PetscInt leading = HycoPODRank(n, sigma, tol * tol, t->noise, 0), m = leading + n_bodies;
   PetscReal *A, *b;
 
   PetscFunctionBegin;
@@ -159,69 +158,28 @@ static PetscErrorCode FindWeights(HycoReducer t, PetscInt n, const PetscReal vec
   FillSystem(n_cells, leading, vectors, n_bodies, volume, body, A, b);
   PetscCall(HycoNNLSMonitored(m, n_cells, A, b, ShowCells, t, w, NULL));
   PetscCall(PetscFree2(A, b));
-  for (PetscInt e = 0; e < n_cells; e++) w[e] = near[e] > 0 ? 1 : w[e];
-  Measure(n_cells, n, vectors, sigma, n_bodies, volume, body, w, c->error);
-  HycoCheckModel(c->error[0] <= PetscMax(10 * c->tol, 1e-6) && c->error[1] <= 1e-3,
-                 "the error of the cubature is %.1e in the internal forces of training and %.1e in a body's volume; "
-                 "use another -hyco_cubature_tol, or fewer modes (-hyco_pod_tol)",
-                 (double)c->error[0], (double)c->error[1]);
+  for (PetscInt e = 0; e < n_cells; e++) w[e] = near[e] > 0 ? fixed : w[e];
+  Measure(n_cells, n, vectors, sigma, n_bodies, volume, body, w, error);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Stores the cells with positive weights on every rank. Collective; w: on rank 0. */
-static PetscErrorCode Take(HycoReducer t, const PetscReal w[])
-{
-  HycoCubatureTraining c = (HycoCubatureTraining)t->training;
-  const PetscInt n_cells = t->sizes[1];
-  PetscInt n = 0;
-
-  PetscFunctionBegin;
-  PetscCall(PetscFree(c->weight));
-  PetscCall(PetscFree(t->seeds_cell));
-  PetscCall(PetscMalloc1(n_cells, &c->weight));
-  PetscCall(PetscMalloc1(n_cells, &t->seeds_cell));
-  for (PetscInt e = 0; w && e < n_cells; e++) {
-    if (!(w[e] > 0)) continue;
-    t->seeds_cell[n] = e;
-    c->weight[n++] = w[e];
-  }
-  PetscCallMPI(MPI_Bcast(&n, 1, MPIU_INT, 0, HycoComm(t)));
-  HycoBcast(t->seeds_cell, n, MPIU_INT, HycoComm(t));
-  HycoBcast(c->weight, n, MPIU_REAL, HycoComm(t));
-  c->n = t->n_seeds_cell = n;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoCubatureChooseAll(HycoReducer t)
-{
-  HycoCubatureTraining c = (HycoCubatureTraining)t->training;
-  PetscReal *w;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1(t->sizes[1], &w));
-  for (PetscInt e = 0; e < t->sizes[1]; e++) w[e] = 1;
-  c->error[0] = c->error[1] = 0;
-  PetscCall(Take(t, w));
-  PetscCall(PetscFree(w));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoCubatureChoose(HycoReducer t, Mat W, PetscInt n, const PetscReal sigma[])
+PetscErrorCode HycoCubatureFind(HycoReducer t, const PetscBool near[], PetscReal fixed, PetscReal tol, Mat W,
+                                PetscInt n, const PetscReal sigma[], PetscReal w[], PetscReal error[2])
 {
   const size_t n_cells = t->rank ? 0 : (size_t)t->sizes[1];
-  PetscReal *vectors, *notes, *w;
+  PetscReal *vectors, *notes;
   PetscInt rows;
   Mat X;
 
   PetscFunctionBegin;
   PetscCall(MatGetLocalSize(W, &rows, NULL));
-  PetscCall(Notes(t, rows, &X));
-  PetscCall(PetscMalloc3((size_t)n * n_cells + 1, &vectors, N_NOTES * n_cells + 1, &notes, n_cells + 1, &w));
+  PetscCall(Notes(t, near, rows, &X));
+  PetscCall(PetscMalloc2((size_t)n * n_cells + 1, &vectors, N_NOTES * n_cells + 1, &notes));
   for (PetscInt j = 0; j < n; j++) PetscCall(GatherColumn(W, j, vectors + (size_t)j * n_cells));
   for (PetscInt j = 0; j < N_NOTES; j++) PetscCall(GatherColumn(X, j, notes + (size_t)j * n_cells));
   PetscCall(MatDestroy(&X));
-  HycoOnRoot(HycoComm(t), FindWeights(t, n, vectors, sigma, notes, w));
-  PetscCall(Take(t, t->rank ? NULL : w));
-  PetscCall(PetscFree3(vectors, notes, w));
+  HycoOnRoot(HycoComm(t), FindWeights(t, fixed, tol, n, vectors, sigma, notes, w, error));
+  HycoBcast(error, 2, MPIU_REAL, HycoComm(t));
+  PetscCall(PetscFree2(vectors, notes));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
