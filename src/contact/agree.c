@@ -24,6 +24,9 @@ static PetscErrorCode IsShared(MPI_Comm comm, HycoMesh part, HycoMesh m, const H
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether the contacts that the ranks have found for their own slaves are those of a search on one rank: every
+   contact of the scene has slaves, one with drawn masters has at least one master, and pairs are one to one. If not,
+   the caller searches on one rank, which reports the error. Collective. */
 PetscErrorCode HycoContactsAgree(MPI_Comm comm, HycoScene scene, HycoMesh part, HycoMesh surface, const HycoPairs *p,
                                  PetscBool *agreed)
 {
@@ -41,6 +44,7 @@ PetscErrorCode HycoContactsAgree(MPI_Comm comm, HycoScene scene, HycoMesh part, 
     const HycoContact contact = scene->contact[c];
     PetscBool shared = PETSC_FALSE;
 
+    /* Two ranks may have given one master to different slaves, which neither sees alone. */
     if (contact->matched) PetscCall(IsShared(comm, part, surface, p, c, &shared));
     if (!n[2 * c] || (contact->master && !HycoPairsFollows(p, c) && !n[2 * c + 1]) || shared) *agreed = PETSC_FALSE;
   }

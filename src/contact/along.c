@@ -16,7 +16,8 @@ typedef struct {
   PetscInt patch;
 } Line;
 
-/* The least squared distance of the points in box t from their lines, by interval arithmetic and less round-off. */
+/* The least squared distance of the points in box t from their lines, by interval arithmetic and less round-off.
+   Bounds the cross product of (x - patch) and the mean normal from below, and the mean normal from above. */
 static PetscReal LeastOff(HycoPatches s, PetscInt t, const Line *l)
 {
   const HycoBox *b = &s->box[t], *turn = &s->turn[t];
@@ -46,9 +47,11 @@ static PetscReal LeastOff(HycoPatches s, PetscInt t, const Line *l)
     away = PetscMax(PetscMax(least[0] - most[1], least[1] - most[0]), 0);
     sum += away * away;
   }
+  /* Less than the exact bound by the round-off of the products, so that no nearest point is lost. */
   return sum / mm * (1 - 1e-12) - 1e-13 * rr;
 }
 
+/* Ties go to the nearer node, then to the smaller index: the result does not depend on the order of the tree. */
 static void TryAlong(HycoPatches s, PetscInt patch, Line *l)
 {
   const PetscReal *n = s->normal + 3 * patch, *X = s->X + 3 * s->node[patch];
@@ -82,6 +85,8 @@ static void SearchAlong(HycoPatches s, PetscInt t, PetscReal least, PetscInt lo,
     SearchAlong(s, 2 * t + 1 + right, of[right], right ? mid : lo, right ? hi : mid, l);
 }
 
+/* The node nearest to the line from x along the mean of its normal `out` and the node's reversed normal, within
+   `small` of it (length); p->n = 0: none. Matches mirrored surfaces at any distance. */
 void HycoPatchesAlong(HycoPatches s, const PetscReal x[3], const PetscReal out[3], PetscReal small, HycoProjection *p)
 {
   Line line = {.x = x, .out = out, .off = small * small, .patch = -1};

@@ -92,6 +92,7 @@ static PetscErrorCode FindBoxes(Candidates *s)
   }
   Halve(point, 0, n, 0, s->tree + (size_t)s->rank * BOXES);
   PetscCall(PetscFree(point));
+  /* Every rank has all trees: 127 boxes per rank, whatever the mesh is. */
   PetscCallMPI(MPI_Allgather(MPI_IN_PLACE, 0, MPI_DATATYPE_NULL, s->tree, BOXES * sizeof(Box), MPI_BYTE, s->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -105,6 +106,7 @@ static void Lower(Box tree[], PetscInt b, const PetscReal x[3])
 
   if (IsEmpty(box)) return;
   Distances(box, x, &least, &most);
+  /* The node cannot lower any leaf in this box. */
   if (least >= box->reach) return;
   if (b >= BLOCKS - 1) {
     box->reach = PetscMin(box->reach, most);
@@ -126,6 +128,7 @@ static PetscErrorCode FindReach(Candidates *s)
   PetscReal *reach;
 
   PetscFunctionBegin;
+  /* A sample of the master's nodes of this rank is enough: each gives a valid bound, and more only tighten it. */
   for (PetscMPIInt r = 0; r < s->size; r++) {
     for (PetscInt k = 0; k < n; k += PetscMax(n / SAMPLES, 1))
       Lower(s->tree + (size_t)r * BOXES, 0, s->fe->X + 3 * m->group_node[first + k]);
@@ -239,7 +242,7 @@ static PetscErrorCode AddNear(Candidates *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sends all nodes of the master to the ranks with slaves. */
+/* Sends all nodes of the master to the ranks with slaves. A rigid body's master is one node, wherever it lies. */
 static PetscErrorCode AddAll(Candidates *s)
 {
   HycoMesh m = s->fe->mesh;
@@ -253,6 +256,8 @@ static PetscErrorCode AddAll(Candidates *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The nodes of master surfaces (numbers in the distributed vectors) that this rank's slaves may meet, for all
+   contacts; slack: additional distance, in widths of a facet. The caller frees node[]. Collective. */
 PetscErrorCode HycoContactsCandidates(MPI_Comm comm, HycoFE fe, PetscReal slack, PetscInt *n, PetscInt **node)
 {
   HycoScene scene = fe->scene;

@@ -11,6 +11,7 @@ typedef struct {
   PetscReal *size;
 } Sizes;
 
+/* Sizes of a whole surface are computed once, when the first of its nodes is needed. */
 static PetscErrorCode SizeAt(HycoFE fe, const char group[], PetscInt node, Sizes *s, PetscReal *size)
 {
   PetscInt g = 0;
@@ -36,6 +37,7 @@ static PetscErrorCode AllowedOverlap(HycoFE fe, const HycoPairs *p, PetscInt k, 
 
   PetscFunctionBegin;
   *deep = PETSC_FALSE;
+  /* A gap given by the scene is no overlap of drawn surfaces. */
   if (c->gap || c->ops->gap || gap >= 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoContactGetLength(c, "overlap", allowed));
   if (*allowed < 0) {
@@ -61,6 +63,8 @@ static PetscErrorCode RefuseOverlap(HycoFE fe, const HycoPairs *p, PetscInt k, P
            (double)allowed, stated < 0 ? ", half of its facet" : "", c->name, -1.01 * (double)gap);
 }
 
+/* Refuses contacts that overlap too deeply before any load, then lets each type verify its pairs. The deepest
+   contact is named, whatever the order. Not collective. */
 PetscErrorCode HycoContactCheck(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], const PetscReal gap[])
 {
   Sizes sizes = {NULL, NULL};
@@ -73,6 +77,7 @@ PetscErrorCode HycoContactCheck(HycoFE fe, const HycoPairs *pairs, const PetscRe
     PetscReal here;
     PetscBool deep;
 
+    /* A slave that faces no master has no overlap. */
     if (pairs->master_start[k] == pairs->master_start[k + 1]) continue;
     ierr = AllowedOverlap(fe, pairs, k, gap[k], &sizes, &here, &deep);
     if (!ierr && deep && (deepest < 0 || gap[k] < worst)) {
@@ -108,6 +113,8 @@ static PetscErrorCode SlidingOf(HycoFE fe, const HycoPairs *p, PetscInt k, const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For an active contact, the tangential motion over the facet's size: the measure of whether displacements are
+   small. overlap: of the unloaded gaps. index: from contacts to entries of L (NULL: the same). */
 PetscErrorCode HycoContactMeasure(HycoFE fe, HycoPairs *pairs, const PetscReal u[], const PetscReal L[],
                                   const PetscInt index[], HycoContactState *state)
 {

@@ -26,6 +26,7 @@ PetscErrorCode HycoContactDestroy(HycoContact *contact)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The type's constructor declares its entries, which the scene then reads. */
 PetscErrorCode HycoContactSetType(HycoContact contact, HycoContactType type)
 {
   PetscErrorCode (*create)(HycoContact);
@@ -86,6 +87,7 @@ HycoDefineMethod(HycoContactSetData, (HycoContact contact, void *data), contact,
 HycoDefineMethod(HycoContactGetData, (HycoContact contact, void *data), contact, HYCO_CONTACT_CLASSID,
                  *(void **)data = contact->data)
 
+/* Values of a declared expression at n points, for types outside the library. */
 PetscErrorCode HycoContactEvaluate(HycoContact contact, const char name[], const PetscReal mu[], PetscInt n,
                                    const PetscReal x[], PetscReal value[])
 {
@@ -99,6 +101,7 @@ PetscErrorCode HycoContactEvaluate(HycoContact contact, const char name[], const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A length of the scene's entry, or -1 if it is not given. */
 PetscErrorCode HycoContactGetLength(HycoContact contact, const char name[], PetscReal *length)
 {
   const HycoEntry *entry;
@@ -110,6 +113,7 @@ PetscErrorCode HycoContactGetLength(HycoContact contact, const char name[], Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* After the entries are read: checks the required ones and copies those that the library itself needs. */
 PetscErrorCode HycoContactComplete(HycoContact contact)
 {
   static const char *const groups[] = {"group", "slave", "master"}, *const normals[] = {"normal_x", "normal_y",

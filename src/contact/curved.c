@@ -41,6 +41,7 @@ static PetscReal Step(const HycoCurved *f, const PetscReal r[3], PetscReal tange
   PetscReal length;
 
   if (!(det > (f->corners > 2 ? 1e-28 * a * d : 0))) return 0;
+  /* -(T^T T)^-1 T^T r for the tangents T. */
   step[0] = f->corners > 2 ? (b * g1 - d * g0) / det : -g0 / det;
   step[1] = f->corners > 2 ? (b * g0 - a * g1) / det : 0;
   length = PetscMax(PetscAbsReal(step[0]), PetscAbsReal(step[1]));
@@ -56,6 +57,8 @@ static PetscReal Descend(const HycoCurved *f, const PetscReal x[3], PetscReal at
   for (PetscInt it = 0; it < 100 && PetscMax(PetscAbsReal(at[0]), PetscAbsReal(at[1])) < FAR_OUTSIDE; it++) {
     PetscReal step[2], length = Step(f, r, tangent, step), trial[2], next = PETSC_MAX_REAL;
 
+    /* Halves the step until the distance does not grow; equality within round-off is accepted, so that the last
+       steps converge. */
     for (; length > SMALL_STEP; length /= 2) {
       for (PetscInt k = 0; k < 2; k++) trial[k] = at[k] + step[k];
       if (f->corners == 2) trial[0] = PetscMin(PetscMax(trial[0], -1), 1);
@@ -92,6 +95,8 @@ static PetscReal OnLine(const HycoCurved *line, const PetscReal x[3], PetscReal 
   return Descend(line, x, at, w);
 }
 
+/* Squared distance of x from a second-order facet, with the weights of its nodes at the nearest point. Sides are
+   always tried, since the interior minimum may be a local one. */
 PetscReal HycoCurvedProject(const HycoCurved *f, const PetscReal x[3], PetscReal w[HYCO_FACET_NODES])
 {
   PetscReal at[2] = {f->corners == 3 ? 1.0 / 3 : 0, f->corners == 3 ? 1.0 / 3 : 0}, best;
@@ -112,8 +117,9 @@ PetscReal HycoCurvedProject(const HycoCurved *f, const PetscReal x[3], PetscReal
   return best;
 }
 
-/* The facet is the linear one through its corners plus, for each further node, its distance from where the functions of
-   the nodes before it place it, times a function between 0 and 1. */
+/* The facet is the linear one through its corners plus, for each further node, its distance from where the functions
+   of the nodes before it place it, times a function between 0 and 1. A box that contains the facet, for the tree:
+   nodes alone do not bound a curved facet. */
 void HycoCurvedBox(const HycoCurved *f, PetscReal lo[3], PetscReal hi[3])
 {
   const PetscInt corners = f->corners, sides = corners == 2 ? 1 : corners;

@@ -4,6 +4,7 @@
 #include <hycokinematics.h>
 #include <hycovector.h>
 
+/* Unit normals at the nodes of a group (n_nodes x 3), zero elsewhere. */
 PetscErrorCode HycoSurfaceNormals(HycoFE fe, PetscInt group, PetscReal normal[])
 {
   PetscFunctionBegin;
@@ -12,6 +13,8 @@ PetscErrorCode HycoSurfaceNormals(HycoFE fe, PetscInt group, PetscReal normal[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Nodes that carry contact: all of the group, except for the first nodes of each facet whose functions have no
+   positive integral (corners of second-order facets in 3D). */
 void HycoSurfaceCarriers(HycoMesh m, PetscInt group, PetscBool carries[])
 {
   for (PetscInt i = 0; i < m->n_nodes; i++) carries[i] = PETSC_FALSE;
@@ -22,6 +25,7 @@ void HycoSurfaceCarriers(HycoMesh m, PetscInt group, PetscBool carries[])
   }
 }
 
+/* n dS summed over the facet (m^2; axisymmetric: of the ring). */
 PetscErrorCode HycoFacetVector(HycoFE fe, PetscInt facet, PetscReal vector[3])
 {
   const HycoElement *el = HycoElementGetFacet(fe->mesh->type);
@@ -37,6 +41,7 @@ PetscErrorCode HycoFacetVector(HycoFE fe, PetscInt facet, PetscReal vector[3])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* By node, the longest edge of the group's facets around it, in the moved position; 0 at other nodes. */
 void HycoSurfaceSizes(HycoFE fe, PetscInt group, PetscReal size[])
 {
   HycoMesh m = fe->mesh;
@@ -81,6 +86,8 @@ static void AddVector(HycoFE fe, PetscInt node, PetscReal N, const PetscReal n[3
   for (PetscInt c = none; c < 3; c++) vector[c] += (none ? N * N : N) * n[c];
 }
 
+/* Integral of N_a n dS by node: its direction is the node's averaged normal, and its length the node's area of a
+   plane surface. */
 PetscErrorCode HycoSurfaceVectors(HycoFE fe, PetscInt group, PetscReal vector[])
 {
   HycoMesh m = fe->mesh;
@@ -129,6 +136,7 @@ static PetscErrorCode Shares(HycoFE fe, PetscInt group, PetscReal share[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Areas of the contacts' slaves (m^2), by which forces become pressures. Not collective. */
 PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, PetscReal area[])
 {
   PetscReal *share;
@@ -150,6 +158,7 @@ PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, PetscReal are
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A tenth of the shortest edge as drawn: nodes that are closer count as coincident. 0: no facets here. */
 PetscReal HycoSurfaceTolerance(HycoMesh m, PetscInt group)
 {
   const PetscInt corners = HycoCellKinds[m->type].corners;

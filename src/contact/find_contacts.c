@@ -30,11 +30,14 @@ static PetscErrorCode IsSurfaceMoved(HycoScene scene, HycoMesh m, HycoContact c,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Tolerance and motion of each contact over all ranks: a rank alone sees only a part of the surface, and all must
+   search alike. Collective. */
 PetscErrorCode HycoContactsFacts(MPI_Comm comm, HycoScene scene, HycoMesh part, HycoSurfaceFacts facts[])
 {
   PetscFunctionBegin;
   for (PetscInt k = 0; k < scene->n_contacts; k++) {
     HycoContact c = scene->contact[k];
+    /* One reduction with MPI_MIN for both. */
     PetscReal least[2] = {PETSC_MAX_REAL, 0}; /* the tolerance, minus whether it is moved */
     PetscBool moved = PETSC_FALSE;
     PetscInt g = 0;
@@ -51,6 +54,7 @@ PetscErrorCode HycoContactsFacts(MPI_Comm comm, HycoScene scene, HycoMesh part, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Marks contacts whose masters are searched again after each motion, and sets the room for their masters. */
 PetscErrorCode HycoPairsSetSearch(HycoScene scene, HycoMesh m, HycoPairs *pairs)
 {
   PetscFunctionBegin;
@@ -74,11 +78,14 @@ PetscErrorCode HycoPairsSetSearch(HycoScene scene, HycoMesh m, HycoPairs *pairs)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Limits later searches to these distances (length, by contact of the scene); reach NULL: no limit. */
 void HycoPairsSetReach(HycoPairs *pairs, const PetscReal reach[])
 {
   for (PetscInt c = 0; reach && pairs->search && c < pairs->n_searches; c++) pairs->search[c].reach = reach[c];
 }
 
+/* Searches the masters of moved surfaces at the current nodes of fe; others keep theirs. Nothing is done if the
+   nodes are where they were at the last search. Not collective: candidates must be in the mesh. */
 PetscErrorCode HycoPairsMove(HycoFE fe, HycoPairs *p)
 {
   PetscInt *start, *master, kept;
@@ -117,7 +124,7 @@ PetscErrorCode HycoPairsMove(HycoFE fe, HycoPairs *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Number of fixed components of each node. */
+/* Number of fixed components of each node. By supports alone: neither by ties nor by the axis. */
 static PetscErrorCode CountHeld(HycoScene scene, HycoMesh m, PetscInt held[])
 {
   PetscBool *fixed;
@@ -215,6 +222,8 @@ static PetscErrorCode KeepOwned(HycoMesh m, HycoPairs *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Setup by type, then what concerns several contacts: ties and slaves with several contacts. Masters of moved
+   surfaces are found last. */
 static PetscErrorCode FindAll(HycoFE fe, HycoPairs *pairs)
 {
   HycoScene scene = fe->scene;
@@ -241,6 +250,8 @@ static PetscErrorCode FindAll(HycoFE fe, HycoPairs *pairs)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* All potential contacts on the mesh as drawn. facts: of a distributed mesh, of which m is a part (NULL: m is the
+   whole mesh, in which an empty group is an error). The caller destroys them, also after an error. Not collective. */
 PetscErrorCode HycoPairsFind(HycoScene scene, HycoMesh m, const HycoSurfaceFacts facts[], HycoPairs *pairs)
 {
   HycoFE fe;

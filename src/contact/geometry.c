@@ -3,6 +3,8 @@
 #include <hycokinematics.h>
 #include <hycovector.h>
 
+/* Removes from a normal the directions of released rigid motions at the contact, so that the discretisation of a
+   surface does not resist them. At most dim - 1 directions, orthonormalised; nearly dependent ones are left out. */
 void HycoTurnNormal(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscReal n[3])
 {
   PetscReal unit[3][3], length;
@@ -19,6 +21,7 @@ void HycoTurnNormal(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscReal n[3
       for (PetscInt c = 0; c < 3; c++) d[c] -= dot * unit[b][c];
     }
     length = PetscSqrtReal(HycoDot(d, d));
+    /* Round-off of an orthonormal motion over all unknowns. */
     if (length <= 1e-9 / PetscSqrtReal((PetscReal)HycoFEUnknowns(fe)) || length * length < 0.01 * before) continue;
     for (PetscInt c = 0; c < 3; c++) d[c] /= length;
     n_units++;
@@ -52,6 +55,7 @@ static PetscErrorCode Normals(HycoFE fe, HycoContact c, const HycoPairs *pairs, 
   PetscInt g = 0;
 
   PetscFunctionBegin;
+  /* In this order: the type's own, the slave surface's averaged normal, the scene's expressions at the master point. */
   PetscCall(PetscArrayzero(normal, 3 * points->n));
   if (c->ops->normal) {
     PetscCall((*c->ops->normal)(c, points, normal));
@@ -78,6 +82,7 @@ static PetscErrorCode Normals(HycoFE fe, HycoContact c, const HycoPairs *pairs, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The placeholder is far beyond any displacement, and of a size that does not spoil the scaling of D. */
 PetscReal HycoContactNoGap(HycoFE fe)
 {
   return 1e-2 * HycoMeshLength(fe->mesh);
@@ -127,6 +132,8 @@ static PetscErrorCode Geometry(HycoFE fe, const HycoPairs *pairs, PetscReal work
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Unit normals (n x 3, from slave to master) and gaps D (n, length) at the current parameters; searches masters
+   first if surfaces have moved. Not collective. */
 PetscErrorCode HycoContactGeometry(HycoFE fe, HycoPairs *pairs, PetscReal normal[], PetscReal gap[])
 {
   PetscReal *work;

@@ -11,7 +11,8 @@
 /* Share of the coordinates' size: more than the round-off of a distance. */
 #define ROUND_OFF 1e-14
 
-/* Whether p comes before q along an axis. */
+/* Whether p comes before q along an axis. Equal coordinates are ordered by index: the tree is the same on any number
+   of ranks. */
 static PetscBool Before(const HycoPoint *p, const HycoPoint *q, PetscInt axis)
 {
   return (PetscBool)(p->x[axis] < q->x[axis] || (p->x[axis] == q->x[axis] && p->index < q->index));
@@ -25,6 +26,8 @@ static HycoPoint Pivot(const HycoPoint *first, const HycoPoint *middle, const Hy
   return Before(middle, lo, axis) ? *lo : Before(middle, hi, axis) ? *middle : *hi;
 }
 
+/* Reorders point[lo .. hi) such that those before mid are the smallest along the axis: selection without a complete
+   sort, n steps on average. */
 void HycoPointsSplit(HycoPoint point[], PetscInt lo, PetscInt mid, PetscInt hi, PetscInt axis)
 {
   while (hi - lo > 1 && lo < mid && mid < hi) { /* Hoare's selection */
@@ -58,7 +61,7 @@ static HycoCurved Curved(HycoPatches s, PetscInt patch)
   return facet;
 }
 
-/* A box that contains a patch. */
+/* A box that contains a patch. Of first order the nodes bound the patch, also a bilinear one. */
 static void Enclose(HycoPatches s, PetscInt patch, HycoBox *b)
 {
   const PetscInt *node = s->node + patch * s->nf;
@@ -121,6 +124,8 @@ static void Build(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi)
   Build(s, 2 * t + 2, (lo + hi) / 2, hi);
 }
 
+/* nf nodes and `corners` corners per patch (corners < nf: second order); normal: n x 3 or NULL. Borrows X, node and
+   normal, which must stay in place. */
 PetscErrorCode HycoPatchesCreate(const PetscReal X[], PetscInt n, PetscInt nf, PetscInt corners, const PetscInt node[],
                                  const PetscReal normal[], HycoPatches *patches)
 {
@@ -138,6 +143,7 @@ PetscErrorCode HycoPatchesCreate(const PetscReal X[], PetscInt n, PetscInt nf, P
   for (PetscInt most = n; most > HYCO_LEAF; most = (most + 1) / 2) boxes = 2 * boxes + 1;
   PetscCall(PetscMalloc1(n, &s->item));
   PetscCall(PetscMalloc1(boxes, &s->box));
+  /* Boxes of normals serve the search along lines between nodes. */
   if (nf == 1 && normal) PetscCall(PetscMalloc1(boxes, &s->turn));
   for (PetscInt k = 0; k < n; k++) {
     s->item[k].index = k;
@@ -189,6 +195,7 @@ static PetscBool InTriangle(const PetscReal *const X[], const PetscReal x[3], Pe
   aa = HycoDot(a, a);
   ab = HycoDot(a, b);
   bb = HycoDot(b, b);
+  /* Relative to the edges: a degenerate triangle is left to its edges. */
   det = aa * bb - ab * ab;
   if (!(det > 1e-28 * aa * bb)) return PETSC_FALSE;
   w[1] = (bb * HycoDot(a, r) - ab * HycoDot(b, r)) / det;
@@ -216,6 +223,7 @@ static PetscBool InQuadrilateral(const PetscReal *const X[], const PetscReal x[3
     a = HycoDot(t[0], t[0]);
     b = HycoDot(t[0], t[1]) + HycoDot(r, twist);
     d = HycoDot(t[1], t[1]);
+    /* The twist term makes the Hessian indefinite far from the patch. */
     if (!(a * d - b * b > 1e-3 * a * d)) b = HycoDot(t[0], t[1]);
     det = a * d - b * b;
     if (!(det > 1e-28 * a * d)) return PETSC_FALSE;
@@ -248,6 +256,7 @@ static PetscReal OnPatch(HycoPatches s, PetscInt patch, const PetscReal x[3], Pe
 
     return HycoCurvedProject(&facet, x, w);
   }
+  /* Edges are always tried: for a warped quadrilateral the inner stationary point need not be the nearest. */
   for (PetscInt a = 0; a < nf; a++) X[a] = s->X + 3 * s->node[patch * s->nf + a];
   if ((nf == 3 && InTriangle(X, x, w)) || (nf == 4 && InQuadrilateral(X, x, w))) best = Distance2(nf, X, w, x);
   for (PetscInt k = 0; k < edges; k++) {
@@ -326,6 +335,7 @@ static void Search(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi, Query *q
 
     if (!Opposes(s, s->item[k].index, q->against)) continue;
     d = OnPatch(s, s->item[k].index, q->x, trial);
+    /* Equal distances go to the smaller patch number, whatever the order of the search. */
     if (d < q->best || (d == q->best && s->item[k].index < q->patch)) SetBest(q, d, s->item[k].index, trial);
   }
 }
@@ -338,6 +348,8 @@ static PetscReal LargestCoordinate(const PetscReal lo[3], const PetscReal hi[3])
   return most;
 }
 
+/* The nearest point of all patches that oppose `against` (NULL: of all), with the nodes in ascending order and
+   weights that add up to 1; weights within round-off of 0 are dropped. */
 void HycoPatchesProject(HycoPatches s, const PetscReal x[3], const PetscReal against[3], HycoProjection *p)
 {
   const PetscReal none[HYCO_FACET_NODES] = {0}, *w;

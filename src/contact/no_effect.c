@@ -5,6 +5,7 @@
 #include "facing.h"
 #include <hycokinematics.h>
 
+/* Scale of the round-off of a gap: its terms may cancel. */
 static PetscReal Largest(const PetscReal v[], PetscInt n)
 {
   PetscReal largest = 0;
@@ -13,6 +14,8 @@ static PetscReal Largest(const PetscReal v[], PetscInt n)
   return largest;
 }
 
+/* *left: the gap that the prescribed displacements leave (length). Negative beyond round-off is an error; within it,
+   0. */
 PetscErrorCode HycoContactCheckStill(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscReal gap, PetscReal *left)
 {
   const PetscInt slave = pairs->slave[k], dim = fe->dim;
@@ -91,6 +94,8 @@ static PetscErrorCode CheckObstacles(HycoFE fe, HycoPairs *still, PetscReal norm
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Number of contacts without a free unknown, after the check that none is violated; start: of the rows of B. Not
+   collective. */
 PetscErrorCode HycoContactCountStill(HycoFE fe, const HycoPairs *pairs, const PetscInt start[], PetscInt *n)
 {
   HycoPairs still;

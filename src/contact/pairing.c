@@ -14,6 +14,7 @@ typedef struct {
   HycoVerdict why;
 } Missed;
 
+/* Equal distances by node, for one message on any number of ranks. */
 static int FarthestFirst(const void *a, const void *b)
 {
   const Missed *p = (const Missed *)a, *q = (const Missed *)b;
@@ -133,6 +134,7 @@ static PetscErrorCode AppendMatched(HycoPartners *t, HycoContact c, PetscInt ind
     if (m->why[k] != HYCO_MET) {
       const Missed here = {m->at[k].distance, m->slave[k], m->why[k]};
 
+      /* All nodes without a master are collected, so that the message can name the farthest ones. */
       missed[n_missed++] = here;
       continue;
     }
@@ -154,10 +156,12 @@ static PetscErrorCode Match(HycoPartners *t, HycoContact c, PetscInt index, Hyco
 
   PetscFunctionBegin;
   m->part = (PetscBool)(p->facts != NULL);
+  /* Empty on a rank, or an empty group: only the latter is an error. */
   if (m->part && !m->n) PetscFunctionReturn(PETSC_SUCCESS); /* no slave of this rank */
   HycoCheck(m->n && t->n, "contact %s: the group %s is empty", c->name, m->n ? c->master : c->slave);
   PetscCall(HycoPairsReserve(p, m->n, t->nf));
   PetscCall(CheckApart(t, c));
+  /* Without `settle`, masters are found on moved nodes: here only the slaves are listed. */
   for (PetscInt k = 0; k < m->n && !settle; k++) HycoPairsAppend(p, index, m->slave[k], 0, NULL, NULL);
   if (!settle) PetscFunctionReturn(PETSC_SUCCESS);
   m->small = m->part ? p->facts[index].small : HycoSurfaceTolerance(t->fe->mesh, t->slave);
@@ -207,6 +211,8 @@ static PetscErrorCode FindSlaves(const HycoPartners *t, PetscInt *n, PetscInt **
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Adds the contacts of one scene entry to the pairs: the search, the type's settling of the matches, errors with the
+   type's remedy. nodes: masters are nodes, not points of facets. Not collective. */
 PetscErrorCode HycoPartnersMatch(HycoContact c, HycoFE fe, PetscInt index, PetscBool nodes, HycoSettle settle,
                                  HycoRemedy remedy, HycoPairs *pairs)
 {

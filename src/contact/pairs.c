@@ -1,6 +1,7 @@
 /* The arrays of potential contacts. */
 #include <hycocontactimpl.h>
 
+/* Room for more contacts, with up to `width` masters each. */
 PetscErrorCode HycoPairsReserve(HycoPairs *p, PetscInt contacts, PetscInt width)
 {
   const PetscInt n = p->n + contacts;
@@ -15,6 +16,7 @@ PetscErrorCode HycoPairsReserve(HycoPairs *p, PetscInt contacts, PetscInt width)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The room must have been reserved. Masters' weights add up to 1. */
 void HycoPairsAppend(HycoPairs *p, PetscInt contact, PetscInt slave, PetscInt n, const PetscInt node[],
                      const PetscReal weight[])
 {
@@ -38,6 +40,8 @@ PetscErrorCode HycoPairsDestroy(HycoPairs *pairs)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Copies the contacts which[0 .. n); index: new numbers of nodes (NULL: unchanged). Masters of moved surfaces are
+   then searched again, as the copy has no place. The caller destroys it. */
 PetscErrorCode HycoPairsSelect(const HycoPairs *all, PetscInt n, const PetscInt which[], const PetscInt index[],
                                HycoPairs *out)
 {
@@ -79,6 +83,8 @@ PetscErrorCode HycoPairsRenumber(const HycoPairs *pairs, const PetscInt index[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Difference of a nodal field at the slave and its master point, u_s - sum of w u_m, the field with dim components
+   per node. */
 void HycoPairsJump(const HycoPairs *p, PetscInt k, PetscInt dim, const PetscReal value[], PetscReal d[3])
 {
   for (PetscInt c = 0; c < 3; c++) {
@@ -96,6 +102,7 @@ void HycoPairsMark(const HycoPairs *pairs, PetscBool node[])
   }
 }
 
+/* The largest number of nodes in a contact's row, also after later searches. */
 PetscInt HycoPairsWidth(const HycoPairs *pairs)
 {
   PetscInt most = pairs->n ? 1 + pairs->room : 0;
@@ -105,6 +112,7 @@ PetscInt HycoPairsWidth(const HycoPairs *pairs)
   return most;
 }
 
+/* Nodes that a contact has or may have later: of moved surfaces all of the master's. */
 PetscErrorCode HycoPairsMarkSurfaces(HycoScene scene, HycoMesh m, const HycoPairs *pairs, PetscBool node[])
 {
   PetscFunctionBegin;

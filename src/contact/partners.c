@@ -8,7 +8,8 @@
    of the border. */
 #define HYCO_PAST_BORDER 0.1
 
-/* Patches and their normals: the master's nodes (pair) or facets (surface). */
+/* Patches and their normals: the master's nodes (pair) or facets (surface). Borrowed data of fe: nodes must not move
+   while the search exists. */
 static PetscErrorCode FindPatches(HycoPartners *t)
 {
   HycoMesh m = t->fe->mesh;
@@ -17,6 +18,7 @@ static PetscErrorCode FindPatches(HycoPartners *t)
   PetscFunctionBegin;
   t->nf = t->nodes ? 1 : m->nf;
   PetscCall(PetscMalloc1(PetscMax(m->group_start[gm + 1] - m->group_start[gm], m->n_facets * t->nf), &t->node));
+  /* In 1D normals are zero, and every patch opposes. */
   PetscCall(PetscCalloc1(3 * PetscMax(m->group_start[gm + 1] - m->group_start[gm], m->n_facets), &t->normal));
   if (t->nodes) {
     PetscBool *carries;
@@ -58,6 +60,7 @@ PetscErrorCode HycoPartnersCreate(HycoFE fe, HycoContact c, PetscBool nodes, Hyc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The tree is built at the first query; a contact whose slaves are all on other ranks builds none. */
 PetscErrorCode HycoPartnersReady(HycoPartners *t)
 {
   PetscFunctionBegin;
@@ -65,6 +68,7 @@ PetscErrorCode HycoPartnersReady(HycoPartners *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Drops the tree and the border, for other patches or positions. */
 PetscErrorCode HycoPartnersForget(HycoPartners *t)
 {
   PetscFunctionBegin;
@@ -82,6 +86,7 @@ PetscErrorCode HycoPartnersDestroy(HycoPartners *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* NULL: the slave has no normal (1D, or a group without facets). */
 const PetscReal *HycoPartnersOutward(const HycoPartners *t, PetscInt slave)
 {
   const PetscReal *n = t->outward + 3 * slave;
@@ -100,6 +105,8 @@ static PetscReal ShortestEdge(const HycoPartners *t, PetscInt patch)
   return shortest;
 }
 
+/* The nearest point whose facet opposes the slave's normal; any_side: the nearest point whatever its normal. Where
+   the nearest one does not oppose, another facet at the same point may, within HYCO_SAME_POINT. */
 void HycoPartnersProject(const HycoPartners *t, PetscInt slave, PetscBool any_side, HycoProjection *at)
 {
   const PetscReal *out = HycoPartnersOutward(t, slave), *x = t->X + 3 * slave;
@@ -112,6 +119,7 @@ void HycoPartnersProject(const HycoPartners *t, PetscInt slave, PetscBool any_si
   if (at->n && at->distance > nearest.distance + HYCO_SAME_POINT * ShortestEdge(t, at->patch)) at->n = 0;
 }
 
+/* The vector from the slave to its master point, at the current nodes. */
 void HycoPartnersAcross(const HycoPartners *t, PetscInt slave, const HycoProjection *at, PetscReal r[3])
 {
   for (PetscInt c = 0; c < 3; c++) {
@@ -120,6 +128,7 @@ void HycoPartnersAcross(const HycoPartners *t, PetscInt slave, const HycoProject
   }
 }
 
+/* Edges as pairs of ascending nodes. */
 static int CompareEdges(const void *a, const void *b)
 {
   const PetscInt *p = (const PetscInt *)a, *q = (const PetscInt *)b;
@@ -155,6 +164,7 @@ static PetscErrorCode FindBorder(HycoPartners *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether a projection is on a node or an edge of the master's border. In the interior of a facet: no. */
 PetscErrorCode HycoPartnersAtBorder(HycoPartners *t, const HycoProjection *at, PetscBool *border)
 {
   const PetscInt edge[2] = {at->node[0], at->n > 1 ? at->node[1] : at->node[0]};

@@ -3,7 +3,8 @@
 #include <hycokinematics.h>
 #include <string.h>
 
-/* Sums of all ranks' values by node of the surface. */
+/* Sums of all ranks' values by node of the surface. By the sum over ranks, because a node's contact belongs to the
+   rank that owns it. */
 static PetscErrorCode SumByNode(PetscSF sf, HycoMesh m, PetscReal value[])
 {
   PetscReal *owned;
@@ -41,6 +42,8 @@ static void AddMiddles(HycoFE fe, const HycoPairs *pairs, PetscInt c, const Pets
   }
 }
 
+/* p = lambda / area (Pa). On the axis of a second-order axisymmetric mesh a node's area vanishes, and the facets'
+   middles give the pressure. Collective. */
 PetscErrorCode HycoContactPressures(MPI_Comm comm, HycoFE fe, const HycoPairs *pairs, const PetscReal area[],
                                     const PetscReal lambda[], PetscReal pressure[])
 {
@@ -82,6 +85,7 @@ static void Add(HycoFE fe, const PetscReal x[3], const PetscReal normal[3], Pets
   r->n_active++;
   r->area += area;
   r->pressure = PetscMax(r->pressure, pressure);
+  /* The force on the slave's body: lambda >= 0 pushes it against the normal. */
   for (PetscInt d = 0; d < 3; d++) push[d] = d < fe->dim ? -lambda * normal[d] : 0;
   if (around) push[0] = 0; /* the radial force is zero in the sum over the circle */
   for (PetscInt d = 0; d < 3; d++) {
@@ -92,6 +96,8 @@ static void Add(HycoFE fe, const PetscReal x[3], const PetscReal normal[3], Pets
   }
 }
 
+/* Results by contact of the scene, sums over this process's contacts; lambda > least counts as active. Not
+   collective: the caller adds the ranks. */
 void HycoContactResults(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], const PetscReal area[],
                         const PetscReal lambda[], const PetscReal pressure[], PetscReal least,
                         HycoContactResult result[])

@@ -3,7 +3,8 @@
 #include <hycokinematics.h>
 #include <hycovector.h>
 
-/* The row B T of a node's unknowns for a normal. */
+/* The row B T of a node's unknowns for a normal. A force lambda n at the node has these components on the unknowns
+   that remain after oblique supports. */
 static void OfUnknowns(HycoFE fe, PetscInt node, const PetscReal normal[3], PetscReal along[3])
 {
   for (PetscInt c = 0; c < 3; c++) along[c] = normal[c];
@@ -68,6 +69,7 @@ static PetscErrorCode CheckCorner(HycoFE fe, const HycoPairs *pairs, PetscInt k,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Contacts with the same slave are chained from the last to the first. */
 static PetscErrorCode CheckCorners(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[])
 {
   PetscInt *last, *before;
@@ -88,6 +90,7 @@ static PetscErrorCode CheckCorners(HycoFE fe, const HycoPairs *pairs, const Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* B and D in CSR: slave with the normal, masters with minus the weight times the normal; fixed unknowns move to D. */
 static PetscErrorCode Rows(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], PetscInt start[],
                            PetscInt dof[], PetscReal value[], PetscReal gap[])
 {
@@ -108,6 +111,8 @@ static PetscErrorCode Rows(HycoFE fe, const HycoPairs *pairs, const PetscReal no
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rows of B (start, dof, value: room for HycoPairsWidth() nodes each) and gaps D (length) at the current parameters.
+   Not collective. */
 PetscErrorCode HycoContactRows(HycoFE fe, HycoPairs *pairs, PetscInt start[], PetscInt dof[], PetscReal value[],
                                PetscReal gap[])
 {

@@ -3,6 +3,8 @@
 */
 #include "partners.h"
 
+/* Verdict on a slave as drawn: met, turned away, too far, askew (its normal misses the master point), past the
+   border. Within `small` the direction is round-off and is not judged. */
 PetscErrorCode HycoPartnersJudge(HycoPartners *t, PetscInt slave, PetscReal tolerance, PetscReal small,
                                  HycoProjection *at, HycoVerdict *why)
 {
@@ -20,6 +22,7 @@ PetscErrorCode HycoPartnersJudge(HycoPartners *t, PetscInt slave, PetscReal tole
   if (*why == HYCO_MET && at->distance > tolerance) *why = HYCO_FAR;
   if (*why != HYCO_MET || !out || at->distance <= small) PetscFunctionReturn(PETSC_SUCCESS);
   HycoPartnersAcross(t, slave, at, r);
+  /* A normal that is farther than the limit angle from the direction to the master point. */
   if (PetscAbsReal(HycoDot(r, out)) < -HYCO_OPPOSED * at->distance) *why = HYCO_ASKEW;
   PetscCall(HycoPartnersIsPast(t, slave, at, &past));
   if (past) *why = HYCO_PAST;
@@ -40,6 +43,7 @@ static PetscErrorCode Follow(HycoPartners *t, PetscInt slave, PetscReal reach, H
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Also the place of the event of -log_view. */
 static PetscErrorCode AnswerAll(HycoPartners *t, const HycoQuery *q, PetscInt n, const PetscInt slave[],
                                 HycoProjection at[], HycoVerdict why[])
 {
@@ -63,7 +67,7 @@ PetscErrorCode HycoPartnersSearch(HycoPartners *t, const HycoQuery *q, PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the pairs of one contact. */
+/* Adds the pairs of one contact. Nearest node, whatever its normal: for the partitioner's edges a hint is enough. */
 static PetscErrorCode AddNeighbours(HycoMesh m, PetscInt slave, PetscInt master, PetscInt *n, PetscInt pairs[])
 {
   const PetscInt lo = m->group_start[master], n_masters = m->group_start[master + 1] - lo;
@@ -83,12 +87,15 @@ static PetscErrorCode AddNeighbours(HycoMesh m, PetscInt slave, PetscInt master,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Pairs (slave, nearest master node) for heavy edges of the partition, on the mesh as drawn; the caller frees them.
+   Rigid bodies are left out, because one node would draw all slaves to one rank. */
 PetscErrorCode HycoContactsNeighbours(HycoScene scene, HycoMesh m, PetscInt *n, PetscInt **pairs)
 {
   PetscInt g[2] = {0, 0}, room = 0;
 
   PetscFunctionBegin;
   *n = 0;
+  /* The first pass counts, the second fills. */
   for (PetscInt pass = 0; pass < 2; pass++) {
     if (pass) PetscCall(PetscMalloc1(2 * room, pairs));
     for (PetscInt k = 0; k < scene->n_contacts; k++) {

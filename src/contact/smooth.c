@@ -31,6 +31,7 @@ typedef struct {
   PetscInt *fan;           /* n_nodes: 0 if the facets form a closed ring around the node */
 } Surface;
 
+/* Max's weights are sin(angle) / (a b), in 2D 1 / a. */
 static PetscErrorCode AddFacets(HycoFE fe, PetscInt group, Surface *s)
 {
   HycoMesh m = fe->mesh;
@@ -61,6 +62,7 @@ static PetscErrorCode AddFacets(HycoFE fe, PetscInt group, Surface *s)
 /* The unit normal of a facet at its node v; for first order that of the facet. */
 static PetscErrorCode NormalAt(HycoFE fe, PetscInt facet, PetscInt v, PetscReal n[3])
 {
+  /* Corners of second-order facets have their own tangents. */
   const HycoElement *nodes = HycoElementGetFacetNodes(fe->mesh->type);
 
   PetscFunctionBegin;
@@ -104,6 +106,7 @@ static PetscErrorCode FindBends(HycoFE fe, PetscInt group, Surface *s, PetscReal
 
     if (m->facet_group[k / m->nf] != group) continue;
     PetscCall(NormalAt(fe, k / m->nf, k % m->nf, n));
+    /* Twice the distance from the mean is about the largest angle between the facets. */
     s->bend[i] = PetscMax(s->bend[i], 2 * HycoDistance(n, s->mean + 3 * i));
   }
   for (PetscInt f = 0; f < m->n_facets; f++) {
@@ -121,6 +124,9 @@ static PetscErrorCode FindBends(HycoFE fe, PetscInt group, Surface *s, PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Normals of the smooth surface at the group's nodes (n_nodes x 3), their possible errors (doubt, radians) and the
+   angles between facets (bend). At a closed ring the error is of second order in the bend, at a border of first
+   order. Not collective: all facets around the nodes must be in the mesh. */
 PetscErrorCode HycoSmoothNormals(HycoFE fe, PetscInt group, PetscReal normal[], PetscReal doubt[], PetscReal bend[])
 {
   HycoMesh m = fe->mesh;

@@ -37,6 +37,7 @@ static PetscErrorCode Project(HycoScene s, HycoMesh m, PetscInt k, PetscInt grou
   PetscReal most = 0;
 
   PetscFunctionBegin;
+  /* Without a stated tolerance, nodes must coincide within a tenth of the shortest edge. */
   found->tolerance[k] = tie->tolerance < 0 ? HycoSurfaceTolerance(m, group) : tie->tolerance;
   for (PetscInt j = lo; j < lo + n; j++) {
     const PetscInt i = m->group_node[j];
@@ -63,6 +64,7 @@ static PetscErrorCode Project(HycoScene s, HycoMesh m, PetscInt k, PetscInt grou
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One tie, with the tree of its master's facets. */
 static PetscErrorCode FindOne(HycoScene s, HycoMesh m, PetscInt k, Found *found)
 {
   const HycoTie *tie = &s->tie[k];
@@ -106,6 +108,7 @@ static PetscErrorCode CheckChains(HycoScene s, HycoMesh m, const Found *found)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Entries by ascending slave node, which HycoMeshSetTies() relies on. */
 static PetscErrorCode Find(HycoScene s, HycoMesh m, Found *found, HycoTies *ties)
 {
   PetscInt n = 0;
@@ -136,6 +139,7 @@ static PetscErrorCode Find(HycoScene s, HycoMesh m, Found *found, HycoTies *ties
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The ties of the scene on the whole mesh as drawn (NULL: none); the caller destroys them. One process. */
 PetscErrorCode HycoTiesFind(HycoScene s, HycoMesh m, HycoTies *ties)
 {
   Found found;
@@ -188,6 +192,7 @@ static PetscErrorCode Choose(HycoScene s, HycoMesh m, const HycoPairs *p, PetscI
   PetscFunctionBegin;
   *n = 0;
   for (PetscInt i = 0; i < m->n_nodes; i++) has[i] = -1;
+  /* Contacts of one scene entry are contiguous. */
   for (PetscInt k = 0, next; k < p->n; k = next) {
     next = HycoPairsRun(p, k);
     for (PetscInt j = k; j < next; j++) has[p->slave[j]] = p->contact[k];
@@ -206,6 +211,7 @@ static PetscErrorCode Choose(HycoScene s, HycoMesh m, const HycoPairs *p, PetscI
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Removes contacts of tied slaves, whose masters have the contact in their place. */
 PetscErrorCode HycoPairsDropTied(HycoScene s, HycoMesh m, HycoPairs *p)
 {
   PetscInt *has, *which, n;

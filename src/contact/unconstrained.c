@@ -23,7 +23,8 @@ typedef struct {
   PetscReal *doubt[N_SENSES], *bend[N_SENSES]; /* m */
 } Shapes;
 
-/* A slave that faces nothing meets no resistance. */
+/* A slave that faces nothing meets no resistance. Motions are orthonormal over all unknowns, so that d is small for
+   large meshes; tolerances are scaled accordingly. */
 static void Relative(Shapes *s, const HycoMotions *motions)
 {
   for (PetscInt i = 0; i < s->m; i++) {
@@ -33,7 +34,8 @@ static void Relative(Shapes *s, const HycoMotions *motions)
   }
 }
 
-/* Normals of the slave's and the master's surface at one contact's pairs; work: room for 5 reals a node. */
+/* Normals of the slave's and the master's surface at one contact's pairs; work: room for 5 reals a node. The
+   master's normal is reversed and interpolated at the master point. */
 static PetscErrorCode SurfaceSenses(Shapes *s, PetscInt contact, PetscReal work[])
 {
   HycoContact c = s->fe->scene->contact[contact];
@@ -66,6 +68,7 @@ static PetscErrorCode SurfaceSenses(Shapes *s, PetscInt contact, PetscReal work[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The slave surface's error is also taken for given normals, which cannot be more exact than the mesh. */
 static PetscErrorCode FindSenses(Shapes *s)
 {
   HycoScene scene = s->fe->scene;
@@ -106,7 +109,8 @@ static void Combine(const Shapes *s, PetscInt i, const PetscReal z[], PetscReal 
   }
 }
 
-/* The eigenvectors of sum of (n.d / doubt)^2 against sum of |d|^2, in A (k x k), values ascending. */
+/* The eigenvectors of sum of (n.d / doubt)^2 against sum of |d|^2, in A (k x k), values ascending. Only the ratio
+   matters: how far a motion is from tangential, in units of the normals' errors, against its size. */
 static PetscErrorCode Spectrum(const Shapes *s, const PetscInt sense[], const PetscReal weight[], PetscReal A[],
                                PetscReal M[], PetscReal values[])
 {
@@ -146,7 +150,9 @@ static PetscErrorCode Spectrum(const Shapes *s, const PetscInt sense[], const Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the combination z is tangential at every contact; raises the weights of the contacts where it is not. */
+/* Whether the combination z is tangential at every contact; raises the weights of the contacts where it is not. The
+   mean over contacts may hide one that resists: each is tested alone, and a violated one counts 100 times more in
+   the next round. */
 static PetscErrorCode Tangential(const Shapes *s, const PetscInt sense[], const PetscReal z[], PetscReal weight[],
                                  PetscBool *tangential)
 {
@@ -171,7 +177,8 @@ static PetscErrorCode Tangential(const Shapes *s, const PetscInt sense[], const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The combinations that are tangential for these normals: z (room k x k, rows of length 1), *n of them. */
+/* The combinations that are tangential for these normals: z (room k x k, rows of length 1), *n of them. The subspace
+   is at first that of the mean; rounds with raised weights turn it away from contacts that resist. */
 static PetscErrorCode Null(const Shapes *s, const PetscInt sense[], PetscReal z[], PetscInt *n)
 {
   const PetscInt k = s->k;
@@ -221,7 +228,8 @@ static void Join(PetscInt k, const PetscReal z[], PetscReal basis[], PetscInt *n
   (*n)++;
 }
 
-/* Whether all slaves of the contact that face something have a normal in that sense. */
+/* Whether all slaves of the contact that face something have a normal in that sense. A surface without facets around
+   its nodes has no normal there. Collective. */
 static PetscErrorCode HasSense(const Shapes *s, PetscInt contact, PetscInt sense, PetscBool *has)
 {
   PetscFunctionBegin;
@@ -236,7 +244,8 @@ static PetscErrorCode HasSense(const Shapes *s, PetscInt contact, PetscInt sense
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The normals of choice number `code`; *possible: each contact has them. */
+/* The normals of choice number `code`; *possible: each contact has them. Collective. With up to three contacts a
+   code has one digit (base 3) for each. */
 static PetscErrorCode Senses(const Shapes *s, PetscInt code, PetscInt sense[], PetscBool *possible)
 {
   const PetscBool common = (PetscBool)(s->fe->scene->n_contacts > MOST_CONTACTS); /* as far as available */
@@ -259,6 +268,8 @@ static PetscErrorCode Senses(const Shapes *s, PetscInt code, PetscInt sense[], P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A motion is unconstrained if it is tangential for any choice of normals: an error of the normals must not make a
+   motion resisted. alike: the largest space of a single choice, whose motions are free together. */
 static PetscErrorCode Search(const Shapes *s, PetscInt *n_unconstrained, PetscReal unconstrained[], PetscInt *n_alike,
                              PetscReal alike[])
 {
@@ -288,7 +299,8 @@ static PetscErrorCode Search(const Shapes *s, PetscInt *n_unconstrained, PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Component of a combination's rigid motions: first the rotations of each part, then the translations. */
+/* Component of a combination's rigid motions: first the rotations of each part, then the translations. Columns of
+   the elimination in Reduce(). */
 static PetscReal Entry(const HycoMotions *motions, const PetscReal z[], PetscInt dim, PetscInt column)
 {
   const PetscInt k = motions->n, turns = dim == 1 ? 0 : dim == 2 ? 1 : 3;
@@ -306,7 +318,8 @@ static PetscReal Entry(const HycoMotions *motions, const PetscReal z[], PetscInt
   return sum;
 }
 
-/* Changes the basis of the combinations for their names: with as many pure translations as possible. */
+/* Changes the basis of the combinations for their names: with as many pure translations as possible. Gaussian
+   elimination, rotations first: what remains after them are translations. */
 static void Reduce(const HycoMotions *motions, PetscInt dim, PetscInt n, PetscReal z[])
 {
   const PetscInt k = motions->n, columns = k * (dim == 1 ? 1 : dim == 2 ? 3 : 6), turns = columns - k * dim;
@@ -337,6 +350,9 @@ static void Reduce(const HycoMotions *motions, PetscInt dim, PetscInt n, PetscRe
   }
 }
 
+/* From the k rigid motions that supports leave, those that frictionless contact does not resist either: coefficients
+   (rows of k, orthonormal before Reduce()), freed by the caller. wide: a mesh with all facets around the nodes of
+   fe's contacts. Collective. */
 PetscErrorCode HycoFEFindUnconstrained(MPI_Comm comm, HycoFE fe, HycoFE wide, const PetscInt index[], HycoPairs *pairs,
                                        const HycoMotions *motions, PetscInt *n_unconstrained, PetscReal **unconstrained,
                                        PetscInt *n_alike, PetscReal **alike)

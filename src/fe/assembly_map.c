@@ -24,7 +24,8 @@ PetscErrorCode HycoAssemblyMapDestroy(HycoAssemblyMap *places)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The first free unknown of a node, -1: none. */
+/* The first free unknown of a node, -1: none. Free unknowns of a node are contiguous in a row of K, so that one
+   offset per pair of nodes locates a dim x dim block. */
 static PetscInt FirstFree(HycoFE fe, PetscInt node)
 {
   for (PetscInt c = 0; c < fe->dim; c++) {
@@ -33,7 +34,8 @@ static PetscInt FirstFree(HycoFE fe, PetscInt node)
   return -1;
 }
 
-/* False if a row lacks an entry: then the matrix was not created for this mesh. */
+/* False if a row lacks an entry: then the matrix was not created for this mesh. Offsets of all pairs of nodes of all
+   cells: once per pattern, in place of a search for each entry of each assembly. */
 static PetscBool FindOffsets(HycoFE fe, const PetscInt ia[], const PetscInt ja[], PetscInt offset[])
 {
   for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
@@ -95,6 +97,7 @@ static PetscErrorCode AddCells(HycoFE fe, HycoAssemblyMap p, PetscBool constant,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Leaves *places NULL if the pattern does not fit; the caller then assembles by MatSetValues(). */
 static PetscErrorCode Create(HycoFE fe, const PetscInt ia[], const PetscInt ja[], PetscInt n, HycoAssemblyMap *places)
 {
   HycoAssemblyMap p;
@@ -115,6 +118,7 @@ static PetscErrorCode Create(HycoFE fe, const PetscInt ia[], const PetscInt ja[]
     PetscCall(HycoAssemblyMapDestroy(places));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+  /* Cells with fixed stiffness are summed now; later assemblies start with a copy of this sum. */
   if (fe->n_constant) {
     PetscCall(PetscCalloc1(ia[n], &p->constant));
     PetscCall(AddCells(fe, p, PETSC_TRUE, ia, p->constant));
@@ -122,6 +126,8 @@ static PetscErrorCode Create(HycoFE fe, const PetscInt ia[], const PetscInt ja[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* K (n_dof x n_dof, sequential, assembled before) by direct addition; *done is false if this is not possible.
+   Rewrites all values; the pattern stays. The map is kept in fe until the matrix or its nonzero pattern is another. */
 PetscErrorCode HycoAssemblyMapAssemble(HycoFE fe, Mat K, PetscBool *done)
 {
   const PetscInt *ia, *ja;
@@ -131,6 +137,7 @@ PetscErrorCode HycoAssemblyMapAssemble(HycoFE fe, Mat K, PetscBool *done)
   PetscScalar *a;
   PetscBool rows, assembled, sequential;
 
+  /* Distributed meshes have numbers of other ranks in their rows. */
   PetscFunctionBegin;
   *done = PETSC_FALSE;
   PetscCall(MatAssembled(K, &assembled));
@@ -152,6 +159,7 @@ PetscErrorCode HycoAssemblyMapAssemble(HycoFE fe, Mat K, PetscBool *done)
       PetscCall(PetscArrayzero(a, ia[n]));
     PetscCall(AddCells(fe, fe->places, PETSC_FALSE, ia, a));
     PetscCall(MatSeqAIJRestoreArrayWrite(K, &a));
+    /* The values were written past PETSc, which must know that they changed (a factor or norm may be cached). */
     PetscCall(PetscObjectStateIncrease((PetscObject)K));
     *done = PETSC_TRUE;
   }

@@ -74,6 +74,7 @@ static void LineAt(PetscReal x, PetscReal N[], PetscReal dN[][3])
   }
 }
 
+/* Tabulated at the Gauss points, or with unit weights at the nodes, which gives nodal normals. */
 static void Line3(HycoElement *e, PetscBool at_nodes)
 {
   e->dim = 1;
@@ -100,6 +101,7 @@ static void QuadAt(PetscInt nv, PetscReal x, PetscReal y, PetscReal N[], PetscRe
   }
 }
 
+/* Quad8 and quad9 share their first eight nodes in gmsh's order. */
 static void Quad(HycoElement *e, PetscInt nv, PetscBool at_nodes)
 {
   e->dim = 2;
@@ -215,6 +217,7 @@ static void ProductAt(const PetscInt r[3], const PetscReal x[3], PetscReal *N, P
   for (PetscInt c = 0; c < 3; c++) dN[c] = QuadraticSlope(r[c], x[c]) * f[(c + 1) % 3] * f[(c + 2) % 3];
 }
 
+/* 27 Gauss points for both: either kind has terms of degree 2 in each coordinate. */
 static void Hex(HycoElement *e, PetscInt nv)
 {
   e->dim = 3;
@@ -229,6 +232,7 @@ static void Hex(HycoElement *e, PetscInt nv)
   }
 }
 
+/* At the first use: 13 small tables, constant afterwards. */
 static void Tabulate(void)
 {
   Tensor(&table[HYCO_LINE2], 1);
@@ -257,6 +261,7 @@ const HycoElement *HycoElementGet(HycoCellType type)
   return &table[type];
 }
 
+/* The element of a cell's facets; in 1D a point of weight 1. */
 const HycoElement *HycoElementGetFacet(HycoCellType type)
 {
   if (!ready) Tabulate();
@@ -283,6 +288,8 @@ const HycoElement *HycoElementGetFacet(HycoCellType type)
   }
 }
 
+/* The facet's functions and slopes at its own nodes, for normals at carriers; NULL where contacts use the integral
+   instead. */
 const HycoElement *HycoElementGetFacetNodes(HycoCellType type)
 {
   if (!ready) Tabulate();
@@ -296,6 +303,8 @@ const HycoElement *HycoElementGetFacetNodes(HycoCellType type)
   }
 }
 
+/* Functions and slopes of a second-order facet (nf 3, 6, 8 or 9) at local coordinates, for projections onto curved
+   surfaces. */
 void HycoFacetFunctions(PetscInt nf, const PetscReal at[2], PetscReal N[HYCO_FACET_NODES],
                         PetscReal dN[HYCO_FACET_NODES][3])
 {

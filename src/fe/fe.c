@@ -37,11 +37,14 @@ PetscErrorCode HycoFEDestroy(HycoFE *fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Finds the cells and supports that no parameter changes. */
+/* Finds the cells and supports that no parameter changes. A cell is constant if its law, its springs and the
+   positions of its nodes and of its masters are. The supports are constant unless a value changes, or depends on a
+   position that changes. */
 static PetscErrorCode FindConstant(HycoFE fe)
 {
   HycoMesh m = fe->mesh;
   HycoScene s = fe->scene;
+  /* Every parameter is assumed to change: what is constant then is so for all of them. */
   PetscBool every[HYCO_MAX_PARAMETERS], *moves, any = PETSC_FALSE;
 
   PetscFunctionBegin;
@@ -109,6 +112,8 @@ static PetscErrorCode ChooseElements(HycoScene scene, HycoMesh mesh, PetscBool b
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Takes references to scene and mesh, which must outlive fe. No parameter is set yet: HycoFESetParameters() follows.
+   Not collective. */
 PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe)
 {
   PetscBool *bbar;
@@ -145,6 +150,7 @@ PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The counter gives each placement of nodes its own number, by which kept gradients are recognised as old. */
 PetscErrorCode HycoFESetDrawn(HycoFE fe)
 {
   static PetscInt places = 0;
@@ -184,6 +190,8 @@ static PetscBool OnAxis(HycoFE fe, PetscInt node)
                      PetscAbsReal(fe->mesh->xyz[3 * node]) <= 1e-9 * HycoMeshLength(fe->mesh));
 }
 
+/* Nodes of second order on the axis: the integral of their function over the surface vanishes with the radius, so
+   that they carry no contact. */
 PetscBool HycoNodeHasNoArea(HycoFE fe, PetscInt node)
 {
   return (PetscBool)(HycoMeshIsQuadratic(fe->mesh) && OnAxis(fe, node));
@@ -192,6 +200,7 @@ PetscBool HycoNodeHasNoArea(HycoFE fe, PetscInt node)
 /* In an axisymmetric scene: checks that no node crosses the axis, and that those on it stay there. */
 static PetscErrorCode CheckAxis(HycoFE fe)
 {
+  /* Length (m) below which a radius counts as zero. */
   const PetscReal zero = 1e-9 * HycoMeshLength(fe->mesh);
 
   PetscFunctionBegin;
@@ -209,7 +218,8 @@ static PetscErrorCode CheckAxis(HycoFE fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets supports along a direction, after all others, in the order of the scene. */
+/* Sets supports along a direction, after all others, in the order of the scene. The order matters: each direction is
+   expressed by the displacements that earlier supports leave free. */
 static PetscErrorCode SetOblique(HycoFE fe)
 {
   HycoMesh m = fe->mesh;
@@ -253,7 +263,8 @@ static PetscErrorCode SetOblique(HycoFE fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fixed components and their values, evaluated at the moved nodes. */
+/* Fixed components and their values, evaluated at the moved nodes. u0: prescribed value at fixed unknowns, 0
+   elsewhere. Axis first, then components, oblique directions, ties and pins, which each assume the former. */
 static PetscErrorCode SetSupports(HycoFE fe)
 {
   HycoMesh m = fe->mesh;
@@ -290,6 +301,8 @@ static PetscErrorCode SetSupports(HycoFE fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Pins: additional fixed unknowns by node tag and component, which make K regular for a floating body. Nodes of
+   other ranks are not in this mesh and are skipped. */
 PetscErrorCode HycoFESetPins(HycoFE fe, PetscInt n, const PetscInt tag[], const PetscInt component[])
 {
   HycoMesh m = fe->mesh;
@@ -311,6 +324,8 @@ PetscErrorCode HycoFESetPins(HycoFE fe, PetscInt n, const PetscInt tag[], const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What a change of some parameters requires: nodes, K, rows of B, gaps D. Moved nodes change all of them; a
+   contact's entry gap changes D alone. */
 HycoChanges HycoSceneChanges(HycoScene s, const PetscBool changed[])
 {
   HycoChanges c = {PETSC_FALSE, PETSC_FALSE, PETSC_FALSE, PETSC_FALSE};
@@ -330,6 +345,7 @@ HycoChanges HycoSceneChanges(HycoScene s, const PetscBool changed[])
   return c;
 }
 
+/* By parameter: whether K or B depends on it; others act on F and D only, so that a factor of K stays valid. */
 void HycoSceneReaches(HycoScene scene, PetscBool reaches[])
 {
   for (PetscInt p = 0; p < scene->n_parameters; p++) {
@@ -342,6 +358,9 @@ void HycoSceneReaches(HycoScene scene, PetscBool reaches[])
   }
 }
 
+/* Moves fe to mu and updates only what depends on the changed values; the flags stiffness_changed, contact_changed
+   and gap_changed tell the caller what to assemble. After an error fe is not ready, and the next call updates
+   everything. Not collective. */
 PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
 {
   PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, first = (PetscBool)!fe->ready;

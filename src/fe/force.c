@@ -10,6 +10,8 @@ typedef struct {
   PetscReal *all; /* n_dof; NULL: the vector */
 } Into;
 
+/* Adds a component of a force at a node to F, in generalised unknowns: a tied node passes it to its masters by the
+   weights, an oblique support passes the eliminated component to the free ones (T^T F). */
 static PetscErrorCode AddNode(HycoFE fe, PetscInt node, PetscInt c, PetscReal value, Into F)
 {
   const PetscInt global = fe->mesh->node_global ? fe->mesh->node_global[node] : node;
@@ -38,7 +40,8 @@ static PetscErrorCode AddNode(HycoFE fe, PetscInt node, PetscInt c, PetscReal va
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the body forces at point q of a cell to its unknowns. */
+/* Adds the body forces at point q of a cell to its unknowns. w N_a f, f: the body's force per volume plus gravity
+   and centrifugal force, at X(mu). */
 static PetscErrorCode AddPointForce(HycoFE fe, PetscInt cell, PetscInt q, const HycoAcceleration *motion,
                                     PetscReal value[])
 {
@@ -70,6 +73,8 @@ static PetscBool HasBodyForce(HycoFE fe, PetscInt cell)
   return (PetscBool)(body->force[0] || body->force[1] || body->force[2] || HycoSceneHasInertia(fe->scene, body, NULL));
 }
 
+/* Body forces of one cell (nv x dim, N) without elimination of unknowns, for the parts of a force that depend on
+   parameters. */
 PetscErrorCode HycoFEBodyForce(HycoFE fe, PetscInt cell, PetscReal value[])
 {
   HycoAcceleration motion;
@@ -99,6 +104,7 @@ static PetscBool Acts(HycoFE fe, PetscInt facet)
   return (PetscBool)(fe->all_facets || fe->mesh->facet_cell[facet] >= 0);
 }
 
+/* Quadrature of t dS - p n dS, for loads that vary over the facet; n has the length of the area element. */
 static PetscErrorCode AddFacetLoad(HycoFE fe, const HycoLoad *load, PetscInt facet, Into F)
 {
   HycoMesh m = fe->mesh;
@@ -165,7 +171,8 @@ static PetscErrorCode SetShares(HycoFE fe, PetscInt group, HycoLoadShares *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A load that is constant in space: its values times the nodes' shares of the surface. */
+/* A load that is constant in space: its values times the nodes' shares of the surface. Saves evaluations of
+   expressions and of normals while the nodes stay in place: four reals per node. */
 static PetscErrorCode AddUniformLoad(HycoFE fe, const HycoLoad *load, PetscInt group, HycoLoadShares *s, Into F)
 {
   PetscReal p = 0, t[3] = {0, 0, 0};
@@ -194,6 +201,7 @@ static PetscErrorCode AddLifting(HycoFE fe, PetscInt cell, Into F)
   PetscBool any = PETSC_FALSE;
 
   PetscFunctionBegin;
+  /* u0 is mostly zero; a cell without prescribed values is skipped. */
   for (PetscInt k = 0; k < n; k++) {
     u0[k] = fe->u0[node[k / m->dim] * m->dim + k % m->dim];
     any = (PetscBool)(any || u0[k] != 0);
@@ -204,6 +212,8 @@ static PetscErrorCode AddLifting(HycoFE fe, PetscInt cell, Into F)
   for (PetscInt k = 0; k < n; k++) {
     const PetscInt i = node[k / m->dim], c = k % m->dim, global = m->node_global ? m->node_global[i] : i;
 
+    /* The row of a fixed unknown is its diagonal alone (K is reduced in the same way), so that the solution there is
+       u0. */
     if (fe->fixed[i * m->dim + c]) {
       PetscCall(VecSetValue(F.vec, global * m->dim + c, Ke[k * n + k] * u0[k], ADD_VALUES));
     } else {
@@ -217,6 +227,7 @@ static PetscErrorCode AddLifting(HycoFE fe, PetscInt cell, Into F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Forces of the thermal strains, w B^T C (alpha dT), added to push (nv x dim, N). */
 PetscErrorCode HycoCellHeat(HycoFE fe, PetscInt cell, PetscReal push[])
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
@@ -238,7 +249,8 @@ PetscErrorCode HycoCellHeat(HycoFE fe, PetscInt cell, PetscReal push[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds body forces and forces of thermal strains of a cell. */
+/* Adds body forces and forces of thermal strains of a cell. With a history, thermal strains enter through the laws'
+   stresses, not as forces. */
 static PetscErrorCode AddVolume(HycoFE fe, PetscInt cell, Into F)
 {
   const HycoBody *body = &fe->scene->body[fe->mesh->cell_body[cell]];
@@ -257,7 +269,8 @@ static PetscErrorCode AddVolume(HycoFE fe, PetscInt cell, Into F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The force per unit length along a segment: its ends, and its middle if of second order. */
+/* The force per unit length along a segment: its ends, and its middle if of second order. Integral of N_a f ds over
+   the moved segment (force per length, N/m). */
 static PetscErrorCode AddSegment(HycoFE fe, const HycoPointLoad *load, const PetscInt node[], Into F)
 {
   const HycoElement *el = HycoMeshIsQuadratic(fe->mesh) ? HycoElementGetFacet(HYCO_TRI6) : HycoElementGet(HYCO_LINE2);
@@ -280,7 +293,8 @@ static PetscErrorCode AddSegment(HycoFE fe, const HycoPointLoad *load, const Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Forces on points and along lines in space. */
+/* Forces on points and along lines in space. Points: the whole force at each node (N). Lines: segments are found
+   again at each call, which is cheap against the loop over cells. */
 static PetscErrorCode AddPointLoad(HycoFE fe, const HycoPointLoad *load, Into F)
 {
   HycoMesh m = fe->mesh;
@@ -313,6 +327,8 @@ static PetscErrorCode AddPointLoad(HycoFE fe, const HycoPointLoad *load, Into F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The loop is the same for F (vector: eliminated unknowns, with lifting) and for all unknowns (array: plain nodal
+   forces, from which reactions are computed). */
 static PetscErrorCode AddForces(HycoFE fe, Into F)
 {
   HycoMesh m = fe->mesh;
@@ -338,7 +354,8 @@ static PetscErrorCode AddForces(HycoFE fe, Into F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The end of an assembly is collective: a rank with an error takes part in it, so that the others do not wait. */
+/* The end of an assembly is collective: a rank with an error takes part in it, so that the others do not wait. F
+   (distributed, N). Entries of other ranks are dropped, because their owners have the same cells. Collective. */
 PetscErrorCode HycoFEAssembleForce(HycoFE fe, Vec F)
 {
   PetscErrorCode ierr;
@@ -353,6 +370,7 @@ PetscErrorCode HycoFEAssembleForce(HycoFE fe, Vec F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Applied forces at all local unknowns, f[n_dof], without elimination; complete at owned nodes. Not collective. */
 PetscErrorCode HycoFELoads(HycoFE fe, PetscReal f[])
 {
   PetscFunctionBegin;
@@ -361,6 +379,9 @@ PetscErrorCode HycoFELoads(HycoFE fe, PetscReal f[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* r = internal minus applied forces at supported unknowns, 0 elsewhere: f_int if it is given (histories), else K u
+   of the cells with a fixed unknown, since the assembled K has only the diagonal in these rows. Complete at owned
+   nodes. Not collective. */
 PetscErrorCode HycoFEReactions(HycoFE fe, const PetscReal u[], const PetscReal f_int[], PetscReal r[])
 {
   HycoMesh m = fe->mesh;

@@ -1,6 +1,7 @@
 /* Given temperature fields of the bodies, and their thermal strains: expansion (T - reference), isotropic. */
 #include <hycokinematics.h>
 
+/* Only if a body has a temperature; others keep NULL. */
 PetscErrorCode HycoHeatCreate(HycoFE fe)
 {
   const PetscInt n = fe->mesh->n_cells * HycoElementGet(fe->mesh->type)->nq;
@@ -14,7 +15,8 @@ PetscErrorCode HycoHeatCreate(HycoFE fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One cell: temperatures and strains at its points. */
+/* One cell: temperatures and strains at its points. T (K) and expansion (T - reference) at the integration points; a
+   law may need T without an expansion. */
 static PetscErrorCode SetCell(HycoFE fe, const HycoElement *el, PetscInt cell)
 {
   const HycoBody *body = &fe->scene->body[fe->mesh->cell_body[cell]];
@@ -42,6 +44,7 @@ static PetscErrorCode SetCell(HycoFE fe, const HycoElement *el, PetscInt cell)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Only bodies whose expressions changed; all after the nodes moved. Not collective. */
 PetscErrorCode HycoFESetHeat(HycoFE fe, PetscBool all, const PetscBool changed[])
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);

@@ -31,6 +31,7 @@ static PetscInt PointSize(HycoFE fe, PetscInt cell)
   return 2 * fe->n_sigma + N_PLAIN + fe->scene->body[fe->mesh->cell_body[cell]].law->n_state;
 }
 
+/* Pointers into the packed state; nothing is copied. */
 static Point PointAt(HycoFE fe, HycoFEState state, PetscInt cell, PetscInt q)
 {
   PetscReal *value = state->value + state->start[cell] + q * PointSize(fe, cell);
@@ -73,6 +74,7 @@ static PetscErrorCode ListNames(HycoScene scene, HycoFEState s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Zero except for the temperature, which tells a first step: a rise from an unknown temperature is no strain. */
 PetscErrorCode HycoFEStateCreate(HycoFE fe, HycoFEState *state)
 {
   const PetscInt n = fe->mesh->n_cells, nq = HycoElementGet(fe->mesh->type)->nq;
@@ -93,6 +95,7 @@ PetscErrorCode HycoFEStateCreate(HycoFE fe, HycoFEState *state)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The layout of both must come from the same mesh and laws. */
 PetscErrorCode HycoFEStateCopy(HycoFEState from, HycoFEState to)
 {
   PetscFunctionBegin;
@@ -133,7 +136,8 @@ typedef struct {
   PetscReal (*g)[3], (*mean)[3]; /* nv by point, by cell */
 } Batch;
 
-/* Allocates all arrays of a batch at once. */
+/* Allocates all arrays of a batch at once. Room for the largest law, allocated once per step and used by all
+   batches. */
 static PetscErrorCode BatchCreate(HycoFE fe, Batch *b)
 {
   const PetscInt n = BATCH * HycoElementGet(fe->mesh->type)->nq, ns = fe->n_sigma;
@@ -185,7 +189,7 @@ static PetscErrorCode BatchDestroy(Batch *b)
 }
 
 /* Computes strains at the end of the step and reads the state at its begin; the law's strains exclude thermal
-   strain. */
+   strain. Total and thermal strains go to the state separately. */
 static PetscErrorCode Gather(HycoFE fe, const HycoElement *el, Batch *b)
 {
   const PetscInt ns = fe->n_sigma, body = fe->mesh->cell_body[b->cell[0]];
@@ -221,7 +225,8 @@ static PetscErrorCode Gather(HycoFE fe, const HycoElement *el, Batch *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A linear law: stress and energy by fe's tangents. */
+/* A linear law: stress and energy by fe's tangents. The potential of a linear law is its stored energy; Newton's
+   line search adds it to those of the other laws. */
 static void Linear(HycoFE fe, const HycoElement *el, Batch *b)
 {
   const PetscInt ns = fe->n_sigma, size = fe->tangent_size[fe->mesh->cell_body[b->cell[0]]];
@@ -260,7 +265,8 @@ static void Complete(HycoFE fe, const HycoElement *el, Batch *b)
   }
 }
 
-/* Evaluates the batch's law; *failed: it has no solution at a point. */
+/* Evaluates the batch's law; *failed: it has no solution at a point. NaN marks what the law does not compute;
+   Complete() replaces it. A failure is reported, not raised: the caller halves the step. */
 static PetscErrorCode Update(HycoFE fe, const HycoElement *el, Batch *b, PetscBool *failed)
 {
   const HycoBody *body = &fe->scene->body[fe->mesh->cell_body[b->cell[0]]];
@@ -300,7 +306,9 @@ static PetscErrorCode Update(HycoFE fe, const HycoElement *el, Batch *b, PetscBo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds a point's energies, so that the identity of the report holds. */
+/* Adds a point's energies, so that the identity of the report holds. Trapezoidal rule of stress times strain
+   increment. moduli: the rest of the balance, from moduli that changed with temperature during the step. Only cells
+   whose first node is owned are counted, so that sums over ranks count each once. */
 static void Count(HycoFE fe, Batch *b, PetscInt i, const Point *from, const Point *to)
 {
   HycoFEStepReport *r = b->report;
@@ -345,6 +353,7 @@ static void Scatter(HycoFE fe, const HycoElement *el, Batch *b, PetscBool linear
       HycoPointForce(fe, el, b->g + i * b->nv, fe->bbar[body] ? b->mean + k * b->nv : NULL, b->w[i], s, f);
       b->report->increment = PetscMax(b->report->increment, b->increment[i]);
       if (HycoMeshOwned(fe->mesh, fe->mesh->cells[cell * fe->mesh->nv]) >= 0) Count(fe, b, i, &from, &to);
+      /* Symmetrised, because K is assembled and factored as a symmetric matrix. */
       for (PetscInt r = 0; r < ns && b->tangents && !linear; r++) {
         const PetscReal *C = b->tangent + i * ns * ns;
 
@@ -357,6 +366,7 @@ static void Scatter(HycoFE fe, const HycoElement *el, Batch *b, PetscBool linear
   }
 }
 
+/* The four phases of one batch; a batch with a failure leaves no results. */
 static PetscErrorCode Step(HycoFE fe, const HycoElement *el, Batch *b)
 {
   PetscBool failed = PETSC_FALSE, linear;
@@ -374,6 +384,7 @@ static PetscErrorCode Step(HycoFE fe, const HycoElement *el, Batch *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Batches never mix bodies, as each has its law. */
 static PetscErrorCode StepAll(HycoFE fe, HycoBodies bodies, Batch *b)
 {
   HycoMesh m = fe->mesh;
@@ -391,6 +402,9 @@ static PetscErrorCode StepAll(HycoFE fe, HycoBodies bodies, Batch *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One step from t0 to t1 for all, linear or inelastic bodies: adds internal forces to f_int[n_dof] (N), writes state
+   `end`, optionally replaces fe's tangents by the consistent ones. Complete at owned nodes; report sums are those of
+   this process. Not collective. */
 PetscErrorCode HycoFEStepBodies(HycoFE fe, HycoBodies bodies, const PetscReal u[], PetscReal t0, PetscReal t1,
                                 HycoFEState begin, HycoFEState end, PetscReal f_int[], PetscBool tangent,
                                 HycoFEStepReport *report)
@@ -429,6 +443,8 @@ PetscErrorCode HycoFEStep(HycoFE fe, const PetscReal u[], PetscReal t0, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Elastic tangents in place of consistent ones. Linear cells whose constants no parameter changes were never
+   replaced. */
 PetscErrorCode HycoFEElasticTangent(HycoFE fe)
 {
   PetscFunctionBegin;
@@ -436,6 +452,7 @@ PetscErrorCode HycoFEElasticTangent(HycoFE fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Internal forces of one cell from stored stresses, B^T sigma (nv x dim, N), without a law's evaluation. */
 PetscErrorCode HycoFEStateForce(HycoFE fe, HycoFEState state, PetscInt cell, PetscReal f[])
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
@@ -455,6 +472,8 @@ PetscErrorCode HycoFEStateForce(HycoFE fe, HycoFEState state, PetscInt cell, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Volume means by cell: stress (n_sigma each), von Mises stress, accumulated inelastic strain, temperature; NULL
+   outputs are skipped. */
 PetscErrorCode HycoFEStateFields(HycoFE fe, HycoFEState state, PetscReal sigma[], PetscReal mises[],
                                  PetscReal inelastic[], PetscReal temperature[])
 {
@@ -484,6 +503,7 @@ PetscErrorCode HycoFEStateFields(HycoFE fe, HycoFEState state, PetscReal sigma[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Volume mean by cell of a law's variable; 0 in bodies whose law does not have it. */
 PetscErrorCode HycoFEStateVariable(HycoFE fe, HycoFEState state, const char name[], PetscReal value[])
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);

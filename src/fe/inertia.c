@@ -2,6 +2,7 @@
 #include "inertia.h"
 #include <hycovector.h>
 
+/* Entries that do not depend on the position, evaluated at the origin. */
 static PetscErrorCode Vector(HycoFE fe, HycoExpr const e[3], PetscReal v[3])
 {
   const PetscReal nowhere[3] = {0, 0, 0};
@@ -38,6 +39,7 @@ static PetscErrorCode SetAxis(HycoFE fe, const HycoMotion *m, HycoAcceleration *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Evaluated once per body and parameter value, not per point: gravity (m/s^2), axis, square of the angular velocity. */
 PetscErrorCode HycoAccelerationSet(HycoFE fe, const HycoBody *body, HycoAcceleration *a)
 {
   const HycoMotion *m = &fe->scene->motion;
@@ -58,6 +60,7 @@ PetscErrorCode HycoAccelerationSet(HycoFE fe, const HycoBody *body, HycoAccelera
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* rho (g + omega^2 r), r the vector from the axis (N/m^3). */
 PetscErrorCode HycoInertiaForce(HycoFE fe, const HycoBody *body, const HycoAcceleration *a, const PetscReal x[3],
                                 PetscReal force[3])
 {

@@ -1,6 +1,7 @@
 /* Jacobians of cells and facets. */
 #include <hycokinematics.h>
 
+/* det dX/dxi at point q, with its sign. */
 PetscReal HycoDeterminant(const HycoElement *el, const PetscInt node[], const PetscReal X[], PetscInt q)
 {
   PetscReal J[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
@@ -24,6 +25,8 @@ static PetscReal Radius(HycoFE fe, PetscInt n, const PetscInt node[], const Pets
   return r;
 }
 
+/* g[a] = dN_a/dX at point q (in an axisymmetric scene g[a][2] = N_a / r, the hoop strain), weight = |det J| w (times
+   2 pi r, times the cell's cubature weight). Kept values are used while the nodes are in place. */
 PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscInt q,
                              PetscReal g[HYCO_CELL_NODES][3], PetscReal *weight)
 {
@@ -46,6 +49,7 @@ PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, Pe
       for (PetscInt a = 0; a < el->nv; a++) J[c][d] += fe->X[3 * node[a] + c] * el->dN[q][a][d];
       row += J[c][d] * J[c][d];
     }
+    /* The product of the rows' lengths bounds det (Hadamard): the test for degeneration has no unit. */
     size *= PetscSqrtReal(row);
   }
   for (PetscInt c = 0; c < 3; c++) {
@@ -102,6 +106,7 @@ static PetscErrorCode KeepMeans(HycoFE fe, const HycoElement *el)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Stores gradients and weights of all points, (3 nv + 1) reals each, for repeated steps on unmoved nodes. */
 PetscErrorCode HycoFEKeepGradients(HycoFE fe)
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
@@ -127,6 +132,7 @@ PetscErrorCode HycoFEKeepGradients(HycoFE fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Degenerate and inverted cells of the mesh as drawn, before any parameter moves it. */
 PetscErrorCode HycoMeshCheckCells(HycoMesh m)
 {
   const HycoElement *el = HycoElementGet(m->type);
@@ -140,6 +146,7 @@ PetscErrorCode HycoMeshCheckCells(HycoMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Mean dilatation of the cell: mean[a][c] = 1/V integral of d(tr eps)/du_ac, the bbar element's volumetric row. */
 PetscErrorCode HycoMeanGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal mean[HYCO_CELL_NODES][3])
 {
   const PetscInt dim = el->dim;
@@ -164,6 +171,7 @@ PetscErrorCode HycoMeanGradients(HycoFE fe, const HycoElement *el, PetscInt cell
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* n dS w at point q of a facet (area-weighted), outward as the body lies now; without the axisymmetric factor. */
 PetscErrorCode HycoFacetDirection(HycoFE fe, const HycoElement *el, PetscInt facet, PetscInt q, PetscReal n[3])
 {
   HycoMesh m = fe->mesh;
@@ -197,6 +205,7 @@ PetscErrorCode HycoFacetDirection(HycoFE fe, const HycoElement *el, PetscInt fac
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The same with the circumference 2 pi r. */
 PetscErrorCode HycoFacetNormal(HycoFE fe, const HycoElement *el, PetscInt facet, PetscInt q, PetscReal n[3])
 {
   const PetscInt *node = fe->mesh->facets + facet * fe->mesh->nf;
@@ -218,6 +227,7 @@ void HycoPointPlace(HycoFE fe, const HycoElement *el, PetscInt cell, PetscInt q,
   }
 }
 
+/* Strain (xx, yy, zz, 2 xy, 2 yz, 2 xz) of u; with mean, its trace is replaced by the cell's mean dilatation. */
 void HycoPointStrain(HycoFE fe, const HycoElement *el, PetscInt cell, const PetscReal u[],
                      PetscReal g[HYCO_CELL_NODES][3], PetscReal mean[HYCO_CELL_NODES][3], PetscReal e[6])
 {
@@ -245,6 +255,7 @@ void HycoPointStrain(HycoFE fe, const HycoElement *el, PetscInt cell, const Pets
     e[k] = k < 3 ? h[k][k] : h[k == 4 ? 1 : 0][k == 3 ? 1 : 2] + h[k == 3 ? 1 : 2][k == 4 ? 1 : 0];
 }
 
+/* f += w B^T s, the transpose of HycoPointStrain() with the same bbar correction, so that K and forces agree. */
 void HycoPointForce(HycoFE fe, const HycoElement *el, PetscReal g[HYCO_CELL_NODES][3],
                     PetscReal mean[HYCO_CELL_NODES][3], PetscReal w, const PetscReal s[6], PetscReal f[])
 {

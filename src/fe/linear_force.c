@@ -30,7 +30,8 @@ static PetscBool IsLinear(HycoFE fe, PetscInt cell)
   return fe->scene->body[fe->mesh->cell_body[cell]].law->linear;
 }
 
-/* The nodes of the linear cells around node i, ascending, in list; returns their number. */
+/* The nodes of the linear cells around node i, ascending, in list; returns their number. Insertion keeps the list
+   sorted; a node has at most some tens of neighbours. */
 static PetscInt Neighbours(HycoFE fe, PetscInt n, const PetscInt around[], PetscInt list[])
 {
   const PetscInt nv = fe->mesh->nv;
@@ -49,6 +50,7 @@ static PetscInt Neighbours(HycoFE fe, PetscInt n, const PetscInt around[], Petsc
   return count;
 }
 
+/* Rows of the wanted nodes that have linear cells, in CSR by blocks of dim x dim. */
 static PetscErrorCode ListRows(HycoLinearForce f, const PetscBool nodes[])
 {
   HycoMesh m = f->fe->mesh;
@@ -83,6 +85,7 @@ static PetscErrorCode ListRows(HycoLinearForce f, const PetscBool nodes[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For the rows of nodes[] (NULL: all nodes). Only linear bodies enter; others are integrated at each step. */
 PetscErrorCode HycoLinearForceCreate(HycoFE fe, const PetscBool nodes[], HycoLinearForce *force)
 {
   HycoMesh m = fe->mesh;
@@ -105,7 +108,8 @@ PetscErrorCode HycoLinearForceCreate(HycoFE fe, const PetscBool nodes[], HycoLin
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the element matrices to the blocks. */
+/* Adds the element matrices to the blocks. Bodies alone, without springs and elimination: internal forces are those
+   of all unknowns, as in HycoFEStep(). */
 static PetscErrorCode SetStiffness(HycoLinearForce f)
 {
   const PetscInt dim = f->fe->dim, nv = f->fe->mesh->nv, n = nv * dim;
@@ -153,6 +157,7 @@ static PetscErrorCode SetHeat(HycoLinearForce f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* K: whether the stiffness changed since the last call; thermal forces follow the temperature of each time. */
 PetscErrorCode HycoLinearForceSet(HycoLinearForce f, PetscBool K)
 {
   PetscFunctionBegin;
@@ -161,6 +166,7 @@ PetscErrorCode HycoLinearForceSet(HycoLinearForce f, PetscBool K)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* f_int[n_dof] += K u - thermal forces, at the wanted rows. */
 void HycoLinearForceAdd(HycoLinearForce f, const PetscReal u[], PetscReal f_int[])
 {
   const PetscInt dim = f->fe->dim;

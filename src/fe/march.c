@@ -1,6 +1,7 @@
 /* Integrates the laws along known displacements. */
 #include <hycoinelastic.h>
 
+/* Two states that alternate as begin and end, so that a step copies nothing. */
 PetscErrorCode HycoMarchBegin(HycoFE fe, HycoMarch *m)
 {
   PetscFunctionBegin;
@@ -11,6 +12,7 @@ PetscErrorCode HycoMarchBegin(HycoFE fe, HycoMarch *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One step without tangents: u is known, and no equilibrium is solved. The internal forces stay in m->f_int (n_dof). */
 PetscErrorCode HycoMarchStep(HycoMarch *m, const PetscReal u[], PetscReal t0, PetscReal t1, HycoFEStepReport *report)
 {
   const HycoFEState state = m->state;

@@ -10,11 +10,13 @@ static PetscInt Sign(HycoMesh m, const HycoElement *el, PetscInt cell, const Pet
 {
   PetscReal volume = 0;
 
+  /* In a simplex det J is constant: one point. */
   for (PetscInt q = 0; q < (el->nv == el->dim + 1 ? 1 : el->nq); q++)
     volume += HycoDeterminant(el, m->cells + cell * m->nv, X, q);
   return (volume > 0) - (volume < 0);
 }
 
+/* Signs of the cells as drawn, with which those of the moved cells are compared. */
 PetscErrorCode HycoMirrorCreate(HycoFE fe)
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
@@ -73,6 +75,7 @@ static PetscErrorCode CellsTurn(HycoFE fe, PetscInt turn[])
   for (PetscInt e = 0; e < m->n_cells; e++) {
     const PetscInt b = m->cell_body[e];
     HycoExpr *map = fe->scene->body[b].map;
+    /* The sign relative to the drawing: files may number cells in either orientation. */
     const PetscInt sign = map[0] || map[1] || map[2] ? fe->drawn_sign[e] * Sign(m, el, e, fe->X) : 1;
 
     HycoCheck(sign, "cell %d is degenerate: its volume vanishes", (int)m->cell_id[e]);
@@ -104,6 +107,8 @@ static PetscErrorCode CheckPieces(HycoFE fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Which bodies the map of the current mu mirrors. Called after nodes moved; an error names a cell of each sign. Not
+   collective: bodies without cells here are decided by their maps. */
 PetscErrorCode HycoMirrorFind(HycoFE fe)
 {
   PetscInt *turn;
@@ -124,6 +129,7 @@ PetscErrorCode HycoMirrorFind(HycoFE fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A body's cells may all be mirrored on one rank and none on another, which no rank alone sees. Collective. */
 PetscErrorCode HycoFEAgreeOnMirrors(MPI_Comm comm, HycoFE fe)
 {
   const PetscInt n = fe->scene->n_bodies;

@@ -53,6 +53,9 @@ static PetscErrorCode CheckSame(HycoFE fe, PetscInt node, const PetscReal n[3], 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Adds n.u = v at a node. The largest free entry of n is eliminated (|a_d| <= 1 then bounds the growth of
+   round-off); entries equal to 1e-9 count as ties, and the first component wins, so that round-off does not choose.
+   Not collective. */
 PetscErrorCode HycoObliqueAdd(HycoFE fe, PetscInt support, PetscInt node, const PetscReal direction[3], PetscReal value,
                               const char key[])
 {
@@ -87,6 +90,7 @@ PetscErrorCode HycoObliqueAdd(HycoFE fe, PetscInt support, PetscInt node, const 
   for (PetscInt d = 0; d < fe->dim; d++) o->a[d] = d == c ? 0 : -n[d] / n[c];
   fe->fixed[node * fe->dim + c] = PETSC_TRUE;
   fe->u0[node * fe->dim + c] = v / n[c];
+  /* Earlier rows must not refer to an unknown that is now dependent. */
   for (PetscInt k = 0; k < fe->n_oblique; k++) { /* substitutes u_c in other rows */
     HycoOblique *other = &fe->oblique[k];
     PetscReal share;
@@ -101,6 +105,7 @@ PetscErrorCode HycoObliqueAdd(HycoFE fe, PetscInt support, PetscInt node, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The inverse list, from unknown to its support, for the element loops. */
 PetscErrorCode HycoObliqueIndex(HycoFE fe)
 {
   PetscFunctionBegin;
@@ -116,6 +121,8 @@ const HycoOblique *HycoFEOblique(HycoFE fe, PetscInt dof)
   return fe->n_oblique && fe->oblique_at[dof] >= 0 ? &fe->oblique[fe->oblique_at[dof]] : NULL;
 }
 
+/* Ke <- T^T Ke T in place: rows and columns of the eliminated component are added to those of the free ones; its own
+   stay, as the diagonal of the fixed unknown. */
 void HycoObliqueStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
 {
   const PetscInt dim = fe->dim;
@@ -135,6 +142,7 @@ void HycoObliqueStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
   }
 }
 
+/* f <- T^T f: ties first, because a master may have an oblique support. The eliminated components keep their forces. */
 void HycoFEGeneralise(HycoFE fe, PetscReal f[])
 {
   HycoTiedGeneralise(fe, f);
@@ -145,6 +153,7 @@ void HycoFEGeneralise(HycoFE fe, PetscReal f[])
   }
 }
 
+/* The displacements of eliminated components: offset + a.u, then ties, whose masters must be complete. */
 void HycoFEComplete(HycoFE fe, PetscReal u[])
 {
   for (PetscInt k = 0; k < fe->n_oblique; k++) {

@@ -53,6 +53,7 @@ static PetscErrorCode ForEach(HycoFE fe, const PetscInt around[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* First pass: numbers per cell. */
 static PetscErrorCode Count(HycoFE fe, PetscInt spring, PetscInt cell, PetscInt facet, PetscInt node, void *ctx)
 {
   PetscFunctionBegin;
@@ -86,6 +87,8 @@ PetscErrorCode HycoSpringsDestroy(HycoSprings *springs)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* CSR by cell of all springs. Two passes in the same order; a point belongs to its first cell, which is that of the
+   smallest tag. Not collective. */
 PetscErrorCode HycoSpringsCreate(HycoFE fe)
 {
   HycoMesh m = fe->mesh;
@@ -152,6 +155,7 @@ static PetscErrorCode PointMatrix(HycoFE fe, const HycoSpring *spring, PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Normal and area at each Gauss point: n n^T dS = (n dS)(n dS)^T / dS. */
 static PetscErrorCode FacetMatrix(HycoFE fe, const HycoSpring *spring, PetscInt facet, PetscReal K[])
 {
   HycoMesh m = fe->mesh;
@@ -181,6 +185,7 @@ static PetscErrorCode FacetMatrix(HycoFE fe, const HycoSpring *spring, PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Evaluated when the nodes move or a stiffness changes. */
 PetscErrorCode HycoSpringsSet(HycoFE fe)
 {
   HycoSprings s = fe->springs;
@@ -210,6 +215,8 @@ static PetscBool IsOwn(HycoFE fe, PetscInt k)
   return (PetscBool)(HycoMeshOwned(fe->mesh, least) >= 0);
 }
 
+/* Adds the matrices of the cell's springs to Ke (before nodes are summed or eliminated). counted: only those that
+   this process counts, for sums over ranks. */
 void HycoSpringsAddStiffness(HycoFE fe, PetscInt cell, PetscBool counted, PetscReal Ke[])
 {
   HycoMesh m = fe->mesh;
@@ -233,6 +240,7 @@ void HycoSpringsAddStiffness(HycoFE fe, PetscInt cell, PetscBool counted, PetscR
   }
 }
 
+/* Cells whose springs depend on a parameter are not constant. */
 void HycoSpringsMarkVarying(HycoFE fe, const PetscBool changed[])
 {
   for (PetscInt e = 0; fe->springs && e < fe->mesh->n_cells; e++) {
@@ -262,6 +270,7 @@ static PetscReal Pull(HycoFE fe, PetscInt k, const PetscReal u[], PetscReal forc
   return energy;
 }
 
+/* f += scale times the springs' forces -K u, of all springs in this process's tables: complete at owned nodes. */
 void HycoSpringsAddForces(HycoFE fe, PetscReal scale, const PetscReal u[], PetscReal f[])
 {
   for (PetscInt k = 0; fe->springs && k < fe->springs->n; k++) {
@@ -273,6 +282,7 @@ void HycoSpringsAddForces(HycoFE fe, PetscReal scale, const PetscReal u[], Petsc
   }
 }
 
+/* u^T K u / 2 of the springs that this process counts; the sum over ranks is the total. */
 PetscReal HycoSpringsEnergy(HycoFE fe, const PetscReal u[])
 {
   PetscReal sum = 0, force[MAX_FACET_DOFS];
@@ -283,6 +293,7 @@ PetscReal HycoSpringsEnergy(HycoFE fe, const PetscReal u[])
   return sum;
 }
 
+/* Visits the counted springs; Gram matrices of rigid modes are sums over them. */
 PetscErrorCode HycoSpringsVisit(HycoFE fe, HycoSpringVisit visit, void *ctx)
 {
   const HycoSprings s = fe->springs;

@@ -18,7 +18,9 @@ static void AddProducts(PetscInt nv, PetscInt dim, const PetscReal p[], const Pe
   }
 }
 
-/* Ke += lambda P_cd + mu (P_dc + tr P) in each upper block, P = sum of w grad_a grad_b over points of one material. */
+/* Ke += lambda P_cd + mu (P_dc + tr P) in each upper block, P = sum of w grad_a grad_b over points of one material.
+   Products are summed over points of equal moduli first: with constant moduli the 4th-order contraction is done once
+   per cell. */
 static void AddMaterial(PetscInt nv, PetscInt dim, const PetscReal lame[2], const PetscReal P[], PetscReal Ke[])
 {
   const PetscInt n = nv * dim;
@@ -38,7 +40,8 @@ static void AddMaterial(PetscInt nv, PetscInt dim, const PetscReal lame[2], cons
   }
 }
 
-/* The bulk part of bbar: bulk times the products of the mean gradients, in the upper blocks. */
+/* The bulk part of bbar: bulk times the products of the mean gradients, in the upper blocks. Only the volumetric
+   part changes: AddIsotropic() uses -2 mu / 3 in place of lambda, and the rest of the bulk modulus comes here. */
 static PetscErrorCode AddMean(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal bulk, PetscReal Ke[])
 {
   const PetscInt n = el->nv * fe->dim;
@@ -82,7 +85,8 @@ static PetscErrorCode AddIsotropic(HycoFE fe, const HycoElement *el, PetscInt ce
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Strain components of unit displacements at a point, B (n_sigma x n); mean: gradients for the dilatation. */
+/* Strain components of unit displacements at a point, B (n_sigma x n); mean: gradients for the dilatation. The mean
+   part replaces the dilatation by the cell's mean, a third in each normal component. */
 static void StrainRows(HycoFE fe, const HycoElement *el, PetscReal g[HYCO_CELL_NODES][3],
                        PetscReal mean[HYCO_CELL_NODES][3], PetscReal B[])
 {
@@ -102,7 +106,8 @@ static void StrainRows(HycoFE fe, const HycoElement *el, PetscReal g[HYCO_CELL_N
   }
 }
 
-/* The upper blocks of the sum of w B^T C B. */
+/* The upper blocks of the sum of w B^T C B. C B is formed row by row, so that only one row is stored; zeros of B are
+   skipped. */
 static PetscErrorCode AddGeneral(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal Ke[])
 {
   const PetscInt ns = fe->n_sigma, n = el->nv * fe->dim;
@@ -134,6 +139,8 @@ static PetscErrorCode AddGeneral(HycoFE fe, const HycoElement *el, PetscInt cell
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The body's element matrix, n x n (n = nv x dim), without springs and elimination: upper blocks are computed, then
+   mirrored. */
 PetscErrorCode HycoFEBodyStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
@@ -151,6 +158,8 @@ PetscErrorCode HycoFEBodyStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One buffer in fe, which grows to the largest cell: cells with tied nodes have rows for their masters. Borrowed
+   until the next call. */
 PetscErrorCode HycoFEElementRoom(HycoFE fe, PetscInt cell, PetscReal **Ke)
 {
   const size_t n = (size_t)(HycoMeshCellSize(fe->mesh, cell) * fe->dim);
@@ -182,7 +191,8 @@ static void SumRepeated(HycoMesh m, PetscInt cell, PetscReal Ke[])
   for (PetscInt k = 0; k < size * size; k++) Ke[k] = sum[k];
 }
 
-/* From the body's matrix: adds the springs (counted: those that this process counts), eliminates unknowns. */
+/* From the body's matrix: adds the springs (counted: those that this process counts), eliminates unknowns. The order
+   matters: springs refer to all nv places of the cell, ties and supports to its distinct nodes. */
 static void OfUnknowns(HycoFE fe, PetscInt cell, PetscBool counted, PetscReal Ke[])
 {
   HycoSpringsAddStiffness(fe, cell, counted, Ke);
@@ -191,6 +201,7 @@ static void OfUnknowns(HycoFE fe, PetscInt cell, PetscBool counted, PetscReal Ke
   HycoObliqueStiffness(fe, cell, Ke);
 }
 
+/* The element matrix of the cell's generalised unknowns (T^T K T); fixed unknowns are not yet removed. */
 PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
 {
   PetscFunctionBegin;
@@ -199,6 +210,8 @@ PetscErrorCode HycoFEElementStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Such that the sum over all ranks counts each cell and each spring once, for energies and products of the whole
+   mesh. */
 PetscErrorCode HycoFECountedStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
 {
   const PetscInt n = fe->mesh->nv * fe->dim;
@@ -217,7 +230,8 @@ static PetscInt Global(HycoMesh m, PetscInt node)
   return m->node_global ? m->node_global[node] : node;
 }
 
-/* Counts the distinct neighbours of each owned node, in this rank's columns and in the others. */
+/* Counts the distinct neighbours of each owned node, in this rank's columns and in the others. seen[] marks
+   neighbours by the current node, in place of a sort. */
 static PetscErrorCode CountNeighbours(HycoMesh m, PetscInt n_owned, PetscInt first, PetscInt on[], PetscInt off[])
 {
   PetscInt *start, *around, *seen, node[HYCO_MAX_CELL_NODES];
@@ -253,6 +267,8 @@ static PetscErrorCode CountNeighbours(HycoMesh m, PetscInt n_owned, PetscInt fir
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* An AIJ matrix with the pattern of node blocks and exact preallocation from the cells around owned nodes, which are
+   all local: no communication of entries. n_owned nodes of this rank, the first of which is `first`. Collective. */
 PetscErrorCode HycoFECreateMatrix(HycoFE fe, MPI_Comm comm, PetscInt n_owned, PetscInt first, Mat *A)
 {
   PetscInt *on, *off;
@@ -272,7 +288,8 @@ PetscErrorCode HycoFECreateMatrix(HycoFE fe, MPI_Comm comm, PetscInt n_owned, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds an element matrix, fixed unknowns reduced to their own diagonal. */
+/* Adds an element matrix, fixed unknowns reduced to their own diagonal. Negative indices are ignored by
+   MatSetValues(): rows and columns of fixed unknowns. */
 static PetscErrorCode AddElement(HycoFE fe, PetscInt cell, const PetscReal Ae[], Mat A)
 {
   HycoMesh m = fe->mesh;
@@ -306,6 +323,7 @@ static PetscErrorCode Finish(Mat A)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Direct addition where the map exists (sequential, second assembly on); else MatSetValues(). */
 static PetscErrorCode AddStiffness(HycoFE fe, Mat K)
 {
   PetscReal *Ke;
@@ -323,7 +341,8 @@ static PetscErrorCode AddStiffness(HycoFE fe, Mat K)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The end of an assembly is collective: a rank with an error takes part in it, so that the others do not wait. */
+/* The end of an assembly is collective: a rank with an error takes part in it, so that the others do not wait. K
+   (N/m), of the current mu and tangents. Collective. */
 PetscErrorCode HycoFEAssembleStiffness(HycoFE fe, Mat K)
 {
   PetscErrorCode ierr;
@@ -335,6 +354,8 @@ PetscErrorCode HycoFEAssembleStiffness(HycoFE fe, Mat K)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* M of the norm ||u||^2 = integral of u^2 + length^2 |grad u|^2, in generalised unknowns; for errors of fields.
+   Collective. */
 PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M)
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
@@ -356,6 +377,7 @@ PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M)
           const PetscReal plane = g[a][0] * g[b][0] + g[a][1] * g[b][1], third = g[a][2] * g[b][2];
 
           for (PetscInt c = 0; c < dim; c++) {
+            /* The hoop term belongs to the radial component alone. */
             const PetscReal slopes = plane + (fe->formulation != HYCO_AXISYMMETRIC || c == 0 ? third : 0);
 
             Me[(a * dim + c) * n + b * dim + c] += w * (el->N[q][a] * el->N[q][b] + length * length * slopes);

@@ -32,6 +32,7 @@ static PetscErrorCode AtPoint(HycoFE fe, const HycoElement *el, PetscInt cell, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Volume means by cell, sigma[n_cells][n_sigma], of the elastic stress C (e - e_thermal). */
 PetscErrorCode HycoFEStress(HycoFE fe, const PetscReal u[], PetscReal sigma[])
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
@@ -55,6 +56,7 @@ PetscErrorCode HycoFEStress(HycoFE fe, const PetscReal u[], PetscReal sigma[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Integration weights summed by cell (m^3; in 2D per unit thickness; axisymmetric: of the full ring). */
 PetscErrorCode HycoFEVolumes(HycoFE fe, PetscReal volume[])
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
@@ -72,6 +74,7 @@ PetscErrorCode HycoFEVolumes(HycoFE fe, PetscReal volume[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Elastic energy by cell, sigma : e / 2 with the elastic strain, so that free thermal expansion stores nothing. */
 PetscErrorCode HycoFEEnergy(HycoFE fe, const PetscReal u[], PetscReal energy[])
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
@@ -93,6 +96,7 @@ PetscErrorCode HycoFEEnergy(HycoFE fe, const PetscReal u[], PetscReal energy[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* By cell, the part of 2 x energy that thermal strains contribute, so that u^T K u follows from the energies. */
 PetscErrorCode HycoFEHeatWork(HycoFE fe, const PetscReal u[], PetscReal work[])
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);

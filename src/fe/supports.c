@@ -6,7 +6,7 @@
 #include <petscblaslapack.h>
 #include <string.h>
 
-/* The representative node of the part connected to i; part leads to it. */
+/* The representative node of the part connected to i; part leads to it. Path halving keeps the trees flat. */
 static PetscInt Root(PetscInt part[], PetscInt i)
 {
   while (part[i] != i) {
@@ -17,7 +17,8 @@ static PetscInt Root(PetscInt part[], PetscInt i)
 }
 
 /* Each process identifies a piece of a part by its smallest node in the whole mesh: finds the smallest of the part.
-   piece: of each node; label: of each piece. */
+   piece: of each node; label: of each piece. Minimum over the ranks at shared nodes, repeated until nothing changes:
+   as many rounds as the longest chain of ranks through one part. */
 static PetscErrorCode JoinPieces(MPI_Comm comm, HycoMesh m, const PetscInt piece[], PetscInt label[])
 {
   PetscInt *node, *own;
@@ -57,6 +58,7 @@ static PetscErrorCode FindParts(MPI_Comm comm, HycoMesh m, PetscInt part[], Pets
   for (PetscInt k = 0; k < m->n_cells * m->nv; k++) {
     const PetscInt a = Root(part, m->cells[k]), b = Root(part, m->cells[k - k % m->nv]);
 
+    /* The smaller root wins: a representative precedes all nodes of its part, on which the numbering below relies. */
     part[PetscMax(a, b)] = PetscMin(a, b);
   }
   for (PetscInt k = 0; k < m->n_tied; k++) {
@@ -88,6 +90,7 @@ typedef struct {
   PetscReal high, low;
 } Sum;
 
+/* Error-free addition (two-sum) of the high part; the error goes to the low part. */
 static void Add(Sum *s, PetscReal value)
 {
   const PetscReal sum = s->high + value, part = sum - s->high;
@@ -96,6 +99,7 @@ static void Add(Sum *s, PetscReal value)
   s->high = sum;
 }
 
+/* An MPI operation; it is commutative up to round-off of the low part alone. */
 static void AddSums(void *in, void *inout, PetscMPIInt *n, MPI_Datatype *type)
 {
   const Sum *from = (const Sum *)in;
@@ -121,6 +125,7 @@ static PetscErrorCode Total(MPI_Comm comm, PetscInt n, Sum sum[])
   PetscCallMPI(MPI_Type_commit(&type));
   PetscCallMPI(MPI_Op_create(AddSums, 1, &op));
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  /* Reduce and broadcast, not Allreduce, whose order of sums may differ between ranks. */
   PetscCallMPI(MPI_Reduce(rank ? (void *)sum : MPI_IN_PLACE, sum, count, type, op, 0, comm));
   PetscCallMPI(MPI_Bcast(sum, count, type, 0, comm));
   PetscCallMPI(MPI_Op_free(&op));
@@ -136,7 +141,8 @@ typedef struct {
   PetscReal centre[3], size, gram[6][6];
 } Part;
 
-/* Row of component c of the rigid motions (dim translations, then rotations) at x. */
+/* Row of component c of the rigid motions (dim translations, then rotations) at x. x is relative to the part's
+   centre and size, so that all entries are of order 1 and a tolerance has no unit. */
 static PetscInt RigidRow(PetscInt dim, const PetscReal x[3], PetscInt c, PetscReal row[6])
 {
   const PetscInt n = dim == 1 ? 1 : dim == 2 ? 3 : 6;
@@ -153,6 +159,7 @@ static PetscInt RigidRow(PetscInt dim, const PetscReal x[3], PetscInt c, PetscRe
   return n;
 }
 
+/* The value of component c of a motion at x (m), from its six coefficients. */
 PetscReal HycoRigidAt(const HycoRigid *r, PetscInt dim, const PetscReal x[3], PetscInt c)
 {
   PetscReal at[3], row[6], sum = 0;
@@ -179,6 +186,7 @@ static void Name(HycoFE fe, const HycoRigid *r, const char others[], char name[H
     move += t[c] * t[c];
     turn += omega[c] * omega[c];
   }
+  /* The point of the axis nearest to the centre is omega x t / |omega|^2. */
   for (PetscInt c = 0; c < 3; c++) {
     const PetscInt e = (c + 1) % 3, f = (c + 2) % 3;
 
@@ -202,7 +210,8 @@ static void Name(HycoFE fe, const HycoRigid *r, const char others[], char name[H
                (double)at[1], (double)at[2]);
 }
 
-/* The combination's motion of the part to which motion k belongs; its share of the whole. */
+/* The combination's motion of the part to which motion k belongs; its share of the whole. Motions of one part are
+   contiguous, but a combination may mix several of them. */
 static PetscReal OfPart(const HycoMotions *motions, const PetscReal coefficient[], PetscInt k, HycoRigid *r)
 {
   PetscReal share = 0;
@@ -217,6 +226,8 @@ static PetscReal OfPart(const HycoMotions *motions, const PetscReal coefficient[
   return share;
 }
 
+/* Names a combination of motions by its largest part, with the bodies that move more than 1e-2 of the whole; for
+   messages. */
 void HycoMotionsName(HycoFE fe, const HycoMotions *motions, const PetscReal coefficient[], char name[HYCO_LINE])
 {
   HycoRigid best, r;
@@ -280,6 +291,7 @@ static PetscErrorCode AddMotion(MPI_Comm comm, HycoFE fe, const PetscInt part[],
     if (part[i / fe->dim] != which) continue;
     for (PetscInt c = 0; c < 3; c++) x[c] = (fe->X[3 * (i / fe->dim) + c] - p->centre[c]) / p->size;
     RigidRow(fe->dim, x, i % fe->dim, row);
+    /* Fixed unknowns are left out: they are zero within round-off, since the motion satisfies the supports. */
     for (PetscInt j = 0; j < n_rigid && !fe->fixed[i]; j++) u[i] += row[j] * v[j];
   }
   for (PetscInt j = first; j < k; j++) {
@@ -297,6 +309,8 @@ static PetscErrorCode AddMotion(MPI_Comm comm, HycoFE fe, const PetscInt part[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Eigenvectors of the Gram matrix with eigenvalue 0: motions that no support resists. The matrix holds squares,
+   hence 1e-13 corresponds to 3e-7 in a motion. */
 static PetscErrorCode PartMotions(MPI_Comm comm, HycoFE fe, const PetscInt part[], PetscInt which, Part *p,
                                   HycoMotions *motions)
 {
@@ -312,7 +326,8 @@ static PetscErrorCode PartMotions(MPI_Comm comm, HycoFE fe, const PetscInt part[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets body (of its last node), centre and size of each part. */
+/* Sets body (of its last node), centre and size of each part. Centre: mean of the nodes; size: largest distance of a
+   coordinate. Of owned nodes, and the maximum also sees ghosts. */
 static PetscErrorCode PlaceParts(MPI_Comm comm, HycoFE fe, const PetscInt part[], PetscInt n_parts, Part parts[])
 {
   HycoMesh m = fe->mesh;
@@ -347,7 +362,8 @@ static PetscErrorCode PlaceParts(MPI_Comm comm, HycoFE fe, const PetscInt part[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Springs hold a part as supports do, however small their stiffness is. */
+/* Springs hold a part as supports do, however small their stiffness is. Scaled by its largest entry: a soft spring
+   still makes K regular. */
 typedef struct {
   const PetscInt *part;
   const Part *parts;
@@ -380,7 +396,8 @@ static PetscErrorCode AddSpring(HycoFE fe, PetscInt spring, PetscInt n, const Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sums the Gram matrix of each part. */
+/* Sums the Gram matrix of each part. A row per supported unknown: rigid motions that it resists. An oblique support
+   resists n.u, thus the motion minus that of the expressed components. */
 static PetscErrorCode MeasureParts(MPI_Comm comm, HycoFE fe, const PetscInt part[], PetscInt n_parts, Part parts[])
 {
   SpringGram ctx;
@@ -418,6 +435,8 @@ static PetscErrorCode MeasureParts(MPI_Comm comm, HycoFE fe, const PetscInt part
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rigid motions that supports and springs leave, orthonormal over all unknowns, part by part in the order of the
+   mesh file: identical on any number of ranks. Values at local unknowns; the caller destroys them. Collective. */
 PetscErrorCode HycoFEFreeMotions(MPI_Comm comm, HycoFE fe, HycoMotions *motions)
 {
   HycoMesh m = fe->mesh;

@@ -4,6 +4,7 @@
 
 #define BATCH 64 /* cells of one body whose points a law evaluates together */
 
+/* Two reals per point for isotropic laws, n_sigma^2 otherwise; the offsets of cells are fixed for fe's life. */
 PetscErrorCode HycoTangentsCreate(HycoFE fe)
 {
   HycoMesh m = fe->mesh;
@@ -51,6 +52,7 @@ static PetscErrorCode Update(HycoFE fe, Batch *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Batches of one body: a law is called for up to 64 cells at once. */
 static PetscErrorCode UpdateAll(HycoFE fe, PetscBool all, Batch *b)
 {
   HycoMesh m = fe->mesh;
@@ -65,6 +67,7 @@ static PetscErrorCode UpdateAll(HycoFE fe, PetscBool all, Batch *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Elastic tangents at mu; all: also those of cells that no parameter changes. Not collective. */
 PetscErrorCode HycoFESetTangents(HycoFE fe, PetscBool all)
 {
   const PetscInt n = BATCH * HycoElementGet(fe->mesh->type)->nq, ns = fe->n_sigma;

@@ -7,6 +7,7 @@
 #include <hycokinematics.h>
 #include <hycovector.h>
 
+/* Before normals and gaps are computed. A map that opens the tie by more than its tolerance is an error. */
 PetscErrorCode HycoTiedPlace(HycoFE fe)
 {
   HycoMesh m = fe->mesh;
@@ -47,6 +48,8 @@ static PetscBool MastersHold(HycoFE fe, PetscInt k, PetscInt c)
   return (PetscBool)(PetscAbsReal(u - own) <= 1e-9 * size);
 }
 
+/* The difference from the masters is fixed to 0. A support of the slave itself must follow from those of its
+   masters. */
 PetscErrorCode HycoTiedFix(HycoFE fe)
 {
   HycoMesh m = fe->mesh;
@@ -69,6 +72,7 @@ PetscErrorCode HycoTiedFix(HycoFE fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A direction is the same for slave and masters only if it is constant in space and all masters are in its group. */
 PetscErrorCode HycoTiedCheckOblique(HycoFE fe, const HycoFixed *fixed, PetscInt group, PetscInt node)
 {
   HycoMesh m = fe->mesh;
@@ -98,6 +102,8 @@ static void Grow(PetscInt n, PetscInt to, PetscReal Ke[])
   }
 }
 
+/* Ke <- T^T Ke T, extended by the masters that are not nodes of the cell; the slaves' rows stay for their
+   differences. */
 void HycoTiedStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
 {
   HycoMesh m = fe->mesh;
@@ -124,6 +130,7 @@ void HycoTiedStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
   }
 }
 
+/* u_slave from its masters. A master is never a slave, so that the order is free. */
 void HycoTiedComplete(HycoFE fe, PetscReal u[])
 {
   HycoMesh m = fe->mesh;
@@ -141,6 +148,7 @@ void HycoTiedComplete(HycoFE fe, PetscReal u[])
   }
 }
 
+/* f_master += w f_slave; the slave keeps its own. */
 void HycoTiedGeneralise(HycoFE fe, PetscReal f[])
 {
   HycoMesh m = fe->mesh;
@@ -155,6 +163,8 @@ void HycoTiedGeneralise(HycoFE fe, PetscReal f[])
   }
 }
 
+/* Moves the forces of slaves to masters and clears them: for internal forces, whose equilibrium is that of free
+   nodes. */
 void HycoFEPassTied(HycoFE fe, PetscReal f[])
 {
   HycoTiedGeneralise(fe, f);

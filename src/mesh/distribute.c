@@ -2,6 +2,8 @@
 #include "plex.h"
 #include <string.h>
 
+/* Broadcasts the tags (IS of this process, by point) along the migration star forest of points, because
+   DMPlexDistribute() sends labels and coordinates but no composed object. Collective. */
 PetscErrorCode HycoPlexSendTags(DM from, PetscSF sf, DM to)
 {
   PetscInt first, last, *tag;
@@ -53,6 +55,9 @@ static PetscErrorCode CheckParts(DM dm)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whole mesh on rank 0 -> a part of each rank, refined, then with one layer of overlap: every cell around an owned
+   node is local, so that each rank assembles its rows of K and B without communication. Refinement comes before
+   the overlap, which is one layer of refined cells. Replaces *dm. Collective. */
 PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, PetscInt n_pairs, const PetscInt pairs[],
                                   HycoPartitioner by, const char write[])
 {
@@ -77,6 +82,7 @@ PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, Petsc
   if (overlap) PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheck(!write[0] || !scene->n_ties, "hyco_mesh_write: a mesh with ties (%s) cannot be written as a DMPlex",
             scene->tie[0].name);
+  /* Written before the overlap is added: the file has each cell once. */
   if (write[0]) {
     PetscCall(HycoPlexType(*dm, &type, &mixed));
     HycoCheck(!HycoCellKinds[PetscMax(type, 0)].quadratic,
@@ -118,6 +124,8 @@ static PetscErrorCode NumberPoints(DM dm)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For a DM that another program made: adds tags, requires faces and edges as points (a facet of a group must be
+   one), and completes the labels, so that a group of facets contains its nodes. Collective. */
 PetscErrorCode HycoPlexComplete(DM dm)
 {
   PetscInt n, dim, depth;
@@ -129,6 +137,7 @@ PetscErrorCode HycoPlexComplete(DM dm)
   PetscCall(NumberPoints(dm));
   PetscCall(DMGetDimension(dm, &dim));
   PetscCall(DMPlexGetDepth(dm, &depth));
+  /* A rank without cells has depth -1 or 0, thus the maximum. */
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &depth, 1, MPIU_INT, MPI_MAX, HycoComm(dm)));
   HycoCheck(depth == dim,
             "the DM has cells of dimension %d and points of %d depths; interpolate it (DMPlexInterpolate)", (int)dim,

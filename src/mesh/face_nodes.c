@@ -16,6 +16,8 @@ typedef struct {
   PetscInt corner[CORNERS], group, element, face;
 } Wanted;
 
+/* Orders by corners first, so that all requests for one position are contiguous whatever element makes them;
+   group, element and face only make the order total, as qsort() is not stable. */
 static int Compare(const void *a, const void *b)
 {
   const PetscInt *p = (const PetscInt *)a, *q = (const PetscInt *)b; /* all members of Wanted are PetscInt */
@@ -88,6 +90,7 @@ static void Place(const HycoMsh *mesh, const Wanted *w, PetscReal x[3])
 
   for (PetscInt c = 0; c < 3; c++) {
     x[c] = 0;
+    /* Quad8 at its middle: corners -1/4, middles of sides 1/2. Hex20: corners -1/4, middles of edges 1/4. */
     for (PetscInt k = 0; k < n; k++) x[c] -= mesh->xyz[3 * node[k] + c] / 4;
     for (PetscInt k = n; k < n + n_sides; k++) x[c] += mesh->xyz[3 * node[k] + c] * 2 / n;
   }
@@ -110,6 +113,9 @@ static PetscErrorCode Widen(HycoMshGroup *g)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Adds to the file's tables one node for each face and cell of its hex20, tagged after the largest tag, in the
+   order of the corners' indices: the tags thus depend on the file alone. Coordinates come from the old nodes,
+   before groups are widened. One process. */
 PetscErrorCode HycoMshAddFaceNodes(const char path[], HycoMsh *mesh)
 {
   Wanted *list;
@@ -132,6 +138,7 @@ PetscErrorCode HycoMshAddFaceNodes(const char path[], HycoMsh *mesh)
     at++;
   }
   for (PetscInt k = 0; k < mesh->n_groups; k++) PetscCall(Widen(&mesh->group[k]));
+  /* The second pass counts positions as the first one did, and so finds each new node's index. */
   at = mesh->n_nodes - 1;
   for (PetscInt k = 0; k < n; k++) {
     HycoMshGroup *g = &mesh->group[list[k].group];

@@ -37,6 +37,7 @@ const signed char *HycoFacetNodes(HycoCellType type, PetscInt number)
   return face[type][number];
 }
 
+/* Brings a collapsed quadrilateral to the form (a, b, c, c), with the same orientation. Others are left alone. */
 void HycoFacetRepeatLast(PetscInt nf, PetscInt node[])
 {
   PetscInt turned[4], k = 0;
@@ -48,6 +49,8 @@ void HycoFacetRepeatLast(PetscInt nf, PetscInt node[])
   for (PetscInt v = 0; v < 4; v++) node[v] = turned[v];
 }
 
+/* Nodes of a facet in m->nf places; returns how many are different. The cell's repeated nodes appear in the facet
+   too: 3 of 4 for a triangle, 1 or 2 for a facet that has collapsed to a point or an edge. */
 PetscInt HycoMeshFace(HycoMesh m, PetscInt cell, PetscInt number, PetscInt node[])
 {
   PetscInt n = 0;
@@ -75,6 +78,8 @@ static PetscBool AreAmong(PetscInt n, const PetscInt node[], const PetscInt othe
   return PETSC_TRUE;
 }
 
+/* The facet of the cell with these nodes, as sets in both directions: in collapsed cells the number of entries
+   does not distinguish a triangle from a quadrilateral. -1: none. */
 PetscInt HycoCellFace(HycoMesh m, PetscInt cell, const PetscInt node[])
 {
   for (PetscInt f = 0; f < n_faces[m->type]; f++) {

@@ -1,6 +1,8 @@
 /* The file's order: rows by ascending tag, in contiguous blocks over the processes, or all on rank 0. */
 #include <hycomesh.h>
 
+/* The star forest from rows of the file (roots) to this process's owned nodes or cells (leaves). Roots are in
+   blocks of equal size, or all on rank 0 if `root`. */
 static PetscErrorCode CreateSF(HycoFileOrder *o, HycoPlace place, PetscInt n, const PetscInt leaf[],
                                const PetscInt row[], PetscBool root)
 {
@@ -22,6 +24,8 @@ static PetscErrorCode CreateSF(HycoFileOrder *o, HycoPlace place, PetscInt n, co
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rows of nodes and of cells by ascending tag. Each row has one leaf: a node at its owner, a cell at the owner of
+   its first node, so that overlapping parts send nothing twice. Collective. */
 PetscErrorCode HycoFileOrderCreate(MPI_Comm comm, HycoMesh m, PetscBool root, HycoFileOrder **order)
 {
   PetscInt *leaf, *row;
@@ -58,6 +62,7 @@ PetscErrorCode HycoFileOrderDestroy(HycoFileOrder **order)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* `width` values as one MPI type: a star forest then moves whole rows in one message. */
 static PetscErrorCode CreateUnit(MPI_Datatype type, PetscInt width, MPI_Datatype *unit)
 {
   PetscMPIInt count;
@@ -69,6 +74,7 @@ static PetscErrorCode CreateUnit(MPI_Datatype type, PetscInt width, MPI_Datatype
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* PetscSFBcastBegin() and -End() for rows of `width` values. Collective. */
 PetscErrorCode HycoSFBcast(PetscSF sf, MPI_Datatype type, PetscInt width, const void *root, void *leaf)
 {
   MPI_Datatype unit;
@@ -81,6 +87,7 @@ PetscErrorCode HycoSFBcast(PetscSF sf, MPI_Datatype type, PetscInt width, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The reverse: leaf to root, for star forests with one leaf per root, hence MPI_REPLACE. Collective. */
 PetscErrorCode HycoSFSend(PetscSF sf, MPI_Datatype type, PetscInt width, const void *leaf, void *root)
 {
   MPI_Datatype unit;
@@ -101,6 +108,8 @@ PetscErrorCode HycoFileOrderSend(const HycoFileOrder *o, HycoPlace place, MPI_Da
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rows of the file to all nodes or cells of a part, those of other owners included: another star forest than that
+   of Create, in which ghosts have no leaf. Made at each call, because fields are read seldom. Collective. */
 PetscErrorCode HycoFileOrderFetch(const HycoFileOrder *o, HycoMesh m, HycoPlace place, PetscInt components,
                                   const PetscReal rows[], PetscReal value[])
 {

@@ -30,6 +30,7 @@ static PetscErrorCode Agree(const Gather *g, MPI_Op op, PetscInt value[])
   PetscFunctionBegin;
   PetscCall(DMGetPointSF(g->part->dm, &sf));
   PetscCall(PetscSFGetGraph(sf, &n_roots, NULL, NULL, NULL));
+  /* No star forest is set on one rank. */
   if (n_roots < 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscSFReduceBegin(sf, MPIU_INT, value, value, op));
   PetscCall(PetscSFReduceEnd(sf, MPIU_INT, value, value, op));
@@ -58,6 +59,8 @@ static PetscErrorCode Choose(Gather *g)
     for (PetscInt j = m->group_start[k]; g->in && g->in[k] && j < m->group_start[k + 1]; j++)
       kind[m->node_point[m->group_node[j]]] = CHOSEN;
   }
+  /* First pass: chosen points over all ranks. A cell's nodes follow in a second pass at every rank that has the
+     cell, because the owner of a node need not have the group's facet in its tables. */
   PetscCall(Agree(g, MPI_MAX, kind));
   for (PetscInt e = 0; e < m->n_cells; e++) {
     const PetscInt n = HycoMeshCellNodes(m, e, node), of = kind[m->cell_point[e]];
@@ -110,6 +113,8 @@ static PetscErrorCode AddFacets(const Gather *g, PetscInt n, const PetscInt poin
     for (PetscInt f = 0; f < m->n_facets; f++) {
       if (m->facet_group[f] == k) facets[m->cell_point[m->facet_cell[f]]] |= 1 << HycoMeshFacetNumber(m, f);
     }
+    /* A facet is in the tables of ranks that own one of its nodes; the cell may be sent by another rank. The bits
+       of all of them are combined at the cell. */
     PetscCall(Agree(g, MPI_BOR, facets));
     PetscCall(HycoPlexGroupLabel(g->share, m->group_name[k], &label));
     for (PetscInt c = 0; c < n; c++) {
@@ -149,6 +154,7 @@ static PetscErrorCode SetPointSF(const Gather *g, PetscInt n, const PetscInt poi
     leaf[n_mine] = at[p];
     remote[n_mine++].rank = to[j].rank;
   }
+  /* The number of the node in the share of its owner, which has all chosen nodes that it owns. */
   PetscCall(PetscSFBcastBegin(sf, MPIU_INT, at, at, MPI_REPLACE));
   PetscCall(PetscSFBcastEnd(sf, MPIU_INT, at, at, MPI_REPLACE));
   for (PetscInt j = 0; j < n_mine; j++) remote[j].index = at[point[leaf[j]]];
@@ -174,6 +180,8 @@ static PetscErrorCode CreateSF(const Gather *g, PetscInt n, const PetscBool own[
     for (PetscInt p = k ? v0 : 0; p < (k ? n : v0); p++) {
       if (own[p]) mine[n_mine++] = (PetscSFNode){g->rank, p};
     }
+    /* Gathered on rank 0 in the order of the ranks: all cells first, then all nodes, as a DMPlex of cells and
+       vertices is numbered. An entry is two integers (rank, point). */
     PetscCall(HycoConcatenate(g->comm, 2 * n_mine, mine, MPIU_INT, sizeof(PetscInt), &n_all[k], &all[k]));
     n_all[k] = g->rank ? 0 : n_all[k] / 2;
   }
@@ -195,6 +203,7 @@ static PetscErrorCode SendColumns(Gather *g, PetscSF sf, PetscInt n, const Petsc
   PetscInt *value[N_COLUMNS], *mine, n_root, first = 0;
 
   PetscFunctionBegin;
+  /* Point numbers of different ranks would coincide; the offset makes them unique over the ranks. */
   PetscCallMPI(MPI_Exscan(&g->n, &first, 1, MPIU_INT, MPI_SUM, g->comm));
   PetscCall(PetscMalloc3(g->n, &value[GLOBAL], g->n, &value[WHOLE], n, &mine));
   for (PetscInt i = 0; i < m->n_nodes; i++) {
@@ -303,6 +312,9 @@ static PetscErrorCode MakeSubmesh(const Gather *g, HycoMesh *sub)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Chosen cells, facets and nodes of a distributed mesh as one mesh on rank 0 (NULL elsewhere): groups in[] (NULL:
+   everything) and cells cell[] (NULL: none). Rows, tags and unknowns keep the numbers of the distributed mesh.
+   Collective; the cost is that of the chosen points, not of the mesh. */
 PetscErrorCode HycoMeshGather(HycoScene scene, HycoMesh part, const PetscBool in[], const PetscBool cell[],
                               HycoMesh *mesh)
 {

@@ -23,6 +23,7 @@ static PetscErrorCode OrderTags(DM dm, IS *ordered)
   PetscFunctionBegin;
   PetscCall(PetscObjectQuery((PetscObject)dm, HYCO_TAGS, (PetscObject *)&tags));
   PetscCall(DMPlexCreatePointNumbering(dm, &numbers));
+  /* Global numbers: -1 - number where another rank owns the point, so that each is sent by its owner alone. */
   PetscCall(DMPlexGetChart(dm, &first, &last));
   PetscCall(PetscMalloc2(last - first, &leaf, last - first, &to));
   PetscCall(ISGetIndices(tags, &tag));
@@ -50,6 +51,7 @@ static PetscErrorCode OrderTags(DM dm, IS *ordered)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Topology, labels, coordinates and tags, with all processes: nothing is gathered. Collective. */
 PetscErrorCode HycoPlexWrite(DM dm, const char path[])
 {
   PetscViewer viewer;
@@ -81,6 +83,7 @@ static PetscErrorCode FindTopology(const char path[], size_t room, char name[])
   PetscFunctionBegin;
   HycoCheck(file, "the mesh %s cannot be opened", path);
   fclose(file);
+  /* HDF5 would print its stack of errors for a file of another kind; the failure is reported by one line below. */
   H5E_BEGIN_TRY
   {
     h = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
@@ -110,6 +113,7 @@ static PetscErrorCode LoadTags(DM dm, PetscViewer viewer, PetscSF from_file)
   PetscCall(ISCreate(PetscObjectComm((PetscObject)dm), &tags));
   PetscCall(ISSetType(tags, ISGENERAL));
   PetscCall(PetscObjectSetName((PetscObject)tags, HYCO_TAGS));
+  /* A loaded IS would get PETSC_DECIDE's layout, which differs from that of the file's points. */
   {
     PetscLayout layout;
 
@@ -127,6 +131,8 @@ static PetscErrorCode LoadTags(DM dm, PetscViewer viewer, PetscSF from_file)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The topology arrives on rank 0 (PETSc 3.18), and is distributed later. The file is checked on rank 0 first,
+   because a failing open on one rank leaves the others waiting. Collective. */
 PetscErrorCode HycoPlexRead(MPI_Comm comm, const char path[], DM *dm)
 {
   char name[HYCO_LINE] = "";

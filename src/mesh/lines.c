@@ -24,6 +24,7 @@ static Edge EdgeOf(HycoMesh m, PetscInt cell, PetscInt number, PetscInt k)
   const PetscInt corners = HycoCellKinds[m->type].corners, *node = m->cells + cell * m->nv;
   const signed char *of = HycoFacetNodes(m->type, number);
   const PetscInt a = node[of[k]], b = node[of[(k + 1) % corners]];
+  /* Both ends in one 64-bit key, smaller index first: edges are compared and sorted by one number. */
   const Edge edge = {(PetscInt64)PetscMin(a, b) * m->n_nodes + PetscMax(a, b),
                      HycoMeshIsQuadratic(m) ? node[of[corners + k]] : -1};
 
@@ -83,6 +84,9 @@ static PetscErrorCode CheckPath(HycoMesh m, PetscInt group, PetscInt n, const Ed
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Segments (rows of 2 nodes, 3 of second order: ends, then the middle) of a group of dimension 1 in this process's
+   part, by ascending key; the caller frees them. Not collective; branches are an error at the node's owner alone,
+   who has all cells around it. */
 PetscErrorCode HycoMeshLine(HycoMesh m, PetscInt group, PetscInt *n, PetscInt **segment)
 {
   const PetscInt width = HycoMeshIsQuadratic(m) ? 3 : 2;

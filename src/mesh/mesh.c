@@ -44,6 +44,7 @@ PetscErrorCode HycoMeshDestroy(HycoMesh *mesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Linear search: a mesh has tens of groups. The message lists all groups and the nearest name. */
 PetscErrorCode HycoMeshFindGroup(HycoMesh mesh, const char key[], const char name[], PetscInt *group)
 {
   char list[HYCO_LINE] = "";
@@ -89,6 +90,7 @@ static PetscErrorCode CheckPointLoad(HycoMesh mesh, const HycoPointLoad *load)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Stiffness per area of a surface, or of single points; a normal component needs a surface. */
 static PetscErrorCode CheckSpring(HycoMesh mesh, const HycoSpring *spring)
 {
   PetscInt group, dim;
@@ -106,6 +108,7 @@ static PetscErrorCode CheckSpring(HycoMesh mesh, const HycoSpring *spring)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Both sides must have facets: a slave's weights are shape functions of the master's facet. */
 static PetscErrorCode CheckTie(HycoMesh mesh, const HycoTie *tie)
 {
   PetscFunctionBegin;
@@ -140,6 +143,8 @@ static PetscErrorCode CheckContact(HycoMesh mesh, HycoContact contact)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Everything the scene says about groups is checked here, before any assembly: existence, dimension, components.
+   Not collective; the same result on every rank once group_dim is. */
 PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene)
 {
   PetscInt group;
@@ -180,7 +185,7 @@ PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether two bodies move a node differently. */
+/* Whether two bodies leave a shared node in the same place: here, whether neither has a map. */
 static PetscBool SameMap(const HycoBody *a, const HycoBody *b)
 {
   for (PetscInt c = 0; c < 3; c++) {
@@ -189,6 +194,8 @@ static PetscBool SameMap(const HycoBody *a, const HycoBody *b)
   return PETSC_TRUE;
 }
 
+/* The body of each node: the one of its cells, the first in the scene's order at a shared node. Needed since maps
+   and laws belong to bodies, while nodes are moved one by one. Checks that a shared node has one motion. */
 PetscErrorCode HycoMeshSetNodeBodies(HycoScene scene, HycoMesh m)
 {
   PetscFunctionBegin;
@@ -227,6 +234,7 @@ PetscErrorCode HycoMeshSetNodeBodies(HycoScene scene, HycoMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* In place; lists made in order (most of them) are only scanned. */
 PetscErrorCode HycoSortUnique(PetscInt *n, PetscInt a[])
 {
   PetscBool sorted;
@@ -240,6 +248,8 @@ PetscErrorCode HycoSortUnique(PetscInt *n, PetscInt a[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* ends[c]: the largest coordinate c, ends[3 + c]: minus the smallest, so that one reduction with MPI_MAX gives
+   both ends over all ranks. */
 void HycoMeshEnds(HycoMesh m, PetscReal ends[6])
 {
   for (PetscInt c = 0; c < 6; c++) ends[c] = PETSC_MIN_REAL;
@@ -249,6 +259,8 @@ void HycoMeshEnds(HycoMesh m, PetscReal ends[6])
   }
 }
 
+/* The longest side of the bounding box of the whole mesh (length): the scale of tolerances. A part uses the whole
+   mesh's value, so that tolerances do not depend on the partition. */
 PetscReal HycoMeshLength(HycoMesh m)
 {
   PetscReal length = m->whole_length, ends[6];
@@ -259,6 +271,8 @@ PetscReal HycoMeshLength(HycoMesh m)
   return length;
 }
 
+/* The star forest from the owners' nodes (contiguous numbers of the distributed vectors) to n given ones.
+   Collective; the caller destroys it. */
 PetscErrorCode HycoMeshNodeSF(MPI_Comm comm, HycoMesh part, PetscInt n, const PetscInt global[], PetscSF *sf)
 {
   PetscLayout layout;
@@ -271,6 +285,7 @@ PetscErrorCode HycoMeshNodeSF(MPI_Comm comm, HycoMesh part, PetscInt n, const Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Neighbouring entries mostly have one owner, so that the last one is tried before the search. */
 PetscErrorCode HycoMeshOwners(MPI_Comm comm, HycoMesh part, PetscInt n, const PetscInt global[], PetscMPIInt owner[])
 {
   PetscLayout layout;
@@ -287,6 +302,8 @@ PetscErrorCode HycoMeshOwners(MPI_Comm comm, HycoMesh part, PetscInt n, const Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The cells around each node in CSR, masters of tied nodes included; cells ascend at each node. The caller frees
+   both arrays. */
 PetscErrorCode HycoMeshNodeCells(HycoMesh m, PetscInt **start, PetscInt **cell)
 {
   PetscInt *next, node[HYCO_MAX_CELL_NODES];

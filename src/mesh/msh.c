@@ -119,6 +119,8 @@ static PetscErrorCode ReadCountLine(Msh *m, size_t bytes, const char what[], siz
 
 /* -- nodes -- */
 
+/* Allocates tags and coordinates for n nodes; the count was checked against the file's size, so that a damaged
+   file cannot ask for all memory. */
 static PetscErrorCode MakeNodes(Msh *m, size_t n)
 {
   PetscFunctionBegin;
@@ -128,6 +130,7 @@ static PetscErrorCode MakeNodes(Msh *m, size_t n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Tags must leave room for the sentinel PETSC_MAX_INT. */
 static PetscErrorCode AddNode(Msh *m, size_t k, long long tag)
 {
   PetscFunctionBegin;
@@ -176,6 +179,7 @@ static PetscErrorCode CheckEntity(Msh *m, long long dim, long long tag)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Blocks by entity: first all tags, then all coordinates, with parametric ones that are dropped. */
 static PetscErrorCode ReadNodes4(Msh *m)
 {
   size_t blocks, n, all, done = 0;
@@ -268,6 +272,8 @@ static PetscInt FindNode(const HycoMsh *mesh, long long tag)
 
 /* -- elements, by group -- */
 
+/* Index of a group, which is inserted if it is new. Groups are sorted by dimension and tag, so that their order
+   does not depend on that of the file's sections. */
 static PetscErrorCode FindGroup(HycoMsh *mesh, int dim, int tag, PetscInt *index)
 {
   PetscInt k = 0;
@@ -388,6 +394,7 @@ static PetscErrorCode ReadElement(Msh *m, size_t bytes, long long tag, long long
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* gmsh numbers its types from 1; only those with a known number of nodes can even be skipped. */
 static PetscErrorCode CheckType(Msh *m, long long type)
 {
   PetscFunctionBegin;
@@ -410,6 +417,8 @@ static PetscErrorCode ReadTags2(Msh *m, long long n, long long *group)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Binary files have blocks of elements with one header, text has a header per line; both are read as blocks, of
+   one element in text. */
 static PetscErrorCode ReadElements2(Msh *m)
 {
   size_t n;
@@ -436,6 +445,7 @@ static PetscErrorCode ReadElements2(Msh *m)
       if (m->binary) tag = ReadInt(m, 4);
       PetscCall(ReadTags2(m, n_tags, &group));
       PetscCall(ReadElement(m, 4, tag, &own, node));
+      /* gmsh's group 0: the element belongs to no physical group. */
       if (!group) continue;
       PetscCall(FindGroup(m->mesh, type_dim[type], (int)group, &at));
       PetscCall(AddElement(m, &m->mesh->group[at], tag, own, node));
@@ -452,6 +462,7 @@ static PetscErrorCode ReadBlock4(Msh *m, long long dim, long long entity, long l
   size_t first = 0, last;
 
   PetscFunctionBegin;
+  /* Members are contiguous by entity, in the order of $Entities. */
   while (first < m->n_members && (m->member[first].dim != dim || m->member[first].entity != entity)) first++;
   for (last = first; last < m->n_members && m->member[last].dim == dim && m->member[last].entity == entity;) last++;
   for (size_t k = 0; k < n; k++) {
@@ -538,6 +549,8 @@ static PetscErrorCode ReadList(Msh *m, PetscBool groups, int dim, long long enti
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Bounding boxes and boundaries are skipped; only the entity's groups count. A point has 3 coordinates, others a
+   box of 6. */
 static PetscErrorCode ReadEntities(Msh *m)
 {
   size_t n[4];
@@ -654,6 +667,8 @@ static PetscErrorCode ReadFormat(Msh *m)
   char *end;
   long binary, size, one;
 
+  /* Checks the version (2.2 or 4.1), the kind and the size of numbers; the integer 1 in binary files shows the
+     byte order. */
   PetscFunctionBegin;
   line = line && strncmp(line, "$MeshFormat", 11) == 0 ? NextLine(m) : NULL;
   if (!line) PetscCall(RefuseOther(m));
@@ -702,6 +717,7 @@ static PetscErrorCode ReadSections(Msh *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The whole file in memory: the parsers then never meet the end of a buffer within a number. */
 static PetscErrorCode ReadAll(Msh *m)
 {
   FILE *file = fopen(m->path, "rb");
@@ -725,6 +741,7 @@ static PetscErrorCode ReadAll(Msh *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Fills the tables of a file; the caller destroys them also after an error. One process. */
 PetscErrorCode HycoMshRead(const char path[], HycoMsh *mesh)
 {
   Msh m = {.path = path, .mesh = mesh};

@@ -1,6 +1,7 @@
 /* Groups of a mesh file with cells of several shapes. */
 #include "msh.h"
 
+/* HYCO_N_CELL_TYPES: none of these. Also for facets: dimension and number of nodes determine the type. */
 HycoCellType HycoMshType(int dim, PetscInt nv)
 {
   int t = 0;
@@ -9,6 +10,7 @@ HycoCellType HycoMshType(int dim, PetscInt nv)
   return (HycoCellType)t;
 }
 
+/* Elements of the group as collapsed ones of nv nodes; the room is kept. */
 PetscErrorCode HycoMshWiden(HycoMshGroup *g, PetscInt nv)
 {
   const HycoCellType shape = HycoMshType(g->dim, g->nv);
@@ -27,6 +29,8 @@ PetscErrorCode HycoMshWiden(HycoMshGroup *g, PetscInt nv)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A quad4 or hex8 with repeated nodes -> gmsh's type of the smaller cell, with its nodes in node[]; 0 if the
+   repetition is no known collapse. Files of other programs store prisms and triangles in this form. */
 int HycoMshReduce(long long type, PetscInt node[])
 {
   const PetscInt nv = type == 3 ? 4 : 8;
@@ -46,6 +50,7 @@ int HycoMshReduce(long long type, PetscInt node[])
     wide[v] = own[v];
   }
   HycoShapeWiden(shape, nv, wide);
+  /* The widened cell must reproduce the input: another pattern of repetitions has the same number of nodes. */
   for (PetscInt v = 0; v < nv && type == 5; v++) {
     if (wide[v] != node[v]) return 0;
   }

@@ -77,6 +77,7 @@ static PetscErrorCode CellGraph(HycoMesh m, PetscInt n_pairs, const PetscInt pai
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* METIS with edge weights alone: cells cost the same. Returns done = false on any failure, for instance of memory. */
 static PetscErrorCode ByMetis(PetscInt n, const Graph *g, PetscInt n_parts, PetscInt part[], PetscBool *done)
 {
   idx_t ne = (idx_t)n, ncon = 1, parts = (idx_t)n_parts, cut, *p;
@@ -90,6 +91,7 @@ static PetscErrorCode ByMetis(PetscInt n, const Graph *g, PetscInt n_parts, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* PT-Scotch by PETSc's MatPartitioning on this process, for the same graph. */
 static PetscErrorCode ByScotch(PetscInt n, const Graph *g, PetscInt n_parts, PetscInt part[])
 {
   PetscInt *i, *j, *weight;
@@ -155,6 +157,7 @@ typedef struct {
   HycoPartitioner by;
 } Data;
 
+/* METIS fails for graphs that PT-Scotch divides; the fallback keeps the run alive. */
 static PetscErrorCode Cut(const Data *d, PetscInt n_parts, PetscInt part[])
 {
   Graph graph;
@@ -217,6 +220,8 @@ static PetscErrorCode Create(PetscPartitioner partitioner)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Registering again is harmless, and no start of the library has to do it. `pairs`: 2 x n_pairs node indices,
+   slave and master. Borrows mesh and pairs until the partition is made. */
 PetscErrorCode HycoPartitionerSetMesh(PetscPartitioner partitioner, HycoMesh mesh, PetscInt n_pairs,
                                       const PetscInt pairs[], HycoPartitioner by)
 {

@@ -29,6 +29,8 @@ PetscInt HycoConePlace(HycoCellType shape, PetscInt node)
   return shape < HYCO_N_CELL_TYPES && !HycoCellKinds[shape].quadratic ? cone_place[shape][node] : node;
 }
 
+/* The type of one cell: the mesh's, or a smaller one in a mesh whose smaller cells are stored as collapsed quad4
+   or hex8. DMPlex knows the true shape. */
 PetscErrorCode HycoPlexShape(DM dm, HycoCellType type, PetscInt cell, HycoCellType *shape)
 {
   DMPolytopeType of;
@@ -43,6 +45,8 @@ PetscErrorCode HycoPlexShape(DM dm, HycoCellType type, PetscInt cell, HycoCellTy
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The n nodes of a cell or facet in gmsh's order, repeated if the shape is smaller: from the cone (cells and
+   vertices only), or from the closure (interpolated DM), whose vertices come last, in the order of the cone. */
 PetscErrorCode HycoPlexVertices(DM dm, PetscBool interpolated, HycoCellType type, PetscInt p, PetscInt n,
                                 PetscInt vertex[])
 {
@@ -118,6 +122,8 @@ static PetscErrorCode FindShapes(DM dm, PetscInt *shapes)
 
 #define TYPE "HycoType"
 
+/* Composed with submeshes, shares and their migrated points: the type of the parent mesh stays, even if the part
+   has only one shape or no cell. As an IS, because PETSc composes objects alone. */
 PetscErrorCode HycoPlexSetType(DM dm, HycoCellType type, PetscBool mixed)
 {
   const PetscInt value[2] = {(PetscInt)type, mixed};
@@ -130,6 +136,7 @@ PetscErrorCode HycoPlexSetType(DM dm, HycoCellType type, PetscBool mixed)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The type that holds all shapes of all ranks (-1: no cells at all). Collective, unless it is composed. */
 PetscErrorCode HycoPlexType(DM dm, PetscInt *type, PetscBool *mixed)
 {
   const MPI_Comm comm = PetscObjectComm((PetscObject)dm);
@@ -163,6 +170,7 @@ PetscBool HycoPlexOwnLabel(const char name[])
   return (PetscBool)(!strcmp(name, "depth") || !strcmp(name, "celltype") || !strcmp(name, "marker"));
 }
 
+/* Prefixes group names that DMPlex reserves. */
 PetscErrorCode HycoPlexLabelName(const char group[], size_t room, char name[])
 {
   PetscFunctionBegin;
@@ -180,6 +188,7 @@ PetscErrorCode HycoPlexGroupLabel(DM dm, const char group[], DMLabel *label)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Takes ownership of tag[], by point of this process. The IS is of one process, for tags need no communication. */
 PetscErrorCode HycoPlexSetTags(DM dm, PetscInt tag[])
 {
   PetscInt first, last;
@@ -247,6 +256,7 @@ static PetscErrorCode FindOwned(Builder *b)
 {
   PetscSF sf;
   PetscInt n = 0;
+  /* Leaves of the point star forest are owned by other ranks. */
   const PetscInt *leaf = NULL;
 
   PetscFunctionBegin;
@@ -277,7 +287,8 @@ static PetscErrorCode FollowedVertices(const Builder *b, PetscInt cell, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Collects the cells that touch a vertex owned by this process, by tag. */
+/* Collects the cells that touch a vertex owned by this process, by tag: those that contribute to its rows. The outer part
+   of the overlap is dropped, which would only cost assembly. */
 static PetscErrorCode TakeCells(Builder *b)
 {
   HycoMesh m = b->m;
@@ -297,6 +308,7 @@ static PetscErrorCode TakeCells(Builder *b)
       PetscCall(FollowedVertices(b, c, &n_followed, &followed));
       for (PetscInt k = 0; k < n_followed; k++) mine = (PetscBool)(mine || b->owned[followed[k] - b->v0]);
     }
+    /* The order of the tags, not of the DM, so that sums over cells run in the same order on any number of ranks. */
     b->cell[c - b->c0] = -1;
     if (!mine) continue;
     key[n] = b->tag[c];
@@ -328,6 +340,7 @@ static PetscErrorCode TakeNodes(Builder *b)
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(b->v1 - b->v0, &b->node));
+  /* A part also has nodes without cells: those of facets, and masters. */
   for (PetscInt v = b->v0; v < b->v1; v++) b->node[v - b->v0] = b->part ? 0 : -1;
   for (PetscInt k = 0; k < m->n_cells * m->nv; k++) b->node[m->cells[k] - b->v0] = 0;
   for (PetscInt e = 0; e < m->n_cells && b->ties; e++) {
@@ -363,6 +376,7 @@ static PetscErrorCode TakeNodes(Builder *b)
   }
   PetscCall(VecRestoreArrayRead(x, &xyz));
   PetscCall(PetscFree3(keep, key, place));
+  /* From points to indices of nodes, which exist only now. */
   for (PetscInt k = 0; k < m->n_cells * m->nv; k++) m->cells[k] = b->node[m->cells[k] - b->v0];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -440,6 +454,7 @@ static PetscErrorCode AddFacet(Builder *b, PetscInt cell, PetscInt point, PetscI
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The lists of the current group grow at the end; group_start[group + 1] counts. */
 static PetscErrorCode AddNode(Builder *b, PetscInt group, PetscInt node)
 {
   HycoMesh m = b->m;
@@ -488,6 +503,7 @@ static PetscErrorCode AddFacetPoint(Builder *b, PetscInt group, PetscInt p, cons
               m->group_name[group]);
   if (n != 1) PetscFunctionReturn(PETSC_SUCCESS);
   cell = b->cell[support[0] - b->c0];
+  /* A number in the DM's cone, not in gmsh's order: it only makes the order of facets unique. */
   PetscCall(DMPlexGetCone(b->dm, support[0], &cone));
   while (number < HycoFacetCount(m->type) && cone[number] != p) number++;
   for (PetscInt v = 0; v < m->nf; v++) cell = node[v] < 0 ? -1 : cell;
@@ -499,6 +515,8 @@ static PetscErrorCode AddFacetPoint(Builder *b, PetscInt group, PetscInt p, cons
 static PetscErrorCode AddPoint(Builder *b, PetscInt group, PetscInt value, PetscInt p)
 {
   HycoMesh m = b->m;
+  /* of: the dimension of what the point shows the group to contain. Labels of DMs without faces carry it as the
+     value 1 + dimension. */
   PetscInt vertex[HYCO_FACET_NODES], node[HYCO_FACET_NODES], depth = 0, of = 0;
 
   PetscFunctionBegin;
@@ -525,6 +543,8 @@ static PetscErrorCode AddPoint(Builder *b, PetscInt group, PetscInt value, Petsc
       PetscCall(DMPlexGetPointDepth(b->dm, p, &depth));
     else if (b->node[p - b->v0] >= 0)
       PetscCall(AddNode(b, group, b->node[p - b->v0]));
+    /* The group's dimension: of the point itself if facets are points, as the label contains closures; else the
+       value's. */
     of = b->facets_are_points ? depth : value - 1;
     if (b->facets_are_points && depth == m->dim - 1) {
       PetscCall(HycoPlexVertices(b->dm, PETSC_TRUE, HYCO_N_CELL_TYPES, p, m->nf, vertex));
@@ -536,6 +556,7 @@ static PetscErrorCode AddPoint(Builder *b, PetscInt group, PetscInt value, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* By the tag of the cell, then the number in it: the same on any number of ranks. */
 static int CompareFacets(const void *a, const void *b)
 {
   const Facet *x = (const Facet *)a, *y = (const Facet *)b;
@@ -570,6 +591,8 @@ static PetscErrorCode PlaceFacets(Builder *b, PetscInt group)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Adds the points of one label, in all its strata; duplicates come from values that share points (a cell with two
+   facets). */
 static PetscErrorCode TakeGroup(Builder *b, PetscInt group, DMLabel label)
 {
   HycoMesh m = b->m;
@@ -605,6 +628,7 @@ static PetscErrorCode TakeGroup(Builder *b, PetscInt group, DMLabel label)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Labels in the DM's order, the same on all ranks; DMPlex's own labels are no groups. */
 static PetscErrorCode TakeGroups(Builder *b)
 {
   HycoMesh m = b->m;
@@ -673,6 +697,8 @@ static PetscErrorCode FindStrata(Builder *b)
   PetscCall(PetscObjectQuery((PetscObject)b->dm, TYPE, (PetscObject *)&type));
   b->part = (PetscBool)(type != NULL);
   b->facets_are_points = (PetscBool)(depth == dim && !b->part);
+  /* Cells and the facets after them are in one stratum, of height 0, since neither is in a cone; bisection by type
+     finds the border. */
   for (PetscInt end = b->c1, first = b->c0; b->sub && first < end;) {
     DMPolytopeType of;
 
@@ -738,6 +764,7 @@ static PetscErrorCode Number(Builder *b)
   PetscCall(DMSetLocalSection(b->dm, section));
   PetscCall(PetscSectionDestroy(&section));
   PetscCall(DMGetGlobalSection(b->dm, &global));
+  /* The local section has dim unknowns at each vertex; the global one numbers them owner by owner. */
   for (PetscInt i = 0; i < m->n_nodes; i++) m->n_owned += b->owned[b->m->node_point[i] - b->v0];
   PetscCallMPI(MPI_Exscan(&m->n_owned, &m->first, 1, MPIU_INT, MPI_SUM, comm));
   PetscCall(PetscMalloc1(m->n_nodes, &m->node_global));
@@ -783,6 +810,7 @@ static void DropInnerFacets(HycoMesh m)
   m->n_facets = n;
 }
 
+/* Separate from the caller, which frees its tables before it returns an error. */
 static PetscErrorCode CheckGroups(MPI_Comm comm, HycoMesh m, HycoScene scene)
 {
   PetscFunctionBegin;
@@ -790,6 +818,9 @@ static PetscErrorCode CheckGroups(MPI_Comm comm, HycoMesh m, HycoScene scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The local tables of a DM's part: nodes and cells by tag, groups, facets outward, bodies; with several ranks also
+   global numbers. Holds a reference to the DM. Collective on comm, which is PETSC_COMM_SELF for a DM that one rank
+   alone uses. */
 PetscErrorCode HycoPlexToTables(DM dm, MPI_Comm comm, HycoScene scene, HycoMesh *mesh)
 {
   Builder b = {.dm = dm, .scene = scene};

@@ -17,7 +17,8 @@ static void Offsets(PetscMPIInt size, const PetscMPIInt counts[], PetscMPIInt st
   for (PetscMPIInt r = 0; r < size; r++) start[r + 1] = start[r] + counts[r];
 }
 
-/* The places of the n keys that this process sorts, among its own; *n_own of them are different. */
+/* The places of the n keys that this process sorts, among its own; *n_own of them are different. A copy is sorted, as the
+   places are needed in the order of the keys. */
 static PetscErrorCode RankOwn(PetscInt n, const PetscInt64 key[], PetscInt place[], PetscInt *n_own)
 {
   PetscInt64 *sorted;
@@ -36,6 +37,9 @@ static PetscErrorCode RankOwn(PetscInt n, const PetscInt64 key[], PetscInt place
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* place[k] in 0..total-1: the position of key[k] among all distinct keys of all ranks, by ascending value. Equal
+   keys get equal places. The range of keys is divided evenly; dense tags thus balance. Memory is that of the keys
+   of a rank. Collective. */
 PetscErrorCode HycoRankKeys(MPI_Comm comm, PetscInt n, const PetscInt64 key[], PetscInt place[], PetscInt *total)
 {
   PetscMPIInt size, *n_send, *n_receive, *send, *receive;

@@ -47,6 +47,7 @@ static PetscErrorCode CheckBodies(HycoScene scene, Reader *r, HycoMesh m)
   PetscInt cells = 0, shapes = 0, nv = 0;
 
   PetscFunctionBegin;
+  /* Groups of the name of a body, in any dimension; a body's group of points is not one. */
   for (PetscInt k = 0; k < r->n_groups; k++) {
     Group *g = &r->group[k];
 
@@ -115,6 +116,7 @@ static PetscErrorCode CollectCells(HycoScene scene, Reader *r, HycoMesh m)
       order[n] = n;
     }
   }
+  /* By tag: file order would depend on the groups' order. */
   PetscCall(PetscSortIntWithPermutation(n, tag, order));
   for (PetscInt e = 0; e < n; e++) {
     m->cell_id[e] = tag[order[e]];
@@ -212,6 +214,8 @@ static PetscErrorCode RefuseFacet(HycoScene scene, const Reader *r, HycoMesh m, 
            g->name);
 }
 
+/* The facets of one group. Each is searched among the cells around its first node; one cell: boundary, two: inner.
+   m->facets is written in place, and kept only if the facet counts. */
 static PetscErrorCode AddFacets(HycoScene scene, Reader *r, HycoMesh m, Group *g, PetscInt group,
                                 const PetscInt start[], const PetscInt around[])
 {
@@ -280,6 +284,8 @@ static PetscErrorCode AddMembers(Reader *r, HycoMesh m, Group *g, PetscInt group
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* All groups with one allocation by upper bounds; last and before chain the facets of each cell for the search for
+   duplicates. */
 static PetscErrorCode CollectGroups(HycoScene scene, Reader *r, HycoMesh m)
 {
   PetscInt n_facets = 0, n_members = 0, n_cells = 0, n_node = 0, n_cell = 0;
@@ -321,6 +327,7 @@ static PetscErrorCode CheckConforming(HycoScene scene, HycoMesh m, const PetscIn
     const PetscInt e = k / HycoFacetCount(m->type);
     PetscInt facet[HYCO_FACET_NODES];
 
+    /* Faces with 3 different nodes: triangles of pyramids, prisms and tetrahedra. */
     if (HycoMeshFace(m, e, k % HycoFacetCount(m->type), facet) != 3) continue;
     for (PetscInt j = start[facet[0]]; j < start[facet[0] + 1]; j++)
       HycoCheck(!CellHas(m, around[j], m->nf, facet) || HycoCellFace(m, around[j], facet) >= 0,
@@ -376,6 +383,8 @@ static PetscErrorCode CheckTwins(HycoScene scene, HycoMesh m, const PetscInt sta
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The order matters: types before cells, cells before nodes, and the checks that need the cells around a node
+   before groups. */
 static PetscErrorCode MakeTables(HycoScene scene, Reader *r, HycoMesh m)
 {
   PetscFunctionBegin;
@@ -395,6 +404,7 @@ static PetscErrorCode MakeTables(HycoScene scene, Reader *r, HycoMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The scene's mesh file as tables; the caller destroys them. One process: errors are passed on by the caller. */
 PetscErrorCode HycoMeshRead(HycoScene scene, HycoMesh *mesh)
 {
   Reader r = {0};

@@ -56,6 +56,8 @@ static PetscErrorCode AddOwnPoints(DM dm, HycoCellType type, PetscInt nv, PetscI
     if (!points) continue;
     PetscCall(ISGetLocalSize(points, &n));
     PetscCall(ISGetIndices(points, &point));
+    /* Values: 1 points, 1 + dimension cells and nodes, HYCO_FACET + number facets. Vertices of a group of cells or
+       facets come back by the closure. */
     for (PetscInt j = 0; j < n; j++) {
       PetscInt depth;
 
@@ -160,6 +162,7 @@ static PetscErrorCode Interpolate(DM *dm, HycoScene scene)
     PetscCall(DMGetLabelName(*dm, k, &name));
     if (HycoPlexOwnLabel(name)) continue;
     PetscCall(DMGetLabel(*dm, name, &from));
+    /* DMPlexInterpolate() has copied the label with its values for cells; it starts empty here. */
     PetscCall(DMRemoveLabel(full, name, NULL));
     PetscCall(DMCreateLabel(full, name));
     PetscCall(DMGetLabel(full, name, &to));
@@ -192,6 +195,8 @@ static PetscErrorCode CountChildren(DMPlexTransform transform, PetscInt p, DMPol
 static PetscErrorCode Key(DM dm, const PetscInt tag[], PetscInt p, PetscInt depth, PetscInt dim, PetscInt64 *key)
 {
   PetscInt vertex[4], least = 0;
+  /* An edge: its two ends. A quadrilateral: its smallest vertex and the opposite one, which no other face shares
+     in a conforming mesh. These do not depend on the orientation or the partition. */
   const PetscInt n = depth == 1 ? 2 : 4;
 
   PetscFunctionBegin;
@@ -230,6 +235,7 @@ static PetscErrorCode TagMiddles(DM dm, DMPlexTransform transform, const PetscIn
   HycoCheck(
       total < PETSC_MAX_INT - *last,
       "the refined mesh has more nodes than the integers of this PETSc can count; use a PETSc with 64-bit indices");
+  /* A vertex that several ranks have gets the same key there, and hence the same tag. */
   for (PetscInt k = 0; k < n; k++) new_tag[child[k]] = *last + 1 + place[k];
   *last += total;
   PetscCall(PetscFree3(key, place, child));
@@ -256,6 +262,7 @@ static PetscErrorCode TagCells(DM dm, DMPlexTransform transform, const PetscInt 
         "the refined mesh has more cells than the integers of this PETSc can count; use a PETSc with 64-bit indices");
     for (PetscInt r = 0; r < n; r++) {
       PetscCall(DMPlexTransformGetTargetPoint(transform, type, type, c, r, &child));
+      /* Children of one parent are contiguous: a body's cells stay together in the order of the tags. */
       new_tag[child] = 1 + place[c - c0] * n + r;
     }
   }
@@ -263,6 +270,8 @@ static PetscErrorCode TagCells(DM dm, DMPlexTransform transform, const PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One uniform refinement with tags that do not depend on the partition: old vertices keep theirs, then the middles
+   of edges, faces and cells follow. Collective. */
 static PetscErrorCode RefineOnce(DM *dm)
 {
   const MPI_Comm comm = PetscObjectComm((PetscObject)*dm);
@@ -341,6 +350,7 @@ static PetscErrorCode SortByType(DM *dm)
   PetscCall(PetscObjectQuery((PetscObject)*dm, HYCO_TAGS, (PetscObject *)&tags));
   PetscCall(DMPlexGetChart(*dm, NULL, &last));
   PetscCall(ISGetLocalSize(tags, &n));
+  /* A permutation of cells within their stratum; vertices stay. */
   PetscCall(PetscMalloc1(last, &place));
   PetscCall(PetscMalloc1(n, &new_tag));
   for (PetscInt p = 0; p < last; p++) place[p] = p;
@@ -363,6 +373,7 @@ static PetscErrorCode SortByType(DM *dm)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Refines `times` times, and leaves an interpolated DM. Replaces *dm. Collective. */
 PetscErrorCode HycoPlexRefine(DM *dm, HycoScene scene, PetscInt times)
 {
   PetscFunctionBegin;

@@ -27,6 +27,7 @@ static PetscErrorCode NextRow(Rows *r, PetscMPIInt to, PetscInt **row)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The first three entries of every kind of row identify it; the rest is the same from every sender. */
 static int CompareThree(const void *a, const void *b)
 {
   const PetscInt *x = (const PetscInt *)a, *y = (const PetscInt *)b;
@@ -43,6 +44,7 @@ static PetscErrorCode Exchange(MPI_Comm comm, Rows *r)
   PetscInt *got, n = 0, n_got;
 
   PetscFunctionBegin;
+  /* Rows come from all ranks that have the item, so that equal ones are dropped after the sort. */
   PetscCall(HycoSendRows(comm, r->n, r->to, (size_t)r->width * sizeof(PetscInt), r->row, &n_got, &got));
   if (n_got) qsort(got, (size_t)n_got, (size_t)r->width * sizeof(PetscInt), CompareThree);
   for (PetscInt k = 0; k < n_got; k++) {
@@ -126,8 +128,10 @@ static PetscErrorCode PackNode(Packing *p, PetscMPIInt to, PetscInt i)
   PetscInt *row;
 
   PetscFunctionBegin;
+  /* A mark per rank suffices, because requests are processed in the order of the ranks. */
   if (p->took[0][i] == to + 1) PetscFunctionReturn(PETSC_SUCCESS);
   p->took[0][i] = to + 1;
+  /* A node: tag, two zeros, body, its numbers in the vectors and in the file, and the bits of three coordinates. */
   PetscCall(NextRow(&p->node, to, &row));
   row[0] = m->node_id[i];
   row[1] = row[2] = 0;
@@ -156,6 +160,7 @@ static PetscErrorCode PackFacet(Packing *p, PetscMPIInt to, PetscInt f)
   PetscFunctionBegin;
   if (p->took[1][f] == to + 1) PetscFunctionReturn(PETSC_SUCCESS);
   p->took[1][f] = to + 1;
+  /* A facet: group, tag of its cell, number in it (the order of the tables of a whole mesh), then its nodes' tags. */
   PetscCall(NextRow(&p->facet, to, &row));
   row[0] = m->facet_group[f];
   row[1] = m->cell_id[e];
@@ -186,6 +191,7 @@ static PetscErrorCode Pack(Packing *p, PetscInt n, const PetscInt request[])
     if (HycoMeshOwned(m, i) >= 0) p->at[HycoMeshOwned(m, i)] = i;
   }
   for (PetscInt k = 0; k < n; k++) {
+    /* Requests name nodes of the distributed vectors, which are contiguous per rank. */
     const PetscInt i = p->at[request[2 * k + 1] - m->first];
 
     PetscCall(PackNode(p, (PetscMPIInt)request[2 * k], i));
@@ -197,6 +203,7 @@ static PetscErrorCode Pack(Packing *p, PetscInt n, const PetscInt request[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rows of nodes arrive sorted by tag; bisection gives the index. */
 static PetscInt Find(HycoMesh m, PetscInt tag)
 {
   PetscInt at = -1;
@@ -257,6 +264,7 @@ static PetscErrorCode PlaceFacets(HycoMesh m, const Rows *r)
 
     m->facet_group[f] = row[0];
     m->facet_cell[f] = -1;
+    /* Cells arrive in 1D alone; elsewhere the facet has no cell. */
     if (m->n_cells) PetscCall(PetscFindInt(row[1], m->n_cells, m->cell_id, &m->facet_cell[f]));
     for (PetscInt v = 0; v < m->nf; v++) m->facets[f * m->nf + v] = Find(m, row[3 + v]);
   }
@@ -273,6 +281,7 @@ static PetscErrorCode PlaceGroups(HycoMesh m, HycoMesh part, const Rows *r)
   PetscCall(PetscCalloc1(m->n_groups + 1, &m->group_start));
   PetscCall(PetscCalloc1(m->n_groups + 1, &m->group_cell_start));
   PetscCall(PetscMalloc1(r->n, &m->group_node));
+  /* Members are sorted by group, then tag: already CSR. */
   for (PetscInt k = 0; k < r->n; k++) {
     m->group_start[r->row[k * r->width] + 1]++;
     m->group_node[k] = Find(m, r->row[k * r->width + 1]);
@@ -307,6 +316,9 @@ static PetscErrorCode MakeMesh(const Packing *p, HycoMesh *mesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The facets of groups in[] around n nodes (numbers in the distributed vectors, from any rank), as a mesh of this
+   rank. Two messages between neighbours: requests, then rows. Memory is that of the rings. Collective; the caller
+   destroys the mesh. */
 PetscErrorCode HycoMeshRings(MPI_Comm comm, HycoMesh part, const PetscBool in[], PetscInt n, const PetscInt node[],
                              HycoMesh *mesh)
 {

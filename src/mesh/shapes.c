@@ -3,6 +3,8 @@
 
 #define BIT(shape) ((PetscInt)1 << (shape))
 
+/* A single type is its own; several of first order are collapsed ones of quad4 or hex8. HYCO_N_CELL_TYPES: these
+   cannot be in one mesh. */
 HycoCellType HycoShapesType(PetscInt shapes)
 {
   static const PetscInt plane = BIT(HYCO_TRI3) | BIT(HYCO_QUAD4),
@@ -34,6 +36,7 @@ static const signed char *Places(HycoCellType shape)
   }
 }
 
+/* From the last place to the first, so that the copy may be in place: no node moves to an earlier place. */
 void HycoShapeWiden(HycoCellType shape, PetscInt nv, PetscInt node[])
 {
   const signed char *places = HycoCellKinds[shape].nv < nv ? Places(shape) : NULL;
@@ -41,6 +44,7 @@ void HycoShapeWiden(HycoCellType shape, PetscInt nv, PetscInt node[])
   for (PetscInt k = nv - 1; places && k >= 0; k--) node[k] = node[places[k]];
 }
 
+/* Two comparisons identify the shape of a collapsed cell, as its repeated places are fixed. */
 HycoCellType HycoShapeOf(HycoCellType type, const PetscInt node[])
 {
   if (type == HYCO_QUAD4) return node[2] == node[3] ? HYCO_TRI3 : HYCO_QUAD4;

@@ -66,6 +66,7 @@ static PetscErrorCode FacetNumber(HycoMesh m, PetscInt f, PetscInt *number)
     *number = HycoMeshFacetNumber(m, f);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+  /* The facet's label value keeps the number when its cell was left behind. */
   PetscCall(HycoPlexGroupLabel(m->dm, m->group_name[m->facet_group[f]], &label));
   PetscCall(DMLabelGetValue(label, m->facet_point[f], number));
   *number -= HYCO_FACET;
@@ -82,6 +83,7 @@ static PetscErrorCode SetCones(DM dm, const Cut *c)
   HycoMesh m = c ? c->of : NULL;
 
   PetscFunctionBegin;
+  /* Without a mesh (c NULL, ranks other than 0) the chart is empty, but the calls are collective. */
   PetscCall(DMPlexSetChart(dm, 0, c ? first + c->n_nodes : 0));
   for (PetscInt e = 0; c && e < c->n_cells; e++)
     PetscCall(DMPlexSetConeSize(dm, e, HycoMeshCellNodes(m, c->cell[e], node)));
@@ -102,6 +104,7 @@ static PetscErrorCode SetCones(DM dm, const Cut *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A sorted stratum set at once: DMLabelSetValue() per point is slow for millions of points. */
 static PetscErrorCode SetStratum(DMLabel label, PetscInt value, PetscInt n, const PetscInt point[])
 {
   IS is;
@@ -186,6 +189,8 @@ static PetscErrorCode FillMembers(DMLabel label, const Cut *c, PetscInt g)
   const PetscInt body = BodyOf(c->scene, m->group_name[g]), first = c->n_cells + c->n_facets;
   PetscInt *point, n = 0;
 
+  /* A cell may be listed by several groups; bodies take theirs from cell_body, which submeshes keep also where the
+     group's list is not complete. */
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(c->n_cells + c->n_nodes, &point));
   for (PetscInt e = 0; e < c->n_cells && body >= 0; e++) {
@@ -202,6 +207,8 @@ static PetscErrorCode FillMembers(DMLabel label, const Cut *c, PetscInt g)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A facet is a value of its cell or, if the cell is not taken, of the facet's own point. c->facet ascends, so that
+   one pass finds it. */
 static PetscErrorCode FillFacets(DMLabel label, const Cut *c, PetscInt g)
 {
   HycoMesh m = c->of;
@@ -217,6 +224,7 @@ static PetscErrorCode FillFacets(DMLabel label, const Cut *c, PetscInt g)
     point[n] = at < 0 ? c->n_cells + next : at;
     PetscCall(FacetNumber(m, f, &number[n++]));
   }
+  /* One stratum per number, each filled at once. */
   for (PetscInt k = 0; k < HycoFacetCount(m->type); k++) {
     PetscInt of = 0;
 
@@ -254,6 +262,8 @@ static PetscErrorCode AddLabels(DM dm, const Cut *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Facets without cells have the tag of the cell that they bound: with the number in it, they sort as in the whole
+   mesh. */
 static PetscErrorCode AddTags(DM dm, const Cut *c)
 {
   const PetscInt first = c ? c->n_cells + c->n_facets : 0, *tag_of = NULL;
@@ -276,6 +286,8 @@ static PetscErrorCode AddTags(DM dm, const Cut *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The DM of a mesh on rank 0 (m NULL elsewhere). Plain cells use PETSc's constructor; ties, collapsed cells and
+   second order need cones of their own sizes. Collective. */
 PetscErrorCode HycoPlexFromMesh(MPI_Comm comm, HycoMesh m, DM *dm)
 {
   PetscInt head[3] = {m ? m->dim : 0, m ? m->nv : 0, m ? HycoMeshIsQuadratic(m) || m->mixed : 0}, *cone = NULL;
@@ -348,6 +360,7 @@ static PetscErrorCode SelectNodes(Cut *c, PetscInt n_extra, const PetscInt extra
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Facets of the groups in all_facets whose cell is not kept become points. */
 static PetscErrorCode Select(Cut *c, PetscInt n_keep, const PetscInt keep[], PetscInt n_extra, const PetscInt extra[],
                              PetscInt n_all, const PetscInt all_facets[])
 {
@@ -411,6 +424,7 @@ static PetscErrorCode MakeDM(MPI_Comm comm, const Cut *c, DM *dm)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The DM alone, on a communicator with several ranks: each gives its own share. Collective. */
 PetscErrorCode HycoPlexCut(MPI_Comm comm, HycoScene scene, HycoMesh of, PetscInt n_keep, const PetscInt keep[],
                            PetscInt n_extra, const PetscInt extra[], PetscInt n_all, const PetscInt all_facets[],
                            DM *dm)
@@ -424,6 +438,7 @@ PetscErrorCode HycoPlexCut(MPI_Comm comm, HycoScene scene, HycoMesh of, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Local tables of the submesh on this process, with the places in the whole mesh, which the DM does not store. */
 static PetscErrorCode Make(const Cut *c, HycoMesh *sub)
 {
   HycoMesh m = c->of;
@@ -444,6 +459,8 @@ static PetscErrorCode Make(const Cut *c, HycoMesh *sub)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Cells keep[], nodes extra[] and all facets of some groups of another mesh, as a mesh of this process. The order
+   of the other mesh is kept. Not collective; the caller destroys it. */
 PetscErrorCode HycoSubmesh(HycoScene scene, HycoMesh of, PetscInt n_keep, const PetscInt keep[], PetscInt n_extra,
                            const PetscInt extra[], PetscInt n_all, const PetscInt all_facets[], HycoMesh *sub)
 {
@@ -458,6 +475,7 @@ PetscErrorCode HycoSubmesh(HycoScene scene, HycoMesh of, PetscInt n_keep, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* node[i]: the index in `of` of node i of the submesh, by an inverse table over the range of points. */
 PetscErrorCode HycoSubmeshNodes(HycoMesh sub, HycoMesh of, PetscInt node[])
 {
   PetscInt *at, first = PETSC_MAX_INT, last = 0;

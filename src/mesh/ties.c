@@ -8,6 +8,8 @@
 
 #define TIES "HycoTies"
 
+/* Arrays of n entries (slave, master, weight), grouped by slave. Counted references: meshes, DMs and submeshes
+   share one list. */
 PetscErrorCode HycoTiesCreate(PetscInt n, HycoCellType type, HycoTies *ties)
 {
   HycoTies t;
@@ -39,6 +41,8 @@ PetscErrorCode HycoTiesDestroy(HycoTies *ties)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rank 0's ties on all ranks: slaves and masters are known by tags, so that every rank finds those of its part.
+   The list is that of the tied nodes alone. Collective. */
 PetscErrorCode HycoTiesBcast(MPI_Comm comm, HycoTies *ties)
 {
   PetscInt head[2] = {*ties ? (*ties)->n : 0, *ties ? (PetscInt)(*ties)->type : 0}, n;
@@ -68,6 +72,7 @@ static PetscErrorCode DestroyAttached(HycoContained contained)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The container holds a reference, released with the DM. */
 PetscErrorCode HycoTiesAttach(DM dm, HycoTies ties)
 {
   PetscContainer container;
@@ -183,6 +188,8 @@ static PetscErrorCode FindFollow(HycoMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Replaces the ties of local tables (NULL: none) and finds which of its nodes are tied; shares the list by
+   reference. Needs node_id and cells. Not collective. */
 PetscErrorCode HycoMeshSetTies(HycoMesh m, HycoTies ties)
 {
   PetscInt *tag, *node;

@@ -1,6 +1,7 @@
 /* Obstacles: the displacement of a group's nodes along the normal is at most the gap. */
 #include <hycocontactimpl.h>
 
+/* Without a master: the gap and the normal are expressions of the position. */
 PetscErrorCode HycoContactCreate_Obstacle(HycoContact contact)
 {
   PetscFunctionBegin;

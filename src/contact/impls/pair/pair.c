@@ -14,6 +14,7 @@ static PetscErrorCode AreMatched(HycoMesh m, PetscInt n, const HycoProjection at
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(m->n_nodes, &taken));
   *matched = PETSC_TRUE;
+  /* Two slaves with one master would share its unknowns. */
   for (PetscInt k = 0; k < n && *matched; k++) {
     if (!at[k].n && needs && !needs[k]) continue;
     *matched = (PetscBool)(at[k].n == 1 && at[k].distance <= far && !taken[at[k].node[0]]);
@@ -66,7 +67,7 @@ static PetscErrorCode MatchAlong(HycoPartners *t, HycoContact c, HycoMatch *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Checks that each master has one slave. */
+/* Checks that each master has one slave. A master with two slaves would make rows of B dependent up to round-off. */
 static PetscErrorCode CheckMasters(HycoMesh m, HycoContact c, const HycoMatch *match)
 {
   PetscInt *partner_of;
@@ -92,7 +93,8 @@ static PetscErrorCode CheckMasters(HycoMesh m, HycoContact c, const HycoMatch *m
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nearest nodes, if they match one to one; else nodes along the normals, if these do. */
+/* Nearest nodes, if they match one to one; else nodes along the normals, if these do. Coinciding meshes take the
+   first way; the second is for gaps. */
 static PetscErrorCode Settle(HycoPartners *t, HycoContact c, HycoMatch *m)
 {
   PetscBool matched;
@@ -100,12 +102,14 @@ static PetscErrorCode Settle(HycoPartners *t, HycoContact c, HycoMatch *m)
   PetscFunctionBegin;
   PetscCall(AreMatched(t->fe->mesh, m->n, m->at, NULL, PetscMin(m->small, m->tolerance), &matched));
   for (PetscInt k = 0; k < m->n; k++) matched = (PetscBool)(matched && m->why[k] == HYCO_MET);
+  /* A rank's part cannot be matched along normals: one-to-one is a property of the whole surfaces. */
   HycoCheck(matched || !m->part, "contact %s: its nodes are not matched as drawn", c->name);
   if (!matched) PetscCall(MatchAlong(t, c, m));
   PetscCall(CheckMasters(t->fe->mesh, c, m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Without a stated tolerance a larger one cannot be advised. */
 static PetscErrorCode Remedy(HycoPartners *t, HycoContact c, PetscInt n, const PetscInt missed[], char text[HYCO_LINE])
 {
   PetscReal stated;
@@ -144,6 +148,7 @@ static PetscErrorCode Verify(HycoContact c, HycoFE fe, const HycoPairs *p, Petsc
     HycoPairsJump(p, k, 3, fe->X, now);
     HycoPairsJump(p, k, 3, m->xyz, drawn);
     along = HycoTangentialLength(now, normal + 3 * k);
+    /* Allowed: the distance along the surface as drawn, plus half a facet. */
     if (along <= HycoLength(drawn)) continue;
     if (!size) {
       PetscInt g = 0;

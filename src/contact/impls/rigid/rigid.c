@@ -4,6 +4,7 @@
 */
 #include "../../facing.h"
 
+/* All slaves have the same master with weight 1; the rank that has no slaves need not have the master's node. */
 static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs *pairs)
 {
   HycoMesh m = fe->mesh;

@@ -54,6 +54,7 @@ static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* All n slaves of a moved contact in one tree; reach limits the distance. */
 static PetscErrorCode Find(HycoContact c, HycoFE fe, PetscReal reach, PetscInt n, const PetscInt slave[],
                            PetscInt start[], PetscInt master[], PetscReal weight[])
 {
