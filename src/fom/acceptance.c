@@ -12,7 +12,7 @@
 #define HYCO_MOST_DEFECT 1e-3
 
 /* The largest displacement relative to the mesh's longest side, or to the largest prescribed displacement if that is
-   more. Collective. */
+   more. Collective. Moved positions, since a map may scale the mesh; components of all ranks in one reduction. */
 static PetscErrorCode Relative(HycoFOM f, const PetscReal u[], PetscReal *relative)
 {
   const PetscInt dim = f->fe->dim;
@@ -36,7 +36,8 @@ static PetscErrorCode Relative(HycoFOM f, const PetscReal u[], PetscReal *relati
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The motion on which F - B^T L has work; "" if it has none. Collective. */
+/* The motion on which F - B^T L has work; "" if it has none. Collective. With the contact forces L as found: what is
+   left of F on the motions that supports leave free (F - B^T L is orthogonal to them in equilibrium). */
 static PetscErrorCode NameLifted(HycoFOM f, Vec L, char name[HYCO_LINE])
 {
   PetscReal *coefficient, work = 0;
@@ -83,6 +84,7 @@ static PetscErrorCode HeldBy(HycoFOM f, PetscInt p, const Vec v[], PetscReal gra
     PetscCall(VecDot(w[k], w[k], &square));
     *size = PetscMax(*size, square);
     PetscCall(VecGetArray(w[k], &own));
+    /* Rows with a force within round-off of the largest do not hold anything. */
     for (PetscInt i = 0; i < n; i++) own[i] = most > 0 && force[i] > 1e-12 * most ? own[i] : 0;
     PetscCall(VecRestoreArray(w[k], &own));
   }
@@ -92,6 +94,8 @@ static PetscErrorCode HeldBy(HycoFOM f, PetscInt p, const Vec v[], PetscReal gra
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Names a rigid motion that the closed contacts with a force do not resist: the solution is one of several. name is
+   "" if there is none. A Gram matrix of the size of the null space decides. Collective. */
 PetscErrorCode HycoFOMNameLoose(HycoFOM f, char name[HYCO_LINE])
 {
   MatNullSpace kernel = NULL;
@@ -112,6 +116,7 @@ PetscErrorCode HycoFOMNameLoose(HycoFOM f, char name[HYCO_LINE])
   PetscCall(HeldBy(f, p, v, gram, &size));
   LAPACKsyev_("V", "U", &n, gram, &n, value, work, &lwork, &info);
   PetscCheck(info == 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "LAPACK syev: %d", (int)info);
+  /* Squares: a share of 1e-7 of the motion. */
   if (value[0] <= 1e-14 * size) {
     PetscCall(HycoFEFreeMotions(HycoComm(f), f->fe, &motions));
     if (motions.n == p) HycoMotionsName(f->fe, &motions, gram, name);
@@ -121,6 +126,8 @@ PetscErrorCode HycoFOMNameLoose(HycoFOM f, char name[HYCO_LINE])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Turns a converged reason into a divergence if displacements or the energy defect are too large, and writes why
+   (one line; "" for an accepted solution). *relative: the largest displacement over the mesh's extent. Collective. */
 PetscErrorCode HycoFOMJudge(HycoFOM f, const PetscReal u[], Vec L, PetscReal energy_defect, HycoReason *reason,
                             PetscReal *relative, char why[HYCO_LINE])
 {

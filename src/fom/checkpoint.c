@@ -44,6 +44,7 @@ static const Member later[] = {INT(linear_iterations), INT(most_linear_iteration
 
 #define STEP_COLS(f) (N_MEMBERS + (f)->scene->n_quantities + N_LATER)
 
+/* All members in one array of reals: an int32 is exact in a double. */
 static void MembersToReals(PetscInt n, const Member m[], const HycoStep *s, PetscReal v[])
 {
   for (PetscInt j = 0; j < n; j++) {
@@ -98,7 +99,8 @@ static PetscErrorCode StateCols(HycoFOM f, PetscInt *cols)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Identifies the scene and the point of a checkpoint. */
+/* Identifies the scene and the point of a checkpoint. Scene, mesh, point and outputs: a checkpoint of another one
+   would resume silently wrong. */
 static PetscErrorCode Identify(HycoFOM f, char text[HYCO_LINE])
 {
   HycoScene scene = f->scene;
@@ -192,6 +194,7 @@ typedef struct {
   PetscInt cell_cols, n_steps, n_orders;
 } Content;
 
+/* Rank 0. The key is compared before anything else is read. */
 static PetscErrorCode WriteContent(HycoFOM f, HycoH5 h, const Content *c, const char key[])
 {
   const PetscInt format = FORMAT;
@@ -246,7 +249,7 @@ static PetscErrorCode FreeContent(Content *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Refuses to overwrite a file that is not a checkpoint. */
+/* Refuses to overwrite a file that is not a checkpoint. Models and snapshots are expensive to make. */
 static PetscErrorCode CheckPlace(const char path[])
 {
   PetscBool precious;
@@ -267,6 +270,8 @@ PetscErrorCode HycoPathCheckPlace(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Writes to a temporary file that replaces the former checkpoint at its close: an interruption leaves one that is
+   complete. Collective. */
 PetscErrorCode HycoPathSave(HycoFOM f)
 {
   HycoPath p = f->path;
@@ -292,7 +297,7 @@ PetscErrorCode HycoPathSave(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What an older checkpoint does not have is 0. */
+/* What an older checkpoint does not have is 0. Number of stored steps (with the current one) and their reals. */
 static PetscErrorCode LoadSteps(HycoFOM f, HycoH5 h, PetscInt *rows, PetscReal **steps)
 {
   const PetscInt full = STEP_COLS(f);
@@ -309,6 +314,7 @@ static PetscErrorCode LoadSteps(HycoFOM f, HycoH5 h, PetscInt *rows, PetscReal *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Checks format, key and sizes before the path is changed. Rank 0. */
 static PetscErrorCode ReadOpened(HycoFOM f, HycoH5 h, const char key[], Content *c)
 {
   char *text = NULL;
@@ -417,6 +423,7 @@ static PetscErrorCode ReadItems(HycoFOM f, const char name[], HycoPlace place, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Values of ghosts come with the parts; the columns of cells must be those of the present laws. */
 static PetscErrorCode TakeContent(HycoFOM f, const Content *c)
 {
   HycoPath p = f->path;
@@ -445,6 +452,8 @@ static PetscErrorCode TakeContent(HycoFOM f, const Content *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Continues from the checkpoint, or leaves the path at its begin if there is no file. K, B, D are assembled at the
+   resumed time; fields of earlier times come from the separate files. Collective. */
 PetscErrorCode HycoPathLoad(HycoFOM f)
 {
   HycoPath p = f->path;

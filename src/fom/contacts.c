@@ -11,7 +11,8 @@
 /* The radii of the widest facet by which masters may move before further facets are fetched. */
 #define SLACK 2
 
-/* Adds to the nodes that this rank's contacts need; they stay sorted and different. */
+/* Adds to the nodes that this rank's contacts need; they stay sorted and different. Numbers in the distributed
+   vectors. */
 static PetscErrorCode AddNeeded(HycoFOM f, PetscInt n, const PetscInt node[])
 {
   PetscFunctionBegin;
@@ -73,6 +74,7 @@ typedef struct {
   PetscReal weight[HYCO_FACET_NODES];
 } Sent;
 
+/* Padding is zeroed, as the struct is sent as bytes. */
 static PetscErrorCode PackContacts(HycoMesh m, const HycoPairs *p, Sent sent[])
 {
   PetscFunctionBegin;
@@ -118,7 +120,7 @@ static PetscInt PlaceOf(const Places *p, PetscInt global)
   return at < 0 ? -1 : p->node[at];
 }
 
-/* Appends contacts whose nodes are all on the mesh. */
+/* Appends contacts whose nodes are all on the mesh. The needed facets have been fetched, thus all nodes are found. */
 static PetscErrorCode UnpackContacts(HycoMesh m, PetscInt n, const Sent sent[], HycoPairs *p)
 {
   Places places;
@@ -136,6 +138,8 @@ static PetscErrorCode UnpackContacts(HycoMesh m, PetscInt n, const Sent sent[], 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The surfaces of all contacts on rank 0 (NULL elsewhere); in 1D the whole mesh, where facets need their cells.
+   Collective. */
 PetscErrorCode HycoFOMGatherSurface(HycoFOM f, HycoMesh *mesh)
 {
   PetscBool *in;
@@ -163,6 +167,8 @@ static PetscErrorCode PlaceGathered(HycoFOM f, HycoMesh mesh, PetscInt n, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* All contacts on rank 0, in the order of one rank, with their surfaces: for errors and for results that need an
+   order. The caller destroys both. Collective. */
 PetscErrorCode HycoFOMGatherContacts(HycoFOM f, HycoMesh *mesh, HycoPairs *pairs)
 {
   const HycoPairs *p = &f->pairs;
@@ -213,6 +219,7 @@ static PetscErrorCode FindWhole(HycoFOM f, HycoMesh mesh, HycoPairs *whole, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The fallback: contacts found on rank 0 are sent back, and their masters' facets are fetched. */
 static PetscErrorCode FindOnRoot(HycoFOM f, const HycoSurfaceFacts facts[])
 {
   HycoPairs whole;
@@ -223,6 +230,7 @@ static PetscErrorCode FindOnRoot(HycoFOM f, const HycoSurfaceFacts facts[])
 
   PetscFunctionBegin;
   PetscCall(PetscMemzero(&whole, sizeof(whole)));
+  /* Those of the failed search. */
   PetscCall(HycoPairsDestroy(&f->pairs));
   PetscCall(HycoFOMGatherSurface(f, &mesh));
   ierr = FindWhole(f, mesh, &whole, &n_got, &got);
@@ -247,7 +255,8 @@ static PetscErrorCode FindOnRoot(HycoFOM f, const HycoSurfaceFacts facts[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The numbers of the contacts in the order of the scene's contacts, then of the slaves' tags. */
+/* The numbers of the contacts in the order of the scene's contacts, then of the slaves' tags. Keys of contact and
+   node: the numbers do not depend on the partition. */
 static PetscErrorCode NumberContacts(HycoFOM f)
 {
   HycoPairs *p = &f->pairs;
@@ -264,7 +273,8 @@ static PetscErrorCode NumberContacts(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Searches on this rank, and notes whether it has found its contacts. */
+/* Searches on this rank, and notes whether it has found its contacts. A rank's error must not be raised here: its
+   text may differ from that on one rank. */
 static PetscErrorCode Try(HycoFOM f, const HycoSurfaceFacts facts[], PetscBool *found)
 {
   char message[HYCO_LINE];
@@ -278,7 +288,8 @@ static PetscErrorCode Try(HycoFOM f, const HycoSurfaceFacts facts[], PetscBool *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Finds the contacts with the facets that the drawn positions need. */
+/* Finds the contacts with the facets that the drawn positions need. A search on each rank; rank 0 repeats it if a
+   rank fails or if what the ranks have found does not fit together. Collective. */
 static PetscErrorCode Search(HycoFOM f, HycoSurfaceFacts facts[])
 {
   PetscInt n, *near;
@@ -299,7 +310,8 @@ static PetscErrorCode Search(HycoFOM f, HycoSurfaceFacts facts[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The facets of the masters on this rank's surfaces, at most of one contact, and of all ranks. */
+/* The facets of the masters on this rank's surfaces, at most of one contact, and of all ranks. For the report of
+   -hyco_fom_view. */
 static PetscErrorCode CountPatches(HycoFOM f)
 {
   PetscFunctionBegin;
@@ -324,6 +336,7 @@ static PetscErrorCode CountPatches(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Positions as drawn; facets within the slack of moved surfaces are fetched at once. */
 static PetscErrorCode FindContacts(HycoFOM f)
 {
   HycoSurfaceFacts *facts;
@@ -345,6 +358,7 @@ static PetscErrorCode FindContacts(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Finds the potential contacts and their numbers; with several ranks each has those of its slaves. Collective. */
 PetscErrorCode HycoFOMFindContacts(HycoFOM f)
 {
   PetscFunctionBegin;
@@ -370,7 +384,8 @@ static PetscBool HasNeeded(HycoFOM f, PetscInt n, const PetscInt node[])
   return PETSC_TRUE;
 }
 
-/* Replaces the surfaces by those with more facets, and what depends on their nodes. */
+/* Replaces the surfaces by those with more facets, and what depends on their nodes. Contacts keep their order, and
+   thus the rows of B and Lambda. */
 static PetscErrorCode Renew(HycoFOM f)
 {
   HycoMesh before = f->surface;
@@ -395,6 +410,7 @@ static PetscErrorCode Renew(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* First without slack: mostly the facets at hand suffice, and nothing is sent but this question. */
 static PetscErrorCode FetchMasters(HycoFOM f)
 {
   PetscInt n, *near;
@@ -415,6 +431,8 @@ static PetscErrorCode FetchMasters(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* After the nodes of f->fe have moved: makes sure that every rank has the facets that its slaves may meet now.
+   Collective. */
 PetscErrorCode HycoFOMFetchMasters(HycoFOM f)
 {
   PetscFunctionBegin;
@@ -423,6 +441,8 @@ PetscErrorCode HycoFOMFetchMasters(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A mesh with all facets around the nodes of this rank's surfaces, its fe at the current parameters, and the places
+   of the surfaces' nodes there; the caller destroys them. Collective. */
 PetscErrorCode HycoFOMWiden(HycoFOM f, HycoMesh *mesh, HycoFE *fe, PetscInt **index)
 {
   HycoMesh m = f->surface;
@@ -460,6 +480,7 @@ PetscErrorCode HycoFOMKeepOnRoot(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* group[] must be false before; the groups of slaves and masters are set. */
 PetscErrorCode HycoMarkContactGroups(HycoScene scene, HycoMesh mesh, PetscBool group[])
 {
   PetscFunctionBegin;
@@ -474,6 +495,7 @@ PetscErrorCode HycoMarkContactGroups(HycoScene scene, HycoMesh mesh, PetscBool g
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Creates the fe of this rank's surfaces, and the scatter from U to their nodes (ghosts of any rank). Collective. */
 PetscErrorCode HycoFOMSetUpSurface(HycoFOM f)
 {
   const PetscInt dim = f->part->dim;

@@ -91,7 +91,8 @@ static PetscErrorCode CellSums(HycoFOM f, PetscReal *strain, PetscReal *lifting)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of this rank's contacts: L.D with the gap as drawn, and the work of contacts on fixed unknowns, L.(B u0) over those. */
+/* Of this rank's contacts: L.D with the gap as drawn, and the work of contacts on fixed unknowns, L.(B u0) over
+   those. The difference of the two gaps is what fixed unknowns have moved to D. */
 static PetscErrorCode ContactSums(HycoFOM f, PetscReal *gap_work, PetscReal *fixed_work)
 {
   PetscReal *normal, *gap;
@@ -122,6 +123,8 @@ static PetscErrorCode NodalEnergy(HycoFOM f, PetscReal *sum)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* 2 W, the works and the defect of their identity relative to the largest of the three, from stresses, loads and
+   contact forces. The defect is independent of the solver. Collective. */
 PetscErrorCode HycoFOMEnergy(HycoFOM f, HycoSummary *s)
 {
   PetscReal mine[4] = {0, 0, 0, 0}, all[4], free_work = 0, lifting = 0, nodal, largest;

@@ -52,7 +52,8 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Partitions the DM so that few contacts are cut. */
+/* Partitions the DM so that few contacts are cut. Each rank has at least a cell; contacts' pairs become heavy edges
+   of the graph. */
 static PetscErrorCode Distribute(HycoFOM f)
 {
   const HycoPartitioner cut = (HycoPartitioner)f->partition;
@@ -79,7 +80,8 @@ static PetscErrorCode Distribute(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads the mesh, and makes its parts and its contacts. */
+/* Reads the mesh, and makes its parts and its contacts. With several ranks the fe of a part comes before the search,
+   which needs positions; on one rank after it, so that errors come in the same order. */
 static PetscErrorCode ReadMesh(HycoFOM f)
 {
   PetscFunctionBegin;
@@ -116,12 +118,14 @@ static PetscErrorCode CreateScatter(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Unknowns of B's columns by the numbers of the distributed vectors. */
 static PetscInt GlobalNode(HycoFOM f, PetscInt node)
 {
   return f->surface->node_global ? f->surface->node_global[node] : node;
 }
 
-/* Composes B with the slaves of its rows, which do not change. Collective. */
+/* Composes B with the slaves of its rows, which do not change. Collective. The solver's gap coordinates need a slave
+   for each row. */
 static PetscErrorCode TellSlaves(HycoFOM f)
 {
   PetscScalar *slave;
@@ -137,8 +141,8 @@ static PetscErrorCode TellSlaves(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Creates B and Bt with the pattern for any parameters: all components of a contact's nodes. Each rank has the rows of its
-   contacts. */
+/* Creates B and Bt with the pattern for any parameters: all components of a contact's nodes. Each rank has the rows
+   of its contacts. Preallocated by the widest contact; rows are local, therefore nothing is sent at assembly. */
 static PetscErrorCode CreateB(HycoFOM f)
 {
   const PetscInt dim = f->part->dim, entries = f->width * dim;
@@ -203,6 +207,7 @@ static PetscErrorCode Create(MPI_Comm comm, HycoFOM *fom)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Declares the options on an object without a scene, for -help and the check of names. */
 PetscErrorCode HycoFOMDeclare(PetscOptions options)
 {
   HycoFOM f;
@@ -213,6 +218,7 @@ PetscErrorCode HycoFOMDeclare(PetscOptions options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Order: mesh, K and vectors, B, scatters, solver, path. Nothing is assembled yet. Collective. */
 static PetscErrorCode SetUp(HycoFOM f)
 {
   PetscFunctionBegin;
@@ -242,6 +248,8 @@ static PetscErrorCode SetUp(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Reads and distributes the mesh and finds the contacts; holds a reference to the scene. Collective on comm; after
+   an error *fom is NULL. */
 PetscErrorCode HycoFOMCreate(MPI_Comm comm, HycoScene scene, HycoFOM *fom)
 {
   PetscErrorCode ierr;
@@ -257,6 +265,7 @@ PetscErrorCode HycoFOMCreate(MPI_Comm comm, HycoScene scene, HycoFOM *fom)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Without K, solver and path: for models that need the mesh and its contacts (on rank 0) alone. Collective. */
 PetscErrorCode HycoFOMCreateMesh(MPI_Comm comm, HycoScene scene, HycoFOM *fom)
 {
   PetscErrorCode ierr;
@@ -291,7 +300,7 @@ typedef struct {
 } Rows;
 
 /* The rows and gaps of a process's contacts, and how many have no effect. The caller frees the rows, also after an
-   error. */
+   error. The widths bound the room: no counting pass is needed. */
 static PetscErrorCode ComputeRows(HycoFE fe, HycoPairs *pairs, PetscInt width, Rows *r, PetscReal gap[],
                                   PetscInt *n_still)
 {
@@ -326,7 +335,8 @@ static PetscErrorCode ComputeWhole(HycoFOM f, HycoMesh mesh, HycoPairs *pairs)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Raises the error that the whole surfaces have, which is the same on any number of ranks. */
+/* Raises the error that the whole surfaces have, which is the same on any number of ranks. An error of one rank
+   depends on the partition: it is replaced by that of the whole surfaces, if they fail as well. */
 static PetscErrorCode RaiseWhole(HycoFOM f)
 {
   HycoPairs pairs;
@@ -365,7 +375,8 @@ static PetscErrorCode AllRows(HycoFOM f, Rows *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets D and, if the parameters that it depends on have changed, B. */
+/* Sets D and, if the parameters that it depends on have changed, B. Rows are set by INSERT_VALUES, as each contact
+   has one row. */
 static PetscErrorCode Insert(HycoFOM f, PetscBool rows_changed, const Rows *r)
 {
   const PetscInt dim = f->part->dim;
@@ -389,6 +400,7 @@ static PetscErrorCode Insert(HycoFOM f, PetscBool rows_changed, const Rows *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* B and B^T (explicit, since PETSc's products with a parallel transpose are slower) and D. Collective. */
 static PetscErrorCode AssembleContact(HycoFOM f, PetscBool rows_changed)
 {
   Rows r = {NULL, NULL, NULL};
@@ -412,6 +424,7 @@ static PetscErrorCode AssembleContact(HycoFOM f, PetscBool rows_changed)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* At the first parameters: supports are the same at all of them. Collective. */
 static PetscErrorCode CountFree(HycoFOM f)
 {
   PetscInt mine = 0;
@@ -426,7 +439,8 @@ static PetscErrorCode CountFree(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the loads at the pinned unknowns, which belong to the balance. */
+/* Adds the loads at the pinned unknowns, which belong to the balance. Pins are no supports: without them the loads
+   there would be lost from the balance. */
 static PetscErrorCode AssembleForce(HycoFOM f)
 {
   PetscFunctionBegin;
@@ -438,7 +452,8 @@ static PetscErrorCode AssembleForce(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Moves this rank's surfaces, and searches for the masters on them. */
+/* Moves this rank's surfaces, and searches for the masters on them. The mirror signs are those that all ranks agree
+   on, also where a rank has no cell of a body. */
 static PetscErrorCode MoveSurface(HycoFOM f, const PetscReal mu[])
 {
   PetscFunctionBegin;
@@ -449,6 +464,8 @@ static PetscErrorCode MoveSurface(HycoFOM f, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Moves the mesh to mu on all ranks: parts first, then facets that are newly needed, then surfaces and masters.
+   Collective. */
 PetscErrorCode HycoFOMSetParameters(HycoFOM f, const PetscReal mu[])
 {
   PetscFunctionBegin;
@@ -462,6 +479,8 @@ PetscErrorCode HycoFOMSetParameters(HycoFOM f, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* K, F, B, D of (16) at mu; only what has changed since the last call. After an error everything is assembled again.
+   Collective. */
 PetscErrorCode HycoFOMAssemble(HycoFOM f, const PetscReal mu[])
 {
   PetscFunctionBegin;
@@ -511,6 +530,8 @@ static PetscErrorCode CheckPoint(HycoFOM f, PetscInt n, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Solves (16) at the point mu (n parameters), or its path. Whether the result is a solution is judged in
+   HycoFOMGetSummary(). Collective. */
 PetscErrorCode HycoFOMSolve(HycoFOM f, PetscInt n, const PetscReal mu[])
 {
   HycoSeconds *t;
@@ -546,7 +567,7 @@ PetscErrorCode HycoFOMGetSystem(HycoFOM f, HycoSystem *system)
 }
 
 /* Of the rank with the largest part: its own unknowns, those of other ranks in its rows, and the number of these
-   ranks. */
+   ranks. By the ranges of ownership; a neighbour counts once. */
 static PetscErrorCode LargestPart(HycoFOM f, PetscInt largest[3])
 {
   const PetscInt dim = f->part->dim, *start;

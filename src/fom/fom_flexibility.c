@@ -1,6 +1,8 @@
 /* B K^-1 B^T from the factorisation of the dual form. */
 #include <hycofomimpl.h>
 
+/* G = B K^-1 B^T: the upper triangle by rows, on rank 0 (m (m + 1) / 2 reals), in the order of the contacts on one
+   rank. Computed with the dual form, whose matrix it is. Collective. */
 PetscErrorCode HycoFOMFlexibility(HycoFOM f, const PetscReal mu[], PetscReal G[])
 {
   const PetscReal *S;

@@ -11,7 +11,8 @@ typedef struct {
   PetscReal *value, *gap;
 } Rows;
 
-/* Marks contacts whose gap is closed, and that have an unknown. */
+/* Marks contacts whose gap is closed, and that have an unknown. The scale is of all contacts, so that round-off
+   counts equally everywhere; two passes, since it is known after the first. */
 static PetscErrorCode MarkClosed(MPI_Comm comm, const Rows *r, const PetscReal u[], const PetscReal lambda[],
                                  PetscBool in[])
 {
@@ -34,7 +35,8 @@ static PetscErrorCode MarkClosed(MPI_Comm comm, const Rows *r, const PetscReal u
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* In how many of all ranks' rows each unknown of the surface occurs. Collective. */
+/* In how many of all ranks' rows each unknown of the surface occurs. Collective. Counts are sums over ranks at the
+   owners, then sent back. */
 static PetscErrorCode CountRows(HycoFOM f, const Rows *r, const PetscBool in[], PetscReal count[])
 {
   const PetscInt n_dof = f->fe_surface->n_dof;
@@ -57,7 +59,8 @@ static PetscErrorCode CountRows(HycoFOM f, const Rows *r, const PetscBool in[], 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Removes this rank's rows with an unknown that occurs in no other row, until there are none. */
+/* Removes this rank's rows with an unknown that occurs in no other row, until there are none. An entry below 1e-6
+   does not make a row independent in finite precision. */
 static PetscBool PeelOwn(const Rows *r, PetscReal count[], PetscBool in[])
 {
   PetscBool change = PETSC_TRUE, any = PETSC_FALSE;
@@ -79,7 +82,9 @@ static PetscBool PeelOwn(const Rows *r, PetscReal count[], PetscBool in[])
   return any;
 }
 
-/* Removes repeatedly the rows with an unknown that occurs in no other row: they are independent. */
+/* Removes repeatedly the rows with an unknown that occurs in no other row: they are independent. Exact and cheap;
+   only what remains needs a dense Gram matrix. Ranks may remove rows at the same time: each counts on an unknown
+   that is in no other row. */
 static PetscErrorCode Peel(HycoFOM f, const Rows *r, PetscBool in[])
 {
   PetscReal *count;
@@ -126,7 +131,8 @@ static PetscErrorCode GatherRest(HycoFOM f, const Rows *r, const PetscBool in[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The number of rows minus their rank; the unknowns are numbered anew, those that occur. Rank 0. */
+/* The number of rows minus their rank; the unknowns are numbered anew, those that occur. Rank 0. By the Gram matrix
+   (n x n, dense): n is small after peeling. */
 static PetscErrorCode Dependent(const Rows *r, PetscInt *dependent)
 {
   const PetscInt n = r->m, n_values = r->start[n];
@@ -158,7 +164,7 @@ static PetscErrorCode Dependent(const Rows *r, PetscInt *dependent)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same for the rows that are marked, on all ranks. */
+/* The same for the rows that are marked, on all ranks. A row without force cannot exchange it with others. */
 static PetscErrorCode CountRest(HycoFOM f, const Rows *r, const PetscBool in[], PetscInt *dependent)
 {
   Rows rest = {0, NULL, NULL, NULL, NULL};
@@ -186,6 +192,7 @@ static PetscErrorCode Count(HycoFOM f, Rows *r, PetscBool in[], PetscInt *depend
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* By how many the rows of closed contacts exceed their rank: contact forces are unique if 0. Collective. */
 PetscErrorCode HycoFOMCountDependent(HycoFOM f, PetscInt *dependent)
 {
   const PetscInt m = f->pairs.n;
@@ -222,6 +229,7 @@ static PetscErrorCode TakeRest(const Rows *r, const PetscBool in[], Rows *rest)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The same for the rows of a reduced system, on one process; dof < n_dof. */
 PetscErrorCode HycoRowsCountDependent(PetscInt m, PetscInt start[], PetscInt dof[], PetscReal value[], PetscReal gap[],
                                       PetscInt n_dof, const PetscReal u[], const PetscReal lambda[],
                                       PetscInt *dependent)

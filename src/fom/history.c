@@ -11,6 +11,7 @@
 
 const char *const HycoNewtons[] = {"auto", "tangent", "elastic", "modified", NULL};
 
+/* Defaults of a path; scene NULL: for the declaration of options alone. */
 PetscErrorCode HycoPathNew(MPI_Comm comm, HycoScene scene, HycoPath *path)
 {
   HycoPath p;
@@ -29,6 +30,7 @@ PetscErrorCode HycoPathNew(MPI_Comm comm, HycoScene scene, HycoPath *path)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Work vectors like U and Lambda, which the owner has set. Collective. */
 PetscErrorCode HycoPathSetUp(HycoPath p)
 {
   Vec *likeU[] = {&p->F, &p->f_int, &p->r, &p->U_old, &p->work, &p->diagonal, &p->U_last, &p->G_last, &p->G};
@@ -103,6 +105,7 @@ PetscErrorCode HycoPathSetFromOptions(HycoPath p, HycoOptionItems PetscOptionsOb
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* To the first time with a virgin state. K must be assembled anew if a former path left a tangent in it. Collective. */
 PetscErrorCode HycoPathBegin(HycoPath p, const PetscReal mu[])
 {
   PetscReal all[HYCO_MAX_PARAMETERS];
@@ -129,6 +132,7 @@ PetscErrorCode HycoPathBegin(HycoPath p, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The observed order of convergence, for the report; 0: not observed. */
 static PetscErrorCode NoteOrder(HycoPath p, PetscReal order)
 {
   PetscFunctionBegin;
@@ -141,6 +145,7 @@ static PetscErrorCode NoteOrder(HycoPath p, PetscReal order)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Accepted times, which a reduced path may repeat. */
 static PetscErrorCode NoteTime(HycoPath p)
 {
   PetscFunctionBegin;
@@ -152,7 +157,8 @@ static PetscErrorCode NoteTime(HycoPath p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Makes the attempt the state of the path at t1. */
+/* Makes the attempt the state of the path at t1. States are exchanged, not copied: the former begin is the room of
+   the next end. */
 static PetscErrorCode Accept(HycoPath p, PetscReal t1, const HycoStepAttempt *a)
 {
   HycoFEState state = p->begin;
@@ -171,6 +177,7 @@ static PetscErrorCode Accept(HycoPath p, PetscReal t1, const HycoStepAttempt *a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Work of rejected attempts counts too. */
 static void Count(HycoPath p, const HycoStepAttempt *a)
 {
   p->now.iterations += a->iterations;
@@ -186,7 +193,8 @@ static void Count(HycoPath p, const HycoStepAttempt *a)
   p->n_cuts++;
 }
 
-/* One attempt at a step to `stop`, or by p->dt; advances p->t if it is accepted. */
+/* One attempt at a step to `stop`, or by p->dt; advances p->t if it is accepted. The rest of the interval is divided
+   evenly: no tiny last step. 1e-9 allows for round-off of rest / dt. */
 static PetscErrorCode TryStep(HycoPath p, PetscReal stop)
 {
   const PetscReal rest = stop - p->t, n = PetscCeilReal(rest / p->dt - 1e-9), h = n > 1 ? rest / n : rest;
@@ -201,11 +209,13 @@ static PetscErrorCode TryStep(HycoPath p, PetscReal stop)
   }
   Count(p, &a);
   if (!a.converged) {
+    /* At least halved; a law may ask for less. */
     p->dt = h * PetscMin(0.5, a.law.dt_factor > 0 ? a.law.dt_factor : 0.5);
     PetscCall(PetscStrncpy(p->why, a.why, sizeof(p->why)));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(Accept(p, n > 1 ? p->t + h : stop, &a));
+  /* The next size: prescribed times are followed as given; a law's wish to shorten goes before growth. */
   if (p->given)
     p->dt = PetscMax(p->dt, GROWTH * h);
   else if (a.law.dt_factor < 1)
@@ -224,7 +234,8 @@ static PetscReal NextGiven(HycoPath p)
   return PETSC_MAX_REAL;
 }
 
-/* From the previous listed time to the next; false: the step has become too small, or too many were halved. */
+/* From the previous listed time to the next; false: the step has become too small, or too many were halved. Stops
+   are also the kinks of the scene's functions of time, so that no step jumps over one. */
 static PetscErrorCode Reach(HycoPath p, PetscReal end, PetscBool *reached)
 {
   const HycoScene s = p->scene;
@@ -269,7 +280,8 @@ static PetscErrorCode Record(HycoPath p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* To the next listed time; false: it cannot be reached. */
+/* To the next listed time; false: it cannot be reached. The first listed time is an instantaneous response, later
+   ones are integrated. */
 static PetscErrorCode Advance(HycoPath p, PetscBool *reached)
 {
   HycoScene s = p->scene;
@@ -288,6 +300,8 @@ static PetscErrorCode Advance(HycoPath p, PetscBool *reached)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* All listed times from the current one; stops at the first that cannot be reached, which is no error: p->ended is
+   false and p->why says why. Collective. */
 PetscErrorCode HycoPathRun(HycoPath p)
 {
   PetscBool reached = PETSC_TRUE;
@@ -307,6 +321,7 @@ static int Ascending(const void *a, const void *b)
   return (x > y) - (x < y);
 }
 
+/* Borrowed until the next solve. The order is the median of those observed. */
 void HycoPathGetHistory(HycoPath p, HycoHistory *h)
 {
   h->n = p->n_steps;

@@ -4,7 +4,8 @@
 */
 #include <hycocontactimpl.h>
 
-/* Ties must be found in the mesh file, before it is refined or distributed. */
+/* Ties must be found in the mesh file, before it is refined or distributed. A tied node's masters are found by
+   positions, which a DMPlex from another program need not have in this form. */
 static PetscErrorCode CheckTies(HycoScene scene)
 {
   size_t length;
@@ -19,6 +20,7 @@ static PetscErrorCode CheckTies(HycoScene scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rank 0. Degenerate facets would give misleading errors of the tie search. */
 static PetscErrorCode ReadMesh(HycoScene scene, HycoMesh *mesh)
 {
   HycoTies ties = NULL;
@@ -36,6 +38,7 @@ static PetscErrorCode ReadMesh(HycoScene scene, HycoMesh *mesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The DM of the scene, with tags and labels; a file's DM is on rank 0, an HDF5 one is not yet balanced. Collective. */
 PetscErrorCode HycoMeshLoad(MPI_Comm comm, HycoScene scene, DM *dm)
 {
   HycoMesh mesh = NULL;
@@ -65,6 +68,7 @@ PetscErrorCode HycoMeshLoad(MPI_Comm comm, HycoScene scene, DM *dm)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Local tables of the mesh without its distribution: for programs on one rank. Collective. */
 PetscErrorCode HycoMeshCreate(MPI_Comm comm, HycoScene scene, HycoMesh *mesh)
 {
   DM dm;

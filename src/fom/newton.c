@@ -28,7 +28,7 @@ typedef struct {
 } Progress;
 
 /* Evaluates the law at U: state `end`, f_int, r = F - f_int - B^T L, with `tangent` the consistent tangents; and the
-   magnitudes of the terms of r. */
+   magnitudes of the terms of r. floor: 16 eps (|diag(K) U| + summands): below it the residual is round-off of U. */
 static PetscErrorCode Evaluate(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tangent, HycoStepAttempt *a,
                                Progress *now)
 {
@@ -57,7 +57,8 @@ static PetscErrorCode Evaluate(HycoPath p, PetscReal t0, PetscReal t1, PetscBool
 }
 
 /* K (u0 - u) of supports that have moved, subtracted from the loads of the free unknowns; K_ii (u0 - u)_i at the
-   others. */
+   others. By the lifting of HycoFEAssembleForce() for the differences of prescribed displacements in place of their
+   values. */
 PetscErrorCode HycoPathMoves(HycoPath p, const PetscScalar u[], Vec work, PetscBool *moved)
 {
   HycoFE fe = p->fe;
@@ -83,7 +84,8 @@ PetscErrorCode HycoPathMoves(HycoPath p, const PetscScalar u[], Vec work, PetscB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* rhs = K U + F - f_int: the right-hand side of the contact system. */
+/* rhs = K U + F - f_int: the right-hand side of the contact system. r is F - f_int - B^T L on entry, so that B^T L
+   is added back. */
 static PetscErrorCode RightSide(HycoPath p)
 {
 
@@ -94,6 +96,7 @@ static PetscErrorCode RightSide(HycoPath p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Replaces the values of K; the solver factors it at the next solve. */
 static PetscErrorCode AssembleK(HycoPath p, PetscBool tangent)
 {
   PetscFunctionBegin;
@@ -114,7 +117,8 @@ static PetscReal Target(HycoPath p, const Progress *now)
   return PetscMax(least, share * r);
 }
 
-/* Solves the contact system at U: the solution is in G and L_new. */
+/* Solves the contact system at U: the solution is in G and L_new. U and L are the start of the solve: the active set
+   of the last iterate is mostly right. */
 static PetscErrorCode SolveSystem(HycoPath p, PetscBool first, const Progress *now, HycoStepAttempt *a)
 {
   HycoReason reason;
@@ -150,7 +154,8 @@ static PetscErrorCode SolveSystem(HycoPath p, PetscBool first, const Progress *n
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A step of Newton's method: to the system's solution; Evaluate() and Shorten() determine the step length. */
+/* A step of Newton's method: to the system's solution; Evaluate() and Shorten() determine the step length. The slope
+   of the potential along the step is -(F - f_int) . dU. */
 static PetscErrorCode Advance(HycoPath p, PetscBool feasible, const HycoStepAttempt *a, Progress *now)
 {
   PetscReal work;
@@ -178,7 +183,8 @@ static PetscErrorCode Advance(HycoPath p, PetscBool feasible, const HycoStepAtte
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the incremental potential has decreased enough; no if a law has no solution. */
+/* Whether the incremental potential has decreased enough; no if a law has no solution. The last term allows for
+   round-off of the two sums. */
 static PetscErrorCode IsLower(HycoPath p, const HycoStepAttempt *a, const Progress *now, PetscBool *lower)
 {
   PetscReal work, potential;
@@ -195,7 +201,8 @@ static PetscErrorCode IsLower(HycoPath p, const HycoStepAttempt *a, const Progre
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Halves the last step until the potential decreases, and evaluates there. */
+/* Halves the last step until the potential decreases, and evaluates there. The tangents of the last evaluation
+   remain: those at the accepted point. */
 static PetscErrorCode Shorten(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAttempt *a, Progress *now)
 {
   PetscBool lower;
@@ -214,7 +221,8 @@ static PetscErrorCode Shorten(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a contact is closed in exactly one of the two solutions. */
+/* Whether a contact is closed in exactly one of the two solutions. Forces of open contacts are exactly 0 after a
+   solve. */
 static PetscErrorCode SetChanged(HycoPath p, Vec a, Vec b, PetscBool *changed)
 {
   const PetscScalar *x, *y;
@@ -235,7 +243,8 @@ static PetscErrorCode SetChanged(HycoPath p, Vec a, Vec b, PetscBool *changed)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Shifts the last differences by one place, and stores the newest, `vector` - `last`. */
+/* Shifts the last differences by one place, and stores the newest, `vector` - `last`. Vectors are rotated, not
+   copied. */
 static PetscErrorCode Push(PetscInt n, Vec store[], Vec vector, Vec last)
 {
   Vec oldest = store[0];
@@ -249,7 +258,8 @@ static PetscErrorCode Push(PetscInt n, Vec store[], Vec vector, Vec last)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* gamma of min |g - sum of gamma_j dG_j|, by normal equations with a small ridge; n <= HYCO_ANDERSON. */
+/* gamma of min |g - sum of gamma_j dG_j|, by normal equations with a small ridge; n <= HYCO_ANDERSON. n is at most
+   HYCO_ANDERSON: dense elimination; the ridge keeps dependent differences harmless. */
 static PetscErrorCode LeastSquares(PetscInt n, Vec dG[], Vec g, PetscReal gamma[])
 {
   PetscReal A[HYCO_ANDERSON][HYCO_ANDERSON], trace = 0;
@@ -277,7 +287,8 @@ static PetscErrorCode LeastSquares(PetscInt n, Vec dG[], Vec g, PetscReal gamma[
 }
 
 /* The next iterate with a K that is kept: the system's solution, mixed with previous ones on the same contacts. The
-   first of a step, k = 0, does not satisfy the step's supports and is left out; the mixing begins with k = 1. */
+   first of a step, k = 0, does not satisfy the step's supports and is left out; the mixing begins with k = 1. With
+   another contact set the former differences belong to another linear map. */
 static PetscErrorCode Mix(HycoPath p, PetscInt k)
 {
   PetscReal gamma[HYCO_ANDERSON];
@@ -309,7 +320,8 @@ static PetscErrorCode Mix(HycoPath p, PetscInt k)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The four residuals of the nonlinear problem: with the right-hand side K U + F - f_int, K cancels in the first. */
+/* The four residuals of the nonlinear problem: with the right-hand side K U + F - f_int, K cancels in the first.
+   Feasibility and complementarity of the contacts at U, stationarity by the residual of the nonlinear forces. */
 static PetscErrorCode Judge(HycoPath p, const Progress *now, HycoStepAttempt *a, PetscReal *worst)
 {
   HycoKKT *kkt = &p->kkt;
@@ -326,7 +338,8 @@ static PetscErrorCode Judge(HycoPath p, const Progress *now, HycoStepAttempt *a,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* log(r2 / r1) / log(r1 / r0), unless one of the three is round-off. */
+/* log(r2 / r1) / log(r1 / r0), unless one of the three is round-off. Three residuals in the asymptotic range are
+   needed. */
 static void Observe(const Progress *now, PetscInt k, HycoStepAttempt *a)
 {
   const PetscReal *r = now->residual, least = 1e-13 * now->size + now->floor;
@@ -335,7 +348,8 @@ static void Observe(const Progress *now, PetscInt k, HycoStepAttempt *a)
   a->order = PetscLogReal(r[2] / r[1]) / PetscLogReal(r[1] / r[0]);
 }
 
-/* Whether a new tangent is cheaper than the iterations that the present one would need. */
+/* Whether a new tangent is cheaper than the iterations that the present one would need. Expected iterations by the
+   last contraction rate against WORTH, in logarithms. */
 static PetscBool Stalls(HycoPath p, const Progress *now)
 {
   const PetscReal *r = now->residual, target = PetscMax(p->rtol * now->size, now->floor), rate = r[2] / r[1];
@@ -343,7 +357,7 @@ static PetscBool Stalls(HycoPath p, const Progress *now)
   return (PetscBool)(p->kept > 0 && !(rate < 1 && PetscLogReal(target / r[2]) > WORTH * PetscLogReal(rate)));
 }
 
-/* Updates K at U. */
+/* Updates K at U. The evaluation at U gave no tangents; residuals are kept, as U is the same. */
 static PetscErrorCode Renew(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAttempt *a, Progress *now)
 {
   const Progress here = *now;
@@ -358,6 +372,7 @@ static PetscErrorCode Renew(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAtte
 /* Iterations of a step before it is halved, by HycoNewton; a step with at most half of them was easy. */
 static const PetscInt usual_its[] = {0, 15, 60, 30};
 
+/* One attempt: evaluate, test, assemble where needed, solve, advance. Ends with a->converged or a reason in a->why. */
 static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoNewton method, HycoStepAttempt *a)
 {
   const PetscBool tangent = (PetscBool)(method == HYCO_NEWTON_TANGENT);
@@ -402,6 +417,7 @@ static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoNewton
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Undoes an attempt: U and Lambda of the last accepted time; states were never overwritten. */
 PetscErrorCode HycoPathRestore(HycoPath p)
 {
 
@@ -411,6 +427,7 @@ PetscErrorCode HycoPathRestore(HycoPath p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* K is assembled here if it is elastic, else in the iterations. */
 PetscErrorCode HycoPathAssemble(HycoPath p, PetscReal t1)
 {
   PetscReal mu[HYCO_MAX_PARAMETERS];
@@ -422,6 +439,7 @@ PetscErrorCode HycoPathAssemble(HycoPath p, PetscReal t1)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Cost of a factorisation in units of a solve with it, by the growth of both with n_free. */
 PetscReal HycoPathFactorCost(HycoPath p)
 {
   return (p->fe->dim == 3 ? 0.15 : 0.03) * PetscSqrtReal((PetscReal)p->n_free);
@@ -436,6 +454,8 @@ HycoNewton HycoPathMethod(HycoPath p)
   return HycoPathFactorCost(p) > 5 ? HYCO_NEWTON_ELASTIC : HYCO_NEWTON_TANGENT;
 }
 
+/* A step from t0 to t1, U and Lambda in place. A variant with a kept K that fails is repeated with tangents before
+   the step is halved. Collective. */
 PetscErrorCode HycoPathAttempt(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAttempt *a)
 {
   HycoNewton method;

@@ -4,6 +4,7 @@
 */
 #include <hycopath.h>
 
+/* A scene without times would ignore these options silently. */
 PetscErrorCode HycoPathRefuseOptions(HycoFOM f)
 {
   static const char *const name[] = {"-hyco_newton",         "-hyco_newton_rtol",   "-hyco_newton_max_its",
@@ -21,7 +22,8 @@ PetscErrorCode HycoPathRefuseOptions(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reduces the laws' report over all ranks. */
+/* Reduces the laws' report over all ranks. Sums, extremes and the text of the lowest rank that failed: the same
+   report on all ranks. */
 static PetscErrorCode ReduceReport(HycoFOM f, HycoFEStepReport *r)
 {
   PetscReal sum[6] = {r->work, r->stored, r->dissipated, r->thermal, r->moduli, r->potential};
@@ -47,7 +49,8 @@ static PetscErrorCode ReduceReport(HycoFOM f, HycoFEStepReport *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets this rank's rows of f_int from f_local; and r = F - f_int there, 0 where fixed. */
+/* Sets this rank's rows of f_int from f_local; and r = F - f_int there, 0 where fixed. f_local is complete at owned
+   nodes, so that no communication is needed. */
 static PetscErrorCode TakeForces(HycoFOM f)
 {
   HycoPath p = f->path;
@@ -74,7 +77,8 @@ static PetscErrorCode TakeForces(HycoFOM f)
   PetscCall(VecRestoreArray(p->r, &r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-/* Updates f->fe to mu, K, B, D; the loads without the effect of moved supports. */
+/* Updates f->fe to mu, K, B, D; the loads without the effect of moved supports. The path adds the effect of moved
+   supports itself, by increments: p->F is without lifting. */
 static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elastic)
 {
   HycoFOM f = (HycoFOM)p->ctx;
@@ -96,6 +100,7 @@ static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elast
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Internal forces at U: scatter, complete eliminated unknowns, laws, reduction. Collective. */
 static PetscErrorCode Step(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tangent, HycoFEStepReport *report)
 {
   HycoFOM f = (HycoFOM)p->ctx;
@@ -122,6 +127,7 @@ static PetscErrorCode Stiffness(HycoPath p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* In the first iteration of a step the supports move to the new time's values. */
 static PetscErrorCode Moves(HycoPath p, Vec rhs)
 {
   HycoFOM f = (HycoFOM)p->ctx;
@@ -138,7 +144,8 @@ static PetscErrorCode Moves(HycoPath p, Vec rhs)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The mean of two vectors times the change of U, over the free or the fixed unknowns. */
+/* The mean of two vectors times the change of U, over the free or the fixed unknowns. Trapezoidal rule; fixed
+   unknowns of other ranks are counted by their owners. */
 static PetscErrorCode MeanWork(HycoFOM f, Vec before, Vec after, PetscBool on_fixed, PetscReal *work)
 {
   const PetscInt dim = f->part->dim;
@@ -183,13 +190,10 @@ static PetscErrorCode ContactWork(HycoFOM f, PetscReal *sum)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/*
-  The energies of the accepted step. With all forces at their mean over the step the balance
-
-    work of loads and supports = stored + dissipated + of heat and of moduli that change + work against contact
-
-  is an identity: its defect measures the equilibrium, since the laws give the energies and the loads give the work.
-*/
+/* The energies of the accepted step. With all forces at their mean over the step the balance  work of loads and
+   supports = stored + dissipated + of heat and of moduli that change + work against contact  is an identity: its
+   defect measures the equilibrium, since the laws give the energies and the loads give the work. The defect is
+   relative to all energies exchanged so far, so that a step without any does not divide by round-off. */
 static PetscErrorCode AddWork(HycoFOM f, const HycoFEStepReport *law, PetscReal *step_defect)
 {
   HycoPath p = f->path;
@@ -215,6 +219,7 @@ static PetscErrorCode AddWork(HycoFOM f, const HycoFEStepReport *law, PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The criteria of a single solution, without the energy identity, which a path has by steps. */
 static PetscErrorCode JudgeStep(HycoPath p, HycoReason reason, char why[HYCO_LINE])
 {
   HycoFOM f = (HycoFOM)p->ctx;
@@ -228,6 +233,8 @@ static PetscErrorCode JudgeStep(HycoPath p, HycoReason reason, char why[HYCO_LIN
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Adds the step's energies, keeps F and f_int for the next one; between listed times the monitor gets the gathered
+   solution. */
 static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
 {
   PetscReal defect = 0;
@@ -244,7 +251,7 @@ static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The largest values over the cells of all ranks. */
+/* The largest values over the cells of all ranks. Volume means by cell, at the state of the accepted time. */
 static PetscErrorCode Largest(HycoFOM f, HycoStep *s)
 {
   PetscReal *mises, *inelastic, most[2] = {0, 0};
@@ -263,6 +270,7 @@ static PetscErrorCode Largest(HycoFOM f, HycoStep *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Collective, like the other measures. */
 static PetscErrorCode MeasureContacts(HycoFOM f, HycoStep *s)
 {
   const PetscScalar *l;
@@ -288,7 +296,7 @@ static PetscErrorCode MeasureContacts(HycoFOM f, HycoStep *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Records a listed time. */
+/* Records a listed time. Energies are those since the start. */
 static PetscErrorCode Record(HycoPath p)
 {
   HycoFOM f = (HycoFOM)p->ctx;
@@ -321,6 +329,7 @@ static PetscErrorCode Save(HycoPath p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The full-order operations of a path; f's vectors are borrowed. Collective. */
 PetscErrorCode HycoFOMPathCreate(HycoFOM f)
 {
   static const HycoPathOps ops = {.assemble = Assemble,
@@ -351,6 +360,7 @@ PetscErrorCode HycoFOMPathCreate(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The path at mu, from its first time or from a checkpoint. Not reaching the end is no error. Collective. */
 PetscErrorCode HycoPathSolve(HycoFOM f, const PetscReal mu[])
 {
   HycoPath p = f->path;
@@ -372,6 +382,7 @@ PetscErrorCode HycoPathSolve(HycoFOM f, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Empty without a history. Borrowed until the next solve. */
 PetscErrorCode HycoFOMGetHistory(HycoFOM f, HycoHistory *h)
 {
   PetscFunctionBegin;

@@ -9,7 +9,8 @@
 #include <hycofields.h>
 #include <hycopath.h>
 
-/* -B^T L at all unknowns of the part, fixed ones too, from the contacts of all ranks. Collective. */
+/* -B^T L at all unknowns of the part, fixed ones too, from the contacts of all ranks. Collective. All components at
+   fixed unknowns too, which B does not have: therefore from the contacts' normals, not from B^T. */
 static PetscErrorCode ContactForces(HycoFOM f, PetscReal force[])
 {
   const PetscInt dim = f->fe->dim;
@@ -38,7 +39,7 @@ static PetscErrorCode ContactForces(HycoFOM f, PetscReal force[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* contact: room for n_dof reals. Collective. */
+/* contact: room for n_dof reals. Collective. R = f_int - F - (-B^T L), at supported unknowns in generalised form. */
 static PetscErrorCode Reactions(HycoFOM f, PetscReal contact[], PetscReal r[])
 {
   const PetscScalar *u;
@@ -64,6 +65,7 @@ static PetscErrorCode Reactions(HycoFOM f, PetscReal contact[], PetscReal r[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* r[n_dof] of this rank's part (N), complete at owned nodes. Collective. */
 PetscErrorCode HycoFOMReactions(HycoFOM f, PetscReal r[])
 {
   PetscReal *contact;
@@ -90,7 +92,8 @@ static void AddTo(HycoFE fe, PetscInt dof, PetscReal value, HycoReaction *to)
   to->moment[e] -= x[d] * value;
 }
 
-/* The support of each unknown: the first in the scene's order; -1: none. */
+/* The support of each unknown: the first in the scene's order; -1: none. A node in several supports is listed with
+   the first, so that each force counts once. */
 static PetscErrorCode FindSupports(HycoFOM f, PetscInt support[])
 {
   HycoMesh m = f->part;
@@ -117,6 +120,7 @@ typedef struct {
   PetscReal size;
 } Sums;
 
+/* -K u of the springs that this process counts. */
 static PetscErrorCode AddSpring(HycoFE fe, PetscInt spring, PetscInt n, const PetscInt node[], const PetscReal K[],
                                 void *ctx)
 {
@@ -158,7 +162,9 @@ static void Resolve(PetscInt n, const HycoOblique *const o[], const PetscBool pl
   }
 }
 
-/* The force of each support on a node: r is that of the unknowns, support[] the support of each. */
+/* The force of each support on a node: r is that of the unknowns, support[] the support of each. In an oblique
+   support the unknowns' force is along the eliminated component; the force along n follows by least squares, the
+   rest belongs to plain supports. */
 static void AddSupports(HycoFE fe, PetscInt node, const PetscReal r[], const PetscInt support[], HycoReaction result[])
 {
   const HycoOblique *o[3];
@@ -188,7 +194,8 @@ static void AddSupports(HycoFE fe, PetscInt node, const PetscReal r[], const Pet
   }
 }
 
-/* Sums over the nodes that this process owns; work: 3 x n_dof reals. Collective. */
+/* Sums over the nodes that this process owns; work: 3 x n_dof reals. Collective. The loads of fixed unknowns count
+   as well: they go directly into the supports. */
 static PetscErrorCode AddUp(HycoFOM f, PetscReal *work, PetscInt support[], Sums *s)
 {
   const PetscInt n = f->fe->n_dof, dim = f->fe->dim;
@@ -212,7 +219,8 @@ static PetscErrorCode AddUp(HycoFOM f, PetscReal *work, PetscInt support[], Sums
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sums over the ranks, and the imbalance of the sum. Collective. */
+/* Sums over the ranks, and the imbalance of the sum. Collective. Largest component of the resultant of everything,
+   over the sum of all magnitudes. Forces alone: moments about the origin depend on its distance. */
 static PetscErrorCode Balance(HycoFOM f, PetscInt n, Sums *s, PetscReal *balance)
 {
   PetscReal *sum, most = 0;
@@ -238,6 +246,8 @@ static PetscErrorCode Balance(HycoFOM f, PetscInt n, Sums *s, PetscReal *balance
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Resultants (N) and moments about the origin of each support and spring, of the loads and of the obstacles, and
+   their balance, in f->reaction (borrowed). Collective. */
 PetscErrorCode HycoFOMGetReactions(HycoFOM f, PetscInt *n, const HycoReaction *result[], PetscReal *balance)
 {
   const HycoScene scene = f->scene;

@@ -7,7 +7,8 @@
 
 #define BLOCK 32 /* right-hand sides solved at once */
 
-/* Creates a solver without contacts; in the other one they are unknowns. */
+/* Creates a solver without contacts; in the other one they are unknowns. The factor of the contact solver may be
+   that of another form. */
 static PetscErrorCode SetUp(HycoFOM f)
 {
   PetscFunctionBegin;
@@ -22,7 +23,7 @@ static PetscErrorCode SetUp(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* K U = given_F */
+/* K U = given_F Without contacts the system is linear: one factorisation as long as K is unchanged. */
 static PetscErrorCode SolveGiven(HycoFOM f)
 {
   PetscFunctionBegin;
@@ -33,6 +34,8 @@ static PetscErrorCode SolveGiven(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* U under given forces (Lambda on rank 0, in the order of one rank). The KKT residuals are those of (16), thus they
+   show what the forces violate. Collective. */
 PetscErrorCode HycoFOMSolveForces(HycoFOM f, PetscInt n, const PetscReal mu[], const PetscReal Lambda[])
 {
   HycoSeconds *t;
@@ -61,7 +64,8 @@ PetscErrorCode HycoFOMSolveForces(HycoFOM f, PetscInt n, const PetscReal mu[], c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves a block of n patterns, from P to their columns of X (stride q). */
+/* Solves a block of n patterns, from P to their columns of X (stride q). In blocks, because a triangular solve of 32
+   right-hand sides costs little more than a few, and memory stays bounded. */
 static PetscErrorCode RespondBlock(HycoFOM f, PetscInt n, const PetscReal P[], PetscInt q, PetscReal X[])
 {
   PetscReal *local;
@@ -86,6 +90,7 @@ static PetscErrorCode RespondBlock(HycoFOM f, PetscInt n, const PetscReal P[], P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* X[n_dof][q] = K^-1 B^T P, P of n_contacts x q by columns on rank 0. Overwrites U and Lambda of f. Collective. */
 PetscErrorCode HycoFOMResponses(HycoFOM f, const PetscReal mu[], PetscInt q, const PetscReal P[], PetscReal X[])
 {
   PetscFunctionBegin;

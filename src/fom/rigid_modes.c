@@ -11,6 +11,7 @@
 #include <limits.h>
 #include <string.h>
 
+/* The motions as distributed vectors; the caller destroys them by VecDestroyVecs(). Collective. */
 PetscErrorCode HycoFOMMotionVectors(HycoFOM f, const HycoMotions *motions, Vec **v)
 {
   const PetscInt dim = f->fe->dim;
@@ -41,7 +42,7 @@ static PetscErrorCode ToSurface(HycoFOM f, PetscInt n, const Vec v[], PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* "body upper from turning about (0, 0, 1) through (0, 10, 0); nor body ..." */
+/* "body upper from turning about (0, 0, 1) through (0, 10, 0); nor body ..." As many as there is room for. */
 static void Names(HycoFOM f, const HycoMotions *free, PetscInt n, const PetscReal unconstrained[], const char between[],
                   size_t room, char list[])
 {
@@ -57,7 +58,7 @@ static void Names(HycoFOM f, const HycoMotions *free, PetscInt n, const PetscRea
 }
 
 /* Adds a combination to the released motions, orthonormalised against the existing ones; a dependent one is left
-   out. */
+   out. Dependent: less than a tenth remains. */
 static PetscErrorCode AddReleased(HycoFOM f, PetscInt n, const Vec motion[], const PetscReal z[])
 {
   PetscReal norm, before;
@@ -91,7 +92,8 @@ typedef struct {
   PetscReal *all, *alike;
 } Unconstrained;
 
-/* Names them, and refuses them unless they are to be released. Rank 0, whose sums decide. */
+/* Names them, and refuses them unless they are to be released. Rank 0, whose sums decide. All ranks have the same
+   combinations; rank 0 gives the text. */
 static PetscErrorCode NameUnconstrained(HycoFOM f, const HycoMotions *free, const Unconstrained *z)
 {
   char list[HYCO_LINE / 2];
@@ -127,7 +129,8 @@ static PetscErrorCode FindUnconstrained(HycoFOM f, const HycoMotions *free, Unco
 }
 
 /* Releases unconstrained motions, first those that are tangential in the same sense: the normals can be turned only
-   for these. */
+   for these. With turned normals the motions are free also on the mesh; the others are only kept from the pins'
+   forces. */
 static PetscErrorCode FindReleased(HycoFOM f, const HycoMotions *free)
 {
   Unconstrained z = {0, 0, NULL, NULL};
@@ -152,7 +155,8 @@ static PetscErrorCode FindReleased(HycoFOM f, const HycoMotions *free)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The rows of the released motions at this rank's unknowns, zero at the contacts' nodes. */
+/* The rows of the released motions at this rank's unknowns, zero at the contacts' nodes. Pins at contacts' nodes
+   would carry contact forces. */
 static PetscErrorCode ReleasedRows(HycoFOM f, PetscReal row[])
 {
   const PetscInt n = f->n_released, n_own = f->part->n_owned * f->fe->dim;
@@ -194,7 +198,7 @@ static PetscReal RowSize(PetscInt n, const PetscReal row[])
 }
 
 /* The longest of all ranks' rows, among equal ones that of the node with the smallest tag: its tag and component,
-   and the row. tag: of this rank's nodes. */
+   and the row. tag: of this rank's nodes. Equal within 1e-10: symmetric bodies have many such rows. */
 static PetscErrorCode LongestRow(HycoFOM f, const PetscInt tag[], const PetscReal row[], PetscInt *pin,
                                  PetscInt *component, PetscReal longest[])
 {
@@ -221,7 +225,9 @@ static PetscErrorCode LongestRow(HycoFOM f, const PetscInt tag[], const PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* As many unknowns as released motions, pivots of the motions' rows, not at contacts: by tag and component. */
+/* As many unknowns as released motions, pivots of the motions' rows, not at contacts: by tag and component.
+   Gram-Schmidt on rows with pivoting: the pinned rows are well conditioned. Chosen once, since pins change the
+   pattern of fixed unknowns. */
 static PetscErrorCode ChoosePins(HycoFOM f)
 {
   const PetscInt n = f->n_released, n_own = f->part->n_owned * f->fe->dim;
@@ -249,7 +255,8 @@ static PetscErrorCode ChoosePins(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets the pins, on the part and on the surfaces, and the motions for which the normals there are turned. */
+/* Sets the pins, on the part and on the surfaces, and the motions for which the normals there are turned. Pins are
+   set after the contacts' motions are known; 0 removes them. */
 static PetscErrorCode SetPins(HycoFOM f, PetscInt n)
 {
   HycoFE fe = f->fe_surface;
@@ -265,6 +272,8 @@ static PetscErrorCode SetPins(HycoFOM f, PetscInt n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Finds the unconstrained motions at the current parameters and releases them (-hyco_regularise), or refuses them.
+   Before K is assembled, as pins belong to its fixed unknowns. Collective. */
 PetscErrorCode HycoFOMRelease(HycoFOM f)
 {
   HycoMotions free;
@@ -307,7 +316,7 @@ static PetscErrorCode Work(Vec force, Vec motion, PetscReal *on, PetscReal *all)
 }
 
 /* The share of the forces' work on a released motion that is not balanced must be small: otherwise it would
-   accelerate the body. */
+   accelerate the body. A disc under its own symmetric load has round-off here, a missing support has 1. */
 static PetscErrorCode CheckBalance(HycoFOM f, const char forces[], PetscReal share)
 {
   PetscFunctionBegin;
@@ -319,6 +328,7 @@ static PetscErrorCode CheckBalance(HycoFOM f, const char forces[], PetscReal sha
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Makes F orthogonal to the released motions, so that pins carry nothing. Collective. */
 PetscErrorCode HycoFOMBalance(HycoFOM f)
 {
   const PetscInt dim = f->fe->dim;
@@ -341,6 +351,7 @@ PetscErrorCode HycoFOMBalance(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* After the solve: contact forces with turned normals must not push along a released motion. Collective. */
 PetscErrorCode HycoFOMCheckContactBalance(HycoFOM f)
 {
   PetscReal on, all, size, worst = 0;
@@ -363,6 +374,7 @@ PetscErrorCode HycoFOMCheckContactBalance(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The solution is determined up to these motions; the shown one is orthogonal to them. */
 PetscErrorCode HycoFOMTakeOutReleased(HycoFOM f, Vec u)
 {
   PetscScalar dot;
@@ -375,6 +387,7 @@ PetscErrorCode HycoFOMTakeOutReleased(HycoFOM f, Vec u)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The solver prevents these motions by contact; NULL where supports prevent all. */
 static PetscErrorCode SetKernel(HycoFOM f)
 {
   HycoMotions motions;
@@ -395,7 +408,7 @@ static PetscErrorCode SetKernel(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Modified Gram-Schmidt, twice; dependent vectors are removed. */
+/* Modified Gram-Schmidt, twice; dependent vectors are removed. Twice, against round-off of nearly dependent motions. */
 static PetscErrorCode Orthonormalize(PetscInt *n, Vec v[])
 {
   PetscInt kept = 0;
@@ -424,7 +437,8 @@ static PetscErrorCode Orthonormalize(PetscInt *n, Vec v[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets translations and rotations of the moved nodes, zero where fixed. */
+/* Sets translations and rotations of the moved nodes, zero where fixed. For an algebraic multigrid, in block layout.
+   MatNullSpaceCreateRigidBody() gives them without supports; zeros at fixed rows match K. */
 static PetscErrorCode SetNearKernel(HycoFOM f)
 {
   const PetscInt dim = f->fe->dim;
@@ -470,6 +484,7 @@ static PetscErrorCode SetNearKernel(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* After each change of K or of the nodes, because both depend on positions. Collective. */
 PetscErrorCode HycoFOMSetMotions(HycoFOM f)
 {
   PetscFunctionBegin;

@@ -14,7 +14,8 @@ struct _n_HycoSeries {
   HycoH5 part; /* file of this time beside the checkpoint; NULL: none */
 };
 
-/* Writes a field of this time. */
+/* Writes a field of this time. One write to the series, a second one to the separate file, from which a resumed run
+   restores the series. */
 static PetscErrorCode AddField(HycoSeries s, const char name[], HycoPlace place, PetscInt components,
                                const PetscReal value[])
 {
@@ -93,6 +94,7 @@ static PetscErrorCode AddContacts(HycoSeries s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The file at `path` is written completely or not at all, at HycoSeriesClose(); most: number of times. Collective. */
 PetscErrorCode HycoSeriesCreate(MPI_Comm comm, const char path[], PetscInt most, HycoSeries *series)
 {
   HycoFieldFile file;
@@ -106,6 +108,7 @@ PetscErrorCode HycoSeriesCreate(MPI_Comm comm, const char path[], PetscInt most,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For the next solve; replaces a former series. Collective. */
 PetscErrorCode HycoFOMSetSeries(HycoFOM f, const char path[])
 {
   HycoSeries s;
@@ -119,7 +122,8 @@ PetscErrorCode HycoFOMSetSeries(HycoFOM f, const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The data of full order at its last time. */
+/* The data of full order at its last time. Borrowed pointers, read again at each time, since the masters' search may
+   replace the surfaces. */
 static PetscErrorCode Look(HycoFOM f, HycoSeriesSource *from)
 {
   HycoPath p = f->path;
@@ -142,6 +146,7 @@ static PetscErrorCode Look(HycoFOM f, HycoSeriesSource *from)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Writes mesh and parameters; fields follow by HycoSeriesAddTime(). Collective. */
 PetscErrorCode HycoSeriesOpen(HycoSeries s, const HycoSeriesSource *from)
 {
   PetscFunctionBegin;
@@ -194,6 +199,7 @@ static PetscErrorCode ReadField(HycoFOM f, HycoH5 h, const HycoFileOrder *order,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Fields of nodes and of cells have separate names in the file; the place is found by trial. */
 static PetscErrorCode CopyField(HycoFOM f, HycoSeries s, HycoH5 h, const char name[], PetscInt k)
 {
   HycoField field = {name, HYCO_ON_NODES, 0, NULL};
@@ -245,6 +251,7 @@ static PetscErrorCode OpenPart(HycoFOM f, PetscInt k, HycoH5 *h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Restores the times before the checkpoint from their separate files. Collective. */
 PetscErrorCode HycoSeriesRestore(HycoFOM f)
 {
   HycoSeries s = f->path->series;
@@ -274,6 +281,7 @@ static PetscErrorCode AddFields(HycoSeries s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A time of a path of any model: full order or reduced. Collective. */
 PetscErrorCode HycoSeriesAddTime(HycoSeries s, const HycoSeriesSource *from)
 {
   PetscFunctionBegin;
@@ -284,6 +292,7 @@ PetscErrorCode HycoSeriesAddTime(HycoSeries s, const HycoSeriesSource *from)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The separate file is complete before the checkpoint that refers to it is written. Collective. */
 PetscErrorCode HycoSeriesAdd(HycoFOM f)
 {
   HycoSeries s = f->path->series;
@@ -304,6 +313,7 @@ PetscErrorCode HycoSeriesAdd(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A path without any listed time leaves no file. */
 PetscErrorCode HycoSeriesClose(HycoSeries s)
 {
   PetscFunctionBegin;

@@ -3,6 +3,7 @@
 #include <hycoquantities.h>
 #include <hycopath.h>
 
+/* Measures of contact over all ranks. Collective. */
 static PetscErrorCode MeasureContacts(HycoFOM f, HycoSummary *s)
 {
   PetscReal sum[2] = {0, 0}, most[3] = {0, 0, 0};
@@ -33,6 +34,7 @@ static PetscErrorCode MeasureContacts(HycoFOM f, HycoSummary *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Sum of squares over owned nodes, extremes over all. */
 static PetscErrorCode MeasureDisplacements(HycoFOM f, HycoSummary *s)
 {
   const PetscInt dim = f->fe->dim;
@@ -56,7 +58,7 @@ static PetscErrorCode MeasureDisplacements(HycoFOM f, HycoSummary *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of all ranks. */
+/* Of all ranks. Pressures are maxima, everything else sums. */
 static PetscErrorCode SumResult(HycoFOM f, HycoContactResult *r)
 {
   PetscReal sum[7];
@@ -77,7 +79,7 @@ static PetscErrorCode SumResult(HycoFOM f, HycoContactResult *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Collective. */
+/* Collective. Results by contact of the scene in f->contact_result. */
 static PetscErrorCode SumContacts(HycoFOM f)
 {
   const PetscInt n = f->scene->n_contacts;
@@ -95,6 +97,8 @@ static PetscErrorCode SumContacts(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Values of the scene's outputs at the last solution; stresses, contacts and reactions only if an output needs them.
+   Collective. */
 PetscErrorCode HycoFOMMeasureQuantities(HycoFOM f, PetscReal value[])
 {
   PetscReal *reaction = NULL;
@@ -132,6 +136,7 @@ static void SumPath(HycoFOM f, HycoSummary *s)
   s->energy_defect = p->work_done.defect;
 }
 
+/* Judges the last solution and measures it; *out is rank 0's, because sums may differ in the last bits. Collective. */
 PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
 {
   HycoSummary *s;
@@ -180,6 +185,7 @@ PetscErrorCode HycoFOMGetContacts(HycoFOM f, PetscInt *n, const HycoContactResul
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Volume means by cell of this rank, once per solution. Not collective. */
 PetscErrorCode HycoFOMStress(HycoFOM f)
 {
   const PetscScalar *u;
@@ -197,7 +203,8 @@ PetscErrorCode HycoFOMStress(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Gathers the whole solution on rank 0. */
+/* Gathers the whole solution on rank 0. Rows in the file's order, the same on any number of ranks; the only place
+   where a solution is gathered. */
 static PetscErrorCode BringTogether(HycoFOM f)
 {
   HycoFileOrder *all;
@@ -215,6 +222,7 @@ static PetscErrorCode BringTogether(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Borrowed until the next solve; rank 0 alone has arrays. Collective. */
 PetscErrorCode HycoFOMGetSolution(HycoFOM f, PetscInt *n_nodes, const PetscReal *U[], PetscInt *n_contacts,
                                   const PetscReal *Lambda[], PetscInt *n_cells, const PetscReal *sigma[])
 {
@@ -234,6 +242,7 @@ PetscErrorCode HycoFOMGetSolution(HycoFOM f, PetscInt *n_nodes, const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* F - B^T L at local unknowns, 0 where fixed: the forces that the displacements balance. Collective. */
 PetscErrorCode HycoFOMGetForces(HycoFOM f, PetscReal forces[])
 {
   Vec work;
@@ -265,6 +274,7 @@ static PetscErrorCode Look(HycoFOM f, HycoSolution *solution)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One file per solution. Collective. */
 PetscErrorCode HycoFOMWrite(HycoFOM f, const char path[])
 {
   HycoSolution solution;
@@ -277,6 +287,8 @@ PetscErrorCode HycoFOMWrite(HycoFOM f, const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A file of n solutions (a batch); HycoFOMWriteAdd() adds the last one, HycoFOMWriteEnd() puts it in place.
+   Collective. */
 PetscErrorCode HycoFOMWriteBegin(HycoFOM f, const char path[], PetscInt n)
 {
   PetscFunctionBegin;

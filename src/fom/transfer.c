@@ -2,6 +2,7 @@
 #include <hycofields.h>
 #include <hycofomimpl.h>
 
+/* value[n_dof] of this rank's part, ghosts included. Collective. */
 PetscErrorCode HycoFOMToLocal(HycoFOM f, Vec v, PetscReal value[])
 {
   Vec local;
@@ -14,6 +15,7 @@ PetscErrorCode HycoFOMToLocal(HycoFOM f, Vec v, PetscReal value[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* value[] of fe_surface's unknowns; on one rank these are all. Collective. */
 PetscErrorCode HycoFOMToSurface(HycoFOM f, Vec v, PetscReal value[])
 {
   const PetscScalar *from;
@@ -30,6 +32,8 @@ PetscErrorCode HycoFOMToSurface(HycoFOM f, Vec v, PetscReal value[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The last solution as local arrays: u (parts), u_surface, lambda. U_local keeps the motions that are taken out of
+   u, as forces are computed from the former. Collective. */
 PetscErrorCode HycoFOMGather(HycoFOM f)
 {
   const PetscScalar *v;
@@ -59,6 +63,8 @@ PetscErrorCode HycoFOMGather(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The number of each contact in the order of one rank, for all rows of B in the order of the ranks; on rank 0, the
+   caller frees it. Collective. */
 PetscErrorCode HycoFOMGetNumbers(HycoFOM f, PetscInt **number)
 {
   PetscInt n;
@@ -68,6 +74,7 @@ PetscErrorCode HycoFOMGetNumbers(HycoFOM f, PetscInt **number)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rank 0: Lambda in the order of one rank, borrowed; with one rank it is f->lambda. Collective. */
 PetscErrorCode HycoFOMGetLambda(HycoFOM f, const PetscReal *lambda[])
 {
   PetscInt n, *number;
@@ -88,6 +95,7 @@ PetscErrorCode HycoFOMGetLambda(HycoFOM f, const PetscReal *lambda[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The reverse: lambda of rank 0 (order of one rank) to the rows of the ranks. Collective. */
 PetscErrorCode HycoFOMSetLambda(HycoFOM f, const PetscReal lambda[])
 {
   PetscInt *number = NULL;
@@ -103,6 +111,7 @@ PetscErrorCode HycoFOMSetLambda(HycoFOM f, const PetscReal lambda[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* In the order of one rank, written by all ranks. Collective. */
 PetscErrorCode HycoFOMWriteForces(HycoFOM f, HycoH5 h, const char name[])
 {
   const PetscScalar *lambda = NULL;
@@ -116,6 +125,7 @@ PetscErrorCode HycoFOMWriteForces(HycoFOM f, HycoH5 h, const char name[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* NULL on one rank, where the part is the file's order. Created at the first call. Collective. */
 PetscErrorCode HycoFOMGetRows(HycoFOM f, const HycoFileOrder **rows)
 {
   PetscFunctionBegin;
@@ -124,6 +134,7 @@ PetscErrorCode HycoFOMGetRows(HycoFOM f, const HycoFileOrder **rows)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rows of a file to the values of this rank's nodes or cells, ghosts included. Collective. */
 PetscErrorCode HycoFOMFromRows(HycoFOM f, HycoPlace place, PetscInt components, const PetscReal rows[],
                                PetscReal value[])
 {
@@ -139,6 +150,7 @@ PetscErrorCode HycoFOMFromRows(HycoFOM f, HycoPlace place, PetscInt components, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Owned values to the rows of a file. Collective. */
 PetscErrorCode HycoFOMToRows(HycoFOM f, HycoPlace place, MPI_Datatype type, PetscInt components, const void *value,
                              void *rows)
 {
