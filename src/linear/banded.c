@@ -7,7 +7,8 @@
 /* Largest mean row length of an envelope for which PETSc's own factor is faster than a multifrontal one. */
 #define HYCO_THIN_ENVELOPE 32
 
-/* Entries between the first nonzero of each row and its diagonal, in the order of `order`. */
+/* Entries between the first nonzero of each row and its diagonal, in the order of `order`. The envelope bounds the
+   fill of a factor in this order. */
 static PetscErrorCode Envelope(Mat K, IS order, PetscReal *sum)
 {
   PetscInt n;
@@ -35,7 +36,8 @@ static PetscErrorCode Envelope(Mat K, IS order, PetscReal *sum)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On several ranks, without an order: whether there are at most two neighbours on average, as in a mesh of lines. */
+/* On several ranks, without an order: whether there are at most two neighbours on average, as in a mesh of lines.
+   Several ranks have no common order to judge by. */
 static PetscErrorCode IsLine(Mat K, PetscBool *line)
 {
   PetscInt n;
@@ -48,6 +50,7 @@ static PetscErrorCode IsLine(Mat K, PetscBool *line)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Reverse Cuthill-McKee with PETSc's own Cholesky factor; pc has the type of Cholesky. */
 PetscErrorCode HycoBandedSolver(PC pc)
 {
   MPI_Comm comm = PetscObjectComm((PetscObject)pc);
@@ -69,6 +72,7 @@ PetscErrorCode HycoBandedSolver(PC pc)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether a factor in reverse Cuthill-McKee order is small. Collective. */
 PetscErrorCode HycoBanded(Mat K, PetscBool *thin)
 {
   PetscInt n;

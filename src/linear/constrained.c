@@ -16,7 +16,8 @@
 /* The share of the initial residual that is compared with the loads: without loads only the constraints act. */
 #define HYCO_START 0.01
 
-/* The largest eigenvalue of D^-1 K by Lanczos' method. */
+/* The largest eigenvalue of D^-1 K by Lanczos' method. The start has irregular entries by a hash of the row: the
+   same estimate on any number of ranks, up to round-off. */
 static PetscErrorCode LargestEigenvalue(Mat K, PetscReal *largest)
 {
   KSP ksp;
@@ -48,7 +49,8 @@ static PetscErrorCode LargestEigenvalue(Mat K, PetscReal *largest)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The levels of the multigrid `pc`, finest first; of another preconditioner only the finest. */
+/* The levels of the multigrid `pc`, finest first; of another preconditioner only the finest. Borrowed levels of
+   PETSc's multigrid; work vectors and estimates are own. */
 static PetscErrorCode ReadLevels(HycoConstrained c, Mat K)
 {
   PetscBool multigrid;
@@ -85,7 +87,7 @@ static PetscErrorCode ReadLevels(HycoConstrained c, Mat K)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* mu = (B D^-1 B^T)^-1 mu */
+/* mu = (B D^-1 B^T)^-1 mu Diagonal if no two constraints share an unknown. */
 static PetscErrorCode SolveG(const HycoLevel *v, Vec mu)
 {
   PetscFunctionBegin;
@@ -98,6 +100,7 @@ static PetscErrorCode SolveG(const HycoLevel *v, Vec mu)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Removes from z what violates B z = 0, by D^-1 B^T: the projection that is orthogonal in D. */
 PetscErrorCode HycoLevelProject(const HycoLevel *v, Vec z)
 {
   PetscFunctionBegin;
@@ -123,7 +126,7 @@ static PetscErrorCode ProjectForce(const HycoLevel *v, Vec r)
 }
 
 /* Chebyshev steps on K z = r from the current z; r becomes the residual (without `residual`, that before the last
-   step). */
+   step). Each step is projected, so that z satisfies the constraints throughout. */
 static PetscErrorCode Smooth(HycoLevel *v, PetscBool residual, Vec r, Vec z)
 {
   const PetscReal hi = HYCO_EIGEN_SAFETY * v->largest, lo = HYCO_EIGEN_LEAST * v->largest;
@@ -150,7 +153,8 @@ static PetscErrorCode Smooth(HycoLevel *v, PetscBool residual, Vec r, Vec z)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The coarsest level: K z + B^T mu = r, B z = 0 by the multigrid's coarse solver and B K^-1 B^T. */
+/* The coarsest level: K z + B^T mu = r, B z = 0 by the multigrid's coarse solver and B K^-1 B^T. S is factored on
+   every rank: m is small on this level. */
 static PetscErrorCode SolveCoarsest(HycoConstrained c, HycoLevel *v, Vec r, Vec z)
 {
   PetscBLASInt m, one = 1, info;
@@ -171,7 +175,8 @@ static PetscErrorCode SolveCoarsest(HycoConstrained c, HycoLevel *v, Vec r, Vec 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* z = M r, M symmetric, B z = 0; r is overwritten. */
+/* z = M r, M symmetric, B z = 0; r is overwritten. Symmetric, as conjugate gradients need: the same smoother before
+   and after, restriction transpose to interpolation. */
 static PetscErrorCode Cycle(HycoConstrained c, PetscInt l, Vec r, Vec z)
 {
   HycoLevel *v = &c->level[l];
@@ -196,6 +201,7 @@ static PetscErrorCode Cycle(HycoConstrained c, PetscInt l, Vec r, Vec z)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Of another preconditioner than multigrid only the projected application. */
 static PetscErrorCode Apply(PC shell, Vec r, Vec z)
 {
   HycoConstrained c;
@@ -225,6 +231,8 @@ static PetscErrorCode View(PC shell, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Conjugate gradients and multigrid for K, without constraints yet. The natural norm is that of the energy.
+   Collective. */
 PetscErrorCode HycoConstrainedCreate(MPI_Comm comm, const char prefix[], Mat K, HycoConstrained *constrained)
 {
   HycoConstrained c;
@@ -289,6 +297,7 @@ PetscErrorCode HycoConstrainedGetKSP(HycoConstrained c, KSP *ksp)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The norm of f in the preconditioner, with which residuals are compared. */
 PetscErrorCode HycoConstrainedSize(HycoConstrained c, Vec f, PetscReal *size)
 {
   PetscScalar dot;
@@ -300,6 +309,8 @@ PetscErrorCode HycoConstrainedSize(HycoConstrained c, Vec f, PetscReal *size)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* x satisfies B x = d on return, with the residual below accuracy times *size, which grows with the first residual.
+   Collective. */
 PetscErrorCode HycoConstrainedSolve(HycoConstrained c, Vec f, Vec d, PetscReal accuracy, PetscReal *size, Vec x,
                                     PetscInt *its)
 {
@@ -327,6 +338,7 @@ PetscErrorCode HycoConstrainedSolve(HycoConstrained c, Vec f, Vec d, PetscReal a
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* force = (B D^-1 B^T)^-1 B D^-1 r: the multipliers that balance the residual best. */
 PetscErrorCode HycoConstrainedForces(HycoConstrained c, Vec r, Vec force)
 {
   HycoLevel *v = c->level;

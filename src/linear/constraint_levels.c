@@ -50,7 +50,8 @@ PetscErrorCode HycoConstraintsFree(HycoConstrained c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The coarse node with the largest entries in the rows of one fine node. */
+/* The coarse node with the largest entries in the rows of one fine node. Smoothed interpolation reaches several
+   aggregates; the node belongs to the one with the largest weights. */
 static PetscErrorCode NodeAggregate(Mat P, PetscInt row, PetscInt rows, PetscInt coarse_size, PetscInt *aggregate)
 {
   enum { MOST = 64 };
@@ -86,6 +87,7 @@ static PetscErrorCode NodeAggregate(Mat P, PetscInt row, PetscInt rows, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Once per hierarchy, by unknown of the finer level; -1: none (a decoupled row). */
 static PetscErrorCode FindAggregates(HycoLevel *fine, Mat coarse)
 {
   PetscInt lo, hi, rows, cols, aggregate;
@@ -106,7 +108,7 @@ static PetscErrorCode FindAggregates(HycoLevel *fine, Mat coarse)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Gathers every rank's part of n numbers on all ranks. */
+/* Gathers every rank's part of n numbers on all ranks. Constraints are few against the unknowns. */
 static PetscErrorCode AllGather(MPI_Comm comm, PetscInt n, const void *mine, MPI_Datatype type, void *all)
 {
   PetscMPIInt size, count, *counts, *starts;
@@ -123,7 +125,8 @@ static PetscErrorCode AllGather(MPI_Comm comm, PetscInt n, const void *mine, MPI
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The constraints on the finest level: the entries of B at the node of unknown at[i] are the normal. */
+/* The constraints on the finest level: the entries of B at the node of unknown at[i] are the normal. Slaves have
+   entries of their normal at their own node. */
 static PetscErrorCode KnownOfB(Mat K, Mat B, const PetscInt at[], Known *known)
 {
   MPI_Comm comm = PetscObjectComm((PetscObject)B);
@@ -157,7 +160,7 @@ static PetscErrorCode KnownOfB(Mat K, Mat B, const PetscInt at[], Known *known)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* aggregate[i] of each constraint. */
+/* aggregate[i] of each constraint. Aggregates of other ranks' nodes come by a scatter. */
 static PetscErrorCode AggregatesAt(const HycoLevel *fine, const Known *known, PetscInt aggregate[])
 {
   IS is;
@@ -181,7 +184,8 @@ static PetscErrorCode AggregatesAt(const HycoLevel *fine, const Known *known, Pe
 }
 
 /* An orthonormal basis of the columns of the normals' rows i[0..n), largest first: column j of q (leading dimension
-   3 in `weight`) at each of them; the new constraints' normals. Returns their number. */
+   3 in `weight`) at each of them; the new constraints' normals. Returns their number. Gram-Schmidt with pivoting on
+   three columns. */
 static PetscInt Basis(PetscInt n, const PetscInt i[], const PetscReal normal[], PetscReal weight[], PetscReal coarse[])
 {
   PetscReal largest = 0;
@@ -227,7 +231,8 @@ static PetscInt Basis(PetscInt n, const PetscInt i[], const PetscReal normal[], 
   return made;
 }
 
-/* Coarse constraints and A: column first[i] + j has the entry weight[3 i + j] in row i, j < count[i]. */
+/* Coarse constraints and A: column first[i] + j has the entry weight[3 i + j] in row i, j < count[i]. By sorted
+   aggregates, on every rank alike. */
 static PetscErrorCode Coarsen(const HycoLevel *fine, PetscInt coarse_size, const Known *known, Known *coarse,
                               PetscInt first[], PetscInt count[], PetscReal weight[])
 {
@@ -257,7 +262,7 @@ static PetscErrorCode Coarsen(const HycoLevel *fine, PetscInt coarse_size, const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* B of the next level. */
+/* B of the next level. A has up to three entries in a row. */
 static PetscErrorCode CoarseB(HycoLevel *fine, const Known *known, Mat coarse_K, Known *coarse, Mat *B)
 {
   PetscInt *first, *count, lo, hi, bs;
@@ -285,7 +290,8 @@ static PetscErrorCode CoarseB(HycoLevel *fine, const Known *known, Mat coarse_K,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A solver for G, whose diagonal entries are about 1; each rank has the factor. */
+/* A solver for G, whose diagonal entries are about 1; each rank has the factor. PCREDUNDANT: each rank factors the
+   gathered matrix. */
 static PetscErrorCode Redundant(Mat G, KSP *ksp)
 {
   KSP inner;
@@ -305,7 +311,7 @@ static PetscErrorCode Redundant(Mat G, KSP *ksp)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Chooses a solver for G by its size. */
+/* Chooses a solver for G by its size. Small ones redundantly, large ones by MUMPS. */
 static PetscErrorCode SolverForG(Mat G, KSP *ksp)
 {
   MPI_Comm comm = PetscObjectComm((PetscObject)G);
@@ -322,7 +328,8 @@ static PetscErrorCode SolverForG(Mat G, KSP *ksp)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Inverts or factors B D^-1 B^T. */
+/* Inverts or factors B D^-1 B^T. Scaled to a largest diagonal entry of 1, since PETSc's limit of a zero pivot is
+   absolute. */
 static PetscErrorCode PrepareG(HycoLevel *v, PetscReal shift, PetscBool *singular)
 {
   Mat G;
@@ -361,7 +368,8 @@ static PetscErrorCode PrepareG(HycoLevel *v, PetscReal shift, PetscBool *singula
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Factors the coarsest level's B K^-1 B^T on every rank. */
+/* Factors the coarsest level's B K^-1 B^T on every rank. One coarse solve per constraint: there are few on this
+   level. */
 static PetscErrorCode PrepareCoarsest(HycoConstrained c, HycoLevel *v, PetscBool *singular)
 {
   const PetscInt m = v->m;
@@ -398,6 +406,8 @@ static PetscErrorCode PrepareCoarsest(HycoConstrained c, HycoLevel *v, PetscBool
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Sets the constraints B x = d (rows of B; at[i]: an unknown at the node of row i) and coarsens them; *singular:
+   rows without entries or dependent ones. Replaces former constraints. Collective. */
 PetscErrorCode HycoConstrainedSet(HycoConstrained c, Mat B, const PetscInt at[], PetscBool *singular)
 {
   Known known = {0, NULL, NULL};

@@ -34,12 +34,14 @@ enum { BEGIN = -1, END = -2, ANALYSE = 1, FACTOR = 2, SOLVE = 3 };
 #define ICNTL(d, k) ((d)->id.icntl[(k)-1])
 #define INFOG(d, k) ((d)->id.infog[(k)-1])
 
+/* MUMPS's single entry point: the job decides. */
 static void Call(HycoDirect d, int job)
 {
   d->id.job = job;
   dmumps_c(&d->id);
 }
 
+/* Ends the MUMPS instance: pattern, analysis and factor. */
 static PetscErrorCode Release(HycoDirect d)
 {
   PetscFunctionBegin;
@@ -52,6 +54,7 @@ static PetscErrorCode Release(HycoDirect d)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* MUMPS itself is started by the first analysis. */
 PetscErrorCode HycoDirectCreate(MPI_Comm comm, HycoDirect *d)
 {
   PetscMPIInt size;
@@ -75,6 +78,7 @@ PetscErrorCode HycoDirectDestroy(HycoDirect *d)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The unknowns of a singular K that become Schur variables; other ones invalidate the analysis. Collective. */
 PetscErrorCode HycoDirectPinKernel(HycoDirect d, Mat K)
 {
   PetscInt n, *pinned;
@@ -97,7 +101,8 @@ PetscErrorCode HycoDirectPinKernel(HycoDirect d, Mat K)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Collects the entries of the saddle point in this rank's rows of K, B (and Bt): the lower triangle when symmetric. */
+/* Collects the entries of the saddle point in this rank's rows of K, B (and Bt): the lower triangle when symmetric.
+   pattern: also their places; values if a_loc exists. */
 static PetscErrorCode Entries(HycoDirect d, Mat A, PetscInt row0, PetscInt col0, PetscBool pattern, MUMPS_INT8 *at)
 {
   PetscInt lo, hi;
@@ -124,6 +129,7 @@ static PetscErrorCode Entries(HycoDirect d, Mat A, PetscInt row0, PetscInt col0,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The second call (values) visits the entries in the same order as the first one (places). */
 static PetscErrorCode AllEntries(HycoDirect d, Mat K, Mat Bt, Mat B, PetscBool pattern)
 {
   MUMPS_INT8 at = 0;
@@ -159,7 +165,8 @@ static PetscErrorCode CountEntries(Mat K, Mat Bt, Mat B, size_t *n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The elimination order: nested dissection, with pinned unknowns and forces last. On rank 0. */
+/* The elimination order: nested dissection, with pinned unknowns and forces last. On rank 0. Contacts last: they are
+   the Schur complement. */
 static PetscErrorCode PlaceLast(HycoDirect d, const PetscInt place[])
 {
   PetscInt *at, next = 0;
@@ -178,6 +185,7 @@ static PetscErrorCode PlaceLast(HycoDirect d, const PetscInt place[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Debian's MUMPS has no METIS; its own orders give several times the fill for 3D meshes. */
 static PetscErrorCode Order(HycoDirect d, Mat K)
 {
   PetscInt *place = NULL;
@@ -192,7 +200,8 @@ static PetscErrorCode Order(HycoDirect d, Mat K)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -hyco_mumps_icntl_K and -hyco_mumps_cntl_K set MUMPS's controls. */
+/* -hyco_mumps_icntl_K and -hyco_mumps_cntl_K set MUMPS's controls. After the defaults, so that the user's values
+   win. */
 static PetscErrorCode ReadControls(HycoDirect d)
 {
   PetscFunctionBegin;
@@ -213,6 +222,7 @@ static PetscErrorCode ReadControls(HycoDirect d)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* sym 1: positive definite, which needs no pivoting; Schur variables are not factored. */
 static PetscErrorCode Begin(HycoDirect d)
 {
   PetscFunctionBegin;
@@ -232,7 +242,7 @@ static PetscErrorCode Begin(HycoDirect d)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Declares the Schur variables; their matrix is centralised by rows. */
+/* Declares the Schur variables; their matrix is centralised by rows. The complement is on rank 0, by rows. */
 static PetscErrorCode DeclareSchur(HycoDirect d)
 {
   PetscFunctionBegin;
@@ -246,6 +256,7 @@ static PetscErrorCode DeclareSchur(HycoDirect d)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Analysis of the pattern, with the room for right-hand sides on rank 0. */
 static PetscErrorCode Analyse(HycoDirect d, Mat K, Mat Bt, Mat B)
 {
   size_t room;
@@ -275,7 +286,8 @@ static PetscErrorCode Analyse(HycoDirect d, Mat K, Mat Bt, Mat B)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether K and B have the analysed pattern; stores their identity. */
+/* Whether K and B have the analysed pattern; stores their identity. Object and nonzero state: values may change
+   without a new analysis. */
 static PetscErrorCode SamePattern(HycoDirect d, Mat K, Mat B, PetscBool *same)
 {
   PetscObjectId K_id, B_id = 0;
@@ -298,6 +310,8 @@ static PetscErrorCode SamePattern(HycoDirect d, Mat K, Mat B, PetscBool *same)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* *bytes: MUMPS's estimate for its factor over all ranks, plus the dense Schur complement. Keeps the analysis while
+   the patterns are unchanged. Collective. */
 PetscErrorCode HycoDirectAnalyse(HycoDirect d, Mat K, Mat Bt, Mat B, PetscBool symmetric, PetscReal *bytes)
 {
   PetscBool same = PETSC_FALSE;
@@ -317,12 +331,14 @@ PetscErrorCode HycoDirectAnalyse(HycoDirect d, Mat K, Mat Bt, Mat B, PetscBool s
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Floating-point operations of the elimination, estimated by the analysis. */
 PetscReal HycoDirectOperations(HycoDirect d)
 {
   return (PetscReal)d->id.rinfog[0];
 }
 
-/* Sends rank 0's Schur complement (by rows; the lower triangle when symmetric) to M on every rank, by columns. */
+/* Sends rank 0's Schur complement (by rows; the lower triangle when symmetric) to M on every rank, by columns. The
+   sign: MUMPS eliminates -B K^-1 Bt, and S is positive. */
 static PetscErrorCode SpreadSchur(HycoDirect d, PetscReal M[])
 {
   const size_t n = (size_t)d->n_schur;
@@ -343,6 +359,7 @@ static PetscErrorCode SpreadSchur(HycoDirect d, PetscReal M[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Factors, and sets M (n_schur x n_schur, by columns) on every rank. *singular: MUMPS met a zero pivot. Collective. */
 PetscErrorCode HycoDirectFactor(HycoDirect d, Mat K, Mat Bt, Mat B, PetscReal M[], PetscBool *singular)
 {
   PetscFunctionBegin;
@@ -351,6 +368,7 @@ PetscErrorCode HycoDirectFactor(HycoDirect d, Mat K, Mat Bt, Mat B, PetscReal M[
   PetscCall(AllEntries(d, K, Bt, B, PETSC_FALSE));
   if (d->rank == 0) d->id.schur = M;
   d->id.schur_lld = (MUMPS_INT)d->n_schur;
+  /* Each round has four times the extra workspace. */
   for (;;) {
     Call(d, FACTOR);
     /* -8, -9 and similar codes: the workspace was underestimated */
@@ -370,7 +388,8 @@ PetscErrorCode HycoDirectFactor(HycoDirect d, Mat K, Mat Bt, Mat B, PetscReal M[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Copies a distributed vector of n unknowns to rank 0's right-hand side, or back. */
+/* Copies a distributed vector of n unknowns to rank 0's right-hand side, or back. MUMPS has centralised right-hand
+   sides. */
 static PetscErrorCode Fetch(HycoDirect d, Vec v)
 {
   const PetscScalar *r;
@@ -405,6 +424,7 @@ static PetscErrorCode Deliver(HycoDirect d, Vec v)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* part: 0 without Schur variables, 1 reduction to them, 2 expansion from them (ICNTL(26)). */
 static PetscErrorCode Run(HycoDirect d, int part)
 {
   PetscFunctionBegin;
@@ -415,6 +435,7 @@ static PetscErrorCode Run(HycoDirect d, int part)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* q of the Schur variables from F and D, by forward substitution. Collective. */
 PetscErrorCode HycoDirectReduce(HycoDirect d, Vec F, const PetscReal D[], PetscReal q[])
 {
   PetscFunctionBegin;
@@ -426,6 +447,8 @@ PetscErrorCode HycoDirectReduce(HycoDirect d, Vec F, const PetscReal D[], PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* x from the Schur variables z, by back substitution; after HycoDirectReduce(), whose right-hand side MUMPS keeps.
+   Collective. */
 PetscErrorCode HycoDirectExpand(HycoDirect d, const PetscReal z[], Vec x)
 {
   PetscFunctionBegin;
@@ -489,6 +512,7 @@ PetscErrorCode HycoDirectExpandMany(HycoDirect d, PetscInt k, const Vec F[], con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Many right-hand sides at once: their triangular solves are matrix products. Collective. */
 PetscErrorCode HycoDirectSolveMany(HycoDirect d, PetscInt k, Vec r[], Vec x[])
 {
   const size_t rows = (size_t)(d->n + d->m);
@@ -513,6 +537,7 @@ PetscErrorCode HycoDirectSolveMany(HycoDirect d, PetscInt k, Vec r[], Vec x[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* x = K^-1 r with pinned unknowns 0. Collective. */
 PetscErrorCode HycoDirectSolve(HycoDirect d, Vec r, Vec x)
 {
   PetscFunctionBegin;

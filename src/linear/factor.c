@@ -2,6 +2,7 @@
 #include <hycolinear.h>
 #include <petsc/private/petscimpl.h> /* PetscObjectStateGet() */
 
+/* Whether K and B are the same objects in the same state as at the last call; notes the present ones. */
 PetscErrorCode HycoOperatorStateUpdate(HycoOperatorState *seen, Mat K, Mat B, PetscBool *same)
 {
   PetscObjectState k, b = 0;
@@ -36,6 +37,8 @@ static PetscErrorCode PrepareMumps(PC pc, Mat K, const char prefix[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Own Cholesky or LU factor for small or banded matrices on one rank, MUMPS otherwise. Options with the prefix may
+   choose others. Collective. */
 PetscErrorCode HycoDirectSolver(MPI_Comm comm, const char prefix[], Mat K, PetscBool symmetric, KSP *ksp)
 {
   PC pc;
@@ -66,7 +69,8 @@ PetscErrorCode HycoDirectSolver(MPI_Comm comm, const char prefix[], Mat K, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* PETSc treats pivots below 2.2e-14 as zero, whatever the unit: this scales the limit by the least diagonal entry. */
+/* PETSc treats pivots below 2.2e-14 as zero, whatever the unit: this scales the limit by the least diagonal entry.
+   In N/m a soft model has small pivots that are no zeros. */
 static PetscErrorCode ScaleZeroPivot(KSP ksp, PC pc)
 {
   Mat K;
@@ -91,6 +95,7 @@ static PetscErrorCode ScaleZeroPivot(KSP ksp, PC pc)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Factors the operator of ksp; a failure sets *singular. Collective. */
 PetscErrorCode HycoFactor(KSP ksp, PetscBool *singular)
 {
   PC pc;
@@ -120,6 +125,7 @@ PetscErrorCode HycoFactor(KSP ksp, PetscBool *singular)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For mass-like matrices of norms, which are regular by construction. Collective. */
 PetscErrorCode HycoDefiniteSolver(Mat A, const char name[], KSP *ksp)
 {
   const MPI_Comm comm = PetscObjectComm((PetscObject)A);
@@ -133,6 +139,7 @@ PetscErrorCode HycoDefiniteSolver(Mat A, const char name[], KSP *ksp)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* X = A^-1 R for a dense R; the caller destroys X. Collective. */
 PetscErrorCode HycoSolveColumns(Mat A, const char name[], Mat R, Mat *X)
 {
   KSP ksp;

@@ -4,6 +4,7 @@
 */
 #include <hycolinear.h>
 
+/* Number of rigid modes attached to K: 0 if K is regular. */
 PetscErrorCode HycoKernelSize(Mat K, PetscInt *n)
 {
   MatNullSpace kernel = NULL;
@@ -39,7 +40,8 @@ static PetscErrorCode Rows(Mat K, PetscInt n, PetscInt *rows, PetscReal **row)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The unknown with the longest row, the lowest among equals; its row, scaled to length 1, on every rank. */
+/* The unknown with the longest row, the lowest among equals; its row, scaled to length 1, on every rank. Equal
+   within 1e-10, because symmetric bodies have many such rows. Collective. */
 static PetscErrorCode Longest(MPI_Comm comm, PetscInt first, PetscInt rows, PetscInt n, const PetscReal row[],
                               PetscInt *at, PetscReal unit[])
 {
@@ -65,6 +67,7 @@ static PetscErrorCode Longest(MPI_Comm comm, PetscInt first, PetscInt rows, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* n unknowns, ascending, such that K without them is regular: pivots of the null space's rows. Collective. */
 PetscErrorCode HycoKernelPins(MPI_Comm comm, Mat K, PetscInt n, PetscInt pinned[])
 {
   PetscInt rows, first;
@@ -90,7 +93,8 @@ PetscErrorCode HycoKernelPins(MPI_Comm comm, Mat K, PetscInt n, PetscInt pinned[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* |z.(F - b)| without the round-off of K x, relative to the forces; least: of |z|. */
+/* |z.(F - b)| without the round-off of K x, relative to the forces; least: of |z|. Limited to 1 %, so that a large x
+   does not hide any load. */
 static PetscErrorCode WorkOn(Vec z, Vec F, Vec b, Vec Kx, PetscReal least, Vec work, PetscReal *share)
 {
   const Vec force[2] = {F, b};
@@ -111,6 +115,7 @@ static PetscErrorCode WorkOn(Vec z, Vec F, Vec b, Vec Kx, PetscReal least, Vec w
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The largest share of the forces' work on a rigid mode that is unbalanced: no x changes it. Collective. */
 PetscErrorCode HycoKernelWork(Mat K, Vec x, Vec F, Vec b, PetscReal *share)
 {
   MatNullSpace kernel = NULL;

@@ -5,7 +5,8 @@
 #include <hycolinear.h>
 #include <metis.h>
 
-/* Neighbours of this rank's rows by node of bs unknowns: CSR, columns global, without the node itself. */
+/* Neighbours of this rank's rows by node of bs unknowns: CSR, columns global, without the node itself. By nodes: the
+   graph is smaller by bs^2, and unknowns of a node stay together. */
 static PetscErrorCode LocalGraph(Mat K, PetscInt bs, PetscInt *n_nodes, PetscInt **start, PetscInt **next)
 {
   PetscInt lo, hi, n, room, *seen, at = 0;
@@ -40,7 +41,8 @@ static PetscErrorCode LocalGraph(Mat K, PetscInt bs, PetscInt *n_nodes, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* METIS on the whole graph: from degree and neighbours of each node to place[node]. On rank 0. */
+/* METIS on the whole graph: from degree and neighbours of each node to place[node]. On rank 0. METIS has 32-bit
+   indices in most builds. */
 static PetscErrorCode Dissect(PetscInt n, const PetscInt degree[], const PetscInt next[], PetscInt place[])
 {
   idx_t nv = (idx_t)n, *xadj, *adjncy, *perm, *iperm;
@@ -60,6 +62,7 @@ static PetscErrorCode Dissect(PetscInt n, const PetscInt degree[], const PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* place[i]: position of unknown i in the elimination, on rank 0. Collective. */
 PetscErrorCode HycoDissection(MPI_Comm comm, Mat K, PetscInt place[])
 {
   PetscInt bs, n_nodes = 0, *start, *next, n_all = 0, n_edges, *degree, *edges, *node = NULL;

@@ -9,6 +9,7 @@
 
 #define MAX_STEPS 20
 
+/* Two-product by fma and two-sum: sum[0] + sum[1] has about 32 digits. */
 void HycoAddProduct(PetscReal a, PetscReal b, PetscReal sum[2])
 {
   const PetscReal product = a * b, high = sum[0] + product, moved = high - sum[0];
@@ -17,7 +18,7 @@ void HycoAddProduct(PetscReal a, PetscReal b, PetscReal sum[2])
   sum[0] = high;
 }
 
-/* r = b + low - K x */
+/* r = b + low - K x Rounded once at the end. */
 static void Residual(PetscBLASInt n, const PetscReal K[], PetscBLASInt lda, const PetscReal b[], const PetscReal low[],
                      const PetscReal x[], PetscReal r[])
 {
@@ -29,6 +30,8 @@ static void Residual(PetscBLASInt n, const PetscReal K[], PetscBLASInt lda, cons
   }
 }
 
+/* x in place; stops when a step does not halve the last change. K: n x n, by columns with leading dimension lda, lu
+   and ipiv by getrf. */
 PetscErrorCode HycoRefine(PetscBLASInt n, const PetscReal K[], PetscBLASInt lda, const PetscReal lu[],
                           const PetscBLASInt ipiv[], const PetscReal b[], const PetscReal low[], PetscReal x[])
 {

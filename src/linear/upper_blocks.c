@@ -2,7 +2,8 @@
    which inserts entry by entry. */
 #include "constrained.h"
 
-/* The columns of a block row's blocks from the diagonal on, ascending; column: room for all entries of its rows. */
+/* The columns of a block row's blocks from the diagonal on, ascending; column: room for all entries of its rows.
+   Entries below the diagonal block are not stored. */
 static PetscErrorCode RowBlocks(Mat K, PetscInt block, PetscInt bs, PetscInt *n_blocks, PetscInt column[])
 {
   PetscFunctionBegin;
@@ -22,7 +23,7 @@ static PetscErrorCode RowBlocks(Mat K, PetscInt block, PetscInt bs, PetscInt *n_
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Copies their values; value[] has the room. */
+/* Copies their values; value[] has the room. Blocks are filled up with zeros. */
 static PetscErrorCode CopyRow(Mat K, PetscInt block, PetscInt bs, PetscInt column[], PetscScalar value[], Mat upper)
 {
   PetscInt blocks, width;
@@ -66,6 +67,7 @@ static PetscErrorCode LongestRow(Mat K, PetscInt *longest)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* *upper is NULL for matrices without blocks. Half the memory traffic of products with K. Collective. */
 PetscErrorCode HycoUpperBlocks(Mat K, Mat *upper)
 {
   PetscInt bs, lo, hi, n, blocks, longest, *here, *there, *column;

@@ -23,6 +23,8 @@ static PetscReal Available(void)
   return kb > 0 ? 1024 * kb : (PetscReal)sysconf(_SC_PHYS_PAGES) * (PetscReal)sysconf(_SC_PAGESIZE) / 2;
 }
 
+/* Four fifths of the free memory of all machines of the ranks, the same on every rank. The memory set by the user,
+   or one share for each machine, read by its first rank. */
 PetscErrorCode HycoSolverMemory(HycoSolver s, PetscReal *bytes)
 {
   MPI_Comm node;
@@ -40,7 +42,8 @@ PetscErrorCode HycoSolverMemory(HycoSolver s, PetscReal *bytes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Memory of the form's factor: its own estimate, or that of a factor of K. */
+/* Memory of the form's factor: its own estimate, or that of a factor of K. Analysis without numbers; a form may keep
+   it for its factorisation. */
 static PetscErrorCode Estimate(HycoSolver s, HycoSolverForm form, PetscReal *bytes)
 {
   HycoDirect probe = NULL;
@@ -69,6 +72,7 @@ static PetscErrorCode TakeIterative(HycoSolver s, HycoSolverForm *form)
   PetscFunctionBegin;
   s->iterative = PETSC_TRUE;
   PetscCall(PetscStrncpy(asked, s->form_name, sizeof(asked)));
+  /* An automatic choice may leave the user's form; a stated choice may not. */
   if (s->linear == HYCO_LINEAR_AUTO) s->form_name[0] = '\0';
   PetscCall(HycoSolverAcceptingForm(s, NULL, &other, why));
   PetscCall(PetscStrncpy(s->form_name, asked, sizeof(s->form_name)));
@@ -92,6 +96,7 @@ static PetscErrorCode DecideByMemory(HycoSolver s, HycoSolverForm *form)
   MatInfo info;
 
   PetscFunctionBegin;
+  /* A plane mesh's factor is small, and its estimate would cost an analysis. */
   PetscCall(MatGetInfo(s->system->K, MAT_GLOBAL_SUM, &info));
   if (info.nz_used <= HYCO_PLANE_ROW * (PetscReal)s->system->n || !s->system->symmetric)
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -105,6 +110,7 @@ static PetscErrorCode DecideByMemory(HycoSolver s, HycoSolverForm *form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Direct or iterative for this K, and the form that goes with it. With automatic choice once per K. Collective. */
 PetscErrorCode HycoChooseLinear(HycoSolver s, HycoSolverForm *form)
 {
   PetscBool aij, same;
@@ -127,6 +133,7 @@ PetscErrorCode HycoChooseLinear(HycoSolver s, HycoSolverForm *form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Sums of conjugate-gradient iterations, for the report. */
 void HycoCountLinear(HycoSolver s, PetscInt its)
 {
   s->linear_its += its;
@@ -134,6 +141,7 @@ void HycoCountLinear(HycoSolver s, PetscInt its)
   s->linear_most = PetscMax(s->linear_most, its);
 }
 
+/* ksp NULL: the own interface to MUMPS. */
 PetscErrorCode HycoNameLinear(HycoSolver s, KSP ksp)
 {
   KSPType method;

@@ -10,7 +10,8 @@
 /* The matrix of the problem is dense. */
 #define HYCO_MOST_CONTACTS 3000
 
-/* M = [0 A; -A^T I] and q = (-f', 0), with the motions z in place of pinned unknowns. */
+/* M = [0 A; -A^T I] and q = (-f', 0), with the motions z in place of pinned unknowns. Rows of contacts are gathered:
+   the problem is small and identical on every rank. */
 static PetscErrorCode Fill(HycoSystem y, PetscInt p, const Vec z[], PetscReal M[], PetscReal q[])
 {
   const size_t n = (size_t)(p + y->m);
@@ -41,6 +42,8 @@ static PetscErrorCode Fill(HycoSystem y, PetscInt p, const Vec z[], PetscReal M[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether the load lifts a floating body off: no contact forces >= 0 balance it on the rigid modes. Otherwise a
+   failure of the solver is its own. Collective. */
 PetscErrorCode HycoSolverLifts(HycoSolver s, PetscBool *lifts)
 {
   HycoSystem y = s->system;
@@ -53,6 +56,7 @@ PetscErrorCode HycoSolverLifts(HycoSolver s, PetscBool *lifts)
   const Vec *motion;
 
   PetscFunctionBegin;
+  /* The proximal point method ends on a ray if the problem is infeasible. */
   *lifts = PETSC_FALSE;
   if (!y->K) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatGetNullSpace(y->K, &kernel));

@@ -7,6 +7,7 @@ static HycoRegistry forms = {.sorted = PETSC_FALSE}; /* searched in the order of
 
 HycoDefineRegister(HycoSolverRegister, forms, HycoSolverFormCreate create)
 
+/* A private instance of each form, since a form keeps factors and the last active set. */
 PetscErrorCode HycoSolverCreateForms(HycoSolver s)
 {
   const char *const *names;

@@ -32,6 +32,7 @@ static const Candidate *const by_default = &order[2];
 /* The names of the forms, by the values of HycoForm. */
 static const char *const form_names[] = {"", "dual", "primal", "dual_free"};
 
+/* Forms are created with the solver, since options declare their names. */
 PetscErrorCode HycoSolverCreate(MPI_Comm comm, HycoSolver *solver)
 {
   PetscFunctionBegin;
@@ -65,6 +66,7 @@ PetscErrorCode HycoSolverDestroy(HycoSolver *solver)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Takes a reference. Factors stay valid if K and B are the same objects in the same state. */
 PetscErrorCode HycoSolverSetSystem(HycoSolver s, HycoSystem system)
 {
   PetscFunctionBegin;
@@ -92,6 +94,7 @@ PetscErrorCode HycoSolverSetType(HycoSolver s, HycoSolverType type)
   HycoFail("the solver type \"%s\" is unknown; types are active_set, tao, lemke and semismooth", type);
 }
 
+/* NULL: by the system. */
 PetscErrorCode HycoSolverSetTaoType(HycoSolver s, const char type[])
 {
   char list[HYCO_LINE];
@@ -109,6 +112,7 @@ PetscErrorCode HycoSolverSetTaoType(HycoSolver s, const char type[])
 HycoDefineMethod(HycoSolverSetForm, (HycoSolver s, HycoForm form), s, HYCO_SOLVER_CLASSID,
                  PetscCall(PetscStrncpy(s->form_name, form_names[form], sizeof(s->form_name))))
 
+/* 0: four fifths of the free memory. */
 PetscErrorCode HycoSolverSetLinear(HycoSolver s, HycoLinear linear, PetscReal gigabytes)
 {
   PetscFunctionBegin;
@@ -187,6 +191,7 @@ static PetscErrorCode ReadTaoType(HycoSolver s, HycoOptionItems PetscOptionsObje
 HycoDefineMethod(HycoSolverSetOptionsPrefix, (HycoSolver s, const char prefix[]), s, HYCO_SOLVER_CLASSID,
                  PetscCall(PetscObjectSetOptionsPrefix((PetscObject)s, prefix)))
 
+/* Values before the call are the defaults. Collective, as option errors are. */
 PetscErrorCode HycoSolverSetFromOptions(HycoSolver s)
 {
   PetscInt linear;
@@ -244,6 +249,7 @@ PetscErrorCode HycoSolverDeclare(PetscOptions options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For nonsymmetric systems of reduced models, which then use the active set method. */
 PetscBool HycoSolverNeedsSymmetry(HycoSolver s)
 {
   return (PetscBool)(s->type == TAO && HycoTaoTraits(s->tao_type) & HYCO_TAO_SYMMETRIC);
@@ -259,6 +265,7 @@ PetscErrorCode HycoSolverNameMethod(HycoSolver s, const char form[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A singular K is a reason of divergence, not an error. */
 PetscErrorCode HycoSolverGiveUp(HycoSolver s, Vec x, Vec L)
 {
   PetscFunctionBegin;
@@ -297,6 +304,8 @@ static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscReal *cost
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The form `stay` if it accepts the system, else the cheapest; a form that the user asks for has no alternative.
+   *form NULL: none, and `why` may say why. */
 PetscErrorCode HycoSolverAcceptingForm(HycoSolver s, HycoSolverForm stay, HycoSolverForm *form, char why[HYCO_LINE])
 {
   const PetscBool posed = (PetscBool)(s->system->K && s->system->m); /* whether there is a choice */
@@ -325,7 +334,8 @@ PetscErrorCode HycoSolverAcceptingForm(HycoSolver s, HycoSolverForm stay, HycoSo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The form of the first attempt: the user's, or the cheapest; then direct or iterative. */
+/* The form of the first attempt: the user's, or the cheapest; then direct or iterative. The form is first found as
+   for a direct solver: its factor decides whether iterations are needed. */
 static PetscErrorCode FirstForm(HycoSolver s, HycoSolverForm *form)
 {
   const PetscBool iterative = s->iterative;
@@ -350,6 +360,7 @@ static PetscErrorCode FirstForm(HycoSolver s, HycoSolverForm *form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The reason follows from the recomputed residuals alone; `solved` only distinguishes the text of a failure. */
 static PetscErrorCode Judge(HycoSolver s, Vec x, Vec L, PetscBool solved)
 {
   PetscFunctionBegin;
@@ -363,7 +374,8 @@ static PetscErrorCode Judge(HycoSolver s, Vec x, Vec L, PetscBool solved)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves with the current method on that form, and checks the result; adds its iterations. */
+/* Solves with the current method on that form, and checks the result; adds its iterations. The form may change
+   s->reason to singular. */
 static PetscErrorCode Attempt(HycoSolver s, HycoSolverForm form, Vec x, Vec L)
 {
   const PetscInt its = s->its;
@@ -380,8 +392,8 @@ static PetscErrorCode Attempt(HycoSolver s, HycoSolverForm form, Vec x, Vec L)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Floating bodies: of the forms, only the dual finds a solution where contact does not determine all rigid motions, and
-   decides whether there is one. */
+/* Floating bodies: of the forms, only the dual finds a solution where contact does not determine all rigid motions,
+   and decides whether there is one. Not for cones: their dual problem has other failures. */
 static PetscErrorCode DecideByForces(HycoSolver s, Vec x, Vec L)
 {
   const HycoSolverForm dual = HycoSolverFindForm(s, "dual");
@@ -428,7 +440,8 @@ static PetscErrorCode FormOf(HycoSolver s, const Candidate *c, HycoSolverForm *f
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves with one method; again if its form can solve with less round-off. *tried: a form accepts it. */
+/* Solves with one method; again if its form can solve with less round-off. *tried: a form accepts it. A refinement
+   counts as part of the same method. */
 static PetscErrorCode Try(HycoSolver s, const Candidate *c, Vec x, Vec L, PetscBool *tried)
 {
   char before[sizeof(s->method)];
@@ -448,7 +461,8 @@ static PetscErrorCode Try(HycoSolver s, const Candidate *c, Vec x, Vec L, PetscB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether candidate k is next: the chosen method, or after it one that this system accepts and that was not tried. */
+/* Whether candidate k is next: the chosen method, or after it one that this system accepts and that was not tried.
+   Candidates are unique by their Tao type. */
 static PetscBool IsNext(HycoSolver s, int k, const PetscBool tried[], const char chosen[])
 {
   if (!chosen[0]) return (PetscBool)(order[k].type == s->type);
@@ -460,7 +474,8 @@ static PetscBool IsNext(HycoSolver s, int k, const PetscBool tried[], const char
   return (PetscBool)(strcmp(order[k].tao, chosen) != 0);
 }
 
-/* Tries methods in order, from the chosen one on, until one converges. */
+/* Tries methods in order, from the chosen one on, until one converges. A singular K ends the attempts: other methods
+   would meet the same factor. */
 static PetscErrorCode Attempts(HycoSolver s, Vec x, Vec L)
 {
   char chosen[HYCO_TAO_NAME] = "";
@@ -480,6 +495,8 @@ static PetscErrorCode Attempts(HycoSolver s, Vec x, Vec L)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* x and L (NULL without contact) in place; the reason tells whether the KKT residuals, recomputed from K, B, F, D,
+   are below the tolerance. Collective. */
 PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
 {
   PetscInt n_free = 0;
@@ -499,6 +516,7 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
   for (PetscInt k = 0; k < s->n_forms; k++) {
     if (s->forms[k]->ops->reset) PetscCall(s->forms[k]->ops->reset(s, s->forms[k]));
   }
+  /* A failure with floating bodies is either a load that lifts them off or one of the solver. */
   if (s->reason < 0 && s->system->K) PetscCall(HycoKernelSize(s->system->K, &n_free));
   if (n_free) PetscCall(HycoSolverLifts(s, &lifts));
   if (n_free) s->reason = lifts ? HYCO_DIVERGED_FLOATING : HYCO_DIVERGED_HELD;
@@ -511,6 +529,7 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The factorisation alone, whose time counts for the next solve. Collective. */
 PetscErrorCode HycoSolverFactor(HycoSolver s, PetscBool *singular)
 {
   HycoSolverForm form = HycoSolverFindForm(s, s->system->m ? "dual" : "linear");
@@ -522,6 +541,7 @@ PetscErrorCode HycoSolverFactor(HycoSolver s, PetscBool *singular)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* K x = r by the present factor, refined once. Collective. */
 PetscErrorCode HycoSolverSolveLinear(HycoSolver s, Vec r, Vec x)
 {
   HycoSystem y = s->system;
@@ -538,6 +558,7 @@ PetscErrorCode HycoSolverSolveLinear(HycoSolver s, Vec r, Vec x)
 
 HycoDefineMethod(HycoSolverSetRefine, (HycoSolver s, PetscBool refine), s, HYCO_SOLVER_CLASSID, s->refine = refine)
 
+/* x = K^-1 F is known to the caller (NULL: not): saves a solve. For one solve. */
 PetscErrorCode HycoSolverSetFree(HycoSolver s, Vec x)
 {
   PetscFunctionBegin;
@@ -545,6 +566,7 @@ PetscErrorCode HycoSolverSetFree(HycoSolver s, Vec x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The active set with which the next solve starts. Borrowed for one solve. */
 PetscErrorCode HycoSolverSetStartSet(HycoSolver s, const PetscBool active[])
 {
   PetscFunctionBegin;
@@ -552,6 +574,7 @@ PetscErrorCode HycoSolverSetStartSet(HycoSolver s, const PetscBool active[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Residual to which the next solve goes, with x and L as start; 0: the tolerance alone. */
 PetscErrorCode HycoSolverSetTarget(HycoSolver s, PetscReal residual)
 {
   PetscFunctionBegin;

@@ -15,7 +15,8 @@ PetscErrorCode HycoStiffnessDestroy(HycoStiffness *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A zero pivot means that K is singular; it is not an error. */
+/* A zero pivot means that K is singular; it is not an error. A copy, by columns without gaps, as getrf overwrites
+   it. */
 static PetscErrorCode FactorDense(HycoStiffness *f, Mat K, PetscBool *singular)
 {
   const PetscScalar *k;
@@ -41,6 +42,7 @@ static PetscErrorCode FactorDense(HycoStiffness *f, Mat K, PetscBool *singular)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* S: the Schur complement on contacts (and pinned unknowns), by columns on every rank; NULL: the factor alone. */
 static PetscErrorCode FactorSparse(HycoSolver s, Mat Bt, Mat B, PetscReal S[], PetscBool *singular)
 {
   HycoStiffness *f = &s->stiffness;
@@ -78,7 +80,7 @@ static PetscErrorCode RefineDense(HycoSolver s, PetscInt n, const PetscReal b[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* S = B X, each entry rounded once; made symmetric. */
+/* S = B X, each entry rounded once; made symmetric. Twice the working precision: S decides signs of small gaps. */
 static void RefineProduct(HycoSolver s, const PetscReal B[], const PetscReal X[], PetscReal S[])
 {
   const size_t m = (size_t)s->system->m, n = (size_t)s->stiffness.n;
@@ -96,6 +98,7 @@ static void RefineProduct(HycoSolver s, const PetscReal B[], const PetscReal X[]
   }
 }
 
+/* S = B K^-1 Bt (m x m, by columns) for a dense K; B and Bt are dense without gaps. */
 PetscErrorCode HycoStiffnessCondense(HycoSolver s, Mat Bt, Mat B, PetscReal S[])
 {
   HycoStiffness *f = &s->stiffness;
@@ -125,6 +128,7 @@ PetscErrorCode HycoStiffnessCondense(HycoSolver s, Mat Bt, Mat B, PetscReal S[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* x = K^-1 r by the current factor; with refinement if it is switched on. */
 PetscErrorCode HycoStiffnessSolve(HycoSolver s, Vec r, Vec x)
 {
   HycoStiffness *f = &s->stiffness;
@@ -149,6 +153,7 @@ PetscErrorCode HycoStiffnessSolve(HycoSolver s, Vec r, Vec x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* x for F - Bt L, whose low part is kept: the difference of large forces decides. */
 PetscErrorCode HycoStiffnessRefine(HycoSolver s, const PetscReal L[], Vec x)
 {
   HycoSystem y = s->system;
@@ -177,6 +182,7 @@ PetscErrorCode HycoStiffnessRefine(HycoSolver s, const PetscReal L[], Vec x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One step of refinement if the residual is large: costs one solve, and mostly none. */
 PetscErrorCode HycoStiffnessCorrect(HycoSolver s, Vec L, Vec x)
 {
   HycoSystem y = s->system;
@@ -202,6 +208,7 @@ PetscErrorCode HycoStiffnessCorrect(HycoSolver s, Vec L, Vec x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Keeps the factor while K and B are the same objects in the same state; *singular is no error. Collective. */
 PetscErrorCode HycoStiffnessFactor(HycoSolver s, Mat Bt, Mat B, PetscReal S[], PetscBool *singular)
 {
   HycoStiffness *f = &s->stiffness;

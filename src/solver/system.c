@@ -19,6 +19,7 @@ static PetscErrorCode FreeWork(HycoSystem s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Work vectors are created at the first use: many systems never need them. */
 PetscErrorCode HycoSystemWork(HycoSystem s)
 {
   PetscFunctionBegin;
@@ -49,6 +50,8 @@ PetscErrorCode HycoSystemDestroy(HycoSystem *system)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* References K, Bt (n x m), B (m x n); Bt need not be the transpose of B in reduced systems. Replaces a given
+   flexibility. */
 PetscErrorCode HycoSystemSetMatrices(HycoSystem s, Mat K, Mat Bt, Mat B, PetscBool symmetric)
 {
   PetscInt rows, cols;
@@ -93,6 +96,7 @@ PetscErrorCode HycoSystemGetMatrices(HycoSystem s, Mat *K, Mat *Bt, Mat *B)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* References F (n) and D (m). */
 PetscErrorCode HycoSystemSetVectors(HycoSystem s, Vec F, Vec D)
 {
   PetscInt n, m = 0;
@@ -123,6 +127,7 @@ PetscErrorCode HycoSystemGetVectors(HycoSystem s, Vec *F, Vec *D)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A system w = g + G L on one process: no displacements. G must be dense without gaps. */
 PetscErrorCode HycoSystemSetFlexibility(HycoSystem s, Mat G, Vec g)
 {
   PetscInt rows, cols, m, lda = 0;
@@ -154,7 +159,7 @@ PetscErrorCode HycoSystemSetFlexibility(HycoSystem s, Mat G, Vec g)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fails unless the blocks cover these rows. */
+/* Fails unless the blocks cover these rows. On every rank with its own rows. */
 static PetscErrorCode CheckCover(PetscInt n_cones, const HycoCone cones[], PetscInt n, const PetscInt cone_of[],
                                  const PetscReal data[], PetscInt rows)
 {
@@ -180,6 +185,8 @@ static PetscErrorCode CountRows(HycoSystem s, PetscInt *rows)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Blocks of rows with their cones, in the order of this rank's rows; n_cones 0 or nonnegative cones alone: none.
+   Collective. */
 PetscErrorCode HycoSystemSetBlocks(HycoSystem s, PetscInt n_cones, const HycoCone cones[], PetscInt n_blocks,
                                    const PetscInt cone_of[], const PetscReal data[])
 {
@@ -214,11 +221,13 @@ PetscErrorCode HycoSystemCheckBlocks(HycoSystem s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The largest of the four: a solution counts as solved by it. */
 PetscReal HycoKKTMax(const HycoKKT *kkt)
 {
   return PetscMax(PetscMax(kkt->stationarity, kkt->penetration), PetscMax(kkt->adhesion, kkt->complementarity));
 }
 
+/* 0 / 0 is 0: without forces and gaps there is no violation; x / 0 and NaN are infinite. */
 static PetscReal Quotient(PetscReal a, PetscReal b)
 {
   if (PetscIsInfOrNanReal(a) || PetscIsInfOrNanReal(b)) return PETSC_MAX_REAL;
@@ -226,7 +235,7 @@ static PetscReal Quotient(PetscReal a, PetscReal b)
 }
 
 /* Removes from r the part due to the rounding of x, entries of at most 16 eps (|K_ii x_i| + |F_i|); returns their
-   norm. */
+   norm. Rounding x to doubles leaves a residual of this size whatever the solver does. */
 static PetscErrorCode DropRounding(HycoSystem s, Vec x, Vec r, Vec diagonal, PetscReal *dropped)
 {
   PetscInt n;
@@ -256,9 +265,9 @@ static PetscErrorCode DropRounding(HycoSystem s, Vec x, Vec r, Vec diagonal, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* |K x + Bt L - F|, and the part of F - Bt L that no x balances if K is singular: it is computed from the forces only,
-   because K x has the round-off of x, which is unlimited there. Relative to the forces: where |K x| is above their sum,
-   it is round-off too. */
+/* |K x + Bt L - F|, and the part of F - Bt L that no x balances if K is singular: it is computed from the forces
+   only, because K x has the round-off of x, which is unlimited there. Relative to the forces: where |K x| is above
+   their sum, it is round-off too. Relative to the larger of |B^T L| and |F|; collective. */
 static PetscErrorCode Stationarity(HycoSystem s, Vec x, Vec L, PetscReal *value, PetscReal *rounding)
 {
   Vec Kx = s->work_x[0], BtL = s->work_x[1];
@@ -284,8 +293,8 @@ static PetscErrorCode Stationarity(HycoSystem s, Vec x, Vec L, PetscReal *value,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The residuals of the blocks' laws with the gaps w of the size size_w; size_L: that of the forces, `instead` if it is
-   0. */
+/* The residuals of the blocks' laws with the gaps w of the size size_w; size_L: that of the forces, `instead` if it
+   is 0. The scale makes forces and gaps comparable: the law's residual is P(L - rho w) - L. */
 static PetscErrorCode BlockKKT(HycoSystem s, const PetscReal w[], const PetscReal l[], PetscReal size_w,
                                PetscReal size_L, PetscReal instead, HycoKKT *kkt)
 {
@@ -303,7 +312,8 @@ static PetscErrorCode BlockKKT(HycoSystem s, const PetscReal w[], const PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The residuals of w = g + G L. Equilibrium has no residual here: it is satisfied by the definition of G. */
+/* The residuals of w = g + G L. Equilibrium has no residual here: it is satisfied by the definition of G. On one
+   process. */
 static PetscErrorCode FlexibilityKKT(HycoSystem s, Vec L, HycoKKT *kkt)
 {
   const PetscInt m = s->m;
@@ -364,6 +374,8 @@ static PetscErrorCode GapKKT(HycoSystem s, Vec gap, Vec L, PetscReal size_gap, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The four KKT residuals of x and L, recomputed from K, B, F, D (none is taken from a solver): stationarity,
+   penetration, negative forces, complementarity, each relative. Collective. */
 PetscErrorCode HycoSystemComputeKKT(HycoSystem s, Vec x, Vec L, HycoKKT *kkt)
 {
   Vec gap;
@@ -388,6 +400,7 @@ PetscErrorCode HycoSystemComputeKKT(HycoSystem s, Vec x, Vec L, HycoKKT *kkt)
   gap = s->work_L;
   PetscCall(MatMult(s->B, x, gap));
   PetscCall(VecAYPX(gap, -1, s->D));
+  /* The norm of B is computed once per B. */
   PetscCall(HycoOperatorStateUpdate(&s->seen_B, s->B, NULL, &same));
   if (!same) PetscCall(MatNorm(s->B, NORM_INFINITY, &s->size_B));
   PetscCall(VecNorm(x, NORM_INFINITY, &size_x));

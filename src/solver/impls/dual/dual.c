@@ -18,6 +18,7 @@ typedef struct {
   HycoTao tao;       /* on each rank alone, because the problem is replicated */
 } Dual;
 
+/* The usual form: one factorisation, then a dense problem. Cost 2: others are cheaper only for many contacts. */
 static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost, char why[HYCO_LINE])
 {
   HycoSystem y = s->system;
@@ -39,6 +40,7 @@ static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The analysis stays for the factorisation. */
 static PetscErrorCode EstimateFactor(HycoSolver s, HycoSolverForm form, PetscReal *bytes)
 {
   HycoStiffness *f = &s->stiffness;
@@ -70,6 +72,7 @@ static PetscErrorCode Resize(Dual *d, PetscInt m, PetscInt p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* S from one factorisation; the factor is kept while K and B are unchanged. */
 static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singular)
 {
   Dual *d = (Dual *)form->data;
@@ -124,6 +127,8 @@ static PetscErrorCode FreeGap(HycoSolver s, const Dual *d, Vec x)
   HycoSystem y = s->system;
 
   PetscFunctionBegin;
+  /* MUMPS reduces F and D to the Schur variables in one forward substitution; with s->free the displacements without
+     forces are known. */
   if (!s->stiffness.lu && !s->free) {
     PetscCall(GatherVec(HycoComm(s), y->D, d->L));
     PetscCall(HycoDirectReduce(s->stiffness.direct, y->F, d->L, d->g));
@@ -157,6 +162,7 @@ static PetscErrorCode SolveForces(HycoSolver s, Dual *d, PetscBool *solved)
   PetscFunctionBegin;
   if (d->p) HycoFormat(name, "dual, %d rigid motions held by contact", (int)d->p);
   PetscCall(HycoSolverNameMethod(s, name));
+  /* A cold start: no contact closed, or all for floating bodies, which are otherwise singular. */
   for (PetscInt i = 0; i < d->m && (!s->warm || !d->started); i++) d->active[i] = (PetscBool)(d->p > 0);
   PetscCall(HycoTaoSetType(d->tao, s->now.type, s->max_its));
   if (s->system->blocks) PetscCall(HycoBlocksGather(HycoComm(s), s->system->blocks, &blocks));
@@ -169,6 +175,7 @@ static PetscErrorCode SolveForces(HycoSolver s, Dual *d, PetscBool *solved)
     *L = d->p && !d->active[i] ? 0 : PetscMax(*L, 0);
     if (!d->p) d->active[i] = (PetscBool)(*L > 0);
   }
+  /* A set of blocks is no set of closed rows. */
   d->started = (PetscBool)(*solved && !blocks);
   PetscCall(HycoBlocksDestroy(&blocks));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -253,7 +260,8 @@ static PetscErrorCode Shift(HycoSolver s, const PetscReal dL[], Vec x, Vec L)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* If K is ill conditioned, the gaps of x are less accurate than those from S and g: S dL = D - B x corrects them. */
+/* If K is ill conditioned, the gaps of x are less accurate than those from S and g: S dL = D - B x corrects them.
+   With dense K alone, which may be of reduced models with a condition number near 1e16. */
 static PetscErrorCode CloseGaps(HycoSolver s, const Dual *d, Vec x, Vec L)
 {
   HycoSystem y = s->system;
@@ -276,6 +284,7 @@ static PetscErrorCode CloseGaps(HycoSolver s, const Dual *d, Vec x, Vec L)
     open = PetscMax(open, PetscAbsReal(d->g[i]));
   }
   if (open > 1e-10 * size) PetscCall(HycoLCPSolveOnSet(d->m, d->S, d->g, y->symmetric, NULL, &k, a, change, &singular));
+  /* Forces stay nonnegative. */
   for (PetscInt i = 0; i < d->m && !singular; i++) change[i] = PetscMax(change[i], -d->L[i]);
   if (!singular) PetscCall(Shift(s, change, x, L));
   PetscCall(PetscFree2(a, change));
@@ -285,7 +294,8 @@ static PetscErrorCode CloseGaps(HycoSolver s, const Dual *d, Vec x, Vec L)
 /* If refinement changes S by at most this share of its largest entry, it had no relevant round-off. */
 #define SAME_FLEXIBILITY 1e-12
 
-/* For a small dense K: computes S again, by solves refined in twice the working precision. */
+/* For a small dense K: computes S again, by solves refined in twice the working precision. Called after a failed
+   attempt; *better: S has changed, so that another attempt may succeed. */
 static PetscErrorCode Refine(HycoSolver s, HycoSolverForm form, PetscBool *better)
 {
   Dual *d = (Dual *)form->data;
@@ -310,6 +320,7 @@ static PetscErrorCode Refine(HycoSolver s, HycoSolverForm form, PetscBool *bette
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A refined factor is that of one solve: later systems start without it. */
 static PetscErrorCode Reset(HycoSolver s, HycoSolverForm form)
 {
   PetscFunctionBegin;
@@ -319,6 +330,7 @@ static PetscErrorCode Reset(HycoSolver s, HycoSolverForm form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* S and g, forces, displacements, and for dense K a correction. */
 static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, PetscBool *solved)
 {
   Dual *d = (Dual *)form->data;
@@ -368,6 +380,7 @@ PetscErrorCode HycoSolverFormCreate_Dual(HycoSolver s, HycoSolverForm form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Borrowed until the next solve: S by columns, m x m, on every rank. */
 PetscErrorCode HycoSolverGetFlexibility(HycoSolver s, PetscInt *m, const PetscReal *S[])
 {
   HycoSolverForm form;

@@ -13,6 +13,7 @@ typedef struct {
   HycoTao tao;
 } Flexibility;
 
+/* The only form for a given G. */
 static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost, char why[HYCO_LINE])
 {
   PetscFunctionBegin;
@@ -37,11 +38,13 @@ static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singul
     f->m = y->m;
     f->started = PETSC_FALSE;
   }
+  /* The factor of the active set belongs to the former G. */
   PetscCall(HycoOperatorStateUpdate(&f->of, y->G, NULL, &same));
   if (!same) HycoSetFactorForget(f->factor);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Starts from the given set, else from that of the last solution. */
 static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, PetscBool *solved)
 {
   Flexibility *f = (Flexibility *)form->data;

@@ -6,6 +6,7 @@ typedef struct {
   HycoOperatorState of;
 } Linear;
 
+/* Cost 0: without contact there is nothing else. */
 static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost, char why[HYCO_LINE])
 {
   PetscFunctionBegin;
@@ -23,6 +24,7 @@ static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singul
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* With a target, x is the start, and the residual is measured without the preconditioner, as the target is. */
 static PetscErrorCode SolveIterative(HycoSolver s, Linear *l, Vec x, PetscBool *solved)
 {
   KSPConvergedReason why;
@@ -51,6 +53,7 @@ static PetscErrorCode SolveIterative(HycoSolver s, Linear *l, Vec x, PetscBool *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* x in place; L is not used. */
 static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, PetscBool *solved)
 {
   PetscBool singular;
@@ -94,6 +97,7 @@ PetscErrorCode HycoSolverFormCreate_Linear(HycoSolver s, HycoSolverForm form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* K^-1 r for k vectors, with the factor of the last solve in the dual form. Collective. */
 PetscErrorCode HycoSolverApplyInverse(HycoSolver s, PetscInt k, Vec r[], Vec x[])
 {
   PetscInt p;

@@ -4,6 +4,8 @@
 */
 #include "gap.h"
 
+/* For each contact of this rank (row of B) the unknown with its largest entry that no other contact has; HYCO_IDLE
+   for an empty row, HYCO_NO_PIVOT if there is none. *all: every row has a pivot. Collective. */
 PetscErrorCode HycoGapPivots(HycoSystem y, PetscInt pivot[], PetscBool *all)
 {
   PetscMPIInt bad = 0, any;
@@ -50,6 +52,7 @@ PetscErrorCode HycoGapPivots(HycoSystem y, PetscInt pivot[], PetscBool *all)
   PetscCall(VecScatterCreate(count, is, mine, NULL, &scatter));
   PetscCall(VecScatterBegin(scatter, count, mine, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(VecScatterEnd(scatter, count, mine, INSERT_VALUES, SCATTER_FORWARD));
+  /* Counts are exact in reals; 1.5 allows for none. */
   PetscCall(VecGetArrayRead(mine, &shared));
   for (PetscInt r = lo; r < hi; r++) {
     PetscInt n;
@@ -78,6 +81,7 @@ PetscErrorCode HycoGapPivots(HycoSystem y, PetscInt pivot[], PetscBool *all)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether the gap coordinates exist for this B. Collective. */
 PetscErrorCode HycoGapPossible(HycoSystem y, PetscBool *possible)
 {
   PetscInt lo, hi, *pivot;
@@ -90,7 +94,7 @@ PetscErrorCode HycoGapPossible(HycoSystem y, PetscBool *possible)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether every contact row has one entry: T is then diagonal. */
+/* Whether every contact row has one entry: T is then diagonal. For instance obstacles with a normal along an axis. */
 static PetscErrorCode OneEach(Mat B, PetscBool *diagonal)
 {
   PetscInt lo, hi;
@@ -110,7 +114,8 @@ static PetscErrorCode OneEach(Mat B, PetscBool *diagonal)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Kg = T^T K T if each contact is on one unknown: without a matrix product. */
+/* Kg = T^T K T if each contact is on one unknown: without a matrix product. T = diag(1 / B_ip), so that the product
+   is a scaling of rows and columns. */
 static PetscErrorCode ScaleOnly(HycoSystem y, Gap *s)
 {
   PetscInt lo, hi, n;
@@ -140,7 +145,8 @@ static PetscErrorCode ScaleOnly(HycoSystem y, Gap *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* T = I, except in a pivot's row: x_p = (y_p - sum_j B_ij y_j) / B_ip. */
+/* T = I, except in a pivot's row: x_p = (y_p - sum_j B_ij y_j) / B_ip. Two passes: a MATPREALLOCATOR records the
+   pattern, then the values follow. Other ranks own some pivots' rows. */
 static PetscErrorCode BuildT(HycoSystem y, Gap *s)
 {
   PetscInt lo, hi, first, last, bs;
@@ -189,7 +195,8 @@ static PetscErrorCode BuildT(HycoSystem y, Gap *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Removes the idle contacts from pivot, contact and the active set. */
+/* Removes the idle contacts from pivot, contact and the active set. Empty rows have no unknown, thus neither a bound
+   nor a force. */
 static PetscErrorCode DropIdle(Gap *s, PetscInt n)
 {
   PetscFunctionBegin;
@@ -223,7 +230,8 @@ static PetscErrorCode ToGaps(HycoSystem s, const Gap *q, Vec x, Vec y)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Attaches K's near-null space to Kw, in gap coordinates, for multigrid. */
+/* Attaches K's near-null space to Kw, in gap coordinates, for multigrid. Orthonormalised, as multigrid expects; the
+   modes of x are no modes of y. */
 static PetscErrorCode NearKernel(HycoSystem s, const Gap *g)
 {
   MatNullSpace near = NULL, mine;
@@ -255,7 +263,8 @@ static PetscErrorCode NearKernel(HycoSystem s, const Gap *g)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets the new Kw in the solver, which keeps its data if the sizes are unchanged. */
+/* Sets the new Kw in the solver, which keeps its data if the sizes are unchanged. KSPReset() drops the factor, but
+   keeps options and type. */
 static PetscErrorCode RenewSolver(HycoSolver s, Gap *g)
 {
   PetscInt n_old = -1;
@@ -278,6 +287,8 @@ static PetscErrorCode RenewSolver(HycoSolver s, Gap *g)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* T, Kg and the solver for the current K and B; nothing is done if both are unchanged. The last active set stays if
+   the contacts are the same. Collective. */
 PetscErrorCode HycoGapSetUp(HycoSolver s, Gap *g)
 {
   HycoSystem y = s->system;
@@ -322,6 +333,8 @@ PetscErrorCode HycoGapSetUp(HycoSolver s, Gap *g)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Options of a work copy: symmetric positive definite, and rows that are zeroed keep their entries, so that the
+   pattern and the analysis stay. */
 PetscErrorCode HycoGapWork(Mat Kw)
 {
   PetscFunctionBegin;
@@ -331,7 +344,8 @@ PetscErrorCode HycoGapWork(Mat Kw)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One step of refinement makes the residual small entry by entry (R. D. Skeel, Math. Comp. 35, 1980). */
+/* One step of refinement makes the residual small entry by entry (R. D. Skeel, Math. Comp. 35, 1980). Needed for the
+   forces: they are residuals at the pivots. */
 static PetscErrorCode SolveRefined(Mat Kw, KSP ksp, Vec rhs, Vec y)
 {
   Vec r, dy;
@@ -352,6 +366,8 @@ static PetscErrorCode SolveRefined(Mat Kw, KSP ksp, Vec rhs, Vec y)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* y: Kg y = f with y = d on the unknowns a (global numbers, this rank's), by elimination of these in the copy Kw.
+   The mean diagonal in eliminated rows keeps the matrix well scaled. Collective. */
 PetscErrorCode HycoSolveOnSet(Mat Kg, Mat Kw, KSP ksp, Vec f, PetscInt n, const PetscInt a[], const PetscReal d[],
                               Vec rhs, Vec y, PetscBool *singular)
 {

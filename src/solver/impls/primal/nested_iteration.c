@@ -39,6 +39,7 @@ typedef struct {
   const PetscScalar *value;
 } Rows;
 
+/* Restored by RowsRestore(). */
 static PetscErrorCode RowsGet(Mat K, Rows *r)
 {
   PetscBool done;
@@ -61,7 +62,8 @@ static PetscErrorCode RowsRestore(Rows *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Changes the sign of unknowns without a bound if this makes all couplings <= 0: sign[i] = 1 or -1. */
+/* Changes the sign of unknowns without a bound if this makes all couplings <= 0: sign[i] = 1 or -1. Breadth first
+   from the bounds, whose signs are fixed. */
 static PetscErrorCode FindSigns(const Rows *r, const PetscReal bound[], PetscReal sign[], PetscBool *found)
 {
   PetscInt *queue;
@@ -90,6 +92,7 @@ static PetscErrorCode FindSigns(const Rows *r, const PetscReal bound[], PetscRea
       }
     }
   }
+  /* The signs were greedy: couplings between unknowns reached on different ways decide. */
   for (PetscInt i = 0; i < r->n; i++) {
     PetscReal diagonal = 0, worst = 0;
 
@@ -105,7 +108,8 @@ static PetscErrorCode FindSigns(const Rows *r, const PetscReal bound[], PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The weakest strong coupling of a row, as a negative number; 0: the row has no couplings. */
+/* The weakest strong coupling of a row, as a negative number; 0: the row has no couplings. Couplings are negative
+   here. */
 static PetscReal Strong(const Rows *r, PetscInt i)
 {
   PetscReal least = 0;
@@ -116,7 +120,8 @@ static PetscReal Strong(const Rows *r, PetscInt i)
   return HYCO_STRONG * least;
 }
 
-/* coarse_of: a maximal independent set, numbered in the order of the unknowns; returns its size. */
+/* coarse_of: a maximal independent set, numbered in the order of the unknowns; returns its size. Breadth first in
+   the matrix graph: about every second unknown of a chain is kept. */
 static PetscErrorCode Split(const Rows *r, PetscInt coarse_of[], PetscInt *n_coarse)
 {
   PetscInt *queue, head = 0, tail = 0;
@@ -156,7 +161,8 @@ static PetscErrorCode Split(const Rows *r, PetscInt coarse_of[], PetscInt *n_coa
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* P: identity on the unknowns kept; elsewhere w_ij = -(sum_k K_ik / sum of its strong coarse K_ij) K_ij / K_ii. */
+/* P: identity on the unknowns kept; elsewhere w_ij = -(sum_k K_ik / sum of its strong coarse K_ij) K_ij / K_ii.
+   Classical direct interpolation: constants are reproduced where rows sum to zero. */
 static PetscErrorCode Interpolate(const Rows *r, const PetscInt coarse_of[], PetscInt n_coarse, Mat *P)
 {
   PetscInt *length, *col, longest = 1;
@@ -206,7 +212,8 @@ static PetscErrorCode Interpolate(const Rows *r, const PetscInt coarse_of[], Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The next coarser level; *made is false if the matrix is small, or cannot be coarsened. */
+/* The next coarser level; *made is false if the matrix is small, or cannot be coarsened. Bounds and loads of coarse
+   unknowns are those of the finer level. */
 static PetscErrorCode Coarsen(Level *fine, Level *coarse, PetscBool *made)
 {
   Rows r;
@@ -243,6 +250,7 @@ typedef struct {
   PetscReal *at_bound;
 } Solve;
 
+/* The solve step of the active set method on a level. */
 static PetscErrorCode SolveOnLevel(void *ctx, PetscBool active[], PetscBool *singular)
 {
   const Solve *p = (const Solve *)ctx;
@@ -262,6 +270,8 @@ static PetscErrorCode SolveOnLevel(void *ctx, PetscBool active[], PetscBool *sin
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Which unknowns change sides: negative forces at closed ones, values beyond the bound at open ones, both beyond
+   round-off. */
 static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool violates[])
 {
   const Solve *p = (const Solve *)ctx;
@@ -290,7 +300,7 @@ static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool 
 }
 
 /* The active set method from l->active; y is the last solution. Only the set is used, whether or not it has
-   converged. */
+   converged. At most 40 iterations: the set need not be final. */
 static PetscErrorCode SolveLevel(Level *l, Vec y)
 {
   Solve p = {.level = l, .y = y};
@@ -323,7 +333,7 @@ static PetscErrorCode SolveLevel(Level *l, Vec y)
 }
 
 /* The finer set: coarse unknowns keep their state; interpolated ones are relaxed once, and closed if this exceeds
-   the bound. */
+   the bound. One Jacobi step with the coarse values. */
 static PetscErrorCode Prolong(Level *fine, const Level *coarse, Vec y)
 {
   Vec fine_y, diagonal;
@@ -361,7 +371,8 @@ static PetscErrorCode LevelDestroy(Level *l)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* From level 0 to the coarsest level and back; level 0 is not solved. */
+/* From level 0 to the coarsest level and back; level 0 is not solved. A level is freed as soon as the finer set is
+   known. */
 static PetscErrorCode Cascade(Level level[], PetscBool *made)
 {
   PetscInt n = 1;
@@ -385,7 +396,8 @@ static PetscErrorCode Cascade(Level level[], PetscBool *made)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rank 0's part: from the whole matrix, right-hand side and bounds to the set. */
+/* Rank 0's part: from the whole matrix, right-hand side and bounds to the set. made: couplings of one sign and at
+   least one coarse level. */
 static PetscErrorCode StartOnRoot(Mat K, Vec f, Vec bound, Vec set, PetscBool *made)
 {
   Level *level;
@@ -424,7 +436,7 @@ static PetscErrorCode StartOnRoot(Mat K, Vec f, Vec bound, Vec set, PetscBool *m
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Gathers the whole matrix on rank 0, an empty one elsewhere. */
+/* Gathers the whole matrix on rank 0, an empty one elsewhere. A submatrix of all rows on rank 0. */
 static PetscErrorCode GatherMatrix(MPI_Comm comm, Mat K, Mat *whole)
 {
   PetscMPIInt rank, size;
@@ -450,6 +462,8 @@ static PetscErrorCode GatherMatrix(MPI_Comm comm, Mat K, Mat *whole)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* set: 1 where the bound is active in the coarse solutions, else 0 (distributed like f). *made is false if the
+   matrix is not suitable. Collective. */
 PetscErrorCode HycoMultilevelStart(Mat K, Vec f, Vec bound, Vec set, PetscBool *made)
 {
   MPI_Comm comm = PetscObjectComm((PetscObject)K);

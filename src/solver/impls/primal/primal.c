@@ -16,7 +16,7 @@
 #define HYCO_NOISE       1e-9
 #define HYCO_NOISE_LEAST 1e-13
 
-/* The value of a distributed vector at this rank's pivots. */
+/* The value of a distributed vector at this rank's pivots. Pivots may be owned by other ranks. */
 static PetscErrorCode AtPivots(Vec v, VecScatter scatter, Vec work, PetscInt n, PetscReal out[])
 {
   const PetscScalar *w;
@@ -44,7 +44,7 @@ typedef struct {
   PetscBool cold;
 } Primal;
 
-/* Evaluates the values at the pivots, and the forces. */
+/* Evaluates the values at the pivots, and the forces. Forces are the residuals f - Kg y. */
 static PetscErrorCode Evaluate(const Primal *p)
 {
   PetscFunctionBegin;
@@ -55,6 +55,7 @@ static PetscErrorCode Evaluate(const Primal *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The solve step: closed contacts have y_p = D_i. */
 static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singular)
 {
   const Primal *p = (const Primal *)ctx;
@@ -74,6 +75,7 @@ static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singu
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Sizes over all ranks, so that a rank without contacts with forces judges alike; noise: of iterative solves. */
 static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool violates[])
 {
   const Primal *p = (const Primal *)ctx;
@@ -93,7 +95,8 @@ static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The set from coarser problems, if they exist: most unknowns are contacts, with couplings of one sign. */
+/* The set from coarser problems, if they exist: most unknowns are contacts, with couplings of one sign. A quarter of
+   the unknowns: below it a cold start from no contact needs few iterations. */
 static PetscErrorCode StartFromCoarse(const Primal *p, PetscBool active[], PetscBool *made)
 {
   HycoSolver s = p->s;
@@ -128,7 +131,8 @@ static PetscErrorCode SetAccuracy(Primal *p, PetscReal noise)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Writes x and the forces of the set, without negative ones if `clean`. */
+/* Writes x and the forces of the set, without negative ones if `clean`. x = T y; rows of idle contacts have no
+   force. */
 static PetscErrorCode Fill(const Primal *p, PetscBool clean)
 {
   const Gap *g = p->gap;
@@ -148,7 +152,8 @@ static PetscErrorCode Fill(const Primal *p, PetscBool clean)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The set has converged with inaccurate solves: continues with accurate ones, up to the target of the residual. */
+/* The set has converged with inaccurate solves: continues with accurate ones, up to the target of the residual.
+   First the accuracy of the set, then, with a target, that of the residual. */
 static PetscErrorCode Settled(void *ctx, PetscBool *more)
 {
   Primal *p = (Primal *)ctx;
@@ -166,7 +171,7 @@ static PetscErrorCode Settled(void *ctx, PetscBool *more)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Replaces a set from the last solution that was far from the new one. */
+/* Replaces a set from the last solution that was far from the new one. Once, after HYCO_WARM_ITS iterations. */
 static PetscErrorCode Restart(void *ctx, PetscInt its, PetscBool active[], PetscBool *fresh)
 {
   const Primal *p = (const Primal *)ctx;
@@ -192,6 +197,7 @@ static PetscErrorCode StartCold(Primal *p, PetscBool active[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The set of the last solution, or of coarser problems, or none. Collective. */
 static PetscErrorCode ActiveSet(Primal *p, Gap *g, PetscBool *solved)
 {
   HycoSolver s = p->s;
@@ -220,7 +226,8 @@ static PetscErrorCode ActiveSet(Primal *p, Gap *g, PetscBool *solved)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves the bound-constrained problem by a Tao type. */
+/* Solves the bound-constrained problem by a Tao type. min 1/2 y^T Kg y - f^T y with y_p <= D_i. TAO scales the
+   Hessian in place, hence the copy. */
 static PetscErrorCode BoundQP(Primal *p, Gap *g, PetscBool *solved)
 {
   HycoSolver s = p->s;
@@ -254,6 +261,7 @@ static PetscErrorCode BoundQP(Primal *p, Gap *g, PetscBool *solved)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Bounds in the order of the contacts without idle ones. */
 static PetscErrorCode PrimalCreate(HycoSolver s, const Gap *g, Vec x, Primal *p)
 {
   HycoSystem y = s->system;
@@ -297,7 +305,8 @@ static PetscErrorCode PrimalDestroy(Primal *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Chosen automatically if there are many contacts, or if K is solved iteratively. */
+/* Chosen automatically if there are many contacts, or if K is solved iteratively. Cost 1 is below that of the dual
+   form. */
 static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost, char why[HYCO_LINE])
 {
   Gap *g = (Gap *)form->data;
@@ -337,6 +346,7 @@ static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singul
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Active set method or a Tao type, then x and L from y. */
 static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, PetscBool *solved)
 {
   Gap *g = (Gap *)form->data;

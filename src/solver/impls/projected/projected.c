@@ -40,7 +40,8 @@ typedef struct {
   Vec x, d, l, r, gap;      /* d, l: for the active rows */
 } Run;
 
-/* The node of each contact: its slave if B has one, else that of an entry that no other contact has. */
+/* The node of each contact: its slave if B has one, else that of an entry that no other contact has. `possible` is
+   of all ranks: each contact needs an unknown of its own, so that closed rows are independent. */
 static PetscErrorCode FindNodes(HycoSystem y, Projected *f)
 {
   PetscInt lo, hi, *pivot;
@@ -77,7 +78,8 @@ static PetscErrorCode FindNodes(HycoSystem y, Projected *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets the active rows of B and their nodes as constraints. */
+/* Sets the active rows of B and their nodes as constraints. Only if the set differs from that of the last solve on
+   any rank. */
 static PetscErrorCode SetConstraints(Run *p, const PetscBool active[], PetscBool *singular)
 {
   const Projected *f = p->form;
@@ -119,7 +121,8 @@ static PetscErrorCode SetConstraints(Run *p, const PetscBool active[], PetscBool
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Evaluates the contacts' B x, and the forces of the active ones. */
+/* Evaluates the contacts' B x, and the forces of the active ones. Forces of the active rows by least squares from
+   the residual K x - F. */
 static PetscErrorCode Evaluate(Run *p, const PetscBool active[])
 {
   const Projected *f = p->form;
@@ -148,6 +151,7 @@ static PetscErrorCode Evaluate(Run *p, const PetscBool active[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The present x is the start: sets mostly differ by few contacts. */
 static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singular)
 {
   Run *p = (Run *)ctx;
@@ -163,6 +167,7 @@ static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singu
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Violations below the accuracy of the solve do not change the set. */
 static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool violates[])
 {
   const Run *p = (const Run *)ctx;
@@ -182,7 +187,7 @@ static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets L to the forces of the set, without negative ones. */
+/* Sets L to the forces of the set, without negative ones. p->gap serves as a work vector of the length of L. */
 static PetscErrorCode FillForces(const Run *p, PetscBool clean, const PetscBool active[], Vec L)
 {
   PetscScalar *l;
@@ -197,7 +202,8 @@ static PetscErrorCode FillForces(const Run *p, PetscBool clean, const PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reduces the accuracy by a factor. A given start may already be more accurate than the present one. */
+/* Reduces the accuracy by a factor. A given start may already be more accurate than the present one. By what the
+   last solve has reached, if that is less. */
 static PetscErrorCode Sharpen(Run *p, PetscReal factor)
 {
   KSP ksp;
@@ -235,6 +241,7 @@ static PetscErrorCode Settled(void *ctx, PetscBool *more)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Without a target the start is 0, so that equal problems have equal iterations. */
 static PetscErrorCode RunCreate(HycoSolver s, Projected *f, Vec x, Run *p)
 {
   HycoSystem y = s->system;
@@ -290,6 +297,7 @@ static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Multigrid of K; constraints are set for each active set. */
 static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singular)
 {
   Projected *f = (Projected *)form->data;
@@ -321,6 +329,7 @@ static PetscErrorCode NameSolves(HycoSolver s, const Projected *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Cold or warm active set; accuracy grows by Settled(). */
 static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, PetscBool *solved)
 {
   Projected *f = (Projected *)form->data;

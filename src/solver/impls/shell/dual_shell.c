@@ -11,6 +11,7 @@ typedef struct {
   HycoTao tao;
 } Shell;
 
+/* Only on request, for Tao types that need products alone. */
 static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost, char why[HYCO_LINE])
 {
   const int traits = s->now.traits;
@@ -38,6 +39,7 @@ static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One product: a multiplication by B^T, a solve, a multiplication by B. */
 static PetscErrorCode MultS(Mat S, Vec v, Vec Sv)
 {
   Shell *f;
@@ -60,7 +62,8 @@ static PetscErrorCode DiagonalS(Mat S, Vec d)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The diagonal of B diag(K)^-1 B^T, which has the unit of each contact. */
+/* The diagonal of B diag(K)^-1 B^T, which has the unit of each contact. Exact diagonals would need a solve per
+   contact. */
 static PetscErrorCode LocalDiagonal(HycoSystem y, Vec d)
 {
   Mat scaled;
@@ -93,7 +96,8 @@ static PetscErrorCode LocalDiagonal(HycoSystem y, Vec d)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* That diagonal d times the mean of v_i (S v)_i / d_i over v_i = +-1, about trace(S) / trace(d): one product. */
+/* That diagonal d times the mean of v_i (S v)_i / d_i over v_i = +-1, about trace(S) / trace(d): one product. TAO's
+   types scale their problem by this diagonal. */
 static PetscErrorCode EstimateDiagonal(Mat S, Shell *f)
 {
   Vec v, Sv;
@@ -128,7 +132,8 @@ static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singul
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* L from min 1/2 L^T S L + g^T L, L >= 0, with g = D - B K^-1 F. */
+/* L from min 1/2 L^T S L + g^T L, L >= 0, with g = D - B K^-1 F. Bound-constrained quadratic problem; S is symmetric
+   here. */
 static PetscErrorCode Forces(const Shell *p, Mat S, Vec x, Vec L, PetscBool *solved)
 {
   HycoSolver s = p->s;
@@ -154,7 +159,7 @@ static PetscErrorCode Forces(const Shell *p, Mat S, Vec x, Vec L, PetscBool *sol
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* x = K^-1 (F - Bt L), refined once. */
+/* x = K^-1 (F - Bt L), refined once. The second pass refines by the residual of the first one. */
 static PetscErrorCode Displacements(HycoSolver s, Shell *f, Vec x, Vec L)
 {
   HycoSystem y = s->system;
@@ -173,6 +178,7 @@ static PetscErrorCode Displacements(HycoSolver s, Shell *f, Vec x, Vec L)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The factor is kept; vectors and the shell are of this solve. */
 static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, PetscBool *solved)
 {
   Shell *f = (Shell *)form->data;
