@@ -10,7 +10,8 @@
 #define LEVERAGE   1.4  /* in logarithms: a factor of 4 */
 #define FAR        1.4  /* no value lies above the limit by more: logarithms, a factor of 4 */
 
-/* c >= 0 that minimises |X c - y|^2 about the means, regularised. */
+/* c >= 0 that minimises |X c - y|^2 about the means, regularised. The ridge is added as p rows; the means are
+   removed, since the constant is fitted separately. */
 static PetscErrorCode Fit(PetscInt n, PetscInt p, const PetscReal X[], const PetscReal y[], PetscReal c[])
 {
   const PetscInt rows = n + p;
@@ -72,12 +73,14 @@ static PetscErrorCode Limit(PetscInt n, PetscInt independent, PetscReal value[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* y minus the formula without its constant. */
 static PetscReal Above(PetscInt p, const PetscReal X[], PetscReal y, const PetscReal c[])
 {
   for (PetscInt j = 0; j < p; j++) y -= c[j] * X[j];
   return y;
 }
 
+/* Values of one group (of one solution) are not independent. */
 static PetscInt CountGroups(PetscInt n, const PetscInt group[])
 {
   PetscInt count = 0;
@@ -91,6 +94,8 @@ static PetscInt CountGroups(PetscInt n, const PetscInt group[])
   return count;
 }
 
+/* c[p]: the constant such that `share` of the y lie below the formula with exponents c[0 .. p). X: n x p by rows, in
+   logarithms. */
 PetscErrorCode HycoRaiseBound(PetscInt n, const PetscInt group[], PetscInt p, const PetscReal X[], const PetscReal y[],
                               PetscReal share, PetscReal c[])
 {
@@ -131,6 +136,8 @@ static PetscErrorCode LeaveOut(PetscInt n, PetscInt telling, const PetscInt grou
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Exponents c[0 .. p) from the first `telling` rows, and the constant c[p] from all n rows, judged by fits without
+   each row's group. Share of values below: `share`. */
 PetscErrorCode HycoUpperBound(PetscInt n, PetscInt telling, const PetscInt group[], PetscInt p, const PetscReal X[],
                               const PetscReal y[], PetscReal share, PetscReal c[])
 {

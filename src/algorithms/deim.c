@@ -2,6 +2,7 @@
 #include <hycoalgorithms.h>
 #include <petscblaslapack.h>
 
+/* values[k][j] = V[rows[k], j] on every rank, by a sum in which one rank has the row. Collective. */
 PetscErrorCode HycoGatherRows(Mat V, PetscInt n, const PetscInt rows[], PetscReal values[])
 {
   PetscInt lo, hi, cols, lda;
@@ -23,7 +24,7 @@ PetscErrorCode HycoGatherRows(Mat V, PetscInt n, const PetscInt rows[], PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* c: V[index[0..k), 0..k) c = V[index[0..k), k]. */
+/* c: V[index[0..k), 0..k) c = V[index[0..k), k]. Row-wise storage of `rows`, column-wise for LAPACK. */
 static PetscErrorCode Interpolate(PetscInt k, PetscInt l, const PetscReal rows[], PetscReal c[])
 {
   PetscReal *A;
@@ -42,6 +43,8 @@ static PetscErrorCode Interpolate(PetscInt k, PetscInt l, const PetscReal rows[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* index[k] (global row): where mode k differs most from its interpolation by the former ones; among entries equal to
+   1e-10 the lowest row, so that the choice is the same on any number of ranks. Collective. */
 PetscErrorCode HycoDEIM(Mat V, PetscInt index[])
 {
   PetscInt l, lo, hi, lda;
@@ -96,6 +99,7 @@ static PetscErrorCode LongestRow(Mat V, const PetscReal length2[], PetscInt *row
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Pivoted QR of V^T: the l rows that are best conditioned; fails for dependent columns. Collective. */
 PetscErrorCode HycoQDEIM(Mat V, PetscInt index[])
 {
   PetscInt l, found;
@@ -107,6 +111,7 @@ PetscErrorCode HycoQDEIM(Mat V, PetscInt index[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The same as far as there are nonzero rows; *found of them. Collective. */
 PetscErrorCode HycoQDEIMRank(Mat V, PetscInt index[], PetscInt *found)
 {
   Mat R;
@@ -130,6 +135,7 @@ PetscErrorCode HycoQDEIMRank(Mat V, PetscInt index[], PetscInt *found)
       for (PetscInt i = 0; i < hi - lo; i++) length2[i] += PetscSqr(r[(size_t)j * (size_t)lda + (size_t)i]);
     }
     PetscCall(MatDenseRestoreArray(R, &r));
+    /* Round-off is left in rows that were chosen. */
     for (PetscInt p = 0; p < k; p++) {
       if (index[p] >= lo && index[p] < hi) length2[index[p] - lo] = 0;
     }

@@ -2,6 +2,7 @@
 #include <hycoalgorithms.h>
 #include <petscblaslapack.h>
 
+/* pivot[0 .. k): the first k pivot columns of A (m x n, by columns, overwritten). */
 PetscErrorCode HycoPivotColumns(PetscInt m, PetscInt n, PetscReal A[], PetscInt k, PetscInt pivot[])
 {
   PetscReal *norm;
@@ -34,6 +35,7 @@ PetscErrorCode HycoPivotColumns(PetscInt m, PetscInt n, PetscReal A[], PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* P (n x m) = A^+ by the SVD; singular values below tol of the largest are dropped. */
 PetscErrorCode HycoPseudoInverse(PetscInt m, PetscInt n, const PetscReal A[], PetscReal tol, PetscReal P[])
 {
   const PetscInt k = PetscMin(m, n);
@@ -61,6 +63,7 @@ PetscErrorCode HycoPseudoInverse(PetscInt m, PetscInt n, const PetscReal A[], Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Of a dense A (m x n, by columns), which is not changed. */
 PetscErrorCode HycoExtremeSingularValues(PetscInt m, PetscInt n, const PetscReal A[], PetscReal *smallest,
                                          PetscReal *largest)
 {
@@ -82,7 +85,8 @@ PetscErrorCode HycoExtremeSingularValues(PetscInt m, PetscInt n, const PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The largest eigenvalue of A^T A, or with the LU factors of A of its inverse: power iterations from a fixed start. */
+/* The largest eigenvalue of A^T A, or with the LU factors of A of its inverse: power iterations from a fixed start.
+   One significant digit of the ratio is enough: stops at a change of 1e-3. */
 static PetscReal LargestOfSquare(PetscBLASInt n, const PetscReal A[], const PetscReal LU[], const PetscBLASInt ipiv[],
                                  PetscReal x[], PetscReal y[])
 {
@@ -114,6 +118,8 @@ static PetscReal LargestOfSquare(PetscBLASInt n, const PetscReal A[], const Pets
   return value;
 }
 
+/* Sign of det A and the reciprocal of its condition number, both from one LU factorisation; *ratio 0: singular. For
+   the search of turning points. */
 PetscErrorCode HycoSingularity(PetscInt n, const PetscReal A[], PetscInt *sign, PetscReal *ratio)
 {
   PetscReal *LU, *x, *y, large, inverse;

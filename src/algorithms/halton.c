@@ -14,6 +14,7 @@ static PetscInt Prime(PetscInt j)
   }
 }
 
+/* Entry j of the k-th point, in [0, 1): the digits of k in the j-th prime base, mirrored. */
 PetscReal HycoHalton(PetscInt k, PetscInt j)
 {
   const PetscInt base = Prime(j);

@@ -26,6 +26,7 @@ struct _n_HycoInterpolant {
 /* A scaled simplex with a smaller volume is degenerate. */
 #define FLAT 1e-12
 
+/* Duplicates would make the triangulation degenerate; the first of equal points counts. */
 static PetscErrorCode KeepDifferent(HycoInterpolant it, const PetscReal points[])
 {
   PetscFunctionBegin;
@@ -39,6 +40,7 @@ static PetscErrorCode KeepDifferent(HycoInterpolant it, const PetscReal points[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* To [0, 1]; a parameter with one value keeps the width 1. */
 static PetscErrorCode Scale(HycoInterpolant it, const PetscReal points[])
 {
   PetscFunctionBegin;
@@ -155,6 +157,8 @@ static PetscErrorCode TakeSimplices(HycoInterpolant it, qhT *qh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Exact points are on a lower hull in one more dimension; Qhull's messages go into memory, since the library does
+   not print. */
 static PetscErrorCode Triangulate(HycoInterpolant it)
 {
   static char options[] = "qhull d Qbb Qc Qz Q12 Qt"; /* Delaunay, with points on a common circle triangulated */
@@ -185,6 +189,7 @@ static PetscErrorCode Triangulate(HycoInterpolant it)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* n points (n x dim); duplicates are allowed. The caller destroys it also after an error. */
 PetscErrorCode HycoInterpolantCreate(PetscInt dim, PetscInt n, const PetscReal points[], HycoInterpolant *interpolant)
 {
   HycoInterpolant it;
@@ -220,7 +225,8 @@ PetscErrorCode HycoInterpolantDestroy(HycoInterpolant *interpolant)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Weights of the corners of the box around x. */
+/* Weights of the corners of the box around x. Parameters at a node of their axis do not double the number of
+   corners. */
 static void GridWeights(HycoInterpolant it, const PetscReal x[], PetscReal weight[])
 {
   PetscInt place[HYCO_INTERPOLANT_MAX_DIM];
@@ -253,7 +259,7 @@ static void GridWeights(HycoInterpolant it, const PetscReal x[], PetscReal weigh
 }
 
 /* Barycentric coordinates in the first simplex that contains x; outside all, in the one with the least negative
-   coordinates, clipped to its faces. */
+   coordinates, clipped to its faces. A linear search: models have some hundred simplices. */
 static void SimplexWeights(HycoInterpolant it, const PetscReal x[], PetscReal weight[])
 {
   const PetscInt dim = it->dim;
@@ -281,6 +287,8 @@ static void SimplexWeights(HycoInterpolant it, const PetscReal x[], PetscReal we
   for (PetscInt i = 0; i <= dim; i++) weight[it->own[it->simplex[at * (dim + 1) + i]]] = best[i] / sum;
 }
 
+/* weight[n]: the alpha of (42), which add up to 1; zero at most points. Outside the points' range the nearest value
+   is taken. */
 PetscErrorCode HycoInterpolantGetWeights(HycoInterpolant it, const PetscReal point[], PetscReal weight[])
 {
   PetscReal x[HYCO_INTERPOLANT_MAX_DIM];

@@ -8,7 +8,8 @@ typedef struct {
   PetscReal *Q, *R, *y;
 } Passive;
 
-/* Appends column j of A by modified Gram-Schmidt, twice; false if it depends on the present ones. */
+/* Appends column j of A by modified Gram-Schmidt, twice; false if it depends on the present ones. Dependent: less
+   than 1e-12 of its length remains. */
 static PetscBool Append(Passive *f, const PetscReal A[], const PetscReal b[], PetscInt j)
 {
   const PetscInt m = f->m, k = f->k;
@@ -51,6 +52,8 @@ static void BackSolve(const Passive *f, PetscReal z[])
   }
 }
 
+/* Largest step from x towards z (by position in p) that keeps x >= 0, taken in place; returns the position of the
+   entry that becomes 0, -1 if z is reached. */
 PetscInt HycoNNLSStep(PetscInt k, const PetscInt p[], const PetscReal z[], PetscReal x[])
 {
   PetscReal alpha = 1;
@@ -68,7 +71,8 @@ PetscInt HycoNNLSStep(PetscInt k, const PetscInt p[], const PetscReal z[], Petsc
   return blocking;
 }
 
-/* Moves from x towards z until an entry becomes 0, which then leaves the set; true if z itself is reached. */
+/* Moves from x towards z until an entry becomes 0, which then leaves the set; true if z itself is reached. The
+   factorisation is made anew from the entries that stay: removals are rare. */
 static PetscBool MoveTowards(Passive *f, const PetscReal A[], const PetscReal b[], const PetscReal z[], PetscReal x[],
                              PetscBool passive[])
 {
@@ -117,6 +121,8 @@ PetscErrorCode HycoNNLS(PetscInt m, PetscInt n, const PetscReal A[], const Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* x >= 0 that minimises |A x - b|, A m x n by columns; monitor (NULL: none) after each column that enters. On one
+   process. */
 PetscErrorCode HycoNNLSMonitored(PetscInt m, PetscInt n, const PetscReal A[], const PetscReal b[],
                                  PetscErrorCode (*monitor)(void *ctx, PetscInt k, PetscInt most), void *ctx,
                                  PetscReal x[], PetscReal *residual)
@@ -133,6 +139,7 @@ PetscErrorCode HycoNNLSMonitored(PetscInt m, PetscInt n, const PetscReal A[], co
   PetscCall(PetscCalloc2(n, &passive, n, &banned));
   PetscCall(PetscArrayzero(x, n));
   Gradient(&f, A, b, r, w);
+  /* Gradients below round-off of the first one are zero. */
   for (PetscInt j = 0; j < n; j++) tol = PetscMax(tol, 1e-12 * PetscAbsReal(w[j]));
   for (PetscInt it = 0; it < 3 * n + 10 && f.k < most; it++) {
     PetscInt best = -1;

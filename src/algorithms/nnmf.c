@@ -71,7 +71,8 @@ static PetscErrorCode Try(const Half *h, const PetscReal X[], PetscReal alpha, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Projected gradients on one half until their norm is below tol; returns their number. */
+/* Projected gradients on one half until their norm is below tol; returns their number. The step length of the last
+   iteration is tried first. */
 static PetscErrorCode SolveHalf(const Half *h, PetscReal tol, PetscReal X[], PetscInt *its)
 {
   const PetscInt n = h->k * h->n;
@@ -99,7 +100,8 @@ static PetscErrorCode SolveHalf(const Half *h, PetscReal tol, PetscReal X[], Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The larger one of the parts of u v^T with u and v split by sign: its sign and size. */
+/* The larger one of the parts of u v^T with u and v split by sign: its sign and size. The smaller part is zeroed by
+   the start; signs of singular vectors are arbitrary. */
 static PetscReal LargerPart(PetscInt m, const PetscReal u[], PetscInt n, const PetscReal v[], PetscInt stride,
                             PetscReal *sign, PetscReal *length_u, PetscReal *length_v)
 {
@@ -162,6 +164,7 @@ static PetscErrorCode SetHalf(PetscInt m, PetscInt n, PetscInt k, const PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Each half is solved only as accurately as the other needs: its tolerance drops when it has nothing to do. */
 static PetscErrorCode Alternate(PetscInt m, PetscInt n, PetscInt k, const PetscReal S[], PetscInt max_its,
                                 PetscReal Wt[], PetscReal H[], PetscReal room[])
 {
@@ -193,7 +196,7 @@ static PetscErrorCode Alternate(PetscInt m, PetscInt n, PetscInt k, const PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* |S - Wt^T H|^2 / |S|^2 for the scaled S, whose norm is 1. */
+/* |S - Wt^T H|^2 / |S|^2 for the scaled S, whose norm is 1. From the factors, not from the halves' values. */
 static PetscErrorCode Misfit(PetscInt m, PetscInt n, PetscInt k, const PetscReal S[], const PetscReal Wt[],
                              const PetscReal H[], PetscReal *misfit)
 {
@@ -208,6 +211,8 @@ static PetscErrorCode Misfit(PetscInt m, PetscInt n, PetscInt k, const PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* W (m x *n_vectors): columns of length 1 of the factorisation with k columns, without those that are not used;
+   *misfit: |S - W H|^2 / |S|^2. S >= 0, m x n by columns. On one process. */
 PetscErrorCode HycoNNMF(PetscInt m, PetscInt n, const PetscReal S[], PetscInt k, PetscInt max_its, PetscReal W[],
                         PetscInt *n_vectors, PetscReal *misfit)
 {

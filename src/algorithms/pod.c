@@ -12,6 +12,7 @@
 #define ORTHONORMAL 1e-9
 #define FIRST       16 /* number of triplets requested at first; doubled until sufficient */
 
+/* The options may choose another SVD type. */
 PetscErrorCode HycoPODCreateSVD(MPI_Comm comm, SVD *svd)
 {
   PetscFunctionBegin;
@@ -21,6 +22,8 @@ PetscErrorCode HycoPODCreateSVD(MPI_Comm comm, SVD *svd)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The smallest l whose left-out energy is at most tol of the whole (18); values below noise times the first are
+   round-off. Summed from the smallest. */
 PetscInt HycoPODRank(PetscInt k, const PetscReal s[], PetscReal tol, PetscReal noise, PetscInt max_modes)
 {
   PetscReal total = 0, tail = 0;
@@ -35,7 +38,8 @@ PetscInt HycoPODRank(PetscInt k, const PetscReal s[], PetscReal tol, PetscReal n
   return max_modes > 0 ? PetscMin(l, max_modes) : l;
 }
 
-/* Makes a mode's largest entry (the first of nearly equal ones) positive. */
+/* Makes a mode's largest entry (the first of nearly equal ones) positive. Singular vectors have no sign; with this
+   rule, models are the same on any number of ranks. Collective. */
 static PetscErrorCode FixSigns(Mat V, PetscInt l)
 {
   PetscInt lo, hi, lda;
@@ -90,7 +94,8 @@ static PetscErrorCode Solve(SVD svd, Mat S, PetscInt most, PetscBool *fixed)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The first k left singular vectors, distributed like the rows of S. */
+/* The first k left singular vectors, distributed like the rows of S. SLEPc stores them by its own vectors; a dense
+   matrix is what the models need. */
 static PetscErrorCode GetVectors(SVD svd, Mat S, PetscInt k, Mat *V)
 {
   PetscInt N, rows;
@@ -109,7 +114,7 @@ static PetscErrorCode GetVectors(SVD svd, Mat S, PetscInt k, Mat *V)
 }
 
 /* The number of modes, of the first k, that are orthonormal and whose images under S^T have the length of their
-   singular values. */
+   singular values. A mode is as inaccurate as its product with any former one. */
 static PetscErrorCode CountAccurate(Mat S, Mat V, PetscInt k, const PetscReal sigma[], PetscInt *accurate)
 {
   PetscInt lo, hi, lda;
@@ -159,7 +164,8 @@ static PetscErrorCode GetValues(SVD svd, PetscInt k, PetscReal sigma[], PetscInt
 }
 
 /* For types other than tsqr: as few triplets as the criterion needs, as far as they are accurate. The rest of the
-   energy size^2 becomes the next singular value, so that (18) includes it. */
+   energy size^2 becomes the next singular value, so that (18) includes it. The number of triplets doubles until the
+   criterion (18) is met. */
 static PetscErrorCode SolveAccurate(SVD svd, Mat S, PetscReal size, PetscReal tol, PetscReal noise, PetscInt max_modes,
                                     PetscInt k, PetscReal sigma[], PetscInt *accurate)
 {
@@ -188,6 +194,8 @@ static PetscErrorCode SolveAccurate(SVD svd, Mat S, PetscReal size, PetscReal to
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* V (N x l, distributed like S): modes of the columns of S by (17) and (18); sigma: min(N, n) values. V is NULL if l
+   = 0; the caller destroys it. S is scaled and restored. Collective. */
 PetscErrorCode HycoPOD(SVD svd, Mat S, PetscReal tol, PetscReal noise, PetscInt max_modes, Mat *V, PetscInt *l,
                        PetscReal sigma[])
 {
@@ -230,6 +238,8 @@ PetscErrorCode HycoPOD(SVD svd, Mat S, PetscReal tol, PetscReal noise, PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* POD from a Gram matrix G (n x n): W (n x l) such that S W has orthonormal columns. Eigenvalues are squares, hence
+   values below 1e-7 of the first are round-off. The caller frees W. */
 PetscErrorCode HycoPODGram(PetscInt n, const PetscReal G[], PetscReal tol, PetscReal noise, PetscReal **W, PetscInt *l,
                            PetscReal sigma[])
 {

@@ -23,6 +23,7 @@ static PetscErrorCode ScaleModes(Mat V, PetscInt l, const PetscReal sigma[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Columns of X to the columns from `at` of Y. Collective. */
 PetscErrorCode HycoCopyColumns(Mat X, Mat Y, PetscInt at)
 {
   PetscInt n;
@@ -37,6 +38,7 @@ PetscErrorCode HycoCopyColumns(Mat X, Mat Y, PetscInt at)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* [A B] with the same distribution; A and B are destroyed. Collective. */
 PetscErrorCode HycoJoinColumns(Mat *A, Mat *B, Mat *joined)
 {
   PetscInt N, n[2], rows;
@@ -55,6 +57,8 @@ PetscErrorCode HycoJoinColumns(Mat *A, Mat *B, Mat *joined)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Adds the columns of S, which is destroyed, to the merged ones; loss: energy that may be left out, relative.
+   *merged NULL: nothing yet. Collective. */
 PetscErrorCode HycoPODMerge(SVD svd, PetscReal loss, Mat *merged, Mat *S)
 {
   PetscInt N, n, l;

@@ -15,6 +15,7 @@
 #define FEW  5
 #define MANY 12
 
+/* Zeros of Chebyshev's polynomial on [lo, hi], ascending. */
 PetscErrorCode HycoChebyshevNodes(PetscInt n, PetscReal lo, PetscReal hi, PetscReal x[])
 {
   PetscFunctionBegin;
@@ -24,7 +25,7 @@ PetscErrorCode HycoChebyshevNodes(PetscInt n, PetscReal lo, PetscReal hi, PetscR
 }
 
 /* The next orthonormal polynomial, x times the last one orthogonalised against the previous ones, at the n nodes
-   and, as entry n, at the point. */
+   and, as entry n, at the point. Orthogonalised twice, against round-off. */
 static void NextPolynomial(PetscInt n, const PetscReal s[], PetscInt d, PetscReal P[])
 {
   PetscReal *p = P + d * (n + 1), length = 0;
@@ -43,6 +44,8 @@ static void NextPolynomial(PetscInt n, const PetscReal s[], PetscInt d, PetscRea
   for (PetscInt k = 0; k <= n; k++) p[k] /= PetscSqrtReal(length);
 }
 
+/* weight[n] of the polynomial's value at `at` by the nodes' data; without node `skip` (-1: none), whose weight is 0.
+   The degree is limited by the number of nodes. */
 PetscErrorCode HycoPolynomialWeights(PetscInt n, const PetscReal x[], PetscInt degree, PetscInt skip, PetscReal at,
                                      PetscReal weight[])
 {
@@ -73,6 +76,8 @@ PetscErrorCode HycoPolynomialWeights(PetscInt n, const PetscReal x[], PetscInt d
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* How much larger the node polynomial is at `at` outside the nodes than inside: by this factor an interpolation
+   error grows. */
 PetscReal HycoPolynomialGrowth(PetscInt n, const PetscReal x[], PetscReal at)
 {
   PetscReal inside = 0, there = 1;
@@ -89,6 +94,7 @@ PetscReal HycoPolynomialGrowth(PetscInt n, const PetscReal x[], PetscReal at)
   return PetscMax(1, there / inside);
 }
 
+/* Product of the distances to the nodes, in units of a quarter of the range, where Chebyshev nodes give about 2. */
 PetscReal HycoPolynomialProduct(PetscInt n, const PetscReal x[], PetscInt skip, PetscReal at)
 {
   PetscReal product = 1;
@@ -107,6 +113,7 @@ PetscInt HycoTensorSize(const HycoTensor *t)
   return size;
 }
 
+/* Weights of all nodes (their product over the axes), the last axis fastest; along `axis` without node `skip`. */
 PetscErrorCode HycoTensorWeights(const HycoTensor *t, const PetscReal at[], PetscInt axis, PetscInt skip,
                                  PetscReal weight[])
 {
@@ -138,7 +145,7 @@ static PetscInt Stride(const HycoTensor *t, PetscInt axis)
   return stride;
 }
 
-/* The error for nodes first .. last along the axis. */
+/* The error for nodes first .. last along the axis. By the weights of a prediction from the other nodes on the line. */
 static PetscErrorCode LeaveOut(const HycoTensor *t, PetscInt axis, PetscInt first_out, PetscInt last_out, PetscInt rows,
                                const PetscReal data[], PetscReal *error)
 {
@@ -182,7 +189,8 @@ static PetscErrorCode LeaveOneOut(const HycoTensor *t, PetscInt axis, PetscInt r
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The norm of the divided differences over nodes first .. first + n - 1 of all lines along an axis. */
+/* The norm of the divided differences over nodes first .. first + n - 1 of all lines along an axis. Scaled by a
+   quarter of the range, so that orders can be compared. */
 static PetscReal Difference(const HycoTensor *t, PetscInt axis, PetscInt first, PetscInt n, PetscInt rows,
                             const PetscReal data[])
 {
@@ -207,6 +215,7 @@ static PetscReal Difference(const HycoTensor *t, PetscInt axis, PetscInt first, 
   return PetscSqrtReal(square);
 }
 
+/* Decay of the divided differences of the highest orders: below 1 the polynomials converge. 1: no statement. */
 PetscErrorCode HycoTensorDecay(const HycoTensor *t, PetscInt axis, PetscInt rows, const PetscReal data[],
                                PetscReal *decay)
 {
@@ -227,6 +236,8 @@ PetscErrorCode HycoTensorDecay(const HycoTensor *t, PetscInt axis, PetscInt rows
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Sets the degree along the axis by leave-one-out errors; *error: that of the chosen degree. Noise favours a lower
+   degree, smooth data the highest. */
 PetscErrorCode HycoTensorChooseDegree(HycoTensor *t, PetscInt axis, PetscInt rows, const PetscReal data[],
                                       PetscReal *error)
 {
@@ -252,6 +263,7 @@ PetscErrorCode HycoTensorChooseDegree(HycoTensor *t, PetscInt axis, PetscInt row
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* value[rows] = data weight, data rows x nodes by columns. */
 PetscErrorCode HycoGridFieldSum(const HycoGridField *f, const PetscReal weight[], PetscReal value[])
 {
   const PetscReal one = 1, zero = 0;
@@ -266,6 +278,7 @@ PetscErrorCode HycoGridFieldSum(const HycoGridField *f, const PetscReal weight[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The field at a point of the parameters. */
 PetscErrorCode HycoGridFieldEvaluate(const HycoGridField *f, const PetscReal at[], PetscInt axis, PetscInt skip,
                                      PetscReal value[])
 {

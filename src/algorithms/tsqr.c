@@ -9,6 +9,7 @@
 #include <petscblaslapack.h>
 #include <slepc/private/svdimpl.h>
 
+/* SLEPc asks for the space of the solution before the solve. */
 static PetscErrorCode SetUp(SVD svd)
 {
   PetscBool dense;
@@ -28,7 +29,7 @@ static PetscErrorCode SetUp(SVD svd)
 }
 
 /* Copies this rank's rows of the dense matrix A to B, which has the same number of columns: as many rows as both
-   have, then zeros. */
+   have, then zeros. Zero rows change neither R nor the singular values. */
 static PetscErrorCode CopyRows(Mat A, Mat B)
 {
   PetscInt n, rows, have, lda, ldb;
@@ -54,7 +55,7 @@ static PetscErrorCode CopyRows(Mat A, Mat B)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* R = U s V^T: R (n x n, its upper triangle) is overwritten by U; Vt: n x n. */
+/* R = U s V^T: R (n x n, its upper triangle) is overwritten by U; Vt: n x n. Workspace by a query of LAPACK. */
 static PetscErrorCode DecomposeTriangle(PetscInt n, PetscScalar R[], PetscReal s[], PetscScalar Vt[])
 {
   PetscBLASInt nb, one = 1, lwork = -1, info;
@@ -74,7 +75,7 @@ static PetscErrorCode DecomposeTriangle(PetscInt n, PetscScalar R[], PetscReal s
 }
 
 /* Q, whose n columns SLEPc's tall-skinny QR makes orthonormal: svd->U if each rank has at least n rows, as SLEPc
-   requires, otherwise a copy padded with rows of zeros. */
+   requires, otherwise a copy padded with rows of zeros. SLEPc's tall-skinny QR assumes n rows on each rank. */
 static PetscErrorCode MakeBasis(SVD svd, BV *Q)
 {
   MPI_Comm comm = PetscObjectComm((PetscObject)svd);
@@ -122,6 +123,7 @@ static PetscErrorCode StoreRight(BV V, PetscInt n, const PetscScalar Vt[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A = Q R, R = U s V^T: left vectors are Q U. */
 static PetscErrorCode Solve(SVD svd)
 {
   const PetscInt n = svd->ncv;
@@ -165,6 +167,7 @@ static PetscErrorCode Create(SVD svd)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Registered once: a program may start SLEPc itself. */
 PetscErrorCode HycoSVDRegisterAll(void)
 {
   PetscErrorCode (*create)(SVD);

@@ -19,6 +19,7 @@ struct _n_HycoWeighted {
   PetscReal *g, *w, *z, *t; /* S^T h, gradient, work, n each; a weighted column of S, m */
 };
 
+/* S is borrowed and must not change. */
 PetscErrorCode HycoWeightedCreate(PetscInt m, PetscInt n, const PetscReal S[], PetscReal shift, HycoWeighted *weighted)
 {
   HycoWeighted f;
@@ -58,7 +59,7 @@ static void Transposed(HycoWeighted f, const PetscReal t[], PetscReal y[])
   BLASgemv_("T", &m, &n, &one, f->S, &m, t, &inc, &zero, y, &inc);
 }
 
-/* Column j of S^T diag(d) S + shift. */
+/* Column j of S^T diag(d) S + shift. Computed at the first use: few columns become passive. */
 static const PetscReal *Gram(HycoWeighted f, PetscInt j)
 {
   const PetscReal *s = f->S + (size_t)j * (size_t)f->m;
@@ -72,7 +73,8 @@ static const PetscReal *Gram(HycoWeighted f, PetscInt j)
   return column;
 }
 
-/* Makes column j passive; false if it depends on the passive ones. */
+/* Makes column j passive; false if it depends on the passive ones. A row of the Cholesky factor, from the known
+   columns. */
 static PetscBool Append(HycoWeighted f, PetscInt j)
 {
   const PetscReal *column = Gram(f, j);
@@ -155,7 +157,7 @@ static void TrueGradient(HycoWeighted f, const PetscReal x[])
 }
 
 /* One step of refinement on the passive set, then the gradient: returns its largest entry where it should be zero or
-   negative. */
+   negative. The normal equations lose digits that S still has. */
 static PetscReal Refine(HycoWeighted f, PetscReal x[])
 {
   PetscReal worst = 0;
@@ -197,6 +199,8 @@ static PetscErrorCode Begin(HycoWeighted f, const PetscReal d[], const PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* x >= 0 (n) minimising the weighted problem: rows d (m) and h = d times the right-hand side (m). *solved: the
+   gradient from S is at most rtol of the first. On one process. */
 PetscErrorCode HycoWeightedNNLS(HycoWeighted f, const PetscReal d[], const PetscReal h[], PetscReal rtol, PetscReal x[],
                                 PetscBool *solved)
 {

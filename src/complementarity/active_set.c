@@ -15,6 +15,7 @@ typedef struct {
   PetscBool *violates;
 } History;
 
+/* Order matters: the hash identifies a set, with a probability of error of 2^-64 per pair. */
 unsigned long long HycoSetHash(PetscInt n, const PetscBool active[])
 {
   unsigned long long hash = HYCO_HASH_START;
@@ -100,6 +101,8 @@ static PetscErrorCode Step(const HycoActiveSet *e, PetscInt its, History *h, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Runs from the given set to a solution, a repeated set (a cycle, unless changes one by one are allowed), or the
+   limit; *its counts solves. Collective on e->comm (MPI_COMM_NULL: this process alone). */
 PetscErrorCode HycoActiveSetRun(const HycoActiveSet *e, PetscBool active[], PetscInt *its, HycoLCPStatus *status)
 {
   History h = {NULL, 0, 0, PETSC_FALSE, NULL};
@@ -113,6 +116,7 @@ PetscErrorCode HycoActiveSetRun(const HycoActiveSet *e, PetscBool active[], Pets
     PetscInt changes;
 
     if (e->restart) PetscCall(e->restart(e->ctx, *its, active, &more));
+    /* A fresh set starts a new history. */
     if (more) h.since = *its;
     PetscCall(Met(e, active, *its, &h, &met));
     if (met && !e->one_by_one) {

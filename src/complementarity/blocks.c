@@ -18,6 +18,8 @@ static PetscErrorCode Check(PetscInt n_cones, const HycoCone cones[], PetscInt n
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Blocks of consecutive rows: block k has the cone of[k] (NULL: the first) and its data; copies the data, and refers
+   to the cones. */
 PetscErrorCode HycoBlocksCreate(PetscInt n_cones, const HycoCone cones[], PetscInt n, const PetscInt of[],
                                 const PetscReal data[], HycoBlocks **blocks)
 {
@@ -42,6 +44,7 @@ PetscErrorCode HycoBlocksCreate(PetscInt n_cones, const HycoCone cones[], PetscI
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The blocks of the ordinary problem: one row each, force >= 0. */
 PetscErrorCode HycoBlocksCreateNonnegative(PetscInt n, HycoBlocks **blocks)
 {
   HycoCone cone;
@@ -90,6 +93,7 @@ static PetscErrorCode GatherAll(MPI_Comm comm, PetscInt n, const void *mine, MPI
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* All ranks' blocks on every rank, in the order of the ranks, for the dense problem. Collective. */
 PetscErrorCode HycoBlocksGather(MPI_Comm comm, const HycoBlocks *b, HycoBlocks **all)
 {
   PetscInt n, n_data, *of;
@@ -122,6 +126,7 @@ PetscErrorCode HycoBlockDerivative(const HycoBlocks *b, PetscInt k, const PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Replaces r by the nearest admissible forces, block by block. */
 PetscErrorCode HycoBlocksAdmit(const HycoBlocks *b, PetscReal r[])
 {
   PetscReal z[HYCO_MAX_BLOCK];
@@ -140,6 +145,8 @@ static PetscReal Most(PetscReal most, PetscReal value)
   return value <= PETSC_MAX_REAL ? PetscMax(most, value) : PETSC_MAX_REAL;
 }
 
+/* Largest entries of the residual P(r - rho w) - r of the law: of all components, of the missing normal force, and
+   of what makes r itself inadmissible. Not collective. */
 PetscErrorCode HycoBlocksNaturalMap(const HycoBlocks *b, PetscReal rho, const PetscReal r[], const PetscReal w[],
                                     HycoNaturalMap *map)
 {

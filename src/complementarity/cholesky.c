@@ -11,6 +11,7 @@ struct _n_HycoSetFactor {
   PetscBool *wanted, *kept; /* n */
 };
 
+/* Room for all n contacts, so that a set of any size can be factored. */
 PetscErrorCode HycoSetFactorCreate(PetscInt n, HycoSetFactor *factor)
 {
   HycoSetFactor f;
@@ -36,6 +37,7 @@ PetscErrorCode HycoSetFactorDestroy(HycoSetFactor *factor)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For another matrix M. */
 void HycoSetFactorForget(HycoSetFactor factor)
 {
   if (factor) factor->k = 0;
@@ -77,6 +79,7 @@ static PetscErrorCode Append(HycoSetFactor f, const PetscReal M[], PetscInt k, P
   PetscCall(PetscBLASIntCast(f->n, &ld));
   PetscCall(PetscBLASIntCast(f->k, &old));
   PetscCall(PetscBLASIntCast(k - f->k, &more));
+  /* Only what changed: the valid rows' columns are reused by a triangular solve and a rank-k update. */
   for (PetscInt j = 0; j < k; j++) {
     const PetscReal *column = M + (size_t)f->a[j] * n;
 
@@ -97,6 +100,8 @@ static PetscErrorCode Append(HycoSetFactor f, const PetscReal M[], PetscInt k, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* z = -M_aa^-1 q_a on the set a, 0 elsewhere; *regular is false for dependent contacts, and the factor is then
+   dropped. M: n x n by columns, symmetric. */
 PetscErrorCode HycoSetFactorSolve(HycoSetFactor f, const PetscReal M[], const PetscReal q[], PetscInt k,
                                   const PetscInt a[], PetscReal tol, PetscReal z[], PetscBool *regular)
 {

@@ -6,6 +6,7 @@ static HycoRegistry cones = {.sorted = PETSC_TRUE};
 
 HycoDefineRegister(HycoConeRegister, cones, PetscErrorCode (*create)(HycoCone))
 
+/* Size 1 until it is set. */
 PetscErrorCode HycoConeCreate(MPI_Comm comm, HycoCone *cone)
 {
   PetscFunctionBegin;
@@ -25,6 +26,7 @@ PetscErrorCode HycoConeDestroy(HycoCone *cone)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Before the type, whose constructor may depend on it. */
 PetscErrorCode HycoConeSetSize(HycoCone cone, PetscInt size)
 {
   PetscFunctionBegin;
@@ -62,6 +64,7 @@ PetscErrorCode HycoConeSetType(HycoCone cone, HycoConeType type)
 HycoDefineMethod(HycoConeGetType, (HycoCone cone, HycoConeType *type), cone, HYCO_CONE_CLASSID,
                  *type = ((PetscObject)cone)->type_name)
 
+/* n_data: reals of each block, such as a coefficient of friction. */
 PetscErrorCode HycoConeSetOps(HycoCone cone, const struct _HycoConeOps *ops, PetscInt n_data)
 {
   PetscFunctionBegin;
@@ -100,6 +103,7 @@ static PetscErrorCode Project(HycoCone cone, const PetscReal data[], const Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* At 0 the derivative of the open side: the contact counts as open. */
 static PetscErrorCode Derivative(HycoCone cone, const PetscReal data[], const PetscReal y[], PetscReal J[])
 {
   PetscFunctionBegin;

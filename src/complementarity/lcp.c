@@ -10,7 +10,7 @@ typedef struct {
 } Dense;
 
 /* Computes w = q + M z for the contacts that are not active (all if M is not symmetric); returns the size relative
-   to which its zeros are round-off. */
+   to which its zeros are round-off. Of a symmetric M the fewer rows are read. */
 static PetscReal Slack(const Dense *d, const PetscBool active[])
 {
   const PetscInt n = d->lcp->n;
@@ -76,6 +76,8 @@ static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singu
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Dense primal-dual active set from `active`, which is also the result; z: n (with p pinned unknowns p + n). On one
+   process, or alike on every rank. */
 PetscErrorCode HycoLCPActiveSet(const HycoLCP *lcp, PetscBool active[], PetscReal z[], PetscInt *its,
                                 HycoLCPStatus *status)
 {

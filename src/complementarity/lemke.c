@@ -34,6 +34,7 @@ static PetscReal Cover(PetscInt i)
   return 1 + x - PetscFloorReal(x);
 }
 
+/* Scaled to entries of order one, so that the tolerances of pivots have no unit. */
 static PetscErrorCode DictionaryCreate(PetscInt n, const PetscReal M[], const PetscReal q[], PetscReal size_M,
                                        PetscReal size_q, Dictionary *d)
 {
@@ -65,6 +66,7 @@ static PetscErrorCode DictionaryDestroy(Dictionary *d)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Entry (i, j) of the current dictionary, with the collected pivots. */
 static PetscReal Entry(const Dictionary *d, PetscInt i, PetscInt j)
 {
   const size_t n = (size_t)d->n;
@@ -111,6 +113,7 @@ static PetscErrorCode FetchRow(Dictionary *d, PetscInt i)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One product for up to 48 pivots, at the speed of matrix multiplication. */
 static PetscErrorCode Apply(Dictionary *d)
 {
   PetscBLASInt n, cols, k;
@@ -161,6 +164,7 @@ static PetscInt BreakTie(const Dictionary *d, PetscInt n_tied)
   for (PetscInt t = 0; t < n_tied; t++) {
     if (d->basic[tied[t]] == 2 * d->n) return tied[t]; /* the artificial variable leaves first */
   }
+  /* Two passes for each column: least value, then all rows within round-off of it. */
   for (PetscInt w = 0; w < d->n && n_tied > 1; w++) {
     PetscReal least = PETSC_MAX_REAL;
     PetscInt left = 0;
@@ -227,7 +231,8 @@ static PetscErrorCode Run(Dictionary *d, PetscInt row, PetscInt max_its, PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Largest violation of w >= 0 relative to q, and of z >= 0 relative to z. */
+/* Largest violation of w >= 0 relative to q, and of z >= 0 relative to z. A basis from many pivots may have lost
+   digits; the comparison is with the original M and q. */
 static PetscReal Violation(PetscInt n, const PetscReal M[], const PetscReal q[], const PetscReal z[])
 {
   PetscReal worst = 0, size_q = 0, size_z = 0, least_z = 0;
@@ -270,6 +275,8 @@ static PetscErrorCode Unpack(const Dictionary *d, const PetscReal M[], const Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* z >= 0 (n) from M (n x n, by columns) and q; ends with a solution, on a ray (no solution for the matrices of the
+   header) or at the limit. On one process. */
 PetscErrorCode HycoLCPLemke(PetscInt n, const PetscReal M[], const PetscReal q[], PetscInt max_its, PetscReal z[],
                             PetscInt *its, HycoLCPStatus *status)
 {

@@ -40,7 +40,8 @@ static PetscReal Closing(const Proximal *h, PetscInt j, const PetscReal v[])
   return sum;
 }
 
-/* Springs that are soft compared with the contacts that move their unknown. */
+/* Springs that are soft compared with the contacts that move their unknown. kappa_i = SOFT times the stiffness that
+   a contact gives to unknown i. */
 static void SetSprings(Proximal *h)
 {
   PetscReal most = 0;
@@ -93,7 +94,7 @@ static void Place(Proximal *h, const PetscReal L[])
   for (PetscInt i = 0; i < h->p; i++) h->x[i] = h->centre[i] + h->r[i] / h->kappa[i];
 }
 
-/* L, r and x for the present centre. */
+/* L, r and x for the present centre. The active set first; Lemke's method where dependent contacts make it cycle. */
 static PetscErrorCode SolveForces(Proximal *h, PetscBool active[], PetscReal L[], PetscInt *its, HycoLCPStatus *status)
 {
   const HycoLCP held = {.n = h->m,
@@ -125,7 +126,8 @@ static PetscErrorCode SolveForces(Proximal *h, PetscBool active[], PetscReal L[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the springs carry nothing but round-off. */
+/* Whether the springs carry nothing but round-off. Relative to each unknown's own forces, but not to less than 1e-3
+   of the largest. */
 static PetscBool Balanced(const Proximal *h, const PetscReal L[])
 {
   PetscReal most = 0;
@@ -174,6 +176,7 @@ static PetscBool Escapes(Proximal *h, const PetscReal L[], PetscReal *far)
   return (PetscBool)(none && work > 0);
 }
 
+/* far: a long way without contact is covered at once, instead of by many small steps. */
 static PetscErrorCode Iterate(Proximal *h, PetscBool active[], PetscReal L[], PetscInt *its, HycoLCPStatus *status)
 {
   PetscReal far;
@@ -191,6 +194,8 @@ static PetscErrorCode Iterate(Proximal *h, PetscBool active[], PetscReal L[], Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* z = (x_pinned, L) by the proximal point method; HYCO_LCP_RAY: no equilibrium exists. M must be symmetric in its
+   block S. */
 PetscErrorCode HycoLCPProximal(const HycoLCP *lcp, PetscBool active[], PetscReal z[], PetscInt *its,
                                HycoLCPStatus *status)
 {

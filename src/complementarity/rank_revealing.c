@@ -12,7 +12,8 @@
    1e-14. */
 #define DEPENDENT 1e-12
 
-/* A = D M_aa D with D = |diag|^-1/2 (0 for a contact with a zero diagonal). */
+/* A = D M_aa D with D = |diag|^-1/2 (0 for a contact with a zero diagonal). Contacts have different units and
+   stiffnesses; the scaled matrix has a unit diagonal. */
 static void CopyScaled(PetscInt n, const PetscReal M[], PetscInt k, const PetscInt a[], PetscReal A[], PetscReal d[])
 {
   for (PetscInt j = 0; j < k; j++) {
@@ -28,7 +29,7 @@ static void CopyScaled(PetscInt n, const PetscReal M[], PetscInt k, const PetscI
 }
 
 /* Factors A (k x k, overwritten) and solves in place; *regular: no pivot below `tol` of the largest, and a finite
-   solution. */
+   solution. Cholesky if symmetric, else LU with partial pivoting. */
 static PetscErrorCode Solve(PetscInt k, PetscReal A[], PetscBool symmetric, PetscReal tol, PetscReal x[],
                             PetscBool *regular)
 {
@@ -73,7 +74,8 @@ static PetscInt NextPivot(PetscInt k, const PetscReal A[], const PetscReal gap[]
   return best;
 }
 
-/* Diagonal pivoting of A (k x k, overwritten): kept[i] marks a largest set on which A is regular. */
+/* Diagonal pivoting of A (k x k, overwritten): kept[i] marks a largest set on which A is regular. The Schur
+   complement is updated for all columns: O(k^2) for each pivot. */
 static PetscErrorCode Reveal(PetscInt k, PetscReal A[], const PetscReal gap[], PetscBool kept[])
 {
   PetscReal *row;
@@ -95,6 +97,7 @@ static PetscErrorCode Reveal(PetscInt k, PetscReal A[], const PetscReal gap[], P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The rank of a Gram matrix A (k x k, overwritten), by pivots of the scaled matrix. */
 PetscErrorCode HycoGramRank(PetscInt k, PetscReal A[], PetscInt *rank)
 {
   PetscReal *d;
@@ -118,7 +121,7 @@ PetscErrorCode HycoGramRank(PetscInt k, PetscReal A[], PetscInt *rank)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One solve on a set. */
+/* One solve on a set. q and z are scaled with the matrix. */
 static PetscErrorCode TrySet(PetscInt n, const PetscReal M[], const PetscReal q[], PetscBool symmetric, PetscReal tol,
                              PetscInt k, const PetscInt a[], PetscReal A[], PetscReal z[], PetscBool *regular)
 {
@@ -134,6 +137,8 @@ static PetscErrorCode TrySet(PetscInt n, const PetscReal M[], const PetscReal q[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* First the kept factor or a plain one; if it is not regular, contacts are chosen by pivoting. On return a[0 .. *k)
+   are those that carry force. */
 PetscErrorCode HycoLCPSolveOnSet(PetscInt n, const PetscReal M[], const PetscReal q[], PetscBool symmetric,
                                  HycoSetFactor factor, PetscInt *k, PetscInt a[], PetscReal z[], PetscBool *singular)
 {

@@ -30,6 +30,7 @@ static void FindIdle(Floating *h)
   }
 }
 
+/* By LU: the matrix is not symmetric in sign. Rows of unknowns are scaled by the typical flexibility. */
 static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singular)
 {
   Floating *h = (Floating *)ctx;
@@ -101,7 +102,8 @@ static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The proximal method, and from its set the exact solution, if the set determines it. */
+/* The proximal method, and from its set the exact solution, if the set determines it. SolveOnSet() returns singular,
+   hence the negation. */
 static PetscErrorCode Continue(const HycoActiveSet *e, const HycoLCP *lcp, PetscBool active[], PetscReal z[],
                                PetscInt *its, HycoLCPStatus *status)
 {
@@ -125,6 +127,7 @@ static PetscErrorCode Continue(const HycoActiveSet *e, const HycoLCP *lcp, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For lcp->p > 0; z = (x_pinned, L). On one process, or alike on every rank. */
 PetscErrorCode HycoLCPSemidefinite(const HycoLCP *lcp, PetscBool active[], PetscReal z[], PetscInt *its,
                                    HycoLCPStatus *status)
 {

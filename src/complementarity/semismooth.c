@@ -60,7 +60,7 @@ static PetscErrorCode SetScales(Newton *h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* w = q + M z */
+/* w = q + M z Columns of zero forces are skipped. */
 static PetscErrorCode Slack(Newton *h, const PetscReal z[])
 {
   PetscFunctionBegin;
@@ -121,7 +121,7 @@ static PetscErrorCode Derive(Newton *h, PetscInt *changes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Column c of J on the kept rows. */
+/* Column c of J on the kept rows. J = I - DP (I - rho M), rows of one block share DP. */
 static void Column(const Newton *h, PetscInt c, PetscReal column[])
 {
   const PetscReal *M = h->M + (size_t)c * (size_t)h->n;
@@ -136,7 +136,8 @@ static void Column(const Newton *h, PetscInt c, PetscReal column[])
   }
 }
 
-/* The step J s = -F; *regular: J has a factor, and s is finite. */
+/* The step J s = -F; *regular: J has a factor, and s is finite. Rows with DP = 0 have s = -F and move to the
+   right-hand side. */
 static PetscErrorCode Step(Newton *h, PetscBool *regular)
 {
   const PetscBLASInt one = 1;
@@ -203,7 +204,7 @@ static PetscErrorCode Show(const Newton *h, const PetscReal z[], PetscInt change
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Newton's method from z. */
+/* Newton's method from z. Ends where |F| is round-off, does not decrease, or J is singular. */
 static PetscErrorCode Iterate(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
   const PetscInt most = h->lcp->max_its ? h->lcp->max_its : MOST_ITS;
@@ -226,7 +227,7 @@ static PetscErrorCode Iterate(Newton *h, PetscReal z[], HycoLCPStatus *status)
 }
 
 /* Sweeps of block Gauss-Seidel from z: each block takes one projected step, which is short enough to decrease the
-   energy of a symmetric problem. */
+   energy of a symmetric problem. The step is 1 over a row-sum bound of the block's matrix. */
 static PetscErrorCode Sweep(Newton *h, PetscInt sweeps, PetscReal z[])
 {
   const HycoBlocks *b = h->blocks;
@@ -271,7 +272,8 @@ static PetscErrorCode Starts(Newton *h, PetscReal z[], HycoLCPStatus *status)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The proximal point method from z: it ends if z solves the problem of lcp, and further steps gain nothing. */
+/* The proximal point method from z: it ends if z solves the problem of lcp, and further steps gain nothing. Proximal
+   point problems are solved from the last z; if one fails, so does the method. */
 static PetscErrorCode Proximal(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
   const size_t n = (size_t)h->n;
@@ -306,6 +308,7 @@ static PetscErrorCode Proximal(Newton *h, PetscReal z[], HycoLCPStatus *status)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Scales are those of the original M for all starts. */
 static PetscErrorCode Chain(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
   PetscFunctionBegin;
@@ -317,6 +320,7 @@ static PetscErrorCode Chain(Newton *h, PetscReal z[], HycoLCPStatus *status)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* z: start and solution (n); lcp->blocks NULL: forces >= 0. On one process, or alike on every rank. */
 PetscErrorCode HycoLCPSemismooth(const HycoLCP *lcp, PetscReal z[], PetscInt *its, HycoLCPStatus *status)
 {
   const PetscInt n = lcp->n;

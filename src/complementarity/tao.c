@@ -35,6 +35,7 @@ static const struct {
              {"ssfls", HYCO_TAO_DENSE | HYCO_TAO_SEMISMOOTH | HYCO_TAO_NEWTON},
              {"asfls", HYCO_TAO_DENSE | HYCO_TAO_SEMISMOOTH | HYCO_TAO_NEWTON}};
 
+/* Unknown types have none: they get a bound-constrained problem. */
 int HycoTaoTraits(const char type[])
 {
   for (size_t k = 0; k < sizeof(known) / sizeof(known[0]); k++) {
@@ -43,6 +44,7 @@ int HycoTaoTraits(const char type[])
   return 0;
 }
 
+/* name: the type as TAO knows it, "" if it is unknown; list: the names for a message. */
 PetscErrorCode HycoTaoFindType(const char type[], char name[HYCO_TAO_NAME], char list[HYCO_LINE])
 {
   PetscErrorCode (*create)(Tao);
@@ -60,6 +62,7 @@ PetscErrorCode HycoTaoFindType(const char type[], char name[HYCO_TAO_NAME], char
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* owner: its options prefix; quiet: of several ranks that solve the same problem only the first shows monitors. */
 PetscErrorCode HycoTaoCreate(MPI_Comm comm, PetscObject owner, HycoTao *t)
 {
   PetscMPIInt rank = 0, size;
@@ -110,6 +113,7 @@ PetscErrorCode HycoTaoDestroy(HycoTao *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Takes effect at the next solve; another type drops the Tao. */
 PetscErrorCode HycoTaoSetType(HycoTao t, const char type[], PetscInt max_its)
 {
   PetscFunctionBegin;
@@ -122,7 +126,8 @@ PetscErrorCode HycoTaoSetType(HycoTao t, const char type[], PetscInt max_its)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Creates the Tao for a problem of y's size, with the user's options, unless it exists; *made: it is new. */
+/* Creates the Tao for a problem of y's size, with the user's options, unless it exists; *made: it is new. TAO 3.18
+   cannot change its size, hence a new one. */
 static PetscErrorCode Prepare(HycoTao t, Vec y, PetscInt max_its, PetscBool *made)
 {
   PetscInt n, N;
@@ -179,6 +184,7 @@ static PetscInt Patience(const HycoTao t)
   return t->traits & HYCO_TAO_NEWTON && t->best <= 1e-8 ? 20 : 300;
 }
 
+/* 1/2 y^T H y - f^T y and H y - f, by one product. */
 static PetscErrorCode Objective(Tao tao, Vec y, PetscReal *value, Vec gradient, void *ctx)
 {
   HycoTao t = (HycoTao)ctx;
@@ -244,7 +250,8 @@ static PetscErrorCode Converged(Tao tao, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* `krylov`: without a factor, because H is singular (dependent contacts). */
+/* `krylov`: without a factor, because H is singular (dependent contacts). Tolerances near round-off: the problem is
+   scaled to size one. */
 static PetscErrorCode SetBoundProblem(HycoTao t, PetscBool krylov)
 {
   PetscBool shell;
@@ -265,6 +272,7 @@ static PetscErrorCode SetBoundProblem(HycoTao t, PetscBool krylov)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* LU of the Newton matrix, or GMRES where that is singular. */
 static PetscErrorCode SetComplementarity(HycoTao t, PetscBool krylov)
 {
   KSP ksp;
@@ -287,7 +295,8 @@ static PetscErrorCode SetComplementarity(HycoTao t, PetscBool krylov)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The part of a run that may fail inside TAO. */
+/* The part of a run that may fail inside TAO. Options and callbacks are set once for a Tao; H is the caller's at
+   each call. */
 static PetscErrorCode Run(HycoTao t, Vec lo, Vec hi, Vec y, PetscBool krylov, PetscInt *its, PetscBool *solved)
 {
   TaoConvergedReason why;
@@ -315,7 +324,7 @@ static PetscErrorCode Run(HycoTao t, Vec lo, Vec hi, Vec y, PetscBool krylov, Pe
 }
 
 /* y = d size y', lo and hi likewise; f' = d f / size; H' = d H d: unit diagonal, max |f'| = 1. Infinite bounds are
-   kept. */
+   kept. Diagonal entries below 1e-8 of the largest are raised, so that the scaling stays finite. */
 static PetscErrorCode Scale(Mat H, Vec f, Vec lo, Vec hi, Vec y, Vec d, PetscReal *size)
 {
   PetscInt n;
@@ -348,7 +357,8 @@ static PetscErrorCode Scale(Mat H, Vec f, Vec lo, Vec hi, Vec y, Vec d, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One run of TAO from y; after an error inside it, sets *failed and destroys its Tao. y is finite at the end. */
+/* One run of TAO from y; after an error inside it, sets *failed and destroys its Tao. y is finite at the end. TAO's
+   errors are caught: a type may divide by zero or meet a singular matrix. A failed Tao is not used again. */
 static PetscErrorCode CatchRun(HycoTao t, Vec lo, Vec hi, Vec y, PetscBool krylov, PetscInt *its, PetscBool *solved,
                                PetscBool *failed)
 {
@@ -377,7 +387,7 @@ static PetscErrorCode CatchRun(HycoTao t, Vec lo, Vec hi, Vec y, PetscBool krylo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* | y - median(lo, y - (H y - f), hi) |, 0 at the solution. */
+/* | y - median(lo, y - (H y - f), hi) |, 0 at the solution. For the choice between two results. */
 static PetscErrorCode Projected(const HycoTao t, Vec lo, Vec hi, Vec y, PetscReal *size)
 {
   Vec step;
@@ -417,6 +427,8 @@ static PetscErrorCode SecondStart(HycoTao t, Vec lo, Vec hi, Vec y, PetscBool kr
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* y: start and solution; H, f, lo and hi are scaled in place and are not restored. *solved is TAO's word, and the
+   caller checks. Collective. */
 PetscErrorCode HycoTaoSolve(HycoTao t, Mat H, Vec f, Vec lo, Vec hi, Vec y, PetscInt *its, PetscBool *solved)
 {
   PetscReal size = 1;
@@ -453,6 +465,7 @@ static PetscErrorCode SolveOwn(HycoTao t, Vec y, PetscInt max_its)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* hyco's active set with the functions of a form; y has the size of the unknowns only. Collective. */
 PetscErrorCode HycoTaoSolveSet(HycoTao t, const HycoActiveSet *set, PetscBool active[], Vec y, PetscInt *its,
                                HycoLCPStatus *status)
 {
@@ -468,7 +481,8 @@ PetscErrorCode HycoTaoSolveSet(HycoTao t, const HycoActiveSet *set, PetscBool ac
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of each pair (z_i, w_i) sets the smaller to 0: interior and first-order types leave small forces at open gaps. */
+/* Of each pair (z_i, w_i) sets the smaller to 0: interior and first-order types leave small forces at open gaps.
+   Positive forces at clearly open gaps would count as active contacts. */
 static void Clean(const HycoLCP *lcp, PetscReal z[])
 {
   const PetscInt n = lcp->n;
@@ -487,7 +501,7 @@ static void Clean(const HycoLCP *lcp, PetscReal z[])
   }
 }
 
-/* Makes scaled copies of M, -q and the bounds, for TAO's types. */
+/* Makes scaled copies of M, -q and the bounds, for TAO's types. TAO's types overwrite and scale their matrix. */
 static PetscErrorCode CopyDense(HycoTao t, const HycoLCP *lcp)
 {
   PetscScalar *h;
@@ -518,7 +532,8 @@ static PetscErrorCode CopyDense(HycoTao t, const HycoLCP *lcp)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Creates the solution vector of hyco's own types, with z as its array. */
+/* Creates the solution vector of hyco's own types, with z as its array. No copy of z: an online solve takes some
+   microseconds. */
 static PetscErrorCode PlaceSolution(HycoTao t, PetscInt n, PetscReal z[])
 {
   PetscInt old = -1;
@@ -534,6 +549,8 @@ static PetscErrorCode PlaceSolution(HycoTao t, PetscInt n, PetscReal z[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A dense problem on one process (or alike on every rank), by hyco's or TAO's types. active: start and result of the
+   active set, unused by others. */
 PetscErrorCode HycoTaoSolveLCP(HycoTao t, const HycoLCP *lcp, PetscBool active[], PetscReal z[], PetscInt *its,
                                PetscBool *solved)
 {

@@ -20,7 +20,8 @@ typedef struct {
   PetscBool objective;
 } Model;
 
-/* Fills with this rank's free unknowns: those with no bound in the set. */
+/* Fills with this rank's free unknowns: those with no bound in the set. Global numbers, as the block of H is
+   selected by them. */
 static PetscErrorCode Free(const Model *m, const PetscBool active[], IS *is, PetscInt *n_free)
 {
   PetscInt k = 0, *rows;
@@ -55,7 +56,8 @@ static PetscErrorCode Close(const Model *m, const PetscBool active[])
 }
 
 /* The block of H on the free unknowns; parallel dense ones as AIJ, which has a factor. A matrix without entries has
-   none: conjugate gradients, unless options say otherwise. */
+   none: conjugate gradients, unless options say otherwise. The block's pattern changes with the set: a new factor
+   for each. */
 static PetscErrorCode SetBlock(const Model *m, IS is)
 {
   KSP ksp = m->tao->ksp;
@@ -81,7 +83,7 @@ static PetscErrorCode SetBlock(const Model *m, IS is)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* d on the free unknowns, where w = 0. */
+/* d on the free unknowns, where w = 0. A singular block or a diverged solve ends the iteration. */
 static PetscErrorCode SolveFree(const Model *m, IS is, PetscBool *singular)
 {
   KSPConvergedReason why;
@@ -103,6 +105,7 @@ static PetscErrorCode SolveFree(const Model *m, IS is, PetscBool *singular)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* w = g + H d is the multiplier on the set, and 0 on the free unknowns. */
 static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singular)
 {
   const Model *m = (const Model *)ctx;
@@ -151,7 +154,8 @@ static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* |x - median(lo, x - g, hi)|, 0 at a solution; also for the model: x + d, w. Overwrites p. */
+/* |x - median(lo, x - g, hi)|, 0 at a solution; also for the model: x + d, w. Overwrites p. The measure of
+   optimality for bounds, by which TAO's tolerances are tested. */
 static PetscErrorCode ProjectedGradient(const Model *m, Vec x, Vec g, PetscReal *size)
 {
   PetscFunctionBegin;
@@ -174,7 +178,8 @@ static PetscErrorCode Show(const Model *m, PetscReal f, PetscReal residual, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One solve on a set: the model's value and projected gradient, those of a quadratic f itself. */
+/* One solve on a set: the model's value and projected gradient, those of a quadratic f itself. An iteration of the
+   inner loop counts as one of the Tao. */
 static PetscErrorCode Monitor(PetscInt its, PetscInt n_active, PetscInt changes, void *ctx)
 {
   const Model *m = (const Model *)ctx;
@@ -195,7 +200,7 @@ static PetscErrorCode Monitor(PetscInt its, PetscInt n_active, PetscInt changes,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The bounds on which x lies, and which hold it. */
+/* The bounds on which x lies, and which hold it. A bound with a gradient that pushes away from it is not in the set. */
 static PetscErrorCode StartSet(const Model *m, PetscBool active[])
 {
   const PetscScalar *x, *g, *lo, *hi;
@@ -216,6 +221,7 @@ static PetscErrorCode StartSet(const Model *m, PetscBool active[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The limit is what is left of the Tao's iterations. */
 static PetscErrorCode StepByActiveSet(Model *m, HycoLCPStatus *status)
 {
   HycoActiveSet set = {.comm = PetscObjectComm((PetscObject)m->x),
@@ -239,7 +245,7 @@ static PetscErrorCode StepByActiveSet(Model *m, HycoLCPStatus *status)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All of H on every rank, column major. */
+/* All of H on every rank, column major. Dense on every rank: Lemke's method is sequential. */
 static PetscErrorCode GatherHessian(Mat H, PetscInt N, PetscReal M[])
 {
   const PetscScalar *entries;
@@ -259,7 +265,8 @@ static PetscErrorCode GatherHessian(Mat H, PetscInt N, PetscReal M[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* z = x + d - lo: w = q + H z >= 0, z >= 0, w.z = 0 with q = g + H (lo - x). */
+/* z = x + d - lo: w = q + H z >= 0, z >= 0, w.z = 0 with q = g + H (lo - x). All ranks compute the same z, and each
+   takes its part. */
 static PetscErrorCode StepByLemke(Model *m, HycoLCPStatus *status)
 {
   const PetscScalar *q;
@@ -291,7 +298,7 @@ static PetscErrorCode StepByLemke(Model *m, HycoLCPStatus *status)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* f and its gradient at x. */
+/* f and its gradient at x. f is not needed without a line search. */
 static PetscErrorCode Evaluate(Model *m)
 {
   PetscFunctionBegin;
@@ -303,7 +310,8 @@ static PetscErrorCode Evaluate(Model *m)
 }
 
 /* Moves x along d, within the bounds, by the first of 1, 1/2, 1/4, ... with a sufficient decrease of f beyond
- *round-off; step: that share of d, 0 if there is none; *small: it does not change x beyond round-off. */
+   *round-off; step: that share of d, 0 if there is none; *small: it does not change x beyond round-off. x + d is
+   projected first, as round-off may leave the bounds. */
 static PetscErrorCode Move(Model *m, PetscReal *step, PetscBool *small)
 {
   const PetscReal before = m->f;
@@ -331,7 +339,7 @@ static PetscErrorCode Move(Model *m, PetscReal *step, PetscBool *small)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One Newton iteration. */
+/* One Newton iteration. Stops are TAO's tests, a step at round-off, or a line search without decrease. */
 static PetscErrorCode Iterate(Model *m, PetscErrorCode (*minimise)(Model *, HycoLCPStatus *))
 {
   Tao tao = m->tao;
@@ -397,6 +405,7 @@ static PetscErrorCode Read(Tao tao, PetscBool lemke, Model *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The general method of both types for a Tao of any program. Collective. */
 PetscErrorCode HycoTaoNewton(Tao tao, PetscBool lemke)
 {
   Model m;

@@ -6,6 +6,8 @@
 #include <hycolcp.h>
 #include <petscblaslapack.h>
 
+/* Optimality of x for min |A x - b|, x >= 0, recomputed from A (m x n, by columns): gradients relative to |a_j| |b|.
+   residual (NULL: not wanted): |A x - b|. */
 PetscErrorCode HycoNNLSCheck(PetscInt m, PetscInt n, const PetscReal A[], const PetscReal b[], const PetscReal x[],
                              PetscReal rtol, PetscReal *residual, PetscBool *solved)
 {
@@ -39,6 +41,7 @@ PetscErrorCode HycoNNLSCheck(PetscInt m, PetscInt n, const PetscReal A[], const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The solution counts only if HycoNNLSCheck() accepts it with rtol. */
 PetscErrorCode HycoTaoNNLS(PetscInt m, PetscInt n, const PetscReal A[], const PetscReal b[], const char type[],
                            PetscReal rtol, PetscReal x[], PetscReal *residual, PetscBool *solved)
 {

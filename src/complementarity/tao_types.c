@@ -20,6 +20,7 @@ static PetscErrorCode Monitor(PetscInt its, PetscInt n_active, PetscInt changes,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* TAO's reason, for -tao_converged_reason; the caller reads t->status. */
 static void SetReason(const HycoTao t)
 {
   t->tao->niter = t->its;
@@ -28,6 +29,7 @@ static void SetReason(const HycoTao t)
                                                  : TAO_DIVERGED_USER;
 }
 
+/* With a HycoTao as data the form's problem, otherwise that of the Tao. */
 static PetscErrorCode SolveActiveSet(Tao tao)
 {
   const HycoTao t = (HycoTao)tao->data;
@@ -58,6 +60,7 @@ static PetscErrorCode SolveActiveSet(Tao tao)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The iteration limit counts pivots. */
 static PetscErrorCode SolveLemke(Tao tao)
 {
   const HycoTao t = (HycoTao)tao->data;
@@ -90,6 +93,7 @@ static PetscErrorCode RunSemismooth(HycoTao t, const HycoLCP *lcp)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* z is the start of the next problem of the same size. */
 static PetscErrorCode SolveSemismooth(Tao tao)
 {
   const HycoTao t = (HycoTao)tao->data;
@@ -126,6 +130,7 @@ static PetscErrorCode CreateKSP(Tao tao)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For any program: -tao_type with this name. */
 static PetscErrorCode CreateActiveSet(Tao tao)
 {
   PetscFunctionBegin;
@@ -154,6 +159,7 @@ static PetscErrorCode CreateSemismooth(Tao tao)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Once, by the package's start; a second registration replaces the first. */
 PetscErrorCode HycoTaoRegisterAll(void)
 {
   PetscFunctionBegin;

@@ -20,6 +20,7 @@ typedef struct {
   PetscInt iterations;
 } Bracket;
 
+/* Every eighth step is a bisection, so that no law, however stiff, can stall the iteration. */
 static PetscBool Advance(Bracket *b, PetscReal newton, PetscReal *q)
 {
   const PetscReal old = *q;
@@ -42,7 +43,8 @@ typedef struct {
   PetscBool done;
 } Work;
 
-/* The first iterate: q_tr, or, if creep there is too fast, a step towards the root of the tangent power law. */
+/* The first iterate: q_tr, or, if creep there is too fast, a step towards the root of the tangent power law. Under
+   strong creep q_tr is far from the root, and Newton's method from there takes many steps. */
 static void StartCreep(const HycoFlowRule *rule, Work *w)
 {
   const PetscReal trial = w->trial;
@@ -100,7 +102,8 @@ typedef struct {
 } Flow;
 
 /* Solves q = Y(plastic0 + (q_tr - q) / H - creep(q)) between the yield stress before the step and f->q, the solution
-   for creep alone. */
+   for creep alone. Creep and yielding together: q is the only unknown, since plastic flow follows from the trial
+   stress. */
 static PetscReal SolveYield(const HycoFlowRule *rule, const Work *w, PetscReal yield, Flow *f, PetscReal *slope,
                             PetscReal *hardening)
 {
@@ -123,7 +126,8 @@ static PetscReal SolveYield(const HycoFlowRule *rule, const Work *w, PetscReal y
   }
 }
 
-/* The flow of a point after the solution for creep alone. */
+/* The flow of a point after the solution for creep alone. Slope: derivative of the flow by q_tr, for the consistent
+   tangent. */
 static Flow Solve(const HycoFlowRule *rule, const Work *w)
 {
   Flow f = {w->q, w->creep, 0, 0};
@@ -139,7 +143,8 @@ static Flow Solve(const HycoFlowRule *rule, const Work *w)
   return f;
 }
 
-/* Trial stress without flow, deviator first: returns q_tr; s[n_strain]: the deviator, *pressure: the mean. */
+/* Trial stress without flow, deviator first: returns q_tr; s[n_strain]: the deviator, *pressure: the mean. Shear
+   strains are engineering ones (twice the tensor's), hence G and the factor 2 in the sum. */
 static PetscReal Trial(PetscInt ns, PetscReal G, PetscReal bulk, const PetscReal elastic[], PetscReal s[],
                        PetscReal *pressure)
 {
@@ -158,7 +163,8 @@ static PetscReal Trial(PetscInt ns, PetscReal G, PetscReal bulk, const PetscReal
   return PetscSqrtReal(1.5 * sum);
 }
 
-/* C - 6 G^2 r I_dev - 4 G^2 (slope - r) N N with r = dp / q_tr, N = 3/2 s / q. */
+/* C - 6 G^2 r I_dev - 4 G^2 (slope - r) N N with r = dp / q_tr, N = 3/2 s / q. The consistent tangent: quadratic
+   convergence of Newton's method needs the derivative of the algorithm, not that of the rate law. */
 static void Tangent(PetscInt ns, PetscReal G, PetscReal bulk, PetscReal slope, PetscReal r, const PetscReal N[],
                     PetscReal C[])
 {
@@ -173,7 +179,9 @@ static void Tangent(PetscInt ns, PetscReal G, PetscReal bulk, PetscReal slope, P
   }
 }
 
-/* A point's energies: elastic, dissipated, and the potential, which is elastic plus that of the flow at this stress. */
+/* A point's energies: elastic, dissipated, and the potential, which is elastic plus that of the flow at this stress.
+   The dissipation is the trapezoidal rule of stress times inelastic strain; the potential exists if the rule's
+   integrals do. */
 static void Energies(const HycoFlowRule *rule, const HycoFlowPoint *p, HycoMaterialPoints *m, PetscInt i, const Flow *f,
                      PetscReal elastic)
 {
@@ -192,7 +200,8 @@ static void Energies(const HycoFlowRule *rule, const HycoFlowPoint *p, HycoMater
   if (f->plastic > 0) m->potential[i] += (*rule->yield_integral)(p, f->plastic);
 }
 
-/* The trial state of point i. State: inelastic strain, accumulated creep, accumulated plastic strain. */
+/* The trial state of point i. State: inelastic strain, accumulated creep, accumulated plastic strain. Constants 0
+   and 1 are Young's modulus and Poisson's ratio; in 1D the stress alone counts. */
 static void Begin(const HycoMaterialPoints *m, PetscInt i, Work *w)
 {
   const PetscInt ns = m->n_strain;
@@ -210,7 +219,8 @@ static void Begin(const HycoMaterialPoints *m, PetscInt i, Work *w)
     w->trial = Trial(ns, G, young / (3 * (1 - 2 * poisson)), elastic, w->s, &w->pressure);
 }
 
-/* Sets point i at the end of the step. */
+/* Sets point i at the end of the step. Stress, state and tangent from the equivalent stress, radially along the
+   trial deviator. */
 static void Finish(const HycoFlowRule *rule, HycoMaterialPoints *m, PetscInt i, const Work *w)
 {
   const PetscInt ns = m->n_strain;
@@ -238,7 +248,8 @@ static void Finish(const HycoFlowRule *rule, HycoMaterialPoints *m, PetscInt i, 
 }
 
 /* Evaluates the law at n points from `first`: the iterations of different points are interleaved, so that the
-   processor does not wait for one logarithm after the other. */
+   processor does not wait for one logarithm after the other. The first failure of the batch is reported, with its
+   reason. */
 static void UpdateBlock(const HycoFlowRule *rule, HycoMaterialPoints *m, PetscInt first, PetscInt n)
 {
   const PetscInt ns = m->n_strain;
@@ -283,6 +294,7 @@ static void UpdateBlock(const HycoFlowRule *rule, HycoMaterialPoints *m, PetscIn
   }
 }
 
+/* Blocks bound the stack, and keep the interleaved points in cache. */
 static PetscErrorCode Update(HycoMaterial material, HycoMaterialPoints *m)
 {
   PetscFunctionBegin;
@@ -291,6 +303,7 @@ static PetscErrorCode Update(HycoMaterial material, HycoMaterialPoints *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* State names are those of the outputs. */
 static PetscErrorCode SetUp(HycoMaterial material, PetscInt dim)
 {
   static const char *const component[] = {"xx", "yy", "zz", "xy", "yz", "xz"};
@@ -316,6 +329,7 @@ static PetscBool Depends(HycoMaterial material, const PetscBool changed[])
   return (PetscBool)(changed[0] || changed[1]);
 }
 
+/* Declares the elastic constants, first in the order of constants. */
 PetscErrorCode HycoFlowBegin(HycoMaterial material)
 {
   PetscFunctionBegin;
@@ -323,6 +337,7 @@ PetscErrorCode HycoFlowBegin(HycoMaterial material)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* rule: static data of the law, kept by reference. */
 PetscErrorCode HycoFlowEnd(HycoMaterial material, const HycoFlowRule *rule)
 {
   static const struct _HycoMaterialOps ops = {

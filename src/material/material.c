@@ -6,6 +6,7 @@ static HycoRegistry laws = {.sorted = PETSC_TRUE};
 
 HycoDefineRegister(HycoMaterialRegister, laws, PetscErrorCode (*create)(HycoMaterial))
 
+/* Linear until a law says otherwise. */
 PetscErrorCode HycoMaterialCreate(MPI_Comm comm, HycoMaterial *material)
 {
   PetscFunctionBegin;
@@ -27,6 +28,7 @@ PetscErrorCode HycoMaterialDestroy(HycoMaterial *material)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The type's constructor declares its constants, which the scene then reads. */
 PetscErrorCode HycoMaterialSetType(HycoMaterial material, HycoMaterialType type)
 {
   PetscErrorCode (*create)(HycoMaterial);
@@ -65,6 +67,8 @@ PetscErrorCode HycoMaterialView(HycoMaterial material, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* initial: the default (HYCO_REQUIRED: none); values must lie inside (lo, hi), ends excluded. Constants may depend
+   on the temperature. */
 PetscErrorCode HycoMaterialDeclare(HycoMaterial material, const char name[], const char title[], PetscReal initial,
                                    PetscReal lo, PetscReal hi)
 {
@@ -120,6 +124,7 @@ PetscErrorCode HycoMaterialSetStateSize(HycoMaterial material, PetscInt n_state)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* names (n_state) are copied; NULL: unnamed variables. */
 PetscErrorCode HycoMaterialSetStateNames(HycoMaterial material, PetscInt n_state, const char *const names[])
 {
   PetscFunctionBegin;
@@ -166,6 +171,7 @@ PetscErrorCode HycoMaterialGetData(HycoMaterial material, void *data)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Checks that the scene suits the law: inelastic laws need a history, and no plane stress. */
 PetscErrorCode HycoMaterialSetUp(HycoMaterial material, PetscInt dim, HycoFormulation formulation,
                                  PetscBool has_history)
 {
@@ -182,6 +188,8 @@ PetscErrorCode HycoMaterialSetUp(HycoMaterial material, PetscInt dim, HycoFormul
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether the elastic response depends on changed parameters, directly or by the temperature; a law may say that
+   some constants do not matter for it. */
 PetscBool HycoMaterialChanges(HycoMaterial material, const PetscBool changed[])
 {
   PetscBool constant[HYCO_MAX_DECLARED], any = PETSC_FALSE;
@@ -202,6 +210,7 @@ static PetscBool IsLame(HycoMaterial material)
   return (PetscBool)(material->linear && material->ops->isotropic);
 }
 
+/* von Mises stress (Pa) of a stress with HycoStrainSize(dim) components; in 1D its magnitude. */
 PetscReal HycoMises(PetscInt dim, const PetscReal s[])
 {
   PetscReal mean, sum = 0;
@@ -212,11 +221,14 @@ PetscReal HycoMises(PetscInt dim, const PetscReal s[])
   return PetscSqrtReal(1.5 * sum);
 }
 
+/* Two reals (Lame) where the kernels for isotropic tangents apply; plane stress changes the tangent's form, thus
+   needs all. */
 PetscInt HycoMaterialTangentSize(HycoMaterial material, PetscInt dim)
 {
   return IsLame(material) && material->formulation == HYCO_PLANE_STRAIN ? 2 : HycoStrainSize(dim) * HycoStrainSize(dim);
 }
 
+/* stress = C strain; engineering shear strains. */
 void HycoTangentApply(PetscBool isotropic, PetscInt dim, const PetscReal tangent[], const PetscReal strain[],
                       PetscReal stress[])
 {
@@ -236,7 +248,8 @@ void HycoTangentApply(PetscBool isotropic, PetscInt dim, const PetscReal tangent
   }
 }
 
-/* The tangent of a point from its Lame constants: the columns are stresses of unit strains. */
+/* The tangent of a point from its Lame constants: the columns are stresses of unit strains. The input may be where
+   the output goes, hence the copy. */
 static void ExpandLame(PetscInt dim, const PetscReal lame[2], PetscReal tangent[])
 {
   const PetscInt ns = HycoStrainSize(dim);
@@ -251,6 +264,7 @@ static void ExpandLame(PetscInt dim, const PetscReal lame[2], PetscReal tangent[
   }
 }
 
+/* Evaluates p->n points; a linear law by its tangents. p->failed: the first point without a solution, -1: none. */
 PetscErrorCode HycoMaterialUpdate(HycoMaterial material, HycoMaterialPoints *p)
 {
   const PetscInt ns = p->n_strain;
@@ -310,6 +324,7 @@ static PetscBool IsDefinite(PetscInt dim, const PetscReal C[])
       const PetscInt i = seen[dim - 1][r], j = seen[dim - 1][c];
       PetscReal sum = C[i * n + j];
 
+      /* Relative to the diagonal, so that units do not matter. */
       if (!(PetscAbsReal(sum - C[j * n + i]) <= 1e-12 * (PetscAbsReal(C[i * n + i]) + PetscAbsReal(C[j * n + j]))))
         return PETSC_FALSE;
       for (PetscInt k = 0; k < c; k++) sum -= L[r][k] * L[c][k];
@@ -320,6 +335,7 @@ static PetscBool IsDefinite(PetscInt dim, const PetscReal C[])
   return PETSC_TRUE;
 }
 
+/* constant[j]: values of the j-th constant at n points, in work (HYCO_MAX_DECLARED x n). Checks their intervals. */
 PetscErrorCode HycoMaterialConstants(HycoMaterial material, const PetscReal mu[], PetscInt n, const PetscReal x[],
                                      const PetscReal temperature[], PetscReal work[], const PetscReal *constant[])
 {
@@ -338,7 +354,8 @@ PetscErrorCode HycoMaterialConstants(HycoMaterial material, const PetscReal mu[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The tangents of a law that is not linear: its instantaneous response at rest, without strain, state and time. */
+/* The tangents of a law that is not linear: its instantaneous response at rest, without strain, state and time. The
+   elastic response of an inelastic law, for supports, K and models that are linear. */
 static PetscErrorCode RestTangents(HycoMaterial material, HycoMaterialPoints *p)
 {
   const PetscInt n = p->n * (3 * p->n_strain + 2 * material->n_state);
@@ -369,7 +386,8 @@ static void ExpandAll(PetscInt dim, PetscInt n, PetscReal tangent[])
   }
 }
 
-/* Plane stress from tangents (n x 4 x 4): sigma_zz = 0 gives eps_zz, and its row and column become 0. */
+/* Plane stress from tangents (n x 4 x 4): sigma_zz = 0 gives eps_zz, and its row and column become 0. sigma_zz = 0:
+   static condensation of one component. */
 static void ReleaseThickness(PetscInt n, PetscReal tangent[])
 {
   for (PetscInt i = 0; i < n; i++) {
@@ -383,6 +401,8 @@ static void ReleaseThickness(PetscInt n, PetscReal tangent[])
   }
 }
 
+/* Elastic tangents at n points (x: n x 3, temperature: n or NULL): n x HycoMaterialTangentSize() reals. An
+   indefinite or unsymmetric one is an error, because K is factored by Cholesky. */
 PetscErrorCode HycoMaterialTangents(HycoMaterial material, PetscInt dim, const PetscReal mu[], PetscInt n,
                                     const PetscReal x[], const PetscReal temperature[], PetscReal work[],
                                     PetscReal tangent[])
@@ -413,6 +433,7 @@ PetscErrorCode HycoMaterialTangents(HycoMaterial material, PetscInt dim, const P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* lambda and mu; in 1D lambda is 0 and mu Young's modulus. */
 PetscErrorCode HycoElasticLame(HycoMaterial material, HycoMaterialPoints *p, PetscReal lame[])
 {
   const PetscReal *young = p->constant[0], *poisson = p->constant[1];
@@ -426,6 +447,7 @@ PetscErrorCode HycoElasticLame(HycoMaterial material, HycoMaterialPoints *p, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Poisson's ratio lies between -1 and 0.5, ends excluded. */
 PetscErrorCode HycoElasticDeclare(HycoMaterial material)
 {
   PetscFunctionBegin;

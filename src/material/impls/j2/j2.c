@@ -4,6 +4,7 @@
 
 enum { YIELD, HARDENING, SATURATION, RATE, N_CONSTANTS };
 
+/* Y(p) and its slope. */
 static PetscReal Yield(const HycoFlowPoint *p, PetscReal x, PetscReal *slope)
 {
   const PetscReal left = p->c[SATURATION] > 0 ? p->c[SATURATION] * PetscExpReal(-p->c[RATE] * x) : 0;
@@ -12,6 +13,7 @@ static PetscReal Yield(const HycoFlowPoint *p, PetscReal x, PetscReal *slope)
   return p->c[YIELD] + p->c[HARDENING] * x + (p->c[SATURATION] - left);
 }
 
+/* Integral of Y from plastic0 to plastic0 + dp; expm1 for small steps. */
 static PetscReal YieldIntegral(const HycoFlowPoint *p, PetscReal dp)
 {
   const PetscReal r = p->c[RATE], left = PetscExpReal(-r * p->plastic0);

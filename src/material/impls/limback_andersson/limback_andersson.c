@@ -10,7 +10,7 @@
 
 enum { RATE, FACTOR, ACTIVATION, MODULUS, N_CONSTANTS };
 
-/* scratch: dt rate E'/T exp(-Q/RT), factor / E' */
+/* scratch: dt rate E'/T exp(-Q/RT), factor / E' What does not depend on q, once per point and step. */
 static void Prepare(HycoFlowPoint *p, const char **why)
 {
   const PetscReal T = p->temperature, modulus = p->c[MODULUS] < 0 ? 1.148e5 - 59.9 * T : p->c[MODULUS];
@@ -21,6 +21,7 @@ static void Prepare(HycoFlowPoint *p, const char **why)
   p->scratch[1] = *why ? 0 : p->c[FACTOR] / modulus;
 }
 
+/* Creep strain of the step at q, and its derivative. */
 static PetscReal Creep(const HycoFlowPoint *p, PetscReal q, PetscReal *slope)
 {
   const PetscReal sh = sinh(p->scratch[1] * q), ch = PetscSqrtReal(1 + sh * sh);

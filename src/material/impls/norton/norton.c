@@ -3,6 +3,7 @@
 
 enum { RATE, EXPONENT, YIELD, HARDENING, N_CONSTANTS };
 
+/* dp = dt rate q^exponent; q > 0 here. */
 static PetscReal Creep(const HycoFlowPoint *p, PetscReal q, PetscReal *slope)
 {
   const PetscReal dp = p->dt * p->c[RATE] * PetscPowReal(q, p->c[EXPONENT]);
@@ -11,11 +12,13 @@ static PetscReal Creep(const HycoFlowPoint *p, PetscReal q, PetscReal *slope)
   return dp;
 }
 
+/* Integral of dp over q, for the incremental potential. */
 static PetscReal CreepIntegral(const HycoFlowPoint *p, PetscReal q)
 {
   return p->dt * p->c[RATE] * PetscPowReal(q, p->c[EXPONENT]) * q / (p->c[EXPONENT] + 1);
 }
 
+/* Negative: no yield stress. */
 static PetscReal Yield(const HycoFlowPoint *p, PetscReal x, PetscReal *slope)
 {
   *slope = p->c[HARDENING];

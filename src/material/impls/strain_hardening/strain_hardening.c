@@ -16,6 +16,7 @@ static void Prepare(HycoFlowPoint *p, const char **why)
   p->scratch[0] = PetscPowReal(p->creep0, 1 / p->c[TIME_EXPONENT]);
 }
 
+/* log1p and expm1 where the step is small against p0, since the difference of two powers would cancel. */
 static PetscReal Creep(const HycoFlowPoint *p, PetscReal q, PetscReal *slope)
 {
   const PetscReal m = p->c[TIME_EXPONENT], before = p->scratch[0];
