@@ -155,7 +155,7 @@ static PetscErrorCode Prepare(HycoTao t, Vec y, PetscInt max_its, PetscBool *mad
 }
 
 /* Reads the user's -hyco_tao_... options. -hyco_tao_type is read by HycoSolver: it must not change the type of a
-   fallback, or of another problem. */
+   fallback, or of another problem. The option is hidden during TaoSetFromOptions(). */
 static PetscErrorCode ReadOptions(HycoTao t)
 {
   char named[HYCO_TAO_NAME], option[2 * HYCO_TAO_NAME];

@@ -37,7 +37,8 @@ typedef struct {
   HycoMsh *mesh;
 } Msh;
 
-/* Returns 0 and sets `failed` at the end of the file or if there is no number. */
+/* Returns 0 and sets `failed` at the end of the file or if there is no number. `bytes` matters in binary files
+   alone: 4 (int) or 8 (size_t). */
 static long long ReadInt(Msh *m, size_t bytes)
 {
   long long value = 0;

@@ -173,7 +173,8 @@ static PetscErrorCode Cut(const Data *d, PetscInt n_parts, PetscInt part[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Lists the cells by part. */
+/* Lists the cells by part. The operation of a PetscPartitioner: sizes per part, and the cells grouped by part,
+   ascending in each. All cells are on rank 0; other ranks have n = 0. */
 static PetscErrorCode Partition(PetscPartitioner partitioner, PetscInt n_parts, PetscInt n, PetscInt start[],
                                 PetscInt adjacent[], PetscSection weights,
                                 HYCO_EDGE_WEIGHTS_ARGUMENT PetscSection targets, PetscSection sizes, IS *partition)

@@ -252,7 +252,8 @@ static PetscErrorCode AddFacets(HycoScene scene, Reader *r, HycoMesh m, Group *g
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nodes and cells of each group as CSR lists. */
+/* Nodes and cells of each group as CSR lists. Nodes may lie outside the bodies (index -1) and are then left out,
+   with the cells that have them. */
 static PetscErrorCode AddMembers(Reader *r, HycoMesh m, Group *g, PetscInt group, const PetscInt start[],
                                  const PetscInt around[], PetscInt *n_node, PetscInt *n_cell)
 {

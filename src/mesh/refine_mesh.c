@@ -7,7 +7,8 @@
 #include <petscdmplextransform.h>
 #include <string.h>
 
-/* The facet of a cell with this number, as a point of the interpolated DM. */
+/* The facet of a cell with this number, as a point of the interpolated DM. Compared as sets of vertices, since
+   DMPlex orders those of a face in its own way. -1: none. */
 static PetscErrorCode FacetPoint(DM dm, HycoCellType type, PetscInt nv, PetscInt nf, PetscInt cell, PetscInt number,
                                  PetscInt *facet)
 {
@@ -126,7 +127,9 @@ static PetscErrorCode CheckVertices(DM dm, HycoScene scene, const char name[], D
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Interpolates the DM, and its labels of facets. */
+/* Interpolates the DM, and its labels of facets. Groups are rebuilt: edges and faces are not in the labels yet, and
+   facets change from values of cells to points. Vertices and cells keep their numbers, thus also their tags.
+   Collective. */
 static PetscErrorCode Interpolate(DM *dm, HycoScene scene)
 {
   const MPI_Comm comm = PetscObjectComm((PetscObject)*dm);

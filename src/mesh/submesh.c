@@ -237,7 +237,8 @@ static PetscErrorCode FillFacets(DMLabel label, const Cut *c, PetscInt g)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A label for each group, on every process. In 1D the DM of a whole mesh has facets as points. */
+/* A label for each group, on every process. In 1D the DM of a whole mesh has facets as points. Names come from rank
+   0, since DMPlexDistribute() needs the same labels in the same order on every rank. */
 static PetscErrorCode AddLabels(DM dm, const Cut *c)
 {
   const MPI_Comm comm = PetscObjectComm((PetscObject)dm);
@@ -326,7 +327,8 @@ PetscErrorCode HycoSubmeshGetPoints(DM dm, IS *points)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Selects the nodes: those of cells first, then those of facets, the others and the masters of tied nodes. */
+/* Selects the nodes: those of cells first, then those of facets, the others and the masters of tied nodes. The
+   unknowns of assembled cells are then a leading block of the submesh. */
 static PetscErrorCode SelectNodes(Cut *c, PetscInt n_extra, const PetscInt extra[])
 {
   enum { NOT, ALSO, IN_CELL };

@@ -150,7 +150,8 @@ static PetscErrorCode FindTied(HycoMesh m, const PetscInt tag[], const PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The masters of a cell's nodes that are not nodes of the cell, ascending; returns their number. */
+/* The masters of a cell's nodes that are not nodes of the cell, ascending; returns their number. They are the
+   additional rows and columns of the cell's matrix. */
 static PetscInt Follow(HycoMesh m, PetscInt cell, PetscInt follow[])
 {
   const PetscInt *own = m->cells + cell * m->nv;
