@@ -53,7 +53,7 @@ static PetscErrorCode CheckChanges(HycoReducer t)
 PetscErrorCode HycoBodiesCheckPath(HycoReducer t)
 {
   const HycoScene s = t->scene;
-  PetscBool oblique = PETSC_FALSE;
+  PetscBool oblique = PETSC_FALSE, rigid = PETSC_FALSE;
   HycoMotions motions;
   char name[HYCO_LINE] = "";
   PetscInt free;
@@ -61,9 +61,12 @@ PetscErrorCode HycoBodiesCheckPath(HycoReducer t)
   PetscFunctionBegin;
   HycoCheckModel(t->sizes[3] > 1, "-hyco_model_type bodies with a history is for 2D and 3D; in 1D use hybrid");
   for (PetscInt k = 0; k < s->n_fixed; k++) oblique = (PetscBool)(oblique || s->fixed[k].normal);
-  HycoCheckModel(!s->n_ties && !oblique,
+  for (PetscInt k = 0; k < s->n_contacts; k++) rigid = (PetscBool)(rigid || s->contact[k]->rigid);
+  HycoCheckModel(!s->n_ties && !oblique && !rigid,
                  "the scene has %s, which a model of bodies with a history does not support; train a hybrid model",
-                 s->n_ties ? "ties" : "a support along a direction");
+                 s->n_ties ? "ties"
+                 : rigid   ? "a contact of type rigid"
+                           : "a support along a direction");
   PetscCall(HycoFEFreeMotions(HycoComm(t), t->fom->fe, &motions));
   free = motions.n;
   if (free) PetscCall(PetscStrncpy(name, motions.name[0], sizeof(name)));
