@@ -46,7 +46,7 @@ static PetscErrorCode CheckCorner(HycoFE fe, const HycoPairs *pairs, PetscInt k,
   PetscInt n = 0;
 
   PetscFunctionBegin;
-  for (PetscInt j = k; j >= 0; j = before[j], n++) { /* k's own last: Gram-Schmidt in reverse order */
+  for (PetscInt j = k; j >= 0 && n < 3; j = before[j], n++) { /* k's own last: Gram-Schmidt in reverse order */
     OfUnknowns(fe, slave, normal + 3 * j, base[n]);
     for (PetscInt c = 0; c < 3; c++) base[n][c] = c < fe->dim && !fe->fixed[slave * fe->dim + c] ? base[n][c] : 0;
   }

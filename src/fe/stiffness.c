@@ -354,17 +354,14 @@ PetscErrorCode HycoFEAssembleStiffness(HycoFE fe, Mat K)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* M of the norm ||u||^2 = integral of u^2 + length^2 |grad u|^2, in generalised unknowns; for errors of fields.
-   Collective. */
-PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M)
+/* Adds the rank's cells to M of the norm ||u||^2 = integral of u^2 + length^2 |grad u|^2, in generalised unknowns. */
+static PetscErrorCode AddH1(HycoFE fe, PetscReal length, Mat M)
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
   const PetscInt dim = fe->dim, n = el->nv * dim;
   PetscReal *Me;
 
   PetscFunctionBegin;
-  PetscCall(MatSetOption(M, MAT_IGNORE_ZERO_ENTRIES, PETSC_TRUE)); /* the components are not coupled */
-  PetscCall(MatZeroEntries(M));
   for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
     PetscCall(HycoFEElementRoom(fe, e, &Me));
     PetscCall(PetscArrayzero(Me, n * n));
@@ -390,6 +387,19 @@ PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M)
     HycoObliqueStiffness(fe, e, Me);
     PetscCall(AddElement(fe, e, Me, M));
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* M of that norm, for errors of fields. Collective, also where the cells of a rank fail. */
+PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M)
+{
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(MatSetOption(M, MAT_IGNORE_ZERO_ENTRIES, PETSC_TRUE)); /* the components are not coupled */
+  PetscCall(MatZeroEntries(M));
+  ierr = AddH1(fe, length, M);
   PetscCall(Finish(M));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -38,6 +38,9 @@ static PetscErrorCode Evaluate(HycoPath p, PetscReal t0, PetscReal t1, PetscBool
   PetscCall(PetscMemzero(&a->law, sizeof(a->law)));
   PetscCall((*p->ops->step)(p, t0, t1, tangent, &a->law));
   a->seconds_law += HycoNow() - begin;
+  now->residual[0] = now->residual[1]; /* also where a law fails: Shorten() takes one back for each evaluation */
+  now->residual[1] = now->residual[2];
+  now->residual[2] = PETSC_INFINITY;
   if (a->law.failed) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecNorm(p->f_int, NORM_2, &size[0]));
   PetscCall(VecNorm(p->F, NORM_2, &size[1]));
@@ -47,8 +50,6 @@ static PetscErrorCode Evaluate(HycoPath p, PetscReal t0, PetscReal t1, PetscBool
     PetscCall(VecAXPY(p->r, -1, p->work));
   }
   now->size = PetscMax(size[0], PetscMax(size[1], size[2]));
-  now->residual[0] = now->residual[1];
-  now->residual[1] = now->residual[2];
   PetscCall(VecNorm(p->r, NORM_2, &now->residual[2]));
   PetscCall(VecPointwiseMult(p->work, p->diagonal, p->U));
   PetscCall(VecNorm(p->work, NORM_2, &now->floor));
