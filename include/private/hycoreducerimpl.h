@@ -144,6 +144,11 @@ struct _p_HycoReducer {
 
 /* The scene's variables of column k of the snapshots: all of mu (HYCO_MAX_PARAMETERS). */
 PetscErrorCode HycoReducerColumn(HycoReducer t, PetscInt k, PetscReal mu[]);
+/* Whether a type needs no training solutions: those of paths have the inelastic strains, from which its modes are made. */
+static inline PetscBool HycoReducerOwnModes(HycoReducer t, const HycoROM type)
+{
+  return (PetscBool)(type->model->traits.own_modes && !(t->scene && t->scene->n_times));
+}
 /* Sets t->columns, and t->n_s from it. */
 PetscErrorCode HycoReducerSetColumns(HycoReducer t, HycoSamples columns);
 /* Solves points that are not in the store, and counts the time. Collective. */

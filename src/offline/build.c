@@ -727,8 +727,7 @@ static PetscErrorCode DecideLate(HycoReducer t)
     PetscCall(HycoReducerTries(t, types[k], &tries));
     PetscCall(HycoROMCreate(&type));
     PetscCall(HycoROMSetType(type, types[k]));
-    if (tries && type->model->traits.own_modes && (type->model->traits.history || !t->scene->n_times))
-      t->late = PETSC_TRUE;
+    if (tries && HycoReducerOwnModes(t, type)) t->late = PETSC_TRUE;
     PetscCall(HycoROMDestroy(&type));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

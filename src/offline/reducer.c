@@ -531,7 +531,7 @@ void HycoReducerSettingsDescribe(const HycoReducerSettings *r, size_t length, ch
 void HycoReducerGetSettings(HycoReducer t, HycoReducerSettings *r)
 {
   *r = (HycoReducerSettings){.type = t->prototype->model->type,
-                             .pod = (PetscBool)!t->prototype->model->traits.own_modes,
+                             .pod = (PetscBool)!HycoReducerOwnModes(t, t->prototype),
                              .rid = (PetscBool)(t->prototype->model->traits.settings == HYCO_SETTINGS_RID),
                              .pod_tol = t->tol[HYCO_SEED_DISPLACEMENT],
                              .contact_extension = t->extension,

@@ -511,7 +511,7 @@ static HycoReducerSettings KindFor(const Search *s, const HycoROM type, HycoHybr
 
   r.type = type->model->type;
   r.rid = (PetscBool)(type->model->traits.settings == HYCO_SETTINGS_RID);
-  r.pod = (PetscBool)!type->model->traits.own_modes;
+  r.pod = (PetscBool)!HycoReducerOwnModes(s->t, type);
   r.hybrid = s->t->pinned[HYCO_CHOICE_HYBRID] ? s->given.hybrid : hybrid;
   if (r.rid) return r;
   r.layers = s->given.layers;
@@ -661,7 +661,7 @@ static PetscErrorCode TryOne(Search *s, const HycoROM type)
   PetscFunctionBegin;
   r.type = type->model->type;
   r.rid = PETSC_FALSE;
-  r.pod = (PetscBool)!type->model->traits.own_modes;
+  r.pod = (PetscBool)!HycoReducerOwnModes(s->t, type);
   if (s->t->scene->n_times) r.layers = s->given.layers; /* its mesh consists of the cells of its modes */
   PetscCall(Try(s, &r, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -727,7 +727,7 @@ static PetscErrorCode Wants(Search *s, const HycoROM type, PetscBool *wanted)
     *wanted = possible = PETSC_FALSE;
     if (type->model->traits.own_modes) HycoFormat(why, "it does not support scenes with a history");
   }
-  if (*wanted && !(type->model->traits.own_modes && Ends(s, best))) PetscCall(Offers(s, type, wanted, &possible, why));
+  if (*wanted && !(HycoReducerOwnModes(t, type) && Ends(s, best))) PetscCall(Offers(s, type, wanted, &possible, why));
   if (*wanted && Ends(s, best))
     snprintf(why, sizeof(why),
              t->late ? "settings %d are accurate enough, without training solutions"
@@ -747,7 +747,7 @@ static PetscErrorCode TryType(Search *s, const char name[], PetscBool own)
   PetscCall(HycoROMCreate(&type));
   PetscCall(HycoROMSetType(type, name));
   wanted = PETSC_FALSE;
-  if (type->model->traits.own_modes == own) PetscCall(Wants(s, type, &wanted));
+  if (HycoReducerOwnModes(s->t, type) == own) PetscCall(Wants(s, type, &wanted));
   if (wanted && type->model->traits.settings == HYCO_SETTINGS_NONE) PetscCall(TryOne(s, type));
   if (wanted && type->model->traits.settings == HYCO_SETTINGS_RID) PetscCall(TryHybrids(s, type));
   if (wanted && type->model->traits.settings == HYCO_SETTINGS_MODES)
@@ -918,7 +918,7 @@ static void Forget(Search *s)
 /* Whether the options set a type with modes of its own: further solutions do not change its models. */
 static PetscBool IsOwn(HycoReducer t)
 {
-  return (PetscBool)(t->pinned[HYCO_CHOICE_TYPE] && t->prototype->model->traits.own_modes);
+  return (PetscBool)(t->pinned[HYCO_CHOICE_TYPE] && HycoReducerOwnModes(t, t->prototype));
 }
 
 /* Tries all settings that are not fixed. */
@@ -1182,7 +1182,7 @@ PetscErrorCode HycoReducerLearn(HycoReducer t, HycoSnapshots store, HycoROM *mod
   *grown = NULL;
   t->plane = NULL;
   if (Settled(t)) {
-    PetscCall(TakeColumns(t, store, t->prototype->model->traits.own_modes));
+    PetscCall(TakeColumns(t, store, HycoReducerOwnModes(t, t->prototype)));
     PetscCall(HycoReducerReduce(t, store, PETSC_FALSE));
     PetscCall(TakeModes(t, store));
     PetscCall(HycoReducerBuild(t, PETSC_TRUE, model, report));
