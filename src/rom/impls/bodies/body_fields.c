@@ -495,7 +495,7 @@ static PetscErrorCode MeasureLeft(HycoReducer t, HycoBodiesFactor *factor, const
   PetscInt *sample;
 
   PetscFunctionBegin;
-  b->left = 0;
+  b->left = b->l ? PetscSqrtReal(HycoTrainingOfBodies(t)->pod_tol) : 0; /* what the modes may leave out elsewhere */
   PetscCall(PetscMalloc3(n_dof * (size_t)n + 1, &U, n, &all, b->dim * b->dim * n, &norm));
   PetscCall(PetscCalloc1(n, &lost));
   PetscCall(PetscMalloc1(n + 1, &sample));
