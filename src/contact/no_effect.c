@@ -49,7 +49,6 @@ static PetscErrorCode FixedAtObstacles(HycoFE fe, const HycoPairs *pairs, HycoPa
   PetscFunctionBegin;
   PetscCall(PetscMemzero(still, sizeof(*still)));
   PetscCall(PetscCalloc2(m->n_nodes, &is_slave, m->n_nodes, &carries));
-  for (PetscInt k = 0; k < pairs->n; k++) is_slave[pairs->slave[k]] = PETSC_TRUE;
   for (PetscInt k = 0; k < s->n_contacts; k++) room += s->contact[k]->master ? 0 : m->n_nodes;
   PetscCall(PetscMalloc1(room, &still->slave));
   PetscCall(PetscMalloc1(room, &still->contact));
@@ -58,6 +57,10 @@ static PetscErrorCode FixedAtObstacles(HycoFE fe, const HycoPairs *pairs, HycoPa
     PetscInt g = 0;
 
     if (s->contact[k]->master) continue;
+    PetscCall(PetscArrayzero(is_slave, m->n_nodes)); /* of this contact: another one does not check its obstacle */
+    for (PetscInt j = 0; j < pairs->n; j++) {
+      if (pairs->contact[j] == k) is_slave[pairs->slave[j]] = PETSC_TRUE;
+    }
     PetscCall(HycoMeshFindGroup(m, "contact", s->contact[k]->slave, &g));
     HycoSurfaceCarriers(m, g, carries);
     for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) {

@@ -121,6 +121,8 @@ PetscErrorCode HycoFactor(KSP ksp, PetscBool *singular)
     PetscCall(KSPSetUp(ksp));
     PetscCall(PCGetFailedReason(pc, &failed));
   }
+  PetscCheck(failed != PC_FACTOR_OUTMEMORY, PetscObjectComm((PetscObject)ksp), PETSC_ERR_MEM,
+             "a factorisation needs more memory than there is; use more ranks, or -hyco_linear iterative");
   *singular = (PetscBool)(failed != PC_NOERROR);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -79,6 +79,8 @@ PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, Petsc
   }
   if (scene->refine) PetscCall(CheckParts(*dm));
   PetscCall(HycoPlexRefine(dm, scene, scene->refine));
+  HycoCheck(!overlap || !write[0],
+            "hyco_mesh_write: the DM has an overlap, and would have cells twice; write it before the overlap is added");
   if (overlap) PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheck(!write[0] || !scene->n_ties, "hyco_mesh_write: a mesh with ties (%s) cannot be written as a DMPlex",
             scene->tie[0].name);

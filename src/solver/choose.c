@@ -78,8 +78,9 @@ static PetscErrorCode TakeIterative(HycoSolver s, HycoSolverForm *form)
   PetscCall(PetscStrncpy(s->form_name, asked, sizeof(s->form_name)));
   s->iterative = (PetscBool)(other != NULL);
   if (other) *form = other;
-  PetscCheck(other || s->linear != HYCO_LINEAR_ITERATIVE || !asked[0] || strcmp(asked, "primal") == 0, HycoComm(s),
-             PETSC_ERR_USER,
+  PetscCheck(other || s->linear != HYCO_LINEAR_ITERATIVE || !asked[0] || strcmp(asked, "primal") == 0 ||
+                 strcmp(asked, "projected") == 0,
+             HycoComm(s), PETSC_ERR_USER,
              "-hyco_linear iterative works with the forms primal and projected only; remove -hyco_solver_form, or set "
              "one of these");
   PetscCheck(other || s->linear != HYCO_LINEAR_ITERATIVE, HycoComm(s), PETSC_ERR_USER,

@@ -88,6 +88,17 @@ class Still(Case):
                         self.assertIn(word, run.stderr)
                     self.assertFalse(os.path.exists(self.path('no.h5')))
 
+    def test_two_contacts(self):
+        """A fixed node that is a slave of a pair is checked against its obstacle too."""
+        held = 'lower_foot: {x: 0, y: 0}, upper_foot: {x: 0, y: -0.01}, upper_head: {x: 0}'
+        for gap, ok in (('0.02', True), ('0.005', False)):
+            scene = self.scene(held, PAIR + ', overlap: 1}, floor: {' + FLOOR % gap)
+            for ranks in (0, 2):
+                run = self.run_raw('solve', '-scene', scene, '-mu', 1, ranks=ranks)
+                self.assertEqual(run.returncode == 0, ok, run.stderr)
+                if not ok:
+                    self.assertIn('floor', run.stderr)
+
     def test_parameter(self):
         """Possible at one value and not at another."""
         held = 'lower_foot: {x: 0, y: 0}, upper_foot: {x: 0, y: -0.02*press}, upper_head: {x: 0}'
