@@ -149,7 +149,7 @@ class Rope(Case):
     def test_three_types(self):
         """The same commands, and the same C functions (examples/embed.c), train, load and use each of the three models."""
         found = set()
-        for name, options in (('hybrid', ()), ('nnmf', TYPE), ('snapshots', (*TYPE, '-hyco_dual', 'snapshots'))):
+        for name, options in (('hybrid', ('-hyco_model_type', 'hybrid')), ('nnmf', TYPE), ('snapshots', (*TYPE, '-hyco_dual', 'snapshots'))):
             t = self.hyco('train', '-scene', ROPE, '-grid', '10,12', '-grid_type', 'centred', '-model', 'three.h5', *SAME, *options)
             p = self.hyco('predict', '-model', 'three.h5', '-mu', '0.07,0.17')
             c = self.hyco('compare', '-scene', ROPE, '-model', 'three.h5', '-grid', '2,3')
