@@ -243,7 +243,8 @@ static PetscErrorCode SayMotions(Check *check)
     CheckReportWarning(
         check,
         "%d rigid motion%s prevented only by contact: full order can solve this if the loads press the bodies "
-        "together, and so can hybrid and projection-based models; a condensed model needs a support or a soft spring",
+        "together, and so can models of bodies, hybrid and projection-based ones; a condensed model needs a support or "
+        "a soft spring",
         (int)loose, loose > 1 ? "s are" : " is");
   PetscCall(HycoMotionsDestroy(&free));
   PetscFunctionReturn(PETSC_SUCCESS);
