@@ -72,11 +72,6 @@ typedef struct _n_HycoPairs {
   PetscInt64 queries; /* searches for a master so far */
   const HycoSurfaceFacts *facts; /* while the contacts of a rank's slaves are found (borrowed); else NULL */
 } HycoPairs;
-/* The number of contact k among those of all ranks. */
-static inline PetscInt HycoPairsNumber(const HycoPairs *pairs, PetscInt k)
-{
-  return pairs->number ? pairs->number[k] : k;
-}
 
 /* Finds the contacts on the nodes as drawn. Where no map moves the surfaces they are final, and a slave node without a
    master is an error. facts: of each contact of the scene, for the contacts of the slaves that this rank owns on its part

@@ -361,7 +361,7 @@ static PetscReal Cost(HycoReducer t, const HycoAttempt *a)
 
 PetscErrorCode HycoBodiesTakePath(HycoROM m)
 {
-  static const HycoROMTraits traits = {.title = "substructured",
+  static const HycoROMTraits traits = {.title = "condensed bodies",
                                        .settings = HYCO_SETTINGS_NONE,
                                        .constrains = PETSC_TRUE,
                                        .history = PETSC_TRUE,
