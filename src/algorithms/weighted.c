@@ -23,8 +23,11 @@ struct _n_HycoWeighted {
 PetscErrorCode HycoWeightedCreate(PetscInt m, PetscInt n, const PetscReal S[], PetscReal shift, HycoWeighted *weighted)
 {
   HycoWeighted f;
+  PetscBLASInt rows, columns;
 
   PetscFunctionBegin;
+  PetscCall(PetscBLASIntCast(m, &rows)); /* the products call BLAS with m and n */
+  PetscCall(PetscBLASIntCast(n, &columns));
   PetscCall(PetscNew(&f));
   f->m = m;
   f->n = n;

@@ -3,6 +3,7 @@
 #include <ctype.h>
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 
 /* Options of PETSc, SLEPc and the solvers: recognised by their prefix, checked by the code that reads them; first
    those of the solvers that hyco creates. */

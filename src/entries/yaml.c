@@ -3,7 +3,6 @@
   that PETSc cannot read; and repeated keys, of which PETSc takes the last without a message.
 */
 #include <hycoentries.h>
-#include <hycoyaml.h>
 #include <stdlib.h>
 #include <string.h>
 #include <yaml.h>

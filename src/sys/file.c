@@ -1,5 +1,6 @@
 /* Files that are written either completely or not at all. */
 #include <hycofile.h>
+#include <hycoimpl.h>
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>

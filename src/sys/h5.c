@@ -5,6 +5,7 @@
   numbers to their positions without HDF5, because parallel HDF5 cannot report a full disk.
 */
 #include <hycofile.h>
+#include <hycoimpl.h>
 #include <hycoh5.h>
 #include <errno.h>
 #include <fcntl.h>

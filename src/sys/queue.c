@@ -1,5 +1,6 @@
 /* HycoQueue: counters in an MPI-3 window, updated by atomic operations. */
 #include <hycoqueue.h>
+#include <hycoimpl.h>
 
 /* The first counters of the window, followed by those of the kinds: groups that failed, tasks done, kinds begun,
    events. */
