@@ -185,6 +185,7 @@ static PetscInt Steepest(HycoWeighted f, PetscReal tol)
   return best;
 }
 
+/* No column is passive at first: the gradient is then S^T h. */
 static PetscErrorCode Begin(HycoWeighted f, const PetscReal d[], const PetscReal h[], PetscReal x[], PetscReal *size)
 {
   PetscFunctionBegin;

@@ -167,6 +167,7 @@ static PetscErrorCode TakeEnd(Scan *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A scalar in a mapping is a key or a value in turn; libyaml's events do not tell which. */
 static PetscErrorCode TakeEvent(Scan *s, const yaml_event_t *event)
 {
   Level *of = s->depth ? &s->level[s->depth - 1] : NULL;

@@ -370,6 +370,8 @@ typedef struct {
   Sum *sum;
 } SpringGram;
 
+/* Adds a spring's energy on the part's rigid motions to its Gram matrix, with K scaled to 1: only which motions it holds
+   matters here, not how stiff it is. Sums have twice the precision, so that their order does not matter. */
 static PetscErrorCode AddSpring(HycoFE fe, PetscInt spring, PetscInt n, const PetscInt node[], const PetscReal K[],
                                 void *ctx)
 {

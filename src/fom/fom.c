@@ -168,6 +168,7 @@ static PetscErrorCode ReadPath(HycoFOM f, HycoOptionItems PetscOptionsObject)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A scene without a history refuses the options of paths: an option without effect is an error. */
 static PetscErrorCode SetFromOptions(HycoFOM f)
 {
   PetscFunctionBegin;

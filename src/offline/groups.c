@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+/* Read from the options of the caller's object; there is no object of its own whose prefix could apply. */
 static PetscErrorCode ReadGroups(MPI_Comm comm, PetscOptions options, PetscInt *groups, PetscBool *monitor)
 {
   PetscFunctionBegin;

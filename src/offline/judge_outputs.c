@@ -84,6 +84,7 @@ static PetscInt Places(const Outputs *o, int k, const PetscInt **at)
   return k == STRESS ? o->fe->mesh->n_cells : o->fe->mesh->n_nodes;
 }
 
+/* The ranges of rows of each field that the outputs' cells need: only these are read from the snapshots. */
 static PetscErrorCode Begin(Outputs *o)
 {
   PetscFunctionBegin;
@@ -203,6 +204,7 @@ static PetscErrorCode JudgeAll(Outputs *o, const HycoHeldOut rows[], HycoOutputE
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The model's output cells were made for this judgement; predictions make their own. */
 static PetscErrorCode JudgeOnRoot(Outputs *o, const HycoHeldOut rows[], HycoOutputErrors e[])
 {
   PetscErrorCode ierr;

@@ -22,6 +22,7 @@ typedef struct {
   PetscInt body; /* the body with the group's name; -1: none */
 } Place;
 
+/* Where an output is evaluated: a group of cells, facets or nodes; a body's name is its group of cells. */
 static PetscErrorCode FindPlace(HycoScene scene, HycoMesh m, const HycoQuantity *q, Place *p)
 {
   PetscFunctionBegin;
@@ -289,6 +290,8 @@ static PetscErrorCode AddContacts(HycoFE fe, const HycoQuantity *q, const HycoCo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A group of points or lines is evaluated at its nodes, one of cells or facets by entity. Stresses on a facet are those of
+   its cell. */
 static PetscErrorCode Measure(HycoFE fe, const HycoQuantity *q, const PetscReal u[], const PetscReal sigma[], Sum *s)
 {
   HycoMesh m = fe->mesh;

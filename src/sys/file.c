@@ -175,6 +175,7 @@ PetscErrorCode HycoFileOpenScratch(const char scratch[], const char path[], int 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* O_EXCL: a temporary name that exists belongs to another process, and must not be written to. */
 static PetscErrorCode OpenPlace(HycoFile f)
 {
   int fd;

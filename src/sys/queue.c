@@ -42,6 +42,8 @@ static PetscErrorCode SortKinds(HycoQueue q, PetscInt n, const PetscInt kind[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The counters are in a window on rank 0, which other ranks access without rank 0's help where the network has atomic
+   operations. One group needs no window. */
 static PetscErrorCode OpenWindow(HycoQueue q)
 {
   const PetscInt n = N_COUNTERS + q->n_kinds;
