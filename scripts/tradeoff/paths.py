@@ -226,20 +226,6 @@ def section(mesh, rows, picture):
             *([""] if notes else []), *notes]
 
 
-def headline(mesh, rows):
-    """The README's picture, mesh B's with all types, and sentence: what the most accurate hybrid model gains."""
-    ok, _, full = split(rows)
-    best = accurate([r for r in ok if r["type"] == "hybrid"])
-    newton, elastic = (f["path_s"] for f in full)
-    words = [f"{percent(best[k + '_max'])} % in {word.split(' of the')[0].split(' on the')[0]}" for k, word in KINDS.items()]
-    return ["![error against online time for each type of model, a power ramp on a fuel rod](docs/tradeoff/rod-B.png)", "",
-            f"On one power ramp of a fuel rod whose cladding creeps and yields (`examples/rod`, mesh {mesh}), full order takes {seconds(newton)} by Newton's method, or {seconds(elastic)} if",
-            f"the elastic factor is kept; the hybrid model takes {seconds(best['path_s'])}, which is {newton / best['path_s']:.0f} and {elastic / best['path_s']:.0f} times less. On "
-            f"{len(case_of(mesh).unseen)} paths that no training has seen, each at its worst time,",
-            f"its errors are at most {', '.join(words[:-1])} and {words[-1]}. At the edges of the parameters' ranges",
-            "the forces are less accurate ([docs/tradeoff.md](docs/tradeoff.md))."]
-
-
 def plot(mesh, rows, path):
     ok, _, full = split(rows)
     figure, axes = plt.subplots(2, 2, figsize=(11, 8.6), sharex=True)

@@ -105,27 +105,6 @@ def wanted(case, rows, full):
                   *([f"a ramp of {full['warm']['ramp_n']:.0f} solves at a new {case.ramp[0]}"] if case.ramp else []), f"speed-up over {PLAIN}"], lines)
 
 
-def headline(case, rows, full):
-    """A table for the README: the requirement, and the time of each type, in brackets the speed-up over warm full order."""
-    words, bounds = case.wanted[1]
-    warm = full["warm"]
-    ramps = "ramp_s" in warm
-
-    def line(name, row, factor):
-        def cell(key):
-            return "" if key not in row else seconds(row[key]) + (f" ({warm[key] / row[key]:.0f} times)" if factor else "")
-        return [name, *([cell("ramp_s")] if ramps else []), cell("single_s")]
-
-    lines = [line(f"full order, {PLAIN} (the paper's baseline)", full[PLAIN], False),
-             line("full order that keeps its factor and its active set", warm, False)]
-    for kind in COLORS:
-        r = joint(rows, bounds, kind)
-        if r:
-            lines.append(line(kind, r, True))
-    columns = ["", *([f"a ramp of {warm['ramp_n']:.0f} loads"] if ramps else []), "a new geometry"]
-    return [f"{case.name}; {words}:", "", *table(columns, lines)]
-
-
 def published(rows):
     """The columns of docs/tradeoff/*.csv, with the digits that the measurement has."""
     return [{name: f"{r[name]:.3g}" if isinstance(r[name], float) else r[name] for name in PUBLISHED if name in r} for r in rows]
@@ -158,7 +137,7 @@ def plot(case, rows, full, path):
 
 
 def section(case, rows, full, words, picture):
-    """The text of docs/tradeoff.md for one case."""
+    """The text of docs/tradeoff/settings.md for one case."""
     failed = [r for r in rows if r["status"] != "ok"]
     return [words, "", f"![error against online time, {case.name}]({picture})", "",
             f"{len(rows)} settings ([csv]({picture.removesuffix('.png')}.csv)" + (f"; {len(failed)} of them gave no model or no converged solution" if failed else "")
