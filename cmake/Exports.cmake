@@ -1,4 +1,4 @@
-# A shared library exports the functions and class ids that include/*.h declares, and no others: the names are read from the headers and
+# A shared library exports the functions, class ids and lists of names that include/*.h declares, and no others: the names are read from the headers and
 # written to a version script of the linker.
 function(hyco_export_public target)
   get_target_property(type ${target} TYPE)
@@ -11,6 +11,9 @@ function(hyco_export_public target)
     file(READ ${header} text)
     string(REGEX REPLACE "/\\*([^*]|\\*+[^*/])*\\*+/" "" text "${text}")
     string(REGEX MATCHALL "Hyco[A-Z][A-Za-z0-9_]*[ \n]*\\(|HYCO_[A-Z]+_CLASSID" found "${text}")
+    list(APPEND names ${found})
+    string(REGEX MATCHALL "extern const char \\*const Hyco[A-Za-z]+" found "${text}")
+    list(TRANSFORM found REPLACE ".*const " "")
     list(APPEND names ${found})
   endforeach()
   list(TRANSFORM names REPLACE "[ \n]*\\($" "")

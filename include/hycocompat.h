@@ -1,6 +1,6 @@
 /*
   Differences between library versions. The code is written for the newest supported version; this file adds what older
-  ones lack or name otherwise. The parts for HDF5 and gmsh apply if their headers are included before.
+  ones lack or name otherwise. The part for HDF5 applies if its header is included before.
 */
 #ifndef HYCOCOMPAT_H
 #define HYCOCOMPAT_H
@@ -56,14 +56,5 @@ typedef H5O_info2_t HycoH5Info;
 #else
 typedef H5O_info_t HycoH5Info;
 #define HycoH5Visit(file, op, ctx) H5Ovisit2(file, H5_INDEX_NAME, H5_ITER_NATIVE, op, ctx, H5O_INFO_BASIC)
-#endif
-#endif
-
-#if defined(GMSH_API_VERSION_MAJOR) && !defined(HYCOCOMPAT_GMSH)
-#define HYCOCOMPAT_GMSH
-#if GMSH_API_VERSION_MAJOR * 100 + GMSH_API_VERSION_MINOR >= 409 /* one more argument */
-#define HycoGmshInitialize(initialize, ierr) initialize(0, NULL, 0, 0, ierr)
-#else
-#define HycoGmshInitialize(initialize, ierr) initialize(0, NULL, 0, ierr)
 #endif
 #endif

@@ -1,270 +1,124 @@
-/* hyco check: cells, bodies and groups of the mesh. */
+/* hyco check: the mesh, its bodies and groups. */
 #include "check.h"
-#include <hycokinematics.h>
 #include <string.h>
-#include <strings.h>
 
 /* Cells with a larger aspect ratio are reported: the solver can handle them, but they resolve poorly along their
    length. */
 #define LONG_CELL 100
-/* Groups with this share of common nodes are reported as alike. */
-#define ALIKE 0.95
 
-/* From the reference simplex to the regular one, inverted. */
-static void ToRegular(PetscInt dim, PetscReal J[3][3])
+/* The cells by type, "quad4 (24), tri3 (12)", and with their numbers to the report; of a mesh of one type only its
+   name. */
+static PetscErrorCode NameCells(Check *check, char name[HYCO_LINE])
 {
-  const PetscReal a = 1 / PetscSqrtReal(3), b = 1 / PetscSqrtReal(6);
-
-  for (PetscInt c = 0; c < dim; c++) {
-    const PetscReal x = J[c][0], y = J[c][1];
-
-    J[c][1] = 2 * a * y - a * x;
-    if (dim == 3) J[c][2] = PetscSqrtReal(1.5) * J[c][2] - b * (x + y);
-  }
-}
-
-/* The map from the regular pyramid or prism at its axis. */
-static void FromAxis(HycoCellType shape, const PetscInt node[], const PetscReal X[], PetscReal J[3][3])
-{
-  for (PetscInt c = 0; c < 3; c++) {
-    PetscReal x[6];
-
-    for (PetscInt a = 0; a < HycoCellKinds[shape].nv; a++) x[a] = X[3 * node[a] + c];
-    if (shape == HYCO_PYRAMID5) {
-      J[c][0] = (x[1] - x[0] + x[2] - x[3]) / 2;
-      J[c][1] = (x[3] - x[0] + x[2] - x[1]) / 2;
-      J[c][2] = PetscSqrtReal(2) * (x[4] - (x[0] + x[1] + x[2] + x[3]) / 4); /* sides are 1, the height 1 / sqrt(2) */
-    } else {
-      J[c][0] = (x[1] - x[0] + x[4] - x[3]) / 2;
-      J[c][1] = (x[2] - x[0] + x[5] - x[3]) / 2;
-      J[c][1] = (2 * J[c][1] - J[c][0]) / PetscSqrtReal(3);
-      J[c][2] = (x[3] + x[4] + x[5] - x[0] - x[1] - x[2]) / 3;
-    }
-  }
-}
-
-/* Aspect ratio of a cell at a quadrature point, 1 if it is regular there: k + sqrt(k^2 - 1) with the condition
-   number k = |J| |J^-1| / dim in the Frobenius norm of the map from the regular cell. Exact for rectangles. */
-static PetscReal Stretch(HycoCellType shape, const PetscInt node[], const PetscReal X[], PetscInt q)
-{
-  const HycoElement *el = HycoElementGet(shape);
-  const PetscInt dim = HycoCellKinds[shape].dim;
-  PetscReal J[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, norm = 0, inverse = 0, det = 0, k;
-
-  if (shape >= HYCO_N_MESH_TYPES) FromAxis(shape, node, X, J);
-  for (PetscInt c = 0; c < dim && shape < HYCO_N_MESH_TYPES; c++) {
-    for (PetscInt d = 0; d < dim; d++) {
-      J[c][d] = 0;
-      for (PetscInt a = 0; a < el->nv; a++) J[c][d] += X[3 * node[a] + c] * el->dN[q][a][d];
-    }
-  }
-  if (shape < HYCO_N_MESH_TYPES && el->nv == dim + 1) ToRegular(dim, J);
-  for (PetscInt c = 0; c < dim; c++) {
-    for (PetscInt d = 0; d < dim; d++) {
-      const PetscInt c1 = (c + 1) % 3, c2 = (c + 2) % 3, d1 = (d + 1) % 3, d2 = (d + 2) % 3;
-      const PetscReal minor = J[c1][d1] * J[c2][d2] - J[c1][d2] * J[c2][d1];
-
-      norm += J[c][d] * J[c][d];
-      inverse += minor * minor;
-      if (c == 0) det += J[c][d] * minor;
-    }
-  }
-  k = PetscMax(PetscSqrtReal(norm * inverse) / (PetscAbsReal(det) * dim), 1); /* no division by 0, because K is
-                                                                                 assembled */
-  return k + PetscSqrtReal(k * k - 1);
-}
-
-void CheckReportCells(Check *check, HycoFE fe)
-{
-  HycoMesh m = fe->mesh;
-
-  for (PetscInt e = 0; e < m->n_cells && m->dim > 1; e++) {
-    const PetscInt b = m->cell_body[e];
-    const HycoCellType shape = HycoMeshShape(m, e);
-    PetscInt node[HYCO_CELL_NODES];
-    const PetscInt n = HycoMeshOwnNodes(m, e, node);
-
-    for (PetscInt q = 0; q < (shape >= HYCO_N_MESH_TYPES || n == m->dim + 1 ? 1 : HycoElementGet(shape)->nq); q++) {
-      const PetscReal stretch = Stretch(shape, node, fe->X, q);
-
-      if (stretch <= check->stretch[b] * (1 + 1e-6)) continue; /* round-off, whose root remains for a square */
-      check->stretch[b] = stretch;
-      check->stretched[b] = m->cell_id[e];
-    }
-  }
-}
-
-static PetscInt Root(PetscInt part[], PetscInt i)
-{
-  while (part[i] != i) i = part[i] = part[part[i]];
-  return i;
-}
-
-/* The number of parts of each body that share no node. */
-static PetscErrorCode CountParts(HycoMesh m, PetscInt n_bodies, PetscInt n[])
-{
-  PetscInt *part;
-  PetscBool *seen;
+  const HycoInspection *in = &check->in;
+  cJSON *types = cJSON_AddObjectToObject(check->json, "cell_types");
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(m->n_nodes, &part));
-  PetscCall(PetscMalloc1(m->n_nodes, &seen));
-  for (PetscInt b = 0; b < n_bodies; b++) {
-    n[b] = 0;
-    for (PetscInt i = 0; i < m->n_nodes; i++) part[i] = i;
-    PetscCall(PetscArrayzero(seen, m->n_nodes));
-    for (PetscInt k = 0; k < m->n_cells * m->nv; k++) {
-      if (m->cell_body[k / m->nv] == b) part[Root(part, m->cells[k])] = Root(part, m->cells[k - k % m->nv]);
-    }
-    for (PetscInt e = 0; e < m->n_cells; e++) {
-      const PetscInt root = Root(part, m->cells[e * m->nv]);
+  name[0] = '\0';
+  for (PetscInt t = 0; t < in->n_types; t++) {
+    char one[HYCO_LINE];
 
-      if (m->cell_body[e] != b || seen[root]) continue;
-      seen[root] = PETSC_TRUE;
-      n[b]++;
-    }
+    cJSON_AddNumberToObject(types, in->type[t], in->cells[t]);
+    HycoFormat(one, in->n_types > 1 ? "%s (%d)" : "%s", in->type[t], (int)in->cells[t]);
+    PetscCall(HycoListAdd(name, ", ", one));
   }
-  PetscCall(PetscFree(part));
-  PetscCall(PetscFree(seen));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode CheckReportMesh(Check *check)
+{
+  const HycoInspection *in = &check->in;
+  const char *title;
+  char cells[HYCO_LINE];
+  PetscInt n_tied = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetTitle(check->scene, &title));
+  PetscCall(DriverPrint("scene: %s\n", title[0] ? title : "(no title)"));
+  PetscCall(NameCells(check, cells));
+  PetscCall(DriverPrint("mesh %s: %dD, %s%s, %d nodes, %d cells; %d free unknowns, and %d fixed by supports%s\n",
+                        in->mesh ? in->mesh : "of the program", (int)in->dim, cells,
+                        in->face_nodes ? " (the file's hex20 cells with nodes on faces and inside, for contact)" : "",
+                        (int)in->n_nodes, (int)in->n_cells, (int)in->n_free, (int)in->n_fixed,
+                        in->n_ties ? " and ties" : ""));
+  PetscCall(CheckReportTies(check));
+  for (PetscInt t = 0; t < in->n_ties; t++) n_tied += in->tie[t].n_nodes;
+  cJSON_AddNumberToObject(check->json, "dimension", in->dim);
+  cJSON_AddStringToObject(check->json, "cell_type", in->cell_type);
+  cJSON_AddBoolToObject(check->json, "hex20_as_hex27", in->face_nodes);
+  ReportNumbers(check->json, {"n_nodes", in->n_nodes}, {"n_cells", in->n_cells}, {"n_dof", in->n_free},
+                {"n_fixed", in->n_fixed - n_tied * in->dim}, {"n_contacts", in->n_contacts},
+                {"points_checked", in->n_points});
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The text of a body, and its warnings. */
+static PetscErrorCode PrintBody(Check *check, const HycoBodyInspection *b)
+{
+  PetscFunctionBegin;
+  PetscCall(DriverPrint("body %s: %d cells", b->name, (int)b->n_cells));
+  if (check->in.dim > 1)
+    PetscCall(DriverPrint("; the most stretched one, %d, is %.3g times as long as wide", (int)b->stretched,
+                          (double)b->stretch));
+  PetscCall(DriverPrint("\n"));
+  if (b->n_parts > 1)
+    CheckReportWarning(
+        check,
+        "body %s consists of %d parts that share no node; if it should be one piece, the mesh has duplicate "
+        "nodes (gmsh: Coherence, or BooleanFragments)",
+        b->name, (int)b->n_parts);
+  if (b->stretch > LONG_CELL)
+    CheckReportWarning(check, "body %s: cell %d is %.3g times as long as wide", b->name, (int)b->stretched,
+                       (double)b->stretch);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode CheckReportBodies(Check *check)
 {
-  HycoMesh m = check->whole->part;
-  HycoScene s = check->fom->scene;
   cJSON *bodies = cJSON_AddArrayToObject(check->json, "bodies");
-  PetscInt *parts;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(s->n_bodies, &parts));
-  PetscCall(CountParts(m, s->n_bodies, parts));
-  for (PetscInt b = 0; b < s->n_bodies; b++) {
+  for (PetscInt k = 0; k < check->in.n_bodies; k++) {
+    const HycoBodyInspection *b = &check->in.body[k];
     cJSON *body = cJSON_CreateObject();
-    PetscInt cells = 0;
 
-    for (PetscInt e = 0; e < m->n_cells; e++) cells += m->cell_body[e] == b;
     cJSON_AddItemToArray(bodies, body);
-    cJSON_AddStringToObject(body, "name", s->body[b].name);
-    ReportNumbers(body, {"n_cells", cells}, {"n_parts", parts[b]}, {"stretch", check->stretch[b]},
-                  {"stretched_cell", check->stretched[b]});
-    PetscCall(DriverPrint("body %s: %d cells", s->body[b].name, (int)cells));
-    if (m->dim > 1)
-      PetscCall(DriverPrint("; the most stretched one, %d, is %.3g times as long as wide", (int)check->stretched[b],
-                            (double)check->stretch[b]));
-    PetscCall(DriverPrint("\n"));
-    if (parts[b] > 1)
-      CheckReportWarning(
-          check,
-          "body %s consists of %d parts that share no node; if it should be one piece, the mesh has duplicate "
-          "nodes (gmsh: Coherence, or BooleanFragments)",
-          s->body[b].name, (int)parts[b]);
-    if (check->stretch[b] > LONG_CELL)
-      CheckReportWarning(check, "body %s: cell %d is %.3g times as long as wide", s->body[b].name,
-                         (int)check->stretched[b], (double)check->stretch[b]);
-  }
-  PetscCall(PetscFree(parts));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The number of common nodes of the groups g and h; both are ascending. */
-static PetscInt Common(HycoMesh m, PetscInt g, PetscInt h)
-{
-  PetscInt n = 0, j = m->group_start[h];
-
-  for (PetscInt i = m->group_start[g]; i < m->group_start[g + 1]; i++) {
-    while (j < m->group_start[h + 1] && m->group_node[j] < m->group_node[i]) j++;
-    n += j < m->group_start[h + 1] && m->group_node[j] == m->group_node[i];
-  }
-  return n;
-}
-
-static void CheckTwins(Check *check, HycoMesh m)
-{
-  for (PetscInt g = 0; g < m->n_groups; g++) {
-    for (PetscInt h = 0; h < g; h++) {
-      const PetscInt n = m->group_start[g + 1] - m->group_start[g], k = m->group_start[h + 1] - m->group_start[h];
-      PetscInt common;
-
-      if (strcasecmp(m->group_name[g], m->group_name[h]) == 0)
-        CheckReportWarning(
-            check,
-            "the groups %s and %s differ only in upper and lower case, which options do not distinguish; rename one",
-            m->group_name[h], m->group_name[g]);
-      if (m->group_dim[g] != m->group_dim[h] || !n || PetscMin(n, k) < ALIKE * PetscMax(n, k)) continue;
-      common = Common(m, g, h);
-      if (common == n && common == k)
-        CheckReportWarning(check, "the groups %s and %s have the same nodes", m->group_name[h], m->group_name[g]);
-      else if (common >= ALIKE * PetscMax(n, k))
-        CheckReportWarning(check, "the groups %s (%d nodes) and %s (%d) have %d nodes in common", m->group_name[h],
-                           (int)k, m->group_name[g], (int)n, (int)common);
-    }
-  }
-}
-
-/* Sets used[g] for the group `name`; fails if there is none. */
-static PetscErrorCode Use(HycoMesh m, const char key[], const char name[], PetscBool used[])
-{
-  PetscInt g = 0;
-
-  PetscFunctionBegin;
-  PetscCall(HycoMeshFindGroup(m, key, name, &g));
-  used[g] = PETSC_TRUE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Marks the groups used in the scene: bodies, supports, loads, contacts with the entries of their types, outputs, the
-   region of interest. */
-static PetscErrorCode MarkUsed(HycoScene s, HycoMesh m, PetscBool used[])
-{
-  char *region[64];
-  PetscInt n = 64;
-
-  PetscFunctionBegin;
-  for (PetscInt k = 0; k < s->n_bodies; k++) PetscCall(Use(m, "body", s->body[k].name, used));
-  for (PetscInt k = 0; k < s->n_fixed; k++) PetscCall(Use(m, "fixed", s->fixed[k].group, used));
-  for (PetscInt k = 0; k < s->n_loads; k++) PetscCall(Use(m, "load", s->load[k].group, used));
-  for (PetscInt k = 0; k < s->n_point_loads; k++) PetscCall(Use(m, "force", s->point_load[k].group, used));
-  for (PetscInt k = 0; k < s->n_springs; k++) PetscCall(Use(m, "spring", s->spring[k].group, used));
-  for (PetscInt k = 0; k < 2 * s->n_ties; k++)
-    PetscCall(Use(m, "tie", k % 2 ? s->tie[k / 2].master : s->tie[k / 2].slave, used));
-  for (PetscInt k = 0; k < s->n_contacts; k++) {
-    for (PetscInt j = 0; j < s->contact[k]->entries.n; j++) {
-      const HycoEntry *entry = &s->contact[k]->entries.entry[j];
-
-      if (entry->kind == HYCO_ENTRY_GROUP && entry->text) PetscCall(Use(m, "contact", entry->text, used));
-    }
-  }
-  for (PetscInt k = 0; k < s->n_quantities; k++) {
-    if (s->quantity[k].group) PetscCall(Use(m, "output", s->quantity[k].group, used));
-  }
-  PetscCall(PetscOptionsGetStringArray(s->options, NULL, "-hyco_rid_groups", region, &n, NULL));
-  for (PetscInt k = 0; k < n && n < 64; k++) {
-    PetscCall(Use(m, "hyco_rid_groups", region[k], used));
-    PetscCall(PetscFree(region[k]));
+    cJSON_AddStringToObject(body, "name", b->name);
+    ReportNumbers(body, {"n_cells", b->n_cells}, {"n_parts", b->n_parts}, {"stretch", b->stretch},
+                  {"stretched_cell", b->stretched});
+    PetscCall(PrintBody(check, b));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A user may have confused them. */
+static void WarnOfAlike(Check *check, const HycoAlikeGroups *a)
+{
+  if (a->letters)
+    CheckReportWarning(
+        check, "the groups %s and %s differ only in upper and lower case, which options do not distinguish; rename one",
+        a->name[0], a->name[1]);
+  if (a->nodes && a->common == a->n[0] && a->common == a->n[1])
+    CheckReportWarning(check, "the groups %s and %s have the same nodes", a->name[0], a->name[1]);
+  else if (a->nodes)
+    CheckReportWarning(check, "the groups %s (%d nodes) and %s (%d) have %d nodes in common", a->name[0], (int)a->n[0],
+                       a->name[1], (int)a->n[1], (int)a->common);
 }
 
 PetscErrorCode CheckReportGroups(Check *check)
 {
-  HycoMesh m = check->whole->part;
+  const HycoInspection *in = &check->in;
   cJSON *unused = cJSON_AddArrayToObject(check->json, "unused_groups");
   char list[HYCO_LINE] = "";
-  PetscBool *used;
 
   PetscFunctionBegin;
-  CheckTwins(check, m);
-  PetscCall(PetscCalloc1(m->n_groups, &used));
-  PetscCall(MarkUsed(check->fom->scene, m, used));
-  for (PetscInt g = 0; g < m->n_groups; g++) {
-    if (used[g] && m->group_start[g] == m->group_start[g + 1])
-      CheckReportWarning(check, "the group %s has no nodes of a body", m->group_name[g]);
-    if (used[g]) continue;
-    cJSON_AddItemToArray(unused, cJSON_CreateString(m->group_name[g]));
-    PetscCall(HycoListAdd(list, ", ", m->group_name[g]));
+  for (PetscInt k = 0; k < in->n_alike; k++) WarnOfAlike(check, &in->alike[k]);
+  for (PetscInt g = 0; g < in->n_groups; g++) {
+    if (in->used[g] && in->empty[g]) CheckReportWarning(check, "the group %s has no nodes of a body", in->group[g]);
+    if (in->used[g]) continue;
+    cJSON_AddItemToArray(unused, cJSON_CreateString(in->group[g]));
+    PetscCall(HycoListAdd(list, ", ", in->group[g]));
   }
   if (list[0]) CheckReportWarning(check, "no entry of the scene uses these groups of the mesh: %s", list);
-  PetscCall(PetscFree(used));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -102,13 +102,12 @@ class Sources(unittest.TestCase):
             self.assertEqual([n for n in names if n in above], [], name)
 
     def test_command(self):
-        """The command includes public headers alone; hyco check, which inspects meshes, pairs and factors, private ones too."""
+        """The command includes public headers and its own alone."""
         public = {os.path.basename(path) for path in glob.glob(os.path.join(SOURCE, 'include', '*.h'))}
         for path in sources('app'):
             names = set(re.findall(r'#include\s*<(hyco\w*\.h)>', text(path)))
-            if 'check' not in os.path.basename(path):
-                self.assertEqual(names - public, set(), path)
-                self.assertNotRegex(text(path), r'#include\s*"(?!driver\.h")', path)
+            self.assertEqual(names - public, set(), path)
+            self.assertNotRegex(text(path), r'#include\s*"(?!(driver|check)\.h")', path)
 
     def test_circles(self):
         """Folders call each other in no circle, files in circles of at most five; only the package calls extensions."""

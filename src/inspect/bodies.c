@@ -1,0 +1,156 @@
+/* Cells and bodies of the mesh: shapes of cells, parts that share no node. */
+#include "inspect.h"
+#include <hycokinematics.h>
+
+/* From the reference simplex to the regular one, inverted. */
+static void ToRegular(PetscInt dim, PetscReal J[3][3])
+{
+  const PetscReal a = 1 / PetscSqrtReal(3), b = 1 / PetscSqrtReal(6);
+
+  for (PetscInt c = 0; c < dim; c++) {
+    const PetscReal x = J[c][0], y = J[c][1];
+
+    J[c][1] = 2 * a * y - a * x;
+    if (dim == 3) J[c][2] = PetscSqrtReal(1.5) * J[c][2] - b * (x + y);
+  }
+}
+
+/* The map from the regular pyramid or prism at its axis. */
+static void FromAxis(HycoCellType shape, const PetscInt node[], const PetscReal X[], PetscReal J[3][3])
+{
+  for (PetscInt c = 0; c < 3; c++) {
+    PetscReal x[6];
+
+    for (PetscInt a = 0; a < HycoCellKinds[shape].nv; a++) x[a] = X[3 * node[a] + c];
+    if (shape == HYCO_PYRAMID5) {
+      J[c][0] = (x[1] - x[0] + x[2] - x[3]) / 2;
+      J[c][1] = (x[3] - x[0] + x[2] - x[1]) / 2;
+      J[c][2] = PetscSqrtReal(2) * (x[4] - (x[0] + x[1] + x[2] + x[3]) / 4); /* sides are 1, the height 1 / sqrt(2) */
+    } else {
+      J[c][0] = (x[1] - x[0] + x[4] - x[3]) / 2;
+      J[c][1] = (x[2] - x[0] + x[5] - x[3]) / 2;
+      J[c][1] = (2 * J[c][1] - J[c][0]) / PetscSqrtReal(3);
+      J[c][2] = (x[3] + x[4] + x[5] - x[0] - x[1] - x[2]) / 3;
+    }
+  }
+}
+
+/* Aspect ratio of a cell at a quadrature point, 1 if it is regular there: k + sqrt(k^2 - 1) with the condition
+   number k = |J| |J^-1| / dim in the Frobenius norm of the map from the regular cell. Exact for rectangles. */
+static PetscReal Stretch(HycoCellType shape, const PetscInt node[], const PetscReal X[], PetscInt q)
+{
+  const HycoElement *el = HycoElementGet(shape);
+  const PetscInt dim = HycoCellKinds[shape].dim;
+  PetscReal J[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, norm = 0, inverse = 0, det = 0, k;
+
+  if (shape >= HYCO_N_MESH_TYPES) FromAxis(shape, node, X, J);
+  for (PetscInt c = 0; c < dim && shape < HYCO_N_MESH_TYPES; c++) {
+    for (PetscInt d = 0; d < dim; d++) {
+      J[c][d] = 0;
+      for (PetscInt a = 0; a < el->nv; a++) J[c][d] += X[3 * node[a] + c] * el->dN[q][a][d];
+    }
+  }
+  if (shape < HYCO_N_MESH_TYPES && el->nv == dim + 1) ToRegular(dim, J);
+  for (PetscInt c = 0; c < dim; c++) {
+    for (PetscInt d = 0; d < dim; d++) {
+      const PetscInt c1 = (c + 1) % 3, c2 = (c + 2) % 3, d1 = (d + 1) % 3, d2 = (d + 2) % 3;
+      const PetscReal minor = J[c1][d1] * J[c2][d2] - J[c1][d2] * J[c2][d1];
+
+      norm += J[c][d] * J[c][d];
+      inverse += minor * minor;
+      if (c == 0) det += J[c][d] * minor;
+    }
+  }
+  k = PetscMax(PetscSqrtReal(norm * inverse) / (PetscAbsReal(det) * dim), 1); /* no division by 0, because K is
+                                                                                 assembled */
+  return k + PetscSqrtReal(k * k - 1);
+}
+
+void HycoInspectCells(HycoInspection *in, HycoFE fe)
+{
+  HycoMesh m = fe->mesh;
+
+  for (PetscInt e = 0; e < m->n_cells && m->dim > 1; e++) {
+    HycoBodyInspection *b = &in->body[m->cell_body[e]];
+    const HycoCellType shape = HycoMeshShape(m, e);
+    PetscInt node[HYCO_CELL_NODES];
+    const PetscInt n = HycoMeshOwnNodes(m, e, node);
+
+    for (PetscInt q = 0; q < (shape >= HYCO_N_MESH_TYPES || n == m->dim + 1 ? 1 : HycoElementGet(shape)->nq); q++) {
+      const PetscReal stretch = Stretch(shape, node, fe->X, q);
+
+      if (stretch <= b->stretch * (1 + 1e-6)) continue; /* round-off, whose root remains for a square */
+      b->stretch = stretch;
+      b->stretched = m->cell_id[e];
+    }
+  }
+}
+
+static PetscInt Root(PetscInt part[], PetscInt i)
+{
+  while (part[i] != i) i = part[i] = part[part[i]];
+  return i;
+}
+
+/* The number of parts of each body that share no node. */
+static PetscErrorCode CountParts(HycoMesh m, PetscInt n_bodies, PetscInt n[])
+{
+  PetscInt *part;
+  PetscBool *seen;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(m->n_nodes, &part));
+  PetscCall(PetscMalloc1(m->n_nodes, &seen));
+  for (PetscInt b = 0; b < n_bodies; b++) {
+    n[b] = 0;
+    for (PetscInt i = 0; i < m->n_nodes; i++) part[i] = i;
+    PetscCall(PetscArrayzero(seen, m->n_nodes));
+    for (PetscInt k = 0; k < m->n_cells * m->nv; k++) {
+      if (m->cell_body[k / m->nv] == b) part[Root(part, m->cells[k])] = Root(part, m->cells[k - k % m->nv]);
+    }
+    for (PetscInt e = 0; e < m->n_cells; e++) {
+      const PetscInt root = Root(part, m->cells[e * m->nv]);
+
+      if (m->cell_body[e] != b || seen[root]) continue;
+      seen[root] = PETSC_TRUE;
+      n[b]++;
+    }
+  }
+  PetscCall(PetscFree(part));
+  PetscCall(PetscFree(seen));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The types of cells that occur, with their numbers. */
+static PetscErrorCode CountTypes(HycoInspection *in, HycoMesh m)
+{
+  PetscInt n[HYCO_N_CELL_TYPES] = {0};
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(HYCO_N_CELL_TYPES, &in->type, HYCO_N_CELL_TYPES, &in->cells));
+  for (PetscInt e = 0; e < m->n_cells; e++) n[HycoMeshShape(m, e)]++;
+  for (int t = 0; t < HYCO_N_CELL_TYPES; t++) {
+    if (!n[t]) continue;
+    in->type[in->n_types] = HycoCellKinds[t].name;
+    in->cells[in->n_types++] = n[t];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoInspectBodies(HycoInspection *in)
+{
+  HycoMesh m = in->whole->part;
+  PetscInt *parts;
+
+  PetscFunctionBegin;
+  PetscCall(CountTypes(in, m));
+  PetscCall(PetscMalloc1(in->n_bodies, &parts));
+  PetscCall(CountParts(m, in->n_bodies, parts));
+  for (PetscInt b = 0; b < in->n_bodies; b++) {
+    in->body[b].name = in->whole->scene->body[b].name;
+    in->body[b].n_parts = parts[b];
+  }
+  for (PetscInt e = 0; e < m->n_cells; e++) in->body[m->cell_body[e]].n_cells++;
+  PetscCall(PetscFree(parts));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

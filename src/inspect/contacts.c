@@ -1,0 +1,146 @@
+/* Gaps, whether surfaces face each other, which side of contacts and ties has the finer facets. */
+#include "inspect.h"
+
+/* Share of the mesh's extent: a smaller gap is round-off. */
+#define ROUNDING 1e-12
+
+/* Slave's facet size over the master's around contact k; 0: one of the groups is not a surface. size: room for 2
+   reals a node. */
+static PetscReal Coarseness(const HycoPairs *p, PetscInt k, PetscInt n_nodes, const PetscReal size[])
+{
+  PetscReal master = 0;
+
+  for (PetscInt j = p->master_start[k]; j < p->master_start[k + 1]; j++)
+    master += p->weight[j] * size[n_nodes + p->master[j]];
+  return master > 0 ? size[p->slave[k]] / master : 0;
+}
+
+/* The facet sizes of two groups: room for 2 reals a node. */
+static PetscErrorCode FacetSizes(HycoFE fe, const char key[], const char slave[], const char master[], PetscReal size[])
+{
+  PetscInt g = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeshFindGroup(fe->mesh, key, slave, &g));
+  HycoSurfaceSizes(fe, g, size);
+  PetscCall(HycoMeshFindGroup(fe->mesh, key, master, &g));
+  HycoSurfaceSizes(fe, g, size + fe->mesh->n_nodes);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The median over the contacts of one entry; for types with a search, whose meshes need not match. */
+static PetscErrorCode CompareFacets(HycoInspection *in, HycoFE fe, PetscInt contact)
+{
+  const HycoPairs *p = &in->whole->pairs;
+  HycoContact c = fe->scene->contact[contact];
+  PetscReal *size, *ratio;
+  PetscInt n = 0;
+
+  PetscFunctionBegin;
+  if (!c->master || !c->ops->find || fe->dim == 1) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc2(2 * fe->mesh->n_nodes, &size, p->n, &ratio));
+  PetscCall(FacetSizes(fe, "contact", c->slave, c->master, size));
+  for (PetscInt k = 0; k < p->n; k++) {
+    if (p->contact[k] == contact && p->master_start[k] < p->master_start[k + 1])
+      ratio[n++] = Coarseness(p, k, fe->mesh->n_nodes, size);
+  }
+  PetscCall(PetscSortReal(n, ratio));
+  if (n) in->contact[contact].coarse = ratio[n / 2];
+  PetscCall(PetscFree2(size, ratio));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The same over the nodes of a tie. */
+static PetscErrorCode CompareTie(HycoFE fe, PetscInt tie, PetscReal *coarse)
+{
+  HycoMesh m = fe->mesh;
+  const HycoTie *t = &fe->scene->tie[tie];
+  PetscReal *size, *ratio;
+  PetscInt n = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(2 * m->n_nodes, &size, m->n_tied, &ratio));
+  PetscCall(FacetSizes(fe, "tie", t->slave, t->master, size));
+  for (PetscInt k = 0; k < m->n_tied; k++) {
+    PetscReal master = 0;
+
+    for (PetscInt j = m->tied_start[k]; j < m->tied_start[k + 1]; j++)
+      master = PetscMax(master, size[m->n_nodes + m->tied_master[j]]);
+    if (m->ties->tie[m->tied_entry[k]] == tie) ratio[n++] = size[m->tied[k]] / master;
+  }
+  PetscCall(PetscSortReal(n, ratio));
+  *coarse = n ? ratio[n / 2] : 0;
+  PetscCall(PetscFree2(size, ratio));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoInspectTies(HycoInspection *in)
+{
+  HycoFE fe = in->whole->fe;
+  HycoScene s = fe->scene;
+  const HycoTies ties = fe->mesh->ties;
+
+  PetscFunctionBegin;
+  for (PetscInt t = 0; t < s->n_ties; t++) {
+    HycoTieInspection *one = &in->tie[t];
+
+    *one = (HycoTieInspection){.name = s->tie[t].name, .slave = s->tie[t].slave, .master = s->tie[t].master};
+    for (PetscInt e = 0; ties && e < ties->n; e++)
+      one->n_nodes += ties->tie[e] == t && (!e || ties->slave[e - 1] != ties->slave[e]);
+    PetscCall(CompareTie(fe, t, &one->coarse));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoInspectContactsBegin(HycoInspection *in)
+{
+  HycoScene s = in->whole->scene;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < s->n_contacts; k++) {
+    const HycoContact c = s->contact[k];
+
+    in->contact[k] = (HycoContactInspection){.name = c->name,
+                                             .type = ((PetscObject)c)->type_name,
+                                             .slave = c->slave,
+                                             .master = c->master,
+                                             .facing_min = PETSC_MAX_INT,
+                                             .gap_min = PETSC_MAX_REAL,
+                                             .gap_max = -PETSC_MAX_REAL};
+    PetscCall(HycoContactGetLength(c, "tolerance", &in->contact[k].tolerance));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoInspectGaps(HycoInspection *in, HycoFE fe, PetscBool first)
+{
+  HycoPairs *p = &in->whole->pairs;
+  HycoScene s = fe->scene;
+  const PetscReal length = HycoMeshLength(fe->mesh);
+  PetscReal *normal, *gap;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(3 * p->n, &normal, p->n, &gap));
+  PetscCall(HycoContactGeometry(fe, p, normal, gap));
+  for (PetscInt c = 0; c < s->n_contacts; c++) {
+    HycoContactInspection *r = &in->contact[c];
+    PetscInt facing = 0;
+
+    r->n = 0;
+    for (PetscInt k = 0; k < p->n; k++) {
+      if (p->contact[k] != c) continue;
+      r->n++;
+      if (HycoPairsAlone(s, p, k)) continue;
+      facing++;
+      if (PetscAbsReal(gap[k]) <= ROUNDING * length) gap[k] = 0;
+      r->gap_min = PetscMin(r->gap_min, gap[k]);
+      r->gap_max = PetscMax(r->gap_max, gap[k]);
+    }
+    r->facing_min = PetscMin(r->facing_min, facing);
+    r->facing_max = PetscMax(r->facing_max, facing);
+    if (HycoPairsFollows(p, c)) r->tolerance = -1; /* surfaces that move are searched at any distance */
+    if (first) PetscCall(CompareFacets(in, fe, c));
+  }
+  PetscCall(PetscFree2(normal, gap));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

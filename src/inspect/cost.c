@@ -1,0 +1,90 @@
+/* Memory and time of a solve, and the number of solves of a training. */
+#include "inspect.h"
+#include <hycolinear.h>
+#include <sys/resource.h>
+
+/* Assumed number of solutions if no training points are given. */
+#define TYPICAL_TRAINING 100
+/* Speed of a sparse factorisation as a share of a matrix product's. */
+#define SPARSE_SHARE 0.5
+
+/* Memory of the process now, summed over all ranks. */
+static PetscErrorCode Resident(MPI_Comm comm, PetscReal *bytes)
+{
+  struct rusage usage;
+  PetscReal mine;
+
+  PetscFunctionBegin;
+  getrusage(RUSAGE_SELF, &usage);
+  mine = 1024 * (PetscReal)usage.ru_maxrss;
+  PetscCallMPI(MPI_Allreduce(&mine, bytes, 1, MPIU_REAL, MPI_SUM, comm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Floating-point operations per second of a small matrix product on this process. */
+static PetscErrorCode Speed(PetscReal *flops)
+{
+  const PetscBLASInt n = 256;
+  const PetscScalar one = 1, zero = 0;
+  PetscScalar *a;
+  PetscReal begin;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(3 * n * n, &a));
+  for (PetscInt k = 0; k < 3 * n * n; k++) a[k] = 1;
+  *flops = 0;
+  for (PetscInt k = 0; k < 10; k++) { /* the fastest, because others may use the machine */
+    begin = HycoNow();
+    BLASgemm_("N", "N", &n, &n, &n, &one, a, &n, a + n * n, &n, &zero, a + 2 * n * n, &n);
+    *flops = PetscMax(*flops, 2. * n * n * n / PetscMax(HycoNow() - begin, 1e-9));
+  }
+  PetscCall(PetscFree(a));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoInspectCost(HycoFOM f, PetscReal assembly, HycoInspection *in)
+{
+  HycoDirect probe;
+  PetscReal begin = HycoNow(), speed = 1;
+
+  PetscFunctionBegin;
+  PetscCall(Resident(HycoComm(f), &in->resident));
+  PetscCall(HycoDirectCreate(HycoComm(f), &probe));
+  PetscCall(HycoDirectPinKernel(probe, f->K));
+  PetscCall(HycoDirectAnalyse(probe, f->K, f->n_contacts ? f->Bt : NULL, f->n_contacts ? f->B : NULL, PETSC_TRUE,
+                              &in->bytes));
+  PetscCall(Speed(&speed));
+  in->first = assembly + HycoNow() - begin + HycoDirectOperations(probe) / (SPARSE_SHARE * speed * f->size);
+  in->next = 20 * in->bytes / 8 / (SPARSE_SHARE * speed * f->size); /* a few products with the factor */
+  PetscCall(HycoDirectDestroy(&probe));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoInspectionCountTraining(HycoScene s, HycoSamples samples, PetscInt *n_training,
+                                           PetscInt *n_stiffness)
+{
+  PetscBool reaches[HYCO_MAX_PARAMETERS], any = PETSC_FALSE;
+  PetscInt n = TYPICAL_TRAINING, held;
+  const PetscReal *mu = NULL;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(s, HYCO_SCENE_CLASSID);
+  HycoSceneReaches(s, reaches);
+  for (PetscInt p = 0; p < s->n_parameters; p++) any = (PetscBool)(any || reaches[p]);
+  if (samples) PetscCall(HycoSamplesGet(samples, &n, NULL, &mu));
+  held = PetscMin(PetscMax(n, 20), 30);
+  *n_training = n + held;
+  *n_stiffness = any ? n : 1;
+  for (PetscInt k = 1; mu && any && k < n; k++) { /* previous ones */
+    PetscBool seen = PETSC_FALSE;
+
+    for (PetscInt j = 0; j < k && !seen; j++) {
+      seen = PETSC_TRUE;
+      for (PetscInt p = 0; p < s->n_parameters; p++)
+        seen = (PetscBool)(seen && (!reaches[p] || mu[j * s->n_parameters + p] == mu[k * s->n_parameters + p]));
+    }
+    *n_stiffness -= seen;
+  }
+  if (any) *n_stiffness += held; /* held-out points may share stiffnesses, which is neglected here */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

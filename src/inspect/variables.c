@@ -1,0 +1,57 @@
+/* What each variable affects, from the entries that contain it. */
+#include "inspect.h"
+#include <hycomaterialimpl.h>
+
+const char *const HycoAffectedNames[HYCO_N_AFFECTED] = {"maps",         "stiffness", "laws",  "temperatures",
+                                                        "contact rows", "gaps",      "loads", "supports"};
+
+static PetscBool AnyChanges(HycoExpr const e[3], const PetscBool changed[])
+{
+  return (PetscBool)(HycoExprChanges(e[0], changed) || HycoExprChanges(e[1], changed) ||
+                     HycoExprChanges(e[2], changed));
+}
+
+/* A variable reaches what its entries do; a map moves everything on its body. */
+static void FindReach(HycoScene s, PetscInt p, PetscBool does[HYCO_N_AFFECTED])
+{
+  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE};
+  HycoChanges c;
+
+  changed[p] = PETSC_TRUE;
+  c = HycoSceneChanges(s, changed);
+  does[HYCO_AFFECTS_MAPS] = c.nodes;
+  does[HYCO_AFFECTS_STIFFNESS] = c.stiffness;
+  does[HYCO_AFFECTS_ROWS] = (PetscBool)(c.rows && s->n_contacts);
+  does[HYCO_AFFECTS_GAPS] = (PetscBool)(c.gaps && s->n_contacts);
+  for (PetscInt k = 0; k < s->n_loads; k++)
+    does[HYCO_AFFECTS_LOADS] = (PetscBool)(does[HYCO_AFFECTS_LOADS] || HycoExprChanges(s->load[k].pressure, changed) ||
+                                           AnyChanges(s->load[k].traction, changed));
+  for (PetscInt k = 0; k < s->n_point_loads; k++)
+    does[HYCO_AFFECTS_LOADS] = (PetscBool)(does[HYCO_AFFECTS_LOADS] || AnyChanges(s->point_load[k].force, changed));
+  for (PetscInt b = 0; b < s->n_bodies; b++) {
+    const HycoMaterial law = s->body[b].law;
+    HycoExpr const heat[3] = {s->body[b].temperature, s->body[b].reference, s->body[b].expansion};
+
+    does[HYCO_AFFECTS_LOADS] = (PetscBool)(does[HYCO_AFFECTS_LOADS] || AnyChanges(s->body[b].force, changed) ||
+                                           HycoSceneHasInertia(s, &s->body[b], changed));
+    does[HYCO_AFFECTS_TEMPERATURES] = (PetscBool)(does[HYCO_AFFECTS_TEMPERATURES] || AnyChanges(heat, changed));
+    for (PetscInt j = 0; j < law->constants.n && !c.stiffness; j++)
+      does[HYCO_AFFECTS_LAWS] =
+          (PetscBool)(does[HYCO_AFFECTS_LAWS] || HycoExprChanges(law->constants.entry[j].expr, changed));
+  }
+  for (PetscInt k = 0; k < s->n_fixed; k++)
+    does[HYCO_AFFECTS_SUPPORTS] = (PetscBool)(does[HYCO_AFFECTS_SUPPORTS] || AnyChanges(s->fixed[k].value, changed) ||
+                                              HycoExprChanges(s->fixed[k].normal, changed));
+}
+
+PetscErrorCode HycoInspectVariables(HycoInspection *in)
+{
+  HycoScene s = in->whole->scene;
+
+  PetscFunctionBegin;
+  for (PetscInt p = 0; p < s->n_variables; p++) {
+    in->variable[p].name = s->parameter[p];
+    FindReach(s, p, in->variable[p].affects);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
