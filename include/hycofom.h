@@ -154,6 +154,11 @@ PetscErrorCode HycoFOMWrite(HycoFOM fom, const char path[]);
 PetscErrorCode HycoFOMWriteBegin(HycoFOM fom, const char path[], PetscInt n);
 PetscErrorCode HycoFOMWriteAdd(HycoFOM fom);
 PetscErrorCode HycoFOMWriteEnd(HycoFOM fom);
+/* The file of such an output that has the numbers: PATH.h5 for PATH.xdmf, PATH.vtkhdf itself; fails for other endings.
+   Not collective. */
+PetscErrorCode HycoFieldsNumbers(const char path[], char numbers[PETSC_MAX_PATH_LEN]);
+/* Fails for other endings, and if a model or a snapshot would be overwritten. On this process alone. */
+PetscErrorCode HycoFieldsCheckPath(const char path[]);
 
 /* Describes the object on an ASCII viewer (NULL: stdout). Collective. */
 PetscErrorCode HycoFOMView(HycoFOM object, PetscViewer viewer);

@@ -40,6 +40,9 @@ PetscErrorCode HycoSceneGetParameters(HycoScene scene, PetscInt *n, const char *
    collective. Borrowed. */
 #define HYCO_MAX_QUANTITIES 16
 PetscErrorCode HycoSceneGetQuantities(HycoScene scene, PetscInt *n, const char *names[HYCO_MAX_QUANTITIES]);
+/* at[k]: the number in `other` of the scene's output k, by name and definition; -1: `other` does not have it. Not
+   collective. */
+void HycoSceneMatchQuantities(HycoScene scene, HycoScene other, PetscInt at[]);
 
 /* Gets the number of the scene's contacts and, in names (room for n; may be NULL), their names, in the order of
    HycoFOMGetContacts() and HycoROMGetContacts(). Not collective. Borrowed. */
@@ -60,6 +63,9 @@ PetscErrorCode HycoSceneGetTitle(HycoScene scene, const char *title[]);
   scene.
 */
 PetscErrorCode HycoSceneSetDM(HycoScene scene, DM dm);
+/* Reads the mesh: fails if it, or one of its groups that the scene names, is missing. Keeps nothing. Collective on
+   comm. */
+PetscErrorCode HycoSceneCheckMesh(MPI_Comm comm, HycoScene scene);
 
 /* Gets the path of the scene's mesh file. Not collective. Borrowed. */
 PetscErrorCode HycoSceneGetMesh(HycoScene scene, const char *path[]);

@@ -10,6 +10,7 @@ extern "C" {
 #endif
 
 typedef struct _p_HycoSnapshots *HycoSnapshots;
+typedef struct _HycoQueue *HycoQueue; /* hycoqueue.h */
 
 /* Called on rank 0 of the store's communicator after each solution of its group: at least `done` of n solutions are
    stored, by all groups. At the end it is called once with n of n. */
@@ -40,6 +41,11 @@ PetscErrorCode HycoSnapshotsGetBalance(HycoSnapshots snapshots, PetscInt *unsolv
 /* Gets the number of groups of ranks that solve n samples at the same time: -hyco_groups, or as many as fit into half
    of the memory if each factors the stiffness of its own mesh. Collective. */
 PetscErrorCode HycoSnapshotsChooseGroups(MPI_Comm comm, HycoScene scene, PetscInt n, PetscInt *groups);
+/* Creates a queue of the points list[n] of mu (n_par each) for as many groups as HycoSnapshotsChooseGroups() chooses
+   for n_all, the points of the whole set: a solution does not depend on how many others are missing. Points with a
+   common stiffness, and thus a common factor, are of one kind. Everything is the same on every rank. Collective. */
+PetscErrorCode HycoSnapshotsCreateQueue(MPI_Comm comm, HycoScene scene, PetscInt n_par, const PetscReal mu[],
+                                        PetscInt n, const PetscInt list[], PetscInt n_all, HycoQueue *queue);
 
 /* Describes the object on an ASCII viewer (NULL: stdout). Collective. */
 PetscErrorCode HycoSnapshotsView(HycoSnapshots object, PetscViewer viewer);

@@ -71,10 +71,6 @@ PetscErrorCode HycoContactFieldsDestroy(HycoContactFields *fields);
    contacts. Collective. */
 PetscErrorCode HycoContactsWrite(MPI_Comm comm, HycoH5 h, const char name[], const HycoPairs *pairs, PetscInt n,
                                  MPI_Datatype type, const void *value);
-/* The file of an output that has the numbers: PATH.h5 for PATH.xdmf, PATH.vtkhdf itself; fails for other endings. */
-PetscErrorCode HycoFieldsNumbers(const char path[], char numbers[PETSC_MAX_PATH_LEN]);
-/* Fails for other endings, and if a model or a snapshot would be overwritten. On this process alone. */
-PetscErrorCode HycoFieldsCheckPath(const char path[]);
 
 /*
   A file of fields on one mesh (src/output/field_file.c): PATH.xdmf and PATH.h5, or PATH.vtkhdf, which ParaView, VTK and

@@ -2,73 +2,16 @@
 #ifndef HYCOIMPL_H
 #define HYCOIMPL_H
 
-#include <hycocompat.h>
-#include <hycosys.h>
+#include <hycoprogram.h>
 #include <petsc/private/petscimpl.h>
 #include <petscmat.h>
 #include <stdio.h>
 #include <strings.h>
 
-/* Length of a message or a name that the library builds. */
-#define HYCO_LINE 1024
-
-/* Error code: these solutions give no useful model with these settings. A search then tries other settings, and an
-   estimate is left out; any other error (disk, memory, a damaged file) ends a run. */
-#define HYCO_ERR_NO_MODEL ((PetscErrorCode)(PETSC_ERR_MAX_VALUE + 1))
-
-/* Fails on every rank with the message of the lowest rank whose `message` is not empty, and with the error `caught`
-   there if that is HYCO_ERR_NO_MODEL, else PETSC_ERR_USER. Collective. */
-PetscErrorCode HycoErrorSync(MPI_Comm comm, PetscErrorCode caught, const char message[]);
-
-/* Begin and end catching PETSc errors on this rank as text: between the two, errors print nothing. */
-PetscErrorCode HycoCatchBegin(void);
-PetscErrorCode HycoCatchEnd(PetscErrorCode caught, char message[HYCO_LINE]);
 /* Raises the caught error again, unless it is HYCO_ERR_NO_MODEL. */
 PetscErrorCode HycoCatchNoModel(PetscErrorCode caught, const char message[]);
 
-/* Runs `call` on rank 0 of comm; its error is raised on every rank. Collective. */
-#define HycoOnRoot(comm, call)                                                                                         \
-  do {                                                                                                                 \
-    char message_[HYCO_LINE] = "";                                                                                     \
-    PetscMPIInt rank_;                                                                                                 \
-    PetscErrorCode caught_ = 0;                                                                                        \
-    PetscCallMPI(MPI_Comm_rank((comm), &rank_));                                                                       \
-    if (rank_ == 0) {                                                                                                  \
-      PetscCall(HycoCatchBegin());                                                                                     \
-      caught_ = (call);                                                                                                \
-      PetscCall(HycoCatchEnd(caught_, message_));                                                                      \
-    }                                                                                                                  \
-    PetscCall(HycoErrorSync((comm), caught_, message_));                                                               \
-  } while (0)
-
-/* Runs `call`, which may differ from rank to rank, on every rank; an error on any rank is raised on all. Collective. */
-#define HycoOnEach(comm, call)                                                                                         \
-  do {                                                                                                                 \
-    char message_[HYCO_LINE] = "";                                                                                     \
-    PetscErrorCode caught_;                                                                                            \
-    PetscCall(HycoCatchBegin());                                                                                       \
-    caught_ = (call);                                                                                                  \
-    PetscCall(HycoCatchEnd(caught_, message_));                                                                        \
-    PetscCall(HycoErrorSync((comm), caught_, message_));                                                               \
-  } while (0)
-
-/* Replaces bytes that are no printable characters in UTF-8: blanks by a blank, others by ?. */
-void HycoMakePrintable(char text[]);
-/* Formats a line like printf; truncated to HYCO_LINE. */
-void HycoFormat(char line[HYCO_LINE], const char format[], ...) PETSC_ATTRIBUTE_FORMAT(2, 3);
-
-/* Appends `name` to a list of names, with `between` before all but the first; truncated to HYCO_LINE. */
-PetscErrorCode HycoListAdd(char list[HYCO_LINE], const char between[], const char name[]);
-
-/* Raises a user's error on this rank: one line, with numbers as C's printf writes them (PETSc would write 2 as
-   "2."). */
-#define HycoFail(...)                                                                                                  \
-  do {                                                                                                                 \
-    char line_[HYCO_LINE];                                                                                             \
-    HycoFormat(line_, __VA_ARGS__);                                                                                    \
-    SETERRQ(PETSC_COMM_SELF, PETSC_ERR_USER, "%s", line_);                                                             \
-  } while (0)
-/* The same with HYCO_ERR_NO_MODEL. */
+/* HycoFail() and HycoCheck() with HYCO_ERR_NO_MODEL. */
 #define HycoFailNoModel(...)                                                                                           \
   do {                                                                                                                 \
     char line_[HYCO_LINE];                                                                                             \
@@ -78,10 +21,6 @@ PetscErrorCode HycoListAdd(char list[HYCO_LINE], const char between[], const cha
 #define HycoCheckModel(condition, ...)                                                                                 \
   do {                                                                                                                 \
     if (PetscUnlikely(!(condition))) HycoFailNoModel(__VA_ARGS__);                                                     \
-  } while (0)
-#define HycoCheck(condition, ...)                                                                                      \
-  do {                                                                                                                 \
-    if (PetscUnlikely(!(condition))) HycoFail(__VA_ARGS__);                                                            \
   } while (0)
 
 /* Fails for NULL and for an object of another class. Not collective. `classid` is one of HYCO_..._CLASSID. */
@@ -115,8 +54,6 @@ PetscErrorCode HycoViewBegin_Private(PetscObject object, PetscViewer *viewer, Pe
     __VA_ARGS__;                                                                                                       \
     PetscFunctionReturn(PETSC_SUCCESS);                                                                                \
   }
-/* The communicator of an object of any class. */
-#define HycoComm(object) PetscObjectComm((PetscObject)(object))
 /* Begins a Destroy: returns from the calling function for NULL; checks the object, removes one reference and, unless that
    was the last, sets `*object` to NULL and returns. */
 #define HycoDestroyBegin(object, classid)                                                                              \
@@ -129,29 +66,10 @@ PetscErrorCode HycoViewBegin_Private(PetscObject object, PetscViewer *viewer, Pe
     }                                                                                                                  \
   } while (0)
 
-/* Concatenates every rank's n items, of an MPI type of `size` bytes, by rank, in *all on rank 0 (elsewhere NULL,
- *n_all 0); the caller frees it by PetscFree(). Collective. */
-PetscErrorCode HycoConcatenate(MPI_Comm comm, PetscInt n, const void *mine, MPI_Datatype type, size_t size,
-                               PetscInt *n_all, void *all);
 /* Sends n rows of `size` bytes, row k to rank to[k]; *got: the *n_got rows that arrive, by the rank that sent them and
    then in its order. The caller frees it by PetscFree(). Collective. */
 PetscErrorCode HycoSendRows(MPI_Comm comm, PetscInt n, const PetscMPIInt to[], size_t size, const void *row,
                             PetscInt *n_got, void *got);
-
-/* MPI_Bcast() from rank 0 and MPI_Allreduce() in place, with a PetscInt count: a count too large for MPI is an
-   error. */
-#define HycoBcast(data, n, type, comm)                                                                                 \
-  do {                                                                                                                 \
-    PetscMPIInt count_;                                                                                                \
-    PetscCall(PetscMPIIntCast((n), &count_));                                                                          \
-    PetscCallMPI(MPI_Bcast((data), count_, (type), 0, (comm)));                                                        \
-  } while (0)
-#define HycoAllreduce(data, n, type, op, comm)                                                                         \
-  do {                                                                                                                 \
-    PetscMPIInt count_;                                                                                                \
-    PetscCall(PetscMPIIntCast((n), &count_));                                                                          \
-    PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, (data), count_, (type), (op), (comm)));                                   \
-  } while (0)
 
 /* 64-bit FNV-1a hash, continued from `hash` (start with HYCO_HASH_START). */
 #define HYCO_HASH_START 14695981039346656037ULL
@@ -180,28 +98,14 @@ typedef enum {
   HYCO_EVENT_RECONSTRUCT,
   HYCO_N_EVENTS
 } HycoEvent;
-typedef enum { HYCO_STAGE_FULL_ORDER, HYCO_STAGE_REDUCTION, HYCO_STAGE_ONLINE, HYCO_N_STAGES } HycoStage;
 PetscErrorCode HycoLogEvent(HycoEvent event, PetscBool begin);
-PetscErrorCode HycoLogStage(HycoStage stage, PetscBool begin);
-/* Whether the environment variable HYCO_TRACE requests PETSc's trace of an error. */
-PetscBool HycoWantsTrace(void);
-/* The name of what runs now: the innermost event, else the stage, else NULL. May be called from any thread. */
-const char *HycoLogDoing(void);
-/* PetscCall(call) within the event, or the stage; both also end on an error. */
+/* PetscCall(call) within the event, which also ends on an error. */
 #define HycoLogged(event, call)                                                                                        \
   do {                                                                                                                 \
     PetscErrorCode logged_;                                                                                            \
     PetscCall(HycoLogEvent((event), PETSC_TRUE));                                                                      \
     logged_ = (call);                                                                                                  \
     PetscCall(HycoLogEvent((event), PETSC_FALSE));                                                                     \
-    PetscCall(logged_);                                                                                                \
-  } while (0)
-#define HycoStaged(stage, call)                                                                                        \
-  do {                                                                                                                 \
-    PetscErrorCode logged_;                                                                                            \
-    PetscCall(HycoLogStage((stage), PETSC_TRUE));                                                                      \
-    logged_ = (call);                                                                                                  \
-    PetscCall(HycoLogStage((stage), PETSC_FALSE));                                                                     \
     PetscCall(logged_);                                                                                                \
   } while (0)
 
@@ -229,23 +133,11 @@ static inline PetscReal HycoRelative(PetscReal lost, PetscReal size)
   return size > 0 ? lost / size : lost > 0 ? PETSC_INFINITY : 0;
 }
 
-/* Seconds since the first call, on this rank's clock. */
-PetscReal HycoNow(void);
 /* CPU seconds of this process. */
 PetscReal HycoCPU(void);
 
-/* Recorded declarations; the strings of an option are one allocation, at its name. */
-typedef struct {
-  PetscInt n, room;
-  HycoOption *option;
-} HycoOptionList;
-/* Runs `declare` with an empty database; its declarations are added to the list, and no option is read. */
-PetscErrorCode HycoOptionsRecord(HycoOptionList *list, PetscErrorCode (*declare)(PetscOptions));
-PetscErrorCode HycoOptionListDestroy(HycoOptionList *list);
 /* The table of HycoGetOptionTable() is recorded again at its next call. */
 PetscErrorCode HycoOptionsForgetTable(void);
-/* The option of this name (without dash; the entry mu_ matches mu_radius), or NULL. Borrowed. */
-const HycoOption *HycoOptionListFind(const HycoOptionList *list, const char name[]);
 /* Creates an object of each class and calls its SetFromOptions with `options` (src/package): the declaration pass of
    the table. */
 PetscErrorCode HycoDeclareClasses(PetscOptions options);
@@ -271,25 +163,8 @@ PetscErrorCode HycoROMDeclare(PetscOptions options);
     PetscCall(declared_);                                                                                              \
   } while (0)
 
-/* What a class declares for an option (name without the dash), or NULL. Borrowed. */
-const HycoOption *HycoOptionFind(const char name[]);
-/* The known name nearest to `word`, of those that the classes declare and (if not NULL) those in `more`; NULL: none
-   is near. Borrowed. */
-const char *HycoOptionNearest(const char word[], const HycoOptionList *more);
-/* Fails for the former name of an option, with its present name. */
-PetscErrorCode HycoOptionsCheckName(const char name[]);
-/* Whether an option's name (without dash) begins like an entry of a scene. */
-PetscBool HycoIsSceneKey(const char name[]);
-
 /* PetscFree() of each pointer, given by its address. */
 #define HycoFreeAll(...) PetscCall(HycoFreeAll_Private((void *[]){__VA_ARGS__, NULL}))
 PetscErrorCode HycoFreeAll_Private(void *const addresses[]);
-
-/* A copy of `n` items of type `type`: *to = copy of from. */
-#define HycoDuplicate(n, from, to)                                                                                     \
-  do {                                                                                                                 \
-    PetscCall(PetscMalloc1((n), (to)));                                                                                \
-    PetscCall(PetscArraycpy(*(to), (from), (n)));                                                                      \
-  } while (0)
 
 #endif

@@ -9,7 +9,7 @@
 #include <hycoinelastic.h>
 #include <hycosolverimpl.h>
 
-typedef struct _n_HycoProbe *HycoProbe;
+typedef struct _n_HycoOutputCells *HycoOutputCells;
 typedef struct _n_HycoCarried *HycoCarried;
 typedef struct _n_HycoResultants *HycoResultants;
 typedef struct _n_HycoFloating *HycoFloating;
@@ -134,14 +134,14 @@ struct _p_HycoROM {
   HycoSolver solver;
   void *work; /* the type's */
   /* created when needed */
-  HycoMesh beyond;     /* mesh without cells */
-  HycoFE fe_beyond;    /* on it */
-  HycoFE fe_whole;     /* on whole */
-  HycoFE fe_floating;  /* on the loaded cells of the bodies that contact alone holds */
-  HycoProbe probe;     /* of the scene's quantities */
-  HycoCarried carried; /* results of the contacts (contact_results.c) */
-  HycoBalance balance; /* data kept by HycoROMGetEquilibrium() */
-  HycoRows rows;       /* of B over dofs of mesh, all contacts; current after HycoROMComplete() */
+  HycoMesh beyond;              /* mesh without cells */
+  HycoFE fe_beyond;             /* on it */
+  HycoFE fe_whole;              /* on whole */
+  HycoFE fe_floating;           /* on the loaded cells of the bodies that contact alone holds */
+  HycoOutputCells output_cells; /* of the scene's quantities */
+  HycoCarried carried;          /* results of the contacts (contact_results.c) */
+  HycoBalance balance;          /* data kept by HycoROMGetEquilibrium() */
+  HycoRows rows;                /* of B over dofs of mesh, all contacts; current after HycoROMComplete() */
   /* the last prediction */
   PetscBool solved;
   PetscBool beyond_current; /* U on all nodes of mesh and the rows of all contacts are current: HycoROMComplete() was
@@ -230,7 +230,7 @@ static inline PetscReal HycoROMAddRow(HycoROM model, PetscInt k, PetscReal start
   return start;
 }
 
-/* The scene's quantities of the last prediction, of a path also those of its listed times (probe.c). */
+/* The scene's quantities of the last prediction, of a path also those of its listed times (output_cells.c). */
 PetscErrorCode HycoROMMeasureQuantities(HycoROM model, HycoPrediction *prediction);
 /* For a path: evaluates them in its history's steps; done once. */
 PetscErrorCode HycoROMMeasurePath(HycoROM model);
@@ -238,14 +238,15 @@ PetscErrorCode HycoROMMeasurePath(HycoROM model);
    their nodes and cells in the whole mesh, and the modes at their unknowns (n_dof x l, row major); the reactions that
    follow from balance, and the cells with the loads of their bodies (NULL, NULL: there are no reactions). Takes
    ownership of all. */
-PetscErrorCode HycoROMSetProbe(HycoROM model, HycoMesh mesh, PetscReal V[], PetscBool balanced[], HycoMesh loaded);
+PetscErrorCode HycoROMSetOutputCells(HycoROM model, HycoMesh mesh, PetscReal V[], PetscBool balanced[],
+                                     HycoMesh loaded);
 /* On that mesh; NULL: the quantities need only results of contacts. Borrowed. */
-HycoFE HycoROMGetProbe(HycoROM model);
+HycoFE HycoROMGetOutputCells(HycoROM model);
 /* The quantities of another solution at the last prediction's parameters, mu[] with the time of a history: u and sigma
-   at the nodes and cells of the probe (NULL: the model has none), Lambda of all contacts. reaction: for a path the
+   at the nodes and cells of the output cells (NULL: the model has none), Lambda of all contacts. reaction: for a path the
    supports' forces at these nodes (NULL: not known, NaN); else not needed. */
-PetscErrorCode HycoROMMeasureGiven(HycoROM model, const PetscReal mu[], const PetscReal u[], const PetscReal sigma[],
-                                   const PetscReal reaction[], const PetscReal Lambda[], PetscReal value[]);
+PetscErrorCode HycoROMMeasureSolution(HycoROM model, const PetscReal mu[], const PetscReal u[], const PetscReal sigma[],
+                                      const PetscReal reaction[], const PetscReal Lambda[], PetscReal value[]);
 /* Results of each contact of the scene for forces Lambda (of all contacts) at the last prediction's parameters; NULL
    if the model does not have all forces. Borrowed until the next call. */
 PetscErrorCode HycoROMSumContacts(HycoROM model, const PetscReal Lambda[], const HycoContactResult *result[]);
@@ -284,7 +285,7 @@ PetscErrorCode HycoResultantsSet(HycoROM model, HycoResultants resultants, const
 PetscErrorCode HycoResultantsDestroy(HycoResultants *resultants);
 /* NULL-safe. */
 PetscErrorCode HycoCarriedDestroy(HycoCarried *carried);
-PetscErrorCode HycoProbeDestroy(HycoProbe *probe);
+PetscErrorCode HycoOutputCellsDestroy(HycoOutputCells *cells);
 PetscErrorCode HycoBalanceDestroy(HycoBalance *balance);
 
 /* Features that indicate the last prediction's error without a full-order solution: feature[HYCO_FEATURES], all >= 0.

@@ -199,14 +199,12 @@ PetscErrorCode HycoSceneDestroyTies(HycoScene scene);
 /* Reads an entry output_NAME_...; checks all of them. */
 PetscErrorCode HycoSceneReadQuantity(HycoScene scene, PetscInt entry, const char name[], PetscInt field);
 PetscErrorCode HycoSceneCheckQuantities(HycoScene scene);
-/* at[k]: the number in `other` of the scene's quantity k, by name and definition; -1: `other` does not have it. */
-void HycoSceneMatchQuantities(HycoScene scene, HycoScene other, PetscInt at[]);
 /* Whether the scene has a quantity of kind `first`, or of a kind from `first` to `last`. */
-PetscBool HycoSceneAsks(HycoScene scene, HycoQuantityKind first, HycoQuantityKind last);
+PetscBool HycoSceneHasOutputs(HycoScene scene, HycoQuantityKind first, HycoQuantityKind last);
 PetscBool HycoSceneHasReactions(HycoScene scene);
 /* Whether the quantities need the bodies' fields; the results of contacts. */
-PetscBool HycoSceneAsksFields(HycoScene scene);
-PetscBool HycoSceneAsksContacts(HycoScene scene);
+PetscBool HycoSceneHasFieldOutputs(HycoScene scene);
+PetscBool HycoSceneHasContactOutputs(HycoScene scene);
 /* Reads the history's entries, once the parameters are read. */
 PetscErrorCode HycoSceneReadHistory(HycoScene scene);
 /* Fails if time changes what must be constant: the bodies' places, the rows of B. */

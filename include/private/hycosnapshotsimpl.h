@@ -21,12 +21,6 @@ struct _p_HycoSnapshots {
   char last_path[PETSC_MAX_PATH_LEN]; /* its name */
 };
 
-/* Creates a queue of the points list[n] of mu (n_par each) for as many groups as HycoSnapshotsChooseGroups() chooses
-   for n_all, the points of the whole set: a solution does not depend on how many others are missing. Points with a
-   common stiffness, and thus a common factor, are of one kind. Everything is the same on every rank. Collective. */
-PetscErrorCode HycoSnapshotsCreateQueue(MPI_Comm comm, HycoScene scene, PetscInt n_par, const PetscReal mu[],
-                                        PetscInt n, const PetscInt list[], PetscInt n_all, HycoQueue *queue);
-
 /* Reads -hyco_groups_monitor; prints a line about this rank's group, with the event's number, on the group's first
    rank, if it was given. Collective; not collective. */
 PetscErrorCode HycoSnapshotsReadMonitor(HycoSnapshots store);

@@ -14,7 +14,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from cases import Setting
 from page import machine
-from report import COLORS, MARKS, percent, seconds, speedup, table
+from report import COLORS, MARKS, number, percent, seconds, speedup, table
 from timing import timed
 
 NAMES = ["gap", "q2", "creep"]
@@ -226,20 +226,6 @@ def section(mesh, rows, picture):
             *([""] if notes else []), *notes]
 
 
-def headline(mesh, rows):
-    """The README's picture, mesh B's with all types, and sentence: what the most accurate hybrid model gains."""
-    ok, _, full = split(rows)
-    best = accurate([r for r in ok if r["type"] == "hybrid"])
-    newton, elastic = (f["path_s"] for f in full)
-    words = [f"{percent(best[k + '_max'])} % in {word.split(' of the')[0].split(' on the')[0]}" for k, word in KINDS.items()]
-    return ["![error against online time for each type of model, a power ramp on a fuel rod](docs/tradeoff/rod-B.png)", "",
-            f"On one power ramp of a fuel rod whose cladding creeps and yields (`examples/rod`, mesh {mesh}), full order takes {seconds(newton)} by Newton's method, or {seconds(elastic)} if",
-            f"the elastic factor is kept; the hybrid model takes {seconds(best['path_s'])}, which is {newton / best['path_s']:.0f} and {elastic / best['path_s']:.0f} times less. On "
-            f"{len(case_of(mesh).unseen)} paths that no training has seen, each at its worst time,",
-            f"its errors are at most {', '.join(words[:-1])} and {words[-1]}. At the edges of the parameters' ranges",
-            "the forces are less accurate ([docs/tradeoff.md](docs/tradeoff.md))."]
-
-
 def plot(mesh, rows, path):
     ok, _, full = split(rows)
     figure, axes = plt.subplots(2, 2, figsize=(11, 8.6), sharex=True)
@@ -250,17 +236,18 @@ def plot(mesh, rows, path):
             x, low, high = ([r["path_s"] for r in mine], *([max(100 * r[f"{kind}_{which}"], 1e-6) for r in mine] for which in ("median", "max")))
             axis.vlines(x, low, high, color=COLOR[type_], lw=1.2, alpha=0.6)
             axis.scatter(x, high, s=30, marker=MARK[type_], color=COLOR[type_], label=type_)
-            for r, y in zip(mine, high):
-                axis.annotate(str(r["id"]), (r["path_s"], y), xytext=(4, 3), textcoords="offset points", fontsize=8)
         for f, style in zip(full, ("--", "-")):
             axis.axvline(f["path_s"], color="0.4", ls=style, label=f["label"])
         for limits in LIMITS:
             axis.axhline(100 * limits[kind], color="0.8", lw=0.9, zorder=0)
-        axis.set(xscale="log", yscale="log", title=words, ylabel="error, %: median to largest")
+            axis.annotate(f"{100 * limits[kind]:g} %", (1, 100 * limits[kind]), xycoords=("axes fraction", "data"), xytext=(3, 0),
+                          textcoords="offset points", fontsize=8, color="0.4", va="center")
+        axis.set(xscale="log", yscale="log", title=words, ylabel="error, % (line: from the median)")
+        number(axis, [(r["path_s"], max(100 * r[kind + "_max"], 1e-6), str(r["id"])) for r in ok if kind + "_max" in r])
     for axis in axes[1]:
         axis.set_xlabel("CPU seconds of a path")
     handles, words = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, words, loc="lower center", ncol=4, fontsize=9)
-    figure.suptitle(f"{case_of(mesh).name}: error at unseen paths, each at its worst time, against online time")
+    figure.suptitle(f"{case_of(mesh).name}: error at unseen paths, each at its worst time, against online time (numbers: settings)")
     figure.savefig(path, dpi=100)
     plt.close(figure)

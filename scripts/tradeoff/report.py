@@ -10,6 +10,7 @@ QUANTITIES = [("u", "displacement"), ("sigma", "stress of the RID's cells"), ("l
               ("lambda", "all contact forces")]
 COLORS = {"hybrid": "#2c5aa0", "projection": "#c8352c", "condensed": "#3a9a4e"}
 MARKS = {"hybrid": "o", "projection": "s", "condensed": "^"}
+SHOWN = 1e-4  # per cent: smaller errors tell nothing
 PUBLISHED = ["id", "label", "type", "modes", "rid_fraction", "offline_s", "train_s", "model_bytes", "memory_mb", "path_s",
              *(f"{name}_s{end}" for name in ("batch", "single") for end in ("", "_min", "_max")), "ramp_s", "ramp_n",
              *(f"{name}_{which}" for name in ("u", "sigma", "inelastic", "lambda_rid", "lambda") for which in ("mean", "median", "max")), "bounded", "ratio", "status"]
@@ -105,30 +106,30 @@ def wanted(case, rows, full):
                   *([f"a ramp of {full['warm']['ramp_n']:.0f} solves at a new {case.ramp[0]}"] if case.ramp else []), f"speed-up over {PLAIN}"], lines)
 
 
-def headline(case, rows, full):
-    """A table for the README: the requirement, and the time of each type, in brackets the speed-up over warm full order."""
-    words, bounds = case.wanted[1]
-    warm = full["warm"]
-    ramps = "ramp_s" in warm
-
-    def line(name, row, factor):
-        def cell(key):
-            return "" if key not in row else seconds(row[key]) + (f" ({warm[key] / row[key]:.0f} times)" if factor else "")
-        return [name, *([cell("ramp_s")] if ramps else []), cell("single_s")]
-
-    lines = [line(f"full order, {PLAIN} (the paper's baseline)", full[PLAIN], False),
-             line("full order that keeps its factor and its active set", warm, False)]
-    for kind in COLORS:
-        r = joint(rows, bounds, kind)
-        if r:
-            lines.append(line(kind, r, True))
-    columns = ["", *([f"a ramp of {warm['ramp_n']:.0f} loads"] if ramps else []), "a new geometry"]
-    return [f"{case.name}; {words}:", "", *table(columns, lines)]
-
-
 def published(rows):
     """The columns of docs/tradeoff/*.csv, with the digits that the measurement has."""
     return [{name: f"{r[name]:.3g}" if isinstance(r[name], float) else r[name] for name in PUBLISHED if name in r} for r in rows]
+
+
+def shown(row, quantity):
+    """A row's mean error in per cent, as the diagram has it."""
+    return max(100 * row[quantity + "_mean"], SHOWN)
+
+
+def number(axis, marks):
+    """Numbers beside marks: each at the first of eight places where it touches no other number and no other mark."""
+    axis.figure.canvas.draw()
+    at = {label: axis.transData.transform((x, y)) for x, y, label in marks}
+    taken = [(x - 5, y - 5, x + 5, y + 5) for x, y in at.values()]
+    for x, y, label in marks:
+        px, py = at[label]
+        wide = 7 * len(label)
+        for dx, dy in ((6, 3), (6, -12), (-6 - wide, 3), (-6 - wide, -12), (-wide / 2, 8), (-wide / 2, -18), (14, 14), (-14 - wide, 14)):
+            box = (px + dx, py + dy, px + dx + wide, py + dy + 10)
+            if not any(box[0] < b[2] and b[0] < box[2] and box[1] < b[3] and b[1] < box[3] for b in taken):
+                break
+        taken.append(box)
+        axis.annotate(label, (x, y), xytext=((box[0] - px) * 72 / axis.figure.dpi, (box[1] - py) * 72 / axis.figure.dpi), textcoords="offset points", fontsize=8)
 
 
 def plot(case, rows, full, path):
@@ -136,29 +137,27 @@ def plot(case, rows, full, path):
     for axis, (q, words) in zip(axes.flat, QUANTITIES):
         for kind in COLORS:
             mine = [r for r in good(rows) if r["type"] == kind]
-            axis.scatter([r["batch_s"] for r in mine], [max(100 * r[q + "_mean"], 1e-9) for r in mine], s=22, alpha=0.55,
+            axis.scatter([r["batch_s"] for r in mine], [shown(r, q) for r in mine], s=22, alpha=0.55,
                          marker=MARKS[kind], color=COLORS[kind], label=kind if mine else None)
         front = pareto(rows, q + "_mean")
-        axis.step([r["batch_s"] for r in front], [max(100 * r[q + "_mean"], 1e-9) for r in front], where="post", color="k", lw=1)
-        for r in front:
-            axis.annotate(str(r["id"]), (r["batch_s"], max(100 * r[q + "_mean"], 1e-9)), xytext=(3, 4),
-                          textcoords="offset points", fontsize=8)
+        axis.step([r["batch_s"] for r in front], [shown(r, q) for r in front], where="post", color="k", lw=1, label="Pareto front")
         for name, style in (("warm", "-"), (PLAIN, "--")):
             if name in full:
                 axis.axvline(full[name]["batch_s"], color="0.4", ls=style, label=f"full order, {name}")
         for level in LEVELS:
             axis.axhline(100 * level, color="0.85", lw=0.8, zorder=0)
         axis.set(xscale="log", yscale="log", title=f"{words}", ylabel="mean relative error, %")
+        number(axis, [(r["batch_s"], shown(r, q), str(r["id"])) for r in front])
     for axis in axes[1]:
-        axis.set_xlabel("seconds a solve, as a set")
+        axis.set_xlabel("seconds a solve, in a set")
     axes[0, 0].legend(fontsize=8, framealpha=0.9)
-    figure.suptitle(f"{case}: error against online time; the line joins the Pareto-optimal settings")
+    figure.suptitle(f"{case}: error against online time (numbers: settings; errors below {SHOWN:g} % are drawn there)")
     figure.savefig(path, dpi=110)
     plt.close(figure)
 
 
 def section(case, rows, full, words, picture):
-    """The text of docs/tradeoff.md for one case."""
+    """The text of docs/tradeoff/settings.md for one case."""
     failed = [r for r in rows if r["status"] != "ok"]
     return [words, "", f"![error against online time, {case.name}]({picture})", "",
             f"{len(rows)} settings ([csv]({picture.removesuffix('.png')}.csv)" + (f"; {len(failed)} of them gave no model or no converged solution" if failed else "")

@@ -23,8 +23,11 @@ struct _n_HycoWeighted {
 PetscErrorCode HycoWeightedCreate(PetscInt m, PetscInt n, const PetscReal S[], PetscReal shift, HycoWeighted *weighted)
 {
   HycoWeighted f;
+  PetscBLASInt rows, columns;
 
   PetscFunctionBegin;
+  PetscCall(PetscBLASIntCast(m, &rows)); /* the products call BLAS with m and n */
+  PetscCall(PetscBLASIntCast(n, &columns));
   PetscCall(PetscNew(&f));
   f->m = m;
   f->n = n;
@@ -182,6 +185,7 @@ static PetscInt Steepest(HycoWeighted f, PetscReal tol)
   return best;
 }
 
+/* No column is passive at first: the gradient is then S^T h. */
 static PetscErrorCode Begin(HycoWeighted f, const PetscReal d[], const PetscReal h[], PetscReal x[], PetscReal *size)
 {
   PetscFunctionBegin;

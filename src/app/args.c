@@ -3,6 +3,7 @@
 #include <ctype.h>
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 
 /* Options of PETSc, SLEPc and the solvers: recognised by their prefix, checked by the code that reads them; first
    those of the solvers that hyco creates. */
@@ -278,7 +279,7 @@ PetscErrorCode DriverHelp(const Command *command)
   printf("\nPETSc's options work too: -log_view, -info, -hyco_mumps_icntl_14 100 (MUMPS, solver of K), "
          "-hyco_primal_..., -hyco_tao_monitor, -hyco_pod_svd_view.\n");
   printf("Exit status: 0 success; 1 an error, in one line; 3 a model is written, but it misses a target or the default "
-         "limits; 130 a training was interrupted (Ctrl-C); the same command continues it.\n");
-  printf("Under MPI: mpiexec -n 2 hyco ...; set OPENBLAS_NUM_THREADS=1.\n");
+         "limits; 130 a training was interrupted (Ctrl-C; 143: terminated); the same command continues it.\n");
+  printf("Under MPI: mpiexec -n 2 hyco ...\n");
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -146,16 +146,19 @@ static void Print(const Check *check, PetscInt contact, const ContactRange *r)
   PetscReal stated;
 
   PetscCallVoid(HycoContactGetLength(c, "tolerance", &stated));
-  PetscCallVoid(Say("contact %s, %s: %d nodes of %s", c->name, ((PetscObject)c)->type_name, (int)r->n, c->slave));
-  if (c->master) PetscCallVoid(Say(" against %s", c->master));
+  PetscCallVoid(
+      DriverPrint("contact %s, %s: %d nodes of %s", c->name, ((PetscObject)c)->type_name, (int)r->n, c->slave));
+  if (c->master) PetscCallVoid(DriverPrint(" against %s", c->master));
   if (r->facing_max && c->master)
-    PetscCallVoid(r->facing_min == r->n ? Say(", all of which face it")
-                                        : Say(", %d to %d of which face it", (int)r->facing_min, (int)r->facing_max));
+    PetscCallVoid(r->facing_min == r->n
+                      ? DriverPrint(", all of which face it")
+                      : DriverPrint(", %d to %d of which face it", (int)r->facing_min, (int)r->facing_max));
   if (r->facing_max && r->facing_min < r->n && stated >= 0 && !HycoPairsFollows(&check->whole->pairs, contact))
-    PetscCallVoid(Say("; %d face nothing within the tolerance of %g", (int)(r->n - r->facing_max), (double)stated));
-  if (r->facing_max) PetscCallVoid(Say("; gaps from %.4g to %.4g", (double)r->gap_min, (double)r->gap_max));
-  if (r->facing_max && r->gap_min < 0) PetscCallVoid(Say(" (below 0 the bodies overlap before any load)"));
-  PetscCallVoid(Say("\n"));
+    PetscCallVoid(
+        DriverPrint("; %d face nothing within the tolerance of %g", (int)(r->n - r->facing_max), (double)stated));
+  if (r->facing_max) PetscCallVoid(DriverPrint("; gaps from %.4g to %.4g", (double)r->gap_min, (double)r->gap_max));
+  if (r->facing_max && r->gap_min < 0) PetscCallVoid(DriverPrint(" (below 0 the bodies overlap before any load)"));
+  PetscCallVoid(DriverPrint("\n"));
 }
 
 void CheckReportContacts(Check *check)
@@ -179,6 +182,6 @@ void CheckReportContacts(Check *check)
   }
   cJSON_AddNumberToObject(check->json, "n_without_effect", check->n_without);
   if (check->n_without)
-    PetscCallVoid(Say("%d contact%s between fixed displacements: without effect\n", (int)check->n_without,
-                      check->n_without > 1 ? "s lie" : " lies"));
+    PetscCallVoid(DriverPrint("%d contact%s between fixed displacements: without effect\n", (int)check->n_without,
+                              check->n_without > 1 ? "s lie" : " lies"));
 }

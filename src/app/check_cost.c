@@ -75,8 +75,8 @@ PetscErrorCode CheckReportSolve(Check *check, const PetscReal mu[], Cost *cost)
   cost->solved = PETSC_TRUE;
   cost->first = s.seconds.total;
   cost->next = s.seconds.solve;
-  PetscCall(Say("solved at the centre: %d of %d contacts closed, total contact force %.10g\n", (int)s.n_active,
-                (int)s.n_contacts, (double)s.total_contact_force));
+  PetscCall(DriverPrint("solved at the centre: %d of %d contacts closed, total contact force %.10g\n", (int)s.n_active,
+                        (int)s.n_contacts, (double)s.total_contact_force));
   ReportNumbers(check->json, {"n_active", s.n_active}, {"total_contact_force", s.total_contact_force});
   if (s.u_relative > 1 && check->warnings)
     CheckReportWarning(
@@ -125,7 +125,7 @@ static void Seconds(PetscReal t, char text[32])
     snprintf(text, 32, "%.2g hours", (double)t / 3600);
 }
 
-static PetscErrorCode SayTraining(Check *check, const Cost *cost, PetscBool given, cJSON *object)
+static PetscErrorCode PrintTraining(Check *check, const Cost *cost, PetscBool given, cJSON *object)
 {
   HycoFOM f = check->fom;
   const PetscReal values =
@@ -136,9 +136,10 @@ static PetscErrorCode SayTraining(Check *check, const Cost *cost, PetscBool give
 
   PetscFunctionBegin;
   Seconds(training, all);
-  PetscCall(Say("a training on %s%d solutions, including held-out ones: about %s of full-order solves, and %.3g MB of "
-                "solutions; the reduction is not included\n",
-                given ? "" : "for example ", (int)cost->n_training, all, 1e-6 * (double)snapshots));
+  PetscCall(DriverPrint(
+      "a training on %s%d solutions, including held-out ones: about %s of full-order solves, and %.3g MB of "
+      "solutions; the reduction is not included\n",
+      given ? "" : "for example ", (int)cost->n_training, all, 1e-6 * (double)snapshots));
   ReportNumbers(object, {"n_training", cost->n_training}, {"n_stiffness", cost->n_stiff},
                 {"seconds_training", training}, {"snapshots_mb", 1e-6 * snapshots});
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -154,16 +155,16 @@ PetscErrorCode CheckReportCost(Check *check, const Cost *cost, PetscBool given)
   Seconds(cost->first, first);
   Seconds(cost->next, next);
   if (n_times && cost->solved)
-    PetscCall(Say("a full-order solve of the history, as measured: %s", first));
+    PetscCall(DriverPrint("a full-order solve of the history, as measured: %s", first));
   else
-    PetscCall(Say("%s, %s: %s, or %s if the stiffness is unchanged",
-                  n_times ? "an iteration of a step of the history" : "a full-order solve",
-                  cost->solved ? "as measured" : "about", first, next));
-  PetscCall(Say("; %.3g MB, of which %.3g MB for the factor\n", 1e-6 * (double)(cost->resident + cost->bytes),
-                1e-6 * (double)cost->bytes));
+    PetscCall(DriverPrint("%s, %s: %s, or %s if the stiffness is unchanged",
+                          n_times ? "an iteration of a step of the history" : "a full-order solve",
+                          cost->solved ? "as measured" : "about", first, next));
+  PetscCall(DriverPrint("; %.3g MB, of which %.3g MB for the factor\n", 1e-6 * (double)(cost->resident + cost->bytes),
+                        1e-6 * (double)cost->bytes));
   cJSON_AddBoolToObject(object, "measured", cost->solved);
   ReportNumbers(object, {"factor_mb", 1e-6 * cost->bytes}, {"solve_mb", 1e-6 * (cost->resident + cost->bytes)},
                 {"seconds_first", cost->first}, {"seconds_next", cost->next});
-  if (!n_times) PetscCall(SayTraining(check, cost, given, object)); /* train refuses histories */
+  if (!n_times) PetscCall(PrintTraining(check, cost, given, object)); /* train refuses histories */
   PetscFunctionReturn(PETSC_SUCCESS);
 }

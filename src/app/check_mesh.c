@@ -2,6 +2,7 @@
 #include "check.h"
 #include <hycokinematics.h>
 #include <string.h>
+#include <strings.h>
 
 /* Cells with a larger aspect ratio are reported: the solver can handle them, but they resolve poorly along their
    length. */
@@ -147,11 +148,11 @@ PetscErrorCode CheckReportBodies(Check *check)
     cJSON_AddStringToObject(body, "name", s->body[b].name);
     ReportNumbers(body, {"n_cells", cells}, {"n_parts", parts[b]}, {"stretch", check->stretch[b]},
                   {"stretched_cell", check->stretched[b]});
-    PetscCall(Say("body %s: %d cells", s->body[b].name, (int)cells));
+    PetscCall(DriverPrint("body %s: %d cells", s->body[b].name, (int)cells));
     if (m->dim > 1)
-      PetscCall(Say("; the most stretched one, %d, is %.3g times as long as wide", (int)check->stretched[b],
-                    (double)check->stretch[b]));
-    PetscCall(Say("\n"));
+      PetscCall(DriverPrint("; the most stretched one, %d, is %.3g times as long as wide", (int)check->stretched[b],
+                            (double)check->stretch[b]));
+    PetscCall(DriverPrint("\n"));
     if (parts[b] > 1)
       CheckReportWarning(
           check,

@@ -111,7 +111,7 @@ static PetscErrorCode CheckPoint(Check *check, const PetscReal mu[], PetscBool f
 /* -- description of the scene: rank 0 -- */
 
 /* The number of nodes of each tie's slave; *n: of all ties. */
-static PetscErrorCode SayTies(Check *check, HycoMesh m, PetscInt *n)
+static PetscErrorCode PrintTies(Check *check, HycoMesh m, PetscInt *n)
 {
   HycoScene s = check->fom->scene;
   cJSON *list = cJSON_AddArrayToObject(check->json, "ties");
@@ -128,7 +128,8 @@ static PetscErrorCode SayTies(Check *check, HycoMesh m, PetscInt *n)
     cJSON_AddNumberToObject(one, "n_nodes", nodes);
     cJSON_AddItemToArray(list, one);
     PetscCall(CheckReportTie(check, t, one));
-    PetscCall(Say("tie %s: %d nodes of %s follow %s\n", s->tie[t].name, (int)nodes, s->tie[t].slave, s->tie[t].master));
+    PetscCall(DriverPrint("tie %s: %d nodes of %s follow %s\n", s->tie[t].name, (int)nodes, s->tie[t].slave,
+                          s->tie[t].master));
     *n += nodes;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -157,7 +158,7 @@ static PetscErrorCode NameCells(Check *check, char name[HYCO_LINE])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode SayMesh(Check *check)
+static PetscErrorCode PrintMesh(Check *check)
 {
   HycoFOM f = check->fom;
   HycoMesh m = f->part;
@@ -167,13 +168,14 @@ static PetscErrorCode SayMesh(Check *check)
 
   PetscFunctionBegin;
   PetscCall(HycoSceneGetTitle(f->scene, &title));
-  PetscCall(Say("scene: %s\n", title[0] ? title : "(no title)"));
+  PetscCall(DriverPrint("scene: %s\n", title[0] ? title : "(no title)"));
   PetscCall(NameCells(check, cells));
-  PetscCall(Say("mesh %s: %dD, %s%s, %d nodes, %d cells; %d free unknowns, and %d fixed by supports%s\n",
-                f->scene->dm ? "of the program" : f->scene->mesh_path, (int)m->dim, cells,
-                f->scene->face_nodes ? " (the file's hex20 cells with nodes on faces and inside, for contact)" : "",
-                (int)f->n_nodes, (int)f->n_cells, (int)f->n_free, (int)n_fixed, f->scene->n_ties ? " and ties" : ""));
-  PetscCall(SayTies(check, m, &n_tied));
+  PetscCall(
+      DriverPrint("mesh %s: %dD, %s%s, %d nodes, %d cells; %d free unknowns, and %d fixed by supports%s\n",
+                  f->scene->dm ? "of the program" : f->scene->mesh_path, (int)m->dim, cells,
+                  f->scene->face_nodes ? " (the file's hex20 cells with nodes on faces and inside, for contact)" : "",
+                  (int)f->n_nodes, (int)f->n_cells, (int)f->n_free, (int)n_fixed, f->scene->n_ties ? " and ties" : ""));
+  PetscCall(PrintTies(check, m, &n_tied));
   cJSON_AddNumberToObject(check->json, "dimension", m->dim);
   cJSON_AddStringToObject(check->json, "cell_type", HycoCellKinds[m->type].name);
   cJSON_AddBoolToObject(check->json, "hex20_as_hex27", f->scene->face_nodes);
@@ -220,7 +222,7 @@ static PetscErrorCode CheckOutputs(Check *check)
 
 /* Reports motions that the supports leave free: contact prevents them, or -hyco_regularise removes them; others are
    an error of the assembly. */
-static PetscErrorCode SayMotions(Check *check)
+static PetscErrorCode PrintMotions(Check *check)
 {
   HycoFOM f = check->whole;
   cJSON *list = cJSON_AddArrayToObject(check->json, "free_motions");
@@ -230,13 +232,13 @@ static PetscErrorCode SayMotions(Check *check)
   PetscFunctionBegin;
   cJSON_AddStringToObject(check->json, "regularised", f->summary.regularised);
   if (f->summary.regularised[0]) {
-    PetscCall(Say("regularised: neither supports nor contact keep %s\n", f->summary.regularised));
+    PetscCall(DriverPrint("regularised: neither supports nor contact keep %s\n", f->summary.regularised));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(HycoFEFreeMotions(HycoComm(f), f->fe, &free));
   for (PetscInt k = 0; k < free.n; k++) {
     cJSON_AddItemToArray(list, cJSON_CreateString(free.name[k]));
-    PetscCall(Say("no support keeps %s: contact alone does\n", free.name[k]));
+    PetscCall(DriverPrint("no support keeps %s: contact alone does\n", free.name[k]));
     loose += !IsRigidBodys(f, free.motion + k * HycoFEUnknowns(f->fe));
   }
   if (loose)
@@ -294,7 +296,7 @@ static void FindReach(HycoScene s, PetscInt p, PetscBool does[N_REACHED])
 }
 
 /* Reports a parameter, or the time of a history, or one of its tables. */
-static PetscErrorCode SayReach(Check *check, PetscInt p, cJSON *reaches)
+static PetscErrorCode PrintReach(Check *check, PetscInt p, cJSON *reaches)
 {
   HycoScene s = check->fom->scene;
   PetscBool does[N_REACHED] = {PETSC_FALSE};
@@ -312,15 +314,15 @@ static PetscErrorCode SayReach(Check *check, PetscInt p, cJSON *reaches)
   if (!words[0] && p == s->n_parameters)
     PetscFunctionReturn(PETSC_SUCCESS); /* laws and tables depend on time in any
                                            case */
-  PetscCall(Say("%s %s", what, s->parameter[p]));
-  if (p < s->n_parameters) PetscCall(Say(" from %g to %g", (double)s->lo[p], (double)s->hi[p]));
-  PetscCall(Say(": affects %s\n", words[0] ? words : "nothing"));
+  PetscCall(DriverPrint("%s %s", what, s->parameter[p]));
+  if (p < s->n_parameters) PetscCall(DriverPrint(" from %g to %g", (double)s->lo[p], (double)s->hi[p]));
+  PetscCall(DriverPrint(": affects %s\n", words[0] ? words : "nothing"));
   if (p < s->n_parameters && does[STIFFNESS] && !does[MAPS] && s->lo[p] > 0 && s->hi[p] >= WIDE * s->lo[p]) {
     cJSON_AddItemToArray(cJSON_GetObjectItem(check->json, "wide_ranges"), cJSON_CreateString(s->parameter[p]));
-    PetscCall(
-        Say("  for a condensed model, let its logarithm be the parameter: q from %.4g to %.4g, and 10^q in place of "
-            "%s\n",
-            log10((double)s->lo[p]), log10((double)s->hi[p]), s->parameter[p]));
+    PetscCall(DriverPrint(
+        "  for a condensed model, let its logarithm be the parameter: q from %.4g to %.4g, and 10^q in place of "
+        "%s\n",
+        log10((double)s->lo[p]), log10((double)s->hi[p]), s->parameter[p]));
   }
   if (!words[0]) CheckReportWarning(check, "the %s %s affects nothing: no expression uses it", what, s->parameter[p]);
   if (p < s->n_parameters && s->lo[p] == s->hi[p])
@@ -334,30 +336,31 @@ static PetscErrorCode Describe(Check *check)
   cJSON *reaches;
 
   PetscFunctionBegin;
-  PetscCall(SayMesh(check));
+  PetscCall(PrintMesh(check));
   PetscCall(CheckReportBodies(check));
   CheckReportContacts(check);
-  PetscCall(SayMotions(check));
+  PetscCall(PrintMotions(check));
   PetscCall(CheckOutputs(check));
   reaches = cJSON_AddObjectToObject(check->json, "parameters");
   cJSON_AddArrayToObject(check->json, "wide_ranges");
-  for (PetscInt p = 0; p < s->n_variables; p++) PetscCall(SayReach(check, p, reaches));
+  for (PetscInt p = 0; p < s->n_variables; p++) PetscCall(PrintReach(check, p, reaches));
   if (s->n_times)
-    PetscCall(Say("history of %d times from %g to %g\n", (int)s->n_times, (double)s->times[0],
-                  (double)s->times[s->n_times - 1]));
+    PetscCall(DriverPrint("history of %d times from %g to %g\n", (int)s->n_times, (double)s->times[0],
+                          (double)s->times[s->n_times - 1]));
   cJSON_AddNumberToObject(check->json, "n_times", s->n_times);
   PetscCall(CheckReportGroups(check));
-  PetscCall(Say("%d point%s of the ranges assembled%s%s\n", (int)check->n_points, check->n_points > 1 ? "s" : "",
-                s->n_parameters > MOST_CORNERS ? ": the centre and the ends of each parameter"
-                : s->n_parameters              ? ": the centre and the corners"
-                                               : "",
-                s->n_times ? ", each at the first and the last time" : ""));
+  PetscCall(DriverPrint("%d point%s of the ranges assembled%s%s\n", (int)check->n_points,
+                        check->n_points > 1 ? "s" : "",
+                        s->n_parameters > MOST_CORNERS ? ": the centre and the ends of each parameter"
+                        : s->n_parameters              ? ": the centre and the corners"
+                                                       : "",
+                        s->n_times ? ", each at the first and the last time" : ""));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* How the parameters enter the bodies, with changes from the point mu; of scenes with contact whose bodies are all
    linear. Collective. */
-static PetscErrorCode SayBodies(Check *check, const PetscReal mu[])
+static PetscErrorCode PrintBodies(Check *check, const PetscReal mu[])
 {
   HycoFOM f = check->fom;
   HycoBodyParts parts;
@@ -368,7 +371,7 @@ static PetscErrorCode SayBodies(Check *check, const PetscReal mu[])
   PetscCall(HycoBodyPartsFind(f, mu, &parts));
   PetscCall(HycoBodyPartsDescribe(f->scene, &parts, text));
   PetscCall(HycoBodyPartsDestroy(&parts));
-  PetscCall(Say("%s\n", text));
+  PetscCall(DriverPrint("%s\n", text));
   if (check->json) cJSON_AddStringToObject(check->json, "bodies_by_parameter", text);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -424,8 +427,8 @@ static PetscErrorCode Finish(Check *check)
 
   PetscFunctionBegin;
   for (int k = 0; k < n; k++)
-    PetscCall(Say("warning: %s\n", cJSON_GetStringValue(cJSON_GetArrayItem(check->warnings, k))));
-  PetscCall(Say("%d warning%s, no error\n", n, n == 1 ? "" : "s"));
+    PetscCall(DriverPrint("warning: %s\n", cJSON_GetStringValue(cJSON_GetArrayItem(check->warnings, k))));
+  PetscCall(DriverPrint("%d warning%s, no error\n", n, n == 1 ? "" : "s"));
   cJSON_AddItemToObject(check->json, "warnings", check->warnings);
   cJSON_AddNumberToObject(check->json, "n_warnings", n);
   PetscCall(ReportWrite(&check->json));
@@ -449,7 +452,7 @@ static PetscErrorCode Visit(Check *check, PetscBool solve, Cost *cost)
   begin = HycoNow() - begin;
   PetscCall(CheckReportEstimate(check, begin, cost));
   HycoOnRoot(HycoComm(check->fom), Describe(check));
-  PetscCall(SayBodies(check, mu));
+  PetscCall(PrintBodies(check, mu));
   if (solve) PetscCall(CheckReportSolve(check, mu, cost));
   PetscCall(PetscFree(mu));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,6 +1,6 @@
 /* hyco compare: compares the reduced model with full order over a set of points, or of paths in full order's steps. */
 #include "driver.h"
-#include <hycosnapshotsimpl.h>
+#include <hycoqueue.h>
 #include <math.h>
 
 /* The outputs that the scenes of a full-order solution and of a model have in common, and their numbers in both. */

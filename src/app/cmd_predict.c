@@ -39,7 +39,7 @@ static PetscErrorCode ReportEstimates(cJSON *json, HycoScene scene, const HycoPr
 }
 
 /* "estimated errors of the outputs: peak 0.012, tip none": absolute, in the units of the outputs. */
-static PetscErrorCode SayOutputEstimates(HycoScene scene, const HycoPrediction *p)
+static PetscErrorCode PrintOutputEstimates(HycoScene scene, const HycoPrediction *p)
 {
   const char *names[HYCO_MAX_QUANTITIES];
   PetscInt n;
@@ -47,17 +47,17 @@ static PetscErrorCode SayOutputEstimates(HycoScene scene, const HycoPrediction *
   PetscFunctionBegin;
   PetscCall(HycoSceneGetQuantities(scene, &n, names));
   for (PetscInt q = 0; q < n; q++) {
-    PetscCall(Say("%s%s ", q ? ", " : "estimated errors of the outputs: ", names[q]));
+    PetscCall(DriverPrint("%s%s ", q ? ", " : "estimated errors of the outputs: ", names[q]));
     if (p->estimated_error_quantity[q] >= 0)
-      PetscCall(Say("%.3g", (double)p->estimated_error_quantity[q]));
+      PetscCall(DriverPrint("%.3g", (double)p->estimated_error_quantity[q]));
     else
-      PetscCall(Say("none"));
+      PetscCall(DriverPrint("none"));
   }
-  if (n) PetscCall(Say("\n"));
+  if (n) PetscCall(DriverPrint("\n"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode SayEstimates(HycoScene scene, const HycoPrediction *p)
+static PetscErrorCode PrintEstimates(HycoScene scene, const HycoPrediction *p)
 {
   const PetscReal estimate[3] = {p->estimated_error_u, p->estimated_error_sigma, p->estimated_error_lambda};
   char words[3][32];
@@ -69,15 +69,16 @@ static PetscErrorCode SayEstimates(HycoScene scene, const HycoPrediction *p)
     else
       snprintf(words[k], sizeof(words[k]), "none");
   }
-  PetscCall(Say("estimated errors: u %s, stress %s, contact forces %s\n", words[0], words[1], words[2]));
-  PetscCall(SayOutputEstimates(scene, p));
+  PetscCall(DriverPrint("estimated errors: u %s, stress %s, contact forces %s\n", words[0], words[1], words[2]));
+  PetscCall(PrintOutputEstimates(scene, p));
   DriverPercent(p->beyond, words[0]);
-  if (p->beyond > 0) PetscCall(Say("EXTRAPOLATED: outside the region of training by %s of a range\n", words[0]));
+  if (p->beyond > 0)
+    PetscCall(DriverPrint("EXTRAPOLATED: outside the region of training by %s of a range\n", words[0]));
   if (p->unseen > HYCO_UNSEEN)
-    PetscCall(
-        Say("UNSEEN REGIME: the %s is %.3g times the largest at the held-out points; the estimates are multiplied "
-            "by it (up to 100), and are not tested\n",
-            HycoFeatureNames[p->unseen_feature], (double)p->unseen));
+    PetscCall(DriverPrint(
+        "UNSEEN REGIME: the %s is %.3g times the largest at the held-out points; the estimates are multiplied "
+        "by it (up to 100), and are not tested\n",
+        HycoFeatureNames[p->unseen_feature], (double)p->unseen));
   if (p->inconsistent)
     PetscCall(
         DriverMissed("the displacements do not follow the contact forces: at closed contacts they miss the gaps by "
@@ -134,21 +135,22 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode SayReduced(const HycoPrediction *p)
+static PetscErrorCode PrintReduced(const HycoPrediction *p)
 {
   PetscFunctionBegin;
   if (p->gives_forces)
-    PetscCall(Say("%s: %d contacts, %d modes\n", p->title, (int)p->n_contacts, (int)p->n_modes));
+    PetscCall(DriverPrint("%s: %d contacts, %d modes\n", p->title, (int)p->n_contacts, (int)p->n_modes));
   else if (p->rid_fraction < 1 && p->n_multipliers != p->n_contacts)
-    PetscCall(Say("%s: %d modes, %d force vectors for %d contacts; %d elements (%.1f %%)\n", p->title, (int)p->n_modes,
-                  (int)p->n_multipliers, (int)p->n_contacts, (int)p->rid_elements, 100 * (double)p->rid_fraction));
+    PetscCall(DriverPrint("%s: %d modes, %d force vectors for %d contacts; %d elements (%.1f %%)\n", p->title,
+                          (int)p->n_modes, (int)p->n_multipliers, (int)p->n_contacts, (int)p->rid_elements,
+                          100 * (double)p->rid_fraction));
   else if (p->n_fe_dofs || p->rid_fraction < 1)
-    PetscCall(Say("%d modes, %d full-order displacements, %d contacts on an RID of %d elements (%.1f %%)\n",
-                  (int)p->n_modes, (int)p->n_fe_dofs, (int)p->n_contacts, (int)p->rid_elements,
-                  100 * (double)p->rid_fraction));
+    PetscCall(DriverPrint("%d modes, %d full-order displacements, %d contacts on an RID of %d elements (%.1f %%)\n",
+                          (int)p->n_modes, (int)p->n_fe_dofs, (int)p->n_contacts, (int)p->rid_elements,
+                          100 * (double)p->rid_fraction));
   else
-    PetscCall(Say("%s: %d modes, %d force vectors for %d contacts; the whole mesh, %d elements\n", p->title,
-                  (int)p->n_modes, (int)p->n_multipliers, (int)p->n_contacts, (int)p->rid_elements));
+    PetscCall(DriverPrint("%s: %d modes, %d force vectors for %d contacts; the whole mesh, %d elements\n", p->title,
+                          (int)p->n_modes, (int)p->n_multipliers, (int)p->n_contacts, (int)p->rid_elements));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -173,13 +175,13 @@ static PetscErrorCode One(HycoROM model, HycoScene scene, Fallback *fallback, co
   DriverWantsFullOrder(fallback, &p, why);
   if (why[0]) {
     PetscCall(DriverSolveFullOrder(fallback, n, mu, &p));
-    PetscCall(Say("FULL ORDER instead of the reduced model: %s\n", why));
+    PetscCall(DriverPrint("FULL ORDER instead of the reduced model: %s\n", why));
   } else {
-    PetscCall(SayReduced(&p));
+    PetscCall(PrintReduced(&p));
     if (fallback->displacement) {
       PetscCall(DriverSolveDisplacement(fallback, model, n, mu, &p));
-      PetscCall(
-          Say("one full-order solve with these forces: displacements of the whole mesh, residuals of full order\n"));
+      PetscCall(DriverPrint(
+          "one full-order solve with these forces: displacements of the whole mesh, residuals of full order\n"));
     }
   }
   PetscCall(DriverCheckLeft());
@@ -191,14 +193,14 @@ static PetscErrorCode One(HycoROM model, HycoScene scene, Fallback *fallback, co
   else if (output[0])
     HycoOnRoot(PETSC_COMM_WORLD, HycoROMWrite(model, output));
   if (!why[0]) snprintf(covered, sizeof(covered), " (%.1f %% of it in the RID)", 100 * (double)p.covered_force);
-  PetscCall(Say("total contact force %.10g%s, %d of %d contacts active; %s after %d iterations\n",
-                (double)p.total_contact_force, covered, (int)p.n_active, (int)p.n_all_contacts,
-                HycoReasonName(p.reason), (int)p.iterations));
-  PetscCall(Say("KKT residuals: stationarity %.1e, penetration %.1e, adhesion %.1e, complementarity %.1e\n",
-                (double)p.kkt.stationarity, (double)p.kkt.penetration, (double)p.kkt.adhesion,
-                (double)p.kkt.complementarity));
-  if (!why[0]) PetscCall(SayEstimates(scene, &p));
-  PetscCall(Say("seconds: %.6f set-up, %.6f prediction\n", (double)p.seconds.setup, (double)p.seconds.total));
+  PetscCall(DriverPrint("total contact force %.10g%s, %d of %d contacts active; %s after %d iterations\n",
+                        (double)p.total_contact_force, covered, (int)p.n_active, (int)p.n_all_contacts,
+                        HycoReasonName(p.reason), (int)p.iterations));
+  PetscCall(DriverPrint("KKT residuals: stationarity %.1e, penetration %.1e, adhesion %.1e, complementarity %.1e\n",
+                        (double)p.kkt.stationarity, (double)p.kkt.penetration, (double)p.kkt.adhesion,
+                        (double)p.kkt.complementarity));
+  if (!why[0]) PetscCall(PrintEstimates(scene, &p));
+  PetscCall(DriverPrint("seconds: %.6f set-up, %.6f prediction\n", (double)p.seconds.setup, (double)p.seconds.total));
   if (why[0] || fallback->displacement)
     energy = fallback->strain_energy;
   else
@@ -232,16 +234,16 @@ static PetscErrorCode Path(HycoROM model, HycoScene scene, const char output[])
   HycoCheck(path.n, "no prediction: %s; nothing was written", path.why);
   HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetPrediction(model, &p));
   PetscCallMPI(MPI_Bcast(&p, sizeof(p), MPI_BYTE, 0, PETSC_COMM_WORLD));
-  PetscCall(SayReduced(&p));
-  PetscCall(DriverSayReducedPath(scene, mu, &path, table));
+  PetscCall(PrintReduced(&p));
+  PetscCall(DriverPrintReducedPath(scene, mu, &path, table));
   if (output[0]) HycoOnRoot(PETSC_COMM_WORLD, HycoROMWrite(model, output));
-  PetscCall(
-      Say("%d iterations; KKT residuals: stationarity %.1e, penetration %.1e, adhesion %.1e, complementarity %.1e\n",
-          (int)p.iterations, (double)p.kkt.stationarity, (double)p.kkt.penetration, (double)p.kkt.adhesion,
-          (double)p.kkt.complementarity));
-  PetscCall(SayEstimates(scene, &p));
-  PetscCall(DriverSayEquilibrium(&path));
-  PetscCall(Say("seconds: %.6f set-up, %.6f prediction\n", (double)p.seconds.setup, (double)p.seconds.total));
+  PetscCall(DriverPrint(
+      "%d iterations; KKT residuals: stationarity %.1e, penetration %.1e, adhesion %.1e, complementarity %.1e\n",
+      (int)p.iterations, (double)p.kkt.stationarity, (double)p.kkt.penetration, (double)p.kkt.adhesion,
+      (double)p.kkt.complementarity));
+  PetscCall(PrintEstimates(scene, &p));
+  PetscCall(DriverPrintEquilibrium(&path));
+  PetscCall(DriverPrint("seconds: %.6f set-up, %.6f prediction\n", (double)p.seconds.setup, (double)p.seconds.total));
   HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetStrainEnergy(model, &energy));
   PetscCall(DriverGetCarried(model, scene, &n_carried, &carried));
   PetscCall(Report(scene, mu, &p, n_carried, carried, energy, "", PETSC_FALSE, &path));
@@ -455,16 +457,16 @@ static PetscErrorCode PredictQueued(HycoROM model, PetscInt each, PetscInt n_par
 }
 
 /* Reports the points of all ranks at which the model's estimates or displacements are in doubt. */
-static PetscErrorCode SayDoubts(PetscInt n, const Taken *t)
+static PetscErrorCode PrintDoubts(PetscInt n, const Taken *t)
 {
   PetscInt count[2] = {t->n_unseen, t->n_inconsistent};
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, count, 2, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD));
   if (count[0])
-    PetscCall(
-        Say("UNSEEN REGIME at %d of %d points: column unseen is above %d, and the estimates are not tested there\n",
-            (int)count[0], (int)n, HYCO_UNSEEN));
+    PetscCall(DriverPrint(
+        "UNSEEN REGIME at %d of %d points: column unseen is above %d, and the estimates are not tested there\n",
+        (int)count[0], (int)n, HYCO_UNSEEN));
   if (count[1])
     PetscCall(DriverMissed("the displacements do not follow the contact forces at %d of %d points (column "
                            "inconsistency); add training points, or use -hyco_fallback",
@@ -486,7 +488,7 @@ static PetscErrorCode PredictAll(HycoROM model, const Fallback *fallback, PetscI
   PetscCall(HycoQueueCreate(PETSC_COMM_WORLD, size, (rows->n + each - 1) / each, NULL, &taken.queue));
   HycoOnEach(PETSC_COMM_WORLD, HycoQueueEnd(taken.queue, PredictQueued(model, each, n_par, mu, &taken, rows)));
   PetscCall(HycoQueueDestroy(&taken.queue));
-  PetscCall(SayDoubts(rows->n, &taken));
+  PetscCall(PrintDoubts(rows->n, &taken));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -557,7 +559,7 @@ static PetscErrorCode SolveRest(Fallback *fallback, PetscInt n_par, const PetscR
     FillRow(&p, n_carried, carried, s, v);
     v[U_NORM] = NAN; /* that of the whole mesh, not of an RID */
   }
-  PetscCall(Say("%d of the %d points were solved at full order\n", (int)n, (int)rows->n));
+  PetscCall(DriverPrint("%d of the %d points were solved at full order\n", (int)n, (int)rows->n));
   PetscCall(PetscFree(list));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -5,15 +5,16 @@
 static PetscErrorCode Remarks(const HycoSummary *s)
 {
   PetscFunctionBegin;
-  if (s->regularised[0]) PetscCall(Say("regularised: neither supports nor contact keep %s\n", s->regularised));
-  if (s->loose[0]) PetscCall(Say("warning: no contact force keeps %s: its position is arbitrary\n", s->loose));
+  if (s->regularised[0]) PetscCall(DriverPrint("regularised: neither supports nor contact keep %s\n", s->regularised));
+  if (s->loose[0]) PetscCall(DriverPrint("warning: no contact force keeps %s: its position is arbitrary\n", s->loose));
   if (s->n_still)
-    PetscCall(Say("%d contact%s between fixed displacements: without effect\n", (int)s->n_still,
-                  s->n_still > 1 ? "s lie" : " lies"));
+    PetscCall(DriverPrint("%d contact%s between fixed displacements: without effect\n", (int)s->n_still,
+                          s->n_still > 1 ? "s lie" : " lies"));
   if (s->n_dependent)
-    PetscCall(Say("contact forces are not unique: %d closed contact%s linearly on the others (more slaves than their "
-                  "masters' unknowns); displacements and resultants are unique\n",
-                  (int)s->n_dependent, s->n_dependent > 1 ? "s depend" : " depends"));
+    PetscCall(
+        DriverPrint("contact forces are not unique: %d closed contact%s linearly on the others (more slaves than their "
+                    "masters' unknowns); displacements and resultants are unique\n",
+                    (int)s->n_dependent, s->n_dependent > 1 ? "s depend" : " depends"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -22,13 +23,13 @@ static PetscErrorCode WarnOfUnits(PetscReal u_relative)
 {
   PetscFunctionBegin;
   if (u_relative > 1)
-    PetscCall(
-        Say("warning: displacements of %.1e times the extent of the mesh; are the units right?\n", (double)u_relative));
+    PetscCall(DriverPrint("warning: displacements of %.1e times the extent of the mesh; are the units right?\n",
+                          (double)u_relative));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Reports the reactions, and the imbalance of all forces. */
-static PetscErrorCode SayReactions(cJSON *json, HycoFOM fom, PetscInt dim)
+static PetscErrorCode PrintReactions(cJSON *json, HycoFOM fom, PetscInt dim)
 {
   static const char *const section[] = {"supports", "springs", "loads", "contact"};
   const HycoReaction *r;
@@ -46,9 +47,9 @@ static PetscErrorCode SayReactions(cJSON *json, HycoFOM fom, PetscInt dim)
     if (dim == 2) ReportVector(one, "moment", 1, r[k].moment + 2);
     if (dim == 3) ReportVector(one, "moment", 3, r[k].moment);
     if (r[k].group[0])
-      PetscCall(Say("%s %s: force on the bodies (%.6g, %.6g, %.6g)\n",
-                    r[k].kind == HYCO_REACTION_SPRING ? "springs" : "support", r[k].group, (double)r[k].force[0],
-                    (double)r[k].force[1], (double)r[k].force[2]));
+      PetscCall(DriverPrint("%s %s: force on the bodies (%.6g, %.6g, %.6g)\n",
+                            r[k].kind == HYCO_REACTION_SPRING ? "springs" : "support", r[k].group,
+                            (double)r[k].force[0], (double)r[k].force[1], (double)r[k].force[2]));
   }
   cJSON_AddNumberToObject(json, "balance", balance);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -89,26 +90,26 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
   ReportSeconds(json, &s->seconds);
   PetscCall(HycoFOMGetHistory(fom, &history));
   if (history.n) PetscCall(DriverReportHistory(json, scene, &history));
-  PetscCall(Say("%d unknowns, %d contacts, %d active after %d iterations (%s)\n", (int)s->n_dof, (int)s->n_contacts,
-                (int)s->n_active, (int)s->iterations, method));
+  PetscCall(DriverPrint("%d unknowns, %d contacts, %d active after %d iterations (%s)\n", (int)s->n_dof,
+                        (int)s->n_contacts, (int)s->n_active, (int)s->iterations, method));
   PetscCall(Remarks(s));
   PetscCall(WarnOfUnits(s->u_relative));
-  PetscCall(Say("total contact force %.10g, largest %.6g; strain energy %.10g, identity to %.1e\n",
-                (double)s->total_contact_force, (double)s->lambda_max, (double)s->strain_energy,
-                (double)s->energy_defect));
+  PetscCall(DriverPrint("total contact force %.10g, largest %.6g; strain energy %.10g, identity to %.1e\n",
+                        (double)s->total_contact_force, (double)s->lambda_max, (double)s->strain_energy,
+                        (double)s->energy_defect));
   PetscCall(HycoFOMGetContacts(fom, &n, &carried));
   PetscCall(DriverReportCarried(json, s->dim, n, carried));
-  PetscCall(SayReactions(json, fom, s->dim));
+  PetscCall(PrintReactions(json, fom, s->dim));
   PetscCall(ReportQuantities(json, scene, s->quantity));
-  PetscCall(
-      Say("KKT residuals: stationarity %.1e (round-off %.1e), penetration %.1e, adhesion %.1e, complementarity %.1e\n",
-          (double)s->kkt.stationarity, (double)s->kkt.rounding, (double)s->kkt.penetration, (double)s->kkt.adhesion,
-          (double)s->kkt.complementarity));
+  PetscCall(DriverPrint(
+      "KKT residuals: stationarity %.1e (round-off %.1e), penetration %.1e, adhesion %.1e, complementarity %.1e\n",
+      (double)s->kkt.stationarity, (double)s->kkt.rounding, (double)s->kkt.penetration, (double)s->kkt.adhesion,
+      (double)s->kkt.complementarity));
   if (s->n_facing && s->n_facing < s->n_contacts)
-    PetscCall(Say("%d of the %d slave nodes face a master\n", (int)s->n_facing, (int)s->n_contacts));
+    PetscCall(DriverPrint("%d of the %d slave nodes face a master\n", (int)s->n_facing, (int)s->n_contacts));
   PetscCall(ReportContacts(json, s->n_contacts, s->n_facing, s->overlap, s->sliding));
-  PetscCall(Say("seconds: %.3f assemble, %.3f factor, %.3f solve (%s)\n", (double)s->seconds.assemble,
-                (double)s->seconds.factor, (double)s->seconds.solve, linear));
+  PetscCall(DriverPrint("seconds: %.3f assemble, %.3f factor, %.3f solve (%s)\n", (double)s->seconds.assemble,
+                        (double)s->seconds.factor, (double)s->seconds.solve, linear));
   PetscCall(ReportWrite(&json));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -42,7 +42,7 @@ static PetscErrorCode ReportGroups(cJSON *json, HycoReducer reducer)
 
 /* The time of a prediction beside that of a full-order solution, if this run has solved any; one group of ranks solves
    one at a time. */
-static PetscErrorCode SayGain(HycoReducer reducer, const HycoTraining *t)
+static PetscErrorCode PrintGain(HycoReducer reducer, const HycoTraining *t)
 {
   PetscInt n, solved = 0;
   const PetscInt *of;
@@ -53,10 +53,10 @@ static PetscErrorCode SayGain(HycoReducer reducer, const HycoTraining *t)
   for (PetscInt k = 0; k < n; k++) solved += of[k];
   if (!solved || !t->held_out.n || !(t->held_out.seconds > 0)) PetscFunctionReturn(PETSC_SUCCESS);
   each = n * t->seconds_snapshots / solved;
-  PetscCall(Say("a prediction takes %.3g ms, a full-order solution took %.3g ms%s\n", 1e3 * (double)t->held_out.seconds,
-                1e3 * (double)each,
-                each < HARDLY * t->held_out.seconds ? ": this model gains little, looser targets may give a faster one"
-                                                    : ""));
+  PetscCall(DriverPrint(
+      "a prediction takes %.3g ms, a full-order solution took %.3g ms%s\n", 1e3 * (double)t->held_out.seconds,
+      1e3 * (double)each,
+      each < HARDLY * t->held_out.seconds ? ": this model gains little, looser targets may give a faster one" : ""));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -147,8 +147,8 @@ static PetscErrorCode TakeOnce(HycoSamples samples, const char what[])
   PetscCall(HycoSamplesDropTwins(samples, &dropped));
   PetscCall(HycoSamplesGet(samples, &n, NULL, NULL));
   if (dropped)
-    PetscCall(Say("%d of the %d %s points are duplicates; each of the %d different points is used once\n", (int)dropped,
-                  (int)(n + dropped), what, (int)n));
+    PetscCall(DriverPrint("%d of the %d %s points are duplicates; each of the %d different points is used once\n",
+                          (int)dropped, (int)(n + dropped), what, (int)n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -231,21 +231,22 @@ PetscErrorCode CommandTrain(void)
     PetscCall(HycoReducerRunGreedy(reducer, given ? samples : NULL, training, model, &t));
   else
     PetscCall(HycoReducerRun(reducer, given ? samples : NULL, model, &t));
-  PetscCall(Say("%s", t.summary));
+  PetscCall(DriverPrint("%s", t.summary));
   if (t.missed[0]) PetscCall(DriverMissed("%s", t.missed));
   if (t.error_u >= 0) {
-    PetscCall(Say("mean training errors: u %.2e, %sforces %.2e", (double)t.error_u, t.chosen.settings.rid ? "RID " : "",
-                  (double)t.error_lambda));
-    if (t.condition > 0) PetscCall(Say("; condition of the reduced stiffness %.1e", (double)t.condition));
-    PetscCall(Say("\n"));
+    PetscCall(DriverPrint("mean training errors: u %.2e, %sforces %.2e", (double)t.error_u,
+                          t.chosen.settings.rid ? "RID " : "", (double)t.error_lambda));
+    if (t.condition > 0) PetscCall(DriverPrint("; condition of the reduced stiffness %.1e", (double)t.condition));
+    PetscCall(DriverPrint("\n"));
   }
   if (t.scan.n)
-    PetscCall(Say("scan of the ranges: %d points, smallest singular value %.1e of the largest%s\n", (int)t.scan.n,
-                  (double)t.scan.smallest, t.scan.n_singular ? "; SINGULAR inside, kept by -hyco_keep_singular" : ""));
+    PetscCall(DriverPrint("scan of the ranges: %d points, smallest singular value %.1e of the largest%s\n",
+                          (int)t.scan.n, (double)t.scan.smallest,
+                          t.scan.n_singular ? "; SINGULAR inside, kept by -hyco_keep_singular" : ""));
   PetscCall(DriverJudgeModel(&search, &t));
-  PetscCall(SayGain(reducer, &t));
-  PetscCall(Say("seconds: %.2f snapshots, %.2f reduction; model in %s\n", (double)t.seconds_snapshots,
-                (double)t.seconds_reduction, model));
+  PetscCall(PrintGain(reducer, &t));
+  PetscCall(DriverPrint("seconds: %.2f snapshots, %.2f reduction; model in %s\n", (double)t.seconds_snapshots,
+                        (double)t.seconds_reduction, model));
   if (greedy) PetscCall(DriverJudgeGreedy(&log));
   PetscCall(Report(scene, reducer, &t, &log, &search));
   PetscCall(PetscFree(search.text));

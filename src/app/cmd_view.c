@@ -1,6 +1,5 @@
 /* hyco view: describes a model or a scene. */
 #include "driver.h"
-#include <hycomesh.h>
 #include <petscviewer.h>
 
 PetscErrorCode DeclareView(PetscOptions options)
@@ -18,7 +17,6 @@ PetscErrorCode CommandView(void)
   char path[PETSC_MAX_PATH_LEN], file[PETSC_MAX_PATH_LEN];
   HycoROM model = NULL;
   HycoScene scene;
-  HycoMesh mesh;
   PetscMPIInt rank;
 
   PetscFunctionBegin;
@@ -33,8 +31,7 @@ PetscErrorCode CommandView(void)
   } else {
     PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
     PetscCall(DriverCheckLeft());
-    PetscCall(HycoMeshCreate(PETSC_COMM_WORLD, scene, &mesh)); /* fails if it, or a group, is missing */
-    PetscCall(HycoMeshDestroy(&mesh));
+    PetscCall(HycoSceneCheckMesh(PETSC_COMM_WORLD, scene));
     if (rank == 0) PetscCall(HycoSceneView(scene, PETSC_VIEWER_STDOUT_SELF));
     PetscCall(HycoSceneDestroy(&scene));
   }

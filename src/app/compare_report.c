@@ -105,13 +105,14 @@ static PetscErrorCode JudgeEstimates(cJSON *json, const DriverColumns *c, PetscI
     qsort(ratio, (size_t)m, sizeof(*ratio), CompareReal);
     ReportNumbers(cJSON_AddObjectToObject(all, keys[e]), {"bounded", (PetscReal)bounded / m},
                   {"median_ratio", ratio[m / 2]}, {"worst_error_over_estimate", worst});
-    PetscCall(Say("estimates of %s: at least the error at %.1f %% of the points; estimate / error %.3g in the median, "
-                  "error / estimate at most %.3g\n",
-                  words[e], 100. * bounded / m, (double)ratio[m / 2], (double)worst));
+    PetscCall(DriverPrint(
+        "estimates of %s: at least the error at %.1f %% of the points; estimate / error %.3g in the median, "
+        "error / estimate at most %.3g\n",
+        words[e], 100. * bounded / m, (double)ratio[m / 2], (double)worst));
   }
   for (PetscInt k = 0; k < n; k++) unseen += value[k * c->n + c->estimates + DRIVER_ESTIMATES] > HYCO_UNSEEN;
   cJSON_AddNumberToObject(all, "unseen", unseen);
-  if (unseen) PetscCall(Say("unseen regime at %d of %d points\n", (int)unseen, (int)n));
+  if (unseen) PetscCall(DriverPrint("unseen regime at %d of %d points\n", (int)unseen, (int)n));
   PetscCall(PetscFree2(ratio, error));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -154,16 +155,18 @@ static PetscErrorCode ReportPoints(cJSON *json, PetscBool contact, const Totals 
 {
   PetscFunctionBegin;
   ReportNumbers(cJSON_AddObjectToObject(json, "speedup"), {"mean", t->speedup}, {"median", t->median});
-  PetscCall(Say("speed-up: mean %.3g, median %.3g\n", (double)t->speedup, (double)t->median));
+  PetscCall(DriverPrint("speed-up over full order, which keeps its factor: mean %.3g, median %.3g\n",
+                        (double)t->speedup, (double)t->median));
   if (contact) {
     ReportNumbers(cJSON_AddObjectToObject(json, "covered_force"), {"mean", t->covered[0]}, {"min", t->covered[1]});
-    PetscCall(Say("contact force in the RID: mean %.1f %%, least %.1f %%\n", 100 * (double)t->covered[0],
-                  100 * (double)t->covered[1]));
+    PetscCall(DriverPrint("contact force in the RID: mean %.1f %%, least %.1f %%\n", 100 * (double)t->covered[0],
+                          100 * (double)t->covered[1]));
   }
   ReportNumbers(json, {"undefined", t->undefined}, {"not_converged", t->failed}, {"fallback", t->fallback},
                 {"kkt_max", t->kkt});
-  PetscCall(Say("%d not converged, %d by the fallback solver, %d errors undefined (x/0); largest KKT residual %.1e\n",
-                (int)t->failed, (int)t->fallback, (int)t->undefined, (double)t->kkt));
+  PetscCall(
+      DriverPrint("%d not converged, %d by the fallback solver, %d errors undefined (x/0); largest KKT residual %.1e\n",
+                  (int)t->failed, (int)t->fallback, (int)t->undefined, (double)t->kkt));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -172,7 +175,7 @@ static PetscErrorCode ReportPaths(cJSON *json, const Totals *t)
   PetscFunctionBegin;
   ReportNumbers(json, {"seconds_full_order", t->seconds[0]}, {"seconds_reduced", t->seconds[1]},
                 {"undefined", t->undefined}, {"not_converged", t->failed}, {"kkt_max", t->kkt});
-  PetscCall(Say(
+  PetscCall(DriverPrint(
       "mean seconds of a path: full order %.3g, reduced %.3g; %d did not reach their end; largest KKT residual %.1e\n",
       (double)t->seconds[0], (double)t->seconds[1], (int)t->failed, (double)t->kkt));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -192,8 +195,8 @@ PetscErrorCode DriverReportComparison(HycoScene scene, PetscBool contact, const 
   PetscCall(Sum(c, n, value, &t));
   PetscCall(ReportCreate("compare", scene, NULL, &json));
   cJSON_AddNumberToObject(json, "n_points", n);
-  PetscCall(Say("%d %s%s%s\n", (int)n, c->paths ? "path" : "point", n == 1 ? "" : "s",
-                c->paths ? ", each at its worst listed time and at its end" : ""));
+  PetscCall(DriverPrint("%d %s%s%s\n", (int)n, c->paths ? "path" : "point", n == 1 ? "" : "s",
+                        c->paths ? ", each at its worst listed time and at its end" : ""));
   for (PetscInt k = 0; k < c->n_errors; k++) {
     if (contact || !strstr(c->names[k], "lambda"))
       ReportError(json, c->names[k], n, c->n, value, k, converged, &t.undefined);

@@ -16,9 +16,10 @@ PetscErrorCode DriverReportCarried(cJSON *json, PetscInt dim, PetscInt n, const 
     if (dim == 3) ReportVector(one, "moment", 3, r[k].moment);
     ReportNumbers(one, {"area", r[k].area}, {"pressure_max", r[k].pressure});
     if (n > 1)
-      PetscCall(Say("contact %s: %d of %d active, force on the slave (%.6g, %.6g, %.6g), largest pressure %.6g\n",
-                    r[k].name, (int)r[k].n_active, (int)r[k].n, (double)r[k].force[0], (double)r[k].force[1],
-                    (double)r[k].force[2], (double)r[k].pressure));
+      PetscCall(
+          DriverPrint("contact %s: %d of %d active, force on the slave (%.6g, %.6g, %.6g), largest pressure %.6g\n",
+                      r[k].name, (int)r[k].n_active, (int)r[k].n, (double)r[k].force[0], (double)r[k].force[1],
+                      (double)r[k].force[2], (double)r[k].pressure));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

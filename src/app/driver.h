@@ -5,8 +5,7 @@
 #include <hyco.h>
 #include <cjson/cJSON.h>
 
-/* Compatibility definitions of the library. */
-#include <hycoimpl.h>
+#include <hycoprogram.h>
 
 #define DRIVER_LINE 1024
 
@@ -104,14 +103,14 @@ void DriverChooseKernels(char **argv);
    main().) */
 void DriverOneThread(void);
 
-/* -- sources.c -- */
+/* -- option_files.c -- */
 
 /* Before PETSc reads them: whether option files, and those that they name, come to an end and are YAML where they are
    to be; false, with a line on stderr: not. */
-PetscBool DriverSourcesEnd(int argc, char **argv);
+PetscBool DriverCheckOptionFiles(int argc, char **argv);
 /* "options_from" in the report: the options in PETSC_OPTIONS, the files .petscrc and -options_file, by name; nothing
    if there are none. On this process alone. */
-PetscErrorCode DriverReportSources(cJSON *json);
+PetscErrorCode DriverReportOptionFiles(cJSON *json);
 
 /* -- report.c: JSON -- */
 
@@ -203,7 +202,7 @@ void DriverCarriedFill(const DriverCarried *columns, PetscInt n, const HycoConta
 /* -- progress.c -- */
 
 /* Prints on rank 0. */
-PetscErrorCode Say(const char format[], ...) PETSC_ATTRIBUTE_FORMAT(1, 2);
+PetscErrorCode DriverPrint(const char format[], ...) PETSC_ATTRIBUTE_FORMAT(1, 2);
 /* A share in percent: "0.12 %", "120 %". */
 void DriverPercent(PetscReal share, char text[32]);
 /* A HycoProgress: a bar on a terminal, a line a minute elsewhere. ctx: a word for the activity. */
@@ -223,15 +222,15 @@ PetscErrorCode DriverReadMonitor(PetscBool *monitor);
 /* A HycoMonitor. */
 PetscErrorCode DriverMonitor(PetscInt iteration, PetscInt n_active, PetscInt changes, void *ctx);
 
-/* -- beat.c -- */
+/* -- progress_thread.c -- */
 
 /* Rank 0's thread that prints the current long step: started, ended, delayed by other output. */
-void DriverBeatBegin(void);
-void DriverBeatHold(void);
-void DriverBeatEnd(void);
+void DriverProgressBegin(void);
+void DriverProgressHold(void);
+void DriverProgressEnd(void);
 /* Seconds between lines of progress in a file. */
-void DriverBeatSetPeriod(PetscReal seconds);
-PetscReal DriverBeatPeriod(void);
+void DriverProgressSetPeriod(PetscReal seconds);
+PetscReal DriverProgressPeriod(void);
 
 /* -- greedy.c -- */
 
@@ -312,14 +311,14 @@ void DriverReportModel(cJSON *json, const Search *search, const HycoTraining *tr
 /* -- steps.c: the listed times of a path; reduced: those of predict, whose values are those of the RID -- */
 
 /* Prints a line on rank 0; n: number of listed times of the scene. */
-PetscErrorCode DriverSayStep(const HycoStep *step, PetscInt n);
+PetscErrorCode DriverPrintStep(const HycoStep *step, PetscInt n);
 /* A CSV ("": none) with a row for each of n times. Collective. */
 PetscErrorCode DriverWriteSteps(const char table[], HycoScene scene, const PetscReal mu[], PetscBool reduced,
                                 PetscInt n, const HycoStep step[]);
 /* An array of the values at each of n times, with the scene's quantities under `outputs`. */
 PetscErrorCode DriverReportSteps(cJSON *history, HycoScene scene, PetscBool reduced, PetscInt n, const HycoStep step[]);
 
-/* -- solve_history.c: a path -- */
+/* -- solve_path.c: a path -- */
 
 /* The number of listed times of the scene; whether unread options have been checked. */
 typedef struct {
@@ -332,7 +331,7 @@ PetscErrorCode DriverReportHistory(cJSON *json, HycoScene scene, const HycoHisto
 /* After the solve: the table ("": none), a summary; fails if the path has not reached its end. Collective. */
 PetscErrorCode DriverEndHistory(HycoFOM fom, HycoScene scene, const PetscReal mu[], const char table[]);
 
-/* -- predict_history.c: a reduced path -- */
+/* -- predict_path.c: a reduced path -- */
 
 /* The listed times that a prediction reached. On every rank. */
 typedef struct {
@@ -347,11 +346,11 @@ typedef struct {
 /* That of the last prediction, model on rank 0. Collective. */
 PetscErrorCode DriverGetReducedPath(HycoROM model, DriverReducedPath *path);
 /* Prints a line for each time; the table ("": none). Collective. */
-PetscErrorCode DriverSayReducedPath(HycoScene scene, const PetscReal mu[], const DriverReducedPath *path,
-                                    const char table[]);
+PetscErrorCode DriverPrintReducedPath(HycoScene scene, const PetscReal mu[], const DriverReducedPath *path,
+                                      const char table[]);
 PetscErrorCode DriverReportReducedPath(cJSON *json, HycoScene scene, const DriverReducedPath *path);
 /* Prints its residual of equilibrium, if requested. */
-PetscErrorCode DriverSayEquilibrium(const DriverReducedPath *path);
+PetscErrorCode DriverPrintEquilibrium(const DriverReducedPath *path);
 
 /* -- compare_report.c: the columns of compare's table, and its report -- */
 

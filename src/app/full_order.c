@@ -1,7 +1,6 @@
 /* hyco predict with the scene: -hyco_fallback, full order where the reduced model is not accurate enough;
    -hyco_full_displacement, one full-order solve with a condensed model's forces. */
 #include "driver.h"
-#include <hycosceneimpl.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

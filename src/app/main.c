@@ -141,7 +141,7 @@ static PetscErrorCode Run(const Command *command, int argc, char **argv)
   PetscCall(DriverCheckLaunch());
   PetscCall(DriverCheckArguments(command, argc, argv));
   PetscCall(DriverCheckOutputs(command));
-  DriverBeatBegin();
+  DriverProgressBegin();
   PetscCall(command->run());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -160,7 +160,7 @@ static PetscErrorCode Start(int *argc, char ***argv)
   PetscErrorCode ierr;
   HycoErrorText said = NULL;
 
-  if (!DriverHasStack(*argv) || !DriverSourcesEnd(*argc, *argv)) return PETSC_ERR_USER;
+  if (!DriverHasStack(*argv) || !DriverCheckOptionFiles(*argc, *argv)) return PETSC_ERR_USER;
   PetscErrorPrintf = PrintNothing;
   ierr = HycoInitialize(argc, argv);
   signal(SIGPIPE, SIG_IGN);
@@ -214,7 +214,7 @@ int main(int argc, char **argv)
                                                begins */
   signal(SIGXFSZ, SIG_IGN);                 /* a file beyond the size limit is reported as a failed write */
   ierr = Run(FindCommand(argv[1]), argc, argv);
-  DriverBeatEnd();
+  DriverProgressEnd();
   PetscPopErrorHandler();
   if (ierr) Stop();
   fflush(stdout);

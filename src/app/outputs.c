@@ -1,11 +1,11 @@
 /* Checks before any work that the files a command writes and reads are different. */
 #include "driver.h"
-#include <hycofields.h>
 #include <hycofile.h>
 #include <hycoh5.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include <strings.h>
 
 /* The value of an option, "" if absent, without counting it as read. */
 static PetscErrorCode Peek(const char name[], char value[PETSC_MAX_PATH_LEN])

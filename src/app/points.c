@@ -2,6 +2,7 @@
 #include "driver.h"
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 /* Numbers separated by commas, in new memory. */
 static PetscErrorCode ParseNumbers(const char name[], const char text[], PetscInt *n, PetscReal **values)

@@ -23,7 +23,7 @@ PetscErrorCode DriverReadQuiet(void)
   PetscCall(HycoOptionsReal("-progress", "<seconds> interval between progress lines in a file", 0.01, PETSC_MAX_REAL,
                             &seconds, NULL));
   PetscOptionsEnd();
-  DriverBeatSetPeriod(seconds);
+  DriverProgressSetPeriod(seconds);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -63,7 +63,7 @@ PetscErrorCode DriverCatchInterrupt(const char folder[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode Say(const char format[], ...)
+PetscErrorCode DriverPrint(const char format[], ...)
 {
   PetscMPIInt rank;
   va_list args;
@@ -71,7 +71,7 @@ PetscErrorCode Say(const char format[], ...)
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   if (rank == 0 && !quiet) {
-    DriverBeatHold();
+    DriverProgressHold();
     va_start(args, format);
     vfprintf(stdout, format, args);
     va_end(args);
@@ -112,10 +112,10 @@ static void Show(const char word[], PetscInt done, PetscInt n, PetscBool ends)
   if (n && (done > first || done == n))
     snprintf(left, sizeof(left), ", %.0f s left",
              done > first ? (double)(now - begin) / (done - first) * (n - done) : 0.);
-  if (!quiet && (done == n ? ends || shown : now - last > (terminal ? 0.2 : DriverBeatPeriod()))) {
+  if (!quiet && (done == n ? ends || shown : now - last > (terminal ? 0.2 : DriverProgressPeriod()))) {
     last = now;
     shown = PETSC_TRUE;
-    DriverBeatHold();
+    DriverProgressHold();
     fprintf(stderr, "%s%.*s %d%s%s%s", terminal ? "\r\033[K" : "",
             terminal ? TERMINAL - 16 - (int)(strlen(share) + strlen(left)) : DRIVER_LINE, word, (int)done, share, left,
             terminal && done != n ? "" : "\n");
@@ -170,6 +170,7 @@ PetscErrorCode DriverMonitor(PetscInt iteration, PetscInt n_active, PetscInt cha
 {
   PetscFunctionBegin;
   (void)ctx;
-  PetscCall(Say("  active set, iteration %d: %d active, %d to change\n", (int)iteration, (int)n_active, (int)changes));
+  PetscCall(DriverPrint("  active set, iteration %d: %d active, %d to change\n", (int)iteration, (int)n_active,
+                        (int)changes));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -29,7 +29,7 @@ PetscErrorCode ReportCreate(const char command[], HycoScene scene, const PetscRe
   point = cJSON_AddObjectToObject(*json, "mu");
   for (PetscInt p = 0; mu && p < n; p++) cJSON_AddNumberToObject(point, names[p], mu[p]);
   cJSON_AddNumberToObject(*json, "ranks", size);
-  PetscCall(DriverReportSources(*json));
+  PetscCall(DriverReportOptionFiles(*json));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -42,12 +42,14 @@ PetscErrorCode ReportContacts(cJSON *json, PetscInt n_contacts, PetscInt n_facin
 {
   PetscFunctionBegin;
   ReportNumbers(json, {"n_facing", n_facing}, {"overlap", overlap}, {"sliding", sliding});
-  if (n_contacts && !n_facing) PetscCall(Say("NO CONTACT: no slave node faces a master at these parameter values\n"));
-  if (overlap > 0) PetscCall(Say("largest initial overlap %.4g\n", (double)overlap));
+  if (n_contacts && !n_facing)
+    PetscCall(DriverPrint("NO CONTACT: no slave node faces a master at these parameter values\n"));
+  if (overlap > 0) PetscCall(DriverPrint("largest initial overlap %.4g\n", (double)overlap));
   if (sliding > 1)
-    PetscCall(Say("LARGE SLIDING: a closed contact moves by %.2g facets along its surface; contact pairs are found "
-                  "before displacement, and are valid for less than one facet\n",
-                  (double)sliding));
+    PetscCall(
+        DriverPrint("LARGE SLIDING: a closed contact moves by %.2g facets along its surface; contact pairs are found "
+                    "before displacement, and are valid for less than one facet\n",
+                    (double)sliding));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -63,7 +65,7 @@ PetscErrorCode ReportQuantities(cJSON *json, HycoScene scene, const PetscReal va
   object = cJSON_AddObjectToObject(json, "outputs");
   for (PetscInt k = 0; k < n; k++) {
     cJSON_AddNumberToObject(object, names[k], value[k]);
-    PetscCall(Say("%s %.6g%s", names[k], (double)value[k], k + 1 < n ? ", " : "\n"));
+    PetscCall(DriverPrint("%s %.6g%s", names[k], (double)value[k], k + 1 < n ? ", " : "\n"));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -136,7 +138,7 @@ static void AddColumn(cJSON *json, const char name[], PetscInt n, PetscInt n_col
   } else { /* defined at no point */
     cJSON_AddNullToObject(object, "mean");
     cJSON_AddNullToObject(object, "max");
-    (void)!Say("  %-21s undefined at every point\n", name);
+    (void)!DriverPrint("  %-21s undefined at every point\n", name);
   }
 }
 
@@ -147,7 +149,8 @@ void ReportError(cJSON *json, const char name[], PetscInt n, PetscInt n_columns,
 
   AddColumn(json, name, n, n_columns, value, column, converged, &c);
   *all_undefined += c.undefined;
-  if (c.used) (void)!Say("  %-21s mean %9.4f %%   max %9.4f %%\n", name, 100 * (double)c.mean, 100 * (double)c.worst);
+  if (c.used)
+    (void)!DriverPrint("  %-21s mean %9.4f %%   max %9.4f %%\n", name, 100 * (double)c.mean, 100 * (double)c.worst);
 }
 
 void ReportOutputError(cJSON *json, const char name[], PetscInt n, PetscInt n_columns, const PetscReal value[],
@@ -156,7 +159,7 @@ void ReportOutputError(cJSON *json, const char name[], PetscInt n, PetscInt n_co
   Column c;
 
   AddColumn(json, name, n, n_columns, value, column, converged, &c);
-  if (c.used) (void)!Say("  %-21s mean %9.4g     max %9.4g\n", name, (double)c.mean, (double)c.worst);
+  if (c.used) (void)!DriverPrint("  %-21s mean %9.4g     max %9.4g\n", name, (double)c.mean, (double)c.worst);
 }
 
 /* The column of a set's table that says whether a point converged. */
@@ -184,9 +187,9 @@ PetscErrorCode ReportSet(const char command[], const char table[], HycoScene sce
   }
   HycoAllreduce(&failed, 1, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD);
   if (table[0]) PetscCall(DriverWriteTable(table, scene, mu, columns, rows));
-  PetscCall(Say("%d points in %.3f s (%.3g a second), %d not converged%s\n", (int)n, (double)seconds,
-                seconds > 0 ? (double)(n / seconds) : 0., (int)failed,
-                table[0] ? "" : "; -table FILE.csv writes their results"));
+  PetscCall(DriverPrint("%d points in %.3f s (%.3g a second), %d not converged%s\n", (int)n, (double)seconds,
+                        seconds > 0 ? (double)(n / seconds) : 0., (int)failed,
+                        table[0] ? "" : "; -table FILE.csv writes their results"));
   PetscCall(ReportCreate(command, scene, NULL, &json));
   ReportNumbers(json, {"n_points", n}, {"not_converged", failed}, {"seconds_total", seconds});
   if (seconds > 0) cJSON_AddNumberToObject(json, "points_per_second", n / seconds);

@@ -64,11 +64,12 @@ static PetscErrorCode Monitor(const HycoGreedyStep *s, void *ctx)
 
   PetscFunctionBegin;
   PetscCall(DriverFormatPoint(log->scene, s->worst, words, columns));
-  PetscCall(Say("greedy %3d: %d snapshots, %d modes, RID %d nodes; eta %.2e (u %.2e, forces %.2e) at %s; largest %.2e, "
-                "infinite at %d of %d\n",
-                (int)s->iteration, (int)s->n_samples, (int)s->n_modes, (int)s->rid_nodes, (double)s->eta,
-                (double)s->eta_u, (double)s->eta_lambda, s->worst ? words : "no remaining point", (double)s->max_eta,
-                (int)s->n_infinite, (int)s->n_points));
+  PetscCall(DriverPrint(
+      "greedy %3d: %d snapshots, %d modes, RID %d nodes; eta %.2e (u %.2e, forces %.2e) at %s; largest %.2e, "
+      "infinite at %d of %d\n",
+      (int)s->iteration, (int)s->n_samples, (int)s->n_modes, (int)s->rid_nodes, (double)s->eta, (double)s->eta_u,
+      (double)s->eta_lambda, s->worst ? words : "no remaining point", (double)s->max_eta, (int)s->n_infinite,
+      (int)s->n_points));
   snprintf(row, sizeof(row), "%d,%d,%d,%d,%d,%s%.8g,%.8g,%.8g,%.8g,%.8g,%.8g,%d,%.3f\n", (int)s->iteration,
            (int)s->n_samples, (int)s->n_modes, (int)s->rid_nodes, (int)s->rid_elements, columns, (double)s->eta,
            (double)s->eta_u, (double)s->eta_lambda, (double)s->max_eta, (double)s->mean_eta_u,

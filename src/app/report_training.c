@@ -141,16 +141,17 @@ static PetscErrorCode DescribeEnd(const Search *s, const HycoAttempt *a, char te
 }
 
 /* The title of the lines of the attempts. */
-static PetscErrorCode SayAim(const Search *s, PetscInt n_held)
+static PetscErrorCode PrintAim(const Search *s, PetscInt n_held)
 {
   char aim[DRIVER_LINE];
 
   PetscFunctionBegin;
   DescribeErrors(IsPath(s), s->aim, aim);
   if (s->on)
-    PetscCall(Say("settings, each judged at %d held-out points (largest errors):\n", (int)n_held));
+    PetscCall(DriverPrint("settings, each judged at %d held-out points (largest errors):\n", (int)n_held));
   else
-    PetscCall(Say("settings, each judged at %d held-out points (largest errors; enough are %s):\n", (int)n_held, aim));
+    PetscCall(DriverPrint("settings, each judged at %d held-out points (largest errors; enough are %s):\n", (int)n_held,
+                          aim));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -161,18 +162,18 @@ static PetscErrorCode Attempted(const HycoAttempt *a, void *ctx)
   char what[DRIVER_LINE], errors[DRIVER_LINE], end[DRIVER_LINE];
 
   PetscFunctionBegin;
-  if (a->number == 1) PetscCall(SayAim(s, a->n_held));
+  if (a->number == 1) PetscCall(PrintAim(s, a->n_held));
   HycoReducerSettingsDescribe(&a->settings, sizeof(what), what);
   DescribeErrors(IsPath(s), a->held_out.largest, errors);
   PetscCall(DescribeEnd(s, a, end));
   if (a->failure[0])
-    PetscCall(Say("  %2d %s: no model: %s\n", (int)a->number, what, a->failure));
+    PetscCall(DriverPrint("  %2d %s: no model: %s\n", (int)a->number, what, a->failure));
   else if (!a->held_out.n)
-    PetscCall(Say("  %2d %s: %d modes, RID %.1f %%%s\n", (int)a->number, what, (int)a->n_modes,
-                  100 * (double)a->rid_fraction, end));
+    PetscCall(DriverPrint("  %2d %s: %d modes, RID %.1f %%%s\n", (int)a->number, what, (int)a->n_modes,
+                          100 * (double)a->rid_fraction, end));
   else
-    PetscCall(Say("  %2d %s: %d modes, RID %.1f %%; %s; %.3g ms%s\n", (int)a->number, what, (int)a->n_modes,
-                  100 * (double)a->rid_fraction, errors, 1e3 * (double)a->held_out.seconds, end));
+    PetscCall(DriverPrint("  %2d %s: %d modes, RID %.1f %%; %s; %.3g ms%s\n", (int)a->number, what, (int)a->n_modes,
+                          100 * (double)a->rid_fraction, errors, 1e3 * (double)a->held_out.seconds, end));
   PetscCall(AppendRow(s, a));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -187,14 +188,15 @@ static PetscErrorCode Added(PetscInt n, PetscInt parameter, PetscBool former, vo
   PetscCall(HycoSceneGetParameters(s->scene, NULL, &names, NULL, NULL));
   s->n_points += n;
   if (former) {
-    PetscCall(Say("the targets are missed, at the held-out points or at fresh ones away from the added solutions: the "
-                  "search goes on with the fresh ones, and %d former ones become training points\n",
-                  (int)n));
+    PetscCall(DriverPrint(
+        "the targets are missed, at the held-out points or at fresh ones away from the added solutions: the "
+        "search goes on with the fresh ones, and %d former ones become training points\n",
+        (int)n));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(Say("no settings meet the targets: %d solutions are added where the errors are largest%s%s\n", (int)n,
-                parameter < 0 ? "" : "; the training values are too far apart in ",
-                parameter < 0 ? "" : names[parameter]));
+  PetscCall(DriverPrint("no settings meet the targets: %d solutions are added where the errors are largest%s%s\n",
+                        (int)n, parameter < 0 ? "" : "; the training values are too far apart in ",
+                        parameter < 0 ? "" : names[parameter]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -240,24 +242,24 @@ static PetscErrorCode Misses(const Search *s, const HycoTraining *t)
 }
 
 /* What the search did not try, in one line; several with the same reason together. */
-static PetscErrorCode SayLeftOut(const HycoTraining *t)
+static PetscErrorCode PrintLeftOut(const HycoTraining *t)
 {
   PetscFunctionBegin;
   for (PetscInt k = 0; k < t->n_left_out; k++) {
     const PetscBool last = (PetscBool)(k + 1 == t->n_left_out),
                     same = (PetscBool)(!last && strcmp(t->left_out[k].why, t->left_out[k + 1].why) == 0);
 
-    PetscCall(Say("%s%s", k ? "" : "not tried: ", t->left_out[k].what));
+    PetscCall(DriverPrint("%s%s", k ? "" : "not tried: ", t->left_out[k].what));
     if (same)
-      PetscCall(Say(", "));
+      PetscCall(DriverPrint(", "));
     else
-      PetscCall(Say(" (%s)%s", t->left_out[k].why, last ? "\n" : "; "));
+      PetscCall(DriverPrint(" (%s)%s", t->left_out[k].why, last ? "\n" : "; "));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* A line for each output of the scene: its errors in its own unit, and its size. */
-static PetscErrorCode SayOutputs(const Search *s, const HycoTraining *t)
+static PetscErrorCode PrintOutputs(const Search *s, const HycoTraining *t)
 {
   const char *names[HYCO_MAX_QUANTITIES];
   PetscInt n;
@@ -268,12 +270,12 @@ static PetscErrorCode SayOutputs(const Search *s, const HycoTraining *t)
     const HycoOutputValidation *o = &t->output[q];
 
     if (o->magnitude < 0)
-      PetscCall(Say("output %s: its error is not known%s, and not estimated\n", names[q],
-                    IsPath(s) ? " (snapshots from before a reaction was named do not have it)" : ""));
+      PetscCall(DriverPrint("output %s: its error is not known%s, and not estimated\n", names[q],
+                            IsPath(s) ? " (snapshots from before a reaction was named do not have it)" : ""));
     else
-      PetscCall(Say("output %s: errors median %.3g, largest %.3g; values up to %.4g%s\n", names[q], (double)o->median,
-                    (double)o->largest, (double)o->magnitude,
-                    o->magnitude > 0 ? "" : "; no estimate: it is zero at all held-out points"));
+      PetscCall(DriverPrint("output %s: errors median %.3g, largest %.3g; values up to %.4g%s\n", names[q],
+                            (double)o->median, (double)o->largest, (double)o->magnitude,
+                            o->magnitude > 0 ? "" : "; no estimate: it is zero at all held-out points"));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -285,25 +287,26 @@ PetscErrorCode DriverJudgeModel(const Search *s, const HycoTraining *t)
   PetscFunctionBegin;
   if (t->chosen.number) {
     HycoReducerSettingsDescribe(&t->chosen.settings, sizeof(what), what);
-    PetscCall(Say("chosen: settings %d of %d: %s\n", (int)t->chosen.number, (int)t->chosen.of, what));
-    PetscCall(SayLeftOut(t));
+    PetscCall(DriverPrint("chosen: settings %d of %d: %s\n", (int)t->chosen.number, (int)t->chosen.of, what));
+    PetscCall(PrintLeftOut(t));
   }
   if (!t->held_out.n) {
-    PetscCall(Say("no held-out points: the errors of this model are not known, and it cannot estimate them\n"));
+    PetscCall(DriverPrint("no held-out points: the errors of this model are not known, and it cannot estimate them\n"));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   DescribeErrors(IsPath(s), t->held_out.median, median);
   DescribeErrors(IsPath(s), t->held_out.largest, largest);
   if (t->n_fresh)
     snprintf(fresh, sizeof(fresh), ", %d of them fresh (no solution was added near them)", (int)t->n_fresh);
-  PetscCall(Say("errors at %d held-out points%s: median %s; largest%s %s\n", (int)t->held_out.n, fresh, median,
-                t->n_corners ? ", also at corners of the training," : "", largest));
+  PetscCall(DriverPrint("errors at %d held-out points%s: median %s; largest%s %s\n", (int)t->held_out.n, fresh, median,
+                        t->n_corners ? ", also at corners of the training," : "", largest));
   DescribeErrors(IsPath(s), t->held_out.end, end);
   if (IsPath(s))
-    PetscCall(Say("these are the errors at each path's worst listed time; the largest at the end are %s\n", end));
-  PetscCall(SayOutputs(s, t));
+    PetscCall(
+        DriverPrint("these are the errors at each path's worst listed time; the largest at the end are %s\n", end));
+  PetscCall(PrintOutputs(s, t));
   if (!t->n_held)
-    PetscCall(Say("the model does not estimate its errors: fewer than 10 predictions of held-out solutions\n"));
+    PetscCall(DriverPrint("the model does not estimate its errors: fewer than 10 predictions of held-out solutions\n"));
   PetscCall(Misses(s, t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -62,14 +62,14 @@ static PetscReal ValueOf(const Column *c, const HycoStep *s)
   return c->count ? (PetscReal) * (const PetscInt *)(const void *)at : *(const PetscReal *)(const void *)at;
 }
 
-PetscErrorCode DriverSayStep(const HycoStep *s, PetscInt n)
+PetscErrorCode DriverPrintStep(const HycoStep *s, PetscInt n)
 {
   PetscFunctionBegin;
-  PetscCall(
-      Say("t %-11.10g %3d of %d: %d step%s, %d iteration%s%s, %d closed, force %.8g, inelastic %.3g, mises %.5g\n",
-          (double)s->t, (int)s->index + 1, (int)n, (int)s->substeps, s->substeps == 1 ? "" : "s", (int)s->iterations,
-          s->iterations == 1 ? "" : "s", s->cuts ? ", cut" : "", (int)s->n_active, (double)s->total_contact_force,
-          (double)s->inelastic, (double)s->mises));
+  PetscCall(DriverPrint(
+      "t %-11.10g %3d of %d: %d step%s, %d iteration%s%s, %d closed, force %.8g, inelastic %.3g, mises %.5g\n",
+      (double)s->t, (int)s->index + 1, (int)n, (int)s->substeps, s->substeps == 1 ? "" : "s", (int)s->iterations,
+      s->iterations == 1 ? "" : "s", s->cuts ? ", cut" : "", (int)s->n_active, (double)s->total_contact_force,
+      (double)s->inelastic, (double)s->mises));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -63,7 +63,7 @@ static PetscErrorCode WritePiece(const Table *t, PetscMPIInt owner, const Driver
   const MPI_Comm comm = PETSC_COMM_WORLD;
   const size_t room = (size_t)BLOCK * (size_t)(t->n_par + t->rows->width) * NUMBER + 1;
   PetscInt n = piece ? piece->n : 0;
-  PetscMPIInt rank, length;
+  PetscMPIInt rank, length, most;
   char *text;
 
   PetscFunctionBegin;
@@ -71,6 +71,7 @@ static PetscErrorCode WritePiece(const Table *t, PetscMPIInt owner, const Driver
   if (rank && rank != owner) PetscFunctionReturn(PETSC_SUCCESS);
   if (rank) PetscCallMPI(MPI_Send(&n, 1, MPIU_INT, 0, 0, comm));
   if (!rank && owner) PetscCallMPI(MPI_Recv(&n, 1, MPIU_INT, owner, 0, comm, MPI_STATUS_IGNORE));
+  PetscCall(PetscMPIIntCast((PetscInt)room, &most));
   PetscCall(PetscMalloc1(room, &text));
   for (PetscInt begin = 0; begin < n; begin += BLOCK) {
     size_t at = 0;
@@ -82,7 +83,7 @@ static PetscErrorCode WritePiece(const Table *t, PetscMPIInt owner, const Driver
     if (!rank && owner) {
       MPI_Status status;
 
-      PetscCallMPI(MPI_Recv(text, (PetscMPIInt)room, MPI_CHAR, owner, 0, comm, &status));
+      PetscCallMPI(MPI_Recv(text, most, MPI_CHAR, owner, 0, comm, &status));
       PetscCallMPI(MPI_Get_count(&status, MPI_CHAR, &length));
     }
     if (!rank) (void)!fwrite(text, 1, (size_t)length, stream); /* closing the file reports a failure */

@@ -20,6 +20,7 @@ typedef struct {
   PetscBool *idle; /* contacts without a row: slaves that face nothing, or whose unknowns are all fixed */
 } Floating;
 
+/* A contact without flexibility, on which no rigid motion works either, changes nothing: it is left out. */
 static void FindIdle(Floating *h)
 {
   for (PetscInt j = 0; j < h->m; j++) {
@@ -88,6 +89,7 @@ static PetscReal Slack(const Floating *h)
   return size;
 }
 
+/* Forces and slacks below 1e-12 of the largest are round-off. Idle contacts violate nothing. */
 static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool violates[])
 {
   const Floating *h = (const Floating *)ctx;

@@ -12,6 +12,7 @@ static const char *Name(HycoScene s, PetscInt c)
   return s->key[s->constant[c]] + strlen(SECTION);
 }
 
+/* A constant must not hide a variable that some expression uses under the same name. */
 static PetscErrorCode CheckName(HycoScene s, const char key[], const char name[])
 {
   PetscFunctionBegin;

@@ -205,6 +205,8 @@ static PetscErrorCode Insert(PetscOptions options, const char file[], char text[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Duplicate keys and nesting are checked before PETSc reads the text, which accepts both silently. PETSc's own errors name
+   no file, and are replaced by a line that does. */
 static PetscErrorCode ReadYAML(PetscOptions options, const char file[])
 {
   char message[HYCO_LINE], *text;

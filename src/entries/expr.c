@@ -39,6 +39,7 @@ PetscBool HycoExprAlike(HycoExpr a, HycoExpr b)
 
 /* Only the two ends of a long expression are shown, so that a message has room for the reason. */
 #define SHORT 260
+/* Both ends of a long expression, for messages: the error is usually near one of them. */
 static void Shorten(const char text[], char out[SHORT])
 {
   const size_t n = strlen(text);
@@ -58,6 +59,8 @@ static PetscErrorCode Raise(HycoExpr e)
   HycoFail("%s: \"%s\" is not an expression: %.300s", e->key, text, mupGetErrorMsg(e->parser));
 }
 
+/* Which variables an expression uses, found by the addresses that the parser was given: what does not depend on a parameter
+   is computed once. An unknown name is refused here, with the known ones. */
 static PetscErrorCode FindVariables(HycoExpr e, PetscInt n, const char *const names[])
 {
   int n_used = mupGetExprVarNum(e->parser);
@@ -88,6 +91,7 @@ static PetscErrorCode FindVariables(HycoExpr e, PetscInt n, const char *const na
 
 /* muParser takes minutes for many brackets inside each other. */
 #define DEEPEST 100
+/* Before the parser sees it, which would run for minutes. */
 static PetscErrorCode CheckNesting(HycoExpr e)
 {
   PetscInt depth = 0, most = 0;
@@ -104,6 +108,8 @@ static PetscErrorCode CheckNesting(HycoExpr e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A plain number does not need a parser. Variables are defined before the text is set, and the text is evaluated once, since
+   muParser reports some errors only then. */
 static PetscErrorCode Parse(HycoExpr e, PetscInt n, const char *const names[])
 {
   static const char *const axis[3] = {"x", "y", "z"};

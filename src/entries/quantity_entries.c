@@ -89,7 +89,7 @@ void HycoSceneMatchQuantities(HycoScene s, HycoScene other, PetscInt at[])
   }
 }
 
-PetscBool HycoSceneAsks(HycoScene s, HycoQuantityKind first, HycoQuantityKind last)
+PetscBool HycoSceneHasOutputs(HycoScene s, HycoQuantityKind first, HycoQuantityKind last)
 {
   for (PetscInt k = 0; k < s->n_quantities; k++) {
     if (s->quantity[k].kind >= first && s->quantity[k].kind <= last) return PETSC_TRUE;
@@ -99,17 +99,17 @@ PetscBool HycoSceneAsks(HycoScene s, HycoQuantityKind first, HycoQuantityKind la
 
 PetscBool HycoSceneHasReactions(HycoScene s)
 {
-  return HycoSceneAsks(s, HYCO_QUANTITY_REACTION, HYCO_QUANTITY_REACTION);
+  return HycoSceneHasOutputs(s, HYCO_QUANTITY_REACTION, HYCO_QUANTITY_REACTION);
 }
 
-PetscBool HycoSceneAsksFields(HycoScene s)
+PetscBool HycoSceneHasFieldOutputs(HycoScene s)
 {
-  return HycoSceneAsks(s, HYCO_QUANTITY_MAX, HYCO_QUANTITY_REACTION);
+  return HycoSceneHasOutputs(s, HYCO_QUANTITY_MAX, HYCO_QUANTITY_REACTION);
 }
 
-PetscBool HycoSceneAsksContacts(HycoScene s)
+PetscBool HycoSceneHasContactOutputs(HycoScene s)
 {
-  return HycoSceneAsks(s, HYCO_QUANTITY_FORCE, HYCO_QUANTITY_PRESSURE);
+  return HycoSceneHasOutputs(s, HYCO_QUANTITY_FORCE, HYCO_QUANTITY_PRESSURE);
 }
 
 /* A quantity of contacts has a contact of the scene or none, and no group; one of a field has no contact. */

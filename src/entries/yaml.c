@@ -3,7 +3,6 @@
   that PETSc cannot read; and repeated keys, of which PETSc takes the last without a message.
 */
 #include <hycoentries.h>
-#include <hycoyaml.h>
 #include <stdlib.h>
 #include <string.h>
 #include <yaml.h>
@@ -168,6 +167,7 @@ static PetscErrorCode TakeEnd(Scan *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A scalar in a mapping is a key or a value in turn; libyaml's events do not tell which. */
 static PetscErrorCode TakeEvent(Scan *s, const yaml_event_t *event)
 {
   Level *of = s->depth ? &s->level[s->depth - 1] : NULL;

@@ -114,6 +114,7 @@ static PetscErrorCode ReadModes(HycoCompared k, const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Only rank 0 has the model; every rank reads its own rows of the modes from the file, so that none has them all. */
 static PetscErrorCode Fill(HycoROM m, HycoFOM f, HycoCompared k)
 {
   char path[PETSC_MAX_PATH_LEN] = "";

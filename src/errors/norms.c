@@ -15,6 +15,7 @@ struct _n_HycoNorms {
   KSP ksp;
 };
 
+/* The H1 norm's matrix, scaled by the mesh's length so that both parts have one unit. */
 static PetscErrorCode AssembleNorm(HycoNorms h, Mat *A)
 {
   HycoMesh part = h->f->part;

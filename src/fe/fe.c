@@ -282,13 +282,14 @@ static PetscErrorCode SetSupports(HycoFE fe)
     for (PetscInt c = 0; c < m->dim; c++) {
       for (PetscInt j = m->group_start[g]; fixed->value[c] && j < m->group_start[g + 1]; j++) {
         const PetscInt i = m->group_node[j], dof = i * m->dim + c;
+        const PetscReal former = fe->u0[dof];
         PetscReal value;
 
         PetscCall(HycoExprEval(fixed->value[c], fe->mu, 1, fe->X + 3 * i, &value));
         HycoCheck(!fe->fixed[dof] ||
-                      PetscAbsReal(value - fe->u0[dof]) <= 1e-12 * (PetscAbsReal(value) + PetscAbsReal(fe->u0[dof])),
+                      PetscAbsReal(value - former) <= 1e-12 * (PetscAbsReal(value) + PetscAbsReal(former)),
                   "node %d is fixed twice in %c, to %g and to %g (by %s); remove it from one support",
-                  (int)m->node_id[i], "xyz"[c], (double)fe -> u0[dof], (double)value, HycoExprKey(fixed->value[c]));
+                  (int)m->node_id[i], "xyz"[c], (double)former, (double)value, HycoExprKey(fixed->value[c]));
         fe->fixed[dof] = PETSC_TRUE;
         fe->u0[dof] = value;
         fe->lifted = (PetscBool)(fe->lifted || value != 0);

@@ -139,7 +139,7 @@ PetscErrorCode HycoFEAgreeOnMirrors(MPI_Comm comm, HycoFE fe)
   PetscCall(PetscCalloc1(2 * n, &seen));
   for (PetscInt e = 0; e < fe->mesh->n_cells; e++)
     seen[2 * fe->mesh->cell_body[e] + fe->mirrored[fe->mesh->cell_body[e]]] = PETSC_TRUE;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, seen, (PetscMPIInt)(2 * n), HYCO_MPI_BOOL, MPI_LOR, comm));
+  HycoAllreduce(seen, 2 * n, HYCO_MPI_BOOL, MPI_LOR, comm);
   for (PetscInt b = 0; b < n; b++) {
     HycoCheck(!seen[2 * b] || !seen[2 * b + 1],
               "body %s: its map inverts some cells and not others; a map may mirror a whole body, but not fold it",

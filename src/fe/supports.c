@@ -346,7 +346,7 @@ static PetscErrorCode PlaceParts(MPI_Comm comm, HycoFE fe, const PetscInt part[]
     Add(&sum[4 * part[i]], 1);
     for (PetscInt c = 0; c < 3; c++) Add(&sum[4 * part[i] + 1 + c], fe->X[3 * i + c]);
   }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, last, (PetscMPIInt)n_parts, MPIU_INT64, MPI_MAX, comm));
+  HycoAllreduce(last, n_parts, MPIU_INT64, MPI_MAX, comm);
   PetscCall(Total(comm, 4 * n_parts, sum));
   for (PetscInt p = 0; p < n_parts; p++) {
     parts[p].body = (PetscInt)(last[p] % n_bodies);
@@ -356,7 +356,7 @@ static PetscErrorCode PlaceParts(MPI_Comm comm, HycoFE fe, const PetscInt part[]
     for (PetscInt c = 0; c < 3; c++)
       size[part[i]] = PetscMax(size[part[i]], PetscAbsReal(fe->X[3 * i + c] - parts[part[i]].centre[c]));
   }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, size, (PetscMPIInt)n_parts, MPIU_REAL, MPI_MAX, comm));
+  HycoAllreduce(size, n_parts, MPIU_REAL, MPI_MAX, comm);
   for (PetscInt p = 0; p < n_parts; p++) parts[p].size = size[p];
   PetscCall(PetscFree3(last, size, sum));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -370,6 +370,8 @@ typedef struct {
   Sum *sum;
 } SpringGram;
 
+/* Adds a spring's energy on the part's rigid motions to its Gram matrix, with K scaled to 1: only which motions it holds
+   matters here, not how stiff it is. Sums have twice the precision, so that their order does not matter. */
 static PetscErrorCode AddSpring(HycoFE fe, PetscInt spring, PetscInt n, const PetscInt node[], const PetscReal K[],
                                 void *ctx)
 {

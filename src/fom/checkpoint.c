@@ -54,6 +54,7 @@ static void MembersToReals(PetscInt n, const Member m[], const HycoStep *s, Pets
   }
 }
 
+/* The reverse of what was written: integers are stored as reals, exactly up to 2^53. */
 static void RealsToMembers(PetscInt n, const Member m[], const PetscReal v[], HycoStep *s)
 {
   for (PetscInt j = 0; j < n; j++) {
@@ -86,6 +87,7 @@ static void RealsToStep(HycoFOM f, const PetscReal v[], HycoStep *s)
 
 /* Columns of the file: U, F_old, f_old for a node; the state of a cell, as long as the longest one. */
 #define NODE_COLS(f) (3 * (f)->part->dim)
+/* A rectangular dataset needs one width: the longest state of any cell on any rank. */
 static PetscErrorCode StateCols(HycoFOM f, PetscInt *cols)
 {
   const PetscInt *start;
@@ -146,6 +148,7 @@ static PetscErrorCode MoveNodes(HycoFOM f, PetscBool out, PetscReal value[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* States are packed by cell; in the file each cell has a row of the same width. */
 static PetscErrorCode MoveState(HycoFOM f, PetscBool out, PetscInt cols, PetscReal value[])
 {
   const PetscInt *start;
@@ -166,6 +169,7 @@ static PetscErrorCode MoveState(HycoFOM f, PetscBool out, PetscInt cols, PetscRe
 
 /* Number of reals that describe the position on the path. */
 #define N_HEAD (4 + (PetscInt)(sizeof(HycoWork) / sizeof(PetscReal)) + (PetscInt)(sizeof(HycoKKT) / sizeof(PetscReal)))
+/* The numbers of a path that resume needs beside its fields. HycoWork and HycoKKT consist of reals alone. */
 static void MoveHead(HycoPath p, PetscBool out, PetscReal head[])
 {
   PetscReal *work = (PetscReal *)&p->work_done, *kkt = (PetscReal *)&p->kkt;
@@ -350,6 +354,7 @@ static PetscErrorCode ReadOpened(HycoFOM f, HycoH5 h, const char key[], Content 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The file is closed on an error too. */
 static PetscErrorCode ReadContent(HycoFOM f, const char key[], Content *c)
 {
   HycoH5 h;
@@ -375,6 +380,7 @@ static PetscErrorCode Spread(HycoFOM f, PetscInt n, PetscReal **array)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rank 0 has read the small arrays; the sizes come first, since the others allocate by them. */
 static PetscErrorCode SpreadContent(HycoFOM f, Content *c)
 {
   PetscInt size[3] = {c->cell_cols, c->n_steps, c->n_orders};
@@ -390,6 +396,7 @@ static PetscErrorCode SpreadContent(HycoFOM f, Content *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Opened for each dataset: the ranks read their rows at different times. */
 static PetscErrorCode ReadRows(HycoFOM f, const char name[], PetscInt first, PetscInt n, PetscInt cols,
                                PetscReal rows[])
 {

@@ -99,6 +99,7 @@ typedef struct {
   PetscInt n, *global, *node;
 } Places;
 
+/* Local nodes sorted by their global numbers, for binary search. */
 static PetscErrorCode PlacesCreate(HycoMesh m, Places *p)
 {
   PetscFunctionBegin;

@@ -168,6 +168,7 @@ static PetscErrorCode ReadPath(HycoFOM f, HycoOptionItems PetscOptionsObject)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A scene without a history refuses the options of paths: an option without effect is an error. */
 static PetscErrorCode SetFromOptions(HycoFOM f)
 {
   PetscFunctionBegin;
@@ -521,7 +522,7 @@ static PetscErrorCode CheckPoint(HycoFOM f, PetscInt n, const PetscReal mu[])
     bounds[p] = mu[p];
     bounds[n + p] = -mu[p];
   }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, bounds, (PetscMPIInt)(2 * n), MPIU_REAL, MPI_MAX, HycoComm(f)));
+  HycoAllreduce(bounds, 2 * n, MPIU_REAL, MPI_MAX, HycoComm(f));
   for (PetscInt p = 0; p < n; p++) {
     HycoCheck(bounds[p] == -bounds[n + p],
               "%s is %.10g on one rank and %.10g on another; all ranks need the same point", f->scene->parameter[p],

@@ -182,6 +182,7 @@ static PetscErrorCode CountRest(HycoFOM f, const Rows *r, const PetscBool in[], 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rows that share no unknown with another closed row are independent; only the rest needs a rank. */
 static PetscErrorCode Count(HycoFOM f, Rows *r, PetscBool in[], PetscInt *dependent)
 {
   PetscFunctionBegin;

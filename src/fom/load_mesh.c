@@ -80,3 +80,14 @@ PetscErrorCode HycoMeshCreate(MPI_Comm comm, HycoScene scene, HycoMesh *mesh)
   PetscCall(DMDestroy(&dm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+PetscErrorCode HycoSceneCheckMesh(MPI_Comm comm, HycoScene scene)
+{
+  HycoMesh mesh;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
+  PetscCall(HycoMeshCreate(comm, scene, &mesh));
+  PetscCall(HycoMeshDestroy(&mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -230,7 +230,7 @@ static PetscErrorCode Balance(HycoFOM f, PetscInt n, Sums *s, PetscReal *balance
   for (PetscInt k = 0; k < 6 * n; k++)
     sum[k] = k % 6 < 3 ? s->result[k / 6].force[k % 6] : s->result[k / 6].moment[k % 6 - 3];
   sum[6 * n] = s->size;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sum, (PetscMPIInt)(6 * n + 1), MPIU_REAL, MPI_SUM, HycoComm(f)));
+  HycoAllreduce(sum, 6 * n + 1, MPIU_REAL, MPI_SUM, HycoComm(f));
   for (PetscInt k = 0; k < n; k++) {
     PetscCall(PetscArraycpy(s->result[k].force, sum + 6 * k, 3));
     PetscCall(PetscArraycpy(s->result[k].moment, sum + 6 * k + 3, 3));

@@ -219,7 +219,7 @@ static PetscErrorCode LongestRow(HycoFOM f, const PetscInt tag[], const PetscRea
   }
   PetscCallMPI(MPI_Allreduce(&key, &all, 1, MPIU_INT64, MPI_MIN, HycoComm(f)));
   for (PetscInt k = 0; k < n; k++) longest[k] = at >= 0 && key == all ? row[at * n + k] : 0;
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, longest, (PetscMPIInt)n, MPIU_REAL, MPI_SUM, HycoComm(f)));
+  HycoAllreduce(longest, n, MPIU_REAL, MPI_SUM, HycoComm(f));
   *pin = (PetscInt)(all / dim);
   *component = (PetscInt)(all % dim);
   PetscFunctionReturn(PETSC_SUCCESS);

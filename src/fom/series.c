@@ -29,6 +29,7 @@ static PetscErrorCode AddField(HycoSeries s, const char name[], HycoPlace place,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* VTK's vectors have three components in every dimension. */
 static PetscErrorCode AddDisplacement(HycoSeries s)
 {
   const HycoSeriesSource *f = &s->from;
@@ -237,6 +238,7 @@ static PetscErrorCode CopyFields(HycoFOM f, HycoSeries s, HycoH5 h, PetscInt k)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A resumed run appends to the fields of the run before; if that wrote none, the series would begin in the middle. */
 static PetscErrorCode OpenPart(HycoFOM f, PetscInt k, HycoH5 *h)
 {
   char path[PETSC_MAX_PATH_LEN];

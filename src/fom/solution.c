@@ -105,8 +105,8 @@ PetscErrorCode HycoFOMMeasureQuantities(HycoFOM f, PetscReal value[])
 
   PetscFunctionBegin;
   if (!f->scene->n_quantities) PetscFunctionReturn(PETSC_SUCCESS);
-  if (HycoSceneAsksFields(f->scene)) PetscCall(HycoFOMStress(f));
-  if (HycoSceneAsksContacts(f->scene)) PetscCall(SumContacts(f));
+  if (HycoSceneHasFieldOutputs(f->scene)) PetscCall(HycoFOMStress(f));
+  if (HycoSceneHasContactOutputs(f->scene)) PetscCall(SumContacts(f));
   if (HycoSceneHasReactions(f->scene)) {
     PetscCall(PetscMalloc1(f->fe->n_dof, &reaction));
     PetscCall(HycoFOMReactions(f, reaction));

@@ -409,6 +409,7 @@ static PetscErrorCode Fetch(HycoDirect d, Vec v)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* MUMPS returns the solution on rank 0, from which the ranks get their rows. */
 static PetscErrorCode Deliver(HycoDirect d, Vec v)
 {
   PetscScalar *r;

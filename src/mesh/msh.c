@@ -66,6 +66,7 @@ static long long ReadInt(Msh *m, size_t bytes)
   return value;
 }
 
+/* A read past the end marks the file as failed and returns 0; the caller checks once per node. */
 static double ReadDouble(Msh *m)
 {
   double value = 0;
@@ -142,6 +143,7 @@ static PetscErrorCode AddNode(Msh *m, size_t k, long long tag)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* PETSc would accept NaN, and a solve with it would end without a result. */
 static PetscErrorCode AddCoordinates(Msh *m, size_t k)
 {
   PetscFunctionBegin;
@@ -157,6 +159,8 @@ static PetscErrorCode AddCoordinates(Msh *m, size_t k)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Format 2.2: 28 bytes a node in binary files, at least 8 characters in text, which bounds a declared number by the file's
+   size. */
 static PetscErrorCode ReadNodes2(Msh *m)
 {
   size_t n;
@@ -244,6 +248,7 @@ static PetscErrorCode SortNodes(HycoMsh *mesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Nodes are sorted by tag: every later order follows from the tags, not from the file. */
 static PetscErrorCode ReadNodes(Msh *m)
 {
   PetscFunctionBegin;
@@ -485,6 +490,8 @@ static PetscErrorCode ReadBlock4(Msh *m, long long dim, long long entity, long l
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Format 4.1: blocks of elements of one entity and type. The declared numbers are compared with what the blocks have, since
+   a truncated file may end at a block. */
 static PetscErrorCode ReadElements4(Msh *m)
 {
   size_t blocks, n, all, done = 0;
@@ -510,6 +517,7 @@ static PetscErrorCode ReadElements4(Msh *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Elements refer to nodes by tag, so that the nodes must come first. */
 static PetscErrorCode ReadElements(Msh *m)
 {
   PetscFunctionBegin;
@@ -647,6 +655,7 @@ static const char *OtherFormat(const Msh *m)
   return NULL;
 }
 
+/* Recognises formats that users have by mistake, and names the conversion. */
 static PetscErrorCode RefuseOther(const Msh *m)
 {
   const char *other = OtherFormat(m);

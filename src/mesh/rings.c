@@ -212,6 +212,7 @@ static PetscInt Find(HycoMesh m, PetscInt tag)
   return at;
 }
 
+/* Nodes from the rows that arrived, sorted by tag; coordinates were sent as their bit patterns in integers. */
 static PetscErrorCode PlaceNodes(HycoMesh m, const Rows *r)
 {
   PetscFunctionBegin;
@@ -233,6 +234,7 @@ static PetscErrorCode PlaceNodes(HycoMesh m, const Rows *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Cells arrive in 1D alone, where a facet is a point and needs its cell for the normal. */
 static PetscErrorCode PlaceCells(HycoMesh m, const Rows *r)
 {
   PetscFunctionBegin;
@@ -252,6 +254,7 @@ static PetscErrorCode PlaceCells(HycoMesh m, const Rows *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A facet refers to nodes by tag: on this rank they have other numbers than on the one that sent it. */
 static PetscErrorCode PlaceFacets(HycoMesh m, const Rows *r)
 {
   PetscFunctionBegin;

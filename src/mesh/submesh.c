@@ -414,6 +414,8 @@ static PetscErrorCode SetPoints(DM sub, const Cut *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A DM of the chosen points, with what the whole mesh's DM has composed with it: ties, labels of groups, tags, the points in
+   the whole mesh, the type of its cells. */
 static PetscErrorCode MakeDM(MPI_Comm comm, const Cut *c, DM *dm)
 {
   PetscFunctionBegin;

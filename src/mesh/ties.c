@@ -176,6 +176,7 @@ static PetscInt Follow(HycoMesh m, PetscInt cell, PetscInt follow[])
   return n;
 }
 
+/* By cell, the masters that its tied nodes follow; sizes first, then the lists. */
 static PetscErrorCode FindFollow(HycoMesh m)
 {
   PetscInt follow[HYCO_MAX_CELL_NODES];

@@ -172,6 +172,8 @@ static PetscErrorCode CutMesh(HycoReducer t, HycoMesh from, const PetscBool in[]
 /* Known only on a node's own rank: whether it has a cell outside Omega_A, and which of its components are fixed. */
 #define BESIDE 8
 
+/* What rank 0 must know about the RID's nodes, which other ranks own: which components are fixed, and whether a cell outside
+   the RID has the node, which is then on the interface. */
 static PetscErrorCode FetchNotes(HycoReducer t, const PetscBool in[], PetscInt n, const PetscInt global[],
                                  PetscInt note[])
 {
@@ -348,6 +350,7 @@ static PetscErrorCode FillModel(HycoReducer t, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Fills the report from the built model; the numbers of the last iteration of a greedy training are overwritten. */
 static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
 {
   PetscFunctionBegin;
@@ -455,6 +458,7 @@ static PetscErrorCode BeginOnRoot(HycoReducer t, HycoROM *model)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A model that failed half-built is destroyed here: the caller gets none. */
 static PetscErrorCode BuildOnRoot(HycoReducer t, PetscBool useful, HycoROM *model, HycoTraining *report)
 {
   PetscErrorCode ierr;

@@ -20,6 +20,7 @@ static PetscBool Complete(const HycoAttempt *a)
   return (PetscBool)(!a->failure[0] && !a->beaten_by);
 }
 
+/* The largest ratio that may be chosen (above): max(1, LITTLE times the least), but below HYCO_MISSES if the best is. */
 static PetscReal Bound(PetscInt n, const HycoAttempt attempt[], const HycoAttempt **best)
 {
   *best = NULL;

@@ -43,8 +43,8 @@ static PetscErrorCode PartsOfBodies(HycoReducer t, const HycoMotions *motions, P
     first[b] = PetscMin(first[b], motions->part[i]);
     last[b] = PetscMax(last[b], motions->part[i]);
   }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, first, (PetscMPIInt)n, MPIU_INT, MPI_MIN, HycoComm(t)));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, last, (PetscMPIInt)n, MPIU_INT, MPI_MAX, HycoComm(t)));
+  HycoAllreduce(first, n, MPIU_INT, MPI_MIN, HycoComm(t));
+  HycoAllreduce(last, n, MPIU_INT, MPI_MAX, HycoComm(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -265,6 +265,8 @@ static const char *WhyStop(HycoReducer t, const HycoGreedyStep *step)
   return step->worst ? NULL : "points";
 }
 
+/* One iteration of section 5.4: a model of the points so far, its indicator at all training points, the worst of which is
+   added. The decision to stop uses rank 0's clock, so that it is the same on every rank. */
 static PetscErrorCode Iterate(HycoReducer t, Loop *loop, PetscInt iteration, HycoTraining *report, PetscBool *last)
 {
   HycoGreedyStep step = {0};

@@ -4,13 +4,14 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+/* Read from the options of the caller's object; there is no object of its own whose prefix could apply. */
 static PetscErrorCode ReadGroups(MPI_Comm comm, PetscOptions options, PetscInt *groups, PetscBool *monitor)
 {
   PetscFunctionBegin;
   PetscOptionsBegin(comm, NULL, "HycoSnapshots", NULL);
   PetscOptionsObject->options = options;
   PetscCall(HycoOptionsInt(
-      "-hyco_groups", "number of groups of ranks that solve snapshots at the same time (0: from the size of the mesh)",
+      "-hyco_groups", "number of groups of ranks that solve snapshots at the same time (0: as many as the memory allows)",
       0, PETSC_MAX_INT, groups, NULL));
   PetscCall(HycoOptionsFlag("-hyco_groups_monitor",
                             "print a numbered line when a group of ranks begins a point, fails, or finds none left",

@@ -167,6 +167,7 @@ PetscErrorCode HycoHeldOutPredict(HycoROM m, HycoSnapshots store, const PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A repetition measures time alone; the median counts, because the machine may be busy at one of them. */
 static PetscErrorCode Predict(HycoROM m, HycoSnapshots store, const PetscReal mu[], PetscInt repeat, HycoHeldOut *row)
 {
   PetscFunctionBegin;

@@ -111,6 +111,8 @@ static PetscErrorCode JudgeAll(HycoReducer t, HycoROM m, PetscReal most, HycoJud
 /* Smallest number of paths after which a race is decided. */
 #define RACED 3
 
+/* Predicts the training paths one by one, and stops when this model has lost: its sum of errors reaches that of the best
+   settings over all paths, or, from RACED paths on, theirs over the same paths. */
 static PetscErrorCode Race(HycoReducer t, HycoROM m, PetscInt n, const PetscInt order[], const HycoJudged best[],
                            PetscReal most, HycoJudged judged[], PetscBool *lost)
 {

@@ -1,7 +1,7 @@
 /*
   Errors of the scene's outputs at held-out points: those of the final model compared with those of the stored
   full-order solutions, in the outputs' own units. Rank 0 evaluates both on the cells that the outputs need, by the
-  functions of predict (probe.c). Outputs may pass through zero, so that no error is divided by the output itself.
+  functions of predict (output_cells.c). Outputs may pass through zero, so that no error is divided by the output itself.
 */
 #include <hycoquantities.h>
 #include <hycoreducerimpl.h>
@@ -17,7 +17,7 @@ typedef struct {
   HycoSamples points;
   HycoROM m;
   HycoSnapshots store;
-  HycoFE fe; /* of the probe (borrowed); NULL: the outputs need only results of contacts */
+  HycoFE fe; /* of the output cells (borrowed); NULL: the outputs need only results of contacts */
   PetscInt first[N_FIELDS], n[N_FIELDS];
   PetscReal *rows[N_FIELDS], *value[N_FIELDS]; /* these nodes or cells, then those of the mesh */
   PetscReal *lambda;
@@ -46,7 +46,7 @@ static PetscErrorCode GatherCells(HycoReducer t, HycoMesh *mesh, PetscBool **bal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Makes the model's probe of these cells and the modes at their nodes. Collective; m: on rank 0. */
+/* Makes the model's output cells from these cells and the modes at their nodes. Collective; m: on rank 0. */
 static PetscErrorCode MakeProbe(HycoReducer t, HycoROM m)
 {
   HycoMesh mesh, loaded;
@@ -55,7 +55,7 @@ static PetscErrorCode MakeProbe(HycoReducer t, HycoROM m)
   PetscInt n;
 
   PetscFunctionBegin;
-  if (!HycoSceneAsksFields(t->scene)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!HycoSceneHasFieldOutputs(t->scene)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(GatherCells(t, &mesh, &balanced, &loaded));
   n = mesh ? mesh->n_nodes * t->sizes[3] : 0;
   PetscCall(PetscMalloc1((size_t)n * (size_t)t->l + 1, &columns));
@@ -66,7 +66,7 @@ static PetscErrorCode MakeProbe(HycoReducer t, HycoROM m)
       V[(size_t)i * (size_t)t->l + (size_t)j] = columns[(size_t)j * (size_t)n + (size_t)i];
   }
   PetscCall(PetscFree(columns));
-  HycoOnRoot(HycoComm(t), HycoROMSetProbe(m, mesh, V, balanced, loaded));
+  HycoOnRoot(HycoComm(t), HycoROMSetOutputCells(m, mesh, V, balanced, loaded));
   if (t->rank) PetscCall(PetscFree(balanced));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -84,11 +84,12 @@ static PetscInt Places(const Outputs *o, int k, const PetscInt **at)
   return k == STRESS ? o->fe->mesh->n_cells : o->fe->mesh->n_nodes;
 }
 
+/* The ranges of rows of each field that the outputs' cells need: only these are read from the snapshots. */
 static PetscErrorCode Begin(Outputs *o)
 {
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(o->m->model->pairs.n, &o->lambda));
-  o->fe = HycoROMGetProbe(o->m);
+  o->fe = HycoROMGetOutputCells(o->m);
   for (int k = 0; o->fe && k < N_FIELDS; k++) {
     const PetscInt *at, n = Places(o, k, &at);
     PetscInt last = -1;
@@ -139,8 +140,8 @@ static PetscErrorCode MeasureStored(Outputs *o, const PetscReal mu[], PetscInt s
     PetscCall(ReadField(o, mu, step, k, &has[k]));
   PetscCall(HycoSnapshotsReadRows(o->store, mu, step, "lambda", 0, o->m->model->pairs.n, o->lambda));
   HycoSceneSetTime(scene, mu, scene->n_times ? scene->times[step] : 0, all);
-  PetscCall(HycoROMMeasureGiven(o->m, all, o->value[DISPLACEMENT], o->value[STRESS],
-                                has[REACTION] ? o->value[REACTION] : NULL, o->lambda, value));
+  PetscCall(HycoROMMeasureSolution(o->m, all, o->value[DISPLACEMENT], o->value[STRESS],
+                                   has[REACTION] ? o->value[REACTION] : NULL, o->lambda, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -203,6 +204,7 @@ static PetscErrorCode JudgeAll(Outputs *o, const HycoHeldOut rows[], HycoOutputE
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The model's output cells were made for this judgement; predictions make their own. */
 static PetscErrorCode JudgeOnRoot(Outputs *o, const HycoHeldOut rows[], HycoOutputErrors e[])
 {
   PetscErrorCode ierr;
@@ -211,7 +213,7 @@ static PetscErrorCode JudgeOnRoot(Outputs *o, const HycoHeldOut rows[], HycoOutp
   ierr = Begin(o);
   if (!ierr) ierr = JudgeAll(o, rows, e);
   PetscCall(End(o));
-  PetscCall(HycoProbeDestroy(&o->m->probe));
+  PetscCall(HycoOutputCellsDestroy(&o->m->output_cells));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

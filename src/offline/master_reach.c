@@ -44,6 +44,7 @@ PetscErrorCode HycoMovedGroups(HycoScene scene, HycoMesh m, const HycoPairs *pai
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The moved surfaces as a mesh without cells: geometry alone decides which masters a slave meets. */
 static PetscErrorCode CutSurfaces(HycoScene scene, HycoMesh whole, const HycoPairs *pairs, HycoMesh *mesh)
 {
   PetscInt *group, *extra, n_groups, n_extra = 0;
@@ -66,6 +67,7 @@ static PetscErrorCode CutSurfaces(HycoScene scene, HycoMesh whole, const HycoPai
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The moved contacts on a mesh of their surfaces, which is moved to many parameter values at little cost. */
 static PetscErrorCode SurfacesCreate(HycoScene scene, HycoMesh whole, const HycoPairs *all, Surfaces *s)
 {
   PetscInt *index, n = 0;
@@ -179,6 +181,8 @@ static PetscErrorCode Note(const HycoPairs *p, Lists *l, PetscInt *grown)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Adds the masters at these parameters to the lists; *grown counts what is new, so that the caller can stop when nothing
+   is. */
 static PetscErrorCode NoteAt(Surfaces *s, const PetscReal mu[], Lists *l, PetscInt *grown)
 {
   PetscFunctionBegin;

@@ -560,6 +560,8 @@ static PetscErrorCode TakeDisplacements(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rows chosen by DEIM from one field's modes, as seeds of the RID. Where a plane of symmetry is the RID, only displacements
+   seed. */
 static PetscErrorCode TakeField(HycoReducer t, PetscInt kind, PetscInt divide, PetscInt *n_seeds, PetscInt **seeds)
 {
   Mat V;

@@ -28,6 +28,8 @@ static PetscErrorCode RidDestroy(Rid *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* On several ranks two star forests connect owned nodes with those of the parts (with their overlap) and of the surfaces,
+   so that layers of the label grow across the ranks. */
 static PetscErrorCode RidCreate(HycoFOM f, Rid *r)
 {
   HycoMesh part = f->part, surface = f->surface;
@@ -88,6 +90,7 @@ static PetscErrorCode ToSurface(Rid *r, const PetscBool node[], PetscInt on[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Marks of the surfaces' nodes, which rank 0 has, on the nodes of every rank's part. */
 static PetscErrorCode FromSurface(Rid *r, const PetscInt on[], PetscInt node[])
 {
   PetscFunctionBegin;
@@ -163,6 +166,7 @@ static PetscErrorCode AddGroup(Rid *r, const char name[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Nodes where the user's expression is positive, with the cells around them. */
 static PetscErrorCode AddRegion(Rid *r, const char text[])
 {
   HycoMesh m = r->part;

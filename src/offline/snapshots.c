@@ -10,6 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+/* An existing folder is used as it is: solutions in it are kept. What killed runs left is removed. */
 static PetscErrorCode MakeFolder(const char folder[])
 {
   struct stat info;
@@ -100,6 +101,7 @@ static PetscErrorCode CheckHistory(HycoSnapshots s, HycoH5 h, const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Another scene's solutions would silently give a wrong model. Of a changed history, the message says what changed. */
 static PetscErrorCode CheckFingerprint(HycoSnapshots s, HycoH5 h, const char path[])
 {
   char *text, mine[32];
@@ -199,6 +201,7 @@ static PetscErrorCode WriteSprings(HycoFOM fom, HycoH5 h, const char name[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Every rank writes its rows in the mesh file's order, so that a file does not depend on the number of ranks. */
 static PetscErrorCode WriteFields(HycoSnapshots s, HycoFOM fom, HycoH5 h, const PetscReal mu[], const PetscReal force[])
 {
   const PetscInt dim = fom->fe->dim;
@@ -429,6 +432,8 @@ static PetscErrorCode SolveQueued(HycoSnapshots s, HycoQueue queue, const Missin
   }
 }
 
+/* A group has a full-order model of its own, whose factor it keeps from point to point. A long path looks between its steps
+   whether another group has failed. */
 static PetscErrorCode SolveGroup(HycoSnapshots s, HycoQueue queue, const Missing *m)
 {
   MPI_Comm group;
@@ -476,6 +481,7 @@ static PetscErrorCode CountWork(HycoSnapshots s, HycoQueue queue)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The queue orders the points by stiffness; an error of one group ends the work of all. */
 static PetscErrorCode SolveMissing(HycoSnapshots s, const Missing *m)
 {
   HycoQueue queue;
@@ -542,6 +548,7 @@ static PetscErrorCode ReadColumns(HycoSnapshots s, PetscInt n, const PetscReal m
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* All solutions have the same size; the first one gives it. */
 static PetscErrorCode FirstSize(HycoSnapshots s, HycoSamples samples, const char field[], PetscInt *rows)
 {
   const PetscReal *mu;
@@ -604,6 +611,7 @@ static PetscErrorCode CountBetween(HycoSnapshots s, const PetscReal mu[], PetscI
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The columns of the steps between listed times, which are numbered in the file. */
 static PetscErrorCode ReadBetween(HycoSnapshots s, const PetscReal mu[], PetscInt n, PetscInt lo, PetscInt rows,
                                   PetscScalar data[], PetscInt lda)
 {

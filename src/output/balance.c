@@ -20,7 +20,7 @@ static PetscErrorCode JoinBodies(MPI_Comm comm, HycoScene scene, HycoMesh m, Pet
     for (PetscInt j = m->tied_start[k]; j < m->tied_start[k + 1]; j++)
       joined[m->node_body[m->tied[k]] * n + m->node_body[m->tied_master[j]]] = PETSC_TRUE;
   }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, joined, (PetscMPIInt)(n * n), HYCO_MPI_BOOL, MPI_LOR, comm));
+  HycoAllreduce(joined, n * n, HYCO_MPI_BOOL, MPI_LOR, comm);
   for (PetscInt b = 0; b < n; b++) part[b] = b;
   while (change) {
     change = PETSC_FALSE;
@@ -130,8 +130,7 @@ PetscErrorCode HycoQuantitiesBalance(MPI_Comm comm, HycoScene scene, HycoMesh m,
   PetscCall(PetscCalloc1(2 * scene->n_quantities * n, &held));
   PetscCall(JoinBodies(comm, scene, m, part));
   HycoOnEach(comm, MarkAll(scene, m, part, held));
-  PetscCallMPI(
-      MPI_Allreduce(MPI_IN_PLACE, held, (PetscMPIInt)(2 * scene->n_quantities * n), HYCO_MPI_BOOL, MPI_LOR, comm));
+  HycoAllreduce(held, 2 * scene->n_quantities * n, HYCO_MPI_BOOL, MPI_LOR, comm);
   for (PetscInt k = 0; k < scene->n_quantities; k++) {
     const PetscBool *inside = held + 2 * k * n, *outside = inside + n;
     PetscBool follows = PETSC_TRUE;

@@ -4,6 +4,7 @@
 */
 #include <hycofields.h>
 #include <hycofile.h>
+#include <hycofom.h>
 #include <hycoh5.h>
 #include <stdio.h>
 #include <string.h>

@@ -351,6 +351,7 @@ static PetscErrorCode AddContactFields(HycoFieldFile file, const HycoSolution *s
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Fields of contacts live on surfaces, and are moved to the part's nodes before they are written. */
 static PetscErrorCode AddContacts(HycoFieldFile file, const HycoSolution *s)
 {
   HycoContactFields f;

@@ -22,6 +22,7 @@ typedef struct {
   PetscInt body; /* the body with the group's name; -1: none */
 } Place;
 
+/* Where an output is evaluated: a group of cells, facets or nodes; a body's name is its group of cells. */
 static PetscErrorCode FindPlace(HycoScene scene, HycoMesh m, const HycoQuantity *q, Place *p)
 {
   PetscFunctionBegin;
@@ -267,14 +268,15 @@ static PetscErrorCode AddReactions(HycoFE fe, const HycoQuantity *q, const Petsc
 static PetscErrorCode AddContacts(HycoFE fe, const HycoQuantity *q, const HycoContactResult contact[], PetscReal *value)
 {
   const PetscBool turns = (PetscBool)(fe->dim == 3 || (fe->dim == 2 && q->field == 2));
+  const PetscBool axisymmetric = (PetscBool)(fe->formulation == HYCO_AXISYMMETRIC);
 
   PetscFunctionBegin;
   if (q->kind == HYCO_QUANTITY_FORCE) PetscCall(CheckAxis(fe, q, "force"));
-  HycoCheck(q->kind != HYCO_QUANTITY_MOMENT || (turns && fe->formulation != HYCO_AXISYMMETRIC),
-            "output_%s: there is no moment about %c%s", q->name, "xyz"[q->field],
-            fe -> formulation == HYCO_AXISYMMETRIC ? " in an axisymmetric scene"
-                  : fe->dim == 2                   ? " in 2D; use z"
-                                                   : " in 1D");
+  HycoCheck(q->kind != HYCO_QUANTITY_MOMENT || (turns && !axisymmetric), "output_%s: there is no moment about %c%s",
+            q->name, "xyz"[q->field],
+            axisymmetric   ? " in an axisymmetric scene"
+            : fe->dim == 2 ? " in 2D; use z"
+                           : " in 1D");
   *value = contact ? 0 : NAN;
   for (PetscInt c = 0; contact && c < fe->scene->n_contacts; c++) {
     const HycoContactResult *r = &contact[c];
@@ -288,6 +290,8 @@ static PetscErrorCode AddContacts(HycoFE fe, const HycoQuantity *q, const HycoCo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A group of points or lines is evaluated at its nodes, one of cells or facets by entity. Stresses on a facet are those of
+   its cell. */
 static PetscErrorCode Measure(HycoFE fe, const HycoQuantity *q, const PetscReal u[], const PetscReal sigma[], Sum *s)
 {
   HycoMesh m = fe->mesh;
@@ -323,6 +327,7 @@ static PetscErrorCode MeasureBodies(MPI_Comm comm, HycoFE fe, const HycoQuantity
 {
   const PetscBool is_reaction = (PetscBool)(q->kind == HYCO_QUANTITY_REACTION);
   Sum s = {-PETSC_INFINITY, PETSC_INFINITY, 0, 0};
+  const char *group = q->group ? q->group : "any group";
   PetscReal ends[2], sums[2];
 
   PetscFunctionBegin;
@@ -333,8 +338,7 @@ static PetscErrorCode MeasureBodies(MPI_Comm comm, HycoFE fe, const HycoQuantity
   sums[1] = s.weight;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ends, 2, MPIU_REAL, MPI_MAX, comm));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sums, 2, MPIU_REAL, MPI_SUM, comm));
-  HycoCheck(sums[1] > 0 || !is_reaction, "output_%s: no support fixes %c on %s", q->name, "xyz"[q->field],
-            q -> group ? q -> group : "any group");
+  HycoCheck(sums[1] > 0 || !is_reaction, "output_%s: no support fixes %c on %s", q->name, "xyz"[q->field], group);
   HycoCheck(sums[1] > 0, "output_%s: the group %s has no cell, facet or node", q->name,
             q->group ? q->group : "of all cells");
   *value = is_reaction                    ? sums[0]

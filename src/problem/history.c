@@ -35,6 +35,7 @@ static PetscErrorCode ReadRows(const char text[], PetscInt width, PetscInt *n, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Times must increase strictly: a step of no length has no rate. */
 static PetscErrorCode CheckTimes(const char key[], PetscInt n, const PetscReal t[], PetscInt stride)
 {
   PetscFunctionBegin;
@@ -45,6 +46,7 @@ static PetscErrorCode CheckTimes(const char key[], PetscInt n, const PetscReal t
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Replaces former times: the last of repeated entries counts, as for other options. */
 static PetscErrorCode ReadTimes(HycoScene s, const char key[], const char text[])
 {
   PetscInt n;
@@ -80,6 +82,8 @@ static PetscErrorCode AddVariable(HycoScene s, const char key[], const char name
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A table is a variable of expressions, of the name after history_tables_. It is counted before its rows are read, so that
+   an error in them leaves a scene that can be destroyed. */
 static PetscErrorCode ReadTable(HycoScene s, const char key[], const char text[])
 {
   const char *name = key + strlen(TABLES);
@@ -165,6 +169,7 @@ PetscErrorCode HycoSceneDestroyHistory(HycoScene s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Linear between the rows; before the first and after the last row the value stays. */
 static PetscReal ValueAt(const HycoTimeTable *table, PetscReal t)
 {
   PetscInt k = 0;

@@ -115,6 +115,7 @@ static PetscErrorCode HashDM(HycoScene scene, unsigned long long *hash)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The mesh enters the fingerprint by its bytes, so that an edited mesh of the same name makes snapshots stale. */
 static PetscErrorCode HashFile(HycoScene scene, unsigned long long *hash)
 {
   unsigned char buffer[65536];

@@ -92,6 +92,8 @@ static PetscErrorCode Member(const char name[], size_t size, PetscInt *n, void *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Option names do not distinguish case: the same entry in other letters replaces the former one, another entry for the
+   same group is an error. */
 static PetscErrorCode NewExpr(HycoScene s, PetscInt entry, HycoExpr *expr)
 {
   PetscFunctionBegin;
@@ -125,6 +127,7 @@ static PetscBool SplitRange(const char text[], PetscReal range[2])
   return (PetscBool)(!PetscIsInfOrNanReal(range[0]) && !PetscIsInfOrNanReal(range[1]) && range[0] <= range[1]);
 }
 
+/* From the entry's text, so that the message can show the form that is expected. */
 static PetscErrorCode ReadRange(HycoScene s, PetscInt p)
 {
   char key[HYCO_LINE];
@@ -143,6 +146,7 @@ static PetscErrorCode ReadRange(HycoScene s, PetscInt p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The commas are counted first: PETSc would silently drop names beyond the array's length. */
 static PetscErrorCode ReadParameters(HycoScene s)
 {
   PetscInt n = HYCO_MAX_PARAMETERS, commas = 0;
@@ -315,6 +319,7 @@ static PetscErrorCode FindDeclared(HycoScene s, const Section *section, const ch
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The body of that name; its law is created at its first entry, because the law decides which entries are valid. */
 static PetscErrorCode FindBody(HycoScene s, const char name[], HycoBody **body)
 {
   PetscInt k = 0;
@@ -331,6 +336,8 @@ static PetscErrorCode FindBody(HycoScene s, const char name[], HycoBody **body)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Fields that every law has are read here, by their place in body_fields; all others must be constants that the body's law
+   declares. */
 static PetscErrorCode ReadBody(HycoScene s, PetscInt entry, const char rest[])
 {
   const char *key = s->key[entry], *constant;
@@ -355,6 +362,7 @@ static PetscErrorCode ReadBody(HycoScene s, PetscInt entry, const char rest[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The contact of that name; created at its first entry, since its type decides which entries are valid. */
 static PetscErrorCode FindContact(HycoScene s, const char name[], HycoContact *contact)
 {
   HycoDeclared *declared;
@@ -371,6 +379,7 @@ static PetscErrorCode FindContact(HycoScene s, const char name[], HycoContact *c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* `type` has been read when the contact was created; all other fields are those that the type declares. */
 static PetscErrorCode ReadContact(HycoScene s, PetscInt entry, const char rest[])
 {
   const char *key = s->key[entry], *field;
@@ -603,6 +612,7 @@ static PetscErrorCode CheckScene(HycoScene s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The last entry of that name counts; a missing one is "", so that callers need no second case. */
 static PetscErrorCode GetString(HycoScene s, const char key[], char **value)
 {
   PetscFunctionBegin;
@@ -614,6 +624,7 @@ static PetscErrorCode GetString(HycoScene s, const char key[], char **value)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Twelve halvings multiply the cells of a 2D mesh by 16 million: more is a typing error. */
 static PetscErrorCode ReadRefine(HycoScene s)
 {
   char *text = NULL, *end;
@@ -630,6 +641,7 @@ static PetscErrorCode ReadRefine(HycoScene s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* No entry: the first name. */
 static PetscErrorCode ReadFormulation(HycoScene s)
 {
   static const char *const names[] = {"plane_strain", "plane_stress", "axisymmetric"};
@@ -700,6 +712,8 @@ static PetscErrorCode Build(HycoScene s, const char folder[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Reading the file is collective; building the scene from its entries is done by each rank for itself, and an error on one
+   is raised on all. */
 static PetscErrorCode LoadInto(HycoScene s, const char path[])
 {
   char folder[PETSC_MAX_PATH_LEN] = "";
@@ -727,6 +741,7 @@ PetscErrorCode HycoSceneLoad(MPI_Comm comm, const char path[], HycoScene *scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A scene of a program, from keys and values instead of a file. The command line still takes precedence. */
 static PetscErrorCode FillFromEntries(HycoScene s, PetscInt n, char *const key[], char *const value[],
                                       const char folder[])
 {

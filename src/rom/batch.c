@@ -9,6 +9,7 @@ typedef struct {
   PetscInt n, at;
 } Point;
 
+/* By the parameters in p->order, then by the place in the batch: equal points stay in the caller's order. */
 static int Compare(const void *a, const void *b)
 {
   const Point *p = a, *q = b;
@@ -21,6 +22,8 @@ static int Compare(const void *a, const void *b)
   return p->at < q->at ? -1 : p->at > q->at;
 }
 
+/* Points in an order in which the parameters that the stiffness depends on change least often, so that consecutive
+   points share its factor. */
 static PetscErrorCode Sort(HycoROM m, PetscInt n, const PetscReal mu[], PetscInt order[], Point point[])
 {
   const PetscInt n_par = m->model->scene->n_parameters;

@@ -40,6 +40,7 @@ PetscErrorCode HycoBalanceDestroy(HycoBalance *balance)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Everything that a measurement of a whole-mesh path needs; kept in the model, because each held-out path is measured. */
 static PetscErrorCode Create(HycoROM m, HycoBalance b)
 {
   const HycoFE fe = m->fe_whole;
@@ -210,6 +211,8 @@ static void Summarise(HycoROM m, HycoBalance b, HycoEquilibrium *e)
   }
 }
 
+/* Replays the laws along the last predicted path and measures the residual of equilibrium at each listed time; a law that
+   has no solution there gives an infinite residual with the reason, not an error. */
 static PetscErrorCode Measure(HycoROM m, HycoBalance b, HycoEquilibrium *e)
 {
   HycoReplay replay = {0};

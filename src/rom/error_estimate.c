@@ -65,6 +65,8 @@ static PetscReal Quotient(PetscReal part2, PetscReal size2)
   return size2 > 0 ? PetscSqrtReal(part2 / size2) : part2 > 0 ? 1 : 0;
 }
 
+/* How far the full-order displacements are from what the modes alone would give there, relative to their size: a basis
+   that describes the solution well makes both agree. */
 static PetscReal Misfit(HycoROM m)
 {
   PetscReal lost = 0, size = 0;
@@ -81,6 +83,8 @@ static PetscReal Misfit(HycoROM m)
   return Quotient(lost, size);
 }
 
+/* Penetration of the contacts that the reduced system does not constrain, and forces on those that are open: what (38)
+   leaves unchecked outside the RID. */
 static void Contacts(HycoROM m, PetscReal *penetration, PetscReal *adhesion)
 {
   PetscReal in = 0, moved = 0, stuck = 0, force = 0;

@@ -117,6 +117,7 @@ typedef struct {
   const PetscReal *force, *load;
 } Dual;
 
+/* The work of each pressing contact's row of B on the floating bodies' rigid motions, a column per contact. */
 static PetscErrorCode FillDual(HycoROM m, HycoFloating f, HycoFE fe, Dual *d)
 {
   PetscFunctionBegin;

@@ -115,7 +115,7 @@ PetscErrorCode HycoROMReset(HycoROM m)
   m->ready = m->solved = m->whole_current = m->beyond_current = PETSC_FALSE;
   if (m->work || !m->model->traits.work) PetscTryTypeMethod(m, reset);
   PetscCall(PetscFree(m->work));
-  PetscCall(HycoProbeDestroy(&m->probe));
+  PetscCall(HycoOutputCellsDestroy(&m->output_cells));
   PetscCall(HycoCarriedDestroy(&m->carried));
   PetscCall(HycoFEDestroy(&m->fe_floating));
   PetscCall(HycoSolverDestroy(&m->solver));

@@ -84,6 +84,8 @@ static PetscErrorCode MeasureDisplacements(HycoROM m, HycoPrediction *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Sliding, overlap and facing contacts of the prediction; dependent rows are counted only where surfaces are complete, since
+   an RID cuts rows off. */
 static PetscErrorCode MeasureContacts(HycoROM m, HycoPrediction *p)
 {
   HycoContactState state;
@@ -244,6 +246,7 @@ PetscErrorCode HycoROMWrite(HycoROM m, const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Predicts a point and adds its fields to the file; the array of the RID's cells is freed on an error too. */
 static PetscErrorCode WritePoint(HycoROM m, const PetscReal mu[], HycoFieldFile file)
 {
   HycoSolution solution;

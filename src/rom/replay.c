@@ -72,6 +72,7 @@ static HycoSeriesSource Look(const HycoReplay *r, PetscInt j)
   return from;
 }
 
+/* Replays all accepted times in order, because states depend on those before, and writes the listed ones. */
 static PetscErrorCode WriteTimes(HycoReplay *r, HycoSeries series)
 {
   HycoROM m = r->m;

@@ -43,6 +43,7 @@ static PetscErrorCode MoveTies(HycoH5 h, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Number of contacts and of entries follow from the file when it is read: -1 means "not known yet". */
 static PetscErrorCode MovePairs(HycoH5 h, PetscInt n_nodes, PetscInt n_contacts, HycoPairs *p)
 {
   PetscInt *entries;
@@ -100,6 +101,7 @@ enum {
   ESTIMATE_NUMBERS = 2 + HYCO_ESTIMATE_FEATURES + HYCO_N_ESTIMATES * (2 + HYCO_ESTIMATE_FEATURES)
 };
 
+/* One row of OUTPUT_NUMBERS for each output of the scene, in the order that LoadOutputEstimates() expects. */
 static PetscErrorCode SaveOutputEstimates(HycoH5 h, HycoROM m)
 {
   const HycoEstimates *t = &m->model->estimates;
@@ -120,6 +122,8 @@ static PetscErrorCode SaveOutputEstimates(HycoH5 h, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The held-out errors, the fitted laws of the estimates and the features reached in training. Infinite errors are written
+   as the largest number, because a model file holds finite numbers only. */
 static PetscErrorCode SaveEstimates(HycoH5 h, HycoROM m)
 {
   const HycoEstimates *t = &m->model->estimates;
@@ -154,6 +158,7 @@ static PetscBool IsCount(PetscReal x)
   return (PetscBool)(x >= 1 && x <= (PetscReal)PETSC_MAX_INT);
 }
 
+/* Median and largest held-out errors; absent in models that were not judged. */
 static PetscErrorCode LoadHeldOut(HycoH5 h, HycoROM m)
 {
   HycoEstimates *t = &m->model->estimates;
@@ -230,6 +235,7 @@ static PetscErrorCode LoadOldEstimates(HycoH5 h, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The estimates of outputs, which need the number of held-out points that LoadEstimates() has read. */
 static PetscErrorCode LoadOutputEstimates(HycoH5 h, HycoROM m)
 {
   HycoEstimates *t = &m->model->estimates;
@@ -257,6 +263,8 @@ static PetscErrorCode LoadOutputEstimates(HycoH5 h, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The laws of the estimates, or those of older files under their former name. Every number is checked: a damaged file must
+   not give a plausible estimate. */
 static PetscErrorCode LoadEstimates(HycoH5 h, HycoROM m)
 {
   HycoEstimates *t = &m->model->estimates;
@@ -289,6 +297,7 @@ static PetscErrorCode LoadEstimates(HycoH5 h, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Writes or reads; reading has an order, since the outputs' estimates refer to the others. */
 static PetscErrorCode MoveEstimates(HycoH5 h, HycoROM m)
 {
   PetscFunctionBegin;
@@ -301,6 +310,7 @@ static PetscErrorCode MoveEstimates(HycoH5 h, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Sizes of the whole mesh, the kind of hybrid, and the numbers of snapshots' modes, in one dataset. */
 static PetscErrorCode MoveSizes(HycoH5 h, HycoROM m)
 {
   PetscInt sizes[6] = {m->model->whole_nodes, m->model->whole_cells, (PetscInt)m->model->hybrid,
@@ -330,6 +340,7 @@ static PetscErrorCode MoveReach(HycoH5 h, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The scene as text: a model needs neither the scene's folder nor its options afterwards. */
 static PetscErrorCode MoveScene(HycoH5 h, HycoROM m)
 {
   char *text;
@@ -359,6 +370,7 @@ static PetscErrorCode MoveType(HycoH5 h, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Which program trained the model, from what; the fingerprint identifies the scene and mesh of its snapshots. */
 static PetscErrorCode MoveProvenance(HycoH5 h, HycoROM m)
 {
   char *text;
@@ -376,6 +388,7 @@ static PetscErrorCode MoveProvenance(HycoH5 h, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The sets A and I as a number per node; the dataset keeps its former name, so that models of older versions load. */
 static PetscErrorCode MoveDomain(HycoH5 h, HycoROM m)
 {
   PetscInt *sets = NULL;
@@ -466,6 +479,8 @@ PetscErrorCode HycoROMSave(HycoROM m, HycoFOM mesh, PetscInt l, Mat V, const cha
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Fields, solutions and snapshots are HDF5 files too: the message says which file to give. A format that is too new or too
+   old is refused before anything else is read. */
 static PetscErrorCode CheckKind(HycoH5 h, const char path[])
 {
   char *kind;
@@ -525,6 +540,7 @@ PetscErrorCode HycoROMLoad(const char path[], HycoROM *model)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The bytes of the file without the whole mesh, which rank 0 sends to the other ranks. */
 static PetscErrorCode MakeImage(HycoROM m, void **image, size_t *size)
 {
   HycoH5 h;

@@ -51,7 +51,7 @@ static PetscErrorCode WriteGroupNodes(MPI_Comm comm, HycoH5 h, HycoMesh m, Petsc
       start[g + 1]++;
     }
   }
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, start, (PetscMPIInt)(m->n_groups + 1), MPIU_INT, MPI_SUM, comm));
+  HycoAllreduce(start, m->n_groups + 1, MPIU_INT, MPI_SUM, comm);
   for (PetscInt g = 0; g < m->n_groups; g++) start[g + 1] += start[g];
   PetscCall(HycoRankKeys(comm, n, key, place, &all));
   HycoOnRoot(comm, HycoH5WriteInt(h, IN("group_start"), m->n_groups + 1, 1, start));

@@ -14,6 +14,7 @@ PetscBool HycoWantsTrace(void)
 
 static char caught_line[HYCO_LINE];
 
+/* Keeps the first message of an error, where it is raised; the calls that it passes through add none. */
 static PetscErrorCode CatchHandler(MPI_Comm comm, int line, const char *function, const char *file, PetscErrorCode code,
                                    PetscErrorType type, const char *message, void *ctx)
 {

@@ -1,5 +1,6 @@
 /* Files that are written either completely or not at all. */
 #include <hycofile.h>
+#include <hycoimpl.h>
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -174,6 +175,7 @@ PetscErrorCode HycoFileOpenScratch(const char scratch[], const char path[], int 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* O_EXCL: a temporary name that exists belongs to another process, and must not be written to. */
 static PetscErrorCode OpenPlace(HycoFile f)
 {
   int fd;

@@ -5,6 +5,7 @@
   numbers to their positions without HDF5, because parallel HDF5 cannot report a full disk.
 */
 #include <hycofile.h>
+#include <hycoimpl.h>
 #include <hycoh5.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -42,6 +43,8 @@ static herr_t RefuseLink(const char *parent_file, const char *parent_group, cons
   return -1;
 }
 
+/* HDF5's own error printing is off, since errors are reported in one line. External links are refused when they are
+   followed: a file could otherwise read any other. */
 static PetscErrorCode New(const char path[], HycoH5 *file)
 {
   HycoH5 f;
@@ -85,6 +88,7 @@ static hid_t InMemory(void)
   return access;
 }
 
+/* The file says that it has a seal, so that a truncated one, whose seal is missing, is recognised. */
 static PetscErrorCode MarkSealed(HycoH5 f)
 {
   const PetscInt yes = 1;
@@ -95,6 +99,7 @@ static PetscErrorCode MarkSealed(HycoH5 f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A file in memory: HDF5 cannot close a file on a full disk, but memory can be discarded. */
 static PetscErrorCode CreateImage(const char name[], PetscBool table, HycoH5 *file)
 {
   hid_t access;
@@ -187,6 +192,7 @@ static PetscErrorCode OpenShared(HycoH5 f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One rank needs no shared file. With several, rank 0 allocates the datasets under a temporary name, and all write to it. */
 static PetscErrorCode CreateShared(MPI_Comm comm, const char path[], PetscBool table, HycoH5 *file)
 {
   PetscErrorCode ierr;
@@ -387,6 +393,7 @@ static PetscErrorCode Commit(HycoH5 f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Renames the file once it is complete and sealed; otherwise nothing stays. */
 static PetscErrorCode CloseShared(HycoH5 f, PetscBool commit)
 {
   PetscErrorCode ierr = commit ? Commit(f) : PETSC_SUCCESS;
@@ -656,6 +663,7 @@ static PetscErrorCode ReadSet(HycoH5 f, const char name[], hid_t set, hid_t type
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A size of -1 is not known beforehand, and is printed as n. */
 static PetscErrorCode CheckSize(HycoH5 f, const char name[], const hsize_t dims[2], PetscInt rows, PetscInt cols)
 {
   char wanted[2][24];

@@ -1,5 +1,6 @@
 /* Resolves paths, whether or not the file exists. */
 #include <hycofile.h>
+#include <hycoimpl.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>

@@ -1,5 +1,6 @@
 /* HycoQueue: counters in an MPI-3 window, updated by atomic operations. */
 #include <hycoqueue.h>
+#include <hycoimpl.h>
 
 /* The first counters of the window, followed by those of the kinds: groups that failed, tasks done, kinds begun,
    events. */
@@ -41,6 +42,8 @@ static PetscErrorCode SortKinds(HycoQueue q, PetscInt n, const PetscInt kind[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The counters are in a window on rank 0, which other ranks access without rank 0's help where the network has atomic
+   operations. One group needs no window. */
 static PetscErrorCode OpenWindow(HycoQueue q)
 {
   const PetscInt n = N_COUNTERS + q->n_kinds;

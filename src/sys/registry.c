@@ -18,6 +18,8 @@ static PetscErrorCode ForgetAll(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The names are kept beside PETSc's list, which can be searched but not listed in an order; a name that is registered again
+   replaces its function. */
 static PetscErrorCode Add(HycoRegistry *r, const char name[], HycoVoidFn *create)
 {
   HycoVoidFn *former;
@@ -34,6 +36,7 @@ static PetscErrorCode Add(HycoRegistry *r, const char name[], HycoVoidFn *create
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Every registry is forgotten in PetscFinalize(), so that a program can initialise PETSc again. */
 static PetscErrorCode Begin(HycoRegistry *r)
 {
   PetscFunctionBegin;

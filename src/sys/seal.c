@@ -66,6 +66,7 @@ static unsigned long long SumFile(FILE *file, size_t left)
   return sum;
 }
 
+/* Folders and devices can be opened too; only a file has a size and a seal. */
 static PetscErrorCode Open(const char path[], FILE **file, size_t *size)
 {
   struct stat info;

@@ -10,7 +10,7 @@ import unittest
 from common import PATIENCE
 
 SOURCE = os.path.dirname(os.path.realpath(os.path.join(os.environ['HYCO_SOURCE'], 'CMakeLists.txt')))
-PAGES = [os.path.join(SOURCE, 'README.md'), *sorted(glob.glob(os.path.join(SOURCE, 'docs', '*.md')))]
+PAGES = [os.path.join(SOURCE, 'README.md'), *sorted(glob.glob(os.path.join(SOURCE, 'docs', '**', '*.md'), recursive=True))]
 
 
 def text(*path):
@@ -39,7 +39,7 @@ class Docs(unittest.TestCase):
 
     def test_files(self):
         """Every source or script that a page names exists."""
-        for page in ('theory.md', 'glossary.md', 'models.md', 'faq.md', 'tutorial.md'):
+        for page in ('theory.md', 'glossary.md', 'models.md', 'faq.md', 'tutorial.md', 'petsc.md'):
             for name in re.findall(r'`((?:src|scripts|examples|include|tests)/[\w./-]+)`', text('docs', page)):
                 self.assertTrue(os.path.exists(os.path.join(SOURCE, name)), f'{page}: {name}')
 

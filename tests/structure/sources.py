@@ -86,7 +86,7 @@ class Sources(unittest.TestCase):
             self.assertEqual(word.findall(code(path)), [], path)
 
     def test_layers(self):
-        """Algorithms, linear solves, complementarity and contact do not include scene, mesh or cells; only the driver includes driver.h."""
+        """Algorithms, linear solves, complementarity and the solver do not include scene, mesh or cells; only the command includes driver.h."""
         above = ('hycoscene', 'hycosceneimpl', 'hycomesh', 'hycofe', 'hycofom', 'hycodomain', 'hycorom', 'hycoreducer',
                  'hycosnapshots', 'hycosamples', 'hycofields', 'hyco')
         for folder in ('algorithms', 'solver', 'linear', 'complementarity'):
@@ -100,6 +100,15 @@ class Sources(unittest.TestCase):
             path = os.path.join(SOURCE, 'include', 'private', name)
             names = re.findall(r'#include\s*[<"](\w+)\.h[>"]', text(path))
             self.assertEqual([n for n in names if n in above], [], name)
+
+    def test_command(self):
+        """The command includes public headers alone; hyco check, which inspects meshes, pairs and factors, private ones too."""
+        public = {os.path.basename(path) for path in glob.glob(os.path.join(SOURCE, 'include', '*.h'))}
+        for path in sources('app'):
+            names = set(re.findall(r'#include\s*<(hyco\w*\.h)>', text(path)))
+            if 'check' not in os.path.basename(path):
+                self.assertEqual(names - public, set(), path)
+                self.assertNotRegex(text(path), r'#include\s*"(?!driver\.h")', path)
 
     def test_circles(self):
         """Folders call each other in no circle, files in circles of at most five; only the package calls extensions."""
@@ -180,10 +189,10 @@ class Sources(unittest.TestCase):
             self.assertEqual(run.returncode, 0, f'{compiler[0]}: {run.stderr}')
 
     def test_public_headers_hide(self):
-        """Public headers include no private one, and compile in C++."""
+        """Public headers include no private one, and those with functions compile in C++."""
         for path in glob.glob(os.path.join(SOURCE, 'include', '*.h')):
             self.assertNotIn('impl.h', text(path), path)
-            if not path.endswith('hyco.h'):
+            if re.search(r'^PetscErrorCode Hyco', text(path), flags=re.M):
                 self.assertIn('extern "C"', text(path), path)
 
 

@@ -1,5 +1,5 @@
 /* Full order in 2D and 3D, by a factor and by iterations, which need the rigid motions: the energy identity, the
-   force of the pellet (tests/pipeline/solve.py) and the plate's balance of energy. */
+   force of the pellet (tests/fom/solve.py) and the plate's balance of energy. */
 #include "check.h"
 #include <hycofom.h>
 #include <hycosolver.h>

@@ -47,6 +47,7 @@ static PetscErrorCode Agrees(HycoROM m, HycoTable t, const PetscReal mu[], Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Samples the entries at every node of the tensor grid, the last parameter fastest. */
 static PetscErrorCode FillTable(HycoROM m, HycoTable t)
 {
   const HycoTensor *tensor = &t->values.tensor;

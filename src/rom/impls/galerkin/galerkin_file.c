@@ -2,6 +2,7 @@
 #include "table.h"
 #include <petscviewer.h>
 
+/* The result of the scan: absent, and then not written either, in models that were not scanned. */
 static PetscErrorCode MoveScan(HycoROM m, HycoH5 h)
 {
   HycoScan *scan = &((HycoGalerkinModel)m->model->data)->scan;
@@ -32,6 +33,7 @@ PetscErrorCode HycoGalerkinMove(HycoROM m, HycoH5 h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A singular reduced stiffness inside the ranges is printed in capitals: predictions near it are meaningless. */
 static PetscErrorCode ViewScan(HycoROM m, PetscViewer viewer)
 {
   HycoGalerkinModel g = (HycoGalerkinModel)m->model->data;

@@ -55,6 +55,8 @@ static PetscErrorCode Loads(HycoPath p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Brings the reduced system to the parameters of a time. What did not change is kept: the linear cells' stiffness, the rows
+   of B, the loads. Until all is current, fe->ready is false, so that an error leaves no half-assembled system in use. */
 static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elastic)
 {
   HycoROM m = (HycoROM)p->ctx;
@@ -94,6 +96,8 @@ static PetscErrorCode Displace(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Residual and, on request, consistent tangent of a time step: the laws of the cells that flow, plus the linear cells'
+   forces by their constant matrix, tested with the modes. */
 static PetscErrorCode Step(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tangent, HycoFEStepReport *report)
 {
   HycoROM m = (HycoROM)p->ctx;
@@ -116,6 +120,8 @@ static PetscErrorCode Step(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tan
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Adds the effect of supports that move in this step to the right-hand side. The loads alone are subtracted, because
+   HycoPathMoves() adds to them. */
 static PetscErrorCode Moves(HycoPath p, Vec rhs)
 {
   HycoROM m = (HycoROM)p->ctx;
@@ -136,6 +142,8 @@ static PetscErrorCode Moves(HycoPath p, Vec rhs)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* After an accepted step: the prescribed displacements become the held ones, and the displacements enter the trace from
+   which states are replayed. */
 static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
 {
   HycoROM m = (HycoROM)p->ctx;
@@ -189,6 +197,7 @@ static PetscErrorCode Watch(HycoROM m, PetscInt k)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A listed time: completes what the getters return there and stores it, since the next step overwrites it. */
 static PetscErrorCode Record(HycoPath p)
 {
   HycoROM m = (HycoROM)p->ctx;
@@ -206,6 +215,8 @@ static PetscErrorCode Record(HycoPath p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The constant matrix of the cells without history. Only rows of A are tested, but the forces of tied nodes are passed to
+   their masters afterwards, so those rows are needed too. */
 static PetscErrorCode CreateLinear(HycoROM m)
 {
   HycoMesh mesh = m->fe->mesh;

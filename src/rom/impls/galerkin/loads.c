@@ -78,6 +78,7 @@ static PetscErrorCode Sum(HycoLoads p, const Vec v[], const PetscReal t[], Vec y
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The loads are affine in the parameters: 1 and each parameter's place between the ends of its range. */
 static void Coordinates(HycoROM m, const PetscReal mu[], PetscReal t[])
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -148,6 +149,8 @@ static PetscErrorCode SampleForces(HycoROM m, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Solves K x = F anew at the corners of the loads' ranges, for a stiffness that has changed. Forces that the corner solves
+   left at other parameters make the assembly not current. */
 static PetscErrorCode Renew(HycoROM m, const PetscReal mu[])
 {
   HycoGalerkin g = (HycoGalerkin)m->work;

@@ -178,6 +178,8 @@ static PetscErrorCode CreateContactSets(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* B on the RID's unknowns, with room for the masters that a slave may meet while surfaces move; rows of contacts outside
+   A_lambda are empty. */
 static PetscErrorCode CreateContactMatrix(HycoROM m, Mat *B)
 {
   const PetscInt width = HycoPairsWidth(&((HycoGalerkin)m->work)->own_pairs) * m->fe->dim;
@@ -217,6 +219,7 @@ PetscErrorCode HycoGalerkinContactMatrix(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Frees the arrays that the view does not share with the mesh it is of. */
 static PetscErrorCode DestroyView(HycoMesh *mesh)
 {
   PetscFunctionBegin;

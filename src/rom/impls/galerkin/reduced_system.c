@@ -39,6 +39,7 @@ struct _n_HycoReduced {
   PetscObjectState pattern;          /* of B, for which these are */
 };
 
+/* The matrices of one group of rows, all made by MatCreateSubMatrix() or products on the model's IS. */
 static PetscErrorCode DestroyRows(Rows *s)
 {
   Mat *const each[] = {&s->K_m, &s->V_m, &s->KV, &s->M, &s->K_f, &s->U, &s->F};

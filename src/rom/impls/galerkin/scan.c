@@ -196,6 +196,8 @@ static PetscErrorCode ScanPaths(HycoReducer t, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Each rank scans its share of the grid; rank 0 concludes from all signs and ratios. Models with more unknowns than LARGEST
+   are not scanned: each point needs a dense factorisation. */
 static PetscErrorCode Scan(HycoReducer t, HycoROM m, PetscBool reaches[])
 {
   HycoGalerkinModel g = (HycoGalerkinModel)m->model->data;

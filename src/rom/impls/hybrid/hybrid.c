@@ -90,6 +90,7 @@ static PetscErrorCode Move(HycoROM m, HycoH5 file)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The type's own data last: the common part of the Galerkin models refers to it. */
 static PetscErrorCode Destroy(HycoROM m)
 {
   HycoHybridModel h = (HycoHybridModel)m->model->data;

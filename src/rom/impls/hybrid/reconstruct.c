@@ -40,6 +40,8 @@ struct _n_HycoReconstruction {
   HycoWeighted weighted;
 };
 
+/* Keeps the contacts that have a force in some dual snapshot: (41) can give no force to others. S is repacked by those rows.
+   The shift, the square of a small force, keeps the normal equations definite where snapshots are dependent. */
 static PetscErrorCode SetUp(HycoROM m)
 {
   const HycoHybridModel h = (HycoHybridModel)m->model->data;

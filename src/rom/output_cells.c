@@ -8,7 +8,7 @@
 #include <hycoromimpl.h>
 #include <math.h>
 
-struct _n_HycoProbe {
+struct _n_HycoOutputCells {
   HycoMesh mesh; /* with these cells */
   HycoFE fe;
   PetscReal *V, *u, *sigma; /* n_dof x l; n_dof; n_cells x n_sigma */
@@ -20,22 +20,22 @@ struct _n_HycoProbe {
   HycoResultants resultants; /* of the reactions that follow from balance; NULL: there are no reactions */
 };
 
-PetscErrorCode HycoProbeDestroy(HycoProbe *probe)
+PetscErrorCode HycoOutputCellsDestroy(HycoOutputCells *cells)
 {
   PetscFunctionBegin;
-  if (!*probe) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoFEDestroy(&(*probe)->fe));
-  PetscCall(HycoFEDestroy(&(*probe)->fe_surface));
-  PetscCall(HycoResultantsDestroy(&(*probe)->resultants));
-  PetscCall(HycoMeshDestroy(&(*probe)->mesh));
-  HycoFreeAll(&(*probe)->V, &(*probe)->u, &(*probe)->sigma, &(*probe)->fe_at, &(*probe)->reaction,
-              &(*probe)->surface_node, &(*probe)->surface);
-  PetscCall(PetscFree(*probe));
+  if (!*cells) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoFEDestroy(&(*cells)->fe));
+  PetscCall(HycoFEDestroy(&(*cells)->fe_surface));
+  PetscCall(HycoResultantsDestroy(&(*cells)->resultants));
+  PetscCall(HycoMeshDestroy(&(*cells)->mesh));
+  HycoFreeAll(&(*cells)->V, &(*cells)->u, &(*cells)->sigma, &(*cells)->fe_at, &(*cells)->reaction,
+              &(*cells)->surface_node, &(*cells)->surface);
+  PetscCall(PetscFree(*cells));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Sets mesh and V from the whole mesh. */
-static PetscErrorCode Extract(HycoROM m, HycoProbe p)
+static PetscErrorCode Extract(HycoROM m, HycoOutputCells p)
 {
   const PetscInt width = m->model->whole->dim * m->model->l;
   PetscBool *needed;
@@ -56,7 +56,7 @@ static PetscErrorCode Extract(HycoROM m, HycoProbe p)
 }
 
 /* Created when contact acts on a support. */
-static PetscErrorCode MakeSurface(HycoROM m, HycoProbe p)
+static PetscErrorCode MakeSurface(HycoROM m, HycoOutputCells p)
 {
   PetscFunctionBegin;
   if (p->fe_surface) PetscFunctionReturn(PETSC_SUCCESS);
@@ -69,7 +69,7 @@ static PetscErrorCode MakeSurface(HycoROM m, HycoProbe p)
 }
 
 /* Allocates reactions, and finds the nodes where contact forces may be part of them. */
-static PetscErrorCode PrepareReactions(HycoROM m, HycoProbe p)
+static PetscErrorCode PrepareReactions(HycoROM m, HycoOutputCells p)
 {
   PetscBool *in;
   PetscInt *place;
@@ -92,7 +92,7 @@ static PetscErrorCode PrepareReactions(HycoROM m, HycoProbe p)
 }
 
 /* Subtracts contact forces on fixed unknowns from the reactions there. */
-static PetscErrorCode TakeContact(HycoROM m, HycoProbe p, const PetscReal Lambda[])
+static PetscErrorCode TakeContact(HycoROM m, HycoOutputCells p, const PetscReal Lambda[])
 {
   const PetscInt dim = p->fe->dim;
   PetscBool any = PETSC_FALSE;
@@ -120,7 +120,7 @@ static PetscErrorCode TakeContact(HycoROM m, HycoProbe p, const PetscReal Lambda
 }
 
 /* f_int: NULL: for a prediction without a history. */
-static PetscErrorCode React(HycoROM m, HycoProbe p, const PetscReal f_int[], const PetscReal Lambda[])
+static PetscErrorCode React(HycoROM m, HycoOutputCells p, const PetscReal f_int[], const PetscReal Lambda[])
 {
   PetscFunctionBegin;
   if (!p->reaction) PetscFunctionReturn(PETSC_SUCCESS);
@@ -130,7 +130,7 @@ static PetscErrorCode React(HycoROM m, HycoProbe p, const PetscReal f_int[], con
 }
 
 /* Those of a prediction, unless all that the quantities need follow from balance. */
-static PetscErrorCode ReactPredicted(HycoROM m, HycoProbe p, const PetscReal f_int[], const PetscReal Lambda[])
+static PetscErrorCode ReactPredicted(HycoROM m, HycoOutputCells p, const PetscReal f_int[], const PetscReal Lambda[])
 {
   PetscFunctionBegin;
   if (!p->reaction) PetscFunctionReturn(PETSC_SUCCESS);
@@ -142,7 +142,7 @@ static PetscErrorCode ReactPredicted(HycoROM m, HycoProbe p, const PetscReal f_i
 }
 
 /* Once mesh and V are set. */
-static PetscErrorCode Fill(HycoROM m, HycoProbe p)
+static PetscErrorCode Fill(HycoROM m, HycoOutputCells p)
 {
   const PetscInt dim = m->model->mesh->dim;
   PetscInt *place;
@@ -166,7 +166,7 @@ static PetscErrorCode Fill(HycoROM m, HycoProbe p)
 }
 
 /* Sets p->u from these coefficients and full-order displacements. */
-static void Displace(HycoROM m, HycoProbe p, const PetscReal gamma[], const PetscReal U_fe[])
+static void Displace(HycoROM m, HycoOutputCells p, const PetscReal gamma[], const PetscReal U_fe[])
 {
   for (PetscInt k = 0; k < p->fe->n_dof; k++) {
     p->u[k] = p->fe->u0[k];
@@ -179,12 +179,12 @@ static void Displace(HycoROM m, HycoProbe p, const PetscReal gamma[], const Pets
 }
 
 /* The quantities for forces Lambda (of all contacts) and, where needed, p's fields (p: else NULL). */
-static PetscErrorCode Measure(HycoROM m, HycoProbe p, const PetscReal Lambda[], PetscReal value[])
+static PetscErrorCode Measure(HycoROM m, HycoOutputCells p, const PetscReal Lambda[], PetscReal value[])
 {
   const HycoContactResult *contact = NULL;
 
   PetscFunctionBegin;
-  if (HycoSceneAsksContacts(m->model->scene)) PetscCall(HycoROMSumContacts(m, Lambda, &contact));
+  if (HycoSceneHasContactOutputs(m->model->scene)) PetscCall(HycoROMSumContacts(m, Lambda, &contact));
   PetscCall(HycoQuantitiesMeasure(PETSC_COMM_SELF, p ? p->fe : m->fe, p ? p->u : NULL, p ? p->sigma : NULL,
                                   p ? p->reaction : NULL, contact, value));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -197,7 +197,7 @@ static const PetscReal *ForcesAt(HycoROM m, PetscInt listed)
 }
 
 /* Those of a prediction: reactions that follow from balance are set from the loads and the contact forces. */
-static PetscErrorCode MeasurePredicted(HycoROM m, HycoProbe p, const PetscReal Lambda[], PetscReal value[])
+static PetscErrorCode MeasurePredicted(HycoROM m, HycoOutputCells p, const PetscReal Lambda[], PetscReal value[])
 {
   PetscFunctionBegin;
   PetscCall(Measure(m, p, Lambda, value));
@@ -206,7 +206,7 @@ static PetscErrorCode MeasurePredicted(HycoROM m, HycoProbe p, const PetscReal L
 }
 
 /* Replays the laws from the first time to the last, and evaluates the quantities at the listed ones. */
-static PetscErrorCode March(HycoProbe p, HycoReplay *r)
+static PetscErrorCode March(HycoOutputCells p, HycoReplay *r)
 {
   HycoROM m = r->m;
   HycoTrace *trace = &m->trace;
@@ -245,7 +245,7 @@ static void CollectPath(HycoROM m, HycoPrediction *out)
 }
 
 /* Sets p->u and p->sigma for a prediction without a history. */
-static PetscErrorCode Follow(HycoROM m, HycoProbe p)
+static PetscErrorCode Follow(HycoROM m, HycoOutputCells p)
 {
   PetscReal *U_fe;
 
@@ -266,30 +266,30 @@ static PetscErrorCode Make(HycoROM m)
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  if (m->probe || !HycoSceneAsksFields(m->model->scene)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (m->output_cells || !HycoSceneHasFieldOutputs(m->model->scene)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoROMLoadWhole(m));
-  PetscCall(PetscNew(&m->probe));
-  ierr = Extract(m, m->probe);
-  if (!ierr) ierr = Fill(m, m->probe);
-  if (!ierr && HycoSceneHasReactions(m->model->scene)) ierr = HycoResultantsFind(m, &m->probe->resultants);
-  if (ierr) PetscCall(HycoProbeDestroy(&m->probe));
+  PetscCall(PetscNew(&m->output_cells));
+  ierr = Extract(m, m->output_cells);
+  if (!ierr) ierr = Fill(m, m->output_cells);
+  if (!ierr && HycoSceneHasReactions(m->model->scene)) ierr = HycoResultantsFind(m, &m->output_cells->resultants);
+  if (ierr) PetscCall(HycoOutputCellsDestroy(&m->output_cells));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoROMSetProbe(HycoROM m, HycoMesh mesh, PetscReal V[], PetscBool balanced[], HycoMesh loaded)
+PetscErrorCode HycoROMSetOutputCells(HycoROM m, HycoMesh mesh, PetscReal V[], PetscBool balanced[], HycoMesh loaded)
 {
   PetscErrorCode ierr, taken = PETSC_SUCCESS;
 
   PetscFunctionBegin;
-  ierr = HycoROMSetUp(m); /* which otherwise destroys the probe */
-  PetscCall(HycoProbeDestroy(&m->probe));
-  PetscCall(PetscNew(&m->probe));
-  m->probe->mesh = mesh;
-  m->probe->V = V;
-  if (!ierr) ierr = Fill(m, m->probe);
-  if (balanced) taken = HycoResultantsCreate(m, balanced, loaded, &m->probe->resultants);
-  if (ierr || taken) PetscCall(HycoProbeDestroy(&m->probe));
+  ierr = HycoROMSetUp(m); /* which otherwise destroys the cells */
+  PetscCall(HycoOutputCellsDestroy(&m->output_cells));
+  PetscCall(PetscNew(&m->output_cells));
+  m->output_cells->mesh = mesh;
+  m->output_cells->V = V;
+  if (!ierr) ierr = Fill(m, m->output_cells);
+  if (balanced) taken = HycoResultantsCreate(m, balanced, loaded, &m->output_cells->resultants);
+  if (ierr || taken) PetscCall(HycoOutputCellsDestroy(&m->output_cells));
   PetscCall(ierr);
   PetscCall(taken);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -302,13 +302,13 @@ static PetscErrorCode MeasureTimes(HycoROM m)
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  if (!m->probe) { /* only results of contacts */
+  if (!m->output_cells) { /* only results of contacts */
     for (PetscInt j = 0; j < m->trace.n_listed; j++)
       PetscCall(MeasurePredicted(m, NULL, ForcesAt(m, j), m->trace.step[j].quantity));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  ierr = HycoReplayBegin(m, m->probe->fe, &r);
-  if (!ierr) ierr = March(m->probe, &r);
+  ierr = HycoReplayBegin(m, m->output_cells->fe, &r);
+  if (!ierr) ierr = March(m->output_cells, &r);
   PetscCall(HycoReplayEnd(&r));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -341,20 +341,20 @@ PetscErrorCode HycoROMMeasureQuantities(HycoROM m, HycoPrediction *out)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(Make(m));
-  if (m->probe) PetscCall(Follow(m, m->probe));
-  PetscCall(MeasurePredicted(m, m->probe, m->Lambda, out->quantity));
+  if (m->output_cells) PetscCall(Follow(m, m->output_cells));
+  PetscCall(MeasurePredicted(m, m->output_cells, m->Lambda, out->quantity));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-HycoFE HycoROMGetProbe(HycoROM m)
+HycoFE HycoROMGetOutputCells(HycoROM m)
 {
-  return m->probe ? m->probe->fe : NULL;
+  return m->output_cells ? m->output_cells->fe : NULL;
 }
 
-PetscErrorCode HycoROMMeasureGiven(HycoROM m, const PetscReal mu[], const PetscReal u[], const PetscReal sigma[],
-                                   const PetscReal reaction[], const PetscReal Lambda[], PetscReal value[])
+PetscErrorCode HycoROMMeasureSolution(HycoROM m, const PetscReal mu[], const PetscReal u[], const PetscReal sigma[],
+                                      const PetscReal reaction[], const PetscReal Lambda[], PetscReal value[])
 {
-  HycoProbe p = m->probe;
+  HycoOutputCells p = m->output_cells;
 
   PetscFunctionBegin;
   if (p) {

@@ -8,7 +8,7 @@ import unittest
 import h5py
 import numpy as np
 
-import motions
+import rigid_motions
 import rigid
 from common import SOURCE, Case
 
@@ -230,7 +230,7 @@ class Bodies(Case):
     def test_unique(self):
         """A rigid tool with more closed slaves than its masters have unknowns: the forces are not unique, as full order says, but their sum is."""
         for tool in (True, False):
-            with open(motions.Unique.columns(self, tool), encoding='ascii') as f:
+            with open(rigid_motions.Unique.columns(self, tool), encoding='ascii') as f:
                 text = f.read().replace('mesh: columns.msh', 'mesh: columns.msh, parameters: [press]').replace('y: -0.01', 'y: -press')
             scene = self.write('unique.yaml', text + 'parameter: {press: {range: [0.005, 0.02]}}\n')
             self.hyco('train', '-scene', scene, *TYPE, '-scatter', '2', '-model', f'q{tool}.h5')

@@ -1,10 +1,10 @@
 /* Sources of options other than the command line: their check before PETSc reads them, and the report. */
 #include "driver.h"
-#include <hycoyaml.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <strings.h>
 
 #define DEEPEST 16 /* files that name each other */
 
@@ -55,7 +55,7 @@ static PetscBool Follow(const char path[], PetscBool yaml, int depth, char probl
   return good;
 }
 
-PetscBool DriverSourcesEnd(int argc, char **argv)
+PetscBool DriverCheckOptionFiles(int argc, char **argv)
 {
   static const char *const files[] = {".petscrc", "petscrc"};
   const char *home = getenv("HOME"), *environment = getenv("PETSC_OPTIONS");
@@ -101,7 +101,7 @@ static void AddEnvironment(cJSON *object, const char name[])
   if (text && text[strspn(text, " ")]) cJSON_AddStringToObject(object, name, text);
 }
 
-PetscErrorCode DriverReportSources(cJSON *json)
+PetscErrorCode DriverReportOptionFiles(cJSON *json)
 {
   cJSON *object = cJSON_CreateObject();
   PetscBool skip = PETSC_FALSE;

@@ -8,7 +8,12 @@
 #ifndef HYCOFILE_H
 #define HYCOFILE_H
 
-#include <hycoimpl.h>
+#include <hycoprogram.h>
+#include <stdio.h>
+
+#if defined(__cplusplus)
+extern "C" {
+#endif
 
 typedef struct _n_HycoFile *HycoFile;
 
@@ -66,4 +71,7 @@ typedef struct {
 void HycoFileIdentify(const char path[], HycoFileIdentity *identity);
 PetscBool HycoFileSame(const HycoFileIdentity *a, const HycoFileIdentity *b);
 
+#if defined(__cplusplus)
+}
+#endif
 #endif

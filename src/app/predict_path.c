@@ -22,19 +22,19 @@ PetscErrorCode DriverGetReducedPath(HycoROM model, DriverReducedPath *path)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode DriverSayReducedPath(HycoScene scene, const PetscReal mu[], const DriverReducedPath *path,
-                                    const char table[])
+PetscErrorCode DriverPrintReducedPath(HycoScene scene, const PetscReal mu[], const DriverReducedPath *path,
+                                      const char table[])
 {
   PetscInt n_times;
 
   PetscFunctionBegin;
   PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
-  for (PetscInt k = 0; k < path->n; k++) PetscCall(DriverSayStep(&path->step[k], n_times));
+  for (PetscInt k = 0; k < path->n; k++) PetscCall(DriverPrintStep(&path->step[k], n_times));
   PetscCall(DriverWriteSteps(table, scene, mu, PETSC_TRUE, path->n, path->step));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode DriverSayEquilibrium(const DriverReducedPath *path)
+PetscErrorCode DriverPrintEquilibrium(const DriverReducedPath *path)
 {
   const HycoEquilibrium *e = &path->equilibrium;
   char words[3][32];
@@ -42,15 +42,16 @@ PetscErrorCode DriverSayEquilibrium(const DriverReducedPath *path)
   PetscFunctionBegin;
   if (!path->balanced) PetscFunctionReturn(PETSC_SUCCESS);
   if (e->why) {
-    PetscCall(Say("equilibrium on the whole mesh is not known: %s\n", e->why));
+    PetscCall(DriverPrint("equilibrium on the whole mesh is not known: %s\n", e->why));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   DriverPercent(e->worst, words[0]);
   DriverPercent(e->n ? e->residual[e->n - 1] : 0, words[1]);
   DriverPercent(e->worst_contact, words[2]);
-  PetscCall(Say("equilibrium on the whole mesh: largest residual %s of the path's size, at t = %.10g; %s at the end; "
-                "residual of the contact conditions %s\n",
-                words[0], (double)path->step[e->at].t, words[1], words[2]));
+  PetscCall(
+      DriverPrint("equilibrium on the whole mesh: largest residual %s of the path's size, at t = %.10g; %s at the end; "
+                  "residual of the contact conditions %s\n",
+                  words[0], (double)path->step[e->at].t, words[1], words[2]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

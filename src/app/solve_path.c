@@ -9,7 +9,7 @@ PetscErrorCode DriverMonitorStep(HycoFOM fom, const HycoStep *s, void *ctx)
   (void)fom;
   if (!path->checked) PetscCall(DriverCheckLeft()); /* the solvers have read their options */
   path->checked = PETSC_TRUE;
-  PetscCall(DriverSayStep(s, path->n));
+  PetscCall(DriverPrintStep(s, path->n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -34,7 +34,7 @@ PetscErrorCode DriverReportHistory(cJSON *json, HycoScene scene, const HycoHisto
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode SayEnd(const HycoHistory *h)
+static PetscErrorCode PrintEnd(const HycoHistory *h)
 {
   PetscInt substeps = 0, iterations = 0, factors = 0, cuts = 0;
   PetscReal residual = 0, defect = 0, seconds[4] = {0, 0, 0, 0};
@@ -54,12 +54,13 @@ static PetscErrorCode SayEnd(const HycoHistory *h)
     seconds[2] += s->seconds_solve;
     seconds[3] += s->seconds_law;
   }
-  PetscCall(Say("%d steps (%d halved), %d iterations with the %s stiffness, %d factors", (int)substeps, (int)cuts,
-                (int)iterations, h->newton, (int)factors));
-  if (h->n_orders) PetscCall(Say("; order of convergence %.2f (median of %d)", (double)h->order, (int)h->n_orders));
-  PetscCall(Say("\nlargest KKT residual %.1e, energy balance to %.1e\n", (double)residual, (double)defect));
-  PetscCall(Say("seconds: %.3f in all, %.3f factors, %.3f solves, %.3f laws\n", (double)seconds[0], (double)seconds[1],
-                (double)seconds[2], (double)seconds[3]));
+  PetscCall(DriverPrint("%d steps (%d halved), %d iterations with the %s stiffness, %d factors", (int)substeps,
+                        (int)cuts, (int)iterations, h->newton, (int)factors));
+  if (h->n_orders)
+    PetscCall(DriverPrint("; order of convergence %.2f (median of %d)", (double)h->order, (int)h->n_orders));
+  PetscCall(DriverPrint("\nlargest KKT residual %.1e, energy balance to %.1e\n", (double)residual, (double)defect));
+  PetscCall(DriverPrint("seconds: %.3f in all, %.3f factors, %.3f solves, %.3f laws\n", (double)seconds[0],
+                        (double)seconds[1], (double)seconds[2], (double)seconds[3]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -70,7 +71,7 @@ PetscErrorCode DriverEndHistory(HycoFOM fom, HycoScene scene, const PetscReal mu
   PetscFunctionBegin;
   PetscCall(HycoFOMGetHistory(fom, &h));
   PetscCall(DriverWriteSteps(table, scene, mu, PETSC_FALSE, h.n, h.step));
-  if (h.ended) PetscCall(SayEnd(&h));
+  if (h.ended) PetscCall(PrintEnd(&h));
   HycoCheck(h.ended || h.n, "no solution: %s; nothing was written", h.why);
   HycoCheck(
       h.ended,

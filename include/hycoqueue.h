@@ -2,7 +2,11 @@
 #ifndef HYCOQUEUE_H
 #define HYCOQUEUE_H
 
-#include <hycoimpl.h>
+#include <hycoprogram.h>
+
+#if defined(__cplusplus)
+extern "C" {
+#endif
 
 /*
   n tasks of one or several kinds: tasks of a kind share data that a group computes once (a factor of the stiffness). A
@@ -47,4 +51,7 @@ PetscErrorCode HycoQueueCount(HycoQueue queue, PetscInt *n_groups, PetscInt done
    is smaller than the number of groups. 0 after a failure. Collective on comm. */
 PetscErrorCode HycoQueueLeft(HycoQueue queue, PetscInt *n);
 
+#if defined(__cplusplus)
+}
+#endif
 #endif

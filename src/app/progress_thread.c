@@ -1,0 +1,100 @@
+/* Progress within a long step: its name, as a line a minute in a file, or with the seconds on a terminal. A separate
+   thread, because a factorisation or a solver does not report progress. */
+#include "driver.h"
+#include <pthread.h>
+#include <stdio.h>
+#include <time.h>
+#include <unistd.h>
+
+static struct {
+  pthread_t thread;
+  pthread_mutex_t lock;
+  pthread_cond_t ends;
+  PetscBool runs, over, bar; /* bar: the terminal has an unfinished line */
+  double begin, last, period;
+} progress = {.lock = PTHREAD_MUTEX_INITIALIZER, .ends = PTHREAD_COND_INITIALIZER, .period = 60};
+
+static double Now(void)
+{
+  struct timespec now;
+
+  clock_gettime(CLOCK_REALTIME, &now);
+  return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+/* Called with the lock held. */
+static void Clear(void)
+{
+  if (progress.bar) fprintf(stderr, "\r\033[K");
+  progress.bar = PETSC_FALSE;
+}
+
+static void PrintStep(double now)
+{
+  const char *doing = HycoLogDoing();
+  const int terminal = isatty(STDERR_FILENO);
+
+  if (!doing || DriverIsQuiet() || now - progress.last < (terminal ? 2 : progress.period)) return;
+  fprintf(stderr, "%safter %.0f s: %s%s", terminal ? "\r\033[K" : "", now - progress.begin, doing,
+          terminal ? "" : "\n");
+  fflush(stderr);
+  progress.bar = (PetscBool)terminal;
+  if (!terminal) progress.last = now;
+}
+
+static void *Run(void *unused)
+{
+  pthread_mutex_lock(&progress.lock);
+  while (!progress.over) {
+    const double next = Now() + PetscMin(1, progress.period / 2);
+    const struct timespec until = {(time_t)next, (long)(1e9 * (next - (double)(time_t)next))};
+
+    (void)pthread_cond_timedwait(&progress.ends, &progress.lock, &until);
+    if (!progress.over) PrintStep(Now());
+  }
+  pthread_mutex_unlock(&progress.lock);
+  return unused;
+}
+
+void DriverProgressBegin(void)
+{
+  PetscMPIInt rank;
+
+  MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
+  if (rank) return;
+  progress.begin = progress.last = Now();
+  progress.runs = (PetscBool)(pthread_create(&progress.thread, NULL, Run, NULL) == 0); /* otherwise there is no such
+                                                                                   progress */
+}
+
+void DriverProgressSetPeriod(PetscReal seconds)
+{
+  pthread_mutex_lock(&progress.lock);
+  progress.period = (double)seconds;
+  pthread_mutex_unlock(&progress.lock);
+}
+
+PetscReal DriverProgressPeriod(void)
+{
+  return (PetscReal)progress.period;
+}
+
+void DriverProgressHold(void)
+{
+  pthread_mutex_lock(&progress.lock);
+  Clear();
+  progress.last = Now();
+  pthread_mutex_unlock(&progress.lock);
+}
+
+void DriverProgressEnd(void)
+{
+  if (!progress.runs) return;
+  pthread_mutex_lock(&progress.lock);
+  progress.over = PETSC_TRUE;
+  Clear();
+  pthread_cond_signal(&progress.ends);
+  pthread_mutex_unlock(&progress.lock);
+  pthread_join(progress.thread, NULL);
+  progress.runs = PETSC_FALSE;
+}
