@@ -165,6 +165,10 @@ PetscErrorCode CheckReportCost(Check *check, const Cost *cost, PetscBool given)
   cJSON_AddBoolToObject(object, "measured", cost->solved);
   ReportNumbers(object, {"factor_mb", 1e-6 * cost->bytes}, {"solve_mb", 1e-6 * (cost->resident + cost->bytes)},
                 {"seconds_first", cost->first}, {"seconds_next", cost->next});
-  if (!n_times) PetscCall(PrintTraining(check, cost, given, object)); /* train refuses histories */
+  if (!n_times || cost->solved)
+    PetscCall(PrintTraining(check, cost, given, object));
+  else
+    PetscCall(DriverPrint("a training on %s%d paths, including held-out ones: -check_solve measures the time of one\n",
+                          given ? "" : "for example ", (int)cost->n_training));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,12 +1,15 @@
 /* hyco check: cells, bodies and groups of the mesh. */
 #include "check.h"
 #include <hycokinematics.h>
+#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
 /* Cells with a larger aspect ratio are reported: the solver can handle them, but they resolve poorly along their
    length. */
 #define LONG_CELL 100
+/* Share of the mesh's length up to which two nodes are at the same place. */
+#define SAME_PLACE 1e-8
 /* Groups with this share of common nodes are reported as alike. */
 #define ALIKE 0.95
 
@@ -129,16 +132,86 @@ static PetscErrorCode CountParts(HycoMesh m, PetscInt n_bodies, PetscInt n[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Marks the nodes of contacts' and ties' surfaces: a body may touch itself there. */
+static PetscErrorCode MarkSurfaces(HycoScene s, HycoMesh m, PetscBool of_surface[])
+{
+  PetscInt g = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < 2 * (s->n_contacts + s->n_ties); k++) {
+    const PetscInt c = k / 2;
+    const char *name = c < s->n_contacts ? (k % 2 ? s->contact[c]->slave : s->contact[c]->master)
+                                         : (k % 2 ? s->tie[c - s->n_contacts].slave : s->tie[c - s->n_contacts].master);
+
+    if (!name) continue;
+    PetscCall(HycoMeshFindGroup(m, "contact", name, &g));
+    for (PetscInt i = m->group_start[g]; i < m->group_start[g + 1]; i++) of_surface[m->group_node[i]] = PETSC_TRUE;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A node's place in steps of SAME_PLACE, and its body. */
+typedef struct {
+  double at[3];
+  PetscInt body, node;
+} Place;
+
+static int ComparePlaces(const void *a, const void *b)
+{
+  const Place *p = (const Place *)a, *q = (const Place *)b;
+
+  for (PetscInt c = 0; c < 3; c++) {
+    if (p->at[c] != q->at[c]) return p->at[c] < q->at[c] ? -1 : 1;
+  }
+  if (p->body != q->body) return p->body < q->body ? -1 : 1;
+  return (p->node > q->node) - (p->node < q->node);
+}
+
+/* By body, the number of its nodes that lie on another of its nodes, away from contacts and ties, and the first pair:
+   the body is open there, like at a crack, though its cells may hang together elsewhere. */
+static PetscErrorCode CountDoubled(HycoScene s, HycoMesh m, PetscInt n[], PetscInt pair[][2])
+{
+  const PetscReal step = SAME_PLACE * HycoMeshLength(m);
+  PetscBool *of_surface;
+  Place *place;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(m->n_nodes, &place));
+  PetscCall(PetscCalloc1(m->n_nodes, &of_surface));
+  PetscCall(MarkSurfaces(s, m, of_surface));
+  for (PetscInt i = 0; i < m->n_nodes; i++) {
+    place[i] = (Place){.body = m->node_body[i], .node = i};
+    for (PetscInt c = 0; c < 3; c++) place[i].at[c] = PetscFloorReal(m->xyz[3 * i + c] / step + 0.5);
+  }
+  qsort(place, (size_t)m->n_nodes, sizeof(*place), ComparePlaces);
+  for (PetscInt k = 1; k < m->n_nodes; k++) {
+    const Place *p = &place[k - 1], *q = &place[k];
+
+    if (p->body != q->body || p->body < 0 || of_surface[p->node] || of_surface[q->node]) continue;
+    if (memcmp(p->at, q->at, sizeof(p->at)) != 0) continue;
+    if (!n[p->body]++) {
+      pair[p->body][0] = m->node_id[p->node];
+      pair[p->body][1] = m->node_id[q->node];
+    }
+  }
+  PetscCall(PetscFree(place));
+  PetscCall(PetscFree(of_surface));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode CheckReportBodies(Check *check)
 {
   HycoMesh m = check->whole->part;
   HycoScene s = check->fom->scene;
   cJSON *bodies = cJSON_AddArrayToObject(check->json, "bodies");
-  PetscInt *parts;
+  PetscInt *parts, *doubled, (*pair)[2];
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(s->n_bodies, &parts));
+  PetscCall(PetscCalloc1(s->n_bodies, &doubled));
+  PetscCall(PetscCalloc1(s->n_bodies, &pair));
   PetscCall(CountParts(m, s->n_bodies, parts));
+  PetscCall(CountDoubled(s, m, doubled, pair));
   for (PetscInt b = 0; b < s->n_bodies; b++) {
     cJSON *body = cJSON_CreateObject();
     PetscInt cells = 0;
@@ -146,8 +219,8 @@ PetscErrorCode CheckReportBodies(Check *check)
     for (PetscInt e = 0; e < m->n_cells; e++) cells += m->cell_body[e] == b;
     cJSON_AddItemToArray(bodies, body);
     cJSON_AddStringToObject(body, "name", s->body[b].name);
-    ReportNumbers(body, {"n_cells", cells}, {"n_parts", parts[b]}, {"stretch", check->stretch[b]},
-                  {"stretched_cell", check->stretched[b]});
+    ReportNumbers(body, {"n_cells", cells}, {"n_parts", parts[b]}, {"n_doubled", doubled[b]},
+                  {"stretch", check->stretch[b]}, {"stretched_cell", check->stretched[b]});
     PetscCall(DriverPrint("body %s: %d cells", s->body[b].name, (int)cells));
     if (m->dim > 1)
       PetscCall(DriverPrint("; the most stretched one, %d, is %.3g times as long as wide", (int)check->stretched[b],
@@ -159,11 +232,17 @@ PetscErrorCode CheckReportBodies(Check *check)
           "body %s consists of %d parts that share no node; if it should be one piece, the mesh has duplicate "
           "nodes (gmsh: Coherence, or BooleanFragments)",
           s->body[b].name, (int)parts[b]);
+    if (doubled[b])
+      CheckReportWarning(
+          check,
+          "body %s: %d node%s on another node of the body, such as %d on %d; the body is open there, as at a "
+          "crack; if it should be whole, the mesh has duplicate nodes (gmsh: Coherence, or BooleanFragments)",
+          s->body[b].name, (int)doubled[b], doubled[b] == 1 ? " lies" : "s lie", (int)pair[b][1], (int)pair[b][0]);
     if (check->stretch[b] > LONG_CELL)
       CheckReportWarning(check, "body %s: cell %d is %.3g times as long as wide", s->body[b].name,
                          (int)check->stretched[b], (double)check->stretch[b]);
   }
-  PetscCall(PetscFree(parts));
+  HycoFreeAll(&parts, &doubled, &pair);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
