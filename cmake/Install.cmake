@@ -20,7 +20,7 @@ file(RELATIVE_PATH HYCO_PC_TO_PREFIX /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
 configure_file(cmake/hyco.pc.in hyco.pc @ONLY)
 install(FILES ${PROJECT_BINARY_DIR}/hyco.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 
-# Manual pages and the shell completion are made from the help of the commands.
+# Manual pages and the shells' completions are made from the help of the commands.
 install(CODE "execute_process(COMMAND sh \"${PROJECT_SOURCE_DIR}/cmake/manual\" \"$<TARGET_FILE:hyco_command>\" \"${PROJECT_BINARY_DIR}/manual\"
                               RESULT_VARIABLE failed)
 if(failed)
@@ -28,6 +28,8 @@ if(failed)
 endif()")
 install(DIRECTORY ${PROJECT_BINARY_DIR}/manual/man1 DESTINATION ${CMAKE_INSTALL_MANDIR})
 install(FILES ${PROJECT_BINARY_DIR}/manual/hyco DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
+install(FILES ${PROJECT_BINARY_DIR}/manual/_hyco DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/site-functions)
+install(FILES ${PROJECT_BINARY_DIR}/manual/hyco.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d)
 
 install(FILES README.md LICENSE CHANGELOG.md CONTRIBUTING.md CITATION.cff DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} FILES_MATCHING PATTERN *.md PATTERN *.csv PATTERN *.png)

@@ -263,7 +263,7 @@ static PetscErrorCode ReadTraining(HycoReducer t)
       "-hyco_model_type",
       "hybrid hyper-reduced (38) on an RID; projection-based (44) on the whole mesh, or with a "
       "cubature on some of its cells; condensed on the contact forces; bodies condensed to their surfaces; "
-      "regression without a solve",
+      "regression without a solve [train searches: bodies, then hybrid]",
       types, &type, &t->pinned[HYCO_CHOICE_TYPE]));
   PetscCall(HycoOptionsReal("-hyco_pod_tol", "energy left out of the displacement basis, epsilon of (18)", 0, 1,
                             &t->tol[HYCO_SEED_DISPLACEMENT], &t->pinned[HYCO_CHOICE_TOLERANCE]));

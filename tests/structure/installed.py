@@ -78,6 +78,16 @@ class Installed(unittest.TestCase):
         completion = os.path.join(self.prefix, 'share', 'bash-completion', 'completions', 'hyco')
         words = run('bash', '-c', 'source "$1"; COMP_WORDS=(hyco predict -mo); COMP_CWORD=2; _hyco; echo "${COMPREPLY[@]}"', '-', completion)
         self.assertEqual(words.split(), ['-model'])
+        values = 'source "$1"; COMP_WORDS=(hyco train -hyco_model_type b); COMP_CWORD=3; _hyco; echo "${COMPREPLY[@]}"'
+        self.assertEqual(run('bash', '-c', values, '-', completion).split(), ['bodies'])
+        for heading in ('EXAMPLES', 'FILES', 'ENVIRONMENT', 'MOST USED OPTIONS'):
+            self.assertIn(f'\n.SH {heading}\n', page)
+        for shell, name, line in (('zsh', 'share/zsh/site-functions/_hyco', '-model) _files; return ;;'),
+                                  ('fish', 'share/fish/vendor_completions.d/hyco.fish', '-o hyco_linear -x -a \'auto direct iterative\'')):
+            with open(os.path.join(self.prefix, name), encoding='utf-8') as file:
+                self.assertIn(line, file.read())
+            if shutil.which(shell):
+                run(shell, '-n', os.path.join(self.prefix, name))
 
     def test_pkg_config(self):
         """The ladder builds by make and pkg-config from the installed files."""
