@@ -37,6 +37,7 @@ typedef struct {
                         points, and no less than those of ops->estimate */
   PetscBool own_modes; /* its modes are displacements of its own: solutions choose only the cells of its mesh, for which
                             those at held-out points serve, and a search tries it before the training points are solved */
+  PetscBool integrals; /* it takes contacts whose rows are integrals, with any number of masters (type mortar) */
   PetscBool cells;     /* its mesh consists of the cells that it chooses, and of the surfaces of contacts and, without
                       `surfaces`, loads */
 } HycoROMTraits;

@@ -142,8 +142,8 @@ typedef struct _n_HycoBodiesWork {
   HycoPose *pose;
   PetscReal *kappa, *c, *elastic, *free, *u, *f, *x; /* elastic: free, without inelastic strains */
   PetscReal *Z, *work;                               /* ns x p, p x r row major: of all bodies, interpolated */
-  PetscInt n_loc, *loc;         /* by unknown of the surface's mesh: its place, with ns added inside; or -1 */
-  PetscInt *row_start, *row_at; /* the rows of B in the bodies' axes */
+  PetscInt n_loc, *loc;                   /* by unknown of the surface's mesh: its place, with ns added inside; or -1 */
+  PetscInt *row_start, *row_at, row_room; /* the rows of B in the bodies' axes */
   PetscReal *row;
   PetscReal *gap;    /* by contact: without the forces */
   PetscBool *active; /* of the contacts in the problem */

@@ -141,6 +141,8 @@ struct _p_HycoReducer {
   PetscBool late;    /* the training points are solved when a type needs them; every rank */
   PetscBool *grown;  /* every rank, greedy: cells of its part that belong to the RIDs so far; else NULL */
 };
+/* Fails (no model) if the scene has contacts whose rows the type does not take. */
+PetscErrorCode HycoReducerCheckContacts(HycoReducer t, const HycoROM type);
 
 /* The scene's variables of column k of the snapshots: all of mu (HYCO_MAX_PARAMETERS). */
 PetscErrorCode HycoReducerColumn(HycoReducer t, PetscInt k, PetscReal mu[]);

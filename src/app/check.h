@@ -8,6 +8,8 @@
 typedef struct {
   PetscInt n, facing_min, facing_max; /* number of contacts; of those that may close, the smallest and largest number */
   PetscReal gap_min, gap_max;         /* gaps of those that may close; max < min: no contact may close */
+  PetscInt
+      between; /* those whose masters are between nodes, as where meshes do not match, unless their type is for this */
   PetscReal coarse; /* slave's facet size over the master's there, where most contacts may close; 0: not compared */
 } ContactRange;
 

@@ -45,8 +45,9 @@ static PetscErrorCode CompareFacets(Check *check, HycoFE fe, PetscInt contact)
   PetscCall(PetscMalloc2(2 * fe->mesh->n_nodes, &size, p->n, &ratio));
   PetscCall(FacetSizes(fe, "contact", c->slave, c->master, size));
   for (PetscInt k = 0; k < p->n; k++) {
-    if (p->contact[k] == contact && p->master_start[k] < p->master_start[k + 1])
-      ratio[n++] = Coarseness(p, k, fe->mesh->n_nodes, size);
+    if (p->contact[k] != contact || p->master_start[k] == p->master_start[k + 1]) continue;
+    ratio[n++] = Coarseness(p, k, fe->mesh->n_nodes, size);
+    check->contact[contact].between += !c->integrated && p->master_start[k + 1] > p->master_start[k] + 1;
   }
   PetscCall(PetscSortReal(n, ratio));
   if (n) check->contact[contact].coarse = ratio[n / 2];
@@ -132,7 +133,7 @@ static void Warn(Check *check, HycoContact c, const ContactRange *r)
     CheckReportWarning(
         check, "contact %s: the smallest gap is %.3g, %.2g of the mesh's extent; small displacements cannot close it",
         c->name, (double)r->gap_min, (double)(r->gap_min / length));
-  if (r->coarse > COARSER)
+  if (r->coarse > COARSER && !c->integrated)
     CheckReportWarning(
         check,
         "contact %s: the slave's facets (%s) are %.2g times as long as the master's (%s); the finer side should "
@@ -158,6 +159,8 @@ static void Print(const Check *check, PetscInt contact, const ContactRange *r)
         DriverPrint("; %d face nothing within the tolerance of %g", (int)(r->n - r->facing_max), (double)stated));
   if (r->facing_max) PetscCallVoid(DriverPrint("; gaps from %.4g to %.4g", (double)r->gap_min, (double)r->gap_max));
   if (r->facing_max && r->gap_min < 0) PetscCallVoid(DriverPrint(" (below 0 the bodies overlap before any load)"));
+  if (r->between)
+    PetscCallVoid(DriverPrint("; %d have no node opposite: type: mortar gives better pressures there", (int)r->between));
   PetscCallVoid(DriverPrint("\n"));
 }
 
@@ -176,6 +179,7 @@ void CheckReportContacts(Check *check)
     ReportNumbers(contact, {"n", r->n}, {"n_facing_min", r->facing_min}, {"n_facing_max", r->facing_max});
     if (r->facing_max) cJSON_AddNumberToObject(contact, "gap_min", r->gap_min);
     if (r->facing_max) cJSON_AddNumberToObject(contact, "gap_max", r->gap_max);
+    if (r->between) cJSON_AddNumberToObject(contact, "n_between_nodes", r->between);
     if (r->coarse > 0) cJSON_AddNumberToObject(contact, "slave_over_master", r->coarse);
     Print(check, k, r);
     Warn(check, s->contact[k], r);

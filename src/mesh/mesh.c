@@ -175,9 +175,9 @@ PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene)
             "hex27 cells, or a mesh file, whose hex20 cells are read as hex27",
             scene->contact[0]->name);
   for (PetscInt k = 0; k < scene->n_contacts; k++)
-    HycoCheck(!HycoMeshIsQuadratic(mesh) || !scene->contact[k]->ops->find,
-              "contact %s: type surface needs first-order cells, and the mesh has %s; use matching meshes with type: "
-              "pair, or mesh with gmsh -order 1",
+    HycoCheck(!HycoMeshIsQuadratic(mesh) || !scene->contact[k]->ops->find || scene->contact[k]->integrated,
+              "contact %s: type surface needs first-order cells, and the mesh has %s; use type: mortar, matching "
+              "meshes with type: pair, or mesh with gmsh -order 1",
               scene->contact[k]->name, HycoCellKinds[mesh->type].name);
   for (PetscInt k = 0; k < scene->n_quantities; k++) {
     if (scene->quantity[k].group) PetscCall(HycoMeshFindGroup(mesh, "output", scene->quantity[k].group, &group));

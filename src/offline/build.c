@@ -737,6 +737,18 @@ static PetscErrorCode DecideLate(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Before any solve: contacts whose rows the type of model takes. */
+PetscErrorCode HycoReducerCheckContacts(HycoReducer t, const HycoROM type)
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < t->scene->n_contacts && !type->model->traits.integrals; k++)
+    HycoCheckModel(!t->scene->contact[k]->integrated,
+                   "contact %s has type %s, whose rows have more masters than a facet; a model of type %s does not "
+                   "take them: train one of type bodies, or use type: surface",
+                   t->scene->contact[k]->name, ((PetscObject)t->scene->contact[k])->type_name, type->model->type);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoReducerRun(HycoReducer t, HycoSamples samples, const char path[], HycoTraining *training)
 {
   HycoSnapshots store;
@@ -751,6 +763,7 @@ PetscErrorCode HycoReducerRun(HycoReducer t, HycoSamples samples, const char pat
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++)
     HycoCheck(!(t->target[j] > 0) || t->validation || t->n_validation,
               "-target_%s needs held-out points, and -hyco_validation is 0; remove one of the two", HycoErrorKinds[j]);
+  if (t->pinned[HYCO_CHOICE_TYPE] || !t->search) PetscCall(HycoReducerCheckContacts(t, t->prototype));
   if (choose) {
     PetscCall((*t->prototype->ops->startpoints)(t, &chosen));
     samples = chosen;

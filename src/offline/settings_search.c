@@ -673,13 +673,17 @@ static PetscBool Ends(const Search *s, const HycoAttempt *best)
   return (PetscBool)(best && best->ratio <= (s->t->late ? 1 : MARGIN) && !s->t->exhaustive);
 }
 
-/* Lets a type with modes of its own refuse the scene: why. Collective. */
+/* Lets a type refuse the scene's contacts, one with modes of its own the scene: why. Collective. */
 static PetscErrorCode Refuse(HycoReducer t, const HycoROM type, char why[HYCO_LINE])
 {
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  if (!type->model->traits.own_modes || !type->ops->begin) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoCatchBegin());
+  ierr = HycoReducerCheckContacts(t, type);
+  PetscCall(HycoCatchEnd(ierr, why));
+  PetscCall(HycoCatchNoModel(ierr, why));
+  if (why[0] || !type->model->traits.own_modes || !type->ops->begin) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoReducerSetType(t, type->model->type));
   PetscCall(HycoCatchBegin());
   ierr = (*type->ops->begin)(t);

@@ -369,6 +369,7 @@ PetscErrorCode HycoROMCreate_Bodies(HycoROM m)
                                        .own_modes = PETSC_TRUE,
                                        .surfaces = PETSC_TRUE,
                                        .history = PETSC_TRUE,
+                                       .integrals = PETSC_TRUE,
                                        .cells = PETSC_TRUE,
                                        .uniform = PETSC_TRUE,
                                        .work = sizeof(*(HycoBodiesWork)NULL),

@@ -150,10 +150,21 @@ static PetscErrorCode TakeReference(HycoBodiesWork o, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Room for the entries of the rows in the bodies' axes. */
+static PetscErrorCode GrowRows(HycoBodiesWork o, PetscInt room)
+{
+  PetscFunctionBegin;
+  if (room <= o->row_room) PetscFunctionReturn(PETSC_SUCCESS);
+  o->row_room = room;
+  PetscCall(PetscRealloc((size_t)room * sizeof(*o->row_at), &o->row_at));
+  PetscCall(PetscRealloc((size_t)room * sizeof(*o->row), &o->row));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoBodiesSetUp(HycoBodiesWork o, HycoSubstructures b, HycoScene scene, const HycoBodiesSurface *s,
                                HycoSolver solver)
 {
-  const PetscInt m = s->pairs->n, entries = HycoPairsWidth(s->pairs) * b->dim * m;
+  const PetscInt m = s->pairs->n;
 
   PetscFunctionBegin;
   o->bodies = b;
@@ -178,8 +189,7 @@ PetscErrorCode HycoBodiesSetUp(HycoBodiesWork o, HycoSubstructures b, HycoScene 
   PetscCall(PetscCalloc1(b->ns + b->ni + 1, &o->u));
   PetscCall(PetscCalloc1(b->ns + 1, &o->f));
   PetscCall(PetscMalloc1(m + 1, &o->row_start));
-  PetscCall(PetscMalloc1(entries * b->dim + 1, &o->row_at));
-  PetscCall(PetscMalloc1(entries * b->dim + 1, &o->row));
+  PetscCall(GrowRows(o, HycoPairsWidth(s->pairs) * b->dim * m * b->dim + 1));
   PetscCall(PetscMalloc1(m + 1, &o->gap));
   PetscCall(PetscMalloc1(m + 1, &o->active));
   PetscCall(HycoTaoCreate(PETSC_COMM_SELF, NULL, &o->tao));
@@ -308,6 +318,7 @@ static PetscErrorCode TurnRows(HycoBodiesWork o, const HycoBodiesSurface *s)
   PetscInt n = 0;
 
   PetscFunctionBegin;
+  PetscCall(GrowRows(o, rows->start[s->pairs->n] * dim + 1)); /* mortars may meet more masters than before */
   o->row_start[0] = 0;
   for (PetscInt k = 0; k < s->pairs->n; k++) {
     for (PetscInt e = rows->start[k]; e < rows->start[k + 1]; e++) {

@@ -37,7 +37,7 @@ static PetscErrorCode SolveOne(HycoBodiesWork o, const HycoBodiesSurface *s, con
 {
   PetscFunctionBegin;
   PetscCall(HycoFESetParameters(s->fe, mu));
-  PetscCall(HycoContactRows(s->fe, s->pairs, s->rows->start, s->rows->dof, s->rows->value, s->rows->gap));
+  PetscCall(HycoRowsFill(s->fe, s->pairs, s->rows));
   PetscCall(HycoBodiesSolve(o, s, mu, Lambda, solved));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -109,7 +109,7 @@ static PetscErrorCode TakePaths(HycoReducer t, HycoBodiesWork o, const HycoBodie
 
     PetscCall(HycoReducerColumn(t, k, mu));
     PetscCall(HycoFESetParameters(s->fe, mu));
-    PetscCall(HycoContactRows(s->fe, s->pairs, s->rows->start, s->rows->dof, s->rows->value, s->rows->gap));
+    PetscCall(HycoRowsFill(s->fe, s->pairs, s->rows));
     PetscCall(HycoBodiesPrepare(o, s, mu));
     HycoBodiesGiven(o, s, t->Lambda + (size_t)k * (size_t)s->pairs->n);
     PetscCall(PetscArraycpy(sampled->c + sampled->n * b->r, o->c, b->r));
