@@ -276,10 +276,11 @@ static PetscErrorCode ReadTraining(HycoReducer t)
   PetscCall(ReadSVDType(t, PetscOptionsObject));
   PetscCall(HycoOptionsInt("-hyco_pod_max_modes", "largest number of displacement modes (0: no limit)", 0,
                            PETSC_MAX_INT, &t->max_modes, NULL));
-  PetscCall(HycoOptionsInt(
-      "-hyco_validation",
-      "number of held-out solutions, on which the model is judged (-1: from the number of training points; 0: none)",
-      -1, 100000, &t->n_validation, NULL));
+  PetscCall(HycoOptionsInt("-hyco_validation",
+                           "number of held-out solutions, on which the model is judged (-1: from the number of "
+                           "training points, few for bodies; "
+                           "0: none)",
+                           -1, 100000, &t->n_validation, NULL));
   PetscCall(HycoOptionsBool(
       "-hyco_search",
       "choose model_type, pod_tol, rid_layers, rid_contact_extension and hybrid by the held-out errors, unless given",

@@ -36,7 +36,6 @@
 #define ROUND        4   /* share of the training points that is added at a time, as a divisor */
 #define TELLING      0.3 /* correlation above which a parameter explains the errors */
 #define WHOLE        -1
-#define FEWEST       10 /* held-out solutions that may serve instead of training solutions */
 
 /* Sizes of RIDs and bases, the cheapest first; layers WHOLE: the whole mesh. */
 typedef struct {
@@ -776,7 +775,7 @@ static PetscErrorCode TakeColumns(HycoReducer t, HycoSnapshots store, PetscBool 
 
   PetscFunctionBegin;
   if (t->held) PetscCall(HycoSamplesGet(t->held, &n, NULL, NULL));
-  if (t->late && own && n >= FEWEST) {
+  if (t->late && own && n >= HYCO_FEW_HELD) {
     PetscCall(HycoReducerSetColumns(t, t->held));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -925,19 +924,29 @@ static PetscBool IsOwn(HycoReducer t)
   return (PetscBool)(t->pinned[HYCO_CHOICE_TYPE] && HycoReducerOwnModes(t, t->prototype));
 }
 
-/* Tries all settings that are not fixed. */
-static PetscErrorCode Attempts(Search *s)
+/* The ratios and the order of the held-out points before the first attempt that is judged at them. */
+static PetscErrorCode BeginHeld(Search *s)
 {
   PetscInt n;
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(s->t->held, &n, NULL, NULL));
-  Forget(s);
+  PetscCall(PetscFree2(s->ratio, s->order));
   PetscCall(PetscMalloc2(n, &s->ratio, n, &s->order));
   for (PetscInt k = 0; k < n; k++) {
     s->ratio[k] = 1; /* until an attempt gives another value */
     s->order[k] = k;
   }
+  s->force = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Tries all settings that are not fixed. */
+static PetscErrorCode Attempts(Search *s)
+{
+  PetscFunctionBegin;
+  Forget(s);
+  PetscCall(BeginHeld(s));
   s->least = PETSC_INFINITY;
   s->n_models = s->n_left_out = 0;
   s->ended = PETSC_FALSE;
@@ -947,7 +956,10 @@ static PetscErrorCode Attempts(Search *s)
   PetscCall(TryAll(s, PETSC_TRUE));
   if (!Ends(s, HycoAttemptsChoose(s->n, s->attempt)) && !IsOwn(s->t)) {
     const HycoSamples before = s->t->columns;
+    const PetscBool few = s->t->few;
 
+    PetscCall(HycoReducerHoldOutMore(s->t, s->store));
+    if (few) PetscCall(BeginHeld(s));
     PetscCall(TakeColumns(s->t, s->store, PETSC_FALSE));
     s->reduced = (PetscBool)(s->reduced && s->t->columns == before);
     PetscCall(Reduce(s));

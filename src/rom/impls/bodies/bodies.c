@@ -147,9 +147,10 @@ static PetscErrorCode Estimate(HycoROM m, HycoPrediction *p)
 
   PetscFunctionBegin;
   p->estimated_error_lambda = PetscMax(p->interpolation_error, ROUNDING);
-  if (b->n_theta) PetscFunctionReturn(PETSC_SUCCESS); /* errors of interpolated displacements are not known */
+  if (b->n_theta && !m->model->estimates.n) /* errors of interpolated displacements are not known */
+    PetscFunctionReturn(PETSC_SUCCESS);
   p->estimated_error_u = PetscMax(3 * b->left, ROUNDING);
-  if (b->ni) p->estimated_error_sigma = ROUNDING;
+  if (b->ni && !b->n_theta) p->estimated_error_sigma = ROUNDING;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -189,8 +190,8 @@ PetscErrorCode HycoBodiesOptions(HycoReducer t)
   PetscFunctionBegin;
   PetscCall(PetscNew(&s));
   t->training = s;
-  s->pod_tol = 1e-12;
-  s->samples = 120;
+  s->pod_tol = 1e-10;
+  s->samples = 60;
   s->inelastic_tol = 1e-10;
   s->cells = 2;
   s->cubature_tol = 1e-4;
@@ -202,7 +203,7 @@ PetscErrorCode HycoBodiesOptions(HycoReducer t)
                             1, &s->pod_tol, NULL));
   PetscCall(HycoOptionsInt(
       "-hyco_bodies_samples",
-      "bodies: contact problems on the surfaces alone whose displacements give the modes; twice as many, up to three "
+      "bodies: contact problems on the surfaces alone whose displacements give the modes; twice as many, up to four "
       "times, while a body has more modes than half of them",
       1, 100000, &s->samples, NULL));
   PetscCall(HycoOptionsReal("-hyco_bodies_tol",
