@@ -19,6 +19,13 @@ class SearchPaths(Ring):
         with open(self.path(name + '.csv'), newline='', encoding='utf-8') as f:
             return report, list(csv.DictReader(f))
 
+    def test_bodies_first(self):
+        """Models of bodies come first; accurate enough at held-out paths, they end the search, and the other types are named with the reason."""
+        found, rows = self.search('first', '-grid', '3,3', '-hyco_validation', '10')
+        self.assertEqual([r['model_type'] for r in rows], ['bodies'])
+        self.assertIn('hybrid', found['search']['not_tried'])
+        self.assertLess(found['held_out']['u']['largest'], 0.01)
+
     def test_same_choice(self):
         """Same settings, same errors, fewer paths; on two ranks the same settings are dropped at the same paths."""
         grid = ('-grid', '3,3')

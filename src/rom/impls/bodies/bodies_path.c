@@ -376,6 +376,8 @@ PetscErrorCode HycoBodiesTakePath(HycoROM m)
                                  .build = Build,
                                  .report = Report,
                                  .cost = Cost,
+                                 .offers = HycoBodiesOffers,
+                                 .work = HycoBodiesOperations,
                                  .setup = SetUp,
                                  .reset = Reset,
                                  .solve = Solve,
