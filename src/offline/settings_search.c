@@ -117,6 +117,7 @@ static PetscErrorCode SetSettings(HycoReducer t, const HycoReducerSettings *r)
   t->whole_rid = (PetscBool)(r->whole || t->prototype->model->traits.whole);
   t->plane = r->plane;
   t->ridge = r->ridge;
+  if (r->variant) PetscCall((*t->prototype->ops->setvariant)(t, r->variant));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -654,18 +655,28 @@ static PetscErrorCode TryHybrids(Search *s, const HycoROM type)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One attempt, for a type whose online cost hardly depends on the modes. */
+/* One attempt for each variant of a type whose online cost hardly depends on the modes, until one meets the targets. */
 static PetscErrorCode TryOne(Search *s, const HycoROM type)
 {
+  static const char *const one[] = {NULL, NULL};
   const Size size = {1e-12, 1, PETSC_FALSE};
+  const char *const *variant;
   HycoReducerSettings r = SettingsFor(s, &size);
+  PetscBool met = PETSC_FALSE;
 
   PetscFunctionBegin;
   r.type = type->model->type;
   r.rid = PETSC_FALSE;
   r.pod = (PetscBool)!HycoReducerOwnModes(s->t, type);
   if (s->t->scene->n_times) r.layers = s->given.layers; /* its mesh consists of the cells of its modes */
-  PetscCall(Try(s, &r, PETSC_FALSE));
+  PetscCall(HycoReducerSetType(s->t, r.type));
+  variant = HycoReducerVariants(s->t);
+  if (!variant) variant = one;
+  do {
+    r.variant = *variant++;
+    PetscCall(Try(s, &r, PETSC_FALSE));
+    met = (PetscBool)(s->attempt[s->n - 1].ratio <= 1 && !s->t->exhaustive);
+  } while (*variant && !met && !s->ended);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -809,7 +820,8 @@ static PetscBool Settled(HycoReducer t)
   PetscBool open = PETSC_FALSE;
 
   for (PetscInt k = 0; k < HYCO_CHOICE_WHOLE; k++) open = (PetscBool)(open || !t->pinned[k]);
-  if (t->pinned[HYCO_CHOICE_TYPE] && t->prototype->model->traits.settings == HYCO_SETTINGS_NONE) open = PETSC_FALSE;
+  if (t->pinned[HYCO_CHOICE_TYPE] && t->prototype->model->traits.settings == HYCO_SETTINGS_NONE)
+    open = (PetscBool)(HycoReducerVariants(t) != NULL);
   return (PetscBool)(!t->search || !t->held || !open);
 }
 

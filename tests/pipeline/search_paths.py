@@ -6,7 +6,7 @@ import unittest
 from baselines import Ring
 
 
-SETTINGS = ('model_type', 'pod_tol', 'rid_layers', 'rid_contact_extension', 'hybrid', 'rid_whole')
+SETTINGS = ('model_type', 'variant', 'pod_tol', 'rid_layers', 'rid_contact_extension', 'hybrid', 'rid_whole')
 
 
 class SearchPaths(Ring):

@@ -378,6 +378,8 @@ PetscErrorCode HycoBodiesTakePath(HycoROM m)
                                  .cost = Cost,
                                  .offers = HycoBodiesOffers,
                                  .work = HycoBodiesOperations,
+                                 .variants = HycoBodiesVariants,
+                                 .setvariant = HycoBodiesSetVariant,
                                  .setup = SetUp,
                                  .reset = Reset,
                                  .solve = Solve,

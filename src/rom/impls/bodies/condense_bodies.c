@@ -393,6 +393,7 @@ static PetscErrorCode Condense(HycoReducer t, HycoSnapshots store, HycoBodiesFac
 
   PetscFunctionBegin;
   PetscCall(HycoFOMAssemble(factor->fom, b->first));
+  factor->fom->fe->heat_is_load = PETSC_TRUE;
   PetscCheck(factor->fom->part->n_nodes == t->fom->part->n_nodes && factor->fom->part->first == t->fom->part->first,
              PETSC_COMM_SELF, PETSC_ERR_PLIB, "two meshes of one scene differ");
   PetscCall(HycoFOMSetParameters(t->fom, b->first));
