@@ -216,6 +216,8 @@ PetscErrorCode HycoBodiesTakePath(HycoROM model);
 /* Ops of both kinds of models. */
 PetscErrorCode HycoBodiesOptions(HycoReducer reducer);
 PetscErrorCode HycoBodiesResetTraining(HycoReducer reducer);
+const char *const *HycoBodiesVariants(HycoReducer reducer);
+PetscErrorCode HycoBodiesSetVariant(HycoReducer reducer, const char name[]);
 PetscErrorCode HycoBodiesBuild(HycoROM model, HycoReducer reducer);
 PetscErrorCode HycoBodiesView(HycoROM model, PetscViewer viewer);
 PetscErrorCode HycoBodiesDestroyModel(HycoROM model);
@@ -235,6 +237,7 @@ enum { HYCO_BODIES_AUTO, HYCO_BODIES_INTERPOLATION, HYCO_BODIES_CUBATURE };
 typedef struct {
   PetscReal pod_tol, tol, inelastic_tol, cubature_tol;
   PetscInt samples, most_samples, cells, laws; /* laws: how they are evaluated in few cells */
+  PetscBool named;                             /* by an option */
   HycoBasis strains;                           /* modes of the inelastic forces; V is NULL without a history */
   HycoBodyParts parts;
   HycoSubstructures bodies; /* complete on rank 0 */

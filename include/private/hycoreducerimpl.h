@@ -152,6 +152,11 @@ static inline PetscBool HycoReducerOwnModes(HycoReducer t, const HycoROM type)
 {
   return (PetscBool)(type->model->traits.own_modes && !(t->scene && t->scene->n_times));
 }
+/* The ways to make a model of the type that is set, which a search tries; NULL: one. */
+static inline const char *const *HycoReducerVariants(HycoReducer t)
+{
+  return t->prototype->ops->variants ? (*t->prototype->ops->variants)(t) : NULL;
+}
 /* Sets t->columns, and t->n_s from it. */
 PetscErrorCode HycoReducerSetColumns(HycoReducer t, HycoSamples columns);
 /* Solves points that are not in the store, and counts the time. Collective. */

@@ -517,7 +517,9 @@ void HycoReducerSettingsDescribe(const HycoReducerSettings *r, size_t length, ch
 {
   const char *kind = HycoHybrids[r->hybrid];
 
-  if (!r->pod)
+  if (r->variant)
+    snprintf(text, length, "%s, %s", r->type, r->variant);
+  else if (!r->pod)
     snprintf(text, length, "%s", r->type);
   else if (!r->rid)
     snprintf(text, length, "%s, pod_tol %g", r->type, (double)r->pod_tol);

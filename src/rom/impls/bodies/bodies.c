@@ -6,6 +6,7 @@
 #include <hycobodies.h>
 #include <hycoromtypes.h>
 #include <petscviewer.h>
+#include <string.h>
 
 #define ROUNDING 1e-10 /* relative, of exact results */
 #define ACTIVE   0.3   /* assumed share of closed contacts, and entries of a row of B, for costs */
@@ -222,11 +223,12 @@ PetscErrorCode HycoBodiesOptions(HycoReducer t)
   PetscCall(HycoOptionsWord("-hyco_bodies_laws",
                             "bodies, with a history: coefficients of the inelastic modes by interpolation in the cells "
                             "with laws, or by Galerkin's method with a cubature (auto: where a law yields)",
-                            laws, &s->laws, &set[2]));
+                            laws, &s->laws, &s->named));
   PetscCall(HycoOptionsReal("-hyco_bodies_cubature_tol",
                             "bodies, with a history: relative error of the cubature in training", 1e-12, 1,
                             &s->cubature_tol, &set[3]));
   PetscOptionsEnd();
+  set[2] = s->named;
   for (int k = 0; k < 4; k++)
     HycoCheck(!set[k] || !t->scene || t->scene->n_times,
               "%s is for scenes with a history, and this scene has none; remove it", of_history[k]);
@@ -243,6 +245,21 @@ PetscErrorCode HycoBodiesResetTraining(HycoReducer t)
   PetscCall(MatDestroy(&s->strains.V));
   PetscCall(PetscFree(s->strains.sigma));
   PetscCall(HycoBodiesDestroy(&s->bodies));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Over paths the laws in few cells, unless an option names how. */
+const char *const *HycoBodiesVariants(HycoReducer t)
+{
+  static const char *const variants[] = {"interpolation", "cubature", NULL};
+
+  return t->scene->n_times && !HycoTrainingOfBodies(t)->named ? variants : NULL;
+}
+
+PetscErrorCode HycoBodiesSetVariant(HycoReducer t, const char name[])
+{
+  PetscFunctionBegin;
+  HycoTrainingOfBodies(t)->laws = strcmp(name, "cubature") == 0 ? HYCO_BODIES_CUBATURE : HYCO_BODIES_INTERPOLATION;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -384,6 +401,8 @@ PetscErrorCode HycoROMCreate_Bodies(HycoROM m)
                                  .cost = Cost,
                                  .offers = HycoBodiesOffers,
                                  .work = HycoBodiesOperations,
+                                 .variants = HycoBodiesVariants,
+                                 .setvariant = HycoBodiesSetVariant,
                                  .setup = SetUp,
                                  .reset = Reset,
                                  .solve = Solve,

@@ -71,6 +71,7 @@ PetscErrorCode HycoBodiesBegin(HycoReducer t)
 
 #define SAMPLES 5  /* assumed nodes along each axis of theta */
 #define SOLVES  12 /* assumed solves for each load, mode and sample of the fields */
+#define STRAINS 40 /* assumed modes of the inelastic forces, each with unknowns of its cells of the model */
 
 PetscReal HycoBodiesOperations(HycoReducer t)
 {
@@ -78,16 +79,16 @@ PetscReal HycoBodiesOperations(HycoReducer t)
   PetscInt shape[HYCO_MAX_PARAMETERS];
   const PetscInt n = HycoBodyPartsShapes(&s->parts, -1, shape);
   const PetscReal unknowns = 2 * (PetscReal)t->sizes[2] * t->sizes[3], /* slaves and about as many masters */
-      samples = PetscMin(PetscPowRealInt(SAMPLES, n), (PetscReal)s->most_samples);
+      samples = PetscMin(PetscPowRealInt(SAMPLES, n), (PetscReal)s->most_samples),
+                  strains = t->scene->n_times ? STRAINS * (PetscReal)(s->cells * t->fom->part->nv * t->sizes[3]) : 0;
 
   return samples * (HycoReducerFactorWork(t) + unknowns * unknowns * unknowns / 3) +
-         SOLVES * (PetscReal)s->samples * HycoReducerSolveWork(t);
+         (SOLVES * (PetscReal)s->samples + strains) * HycoReducerSolveWork(t);
 }
 
 PetscBool HycoBodiesOffers(HycoReducer t, PetscBool targets, size_t length, char why[])
 {
   (void)targets;
-  if (t->scene->n_times) snprintf(why, length, "the scene has a history; name the type to train it");
   if (t->pod_memory > 0)
     snprintf(why, length,
              "its columns are not read in batches, and -hyco_pod_memory is given; name the type to train it");
@@ -436,6 +437,7 @@ static PetscErrorCode Condense(HycoReducer t, HycoSnapshots store, HycoBodiesFac
 
   PetscFunctionBegin;
   PetscCall(HycoFOMAssemble(factor->fom, b->first));
+  factor->fom->fe->heat_is_load = PETSC_TRUE;
   PetscCheck(factor->fom->part->n_nodes == t->fom->part->n_nodes && factor->fom->part->first == t->fom->part->first,
              PETSC_COMM_SELF, PETSC_ERR_PLIB, "two meshes of one scene differ");
   PetscCall(HycoFOMSetParameters(t->fom, b->first));
