@@ -39,7 +39,7 @@ def find():
 
 
 try:
-    lib = ctypes.CDLL(find(), mode=ctypes.RTLD_GLOBAL)  # Open MPI's plugins look for MPI's names among the global ones
+    lib = ctypes.CDLL(find())  # not among the global names: h5py may have an HDF5 of its own
 except OSError as error:
     raise ImportError(f'hyco: {error}; HYCO_LIBRARY names the shared library libhyco.so') from None
 lib.HycoKeptError.restype = ctypes.c_char_p
