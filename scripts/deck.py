@@ -67,8 +67,8 @@ def piecewise(rows, at):
 class Draft:
     """The scene of a deck. The mesh m gets the groups that the scene names; `left` has what is not converted: (block, text)."""
 
-    def __init__(self, m, name, facets, plain, boundary):
-        self.m, self.deck, self.name, self.facets, self.plain, self.boundary = m, m.deck, name, facets, plain, boundary
+    def __init__(self, m, name, facets_of, plain):
+        self.m, self.deck, self.name, self.facets_of, self.plain = m, m.deck, name, facets_of, plain
         self.left, self.notes = {}, []
         self.bodies, self.materials, self.body_of, self.thickness = {}, {}, {}, 1.0
         self.interactions, self.contacts, self.ties, self.rigids, self.loose = {}, {}, {}, [], {}
@@ -117,14 +117,20 @@ class Draft:
             name, k = re.sub(r"_\d+$", "", name) + f"_{k}", k + 1
         return name
 
-    def node_group(self, word, block, points=False):
-        """The name of a group of these nodes; single nodes of one block are one group. points: a group of points, on which forces act."""
-        number = re.fullmatch(r"(.*\.)?\d+", word.strip('"')) and word.strip('"').upper() not in self.deck.nsets
-        name = self.plain(f"{block.word}_{block.line}" if number else word.strip('"').upper())
+    def alone(self, word):
+        """Whether a word is the number of a node or cell, not the name of a set."""
+        word = word.strip('"').upper()
+        return bool(re.fullmatch(r"(.*\.)?\d+", word)) and word not in self.deck.nsets and word not in self.deck.elsets
+
+    def node_group(self, word, block, what, points=False):
+        """The name of a group of these nodes; single nodes of one block with the same `what` are one group. points: on which forces act."""
+        name = self.plain(f"{block.word}_{block.line}_{what}" if self.alone(word) else word.strip('"').upper())
         if points:
             name += "_points"
+        elif name in self.bodies or name in map(self.plain, self.deck.surfaces):
+            name += "_nodes"  # the name of other groups too
         groups = self.m.point_groups if points else self.m.node_groups
-        if number:
+        if self.alone(word):
             groups.setdefault(name, []).extend(self.nodes(word, block))
         else:
             groups[name] = self.nodes(word, block)
@@ -235,8 +241,14 @@ class Draft:
     # ---- contact, ties, rigid bodies
 
     def surfaces(self, row, block):
+        """The groups of a slave and a master; None, with a note, if one of them has no solid behind it."""
         if len(row) < 2:
             raise DeckError(f"line {block.line}: *{block.word} needs two surfaces, the slave first")
+        for word in row[:2]:
+            found = self.deck.surfaces.get(word.strip('"').upper())
+            if found == [] or any(cell not in self.m.cells for cell, _ in found or ()) or any(b.word == "SURFACE" and b.parameters.get("NAME", "").upper() == word.upper() for b in self.deck.rest):
+                self.leave(block, f"*{block.word} with a surface without solids", "a rigid surface is a contact of type obstacle (normal and gap as expressions), or a solid that is held")
+                return None
         return [self.facet_group(w, block) for w in row[:2]]
 
     def on_contact_pair(self, block):
@@ -244,7 +256,10 @@ class Draft:
         interaction = p.get("INTERACTION", "").upper()
         for row in block.rows:
             row = [w for w in row if w]
-            slave, master = self.surfaces(row, block)
+            both = self.surfaces(row, block)
+            if not both:
+                continue
+            slave, master = both
             if "TIED" in p or self.interactions.get(interaction, {}).get("tied"):
                 self.ties[self.free_name(f"{slave}_{master}", self.ties)] = (slave, master, None)
                 continue
@@ -256,7 +271,10 @@ class Draft:
             self.leave(block, "*CONTACT INCLUSIONS", WHY["CONTACT"])
             return
         for row in block.rows:
-            slave, master = self.surfaces(row, block)
+            both = self.surfaces(row, block)
+            if not both:
+                continue
+            slave, master = both
             self.contacts[self.free_name(f"{slave}_{master}".lower(), self.contacts)] = (slave, master, "", 0, row, block)
 
     def on_contact(self, block):
@@ -275,7 +293,10 @@ class Draft:
         if "CYCLIC SYMMETRY" in block.parameters or "MULTISTAGE" in block.parameters:
             self.leave(block, "*TIE, CYCLIC SYMMETRY", WHY["CYCLIC SYMMETRY MODEL"])
             return
-        slave, master = self.surfaces([w for w in block.rows[0] if w], block)
+        both = self.surfaces([w for w in block.rows[0] if w], block)
+        if not both:
+            return
+        slave, master = both
         reach = block.parameters.get("POSITION TOLERANCE")
         self.ties[self.free_name(block.parameters.get("NAME", "tie"), self.ties)] = (slave, master, real(reach) if reach else None)
 
@@ -283,7 +304,7 @@ class Draft:
         p = block.parameters
         found = [self.nodes(p[k], block) for k in ("NSET", "TIE NSET", "PIN NSET") if k in p]
         if "ELSET" in p:
-            found.append([n for c in self.cells(p["ELSET"], block) for n in self.m.cells[c][1]])
+            found.append([n for c in self.cells(p["ELSET"], block) for n in self.m.cells[c][1]])  # rigid facets are left out
         at = p.get("REF NODE", "")
         self.rigids.append((block, sorted({n for keys in found for n in keys}, key=str), self.nodes(at, block)[0] if at else None,
                             self.nodes(p["ROT NODE"], block)[0] if "ROT NODE" in p else None))
@@ -295,8 +316,7 @@ class Draft:
         if after != "KINEMATIC" or surface not in self.deck.surfaces and surface not in self.deck.nsets:
             self.leave(block, "*COUPLING", WHY["COUPLING"])
             return
-        nodes = self.deck.nsets.get(surface) or [n for cell, side in self.deck.surfaces[surface] if side is not None
-                                                 for n in (self.m.cells[cell][1][k] for k in self.facets[self.m.cells[cell][0]][side])]
+        nodes = self.deck.nsets.get(surface) or [n for facet in self.facets_of(self.m, self.deck.surfaces[surface]) for n in facet]
         self.rigids.append((block, sorted(set(nodes), key=str), self.nodes(p["REF NODE"], block)[0], None))
 
     # ---- steps
@@ -378,18 +398,10 @@ class Draft:
             group = None
             for d in dofs:
                 if d <= dim:
-                    group = group or self.node_group(row[0], block) if not re.fullmatch(r"(.*\.)?\d+", row[0]) else self.single(row[0], block, dofs, value)
+                    group = group or self.node_group(row[0], block, "_".join(map(str, dofs)) + (f"_{said(value)}" if value else ""))
                     self.put(("fixed", group, AXES[d - 1]), value, block)
                 elif d > 6:
                     self.leave(block, f"*BOUNDARY of degree of freedom {d}", "only displacements are prescribed")
-
-    def single(self, word, block, dofs, value):
-        """The group of the single nodes of a block that have the same support."""
-        name = self.plain(f"fixed_{block.line}_{'_'.join(map(str, dofs))}" + (f"_{said(value)}" if value else ""))
-        keys = self.m.node_groups.setdefault(name, [])
-        keys += [n for n in self.nodes(word, block) if n not in keys]
-        self.groups.add(name)
-        return name
 
     def on_cload(self, block):
         self.renewed(block, ("force",))
@@ -399,11 +411,13 @@ class Draft:
             if len(held) < len(nodes) or d > self.dim():
                 self.leave(block, "*CLOAD on a reference point or a rotation", "a load on a rigid or coupled body: see contact type rigid, or a traction")
                 continue
-            self.put(("force", self.node_group(row[0], block, points=True), AXES[d - 1]), item(row, 2) / self.thickness, block)
+            self.put(("force", self.node_group(row[0], block, f"{d}_{said(item(row, 2))}", True), AXES[d - 1]), item(row, 2) / self.thickness, block)
 
-    def pressure_group(self, word, face, block):
-        name = self.plain(f"{word.strip(chr(34)).upper()}_P{face}" if not re.fullmatch(r"(.*\.)?\d+", word) else f"pressure_{block.line}")
-        self.m.facet_groups.setdefault(name, []).extend((c, face - 1) for c in self.cells(word, block))
+    def pressure_group(self, word, face, value, block):
+        """The group of a face of cells; faces of single cells with one pressure in one block are one group."""
+        name = self.plain(f"PRESSURE_{block.line}_{said(value)}" if self.alone(word) else f"{word.strip(chr(34)).upper()}_P{face}")
+        mine = self.m.facet_groups.setdefault(name, [])
+        mine += [(c, face - 1) for c in self.cells(word, block) if (c, face - 1) not in mine]
         self.groups.add(name)
         return name
 
@@ -432,7 +446,7 @@ class Draft:
                 for title in self.body_groups(row[0], block):
                     self.put(("force", title, kind[1].lower()), item(row, 2), block)
             elif face:
-                self.put(("pressure", self.pressure_group(row[0], int(face[1]), block), ""), item(row, 2), block)
+                self.put(("pressure", self.pressure_group(row[0], int(face[1]), item(row, 2), block), ""), item(row, 2), block)
             else:
                 self.leave(block, f"*DLOAD of type {kind}")
 
@@ -507,6 +521,8 @@ class Draft:
         if any(d not in given for d in range(1, dim + 1)) or any(v is None or v[0] for v in turns):
             self.leave(block, f"*{block.word}", "only a rigid part whose reference point is held in all displacements and rotations (then: fixed); see contact type rigid for one under a load")
             return
+        if not any(n in self.used for n in nodes):
+            return  # rigid facets: their contacts are listed
         name = self.free_name(f"rigid_{block.line}", self.groups)
         self.m.node_groups[name] = [n for n in nodes if n in self.used]
         self.groups.add(name)
@@ -598,11 +614,7 @@ class Draft:
             if name in self.m.node_groups:
                 return set(self.m.node_groups[name]), []
             keys, edges = set(), []
-            for cell, side in self.m.facet_groups.get(name, []):
-                kind, corners = self.m.cells[cell]
-                if side is None:
-                    continue
-                facet = [corners[k] for k in self.facets[kind][side]]
+            for facet in self.facets_of(self.m, self.m.facet_groups.get(name, [])):
                 keys.update(facet)
                 edges += [math.dist(self.m.nodes[a], self.m.nodes[b]) for a, b in zip(facet, facet[1:])]
             return keys, edges

@@ -255,6 +255,37 @@ class Decks(Case):
         checked = self.run_raw('check', '-scene', folder)
         self.assertEqual(checked.returncode, 0, checked.stdout + checked.stderr)
 
+    def test_loads(self):
+        """Forces and pressures on single nodes and cells keep their values; several steps with amplitudes are a history; tied contact, clearance, shells, rigid
+        facets, general contact and a dynamic step are what the draft says of them."""
+        a, b = Box('A', 'C3D8', (0, 0, 0), (1, 1, 1), (2, 2, 2)), Box('B', 'C3D8', (0, 0, 1), (1, 1, 2), (2, 2, 2), 1001)
+        top, cells = b.sides['Z1'][0], b.sides['Z1'][1]
+        hold = SYMMETRY + 'A_Z0, 3, 3\n'
+        _, folder = self.convert('single', deck([a, b], '*SURFACE INTERACTION, NAME=SI\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TIED\n*CONTACT PAIR, INTERACTION=SI\nB_SZ0, A_SZ1\n' + hold,
+                                                [('', f'*STATIC\n*CLOAD\n{top[0]}, 3, -1.\n{top[1]}, 3, -2.\n{top[2]}, 3, -2.\n*DLOAD\n{cells[0]}, P2, 4.\n{cells[1]}, P2, 8.\n')]))
+        s = self.solve(folder)
+        self.near(sum(np.array(r['force']) for r in s.reactions if r['group'] == 'A_Z0')[2], 5 + 0.25 * (4 + 8), 1e-9)
+        with open(os.path.join(folder, 'scene.yaml'), encoding='utf-8') as file:
+            self.assertRegex(file.read(), r'(?m)^tie:\n  B_SZ0_A_SZ1: \{slave: B_SZ0, master: A_SZ1\}')
+        two = deck([a, b], '*AMPLITUDE, NAME=UP\n0., 0., 0.5, 1., 1., 0.25\n' + pair('B_SZ0', 'A_SZ1') + '*CLEARANCE, MASTER=A_SZ1, SLAVE=B_SZ0, VALUE=0.001\n' + hold,
+                   [('', '*STATIC\n1., 2.\n*BOUNDARY\nB_Z1, 3, 3, -0.002\n'), ('', '*STATIC\n1., 1.\n*DSLOAD, AMPLITUDE=UP\nB_SX1, P, 40.\n'), ('', '*DYNAMIC\n1., 1.\n*DSLOAD\nB_SX1, P, 1000.\n')])
+        left, folder = self.convert('steps', two)
+        self.assertEqual(len(left), 1, left)
+        self.assertIn('*DYNAMIC', left[0])
+        with open(os.path.join(folder, 'scene.yaml'), encoding='utf-8') as file:
+            draft = file.read()
+        self.assertIn('times: [0, 2, 3]', draft)
+        self.assertIn('[[0, 0], [2, 0], [2.5, 1], [3, 0.25]]', draft)
+        self.assertIn('gap: 0.001', draft)
+        h = self.solve(folder).history
+        self.near(h['total_contact_force'][1], 210000 * 0.001 / 2, 1e-6)
+        odd = '*NODE\n9001, 0., 0., 2.\n9002, 1., 0., 2.\n9003, 1., 1., 2.\n9004, 0., 1., 2.\n*ELEMENT, TYPE=S4R, ELSET=SKIN\n9001, 9001, 9002, 9003, 9004\n*ELEMENT, TYPE=R3D4, ELSET=TOOL\n9002, 9001, 9002, 9003, 9004\n' \
+              '*SURFACE, NAME=RIGID, TYPE=ELEMENT\nTOOL, SPOS\n*CONTACT PAIR, INTERACTION=SI\nB_SZ1, RIGID\n*CONTACT\n*CONTACT INCLUSIONS, ALL EXTERIOR\n'
+        left, folder = self.convert('odd', deck([a, b], pair('B_SZ0', 'A_SZ1') + odd + hold, [('', '*STATIC\n*DSLOAD\nB_SZ1, P, 30.\n')]))
+        for words in ('TYPE=S4R', 'TYPE=R3D4', 'surface without solids', 'name the pairs'):
+            self.assertEqual(len([line for line in left if words in line]), 1, left)
+        self.near(self.solve(folder).total_contact_force, 30, 1e-9)
+
     def test_page(self):
         """docs/convert.md: the commands of the worked deck, and what they print."""
         tools = self.path('page', 'tools')
