@@ -1,5 +1,5 @@
 # cmake --install build --prefix FOLDER installs the library, its headers, the command, its manual pages and completion, the files for pkg-config
-# and CMake, and the examples; cpack makes a Debian package of the same files.
+# and CMake, the Python package, and the examples; cpack makes a Debian package of the same files.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
@@ -20,7 +20,7 @@ file(RELATIVE_PATH HYCO_PC_TO_PREFIX /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
 configure_file(cmake/hyco.pc.in hyco.pc @ONLY)
 install(FILES ${PROJECT_BINARY_DIR}/hyco.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 
-# Manual pages and the shell completion are made from the help of the commands.
+# Manual pages and the shells' completions are made from the help of the commands.
 install(CODE "execute_process(COMMAND sh \"${PROJECT_SOURCE_DIR}/cmake/manual\" \"$<TARGET_FILE:hyco_command>\" \"${PROJECT_BINARY_DIR}/manual\"
                               RESULT_VARIABLE failed)
 if(failed)
@@ -28,11 +28,30 @@ if(failed)
 endif()")
 install(DIRECTORY ${PROJECT_BINARY_DIR}/manual/man1 DESTINATION ${CMAKE_INSTALL_MANDIR})
 install(FILES ${PROJECT_BINARY_DIR}/manual/hyco DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
+install(FILES ${PROJECT_BINARY_DIR}/manual/_hyco DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/site-functions)
+install(FILES ${PROJECT_BINARY_DIR}/manual/hyco.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d)
 
 install(FILES README.md LICENSE CHANGELOG.md CONTRIBUTING.md CITATION.cff DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} FILES_MATCHING PATTERN *.md PATTERN *.csv PATTERN *.png)
-install(PROGRAMS scripts/meshes scripts/plot scripts/convert scripts/hyco.sbatch DESTINATION ${CMAKE_INSTALL_DOCDIR}/scripts)
+install(PROGRAMS scripts/meshes scripts/plot scripts/convert scripts/deck.py scripts/hyco.sbatch DESTINATION ${CMAKE_INSTALL_DOCDIR}/scripts)
 install(DIRECTORY examples DESTINATION ${CMAKE_INSTALL_DOCDIR} PATTERN *.msh EXCLUDE PATTERN *.h5 EXCLUDE PATTERN *.xdmf EXCLUDE)
+
+# The Python package needs no compilation; _where.py is the path of the library from its folder. Debian's python3 looks into /usr/lib/python3/dist-packages.
+set(HYCO_PYTHON_DIR lib/python3/dist-packages CACHE STRING "Folder of the Python package, in the prefix")
+if(BUILD_SHARED_LIBS)
+  set(modules ${PROJECT_SOURCE_DIR}/python/hyco/__init__.py ${PROJECT_SOURCE_DIR}/python/hyco/_library.py)
+  foreach(module ${modules})
+    cmake_path(GET module FILENAME name)
+    configure_file(${module} python/hyco/${name} COPYONLY)
+  endforeach()
+  file(GENERATE OUTPUT ${PROJECT_BINARY_DIR}/python/hyco/_where.py CONTENT "LIBRARY = '$<TARGET_SONAME_FILE:hyco>'\n")
+  set(folder ${CMAKE_INSTALL_LIBDIR})
+  if(NOT IS_ABSOLUTE "${folder}")
+    file(RELATIVE_PATH folder /${HYCO_PYTHON_DIR}/hyco /${folder})
+  endif()
+  file(GENERATE OUTPUT ${PROJECT_BINARY_DIR}/installed/_where.py CONTENT "LIBRARY = '${folder}/$<TARGET_SONAME_FILE_NAME:hyco>'\n")
+  install(FILES ${modules} ${PROJECT_BINARY_DIR}/installed/_where.py DESTINATION ${HYCO_PYTHON_DIR}/hyco)
+endif()
 
 # The headers of PETSc and SLEPc are needed only by programs that link hyco; the package therefore only recommends them.
 set(CPACK_GENERATOR DEB)
@@ -46,6 +65,6 @@ set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_DEPENDS openmpi-bin)
-set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "libpetsc-real-dev, libslepc-real-dev, libopenblas0-serial, gmsh, python3-matplotlib, python3-h5py")
+set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "libpetsc-real-dev, libslepc-real-dev, libopenblas0-serial, gmsh, python3-numpy, python3-matplotlib, python3-h5py")
 set(CPACK_STRIP_FILES ON)
 include(CPack)

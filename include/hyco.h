@@ -29,5 +29,6 @@
 #include <hycosnapshots.h>
 #include <hycoreducer.h>
 #include <hycorom.h>
+#include <hycobindings.h>
 
 #endif

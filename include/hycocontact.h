@@ -14,6 +14,7 @@ typedef const char *HycoContactType;
 #define HYCO_CONTACT_OBSTACLE "obstacle" /* n . u <= gap on the nodes of a group */
 #define HYCO_CONTACT_PAIR     "pair"     /* n . (u_slave - u_master) <= gap on pairs of nodes */
 #define HYCO_CONTACT_SURFACE  "surface"  /* the same at a slave node's projection on the master's facets */
+#define HYCO_CONTACT_MORTAR   "mortar"   /* the same on the mean over the slave's facets, by dual functions */
 #define HYCO_CONTACT_RIGID    "rigid"    /* an obstacle that moves as one node does */
 
 /* Resultants of a contact of the scene. */
@@ -43,10 +44,10 @@ struct _HycoContactOps {
   /* Sets the slave nodes and their masters on the mesh as drawn. NULL: the nodes of `group` that have a free
      displacement, without masters. */
   PetscErrorCode (*setup)(HycoContact, struct _n_HycoFE *fe, PetscInt index, struct _n_HycoPairs *pairs);
-  /* Finds the masters of slave nodes on surfaces that a map moves, at most `reach` away, in CSR from start[0], which is
-     set. NULL: masters do not change. */
-  PetscErrorCode (*find)(HycoContact, struct _n_HycoFE *fe, PetscReal reach, PetscInt n, const PetscInt slave[],
-                         PetscInt start[], PetscInt master[], PetscReal weight[]);
+  /* Appends to `found` the n slave nodes of contact number `index` on surfaces that a map moves, with their masters at
+     most `reach` away. NULL: masters do not change. */
+  PetscErrorCode (*find)(HycoContact, struct _n_HycoFE *fe, PetscInt index, PetscReal reach, PetscInt n,
+                         const PetscInt slave[], struct _n_HycoPairs *found);
   /* Computes unit normals (n x 3), outward from the slave side. NULL: from the entries normal_x, ... at the master
      points, or from the slave surface. */
   PetscErrorCode (*normal)(HycoContact, const HycoContactPoints *points, PetscReal normal[]);

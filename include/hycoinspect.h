@@ -32,15 +32,19 @@ typedef struct {
 
 typedef struct {
   const char *name;
-  PetscInt n_cells, n_parts; /* parts share no node */
-  PetscReal stretch;         /* largest length of a cell over its width, 1: regular; 0 in 1D */
-  PetscInt stretched;        /* tag of that cell */
+  PetscInt n_cells, n_parts;      /* parts share no node */
+  PetscReal stretch;              /* largest length of a cell over its width, 1: regular; 0 in 1D */
+  PetscInt stretched;             /* tag of that cell */
+  PetscInt n_doubled, doubled[2]; /* nodes on another node of the body, away from contacts and ties: it is open there;
+                                     tags of the first two */
 } HycoBodyInspection;
 
 typedef struct {
   const char *name, *type, *slave, *master; /* groups; master NULL: none */
   PetscInt n, facing_min, facing_max; /* number of contacts; of those that may close, the smallest and largest number */
   PetscReal gap_min, gap_max;         /* gaps of those that may close; max < min: no contact may close */
+  PetscInt between;     /* masters between nodes, as where meshes do not match, unless the type is for this */
+  PetscBool integrated; /* the type integrates over facets: either side may be the finer */
   PetscReal coarse; /* slave's facet size over the master's, median, where most contacts may close; 0: not compared */
   PetscReal tolerance; /* of the search, where the scene states it and it decides; < 0: else */
 } HycoContactInspection;

@@ -67,6 +67,8 @@ typedef struct {
   PetscBool whole;   /* the whole mesh as the RID */
   const char *plane; /* group of a plane of symmetry whose cells are in the RID; NULL: none. Borrowed from the scene */
   PetscReal ridge;   /* hybrid all: of the interface's regression, as training has found it; < 0: not yet */
+  const char
+      *variant; /* of a type whose model can be made in several ways; NULL: its default. Borrowed from the type */
 } HycoReducerSettings;
 
 /* Describes settings: "hybrid, pod_tol 1e-10, hybrid contact, layers 1, contact extension 2.5". */

@@ -134,6 +134,13 @@ PetscErrorCode HycoROMGetSizes(HycoROM model, PetscInt *n_contacts, PetscInt *n_
 */
 PetscErrorCode HycoROMSolveMany(HycoROM model, PetscInt n, PetscInt n_parameters, const PetscReal mu[],
                                 HycoPrediction prediction[], PetscReal Lambda[], PetscReal U[]);
+/*
+  HycoROMSolveMany() divided over the ranks of comm: each rank has loaded the model, has the same n and mu, and solves a
+  share of consecutive points; every rank receives the results of all points. An error on a rank is one on all of them. The arrays are
+  given by all ranks or by none. Collective on comm.
+*/
+PetscErrorCode HycoROMSolveShared(MPI_Comm comm, HycoROM model, PetscInt n, PetscInt n_parameters, const PetscReal mu[],
+                                  HycoPrediction prediction[], PetscReal Lambda[], PetscReal U[]);
 /* Called after each point of HycoROMSolveMany() with its number, in the order in which the points are solved. The
    model's getters then return the results of that point. NULL: none. Not collective. */
 typedef PetscErrorCode (*HycoPointMonitor)(HycoROM model, PetscInt point, void *ctx);

@@ -37,6 +37,7 @@ typedef struct {
                         points, and no less than those of ops->estimate */
   PetscBool own_modes; /* its modes are displacements of its own: solutions choose only the cells of its mesh, for which
                             those at held-out points serve, and a search tries it before the training points are solved */
+  PetscBool integrals; /* it takes contacts whose rows are integrals, with any number of masters (type mortar) */
   PetscBool cells;     /* its mesh consists of the cells that it chooses, and of the surfaces of contacts and, without
                       `surfaces`, loads */
 } HycoROMTraits;
@@ -69,6 +70,10 @@ typedef struct _HycoROMOps {
                                       `why` may get a reason for the user. Of types with own_modes `begin` is called
                                       before, and its refusal is the reason */
   PetscReal (*work)(HycoReducer);  /* operations of making a model, if they are many, from the sizes of the scene */
+  const char *const *(*variants)(
+      HycoReducer); /* ways to make a model, of which a search tries one after the other until
+                                                  one meets the targets: their names, then NULL; NULL: one way */
+  PetscErrorCode (*setvariant)(HycoReducer, const char name[]);
   /* -- online -- */
   PetscErrorCode (*options)(HycoROM);                     /* its options of a model */
   PetscErrorCode (*setup)(HycoROM);                       /* default: HycoROMSetUpDefault() */

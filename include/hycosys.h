@@ -52,6 +52,12 @@ PetscErrorCode HycoInitialize(int *argc, char ***argv);
 /* Finalises what HycoInitialize() initialised. Collective on all processes. */
 PetscErrorCode HycoFinalize(void);
 
+/* Errors from now on are kept in place of being printed, for a program that reports them itself; PETSC_FALSE: as before
+   the last HycoKeepErrors(PETSC_TRUE). It forgets the kept error. Not collective. */
+PetscErrorCode HycoKeepErrors(PetscBool keep);
+/* The line of the last error that was kept on this rank; "": none. Not collective. Borrowed until the next error. */
+const char *HycoKeptError(void);
+
 /* The version as "major.minor.patch". Not collective. Borrowed. */
 const char *HycoVersion(void);
 

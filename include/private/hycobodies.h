@@ -83,7 +83,7 @@ typedef struct {
   PetscInt n_samples, n, l;    /* n: unknowns of its surfaces; l: modes */
   PetscInt m;                  /* unknowns inside whose displacements are exact */
   PetscReal *C, *R, *Z, *work; /* n x n; n x r; n x p; p x r, the work of the loads on the rigid motions */
-  PetscReal *H, *a, *g;        /* l rows for each turn, then m rows: of n, of r, of p */
+  PetscReal *H, *a, *g;        /* l rows for each turn, then m rows: of n (column after column), of r, of p */
   PetscReal *gram;             /* r x r: of the errors of R at held-out samples in the norm of C^-1, summed; 0 */
 } HycoSubstructure;
 
@@ -131,6 +131,15 @@ typedef struct _n_HycoSubstructures {
   HycoBodiesInelastic inelastic; /* NULL: no history */
 } * HycoSubstructures;
 
+/* Rows of B in the bodies' axes that the last prediction had too, and what follows from them (bodies_kept.c). */
+typedef struct {
+  PetscBool same;          /* the rows are the last ones */
+  PetscInt m, *start, *at; /* the last rows, of m contacts */
+  PetscReal *value;
+  PetscReal **P, **W; /* by contact and body: C_b B_b^T, n x samples; B C_b B_b^T, m x samples; NULL: not yet, or 0 */
+  PetscReal bytes;    /* of all P and W */
+} HycoBodiesKept;
+
 /* What solves change. In the bodies' axes: c of the loads (r); displacements of the surfaces without contact (free, ns)
    and with it, then of the unknowns inside (u, ns + ni); forces on the surfaces (f, ns); x (p). */
 typedef struct _n_HycoBodiesWork {
@@ -142,9 +151,10 @@ typedef struct _n_HycoBodiesWork {
   HycoPose *pose;
   PetscReal *kappa, *c, *elastic, *free, *u, *f, *x; /* elastic: free, without inelastic strains */
   PetscReal *Z, *work;                               /* ns x p, p x r row major: of all bodies, interpolated */
-  PetscInt n_loc, *loc;         /* by unknown of the surface's mesh: its place, with ns added inside; or -1 */
-  PetscInt *row_start, *row_at; /* the rows of B in the bodies' axes */
+  PetscInt n_loc, *loc;                   /* by unknown of the surface's mesh: its place, with ns added inside; or -1 */
+  PetscInt *row_start, *row_at, row_room; /* the rows of B in the bodies' axes */
   PetscReal *row;
+  HycoBodiesKept kept;
   PetscReal *gap;    /* by contact: without the forces */
   PetscBool *active; /* of the contacts in the problem */
   HycoTao tao;       /* the active set; if it fails, or another method is asked for: */
@@ -180,6 +190,14 @@ PetscErrorCode HycoBodiesStrain(HycoBodiesWork work, const HycoBodiesSurface *su
 PetscErrorCode HycoBodiesContact(HycoBodiesWork work, const HycoBodiesSurface *surface, PetscReal Lambda[],
                                  PetscBool *solved);
 void HycoBodiesGiven(HycoBodiesWork work, const HycoBodiesSurface *surface, const PetscReal Lambda[]);
+/* Compares the rows of m contacts with the last ones: kept.same, and takes them. */
+PetscErrorCode HycoBodiesKeepRows(HycoBodiesWork work, PetscInt m);
+PetscErrorCode HycoBodiesForgetKept(HycoBodiesWork work);
+/* If the rows are the last ones: P and W of n contacts, unless they need too much memory (kept.same is false then). */
+PetscErrorCode HycoBodiesKeep(HycoBodiesWork work, PetscInt n, const PetscInt contact[]);
+/* row[n]: of the matrix W at the present parameters, contact k with n contacts; u -= C B^T Lambda. */
+void HycoBodiesKeptRow(HycoBodiesWork work, PetscInt k, PetscInt n, const PetscInt contact[], PetscReal row[]);
+PetscErrorCode HycoBodiesKeptDisplace(HycoBodiesWork work, PetscInt m, const PetscReal Lambda[], PetscReal u[]);
 /* Sets the displacements of the surfaces and, after HycoBodiesExpand(), of the unknowns inside in U (by unknown of the
    surface's mesh) without prescribed ones. */
 void HycoBodiesMove(HycoBodiesWork work, const HycoBodiesSurface *surface, PetscReal U[]);
@@ -198,6 +216,8 @@ PetscErrorCode HycoBodiesTakePath(HycoROM model);
 /* Ops of both kinds of models. */
 PetscErrorCode HycoBodiesOptions(HycoReducer reducer);
 PetscErrorCode HycoBodiesResetTraining(HycoReducer reducer);
+const char *const *HycoBodiesVariants(HycoReducer reducer);
+PetscErrorCode HycoBodiesSetVariant(HycoReducer reducer, const char name[]);
 PetscErrorCode HycoBodiesBuild(HycoROM model, HycoReducer reducer);
 PetscErrorCode HycoBodiesView(HycoROM model, PetscViewer viewer);
 PetscErrorCode HycoBodiesDestroyModel(HycoROM model);
@@ -217,6 +237,7 @@ enum { HYCO_BODIES_AUTO, HYCO_BODIES_INTERPOLATION, HYCO_BODIES_CUBATURE };
 typedef struct {
   PetscReal pod_tol, tol, inelastic_tol, cubature_tol;
   PetscInt samples, most_samples, cells, laws; /* laws: how they are evaluated in few cells */
+  PetscBool named;                             /* by an option */
   HycoBasis strains;                           /* modes of the inelastic forces; V is NULL without a history */
   HycoBodyParts parts;
   HycoSubstructures bodies; /* complete on rank 0 */
@@ -231,9 +252,15 @@ static inline HycoBodiesTraining HycoTrainingOfBodies(HycoReducer t)
 /* The factor of K at a point of theta with the unknowns of the surfaces last. Every rank. */
 typedef struct {
   HycoFOM fom;
-  Mat N; /* selects them */
-  HycoDirect direct;
-  PetscReal *theta; /* of the factor */
+  Mat N;             /* selects them */
+  HycoDirect direct; /* the present factor, borrowed from: */
+  PetscInt n_kept;
+  struct {
+    HycoDirect direct;
+    PetscReal *theta;
+  } * kept;
+  PetscReal bytes;  /* of one */
+  PetscReal *theta; /* of the present factor */
   PetscInt *pins;   /* of the first factor */
   PetscReal *z;     /* p + ns */
   PetscInt n_basis;

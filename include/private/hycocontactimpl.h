@@ -14,7 +14,9 @@ struct _p_HycoContact {
   const char *name, *slave, *master; /* slave, master: groups; master NULL: no masters */
   HycoExpr normal[3], gap;           /* NULL: not given */
   PetscBool matched;                 /* set by the type: no two contacts have the same master node */
-  PetscBool rigid; /* set by the type: the master is a node that moves with a rigid body, whose surface is given by
+  PetscBool integrated; /* set by the type: rows are integrals over the slave's facets around a node, with any
+                                        number of masters */
+  PetscBool rigid;      /* set by the type: the master is a node that moves with a rigid body, whose surface is given by
                       the normals and gaps at the slaves; its equilibrium sums the forces of all of the contact's
                       nodes */
 };
@@ -30,6 +32,7 @@ static inline PetscBool HycoContactAverages(HycoContact contact)
 PetscErrorCode HycoContactCreate_Obstacle(HycoContact contact);
 PetscErrorCode HycoContactCreate_Pair(HycoContact contact);
 PetscErrorCode HycoContactCreate_Surface(HycoContact contact);
+PetscErrorCode HycoContactCreate_Mortar(HycoContact contact);
 PetscErrorCode HycoContactCreate_Rigid(HycoContact contact);
 
 /* Finds the scene's ties on a mesh that has all nodes and facets of their surfaces. Fails for a slave node without a
@@ -42,7 +45,7 @@ PetscErrorCode HycoTiesFind(HycoScene scene, HycoMesh mesh, HycoTies *ties);
 /*
   N_lambda contacts in the order of the scene's contacts, then of the slave's tag. A contact's master point is the sum
   of weight[j] times node master[j], j in master_start[k] .. master_start[k+1] - 1: no node for an obstacle, one of
-  weight 1 for a pair, up to four (of a facet, ascending, weights positive with sum 1) on a surface.
+  weight 1 for a pair, up to four (of a facet, ascending, weights positive with sum 1) on a surface, any number with sum 1 of a mortar.
 
   On surfaces that a map moves, every slave node is a contact, and HycoPairsMove() searches for its master point on the
   moved nodes. A slave node that faces no master then has no master nodes: its row of B is empty.
@@ -64,7 +67,9 @@ typedef struct _n_HycoPairs {
   PetscInt *contact; /* index in scene->contact */
   PetscInt *master_start, *master;
   PetscReal *weight;
-  PetscInt room;  /* most masters of a contact on moved surfaces; 0: none is moved, all masters are final */
+  PetscInt
+      room; /* masters of a contact on moved surfaces: most of those of one facet, of mortars as many as were met so
+                     far; 0: none is moved, all masters are final */
   PetscInt place; /* place number (HycoFE) of the nodes at the last search */
   PetscInt n_searches;
   HycoSearch *search; /* by contact of the scene; NULL where room is 0 */

@@ -65,9 +65,10 @@ struct _n_HycoFE {
   PetscBool *bbar;          /* by body: mean dilatation of each cell (B-bar) */
   signed char *drawn_sign;  /* by cell: the sign of its volume in the mesh file's coordinates */
   /* for a cubature (borrowed; set before anything is assembled): weight of each cell's integrals; NULL: 1.
-     all_facets: loads also act on facets whose cell is not in the mesh (2D, 3D) */
+     all_facets: loads also act on facets whose cell is not in the mesh (2D, 3D); heat_is_load: with a history too,
+     forces of thermal strains are loads, with elastic tangents */
   const PetscReal *cell_weight;
-  PetscBool all_facets;
+  PetscBool all_facets, heat_is_load;
   /* kept from one parameter value to the next */
   HycoAssemblyMap places; /* positions of the element entries in K; created by the second assembly */
   PetscInt n_loads;
@@ -187,7 +188,7 @@ PetscErrorCode HycoFECreateMatrix(HycoFE fe, MPI_Comm comm, PetscInt n_owned, Pe
 PetscErrorCode HycoFEAssembleStiffness(HycoFE fe, Mat K);
 /* F (12), with the lifting of the prescribed displacements: K u0 moved to the right-hand side, F_i = K_ii u0_i where
    fixed; and with the forces of thermal strains, unless the scene has a history (HycoFEStep() then has them in
-   f_int). */
+   f_int) and heat_is_load is not set. */
 PetscErrorCode HycoFEAssembleForce(HycoFE fe, Vec F);
 /* For supports along a direction: the support that eliminates an unknown, or NULL. For these and for ties: sets the
    eliminated displacements from the others (u: n_dof); transforms nodal forces to those of the unknowns, T^T f. All

@@ -139,8 +139,11 @@ struct _p_HycoReducer {
   PetscReal *written;
   PetscReal solving; /* seconds of its full-order solutions */
   PetscBool late;    /* the training points are solved when a type needs them; every rank */
+  PetscBool few;     /* the held-out points are those for types that are tried before; every rank */
   PetscBool *grown;  /* every rank, greedy: cells of its part that belong to the RIDs so far; else NULL */
 };
+/* Fails (no model) if the scene has contacts whose rows the type does not take. */
+PetscErrorCode HycoReducerCheckContacts(HycoReducer t, const HycoROM type);
 
 /* The scene's variables of column k of the snapshots: all of mu (HYCO_MAX_PARAMETERS). */
 PetscErrorCode HycoReducerColumn(HycoReducer t, PetscInt k, PetscReal mu[]);
@@ -148,6 +151,11 @@ PetscErrorCode HycoReducerColumn(HycoReducer t, PetscInt k, PetscReal mu[]);
 static inline PetscBool HycoReducerOwnModes(HycoReducer t, const HycoROM type)
 {
   return (PetscBool)(type->model->traits.own_modes && !(t->scene && t->scene->n_times));
+}
+/* The ways to make a model of the type that is set, which a search tries; NULL: one. */
+static inline const char *const *HycoReducerVariants(HycoReducer t)
+{
+  return t->prototype->ops->variants ? (*t->prototype->ops->variants)(t) : NULL;
 }
 /* Sets t->columns, and t->n_s from it. */
 PetscErrorCode HycoReducerSetColumns(HycoReducer t, HycoSamples columns);
@@ -248,8 +256,13 @@ PetscErrorCode HycoReducerMultiply(HycoReducer t, Mat X, Mat Y, PetscReal produc
    HycoReducerTakeBases() can truncate the bases again when the tolerances have changed. Collective. */
 PetscErrorCode HycoReducerReduce(HycoReducer t, HycoSnapshots store, PetscBool all);
 PetscErrorCode HycoReducerTakeBases(HycoReducer t);
+/* Held-out solutions of a search that begins with types with modes of their own, whose errors have bounds or are those
+   of round-off; the least number that may serve instead of training solutions. */
+#define HYCO_FEW_HELD 6
 /* Draws or takes the held-out points, and solves them: t->held, NULL if there are none. Collective. */
 PetscErrorCode HycoReducerHoldOut(HycoReducer t, HycoSnapshots store);
+/* Adds the points that other types need, if there are few. Collective. */
+PetscErrorCode HycoReducerHoldOutMore(HycoReducer t, HycoSnapshots store);
 /* Replaces the held-out points by fresh ones, as many, and solves these; the user's own points stay, and fresh ones
    join them. Corners that training does not have are held out again. former: the points that no longer are (the caller
    owns it); n_fresh: the number of those that were not before. Collective. */

@@ -17,7 +17,7 @@ typedef struct _n_HycoBalance *HycoBalance;
 
 /* Rows of B in CSR over dofs of a mesh, and D, as in HycoContactRows(). */
 typedef struct {
-  PetscInt *start, *dof;
+  PetscInt *start, *dof, room; /* room: of dof and value */
   PetscReal *value, *gap;
 } HycoRows;
 
@@ -217,6 +217,8 @@ PetscErrorCode HycoROMSetFE(HycoROM model, HycoHybrid hybrid, PetscInt n, const 
 /* Allocates the rows of contacts. */
 PetscErrorCode HycoRowsCreate(const HycoPairs *pairs, PetscInt dim, HycoRows *rows);
 PetscErrorCode HycoRowsDestroy(HycoRows *rows);
+/* HycoContactRows(), with more room where mortars meet more masters. */
+PetscErrorCode HycoRowsFill(HycoFE fe, HycoPairs *pairs, HycoRows *rows);
 /* Updates the rows and gaps of all contacts, and U on all nodes of mesh, to the last prediction. */
 PetscErrorCode HycoROMComplete(HycoROM model);
 /* Updates only the rows and gaps; fe: at the last prediction's parameters, on a mesh with the nodes and facets of

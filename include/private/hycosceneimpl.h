@@ -16,6 +16,8 @@ typedef struct _n_HycoExpr *HycoExpr;
 PetscErrorCode HycoExprCreate(const char key[], const char text[], PetscInt n, const char *const names[],
                               HycoExpr *expr);
 PetscErrorCode HycoExprDestroy(HycoExpr *expr);
+/* Whether two expressions have the same text, or both are NULL. */
+PetscBool HycoExprAlike(HycoExpr a, HycoExpr b);
 /* The place of an evaluation, for messages: the coordinates, and the parameters in the expression. */
 PetscErrorCode HycoExprPlace(HycoExpr expr, const PetscReal mu[], const PetscReal xyz[3], char place[HYCO_LINE]);
 /* Values at n points (n x 3 coordinates) and mu; fails for a value that is not finite. */

@@ -86,7 +86,8 @@ class Series:
 def pictures(runs, size, found, out):
     both = {word: Series(runs.path(f"{found['name']}-{word}.h5"), size) for word in ("full", "reduced")}
     history(found, both, out)
-    pressures(size, both, out)
+    if size.mesh:  # on a slice it is uniform
+        pressures(size, both, out)
     study(found, out)
 
 
@@ -105,6 +106,8 @@ def history(found, both, out):
             row[1].plot(t[t >= RAMP] - RAMP, v[t >= RAMP], **style)
         row[0].set_ylabel(label)
         row[1].set_xscale("symlog", linthresh=0.05)
+        row[1].set_xticks([0, 0.05, 0.5, 5, 24], ["0", "0.05", "0.5", "5", "24"])
+        row[1].minorticks_off()
         for ax in row:
             ax.grid(alpha=0.3)
     axes[0, 0].legend()
@@ -162,6 +165,7 @@ def report(found, size, folder):
                     ("largest inelastic strain, %", *quantiles(rows, "largest_rid_inelastic", 100)),
                     ("largest contact force, N", *quantiles(rows, "largest_contact_force"))])
     where = f"`examples/rod/3d.yaml` on mesh {size.mesh} of the pellet" if size.mesh else "`examples/rod`, a slice of the rod"
+    pressure = f"![contact pressure at five times]({folder}/pressure.png)\n\n" if size.mesh else ""
     command = f"scripts/reproduce rod{' --mesh ' + size.mesh if size.mesh else ''}"
     return f"""# A power ramp on a fuel rod, a thousand times
 
@@ -169,20 +173,21 @@ Written by `{command}`, with the numbers of its runs. The scene is {where}. In a
 pellet. A ramp to the power q2 in two minutes follows, then a day at this power and a return to zero. The parameters are the cold gap, q2, and a factor of the creep rate.
 
 {found['full']['n_dof']} unknowns, {found['full']['n_contacts']} contacts; {train['n_samples']} training paths, {train['n_modes']} modes, an RID of {percent(train['rid_fraction'])} % of
-the cells. A path takes {seconds['full']:.3g} s at full order and {seconds['reduced']:.3g} s with the reduced model (one core of a machine that ran other programs too).
+the cells. The time steps of a path take {seconds['full']:.3g} s at full order and {seconds['reduced']:.3g} s with the reduced model (one core of a machine that ran other programs too).
 
 {errors}
 ## One ramp: gap {POINT[0]} mm, q2 {POINT[1]} kW/m, creep {POINT[2]}
 
 ![gap, force and hoop stress over time]({folder}/paths.png)
 
-![contact pressure at five times]({folder}/pressure.png)
+The curves begin at a smaller gap than the cold one, since the temperatures and pressures of the first time act at once.
 
-## The study
+{pressure}## The study
 
     build/hyco predict -model rod.h5 -points ramps.csv -table study.csv
 
-{len(found['study'])} ramps, with parameters distributed uniformly in their ranges, take {found['seconds']:.0f} s; {len(found['study']) - len(rows)} did not converge. The hoop stress is an output
+{len(found['study'])} ramps, with parameters distributed uniformly in their ranges, take {found['seconds']:.0f} s, the whole command with outputs and contact results; {len(found['study']) - len(rows)} did not converge (`-scatter 1000` gives
+points without a file). The hoop stress, negative where contact does not outweigh the outer pressure, is an output
 that is named in the training (`-output_hoop_max sigma_tt -output_hoop_group {size.inside}`); `path_hoop` in the table is its largest value over a path.
 
 {spread}

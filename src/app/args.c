@@ -1,4 +1,4 @@
-/* Options of the command line: checks, values, help. Each page declares its own where it reads them. */
+/* Options of the command line: checks, values. Each page declares its own where it reads them. */
 #include "driver.h"
 #include <ctype.h>
 #include <stdio.h>
@@ -86,8 +86,7 @@ static PetscErrorCode Unknown(const Command *command, const HycoOptionList *own,
   HycoFail("hyco %s has no option -%s (hyco %s -help lists them)", command->name, name, command->name);
 }
 
-/* Whether an object of the command reads an option of the library. Of a model's, some are read by one command only. */
-static PetscBool Reads(const Command *command, const HycoOption *option)
+PetscBool DriverReads(const Command *command, const HycoOption *option)
 {
   if (!strstr(command->classes, option->owner)) return PETSC_FALSE;
   return (PetscBool)(strcmp(option->owner, "HycoROM") || !option->only[0] || strstr(option->only, command->name));
@@ -99,9 +98,9 @@ static PetscErrorCode CheckReaders(const Command *command, const HycoOption *opt
   char readers[DRIVER_LINE] = "";
 
   PetscFunctionBegin;
-  if (Reads(command, option)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (DriverReads(command, option)) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt c = 0; commands[c].name; c++) {
-    if (Reads(&commands[c], option)) PetscCall(HycoListAdd(readers, ", ", commands[c].name));
+    if (DriverReads(&commands[c], option)) PetscCall(HycoListAdd(readers, ", ", commands[c].name));
   }
   HycoFail("hyco %s does not use -%s; these commands do: hyco %s%s", command->name, option->name, readers,
            strcmp(readers, "train") ? "" : " (it sets the model in training)");
@@ -244,42 +243,5 @@ PetscErrorCode DriverRequire(const char name[], const char value[])
 {
   PetscFunctionBegin;
   HycoCheck(value[0], "the option -%s is missing; hyco -help explains it", name);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static void HelpLine(const HycoOption *o)
-{
-  char left[128];
-
-  snprintf(left, sizeof(left), "-%s%s %s", o->name, o->name[strlen(o->name) - 1] == '_' ? "NAME" : "", o->value);
-  printf("  %-46s %s%s%s%s\n", left, o->meaning, o->initial[0] ? " [" : "", o->initial, o->initial[0] ? "]" : "");
-}
-
-PetscErrorCode DriverHelp(const Command *command)
-{
-  const HycoOption *table;
-  HycoOptionList own = {0};
-  PetscInt n;
-
-  PetscFunctionBegin;
-  printf("hyco %s: reduced and full-order models of parametrised unilateral contact\n\n", HycoVersion());
-  for (PetscInt k = 0; commands[k].name; k++) {
-    if (command && command != &commands[k]) continue;
-    printf("  %s\n      %s\n", commands[k].usage, commands[k].meaning);
-    PetscCall(HycoOptionsRecord(&own, commands[k].declare));
-  }
-  printf("\nOptions of %s%s\n", command ? "hyco " : "the commands", command ? command->name : "");
-  for (PetscInt k = 0; k < own.n; k++) HelpLine(&own.option[k]);
-  PetscCall(HycoOptionListDestroy(&own));
-  printf("\nOptions of the method (a scene may set them too, in its hyco: section without the prefix)\n");
-  PetscCall(HycoGetOptionTable(&n, &table));
-  for (PetscInt k = 0; k < n; k++) {
-    if (!command || Reads(command, &table[k])) HelpLine(&table[k]);
-  }
-  printf("\nPETSc's options work too: -log_view, -info, -hyco_mumps_icntl_14 100 (MUMPS, solver of K), "
-         "-hyco_primal_..., -hyco_tao_monitor, -hyco_pod_svd_view.\n");
-  printf("Exit status: 0 success; 1 an error, in one line; 3 a model is written, but it misses a target or the default "
-         "limits; 130 a training was interrupted (Ctrl-C; 143: terminated); the same command continues it.\n");
-  printf("Under MPI: mpiexec -n 2 hyco ...\n");
   PetscFunctionReturn(PETSC_SUCCESS);
 }

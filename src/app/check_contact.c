@@ -45,7 +45,7 @@ static void Warn(Check *check, const HycoContactInspection *c)
     CheckReportWarning(
         check, "contact %s: the smallest gap is %.3g, %.2g of the mesh's extent; small displacements cannot close it",
         c->name, (double)c->gap_min, (double)(c->gap_min / length));
-  if (c->coarse > COARSER)
+  if (c->coarse > COARSER && !c->integrated)
     CheckReportWarning(
         check,
         "contact %s: the slave's facets (%s) are %.2g times as long as the master's (%s); the finer side should "
@@ -67,6 +67,8 @@ static PetscErrorCode Print(const HycoContactInspection *c)
         DriverPrint("; %d face nothing within the tolerance of %g", (int)(c->n - c->facing_max), (double)c->tolerance));
   if (c->facing_max) PetscCall(DriverPrint("; gaps from %.4g to %.4g", (double)c->gap_min, (double)c->gap_max));
   if (c->facing_max && c->gap_min < 0) PetscCall(DriverPrint(" (below 0 the bodies overlap before any load)"));
+  if (c->between)
+    PetscCall(DriverPrint("; %d have no node opposite: type: mortar gives better pressures there", (int)c->between));
   PetscCall(DriverPrint("\n"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -87,6 +89,7 @@ PetscErrorCode CheckReportContacts(Check *check)
     ReportNumbers(contact, {"n", c->n}, {"n_facing_min", c->facing_min}, {"n_facing_max", c->facing_max});
     if (c->facing_max) cJSON_AddNumberToObject(contact, "gap_min", c->gap_min);
     if (c->facing_max) cJSON_AddNumberToObject(contact, "gap_max", c->gap_max);
+    if (c->between) cJSON_AddNumberToObject(contact, "n_between_nodes", c->between);
     if (c->coarse > 0) cJSON_AddNumberToObject(contact, "slave_over_master", c->coarse);
     PetscCall(Print(c));
     Warn(check, c);

@@ -63,6 +63,18 @@ static PetscErrorCode PrintTraining(Check *check, HycoSamples samples, cJSON *ob
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* An estimate of a path would need the number of its steps and of their iterations. */
+static PetscErrorCode PrintPaths(Check *check, HycoSamples samples)
+{
+  PetscInt n, n_stiff;
+
+  PetscFunctionBegin;
+  PetscCall(HycoInspectionCountTraining(check->scene, samples, &n, &n_stiff));
+  PetscCall(DriverPrint("a training on %s%d paths, including held-out ones: -check_solve measures the time of one\n",
+                        samples ? "" : "for example ", (int)n));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode CheckReportCost(Check *check, HycoSamples samples, PetscBool solved)
 {
   const HycoInspection *in = &check->in;
@@ -85,6 +97,9 @@ PetscErrorCode CheckReportCost(Check *check, HycoSamples samples, PetscBool solv
   cJSON_AddBoolToObject(object, "measured", solved);
   ReportNumbers(object, {"factor_mb", 1e-6 * in->bytes}, {"solve_mb", 1e-6 * (in->resident + in->bytes)},
                 {"seconds_first", in->first}, {"seconds_next", in->next});
-  if (!n_times) PetscCall(PrintTraining(check, samples, object)); /* train refuses histories */
+  if (!n_times || solved)
+    PetscCall(PrintTraining(check, samples, object));
+  else
+    PetscCall(PrintPaths(check, samples));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -67,6 +67,12 @@ static PetscErrorCode PrintBody(Check *check, const HycoBodyInspection *b)
         "body %s consists of %d parts that share no node; if it should be one piece, the mesh has duplicate "
         "nodes (gmsh: Coherence, or BooleanFragments)",
         b->name, (int)b->n_parts);
+  if (b->n_doubled)
+    CheckReportWarning(
+        check,
+        "body %s: %d node%s on another node of the body, such as %d on %d; the body is open there, as at a "
+        "crack; if it should be whole, the mesh has duplicate nodes (gmsh: Coherence, or BooleanFragments)",
+        b->name, (int)b->n_doubled, b->n_doubled == 1 ? " lies" : "s lie", (int)b->doubled[1], (int)b->doubled[0]);
   if (b->stretch > LONG_CELL)
     CheckReportWarning(check, "body %s: cell %d is %.3g times as long as wide", b->name, (int)b->stretched,
                        (double)b->stretch);
@@ -84,8 +90,8 @@ PetscErrorCode CheckReportBodies(Check *check)
 
     cJSON_AddItemToArray(bodies, body);
     cJSON_AddStringToObject(body, "name", b->name);
-    ReportNumbers(body, {"n_cells", b->n_cells}, {"n_parts", b->n_parts}, {"stretch", b->stretch},
-                  {"stretched_cell", b->stretched});
+    ReportNumbers(body, {"n_cells", b->n_cells}, {"n_parts", b->n_parts}, {"n_doubled", b->n_doubled},
+                  {"stretch", b->stretch}, {"stretched_cell", b->stretched});
     PetscCall(PrintBody(check, b));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -39,6 +39,8 @@ PetscErrorCode DriverReadFiles(char scene[], char model[], char output[], char r
 PetscErrorCode DriverRequire(const char name[], const char value[]);
 /* Prints the options of a command (NULL: all). On this process alone. */
 PetscErrorCode DriverHelp(const Command *command);
+/* Whether an object of the command reads an option of the library. Of a model's, some are read by one command only. */
+PetscBool DriverReads(const Command *command, const HycoOption *option);
 
 /* -- outputs.c: files -- */
 

@@ -3,6 +3,7 @@
 #include <hycofile.h>
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/resource.h>
 
 /* A column of a table: over the rows that converged, its mean and largest value, and their number. */
@@ -73,9 +74,18 @@ PetscErrorCode ReportQuantities(cJSON *json, HycoScene scene, const PetscReal va
 PetscErrorCode ReportColumns(HycoScene scene, PetscInt n, const char *const columns[], PetscInt *n_all,
                              const char *names[])
 {
+  static char renamed[HYCO_MAX_QUANTITIES][HYCO_LINE / 8]; /* names are borrowed, like those of the scene */
+
   PetscFunctionBegin;
   for (PetscInt c = 0; c < n; c++) names[c] = columns[c];
   PetscCall(HycoSceneGetQuantities(scene, n_all, names + n));
+  for (PetscInt k = 0; k < *n_all; k++) {
+    for (PetscInt c = 0; c < n; c++) {
+      if (strcasecmp(names[n + k], columns[c]) || names[n + k] == renamed[k]) continue;
+      snprintf(renamed[k], sizeof(renamed[k]), "output.%s", columns[c]);
+      names[n + k] = renamed[k];
+    }
+  }
   *n_all += n;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -96,8 +96,9 @@ static PetscErrorCode AppendRow(Search *s, const HycoAttempt *a)
   PetscFunctionBegin;
   if (!s->length) {
     PetscCall(Append(
-        s, "attempt,training_points,model_type,pod_tol,rid_layers,rid_contact_extension,hybrid,rid_whole,n_modes,"
-           "rid_elements,rid_fraction,held_out_points"));
+        s,
+        "attempt,training_points,model_type,variant,pod_tol,rid_layers,rid_contact_extension,hybrid,rid_whole,n_modes,"
+        "rid_elements,rid_fraction,held_out_points"));
     for (PetscInt j = 0; j < CountKinds(s); j++) {
       snprintf(row, sizeof(row), ",error_%s,median_%s", HycoErrorKinds[j], HycoErrorKinds[j]);
       PetscCall(Append(s, row));
@@ -105,10 +106,10 @@ static PetscErrorCode AppendRow(Search *s, const HycoAttempt *a)
     PetscCall(Append(s, ",not_converged,seconds,operations,meets,failure\n"));
   }
   none = (PetscBool)(a->failure[0] || !a->held_out.n);
-  at = (size_t)snprintf(row, sizeof(row), "%d,%d,%s,%g,%d,%g,%s,%d,%d,%d,%.6g,%d", (int)++s->n, (int)s->n_points,
-                        r->type, (double)r->pod_tol, (int)r->layers, (double)r->contact_extension,
-                        HycoHybrids[r->hybrid], (int)r->whole, (int)a->n_modes, (int)a->rid_elements,
-                        (double)a->rid_fraction, a->failure[0] ? 0 : (int)a->held_out.n);
+  at = (size_t)snprintf(row, sizeof(row), "%d,%d,%s,%s,%g,%d,%g,%s,%d,%d,%d,%.6g,%d", (int)++s->n, (int)s->n_points,
+                        r->type, r->variant ? r->variant : "", (double)r->pod_tol, (int)r->layers,
+                        (double)r->contact_extension, HycoHybrids[r->hybrid], (int)r->whole, (int)a->n_modes,
+                        (int)a->rid_elements, (double)a->rid_fraction, a->failure[0] ? 0 : (int)a->held_out.n);
   for (PetscInt j = 0; j < 2 * CountKinds(s); j++) {
     Number(none ? (PetscReal)NAN : (j % 2 ? a->held_out.median : a->held_out.largest)[j / 2], number);
     at += (size_t)snprintf(row + at, sizeof(row) - at, ",%s", number);
@@ -368,6 +369,7 @@ void DriverReportModel(cJSON *json, const Search *s, const HycoTraining *t)
     ReportNumbers(search, {"attempts", s->n}, {"chosen", s->n - a->of + a->number}, {"added", t->n_added},
                   {"former_held_out", t->n_former});
     cJSON_AddStringToObject(search, "model_type", a->settings.type);
+    if (a->settings.variant) cJSON_AddStringToObject(search, "variant", a->settings.variant);
     ReportNumbers(search, {"pod_tol", a->settings.pod_tol}, {"rid_layers", a->settings.layers},
                   {"rid_contact_extension", a->settings.contact_extension});
     cJSON_AddStringToObject(search, "hybrid", HycoHybrids[a->settings.hybrid]);

@@ -24,12 +24,12 @@ typedef struct {
   MPI_Comm comm;
   PetscMPIInt size, rank;
   HycoFE fe;
-  PetscInt slave, master; /* groups */
-  Box *tree;              /* by rank, BOXES each */
-  PetscReal margin;
-  PetscInt n, room, *node; /* nodes that are sent, with their ranks */
-  PetscMPIInt *to, *sent;  /* sent: by node of the part, the last rank, plus 1, to which it goes */
-  PetscBool *on;           /* by node of the part: it has a facet of the master */
+  PetscInt slave, master;    /* groups */
+  Box *tree;                 /* by rank, BOXES each */
+  PetscReal margin, stretch; /* stretch: of the bound; more than 1 where the master is found along normals */
+  PetscInt n, room, *node;   /* nodes that are sent, with their ranks */
+  PetscMPIInt *to, *sent;    /* sent: by node of the part, the last rank, plus 1, to which it goes */
+  PetscBool *on;             /* by node of the part: it has a facet of the master */
 } Candidates;
 
 static PetscBool IsEmpty(const Box *b)
@@ -141,7 +141,7 @@ static PetscErrorCode FindReach(Candidates *s)
     Box *box = &s->tree[b], *child;
 
     if (IsEmpty(box)) continue;
-    box->reach = reach[b] + s->margin + ROUND_OFF * (HycoLength(box->lo) + HycoLength(box->hi));
+    box->reach = s->stretch * reach[b] + s->margin + ROUND_OFF * (HycoLength(box->lo) + HycoLength(box->hi));
     if (place >= BLOCKS - 1) continue;
     child = box + place + 1; /* 2 place + 1 in its tree */
     box->reach = PetscMax(IsEmpty(&child[0]) ? 0 : child[0].reach, IsEmpty(&child[1]) ? 0 : child[1].reach);
@@ -192,9 +192,27 @@ static PetscReal Ball(HycoFE fe, PetscInt facet, PetscReal centre[3])
   return radius;
 }
 
+/* Where rows are integrals over the facets around a slave: these have points 2 radii R away, whose middles are as far from
+   the master as the slave, plus R, and along the normal the master is farther than its nearest point is, by the limit of
+   opposed normals. */
+static PetscErrorCode WidenMargin(Candidates *s)
+{
+  HycoMesh m = s->fe->mesh;
+  PetscReal most = 0, centre[3];
+
+  PetscFunctionBegin;
+  for (PetscInt f = 0; f < m->n_facets; f++) {
+    if (m->facet_group[f] == s->slave) most = PetscMax(most, Ball(s->fe, f, centre));
+  }
+  HycoAllreduce(&most, 1, MPIU_REAL, MPI_MAX, s->comm);
+  s->stretch = 1 / -HYCO_OPPOSED;
+  s->margin += (3 + 3 * s->stretch) * most;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* How far beyond its bound a block searches: coincident points of HycoPartnersProject(), round-off, and `slack` times
    the widest facet. */
-static PetscErrorCode FindMargin(Candidates *s, PetscReal slack)
+static PetscErrorCode FindMargin(Candidates *s, PetscBool integrated, PetscReal slack)
 {
   HycoMesh m = s->fe->mesh;
   PetscReal most[2] = {0, 0}, centre[3]; /* radius, distance from the origin */
@@ -210,6 +228,8 @@ static PetscErrorCode FindMargin(Candidates *s, PetscReal slack)
   }
   HycoAllreduce(most, 2, MPIU_REAL, MPI_MAX, s->comm);
   s->margin = (2 * HYCO_SAME_POINT + slack) * most[0] + ROUND_OFF * most[1];
+  s->stretch = 1;
+  if (integrated) PetscCall(WidenMargin(s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -276,7 +296,7 @@ PetscErrorCode HycoContactsCandidates(MPI_Comm comm, HycoFE fe, PetscReal slack,
     PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->master, &s.master));
     PetscCall(PetscArrayzero(s.sent, fe->mesh->n_nodes));
     PetscCall(FindBoxes(&s));
-    PetscCall(FindMargin(&s, slack));
+    PetscCall(FindMargin(&s, c->integrated, slack));
     PetscCall(FindReach(&s));
     PetscCall(c->rigid ? AddAll(&s) : AddNear(&s));
   }

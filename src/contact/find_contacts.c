@@ -84,43 +84,50 @@ void HycoPairsSetReach(HycoPairs *pairs, const PetscReal reach[])
   for (PetscInt c = 0; reach && pairs->search && c < pairs->n_searches; c++) pairs->search[c].reach = reach[c];
 }
 
+/* Appends the contacts k .. next - 1 of one contact of the scene to `found`: with the masters that they meet now, if a
+   map moves them. */
+static PetscErrorCode FindRun(HycoFE fe, HycoPairs *p, PetscInt k, PetscInt next, HycoPairs *found)
+{
+  const PetscInt index = p->contact[k];
+  const HycoContact c = fe->scene->contact[index];
+  PetscInt widest = 0;
+
+  PetscFunctionBegin;
+  if (HycoPairsMoved(p, k)) {
+    p->queries += next - k;
+    PetscCall((*c->ops->find)(c, fe, index, p->search[index].reach, next - k, p->slave + k, found));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  for (PetscInt j = k; j < next; j++) widest = PetscMax(widest, p->master_start[j + 1] - p->master_start[j]);
+  PetscCall(HycoPairsReserve(found, next - k, widest));
+  for (PetscInt j = k; j < next; j++)
+    HycoPairsAppend(found, index, p->slave[j], p->master_start[j + 1] - p->master_start[j],
+                    p->master + p->master_start[j], p->weight + p->master_start[j]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Searches the masters of moved surfaces at the current nodes of fe; others keep theirs. Nothing is done if the
    nodes are where they were at the last search. Not collective: candidates must be in the mesh. */
 PetscErrorCode HycoPairsMove(HycoFE fe, HycoPairs *p)
 {
-  PetscInt *start, *master, kept;
-  PetscReal *weight;
+  HycoPairs found = {0};
+  PetscErrorCode ierr = 0;
 
   PetscFunctionBegin;
   if (!p->room || p->place == fe->place) PetscFunctionReturn(PETSC_SUCCESS);
-  kept = p->master_start[p->n];
-  PetscCall(PetscMalloc1(p->n + 1, &start));
-  PetscCall(PetscMalloc1(kept + p->n * p->room, &master));
-  PetscCall(PetscMalloc1(kept + p->n * p->room, &weight));
-  start[0] = 0;
-  for (PetscInt k = 0, next; k < p->n; k = next) {
-    const PetscInt lo = p->master_start[k], n = p->master_start[k + 1] - lo;
-
-    next = k + 1;
-    if (HycoPairsMoved(p, k)) {
-      next = HycoPairsRun(p, k);
-      p->queries += next - k;
-      PetscCall((*fe->scene->contact[p->contact[k]]->ops->find)(fe->scene->contact[p->contact[k]], fe,
-                                                                p->search[p->contact[k]].reach, next - k, p->slave + k,
-                                                                start + k, master, weight));
-      continue;
-    }
-    if (n) PetscCall(PetscArraycpy(master + start[k], p->master + lo, n));
-    if (n) PetscCall(PetscArraycpy(weight + start[k], p->weight + lo, n));
-    start[k + 1] = start[k] + n;
+  PetscCall(HycoPairsReserve(&found, 0, 0));
+  for (PetscInt k = 0, next; k < p->n && !ierr; k = next) {
+    next = HycoPairsRun(p, k);
+    ierr = FindRun(fe, p, k, next, &found);
   }
-  PetscCall(PetscFree(p->master_start));
-  PetscCall(PetscFree(p->master));
-  PetscCall(PetscFree(p->weight));
-  p->master_start = start;
-  p->master = master;
-  p->weight = weight;
+  if (ierr) PetscCall(HycoPairsDestroy(&found));
+  PetscCall(ierr);
+  HycoFreeAll(&p->master_start, &p->master, &p->weight, &found.slave, &found.contact);
+  p->master_start = found.master_start;
+  p->master = found.master;
+  p->weight = found.weight;
   p->place = fe->place;
+  for (PetscInt k = 0; k < p->n; k++) p->room = PetscMax(p->room, p->master_start[k + 1] - p->master_start[k]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -3,6 +3,9 @@
 #include <hycokinematics.h>
 #include <hycovector.h>
 
+/* Share of the mesh's length: the round-off of a mean of positions. */
+#define ROUND_OFF 1e-14
+
 /* Removes from a normal the directions of released rigid motions at the contact, so that the discretisation of a
    surface does not resist them. At most dim - 1 directions, orthonormalised; nearly dependent ones are left out. */
 void HycoTurnNormal(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscReal n[3])
@@ -104,6 +107,8 @@ static PetscErrorCode Gaps(HycoFE fe, HycoContact c, const HycoPairs *pairs, Pet
     } else if (!c->ops->gap) {
       gap[i] = 0;
       for (PetscInt d = 0; d < 3; d++) gap[i] += n[d] * (x[d] - points->slave[3 * i + d]);
+      /* surfaces that touch have gaps of 0, and not the round-off of a sum over many nodes */
+      if (c->integrated && PetscAbsReal(gap[i]) <= ROUND_OFF * HycoMeshLength(fe->mesh)) gap[i] = 0;
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -51,5 +51,11 @@ void HycoPatchesProject(HycoPatches patches, const PetscReal x[3], const PetscRe
    its line; points without a normal, or with nearly the same one, have no line. */
 void HycoPatchesAlong(HycoPatches patches, const PetscReal x[3], const PetscReal out[3], PetscReal small,
                       HycoProjection *p);
+/* Points within `along` of a facet's plane and within `radius` of its centre in the plane. */
+typedef struct {
+  PetscReal centre[3], normal[3], radius, along;
+} HycoPrism;
+/* The patches that may meet the prism and others near it, ascending (patch: room for all). */
+PetscErrorCode HycoPatchesWithin(HycoPatches patches, const HycoPrism *prism, PetscInt *n, PetscInt patch[]);
 
 #endif

@@ -32,6 +32,11 @@ static void Quiet(muParserHandle_t parser)
   (void)parser;
 }
 
+PetscBool HycoExprAlike(HycoExpr a, HycoExpr b)
+{
+  return a && b ? (PetscBool)(strcmp(a->text, b->text) == 0) : (PetscBool)(!a && !b);
+}
+
 /* Only the two ends of a long expression are shown, so that a message has room for the reason. */
 #define SHORT 260
 /* Both ends of a long expression, for messages: the error is usually near one of them. */

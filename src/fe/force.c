@@ -250,11 +250,11 @@ PetscErrorCode HycoCellHeat(HycoFE fe, PetscInt cell, PetscReal push[])
 }
 
 /* Adds body forces and forces of thermal strains of a cell. With a history, thermal strains enter through the laws'
-   stresses, not as forces. */
+   stresses, not as forces, unless fe->heat_is_load. */
 static PetscErrorCode AddVolume(HycoFE fe, PetscInt cell, Into F)
 {
   const HycoBody *body = &fe->scene->body[fe->mesh->cell_body[cell]];
-  const PetscBool hot = (PetscBool)(fe->thermal && !fe->scene->n_times && body->expansion);
+  const PetscBool hot = (PetscBool)(fe->thermal && (!fe->scene->n_times || fe->heat_is_load) && body->expansion);
   PetscReal f[HYCO_MAX_CELL_DOFS] = {0}, push[HYCO_MAX_CELL_DOFS] = {0};
 
   PetscFunctionBegin;

@@ -68,27 +68,42 @@ static PetscErrorCode FetchSurface(HycoFOM f, HycoMesh *surface)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One contact as it is sent: nodes by their numbers in the distributed vectors. */
+/* A contact as it is sent: nodes by their numbers in the distributed vectors. One with more masters than a facet has
+   nodes is sent in several pieces, of which all but the first say `more`. */
 typedef struct {
-  PetscInt contact, slave, n, master[HYCO_FACET_NODES];
+  PetscInt contact, slave, number, more, n, master[HYCO_FACET_NODES];
   PetscReal weight[HYCO_FACET_NODES];
 } Sent;
 
-/* Padding is zeroed, as the struct is sent as bytes. */
-static PetscErrorCode PackContacts(HycoMesh m, const HycoPairs *p, Sent sent[])
+/* The pieces of a contact. */
+static PetscInt Pieces(const HycoPairs *p, PetscInt k)
+{
+  const PetscInt masters = p->master_start[k + 1] - p->master_start[k];
+
+  return PetscMax(1, (masters + HYCO_FACET_NODES - 1) / HYCO_FACET_NODES);
+}
+
+/* The contacts in n pieces, which the caller frees. Padding is zeroed, as the struct is sent as bytes. */
+static PetscErrorCode PackContacts(HycoMesh m, const HycoPairs *p, PetscInt *n, Sent **sent)
 {
   PetscFunctionBegin;
+  *n = 0;
+  for (PetscInt k = 0; k < p->n; k++) *n += Pieces(p, k);
+  PetscCall(PetscCalloc1(*n, sent));
+  *n = 0;
   for (PetscInt k = 0; k < p->n; k++) {
-    Sent *s = &sent[k];
-    const PetscInt lo = p->master_start[k];
+    for (PetscInt i = 0, lo = p->master_start[k]; i < Pieces(p, k); i++, lo += HYCO_FACET_NODES) {
+      Sent *s = &(*sent)[(*n)++];
 
-    PetscCall(PetscMemzero(s, sizeof(*s)));
-    s->contact = p->contact[k];
-    s->slave = m->node_global[p->slave[k]];
-    s->n = p->master_start[k + 1] - lo;
-    for (PetscInt j = 0; j < s->n; j++) {
-      s->master[j] = m->node_global[p->master[lo + j]];
-      s->weight[j] = p->weight[lo + j];
+      s->contact = p->contact[k];
+      s->slave = m->node_global[p->slave[k]];
+      s->number = p->number ? p->number[k] : k;
+      s->more = i > 0;
+      s->n = PetscMin(p->master_start[k + 1] - lo, HYCO_FACET_NODES);
+      for (PetscInt j = 0; j < s->n; j++) {
+        s->master[j] = m->node_global[p->master[lo + j]];
+        s->weight[j] = p->weight[lo + j];
+      }
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -133,6 +148,7 @@ static PetscErrorCode UnpackContacts(HycoMesh m, PetscInt n, const Sent sent[], 
     PetscInt master[HYCO_FACET_NODES];
 
     for (PetscInt j = 0; j < sent[k].n; j++) master[j] = PlaceOf(&places, sent[k].master[j]);
+    if (sent[k].more) p->n--; /* to the masters of the contact before */
     HycoPairsAppend(p, sent[k].contact, PlaceOf(&places, sent[k].slave), sent[k].n, master, sent[k].weight);
   }
   PetscCall(PetscFree2(places.global, places.node));
@@ -153,17 +169,21 @@ PetscErrorCode HycoFOMGatherSurface(HycoFOM f, HycoMesh *mesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sorts contacts by their numbers and makes them those of the whole surfaces. Rank 0. */
-static PetscErrorCode PlaceGathered(HycoFOM f, HycoMesh mesh, PetscInt n, const PetscInt number[], const Sent sent[],
-                                    HycoPairs *p)
+/* Sorts contacts by their numbers and makes them those of the whole surfaces; the pieces of one are together. Rank 0. */
+static PetscErrorCode PlaceGathered(HycoFOM f, HycoMesh mesh, PetscInt n, const Sent sent[], HycoPairs *p)
 {
+  PetscInt *place;
   Sent *sorted;
 
   PetscFunctionBegin;
+  PetscCall(PetscCalloc1(f->n_contacts + 1, &place));
   PetscCall(PetscMalloc1(n, &sorted));
-  for (PetscInt k = 0; k < n; k++) sorted[number[k]] = sent[k];
+  for (PetscInt k = 0; k < n; k++) place[sent[k].number + 1]++;
+  for (PetscInt k = 0; k < f->n_contacts; k++) place[k + 1] += place[k];
+  for (PetscInt k = 0; k < n; k++) sorted[place[sent[k].number]++] = sent[k];
   PetscCall(UnpackContacts(mesh, n, sorted, p));
   PetscCall(PetscFree(sorted));
+  PetscCall(PetscFree(place));
   PetscCall(HycoPairsSetSearch(f->scene, mesh, p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -175,39 +195,37 @@ PetscErrorCode HycoFOMGatherContacts(HycoFOM f, HycoMesh *mesh, HycoPairs *pairs
   const HycoPairs *p = &f->pairs;
   MPI_Datatype type;
   Sent *mine, *all;
-  PetscInt n, *number;
+  PetscInt n_mine, n;
 
   PetscFunctionBegin;
   PetscCall(PetscMemzero(pairs, sizeof(*pairs)));
   PetscCall(HycoFOMGatherSurface(f, mesh));
-  PetscCall(PetscMalloc1(p->n, &mine));
-  PetscCall(PackContacts(f->surface, p, mine));
+  PetscCall(PackContacts(f->surface, p, &n_mine, &mine));
   PetscCallMPI(MPI_Type_contiguous((PetscMPIInt)sizeof(Sent), MPI_BYTE, &type));
   PetscCallMPI(MPI_Type_commit(&type));
-  PetscCall(HycoConcatenate(HycoComm(f), p->n, mine, type, sizeof(Sent), &n, &all));
-  PetscCall(HycoConcatenate(HycoComm(f), p->n, p->number, MPIU_INT, sizeof(PetscInt), &n, &number));
+  PetscCall(HycoConcatenate(HycoComm(f), n_mine, mine, type, sizeof(Sent), &n, &all));
   PetscCallMPI(MPI_Type_free(&type));
   PetscCall(PetscFree(mine));
-  HycoOnRoot(HycoComm(f), PlaceGathered(f, *mesh, n, number, all, pairs));
-  HycoFreeAll(&all, &number);
+  HycoOnRoot(HycoComm(f), PlaceGathered(f, *mesh, n, all, pairs));
+  PetscCall(PetscFree(all));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Sends contacts of rank 0 to the ranks of their slaves. */
 static PetscErrorCode SendContacts(HycoFOM f, HycoMesh mesh, const HycoPairs *whole, PetscInt *n_got, Sent **got)
 {
-  const PetscInt n = whole->n;
-  PetscInt *slave;
+  PetscInt *slave, n;
   PetscMPIInt *to;
   Sent *sent;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc3(n, &sent, n, &slave, n, &to));
-  if (n) PetscCall(PackContacts(mesh, whole, sent));
+  PetscCall(PackContacts(mesh, whole, &n, &sent));
+  PetscCall(PetscMalloc2(n, &slave, n, &to));
   for (PetscInt k = 0; k < n; k++) slave[k] = sent[k].slave;
   PetscCall(HycoMeshOwners(HycoComm(f), f->part, n, slave, to));
   PetscCall(HycoSendRows(HycoComm(f), n, to, sizeof(Sent), sent, n_got, got));
-  PetscCall(PetscFree3(sent, slave, to));
+  PetscCall(PetscFree2(slave, to));
+  PetscCall(PetscFree(sent));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

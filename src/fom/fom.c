@@ -401,14 +401,33 @@ static PetscErrorCode Insert(HycoFOM f, PetscBool rows_changed, const Rows *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* On moved surfaces: the masters, and the widest row of all ranks; *wider: it has grown with the masters that mortars
+   meet. Collective. */
+static PetscErrorCode FindMasters(HycoFOM f, PetscBool *wider)
+{
+  PetscInt width;
+
+  PetscFunctionBegin;
+  *wider = PETSC_FALSE;
+  if (!f->searches) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoOnEach(HycoComm(f), f->fe_surface ? HycoPairsMove(f->fe_surface, &f->pairs) : PETSC_SUCCESS);
+  width = HycoPairsWidth(&f->pairs);
+  HycoAllreduce(&width, 1, MPIU_INT, MPI_MAX, HycoComm(f));
+  *wider = (PetscBool)(width > f->width);
+  f->width = PetscMax(f->width, width);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* B and B^T (explicit, since PETSc's products with a parallel transpose are slower) and D. Collective. */
 static PetscErrorCode AssembleContact(HycoFOM f, PetscBool rows_changed)
 {
   Rows r = {NULL, NULL, NULL};
+  PetscBool wider;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  if (f->n_contacts && rows_changed && f->Bt && f->searches) { /* removes entries of former masters */
+  PetscCall(FindMasters(f, &wider));
+  if (f->n_contacts && rows_changed && (f->Bt || wider) && f->searches) { /* removes entries of former masters */
     PetscCall(MatDestroy(&f->B));
     PetscCall(CreateB(f));
   } else if (f->n_contacts && rows_changed && f->Bt)

@@ -1,6 +1,11 @@
 /* Cells and bodies of the mesh: shapes of cells, parts that share no node. */
 #include "inspect.h"
 #include <hycokinematics.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Share of the mesh's length up to which two nodes are at the same place. */
+#define SAME_PLACE 1e-8
 
 /* From the reference simplex to the regular one, inverted. */
 static void ToRegular(PetscInt dim, PetscReal J[3][3])
@@ -121,6 +126,73 @@ static PetscErrorCode CountParts(HycoMesh m, PetscInt n_bodies, PetscInt n[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Marks the nodes of contacts' and ties' surfaces: a body may touch itself there. */
+static PetscErrorCode MarkSurfaces(HycoScene s, HycoMesh m, PetscBool of_surface[])
+{
+  PetscInt g = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < 2 * (s->n_contacts + s->n_ties); k++) {
+    const PetscInt c = k / 2;
+    const char *name = c < s->n_contacts ? (k % 2 ? s->contact[c]->slave : s->contact[c]->master)
+                                         : (k % 2 ? s->tie[c - s->n_contacts].slave : s->tie[c - s->n_contacts].master);
+
+    if (!name) continue;
+    PetscCall(HycoMeshFindGroup(m, "contact", name, &g));
+    for (PetscInt i = m->group_start[g]; i < m->group_start[g + 1]; i++) of_surface[m->group_node[i]] = PETSC_TRUE;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A node's place in steps of SAME_PLACE, and its body. */
+typedef struct {
+  double at[3];
+  PetscInt body, node;
+} Place;
+
+static int ComparePlaces(const void *a, const void *b)
+{
+  const Place *p = (const Place *)a, *q = (const Place *)b;
+
+  for (PetscInt c = 0; c < 3; c++) {
+    if (p->at[c] != q->at[c]) return p->at[c] < q->at[c] ? -1 : 1;
+  }
+  if (p->body != q->body) return p->body < q->body ? -1 : 1;
+  return (p->node > q->node) - (p->node < q->node);
+}
+
+/* By body, the number of its nodes that lie on another of its nodes, away from contacts and ties, and the first pair:
+   the body is open there, like at a crack, though its cells may hang together elsewhere. */
+static PetscErrorCode CountDoubled(HycoScene s, HycoMesh m, HycoBodyInspection body[])
+{
+  const PetscReal step = SAME_PLACE * HycoMeshLength(m);
+  PetscBool *of_surface;
+  Place *place;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(m->n_nodes, &place));
+  PetscCall(PetscCalloc1(m->n_nodes, &of_surface));
+  PetscCall(MarkSurfaces(s, m, of_surface));
+  for (PetscInt i = 0; i < m->n_nodes; i++) {
+    place[i] = (Place){.body = m->node_body[i], .node = i};
+    for (PetscInt c = 0; c < 3; c++) place[i].at[c] = PetscFloorReal(m->xyz[3 * i + c] / step + 0.5);
+  }
+  qsort(place, (size_t)m->n_nodes, sizeof(*place), ComparePlaces);
+  for (PetscInt k = 1; k < m->n_nodes; k++) {
+    const Place *p = &place[k - 1], *q = &place[k];
+
+    if (p->body != q->body || p->body < 0 || of_surface[p->node] || of_surface[q->node]) continue;
+    if (memcmp(p->at, q->at, sizeof(p->at)) != 0) continue;
+    if (!body[p->body].n_doubled++) {
+      body[p->body].doubled[0] = m->node_id[p->node];
+      body[p->body].doubled[1] = m->node_id[q->node];
+    }
+  }
+  PetscCall(PetscFree(place));
+  PetscCall(PetscFree(of_surface));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The types of cells that occur, with their numbers. */
 static PetscErrorCode CountTypes(HycoInspection *in, HycoMesh m)
 {
@@ -146,6 +218,7 @@ PetscErrorCode HycoInspectBodies(HycoInspection *in)
   PetscCall(CountTypes(in, m));
   PetscCall(PetscMalloc1(in->n_bodies, &parts));
   PetscCall(CountParts(m, in->n_bodies, parts));
+  PetscCall(CountDoubled(in->whole->scene, m, in->body));
   for (PetscInt b = 0; b < in->n_bodies; b++) {
     in->body[b].name = in->whole->scene->body[b].name;
     in->body[b].n_parts = parts[b];

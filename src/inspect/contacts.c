@@ -41,8 +41,9 @@ static PetscErrorCode CompareFacets(HycoInspection *in, HycoFE fe, PetscInt cont
   PetscCall(PetscMalloc2(2 * fe->mesh->n_nodes, &size, p->n, &ratio));
   PetscCall(FacetSizes(fe, "contact", c->slave, c->master, size));
   for (PetscInt k = 0; k < p->n; k++) {
-    if (p->contact[k] == contact && p->master_start[k] < p->master_start[k + 1])
-      ratio[n++] = Coarseness(p, k, fe->mesh->n_nodes, size);
+    if (p->contact[k] != contact || p->master_start[k] == p->master_start[k + 1]) continue;
+    ratio[n++] = Coarseness(p, k, fe->mesh->n_nodes, size);
+    in->contact[contact].between += !c->integrated && p->master_start[k + 1] > p->master_start[k] + 1;
   }
   PetscCall(PetscSortReal(n, ratio));
   if (n) in->contact[contact].coarse = ratio[n / 2];
@@ -104,6 +105,7 @@ PetscErrorCode HycoInspectContactsBegin(HycoInspection *in)
                                              .type = ((PetscObject)c)->type_name,
                                              .slave = c->slave,
                                              .master = c->master,
+                                             .integrated = c->integrated,
                                              .facing_min = PETSC_MAX_INT,
                                              .gap_min = PETSC_MAX_REAL,
                                              .gap_max = -PETSC_MAX_REAL};

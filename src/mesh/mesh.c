@@ -175,9 +175,9 @@ PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene)
             "hex27 cells, or a mesh file, whose hex20 cells are read as hex27",
             scene->contact[0]->name);
   for (PetscInt k = 0; k < scene->n_contacts; k++)
-    HycoCheck(!HycoMeshIsQuadratic(mesh) || !scene->contact[k]->ops->find,
-              "contact %s: type surface needs first-order cells, and the mesh has %s; use matching meshes with type: "
-              "pair, or mesh with gmsh -order 1",
+    HycoCheck(!HycoMeshIsQuadratic(mesh) || !scene->contact[k]->ops->find || scene->contact[k]->integrated,
+              "contact %s: type surface needs first-order cells, and the mesh has %s; use type: mortar, matching "
+              "meshes with type: pair, or mesh with gmsh -order 1",
               scene->contact[k]->name, HycoCellKinds[mesh->type].name);
   for (PetscInt k = 0; k < scene->n_quantities; k++) {
     if (scene->quantity[k].group) PetscCall(HycoMeshFindGroup(mesh, "output", scene->quantity[k].group, &group));
@@ -185,11 +185,11 @@ PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether two bodies leave a shared node in the same place: here, whether neither has a map. */
+/* Whether two bodies move a shared node to the same place: here, whether their maps are written alike. */
 static PetscBool SameMap(const HycoBody *a, const HycoBody *b)
 {
   for (PetscInt c = 0; c < 3; c++) {
-    if (a->map[c] || b->map[c]) return PETSC_FALSE;
+    if (!HycoExprAlike(a->map[c], b->map[c])) return PETSC_FALSE;
   }
   return PETSC_TRUE;
 }
@@ -206,8 +206,9 @@ PetscErrorCode HycoMeshSetNodeBodies(HycoScene scene, HycoMesh m)
 
     if (*body >= 0 && *body != b) {
       HycoCheck(SameMap(&scene->body[*body], &scene->body[b]),
-                "%s: the bodies %s and %s share node %d, and a map moves one of them", scene->mesh_path,
-                scene->body[*body].name, scene->body[b].name, (int)m->node_id[m->cells[k]]);
+                "%s: the bodies %s and %s share node %d and have different maps; give both the same map, or the mesh a "
+                "node for each and the scene a tie",
+                scene->mesh_path, scene->body[*body].name, scene->body[b].name, (int)m->node_id[m->cells[k]]);
       *body = PetscMin(*body, b);
     } else
       *body = b;

@@ -648,23 +648,29 @@ PetscErrorCode HycoReducerSolve(HycoReducer t, HycoSnapshots store, HycoSamples 
    justify their cost. */
 #define LEAST_HELD 20
 #define MOST_HELD  30
-#define TOGETHER   3              /* that share a stiffness, if loads or gaps are parameters too */
+#define FEW_HELD   HYCO_FEW_HELD /* for types whose errors are known without them, and which are tried first */
+#define TOGETHER   3             /* that share a stiffness, if loads or gaps are parameters too */
 #define CYCLE      (4 * TOGETHER) /* after as many points of the sequence the places inside, at corners, on faces repeat */
 
-static PetscErrorCode DrawHeld(HycoReducer t, PetscInt count, HycoSamples *held)
+static PetscInt HeldByDefault(PetscInt n)
+{
+  return PetscMin(MOST_HELD, PetscMax(LEAST_HELD, n));
+}
+
+static PetscErrorCode DrawHeld(HycoReducer t, PetscInt count, PetscInt together, HycoSamples *held)
 {
   PetscInt n, n_par, slow[HYCO_MAX_PARAMETERS];
   PetscBool reaches[HYCO_MAX_PARAMETERS];
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->samples, &n, &n_par, NULL));
-  if (count < 0) count = PetscMin(MOST_HELD, PetscMax(LEAST_HELD, n));
+  if (count < 0) count = HeldByDefault(n);
   if (t->rank == 0) HycoSceneReaches(t->scene, reaches);
   for (PetscInt p = 0; p < n_par; p++) slow[p] = t->rank == 0 && reaches[p];
   HycoBcast(slow, n_par, MPIU_INT, HycoComm(t));
   for (PetscInt p = 0; p < n_par; p++) reaches[p] = (PetscBool)slow[p];
   t->drawn = (t->drawn + CYCLE - 1) / CYCLE * CYCLE;
-  PetscCall(HycoSamplesUnseen(t->samples, t->drawn, count, TOGETHER, reaches, held));
+  PetscCall(HycoSamplesUnseen(t->samples, t->drawn, count, together, reaches, held));
   t->drawn += count;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -675,6 +681,7 @@ PetscErrorCode HycoReducerHoldOut(HycoReducer t, HycoSnapshots store)
 
   PetscFunctionBegin;
   t->drawn = 0;
+  t->few = (PetscBool)(t->late && !t->validation && t->n_validation < 0);
   PetscCall(HycoSamplesDestroy(&t->held));
   if (t->validation) {
     PetscCall(HycoSamplesExcept(t->validation, t->samples, &t->held));
@@ -682,9 +689,26 @@ PetscErrorCode HycoReducerHoldOut(HycoReducer t, HycoSnapshots store)
     PetscCall(HycoSamplesGet(t->held, &m, NULL, NULL));
     HycoCheck(m, "each of the %d held-out points is also a training point; give other held-out points", (int)n);
   } else if (t->n_validation && t->scene->n_parameters)
-    PetscCall(DrawHeld(t, t->n_validation, &t->held));
+    PetscCall(DrawHeld(t, t->few ? FEW_HELD : t->n_validation, t->few ? 1 : TOGETHER, &t->held));
   else
     PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoReducerSolve(t, store, t->held));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerHoldOutMore(HycoReducer t, HycoSnapshots store)
+{
+  HycoSamples more;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  if (!t->few) PetscFunctionReturn(PETSC_SUCCESS);
+  t->few = PETSC_FALSE;
+  PetscCall(HycoSamplesGet(t->samples, &n, NULL, NULL));
+  PetscCall(DrawHeld(t, HeldByDefault(n) - FEW_HELD, TOGETHER, &more));
+  PetscCall(HycoSamplesAddSet(t->held, more));
+  PetscCall(HycoSamplesDropTwins(t->held, NULL));
+  PetscCall(HycoSamplesDestroy(&more));
   PetscCall(HycoReducerSolve(t, store, t->held));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -701,7 +725,7 @@ PetscErrorCode HycoReducerHoldOutFresh(HycoReducer t, HycoSnapshots store, HycoS
     PetscCall(HycoSamplesGet(held, &m, NULL, NULL));
   } else
     PetscCall(HycoSamplesCreate(t->scene, &held));
-  PetscCall(DrawHeld(t, n > m ? n - m : -1, &fresh));
+  PetscCall(DrawHeld(t, n > m ? n - m : -1, TOGETHER, &fresh));
   PetscCall(HycoSamplesAddSet(held, fresh));
   PetscCall(HycoSamplesDropTwins(held, NULL));
   PetscCall(HycoSamplesExcept(held, last, &others));
@@ -737,6 +761,18 @@ static PetscErrorCode DecideLate(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Before any solve: contacts whose rows the type of model takes. */
+PetscErrorCode HycoReducerCheckContacts(HycoReducer t, const HycoROM type)
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < t->scene->n_contacts && !type->model->traits.integrals; k++)
+    HycoCheckModel(!t->scene->contact[k]->integrated,
+                   "contact %s has type %s, whose rows have more masters than a facet; a model of type %s does not "
+                   "take them: train one of type bodies, or use type: surface",
+                   t->scene->contact[k]->name, ((PetscObject)t->scene->contact[k])->type_name, type->model->type);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoReducerRun(HycoReducer t, HycoSamples samples, const char path[], HycoTraining *training)
 {
   HycoSnapshots store;
@@ -751,6 +787,7 @@ PetscErrorCode HycoReducerRun(HycoReducer t, HycoSamples samples, const char pat
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++)
     HycoCheck(!(t->target[j] > 0) || t->validation || t->n_validation,
               "-target_%s needs held-out points, and -hyco_validation is 0; remove one of the two", HycoErrorKinds[j]);
+  if (t->pinned[HYCO_CHOICE_TYPE] || !t->search) PetscCall(HycoReducerCheckContacts(t, t->prototype));
   if (choose) {
     PetscCall((*t->prototype->ops->startpoints)(t, &chosen));
     samples = chosen;

@@ -13,7 +13,7 @@
 
 #define SHARE      0.93
 #define MARGIN     1.2
-#define LEAST      10   /* smallest number of predictions for an estimate */
+#define LEAST      10   /* smallest number of predictions for a formula */
 #define SMALL      0.3  /* share of a feature's median, its floor: a smaller feature is no sign of a smaller error */
 #define NEGLIGIBLE 1e-3 /* share of the errors' median: least error that is distinguished */
 
@@ -168,11 +168,19 @@ static PetscErrorCode FitOutput(PetscInt n, const HycoHeldOut rows[], const Hyco
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The smallest number of predictions for an estimate: a type that needs no formula takes a multiple of the largest of
+   few errors. */
+static PetscInt Least(const HycoROM m)
+{
+  return m->model->traits.uniform ? HYCO_FEW_HELD : LEAST;
+}
+
 /* Fits the formulas to converged predictions. */
-static PetscErrorCode FitAll(HycoReducer t, PetscInt n, const HycoHeldOut rows[], HycoEstimates *estimates)
+static PetscErrorCode FitAll(HycoReducer t, PetscInt n, PetscInt least, const HycoHeldOut rows[],
+                             HycoEstimates *estimates)
 {
   PetscFunctionBegin;
-  if (n < LEAST) PetscFunctionReturn(PETSC_SUCCESS);
+  if (n < least) PetscFunctionReturn(PETSC_SUCCESS);
   estimates->n = n;
   for (PetscInt j = 0; j < HYCO_ESTIMATE_FEATURES; j++) {
     PetscCall(
@@ -185,11 +193,11 @@ static PetscErrorCode FitAll(HycoReducer t, PetscInt n, const HycoHeldOut rows[]
 }
 
 /* The largest values of the features. */
-static void Reach(PetscInt n, const HycoHeldOut rows[], PetscReal reached[])
+static void Reach(PetscInt n, PetscInt least, const HycoHeldOut rows[], PetscReal reached[])
 {
   for (PetscInt j = 0; j < HYCO_FEATURES; j++) {
-    reached[j] = n >= LEAST ? 0 : -1;
-    for (PetscInt i = 0; i < n && n >= LEAST; i++) reached[j] = PetscMax(reached[j], rows[i].feature[j]);
+    reached[j] = n >= least ? 0 : -1;
+    for (PetscInt i = 0; i < n && n >= least; i++) reached[j] = PetscMax(reached[j], rows[i].feature[j]);
   }
 }
 
@@ -268,8 +276,8 @@ static PetscErrorCode Conclude(HycoReducer t, HycoSamples points, PetscInt n, Hy
   estimates.force = HycoHeldOutForce(n, rows);
   PetscCall(Group(t, points, n, rows));
   n = KeepConverged(n, rows, outputs);
-  Reach(n, rows, estimates.reached);
-  PetscCall(FitAll(t, n, rows, &estimates));
+  Reach(n, Least(m), rows, estimates.reached);
+  PetscCall(FitAll(t, n, Least(m), rows, &estimates));
   estimates.n_outputs = t->scene->n_quantities;
   for (PetscInt q = 0; q < estimates.n_outputs; q++) {
     const HycoOutputEstimate *o = &estimates.output[q];
@@ -354,7 +362,7 @@ PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, HycoROM 
   t->judged_held = NULL;
   if (t->held) PetscCall(HycoSamplesGet(t->held, &n, NULL, NULL));
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(TrainingCorners(t, t->validation || n < LEAST ? 0 : n / CORNERS, &corners));
+  PetscCall(TrainingCorners(t, t->validation || n < Least(model) ? 0 : n / CORNERS, &corners));
   PetscCall(HycoSamplesGet(corners, &n_corners, NULL, NULL));
   if (t->late && n_corners) PetscCall(HycoReducerSolve(t, store, corners));
   if (!rows) {

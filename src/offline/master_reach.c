@@ -147,8 +147,9 @@ PetscErrorCode HycoMetReach(HycoScene scene, HycoMesh whole, const HycoPairs *pa
 typedef struct {
   PetscInt n, room, *head; /* by contact of the surfaces: its last row, or -1 */
   struct {
-    PetscInt n, node[4], next;
+    PetscInt n, first, next; /* its nodes: node[first .. first + n) */
   } * row;
+  PetscInt n_nodes, room_nodes, *node;
 } Lists;
 
 /* Adds the contacts' current masters; *grown counts the new ones. */
@@ -165,15 +166,21 @@ static PetscErrorCode Note(const HycoPairs *p, Lists *l, PetscInt *grown)
     if (!n) continue;
     for (; r >= 0 && !same; r = l->row[r].next) {
       same = (PetscBool)(l->row[r].n == n);
-      for (PetscInt a = 0; a < n && same; a++) same = (PetscBool)(l->row[r].node[a] == node[a]);
+      for (PetscInt a = 0; a < n && same; a++) same = (PetscBool)(l->node[l->row[r].first + a] == node[a]);
     }
     if (same) continue;
     if (l->n == l->room) {
       l->room = 2 * l->room + 64;
       PetscCall(PetscRealloc((size_t)l->room * sizeof(*l->row), &l->row));
     }
+    if (l->n_nodes + n > l->room_nodes) {
+      l->room_nodes = 2 * (l->room_nodes + n) + 256;
+      PetscCall(PetscRealloc((size_t)l->room_nodes * sizeof(*l->node), &l->node));
+    }
     l->row[l->n].n = n;
-    for (PetscInt a = 0; a < n; a++) l->row[l->n].node[a] = node[a];
+    l->row[l->n].first = l->n_nodes;
+    PetscCall(PetscArraycpy(l->node + l->n_nodes, node, n));
+    l->n_nodes += n;
     l->row[l->n].next = l->head[k];
     l->head[k] = l->n++;
     (*grown)++;
@@ -232,12 +239,17 @@ static PetscErrorCode Collect(const Surfaces *s, const HycoPairs *pairs, const L
 {
   HycoPairs *out = &met->rows;
   const PetscInt most = pairs->n + l->n;
-  PetscInt at = 0;
+  PetscInt at = 0, widest = 0, *node;
+  PetscReal *shares;
 
   PetscFunctionBegin;
+  for (PetscInt k = 0; k < pairs->n; k++)
+    widest = PetscMax(widest, pairs->master_start[k + 1] - pairs->master_start[k]);
+  for (PetscInt r = 0; r < l->n; r++) widest = PetscMax(widest, l->row[r].n);
+  PetscCall(PetscMalloc2(widest, &node, widest, &shares));
   PetscCall(PetscMalloc1(most, &met->of));
   PetscCall(HycoPairsSelect(pairs, 0, NULL, NULL, out));
-  PetscCall(HycoPairsReserve(out, most, 4));
+  PetscCall(HycoPairsReserve(out, most, widest));
   for (PetscInt k = 0; k < pairs->n; k++) {
     const PetscBool moved = HycoPairsMoved(pairs, k);
     const PetscInt *master;
@@ -248,15 +260,16 @@ static PetscErrorCode Collect(const Surfaces *s, const HycoPairs *pairs, const L
     if (!moved) met->of[out->n] = k;
     if (!moved) HycoPairsAppend(out, pairs->contact[k], pairs->slave[k], n, master, weight);
     for (PetscInt r = moved ? l->head[at] : -1; r >= 0; r = l->row[r].next) {
-      const PetscReal share = 1 / (PetscReal)l->row[r].n, shares[4] = {share, share, share, share};
-      PetscInt node[4];
-
-      for (PetscInt a = 0; a < l->row[r].n; a++) node[a] = s->node[l->row[r].node[a]];
+      for (PetscInt a = 0; a < l->row[r].n; a++) {
+        node[a] = s->node[l->node[l->row[r].first + a]];
+        shares[a] = 1 / (PetscReal)l->row[r].n;
+      }
       met->of[out->n] = k;
       HycoPairsAppend(out, pairs->contact[k], pairs->slave[k], l->row[r].n, node, shares);
     }
     at += moved;
   }
+  PetscCall(PetscFree2(node, shares));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -264,7 +277,7 @@ PetscErrorCode HycoMetFind(HycoScene scene, HycoMesh whole, const HycoPairs *pai
                            const PetscReal reach[], HycoMet *met)
 {
   Surfaces s;
-  Lists l = {0, 0, NULL, NULL};
+  Lists l = {0};
   PetscInt grown;
 
   PetscFunctionBegin;
@@ -277,7 +290,7 @@ PetscErrorCode HycoMetFind(HycoScene scene, HycoMesh whole, const HycoPairs *pai
   if (n) PetscCall(NoteBetween(&s, scene, mu, &l));
   PetscCall(Collect(&s, pairs, &l, met));
   PetscCall(PetscFree(l.head));
-  PetscCall(PetscFree(l.row));
+  HycoFreeAll(&l.row, &l.node);
   PetscCall(SurfacesDestroy(&s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

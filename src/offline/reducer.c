@@ -263,7 +263,7 @@ static PetscErrorCode ReadTraining(HycoReducer t)
       "-hyco_model_type",
       "hybrid hyper-reduced (38) on an RID; projection-based (44) on the whole mesh, or with a "
       "cubature on some of its cells; condensed on the contact forces; bodies condensed to their surfaces; "
-      "regression without a solve",
+      "regression without a solve [train searches: bodies, then hybrid]",
       types, &type, &t->pinned[HYCO_CHOICE_TYPE]));
   PetscCall(HycoOptionsReal("-hyco_pod_tol", "energy left out of the displacement basis, epsilon of (18)", 0, 1,
                             &t->tol[HYCO_SEED_DISPLACEMENT], &t->pinned[HYCO_CHOICE_TOLERANCE]));
@@ -276,10 +276,11 @@ static PetscErrorCode ReadTraining(HycoReducer t)
   PetscCall(ReadSVDType(t, PetscOptionsObject));
   PetscCall(HycoOptionsInt("-hyco_pod_max_modes", "largest number of displacement modes (0: no limit)", 0,
                            PETSC_MAX_INT, &t->max_modes, NULL));
-  PetscCall(HycoOptionsInt(
-      "-hyco_validation",
-      "number of held-out solutions, on which the model is judged (-1: from the number of training points; 0: none)",
-      -1, 100000, &t->n_validation, NULL));
+  PetscCall(HycoOptionsInt("-hyco_validation",
+                           "number of held-out solutions, on which the model is judged (-1: from the number of "
+                           "training points, few for bodies; "
+                           "0: none)",
+                           -1, 100000, &t->n_validation, NULL));
   PetscCall(HycoOptionsBool(
       "-hyco_search",
       "choose model_type, pod_tol, rid_layers, rid_contact_extension and hybrid by the held-out errors, unless given",
@@ -516,7 +517,9 @@ void HycoReducerSettingsDescribe(const HycoReducerSettings *r, size_t length, ch
 {
   const char *kind = HycoHybrids[r->hybrid];
 
-  if (!r->pod)
+  if (r->variant)
+    snprintf(text, length, "%s, %s", r->type, r->variant);
+  else if (!r->pod)
     snprintf(text, length, "%s", r->type);
   else if (!r->rid)
     snprintf(text, length, "%s, pod_tol %g", r->type, (double)r->pod_tol);

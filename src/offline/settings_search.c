@@ -4,7 +4,8 @@
   RID and the model on it and predicts the held-out points.
 
   Types with modes of their own (HycoROMTraits.own_modes) come first, judged by the held-out solutions before any training
-  point is solved. If one of them is accurate enough, that ends the search, and its model is the one of the attempt.
+  point is solved; over paths, whose inelastic modes need the training solutions, after that. If one of them is accurate
+  enough, that ends the search, and its model is the one of the attempt.
 
   Only settings that no option fixes are varied. The settings of a kind are tried in the order of their cost, and the
   first that meet the targets end their kind; if they meet them with a margin, they end the search. So do attempts that
@@ -36,7 +37,6 @@
 #define ROUND        4   /* share of the training points that is added at a time, as a divisor */
 #define TELLING      0.3 /* correlation above which a parameter explains the errors */
 #define WHOLE        -1
-#define FEWEST       10 /* held-out solutions that may serve instead of training solutions */
 
 /* Sizes of RIDs and bases, the cheapest first; layers WHOLE: the whole mesh. */
 typedef struct {
@@ -74,6 +74,7 @@ typedef struct {
   PetscReal least, *ratio;         /* least ratio so far; ratios of the best model at its held-out points */
   PetscReal spent, last, budget;   /* operations of all attempts, and of the last one; the largest number of them */
   PetscInt n_models;               /* attempts with these bases that gave a model of any use */
+  PetscInt n_own;                  /* the last attempt of a type with modes of its own */
   PetscBool ended;                 /* by the budget */
   PetscBool reduced;               /* the bases are those of the columns */
   HycoROM kept;                    /* the model of the last attempt, if it can be taken as it is; else NULL */
@@ -115,6 +116,7 @@ static PetscErrorCode SetSettings(HycoReducer t, const HycoReducerSettings *r)
   t->whole_rid = (PetscBool)(r->whole || t->prototype->model->traits.whole);
   t->plane = r->plane;
   t->ridge = r->ridge;
+  if (r->variant) PetscCall((*t->prototype->ops->setvariant)(t, r->variant));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -652,34 +654,49 @@ static PetscErrorCode TryHybrids(Search *s, const HycoROM type)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One attempt, for a type whose online cost hardly depends on the modes. */
+/* One attempt for each variant of a type whose online cost hardly depends on the modes, until one meets the targets. */
 static PetscErrorCode TryOne(Search *s, const HycoROM type)
 {
+  static const char *const one[] = {NULL, NULL};
   const Size size = {1e-12, 1, PETSC_FALSE};
+  const char *const *variant;
   HycoReducerSettings r = SettingsFor(s, &size);
+  PetscBool met = PETSC_FALSE;
 
   PetscFunctionBegin;
   r.type = type->model->type;
   r.rid = PETSC_FALSE;
   r.pod = (PetscBool)!HycoReducerOwnModes(s->t, type);
   if (s->t->scene->n_times) r.layers = s->given.layers; /* its mesh consists of the cells of its modes */
-  PetscCall(Try(s, &r, PETSC_FALSE));
+  PetscCall(HycoReducerSetType(s->t, r.type));
+  variant = HycoReducerVariants(s->t);
+  if (!variant) variant = one;
+  do {
+    r.variant = *variant++;
+    PetscCall(Try(s, &r, PETSC_FALSE));
+    met = (PetscBool)(s->attempt[s->n - 1].ratio <= 1 && !s->t->exhaustive);
+  } while (*variant && !met && !s->ended);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether these settings end the search: by their errors, with a margin unless that saves the training solutions. */
+/* Whether these settings end the search: by their errors, with a margin unless their type has modes of its own, which
+   is cheaper than others and may save the training solutions. */
 static PetscBool Ends(const Search *s, const HycoAttempt *best)
 {
-  return (PetscBool)(best && best->ratio <= (s->t->late ? 1 : MARGIN) && !s->t->exhaustive);
+  return (PetscBool)(best && best->ratio <= (best->number <= s->n_own ? 1 : MARGIN) && !s->t->exhaustive);
 }
 
-/* Lets a type with modes of its own refuse the scene: why. Collective. */
+/* Lets a type refuse the scene's contacts, one with modes of its own the scene: why. Collective. */
 static PetscErrorCode Refuse(HycoReducer t, const HycoROM type, char why[HYCO_LINE])
 {
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  if (!type->model->traits.own_modes || !type->ops->begin) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoCatchBegin());
+  ierr = HycoReducerCheckContacts(t, type);
+  PetscCall(HycoCatchEnd(ierr, why));
+  PetscCall(HycoCatchNoModel(ierr, why));
+  if (why[0] || !type->model->traits.own_modes || !type->ops->begin) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoReducerSetType(t, type->model->type));
   PetscCall(HycoCatchBegin());
   ierr = (*type->ops->begin)(t);
@@ -730,8 +747,9 @@ static PetscErrorCode Wants(Search *s, const HycoROM type, PetscBool *wanted)
   if (*wanted && !(HycoReducerOwnModes(t, type) && Ends(s, best))) PetscCall(Offers(s, type, wanted, &possible, why));
   if (*wanted && Ends(s, best))
     snprintf(why, sizeof(why),
-             t->late ? "settings %d are accurate enough, without training solutions"
-                     : "settings %d are accurate by a margin",
+             t->late                    ? "settings %d are accurate enough, without training solutions"
+             : best->number <= s->n_own ? "settings %d are accurate enough"
+                                        : "settings %d are accurate by a margin",
              (int)best->number);
   if (why[0]) LeaveOut(s, type->model->type, possible, why);
   *wanted = (PetscBool)(*wanted && !why[0]);
@@ -752,6 +770,7 @@ static PetscErrorCode TryType(Search *s, const char name[], PetscBool own)
   if (wanted && type->model->traits.settings == HYCO_SETTINGS_RID) PetscCall(TryHybrids(s, type));
   if (wanted && type->model->traits.settings == HYCO_SETTINGS_MODES)
     PetscCall(TrySizes(s, type, HYCO_HYBRID_AUTO, &met));
+  if (wanted && type->model->traits.own_modes) s->n_own = s->n;
   PetscCall(HycoROMDestroy(&type));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -772,7 +791,7 @@ static PetscErrorCode TakeColumns(HycoReducer t, HycoSnapshots store, PetscBool 
 
   PetscFunctionBegin;
   if (t->held) PetscCall(HycoSamplesGet(t->held, &n, NULL, NULL));
-  if (t->late && own && n >= FEWEST) {
+  if (t->late && own && n >= HYCO_FEW_HELD) {
     PetscCall(HycoReducerSetColumns(t, t->held));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -804,7 +823,8 @@ static PetscBool Settled(HycoReducer t)
   PetscBool open = PETSC_FALSE;
 
   for (PetscInt k = 0; k < HYCO_CHOICE_WHOLE; k++) open = (PetscBool)(open || !t->pinned[k]);
-  if (t->pinned[HYCO_CHOICE_TYPE] && t->prototype->model->traits.settings == HYCO_SETTINGS_NONE) open = PETSC_FALSE;
+  if (t->pinned[HYCO_CHOICE_TYPE] && t->prototype->model->traits.settings == HYCO_SETTINGS_NONE)
+    open = (PetscBool)(HycoReducerVariants(t) != NULL);
   return (PetscBool)(!t->search || !t->held || !open);
 }
 
@@ -911,7 +931,7 @@ static void Forget(Search *s)
 {
   for (PetscInt k = 0; k < s->n; k++) (void)!PetscFree(s->rows[k]);
   (void)!PetscFree2(s->ratio, s->order);
-  s->n = 0;
+  s->n = s->n_own = 0;
   s->force = 0;
 }
 
@@ -921,19 +941,29 @@ static PetscBool IsOwn(HycoReducer t)
   return (PetscBool)(t->pinned[HYCO_CHOICE_TYPE] && HycoReducerOwnModes(t, t->prototype));
 }
 
-/* Tries all settings that are not fixed. */
-static PetscErrorCode Attempts(Search *s)
+/* The ratios and the order of the held-out points before the first attempt that is judged at them. */
+static PetscErrorCode BeginHeld(Search *s)
 {
   PetscInt n;
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(s->t->held, &n, NULL, NULL));
-  Forget(s);
+  PetscCall(PetscFree2(s->ratio, s->order));
   PetscCall(PetscMalloc2(n, &s->ratio, n, &s->order));
   for (PetscInt k = 0; k < n; k++) {
     s->ratio[k] = 1; /* until an attempt gives another value */
     s->order[k] = k;
   }
+  s->force = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Tries all settings that are not fixed. */
+static PetscErrorCode Attempts(Search *s)
+{
+  PetscFunctionBegin;
+  Forget(s);
+  PetscCall(BeginHeld(s));
   s->least = PETSC_INFINITY;
   s->n_models = s->n_left_out = 0;
   s->ended = PETSC_FALSE;
@@ -943,7 +973,10 @@ static PetscErrorCode Attempts(Search *s)
   PetscCall(TryAll(s, PETSC_TRUE));
   if (!Ends(s, HycoAttemptsChoose(s->n, s->attempt)) && !IsOwn(s->t)) {
     const HycoSamples before = s->t->columns;
+    const PetscBool few = s->t->few;
 
+    PetscCall(HycoReducerHoldOutMore(s->t, s->store));
+    if (few) PetscCall(BeginHeld(s));
     PetscCall(TakeColumns(s->t, s->store, PETSC_FALSE));
     s->reduced = (PetscBool)(s->reduced && s->t->columns == before);
     PetscCall(Reduce(s));

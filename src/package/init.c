@@ -8,25 +8,56 @@
 
 static PetscBool began_petsc = PETSC_FALSE, handles = PETSC_FALSE;
 
-/* Prints hyco's own message, or PETSc's with its location. On rank 0 of the object with the error. */
-static void Tell(MPI_Comm comm, int line, const char function[], const char file[], PetscErrorCode code,
-                 const char message[])
+/* The line of an error: hyco's own message, or PETSc's with its location. */
+static void Compose(char said[HYCO_LINE], int line, const char function[], const char file[], PetscErrorCode code,
+                    const char message[])
 {
   const PetscBool own = (PetscBool)(code == PETSC_ERR_USER || code == PETSC_ERR_ORDER || code == HYCO_ERR_NO_MODEL ||
                                     code == PETSC_ERR_ARG_NULL || code == PETSC_ERR_ARG_WRONG);
   char text[HYCO_LINE];
+
+  snprintf(text, sizeof(text), "%s", message ? message : "");
+  HycoMakePrintable(text);
+  if (own && text[0])
+    snprintf(said, HYCO_LINE, "%s", text);
+  else
+    HycoFormat(said, "%s (PETSc error %d in %s(), %s:%d; HYCO_TRACE=1 shows the calls)", text[0] ? text : "failed",
+               (int)code, function ? function : "?", file ? file : "?", line);
+}
+
+/* Prints it on rank 0 of the object with the error. */
+static void Tell(MPI_Comm comm, int line, const char function[], const char file[], PetscErrorCode code,
+                 const char message[])
+{
+  char said[HYCO_LINE];
   PetscMPIInt rank = 0;
 
   MPI_Comm_rank(comm, &rank);
   if (rank) return;
-  snprintf(text, sizeof(text), "%s", message ? message : "");
-  HycoMakePrintable(text);
-  if (own && text[0])
-    fprintf(stderr, "hyco: error: %s\n", text);
-  else
-    fprintf(stderr, "hyco: error: %s (PETSc error %d in %s(), %s:%d; HYCO_TRACE=1 shows the calls)\n",
-            text[0] ? text : "failed", (int)code, function ? function : "?", file ? file : "?", line);
+  Compose(said, line, function, file, code, message);
+  fprintf(stderr, "hyco: error: %s\n", said);
   fflush(stderr);
+}
+
+static char kept[HYCO_LINE];
+
+static PetscErrorCode Keep(MPI_Comm comm, int line, const char *function, const char *file, PetscErrorCode code,
+                           PetscErrorType type, const char *text, void *ctx)
+{
+  (void)comm, (void)ctx;
+  if (type == PETSC_ERROR_INITIAL) Compose(kept, line, function, file, code, text);
+  return code;
+}
+
+PetscErrorCode HycoKeepErrors(PetscBool keep)
+{
+  kept[0] = '\0';
+  return keep ? PetscPushErrorHandler(Keep, NULL) : PetscPopErrorHandler();
+}
+
+const char *HycoKeptError(void)
+{
+  return kept;
 }
 
 /* Replaces PETSc's error handler, which prints a call trace. In main() PETSc aborts by MPI; a process that runs

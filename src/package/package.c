@@ -49,6 +49,7 @@ static PetscErrorCode RegisterContacts(void)
   PetscCall(HycoContactRegister(HYCO_CONTACT_OBSTACLE, HycoContactCreate_Obstacle));
   PetscCall(HycoContactRegister(HYCO_CONTACT_PAIR, HycoContactCreate_Pair));
   PetscCall(HycoContactRegister(HYCO_CONTACT_SURFACE, HycoContactCreate_Surface));
+  PetscCall(HycoContactRegister(HYCO_CONTACT_MORTAR, HycoContactCreate_Mortar));
   PetscCall(HycoContactRegister(HYCO_CONTACT_RIGID, HycoContactCreate_Rigid));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -94,3 +94,46 @@ PetscErrorCode HycoROMSolveMany(HycoROM m, PetscInt n, PetscInt n_parameters, co
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+/* Gives all ranks the rows of each, `bytes` per point. */
+static PetscErrorCode Share(MPI_Comm comm, size_t bytes, const PetscMPIInt count[], const PetscMPIInt first[],
+                            void *rows)
+{
+  MPI_Datatype row;
+
+  PetscFunctionBegin;
+  if (!rows || !bytes) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCallMPI(MPI_Type_contiguous((int)bytes, MPI_BYTE, &row));
+  PetscCallMPI(MPI_Type_commit(&row));
+  PetscCallMPI(MPI_Allgatherv(MPI_IN_PLACE, 0, row, rows, count, first, row, comm));
+  PetscCallMPI(MPI_Type_free(&row));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMSolveShared(MPI_Comm comm, HycoROM m, PetscInt n, PetscInt n_parameters, const PetscReal mu[],
+                                  HycoPrediction prediction[], PetscReal Lambda[], PetscReal U[])
+{
+  PetscMPIInt rank, size, *count, *first;
+  PetscInt n_contacts, n_nodes, dim;
+  size_t n_dof, at;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMGetSizes(m, &n_contacts, &n_nodes, &dim));
+  PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  PetscCall(PetscMalloc2(size, &count, size, &first));
+  for (PetscMPIInt r = 0; r < size; r++) {
+    first[r] = (PetscMPIInt)((PetscInt64)n * r / size);
+    count[r] = (PetscMPIInt)((PetscInt64)n * (r + 1) / size) - first[r];
+  }
+  n_dof = (size_t)(n_nodes * dim);
+  at = (size_t)first[rank];
+  HycoOnEach(comm, HycoROMSolveMany(m, count[rank], n_parameters, mu + at * (size_t)n_parameters,
+                                    prediction ? prediction + at : NULL,
+                                    Lambda ? Lambda + at * (size_t)n_contacts : NULL, U ? U + at * n_dof : NULL));
+  PetscCall(Share(comm, sizeof(*prediction), count, first, prediction));
+  PetscCall(Share(comm, (size_t)n_contacts * sizeof(*Lambda), count, first, Lambda));
+  PetscCall(Share(comm, n_dof * sizeof(*U), count, first, U));
+  PetscCall(PetscFree2(count, first));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

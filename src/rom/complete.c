@@ -4,13 +4,28 @@
 
 PetscErrorCode HycoRowsCreate(const HycoPairs *pairs, PetscInt dim, HycoRows *rows)
 {
-  const PetscInt entries = HycoPairsWidth(pairs) * dim * pairs->n;
+  PetscFunctionBegin;
+  rows->room = HycoPairsWidth(pairs) * dim * pairs->n;
+  PetscCall(PetscMalloc1(pairs->n + 1, &rows->start));
+  PetscCall(PetscMalloc1(rows->room, &rows->dof));
+  PetscCall(PetscMalloc1(rows->room, &rows->value));
+  PetscCall(PetscMalloc1(pairs->n, &rows->gap));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoRowsFill(HycoFE fe, HycoPairs *pairs, HycoRows *rows)
+{
+  PetscInt entries;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(pairs->n + 1, &rows->start));
-  PetscCall(PetscMalloc1(entries, &rows->dof));
-  PetscCall(PetscMalloc1(entries, &rows->value));
-  PetscCall(PetscMalloc1(pairs->n, &rows->gap));
+  PetscCall(HycoPairsMove(fe, pairs));
+  entries = HycoPairsWidth(pairs) * fe->dim * pairs->n;
+  if (entries > rows->room) {
+    PetscCall(PetscRealloc((size_t)entries * sizeof(*rows->dof), &rows->dof));
+    PetscCall(PetscRealloc((size_t)entries * sizeof(*rows->value), &rows->value));
+    rows->room = entries;
+  }
+  PetscCall(HycoContactRows(fe, pairs, rows->start, rows->dof, rows->value, rows->gap));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -40,7 +55,7 @@ static PetscErrorCode BringRows(HycoROM m, HycoFE fe, const PetscReal mu[])
   PetscCall(HycoFESetParameters(fe, mu));
   if (!fe->contact_changed && !fe->gap_changed) PetscFunctionReturn(PETSC_SUCCESS);
   fe->ready = PETSC_FALSE; /* until its rows are computed */
-  PetscCall(HycoContactRows(fe, &m->model->pairs, m->rows.start, m->rows.dof, m->rows.value, m->rows.gap));
+  PetscCall(HycoRowsFill(fe, &m->model->pairs, &m->rows));
   fe->ready = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -132,7 +132,7 @@ static PetscErrorCode MeasureTime(HycoROM m, HycoBalance b, HycoReplay *replay, 
   PetscScalar *r, square;
 
   PetscFunctionBegin;
-  PetscCall(HycoContactRows(fe, &m->model->whole_pairs, b->rows.start, b->rows.dof, b->rows.value, b->rows.gap));
+  PetscCall(HycoRowsFill(fe, &m->model->whole_pairs, &b->rows));
   PetscCall(HycoFELoads(fe, b->load));
   HycoFEGeneralise(fe, b->load);
   PetscCall(VecGetArray(b->r, &r));

@@ -277,6 +277,7 @@ static PetscBool IsInconsistent(HycoROM m, PetscReal inconsistency)
 /* A formula fitted to few points may grow or fall without measure between them: in regimes that held-out points had, no
    more than a multiple of their largest error, and no less than a share of it. */
 #define MOST_OVER  3
+#define MANY       20.
 #define MOST_UNDER 30
 
 static PetscReal Clamped(PetscReal estimate, PetscReal largest)
@@ -284,10 +285,13 @@ static PetscReal Clamped(PetscReal estimate, PetscReal largest)
   return largest > 0 ? PetscMax(PetscMin(estimate, MOST_OVER * largest), largest / MOST_UNDER) : estimate;
 }
 
-/* From a formula, or for a type whose errors do not follow the features from their largest. */
+/* From a formula, or for a type whose errors do not follow the features from their largest: the largest of few is a
+   smaller one. */
 static PetscReal EstimateError(HycoROM m, const PetscReal law[], const PetscReal term[], PetscReal largest)
 {
-  return m->model->traits.uniform ? MOST_OVER * largest : Clamped(Estimate(law, term), largest);
+  const PetscReal few = PetscSqrtReal(PetscMax(1, MANY / (PetscReal)m->model->estimates.n));
+
+  return m->model->traits.uniform ? MOST_OVER * few * largest : Clamped(Estimate(law, term), largest);
 }
 
 /* The estimates of the calibrated formulas, times `factor`. */

@@ -87,6 +87,22 @@ class Check(Case):
                 else:
                     self.assertEqual(ours[key], value, key)
 
+    def test_crack(self):
+        """Nodes on other nodes inside a body, whose cells hang together elsewhere, are named; none where a contact's surfaces touch."""
+        nodes = [(i, j, 0) for j in range(3) for i in range(5)] + [(2, 1, 0), (2, 2, 0)]
+        doubled = {8: 16, 13: 17}
+        cells = [[1 + i + a + 5 * (j + b) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))] for j in range(2) for i in range(4)]
+        for crack in (False, True):
+            elements = [(3, 1, [doubled.get(v, v) if crack and at % 4 > 1 else v for v in cell]) for at, cell in enumerate(cells)]
+            elements += [(1, 2, [1, 6]), (1, 2, [6, 11]), (1, 3, [5, 10]), (1, 3, [10, 15])]
+            msh(self.path('crack.msh'), nodes if crack else nodes[:15], elements, {1: (2, 'b'), 2: (1, 'left'), 3: (1, 'right')})
+            scene = self.written('scene: {mesh: crack.msh, parameters: [load]}\nparameter: {load: {range: [1, 2]}}\n'
+                                 'body: {b: {young: 100, poisson: 0.3}}\nfixed: {left: {x: 0, y: 0}}\npressure: {right: load}\n')
+            found = self.hyco('check', '-scene', scene)
+            self.assertEqual([(b['n_parts'], b['n_doubled']) for b in found['bodies']], [(1, 2 * crack)])
+            self.assertEqual(found['n_warnings'], int(crack), found['warnings'])
+        self.warned(found, 'body b', '16 on 8')
+
     def test_costs(self):
         """The points of a training are counted: with those held out, and the stiffnesses among them. A solve measures."""
         pellet = os.path.join(EXAMPLES, 'pellet')

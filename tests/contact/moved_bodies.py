@@ -51,6 +51,26 @@ class FullOrder(Moved):
                         self.near(self.centre('moved.h5'), self.centre('drawn.h5'), 1e-8)
                         self.assertLess(abs(self.centre('moved.h5') - place), 0.5)
 
+    def test_bonded(self):
+        """A cylinder of two bodies that share nodes and have the same map is the cylinder of one body; with different maps they are refused,
+        with both names."""
+        mesh(self.path('bonded.msh'), bonded=True)
+        scene(self.path('bonded.yaml'), 'bonded.msh')
+        with open(self.path('bonded.yaml'), encoding='ascii') as file:
+            whole = file.read()
+        core = '  core: {young: 100, poisson: 0.3, map: {x: x + %s}}\nfixed:'
+        with open(self.path('bonded.yaml'), 'w', encoding='ascii') as file:
+            file.write(whole.replace('fixed:', core % 'place'))
+        one, two = (self.solve(name, 3.3) for name in ('moved.yaml', 'bonded.yaml'))
+        for name in ('total_contact_force', 'lambda_max', 'strain_energy', 'u_norm2'):
+            self.near(two[name], one[name], 1e-10, name)
+        with open(self.path('bonded.yaml'), 'w', encoding='ascii') as file:
+            file.write(whole.replace('fixed:', core % '2*place'))
+        run = self.run_raw('solve', '-scene', self.path('bonded.yaml'), '-mu', f'3.3,{POINT}')
+        self.assertEqual(run.returncode, 1)
+        for word in ('cylinder', 'core', 'different maps'):
+            self.assertIn(word, run.stderr)
+
     def test_either_slave(self):
         """Whichever side is the slave, wherever the cylinder is: the same force."""
         scene(self.path('swap.yaml'), 'm.msh', swap=True)

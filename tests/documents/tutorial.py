@@ -44,6 +44,19 @@ class Documents(unittest.TestCase):
         """The complete scene with which the page on scenes begins."""
         self.run_page('scenes.md', 2)
 
+    def test_gallery(self):
+        """scripts/gallery writes the page of the examples, and draws one; the page has a picture of each."""
+        if not drawable():
+            self.skipTest('python3-matplotlib, python3-h5py or python3-numpy is missing')
+        with tempfile.TemporaryDirectory(prefix='hyco-gallery-') as folder:
+            subprocess.run([os.path.join(SOURCE, 'scripts', 'gallery'), 'rope', '--hyco', os.environ['HYCO'], '--output', folder], check=True, timeout=50 * PATIENCE)
+            self.assertTrue(os.path.exists(os.path.join(folder, 'gallery', 'rope.png')))
+            with open(os.path.join(folder, 'gallery.md'), encoding='utf-8') as made, open(os.path.join(DOCS, 'gallery.md'), encoding='utf-8') as page:
+                text = made.read()
+                self.assertEqual(text, page.read())
+        for name in set(os.listdir(os.path.join(SOURCE, 'examples'))) - {'ladder', 'embed.c'}:
+            self.assertIn(f'gallery/{name}.png', text)
+
     def test_pictures(self):
         """They are small, and the tutorial shows each."""
         with open(os.path.join(DOCS, 'tutorial.md'), encoding='utf-8') as f:

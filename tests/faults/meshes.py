@@ -89,7 +89,7 @@ TOGETHER = [
     ('a master between two cells', lambda n, e, g: (n, e + [(1, 7, [4, 5])], {**g, 7: (1, 'mid')}),
      lambda s: s.replace('type: pair', 'type: surface').replace('master: under', 'master: mid'), 'contact c: the group mid is empty'),
     ('bodies that share nodes', lambda n, e, g: (n, [(k, t, [{10: 7, 11: 8, 12: 9}.get(v, v) for v in of]) for k, t, of in e], g),
-     lambda s: s.replace('young: 1,', 'map: {x: 2*x}, young: 1,'), 'the bodies low and up share node 7, and a map moves one of them'),
+     lambda s: s.replace('young: 1,', 'map: {x: 2*x}, young: 1,'), 'the bodies low and up share node 7 and have different maps'),
     ('two nodes on one, a large tolerance', lambda n, e, g: ([(0.001 * x, y, z) if k == 10 else (x, y, z) for k, (x, y, z) in enumerate(n)], e, g),
      lambda s: s.replace('master: under', 'master: under, tolerance: 10'), 'nodes 10 and 11 of over are both nearest to node 7 of under'),
     ('triangles on a hexahedron', lambda n, e, g: (HEX, [(5, 1, [1, 2, 3, 4, 5, 6, 7, 8]), (2, 2, [1, 2, 3])], {1: (3, 'b'), 2: (2, 'f')}),

@@ -136,7 +136,7 @@ class Convert(Case):
     def test_flat(self):
         """An Abaqus .inp in 2D: its sets as groups."""
         self.assertEqual(self.convert('flat.inp', FLAT),
-                         {'ALL': (2, 'quad4'), 'FIRST': (1, 'quad4'), 'FOOT': (2, 'line2'), 'TOP': (2, 'line2'), '_OUTER_SKIN_': (6, 'line2'),
+                         {'ALL': (2, 'quad4'), 'FIRST': (1, 'quad4'), 'FOOT': (2, 'line2'), 'TOP': (2, 'line2'), 'OUTER_SKIN': (6, 'line2'),
                           'CORNER': (1, 'point1'), 'TWO': (1, 'line2'), 'SOME': (2, 'point1')})
         self.checked('scene: {mesh: m.msh, parameters: [p]}\nparameter: {p: {range: [0.1, 1]}}\nbody: {ALL: {young: 100, poisson: 0.3}}\n'
                      'fixed: {FOOT: {y: 0}, CORNER: {x: 0}}\npressure: {TOP: p}\n')
@@ -201,7 +201,7 @@ class Convert(Case):
         """Elements and files that cannot be converted are named."""
         for name, text, words in (('a.inp', FLAT.replace('CPE4', 'C3D15'), 'elements of type C3D15'), ('g.inp', FLAT.replace('CPE4', 'CPE8R'), 'element 1 of type CPE8R has 4 nodes; 8 are expected'), ('b.inp', '*Heading\n', 'has no cells'),
                                   ('c.inp', FLAT.replace('1, 1, 2, 5, 4', '1, 1, 2, 5, 44'), 'is not as such a file should be'),
-                                  ('d.inp', PARTS.replace(' 0., 1.', ' 0., 1.\n 0,0,0,0,0,1,90'), 'is rotated'),
+                                  ('d.inp', PARTS.replace(' 0., 1.', ' 0., 1.\n 0,0,0,0,0,1'), 'two points and an angle'),
                                   ('e.unv', UNV.replace('115', '116'), 'FE descriptor 116')):
             self.assertIn(words, self.convert(name, text, status=1))
         self.assertIn('has groups of its own', self.convert('f.inp', FLAT, '--groups', 'x', status=1))

@@ -12,6 +12,7 @@ from paths import HISTORY, J2, KINDS, NORTON, POINTS, SCENE, arrays
 BODIES = ['-hyco_model_type', 'bodies']
 # A core that moves and softens, elastic; a ring that creeps
 MOVED = [('core: {young: 1e5', 'core: {map: {x: x*(1 - push*1e-3), y: y*(1 - push*1e-3)}, young: 1e5*(1.5 - gap*60)')]
+HOT = 'core: {temperature: 500 + 100*q*x, reference_temperature: 293, expansion: 1e-6, '
 
 
 class BodiesPath(Ring):
@@ -67,6 +68,15 @@ class BodiesPath(Ring):
         self.train('moved.h5', *BODIES, scene=scene, store='moved')
         errors = self.errors('moved.h5', scene=scene)
         self.assertLess(max(errors.values()), 5e-3, errors)
+
+    def test_heat(self):
+        """Temperatures of elastic and of creeping bodies that change along the path, prescribed displacements and body forces are loads."""
+        scene = self.altered('hot.yaml', NORTON, HISTORY, ('core: {', HOT), ('ring: {', HOT.replace('core', 'ring')), ('sym_y0: {y: 0}', 'sym_y0: {y: 1e-3*q*push}'),
+                             ('\ncontact:', '\nforce: {ring: {x: -0.1*q*x}}\ncontact:'))
+        for laws in ('interpolation', 'cubature'):
+            self.train('hot.h5', *BODIES, '-hyco_bodies_laws', laws, scene=scene, store='hot')
+            errors = self.errors('hot.h5', scene=scene)
+            self.assertLess(max(errors.values()), 5e-3, (laws, errors))
 
     def test_order_of_questions(self):
         """A point's path is the same to the last bit whatever was predicted before it."""

@@ -4,6 +4,7 @@ import os
 import re
 import shutil
 import subprocess
+import sys
 import tempfile
 import unittest
 
@@ -78,6 +79,16 @@ class Installed(unittest.TestCase):
         completion = os.path.join(self.prefix, 'share', 'bash-completion', 'completions', 'hyco')
         words = run('bash', '-c', 'source "$1"; COMP_WORDS=(hyco predict -mo); COMP_CWORD=2; _hyco; echo "${COMPREPLY[@]}"', '-', completion)
         self.assertEqual(words.split(), ['-model'])
+        values = 'source "$1"; COMP_WORDS=(hyco train -hyco_model_type b); COMP_CWORD=3; _hyco; echo "${COMPREPLY[@]}"'
+        self.assertEqual(run('bash', '-c', values, '-', completion).split(), ['bodies'])
+        for heading in ('EXAMPLES', 'FILES', 'ENVIRONMENT', 'MOST USED OPTIONS'):
+            self.assertIn(f'\n.SH {heading}\n', page)
+        for shell, name, line in (('zsh', 'share/zsh/site-functions/_hyco', '-model) _files; return ;;'),
+                                  ('fish', 'share/fish/vendor_completions.d/hyco.fish', '-o hyco_linear -x -a \'auto direct iterative\'')):
+            with open(os.path.join(self.prefix, name), encoding='utf-8') as file:
+                self.assertIn(line, file.read())
+            if shutil.which(shell):
+                run(shell, '-n', os.path.join(self.prefix, name))
 
     def test_pkg_config(self):
         """The ladder builds by make and pkg-config from the installed files."""
@@ -99,6 +110,15 @@ class Installed(unittest.TestCase):
             self.assertTrue(os.access(os.path.join(build, name), os.X_OK), name)
         self.predicts(os.path.join(build, 'batch'))
 
+    def test_python(self):
+        """The installed Python package finds its library, from anywhere, and predicts."""
+        self.imports(os.path.join(self.prefix, 'lib', 'python3', 'dist-packages'))
+
+    def imports(self, packages, **environment):
+        model = os.path.join(SOURCE, 'tests', 'data', 'rope-hybrid-4-table.h5')
+        program = f"import hyco; print('force', hyco.Model({model!r}).predict([0.07, 0.17]).total_contact_force)"
+        self.assertIn('force 0.3', run(sys.executable, '-c', program, cwd='/', env={**os.environ, 'PYTHONPATH': packages, **environment}))
+
     @unittest.skipUnless(shutil.which('dpkg-shlibdeps') and shutil.which('file'), 'cpack requires dpkg-dev and file')
     def test_package(self):
         """The Debian package depends on the libraries that hyco links, but not on gmsh's; its command runs from wherever it is unpacked."""
@@ -118,6 +138,7 @@ class Installed(unittest.TestCase):
         said = run(os.path.join(root, 'usr', 'bin', 'hyco'), 'predict', '-model', model, '-mu', '0.07,0.17',
                    env={**os.environ, 'LD_LIBRARY_PATH': paths})
         self.assertIn('force', said)
+        self.imports(os.path.join(root, 'usr', 'lib', 'python3', 'dist-packages'), LD_LIBRARY_PATH=paths)
 
     def test_version(self):
         """One version, CMakeLists.txt's."""

@@ -173,6 +173,18 @@ class Sources(unittest.TestCase):
         self.assertEqual({n for n in listed if n.startswith('hyco_')} - set(declared), set(), 'in -help, but not declared')
         self.assertEqual(asked - set(declared), set(), 'asked, but not declared')
 
+    def test_help_of_a_command(self):
+        """The help of a command begins with its most used options, which it has, and two examples; it lists each option once."""
+        for command in ('check', 'solve', 'train', 'predict', 'compare', 'view'):
+            said = subprocess.run([os.environ['HYCO'], 'help', command], capture_output=True, text=True, check=True, timeout=20 * PATIENCE).stdout
+            listed = re.findall(r'^  -(\w+) ', said, flags=re.M)
+            self.assertEqual(len(set(listed)), len(listed), command)
+            used = re.search(r'^Most used options\n((?:  .*\n)+)\nExamples\n((?:    hyco .*\n|    mpiexec .*\n){2})', said, flags=re.M)
+            named = re.search(rf'{{"{command}",\s*{{([^}}]*)}}', text(os.path.join(SOURCE, 'src', 'app', 'help.c')))[1].count('"') // 2
+            self.assertEqual(used[1].count('\n'), named, command)
+            for option in re.findall(r' -(\w+)', used[2]):
+                self.assertTrue(option in listed or re.sub('_[^_]+$', '_NAME', option) in listed or option == 'n', f'{command}: {option}')
+
     def test_public_header(self):
         """include/hyco.h compiles alone, in C and in C++, without the private headers."""
         flags = subprocess.run(['pkg-config', '--cflags', 'petsc', 'slepc'], capture_output=True, text=True, check=True,

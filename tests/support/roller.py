@@ -50,9 +50,9 @@ def grid(shape, point, nodes, elements, tag, sides):
                 elements.append((KINDS[dim][1], group, facet))
 
 
-def mesh(path, dim=2, at=0.0, n=64, m=36, half=16.0, radius=10.0, angle=60.0, lift=0.0, wide=4):
+def mesh(path, dim=2, at=0.0, n=64, m=36, half=16.0, radius=10.0, angle=60.0, lift=0.0, wide=4, bonded=False):
     """The block [-half, half] x [-8, 0] (x [0, wide] in 3D) of n elements along its top, under the part of a cylinder
-    within `angle` degrees of its lowest line, m elements along its round, over x = at and `lift` above the block."""
+    within `angle` degrees of its lowest line, m elements along its round, over x = at and `lift` above the block. bonded: the cylinder's inner half is a body `core` of its own."""
     nodes, elements = [], []
     deep = max(n // 8, 3)
     grid([n, deep] + [wide] * (dim - 2), lambda i, j, k: (-half + 2 * half * i / n, -8 + 8 * (1 - (1 - j / deep)**1.5), k),
@@ -62,8 +62,12 @@ def mesh(path, dim=2, at=0.0, n=64, m=36, half=16.0, radius=10.0, angle=60.0, li
         t, r = math.radians(angle * (2 * i / m - 1)), radius * (1 - 0.5 * j / 6)
         return (at + r * math.sin(t), lift + radius - r * math.cos(t), 0.5 + 0.75 * k if dim == 3 else 0)
 
+    begin = len(elements)
     grid([m, 6] + [wide] * (dim - 2), round_, nodes, elements, 2, {(1, 0): 13, (1, 1): 14})
-    msh(path, nodes, elements, {1: (dim, 'block'), 2: (dim, 'cylinder'), 11: (dim - 1, 'base'), 12: (dim - 1, 'upper'),
+    for at, (kind, tag, of) in enumerate(elements[begin:]):
+        if bonded and tag == 2 and at // m % 6 >= 3:
+            elements[begin + at] = (kind, 3, of)
+    msh(path, nodes, elements, {1: (dim, 'block'), 2: (dim, 'cylinder'), **({3: (dim, 'core')} if bonded else {}), 11: (dim - 1, 'base'), 12: (dim - 1, 'upper'),
                                 13: (dim - 1, 'round'), 14: (dim - 1, 'top')})
 
 

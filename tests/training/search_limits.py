@@ -49,7 +49,7 @@ class SearchLimits(Ring):
         self.assertEqual(set(report['search']['not_tried']), {'condensed', 'hybrid'})
         for why in report['search']['not_tried'].values():
             self.assertIn('settings 1 are accurate enough, without training solutions', why)
-        self.assertEqual((sum(report['solved_by_group']), report['n_samples']), (25 + 4, 0))  # held-out points, the corners of the training among them
+        self.assertEqual((sum(report['solved_by_group']), report['n_samples']), (6 + 2, 0))  # held-out points, the corners of the training among them
         report, rows = self.search(BLOCKS, 'every', '-grid', '5,5', '-hyco_search_exhaustive')
         self.assertEqual({r['model_type'] for r in rows}, {'bodies', 'condensed', 'hybrid'})
         self.assertEqual(sum(report['solved_by_group']), 25 + 25)

@@ -55,8 +55,8 @@ static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs 
 }
 
 /* All n slaves of a moved contact in one tree; reach limits the distance. */
-static PetscErrorCode Find(HycoContact c, HycoFE fe, PetscReal reach, PetscInt n, const PetscInt slave[],
-                           PetscInt start[], PetscInt master[], PetscReal weight[])
+static PetscErrorCode Find(HycoContact c, HycoFE fe, PetscInt index, PetscReal reach, PetscInt n,
+                           const PetscInt slave[], HycoPairs *found)
 {
   const HycoQuery query = {.moved = PETSC_TRUE, .tolerance = reach};
   HycoPartners t;
@@ -68,11 +68,8 @@ static PetscErrorCode Find(HycoContact c, HycoFE fe, PetscReal reach, PetscInt n
   PetscCall(HycoPartnersCreate(fe, c, PETSC_FALSE, &t));
   PetscCall(PetscMalloc2(n, &at, n, &why));
   ierr = HycoPartnersSearch(&t, &query, n, slave, at, why);
-  for (PetscInt k = 0; k < n && !ierr; k++) {
-    PetscCall(PetscArraycpy(master + start[k], at[k].node, at[k].n));
-    PetscCall(PetscArraycpy(weight + start[k], at[k].weight, at[k].n));
-    start[k + 1] = start[k] + at[k].n;
-  }
+  PetscCall(HycoPairsReserve(found, n, fe->mesh->nf));
+  for (PetscInt k = 0; k < n && !ierr; k++) HycoPairsAppend(found, index, slave[k], at[k].n, at[k].node, at[k].weight);
   PetscCall(PetscFree2(at, why));
   PetscCall(HycoPartnersDestroy(&t));
   PetscCall(ierr);

@@ -6,6 +6,7 @@
 #include <hycobodies.h>
 #include <hycoromtypes.h>
 #include <petscviewer.h>
+#include <string.h>
 
 #define ROUNDING 1e-10 /* relative, of exact results */
 #define ACTIVE   0.3   /* assumed share of closed contacts, and entries of a row of B, for costs */
@@ -147,9 +148,10 @@ static PetscErrorCode Estimate(HycoROM m, HycoPrediction *p)
 
   PetscFunctionBegin;
   p->estimated_error_lambda = PetscMax(p->interpolation_error, ROUNDING);
-  if (b->n_theta) PetscFunctionReturn(PETSC_SUCCESS); /* errors of interpolated displacements are not known */
+  if (b->n_theta && !m->model->estimates.n) /* errors of interpolated displacements are not known */
+    PetscFunctionReturn(PETSC_SUCCESS);
   p->estimated_error_u = PetscMax(3 * b->left, ROUNDING);
-  if (b->ni) p->estimated_error_sigma = ROUNDING;
+  if (b->ni && !b->n_theta) p->estimated_error_sigma = ROUNDING;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -189,8 +191,8 @@ PetscErrorCode HycoBodiesOptions(HycoReducer t)
   PetscFunctionBegin;
   PetscCall(PetscNew(&s));
   t->training = s;
-  s->pod_tol = 1e-12;
-  s->samples = 120;
+  s->pod_tol = 1e-10;
+  s->samples = 60;
   s->inelastic_tol = 1e-10;
   s->cells = 2;
   s->cubature_tol = 1e-4;
@@ -202,7 +204,7 @@ PetscErrorCode HycoBodiesOptions(HycoReducer t)
                             1, &s->pod_tol, NULL));
   PetscCall(HycoOptionsInt(
       "-hyco_bodies_samples",
-      "bodies: contact problems on the surfaces alone whose displacements give the modes; twice as many, up to three "
+      "bodies: contact problems on the surfaces alone whose displacements give the modes; twice as many, up to four "
       "times, while a body has more modes than half of them",
       1, 100000, &s->samples, NULL));
   PetscCall(HycoOptionsReal("-hyco_bodies_tol",
@@ -221,11 +223,12 @@ PetscErrorCode HycoBodiesOptions(HycoReducer t)
   PetscCall(HycoOptionsWord("-hyco_bodies_laws",
                             "bodies, with a history: coefficients of the inelastic modes by interpolation in the cells "
                             "with laws, or by Galerkin's method with a cubature (auto: where a law yields)",
-                            laws, &s->laws, &set[2]));
+                            laws, &s->laws, &s->named));
   PetscCall(HycoOptionsReal("-hyco_bodies_cubature_tol",
                             "bodies, with a history: relative error of the cubature in training", 1e-12, 1,
                             &s->cubature_tol, &set[3]));
   PetscOptionsEnd();
+  set[2] = s->named;
   for (int k = 0; k < 4; k++)
     HycoCheck(!set[k] || !t->scene || t->scene->n_times,
               "%s is for scenes with a history, and this scene has none; remove it", of_history[k]);
@@ -242,6 +245,21 @@ PetscErrorCode HycoBodiesResetTraining(HycoReducer t)
   PetscCall(MatDestroy(&s->strains.V));
   PetscCall(PetscFree(s->strains.sigma));
   PetscCall(HycoBodiesDestroy(&s->bodies));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Over paths the laws in few cells, unless an option names how. */
+const char *const *HycoBodiesVariants(HycoReducer t)
+{
+  static const char *const variants[] = {"interpolation", "cubature", NULL};
+
+  return t->scene->n_times && !HycoTrainingOfBodies(t)->named ? variants : NULL;
+}
+
+PetscErrorCode HycoBodiesSetVariant(HycoReducer t, const char name[])
+{
+  PetscFunctionBegin;
+  HycoTrainingOfBodies(t)->laws = strcmp(name, "cubature") == 0 ? HYCO_BODIES_CUBATURE : HYCO_BODIES_INTERPOLATION;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -369,6 +387,7 @@ PetscErrorCode HycoROMCreate_Bodies(HycoROM m)
                                        .own_modes = PETSC_TRUE,
                                        .surfaces = PETSC_TRUE,
                                        .history = PETSC_TRUE,
+                                       .integrals = PETSC_TRUE,
                                        .cells = PETSC_TRUE,
                                        .uniform = PETSC_TRUE,
                                        .work = sizeof(*(HycoBodiesWork)NULL),
@@ -382,6 +401,8 @@ PetscErrorCode HycoROMCreate_Bodies(HycoROM m)
                                  .cost = Cost,
                                  .offers = HycoBodiesOffers,
                                  .work = HycoBodiesOperations,
+                                 .variants = HycoBodiesVariants,
+                                 .setvariant = HycoBodiesSetVariant,
                                  .setup = SetUp,
                                  .reset = Reset,
                                  .solve = Solve,

@@ -97,8 +97,9 @@ static PetscErrorCode MoveBody(HycoH5 h, HycoSubstructures b, PetscInt k)
   PetscCall(HycoH5Real(h, At(k, "Z", path), &rows, b->p, &s->Z));
   PetscCall(HycoH5Real(h, At(k, "work", path), &columns, b->r, &s->work));
   PetscCall(HycoH5Real(h, At(k, "gram", path), &b->r, b->r, &s->gram));
-  rows = s->n_samples * ((b->turn_start[k + 1] - b->turn_start[k]) * s->l + s->m);
-  PetscCall(HycoH5Real(h, At(k, "H", path), &rows, s->n, &s->H));
+  columns = (b->turn_start[k + 1] - b->turn_start[k]) * s->l + s->m;
+  PetscCall(HycoH5Real(h, At(k, "responses", path), &rows, columns, &s->H));
+  rows = s->n_samples * columns;
   PetscCall(HycoH5Real(h, At(k, "a", path), &rows, b->r, &s->a));
   PetscCall(HycoH5Real(h, At(k, "g", path), &rows, b->p, &s->g));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -6,6 +6,7 @@
 */
 #include <hycobodies.h>
 #include <hycotao.h>
+#include <petscblaslapack.h>
 #include <string.h>
 
 #define ROUNDS 60    /* of joining contacts */
@@ -21,6 +22,7 @@ PetscErrorCode HycoBodiesCreate(HycoSubstructures *bodies)
 PetscErrorCode HycoBodiesReset(HycoBodiesWork o)
 {
   PetscFunctionBegin;
+  PetscCall(HycoBodiesForgetKept(o));
   PetscCall(HycoFEDestroy(&o->fe));
   PetscCall(HycoTaoDestroy(&o->tao));
   PetscCall(HycoSolverDestroy(&o->own));
@@ -88,6 +90,14 @@ PetscErrorCode HycoBodiesWeights(HycoSubstructures b, PetscInt k, const PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* to += factor times from, n numbers. */
+static void Add(PetscInt n, PetscReal factor, const PetscReal from[], PetscReal to[])
+{
+  const PetscBLASInt size = (PetscBLASInt)n, one = 1;
+
+  BLASaxpy_(&size, &factor, from, &one, to, &one);
+}
+
 /* sum = the sum of the n_samples of n numbers each, times their weights. */
 static void Blend(PetscInt n_samples, const PetscReal weight[], PetscInt n, const PetscReal data[], PetscReal sum[])
 {
@@ -150,10 +160,21 @@ static PetscErrorCode TakeReference(HycoBodiesWork o, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Room for the entries of the rows in the bodies' axes. */
+static PetscErrorCode GrowRows(HycoBodiesWork o, PetscInt room)
+{
+  PetscFunctionBegin;
+  if (room <= o->row_room) PetscFunctionReturn(PETSC_SUCCESS);
+  o->row_room = room;
+  PetscCall(PetscRealloc((size_t)room * sizeof(*o->row_at), &o->row_at));
+  PetscCall(PetscRealloc((size_t)room * sizeof(*o->row), &o->row));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoBodiesSetUp(HycoBodiesWork o, HycoSubstructures b, HycoScene scene, const HycoBodiesSurface *s,
                                HycoSolver solver)
 {
-  const PetscInt m = s->pairs->n, entries = HycoPairsWidth(s->pairs) * b->dim * m;
+  const PetscInt m = s->pairs->n;
 
   PetscFunctionBegin;
   o->bodies = b;
@@ -162,6 +183,7 @@ PetscErrorCode HycoBodiesSetUp(HycoBodiesWork o, HycoSubstructures b, HycoScene 
   PetscCall(PetscCalloc1(b->n, &o->weight));
   for (PetscInt k = 0; k < b->n; k++) PetscCall(PetscMalloc1(b->body[k].n_samples, &o->weight[k]));
   PetscCall(HycoFECreate(scene, b->probe, &o->fe));
+  o->fe->heat_is_load = PETSC_TRUE;
   PetscCall(PetscMalloc1(3 * b->probe->nv * b->n, &o->X0));
   PetscCall(PetscMalloc1(b->n, &o->E0));
   PetscCall(PetscMalloc1(b->n, &o->E_at));
@@ -178,8 +200,7 @@ PetscErrorCode HycoBodiesSetUp(HycoBodiesWork o, HycoSubstructures b, HycoScene 
   PetscCall(PetscCalloc1(b->ns + b->ni + 1, &o->u));
   PetscCall(PetscCalloc1(b->ns + 1, &o->f));
   PetscCall(PetscMalloc1(m + 1, &o->row_start));
-  PetscCall(PetscMalloc1(entries * b->dim + 1, &o->row_at));
-  PetscCall(PetscMalloc1(entries * b->dim + 1, &o->row));
+  PetscCall(GrowRows(o, HycoPairsWidth(s->pairs) * b->dim * m * b->dim + 1));
   PetscCall(PetscMalloc1(m + 1, &o->gap));
   PetscCall(PetscMalloc1(m + 1, &o->active));
   PetscCall(HycoTaoCreate(PETSC_COMM_SELF, NULL, &o->tao));
@@ -308,6 +329,7 @@ static PetscErrorCode TurnRows(HycoBodiesWork o, const HycoBodiesSurface *s)
   PetscInt n = 0;
 
   PetscFunctionBegin;
+  PetscCall(GrowRows(o, rows->start[s->pairs->n] * dim + 1)); /* mortars may meet more masters than before */
   o->row_start[0] = 0;
   for (PetscInt k = 0; k < s->pairs->n; k++) {
     for (PetscInt e = rows->start[k]; e < rows->start[k + 1]; e++) {
@@ -380,8 +402,14 @@ static PetscErrorCode Gather(HycoBodiesWork o, Problem *p)
       for (PetscInt j = p->first[k]; j < i; j++) {
         const PetscReal *column = C + (size_t)(p->place[j] - lo) * (size_t)own->n;
 
-        for (PetscInt d = p->first[k]; d < i; d++) *to++ += weight * column[p->place[d] - lo];
+        to += j - p->first[k]; /* the lower triangle */
+        for (PetscInt d = j; d < i; d++) *to++ += weight * column[p->place[d] - lo];
       }
+    }
+    for (PetscInt j = 0; j < i - p->first[k]; j++) {
+      const size_t n = (size_t)(i - p->first[k]);
+
+      for (size_t d = (size_t)j + 1; d < n; d++) p->C[k][d * n + (size_t)j] = p->C[k][(size_t)j * n + d];
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -396,9 +424,25 @@ static void Respond(HycoBodiesWork o, const Problem *p, PetscInt contact)
   for (PetscInt j = o->row_start[contact]; j < o->row_start[contact + 1]; j++) {
     const PetscInt at = p->at[o->row_at[j]], body = BodyOf(b, o->row_at[j]), lo = p->first[body];
     const PetscInt n = p->first[body + 1] - lo;
-    const PetscReal *column = p->C[body] + (size_t)(at - lo) * (size_t)n, value = o->row[j];
 
-    for (PetscInt i = 0; i < n; i++) p->y[lo + i] += value * column[i];
+    Add(n, o->row[j], p->C[body] + (size_t)(at - lo) * (size_t)n, p->y + lo);
+  }
+}
+
+/* row[j] = W of the contact with those in the problem from number `first` on. */
+static void FillRow(HycoBodiesWork o, Problem *p, PetscInt first, PetscReal row[])
+{
+  if (o->kept.same) {
+    HycoBodiesKeptRow(o, p->contact[first], p->n - first, p->contact + first, row);
+    return;
+  }
+  Respond(o, p, p->contact[first]);
+  for (PetscInt j = 0; j < p->n - first; j++) {
+    const PetscInt contact = p->contact[first + j];
+
+    row[j] = 0;
+    for (PetscInt e = o->row_start[contact]; e < o->row_start[contact + 1]; e++)
+      row[j] += o->row[e] * p->y[p->at[o->row_at[e]]];
   }
 }
 
@@ -409,8 +453,9 @@ static PetscErrorCode Fill(HycoBodiesWork o, Problem *p)
   const size_t n = (size_t)(b->p + p->n);
 
   PetscFunctionBegin;
-  PetscCall(FindTouched(o, p));
-  PetscCall(Gather(o, p));
+  PetscCall(HycoBodiesKeep(o, p->n, p->contact));
+  if (!o->kept.same) PetscCall(FindTouched(o, p));
+  if (!o->kept.same) PetscCall(Gather(o, p));
   PetscCall(PetscCalloc1(n * n + 1, &p->M));
   PetscCall(PetscCalloc3(n + 1, &p->q, n + 1, &p->z, p->n_place + 1, &p->y));
   for (PetscInt i = 0; i < b->p; i++) {
@@ -421,14 +466,8 @@ static PetscErrorCode Fill(HycoBodiesWork o, Problem *p)
     const size_t column = (size_t)(b->p + k);
 
     p->q[column] = o->gap[contact];
-    Respond(o, p, contact);
-    for (PetscInt j = k; j < p->n; j++) {
-      PetscReal sum = 0;
-
-      for (PetscInt e = o->row_start[p->contact[j]]; e < o->row_start[p->contact[j] + 1]; e++)
-        sum += o->row[e] * p->y[p->at[o->row_at[e]]];
-      p->M[column * n + (size_t)(b->p + j)] = p->M[(size_t)(b->p + j) * n + column] = sum;
-    }
+    FillRow(o, p, k, p->M + column * n + column);
+    for (size_t j = column; j < n; j++) p->M[j * n + column] = p->M[column * n + j];
     for (PetscInt i = 0; i < b->p; i++) {
       PetscReal sum = 0;
 
@@ -503,8 +542,8 @@ static PetscErrorCode SolveProblem(HycoBodiesWork o, Problem *p, PetscReal Lambd
   for (PetscInt i = 0; i < b->p; i++) o->x[i] = p->z[i];
   for (PetscInt k = 0; k < p->n; k++) /* negative by round-off; the residuals are recomputed */
     Lambda[p->contact[k]] = b->p && !o->active[k] ? 0 : PetscMax(p->z[b->p + k], 0);
-  for (PetscInt k = 0; k < b->n; k++) PetscCall(PetscFree(p->C[k]));
-  PetscCall(PetscFree2(p->first, p->C));
+  for (PetscInt k = 0; p->C && k < b->n; k++) PetscCall(PetscFree(p->C[k]));
+  if (p->C) PetscCall(PetscFree2(p->first, p->C));
   HycoFreeAll(&p->M, &p->at, &p->place);
   PetscCall(PetscFree3(p->q, p->z, p->y));
   p->n_place = 0;
@@ -512,17 +551,19 @@ static PetscErrorCode SolveProblem(HycoBodiesWork o, Problem *p, PetscReal Lambd
 }
 
 /* u = free - C f / kappa + Z x */
-static void Displace(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal Lambda[])
+static PetscErrorCode Displace(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal Lambda[])
 {
   const HycoSubstructures b = o->bodies;
 
-  PetscCallVoid(PetscArrayzero(o->f, b->ns));
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(o->f, b->ns));
   for (PetscInt k = 0; k < s->pairs->n; k++) {
     for (PetscInt j = o->row_start[k]; Lambda[k] > 0 && j < o->row_start[k + 1]; j++)
       o->f[o->row_at[j]] += o->row[j] * Lambda[k];
   }
-  PetscCallVoid(PetscArraycpy(o->u, o->free, b->ns));
-  for (PetscInt k = 0; k < b->n; k++) {
+  PetscCall(PetscArraycpy(o->u, o->free, b->ns));
+  if (o->kept.same) PetscCall(HycoBodiesKeptDisplace(o, s->pairs->n, Lambda, o->u));
+  for (PetscInt k = 0; k < b->n && !o->kept.same; k++) {
     const HycoSubstructure *own = &b->body[k];
     PetscReal *u = o->u + b->start[k];
 
@@ -531,15 +572,15 @@ static void Displace(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscRe
 
       for (PetscInt q = 0; force != 0 && q < own->n_samples; q++) {
         const PetscReal *column = own->C + ((size_t)q * (size_t)own->n + (size_t)j) * (size_t)own->n;
-        const PetscReal share = o->weight[k][q] * force;
 
-        for (PetscInt i = 0; i < own->n; i++) u[i] -= column[i] * share;
+        Add(own->n, -o->weight[k][q] * force, column, u);
       }
     }
   }
   for (PetscInt i = 0; i < b->ns; i++) {
     for (PetscInt j = 0; j < b->p; j++) o->u[i] += o->Z[i * b->p + j] * o->x[j];
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Adds the contacts outside the problem that penetrate in the present displacements; *more: there are some. */
@@ -579,7 +620,7 @@ static PetscErrorCode SolveRounds(HycoBodiesWork o, const HycoBodiesSurface *s, 
   PetscCall(PetscArrayzero(o->x, b->p));
   for (PetscInt round = 0; more && *solved && round < ROUNDS; round++) {
     if (p->n) PetscCall(SolveProblem(o, p, Lambda, solved));
-    Displace(o, s, Lambda);
+    PetscCall(Displace(o, s, Lambda));
     Join(o, s, size, in, p, &more);
   }
   if (*solved && more) o->reason = HYCO_DIVERGED_ITERATIONS;
@@ -595,6 +636,7 @@ PetscErrorCode HycoBodiesPrepare(HycoBodiesWork o, const HycoBodiesSurface *s, c
   PetscCall(Load(o));
   PetscCall(BlendMotions(o));
   PetscCall(TurnRows(o, s));
+  PetscCall(HycoBodiesKeepRows(o, s->pairs->n));
   PetscCall(HycoBodiesStrain(o, s, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -622,7 +664,15 @@ PetscErrorCode HycoBodiesStrain(HycoBodiesWork o, const HycoBodiesSurface *s, co
 
 void HycoBodiesGiven(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal Lambda[])
 {
-  Displace(o, s, Lambda);
+  PetscInt *closed, n = 0;
+
+  PetscCallVoid(PetscMalloc1(s->pairs->n + 1, &closed));
+  for (PetscInt k = 0; k < s->pairs->n; k++) {
+    if (Lambda[k] > 0) closed[n++] = k;
+  }
+  PetscCallVoid(HycoBodiesKeep(o, n, closed));
+  PetscCallVoid(PetscFree(closed));
+  PetscCallVoid(Displace(o, s, Lambda));
 }
 
 PetscErrorCode HycoBodiesContact(HycoBodiesWork o, const HycoBodiesSurface *s, PetscReal Lambda[], PetscBool *solved)
@@ -695,68 +745,60 @@ void HycoBodiesMove(HycoBodiesWork o, const HycoBodiesSurface *s, PetscReal U[])
   }
 }
 
-/* The forces of a body that are not zero, and their places in it. */
-typedef struct {
-  PetscInt n, *at;
-  PetscReal *value;
-} Forces;
-
-/* to += share times the rows of n displacements of a body, at one of its samples. */
-static void AddRows(HycoBodiesWork o, PetscInt k, const Forces *f, PetscReal share, PetscInt n, size_t row,
-                    PetscReal to[])
+/* row = (a c - H f) / kappa + g x for all rows of body k at one of its samples. */
+static void RowsOf(HycoBodiesWork o, PetscInt k, PetscInt sample, PetscInt n, PetscReal row[])
 {
   const HycoSubstructures b = o->bodies;
   const HycoSubstructure *own = &b->body[k];
-  const PetscReal *H = own->H + row * (size_t)own->n, *a = own->a + row * (size_t)b->r,
-                  *g = own->g + row * (size_t)b->p;
+  const size_t before = (size_t)sample * (size_t)n;
+  const PetscReal *H = own->H + before * (size_t)own->n, *a = own->a + before * (size_t)b->r,
+                  *g = own->g + before * (size_t)b->p;
 
-  for (PetscInt i = 0; i < n; i++, H += own->n, a += b->r, g += b->p) {
-    PetscReal elastic = 0, rigid = 0;
-
-    for (PetscInt d = 0; d < b->r; d++) elastic += a[d] * o->c[d];
-    for (PetscInt d = 0; d < f->n; d++) elastic -= H[f->at[d]] * f->value[d];
-    for (PetscInt d = 0; d < b->p; d++) rigid += g[d] * o->x[d];
-    to[i] += share * (elastic / o->kappa[k] + rigid);
+  for (PetscInt i = 0; i < n; i++, a += b->r) {
+    row[i] = 0;
+    for (PetscInt d = 0; d < b->r; d++) row[i] += a[d] * o->c[d];
+  }
+  for (PetscInt d = 0; d < own->n; d++, H += n) {
+    if (o->f[b->start[k] + d] != 0) Add(n, -o->f[b->start[k] + d], H, row);
+  }
+  for (PetscInt i = 0; i < n; i++, g += b->p) {
+    row[i] /= o->kappa[k];
+    for (PetscInt d = 0; d < b->p; d++) row[i] += g[d] * o->x[d];
   }
 }
 
-/* Of body k, whose forces have room in f. */
-static void ExpandBody(HycoBodiesWork o, PetscInt k, Forces *f, PetscReal gamma[])
+/* The modes of body k in its turns, and its unknowns inside. */
+static PetscErrorCode ExpandBody(HycoBodiesWork o, PetscInt k, PetscReal gamma[])
 {
   const HycoSubstructures b = o->bodies;
   const HycoSubstructure *own = &b->body[k];
-  const PetscInt turns = b->turn_start[k + 1] - b->turn_start[k];
+  const PetscInt turns = b->turn_start[k + 1] - b->turn_start[k], n = turns * own->l + own->m;
+  PetscReal *row;
 
-  f->n = 0;
-  for (PetscInt i = 0; i < own->n; i++) {
-    if (o->f[b->start[k] + i] == 0) continue;
-    f->at[f->n] = i;
-    f->value[f->n++] = o->f[b->start[k] + i];
-  }
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n + 1, &row));
   for (PetscInt s = 0; s < own->n_samples; s++) {
-    const size_t row = (size_t)s * (size_t)(turns * own->l + own->m);
-
+    RowsOf(o, k, s, n, row);
     for (PetscInt j = 0; j < turns; j++) {
       PetscReal share = 0;
 
       for (PetscInt d = 0; d < 9; d++) share += b->G[9 * (b->turn_start[k] + j) + d] * o->pose[k].Q[d];
-      AddRows(o, k, f, share * o->weight[k][s], own->l, row + (size_t)(j * own->l), gamma + b->mode_start[k]);
+      Add(own->l, share * o->weight[k][s], row + j * own->l, gamma + b->mode_start[k]);
     }
-    AddRows(o, k, f, o->weight[k][s], own->m, row + (size_t)(turns * own->l), o->u + b->ns + b->inner_start[k]);
+    Add(own->m, o->weight[k][s], row + turns * own->l, o->u + b->ns + b->inner_start[k]);
   }
+  PetscCall(PetscFree(row));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoBodiesExpand(HycoBodiesWork o, PetscReal gamma[])
 {
   const HycoSubstructures b = o->bodies;
-  Forces f;
 
   PetscFunctionBegin;
   PetscCall(PetscArrayzero(gamma, b->l));
   PetscCall(PetscArrayzero(o->u + b->ns, b->ni));
-  PetscCall(PetscMalloc2(b->ns + 1, &f.at, b->ns + 1, &f.value));
-  for (PetscInt k = 0; k < b->n; k++) ExpandBody(o, k, &f, gamma);
-  PetscCall(PetscFree2(f.at, f.value));
+  for (PetscInt k = 0; k < b->n; k++) PetscCall(ExpandBody(o, k, gamma));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

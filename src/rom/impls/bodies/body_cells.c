@@ -7,8 +7,8 @@
 #include <hycofields.h>
 #include <hycoquantities.h>
 
-#define MOST_INNER   2400 /* unknowns: a row and a solve each */
-#define MOST_NUMBERS 6e6  /* of their rows in the file */
+#define MOST_INNER   1200 /* unknowns: a row and a solve each */
+#define MOST_NUMBERS 3e6  /* of their rows in the file */
 #define LEAST_SCORE  0.1
 
 PetscErrorCode HycoBodiesAddScores(HycoReducer t, HycoBodiesFactor *factor, const PetscReal u[])

@@ -12,12 +12,12 @@
 #define LEAST        20   /* samples */
 #define MOST_COLUMNS 600  /* of training paths */
 #define FULL         0.5  /* modes for each sample: with more of them the samples do not show all displacements */
-#define DOUBLINGS    3    /* of the samples then */
+#define DOUBLINGS    4    /* of the samples then */
 #define SPREAD       3    /* nodes of theta at which the displacements of each are computed */
 #define SMALL        1e-7 /* of the largest sample: smaller ones count as much as this */
-#define SCORED       40   /* displacements at a node of theta whose stresses show which cells matter */
+#define SCORED       24   /* displacements at all nodes of theta whose stresses show which cells matter */
 #define MANY         64   /* right-hand sides at once */
-#define CHECKS       32   /* points at which the displacements that the modes miss are measured, no samples */
+#define CHECKS       16   /* points at which the displacements that the modes miss are measured, no samples */
 
 /* Samples: the loads' coefficients and the surfaces' forces, a column each; the last n_checks are
    checks. */
@@ -37,7 +37,7 @@ static PetscErrorCode SolveOne(HycoBodiesWork o, const HycoBodiesSurface *s, con
 {
   PetscFunctionBegin;
   PetscCall(HycoFESetParameters(s->fe, mu));
-  PetscCall(HycoContactRows(s->fe, s->pairs, s->rows->start, s->rows->dof, s->rows->value, s->rows->gap));
+  PetscCall(HycoRowsFill(s->fe, s->pairs, s->rows));
   PetscCall(HycoBodiesSolve(o, s, mu, Lambda, solved));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -109,7 +109,7 @@ static PetscErrorCode TakePaths(HycoReducer t, HycoBodiesWork o, const HycoBodie
 
     PetscCall(HycoReducerColumn(t, k, mu));
     PetscCall(HycoFESetParameters(s->fe, mu));
-    PetscCall(HycoContactRows(s->fe, s->pairs, s->rows->start, s->rows->dof, s->rows->value, s->rows->gap));
+    PetscCall(HycoRowsFill(s->fe, s->pairs, s->rows));
     PetscCall(HycoBodiesPrepare(o, s, mu));
     HycoBodiesGiven(o, s, t->Lambda + (size_t)k * (size_t)s->pairs->n);
     PetscCall(PetscArraycpy(sampled->c + sampled->n * b->r, o->c, b->r));
@@ -283,7 +283,7 @@ static PetscErrorCode ExpandNode(HycoReducer t, HycoBodiesFactor *factor, PetscI
   PetscCall(PetscRealloc((n_dof * (size_t)(sampled->n_U + n + b->p) + 1) * sizeof(PetscReal), &sampled->U));
   U = sampled->U + n_dof * (size_t)sampled->n_U;
   PetscCall(ExpandSamples(b, factor, sampled, n, sample, U));
-  for (PetscInt k = 0; k < n && !t->scene->n_times; k += 1 + n / SCORED)
+  for (PetscInt k = 0; k < n && !t->scene->n_times; k += 1 + n * nodes / SCORED)
     PetscCall(HycoBodiesAddScores(t, factor, U + n_dof * (size_t)k));
   sampled->n_U += n;
   if (!sampled->expanded) {
@@ -500,6 +500,7 @@ static PetscErrorCode MeasureLeft(HycoReducer t, HycoBodiesFactor *factor, const
   PetscCall(PetscCalloc1(n, &lost));
   PetscCall(PetscMalloc1(n + 1, &sample));
   for (PetscInt k = 0; k < n; k++) sample[k] = sampled->n - n + k;
+  if (b->n_theta) PetscCall(HycoBodiesRefactor(t, factor, factor->record[factor->n_records - 1].theta)); /* no sample */
   PetscCall(ExpandSamples(b, factor, sampled, n, sample, U));
   PetscCall(PetscFree(sample));
   PetscCall(Squares(factor->fom, n, U, all));
@@ -643,7 +644,8 @@ static PetscErrorCode BodyCoefficients(HycoReducer t, HycoBodiesFactor *factor, 
     for (PetscInt j = 0; j < many; j++) {
       const size_t row = (size_t)(sample * rows + first + j);
 
-      PetscCall(PetscArraycpy(s->H + row * (size_t)s->n, u + j * b->ns + b->start[k], s->n));
+      for (PetscInt d = 0; d < s->n; d++)
+        s->H[(size_t)(sample * s->n + d) * (size_t)rows + (size_t)(first + j)] = u[j * b->ns + b->start[k] + d];
       PetscCall(PetscArraycpy(s->g + row * (size_t)b->p, g + j * b->p, b->p));
       for (PetscInt d = 0; d < b->r; d++) PetscCall(VecDot(v[j], x[d], &s->a[row * (size_t)b->r + (size_t)d]));
       for (PetscInt d = 0; d < factor->n_strains; d++)
@@ -717,7 +719,6 @@ static PetscErrorCode ModesOf(HycoReducer t, HycoBodiesFactor *factor, PetscInt 
   if (!t->scene->n_times) PetscCall(HycoBodiesChooseCells(t, factor)); /* else those with laws are chosen */
   PetscCall(PetscFree(b->mode_start));
   PetscCall(FindModes(t, factor, sampled->n_U, sampled->U, V, sigma));
-  if (!b->n_theta && !t->scene->n_times) PetscCall(MeasureLeft(t, factor, sampled, *V));
   *enough = PETSC_TRUE;
   for (PetscInt k = 0; k < b->n; k++)
     *enough = (PetscBool)(*enough && b->mode_start[k + 1] - b->mode_start[k] <= FULL * sampled->expanded);
@@ -748,6 +749,7 @@ PetscErrorCode HycoBodiesFields(HycoReducer t, HycoSnapshots store, HycoBodiesFa
     PetscCall(PetscFree(sigma));
     ierr = ModesOf(t, factor, n, &sampled, &V, &sigma, &enough);
   }
+  if (!ierr && !t->scene->n_times) ierr = MeasureLeft(t, factor, &sampled, V);
   HycoFreeAll(&sampled.c, &sampled.f, &sampled.U);
   PetscCall(ierr);
   PetscCall(Coefficients(t, factor, V));

@@ -368,14 +368,60 @@ static PetscErrorCode Yields(HycoReducer t, PetscBool *yields)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The contributions of cells to alpha for each mode, work^-1 times that of q_k on the modes' displacements, a column for
-   each pair, by the modes' sizes: rows in the file's order. Collective. */
-static PetscErrorCode Contributions(HycoReducer t, HycoBodiesFactor *factor, const PetscReal inverse[], PetscInt n_k,
-                                    Mat *S)
+/* Columns of X become X M, with M m x l column major; x: their number, then l. Collective. */
+static PetscErrorCode Combine(PetscInt m, PetscInt l, const PetscReal M[], Vec X[])
+{
+  Vec *Y;
+
+  PetscFunctionBegin;
+  PetscCall(VecDuplicateVecs(X[0], l, &Y));
+  for (PetscInt j = 0; j < l; j++) PetscCall(VecMAXPY(Y[j], m, M + j * m, X));
+  for (PetscInt k = 0; k < m; k++) {
+    PetscCall(VecDestroy(&X[k]));
+    if (k < l) X[k] = Y[k];
+  }
+  PetscCall(PetscFree(Y));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Takes the modes' displacements that have energy, orthonormal in it: the inelastic forces of the paths are sums of
+   sigma_k q_k, so that the eigenvectors of their displacements' Gram matrix are those of a POD of the displacements.
+   work[m x m]: Q^T K^-1 Q. The modes of the forces stay. Collective. */
+static PetscErrorCode Orthogonalise(HycoReducer t, HycoBodiesFactor *factor, const PetscReal work[])
+{
+  HycoBodiesTraining s = HycoTrainingOfBodies(t);
+  HycoSubstructures b = s->bodies;
+  HycoBodiesInelastic in = b->inelastic;
+  const PetscInt m = in->m;
+  const PetscReal *scale = s->strains.sigma;
+  PetscReal *gram, *M, *sigma, *P;
+  PetscInt l;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(m * m, &gram, m, &sigma));
+  for (PetscInt i = 0; i < m * m; i++) gram[i] = scale[i / m] * work[i] * scale[i % m];
+  PetscCall(HycoPODGram(m, gram, s->inelastic_tol, 0, &M, &l, sigma));
+  for (PetscInt i = 0; i < m * l; i++) M[i] *= scale[i % m];
+  PetscCall(Combine(m, l, M, factor->strain));
+  PetscCall(PetscCalloc1((size_t)b->ns * (size_t)l + 1, &P));
+  for (PetscInt i = 0; i < b->ns; i++) {
+    for (PetscInt d = 0; d < l * m; d++) P[i * l + d / m] += in->P[i * m + d % m] * M[d];
+  }
+  PetscCall(PetscFree(in->P));
+  in->P = P;
+  in->m = factor->n_strains = l;
+  PetscCall(PetscFree(M));
+  PetscCall(PetscFree2(gram, sigma));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The work of the largest n_k modes of the forces on the modes' displacements in each cell, a column for each pair, by
+   the forces' sizes: rows in the file's order. Collective. */
+static PetscErrorCode Contributions(HycoReducer t, HycoBodiesFactor *factor, PetscInt n_k, Mat *S)
 {
   const HycoBasis *modes = &HycoTrainingOfBodies(t)->strains;
   HycoMesh part = t->fom->part;
-  const PetscInt m = modes->l, n = part->nv * part->dim;
+  const PetscInt m = factor->n_strains, n = part->nv * part->dim;
   const HycoFileOrder *order;
   const PetscScalar *V;
   PetscReal *u, *q, *value, *rows;
@@ -405,12 +451,8 @@ static PetscErrorCode Contributions(HycoReducer t, HycoBodiesFactor *factor, con
         value[e / n * m + i] += q[e] * u[(size_t)i * (size_t)(part->n_nodes * part->dim) + (size_t)unknown];
     }
     PetscCall(HycoFOMToRows(t->fom, HYCO_ON_CELLS, MPIU_REAL, m, value, rows));
-    for (PetscInt e = 0; e < n_rows * m; e++) {
-      PetscReal sum = 0;
-
-      for (PetscInt i = 0; i < m; i++) sum += inverse[e % m * m + i] * rows[e / m * m + i];
-      s[(size_t)(k * m + e % m) * (size_t)lds + (size_t)(e / m)] = modes->sigma[k] * sum;
-    }
+    for (PetscInt e = 0; e < n_rows * m; e++)
+      s[(size_t)(k * m + e % m) * (size_t)lds + (size_t)(e / m)] = modes->sigma[k] * rows[e];
   }
   PetscCall(MatDenseRestoreArray(*S, &s));
   PetscCall(MatAssemblyBegin(*S, MAT_FINAL_ASSEMBLY));
@@ -448,9 +490,9 @@ static PetscErrorCode MarkElastic(HycoReducer t, PetscBool **elastic)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Galerkin's method on the modes' displacements K^-1 q_k, with a cubature: alpha = (Q^T K^-1 Q)^-1 sum of w_e (K^-1
-   Q)_e^T q_e. weight: of the cells. Collective. */
-static PetscErrorCode Cubature(HycoReducer t, HycoBodiesFactor *factor, const PetscReal inverse[], PetscReal **weight)
+/* Galerkin's method on the modes' displacements A, orthonormal in energy, with a cubature: alpha = sum of w_e A_e^T q_e.
+   weight: of the cells. Collective. */
+static PetscErrorCode Cubature(HycoReducer t, HycoBodiesFactor *factor, PetscReal **weight)
 {
   HycoBodiesTraining s = HycoTrainingOfBodies(t);
   HycoBodiesInelastic in = s->bodies->inelastic;
@@ -460,8 +502,8 @@ static PetscErrorCode Cubature(HycoReducer t, HycoBodiesFactor *factor, const Pe
   Mat S, W;
 
   PetscFunctionBegin;
-  while (n_k < in->m && s->strains.sigma[n_k] > s->cubature_tol * s->strains.sigma[0]) n_k++;
-  PetscCall(Contributions(t, factor, inverse, n_k, &S));
+  while (n_k < s->strains.l && s->strains.sigma[n_k] > s->cubature_tol * s->strains.sigma[0]) n_k++;
+  PetscCall(Contributions(t, factor, n_k, &S));
   PetscCall(PetscCalloc1(in->m * n_k + 1, &sigma));
   PetscCall(HycoReducerPOD(t, S, s->cubature_tol * s->cubature_tol, 0, &W, &n, sigma));
   PetscCall(MatDestroy(&S));
@@ -476,9 +518,8 @@ static PetscErrorCode Cubature(HycoReducer t, HycoBodiesFactor *factor, const Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* T = w_e A_e (Q^T K^-1 Q)^-1, from the rows A of the cells; and the modes there. Collective. */
-static PetscErrorCode FillGalerkin(HycoReducer t, const Unknowns *at, const PetscReal inverse[],
-                                   const PetscReal weight[])
+/* T = w_e A_e, from the rows A of the cells. Collective. */
+static PetscErrorCode FillGalerkin(HycoReducer t, const Unknowns *at, const PetscReal weight[])
 {
   HycoBodiesInelastic in = HycoTrainingOfBodies(t)->bodies->inelastic;
   HycoMesh part = t->fom->part;
@@ -497,7 +538,7 @@ static PetscErrorCode FillGalerkin(HycoReducer t, const Unknowns *at, const Pets
 
       PetscCall(PetscFindInt((part->node_whole ? part->node_whole[node] : node) * part->dim + k % part->dim, at->n,
                              at->dof, &row));
-      for (PetscInt d = 0; d < m * m && row >= 0; d++) T[d % m] += weight[cell] * in->A[row * m + d / m] * inverse[d];
+      for (PetscInt d = 0; d < m && row >= 0; d++) T[d] = weight[cell] * in->A[row * m + d];
     }
   }
   HycoAllreduce(in->T, m * in->n_cells * n, MPIU_REAL, MPI_SUM, HycoComm(t));
@@ -505,8 +546,7 @@ static PetscErrorCode FillGalerkin(HycoReducer t, const Unknowns *at, const Pets
 }
 
 /* The cells and their rows for forces, loads and modes. weight: of the cells, NULL: interpolation. Collective. */
-static PetscErrorCode FillCells(HycoReducer t, HycoBodiesFactor *factor, const PetscReal inverse[],
-                                const PetscReal weight[], PetscReal u[])
+static PetscErrorCode FillCells(HycoReducer t, HycoBodiesFactor *factor, const PetscReal weight[], PetscReal u[])
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   HycoBodiesInelastic in = b->inelastic;
@@ -525,19 +565,16 @@ static PetscErrorCode FillCells(HycoReducer t, HycoBodiesFactor *factor, const P
   PetscCall(FillLoads(t, factor, &at, u));
   HycoAllreduce(in->A, at.n * in->m, MPIU_REAL, MPI_SUM, HycoComm(t));
   HycoAllreduce(in->R, at.n * b->r, MPIU_REAL, MPI_SUM, HycoComm(t));
-  if (weight) PetscCall(FillGalerkin(t, &at, inverse, weight));
+  if (weight) PetscCall(FillGalerkin(t, &at, weight));
   PetscCall(PetscFree(at.global));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The laws in few cells by the method that fits them. weight: of the cells, NULL: interpolation. Collective. */
-static PetscErrorCode ChooseCells(HycoReducer t, HycoBodiesFactor *factor, const PetscReal work[], PetscReal inverse[],
-                                  PetscReal **weight)
+static PetscErrorCode ChooseCells(HycoReducer t, HycoBodiesFactor *factor, const PetscReal work[], PetscReal **weight)
 {
   HycoBodiesTraining s = HycoTrainingOfBodies(t);
   HycoBodiesInelastic in = s->bodies->inelastic;
-  const PetscInt columns = t->fom->part->nv * t->sizes[3];
-  PetscReal *pseudo, smallest;
   PetscBool yields = (PetscBool)(s->laws == HYCO_BODIES_CUBATURE);
 
   PetscFunctionBegin;
@@ -547,11 +584,8 @@ static PetscErrorCode ChooseCells(HycoReducer t, HycoBodiesFactor *factor, const
     PetscCall(Interpolate(t));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(HycoPseudoInverse(in->m, in->m, work, 1e-14, inverse));
-  PetscCall(Cubature(t, factor, inverse, weight));
-  PetscCall(PetscCalloc1((size_t)in->m * (size_t)(in->n_cells * columns) + 1, &pseudo));
-  PetscCall(TakeThere(t, pseudo, &smallest));
-  PetscCall(PetscFree(pseudo));
+  PetscCall(Orthogonalise(t, factor, work));
+  PetscCall(Cubature(t, factor, weight));
   in->amplification = 1;
   in->weighted = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -561,19 +595,19 @@ PetscErrorCode HycoBodiesStrains(HycoReducer t, HycoBodiesFactor *factor)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   HycoBodiesInelastic in = b->inelastic;
-  PetscReal theta[HYCO_MAX_PARAMETERS], *u, *work, *inverse, *weight = NULL;
+  PetscReal theta[HYCO_MAX_PARAMETERS], *u, *work, *weight = NULL;
 
   PetscFunctionBegin;
   PetscCall(HycoFOMSetParameters(t->fom, b->first));
   HycoBodiesPoint(t, 0, theta);
   PetscCall(HycoBodiesRefactor(t, factor, theta));
   PetscCall(PetscCalloc1((size_t)b->ns * (size_t)in->m + 1, &in->P));
-  PetscCall(PetscMalloc3(b->ns + 1, &u, in->m * in->m + 1, &work, in->m * in->m + 1, &inverse));
+  PetscCall(PetscMalloc2(b->ns + 1, &u, in->m * in->m + 1, &work));
   PetscCall(Respond(t, factor, u, work));
-  PetscCall(ChooseCells(t, factor, work, inverse, &weight));
-  PetscCall(FillCells(t, factor, inverse, weight, u));
+  PetscCall(ChooseCells(t, factor, work, &weight));
+  PetscCall(FillCells(t, factor, weight, u));
   PetscCall(PetscFree(weight));
-  PetscCall(PetscFree3(u, work, inverse));
+  PetscCall(PetscFree2(u, work));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

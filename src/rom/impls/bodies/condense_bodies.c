@@ -7,6 +7,7 @@
 
 #define MOST_UNKNOWNS 4000 /* of the surfaces of a body: C_b is dense */
 #define MOST_ALL      8000 /* of all surfaces: the Schur complement is dense until its blocks are taken */
+#define KEPT          0.3  /* share of the memory for the factors of samples that are kept */
 #define MOST_THETA    3    /* parameters that change the shape of bodies */
 
 /* -- before the solves -- */
@@ -70,6 +71,7 @@ PetscErrorCode HycoBodiesBegin(HycoReducer t)
 
 #define SAMPLES 5  /* assumed nodes along each axis of theta */
 #define SOLVES  12 /* assumed solves for each load, mode and sample of the fields */
+#define STRAINS 40 /* assumed modes of the inelastic forces, each with unknowns of its cells of the model */
 
 PetscReal HycoBodiesOperations(HycoReducer t)
 {
@@ -77,16 +79,16 @@ PetscReal HycoBodiesOperations(HycoReducer t)
   PetscInt shape[HYCO_MAX_PARAMETERS];
   const PetscInt n = HycoBodyPartsShapes(&s->parts, -1, shape);
   const PetscReal unknowns = 2 * (PetscReal)t->sizes[2] * t->sizes[3], /* slaves and about as many masters */
-      samples = PetscMin(PetscPowRealInt(SAMPLES, n), (PetscReal)s->most_samples);
+      samples = PetscMin(PetscPowRealInt(SAMPLES, n), (PetscReal)s->most_samples),
+                  strains = t->scene->n_times ? STRAINS * (PetscReal)(s->cells * t->fom->part->nv * t->sizes[3]) : 0;
 
   return samples * (HycoReducerFactorWork(t) + unknowns * unknowns * unknowns / 3) +
-         SOLVES * (PetscReal)s->samples * HycoReducerSolveWork(t);
+         (SOLVES * (PetscReal)s->samples + strains) * HycoReducerSolveWork(t);
 }
 
 PetscBool HycoBodiesOffers(HycoReducer t, PetscBool targets, size_t length, char why[])
 {
   (void)targets;
-  if (t->scene->n_times) snprintf(why, length, "the scene has a history; name the type to train it");
   if (t->pod_memory > 0)
     snprintf(why, length,
              "its columns are not read in batches, and -hyco_pod_memory is given; name the type to train it");
@@ -252,32 +254,65 @@ static PetscErrorCode CheckMemory(HycoReducer t, HycoBodiesFactor *factor, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The stiffness at theta. Collective. */
+static PetscErrorCode AssembleAt(HycoReducer t, HycoBodiesFactor *factor, const PetscReal theta[])
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  PetscReal mu[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  PetscCall(PetscArraycpy(mu, b->first, b->n_variables));
+  for (PetscInt p = 0; p < b->n_theta; p++) mu[b->theta[p]] = theta[p];
+  factor->fom->fe->ready = PETSC_FALSE;
+  PetscCall(HycoFOMAssemble(factor->fom, mu));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A further factor beside those that are kept, or in the place of the last one if they would take more than a share of
+   the memory. Collective. */
+static PetscErrorCode NextFactor(HycoBodiesFactor *factor)
+{
+  PetscReal limit;
+  HycoSolver solver;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMGetSolver(factor->fom, &solver));
+  PetscCall(HycoSolverMemory(solver, &limit));
+  if (factor->n_kept && (factor->n_kept + 1) * factor->bytes > KEPT * limit) {
+    PetscCall(PetscFree(factor->kept[factor->n_kept - 1].theta));
+  } else {
+    PetscCall(PetscRealloc((size_t)(factor->n_kept + 1) * sizeof(*factor->kept), &factor->kept));
+    factor->kept[factor->n_kept].theta = NULL;
+    PetscCall(HycoDirectCreate(HycoComm(factor->fom), &factor->kept[factor->n_kept++].direct));
+  }
+  factor->direct = factor->kept[factor->n_kept - 1].direct;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* record: takes the blocks; NULL: they are not needed. Collective. */
 static PetscErrorCode Factor(HycoReducer t, HycoBodiesFactor *factor, const PetscReal theta[], HycoBodiesRecord *record)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   HycoFOM f = factor->fom;
-  PetscReal bytes, *M, mu[HYCO_MAX_PARAMETERS];
+  PetscReal bytes, *M;
   PetscInt kernel;
   PetscBool singular;
   size_t n;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(PetscArraycpy(mu, b->first, b->n_variables));
-  for (PetscInt p = 0; p < b->n_theta; p++) mu[b->theta[p]] = theta[p];
   PetscCall(PetscFree(factor->theta));
-  f->fe->ready = PETSC_FALSE;
-  PetscCall(HycoFOMAssemble(f, mu));
+  PetscCall(AssembleAt(t, factor, theta));
   PetscCall(HycoKernelSize(f->K, &kernel));
   if (!factor->pins) b->p = kernel;
   HycoCheckModel(kernel == b->p, "the number of rigid motions that contact alone prevents changes with the parameters, "
                                  "which a model of bodies does not support; train a hybrid model");
   PetscCall(CheckPins(t, b, factor));
-  if (!factor->direct) PetscCall(HycoDirectCreate(HycoComm(f), &factor->direct));
+  PetscCall(NextFactor(factor));
   PetscCall(HycoDirectPinKernel(factor->direct, f->K));
   PetscCall(HycoDirectAnalyse(factor->direct, f->K, NULL, factor->N, PETSC_TRUE, &bytes));
   if (!factor->z) PetscCall(CheckMemory(t, factor, bytes)); /* before the first factor */
+  factor->bytes = bytes;
   n = (size_t)(b->p + b->ns);
   PetscCall(PetscCalloc1(n * n + 1, &M));
   ierr = HycoDirectFactor(factor->direct, f->K, NULL, factor->N, M, &singular);
@@ -287,6 +322,7 @@ static PetscErrorCode Factor(HycoReducer t, HycoBodiesFactor *factor, const Pets
   HycoCheckModel(!singular, "the stiffness of the bodies is singular; check supports and springs");
   if (!factor->z) PetscCall(PetscCalloc1(b->p + b->ns + 1, &factor->z));
   HycoDuplicate(b->n_theta + 1, theta, &factor->theta);
+  HycoDuplicate(b->n_theta + 1, theta, &factor->kept[factor->n_kept - 1].theta);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -300,9 +336,18 @@ static PetscBool Same(PetscInt n, const PetscReal a[], const PetscReal b[])
 
 PetscErrorCode HycoBodiesRefactor(HycoReducer t, HycoBodiesFactor *factor, const PetscReal theta[])
 {
+  const PetscInt n = HycoTrainingOfBodies(t)->bodies->n_theta;
+
   PetscFunctionBegin;
-  if (factor->theta && Same(HycoTrainingOfBodies(t)->bodies->n_theta, theta, factor->theta))
+  if (factor->theta && Same(n, theta, factor->theta)) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt k = 0; k < factor->n_kept; k++) {
+    if (!factor->kept[k].theta || !Same(n, theta, factor->kept[k].theta)) continue;
+    PetscCall(AssembleAt(t, factor, theta));
+    PetscCall(PetscFree(factor->theta));
+    HycoDuplicate(n + 1, theta, &factor->theta);
+    factor->direct = factor->kept[k].direct;
     PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(Factor(t, factor, theta, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -392,6 +437,7 @@ static PetscErrorCode Condense(HycoReducer t, HycoSnapshots store, HycoBodiesFac
 
   PetscFunctionBegin;
   PetscCall(HycoFOMAssemble(factor->fom, b->first));
+  factor->fom->fe->heat_is_load = PETSC_TRUE;
   PetscCheck(factor->fom->part->n_nodes == t->fom->part->n_nodes && factor->fom->part->first == t->fom->part->first,
              PETSC_COMM_SELF, PETSC_ERR_PLIB, "two meshes of one scene differ");
   PetscCall(HycoFOMSetParameters(t->fom, b->first));
@@ -407,7 +453,11 @@ static PetscErrorCode Condense(HycoReducer t, HycoSnapshots store, HycoBodiesFac
 static PetscErrorCode Release(HycoBodiesFactor *factor)
 {
   PetscFunctionBegin;
-  PetscCall(HycoDirectDestroy(&factor->direct));
+  for (PetscInt k = 0; k < factor->n_kept; k++) {
+    PetscCall(HycoDirectDestroy(&factor->kept[k].direct));
+    PetscCall(PetscFree(factor->kept[k].theta));
+  }
+  PetscCall(PetscFree(factor->kept));
   PetscCall(MatDestroy(&factor->N));
   for (PetscInt k = 0; k < factor->n_basis; k++) PetscCall(VecDestroy(&factor->basis[k]));
   for (PetscInt k = 0; k < factor->n_strains; k++) PetscCall(VecDestroy(&factor->strain[k]));

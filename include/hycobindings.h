@@ -1,0 +1,32 @@
+/* For bindings to other languages: the layout of the public structs. With it a binding reads results by name, without a
+   compiler and without a second declaration of each struct (python/hyco). */
+#ifndef HYCOBINDINGS_H
+#define HYCOBINDINGS_H
+
+#include <hycosys.h>
+
+#if defined(__cplusplus)
+extern "C" {
+#endif
+
+/* A member of a struct: `count` items of `size` bytes, from byte `offset` on. A struct within another contributes its
+   own members, "kkt.penetration". */
+typedef struct {
+  const char *name;
+  char
+      kind; /* 'i': signed integer or enum; 'f': real; 'S': characters, up to a 0; 'z': const char*; 'p': other pointer */
+  size_t offset, size, count;
+} HycoMember;
+
+/*
+  Gets the size in bytes of a type of the library, and the n members of a struct in their order. Types: HycoSummary,
+  HycoStep, HycoHistory, HycoReaction, HycoContactResult, HycoPrediction with all of their members; HycoTraining with
+  those of its members that are numbers or texts of the whole training; PetscInt, PetscReal and MPI_Comm with n = 0. Fails
+  for another name. `n` and `fields` may be NULL. Not collective. Borrowed from the library.
+*/
+PetscErrorCode HycoGetLayout(const char type[], size_t *size, PetscInt *n, const HycoMember *fields[]);
+
+#if defined(__cplusplus)
+}
+#endif
+#endif

@@ -1,0 +1,479 @@
+"""hyco: full-order and reduced models of parametrised unilateral contact, from Python.
+
+    import hyco
+
+    with hyco.Scene('examples/pellet') as scene:
+        full = scene.solve([4.06, 1.0])                  # full order
+        scene.train('pellet.h5', grid=[6, 4])
+    with hyco.Model('pellet.h5') as model:               # needs the file alone
+        p = model.predict([[4.06, 1.0], [4.07, 0.8]])    # many points at once
+        print(p.outputs, p.estimates)
+
+Arrays in, arrays out; only NumPy is needed. Under mpiexec every process runs the same program: scenes are solved and trained by all
+together, and many points are divided over them. Errors are hyco.Error with hyco's one line.
+"""
+import ctypes
+import warnings
+from functools import cached_property
+
+import numpy as np
+
+from . import _library as c
+from ._library import Error, NotConverged, World
+
+__all__ = ['Scene', 'Model', 'Solution', 'Prediction', 'Error', 'NotConverged', 'version', 'rank', 'size']
+
+
+def version():
+    """The library's version."""
+    return c.lib.HycoVersion().decode()
+
+
+def rank():
+    """The number of this process, from 0."""
+    c.begin()
+    return World.rank
+
+
+def size():
+    """The number of processes."""
+    c.begin()
+    return World.size
+
+
+def _parameters(scene):
+    """{name: (lo, hi)} in the scene's order."""
+    n, names, lo, hi = c.count(), *(ctypes.c_void_p() for _ in range(3))
+    c.call('HycoSceneGetParameters', scene, *(ctypes.byref(x) for x in (n, names, lo, hi)))
+    names = c.copied(names, n.value, np.uintp)
+    return {c.text(w): (float(a), float(b)) for w, a, b in zip(names, c.copied(lo, n.value), c.copied(hi, n.value))}
+
+
+def _names(function, scene):
+    """Names that a function of the scene gives."""
+    n, names = c.count(), (ctypes.c_char_p * 1024)()
+    c.call(function, scene, ctypes.byref(n), names)
+    return [w.decode() for w in names[:n.value]]
+
+
+def _points(mu, parameters):
+    """Parameter values as an array (..., parameters): a sequence, or values (or columns of a table) by name."""
+    if hasattr(mu, 'keys'):
+        lacking = [name for name in parameters if name not in mu.keys()]
+        if lacking:
+            raise Error(f'the values have no {", ".join(lacking)}; the parameters are {", ".join(parameters)}')
+        values = np.broadcast_arrays(*(np.asarray(mu[name], float) for name in parameters))
+        return np.ascontiguousarray(np.stack(values, -1)) if parameters else np.zeros(0)
+    mu = np.ascontiguousarray(mu, float)
+    if mu.ndim == 0 or mu.shape[-1] != len(parameters):
+        raise Error(f'parameter values of shape {mu.shape} were given; the last dimension must be {len(parameters)}, for '
+                    f'{", ".join(parameters) or "no parameters"}')
+    return mu
+
+
+def _one(mu, parameters):
+    mu = _points(mu, parameters)
+    if mu.ndim != 1:
+        raise Error(f'parameter values of shape {mu.shape} were given; one point is expected here: {", ".join(parameters)}')
+    return mu
+
+
+def _records(function, handle, name, *more):
+    """A list of {member: value} of an array of structs."""
+    n, pointer = c.count(), ctypes.c_void_p()
+    c.call(function, handle, ctypes.byref(n), ctypes.byref(pointer), *more)
+    texts = [member for member, (_, _, kind) in c.layout(name)[1].items() if kind == 'z']
+    rows = c.copied(pointer, n.value, c.struct(name))
+    return [{member: c.text(row[member]) if member in texts else row[member].copy() for member in rows.dtype.names} for row in rows]
+
+
+def _history(function, handle, outputs):
+    """The listed times of a path as a structured array: the members of HycoStep, then the outputs; None without a history."""
+    head = np.zeros(1, c.struct('HycoHistory'))
+    c.call(function, handle, c.address(head))
+    if not head['n'][0]:
+        return None
+    steps = c.copied(ctypes.c_void_p(int(head['step'][0])), int(head['n'][0]), c.struct('HycoStep'))
+    kinds = [(name, steps.dtype[name]) for name in steps.dtype.names if name != 'quantity']
+    table = np.zeros(len(steps), kinds + [(name, float) for name in outputs])
+    for name, _ in kinds:
+        table[name] = steps[name]
+    for k, name in enumerate(outputs):
+        table[name] = steps['quantity'][:, k]
+    return table
+
+
+class _Handle:
+    """An object of the library: closed by close() or at the end of a with block."""
+    _destroy = ''
+    _collective = True  # all processes must close it together
+
+    def __init__(self):
+        c.begin()
+        self._handle = ctypes.c_void_p()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+    def __del__(self):
+        if c is not None and c.running and getattr(self, '_handle', None) and not (self._collective and World.size > 1):
+            self.close()
+
+    def close(self):
+        """Frees the object. Closing twice is allowed."""
+        if c.running and self._handle:
+            c.call(self._destroy, ctypes.byref(self._handle))
+        self._handle = ctypes.c_void_p()
+
+    @property
+    def _open(self):
+        if not self._handle:
+            raise Error(f'this {type(self).__name__} is closed; make a new one')
+        return self._handle
+
+
+class Solution:
+    """A full-order solution, in the scene's units. It is a copy, independent of later solves.
+
+    mu                parameter values
+    outputs           {name: value} of the scene's `output:` entries
+    displacement      (nodes, dim)        on process 0, in the mesh file's order; no rows elsewhere
+    contact_forces    (contacts,)         the same; compression positive
+    stress            (cells, components) the same; xx / xx yy zz xy / xx yy zz xy yz xz
+    contacts          list of {name, n, n_active, force, moment, area, pressure}: force on the slave's side
+    reactions         list of {kind, group, force, moment} on the bodies; kind 0 support, 1 spring, 2 loads, 3 contact
+    history           of a scene with a history its listed times, a structured array; else None
+    converged, reason whether the KKT conditions hold, in words
+    summary           everything else of HycoSummary (hycofom.h): solution.summary['strain_energy']
+    """
+
+    def __init__(self, fom, mu, outputs):
+        self.mu = mu.copy()
+        self.summary = np.zeros(1, c.struct('HycoSummary'))
+        c.call('HycoFOMGetSummary', fom, c.address(self.summary))
+        self.summary = self.summary[0]
+        self.reason = c.reason(self.summary['reason'])
+        self.converged = bool(self.summary['reason'] > 0)
+        self.outputs = {name: float(self.summary['quantity'][k]) for k, name in enumerate(outputs)}
+        n = [c.count() for _ in range(3)]
+        at = [ctypes.c_void_p() for _ in range(3)]
+        c.call('HycoFOMGetSolution', fom, *(ctypes.byref(x) for pair in zip(n, at) for x in pair))
+        dim = int(self.summary['dim'])
+        self.displacement = c.copied(at[0], (n[0].value, dim))
+        self.contact_forces = c.copied(at[1], n[1].value)
+        self.stress = c.copied(at[2], (n[2].value, (1, 4, 6)[dim - 1]))
+        self.contacts = _records('HycoFOMGetContacts', fom, 'HycoContactResult')
+        self.balance = ctypes.c_double()
+        self.reactions = _records('HycoFOMGetReactions', fom, 'HycoReaction', ctypes.byref(self.balance))
+        self.balance = self.balance.value
+        self.history = _history('HycoFOMGetHistory', fom, outputs)
+
+    @property
+    def total_contact_force(self):
+        """Sum of the contact forces."""
+        return float(self.summary['total_contact_force'])
+
+
+class Scene(_Handle):
+    """A scene: a folder with scene.yaml, or a YAML file. `entries` replace those of the file, as on the command line without the dash:
+    Scene('examples/pellet', scene_mesh='fine.msh', body_pellet_young=2e5, hyco_model_type='hybrid').
+
+    parameters  {name: (lo, hi)} in the order of the points' components
+    outputs     names of the outputs
+    contacts    names of the contacts
+    times       the listed times of its history; empty without one
+    """
+    _destroy = 'HycoSceneDestroy'
+
+    def __init__(self, path, **entries):
+        super().__init__()
+        self._fom = ctypes.c_void_p()
+        _check_options(entries)
+        try:
+            for name, value in entries.items():
+                c.call('PetscOptionsSetValue', None, f'-{name}'.encode(), _word(value))
+            c.call('HycoSceneLoad', World.comm, str(path).encode(), ctypes.byref(self._handle))
+        finally:
+            for name in entries:
+                c.call('PetscOptionsClearValue', None, f'-{name}'.encode())
+        self.parameters = _parameters(self._handle)
+        self.outputs = _names('HycoSceneGetQuantities', self._handle)
+        self.contacts = _names('HycoSceneGetContacts', self._handle)
+        n, times = c.count(), ctypes.c_void_p()
+        c.call('HycoSceneGetHistory', self._handle, ctypes.byref(n), ctypes.byref(times))
+        self.times = c.copied(times, n.value)
+
+    def close(self):
+        if c.running and self._fom:
+            c.call('HycoFOMDestroy', ctypes.byref(self._fom))
+        self._fom = ctypes.c_void_p()
+        super().close()
+
+    def solve(self, mu=(), check=True):
+        """The full-order Solution at mu. check: raise NotConverged if it does not converge."""
+        handle, mu = self._open, _one(mu, self.parameters)
+        if not self._fom:
+            c.call('HycoFOMCreate', World.comm, handle, ctypes.byref(self._fom))
+        c.call('HycoFOMSolve', self._fom, c.count(len(mu)), c.address(mu))
+        solution = Solution(self._fom, mu, self.outputs)
+        if check and not solution.converged:
+            why = solution.summary['why'].decode('utf-8', 'replace')
+            raise NotConverged(f'full order at {_where(mu, self.parameters)}: {why or solution.reason}', solution)
+        return solution
+
+    def write(self, path):
+        """Writes the last solution to PATH.xdmf with PATH.h5, or PATH.vtkhdf."""
+        if not self._fom:
+            raise Error('there is no solution to write; solve first')
+        c.call('HycoFOMWrite', self._fom, str(path).encode())
+
+    def train(self, path, grid=None, points=None, scatter=None, validation=None, progress=None):
+        """Trains a model, writes it to `path` and returns it. Training points: `grid` of so many values per parameter, ends included;
+        `points` (n, parameters); `scatter` points over the ranges; or none for types that choose them. validation: held-out points
+        (n, parameters). progress(done, n): called as points are solved. Settings are those of hyco train, as entries of the Scene:
+        hyco_model_type, hyco_pod_tol, ... Solutions are kept in PATH.snapshots. Warns if the model misses its limits."""
+        handle, interrupted = self._open, []
+        reducer, samples, held = ctypes.c_void_p(), self._samples(grid, points, scatter), self._samples(None, validation, None)
+        report = np.zeros(1, c.struct('HycoTraining'))
+
+        def told(done, n, _):  # Python handles Ctrl-C only when it runs
+            try:
+                if progress:
+                    progress(done, n)
+            except BaseException as error:  # pylint: disable=broad-except
+                interrupted.append(error)
+                return 83  # PETSC_ERR_USER
+            return 0
+
+        told = ctypes.CFUNCTYPE(ctypes.c_int, c.integer()[0], c.integer()[0], ctypes.c_void_p)(told)
+        try:
+            c.call('HycoReducerCreate', World.comm, handle, ctypes.byref(reducer))
+            c.call('HycoReducerSetFromOptions', reducer)
+            if held:
+                c.call('HycoReducerSetValidation', reducer, held)
+            c.call('HycoReducerSetProgress', reducer, told, None)
+            c.call('HycoReducerRun', reducer, samples, str(path).encode(), c.address(report))
+        except Error:
+            if interrupted:
+                raise interrupted[0] from None
+            raise
+        finally:
+            c.call('HycoReducerDestroy', ctypes.byref(reducer))
+            for each in (samples, held):
+                c.call('HycoSamplesDestroy', ctypes.byref(each))
+        if report['missed'][0] and not World.rank:
+            warnings.warn(report['missed'][0].decode('utf-8', 'replace'), stacklevel=2)
+        model = Model(path)
+        model.training = report[0]
+        return model
+
+    def _samples(self, grid, points, scatter):
+        """HycoSamples of one of them; NULL without any."""
+        given = [x is not None for x in (grid, points, scatter)]
+        if sum(given) > 1:
+            raise Error('several sets of points were given; give one of grid, points, scatter')
+        samples = ctypes.c_void_p()
+        if not any(given):
+            return samples
+        c.call('HycoSamplesCreate', self._open, ctypes.byref(samples))
+        try:
+            if grid is not None:
+                counts = np.ascontiguousarray(grid, c.integer()[1]).ravel()
+                if len(counts) != len(self.parameters):
+                    raise Error(f'a grid of {len(counts)} numbers was given; {len(self.parameters)} are expected, for {", ".join(self.parameters)}')
+                c.call('HycoSamplesAddTrainingGrid', samples, c.address(counts))
+            elif points is not None:
+                for mu in _points(points, self.parameters).reshape(-1, len(self.parameters)):
+                    mu = np.ascontiguousarray(mu)
+                    c.call('HycoSamplesAddPoint', samples, c.address(mu))
+            else:
+                c.call('HycoSamplesAddScattered', samples, c.count(scatter))
+        except Error:
+            c.call('HycoSamplesDestroy', ctypes.byref(samples))
+            raise
+        return samples
+
+
+def _word(value):
+    """A value as the command line would have it."""
+    if isinstance(value, (bool, np.bool_)):
+        return b'true' if value else b'false'
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return ','.join(_word(v).decode() for v in value).encode()
+    return repr(float(value)).encode() if isinstance(value, (float, np.floating)) else str(value).encode()
+
+
+class _Option(ctypes.Structure):
+    """HycoOption of hycosys.h."""
+    _fields_ = [(name, ctypes.c_char_p) for name in ('name', 'value', 'initial', 'meaning', 'owner', 'only')]
+
+
+def _check_options(entries):
+    """Refuses an option of the library that does not exist."""
+    names = [name for name in entries if name.startswith('hyco_')]
+    n, table = c.count(), ctypes.POINTER(_Option)()
+    c.call('HycoGetOptionTable', ctypes.byref(n), ctypes.byref(table)) if names else None  # pylint: disable=expression-not-assigned
+    known = {o.name.decode() for o in table[:n.value]} if names else set()
+    for name in names:
+        if name not in known and not name.startswith(('hyco_mumps_', 'hyco_primal_', 'hyco_norm_', 'hyco_tao_', 'hyco_pod_svd_', 'hyco_pod_bv_',
+                                                       'hyco_pod_ds_')):
+            listed = (ctypes.c_char_p * len(known))(*(w.encode() for w in sorted(known)))
+            c.lib.HycoNearest.restype = ctypes.c_char_p
+            near = c.lib.HycoNearest(name.encode(), c.count(len(known)), listed)
+            raise Error(f'there is no option {name}' + (f'; did you mean {near.decode()}?' if near else ' (hyco train -help lists them)'))
+
+
+def _where(mu, parameters):
+    return ', '.join(f'{name} {value:g}' for name, value in zip(parameters, mu)) or 'no parameters'
+
+
+class Prediction:
+    """The answers of a model at one point or at many; values have the shape of the points, `shape`: () for one point.
+
+    mu              (*shape, parameters)
+    outputs         {name: value} of the scene's outputs
+    estimates       {name: estimated absolute error of that output}; NaN: the model has none
+    error_u, error_stress, error_forces   estimated relative errors of the fields; NaN: none
+    unseen          how far beyond the held-out points' regime (above 3 the estimates are not tested)
+    converged       whether the KKT conditions of the reduced system hold
+    contact_forces  (*shape, contacts), if they were asked for; else None
+    displacement    (*shape, nodes, dim) of the model's nodes (Model.node_tags), if asked for
+    data            all members of HycoPrediction (hycorom.h), a structured array; prediction['lambda_max'] is an output or a member
+    """
+
+    def __init__(self, mu, data, outputs, parameters, contact_forces=None, displacement=None):
+        self.mu, self.data, self.shape = mu, data, data.shape
+        self.contact_forces, self.displacement = contact_forces, displacement
+        self._outputs, self._parameters = outputs, parameters
+        self.converged = data['reason'] > 0 if self.shape else bool(data['reason'] > 0)
+
+    def _value(self, name, k=None):
+        """A member, or item k of one that is an array; a number for one point."""
+        value = self.data[name] if k is None else self.data[name][..., k]
+        return value if self.shape else value.item()
+
+    def _known(self, name, k=None):
+        value = self._value(name, k)
+        return np.where(value < 0, np.nan, value) if self.shape else value if value >= 0 else np.nan
+
+    @cached_property
+    def outputs(self):
+        return {name: self._value('quantity', k) for k, name in enumerate(self._outputs)}
+
+    @cached_property
+    def estimates(self):
+        return {name: self._known('estimated_error_quantity', k) for k, name in enumerate(self._outputs)}
+
+    error_u = property(lambda self: self._known('estimated_error_u'))
+    error_stress = property(lambda self: self._known('estimated_error_sigma'))
+    error_forces = property(lambda self: self._known('estimated_error_lambda'))
+    unseen = property(lambda self: self._value('unseen'))
+
+    @property
+    def total_contact_force(self):
+        """Sum of the contact forces."""
+        return self['total_contact_force']
+
+    @property
+    def reason(self):
+        """Why each solve ended, in words."""
+        words = np.vectorize(c.reason, otypes=[object])(self.data['reason'])
+        return words if self.shape else str(words)
+
+    def __getitem__(self, name):
+        return self.outputs[name] if name in self.outputs else self.data[name][()]
+
+    def table(self):
+        """{column: values}, a row per point: parameters, outputs, their estimates as NAME_estimate, total_contact_force, converged.
+        pandas.DataFrame(prediction.table()) is a table of it."""
+        columns = {name: self.mu[..., k] for k, name in enumerate(self._parameters)}
+        columns.update(self.outputs)
+        columns.update({f'{name}_estimate': value for name, value in self.estimates.items()})
+        columns.update(total_contact_force=self.data['total_contact_force'], converged=self.converged)
+        return {name: np.ravel(value) for name, value in columns.items()}
+
+
+class Model(_Handle):
+    """A reduced model from its file; nothing else is needed.
+
+    parameters  {name: (lo, hi)} of its training
+    outputs     names of the outputs
+    contacts    names of the contacts
+    type        'hybrid', 'condensed', 'bodies', ...
+    n_contacts  number of contact forces
+    """
+    _destroy = 'HycoROMDestroy'
+    _collective = False
+    training = None  # of Scene.train(): numbers and texts of HycoTraining (hycoreducer.h)
+
+    def __init__(self, path):
+        super().__init__()
+        self._extrapolate = False
+        c.call('HycoROMLoad', str(path).encode(), ctypes.byref(self._handle))
+        scene, kind = ctypes.c_void_p(), ctypes.c_char_p()
+        c.call('HycoROMGetScene', self._handle, ctypes.byref(scene))
+        c.call('HycoROMGetType', self._handle, ctypes.byref(kind))
+        self.type = kind.value.decode()
+        self.parameters = _parameters(scene)
+        self.outputs = _names('HycoSceneGetQuantities', scene)
+        self.contacts = _names('HycoSceneGetContacts', scene)
+        sizes = [c.count() for _ in range(3)]
+        c.call('HycoROMGetSizes', self._handle, *(ctypes.byref(n) for n in sizes))
+        self.n_contacts, self._n_nodes, self._dim = (n.value for n in sizes)
+
+    def predict(self, mu, contact_forces=False, displacement=False, extrapolate=False, check=True):
+        """The Prediction at mu: one point (parameters,) or many (..., parameters); or {parameter: values}, a pandas.DataFrame too.
+        Under mpiexec many points are divided over the processes, which must all call it with the same points; every process gets all
+        answers. contact_forces, displacement: return these arrays too. extrapolate: accept points outside the ranges. check: raise
+        NotConverged if a solve does not converge."""
+        handle, mu = self._open, _points(mu, self.parameters)
+        shape, n_par = mu.shape[:-1], mu.shape[-1]
+        n = int(np.prod(shape))
+        data = np.zeros(shape, c.struct('HycoPrediction'))
+        forces = np.zeros((*shape, self.n_contacts)) if contact_forces else None
+        u = np.zeros((*shape, self._n_nodes, self._dim)) if displacement else None
+        if extrapolate != self._extrapolate:
+            c.call('HycoROMSetExtrapolate', handle, ctypes.c_int(bool(extrapolate)))
+            self._extrapolate = extrapolate
+        if shape or contact_forces or displacement:
+            where = ('HycoROMSolveShared', World.comm) if shape and World.size > 1 else ('HycoROMSolveMany',)
+            c.call(*where, handle, c.count(n), c.count(n_par), c.address(mu), c.address(data), c.address(forces), c.address(u))
+        if not shape:  # the one that contacts(), history(), write() are about
+            c.call('HycoROMPredict', handle, c.count(n_par), c.address(mu))
+            c.call('HycoROMGetPrediction', handle, c.address(data))
+        result = Prediction(mu, data, self.outputs, self.parameters, forces, u)
+        if check and not (np.all(result.converged) if shape else result.converged):
+            bad = np.flatnonzero(~np.atleast_1d(result.converged).ravel())
+            at = mu.reshape(-1, n_par)[bad[0]]
+            raise NotConverged(f'{len(bad)} of {n} predictions, the first at {_where(at, self.parameters)}: '
+                               f'{c.reason(data.ravel()[bad[0]]["reason"])}', result)
+        return result
+
+    # ---- of the last prediction at one point
+
+    def contact_results(self):
+        """Of the last single prediction: list of {name, n, n_active, force, moment, area, pressure}, as Solution.contacts."""
+        return _records('HycoROMGetContacts', self._open, 'HycoContactResult')
+
+    def history(self):
+        """Of the last single prediction of a path: its listed times, a structured array; None for other models."""
+        return _history('HycoROMGetHistory', self._open, self.outputs)
+
+    def whole_displacement(self):
+        """Of the last single prediction: (nodes, dim) of the whole mesh, in the mesh file's order."""
+        n, at = c.count(), ctypes.c_void_p()
+        c.call('HycoROMGetWholeU', self._open, ctypes.byref(n), ctypes.byref(at))
+        return c.copied(at, (n.value, self._dim))
+
+    def node_tags(self):
+        """Of the last single prediction: the mesh file's tags of the nodes of Prediction.displacement."""
+        n, tags = c.count(), ctypes.c_void_p()
+        c.call('HycoROMGetRID', self._open, ctypes.byref(n), ctypes.byref(tags), None, None, None, None)
+        return c.copied(tags, n.value, c.integer()[1])
+
+    def write(self, path):
+        """Writes the last single prediction on the whole mesh to PATH.xdmf with PATH.h5, or PATH.vtkhdf."""
+        c.call('HycoROMWrite', self._open, str(path).encode())

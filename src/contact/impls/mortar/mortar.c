@@ -1,0 +1,95 @@
+/*
+  Mortar contacts: the gap of a slave node is the mean of the distance over the slave's facets around it, weighted by a
+  dual function, so that a uniform pressure passes between meshes that do not match.
+*/
+#include "../../facing.h"
+#include "mortar.h"
+
+/* Refuses what the integrals do not cover. */
+static PetscErrorCode CheckSupported(HycoContact c, HycoFE fe)
+{
+  HycoMesh m = fe->mesh;
+  PetscInt g = 0;
+
+  PetscFunctionBegin;
+  HycoCheck(m->dim > 1, "contact %s: type mortar integrates over facets, which a 1D mesh does not have; use type: pair",
+            c->name);
+  PetscCall(HycoMeshFindGroup(m, "contact", c->slave, &g));
+  for (PetscInt k = m->group_start[g]; k < m->group_start[g + 1]; k++)
+    HycoCheck(
+        HycoMeshTied(m, m->group_node[k]) < 0,
+        "contact %s: node %d of %s is tied to another surface, and type mortar needs facets whose nodes are free; "
+        "use type: surface, or let that surface be the master of the tie",
+        c->name, (int)m->node_id[m->group_node[k]], c->slave);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Fails for slave nodes without a facing part of the master, of which a scene that gives a tolerance may have some. */
+static PetscErrorCode CheckFacing(HycoContact c, HycoFE fe, const HycoPairs *p, PetscInt first, PetscReal tolerance)
+{
+  const HycoMesh m = fe->mesh;
+  PetscInt alone = 0, one = -1;
+  PetscReal stated;
+
+  PetscFunctionBegin;
+  PetscCall(HycoContactGetLength(c, "tolerance", &stated));
+  for (PetscInt k = first; k < p->n; k++) {
+    if (p->master_start[k + 1] > p->master_start[k]) continue;
+    if (!alone++) one = p->slave[k];
+  }
+  if (!alone || (stated >= 0 && (p->facts || alone < p->n - first))) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoFail("contact %s: %d of the %d nodes of %s face no part of %s within %g, among them node %d; draw the surfaces "
+           "closer, remove these nodes from %s, extend %s, or give a %scontact_%s_tolerance, with which nodes that do "
+           "not face %s have no contact",
+           c->name, (int)alone, (int)(p->n - first), c->slave, c->master, (double)tolerance, (int)m->node_id[one],
+           c->slave, c->master, stated >= 0 ? "larger " : "", c->name, c->master);
+}
+
+/* On surfaces that a map moves only the slaves are listed. */
+static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs *pairs)
+{
+  const PetscInt first = pairs->n;
+  PetscReal tolerance;
+  PetscInt n, *slave;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(CheckSupported(c, fe));
+  PetscCall(HycoPartnersMatch(c, fe, index, PETSC_FALSE, NULL, NULL, pairs));
+  n = pairs->n - first;
+  if (!n || HycoPairsFollows(pairs, index)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoContactGetLength(c, "tolerance", &tolerance));
+  if (tolerance < 0) {
+    PetscInt g = 0;
+
+    PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->slave, &g));
+    tolerance = pairs->facts ? pairs->facts[index].small : HycoSurfaceTolerance(fe->mesh, g);
+  }
+  HycoDuplicate(n, pairs->slave + first, &slave);
+  pairs->n = first;
+  pairs->queries += n;
+  ierr = HycoMortarRows(c, fe, index, tolerance, n, slave, pairs);
+  PetscCall(PetscFree(slave));
+  PetscCall(ierr);
+  PetscCall(CheckFacing(c, fe, pairs, first, tolerance));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Find(HycoContact c, HycoFE fe, PetscInt index, PetscReal reach, PetscInt n,
+                           const PetscInt slave[], HycoPairs *found)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoMortarRows(c, fe, index, reach, n, slave, found));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactCreate_Mortar(HycoContact contact)
+{
+  static const struct _HycoContactOps ops = {.setup = SetUp, .find = Find};
+
+  PetscFunctionBegin;
+  PetscCall(HycoPartnersDeclare(contact));
+  PetscCall(HycoContactSetOps(contact, &ops));
+  contact->integrated = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,371 @@
+/*
+  The rows of a mortar contact. On the part of a slave's facet that faces the master, the dual functions psi_i are
+  biorthogonal to the nodes' functions N_k: the integral of psi_i N_k is D_i if k = i, else 0, where D_i is the integral
+  of N_i (A. Popp, M. Gitterle, M. Gee, W. Wall, Int. J. Numer. Meth. Engng 83 (2010) 1428-1465). The weighted gap of node
+  i over D_i is then n_i . (sum of w_ij x_j - x_i), with w_ij the integral of psi_i N_j over D_i: a row as of other types,
+  with more masters, the sum of whose weights is 1. The functions of each facet add up to 1, so that a uniform pressure
+  acts as its consistent nodal forces on both sides, at borders of the master too.
+*/
+#include "mortar.h"
+#include "../../facing.h"
+#include <hycokinematics.h>
+#include <petscblaslapack.h>
+
+/* Shares of a facet's area: smaller parts are round-off; on smaller facing parts a facet's dual functions would be
+   ill-conditioned, and its own functions are used (first order), or none (second order). */
+#define ROUND_OFF  1e-12
+#define SLIVER     1e-3
+#define SLIVER_TWO 5e-2
+/* A facet that faces more than this share of itself faces two layers of the master. */
+#define TWICE 1.05
+/* Weights below are round-off. */
+#define SNAP 1e-14
+
+/* The integrals of a slave's facet with one facet of the master. */
+typedef struct {
+  PetscInt nf, node[HYCO_FACET_NODES];
+  PetscReal P[HYCO_FACET_NODES][HYCO_FACET_NODES]; /* of N_i N_j, [i of the slave][j of the master] */
+} Block;
+
+typedef struct {
+  PetscInt row, node;
+  PetscReal value;
+} Term;
+
+typedef struct {
+  HycoFE fe;
+  HycoPartners t;
+  HycoPatches patches;
+  HycoRule rule;
+  PetscInt corners;
+  PetscReal reach;
+  PetscInt *row; /* by node: its place among the slaves, -1: none */
+  PetscReal *D;  /* by row: of all facets */
+  PetscInt n_near, *near;
+  /* of the current facet */
+  PetscReal size, facing; /* its area; of the part that faces the master */
+  PetscReal M[HYCO_FACET_NODES][HYCO_FACET_NODES], own[HYCO_FACET_NODES]; /* integrals of N_i N_k, of N_i */
+  PetscInt n_blocks, room_blocks;
+  Block *block;
+  PetscInt n_terms, room_terms;
+  Term *term;
+} Mortar;
+
+/* Second-order quadrilaterals have products of degree 8, triangles of degree 4; on a circle the radius is one more. */
+static PetscErrorCode MortarCreate(HycoContact c, HycoFE fe, PetscReal reach, PetscInt n, const PetscInt slave[],
+                                   Mortar *s)
+{
+  HycoMesh m = fe->mesh;
+  const PetscInt order = HycoMeshIsQuadratic(m) ? 2 : 1;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMemzero(s, sizeof(*s)));
+  s->fe = fe;
+  s->reach = reach;
+  s->corners = HycoCellKinds[m->type].corners;
+  PetscCall(
+      HycoRuleCreate(m->dim, 2 * order * (s->corners == 4 ? 2 : 1) + (fe->formulation == HYCO_AXISYMMETRIC), &s->rule));
+  PetscCall(HycoPartnersCreate(fe, c, PETSC_FALSE, &s->t));
+  PetscCall(PetscMalloc3(m->n_nodes, &s->row, n, &s->D, s->t.n, &s->near));
+  PetscCall(PetscArrayzero(s->D, n));
+  for (PetscInt i = 0; i < m->n_nodes; i++) s->row[i] = -1;
+  for (PetscInt k = 0; k < n; k++) s->row[slave[k]] = k;
+  if (s->t.n && n) PetscCall(HycoPatchesCreate(fe->X, s->t.n, m->nf, s->corners, s->t.node, s->t.normal, &s->patches));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode MortarDestroy(Mortar *s)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscFree3(s->row, s->D, s->near));
+  PetscCall(HycoPatchesDestroy(&s->patches));
+  PetscCall(HycoPartnersDestroy(&s->t));
+  HycoFreeAll(&s->block, &s->term);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- one facet -- */
+
+/* Adds the integrals over an interval or a triangle of a piece; vertex: its corners. */
+static void AddSimplex(Mortar *s, const HycoPlane *plane, const HycoSide *slave, const HycoSide *master,
+                       const PetscReal *const vertex[3], PetscReal size, Block *b)
+{
+  for (PetscInt q = 0; q < s->rule.n; q++) {
+    const PetscReal *share = s->rule.share[q];
+    PetscReal at[2], N[HYCO_FACET_NODES], other[HYCO_FACET_NODES], w = size * s->rule.weight[q];
+
+    for (PetscInt c = 0; c < 2; c++)
+      at[c] = share[0] * vertex[0][c] + share[1] * vertex[1][c] + share[2] * vertex[2][c];
+    HycoSideFunctions(slave, at, N);
+    HycoSideFunctions(master, at, other);
+    if (s->fe->formulation == HYCO_AXISYMMETRIC) {
+      PetscReal r = plane->centre[0] + at[0] * plane->axis[0][0];
+
+      w *= 2 * PETSC_PI * PetscMax(r, 0);
+    }
+    for (PetscInt i = 0; i < slave->nf; i++) {
+      s->own[i] += w * N[i];
+      for (PetscInt k = 0; k < slave->nf; k++) s->M[i][k] += w * N[i] * N[k];
+      for (PetscInt j = 0; j < master->nf; j++) b->P[i][j] += w * N[i] * other[j];
+    }
+    s->facing += size * s->rule.weight[q];
+  }
+}
+
+/* The distance of the two sides along the normal at the middle of a piece. */
+static PetscReal Height(const HycoSide *slave, const HycoSide *master, const HycoPiece *piece)
+{
+  PetscReal at[2] = {0, 0}, N[HYCO_FACET_NODES], height = 0;
+  HycoSide flat;
+
+  for (PetscInt k = 0; k < piece->n; k++) {
+    for (PetscInt c = 0; c < 2; c++) at[c] += piece->at[k][c] / piece->n;
+  }
+  for (PetscInt side = 0; side < 2; side++) {
+    flat = side ? *slave : *master;
+    flat.nf = flat.corners; /* heights are known at corners */
+    HycoSideFunctions(&flat, at, N);
+    for (PetscInt a = 0; a < flat.corners; a++) height += (side ? -1 : 1) * N[a] * flat.height[a];
+  }
+  return PetscAbsReal(height);
+}
+
+/* Adds the piece of one facet of the master, unless it is farther than `limit`. */
+static PetscErrorCode AddPiece(Mortar *s, const HycoPlane *plane, const HycoSide *slave, PetscInt patch,
+                               PetscReal limit)
+{
+  HycoSide master;
+  HycoPiece piece;
+  Block *b;
+
+  PetscFunctionBegin;
+  HycoSideSet(plane, s->t.nf, s->corners, s->t.node + patch * s->t.nf, s->t.X, &master);
+  HycoPieceCut(plane->dim, slave, &master, &piece);
+  if (!(piece.size > ROUND_OFF * s->size) || Height(slave, &master, &piece) > limit) PetscFunctionReturn(PETSC_SUCCESS);
+  if (s->n_blocks == s->room_blocks) {
+    s->room_blocks = 2 * s->room_blocks + 16;
+    PetscCall(PetscRealloc((size_t)s->room_blocks * sizeof(Block), &s->block));
+  }
+  b = &s->block[s->n_blocks++];
+  b->nf = master.nf;
+  PetscCall(PetscArraycpy(b->node, master.node, master.nf));
+  PetscCall(PetscMemzero(b->P, sizeof(b->P)));
+  for (PetscInt k = 1; k + 1 < PetscMax(piece.n, 3); k++) {
+    const PetscReal *a = piece.at[0], *p = piece.at[k], *q = plane->dim == 2 ? piece.at[0] : piece.at[k + 1];
+    const PetscReal *const vertex[3] = {a, p, q};
+    const PetscReal size =
+        plane->dim == 2 ? piece.size : PetscAbsReal((p[0] - a[0]) * (q[1] - a[1]) - (p[1] - a[1]) * (q[0] - a[0])) / 2;
+
+    AddSimplex(s, plane, slave, &master, vertex, size, b);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* All pieces at most `limit` away, of facets of the master that oppose the slave's. */
+static PetscErrorCode AddPieces(Mortar *s, const HycoPlane *plane, const HycoSide *slave, PetscReal limit)
+{
+  PetscFunctionBegin;
+  s->n_blocks = 0;
+  s->facing = 0;
+  PetscCall(PetscMemzero(s->M, sizeof(s->M)));
+  PetscCall(PetscMemzero(s->own, sizeof(s->own)));
+  for (PetscInt k = 0; k < s->n_near; k++) {
+    const PetscReal *n = s->t.normal + 3 * s->near[k];
+
+    if (HycoDot(n, plane->normal) <= HYCO_OPPOSED && HycoDot(n, n) > 0)
+      PetscCall(AddPiece(s, plane, slave, s->near[k], limit));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The area of a side in its own plane. */
+static PetscReal SizeOf(PetscInt dim, const HycoSide *side)
+{
+  HycoPiece whole;
+
+  HycoPieceCut(dim, side, side, &whole);
+  return whole.size;
+}
+
+/* The pieces of facet f. Along its normal the master may be as far as a facet in the limit angle to it whose nearest
+   point is as far as that of the middle; of two layers the nearer one is taken, by lower limits. */
+static PetscErrorCode FindPieces(Mortar *s, PetscInt f, HycoSide *slave)
+{
+  HycoMesh m = s->fe->mesh;
+  const PetscInt *node = m->facets + f * m->nf, corners = HycoFacetCorners(s->corners, node);
+  const PetscReal *X[4];
+  PetscReal normal[3], limit;
+  HycoProjection at;
+  HycoPlane plane;
+  HycoPrism prism;
+
+  PetscFunctionBegin;
+  s->n_blocks = 0;
+  for (PetscInt a = 0; a < corners; a++) X[a] = s->fe->X + 3 * node[a];
+  PetscCall(HycoFacetVector(s->fe, f, normal));
+  HycoNormalise(normal);
+  if (!(HycoDot(normal, normal) > 0)) PetscFunctionReturn(PETSC_SUCCESS); /* on the axis */
+  HycoPlaneSet(m->dim, corners, X, normal, &plane);
+  HycoSideSet(&plane, m->nf, s->corners, node, s->fe->X, slave);
+  s->size = SizeOf(m->dim, slave);
+  HycoPatchesProject(s->patches, plane.centre, NULL, &at);
+  limit = PetscMin(s->reach, (at.distance + plane.radius) / -HYCO_OPPOSED);
+  prism.radius = plane.radius;
+  prism.along = limit + plane.radius; /* the facet may be warped */
+  PetscCall(PetscArraycpy(prism.centre, plane.centre, 3));
+  PetscCall(PetscArraycpy(prism.normal, plane.normal, 3));
+  PetscCall(HycoPatchesWithin(s->patches, &prism, &s->n_near, s->near));
+  do {
+    PetscCall(AddPieces(s, &plane, slave, limit));
+    limit /= 2;
+  } while (s->facing > TWICE * s->size && limit > ROUND_OFF * plane.radius);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Replaces the integrals P of all blocks by those of the dual functions over D_i: M^-1 P, or P_i / D_i on slivers. */
+static PetscErrorCode MakeDual(Mortar *s, const HycoSide *slave, PetscBool *usable)
+{
+  const PetscBool two = (PetscBool)(slave->nf > slave->corners);
+  PetscScalar A[HYCO_FACET_NODES * HYCO_FACET_NODES];
+  PetscBLASInt n, one = 1, info = 1, failed;
+
+  PetscFunctionBegin;
+  PetscCall(PetscBLASIntCast(slave->nf, &n));
+  *usable = (PetscBool)(s->facing > (two ? SLIVER_TWO : 0) * s->size);
+  if (!*usable) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt i = 0; i < slave->nf; i++) {
+    for (PetscInt k = 0; k < slave->nf; k++) A[i * slave->nf + k] = s->M[i][k];
+  }
+  if (s->facing > SLIVER * s->size) LAPACKpotrf_("L", &n, A, &n, &info);
+  for (PetscInt b = 0; b < s->n_blocks; b++) {
+    PetscScalar *P = &s->block[b].P[0][0], column[HYCO_FACET_NODES];
+
+    for (PetscInt j = 0; j < s->block[b].nf; j++) {
+      for (PetscInt i = 0; i < slave->nf; i++) column[i] = P[i * HYCO_FACET_NODES + j];
+      if (!info) LAPACKpotrs_("L", &n, &one, A, &n, column, &n, &failed);
+      for (PetscInt i = 0; i < slave->nf; i++)
+        P[i * HYCO_FACET_NODES + j] = !info ? column[i] : s->own[i] > 0 ? column[i] / s->own[i] : 0;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds a facet's part to the rows of its nodes, in proportion to the nodes' integrals; a node on the axis of cells of
+   second order, which has none, takes the facet's. */
+static PetscErrorCode AddFacet(Mortar *s, PetscInt f)
+{
+  HycoSide slave;
+  PetscBool usable = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  PetscCall(FindPieces(s, f, &slave));
+  if (s->n_blocks) PetscCall(MakeDual(s, &slave, &usable));
+  for (PetscInt i = 0; usable && i < slave.nf; i++) {
+    const PetscInt row = s->row[slave.node[i]];
+    const PetscReal share = HycoNodeHasNoArea(s->fe, slave.node[i]) ? s->size : s->own[i];
+
+    if (row < 0) continue;
+    s->D[row] += share;
+    for (PetscInt b = 0; b < s->n_blocks; b++) {
+      for (PetscInt j = 0; j < s->block[b].nf; j++) {
+        if (s->n_terms == s->room_terms) {
+          s->room_terms = 2 * s->room_terms + 1024;
+          PetscCall(PetscRealloc((size_t)s->room_terms * sizeof(Term), &s->term));
+        }
+        s->term[s->n_terms++] = (Term){row, s->block[b].node[j], share * s->block[b].P[i][j]};
+      }
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- rows -- */
+
+/* The masters of one row, whose terms are term[0 .. n) of place[]: merged, ascending, with sum 1; 0: none. */
+static PetscErrorCode Merge(const Mortar *s, PetscInt n, PetscInt place[], PetscReal D, PetscInt node[],
+                            PetscReal weight[], PetscInt *n_masters)
+{
+  PetscReal sum = 0;
+  PetscInt kept = 0, merged = 0;
+
+  PetscFunctionBegin;
+  *n_masters = 0;
+  if (!(D > 0)) PetscFunctionReturn(PETSC_SUCCESS); /* second order: at a border that the master covers in part */
+  for (PetscInt k = 0; k < n; k++) node[k] = s->term[place[k]].node;
+  PetscCall(PetscSortIntWithArray(n, node, place));
+  for (PetscInt k = 0; k < n; k++) {
+    if (k && node[k] == node[merged - 1]) {
+      weight[merged - 1] += s->term[place[k]].value / D;
+      continue;
+    }
+    node[merged] = node[k];
+    weight[merged++] = s->term[place[k]].value / D;
+  }
+  for (PetscInt k = 0; k < merged; k++) {
+    if (PetscAbsReal(weight[k]) < SNAP) continue;
+    node[kept] = node[k];
+    weight[kept] = weight[k];
+    sum += weight[kept++];
+  }
+  for (PetscInt k = 0; k < kept; k++) weight[k] /= sum;
+  *n_masters = kept;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Appends all rows: the terms are counted by row first. */
+static PetscErrorCode Append(const Mortar *s, PetscInt index, PetscInt n, const PetscInt slave[], HycoPairs *pairs)
+{
+  PetscInt *start, *place, *node;
+  PetscReal *weight;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(n + 2, &start));
+  PetscCall(PetscMalloc3(s->n_terms, &place, s->n_terms, &node, s->n_terms, &weight));
+  for (PetscInt e = 0; e < s->n_terms; e++) start[s->term[e].row + 2]++;
+  for (PetscInt k = 0; k < n; k++) start[k + 2] += start[k + 1];
+  for (PetscInt e = 0; e < s->n_terms; e++) place[start[s->term[e].row + 1]++] = e;
+  PetscCall(HycoPairsReserve(pairs, n, 0));
+  PetscCall(PetscRealloc((size_t)(pairs->master_start[pairs->n] + s->n_terms + 1) * sizeof(PetscInt), &pairs->master));
+  PetscCall(PetscRealloc((size_t)(pairs->master_start[pairs->n] + s->n_terms + 1) * sizeof(PetscReal), &pairs->weight));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscInt masters;
+
+    PetscCall(Merge(s, start[k + 1] - start[k], place + start[k], s->D[k], node, weight, &masters));
+    HycoPairsAppend(pairs, index, slave[k], masters, node, weight);
+  }
+  PetscCall(PetscFree3(place, node, weight));
+  PetscCall(PetscFree(start));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Integrate(Mortar *s, PetscInt index, PetscInt n, const PetscInt slave[], HycoPairs *pairs)
+{
+  HycoMesh m = s->fe->mesh;
+
+  PetscFunctionBegin;
+  for (PetscInt f = 0; f < m->n_facets && s->patches; f++) {
+    PetscBool any = PETSC_FALSE;
+
+    if (m->facet_group[f] != s->t.slave) continue;
+    for (PetscInt a = 0; a < m->nf; a++) any = (PetscBool)(any || s->row[m->facets[f * m->nf + a]] >= 0);
+    if (any) PetscCall(AddFacet(s, f));
+  }
+  PetscCall(Append(s, index, n, slave, pairs));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMortarRows(HycoContact c, HycoFE fe, PetscInt index, PetscReal reach, PetscInt n,
+                              const PetscInt slave[], HycoPairs *pairs)
+{
+  Mortar s;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoLogEvent(HYCO_EVENT_SEARCH, PETSC_TRUE));
+  PetscCall(MortarCreate(c, fe, reach, n, slave, &s));
+  ierr = Integrate(&s, index, n, slave, pairs);
+  PetscCall(HycoLogEvent(HYCO_EVENT_SEARCH, PETSC_FALSE));
+  PetscCall(MortarDestroy(&s));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

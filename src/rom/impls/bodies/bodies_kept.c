@@ -1,0 +1,162 @@
+/*
+  Rows of B that do not change in the bodies' axes from one prediction to the next, as where a stated normal turns with a
+  body or the bodies do not move past each other: C_b B_b^T and B_b C_b B_b^T do not either, at any sample. A column of
+  each is computed when its contact is in a problem for the first time, and kept.
+*/
+#include <hycobodies.h>
+#include <petscblaslapack.h>
+
+#define SAME       1e-14 /* of entries of B, which are no larger than 1 */
+#define MOST_BYTES 1e9
+
+/* Whether the rows are the last ones. */
+static PetscBool Same(HycoBodiesWork o, PetscInt m)
+{
+  const HycoBodiesKept *kept = &o->kept;
+
+  if (!kept->start) return PETSC_FALSE;
+  for (PetscInt k = 0; k <= m; k++) {
+    if (kept->start[k] != o->row_start[k]) return PETSC_FALSE;
+  }
+  for (PetscInt e = 0; e < o->row_start[m]; e++) {
+    if (kept->at[e] != o->row_at[e] || PetscAbsReal(kept->value[e] - o->row[e]) > SAME) return PETSC_FALSE;
+  }
+  return PETSC_TRUE;
+}
+
+static PetscErrorCode ForgetColumns(HycoBodiesKept *kept, PetscInt n)
+{
+  PetscFunctionBegin;
+  for (PetscInt i = 0; kept->P && i < n; i++) HycoFreeAll(&kept->P[i], &kept->W[i]);
+  kept->bytes = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBodiesForgetKept(HycoBodiesWork o)
+{
+  HycoBodiesKept *kept = &o->kept;
+
+  PetscFunctionBegin;
+  if (o->bodies) PetscCall(ForgetColumns(kept, kept->m * o->bodies->n));
+  HycoFreeAll(&kept->start, &kept->at, &kept->value, &kept->P, &kept->W);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBodiesKeepRows(HycoBodiesWork o, PetscInt m)
+{
+  HycoBodiesKept *kept = &o->kept;
+  const PetscInt n = m * o->bodies->n;
+
+  PetscFunctionBegin;
+  kept->same = Same(o, m);
+  if (kept->same && !kept->P) {
+    PetscCall(PetscCalloc1(n + 1, &kept->P));
+    PetscCall(PetscCalloc1(n + 1, &kept->W));
+  }
+  if (kept->same) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(ForgetColumns(kept, n));
+  HycoFreeAll(&kept->start, &kept->at, &kept->value);
+  kept->m = m;
+  HycoDuplicate(m + 1, o->row_start, &kept->start);
+  HycoDuplicate(o->row_start[m] + 1, o->row_at, &kept->at);
+  HycoDuplicate(o->row_start[m] + 1, o->row, &kept->value);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* W[j] = the products of P, the displacements of body b, with the rows. */
+static void Multiply(HycoBodiesWork o, PetscInt b, const PetscReal P[], PetscReal W[])
+{
+  const PetscInt lo = o->bodies->start[b], hi = o->bodies->start[b + 1];
+
+  for (PetscInt j = 0; j < o->kept.m; j++) {
+    W[j] = 0;
+    for (PetscInt e = o->row_start[j]; e < o->row_start[j + 1]; e++) {
+      if (o->row_at[e] >= lo && o->row_at[e] < hi) W[j] += o->row[e] * P[o->row_at[e] - lo];
+    }
+  }
+}
+
+/* Of contact k in body b, if its row has entries there. */
+static PetscErrorCode KeepInBody(HycoBodiesWork o, PetscInt k, PetscInt b)
+{
+  HycoBodiesKept *kept = &o->kept;
+  const HycoSubstructure *own = &o->bodies->body[b];
+  const PetscInt lo = o->bodies->start[b], at = k * o->bodies->n + b;
+  const size_t n = (size_t)own->n;
+  PetscBLASInt size, one = 1;
+
+  PetscFunctionBegin;
+  PetscCall(PetscBLASIntCast(own->n, &size));
+  for (PetscInt e = o->row_start[k]; e < o->row_start[k + 1]; e++) {
+    const PetscInt place = o->row_at[e] - lo;
+
+    if (place < 0 || place >= own->n) continue;
+    if (!kept->P[at]) {
+      PetscCall(PetscCalloc1((size_t)own->n_samples * n, &kept->P[at]));
+      PetscCall(PetscMalloc1((size_t)own->n_samples * (size_t)kept->m, &kept->W[at]));
+      kept->bytes += 8 * (PetscReal)own->n_samples * (PetscReal)(own->n + kept->m);
+    }
+    for (PetscInt s = 0; s < own->n_samples; s++)
+      BLASaxpy_(&size, &o->row[e], own->C + ((size_t)s * n + (size_t)place) * n, &one, kept->P[at] + (size_t)s * n,
+                &one);
+  }
+  for (PetscInt s = 0; s < own->n_samples && kept->P[at]; s++)
+    Multiply(o, b, kept->P[at] + (size_t)s * n, kept->W[at] + (size_t)s * (size_t)kept->m);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBodiesKeep(HycoBodiesWork o, PetscInt n, const PetscInt contact[])
+{
+  HycoBodiesKept *kept = &o->kept;
+  const PetscInt bodies = o->bodies->n;
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < n && kept->same; i++) {
+    PetscBool known = PETSC_FALSE;
+
+    for (PetscInt b = 0; b < bodies; b++) known = (PetscBool)(known || kept->P[contact[i] * bodies + b]);
+    for (PetscInt b = 0; b < bodies && !known; b++) PetscCall(KeepInBody(o, contact[i], b));
+    if (kept->bytes > MOST_BYTES) kept->same = PETSC_FALSE;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void HycoBodiesKeptRow(HycoBodiesWork o, PetscInt k, PetscInt n, const PetscInt contact[], PetscReal row[])
+{
+  const HycoSubstructures b = o->bodies;
+
+  for (PetscInt i = 0; i < n; i++) row[i] = 0;
+  for (PetscInt j = 0; j < b->n; j++) {
+    const PetscReal *W = o->kept.W[k * b->n + j];
+
+    for (PetscInt s = 0; W && s < b->body[j].n_samples; s++, W += o->kept.m) {
+      const PetscReal weight = o->weight[j][s] / o->kappa[j];
+
+      for (PetscInt i = 0; i < n; i++) row[i] += weight * W[contact[i]];
+    }
+  }
+}
+
+PetscErrorCode HycoBodiesKeptDisplace(HycoBodiesWork o, PetscInt m, const PetscReal Lambda[], PetscReal u[])
+{
+  const HycoSubstructures b = o->bodies;
+  const PetscBLASInt one = 1;
+
+  PetscFunctionBegin;
+  for (PetscInt j = 0; j < b->n; j++) {
+    const HycoSubstructure *own = &b->body[j];
+    PetscBLASInt size;
+
+    PetscCall(PetscBLASIntCast(own->n, &size));
+    for (PetscInt k = 0; k < m; k++) {
+      const PetscReal *P = o->kept.P[k * b->n + j];
+
+      for (PetscInt s = 0; s < own->n_samples && P && Lambda[k] > 0; s++, P += own->n) {
+        const PetscReal force = -Lambda[k] * o->weight[j][s] / o->kappa[j];
+
+        BLASaxpy_(&size, &force, P, &one, u + b->start[j], &one);
+      }
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,90 @@
+"""Contacts of type mortar on moved surfaces: ranks, models, messages. What they are for, pressures: tests/verify/mortar.py."""
+import unittest
+
+import h5py
+
+import roller
+from common import Case, square
+
+RANGES = {'lo': -4, 'hi': 4}
+POINTS = ('1.3,0.5,20', '-3.7,1.5,60')
+
+
+class Mortar(Case):
+    def fields(self, *args, **options):
+        """Displacements and contact forces of a run, which must succeed."""
+        report = self.hyco(*args, '-output', self.path('out.xdmf'), **options)
+        self.solved(report)
+        with h5py.File(self.path('out.h5')) as f:
+            return f['nodes/displacement'][:], f['contact/lambda'][:, 0], report
+
+    def refused(self, *args, texts=()):
+        run = self.run_raw(*args)
+        self.assertNotEqual(run.returncode, 0)
+        self.assertEqual(len(run.stderr.splitlines()), 1, run.stderr)
+        for text in texts:
+            self.assertIn(text, run.stderr)
+
+    def test_moved_on_ranks(self):
+        """A map moves the master under the slave: masters are found again, many to a row, the same on 1 to 4 ranks and for a mesh that
+        is drawn in place; and other than by node to surface."""
+        for dim, n, m in ((2, 64, 36), (3, 16, 10)):
+            with self.subTest(dim=dim):
+                roller.mesh(self.path('moved.msh'), dim, n=n, m=m)
+                roller.mesh(self.path('drawn.msh'), dim, at=1.3, n=n, m=m)
+                scene = self.path('scene.yaml')
+                roller.scene(scene, 'drawn.msh', dim, moved=False, kind='mortar')
+                u, forces, _ = self.fields('solve', '-scene', scene, '-mu', POINTS[0])
+                for ranks in (1, 2, 4):
+                    roller.scene(scene, 'moved.msh', dim, kind='mortar', **RANGES)
+                    moved, found, _ = self.fields('solve', '-scene', scene, '-mu', POINTS[0], ranks=ranks)
+                    self.assertLess(abs(moved - u).max(), 1e-9 * abs(u).max())
+                    self.assertLess(abs(found - forces).max(), 1e-9 * forces.max())
+                roller.scene(scene, 'moved.msh', dim, kind='surface', **RANGES)
+                found = self.fields('solve', '-scene', scene, '-mu', POINTS[0])[1]
+                self.assertGreater(abs(found - forces).max(), 1e-3 * forces.max())
+
+    def test_models(self):
+        """A model of bodies has the forces of full order; other types refuse by name."""
+        roller.mesh(self.path('moved.msh'), 2)
+        scene, model = self.path('scene.yaml'), self.path('bodies.h5')
+        roller.scene(scene, 'moved.msh', kind='mortar', **RANGES)
+        self.hyco('train', '-scene', scene, '-model', model, '-grid', '2,2,2', '-hyco_model_type', 'bodies')
+        for mu in POINTS:
+            u, forces, _ = self.fields('solve', '-scene', scene, '-mu', mu)
+            found_u, found, _ = self.fields('predict', '-model', model, '-mu', mu)
+            self.assertLess(abs(found - forces).max(), 1e-10 * forces.max())
+            self.assertLess(abs(found_u - u).max(), 1e-5 * abs(u).max())
+        for kind in ('hybrid', 'condensed', 'projection'):
+            self.refused('train', '-scene', scene, '-model', self.path('other.h5'), '-grid', '2,2,2', '-hyco_model_type', kind,
+                         texts=('contact under has type mortar', f'a model of type {kind} does not take them'))
+
+    def test_check(self):
+        """check names the contacts without a node opposite, and the type for these; a mortar has no such line."""
+        roller.mesh(self.path('moved.msh'), 2)
+        for kind, there in (('surface', True), ('mortar', False)):
+            roller.scene(self.path('scene.yaml'), 'moved.msh', kind=kind)
+            run = self.run_raw('check', '-scene', self.path('scene.yaml'))
+            self.assertEqual(run.returncode, 0, run.stderr)
+            self.assertEqual('type: mortar gives better pressures' in run.stdout, there, run.stdout)
+
+    def test_nothing_opposite(self):
+        """Slave nodes that face nothing within the tolerance are an error, which names one; with a stated tolerance they have no contact."""
+        roller.mesh(self.path('drawn.msh'), 2)
+        scene = self.path('scene.yaml')
+        roller.scene(scene, 'drawn.msh', moved=False, kind='mortar')
+        with open(scene, encoding='ascii') as f:
+            text = f.read()
+        with open(scene, 'w', encoding='ascii') as f:
+            f.write(text.replace(', tolerance: 30', ''))
+        self.refused('solve', '-scene', scene, '-mu', POINTS[0], texts=('of the 37 nodes of round face no part of upper within', 'tolerance'))
+        with open(scene, 'w', encoding='ascii') as f:
+            f.write(text.replace('tolerance: 30', 'tolerance: 1'))
+        self.assertLess(self.hyco('solve', '-scene', scene, '-mu', POINTS[0])['n_facing'], 37)
+        with open(scene, 'w', encoding='ascii') as f:
+            f.write(text.replace('slave: round', 'slave: upper').replace('master: upper', 'master: base'))
+        self.refused('solve', '-scene', scene, '-mu', POINTS[0], texts=('upper', 'base'))
+
+
+if __name__ == '__main__':
+    unittest.main()

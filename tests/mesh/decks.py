@@ -1,0 +1,312 @@
+"""scripts/convert --scene: decks of Abaqus and CalculiX become scenes that are solved as they are; CalculiX (ccx) solves the same decks."""
+import os
+import re
+import shutil
+import subprocess
+import sys
+import unittest
+
+import numpy as np
+
+import document
+from common import HYCO, PATIENCE, SOURCE, Case
+
+PACKAGE = os.path.join(os.path.dirname(HYCO), 'python')
+sys.path.insert(0, PACKAGE)
+CONVERT = os.path.join(SOURCE, 'scripts', 'convert')
+CCX = shutil.which('ccx')
+STEEL = '*MATERIAL, NAME=STEEL\n*ELASTIC\n210000., 0.3\n'
+HARD = '*SURFACE INTERACTION, NAME=SI\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n5.e7\n'
+PRINT = '*NODE PRINT, NSET=NALL\nU\n*NODE PRINT, NSET=%s, TOTALS=ONLY\nRF\n'  # displacements; the force of the support below
+
+
+class Box:
+    """A block of cells with numbers from `first` on: nodes, cells, sides X0 ... as sets of nodes and surfaces of NAME."""
+
+    def __init__(self, name, kind, low, high, cells, first=1):
+        self.name, self.kind, self.cells = name, kind, cells
+        dim = len(cells)
+        axes = [np.linspace(a, b, n + 1) for a, b, n in zip(low, high, cells)]
+        grid = np.stack(np.meshgrid(*axes, indexing='ij'), -1).reshape(-1, dim)
+        self.x = np.zeros((len(grid), 3))
+        self.x[:, :dim] = grid
+        self.number = first + np.arange(len(grid)).reshape([n + 1 for n in cells])
+        corners = [(0, 0), (1, 0), (1, 1), (0, 1)] if dim == 2 else [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
+        self.elements = {first + k: [int(self.number[tuple(c + r for c, r in zip(cell, corner))]) for corner in corners]
+                         for k, cell in enumerate(np.ndindex(*cells))}
+        self.sides = {}
+        faces = {2: {'Y0': 1, 'X1': 2, 'Y1': 3, 'X0': 4}, 3: {'Z0': 1, 'Z1': 2, 'Y0': 3, 'X1': 4, 'Y1': 5, 'X0': 6}}[dim]
+        for side, face in faces.items():
+            axis, end = 'XYZ'.index(side[0]), int(side[1])
+            nodes = np.take(self.number, -end, axis=axis).ravel()
+            of = [first + k for k, cell in enumerate(np.ndindex(*cells)) if cell[axis] == end * (cells[axis] - 1)]
+            self.sides[side] = (nodes, of, face)
+
+    def mesh(self, part=False):
+        """Nodes, cells, sets and surfaces, without the name of the block within a part."""
+        at = '' if part else self.name + '_'
+        ids = self.number.ravel()
+        out = [f'*NODE, NSET={at}N'] + [f'{n}, {x:.12g}, {y:.12g}, {z:.12g}' for n, (x, y, z) in zip(ids, self.x)]
+        out += [f'*ELEMENT, TYPE={self.kind}, ELSET={"Set-all" if part else self.name}'] + [f'{e}, ' + ', '.join(map(str, c)) for e, c in self.elements.items()]
+        for side, (nodes, of, face) in self.sides.items():
+            rows = [', '.join(map(str, chunk)) for chunk in np.array_split(nodes, max(1, len(nodes) // 8))]
+            out += [f'*NSET, NSET={at}{side}', *rows, f'*ELSET, ELSET=_{at}{side}', *map(str, of), f'*SURFACE, NAME={at}S{side}, TYPE=ELEMENT', f'_{at}{side}, S{face}']
+        return '\n'.join(out) + '\n'
+
+
+def deck(boxes, model, steps, materials=STEEL, sections=None):
+    """A flat deck: blocks of steel unless other sections are given."""
+    text = '*HEADING\nequivalent of a CalculiX test\n' + ''.join(b.mesh() for b in boxes)
+    text += '*NSET, NSET=NALL\n' + ''.join(f'{b.name}_N\n' for b in boxes) + materials
+    text += sections or ''.join(f'*SOLID SECTION, ELSET={b.name}, MATERIAL=STEEL\n' + ('1.\n' if len(b.cells) == 2 else '') for b in boxes)
+    step_print = PRINT % ('A_Y0' if len(boxes[0].cells) == 2 else 'A_Z0')
+    return text + model + ''.join(f'*STEP{more}\n{step}{step_print}*END STEP\n' for more, step in steps)
+
+
+def pair(slave, master, kind='SURFACE TO SURFACE'):
+    return HARD + f'*CONTACT PAIR, INTERACTION=SI, TYPE={kind}\n{slave}, {master}\n'
+
+
+CAE = """*Heading
+** Job name: press
+*Part, name=Low
+{low}*Solid Section, elset=Set-all, material=Steel
+,
+*End Part
+*Part, name=High
+{high}*Solid Section, elset=Set-all, material=Steel
+,
+*End Part
+*Assembly, name=Assembly
+*Instance, name=Block-1, part=Low
+*End Instance
+*Instance, name=Punch-1, part=High
+{place}*End Instance
+*Node
+1, 0.25, 0.25, 3.
+*Nset, nset=RP
+1,
+*Nset, nset=Left, instance=Block-1
+X0,
+*Nset, nset=Left, instance=Punch-1
+X0,
+*Nset, nset=Front, instance=Block-1
+Y0,
+*Nset, nset=Front, instance=Punch-1
+Y0,
+*Elset, elset=_Down_S1, internal, instance=Punch-1
+_Z0,
+*Surface, type=ELEMENT, name=Down
+_Down_S1, S1
+*Elset, elset=_Up_S2, internal, instance=Block-1
+_Z1,
+*Surface, type=ELEMENT, name=Up
+_Up_S2, S2
+*Coupling, constraint name=C1, ref node=RP, surface=Punch-1.SZ1
+*Kinematic
+*End Assembly
+*Material, name=Steel
+*Elastic
+210000., 0.3
+*Surface Interaction, name=IntProp-1
+1.,
+*Friction, slip tolerance=0.005
+ 0.2,
+*Surface Behavior, pressure-overclosure=HARD
+*Boundary
+Left, XSYMM
+Front, YSYMM
+Block-1.Z0, 3, 3
+*Contact Pair, interaction=IntProp-1, type=SURFACE TO SURFACE
+Down, Up
+*Step, name=Step-1, nlgeom=YES
+*Static
+0.1, 1., 1e-05, 1.
+*Boundary
+RP, 1, 2
+RP, 3, 3, -0.002
+RP, 4, 6
+*Output, field, variable=PRESELECT
+*End Step
+"""
+SYMMETRY = '*BOUNDARY\nA_X0, 1, 1\nB_X0, 1, 1\nA_Y0, 2, 2\nB_Y0, 2, 2\n'
+
+
+def flat_decks():
+    """Each name: the deck, tolerance of displacements relative to the largest one."""
+    a, b = Box('A', 'C3D8', (0, 0, 0), (1, 1, 1), (4, 4, 4)), Box('B', 'C3D8', (0, 0, 1), (1, 1, 2), (4, 4, 4), 1001)
+    hold = SYMMETRY + 'A_Z0, 3, 3\n'
+    decks = {}
+    decks['press'] = deck([a, b], pair('B_SZ0', 'A_SZ1') + hold, [('', '*STATIC\n1., 1.\n*DSLOAD\nB_SZ1, P, 300.\n')])
+    push = Box('B', 'C3D8', (0, 0, 1), (0.5, 0.5, 2), (3, 3, 4), 1001)
+    decks['punch'] = deck([a, push], pair('B_SZ0', 'A_SZ1') + hold, [('', '*STATIC\n1., 1.\n*BOUNDARY\nB_Z1, 3, 3, -0.002\n')])
+    decks['glued'] = deck([a, Box('B', 'C3D8', (0, 0, 1), (1, 1, 2), (4, 4, 3), 1001)], '*TIE, NAME=GLUE, POSITION TOLERANCE=0.01\nB_SZ0, A_SZ1\n' + hold,
+                          [('', '*STATIC\n*CLOAD\nB_X1, 1, 20.\n')])
+    flat = [Box('A', 'CPE4', (0, 0), (2, 1), (16, 8)), Box('B', 'CPE4', (0, 1), (1, 2), (8, 8), 1001)]
+    hold2 = '*BOUNDARY\nA_X0, 1, 1\nB_X0, 1, 1\nA_Y0, 2, 2\n'
+    decks['strain'] = deck(flat, pair('B_SY0', 'A_SY1') + hold2, [('', '*STATIC\n1., 1.\n*DLOAD\n_B_Y1, P3, 200.\n')])
+    ring = [Box('A', 'CAX4', (1, 0), (2, 1), (8, 8)), Box('B', 'CAX4', (2.001, 0), (3, 1), (8, 8), 1001)]
+    decks['shrink'] = deck(ring, pair('A_SX1', 'B_SX0') + '*BOUNDARY\nA_Y0, 2, 2\nB_Y0, 2, 2\n', [('', '*STATIC\n1., 1.\n*DSLOAD\nA_SX0, P, 400.\n')])
+    bar = Box('A', 'C3D8', (0, 0, 0), (1, 1, 4), (2, 2, 8))
+    hold3 = '*BOUNDARY\nA_X0, 1, 1\nA_Y0, 2, 2\nA_Z0, 3, 3\n'
+    warm = STEEL + '*EXPANSION\n1.2E-5\n*DENSITY\n7.8E-9\n'
+    stop = Box('B', 'C3D8', (0, 0, 4.002), (1, 1, 5), (2, 2, 2), 1001)
+    decks['warm'] = deck([bar, stop], pair('A_SZ1', 'B_SZ0') + '*INITIAL CONDITIONS, TYPE=TEMPERATURE\nNALL, 293.\n' + SYMMETRY + 'A_Z0, 3, 3\nB_Z1, 3, 3\n',
+                         [('', '*STATIC\n1., 1.\n*TEMPERATURE\nNALL, 393.\n')], warm)
+    decks['hangs'] = deck([bar], hold3, [('', '*STATIC\n*DLOAD\nA, GRAV, 9810., 0., 0., -1.\n')], warm)
+    decks['spins'] = deck([bar], hold3, [('', '*STATIC\n*DLOAD\nA, CENTRIF, 1.E6, 0., 0., 0., 1., 0., 0.\n')], warm)
+    decks['yields'] = deck([bar], hold3, [('', '*STATIC\n0.1, 1.\n*BOUNDARY\nA_Z1, 3, 3, 0.02\n'), ('', '*STATIC\n0.1, 1.\n*BOUNDARY\nA_Z1, 3, 3, 0.01\n')],
+                           STEEL + '*PLASTIC\n300., 0.\n500., 0.2\n')
+    decks['creeps'] = deck([bar], hold3, [('', '*STATIC\n1.E-6, 1.E-6\n*DSLOAD\nA_SZ1, P, -100.\n'), ('', '*VISCO, CETOL=1.E-5\n0.1, 10.\n')],
+                           STEEL + '*CREEP, LAW=NORTON\n1.E-10, 3., 0.\n')
+    return decks
+
+
+class Decks(Case):
+    def convert(self, name, text, status=0, **more):
+        """The lines about what is not converted, and the folder of the scene."""
+        with open(self.path(f'{name}.inp'), 'w', encoding='ascii') as file:
+            file.write(text)
+        run = subprocess.run(['/usr/bin/python3', CONVERT, f'{name}.inp', '--scene', name], cwd=self.folder, capture_output=True, text=True, timeout=100 * PATIENCE,
+                             check=False, **more)
+        self.assertEqual(run.returncode, status, run.stdout + run.stderr)
+        if status:
+            return run.stderr, None
+        return run.stdout.split('in it', 1)[1].splitlines()[1:], self.path(name)
+
+    def solve(self, folder, mu=()):
+        import hyco  # pylint: disable=import-outside-toplevel
+        with hyco.Scene(folder) as scene:
+            return scene.solve(mu)
+
+    def ccx(self, name):
+        """The displacements that CalculiX prints, of the last time, in the order of the nodes' numbers; the force of the support below."""
+        run = subprocess.run([CCX, name], cwd=self.folder, capture_output=True, text=True, timeout=100 * PATIENCE, check=False, env={**os.environ, 'OMP_NUM_THREADS': '1'})
+        self.assertIn('Job finished', run.stdout, run.stdout[-2000:])
+        with open(self.path(f'{name}.dat'), encoding='ascii') as file:
+            last = re.split(r'\n displacements[^\n]*\n', file.read())[-1]
+        u, force = re.split(r'\n total force[^\n]*\n', last)
+        rows = sorted((line.split() for line in u.splitlines() if line.strip()), key=lambda r: int(r[0]))
+        return np.array([[float(w) for w in row[1:]] for row in rows]), np.array([float(w) for w in force.split()])
+
+    @unittest.skipUnless(CCX, 'no ccx (Debian package calculix-ccx): the decks are not compared with CalculiX')
+    def test_calculix(self):
+        """Ten decks: displacements of every node within 0.5 % of the largest; what differs by more has its reason beside it."""
+        wide = {'punch': 0.01}  # the edge of a punch between nodes: CalculiX's own node-to-surface contact differs from its surface-to-surface by 0.6 %
+        for name, text in flat_decks().items():
+            with self.subTest(deck=name):
+                left, folder = self.convert(name, text)
+                self.assertEqual(left, [])
+                s, (u, force) = self.solve(folder), self.ccx(name)
+                dim = s.displacement.shape[1]
+                self.assertEqual(len(s.displacement), len(u))
+                error = np.abs(s.displacement - u[:, :dim]).max() / np.abs(u).max()
+                mine = sum(np.array(r['force'])[:dim] for r in s.reactions if r['group'] == ('A_Y0' if dim == 2 else 'A_Z0'))
+                scale = max(np.abs(force[dim - 1]), np.abs(s.contact_forces).max(initial=0), 1e-9)
+                print(f'{name}: displacements {100 * error:.3f} %, force {mine[dim - 1]:.6g} and {force[dim - 1]:.6g}')
+                self.assertLess(error, wide.get(name, 0.005))
+                if name not in ('hangs', 'spins'):  # CalculiX's reactions lack the loads at the held nodes themselves, 1/16 of the weight
+                    self.assertLess(abs(mine[dim - 1] - force[dim - 1]) / scale, 0.01)
+
+    def same_as_flat(self, text, **more):
+        """Solves a deck in the manner of CAE and the same blocks in a flat deck: one solution. What is not converted."""
+        left, folder = self.convert('cae', text, **more)
+        a, b = Box('A', 'C3D8', (0, 0, 0), (1, 1, 1), (4, 4, 4)), Box('B', 'C3D8', (0, 0, 1), (0.5, 0.5, 2), (3, 3, 4), 1001)
+        _, flat = self.convert('flat', deck([a, b], pair('B_SZ0', 'A_SZ1') + SYMMETRY + 'A_Z0, 3, 3\n', [('', '*STATIC\n1., 1.\n*BOUNDARY\nB_Z1, 1, 2\nB_Z1, 3, 3, -0.002\n')]))
+        s, expected = self.solve(folder), self.solve(flat)
+        np.testing.assert_allclose(s.displacement, expected.displacement, atol=1e-9 * 0.002)
+        self.near(s.total_contact_force, expected.total_contact_force, 1e-9)
+        shutil.rmtree(folder)
+        shutil.rmtree(flat)
+        return left
+
+    def test_cae(self):
+        """Parts with Set-all, an instance that is moved and turned, sets and surfaces of the assembly, a coupled reference point, an included file; friction and
+        NLGEOM are listed once with their lines."""
+        low = Box('A', 'C3D8R', (0, 0, 0), (1, 1, 1), (4, 4, 4))
+        tall = Box('B', 'C3D8R', (0, 0, 0), (0.5, 0.5, 1), (3, 3, 4))
+        turned = Box('B', 'C3D8R', (0, 0, 0), (0.5, 0.5, 1), (3, 3, 4))
+        turned.x = turned.x[:, [2, 1, 0]] * [-1, 1, 1]  # about y by -90 degrees: z becomes -x, x becomes z
+        for part, place in ((tall, '0., 0., 1.\n'), (turned, '0., 0., 1.\n0., 0., 1., 0., 1., 1., 90.\n')):
+            left = self.same_as_flat(CAE.format(low=low.mesh(True), high=part.mesh(True), place=place))
+            for words in ('*ELEMENT, TYPE=C3D8R', '*STEP, NLGEOM', '*FRICTION'):
+                self.assertEqual(len([line for line in left if words in line and 'line ' in line]), 1, left)
+            self.assertEqual(len(left), 3, left)
+        with open(self.path('high.txt'), 'w', encoding='ascii') as file:
+            file.write(tall.mesh(True))
+        self.same_as_flat(CAE.format(low=low.mesh(True), high='*Include, input=high.txt\n', place='0., 0., 1.\n'))
+
+    def test_draft(self):
+        """The draft itself: the friction stands beside its contact, entries that are not converted are comments with their lines, as printed."""
+        low, high = Box('A', 'C3D8R', (0, 0, 0), (1, 1, 1), (4, 4, 4)), Box('B', 'C3D8R', (0, 0, 0), (0.5, 0.5, 1), (3, 3, 4))
+        text = CAE.format(low=low.mesh(True), high=high.mesh(True), place='0., 0., 1.\n').replace('*Step', '*Equation\n2\nBLOCK-1.1, 1, 1., BLOCK-1.2, 1, -1.\n*Spring, elset=none\n*Step')
+        left, folder = self.convert('draft', text)
+        with open(os.path.join(folder, 'scene.yaml'), encoding='utf-8') as file:
+            draft = file.read()
+        for line in left:
+            self.assertIn('#   ' + line.strip(), draft)
+            number, word = re.match(r' *line (\d+): \*(\w+)', line).groups()
+            with open(self.path('draft.inp'), encoding='ascii') as file:
+                self.assertTrue(file.read().splitlines()[int(number) - 1].upper().startswith('*' + word), line)
+        self.assertEqual({re.search(r'\*(\w+)', line)[1] for line in left}, {'ELEMENT', 'STEP', 'FRICTION', 'EQUATION', 'SPRING'})
+        self.assertRegex(draft, r'(?m)^  down_up: \{type: surface, slave: DOWN, master: UP.*# friction: 0.2')
+        error, _ = self.convert('draft', text, status=1)
+        self.assertIn('scene.yaml is there already', error)
+        checked = self.run_raw('check', '-scene', folder)
+        self.assertEqual(checked.returncode, 0, checked.stdout + checked.stderr)
+
+    def test_loads(self):
+        """Forces and pressures on single nodes and cells keep their values; several steps with amplitudes are a history; tied contact, clearance, shells, rigid
+        facets, general contact and a dynamic step are what the draft says of them."""
+        a, b = Box('A', 'C3D8', (0, 0, 0), (1, 1, 1), (2, 2, 2)), Box('B', 'C3D8', (0, 0, 1), (1, 1, 2), (2, 2, 2), 1001)
+        top, cells = b.sides['Z1'][0], b.sides['Z1'][1]
+        hold = SYMMETRY + 'A_Z0, 3, 3\n'
+        _, folder = self.convert('single', deck([a, b], '*SURFACE INTERACTION, NAME=SI\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TIED\n*CONTACT PAIR, INTERACTION=SI\nB_SZ0, A_SZ1\n' + hold,
+                                                [('', f'*STATIC\n*CLOAD\n{top[0]}, 3, -1.\n{top[1]}, 3, -2.\n{top[2]}, 3, -2.\n*DLOAD\n{cells[0]}, P2, 4.\n{cells[1]}, P2, 8.\n')]))
+        s = self.solve(folder)
+        self.near(sum(np.array(r['force']) for r in s.reactions if r['group'] == 'A_Z0')[2], 5 + 0.25 * (4 + 8), 1e-9)
+        with open(os.path.join(folder, 'scene.yaml'), encoding='utf-8') as file:
+            self.assertRegex(file.read(), r'(?m)^tie:\n  B_SZ0_A_SZ1: \{slave: B_SZ0, master: A_SZ1\}')
+        two = deck([a, b], '*AMPLITUDE, NAME=UP\n0., 0., 0.5, 1., 1., 0.25\n' + pair('B_SZ0', 'A_SZ1') + '*CLEARANCE, MASTER=A_SZ1, SLAVE=B_SZ0, VALUE=0.001\n' + hold,
+                   [('', '*STATIC\n1., 2.\n*BOUNDARY\nB_Z1, 3, 3, -0.002\n'), ('', '*STATIC\n1., 1.\n*DSLOAD, AMPLITUDE=UP\nB_SX1, P, 40.\n'), ('', '*DYNAMIC\n1., 1.\n*DSLOAD\nB_SX1, P, 1000.\n')])
+        left, folder = self.convert('steps', two)
+        self.assertEqual(len(left), 1, left)
+        self.assertIn('*DYNAMIC', left[0])
+        with open(os.path.join(folder, 'scene.yaml'), encoding='utf-8') as file:
+            draft = file.read()
+        self.assertIn('times: [0, 2, 3]', draft)
+        self.assertIn('[[0, 0], [2, 0], [2.5, 1], [3, 0.25]]', draft)
+        self.assertIn('gap: 0.001', draft)
+        h = self.solve(folder).history
+        self.near(h['total_contact_force'][1], 210000 * 0.001 / 2, 1e-6)
+        odd = '*NODE\n9001, 0., 0., 2.\n9002, 1., 0., 2.\n9003, 1., 1., 2.\n9004, 0., 1., 2.\n*ELEMENT, TYPE=S4R, ELSET=SKIN\n9001, 9001, 9002, 9003, 9004\n*ELEMENT, TYPE=R3D4, ELSET=TOOL\n9002, 9001, 9002, 9003, 9004\n' \
+              '*SURFACE, NAME=RIGID, TYPE=ELEMENT\nTOOL, SPOS\n*CONTACT PAIR, INTERACTION=SI\nB_SZ1, RIGID\n*CONTACT\n*CONTACT INCLUSIONS, ALL EXTERIOR\n'
+        left, folder = self.convert('odd', deck([a, b], pair('B_SZ0', 'A_SZ1') + odd + hold, [('', '*STATIC\n*DSLOAD\nB_SZ1, P, 30.\n')]))
+        for words in ('TYPE=S4R', 'TYPE=R3D4', 'surface without solids', 'name the pairs'):
+            self.assertEqual(len([line for line in left if words in line]), 1, left)
+        self.near(self.solve(folder).total_contact_force, 30, 1e-9)
+
+    def test_page(self):
+        """docs/convert.md: the commands of the worked deck, and what they print."""
+        tools = self.path('page', 'tools')
+        os.makedirs(tools)
+        os.symlink(sys.executable, os.path.join(tools, 'python3'))
+        path = os.pathsep.join([tools, os.path.dirname(HYCO), os.environ['PATH']])
+        ran = document.run(os.path.join(SOURCE, 'docs', 'convert.md'), self.path('page'), {'TREE': SOURCE, 'PATH': path, 'PYTHONPATH': PACKAGE})
+        self.assertEqual(ran, 4)
+
+    def test_refused(self):
+        """A deck without sections, a section without elements, a surface that is not there."""
+        a = Box('A', 'C3D8', (0, 0, 0), (1, 1, 1), (1, 1, 1))
+        good = deck([a], '*BOUNDARY\nA_Z0, 1, 3\n', [('', '*STATIC\n*DSLOAD\nA_SZ1, P, 1.\n')])
+        for old, new, words in (('*SOLID SECTION, ELSET=A', '*ORIENTATION, NAME=A', 'SOLID SECTION'), ('ELSET=A, MATERIAL', 'ELSET=ZZ, MATERIAL', 'ZZ'),
+                                ('A_SZ1, P, 1.', 'NOWHERE, P, 1.', 'NOWHERE'), ('A_Z0, 1, 3', 'NOTHING, 1, 3', 'NOTHING')):
+            self.assertIn(old, good)
+            error, _ = self.convert('refused', good.replace(old, new), status=1)
+            self.assertIn(words, error)
+            self.assertEqual(len(error.splitlines()), 1)
+            self.assertFalse(os.path.exists(self.path('refused', 'scene.yaml')))
+
+
+if __name__ == '__main__':
+    unittest.main()

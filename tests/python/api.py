@@ -1,0 +1,273 @@
+"""The Python package: scenes, full order, training and predictions equal the command's; errors are exceptions with hyco's line, and the process goes on."""
+import csv
+import os
+import subprocess
+import sys
+import unittest
+
+import numpy as np
+
+from common import HYCO, MPIRUN, PATIENCE, PELLET, SOURCE, Case, said
+
+sys.path.insert(0, os.path.join(SOURCE, 'tests', 'verify'))
+from grids import Grid  # noqa: E402
+
+MODEL = os.path.join(SOURCE, 'tests', 'data', 'rope-hybrid-4-table.h5')
+PACKAGE = os.path.join(os.path.dirname(HYCO), 'python')
+BLOCK = """scene: {title: block, mesh: block.msh, parameters: [press, modulus]}
+parameter: {press: {range: [0.02, 0.05]}, modulus: {range: [500, 2000]}}
+body: {block: {young: modulus, poisson: 0.3}}
+fixed: {left: {x: 0}, foot: {y: 0}}
+contact: {punch: {type: obstacle, group: top, normal: {y: 1}, gap: "0.02*(x - 0.3)^2 - press"}}
+output: {lift: {force: y, contact: punch}, wide: {max: u_x}}
+"""
+BAR = """scene: {title: bar, mesh: block.msh, parameters: [pull]}
+parameter: {pull: {range: [0.5, 1]}}
+body: {block: {law: j2, young: 1000, poisson: 0.3, yield: 1, hardening: 10}}
+fixed: {left: {x: 0}, foot: {y: 0}}
+traction: {right: {x: 1.3*pull*t}}
+history: {times: [0, 0.5, 1]}
+output: {long: {mean: u_x, group: right}}
+"""
+RANKS = r"""
+import sys
+import hyco, numpy as np
+with hyco.Scene(sys.argv[1]) as scene:
+    s = scene.solve([0.03, 900])
+    points = np.stack(np.meshgrid(np.linspace(0.02, 0.05, 5), np.linspace(500, 2000, 3), indexing='ij'), -1)
+    with scene.train(sys.argv[2], grid=[3, 3]) as model:
+        p = model.predict(points, contact_forces=True, displacement=True)
+        one = model.predict([0.03, 900])
+    try:
+        scene.solve([9, 900])
+    except hyco.Error as error:
+        sys.stdout.write(f'refused {hyco.rank()} {error}\n')
+        sys.stdout.flush()
+    again = scene.solve([0.03, 900])
+same = again.outputs == s.outputs and p.outputs['lift'].shape == (5, 3)
+sums = [s.outputs['lift'], s.balance < 1e-9, p.outputs['lift'].sum(), p.contact_forces.sum(), np.abs(p.displacement).sum(), one.outputs['lift'], float(same)]
+sys.stdout.write('sums ' + ' '.join(repr(float(x)) for x in sums) + '\n')
+sys.stdout.flush()
+if sys.argv[3:] and hyco.rank() == 0:
+    raise RuntimeError('one process alone')
+if sys.argv[3:]:
+    scene = hyco.Scene(sys.argv[1])  # waits for the other
+"""
+
+
+@unittest.skipIf(os.environ.get('HYCO_SANITIZE') == '1', 'the interpreter would need the sanitizers')
+class Python(Case):
+    newcomer = True
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        grid = Grid()
+        grid.box('quad4', [np.linspace(0, 1, 9), np.linspace(0, 1, 5)], lambda x: x, 'block', {'x0': 'left', 'y0': 'foot', 'y1': 'top', 'x1': 'right'})
+        grid.write(cls.path('block.msh'))
+        for name, text in (('block', BLOCK), ('bar', BAR)):
+            with open(cls.path(name + '.yaml'), 'w', encoding='ascii') as file:
+                file.write(text)
+        sys.path.insert(0, PACKAGE)
+        os.chdir(cls.folder)
+        import hyco  # pylint: disable=import-outside-toplevel
+        cls.hyco_py = hyco
+
+    def test_layouts(self):
+        """The layouts that the library gives cover its structs: no member is left out, none overlaps another."""
+        from hyco import _library as c  # pylint: disable=import-outside-toplevel
+        c.begin()
+        for name in ('HycoSummary', 'HycoStep', 'HycoHistory', 'HycoReaction', 'HycoContactResult', 'HycoPrediction'):
+            size, members = c.layout(name)
+            at = 0
+            for member, (kind, offset, _) in members.items():
+                self.assertLess(offset - at, min(8, kind.base.alignment) if offset > at else 1, f'{name}: something before {member}')
+                self.assertGreaterEqual(offset, at, f'{name}: {member}')
+                at = offset + kind.itemsize
+            self.assertLess(size - at, 8, f'{name}: something after {member}')
+
+    def test_full_order(self):
+        """Solutions have the numbers of the command's report; arrays have their shapes and balance."""
+        report = self.hyco('solve', '-scene', 'block.yaml', '-mu', '0.03,900')
+        with self.hyco_py.Scene('block.yaml') as scene:
+            self.assertEqual(scene.parameters, {'press': (0.02, 0.05), 'modulus': (500.0, 2000.0)})
+            self.assertEqual((scene.outputs, scene.contacts, len(scene.times)), (['lift', 'wide'], ['punch'], 0))
+            s = scene.solve([0.03, 900])
+            by_name = scene.solve({'modulus': 900, 'press': 0.03})
+            scene.write('solution.xdmf')
+        self.assertTrue(s.converged and os.path.exists('solution.h5'))
+        self.near(s.total_contact_force, report['total_contact_force'], 1e-12)
+        for name in scene.outputs:
+            self.near(s.outputs[name], report['outputs'][name], 1e-12)
+            self.assertEqual(by_name.outputs[name], s.outputs[name])
+        self.assertEqual(s.summary['n_active'], report['n_active'])
+        self.assertEqual((s.displacement.shape, s.contact_forces.shape, s.stress.shape), ((45, 2), (9,), (32, 4)))
+        self.near(s.contact_forces.sum(), s.total_contact_force, 1e-12)
+        self.near(s.contacts[0]['force'][1], -s.total_contact_force, 1e-12)
+        self.assertEqual(s.contacts[0]['name'], 'punch')
+        self.assertIn('foot', [r['group'] for r in s.reactions])
+        self.assertLess(s.balance, 1e-9)
+        self.assertEqual(s.displacement.shape[0] - np.count_nonzero(s.displacement[:, 1]), 9)  # the foot
+
+    def test_model(self):
+        """A training like that of the command; predictions one by one, in batches, by name: the same numbers, those of hyco predict."""
+        with self.hyco_py.Scene('block.yaml', hyco_pod_tol=1e-10) as scene:
+            model = scene.train('block.h5', grid=[4, 3])
+            full = scene.solve([0.031, 1100])
+        self.assertGreaterEqual(model.training['held_out.n'], 1)
+        report = self.hyco('predict', '-model', 'block.h5', '-mu', '0.031,1100')
+        p = model.predict([0.031, 1100], contact_forces=True)
+        self.assertEqual(p.shape, ())
+        for name in model.outputs:
+            self.near(p.outputs[name], report['outputs'][name], 1e-12)
+            self.near(p.outputs[name], full.outputs[name], 0.03)
+            self.near(p.estimates[name], report['estimated_error_outputs'][name], 1e-9)
+        self.near(model.contact_results()[0]['force'][1], report['contacts']['punch']['force'][1], 1e-12)
+        self.assertEqual(model.whole_displacement().shape, (45, 2))
+        points = np.array([[0.031, 1100], [0.02, 500], [0.05, 2000], [0.031, 700]])
+        many = model.predict(points, contact_forces=True, displacement=True)
+        self.assertEqual(many.contact_forces.shape, (4, 9))
+        self.assertEqual(many.displacement.shape[::2], (4, 2))
+        self.near(many.outputs['lift'][0], p.outputs['lift'], 1e-12)
+        np.testing.assert_allclose(many.contact_forces[0], p.contact_forces, rtol=1e-12, atol=1e-12)
+        square = model.predict(points.reshape(2, 2, 2))
+        np.testing.assert_array_equal(square.outputs['lift'], many.outputs['lift'].reshape(2, 2))
+        named = model.predict({'modulus': points[:, 1], 'press': points[:, 0]})
+        np.testing.assert_array_equal(named.outputs['wide'], many.outputs['wide'])
+        self.assertEqual(list(many.table())[:4], ['press', 'modulus', 'lift', 'wide'])
+        self.assertTrue(all(len(column) == 4 for column in many.table().values()))
+        self.hyco('predict', '-model', 'block.h5', '-values_press', '0.02,0.05', '-values_modulus', '700', '-table', 'block.csv')
+        with open('block.csv', encoding='utf-8') as file:
+            for row in csv.DictReader(file):
+                self.near(model.predict([float(row['press']), float(row['modulus'])]).outputs['lift'], float(row['lift']), 1e-6)
+        self.assertEqual(model.predict(np.zeros((0, 2))).outputs['lift'].shape, (0,))
+        model.close()
+        model.close()
+        with self.assertRaisesRegex(self.hyco_py.Error, 'closed'):
+            model.predict([0.03, 900])
+
+    def test_paths(self):
+        """The listed times of a history, at full order."""
+        report = self.hyco('solve', '-scene', 'bar.yaml', '-mu', '0.9', '-table', 'bar.csv')
+        with self.hyco_py.Scene('bar.yaml') as scene:
+            self.assertEqual(list(scene.times), [0, 0.5, 1])
+            s = scene.solve([0.9])
+        with open('bar.csv', encoding='utf-8') as file:
+            rows = list(csv.DictReader(file))
+        self.assertEqual(len(s.history), len(rows))
+        for mine, row in zip(s.history, rows):
+            self.assertAlmostEqual(mine['t'], float(row['t']), places=12)
+            self.assertAlmostEqual(mine['long'], float(row['long']), places=9)
+        self.assertGreater(s.history['inelastic'][-1], 1e-4)
+        self.near(s.outputs['long'], report['outputs']['long'], 1e-9)
+
+    def test_errors(self):
+        """Each error is an exception with the command's line, nothing is printed, and the same objects work afterwards."""
+        program = f"""
+import sys
+sys.path.insert(0, {PACKAGE!r})
+import hyco
+def line(do):
+    try:
+        do()
+    except hyco.Error as error:
+        print(str(error))
+        return
+    raise SystemExit('nothing was refused')
+scene = hyco.Scene('block.yaml')
+before = scene.solve([0.03, 900]).outputs
+model = hyco.Model({MODEL!r})
+line(lambda: scene.solve([0.3, 900]))
+line(lambda: hyco.Scene('nowhere'))
+line(lambda: hyco.Model('block.msh'))
+line(lambda: hyco.Model('none.h5'))
+line(lambda: model.predict([[0.07, 0.17], [7, 0.17]]))
+line(lambda: hyco.Scene('block.yaml', hyco_pod_tool=1))
+line(lambda: scene.solve([0.03]))
+line(lambda: scene.solve({{'press': 0.03}}))
+line(lambda: scene.train('m.h5', grid=[3]))
+line(lambda: scene.train('m.h5', grid=[3, 3], scatter=4))
+line(lambda: hyco.Scene('block.yaml', hyco_model_type='hybrit').train('m.h5', grid=[3, 3]))
+line(lambda: hyco.Scene('block.yaml', body_block_poisson='0.3*nonsense'))
+assert scene.solve([0.03, 900]).outputs == before
+print(model.predict([0.07, 0.17]).total_contact_force)
+"""
+        run = subprocess.run([sys.executable, '-c', program], cwd=self.folder, capture_output=True, text=True, timeout=100 * PATIENCE, check=False)
+        self.assertEqual((run.returncode, run.stderr), (0, ''), run.stdout)
+        lines = run.stdout.splitlines()
+        self.assertEqual(len(lines), 13, run.stdout)
+        for line, words in zip(lines, (('press', '0.3', '0.05'), ('nowhere',), ('block.msh',), ('none.h5',), ('mu1', '7'), ('hyco_pod_tool', 'hyco_pod_tol'),
+                                       ('(1,)', 'press', 'modulus'), ('modulus',), ('1 numbers', '2'), ('one of',), ('hybrit',), ('nonsense',))):
+            for word in words:
+                self.assertIn(word, line)
+        for line, args in ((lines[0], ('solve', '-scene', 'block.yaml', '-mu', '0.3,900')), (lines[3], ('predict', '-model', 'none.h5', '-mu', '0.07,0.17'))):
+            self.assertIn(line, ' '.join(said(self.run_raw(*args))))
+        self.assertGreater(float(lines[-1]), 0)
+
+    def test_not_converged(self):
+        """A solve that does not converge is an exception with the result, or with check=False a result that says so."""
+        hyco = self.hyco_py
+        with hyco.Scene('block.yaml', hyco_solver_max_its=1, hyco_solver_fallback=False, hyco_solver_warm_start=False) as scene:
+            with self.assertRaisesRegex(hyco.NotConverged, 'press 0.05, modulus 900: not converged') as caught:
+                scene.solve([0.05, 900])
+            s = scene.solve([0.05, 900], check=False)
+            self.assertEqual((caught.exception.result.converged, s.converged), (False, False))
+            self.assertIn('not converged', s.reason)
+        with hyco.Model(MODEL) as model:
+            p = model.predict([[0.07, 0.17], [0.1, 0.2]])
+            self.assertEqual((list(p.converged), list(p.reason)), ([True, True], ['converged', 'converged']))
+
+    def test_interrupted(self):
+        """An exception in the progress function, Ctrl-C among them, ends a training; later calls work."""
+        def stop(done, n):
+            raise KeyboardInterrupt
+        with self.hyco_py.Scene(PELLET) as scene:
+            with self.assertRaises(KeyboardInterrupt):
+                scene.train('stopped.h5', grid=[3, 2], progress=stop)
+            self.assertFalse(os.path.exists('stopped.h5'))
+            self.assertTrue(scene.solve([4.06, 0.5]).converged)
+
+    def ranks(self, n, *more, model):
+        program = self.path('ranks.py')
+        with open(program, 'w', encoding='ascii') as file:
+            file.write(RANKS)
+        return subprocess.run([*(MPIRUN + [str(n)] if n else []), sys.executable, program, 'block.yaml', model, *more], cwd=self.folder, capture_output=True,
+                              text=True, timeout=100 * PATIENCE, check=False, env={**os.environ, 'PYTHONPATH': PACKAGE})
+
+    def test_ranks(self):
+        """Under mpiexec every process has the answers of one; errors are on all; an exception that nothing catches on one ends all."""
+        sums = {}
+        for n in (0, 1, 2, 3):
+            run = self.ranks(n, model=f'ranks{n}.h5')
+            self.assertEqual(run.returncode, 0, run.stdout + run.stderr)
+            found = [[float(x) for x in line.split()[1:]] for line in run.stdout.splitlines() if line.startswith('sums')]
+            self.assertEqual((len(found), run.stdout.count('refused')), (max(n, 1), max(n, 1)), run.stdout)
+            for row in found:
+                np.testing.assert_allclose(row, found[0], rtol=0)
+            sums[n] = found[0]
+            np.testing.assert_allclose(sums[n], sums[0], rtol=1e-7 if n else 0, err_msg=f'{n} ranks')
+        self.assertEqual(sums[0][-1], 1)
+        run = self.ranks(2, 'alone', model='alone.h5')
+        self.assertNotEqual(run.returncode, 0)
+        self.assertIn('one process alone', run.stderr)
+
+    def test_plain(self):
+        """Only NumPy is imported beside Python's own modules; PETSc ends with the process, quietly."""
+        program = f"""
+import sys
+sys.path.insert(0, {PACKAGE!r})
+import hyco
+model = hyco.Model({MODEL!r})
+model.predict([0.07, 0.17])
+print(sorted({{name.split('.')[0] for name in sys.modules}} & {{'mpi4py', 'petsc4py', 'scipy', 'h5py', 'pandas'}}))
+"""
+        run = subprocess.run([sys.executable, '-c', program], cwd=self.folder, capture_output=True, text=True, timeout=100 * PATIENCE, check=False)
+        self.assertEqual((run.returncode, run.stdout, run.stderr), (0, '[]\n', ''))
+        run = subprocess.run([sys.executable, '-c', 'import hyco'], capture_output=True, text=True, timeout=100 * PATIENCE, check=False,
+                             env={**os.environ, 'PYTHONPATH': os.path.join(SOURCE, 'python')})
+        self.assertNotEqual(run.returncode, 0)
+        self.assertIn('build/python', run.stderr)
+
+
+if __name__ == '__main__':
+    unittest.main()
