@@ -160,7 +160,8 @@ static void Print(const Check *check, PetscInt contact, const ContactRange *r)
   if (r->facing_max) PetscCallVoid(DriverPrint("; gaps from %.4g to %.4g", (double)r->gap_min, (double)r->gap_max));
   if (r->facing_max && r->gap_min < 0) PetscCallVoid(DriverPrint(" (below 0 the bodies overlap before any load)"));
   if (r->between)
-    PetscCallVoid(DriverPrint("; %d have no node opposite: type: mortar gives better pressures there", (int)r->between));
+    PetscCallVoid(
+        DriverPrint("; %d have no node opposite: type: mortar gives better pressures there", (int)r->between));
   PetscCallVoid(DriverPrint("\n"));
 }
 
