@@ -11,8 +11,9 @@ static PetscErrorCode ReadGroups(MPI_Comm comm, PetscOptions options, PetscInt *
   PetscOptionsBegin(comm, NULL, "HycoSnapshots", NULL);
   PetscOptionsObject->options = options;
   PetscCall(HycoOptionsInt(
-      "-hyco_groups", "number of groups of ranks that solve snapshots at the same time (0: as many as the memory allows)",
-      0, PETSC_MAX_INT, groups, NULL));
+      "-hyco_groups",
+      "number of groups of ranks that solve snapshots at the same time (0: as many as the memory allows)", 0,
+      PETSC_MAX_INT, groups, NULL));
   PetscCall(HycoOptionsFlag("-hyco_groups_monitor",
                             "print a numbered line when a group of ranks begins a point, fails, or finds none left",
                             monitor));
