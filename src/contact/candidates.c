@@ -5,7 +5,7 @@
   the least of these distances cannot have it. Each rank tests the facets around its own nodes against all ranks' boxes,
   and sends the numbers of these nodes.
 */
-#include "partners.h"
+#include "master_search.h"
 #include <hycovector.h>
 
 /* Share of the coordinates' size: more than the round-off of a distance. */
@@ -210,7 +210,7 @@ static PetscErrorCode WidenMargin(Candidates *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How far beyond its bound a block searches: coincident points of HycoPartnersProject(), round-off, and `slack` times
+/* How far beyond its bound a block searches: coincident points of HycoMasterSearchProject(), round-off, and `slack` times
    the widest facet. */
 static PetscErrorCode FindMargin(Candidates *s, PetscBool integrated, PetscReal slack)
 {

@@ -3,7 +3,7 @@
   surfaces that a map moves, masters are searched again whenever the nodes have moved.
 */
 #include "facing.h"
-#include "partners.h"
+#include "master_search.h"
 #include <hycokinematics.h>
 
 /* Whether a map moves a node of a group. */

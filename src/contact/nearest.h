@@ -49,8 +49,8 @@ void HycoPatchesProject(HycoPatches patches, const PetscReal x[3], const PetscRe
 /* For points (nf = 1) with normals: the one closest to the line through x along the mean of the unit normal `out` and
    of its own reversed; among equally close ones the nearest to x, then the first. n = 0 if none is within `small` of
    its line; points without a normal, or with nearly the same one, have no line. */
-void HycoPatchesAlong(HycoPatches patches, const PetscReal x[3], const PetscReal out[3], PetscReal small,
-                      HycoProjection *p);
+void HycoPatchesAlongLine(HycoPatches patches, const PetscReal x[3], const PetscReal out[3], PetscReal small,
+                          HycoProjection *p);
 /* Points within `along` of a facet's plane and within `radius` of its centre in the plane. */
 typedef struct {
   PetscReal centre[3], normal[3], radius, along;

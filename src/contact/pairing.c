@@ -3,7 +3,7 @@
   orientation of the two; nodes without a master are listed. The types pass functions for what differs.
 */
 #include "facing.h"
-#include "partners.h"
+#include "master_search.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -24,27 +24,27 @@ static int FarthestFirst(const void *a, const void *b)
 }
 
 /* Angle in degrees between a slave's normal and the direction to its master point, or between opposed normals. */
-static PetscReal Angle(const HycoPartners *t, PetscInt slave, HycoVerdict why, const HycoProjection *at)
+static PetscReal Angle(const HycoMasterSearch *t, PetscInt slave, HycoVerdict why, const HycoProjection *at)
 {
-  const PetscReal *out = HycoPartnersOutward(t, slave);
+  const PetscReal *out = HycoMasterSearchOutward(t, slave);
   PetscReal r[3], cosine = -HycoDot(out, t->normal + 3 * at->patch);
 
-  HycoPartnersAcross(t, slave, at, r);
+  HycoMasterSearchAcross(t, slave, at, r);
   if (why == HYCO_ASKEW) cosine = PetscAbsReal(HycoDot(out, r)) / at->distance;
   return PetscAcosReal(PetscMax(PetscMin(cosine, 1), -1)) * 180 / PETSC_PI;
 }
 
 /* "12 (0.5 away, past its border)" */
-static PetscErrorCode Describe(HycoPartners *t, const Missed *missed, size_t room, char text[])
+static PetscErrorCode Describe(HycoMasterSearch *t, const Missed *missed, size_t room, char text[])
 {
   HycoProjection at;
   PetscBool border = PETSC_FALSE;
   size_t used;
 
   PetscFunctionBegin;
-  HycoPartnersProject(t, missed->node, PETSC_FALSE, &at);
-  if (!at.n) HycoPartnersProject(t, missed->node, PETSC_TRUE, &at);
-  PetscCall(HycoPartnersAtBorder(t, &at, &border));
+  HycoMasterSearchProject(t, missed->node, PETSC_FALSE, &at);
+  if (!at.n) HycoMasterSearchProject(t, missed->node, PETSC_TRUE, &at);
+  PetscCall(HycoMasterSearchAtBorder(t, &at, &border));
   snprintf(text, room, "%d (%.4g away%s", (int)t->fe->mesh->node_id[missed->node], (double)at.distance,
            border ? ", past its border" : "");
   used = strlen(text);
@@ -56,14 +56,14 @@ static PetscErrorCode Describe(HycoPartners *t, const Missed *missed, size_t roo
 }
 
 /* Fails with the number n of slave nodes without a master, the five farthest of them, and the remedy. */
-static PetscErrorCode Complain(HycoPartners *t, HycoContact c, HycoRemedy remedy, PetscInt n, Missed missed[],
+static PetscErrorCode Complain(HycoMasterSearch *t, HycoContact c, HycoRemedy remedy, PetscInt n, Missed missed[],
                                const HycoMatch *m)
 {
   char list[HYCO_LINE / 2] = "", what[HYCO_LINE];
   PetscInt *node;
 
   PetscFunctionBegin;
-  PetscCall(HycoPartnersReady(t));
+  PetscCall(HycoMasterSearchReady(t));
   qsort(missed, (size_t)n, sizeof(Missed), FarthestFirst);
   for (PetscInt k = 0; k < PetscMin(n, 5); k++) {
     char one[HYCO_LINE / 2];
@@ -82,7 +82,7 @@ static PetscErrorCode Complain(HycoPartners *t, HycoContact c, HycoRemedy remedy
 }
 
 /* Checks that no node is on both surfaces. */
-static PetscErrorCode CheckApart(const HycoPartners *t, HycoContact c)
+static PetscErrorCode CheckApart(const HycoMasterSearch *t, HycoContact c)
 {
   HycoMesh m = t->fe->mesh;
   PetscBool *master;
@@ -99,19 +99,19 @@ static PetscErrorCode CheckApart(const HycoPartners *t, HycoContact c)
 }
 
 /* Fails if no slave node has a master: with the distance of the nearest one that faces it, if any does. */
-static PetscErrorCode RefuseAll(HycoPartners *t, HycoContact c, const HycoMatch *m)
+static PetscErrorCode RefuseAll(HycoMasterSearch *t, HycoContact c, const HycoMatch *m)
 {
   PetscReal nearest = PETSC_MAX_REAL;
   PetscInt node = -1;
 
   PetscFunctionBegin;
-  PetscCall(HycoPartnersReady(t));
+  PetscCall(HycoMasterSearchReady(t));
   for (PetscInt k = 0; k < m->n; k++) {
     HycoProjection at;
     HycoVerdict why;
 
-    PetscCall(HycoPartnersJudge(t, m->slave[k], PETSC_MAX_REAL, 0, &at, &why));
-    if (why != HYCO_MET || at.distance >= nearest) continue;
+    PetscCall(HycoMasterSearchJudge(t, m->slave[k], PETSC_MAX_REAL, 0, &at, &why));
+    if (why != HYCO_FOUND || at.distance >= nearest) continue;
     nearest = at.distance;
     node = m->slave[k];
   }
@@ -124,14 +124,14 @@ static PetscErrorCode RefuseAll(HycoPartners *t, HycoContact c, const HycoMatch 
 }
 
 /* Adds each slave node with its master, or fails for those without one. */
-static PetscErrorCode AppendMatched(HycoPartners *t, HycoContact c, PetscInt index, HycoRemedy remedy,
+static PetscErrorCode AppendMatched(HycoMasterSearch *t, HycoContact c, PetscInt index, HycoRemedy remedy,
                                     const HycoMatch *m, Missed missed[], HycoPairs *p)
 {
   PetscInt n_missed = 0, n_alone = 0;
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < m->n; k++) {
-    if (m->why[k] != HYCO_MET) {
+    if (m->why[k] != HYCO_FOUND) {
       const Missed here = {m->at[k].distance, m->slave[k], m->why[k]};
 
       /* All nodes without a master are collected, so that the message can name the farthest ones. */
@@ -147,7 +147,7 @@ static PetscErrorCode AppendMatched(HycoPartners *t, HycoContact c, PetscInt ind
 }
 
 /* The whole matching, once the search and the slave nodes exist. */
-static PetscErrorCode Match(HycoPartners *t, HycoContact c, PetscInt index, HycoSettle settle, HycoRemedy remedy,
+static PetscErrorCode Match(HycoMasterSearch *t, HycoContact c, PetscInt index, HycoSettle settle, HycoRemedy remedy,
                             HycoMatch *m, HycoPairs *p)
 {
   HycoQuery query = {.moved = PETSC_FALSE};
@@ -171,7 +171,7 @@ static PetscErrorCode Match(HycoPartners *t, HycoContact c, PetscInt index, Hyco
   query.tolerance = m->tolerance;
   query.small = m->small;
   p->queries += m->n;
-  ierr = HycoPartnersSearch(t, &query, m->n, m->slave, m->at, m->why);
+  ierr = HycoMasterSearchFind(t, &query, m->n, m->slave, m->at, m->why);
   if (!ierr) ierr = (*settle)(t, c, m);
   if (!ierr) ierr = AppendMatched(t, c, index, remedy, m, missed, p);
   PetscCall(PetscFree3(m->at, m->why, missed));
@@ -192,7 +192,7 @@ static PetscBool Follows(HycoMesh m, PetscInt node, const PetscBool carries[])
 
 /* The slave nodes that take contact forces, without tied nodes that follow others of them and without those of other
    ranks; the caller frees them. */
-static PetscErrorCode FindSlaves(const HycoPartners *t, PetscInt *n, PetscInt **slave)
+static PetscErrorCode FindSlaves(const HycoMasterSearch *t, PetscInt *n, PetscInt **slave)
 {
   HycoMesh m = t->fe->mesh;
   PetscBool *carries;
@@ -213,26 +213,26 @@ static PetscErrorCode FindSlaves(const HycoPartners *t, PetscInt *n, PetscInt **
 
 /* Adds the contacts of one scene entry to the pairs: the search, the type's settling of the matches, errors with the
    type's remedy. nodes: masters are nodes, not points of facets. Not collective. */
-PetscErrorCode HycoPartnersMatch(HycoContact c, HycoFE fe, PetscInt index, PetscBool nodes, HycoSettle settle,
-                                 HycoRemedy remedy, HycoPairs *pairs)
+PetscErrorCode HycoMasterSearchMatch(HycoContact c, HycoFE fe, PetscInt index, PetscBool nodes, HycoSettle settle,
+                                     HycoRemedy remedy, HycoPairs *pairs)
 {
-  HycoPartners t;
+  HycoMasterSearch t;
   HycoMatch m = {0};
   PetscInt *slave;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(HycoPartnersCreate(fe, c, nodes, &t));
+  PetscCall(HycoMasterSearchCreate(fe, c, nodes, &t));
   PetscCall(FindSlaves(&t, &m.n, &slave));
   m.slave = slave;
   ierr = Match(&t, c, index, settle, remedy, &m, pairs);
   PetscCall(PetscFree(slave));
-  PetscCall(HycoPartnersDestroy(&t));
+  PetscCall(HycoMasterSearchDestroy(&t));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoPartnersDeclare(HycoContact c)
+PetscErrorCode HycoMasterSearchDeclare(HycoContact c)
 {
   PetscFunctionBegin;
   PetscCall(HycoContactDeclare(c, "slave", "slave group", HYCO_ENTRY_GROUP, PETSC_TRUE));

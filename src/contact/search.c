@@ -1,66 +1,66 @@
 /*
   The queries of a search for masters: the projection of each slave node, and its position relative to the master.
 */
-#include "partners.h"
+#include "master_search.h"
 
 /* Verdict on a slave as drawn: met, turned away, too far, askew (its normal misses the master point), past the
    border. Within `small` the direction is round-off and is not judged. */
-PetscErrorCode HycoPartnersJudge(HycoPartners *t, PetscInt slave, PetscReal tolerance, PetscReal small,
-                                 HycoProjection *at, HycoVerdict *why)
+PetscErrorCode HycoMasterSearchJudge(HycoMasterSearch *t, PetscInt slave, PetscReal tolerance, PetscReal small,
+                                     HycoProjection *at, HycoVerdict *why)
 {
-  const PetscReal *out = HycoPartnersOutward(t, slave);
+  const PetscReal *out = HycoMasterSearchOutward(t, slave);
   PetscReal r[3];
   PetscBool past = PETSC_FALSE;
 
   PetscFunctionBegin;
-  *why = HYCO_MET;
-  HycoPartnersProject(t, slave, PETSC_FALSE, at);
+  *why = HYCO_FOUND;
+  HycoMasterSearchProject(t, slave, PETSC_FALSE, at);
   if (!at->n) {
     *why = HYCO_TURNED;
-    HycoPartnersProject(t, slave, PETSC_TRUE, at);
+    HycoMasterSearchProject(t, slave, PETSC_TRUE, at);
   }
-  if (*why == HYCO_MET && at->distance > tolerance) *why = HYCO_FAR;
-  if (*why != HYCO_MET || !out || at->distance <= small) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoPartnersAcross(t, slave, at, r);
+  if (*why == HYCO_FOUND && at->distance > tolerance) *why = HYCO_FAR;
+  if (*why != HYCO_FOUND || !out || at->distance <= small) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoMasterSearchAcross(t, slave, at, r);
   /* A normal that is farther than the limit angle from the direction to the master point. */
   if (PetscAbsReal(HycoDot(r, out)) < -HYCO_OPPOSED * at->distance) *why = HYCO_ASKEW;
-  PetscCall(HycoPartnersIsPast(t, slave, at, &past));
+  PetscCall(HycoMasterSearchIsPast(t, slave, at, &past));
   if (past) *why = HYCO_PAST;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* On moved surfaces; n = 0: it has no master. */
-static PetscErrorCode Follow(HycoPartners *t, PetscInt slave, PetscReal reach, HycoProjection *at)
+static PetscErrorCode Follow(HycoMasterSearch *t, PetscInt slave, PetscReal reach, HycoProjection *at)
 {
   PetscBool past;
 
   PetscFunctionBegin;
-  HycoPartnersProject(t, slave, PETSC_FALSE, at);
+  HycoMasterSearchProject(t, slave, PETSC_FALSE, at);
   if (at->n && at->distance > reach) at->n = 0;
   if (!at->n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoPartnersIsPast(t, slave, at, &past));
+  PetscCall(HycoMasterSearchIsPast(t, slave, at, &past));
   if (past) at->n = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Also the place of the event of -log_view. */
-static PetscErrorCode AnswerAll(HycoPartners *t, const HycoQuery *q, PetscInt n, const PetscInt slave[],
+static PetscErrorCode AnswerAll(HycoMasterSearch *t, const HycoQuery *q, PetscInt n, const PetscInt slave[],
                                 HycoProjection at[], HycoVerdict why[])
 {
   PetscFunctionBegin;
-  if (n) PetscCall(HycoPartnersReady(t));
+  if (n) PetscCall(HycoMasterSearchReady(t));
   for (PetscInt k = 0; k < n; k++) {
-    why[k] = HYCO_MET;
+    why[k] = HYCO_FOUND;
     if (q->moved)
       PetscCall(Follow(t, slave[k], q->tolerance, &at[k]));
     else
-      PetscCall(HycoPartnersJudge(t, slave[k], q->tolerance, q->small, &at[k], &why[k]));
+      PetscCall(HycoMasterSearchJudge(t, slave[k], q->tolerance, q->small, &at[k], &why[k]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoPartnersSearch(HycoPartners *t, const HycoQuery *q, PetscInt n, const PetscInt slave[],
-                                  HycoProjection at[], HycoVerdict why[])
+PetscErrorCode HycoMasterSearchFind(HycoMasterSearch *t, const HycoQuery *q, PetscInt n, const PetscInt slave[],
+                                    HycoProjection at[], HycoVerdict why[])
 {
   PetscFunctionBegin;
   HycoLogged(HYCO_EVENT_SEARCH, AnswerAll(t, q, n, slave, at, why));

@@ -1,4 +1,4 @@
-"""Which nodes are paired: normals oppose each other, partners are in front; overlaps and partners that no longer face each other are
+"""Which nodes are paired: normals oppose each other, masters are in front; overlaps and masters that no longer face each other are
 refused by name."""
 import math
 import unittest

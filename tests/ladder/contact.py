@@ -53,7 +53,7 @@ class Contact(Program):
             self.refused(words, self.scene(contact), '0.06')
         run = self.run_raw('solve', '-scene', self.path('scene.yaml'), '-mu', 0.06)  # the command has no such type
         self.assertNotEqual(run.returncode, 0)
-        self.assertIn('must be obstacle, pair, rigid or surface', run.stderr)
+        self.assertIn('obstacle, pair, rigid or surface', run.stderr)
 
 
 if __name__ == '__main__':

@@ -1,7 +1,7 @@
 /* The search for masters: its points are those without a tree, and those with fewer patches that contain them; pairs along
    the normals. */
 #include "check.h"
-#include "partners.h"
+#include "master_search.h"
 #include <hycovector.h>
 
 #define MOST_PATCHES 5000
@@ -13,7 +13,7 @@ static unsigned long long state = 7;
 typedef struct {
   PetscReal X[3 * (2 * MOST_PATCHES + N_SLAVES)], outward[3 * (2 * MOST_PATCHES + N_SLAVES)], normal[3 * MOST_PATCHES];
   PetscInt node[4 * MOST_PATCHES], slave[N_SLAVES];
-  HycoPartners t;
+  HycoMasterSearch t;
 } Surfaces;
 
 static PetscInt AddNode(Surfaces *s, PetscReal x, PetscReal y, PetscReal z)
@@ -69,7 +69,7 @@ static void AddSlaves(Surfaces *s, PetscInt n_master, PetscReal along, PetscReal
 static void Draws(Surfaces *s, PetscInt nf, PetscInt along, PetscInt across)
 {
   memset(s, 0, sizeof(*s));
-  s->t = (HycoPartners){.nf = nf, .node = s->node, .normal = s->normal, .outward = s->outward, .X = s->X};
+  s->t = (HycoMasterSearch){.nf = nf, .node = s->node, .normal = s->normal, .outward = s->outward, .X = s->X};
   AddStrip(s, along, across, 0, 1);
   AddStrip(s, along, across, -0.4, -1);
   AddSlaves(s, s->t.n_nodes, along, across);
@@ -115,15 +115,15 @@ static PetscErrorCode Compare(Surfaces *s, PetscInt n_why[])
   for (PetscInt moved = 0; moved < 2; moved++) {
     const HycoQuery query = {.moved = (PetscBool)moved, .tolerance = 0.3, .small = 1e-3};
 
-    PetscCall(HycoPartnersSearch(&s->t, &query, N_SLAVES, s->slave, all, why));
+    PetscCall(HycoMasterSearchFind(&s->t, &query, N_SLAVES, s->slave, all, why));
     for (PetscInt k = 0; k < N_SLAVES; k++) {
-      HycoPartners few = s->t;
+      HycoMasterSearch few = s->t;
       HycoProjection at, any;
       HycoVerdict here;
 
       n_why[why[k]]++;
       if (k % 30) continue;
-      HycoPartnersProject(&s->t, s->slave[k], PETSC_TRUE, &any);
+      HycoMasterSearchProject(&s->t, s->slave[k], PETSC_TRUE, &any);
       few.patches = NULL;
       few.node = node;
       few.normal = normal;
@@ -138,12 +138,12 @@ static PetscErrorCode Compare(Surfaces *s, PetscInt n_why[])
         PetscCall(PetscArraycpy(node + few.n * s->t.nf, s->node + f * s->t.nf, s->t.nf));
         PetscCall(PetscArraycpy(normal + 3 * few.n++, s->normal + 3 * f, 3));
       }
-      PetscCall(HycoPartnersSearch(&few, &query, 1, &s->slave[k], &at, &here));
+      PetscCall(HycoMasterSearchFind(&few, &query, 1, &s->slave[k], &at, &here));
       at.patch = at.n ? number[at.patch] : 0;
       CHECK(here == why[k] && Same(&all[k], &at),
             "nf %d, slave %d: verdict %d, distance %.17g; of all patches %d, %.17g", (int)s->t.nf, (int)k, (int)here,
             (double)at.distance, (int)why[k], (double)all[k].distance);
-      PetscCall(HycoPartnersForget(&few));
+      PetscCall(HycoMasterSearchForget(&few));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -157,7 +157,7 @@ static PetscErrorCode CompareNearest(Surfaces *s)
     HycoProjection at;
     PetscReal distance;
 
-    HycoPartnersProject(&s->t, s->slave[k], PETSC_TRUE, &at);
+    HycoMasterSearchProject(&s->t, s->slave[k], PETSC_TRUE, &at);
     PetscCall(Nearest(s, s->X + 3 * s->slave[k], &distance));
     CHECK(at.distance == distance, "slave %d: %.17g, without a tree %.17g", (int)k, (double)at.distance,
           (double)distance);
@@ -176,7 +176,7 @@ static PetscErrorCode TestSame(Surfaces *s)
       Draws(s, nf, shape ? 30 : 200, shape ? 30 : 3);
       PetscCall(Compare(s, n_why));
       PetscCall(CompareNearest(s));
-      PetscCall(HycoPartnersForget(&s->t));
+      PetscCall(HycoMasterSearchForget(&s->t));
     }
   }
   for (PetscInt w = 0; w <= HYCO_PAST; w++) CHECK(n_why[w] > 0, "the verdict %d does not occur", (int)w);
@@ -211,7 +211,7 @@ static PetscErrorCode TestAlong(Surfaces *s)
 
   PetscFunctionBegin;
   memset(s, 0, sizeof(*s));
-  s->t = (HycoPartners){.nf = 1};
+  s->t = (HycoMasterSearch){.nf = 1};
   for (PetscInt k = 0; k < MOST_PATCHES; k++) {
     const PetscReal turn = 3 * Draw(&state), n[3] = {PetscCosReal(turn), PetscSinReal(turn), 0.1 * Draw(&state)};
 
@@ -227,7 +227,7 @@ static PetscErrorCode TestAlong(Surfaces *s)
     const PetscInt right = FindAlong(s, x, out, 0.2);
     HycoProjection at;
 
-    HycoPatchesAlong(tube, x, out, 0.2, &at);
+    HycoPatchesAlongLine(tube, x, out, 0.2, &at);
     CHECK(at.n == (right >= 0) && (!at.n || at.patch == right), "point %d, without a tree %d", (int)at.patch,
           (int)right);
     n_found += at.n;

@@ -55,7 +55,7 @@ static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs 
 
   PetscFunctionBegin;
   PetscCall(CheckSupported(c, fe));
-  PetscCall(HycoPartnersMatch(c, fe, index, PETSC_FALSE, NULL, NULL, pairs));
+  PetscCall(HycoMasterSearchMatch(c, fe, index, PETSC_FALSE, NULL, NULL, pairs));
   n = pairs->n - first;
   if (!n || HycoPairsFollows(pairs, index)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoContactGetLength(c, "tolerance", &tolerance));
@@ -88,7 +88,7 @@ PetscErrorCode HycoContactCreate_Mortar(HycoContact contact)
   static const struct _HycoContactOps ops = {.setup = SetUp, .find = Find};
 
   PetscFunctionBegin;
-  PetscCall(HycoPartnersDeclare(contact));
+  PetscCall(HycoMasterSearchDeclare(contact));
   PetscCall(HycoContactSetOps(contact, &ops));
   contact->integrated = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);

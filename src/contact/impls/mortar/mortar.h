@@ -1,7 +1,7 @@
 /* Mortar contacts: private to their type. */
 #ifndef HYCO_MORTAR_H
 #define HYCO_MORTAR_H
-#include "../../partners.h"
+#include "../../master_search.h"
 
 /* Most points of a rule on a triangle. */
 #define HYCO_MORTAR_POINTS 25

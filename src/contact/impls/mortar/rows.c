@@ -34,7 +34,7 @@ typedef struct {
 
 typedef struct {
   HycoFE fe;
-  HycoPartners t;
+  HycoMasterSearch t;
   HycoPatches patches;
   HycoRule rule;
   PetscInt corners;
@@ -65,7 +65,7 @@ static PetscErrorCode MortarCreate(HycoContact c, HycoFE fe, PetscReal reach, Pe
   s->corners = HycoCellKinds[m->type].corners;
   PetscCall(
       HycoRuleCreate(m->dim, 2 * order * (s->corners == 4 ? 2 : 1) + (fe->formulation == HYCO_AXISYMMETRIC), &s->rule));
-  PetscCall(HycoPartnersCreate(fe, c, PETSC_FALSE, &s->t));
+  PetscCall(HycoMasterSearchCreate(fe, c, PETSC_FALSE, &s->t));
   PetscCall(PetscMalloc3(m->n_nodes, &s->row, n, &s->D, s->t.n, &s->near));
   PetscCall(PetscArrayzero(s->D, n));
   for (PetscInt i = 0; i < m->n_nodes; i++) s->row[i] = -1;
@@ -79,7 +79,7 @@ static PetscErrorCode MortarDestroy(Mortar *s)
   PetscFunctionBegin;
   PetscCall(PetscFree3(s->row, s->D, s->near));
   PetscCall(HycoPatchesDestroy(&s->patches));
-  PetscCall(HycoPartnersDestroy(&s->t));
+  PetscCall(HycoMasterSearchDestroy(&s->t));
   HycoFreeAll(&s->block, &s->term);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

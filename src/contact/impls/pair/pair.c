@@ -1,6 +1,6 @@
 /* Pairs: the master of a slave node is one fixed node of the other surface. */
 #include "../../facing.h"
-#include "../../partners.h"
+#include "../../master_search.h"
 
 /* Share of a slave's facet: the largest tangential distance of a pair's nodes on moved nodes. */
 #define HYCO_APART_SHARE 0.5
@@ -36,7 +36,7 @@ static PetscReal Farthest(PetscReal stated, const HycoMatch *m)
 
 /* For surfaces that do not coincide as drawn: matches nodes along the normals, if all slave nodes that face the
    master are matched one to one; the others have no contact (n = 0). */
-static PetscErrorCode MatchAlong(HycoPartners *t, HycoContact c, HycoMatch *m)
+static PetscErrorCode MatchAlong(HycoMasterSearch *t, HycoContact c, HycoMatch *m)
 {
   HycoProjection *along;
   PetscBool *needs, matched;
@@ -44,24 +44,24 @@ static PetscErrorCode MatchAlong(HycoPartners *t, HycoContact c, HycoMatch *m)
 
   PetscFunctionBegin;
   PetscCall(HycoContactGetLength(c, "tolerance", &stated));
-  PetscCall(HycoPartnersReady(t));
+  PetscCall(HycoMasterSearchReady(t));
   PetscCall(PetscMalloc2(m->n, &along, m->n, &needs));
   for (PetscInt k = 0; k < m->n; k++) {
-    const PetscReal *out = HycoPartnersOutward(t, m->slave[k]);
+    const PetscReal *out = HycoMasterSearchOutward(t, m->slave[k]);
     HycoProjection nearest;
 
     along[k].n = 0; /* this matches mirrored surfaces at any distance */
-    if (out) HycoPatchesAlong(t->patches, t->X + 3 * m->slave[k], out, m->small, &along[k]);
-    HycoPartnersProject(t, m->slave[k], PETSC_TRUE, &nearest);
+    if (out) HycoPatchesAlongLine(t->patches, t->X + 3 * m->slave[k], out, m->small, &along[k]);
+    HycoMasterSearchProject(t, m->slave[k], PETSC_TRUE, &nearest);
     needs[k] = (PetscBool)(!out || HycoDot(out, t->normal + 3 * nearest.patch) <= HYCO_OPPOSED);
   }
   PetscCall(AreMatched(t->fe->mesh, m->n, along, needs, Farthest(stated, m), &matched));
   for (PetscInt k = 0; matched && k < m->n; k++) {
-    const PetscReal *out = HycoPartnersOutward(t, m->slave[k]);
+    const PetscReal *out = HycoMasterSearchOutward(t, m->slave[k]);
 
     m->at[k] = along[k];
     if (m->at[k].n && HycoDot(out, t->normal + 3 * m->at[k].patch) > HYCO_OPPOSED) m->at[k].n = 0;
-    m->why[k] = HYCO_MET;
+    m->why[k] = HYCO_FOUND;
   }
   PetscCall(PetscFree2(along, needs));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -78,7 +78,7 @@ static PetscErrorCode CheckMasters(HycoMesh m, HycoContact c, const HycoMatch *m
   for (PetscInt k = 0; k < match->n; k++) {
     const PetscInt j = match->at[k].node[0];
 
-    if ((match->why[k] != HYCO_MET && match->why[k] != HYCO_ASKEW) || !match->at[k].n) continue;
+    if ((match->why[k] != HYCO_FOUND && match->why[k] != HYCO_ASKEW) || !match->at[k].n) continue;
     if (partner_of[j] >= 0) {
       const PetscInt other = partner_of[j];
 
@@ -95,13 +95,13 @@ static PetscErrorCode CheckMasters(HycoMesh m, HycoContact c, const HycoMatch *m
 
 /* Nearest nodes, if they match one to one; else nodes along the normals, if these do. Coinciding meshes take the
    first way; the second is for gaps. */
-static PetscErrorCode Settle(HycoPartners *t, HycoContact c, HycoMatch *m)
+static PetscErrorCode Settle(HycoMasterSearch *t, HycoContact c, HycoMatch *m)
 {
   PetscBool matched;
 
   PetscFunctionBegin;
   PetscCall(AreMatched(t->fe->mesh, m->n, m->at, NULL, PetscMin(m->small, m->tolerance), &matched));
-  for (PetscInt k = 0; k < m->n; k++) matched = (PetscBool)(matched && m->why[k] == HYCO_MET);
+  for (PetscInt k = 0; k < m->n; k++) matched = (PetscBool)(matched && m->why[k] == HYCO_FOUND);
   /* A rank's part cannot be matched along normals: one-to-one is a property of the whole surfaces. */
   HycoCheck(matched || !m->part, "contact %s: its nodes are not matched as drawn", c->name);
   if (!matched) PetscCall(MatchAlong(t, c, m));
@@ -110,7 +110,8 @@ static PetscErrorCode Settle(HycoPartners *t, HycoContact c, HycoMatch *m)
 }
 
 /* Without a stated tolerance a larger one cannot be advised. */
-static PetscErrorCode Remedy(HycoPartners *t, HycoContact c, PetscInt n, const PetscInt missed[], char text[HYCO_LINE])
+static PetscErrorCode Remedy(HycoMasterSearch *t, HycoContact c, PetscInt n, const PetscInt missed[],
+                             char text[HYCO_LINE])
 {
   PetscReal stated;
 
@@ -129,7 +130,7 @@ static PetscErrorCode Remedy(HycoPartners *t, HycoContact c, PetscInt n, const P
 static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs *pairs)
 {
   PetscFunctionBegin;
-  PetscCall(HycoPartnersMatch(c, fe, index, PETSC_TRUE, Settle, Remedy, pairs));
+  PetscCall(HycoMasterSearchMatch(c, fe, index, PETSC_TRUE, Settle, Remedy, pairs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -174,7 +175,7 @@ PetscErrorCode HycoContactCreate_Pair(HycoContact contact)
   static const struct _HycoContactOps ops = {.setup = SetUp, .verify = Verify};
 
   PetscFunctionBegin;
-  PetscCall(HycoPartnersDeclare(contact));
+  PetscCall(HycoMasterSearchDeclare(contact));
   PetscCall(HycoContactSetOps(contact, &ops));
   contact->matched = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);

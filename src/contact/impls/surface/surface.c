@@ -3,10 +3,10 @@
   the projection is computed on the moved nodes: a slave node has a master if the nearest point's normal opposes its
   own, that point is within reach, and the node is not past the master's border.
 */
-#include "../../partners.h"
+#include "../../master_search.h"
 
 /* If the scene gives a largest distance of masters, a node that faces none within it has no contact. */
-static PetscErrorCode Settle(HycoPartners *t, HycoContact c, HycoMatch *m)
+static PetscErrorCode Settle(HycoMasterSearch *t, HycoContact c, HycoMatch *m)
 {
   PetscReal stated;
 
@@ -14,15 +14,16 @@ static PetscErrorCode Settle(HycoPartners *t, HycoContact c, HycoMatch *m)
   (void)t;
   PetscCall(HycoContactGetLength(c, "tolerance", &stated));
   for (PetscInt k = 0; k < m->n && stated >= 0; k++) {
-    if (m->why[k] == HYCO_MET) continue;
+    if (m->why[k] == HYCO_FOUND) continue;
     m->at[k].n = 0;
-    m->why[k] = HYCO_MET;
+    m->why[k] = HYCO_FOUND;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* What the user can do about nodes without a master. */
-static PetscErrorCode Remedy(HycoPartners *t, HycoContact c, PetscInt n, const PetscInt missed[], char text[HYCO_LINE])
+static PetscErrorCode Remedy(HycoMasterSearch *t, HycoContact c, PetscInt n, const PetscInt missed[],
+                             char text[HYCO_LINE])
 {
   PetscBool facing = PETSC_FALSE;
   PetscReal farthest = 0;
@@ -32,8 +33,8 @@ static PetscErrorCode Remedy(HycoPartners *t, HycoContact c, PetscInt n, const P
     HycoProjection at;
     HycoVerdict why;
 
-    PetscCall(HycoPartnersJudge(t, missed[k], PETSC_MAX_REAL, 0, &at, &why));
-    facing = (PetscBool)(facing || why == HYCO_MET);
+    PetscCall(HycoMasterSearchJudge(t, missed[k], PETSC_MAX_REAL, 0, &at, &why));
+    facing = (PetscBool)(facing || why == HYCO_FOUND);
     farthest = PetscMax(farthest, at.distance);
   }
   if (facing)
@@ -50,7 +51,7 @@ static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs 
 {
   PetscFunctionBegin;
   PetscCall(
-      HycoPartnersMatch(c, fe, index, PETSC_FALSE, HycoPairsFollows(pairs, index) ? NULL : Settle, Remedy, pairs));
+      HycoMasterSearchMatch(c, fe, index, PETSC_FALSE, HycoPairsFollows(pairs, index) ? NULL : Settle, Remedy, pairs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -59,19 +60,19 @@ static PetscErrorCode Find(HycoContact c, HycoFE fe, PetscInt index, PetscReal r
                            const PetscInt slave[], HycoPairs *found)
 {
   const HycoQuery query = {.moved = PETSC_TRUE, .tolerance = reach};
-  HycoPartners t;
+  HycoMasterSearch t;
   HycoProjection *at;
   HycoVerdict *why;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(HycoPartnersCreate(fe, c, PETSC_FALSE, &t));
+  PetscCall(HycoMasterSearchCreate(fe, c, PETSC_FALSE, &t));
   PetscCall(PetscMalloc2(n, &at, n, &why));
-  ierr = HycoPartnersSearch(&t, &query, n, slave, at, why);
+  ierr = HycoMasterSearchFind(&t, &query, n, slave, at, why);
   PetscCall(HycoPairsReserve(found, n, fe->mesh->nf));
   for (PetscInt k = 0; k < n && !ierr; k++) HycoPairsAppend(found, index, slave[k], at[k].n, at[k].node, at[k].weight);
   PetscCall(PetscFree2(at, why));
-  PetscCall(HycoPartnersDestroy(&t));
+  PetscCall(HycoMasterSearchDestroy(&t));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -81,7 +82,7 @@ PetscErrorCode HycoContactCreate_Surface(HycoContact contact)
   static const struct _HycoContactOps ops = {.setup = SetUp, .find = Find};
 
   PetscFunctionBegin;
-  PetscCall(HycoPartnersDeclare(contact));
+  PetscCall(HycoMasterSearchDeclare(contact));
   PetscCall(HycoContactSetOps(contact, &ops));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,7 +1,7 @@
 /* The surfaces of one contact on the current nodes: the master's patches in a tree, normals of both surfaces, the
    master's border. */
 #include "facing.h"
-#include "partners.h"
+#include "master_search.h"
 #include <stdlib.h>
 
 /* How far past the border a slave node may be, as a share of the facet's shortest edge: its master is then a point
@@ -10,7 +10,7 @@
 
 /* Patches and their normals: the master's nodes (pair) or facets (surface). Borrowed data of fe: nodes must not move
    while the search exists. */
-static PetscErrorCode FindPatches(HycoPartners *t)
+static PetscErrorCode FindPatches(HycoMasterSearch *t)
 {
   HycoMesh m = t->fe->mesh;
   const PetscInt gm = t->master;
@@ -44,7 +44,7 @@ static PetscErrorCode FindPatches(HycoPartners *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoPartnersCreate(HycoFE fe, HycoContact c, PetscBool nodes, HycoPartners *t)
+PetscErrorCode HycoMasterSearchCreate(HycoFE fe, HycoContact c, PetscBool nodes, HycoMasterSearch *t)
 {
   PetscFunctionBegin;
   PetscCall(PetscMemzero(t, sizeof(*t)));
@@ -61,7 +61,7 @@ PetscErrorCode HycoPartnersCreate(HycoFE fe, HycoContact c, PetscBool nodes, Hyc
 }
 
 /* The tree is built at the first query; a contact whose slaves are all on other ranks builds none. */
-PetscErrorCode HycoPartnersReady(HycoPartners *t)
+PetscErrorCode HycoMasterSearchReady(HycoMasterSearch *t)
 {
   PetscFunctionBegin;
   if (!t->patches) PetscCall(HycoPatchesCreate(t->X, t->n, t->nf, t->nf, t->node, t->normal, &t->patches));
@@ -69,7 +69,7 @@ PetscErrorCode HycoPartnersReady(HycoPartners *t)
 }
 
 /* Drops the tree and the border, for other patches or positions. */
-PetscErrorCode HycoPartnersForget(HycoPartners *t)
+PetscErrorCode HycoMasterSearchForget(HycoMasterSearch *t)
 {
   PetscFunctionBegin;
   PetscCall(HycoPatchesDestroy(&t->patches));
@@ -78,16 +78,16 @@ PetscErrorCode HycoPartnersForget(HycoPartners *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoPartnersDestroy(HycoPartners *t)
+PetscErrorCode HycoMasterSearchDestroy(HycoMasterSearch *t)
 {
   PetscFunctionBegin;
-  PetscCall(HycoPartnersForget(t));
+  PetscCall(HycoMasterSearchForget(t));
   HycoFreeAll(&t->node, &t->normal, &t->outward);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* NULL: the slave has no normal (1D, or a group without facets). */
-const PetscReal *HycoPartnersOutward(const HycoPartners *t, PetscInt slave)
+const PetscReal *HycoMasterSearchOutward(const HycoMasterSearch *t, PetscInt slave)
 {
   const PetscReal *n = t->outward + 3 * slave;
 
@@ -95,7 +95,7 @@ const PetscReal *HycoPartnersOutward(const HycoPartners *t, PetscInt slave)
 }
 
 /* The shortest edge of a patch. */
-static PetscReal ShortestEdge(const HycoPartners *t, PetscInt patch)
+static PetscReal ShortestEdge(const HycoMasterSearch *t, PetscInt patch)
 {
   const PetscInt *node = t->node + patch * t->nf, corners = HycoFacetCorners(t->nf, node);
   PetscReal shortest = PETSC_MAX_REAL;
@@ -107,9 +107,9 @@ static PetscReal ShortestEdge(const HycoPartners *t, PetscInt patch)
 
 /* The nearest point whose facet opposes the slave's normal; any_side: the nearest point whatever its normal. Where
    the nearest one does not oppose, another facet at the same point may, within HYCO_SAME_POINT. */
-void HycoPartnersProject(const HycoPartners *t, PetscInt slave, PetscBool any_side, HycoProjection *at)
+void HycoMasterSearchProject(const HycoMasterSearch *t, PetscInt slave, PetscBool any_side, HycoProjection *at)
 {
-  const PetscReal *out = HycoPartnersOutward(t, slave), *x = t->X + 3 * slave;
+  const PetscReal *out = HycoMasterSearchOutward(t, slave), *x = t->X + 3 * slave;
   HycoProjection nearest;
 
   HycoPatchesProject(t->patches, x, NULL, &nearest);
@@ -120,7 +120,7 @@ void HycoPartnersProject(const HycoPartners *t, PetscInt slave, PetscBool any_si
 }
 
 /* The vector from the slave to its master point, at the current nodes. */
-void HycoPartnersAcross(const HycoPartners *t, PetscInt slave, const HycoProjection *at, PetscReal r[3])
+void HycoMasterSearchAcross(const HycoMasterSearch *t, PetscInt slave, const HycoProjection *at, PetscReal r[3])
 {
   for (PetscInt c = 0; c < 3; c++) {
     r[c] = -t->X[3 * slave + c];
@@ -138,7 +138,7 @@ static int CompareEdges(const void *a, const void *b)
 }
 
 /* Finds the edges (2D: ends) that belong to one facet only, and their nodes. */
-static PetscErrorCode FindBorder(HycoPartners *t)
+static PetscErrorCode FindBorder(HycoMasterSearch *t)
 {
   const PetscInt nf = t->nf, edges = t->n * nf;
 
@@ -165,7 +165,7 @@ static PetscErrorCode FindBorder(HycoPartners *t)
 }
 
 /* Whether a projection is on a node or an edge of the master's border. In the interior of a facet: no. */
-PetscErrorCode HycoPartnersAtBorder(HycoPartners *t, const HycoProjection *at, PetscBool *border)
+PetscErrorCode HycoMasterSearchAtBorder(HycoMasterSearch *t, const HycoProjection *at, PetscBool *border)
 {
   const PetscInt edge[2] = {at->node[0], at->n > 1 ? at->node[1] : at->node[0]};
 
@@ -182,15 +182,15 @@ PetscErrorCode HycoPartnersAtBorder(HycoPartners *t, const HycoProjection *at, P
 
 /* Compares the tangential part of the vector from the node to its master point, in the facet's plane, with the
    tolerance. */
-PetscErrorCode HycoPartnersIsPast(HycoPartners *t, PetscInt slave, const HycoProjection *at, PetscBool *past)
+PetscErrorCode HycoMasterSearchIsPast(HycoMasterSearch *t, PetscInt slave, const HycoProjection *at, PetscBool *past)
 {
   const PetscReal *n = t->normal + 3 * at->patch;
   PetscReal r[3];
 
   PetscFunctionBegin;
   *past = PETSC_FALSE;
-  HycoPartnersAcross(t, slave, at, r);
+  HycoMasterSearchAcross(t, slave, at, r);
   if (HycoTangentialLength(r, n) > HYCO_PAST_BORDER * ShortestEdge(t, at->patch))
-    PetscCall(HycoPartnersAtBorder(t, at, past));
+    PetscCall(HycoMasterSearchAtBorder(t, at, past));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,6 +1,6 @@
 /* The search for one contact's masters: private to contact/. */
-#ifndef HYCO_PARTNERS_H
-#define HYCO_PARTNERS_H
+#ifndef HYCO_MASTER_SEARCH_H
+#define HYCO_MASTER_SEARCH_H
 #include "nearest.h"
 #include <hycocontactimpl.h>
 #include <hycovector.h>
@@ -14,35 +14,36 @@ typedef struct {
   PetscBool nodes;            /* whether patches are the master's nodes, or its facets */
   PetscInt n_nodes;           /* of the search */
   const PetscReal *X;         /* n_nodes x 3, borrowed */
-  HycoPatches patches;        /* the master's; NULL until HycoPartnersReady() */
+  HycoPatches patches;        /* the master's; NULL until HycoMasterSearchReady() */
   PetscInt n, nf, *node;      /* patches' nodes, n x nf */
   PetscReal *normal;          /* n x 3, of the patches (for a pair: of its nodes); 0: unknown */
   PetscReal *outward;         /* by node x 3, outward normal of the slave's surface; 0: unknown */
   PetscInt n_border, *border; /* edges (2D: ends) of one facet only, as sorted pairs of nodes; created when needed */
   PetscBool *at_border;       /* by node; NULL: not created */
-} HycoPartners;
+} HycoMasterSearch;
 
 /* Creates the search on fe's nodes. The caller destroys it. */
-PetscErrorCode HycoPartnersCreate(HycoFE fe, HycoContact contact, PetscBool nodes, HycoPartners *partners);
-PetscErrorCode HycoPartnersDestroy(HycoPartners *partners);
+PetscErrorCode HycoMasterSearchCreate(HycoFE fe, HycoContact contact, PetscBool nodes, HycoMasterSearch *search);
+PetscErrorCode HycoMasterSearchDestroy(HycoMasterSearch *search);
 /* Creates the tree of the patches, unless it exists: before the first projection. */
-PetscErrorCode HycoPartnersReady(HycoPartners *partners);
+PetscErrorCode HycoMasterSearchReady(HycoMasterSearch *search);
 /* Frees what was created when it was needed: the tree and the border. */
-PetscErrorCode HycoPartnersForget(HycoPartners *partners);
+PetscErrorCode HycoMasterSearchForget(HycoMasterSearch *search);
 /* The slave node's outward normal; NULL: unknown, because its group is not a surface. */
-const PetscReal *HycoPartnersOutward(const HycoPartners *partners, PetscInt slave);
+const PetscReal *HycoMasterSearchOutward(const HycoMasterSearch *search, PetscInt slave);
 /* The nearest point of the master; n = 0 if its normal does not oppose the slave's, unless any_side. */
-void HycoPartnersProject(const HycoPartners *partners, PetscInt slave, PetscBool any_side, HycoProjection *at);
+void HycoMasterSearchProject(const HycoMasterSearch *search, PetscInt slave, PetscBool any_side, HycoProjection *at);
 /* The vector from the slave node to that point. */
-void HycoPartnersAcross(const HycoPartners *partners, PetscInt slave, const HycoProjection *at, PetscReal r[3]);
+void HycoMasterSearchAcross(const HycoMasterSearch *search, PetscInt slave, const HycoProjection *at, PetscReal r[3]);
 /* Whether a point is on the master's border: on an edge with one facet, or at a node of such an edge. */
-PetscErrorCode HycoPartnersAtBorder(HycoPartners *partners, const HycoProjection *at, PetscBool *border);
+PetscErrorCode HycoMasterSearchAtBorder(HycoMasterSearch *search, const HycoProjection *at, PetscBool *border);
 /* Whether a slave node is past the master's border, by more than a tenth of the facet's shortest edge in its plane. */
-PetscErrorCode HycoPartnersIsPast(HycoPartners *partners, PetscInt slave, const HycoProjection *at, PetscBool *past);
+PetscErrorCode HycoMasterSearchIsPast(HycoMasterSearch *search, PetscInt slave, const HycoProjection *at,
+                                      PetscBool *past);
 
 /* Position of a slave node relative to the master: within reach and in front of it; too far; all of the master
    turned away; to the side, as for a pair that does not match; past the border. */
-typedef enum { HYCO_MET, HYCO_FAR, HYCO_TURNED, HYCO_ASKEW, HYCO_PAST } HycoVerdict;
+typedef enum { HYCO_FOUND, HYCO_FAR, HYCO_TURNED, HYCO_ASKEW, HYCO_PAST } HycoVerdict;
 
 /* The n slave nodes with their masters (at[k].n = 0: none), at most `tolerance` away; below `small`, a tenth of the
    slave's shortest edge, they touch. */
@@ -55,7 +56,7 @@ typedef struct {
   PetscBool part; /* they are those of this rank, of whose master only a part is here */
 } HycoMatch;
 
-/* The queries of a search, as drawn or (moved) on surfaces that a map moves: there the verdict is HYCO_MET, and n = 0
+/* The queries of a search, as drawn or (moved) on surfaces that a map moves: there the verdict is HYCO_FOUND, and n = 0
    where the nearest point is farther than the tolerance, turned away or past the border. */
 typedef struct {
   PetscBool moved;
@@ -63,22 +64,22 @@ typedef struct {
 } HycoQuery;
 
 /* The masters of n slave nodes. */
-PetscErrorCode HycoPartnersSearch(HycoPartners *partners, const HycoQuery *query, PetscInt n, const PetscInt slave[],
-                                  HycoProjection at[], HycoVerdict why[]);
+PetscErrorCode HycoMasterSearchFind(HycoMasterSearch *search, const HycoQuery *query, PetscInt n,
+                                    const PetscInt slave[], HycoProjection at[], HycoVerdict why[]);
 /* A type's choice of masters from the nearest points. */
-typedef PetscErrorCode (*HycoSettle)(HycoPartners *partners, HycoContact contact, HycoMatch *match);
+typedef PetscErrorCode (*HycoSettle)(HycoMasterSearch *search, HycoContact contact, HycoMatch *match);
 /* What to do about n slave nodes without a master, as the end of a message. */
-typedef PetscErrorCode (*HycoRemedy)(HycoPartners *partners, HycoContact contact, PetscInt n, const PetscInt node[],
+typedef PetscErrorCode (*HycoRemedy)(HycoMasterSearch *search, HycoContact contact, PetscInt n, const PetscInt node[],
                                      char text[HYCO_LINE]);
 
 /* The master of one slave node, at most `tolerance` away. Beyond `small`, the direction to it must be within the
    angle for opposed normals of the slave's normal, and must not lead past the border. */
-PetscErrorCode HycoPartnersJudge(HycoPartners *partners, PetscInt slave, PetscReal tolerance, PetscReal small,
-                                 HycoProjection *at, HycoVerdict *why);
+PetscErrorCode HycoMasterSearchJudge(HycoMasterSearch *search, PetscInt slave, PetscReal tolerance, PetscReal small,
+                                     HycoProjection *at, HycoVerdict *why);
 /* Adds all slave nodes with their masters to pairs; settle NULL: without masters, which are searched for elsewhere. */
-PetscErrorCode HycoPartnersMatch(HycoContact contact, HycoFE fe, PetscInt index, PetscBool nodes, HycoSettle settle,
-                                 HycoRemedy remedy, HycoPairs *pairs);
+PetscErrorCode HycoMasterSearchMatch(HycoContact contact, HycoFE fe, PetscInt index, PetscBool nodes, HycoSettle settle,
+                                     HycoRemedy remedy, HycoPairs *pairs);
 /* The entries of a type with slave and master. */
-PetscErrorCode HycoPartnersDeclare(HycoContact contact);
+PetscErrorCode HycoMasterSearchDeclare(HycoContact contact);
 
 #endif

@@ -87,7 +87,8 @@ static void SearchAlong(HycoPatches s, PetscInt t, PetscReal least, PetscInt lo,
 
 /* The node nearest to the line from x along the mean of its normal `out` and the node's reversed normal, within
    `small` of it (length); p->n = 0: none. Matches mirrored surfaces at any distance. */
-void HycoPatchesAlong(HycoPatches s, const PetscReal x[3], const PetscReal out[3], PetscReal small, HycoProjection *p)
+void HycoPatchesAlongLine(HycoPatches s, const PetscReal x[3], const PetscReal out[3], PetscReal small,
+                          HycoProjection *p)
 {
   Line line = {.x = x, .out = out, .off = small * small, .patch = -1};
 
