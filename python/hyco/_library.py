@@ -157,7 +157,7 @@ def count(n=0):
 
 def address(array):
     """An array's data as C's pointer; None: NULL."""
-    return None if array is None else ctypes.c_void_p(array.__array_interface__['data'][0])
+    return None if array is None else ctypes.c_void_p(array.ctypes.data)
 
 
 def copied(pointer, shape, kind=float):
