@@ -231,7 +231,7 @@ class Draft:
         keys = self.cells(f"{block.instance}.{name}" if block.instance else name, block)
         if block.rows and item(block.rows[0], 0) not in (0, 1) and self.dim() == 2 and not any(t.startswith("CAX") for t in self.deck.types):
             self.thickness = item(block.rows[0], 0)
-            self.notes.append(f"line {block.line}: *SOLID SECTION: the thickness {said(self.thickness)} is 1 here: forces of *CLOAD are divided by it")
+            self.notes.append(f"line {block.line}: *SOLID SECTION: the thickness {said(self.thickness)} is 1 here: forces of *CLOAD are divided by it, and so are reactions and contact forces")
         alone = sum(b.word == "SOLID SECTION" and b.instance == block.instance for b in self.deck.rest) == 1
         title = self.free_name((block.instance if alone else f"{block.instance}.{name}") if block.instance else name, self.bodies)
         self.bodies[title] = (keys, p.get("MATERIAL", "").upper(), block)

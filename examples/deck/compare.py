@@ -4,6 +4,7 @@
     python3 examples/deck/compare.py SCENE FILE.csv"""
 import sys
 
+import h5py
 import hyco
 import numpy as np
 
@@ -14,7 +15,6 @@ with hyco.Scene(SCENE) as scene:
     mu = [(lo + hi) / 2 for lo, hi in scene.parameters.values()]
     solution = scene.solve(mu)
     scene.write('compared.xdmf')
-import h5py  # noqa: E402  pylint: disable=wrong-import-position
 with h5py.File('compared.h5') as file:
     nodes = file['mesh/xyz'][:, :dim]
 size = np.abs(table[:, dim:]).max()

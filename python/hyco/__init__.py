@@ -311,18 +311,20 @@ class _Option(ctypes.Structure):
     _fields_ = [(name, ctypes.c_char_p) for name in ('name', 'value', 'initial', 'meaning', 'owner', 'only')]
 
 
+SECTIONS = ('scene', 'parameter', 'constant', 'body', 'fixed', 'pressure', 'traction', 'force', 'spring', 'gravity', 'rotation', 'contact', 'output', 'history',
+            'tie', 'hyco')
+
+
 def _check_options(entries):
-    """Refuses an option of the library that does not exist."""
-    names = [name for name in entries if name.startswith('hyco_')]
+    """Refuses what is neither an entry of a scene nor an option of the library: it would have no effect."""
     n, table = c.count(), ctypes.POINTER(_Option)()
-    c.call('HycoGetOptionTable', ctypes.byref(n), ctypes.byref(table)) if names else None  # pylint: disable=expression-not-assigned
-    known = {o.name.decode() for o in table[:n.value]} if names else set()
-    for name in names:
-        if name not in known and not name.startswith(('hyco_mumps_', 'hyco_primal_', 'hyco_norm_', 'hyco_tao_', 'hyco_pod_svd_', 'hyco_pod_bv_',
-                                                       'hyco_pod_ds_')):
-            listed = (ctypes.c_char_p * len(known))(*(w.encode() for w in sorted(known)))
-            c.lib.HycoNearest.restype = ctypes.c_char_p
-            near = c.lib.HycoNearest(name.encode(), c.count(len(known)), listed)
+    c.call('HycoGetOptionTable', ctypes.byref(n), ctypes.byref(table))
+    known = sorted(o.name for o in table[:n.value])
+    for name in entries:
+        if not name.startswith(tuple(f'{section}_' for section in SECTIONS)):
+            raise Error(f'{name} is not an entry of a scene; these begin with {", ".join(f"{section}_" for section in SECTIONS)}')
+        if name.startswith('hyco_') and name.encode() not in known:
+            near = c.lib.HycoNearest(name.encode(), c.count(len(known)), (ctypes.c_char_p * len(known))(*known))
             raise Error(f'there is no option {name}' + (f'; did you mean {near.decode()}?' if near else ' (hyco train -help lists them)'))
 
 

@@ -3,6 +3,7 @@ import atexit
 import ctypes
 import os
 import sys
+import threading
 
 import numpy as np
 
@@ -45,11 +46,13 @@ except OSError as error:
 lib.HycoKeptError.restype = ctypes.c_char_p
 lib.HycoVersion.restype = ctypes.c_char_p
 lib.HycoReasonName.restype = ctypes.c_char_p
+lib.HycoNearest.restype = ctypes.c_char_p
 # As a process that no launcher started: neither a daemon nor a network is needed. As the command does (hyco/src/app/launch.c).
 ALONE = {'OMPI_MCA_ess_singleton_isolated': '1', 'OMPI_MCA_orte_create_session_dirs': '0', 'OMPI_MCA_btl': 'self', 'OMPI_MCA_pml': 'ob1',
          'OMPI_MCA_if': '^posix_ipv4', 'PMIX_MCA_pif': '^posix_ipv4', 'HWLOC_HIDE_ERRORS': '2'}
 LAUNCHED = ('OMPI_COMM_WORLD_SIZE', 'PMIX_RANK', 'PMI_RANK', 'PMI_FD', 'PMI_ID')
 running = False
+lock = threading.RLock()
 
 
 class World:
@@ -102,10 +105,11 @@ def leave(kind, value, trace, report=sys.excepthook):
 
 def call(name, *arguments):
     """Calls a function of the library; its error becomes an exception."""
-    lib.HycoKeepErrors(1)
-    failed = getattr(lib, name)(*arguments)
-    line = bytes(lib.HycoKeptError()) if failed else b''
-    lib.HycoKeepErrors(0)
+    with lock:  # PETSc knows nothing of threads; a callback may call again
+        lib.HycoKeepErrors(1)
+        failed = getattr(lib, name)(*arguments)
+        line = bytes(lib.HycoKeptError()) if failed else b''
+        lib.HycoKeepErrors(0)
     if failed:
         raise Error(line.decode('utf-8', 'replace') or f'{name} failed with PETSc error {failed}')
 
@@ -153,7 +157,7 @@ def count(n=0):
 
 def address(array):
     """An array's data as C's pointer; None: NULL."""
-    return None if array is None else ctypes.c_void_p(array.__array_interface__['data'][0])
+    return None if array is None else ctypes.c_void_p(array.ctypes.data)
 
 
 def copied(pointer, shape, kind=float):

@@ -160,6 +160,30 @@ class Python(Case):
             self.assertAlmostEqual(mine['long'], float(row['long']), places=9)
         self.assertGreater(s.history['inelastic'][-1], 1e-4)
         self.near(s.outputs['long'], report['outputs']['long'], 1e-9)
+        with self.hyco_py.Scene('bar.yaml', hyco_validation=4) as scene, scene.train('bar.h5', grid=[4]) as model:
+            p = model.predict([0.9])
+            h = model.history()
+            self.assertEqual(list(h['t']), [0, 0.5, 1])
+            self.near(h['long'][-1], s.outputs['long'], 0.02)
+            self.near(p.outputs['long'], h['long'][-1], 1e-12)
+            self.near(model.predict([[0.7], [0.9]]).outputs['long'][1], p.outputs['long'], 1e-9)
+
+    def test_threads(self):
+        """Threads take turns: their predictions are those of one."""
+        import threading  # pylint: disable=import-outside-toplevel
+        models = [self.hyco_py.Model(MODEL) for _ in range(3)]
+        points = np.linspace([0.05, -0.05], [0.25, 0.5], 200)
+        expected, found = models[0].predict(points).total_contact_force, {}
+        workers = [threading.Thread(target=lambda m=m, k=k: found.update({k: [m.predict(x).total_contact_force for x in points]})) for k, m in enumerate(models)]
+        for worker in workers:
+            worker.start()
+        for worker in workers:
+            worker.join()
+        for k in range(3):
+            np.testing.assert_allclose(found[k], expected, rtol=1e-12)
+        self.assertEqual(models[0].predict([0.3, 0.2], extrapolate=True, check=False).shape, ())
+        with self.assertRaises(self.hyco_py.Error):
+            models[0].predict([0.3, 0.2])
 
     def test_errors(self):
         """Each error is an exception with the command's line, nothing is printed, and the same objects work afterwards."""
@@ -183,6 +207,7 @@ line(lambda: hyco.Model('block.msh'))
 line(lambda: hyco.Model('none.h5'))
 line(lambda: model.predict([[0.07, 0.17], [7, 0.17]]))
 line(lambda: hyco.Scene('block.yaml', hyco_pod_tool=1))
+line(lambda: hyco.Scene('block.yaml', bodyy_block_young=1))
 line(lambda: scene.solve([0.03]))
 line(lambda: scene.solve({{'press': 0.03}}))
 line(lambda: scene.train('m.h5', grid=[3]))
@@ -195,8 +220,8 @@ print(model.predict([0.07, 0.17]).total_contact_force)
         run = subprocess.run([sys.executable, '-c', program], cwd=self.folder, capture_output=True, text=True, timeout=100 * PATIENCE, check=False)
         self.assertEqual((run.returncode, run.stderr), (0, ''), run.stdout)
         lines = run.stdout.splitlines()
-        self.assertEqual(len(lines), 13, run.stdout)
-        for line, words in zip(lines, (('press', '0.3', '0.05'), ('nowhere',), ('block.msh',), ('none.h5',), ('mu1', '7'), ('hyco_pod_tool', 'hyco_pod_tol'),
+        self.assertEqual(len(lines), 14, run.stdout)
+        for line, words in zip(lines, (('press', '0.3', '0.05'), ('nowhere',), ('block.msh',), ('none.h5',), ('mu1', '7'), ('hyco_pod_tool', 'hyco_pod_tol'), ('bodyy_', 'body_'),
                                        ('(1,)', 'press', 'modulus'), ('modulus',), ('1 numbers', '2'), ('one of',), ('hybrit',), ('nonsense',))):
             for word in words:
                 self.assertIn(word, line)
