@@ -104,9 +104,9 @@ class SearchLimits(Ring):
         self.assertRegex(report['missed'][0], 'let a condensed model choose its points: -hyco_model_type condensed')
 
     def test_paths(self):
-        """Paths with a constant stiffness: the condensed model is tried first."""
+        """Paths: models of bodies are tried first, their laws by interpolation before a cubature."""
         _, rows = self.search(self.norton, 'paths', '-grid', '2,2', '-hyco_snapshots', self.path('store'), status=None)
-        self.assertEqual((rows[0]['model_type'], rows[0]['failure']), ('condensed', ''))
+        self.assertEqual((rows[0]['model_type'], rows[0]['variant'], rows[0]['failure']), ('bodies', 'interpolation', ''))
 
 
 if __name__ == '__main__':
