@@ -95,6 +95,8 @@ PetscReal HycoContactNoGap(HycoFE fe)
 static PetscErrorCode Gaps(HycoFE fe, HycoContact c, const HycoPairs *pairs, PetscInt first,
                            const HycoContactPoints *points, const PetscReal normal[], PetscReal gap[])
 {
+  const PetscReal zero = c->integrated ? ROUND_OFF * HycoMeshLength(fe->mesh) : -1;
+
   PetscFunctionBegin;
   if (c->ops->gap) PetscCall((*c->ops->gap)(c, points, normal, gap));
   for (PetscInt i = 0; i < points->n; i++) {
@@ -108,7 +110,7 @@ static PetscErrorCode Gaps(HycoFE fe, HycoContact c, const HycoPairs *pairs, Pet
       gap[i] = 0;
       for (PetscInt d = 0; d < 3; d++) gap[i] += n[d] * (x[d] - points->slave[3 * i + d]);
       /* surfaces that touch have gaps of 0, and not the round-off of a sum over many nodes */
-      if (c->integrated && PetscAbsReal(gap[i]) <= ROUND_OFF * HycoMeshLength(fe->mesh)) gap[i] = 0;
+      if (PetscAbsReal(gap[i]) <= zero) gap[i] = 0;
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
