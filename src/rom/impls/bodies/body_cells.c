@@ -202,23 +202,28 @@ static PetscErrorCode List(HycoReducer t, HycoBodiesFactor *factor, const PetscB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* known[]: the unknowns of the surfaces in this rank's part. */
+/* known[]: the unknowns of the surfaces in this rank's part; bare[]: those with a force at a sample. The model's mesh has
+   the nodes of these, not of masters that no slave meets, so that the others have modes too. */
 static PetscErrorCode MarkSurfaces(HycoReducer t, HycoBodiesFactor *factor)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   HycoMesh m = factor->fom->part;
-  PetscInt *sorted;
+  PetscInt *sorted, *place;
 
   PetscFunctionBegin;
   HycoDuplicate(b->ns + 1, b->dof, &sorted);
-  PetscCall(PetscSortInt(b->ns, sorted));
+  PetscCall(PetscMalloc1(b->ns + 1, &place));
+  for (PetscInt k = 0; k < b->ns; k++) place[k] = k;
+  PetscCall(PetscSortIntWithArray(b->ns, sorted, place));
   for (PetscInt i = 0; i < m->n_nodes * b->dim; i++) {
     const PetscInt node = m->node_whole ? m->node_whole[i / b->dim] : i / b->dim;
     PetscInt at;
 
     PetscCall(PetscFindInt(node * b->dim + i % b->dim, b->ns, sorted, &at));
     factor->known[i] = (PetscBool)(at >= 0);
+    factor->bare[i] = (PetscBool)(at >= 0 && factor->touched[place[at]]);
   }
+  PetscCall(PetscFree(place));
   PetscCall(PetscFree(sorted));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -273,8 +278,9 @@ PetscErrorCode HycoBodiesChooseCells(HycoReducer t, HycoBodiesFactor *factor)
   if (!fits) PetscCall(PetscArrayzero(inner, fe->n_dof)); /* of the cell that stands for none */
   if (fits && !left) PetscCall(Release(t, factor, inner, &released));
   if (!released) PetscCall(PetscArrayzero(factor->known, fe->n_dof));
+  if (!released) PetscCall(PetscArrayzero(factor->bare, fe->n_dof));
   PetscCall(List(t, factor, inner));
-  for (PetscInt i = 0; i < fe->n_dof; i++) factor->known[i] = (PetscBool)(factor->known[i] || inner[i]);
+  for (PetscInt i = 0; i < fe->n_dof; i++) factor->bare[i] = (PetscBool)(factor->bare[i] || inner[i]);
   PetscCall(PetscFree(inner));
   PetscCall(PetscFree(in));
   PetscFunctionReturn(PETSC_SUCCESS);
