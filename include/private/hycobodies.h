@@ -269,10 +269,12 @@ typedef struct {
   Vec *strain; /* K^-1 times the modes of the inelastic forces */
   PetscInt n_records;
   HycoBodiesRecord *record;
-  PetscReal *score; /* by cell of the part */
-  PetscReal *moved; /* by unknown of the part: largest sampled displacement */
-  PetscBool *known; /* by unknown of the part: on the surfaces or inside, so that no mode has it */
-  PetscInt *row;    /* of the unknowns inside in the distributed vectors */
+  PetscReal *score;   /* by cell of the part */
+  PetscReal *moved;   /* by unknown of the part: largest sampled displacement */
+  PetscBool *known;   /* by unknown of the part: on the surfaces; */
+  PetscBool *bare;    /* the same: no mode has it, because the model's mesh does */
+  PetscBool *touched; /* ns: with a force at a sample */
+  PetscInt *row;      /* of the unknowns inside in the distributed vectors */
 } HycoBodiesFactor;
 
 PetscErrorCode HycoBodiesBegin(HycoReducer reducer);

@@ -7,8 +7,9 @@
 #include <hycofields.h>
 #include <hycoquantities.h>
 
-#define MOST_INNER   1200 /* unknowns: a row and a solve each */
-#define MOST_NUMBERS 3e6  /* of their rows in the file */
+#define MOST_INNER   2400 /* unknowns: a row and a solve each */
+#define MOST_NUMBERS 6e6  /* of their rows in the file */
+#define HOTTEST      0.5  /* share of this room for cells that no output needs */
 #define LEAST_SCORE  0.1
 
 PetscErrorCode HycoBodiesAddScores(HycoReducer t, HycoBodiesFactor *factor, const PetscReal u[])
@@ -49,10 +50,10 @@ PetscErrorCode HycoBodiesAddScores(HycoReducer t, HycoBodiesFactor *factor, cons
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* inner[n_dof]: the free unknowns of the cells in[] that are not on the surfaces; *fits: their rows have room.
-   Collective. */
-static PetscErrorCode MarkInner(HycoReducer t, HycoBodiesFactor *factor, const PetscBool in[], PetscBool inner[],
-                                PetscBool *fits)
+/* inner[n_dof]: the free unknowns of the cells in[] that are not on the surfaces; *fits: their rows have room in this
+   share of it. Collective. */
+static PetscErrorCode MarkInner(HycoReducer t, HycoBodiesFactor *factor, const PetscBool in[], PetscReal share,
+                                PetscBool inner[], PetscBool *fits)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   HycoFE fe = factor->fom->fe;
@@ -74,20 +75,20 @@ static PetscErrorCode MarkInner(HycoReducer t, HycoBodiesFactor *factor, const P
     rows += n[k];
     numbers += n[k] * b->body[k].n * b->body[k].n_samples;
   }
-  *fits = (PetscBool)(rows <= MOST_INNER && numbers <= MOST_NUMBERS);
+  *fits = (PetscBool)(rows <= share * MOST_INNER && numbers <= share * MOST_NUMBERS);
   PetscCall(PetscFree(n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Joins more[] to in[], if there is room. Collective. */
-static PetscErrorCode Join(HycoReducer t, HycoBodiesFactor *factor, PetscBool in[], PetscBool more[], PetscBool inner[],
-                           PetscBool *fits)
+static PetscErrorCode Join(HycoReducer t, HycoBodiesFactor *factor, PetscBool in[], PetscBool more[], PetscReal share,
+                           PetscBool inner[], PetscBool *fits)
 {
   const PetscInt n = factor->fom->part->n_cells;
 
   PetscFunctionBegin;
   for (PetscInt e = 0; e < n; e++) more[e] = (PetscBool)(more[e] || in[e]);
-  PetscCall(MarkInner(t, factor, more, inner, fits));
+  PetscCall(MarkInner(t, factor, more, share, inner, fits));
   if (*fits) PetscCall(PetscArraycpy(in, more, n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -102,12 +103,12 @@ static PetscErrorCode Choose(HycoReducer t, HycoBodiesFactor *factor, PetscBool 
   PetscCall(PetscMalloc1(m->n_cells + 1, &more));
   for (PetscInt k = 0; k < t->scene->n_quantities; k++) {
     HycoOnEach(HycoComm(t), HycoQuantityMarkCells(t->scene, m, k, more));
-    PetscCall(Join(t, factor, in, more, inner, &fits));
+    PetscCall(Join(t, factor, in, more, 1, inner, &fits));
   }
   fits = PETSC_TRUE;
   for (PetscReal least = 0.9; fits && least > LEAST_SCORE; least -= 0.1) {
     for (PetscInt e = 0; e < m->n_cells; e++) more[e] = (PetscBool)(factor->score[e] > least);
-    PetscCall(Join(t, factor, in, more, inner, &fits));
+    PetscCall(Join(t, factor, in, more, HOTTEST, inner, &fits));
   }
   PetscCall(PetscFree(more));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -201,23 +202,28 @@ static PetscErrorCode List(HycoReducer t, HycoBodiesFactor *factor, const PetscB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* known[]: the unknowns of the surfaces in this rank's part. */
+/* known[]: the unknowns of the surfaces in this rank's part; bare[]: those with a force at a sample. The model's mesh has
+   the nodes of these, not of masters that no slave meets, so that the others have modes too. */
 static PetscErrorCode MarkSurfaces(HycoReducer t, HycoBodiesFactor *factor)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   HycoMesh m = factor->fom->part;
-  PetscInt *sorted;
+  PetscInt *sorted, *place;
 
   PetscFunctionBegin;
   HycoDuplicate(b->ns + 1, b->dof, &sorted);
-  PetscCall(PetscSortInt(b->ns, sorted));
+  PetscCall(PetscMalloc1(b->ns + 1, &place));
+  for (PetscInt k = 0; k < b->ns; k++) place[k] = k;
+  PetscCall(PetscSortIntWithArray(b->ns, sorted, place));
   for (PetscInt i = 0; i < m->n_nodes * b->dim; i++) {
     const PetscInt node = m->node_whole ? m->node_whole[i / b->dim] : i / b->dim;
     PetscInt at;
 
     PetscCall(PetscFindInt(node * b->dim + i % b->dim, b->ns, sorted, &at));
     factor->known[i] = (PetscBool)(at >= 0);
+    factor->bare[i] = (PetscBool)(at >= 0 && factor->touched[place[at]]);
   }
+  PetscCall(PetscFree(place));
   PetscCall(PetscFree(sorted));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -267,13 +273,14 @@ PetscErrorCode HycoBodiesChooseCells(HycoReducer t, HycoBodiesFactor *factor)
   PetscCall(MarkSurfaces(t, factor));
   PetscCall(Choose(t, factor, in, inner));
   PetscCall(ShareCells(t, factor->fom->part, in));
-  PetscCall(MarkInner(t, factor, in, inner, &fits));
+  PetscCall(MarkInner(t, factor, in, 1, inner, &fits));
   PetscCall(AnyLeft(t, fe, factor->known, inner, &left));
   if (!fits) PetscCall(PetscArrayzero(inner, fe->n_dof)); /* of the cell that stands for none */
   if (fits && !left) PetscCall(Release(t, factor, inner, &released));
   if (!released) PetscCall(PetscArrayzero(factor->known, fe->n_dof));
+  if (!released) PetscCall(PetscArrayzero(factor->bare, fe->n_dof));
   PetscCall(List(t, factor, inner));
-  for (PetscInt i = 0; i < fe->n_dof; i++) factor->known[i] = (PetscBool)(factor->known[i] || inner[i]);
+  for (PetscInt i = 0; i < fe->n_dof; i++) factor->bare[i] = (PetscBool)(factor->bare[i] || inner[i]);
   PetscCall(PetscFree(inner));
   PetscCall(PetscFree(in));
   PetscFunctionReturn(PETSC_SUCCESS);

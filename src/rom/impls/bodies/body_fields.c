@@ -321,7 +321,7 @@ static PetscErrorCode ExpandAll(HycoReducer t, HycoBodiesFactor *factor, Sampled
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* value = G u at the unknowns of a body that are not known, else 0. */
+/* value = G u at the unknowns of a body that have modes, else 0. */
 static void TurnField(HycoReducer t, const HycoBodiesFactor *factor, PetscInt body, const PetscReal G[], PetscBool back,
                       const PetscReal u[], PetscReal value[])
 {
@@ -333,7 +333,7 @@ static void TurnField(HycoReducer t, const HycoBodiesFactor *factor, PetscInt bo
 
     if (HycoTrainingOfBodies(t)->parts.of[i] == body) HycoPoseTurn(G, dim, back, u + i * dim, turned);
     for (PetscInt c = 0; c < dim; c++)
-      value[i * dim + c] = f->fe->fixed[i * dim + c] || factor->known[i * dim + c] ? 0 : turned[c];
+      value[i * dim + c] = f->fe->fixed[i * dim + c] || factor->bare[i * dim + c] ? 0 : turned[c];
   }
 }
 
@@ -715,6 +715,9 @@ static PetscErrorCode ModesOf(HycoReducer t, HycoBodiesFactor *factor, PetscInt 
 
   PetscFunctionBegin;
   PetscCall(Sample(t, factor->fom, wanted, &all, sampled));
+  for (PetscInt k = 0; k < b->ns * sampled->n && !t->rank; k++)
+    factor->touched[k % b->ns] = (PetscBool)(factor->touched[k % b->ns] || sampled->f[k] != 0);
+  HycoBcast(factor->touched, b->ns, HYCO_MPI_BOOL, HycoComm(t));
   PetscCall(ExpandAll(t, factor, sampled));
   if (!t->scene->n_times) PetscCall(HycoBodiesChooseCells(t, factor)); /* else those with laws are chosen */
   PetscCall(PetscFree(b->mode_start));
@@ -743,6 +746,8 @@ PetscErrorCode HycoBodiesFields(HycoReducer t, HycoSnapshots store, HycoBodiesFa
   }
   PetscCall(PetscCalloc1(factor->fom->part->n_cells + 1, &factor->score));
   PetscCall(PetscCalloc1(factor->fom->fe->n_dof + 1, &factor->known));
+  PetscCall(PetscCalloc1(factor->fom->fe->n_dof + 1, &factor->bare));
+  PetscCall(PetscCalloc1(b->ns + 1, &factor->touched));
   PetscCall(PetscCalloc1(factor->fom->fe->n_dof + 1, &factor->moved));
   for (PetscInt n = HycoTrainingOfBodies(t)->samples, k = 0; !ierr && !enough && k <= DOUBLINGS; n *= 2, k++) {
     PetscCall(MatDestroy(&V));

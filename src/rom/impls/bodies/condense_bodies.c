@@ -467,7 +467,7 @@ static PetscErrorCode Release(HycoBodiesFactor *factor)
     HycoFreeAll(&r->theta, &r->C, &r->R, &r->Z, &r->work);
   }
   HycoFreeAll(&factor->basis, &factor->record, &factor->theta, &factor->pins, &factor->score, &factor->moved,
-              &factor->known, &factor->row);
+              &factor->known, &factor->bare, &factor->touched, &factor->row);
   PetscCall(PetscFree(factor->z));
   PetscCall(HycoFOMDestroy(&factor->fom));
   PetscFunctionReturn(PETSC_SUCCESS);
