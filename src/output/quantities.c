@@ -270,6 +270,7 @@ static PetscErrorCode AddContacts(HycoFE fe, const HycoQuantity *q, const HycoCo
 
   PetscFunctionBegin;
   if (q->kind == HYCO_QUANTITY_FORCE) PetscCall(CheckAxis(fe, q, "force"));
+  if (q->kind == HYCO_QUANTITY_FRICTION && q->field != HYCO_FRICTION_WORK) PetscCall(CheckAxis(fe, q, "friction"));
   HycoCheck(q->kind != HYCO_QUANTITY_MOMENT || (turns && fe->formulation != HYCO_AXISYMMETRIC),
             "output_%s: there is no moment about %c%s", q->name, "xyz"[q->field],
             fe -> formulation == HYCO_AXISYMMETRIC ? " in an axisymmetric scene"
@@ -282,6 +283,8 @@ static PetscErrorCode AddContacts(HycoFE fe, const HycoQuantity *q, const HycoCo
     if (q->contact && strcmp(q->contact, r->name)) continue;
     if (q->kind == HYCO_QUANTITY_PRESSURE)
       *value = PetscMax(*value, r->pressure);
+    else if (q->kind == HYCO_QUANTITY_FRICTION)
+      *value += q->field == HYCO_FRICTION_WORK ? r->friction_work : r->friction[q->field];
     else
       *value += q->kind == HYCO_QUANTITY_FORCE ? r->force[q->field] : r->moment[q->field];
   }
