@@ -393,6 +393,15 @@ static PetscErrorCode ShortenMotions(Newton *h, PetscReal z[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Admissible forces, and displacements without motions that have run away. */
+static PetscErrorCode Restart(Newton *h, PetscReal z[])
+{
+  PetscFunctionBegin;
+  PetscCall(HycoBlocksAdmit(h->blocks, z + h->p));
+  if (h->p) PetscCall(Consistent(h, z));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* From the given forces. Floating bodies have no start without any, as every contact would look open: without loads
    either, they stay where they are. */
 static PetscErrorCode FromForces(Newton *h, PetscReal z[], HycoLCPStatus *status)
@@ -448,11 +457,12 @@ static PetscErrorCode FromNormal(Newton *h, PetscReal z[], HycoLCPStatus *status
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* From the solution in which every contact is closed and sticks, as far as there is one. Contacts without a row have no
-   force. */
+/* From the solution in which every contact is closed and sticks, as far as there is one; then from its admissible forces.
+   Contacts without a row have no force. */
 static PetscErrorCode FromStick(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
   PetscBool regular;
+  PetscReal *stuck;
 
   PetscFunctionBegin;
   PetscCall(PetscArrayzero(z, h->n));
@@ -476,7 +486,14 @@ static PetscErrorCode FromStick(Newton *h, PetscReal z[], HycoLCPStatus *status)
   }
   PetscCall(Step(h, (PetscBool)(h->n_kept <= MOST_LEAST), &regular));
   for (PetscInt i = 0; i < h->n; i++) z[i] = regular ? h->step[i] : 0;
+  HycoDuplicate(h->n, z, &stuck);
   PetscCall(Iterate(h, z, status));
+  if (*status != HYCO_LCP_SOLVED) {
+    PetscCall(PetscArraycpy(z, stuck, h->n));
+    PetscCall(Restart(h, z));
+    PetscCall(Iterate(h, z, status));
+  }
+  PetscCall(PetscFree(stuck));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -556,15 +573,6 @@ static PetscErrorCode Proximal(Newton *h, PetscReal z[], HycoLCPStatus *status)
   }
   PetscCall(PetscFree(M));
   PetscCall(PetscFree2(q, alpha));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Admissible forces, and displacements without motions that have run away. */
-static PetscErrorCode Restart(Newton *h, PetscReal z[])
-{
-  PetscFunctionBegin;
-  PetscCall(HycoBlocksAdmit(h->blocks, z + h->p));
-  if (h->p) PetscCall(Consistent(h, z));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
