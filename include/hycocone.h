@@ -10,7 +10,8 @@
   P depends on numbers of the block, its data: a threshold, a coefficient of friction. If the admissible forces do not
   depend on r, P is the projection onto them. Examples:
 
-      contact without friction   P(y) = max(y_n, 0)                             type "nonnegative", the library's only one
+      contact without friction   P(y) = max(y_n, 0)                             type "nonnegative"
+      Coulomb's law              P(y) = (y_n^+, y_t min(1, mu y_n^+ / |y_t|))   type "coulomb"
       a threshold g (Tresca)     P(y) = (max(y_n, 0), y_t min(1, g / |y_t|))    |r_t| <= g; r_t = -g w_t / |w_t| in slip
 
   A program adds types by HycoConeRegister(). Functions of a type are called on each rank for its own blocks, or for
@@ -28,6 +29,7 @@ extern "C" {
 typedef struct _p_HycoCone *HycoCone;
 typedef const char *HycoConeType;
 #define HYCO_CONE_NONNEGATIVE "nonnegative" /* each component >= 0; no data */
+#define HYCO_CONE_COULOMB     "coulomb" /* friction; data: mu and g, |r_t| <= mu r_n + g, with g = 0 for Coulomb's law */
 
 /* The largest number of components of a block. */
 #define HYCO_MAX_BLOCK 3
@@ -37,6 +39,8 @@ struct _HycoConeOps {
   PetscErrorCode (*project)(HycoCone cone, const PetscReal data[], const PetscReal y[], PetscReal z[]);
   /* J = dP/dy, size x size row by row; where P has a kink, the derivative on either side. Required. */
   PetscErrorCode (*derivative)(HycoCone cone, const PetscReal data[], const PetscReal y[], PetscReal J[]);
+  /* May be NULL, for admissible forces that do not depend on r. frozen[n_data]: data with which they are those at r. */
+  PetscErrorCode (*freeze)(HycoCone cone, const PetscReal data[], const PetscReal r[], PetscReal frozen[]);
   /* May be NULL. Frees the data of the type. */
   PetscErrorCode (*destroy)(HycoCone cone);
 };

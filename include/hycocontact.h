@@ -19,12 +19,14 @@ typedef const char *HycoContactType;
 
 /* Resultants of a contact of the scene. */
 typedef struct {
-  const char *name;     /* the scene's. Borrowed */
-  PetscInt n, n_active; /* contacts, those with L_i > 0 */
-  PetscReal force[3];   /* on the slave's side: the sum of -L_i n_i; on the master's side the opposite */
-  PetscReal moment[3];  /* of these about the origin; 2D: only the last component; 0 in an axisymmetric scene */
-  PetscReal area;       /* sum of the nodal areas of the contacts with L_i > 0 (2D: length; 1D: 0) */
-  PetscReal pressure;   /* largest L_i divided by the area of its node; 0 if the group is not a surface */
+  const char *name;      /* the scene's. Borrowed */
+  PetscInt n, n_active;  /* contacts, those with L_i > 0 */
+  PetscReal force[3];    /* on the slave's side: the sum of -L_i n_i, and friction; on the master's side the opposite */
+  PetscReal moment[3];   /* of these about the origin; 2D: only the last component; 0 in an axisymmetric scene */
+  PetscReal area;        /* sum of the nodal areas of the contacts with L_i > 0 (2D: length; 1D: 0) */
+  PetscReal pressure;    /* largest L_i divided by the area of its node; 0 if the group is not a surface */
+  PetscReal friction[3]; /* the tangential part of `force` */
+  PetscReal friction_work; /* dissipated since the start of the history, >= 0 */
 } HycoContactResult;
 
 /* n potential contacts of one HycoContact, at the positions of the bodies for mu. */

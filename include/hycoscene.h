@@ -79,6 +79,8 @@ PetscErrorCode HycoSceneHasContact(HycoScene scene, PetscBool *contact);
 /* Gets the listed times of its history, increasing, with the beginning of the path first; n is 0 for a scene without a
    history. Either output may be NULL. Not collective. Borrowed. */
 PetscErrorCode HycoSceneGetHistory(HycoScene scene, PetscInt *n, const PetscReal *times[]);
+/* Whether a contact of the scene has friction. Not collective. */
+PetscBool HycoSceneHasFriction(HycoScene scene);
 
 /* Fails with one line if the scene has a history, for a function `what` ("hyco train") that does not support one. Not
    collective. */

@@ -46,5 +46,6 @@ PetscErrorCode HycoBlocksNaturalMap(const HycoBlocks *blocks, PetscReal rho, con
                                     HycoNaturalMap *map);
 
 PetscErrorCode HycoConeCreate_Nonnegative(HycoCone cone);
+PetscErrorCode HycoConeCreate_Coulomb(HycoCone cone);
 
 #endif

@@ -12,7 +12,7 @@ struct _p_HycoContact {
   void *data;
   /* entries that the library reads, set after HycoContactComplete(); borrowed */
   const char *name, *slave, *master; /* slave, master: groups; master NULL: no masters */
-  HycoExpr normal[3], gap;           /* NULL: not given */
+  HycoExpr normal[3], gap, friction; /* NULL: not given */
   PetscBool matched;                 /* set by the type: no two contacts have the same master node */
   PetscBool integrated; /* set by the type: rows are integrals over the slave's facets around a node, with any
                                         number of masters */
@@ -61,6 +61,15 @@ typedef struct {
   PetscReal small; /* a tenth of the shortest edge of the slave's facets; 0: it has none */
 } HycoSurfaceFacts;
 
+/* Friction in a solution, by contact: 3 components in the scene's axes. */
+typedef struct {
+  PetscReal *force; /* tangential force on the slave */
+  PetscReal *slip;  /* sum of the slave's tangential displacements against the master while the contact was closed */
+  PetscReal *work;  /* dissipated since the start; >= 0 */
+  PetscReal *state; /* HYCO_OPEN, ... */
+} HycoShear;
+enum { HYCO_OPEN, HYCO_STICK, HYCO_SLIP };
+
 typedef struct _n_HycoPairs {
   PetscInt n;
   PetscInt *slave;   /* node indices */
@@ -72,9 +81,10 @@ typedef struct _n_HycoPairs {
                      far; 0: none is moved, all masters are final */
   PetscInt place; /* place number (HycoFE) of the nodes at the last search */
   PetscInt n_searches;
-  HycoSearch *search; /* by contact of the scene; NULL where room is 0 */
-  PetscInt *number;   /* of a rank's contacts: their numbers among those of all ranks; NULL: their own indices */
-  PetscInt64 queries; /* searches for a master so far */
+  HycoSearch *search;     /* by contact of the scene; NULL where room is 0 */
+  PetscInt *number;       /* of a rank's contacts: their numbers among those of all ranks; NULL: their own indices */
+  PetscInt64 queries;     /* searches for a master so far */
+  const HycoShear *shear; /* of the last solution; borrowed, not copied with the pairs; NULL: no friction */
   const HycoSurfaceFacts *facts; /* while the contacts of a rank's slaves are found (borrowed); else NULL */
 } HycoPairs;
 
@@ -174,6 +184,12 @@ PetscErrorCode HycoContactGeometry(HycoFE fe, HycoPairs *pairs, PetscReal normal
 */
 PetscErrorCode HycoContactRows(HycoFE fe, HycoPairs *pairs, PetscInt start[], PetscInt dof[], PetscReal value[],
                                PetscReal gap[]);
+/* The same with tangents: contact k has the rows row[k] .. row[k + 1] - 1, its normal, or its normal and dim - 1
+   tangents (unit vectors: tangent, 2 x 3 reals a contact). The entry of `gap` at a tangent's row is the displacement of
+   the slave against the master along it in u (n_dof), minus the contribution of the fixed unknowns. */
+PetscErrorCode HycoContactTangentRows(HycoFE fe, HycoPairs *pairs, const PetscInt row[], const PetscReal u[],
+                                      PetscReal tangent[], PetscInt start[], PetscInt dof[], PetscReal value[],
+                                      PetscReal gap[]);
 /* Counts contacts that have no free unknown and no effect: empty rows, and fixed nodes at obstacles that are no
    contacts; fails if the prescribed displacements of one of these penetrate. start: of the rows. */
 PetscErrorCode HycoContactCountStill(HycoFE fe, const HycoPairs *pairs, const PetscInt start[], PetscInt *n);

@@ -59,6 +59,9 @@ PetscErrorCode HycoCellListDestroy(HycoCellList *list);
 typedef struct {
   PetscReal *force, *pressure, *gap_node, *gap, *normal, *area, *pressure_of; /* pressure_of: by contact */
   PetscInt *slave_id;
+  PetscBool rubs;                     /* on every rank: there are fields of friction */
+  PetscReal *traction, *slip, *state; /* by node: tangential force over area and sum of slips of the slave, 3 each;
+                                         HYCO_OPEN, ... */
 } HycoContactFields;
 PetscErrorCode HycoContactFieldsCreate(MPI_Comm comm, HycoFE surface, HycoPairs *pairs, const PetscReal u[],
                                        const PetscReal lambda[], HycoContactFields *fields);

@@ -11,6 +11,7 @@
 #define HYCO_MAX_PINS 12
 
 typedef struct _n_HycoPath *HycoPath;
+typedef struct _n_HycoFriction *HycoFriction;
 
 struct _p_HycoFOM {
   PETSCHEADER(int);
@@ -61,7 +62,8 @@ struct _p_HycoFOM {
   PetscInt n_pins, n_released, pin_tag[HYCO_MAX_PINS], pin_component[HYCO_MAX_PINS];
   PetscInt n_turned; /* number of released motions for which the contacts' normals are turned */
   Vec *released;
-  HycoPath path; /* of a scene with a history, else NULL */
+  HycoPath path;         /* of a scene with a history, else NULL */
+  HycoFriction friction; /* of a scene with friction, else NULL */
   HycoSummary summary;
 };
 

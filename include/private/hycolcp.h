@@ -68,6 +68,8 @@ typedef struct {
   HycoSetFactor factor;
   const HycoBlocks *blocks;
   PetscBool warm;   /* HYCO_TAO_CONES types start from the last solution of their Tao */
+  PetscBool given;  /* these start from z instead */
+  PetscInt *sign;   /* NULL, or from these: the sign of the determinant of J at the solution; 0: not known */
   PetscInt max_its; /* iterations of the active set; 0: 50 + 4 n */
   HycoLCPMonitor monitor;
   void *monitor_ctx;
@@ -95,7 +97,7 @@ PetscErrorCode HycoLCPSolveOnSet(PetscInt n, const PetscReal M[], const PetscRea
 /* The rank of a symmetric positive semidefinite matrix (k x k, overwritten), scaled to a unit diagonal, with
    tolerance 1e-12. */
 PetscErrorCode HycoGramRank(PetscInt k, PetscReal A[], PetscInt *rank);
-/* Semismooth Newton's method for blocks of any cone, z = P(z - rho w), w = q + M z, from the forces z; p = 0. */
+/* Semismooth Newton's method for blocks of any cone, z = P(z - rho w), w = q + M z, from z = (x_pinned, forces). */
 PetscErrorCode HycoLCPSemismooth(const HycoLCP *lcp, PetscReal z[], PetscInt *its, HycoLCPStatus *status);
 /* Lemke's complementary pivoting. */
 PetscErrorCode HycoLCPLemke(PetscInt n, const PetscReal M[], const PetscReal q[], PetscInt max_its, PetscReal z[],

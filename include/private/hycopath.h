@@ -96,6 +96,7 @@ struct _n_HycoPath {
   PetscBool tangent;       /* K is a tangent, not the elastic stiffness */
   PetscInt kept;           /* number of contact systems solved with this K */
   PetscBool flows;         /* some body's law is inelastic */
+  PetscBool rubs;          /* friction: the contact forces have no potential */
   /* Anderson's acceleration: differences of iterates and residuals, newest last */
   PetscInt n_mixed;
   Vec dU[HYCO_ANDERSON], dG[HYCO_ANDERSON], U_last, G_last, G;
@@ -155,6 +156,23 @@ HycoNewton HycoPathMethod(HycoPath path);
 void HycoPathGetHistory(HycoPath path, HycoHistory *history);
 
 /* -- full order: a HycoPath whose ctx is the HycoFOM -- */
+
+/* Friction (friction.c), once the path's vectors exist. Collective, as all functions below. */
+PetscErrorCode HycoFrictionCreate(HycoFOM fom);
+PetscErrorCode HycoFrictionDestroy(HycoFOM fom);
+/* At the start of a path: no slip. */
+PetscErrorCode HycoFrictionBegin(HycoFOM fom);
+/* After HycoFOMAssemble(): the path's system with tangents, or the one without if no coefficient is above 0. */
+PetscErrorCode HycoFrictionAssemble(HycoFOM fom);
+/* The work of the bodies against the contact forces in the step that was accepted. */
+PetscErrorCode HycoFrictionWork(HycoFOM fom, PetscReal *work);
+/* The accepted step becomes the state of the contacts. */
+PetscErrorCode HycoFrictionAccept(HycoFOM fom);
+/* Sets the results of a listed time. */
+PetscErrorCode HycoFrictionMeasure(HycoFOM fom, HycoStep *step);
+/* The state in a checkpoint. `load` after the path is assembled at the checkpoint's time. */
+PetscErrorCode HycoFrictionSave(HycoFOM fom, HycoH5 h5);
+PetscErrorCode HycoFrictionLoad(HycoFOM fom);
 
 PetscErrorCode HycoFOMPathCreate(HycoFOM fom);
 /* Fails if an option of paths is given and the scene has no history. */

@@ -43,6 +43,7 @@ typedef struct {
   HycoExpr expr;    /* of an expression given in the scene */
   char *text;       /* of a group, a text */
   PetscBool heat;   /* its expression may contain `temperature` */
+  PetscBool law;    /* of a contact: belongs to its law, so that the rows of B do not depend on it */
   PetscReal value;  /* of a length, or if the scene gives no expression */
   PetscReal lo, hi; /* of a law's constant: open interval */
 } HycoEntry;
@@ -58,8 +59,8 @@ PetscErrorCode HycoDeclaredAdd(HycoDeclared *declared, const char name[], const 
 HycoEntry *HycoDeclaredFind(HycoDeclared *declared, const char name[]);
 /* Reads the scene's entry `key`. */
 PetscErrorCode HycoDeclaredRead(HycoScene scene, const char key[], const char text[], HycoEntry *entry);
-/* Whether an expression other than that of the entry `except` (NULL: any) changes with the parameters p with
-   changed[p]. */
+/* Whether an expression other than that of the entry `except` and those of laws (NULL: any) changes with the parameters
+   p with changed[p]. */
 PetscBool HycoDeclaredChanges(const HycoDeclared *declared, const char except[], const PetscBool changed[]);
 PetscErrorCode HycoDeclaredView(const HycoDeclared *declared, PetscViewer viewer);
 PetscErrorCode HycoDeclaredDestroy(HycoDeclared *declared);
@@ -116,7 +117,7 @@ typedef enum { HYCO_PLANE_STRAIN, HYCO_PLANE_STRESS, HYCO_AXISYMMETRIC } HycoFor
 
 /* An output of the scene, a number for each solution: the largest, smallest or mean value of a field over a group;
    the force of supports along an axis; from HYCO_QUANTITY_FORCE on, a result of a contact: its resultant along an
-   axis, its moment about one, its largest pressure. */
+   axis, its moment about one, the tangential resultant along an axis or the work of friction, its largest pressure. */
 typedef enum {
   HYCO_QUANTITY_MAX,
   HYCO_QUANTITY_MIN,
@@ -124,6 +125,7 @@ typedef enum {
   HYCO_QUANTITY_REACTION,
   HYCO_QUANTITY_FORCE,
   HYCO_QUANTITY_MOMENT,
+  HYCO_QUANTITY_FRICTION,
   HYCO_QUANTITY_PRESSURE
 } HycoQuantityKind;
 typedef struct {
@@ -131,9 +133,10 @@ typedef struct {
   char *contact;      /* NULL: all contacts */
   PetscBool given;    /* the kind and the field are given */
   HycoQuantityKind kind;
-  PetscInt field; /* index in HycoQuantityFields; along or about an axis 0 to 2 */
+  PetscInt field; /* index in HycoQuantityFields; along or about an axis 0 to 2; HYCO_FRICTION_WORK */
 } HycoQuantity;
 extern const char *const HycoQuantityFields[]; /* NULL ends */
+#define HYCO_FRICTION_WORK 3
 
 /* A time table: linear between its rows, constant before the first and after the last. */
 typedef struct {

@@ -107,6 +107,7 @@ struct _p_HycoSolver {
   HycoReason reason;
   HycoKKT kkt;
   PetscInt its;
+  PetscInt sign; /* with cones: of the determinant of the derivative at the solution; 0: not known */
   PetscInt linear_its, linear_solves, linear_most; /* of conjugate gradients: iterations, solves, most in one solve */
   char method[128];
   PetscReal seconds_factor, seconds_solve, seconds_before; /* before: time of a factor computed ahead of the solve */

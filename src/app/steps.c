@@ -47,8 +47,17 @@ static const Column columns[] = {
     FULL_ONLY("thermal", thermal, PETSC_FALSE),
     FULL_ONLY("energy_defect", energy_defect, PETSC_FALSE),
     BOTH("seconds", seconds, PETSC_FALSE),
+    /* of scenes with friction */
+    FULL_ONLY("friction_work", friction_work, PETSC_FALSE),
+    FULL_ONLY("n_slipping", n_slipping, PETSC_TRUE),
+    FULL_ONLY("disproven", disproven, PETSC_TRUE),
 };
-enum { N_COLUMNS = sizeof(columns) / sizeof(columns[0]) };
+enum { N_COLUMNS = sizeof(columns) / sizeof(columns[0]), N_FRICTION = 3 };
+
+static PetscInt CountColumns(HycoScene scene)
+{
+  return HycoSceneHasFriction(scene) ? N_COLUMNS : N_COLUMNS - N_FRICTION;
+}
 
 static const char *NameOf(const Column *c, PetscBool reduced)
 {
@@ -84,7 +93,7 @@ PetscErrorCode DriverWriteSteps(const char table[], HycoScene scene, const Petsc
 
   PetscFunctionBegin;
   if (!n || !table[0]) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt c = 0; c < N_COLUMNS; c++) {
+  for (PetscInt c = 0; c < CountColumns(scene); c++) {
     if (NameOf(&columns[c], reduced)) own[n_own++] = NameOf(&columns[c], reduced);
   }
   PetscCall(ReportColumns(scene, n_own, own, &width, names));
@@ -93,7 +102,7 @@ PetscErrorCode DriverWriteSteps(const char table[], HycoScene scene, const Petsc
   for (PetscInt k = 0; k < n; k++) {
     PetscReal *v = value + k * width;
 
-    for (PetscInt c = 0; c < N_COLUMNS; c++) {
+    for (PetscInt c = 0; c < CountColumns(scene); c++) {
       if (NameOf(&columns[c], reduced)) *v++ = ValueOf(&columns[c], &step[k]);
     }
     PetscCall(PetscArraycpy(v, step[k].quantity, width - n_own));
@@ -112,7 +121,7 @@ PetscErrorCode DriverReportSteps(cJSON *history, HycoScene scene, PetscBool redu
   PetscInt n_quantities;
 
   PetscFunctionBegin;
-  for (PetscInt c = 0; c < N_COLUMNS; c++) {
+  for (PetscInt c = 0; c < CountColumns(scene); c++) {
     const char *name = NameOf(&columns[c], reduced);
     cJSON *array = name ? cJSON_AddArrayToObject(history, name) : NULL;
 

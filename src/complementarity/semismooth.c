@@ -5,10 +5,15 @@
 
   rho is 1/M_nn of the block's normal force and 1/mean M_tt of its other components. Rows in which DP is 0 (open contacts,
   slip in 2D) are eliminated. The steps are halved until |F| decreases. It has no global convergence, so that there is
-  a chain of starts: the given forces; forces after block Gauss-Seidel sweeps; the proximal point method, whose problems
-  M + alpha, q - alpha z_k are regular where M has no full rank (P. Alart, A. Curnier, Comput. Methods Appl. Mech. Engng
-  92 (1991) 353-375; V. Acary, M. Bremond, O. Huber, in: Advanced Topics in Nonsmooth Dynamics, Springer 2018, 375-457).
-  With nonnegative forces only, it is the active set method with a line search.
+  a chain of starts: the given forces; the solution with the normal forces alone; forces after block Gauss-Seidel sweeps;
+  forces after steps in which the admissible forces are those of the last step (freeze); the proximal point method, whose
+  problems M + alpha, q - alpha z_k are regular where M has no full rank (P. Alart, A. Curnier, Comput. Methods Appl.
+  Mech. Engng 92 (1991) 353-375; V. Acary, M. Bremond, O. Huber, in: Advanced Topics in Nonsmooth Dynamics, Springer 2018,
+  375-457). With nonnegative forces only, it is the active set method with a line search.
+
+  Floating bodies: the first p entries of z are displacements with w = 0, scaled to forces by a typical flexibility. They
+  start from the displacements that close the contacts with a force: otherwise every contact looks open. The sweeps are
+  replaced by the solution in which every contact is closed and sticks.
 */
 #include <hycoconeimpl.h>
 #include <hycolcp.h>
@@ -17,6 +22,10 @@
 #define MOST_ITS    100   /* of Newton's method from one start */
 #define MOST_SWEEPS 30    /* of Gauss-Seidel before a start */
 #define MOST_STEPS  100   /* of the proximal point method */
+#define MOST_FROZEN 3     /* steps with frozen admissible forces before a start */
+#define MOST_LEAST  1000  /* rows up to which a singular J is solved by least squares */
+#define RANK_TOL    1e-10 /* of these: singular values relative to the largest that count as 0 */
+#define GAPS        1e-4  /* share of the forces that would close the gaps, whose round-off the forces have */
 #define SHIFT       1e-3  /* alpha relative to M's diagonal: the proximal point method's rate of convergence */
 #define TIGHT       1e-14 /* |F| relative to the forces: nothing is left to gain */
 #define SOLVED      1e-10 /* the same: solved, if the steps gain nothing more */
@@ -26,12 +35,14 @@
 typedef struct {
   const HycoLCP *lcp;
   const HycoBlocks *blocks;
-  PetscInt n;
-  const PetscReal *M, *q;              /* of the problem that is solved now: lcp's, or a proximal step's */
+  PetscInt n, p;                       /* length of z; free unknowns before the forces */
+  const PetscReal *M, *q;              /* of the problem that is solved now: `M0`, or a proximal step's */
+  const PetscReal *M0, *q0;            /* lcp's, scaled if p > 0 */
+  PetscReal *scaled, flexibility;      /* of a typical contact; p > 0 */
   PetscReal *rho, *w, *y, *F;          /* n each; y = z - rho w */
   PetscReal *step, *trial;             /* n each */
   PetscReal *DP;                       /* BLOCK for each block */
-  PetscInt n_kept, *kept, *kept_block; /* rows that are not eliminated, and their blocks */
+  PetscInt n_kept, *kept, *kept_block; /* rows that are not eliminated, and their blocks; -1: a free unknown */
   PetscBool *in;                       /* n: kept */
   PetscReal *J;                        /* n_kept x n_kept, column major */
   PetscBLASInt *pivot;
@@ -46,11 +57,11 @@ static PetscErrorCode SetScales(Newton *h)
 
   PetscFunctionBegin;
   for (PetscInt i = 0; i < h->n; i++) {
-    h->rho[i] = h->M[(size_t)i * (size_t)h->n + (size_t)i];
+    h->rho[i] = i < h->p ? h->flexibility : h->M[(size_t)i * (size_t)h->n + (size_t)i];
     most = PetscMax(most, h->rho[i]);
   }
   for (PetscInt k = 0; k < b->n; k++) {
-    const PetscInt first = b->row[k], size = b->row[k + 1] - first;
+    const PetscInt first = h->p + b->row[k], size = b->row[k + 1] - b->row[k];
     PetscReal mean = 0;
 
     for (PetscInt i = 1; i < size; i++) mean += h->rho[first + i] / (PetscReal)(size - 1);
@@ -81,19 +92,20 @@ static PetscErrorCode Residual(Newton *h, const PetscReal z[], PetscReal *norm, 
   PetscFunctionBegin;
   PetscCall(Slack(h, z));
   for (PetscInt i = 0; i < h->n; i++) h->y[i] = z[i] - h->rho[i] * h->w[i];
+  for (PetscInt i = 0; i < h->p; i++) h->F[i] = h->y[i];
   for (PetscInt k = 0; k < h->blocks->n; k++) {
-    const PetscInt first = h->blocks->row[k];
+    const PetscInt first = h->p + h->blocks->row[k];
 
     PetscCall(HycoBlockProject(h->blocks, k, h->y + first, h->F + first));
   }
   for (PetscInt i = 0; i < h->n; i++) {
     h->F[i] = z[i] - h->F[i];
     sum += h->F[i] * h->F[i];
-    most = PetscMax(most, PetscAbsReal(z[i]));
+    if (i >= h->p) most = PetscMax(most, PetscAbsReal(z[i]));
     least = PetscMax(least, PetscAbsReal(h->rho[i] * h->q[i]));
   }
   *norm = PetscSqrtReal(sum);
-  *size = most > 0 ? most : least;
+  *size = most > 0 ? PetscMax(most, GAPS * least) : least;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -102,8 +114,13 @@ static PetscErrorCode Derive(Newton *h, PetscInt *changes)
 {
   PetscFunctionBegin;
   h->n_kept = *changes = 0;
+  for (PetscInt i = 0; i < h->p; i++) {
+    h->in[i] = PETSC_TRUE;
+    h->kept[h->n_kept] = i;
+    h->kept_block[h->n_kept++] = -1;
+  }
   for (PetscInt k = 0; k < h->blocks->n; k++) {
-    const PetscInt first = h->blocks->row[k], size = h->blocks->row[k + 1] - first;
+    const PetscInt first = h->p + h->blocks->row[k], size = h->blocks->row[k + 1] - h->blocks->row[k];
     PetscReal *D = h->DP + (size_t)k * BLOCK;
 
     PetscCall(HycoBlockDerivative(h->blocks, k, h->y + first, D));
@@ -127,18 +144,49 @@ static void Column(const Newton *h, PetscInt c, PetscReal column[])
   const PetscReal *M = h->M + (size_t)c * (size_t)h->n;
 
   for (PetscInt a = 0; a < h->n_kept; a++) {
-    const PetscInt k = h->kept_block[a], first = h->blocks->row[k], size = h->blocks->row[k + 1] - first;
-    const PetscReal *D = h->DP + (size_t)k * BLOCK + (h->kept[a] - first) * size;
-    PetscReal sum = h->kept[a] == c ? 1 : 0;
+    const PetscInt k = h->kept_block[a], first = k < 0 ? 0 : h->p + h->blocks->row[k],
+                   size = k < 0 ? 0 : h->blocks->row[k + 1] - h->blocks->row[k];
+    const PetscReal *D = h->DP + (size_t)PetscMax(k, 0) * BLOCK + (h->kept[a] - first) * size;
+    PetscReal sum = k < 0 ? h->rho[a] * M[a] : h->kept[a] == c ? 1 : 0;
 
     for (PetscInt j = 0; j < size; j++) sum += D[j] * (h->rho[first + j] * M[first + j] - (first + j == c ? 1 : 0));
     column[a] = sum;
   }
 }
 
-/* The step J s = -F; *regular: J has a factor, and s is finite. Rows with DP = 0 have s = -F and move to the
-   right-hand side. */
-static PetscErrorCode Step(Newton *h, PetscBool *regular)
+/* J on the kept rows and columns. rhs (NULL: only J): -F there, with what the eliminated rows, s = -F, move to it. */
+static void Jacobian(Newton *h, PetscReal rhs[])
+{
+  const size_t m = (size_t)h->n_kept;
+  PetscReal *other = h->J + m * m; /* the last column is the room of those that are not kept */
+
+  for (PetscInt i = 0; rhs && i < h->n_kept; i++) rhs[i] = -h->F[h->kept[i]];
+  for (PetscInt c = 0, a = 0; c < h->n; c++) {
+    if (h->in[c])
+      Column(h, c, h->J + (size_t)a++ * m);
+    else if (rhs && h->F[c] != 0 && m) {
+      Column(h, c, other);
+      for (PetscInt i = 0; i < h->n_kept; i++) rhs[i] += other[i] * h->F[c];
+    }
+  }
+}
+
+/* The shortest s of the least squares of a J without full rank. */
+static PetscErrorCode LeastSquares(Newton *h, PetscBLASInt m, PetscReal rhs[], PetscBLASInt *info)
+{
+  const PetscBLASInt one = 1, lwork = 5 * m + 5 * 64 * m;
+  PetscReal *value, *work, tol = RANK_TOL;
+  PetscBLASInt rank;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(m, &value, lwork, &work));
+  LAPACKgelss_(&m, &m, &one, h->J, &m, rhs, &m, value, &tol, &rank, work, (PetscBLASInt *)&lwork, info);
+  PetscCall(PetscFree2(value, work));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The step J s = -F, by least squares if `least`; *regular: J has a factor, and s is finite. */
+static PetscErrorCode Step(Newton *h, PetscBool least, PetscBool *regular)
 {
   const PetscBLASInt one = 1;
   PetscBLASInt m, info = 0;
@@ -147,24 +195,34 @@ static PetscErrorCode Step(Newton *h, PetscBool *regular)
   PetscFunctionBegin;
   PetscCall(PetscBLASIntCast(h->n_kept, &m));
   for (PetscInt i = 0; i < h->n; i++) h->step[i] = -h->F[i];
-  for (PetscInt a = 0; a < m; a++) rhs[a] = -h->F[h->kept[a]];
-  for (PetscInt c = 0, a = 0; c < h->n; c++) {
-    PetscReal *column = h->J + (size_t)a * (size_t)m;
-
-    if (h->in[c]) {
-      Column(h, c, column);
-      a++;
-    } else if (h->step[c] != 0 && m) { /* the last column is the room of those that are not kept */
-      column = h->J + (size_t)m * (size_t)m;
-      Column(h, c, column);
-      for (PetscInt i = 0; i < m; i++) rhs[i] -= column[i] * h->step[c];
-    }
-  }
-  if (m) LAPACKgetrf_(&m, &m, h->J, &m, h->pivot, &info);
-  if (m && info == 0) LAPACKgetrs_("N", &m, &one, h->J, &m, h->pivot, rhs, &m, &info);
+  Jacobian(h, rhs);
+  if (m && least) PetscCall(LeastSquares(h, m, rhs, &info));
+  if (m && !least) LAPACKgetrf_(&m, &m, h->J, &m, h->pivot, &info);
+  if (m && !least && info == 0) LAPACKgetrs_("N", &m, &one, h->J, &m, h->pivot, rhs, &m, &info);
   for (PetscInt a = 0; a < m; a++) h->step[h->kept[a]] = rhs[a];
   for (PetscInt i = 0; i < h->n; i++) size += PetscAbsReal(h->step[i]);
   *regular = (PetscBool)(info == 0 && !PetscIsInfOrNanReal(size));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The sign of the determinant of J at z, a solution; 0: J is singular. That of the eliminated rows is 1. */
+static PetscErrorCode Sign(Newton *h, const PetscReal z[], PetscInt *sign)
+{
+  PetscReal norm, size;
+  PetscBLASInt m, info = 0;
+  PetscInt changes;
+
+  PetscFunctionBegin;
+  PetscCall(Residual(h, z, &norm, &size));
+  PetscCall(Derive(h, &changes));
+  PetscCall(PetscBLASIntCast(h->n_kept, &m));
+  Jacobian(h, NULL);
+  if (m) LAPACKgetrf_(&m, &m, h->J, &m, h->pivot, &info);
+  *sign = info == 0;
+  for (PetscInt a = 0; a < m; a++) {
+    if (h->J[(size_t)a * (size_t)(m + 1)] < 0) *sign = -*sign;
+    if (h->pivot[a] != a + 1) *sign = -*sign;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -204,6 +262,20 @@ static PetscErrorCode Show(const Newton *h, const PetscReal z[], PetscInt change
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One step from z, and its search; a J without full rank, or one that is nearly singular, by least squares. */
+static PetscErrorCode Improve(Newton *h, PetscReal z[], PetscReal *norm, PetscReal *size, PetscBool *regular,
+                              PetscBool *less)
+{
+  PetscFunctionBegin;
+  *less = PETSC_FALSE;
+  PetscCall(Step(h, PETSC_FALSE, regular));
+  if (*regular) PetscCall(Search(h, z, norm, size, less));
+  if (*less || *norm <= SOLVED * *size || !h->n_kept || h->n_kept > MOST_LEAST) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(Step(h, PETSC_TRUE, regular));
+  if (*regular) PetscCall(Search(h, z, norm, size, less));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Newton's method from z. Ends where |F| is round-off, does not decrease, or J is singular. */
 static PetscErrorCode Iterate(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
@@ -217,8 +289,7 @@ static PetscErrorCode Iterate(Newton *h, PetscReal z[], HycoLCPStatus *status)
     PetscInt changes;
 
     PetscCall(Derive(h, &changes));
-    PetscCall(Step(h, &regular));
-    if (regular) PetscCall(Search(h, z, &norm, &size, &less));
+    PetscCall(Improve(h, z, &norm, &size, &regular, &less));
     h->its++;
     PetscCall(Show(h, z, changes));
   }
@@ -260,12 +331,210 @@ static PetscErrorCode Sweep(Newton *h, PetscInt sweeps, PetscReal z[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* From z, then after sweeps. */
+/* The shortest displacements x of floating bodies by least squares of A x = target on the rows `in`; A: M's columns of
+   x. The entries of z. */
+static PetscErrorCode FitMotions(Newton *h, const PetscBool in[], const PetscReal target[], PetscReal z[])
+{
+  const PetscBLASInt one = 1;
+  PetscReal *A, *rhs, *value, *work, tol = RANK_TOL;
+  PetscBLASInt n, p, m = 0, room, rank, info = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscBLASIntCast(h->n, &n));
+  PetscCall(PetscBLASIntCast(h->p, &p));
+  room = 64 * p + 5 * n;
+  PetscCall(PetscCalloc4((size_t)n * (size_t)p, &A, n, &rhs, p, &value, room, &work));
+  for (PetscInt i = h->p; i < h->n; i++) {
+    if (!in[i]) continue;
+    for (PetscInt c = 0; c < h->p; c++) A[c * n + m] = h->M[(size_t)c * (size_t)h->n + (size_t)i];
+    rhs[m++] = target[i];
+  }
+  if (m) LAPACKgelss_(&n, &p, &one, A, &n, rhs, &n, value, &tol, &rank, work, &room, &info);
+  for (PetscInt c = 0; c < h->p; c++) z[c] = m && info == 0 ? rhs[c] : 0;
+  PetscCall(PetscFree4(A, rhs, value, work));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Displacements x of floating bodies for given forces: those that close the gaps of the blocks with a force. */
+static PetscErrorCode Consistent(Newton *h, PetscReal z[])
+{
+  const HycoBlocks *b = h->blocks;
+  PetscBool *in;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(h->n, &in));
+  PetscCall(PetscArrayzero(z, h->p));
+  PetscCall(Slack(h, z));
+  for (PetscInt k = 0; k < b->n; k++) {
+    for (PetscInt i = h->p + b->row[k]; i < h->p + b->row[k + 1]; i++) {
+      in[i] = (PetscBool)(z[h->p + b->row[k]] > 0);
+      h->w[i] = -h->w[i];
+    }
+  }
+  PetscCall(FitMotions(h, in, h->w, z));
+  PetscCall(PetscFree(in));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Takes away motions that no normal force resists, and which the solution without tangents has at will. */
+static PetscErrorCode ShortenMotions(Newton *h, PetscReal z[])
+{
+  PetscBool *in;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(h->n, &in));
+  for (PetscInt k = 0; k < h->blocks->n; k++) in[h->p + h->blocks->row[k]] = PETSC_TRUE;
+  PetscCall(PetscArrayzero(h->w, h->n));
+  for (PetscInt c = 0; c < h->p; c++) {
+    for (PetscInt i = h->p; i < h->n; i++) h->w[i] += h->M[(size_t)c * (size_t)h->n + (size_t)i] * z[c];
+  }
+  PetscCall(FitMotions(h, in, h->w, z));
+  PetscCall(PetscFree(in));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Admissible forces, and displacements without motions that have run away. */
+static PetscErrorCode Restart(Newton *h, PetscReal z[])
+{
+  PetscFunctionBegin;
+  PetscCall(HycoBlocksAdmit(h->blocks, z + h->p));
+  if (h->p) PetscCall(Consistent(h, z));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* From the given forces. Floating bodies have no start without any, as every contact would look open: without loads
+   either, they stay where they are. */
+static PetscErrorCode FromForces(Newton *h, PetscReal z[], HycoLCPStatus *status)
+{
+  PetscBool any = PETSC_FALSE;
+  PetscReal norm, size;
+
+  PetscFunctionBegin;
+  for (PetscInt i = h->p; i < h->n; i++) any = (PetscBool)(any || z[i] != 0);
+  if (h->p && !any) {
+    PetscCall(PetscArrayzero(z, h->p));
+    PetscCall(Residual(h, z, &norm, &size));
+    *status = norm <= SOLVED * size ? HYCO_LCP_SOLVED : HYCO_LCP_LIMIT;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (h->p) PetscCall(Consistent(h, z));
+  PetscCall(Iterate(h, z, status));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* From the solution with normal forces alone. */
+static PetscErrorCode FromNormal(Newton *h, PetscReal z[], HycoLCPStatus *status)
+{
+  const HycoBlocks *b = h->blocks;
+  const PetscInt p = h->p, m = p + b->n;
+  HycoLCP normal = {.n = b->n, .p = p, .symmetric = h->lcp->symmetric};
+  PetscInt its, *row;
+  PetscBool *active;
+  PetscReal *M, *q, *forces;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc3((size_t)m * (size_t)m, &M, m, &q, m, &forces));
+  PetscCall(PetscMalloc2(m, &row, b->n, &active));
+  for (PetscInt i = 0; i < m; i++) row[i] = i < p ? i : p + b->row[i - p];
+  for (PetscInt j = 0; j < m; j++) {
+    q[j] = h->q[row[j]];
+    forces[j] = 0;
+    for (PetscInt i = 0; i < m; i++)
+      M[(size_t)j * (size_t)m + (size_t)i] = h->M[(size_t)row[j] * (size_t)h->n + (size_t)row[i]];
+  }
+  for (PetscInt k = 0; k < b->n; k++) active[k] = (PetscBool)(p > 0 || z[row[k]] > 0);
+  normal.M = M;
+  normal.q = q;
+  PetscCall(HycoLCPActiveSet(&normal, active, forces, &its, status));
+  h->its += its;
+  PetscCall(PetscArrayzero(z, h->n));
+  for (PetscInt i = 0; i < m && *status == HYCO_LCP_SOLVED; i++) z[row[i]] = forces[i];
+  PetscCall(PetscFree3(M, q, forces));
+  PetscCall(PetscFree2(row, active));
+  if (*status != HYCO_LCP_SOLVED) PetscFunctionReturn(PETSC_SUCCESS);
+  if (p) PetscCall(ShortenMotions(h, z));
+  PetscCall(Iterate(h, z, status));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* From the solution in which every contact is closed and sticks, as far as there is one; then from its admissible forces.
+   Contacts without a row have no force. */
+static PetscErrorCode FromStick(Newton *h, PetscReal z[], HycoLCPStatus *status)
+{
+  PetscBool regular;
+  PetscReal *stuck;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(z, h->n));
+  PetscCall(Slack(h, z));
+  h->n_kept = 0;
+  for (PetscInt i = 0; i < h->n; i++) {
+    h->F[i] = h->rho[i] * h->w[i];
+    h->in[i] = (PetscBool)(i < h->p || h->M[(size_t)i * (size_t)(h->n + 1)] > 0);
+    if (!h->in[i]) h->F[i] = 0;
+  }
+  for (PetscInt k = -1; k < h->blocks->n; k++) { /* DP = 1 */
+    const PetscInt first = k < 0 ? 0 : h->p + h->blocks->row[k],
+                   size = k < 0 ? 0 : h->blocks->row[k + 1] - h->blocks->row[k];
+
+    for (PetscInt i = 0; i < size * size; i++) h->DP[(size_t)k * BLOCK + (size_t)i] = i % (size + 1) == 0;
+    for (PetscInt i = first; i < (k < 0 ? h->p : first + size); i++) {
+      if (!h->in[i]) continue;
+      h->kept[h->n_kept] = i;
+      h->kept_block[h->n_kept++] = k;
+    }
+  }
+  PetscCall(Step(h, (PetscBool)(h->n_kept <= MOST_LEAST), &regular));
+  for (PetscInt i = 0; i < h->n; i++) z[i] = regular ? h->step[i] : 0;
+  HycoDuplicate(h->n, z, &stuck);
+  PetscCall(Iterate(h, z, status));
+  if (*status != HYCO_LCP_SOLVED) {
+    PetscCall(PetscArraycpy(z, stuck, h->n));
+    PetscCall(Restart(h, z));
+    PetscCall(Iterate(h, z, status));
+  }
+  PetscCall(PetscFree(stuck));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Steps in which the admissible forces are those of the last one, then the problem itself. */
+static PetscErrorCode FromFrozen(Newton *h, PetscReal z[], HycoLCPStatus *status)
+{
+  const HycoBlocks *b = h->blocks;
+  HycoBlocks *frozen;
+  PetscBool all = PETSC_TRUE;
+
+  PetscFunctionBegin;
+  for (PetscInt c = 0; c < b->n_cones; c++)
+    all = (PetscBool)(all && (b->cone[c]->nonnegative || b->cone[c]->ops->freeze));
+  if (!all) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoBlocksCreate(b->n_cones, b->cone, b->n, b->of, b->data, &frozen));
+  h->blocks = frozen;
+  for (PetscInt s = 0; s < MOST_FROZEN; s++) {
+    for (PetscInt k = 0; k < b->n; k++) {
+      const HycoCone cone = b->cone[b->of[k]];
+
+      if (cone->ops->freeze)
+        PetscCall((*cone->ops->freeze)(cone, b->data + b->at[k], z + h->p + b->row[k], frozen->data + b->at[k]));
+    }
+    PetscCall(Iterate(h, z, status));
+  }
+  h->blocks = b;
+  PetscCall(HycoBlocksDestroy(&frozen));
+  PetscCall(Iterate(h, z, status));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* From z, then after sweeps; floating bodies from stick. */
 static PetscErrorCode Starts(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
   PetscFunctionBegin;
   PetscCall(Iterate(h, z, status));
   if (*status == HYCO_LCP_SOLVED) PetscFunctionReturn(PETSC_SUCCESS);
+  if (h->p) {
+    PetscCall(FromStick(h, z, status));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(HycoBlocksAdmit(h->blocks, z));
   PetscCall(Sweep(h, MOST_SWEEPS, z));
   PetscCall(Iterate(h, z, status));
@@ -277,12 +546,11 @@ static PetscErrorCode Starts(Newton *h, PetscReal z[], HycoLCPStatus *status)
 static PetscErrorCode Proximal(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
   const size_t n = (size_t)h->n;
-  const HycoLCP *lcp = h->lcp;
   PetscReal *M, *q, *alpha, before = PETSC_MAX_REAL;
   PetscBool done = PETSC_FALSE;
 
   PetscFunctionBegin;
-  HycoDuplicate(n * n, lcp->M, &M);
+  HycoDuplicate(n * n, h->M0, &M);
   PetscCall(PetscMalloc2(n, &q, n, &alpha));
   for (size_t i = 0; i < n; i++) {
     alpha[i] = SHIFT / h->rho[i];
@@ -291,13 +559,13 @@ static PetscErrorCode Proximal(Newton *h, PetscReal z[], HycoLCPStatus *status)
   for (PetscInt k = 0; k < MOST_STEPS && !done; k++) {
     PetscReal norm, size;
 
-    for (size_t i = 0; i < n; i++) q[i] = lcp->q[i] - alpha[i] * z[i];
+    for (size_t i = 0; i < n; i++) q[i] = h->q0[i] - alpha[i] * z[i];
     h->M = M;
     h->q = q;
     PetscCall(Starts(h, z, status));
     done = (PetscBool)(*status != HYCO_LCP_SOLVED);
-    h->M = lcp->M;
-    h->q = lcp->q;
+    h->M = h->M0;
+    h->q = h->q0;
     PetscCall(Residual(h, z, &norm, &size));
     *status = norm <= SOLVED * size ? HYCO_LCP_SOLVED : HYCO_LCP_LIMIT;
     done = (PetscBool)(done || norm <= TIGHT * size || (*status == HYCO_LCP_SOLVED && norm > before / 2));
@@ -313,32 +581,90 @@ static PetscErrorCode Chain(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
   PetscFunctionBegin;
   PetscCall(SetScales(h));
+  if (h->lcp->blocks) {
+    PetscCall(FromForces(h, z, status));
+    if (*status != HYCO_LCP_SOLVED) PetscCall(FromNormal(h, z, status));
+    if (*status == HYCO_LCP_SOLVED) PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(Starts(h, z, status));
+  if (*status != HYCO_LCP_SOLVED && h->lcp->blocks) {
+    PetscCall(Restart(h, z));
+    PetscCall(FromFrozen(h, z, status));
+  }
   if (*status == HYCO_LCP_SOLVED) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoBlocksAdmit(h->blocks, z));
+  PetscCall(Restart(h, z));
   PetscCall(Proximal(h, z, status));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* z: start and solution (n); lcp->blocks NULL: forces >= 0. On one process, or alike on every rank. */
-PetscErrorCode HycoLCPSemismooth(const HycoLCP *lcp, PetscReal z[], PetscInt *its, HycoLCPStatus *status)
+/* Floating bodies: z_i = x_i / flexibility for the free unknowns, so that all entries are forces and all w lengths. */
+static PetscErrorCode ScaleFree(Newton *h, PetscReal z[])
 {
-  const PetscInt n = lcp->n;
-  HycoBlocks *nonnegative = NULL;
-  Newton h = {.lcp = lcp, .blocks = lcp->blocks, .n = n, .M = lcp->M, .q = lcp->q};
+  const size_t n = (size_t)h->n, p = (size_t)h->p;
+  PetscReal *M, *q, f = 0;
 
   PetscFunctionBegin;
-  if (!lcp->blocks) PetscCall(HycoBlocksCreateNonnegative(n, &nonnegative));
+  h->M0 = h->lcp->M;
+  h->q0 = h->lcp->q;
+  for (size_t i = p; i < n; i++) f = PetscMax(f, PetscAbsReal(h->M0[i * n + i]));
+  h->flexibility = f > 0 ? f : 1;
+  if (p) {
+    PetscCall(PetscMalloc1(n * n + n, &M));
+    q = M + n * n;
+    PetscCall(PetscArraycpy(M, h->M0, n * n));
+    PetscCall(PetscArraycpy(q, h->q0, n));
+    for (size_t i = 0; i < p; i++) {
+      q[i] *= h->flexibility;
+      z[i] /= h->flexibility;
+      for (size_t j = 0; j < n; j++) M[i * n + j] *= h->flexibility;
+      for (size_t j = 0; j < n; j++) M[j * n + i] *= h->flexibility;
+    }
+    h->scaled = M;
+    h->M0 = M;
+    h->q0 = q;
+  }
+  h->M = h->M0;
+  h->q = h->q0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Without loads all forces may be round-off, with which nothing is in equilibrium: they are 0 then. */
+static void DropRounding(const Newton *h, PetscReal z[])
+{
+  PetscReal most = 0, least = 0;
+
+  for (PetscInt i = h->p; i < h->n; i++) {
+    most = PetscMax(most, PetscAbsReal(z[i]));
+    least = PetscMax(least, PetscAbsReal(h->rho[i] * h->q[i]));
+  }
+  for (PetscInt i = h->p; i < h->n && most <= TIGHT * least; i++) z[i] = 0;
+}
+
+/* z: start and solution (p + n); lcp->blocks NULL: forces >= 0. On one process, or alike on every rank. */
+PetscErrorCode HycoLCPSemismooth(const HycoLCP *lcp, PetscReal z[], PetscInt *its, HycoLCPStatus *status)
+{
+  const PetscInt n = lcp->p + lcp->n;
+  HycoBlocks *nonnegative = NULL;
+  Newton h = {.lcp = lcp, .blocks = lcp->blocks, .n = n, .p = lcp->p};
+
+  PetscFunctionBegin;
+  if (!lcp->blocks) PetscCall(HycoBlocksCreateNonnegative(lcp->n, &nonnegative));
   if (!lcp->blocks) h.blocks = nonnegative;
   PetscCall(PetscMalloc6(n, &h.rho, n, &h.w, n, &h.y, n, &h.F, n, &h.step, n, &h.trial));
-  PetscCall(PetscMalloc5((size_t)h.blocks->n * BLOCK, &h.DP, n, &h.kept, n, &h.kept_block, (size_t)(n + 1) * (size_t)n,
-                         &h.J, n, &h.pivot));
+  PetscCall(PetscMalloc5((size_t)h.blocks->n * BLOCK + 1, &h.DP, n, &h.kept, n, &h.kept_block,
+                         (size_t)(n + 1) * (size_t)n, &h.J, n, &h.pivot));
   PetscCall(PetscCalloc1(n, &h.in));
+  PetscCall(ScaleFree(&h, z));
   PetscCall(Chain(&h, z, status));
+  if (lcp->sign) *lcp->sign = 0;
+  if (lcp->sign && *status == HYCO_LCP_SOLVED) PetscCall(Sign(&h, z, lcp->sign));
+  DropRounding(&h, z);
+  for (PetscInt i = 0; i < h.p; i++) z[i] *= h.flexibility;
   *its = h.its;
   PetscCall(PetscFree6(h.rho, h.w, h.y, h.F, h.step, h.trial));
   PetscCall(PetscFree5(h.DP, h.kept, h.kept_block, h.J, h.pivot));
   PetscCall(PetscFree(h.in));
+  PetscCall(PetscFree(h.scaled));
   PetscCall(HycoBlocksDestroy(&nonnegative));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -81,15 +81,17 @@ static PetscErrorCode SolveLemke(Tao tao)
 static PetscErrorCode RunSemismooth(HycoTao t, const HycoLCP *lcp)
 {
   PetscFunctionBegin;
-  if (lcp->warm && t->n_last == lcp->n && t->last)
-    PetscCall(PetscArraycpy(t->z, t->last, lcp->n));
+  if (lcp->given && lcp->warm) {
+    /* z is the start */
+  } else if (lcp->warm && t->n_last == lcp->p + lcp->n && t->last)
+    PetscCall(PetscArraycpy(t->z, t->last, t->n_last));
   else
-    PetscCall(PetscArrayzero(t->z, lcp->n));
+    PetscCall(PetscArrayzero(t->z, lcp->p + lcp->n));
   PetscCall(HycoLCPSemismooth(lcp, t->z, &t->its, &t->status));
   if (t->status != HYCO_LCP_SOLVED) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree(t->last));
-  HycoDuplicate(lcp->n, t->z, &t->last);
-  t->n_last = lcp->n;
+  t->n_last = lcp->p + lcp->n;
+  HycoDuplicate(t->n_last, t->z, &t->last);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -100,7 +102,7 @@ static PetscErrorCode SolveSemismooth(Tao tao)
   HycoLCP lcp;
 
   PetscFunctionBegin;
-  PetscCheck(t && t->lcp && !t->lcp->p, PetscObjectComm((PetscObject)tao), PETSC_ERR_SUP,
+  PetscCheck(t && t->lcp, PetscObjectComm((PetscObject)tao), PETSC_ERR_SUP,
              HYCO_TAO_SEMISMOOTH_NEWTON " solves contact systems of a HycoSolver; for bounds use " HYCO_TAO_ACTIVE_SET);
   lcp = *t->lcp;
   lcp.max_its = t->max_its;

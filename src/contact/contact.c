@@ -26,6 +26,19 @@ PetscErrorCode HycoContactDestroy(HycoContact *contact)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Each type may have friction, unless it has an entry of this name itself. */
+static PetscErrorCode DeclareFriction(HycoContact contact)
+{
+  HycoEntry *entry;
+
+  PetscFunctionBegin;
+  if (HycoDeclaredFind(&contact->entries, "friction")) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoDeclaredAdd(&contact->entries, "friction", "coefficient of friction", HYCO_ENTRY_EXPRESSION,
+                            PETSC_FALSE, &entry));
+  entry->law = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The type's constructor declares its entries, which the scene then reads. */
 PetscErrorCode HycoContactSetType(HycoContact contact, HycoContactType type)
 {
@@ -43,6 +56,7 @@ PetscErrorCode HycoContactSetType(HycoContact contact, HycoContactType type)
   }
   PetscCall(PetscObjectChangeTypeName((PetscObject)contact, type));
   PetscCall((*create)(contact));
+  PetscCall(DeclareFriction(contact));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -132,6 +146,7 @@ PetscErrorCode HycoContactComplete(HycoContact contact)
     if ((e = HycoDeclaredFind(d, normals[k]))) contact->normal[k] = e->expr;
   }
   if ((e = HycoDeclaredFind(d, "gap"))) contact->gap = e->expr;
+  if ((e = HycoDeclaredFind(d, "friction")) && e->law) contact->friction = e->expr;
   PetscCheck(contact->slave, PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG,
              "the contact type %s declares neither group nor slave as required", ((PetscObject)contact)->type_name);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -75,9 +75,9 @@ PetscErrorCode HycoContactPressures(MPI_Comm comm, HycoFE fe, const HycoPairs *p
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the contribution of potential contact k. */
+/* Adds the contribution of potential contact k; shear: the tangential force on the slave. */
 static void Add(HycoFE fe, const PetscReal x[3], const PetscReal normal[3], PetscReal area, PetscReal lambda,
-                PetscReal pressure, HycoContactResult *r)
+                const PetscReal shear[3], PetscReal pressure, HycoContactResult *r)
 {
   const PetscBool around = (PetscBool)(fe->formulation == HYCO_AXISYMMETRIC);
   PetscReal push[3];
@@ -86,8 +86,9 @@ static void Add(HycoFE fe, const PetscReal x[3], const PetscReal normal[3], Pets
   r->area += area;
   r->pressure = PetscMax(r->pressure, pressure);
   /* The force on the slave's body: lambda >= 0 pushes it against the normal. */
-  for (PetscInt d = 0; d < 3; d++) push[d] = d < fe->dim ? -lambda * normal[d] : 0;
+  for (PetscInt d = 0; d < 3; d++) push[d] = d < fe->dim ? shear[d] - lambda * normal[d] : 0;
   if (around) push[0] = 0; /* the radial force is zero in the sum over the circle */
+  for (PetscInt d = 0; d < 3; d++) r->friction[d] += around && d == 0 ? 0 : shear[d];
   for (PetscInt d = 0; d < 3; d++) {
     const PetscInt e = (d + 1) % 3, g = (d + 2) % 3;
 
@@ -105,9 +106,12 @@ void HycoContactResults(HycoFE fe, const HycoPairs *pairs, const PetscReal norma
   for (PetscInt c = 0; c < fe->scene->n_contacts; c++)
     result[c] = (HycoContactResult){.name = fe->scene->contact[c]->name};
   for (PetscInt k = 0; k < pairs->n; k++) {
+    const PetscReal none[3] = {0, 0, 0}, *shear = pairs->shear ? pairs->shear->force + 3 * k : none;
     HycoContactResult *r = &result[pairs->contact[k]];
 
     r->n++;
-    if (lambda[k] > least) Add(fe, fe->X + 3 * pairs->slave[k], normal + 3 * k, area[k], lambda[k], pressure[k], r);
+    if (pairs->shear) r->friction_work += pairs->shear->work[k];
+    if (lambda[k] > least)
+      Add(fe, fe->X + 3 * pairs->slave[k], normal + 3 * k, area[k], lambda[k], shear, pressure[k], r);
   }
 }

@@ -36,6 +36,15 @@ static void AddToRow(HycoFE fe, PetscInt node, PetscReal scale, const PetscReal 
   }
 }
 
+/* Row of contact k along a direction; *n entries so far. */
+static void AddRow(HycoFE fe, const HycoPairs *pairs, PetscInt k, const PetscReal along[3], PetscInt *n, PetscInt dof[],
+                   PetscReal value[], PetscReal *gap)
+{
+  if (!HycoPairsAlone(fe->scene, pairs, k)) AddToRow(fe, pairs->slave[k], 1, along, n, dof, value, gap);
+  for (PetscInt j = pairs->master_start[k]; j < pairs->master_start[k + 1]; j++)
+    AddToRow(fe, pairs->master[j], -pairs->weight[j], along, n, dof, value, gap);
+}
+
 /* Contacts with the same slave node must have different normals: the share of each in the force would not be unique
    with parallel ones. before: the previous contact with k's slave, -1: none. */
 static PetscErrorCode CheckCorner(HycoFE fe, const HycoPairs *pairs, PetscInt k, const PetscInt before[],
@@ -101,9 +110,7 @@ static PetscErrorCode Rows(HycoFE fe, const HycoPairs *pairs, const PetscReal no
   for (PetscInt k = 0; k < pairs->n; k++) {
     const PetscReal drawn = gap[k];
 
-    if (!HycoPairsAlone(fe->scene, pairs, k)) AddToRow(fe, pairs->slave[k], 1, normal + 3 * k, &n, dof, value, &gap[k]);
-    for (PetscInt j = pairs->master_start[k]; j < pairs->master_start[k + 1]; j++)
-      AddToRow(fe, pairs->master[j], -pairs->weight[j], normal + 3 * k, &n, dof, value, &gap[k]);
+    AddRow(fe, pairs, k, normal + 3 * k, &n, dof, value, &gap[k]);
     start[k + 1] = n;
     if (start[k + 1] == start[k] && !HycoPairsAlone(fe->scene, pairs, k))
       PetscCall(HycoContactCheckStill(fe, pairs, k, drawn, &gap[k]));
@@ -125,6 +132,58 @@ PetscErrorCode HycoContactRows(HycoFE fe, HycoPairs *pairs, PetscInt start[], Pe
   if (!ierr) ierr = CheckCorners(fe, pairs, normal);
   if (!ierr) ierr = Rows(fe, pairs, normal, start, dof, value, gap);
   PetscCall(PetscFree(normal));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Unit vectors orthogonal to the normal: one in 2D; two in 3D, the first orthogonal to the axis that is farthest from the
+   normal. */
+static void Tangents(PetscInt dim, const PetscReal n[3], PetscReal t[6])
+{
+  PetscReal axis[3] = {0, 0, 0};
+  PetscInt least = 0;
+
+  for (PetscInt c = 0; c < 6; c++) t[c] = 0;
+  if (dim == 2) {
+    t[0] = -n[1];
+    t[1] = n[0];
+    return;
+  }
+  for (PetscInt c = 1; c < 3; c++) least = PetscAbsReal(n[c]) < PetscAbsReal(n[least]) - 1e-6 ? c : least;
+  axis[least] = 1;
+  for (PetscInt c = 0; c < 3; c++) t[c] = axis[(c + 1) % 3] * n[(c + 2) % 3] - axis[(c + 2) % 3] * n[(c + 1) % 3];
+  HycoNormalise(t);
+  for (PetscInt c = 0; c < 3; c++) t[3 + c] = n[(c + 1) % 3] * t[(c + 2) % 3] - n[(c + 2) % 3] * t[(c + 1) % 3];
+}
+
+PetscErrorCode HycoContactTangentRows(HycoFE fe, HycoPairs *pairs, const PetscInt row[], const PetscReal u[],
+                                      PetscReal tangent[], PetscInt start[], PetscInt dof[], PetscReal value[],
+                                      PetscReal gap[])
+{
+  PetscReal *normal, *drawn;
+  PetscInt n = 0;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(3 * pairs->n, &normal, pairs->n, &drawn));
+  ierr = HycoContactGeometry(fe, pairs, normal, drawn);
+  start[0] = 0;
+  for (PetscInt k = 0; k < pairs->n && !ierr; k++) {
+    PetscReal jump[3];
+
+    Tangents(fe->dim, normal + 3 * k, tangent + 6 * k);
+    HycoPairsJump(pairs, k, fe->dim, u, jump);
+    for (PetscInt r = row[k]; r < row[k + 1]; r++) {
+      const PetscReal *along = r == row[k] ? normal + 3 * k : tangent + 6 * k + 3 * (r - row[k] - 1);
+
+      gap[r] = r == row[k] ? drawn[k] : HycoPairsAlone(fe->scene, pairs, k) ? 0 : HycoDot(jump, along);
+      AddRow(fe, pairs, k, along, &n, dof, value, &gap[r]);
+      start[r + 1] = n;
+      if (r == row[k] && start[r + 1] == start[r] && !HycoPairsAlone(fe->scene, pairs, k))
+        ierr = HycoContactCheckStill(fe, pairs, k, drawn[k], &gap[r]);
+    }
+  }
+  PetscCall(PetscFree2(normal, drawn));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

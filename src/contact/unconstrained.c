@@ -109,6 +109,12 @@ static void Combine(const Shapes *s, PetscInt i, const PetscReal z[], PetscReal 
   }
 }
 
+/* Whether contact i resists tangential motions as well. */
+static PetscBool Rubs(const Shapes *s, PetscInt i)
+{
+  return (PetscBool)(s->fe->scene->contact[s->pairs->contact[i]]->friction != NULL);
+}
+
 /* The eigenvectors of sum of (n.d / doubt)^2 against sum of |d|^2, in A (k x k), values ascending. Only the ratio
    matters: how far a motion is from tangential, in units of the normals' errors, against its size. */
 static PetscErrorCode Spectrum(const Shapes *s, const PetscInt sense[], const PetscReal weight[], PetscReal A[],
@@ -136,8 +142,11 @@ static PetscErrorCode Spectrum(const Shapes *s, const PetscInt sense[], const Pe
     if (HycoPairsAlone(s->fe->scene, s->pairs, i)) continue;
     for (PetscInt a = 0; a < k; a++) {
       for (PetscInt b = 0; b < k; b++) {
-        A[a * k + b] += weight[i] * HycoDot(s->normal[t] + 3 * i, d + 3 * a) *
-                        HycoDot(s->normal[t] + 3 * i, d + 3 * b) / (s->doubt[t][i] * s->doubt[t][i]);
+        const PetscReal both =
+            Rubs(s, i) ? HycoDot(d + 3 * a, d + 3 * b)
+                       : HycoDot(s->normal[t] + 3 * i, d + 3 * a) * HycoDot(s->normal[t] + 3 * i, d + 3 * b);
+
+        A[a * k + b] += weight[i] * both / (s->doubt[t][i] * s->doubt[t][i]);
         M[a * k + b] += HycoDot(d + 3 * a, d + 3 * b);
       }
     }
@@ -167,8 +176,9 @@ static PetscErrorCode Tangential(const Shapes *s, const PetscInt sense[], const 
     PetscReal d[3];
 
     Combine(s, i, z, d);
-    if (PetscAbsReal(HycoDot(s->normal[t] + 3 * i, d)) <=
-        PetscMax(2 * s->doubt[t][i], s->bend[t][i]) * PetscSqrtReal(HycoDot(d, d)) + noise * PetscSqrtReal(norm))
+    if ((Rubs(s, i) ? HycoLength(d) : PetscAbsReal(HycoDot(s->normal[t] + 3 * i, d))) <=
+        (Rubs(s, i) ? 0 : PetscMax(2 * s->doubt[t][i], s->bend[t][i]) * PetscSqrtReal(HycoDot(d, d))) +
+            noise * PetscSqrtReal(norm))
       continue;
     weight[i] *= 100;
     *tangential = PETSC_FALSE;

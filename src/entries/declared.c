@@ -57,7 +57,8 @@ PetscErrorCode HycoDeclaredRead(HycoScene s, const char key[], const char text[]
 PetscBool HycoDeclaredChanges(const HycoDeclared *d, const char except[], const PetscBool changed[])
 {
   for (PetscInt j = 0; j < d->n; j++) {
-    if (HycoExprChanges(d->entry[j].expr, changed) && (!except || strcmp(d->entry[j].name, except))) return PETSC_TRUE;
+    if (except && (d->entry[j].law || !strcmp(d->entry[j].name, except))) continue;
+    if (HycoExprChanges(d->entry[j].expr, changed)) return PETSC_TRUE;
   }
   return PETSC_FALSE;
 }

@@ -43,20 +43,22 @@ PetscErrorCode HycoSceneReadQuantity(HycoScene s, PetscInt entry, const char nam
     q = &s->quantity[s->n_quantities++];
     PetscCall(PetscStrallocpy(name, &q->name));
   }
-  if (field > HYCO_QUANTITY_MOMENT) {
-    char **place = field == HYCO_QUANTITY_MOMENT + 1 ? &q->group : &q->contact;
+  if (field > HYCO_QUANTITY_FRICTION) {
+    char **place = field == HYCO_QUANTITY_FRICTION + 1 ? &q->group : &q->contact;
 
     PetscCall(PetscFree(*place));
     PetscCall(PetscStrallocpy(s->value[entry], place));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   HycoCheck(!q->given,
-            "%s: the output %s already has one of max, min, mean, reaction, force and moment; give each output its own "
-            "name",
+            "%s: the output %s already has one of max, min, mean, reaction, force, moment and friction; give each "
+            "output its own name",
             s->key[entry], name);
   q->given = PETSC_TRUE;
   q->kind = (HycoQuantityKind)field;
-  if (field >= HYCO_QUANTITY_REACTION)
+  if (field == HYCO_QUANTITY_FRICTION && strcmp(s->value[entry], "work") == 0)
+    q->field = HYCO_FRICTION_WORK;
+  else if (field >= HYCO_QUANTITY_REACTION)
     PetscCall(FindAxis(s->key[entry], s->value[entry], &q->field));
   else
     PetscCall(FindField(s->key[entry], s->value[entry], &q->field));
@@ -118,10 +120,11 @@ static PetscErrorCode CheckContact(HycoScene s, const HycoQuantity *q)
   char list[HYCO_LINE] = "";
 
   PetscFunctionBegin;
-  HycoCheck(
-      q->kind >= HYCO_QUANTITY_FORCE || !q->contact,
-      "the output %s names the contact %s, which is for force, moment and max: contact_pressure; give a group instead",
-      q->name, q->contact);
+  HycoCheck(q->kind >= HYCO_QUANTITY_FORCE || !q->contact,
+            "the output %s names the contact %s, which is for force, moment, friction and max: contact_pressure; give "
+            "a group "
+            "instead",
+            q->name, q->contact);
   if (q->kind < HYCO_QUANTITY_FORCE) PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheck(!q->group, "the output %s is for a contact and names the group %s; write contact: NAME instead", q->name,
             q->group);
@@ -142,10 +145,11 @@ PetscErrorCode HycoSceneCheckQuantities(HycoScene s)
     HycoCheck(strcasecmp(s->quantity[k / s->n_parameters].name, s->parameter[k % s->n_parameters]),
               "the output %s has the name of a parameter; give it another", s->quantity[k / s->n_parameters].name);
   for (PetscInt k = 0; k < s->n_quantities; k++) {
-    HycoCheck(s->quantity[k].given,
-              "the output %s has no field; write output: {%s: {max: mises, group: ...}}, or min, mean, reaction, force "
-              "or moment",
-              s->quantity[k].name, s->quantity[k].name);
+    HycoCheck(
+        s->quantity[k].given,
+        "the output %s has no field; write output: {%s: {max: mises, group: ...}}, or min, mean, reaction, force, "
+        "moment or friction",
+        s->quantity[k].name, s->quantity[k].name);
     PetscCall(CheckContact(s, &s->quantity[k]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

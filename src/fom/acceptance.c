@@ -50,7 +50,7 @@ static PetscErrorCode NameLifted(HycoFOM f, Vec L, char name[HYCO_LINE])
   PetscCall(HycoFOMMotionVectors(f, &motions, &v));
   PetscCall(VecDuplicate(f->F, &rest));
   PetscCall(VecCopy(f->F, rest));
-  if (L) PetscCall(MatMult(f->Bt, L, rest));
+  if (L) PetscCall(MatMult(f->path ? f->path->Bt : f->Bt, L, rest));
   if (L) PetscCall(VecAYPX(rest, -1, f->F));
   PetscCall(PetscMalloc1(motions.n, &coefficient));
   PetscCall(VecMDot(rest, motions.n, v, coefficient));
@@ -142,7 +142,10 @@ PetscErrorCode HycoFOMJudge(HycoFOM f, const PetscReal u[], Vec L, PetscReal ene
   HycoFormat(why, "%s", *reason < 0 ? HycoReasonName(*reason) : "");
   if (*reason == HYCO_DIVERGED_FLOATING) PetscCall(NameLifted(f, L, name));
   if (*reason == HYCO_DIVERGED_FLOATING && name[0])
-    HycoFormat(why, "%s; no support keeps %s", HycoReasonName(*reason), name);
+    HycoFormat(why, "%s; no support keeps %s",
+               f->path && f->path->rubs ? "not converged: no contact forces with this friction balance the load"
+                                        : HycoReasonName(*reason),
+               name);
   if (*reason == HYCO_DIVERGED_DISPLACEMENT)
     HycoFormat(why, "%s (%.1e times the mesh's extent)", HycoReasonName(*reason), (double)*relative);
   if (*reason == HYCO_DIVERGED_ENERGY)

@@ -38,7 +38,8 @@ static const Member member[] = {INT(index),          REAL(t),
                                 REAL(seconds),       REAL(seconds_factor),
                                 REAL(seconds_solve), REAL(seconds_law)};
 /* Behind the quantities: what older checkpoints do not have. */
-static const Member later[] = {INT(linear_iterations), INT(most_linear_iterations)};
+static const Member later[] = {INT(linear_iterations), INT(most_linear_iterations), REAL(friction_work),
+                               INT(n_slipping), INT(disproven)};
 #define N_MEMBERS ((PetscInt)(sizeof(member) / sizeof(member[0])))
 #define N_LATER   ((PetscInt)(sizeof(later) / sizeof(later[0])))
 
@@ -239,6 +240,7 @@ static PetscErrorCode WriteAll(HycoFOM f, HycoH5 h, const Content *c, const char
   PetscFunctionBegin;
   HycoOnRoot(HycoComm(f), WriteContent(f, h, c, key));
   if (f->n_contacts) PetscCall(HycoFOMWriteForces(f, h, "lambda"));
+  if (f->friction) PetscCall(HycoFrictionSave(f, h));
   PetscCall(WriteItems(f, h));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -310,7 +312,7 @@ static PetscErrorCode LoadSteps(HycoFOM f, HycoH5 h, PetscInt *rows, PetscReal *
 
   PetscFunctionBegin;
   PetscCall(HycoH5GetSize(h, "steps", rows, &cols));
-  if (cols != full - N_LATER) cols = full;
+  if (cols < full - N_LATER || cols > full) cols = full;
   PetscCall(HycoH5LoadReal(h, "steps", rows, &cols, &found));
   PetscCall(PetscCalloc1(*rows * full + 1, steps));
   for (PetscInt k = 0; k < *rows; k++) PetscCall(PetscArraycpy(*steps + k * full, found + k * cols, cols));
@@ -479,6 +481,7 @@ PetscErrorCode HycoPathLoad(HycoFOM f)
   PetscCall(TakeContent(f, &c));
   PetscCall(FreeContent(&c));
   PetscCall(HycoPathAssemble(p, p->t)); /* quantities available without another step */
+  if (f->friction) PetscCall(HycoFrictionLoad(f));
   PetscCall(HycoFOMGather(f));
   PetscCall(HycoSeriesRestore(f));
   PetscFunctionReturn(PETSC_SUCCESS);

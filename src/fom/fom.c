@@ -9,6 +9,7 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
   PetscFunctionBegin;
   HycoDestroyBegin(fom, HYCO_FOM_CLASSID);
   f = *fom;
+  PetscCall(HycoFrictionDestroy(f));
   PetscCall(HycoPathFree(&f->path));
   PetscCall(HycoSolverDestroy(&f->solver));
   PetscCall(HycoSystemDestroy(&f->system));

@@ -15,6 +15,7 @@
 #define ARMIJO    1e-4
 #define SHORTENED 8    /* largest number of halvings of a step */
 #define WORTH     8    /* expected number of further iterations above which a new tangent is made (modified) */
+#define FEW       5    /* iterations of a step of elastic bodies with friction, beyond which only round-off is left */
 #define FORCING   1e-3 /* residual of a solve without a factor, as a share of that of the iterate */
 
 /* Data of the previous iteration. */
@@ -165,7 +166,7 @@ static PetscErrorCode Advance(HycoPath p, PetscBool feasible, const HycoStepAtte
   PetscCall(VecCopy(p->U, p->U_last));
   if (p->n_contacts) PetscCall(VecCopy(p->Lambda, p->L_last));
   now->feasible = feasible;
-  now->search = (PetscBool)(feasible && a->law.has_potential);
+  now->search = (PetscBool)(feasible && a->law.has_potential && !p->rubs);
   now->share = 1;
   if (now->search) { /* r + B^T L = F - f_int on the free unknowns; on the others U does not change */
     PetscCall(VecWAXPY(p->work, -1, p->U, p->G));
@@ -377,7 +378,8 @@ static const PetscInt usual_its[] = {0, 15, 60, 30};
 static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoNewton method, HycoStepAttempt *a)
 {
   const PetscBool tangent = (PetscBool)(method == HYCO_NEWTON_TANGENT);
-  const PetscInt most = p->max_its ? p->max_its : usual_its[method];
+  const PetscBool one = (PetscBool)(p->rubs && !p->flows); /* one system is the solution */
+  const PetscInt most = p->max_its ? p->max_its : one ? FEW : usual_its[method];
   Progress now = {.residual = {0, 0, 0}};
   PetscReal least = PETSC_MAX_REAL, worst = 0;
 
@@ -401,8 +403,8 @@ static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoNewton
     }
     if (k) least = PetscMin(least, now.residual[2] / (now.size > 0 ? now.size : 1));
     if (k == most || !(now.residual[2] <= 1e4 * PetscMax(now.size, now.floor))) {
-      HycoFormat(a->why, "the residual of equilibrium is %.1e after %d iterations (%s)", (double)least, (int)k,
-                 HycoNewtons[method]);
+      HycoFormat(a->why, "the residual of equilibrium is %.1e after %d iterations (%s)%s", (double)least, (int)k,
+                 HycoNewtons[method], one ? ", as at the largest load that friction balances" : "");
       break;
     }
     if (method == HYCO_NEWTON_MODIFIED && k) fresh = Stalls(p, &now);

@@ -97,6 +97,7 @@ static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elast
   f->fe->lifted = PETSC_FALSE;
   HycoOnEach(p->comm, HycoFEAssembleForce(f->fe, p->F));
   f->fe->lifted = lifted;
+  if (f->friction) PetscCall(HycoFrictionAssemble(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -182,6 +183,10 @@ static PetscErrorCode ContactWork(HycoFOM f, PetscReal *sum)
   PetscFunctionBegin;
   *sum = 0;
   if (!f->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
+  if (f->friction) {
+    PetscCall(HycoFrictionWork(f, sum));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(VecWAXPY(p->work, -1, p->U_old, f->U));
   PetscCall(MatMult(f->B, p->work, p->gap_work));
   PetscCall(VecWAXPY(p->L_new, 1, p->L_old, f->Lambda));
@@ -243,6 +248,7 @@ static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
   PetscCall(AddWork((HycoFOM)p->ctx, &a->law, &defect));
   PetscCall(VecCopy(p->F, p->F_old));
   PetscCall(VecCopy(p->f_int, p->f_old));
+  if (((HycoFOM)p->ctx)->friction) PetscCall(HycoFrictionAccept((HycoFOM)p->ctx));
   p->now.energy_defect = PetscMax(p->now.energy_defect, defect);
   if (p->between && p->t < p->scene->times[p->step]) {
     PetscCall(HycoFOMGather((HycoFOM)p->ctx));
@@ -311,6 +317,7 @@ static PetscErrorCode Record(HycoPath p)
   s->stored = p->work_done.stored;
   s->dissipated = p->work_done.dissipated;
   s->thermal = p->work_done.thermal + p->work_done.moduli;
+  if (f->friction) PetscCall(HycoFrictionMeasure(f, s));
   PetscCall(HycoFOMGather(f));
   f->solved = PETSC_TRUE;
   f->sigma_ready = f->all_ready = PETSC_FALSE;
@@ -357,6 +364,7 @@ PetscErrorCode HycoFOMPathCreate(HycoFOM f)
   PetscCall(HycoPathSetUp(p));
   PetscCall(VecDuplicate(f->U, &p->F_old));
   PetscCall(VecDuplicate(f->U, &p->f_old));
+  if (f->n_contacts && HycoSceneHasFriction(f->scene)) PetscCall(HycoFrictionCreate(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -368,6 +376,7 @@ PetscErrorCode HycoPathSolve(HycoFOM f, const PetscReal mu[])
 
   PetscFunctionBegin;
   PetscCall(HycoPathBegin(p, mu));
+  if (f->friction) PetscCall(HycoFrictionBegin(f));
   PetscCall(PetscMemzero(&p->work_done, sizeof(p->work_done)));
   PetscCall(VecSet(p->F_old, 0));
   PetscCall(VecSet(p->f_old, 0));

@@ -61,19 +61,23 @@ static PetscErrorCode MeasureDisplacements(HycoFOM f, HycoSummary *s)
 /* Of all ranks. Pressures are maxima, everything else sums. */
 static PetscErrorCode SumResult(HycoFOM f, HycoContactResult *r)
 {
-  PetscReal sum[7];
+  PetscReal sum[11];
   PetscInt n[2] = {r->n, r->n_active};
 
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(sum, r->force, 3));
   PetscCall(PetscArraycpy(sum + 3, r->moment, 3));
   sum[6] = r->area;
+  PetscCall(PetscArraycpy(sum + 7, r->friction, 3));
+  sum[10] = r->friction_work;
   HycoAllreduce(n, 2, MPIU_INT, MPI_SUM, HycoComm(f));
-  HycoAllreduce(sum, 7, MPIU_REAL, MPI_SUM, HycoComm(f));
+  HycoAllreduce(sum, 11, MPIU_REAL, MPI_SUM, HycoComm(f));
   HycoAllreduce(&r->pressure, 1, MPIU_REAL, MPI_MAX, HycoComm(f));
   PetscCall(PetscArraycpy(r->force, sum, 3));
   PetscCall(PetscArraycpy(r->moment, sum + 3, 3));
   r->area = sum[6];
+  PetscCall(PetscArraycpy(r->friction, sum + 7, 3));
+  r->friction_work = sum[10];
   r->n = n[0];
   r->n_active = n[1];
   PetscFunctionReturn(PETSC_SUCCESS);

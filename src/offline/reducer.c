@@ -61,6 +61,10 @@ PetscErrorCode HycoReducerCreate(MPI_Comm comm, HycoScene scene, HycoReducer *re
 {
   PetscFunctionBegin;
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
+  HycoCheck(
+      !HycoSceneHasFriction(scene),
+      "the scene has a contact with friction, of which there are no reduced models; use hyco solve, or remove the "
+      "contacts' friction");
   PetscCall(Create(comm, reducer));
   PetscCall(PetscObjectReference((PetscObject)scene));
   (*reducer)->scene = scene;

@@ -130,12 +130,12 @@ static PetscErrorCode FillContacts(HycoFE fe, HycoPairs *pairs, const PetscReal 
     HycoPairsMasters(pairs, k, &masters, &master, &weight);
     f->slave_id[k] = fe->mesh->node_id[s];
     for (PetscInt c = 0; c < fe->dim && !HycoPairsAlone(fe->scene, pairs, k); c++) {
-      const PetscReal n = f->normal[3 * k + c];
+      const PetscReal n = f->normal[3 * k + c], shear = pairs->shear ? pairs->shear->force[3 * k + c] : 0;
 
-      f->force[3 * s + c] -= lambda[k] * n;
+      f->force[3 * s + c] += shear - lambda[k] * n;
       f->gap[k] -= n * u[s * fe->dim + c];
       for (PetscInt j = 0; j < masters; j++) {
-        f->force[3 * master[j] + c] += weight[j] * lambda[k] * n;
+        f->force[3 * master[j] + c] -= weight[j] * (shear - lambda[k] * n);
         f->gap[k] += weight[j] * n * u[master[j] * fe->dim + c];
       }
     }
@@ -146,12 +146,35 @@ static PetscErrorCode FillContacts(HycoFE fe, HycoPairs *pairs, const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What friction adds at the slaves of this process's contacts; for a node in several contacts sums, and the state that is
+   nearest to slip. */
+static PetscErrorCode FillFriction(HycoFE fe, const HycoPairs *pairs, HycoContactFields *f)
+{
+  const HycoShear *shear = pairs->shear;
+  const PetscInt n = fe->mesh->n_nodes;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc3(3 * n, &f->traction, 3 * n, &f->slip, n, &f->state));
+  for (PetscInt k = 0; k < pairs->n; k++) {
+    const PetscInt s = HycoPairsSlave(pairs, k);
+
+    f->state[s] = PetscMax(f->state[s], shear->state[k]);
+    for (PetscInt c = 0; c < 3; c++) {
+      f->slip[3 * s + c] += shear->slip[3 * k + c];
+      if (f->area[k] > 0) f->traction[3 * s + c] += shear->force[3 * k + c] / f->area[k];
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoContactFieldsCreate(MPI_Comm comm, HycoFE surface, HycoPairs *pairs, const PetscReal u[],
                                        const PetscReal lambda[], HycoContactFields *f)
 {
   const PetscInt n = surface->mesh->n_nodes;
 
   PetscFunctionBegin;
+  f->rubs = (PetscBool)(pairs->shear != NULL);
+  f->traction = f->slip = f->state = NULL;
   PetscCall(PetscCalloc3(3 * n, &f->force, n, &f->pressure, n, &f->gap_node));
   PetscCall(PetscCalloc4(pairs->n, &f->gap, 3 * pairs->n, &f->normal, pairs->n, &f->area, pairs->n, &f->slave_id));
   PetscCall(PetscMalloc1(pairs->n, &f->pressure_of));
@@ -162,6 +185,7 @@ PetscErrorCode HycoContactFieldsCreate(MPI_Comm comm, HycoFE surface, HycoPairs 
 
     f->pressure[s] = PetscMax(f->pressure[s], f->pressure_of[k]);
   }
+  if (pairs->shear) PetscCall(FillFriction(surface, pairs, f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -186,6 +210,23 @@ static PetscErrorCode Combine(PetscSF to_owner, PetscSF to_part, HycoMesh part, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The same for what friction adds. */
+static PetscErrorCode FrictionToPart(PetscSF to_owner, PetscSF to_part, HycoMesh part, PetscInt n, HycoContactFields *f)
+{
+  PetscReal *traction, *slip, *state;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc3(3 * part->n_nodes, &traction, 3 * part->n_nodes, &slip, part->n_nodes, &state));
+  PetscCall(Combine(to_owner, to_part, part, n, 3, MPI_SUM, 0, f->traction, traction));
+  PetscCall(Combine(to_owner, to_part, part, n, 3, MPI_SUM, 0, f->slip, slip));
+  PetscCall(Combine(to_owner, to_part, part, n, 1, MPI_MAX, 0, f->state, state));
+  PetscCall(PetscFree3(f->traction, f->slip, f->state));
+  f->traction = traction;
+  f->slip = slip;
+  f->state = state;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* From the nodes of each rank's surface to those of its part: a node may be in contacts of several ranks. */
 static PetscErrorCode ToPart(MPI_Comm comm, HycoMesh part, HycoMesh surface, HycoContactFields *f)
 {
@@ -205,6 +246,7 @@ static PetscErrorCode ToPart(MPI_Comm comm, HycoMesh part, HycoMesh surface, Hyc
   for (PetscInt i = 0; i < part->n_nodes; i++) {
     if (gap[i] >= PETSC_MAX_REAL) gap[i] = NAN;
   }
+  if (f->rubs) PetscCall(FrictionToPart(to_owner, to_part, part, surface->n_nodes, f));
   PetscCall(PetscSFDestroy(&to_owner));
   PetscCall(PetscSFDestroy(&to_part));
   PetscCall(PetscFree3(f->force, f->pressure, f->gap_node));
@@ -231,6 +273,7 @@ PetscErrorCode HycoContactFieldsDestroy(HycoContactFields *f)
 {
   PetscFunctionBegin;
   PetscCall(PetscFree3(f->force, f->pressure, f->gap_node));
+  PetscCall(PetscFree3(f->traction, f->slip, f->state));
   PetscCall(PetscFree4(f->gap, f->normal, f->area, f->slave_id));
   PetscCall(PetscFree(f->pressure_of));
   PetscFunctionReturn(PETSC_SUCCESS);

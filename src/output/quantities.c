@@ -272,6 +272,7 @@ static PetscErrorCode AddContacts(HycoFE fe, const HycoQuantity *q, const HycoCo
 
   PetscFunctionBegin;
   if (q->kind == HYCO_QUANTITY_FORCE) PetscCall(CheckAxis(fe, q, "force"));
+  if (q->kind == HYCO_QUANTITY_FRICTION && q->field != HYCO_FRICTION_WORK) PetscCall(CheckAxis(fe, q, "friction"));
   HycoCheck(q->kind != HYCO_QUANTITY_MOMENT || (turns && !axisymmetric), "output_%s: there is no moment about %c%s",
             q->name, "xyz"[q->field],
             axisymmetric   ? " in an axisymmetric scene"
@@ -284,6 +285,8 @@ static PetscErrorCode AddContacts(HycoFE fe, const HycoQuantity *q, const HycoCo
     if (q->contact && strcmp(q->contact, r->name)) continue;
     if (q->kind == HYCO_QUANTITY_PRESSURE)
       *value = PetscMax(*value, r->pressure);
+    else if (q->kind == HYCO_QUANTITY_FRICTION)
+      *value += q->field == HYCO_FRICTION_WORK ? r->friction_work : r->friction[q->field];
     else
       *value += q->kind == HYCO_QUANTITY_FORCE ? r->force[q->field] : r->moment[q->field];
   }

@@ -86,6 +86,7 @@ PetscErrorCode HycoInitializePackage(void)
   PetscCall(PetscRegisterFinalize(Forget));
   PetscCall(HycoTaoRegisterAll());
   PetscCall(HycoConeRegister(HYCO_CONE_NONNEGATIVE, HycoConeCreate_Nonnegative));
+  PetscCall(HycoConeRegister(HYCO_CONE_COULOMB, HycoConeCreate_Coulomb));
   PetscCall(RegisterLaws());
   PetscCall(RegisterContacts());
   PetscCall(RegisterForms());

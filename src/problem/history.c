@@ -131,6 +131,14 @@ PetscErrorCode HycoSceneReadHistory(HycoScene s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscBool HycoSceneHasFriction(HycoScene s)
+{
+  for (PetscInt k = 0; k < s->n_contacts; k++) {
+    if (s->contact[k]->friction) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
 PetscErrorCode HycoSceneCheckHistory(HycoScene s)
 {
   PetscBool in_time[HYCO_MAX_PARAMETERS] = {PETSC_FALSE};
@@ -152,8 +160,12 @@ PetscErrorCode HycoSceneCheckHistory(HycoScene s)
   }
   for (PetscInt k = 0; k < s->n_contacts; k++) {
     HycoCheck(!HycoDeclaredChanges(&s->contact[k]->entries, "gap", in_time),
-              "contact %s: its normal changes in time; only the gap may change in time",
+              "contact %s: its normal changes in time; only the gap and the friction may change in time",
               ((PetscObject)s->contact[k])->name);
+    HycoCheck(!s->contact[k]->friction || s->n_times,
+              "%s: friction depends on the path of the loads, and the scene has no history; write history: {times: [0, "
+              "...]}",
+              HycoExprKey(s->contact[k]->friction));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -29,9 +29,9 @@ static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked
   *cost = -1;
   if (!y->K || !y->m || s->iterative) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoKernelSize(y->K, &p));
-  if (p && strcmp(s->now.type, HYCO_TAO_ACTIVE_SET)) {
-    HycoFormat(why, "a body is held by contact only, which %s cannot solve; %s", s->now.word,
-               y->blocks ? "add a support or a soft spring" : "use -hyco_solver_type active_set");
+  if (p && strcmp(s->now.type, HYCO_TAO_ACTIVE_SET) && !(y->blocks && s->now.traits & HYCO_TAO_CONES)) {
+    HycoFormat(why, "a body is held by contact only, which %s cannot solve; use -hyco_solver_type active_set",
+               s->now.word);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (s->falling_back && y->m > HYCO_FALLBACK_MAX && (s->form != form || s->now.traits & HYCO_TAO_DENSE))
@@ -146,7 +146,7 @@ static PetscErrorCode FreeGap(HycoSolver s, const Dual *d, Vec x)
 }
 
 /* Solves the dense problem by the current method. Floating bodies start with every contact closed. */
-static PetscErrorCode SolveForces(HycoSolver s, Dual *d, PetscBool *solved)
+static PetscErrorCode SolveForces(HycoSolver s, Dual *d, Vec start, PetscBool *solved)
 {
   HycoBlocks *blocks = NULL;
   HycoLCP lcp = {.n = d->m,
@@ -155,6 +155,8 @@ static PetscErrorCode SolveForces(HycoSolver s, Dual *d, PetscBool *solved)
                  .q = d->g,
                  .symmetric = s->system->symmetric,
                  .warm = s->warm,
+                 .given = (PetscBool)(s->system->blocks != NULL),
+                 .sign = s->system->blocks ? &s->sign : NULL,
                  .monitor = s->monitor,
                  .monitor_ctx = s->monitor_ctx};
   char name[HYCO_LINE] = "dual";
@@ -166,9 +168,13 @@ static PetscErrorCode SolveForces(HycoSolver s, Dual *d, PetscBool *solved)
   for (PetscInt i = 0; i < d->m && (!s->warm || !d->started); i++) d->active[i] = (PetscBool)(d->p > 0);
   PetscCall(HycoTaoSetType(d->tao, s->now.type, s->max_its));
   if (s->system->blocks) PetscCall(HycoBlocksGather(HycoComm(s), s->system->blocks, &blocks));
+  if (blocks)
+    PetscCall(PetscArrayzero(d->L, d->p)); /* the path decides between several solutions: by its last forces */
+  if (blocks) PetscCall(GatherVec(HycoComm(s), start, d->L + d->p));
   lcp.blocks = blocks;
   PetscCall(HycoTaoSolveLCP(d->tao, &lcp, d->active, d->L, &s->its, solved));
-  if (blocks) PetscCall(HycoBlocksAdmit(blocks, d->L)); /* inadmissible by round-off; the residuals are recomputed */
+  if (blocks)
+    PetscCall(HycoBlocksAdmit(blocks, d->L + d->p)); /* inadmissible by round-off; the residuals are recomputed */
   for (PetscInt i = 0; i < d->m && !blocks; i++) {
     PetscReal *L = d->L + d->p + i;
 
@@ -343,7 +349,7 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(FreeGap(s, d, x));
-  HycoLogged(HYCO_EVENT_FORCES, SolveForces(s, d, solved));
+  HycoLogged(HYCO_EVENT_FORCES, SolveForces(s, d, L, solved));
   PetscCall(SetForces(d, L));
   PetscCall(Recover(s, d, x, L));
   if (s->stiffness.lu && !d->p && *solved && s->now.traits & HYCO_TAO_OWN && !s->system->blocks)

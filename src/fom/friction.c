@@ -1,0 +1,499 @@
+/*
+  Coulomb friction on a path, for small sliding. The contact system of a step has a normal row and dim - 1 tangents for
+  each contact with friction,
+
+    K U + B^T r = F,     w = D - B U,     (r_n, r_t) = P(r - rho w)     (HYCO_CONE_COULOMB),
+
+  with D of a tangent the displacement of the slave against the master along it at the last accepted time: -w_t is the
+  slip of the step. B is constant along a path, so that K is condensed onto it once. If no coefficient is above 0 at the
+  time of a step, the path has the system without tangents, and takes the steps of a scene without friction.
+*/
+#include <hycofields.h>
+#include <hycopath.h>
+
+/* The shares of mu r_n above which a contact counts as slipping. */
+#define SLIPS (1 - 1e-8)
+/* Slips below this share of the largest displacement are round-off, and do no work. */
+#define ROUNDING 1e-12
+/* Vectors of a path with an entry for each row of its B. */
+#define N_PER_ROW (5 + HYCO_ANDERSON)
+
+struct _n_HycoFriction {
+  HycoSystem system; /* with tangents */
+  HycoSolver solver;
+  HycoCone cone[2]; /* of contacts without friction, and with */
+  Mat B, Bt;
+  Vec D, L, L_old, work; /* L: forces of the last step; L_old: of the last accepted one */
+  Vec other[N_PER_ROW];  /* the path's vectors for the system that it does not have now */
+  PetscInt rows;         /* of this rank */
+  PetscInt *row;         /* n + 1: the first row of each contact */
+  PetscInt *of;          /* n: its cone */
+  PetscReal *data, *mu;  /* of the blocks; n */
+  PetscReal *tangent;    /* 6 n */
+  PetscInt n_dof;
+  PetscReal *u_old; /* n_dof: of the surface at the last accepted time */
+  HycoShear shear;
+  PetscBool used; /* the path has this system */
+};
+
+/* The addresses of the path's vectors with an entry for each row of B. */
+static void PerRow(HycoPath p, Vec *at[N_PER_ROW])
+{
+  at[0] = &p->Lambda;
+  at[1] = &p->L_old;
+  at[2] = &p->gap_work;
+  at[3] = &p->L_last;
+  at[4] = &p->L_new;
+  for (PetscInt j = 0; j < HYCO_ANDERSON; j++) at[5 + j] = &p->dL[j];
+}
+
+/* Copies the normal components; tangential ones become 0. */
+static PetscErrorCode CopyNormal(HycoFOM f, Vec from, PetscBool with, Vec to)
+{
+  const HycoFriction r = f->friction;
+  const PetscScalar *a;
+  PetscScalar *b;
+
+  PetscFunctionBegin;
+  PetscCall(VecSet(to, 0));
+  PetscCall(VecGetArrayRead(from, &a));
+  PetscCall(VecGetArray(to, &b));
+  for (PetscInt k = 0; k < f->pairs.n; k++) b[with ? k : r->row[k]] = a[with ? r->row[k] : k];
+  PetscCall(VecRestoreArray(to, &b));
+  PetscCall(VecRestoreArrayRead(from, &a));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Gives the path the system with or without tangents. Of the forces at hand it keeps the normal ones. */
+static PetscErrorCode Use(HycoFOM f, PetscBool use)
+{
+  HycoFriction r = f->friction;
+  HycoPath p = f->path;
+  Vec *at[N_PER_ROW];
+
+  PetscFunctionBegin;
+  PerRow(p, at);
+  for (PetscInt j = 0; j < N_PER_ROW && use != r->used; j++) {
+    Vec before = *at[j];
+
+    *at[j] = r->other[j];
+    r->other[j] = before;
+    if (j < 2) PetscCall(CopyNormal(f, before, r->used, *at[j]));
+  }
+  r->used = p->rubs = use;
+  p->system = use ? r->system : f->system;
+  p->solver = use ? r->solver : f->solver;
+  p->B = use ? r->B : f->B;
+  p->Bt = use ? r->Bt : f->Bt;
+  p->D = use ? r->D : f->D;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The rows of this rank's contacts and their cones. */
+static PetscErrorCode CountRows(HycoFOM f, HycoFriction r)
+{
+  const PetscInt n = f->pairs.n, dim = f->fe->dim;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc3(n + 1, &r->row, n, &r->of, n, &r->mu));
+  PetscCall(PetscMalloc2(2 * n, &r->data, 6 * n, &r->tangent));
+  r->row[0] = 0;
+  for (PetscInt k = 0; k < n; k++) {
+    r->of[k] = f->scene->contact[f->pairs.contact[k]]->friction != NULL;
+    r->row[k + 1] = r->row[k] + (r->of[k] ? dim : 1);
+  }
+  r->rows = r->row[n];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode CreateCones(HycoFOM f, HycoFriction r)
+{
+  PetscFunctionBegin;
+  for (PetscInt c = 0; c < 2; c++) {
+    PetscCall(HycoConeCreate(HycoComm(f), &r->cone[c]));
+    PetscCall(HycoConeSetSize(r->cone[c], c ? f->fe->dim : 1));
+    PetscCall(HycoConeSetType(r->cone[c], c ? HYCO_CONE_COULOMB : HYCO_CONE_NONNEGATIVE));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFrictionCreate(HycoFOM f)
+{
+  HycoFriction r;
+
+  PetscFunctionBegin;
+  PetscCheck(f->fe->dim > 1, HycoComm(f), PETSC_ERR_USER,
+             "the mesh has 1 space dimension, in which nothing slides; remove the contacts' friction");
+  PetscCall(PetscNew(&r));
+  f->friction = r;
+  PetscCall(CountRows(f, r));
+  PetscCall(CreateCones(f, r));
+  PetscCall(PetscCalloc4(3 * f->pairs.n, &r->shear.force, 3 * f->pairs.n, &r->shear.slip, f->pairs.n, &r->shear.work,
+                         f->pairs.n, &r->shear.state));
+  PetscCall(VecCreate(HycoComm(f), &r->L));
+  PetscCall(VecSetSizes(r->L, r->rows, PETSC_DETERMINE));
+  PetscCall(VecSetType(r->L, VECSTANDARD));
+  PetscCall(VecDuplicate(r->L, &r->D));
+  PetscCall(VecDuplicate(r->L, &r->L_old));
+  PetscCall(VecDuplicate(r->L, &r->work));
+  for (PetscInt j = 0; j < N_PER_ROW; j++) PetscCall(VecDuplicate(r->L, &r->other[j]));
+  PetscCall(HycoSystemCreate(HycoComm(f), &r->system));
+  PetscCall(HycoSolverCreate(HycoComm(f), &r->solver));
+  PetscCall(HycoSolverSetType(r->solver, HYCO_SOLVER_SEMISMOOTH));
+  PetscCall(PetscObjectSetOptions((PetscObject)r->solver, f->scene->options));
+  PetscCall(HycoSolverSetFromOptions(r->solver));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFrictionDestroy(HycoFOM f)
+{
+  HycoFriction r = f->friction;
+
+  PetscFunctionBegin;
+  if (!r) PetscFunctionReturn(PETSC_SUCCESS);
+  if (r->B) PetscCall(Use(f, PETSC_FALSE)); /* the path frees its own vectors, f Lambda */
+  f->pairs.shear = NULL;
+  PetscCall(HycoSolverDestroy(&r->solver));
+  PetscCall(HycoSystemDestroy(&r->system));
+  for (PetscInt c = 0; c < 2; c++) PetscCall(HycoConeDestroy(&r->cone[c]));
+  PetscCall(MatDestroy(&r->B));
+  PetscCall(MatDestroy(&r->Bt));
+  PetscCall(VecDestroy(&r->D));
+  PetscCall(VecDestroy(&r->L));
+  PetscCall(VecDestroy(&r->L_old));
+  PetscCall(VecDestroy(&r->work));
+  for (PetscInt j = 0; j < N_PER_ROW; j++) PetscCall(VecDestroy(&r->other[j]));
+  PetscCall(PetscFree3(r->row, r->of, r->mu));
+  PetscCall(PetscFree2(r->data, r->tangent));
+  PetscCall(PetscFree4(r->shear.force, r->shear.slip, r->shear.work, r->shear.state));
+  PetscCall(PetscFree(r->u_old));
+  PetscCall(PetscFree(f->friction));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFrictionBegin(HycoFOM f)
+{
+  HycoFriction r = f->friction;
+  const PetscInt n = f->pairs.n;
+
+  PetscFunctionBegin;
+  if (r->B) PetscCall(Use(f, PETSC_FALSE));
+  PetscCall(VecSet(r->L, 0));
+  PetscCall(VecSet(r->L_old, 0));
+  PetscCall(VecSet(f->path->Lambda, 0));
+  PetscCall(PetscFree(r->u_old));
+  r->n_dof = f->fe_surface->n_dof;
+  PetscCall(PetscCalloc1(r->n_dof, &r->u_old));
+  PetscCall(PetscArrayzero(r->shear.force, 3 * n));
+  PetscCall(PetscArrayzero(r->shear.slip, 3 * n));
+  PetscCall(PetscArrayzero(r->shear.work, n));
+  PetscCall(PetscArrayzero(r->shear.state, n));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The coefficients at the slaves' places; of this rank's contacts. */
+static PetscErrorCode Coefficients(HycoFOM f, HycoFriction r)
+{
+  HycoFE fe = f->fe_surface;
+  PetscInt n = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < f->pairs.n; k++) {
+    HycoExpr friction = f->scene->contact[f->pairs.contact[k]]->friction;
+    const PetscReal *x = fe->X + 3 * f->pairs.slave[k];
+    char place[HYCO_LINE];
+
+    r->mu[k] = 0;
+    if (!friction) continue;
+    PetscCall(HycoExprEval(friction, fe->mu, 1, x, &r->mu[k]));
+    if (r->mu[k] < 0) {
+      PetscCall(HycoExprPlace(friction, fe->mu, x, place));
+      HycoFail("%s is %g at %s; a coefficient of friction must be 0 or more", HycoExprKey(friction), (double)r->mu[k],
+               place);
+    }
+    r->data[n++] = r->mu[k];
+    r->data[n++] = 0;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Rows of B and gaps of this rank. */
+typedef struct {
+  PetscInt *start, *dof;
+  PetscReal *value, *gap;
+} Rows;
+
+static PetscErrorCode ComputeRows(HycoFOM f, HycoFriction r, Rows *rows)
+{
+  PetscFunctionBegin;
+  PetscCall(Coefficients(f, r));
+  PetscCall(HycoContactTangentRows(f->fe_surface, &f->pairs, r->row, r->u_old, r->tangent, rows->start, rows->dof,
+                                   rows->value, rows->gap));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* B and its transpose anew. */
+static PetscErrorCode FillB(HycoFOM f, HycoFriction r, const Rows *rows)
+{
+  const PetscInt dim = f->fe->dim, entries = f->width * dim, *global = f->surface->node_global;
+  PetscInt first, *column;
+
+  PetscFunctionBegin;
+  PetscCall(MatDestroy(&r->B));
+  PetscCall(MatDestroy(&r->Bt));
+  PetscCall(MatCreateAIJ(HycoComm(f), r->rows, f->part->n_owned * dim, PETSC_DETERMINE, f->n_nodes * dim, entries, NULL,
+                         entries, NULL, &r->B));
+  PetscCall(MatSetOption(r->B, MAT_NO_OFF_PROC_ENTRIES, PETSC_TRUE));
+  PetscCall(MatGetOwnershipRange(r->B, &first, NULL));
+  PetscCall(PetscMalloc1(entries + 1, &column));
+  for (PetscInt k = 0; k < r->rows; k++) {
+    const PetscInt at = first + k, lo = rows->start[k], n = rows->start[k + 1] - lo;
+
+    for (PetscInt j = 0; j < n; j++) {
+      const PetscInt node = rows->dof[lo + j] / dim;
+
+      column[j] = (global ? global[node] : node) * dim + rows->dof[lo + j] % dim;
+    }
+    PetscCall(MatSetValues(r->B, 1, &at, n, column, rows->value + lo, INSERT_VALUES));
+  }
+  PetscCall(PetscFree(column));
+  PetscCall(MatAssemblyBegin(r->B, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(r->B, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatTranspose(r->B, MAT_INITIAL_MATRIX, &r->Bt));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether a coefficient is above 0 on some rank. */
+static PetscErrorCode Rubs(HycoFOM f, PetscBool *rubs)
+{
+  PetscFunctionBegin;
+  *rubs = PETSC_FALSE;
+  for (PetscInt k = 0; k < f->pairs.n; k++) *rubs = (PetscBool)(*rubs || f->friction->mu[k] > 0);
+  HycoAllreduce(rubs, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Assemble(HycoFOM f, HycoFriction r, Rows *rows)
+{
+  PetscScalar *D;
+  PetscBool rubs;
+
+  PetscFunctionBegin;
+  HycoOnEach(HycoComm(f), ComputeRows(f, r, rows));
+  if (!r->B || f->fe->contact_changed) PetscCall(FillB(f, r, rows));
+  PetscCall(VecGetArray(r->D, &D));
+  PetscCall(PetscArraycpy(D, rows->gap, r->rows));
+  PetscCall(VecRestoreArray(r->D, &D));
+  PetscCall(HycoSystemSetMatrices(r->system, f->K, r->Bt, r->B, PETSC_TRUE));
+  PetscCall(HycoSystemSetVectors(r->system, f->F, r->D));
+  PetscCall(HycoSystemSetBlocks(r->system, 2, r->cone, f->pairs.n, r->of, r->data));
+  PetscCall(Rubs(f, &rubs));
+  PetscCall(Use(f, rubs));
+  f->pairs.shear = &r->shear;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFrictionAssemble(HycoFOM f)
+{
+  HycoFriction r = f->friction;
+  const PetscInt entries = f->width * f->fe->dim * r->rows;
+  Rows rows;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCheck(r->n_dof == f->fe_surface->n_dof, PETSC_COMM_SELF, PETSC_ERR_PLIB, "the surfaces changed along a path");
+  PetscCall(PetscMalloc4(r->rows + 1, &rows.start, entries, &rows.dof, entries, &rows.value, r->rows, &rows.gap));
+  ierr = Assemble(f, r, &rows);
+  PetscCall(PetscFree4(rows.start, rows.dof, rows.value, rows.gap));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The forces of the step with all rows, and the normal ones as the model's. */
+static PetscErrorCode TakeForces(HycoFOM f)
+{
+  HycoFriction r = f->friction;
+
+  PetscFunctionBegin;
+  if (r->used) {
+    PetscCall(VecCopy(f->path->Lambda, r->L));
+    PetscCall(CopyNormal(f, r->L, PETSC_TRUE, f->Lambda));
+  } else
+    PetscCall(CopyNormal(f, f->Lambda, PETSC_FALSE, r->L));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* (L0 + L1) / 2 . B (U1 - U0) with tangents, also where one of the two times has none. */
+PetscErrorCode HycoFrictionWork(HycoFOM f, PetscReal *sum)
+{
+  HycoFriction r = f->friction;
+  HycoPath p = f->path;
+  PetscReal both[2];
+
+  PetscFunctionBegin;
+  PetscCall(TakeForces(f));
+  PetscCall(VecWAXPY(p->work, -1, p->U_old, f->U));
+  PetscCall(MatMult(r->B, p->work, r->work));
+  PetscCall(VecDot(r->L, r->work, &both[0]));
+  PetscCall(VecDot(r->L_old, r->work, &both[1]));
+  *sum = (both[0] + both[1]) / 2;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds the slip -w_t of contact k, with the forces r and gaps w of its rows. most: the largest
+   displacement. */
+static void AddSlip(const HycoFriction h, PetscInt dim, PetscInt k, const PetscReal r[], const PetscReal w[],
+                    PetscReal most)
+{
+  const HycoShear *s = &h->shear;
+  const PetscReal *t = h->tangent + 6 * k;
+  PetscReal size = 0, work = 0;
+
+  for (PetscInt c = 0; c < 3; c++) s->force[3 * k + c] = 0;
+  for (PetscInt j = 0; j + 1 < dim && h->of[k]; j++) {
+    size += r[j + 1] * r[j + 1];
+    if (r[0] > 0) work -= r[j + 1] * w[j + 1];
+    for (PetscInt c = 0; c < 3; c++) {
+      s->force[3 * k + c] -= r[j + 1] * t[3 * j + c];
+      if (r[0] > 0) s->slip[3 * k + c] -= w[j + 1] * t[3 * j + c];
+    }
+  }
+  s->state[k] = !(r[0] > 0) ? HYCO_OPEN : PetscSqrtReal(size) < SLIPS * h->mu[k] * r[0] ? HYCO_STICK : HYCO_SLIP;
+  if (PetscAbsReal(work) > ROUNDING * PetscSqrtReal(size) * most) s->work[k] += work;
+}
+
+PetscErrorCode HycoFrictionAccept(HycoFOM f)
+{
+  HycoFriction r = f->friction;
+  const PetscScalar *L, *w;
+  PetscReal most;
+
+  PetscFunctionBegin;
+  PetscCall(VecNorm(f->U, NORM_INFINITY, &most));
+  PetscCall(MatMult(r->B, f->U, r->work));
+  PetscCall(VecAYPX(r->work, -1, r->D));
+  PetscCall(VecGetArrayRead(r->L, &L));
+  PetscCall(VecGetArrayRead(r->work, &w));
+  for (PetscInt k = 0; k < f->pairs.n; k++) AddSlip(r, f->fe->dim, k, L + r->row[k], w + r->row[k], most);
+  PetscCall(VecRestoreArrayRead(r->work, &w));
+  PetscCall(VecRestoreArrayRead(r->L, &L));
+  PetscCall(VecCopy(r->L, r->L_old));
+  PetscCall(HycoFOMToSurface(f, f->U, r->u_old));
+  HycoFEComplete(f->fe_surface, r->u_old);
+  f->path->now.disproven += r->used && r->solver->sign < 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFrictionMeasure(HycoFOM f, HycoStep *s)
+{
+  HycoFriction r = f->friction;
+  PetscReal sum[2] = {0, 0};
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < f->pairs.n; k++) {
+    sum[0] += r->shear.work[k];
+    sum[1] += r->of[k] && r->shear.state[k] == HYCO_SLIP;
+  }
+  HycoAllreduce(sum, 2, MPIU_REAL, MPI_SUM, HycoComm(f));
+  s->friction_work = sum[0];
+  s->n_slipping = (PetscInt)sum[1];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The columns of a checkpoint: tangential force, slip, work and state of each contact. */
+#define N_STATE 8
+static PetscReal *Column(const HycoShear *s, PetscInt c, PetscInt *stride)
+{
+  *stride = c < 6 ? 3 : 1;
+  return c < 3 ? s->force + c : c < 6 ? s->slip + (c - 3) : c < 7 ? s->work : s->state;
+}
+
+PetscErrorCode HycoFrictionSave(HycoFOM f, HycoH5 h)
+{
+  PetscReal *value;
+  PetscErrorCode ierr = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(f->pairs.n + 1, &value));
+  for (PetscInt c = 0; c < N_STATE && !ierr; c++) {
+    char name[32];
+    PetscInt stride;
+    const PetscReal *from = Column(&f->friction->shear, c, &stride);
+
+    for (PetscInt k = 0; k < f->pairs.n; k++) value[k] = from[k * stride];
+    PetscCall(PetscSNPrintf(name, sizeof(name), "friction/%d", (int)c));
+    ierr = HycoContactsWrite(HycoComm(f), h, name, &f->pairs, f->n_contacts, MPIU_REAL, value);
+  }
+  PetscCall(PetscFree(value));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ReadColumns(HycoFOM f, PetscReal *value[N_STATE])
+{
+  HycoH5 h;
+  PetscErrorCode ierr = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5OpenOr(f->path->checkpoint, "remove -hyco_resume", &h));
+  for (PetscInt c = 0; c < N_STATE && !ierr; c++) {
+    PetscInt rows = f->n_contacts, one = 1;
+    char name[32];
+
+    PetscCall(PetscSNPrintf(name, sizeof(name), "friction/%d", (int)c));
+    ierr = HycoH5LoadReal(h, name, &rows, &one, &value[c]);
+  }
+  PetscCall(HycoH5Close(&h, PETSC_FALSE));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* From the order of one rank on rank 0 to the contacts of each rank, by way of Lambda, which is restored. */
+static PetscErrorCode TakeColumns(HycoFOM f, PetscReal *const value[N_STATE])
+{
+  const PetscScalar *mine;
+  Vec lambda;
+
+  PetscFunctionBegin;
+  PetscCall(VecDuplicate(f->Lambda, &lambda));
+  PetscCall(VecCopy(f->Lambda, lambda));
+  for (PetscInt c = 0; c < N_STATE; c++) {
+    PetscInt stride;
+    PetscReal *to = Column(&f->friction->shear, c, &stride);
+
+    PetscCall(HycoFOMSetLambda(f, value[c]));
+    PetscCall(VecGetArrayRead(f->Lambda, &mine));
+    for (PetscInt k = 0; k < f->pairs.n; k++) to[k * stride] = mine[k];
+    PetscCall(VecRestoreArrayRead(f->Lambda, &mine));
+  }
+  PetscCall(VecCopy(lambda, f->Lambda));
+  PetscCall(VecDestroy(&lambda));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFrictionLoad(HycoFOM f)
+{
+  HycoFriction r = f->friction;
+  PetscReal *value[N_STATE] = {NULL};
+  PetscScalar *L;
+
+  PetscFunctionBegin;
+  HycoOnRoot(HycoComm(f), ReadColumns(f, value));
+  PetscCall(TakeColumns(f, value));
+  for (PetscInt c = 0; c < N_STATE; c++) PetscCall(PetscFree(value[c]));
+  PetscCall(CopyNormal(f, f->Lambda, PETSC_FALSE, r->L));
+  PetscCall(VecGetArray(r->L, &L));
+  for (PetscInt k = 0; k < f->pairs.n; k++) {
+    for (PetscInt j = r->row[k] + 1; j < r->row[k + 1]; j++) {
+      const PetscReal *t = r->tangent + 6 * k + 3 * (j - r->row[k] - 1), *force = r->shear.force + 3 * k;
+
+      L[j] = -(force[0] * t[0] + force[1] * t[1] + force[2] * t[2]);
+    }
+  }
+  PetscCall(VecRestoreArray(r->L, &L));
+  PetscCall(VecCopy(r->L, r->L_old));
+  if (r->used) PetscCall(VecCopy(r->L, f->path->Lambda));
+  PetscCall(HycoFOMToSurface(f, f->U, r->u_old));
+  HycoFEComplete(f->fe_surface, r->u_old);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,203 @@
+"""Scenes with friction: every type of contact, bodies that friction alone holds, creep, several ranks, interrupted runs, mu = 0, refusals.
+Closed forms are in tests/verify/friction.py, random scenes in friction_random.py."""
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import unittest
+
+import h5py
+import numpy as np
+
+from common import HYCO, PATIENCE, SOURCE, Case
+
+sys.path.insert(0, os.path.join(SOURCE, 'tests', 'verify'))
+from grids import Grid  # noqa: E402
+
+PAD = """
+scene: {mesh: mesh.msh}
+body: {pad: {LAW}}
+fixed: {top: {x: "0.01*s", y: "-0.004*min(t, 1)"}}
+contact: {floor: {group: base, normal: {y: -1}, gap: "0.0005*x", friction: "MU"}}
+history: {times: [0, 1, 2, 3], tables: {s: [[0, 0], [1, 0], [2, 1], [3, -1]]}}
+output: {T: {friction: x, contact: floor}, N: {force: y}, W: {friction: work}}
+"""
+ELASTIC = 'young: 1000, poisson: 0.3'
+NORTON = 'law: norton, young: 1000, poisson: 0.3, rate: 1e-3, exponent: 2'
+TWO = """
+scene: {mesh: mesh.msh}
+body: {low: {young: 1000, poisson: 0.3}, high: {young: 500, poisson: 0.2}}
+fixed: {base: {x: 0, y: 0, z: 0}, top: {x: "0.02*max(t - 1, 0)", y: "0.01*max(t - 1, 0)", z: "-0.01*min(t, 1)"}}
+contact: {joint: {CONTACT, friction: "0.1 + 0.1*x"}}
+history: {times: [0, 1, 2]}
+output: {T: {friction: x, contact: joint}, Y: {friction: y, contact: joint}, N: {force: z, contact: joint}}
+"""
+SLOPE = """
+scene: {mesh: mesh.msh}
+body: {block: {young: 1e4, poisson: 0.3}}
+force: {block: {x: 0, y: "-t"}}
+contact: {plane: {group: base, normal: {x: "sin(0.3)", y: "-cos(0.3)"}, gap: 0, friction: "MU"}}
+history: {times: [0, 1, 2]}
+output: {N: {force: y, contact: plane}, T: {friction: x, contact: plane}}
+"""
+RING = """
+scene: {mesh: mesh.msh, formulation: axisymmetric}
+body: {ring: {young: 1000, poisson: 0.3}}
+fixed: {end: {y: "0.05*max(t - 1, 0)"}}
+contact: {bore: {group: outside, normal: {x: 1}, gap: "-0.01*min(t, 1)", friction: 0.25}}
+history: {times: [0, 1, 2]}
+output: {T: {friction: y, contact: bore}, R: {reaction: y, group: end}}
+"""
+RIGID = """
+scene: {mesh: mesh.msh}
+body: {block: {young: 1000, poisson: 0.3}, tool: {young: 1}}
+fixed: {base: {x: 0, y: 0}, tool: {x: "0.1*max(t - 1, 0)"}}
+force: {tip: {y: "-10*min(t, 1)"}}
+contact: {punch: {type: rigid, slave: top, master: tip, gap: 0.01*x^2, friction: 0.3}}
+history: {times: [0, 1, 2]}
+output: {T: {friction: x, contact: punch}, N: {force: y, contact: punch}}
+"""
+
+
+class Friction(Case):
+    def pad(self, name='scene.yaml', law=ELASTIC, mu='0.3', more='', **changes):
+        grid = Grid()
+        grid.box('quad4', [np.linspace(0, 2, 13), np.linspace(0, 1, 7)], lambda x: x, 'pad', {'y0': 'base', 'y1': 'top'})
+        grid.write(self.path('mesh.msh'))
+        return self.changed(name, PAD.replace('LAW', law).replace('MU', mu) + more, changes.values())
+
+    def rows(self, scene, *args, **options):
+        """The columns of the listed times and the outputs, a dictionary for each; residuals, energies and reactions are checked."""
+        report = self.hyco('solve', '-scene', scene, *args, **options)
+        history = report['history']
+        columns = {**{k: v for k, v in history.items() if isinstance(v, list)}, **history['outputs']}
+        rows = [dict(zip(columns, values)) for values in zip(*columns.values())]
+        self.assertLess(max(row['kkt_max'] for row in rows), 1e-8)
+        self.assertLess(max(row['energy_defect'] for row in rows), 1e-8)
+        self.assertLess(report['balance'], 1e-8)
+        return rows
+
+    def test_types(self):
+        """In 3D, pairs and surfaces that do not match: at every node the traction is mu p against the motion; the coefficient changes in space."""
+        for contact, n in (('type: pair, slave: face, master: back', 5), ('type: surface, slave: face, master: back', 4)):
+            grid = Grid()
+            flat = [np.linspace(0, 1, 5)] * 2
+            grid.box('hex8', [*flat, np.linspace(0, 0.5, 3)], lambda x: x, 'low', {'z0': 'base', 'z1': 'back'})
+            grid.box('hex8', [np.linspace(0, 1, n)] * 2 + [np.linspace(0.5, 1, 3)], lambda x: x, 'high', {'z0': 'face', 'z1': 'top'})
+            grid.write(self.path('mesh.msh'))
+            rows = self.rows(self.changed('scene.yaml', TWO.replace('CONTACT', contact), ()), '-output', self.path('out.xdmf'))
+            self.assertEqual(rows[2]['n_slipping'], rows[2]['n_active'])
+            self.assertLess(rows[2]['T'], -0.09 * abs(rows[2]['N']))
+            self.assertLess(rows[2]['Y'], -0.04 * abs(rows[2]['N']))
+            with h5py.File(self.path('out.h5')) as file:
+                step, x = file['step-0002/nodes'], file['mesh/xyz'][:, 0]
+                p, t = step['contact_pressure'][:, 0], step['contact_traction'][:]
+            self.assertLess(abs(np.linalg.norm(t, axis=1) - (0.1 + 0.1 * x) * p).max(), 1e-9 * p.max())
+
+    def test_rigid(self):
+        """A rigid body that a force presses on a block and that is drawn along it: T = mu N, and the force of its support balances it."""
+        grid = Grid()
+        grid.box('quad4', [np.linspace(-1, 1, 9), np.linspace(-1, 0, 5)], lambda x: x, 'block', {'y0': 'base', 'y1': 'top'})
+        grid.tool('quad4', [np.array([1.5, 1.6]), np.array([0, 0.1])])
+        grid.write(self.path('mesh.msh'))
+        last = self.rows(self.changed('scene.yaml', RIGID, ()))[2]
+        self.near(last['N'], -10, 1e-9)
+        self.near(last['T'], 3, 1e-9)
+
+    def test_held(self):
+        """A block on a slope, which friction alone holds: it sticks if mu is above the slope, and is refused by name if it is not."""
+        turn = np.array([[np.cos(0.3), np.sin(0.3)], [-np.sin(0.3), np.cos(0.3)]])
+        grid = Grid()
+        grid.box('quad4', [np.linspace(0, 2, 9), np.linspace(0, 1, 5)], lambda x: x @ turn, 'block', {'y0': 'base'})
+        grid.write(self.path('mesh.msh'))
+        rows = self.rows(self.changed('scene.yaml', SLOPE.replace('MU', '0.5'), ()))
+        self.near(rows[2]['N'], 4, 1e-8)
+        run = self.run_raw('solve', '-scene', self.changed('scene.yaml', SLOPE.replace('MU', '0.25'), ()))
+        self.assertEqual(run.returncode, 1)
+        self.assertIn('with this friction', run.stderr)
+        self.assertIn('body block', run.stderr)
+
+    def test_ring(self):
+        """A ring in a bore that is too small, pushed along it: the resultant is mu times the radial force, and balances the support's."""
+        grid = Grid()
+        grid.box('quad4', [np.linspace(1, 2, 7), np.linspace(0, 1, 7)], lambda x: x, 'ring', {'x1': 'outside', 'y0': 'end'})
+        grid.write(self.path('mesh.msh'))
+        last = self.rows(self.changed('scene.yaml', RING, ()))[2]
+        self.near(last['T'], -0.25 * last['total_contact_force'], 1e-9)
+        self.near(last['R'], -last['T'], 1e-8)
+
+    def test_creep(self):
+        """Bodies that creep: Newton's method outside, the law of contact inside."""
+        last = self.rows(self.pad(law=NORTON))[3]
+        self.near(last['T'], 0.3 * last['N'], 1e-8)
+        self.assertGreater(last['inelastic'], 1e-5)
+        self.assertGreater(last['W'], 0)
+
+    def test_ranks(self):
+        """The same on one to four ranks, with the fields."""
+        scene = self.pad()
+        first = self.rows(scene, '-output', self.path('one.xdmf'))
+        for ranks in (2, 3, 4):
+            rows = self.rows(scene, '-output', self.path('more.xdmf'), ranks=ranks)
+            for name in ('T', 'N', 'W', 'friction_work', 'n_slipping', 'total_contact_force'):
+                for one, more in zip(first, rows):
+                    self.assertLessEqual(abs(one[name] - more[name]), 1e-9 * max(abs(r[name]) for r in first), name)
+            with h5py.File(self.path('one.h5')) as one, h5py.File(self.path('more.h5')) as more:
+                for name in ('contact_traction', 'contact_slip', 'contact_state', 'contact_force'):
+                    for k in range(4):
+                        a, b = (f[f'step-{k:04d}/nodes/{name}'][:] for f in (one, more))
+                        self.assertLessEqual(abs(a - b).max(), 1e-9 * max(abs(a).max(), 1e-12), name)
+
+    def test_resume(self):
+        """A killed run continues with the state of its contacts, also on another number of ranks."""
+        scene, steps = self.pad(), ['-hyco_substeps', '4']
+        whole = self.rows(scene, *steps)
+        keep = ['-hyco_checkpoint', self.path('c.h5')]
+        process = subprocess.Popen([HYCO, 'solve', '-scene', scene, *steps, *keep], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        for line in process.stdout:
+            if line.startswith('t 2 '):
+                process.send_signal(signal.SIGKILL)
+                break
+        process.communicate(timeout=100 * PATIENCE)
+        shutil.copy(self.path('c.h5'), self.path('kept.h5'))
+        for ranks in (0, 2):
+            shutil.copy(self.path('kept.h5'), self.path('c.h5'))
+            rest = self.rows(scene, *steps, *keep, '-hyco_resume', ranks=ranks)
+            for name in ('T', 'W', 'friction_work', 'contact_work', 'n_slipping'):
+                self.near(rest[3][name], whole[3][name], 1e-9, name)
+
+    def test_without(self):
+        """mu = 0 takes the steps of the scene without friction, bit for bit; a coefficient that falls to 0 keeps the work done before."""
+        fields = {}
+        plain = ('gap: "0.0005*x", friction: "0"', 'gap: "0.0005*x"'), ('T: {friction: x, contact: floor}, ', ''), (', W: {friction: work}', '')
+        for name, changes in (('zero', {}), ('plain', dict(zip('abc', plain)))):
+            self.rows(self.pad(name + '.yaml', mu='0', **changes), '-output', self.path(name + '.xdmf'))
+            with h5py.File(self.path(name + '.h5')) as file:
+                fields[name] = [file[f'step-{k:04d}/nodes/{f}'][:] for k in range(4) for f in ('displacement', 'contact_force', 'gap')]
+        for a, b in zip(fields['zero'], fields['plain']):
+            np.testing.assert_array_equal(a, b)
+        rows = self.rows(self.pad(mu='0.3*max(0, 2.5 - t)'))
+        self.assertEqual(rows[3]['T'], 0)
+        self.assertGreater(rows[2]['W'], 0)
+        self.assertEqual(rows[3]['W'], rows[2]['W'])
+
+    def test_refused(self):
+        """One line each: no history, a negative coefficient, reduced models, methods that do not know friction, a wrong output."""
+        times = 'history: {times: [0, 1, 2, 3], tables: {s: [[0, 0], [1, 0], [2, 1], [3, -1]]}}\n'
+        parameter = ('mesh.msh}', 'mesh.msh, parameters: [q]}\nparameter: {q: {range: [0.1, 0.5]}}')
+        for words, scene, args in (
+                (('contact_floor_friction', 'history'), self.pad('a.yaml', a=(times, ''), b=('"0.01*s"', '0'), c=('-0.004*min(t, 1)', '-0.004')), ['solve']),
+                (('contact_floor_friction is -0.1', '0 or more'), self.pad('b.yaml', mu='x - 0.1'), ['solve']),
+                (('friction', 'no reduced models'), self.pad('c.yaml', mu='q', a=parameter), ['train', '-grid', '2', '-model', self.path('m.h5')]),
+                (('use -hyco_solver_type semismooth',), self.pad('d.yaml'), ['solve', '-hyco_solver_type', 'lemke']),
+                (('output_T_friction',), self.pad('e.yaml', a=('T: {friction: x,', 'T: {friction: w,')), ['solve'])):
+            run = self.run_raw(*args, '-scene', scene)
+            self.assertEqual(run.returncode, 1, run.stderr)
+            self.assertEqual(len(run.stderr.strip().splitlines()), 1, run.stderr)
+            for word in words:
+                self.assertIn(word, run.stderr)
+
+
+if __name__ == '__main__':
+    unittest.main()

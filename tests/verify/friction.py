@@ -1,0 +1,164 @@
+"""Coulomb friction against closed forms.
+
+- Pad: pressed on a plane and drawn along it: T = mu N; the work of friction is mu N times the slip.
+- Incline: a block that a horizontal force F pushes up a plane of the angle a against its weight G: F/G = (tan a + mu)/(1 - mu tan a).
+- Cattaneo: two elastic half planes with a curved gap, pressed together by P, then loaded along the surface by Q (C. Cattaneo, Rend. Accad.
+  Lincei 27 (1938); K. L. Johnson, Contact Mechanics, 1985, section 7.2): they stick in |x| < c = a sqrt(1 - Q/(mu P)), and
+  q = mu p0 (sqrt(1 - x^2/a^2) - (c/a) sqrt(1 - x^2/c^2)), exact for equal materials. When Q falls from its largest value Q* (R. D. Mindlin,
+  H. Deresiewicz, J. Appl. Mech. 20 (1953)), they slip back outside c' = a sqrt(1 - (Q* - Q)/(2 mu P)).
+- Spence: a flat rigid punch on an elastic half plane sticks in |x| < c with mu/beta = K(c/a)/K'(c/a), beta Dundurs' constant (D. A. Spence,
+  J. Elasticity 5 (1975) 297-319).
+
+Without friction, each of these numbers is another one: test_without.
+"""
+import unittest
+
+import numpy as np
+
+from grids import Grid, graded
+from verify import Verify, read_step
+
+PAD = """
+scene: {title: pad, mesh: mesh.msh}
+body: {pad: {young: 1000, poisson: 0.3}}
+fixed: {top: {x: "0.01*s", y: "-0.002*min(t,1)"}}
+contact: {floor: {type: obstacle, group: base, normal: {y: -1}, gap: 0, friction: "%s"}}
+history: {times: [0, 1, 2, 3, 4], tables: {s: [[0, 0], [1, 0], [3, 1], [4, 0]]}}
+output: {T: {friction: x, contact: floor}, W: {friction: work}, N: {force: y, contact: floor}}
+"""
+INCLINE = """
+scene: {title: incline, mesh: mesh.msh}
+constant: {a: 0.3, g: 50}
+body: {block: {young: 1e5, poisson: 0.3}}
+force: {block: {y: -g}}
+fixed: {left: {x: "0.01*t"}}
+contact: {plane: {type: obstacle, group: base, normal: {x: "sin(a)", y: "-cos(a)"}, gap: 0, friction: "%s"}}
+history: {times: [0, 0.5, 1]}
+output: {F: {reaction: x, group: left}}
+"""
+CATTANEO = """
+scene: {title: Cattaneo, mesh: mesh.msh}
+body: {low: {young: 1000, poisson: 0.3}, high: {young: 1000, poisson: 0.3}}
+fixed: {bottom: {x: 0, y: 0}, top: {x: "s", y: "-w*min(t, 1)"}}
+constant: {w: 0.0255, R: 100}
+contact: {joint: {type: pair, slave: upper, master: lower, gap: "x^2/(2*R)", friction: "%s"}}
+history: {times: [0, 1, 2, 3], tables: {s: [[0, 0], [1, 0], [2, %g], [3, %g]]}}
+output: {P: {force: y, contact: joint}, Q: {friction: x, contact: joint}}
+"""
+SPENCE = """
+scene: {title: Spence, mesh: mesh.msh}
+body: {block: {young: 1000, poisson: 0.3}}
+fixed: {axis: {x: 0}, bottom: {x: 0, y: 0}}
+contact: {punch: {type: obstacle, group: punch, normal: {y: 1}, gap: "-0.001*t", friction: "%.12g"}}
+history: {times: [0, 1]}
+"""
+
+
+class Friction(Verify):
+    name = 'friction'
+
+    def history(self, scene, *args):
+        """The columns of the listed times and the outputs, a dictionary for each."""
+        history = self.hyco('solve', '-scene', scene, '-output', self.path('out.xdmf'), *args, timeout=200)['history']
+        columns = {**{k: v for k, v in history.items() if isinstance(v, list)}, **history.get('outputs', {})}
+        rows = [dict(zip(columns, values)) for values in zip(*columns.values())]
+        for row in rows:
+            self.assertLess(row['kkt_max'], 1e-8)
+            self.assertLess(row['energy_defect'], 1e-9)
+            self.assertGreaterEqual(row['friction_work'], 0)
+        return rows
+
+    def pad(self, mu):
+        grid = Grid()
+        grid.box('quad4', [np.linspace(0, 2, 17), np.linspace(0, 1, 9)], lambda x: x, 'pad', {'y0': 'base', 'y1': 'top'})
+        return self.history(self.scene(PAD % mu, grid))
+
+    def test_pad(self):
+        """T = mu N in both directions, the state of all contacts, the work of a slip without stick."""
+        rows = self.pad(0.3)
+        self.row('pad: T / (mu N)', -rows[3]['T'] / (0.3 * rows[3]['N']), 1, 1e-9)
+        self.row('pad: T / (mu N), back', rows[4]['T'] / (0.3 * rows[4]['N']), 1, 1e-9)
+        self.row('pad: contacts that slip', rows[3]['n_slipping'] / rows[3]['n_active'], 1, 0)
+        self.row('pad: work of friction over T times the slip', (rows[3]['W'] - rows[2]['W']) / (0.3 * rows[3]['N'] * 0.005), 1, 0.1)
+
+    def incline(self, mu):
+        turn = np.array([[np.cos(0.3), np.sin(0.3)], [-np.sin(0.3), np.cos(0.3)]])
+        grid = Grid()
+        grid.box('quad4', [np.linspace(0, 2, 9), np.linspace(0, 1, 5)], lambda x: x @ turn, 'block', {'y0': 'base', 'x0': 'left'})
+        return self.history(self.scene(INCLINE % mu, grid))[2]['F'] / (50 * 2)
+
+    def test_incline(self):
+        """No support holds the block against turning or sinking: contact does."""
+        exact = lambda mu: (np.tan(0.3) + mu) / (1 - mu * np.tan(0.3))
+        for mu in (0.2, 0.6):
+            self.row(f'incline, mu = {mu}: F/G', self.incline(mu), exact(mu), 1e-6)
+
+    def cattaneo(self, mu, cells, slips):
+        """Rows of the history, the contact's places, and its fields at the listed times; `cells` in the half-width."""
+        half = graded(1 / cells, 1.25, 60, 1.25)
+        wide, deep = np.concatenate([-half[:0:-1], half]), graded(1 / cells, 0.25, 60, 1.3)
+        grid = Grid()
+        grid.box('quad4', [wide, -deep[::-1]], lambda x: x, 'low', {'y0': 'bottom', 'y1': 'lower'})
+        grid.box('quad4', [wide, deep], lambda x: x, 'high', {'y0': 'upper', 'y1': 'top'})
+        rows = self.history(self.scene(CATTANEO % (mu, *slips), grid))
+        steps = [read_step(self.path('out.h5'), k) for k in range(4)]
+        return rows, steps
+
+    def compare(self, what, mu, step, row, cells, exact, stick):
+        """Tractions in mu p0, and the edge of the zone `stick` in elements; a and p0 follow from P."""
+        slave = (step['nodes/contact_pressure'][:, 0] > 0) & (step['mesh/xyz'][:, 1] >= 0)
+        P, R, E = row['P'], 100, 1000 / (1 - 0.09) / 2
+        a = np.sqrt(4 * P * R / (np.pi * E))
+        x, q = step['mesh/xyz'][slave, 0], -step['nodes/contact_traction'][slave, 0]
+        inside = abs(x) < a
+        error = q[inside] - exact(x[inside], a, abs(row['Q']) / (mu * P), mu * 2 * P / (np.pi * a))
+        self.row(f'{what}: rms error of the traction over mu p0', np.sqrt(np.mean(error**2)) / (mu * 2 * P / (np.pi * a)), 0, 0.01)
+        still = abs(x[step['nodes/contact_state'][slave, 0] == 1]).max(initial=0)
+        self.row(f'{what}: error of the stick zone in elements', abs(still - stick(a)) * cells, 0, 1)
+
+    def test_cattaneo(self):
+        """Loading, and unloading from there."""
+        mu, cells = 0.4, 40
+        rows, steps = self.cattaneo(mu, cells, (0.0105, 0.0045))
+        root = lambda x, c: np.sqrt(np.maximum(c**2 - x**2, 0))
+        s = abs(rows[2]['Q']) / (mu * rows[2]['P'])
+        self.assertTrue(0.3 < s < 0.9, s)
+        self.compare('Cattaneo', mu, steps[2], rows[2], cells, lambda x, a, s, q: q * (root(x, a) - root(x, a * np.sqrt(1 - s))) / a,
+                     lambda a: a * np.sqrt(1 - s))
+        back = s - abs(rows[3]['Q']) / (mu * rows[3]['P'])
+        self.assertTrue(0.2 < back < 1.5, back)
+        self.compare('Cattaneo, unloading', mu, steps[3], rows[3], cells, lambda x, a, now, q: q * (
+            -root(x, a) + 2 * root(x, a * np.sqrt(1 - (s - now) / 2)) - root(x, a * np.sqrt(1 - s))) / a,
+                     lambda a: a * np.sqrt(1 - back / 2))
+
+    def spence(self, mu, cells):
+        """The outermost node that sticks, over the half-width."""
+        inner = 1 - graded(1 / (4 * cells), 0.25, 1, 1.15)[::-1]
+        outer = 1 + graded(1 / (4 * cells), 0.25, 99, 1.25)[1:]
+        grid = Grid()
+        grid.box('quad4', [np.concatenate([inner, outer]), -graded(1 / (2 * cells), 0.25, 100, 1.2)[::-1]], lambda x: x, 'block',
+                 {'x0': 'axis', 'y0': 'bottom', 'y1': ('punch', len(inner) - 1)})
+        self.history(self.scene(SPENCE % mu, grid))
+        step = read_step(self.path('out.h5'), 1)
+        return step['mesh/xyz'][step['nodes/contact_state'][:, 0] == 1, 0].max(initial=0), np.diff(inner).max()
+
+    def test_spence(self):
+        """The zone's edge within an element."""
+        beta = (1 - 2 * 0.3) / (2 * (1 - 0.3))
+        for share, stick in ((0.6, 0.287), (1.0, 0.707)):
+            found, element = self.spence(share * beta, 40)
+            self.row(f'Spence, mu/beta = {share}: error of the stick zone in elements', abs(found - stick) / element, 0, 1)
+
+    def test_without(self):
+        """mu = 0 is not what the tests above expect."""
+        rows = self.pad(0)
+        self.assertEqual(rows[3]['T'], 0)
+        self.assertEqual(rows[3]['W'], 0)
+        self.near(self.incline(0), np.tan(0.3), 1e-6)
+        rows, _ = self.cattaneo(0, 5, (0.0105, 0.0045))
+        self.assertEqual(rows[2]['Q'], 0)
+        self.assertEqual(self.spence(0, 10)[0], 0)
+
+
+if __name__ == '__main__':
+    unittest.main()
