@@ -99,6 +99,24 @@ class Bodies(Case):
         self.assertLess(np.abs(u[0][on] - u[1][on]).max(), 1e-12 * np.abs(u[1]).max())
         self.assertLess(np.abs(force[0].sum(axis=0)).max(), 1e-12 * np.abs(force[0]).sum())  # both sides of the pair
 
+    def test_older_file(self):
+        """A file in which the fields' responses lie by mode, not by surface unknown, predicts the same."""
+        self.hyco('train', '-scene', HERTZ, *TYPE, '-scatter', '2', '-model', 'new.h5', '-hyco_bodies_tol', '1e-3')
+        shutil.copy(self.path('new.h5'), self.path('old.h5'))
+        samples = []
+        with h5py.File(self.path('old.h5'), 'r+') as f:
+            del f['sealed']
+            for body in (g for name, g in f['bodies'].items() if name.startswith('body_')):
+                n = body['C'].shape[1]
+                H = body['responses'][:].reshape(-1, n, body['responses'].shape[1])
+                samples.append(H.shape[0])
+                del body['responses']
+                body['H'] = H.transpose(0, 2, 1).reshape(-1, n)
+        self.assertGreater(max(samples), 1)
+        new, old = (self.hyco('predict', '-model', name, '-mu', '0.06,1.1,10.3') for name in ('new.h5', 'old.h5'))
+        for name in ('rid_u_norm2', 'total_contact_force', 'rid_u_min', 'rid_u_max'):
+            self.assertEqual(old[name], new[name], name)
+
     def test_outputs(self):
         """Outputs on surfaces, of the hottest cell, and of supports beside a spring are those of full order with any modes; so are stresses."""
         outputs = '''output:

@@ -79,6 +79,30 @@ static const char *At(PetscInt k, const char name[], char path[64])
   return path;
 }
 
+/* H of body k, by surface unknown. Older files have its transpose in each sample, as the dataset H. */
+static PetscErrorCode MoveResponses(HycoH5 h, HycoSubstructure *s, PetscInt k, PetscInt columns)
+{
+  PetscInt rows = s->n_samples * s->n, old = s->n_samples * columns;
+  PetscReal *H = NULL;
+  char path[64];
+
+  PetscFunctionBegin;
+  if (!HycoH5Reads(h) || !HycoH5Has(h, At(k, "H", path))) {
+    PetscCall(HycoH5Real(h, At(k, "responses", path), &rows, columns, &s->H));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(HycoH5Real(h, path, &old, s->n, &H));
+  PetscCall(PetscMalloc1((size_t)rows * (size_t)columns + 1, &s->H));
+  for (PetscInt i = 0; i < old; i++) {
+    const size_t sample = (size_t)(i / columns) * (size_t)s->n * (size_t)columns, column = (size_t)(i % columns);
+
+    for (PetscInt j = 0; j < s->n; j++)
+      s->H[sample + (size_t)j * (size_t)columns + column] = H[(size_t)i * (size_t)s->n + (size_t)j];
+  }
+  PetscCall(PetscFree(H));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The blocks of body k. */
 static PetscErrorCode MoveBody(HycoH5 h, HycoSubstructures b, PetscInt k)
 {
@@ -98,7 +122,7 @@ static PetscErrorCode MoveBody(HycoH5 h, HycoSubstructures b, PetscInt k)
   PetscCall(HycoH5Real(h, At(k, "work", path), &columns, b->r, &s->work));
   PetscCall(HycoH5Real(h, At(k, "gram", path), &b->r, b->r, &s->gram));
   columns = (b->turn_start[k + 1] - b->turn_start[k]) * s->l + s->m;
-  PetscCall(HycoH5Real(h, At(k, "responses", path), &rows, columns, &s->H));
+  PetscCall(MoveResponses(h, s, k, columns));
   rows = s->n_samples * columns;
   PetscCall(HycoH5Real(h, At(k, "a", path), &rows, b->r, &s->a));
   PetscCall(HycoH5Real(h, At(k, "g", path), &rows, b->p, &s->g));
