@@ -40,6 +40,7 @@ static const Column columns[] = {
     ON_RID("inelastic", inelastic),
     BOTH("residual", residual, PETSC_FALSE),
     BOTH("kkt_max", kkt, PETSC_FALSE),
+    FULL_ONLY("sliding", sliding, PETSC_FALSE),
     FULL_ONLY("work", work, PETSC_FALSE),
     FULL_ONLY("contact_work", contact_work, PETSC_FALSE),
     FULL_ONLY("stored", stored, PETSC_FALSE),

@@ -38,8 +38,9 @@ static const Member member[] = {INT(index),          REAL(t),
                                 REAL(seconds),       REAL(seconds_factor),
                                 REAL(seconds_solve), REAL(seconds_law)};
 /* Behind the quantities: what older checkpoints do not have. */
-static const Member later[] = {INT(linear_iterations), INT(most_linear_iterations), REAL(friction_work),
-                               INT(n_slipping), INT(disproven)};
+static const Member later[] = {INT(linear_iterations), INT(most_linear_iterations),
+                               REAL(friction_work),    INT(n_slipping),
+                               INT(disproven),         REAL(sliding)};
 #define N_MEMBERS ((PetscInt)(sizeof(member) / sizeof(member[0])))
 #define N_LATER   ((PetscInt)(sizeof(later) / sizeof(later[0])))
 

@@ -302,6 +302,19 @@ static PetscErrorCode MeasureContacts(HycoFOM f, HycoStep *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* After HycoFOMGather(). Collective. */
+static PetscErrorCode MeasureSliding(HycoFOM f, PetscReal *sliding)
+{
+  HycoContactState state = {0};
+
+  PetscFunctionBegin;
+  if (f->n_contacts)
+    HycoOnEach(HycoComm(f), HycoContactMeasure(f->fe_surface, &f->pairs, f->u_surface, f->lambda, NULL, &state));
+  *sliding = state.sliding;
+  HycoAllreduce(sliding, 1, MPIU_REAL, MPI_MAX, HycoComm(f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Records a listed time. Energies are those since the start. */
 static PetscErrorCode Record(HycoPath p)
 {
@@ -321,6 +334,7 @@ static PetscErrorCode Record(HycoPath p)
   PetscCall(HycoFOMGather(f));
   f->solved = PETSC_TRUE;
   f->sigma_ready = f->all_ready = PETSC_FALSE;
+  PetscCall(MeasureSliding(f, &s->sliding));
   PetscCall(HycoFOMMeasureQuantities(f, s->quantity));
   p->steps[p->n_steps++] = *s;
   PetscCall(PetscMemzero(&p->now, sizeof(p->now)));

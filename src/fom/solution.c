@@ -171,6 +171,8 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
   if (s->reason > 0 && !f->path && !f->given) PetscCall(HycoFOMNameLoose(f, why));
   PetscCall(PetscStrncpy(s->loose, why, sizeof(s->loose)));
   PetscCall(MeasureContacts(f, s));
+  for (PetscInt k = 0; f->path && k < f->path->n_steps; k++)
+    s->sliding = PetscMax(s->sliding, f->path->steps[k].sliding); /* contacts may be open at the end */
   if (s->reason > 0 && f->n_contacts) PetscCall(HycoFOMCountDependent(f, &s->n_dependent));
   PetscCall(HycoFOMMeasureQuantities(f, s->quantity));
   PetscCallMPI(MPI_Bcast(s, sizeof(*s), MPI_BYTE, 0, HycoComm(f)));

@@ -132,6 +132,22 @@ class FullOrder(Moved):
         run = self.run_raw('solve', '-scene', 'push.yaml', '-mu', f'1,{POINT}', '-report', 'r.json')
         self.assertIn('LARGE SLIDING: a closed contact moves by 2.', run.stdout)
 
+    def test_sliding_path(self):
+        """A cylinder that is pushed along and then lifted: the path has slid, although no contact is closed at its end."""
+        scene(self.path('lift.yaml'), 'm.msh', moved=False, push='1.1*q')
+        with open(self.path('lift.yaml'), encoding='ascii') as file:
+            text = file.read().replace('-press', '-press*(2*q - 1)')
+        with open(self.path('lift.yaml'), 'w', encoding='ascii') as file:
+            file.write(text + 'history: {times: [0, 1, 2], tables: {q: [[0, 0.5], [1, 1], [2, 0]]}}\n')
+        run = self.run_raw('solve', '-scene', 'lift.yaml', '-mu', f'1,{POINT}', '-report', 'r.json', '-table', 't.csv')
+        with open(self.path('t.csv'), encoding='ascii') as file:
+            head, *rows = (line.strip().split(',') for line in file)
+        slid = [float(row[head.index('sliding')]) for row in rows]
+        self.assertEqual(float(rows[-1][head.index('n_active')]), 0)
+        self.assertEqual(slid[-1], 0)
+        self.assertGreater(max(slid), 2)
+        self.assertIn('LARGE SLIDING: a closed contact moves by 2.', run.stdout)
+
 
 class Reduced(Moved):
     TRAIN = ('-values_place', '-3,0.2,2.6', '-values_press', '0.3,0.9', '-values_modulus', '10')
