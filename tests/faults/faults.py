@@ -96,7 +96,7 @@ CASES = [
     (['solve', *R, '-body_rope_young', '-3'], "Young's modulus must be positive"),
     (['solve', *P, '-body_pellet_young', 'x-4'], "Young's modulus must be positive"),
     (['solve', *P, '-body_pellet_poisson', '0.5'], "Poisson's ratio must lie between -1 and 0.5"),
-    (['solve', *R, '-contact_ground_type', 'wall'], 'it must be obstacle, pair, rigid or surface'),
+    (['solve', *R, '-contact_ground_type', 'wall'], 'it must be mortar, obstacle, pair, rigid or surface'),
     # parameters
     (['solve', '-scene', ROPE, '-mu', '0.04,0.17'], 'mu1 = 0.04 lies outside its range [0.05, 0.25]'),
     (['solve', '-scene', ROPE, '-mu', '0.07'], '-mu has 1 values; the scene has 2 parameters: mu1,mu2'),

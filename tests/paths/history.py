@@ -113,7 +113,7 @@ class History(Case):
 
     def test_series_and_table(self):
         """The series of fields of a path and its table have the report's numbers."""
-        report, fields = self.ring('series', '-table', self.path('t.csv'))
+        report, fields = self.ring('series', '-table', self.path('t.csv'), '-output_mises_max', 'sigma_xx')
         grids = ET.parse(self.path('series.xdmf')).getroot().findall('.//Grid[@CollectionType="Temporal"]/Grid')
         self.assertEqual([float(g.find('Time').get('Value')) for g in grids], [0, 1, 3, 8])
         names = {a.get('Name') for a in grids[-1].findall('Attribute')}
@@ -125,6 +125,8 @@ class History(Case):
         with open(self.path('t.csv'), encoding='utf-8') as f:
             rows = list(csv.DictReader(f))
         self.assertEqual([float(r['t']) for r in rows], [0, 1, 3, 8])
+        self.near(float(rows[-1]['mises']), report['history']['mises'][-1], 1e-6)  # an output of the same name has a column of its own
+        self.near(float(rows[-1]['output.mises']), report['history']['outputs']['mises'][-1], 1e-6)
         self.assertAlmostEqual(float(rows[-1]['total_contact_force']), report['total_contact_force'], places=5)
         self.near(fields['step-0003/cells/inelastic'].max(), report['history']['inelastic'][-1], 1e-12)
 
