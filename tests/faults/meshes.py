@@ -211,7 +211,7 @@ SCENES = [
     (('floor:', 'flor:'), 'did you mean floor?'),
     (('slave: over', 'slave: oven'), 'did you mean over?'),
     (('slave: over', 'slave: under'), 'the two surfaces must not share nodes'),
-    (('type: pair', 'type: glue'), 'it must be obstacle, pair, rigid or surface'),
+    (('type: pair', 'type: glue'), 'it must be mortar, obstacle, pair, rigid or surface'),
     (('range: [0.001, 0.1]', 'range: [1, 0]'), 'its range is missing or wrong'),
     (('range: [0.001, 0.1]', 'range: [a, 1]'), 'its range is missing or wrong'),
     (('range: [0.001, 0.1]', 'range: [1]'), 'its range is missing or wrong'),

@@ -20,10 +20,10 @@ TOOLS = {
 
 
 class Setup(unittest.TestCase):
-    def run_setup(self, missing, *args):
-        """Status, what it said, whether apt-get was called."""
+    def run_setup(self, missing, *args, **other):
+        """Status, what it said, whether apt-get was called; other: stand-ins in place of those above."""
         with tempfile.TemporaryDirectory() as folder:
-            for name, text in TOOLS.items():
+            for name, text in {**TOOLS, **other}.items():
                 path = os.path.join(folder, name)
                 with open(path, 'w', encoding='ascii') as file:
                     file.write(f'#!/bin/sh\n{text}\n')
@@ -41,6 +41,14 @@ class Setup(unittest.TestCase):
                 self.assertEqual((code, called), (status, False), text)
                 for name in missing.split():
                     self.assertRegex(text, rf'apt-get install --no-install-recommends.* {name}\b')
+
+    def test_peers(self):
+        """Other programs are installed where the release has them; one that it does not have is no error."""
+        policy = 'case "$2" in calculix-ccx) echo "  Candidate: (none)" ;; *) echo "  Candidate: 1.0" ;; esac'
+        code, text, _ = self.run_setup('calculix-ccx python3-scipy', **{'apt-cache': policy})
+        self.assertEqual(code, 0, text)
+        self.assertRegex(text, r'apt-get install --no-install-recommends.* python3-scipy\b')
+        self.assertNotIn('calculix-ccx', text)
 
     def test_groups(self):
         """A group of packages alone is checked; an unknown one is refused."""
