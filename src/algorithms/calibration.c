@@ -29,7 +29,7 @@ static PetscErrorCode Fit(PetscInt n, PetscInt p, const PetscReal X[], const Pet
       A[j * rows + i] = X[i * p + j] - at;
       square += A[j * rows + i] * A[j * rows + i];
     }
-    if (square < CONSTANT * CONSTANT * n) PetscCall(PetscArrayzero(A + j * rows, n));
+    if (n > 0 && square < CONSTANT * CONSTANT * n) PetscCall(PetscArrayzero(A + j * rows, n)); /* gcc 14: n < 0 */
     A[j * rows + n + j] = PetscSqrtReal(RIDGE * square);
   }
   PetscCall(HycoNNLS(rows, p, A, b, c, &residual));

@@ -8,6 +8,9 @@
 #include <petscviewer.h>
 #include <string.h>
 
+/* The estimate of u over what the modes miss at the checks: a response that no sample has is missed ten times as much as the
+   worst of some tens of points. */
+#define BEYOND   10
 #define ROUNDING 1e-10 /* relative, of exact results */
 #define ACTIVE   0.3   /* assumed share of closed contacts, and entries of a row of B, for costs */
 #define ENTRIES  15
@@ -150,7 +153,7 @@ static PetscErrorCode Estimate(HycoROM m, HycoPrediction *p)
   p->estimated_error_lambda = PetscMax(p->interpolation_error, ROUNDING);
   if (b->n_theta && !m->model->estimates.n) /* errors of interpolated displacements are not known */
     PetscFunctionReturn(PETSC_SUCCESS);
-  p->estimated_error_u = PetscMax(3 * b->left, ROUNDING);
+  p->estimated_error_u = PetscMax(BEYOND * b->left, ROUNDING);
   if (b->ni && !b->n_theta) p->estimated_error_sigma = ROUNDING;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

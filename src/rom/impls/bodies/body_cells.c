@@ -9,7 +9,6 @@
 
 #define MOST_INNER   2400 /* unknowns: a row and a solve each */
 #define MOST_NUMBERS 6e6  /* of their rows in the file */
-#define HOTTEST      0.5  /* share of this room for cells that no output needs */
 #define LEAST_SCORE  0.1
 
 PetscErrorCode HycoBodiesAddScores(HycoReducer t, HycoBodiesFactor *factor, const PetscReal u[])
@@ -50,10 +49,10 @@ PetscErrorCode HycoBodiesAddScores(HycoReducer t, HycoBodiesFactor *factor, cons
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* inner[n_dof]: the free unknowns of the cells in[] that are not on the surfaces; *fits: their rows have room in this
-   share of it. Collective. */
-static PetscErrorCode MarkInner(HycoReducer t, HycoBodiesFactor *factor, const PetscBool in[], PetscReal share,
-                                PetscBool inner[], PetscBool *fits)
+/* inner[n_dof]: the free unknowns of the cells in[] that are not on the surfaces; *fits: there is room for their rows.
+   Collective. */
+static PetscErrorCode MarkInner(HycoReducer t, HycoBodiesFactor *factor, const PetscBool in[], PetscBool inner[],
+                                PetscBool *fits)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   HycoFE fe = factor->fom->fe;
@@ -75,20 +74,20 @@ static PetscErrorCode MarkInner(HycoReducer t, HycoBodiesFactor *factor, const P
     rows += n[k];
     numbers += n[k] * b->body[k].n * b->body[k].n_samples;
   }
-  *fits = (PetscBool)(rows <= share * MOST_INNER && numbers <= share * MOST_NUMBERS);
+  *fits = (PetscBool)(rows <= MOST_INNER && numbers <= MOST_NUMBERS);
   PetscCall(PetscFree(n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Joins more[] to in[], if there is room. Collective. */
-static PetscErrorCode Join(HycoReducer t, HycoBodiesFactor *factor, PetscBool in[], PetscBool more[], PetscReal share,
-                           PetscBool inner[], PetscBool *fits)
+static PetscErrorCode Join(HycoReducer t, HycoBodiesFactor *factor, PetscBool in[], PetscBool more[], PetscBool inner[],
+                           PetscBool *fits)
 {
   const PetscInt n = factor->fom->part->n_cells;
 
   PetscFunctionBegin;
   for (PetscInt e = 0; e < n; e++) more[e] = (PetscBool)(more[e] || in[e]);
-  PetscCall(MarkInner(t, factor, more, share, inner, fits));
+  PetscCall(MarkInner(t, factor, more, inner, fits));
   if (*fits) PetscCall(PetscArraycpy(in, more, n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -103,12 +102,12 @@ static PetscErrorCode Choose(HycoReducer t, HycoBodiesFactor *factor, PetscBool 
   PetscCall(PetscMalloc1(m->n_cells + 1, &more));
   for (PetscInt k = 0; k < t->scene->n_quantities; k++) {
     HycoOnEach(HycoComm(t), HycoQuantityMarkCells(t->scene, m, k, more));
-    PetscCall(Join(t, factor, in, more, 1, inner, &fits));
+    PetscCall(Join(t, factor, in, more, inner, &fits));
   }
   fits = PETSC_TRUE;
   for (PetscReal least = 0.9; fits && least > LEAST_SCORE; least -= 0.1) {
     for (PetscInt e = 0; e < m->n_cells; e++) more[e] = (PetscBool)(factor->score[e] > least);
-    PetscCall(Join(t, factor, in, more, HOTTEST, inner, &fits));
+    PetscCall(Join(t, factor, in, more, inner, &fits));
   }
   PetscCall(PetscFree(more));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -273,7 +272,7 @@ PetscErrorCode HycoBodiesChooseCells(HycoReducer t, HycoBodiesFactor *factor)
   PetscCall(MarkSurfaces(t, factor));
   PetscCall(Choose(t, factor, in, inner));
   PetscCall(ShareCells(t, factor->fom->part, in));
-  PetscCall(MarkInner(t, factor, in, 1, inner, &fits));
+  PetscCall(MarkInner(t, factor, in, inner, &fits));
   PetscCall(AnyLeft(t, fe, factor->known, inner, &left));
   if (!fits) PetscCall(PetscArrayzero(inner, fe->n_dof)); /* of the cell that stands for none */
   if (fits && !left) PetscCall(Release(t, factor, inner, &released));

@@ -17,7 +17,7 @@
 #define SMALL        1e-7 /* of the largest sample: smaller ones count as much as this */
 #define SCORED       24   /* displacements at all nodes of theta whose stresses show which cells matter */
 #define MANY         64   /* right-hand sides at once */
-#define CHECKS       16   /* points at which the displacements that the modes miss are measured, no samples */
+#define CHECKS       32   /* points at which the displacements that the modes miss are measured, no samples */
 
 /* Samples: the loads' coefficients and the surfaces' forces, a column each; the last n_checks are
    checks. */
