@@ -758,6 +758,7 @@ static PetscErrorCode Wants(Search *s, const HycoROM type, PetscBool *wanted)
 
 static PetscErrorCode TryType(Search *s, const char name[], PetscBool own)
 {
+  const PetscReal budget = s->budget, spent = s->spent;
   HycoROM type;
   PetscBool met, wanted;
 
@@ -770,7 +771,12 @@ static PetscErrorCode TryType(Search *s, const char name[], PetscBool own)
   if (wanted && type->model->traits.settings == HYCO_SETTINGS_RID) PetscCall(TryHybrids(s, type));
   if (wanted && type->model->traits.settings == HYCO_SETTINGS_MODES)
     PetscCall(TrySizes(s, type, HYCO_HYBRID_AUTO, &met));
-  if (wanted && type->model->traits.own_modes) s->n_own = s->n;
+  if (wanted && type->model->traits.own_modes) {
+    s->n_own = s->n;
+    s->budget = budget + s->spent - spent; /* the other types, which may be the accurate ones, keep theirs */
+    s->n_models = 0;
+    s->ended = PETSC_FALSE;
+  }
   PetscCall(HycoROMDestroy(&type));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
