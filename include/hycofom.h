@@ -73,7 +73,7 @@ typedef struct {
                                                                 dissipated; given to heat and to moduli that change */
   PetscReal energy_defect; /* largest of the substeps: of their balance, over the sum of the terms' sizes so far */
   PetscReal seconds, seconds_factor, seconds_solve, seconds_law;
-  PetscReal sliding;       /* as in HycoSummary; of a reduced model 0 */
+  PetscReal sliding;                       /* as in HycoSummary; of a reduced model 0 */
   PetscReal friction_work;                 /* dissipated by friction since the start, a part of contact_work; >= 0 */
   PetscInt n_slipping;                     /* closed contacts with friction that slip */
   PetscInt disproven;                      /* substeps in which a determinant proves that there are further solutions */

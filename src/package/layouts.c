@@ -34,8 +34,9 @@ static const HycoMember summary[] = {
 static const HycoMember step[] = {
   F(index), F(t), F(substeps), F(cuts), F(iterations), F(most_iterations), F(factors), F(active_set_iterations),
   F(linear_iterations), F(most_linear_iterations), F(n_active), F(total_contact_force), F(lambda_max), F(u_norm2),
-  F(mises), F(inelastic), F(residual), F(kkt), F(sliding), F(friction_work), F(n_slipping), F(disproven), F(work), F(contact_work), F(stored), F(dissipated), F(thermal),
-  F(energy_defect), F(seconds), F(seconds_factor), F(seconds_solve), F(seconds_law), F(quantity)};
+  F(mises), F(inelastic), F(residual), F(kkt), F(work), F(contact_work), F(stored), F(dissipated), F(thermal),
+  F(energy_defect), F(seconds), F(seconds_factor), F(seconds_solve), F(seconds_law), F(sliding),
+  F(friction_work), F(n_slipping), F(disproven), F(quantity)};
 #undef F
 
 #define F(member) FIELD(HycoHistory, member)
