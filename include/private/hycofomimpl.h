@@ -68,8 +68,8 @@ struct _p_HycoFOM {
   PetscInt n_pins, n_released, pin_tag[HYCO_MAX_PINS], pin_component[HYCO_MAX_PINS];
   PetscInt n_turned; /* number of released motions for which the contacts' normals are turned */
   Vec *released;
-  HycoPath path;         /* of a scene with a history, else NULL */
-  HycoFriction friction; /* of a scene with friction, else NULL */
+  HycoPath path;              /* of a scene with a history, else NULL */
+  HycoFriction friction;      /* of a scene with friction, else NULL */
   HycoGradientStore gradient; /* of HycoFOMGetGradient() */
   HycoSummary summary;
 };

@@ -32,6 +32,8 @@ void HycoDifferenceShrink(HycoDifference *difference);
    by the round-off of values of this size. */
 PetscReal HycoDifferenceJump(const HycoDifference *difference, PetscReal size, PetscReal slope,
                              const PetscReal value[3]);
+/* Whether such a jump is a kink, and not curvature: it stays at a quarter of the step, with the values `closer`. */
+PetscBool HycoDifferenceKinks(const HycoDifference *difference, PetscReal jump, const PetscReal closer[3]);
 
 /* Allocates for the scene's outputs and parameters. */
 PetscErrorCode HycoGradientCreate(HycoScene scene, HycoGradientStore *store, HycoGradient *gradient);

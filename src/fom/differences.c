@@ -1,9 +1,10 @@
 /* Differences of data along a parameter, and the gradients that they give. */
 #include <hycogradient.h>
 
-#define STEP  3e-5 /* share of the range: the error of the central difference is about 1e-9, that of round-off less */
-#define KINK  1e-3 /* share of a slope by which those to the two sides differ, if it is no curvature */
-#define STAYS 0.5  /* share of that difference which remains at a quarter of the step */
+#define STEP 3e-5 /* share of the range: the error of the central difference is about 1e-9, that of round-off less */
+#define KINK 1e-3 /* share of a slope by which those to the two sides differ, if it is no curvature */
+#define STAYS                                                                                                          \
+  0.5 /* share of that difference which remains at a quarter of the step, where curvature leaves a quarter */
 #define ROUND 1e-9 /* share of a value below which a difference may be round-off */
 
 PetscErrorCode HycoGradientCheckScene(HycoScene s)
@@ -49,14 +50,33 @@ void HycoDifferenceShrink(HycoDifference *d)
   }
 }
 
+/* The slopes to the two sides, or of the two parts of a one-sided difference. */
+static void Slopes(const HycoDifference *d, const PetscReal v[3], PetscReal slope[2])
+{
+  const PetscReal *s = d->step;
+
+  slope[0] = (v[1] - v[0]) / (s[1] - s[0]);
+  slope[1] = s[2] * s[1] < 0 ? (v[0] - v[2]) / (s[0] - s[2]) : (v[2] - v[1]) / (s[2] - s[1]);
+}
+
 PetscReal HycoDifferenceJump(const HycoDifference *d, PetscReal size, PetscReal slope, const PetscReal v[3])
 {
-  const PetscReal *s = d->step, first = (v[1] - v[0]) / (s[1] - s[0]);
-  const PetscReal other = s[2] * s[1] < 0 ? (v[0] - v[2]) / (s[0] - s[2]) : (v[2] - v[1]) / (s[2] - s[1]);
-  const PetscReal jump = PetscAbsReal(first - other);
+  PetscReal s[2], jump;
 
-  if (slope <= 0) slope = PetscMax(PetscAbsReal(first), PetscAbsReal(other));
-  return jump > KINK * slope && jump * PetscAbsReal(s[1]) > ROUND * size ? jump : 0;
+  Slopes(d, v, s);
+  jump = PetscAbsReal(s[0] - s[1]);
+  if (slope <= 0) slope = PetscMax(PetscAbsReal(s[0]), PetscAbsReal(s[1]));
+  return jump > KINK * slope && jump * PetscAbsReal(d->step[1]) > ROUND * size ? jump : 0;
+}
+
+PetscBool HycoDifferenceKinks(const HycoDifference *d, PetscReal jump, const PetscReal closer[3])
+{
+  HycoDifference near = *d;
+  PetscReal s[2];
+
+  HycoDifferenceShrink(&near);
+  Slopes(&near, closer, s);
+  return (PetscBool)(jump > 0 && PetscAbsReal(s[0] - s[1]) > STAYS * jump);
 }
 
 PetscErrorCode HycoGradientCreate(HycoScene scene, HycoGradientStore *store, HycoGradient *g)
@@ -101,18 +121,19 @@ PetscBool HycoGradientNeedsCloser(const HycoGradient *g, const HycoDifference *d
 void HycoGradientSet(HycoGradient *g, HycoGradientStore *store, const HycoDifference *d, const PetscReal value[],
                      const PetscReal closer[], PetscBool kink)
 {
-  HycoDifference near = *d;
+  const PetscInt n = g->n_outputs;
 
-  HycoDifferenceShrink(&near);
-  for (PetscInt q = 0; q < g->n_outputs; q++) {
+  for (PetscInt q = 0; q < n; q++) {
     const PetscInt at = q * g->n_parameters + d->parameter;
-    const PetscReal jump = Jump(g, d, value, q); /* of curvature it is a quarter with a quarter of the step */
-    const PetscBool turns = (PetscBool)(jump > 0 && closer && Jump(g, &near, closer, q) > STAYS * jump);
     HycoDifference side = *d;
+    PetscBool turns = PETSC_FALSE;
 
+    if (closer)
+      turns = HycoDifferenceKinks(d, Jump(g, d, value, q),
+                                  (const PetscReal[]){closer[q], closer[n + q], closer[2 * n + q]});
     if (turns) HycoDifferenceTakeSide(&side);
     store->value[at] = 0;
-    for (PetscInt k = 0; k < 3; k++) store->value[at] += side.weight[k] * value[k * g->n_outputs + q];
+    for (PetscInt k = 0; k < 3; k++) store->value[at] += side.weight[k] * value[k * n + q];
     store->kink[at] = (PetscBool)(kink || turns);
   }
 }

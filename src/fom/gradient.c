@@ -15,10 +15,11 @@ typedef struct {
   HycoGradientStore *store;
   PetscReal mu[HYCO_MAX_PARAMETERS];
   HycoSolverTangent tangent;
-  Vec U, L, r, g, dU, dL, R[3], W[3]; /* the solution; changes of the data, of the solution; the data at three points */
-  PetscReal size;                     /* of gaps and displacements of the contacts */
-  PetscReal *output;                  /* 6 x n_outputs: at the three points, at closer ones */
-  PetscBool stress;                   /* the caller may hold the stresses */
+  Vec U, L, r, g, dU, dL; /* the solution; changes of the data, of the solution */
+  Vec R[3], W[5];         /* the data at the three points, and at closer ones */
+  PetscReal size;         /* of gaps and displacements of the contacts */
+  PetscReal *output;      /* 6 x n_outputs: at the three points, at closer ones */
+  PetscBool stress;       /* the caller may hold the stresses */
 } Work;
 
 /* Subtracts B^T L from the imbalance at this rank's surface nodes, and sets the gaps w = D - B U. */
@@ -122,30 +123,52 @@ static PetscErrorCode Measure(Work *o, const PetscReal mu[], PetscReal step, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the gap of a closed contact has different slopes to the two sides: its master changes. Collective. */
-static PetscErrorCode Turns(Work *o, const HycoDifference *d, PetscBool *turns)
+/* Whether the gap of a closed contact has different slopes to the two sides: its master changes. closer: the gaps
+   nearer to mu are known too; otherwise *turns may be curvature. Collective. */
+static PetscErrorCode Turns(Work *o, const HycoDifference *d, PetscBool closer, PetscBool *turns)
 {
   HycoFOM f = o->f;
-  const PetscScalar *w[3], *L;
+  const PetscScalar *w[5], *L;
   PetscReal most, slope = 0;
 
   PetscFunctionBegin;
   *turns = PETSC_FALSE;
   PetscCall(VecMax(o->L, NULL, &most));
   PetscCall(VecGetArrayRead(o->L, &L));
-  for (PetscInt j = 0; j < 3; j++) PetscCall(VecGetArrayRead(o->W[j], &w[j]));
+  for (PetscInt j = 0; j < 5; j++) PetscCall(VecGetArrayRead(o->W[j], &w[j]));
   for (PetscInt k = 0; k < f->pairs.n; k++) {
     if (L[k] > HYCO_GRADIENT_FORCE * most) slope = PetscMax(slope, PetscAbsReal((w[1][k] - w[0][k]) / d->step[1]));
   }
   HycoAllreduce(&slope, 1, MPIU_REAL, MPI_MAX, HycoComm(f));
   for (PetscInt k = 0; k < f->pairs.n; k++) {
-    const PetscReal v[3] = {w[0][k], w[1][k], w[2][k]};
+    const PetscReal v[3] = {w[0][k], w[1][k], w[2][k]}, near[3] = {w[0][k], w[3][k], w[4][k]};
+    PetscReal jump;
 
-    if (L[k] > HYCO_GRADIENT_FORCE * most && HycoDifferenceJump(d, o->size, slope, v) > 0) *turns = PETSC_TRUE;
+    if (L[k] <= HYCO_GRADIENT_FORCE * most) continue;
+    jump = HycoDifferenceJump(d, o->size, slope, v);
+    *turns = (PetscBool)(*turns || (closer ? HycoDifferenceKinks(d, jump, near) : jump > 0));
   }
-  for (PetscInt j = 0; j < 3; j++) PetscCall(VecRestoreArrayRead(o->W[j], &w[j]));
+  for (PetscInt j = 0; j < 5; j++) PetscCall(VecRestoreArrayRead(o->W[j], &w[j]));
   PetscCall(VecRestoreArrayRead(o->L, &L));
   HycoAllreduce(turns, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The same, with the gaps nearer to mu only where they are needed. Collective. */
+static PetscErrorCode FindTurns(Work *o, const HycoDifference *d, PetscBool *turns)
+{
+  HycoDifference near = *d;
+  PetscReal at[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  PetscCall(Turns(o, d, PETSC_FALSE, turns));
+  if (!*turns) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoDifferenceShrink(&near);
+  for (PetscInt j = 1; j < 3; j++) {
+    HycoDifferencePoint(&near, o->f->scene, o->mu, j, at);
+    PetscCall(Data(o, at, o->dU, o->W[2 + j]));
+  }
+  PetscCall(Turns(o, d, PETSC_TRUE, turns));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -161,7 +184,7 @@ static PetscErrorCode Differentiate(Work *o, HycoDifference *d, PetscBool *turns
     HycoDifferencePoint(d, f->scene, o->mu, j, at);
     PetscCall(Data(o, at, o->R[j], o->W[j]));
   }
-  if (f->n_contacts) PetscCall(Turns(o, d, turns));
+  if (f->n_contacts) PetscCall(FindTurns(o, d, turns));
   if (*turns) HycoDifferenceTakeSide(d);
   PetscCall(VecSet(o->r, 0));
   for (PetscInt j = 0; j < 3; j++) PetscCall(VecAXPY(o->r, -d->weight[j], o->R[j]));
@@ -227,7 +250,7 @@ static PetscErrorCode Create(Work *o)
     PetscCall(VecCopy(f->Lambda, o->L));
     PetscCall(VecDuplicate(f->Lambda, &o->g));
     PetscCall(VecDuplicate(f->Lambda, &o->dL));
-    for (PetscInt j = 0; j < 3; j++) PetscCall(VecDuplicate(f->Lambda, &o->W[j]));
+    for (PetscInt j = 0; j < 5; j++) PetscCall(VecDuplicate(f->Lambda, &o->W[j]));
     PetscCall(VecNorm(f->D, NORM_INFINITY, &d));
     PetscCall(MatMult(f->B, f->U, o->g));
     PetscCall(VecNorm(o->g, NORM_INFINITY, &bu));
@@ -263,7 +286,7 @@ static PetscErrorCode Destroy(Work *o)
   PetscCall(HycoSolverTangentDestroy(&o->tangent));
   PetscCall(PetscFree(o->output));
   for (PetscInt j = 0; j < 3; j++) PetscCall(VecDestroy(&o->R[j]));
-  for (PetscInt j = 0; j < 3; j++) PetscCall(VecDestroy(&o->W[j]));
+  for (PetscInt j = 0; j < 5; j++) PetscCall(VecDestroy(&o->W[j]));
   PetscCall(VecDestroy(&o->U));
   PetscCall(VecDestroy(&o->L));
   PetscCall(VecDestroy(&o->r));

@@ -12,7 +12,7 @@ typedef struct {
   PetscReal mu[HYCO_MAX_PARAMETERS];
   PetscInt p, n, k, *contact; /* unknowns x, contacts; those that are closed or undecided */
   PetscReal *z, *dz, *moved;  /* p + n */
-  PetscReal *w[3];            /* p + n: at the three points */
+  PetscReal *w[5];            /* p + n: at the three points, and at closer ones */
   PetscReal *q, *v;           /* p + k */
   PetscReal size;
   HycoTangent tangent;
@@ -93,7 +93,7 @@ static PetscErrorCode Create(Work *o)
   HycoDuplicate(m->model->pairs.n, m->Lambda, &o->Lambda);
   PetscUseTypeMethod(m, unknowns, &o->p, &o->n, NULL);
   PetscCall(PetscMalloc3(o->p + o->n + 1, &o->z, o->p + o->n + 1, &o->dz, o->p + o->n + 1, &o->moved));
-  PetscCall(PetscMalloc3(o->p + o->n + 1, &o->w[0], o->p + o->n + 1, &o->w[1], o->p + o->n + 1, &o->w[2]));
+  for (PetscInt j = 0; j < 5; j++) PetscCall(PetscMalloc1(o->p + o->n + 1, &o->w[j]));
   PetscCall(PetscMalloc3(o->n + 1, &o->contact, o->p + o->n + 1, &o->q, o->p + o->n + 1, &o->v));
   PetscCall(PetscCalloc1(6 * m->model->scene->n_quantities + 1, &o->output));
   PetscUseTypeMethod(m, unknowns, &o->p, &o->n, o->z);
@@ -113,14 +113,15 @@ static PetscErrorCode Destroy(Work *o)
   PetscFunctionBegin;
   PetscCall(HycoTangentDestroy(&o->tangent));
   PetscCall(PetscFree3(o->z, o->dz, o->moved));
-  PetscCall(PetscFree3(o->w[0], o->w[1], o->w[2]));
+  for (PetscInt j = 0; j < 5; j++) PetscCall(PetscFree(o->w[j]));
   PetscCall(PetscFree3(o->contact, o->q, o->v));
   HycoFreeAll(&o->output, &o->gamma, &o->U, &o->Lambda);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the gap of a closed contact has different slopes to the two sides. */
-static PetscBool Turns(const Work *o, const HycoDifference *d)
+/* Whether the gap of a closed contact has different slopes to the two sides: its master changes. closer: the gaps
+   nearer to mu are known too; otherwise it may be curvature. */
+static PetscBool Turns(const Work *o, const HycoDifference *d, PetscBool closer)
 {
   PetscReal most = 0, slope = 0;
 
@@ -133,11 +134,33 @@ static PetscBool Turns(const Work *o, const HycoDifference *d)
   }
   for (PetscInt j = 0; j < o->k; j++) {
     const PetscInt at = o->p + o->contact[j];
-    const PetscReal v[3] = {o->w[0][at], o->w[1][at], o->w[2][at]};
+    const PetscReal v[3] = {o->w[0][at], o->w[1][at], o->w[2][at]}, near[3] = {o->w[0][at], o->w[3][at], o->w[4][at]};
+    PetscReal jump;
 
-    if (o->z[at] > HYCO_GRADIENT_FORCE * most && HycoDifferenceJump(d, o->size, slope, v) > 0) return PETSC_TRUE;
+    if (o->z[at] <= HYCO_GRADIENT_FORCE * most) continue;
+    jump = HycoDifferenceJump(d, o->size, slope, v);
+    if (closer ? HycoDifferenceKinks(d, jump, near) : jump > 0) return PETSC_TRUE;
   }
   return PETSC_FALSE;
+}
+
+/* The same, with the gaps nearer to mu only where they are needed. */
+static PetscErrorCode FindTurns(Work *o, const HycoDifference *d, PetscBool *turns)
+{
+  HycoROM m = o->m;
+  HycoDifference near = *d;
+  PetscReal at[HYCO_MAX_PARAMETERS], size;
+
+  PetscFunctionBegin;
+  *turns = Turns(o, d, PETSC_FALSE);
+  if (!*turns) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoDifferenceShrink(&near);
+  for (PetscInt j = 1; j < 3; j++) {
+    HycoDifferencePoint(&near, m->model->scene, o->mu, j, at);
+    PetscCall((*m->ops->residual)(m, at, o->z, o->w[2 + j], &size));
+  }
+  *turns = Turns(o, d, PETSC_TRUE);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* dz along the parameter of d. */
@@ -152,7 +175,7 @@ static PetscErrorCode Differentiate(Work *o, HycoDifference *d, PetscBool *kink)
     HycoDifferencePoint(d, m->model->scene, o->mu, j, at);
     PetscCall((*m->ops->residual)(m, at, o->z, o->w[j], &size));
   }
-  turns = Turns(o, d);
+  PetscCall(FindTurns(o, d, &turns));
   if (turns) HycoDifferenceTakeSide(d);
   for (PetscInt i = 0; i < o->p + o->k; i++) {
     const PetscInt row = i < o->p ? i : o->p + o->contact[i - o->p];
