@@ -7,6 +7,7 @@ PetscErrorCode HycoFEDestroy(HycoFE *fe)
 {
   PetscFunctionBegin;
   if (!*fe) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(DMDestroy(&(*fe)->dm));
   PetscCall(HycoAssemblyMapDestroy(&(*fe)->places));
   PetscCall(HycoSpringsDestroy(&(*fe)->springs));
   for (PetscInt k = 0; k < (*fe)->n_loads; k++) {
@@ -112,15 +113,17 @@ static PetscErrorCode ChooseElements(HycoScene scene, HycoMesh mesh, PetscBool b
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Takes references to scene and mesh, which must outlive fe. No parameter is set yet: HycoFESetParameters() follows.
-   Not collective. */
-PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe)
+/* The tables of the DM are made once and kept with it. The scene must outlive fe. No parameter is set yet:
+   HycoFESetParameters() follows. */
+PetscErrorCode HycoFECreate(HycoScene scene, DM dm, HycoFE *fe)
 {
+  HycoMesh mesh;
   PetscBool *bbar;
   PetscErrorCode ierr;
   HycoFE f;
 
   PetscFunctionBegin;
+  PetscCall(HycoMeshOf(dm, scene, &mesh));
   PetscCall(PetscMalloc1(scene->n_bodies, &bbar));
   ierr = ChooseElements(scene, mesh, bbar);
   for (PetscInt b = 0; b < scene->n_bodies && !ierr; b++)
@@ -130,6 +133,8 @@ PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe)
   PetscCall(PetscNew(&f));
   f->bbar = bbar;
   f->scene = scene;
+  PetscCall(PetscObjectReference((PetscObject)dm));
+  f->dm = dm;
   f->mesh = mesh;
   f->dim = mesh->dim;
   f->formulation = scene->formulation;

@@ -819,7 +819,7 @@ static PetscErrorCode CheckGroups(MPI_Comm comm, HycoMesh m, HycoScene scene)
 }
 
 /* The local tables of a DM's part: nodes and cells by tag, groups, facets outward, bodies; with several ranks also
-   global numbers. Holds a reference to the DM. Collective on comm, which is PETSC_COMM_SELF for a DM that one rank
+   global numbers. The caller gets a reference to the DM. Collective on comm, which is PETSC_COMM_SELF for a DM that one rank
    alone uses. */
 PetscErrorCode HycoPlexToTables(DM dm, MPI_Comm comm, HycoScene scene, HycoMesh *mesh)
 {
@@ -829,6 +829,11 @@ PetscErrorCode HycoPlexToTables(DM dm, MPI_Comm comm, HycoScene scene, HycoMesh 
   size_t length;
 
   PetscFunctionBegin;
+  PetscCall(HycoMeshQuery(dm, mesh));
+  if (*mesh) {
+    PetscCall(PetscObjectReference((PetscObject)dm));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCallMPI(MPI_Comm_size(comm, &size));
   PetscCall(PetscNew(&b.m));
   PetscCall(FindType(&b));
@@ -846,7 +851,7 @@ PetscErrorCode HycoPlexToTables(DM dm, MPI_Comm comm, HycoScene scene, HycoMesh 
   PetscCall(PetscFree(b.facet));
   PetscCall(ierr);
   PetscCall(PetscObjectReference((PetscObject)dm));
-  b.m->dm = dm;
+  PetscCall(HycoMeshSetDM(b.m, dm));
   *mesh = b.m;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

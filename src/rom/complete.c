@@ -36,14 +36,14 @@ PetscErrorCode HycoRowsDestroy(HycoRows *rows)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Creates mesh without its cells: their materials are not needed. */
+/* Creates fe_beyond without the mesh's cells: their materials are not needed. */
 static PetscErrorCode CreateBeyond(HycoROM m)
 {
+  HycoMesh mesh = m->model->mesh;
+
   PetscFunctionBegin;
-  PetscCall(PetscNew(&m->beyond));
-  *m->beyond = *m->model->mesh;
-  m->beyond->n_cells = 0;
-  PetscCall(HycoFECreate(m->model->scene, m->beyond, &m->fe_beyond));
+  PetscCall(HycoSubmeshFirst(m->model->scene, mesh, mesh->n_nodes, PETSC_FALSE, &m->beyond));
+  PetscCall(HycoFECreate(m->model->scene, m->beyond->dm, &m->fe_beyond));
   PetscCall(HycoRowsCreate(&m->model->pairs, m->model->mesh->dim, &m->rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -29,7 +29,8 @@ PetscErrorCode HycoOutputCellsDestroy(HycoOutputCells *cells)
   PetscCall(HycoResultantsDestroy(&(*cells)->resultants));
   PetscCall(HycoMeshDestroy(&(*cells)->mesh));
   HycoFreeAll(&(*cells)->V, &(*cells)->u, &(*cells)->sigma, &(*cells)->fe_at, &(*cells)->reaction,
-              &(*cells)->surface_node, &(*cells)->surface);
+              &(*cells)->surface_node);
+  PetscCall(HycoMeshDestroy(&(*cells)->surface));
   PetscCall(PetscFree(*cells));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -60,11 +61,9 @@ static PetscErrorCode MakeSurface(HycoROM m, HycoOutputCells p)
 {
   PetscFunctionBegin;
   if (p->fe_surface) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscFree(p->surface)); /* of an attempt that failed */
-  PetscCall(PetscNew(&p->surface));
-  *p->surface = *m->model->mesh;
-  p->surface->n_cells = 0;
-  PetscCall(HycoFECreate(m->model->scene, p->surface, &p->fe_surface));
+  PetscCall(HycoMeshDestroy(&p->surface)); /* of an attempt that failed */
+  PetscCall(HycoSubmeshFirst(m->model->scene, m->model->mesh, m->model->mesh->n_nodes, PETSC_FALSE, &p->surface));
+  PetscCall(HycoFECreate(m->model->scene, p->surface->dm, &p->fe_surface));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -148,7 +147,7 @@ static PetscErrorCode Fill(HycoROM m, HycoOutputCells p)
   PetscInt *place;
 
   PetscFunctionBegin;
-  PetscCall(HycoFECreate(m->model->scene, p->mesh, &p->fe));
+  PetscCall(HycoFECreate(m->model->scene, p->mesh->dm, &p->fe));
   PetscCall(PetscMalloc1(p->fe->n_dof, &p->u));
   PetscCall(PetscMalloc1(p->mesh->n_cells * p->fe->n_sigma, &p->sigma));
   PetscCall(PetscMalloc1(m->model->n_fe, &p->fe_at));
