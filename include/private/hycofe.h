@@ -54,7 +54,8 @@ typedef struct {
 struct _n_HycoFE {
   HycoScene scene; /* borrowed */
   DM dm;
-  HycoMesh mesh; /* its tables; borrowed from it */
+  HycoMesh mesh;    /* its tables, borrowed from it; or surface */
+  HycoMesh surface; /* of HycoFECreateSurface(): the tables without cells, whose arrays are the DM's; else NULL */
   /* sizes: space dimension, n_nodes * dim, stress components */
   PetscInt dim, n_dof, n_sigma;
   HycoFormulation formulation; /* in 1D and 3D HYCO_PLANE_STRAIN */
@@ -122,6 +123,8 @@ static inline PetscInt HycoFEUnknowns(HycoFE fe)
 /* The scene on a DM: the whole mesh distributed over its ranks, a rank's surfaces, an RID, other submeshes, or a DMPlex
    of the caller, whose labels are the scene's groups. Collective on the DM if it has no tables yet (HycoMeshOf()). */
 PetscErrorCode HycoFECreate(HycoScene scene, DM dm, HycoFE *fe);
+/* On its nodes and facets alone, without the cells and their materials. */
+PetscErrorCode HycoFECreateSurface(HycoScene scene, DM dm, HycoFE *fe);
 PetscErrorCode HycoFEDestroy(HycoFE *fe);
 /* Keeps the gradients of the shape functions until the nodes move: for paths, which evaluate the same nodes many
    times. */

@@ -195,9 +195,9 @@ PetscErrorCode HycoSubmesh(HycoScene scene, HycoMesh of, PetscInt n_keep, const 
 /* The subpoint IS of a submesh's DM (borrowed; NULL: it is none): the points of the other DM, of a facet without its
    cell that cell. */
 PetscErrorCode HycoSubmeshGetPoints(DM sub, IS *points);
-/* The submesh of the first n nodes of `of`, with the facets between them, and with all cells, whose nodes must be among
-   these, or none (1D: all, for the facets' normals); nodes keep their indices. The caller owns it; not collective. */
-PetscErrorCode HycoSubmeshFirst(HycoScene scene, HycoMesh of, PetscInt n, PetscBool cells, HycoMesh *sub);
+/* The submesh of all cells and the first n nodes of `of`, with which its cells' nodes begin, and of the facets between
+   these; nodes keep their indices. The caller owns it; not collective. */
+PetscErrorCode HycoSubmeshFirst(HycoScene scene, HycoMesh of, PetscInt n, HycoMesh *sub);
 /* node[i]: the node of `of` that is node i of its submesh. */
 PetscErrorCode HycoSubmeshNodes(HycoMesh sub, HycoMesh of, PetscInt node[]);
 

@@ -7,6 +7,7 @@ PetscErrorCode HycoFEDestroy(HycoFE *fe)
 {
   PetscFunctionBegin;
   if (!*fe) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFree((*fe)->surface));
   PetscCall(DMDestroy(&(*fe)->dm));
   PetscCall(HycoAssemblyMapDestroy(&(*fe)->places));
   PetscCall(HycoSpringsDestroy(&(*fe)->springs));
@@ -113,17 +114,14 @@ static PetscErrorCode ChooseElements(HycoScene scene, HycoMesh mesh, PetscBool b
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The tables of the DM are made once and kept with it. The scene must outlive fe. No parameter is set yet:
-   HycoFESetParameters() follows. */
-PetscErrorCode HycoFECreate(HycoScene scene, DM dm, HycoFE *fe)
+/* Takes a reference to the DM of the tables; the scene must outlive fe. */
+static PetscErrorCode Create(HycoScene scene, DM dm, HycoMesh mesh, HycoFE *fe)
 {
-  HycoMesh mesh;
   PetscBool *bbar;
   PetscErrorCode ierr;
   HycoFE f;
 
   PetscFunctionBegin;
-  PetscCall(HycoMeshOf(dm, scene, &mesh));
   PetscCall(PetscMalloc1(scene->n_bodies, &bbar));
   ierr = ChooseElements(scene, mesh, bbar);
   for (PetscInt b = 0; b < scene->n_bodies && !ierr; b++)
@@ -152,6 +150,35 @@ PetscErrorCode HycoFECreate(HycoScene scene, DM dm, HycoFE *fe)
   PetscCall(FindConstant(f));
   PetscCall(HycoMirrorCreate(f));
   *fe = f;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The tables of the DM are made once and kept with it. No parameter is set yet: HycoFESetParameters() follows. */
+PetscErrorCode HycoFECreate(HycoScene scene, DM dm, HycoFE *fe)
+{
+  HycoMesh mesh;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeshOf(dm, scene, &mesh));
+  PetscCall(Create(scene, dm, mesh, fe));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFECreateSurface(HycoScene scene, DM dm, HycoFE *fe)
+{
+  struct _n_HycoMesh *surface;
+  HycoMesh mesh;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeshOf(dm, scene, &mesh));
+  PetscCall(PetscNew(&surface));
+  *surface = *mesh;
+  surface->n_cells = 0;
+  ierr = Create(scene, dm, surface, fe);
+  if (ierr) PetscCall(PetscFree(surface));
+  PetscCall(ierr);
+  (*fe)->surface = surface;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -46,7 +46,8 @@ static PetscErrorCode ForEach(HycoFE fe, const PetscInt around[],
     }
     for (PetscInt f = 0; f < m->n_facets && !AtPoints(m, g); f++) {
       /* a model's contact surfaces have facets whose cells are not in the mesh */
-      if (m->facet_group[f] == g && m->facet_cell[f] >= 0) PetscCall((*visit)(fe, s, m->facet_cell[f], f, -1, ctx));
+      if (m->facet_group[f] == g && m->facet_cell[f] >= 0 && m->facet_cell[f] < m->n_cells)
+        PetscCall((*visit)(fe, s, m->facet_cell[f], f, -1, ctx));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);

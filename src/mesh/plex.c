@@ -556,13 +556,15 @@ static PetscErrorCode AddPoint(Builder *b, PetscInt group, PetscInt value, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* By the tag of the cell, then the number in it: the same on any number of ranks. */
+/* By the tag of the cell, then the number in it: the same on any number of ranks. Facets without their cell may share
+   both (HycoMeshCreateDM()); their points are in order. */
 static int CompareFacets(const void *a, const void *b)
 {
   const Facet *x = (const Facet *)a, *y = (const Facet *)b;
 
   if (x->tag != y->tag) return x->tag < y->tag ? -1 : 1;
-  return (x->number > y->number) - (x->number < y->number);
+  if (x->number != y->number) return x->number < y->number ? -1 : 1;
+  return (x->point > y->point) - (x->point < y->point);
 }
 
 /* The facets of a group, in the order of their cells; those without their cell have their orientation. */

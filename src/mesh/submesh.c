@@ -500,14 +500,14 @@ PetscErrorCode HycoSubmesh(HycoScene scene, HycoMesh of, PetscInt n_keep, const 
 }
 
 /* The facets of cells are kept with these, the others if all of their nodes are. */
-PetscErrorCode HycoSubmeshFirst(HycoScene scene, HycoMesh of, PetscInt n, PetscBool cells, HycoMesh *sub)
+PetscErrorCode HycoSubmeshFirst(HycoScene scene, HycoMesh of, PetscInt n, HycoMesh *sub)
 {
-  PetscInt *first, n_cells = cells || of->dim == 1 ? of->n_cells : 0;
+  PetscInt *first;
   HycoMesh m;
 
   PetscFunctionBegin;
-  PetscCall(Identity(PetscMax(n, n_cells), &first));
-  PetscCall(HycoSubmesh(scene, of, n_cells, first, n, first, ALL_BETWEEN, NULL, sub));
+  PetscCall(Identity(PetscMax(n, of->n_cells), &first));
+  PetscCall(HycoSubmesh(scene, of, of->n_cells, first, n, first, ALL_BETWEEN, NULL, sub));
   PetscCall(PetscFree(first));
   m = *sub;
   PetscCheck(m->n_nodes == n, PETSC_COMM_SELF, PETSC_ERR_PLIB, "%d nodes of %d", (int)m->n_nodes, (int)n);

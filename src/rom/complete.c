@@ -39,11 +39,8 @@ PetscErrorCode HycoRowsDestroy(HycoRows *rows)
 /* Creates fe_beyond without the mesh's cells: their materials are not needed. */
 static PetscErrorCode CreateBeyond(HycoROM m)
 {
-  HycoMesh mesh = m->model->mesh;
-
   PetscFunctionBegin;
-  PetscCall(HycoSubmeshFirst(m->model->scene, mesh, mesh->n_nodes, PETSC_FALSE, &m->beyond));
-  PetscCall(HycoFECreate(m->model->scene, m->beyond->dm, &m->fe_beyond));
+  PetscCall(HycoFECreateSurface(m->model->scene, m->model->mesh->dm, &m->fe_beyond));
   PetscCall(HycoRowsCreate(&m->model->pairs, m->model->mesh->dim, &m->rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -93,7 +90,7 @@ PetscErrorCode HycoROMBringContacts(HycoROM m, HycoFE *fe)
   PetscFunctionBegin;
   *fe = m->fe;
   if (m->fe->mesh == m->model->mesh) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!m->beyond) PetscCall(CreateBeyond(m));
+  if (!m->fe_beyond) PetscCall(CreateBeyond(m));
   if (!m->beyond_current) PetscCall(BringRows(m, m->fe_beyond, m->fe->mu));
   *fe = m->fe_beyond;
   PetscFunctionReturn(PETSC_SUCCESS);

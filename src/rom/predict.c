@@ -120,7 +120,6 @@ PetscErrorCode HycoROMReset(HycoROM m)
   PetscCall(HycoFEDestroy(&m->fe_floating));
   PetscCall(HycoSolverDestroy(&m->solver));
   PetscCall(HycoFEDestroy(&m->fe_beyond));
-  PetscCall(HycoMeshDestroy(&m->beyond));
   PetscCall(HycoRowsDestroy(&m->rows));
   PetscCall(HycoFEDestroy(&m->fe));
   m->of_fe = NULL;

@@ -70,7 +70,7 @@ PetscErrorCode HycoGalerkinCreateOwn(HycoROM m)
 
   PetscFunctionBegin;
   PetscCall(CountNodes(m, &n));
-  PetscCall(HycoSubmeshFirst(m->model->scene, m->model->mesh, n, PETSC_TRUE, &g->own));
+  PetscCall(HycoSubmeshFirst(m->model->scene, m->model->mesh, n, &g->own));
   PetscCall(SelectPairs(m));
   PetscCall(HycoRowsCreate(&g->own_pairs, m->model->mesh->dim, &g->own_rows));
   m->of_fe = &g->own_pairs;
