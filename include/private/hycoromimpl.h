@@ -140,6 +140,7 @@ struct _p_HycoROM {
   HycoOutputCells output_cells; /* of the scene's quantities */
   HycoCarried carried;          /* results of the contacts (contact_results.c) */
   HycoBalance balance;          /* data kept by HycoROMGetEquilibrium() */
+  HycoGradientStore gradient;   /* of HycoROMGetGradient() */
   HycoRows rows;                /* of B over dofs of mesh, all contacts; current after HycoROMComplete() */
   /* the last prediction */
   PetscBool solved;

@@ -1,5 +1,6 @@
 /* HycoFOM: reads and distributes the mesh, assembles (16), solves it, and gathers the solution in the file's order. */
 #include <hycofields.h>
+#include <hycogradient.h>
 #include <hycopath.h>
 
 PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
@@ -43,6 +44,7 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
   PetscCall(HycoFieldFileDestroy(&f->set));
   PetscCall(PetscFree(f->contact_result));
   PetscCall(PetscFree(f->reaction));
+  PetscCall(HycoGradientDestroy(&f->gradient));
   PetscCall(PetscFree(f->lambda));
   PetscCall(PetscFree(f->lambda_all));
   PetscCall(PetscFree(f->needed));
