@@ -1,6 +1,6 @@
 /*
   HycoFE: the scene on one mesh at one parameter value. It moves the nodes, fixes the supports, evaluates materials and
-  loads, and assembles K, F, B, D, stresses and norms over the cells of its mesh: the whole mesh, a rank's part, or the
+  loads, and assembles K, F, B, D, stresses and norms over the cells of a DM: the whole mesh, a rank's part, or the
   RID.
 */
 #ifndef HYCOFE_H
@@ -52,9 +52,10 @@ typedef struct {
 } HycoOblique;
 
 struct _n_HycoFE {
-  /* borrowed */
-  HycoScene scene;
-  HycoMesh mesh;
+  HycoScene scene; /* borrowed */
+  DM dm;
+  HycoMesh mesh;    /* its tables, borrowed from it; or surface */
+  HycoMesh surface; /* of HycoFECreateSurface(): the tables without cells, whose arrays are the DM's; else NULL */
   /* sizes: space dimension, n_nodes * dim, stress components */
   PetscInt dim, n_dof, n_sigma;
   HycoFormulation formulation; /* in 1D and 3D HYCO_PLANE_STRAIN */
@@ -119,7 +120,11 @@ static inline PetscInt HycoFEUnknowns(HycoFE fe)
   return fe->mesh->n_whole_nodes ? fe->mesh->n_whole_nodes * fe->dim : fe->n_dof;
 }
 
-PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe);
+/* The scene on a DM: the whole mesh distributed over its ranks, a rank's surfaces, an RID, other submeshes, or a DMPlex
+   of the caller, whose labels are the scene's groups. Collective on the DM if it has no tables yet (HycoMeshOf()). */
+PetscErrorCode HycoFECreate(HycoScene scene, DM dm, HycoFE *fe);
+/* On its nodes and facets alone, without the cells and their materials. */
+PetscErrorCode HycoFECreateSurface(HycoScene scene, DM dm, HycoFE *fe);
 PetscErrorCode HycoFEDestroy(HycoFE *fe);
 /* Keeps the gradients of the shape functions until the nodes move: for paths, which evaluate the same nodes many
    times. */

@@ -134,8 +134,7 @@ struct _p_HycoROM {
   HycoSolver solver;
   void *work; /* the type's */
   /* created when needed */
-  HycoMesh beyond;              /* mesh without cells */
-  HycoFE fe_beyond;             /* on it */
+  HycoFE fe_beyond;             /* on mesh without its cells */
   HycoFE fe_whole;              /* on whole */
   HycoFE fe_floating;           /* on the loaded cells of the bodies that contact alone holds */
   HycoOutputCells output_cells; /* of the scene's quantities */

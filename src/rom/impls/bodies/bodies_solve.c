@@ -182,7 +182,7 @@ PetscErrorCode HycoBodiesSetUp(HycoBodiesWork o, HycoSubstructures b, HycoScene 
   o->solver = solver ? solver : o->own;
   PetscCall(PetscCalloc1(b->n, &o->weight));
   for (PetscInt k = 0; k < b->n; k++) PetscCall(PetscMalloc1(b->body[k].n_samples, &o->weight[k]));
-  PetscCall(HycoFECreate(scene, b->probe, &o->fe));
+  PetscCall(HycoFECreate(scene, b->probe->dm, &o->fe));
   o->fe->heat_is_load = PETSC_TRUE;
   PetscCall(PetscMalloc1(3 * b->probe->nv * b->n, &o->X0));
   PetscCall(PetscMalloc1(b->n, &o->E0));
