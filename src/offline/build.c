@@ -18,9 +18,10 @@ static PetscErrorCode ReadMesh(HycoReducer t)
   PetscCall(HycoReducerColumn(t, 0, mu));
   PetscCall(HycoFOMCreateMesh(HycoComm(t), t->scene, &t->fom));
   f = t->fom;
-  HycoCheck(!t->scene->n_times || !f->searches,
-            "the scene has a history, and a map moves a contact surface (type surface); reduced models do not support "
-            "this: draw the bodies where the map puts them, use type pair, or solve at full order by hyco solve -mu");
+  HycoCheck(
+      !t->scene->n_times || !f->searches,
+      "the scene has a history, and a map moves a contact surface (type surface or mortar); reduced models do not "
+      "support this: draw the bodies where the map puts them, use type pair, or solve at full order by hyco solve -mu");
   for (PetscInt k = 0; k < t->n_groups; k++)
     HycoOnRoot(HycoComm(t), HycoMeshFindGroup(f->part, "hyco_rid_groups", t->groups[k], &group));
   t->sizes[0] = f->n_nodes;

@@ -89,6 +89,9 @@ PetscErrorCode HycoROMSumContacts(HycoROM m, const PetscReal Lambda[], const Hyc
   PetscCall(HycoContactPressures(PETSC_COMM_SELF, fe, &m->model->pairs, m->carried->area, Lambda, pressure));
   HycoContactResults(fe, &m->model->pairs, m->carried->normal, m->carried->area, Lambda, pressure, least,
                      m->carried->result);
+  for (PetscInt c = 0; c < m->model->scene->n_contacts; c++) {
+    if (!m->carried->result[c].n) m->carried->result[c].pressure_min = 0;
+  }
   PetscCall(PetscFree(pressure));
   *result = m->carried->result;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -226,7 +226,8 @@ static void CollectPath(HycoROM m, HycoPrediction *out)
   const HycoTrace *trace = &m->trace;
 
   for (PetscInt q = 0; q < m->model->scene->n_quantities; q++) {
-    const PetscBool least = (PetscBool)(m->model->scene->quantity[q].kind == HYCO_QUANTITY_MIN);
+    const HycoQuantityKind kind = m->model->scene->quantity[q].kind;
+    const PetscBool least = (PetscBool)(kind == HYCO_QUANTITY_MIN || kind == HYCO_QUANTITY_PRESSURE_MIN);
     PetscReal *most = &out->path_quantity[q];
 
     out->quantity[q] = trace->step[trace->shown].quantity[q];
