@@ -189,6 +189,13 @@ PetscErrorCode HycoROMGetEquilibrium(HycoROM model, HycoEquilibrium *equilibrium
 
 /* Gets the summary of the last prediction, with estimated errors. Fails before the first prediction. */
 PetscErrorCode HycoROMGetPrediction(HycoROM model, HycoPrediction *prediction);
+/*
+  Gets the gradient of the model's outputs at the last prediction (hycofom.h), by the linear system of its closed contacts
+  and differences of the model's data, never of predictions. The prediction stays. Not collective. Fails without an output
+  or a parameter, for a model of paths, for a type without gradients, where the solve did not converge, and where the
+  forces of closed contacts are not unique; after an error there is no last prediction.
+*/
+PetscErrorCode HycoROMGetGradient(HycoROM model, HycoGradient *gradient);
 /* Gets the strain energy of the last prediction on the RID's cells; this may cost as much as the prediction. */
 PetscErrorCode HycoROMGetStrainEnergy(HycoROM model, PetscReal *energy);
 
@@ -227,7 +234,7 @@ typedef struct {
   PetscReal u_h1;            /* the same, H1 */
   PetscReal u_rid;           /* displacement of the RID's nodes, max norm */
   PetscReal sigma;           /* stress of the RID's cells, 2-norm of the cell values */
-  PetscReal sigma_11;        /* its first component, max norm */
+  PetscReal sigma_11;        /* its first component, max norm; 0 below 1e-12 of the largest stress */
   PetscReal sigma_norm2;     /* no error: the 2-norm of full order's stress there, by which sigma is divided */
   PetscReal lambda_rid;      /* the RID's own contact forces (Gamma_A^C), 2-norm */
   PetscReal lambda_rid_dual; /* the same, dual of H1 */

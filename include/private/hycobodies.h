@@ -198,6 +198,13 @@ PetscErrorCode HycoBodiesKeep(HycoBodiesWork work, PetscInt n, const PetscInt co
 /* row[n]: of the matrix W at the present parameters, contact k with n contacts; u -= C B^T Lambda. */
 void HycoBodiesKeptRow(HycoBodiesWork work, PetscInt k, PetscInt n, const PetscInt contact[], PetscReal row[]);
 PetscErrorCode HycoBodiesKeptDisplace(HycoBodiesWork work, PetscInt m, const PetscReal Lambda[], PetscReal u[]);
+/* M of n contacts at the prepared parameters: p + n square by columns. */
+PetscErrorCode HycoBodiesMatrix(HycoBodiesWork work, PetscInt n, const PetscInt contact[], PetscReal M[]);
+/* Ops of gradients. */
+PetscErrorCode HycoBodiesUnknowns(HycoROM model, PetscInt *p, PetscInt *n, PetscReal z[]);
+PetscErrorCode HycoBodiesResidual(HycoROM model, const PetscReal mu[], const PetscReal z[], PetscReal w[],
+                                  PetscReal *size);
+PetscErrorCode HycoBodiesJacobian(HycoROM model, PetscInt k, const PetscInt contact[], PetscReal M[]);
 /* Sets the displacements of the surfaces and, after HycoBodiesExpand(), of the unknowns inside in U (by unknown of the
    surface's mesh) without prescribed ones. */
 void HycoBodiesMove(HycoBodiesWork work, const HycoBodiesSurface *surface, PetscReal U[]);

@@ -201,6 +201,22 @@ PetscErrorCode DriverCarriedColumns(HycoScene scene, PetscInt dim, DriverCarried
 /* Their values in a row; n = 0: not known. v: n_contacts x each. */
 void DriverCarriedFill(const DriverCarried *columns, PetscInt n, const HycoContactResult r[], PetscReal v[]);
 
+/* -- gradients.c: derivatives of the outputs -- */
+
+/* -gradient; fails if the scene (NULL: not known) has a history. */
+PetscErrorCode DriverReadGradient(HycoScene scene, PetscBool *gradient);
+/* In the report and in the text. */
+PetscErrorCode DriverReportGradient(cJSON *json, HycoScene scene, const HycoGradient *gradient);
+/* Columns of a table, if `on`: d_OUTPUT_d_PARAMETER, and the number of kinks; the caller frees the names. */
+typedef struct {
+  PetscBool on;
+  PetscInt n;
+  char (*name)[DRIVER_LINE];
+} DriverGradients;
+PetscErrorCode DriverGradientColumns(HycoScene scene, DriverGradients *columns);
+/* Their values in a row (v: n). */
+void DriverGradientFill(const DriverGradients *columns, const HycoGradient *gradient, PetscReal v[]);
+
 /* -- progress.c -- */
 
 /* Prints on rank 0. */
