@@ -280,7 +280,7 @@ typedef struct {
   PetscReal *moved;   /* by unknown of the part: largest sampled displacement */
   PetscBool *known;   /* by unknown of the part: on the surfaces; */
   PetscBool *bare;    /* the same: no mode has it, because the model's mesh does */
-  PetscBool *touched; /* ns: with a force at a sample */
+  PetscBool *in_mesh; /* ns: the model's mesh has its node, whatever its cells */
   PetscInt *row;      /* of the unknowns inside in the distributed vectors */
 } HycoBodiesFactor;
 

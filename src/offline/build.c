@@ -50,8 +50,7 @@ static PetscErrorCode Meet(HycoReducer t, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The nodes outside the RID that belong to the model's mesh: those of every contact, for moved surfaces all; and the
-   groups of which it has all facets, whether or not it has their cells. By node of the contacts' surfaces. */
+/* Also the groups of which the model's mesh has all facets, whether or not it has their cells: all[3 n_contacts]. */
 static PetscErrorCode SurfacesOf(HycoReducer t, PetscBool contact[], PetscInt *n_all, PetscInt all[])
 {
   HycoMesh surface = t->fom->surface;
@@ -65,6 +64,17 @@ static PetscErrorCode SurfacesOf(HycoReducer t, PetscBool contact[], PetscInt *n
   }
   for (PetscInt k = 0; k < t->scene->n_contacts; k++)
     PetscCall(HycoMeshFindGroup(surface, "contact", t->scene->contact[k]->slave, &all[(*n_all)++]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerMarkContacts(HycoReducer t, PetscBool contact[])
+{
+  PetscInt *all, n_all;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(3 * t->scene->n_contacts, &all));
+  PetscCall(SurfacesOf(t, contact, &n_all, all));
+  PetscCall(PetscFree(all));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

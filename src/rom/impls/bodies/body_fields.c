@@ -705,6 +705,31 @@ static PetscErrorCode TakeModes(HycoReducer t, HycoSnapshots store, Mat V, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* factor->in_mesh. Rank 0. */
+static PetscErrorCode FindInMesh(HycoReducer t, HycoBodiesFactor *factor)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  HycoMesh surface = t->fom->surface;
+  PetscBool *contact;
+  PetscInt *node, n = 0, at;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(surface->n_nodes, &contact));
+  PetscCall(PetscMalloc1(surface->n_nodes, &node));
+  PetscCall(HycoReducerMarkContacts(t, contact));
+  for (PetscInt i = 0; i < surface->n_nodes; i++) {
+    if (contact[i]) node[n++] = surface->node_whole ? surface->node_whole[i] : i;
+  }
+  PetscCall(PetscSortInt(n, node));
+  for (PetscInt k = 0; k < b->ns; k++) {
+    PetscCall(PetscFindInt(b->dof[k] / b->dim, n, node, &at));
+    factor->in_mesh[k] = (PetscBool)(at >= 0);
+  }
+  PetscCall(PetscFree(node));
+  PetscCall(PetscFree(contact));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The modes of `wanted` samples; *enough: the samples are many more than the modes of any body, or there is no room for
    more. Collective. */
 static PetscErrorCode ModesOf(HycoReducer t, HycoBodiesFactor *factor, PetscInt wanted, Sampled *sampled, Mat *V,
@@ -715,9 +740,6 @@ static PetscErrorCode ModesOf(HycoReducer t, HycoBodiesFactor *factor, PetscInt 
 
   PetscFunctionBegin;
   PetscCall(Sample(t, factor->fom, wanted, &all, sampled));
-  for (PetscInt k = 0; k < b->ns * sampled->n && !t->rank; k++)
-    factor->touched[k % b->ns] = (PetscBool)(factor->touched[k % b->ns] || sampled->f[k] != 0);
-  HycoBcast(factor->touched, b->ns, HYCO_MPI_BOOL, HycoComm(t));
   PetscCall(ExpandAll(t, factor, sampled));
   if (!t->scene->n_times) PetscCall(HycoBodiesChooseCells(t, factor)); /* else those with laws are chosen */
   PetscCall(PetscFree(b->mode_start));
@@ -747,7 +769,9 @@ PetscErrorCode HycoBodiesFields(HycoReducer t, HycoSnapshots store, HycoBodiesFa
   PetscCall(PetscCalloc1(factor->fom->part->n_cells + 1, &factor->score));
   PetscCall(PetscCalloc1(factor->fom->fe->n_dof + 1, &factor->known));
   PetscCall(PetscCalloc1(factor->fom->fe->n_dof + 1, &factor->bare));
-  PetscCall(PetscCalloc1(b->ns + 1, &factor->touched));
+  PetscCall(PetscCalloc1(b->ns + 1, &factor->in_mesh));
+  HycoOnRoot(HycoComm(t), FindInMesh(t, factor));
+  HycoBcast(factor->in_mesh, b->ns, HYCO_MPI_BOOL, HycoComm(t));
   PetscCall(PetscCalloc1(factor->fom->fe->n_dof + 1, &factor->moved));
   for (PetscInt n = HycoTrainingOfBodies(t)->samples, k = 0; !ierr && !enough && k <= DOUBLINGS; n *= 2, k++) {
     PetscCall(MatDestroy(&V));
