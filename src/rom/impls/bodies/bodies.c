@@ -17,7 +17,7 @@
 
 static HycoBodiesSurface SurfaceOf(HycoROM m)
 {
-  return (HycoBodiesSurface){m->fe, &m->model->pairs, &m->rows};
+  return HycoBodiesSurfaceNormal(m->fe, &m->model->pairs, &m->rows);
 }
 
 static PetscErrorCode SetUp(HycoROM m)
@@ -393,6 +393,7 @@ PetscErrorCode HycoROMCreate_Bodies(HycoROM m)
                                        .integrals = PETSC_TRUE,
                                        .cells = PETSC_TRUE,
                                        .uniform = PETSC_TRUE,
+                                       .friction = PETSC_TRUE,
                                        .work = sizeof(*(HycoBodiesWork)NULL),
                                        .resultants = PETSC_TRUE};
   static const HycoROMOps ops = {.setfromoptions = HycoBodiesOptions,

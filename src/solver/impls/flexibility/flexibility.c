@@ -52,6 +52,7 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   HycoLCP lcp = {.n = y->m,
                  .symmetric = PETSC_TRUE,
                  .blocks = y->blocks,
+                 .sign = y->blocks ? &s->sign : NULL,
                  .warm = s->warm,
                  .monitor = s->monitor,
                  .monitor_ctx = s->monitor_ctx};
