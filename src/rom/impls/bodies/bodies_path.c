@@ -74,6 +74,7 @@ static PetscErrorCode Rub(HycoROM m, HycoPath p, HycoStepAttempt *a)
   PetscFunctionBegin;
   PetscCall(HycoBodiesFrictionSolve(w->friction, &w->bodies, &p->kkt, &a->active_its, &solved));
   a->iterations = 1;
+  a->law.dt_factor = 1; /* no law asks for shorter steps */
   a->converged = solved;
   if (!solved) HycoFormat(a->why, "not converged: no contact forces with this friction balance the load");
   PetscCall(VecGetArray(p->Lambda, &L));
