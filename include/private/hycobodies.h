@@ -223,6 +223,8 @@ PetscErrorCode HycoBodiesFrictionSolve(HycoBodiesFriction friction, HycoBodiesWo
                                        PetscBool *solved);
 /* The solved step becomes the state of the contacts. */
 PetscErrorCode HycoBodiesFrictionAccept(HycoBodiesFriction friction);
+/* After a step that was refused, prepared at the last accepted time: its forces, and u, f of work. */
+void HycoBodiesFrictionRestore(HycoBodiesFriction friction, HycoBodiesWork work);
 /* The normal forces of the solved step; the state of the contacts, whose arrays the friction owns; whether the last step
    has further solutions. */
 void HycoBodiesFrictionNormal(HycoBodiesFriction friction, PetscReal Lambda[]);
@@ -307,6 +309,11 @@ typedef struct {
   PetscInt *row;      /* of the unknowns inside in the distributed vectors */
 } HycoBodiesFactor;
 
+/* Whether the model has modes of inelastic forces; bodies without a history, or with friction, are elastic. */
+static inline PetscBool HycoBodiesFlow(HycoReducer t)
+{
+  return (PetscBool)(t->scene->n_times && !HycoSceneHasFriction(t->scene));
+}
 PetscErrorCode HycoBodiesBegin(HycoReducer reducer);
 PetscErrorCode HycoBodiesModes(HycoReducer reducer, HycoSnapshots store);
 /* Operations of the training, after HycoBodiesBegin(); whether a search tries the type. */

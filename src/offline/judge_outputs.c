@@ -110,6 +110,7 @@ static PetscErrorCode Begin(Outputs *o)
 static PetscErrorCode End(Outputs *o)
 {
   PetscFunctionBegin;
+  HycoTraceShow(o->m, o->m->trace.shown);
   for (int k = 0; k < N_FIELDS; k++) PetscCall(PetscFree2(o->rows[k], o->value[k]));
   PetscCall(PetscFree(o->lambda));
   PetscCall(PetscFree2(o->shear.force, o->shear.work));

@@ -256,7 +256,7 @@ const char *const *HycoBodiesVariants(HycoReducer t)
 {
   static const char *const variants[] = {"interpolation", "cubature", NULL};
 
-  return t->scene->n_times && !HycoTrainingOfBodies(t)->named ? variants : NULL;
+  return HycoBodiesFlow(t) && !HycoTrainingOfBodies(t)->named ? variants : NULL;
 }
 
 PetscErrorCode HycoBodiesSetVariant(HycoReducer t, const char name[])

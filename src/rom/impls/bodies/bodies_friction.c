@@ -227,6 +227,16 @@ PetscErrorCode HycoBodiesFrictionAccept(HycoBodiesFriction f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+void HycoBodiesFrictionRestore(HycoBodiesFriction f, HycoBodiesWork o)
+{
+  PetscScalar *L;
+
+  PetscCallVoid(VecGetArray(f->L, &L));
+  PetscCallVoid(PetscArraycpy(L, f->forces, f->all.n));
+  HycoBodiesGiven(o, &f->all, L);
+  PetscCallVoid(VecRestoreArray(f->L, &L));
+}
+
 void HycoBodiesFrictionNormal(HycoBodiesFriction f, PetscReal Lambda[])
 {
   const PetscScalar *L;

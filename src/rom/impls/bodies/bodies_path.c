@@ -37,32 +37,6 @@ static PetscErrorCode Retry(HycoPath p, PetscReal alpha[], PetscReal Lambda[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The displacements of the model's cells by loads and forces, without inelastic strains. */
-static void MoveCells(HycoROM m)
-{
-  HycoBodiesPath w = (HycoBodiesPath)m->work;
-  const HycoBodiesWork o = &w->bodies;
-  const HycoSubstructures b = o->bodies;
-  HycoBodiesInelastic in = b->inelastic;
-  const PetscInt dim = b->dim;
-
-  for (PetscInt i = 0; i < in->nd;) {
-    const PetscInt node = in->dof[i] / dim, first = i;
-    PetscReal own[3] = {0, 0, 0}, turned[3];
-
-    for (; i < in->nd && in->dof[i] / dim == node; i++) {
-      const PetscReal *C = in->C + (size_t)i * (size_t)b->ns;
-      PetscReal u = 0;
-
-      for (PetscInt j = 0; j < b->r; j++) u += in->R[i * b->r + j] * o->c[j];
-      for (PetscInt j = 0; j < b->ns; j++) u -= C[j] * o->f[j];
-      own[in->dof[i] % dim] = u / o->kappa[in->body[i]];
-    }
-    HycoPoseTurn(o->pose[in->body[first]].Q, dim, PETSC_FALSE, own, turned);
-    for (PetscInt j = first; j < i; j++) w->u[w->at[j]] = m->fe->u0[w->at[j]] + turned[in->dof[j] % dim];
-  }
-}
-
 /* A step with friction: elastic bodies. */
 static PetscErrorCode Rub(HycoROM m, HycoPath p, HycoStepAttempt *a)
 {
@@ -81,9 +55,8 @@ static PetscErrorCode Rub(HycoROM m, HycoPath p, HycoStepAttempt *a)
   HycoBodiesFrictionNormal(w->friction, L);
   PetscCall(PetscArraycpy(m->Lambda, L, m->model->pairs.n));
   PetscCall(VecRestoreArray(p->Lambda, &L));
+  PetscCall(HycoBodiesExpand(&w->bodies, m->gamma));
   HycoBodiesMove(&w->bodies, &s, m->U);
-  MoveCells(m);
-  for (PetscInt i = 0; i < w->bodies.bodies->inelastic->nd; i++) m->U[w->at[i]] = w->u[w->at[i]];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -164,8 +137,8 @@ static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
 
   PetscFunctionBegin;
   PetscCall(VecGetArrayRead(p->U, &alpha));
-  PetscCall(HycoBodiesExpand(&w->bodies, m->gamma));
-  HycoBodiesAddStrains(&w->bodies, alpha, m->gamma);
+  if (!w->friction) PetscCall(HycoBodiesExpand(&w->bodies, m->gamma));
+  if (!w->friction) HycoBodiesAddStrains(&w->bodies, alpha, m->gamma);
   PetscCall(VecRestoreArrayRead(p->U, &alpha));
   PetscCall(HycoTraceAdd(m, p->t));
   p->now.stored = a->law.stored;
@@ -218,6 +191,10 @@ static PetscErrorCode Record(HycoPath p)
   PetscCall(VecGetArrayRead(p->Lambda, &L));
   PetscCall(PetscArraycpy(m->Lambda, L, m->model->pairs.n));
   PetscCall(VecRestoreArrayRead(p->Lambda, &L));
+  if (w->friction && p->why[0]) { /* the last step may have been refused */
+    HycoBodiesFrictionRestore(w->friction, &w->bodies);
+    PetscCall(HycoBodiesExpand(&w->bodies, m->gamma));
+  }
   PetscCall(HycoROMExpand(m));
   HycoBodiesMove(&w->bodies, &s, m->U);
   for (PetscInt i = 0; i < w->bodies.bodies->inelastic->nd; i++) m->U[w->at[i]] = w->u[w->at[i]];

@@ -336,7 +336,7 @@ static PetscErrorCode ExpandNode(HycoReducer t, HycoBodiesFactor *factor, PetscI
   PetscCall(PetscRealloc((n_dof * (size_t)(sampled->n_U + n + b->p) + 1) * sizeof(PetscReal), &sampled->U));
   U = sampled->U + n_dof * (size_t)sampled->n_U;
   PetscCall(ExpandSamples(b, factor, sampled, n, sample, U));
-  for (PetscInt k = 0; k < n && !t->scene->n_times; k += 1 + n * nodes / SCORED)
+  for (PetscInt k = 0; k < n && !HycoBodiesFlow(t); k += 1 + n * nodes / SCORED)
     PetscCall(HycoBodiesAddScores(t, factor, U + n_dof * (size_t)k));
   sampled->n_U += n;
   if (!sampled->expanded) {
@@ -772,7 +772,7 @@ static PetscErrorCode ModesOf(HycoReducer t, HycoBodiesFactor *factor, PetscInt 
     factor->touched[k % b->ns] = (PetscBool)(factor->touched[k % b->ns] || sampled->f[k] != 0);
   HycoBcast(factor->touched, b->ns, HYCO_MPI_BOOL, HycoComm(t));
   PetscCall(ExpandAll(t, factor, sampled));
-  if (!t->scene->n_times) PetscCall(HycoBodiesChooseCells(t, factor)); /* else those with laws are chosen */
+  if (!HycoBodiesFlow(t)) PetscCall(HycoBodiesChooseCells(t, factor)); /* else those with laws are chosen */
   PetscCall(PetscFree(b->mode_start));
   PetscCall(FindModes(t, factor, sampled->n_U, sampled->U, V, sigma));
   *enough = PETSC_TRUE;

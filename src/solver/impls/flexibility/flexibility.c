@@ -54,6 +54,7 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
                  .blocks = y->blocks,
                  .sign = y->blocks ? &s->sign : NULL,
                  .warm = s->warm,
+                 .given = (PetscBool)(y->blocks != NULL),
                  .monitor = s->monitor,
                  .monitor_ctx = s->monitor_ctx};
   PetscScalar *l;
