@@ -112,7 +112,7 @@ class FrictionModels(Case):
         """A body whose moduli change their ratio: forces, slip and work to the error of its interpolated flexibility; surfaces and mortar, 2D and 3D."""
         for dim, kind in ((2, 'surface'), (2, 'mortar'), (3, 'surface')):
             scene = self.two(dim, kind)
-            self.train(scene, grid='2,2', ranks=2 if kind == 'mortar' else 0)
+            self.train(scene, '-hyco_snapshots', self.path(f'{kind}{dim}'), grid='2,2', ranks=2 if kind == 'mortar' else 0)
             self.alike(scene, '0.22,1.7', 1e-4)
 
     def test_refused(self):

@@ -425,6 +425,7 @@ PetscErrorCode HycoBodiesTakePath(HycoROM m)
                                        .surfaces = PETSC_TRUE,
                                        .cells = PETSC_TRUE,
                                        .friction = PETSC_TRUE,
+                                       .integrals = PETSC_TRUE,
                                        .work = sizeof(struct _n_HycoBodiesPath),
                                        .resultants = PETSC_TRUE};
   static const HycoROMOps ops = {.setfromoptions = HycoBodiesOptions,
