@@ -92,7 +92,7 @@ typedef struct {
   PetscInt n_orders;      /* steps whose iterations gave an order of convergence */
   PetscReal order;        /* the median of these; 2 for the tangent */
   PetscInt n_taken;       /* number of accepted time steps, including the first time */
-  const PetscReal *taken; /* their ends. Borrowed; for a resumed path those since the resumption */
+  const PetscReal *taken; /* their ends. Borrowed */
 } HycoHistory;
 
 /* Called at each listed time, on every rank; HycoFOMGetSolution() then gives the solution there. */

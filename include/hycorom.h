@@ -227,7 +227,7 @@ typedef struct {
   PetscReal u_h1;            /* the same, H1 */
   PetscReal u_rid;           /* displacement of the RID's nodes, max norm */
   PetscReal sigma;           /* stress of the RID's cells, 2-norm of the cell values */
-  PetscReal sigma_11;        /* its first component, max norm */
+  PetscReal sigma_11;        /* its first component, max norm; 0 below 1e-12 of the largest stress */
   PetscReal sigma_norm2;     /* no error: the 2-norm of full order's stress there, by which sigma is divided */
   PetscReal lambda_rid;      /* the RID's own contact forces (Gamma_A^C), 2-norm */
   PetscReal lambda_rid_dual; /* the same, dual of H1 */

@@ -208,6 +208,10 @@ PetscBool HycoSceneHasReactions(HycoScene scene);
 /* Whether the quantities need the bodies' fields; the results of contacts. */
 PetscBool HycoSceneHasFieldOutputs(HycoScene scene);
 PetscBool HycoSceneHasContactOutputs(HycoScene scene);
+/* Calls `visit` for each group of the mesh that the scene names, as often as it does, with the entry's key for messages;
+   ends at the first error. Not collective. */
+typedef PetscErrorCode (*HycoGroupVisitor)(const char key[], const char name[], void *context);
+PetscErrorCode HycoSceneVisitGroups(HycoScene scene, HycoGroupVisitor visit, void *context);
 /* Reads the history's entries, once the parameters are read. */
 PetscErrorCode HycoSceneReadHistory(HycoScene scene);
 /* Fails if time changes what must be constant: the bodies' places, the rows of B. */

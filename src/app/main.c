@@ -202,6 +202,9 @@ int main(int argc, char **argv)
   PetscErrorCode ierr;
   int status;
 
+  /* A line in one piece: glibc 2.37 and later write to an unbuffered stream in pieces of 128 bytes, which launchers and
+     other ranks mix up. */
+  setvbuf(stderr, NULL, _IOLBF, BUFSIZ);
   if (AsksHelp(argc, argv)) return Help(argv);
   status = AnswerAtOnce(argc, argv);
   if (status >= 0) return status;

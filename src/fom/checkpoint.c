@@ -196,8 +196,8 @@ static void MoveHead(HycoPath p, PetscBool out, PetscReal head[])
 
 /* The data of a checkpoint except nodes and cells: on rank 0; after Spread() on all, without the forces. */
 typedef struct {
-  PetscReal *lambda, *head, *steps, *orders;
-  PetscInt cell_cols, n_steps, n_orders;
+  PetscReal *lambda, *head, *steps, *orders, *taken; /* taken: none in older files */
+  PetscInt cell_cols, n_steps, n_orders, n_taken;
 } Content;
 
 /* Rank 0. The key is compared before anything else is read. */
@@ -211,6 +211,7 @@ static PetscErrorCode WriteContent(HycoFOM f, HycoH5 h, const Content *c, const 
   PetscCall(HycoH5WriteReal(h, "head", N_HEAD, 1, c->head));
   PetscCall(HycoH5WriteReal(h, "steps", c->n_steps + 1, STEP_COLS(f), c->steps));
   if (c->n_orders) PetscCall(HycoH5WriteReal(h, "orders", c->n_orders, 1, c->orders));
+  PetscCall(HycoH5WriteReal(h, "taken", c->n_taken, 1, c->taken));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -253,6 +254,7 @@ static PetscErrorCode FreeContent(Content *c)
   PetscCall(PetscFree(c->head));
   PetscCall(PetscFree(c->steps));
   PetscCall(PetscFree(c->orders));
+  PetscCall(PetscFree(c->taken));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -282,7 +284,7 @@ PetscErrorCode HycoPathCheckPlace(HycoFOM f)
 PetscErrorCode HycoPathSave(HycoFOM f)
 {
   HycoPath p = f->path;
-  Content c = {.n_steps = p->n_steps, .n_orders = p->n_orders};
+  Content c = {.n_steps = p->n_steps, .n_orders = p->n_orders, .n_taken = p->n_taken};
   char key[HYCO_LINE];
   HycoH5 h;
   PetscErrorCode ierr, failed;
@@ -296,6 +298,7 @@ PetscErrorCode HycoPathSave(HycoFOM f)
   for (PetscInt k = 0; k < p->n_steps; k++) StepToReals(f, &p->steps[k], c.steps + k * STEP_COLS(f));
   StepToReals(f, &p->now, c.steps + p->n_steps * STEP_COLS(f));
   HycoDuplicate(p->n_orders, p->orders, &c.orders);
+  HycoDuplicate(p->n_taken, p->taken, &c.taken);
   PetscCall(HycoH5CreateShared(HycoComm(f), p->checkpoint, &h));
   ierr = WriteAll(f, h, &c, key);
   failed = HycoH5Close(&h, (PetscBool)!ierr);
@@ -348,6 +351,9 @@ static PetscErrorCode ReadOpened(HycoFOM f, HycoH5 h, const char key[], Content 
   rows = -1;
   if (HycoH5Has(h, "orders")) PetscCall(HycoH5LoadReal(h, "orders", &rows, &one, &c->orders));
   c->n_orders = PetscMax(0, rows);
+  rows = -1;
+  if (HycoH5Has(h, "taken")) PetscCall(HycoH5LoadReal(h, "taken", &rows, &one, &c->taken));
+  c->n_taken = PetscMax(0, rows);
   PetscCall(HycoH5GetSize(h, "node", &n_nodes, &cols));
   PetscCall(HycoH5GetSize(h, "cell", &n_cells, &c->cell_cols));
   HycoCheck(n_nodes == f->n_nodes && cols == NODE_COLS(f) && n_cells == f->n_cells, "the checkpoint %s is damaged",
@@ -386,16 +392,18 @@ static PetscErrorCode Spread(HycoFOM f, PetscInt n, PetscReal **array)
 /* Rank 0 has read the small arrays; the sizes come first, since the others allocate by them. */
 static PetscErrorCode SpreadContent(HycoFOM f, Content *c)
 {
-  PetscInt size[3] = {c->cell_cols, c->n_steps, c->n_orders};
+  PetscInt size[4] = {c->cell_cols, c->n_steps, c->n_orders, c->n_taken};
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Bcast(size, 3, MPIU_INT, 0, HycoComm(f)));
+  PetscCallMPI(MPI_Bcast(size, 4, MPIU_INT, 0, HycoComm(f)));
   c->cell_cols = size[0];
   c->n_steps = size[1];
   c->n_orders = size[2];
+  c->n_taken = size[3];
   PetscCall(Spread(f, N_HEAD, &c->head));
   PetscCall(Spread(f, (c->n_steps + 1) * STEP_COLS(f), &c->steps));
   if (c->n_orders) PetscCall(Spread(f, c->n_orders, &c->orders));
+  if (c->n_taken) PetscCall(Spread(f, c->n_taken, &c->taken));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -459,6 +467,9 @@ static PetscErrorCode TakeContent(HycoFOM f, const Content *c)
   PetscCall(PetscFree(p->orders));
   HycoDuplicate(c->n_orders, c->orders, &p->orders);
   p->n_orders = p->room_orders = c->n_orders;
+  PetscCall(PetscFree(p->taken));
+  HycoDuplicate(c->n_taken, c->taken, &p->taken);
+  p->n_taken = p->room_taken = c->n_taken;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

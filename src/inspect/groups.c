@@ -41,45 +41,29 @@ static PetscErrorCode FindAlike(HycoInspection *in, HycoMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets used[g] for the group `name`; fails if there is none. */
-static PetscErrorCode Use(HycoMesh m, const char key[], const char name[], PetscBool used[])
+/* Sets used[] for the group `name`; fails if there is none. */
+static PetscErrorCode Use(const char key[], const char name[], void *context)
 {
+  HycoInspection *in = (HycoInspection *)context;
   PetscInt g = 0;
 
   PetscFunctionBegin;
-  PetscCall(HycoMeshFindGroup(m, key, name, &g));
-  used[g] = PETSC_TRUE;
+  PetscCall(HycoMeshFindGroup(in->whole->part, key, name, &g));
+  in->used[g] = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Marks the groups used in the scene: bodies, supports, loads, contacts with the entries of their types, outputs, the
-   region of interest. */
-static PetscErrorCode MarkUsed(HycoScene s, HycoMesh m, PetscBool used[])
+/* Marks the groups of the scene's entries and of the region of interest. */
+static PetscErrorCode MarkUsed(HycoInspection *in)
 {
   char *region[64];
   PetscInt n = 64;
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < s->n_bodies; k++) PetscCall(Use(m, "body", s->body[k].name, used));
-  for (PetscInt k = 0; k < s->n_fixed; k++) PetscCall(Use(m, "fixed", s->fixed[k].group, used));
-  for (PetscInt k = 0; k < s->n_loads; k++) PetscCall(Use(m, "load", s->load[k].group, used));
-  for (PetscInt k = 0; k < s->n_point_loads; k++) PetscCall(Use(m, "force", s->point_load[k].group, used));
-  for (PetscInt k = 0; k < s->n_springs; k++) PetscCall(Use(m, "spring", s->spring[k].group, used));
-  for (PetscInt k = 0; k < 2 * s->n_ties; k++)
-    PetscCall(Use(m, "tie", k % 2 ? s->tie[k / 2].master : s->tie[k / 2].slave, used));
-  for (PetscInt k = 0; k < s->n_contacts; k++) {
-    for (PetscInt j = 0; j < s->contact[k]->entries.n; j++) {
-      const HycoEntry *entry = &s->contact[k]->entries.entry[j];
-
-      if (entry->kind == HYCO_ENTRY_GROUP && entry->text) PetscCall(Use(m, "contact", entry->text, used));
-    }
-  }
-  for (PetscInt k = 0; k < s->n_quantities; k++) {
-    if (s->quantity[k].group) PetscCall(Use(m, "output", s->quantity[k].group, used));
-  }
-  PetscCall(PetscOptionsGetStringArray(s->options, NULL, "-hyco_rid_groups", region, &n, NULL));
+  PetscCall(HycoSceneVisitGroups(in->whole->scene, Use, in));
+  PetscCall(PetscOptionsGetStringArray(in->whole->scene->options, NULL, "-hyco_rid_groups", region, &n, NULL));
   for (PetscInt k = 0; k < n && n < 64; k++) {
-    PetscCall(Use(m, "hyco_rid_groups", region[k], used));
+    PetscCall(Use("hyco_rid_groups", region[k], in));
     PetscCall(PetscFree(region[k]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -97,6 +81,6 @@ PetscErrorCode HycoInspectGroups(HycoInspection *in)
     in->empty[g] = (PetscBool)(m->group_start[g] == m->group_start[g + 1]);
   }
   PetscCall(FindAlike(in, m));
-  PetscCall(MarkUsed(in->whole->scene, m, in->used));
+  PetscCall(MarkUsed(in));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -167,6 +167,7 @@ static PetscErrorCode Cut(const Data *d, PetscInt n_parts, PetscInt part[])
   PetscCall(CellGraph(d->mesh, d->n_pairs, d->pairs, &graph));
   if (d->by == HYCO_PARTITION_METIS) PetscCall(ByMetis(d->mesh->n_cells, &graph, n_parts, part, &done));
   if (!done) PetscCall(ByScotch(d->mesh->n_cells, &graph, n_parts, part));
+  PetscCall(FillParts(d->mesh->n_cells, n_parts, part));
   PetscCall(PetscFree(graph.xadj));
   PetscCall(PetscFree(graph.adjncy));
   PetscCall(PetscFree(graph.weight));
@@ -185,10 +186,7 @@ static PetscErrorCode Partition(PetscPartitioner partitioner, PetscInt n_parts, 
   PetscFunctionBegin;
   (void)start, (void)adjacent, (void)weights, (void)targets;
   PetscCall(PetscMalloc1(n, &part));
-  if (n && d->mesh) {
-    PetscCall(Cut(d, n_parts, part));
-    PetscCall(FillParts(n, n_parts, part));
-  }
+  HycoOnEach(PetscObjectComm((PetscObject)partitioner), n && d->mesh ? Cut(d, n_parts, part) : PETSC_SUCCESS);
   for (PetscInt c = 0; c < n; c++) PetscCall(PetscSectionAddDof(sizes, part[c], 1));
   PetscCall(PetscMalloc1(n, &cells));
   for (PetscInt p = 0; p < n_parts; p++) {

@@ -77,24 +77,19 @@ static PetscErrorCode AddOwnPoints(DM dm, HycoCellType type, PetscInt nv, PetscI
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the scene uses a group. */
-static PetscBool IsNamed(HycoScene scene, const char group[])
-{
-  for (PetscInt k = 0; k < scene->n_fixed; k++) {
-    if (!strcmp(scene->fixed[k].group, group)) return PETSC_TRUE;
-  }
-  for (PetscInt k = 0; k < scene->n_point_loads; k++) {
-    if (!strcmp(scene->point_load[k].group, group)) return PETSC_TRUE;
-  }
-  for (PetscInt k = 0; k < scene->n_springs; k++) {
-    if (!strcmp(scene->spring[k].group, group)) return PETSC_TRUE;
-  }
-  for (PetscInt k = 0; k < scene->n_contacts; k++) {
-    const HycoContact c = scene->contact[k];
+/* Whether an entry of the scene names a group. */
+typedef struct {
+  const char *group;
+  PetscBool named;
+} Asked;
 
-    if (!strcmp(c->slave, group) || (c->master && !strcmp(c->master, group))) return PETSC_TRUE;
-  }
-  return PETSC_FALSE;
+static PetscErrorCode Compare(const char key[], const char name[], void *context)
+{
+  Asked *asked = (Asked *)context;
+
+  (void)key;
+  if (!strcmp(name, asked->group)) asked->named = PETSC_TRUE;
+  return PETSC_SUCCESS;
 }
 
 /* Refuses vertices of a group that belong to none of its cells or facets: those of lines in space, or of facets
@@ -103,9 +98,11 @@ static PetscErrorCode CheckVertices(DM dm, HycoScene scene, const char name[], D
 {
   PetscInt n, v0, v1, value;
   const PetscInt *point;
+  Asked asked = {name, PETSC_FALSE};
 
   PetscFunctionBegin;
-  if (!IsNamed(scene, name)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoSceneVisitGroups(scene, Compare, &asked));
+  if (!asked.named) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(DMPlexGetDepthStratum(dm, 0, &v0, &v1));
   for (PetscInt k = 2; k <= 4; k++) {
     IS points;

@@ -283,5 +283,19 @@ output: {low: {min: u_y}, wall: {reaction: x}}
                     self.assertIn(said, run.stderr)
 
 
+    def test_refined(self):
+        """A group of facets between cells is refused when the mesh is refined, also if an output alone names it."""
+        grid = column('quad4')
+        middle = [i + 1 for i, x in enumerate(grid.nodes) if x[1] == 1]
+        for a, b in zip(middle, middle[1:]):
+            grid.elements.append((GMSH['line2'], grid._tag('middle', 1), [a, b]))
+        base = 'body: {block: {young: 200}}\nfixed: {y0: {x: 0, y: 0}}\n'
+        text = COUNT % '' + base + 'traction: {y1: {y: 1}}\noutput: {sink: {max: u_y, group: middle}}\n'
+        for ranks in (0, 2):
+            run = self.run_raw('solve', '-scene', self.written(text, grid), '-scene_refine', '1', ranks=ranks)
+            with self.subTest(ranks=ranks):
+                self.assertEqual(run.returncode, 1, run.stdout)
+                self.assertIn('the group middle has lines in 3D or facets between two cells', run.stderr)
+
 if __name__ == '__main__':
     unittest.main()

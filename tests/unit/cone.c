@@ -481,7 +481,7 @@ static PetscErrorCode ProjectedGradients(const Case *c, const PetscReal W[], con
   PetscCall(PetscArrayzero(r, c->m));
   for (; change > 1e-14 && its < 200000; its++) {
     change = Next(c, PETSC_FALSE, 1 / PetscSqrtReal(sum), W, q, r, next);
-    PetscCall(PetscArraycpy(r, next, c->m));
+    for (PetscInt i = 0; i < c->m; i++) r[i] = next[i]; /* by hand: gcc 14 takes the size of a copy for negative */
   }
   CHECK(change < 1e-13, "projected gradients change by %g after %d iterations", (double)change, (int)its);
   PetscFunctionReturn(PETSC_SUCCESS);
