@@ -230,6 +230,13 @@ void HycoBodiesFrictionRestore(HycoBodiesFriction friction, HycoBodiesWork work)
 void HycoBodiesFrictionNormal(HycoBodiesFriction friction, PetscReal Lambda[]);
 const HycoSlip *HycoBodiesFrictionSlip(HycoBodiesFriction friction);
 PetscBool HycoBodiesFrictionDisproven(HycoBodiesFriction friction);
+/* M of n contacts at the prepared parameters: p + n square by columns. */
+PetscErrorCode HycoBodiesMatrix(HycoBodiesWork work, PetscInt n, const PetscInt contact[], PetscReal M[]);
+/* Ops of gradients. */
+PetscErrorCode HycoBodiesUnknowns(HycoROM model, PetscInt *p, PetscInt *n, PetscReal z[]);
+PetscErrorCode HycoBodiesResidual(HycoROM model, const PetscReal mu[], const PetscReal z[], PetscReal w[],
+                                  PetscReal *size);
+PetscErrorCode HycoBodiesJacobian(HycoROM model, PetscInt k, const PetscInt contact[], PetscReal M[]);
 /* Sets the displacements of the surfaces and, after HycoBodiesExpand(), of the unknowns inside in U (by unknown of the
    surface's mesh) without prescribed ones. */
 void HycoBodiesMove(HycoBodiesWork work, const HycoBodiesSurface *surface, PetscReal U[]);

@@ -136,13 +136,13 @@ struct _p_HycoROM {
   HycoSolver solver;
   void *work; /* the type's */
   /* created when needed */
-  HycoMesh beyond;              /* mesh without cells */
-  HycoFE fe_beyond;             /* on it */
+  HycoFE fe_beyond;             /* on mesh without its cells */
   HycoFE fe_whole;              /* on whole */
   HycoFE fe_floating;           /* on the loaded cells of the bodies that contact alone holds */
   HycoOutputCells output_cells; /* of the scene's quantities */
   HycoCarried carried;          /* results of the contacts (contact_results.c) */
   HycoBalance balance;          /* data kept by HycoROMGetEquilibrium() */
+  HycoGradientStore gradient;   /* of HycoROMGetGradient() */
   HycoRows rows;                /* of B over dofs of mesh, all contacts; current after HycoROMComplete() */
   /* the last prediction */
   PetscBool solved;

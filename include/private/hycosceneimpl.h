@@ -109,6 +109,8 @@ typedef struct {
 typedef struct {
   char *name, *slave, *master;
   PetscReal tolerance; /* largest distance in the mesh file; negative: derived from the slave's facets */
+  PetscBool mortar; /* a slave follows its mean over the facets around it, by the integrals of mortar contacts; else the
+                          nearest point */
 } HycoTie;
 
 /* The formulation of a 2D scene: plane strain (thickness 1, eps_zz = 0), plane stress (sigma_zz = 0), or a body of

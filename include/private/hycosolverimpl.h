@@ -185,6 +185,19 @@ PetscErrorCode HycoSolverGetLinearIterations(HycoSolver s, PetscInt *its, PetscI
 /* S = B K^-1 Bt of the last solve, which was in the dual form with a factor of a regular K: m x m column major, the
    same on every rank. Borrowed until a matrix changes. Collective. */
 PetscErrorCode HycoSolverGetFlexibility(HycoSolver s, PetscInt *m, const PetscReal *S[]);
+/* The matrix of the dual problem after HycoSolverFactor(): S, p + m square, p unknowns pinned before the m contacts. Borrowed. */
+void HycoSolverGetCondensed(HycoSolver s, PetscInt *m, PetscInt *p, const PetscReal *S[]);
+/*
+  The derivative of the solution x, L of s's system (tangent.c): HycoSolverTangentSolve() gives x' and L' where F - K x -
+  Bt L changes by r, and D - B x by g, at fixed x and L; g and dL are not used without contacts. sign, *kink as in
+  HycoTangentSolve(). Needs a factor of K. HycoSolverTangentDestroy() is NULL-safe. Collective.
+*/
+typedef struct _n_HycoSolverTangent *HycoSolverTangent;
+PetscErrorCode HycoSolverTangentCreate(HycoSolver s, Vec x, Vec L, HycoSolverTangent *tangent);
+PetscErrorCode HycoSolverTangentDestroy(HycoSolverTangent *tangent);
+PetscErrorCode HycoSolverTangentSolve(HycoSolverTangent tangent, Vec r, Vec g, int sign, Vec dx, Vec dL,
+                                      PetscBool *kink);
+PetscInt HycoSolverTangentUndecided(HycoSolverTangent tangent);
 /* x[j] = K^-1 r[j] with the factor of the last solve, for k right-hand sides. Collective. */
 PetscErrorCode HycoSolverApplyInverse(HycoSolver s, PetscInt k, Vec r[], Vec x[]);
 

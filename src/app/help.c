@@ -41,7 +41,7 @@ static const struct {
   const char *subject, *beginnings;
 } subjects[] = {
     {"files and text", "scene model output report table quiet progress"},
-    {"points", "mu grid values_ points scatter extrapolate check_solve"},
+    {"points", "mu grid values_ points scatter extrapolate check_solve gradient"},
     {"accuracy of a training", "target_ hyco_validation validation_ hyco_search hyco_model_type"},
     {"greedy training", "greedy training_grid target max_ hyco_greedy_"},
     {"solutions of a training", "hyco_groups hyco_snapshots"},

@@ -185,7 +185,7 @@ static int Help(char **argv)
   MPI_Comm_rank(MPI_COMM_WORLD, &rank);
   if (rank == 0) {
     if (!command && argv[1] && argv[2]) command = FindCommand(argv[2]); /* hyco help COMMAND */
-    ierr = DriverHelp(command);
+    ierr = !command && argv[1] && argv[2] && strcmp(argv[2], "output") == 0 ? DriverHelpOutput() : DriverHelp(command);
   }
   fflush(stdout); /* PETSc gives the signal of a closed pipe back at its end */
   return HycoFinalize() || ierr ? DRIVER_FAILED : DRIVER_DONE;

@@ -14,6 +14,7 @@
       char *: 'S',                                                                                                     \
       const char *: 'z',                                                                                               \
       const PetscReal *: 'p',                                                                                          \
+      const PetscBool *: 'p',                                                                                          \
       const HycoStep *: 'p',                                                                                           \
       default: 'i')
 #define ITEM(x) _Generic((x), PetscReal *: sizeof(PetscReal), char *: sizeof(char), default: sizeof(x))
@@ -67,6 +68,11 @@ static const HycoMember prediction[] = {
   F(seconds.assemble), F(seconds.factor), F(seconds.solve), F(seconds.total), F(n_dependent)};
 #undef F
 
+#define F(member) FIELD(HycoGradient, member)
+static const HycoMember gradient[] = {
+  F(n_outputs), F(n_parameters), F(n_undecided), F(value), F(kink)};
+#undef F
+
 #define F(member) FIELD(HycoTraining, member)
 static const HycoMember training[] = {
   F(type), F(summary), F(missed), F(next), F(n_samples), F(n_modes), F(n_dual_modes), F(n_stress_modes),
@@ -88,6 +94,7 @@ static const struct {
     STRUCT(HycoReaction, reaction),
     STRUCT(HycoContactResult, contact_result),
     STRUCT(HycoPrediction, prediction),
+    STRUCT(HycoGradient, gradient),
     STRUCT(HycoTraining, training),
     {"PetscInt", sizeof(PetscInt), 0, NULL},
     {"PetscReal", sizeof(PetscReal), 0, NULL},

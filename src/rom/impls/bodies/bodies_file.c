@@ -62,6 +62,7 @@ static PetscErrorCode MoveProbe(HycoH5 h, HycoROM m, HycoSubstructures b)
   PetscFunctionBegin;
   PetscCall(HycoMeshMove(h, "bodies/mesh", m->model->scene->n_bodies, &b->probe));
   if (HycoH5Reads(h)) PetscCall(HycoMeshSetTies(b->probe, m->model->mesh->ties));
+  if (HycoH5Reads(h)) PetscCall(HycoMeshCreateDM(m->model->scene, b->probe));
   PetscCall(HycoH5Int(h, "bodies/cell", 0, b->probe->n_cells - 1, &b->n, 1, &b->cell));
   PetscCall(HycoH5Real(h, "bodies/first", &b->n_variables, 1, &b->first));
   PetscCall(HycoH5Int(h, "bodies/at", 0, b->probe->n_nodes * b->dim - 1, &b->r, 1, &b->at));

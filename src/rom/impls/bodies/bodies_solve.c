@@ -182,7 +182,7 @@ PetscErrorCode HycoBodiesSetUp(HycoBodiesWork o, HycoSubstructures b, HycoScene 
   o->solver = solver ? solver : o->own;
   PetscCall(PetscCalloc1(b->n, &o->weight));
   for (PetscInt k = 0; k < b->n; k++) PetscCall(PetscMalloc1(b->body[k].n_samples, &o->weight[k]));
-  PetscCall(HycoFECreate(scene, b->probe, &o->fe));
+  PetscCall(HycoFECreate(scene, b->probe->dm, &o->fe));
   o->fe->heat_is_load = PETSC_TRUE;
   PetscCall(PetscMalloc1(3 * b->probe->nv * b->n, &o->X0));
   PetscCall(PetscMalloc1(b->n, &o->E0));
@@ -525,6 +525,18 @@ static PetscErrorCode SolveSet(HycoBodiesWork o, Problem *p, PetscBool *solved)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Frees what Fill() made. */
+static PetscErrorCode Release(HycoBodiesWork o, Problem *p)
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; p->C && k < o->bodies->n; k++) PetscCall(PetscFree(p->C[k]));
+  if (p->C) PetscCall(PetscFree2(p->first, p->C));
+  HycoFreeAll(&p->M, &p->at, &p->place);
+  PetscCall(PetscFree3(p->q, p->z, p->y));
+  p->n_place = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode SolveProblem(HycoBodiesWork o, Problem *p, PetscReal Lambda[], PetscBool *solved)
 {
   const HycoSubstructures b = o->bodies;
@@ -542,11 +554,21 @@ static PetscErrorCode SolveProblem(HycoBodiesWork o, Problem *p, PetscReal Lambd
   for (PetscInt i = 0; i < b->p; i++) o->x[i] = p->z[i];
   for (PetscInt k = 0; k < p->n; k++) /* negative by round-off; the residuals are recomputed */
     Lambda[p->contact[k]] = b->p && !o->active[k] ? 0 : PetscMax(p->z[b->p + k], 0);
-  for (PetscInt k = 0; p->C && k < b->n; k++) PetscCall(PetscFree(p->C[k]));
-  if (p->C) PetscCall(PetscFree2(p->first, p->C));
-  HycoFreeAll(&p->M, &p->at, &p->place);
-  PetscCall(PetscFree3(p->q, p->z, p->y));
-  p->n_place = 0;
+  PetscCall(Release(o, p));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBodiesMatrix(HycoBodiesWork o, PetscInt n, const PetscInt contact[], PetscReal M[])
+{
+  const size_t size = (size_t)(o->bodies->p + n);
+  Problem p = {.n = n};
+
+  PetscFunctionBegin;
+  HycoDuplicate(n, contact, &p.contact);
+  PetscCall(Fill(o, &p));
+  PetscCall(PetscArraycpy(M, p.M, size * size));
+  PetscCall(Release(o, &p));
+  PetscCall(PetscFree(p.contact));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -280,7 +280,7 @@ static PetscErrorCode TakeSurfaces(HycoReducer t, HycoCondensed c)
   PetscCall(HycoSubmeshNodes(s->mesh, surface, extra));
   for (PetscInt i = 0; i < s->mesh->n_nodes; i++) index[extra[i]] = i;
   PetscCall(HycoPairsRenumber(&t->fom->pairs, index, &s->pairs));
-  PetscCall(HycoFECreate(t->scene, s->mesh, &s->fe));
+  PetscCall(HycoFECreate(t->scene, s->mesh->dm, &s->fe));
   PetscCall(HycoRowsCreate(&t->fom->pairs, surface->dim, &s->rows));
   c->given = (HycoGapSource){s->fe, &s->pairs, s->rows};
   PetscCall(PetscFree3(extra, index, all));

@@ -386,6 +386,15 @@ PetscErrorCode HycoSolverFormCreate_Dual(HycoSolver s, HycoSolverForm form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+void HycoSolverGetCondensed(HycoSolver s, PetscInt *m, PetscInt *p, const PetscReal *S[])
+{
+  const Dual *d = (const Dual *)HycoSolverFindForm(s, "dual")->data;
+
+  *m = d->m;
+  *p = d->p;
+  *S = d->S;
+}
+
 /* Borrowed until the next solve: S by columns, m x m, on every rank. */
 PetscErrorCode HycoSolverGetFlexibility(HycoSolver s, PetscInt *m, const PetscReal *S[])
 {
