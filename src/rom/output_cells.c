@@ -185,9 +185,10 @@ static PetscErrorCode Measure(HycoROM m, HycoOutputCells p, const PetscReal Lamb
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Forces of all contacts at a listed time of the path. */
+/* Forces of all contacts at a listed time of the path, whose friction they have. */
 static const PetscReal *ForcesAt(HycoROM m, PetscInt listed)
 {
+  HycoTraceShow(m, listed);
   return m->trace.Lambda + (size_t)listed * (size_t)m->model->pairs.n;
 }
 
