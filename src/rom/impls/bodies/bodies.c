@@ -17,7 +17,7 @@
 
 static HycoBodiesSurface SurfaceOf(HycoROM m)
 {
-  return (HycoBodiesSurface){m->fe, &m->model->pairs, &m->rows};
+  return HycoBodiesSurfaceNormal(m->fe, &m->model->pairs, &m->rows);
 }
 
 static PetscErrorCode SetUp(HycoROM m)
@@ -267,7 +267,7 @@ const char *const *HycoBodiesVariants(HycoReducer t)
 {
   static const char *const variants[] = {"interpolation", "cubature", NULL};
 
-  return t->scene->n_times && !HycoTrainingOfBodies(t)->named ? variants : NULL;
+  return HycoBodiesFlow(t) && !HycoTrainingOfBodies(t)->named ? variants : NULL;
 }
 
 PetscErrorCode HycoBodiesSetVariant(HycoReducer t, const char name[])
@@ -378,6 +378,7 @@ PetscErrorCode HycoROMCreate_Bodies(HycoROM m)
                                        .integrals = PETSC_TRUE,
                                        .cells = PETSC_TRUE,
                                        .uniform = PETSC_TRUE,
+                                       .friction = PETSC_TRUE,
                                        .work = sizeof(*(HycoBodiesWork)NULL),
                                        .resultants = PETSC_TRUE};
   static const HycoROMOps ops = {.setfromoptions = HycoBodiesOptions,

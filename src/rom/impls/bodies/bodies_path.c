@@ -61,6 +61,29 @@ static PetscErrorCode Retry(HycoPath p, PetscReal alpha[], PetscReal Lambda[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A step with friction: elastic bodies. */
+static PetscErrorCode Rub(HycoROM m, HycoPath p, HycoStepAttempt *a)
+{
+  HycoBodiesPath w = (HycoBodiesPath)m->work;
+  const HycoBodiesSurface s = HycoBodiesSurfaceOf(m);
+  PetscScalar *L;
+  PetscBool solved;
+
+  PetscFunctionBegin;
+  PetscCall(HycoBodiesFrictionSolve(w->friction, &w->bodies, &p->kkt, &a->active_its, &solved));
+  a->iterations = 1;
+  a->law.dt_factor = 1; /* no law asks for shorter steps */
+  a->converged = solved;
+  if (!solved) HycoFormat(a->why, "not converged: no contact forces with this friction balance the load");
+  PetscCall(VecGetArray(p->Lambda, &L));
+  HycoBodiesFrictionNormal(w->friction, L);
+  PetscCall(PetscArraycpy(m->Lambda, L, m->model->pairs.n));
+  PetscCall(VecRestoreArray(p->Lambda, &L));
+  PetscCall(HycoBodiesExpand(&w->bodies, m->gamma));
+  HycoBodiesMove(&w->bodies, &s, m->U);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAttempt *a)
 {
   HycoROM m = (HycoROM)p->ctx;
@@ -68,6 +91,10 @@ static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAt
   PetscScalar *alpha, *L;
 
   PetscFunctionBegin;
+  if (w->friction) {
+    PetscCall(Rub(m, p, a));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(VecGetArray(p->U, &alpha));
   PetscCall(VecGetArray(p->Lambda, &L));
   w->always = (PetscBool)(p->method == HYCO_NEWTON_TANGENT);
@@ -114,6 +141,10 @@ static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elast
   PetscFunctionBegin;
   (void)elastic;
   PetscCall(HycoROMBringRows(m, mu));
+  if (w->friction) {
+    PetscCall(HycoBodiesFrictionPrepare(w->friction, &w->bodies, mu));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(HycoBodiesPrepare(&w->bodies, &s, mu));
   if (Unchanged(m)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoBodiesForget(m));
@@ -129,11 +160,13 @@ static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
 
   PetscFunctionBegin;
   PetscCall(VecGetArrayRead(p->U, &alpha));
-  PetscCall(HycoBodiesExpand(&w->bodies, m->gamma));
-  HycoBodiesAddStrains(&w->bodies, alpha, m->gamma);
+  if (!w->friction) PetscCall(HycoBodiesExpand(&w->bodies, m->gamma));
+  if (!w->friction) HycoBodiesAddStrains(&w->bodies, alpha, m->gamma);
   PetscCall(VecRestoreArrayRead(p->U, &alpha));
   PetscCall(HycoTraceAdd(m, p->t));
   p->now.stored = a->law.stored;
+  if (w->friction) PetscCall(HycoBodiesFrictionAccept(w->friction));
+  if (w->friction) p->now.disproven += HycoBodiesFrictionDisproven(w->friction);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -154,6 +187,20 @@ static PetscReal Misfit(HycoROM m, const PetscReal alpha[])
   return size > 0 ? PetscSqrtReal(rest / size) : 0;
 }
 
+/* The state of the contacts at a listed time. */
+static PetscErrorCode RecordFriction(HycoROM m, HycoStep *s)
+{
+  const HycoSlip *slip = HycoBodiesFrictionSlip(((HycoBodiesPath)m->work)->friction);
+  PetscReal sum[2];
+
+  PetscFunctionBegin;
+  HycoSlipSum(slip, sum);
+  s->friction_work = sum[0];
+  s->n_slipping = (PetscInt)sum[1];
+  PetscCall(HycoTraceListShear(m, &slip->shear));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Record(HycoPath p)
 {
   HycoROM m = (HycoROM)p->ctx;
@@ -165,6 +212,10 @@ static PetscErrorCode Record(HycoPath p)
   PetscCall(VecGetArrayRead(p->Lambda, &L));
   PetscCall(PetscArraycpy(m->Lambda, L, m->model->pairs.n));
   PetscCall(VecRestoreArrayRead(p->Lambda, &L));
+  if (w->friction && p->why[0]) { /* the last step may have been refused */
+    HycoBodiesFrictionRestore(w->friction, &w->bodies);
+    PetscCall(HycoBodiesExpand(&w->bodies, m->gamma));
+  }
   PetscCall(HycoROMExpand(m));
   MoveAll(m);
   PetscCall(VecGetArrayRead(p->U, &alpha));
@@ -174,6 +225,7 @@ static PetscErrorCode Record(HycoPath p)
                              &report));
   p->now.stored += report.stored;
   PetscCall(HycoTraceRecord(m, p->begin, &p->now));
+  if (w->friction) PetscCall(RecordFriction(m, &p->now));
   p->steps[p->n_steps++] = p->now;
   PetscCall(PetscMemzero(&p->now, sizeof(p->now)));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -306,7 +358,9 @@ static PetscErrorCode SetUp(HycoROM m)
   m->n = w->bodies.bodies->inelastic->m;
   m->fe->all_facets = PETSC_TRUE;
   s = HycoBodiesSurfaceOf(m);
-  PetscCall(HycoBodiesSetUp(&w->bodies, w->bodies.bodies, m->model->scene, &s, m->solver));
+  if (HycoSceneHasFriction(m->model->scene)) PetscCall(HycoBodiesFrictionCreate(m->model->scene, &s, &w->friction));
+  PetscCall(HycoBodiesSetUp(&w->bodies, w->bodies.bodies, m->model->scene,
+                            w->friction ? HycoBodiesFrictionSurface(w->friction) : &s, m->solver));
   PetscCall(FindUnknowns(m));
   PetscCall(FindPoints(m));
   PetscCall(Allocate(m));
@@ -328,6 +382,7 @@ static PetscErrorCode Reset(HycoROM m)
   PetscCall(VecDestroy(&w->L));
   PetscCall(HycoPathFree(&w->path));
   if (w->bodies.bodies) PetscCall(HycoBodiesReset(&w->bodies));
+  PetscCall(HycoBodiesFrictionDestroy(&w->friction));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -338,8 +393,10 @@ static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
   PetscFunctionBegin;
   w->misfit = 0;
   HycoBodiesRestart(m); /* the same factors whatever was predicted before */
+  if (w->friction) PetscCall(HycoBodiesFrictionBegin(w->friction));
   PetscCall(HycoTraceFollow(m, w->path, mu));
-  PetscCall(PetscStrncpy(m->prediction.method, HycoNewtons[w->path->method], sizeof(m->prediction.method)));
+  PetscCall(PetscStrncpy(m->prediction.method, w->friction ? HYCO_SOLVER_SEMISMOOTH : HycoNewtons[w->path->method],
+                         sizeof(m->prediction.method)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -425,6 +482,8 @@ PetscErrorCode HycoBodiesTakePath(HycoROM m)
                                        .history = PETSC_TRUE,
                                        .surfaces = PETSC_TRUE,
                                        .cells = PETSC_TRUE,
+                                       .friction = PETSC_TRUE,
+                                       .integrals = PETSC_TRUE,
                                        .work = sizeof(struct _n_HycoBodiesPath),
                                        .resultants = PETSC_TRUE};
   static const HycoROMOps ops = {.setfromoptions = HycoBodiesOptions,

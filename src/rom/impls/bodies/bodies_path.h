@@ -9,6 +9,7 @@
 typedef struct _n_HycoBodiesPath {
   struct _n_HycoBodiesWork bodies; /* the first, as in the model without a history */
   HycoPath path;
+  HycoBodiesFriction friction; /* NULL: no contact has any */
   Vec alpha, L;
   PetscInt *at, *cell_at;   /* by unknown of the cells: of fe's mesh; by cell and its unknown: its row, or -1 */
   PetscInt *point, n_rows;  /* the points in the model's mesh; n_sigma rows each: */
@@ -38,7 +39,7 @@ typedef struct _n_HycoBodiesPath {
 
 static inline HycoBodiesSurface HycoBodiesSurfaceOf(HycoROM m)
 {
-  return (HycoBodiesSurface){m->fe, &m->model->pairs, &m->rows};
+  return HycoBodiesSurfaceNormal(m->fe, &m->model->pairs, &m->rows);
 }
 
 /* Forgets the responses of the contacts and the set, after a change of rows or stiffness; takes strains and responses of the

@@ -47,6 +47,11 @@ static PetscErrorCode CheckChanges(HycoReducer t)
                    "bodies does not support that: train a hybrid model",
                    s->parameter[shape[0]], parts->name[k]);
   }
+  for (PetscInt k = 0; k < parts->n; k++)
+    HycoCheckModel(!flows[k] || !HycoSceneHasFriction(s),
+                   "the scene has friction, and body %s deforms inelastically; models of bodies with friction are for "
+                   "elastic bodies: use hyco solve",
+                   parts->name[k]);
   PetscCall(PetscFree(flows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
