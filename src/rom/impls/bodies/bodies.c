@@ -232,8 +232,8 @@ PetscErrorCode HycoBodiesOptions(HycoReducer t)
                             "bodies, with a history: energy left out of the modes of the inelastic strain", 0, 1,
                             &s->inelastic_tol, &set[0]));
   PetscCall(HycoOptionsInt("-hyco_bodies_cells",
-                           "bodies, with a history: number of points with laws for each mode of the inelastic strain", 1,
-                           1000000, &s->cells, &set[1]));
+                           "bodies, with a history: number of points with laws for each mode of the inelastic strain",
+                           1, 1000000, &s->cells, &set[1]));
   PetscCall(HycoOptionsWord("-hyco_bodies_laws",
                             "bodies, with a history: coefficients of the inelastic modes by interpolation at few "
                             "points, or by Galerkin's method with a cubature (auto: where a law yields)",
