@@ -95,17 +95,19 @@ typedef struct {
   PetscReal *gram;             /* r x r: of the errors of R at held-out samples in the norm of C^-1, summed; 0 */
 } HycoSubstructure;
 
-/* What is inelastic: u = ... + P alpha / kappa, alpha = T q, with the inelastic forces q of the cells of the model. */
+/* What is inelastic: u = ... + P alpha / kappa, alpha = T^T s of what the stresses lack of the elastic ones at few points. */
 typedef struct {
-  PetscInt m, n_cells;      /* modes of the nodal forces of inelastic strains; cells in which the laws are evaluated */
-  PetscReal amplification;  /* 2-norm of the inverse of the modes in these cells; 1 with a cubature */
-  PetscBool weighted;       /* a cubature, otherwise interpolation */
-  PetscReal *T, *there;     /* (n_cells nv dim) x m row major, cells in the order of the model's mesh: the coefficients
-                              are T^T q; the modes there */
-  PetscReal *P;             /* ns x m: surfaces */
-  PetscReal *fields;        /* modes of displacement, by body, sample and turn, x m */
-  PetscInt nd, *dof, *body; /* the cells' free unknowns (node of the whole mesh times dim plus component, ascending);
-                               their bodies */
+  PetscInt m, n_points; /* modes; integration points at which the laws are evaluated */
+  PetscInt *point;   /* the number of its cell in the whole mesh times the points of a cell, plus its own; ascending */
+  PetscReal *weight; /* of the points, at the bodies' first place */
+  PetscReal amplification; /* 2-norm of the inverse of the modes at these points; 1 with a cubature */
+  PetscBool weighted;      /* a cubature, otherwise interpolation */
+  PetscReal *T, *there;    /* (n_points n_sigma) x m row major: the coefficients are T^T s; the modes there (zero with a
+                              cubature) */
+  PetscReal *P;            /* ns x m: surfaces */
+  PetscReal *fields;       /* modes of displacement, by body, sample and turn, x m */
+  PetscInt nd, *dof, *body; /* the free unknowns of the points' cells (node of the whole mesh times dim plus component,
+                               ascending); their bodies */
   PetscReal *C, *R, *A;     /* their displacements: nd x ns, nd x r, nd x m */
 } * HycoBodiesInelastic;
 

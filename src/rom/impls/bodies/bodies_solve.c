@@ -50,7 +50,8 @@ PetscErrorCode HycoBodiesDestroy(HycoSubstructures *bodies)
   if (b->inelastic) {
     HycoBodiesInelastic s = b->inelastic;
 
-    HycoFreeAll(&s->T, &s->there, &s->P, &s->fields, &s->dof, &s->body, &s->C, &s->R, &s->A, &b->inelastic);
+    HycoFreeAll(&s->point, &s->weight, &s->T, &s->there, &s->P, &s->fields, &s->dof, &s->body, &s->C, &s->R, &s->A,
+                &b->inelastic);
   }
   PetscCall(PetscFree(*bodies));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -671,11 +672,10 @@ PetscErrorCode HycoBodiesStrain(HycoBodiesWork o, const HycoBodiesSurface *s, co
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(o->free, o->elastic, b->ns));
   for (PetscInt k = 0; k < b->n && m; k++) {
-    for (PetscInt i = b->start[k]; i < b->start[k + 1]; i++) {
-      const PetscReal *P = b->inelastic->P + (size_t)i * (size_t)m;
+    const PetscBLASInt rows = (PetscBLASInt)b->body[k].n, modes = (PetscBLASInt)m, each = 1;
+    const PetscReal factor = 1 / o->kappa[k], one = 1, *P = b->inelastic->P + (size_t)b->start[k] * (size_t)m;
 
-      for (PetscInt j = 0; j < m; j++) o->free[i] += P[j] * alpha[j] / o->kappa[k];
-    }
+    if (rows) BLASgemv_("T", &modes, &rows, &factor, P, &modes, alpha, &each, &one, o->free + b->start[k], &each);
   }
   for (PetscInt k = 0; k < s->n; k++) {
     o->gap[k] = s->rows->gap[k];
