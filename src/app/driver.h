@@ -421,12 +421,14 @@ PetscErrorCode CommandSolve(void);
 PetscErrorCode CommandTrain(void);
 PetscErrorCode CommandPredict(void);
 PetscErrorCode CommandCompare(void);
+PetscErrorCode CommandFit(void);
 PetscErrorCode CommandView(void);
 PetscErrorCode DeclareCheck(PetscOptions options);
 PetscErrorCode DeclareSolve(PetscOptions options);
 PetscErrorCode DeclareTrain(PetscOptions options);
 PetscErrorCode DeclarePredict(PetscOptions options);
 PetscErrorCode DeclareCompare(PetscOptions options);
+PetscErrorCode DeclareFit(PetscOptions options);
 PetscErrorCode DeclareView(PetscOptions options);
 
 #endif

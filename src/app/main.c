@@ -27,6 +27,10 @@ const Command commands[] = {
      "hyco compare -scene FOLDER -model M.h5 -mu V,V,... | -grid N,N,... [-report R.json] [-table T.csv]",
      "errors and speed-up of the reduced model, relative to full order, over a set of points",
      "HycoFOM HycoSolver HycoROM"},
+    {"fit", CommandFit, DeclareFit, "hyco fit -model M.h5 -target_OUTPUT V ... [-scene FOLDER] [-report R.json]",
+     "find the parameter values at which a model's outputs are closest to targets, within its ranges and by its "
+     "gradients; with -scene FOLDER the answer is checked by one full-order solve",
+     "HycoFOM HycoSolver HycoROM"},
     {"view", CommandView, DeclareView, "hyco view -model M.h5 | -scene FOLDER",
      "describe the contents of a model or a scene", ""},
     {NULL, NULL, NULL, NULL, NULL, NULL},

@@ -100,6 +100,7 @@ static const struct {
     STRUCT(HycoTraining, training),
     {"PetscInt", sizeof(PetscInt), 0, NULL},
     {"PetscReal", sizeof(PetscReal), 0, NULL},
+    {"PetscBool", sizeof(PetscBool), 0, NULL},
     {"MPI_Comm", sizeof(MPI_Comm), 0, NULL},
 };
 
