@@ -543,7 +543,6 @@ static PetscErrorCode Condense(HycoReducer t, HycoSnapshots store, HycoBodiesFac
   PetscCall(HycoBodiesSample(t, factor));
   if (HycoBodiesFlow(t)) PetscCall(HycoBodiesStrains(t, factor));
   PetscCall(HycoBodiesFields(t, store, factor));
-  if (b->inelastic) b->inelastic->n_cells = t->n_seeds_cell;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
