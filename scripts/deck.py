@@ -149,6 +149,11 @@ class Draft:
     def dim(self):
         return 3 if any(t.startswith("C3D") for t in self.deck.types) else 2
 
+    def quadratic(self):
+        """Whether there are cells of second order, for which node-to-surface contact is not available."""
+        sizes = [int(re.match(r"(?:C3D|CP[SE]|CAX)(\d+)", t)[1]) for t in self.deck.types if re.match(r"(?:C3D|CP[SE]|CAX)\d", t)]
+        return max(sizes, default=0) > (8 if self.dim() == 3 else 4)
+
     # ------------------------------------------------------------------------------------------------ reading
 
     def make(self):
@@ -669,7 +674,8 @@ class Draft:
 
     def contact(self, name):
         slave, master, interaction, reach, row, _ = self.contacts[name]
-        text, far = f"type: surface, slave: {slave}, master: {master}", self.reach(slave, master)
+        kind = "mortar" if self.quadratic() else "surface"
+        text, far = f"type: {kind}, slave: {slave}, master: {master}", self.reach(slave, master)
         if far and max(far[0], reach) > 0.1 * far[1]:
             text += f", tolerance: {said(float(f'{1.001 * max(far[0], reach):.3g}'))}"
         if (slave, master) in self.loose:

@@ -310,6 +310,18 @@ class Decks(Case):
             left, _ = self.convert('rubs', deck([a, b], rows.replace('*FRICTION\n0.2, 1e5\n', given) + hold, steps))
             self.assertEqual(len([line for line in left if '*FRICTION' in line]), 1, given)
 
+    def test_second_order(self):
+        """Contact pairs of cells of second order become mortars, which are solved: a uniform pressure between meshes that do not match."""
+        a, b = Box('A', 'C3D20', (0, 0, 0), (1, 1, 1), (2, 2, 1)).second(), Box('B', 'C3D20', (0, 0, 1), (1, 1, 2), (3, 3, 1), 1001).second()
+        text = deck([a, b], pair('B_SZ0', 'A_SZ1') + SYMMETRY + 'A_Z0, 3, 3\n', [('', '*STATIC\n1., 1.\n*DSLOAD\nB_SZ1, P, 300.\n')])
+        _, folder = self.convert('second', text)
+        with open(os.path.join(folder, 'scene.yaml'), encoding='utf-8') as file:
+            self.assertIn('type: mortar', file.read())
+        s = self.solve(folder)
+        self.near(s.total_contact_force, 300, 1e-10)
+        top = s.displacement[:, 2].min()
+        np.testing.assert_allclose(s.displacement[np.isclose(s.displacement[:, 2], top, rtol=1e-9), 2], -300 / 210000 * 2, rtol=1e-9)
+
     def test_loads(self):
         """Forces and pressures on single nodes and cells keep their values; several steps with amplitudes are a history; tied contact, clearance, shells, rigid
         facets, general contact and a dynamic step are what the draft says of them."""
