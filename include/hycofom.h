@@ -93,6 +93,7 @@ typedef struct {
   PetscReal order;        /* the median of these; 2 for the tangent */
   PetscInt n_taken;       /* number of accepted time steps, including the first time */
   const PetscReal *taken; /* their ends. Borrowed */
+  PetscInt n_bound;       /* number of steps that only -hyco_step_inelastic kept from growing; since a resumption */
 } HycoHistory;
 
 /* The derivatives of the scene's outputs with respect to its parameters, in the unit of the output over that of the

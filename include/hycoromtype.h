@@ -38,6 +38,7 @@ typedef struct {
   PetscBool own_modes; /* its modes are displacements of its own: solutions choose only the cells of its mesh, for which
                             those at held-out points serve, and a search tries it before the training points are solved */
   PetscBool integrals; /* it takes contacts whose rows are integrals, with any number of masters (type mortar) */
+  PetscBool friction;  /* it takes contacts with friction */
   PetscBool cells;     /* its mesh consists of the cells that it chooses, and of the surfaces of contacts and, without
                       `surfaces`, loads */
 } HycoROMTraits;

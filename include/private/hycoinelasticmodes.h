@@ -3,22 +3,11 @@
 #ifndef HYCOINELASTICMODES_H
 #define HYCOINELASTICMODES_H
 
-#include <hycomaterialimpl.h>
-#include <hycoreducerimpl.h>
+#include <hycoinelasticpoints.h>
 
 /* Sampled along the training paths: inelastic forces by cell; loads inside the bodies by cell; loads by node. */
 enum { HYCO_SAMPLED_INELASTIC, HYCO_SAMPLED_INSIDE, HYCO_SAMPLED_LOADS, HYCO_N_SAMPLED };
 
-/* Whether a cell's body may deform inelastically. */
-static inline PetscBool HycoInelasticFlows(HycoFE fe, PetscInt cell)
-{
-  return (PetscBool)!fe->scene->body[fe->mesh->cell_body[cell]].law->linear;
-}
-/* The unknown of fe's mesh that is unknown i of cell e. */
-static inline PetscInt HycoCellUnknown(HycoMesh m, PetscInt e, PetscInt i)
-{
-  return m->cells[e * m->nv + i / m->dim] * m->dim + i % m->dim;
-}
 /* The load of a cell from its supports and heat, K_e u0_e - heat_e, with fe's elastic tangents (load: nv x dim);
    heat_e (NULL: not wanted). */
 PetscErrorCode HycoInelasticCellLoad(HycoFE fe, PetscInt cell, PetscReal load[], PetscReal heat[]);

@@ -216,6 +216,9 @@ static inline PetscInt HycoMeshOwned(HycoMesh m, PetscInt node)
   return !m->node_global || (place >= 0 && place < m->n_owned) ? place : -1;
 }
 
+/* Turns the nodes of a facet of a cell (-1: unknown, kept) so that its normal points out of the cell. Facets of a mesh that
+   was made from a DM are turned; those of one that was read are as in the file. */
+void HycoMeshTurnFacet(HycoMesh mesh, PetscInt cell, PetscInt facet[]);
 /* The number of a facet in its cell. */
 PetscInt HycoMeshFacetNumber(HycoMesh mesh, PetscInt facet);
 /* The segments of a group of dimension 1 in space, n x 2 nodes, of second order n x 3 with the middle nodes: the

@@ -128,7 +128,7 @@ def _gradient(function, handle):
     at = [ctypes.c_void_p(int(g[name][0])) for name in ('value', 'kink')]
     g = g[0]
     shape = int(g['n_outputs']), int(g['n_parameters'])
-    return c.copied(at[0], shape), c.copied(at[1], shape, np.int32).astype(bool), int(g['n_undecided'])
+    return c.copied(at[0], shape), c.copied(at[1], shape, f"i{c.layout('PetscBool')[0]}").astype(bool), int(g['n_undecided'])
 
 
 class _Handle:

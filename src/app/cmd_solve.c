@@ -72,6 +72,8 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
   PetscCall(HycoFOMGetSolver(fom, &solver));
   PetscCall(HycoSolverGetMethod(solver, &method));
   PetscCall(HycoSolverGetLinear(solver, &linear));
+  if (!method[0]) method = HycoSceneHasFriction(scene) ? "semismooth" : "none"; /* friction has a solver of its own */
+  if (!linear[0]) linear = HycoSceneHasFriction(scene) ? "direct" : "none";
   ReportNumbers(json, {"n_dof", s->n_dof}, {"n_contacts", s->n_contacts}, {"n_active", s->n_active},
                 {"n_without_effect", s->n_still});
   cJSON_AddBoolToObject(json, "forces_unique", s->n_dependent == 0);

@@ -39,6 +39,9 @@ PetscErrorCode DriverReadFiles(char scene[], char model[], char output[], char r
 PetscErrorCode DriverRequire(const char name[], const char value[]);
 /* Prints the options of a command (NULL: all). On this process alone. */
 PetscErrorCode DriverHelp(const Command *command);
+/* hyco help output: a line for each key, column and dataset that the command writes, with tabs between its parts: place, commands, name,
+   kind, unit, meaning. */
+PetscErrorCode DriverHelpOutput(void);
 /* Whether an object of the command reads an option of the library. Of a model's, some are read by one command only. */
 PetscBool DriverReads(const Command *command, const HycoOption *option);
 
@@ -418,12 +421,14 @@ PetscErrorCode CommandSolve(void);
 PetscErrorCode CommandTrain(void);
 PetscErrorCode CommandPredict(void);
 PetscErrorCode CommandCompare(void);
+PetscErrorCode CommandFit(void);
 PetscErrorCode CommandView(void);
 PetscErrorCode DeclareCheck(PetscOptions options);
 PetscErrorCode DeclareSolve(PetscOptions options);
 PetscErrorCode DeclareTrain(PetscOptions options);
 PetscErrorCode DeclarePredict(PetscOptions options);
 PetscErrorCode DeclareCompare(PetscOptions options);
+PetscErrorCode DeclareFit(PetscOptions options);
 PetscErrorCode DeclareView(PetscOptions options);
 
 #endif

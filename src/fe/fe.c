@@ -164,6 +164,13 @@ PetscErrorCode HycoFECreate(HycoScene scene, DM dm, HycoFE *fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoFECreateRead(HycoScene scene, HycoMesh mesh, HycoFE *fe)
+{
+  PetscFunctionBegin;
+  PetscCall(Create(scene, NULL, mesh, fe));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFECreateSurface(HycoScene scene, DM dm, HycoFE *fe)
 {
   struct _n_HycoMesh *surface;

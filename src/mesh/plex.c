@@ -426,6 +426,12 @@ static void TurnOutward(HycoMesh m, PetscInt cell, PetscInt facet[])
   if (out < 0) Reverse(m->type, facet);
 }
 
+void HycoMeshTurnFacet(HycoMesh m, PetscInt cell, PetscInt facet[])
+{
+  if (cell >= 0) TurnOutward(m, cell, facet);
+  HycoFacetRepeatLast(m->nf, facet);
+}
+
 /* Adds a facet with a node that this process owns, of a cell or of a point without its cell (cell -1); `number` is its
    number in its cell. */
 static PetscErrorCode AddFacet(Builder *b, PetscInt cell, PetscInt point, PetscInt number, const PetscInt node[])
@@ -583,8 +589,7 @@ static PetscErrorCode PlaceFacets(Builder *b, PetscInt group)
     PetscInt *facet = m->facets + m->n_facets * m->nf;
 
     PetscCall(PetscArraycpy(facet, b->facet[k].node, m->nf));
-    if (b->facet[k].cell >= 0) TurnOutward(m, b->facet[k].cell, facet);
-    HycoFacetRepeatLast(m->nf, facet);
+    HycoMeshTurnFacet(m, b->facet[k].cell, facet);
     m->facet_group[m->n_facets] = group;
     if (b->sub) m->facet_point[m->n_facets] = b->facet[k].point;
     m->facet_cell[m->n_facets++] = b->facet[k].cell;

@@ -18,9 +18,10 @@ static PetscErrorCode ReadMesh(HycoReducer t)
   PetscCall(HycoReducerColumn(t, 0, mu));
   PetscCall(HycoFOMCreateMesh(HycoComm(t), t->scene, &t->fom));
   f = t->fom;
-  HycoCheck(!t->scene->n_times || !f->searches,
-            "the scene has a history, and a map moves a contact surface (type surface); reduced models do not support "
-            "this: draw the bodies where the map puts them, use type pair, or solve at full order by hyco solve -mu");
+  HycoCheck(
+      !t->scene->n_times || !f->searches,
+      "the scene has a history, and a map moves a contact surface (type surface or mortar); reduced models do not "
+      "support this: draw the bodies where the map puts them, use type pair, or solve at full order by hyco solve -mu");
   for (PetscInt k = 0; k < t->n_groups; k++)
     HycoOnRoot(HycoComm(t), HycoMeshFindGroup(f->part, "hyco_rid_groups", t->groups[k], &group));
   t->sizes[0] = f->n_nodes;
@@ -778,8 +779,13 @@ PetscErrorCode HycoReducerCheckContacts(HycoReducer t, const HycoROM type)
   for (PetscInt k = 0; k < t->scene->n_contacts && !type->model->traits.integrals; k++)
     HycoCheckModel(!t->scene->contact[k]->integrated,
                    "contact %s has type %s, whose rows have more masters than a facet; a model of type %s does not "
-                   "take them: train one of type bodies, or use type: surface",
+                   "take them: train one of type bodies or hybrid, or use type: surface",
                    t->scene->contact[k]->name, ((PetscObject)t->scene->contact[k])->type_name, type->model->type);
+  for (PetscInt k = 0; k < t->scene->n_contacts && !type->model->traits.friction; k++)
+    HycoCheckModel(!t->scene->contact[k]->friction,
+                   "contact %s has friction, which a model of type %s does not represent: train one of type bodies, or "
+                   "use hyco solve",
+                   t->scene->contact[k]->name, type->model->type);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -42,7 +42,8 @@ static const HycoMember step[] = {
 
 #define F(member) FIELD(HycoHistory, member)
 static const HycoMember history[] = {
-  F(n), F(step), F(ended), F(t), F(why), F(newton), F(factor_cost), F(n_orders), F(order), F(n_taken), F(taken)};
+  F(n), F(step), F(ended), F(t), F(why), F(newton), F(factor_cost), F(n_orders), F(order), F(n_taken), F(taken),
+  F(n_bound)};
 #undef F
 
 #define F(member) FIELD(HycoReaction, member)
@@ -52,7 +53,8 @@ static const HycoMember reaction[] = {
 
 #define F(member) FIELD(HycoContactResult, member)
 static const HycoMember contact_result[] = {
-  F(name), F(n), F(n_active), F(force), F(moment), F(area), F(pressure), F(friction), F(friction_work)};
+  F(name), F(n), F(n_active), F(force), F(moment), F(area), F(pressure), F(friction), F(friction_work),
+  F(pressure_min)};
 #undef F
 
 #define F(member) FIELD(HycoPrediction, member)
@@ -98,6 +100,7 @@ static const struct {
     STRUCT(HycoTraining, training),
     {"PetscInt", sizeof(PetscInt), 0, NULL},
     {"PetscReal", sizeof(PetscReal), 0, NULL},
+    {"PetscBool", sizeof(PetscBool), 0, NULL},
     {"MPI_Comm", sizeof(MPI_Comm), 0, NULL},
 };
 

@@ -185,9 +185,10 @@ static PetscErrorCode Measure(HycoROM m, HycoOutputCells p, const PetscReal Lamb
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Forces of all contacts at a listed time of the path. */
+/* Forces of all contacts at a listed time of the path, whose friction they have. */
 static const PetscReal *ForcesAt(HycoROM m, PetscInt listed)
 {
+  HycoTraceShow(m, listed);
   return m->trace.Lambda + (size_t)listed * (size_t)m->model->pairs.n;
 }
 
@@ -226,7 +227,8 @@ static void CollectPath(HycoROM m, HycoPrediction *out)
   const HycoTrace *trace = &m->trace;
 
   for (PetscInt q = 0; q < m->model->scene->n_quantities; q++) {
-    const PetscBool least = (PetscBool)(m->model->scene->quantity[q].kind == HYCO_QUANTITY_MIN);
+    const HycoQuantityKind kind = m->model->scene->quantity[q].kind;
+    const PetscBool least = (PetscBool)(kind == HYCO_QUANTITY_MIN || kind == HYCO_QUANTITY_PRESSURE_MIN);
     PetscReal *most = &out->path_quantity[q];
 
     out->quantity[q] = trace->step[trace->shown].quantity[q];

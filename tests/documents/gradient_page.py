@@ -22,7 +22,7 @@ class Page(unittest.TestCase):
             if not python:
                 self.skipTest('the page has a program in Python')
             environment = {'TREE': SOURCE, 'PATH': path, 'PYTHONPATH': os.path.join(BUILD, 'python')}
-            self.assertGreaterEqual(document.run(os.path.join(SOURCE, 'docs', 'gradients.md'), folder, environment), 2)
+            self.assertGreaterEqual(document.run(os.path.join(SOURCE, 'docs', 'gradients.md'), folder, environment), 3)
 
 
 if __name__ == '__main__':

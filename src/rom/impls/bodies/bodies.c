@@ -17,7 +17,7 @@
 
 static HycoBodiesSurface SurfaceOf(HycoROM m)
 {
-  return (HycoBodiesSurface){m->fe, &m->model->pairs, &m->rows};
+  return HycoBodiesSurfaceNormal(m->fe, &m->model->pairs, &m->rows);
 }
 
 static PetscErrorCode SetUp(HycoROM m)
@@ -232,11 +232,11 @@ PetscErrorCode HycoBodiesOptions(HycoReducer t)
                             "bodies, with a history: energy left out of the modes of the inelastic strain", 0, 1,
                             &s->inelastic_tol, &set[0]));
   PetscCall(HycoOptionsInt("-hyco_bodies_cells",
-                           "bodies, with a history: number of cells with laws for each mode of the inelastic strain", 1,
-                           1000000, &s->cells, &set[1]));
+                           "bodies, with a history: number of points with laws for each mode of the inelastic strain",
+                           1, 1000000, &s->cells, &set[1]));
   PetscCall(HycoOptionsWord("-hyco_bodies_laws",
-                            "bodies, with a history: coefficients of the inelastic modes by interpolation in the cells "
-                            "with laws, or by Galerkin's method with a cubature (auto: where a law yields)",
+                            "bodies, with a history: coefficients of the inelastic modes by interpolation at few "
+                            "points, or by Galerkin's method with a cubature (auto: where a law yields)",
                             laws, &s->laws, &s->named));
   PetscCall(HycoOptionsReal("-hyco_bodies_cubature_tol",
                             "bodies, with a history: relative error of the cubature in training", 1e-12, 1,
@@ -267,7 +267,7 @@ const char *const *HycoBodiesVariants(HycoReducer t)
 {
   static const char *const variants[] = {"interpolation", "cubature", NULL};
 
-  return t->scene->n_times && !HycoTrainingOfBodies(t)->named ? variants : NULL;
+  return HycoBodiesFlow(t) && !HycoTrainingOfBodies(t)->named ? variants : NULL;
 }
 
 PetscErrorCode HycoBodiesSetVariant(HycoReducer t, const char name[])
@@ -303,29 +303,6 @@ static PetscErrorCode TakeExact(HycoROM m, HycoSubstructures b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The chosen cells' columns of the table in the order of the model's mesh. */
-static PetscErrorCode TakeColumns(HycoROM m, HycoReducer t, HycoBodiesInelastic in)
-{
-  const size_t size = (size_t)in->m * (size_t)(m->model->mesh->nv * m->model->mesh->dim);
-  PetscReal *T, *there;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1((size_t)in->n_cells * size + 1, &T));
-  PetscCall(PetscMalloc1((size_t)in->n_cells * size + 1, &there));
-  for (PetscInt e = 0; e < m->model->mesh->n_cells; e++) {
-    PetscInt at = -1;
-
-    PetscCall(PetscFindInt(m->model->mesh->cell_whole[e], t->n_seeds_cell, t->seeds_cell, &at));
-    PetscCheck(at >= 0, PETSC_COMM_SELF, PETSC_ERR_PLIB, "a cell of the model is not among the chosen cells");
-    PetscCall(PetscArraycpy(T + (size_t)e * size, in->T + (size_t)at * size, size));
-    PetscCall(PetscArraycpy(there + (size_t)e * size, in->there + (size_t)at * size, size));
-  }
-  HycoFreeAll(&in->T, &in->there);
-  in->T = T;
-  in->there = there;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode HycoBodiesBuild(HycoROM m, HycoReducer t)
 {
   HycoBodiesTraining s = (HycoBodiesTraining)t->training;
@@ -338,10 +315,7 @@ PetscErrorCode HycoBodiesBuild(HycoROM m, HycoReducer t)
   PetscCall(HycoFloatingDestroy(&m->model->floating)); /* their equilibrium is an equation of the model */
   for (PetscInt k = 0; k < m->model->pairs.n; k++) m->model->in_rid[k] = 1;
   PetscCall(TakeExact(m, (HycoSubstructures)m->model->data));
-  if (t->scene->n_times) {
-    PetscCall(HycoROMSetDomain(m, NULL));
-    PetscCall(TakeColumns(m, t, ((HycoSubstructures)m->model->data)->inelastic));
-  }
+  if (t->scene->n_times) PetscCall(HycoROMSetDomain(m, NULL));
   PetscCall(HycoReducerJudge(t, m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -404,6 +378,7 @@ PetscErrorCode HycoROMCreate_Bodies(HycoROM m)
                                        .integrals = PETSC_TRUE,
                                        .cells = PETSC_TRUE,
                                        .uniform = PETSC_TRUE,
+                                       .friction = PETSC_TRUE,
                                        .work = sizeof(*(HycoBodiesWork)NULL),
                                        .resultants = PETSC_TRUE};
   static const HycoROMOps ops = {.setfromoptions = HycoBodiesOptions,

@@ -4,7 +4,7 @@
 
 static HycoBodiesSurface SurfaceOf(HycoROM m)
 {
-  return (HycoBodiesSurface){m->fe, &m->model->pairs, &m->rows};
+  return HycoBodiesSurfaceNormal(m->fe, &m->model->pairs, &m->rows);
 }
 
 PetscErrorCode HycoBodiesUnknowns(HycoROM m, PetscInt *p, PetscInt *n, PetscReal z[])

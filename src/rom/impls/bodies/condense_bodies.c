@@ -506,6 +506,27 @@ static PetscErrorCode TakeTheta(HycoReducer t, HycoSubstructures b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Friction: a history of elastic bodies. */
+static PetscErrorCode TakeNoStrains(HycoReducer t)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  HycoBodiesInelastic in;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&b->inelastic));
+  in = b->inelastic;
+  in->amplification = 1;
+  PetscCall(PetscCalloc1(1, &in->T));
+  PetscCall(PetscCalloc1(1, &in->there));
+  PetscCall(PetscCalloc1(1, &in->P));
+  PetscCall(PetscCalloc1(1, &in->dof));
+  PetscCall(PetscCalloc1(1, &in->body));
+  PetscCall(PetscCalloc1(1, &in->C));
+  PetscCall(PetscCalloc1(1, &in->R));
+  PetscCall(PetscCalloc1(1, &in->A));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Condense(HycoReducer t, HycoSnapshots store, HycoBodiesFactor *factor)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
@@ -520,7 +541,7 @@ static PetscErrorCode Condense(HycoReducer t, HycoSnapshots store, HycoBodiesFac
   for (PetscInt k = 0; k < b->n; k++) b->body[k].n = b->start[k + 1] - b->start[k];
   PetscCall(HycoBodiesLoads(t, factor));
   PetscCall(HycoBodiesSample(t, factor));
-  if (t->scene->n_times) PetscCall(HycoBodiesStrains(t, factor));
+  if (HycoBodiesFlow(t)) PetscCall(HycoBodiesStrains(t, factor));
   PetscCall(HycoBodiesFields(t, store, factor));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -565,7 +586,10 @@ PetscErrorCode HycoBodiesModes(HycoReducer t, HycoSnapshots store)
   PetscCall(HycoReducerColumn(t, 0, mu));
   HycoDuplicate(b->n_variables + 1, mu, &b->first);
   PetscCall(TakeTheta(t, b));
-  if (t->scene->n_times) PetscCall(HycoBodiesStrainModes(t, store));
+  if (HycoBodiesFlow(t))
+    PetscCall(HycoBodiesStrainModes(t, store));
+  else if (t->scene->n_times)
+    PetscCall(TakeNoStrains(t));
   PetscCall(HycoFOMCreate(HycoComm(t), t->scene, &factor.fom));
   ierr = Condense(t, store, &factor);
   PetscCall(Release(&factor));

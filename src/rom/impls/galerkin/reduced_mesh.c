@@ -22,13 +22,14 @@ static PetscErrorCode CountNodes(HycoROM m, PetscInt *n)
   }
   PetscCall(ISGetMinMax(m->model->rid, NULL, &last));
   *n = PetscMax(*n, last + 1);                    /* an empty set has the least integer as its largest node */
-  PetscCall(PetscCalloc1(mesh->n_nodes, &slave)); /* with a measured normal */
+  PetscCall(PetscCalloc1(mesh->n_nodes, &slave)); /* with a measured normal or integrals */
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
     if (!m->model->in_rid[k]) continue;
     *n = PetscMax(*n, m->model->pairs.slave[k] + 1);
     for (PetscInt j = m->model->pairs.master_start[k]; j < m->model->pairs.master_start[k + 1]; j++)
       *n = PetscMax(*n, m->model->pairs.master[j] + 1);
-    if (HycoContactAverages(m->model->scene->contact[m->model->pairs.contact[k]]))
+    if (HycoContactAverages(m->model->scene->contact[m->model->pairs.contact[k]]) ||
+        m->model->scene->contact[m->model->pairs.contact[k]]->integrated)
       slave[m->model->pairs.slave[k]] = PETSC_TRUE;
   }
   for (PetscInt f = 0; f < mesh->n_facets; f++) {

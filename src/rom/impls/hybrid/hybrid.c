@@ -110,7 +110,8 @@ PetscErrorCode HycoROMCreate_Hybrid(HycoROM m)
                                        .stiffness = PETSC_TRUE,
                                        .constrains = PETSC_TRUE,
                                        .resultants = PETSC_TRUE,
-                                       .history = PETSC_TRUE};
+                                       .history = PETSC_TRUE,
+                                       .integrals = PETSC_TRUE};
   static const HycoROMOps ops = {.setfromoptions = HycoHybridSetFromOptions,
                                  .build = HycoHybridBuild,
                                  .finish = HycoGalerkinFinish,

@@ -228,7 +228,8 @@ PetscErrorCode HycoROMCreate_Projection(HycoROM m)
                                        .whole = PETSC_TRUE,
                                        .stiffness = PETSC_TRUE,
                                        .force_basis = PETSC_TRUE,
-                                       .history = PETSC_TRUE};
+                                       .history = PETSC_TRUE,
+                                       .integrals = PETSC_TRUE};
   static const HycoROMOps ops = {.setfromoptions = HycoProjectionSetFromOptions,
                                  .modes = HycoProjectionModes,
                                  .build = HycoProjectionBuild,
