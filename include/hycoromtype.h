@@ -55,8 +55,6 @@ typedef struct _HycoROMOps {
   PetscErrorCode (*setfromoptions)(HycoReducer); /* its options of the training, on every rank */
   PetscErrorCode (*resettraining)(HycoReducer);  /* frees what these options and a run have allocated, on every rank */
   PetscErrorCode (*begin)(HycoReducer); /* before any solve: refuses unsupported scenes and options. Collective */
-  PetscErrorCode (*startpoints)(HycoReducer, HycoSamples *);                 /* chooses the first training points: */
-  PetscErrorCode (*choosepoints)(HycoReducer, HycoSnapshots, HycoSamples *); /* and further ones. Collective */
   PetscErrorCode (*modes)(HycoReducer,
                           HycoSnapshots); /* modes in addition to or instead of the solutions' POD. Collective */
   PetscErrorCode (*build)(HycoROM,

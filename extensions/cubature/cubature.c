@@ -57,7 +57,7 @@ static PetscErrorCode Begin(HycoReducer t)
             "contacts' nodes) or rank (one for each contact)");
   HycoCheck(t->sizes[3] > 1, "-hyco_model_type cubature is for 2D and 3D; in 1D use hybrid or projection");
   HycoCheck(!t->scene->n_ties,
-            "-hyco_model_type cubature is for scenes without ties; use hybrid, projection, condensed or regression");
+            "-hyco_model_type cubature is for scenes without ties; use bodies, hybrid, projection or regression");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -122,15 +122,12 @@ struct _p_HycoReducer {
   PetscReal *V_rid;       /* the rows of V there */
   PetscInt *surface_node; /* by node of the contacts' surfaces: its node of the model's mesh, or -1 */
   PetscBool *fixed;       /* by unknown of the model's mesh */
-  PetscInt *contact_row;  /* by node of the contacts' surfaces: its row in U_contact, or -1 */
-  PetscReal *U_contact;   /* the rows of the contacts' nodes, column major; NULL: not fetched */
-  PetscInt n_contact_nodes;
-  PetscReal *Lambda;     /* n_contacts x n_s column major */
-  PetscReal *VtU;        /* l x n_s column major: V^T of the snapshots minus their lifting */
-  PetscReal *U_norm;     /* n_s: of the whole snapshot */
-  PetscInt n_s;          /* number of snapshot columns: one for each sample, with a history one for each listed time
+  PetscReal *Lambda;      /* n_contacts x n_s column major */
+  PetscReal *VtU;         /* l x n_s column major: V^T of the snapshots minus their lifting */
+  PetscReal *U_norm;      /* n_s: of the whole snapshot */
+  PetscInt n_s;           /* number of snapshot columns: one for each sample, with a history one for each listed time
                             of each sample */
-  PetscInt *taken_start; /* rank 0, with a history: n_samples + 1, where the times of each path's steps begin in */
+  PetscInt *taken_start;  /* rank 0, with a history: n_samples + 1, where the times of each path's steps begin in */
   PetscReal *taken;
   HycoJudged *judged; /* rank 0, by sample: results of HycoReducerJudge(); NULL: not called */
   unsigned long long fingerprint;
@@ -228,9 +225,6 @@ PetscErrorCode HycoReducerFindFloating(HycoReducer t, HycoROM model);
 PetscErrorCode HycoReducerFetchRows(HycoReducer t, Mat S, PetscInt n_columns, PetscInt n, const PetscInt node[],
                                     PetscReal rows[]);
 PetscErrorCode HycoReducerFetchSnapshots(HycoReducer t, PetscInt n, const PetscInt node[], PetscReal **rows);
-/* Sets U_contact, contact_row and n_contact_nodes, unless these snapshots' are there: for types that need them, as
-   they are a share of all snapshots on one rank. Collective. */
-PetscErrorCode HycoReducerFetchContacts(HycoReducer t);
 /* Calls use(t, first, S, ctx) for all displacements, in batches of columns from `first` on: all of them, or with
    pod_memory as many as fit. S must not be changed. Collective. */
 typedef PetscErrorCode (*HycoBatchUse)(HycoReducer t, PetscInt first, Mat S, void *ctx);

@@ -182,10 +182,4 @@ PetscErrorCode HycoSolverSetStartSet(HycoSolver s, const PetscBool active[]);
 PetscErrorCode HycoSolverSetTarget(HycoSolver s, PetscReal residual);
 /* Gets the iterations of conjugate gradients in the last solve, and most of one linear solve; 0 with a factor. */
 PetscErrorCode HycoSolverGetLinearIterations(HycoSolver s, PetscInt *its, PetscInt *most);
-/* S = B K^-1 Bt of the last solve, which was in the dual form with a factor of a regular K: m x m column major, the
-   same on every rank. Borrowed until a matrix changes. Collective. */
-PetscErrorCode HycoSolverGetFlexibility(HycoSolver s, PetscInt *m, const PetscReal *S[]);
-/* x[j] = K^-1 r[j] with the factor of the last solve, for k right-hand sides. Collective. */
-PetscErrorCode HycoSolverApplyInverse(HycoSolver s, PetscInt k, Vec r[], Vec x[]);
-
 #endif

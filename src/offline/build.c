@@ -776,36 +776,25 @@ PetscErrorCode HycoReducerCheckContacts(HycoReducer t, const HycoROM type)
 PetscErrorCode HycoReducerRun(HycoReducer t, HycoSamples samples, const char path[], HycoTraining *training)
 {
   HycoSnapshots store;
-  HycoSamples chosen = NULL;
   HycoTraining report = {0};
   PetscReal begin = HycoNow(), solved;
-  const PetscBool choose = (PetscBool)!samples;
 
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
-  HycoCheck(samples || t->prototype->ops->choosepoints, "give the training points");
+  HycoCheck(samples, "give the training points");
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++)
     HycoCheck(!(t->target[j] > 0) || t->validation || t->n_validation,
               "-target_%s needs held-out points, and -hyco_validation is 0; remove one of the two", HycoErrorKinds[j]);
   if (t->pinned[HYCO_CHOICE_TYPE] || !t->search) PetscCall(HycoReducerCheckContacts(t, t->prototype));
-  if (choose) {
-    PetscCall((*t->prototype->ops->startpoints)(t, &chosen));
-    samples = chosen;
-  }
   PetscCall(HycoReducerOpen(t, samples, path, &store));
   if (t->prototype->ops->begin) PetscCall((*t->prototype->ops->begin)(t));
-  if (choose)
-    HycoStaged(HYCO_STAGE_FULL_ORDER, (*t->prototype->ops->choosepoints)(t, store, &chosen));
-  else
-    PetscCall(DecideLate(t));
-  if (!choose && !t->late) PetscCall(HycoReducerSolve(t, store, samples));
+  PetscCall(DecideLate(t));
+  if (!t->late) PetscCall(HycoReducerSolve(t, store, samples));
   PetscCall(HycoReducerHoldOut(t, store));
   solved = HycoNow() - t->solving;
-  if (choose && t->prototype->ops->modes) HycoStaged(HYCO_STAGE_FULL_ORDER, (*t->prototype->ops->modes)(t, store));
-  HycoStaged(HYCO_STAGE_REDUCTION, HycoReducerFinish(t, store, path, (PetscBool)!choose, &report));
+  HycoStaged(HYCO_STAGE_REDUCTION, HycoReducerFinish(t, store, path, PETSC_TRUE, &report));
   PetscCall(HycoReducerReset(t));
   PetscCall(HycoReducerClose(t, &store));
-  PetscCall(HycoSamplesDestroy(&chosen));
   report.seconds_snapshots = solved - begin + t->solving;
   report.seconds_reduction = HycoNow() - solved - t->solving;
   if (training) *training = report;

@@ -363,8 +363,6 @@ PetscErrorCode HycoReducerRunGreedy(HycoReducer t, HycoSamples start, HycoSample
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
   PetscCall(CheckIndicator(t));
-  HycoCheck(!t->prototype->ops->choosepoints, "a condensed model needs a tensor grid of training points, which -greedy "
-                                              "does not make; use -grid or -values_NAME");
   HycoCheck(!t->prototype->model->traits.cells,
             "train -greedy adds cells to the previous RID, and a %s model chooses all of its cells anew; train it on a "
             "grid or on points",

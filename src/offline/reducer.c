@@ -110,8 +110,8 @@ PetscErrorCode HycoReducerResetBases(HycoReducer t)
     t->basis[k].l = t->basis[k].n_sigma = 0;
   }
   PetscCall(MatDestroy(&t->S));
-  HycoFreeAll(&t->U_rid, &t->rid_row, &t->V_rid, &t->U_contact, &t->contact_row, &t->Lambda, &t->U_norm, &t->dual_seeds,
-              &t->taken_start, &t->taken, &t->judged, &t->judged_held);
+  HycoFreeAll(&t->U_rid, &t->rid_row, &t->V_rid, &t->Lambda, &t->U_norm, &t->dual_seeds, &t->taken_start, &t->taken,
+              &t->judged, &t->judged_held);
   t->n_dual_seeds = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -135,8 +135,6 @@ PetscErrorCode HycoReducerDestroy(HycoReducer *reducer)
 
 HycoDefineMethod(HycoReducerSetSnapshotFolder, (HycoReducer t, const char folder[]), t, HYCO_REDUCER_CLASSID,
                  PetscCall(PetscStrncpy(t->folder, folder, sizeof(t->folder))))
-HycoDefineMethod(HycoReducerChooses, (HycoReducer t, PetscBool *chooses), t, HYCO_REDUCER_CLASSID,
-                 *chooses = (PetscBool)(t->prototype->ops->choosepoints != NULL))
 HycoDefineMethod(HycoReducerGetSolved, (HycoReducer t, PetscInt *n_groups, const PetscInt *solved[]), t,
                  HYCO_REDUCER_CLASSID, *n_groups = t->n_solvers;
                  *solved = t->solved)
@@ -263,12 +261,11 @@ static PetscErrorCode ReadTraining(HycoReducer t)
   PetscCall(HycoOptionsFor(""));
   PetscCall(HycoOptionsString("-hyco_snapshots", "<folder> where full-order solutions are stored [MODEL.snapshots]",
                               t->folder, sizeof(t->folder), NULL));
-  PetscCall(HycoOptionsWord(
-      "-hyco_model_type",
-      "hybrid hyper-reduced (38) on an RID; projection-based (44) on the whole mesh, or with a "
-      "cubature on some of its cells; condensed on the contact forces; bodies condensed to their surfaces; "
-      "regression without a solve [train searches: bodies, then hybrid]",
-      types, &type, &t->pinned[HYCO_CHOICE_TYPE]));
+  PetscCall(HycoOptionsWord("-hyco_model_type",
+                            "hybrid hyper-reduced (38) on an RID; projection-based (44) on the whole mesh, or with a "
+                            "cubature on some of its cells; bodies condensed to their surfaces; "
+                            "regression without a solve [train searches: bodies, then hybrid]",
+                            types, &type, &t->pinned[HYCO_CHOICE_TYPE]));
   PetscCall(HycoOptionsReal("-hyco_pod_tol", "energy left out of the displacement basis, epsilon of (18)", 0, 1,
                             &t->tol[HYCO_SEED_DISPLACEMENT], &t->pinned[HYCO_CHOICE_TOLERANCE]));
   PetscCall(HycoOptionsReal("-hyco_pod_noise", "singular values below this share of the first are treated as round-off",
@@ -306,7 +303,7 @@ static PetscErrorCode ReadTraining(HycoReducer t)
   PetscCall(HycoOptionsBool("-hyco_greedy_keep",
                             "train -greedy stores the model of each iteration beside the snapshots", &t->greedy.keep,
                             NULL));
-  PetscCall(HycoOptionsFor("hybrid, projection, cubature or condensed"));
+  PetscCall(HycoOptionsFor("hybrid, projection or cubature"));
   PetscCall(HycoOptionsInt(
       "-hyco_scan",
       "points per parameter at which training looks for a singular reduced stiffness (0: some hundred in all)", 0,
@@ -374,7 +371,7 @@ static PetscErrorCode ReadRID(HycoReducer t)
   PetscCall(PetscStrArrayDestroy(&t->groups));
   t->tol[HYCO_SEED_STRESS] = t->tol[HYCO_SEED_FORCE] = t->tol[HYCO_SEED_DISPLACEMENT];
   PetscObjectOptionsBegin((PetscObject)t);
-  PetscCall(HycoOptionsFor("hybrid, condensed or regression"));
+  PetscCall(HycoOptionsFor("hybrid or regression"));
   PetscCall(HycoOptionsList("-hyco_rid_modes",
                             "bases whose DEIM points seed the RID: displacement, stress, force, dual and, with a "
                             "history, inelastic [displacement,stress,force,inelastic]",

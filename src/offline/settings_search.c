@@ -294,7 +294,6 @@ static void TakeSizes(HycoReducer t, const HycoTraining *report, HycoAttempt *a)
 {
   a->n_modes = report->n_modes;
   a->n_fe_dofs = report->n_fe_dofs;
-  a->n_flexibilities = report->n_flexibilities;
   a->rid_nodes = report->rid_nodes;
   a->rid_elements = report->rid_elements;
   a->rid_contacts = report->rid_contacts;

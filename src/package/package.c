@@ -72,7 +72,6 @@ static PetscErrorCode RegisterModels(void)
   PetscFunctionBegin;
   PetscCall(HycoROMRegister(HYCO_ROM_HYBRID, HycoROMCreate_Hybrid));
   PetscCall(HycoROMRegister(HYCO_ROM_PROJECTION, HycoROMCreate_Projection));
-  PetscCall(HycoROMRegister(HYCO_ROM_CONDENSED, HycoROMCreate_Condensed));
   PetscCall(HycoROMRegister(HYCO_ROM_BODIES, HycoROMCreate_Bodies));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -55,7 +55,7 @@ class Mortar(Case):
             found_u, found, _ = self.fields('predict', '-model', model, '-mu', mu)
             self.assertLess(abs(found - forces).max(), 1e-10 * forces.max())
             self.assertLess(abs(found_u - u).max(), 1e-4 * abs(u).max())  # away from contacts modes up to -hyco_bodies_pod_tol
-        for kind in ('hybrid', 'condensed', 'projection'):
+        for kind in ('hybrid', 'projection'):
             self.refused('train', '-scene', scene, '-model', self.path('other.h5'), '-grid', '2,2,2', '-hyco_model_type', kind,
                          texts=('contact under has type mortar', f'a model of type {kind} does not take them'))
 

@@ -66,13 +66,12 @@ static PetscErrorCode PrepareCells(HycoROM m, PetscBool stiffness)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   const PetscInt n = m->model->mesh->nv * m->model->mesh->dim;
-  PetscReal load[HYCO_MAX_CELL_DOFS];
 
   PetscFunctionBegin;
   PetscCall(HycoFEElasticTangent(m->fe));
   for (PetscInt e = 0; e < m->model->mesh->n_cells; e++) {
     if (stiffness) PetscCall(HycoFEBodyStiffness(m->fe, e, w->Ke + e * n * n));
-    PetscCall(HycoInelasticCellLoad(m->fe, e, load, w->heat + e * n));
+    PetscCall(HycoInelasticCellHeat(m->fe, e, w->heat + e * n));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -90,7 +90,7 @@ PetscErrorCode HycoBodiesStrainModes(HycoReducer t, HycoSnapshots store)
   PetscCall(PetscNew(&s->bodies->inelastic));
   PetscCall(MatDestroy(&s->strains.V));
   PetscCall(PetscFree(s->strains.sigma));
-  PetscCall(HycoInelasticSample(t, store, s->inelastic_tol, 1, &s->strains));
+  PetscCall(HycoInelasticSample(t, store, s->inelastic_tol, &s->strains));
   s->bodies->inelastic->m = s->strains.l;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -266,7 +266,7 @@ static PetscErrorCode Respond(HycoReducer t, HycoBodiesFactor *factor, PetscReal
   PetscCall(PetscCalloc1(in->m + 1, &factor->strain));
   if (!in->m) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoInelasticColumns(t, in->m, &A));
-  PetscCall(HycoInelasticPut(t, &HycoTrainingOfBodies(t)->strains, HYCO_ON_CELLS, A, 0));
+  PetscCall(HycoInelasticPut(t, &HycoTrainingOfBodies(t)->strains, A));
   PetscCall(MatDenseGetLDA(A, &lda));
   PetscCall(VecDuplicate(f->F, &F));
   for (PetscInt k = 0; k < in->m; k++) {

@@ -16,46 +16,22 @@
 /* Data of a replay. */
 typedef struct {
   HycoReducer t;
-  PetscInt n_fields;
   HycoTrainingReplay replay;
   HycoFE fe;         /* this rank's part */
   PetscInt *flowing; /* by cell: its index among the inelastic ones, or -1 */
   PetscReal *Ke;     /* of these cells, nv dim square */
-  PetscReal *value[HYCO_N_SAMPLED];
-  Mat S[HYCO_N_SAMPLED]; /* for a path, a column for each listed time; rows in the file's order */
-  Mat U;                 /* displacements minus their lifting */
+  PetscReal *value;
+  Mat S; /* for a path, a column for each listed time; rows in the file's order */
+  Mat U; /* displacements minus their lifting */
 } Sampler;
-
-static PetscErrorCode End(Mat A)
-{
-  PetscFunctionBegin;
-  PetscCall(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* -- a cell's forces -- */
 
-PetscErrorCode HycoInelasticCellLoad(HycoFE fe, PetscInt e, PetscReal load[], PetscReal heat[])
+PetscErrorCode HycoInelasticCellHeat(HycoFE fe, PetscInt e, PetscReal heat[])
 {
-  HycoMesh m = fe->mesh;
-  const PetscInt n = m->nv * m->dim;
-  PetscReal Ke[HYCO_MAX_CELL_DOFS * HYCO_MAX_CELL_DOFS], push[HYCO_MAX_CELL_DOFS] = {0}, u0[HYCO_MAX_CELL_DOFS];
-  PetscBool lifted = PETSC_FALSE;
-
   PetscFunctionBegin;
-  if (fe->scene->body[m->cell_body[e]].expansion) PetscCall(HycoCellHeat(fe, e, push));
-  for (PetscInt k = 0; k < n; k++) {
-    u0[k] = fe->u0[HycoCellUnknown(m, e, k)];
-    lifted = (PetscBool)(lifted || u0[k] != 0);
-    load[k] = -push[k];
-    if (heat) heat[k] = push[k];
-  }
-  if (!lifted) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoFEBodyStiffness(fe, e, Ke));
-  for (PetscInt i = 0; i < n; i++) {
-    for (PetscInt j = 0; j < n; j++) load[i] += Ke[i * n + j] * u0[j];
-  }
+  PetscCall(PetscArrayzero(heat, fe->mesh->nv * fe->mesh->dim));
+  if (fe->scene->body[fe->mesh->cell_body[e]].expansion) PetscCall(HycoCellHeat(fe, e, heat));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -92,8 +68,8 @@ static PetscErrorCode DestroySampler(Sampler *s)
 {
   PetscFunctionBegin;
   PetscCall(HycoTrainingReplayDestroy(&s->replay));
-  HycoFreeAll(&s->flowing, &s->Ke, &s->value[0], &s->value[1], &s->value[2]);
-  for (PetscInt k = 0; k < s->n_fields; k++) PetscCall(MatDestroy(&s->S[k]));
+  HycoFreeAll(&s->flowing, &s->Ke, &s->value);
+  PetscCall(MatDestroy(&s->S));
   PetscCall(MatDestroy(&s->U));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -113,44 +89,20 @@ static PetscErrorCode Displacement(void *ctx, PetscInt k, PetscReal u[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The load inside cell e, and its part of the loads of the nodes. */
-static PetscErrorCode MeasureLoads(Sampler *s, PetscInt e, PetscReal inside[])
-{
-  HycoMesh m = s->fe->mesh;
-  const PetscInt n = m->nv * m->dim;
-  PetscReal body[HYCO_MAX_CELL_DOFS] = {0};
-
-  PetscFunctionBegin;
-  PetscCall(HycoFEBodyForce(s->fe, e, body));
-  for (PetscInt i = 0; i < n; i++) {
-    s->value[HYCO_SAMPLED_LOADS][HycoCellUnknown(m, e, i)] -= inside[i];
-    s->value[HYCO_SAMPLED_INSIDE][e * n + i] = inside[i] - body[i];
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Computes the forces of all cells of the part at the replay's time, and the loads of its nodes. */
+/* Computes the forces of all cells of the part at the replay's time. */
 static PetscErrorCode Measure(Sampler *s)
 {
   HycoFE fe = s->fe;
-  HycoMesh m = fe->mesh;
-  const PetscInt n = m->nv * m->dim;
-  const PetscBool loads = (PetscBool)(s->n_fields > HYCO_SAMPLED_LOADS);
+  const PetscInt n = fe->mesh->nv * fe->mesh->dim;
 
   PetscFunctionBegin;
-  if (loads) PetscCall(HycoFELoads(fe, s->value[HYCO_SAMPLED_LOADS]));
-  for (PetscInt e = 0; e < m->n_cells; e++) {
-    PetscReal heat[HYCO_MAX_CELL_DOFS], inside[HYCO_MAX_CELL_DOFS];
+  for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
+    PetscReal heat[HYCO_MAX_CELL_DOFS];
 
-    if (!loads && s->flowing[e] < 0) continue;
-    PetscCall(HycoInelasticCellLoad(fe, e, inside, heat));
-    if (loads) PetscCall(MeasureLoads(s, e, inside));
-    if (s->flowing[e] >= 0)
-      PetscCall(HycoInelasticCellForce(fe, e, s->Ke + (size_t)s->flowing[e] * (size_t)(n * n), heat, s->replay.u,
-                                       s->replay.march.state, s->value[HYCO_SAMPLED_INELASTIC] + e * n, NULL));
-  }
-  for (PetscInt k = 0; k < fe->n_dof && loads; k++) {
-    if (fe->fixed[k]) s->value[HYCO_SAMPLED_LOADS][k] = 0;
+    if (s->flowing[e] < 0) continue;
+    PetscCall(HycoInelasticCellHeat(fe, e, heat));
+    PetscCall(HycoInelasticCellForce(fe, e, s->Ke + (size_t)s->flowing[e] * (size_t)(n * n), heat, s->replay.u,
+                                     s->replay.march.state, s->value + e * n, NULL));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -185,25 +137,20 @@ static PetscErrorCode Record(void *ctx, PetscInt k)
 {
   Sampler *s = (Sampler *)ctx;
   const PetscInt n = s->fe->mesh->nv * s->fe->dim, step = k % HycoSnapshotsSteps(s->t->scene);
+  PetscScalar *a;
+  PetscInt lda;
 
   PetscFunctionBegin;
   if (step == 0) HycoOnEach(HycoComm(s->t), Stiffen(s));
   HycoOnEach(HycoComm(s->t), Measure(s));
-  for (PetscInt field = 0; field < s->n_fields; field++) {
-    const PetscBool on_nodes = (PetscBool)(field == HYCO_SAMPLED_LOADS);
-    PetscScalar *a;
-    PetscInt lda;
-
-    PetscCall(MatDenseGetLDA(s->S[field], &lda));
-    PetscCall(MatDenseGetArray(s->S[field], &a));
-    PetscCall(HycoFOMToRows(s->t->fom, on_nodes ? HYCO_ON_NODES : HYCO_ON_CELLS, MPIU_REAL, on_nodes ? s->fe->dim : n,
-                            s->value[field], a + (size_t)step * (size_t)lda));
-    PetscCall(MatDenseRestoreArray(s->S[field], &a));
-  }
+  PetscCall(MatDenseGetLDA(s->S, &lda));
+  PetscCall(MatDenseGetArray(s->S, &a));
+  PetscCall(HycoFOMToRows(s->t->fom, HYCO_ON_CELLS, MPIU_REAL, n, s->value, a + (size_t)step * (size_t)lda));
+  PetscCall(MatDenseRestoreArray(s->S, &a));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode CreateSampler(HycoReducer t, HycoSnapshots store, PetscInt n_fields, Sampler *s)
+static PetscErrorCode CreateSampler(HycoReducer t, HycoSnapshots store, Sampler *s)
 {
   HycoMesh part = t->fom->part;
   const PetscInt dim = t->sizes[3], n = part->nv * dim;
@@ -211,26 +158,20 @@ static PetscErrorCode CreateSampler(HycoReducer t, HycoSnapshots store, PetscInt
   PetscReal mu[HYCO_MAX_PARAMETERS];
 
   PetscFunctionBegin;
-  *s = (Sampler){.t = t, .n_fields = n_fields, .fe = t->fom->fe};
+  *s = (Sampler){.t = t, .fe = t->fom->fe};
   PetscCall(HycoReducerColumn(t, 0, mu));
   PetscCall(HycoFOMSetParameters(t->fom, mu));
   PetscCall(HycoReducerGetDisplacements(t, store, &s->U));
   HycoOnEach(HycoComm(t), FindFlowing(s));
   PetscCall(HycoFOMGetRows(t->fom, &order));
-  for (PetscInt k = 0; k < n_fields; k++) {
-    const PetscBool on_nodes = (PetscBool)(k == HYCO_SAMPLED_LOADS);
-    const PetscInt rows = on_nodes ? (order ? order->n[HYCO_ON_NODES] : part->n_nodes) * dim
-                                   : (order ? order->n[HYCO_ON_CELLS] : part->n_cells) * n;
-
-    PetscCall(PetscCalloc1((on_nodes ? part->n_nodes * dim : part->n_cells * n) + 1, &s->value[k]));
-    PetscCall(MatCreateDense(HycoComm(t), rows, PETSC_DECIDE, on_nodes ? t->sizes[0] * dim : t->sizes[1] * n,
-                             HycoSnapshotsSteps(t->scene), NULL, &s->S[k]));
-  }
+  PetscCall(PetscCalloc1(part->n_cells * n + 1, &s->value));
+  PetscCall(MatCreateDense(HycoComm(t), (order ? order->n[HYCO_ON_CELLS] : part->n_cells) * n, PETSC_DECIDE,
+                           t->sizes[1] * n, HycoSnapshotsSteps(t->scene), NULL, &s->S));
   PetscCall(HycoTrainingReplayCreate(t, Displacement, Record, s, &s->replay));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode FollowAll(Sampler *s, HycoSnapshots store, const PetscReal tol[], HycoPathModes modes[])
+static PetscErrorCode FollowAll(Sampler *s, HycoSnapshots store, PetscReal tol, HycoPathModes *modes)
 {
   PetscInt n;
 
@@ -238,35 +179,28 @@ static PetscErrorCode FollowAll(Sampler *s, HycoSnapshots store, const PetscReal
   PetscCall(HycoSamplesGet(s->t->samples, &n, NULL, NULL));
   for (PetscInt k = 0; k < n; k++) {
     PetscCall(HycoTrainingReplayFollow(&s->replay, store, k));
-    for (PetscInt f = 0; f < s->n_fields; f++) {
-      PetscCall(End(s->S[f]));
-      PetscCall(HycoPathModesAdd(s->t, s->S[f], tol[f], &modes[f]));
-    }
+    PetscCall(MatAssemblyBegin(s->S, MAT_FINAL_ASSEMBLY));
+    PetscCall(MatAssemblyEnd(s->S, MAT_FINAL_ASSEMBLY));
+    PetscCall(HycoPathModesAdd(s->t, s->S, tol, modes));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoInelasticSample(HycoReducer t, HycoSnapshots store, PetscReal energy, PetscInt n_fields,
-                                   HycoBasis *basis)
+PetscErrorCode HycoInelasticSample(HycoReducer t, HycoSnapshots store, PetscReal tol, HycoBasis *basis)
 {
-  const PetscReal tol[HYCO_N_SAMPLED] = {energy, 0, 0};
-  HycoPathModes modes[HYCO_N_SAMPLED] = {{0}};
-  PetscInt N[HYCO_N_SAMPLED], n_rows[HYCO_N_SAMPLED];
+  HycoPathModes modes = {0};
+  PetscInt N, n_rows;
   PetscErrorCode ierr;
   Sampler s;
 
   PetscFunctionBegin;
-  PetscCall(CreateSampler(t, store, n_fields, &s));
-  for (PetscInt f = 0; f < n_fields; f++) {
-    PetscCall(MatGetSize(s.S[f], &N[f], NULL));
-    PetscCall(MatGetLocalSize(s.S[f], &n_rows[f], NULL));
-  }
-  ierr = FollowAll(&s, store, tol, modes);
+  PetscCall(CreateSampler(t, store, &s));
+  PetscCall(MatGetSize(s.S, &N, NULL));
+  PetscCall(MatGetLocalSize(s.S, &n_rows, NULL));
+  ierr = FollowAll(&s, store, tol, &modes);
   PetscCall(DestroySampler(&s));
-  for (PetscInt f = 0; f < n_fields; f++) {
-    if (!ierr) ierr = HycoPathModesJoin(t, &modes[f], N[f], n_rows[f], tol[f], 0, &basis[f]);
-    PetscCall(HycoPathModesDestroy(&modes[f]));
-  }
+  if (!ierr) ierr = HycoPathModesJoin(t, &modes, N, n_rows, tol, 0, basis);
+  PetscCall(HycoPathModesDestroy(&modes));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -301,26 +235,25 @@ static PetscErrorCode PutColumn(HycoReducer t, const PetscReal value[], Mat A, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoInelasticPut(HycoReducer t, const HycoBasis *modes, HycoPlace place, Mat A, PetscInt first)
+PetscErrorCode HycoInelasticPut(HycoReducer t, const HycoBasis *modes, Mat A)
 {
   HycoMesh part = t->fom->part;
-  const PetscInt dim = part->dim, n = place == HYCO_ON_CELLS ? part->nv * dim : dim;
+  const PetscInt dim = part->dim, n = part->nv * dim;
   const PetscScalar *rows;
   PetscReal *value, *node;
   PetscInt lda;
 
   PetscFunctionBegin;
   if (!modes->l) PetscFunctionReturn(PETSC_SUCCESS); /* V may be NULL */
-  PetscCall(PetscMalloc2(PetscMax(part->n_cells * part->nv, part->n_nodes) * dim, &value, part->n_nodes * dim, &node));
+  PetscCall(PetscMalloc2(part->n_cells * n, &value, part->n_nodes * dim, &node));
   PetscCall(MatDenseGetLDA(modes->V, &lda));
   for (PetscInt j = 0; j < modes->l; j++) {
     PetscCall(MatDenseGetArrayRead(modes->V, &rows));
-    PetscCall(HycoFOMFromRows(t->fom, place, n, rows + (size_t)j * (size_t)lda, value));
+    PetscCall(HycoFOMFromRows(t->fom, HYCO_ON_CELLS, n, rows + (size_t)j * (size_t)lda, value));
     PetscCall(MatDenseRestoreArrayRead(modes->V, &rows));
     PetscCall(PetscArrayzero(node, part->n_nodes * dim));
-    for (PetscInt k = 0; k < part->n_cells * n && place == HYCO_ON_CELLS; k++)
-      node[part->cells[k / dim] * dim + k % dim] += value[k];
-    PetscCall(PutColumn(t, place == HYCO_ON_CELLS ? node : value, A, first + j));
+    for (PetscInt k = 0; k < part->n_cells * n; k++) node[part->cells[k / dim] * dim + k % dim] += value[k];
+    PetscCall(PutColumn(t, node, A, j));
   }
   PetscCall(PetscFree2(value, node));
   PetscFunctionReturn(PETSC_SUCCESS);

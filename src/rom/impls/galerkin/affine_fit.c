@@ -36,7 +36,7 @@ static PetscErrorCode Agrees(HycoROM m, HycoTable t, const PetscReal mu[], Petsc
   PetscCall(PetscMalloc1(entries, &row));
   PetscCall(Sample(m, mu, entries, here));
   PetscCall(HycoReducedRows(m, row));
-  PetscCall(HycoGridFieldEvaluate(&t->values, mu, -1, -1, there));
+  PetscCall(HycoGridFieldEvaluate(&t->values, mu, there));
   PetscCall(PetscArrayzero(largest, m->n));
   for (PetscInt k = 0; k < entries; k++) largest[row[k]] = PetscMax(largest[row[k]], PetscAbsReal(here[k]));
   *agrees = PETSC_TRUE;

@@ -166,11 +166,9 @@ static PetscErrorCode ConcludePaths(HycoReducer t, HycoROM m, PetscInt n, PetscI
   Say(m->model->scene, mu + change / each * n_par, here);
   HycoFailNoModel(
       "the reduced tangent becomes singular along the training path at %s: its determinant changes sign at %d "
-      "of %d times, and predictions near there are arbitrary; %s, or keep the model: -hyco_keep_singular",
-      here, (int)s->n_singular, (int)s->n,
-      ((HycoGalerkinModel)m->model->data)->forces
-          ? "use more cells (-hyco_condensed_cells; 0: all) or fewer modes (-hyco_condensed_inelastic_tol)"
-          : "enlarge the RID (-hyco_rid_layers 1), change the modes (-hyco_pod_tol)");
+      "of %d times, and predictions near there are arbitrary; enlarge the RID (-hyco_rid_layers 1), change the modes "
+      "(-hyco_pod_tol), or keep the model: -hyco_keep_singular",
+      here, (int)s->n_singular, (int)s->n);
 }
 
 /* For a scene with a history: the tangents along the training paths; for long paths and large models some of them. */

@@ -1,27 +1,6 @@
-/* The decay of divided differences; a pseudo-inverse. */
+/* A pseudo-inverse. */
 #include "check.h"
 #include <hycoalgorithms.h>
-#include <math.h>
-
-/* 1/(x + 1.5): differences of order k are c (x0 + 1.5)^-1 ..., whose ratio tends to 1 / (1.5 + sqrt(1.25)) in units
-   of a quarter of the range; those of |x| do not decay in the long run. */
-static PetscErrorCode Decays(void)
-{
-  PetscReal x[9], smooth[9], kink[9], decay[2];
-  HycoTensor t = {1, {9}, {8}, {x}};
-
-  PetscFunctionBegin;
-  PetscCall(HycoChebyshevNodes(9, -1, 1, x));
-  for (PetscInt k = 0; k < 9; k++) {
-    smooth[k] = 1 / (x[k] + 1.5);
-    kink[k] = fabs((double)x[k] - 0.1);
-  }
-  PetscCall(HycoTensorDecay(&t, 0, 1, smooth, &decay[0]));
-  PetscCall(HycoTensorDecay(&t, 0, 1, kink, &decay[1]));
-  CHECK(decay[0] > 0.3 && decay[0] < 0.55, "a pole at 1.5: %g", (double)decay[0]);
-  CHECK(decay[1] > 0.6, "a kink: %g", (double)decay[1]);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* Of rank 2: A P A = A, P A P = P, and A P symmetric. */
 static PetscErrorCode Inverts(void)
@@ -52,7 +31,6 @@ static PetscErrorCode Inverts(void)
 static PetscErrorCode Test(void)
 {
   PetscFunctionBegin;
-  PetscCall(Decays());
   PetscCall(Inverts());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
