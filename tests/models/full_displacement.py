@@ -13,7 +13,7 @@ class Displacements(Case):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        cls.hyco('train', '-scene', PELLET, *TYPE, '-grid', '4,2', '-hyco_validation', 4, '-model', 'p.h5')
+        cls.hyco('train', '-scene', PELLET, *TYPE, '-grid', '4,2', '-hyco_validation', 6, '-model', 'p.h5')
         cls.hyco('train', '-scene', ROPE, *TYPE, '-grid', '4,4', '-hyco_validation', 6, '-model', 'r.h5')
 
     def fields(self, name):
