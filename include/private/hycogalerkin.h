@@ -6,7 +6,7 @@
 #ifndef HYCOGALERKIN_H
 #define HYCOGALERKIN_H
 
-#include <hycoreducerimpl.h>
+#include <hycoromimpl.h>
 
 typedef struct _n_HycoReduced *HycoReduced;
 typedef struct _n_HycoLoads *HycoLoads;
@@ -73,13 +73,6 @@ PetscErrorCode HycoGalerkinView(HycoROM model, PetscViewer viewer);
 PetscErrorCode HycoGalerkinMove(HycoROM model, HycoH5 file);
 /* Parts that are not fields of the ops; NULL-safe. */
 PetscErrorCode HycoGalerkinDestroy(HycoGalerkinModel galerkin);
-/* Scans the ranges for a singular reduced stiffness, with the points distributed over the ranks: the result is
-   stored in the model, or the model is refused; then makes the table. `model` on every rank; changed on rank 0.
-   Collective. */
-PetscErrorCode HycoGalerkinFinish(HycoReducer reducer, HycoROM model, HycoTraining *report);
-/* Creates a table of the reduced stiffness if that is a polynomial of the parameters on which it depends. */
-PetscErrorCode HycoGalerkinTabulate(HycoROM model, const PetscBool reaches[]);
-PetscReal HycoGalerkinCost(HycoReducer reducer, const HycoAttempt *attempt);
 /* K, F and the rows of A_lambda's contacts on the RID before reduction, borrowed, as the last solve assembled them. */
 PetscErrorCode HycoGalerkinLocal(HycoROM model, HycoLocal *local);
 

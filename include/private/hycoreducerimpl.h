@@ -4,7 +4,7 @@
 
 #include <hycoromimpl.h>
 #include <hycosnapshotsimpl.h>
-#include <hycoreducer.h>
+#include <hycotrainer.h>
 #include <slepcsvd.h>
 
 enum {
@@ -83,6 +83,7 @@ struct _p_HycoReducer {
   PetscReal target[HYCO_N_ERRORS]; /* 0: none */
   PetscInt budget;                 /* largest number of solutions added to meet the targets */
   HycoROM prototype;               /* an empty model of the type to be trained, with its ops. Every rank */
+  HycoTrainerOps trainer;          /* of its type */
   void *training;                  /* the type's options, and the data of a run */
   HycoProgress progress;
   HycoPhaseMonitor phase;
@@ -152,7 +153,7 @@ static inline PetscBool HycoReducerOwnModes(HycoReducer t, const HycoROM type)
 /* The ways to make a model of the type that is set, which a search tries; NULL: one. */
 static inline const char *const *HycoReducerVariants(HycoReducer t)
 {
-  return t->prototype->ops->variants ? (*t->prototype->ops->variants)(t) : NULL;
+  return t->trainer.variants ? (*t->trainer.variants)(t) : NULL;
 }
 /* Sets t->columns, and t->n_s from it. */
 PetscErrorCode HycoReducerSetColumns(HycoReducer t, HycoSamples columns);
@@ -161,6 +162,9 @@ PetscErrorCode HycoReducerSolve(HycoReducer t, HycoSnapshots store, HycoSamples 
 /* Frees the data of one run. */
 PetscErrorCode HycoReducerReset(HycoReducer t);
 /* Sets a registered type, with its options; the present one may stay. */
+/* The training of a type; fails without one. The names of the types with one, in order; NULL ends. */
+PetscErrorCode HycoTrainerNames(const char *const **names);
+PetscErrorCode HycoTrainerFind(HycoROMType type, HycoTrainerOps *ops);
 PetscErrorCode HycoReducerSetType(HycoReducer t, HycoROMType type);
 /* Empirical cubature (cubature_weights.c): from the left singular vectors W (n_cells x n, rows in the file's order) and
    singular values of the cells' contributions. The weights of all cells of the whole mesh (w: n_cells, on rank 0; `fixed` in the cells of the part that are `near`,

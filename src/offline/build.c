@@ -372,7 +372,7 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
   r->condition = m->model->numbers[0];
   r->error_u = m->model->numbers[1];
   r->error_lambda = m->model->numbers[2];
-  if (m->ops->report) PetscCall((*m->ops->report)(t, m, r));
+  if (t->trainer.report) PetscCall((*t->trainer.report)(t, m, r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -434,7 +434,7 @@ static PetscErrorCode BuildModel(HycoReducer t, PetscBool useful, HycoROM m, Hyc
 {
   PetscFunctionBegin;
   PetscCall(FillModel(t, m));
-  PetscCall((*m->ops->build)(m, t));
+  PetscCall((*t->trainer.build)(m, t));
   PetscCall(TakeClosed(t, m));
   if (useful) PetscCall(CheckUseful(t, m));
   PetscCall(Report(t, m, report));
@@ -549,9 +549,9 @@ PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, HycoROM *model,
   PetscCallMPI(MPI_Bcast(report, sizeof(*report), MPI_BYTE, 0, HycoComm(t)));
   report->type = report->chosen.settings.type = t->prototype->model->type; /* set on each rank */
   PetscCall(HycoROMBroadcast(HycoComm(t), model));
-  if (!useful || !t->prototype->ops->finish) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!useful || !t->trainer.finish) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoLogEvent(HYCO_EVENT_SCAN, PETSC_TRUE));
-  ierr = (*t->prototype->ops->finish)(t, *model, report);
+  ierr = (*t->trainer.finish)(t, *model, report);
   PetscCall(HycoLogEvent(HYCO_EVENT_SCAN, PETSC_FALSE));
   if (ierr) (void)!HycoROMDestroy(model);
   PetscCall(ierr);
@@ -746,7 +746,7 @@ static PetscErrorCode DecideLate(HycoReducer t)
   const char *const *types;
 
   PetscFunctionBegin;
-  PetscCall(HycoROMTypeNames(&types));
+  PetscCall(HycoTrainerNames(&types));
   t->late = PETSC_FALSE;
   for (PetscInt k = 0; types[k] && t->scene->n_parameters && (t->validation || t->n_validation); k++) {
     HycoROM type;
@@ -787,7 +787,7 @@ PetscErrorCode HycoReducerRun(HycoReducer t, HycoSamples samples, const char pat
               "-target_%s needs held-out points, and -hyco_validation is 0; remove one of the two", HycoErrorKinds[j]);
   if (t->pinned[HYCO_CHOICE_TYPE] || !t->search) PetscCall(HycoReducerCheckContacts(t, t->prototype));
   PetscCall(HycoReducerOpen(t, samples, path, &store));
-  if (t->prototype->ops->begin) PetscCall((*t->prototype->ops->begin)(t));
+  if (t->trainer.begin) PetscCall((*t->trainer.begin)(t));
   PetscCall(DecideLate(t));
   if (!t->late) PetscCall(HycoReducerSolve(t, store, samples));
   PetscCall(HycoReducerHoldOut(t, store));

@@ -100,7 +100,7 @@ static PetscErrorCode BuildModel(HycoReducer t, Loop *loop, PetscInt iteration, 
   PetscCall(HycoSnapshotsFill(loop->store, loop->samples, iteration ? NULL : t->progress, t->progress_ctx));
   PetscCall(HycoReducerResetBases(t));
   PetscCall(HycoReducerReduce(t, loop->store, PETSC_FALSE));
-  if (t->prototype->ops->modes) PetscCall((*t->prototype->ops->modes)(t, loop->store));
+  if (t->trainer.modes) PetscCall((*t->trainer.modes)(t, loop->store));
   PetscCall(HycoReducerBuild(t, PETSC_FALSE, &loop->model, report));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -32,7 +32,7 @@ static PetscErrorCode Create(MPI_Comm comm, HycoReducer *reducer)
 static PetscErrorCode EndTraining(HycoReducer t)
 {
   PetscFunctionBegin;
-  if (t->training && t->prototype->ops->resettraining) PetscCall((*t->prototype->ops->resettraining)(t));
+  if (t->training && t->trainer.reset) PetscCall((*t->trainer.reset)(t));
   PetscCall(PetscFree(t->training));
   PetscCall(HycoROMDestroy(&t->prototype));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -41,6 +41,7 @@ static PetscErrorCode EndTraining(HycoReducer t)
 PetscErrorCode HycoReducerSetType(HycoReducer t, HycoROMType name)
 {
   PetscBool same = PETSC_FALSE;
+  HycoTrainerOps trainer;
   HycoROM type;
   PetscErrorCode ierr;
 
@@ -49,11 +50,13 @@ PetscErrorCode HycoReducerSetType(HycoReducer t, HycoROMType name)
   if (same) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoROMCreate(&type));
   ierr = HycoROMSetType(type, name);
+  if (!ierr) ierr = HycoTrainerFind(name, &trainer);
   if (ierr) (void)!HycoROMDestroy(&type);
   PetscCall(ierr);
   PetscCall(EndTraining(t));
   t->prototype = type;
-  if (type->ops->setfromoptions) PetscCall((*type->ops->setfromoptions)(t));
+  t->trainer = trainer;
+  if (trainer.setfromoptions) PetscCall((*trainer.setfromoptions)(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -82,7 +85,7 @@ PetscErrorCode HycoReducerReset(HycoReducer t)
 {
   PetscFunctionBegin;
   PetscCall(HycoReducerResetBases(t));
-  if (t->training && t->prototype->ops->resettraining) PetscCall((*t->prototype->ops->resettraining)(t));
+  if (t->training && t->trainer.reset) PetscCall((*t->trainer.reset)(t));
   PetscCall(HycoFOMDestroy(&t->fom));
   PetscCall(HycoMetDestroy(&t->met));
   HycoFreeAll(&t->grown, &t->surface_node, &t->fixed);
@@ -255,7 +258,7 @@ static PetscErrorCode ReadTraining(HycoReducer t)
   const char *const *types;
 
   PetscFunctionBegin;
-  PetscCall(HycoROMTypeNames(&types));
+  PetscCall(HycoTrainerNames(&types));
   while (types[type] && strcmp(types[type], t->prototype ? t->prototype->model->type : HYCO_ROM_HYBRID)) type++;
   PetscObjectOptionsBegin((PetscObject)t);
   PetscCall(HycoOptionsFor(""));
@@ -457,7 +460,7 @@ static PetscErrorCode DeclareAll(HycoReducer t)
 
   PetscFunctionBegin;
   PetscCall(ReadAll(t));
-  PetscCall(HycoROMTypeNames(&types));
+  PetscCall(HycoTrainerNames(&types));
   for (PetscInt k = 0; types[k]; k++) PetscCall(HycoReducerSetType(t, types[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -484,15 +487,13 @@ PetscErrorCode HycoReducerTries(HycoReducer t, const char types[], PetscBool *tr
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
   *tries = (PetscBool)(strstr(types, t->prototype->model->type) != NULL);
-  PetscCall(HycoROMTypeNames(&names));
+  PetscCall(HycoTrainerNames(&names));
   for (PetscInt k = 0; names[k] && searches && !*tries; k++) {
-    HycoROM type;
+    HycoTrainerOps trainer;
 
     if (!strstr(types, names[k])) continue;
-    PetscCall(HycoROMCreate(&type));
-    PetscCall(HycoROMSetType(type, names[k]));
-    *tries = (PetscBool)(type->ops->offers != NULL);
-    PetscCall(HycoROMDestroy(&type));
+    PetscCall(HycoTrainerFind(names[k], &trainer));
+    *tries = (PetscBool)(trainer.offers != NULL);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -49,10 +49,17 @@ static PetscErrorCode LateSetFromOptions(HycoReducer reducer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode TrainLate(HycoTrainerOps *ops)
+{
+  PetscFunctionBegin;
+  ops->setfromoptions = LateSetFromOptions;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode CreateLate(HycoROM model)
 {
   static const HycoROMTraits traits = {.title = "late"};
-  static const HycoROMOps ops = {.setfromoptions = LateSetFromOptions};
+  static const HycoROMOps ops = {NULL};
 
   PetscFunctionBegin;
   PetscCall(HycoROMSetOps(model, &ops, &traits, NULL));
@@ -69,6 +76,9 @@ static PetscErrorCode TestLate(void)
   PetscCall(HycoGetOptionTable(&before, &table));
   CHECK(!HycoOptionFind("hyco_late"), "-hyco_late is there before its type");
   PetscCall(HycoROMRegister("late", CreateLate));
+  PetscCall(HycoGetOptionTable(&n, &table));
+  CHECK(n == before && !HycoOptionFind("hyco_late"), "a type without a training has options of it");
+  PetscCall(HycoTrainerRegister("late", TrainLate));
   PetscCall(HycoGetOptionTable(&n, &table));
   CHECK(n == before + 1, "%d options, %d before the type was registered", (int)n, (int)before);
   CHECK(HycoOptionFind("hyco_late"), "-hyco_late is not there");

@@ -129,6 +129,42 @@ static PetscErrorCode MoveBody(HycoH5 h, HycoSubstructures b, PetscInt k)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What is inelastic. */
+static PetscErrorCode MoveInelastic(HycoROM m, HycoH5 h)
+{
+  HycoSubstructures b = (HycoSubstructures)m->model->data;
+  HycoBodiesInelastic in;
+  PetscInt head[4], columns, rows = 0;
+
+  PetscFunctionBegin;
+  if (HycoH5Reads(h)) PetscCall(PetscNew(&b->inelastic));
+  in = b->inelastic;
+  head[0] = in->m;
+  head[1] = in->nd;
+  head[2] = in->n_cells;
+  head[3] = in->weighted;
+  PetscCall(HycoH5Ints(h, "bodies/inelastic/head", 0, PETSC_MAX_INT, 4, head));
+  in->weighted = (PetscBool)head[3];
+  in->m = head[0];
+  in->nd = head[1];
+  in->n_cells = head[2];
+  HycoCheck(in->n_cells == m->model->mesh->n_cells, "%s: bodies/inelastic/head is damaged", m->model->path);
+  columns = in->n_cells * m->model->mesh->nv * b->dim;
+  for (PetscInt k = 0; k < b->n; k++)
+    rows += b->body[k].n_samples * (b->turn_start[k + 1] - b->turn_start[k]) * b->body[k].l;
+  PetscCall(HycoH5Reals(h, "bodies/inelastic/amplification", 1, &in->amplification));
+  PetscCall(HycoH5Real(h, "bodies/inelastic/T", &columns, in->m, &in->T));
+  PetscCall(HycoH5Real(h, "bodies/inelastic/there", &columns, in->m, &in->there));
+  PetscCall(HycoH5Real(h, "bodies/inelastic/P", &b->ns, in->m, &in->P));
+  PetscCall(HycoH5Real(h, "bodies/inelastic/fields", &rows, in->m, &in->fields));
+  PetscCall(HycoH5Int(h, "bodies/inelastic/dof", 0, m->model->whole_nodes * b->dim - 1, &in->nd, 1, &in->dof));
+  PetscCall(HycoH5Int(h, "bodies/inelastic/body", 0, b->n - 1, &in->nd, 1, &in->body));
+  PetscCall(HycoH5Real(h, "bodies/inelastic/C", &in->nd, b->ns, &in->C));
+  PetscCall(HycoH5Real(h, "bodies/inelastic/R", &in->nd, b->r, &in->R));
+  PetscCall(HycoH5Real(h, "bodies/inelastic/A", &in->nd, in->m, &in->A));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoBodiesFile(HycoROM m, HycoH5 h)
 {
   HycoSubstructures b = (HycoSubstructures)m->model->data;
@@ -139,6 +175,6 @@ PetscErrorCode HycoBodiesFile(HycoROM m, HycoH5 h)
   PetscCall(MoveTheta(h, m, b));
   PetscCall(MoveProbe(h, m, b));
   for (PetscInt k = 0; k < b->n; k++) PetscCall(MoveBody(h, b, k));
-  if (m->model->scene->n_times) PetscCall(HycoBodiesInelasticFile(m, h));
+  if (m->model->scene->n_times) PetscCall(MoveInelastic(m, h));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

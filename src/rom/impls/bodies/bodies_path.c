@@ -2,8 +2,6 @@
 #include "bodies_path.h"
 #include <petscviewer.h>
 
-#define USELESS 0.5 /* mean error of the training displacements */
-
 /* -- ops of the path -- */
 
 /* Displacements of the surfaces and the cells, and the residuals, recomputed from them. */
@@ -297,43 +295,6 @@ static PetscErrorCode Features(HycoROM m, PetscReal misfit[2])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -- training and report -- */
-
-static PetscErrorCode Build(HycoROM m, HycoReducer t)
-{
-  char worst[HYCO_LINE] = "";
-  HycoBodiesInelastic in;
-
-  PetscFunctionBegin;
-  PetscCall(HycoBodiesBuild(m, t));
-  in = ((HycoSubstructures)m->model->data)->inelastic;
-  if (!(m->model->numbers[1] < USELESS)) HycoReducerNameWorst(t, worst);
-  HycoCheckModel(m->model->numbers[1] < USELESS,
-                 "the model of bodies misses its own training displacements by %.0f %% on average (%d inelastic modes, "
-                 "%d cells)%s: use more cells (-hyco_bodies_cells), fewer modes (-hyco_bodies_inelastic_tol), or train "
-                 "a hybrid model",
-                 100 * (double)m->model->numbers[1], (int)in->m, (int)in->n_cells, worst);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
-{
-  HycoSubstructures b = (HycoSubstructures)m->model->data;
-
-  PetscFunctionBegin;
-  (void)t;
-  PetscCall(HycoTrainingAddFact(r, "n_bodies", (PetscReal)b->n));
-  PetscCall(HycoTrainingAddFact(r, "n_surface_unknowns", (PetscReal)b->ns));
-  PetscCall(HycoTrainingAddFact(r, "n_inelastic_modes", (PetscReal)b->inelastic->m));
-  PetscCall(HycoTrainingAddFact(r, "inelastic_amplification", b->inelastic->amplification));
-  snprintf(r->summary, sizeof(r->summary),
-           "bodies: %d, with %d unknowns on the surfaces that may touch; %d vectors of loads; %d inelastic modes, laws "
-           "in %d of %d elements; %d displacement modes\n",
-           (int)b->n, (int)b->ns, (int)b->r, (int)b->inelastic->m, (int)m->model->mesh->n_cells,
-           (int)m->model->whole_cells, (int)r->n_modes);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode View(HycoROM m, PetscViewer viewer)
 {
   HycoBodiesInelastic in = ((HycoSubstructures)m->model->data)->inelastic;
@@ -348,16 +309,6 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Operations of an iteration: the tangent in the cells, and its factor. */
-static PetscReal Cost(HycoReducer t, const HycoAttempt *a)
-{
-  HycoBodiesTraining s = HycoTrainingOfBodies(t);
-  const PetscReal m = (PetscReal)s->strains.l, n = (PetscReal)(t->fom->part->nv * t->sizes[3]);
-
-  (void)a;
-  return (PetscReal)(t->n_seeds_cell) * (2 * n * n * m + 2 * n * m * m) + m * m * m;
-}
-
 PetscErrorCode HycoBodiesTakePath(HycoROM m)
 {
   static const HycoROMTraits traits = {.title = "condensed bodies",
@@ -368,18 +319,7 @@ PetscErrorCode HycoBodiesTakePath(HycoROM m)
                                        .cells = PETSC_TRUE,
                                        .work = sizeof(struct _n_HycoBodiesPath),
                                        .resultants = PETSC_TRUE};
-  static const HycoROMOps ops = {.setfromoptions = HycoBodiesOptions,
-                                 .resettraining = HycoBodiesResetTraining,
-                                 .begin = HycoBodiesBegin,
-                                 .modes = HycoBodiesModes,
-                                 .build = Build,
-                                 .report = Report,
-                                 .cost = Cost,
-                                 .offers = HycoBodiesOffers,
-                                 .work = HycoBodiesOperations,
-                                 .variants = HycoBodiesVariants,
-                                 .setvariant = HycoBodiesSetVariant,
-                                 .setup = SetUp,
+  static const HycoROMOps ops = {.setup = SetUp,
                                  .reset = Reset,
                                  .solve = Solve,
                                  .features = Features,

@@ -3,7 +3,7 @@
 #define BODIES_PATH_H
 
 #include <hycobodies.h>
-#include <hycoinelasticmodes.h>
+#include <hycoinelasticforces.h>
 #include <hycopath.h>
 
 typedef struct _n_HycoBodiesPath {

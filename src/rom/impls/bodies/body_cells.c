@@ -3,7 +3,7 @@
   unknown. First those that the scene's outputs need, output by output, then those with the largest stresses at the
   sampled contact problems, as many as there is room for.
 */
-#include <hycobodies.h>
+#include <hycobodiestraining.h>
 #include <hycofields.h>
 #include <hycoquantities.h>
 

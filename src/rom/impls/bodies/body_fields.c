@@ -5,7 +5,7 @@
   from a solve for each mode. On the surfaces the model has the displacements themselves.
 */
 #include <hycoalgorithms.h>
-#include <hycobodies.h>
+#include <hycobodiestraining.h>
 #include <petscblaslapack.h>
 
 #define MOST_NUMBERS 6e7  /* entries of the sampled displacements on all ranks */

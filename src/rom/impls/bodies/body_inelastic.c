@@ -5,7 +5,7 @@
   cells, chosen by Q-DEIM on the q_k, displacements are exact too: rows of K^-1 for surface forces (C) and loads (R).
 */
 #include <hycoalgorithms.h>
-#include <hycobodies.h>
+#include <hycobodiestraining.h>
 #include <hycoinelasticmodes.h>
 
 #define MANY  64  /* right-hand sides at once */
@@ -608,42 +608,5 @@ PetscErrorCode HycoBodiesStrains(HycoReducer t, HycoBodiesFactor *factor)
   PetscCall(FillCells(t, factor, weight, u));
   PetscCall(PetscFree(weight));
   PetscCall(PetscFree2(u, work));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* -- file -- */
-
-PetscErrorCode HycoBodiesInelasticFile(HycoROM m, HycoH5 h)
-{
-  HycoSubstructures b = (HycoSubstructures)m->model->data;
-  HycoBodiesInelastic in;
-  PetscInt head[4], columns, rows = 0;
-
-  PetscFunctionBegin;
-  if (HycoH5Reads(h)) PetscCall(PetscNew(&b->inelastic));
-  in = b->inelastic;
-  head[0] = in->m;
-  head[1] = in->nd;
-  head[2] = in->n_cells;
-  head[3] = in->weighted;
-  PetscCall(HycoH5Ints(h, "bodies/inelastic/head", 0, PETSC_MAX_INT, 4, head));
-  in->weighted = (PetscBool)head[3];
-  in->m = head[0];
-  in->nd = head[1];
-  in->n_cells = head[2];
-  HycoCheck(in->n_cells == m->model->mesh->n_cells, "%s: bodies/inelastic/head is damaged", m->model->path);
-  columns = in->n_cells * m->model->mesh->nv * b->dim;
-  for (PetscInt k = 0; k < b->n; k++)
-    rows += b->body[k].n_samples * (b->turn_start[k + 1] - b->turn_start[k]) * b->body[k].l;
-  PetscCall(HycoH5Reals(h, "bodies/inelastic/amplification", 1, &in->amplification));
-  PetscCall(HycoH5Real(h, "bodies/inelastic/T", &columns, in->m, &in->T));
-  PetscCall(HycoH5Real(h, "bodies/inelastic/there", &columns, in->m, &in->there));
-  PetscCall(HycoH5Real(h, "bodies/inelastic/P", &b->ns, in->m, &in->P));
-  PetscCall(HycoH5Real(h, "bodies/inelastic/fields", &rows, in->m, &in->fields));
-  PetscCall(HycoH5Int(h, "bodies/inelastic/dof", 0, m->model->whole_nodes * b->dim - 1, &in->nd, 1, &in->dof));
-  PetscCall(HycoH5Int(h, "bodies/inelastic/body", 0, b->n - 1, &in->nd, 1, &in->body));
-  PetscCall(HycoH5Real(h, "bodies/inelastic/C", &in->nd, b->ns, &in->C));
-  PetscCall(HycoH5Real(h, "bodies/inelastic/R", &in->nd, b->r, &in->R));
-  PetscCall(HycoH5Real(h, "bodies/inelastic/A", &in->nd, in->m, &in->A));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

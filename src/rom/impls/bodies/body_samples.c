@@ -5,7 +5,7 @@
   where the next finer grid has its nodes, so that these are not lost if that is needed; between these points it is an
   estimate.
 */
-#include <hycobodies.h>
+#include <hycobodiestraining.h>
 #include <petscblaslapack.h>
 
 #define MOST_VALUES 17
@@ -35,24 +35,6 @@ static PetscErrorCode FindAxes(HycoReducer t, HycoSubstructures b)
           parts->enters[k * parts->n_parameters + b->theta[p]] & HYCO_ENTERS_SHAPE ? b->n_nodes[p] : 1;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscInt HycoBodiesGrid(HycoSubstructures b, PetscInt k, PetscReal theta[])
-{
-  PetscInt n = 1;
-  const PetscReal *node = b->node;
-
-  for (PetscInt p = 0; p < b->n_theta; p++) {
-    n *= b->n_nodes[p];
-    node += b->n_nodes[p];
-  }
-  for (PetscInt p = b->n_theta - 1; theta && p >= 0; p--) {
-    node -= b->n_nodes[p];
-    theta[p] = node[k % b->n_nodes[p]];
-    if (b->logarithm[p]) theta[p] = PetscExpReal(theta[p]);
-    k /= b->n_nodes[p];
-  }
-  return n;
 }
 
 PetscInt HycoBodiesSampleOf(HycoSubstructures b, PetscInt body, PetscInt k)

@@ -3,7 +3,7 @@
   surfaces last. K couples no bodies, so that its Schur complement on these unknowns consists of the blocks C_b; the
   unknowns that MUMPS pins for bodies that contact alone holds are their isostatic supports, and give the rigid motions.
 */
-#include <hycobodies.h>
+#include <hycobodiestraining.h>
 
 #define MOST_UNKNOWNS 4000 /* of the surfaces of a body: C_b is dense */
 #define MOST_ALL      8000 /* of all surfaces: the Schur complement is dense until its blocks are taken */

@@ -5,7 +5,7 @@
   cells around these, whatever the loads are: pressures, body forces, prescribed displacements, temperatures.
 */
 #include <hycoalgorithms.h>
-#include <hycobodies.h>
+#include <hycobodiestraining.h>
 #include <hycoinelasticmodes.h>
 
 #define MOST_VECTORS 60    /* of the basis */
@@ -26,7 +26,7 @@ static PetscErrorCode TurnedLoad(HycoReducer t, HycoFOM f, const PetscReal X0[],
   PetscFunctionBegin;
   HycoOnEach(HycoComm(f), HycoFESetParameters(f->fe, mu));
   if (f->size > 1) PetscCall(HycoFEAgreeOnMirrors(HycoComm(f), f->fe));
-  PetscCall(HycoBodyPoses(f, parts, X0, pose));
+  PetscCall(HycoBodyPoses(f, parts->n, parts->of, X0, pose));
   HycoOnEach(HycoComm(f), HycoFEAssembleForce(f->fe, F));
   PetscCall(VecGetArray(F, &v));
   for (PetscInt i = 0; i < f->part->n_nodes; i++) {

@@ -4,7 +4,7 @@
   that it is a polynomial too, determined by its values at few parameter values without the cells of the RID. Training
   finds the degrees, checks them, and stores the values in the file (affine_fit.c).
 */
-#include "table.h"
+#include <hycotable.h>
 #include <petsc/private/petscimpl.h> /* PetscObjectStateIncrease() */
 #include <petscviewer.h>
 

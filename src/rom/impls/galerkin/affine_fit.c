@@ -3,7 +3,8 @@
   entries need to be polynomials along its range, then all combinations; the table must agree with the assembled matrix
   at points in between, otherwise there is no table and predictions assemble.
 */
-#include "table.h"
+#include <hycogalerkintraining.h>
+#include <hycotable.h>
 
 #define MOST     5       /* largest number of values of one parameter */
 #define ENTRIES  5000000 /* largest number of entries in the table: 40 MB */

@@ -9,7 +9,7 @@
   one, with these as equations, and the matrix is sparse.) reduced_system.c fills the system.
 */
 #include <hycoalgorithms.h>
-#include "table.h"
+#include <hycotable.h>
 #include <petscblaslapack.h>
 
 /* With more unknowns the reduced matrix is stored sparse (with a dense border of l modes). */

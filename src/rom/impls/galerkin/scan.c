@@ -6,7 +6,8 @@
   neighbouring points are not detected; a finer grid detects them.
 */
 #include <hycoalgorithms.h>
-#include "table.h"
+#include <hycogalerkintraining.h>
+#include <hycotable.h>
 
 #define LARGEST 2500 /* number of unknowns above which a dense factor at every point takes minutes */
 

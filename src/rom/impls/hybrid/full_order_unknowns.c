@@ -8,7 +8,9 @@
   modes' coefficients follow from U[A] by ridge regression, whose ridge is chosen by the same error.
 */
 #include <hycoalgorithms.h>
-#include "hybrid.h"
+#include <hycogalerkintraining.h>
+#include <hycohybrid.h>
+#include <hycotrainers.h>
 
 #define WORST HYCO_JUDGED_WORST
 
@@ -18,7 +20,7 @@ typedef struct {
   PetscReal ridge; /* all; < 0: automatic */
 } * Training;
 
-PetscErrorCode HycoHybridSetFromOptions(HycoReducer t)
+static PetscErrorCode SetFromOptions(HycoReducer t)
 {
   Training s;
 
@@ -481,12 +483,44 @@ static PetscErrorCode ChooseUnknowns(HycoReducer t, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoHybridBuild(HycoROM m, HycoReducer t)
+static PetscErrorCode Build(HycoROM m, HycoReducer t)
 {
   HycoHybridModel h = (HycoHybridModel)m->model->data;
 
   PetscFunctionBegin;
   PetscCall(HycoReducerDualSnapshots(t, &h->n_dual, &h->S_lambda));
   PetscCall(ChooseUnknowns(t, m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The default type. */
+static PetscBool Offers(HycoReducer t, PetscBool targets, size_t length, char why[])
+{
+  (void)t, (void)targets, (void)length, (void)why;
+  return PETSC_TRUE;
+}
+
+static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
+{
+  PetscFunctionBegin;
+  (void)t, (void)m;
+  snprintf(r->summary, sizeof(r->summary),
+           "%d snapshots; modes: %d displacement, %d stress, %d force, %d dual\n"
+           "RID: %d elements (%.1f %%), %d nodes, %d in A, %d contacts; %d full-order displacements\n",
+           (int)r->n_samples, (int)r->n_modes, (int)r->n_stress_modes, (int)r->n_force_modes, (int)r->n_dual_modes,
+           (int)r->rid_elements, 100 * (double)r->rid_fraction, (int)r->rid_nodes, (int)r->rid_a_nodes,
+           (int)r->rid_contacts, (int)r->n_fe_dofs);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTrainerCreate_Hybrid(HycoTrainerOps *ops)
+{
+  PetscFunctionBegin;
+  *ops = (HycoTrainerOps){.setfromoptions = SetFromOptions,
+                          .build = Build,
+                          .finish = HycoGalerkinFinish,
+                          .report = Report,
+                          .cost = HycoGalerkinCost,
+                          .offers = Offers};
   PetscFunctionReturn(PETSC_SUCCESS);
 }

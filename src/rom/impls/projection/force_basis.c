@@ -6,7 +6,8 @@
   determine the forces.
 */
 #include <hycoalgorithms.h>
-#include <hycoprojection.h>
+#include <hycoprojectiontraining.h>
+#include <hycotrainers.h>
 #include <petscblaslapack.h>
 
 PetscErrorCode HycoForceBasisSetFromOptions(HycoReducer t)
@@ -34,7 +35,7 @@ PetscErrorCode HycoForceBasisSetFromOptions(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoProjectionSetFromOptions(HycoReducer t)
+static PetscErrorCode SetFromOptions(HycoReducer t)
 {
   HycoForceBasis s;
 
@@ -49,7 +50,7 @@ PetscErrorCode HycoProjectionSetFromOptions(HycoReducer t)
 }
 
 /* Offered as a last resort if targets are given. */
-PetscBool HycoProjectionOffers(HycoReducer t, PetscBool targets, size_t length, char why[])
+static PetscBool Offers(HycoReducer t, PetscBool targets, size_t length, char why[])
 {
   (void)t, (void)length, (void)why;
   return targets;
@@ -258,7 +259,7 @@ PetscErrorCode HycoProjectionJudge(HycoROM m, HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoProjectionBuild(HycoROM m, HycoReducer t)
+static PetscErrorCode Build(HycoROM m, HycoReducer t)
 {
   PetscFunctionBegin;
   PetscCall(HycoProjectionMakeBasis(m, t));
@@ -280,5 +281,18 @@ PetscErrorCode HycoProjectionReport(HycoReducer t, HycoROM m, HycoTraining *r)
       "projection-based: %d snapshots; %d displacement modes, %d of them supremizers; %d force vectors, which leave "
       "out %.2e of the dual snapshots' energy\n",
       (int)r->n_samples, (int)r->n_modes, (int)n, (int)p->l_lambda, (double)p->dual_misfit);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTrainerCreate_Projection(HycoTrainerOps *ops)
+{
+  PetscFunctionBegin;
+  *ops = (HycoTrainerOps){.setfromoptions = SetFromOptions,
+                          .modes = HycoProjectionModes,
+                          .build = Build,
+                          .finish = HycoGalerkinFinish,
+                          .report = HycoProjectionReport,
+                          .cost = HycoGalerkinCost,
+                          .offers = Offers};
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,6 +1,6 @@
-/* The hybrid hyper-reduced model (38)-(41): its data and its training. */
-#ifndef HYBRID_H
-#define HYBRID_H
+/* The hybrid hyper-reduced model (38)-(41): its data. */
+#ifndef HYCOHYBRID_H
+#define HYCOHYBRID_H
 
 #include <hycogalerkin.h>
 
@@ -23,9 +23,5 @@ PetscErrorCode HycoHybridReconstruct(HycoROM model);
 /* NULL-safe. */
 PetscErrorCode HycoReconstructionDestroy(HycoReconstruction *reconstruction);
 extern const char *const HycoReconstructSolvers[];
-
-/* Implementations of the training ops (full_order_unknowns.c), which choose the full-order displacements. */
-PetscErrorCode HycoHybridSetFromOptions(HycoReducer reducer);
-PetscErrorCode HycoHybridBuild(HycoROM model, HycoReducer reducer);
 
 #endif

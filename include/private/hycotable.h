@@ -1,6 +1,6 @@
 /* The reduced stiffness at a few parameter values, from which it is interpolated (affine.c). All on one process. */
-#ifndef TABLE_H
-#define TABLE_H
+#ifndef HYCOTABLE_H
+#define HYCOTABLE_H
 
 #include <hycoalgorithms.h>
 #include <hycogalerkin.h>
