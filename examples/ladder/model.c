@@ -6,6 +6,7 @@
 */
 #include <hyco.h>
 #include <hycoromtype.h>
+#include <hycotrainer.h>
 #include <stdlib.h>
 
 typedef struct {

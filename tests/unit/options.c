@@ -3,6 +3,7 @@
 #include <hyco.h>
 #include <hycoromtype.h>
 #include <hycosolverimpl.h>
+#include <hycotrainer.h>
 #include <unistd.h>
 
 /* Whether an invalid value is refused when it is read: a folder, a group or a viewer may be any word. */
