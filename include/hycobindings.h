@@ -20,8 +20,8 @@ typedef struct {
 
 /*
   Gets the size in bytes of a type of the library, and the n members of a struct in their order. Types: HycoSummary,
-  HycoStep, HycoHistory, HycoReaction, HycoContactResult, HycoPrediction with all of their members; HycoTraining with
-  those of its members that are numbers or texts of the whole training; PetscInt, PetscReal and MPI_Comm with n = 0. Fails
+  HycoStep, HycoHistory, HycoReaction, HycoContactResult, HycoPrediction, HycoGradient with all of their members; HycoTraining with
+  those of its members that are numbers or texts of the whole training; PetscInt, PetscReal, PetscBool and MPI_Comm with n = 0. Fails
   for another name. `n` and `fields` may be NULL. Not collective. Borrowed from the library.
 */
 PetscErrorCode HycoGetLayout(const char type[], size_t *size, PetscInt *n, const HycoMember *fields[]);

@@ -27,6 +27,7 @@ typedef struct {
   PetscReal pressure;    /* largest L_i divided by the area of its node; 0 if the group is not a surface */
   PetscReal friction[3]; /* the tangential part of `force` */
   PetscReal friction_work; /* dissipated since the start of the history, >= 0 */
+  PetscReal pressure_min;  /* the smallest, 0 where a contact is open */
 } HycoContactResult;
 
 /* n potential contacts of one HycoContact, at the positions of the bodies for mu. */

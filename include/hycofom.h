@@ -93,7 +93,20 @@ typedef struct {
   PetscReal order;        /* the median of these; 2 for the tangent */
   PetscInt n_taken;       /* number of accepted time steps, including the first time */
   const PetscReal *taken; /* their ends. Borrowed */
+  PetscInt n_bound;       /* number of steps that only -hyco_step_inelastic kept from growing; since a resumption */
 } HycoHistory;
+
+/* The derivatives of the scene's outputs with respect to its parameters, in the unit of the output over that of the
+   parameter. Where the derivatives to the two sides differ, `kink` is true, and the value is that towards larger
+   parameter values (at the upper end of the range towards smaller ones): contacts with neither force nor gap, a change of
+   master, cells that share the largest stress. */
+typedef struct {
+  PetscInt n_outputs, n_parameters;
+  PetscInt n_undecided;   /* contacts with neither force nor gap */
+  const PetscReal *value; /* n_outputs x n_parameters row major, in the orders of HycoSceneGetQuantities() and
+                             HycoSceneGetParameters(). Borrowed until the next call */
+  const PetscBool *kink;  /* the same shape. Borrowed */
+} HycoGradient;
 
 /* Called at each listed time, on every rank; HycoFOMGetSolution() then gives the solution there. */
 typedef PetscErrorCode (*HycoStepMonitor)(HycoFOM fom, const HycoStep *step, void *ctx);
@@ -128,6 +141,15 @@ PetscErrorCode HycoFOMSetStepMonitor(HycoFOM fom, HycoStepMonitor monitor, void 
 PetscErrorCode HycoFOMGetSystem(HycoFOM fom, HycoSystem *system);
 /* Gets the summary of the last solution. Collective. */
 PetscErrorCode HycoFOMGetSummary(HycoFOM fom, HycoSummary *summary);
+
+/*
+  Gets the gradient at the last solution, by the linear system of its closed contacts with the factor of K: for each
+  parameter one forward and one back substitution, and differences of element sums, contact rows and outputs, never of
+  solutions. The solution stays. Collective; the same values on every rank. Fails without an output or a parameter, for a
+  scene with a history, where a solve did not converge, for a solver without a factor (-hyco_linear), with
+  -hyco_regularise, and where the forces of closed contacts are not unique; after an error there is no last solution.
+*/
+PetscErrorCode HycoFOMGetGradient(HycoFOM fom, HycoGradient *gradient);
 
 /* Gets the resultants of each contact in the last solution, in the scene's order. Collective. Borrowed until the next
    solve. */

@@ -53,6 +53,7 @@ typedef struct {
   const char *name, *slave, *master;
   PetscInt n_nodes; /* of the slave */
   PetscReal coarse; /* as of a contact */
+  PetscBool mortar; /* slaves follow means: either side may be the finer */
 } HycoTieInspection;
 
 /* Two groups of one dimension with nearly the same nodes, or with names that differ in letter case alone. */

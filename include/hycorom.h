@@ -186,6 +186,13 @@ PetscErrorCode HycoROMGetEquilibrium(HycoROM model, HycoEquilibrium *equilibrium
 
 /* Gets the summary of the last prediction, with estimated errors. Fails before the first prediction. */
 PetscErrorCode HycoROMGetPrediction(HycoROM model, HycoPrediction *prediction);
+/*
+  Gets the gradient of the model's outputs at the last prediction (hycofom.h), by the linear system of its closed contacts
+  and differences of the model's data, never of predictions. The prediction stays. Not collective. Fails without an output
+  or a parameter, for a model of paths, for a type without gradients, where the solve did not converge, and where the
+  forces of closed contacts are not unique; after an error there is no last prediction.
+*/
+PetscErrorCode HycoROMGetGradient(HycoROM model, HycoGradient *gradient);
 /* Gets the strain energy of the last prediction on the RID's cells; this may cost as much as the prediction. */
 PetscErrorCode HycoROMGetStrainEnergy(HycoROM model, PetscReal *energy);
 

@@ -38,6 +38,7 @@ typedef struct {
   PetscBool own_modes; /* its modes are displacements of its own: solutions choose only the cells of its mesh, for which
                             those at held-out points serve, and a search tries it before the training points are solved */
   PetscBool integrals; /* it takes contacts whose rows are integrals, with any number of masters (type mortar) */
+  PetscBool friction;  /* it takes contacts with friction */
   PetscBool cells;     /* its mesh consists of the cells that it chooses, and of the surfaces of contacts and, without
                       `surfaces`, loads */
 } HycoROMTraits;
@@ -62,6 +63,16 @@ typedef struct _HycoROMOps {
   PetscErrorCode (*local)(HycoROM, HycoLocal *);
   PetscErrorCode (*features)(HycoROM, PetscReal misfit[2]); /* features that indicate its errors, >= 0 */
   PetscErrorCode (*estimate)(HycoROM, HycoPrediction *);    /* its errors, without held-out points */
+  /* gradients; without `residual` the type has none. Its problem is w = q + M z, z = (x, L): w = 0 for the p unknowns x,
+     0 <= w complementary to the n forces L >= 0 */
+  PetscErrorCode (*unknowns)(HycoROM, PetscInt *p, PetscInt *n, PetscReal z[]); /* z (p + n) of the last solve; NULL:
+                                                                                   only the sizes */
+  PetscErrorCode (*residual)(HycoROM, const PetscReal mu[], const PetscReal z[], PetscReal w[],
+                             PetscReal *size); /* moves the data to mu and takes z; w (p + n; NULL: not needed); size:
+                                                  of gaps and displacements of the contacts */
+  PetscErrorCode (*jacobian)(HycoROM, PetscInt k, const PetscInt contact[],
+                             PetscReal M[]); /* of x and these k forces, p + k square by columns, at the last mu */
+  PetscErrorCode (*expand)(HycoROM);         /* sets what a solve sets (modes, displacements, forces) from that z */
   PetscErrorCode (*view)(HycoROM, PetscViewer);
   PetscErrorCode (*save)(HycoROM, HycoH5);
   PetscErrorCode (*load)(HycoROM, HycoH5);

@@ -13,7 +13,7 @@ QUIET = {"HEADING", "PREPRINT", "RESTART", "OUTPUT", "NODE OUTPUT", "ELEMENT OUT
 AXES = "xyz"
 NAMED = {"ENCASTRE": (1, 2, 3, 4, 5, 6), "PINNED": (1, 2, 3), "XSYMM": (1, 5, 6), "YSYMM": (2, 4, 6), "ZSYMM": (3, 4, 5), "XASYMM": (2, 3, 4), "YASYMM": (1, 3, 5),
          "ZASYMM": (1, 2, 6), "NOWARP": (), "NOOVAL": (), "NODEFORM": ()}
-WHY = {"FRICTION": "contact is frictionless in the draft; the coefficient stands beside the contact", "EQUATION": "no equations between displacements",
+WHY = {"FRICTION": "only a constant coefficient of a surface interaction is friction: in the draft", "EQUATION": "no equations between displacements",
        "MPC": "no constraints of this kind", "COUPLING": "no couplings of a reference point, unless it does not move",
        "DISTRIBUTING COUPLING": "no couplings of a reference point",
        "HOURGLASS STIFFNESS": "cells are fully integrated", "TRANSFORM": "supports and loads in turned axes: see fixed: direction in scenes.md",
@@ -43,7 +43,7 @@ def item(row, k, default=0.0):
 
 def said(value):
     """A number as text."""
-    return f"{value:.12g}"
+    return f"{value + 0.0:.12g}"  # not -0
 
 
 def product(value, name):
@@ -67,13 +67,13 @@ def piecewise(rows, at):
 class Draft:
     """The scene of a deck. The mesh m gets the groups that the scene names; `left` has what is not converted: (block, text)."""
 
-    def __init__(self, m, name, facets_of, plain):
+    def __init__(self, m, name, facets_of, plain, frictionless=False):
         self.m, self.deck, self.name, self.facets_of, self.plain = m, m.deck, name, facets_of, plain
         self.left, self.notes = {}, []
         self.bodies, self.materials, self.body_of, self.thickness = {}, {}, {}, 1.0
         self.interactions, self.contacts, self.ties, self.rigids, self.loose = {}, {}, {}, [], {}
         self.amplitudes, self.steps, self.values, self.initial, self.reference = {}, [], {}, {}, {}
-        self.groups, self.tables, self.skipped = set(), {}, False
+        self.groups, self.tables, self.skipped, self.frictionless = set(), {}, False, frictionless
 
     def leave(self, block, what, why=None):
         """Notes what is not converted, once for each keyword and reason."""
@@ -149,6 +149,11 @@ class Draft:
     def dim(self):
         return 3 if any(t.startswith("C3D") for t in self.deck.types) else 2
 
+    def quadratic(self):
+        """Whether there are cells of second order, for which node-to-surface contact is not available."""
+        sizes = [int(re.match(r"(?:C3D|CP[SE]|CAX)(\d+)", t)[1]) for t in self.deck.types if re.match(r"(?:C3D|CP[SE]|CAX)\d", t)]
+        return max(sizes, default=0) > (8 if self.dim() == 3 else 4)
+
     # ------------------------------------------------------------------------------------------------ reading
 
     def make(self):
@@ -170,9 +175,7 @@ class Draft:
             elif word in ("ELASTIC", "EXPANSION", "DENSITY", "PLASTIC", "CREEP") and material is not None:
                 getattr(self, "read_" + word.lower())(material, block)
             elif word == "FRICTION":
-                if rows and interaction is not None and not self.steps:  # not the change of one within a step
-                    interaction["friction"] = item(rows[0], 0)
-                self.leave(block, "*FRICTION", WHY["FRICTION"])
+                self.read_friction(interaction, block)
             elif word == "SURFACE BEHAVIOR" and interaction is not None:
                 if parameters.get("PRESSURE-OVERCLOSURE", "HARD").upper() == "TIED":
                     interaction["tied"] = True
@@ -530,6 +533,23 @@ class Draft:
             value, source = given[d]
             self.put(("fixed", name, AXES[d - 1]), value, source)
 
+    def read_friction(self, interaction, block):
+        """The coefficient of an interaction, of which other forms and changes within a step are left."""
+        given = bool(block.rows) and interaction is not None and not self.steps
+        if given:
+            interaction["friction"] = item(block.rows[0], 0)
+        if self.frictionless:
+            self.leave(block, "*FRICTION", "left out by --frictionless; the coefficient stands beside the contact")
+        elif not given or len(block.rows) > 1 or any(word in block.parameters for word in ("ROUGH", "EXPONENTIAL DECAY", "USER", "TAUMAX", "ANISOTROPIC")):
+            self.leave(block, "*FRICTION", WHY["FRICTION"])
+
+    def friction(self, interaction):
+        return self.interactions.get(interaction, {}).get("friction", 0.0)
+
+    def rubs(self):
+        """Whether a contact of the draft has friction, which depends on the path: it needs a history."""
+        return not self.frictionless and any(self.friction(contact[2]) > 0 for contact in self.contacts.values())
+
     def inelastic(self):
         return any("plastic" in m or "creep" in m for m in (self.materials.get(b[1], {}) for b in self.bodies.values()))
 
@@ -654,20 +674,25 @@ class Draft:
 
     def contact(self, name):
         slave, master, interaction, reach, row, _ = self.contacts[name]
-        text, far = f"type: surface, slave: {slave}, master: {master}", self.reach(slave, master)
+        kind = "mortar" if self.quadratic() else "surface"
+        text, far = f"type: {kind}, slave: {slave}, master: {master}", self.reach(slave, master)
         if far and max(far[0], reach) > 0.1 * far[1]:
             text += f", tolerance: {said(float(f'{1.001 * max(far[0], reach):.3g}'))}"
         if (slave, master) in self.loose:
             text += f", gap: {said(self.loose[slave, master])}"
-        friction = self.interactions.get(interaction, {}).get("friction")
-        return name, "{" + text + "}", f"friction: {said(friction)} in the deck" if friction else ""
+        friction = self.friction(interaction)
+        if friction and not self.frictionless:
+            text += f", friction: {said(friction)}"
+        return name, "{" + text + "}", f"friction: {said(friction)} in the deck" if friction and self.frictionless else ""
 
     def formulation(self):
         return next((name for start, name in (("CPS", "plane_stress"), ("CAX", "axisymmetric"), ("CPE", "plane_strain")) if any(t.startswith(start) for t in self.deck.types)), "")
 
     def text(self):
         """The draft; afterwards `left` is complete."""
-        self.history = self.inelastic() or len(self.steps) > 1
+        self.history = self.inelastic() or self.rubs() or len(self.steps) > 1
+        if self.rubs():
+            self.notes.append("friction is solved at full order only; reduced models need a draft made with --frictionless. More listed times follow its path more closely.")
         self.steps = self.steps or [{"period": 1.0, "kind": "", "ramp": True}]
         sections = list(self.entries())
         lines = [f"# Draft from {self.name}. Displacements are small; bodies are in the deck's units.",

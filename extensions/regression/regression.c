@@ -363,8 +363,11 @@ static PetscErrorCode Destroy(HycoROM m)
 
 static PetscErrorCode Create(HycoROM m)
 {
-  static const HycoROMTraits traits = {
-      .title = "regression", .work = sizeof(*(Work)NULL), .settings = HYCO_SETTINGS_NONE, .history = PETSC_TRUE};
+  static const HycoROMTraits traits = {.title = "regression",
+                                       .work = sizeof(*(Work)NULL),
+                                       .settings = HYCO_SETTINGS_NONE,
+                                       .history = PETSC_TRUE,
+                                       .integrals = PETSC_TRUE};
   static const HycoROMOps ops = {
       .setup = SetUp, .reset = Reset, .solve = Solve, .view = View, .save = Move, .load = Move, .destroy = Destroy};
   Regression r;

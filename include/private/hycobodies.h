@@ -17,7 +17,9 @@
 #include <hycoalgorithms.h>
 #include <hycolcp.h>
 #include <hycolinear.h>
+#include <hycomaterialimpl.h>
 #include <hycoromimpl.h>
+#include <hycoslip.h>
 #include <hycosolver.h>
 
 /* Where a body is, relative to its nodes at another point: x = s Q X + t. */
@@ -41,12 +43,19 @@ static inline void HycoPoseTurn(const PetscReal Q[9], PetscInt dim, PetscBool ba
   }
 }
 
-/* Where contacts are: a mesh with all of their surfaces, and its rows of B and gaps at its parameters. Borrowed. */
+/* Where contacts are: a mesh with all of their surfaces, and its rows of B and gaps at its parameters: one for each
+   contact, or with tangents. Borrowed. */
 typedef struct {
   HycoFE fe;
   HycoPairs *pairs;
   HycoRows *rows;
+  PetscInt n;              /* rows */
+  const PetscInt *contact; /* by row: of the scene */
 } HycoBodiesSurface;
+static inline HycoBodiesSurface HycoBodiesSurfaceNormal(HycoFE fe, HycoPairs *pairs, HycoRows *rows)
+{
+  return (HycoBodiesSurface){fe, pairs, rows, pairs->n, pairs->contact};
+}
 
 /* One body: its blocks at each of its samples (tensor), one sample after the other. All row major, except C. */
 typedef struct {
@@ -58,17 +67,29 @@ typedef struct {
   PetscReal *gram;             /* r x r: of the errors of R at held-out samples in the norm of C^-1, summed; 0 */
 } HycoSubstructure;
 
-/* What is inelastic: u = ... + P alpha / kappa, alpha = T q, with the inelastic forces q of the cells of the model. */
+/* Whether a cell's body may deform inelastically. */
+static inline PetscBool HycoInelasticFlows(HycoFE fe, PetscInt cell)
+{
+  return (PetscBool)!fe->scene->body[fe->mesh->cell_body[cell]].law->linear;
+}
+/* The unknown of fe's mesh that is unknown i of cell e. */
+static inline PetscInt HycoCellUnknown(HycoMesh m, PetscInt e, PetscInt i)
+{
+  return m->cells[e * m->nv + i / m->dim] * m->dim + i % m->dim;
+}
+/* What is inelastic: u = ... + P alpha / kappa, alpha = T^T s of what the stresses lack of the elastic ones at few points. */
 typedef struct {
-  PetscInt m, n_cells;      /* modes of the nodal forces of inelastic strains; cells in which the laws are evaluated */
-  PetscReal amplification;  /* 2-norm of the inverse of the modes in these cells; 1 with a cubature */
-  PetscBool weighted;       /* a cubature, otherwise interpolation */
-  PetscReal *T, *there;     /* (n_cells nv dim) x m row major, cells in the order of the model's mesh: the coefficients
-                              are T^T q; the modes there */
-  PetscReal *P;             /* ns x m: surfaces */
-  PetscReal *fields;        /* modes of displacement, by body, sample and turn, x m */
-  PetscInt nd, *dof, *body; /* the cells' free unknowns (node of the whole mesh times dim plus component, ascending);
-                               their bodies */
+  PetscInt m, n_points; /* modes; integration points at which the laws are evaluated */
+  PetscInt *point;   /* the number of its cell in the whole mesh times the points of a cell, plus its own; ascending */
+  PetscReal *weight; /* of the points, at the bodies' first place */
+  PetscReal amplification; /* 2-norm of the inverse of the modes at these points; 1 with a cubature */
+  PetscBool weighted;      /* a cubature, otherwise interpolation */
+  PetscReal *T, *there;    /* (n_points n_sigma) x m row major: the coefficients are T^T s; the modes there (zero with a
+                              cubature) */
+  PetscReal *P;            /* ns x m: surfaces */
+  PetscReal *fields;       /* modes of displacement, by body, sample and turn, x m */
+  PetscInt nd, *dof, *body; /* the free unknowns of the points' cells (node of the whole mesh times dim plus component,
+                               ascending); their bodies */
   PetscReal *C, *R, *A;     /* their displacements: nd x ns, nd x r, nd x m */
 } * HycoBodiesInelastic;
 
@@ -169,6 +190,37 @@ PetscErrorCode HycoBodiesKeep(HycoBodiesWork work, PetscInt n, const PetscInt co
 /* row[n]: of the matrix W at the present parameters, contact k with n contacts; u -= C B^T Lambda. */
 void HycoBodiesKeptRow(HycoBodiesWork work, PetscInt k, PetscInt n, const PetscInt contact[], PetscReal row[]);
 PetscErrorCode HycoBodiesKeptDisplace(HycoBodiesWork work, PetscInt m, const PetscReal Lambda[], PetscReal u[]);
+/* Friction between the bodies (bodies_friction.c): steps of a path on the rows with tangents. surface: with the normal
+   rows alone (borrowed). */
+typedef struct _n_HycoBodiesFriction *HycoBodiesFriction;
+PetscErrorCode HycoBodiesFrictionCreate(HycoScene scene, const HycoBodiesSurface *surface,
+                                        HycoBodiesFriction *friction);
+PetscErrorCode HycoBodiesFrictionDestroy(HycoBodiesFriction *friction);
+/* The surface with tangents, for HycoBodiesSetUp(). Borrowed. */
+const HycoBodiesSurface *HycoBodiesFrictionSurface(HycoBodiesFriction friction);
+/* At the start of a path: no slip, no forces. */
+PetscErrorCode HycoBodiesFrictionBegin(HycoBodiesFriction friction);
+/* HycoBodiesPrepare() with tangents, once the surface's fe is at mu. */
+PetscErrorCode HycoBodiesFrictionPrepare(HycoBodiesFriction friction, HycoBodiesWork work, const PetscReal mu[]);
+/* The forces of the step, and u, f of work; *solved: the residual of the contacts, recomputed from them, is small. */
+PetscErrorCode HycoBodiesFrictionSolve(HycoBodiesFriction friction, HycoBodiesWork work, HycoKKT *kkt, PetscInt *its,
+                                       PetscBool *solved);
+/* The solved step becomes the state of the contacts. */
+PetscErrorCode HycoBodiesFrictionAccept(HycoBodiesFriction friction);
+/* After a step that was refused, prepared at the last accepted time: its forces, and u, f of work. */
+void HycoBodiesFrictionRestore(HycoBodiesFriction friction, HycoBodiesWork work);
+/* The normal forces of the solved step; the state of the contacts, whose arrays the friction owns; whether the last step
+   has further solutions. */
+void HycoBodiesFrictionNormal(HycoBodiesFriction friction, PetscReal Lambda[]);
+const HycoSlip *HycoBodiesFrictionSlip(HycoBodiesFriction friction);
+PetscBool HycoBodiesFrictionDisproven(HycoBodiesFriction friction);
+/* M of n contacts at the prepared parameters: p + n square by columns. */
+PetscErrorCode HycoBodiesMatrix(HycoBodiesWork work, PetscInt n, const PetscInt contact[], PetscReal M[]);
+/* Ops of gradients. */
+PetscErrorCode HycoBodiesUnknowns(HycoROM model, PetscInt *p, PetscInt *n, PetscReal z[]);
+PetscErrorCode HycoBodiesResidual(HycoROM model, const PetscReal mu[], const PetscReal z[], PetscReal w[],
+                                  PetscReal *size);
+PetscErrorCode HycoBodiesJacobian(HycoROM model, PetscInt k, const PetscInt contact[], PetscReal M[]);
 /* Sets the displacements of the surfaces and, after HycoBodiesExpand(), of the unknowns inside in U (by unknown of the
    surface's mesh) without prescribed ones. */
 void HycoBodiesMove(HycoBodiesWork work, const HycoBodiesSurface *surface, PetscReal U[]);

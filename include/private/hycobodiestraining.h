@@ -83,10 +83,15 @@ typedef struct {
   PetscReal *moved;   /* by unknown of the part: largest sampled displacement */
   PetscBool *known;   /* by unknown of the part: on the surfaces; */
   PetscBool *bare;    /* the same: no mode has it, because the model's mesh does */
-  PetscBool *touched; /* ns: with a force at a sample */
+  PetscBool *in_mesh; /* ns: the model's mesh has its node, whatever its cells */
   PetscInt *row;      /* of the unknowns inside in the distributed vectors */
 } HycoBodiesFactor;
 
+/* Whether the model has modes of inelastic forces; bodies without a history, or with friction, are elastic. */
+static inline PetscBool HycoBodiesFlow(HycoReducer t)
+{
+  return (PetscBool)(t->scene->n_times && !HycoSceneHasFriction(t->scene));
+}
 PetscErrorCode HycoBodiesBegin(HycoReducer reducer);
 PetscErrorCode HycoBodiesModes(HycoReducer reducer, HycoSnapshots store);
 /* Operations of the training, after HycoBodiesBegin(); whether a search tries the type. */

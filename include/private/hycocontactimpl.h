@@ -88,11 +88,11 @@ typedef struct _n_HycoPairs {
   const HycoSurfaceFacts *facts; /* while the contacts of a rank's slaves are found (borrowed); else NULL */
 } HycoPairs;
 
-/* Finds the contacts on the nodes as drawn. Where no map moves the surfaces they are final, and a slave node without a
+/* Finds the contacts of a DM, as HycoFECreate() takes it, on its nodes as drawn. Where no map moves the surfaces they are final, and a slave node without a
    master is an error. facts: of each contact of the scene, for the contacts of the slaves that this rank owns on its part
    of the surfaces; what all ranks must decide together is then left to HycoContactsAgree(), and what this rank alone
-   cannot decide is an error. NULL: the mesh has the whole surfaces. */
-PetscErrorCode HycoPairsFind(HycoScene scene, HycoMesh mesh, const HycoSurfaceFacts facts[], HycoPairs *pairs);
+   cannot decide is an error. NULL: the DM has the whole surfaces. */
+PetscErrorCode HycoPairsFind(HycoScene scene, DM dm, const HycoSurfaceFacts facts[], HycoPairs *pairs);
 /* The facts about the surfaces of each contact of the scene (facts: scene->n_contacts). Collective. */
 PetscErrorCode HycoContactsFacts(MPI_Comm comm, HycoScene scene, HycoMesh part, HycoSurfaceFacts facts[]);
 /* The masters' nodes (numbers in the distributed vectors, perhaps repeated) that this rank's slaves may meet at the

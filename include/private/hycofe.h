@@ -1,6 +1,6 @@
 /*
   HycoFE: the scene on one mesh at one parameter value. It moves the nodes, fixes the supports, evaluates materials and
-  loads, and assembles K, F, B, D, stresses and norms over the cells of its mesh: the whole mesh, a rank's part, or the
+  loads, and assembles K, F, B, D, stresses and norms over the cells of a DM: the whole mesh, a rank's part, or the
   RID.
 */
 #ifndef HYCOFE_H
@@ -52,9 +52,10 @@ typedef struct {
 } HycoOblique;
 
 struct _n_HycoFE {
-  /* borrowed */
-  HycoScene scene;
-  HycoMesh mesh;
+  HycoScene scene;  /* borrowed */
+  DM dm;            /* NULL: of HycoFECreateRead() */
+  HycoMesh mesh;    /* its tables, borrowed from it; or surface */
+  HycoMesh surface; /* of HycoFECreateSurface(): the tables without cells, whose arrays are the DM's; else NULL */
   /* sizes: space dimension, n_nodes * dim, stress components */
   PetscInt dim, n_dof, n_sigma;
   HycoFormulation formulation; /* in 1D and 3D HYCO_PLANE_STRAIN */
@@ -119,7 +120,13 @@ static inline PetscInt HycoFEUnknowns(HycoFE fe)
   return fe->mesh->n_whole_nodes ? fe->mesh->n_whole_nodes * fe->dim : fe->n_dof;
 }
 
-PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe);
+/* The scene on a DM: the whole mesh distributed over its ranks, a rank's surfaces, an RID, other submeshes, or a DMPlex
+   of the caller, whose labels are the scene's groups. Collective on the DM if it has no tables yet (HycoMeshOf()). */
+PetscErrorCode HycoFECreate(HycoScene scene, DM dm, HycoFE *fe);
+/* On its nodes and facets alone, without the cells and their materials. */
+PetscErrorCode HycoFECreateSurface(HycoScene scene, DM dm, HycoFE *fe);
+/* On the tables of a file just read (borrowed), before they become a DM: a tie's weights are part of the topology. */
+PetscErrorCode HycoFECreateRead(HycoScene scene, HycoMesh mesh, HycoFE *fe);
 PetscErrorCode HycoFEDestroy(HycoFE *fe);
 /* Keeps the gradients of the shape functions until the nodes move: for paths, which evaluate the same nodes many
    times. */
@@ -210,6 +217,9 @@ PetscErrorCode HycoFELoads(HycoFE fe, PetscReal f[]);
    owns): f_int minus the loads, where no contact presses. f_int: NULL: K u. For an oblique support, the component c
    of its force; the others are -a_d times it. */
 PetscErrorCode HycoFEReactions(HycoFE fe, const PetscReal u[], const PetscReal f_int[], PetscReal r[]);
+/* K u minus the loads at the free unknowns (r: n_dof, 0 at fixed ones, whose displacements are those prescribed at fe's
+   parameters; complete on the nodes that a part owns). */
+PetscErrorCode HycoFEImbalance(HycoFE fe, const PetscReal u[], PetscReal r[]);
 /* The norm matrix of H1: mass plus length^2 times gradient, fixed unknowns as in K. The length is that of the whole
    mesh (HycoMeshLength()), so that the norm does not depend on the unit; it is 1 in the paper's section 6. */
 PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M);

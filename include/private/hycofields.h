@@ -58,6 +58,7 @@ PetscErrorCode HycoCellListDestroy(HycoCellList *list);
    slaves' tags by contact: each rank's of its own contacts. Collective; must be destroyed after an error too. */
 typedef struct {
   PetscReal *force, *pressure, *gap_node, *gap, *normal, *area, *pressure_of; /* pressure_of: by contact */
+  PetscReal *which; /* by node: the number of the contact whose slave it is, of several the first; NaN: none */
   PetscInt *slave_id;
   PetscBool rubs;                     /* on every rank: there are fields of friction */
   PetscReal *traction, *slip, *state; /* by node: tangential force over area and sum of slips of the slave, 3 each;

@@ -10,6 +10,12 @@
 /* The most rigid motions that -hyco_regularise releases. */
 #define HYCO_MAX_PINS 12
 
+/* The arrays of a HycoGradient. */
+typedef struct {
+  PetscReal *value;
+  PetscBool *kink;
+} HycoGradientStore;
+
 typedef struct _n_HycoPath *HycoPath;
 typedef struct _n_HycoFriction *HycoFriction;
 
@@ -62,8 +68,9 @@ struct _p_HycoFOM {
   PetscInt n_pins, n_released, pin_tag[HYCO_MAX_PINS], pin_component[HYCO_MAX_PINS];
   PetscInt n_turned; /* number of released motions for which the contacts' normals are turned */
   Vec *released;
-  HycoPath path;         /* of a scene with a history, else NULL */
-  HycoFriction friction; /* of a scene with friction, else NULL */
+  HycoPath path;              /* of a scene with a history, else NULL */
+  HycoFriction friction;      /* of a scene with friction, else NULL */
+  HycoGradientStore gradient; /* of HycoFOMGetGradient() */
   HycoSummary summary;
 };
 

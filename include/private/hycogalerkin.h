@@ -76,6 +76,12 @@ PetscErrorCode HycoGalerkinDestroy(HycoGalerkinModel galerkin);
 /* K, F and the rows of A_lambda's contacts on the RID before reduction, borrowed, as the last solve assembled them. */
 PetscErrorCode HycoGalerkinLocal(HycoROM model, HycoLocal *local);
 
+/* Ops of gradients (galerkin_gradient.c); expand is HycoGalerkinUnpack(). */
+PetscErrorCode HycoGalerkinUnknowns(HycoROM model, PetscInt *p, PetscInt *n, PetscReal z[]);
+PetscErrorCode HycoGalerkinResidual(HycoROM model, const PetscReal mu[], const PetscReal z[], PetscReal w[],
+                                    PetscReal *size);
+PetscErrorCode HycoGalerkinJacobian(HycoROM model, PetscInt k, const PetscInt contact[], PetscReal M[]);
+
 /* hybrid all: G = diag(s) (X^T X + r s_1^2 I)^-1 X^T, X = V[A] diag(s); r = 0: the pseudo-inverse of V[A]. */
 PetscErrorCode HycoGalerkinSetRidge(HycoROM model, PetscReal ridge);
 /* Assembles K and the reduced system at mu, without solving: Kr, Br, Btr and the vectors are current, the prediction

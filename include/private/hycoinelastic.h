@@ -118,6 +118,20 @@ PetscErrorCode HycoFEStepBodies(HycoFE fe, HycoBodies bodies, const PetscReal u[
                                 HycoFEStepReport *report);
 
 /*
+  Laws at some integration points, each the number of its cell times the points of a cell plus its own; all in bodies with
+  inelastic laws, whose tangents in fe are the elastic ones. HycoFEPointRows(): B (n_sigma x (nv dim)), so that B u_e is the
+  strain of a point, and its weight. HycoFEInelasticStress(): s = C (eps - thermal eps) - sigma in a state.
+  HycoFEStepPoints(): s of n points (n x n_sigma) in the step from `begin` to strains at t1 (n x n_sigma, with thermal
+  strains), the size of the terms of each (n), and its derivative C - C_t (n x n_sigma x n_sigma; NULL: not wanted); no
+  state is written. A failure is reported as by HycoFEStep(). Not collective.
+*/
+PetscErrorCode HycoFEPointRows(HycoFE fe, PetscInt cell, PetscInt q, PetscReal B[], PetscReal *weight);
+void HycoFEInelasticStress(HycoFE fe, HycoFEState state, PetscInt cell, PetscInt q, PetscReal s[]);
+PetscErrorCode HycoFEStepPoints(HycoFE fe, PetscInt n, const PetscInt point[], const PetscReal strain[], PetscReal t0,
+                                PetscReal t1, HycoFEState begin, PetscReal s[], PetscReal size[], PetscReal tangent[],
+                                HycoFEStepReport *report);
+
+/*
   The linear bodies' contribution to f_int at some nodes, K u minus the force of thermal strains, for repeated
   evaluations at one time: a matrix product in place of their integration points. `nodes` (n_nodes; NULL: all): the
   nodes whose rows are wanted. HycoLinearForceSet(): at fe's parameters; K: the linear bodies' tangents or the nodes'

@@ -103,6 +103,27 @@ PetscErrorCode HycoLCPSemismooth(const HycoLCP *lcp, PetscReal z[], PetscInt *it
 PetscErrorCode HycoLCPLemke(PetscInt n, const PetscReal M[], const PetscReal q[], PetscInt max_its, PetscReal z[],
                             PetscInt *its, HycoLCPStatus *status);
 
+/* -- the derivative of a dense problem's solution -- */
+
+enum { HYCO_TANGENT_OPEN, HYCO_TANGENT_UNDECIDED, HYCO_TANGENT_CLOSED };
+typedef struct _n_HycoTangent *HycoTangent;
+/* state[n]: of contacts with forces L, gaps w and flexibilities M_ii (0: not known). Undecided: force and gap are near
+   zero, the force by the displacement that it causes. size: of the gaps or of the displacements of the contacts. */
+PetscErrorCode HycoTangentStates(PetscInt n, const PetscReal L[], const PetscReal w[], PetscReal size,
+                                 const PetscReal flexibility[], PetscInt state[]);
+/* Whether a contact is closed or undecided, when its flexibility is not known. */
+PetscBool HycoTangentMayTouch(PetscReal L, PetscReal w, PetscReal size);
+/* The derivative with p free unknowns x before the n contacts, M as in HycoLCP (read now). *regular: the closed
+   contacts determine their forces; otherwise only HycoTangentDestroy() (NULL-safe) may be called. */
+PetscErrorCode HycoTangentCreate(PetscInt p, PetscInt n, const PetscReal M[], const PetscInt state[],
+                                 HycoTangent *tangent, PetscBool *regular);
+PetscErrorCode HycoTangentDestroy(HycoTangent *tangent);
+/* Undecided contacts whose rows do not depend on closed ones. */
+PetscInt HycoTangentUndecided(HycoTangent tangent);
+/* z' (p + n) where q changes by q' (p + n). *kink: undecided contacts make it one-sided; it is that for a change of q in
+   the direction sign (1 or -1) times q'. */
+PetscErrorCode HycoTangentSolve(HycoTangent tangent, const PetscReal q[], int sign, PetscReal z[], PetscBool *kink);
+
 /* -- problems solved by a Tao -- */
 
 #define HYCO_TAO_NAME              64

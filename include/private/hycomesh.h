@@ -1,6 +1,6 @@
 /*
-  HycoMesh: cells, nodes and groups as plain arrays on one process, made once from the process's part of a DMPlex, so
-  that no element loop queries the DM. The reduced mesh of a model has the same struct; the element loop runs on any.
+  HycoMesh: the tables of a DM: cells, nodes and groups as plain arrays on one process, made once from its part of the
+  DMPlex and kept with it, so that no element loop queries the DM. They live as long as the DM does.
 */
 #ifndef HYCOMESH_H
 #define HYCOMESH_H
@@ -76,7 +76,7 @@ struct _n_HycoTies {
 #define HYCO_MAX_CELL_NODES (HYCO_CELL_NODES * (1 + HYCO_FACET_NODES))
 
 struct _n_HycoMesh {
-  DM dm;                /* whose tables these are; NULL: they were read from a file */
+  DM dm;                /* that owns these tables; NULL: they have no DM yet */
   PetscInt dim, nv, nf; /* space dimension; nodes of a cell, of a facet */
   HycoCellType type;
   PetscBool mixed; /* whether the whole mesh has collapsed cells */
@@ -160,7 +160,15 @@ static inline HycoCellType HycoMeshShape(HycoMesh m, PetscInt cell)
   return HycoShapeOf(m->type, m->cells + cell * m->nv);
 }
 
+/* The tables of a DM (borrowed): those that it has, or, collectively, new ones for the scene. A DM that another program
+   made gets tags and complete labels. Scenes that share a DM must have the same bodies. */
+PetscErrorCode HycoMeshOf(DM dm, HycoScene scene, HycoMesh *mesh);
+/* Gives tables that were read or received, with their ties, a DM of their own on this process. Not collective. */
+PetscErrorCode HycoMeshCreateDM(HycoScene scene, HycoMesh mesh);
+/* Releases the caller's reference to the tables' DM; frees tables without a DM. */
 PetscErrorCode HycoMeshDestroy(HycoMesh *mesh);
+/* Takes the tables from their DM, which is released: they outlive it. */
+PetscErrorCode HycoMeshDetach(HycoMesh mesh);
 
 /* Whether the mesh's cells are of second order. */
 static inline PetscBool HycoMeshIsQuadratic(HycoMesh mesh)
@@ -187,6 +195,9 @@ PetscErrorCode HycoSubmesh(HycoScene scene, HycoMesh of, PetscInt n_keep, const 
 /* The subpoint IS of a submesh's DM (borrowed; NULL: it is none): the points of the other DM, of a facet without its
    cell that cell. */
 PetscErrorCode HycoSubmeshGetPoints(DM sub, IS *points);
+/* The submesh of all cells and the first n nodes of `of`, with which its cells' nodes begin, and of the facets between
+   these; nodes keep their indices. The caller owns it; not collective. */
+PetscErrorCode HycoSubmeshFirst(HycoScene scene, HycoMesh of, PetscInt n, HycoMesh *sub);
 /* node[i]: the node of `of` that is node i of its submesh. */
 PetscErrorCode HycoSubmeshNodes(HycoMesh sub, HycoMesh of, PetscInt node[]);
 
@@ -205,6 +216,9 @@ static inline PetscInt HycoMeshOwned(HycoMesh m, PetscInt node)
   return !m->node_global || (place >= 0 && place < m->n_owned) ? place : -1;
 }
 
+/* Turns the nodes of a facet of a cell (-1: unknown, kept) so that its normal points out of the cell. Facets of a mesh that
+   was made from a DM are turned; those of one that was read are as in the file. */
+void HycoMeshTurnFacet(HycoMesh mesh, PetscInt cell, PetscInt facet[]);
 /* The number of a facet in its cell. */
 PetscInt HycoMeshFacetNumber(HycoMesh mesh, PetscInt facet);
 /* The segments of a group of dimension 1 in space, n x 2 nodes, of second order n x 3 with the middle nodes: the
@@ -249,7 +263,7 @@ PetscErrorCode HycoPlexRefine(DM *dm, HycoScene scene, PetscInt times);
 PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, PetscInt n_pairs, const PetscInt pairs[],
                                   HycoPartitioner by, const char write[]);
 /* Tables of each process's part: the cells that touch a node that it owns. On one process node_global, node_whole
-   and cell_whole stay NULL. Collective. */
+   and cell_whole stay NULL. The caller owns a reference. Collective. */
 PetscErrorCode HycoPlexToMesh(DM dm, HycoScene scene, HycoMesh *mesh);
 /* The submesh on rank 0 (elsewhere NULL) of a distributed mesh with the nodes and facets of groups (in: by group) and
    the cells with cell[e] (by cell of the part; NULL: none), with the parts' node_global, node_whole and cell_whole; its
@@ -261,8 +275,8 @@ PetscErrorCode HycoMeshGather(HycoScene scene, HycoMesh part, const PetscBool in
    are also the facets of nodes that are tied to it. The mesh has no cells (1D: those of the facets), knows to which
    rank each node belongs (HycoMeshOwned()), and has all groups with its own nodes of them. The caller owns it.
    Collective. */
-PetscErrorCode HycoMeshRings(MPI_Comm comm, HycoMesh part, const PetscBool in[], PetscInt n, const PetscInt node[],
-                             HycoMesh *mesh);
+PetscErrorCode HycoMeshRings(MPI_Comm comm, HycoScene scene, HycoMesh part, const PetscBool in[], PetscInt n,
+                             const PetscInt node[], HycoMesh *mesh);
 /* The ranks that own nodes (numbers in the distributed vectors). Collective. */
 PetscErrorCode HycoMeshOwners(MPI_Comm comm, HycoMesh part, PetscInt n, const PetscInt global[], PetscMPIInt owner[]);
 /* place[k]: the number of different keys of all processes that are smaller than key[k] >= 0. Collective. */

@@ -105,6 +105,8 @@ struct _n_HycoPath {
   PetscInt step; /* number of listed times reached: the index of the next one */
   HycoKKT kkt;   /* of the last accepted time */
   HycoStep now;  /* since the last listed time */
+  PetscInt
+      n_bound; /* number of accepted steps that only -hyco_step_inelastic kept from growing, without those before a resumption */
   PetscInt n_steps;
   HycoStep *steps;
   PetscReal *orders; /* observed orders of the attempts that have one */

@@ -219,6 +219,9 @@ PetscErrorCode HycoPathModesAdd(HycoReducer t, Mat path, PetscReal tol, HycoPath
 PetscErrorCode HycoPathModesJoin(HycoReducer t, HycoPathModes *modes, PetscInt N, PetscInt n_rows, PetscReal tol,
                                  PetscInt max_modes, HycoBasis *basis);
 PetscErrorCode HycoPathModesDestroy(HycoPathModes *modes);
+/* contact[]: the nodes of the contacts' surfaces that every model's mesh has, whatever its cells: those of each contact,
+   for moved surfaces all. Rank 0; others are left as they are. */
+PetscErrorCode HycoReducerMarkContacts(HycoReducer t, PetscBool contact[]);
 /* The marked cells of the mesh (by cell of the process's part) as a mesh on rank 0; elsewhere NULL. The caller owns it.
    Collective. */
 PetscErrorCode HycoReducerGatherMesh(HycoReducer t, const PetscBool needed[], HycoMesh *mesh);

@@ -66,6 +66,8 @@ typedef struct {
   PetscInt n_listed, shown;    /* number of listed times reached; the one to which gamma, U and Lambda belong */
   PetscInt *at;                /* by listed time: its accepted step */
   PetscReal *Lambda, *sigma, *inelastic;
+  PetscReal *shear; /* 8 n_contacts by listed time: force, slip, work, state; NULL: no friction */
+  HycoShear seen;   /* borrows those of a listed time, or others */
   HycoHistory history;
   HycoStep *step; /* n_listed: its steps with the scene's quantities; NULL: not evaluated yet, or there are none */
 } HycoTrace;
@@ -134,13 +136,13 @@ struct _p_HycoROM {
   HycoSolver solver;
   void *work; /* the type's */
   /* created when needed */
-  HycoMesh beyond;              /* mesh without cells */
-  HycoFE fe_beyond;             /* on it */
+  HycoFE fe_beyond;             /* on mesh without its cells */
   HycoFE fe_whole;              /* on whole */
   HycoFE fe_floating;           /* on the loaded cells of the bodies that contact alone holds */
   HycoOutputCells output_cells; /* of the scene's quantities */
   HycoCarried carried;          /* results of the contacts (contact_results.c) */
   HycoBalance balance;          /* data kept by HycoROMGetEquilibrium() */
+  HycoGradientStore gradient;   /* of HycoROMGetGradient() */
   HycoRows rows;                /* of B over dofs of mesh, all contacts; current after HycoROMComplete() */
   /* the last prediction */
   PetscBool solved;
@@ -161,6 +163,11 @@ PetscErrorCode HycoROMCreate(HycoROM *model);
 PetscErrorCode HycoTraceBegin(HycoROM model);
 PetscErrorCode HycoTraceAdd(HycoROM model, PetscReal t);
 PetscErrorCode HycoTraceList(HycoROM model, PetscReal **sigma, PetscReal **inelastic);
+/* For that listed time, with friction: the state of the contacts. HycoTraceShow(): the model's contacts have the friction
+   of listed time k; call it before their results are evaluated. HycoTraceShowOther(): or this one, which is borrowed. */
+PetscErrorCode HycoTraceListShear(HycoROM model, const HycoShear *shear);
+void HycoTraceShow(HycoROM model, PetscInt k);
+void HycoTraceShowOther(HycoROM model, const HycoShear *shear);
 /* For that listed time, once m->Lambda has all contacts: its forces, and the norm of U in the RID. */
 PetscErrorCode HycoTraceMeasure(HycoROM model, HycoStep *step);
 /* In a type that steps along paths: reads the options of paths; solves the path at mu, and sets the prediction; at a

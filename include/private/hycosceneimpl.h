@@ -109,6 +109,8 @@ typedef struct {
 typedef struct {
   char *name, *slave, *master;
   PetscReal tolerance; /* largest distance in the mesh file; negative: derived from the slave's facets */
+  PetscBool mortar; /* a slave follows its mean over the facets around it, by the integrals of mortar contacts; else the
+                          nearest point */
 } HycoTie;
 
 /* The formulation of a 2D scene: plane strain (thickness 1, eps_zz = 0), plane stress (sigma_zz = 0), or a body of
@@ -117,7 +119,8 @@ typedef enum { HYCO_PLANE_STRAIN, HYCO_PLANE_STRESS, HYCO_AXISYMMETRIC } HycoFor
 
 /* An output of the scene, a number for each solution: the largest, smallest or mean value of a field over a group;
    the force of supports along an axis; from HYCO_QUANTITY_FORCE on, a result of a contact: its resultant along an
-   axis, its moment about one, the tangential resultant along an axis or the work of friction, its largest pressure. */
+   axis, its moment about one, the tangential resultant along an axis or the work of friction, its closed area, its
+   largest and smallest pressure. */
 typedef enum {
   HYCO_QUANTITY_MAX,
   HYCO_QUANTITY_MIN,
@@ -126,7 +129,9 @@ typedef enum {
   HYCO_QUANTITY_FORCE,
   HYCO_QUANTITY_MOMENT,
   HYCO_QUANTITY_FRICTION,
-  HYCO_QUANTITY_PRESSURE
+  HYCO_QUANTITY_AREA,
+  HYCO_QUANTITY_PRESSURE,
+  HYCO_QUANTITY_PRESSURE_MIN
 } HycoQuantityKind;
 typedef struct {
   char *name, *group; /* group NULL: all of the mesh */

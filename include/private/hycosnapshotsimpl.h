@@ -32,11 +32,14 @@ static inline PetscInt HycoSnapshotsSteps(HycoScene scene)
 {
   return PetscMax(1, scene->n_times);
 }
+/* Components of the tangential forces, and the dissipated work. */
+#define HYCO_SNAPSHOT_FRICTION 4
+extern const char *const HycoSnapshotFriction[HYCO_SNAPSHOT_FRICTION];
 /*
   One field of the n samples from `first` on as a dense matrix, with a column per sample, for a scene with a history one
   per listed time of each, sample after sample: "U" (n_nodes x dim unrolled), "lambda" (n_contacts), "sigma" (n_cells x
   n_sigma unrolled), "force" (as U); with a history "inelastic" (n_cells, accumulated) and, if the scene of the first
-  run names one as an output, "reaction" (as U). Rows in the mesh file's order,
+  run names one as an output, "reaction" (as U); with friction HycoSnapshotFriction[] (n_contacts). Rows in the mesh file's order,
   in contiguous blocks over comm; the rows of a node or cell stay on one rank. Collective; the caller owns it. A field
   without rows gives a matrix of zero rows.
 */

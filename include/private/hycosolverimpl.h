@@ -182,4 +182,18 @@ PetscErrorCode HycoSolverSetStartSet(HycoSolver s, const PetscBool active[]);
 PetscErrorCode HycoSolverSetTarget(HycoSolver s, PetscReal residual);
 /* Gets the iterations of conjugate gradients in the last solve, and most of one linear solve; 0 with a factor. */
 PetscErrorCode HycoSolverGetLinearIterations(HycoSolver s, PetscInt *its, PetscInt *most);
+/* The matrix of the dual problem after HycoSolverFactor(): S, p + m square, p unknowns pinned before the m contacts. Borrowed. */
+void HycoSolverGetCondensed(HycoSolver s, PetscInt *m, PetscInt *p, const PetscReal *S[]);
+/*
+  The derivative of the solution x, L of s's system (tangent.c): HycoSolverTangentSolve() gives x' and L' where F - K x -
+  Bt L changes by r, and D - B x by g, at fixed x and L; g and dL are not used without contacts. sign, *kink as in
+  HycoTangentSolve(). Needs a factor of K. HycoSolverTangentDestroy() is NULL-safe. Collective.
+*/
+typedef struct _n_HycoSolverTangent *HycoSolverTangent;
+PetscErrorCode HycoSolverTangentCreate(HycoSolver s, Vec x, Vec L, HycoSolverTangent *tangent);
+PetscErrorCode HycoSolverTangentDestroy(HycoSolverTangent *tangent);
+PetscErrorCode HycoSolverTangentSolve(HycoSolverTangent tangent, Vec r, Vec g, int sign, Vec dx, Vec dL,
+                                      PetscBool *kink);
+PetscInt HycoSolverTangentUndecided(HycoSolverTangent tangent);
+
 #endif

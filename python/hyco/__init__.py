@@ -20,7 +20,7 @@ import numpy as np
 from . import _library as c
 from ._library import Error, NotConverged, World
 
-__all__ = ['Scene', 'Model', 'Solution', 'Prediction', 'Error', 'NotConverged', 'version', 'rank', 'size']
+__all__ = ['Scene', 'Model', 'Solution', 'Prediction', 'Gradient', 'Error', 'NotConverged', 'version', 'rank', 'size']
 
 
 def version():
@@ -100,6 +100,34 @@ def _history(function, handle, outputs):
     for k, name in enumerate(outputs):
         table[name] = steps['quantity'][:, k]
     return table
+
+
+class Gradient:
+    """Derivatives of the outputs with respect to the parameters, in the unit of the output over that of the parameter; those of many
+    points have the shape of the points in front.
+
+    value      (..., outputs, parameters), in the orders of the scene's outputs and parameters
+    kink       the same shape: the derivatives to the two sides differ, and value is that towards larger parameter values
+    undecided  (...) number of contacts with neither force nor gap
+    outputs    {name: value} of the outputs there
+    gradient['lift'] is that of one output, (..., parameters)
+    """
+
+    def __init__(self, mu, outputs, value, kink, undecided):
+        self.mu, self.outputs, self.value, self.kink, self.undecided = mu, outputs, value, kink, undecided
+
+    def __getitem__(self, name):
+        return self.value[..., list(self.outputs).index(name), :]
+
+
+def _gradient(function, handle):
+    """value, kink, undecided of the last solution or prediction."""
+    g = np.zeros(1, c.struct('HycoGradient'))
+    c.call(function, handle, c.address(g))
+    at = [ctypes.c_void_p(int(g[name][0])) for name in ('value', 'kink')]
+    g = g[0]
+    shape = int(g['n_outputs']), int(g['n_parameters'])
+    return c.copied(at[0], shape), c.copied(at[1], shape, f"i{c.layout('PetscBool')[0]}").astype(bool), int(g['n_undecided'])
 
 
 class _Handle:
@@ -222,6 +250,11 @@ class Scene(_Handle):
             why = solution.summary['why'].decode('utf-8', 'replace')
             raise NotConverged(f'full order at {_where(mu, self.parameters)}: {why or solution.reason}', solution)
         return solution
+
+    def gradient(self, mu=()):
+        """The Gradient of the outputs at full order at mu, and what solve(mu) finds. All processes call it together."""
+        solution = self.solve(mu)
+        return Gradient(solution.mu, solution.outputs, *_gradient('HycoFOMGetGradient', self._fom))
 
     def write(self, path):
         """Writes the last solution to PATH.xdmf with PATH.h5, or PATH.vtkhdf."""
@@ -450,6 +483,20 @@ class Model(_Handle):
             raise NotConverged(f'{len(bad)} of {n} predictions, the first at {_where(at, self.parameters)}: '
                                f'{c.reason(data.ravel()[bad[0]]["reason"])}', result)
         return result
+
+    def gradient(self, mu, extrapolate=False):
+        """The Gradient of the outputs at mu: one point (parameters,) or many (..., parameters), which this process solves one by one."""
+        mu = _points(mu, self.parameters)
+        points = mu.reshape(-1, mu.shape[-1])
+        size = (len(points), len(self.outputs), len(self.parameters))
+        value, kink, undecided = np.zeros(size), np.zeros(size, bool), np.zeros(len(points), int)
+        outputs = np.zeros(size[:2])
+        for k, point in enumerate(points):
+            outputs[k] = list(self.predict(point, extrapolate=extrapolate).outputs.values())
+            value[k], kink[k], undecided[k] = _gradient('HycoROMGetGradient', self._open)
+        shape = mu.shape[:-1]
+        named = {name: outputs[:, k].reshape(shape)[()] for k, name in enumerate(self.outputs)}
+        return Gradient(mu, named, value.reshape(shape + size[1:]), kink.reshape(shape + size[1:]), undecided.reshape(shape)[()])
 
     # ---- of the last prediction at one point
 

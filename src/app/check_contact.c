@@ -19,11 +19,11 @@ PetscErrorCode CheckReportTies(Check *check)
     cJSON_AddNumberToObject(one, "n_nodes", t->n_nodes);
     cJSON_AddItemToArray(list, one);
     if (t->coarse > 0) cJSON_AddNumberToObject(one, "slave_over_master", t->coarse);
-    if (t->coarse > COARSER)
+    if (t->coarse > COARSER && !t->mortar)
       CheckReportWarning(
           check,
           "tie %s: the slave's facets (%s) are %.2g times as long as the master's (%s), and the forces between them "
-          "are then inaccurate; the finer side should be the slave",
+          "are then inaccurate; the finer side should be the slave, or method: mortar",
           t->name, t->slave, (double)t->coarse, t->master);
     PetscCall(DriverPrint("tie %s: %d nodes of %s follow %s\n", t->name, (int)t->n_nodes, t->slave, t->master));
   }

@@ -94,10 +94,10 @@ static void ReportRID(cJSON *json, const HycoPrediction *p)
 }
 
 /* carried: results of the contacts (n_carried; 0: not known). fallback: the reason for full order; "": not used.
-   whole: u is that of the whole mesh. path: NULL, or with a history. */
+   whole: u is that of the whole mesh. path: NULL, or with a history. gradient: NULL, or that of the prediction. */
 static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPrediction *p, PetscInt n_carried,
                              const HycoContactResult carried[], PetscReal energy, const char fallback[],
-                             PetscBool whole, const DriverReducedPath *path)
+                             PetscBool whole, const DriverReducedPath *path, const HycoGradient *gradient)
 {
   cJSON *json;
 
@@ -121,6 +121,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
   PetscCall(ReportContacts(json, p->n_contacts, p->n_facing, p->overlap, p->sliding));
   if (n_carried) PetscCall(DriverReportCarried(json, p->dim, n_carried, carried));
   PetscCall(ReportQuantities(json, scene, p->quantity));
+  if (gradient) PetscCall(DriverReportGradient(json, scene, gradient));
   PetscCall(ReportEstimates(json, scene, p));
   cJSON_AddBoolToObject(json, "full_order", fallback[0] != '\0');
   if (fallback[0]) cJSON_AddStringToObject(json, "fallback", fallback);
@@ -156,9 +157,10 @@ static PetscErrorCode PrintReduced(const HycoPrediction *p)
 
 /* One point: rank 0 predicts while the others wait; all solve full order if the fallback requires it, or with its
    forces. */
-static PetscErrorCode One(HycoROM model, HycoScene scene, Fallback *fallback, const char output[])
+static PetscErrorCode One(HycoROM model, HycoScene scene, Fallback *fallback, const char output[], PetscBool derives)
 {
   HycoPrediction p = {0};
+  HycoGradient gradient = {0};
   HycoContactResult *own;
   const HycoContactResult *carried;
   PetscInt n, n_carried;
@@ -188,6 +190,7 @@ static PetscErrorCode One(HycoROM model, HycoScene scene, Fallback *fallback, co
   HycoCheck(p.reason > 0, "%s (KKT residuals: %.1e, %.1e, %.1e, %.1e); nothing was written", HycoReasonName(p.reason),
             (double)p.kkt.stationarity, (double)p.kkt.penetration, (double)p.kkt.adhesion,
             (double)p.kkt.complementarity);
+  if (derives) HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetGradient(model, &gradient));
   if (output[0] && (why[0] || fallback->displacement))
     PetscCall(HycoFOMWrite(fallback->fom, output));
   else if (output[0])
@@ -208,8 +211,8 @@ static PetscErrorCode One(HycoROM model, HycoScene scene, Fallback *fallback, co
   PetscCall(DriverGetCarried(model, scene, &n_carried, &own));
   carried = own;
   if (why[0]) PetscCall(HycoFOMGetContacts(fallback->fom, &n_carried, &carried));
-  PetscCall(
-      Report(scene, mu, &p, n_carried, carried, energy, why, (PetscBool)(why[0] || fallback->displacement), NULL));
+  PetscCall(Report(scene, mu, &p, n_carried, carried, energy, why, (PetscBool)(why[0] || fallback->displacement), NULL,
+                   derives ? &gradient : NULL));
   PetscCall(PetscFree(own));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -246,7 +249,7 @@ static PetscErrorCode Path(HycoROM model, HycoScene scene, const char output[])
   PetscCall(DriverPrint("seconds: %.6f set-up, %.6f prediction\n", (double)p.seconds.setup, (double)p.seconds.total));
   HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetStrainEnergy(model, &energy));
   PetscCall(DriverGetCarried(model, scene, &n_carried, &carried));
-  PetscCall(Report(scene, mu, &p, n_carried, carried, energy, "", PETSC_FALSE, &path));
+  PetscCall(Report(scene, mu, &p, n_carried, carried, energy, "", PETSC_FALSE, &path, NULL));
   PetscCall(PetscFree(carried));
   PetscCall(PetscFree(path.step));
   HycoCheck(
@@ -305,11 +308,12 @@ static const char *const columns[N_COLUMNS] = {"total_contact_force",
                                                "contact_residual"};
 
 /* Numbers of columns: own: without the scene's quantities, more for paths; with them; for paths with their extremes
-   too; with the estimates of their errors; width: with the results of contacts. */
+   too; with the estimates of their errors; with the results of contacts; width: with gradients. */
 typedef struct {
-  PetscInt own, with_quantities, with_extremes, with_estimates, width;
+  PetscInt own, with_quantities, with_extremes, with_estimates, with_carried, width;
   char path_name[HYCO_MAX_QUANTITIES][DRIVER_LINE], estimate_name[HYCO_MAX_QUANTITIES][DRIVER_LINE];
   DriverCarried carried;
+  DriverGradients gradients;
   const char **names;
 } Shape;
 
@@ -324,7 +328,9 @@ static PetscErrorCode ShapeOf(HycoROM model, HycoScene scene, Shape *s)
   PetscCall(HycoROMWantsEquilibrium(model, &residual));
   PetscCall(HycoROMGetSizes(model, NULL, NULL, &dim));
   PetscCall(DriverCarriedColumns(scene, dim, &s->carried));
-  PetscCall(PetscMalloc1(N_COLUMNS + 3 * HYCO_MAX_QUANTITIES + s->carried.n_contacts * s->carried.each, &s->names));
+  PetscCall(DriverGradientColumns(scene, &s->gradients));
+  PetscCall(PetscMalloc1(N_COLUMNS + 3 * HYCO_MAX_QUANTITIES + s->carried.n_contacts * s->carried.each + s->gradients.n,
+                         &s->names));
   s->own = n_times ? (residual ? N_COLUMNS : RESIDUAL) : PATH_FORCE;
   PetscCall(ReportColumns(scene, s->own, columns, &s->with_quantities, s->names));
   s->with_extremes = s->with_quantities;
@@ -343,6 +349,8 @@ static PetscErrorCode ShapeOf(HycoROM model, HycoScene scene, Shape *s)
   }
   s->width = s->with_estimates;
   for (PetscInt c = 0; c < s->carried.n_contacts * s->carried.each; c++) s->names[s->width++] = s->carried.name[c];
+  s->with_carried = s->width;
+  for (PetscInt c = 0; c < s->gradients.n; c++) s->names[s->width++] = s->gradients.name[c];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -350,6 +358,7 @@ static PetscErrorCode DestroyShape(Shape *s)
 {
   PetscFunctionBegin;
   PetscCall(PetscFree(s->carried.name));
+  PetscCall(PetscFree(s->gradients.name));
   PetscCall(PetscFree(s->names));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -409,6 +418,7 @@ static PetscErrorCode TakePoint(HycoROM model, PetscInt k, void *ctx)
   PetscReal *v = t->value + (size_t)k * (size_t)t->shape->width;
   const HycoContactResult *carried;
   HycoPrediction p;
+  HycoGradient gradient;
   PetscInt n;
   char why[DRIVER_LINE];
 
@@ -417,6 +427,11 @@ static PetscErrorCode TakePoint(HycoROM model, PetscInt k, void *ctx)
   PetscCall(HycoROMGetPrediction(model, &p));
   PetscCall(HycoROMGetContacts(model, &n, &carried));
   FillRow(&p, n, carried, t->shape, v);
+  for (PetscInt c = t->shape->with_carried; c < t->shape->width; c++) v[c] = NAN;
+  if (t->shape->gradients.on && p.reason > 0) {
+    PetscCall(HycoROMGetGradient(model, &gradient));
+    DriverGradientFill(&t->shape->gradients, &gradient, v + t->shape->with_carried);
+  }
   DriverWantsFullOrder(t->fallback, &p, why);
   v[FULL_ORDER] = why[0] != '\0'; /* required; SolveRest() solves it */
   t->n_unseen += !why[0] && p.unseen > HYCO_UNSEEN;
@@ -564,10 +579,11 @@ static PetscErrorCode SolveRest(Fallback *fallback, PetscInt n_par, const PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, HycoSamples samples, const char output[])
+static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, HycoSamples samples, const char output[],
+                           PetscBool derives)
 {
   PetscInt n, n_par;
-  Shape s;
+  Shape s = {.gradients = {.on = derives}};
   DriverRows rows = {0};
   const PetscReal *mu;
   PetscReal begin;
@@ -618,6 +634,7 @@ PetscErrorCode DeclarePredict(PetscOptions options)
   PetscCall(DriverReadTarget(HYCO_ERROR_U, &target));
   PetscCall(DriverReadTarget(HYCO_ERROR_LAMBDA, &target));
   PetscCall(DriverReadMonitor(&flag));
+  PetscCall(DriverReadGradient(NULL, &flag));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -627,7 +644,7 @@ PetscErrorCode CommandPredict(void)
   HycoScene scene;
   HycoSamples samples = NULL;
   Fallback fallback = {0};
-  PetscBool set, monitor, extrapolate, residual;
+  PetscBool set, monitor, extrapolate, residual, derives;
   PetscInt n_times;
   char path[PETSC_MAX_PATH_LEN], output[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN];
 
@@ -641,6 +658,10 @@ PetscErrorCode CommandPredict(void)
   PetscCall(HycoROMGetScene(model, &scene));
   PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
   PetscCall(DriverReadFallback(model, extrapolate, &fallback));
+  PetscCall(DriverReadGradient(scene, &derives));
+  HycoCheck(!derives || !fallback.on,
+            "-gradient is that of the model, and -hyco_fallback may replace its prediction; give "
+            "one of them, or use hyco solve -gradient");
   if (!n_times) PetscCall(DriverRefuseOnly("history", "it is for scenes with a history, and the model's has none"));
   PetscCall(HycoROMWantsEquilibrium(model, &residual));
   HycoCheck(!residual || n_times,
@@ -655,9 +676,9 @@ PetscErrorCode CommandPredict(void)
     HycoCheck(!fallback.displacement,
               "-hyco_full_displacement needs a single point (-mu); a set of points has only a -table, without fields");
     PetscCall(DriverGetSamples(scene, PETSC_FALSE, &samples, &set));
-    HycoStaged(HYCO_STAGE_ONLINE, Many(model, scene, &fallback, samples, output));
+    HycoStaged(HYCO_STAGE_ONLINE, Many(model, scene, &fallback, samples, output, derives));
   } else {
-    HycoStaged(HYCO_STAGE_ONLINE, n_times ? Path(model, scene, output) : One(model, scene, &fallback, output));
+    HycoStaged(HYCO_STAGE_ONLINE, n_times ? Path(model, scene, output) : One(model, scene, &fallback, output, derives));
   }
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(DriverEndFallback(&fallback));

@@ -1,5 +1,6 @@
 /* hyco solve: full order, at one parameter value or over a set. */
 #include "driver.h"
+#include <math.h>
 
 /* Prints remarks that the user should know. */
 static PetscErrorCode Remarks(const HycoSummary *s)
@@ -55,7 +56,9 @@ static PetscErrorCode PrintReactions(cJSON *json, HycoFOM fom, PetscInt dim)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom, const HycoSummary *s)
+/* gradient: NULL, or that of the solution. */
+static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom, const HycoSummary *s,
+                             const HycoGradient *gradient)
 {
   cJSON *json;
   HycoSolver solver;
@@ -69,6 +72,8 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
   PetscCall(HycoFOMGetSolver(fom, &solver));
   PetscCall(HycoSolverGetMethod(solver, &method));
   PetscCall(HycoSolverGetLinear(solver, &linear));
+  if (!method[0]) method = HycoSceneHasFriction(scene) ? "semismooth" : "none"; /* friction has a solver of its own */
+  if (!linear[0]) linear = HycoSceneHasFriction(scene) ? "direct" : "none";
   ReportNumbers(json, {"n_dof", s->n_dof}, {"n_contacts", s->n_contacts}, {"n_active", s->n_active},
                 {"n_without_effect", s->n_still});
   cJSON_AddBoolToObject(json, "forces_unique", s->n_dependent == 0);
@@ -101,6 +106,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
   PetscCall(DriverReportCarried(json, s->dim, n, carried));
   PetscCall(PrintReactions(json, fom, s->dim));
   PetscCall(ReportQuantities(json, scene, s->quantity));
+  if (gradient) PetscCall(DriverReportGradient(json, scene, gradient));
   PetscCall(DriverPrint(
       "KKT residuals: stationarity %.1e (round-off %.1e), penetration %.1e, adhesion %.1e, complementarity %.1e\n",
       (double)s->kkt.stationarity, (double)s->kkt.rounding, (double)s->kkt.penetration, (double)s->kkt.adhesion,
@@ -129,13 +135,14 @@ static PetscErrorCode Path(HycoFOM fom, HycoScene scene, const PetscReal mu[], c
   PetscCall(HycoFOMSolve(fom, n, mu));
   PetscCall(DriverEndHistory(fom, scene, mu, table));
   PetscCall(HycoFOMGetSummary(fom, &summary));
-  PetscCall(Report(scene, mu, fom, &summary));
+  PetscCall(Report(scene, mu, fom, &summary, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode One(HycoFOM fom, HycoScene scene, const PetscReal mu[], const char output[])
+static PetscErrorCode One(HycoFOM fom, HycoScene scene, const PetscReal mu[], const char output[], PetscBool derives)
 {
   HycoSummary summary;
+  HycoGradient gradient;
   PetscInt n;
 
   PetscFunctionBegin;
@@ -146,8 +153,9 @@ static PetscErrorCode One(HycoFOM fom, HycoScene scene, const PetscReal mu[], co
   HycoCheck(summary.reason > 0, "%s (KKT residuals: %.1e, %.1e, %.1e, %.1e); nothing was written", summary.why,
             (double)summary.kkt.stationarity, (double)summary.kkt.penetration, (double)summary.kkt.adhesion,
             (double)summary.kkt.complementarity);
+  if (derives) PetscCall(HycoFOMGetGradient(fom, &gradient));
   if (output[0]) PetscCall(HycoFOMWrite(fom, output));
-  PetscCall(Report(scene, mu, fom, &summary));
+  PetscCall(Report(scene, mu, fom, &summary, derives ? &gradient : NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -157,10 +165,11 @@ static const char *const columns[N_COLUMNS] = {
     "total_contact_force", "lambda_max", "n_active", "u_norm2", "strain_energy", "kkt_max",
     "converged",           "iterations", "seconds"};
 
-/* The table of a set: these columns, the scene's quantities, the results of its contacts. */
+/* The table of a set: these columns, the scene's quantities, the results of its contacts, gradients. */
 typedef struct {
-  PetscInt with_quantities, width;
+  PetscInt with_quantities, with_carried, width;
   DriverCarried carried;
+  DriverGradients gradients;
   const char **names;
   PetscReal *value;
 } Table;
@@ -170,11 +179,14 @@ static PetscErrorCode CreateTable(HycoScene scene, PetscInt dim, PetscInt n, Tab
 {
   PetscFunctionBegin;
   PetscCall(DriverCarriedColumns(scene, dim, &t->carried));
-  t->width = N_COLUMNS + HYCO_MAX_QUANTITIES + t->carried.n_contacts * t->carried.each;
+  PetscCall(DriverGradientColumns(scene, &t->gradients));
+  t->width = N_COLUMNS + HYCO_MAX_QUANTITIES + t->carried.n_contacts * t->carried.each + t->gradients.n;
   PetscCall(PetscMalloc1(t->width, &t->names));
   PetscCall(ReportColumns(scene, N_COLUMNS, columns, &t->with_quantities, t->names));
   t->width = t->with_quantities;
   for (PetscInt c = 0; c < t->carried.n_contacts * t->carried.each; c++) t->names[t->width++] = t->carried.name[c];
+  t->with_carried = t->width;
+  for (PetscInt c = 0; c < t->gradients.n; c++) t->names[t->width++] = t->gradients.name[c];
   PetscCall(PetscCalloc1(n * t->width, &t->value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -183,6 +195,7 @@ static PetscErrorCode DestroyTable(Table *t)
 {
   PetscFunctionBegin;
   PetscCall(PetscFree(t->carried.name));
+  PetscCall(PetscFree(t->gradients.name));
   PetscCall(PetscFree(t->names));
   PetscCall(PetscFree(t->value));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -191,6 +204,7 @@ static PetscErrorCode DestroyTable(Table *t)
 static PetscErrorCode FillRow(HycoFOM fom, const HycoSummary *s, const Table *t, PetscReal v[])
 {
   const HycoContactResult *carried;
+  HycoGradient gradient;
   PetscInt n;
 
   PetscFunctionBegin;
@@ -206,15 +220,20 @@ static PetscErrorCode FillRow(HycoFOM fom, const HycoSummary *s, const Table *t,
   PetscCall(PetscArraycpy(v + N_COLUMNS, s->quantity, t->with_quantities - N_COLUMNS));
   PetscCall(HycoFOMGetContacts(fom, &n, &carried));
   DriverCarriedFill(&t->carried, n, carried, v + t->with_quantities);
+  for (PetscInt c = 0; c < t->gradients.n; c++) v[t->with_carried + c] = NAN;
+  if (!t->gradients.on || s->reason <= 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoFOMGetGradient(fom, &gradient));
+  DriverGradientFill(&t->gradients, &gradient, v + t->with_carried);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Solves the points in their order, each from the last one's active contacts, by all ranks together. */
-static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, const char output[], const char table[])
+static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, const char output[], const char table[],
+                           PetscBool derives)
 {
   PetscInt n, n_par;
   const PetscReal *mu;
-  Table t = {0};
+  Table t = {.gradients = {.on = derives}};
   DriverPiece all;
   DriverRows rows;
   PetscReal begin, u_relative = 0;
@@ -255,6 +274,7 @@ PetscErrorCode DeclareSolve(PetscOptions options)
   PetscCall(DriverGetPoint(NULL, NULL));
   PetscCall(DriverGetSamples(NULL, PETSC_FALSE, NULL, NULL));
   PetscCall(DriverReadMonitor(&monitor));
+  PetscCall(DriverReadGradient(NULL, &monitor));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -264,7 +284,7 @@ PetscErrorCode CommandSolve(void)
   HycoSamples samples = NULL;
   HycoFOM fom;
   HycoSolver solver;
-  PetscBool monitor, set;
+  PetscBool monitor, derives, set;
   PetscInt n_times;
   PetscReal mu[64];
   char path[PETSC_MAX_PATH_LEN], output[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN], table[PETSC_MAX_PATH_LEN] = "";
@@ -276,6 +296,7 @@ PetscErrorCode CommandSolve(void)
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
   PetscCall(DriverCheckMesh(scene));
   PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
+  PetscCall(DriverReadGradient(scene, &derives));
   PetscCall(DriverHasSamples(scene, &set));
   if (set) PetscCall(HycoSceneRefuseHistory(scene, "a set of points"));
   if (set) {
@@ -286,9 +307,9 @@ PetscErrorCode CommandSolve(void)
   PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom));
   PetscCall(HycoFOMGetSolver(fom, &solver));
   if (monitor) PetscCall(HycoSolverSetMonitor(solver, DriverMonitor, NULL));
-  HycoStaged(HYCO_STAGE_FULL_ORDER, set       ? Many(fom, scene, samples, output, table)
+  HycoStaged(HYCO_STAGE_FULL_ORDER, set       ? Many(fom, scene, samples, output, table, derives)
                                     : n_times ? Path(fom, scene, mu, output, table)
-                                              : One(fom, scene, mu, output));
+                                              : One(fom, scene, mu, output, derives));
   PetscCall(HycoFOMDestroy(&fom));
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(HycoSceneDestroy(&scene));

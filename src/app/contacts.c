@@ -14,7 +14,7 @@ PetscErrorCode DriverReportCarried(cJSON *json, PetscInt dim, PetscInt n, const 
     ReportVector(one, "force", dim, r[k].force);
     if (dim == 2) ReportVector(one, "moment", 1, r[k].moment + 2);
     if (dim == 3) ReportVector(one, "moment", 3, r[k].moment);
-    ReportNumbers(one, {"area", r[k].area}, {"pressure_max", r[k].pressure});
+    ReportNumbers(one, {"area", r[k].area}, {"pressure_max", r[k].pressure}, {"pressure_min", r[k].pressure_min});
     if (n > 1)
       PetscCall(
           DriverPrint("contact %s: %d of %d active, force on the slave (%.6g, %.6g, %.6g), largest pressure %.6g\n",
@@ -46,7 +46,7 @@ PetscErrorCode DriverGetCarried(HycoROM model, HycoScene scene, PetscInt *n, Hyc
 }
 
 /* The columns of a contact in a table; their names follow the contact's name and a dot. */
-enum { WIDTH = 9 };
+enum { WIDTH = 10 };
 static PetscInt List(PetscInt dim, const HycoContactResult *r, const char *name[WIDTH], PetscReal value[WIDTH])
 {
   static const char *const force[] = {"force_x", "force_y", "force_z"}, *const moment[] = {"moment_x", "moment_y",
@@ -58,6 +58,7 @@ static PetscInt List(PetscInt dim, const HycoContactResult *r, const char *name[
   for (PetscInt c = dim == 2 ? 2 : 0; dim > 1 && c < 3; c++) name[n] = moment[c], value[n++] = r->moment[c];
   name[n] = "area", value[n++] = r->area;
   name[n] = "pressure_max", value[n++] = r->pressure;
+  name[n] = "pressure_min", value[n++] = r->pressure_min;
   return n;
 }
 

@@ -39,6 +39,9 @@ PetscErrorCode DriverReadFiles(char scene[], char model[], char output[], char r
 PetscErrorCode DriverRequire(const char name[], const char value[]);
 /* Prints the options of a command (NULL: all). On this process alone. */
 PetscErrorCode DriverHelp(const Command *command);
+/* hyco help output: a line for each key, column and dataset that the command writes, with tabs between its parts: place, commands, name,
+   kind, unit, meaning. */
+PetscErrorCode DriverHelpOutput(void);
 /* Whether an object of the command reads an option of the library. Of a model's, some are read by one command only. */
 PetscBool DriverReads(const Command *command, const HycoOption *option);
 
@@ -200,6 +203,22 @@ typedef struct {
 PetscErrorCode DriverCarriedColumns(HycoScene scene, PetscInt dim, DriverCarried *columns);
 /* Their values in a row; n = 0: not known. v: n_contacts x each. */
 void DriverCarriedFill(const DriverCarried *columns, PetscInt n, const HycoContactResult r[], PetscReal v[]);
+
+/* -- gradients.c: derivatives of the outputs -- */
+
+/* -gradient; fails if the scene (NULL: not known) has a history. */
+PetscErrorCode DriverReadGradient(HycoScene scene, PetscBool *gradient);
+/* In the report and in the text. */
+PetscErrorCode DriverReportGradient(cJSON *json, HycoScene scene, const HycoGradient *gradient);
+/* Columns of a table, if `on`: d_OUTPUT_d_PARAMETER, and the number of kinks; the caller frees the names. */
+typedef struct {
+  PetscBool on;
+  PetscInt n;
+  char (*name)[DRIVER_LINE];
+} DriverGradients;
+PetscErrorCode DriverGradientColumns(HycoScene scene, DriverGradients *columns);
+/* Their values in a row (v: n). */
+void DriverGradientFill(const DriverGradients *columns, const HycoGradient *gradient, PetscReal v[]);
 
 /* -- progress.c -- */
 
@@ -402,12 +421,14 @@ PetscErrorCode CommandSolve(void);
 PetscErrorCode CommandTrain(void);
 PetscErrorCode CommandPredict(void);
 PetscErrorCode CommandCompare(void);
+PetscErrorCode CommandFit(void);
 PetscErrorCode CommandView(void);
 PetscErrorCode DeclareCheck(PetscOptions options);
 PetscErrorCode DeclareSolve(PetscOptions options);
 PetscErrorCode DeclareTrain(PetscOptions options);
 PetscErrorCode DeclarePredict(PetscOptions options);
 PetscErrorCode DeclareCompare(PetscOptions options);
+PetscErrorCode DeclareFit(PetscOptions options);
 PetscErrorCode DeclareView(PetscOptions options);
 
 #endif

@@ -33,6 +33,10 @@ static const Page pages[] = {
      {"scene", "model", "grid", "scatter", "mu", "values_", "points", "table", "report", "quiet"},
      {"hyco compare -scene examples/rope -model rope.h5 -grid 20,24 -table c.csv",
       "hyco compare -scene examples/rope -model rope.h5 -scatter 200 -report c.json"}},
+    {"fit",
+     {"model", "target_", "scene", "mu", "mu_", "fit_starts", "fit_type", "report", "quiet"},
+     {"hyco fit -model roller.h5 -target_lift 6.5 -target_peak 1.1 -scene examples/roller",
+      "hyco fit -model roller.h5 -target_lift 6.5 -mu 0,0.5,10 -fit_type blmvm -report fit.json"}},
     {"view", {"model", "scene"}, {"hyco view -model rope.h5", "hyco view -scene examples/rope"}},
 };
 
@@ -41,8 +45,9 @@ static const struct {
   const char *subject, *beginnings;
 } subjects[] = {
     {"files and text", "scene model output report table quiet progress"},
-    {"points", "mu grid values_ points scatter extrapolate check_solve"},
+    {"points", "mu grid values_ points scatter extrapolate check_solve gradient"},
     {"accuracy of a training", "target_ hyco_validation validation_ hyco_search hyco_model_type"},
+    {"fits", "fit_"},
     {"greedy training", "greedy training_grid target max_ hyco_greedy_"},
     {"solutions of a training", "hyco_groups hyco_snapshots"},
     {"modes", "hyco_pod_"},

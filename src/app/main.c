@@ -27,6 +27,10 @@ const Command commands[] = {
      "hyco compare -scene FOLDER -model M.h5 -mu V,V,... | -grid N,N,... [-report R.json] [-table T.csv]",
      "errors and speed-up of the reduced model, relative to full order, over a set of points",
      "HycoFOM HycoSolver HycoROM"},
+    {"fit", CommandFit, DeclareFit, "hyco fit -model M.h5 -target_OUTPUT V ... [-scene FOLDER] [-report R.json]",
+     "find the parameter values at which a model's outputs are closest to targets, within its ranges and by its "
+     "gradients; with -scene FOLDER the answer is checked by one full-order solve",
+     "HycoFOM HycoSolver HycoROM"},
     {"view", CommandView, DeclareView, "hyco view -model M.h5 | -scene FOLDER",
      "describe the contents of a model or a scene", ""},
     {NULL, NULL, NULL, NULL, NULL, NULL},
@@ -185,7 +189,7 @@ static int Help(char **argv)
   MPI_Comm_rank(MPI_COMM_WORLD, &rank);
   if (rank == 0) {
     if (!command && argv[1] && argv[2]) command = FindCommand(argv[2]); /* hyco help COMMAND */
-    ierr = DriverHelp(command);
+    ierr = !command && argv[1] && argv[2] && strcmp(argv[2], "output") == 0 ? DriverHelpOutput() : DriverHelp(command);
   }
   fflush(stdout); /* PETSc gives the signal of a closed pipe back at its end */
   return HycoFinalize() || ierr ? DRIVER_FAILED : DRIVER_DONE;
@@ -202,6 +206,9 @@ int main(int argc, char **argv)
   PetscErrorCode ierr;
   int status;
 
+  /* A line in one piece: glibc 2.37 and later write to an unbuffered stream in pieces of 128 bytes, which launchers and
+     other ranks mix up. */
+  setvbuf(stderr, NULL, _IOLBF, BUFSIZ);
   if (AsksHelp(argc, argv)) return Help(argv);
   status = AnswerAtOnce(argc, argv);
   if (status >= 0) return status;

@@ -6,6 +6,8 @@
 #include <strings.h>
 #include <sys/resource.h>
 
+#define REPORT_FORMAT 1 /* raised when a key changes its meaning or goes; new keys do not raise it */
+
 /* A column of a table: over the rows that converged, its mean and largest value, and their number. */
 typedef struct {
   PetscReal mean, worst;
@@ -22,6 +24,7 @@ PetscErrorCode ReportCreate(const char command[], HycoScene scene, const PetscRe
 
   PetscFunctionBegin;
   *json = cJSON_CreateObject();
+  cJSON_AddNumberToObject(*json, "format", REPORT_FORMAT);
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(HycoSceneGetTitle(scene, &title));
   PetscCall(HycoSceneGetParameters(scene, &n, &names, NULL, NULL));

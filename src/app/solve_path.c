@@ -1,6 +1,8 @@
 /* hyco solve on a scene with a history: its output during and after the solve, the report. */
 #include "driver.h"
 
+#define ADVISED 50 /* steps from which a path is long enough for advice */
+
 PetscErrorCode DriverMonitorStep(HycoFOM fom, const HycoStep *s, void *ctx)
 {
   DriverPath *path = (DriverPath *)ctx;
@@ -23,7 +25,7 @@ PetscErrorCode DriverReportHistory(cJSON *json, HycoScene scene, const HycoHisto
   cJSON_AddNumberToObject(history, "t_end", h->t);
   cJSON_AddStringToObject(history, "newton", h->newton);
   ReportNumbers(history, {"factor_in_solves", h->factor_cost}, {"newton_order", h->order},
-                {"newton_orders", h->n_orders});
+                {"newton_orders", h->n_orders}, {"steps_limited", h->n_bound});
   PetscCall(DriverReportSteps(history, scene, PETSC_FALSE, h->n, h->step));
   for (PetscInt k = 0; k < h->n; k++) {
     seconds[0] += h->step[k].seconds_factor;
@@ -58,6 +60,11 @@ static PetscErrorCode PrintEnd(const HycoHistory *h)
                         (int)cuts, (int)iterations, h->newton, (int)factors));
   if (h->n_orders)
     PetscCall(DriverPrint("; order of convergence %.2f (median of %d)", (double)h->order, (int)h->n_orders));
+  if (2 * h->n_bound > substeps && substeps >= ADVISED)
+    PetscCall(
+        DriverPrint("\n%d steps could be longer without -hyco_step_inelastic (1e-3 if not given): a larger one is "
+                    "faster, with a larger error in time; compare the results",
+                    (int)h->n_bound));
   PetscCall(DriverPrint("\nlargest KKT residual %.1e, energy balance to %.1e\n", (double)residual, (double)defect));
   PetscCall(DriverPrint("seconds: %.3f in all, %.3f factors, %.3f solves, %.3f laws\n", (double)seconds[0],
                         (double)seconds[1], (double)seconds[2], (double)seconds[3]));

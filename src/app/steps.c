@@ -49,9 +49,9 @@ static const Column columns[] = {
     FULL_ONLY("energy_defect", energy_defect, PETSC_FALSE),
     BOTH("seconds", seconds, PETSC_FALSE),
     /* of scenes with friction */
-    FULL_ONLY("friction_work", friction_work, PETSC_FALSE),
-    FULL_ONLY("n_slipping", n_slipping, PETSC_TRUE),
-    FULL_ONLY("disproven", disproven, PETSC_TRUE),
+    BOTH("friction_work", friction_work, PETSC_FALSE),
+    BOTH("n_slipping", n_slipping, PETSC_TRUE),
+    BOTH("disproven", disproven, PETSC_TRUE),
 };
 enum { N_COLUMNS = sizeof(columns) / sizeof(columns[0]), N_FRICTION = 3 };
 

@@ -257,9 +257,9 @@ static PetscErrorCode FindAll(HycoFE fe, HycoPairs *pairs)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All potential contacts on the mesh as drawn. facts: of a distributed mesh, of which m is a part (NULL: m is the
+/* All potential contacts on the mesh as drawn. facts: of a distributed mesh, of which dm is a part (NULL: it is the
    whole mesh, in which an empty group is an error). The caller destroys them, also after an error. Not collective. */
-PetscErrorCode HycoPairsFind(HycoScene scene, HycoMesh m, const HycoSurfaceFacts facts[], HycoPairs *pairs)
+PetscErrorCode HycoPairsFind(HycoScene scene, DM dm, const HycoSurfaceFacts facts[], HycoPairs *pairs)
 {
   HycoFE fe;
   PetscErrorCode ierr;
@@ -268,7 +268,7 @@ PetscErrorCode HycoPairsFind(HycoScene scene, HycoMesh m, const HycoSurfaceFacts
   PetscCall(PetscMemzero(pairs, sizeof(*pairs)));
   PetscCall(HycoPairsReserve(pairs, 0, 0));
   if (!scene->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoFECreate(scene, m, &fe));
+  PetscCall(HycoFECreate(scene, dm, &fe));
   pairs->facts = facts;
   ierr = FindAll(fe, pairs);
   pairs->facts = NULL;

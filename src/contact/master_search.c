@@ -46,14 +46,26 @@ static PetscErrorCode FindPatches(HycoMasterSearch *t)
 
 PetscErrorCode HycoMasterSearchCreate(HycoFE fe, HycoContact c, PetscBool nodes, HycoMasterSearch *t)
 {
+  PetscInt slave, master;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->slave, &slave));
+  PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->master, &master));
+  PetscCall(HycoMasterSearchCreateOn(fe, slave, master, nodes, t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMasterSearchCreateOn(HycoFE fe, PetscInt slave, PetscInt master, PetscBool nodes,
+                                        HycoMasterSearch *t)
+{
   PetscFunctionBegin;
   PetscCall(PetscMemzero(t, sizeof(*t)));
   t->fe = fe;
   t->nodes = nodes;
   t->n_nodes = fe->mesh->n_nodes;
   t->X = fe->X;
-  PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->slave, &t->slave));
-  PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->master, &t->master));
+  t->slave = slave;
+  t->master = master;
   PetscCall(FindPatches(t));
   PetscCall(PetscCalloc1(3 * t->n_nodes, &t->outward));
   if (fe->dim > 1) PetscCall(HycoSurfaceNormals(fe, t->slave, t->outward));

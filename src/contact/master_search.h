@@ -24,6 +24,9 @@ typedef struct {
 
 /* Creates the search on fe's nodes. The caller destroys it. */
 PetscErrorCode HycoMasterSearchCreate(HycoFE fe, HycoContact contact, PetscBool nodes, HycoMasterSearch *search);
+/* The same between two groups. */
+PetscErrorCode HycoMasterSearchCreateOn(HycoFE fe, PetscInt slave, PetscInt master, PetscBool nodes,
+                                        HycoMasterSearch *search);
 PetscErrorCode HycoMasterSearchDestroy(HycoMasterSearch *search);
 /* Creates the tree of the patches, unless it exists: before the first projection. */
 PetscErrorCode HycoMasterSearchReady(HycoMasterSearch *search);

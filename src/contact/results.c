@@ -97,20 +97,21 @@ static void Add(HycoFE fe, const PetscReal x[3], const PetscReal normal[3], Pets
   }
 }
 
-/* Results by contact of the scene, sums over this process's contacts; lambda > least counts as active. Not
-   collective: the caller adds the ranks. */
+/* Results by contact of the scene, sums over this process's contacts; lambda > least counts as active; without contacts
+   here the smallest pressure is PETSC_MAX_REAL. Not collective: the caller adds the ranks. */
 void HycoContactResults(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], const PetscReal area[],
                         const PetscReal lambda[], const PetscReal pressure[], PetscReal least,
                         HycoContactResult result[])
 {
   for (PetscInt c = 0; c < fe->scene->n_contacts; c++)
-    result[c] = (HycoContactResult){.name = fe->scene->contact[c]->name};
+    result[c] = (HycoContactResult){.name = fe->scene->contact[c]->name, .pressure_min = PETSC_MAX_REAL};
   for (PetscInt k = 0; k < pairs->n; k++) {
     const PetscReal none[3] = {0, 0, 0}, *shear = pairs->shear ? pairs->shear->force + 3 * k : none;
     HycoContactResult *r = &result[pairs->contact[k]];
 
     r->n++;
     if (pairs->shear) r->friction_work += pairs->shear->work[k];
+    r->pressure_min = PetscMin(r->pressure_min, lambda[k] > least ? pressure[k] : 0);
     if (lambda[k] > least)
       Add(fe, fe->X + 3 * pairs->slave[k], normal + 3 * k, area[k], lambda[k], shear, pressure[k], r);
   }

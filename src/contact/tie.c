@@ -1,15 +1,18 @@
 /*
-  The search for ties: the masters of a slave node are those of the nearest point of the master's facets. Also contacts
-  on tied nodes, which have no displacement of their own.
+  The search for ties: the masters of a slave node are those of its mean over the slave's facets around it (by the
+  integrals of mortar contacts), or of the nearest point of the master's facets. Also contacts on tied nodes, which have
+  no displacement of their own.
 */
 #include "facing.h"
-#include "nearest.h"
+#include "mortar.h"
 
-/* By node of the mesh: the tie of which it is a slave (-1: none), the point that it follows. */
+/* By node of the mesh: the tie of which it is a slave (-1: none), the nearest point of its master, its row in `mean` (-1:
+   it follows the nearest point). */
 typedef struct {
-  PetscInt *tie;
+  PetscInt *tie, *row;
   HycoProjection *at;
   PetscReal *tolerance; /* by tie */
+  HycoPairs mean;
 } Found;
 
 /* The master's facets in a tree, their nodes (the caller frees them), and whether a node is on them. */
@@ -90,22 +93,228 @@ static PetscErrorCode FindOne(HycoScene s, HycoMesh m, PetscInt k, Found *found)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The masters of tied node i and their weights; returns their number. */
+static PetscInt Masters(const Found *found, PetscInt i, const PetscInt **node, const PetscReal **weight)
+{
+  PetscInt n = found->at[i].n;
+
+  *node = found->at[i].node;
+  *weight = found->at[i].weight;
+  if (found->row[i] >= 0) HycoPairsMasters(&found->mean, found->row[i], &n, node, weight);
+  return found->tie[i] < 0 ? 0 : n;
+}
+
 /* Checks that no master node is itself tied. */
 static PetscErrorCode CheckChains(HycoScene s, HycoMesh m, const Found *found)
 {
   PetscFunctionBegin;
   for (PetscInt i = 0; i < m->n_nodes; i++) {
-    for (PetscInt a = 0; found->tie[i] >= 0 && a < found->at[i].n; a++) {
-      const PetscInt other = found->tie[found->at[i].node[a]];
+    const PetscInt *node;
+    const PetscReal *weight;
+    const PetscInt n = Masters(found, i, &node, &weight);
+
+    for (PetscInt a = 0; a < n; a++) {
+      const PetscInt other = found->tie[node[a]];
 
       HycoCheck(other < 0,
                 "tie %s: node %d, to which nodes of %s are tied, is itself a slave of the tie %s; exchange slave and "
                 "master of one of them",
-                s->tie[found->tie[i]].name, (int)m->node_id[found->at[i].node[a]], s->tie[found->tie[i]].slave,
+                s->tie[found->tie[i]].name, (int)m->node_id[node[a]], s->tie[found->tie[i]].slave,
                 s->tie[PetscMax(other, 0)].name);
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- means -- */
+
+/* What a tied node shares with its masters, by node: supports (bit c: component c) and groups of contacts and of supports
+   along a direction. */
+typedef struct {
+  PetscInt n_groups, *group, *held;
+} Shared;
+
+static PetscErrorCode SharedCreate(HycoScene s, HycoMesh m, Shared *shared)
+{
+  PetscFunctionBegin;
+  shared->n_groups = 0;
+  PetscCall(PetscMalloc1(s->n_fixed + s->n_contacts, &shared->group));
+  PetscCall(PetscCalloc1(m->n_nodes, &shared->held));
+  for (PetscInt k = 0; k < s->n_fixed; k++) {
+    PetscInt g = 0;
+
+    PetscCall(HycoMeshFindGroup(m, "fixed", s->fixed[k].group, &g));
+    if (s->fixed[k].normal) shared->group[shared->n_groups++] = g;
+    for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) {
+      for (PetscInt c = 0; c < 3; c++) shared->held[m->group_node[j]] |= (s->fixed[k].value[c] != NULL) << c;
+    }
+  }
+  for (PetscInt k = 0; k < s->n_contacts; k++)
+    PetscCall(HycoMeshFindGroup(m, "contact", s->contact[k]->slave, &shared->group[shared->n_groups++]));
+  for (PetscInt i = 0; i < m->n_nodes && s->formulation == HYCO_AXISYMMETRIC; i++)
+    shared->held[i] |= m->xyz[3 * i] <= 1e-9 * HycoMeshLength(m);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SharedDestroy(Shared *shared)
+{
+  PetscFunctionBegin;
+  HycoFreeAll(&shared->group, &shared->held);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscBool IsIn(HycoMesh m, PetscInt group, PetscInt node)
+{
+  PetscInt at = -1;
+
+  PetscCallAbort(PETSC_COMM_SELF, PetscFindInt(node, m->group_start[group + 1] - m->group_start[group],
+                                               m->group_node + m->group_start[group], &at));
+  return (PetscBool)(at >= 0);
+}
+
+/* Whether node i can follow its mean: the masters are not tied and have its supports and contacts, as those of the nearest
+   point have where a plane of symmetry or a contact crosses the tie. */
+static PetscBool CanFollow(HycoMesh m, const Shared *shared, const Found *found, PetscInt i)
+{
+  const PetscInt *node;
+  const PetscReal *weight;
+  const PetscInt n = Masters(found, i, &node, &weight);
+
+  for (PetscInt a = 0; a < n; a++) {
+    if (found->tie[node[a]] >= 0 || (shared->held[i] & ~shared->held[node[a]])) return PETSC_FALSE;
+  }
+  for (PetscInt g = 0; g < shared->n_groups; g++) {
+    for (PetscInt a = 0; a < n && IsIn(m, shared->group[g], i); a++) {
+      if (!IsIn(m, shared->group[g], node[a])) return PETSC_FALSE;
+    }
+  }
+  return (PetscBool)(n > 0);
+}
+
+/* The means of the slaves of tie k without a pin. Those that cannot follow theirs are pinned to their nearest points;
+   *refused counts them. */
+static PetscErrorCode TryMeans(HycoFE fe, PetscInt k, const Shared *shared, HycoProjection pin[], Found *found,
+                               PetscInt *refused)
+{
+  const HycoTie *tie = &fe->scene->tie[k];
+  HycoMesh m = fe->mesh;
+  const PetscInt first = found->mean.n;
+  PetscInt slaves, masters, n = 0, *slave;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeshFindGroup(m, "tie", tie->slave, &slaves));
+  PetscCall(HycoMeshFindGroup(m, "tie", tie->master, &masters));
+  PetscCall(PetscMalloc1(m->group_start[slaves + 1] - m->group_start[slaves], &slave));
+  for (PetscInt j = m->group_start[slaves]; j < m->group_start[slaves + 1]; j++) {
+    if (!pin[m->group_node[j]].n) slave[n++] = m->group_node[j];
+  }
+  PetscCall(HycoMortarTie(fe, slaves, masters, pin, n, slave, &found->mean));
+  *refused = 0;
+  for (PetscInt j = 0; j < n; j++) {
+    found->row[slave[j]] = first + j;
+    if (CanFollow(m, shared, found, slave[j])) continue;
+    pin[slave[j]] = found->at[slave[j]];
+    found->row[slave[j]] = -1;
+    (*refused)++;
+  }
+  PetscCall(PetscFree(slave));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The means of tie k. Nodes of both surfaces are pinned to themselves. A new pin changes the rows around it, so that they
+   are computed again. */
+static PetscErrorCode FindMeans(HycoFE fe, PetscInt k, const Shared *shared, Found *found)
+{
+  HycoMesh m = fe->mesh;
+  const PetscInt first = found->mean.n;
+  PetscInt slaves, refused;
+  HycoProjection *pin;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeshFindGroup(m, "tie", fe->scene->tie[k].slave, &slaves));
+  PetscCall(PetscCalloc1(m->n_nodes, &pin));
+  for (PetscInt j = m->group_start[slaves]; j < m->group_start[slaves + 1]; j++) {
+    const PetscInt i = m->group_node[j];
+
+    if (found->tie[i] != k) pin[i] = (HycoProjection){.n = 1, .node = {i}, .weight = {1}};
+  }
+  do {
+    found->mean.n = first;
+    PetscCall(TryMeans(fe, k, shared, pin, found, &refused));
+  } while (refused);
+  PetscCall(PetscFree(pin));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The means of all ties that have them, after the nearest points of all ties. */
+static PetscErrorCode FindAllMeans(HycoScene s, HycoMesh m, Found *found)
+{
+  PetscBool any = PETSC_FALSE;
+  Shared shared;
+  HycoFE fe;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < s->n_ties; k++) any = (PetscBool)(any || s->tie[k].mortar);
+  if (!any) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt f = 0; f < m->n_facets; f++) HycoMeshTurnFacet(m, m->facet_cell[f], m->facets + f * m->nf);
+  PetscCall(HycoFECreateRead(s, m, &fe));
+  PetscCall(HycoFESetDrawn(fe));
+  PetscCall(SharedCreate(s, m, &shared));
+  for (PetscInt k = 0; k < s->n_ties; k++) {
+    if (s->tie[k].mortar) PetscCall(FindMeans(fe, k, &shared, found));
+  }
+  PetscCall(SharedDestroy(&shared));
+  PetscCall(HycoFEDestroy(&fe));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- all -- */
+
+/* Cells have room for a limited number of masters, which a slave that is much coarser exceeds. */
+static PetscErrorCode CheckRoom(HycoScene s, HycoMesh m, const Found *found)
+{
+  PetscInt *seen;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(m->n_nodes, &seen));
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    PetscInt n = m->nv, tie = 0;
+
+    for (PetscInt v = 0; v < m->nv; v++) {
+      const PetscInt *node, i = m->cells[e * m->nv + v];
+      const PetscReal *weight;
+      const PetscInt masters = Masters(found, i, &node, &weight);
+
+      if (masters) tie = found->tie[i];
+      for (PetscInt a = 0; a < masters; a++) n += seen[node[a]] != e + 1;
+      for (PetscInt a = 0; a < masters; a++) seen[node[a]] = e + 1;
+    }
+    if (n > HYCO_MAX_CELL_NODES) {
+      PetscCall(PetscFree(seen));
+      HycoFail("tie %s: cell %d of its slave %s faces so many facets of %s that it follows %d nodes, more than %d; "
+               "exchange slave and master, or give method: collocation",
+               s->tie[tie].name, (int)m->cell_id[e], s->tie[tie].slave, s->tie[tie].master, (int)(n - m->nv),
+               (int)(HYCO_MAX_CELL_NODES - m->nv));
+    }
+  }
+  PetscCall(PetscFree(seen));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* How far a slave may be from the point of its masters: the tolerance, which allows for round-off of maps. The mean may be
+   farther than the nearest point. */
+static PetscReal Reach(HycoMesh m, const Found *found, PetscInt i)
+{
+  const PetscInt *node;
+  const PetscReal *weight;
+  const PetscInt n = Masters(found, i, &node, &weight);
+  PetscReal at[3] = {0, 0, 0};
+
+  for (PetscInt a = 0; a < n; a++) {
+    for (PetscInt c = 0; c < 3; c++) at[c] += weight[a] * m->xyz[3 * node[a] + c];
+  }
+  return PetscMax(found->tolerance[found->tie[i]],
+                  PetscMax(found->row[i] < 0 ? 0 : 2 * HycoDistance(at, m->xyz + 3 * i), 1e-9 * HycoMeshLength(m)));
 }
 
 /* Entries by ascending slave node, which HycoMeshSetTies() relies on. */
@@ -115,25 +324,33 @@ static PetscErrorCode Find(HycoScene s, HycoMesh m, Found *found, HycoTies *ties
   HycoTies t;
 
   PetscFunctionBegin;
-  for (PetscInt i = 0; i < m->n_nodes; i++) found->tie[i] = -1;
+  for (PetscInt i = 0; i < m->n_nodes; i++) found->tie[i] = found->row[i] = -1;
   for (PetscInt k = 0; k < s->n_ties; k++) PetscCall(FindOne(s, m, k, found));
+  PetscCall(FindAllMeans(s, m, found));
   PetscCall(CheckChains(s, m, found));
-  for (PetscInt i = 0; i < m->n_nodes; i++) n += found->tie[i] >= 0 ? found->at[i].n : 0;
+  PetscCall(CheckRoom(s, m, found));
+  for (PetscInt i = 0; i < m->n_nodes; i++) {
+    const PetscInt *node;
+    const PetscReal *weight;
+
+    n += Masters(found, i, &node, &weight);
+  }
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoTiesCreate(n, m->type, ties));
   t = *ties;
   n = 0;
   for (PetscInt i = 0; i < m->n_nodes; i++) {
-    const HycoProjection *at = &found->at[i];
+    const PetscInt *node;
+    const PetscReal *weight;
+    const PetscInt masters = Masters(found, i, &node, &weight);
 
-    for (PetscInt a = 0; found->tie[i] >= 0 && a < at->n; a++, n++) {
+    for (PetscInt a = 0; a < masters; a++, n++) {
       t->slave[n] = m->node_id[i];
-      t->master[n] = m->node_id[at->node[a]];
+      t->master[n] = m->node_id[node[a]];
       t->tie[n] = found->tie[i];
-      t->body[n] = m->node_body[at->node[a]];
-      t->weight[n] = at->weight[a];
-      t->reach[n] = PetscMax(found->tolerance[found->tie[i]], 1e-9 * HycoMeshLength(m)); /* allows for round-off of
-                                                                                            maps */
+      t->body[n] = m->node_body[node[a]];
+      t->weight[n] = weight[a];
+      t->reach[n] = Reach(m, found, i);
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -148,9 +365,13 @@ PetscErrorCode HycoTiesFind(HycoScene s, HycoMesh m, HycoTies *ties)
   PetscFunctionBegin;
   *ties = NULL;
   if (!s->n_ties) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc3(m->n_nodes, &found.tie, m->n_nodes, &found.at, s->n_ties, &found.tolerance));
+  PetscCall(PetscMemzero(&found.mean, sizeof(found.mean)));
+  PetscCall(HycoPairsReserve(&found.mean, 0, 0));
+  PetscCall(
+      PetscMalloc4(m->n_nodes, &found.tie, m->n_nodes, &found.row, m->n_nodes, &found.at, s->n_ties, &found.tolerance));
   ierr = Find(s, m, &found, ties);
-  PetscCall(PetscFree3(found.tie, found.at, found.tolerance));
+  PetscCall(PetscFree4(found.tie, found.row, found.at, found.tolerance));
+  PetscCall(HycoPairsDestroy(&found.mean));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

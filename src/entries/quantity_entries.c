@@ -43,29 +43,35 @@ PetscErrorCode HycoSceneReadQuantity(HycoScene s, PetscInt entry, const char nam
     q = &s->quantity[s->n_quantities++];
     PetscCall(PetscStrallocpy(name, &q->name));
   }
-  if (field > HYCO_QUANTITY_FRICTION) {
-    char **place = field == HYCO_QUANTITY_FRICTION + 1 ? &q->group : &q->contact;
+  if (field > HYCO_QUANTITY_AREA) {
+    char **place = field == HYCO_QUANTITY_AREA + 1 ? &q->group : &q->contact;
 
     PetscCall(PetscFree(*place));
     PetscCall(PetscStrallocpy(s->value[entry], place));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  HycoCheck(!q->given,
-            "%s: the output %s already has one of max, min, mean, reaction, force, moment and friction; give each "
-            "output its own name",
-            s->key[entry], name);
+  HycoCheck(
+      !q->given,
+      "%s: the output %s already has one of max, min, mean, reaction, force, moment, friction and area; give each "
+      "output its own name",
+      s->key[entry], name);
   q->given = PETSC_TRUE;
   q->kind = (HycoQuantityKind)field;
   if (field == HYCO_QUANTITY_FRICTION && strcmp(s->value[entry], "work") == 0)
     q->field = HYCO_FRICTION_WORK;
+  else if (field == HYCO_QUANTITY_AREA)
+    HycoCheck(strcmp(s->value[entry], "closed") == 0,
+              "%s is \"%.100s\"; it must be closed: the area of closed contacts", s->key[entry], s->value[entry]);
   else if (field >= HYCO_QUANTITY_REACTION)
     PetscCall(FindAxis(s->key[entry], s->value[entry], &q->field));
   else
     PetscCall(FindField(s->key[entry], s->value[entry], &q->field));
   if (field < HYCO_QUANTITY_REACTION && strcmp(HycoQuantityFields[q->field], "contact_pressure") == 0) {
-    HycoCheck(q->kind == HYCO_QUANTITY_MAX,
-              "%s: only the largest contact_pressure is available; write max: contact_pressure", s->key[entry]);
-    q->kind = HYCO_QUANTITY_PRESSURE;
+    HycoCheck(
+        q->kind != HYCO_QUANTITY_MEAN,
+        "%s: there is no mean of contact_pressure; write max: or min: contact_pressure, or divide a force by an area",
+        s->key[entry]);
+    q->kind = q->kind == HYCO_QUANTITY_MAX ? HYCO_QUANTITY_PRESSURE : HYCO_QUANTITY_PRESSURE_MIN;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -111,7 +117,7 @@ PetscBool HycoSceneHasFieldOutputs(HycoScene s)
 
 PetscBool HycoSceneHasContactOutputs(HycoScene s)
 {
-  return HycoSceneHasOutputs(s, HYCO_QUANTITY_FORCE, HYCO_QUANTITY_PRESSURE);
+  return HycoSceneHasOutputs(s, HYCO_QUANTITY_FORCE, HYCO_QUANTITY_PRESSURE_MIN);
 }
 
 /* A quantity of contacts has a contact of the scene or none, and no group; one of a field has no contact. */
@@ -121,9 +127,8 @@ static PetscErrorCode CheckContact(HycoScene s, const HycoQuantity *q)
 
   PetscFunctionBegin;
   HycoCheck(q->kind >= HYCO_QUANTITY_FORCE || !q->contact,
-            "the output %s names the contact %s, which is for force, moment, friction and max: contact_pressure; give "
-            "a group "
-            "instead",
+            "the output %s names the contact %s, which is for force, moment, friction, area and contact_pressure; give "
+            "a group instead",
             q->name, q->contact);
   if (q->kind < HYCO_QUANTITY_FORCE) PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheck(!q->group, "the output %s is for a contact and names the group %s; write contact: NAME instead", q->name,
@@ -148,7 +153,7 @@ PetscErrorCode HycoSceneCheckQuantities(HycoScene s)
     HycoCheck(
         s->quantity[k].given,
         "the output %s has no field; write output: {%s: {max: mises, group: ...}}, or min, mean, reaction, force, "
-        "moment or friction",
+        "moment, friction or area",
         s->quantity[k].name, s->quantity[k].name);
     PetscCall(CheckContact(s, &s->quantity[k]));
   }

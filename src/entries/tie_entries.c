@@ -1,4 +1,5 @@
-/* Tied surfaces: tie: {glue: {slave: GROUP, master: GROUP, tolerance: LENGTH}}. */
+/* Tied surfaces: tie: {glue: {slave: GROUP, master: GROUP, tolerance: LENGTH,
+   method: mortar or collocation}}. */
 #include <hycosceneimpl.h>
 #include <string.h>
 
@@ -14,7 +15,7 @@ PetscErrorCode HycoSceneReadTie(HycoScene s, PetscInt entry, const char name[], 
   if (!tie) {
     PetscCall(PetscRealloc((size_t)(s->n_ties + 1) * sizeof(*s->tie), &s->tie));
     tie = &s->tie[s->n_ties++];
-    *tie = (HycoTie){.tolerance = -1};
+    *tie = (HycoTie){.tolerance = -1, .mortar = PETSC_TRUE};
     PetscCall(PetscStrallocpy(name, &tie->name));
   }
   if (field == 2) {
@@ -23,6 +24,12 @@ PetscErrorCode HycoSceneReadTie(HycoScene s, PetscInt entry, const char name[], 
     tie->tolerance = HycoNumber(s->value[entry], &end);
     HycoCheck(end != s->value[entry] && !*end && tie->tolerance >= 0 && !PetscIsInfOrNanReal(tie->tolerance),
               "%s is \"%.100s\"; it must be a length, 0 or more", s->key[entry], s->value[entry]);
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (field == 3) {
+    tie->mortar = (PetscBool)(strcmp(s->value[entry], "mortar") == 0);
+    HycoCheck(tie->mortar || strcmp(s->value[entry], "collocation") == 0,
+              "%s is \"%.100s\"; it must be mortar or collocation", s->key[entry], s->value[entry]);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   group = field ? &tie->master : &tie->slave;

@@ -37,7 +37,7 @@ PetscErrorCode HycoNormsCreate(HycoFOM f, HycoNorms *norms)
   *norms = h;
   h->f = f;
   for (PetscInt p = 0; p < scene->n_parameters; p++) mu[p] = (scene->lo[p] + scene->hi[p]) / 2;
-  HycoOnEach(HycoComm(f), HycoFECreate(scene, f->part, &h->fe));
+  HycoOnEach(HycoComm(f), HycoFECreate(scene, f->part->dm, &h->fe));
   HycoOnEach(HycoComm(f), HycoFESetParameters(h->fe, mu));
   PetscCall(AssembleNorm(h, &h->M));
   PetscCall(PetscArrayzero(h->fe->fixed, h->fe->n_dof)); /* prescribed displacements are included in the norm */

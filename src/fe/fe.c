@@ -7,6 +7,8 @@ PetscErrorCode HycoFEDestroy(HycoFE *fe)
 {
   PetscFunctionBegin;
   if (!*fe) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFree((*fe)->surface));
+  PetscCall(DMDestroy(&(*fe)->dm));
   PetscCall(HycoAssemblyMapDestroy(&(*fe)->places));
   PetscCall(HycoSpringsDestroy(&(*fe)->springs));
   for (PetscInt k = 0; k < (*fe)->n_loads; k++) {
@@ -112,9 +114,8 @@ static PetscErrorCode ChooseElements(HycoScene scene, HycoMesh mesh, PetscBool b
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Takes references to scene and mesh, which must outlive fe. No parameter is set yet: HycoFESetParameters() follows.
-   Not collective. */
-PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe)
+/* Takes a reference to the DM of the tables; the scene must outlive fe. */
+static PetscErrorCode Create(HycoScene scene, DM dm, HycoMesh mesh, HycoFE *fe)
 {
   PetscBool *bbar;
   PetscErrorCode ierr;
@@ -130,6 +131,8 @@ PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe)
   PetscCall(PetscNew(&f));
   f->bbar = bbar;
   f->scene = scene;
+  PetscCall(PetscObjectReference((PetscObject)dm));
+  f->dm = dm;
   f->mesh = mesh;
   f->dim = mesh->dim;
   f->formulation = scene->formulation;
@@ -147,6 +150,42 @@ PetscErrorCode HycoFECreate(HycoScene scene, HycoMesh mesh, HycoFE *fe)
   PetscCall(FindConstant(f));
   PetscCall(HycoMirrorCreate(f));
   *fe = f;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The tables of the DM are made once and kept with it. No parameter is set yet: HycoFESetParameters() follows. */
+PetscErrorCode HycoFECreate(HycoScene scene, DM dm, HycoFE *fe)
+{
+  HycoMesh mesh;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeshOf(dm, scene, &mesh));
+  PetscCall(Create(scene, dm, mesh, fe));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFECreateRead(HycoScene scene, HycoMesh mesh, HycoFE *fe)
+{
+  PetscFunctionBegin;
+  PetscCall(Create(scene, NULL, mesh, fe));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFECreateSurface(HycoScene scene, DM dm, HycoFE *fe)
+{
+  struct _n_HycoMesh *surface;
+  HycoMesh mesh;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMeshOf(dm, scene, &mesh));
+  PetscCall(PetscNew(&surface));
+  *surface = *mesh;
+  surface->n_cells = 0;
+  ierr = Create(scene, dm, surface, fe);
+  if (ierr) PetscCall(PetscFree(surface));
+  PetscCall(ierr);
+  (*fe)->surface = surface;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -379,22 +379,17 @@ PetscErrorCode HycoFELoads(HycoFE fe, PetscReal f[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* r = internal minus applied forces at supported unknowns, 0 elsewhere: f_int if it is given (histories), else K u
-   of the cells with a fixed unknown, since the assembled K has only the diagonal in these rows. Complete at owned
-   nodes. Not collective. */
-PetscErrorCode HycoFEReactions(HycoFE fe, const PetscReal u[], const PetscReal f_int[], PetscReal r[])
+/* r += K u of the cells; held: only of those with a fixed unknown. */
+static PetscErrorCode AddElastic(HycoFE fe, const PetscReal u[], PetscBool held, PetscReal r[])
 {
   HycoMesh m = fe->mesh;
   PetscReal *Ke;
 
   PetscFunctionBegin;
-  PetscCall(HycoFELoads(fe, r));
-  HycoFEGeneralise(fe, r);
-  for (PetscInt k = 0; k < fe->n_dof; k++) r[k] = (f_int ? f_int[k] : 0) - r[k];
-  for (PetscInt e = 0; e < m->n_cells && !f_int; e++) {
+  for (PetscInt e = 0; e < m->n_cells; e++) {
     PetscInt node[HYCO_MAX_CELL_NODES];
     const PetscInt n = m->dim * HycoMeshCellNodes(m, e, node);
-    PetscBool holds = PETSC_FALSE;
+    PetscBool holds = (PetscBool)!held;
 
     for (PetscInt k = 0; k < n; k++) holds = (PetscBool)(holds || fe->fixed[node[k / m->dim] * m->dim + k % m->dim]);
     if (!holds) continue;
@@ -406,6 +401,30 @@ PetscErrorCode HycoFEReactions(HycoFE fe, const PetscReal u[], const PetscReal f
       r[node[k / n / m->dim] * m->dim + k / n % m->dim] += Ke[k] * (fe->fixed[j] ? fe->u0[j] : u[j]);
     }
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* r = internal minus applied forces at supported unknowns, 0 elsewhere: f_int if it is given (histories), else K u
+   of the cells with a fixed unknown, since the assembled K has only the diagonal in these rows. Complete at owned
+   nodes. Not collective. */
+PetscErrorCode HycoFEReactions(HycoFE fe, const PetscReal u[], const PetscReal f_int[], PetscReal r[])
+{
+  PetscFunctionBegin;
+  PetscCall(HycoFELoads(fe, r));
+  HycoFEGeneralise(fe, r);
+  for (PetscInt k = 0; k < fe->n_dof; k++) r[k] = (f_int ? f_int[k] : 0) - r[k];
+  if (!f_int) PetscCall(AddElastic(fe, u, PETSC_TRUE, r));
   for (PetscInt k = 0; k < fe->n_dof; k++) r[k] = HycoFESupports(fe, k) ? r[k] : 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFEImbalance(HycoFE fe, const PetscReal u[], PetscReal r[])
+{
+  PetscFunctionBegin;
+  PetscCall(HycoFELoads(fe, r));
+  HycoFEGeneralise(fe, r);
+  for (PetscInt k = 0; k < fe->n_dof; k++) r[k] = -r[k];
+  PetscCall(AddElastic(fe, u, PETSC_FALSE, r));
+  for (PetscInt k = 0; k < fe->n_dof; k++) r[k] = fe->fixed[k] ? 0 : r[k];
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -10,9 +10,10 @@
 #include <hycokinematics.h>
 #include <hycomaterialimpl.h>
 
-#define BATCH   16 /* cells of one body whose points a law evaluates together */
-#define VIRGIN  -1 /* temperature of a point before its first step */
-#define N_PLAIN 4
+#define BATCH    16 /* cells of one body whose points a law evaluates together */
+#define VIRGIN   -1 /* temperature of a point before its first step */
+#define N_PLAIN  4
+#define ROUNDING 256 /* units of round-off in what a stress loses */
 
 struct _n_HycoFEState {
   PetscInt n_cells, *start; /* n_cells + 1 */
@@ -265,13 +266,13 @@ static void Complete(HycoFE fe, const HycoElement *el, Batch *b)
   }
 }
 
-/* Evaluates the batch's law; *failed: it has no solution at a point. NaN marks what the law does not compute;
-   Complete() replaces it. A failure is reported, not raised: the caller halves the step. */
-static PetscErrorCode Update(HycoFE fe, const HycoElement *el, Batch *b, PetscBool *failed)
+/* Evaluates the law of a body at n points of the batch; *failed: it has no solution at one. NaN marks what the law does
+   not compute; Complete() replaces it. A failure is reported, not raised: the caller halves the step. */
+static PetscErrorCode Update(HycoFE fe, PetscInt of, PetscInt n, Batch *b, PetscBool *failed)
 {
-  const HycoBody *body = &fe->scene->body[fe->mesh->cell_body[b->cell[0]]];
+  const HycoBody *body = &fe->scene->body[of];
   const PetscReal *constant[HYCO_MAX_DECLARED];
-  HycoMaterialPoints p = {.n = b->n * el->nq,
+  HycoMaterialPoints p = {.n = n,
                           .dim = fe->dim,
                           .n_strain = fe->n_sigma,
                           .constant = constant,
@@ -302,7 +303,6 @@ static PetscErrorCode Update(HycoFE fe, const HycoElement *el, Batch *b, PetscBo
                ((PetscObject)body->law)->type_name, p.why ? p.why : "no answer", (double)b->x[3 * p.failed],
                (double)b->x[3 * p.failed + 1], (double)b->x[3 * p.failed + 2]);
   b->report->failed = (PetscBool)(b->report->failed || *failed);
-  if (!*failed) Complete(fe, el, b);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -378,7 +378,8 @@ static PetscErrorCode Step(HycoFE fe, const HycoElement *el, Batch *b)
   if (linear)
     Linear(fe, el, b);
   else
-    PetscCall(Update(fe, el, b, &failed));
+    PetscCall(Update(fe, fe->mesh->cell_body[b->cell[0]], b->n * el->nq, b, &failed));
+  if (!linear && !failed) Complete(fe, el, b);
   if (!failed) Scatter(fe, el, b, linear);
   b->n = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -469,6 +470,124 @@ PetscErrorCode HycoFEStateForce(HycoFE fe, HycoFEState state, PetscInt cell, Pet
     PetscCall(PetscArraycpy(s, PointAt(fe, state, cell, q).stress, fe->n_sigma));
     HycoPointForce(fe, el, g, bbar ? mean : NULL, w, s, f);
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- laws at some points -- */
+
+PetscErrorCode HycoFEPointRows(HycoFE fe, PetscInt cell, PetscInt q, PetscReal B[], PetscReal *weight)
+{
+  const HycoElement *el = HycoElementGet(fe->mesh->type);
+  const PetscBool bbar = fe->bbar[fe->mesh->cell_body[cell]];
+  const PetscInt n = fe->mesh->nv * fe->dim;
+  PetscReal g[HYCO_CELL_NODES][3], mean[HYCO_CELL_NODES][3];
+
+  PetscFunctionBegin;
+  if (bbar) PetscCall(HycoMeanGradients(fe, el, cell, mean));
+  PetscCall(HycoGradients(fe, el, cell, q, g, weight));
+  PetscCall(PetscArrayzero(B, fe->n_sigma * n));
+  for (PetscInt c = 0; c < fe->n_sigma; c++) {
+    PetscReal unit[6] = {0};
+
+    unit[c] = 1;
+    HycoPointForce(fe, el, g, bbar ? mean : NULL, 1, unit, B + c * n);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* s = C (strain - thermal strain) - stress, 0 where it is round-off. Returns the largest of the terms. */
+static PetscReal Lost(HycoFE fe, PetscInt cell, PetscInt q, const PetscReal elastic[], const PetscReal stress[],
+                      PetscReal s[])
+{
+  const PetscInt ns = fe->n_sigma, size = fe->tangent_size[fe->mesh->cell_body[cell]];
+  PetscReal most = 0, terms = 0;
+
+  HycoTangentApply((PetscBool)(size == 2), fe->dim, fe->tangent + fe->tangent_start[cell] + q * size, elastic, s);
+  for (PetscInt c = 0; c < ns; c++) {
+    terms = PetscMax(terms, PetscMax(PetscAbsReal(s[c]), PetscAbsReal(stress[c])));
+    s[c] -= stress[c];
+    most = PetscMax(most, PetscAbsReal(s[c]));
+  }
+  if (most <= ROUNDING * PETSC_MACHINE_EPSILON * terms)
+    for (PetscInt c = 0; c < ns; c++) s[c] = 0;
+  return terms;
+}
+
+void HycoFEInelasticStress(HycoFE fe, HycoFEState state, PetscInt cell, PetscInt q, PetscReal s[])
+{
+  const Point p = PointAt(fe, state, cell, q);
+  PetscReal elastic[6];
+
+  for (PetscInt c = 0; c < fe->n_sigma; c++) elastic[c] = p.strain[c] - (c < 3 ? *p.thermal : 0);
+  (void)Lost(fe, cell, q, elastic, p.stress, s);
+}
+
+/* The law's input at n points of one body, without thermal strains. */
+static void GatherPoints(HycoFE fe, const HycoElement *el, PetscInt n, const PetscInt point[], const PetscReal strain[],
+                         Batch *b)
+{
+  const PetscInt ns = fe->n_sigma;
+
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt cell = point[i] / el->nq, q = point[i] % el->nq;
+    const PetscInt n_state = fe->scene->body[fe->mesh->cell_body[cell]].law->n_state;
+    const PetscReal T = fe->temperature ? fe->temperature[point[i]] : 0, hot = fe->thermal ? fe->thermal[point[i]] : 0;
+    const Point from = PointAt(fe, b->begin, cell, q);
+
+    HycoPointPlace(fe, el, cell, q, b->x + 3 * i);
+    for (PetscInt c = 0; c < ns; c++) {
+      b->strain[i * ns + c] = strain[i * ns + c] - (c < 3 ? hot : 0);
+      b->strain0[i * ns + c] = from.strain[c] - (c < 3 ? *from.thermal : 0);
+      b->stress0[i * ns + c] = from.stress[c];
+    }
+    for (PetscInt j = 0; j < n_state; j++) b->state0[i * n_state + j] = from.variable[j];
+    b->temperature0[i] = *from.temperature == VIRGIN ? T : *from.temperature;
+    b->temperature[i] = T;
+  }
+}
+
+/* What their stresses lose against the elastic ones, and the tangents of that. */
+static void ScatterPoints(HycoFE fe, const HycoElement *el, PetscInt n, const PetscInt point[], const Batch *b,
+                          PetscReal s[], PetscReal size[], PetscReal tangent[])
+{
+  const PetscInt ns = fe->n_sigma;
+
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscInt cell = point[i] / el->nq, q = point[i] % el->nq;
+    const PetscReal *C = fe->tangent + fe->tangent_start[cell] + q * ns * ns, *Ct = b->tangent + i * ns * ns;
+
+    size[i] = Lost(fe, cell, q, b->strain + i * ns, b->stress + i * ns, s + i * ns);
+    for (PetscInt r = 0; r < ns && b->tangents; r++) {
+      for (PetscInt c = 0; c < ns; c++)
+        tangent[(i * ns + r) * ns + c] = C[r * ns + c] - (Ct[r * ns + c] + Ct[c * ns + r]) / 2;
+    }
+  }
+}
+
+PetscErrorCode HycoFEStepPoints(HycoFE fe, PetscInt n, const PetscInt point[], const PetscReal strain[], PetscReal t0,
+                                PetscReal t1, HycoFEState begin, PetscReal s[], PetscReal size[], PetscReal tangent[],
+                                HycoFEStepReport *report)
+{
+  const HycoFEStepReport fresh = {.dt_factor = 1};
+  const HycoElement *el = HycoElementGet(fe->mesh->type);
+  const PetscInt ns = fe->n_sigma, *of = fe->mesh->cell_body;
+  Batch b = {.t0 = t0, .t1 = t1, .begin = begin, .tangents = (PetscBool)(tangent != NULL), .report = report};
+
+  PetscFunctionBegin;
+  *report = fresh;
+  PetscCall(BatchCreate(fe, &b));
+  for (PetscInt from = 0, more = 0; from < n; from += more, more = 0) {
+    const PetscInt body = of[point[from] / el->nq];
+    PetscBool failed;
+
+    while (from + more < n && more < BATCH * el->nq && of[point[from + more] / el->nq] == body) more++;
+    GatherPoints(fe, el, more, point + from, strain + from * ns, &b);
+    PetscCall(Update(fe, body, more, &b, &failed));
+    if (!failed)
+      ScatterPoints(fe, el, more, point + from, &b, s + from * ns, size + from,
+                    tangent ? tangent + from * ns * ns : NULL);
+  }
+  PetscCall(BatchDestroy(&b));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

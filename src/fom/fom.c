@@ -1,5 +1,6 @@
 /* HycoFOM: reads and distributes the mesh, assembles (16), solves it, and gathers the solution in the file's order. */
 #include <hycofields.h>
+#include <hycogradient.h>
 #include <hycopath.h>
 
 PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
@@ -43,6 +44,7 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
   PetscCall(HycoFieldFileDestroy(&f->set));
   PetscCall(PetscFree(f->contact_result));
   PetscCall(PetscFree(f->reaction));
+  PetscCall(HycoGradientDestroy(&f->gradient));
   PetscCall(PetscFree(f->lambda));
   PetscCall(PetscFree(f->lambda_all));
   PetscCall(PetscFree(f->needed));
@@ -74,7 +76,7 @@ static PetscErrorCode Distribute(HycoFOM f)
   /* the file's first bad cell is named; refined cells are checked later */
   if (!f->scene->refine) HycoOnEach(HycoComm(f), HycoMeshCheckCells(mesh));
   if (mesh->n_cells) PetscCall(HycoContactsNeighbours(f->scene, mesh, &n, &pairs));
-  PetscCall(DMDestroy(&mesh->dm)); /* so that it does not live beside the distributed one */
+  PetscCall(HycoMeshDetach(mesh)); /* so that it does not live beside the distributed one */
   PetscCall(HycoMeshDistribute(&f->dm, f->scene, mesh, n, pairs, cut, f->mesh_write));
   PetscCall(PetscFree(pairs));
   PetscCall(HycoMeshDestroy(&mesh));
@@ -92,12 +94,12 @@ static PetscErrorCode ReadMesh(HycoFOM f)
   f->n_nodes = f->size == 1 ? f->part->n_nodes : f->part->n_whole_nodes;
   f->n_cells = f->size == 1 ? f->part->n_cells : f->part->n_whole_cells;
   if (f->size > 1) HycoOnEach(HycoComm(f), HycoMeshCheckCells(f->part));
-  if (f->size > 1) HycoOnEach(HycoComm(f), HycoFECreate(f->scene, f->part, &f->fe));
+  if (f->size > 1) HycoOnEach(HycoComm(f), HycoFECreate(f->scene, f->part->dm, &f->fe));
   f->contact_cpu -= HycoCPU();
   PetscCall(HycoFOMFindContacts(f));
   f->contact_cpu += HycoCPU();
   if (f->size > 1) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoOnEach(HycoComm(f), HycoFECreate(f->scene, f->part, &f->fe));
+  HycoOnEach(HycoComm(f), HycoFECreate(f->scene, f->part->dm, &f->fe));
   f->fe_surface = f->fe;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -325,7 +327,7 @@ static PetscErrorCode ComputeWhole(HycoFOM f, HycoMesh mesh, HycoPairs *pairs)
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(HycoFECreate(f->scene, mesh, &fe));
+  PetscCall(HycoFECreate(f->scene, mesh->dm, &fe));
   PetscCall(PetscMalloc1(pairs->n, &gap));
   ierr = HycoFESetParameters(fe, f->fe->mu);
   if (!ierr) ierr = PetscArraycpy(fe->mirrored, f->fe->mirrored, f->scene->n_bodies);

@@ -10,30 +10,22 @@
 */
 #include <hycofields.h>
 #include <hycopath.h>
+#include <hycoslip.h>
 
-/* The shares of mu r_n above which a contact counts as slipping. */
-#define SLIPS (1 - 1e-8)
-/* Slips below this share of the largest displacement are round-off, and do no work. */
-#define ROUNDING 1e-12
 /* Vectors of a path with an entry for each row of its B. */
 #define N_PER_ROW (5 + HYCO_ANDERSON)
 
 struct _n_HycoFriction {
   HycoSystem system; /* with tangents */
   HycoSolver solver;
-  HycoCone cone[2]; /* of contacts without friction, and with */
   Mat B, Bt;
   Vec D, L, L_old, work; /* L: forces of the last step; L_old: of the last accepted one */
   Vec other[N_PER_ROW];  /* the path's vectors for the system that it does not have now */
   PetscInt rows;         /* of this rank */
-  PetscInt *row;         /* n + 1: the first row of each contact */
-  PetscInt *of;          /* n: its cone */
-  PetscReal *data, *mu;  /* of the blocks; n */
-  PetscReal *tangent;    /* 6 n */
+  HycoSlip slip;
   PetscInt n_dof;
   PetscReal *u_old; /* n_dof: of the surface at the last accepted time */
-  HycoShear shear;
-  PetscBool used; /* the path has this system */
+  PetscBool used;   /* the path has this system */
 };
 
 /* The addresses of the path's vectors with an entry for each row of B. */
@@ -58,7 +50,7 @@ static PetscErrorCode CopyNormal(HycoFOM f, Vec from, PetscBool with, Vec to)
   PetscCall(VecSet(to, 0));
   PetscCall(VecGetArrayRead(from, &a));
   PetscCall(VecGetArray(to, &b));
-  for (PetscInt k = 0; k < f->pairs.n; k++) b[with ? k : r->row[k]] = a[with ? r->row[k] : k];
+  for (PetscInt k = 0; k < f->pairs.n; k++) b[with ? k : r->slip.row[k]] = a[with ? r->slip.row[k] : k];
   PetscCall(VecRestoreArray(to, &b));
   PetscCall(VecRestoreArrayRead(from, &a));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -89,34 +81,6 @@ static PetscErrorCode Use(HycoFOM f, PetscBool use)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The rows of this rank's contacts and their cones. */
-static PetscErrorCode CountRows(HycoFOM f, HycoFriction r)
-{
-  const PetscInt n = f->pairs.n, dim = f->fe->dim;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc3(n + 1, &r->row, n, &r->of, n, &r->mu));
-  PetscCall(PetscMalloc2(2 * n, &r->data, 6 * n, &r->tangent));
-  r->row[0] = 0;
-  for (PetscInt k = 0; k < n; k++) {
-    r->of[k] = f->scene->contact[f->pairs.contact[k]]->friction != NULL;
-    r->row[k + 1] = r->row[k] + (r->of[k] ? dim : 1);
-  }
-  r->rows = r->row[n];
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode CreateCones(HycoFOM f, HycoFriction r)
-{
-  PetscFunctionBegin;
-  for (PetscInt c = 0; c < 2; c++) {
-    PetscCall(HycoConeCreate(HycoComm(f), &r->cone[c]));
-    PetscCall(HycoConeSetSize(r->cone[c], c ? f->fe->dim : 1));
-    PetscCall(HycoConeSetType(r->cone[c], c ? HYCO_CONE_COULOMB : HYCO_CONE_NONNEGATIVE));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode HycoFrictionCreate(HycoFOM f)
 {
   HycoFriction r;
@@ -126,10 +90,8 @@ PetscErrorCode HycoFrictionCreate(HycoFOM f)
              "the mesh has 1 space dimension, in which nothing slides; remove the contacts' friction");
   PetscCall(PetscNew(&r));
   f->friction = r;
-  PetscCall(CountRows(f, r));
-  PetscCall(CreateCones(f, r));
-  PetscCall(PetscCalloc4(3 * f->pairs.n, &r->shear.force, 3 * f->pairs.n, &r->shear.slip, f->pairs.n, &r->shear.work,
-                         f->pairs.n, &r->shear.state));
+  PetscCall(HycoSlipCreate(HycoComm(f), f->scene, &f->pairs, f->fe->dim, &r->slip));
+  r->rows = r->slip.row[f->pairs.n];
   PetscCall(VecCreate(HycoComm(f), &r->L));
   PetscCall(VecSetSizes(r->L, r->rows, PETSC_DETERMINE));
   PetscCall(VecSetType(r->L, VECSTANDARD));
@@ -155,7 +117,6 @@ PetscErrorCode HycoFrictionDestroy(HycoFOM f)
   f->pairs.shear = NULL;
   PetscCall(HycoSolverDestroy(&r->solver));
   PetscCall(HycoSystemDestroy(&r->system));
-  for (PetscInt c = 0; c < 2; c++) PetscCall(HycoConeDestroy(&r->cone[c]));
   PetscCall(MatDestroy(&r->B));
   PetscCall(MatDestroy(&r->Bt));
   PetscCall(VecDestroy(&r->D));
@@ -163,9 +124,7 @@ PetscErrorCode HycoFrictionDestroy(HycoFOM f)
   PetscCall(VecDestroy(&r->L_old));
   PetscCall(VecDestroy(&r->work));
   for (PetscInt j = 0; j < N_PER_ROW; j++) PetscCall(VecDestroy(&r->other[j]));
-  PetscCall(PetscFree3(r->row, r->of, r->mu));
-  PetscCall(PetscFree2(r->data, r->tangent));
-  PetscCall(PetscFree4(r->shear.force, r->shear.slip, r->shear.work, r->shear.state));
+  PetscCall(HycoSlipDestroy(&r->slip));
   PetscCall(PetscFree(r->u_old));
   PetscCall(PetscFree(f->friction));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -174,7 +133,6 @@ PetscErrorCode HycoFrictionDestroy(HycoFOM f)
 PetscErrorCode HycoFrictionBegin(HycoFOM f)
 {
   HycoFriction r = f->friction;
-  const PetscInt n = f->pairs.n;
 
   PetscFunctionBegin;
   if (r->B) PetscCall(Use(f, PETSC_FALSE));
@@ -184,36 +142,7 @@ PetscErrorCode HycoFrictionBegin(HycoFOM f)
   PetscCall(PetscFree(r->u_old));
   r->n_dof = f->fe_surface->n_dof;
   PetscCall(PetscCalloc1(r->n_dof, &r->u_old));
-  PetscCall(PetscArrayzero(r->shear.force, 3 * n));
-  PetscCall(PetscArrayzero(r->shear.slip, 3 * n));
-  PetscCall(PetscArrayzero(r->shear.work, n));
-  PetscCall(PetscArrayzero(r->shear.state, n));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The coefficients at the slaves' places; of this rank's contacts. */
-static PetscErrorCode Coefficients(HycoFOM f, HycoFriction r)
-{
-  HycoFE fe = f->fe_surface;
-  PetscInt n = 0;
-
-  PetscFunctionBegin;
-  for (PetscInt k = 0; k < f->pairs.n; k++) {
-    HycoExpr friction = f->scene->contact[f->pairs.contact[k]]->friction;
-    const PetscReal *x = fe->X + 3 * f->pairs.slave[k];
-    char place[HYCO_LINE];
-
-    r->mu[k] = 0;
-    if (!friction) continue;
-    PetscCall(HycoExprEval(friction, fe->mu, 1, x, &r->mu[k]));
-    if (r->mu[k] < 0) {
-      PetscCall(HycoExprPlace(friction, fe->mu, x, place));
-      HycoFail("%s is %g at %s; a coefficient of friction must be 0 or more", HycoExprKey(friction), (double)r->mu[k],
-               place);
-    }
-    r->data[n++] = r->mu[k];
-    r->data[n++] = 0;
-  }
+  PetscCall(HycoSlipBegin(&r->slip));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -226,9 +155,9 @@ typedef struct {
 static PetscErrorCode ComputeRows(HycoFOM f, HycoFriction r, Rows *rows)
 {
   PetscFunctionBegin;
-  PetscCall(Coefficients(f, r));
-  PetscCall(HycoContactTangentRows(f->fe_surface, &f->pairs, r->row, r->u_old, r->tangent, rows->start, rows->dof,
-                                   rows->value, rows->gap));
+  PetscCall(HycoSlipCoefficients(&r->slip, f->fe_surface, &f->pairs));
+  PetscCall(HycoContactTangentRows(f->fe_surface, &f->pairs, r->slip.row, r->u_old, r->slip.tangent, rows->start,
+                                   rows->dof, rows->value, rows->gap));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -267,8 +196,7 @@ static PetscErrorCode FillB(HycoFOM f, HycoFriction r, const Rows *rows)
 static PetscErrorCode Rubs(HycoFOM f, PetscBool *rubs)
 {
   PetscFunctionBegin;
-  *rubs = PETSC_FALSE;
-  for (PetscInt k = 0; k < f->pairs.n; k++) *rubs = (PetscBool)(*rubs || f->friction->mu[k] > 0);
+  *rubs = HycoSlipRubs(&f->friction->slip);
   HycoAllreduce(rubs, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -286,10 +214,10 @@ static PetscErrorCode Assemble(HycoFOM f, HycoFriction r, Rows *rows)
   PetscCall(VecRestoreArray(r->D, &D));
   PetscCall(HycoSystemSetMatrices(r->system, f->K, r->Bt, r->B, PETSC_TRUE));
   PetscCall(HycoSystemSetVectors(r->system, f->F, r->D));
-  PetscCall(HycoSystemSetBlocks(r->system, 2, r->cone, f->pairs.n, r->of, r->data));
+  PetscCall(HycoSystemSetBlocks(r->system, 2, r->slip.cone, f->pairs.n, r->slip.of, r->slip.data));
   PetscCall(Rubs(f, &rubs));
   PetscCall(Use(f, rubs));
-  f->pairs.shear = &r->shear;
+  f->pairs.shear = &r->slip.shear;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -340,28 +268,6 @@ PetscErrorCode HycoFrictionWork(HycoFOM f, PetscReal *sum)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the slip -w_t of contact k, with the forces r and gaps w of its rows. most: the largest
-   displacement. */
-static void AddSlip(const HycoFriction h, PetscInt dim, PetscInt k, const PetscReal r[], const PetscReal w[],
-                    PetscReal most)
-{
-  const HycoShear *s = &h->shear;
-  const PetscReal *t = h->tangent + 6 * k;
-  PetscReal size = 0, work = 0;
-
-  for (PetscInt c = 0; c < 3; c++) s->force[3 * k + c] = 0;
-  for (PetscInt j = 0; j + 1 < dim && h->of[k]; j++) {
-    size += r[j + 1] * r[j + 1];
-    if (r[0] > 0) work -= r[j + 1] * w[j + 1];
-    for (PetscInt c = 0; c < 3; c++) {
-      s->force[3 * k + c] -= r[j + 1] * t[3 * j + c];
-      if (r[0] > 0) s->slip[3 * k + c] -= w[j + 1] * t[3 * j + c];
-    }
-  }
-  s->state[k] = !(r[0] > 0) ? HYCO_OPEN : PetscSqrtReal(size) < SLIPS * h->mu[k] * r[0] ? HYCO_STICK : HYCO_SLIP;
-  if (PetscAbsReal(work) > ROUNDING * PetscSqrtReal(size) * most) s->work[k] += work;
-}
-
 PetscErrorCode HycoFrictionAccept(HycoFOM f)
 {
   HycoFriction r = f->friction;
@@ -374,7 +280,7 @@ PetscErrorCode HycoFrictionAccept(HycoFOM f)
   PetscCall(VecAYPX(r->work, -1, r->D));
   PetscCall(VecGetArrayRead(r->L, &L));
   PetscCall(VecGetArrayRead(r->work, &w));
-  for (PetscInt k = 0; k < f->pairs.n; k++) AddSlip(r, f->fe->dim, k, L + r->row[k], w + r->row[k], most);
+  HycoSlipAdd(&r->slip, L, w, most);
   PetscCall(VecRestoreArrayRead(r->work, &w));
   PetscCall(VecRestoreArrayRead(r->L, &L));
   PetscCall(VecCopy(r->L, r->L_old));
@@ -387,13 +293,10 @@ PetscErrorCode HycoFrictionAccept(HycoFOM f)
 PetscErrorCode HycoFrictionMeasure(HycoFOM f, HycoStep *s)
 {
   HycoFriction r = f->friction;
-  PetscReal sum[2] = {0, 0};
+  PetscReal sum[2];
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < f->pairs.n; k++) {
-    sum[0] += r->shear.work[k];
-    sum[1] += r->of[k] && r->shear.state[k] == HYCO_SLIP;
-  }
+  HycoSlipSum(&r->slip, sum);
   HycoAllreduce(sum, 2, MPIU_REAL, MPI_SUM, HycoComm(f));
   s->friction_work = sum[0];
   s->n_slipping = (PetscInt)sum[1];
@@ -418,7 +321,7 @@ PetscErrorCode HycoFrictionSave(HycoFOM f, HycoH5 h)
   for (PetscInt c = 0; c < N_STATE && !ierr; c++) {
     char name[32];
     PetscInt stride;
-    const PetscReal *from = Column(&f->friction->shear, c, &stride);
+    const PetscReal *from = Column(&f->friction->slip.shear, c, &stride);
 
     for (PetscInt k = 0; k < f->pairs.n; k++) value[k] = from[k * stride];
     PetscCall(PetscSNPrintf(name, sizeof(name), "friction/%d", (int)c));
@@ -459,7 +362,7 @@ static PetscErrorCode TakeColumns(HycoFOM f, PetscReal *const value[N_STATE])
   PetscCall(VecCopy(f->Lambda, lambda));
   for (PetscInt c = 0; c < N_STATE; c++) {
     PetscInt stride;
-    PetscReal *to = Column(&f->friction->shear, c, &stride);
+    PetscReal *to = Column(&f->friction->slip.shear, c, &stride);
 
     PetscCall(HycoFOMSetLambda(f, value[c]));
     PetscCall(VecGetArrayRead(f->Lambda, &mine));
@@ -484,8 +387,8 @@ PetscErrorCode HycoFrictionLoad(HycoFOM f)
   PetscCall(CopyNormal(f, f->Lambda, PETSC_FALSE, r->L));
   PetscCall(VecGetArray(r->L, &L));
   for (PetscInt k = 0; k < f->pairs.n; k++) {
-    for (PetscInt j = r->row[k] + 1; j < r->row[k + 1]; j++) {
-      const PetscReal *t = r->tangent + 6 * k + 3 * (j - r->row[k] - 1), *force = r->shear.force + 3 * k;
+    for (PetscInt j = r->slip.row[k] + 1; j < r->slip.row[k + 1]; j++) {
+      const PetscReal *t = r->slip.tangent + 6 * k + 3 * (j - r->slip.row[k] - 1), *force = r->slip.shear.force + 3 * k;
 
       L[j] = -(force[0] * t[0] + force[1] * t[1] + force[2] * t[2]);
     }

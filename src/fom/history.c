@@ -222,6 +222,8 @@ static PetscErrorCode TryStep(HycoPath p, PetscReal stop)
     p->dt = h * PetscMax(a.law.dt_factor, 0.1);
   else if (GROWTH * a.law.increment <= p->bound && a.easy)
     p->dt = PetscMax(p->dt, GROWTH * h);
+  else
+    p->n_bound += a.easy;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -331,6 +333,7 @@ void HycoPathGetHistory(HycoPath p, HycoHistory *h)
   h->why = p->why;
   h->newton = HycoNewtons[HycoPathMethod(p)];
   h->factor_cost = HycoPathFactorCost(p);
+  h->n_bound = p->n_bound;
   h->n_orders = p->n_orders;
   h->n_taken = p->n_taken;
   h->taken = p->taken;

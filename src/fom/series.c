@@ -76,7 +76,7 @@ static PetscErrorCode AddState(HycoSeries s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds contact force, pressure and gap by node; with friction the tangential traction, the slip and the state. */
+/* Adds contact force, pressure, gap and the contact by node; with friction the tangential traction, the slip and the state. */
 static PetscErrorCode AddContacts(HycoSeries s)
 {
   const HycoSeriesSource *f = &s->from;
@@ -90,6 +90,7 @@ static PetscErrorCode AddContacts(HycoSeries s)
   if (!ierr) ierr = AddField(s, "contact_force", HYCO_ON_NODES, 3, c.force);
   if (!ierr) ierr = AddField(s, "contact_pressure", HYCO_ON_NODES, 1, c.pressure);
   if (!ierr) ierr = AddField(s, "gap", HYCO_ON_NODES, 1, c.gap_node);
+  if (!ierr) ierr = AddField(s, "contact", HYCO_ON_NODES, 1, c.which);
   if (!ierr && c.rubs) ierr = AddField(s, "contact_traction", HYCO_ON_NODES, 3, c.traction);
   if (!ierr && c.rubs) ierr = AddField(s, "contact_slip", HYCO_ON_NODES, 3, c.slip);
   if (!ierr && c.rubs) ierr = AddField(s, "contact_state", HYCO_ON_NODES, 1, c.state);

@@ -58,7 +58,7 @@ static PetscErrorCode MeasureDisplacements(HycoFOM f, HycoSummary *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of all ranks. Pressures are maxima, everything else sums. */
+/* Of all ranks. Pressures are extremes, everything else sums. */
 static PetscErrorCode SumResult(HycoFOM f, HycoContactResult *r)
 {
   PetscReal sum[11];
@@ -73,12 +73,14 @@ static PetscErrorCode SumResult(HycoFOM f, HycoContactResult *r)
   HycoAllreduce(n, 2, MPIU_INT, MPI_SUM, HycoComm(f));
   HycoAllreduce(sum, 11, MPIU_REAL, MPI_SUM, HycoComm(f));
   HycoAllreduce(&r->pressure, 1, MPIU_REAL, MPI_MAX, HycoComm(f));
+  HycoAllreduce(&r->pressure_min, 1, MPIU_REAL, MPI_MIN, HycoComm(f));
   PetscCall(PetscArraycpy(r->force, sum, 3));
   PetscCall(PetscArraycpy(r->moment, sum + 3, 3));
   r->area = sum[6];
   PetscCall(PetscArraycpy(r->friction, sum + 7, 3));
   r->friction_work = sum[10];
   r->n = n[0];
+  if (!r->n) r->pressure_min = 0;
   r->n_active = n[1];
   PetscFunctionReturn(PETSC_SUCCESS);
 }

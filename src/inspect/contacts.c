@@ -85,7 +85,8 @@ PetscErrorCode HycoInspectTies(HycoInspection *in)
   for (PetscInt t = 0; t < s->n_ties; t++) {
     HycoTieInspection *one = &in->tie[t];
 
-    *one = (HycoTieInspection){.name = s->tie[t].name, .slave = s->tie[t].slave, .master = s->tie[t].master};
+    *one = (HycoTieInspection){
+        .name = s->tie[t].name, .slave = s->tie[t].slave, .master = s->tie[t].master, .mortar = s->tie[t].mortar};
     for (PetscInt e = 0; ties && e < ties->n; e++)
       one->n_nodes += ties->tie[e] == t && (!e || ties->slave[e - 1] != ties->slave[e]);
     PetscCall(CompareTie(fe, t, &one->coarse));

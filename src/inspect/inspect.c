@@ -169,14 +169,14 @@ static PetscErrorCode Describe(HycoInspection *in)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* How the parameters enter the bodies, with changes from the point mu; of scenes with contact whose bodies are all
-   linear. Collective. */
+/* How the parameters enter the bodies, with changes from the point mu; of scenes with contact. With a history only what does
+   not depend on time. Collective. */
 static PetscErrorCode DescribeBodies(HycoFOM f, const PetscReal mu[], char text[HYCO_LINE])
 {
   HycoBodyParts parts;
 
   PetscFunctionBegin;
-  if (!f->n_contacts || !f->scene->n_parameters || f->scene->n_times) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!f->n_contacts || !f->scene->n_parameters) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoBodyPartsFind(f, mu, &parts));
   PetscCall(HycoBodyPartsDescribe(f->scene, &parts, text));
   PetscCall(HycoBodyPartsDestroy(&parts));

@@ -1,4 +1,5 @@
 /* HycoMesh: groups, adjacency. */
+#include "plex.h"
 #include <hycocontactimpl.h>
 #include <string.h>
 
@@ -9,13 +10,14 @@ const HycoCellKind HycoCellKinds[HYCO_N_CELL_TYPES] = {
     {"hex20", 3, 20, 8, 4, PETSC_TRUE}, {"hex27", 3, 27, 9, 4, PETSC_TRUE}, {"pyramid5", 3, 5, 4, 4, PETSC_FALSE},
     {"prism6", 3, 6, 4, 4, PETSC_FALSE}};
 
-PetscErrorCode HycoMeshDestroy(HycoMesh *mesh)
+/* The container, composed with a DM, of its tables. */
+#define TABLES "HycoTables"
+
+static PetscErrorCode FreeTables(void *tables)
 {
-  HycoMesh m = *mesh;
+  HycoMesh m = (HycoMesh)tables;
 
   PetscFunctionBegin;
-  if (!m) PetscFunctionReturn(PETSC_SUCCESS);
-  *mesh = NULL;
   for (PetscInt g = 0; m->group_name && g < m->n_groups; g++) PetscCall(PetscFree(m->group_name[g]));
   PetscCall(PetscFree(m->group_name));
   PetscCall(PetscFree(m->group_dim));
@@ -39,8 +41,61 @@ PetscErrorCode HycoMeshDestroy(HycoMesh *mesh)
   PetscCall(PetscFree(m->facet_cell));
   PetscCall(PetscFree(m->facet_point));
   PetscCall(HycoMeshSetTies(m, NULL));
-  PetscCall(DMDestroy(&m->dm));
   PetscCall(PetscFree(m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMeshDestroy(HycoMesh *mesh)
+{
+  HycoMesh m = *mesh;
+  DM dm = m ? m->dm : NULL;
+
+  PetscFunctionBegin;
+  *mesh = NULL;
+  if (dm)
+    PetscCall(DMDestroy(&dm));
+  else if (m)
+    PetscCall(FreeTables(m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The DM owns the tables, and they do not hold it: a circle would keep both alive. */
+PetscErrorCode HycoMeshSetDM(HycoMesh m, DM dm)
+{
+  PetscContainer container;
+
+  PetscFunctionBegin;
+  PetscCall(PetscContainerCreate(PETSC_COMM_SELF, &container));
+  PetscCall(PetscContainerSetPointer(container, m));
+  PetscCall(PetscContainerSetUserDestroy(container, FreeTables));
+  PetscCall(PetscObjectCompose((PetscObject)dm, TABLES, (PetscObject)container));
+  PetscCall(PetscContainerDestroy(&container));
+  m->dm = dm;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMeshQuery(DM dm, HycoMesh *mesh)
+{
+  PetscContainer container;
+
+  PetscFunctionBegin;
+  *mesh = NULL;
+  PetscCall(PetscObjectQuery((PetscObject)dm, TABLES, (PetscObject *)&container));
+  if (container) PetscCall(PetscContainerGetPointer(container, (void **)mesh));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMeshDetach(HycoMesh m)
+{
+  PetscContainer container;
+  DM dm = m->dm;
+
+  PetscFunctionBegin;
+  PetscCall(PetscObjectQuery((PetscObject)dm, TABLES, (PetscObject *)&container));
+  PetscCall(PetscContainerSetUserDestroy(container, NULL));
+  PetscCall(PetscObjectCompose((PetscObject)dm, TABLES, NULL));
+  m->dm = NULL;
+  PetscCall(DMDestroy(&dm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -426,6 +426,12 @@ static void TurnOutward(HycoMesh m, PetscInt cell, PetscInt facet[])
   if (out < 0) Reverse(m->type, facet);
 }
 
+void HycoMeshTurnFacet(HycoMesh m, PetscInt cell, PetscInt facet[])
+{
+  if (cell >= 0) TurnOutward(m, cell, facet);
+  HycoFacetRepeatLast(m->nf, facet);
+}
+
 /* Adds a facet with a node that this process owns, of a cell or of a point without its cell (cell -1); `number` is its
    number in its cell. */
 static PetscErrorCode AddFacet(Builder *b, PetscInt cell, PetscInt point, PetscInt number, const PetscInt node[])
@@ -556,13 +562,15 @@ static PetscErrorCode AddPoint(Builder *b, PetscInt group, PetscInt value, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* By the tag of the cell, then the number in it: the same on any number of ranks. */
+/* By the tag of the cell, then the number in it: the same on any number of ranks. Facets without their cell may share
+   both (HycoMeshCreateDM()); their points are in order. */
 static int CompareFacets(const void *a, const void *b)
 {
   const Facet *x = (const Facet *)a, *y = (const Facet *)b;
 
   if (x->tag != y->tag) return x->tag < y->tag ? -1 : 1;
-  return (x->number > y->number) - (x->number < y->number);
+  if (x->number != y->number) return x->number < y->number ? -1 : 1;
+  return (x->point > y->point) - (x->point < y->point);
 }
 
 /* The facets of a group, in the order of their cells; those without their cell have their orientation. */
@@ -581,8 +589,7 @@ static PetscErrorCode PlaceFacets(Builder *b, PetscInt group)
     PetscInt *facet = m->facets + m->n_facets * m->nf;
 
     PetscCall(PetscArraycpy(facet, b->facet[k].node, m->nf));
-    if (b->facet[k].cell >= 0) TurnOutward(m, b->facet[k].cell, facet);
-    HycoFacetRepeatLast(m->nf, facet);
+    HycoMeshTurnFacet(m, b->facet[k].cell, facet);
     m->facet_group[m->n_facets] = group;
     if (b->sub) m->facet_point[m->n_facets] = b->facet[k].point;
     m->facet_cell[m->n_facets++] = b->facet[k].cell;
@@ -819,7 +826,7 @@ static PetscErrorCode CheckGroups(MPI_Comm comm, HycoMesh m, HycoScene scene)
 }
 
 /* The local tables of a DM's part: nodes and cells by tag, groups, facets outward, bodies; with several ranks also
-   global numbers. Holds a reference to the DM. Collective on comm, which is PETSC_COMM_SELF for a DM that one rank
+   global numbers. The caller gets a reference to the DM. Collective on comm, which is PETSC_COMM_SELF for a DM that one rank
    alone uses. */
 PetscErrorCode HycoPlexToTables(DM dm, MPI_Comm comm, HycoScene scene, HycoMesh *mesh)
 {
@@ -829,6 +836,11 @@ PetscErrorCode HycoPlexToTables(DM dm, MPI_Comm comm, HycoScene scene, HycoMesh 
   size_t length;
 
   PetscFunctionBegin;
+  PetscCall(HycoMeshQuery(dm, mesh));
+  if (*mesh) {
+    PetscCall(PetscObjectReference((PetscObject)dm));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCallMPI(MPI_Comm_size(comm, &size));
   PetscCall(PetscNew(&b.m));
   PetscCall(FindType(&b));
@@ -846,7 +858,7 @@ PetscErrorCode HycoPlexToTables(DM dm, MPI_Comm comm, HycoScene scene, HycoMesh 
   PetscCall(PetscFree(b.facet));
   PetscCall(ierr);
   PetscCall(PetscObjectReference((PetscObject)dm));
-  b.m->dm = dm;
+  PetscCall(HycoMeshSetDM(b.m, dm));
   *mesh = b.m;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

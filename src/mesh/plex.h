@@ -24,6 +24,9 @@ PetscErrorCode HycoPlexVertices(DM dm, PetscBool interpolated, HycoCellType type
 PetscErrorCode HycoPlexType(DM dm, PetscInt *type, PetscBool *mixed);
 /* Sets them for a part, which need not have cells of all shapes, nor cells at all nodes. */
 PetscErrorCode HycoPlexSetType(DM dm, HycoCellType type, PetscBool mixed);
+/* Makes tables those of a DM, which then owns them; those that it has, or NULL. */
+PetscErrorCode HycoMeshSetDM(HycoMesh mesh, DM dm);
+PetscErrorCode HycoMeshQuery(DM dm, HycoMesh *mesh);
 /* As HycoPlexToMesh(), for the processes of comm; PETSC_COMM_SELF for a DM with points on one alone. */
 PetscErrorCode HycoPlexToTables(DM dm, MPI_Comm comm, HycoScene scene, HycoMesh *mesh);
 /* DMPlex's types of cells; the position of a node of a cell in its cone (shape HYCO_N_CELL_TYPES: for points that are

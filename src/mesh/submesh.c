@@ -9,6 +9,8 @@
 #include <string.h>
 
 #define SUBPOINTS "HycoSubpoints"
+/* Instead of a number of groups: HycoSubmeshFirst(). */
+#define ALL_BETWEEN -1
 
 /* What of a mesh is taken. */
 typedef struct {
@@ -43,6 +45,10 @@ static PetscErrorCode CutAll(HycoMesh m, Cut *c)
   PetscCall(Identity(m->n_nodes, &c->node));
   PetscCall(Identity(m->n_cells, &c->cell_at));
   PetscCall(Identity(m->n_nodes, &c->node_at));
+  PetscCall(PetscMalloc1(m->n_facets, &c->facet));
+  for (PetscInt f = 0; f < m->n_facets; f++) {
+    if (m->facet_cell[f] < 0) c->facet[c->n_facets++] = f;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -66,6 +72,8 @@ static PetscErrorCode FacetNumber(HycoMesh m, PetscInt f, PetscInt *number)
     *number = HycoMeshFacetNumber(m, f);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+  *number = HycoFacetCount(m->type) - 1; /* of tables without a DM; after a facet whose cell they have */
+  if (!m->dm) PetscFunctionReturn(PETSC_SUCCESS);
   /* The facet's label value keeps the number when its cell was left behind. */
   PetscCall(HycoPlexGroupLabel(m->dm, m->group_name[m->facet_group[f]], &label));
   PetscCall(DMLabelGetValue(label, m->facet_point[f], number));
@@ -264,11 +272,11 @@ static PetscErrorCode AddLabels(DM dm, const Cut *c)
 }
 
 /* Facets without cells have the tag of the cell that they bound: with the number in it, they sort as in the whole
-   mesh. */
+   mesh. Tables without a DM do not tell that of another's cell: it gets that of the facet before it in its group. */
 static PetscErrorCode AddTags(DM dm, const Cut *c)
 {
   const PetscInt first = c ? c->n_cells + c->n_facets : 0, *tag_of = NULL;
-  PetscInt *tag;
+  PetscInt *tag, next = 0, last = 0;
   IS tags = NULL;
 
   PetscFunctionBegin;
@@ -276,10 +284,13 @@ static PetscErrorCode AddTags(DM dm, const Cut *c)
   if (c && c->of->dm) PetscCall(PetscObjectQuery((PetscObject)c->of->dm, HYCO_TAGS, (PetscObject *)&tags));
   if (tags) PetscCall(ISGetIndices(tags, &tag_of));
   for (PetscInt e = 0; c && e < c->n_cells; e++) tag[e] = c->of->cell_id[c->cell[e]];
-  for (PetscInt f = 0; c && f < c->n_facets; f++) {
-    const PetscInt cell = c->of->facet_cell[c->facet[f]];
+  for (PetscInt f = 0; c && f < c->of->n_facets; f++) {
+    const PetscInt cell = c->of->facet_cell[f];
 
-    tag[c->n_cells + f] = cell < 0 ? tag_of[c->of->facet_point[c->facet[f]]] : c->of->cell_id[cell];
+    if (!f || c->of->facet_group[f] != c->of->facet_group[f - 1]) last = 0;
+    if (cell >= 0) last = c->of->cell_id[cell];
+    if (next == c->n_facets || c->facet[next] != f) continue;
+    tag[c->n_cells + next++] = cell < 0 && tags ? tag_of[c->of->facet_point[f]] : last;
   }
   for (PetscInt i = 0; c && i < c->n_nodes; i++) tag[first + i] = c->of->node_id[c->node[i]];
   if (tags) PetscCall(ISRestoreIndices(tags, &tag_of));
@@ -362,7 +373,18 @@ static PetscErrorCode SelectNodes(Cut *c, PetscInt n_extra, const PetscInt extra
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Facets of the groups in all_facets whose cell is not kept become points. */
+/* Whether a facet is taken without its cell: n_all ALL_BETWEEN: if all of its nodes are in extra, the first ones; else if
+   its group is listed. */
+static PetscBool Takes(HycoMesh m, PetscInt facet, PetscInt n_extra, PetscInt n_all, const PetscInt all_facets[])
+{
+  PetscBool take = (PetscBool)(n_all == ALL_BETWEEN);
+
+  for (PetscInt v = 0; take && v < m->nf; v++) take = (PetscBool)(m->facets[facet * m->nf + v] < n_extra);
+  for (PetscInt k = 0; k < n_all; k++) take = (PetscBool)(take || m->facet_group[facet] == all_facets[k]);
+  return take;
+}
+
+/* Facets that are taken and whose cell is not kept become points. */
 static PetscErrorCode Select(Cut *c, PetscInt n_keep, const PetscInt keep[], PetscInt n_extra, const PetscInt extra[],
                              PetscInt n_all, const PetscInt all_facets[])
 {
@@ -376,10 +398,8 @@ static PetscErrorCode Select(Cut *c, PetscInt n_keep, const PetscInt keep[], Pet
   for (PetscInt k = 0; k < n_keep; k++) c->cell_at[keep[k]] = k;
   PetscCall(PetscMalloc1(m->n_facets, &c->facet));
   for (PetscInt f = 0; f < m->n_facets; f++) {
-    PetscBool take = PETSC_FALSE;
-
-    for (PetscInt k = 0; k < n_all; k++) take = (PetscBool)(take || m->facet_group[f] == all_facets[k]);
-    if (take && (m->facet_cell[f] < 0 || c->cell_at[m->facet_cell[f]] < 0)) c->facet[c->n_facets++] = f;
+    if (m->facet_cell[f] >= 0 && c->cell_at[m->facet_cell[f]] >= 0) continue;
+    if (Takes(m, f, n_extra, n_all, all_facets)) c->facet[c->n_facets++] = f;
   }
   PetscCall(SelectNodes(c, n_extra, extra));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -407,7 +427,7 @@ static PetscErrorCode SetPoints(DM sub, const Cut *c)
   for (PetscInt f = 0; f < c->n_facets; f++) {
     const PetscInt cell = c->of->facet_cell[c->facet[f]];
 
-    point[n++] = cell < 0 ? c->of->facet_point[c->facet[f]] : CellPoint(c->of, cell);
+    point[n++] = cell >= 0 ? CellPoint(c->of, cell) : c->of->facet_point ? c->of->facet_point[c->facet[f]] : -1;
   }
   for (PetscInt i = 0; i < c->n_nodes; i++) point[n++] = NodePoint(c->of, c->node[i]);
   PetscCall(HycoSubmeshSetPoints(sub, n, point));
@@ -476,6 +496,44 @@ PetscErrorCode HycoSubmesh(HycoScene scene, HycoMesh of, PetscInt n_keep, const 
   ierr = Make(&cut, sub);
   PetscCall(CutDestroy(&cut));
   PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The facets of cells are kept with these, the others if all of their nodes are. */
+PetscErrorCode HycoSubmeshFirst(HycoScene scene, HycoMesh of, PetscInt n, HycoMesh *sub)
+{
+  PetscInt *first;
+  HycoMesh m;
+
+  PetscFunctionBegin;
+  PetscCall(Identity(PetscMax(n, of->n_cells), &first));
+  PetscCall(HycoSubmesh(scene, of, of->n_cells, first, n, first, ALL_BETWEEN, NULL, sub));
+  PetscCall(PetscFree(first));
+  m = *sub;
+  PetscCheck(m->n_nodes == n, PETSC_COMM_SELF, PETSC_ERR_PLIB, "%d nodes of %d", (int)m->n_nodes, (int)n);
+  m->n_whole_nodes = of->n_whole_nodes;
+  m->n_whole_cells = of->n_whole_cells;
+  m->whole_length = of->whole_length;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMeshCreateDM(HycoScene scene, HycoMesh m)
+{
+  Cut cut = {0};
+  PetscInt next = 0;
+  DM dm;
+
+  PetscFunctionBegin;
+  PetscCall(CutAll(m, &cut));
+  cut.scene = scene;
+  PetscCall(MakeDM(PETSC_COMM_SELF, &cut, &dm));
+  PetscCall(HycoMeshSetDM(m, dm));
+  PetscCall(Identity(m->n_cells, &m->cell_point));
+  PetscCall(PetscMalloc1(m->n_nodes, &m->node_point));
+  PetscCall(PetscMalloc1(m->n_facets, &m->facet_point));
+  for (PetscInt i = 0; i < m->n_nodes; i++) m->node_point[i] = cut.n_cells + cut.n_facets + i;
+  for (PetscInt f = 0; f < m->n_facets; f++) m->facet_point[f] = m->facet_cell[f] < 0 ? cut.n_cells + next++ : -1;
+  PetscCall(CutDestroy(&cut));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

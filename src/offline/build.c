@@ -18,9 +18,10 @@ static PetscErrorCode ReadMesh(HycoReducer t)
   PetscCall(HycoReducerColumn(t, 0, mu));
   PetscCall(HycoFOMCreateMesh(HycoComm(t), t->scene, &t->fom));
   f = t->fom;
-  HycoCheck(!t->scene->n_times || !f->searches,
-            "the scene has a history, and a map moves a contact surface (type surface); reduced models do not support "
-            "this: draw the bodies where the map puts them, use type pair, or solve at full order by hyco solve -mu");
+  HycoCheck(
+      !t->scene->n_times || !f->searches,
+      "the scene has a history, and a map moves a contact surface (type surface or mortar); reduced models do not "
+      "support this: draw the bodies where the map puts them, use type pair, or solve at full order by hyco solve -mu");
   for (PetscInt k = 0; k < t->n_groups; k++)
     HycoOnRoot(HycoComm(t), HycoMeshFindGroup(f->part, "hyco_rid_groups", t->groups[k], &group));
   t->sizes[0] = f->n_nodes;
@@ -49,8 +50,7 @@ static PetscErrorCode Meet(HycoReducer t, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The nodes outside the RID that belong to the model's mesh: those of every contact, for moved surfaces all; and the
-   groups of which it has all facets, whether or not it has their cells. By node of the contacts' surfaces. */
+/* Also the groups of which the model's mesh has all facets, whether or not it has their cells: all[3 n_contacts]. */
 static PetscErrorCode SurfacesOf(HycoReducer t, PetscBool contact[], PetscInt *n_all, PetscInt all[])
 {
   HycoMesh surface = t->fom->surface;
@@ -64,6 +64,17 @@ static PetscErrorCode SurfacesOf(HycoReducer t, PetscBool contact[], PetscInt *n
   }
   for (PetscInt k = 0; k < t->scene->n_contacts; k++)
     PetscCall(HycoMeshFindGroup(surface, "contact", t->scene->contact[k]->slave, &all[(*n_all)++]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerMarkContacts(HycoReducer t, PetscBool contact[])
+{
+  PetscInt *all, n_all;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(3 * t->scene->n_contacts, &all));
+  PetscCall(SurfacesOf(t, contact, &n_all, all));
+  PetscCall(PetscFree(all));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -768,8 +779,13 @@ PetscErrorCode HycoReducerCheckContacts(HycoReducer t, const HycoROM type)
   for (PetscInt k = 0; k < t->scene->n_contacts && !type->model->traits.integrals; k++)
     HycoCheckModel(!t->scene->contact[k]->integrated,
                    "contact %s has type %s, whose rows have more masters than a facet; a model of type %s does not "
-                   "take them: train one of type bodies, or use type: surface",
+                   "take them: train one of type bodies or hybrid, or use type: surface",
                    t->scene->contact[k]->name, ((PetscObject)t->scene->contact[k])->type_name, type->model->type);
+  for (PetscInt k = 0; k < t->scene->n_contacts && !type->model->traits.friction; k++)
+    HycoCheckModel(!t->scene->contact[k]->friction,
+                   "contact %s has friction, which a model of type %s does not represent: train one of type bodies, or "
+                   "use hyco solve",
+                   t->scene->contact[k]->name, type->model->type);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -21,6 +21,7 @@ typedef struct {
   PetscInt first[N_FIELDS], n[N_FIELDS];
   PetscReal *rows[N_FIELDS], *value[N_FIELDS]; /* these nodes or cells, then those of the mesh */
   PetscReal *lambda;
+  HycoShear shear; /* of the full-order solution */
 } Outputs;
 
 /* The cells that the outputs need; the reactions that follow from balance, with the cells of their loads (NULL: there
@@ -89,6 +90,7 @@ static PetscErrorCode Begin(Outputs *o)
 {
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(o->m->model->pairs.n, &o->lambda));
+  PetscCall(PetscCalloc2(3 * o->m->model->pairs.n, &o->shear.force, o->m->model->pairs.n, &o->shear.work));
   o->fe = HycoROMGetOutputCells(o->m);
   for (int k = 0; o->fe && k < N_FIELDS; k++) {
     const PetscInt *at, n = Places(o, k, &at);
@@ -108,8 +110,10 @@ static PetscErrorCode Begin(Outputs *o)
 static PetscErrorCode End(Outputs *o)
 {
   PetscFunctionBegin;
+  HycoTraceShow(o->m, o->m->trace.shown);
   for (int k = 0; k < N_FIELDS; k++) PetscCall(PetscFree2(o->rows[k], o->value[k]));
   PetscCall(PetscFree(o->lambda));
+  PetscCall(PetscFree2(o->shear.force, o->shear.work));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -128,6 +132,21 @@ static PetscErrorCode ReadField(Outputs *o, const PetscReal mu[], PetscInt step,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Gives the contacts the friction of the solution. */
+static PetscErrorCode ReadFriction(Outputs *o, const PetscReal mu[], PetscInt step)
+{
+  const PetscInt n = o->m->model->pairs.n;
+
+  PetscFunctionBegin;
+  if (!HycoSceneHasFriction(o->m->model->scene)) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt c = 0; c < HYCO_SNAPSHOT_FRICTION; c++) {
+    PetscCall(HycoSnapshotsReadRows(o->store, mu, step, HycoSnapshotFriction[c], 0, n, o->lambda));
+    for (PetscInt k = 0; k < n; k++) *(c < 3 ? o->shear.force + 3 * k + c : o->shear.work + k) = o->lambda[k];
+  }
+  HycoTraceShowOther(o->m, &o->shear);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The full-order outputs at mu, at listed time `step` of a history. */
 static PetscErrorCode MeasureStored(Outputs *o, const PetscReal mu[], PetscInt step, PetscReal value[])
 {
@@ -138,6 +157,7 @@ static PetscErrorCode MeasureStored(Outputs *o, const PetscReal mu[], PetscInt s
   PetscFunctionBegin;
   for (int k = 0; o->fe && k < (HycoSceneHasReactions(scene) ? N_FIELDS : REACTION); k++)
     PetscCall(ReadField(o, mu, step, k, &has[k]));
+  PetscCall(ReadFriction(o, mu, step));
   PetscCall(HycoSnapshotsReadRows(o->store, mu, step, "lambda", 0, o->m->model->pairs.n, o->lambda));
   HycoSceneSetTime(scene, mu, scene->n_times ? scene->times[step] : 0, all);
   PetscCall(HycoROMMeasureSolution(o->m, all, o->value[DISPLACEMENT], o->value[STRESS],

@@ -75,7 +75,7 @@ static PetscErrorCode SurfacesCreate(HycoScene scene, HycoMesh whole, const Hyco
   PetscFunctionBegin;
   PetscCall(PetscMemzero(s, sizeof(*s)));
   PetscCall(CutSurfaces(scene, whole, all, &s->mesh));
-  PetscCall(HycoFECreate(scene, s->mesh, &s->fe));
+  PetscCall(HycoFECreate(scene, s->mesh->dm, &s->fe));
   PetscCall(PetscMalloc1(s->mesh->n_nodes, &s->node));
   PetscCall(HycoSubmeshNodes(s->mesh, whole, s->node));
   PetscCall(PetscMalloc1(whole->n_nodes, &index));

@@ -64,10 +64,6 @@ PetscErrorCode HycoReducerCreate(MPI_Comm comm, HycoScene scene, HycoReducer *re
 {
   PetscFunctionBegin;
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
-  HycoCheck(
-      !HycoSceneHasFriction(scene),
-      "the scene has a contact with friction, of which there are no reduced models; use hyco solve, or remove the "
-      "contacts' friction");
   PetscCall(Create(comm, reducer));
   PetscCall(PetscObjectReference((PetscObject)scene));
   (*reducer)->scene = scene;
@@ -77,7 +73,7 @@ PetscErrorCode HycoReducerCreate(MPI_Comm comm, HycoScene scene, HycoReducer *re
     if (!scene->body[b].law->linear) (*reducer)->seed[HYCO_SEED_INELASTIC] = PETSC_TRUE;
   }
   PetscCall(PetscObjectSetOptions((PetscObject)*reducer, scene->options));
-  PetscCall(HycoReducerSetType(*reducer, HYCO_ROM_HYBRID));
+  PetscCall(HycoReducerSetType(*reducer, HycoSceneHasFriction(scene) ? HYCO_ROM_BODIES : HYCO_ROM_HYBRID));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -253,6 +253,8 @@ typedef struct {
   PetscInt slot;      /* of the last of these: number of its subinterval, counted from the path's start */
 } PathWriter;
 
+const char *const HycoSnapshotFriction[] = {"friction_x", "friction_y", "friction_z", "friction_work"};
+
 /* At most this number of steps between two listed times are stored, one in each of as many equal subintervals. */
 #define MOST_BETWEEN 5
 
@@ -294,6 +296,29 @@ static PetscErrorCode WriteReactions(HycoFOM fom, HycoH5 h, const char name[], P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Writes what outputs need of friction, a field for each component of the tangential force and one for the work.
+   Collective. */
+static PetscErrorCode WriteFriction(HycoFOM fom, PathWriter *w, PetscInt step)
+{
+  const HycoShear *shear = fom->pairs.shear;
+  PetscReal *value;
+  PetscErrorCode ierr = PETSC_SUCCESS;
+
+  PetscFunctionBegin;
+  if (!shear) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(fom->pairs.n + 1, &value));
+  for (PetscInt c = 0; c < HYCO_SNAPSHOT_FRICTION && !ierr; c++) {
+    char name[HYCO_LINE];
+
+    for (PetscInt k = 0; k < fom->pairs.n; k++) value[k] = c < 3 ? shear->force[3 * k + c] : shear->work[k];
+    NameField(w->s, step, HycoSnapshotFriction[c], name);
+    ierr = HycoContactsWrite(HycoComm(fom), w->h, name, &fom->pairs, fom->n_contacts, MPIU_REAL, value);
+  }
+  PetscCall(PetscFree(value));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* A HycoStepMonitor: writes the fields of a listed time. The forces are the internal forces f_int. */
 static PetscErrorCode WriteStep(HycoFOM fom, const HycoStep *step, void *ctx)
 {
@@ -319,6 +344,7 @@ static PetscErrorCode WriteStep(HycoFOM fom, const HycoStep *step, void *ctx)
   PetscCall(HycoFieldWrite(w->h, rows, fom->n_nodes, name, HYCO_ON_NODES, MPIU_REAL, dim, 1, w->force));
   NameField(w->s, step->index, "reaction", name);
   PetscCall(WriteReactions(fom, w->h, name, w->force));
+  PetscCall(WriteFriction(fom, w, step->index));
   NameField(w->s, step->index, "spring", name);
   PetscCall(WriteSprings(fom, w->h, name));
   NameField(w->s, step->index, "inelastic", name);

@@ -161,14 +161,30 @@ void HycoFieldName(const HycoField *field, PetscInt k, char name[HYCO_LINE])
   HycoFormat(name, "step-%04d/%s/%s", (int)k, field->place == HYCO_ON_CELLS ? "cells" : "nodes", field->name);
 }
 
+/* The attribute names of an existing dataset: those of the contacts in their order, with blanks between. */
+static PetscErrorCode NameContacts(HycoFieldFile f, const char set[])
+{
+  size_t length = 1, at = 0;
+  char *names;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < f->scene->n_contacts; k++) length += strlen(f->scene->contact[k]->name) + 1;
+  PetscCall(PetscCalloc1(length, &names));
+  for (PetscInt k = 0; k < f->scene->n_contacts; k++)
+    at += (size_t)snprintf(names + at, length - at, "%s%s", k ? " " : "", f->scene->contact[k]->name);
+  PetscCall(HycoH5WriteAttribute(f->h, set, "names", names));
+  PetscCall(PetscFree(names));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Writes the unit of a field, as given in the scene, and the names of its components, to an existing dataset. On one
    process. */
 static PetscErrorCode Describe(HycoFieldFile f, const char set[], const HycoField *field)
 {
-  static const char *const lengths[] = {"displacement", "gap", NULL}, *const forces[] = {"contact_force", NULL},
-                           *const stresses[] = {
-                               "stress",      "mises", "principal_stress", "contact_pressure", "nodal_stress",
-                               "nodal_mises", NULL};
+  static const char *const lengths[] = {"displacement", "gap", "contact_slip", NULL},
+                           *const forces[] = {"contact_force", NULL},
+                           *const stresses[] = {"stress",       "mises",       "principal_stress", "contact_pressure",
+                                                "nodal_stress", "nodal_mises", "contact_traction", NULL};
   const char *const *const kinds[3] = {lengths, forces, stresses};
 
   PetscFunctionBegin;
@@ -178,6 +194,7 @@ static PetscErrorCode Describe(HycoFieldFile f, const char set[], const HycoFiel
         PetscCall(HycoH5WriteAttribute(f->h, set, "unit", f->scene->unit[kind]));
     }
   }
+  if (!strcmp(field->name, "contact")) PetscCall(NameContacts(f, set));
   if (!strcmp(field->name, "principal_stress"))
     PetscCall(HycoH5WriteAttribute(f->h, set, "components", "1 2 3"));
   else if (field->components == 3)

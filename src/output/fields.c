@@ -119,7 +119,7 @@ static PetscErrorCode FillContacts(HycoFE fe, HycoPairs *pairs, const PetscReal 
                                    HycoContactFields *f)
 {
   PetscFunctionBegin;
-  for (PetscInt i = 0; i < fe->mesh->n_nodes; i++) f->gap_node[i] = NAN;
+  for (PetscInt i = 0; i < fe->mesh->n_nodes; i++) f->gap_node[i] = f->which[i] = NAN;
   PetscCall(HycoContactGeometry(fe, pairs, f->normal, f->gap));
   PetscCall(HycoContactAreas(fe, pairs, f->area));
   for (PetscInt k = 0; k < pairs->n; k++) {
@@ -142,6 +142,7 @@ static PetscErrorCode FillContacts(HycoFE fe, HycoPairs *pairs, const PetscReal 
     if (HycoPairsAlone(fe->scene, pairs, k)) f->gap[k] = NAN;
     if (!(f->gap_node[s] <= f->gap[k])) /* for a node in several contacts the smallest */
       f->gap_node[s] = f->gap[k];
+    if (!(f->which[s] <= pairs->contact[k])) f->which[s] = pairs->contact[k];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -175,7 +176,7 @@ PetscErrorCode HycoContactFieldsCreate(MPI_Comm comm, HycoFE surface, HycoPairs 
   PetscFunctionBegin;
   f->rubs = (PetscBool)(pairs->shear != NULL);
   f->traction = f->slip = f->state = NULL;
-  PetscCall(PetscCalloc3(3 * n, &f->force, n, &f->pressure, n, &f->gap_node));
+  PetscCall(PetscCalloc4(3 * n, &f->force, n, &f->pressure, n, &f->gap_node, n, &f->which));
   PetscCall(PetscCalloc4(pairs->n, &f->gap, 3 * pairs->n, &f->normal, pairs->n, &f->area, pairs->n, &f->slave_id));
   PetscCall(PetscMalloc1(pairs->n, &f->pressure_of));
   HycoOnEach(comm, FillContacts(surface, pairs, u, lambda, f));
@@ -210,6 +211,21 @@ static PetscErrorCode Combine(PetscSF to_owner, PetscSF to_part, HycoMesh part, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The smallest values, not a number where there is none: it cannot be compared. */
+static PetscErrorCode CombineLeast(PetscSF to_owner, PetscSF to_part, HycoMesh part, PetscInt n, PetscReal value[],
+                                   PetscReal at_part[])
+{
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < n; i++) {
+    if (!(PetscAbsReal(value[i]) < PETSC_MAX_REAL)) value[i] = PETSC_MAX_REAL;
+  }
+  PetscCall(Combine(to_owner, to_part, part, n, 1, MPI_MIN, PETSC_MAX_REAL, value, at_part));
+  for (PetscInt i = 0; i < part->n_nodes; i++) {
+    if (at_part[i] >= PETSC_MAX_REAL) at_part[i] = NAN;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The same for what friction adds. */
 static PetscErrorCode FrictionToPart(PetscSF to_owner, PetscSF to_part, HycoMesh part, PetscInt n, HycoContactFields *f)
 {
@@ -230,29 +246,26 @@ static PetscErrorCode FrictionToPart(PetscSF to_owner, PetscSF to_part, HycoMesh
 /* From the nodes of each rank's surface to those of its part: a node may be in contacts of several ranks. */
 static PetscErrorCode ToPart(MPI_Comm comm, HycoMesh part, HycoMesh surface, HycoContactFields *f)
 {
-  PetscReal *force, *pressure, *gap;
+  PetscReal *force, *pressure, *gap, *which;
   PetscSF to_owner, to_part;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc3(3 * part->n_nodes, &force, part->n_nodes, &pressure, part->n_nodes, &gap));
+  PetscCall(
+      PetscMalloc4(3 * part->n_nodes, &force, part->n_nodes, &pressure, part->n_nodes, &gap, part->n_nodes, &which));
   PetscCall(HycoMeshNodeSF(comm, part, surface->n_nodes, surface->node_global, &to_owner));
   PetscCall(HycoMeshNodeSF(comm, part, part->n_nodes, part->node_global, &to_part));
-  for (PetscInt i = 0; i < surface->n_nodes; i++) { /* not a number cannot be compared */
-    if (!(PetscAbsReal(f->gap_node[i]) < PETSC_MAX_REAL)) f->gap_node[i] = PETSC_MAX_REAL;
-  }
   PetscCall(Combine(to_owner, to_part, part, surface->n_nodes, 3, MPI_SUM, 0, f->force, force));
   PetscCall(Combine(to_owner, to_part, part, surface->n_nodes, 1, MPI_MAX, 0, f->pressure, pressure));
-  PetscCall(Combine(to_owner, to_part, part, surface->n_nodes, 1, MPI_MIN, PETSC_MAX_REAL, f->gap_node, gap));
-  for (PetscInt i = 0; i < part->n_nodes; i++) {
-    if (gap[i] >= PETSC_MAX_REAL) gap[i] = NAN;
-  }
+  PetscCall(CombineLeast(to_owner, to_part, part, surface->n_nodes, f->gap_node, gap));
+  PetscCall(CombineLeast(to_owner, to_part, part, surface->n_nodes, f->which, which));
   if (f->rubs) PetscCall(FrictionToPart(to_owner, to_part, part, surface->n_nodes, f));
   PetscCall(PetscSFDestroy(&to_owner));
   PetscCall(PetscSFDestroy(&to_part));
-  PetscCall(PetscFree3(f->force, f->pressure, f->gap_node));
+  PetscCall(PetscFree4(f->force, f->pressure, f->gap_node, f->which));
   f->force = force;
   f->pressure = pressure;
   f->gap_node = gap;
+  f->which = which;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -272,7 +285,7 @@ PetscErrorCode HycoContactFieldsToPart(MPI_Comm comm, HycoFE fe, HycoMesh surfac
 PetscErrorCode HycoContactFieldsDestroy(HycoContactFields *f)
 {
   PetscFunctionBegin;
-  PetscCall(PetscFree3(f->force, f->pressure, f->gap_node));
+  PetscCall(PetscFree4(f->force, f->pressure, f->gap_node, f->which));
   PetscCall(PetscFree3(f->traction, f->slip, f->state));
   PetscCall(PetscFree4(f->gap, f->normal, f->area, f->slave_id));
   PetscCall(PetscFree(f->pressure_of));
@@ -384,13 +397,14 @@ static PetscErrorCode WriteContacts(HycoFieldFile file, const HycoSolution *s, c
 /* f: at the part's nodes. */
 static PetscErrorCode AddContactFields(HycoFieldFile file, const HycoSolution *s, const HycoContactFields *f)
 {
-  const HycoField field[3] = {{"contact_force", HYCO_ON_NODES, 3, f->force},
+  const HycoField field[4] = {{"contact_force", HYCO_ON_NODES, 3, f->force},
                               {"contact_pressure", HYCO_ON_NODES, 1, f->pressure},
-                              {"gap", HYCO_ON_NODES, 1, f->gap_node}};
+                              {"gap", HYCO_ON_NODES, 1, f->gap_node},
+                              {"contact", HYCO_ON_NODES, 1, f->which}};
 
   PetscFunctionBegin;
   if (!file->vtk && !file->most) PetscCall(WriteContacts(file, s, f));
-  for (PetscInt k = 0; k < 3; k++) PetscCall(HycoFieldFileAdd(file, &field[k]));
+  for (PetscInt k = 0; k < 4; k++) PetscCall(HycoFieldFileAdd(file, &field[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -278,13 +278,17 @@ static PetscErrorCode AddContacts(HycoFE fe, const HycoQuantity *q, const HycoCo
             axisymmetric   ? " in an axisymmetric scene"
             : fe->dim == 2 ? " in 2D; use z"
                            : " in 1D");
-  *value = contact ? 0 : NAN;
+  *value = !contact ? NAN : q->kind == HYCO_QUANTITY_PRESSURE_MIN ? PETSC_MAX_REAL : 0;
   for (PetscInt c = 0; contact && c < fe->scene->n_contacts; c++) {
     const HycoContactResult *r = &contact[c];
 
     if (q->contact && strcmp(q->contact, r->name)) continue;
     if (q->kind == HYCO_QUANTITY_PRESSURE)
       *value = PetscMax(*value, r->pressure);
+    else if (q->kind == HYCO_QUANTITY_PRESSURE_MIN)
+      *value = PetscMin(*value, r->pressure_min);
+    else if (q->kind == HYCO_QUANTITY_AREA)
+      *value += r->area;
     else if (q->kind == HYCO_QUANTITY_FRICTION)
       *value += q->field == HYCO_FRICTION_WORK ? r->friction_work : r->friction[q->field];
     else

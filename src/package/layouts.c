@@ -14,6 +14,7 @@
       char *: 'S',                                                                                                     \
       const char *: 'z',                                                                                               \
       const PetscReal *: 'p',                                                                                          \
+      const PetscBool *: 'p',                                                                                          \
       const HycoStep *: 'p',                                                                                           \
       default: 'i')
 #define ITEM(x) _Generic((x), PetscReal *: sizeof(PetscReal), char *: sizeof(char), default: sizeof(x))
@@ -41,7 +42,8 @@ static const HycoMember step[] = {
 
 #define F(member) FIELD(HycoHistory, member)
 static const HycoMember history[] = {
-  F(n), F(step), F(ended), F(t), F(why), F(newton), F(factor_cost), F(n_orders), F(order), F(n_taken), F(taken)};
+  F(n), F(step), F(ended), F(t), F(why), F(newton), F(factor_cost), F(n_orders), F(order), F(n_taken), F(taken),
+  F(n_bound)};
 #undef F
 
 #define F(member) FIELD(HycoReaction, member)
@@ -51,7 +53,8 @@ static const HycoMember reaction[] = {
 
 #define F(member) FIELD(HycoContactResult, member)
 static const HycoMember contact_result[] = {
-  F(name), F(n), F(n_active), F(force), F(moment), F(area), F(pressure), F(friction), F(friction_work)};
+  F(name), F(n), F(n_active), F(force), F(moment), F(area), F(pressure), F(friction), F(friction_work),
+  F(pressure_min)};
 #undef F
 
 #define F(member) FIELD(HycoPrediction, member)
@@ -65,6 +68,11 @@ static const HycoMember prediction[] = {
   F(unseen_feature), F(beyond), F(gives_forces), F(interpolation_error), F(kkt.stationarity), F(kkt.penetration),
   F(kkt.adhesion), F(kkt.complementarity), F(kkt.rounding), F(method), F(reason), F(seconds.setup),
   F(seconds.assemble), F(seconds.factor), F(seconds.solve), F(seconds.total), F(n_dependent)};
+#undef F
+
+#define F(member) FIELD(HycoGradient, member)
+static const HycoMember gradient[] = {
+  F(n_outputs), F(n_parameters), F(n_undecided), F(value), F(kink)};
 #undef F
 
 #define F(member) FIELD(HycoTraining, member)
@@ -88,9 +96,11 @@ static const struct {
     STRUCT(HycoReaction, reaction),
     STRUCT(HycoContactResult, contact_result),
     STRUCT(HycoPrediction, prediction),
+    STRUCT(HycoGradient, gradient),
     STRUCT(HycoTraining, training),
     {"PetscInt", sizeof(PetscInt), 0, NULL},
     {"PetscReal", sizeof(PetscReal), 0, NULL},
+    {"PetscBool", sizeof(PetscBool), 0, NULL},
     {"MPI_Comm", sizeof(MPI_Comm), 0, NULL},
 };
 

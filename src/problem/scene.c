@@ -15,9 +15,9 @@ static const char *const component_fields[] = {"x", "y", "z", NULL};
 static const char *const fixed_fields[] = {"x", "y", "z", "normal", "direction_x", "direction_y", "direction_z", NULL};
 static const char *const spring_fields[] = {"x", "y", "z", "normal", NULL};
 static const char *const contact_fields[] = {"type", NULL};
-static const char *const tie_fields[] = {"slave", "master", "tolerance", NULL};
+static const char *const tie_fields[] = {"slave", "master", "tolerance", "method", NULL};
 static const char *const output_fields[] = {"max",    "min",      "mean",  "reaction", "force",
-                                            "moment", "friction", "group", "contact",  NULL};
+                                            "moment", "friction", "area", "group", "contact",  NULL};
 static const char *const scene_fields[] = {"title",       "mesh",       "parameters",  "refine", "formulation",
                                            "unit_length", "unit_force", "unit_stress", NULL};
 static const char *const parameter_fields[] = {"range", "unit", "title", NULL};

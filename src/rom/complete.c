@@ -36,14 +36,11 @@ PetscErrorCode HycoRowsDestroy(HycoRows *rows)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Creates mesh without its cells: their materials are not needed. */
+/* Creates fe_beyond without the mesh's cells: their materials are not needed. */
 static PetscErrorCode CreateBeyond(HycoROM m)
 {
   PetscFunctionBegin;
-  PetscCall(PetscNew(&m->beyond));
-  *m->beyond = *m->model->mesh;
-  m->beyond->n_cells = 0;
-  PetscCall(HycoFECreate(m->model->scene, m->beyond, &m->fe_beyond));
+  PetscCall(HycoFECreateSurface(m->model->scene, m->model->mesh->dm, &m->fe_beyond));
   PetscCall(HycoRowsCreate(&m->model->pairs, m->model->mesh->dim, &m->rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -93,7 +90,7 @@ PetscErrorCode HycoROMBringContacts(HycoROM m, HycoFE *fe)
   PetscFunctionBegin;
   *fe = m->fe;
   if (m->fe->mesh == m->model->mesh) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!m->beyond) PetscCall(CreateBeyond(m));
+  if (!m->fe_beyond) PetscCall(CreateBeyond(m));
   if (!m->beyond_current) PetscCall(BringRows(m, m->fe_beyond, m->fe->mu));
   *fe = m->fe_beyond;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -89,6 +89,9 @@ PetscErrorCode HycoROMSumContacts(HycoROM m, const PetscReal Lambda[], const Hyc
   PetscCall(HycoContactPressures(PETSC_COMM_SELF, fe, &m->model->pairs, m->carried->area, Lambda, pressure));
   HycoContactResults(fe, &m->model->pairs, m->carried->normal, m->carried->area, Lambda, pressure, least,
                      m->carried->result);
+  for (PetscInt c = 0; c < m->model->scene->n_contacts; c++) {
+    if (!m->carried->result[c].n) m->carried->result[c].pressure_min = 0;
+  }
   PetscCall(PetscFree(pressure));
   *result = m->carried->result;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -107,7 +110,8 @@ PetscErrorCode HycoROMPushBodies(HycoROM m, const PetscReal Lambda[], const Pets
   PetscCall(Prepare(m, Lambda, &fe, &least));
   *force = 0;
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
-    const PetscReal along = Lambda[k] * m->carried->normal[3 * k + axis];
+    const HycoShear *shear = m->model->pairs.shear;
+    const PetscReal along = Lambda[k] * m->carried->normal[3 * k + axis] - (shear ? shear->force[3 * k + axis] : 0);
 
     if (Lambda[k] <= least || HycoPairsAlone(m->model->scene, &m->model->pairs, k)) continue;
     if (of[body[m->model->pairs.slave[k]]]) *force -= along;
@@ -122,6 +126,7 @@ PetscErrorCode HycoROMGetContacts(HycoROM m, PetscInt *n, const HycoContactResul
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
   PetscCheck(m->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoROMPredict() before HycoROMGetContacts()");
+  HycoTraceShow(m, m->trace.shown);
   PetscCall(HycoROMSumContacts(m, m->Lambda, result));
   *n = *result ? m->model->scene->n_contacts : 0;
   PetscFunctionReturn(PETSC_SUCCESS);

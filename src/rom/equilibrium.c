@@ -103,6 +103,25 @@ static PetscErrorCode Factor(HycoROM m, HycoBalance b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Subtracts the tangential forces of friction on the slaves, and adds those on the masters. */
+static void AddFriction(HycoROM m, PetscReal f[])
+{
+  const HycoPairs *pairs = &m->model->whole_pairs;
+  const PetscInt dim = m->fe_whole->dim, *master;
+  const PetscReal *weight;
+  PetscInt n;
+
+  for (PetscInt k = 0; k < pairs->n; k++) {
+    HycoPairsMasters(pairs, k, &n, &master, &weight);
+    for (PetscInt c = 0; c < dim; c++) {
+      const PetscReal force = pairs->shear->force[3 * k + c];
+
+      f[pairs->slave[k] * dim + c] -= force;
+      for (PetscInt j = 0; j < n; j++) f[master[j] * dim + c] += weight[j] * force;
+    }
+  }
+}
+
 /* Adds B^T L to f, and stores the gaps and the displacements at the contacts, for listed time j. */
 static void AddContact(HycoROM m, HycoBalance b, PetscInt j, PetscReal f[])
 {
@@ -138,6 +157,8 @@ static PetscErrorCode MeasureTime(HycoROM m, HycoBalance b, HycoReplay *replay, 
   PetscCall(VecGetArray(b->r, &r));
   for (PetscInt k = 0; k < fe->n_dof; k++) r[k] = replay->march.f_int[k] - b->load[k];
   AddContact(m, b, j, r);
+  HycoTraceShow(m, j);
+  if (m->model->whole_pairs.shear) AddFriction(m, r);
   for (PetscInt k = 0; k < fe->n_dof; k++) r[k] = fe->fixed[k] ? 0 : r[k];
   PetscCall(VecRestoreArray(b->r, &r));
   PetscCall(KSPSolve(b->ksp, b->r, b->x));

@@ -274,10 +274,11 @@ static PetscBool IsInconsistent(HycoROM m, PetscReal inconsistency)
 }
 
 /* A formula fitted to few points may grow or fall without measure between them: in regimes that held-out points had, no
-   more than a multiple of their largest error, and no less than a share of it. */
+   more than a multiple of their largest error, and no less than a share of it, so that an error as large as one that was
+   seen is within five estimates. */
 #define MOST_OVER  3
 #define MANY       20.
-#define MOST_UNDER 30
+#define MOST_UNDER 5
 
 static PetscReal Clamped(PetscReal estimate, PetscReal largest)
 {

@@ -77,6 +77,7 @@ PetscErrorCode HycoFloatingMove(HycoH5 h, HycoROM m)
   if (reads ? !HycoH5Has(h, "floating/mesh/head") : !f->mesh) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoMeshMove(h, "floating/mesh", f->n_bodies, &f->mesh));
   if (reads) PetscCall(HycoMeshSetTies(f->mesh, m->model->mesh->ties));
+  if (reads) PetscCall(HycoMeshCreateDM(m->model->scene, f->mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -96,7 +97,7 @@ static PetscErrorCode LoadWork(HycoROM m, HycoFloating f, const PetscReal mu[], 
   PetscFunctionBegin;
   PetscCall(PetscArrayzero(work, f->n));
   if (!f->mesh) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!m->fe_floating) PetscCall(HycoFECreate(m->model->scene, f->mesh, &m->fe_floating));
+  if (!m->fe_floating) PetscCall(HycoFECreate(m->model->scene, f->mesh->dm, &m->fe_floating));
   PetscCall(HycoFESetParameters(m->fe_floating, mu));
   PetscCall(PetscMalloc1(m->fe_floating->n_dof, &load));
   ierr = HycoFELoads(m->fe_floating, load);

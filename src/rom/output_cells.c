@@ -11,12 +11,11 @@
 struct _n_HycoOutputCells {
   HycoMesh mesh; /* with these cells */
   HycoFE fe;
-  PetscReal *V, *u, *sigma; /* n_dof x l; n_dof; n_cells x n_sigma */
-  PetscInt *fe_at;          /* by full-order displacement: its index in u; -1: none */
-  PetscReal *reaction;      /* n_dof, of supports; NULL: no quantity needs them */
-  PetscInt *surface_node;   /* by node: its number on `surface`; -1: in no contact. Allocated with reaction */
-  HycoMesh surface;         /* the model's mesh without cells; NULL until needed */
-  HycoFE fe_surface;
+  PetscReal *V, *u, *sigma;  /* n_dof x l; n_dof; n_cells x n_sigma */
+  PetscInt *fe_at;           /* by full-order displacement: its index in u; -1: none */
+  PetscReal *reaction;       /* n_dof, of supports; NULL: no quantity needs them */
+  PetscInt *surface_node;    /* by node: its number on fe_surface; -1: in no contact. Allocated with reaction */
+  HycoFE fe_surface;         /* on the model's mesh without its cells; NULL until needed */
   HycoResultants resultants; /* of the reactions that follow from balance; NULL: there are no reactions */
 };
 
@@ -29,7 +28,7 @@ PetscErrorCode HycoOutputCellsDestroy(HycoOutputCells *cells)
   PetscCall(HycoResultantsDestroy(&(*cells)->resultants));
   PetscCall(HycoMeshDestroy(&(*cells)->mesh));
   HycoFreeAll(&(*cells)->V, &(*cells)->u, &(*cells)->sigma, &(*cells)->fe_at, &(*cells)->reaction,
-              &(*cells)->surface_node, &(*cells)->surface);
+              &(*cells)->surface_node);
   PetscCall(PetscFree(*cells));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -60,11 +59,7 @@ static PetscErrorCode MakeSurface(HycoROM m, HycoOutputCells p)
 {
   PetscFunctionBegin;
   if (p->fe_surface) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscFree(p->surface)); /* of an attempt that failed */
-  PetscCall(PetscNew(&p->surface));
-  *p->surface = *m->model->mesh;
-  p->surface->n_cells = 0;
-  PetscCall(HycoFECreate(m->model->scene, p->surface, &p->fe_surface));
+  PetscCall(HycoFECreateSurface(m->model->scene, m->model->mesh->dm, &p->fe_surface));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -148,7 +143,7 @@ static PetscErrorCode Fill(HycoROM m, HycoOutputCells p)
   PetscInt *place;
 
   PetscFunctionBegin;
-  PetscCall(HycoFECreate(m->model->scene, p->mesh, &p->fe));
+  PetscCall(HycoFECreate(m->model->scene, p->mesh->dm, &p->fe));
   PetscCall(PetscMalloc1(p->fe->n_dof, &p->u));
   PetscCall(PetscMalloc1(p->mesh->n_cells * p->fe->n_sigma, &p->sigma));
   PetscCall(PetscMalloc1(m->model->n_fe, &p->fe_at));
@@ -190,9 +185,10 @@ static PetscErrorCode Measure(HycoROM m, HycoOutputCells p, const PetscReal Lamb
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Forces of all contacts at a listed time of the path. */
+/* Forces of all contacts at a listed time of the path, whose friction they have. */
 static const PetscReal *ForcesAt(HycoROM m, PetscInt listed)
 {
+  HycoTraceShow(m, listed);
   return m->trace.Lambda + (size_t)listed * (size_t)m->model->pairs.n;
 }
 
@@ -231,7 +227,8 @@ static void CollectPath(HycoROM m, HycoPrediction *out)
   const HycoTrace *trace = &m->trace;
 
   for (PetscInt q = 0; q < m->model->scene->n_quantities; q++) {
-    const PetscBool least = (PetscBool)(m->model->scene->quantity[q].kind == HYCO_QUANTITY_MIN);
+    const HycoQuantityKind kind = m->model->scene->quantity[q].kind;
+    const PetscBool least = (PetscBool)(kind == HYCO_QUANTITY_MIN || kind == HYCO_QUANTITY_PRESSURE_MIN);
     PetscReal *most = &out->path_quantity[q];
 
     out->quantity[q] = trace->step[trace->shown].quantity[q];

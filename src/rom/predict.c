@@ -19,7 +19,7 @@ PetscErrorCode HycoROMSetUpFields(HycoROM m)
 PetscErrorCode HycoROMSetUpDefault(HycoROM m)
 {
   PetscFunctionBegin;
-  PetscCall(HycoFECreate(m->model->scene, m->model->mesh, &m->fe));
+  PetscCall(HycoFECreate(m->model->scene, m->model->mesh->dm, &m->fe));
   m->n = m->model->l;
   m->m = m->n_L = m->model->pairs.n;
   m->spread = PETSC_TRUE;
@@ -120,7 +120,6 @@ PetscErrorCode HycoROMReset(HycoROM m)
   PetscCall(HycoFEDestroy(&m->fe_floating));
   PetscCall(HycoSolverDestroy(&m->solver));
   PetscCall(HycoFEDestroy(&m->fe_beyond));
-  PetscCall(PetscFree(m->beyond));
   PetscCall(HycoRowsDestroy(&m->rows));
   PetscCall(HycoFEDestroy(&m->fe));
   m->of_fe = NULL;

@@ -79,12 +79,14 @@ static PetscErrorCode WriteTimes(HycoReplay *r, HycoSeries series)
   HycoSeriesSource from = Look(r, 0);
 
   PetscFunctionBegin;
+  HycoTraceShow(m, 0);
   PetscCall(HycoSeriesOpen(series, &from));
   for (PetscInt k = 0, j = 0; k < m->trace.n; k++) {
     PetscCall(HycoReplayMove(r, k));
     HycoTraceWholeU(m, k, m->U_whole);
     PetscCall(HycoReplayStep(r, k, m->U_whole));
     if (j == m->trace.n_listed || m->trace.at[j] != k) continue;
+    HycoTraceShow(m, j);
     from = Look(r, j++);
     PetscCall(HycoSeriesAddTime(series, &from));
   }

@@ -78,7 +78,7 @@ PetscErrorCode HycoResultantsCreate(HycoROM m, PetscBool balanced[], HycoMesh lo
   r = *resultants;
   r->balanced = balanced;
   r->mesh = loaded;
-  ierr = HycoFECreate(m->model->scene, loaded, &r->fe);
+  ierr = HycoFECreate(m->model->scene, loaded->dm, &r->fe);
   if (!ierr) PetscCall(PetscMalloc1(r->fe->n_dof, &r->load));
   if (!ierr) ierr = FindPushed(m, r);
   if (ierr) PetscCall(HycoResultantsDestroy(resultants));

@@ -1,5 +1,6 @@
 /* HycoROM: creation, access, destruction. */
 #include <hycofields.h>
+#include <hycogradient.h>
 #include <hycoromimpl.h>
 #include <hycoromtypes.h>
 #include <petscviewer.h>
@@ -139,6 +140,7 @@ PetscErrorCode HycoROMDestroy(HycoROM *model)
   HycoDestroyBegin(model, HYCO_ROM_CLASSID);
   PetscCall(HycoROMReset(*model));
   PetscCall(HycoBalanceDestroy(&(*model)->balance));
+  PetscCall(HycoGradientDestroy(&(*model)->gradient));
   PetscCall(HycoROMFreeWhole(*model));
   PetscCall(DestroyModel(*model));
   PetscCall(PetscHeaderDestroy(model));

@@ -421,6 +421,7 @@ static PetscErrorCode MoveProblem(HycoH5 h, HycoROM m)
   PetscCall(HycoH5Int(h, "mesh/node_whole", 0, m->model->whole_nodes - 1, nodes, 1, &m->model->mesh->node_whole));
   PetscCall(HycoH5Int(h, "mesh/cell_whole", 0, m->model->whole_cells - 1, &m->model->mesh->n_cells, 1,
                       &m->model->mesh->cell_whole));
+  if (HycoH5Reads(h)) PetscCall(HycoMeshCreateDM(m->model->scene, m->model->mesh));
   PetscCall(MoveDomain(h, m));
   PetscCall(MovePairs(h, *nodes, m->model->scene->n_contacts, &m->model->pairs));
   PetscCall(HycoH5Int(h, "problem/in_rid", 0, 1, &m->model->pairs.n, 1, &m->model->in_rid));

@@ -9,7 +9,9 @@ PetscErrorCode HycoTraceFree(HycoROM m)
   const HycoTrace empty = {.n_given = r->n_given, .given = r->given, .most_cuts = r->most_cuts};
 
   PetscFunctionBegin;
-  HycoFreeAll(&r->t, &r->gamma, &r->U_fe, &r->at, &r->Lambda, &r->sigma, &r->inelastic, &r->step);
+  if (m->model && m->model->pairs.shear == &r->seen) m->model->pairs.shear = NULL;
+  if (m->model && m->model->whole_pairs.shear == &r->seen) m->model->whole_pairs.shear = NULL;
+  HycoFreeAll(&r->t, &r->gamma, &r->U_fe, &r->at, &r->Lambda, &r->sigma, &r->inelastic, &r->shear, &r->step);
   *r = empty;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -28,6 +30,8 @@ PetscErrorCode HycoTraceBegin(HycoROM m)
   PetscCall(PetscMalloc1((size_t)(n_times + 1) * (size_t)m->model->pairs.n + 1, &r->Lambda));
   PetscCall(PetscMalloc1((size_t)(n_times + 1) * (size_t)(m->model->mesh->n_cells * m->fe->n_sigma) + 1, &r->sigma));
   PetscCall(PetscMalloc1((size_t)(n_times + 1) * (size_t)m->model->mesh->n_cells + 1, &r->inelastic));
+  if (HycoSceneHasFriction(m->model->scene))
+    PetscCall(PetscCalloc1((size_t)(n_times + 1) * (size_t)(8 * m->model->pairs.n) + 1, &r->shear));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -211,6 +215,7 @@ PetscErrorCode HycoROMSetStep(HycoROM m, PetscInt k)
   PetscCall(HycoROMExpand(m));
   for (PetscInt f = 0; f < m->model->n_fe; f++)
     m->U[m->model->fe_dof[f]] = r->U_fe[(size_t)at * (size_t)m->model->n_fe + (size_t)f];
+  HycoTraceShow(m, k);
   m->spread = PETSC_TRUE;
   m->whole_current = m->beyond_current = PETSC_FALSE;
   r->shown = k;

@@ -151,6 +151,7 @@ static PetscErrorCode LoadWholeMesh(HycoH5 h, HycoModel m, HycoMesh *whole)
   PetscFunctionBegin;
   PetscCall(HycoMeshMove(h, "whole", m->scene->n_bodies, whole));
   PetscCall(HycoMeshSetTies(*whole, m->mesh->ties));
+  PetscCall(HycoMeshCreateDM(m->scene, *whole));
   n_dof = (*whole)->n_nodes * (*whole)->dim;
   PetscCall(HycoH5Real(h, "whole/V", &n_dof, m->l, &m->V_whole));
   HycoCheck((*whole)->n_nodes == m->whole_nodes && (*whole)->n_cells == m->whole_cells, "%s: the whole mesh is damaged",
@@ -197,7 +198,7 @@ PetscErrorCode HycoROMLoadWhole(HycoROM m)
   if (m->U_whole) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(OpenWhole(m->model));
   PetscCall(HycoROMFreeWhole(m)); /* what a failed attempt has left */
-  PetscCall(HycoFECreate(m->model->scene, m->model->whole, &m->fe_whole));
+  PetscCall(HycoFECreate(m->model->scene, m->model->whole->dm, &m->fe_whole));
   PetscCall(PetscMalloc1((size_t)m->model->whole->n_nodes * (size_t)m->model->whole->dim, &m->U_whole));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -31,6 +31,18 @@ class Launch(Case):
             with self.subTest(name=name):
                 self.assertEqual(self.start('view', '-model', MODEL, **{name: value}).returncode, 0)
 
+    @unittest.skipUnless(hasattr(os, 'O_DIRECT'), 'needs pipes that keep what is written in one piece apart')
+    def test_one_piece(self):
+        """A line of stderr, however long, is written in one piece: of pieces, launchers lose some and ranks mix them up."""
+        reading, writing = os.pipe2(os.O_DIRECT)
+        run = subprocess.run([HYCO, 'view', '-model', 'a' * 200 + '.h5'], cwd=self.folder, stdout=subprocess.DEVNULL, stderr=writing, timeout=60 * PATIENCE)
+        os.close(writing)
+        line = os.read(reading, 65536).decode()
+        os.close(reading)
+        self.assertEqual(run.returncode, 1)
+        self.assertTrue(line.startswith('hyco: error: ') and line.endswith('\n'), line)
+        self.assertGreater(len(line), 200)
+
     COMMANDS = (('view', '-model', MODEL), ('predict', '-model', MODEL, *MU), ('solve', '-scene', ROPE, *MU))
 
     def noise(self, *before, command=COMMANDS[0], **environment):

@@ -1,5 +1,6 @@
 """scripts/plot: pictures of solutions in 1D, 2D and 3D, of a path and a study, with and without zoom: written, small, not blank; errors give one
 line."""
+import csv
 import os
 import subprocess
 import sys
@@ -41,6 +42,26 @@ class Plot(Case):
             self.assertLess(os.path.getsize(self.path(name)), 200000, args)
             with Image.open(self.path(name)) as picture:
                 self.assertGreater(len(picture.convert('RGB').getcolors(1 << 24)), 20, args)
+
+    def test_contacts(self):
+        """Contact nodes: a row for each slave in order along the surface, forces that add up to the report's; one line for each contact; named in refusals."""
+        report = self.hyco('solve', '-scene', os.path.join(EXAMPLES, 'blocks'), '-mu', '0.05,0.05', '-output', 'blocks.xdmf')
+        self.plot('contacts', 'blocks.h5', '-o', 'blocks.csv')
+        with open(self.path('blocks.csv'), encoding='utf-8') as f:
+            rows = list(csv.DictReader(f))
+        along = [float(row['along']) for row in rows]
+        self.assertEqual(along, sorted(along))
+        self.assertEqual({row['contact'] for row in rows}, {'under'})
+        self.assertEqual(len(rows), report['contacts']['under']['n'])
+        for axis, force in zip('xy', report['contacts']['under']['force']):
+            self.near(sum(float(row['force_' + axis]) for row in rows), force, 1e-9)
+        self.near(max(float(row['pressure']) for row in rows), report['contacts']['under']['pressure_max'], 1e-9)
+        self.assertEqual([float(row['pressure']) > 0 for row in rows], [float(row['gap']) < 1e-9 for row in rows])
+        for k, name in enumerate(('blocks.h5', 'pellet.h5')):
+            self.plot('contacts', name, '-o', f'c{k}.png')
+            self.assertGreater(os.path.getsize(self.path(f'c{k}.png')), 3000)
+        self.assertIn('contacts are under', self.plot('contacts', 'blocks.h5', '--contact', 'top', '-o', 'no.csv', status=1))
+        self.assertFalse(os.path.exists(self.path('no.csv')))
 
     def test_refused(self):
         """Fields, components and times that a file does not have are named."""

@@ -57,8 +57,9 @@ class Scale(Case):
         """Each rank searches for the masters of its slave nodes, one a node and position (as drawn, as moved), and on four ranks not on the whole master;
         the iterations are those of one rank. The upper block has 10 x 10 cells, cut into 20 x 20."""
         self.bench('scale', '--two', '8', '--ranks', '1,4')
-        one, four = self.rows('search')
+        one, four, mortar = self.rows('search')
         self.assertEqual((one['contacts'], four['contacts'], four['searches']), ('441', '441', '882'))
+        self.assertEqual((mortar['contacts'], mortar['ranks'], mortar['case'].split(', ')[1]), ('441', '1', 'mortar'))
         self.assertLessEqual(int(four['searches_rank']), 0.35 * 882)
         self.assertLess(int(four['facets_rank']), 0.8 * int(four['facets']))  # the finer the mesh, the fewer
         self.assertEqual(int(four['facets']), 16 * 16)

@@ -183,13 +183,11 @@ class Friction(Case):
         self.assertEqual(rows[3]['W'], rows[2]['W'])
 
     def test_refused(self):
-        """One line each: no history, a negative coefficient, reduced models, methods that do not know friction, a wrong output."""
+        """One line each: no history, a negative coefficient, methods that do not know friction, a wrong output."""
         times = 'history: {times: [0, 1, 2, 3], tables: {s: [[0, 0], [1, 0], [2, 1], [3, -1]]}}\n'
-        parameter = ('mesh.msh}', 'mesh.msh, parameters: [q]}\nparameter: {q: {range: [0.1, 0.5]}}')
         for words, scene, args in (
                 (('contact_floor_friction', 'history'), self.pad('a.yaml', a=(times, ''), b=('"0.01*s"', '0'), c=('-0.004*min(t, 1)', '-0.004')), ['solve']),
                 (('contact_floor_friction is -0.1', '0 or more'), self.pad('b.yaml', mu='x - 0.1'), ['solve']),
-                (('friction', 'no reduced models'), self.pad('c.yaml', mu='q', a=parameter), ['train', '-grid', '2', '-model', self.path('m.h5')]),
                 (('use -hyco_solver_type semismooth',), self.pad('d.yaml'), ['solve', '-hyco_solver_type', 'lemke']),
                 (('output_T_friction',), self.pad('e.yaml', a=('T: {friction: x,', 'T: {friction: w,')), ['solve'])):
             run = self.run_raw(*args, '-scene', scene)

@@ -45,7 +45,8 @@ class Mortar(Case):
                 self.assertGreater(abs(found - forces).max(), 1e-3 * forces.max())
 
     def test_models(self):
-        """A model of bodies has the forces of full order; other types refuse by name."""
+        """A model of bodies has the forces of full order; hybrid models on a part of the mesh, whose contacts' masters are in it, and projection-based ones
+        have them at training points; regression takes them; other types refuse by name."""
         roller.mesh(self.path('moved.msh'), 2)
         scene, model = self.path('scene.yaml'), self.path('bodies.h5')
         roller.scene(scene, 'moved.msh', kind='mortar', **RANGES)
@@ -55,9 +56,21 @@ class Mortar(Case):
             found_u, found, _ = self.fields('predict', '-model', model, '-mu', mu)
             self.assertLess(abs(found - forces).max(), 1e-10 * forces.max())
             self.assertLess(abs(found_u - u).max(), 1e-4 * abs(u).max())  # away from contacts modes up to -hyco_bodies_pod_tol
-        for kind in ('hybrid', 'projection'):
+        points = ('-values_place', '-4,1.3,4', '-values_press', '0.3,1', '-values_modulus', '5,20')
+        for kind, more, bound in (('hybrid', ('-hyco_rid_layers', 1), 1e-9), ('projection', ('-hyco_dual', 'snapshots'), 1e-6), ('regression', (), 0.1)):
+            model = self.path(f'{kind}.h5')
+            report = self.hyco('train', '-scene', scene, '-model', model, *points, '-hyco_model_type', kind, '-hyco_pod_tol', '1e-18', *more)
+            if kind == 'hybrid':
+                self.assertLess(report['rid_fraction'], 0.9)
+            for mu in ('1.3,0.3,20', '4,1,5'):
+                u, forces, _ = self.fields('solve', '-scene', scene, '-mu', mu)
+                found_u, found, _ = self.fields('predict', '-model', model, '-mu', mu)
+                self.assertLess(abs(found_u - u).max(), bound * abs(u).max(), kind)
+                if kind == 'hybrid':
+                    self.assertLess(abs(found - forces).max(), bound * forces.max())
+        for kind in ('cubature',):
             self.refused('train', '-scene', scene, '-model', self.path('other.h5'), '-grid', '2,2,2', '-hyco_model_type', kind,
-                         texts=('contact under has type mortar', f'a model of type {kind} does not take them'))
+                         texts=('contact under has type mortar', f'a model of type {kind} does not take them', 'type: surface'))
 
     def test_check(self):
         """check names the contacts without a node opposite, and the type for these; a mortar has no such line."""

@@ -262,7 +262,7 @@ class Files(Case):
 
     def test_snapshots_of_another(self):
         """Solutions of other materials in the folder."""
-        run = self.run_raw('train', '-scene', ROPE, '-grid', '4,4', '-body_rope_young', '2*mu1+x', '-model', 'o.h5', '-hyco_snapshots', 'good.h5.snapshots')
+        run = self.run_raw('train', '-scene', ROPE, '-grid', '4,4', '-grid_type', 'centred', '-body_rope_young', '2*mu1+x', '-model', 'o.h5', '-hyco_snapshots', 'good.h5.snapshots')
         self.assertEqual(run.returncode, 1)
         self.assertIn('another scene', run.stderr)
         ROWS.add('snapshots of another scene in the folder; a model of another', 'refused')

@@ -47,14 +47,14 @@ class Ties(Case):
         grid.box(kind, [np.linspace(0, 1, m + 1)] * (dim - 1) + [np.linspace(1, 2, m + 1)], bend, 'high', {**sides, f'{last}0': 'under', f'{last}1': 'top'})
         return grid
 
-    def pulled(self, kind, n, m, p=1.5, E=200):
+    def pulled(self, kind, n, m, p=1.5, E=200, method=''):
         """The scene of uniaxial stress in a column, and its strain energy."""
         dim = KINDS[kind]
         last = 'xyz'[dim - 1]
         planes = ', '.join(f'{a}0: {{{a}: 0}}' for a in 'xyz'[:dim - 1])
         plane = ', formulation: plane_stress' if dim == 2 else ''
         text = (f'scene: {{mesh: mesh.msh{plane}}}\nbody: {{low: {{young: {E}, poisson: 0.3}}, high: {{young: {E}, poisson: 0.3}}}}\n'
-                f'fixed: {{{planes}, base: {{{last}: 0}}}}\npressure: {{top: {p}}}\ntie: {{glue: {{slave: under, master: over}}}}\n'
+                f'fixed: {{{planes}, base: {{{last}: 0}}}}\npressure: {{top: {p}}}\ntie: {{glue: {{slave: under, master: over{method}}}}}\n'
                 f'output: {{pull: {{reaction: {last}, group: base}}}}\n')
         return self.written(text, self.column(kind, n, m)), p * p * 2 / 2 / E
 
@@ -65,12 +65,33 @@ class Ties(Case):
             with self.subTest(kind=kind, n=n, m=m):
                 pulled_evenly(self, scene, energy, KINDS[kind], ranks, 1e-14)
 
+    def test_mean(self):
+        """Uniform stress is transmitted between meshes of any ratio; tied nodes on planes of symmetry follow their nearest points."""
+        for kind, n, m, ranks in (('quad4', 5, 7, 2), ('quad4', 10, 7, 0), ('tri3', 3, 2, 3), ('hex8', 2, 3, 2), ('hex8', 4, 3, 0), ('tet4', 3, 4, 3), ('tet4', 3, 2, 0)):
+            scene, energy = self.pulled(kind, n, m)
+            with self.subTest(kind=kind, n=n, m=m):
+                pulled_evenly(self, scene, energy, KINDS[kind], ranks, 1e-13)
+
+    def test_corners(self):
+        """A triangle all of whose nodes are on two planes of symmetry leaves its forces to the facets beside it."""
+        scene, energy = self.pulled('tet4', 3, 2)
+        grid = Grid()
+        for name, n, z, low, high in (('low', 3, 0, 'base', 'over'), ('high', 2, 1, 'under', 'top')):
+            grid.box('tet4', [np.linspace(0, 1, n + 1)] * 2 + [z + np.linspace(0, 1, n + 1)], lambda x: x, name,
+                     {'x1': 'x0', 'y0': 'y0', 'z0': low, 'z1': high})
+        with open(self.path('scene.yaml'), encoding='utf-8') as f:
+            text = f.read()
+        pulled = self.hyco('solve', '-scene', self.written(text, grid))
+        self.solved(pulled)
+        self.near(pulled['strain_energy'], energy, 1e-12)
+        self.near(pulled['outputs']['pull'], 1.5, 1e-12)
+
     def test_not_matching(self):
-        """Meshes of any ratio: resultants are exact, the energy's error is small and decreases with the facets."""
+        """Nearest points, meshes of any ratio: resultants are exact, the energy's error is small and decreases with the facets."""
         for kind, ranks in (('quad4', 2), ('hex8', 0)):
             errors = []
             for k in (1, 2):
-                scene, energy = self.pulled(kind, 3 * k, 4 * k)
+                scene, energy = self.pulled(kind, 3 * k, 4 * k, method=', method: collocation')
                 found = self.hyco('solve', '-scene', scene, ranks=ranks)
                 self.solved(found)
                 self.near(found['outputs']['pull'], 1.5, 1e-12)
@@ -104,7 +125,7 @@ class Ties(Case):
 
     def test_models(self):
         """Contact, loads, springs and weight across a tie, on one and two ranks, iteratively; every type of model against full order."""
-        scene = self.written(MODEL.replace('SLAVE', 'seam').replace('MASTER', 'edge'), self.blocks())
+        scene = self.written(MODEL.replace('SLAVE', 'seam').replace('MASTER', 'edge, method: collocation'), self.blocks())
         full = [self.hyco('solve', '-scene', scene, '-mu', '0.27,310', *more, ranks=ranks)
                 for ranks, more in ((0, ()), (2, ()), (3, ()), (2, ('-hyco_linear', 'iterative')))]
         for found in full:
@@ -170,6 +191,7 @@ class Ties(Case):
                            ('tie: {glue: {slave: under, master: nowhere}}', 'no group "nowhere"'), ('tie: {glue: {slave: under, mastre: over}}', 'a tie has: slave, master'),
                            ('tie: {glue: {slave: under, master: low}}', 'must be a group of dimension 1'), ('tie: {glue: {slave: top, master: over}}', '5 of the 5 nodes of top have no point'),
                            ('tie: {glue: {slave: under, master: over, tolerance: wide}}', 'must be a length'),
+                           ('tie: {glue: {slave: under, master: over, method: morta}}', 'must be mortar or collocation'),
                            (tie + 'fixed_under_x: 0', 'are not fixed in the same way'), (tie + 'fixed_under_normal: 0\nfixed_under_direction_x: 1', 'are not fixed in the same way'),
                            (tie + 'contact: {c: {group: under, normal: {x: 1}, gap: 1}}', 'do not have this contact'),
                            (tie + 'contact: {c: {type: surface, slave: over, master: under}}', 'exchange slave and master of the tie'),

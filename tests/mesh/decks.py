@@ -189,11 +189,11 @@ def flat_decks():
 
 
 class Decks(Case):
-    def convert(self, name, text, status=0, **more):
+    def convert(self, name, text, status=0, *options, **more):
         """The lines about what is not converted, and the folder of the scene."""
         with open(self.path(f'{name}.inp'), 'w', encoding='ascii') as file:
             file.write(text)
-        run = subprocess.run(['/usr/bin/python3', CONVERT, f'{name}.inp', '--scene', name], cwd=self.folder, capture_output=True, text=True, timeout=100 * PATIENCE,
+        run = subprocess.run(['/usr/bin/python3', CONVERT, f'{name}.inp', '--scene', name, *options], cwd=self.folder, capture_output=True, text=True, timeout=100 * PATIENCE,
                              check=False, **more)
         self.assertEqual(run.returncode, status, run.stdout + run.stderr)
         if status:
@@ -237,7 +237,7 @@ class Decks(Case):
 
     def same_as_flat(self, text, **more):
         """Solves a deck in the manner of CAE and the same blocks in a flat deck: one solution. What is not converted."""
-        left, folder = self.convert('cae', text, **more)
+        left, folder = self.convert('cae', text, 0, '--frictionless', **more)
         a, b = Box('A', 'C3D8', (0, 0, 0), (1, 1, 1), (4, 4, 4)), Box('B', 'C3D8', (0, 0, 1), (0.5, 0.5, 2), (3, 3, 4), 1001)
         _, flat = self.convert('flat', deck([a, b], pair('B_SZ0', 'A_SZ1') + SYMMETRY + 'A_Z0, 3, 3\n', [('', '*STATIC\n1., 1.\n*BOUNDARY\nB_Z1, 1, 2\nB_Z1, 3, 3, -0.002\n')]))
         s, expected = self.solve(folder), self.solve(flat)
@@ -248,8 +248,8 @@ class Decks(Case):
         return left
 
     def test_cae(self):
-        """Parts with Set-all, an instance that is moved and turned, sets and surfaces of the assembly, a coupled reference point, an included file; friction and
-        NLGEOM are listed once with their lines."""
+        """Parts with Set-all, an instance that is moved and turned, sets and surfaces of the assembly, a coupled reference point, an included file; friction left
+        out by --frictionless and NLGEOM are listed once with their lines."""
         low = Box('A', 'C3D8R', (0, 0, 0), (1, 1, 1), (4, 4, 4))
         tall = Box('B', 'C3D8R', (0, 0, 0), (0.5, 0.5, 1), (3, 3, 4))
         turned = Box('B', 'C3D8R', (0, 0, 0), (0.5, 0.5, 1), (3, 3, 4))
@@ -264,10 +264,10 @@ class Decks(Case):
         self.same_as_flat(CAE.format(low=low.mesh(True), high='*Include, input=high.txt\n', place='0., 0., 1.\n'))
 
     def test_draft(self):
-        """The draft itself: the friction stands beside its contact, entries that are not converted are comments with their lines, as printed."""
+        """The draft itself: with --frictionless the coefficient stands beside its contact, entries that are not converted are comments with their lines, as printed."""
         low, high = Box('A', 'C3D8R', (0, 0, 0), (1, 1, 1), (4, 4, 4)), Box('B', 'C3D8R', (0, 0, 0), (0.5, 0.5, 1), (3, 3, 4))
         text = CAE.format(low=low.mesh(True), high=high.mesh(True), place='0., 0., 1.\n').replace('*Step', '*Equation\n2\nBLOCK-1.1, 1, 1., BLOCK-1.2, 1, -1.\n*Spring, elset=none\n*Step')
-        left, folder = self.convert('draft', text)
+        left, folder = self.convert('draft', text, 0, '--frictionless')
         with open(os.path.join(folder, 'scene.yaml'), encoding='utf-8') as file:
             draft = file.read()
         for line in left:
@@ -281,6 +281,46 @@ class Decks(Case):
         self.assertIn('scene.yaml is there already', error)
         checked = self.run_raw('check', '-scene', folder)
         self.assertEqual(checked.returncode, 0, checked.stdout + checked.stderr)
+
+    def test_friction(self):
+        """*FRICTION of the interaction of a contact pair is friction of this contact, and the draft has a history: a block that is pressed and drawn slips with T = mu N.
+        Frictions that depend on something, or change in a step, are listed."""
+        a, b = Box('A', 'C3D8', (0, 0, 0), (1, 1, 1), (2, 2, 2)), Box('B', 'C3D8', (0.25, 0, 1), (0.75, 1, 2), (2, 2, 2), 1001)
+        rows = '*SURFACE INTERACTION, NAME=SMOOTH\n*SURFACE INTERACTION, NAME=ROUGH\n*FRICTION\n0.2, 1e5\n*CONTACT PAIR, INTERACTION=ROUGH\nB_SZ0, A_SZ1\n'
+        steps = [('', '*STATIC\n1., 1.\n*BOUNDARY\nB_Z1, 1, 2\nB_Z1, 3, 3, -0.002\n'), ('', '*STATIC\n1., 1.\n*BOUNDARY\nB_Z1, 1, 1, 0.05\n')]
+        hold = '*BOUNDARY\nA_Z0, 1, 3\n'
+        left, folder = self.convert('rubs', deck([a, b], rows + hold, steps))
+        self.assertEqual(left, [])
+        with open(os.path.join(folder, 'scene.yaml'), encoding='utf-8') as file:
+            draft = file.read()
+        self.assertRegex(draft, r'(?m)^  b_sz0_a_sz1: \{type: surface, .*, friction: 0.2\}$')
+        self.assertIn('--frictionless', draft)
+        found = self.hyco('solve', '-scene', folder)
+        force = found['contacts']['b_sz0_a_sz1']['force']
+        self.assertGreater(force[2], 1)
+        self.near(-force[0], 0.2 * force[2], 1e-6, 'T = mu N')
+        self.assertEqual(found['solver'], 'semismooth')
+        _, folder = self.convert('one', deck([a, b], rows + hold, steps[:1]))
+        self.assertGreater(self.hyco('solve', '-scene', folder)['contacts']['b_sz0_a_sz1']['force'][2], 1)  # one step: a history all the same
+        left, folder = self.convert('smooth', deck([a, b], rows.replace('INTERACTION=ROUGH', 'INTERACTION=SMOOTH') + hold, steps[:1]))
+        with open(os.path.join(folder, 'scene.yaml'), encoding='utf-8') as file:
+            self.assertNotRegex(file.read(), 'friction|history')
+        for given in ('*FRICTION, ROUGH\n', '*FRICTION\n0.2, , 10.\n0.3, , 20.\n', '*FRICTION, TAUMAX=5.\n0.2\n'):
+            shutil.rmtree(self.path('rubs'))
+            left, _ = self.convert('rubs', deck([a, b], rows.replace('*FRICTION\n0.2, 1e5\n', given) + hold, steps))
+            self.assertEqual(len([line for line in left if '*FRICTION' in line]), 1, given)
+
+    def test_second_order(self):
+        """Contact pairs of cells of second order become mortars, which are solved: a uniform pressure between meshes that do not match."""
+        a, b = Box('A', 'C3D20', (0, 0, 0), (1, 1, 1), (2, 2, 1)).second(), Box('B', 'C3D20', (0, 0, 1), (1, 1, 2), (3, 3, 1), 1001).second()
+        text = deck([a, b], pair('B_SZ0', 'A_SZ1') + SYMMETRY + 'A_Z0, 3, 3\n', [('', '*STATIC\n1., 1.\n*DSLOAD\nB_SZ1, P, 300.\n')])
+        _, folder = self.convert('second', text)
+        with open(os.path.join(folder, 'scene.yaml'), encoding='utf-8') as file:
+            self.assertIn('type: mortar', file.read())
+        s = self.solve(folder)
+        self.near(s.total_contact_force, 300, 1e-10)
+        top = s.displacement[:, 2].min()
+        np.testing.assert_allclose(s.displacement[np.isclose(s.displacement[:, 2], top, rtol=1e-9), 2], -300 / 210000 * 2, rtol=1e-9)
 
     def test_loads(self):
         """Forces and pressures on single nodes and cells keep their values; several steps with amplitudes are a history; tied contact, clearance, shells, rigid

@@ -61,6 +61,69 @@ fixed: {{block_sym: {{x: 0}}, foundation_sym: {{x: 0}}, block_top: {{y: -press}}
 contact: {{under: {{type: pair, slave: block_under, master: foundation_top, tolerance: 0.1}}}}
 """
 
+LEAF = ("""scene:
+  title: a leaf over a bump at any place
+  mesh: leaf.msh
+  parameters: [load, place]
+parameter:
+  load: {range: [0.5, 2]}
+  place: {range: [2, 9]}
+body:
+  leaf: {young: 100, poisson: 0.3}
+fixed:
+  left: {x: 0, y: 0}
+pressure: {top: 0.001*load}
+contact:
+  bump: {type: obstacle, group: bottom, normal_y: -1, gap: "0.01 + 0.05*(x - place)^2"}
+""", """Point(1) = {0, 0, 0}; Point(2) = {10, 0, 0}; Point(3) = {10, 0.4, 0}; Point(4) = {0, 0.4, 0};
+Line(1) = {1, 2}; Line(2) = {2, 3}; Line(3) = {3, 4}; Line(4) = {4, 1}; Curve Loop(1) = {1:4}; Plane Surface(1) = {1};
+Transfinite Curve{1, 3} = 101; Transfinite Curve{2, 4} = 4; Transfinite Surface{1}; Recombine Surface{1};
+Physical Surface("leaf") = {1}; Physical Curve("bottom") = {1}; Physical Curve("top") = {3}; Physical Curve("left") = {4};
+""")
+PAD = ("""scene:
+  title: a pad that slides on the middle of a wide plate
+  mesh: pad.msh
+  parameters: [place, press]
+parameter:
+  place: {range: [-2, 2]}
+  press: {range: [0.01, 0.05]}
+body:
+  plate: {young: 1000, poisson: 0.3}
+  pad: {young: 100, poisson: 0.3, map: {x: x + place, z: "z + 0.01*(x^2 + y^2)"}}
+fixed:
+  base: {x: 0, y: 0, z: 0}
+  press: {x: 0, y: 0, z: -press}
+contact:
+  under: {type: surface, slave: sole, master: top}
+""", """SetFactory("OpenCASCADE"); Box(1) = {-12, -12, -1, 24, 24, 1}; Box(2) = {-1, -1, 0, 2, 2, 1};
+Transfinite Curve{:} = 25; Transfinite Curve{1, 3, 5, 7} = 2; Transfinite Curve{13:24} = 4; Transfinite Surface{:}; Recombine Surface{:};
+Transfinite Volume{:};
+Physical Volume("plate") = {1}; Physical Volume("pad") = {2}; Physical Surface("base") = {5}; Physical Surface("top") = {6};
+Physical Surface("sole") = {11}; Physical Surface("press") = {12};
+""")
+SHORT = ("""scene:
+  title: a short block on a long foundation
+  mesh: short.msh
+  parameters: [press]
+parameter:
+  press: {range: [0.01, 0.05]}
+body:
+  below: {young: 100, poisson: 0.3}
+  above: {young: 100, poisson: 0.3}
+fixed:
+  base: {x: 0, y: 0}
+  press: {x: 0, y: -press}
+contact:
+  under: {type: surface, slave: sole, master: top, tolerance: 0.01}
+""", """Point(1) = {-10, -4, 0}; Point(2) = {10, -4, 0}; Point(3) = {10, 0, 0}; Point(4) = {-10, 0, 0};
+Point(5) = {-1, 0, 0}; Point(6) = {1, 0, 0}; Point(7) = {1, 1, 0}; Point(8) = {-1, 1, 0};
+Line(1) = {1, 2}; Line(2) = {2, 3}; Line(3) = {3, 4}; Line(4) = {4, 1}; Line(5) = {5, 6}; Line(6) = {6, 7}; Line(7) = {7, 8}; Line(8) = {8, 5};
+Curve Loop(1) = {1:4}; Curve Loop(2) = {5:8}; Plane Surface(1) = {1}; Plane Surface(2) = {2};
+Transfinite Curve{1, 3} = 41; Transfinite Curve{2, 4} = 9; Transfinite Curve{5:8} = 5; Transfinite Surface{:}; Recombine Surface{:};
+Physical Surface("below") = {1}; Physical Surface("above") = {2}; Physical Curve("base") = {1}; Physical Curve("top") = {3};
+Physical Curve("sole") = {5}; Physical Curve("press") = {7};
+""")
+
 
 class Bodies(Case):
     @classmethod
@@ -116,6 +179,44 @@ class Bodies(Case):
         new, old = (self.hyco('predict', '-model', name, '-mu', '0.06,1.1,10.3') for name in ('new.h5', 'old.h5'))
         for name in ('rid_u_norm2', 'total_contact_force', 'rid_u_min', 'rid_u_max'):
             self.assertEqual(old[name], new[name], name)
+
+    def test_unmet_masters(self):
+        """A surface of which no slave meets the greater part: displacements there are right too, on the surface as inside."""
+        self.drawn('short', 2, SHORT[1], SHORT[0])
+        self.judge('short', ('-values_press', '0.017,0.042'), u=1e-6, model='short.h5')
+
+    def test_all_cells(self):
+        """An output that needs all cells: where all displacements are exact, stresses are, though samples touch few of the contacts."""
+        self.drawn('leaf', 2, LEAF[1], LEAF[0] + 'output: {bend: {max: sigma_xx, group: leaf}}\n')
+        c = self.judge('leaf', ('-scatter', '40'), options=('-hyco_bodies_samples', '20'), model='leaf.h5')
+        self.assertLess(c['error_sigma']['max'], 1e-6)
+
+    def test_reached(self):
+        """A pad that reaches a small part of a wide surface: the unknowns of the others are left out, forces stay those of full order, also at the ends
+        of the range; beyond it, where it meets others, a prediction is refused by the contact's name."""
+        self.drawn('pad', 3, PAD[1], PAD[0])
+        report = self.hyco('train', '-scene', 'pad', *TYPE, '-grid', '3,2', '-model', 'pad.h5')
+        self.assertLess(report['n_surface_unknowns'], 900)  # of 1875 + 48
+        c = self.hyco('compare', '-scene', 'pad', '-model', 'pad.h5', '-scatter', '20')
+        self.assertEqual(c['not_converged'], 0)
+        self.assertLess(c['error_lambda']['max'], 1e-9)
+        self.assertLess(c['error_u']['max'], 1e-3)
+        run = self.run_raw('predict', '-model', 'pad.h5', '-mu', '9,0.03', '-extrapolate')
+        self.assertNotEqual(run.returncode, 0)
+        self.assertIn('contact under', run.stderr)
+
+    def test_kept_rows(self):
+        """Rows that stay from one prediction to the next, while loads and moduli change, and rows that do not: a batch is what single predictions are."""
+        self.hyco('train', '-scene', self.write('kept.yaml', TURNED), *TYPE, '-scatter', '2', '-model', 'kept.h5')
+        points = ['1,0.3,7,0,1', '1,0.8,7,0,1', '1,0.8,19,0,1', '-2,0.8,19,0,1', '1,0.8,19,0,1', '1,0.8,19,9,1', '1,0.8,19,9,1.07', '1,0.21,6,9,1.07']
+        with open(self.path('kept.csv'), 'w', encoding='ascii') as f:
+            f.write('\n'.join(['place,press,modulus,turn,size', *points]) + '\n')
+        self.hyco('predict', '-model', 'kept.h5', '-points', 'kept.csv', '-table', 'batch.csv')
+        rows = np.genfromtxt(self.path('batch.csv'), delimiter=',', names=True)
+        for row, point in zip(rows, points):
+            one = self.hyco('predict', '-model', 'kept.h5', '-mu', point)
+            for name in ('total_contact_force', 'rid_u_norm2'):
+                self.near(row[name], one[name], 1e-7, point)  # of eight digits in a table
 
     def test_outputs(self):
         """Outputs on surfaces, of the hottest cell, and of supports beside a spring are those of full order with any modes; so are stresses."""

@@ -26,6 +26,8 @@ output:
   turn: {moment: z, contact: wall}
   peak: {max: contact_pressure, contact: floor}
   most: {max: contact_pressure}
+  seal: {min: contact_pressure, contact: floor}
+  touch: {area: closed, contact: floor}
 """
 OUTPUTS = {'weight': ('force', 'y'), 'peak': ('max', 'contact_pressure')}
 
@@ -38,7 +40,7 @@ def flat(contacts):
         values[f'{name}.n_active'] = c['n_active']
         values.update({f'{name}.force_{a}': v for a, v in zip('xyz', c['force'])})
         values.update({f'{name}.moment_{a}': v for a, v in zip('xyz'[3 - len(c['moment']):] if dim > 1 else '', c['moment'])} if dim > 1 else {})
-        values.update({f'{name}.area': c['area'], f'{name}.pressure_max': c['pressure_max']})
+        values.update({f'{name}.area': c['area'], f'{name}.pressure_max': c['pressure_max'], f'{name}.pressure_min': c['pressure_min']})
     return values
 
 
@@ -59,6 +61,7 @@ class Carried(Case):
                 if what in c:
                     np.testing.assert_allclose(found[name][what], c[what], atol=relative * np.abs(c[what]).max(), err_msg=what)
             self.near(found[name]['pressure_max'], c['pressure_max'], relative, 'pressure')
+            self.assertLessEqual(abs(found[name]['pressure_min'] - c['pressure_min']), relative * c['pressure_max'])
 
     def table(self, *args, ranks=0, name='t.csv'):
         self.hyco(*args, '-table', name, ranks=ranks)
@@ -127,8 +130,28 @@ class Carried(Case):
                 np.testing.assert_allclose(two[name], one[name], rtol=1e-7, atol=1e-12, err_msg=name)
                 np.testing.assert_allclose(h5[name], one[name], rtol=1e-7, atol=1e-12, err_msg=name)
                 np.testing.assert_allclose(one[name][1], value, rtol=1e-6, atol=1e-12, err_msg=name)
-            for name, column in (('lift', 'floor.force_y'), ('turn', 'wall.moment_z'), ('peak', 'floor.pressure_max')):
+            for name, column in (('lift', 'floor.force_y'), ('turn', 'wall.moment_z'), ('peak', 'floor.pressure_max'), ('seal', 'floor.pressure_min'), ('touch', 'floor.area')):
                 np.testing.assert_array_equal(one[name], one[column])
+
+    def test_seal(self):
+        """The smallest pressure of a contact and its closed area are those of its nodes, at full order on 1 to 3 ranks, and by a model of bodies, with estimates:
+        closed all over, and where a part is open."""
+        scene = ['-scene', BLOCKS, *'-output_seal_min contact_pressure -output_seal_contact under -output_touch_area closed'.split()]
+        self.hyco('train', *scene, '-hyco_validation', '10', '-model', 'seal.h5', '-hyco_model_type', 'bodies', '-grid', '3,3')
+        for mu, closed in (('0.02,0.08', True), ('0.05,0.05', False)):
+            runs = [self.hyco('solve', *scene, '-mu', mu, '-output', 'fields.xdmf', ranks=ranks) for ranks in (0, 3)] + [self.hyco('predict', '-model', 'seal.h5', '-mu', mu)]
+            with h5py.File(self.path('fields.h5')) as f:
+                slave = np.isfinite(f['nodes/contact'][:, 0])
+                least = f['nodes/contact_pressure'][:, 0][slave].min()
+            for found in runs:
+                c, out = found['contacts']['under'], found['outputs']
+                self.assertEqual((out['seal'], out['touch']), (c['pressure_min'], c['area']))
+                self.assertEqual((out['seal'] > 0, c['n_active'] == c['n']), (closed, closed))
+                self.assertLessEqual(abs(out['seal'] - least), 1e-8 * c['pressure_max'])
+                self.near(out['touch'], runs[0]['outputs']['touch'], 1e-9)
+            if closed:
+                self.near(runs[0]['outputs']['touch'], 20, 1e-5)  # the length of the underside, which is curved
+            self.assertIsNotNone(runs[-1]['estimated_error_outputs']['seal'])
 
     def test_not_reconstructed(self):
         """Without the forces outside the RID there is no resultant: no contacts in the report, nan in the table, null as an output."""
@@ -145,7 +168,7 @@ class Carried(Case):
         """Outputs with a wrong contact, group or quantity: the message lists the valid ones."""
         for outputs, said in (('{a: {force: y, contact: roof}}', 'the contacts of the scene are: '), ('{a: {force: y, group: low}}', 'write contact: NAME'),
                               ('{a: {max: mises, contact: wall}}', 'give a group instead'), ('{a: {force: z}}', 'no force along z'), ('{a: {moment: x}}', 'use z'),
-                              ('{a: {min: contact_pressure}}', 'only the largest'), ('{a: {force: up}}', 'one of x, y and z'), ('{a: {contact: wall}}', 'has no field')):
+                              ('{a: {mean: contact_pressure}}', 'min: contact_pressure'), ('{a: {area: open}}', 'closed'), ('{a: {force: up}}', 'one of x, y and z'), ('{a: {contact: wall}}', 'has no field')):
             for ranks in (0,) if outputs[4:7] != 'for' else (0, 2):
                 run = self.run_raw('solve', '-scene', self.corner('bad.yaml', f'output: {outputs}\n'), '-mu', '1,0', ranks=ranks)
                 with self.subTest(outputs=outputs, ranks=ranks):

@@ -12,6 +12,8 @@ from paths import HISTORY, J2, KINDS, NORTON, POINTS, SCENE, arrays
 BODIES = ['-hyco_model_type', 'bodies']
 # A core that moves and softens, elastic; a ring that creeps
 MOVED = [('core: {young: 1e5', 'core: {map: {x: x*(1 - push*1e-3), y: y*(1 - push*1e-3)}, young: 1e5*(1.5 - gap*60)')]
+# A ring that grows uniformly while its gap stays
+GROWN = [('ring: {', 'ring: {map: {x: x*(1 + push*1e-2), y: y*(1 + push*1e-2)}, '), ('core: {', 'core: {map: {x: x*(1 + push*1e-2), y: y*(1 + push*1e-2)}, ')]
 HOT = 'core: {temperature: 500 + 100*q*x, reference_temperature: 293, expansion: 1e-6, '
 
 
@@ -69,6 +71,23 @@ class BodiesPath(Ring):
         errors = self.errors('moved.h5', scene=scene)
         self.assertLess(max(errors.values()), 5e-3, errors)
 
+    def test_grown(self):
+        """A body that creeps and grows uniformly: forces of its stresses follow its size."""
+        scene = self.altered('grown.yaml', NORTON, HISTORY, *GROWN)
+        for laws in ('interpolation', 'cubature'):
+            self.train('grown.h5', *BODIES, '-hyco_bodies_laws', laws, scene=scene, store='grown')
+            errors = self.errors('grown.h5', scene=scene)
+            self.assertLess(max(errors.values()), 5e-3, (laws, errors))
+
+    def test_points(self):
+        """Interpolation evaluates laws at no more than two points a mode; a model without points is refused in one line."""
+        trained = self.train('points.h5', *BODIES, grid='2,2')
+        with h5py.File(self.path('points.h5'), 'r+') as f:
+            self.assertLessEqual(len(f['bodies/inelastic/point']), 2 * trained['n_inelastic_modes'])
+            del f['bodies/inelastic/point']
+            del f['sealed']
+        self.refused_in_one_line(['points.h5', 'earlier version', 'train it again'], 'predict', '-model', self.path('points.h5'), '-mu', POINT)
+
     def test_heat(self):
         """Temperatures of elastic and of creeping bodies that change along the path, prescribed displacements and body forces are loads."""
         scene = self.altered('hot.yaml', NORTON, HISTORY, ('core: {', HOT), ('ring: {', HOT.replace('core', 'ring')), ('sym_y0: {y: 0}', 'sym_y0: {y: 1e-3*q*push}'),
@@ -106,7 +125,7 @@ class BodiesPath(Ring):
         size = max(abs(full[n]).max() for n in steps)
         self.assertLess(max(abs(full[n] - reduced[n]).max() for n in steps), 0.005 * size)
         view = self.run_raw('view', '-model', self.path('series.h5')).stdout
-        for words in ('inelastic modes: ', 'laws in'):
+        for words in ('inelastic modes: ', 'laws at'):
             self.assertIn(words, view)
 
     def test_refused(self):

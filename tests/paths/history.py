@@ -1,5 +1,6 @@
 """Scenes with a history: their path, on any number of ranks, by either kind of iteration, interrupted or not."""
 import csv
+import json
 import os
 import re
 import signal
@@ -27,6 +28,19 @@ def arrays(path):
 
 
 class History(Case):
+    def test_limited_steps(self):
+        """A path whose steps only -hyco_step_inelastic keeps short says so, with the option to change; one with few steps does not. check tells what enters the bodies."""
+        for bound, limited in (('2e-6', True), ('1e-2', False)):
+            run = self.run_raw('solve', '-scene', RING, '-mu', '0.01,1', '-history_times', '0,1', '-hyco_step_inelastic', bound, '-report', self.path('limited.json'))
+            self.assertEqual(run.returncode, 0, run.stderr)
+            self.assertEqual('-hyco_step_inelastic' in run.stdout, limited, run.stdout)
+            with open(self.path('limited.json'), encoding='utf-8') as f:
+                history = json.load(f)['history']
+            self.assertEqual(2 * history['steps_limited'] > sum(history['substeps']), limited, history['steps_limited'])
+        found = self.hyco('check', '-scene', RING, '-body_core_young', '1e5*creep')
+        self.assertIn('creep: scales the stiffness of body core', found['bodies_by_parameter'])
+        self.assertIn('interference: leaves', found['bodies_by_parameter'])
+
     def ring(self, name, *args, **options):
         """The report and the series of the ring, on a coarse history."""
         report = self.hyco('solve', '-scene', RING, '-mu', '0.01,1', '-history_times', '0,1,3,8', '-body_ring_exponent', '4',

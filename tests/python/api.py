@@ -77,7 +77,7 @@ class Python(Case):
         """The layouts that the library gives cover its structs: no member is left out, none overlaps another."""
         from hyco import _library as c  # pylint: disable=import-outside-toplevel
         c.begin()
-        for name in ('HycoSummary', 'HycoStep', 'HycoHistory', 'HycoReaction', 'HycoContactResult', 'HycoPrediction'):
+        for name in ('HycoSummary', 'HycoStep', 'HycoHistory', 'HycoReaction', 'HycoContactResult', 'HycoPrediction', 'HycoGradient'):
             size, members = c.layout(name)
             at = 0
             for member, (kind, offset, _) in members.items():
@@ -145,6 +145,33 @@ class Python(Case):
         model.close()
         with self.assertRaisesRegex(self.hyco_py.Error, 'closed'):
             model.predict([0.03, 900])
+
+    def test_gradients(self):
+        """Gradients of full order and of a model: the command's numbers as arrays, for one point and for many; the last solution stays."""
+        point = ('-mu', '0.031,1100', '-gradient')
+        with self.hyco_py.Scene('block.yaml', hyco_model_type='bodies', hyco_validation=0) as scene:
+            g = scene.gradient([0.031, 1100])
+            report = self.hyco('solve', '-scene', 'block.yaml', *point)
+            model = scene.train('slopes.h5', scatter=3)
+        self.assertEqual((g.value.shape, g.kink.shape, g.kink.any(), g.undecided), ((2, 2), (2, 2), False, 0))
+        for k, output in enumerate(g.outputs):
+            self.near(g.outputs[output], report['outputs'][output], 1e-12)
+            for j, name in enumerate(scene.parameters):
+                self.near(g.value[k, j], report['gradient'][output][name], 1e-9)
+                self.assertEqual(g[output][j], g.value[k, j])
+        with model:
+            report = self.hyco('predict', '-model', 'slopes.h5', *point)
+            many = model.gradient([[[0.031, 1100]], [[0.045, 600]]])
+            one = model.gradient({'modulus': 1100, 'press': 0.031})
+            self.assertEqual((many.value.shape, many.kink.shape, many.undecided.shape, many['lift'].shape), ((2, 1, 2, 2), (2, 1, 2, 2), (2, 1), (2, 1, 2)))
+            np.testing.assert_allclose(many.value[0, 0], one.value, rtol=1e-9)
+            for output, by in report['gradient'].items():
+                np.testing.assert_allclose(one[output], list(by.values()), rtol=1e-9)
+            h = [0.03e-4, 1500e-4]
+            for j in range(2):
+                shift = np.eye(2)[j] * h
+                lo, hi = (model.predict(np.array([0.031, 1100]) + s * shift).outputs['lift'] for s in (-1, 1))
+                self.near(one['lift'][j], (hi - lo) / (2 * h[j]), 1e-6)
 
     def test_paths(self):
         """The listed times of a history, at full order."""

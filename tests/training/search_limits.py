@@ -90,6 +90,12 @@ class SearchLimits(Ring):
         self.assertGreater(len(rows), 4)
         self.assertGreater(report['search']['operations'], 0)
 
+    def test_budget_left(self):
+        """Models of bodies, whose modes are their own, miss a target: the other types have the whole budget, two models without one."""
+        _, rows = self.search(ROPE, 'left', '-grid', '3,3', '-target_u', 1e-15, '-target_max_added', 0, '-hyco_search_budget', 0, status=3)
+        self.assertEqual(rows[0]['model_type'], 'bodies')
+        self.assertEqual(len([r for r in rows if r['model_type'] != 'bodies' and not r['failure']]), 2)
+
     def test_many_contacts(self):
         """801 contacts, gaps and loads as parameters: one factor. A model of bodies is tried and chosen; its forces are those of full order."""
         self.drawn('strip', 2, GEO, STRIP)

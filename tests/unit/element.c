@@ -187,11 +187,98 @@ static PetscErrorCode TestMeanDilatation(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The energy of the linear displacement on a DM, whose only reference then is fe's. */
+static PetscErrorCode EnergyOf(HycoScene scene, DM *dm, double expected)
+{
+  PetscReal mu[1] = {0}, *u, *energy, sum = 0;
+  HycoFE fe;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFECreate(scene, *dm, &fe));
+  PetscCall(DMDestroy(dm));
+  PetscCall(HycoFESetParameters(fe, mu));
+  PetscCall(PetscMalloc2(fe->n_dof, &u, fe->mesh->n_cells, &energy));
+  Linear(fe->mesh, u);
+  PetscCall(HycoFEEnergy(fe, u, energy));
+  for (PetscInt e = 0; e < fe->mesh->n_cells; e++) sum += energy[e];
+  CHECK_NEAR(sum, expected, 1e-12 * expected);
+  PetscCall(PetscFree2(u, energy));
+  PetscCall(HycoFEDestroy(&fe));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A DMPlex of two unit squares that PETSc made, with labels for groups, and the submesh of its second cell: fe is on either,
+   and both have their own tables. */
+static PetscErrorCode TestDM(void)
+{
+  const PetscInt cell[8] = {0, 1, 4, 3, 1, 2, 5, 4}, second = 1;
+  const PetscReal xy[12] = {0, 0, 1, 0, 2, 0, 0, 1, 1, 1, 2, 1};
+  PetscReal stress[6];
+  const double density = Hooke(2, stress);
+  HycoMesh mesh = NULL, of, again, sub;
+  HycoScene scene;
+  DMLabel label;
+  HycoFE fe;
+  DM dm;
+
+  PetscFunctionBegin;
+  PetscCall(PatchLoad(&patches[HYCO_QUAD4], NULL, NULL, &scene, &mesh, &fe));
+  PetscCall(DMPlexCreateFromCellListPetsc(PETSC_COMM_SELF, 2, 2, 6, 4, PETSC_TRUE, cell, 2, xy, &dm));
+  PetscCall(DMSetLabelValue(dm, "block", 0, 1));
+  PetscCall(DMSetLabelValue(dm, "block", 1, 1));
+  PetscCall(DMCreateLabel(dm, "skin"));
+  PetscCall(DMGetLabel(dm, "skin", &label));
+  PetscCall(DMPlexMarkBoundaryFaces(dm, 1, label));
+  PetscCall(HycoMeshOf(dm, scene, &of));
+  PetscCall(HycoMeshOf(dm, scene, &again));
+  CHECK(of == again && of->dm == dm && of->n_cells == 2 && of->n_facets == 6, "%d cells, %d facets", (int)of->n_cells,
+        (int)of->n_facets);
+  PetscCall(HycoSubmesh(scene, of, 1, &second, 0, NULL, 0, NULL, &sub));
+  PetscCall(EnergyOf(scene, &dm, 2 * density));
+  CHECK(sub->n_nodes == 4 && sub->n_facets == 3, "%d nodes, %d facets", (int)sub->n_nodes, (int)sub->n_facets);
+  PetscCall(EnergyOf(scene, &sub->dm, density));
+  PetscCall(PatchFree(&scene, &mesh, &fe));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The DM of tables that come from a file: the tables made from it anew are the same, with facets that have no cell. */
+static PetscErrorCode TestLoaded(const Patch *p)
+{
+  HycoMesh mesh = NULL, sub, again;
+  PetscInt skin, keep = 0;
+  HycoScene scene;
+  HycoFE fe;
+  DM dm;
+
+  PetscFunctionBegin;
+  PetscCall(PatchLoad(p, NULL, NULL, &scene, &mesh, &fe));
+  PetscCall(HycoMeshFindGroup(mesh, "test", "skin", &skin));
+  PetscCall(HycoSubmesh(scene, mesh, 1, &keep, 0, NULL, 1, &skin, &sub));
+  PetscCall(HycoMeshDetach(sub)); /* as it is read from a file */
+  PetscCall(HycoMeshCreateDM(scene, sub));
+  dm = sub->dm;
+  PetscCall(PetscObjectReference((PetscObject)dm));
+  PetscCall(HycoMeshDetach(sub));
+  PetscCall(HycoMeshOf(dm, scene, &again));
+  CHECK(again != sub && again->n_nodes == sub->n_nodes && again->n_facets == p->n_facets && again->n_cells == 1,
+        "%s: %d nodes, %d facets", p->name, (int)again->n_nodes, (int)again->n_facets);
+  for (PetscInt f = 0; f < p->n_facets * sub->nf; f++)
+    CHECK(again->facets[f] == sub->facets[f] && again->facet_cell[f / sub->nf] == sub->facet_cell[f / sub->nf],
+          "%s: facet %d differs", p->name, (int)(f / sub->nf));
+  PetscCall(DMDestroy(&dm));
+  PetscCall(HycoMeshDestroy(&sub));
+  PetscCall(PatchFree(&scene, &mesh, &fe));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Test(void)
 {
   PetscFunctionBegin;
   PatchesComplete();
   PetscCall(TestMeanDilatation());
+  PetscCall(TestDM());
+  PetscCall(TestLoaded(&patches[HYCO_QUAD4]));
+  PetscCall(TestLoaded(&patches[HYCO_TET10]));
   for (int type = 0; type < HYCO_N_MESH_TYPES; type++) {
     HycoScene scene;
     HycoMesh mesh = NULL;

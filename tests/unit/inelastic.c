@@ -45,7 +45,7 @@ static PetscErrorCode Load(const Patch *p, const char element[], Model *m)
   PetscCall(HycoSceneFromEntries(PETSC_COMM_SELF, N_KEYS, keys, values, "/", &m->scene));
   PetscCall(HycoMeshCreate(PETSC_COMM_SELF, m->scene, &m->mesh));
   unlink(path);
-  PetscCall(HycoFECreate(m->scene, m->mesh, &m->fe));
+  PetscCall(HycoFECreate(m->scene, m->mesh->dm, &m->fe));
   m->mu[0] = 1;
   PetscCall(HycoFESetParameters(m->fe, m->mu));
   PetscCall(HycoFEStateCreate(m->fe, &m->begin));
@@ -235,7 +235,7 @@ static PetscErrorCode TestProgram(void)
   PetscCall(HycoSceneFromEntries(PETSC_COMM_SELF, 5, names, values, "/", &m.scene));
   PetscCall(HycoMeshCreate(PETSC_COMM_SELF, m.scene, &m.mesh));
   unlink(path);
-  PetscCall(HycoFECreate(m.scene, m.mesh, &m.fe));
+  PetscCall(HycoFECreate(m.scene, m.mesh->dm, &m.fe));
   m.mu[0] = 1;
   PetscCall(HycoFESetParameters(m.fe, m.mu));
   PetscCall(HycoFEStateCreate(m.fe, &m.begin));

@@ -301,7 +301,7 @@ static inline PetscErrorCode PatchLoad(const Patch *p, const char key[], const c
   }
   PetscCall(HycoMeshCreate(PETSC_COMM_SELF, *scene, mesh));
   unlink(path);
-  PetscCall(HycoFECreate(*scene, *mesh, fe));
+  PetscCall(HycoFECreate(*scene, (*mesh)->dm, fe));
   PetscCall(HycoFESetParameters(*fe, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

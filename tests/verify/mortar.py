@@ -11,7 +11,7 @@ import patch
 from grids import Grid, ball, second
 from hertz import under
 from patch import KINDS, exact, stack
-from verify import Verify, read
+from verify import Verify, read, read_step
 
 # cells of the slave over those of the master: finer by 1.4 and 1.5, coarser by 0.7
 RATIOS = {'quad4': ((7, 5), (3, 2), (7, 10)), 'tri3': ((7, 5), (3, 2), (7, 10)),
@@ -24,6 +24,14 @@ fixed: {base: {%s}, top: {%s}%s}
 contact: {seam: {type: %s, slave: %s, master: %s%s}}
 """
 PRESS = 0.03
+SHEAR = """
+scene: {mesh: mesh.msh}
+body: {a: {young: 100}, b: {young: 40}}
+fixed: {base: {x: 0, y: 0%s}%s}
+traction: {top: {%s: "-0.6*min(t,1)"%s}, "a_x0,b_x0": {%s: -%g*s}, "a_x1,b_x1": {%s: %g*s}}
+contact: {seam: {type: %s, slave: b_low, master: a_top, friction: 0.3}}
+history: {times: [0, 1, 2], tables: {s: [[0, 0], [1, 0], [2, 1]]}}
+"""
 
 
 def axes(n, top):
@@ -182,6 +190,37 @@ class MortarHertz(Verify):
     def test_balls(self):
         """An eighth of each ball, on coarse meshes: the error is theirs."""
         self.compare('spheres', 'hex8', ((6, 4), (4, 6)), 1.5e-4, 1 / 4)
+
+
+class MortarFriction(Verify):
+    name = 'mortar_friction'
+
+    def sheared(self, kind, slaves, masters, contact, slips):
+        """Poisson's ratio 0, a pressure of 0.6 and the shear stress q on all sides: uniform stress. The nodes' pressures and tractions."""
+        dim, q, grid = KINDS[kind], 0.6 * 0.3 if slips else 0.12, Grid()
+        up = 'xyz'[dim - 1]
+        for name, n, span, groups in (('a', masters, (0, 1), ('base', 'a_top')), ('b', slaves, (1, 2.5), ('b_low', 'top'))):
+            grid.box(kind, axes([n] * (dim - 1) + [3], span), lambda x: x, name,
+                     {f'{up}0': groups[0], f'{up}1': groups[1], 'x0': f'{name}_x0', 'x1': f'{name}_x1'})
+        drawn, pulled = (', top: {x: 0.2*s}', '') if slips else ('', f', x: {q}*s')
+        text = SHEAR % (', z: 0' * (dim == 3), drawn, up, pulled, up, q, up, q, contact)
+        report = self.hyco('solve', '-scene', self.scene(text, grid), '-output', self.path('s.xdmf'))
+        self.assertLess(max(report['history']['kkt_max']), 1e-8)
+        step = read_step(self.path('s.h5'), 2)
+        slave = step['nodes/contact_pressure'][:, 0] > 0
+        self.assertEqual(slave.sum(), (slaves + 1)**(dim - 1))
+        return step['nodes/contact_pressure'][slave, 0], step['nodes/contact_traction'][slave], q
+
+    def test_uniform(self):
+        """A block that sticks, pressed and sheared; and one that is drawn until it slips: uniform tractions, mu times the pressure where it slips."""
+        for kind, (slaves, masters), slips in itertools.product(('quad4', 'hex8'), ((3, 2), (2, 3)), (False, True)):
+            with self.subTest(kind=kind, slaves=slaves, slips=slips):
+                pressure, traction, q = self.sheared(kind, slaves, masters, 'mortar', slips)
+                name = f'{kind} {slaves} slave cells on {masters}, {"slip" if slips else "stick"}'
+                worst = max(abs(pressure / 0.6 - 1).max(), np.linalg.norm(traction + [q, 0, 0], axis=1).max() / q)
+                self.row(f'{name}, pressure and traction', worst, 0, 1e-8)
+        pressure, traction, q = self.sheared('quad4', 2, 3, 'surface', False)
+        self.assertGreater(abs(traction[:, 0] / q + 1).max(), 0.01)
 
 
 BOUND = {'cylinders': 0.005, 'axisymmetric spheres': 0.008, 'spheres': 0.02}

@@ -3,7 +3,7 @@
   dual function, so that a uniform pressure passes between meshes that do not match.
 */
 #include "../../facing.h"
-#include "mortar.h"
+#include "../../mortar.h"
 
 /* Refuses what the integrals do not cover. */
 static PetscErrorCode CheckSupported(HycoContact c, HycoFE fe)

@@ -67,6 +67,12 @@ static PetscErrorCode MatchAlong(HycoMasterSearch *t, HycoContact c, HycoMatch *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The type for meshes that do not match. */
+static const char *ForOthers(HycoMesh m)
+{
+  return HycoMeshIsQuadratic(m) ? "mortar" : "surface";
+}
+
 /* Checks that each master has one slave. A master with two slaves would make rows of B dependent up to round-off. */
 static PetscErrorCode CheckMasters(HycoMesh m, HycoContact c, const HycoMatch *match)
 {
@@ -83,9 +89,9 @@ static PetscErrorCode CheckMasters(HycoMesh m, HycoContact c, const HycoMatch *m
       const PetscInt other = partner_of[j];
 
       PetscCall(PetscFree(partner_of));
-      HycoFail(
-          "contact %s: nodes %d and %d of %s are both nearest to node %d of %s; use matching meshes, or type: surface",
-          c->name, (int)m->node_id[other], (int)m->node_id[match->slave[k]], c->slave, (int)m->node_id[j], c->master);
+      HycoFail("contact %s: nodes %d and %d of %s are both nearest to node %d of %s; use matching meshes, or type: %s",
+               c->name, (int)m->node_id[other], (int)m->node_id[match->slave[k]], c->slave, (int)m->node_id[j],
+               c->master, ForOthers(m));
     }
     partner_of[j] = match->slave[k];
   }
@@ -116,14 +122,14 @@ static PetscErrorCode Remedy(HycoMasterSearch *t, HycoContact c, PetscInt n, con
   PetscReal stated;
 
   PetscFunctionBegin;
-  (void)t;
   (void)n;
   (void)missed;
   PetscCall(HycoContactGetLength(c, "tolerance", &stated));
   if (stated >= 0)
-    HycoFormat(text, "use matching meshes, a larger contact_%s_tolerance, or type: surface", c->name);
+    HycoFormat(text, "use matching meshes, a larger contact_%s_tolerance, or type: %s", c->name,
+               ForOthers(t->fe->mesh));
   else
-    HycoFormat(text, "use matching meshes, or type: surface");
+    HycoFormat(text, "use matching meshes, or type: %s", ForOthers(t->fe->mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -45,12 +45,13 @@ static PetscErrorCode SetFromOptions(HycoReducer t)
                             "bodies, with a history: energy left out of the modes of the inelastic strain", 0, 1,
                             &s->inelastic_tol, &set[0]));
   PetscCall(HycoOptionsInt("-hyco_bodies_cells",
-                           "bodies, with a history: number of cells with laws for each mode of the inelastic strain", 1,
-                           1000000, &s->cells, &set[1]));
-  PetscCall(HycoOptionsWord("-hyco_bodies_laws",
-                            "bodies, with a history: coefficients of the inelastic modes by interpolation in the cells "
-                            "with laws, or by Galerkin's method with a cubature (auto: where a law yields)",
-                            laws, &s->laws, &s->named));
+                           "bodies, with a history: number of points with laws for each mode of the inelastic strain",
+                           1, 1000000, &s->cells, &set[1]));
+  PetscCall(
+      HycoOptionsWord("-hyco_bodies_laws",
+                      "bodies, with a history: coefficients of the inelastic modes by interpolation at few points, "
+                      "or by Galerkin's method with a cubature (auto: where a law yields)",
+                      laws, &s->laws, &s->named));
   PetscCall(HycoOptionsReal("-hyco_bodies_cubature_tol",
                             "bodies, with a history: relative error of the cubature in training", 1e-12, 1,
                             &s->cubature_tol, &set[3]));
@@ -80,7 +81,7 @@ static const char *const *Variants(HycoReducer t)
 {
   static const char *const variants[] = {"interpolation", "cubature", NULL};
 
-  return t->scene->n_times && !HycoTrainingOfBodies(t)->named ? variants : NULL;
+  return HycoBodiesFlow(t) && !HycoTrainingOfBodies(t)->named ? variants : NULL;
 }
 
 static PetscErrorCode SetVariant(HycoReducer t, const char name[])
@@ -116,29 +117,6 @@ static PetscErrorCode TakeExact(HycoROM m, HycoSubstructures b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The chosen cells' columns of the table in the order of the model's mesh. */
-static PetscErrorCode TakeColumns(HycoROM m, HycoReducer t, HycoBodiesInelastic in)
-{
-  const size_t size = (size_t)in->m * (size_t)(m->model->mesh->nv * m->model->mesh->dim);
-  PetscReal *T, *there;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1((size_t)in->n_cells * size + 1, &T));
-  PetscCall(PetscMalloc1((size_t)in->n_cells * size + 1, &there));
-  for (PetscInt e = 0; e < m->model->mesh->n_cells; e++) {
-    PetscInt at = -1;
-
-    PetscCall(PetscFindInt(m->model->mesh->cell_whole[e], t->n_seeds_cell, t->seeds_cell, &at));
-    PetscCheck(at >= 0, PETSC_COMM_SELF, PETSC_ERR_PLIB, "a cell of the model is not among the chosen cells");
-    PetscCall(PetscArraycpy(T + (size_t)e * size, in->T + (size_t)at * size, size));
-    PetscCall(PetscArraycpy(there + (size_t)e * size, in->there + (size_t)at * size, size));
-  }
-  HycoFreeAll(&in->T, &in->there);
-  in->T = T;
-  in->there = there;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode Take(HycoROM m, HycoReducer t)
 {
   HycoBodiesTraining s = (HycoBodiesTraining)t->training;
@@ -151,10 +129,7 @@ static PetscErrorCode Take(HycoROM m, HycoReducer t)
   PetscCall(HycoFloatingDestroy(&m->model->floating)); /* their equilibrium is an equation of the model */
   for (PetscInt k = 0; k < m->model->pairs.n; k++) m->model->in_rid[k] = 1;
   PetscCall(TakeExact(m, (HycoSubstructures)m->model->data));
-  if (t->scene->n_times) {
-    PetscCall(HycoROMSetDomain(m, NULL));
-    PetscCall(TakeColumns(m, t, ((HycoSubstructures)m->model->data)->inelastic));
-  }
+  if (t->scene->n_times) PetscCall(HycoROMSetDomain(m, NULL));
   PetscCall(HycoReducerJudge(t, m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -167,11 +142,12 @@ static PetscErrorCode CheckPath(HycoROM m, HycoReducer t)
 
   PetscFunctionBegin;
   if (!(m->model->numbers[1] < USELESS)) HycoReducerNameWorst(t, worst);
-  HycoCheckModel(m->model->numbers[1] < USELESS,
-                 "the model of bodies misses its own training displacements by %.0f %% on average (%d inelastic modes, "
-                 "%d cells)%s: use more cells (-hyco_bodies_cells), fewer modes (-hyco_bodies_inelastic_tol), or train "
-                 "a hybrid model",
-                 100 * (double)m->model->numbers[1], (int)in->m, (int)in->n_cells, worst);
+  HycoCheckModel(
+      m->model->numbers[1] < USELESS,
+      "the model of bodies misses its own training displacements by %.0f %% on average (%d inelastic modes, "
+      "%d points)%s: use more points (-hyco_bodies_cells), fewer modes (-hyco_bodies_inelastic_tol), or train "
+      "a hybrid model",
+      100 * (double)m->model->numbers[1], (int)in->m, (int)in->n_points, worst);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -195,19 +171,20 @@ static PetscErrorCode ReportPath(HycoROM m, HycoTraining *r)
   PetscCall(HycoTrainingAddFact(r, "inelastic_amplification", b->inelastic->amplification));
   snprintf(r->summary, sizeof(r->summary),
            "bodies: %d, with %d unknowns on the surfaces that may touch; %d vectors of loads; %d inelastic modes, laws "
-           "in %d of %d elements; %d displacement modes\n",
-           (int)b->n, (int)b->ns, (int)b->r, (int)b->inelastic->m, (int)m->model->mesh->n_cells,
-           (int)m->model->whole_cells, (int)r->n_modes);
+           "at %d points, in %d of %d elements; %d displacement modes\n",
+           (int)b->n, (int)b->ns, (int)b->r, (int)b->inelastic->m, (int)b->inelastic->n_points,
+           (int)m->model->mesh->n_cells, (int)m->model->whole_cells, (int)r->n_modes);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Operations of an iteration: the tangent in the cells, and its factor. */
+/* Operations of an iteration: the laws in the cells, the tangent, and its factor. */
 static PetscReal PathCost(HycoReducer t)
 {
-  HycoBodiesTraining s = HycoTrainingOfBodies(t);
-  const PetscReal m = (PetscReal)s->strains.l, n = (PetscReal)(t->fom->part->nv * t->sizes[3]);
+  const HycoBodiesTraining s = HycoTrainingOfBodies(t);
+  const PetscReal m = (PetscReal)s->strains.l, ns = (PetscReal)t->fom->fe->n_sigma,
+                  points = (PetscReal)(s->cells * s->strains.l);
 
-  return (PetscReal)(t->n_seeds_cell) * (2 * n * n * m + 2 * n * m * m) + m * m * m;
+  return points * (2 * ns * ns * m + 2 * ns * m * m) + m * m * m;
 }
 
 static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)

@@ -201,8 +201,8 @@ static PetscErrorCode List(HycoReducer t, HycoBodiesFactor *factor, const PetscB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* known[]: the unknowns of the surfaces in this rank's part; bare[]: those with a force at a sample. The model's mesh has
-   the nodes of these, not of masters that no slave meets, so that the others have modes too. */
+/* known[]: the unknowns of the surfaces in this rank's part; bare[]: those that the model's mesh has with its contacts.
+   The others, of masters that no slave meets, have modes outside the chosen cells. */
 static PetscErrorCode MarkSurfaces(HycoReducer t, HycoBodiesFactor *factor)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
@@ -220,20 +220,32 @@ static PetscErrorCode MarkSurfaces(HycoReducer t, HycoBodiesFactor *factor)
 
     PetscCall(PetscFindInt(node * b->dim + i % b->dim, b->ns, sorted, &at));
     factor->known[i] = (PetscBool)(at >= 0);
-    factor->bare[i] = (PetscBool)(at >= 0 && factor->touched[place[at]]);
+    factor->bare[i] = (PetscBool)(at >= 0 && factor->in_mesh[place[at]]);
   }
   PetscCall(PetscFree(place));
   PetscCall(PetscFree(sorted));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether an unknown inside the bodies is left to the modes. Collective. */
-static PetscErrorCode AnyLeft(HycoReducer t, HycoFE fe, const PetscBool known[], const PetscBool inner[],
-                              PetscBool *any)
+/* bare[]: also the unknowns of the surfaces in the cells in[], which the model's mesh has. */
+static void MarkBare(HycoBodiesFactor *factor, const PetscBool in[])
+{
+  HycoMesh m = factor->fom->part;
+  const PetscInt dim = factor->fom->fe->dim, n = m->nv * dim;
+
+  for (PetscInt k = 0; k < m->n_cells * n; k++) {
+    const PetscInt i = m->cells[k / dim] * dim + k % dim;
+
+    if (in[k / n] && factor->known[i]) factor->bare[i] = PETSC_TRUE;
+  }
+}
+
+/* Whether an unknown is left to the modes. Collective. */
+static PetscErrorCode AnyLeft(HycoReducer t, HycoFE fe, const PetscBool bare[], const PetscBool inner[], PetscBool *any)
 {
   PetscFunctionBegin;
   *any = PETSC_FALSE;
-  for (PetscInt i = 0; i < fe->n_dof; i++) *any = (PetscBool)(*any || !(fe->fixed[i] || known[i] || inner[i]));
+  for (PetscInt i = 0; i < fe->n_dof; i++) *any = (PetscBool)(*any || !(fe->fixed[i] || bare[i] || inner[i]));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, any, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(t)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -273,7 +285,8 @@ PetscErrorCode HycoBodiesChooseCells(HycoReducer t, HycoBodiesFactor *factor)
   PetscCall(Choose(t, factor, in, inner));
   PetscCall(ShareCells(t, factor->fom->part, in));
   PetscCall(MarkInner(t, factor, in, inner, &fits));
-  PetscCall(AnyLeft(t, fe, factor->known, inner, &left));
+  MarkBare(factor, in);
+  PetscCall(AnyLeft(t, fe, factor->bare, inner, &left));
   if (!fits) PetscCall(PetscArrayzero(inner, fe->n_dof)); /* of the cell that stands for none */
   if (fits && !left) PetscCall(Release(t, factor, inner, &released));
   if (!released) PetscCall(PetscArrayzero(factor->known, fe->n_dof));

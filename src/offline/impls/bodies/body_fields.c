@@ -17,6 +17,7 @@
 #define SMALL        1e-7 /* of the largest sample: smaller ones count as much as this */
 #define SCORED       24   /* displacements at all nodes of theta whose stresses show which cells matter */
 #define MANY         64   /* right-hand sides at once */
+#define SEEN         4    /* times of a path with friction whose forces are samples */
 #define CHECKS       32   /* points at which the displacements that the modes miss are measured, no samples */
 
 /* Samples: the loads' coefficients and the surfaces' forces, a column each; the last n_checks are
@@ -42,17 +43,58 @@ static PetscErrorCode SolveOne(HycoBodiesWork o, const HycoBodiesSurface *s, con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A time of the history for point k of a sequence: irregular, and any. */
-static PetscReal SomeTime(HycoScene s, PetscInt k)
+/* A share for point k of a sequence: irregular, and any. */
+static PetscReal SomeShare(PetscInt k)
 {
   const PetscReal share = (k + 1) * 0.6180339887;
 
-  if (!s->n_times) return 0;
-  return s->times[0] + (share - (PetscInt)share) * (s->times[s->n_times - 1] - s->times[0]);
+  return share - (PetscInt)share;
 }
 
-static PetscErrorCode SolvePoints(HycoReducer t, HycoBodiesWork o, const HycoBodiesSurface *s, HycoSamples points,
-                                  Sampled *sampled)
+/* A path with friction at mu: the forces at some of its times are samples. It takes the steps between the stops of the
+   history, and ends where one has no solution. Rank 0. */
+static PetscErrorCode SolvePath(HycoBodiesFriction f, HycoBodiesWork o, HycoScene scene, HycoFE fe, PetscInt k,
+                                const PetscReal mu[], Sampled *sampled, PetscBool *solved)
+{
+  const HycoSubstructures b = o->bodies;
+  const PetscReal first = scene->times[0], last = scene->times[scene->n_times - 1];
+  PetscReal t = first;
+  PetscInt seen = 0, its;
+  HycoKKT kkt;
+
+  PetscFunctionBegin;
+  PetscCall(HycoBodiesFrictionBegin(f));
+  for (PetscInt step = 0; t <= last; step++) {
+    PetscReal all[HYCO_MAX_PARAMETERS];
+
+    HycoSceneSetTime(scene, mu, t, all);
+    PetscCall(HycoFESetParameters(fe, all));
+    PetscCall(HycoBodiesFrictionPrepare(f, o, all));
+    PetscCall(HycoBodiesFrictionSolve(f, o, &kkt, &its, solved));
+    if (!*solved) break;
+    PetscCall(HycoBodiesFrictionAccept(f));
+    if (t >= first + (last - first) * (seen + SomeShare(k)) / SEEN && seen < SEEN) {
+      PetscCall(PetscArraycpy(sampled->c + sampled->n * b->r, o->c, b->r));
+      PetscCall(PetscArraycpy(sampled->f + sampled->n * b->ns, o->f, b->ns));
+      sampled->n++;
+      seen++;
+    }
+    if (t >= last) break;
+    t = HycoSceneNextStop(scene, t);
+  }
+  *solved = (PetscBool)(seen > 0);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A time of the history for point k of the sequence. */
+static PetscReal SomeTime(HycoScene s, PetscInt k)
+{
+  return s->n_times ? s->times[0] + SomeShare(k) * (s->times[s->n_times - 1] - s->times[0]) : 0;
+}
+
+/* friction: NULL, or of paths. */
+static PetscErrorCode SolvePoints(HycoReducer t, HycoBodiesWork o, const HycoBodiesSurface *s,
+                                  HycoBodiesFriction friction, HycoSamples points, Sampled *sampled)
 {
   const HycoSubstructures b = o->bodies;
   const PetscInt p = t->scene->n_parameters;
@@ -72,14 +114,18 @@ static PetscErrorCode SolvePoints(HycoReducer t, HycoBodiesWork o, const HycoBod
 
     HycoSceneSetTime(t->scene, mu + k * p, SomeTime(t->scene, k), all);
     PetscCall(HycoCatchBegin()); /* points that full order would refuse, too */
-    ierr = SolveOne(o, s, all, Lambda, &solved);
+    if (friction)
+      ierr = SolvePath(friction, o, t->scene, s->fe, k, mu + k * p, sampled, &solved);
+    else
+      ierr = SolveOne(o, s, all, Lambda, &solved);
     PetscCall(HycoCatchEnd(ierr, message));
     bound[k] = norm[k] = 0;
     if (ierr || !solved) continue;
-    PetscCall(PetscArraycpy(sampled->c + sampled->n * b->r, o->c, b->r));
-    PetscCall(PetscArraycpy(sampled->f + sampled->n * b->ns, o->f, b->ns));
     bound[k] = HycoBodiesBound(o, &norm[k]);
     most = PetscMax(most, norm[k]);
+    if (friction) continue;
+    PetscCall(PetscArraycpy(sampled->c + sampled->n * b->r, o->c, b->r));
+    PetscCall(PetscArraycpy(sampled->f + sampled->n * b->ns, o->f, b->ns));
     sampled->n++;
     sampled->n_checks += p && !t->scene->n_times && k >= n - CHECKS;
   }
@@ -125,15 +171,19 @@ static PetscErrorCode SampleForces(HycoReducer t, HycoFOM f, HycoSamples points,
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   struct _n_HycoBodiesWork work = {0};
   HycoRows rows;
-  const HycoBodiesSurface s = {f->fe_surface, &f->pairs, &rows};
+  const HycoBodiesSurface s = HycoBodiesSurfaceNormal(f->fe_surface, &f->pairs, &rows);
+  HycoBodiesFriction friction = NULL;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoRowsCreate(&f->pairs, b->dim, &rows));
-  ierr = HycoBodiesSetUp(&work, b, t->scene, &s, NULL);
-  if (!ierr) ierr = SolvePoints(t, &work, &s, points, sampled);
-  if (!ierr && t->scene->n_times && !sampled->expanded) ierr = TakePaths(t, &work, &s, PathStride(t), sampled);
+  if (HycoSceneHasFriction(t->scene)) PetscCall(HycoBodiesFrictionCreate(t->scene, &s, &friction));
+  ierr = HycoBodiesSetUp(&work, b, t->scene, friction ? HycoBodiesFrictionSurface(friction) : &s, NULL);
+  if (!ierr) ierr = SolvePoints(t, &work, &s, friction, points, sampled);
+  if (!ierr && t->scene->n_times && !friction && !sampled->expanded)
+    ierr = TakePaths(t, &work, &s, PathStride(t), sampled);
   PetscCall(HycoBodiesReset(&work));
+  PetscCall(HycoBodiesFrictionDestroy(&friction));
   PetscCall(HycoRowsDestroy(&rows));
   f->fe_surface->ready = PETSC_FALSE;
   PetscCall(ierr);
@@ -158,7 +208,10 @@ static PetscErrorCode Sample(HycoReducer t, HycoFOM f, PetscInt wanted, PetscBoo
   PetscCall(HycoSamplesAddPoint(points, b->first));
   if (t->scene->n_parameters) PetscCall(HycoSamplesAddScattered(points, n + CHECKS));
   PetscCall(HycoSamplesGet(points, &n, NULL, NULL));
-  if (t->scene->n_times) n += 1 + t->n_s / PathStride(t);
+  if (HycoSceneHasFriction(t->scene))
+    n *= SEEN;
+  else if (t->scene->n_times)
+    n += 1 + t->n_s / PathStride(t);
   PetscCall(PetscRealloc(((size_t)n * (size_t)b->r + 1) * sizeof(PetscReal), &sampled->c));
   PetscCall(PetscRealloc(((size_t)n * (size_t)b->ns + 1) * sizeof(PetscReal), &sampled->f));
   {
@@ -283,7 +336,7 @@ static PetscErrorCode ExpandNode(HycoReducer t, HycoBodiesFactor *factor, PetscI
   PetscCall(PetscRealloc((n_dof * (size_t)(sampled->n_U + n + b->p) + 1) * sizeof(PetscReal), &sampled->U));
   U = sampled->U + n_dof * (size_t)sampled->n_U;
   PetscCall(ExpandSamples(b, factor, sampled, n, sample, U));
-  for (PetscInt k = 0; k < n && !t->scene->n_times; k += 1 + n * nodes / SCORED)
+  for (PetscInt k = 0; k < n && !HycoBodiesFlow(t); k += 1 + n * nodes / SCORED)
     PetscCall(HycoBodiesAddScores(t, factor, U + n_dof * (size_t)k));
   sampled->n_U += n;
   if (!sampled->expanded) {
@@ -705,6 +758,31 @@ static PetscErrorCode TakeModes(HycoReducer t, HycoSnapshots store, Mat V, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* factor->in_mesh. Rank 0. */
+static PetscErrorCode FindInMesh(HycoReducer t, HycoBodiesFactor *factor)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  HycoMesh surface = t->fom->surface;
+  PetscBool *contact;
+  PetscInt *node, n = 0, at;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(surface->n_nodes, &contact));
+  PetscCall(PetscMalloc1(surface->n_nodes, &node));
+  PetscCall(HycoReducerMarkContacts(t, contact));
+  for (PetscInt i = 0; i < surface->n_nodes; i++) {
+    if (contact[i]) node[n++] = surface->node_whole ? surface->node_whole[i] : i;
+  }
+  PetscCall(PetscSortInt(n, node));
+  for (PetscInt k = 0; k < b->ns; k++) {
+    PetscCall(PetscFindInt(b->dof[k] / b->dim, n, node, &at));
+    factor->in_mesh[k] = (PetscBool)(at >= 0);
+  }
+  PetscCall(PetscFree(node));
+  PetscCall(PetscFree(contact));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The modes of `wanted` samples; *enough: the samples are many more than the modes of any body, or there is no room for
    more. Collective. */
 static PetscErrorCode ModesOf(HycoReducer t, HycoBodiesFactor *factor, PetscInt wanted, Sampled *sampled, Mat *V,
@@ -715,11 +793,8 @@ static PetscErrorCode ModesOf(HycoReducer t, HycoBodiesFactor *factor, PetscInt 
 
   PetscFunctionBegin;
   PetscCall(Sample(t, factor->fom, wanted, &all, sampled));
-  for (PetscInt k = 0; k < b->ns * sampled->n && !t->rank; k++)
-    factor->touched[k % b->ns] = (PetscBool)(factor->touched[k % b->ns] || sampled->f[k] != 0);
-  HycoBcast(factor->touched, b->ns, HYCO_MPI_BOOL, HycoComm(t));
   PetscCall(ExpandAll(t, factor, sampled));
-  if (!t->scene->n_times) PetscCall(HycoBodiesChooseCells(t, factor)); /* else those with laws are chosen */
+  if (!HycoBodiesFlow(t)) PetscCall(HycoBodiesChooseCells(t, factor)); /* else those with laws are chosen */
   PetscCall(PetscFree(b->mode_start));
   PetscCall(FindModes(t, factor, sampled->n_U, sampled->U, V, sigma));
   *enough = PETSC_TRUE;
@@ -747,7 +822,9 @@ PetscErrorCode HycoBodiesFields(HycoReducer t, HycoSnapshots store, HycoBodiesFa
   PetscCall(PetscCalloc1(factor->fom->part->n_cells + 1, &factor->score));
   PetscCall(PetscCalloc1(factor->fom->fe->n_dof + 1, &factor->known));
   PetscCall(PetscCalloc1(factor->fom->fe->n_dof + 1, &factor->bare));
-  PetscCall(PetscCalloc1(b->ns + 1, &factor->touched));
+  PetscCall(PetscCalloc1(b->ns + 1, &factor->in_mesh));
+  HycoOnRoot(HycoComm(t), FindInMesh(t, factor));
+  HycoBcast(factor->in_mesh, b->ns, HYCO_MPI_BOOL, HycoComm(t));
   PetscCall(PetscCalloc1(factor->fom->fe->n_dof + 1, &factor->moved));
   for (PetscInt n = HycoTrainingOfBodies(t)->samples, k = 0; !ierr && !enough && k <= DOUBLINGS; n *= 2, k++) {
     PetscCall(MatDestroy(&V));

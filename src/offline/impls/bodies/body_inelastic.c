@@ -1,12 +1,13 @@
 /*
   Training of bodies that deform inelastically. Elastic responses to loads and contact forces are exact, so that modes
-  are needed for the nodal forces of inelastic strains alone, q = sum of alpha_k q_k: their displacements
-  K^-1 q_k on the surfaces (P), in the cells in which the laws are evaluated (A), and in the modes of fields. In these
-  cells, chosen by Q-DEIM on the q_k, displacements are exact too: rows of K^-1 for surface forces (C) and loads (R).
+  are needed for what the stresses lack of the elastic ones alone, s = sum of alpha_k s_k: the displacements K^-1 q_k of
+  their nodal forces on the surfaces (P), in the cells of the points at which the laws are evaluated (A), and in the modes
+  of fields. In these cells displacements are exact too: rows of K^-1 for surface forces (C) and loads (R).
 */
 #include <hycoalgorithms.h>
 #include <hycobodiestraining.h>
-#include <hycoinelasticmodes.h>
+#include <hycoinelasticpoints.h>
+#include <hycokinematics.h>
 
 #define MANY  64  /* right-hand sides at once */
 #define LARGE 0.3 /* displacements under which laws are asked whether they yield, as a share of the mesh's length */
@@ -46,6 +47,11 @@ static PetscErrorCode CheckChanges(HycoReducer t)
                    "bodies does not support that: train a hybrid model",
                    s->parameter[shape[0]], parts->name[k]);
   }
+  for (PetscInt k = 0; k < parts->n; k++)
+    HycoCheckModel(!flows[k] || !HycoSceneHasFriction(s),
+                   "the scene has friction, and body %s deforms inelastically; models of bodies with friction are for "
+                   "elastic bodies: use hyco solve",
+                   parts->name[k]);
   PetscCall(PetscFree(flows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -80,7 +86,7 @@ PetscErrorCode HycoBodiesCheckPath(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -- modes and cells -- */
+/* -- modes and points -- */
 
 PetscErrorCode HycoBodiesStrainModes(HycoReducer t, HycoSnapshots store)
 {
@@ -90,56 +96,57 @@ PetscErrorCode HycoBodiesStrainModes(HycoReducer t, HycoSnapshots store)
   PetscCall(PetscNew(&s->bodies->inelastic));
   PetscCall(MatDestroy(&s->strains.V));
   PetscCall(PetscFree(s->strains.sigma));
-  PetscCall(HycoInelasticSample(t, store, s->inelastic_tol, &s->strains));
+  PetscCall(HycoPointsSample(t, store, s->inelastic_tol, &s->strains));
   s->bodies->inelastic->m = s->strains.l;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Makes `count` cells those of the model, ascending; takes ownership. */
-static PetscErrorCode TakeCells(HycoReducer t, PetscInt count, PetscInt cell[])
+/* Makes these points those of the model, ascending, and their cells its cells; takes ownership. */
+static PetscErrorCode TakePoints(HycoReducer t, PetscInt count, PetscInt point[])
 {
   HycoBodiesInelastic in = HycoTrainingOfBodies(t)->bodies->inelastic;
-  const PetscInt n = t->fom->part->nv * t->sizes[3];
+  const PetscInt nq = HycoElementGet(t->fom->part->type)->nq;
+  const size_t size = (size_t)in->m * (size_t)(count * t->fom->fe->n_sigma) + 1;
+  PetscInt *cell;
 
   PetscFunctionBegin;
-  if (!count) cell[count++] = 0; /* a mesh needs a cell */
-  PetscCall(PetscSortRemoveDupsInt(&count, cell));
+  PetscCall(PetscCalloc1(count + 1, &cell)); /* a mesh needs a cell */
+  for (PetscInt i = 0; i < count; i++) cell[i] = point[i] / nq;
+  t->n_seeds_cell = PetscMax(count, 1);
+  PetscCall(PetscSortRemoveDupsInt(&t->n_seeds_cell, cell));
   PetscCall(PetscFree(t->seeds_cell));
   t->seeds_cell = cell;
-  t->n_seeds_cell = in->n_cells = count;
-  PetscCall(PetscCalloc1((size_t)in->m * (size_t)(count * n) + 1, &in->T));
-  PetscCall(PetscCalloc1((size_t)in->m * (size_t)(count * n) + 1, &in->there));
+  in->point = point;
+  in->n_points = count;
+  PetscCall(PetscCalloc1(size, &in->T));
+  PetscCall(PetscCalloc1(size, &in->there));
+  PetscCall(PetscCalloc1(count + 1, &in->weight));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The modes in the chosen cells, and their pseudo-inverse. Collective. */
+/* The modes at the chosen points and their pseudo-inverse, so far of sqrt(w) s. Collective. */
 static PetscErrorCode TakeThere(HycoReducer t, PetscReal inverse[], PetscReal *smallest)
 {
   HycoBodiesTraining s = HycoTrainingOfBodies(t);
   HycoBodiesInelastic in = s->bodies->inelastic;
-  const PetscInt columns = t->n_seeds_cell * t->fom->part->nv * t->sizes[3];
-  PetscReal *there;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc1((size_t)in->m * (size_t)columns + 1, &there));
-  PetscCall(HycoInelasticInverse(t, &s->strains, inverse, there, smallest));
-  for (PetscInt i = 0; i < columns * in->m; i++) in->there[i] = there[i % in->m * columns + i / in->m];
-  PetscCall(PetscFree(there));
+  PetscCall(HycoPointsInverse(&s->strains, t->fom->fe->n_sigma, in->n_points, in->point, inverse, in->there, smallest));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Interpolation: the cells of the modes' Q-DEIM points; T is the pseudo-inverse of the modes there. Collective. */
+/* Interpolation: the modes' Q-DEIM points; T is the pseudo-inverse of the modes there. Collective. */
 static PetscErrorCode Interpolate(HycoReducer t)
 {
   HycoBodiesTraining s = HycoTrainingOfBodies(t);
   HycoBodiesInelastic in = s->bodies->inelastic;
-  PetscInt *cell, count = 0;
+  PetscInt *point, count = 0;
   PetscReal smallest;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(s->cells * in->m + 1, &cell));
-  PetscCall(HycoInelasticChoose(&s->strains, t->fom->part->nv * t->sizes[3], s->cells, &count, cell));
-  PetscCall(TakeCells(t, count, cell));
+  PetscCall(PetscMalloc1(s->cells * in->m + 1, &point));
+  PetscCall(HycoPointsChoose(&s->strains, t->fom->fe->n_sigma, s->cells, &count, point));
+  PetscCall(TakePoints(t, count, point));
   PetscCall(TakeThere(t, in->T, &smallest));
   in->amplification = 1 / smallest;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -250,35 +257,43 @@ static PetscErrorCode Displace(HycoSubstructures b, HycoBodiesFactor *factor, Ve
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* F = the nodal forces of mode k, 0 where fixed. Collective. */
+static PetscErrorCode ForceOfMode(HycoReducer t, HycoFOM f, PetscInt k, Vec F)
+{
+  const PetscInt dim = f->part->dim;
+  PetscReal *value, *force;
+  PetscScalar *v;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(f->part->n_cells * HycoPointRows(t) + 1, &value));
+  PetscCall(PetscCalloc1(f->fe->n_dof + 1, &force));
+  PetscCall(HycoPointsMode(t, &HycoTrainingOfBodies(t)->strains, k, value));
+  HycoOnEach(HycoComm(t), HycoPointsForces(f->fe, value, force));
+  PetscCall(VecGetArray(F, &v));
+  for (PetscInt i = 0; i < f->fe->n_dof; i++) {
+    const PetscInt own = HycoMeshOwned(f->part, i / dim);
+
+    if (own >= 0) v[own * dim + i % dim] = f->fe->fixed[i] ? 0 : force[i];
+  }
+  PetscCall(VecRestoreArray(F, &v));
+  PetscCall(PetscFree(value));
+  PetscCall(PetscFree(force));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The responses to the modes: P and the fields; work[m x m]: of the modes on these, Q^T K^-1 Q. Collective. */
 static PetscErrorCode Respond(HycoReducer t, HycoBodiesFactor *factor, PetscReal u[], PetscReal work[])
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   HycoBodiesInelastic in = b->inelastic;
-  HycoFOM f = factor->fom;
-  const PetscScalar *column;
-  PetscScalar *v;
-  PetscInt lda;
-  Mat A;
   Vec F;
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(in->m + 1, &factor->strain));
   if (!in->m) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoInelasticColumns(t, in->m, &A));
-  PetscCall(HycoInelasticPut(t, &HycoTrainingOfBodies(t)->strains, A));
-  PetscCall(MatDenseGetLDA(A, &lda));
-  PetscCall(VecDuplicate(f->F, &F));
+  PetscCall(VecDuplicate(factor->fom->F, &F));
   for (PetscInt k = 0; k < in->m; k++) {
-    PetscCall(MatDenseGetArrayRead(A, &column));
-    PetscCall(VecGetArray(F, &v));
-    for (PetscInt i = 0; i < f->fe->n_dof; i++) {
-      const PetscInt own = HycoMeshOwned(f->part, i / b->dim), row = own * b->dim + i % b->dim;
-
-      if (own >= 0) v[row] = f->fe->fixed[i] ? 0 : column[(size_t)k * (size_t)lda + (size_t)row];
-    }
-    PetscCall(VecRestoreArray(F, &v));
-    PetscCall(MatDenseRestoreArrayRead(A, &column));
+    PetscCall(ForceOfMode(t, factor->fom, k, F));
     PetscCall(Displace(b, factor, F, u, &factor->strain[k]));
     factor->n_strains++;
     for (PetscInt i = 0; i < b->ns; i++) in->P[(size_t)i * (size_t)in->m + (size_t)k] = u[i];
@@ -288,7 +303,6 @@ static PetscErrorCode Respond(HycoReducer t, HycoBodiesFactor *factor, PetscReal
     }
   }
   PetscCall(VecDestroy(&F));
-  PetscCall(MatDestroy(&A));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -340,7 +354,7 @@ static PetscErrorCode FillLoads(HycoReducer t, HycoBodiesFactor *factor, const U
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -- laws in few cells -- */
+/* -- laws at few points -- */
 
 /* Whether a law deforms inelastically at once, as in yielding: under large strains in no time. Collective. */
 static PetscErrorCode Yields(HycoReducer t, PetscBool *yields)
@@ -415,69 +429,84 @@ static PetscErrorCode Orthogonalise(HycoReducer t, HycoBodiesFactor *factor, con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The work of the largest n_k modes of the forces on the modes' displacements in each cell, a column for each pair, by
-   the forces' sizes: rows in the file's order. Collective. */
+/* The work of values sqrt(w) s in the cells of the part on m displacements (n_dof each): work, n_cells x m. */
+static PetscErrorCode WorkOnModes(HycoFE fe, const PetscReal value[], PetscInt m, const PetscReal u[], PetscReal work[])
+{
+  const PetscInt n = fe->mesh->nv * fe->dim, size = HycoElementGet(fe->mesh->type)->nq * fe->n_sigma;
+  PetscReal force[HYCO_MAX_CELL_DOFS];
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(work, fe->mesh->n_cells * m));
+  for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
+    if (!HycoInelasticFlows(fe, e)) continue;
+    PetscCall(PetscArrayzero(force, n));
+    PetscCall(HycoPointsCellForce(fe, e, value + e * size, force));
+    for (PetscInt k = 0; k < n; k++) {
+      const PetscInt unknown = HycoCellUnknown(fe->mesh, e, k);
+
+      for (PetscInt d = 0; d < m && !fe->fixed[unknown] && force[k] != 0; d++)
+        work[e * m + d] += force[k] * u[(size_t)d * (size_t)fe->n_dof + (size_t)unknown];
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The work of the largest n_k modes of the stresses on the modes' displacements in each cell, a column for each pair, by
+   the stresses' sizes: rows in the file's order. Collective. */
 static PetscErrorCode Contributions(HycoReducer t, HycoBodiesFactor *factor, PetscInt n_k, Mat *S)
 {
   const HycoBasis *modes = &HycoTrainingOfBodies(t)->strains;
-  HycoMesh part = t->fom->part;
-  const PetscInt m = factor->n_strains, n = part->nv * part->dim;
+  HycoFE fe = t->fom->fe;
+  const PetscInt m = factor->n_strains, n_cells = fe->mesh->n_cells;
   const HycoFileOrder *order;
-  const PetscScalar *V;
-  PetscReal *u, *q, *value, *rows;
+  PetscReal *u, *value, *work, *rows;
   PetscScalar *s;
-  PetscInt ldv, lds, n_rows;
+  PetscInt lds, n_rows;
 
   PetscFunctionBegin;
   PetscCall(HycoFOMGetRows(t->fom, &order));
-  n_rows = order ? order->n[HYCO_ON_CELLS] : part->n_cells;
+  n_rows = order ? order->n[HYCO_ON_CELLS] : n_cells;
   PetscCall(MatCreateDense(HycoComm(t), n_rows, PETSC_DECIDE, t->sizes[1], m * n_k, NULL, S));
-  PetscCall(PetscMalloc4((size_t)m * (size_t)(part->n_nodes * part->dim), &u, part->n_cells * n, &q, part->n_cells * m,
-                         &value, n_rows * m + 1, &rows));
+  PetscCall(PetscMalloc4((size_t)m * (size_t)fe->n_dof + 1, &u, n_cells * HycoPointRows(t) + 1, &value, n_cells * m + 1,
+                         &work, n_rows * m + 1, &rows));
   for (PetscInt i = 0; i < m; i++)
-    PetscCall(HycoFOMToLocal(factor->fom, factor->strain[i], u + (size_t)i * (size_t)(part->n_nodes * part->dim)));
-  PetscCall(MatDenseGetLDA(modes->V, &ldv));
+    PetscCall(HycoFOMToLocal(factor->fom, factor->strain[i], u + (size_t)i * (size_t)fe->n_dof));
   PetscCall(MatDenseGetLDA(*S, &lds));
   PetscCall(MatDenseGetArray(*S, &s));
   for (PetscInt k = 0; k < n_k; k++) {
-    PetscCall(MatDenseGetArrayRead(modes->V, &V));
-    PetscCall(HycoFOMFromRows(t->fom, HYCO_ON_CELLS, n, V + (size_t)k * (size_t)ldv, q));
-    PetscCall(MatDenseRestoreArrayRead(modes->V, &V));
-    PetscCall(PetscArrayzero(value, part->n_cells * m));
-    for (PetscInt e = 0; e < part->n_cells * n; e++) {
-      const PetscInt unknown = HycoCellUnknown(part, e / n, e % n);
-
-      for (PetscInt i = 0; i < m && !t->fom->fe->fixed[unknown] && q[e] != 0; i++)
-        value[e / n * m + i] += q[e] * u[(size_t)i * (size_t)(part->n_nodes * part->dim) + (size_t)unknown];
-    }
-    PetscCall(HycoFOMToRows(t->fom, HYCO_ON_CELLS, MPIU_REAL, m, value, rows));
-    for (PetscInt e = 0; e < n_rows * m; e++)
-      s[(size_t)(k * m + e % m) * (size_t)lds + (size_t)(e / m)] = modes->sigma[k] * rows[e];
+    PetscCall(HycoPointsMode(t, modes, k, value));
+    HycoOnEach(HycoComm(t), WorkOnModes(fe, value, m, u, work));
+    PetscCall(HycoFOMToRows(t->fom, HYCO_ON_CELLS, MPIU_REAL, m, work, rows));
+    for (PetscInt i = 0; i < n_rows * m; i++)
+      s[(size_t)(k * m + i % m) * (size_t)lds + (size_t)(i / m)] = modes->sigma[k] * rows[i];
   }
   PetscCall(MatDenseRestoreArray(*S, &s));
   PetscCall(MatAssemblyBegin(*S, MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(*S, MAT_FINAL_ASSEMBLY));
-  PetscCall(PetscFree4(u, q, value, rows));
+  PetscCall(PetscFree4(u, value, work, rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The cells with weights w (rank 0), as those of the model; weight[] ordered as they are. Collective. */
+/* All points of the cells with weights w (rank 0) as those of the model; weight[] ordered as they are. Single points would
+   do for the training paths, but where an unseen plastic front decides, whole cells are much more accurate. Collective. */
 static PetscErrorCode TakeWeighted(HycoReducer t, const PetscReal w[], PetscReal **weight)
 {
-  PetscInt *cell, count = 0;
+  const PetscInt nq = HycoElementGet(t->fom->part->type)->nq;
+  PetscInt *point, count = 0;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(t->sizes[1] + 1, &cell));
-  PetscCall(PetscMalloc1(t->sizes[1] + 1, weight));
-  for (PetscInt e = 0; !t->rank && e < t->sizes[1]; e++) {
-    if (!(w[e] > 0)) continue;
-    (*weight)[count] = w[e];
-    cell[count++] = e;
-  }
+  for (PetscInt e = 0; !t->rank && e < t->sizes[1]; e++) count += w[e] > 0 ? nq : 0;
   PetscCallMPI(MPI_Bcast(&count, 1, MPIU_INT, 0, HycoComm(t)));
-  HycoBcast(cell, count, MPIU_INT, HycoComm(t));
+  PetscCall(PetscMalloc1(count + 1, &point));
+  PetscCall(PetscMalloc1(count + 1, weight));
+  for (PetscInt i = 0, n = 0; !t->rank && i < t->sizes[1] * nq; i++) {
+    if (!(w[i / nq] > 0)) continue;
+    (*weight)[n] = w[i / nq];
+    point[n++] = i;
+  }
+  HycoBcast(point, count, MPIU_INT, HycoComm(t));
   HycoBcast(*weight, count, MPIU_REAL, HycoComm(t));
-  PetscCall(TakeCells(t, count, cell));
+  PetscCall(TakePoints(t, count, point));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -490,8 +519,8 @@ static PetscErrorCode MarkElastic(HycoReducer t, PetscBool **elastic)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Galerkin's method on the modes' displacements A, orthonormal in energy, with a cubature: alpha = sum of w_e A_e^T q_e.
-   weight: of the cells. Collective. */
+/* Galerkin's method on the modes' displacements A, orthonormal in energy, with a cubature: alpha = sum over points of
+   weight w (B A)^T s. Collective. */
 static PetscErrorCode Cubature(HycoReducer t, HycoBodiesFactor *factor, PetscReal **weight)
 {
   HycoBodiesTraining s = HycoTrainingOfBodies(t);
@@ -518,34 +547,68 @@ static PetscErrorCode Cubature(HycoReducer t, HycoBodiesFactor *factor, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* T = w_e A_e, from the rows A of the cells. Collective. */
-static PetscErrorCode FillGalerkin(HycoReducer t, const Unknowns *at, const PetscReal weight[])
+/* The weight of point p, point q of the part's cell e, and with a cubature its rows of T, weight w B A. */
+static PetscErrorCode FillPoint(HycoReducer t, const Unknowns *at, const PetscReal weight[], PetscInt e, PetscInt q,
+                                PetscInt p)
 {
   HycoBodiesInelastic in = HycoTrainingOfBodies(t)->bodies->inelastic;
-  HycoMesh part = t->fom->part;
-  const PetscInt m = in->m, n = part->nv * part->dim;
+  HycoFE fe = t->fom->fe;
+  HycoMesh part = fe->mesh;
+  const PetscInt m = in->m, n = part->nv * part->dim, ns = fe->n_sigma;
+  PetscReal B[6 * HYCO_MAX_CELL_DOFS];
 
   PetscFunctionBegin;
-  for (PetscInt e = 0; e < part->n_cells; e++) {
-    PetscInt cell = -1;
+  PetscCall(HycoFEPointRows(fe, e, q, B, &in->weight[p]));
+  for (PetscInt i = 0; i < n && weight; i++) {
+    const PetscInt k = HycoCellUnknown(part, e, i), node = k / part->dim;
+    PetscInt row;
 
-    if (HycoMeshOwned(part, part->cells[e * part->nv]) >= 0)
-      PetscCall(PetscFindInt(part->cell_whole ? part->cell_whole[e] : e, t->n_seeds_cell, t->seeds_cell, &cell));
-    for (PetscInt i = 0; i < n && cell >= 0; i++) {
-      const PetscInt k = HycoCellUnknown(part, e, i), node = k / part->dim;
-      PetscReal *T = in->T + (size_t)(cell * n + i) * (size_t)m;
-      PetscInt row;
-
-      PetscCall(PetscFindInt((part->node_whole ? part->node_whole[node] : node) * part->dim + k % part->dim, at->n,
-                             at->dof, &row));
-      for (PetscInt d = 0; d < m && row >= 0; d++) T[d] = weight[cell] * in->A[row * m + d];
+    PetscCall(PetscFindInt((part->node_whole ? part->node_whole[node] : node) * part->dim + k % part->dim, at->n,
+                           at->dof, &row));
+    for (PetscInt c = 0; c < ns && row >= 0; c++) {
+      for (PetscInt d = 0; d < m; d++)
+        in->T[(p * ns + c) * m + d] += weight[p] * in->weight[p] * B[c * n + i] * in->A[row * m + d];
     }
   }
-  HycoAllreduce(in->T, m * in->n_cells * n, MPIU_REAL, MPI_SUM, HycoComm(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The cells and their rows for forces, loads and modes. weight: of the cells, NULL: interpolation. Collective. */
+static PetscErrorCode FillOwnPoints(HycoReducer t, const Unknowns *at, const PetscReal weight[])
+{
+  HycoBodiesInelastic in = HycoTrainingOfBodies(t)->bodies->inelastic;
+  HycoMesh part = t->fom->part;
+  const PetscInt nq = HycoElementGet(part->type)->nq;
+
+  PetscFunctionBegin;
+  for (PetscInt e = 0; e < part->n_cells; e++) {
+    for (PetscInt q = 0; q < nq && HycoMeshOwned(part, part->cells[e * part->nv]) >= 0; q++) {
+      PetscInt p;
+
+      PetscCall(PetscFindInt((part->cell_whole ? part->cell_whole[e] : e) * nq + q, in->n_points, in->point, &p));
+      if (p >= 0) PetscCall(FillPoint(t, at, weight, e, q, p));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Weights and T of the points; T and the modes there are of s. weight: of the cubature, NULL: interpolation. Collective. */
+static PetscErrorCode FillPoints(HycoReducer t, const Unknowns *at, const PetscReal weight[])
+{
+  HycoBodiesInelastic in = HycoTrainingOfBodies(t)->bodies->inelastic;
+  const PetscInt size = t->fom->fe->n_sigma * in->m;
+
+  PetscFunctionBegin;
+  HycoOnEach(HycoComm(t), FillOwnPoints(t, at, weight));
+  HycoAllreduce(in->weight, in->n_points, MPIU_REAL, MPI_SUM, HycoComm(t));
+  if (weight) HycoAllreduce(in->T, in->n_points * size, MPIU_REAL, MPI_SUM, HycoComm(t));
+  for (PetscInt i = 0; i < in->n_points * size && !weight; i++) {
+    in->T[i] *= PetscSqrtReal(in->weight[i / size]);
+    in->there[i] /= PetscSqrtReal(in->weight[i / size]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The points and their cells' rows for forces, loads and modes. weight: of the cubature, NULL: interpolation. Collective. */
 static PetscErrorCode FillCells(HycoReducer t, HycoBodiesFactor *factor, const PetscReal weight[], PetscReal u[])
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
@@ -565,13 +628,13 @@ static PetscErrorCode FillCells(HycoReducer t, HycoBodiesFactor *factor, const P
   PetscCall(FillLoads(t, factor, &at, u));
   HycoAllreduce(in->A, at.n * in->m, MPIU_REAL, MPI_SUM, HycoComm(t));
   HycoAllreduce(in->R, at.n * b->r, MPIU_REAL, MPI_SUM, HycoComm(t));
-  if (weight) PetscCall(FillGalerkin(t, &at, weight));
+  PetscCall(FillPoints(t, &at, weight));
   PetscCall(PetscFree(at.global));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The laws in few cells by the method that fits them. weight: of the cells, NULL: interpolation. Collective. */
-static PetscErrorCode ChooseCells(HycoReducer t, HycoBodiesFactor *factor, const PetscReal work[], PetscReal **weight)
+/* The laws at few points by the method that fits them. weight: of the cubature, NULL: interpolation. Collective. */
+static PetscErrorCode ChoosePoints(HycoReducer t, HycoBodiesFactor *factor, const PetscReal work[], PetscReal **weight)
 {
   HycoBodiesTraining s = HycoTrainingOfBodies(t);
   HycoBodiesInelastic in = s->bodies->inelastic;
@@ -604,7 +667,7 @@ PetscErrorCode HycoBodiesStrains(HycoReducer t, HycoBodiesFactor *factor)
   PetscCall(PetscCalloc1((size_t)b->ns * (size_t)in->m + 1, &in->P));
   PetscCall(PetscMalloc2(b->ns + 1, &u, in->m * in->m + 1, &work));
   PetscCall(Respond(t, factor, u, work));
-  PetscCall(ChooseCells(t, factor, work, &weight));
+  PetscCall(ChoosePoints(t, factor, work, &weight));
   PetscCall(FillCells(t, factor, weight, u));
   PetscCall(PetscFree(weight));
   PetscCall(PetscFree2(u, work));

@@ -6,7 +6,10 @@
 #include <hycobodiestraining.h>
 
 #define MOST_UNKNOWNS 4000 /* of the surfaces of a body: C_b is dense */
+#define MANY_UNKNOWNS 1500 /* of a body: masters that no slave meets are left out */
 #define MOST_ALL      8000 /* of all surfaces: the Schur complement is dense until its blocks are taken */
+#define RINGS         2    /* of facets around those that slaves met at some points of the ranges */
+#define SEARCHED      200  /* such points */
 #define KEPT          0.3  /* share of the memory for the factors of samples that are kept */
 #define MOST_THETA    3    /* parameters that change the shape of bodies */
 
@@ -118,15 +121,66 @@ static PetscErrorCode BodiesOfSurface(HycoFOM f, const HycoBodyParts *parts, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Lists the free unknowns of the surfaces by body, with their numbers in the distributed vectors. Rank 0. */
-static PetscErrorCode List(HycoFOM f, const PetscInt of[], HycoSubstructures b, PetscInt global[])
+/* near[i]: also the nodes of the facets of a group that have a node in near[]. */
+static PetscErrorCode AddRing(HycoMesh m, PetscInt group, PetscBool near[])
 {
-  HycoMesh m = f->surface;
-  PetscBool *in;
+  PetscBool *on;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc1(m->n_nodes, &in));
-  PetscCall(HycoPairsMarkSurfaces(f->scene, m, &f->pairs, in));
+  HycoDuplicate(m->n_nodes + 1, near, &on);
+  for (PetscInt f = 0; f < m->n_facets; f++) {
+    const PetscInt *node = m->facets + f * m->nf;
+    PetscBool meets = PETSC_FALSE;
+
+    if (m->facet_group[f] != group) continue;
+    for (PetscInt a = 0; a < m->nf; a++) meets = (PetscBool)(meets || on[node[a]]);
+    for (PetscInt a = 0; a < m->nf && meets; a++) near[node[a]] = PETSC_TRUE;
+  }
+  PetscCall(PetscFree(on));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Takes from in[] the masters of moved surfaces that no slave meets over the ranges: a part slides on a small part of a
+   large one. A prediction that meets another one is refused. Rank 0. */
+static PetscErrorCode LeaveOut(HycoReducer t, PetscBool in[])
+{
+  HycoFOM f = t->fom;
+  HycoMesh m = f->surface;
+  HycoSamples points;
+  HycoMet met;
+  PetscBool *near;
+  const PetscReal *mu;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesCreate(t->scene, &points));
+  PetscCall(HycoSamplesAddScattered(points, SEARCHED));
+  PetscCall(HycoSamplesGet(points, &n, NULL, &mu));
+  PetscCall(HycoMetFind(t->scene, m, &f->pairs, n, mu, NULL, &met));
+  PetscCall(PetscCalloc1(m->n_nodes + 1, &near));
+  HycoPairsMark(&met.rows, near);
+  for (PetscInt k = 0; k < t->scene->n_contacts; k++) {
+    PetscInt g = 0;
+
+    if (!HycoPairsFollows(&f->pairs, k)) continue;
+    PetscCall(HycoMeshFindGroup(m, "contact", t->scene->contact[k]->slave, &g));
+    for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) near[m->group_node[j]] = PETSC_TRUE;
+    PetscCall(HycoMeshFindGroup(m, "contact", t->scene->contact[k]->master, &g));
+    for (PetscInt ring = 0; ring < RINGS; ring++) PetscCall(AddRing(m, g, near));
+  }
+  for (PetscInt i = 0; i < m->n_nodes; i++) in[i] = (PetscBool)(in[i] && near[i]);
+  PetscCall(PetscFree(near));
+  PetscCall(HycoMetDestroy(&met));
+  PetscCall(HycoSamplesDestroy(&points));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Lists the free unknowns of the surfaces by body, with their numbers in the distributed vectors. Rank 0. */
+static PetscErrorCode List(HycoFOM f, const PetscInt of[], const PetscBool in[], HycoSubstructures b, PetscInt global[])
+{
+  HycoMesh m = f->surface;
+
+  PetscFunctionBegin;
   b->ns = 0;
   for (PetscInt k = 0; k < b->n; k++) {
     for (PetscInt i = 0; i < m->n_nodes * b->dim; i++) {
@@ -137,6 +191,25 @@ static PetscErrorCode List(HycoFOM f, const PetscInt of[], HycoSubstructures b, 
       global[b->ns++] = (m->node_global ? m->node_global[node] : node) * b->dim + i % b->dim;
     }
     b->start[k + 1] = b->ns;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The same for the nodes of the surfaces that may touch. Rank 0. */
+static PetscErrorCode ListReached(HycoReducer t, const PetscInt of[], HycoSubstructures b, PetscInt global[])
+{
+  HycoFOM f = t->fom;
+  PetscInt most = 0;
+  PetscBool *in;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(f->surface->n_nodes + 1, &in));
+  PetscCall(HycoPairsMarkSurfaces(f->scene, f->surface, &f->pairs, in));
+  PetscCall(List(f, of, in, b, global));
+  for (PetscInt k = 0; k < b->n; k++) most = PetscMax(most, b->start[k + 1] - b->start[k]);
+  if (most > MANY_UNKNOWNS && f->searches && t->scene->n_parameters) {
+    PetscCall(LeaveOut(t, in));
+    PetscCall(List(f, of, in, b, global));
   }
   PetscCall(PetscFree(in));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -158,8 +231,10 @@ static PetscErrorCode CheckSizes(const HycoBodyParts *parts, HycoSubstructures b
 }
 
 /* The unknowns on every rank, and N, whose rows select them. Collective. */
-static PetscErrorCode Select(HycoFOM f, const HycoBodyParts *parts, HycoSubstructures b, Mat *N)
+static PetscErrorCode Select(HycoReducer t, HycoSubstructures b, Mat *N)
 {
+  HycoFOM f = t->fom;
+  const HycoBodyParts *parts = &HycoTrainingOfBodies(t)->parts;
   const PetscInt n = f->surface ? f->surface->n_nodes * b->dim : 0;
   PetscInt *of, *global;
 
@@ -168,7 +243,7 @@ static PetscErrorCode Select(HycoFOM f, const HycoBodyParts *parts, HycoSubstruc
   PetscCall(PetscCalloc1(b->n + 1, &b->start));
   PetscCall(PetscMalloc1(n + 1, &b->dof));
   PetscCall(PetscMalloc1(n + 1, &global));
-  HycoOnRoot(HycoComm(f), List(f, of, b, global));
+  HycoOnRoot(HycoComm(f), ListReached(t, of, b, global));
   HycoBcast(b->start, b->n + 1, MPIU_INT, HycoComm(f));
   b->ns = b->start[b->n];
   if (f->rank) PetscCall(PetscFree(b->dof));
@@ -431,6 +506,27 @@ static PetscErrorCode TakeTheta(HycoReducer t, HycoSubstructures b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Friction: a history of elastic bodies. */
+static PetscErrorCode TakeNoStrains(HycoReducer t)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  HycoBodiesInelastic in;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&b->inelastic));
+  in = b->inelastic;
+  in->amplification = 1;
+  PetscCall(PetscCalloc1(1, &in->T));
+  PetscCall(PetscCalloc1(1, &in->there));
+  PetscCall(PetscCalloc1(1, &in->P));
+  PetscCall(PetscCalloc1(1, &in->dof));
+  PetscCall(PetscCalloc1(1, &in->body));
+  PetscCall(PetscCalloc1(1, &in->C));
+  PetscCall(PetscCalloc1(1, &in->R));
+  PetscCall(PetscCalloc1(1, &in->A));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Condense(HycoReducer t, HycoSnapshots store, HycoBodiesFactor *factor)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
@@ -441,11 +537,11 @@ static PetscErrorCode Condense(HycoReducer t, HycoSnapshots store, HycoBodiesFac
   PetscCheck(factor->fom->part->n_nodes == t->fom->part->n_nodes && factor->fom->part->first == t->fom->part->first,
              PETSC_COMM_SELF, PETSC_ERR_PLIB, "two meshes of one scene differ");
   PetscCall(HycoFOMSetParameters(t->fom, b->first));
-  PetscCall(Select(t->fom, &HycoTrainingOfBodies(t)->parts, b, &factor->N));
+  PetscCall(Select(t, b, &factor->N));
   for (PetscInt k = 0; k < b->n; k++) b->body[k].n = b->start[k + 1] - b->start[k];
   PetscCall(HycoBodiesLoads(t, factor));
   PetscCall(HycoBodiesSample(t, factor));
-  if (t->scene->n_times) PetscCall(HycoBodiesStrains(t, factor));
+  if (HycoBodiesFlow(t)) PetscCall(HycoBodiesStrains(t, factor));
   PetscCall(HycoBodiesFields(t, store, factor));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -467,7 +563,7 @@ static PetscErrorCode Release(HycoBodiesFactor *factor)
     HycoFreeAll(&r->theta, &r->C, &r->R, &r->Z, &r->work);
   }
   HycoFreeAll(&factor->basis, &factor->record, &factor->theta, &factor->pins, &factor->score, &factor->moved,
-              &factor->known, &factor->bare, &factor->touched, &factor->row);
+              &factor->known, &factor->bare, &factor->in_mesh, &factor->row);
   PetscCall(PetscFree(factor->z));
   PetscCall(HycoFOMDestroy(&factor->fom));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -490,7 +586,10 @@ PetscErrorCode HycoBodiesModes(HycoReducer t, HycoSnapshots store)
   PetscCall(HycoReducerColumn(t, 0, mu));
   HycoDuplicate(b->n_variables + 1, mu, &b->first);
   PetscCall(TakeTheta(t, b));
-  if (t->scene->n_times) PetscCall(HycoBodiesStrainModes(t, store));
+  if (HycoBodiesFlow(t))
+    PetscCall(HycoBodiesStrainModes(t, store));
+  else if (t->scene->n_times)
+    PetscCall(TakeNoStrains(t));
   PetscCall(HycoFOMCreate(HycoComm(t), t->scene, &factor.fom));
   ierr = Condense(t, store, &factor);
   PetscCall(Release(&factor));

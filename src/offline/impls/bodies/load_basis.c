@@ -6,7 +6,6 @@
 */
 #include <hycoalgorithms.h>
 #include <hycobodiestraining.h>
-#include <hycoinelasticmodes.h>
 
 #define MOST_VECTORS 60    /* of the basis */
 #define INDEPENDENT  1e-12 /* share of the largest load: a smaller part outside the basis is round-off */

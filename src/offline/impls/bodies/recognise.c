@@ -366,8 +366,9 @@ PetscErrorCode HycoBodyPartsFind(HycoFOM f, const PetscReal first[], HycoBodyPar
 
 /* -- in words -- */
 
-/* "moves body cylinder rigidly, changes the loads of body block"; "" if the parameter enters no body. */
-static PetscErrorCode DescribeOne(const HycoBodyParts *parts, PetscInt p, char text[HYCO_LINE])
+/* "moves body cylinder rigidly, changes the loads of body block"; "" if the parameter enters no body. Loads of a path depend
+   on time, and are not told. */
+static PetscErrorCode DescribeOne(const HycoBodyParts *parts, PetscInt p, PetscBool path, char text[HYCO_LINE])
 {
   static const struct {
     PetscInt way;
@@ -383,6 +384,7 @@ static PetscErrorCode DescribeOne(const HycoBodyParts *parts, PetscInt p, char t
   for (size_t w = 0; w < sizeof(words) / sizeof(words[0]); w++) {
     char names[HYCO_LINE] = "", one[HYCO_LINE];
 
+    if (path && words[w].way == HYCO_ENTERS_LOADS) continue;
     for (PetscInt k = 0; k < parts->n; k++) {
       const PetscInt enters = parts->enters[k * parts->n_parameters + p];
 
@@ -427,8 +429,11 @@ PetscErrorCode HycoBodyPartsDescribe(HycoScene s, const HycoBodyParts *parts, ch
   PetscFunctionBegin;
   text[0] = '\0';
   for (PetscInt p = 0; p < s->n_parameters; p++) {
-    PetscCall(DescribeOne(parts, p, one));
-    HycoFormat(line, "%s: %s", s->parameter[p], one[0] ? one : "enters no body");
+    PetscCall(DescribeOne(parts, p, (PetscBool)(s->n_times > 0), one));
+    HycoFormat(line, "%s: %s", s->parameter[p],
+               one[0]       ? one
+               : s->n_times ? "leaves places and elastic stiffness as they are"
+                            : "enters no body");
     PetscCall(HycoListAdd(text, "; ", line));
   }
   body = HycoBodyPartsFail(parts);

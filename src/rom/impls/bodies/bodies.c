@@ -15,7 +15,7 @@
 
 static HycoBodiesSurface SurfaceOf(HycoROM m)
 {
-  return (HycoBodiesSurface){m->fe, &m->model->pairs, &m->rows};
+  return HycoBodiesSurfaceNormal(m->fe, &m->model->pairs, &m->rows);
 }
 
 static PetscErrorCode SetUp(HycoROM m)
@@ -105,6 +105,20 @@ static void Expand(HycoROM m, const PetscInt loc[])
   }
 }
 
+/* gamma and U from the forces and motions of the work. */
+static PetscErrorCode ExpandAll(HycoROM m)
+{
+  HycoBodiesWork o = (HycoBodiesWork)m->work;
+  const HycoBodiesSurface s = SurfaceOf(m);
+
+  PetscFunctionBegin;
+  PetscCall(HycoBodiesExpand(o, m->gamma));
+  Expand(m, o->loc);
+  HycoBodiesMove(o, &s, m->U);
+  HycoFEComplete(m->fe, m->U);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
 {
   HycoBodiesWork o = (HycoBodiesWork)m->work;
@@ -119,10 +133,7 @@ static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
   p->seconds.factor = 0;
   p->seconds.assemble = solve - begin;
   PetscCall(HycoBodiesSolve(o, &s, mu, m->Lambda, &solved));
-  PetscCall(HycoBodiesExpand(o, m->gamma));
-  Expand(m, o->loc);
-  HycoBodiesMove(o, &s, m->U);
-  HycoFEComplete(m->fe, m->U);
+  PetscCall(ExpandAll(m));
   HycoBodiesMeasure(m, &p->kkt);
   p->interpolation_error = HycoBodiesBound(o, &norm);
   p->iterations = o->its;
@@ -209,11 +220,16 @@ PetscErrorCode HycoROMCreate_Bodies(HycoROM m)
                                        .integrals = PETSC_TRUE,
                                        .cells = PETSC_TRUE,
                                        .uniform = PETSC_TRUE,
+                                       .friction = PETSC_TRUE,
                                        .work = sizeof(*(HycoBodiesWork)NULL),
                                        .resultants = PETSC_TRUE};
   static const HycoROMOps ops = {.setup = SetUp,
                                  .reset = Reset,
                                  .solve = Solve,
+                                 .unknowns = HycoBodiesUnknowns,
+                                 .residual = HycoBodiesResidual,
+                                 .jacobian = HycoBodiesJacobian,
+                                 .expand = ExpandAll,
                                  .features = Features,
                                  .estimate = Estimate,
                                  .view = HycoBodiesView,

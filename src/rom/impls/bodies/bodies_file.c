@@ -62,6 +62,7 @@ static PetscErrorCode MoveProbe(HycoH5 h, HycoROM m, HycoSubstructures b)
   PetscFunctionBegin;
   PetscCall(HycoMeshMove(h, "bodies/mesh", m->model->scene->n_bodies, &b->probe));
   if (HycoH5Reads(h)) PetscCall(HycoMeshSetTies(b->probe, m->model->mesh->ties));
+  if (HycoH5Reads(h)) PetscCall(HycoMeshCreateDM(m->model->scene, b->probe));
   PetscCall(HycoH5Int(h, "bodies/cell", 0, b->probe->n_cells - 1, &b->n, 1, &b->cell));
   PetscCall(HycoH5Real(h, "bodies/first", &b->n_variables, 1, &b->first));
   PetscCall(HycoH5Int(h, "bodies/at", 0, b->probe->n_nodes * b->dim - 1, &b->r, 1, &b->at));
@@ -134,25 +135,29 @@ static PetscErrorCode MoveInelastic(HycoROM m, HycoH5 h)
 {
   HycoSubstructures b = (HycoSubstructures)m->model->data;
   HycoBodiesInelastic in;
+  const PetscInt nq = HycoElementGet(m->model->mesh->type)->nq;
   PetscInt head[4], columns, rows = 0;
 
   PetscFunctionBegin;
   if (HycoH5Reads(h)) PetscCall(PetscNew(&b->inelastic));
   in = b->inelastic;
+  HycoCheck(!HycoH5Reads(h) || HycoH5Has(h, "bodies/inelastic/point"),
+            "%s has laws in whole cells, as models of bodies of an earlier version; train it again", m->model->path);
   head[0] = in->m;
   head[1] = in->nd;
-  head[2] = in->n_cells;
+  head[2] = in->n_points;
   head[3] = in->weighted;
   PetscCall(HycoH5Ints(h, "bodies/inelastic/head", 0, PETSC_MAX_INT, 4, head));
   in->weighted = (PetscBool)head[3];
   in->m = head[0];
   in->nd = head[1];
-  in->n_cells = head[2];
-  HycoCheck(in->n_cells == m->model->mesh->n_cells, "%s: bodies/inelastic/head is damaged", m->model->path);
-  columns = in->n_cells * m->model->mesh->nv * b->dim;
+  in->n_points = head[2];
+  columns = in->n_points * HycoStrainSize(b->dim);
   for (PetscInt k = 0; k < b->n; k++)
     rows += b->body[k].n_samples * (b->turn_start[k + 1] - b->turn_start[k]) * b->body[k].l;
   PetscCall(HycoH5Reals(h, "bodies/inelastic/amplification", 1, &in->amplification));
+  PetscCall(HycoH5Int(h, "bodies/inelastic/point", 0, m->model->whole_cells * nq - 1, &in->n_points, 1, &in->point));
+  PetscCall(HycoH5Real(h, "bodies/inelastic/weight", &in->n_points, 1, &in->weight));
   PetscCall(HycoH5Real(h, "bodies/inelastic/T", &columns, in->m, &in->T));
   PetscCall(HycoH5Real(h, "bodies/inelastic/there", &columns, in->m, &in->there));
   PetscCall(HycoH5Real(h, "bodies/inelastic/P", &b->ns, in->m, &in->P));

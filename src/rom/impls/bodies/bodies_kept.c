@@ -151,7 +151,7 @@ PetscErrorCode HycoBodiesKeptDisplace(HycoBodiesWork o, PetscInt m, const PetscR
     for (PetscInt k = 0; k < m; k++) {
       const PetscReal *P = o->kept.P[k * b->n + j];
 
-      for (PetscInt s = 0; s < own->n_samples && P && Lambda[k] > 0; s++, P += own->n) {
+      for (PetscInt s = 0; s < own->n_samples && P && Lambda[k] != 0; s++, P += own->n) {
         const PetscReal force = -Lambda[k] * o->weight[j][s] / o->kappa[j];
 
         BLASaxpy_(&size, &force, P, &one, u + b->start[j], &one);

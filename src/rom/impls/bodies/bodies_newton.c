@@ -4,13 +4,14 @@
 
       u = (R c + P alpha - C B^T L) / kappa
 
-  On a set of closed contacts, L = W_aa^-1 (B P alpha - w), so that the displacements of the cells with laws are affine
-  in alpha alone, u = u_0 + S alpha, and one step in time is the small problem
+  On a set of closed contacts, L = W_aa^-1 (B P alpha - w), so that the strains of the points with laws are affine in
+  alpha alone, e = e_0 + S alpha, and one step in time is the small problem
 
-      r(alpha) = T^T q(u_0 + S alpha) - alpha = 0,      dr/dalpha = sum over these cells of T_e^T (K_e - K_e,t) S_e - 1
+      r(alpha) = T^T s(e_0 + S alpha) - alpha = 0,      dr/dalpha = sum over points of T_p^T (C - C_t) S_p - 1
 
-  solved by Newton's method; its tangent is kept while it contracts, also from step to step. Then the set is checked: forces, and gaps of all contacts;
-  if one is violated, the contact problem at alpha gives the next set. The set of a step is the first one of the next.
+  with what their stresses lack of the elastic ones, s = C (e - e_th) - sigma. It is solved by Newton's method; its tangent
+  is kept while it contracts, also from step to step. Then the set is checked: forces, and gaps of all contacts; if one is
+  violated, the contact problem at alpha gives the next set. The set of a step is the first one of the next.
 */
 #include "bodies_path.h"
 #include <petscblaslapack.h>
@@ -22,7 +23,37 @@
 #define VIOLATED  1e-11 /* share of the largest force or gap: less is round-off */
 #define DEPENDENT 1e-12 /* share of the diagonal of W: contacts that repeat others */
 
+/* y = beta y + factor A x of a table by rows, n x l; transposed: A^T x. */
+static PetscErrorCode Multiply(PetscBool transposed, PetscInt n, PetscInt l, const PetscReal A[], const PetscReal x[],
+                               PetscReal factor, PetscReal beta, PetscReal y[])
+{
+  PetscBLASInt rows, columns, each = 1;
+
+  PetscFunctionBegin;
+  if (!n || !l) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscBLASIntCast(n, &rows));
+  PetscCall(PetscBLASIntCast(l, &columns));
+  BLASgemv_(transposed ? "N" : "T", &columns, &rows, &factor, A, &columns, x, &each, &beta, y, &each);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* to += factor times from, n numbers. */
+static void Add(PetscInt n, PetscReal factor, const PetscReal from[], PetscReal to[])
+{
+  const PetscBLASInt size = (PetscBLASInt)n, one = 1;
+
+  BLASaxpy_(&size, &factor, from, &one, to, &one);
+}
+
 /* -- responses of contacts -- */
+
+void HycoBodiesRestart(HycoROM m)
+{
+  HycoBodiesPath w = (HycoBodiesPath)m->work;
+
+  w->n_set = -1;
+  w->fresh = PETSC_TRUE;
+}
 
 PetscErrorCode HycoBodiesForget(HycoROM m)
 {
@@ -30,7 +61,7 @@ PetscErrorCode HycoBodiesForget(HycoROM m)
 
   PetscFunctionBegin;
   for (PetscInt k = 0; w->column && k < m->model->pairs.n; k++) PetscCall(PetscFree(w->column[k]));
-  w->n_set = -1;
+  HycoBodiesRestart(m);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -61,6 +92,27 @@ static void Push(HycoBodiesWork o, PetscInt k, PetscReal y[])
   }
 }
 
+/* Strains of the points (n_rows x k) from displacements of the cells (nd x k). */
+static void TakeStrains(HycoROM m, PetscInt k, const PetscReal cells[], PetscReal strain[])
+{
+  HycoBodiesPath w = (HycoBodiesPath)m->work;
+  const PetscInt ns = m->fe->n_sigma, nq = HycoElementGet(m->model->mesh->type)->nq,
+                 n = m->model->mesh->nv * m->model->mesh->dim;
+
+  PetscCallVoid(PetscArrayzero(strain, w->n_rows * k));
+  for (PetscInt r = 0; r < w->n_rows; r++) {
+    const PetscInt *at = w->cell_at + w->point[r / ns] / nq * n;
+
+    for (PetscInt i = 0; i < n; i++) {
+      if (at[i] < 0) continue;
+      if (k == 1)
+        strain[r] += w->B[r * n + i] * cells[at[i]];
+      else
+        Add(k, w->B[r * n + i], cells + at[i] * k, strain + r * k);
+    }
+  }
+}
+
 /* The column of contact k, if it is not there. */
 static PetscErrorCode Column(HycoROM m, PetscInt k)
 {
@@ -69,35 +121,66 @@ static PetscErrorCode Column(HycoROM m, PetscInt k)
   const HycoSubstructures b = o->bodies;
   HycoBodiesInelastic in = b->inelastic;
   const PetscInt n = m->model->pairs.n;
-  PetscReal *y;
+  PetscReal *y, *cells;
 
   PetscFunctionBegin;
   if (w->column[k]) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscCalloc1(n + in->nd + 1, &w->column[k]));
+  PetscCall(PetscCalloc1(n + w->n_rows + in->nd + 1, &w->column[k]));
   PetscCall(PetscMalloc1(b->ns + 1, &y));
   Push(o, k, y);
   for (PetscInt j = 0; j < n; j++) {
     for (PetscInt e = o->row_start[j]; e < o->row_start[j + 1]; e++) w->column[k][j] -= o->row[e] * y[o->row_at[e]];
   }
+  cells = w->column[k] + n + w->n_rows;
   for (PetscInt i = 0; i < in->nd; i++) {
     const PetscReal *C = in->C + (size_t)i * (size_t)b->ns;
 
     for (PetscInt e = o->row_start[k]; e < o->row_start[k + 1]; e++)
-      w->column[k][n + i] -= C[o->row_at[e]] * o->row[e] / o->kappa[in->body[i]];
+      cells[i] -= C[o->row_at[e]] * o->row[e] / o->kappa[in->body[i]];
   }
+  TakeStrains(m, 1, cells, w->column[k] + n);
   PetscCall(PetscFree(y));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-void HycoBodiesScale(HycoROM m)
+/* B at fe's nodes, and T and the modes there: what a stress does at the nodes follows the body's size, w B, and the modes'
+   displacements are those of forces at the first one. */
+static PetscErrorCode TakePoints(HycoROM m)
+{
+  HycoBodiesPath w = (HycoBodiesPath)m->work;
+  HycoBodiesInelastic in = w->bodies.bodies->inelastic;
+  const PetscInt ns = m->fe->n_sigma, nq = HycoElementGet(m->model->mesh->type)->nq,
+                 n = m->model->mesh->nv * m->model->mesh->dim, size = ns * in->m;
+  const PetscReal of = m->fe->dim == 3 || m->fe->formulation == HYCO_AXISYMMETRIC ? 3 : 2;
+
+  PetscFunctionBegin;
+  for (PetscInt p = 0; p < in->n_points; p++) {
+    PetscReal weight, factor, sum = 0;
+
+    PetscCall(HycoFEPointRows(m->fe, w->point[p] / nq, w->point[p] % nq, w->B + p * ns * n, &weight));
+    factor = PetscPowReal(weight / in->weight[p], (of - 1) / of);
+    for (PetscInt i = p * size; i < (p + 1) * size; i++) {
+      w->T[i] = in->T[i] * factor;
+      w->there[i] = in->there[i] / factor;
+      sum += w->T[i] * w->T[i];
+    }
+    w->weight[p] = PetscSqrtReal(sum);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBodiesScale(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   const HycoBodiesWork o = &w->bodies;
   const HycoSubstructures b = o->bodies;
   HycoBodiesInelastic in = b->inelastic;
   const PetscInt l = in->m;
+  PetscReal *cells;
 
-  PetscCallVoid(PetscArrayzero(w->BP, m->model->pairs.n * l));
+  PetscFunctionBegin;
+  PetscCall(TakePoints(m));
+  PetscCall(PetscArrayzero(w->BP, m->model->pairs.n * l));
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
     for (PetscInt e = o->row_start[k]; e < o->row_start[k + 1]; e++) {
       const PetscReal value = o->row[e] / o->kappa[BodyOf(b, o->row_at[e])];
@@ -105,27 +188,51 @@ void HycoBodiesScale(HycoROM m)
       for (PetscInt j = 0; j < l; j++) w->BP[k * l + j] += value * in->P[o->row_at[e] * l + j];
     }
   }
-  for (PetscInt i = 0; i < in->nd * l; i++) w->response[i] = in->A[i] / o->kappa[in->body[i / l]];
+  PetscCall(PetscMalloc1(in->nd * PetscMax(l, b->r) + 1, &cells));
+  for (PetscInt i = 0; i < in->nd * l; i++) cells[i] = in->A[i] / o->kappa[in->body[i / l]];
+  TakeStrains(m, l, cells, w->response);
+  for (PetscInt i = 0; i < in->nd * b->r; i++) cells[i] = in->R[i] / o->kappa[in->body[i / b->r]];
+  TakeStrains(m, b->r, cells, w->loads);
+  PetscCall(PetscFree(cells));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* -- a set of closed contacts -- */
 
-/* Factors W_aa, contact by contact; those that depend on the ones before them leave the set. */
-static PetscErrorCode Factor(HycoROM m)
+/* Factors W_aa as a whole. *independent: no contact depends on those before it. */
+static PetscErrorCode FactorAll(HycoROM m, PetscBool *independent)
+{
+  HycoBodiesPath w = (HycoBodiesPath)m->work;
+  const PetscInt n = w->n_set;
+  PetscBLASInt nb, info = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < n; k++) {
+    for (PetscInt i = 0; i < n; i++) w->U[k * n + i] = i <= k ? w->column[w->set[k]][w->set[i]] : 0;
+  }
+  PetscCall(PetscBLASIntCast(n, &nb));
+  if (n) LAPACKpotrf_("U", &nb, w->U, &nb, &info);
+  *independent = (PetscBool)!info;
+  for (PetscInt k = 0; k < n && *independent; k++) {
+    const PetscReal u = w->U[k * n + k];
+
+    *independent = (PetscBool)(u * u > DEPENDENT * w->column[w->set[k]][w->set[k]]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The same contact by contact; those that depend on the ones before them leave the set. */
+static PetscErrorCode FactorEach(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   const PetscInt n = w->n_set;
 
   PetscFunctionBegin;
-  PetscCall(PetscFree(w->U));
-  PetscCall(PetscMalloc1((size_t)n * (size_t)n + 1, &w->U));
   w->n_set = 0;
   for (PetscInt k = 0; k < n; k++) {
     const PetscInt contact = w->set[k], rank = w->n_set;
-    PetscReal *u = w->U + (size_t)rank * (size_t)n, pivot;
+    PetscReal *u = w->U + (size_t)rank * (size_t)n, pivot = w->column[contact][contact];
 
-    PetscCall(Column(m, contact));
-    pivot = w->column[contact][contact];
     for (PetscInt i = 0; i < rank; i++) {
       const PetscReal *other = w->U + (size_t)i * (size_t)n;
 
@@ -139,6 +246,20 @@ static PetscErrorCode Factor(HycoROM m)
     w->set[w->n_set++] = contact;
   }
   for (PetscInt j = 0; j < w->n_set; j++) PetscCall(PetscArraymove(w->U + j * w->n_set, w->U + j * n, j + 1));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Factor(HycoROM m)
+{
+  HycoBodiesPath w = (HycoBodiesPath)m->work;
+  PetscBool independent;
+
+  PetscFunctionBegin;
+  PetscCall(PetscFree(w->U));
+  PetscCall(PetscMalloc1((size_t)w->n_set * (size_t)w->n_set + 1, &w->U));
+  for (PetscInt k = 0; k < w->n_set; k++) PetscCall(Column(m, w->set[k]));
+  PetscCall(FactorAll(m, &independent));
+  if (!independent) PetscCall(FactorEach(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -156,12 +277,32 @@ static void SolveOnSet(const HycoBodiesPath w, PetscInt k, PetscReal X[])
   BLAStrsm_("R", "U", "T", "N", &columns, &n, &one, w->U, &n, X, &columns);
 }
 
+/* S = response + the strains of the forces Z. first: where strains begin in a column. */
+static PetscErrorCode AddForces(const HycoBodiesPath w, PetscInt l, PetscInt first)
+{
+  const PetscReal one = 1;
+  PetscReal *strain;
+  PetscBLASInt rows, modes, n;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArraycpy(w->S, w->response, w->n_rows * l));
+  if (!w->n_set || !l || !w->n_rows) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1((size_t)w->n_set * (size_t)w->n_rows, &strain));
+  for (PetscInt i = 0; i < w->n_set; i++)
+    PetscCall(PetscArraycpy(strain + i * w->n_rows, w->column[w->set[i]] + first, w->n_rows));
+  PetscCall(PetscBLASIntCast(w->n_rows, &rows));
+  PetscCall(PetscBLASIntCast(l, &modes));
+  PetscCall(PetscBLASIntCast(w->n_set, &n));
+  BLASgemm_("N", "T", &modes, &rows, &n, &one, w->Z, &modes, strain, &rows, &one, w->S, &modes); /* S, Z by rows */
+  PetscCall(PetscFree(strain));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* What depends on the set but not on the loads: the factor, Z, S. */
 static PetscErrorCode TakeSet(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
-  HycoBodiesInelastic in = w->bodies.bodies->inelastic;
-  const PetscInt l = in->m, n = m->model->pairs.n;
+  const PetscInt l = w->bodies.bodies->inelastic->m, n = m->model->pairs.n;
 
   PetscFunctionBegin;
   w->factored = PETSC_FALSE;
@@ -170,37 +311,64 @@ static PetscErrorCode TakeSet(HycoROM m)
   PetscCall(PetscMalloc1(w->n_set * l + 1, &w->Z));
   for (PetscInt i = 0; i < w->n_set; i++) PetscCall(PetscArraycpy(w->Z + i * l, w->BP + w->set[i] * l, l));
   SolveOnSet(w, l, w->Z);
-  PetscCall(PetscArraycpy(w->S, w->response, in->nd * l));
-  for (PetscInt i = 0; i < w->n_set; i++) {
-    const PetscReal *cell = w->column[w->set[i]] + n;
-
-    for (PetscInt j = 0; j < in->nd; j++) {
-      for (PetscInt k = 0; k < l; k++) w->S[j * l + k] += cell[j] * w->Z[i * l + k];
-    }
-  }
+  PetscCall(AddForces(w, l, n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The part of the loads: forces and displacements of the cells at alpha = 0. */
+PetscErrorCode HycoBodiesMoveCells(HycoROM m, const PetscReal alpha[], const PetscReal Lambda[])
+{
+  HycoBodiesPath w = (HycoBodiesPath)m->work;
+  const HycoSubstructures b = w->bodies.bodies;
+  HycoBodiesInelastic in = b->inelastic;
+  PetscReal *cells;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(in->nd + 1, &cells));
+  PetscCall(Multiply(PETSC_FALSE, in->nd, b->r, in->R, w->bodies.c, 1, 1, cells));
+  PetscCall(Multiply(PETSC_FALSE, in->nd, in->m, in->A, alpha, 1, 1, cells));
+  for (PetscInt i = 0; i < in->nd; i++) cells[i] /= w->bodies.kappa[in->body[i]];
+  for (PetscInt i = 0; i < w->n_set; i++) {
+    Add(in->nd, Lambda[w->set[i]], w->column[w->set[i]] + m->model->pairs.n + w->n_rows, cells);
+  }
+  PetscCall(PetscArraycpy(w->u, m->fe->u0, m->fe->n_dof));
+  for (PetscInt i = 0; i < in->nd; i++) w->u[w->at[i]] += cells[i];
+  HycoFEComplete(m->fe, w->u);
+  PetscCall(PetscFree(cells));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* e += the strains of prescribed displacements. */
+static void AddSupports(HycoROM m, PetscReal e[])
+{
+  HycoBodiesPath w = (HycoBodiesPath)m->work;
+  const PetscInt ns = m->fe->n_sigma, nq = HycoElementGet(m->model->mesh->type)->nq,
+                 n = m->model->mesh->nv * m->model->mesh->dim;
+
+  for (PetscInt r = 0; r < w->n_rows && m->fe->lifted; r++) {
+    const PetscInt cell = w->point[r / ns] / nq;
+
+    for (PetscInt i = 0; i < n; i++) e[r] += w->B[r * n + i] * m->fe->u0[HycoCellUnknown(m->model->mesh, cell, i)];
+  }
+}
+
+/* The part of the loads: forces and strains of the points at alpha = 0. */
 static PetscErrorCode TakeLoads(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   const HycoBodiesWork o = &w->bodies;
-  const HycoSubstructures b = o->bodies;
-  HycoBodiesInelastic in = b->inelastic;
   const HycoBodiesSurface s = HycoBodiesSurfaceOf(m);
 
   PetscFunctionBegin;
   PetscCall(PetscFree(w->z));
   PetscCall(PetscMalloc1(w->n_set + 1, &w->z));
   PetscCall(HycoBodiesStrain(o, &s, NULL));
+  PetscCall(PetscArraycpy(w->gap, o->gap, m->model->pairs.n));
   for (PetscInt i = 0; i < w->n_set; i++) w->z[i] = -o->gap[w->set[i]];
   SolveOnSet(w, 1, w->z);
-  for (PetscInt i = 0; i < in->nd; i++) {
-    w->u0[i] = 0;
-    for (PetscInt j = 0; j < b->r; j++) w->u0[i] += in->R[i * b->r + j] * o->c[j] / o->kappa[in->body[i]];
-    for (PetscInt k = 0; k < w->n_set; k++) w->u0[i] += w->column[w->set[k]][m->model->pairs.n + i] * w->z[k];
-  }
+  PetscCall(PetscArrayzero(w->e0, w->n_rows));
+  PetscCall(Multiply(PETSC_FALSE, w->n_rows, o->bodies->r, w->loads, o->c, 1, 0, w->e0));
+  AddSupports(m, w->e0);
+  for (PetscInt k = 0; k < w->n_set; k++) Add(w->n_rows, w->z[k], w->column[w->set[k]] + m->model->pairs.n, w->e0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -230,15 +398,14 @@ static PetscErrorCode Check(HycoROM m, const PetscReal alpha[], PetscReal Lambda
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   const HycoBodiesWork o = &w->bodies;
-  const HycoSubstructures b = o->bodies;
-  const HycoBodiesSurface s = HycoBodiesSurfaceOf(m);
-  const PetscInt l = b->inelastic->m;
+  const PetscInt l = o->bodies->inelastic->m;
   PetscReal most = 0, size = 0;
 
   PetscFunctionBegin;
   *violated = PETSC_FALSE;
   PetscCall(PetscArrayzero(Lambda, m->model->pairs.n));
-  PetscCall(HycoBodiesStrain(o, &s, alpha));
+  PetscCall(PetscArraycpy(o->gap, w->gap, m->model->pairs.n)); /* gap -= B P alpha */
+  PetscCall(Multiply(PETSC_FALSE, m->model->pairs.n, l, w->BP, alpha, -1, 1, o->gap));
   for (PetscInt i = 0; i < w->n_set; i++) {
     PetscReal *force = &Lambda[w->set[i]];
 
@@ -263,52 +430,26 @@ static PetscErrorCode Check(HycoROM m, const PetscReal alpha[], PetscReal Lambda
 
 /* -- Newton's method on a set -- */
 
-/* u = u_0 + S alpha on the unknowns of the cells. */
-static void Displace(HycoROM m, const PetscReal alpha[])
-{
-  HycoBodiesPath w = (HycoBodiesPath)m->work;
-  HycoBodiesInelastic in = w->bodies.bodies->inelastic;
-
-  PetscCallVoid(PetscArraycpy(w->u, m->fe->u0, m->fe->n_dof));
-  for (PetscInt i = 0; i < in->nd; i++) {
-    PetscReal u = w->u0[i];
-
-    for (PetscInt k = 0; k < in->m; k++) u += w->S[i * in->m + k] * alpha[k];
-    w->u[w->at[i]] += u;
-  }
-  HycoFEComplete(m->fe, w->u);
-}
-
-/* The laws at alpha: q, r = T^T q - alpha, and its size. */
+/* The laws at alpha: s, r = T^T s - alpha, and its size. */
 static PetscErrorCode Evaluate(HycoROM m, PetscReal t0, PetscReal t1, const PetscReal alpha[], PetscBool tangent,
                                HycoStepAttempt *a)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
-  HycoPath p = w->path;
-  HycoMesh mesh = m->model->mesh;
-  const PetscInt n = mesh->nv * mesh->dim, l = w->bodies.bodies->inelastic->m;
-  const PetscReal *T = w->bodies.bodies->inelastic->T, begin = HycoNow();
-  PetscReal sum[2] = {0, 0}, size, terms = 0;
+  HycoBodiesInelastic in = w->bodies.bodies->inelastic;
+  const PetscReal begin = HycoNow();
+  PetscReal sum[2] = {0, 0}, terms = 0;
 
   PetscFunctionBegin;
-  Displace(m, alpha);
-  PetscCall(PetscMemzero(&a->law, sizeof(a->law)));
-  PetscCall(PetscArrayzero(p->f_local, m->fe->n_dof));
-  PetscCall(HycoFEStepBodies(m->fe, HYCO_BODIES_FLOWING, w->u, t0, t1, p->begin, p->end, p->f_local, tangent, &a->law));
+  PetscCall(PetscArraycpy(w->e, w->e0, w->n_rows));
+  PetscCall(Multiply(PETSC_FALSE, w->n_rows, in->m, w->S, alpha, 1, 1, w->e));
+  PetscCall(HycoFEStepPoints(m->fe, in->n_points, w->point, w->e, t0, t1, w->path->begin, w->s, w->size,
+                             tangent ? w->lost : NULL, &a->law));
   a->seconds_law += HycoNow() - begin;
   if (a->law.failed) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscArrayzero(w->r, l));
-  for (PetscInt e = 0; e < mesh->n_cells; e++) {
-    PetscReal *q = w->q + e * n;
-
-    if (!HycoInelasticFlows(m->fe, e)) continue;
-    PetscCall(HycoInelasticCellForce(m->fe, e, w->Ke + e * n * n, w->heat + e * n, w->u, p->end, q, &size));
-    terms += PetscSqr(w->weight[e] * size);
-    for (PetscInt i = 0; i < n; i++) {
-      for (PetscInt k = 0; k < l; k++) w->r[k] += T[(e * n + i) * l + k] * q[i];
-    }
-  }
-  for (PetscInt k = 0; k < l; k++) {
+  PetscCall(PetscArrayzero(w->r, in->m));
+  PetscCall(Multiply(PETSC_TRUE, w->n_rows, in->m, w->T, w->s, 1, 0, w->r));
+  for (PetscInt p = 0; p < in->n_points; p++) terms += PetscSqr(w->weight[p] * w->size[p]);
+  for (PetscInt k = 0; k < in->m; k++) {
     sum[0] += PetscSqr(w->r[k]);
     sum[1] += PetscSqr(alpha[k]);
     w->r[k] -= alpha[k];
@@ -318,52 +459,30 @@ static PetscErrorCode Evaluate(HycoROM m, PetscReal t0, PetscReal t1, const Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* J -= T_e^T (K_e - K_e,t) S_e; work: 2 n m. */
-static PetscErrorCode AddCell(HycoROM m, PetscInt e, PetscReal work[])
-{
-  HycoBodiesPath w = (HycoBodiesPath)m->work;
-  const PetscInt n = m->model->mesh->nv * m->model->mesh->dim, l = w->bodies.bodies->inelastic->m;
-  PetscReal lost[HYCO_MAX_CELL_DOFS * HYCO_MAX_CELL_DOFS], *S = work, *X = work + n * l;
-  const PetscReal minus = -1, one = 1, zero = 0;
-  PetscBLASInt lb, nb;
-
-  PetscFunctionBegin;
-  PetscCall(PetscBLASIntCast(l, &lb));
-  PetscCall(PetscBLASIntCast(n, &nb));
-  PetscCall(HycoFEBodyStiffness(m->fe, e, lost));
-  for (PetscInt i = 0; i < n * n; i++) lost[i] = w->Ke[e * n * n + i] - lost[i];
-  for (PetscInt i = 0; i < n; i++) {
-    const PetscInt row = w->cell_at[e * n + i];
-
-    if (row < 0)
-      PetscCall(PetscArrayzero(S + i * l, l));
-    else
-      PetscCall(PetscArraycpy(S + i * l, w->S + row * l, l));
-  }
-  /* rows of S, X and T_e are l long */
-  BLASgemm_("N", "N", &lb, &nb, &nb, &one, S, &lb, lost, &nb, &zero, X, &lb);
-  BLASgemm_("N", "T", &lb, &lb, &nb, &minus, X, &lb, w->bodies.bodies->inelastic->T + (size_t)(e * n) * (size_t)l, &lb,
-            &one, w->J, &lb);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Factors J = 1 - sum of T_e^T (K_e - K_e,t) S_e at the laws' tangents; it is stored by rows. */
+/* Factors J = 1 - sum of T_p^T (C - C_t) S_p at the laws' tangents; it is stored by rows. */
 static PetscErrorCode Tangent(HycoROM m, HycoStepAttempt *a)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
-  const PetscInt n = m->model->mesh->nv * m->model->mesh->dim, l = w->bodies.bodies->inelastic->m;
-  PetscReal *work;
-  PetscBLASInt lb, info;
+  const PetscInt ns = m->fe->n_sigma, l = w->bodies.bodies->inelastic->m;
+  const PetscReal minus = -1, one = 1;
+  PetscBLASInt lb, rows, info;
 
   PetscFunctionBegin;
   PetscCall(PetscBLASIntCast(l, &lb));
+  PetscCall(PetscBLASIntCast(w->n_rows, &rows));
   PetscCall(PetscArrayzero(w->J, l * l));
   for (PetscInt k = 0; k < l; k++) w->J[k * (l + 1)] = 1;
-  PetscCall(PetscMalloc1(2 * n * l + 1, &work));
-  for (PetscInt e = 0; e < m->model->mesh->n_cells; e++) {
-    if (HycoInelasticFlows(m->fe, e)) PetscCall(AddCell(m, e, work));
+  PetscCall(PetscArrayzero(w->X, w->n_rows * l));
+  for (PetscInt i = 0; i < w->n_rows; i++) {
+    PetscReal *X = w->X + i * l;
+
+    for (PetscInt c = 0; c < ns; c++) {
+      const PetscReal lost = w->lost[i * ns + c], *S = w->S + (i / ns * ns + c) * l;
+
+      for (PetscInt k = 0; k < l && lost != 0; k++) X[k] += lost * S[k];
+    }
   }
-  PetscCall(PetscFree(work));
+  if (l && rows) BLASgemm_("N", "T", &lb, &lb, &rows, &minus, w->X, &lb, w->T, &lb, &one, w->J, &lb);
   LAPACKgetrf_(&lb, &lb, w->J, &lb, w->pivot, &info);
   w->factored = (PetscBool)!info;
   if (info) HycoFormat(a->why, "the tangent of the inelastic strains is singular");

@@ -4,20 +4,44 @@
 
 /* -- ops of the path -- */
 
-/* Displacements of the surfaces and the cells, and the residuals, recomputed from them. */
-static void Settle(HycoROM m, const PetscReal Lambda[], HycoStepAttempt *a)
+/* Sets the displacements of the surfaces and of the points' cells. */
+static void MoveAll(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   const HycoBodiesSurface s = HycoBodiesSurfaceOf(m);
 
-  PetscCallVoid(PetscArraycpy(m->Lambda, Lambda, m->model->pairs.n));
-  HycoBodiesGiven(&w->bodies, &s, Lambda);
   HycoBodiesMove(&w->bodies, &s, m->U);
   for (PetscInt i = 0; i < w->bodies.bodies->inelastic->nd; i++) m->U[w->at[i]] = w->u[w->at[i]];
-  HycoBodiesMeasure(m, &w->path->kkt);
-  w->path->kkt.stationarity = a->residual;
-  a->converged = (PetscBool)(HycoKKTMax(&w->path->kkt) <= 1e-8);
-  if (!a->converged) HycoFormat(a->why, "the residual of the contacts is %.1e", (double)HycoKKTMax(&w->path->kkt));
+}
+
+/* Displacements of the surfaces and the cells, the state of these, and the residuals, recomputed from them. */
+static PetscErrorCode Settle(HycoROM m, PetscReal t0, PetscReal t1, const PetscReal alpha[], const PetscReal Lambda[],
+                             HycoStepAttempt *a)
+{
+  HycoBodiesPath w = (HycoBodiesPath)m->work;
+  HycoPath p = w->path;
+  const HycoBodiesSurface s = HycoBodiesSurfaceOf(m);
+  const PetscReal begin = HycoNow();
+
+  PetscFunctionBegin;
+  PetscCall(HycoBodiesMoveCells(m, alpha, Lambda));
+  PetscCall(PetscArrayzero(p->f_local, m->fe->n_dof));
+  PetscCall(
+      HycoFEStepBodies(m->fe, HYCO_BODIES_FLOWING, w->u, t0, t1, p->begin, p->end, p->f_local, PETSC_FALSE, &a->law));
+  a->seconds_law += HycoNow() - begin;
+  if (a->law.failed) {
+    HycoFormat(a->why, "%s", a->law.why);
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(PetscArraycpy(m->Lambda, Lambda, m->model->pairs.n));
+  PetscCall(HycoBodiesStrain(&w->bodies, &s, alpha));
+  HycoBodiesGiven(&w->bodies, &s, Lambda);
+  MoveAll(m);
+  HycoBodiesMeasure(m, &p->kkt);
+  p->kkt.stationarity = a->residual;
+  a->converged = (PetscBool)(HycoKKTMax(&p->kkt) <= 1e-8);
+  if (!a->converged) HycoFormat(a->why, "the residual of the contacts is %.1e", (double)HycoKKTMax(&p->kkt));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* alpha and the forces of the last accepted time. */
@@ -35,6 +59,29 @@ static PetscErrorCode Retry(HycoPath p, PetscReal alpha[], PetscReal Lambda[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A step with friction: elastic bodies. */
+static PetscErrorCode Rub(HycoROM m, HycoPath p, HycoStepAttempt *a)
+{
+  HycoBodiesPath w = (HycoBodiesPath)m->work;
+  const HycoBodiesSurface s = HycoBodiesSurfaceOf(m);
+  PetscScalar *L;
+  PetscBool solved;
+
+  PetscFunctionBegin;
+  PetscCall(HycoBodiesFrictionSolve(w->friction, &w->bodies, &p->kkt, &a->active_its, &solved));
+  a->iterations = 1;
+  a->law.dt_factor = 1; /* no law asks for shorter steps */
+  a->converged = solved;
+  if (!solved) HycoFormat(a->why, "not converged: no contact forces with this friction balance the load");
+  PetscCall(VecGetArray(p->Lambda, &L));
+  HycoBodiesFrictionNormal(w->friction, L);
+  PetscCall(PetscArraycpy(m->Lambda, L, m->model->pairs.n));
+  PetscCall(VecRestoreArray(p->Lambda, &L));
+  PetscCall(HycoBodiesExpand(&w->bodies, m->gamma));
+  HycoBodiesMove(&w->bodies, &s, m->U);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAttempt *a)
 {
   HycoROM m = (HycoROM)p->ctx;
@@ -42,6 +89,10 @@ static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAt
   PetscScalar *alpha, *L;
 
   PetscFunctionBegin;
+  if (w->friction) {
+    PetscCall(Rub(m, p, a));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(VecGetArray(p->U, &alpha));
   PetscCall(VecGetArray(p->Lambda, &L));
   w->always = (PetscBool)(p->method == HYCO_NEWTON_TANGENT);
@@ -53,25 +104,30 @@ static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAt
     w->always = PETSC_TRUE;
     PetscCall(HycoBodiesSearch(m, t0, t1, alpha, L, a));
   }
-  if (!a->why[0]) Settle(m, L, a);
+  if (!a->why[0]) PetscCall(Settle(m, t0, t1, alpha, L, a));
   PetscCall(VecRestoreArray(p->U, &alpha));
   PetscCall(VecRestoreArray(p->Lambda, &L));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Elastic stiffness and forces of heat of the cells, with elastic tangents. */
-static PetscErrorCode PrepareCells(HycoROM m, PetscBool stiffness)
+/* Whether the responses are those at the present rows, places, stiffness and samples, which become the last ones. */
+static PetscBool Unchanged(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
-  const PetscInt n = m->model->mesh->nv * m->model->mesh->dim;
+  const HycoBodiesWork o = &w->bodies;
+  PetscBool same = (PetscBool)(o->kept.same && w->place == m->fe->place);
+  PetscReal *last = w->last;
 
-  PetscFunctionBegin;
-  PetscCall(HycoFEElasticTangent(m->fe));
-  for (PetscInt e = 0; e < m->model->mesh->n_cells; e++) {
-    if (stiffness) PetscCall(HycoFEBodyStiffness(m->fe, e, w->Ke + e * n * n));
-    PetscCall(HycoInelasticCellHeat(m->fe, e, w->heat + e * n));
+  w->place = m->fe->place;
+  for (PetscInt k = 0; k < o->bodies->n; k++) {
+    for (PetscInt q = 0; q <= o->bodies->body[k].n_samples; q++, last++) {
+      const PetscReal now = q ? o->weight[k][q - 1] : o->kappa[k];
+
+      same = (PetscBool)(same && now == *last);
+      *last = now;
+    }
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
+  return same;
 }
 
 static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elastic)
@@ -79,19 +135,18 @@ static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elast
   HycoROM m = (HycoROM)p->ctx;
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   const HycoBodiesSurface s = HycoBodiesSurfaceOf(m);
-  PetscBool stiffness, rows;
 
   PetscFunctionBegin;
   (void)elastic;
   PetscCall(HycoROMBringRows(m, mu));
-  stiffness = m->fe->stiffness_changed;
-  rows = m->fe->contact_changed;
-  PetscCall(PrepareCells(m, stiffness));
+  if (w->friction) {
+    PetscCall(HycoBodiesFrictionPrepare(w->friction, &w->bodies, mu));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(HycoBodiesPrepare(&w->bodies, &s, mu));
-  if (!stiffness && !rows) PetscFunctionReturn(PETSC_SUCCESS);
+  if (Unchanged(m)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoBodiesForget(m));
-  w->fresh = PETSC_TRUE;
-  HycoBodiesScale(m);
+  PetscCall(HycoBodiesScale(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -103,37 +158,51 @@ static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
 
   PetscFunctionBegin;
   PetscCall(VecGetArrayRead(p->U, &alpha));
-  PetscCall(HycoBodiesExpand(&w->bodies, m->gamma));
-  HycoBodiesAddStrains(&w->bodies, alpha, m->gamma);
+  if (!w->friction) PetscCall(HycoBodiesExpand(&w->bodies, m->gamma));
+  if (!w->friction) HycoBodiesAddStrains(&w->bodies, alpha, m->gamma);
   PetscCall(VecRestoreArrayRead(p->U, &alpha));
   PetscCall(HycoTraceAdd(m, p->t));
   p->now.stored = a->law.stored;
+  if (w->friction) PetscCall(HycoBodiesFrictionAccept(w->friction));
+  if (w->friction) p->now.disproven += HycoBodiesFrictionDisproven(w->friction);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The part of q in the cells that the modes do not have, relative to q. */
+/* The part of s at the points that the modes do not have, relative to s. */
 static PetscReal Misfit(HycoROM m, const PetscReal alpha[])
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
-  HycoBodiesInelastic in = w->bodies.bodies->inelastic;
-  const PetscInt n = in->n_cells * m->model->mesh->nv * m->model->mesh->dim;
+  const PetscInt l = w->bodies.bodies->inelastic->m;
   PetscReal rest = 0, size = 0;
 
-  for (PetscInt i = 0; i < n; i++) {
-    PetscReal left = w->q[i];
+  for (PetscInt i = 0; i < w->n_rows; i++) {
+    PetscReal left = w->s[i];
 
-    for (PetscInt k = 0; k < in->m; k++) left -= in->there[i * in->m + k] * alpha[k];
+    for (PetscInt k = 0; k < l; k++) left -= w->there[i * l + k] * alpha[k];
     rest += left * left;
-    size += w->q[i] * w->q[i];
+    size += w->s[i] * w->s[i];
   }
   return size > 0 ? PetscSqrtReal(rest / size) : 0;
+}
+
+/* The state of the contacts at a listed time. */
+static PetscErrorCode RecordFriction(HycoROM m, HycoStep *s)
+{
+  const HycoSlip *slip = HycoBodiesFrictionSlip(((HycoBodiesPath)m->work)->friction);
+  PetscReal sum[2];
+
+  PetscFunctionBegin;
+  HycoSlipSum(slip, sum);
+  s->friction_work = sum[0];
+  s->n_slipping = (PetscInt)sum[1];
+  PetscCall(HycoTraceListShear(m, &slip->shear));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 static PetscErrorCode Record(HycoPath p)
 {
   HycoROM m = (HycoROM)p->ctx;
   HycoBodiesPath w = (HycoBodiesPath)m->work;
-  const HycoBodiesSurface s = HycoBodiesSurfaceOf(m);
   const PetscScalar *alpha, *L;
   HycoFEStepReport report;
 
@@ -141,9 +210,12 @@ static PetscErrorCode Record(HycoPath p)
   PetscCall(VecGetArrayRead(p->Lambda, &L));
   PetscCall(PetscArraycpy(m->Lambda, L, m->model->pairs.n));
   PetscCall(VecRestoreArrayRead(p->Lambda, &L));
+  if (w->friction && p->why[0]) { /* the last step may have been refused */
+    HycoBodiesFrictionRestore(w->friction, &w->bodies);
+    PetscCall(HycoBodiesExpand(&w->bodies, m->gamma));
+  }
   PetscCall(HycoROMExpand(m));
-  HycoBodiesMove(&w->bodies, &s, m->U);
-  for (PetscInt i = 0; i < w->bodies.bodies->inelastic->nd; i++) m->U[w->at[i]] = w->u[w->at[i]];
+  MoveAll(m);
   PetscCall(VecGetArrayRead(p->U, &alpha));
   w->misfit = PetscMax(w->misfit, Misfit(m, alpha));
   PetscCall(VecRestoreArrayRead(p->U, &alpha));
@@ -151,6 +223,7 @@ static PetscErrorCode Record(HycoPath p)
                              &report));
   p->now.stored += report.stored;
   PetscCall(HycoTraceRecord(m, p->begin, &p->now));
+  if (w->friction) PetscCall(RecordFriction(m, &p->now));
   p->steps[p->n_steps++] = p->now;
   PetscCall(PetscMemzero(&p->now, sizeof(p->now)));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -182,31 +255,66 @@ static PetscErrorCode FindUnknowns(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The points in the model's mesh. */
+static PetscErrorCode FindPoints(HycoROM m)
+{
+  HycoBodiesPath w = (HycoBodiesPath)m->work;
+  HycoBodiesInelastic in = w->bodies.bodies->inelastic;
+  HycoMesh mesh = m->model->mesh;
+  const PetscInt nq = HycoElementGet(mesh->type)->nq;
+  PetscInt *whole, *cell;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(in->n_points + 1, &w->point));
+  PetscCall(PetscMalloc2(mesh->n_cells, &whole, mesh->n_cells, &cell));
+  for (PetscInt e = 0; e < mesh->n_cells; e++) cell[e] = e;
+  PetscCall(PetscArraycpy(whole, mesh->cell_whole, mesh->n_cells));
+  PetscCall(PetscSortIntWithArray(mesh->n_cells, whole, cell));
+  for (PetscInt i = 0; i < in->n_points; i++) {
+    PetscInt at;
+
+    PetscCall(PetscFindInt(in->point[i] / nq, mesh->n_cells, whole, &at));
+    HycoCheck(at >= 0 && HycoInelasticFlows(m->fe, cell[at]), "%s: bodies/inelastic/point is damaged", m->model->path);
+    w->point[i] = cell[at] * nq + in->point[i] % nq;
+  }
+  PetscCall(PetscFree2(whole, cell));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Allocate(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   HycoBodiesInelastic in = w->bodies.bodies->inelastic;
-  const PetscInt n = m->model->mesh->nv * m->model->mesh->dim, cells = in->n_cells, l = in->m,
+  const PetscInt n = m->model->mesh->nv * m->model->mesh->dim, l = in->m, ns = m->fe->n_sigma,
                  pairs = m->model->pairs.n;
+  const PetscInt rows = w->n_rows = in->n_points * ns;
+  PetscInt samples = 0;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc1(cells * n * n, &w->Ke));
-  PetscCall(PetscCalloc1(cells * n, &w->heat));
-  PetscCall(PetscCalloc1(cells * n, &w->q));
-  PetscCall(PetscCalloc1(cells, &w->weight));
+  PetscCall(PetscCalloc1(rows * n + 1, &w->B));
+  PetscCall(PetscCalloc1(rows * l + 1, &w->T));
+  PetscCall(PetscCalloc1(rows * l + 1, &w->there));
+  PetscCall(PetscCalloc1(in->n_points + 1, &w->weight));
   PetscCall(PetscMalloc1(pairs * l + 1, &w->BP));
-  PetscCall(PetscMalloc1(in->nd * l + 1, &w->response));
-  PetscCall(PetscMalloc1(in->nd * l + 1, &w->S));
-  PetscCall(PetscCalloc1(in->nd + 1, &w->u0));
+  PetscCall(PetscMalloc1(rows * l + 1, &w->response));
+  PetscCall(PetscMalloc1(rows * w->bodies.bodies->r + 1, &w->loads));
+  PetscCall(PetscMalloc1(rows * l + 1, &w->S));
+  PetscCall(PetscMalloc1(rows * l + 1, &w->X));
+  PetscCall(PetscCalloc1(rows + 1, &w->e0));
+  PetscCall(PetscCalloc1(rows + 1, &w->e));
+  PetscCall(PetscCalloc1(rows + 1, &w->s));
+  PetscCall(PetscCalloc1(in->n_points + 1, &w->size));
+  PetscCall(PetscCalloc1(rows * ns + 1, &w->lost));
   PetscCall(PetscCalloc1(m->fe->n_dof, &w->u));
   PetscCall(PetscCalloc1(l + 1, &w->r));
   PetscCall(PetscMalloc1(l * l + 1, &w->J));
   PetscCall(PetscMalloc1(l + 1, &w->pivot));
   PetscCall(PetscCalloc1(pairs + 1, &w->column));
+  PetscCall(PetscCalloc1(pairs + 1, &w->gap));
+  for (PetscInt k = 0; k < w->bodies.bodies->n; k++) samples += 1 + w->bodies.bodies->body[k].n_samples;
+  PetscCall(PetscCalloc1(samples + 1, &w->last));
   PetscCall(PetscMalloc1(pairs + 1, &w->set));
   w->n_set = -1;
-  for (PetscInt i = 0; i < cells * n * l; i++) w->weight[i / (n * l)] += PetscSqr(in->T[i]);
-  for (PetscInt e = 0; e < cells; e++) w->weight[e] = PetscSqrtReal(w->weight[e]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -248,8 +356,11 @@ static PetscErrorCode SetUp(HycoROM m)
   m->n = w->bodies.bodies->inelastic->m;
   m->fe->all_facets = PETSC_TRUE;
   s = HycoBodiesSurfaceOf(m);
-  PetscCall(HycoBodiesSetUp(&w->bodies, w->bodies.bodies, m->model->scene, &s, m->solver));
+  if (HycoSceneHasFriction(m->model->scene)) PetscCall(HycoBodiesFrictionCreate(m->model->scene, &s, &w->friction));
+  PetscCall(HycoBodiesSetUp(&w->bodies, w->bodies.bodies, m->model->scene,
+                            w->friction ? HycoBodiesFrictionSurface(w->friction) : &s, m->solver));
   PetscCall(FindUnknowns(m));
+  PetscCall(FindPoints(m));
   PetscCall(Allocate(m));
   PetscCall(CreatePath(m));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -262,12 +373,14 @@ static PetscErrorCode Reset(HycoROM m)
   PetscFunctionBegin;
   if (!w) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoBodiesForget(m));
-  HycoFreeAll(&w->at, &w->cell_at, &w->Ke, &w->heat, &w->weight, &w->BP, &w->response, &w->column, &w->set, &w->U,
-              &w->Z, &w->S, &w->z, &w->u0, &w->u, &w->q, &w->r, &w->J, &w->pivot);
+  HycoFreeAll(&w->at, &w->cell_at, &w->point, &w->B, &w->T, &w->there, &w->weight, &w->BP, &w->response, &w->loads,
+              &w->column, &w->set, &w->U, &w->Z, &w->S, &w->z, &w->e0, &w->gap, &w->last, &w->u, &w->e, &w->s, &w->size,
+              &w->lost, &w->X, &w->r, &w->J, &w->pivot);
   PetscCall(VecDestroy(&w->alpha));
   PetscCall(VecDestroy(&w->L));
   PetscCall(HycoPathFree(&w->path));
   if (w->bodies.bodies) PetscCall(HycoBodiesReset(&w->bodies));
+  PetscCall(HycoBodiesFrictionDestroy(&w->friction));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -277,10 +390,11 @@ static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
 
   PetscFunctionBegin;
   w->misfit = 0;
-  w->fresh = PETSC_TRUE; /* the same factors whatever was predicted before */
-  PetscCall(HycoBodiesForget(m));
+  HycoBodiesRestart(m); /* the same factors whatever was predicted before */
+  if (w->friction) PetscCall(HycoBodiesFrictionBegin(w->friction));
   PetscCall(HycoTraceFollow(m, w->path, mu));
-  PetscCall(PetscStrncpy(m->prediction.method, HycoNewtons[w->path->method], sizeof(m->prediction.method)));
+  PetscCall(PetscStrncpy(m->prediction.method, w->friction ? HYCO_SOLVER_SEMISMOOTH : HycoNewtons[w->path->method],
+                         sizeof(m->prediction.method)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -301,11 +415,12 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
 
   PetscFunctionBegin;
   PetscCall(HycoBodiesView(m, viewer));
-  PetscCall(PetscViewerASCIIPrintf(viewer,
-                                   "  inelastic modes: %d; laws in %d of %d elements; an error of the modes is "
-                                   "amplified up to %.3g times\n",
-                                   (int)in->m, (int)in->n_cells, (int)m->model->whole_cells,
-                                   (double)in->amplification));
+  PetscCall(
+      PetscViewerASCIIPrintf(viewer,
+                             "  inelastic modes: %d; laws at %d points, in %d of %d elements; an error of the modes is "
+                             "amplified up to %.3g times\n",
+                             (int)in->m, (int)in->n_points, (int)m->model->mesh->n_cells, (int)m->model->whole_cells,
+                             (double)in->amplification));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -317,6 +432,8 @@ PetscErrorCode HycoBodiesTakePath(HycoROM m)
                                        .history = PETSC_TRUE,
                                        .surfaces = PETSC_TRUE,
                                        .cells = PETSC_TRUE,
+                                       .friction = PETSC_TRUE,
+                                       .integrals = PETSC_TRUE,
                                        .work = sizeof(struct _n_HycoBodiesPath),
                                        .resultants = PETSC_TRUE};
   static const HycoROMOps ops = {.setup = SetUp,

@@ -3,39 +3,52 @@
 #define BODIES_PATH_H
 
 #include <hycobodies.h>
-#include <hycoinelasticforces.h>
 #include <hycopath.h>
 
 typedef struct _n_HycoBodiesPath {
   struct _n_HycoBodiesWork bodies; /* the first, as in the model without a history */
   HycoPath path;
+  HycoBodiesFriction friction; /* NULL: no contact has any */
   Vec alpha, L;
-  PetscInt *at, *cell_at;        /* by unknown of the cells: of fe's mesh; by cell and its unknown: its row, or -1 */
-  PetscReal *Ke, *heat, *weight; /* by cell: elastic stiffness, force of thermal strains, 2-norm of its part of T */
-  PetscReal *BP, *response;      /* contacts x m: B P / kappa; nd x m: A / kappa */
-  PetscReal **column;       /* by contact: gaps of all contacts, then cells, for a unit force; NULL: not needed yet */
+  PetscInt *at, *cell_at;   /* by unknown of the cells: of fe's mesh; by cell and its unknown: its row, or -1 */
+  PetscInt *point, n_rows;  /* the points in the model's mesh; n_sigma rows each: */
+  PetscReal *B, *T, *there; /* n_rows x (nv dim): strains; n_rows x m: as in HycoBodiesInelastic, at fe's nodes */
+  PetscReal *weight;        /* by point: norm of its rows of T */
+  PetscReal *BP, *response; /* contacts x m: B P / kappa; n_rows x m: strains by alpha, */
+  PetscReal *loads;         /* and n_rows x r: by loads */
+  PetscReal **column;       /* by contact: gaps of all contacts, strains, displacements of the cells for a unit force;
+                               NULL: not needed yet */
   PetscBool fresh;          /* rows or stiffness have changed since the set was factored */
   PetscInt n_set, *set;     /* closed contacts */
   PetscReal *U;             /* n_set x n_set: upper factor of W_aa */
-  PetscReal *Z, *S;         /* n_set x m: forces per alpha; nd x m: displacements of the cells per alpha */
-  PetscReal *z, *u0;        /* n_set, nd: the same at alpha = 0 */
-  PetscReal *u, *q, *r, *J; /* n_dof, columns of T, m, m x m */
+  PetscReal *Z, *S;         /* n_set x m: forces per alpha; n_rows x m: strains per alpha */
+  PetscReal *z, *e0, *gap;  /* n_set, n_rows: the same at alpha = 0; by contact: gaps there, without forces */
+  PetscReal *u;             /* n_dof: displacements, in the points' cells */
+  PetscReal *e, *s, *size;  /* n_rows: strains; what their stresses lack of the elastic ones; by point: of its terms */
+  PetscReal *lost, *X;      /* n_rows x n_sigma: derivative of s; n_rows x m: times S */
+  PetscReal *r, *J;         /* m, m x m */
   PetscBLASInt *pivot;      /* of J's factor, */
   PetscBool factored;       /* which belongs to the set */
+  PetscReal *last;          /* by body: kappa and weights of its samples to which the columns belong, */
+  PetscInt place;           /* and the place of fe's nodes */
   PetscBool always;         /* a new tangent in each iteration */
-  PetscReal norm, floor;    /* of alpha and T q; of r: round-off */
-  PetscReal misfit;         /* of q in the span of the modes in the cells, the largest of the listed times */
+  PetscReal norm, floor;    /* of alpha and T^T s; of r: round-off */
+  PetscReal misfit;         /* of s in the span of the modes at the points, the largest of the listed times */
 } * HycoBodiesPath;
 
 static inline HycoBodiesSurface HycoBodiesSurfaceOf(HycoROM m)
 {
-  return (HycoBodiesSurface){m->fe, &m->model->pairs, &m->rows};
+  return HycoBodiesSurfaceNormal(m->fe, &m->model->pairs, &m->rows);
 }
 
-/* Forgets the responses of the contacts and the set, after a change of rows or stiffness, and scales those of the modes to
-   the present one. */
+/* Forgets the responses of the contacts and the set, after a change of rows or stiffness; takes strains and responses of the
+   modes at the present ones. */
 PetscErrorCode HycoBodiesForget(HycoROM model);
-void HycoBodiesScale(HycoROM model);
+/* Forgets the set alone. */
+void HycoBodiesRestart(HycoROM model);
+PetscErrorCode HycoBodiesScale(HycoROM model);
+/* The displacements of the points' cells, without those prescribed there: u, for alpha and forces. */
+PetscErrorCode HycoBodiesMoveCells(HycoROM model, const PetscReal alpha[], const PetscReal Lambda[]);
 /* Newton's method on sets of contacts until one holds: alpha and the forces at t1 from those at t0; else a->why. */
 PetscErrorCode HycoBodiesSearch(HycoROM model, PetscReal t0, PetscReal t1, PetscReal alpha[], PetscReal Lambda[],
                                 HycoStepAttempt *a);

@@ -50,7 +50,8 @@ PetscErrorCode HycoBodiesDestroy(HycoSubstructures *bodies)
   if (b->inelastic) {
     HycoBodiesInelastic s = b->inelastic;
 
-    HycoFreeAll(&s->T, &s->there, &s->P, &s->fields, &s->dof, &s->body, &s->C, &s->R, &s->A, &b->inelastic);
+    HycoFreeAll(&s->point, &s->weight, &s->T, &s->there, &s->P, &s->fields, &s->dof, &s->body, &s->C, &s->R, &s->A,
+                &b->inelastic);
   }
   PetscCall(PetscFree(*bodies));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -174,7 +175,7 @@ static PetscErrorCode GrowRows(HycoBodiesWork o, PetscInt room)
 PetscErrorCode HycoBodiesSetUp(HycoBodiesWork o, HycoSubstructures b, HycoScene scene, const HycoBodiesSurface *s,
                                HycoSolver solver)
 {
-  const PetscInt m = s->pairs->n;
+  const PetscInt m = s->n;
 
   PetscFunctionBegin;
   o->bodies = b;
@@ -182,7 +183,7 @@ PetscErrorCode HycoBodiesSetUp(HycoBodiesWork o, HycoSubstructures b, HycoScene 
   o->solver = solver ? solver : o->own;
   PetscCall(PetscCalloc1(b->n, &o->weight));
   for (PetscInt k = 0; k < b->n; k++) PetscCall(PetscMalloc1(b->body[k].n_samples, &o->weight[k]));
-  PetscCall(HycoFECreate(scene, b->probe, &o->fe));
+  PetscCall(HycoFECreate(scene, b->probe->dm, &o->fe));
   o->fe->heat_is_load = PETSC_TRUE;
   PetscCall(PetscMalloc1(3 * b->probe->nv * b->n, &o->X0));
   PetscCall(PetscMalloc1(b->n, &o->E0));
@@ -329,16 +330,16 @@ static PetscErrorCode TurnRows(HycoBodiesWork o, const HycoBodiesSurface *s)
   PetscInt n = 0;
 
   PetscFunctionBegin;
-  PetscCall(GrowRows(o, rows->start[s->pairs->n] * dim + 1)); /* mortars may meet more masters than before */
+  PetscCall(GrowRows(o, rows->start[s->n] * dim + 1)); /* mortars may meet more masters than before */
   o->row_start[0] = 0;
-  for (PetscInt k = 0; k < s->pairs->n; k++) {
+  for (PetscInt k = 0; k < s->n; k++) {
     for (PetscInt e = rows->start[k]; e < rows->start[k + 1]; e++) {
       const PetscInt place = o->loc[rows->dof[e]], node = rows->dof[e] / dim, c = rows->dof[e] % dim;
       PetscInt body;
 
       HycoCheck(place >= 0 && place < b->ns,
                 "contact %s: node %d is not among the surfaces on which the model of bodies was trained",
-                s->fe->scene->contact[s->pairs->contact[k]]->name, (int)s->fe->mesh->node_id[node]);
+                s->fe->scene->contact[s->contact[k]]->name, (int)s->fe->mesh->node_id[node]);
       body = BodyOf(b, place);
       for (PetscInt d = 0; d < dim; d++) {
         const PetscReal value = o->pose[body].Q[3 * c + d] * rows->value[e];
@@ -525,6 +526,18 @@ static PetscErrorCode SolveSet(HycoBodiesWork o, Problem *p, PetscBool *solved)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Frees what Fill() made. */
+static PetscErrorCode Release(HycoBodiesWork o, Problem *p)
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; p->C && k < o->bodies->n; k++) PetscCall(PetscFree(p->C[k]));
+  if (p->C) PetscCall(PetscFree2(p->first, p->C));
+  HycoFreeAll(&p->M, &p->at, &p->place);
+  PetscCall(PetscFree3(p->q, p->z, p->y));
+  p->n_place = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode SolveProblem(HycoBodiesWork o, Problem *p, PetscReal Lambda[], PetscBool *solved)
 {
   const HycoSubstructures b = o->bodies;
@@ -542,11 +555,21 @@ static PetscErrorCode SolveProblem(HycoBodiesWork o, Problem *p, PetscReal Lambd
   for (PetscInt i = 0; i < b->p; i++) o->x[i] = p->z[i];
   for (PetscInt k = 0; k < p->n; k++) /* negative by round-off; the residuals are recomputed */
     Lambda[p->contact[k]] = b->p && !o->active[k] ? 0 : PetscMax(p->z[b->p + k], 0);
-  for (PetscInt k = 0; p->C && k < b->n; k++) PetscCall(PetscFree(p->C[k]));
-  if (p->C) PetscCall(PetscFree2(p->first, p->C));
-  HycoFreeAll(&p->M, &p->at, &p->place);
-  PetscCall(PetscFree3(p->q, p->z, p->y));
-  p->n_place = 0;
+  PetscCall(Release(o, p));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBodiesMatrix(HycoBodiesWork o, PetscInt n, const PetscInt contact[], PetscReal M[])
+{
+  const size_t size = (size_t)(o->bodies->p + n);
+  Problem p = {.n = n};
+
+  PetscFunctionBegin;
+  HycoDuplicate(n, contact, &p.contact);
+  PetscCall(Fill(o, &p));
+  PetscCall(PetscArraycpy(M, p.M, size * size));
+  PetscCall(Release(o, &p));
+  PetscCall(PetscFree(p.contact));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -557,12 +580,12 @@ static PetscErrorCode Displace(HycoBodiesWork o, const HycoBodiesSurface *s, con
 
   PetscFunctionBegin;
   PetscCall(PetscArrayzero(o->f, b->ns));
-  for (PetscInt k = 0; k < s->pairs->n; k++) {
-    for (PetscInt j = o->row_start[k]; Lambda[k] > 0 && j < o->row_start[k + 1]; j++)
+  for (PetscInt k = 0; k < s->n; k++) {
+    for (PetscInt j = o->row_start[k]; Lambda[k] != 0 && j < o->row_start[k + 1]; j++)
       o->f[o->row_at[j]] += o->row[j] * Lambda[k];
   }
   PetscCall(PetscArraycpy(o->u, o->free, b->ns));
-  if (o->kept.same) PetscCall(HycoBodiesKeptDisplace(o, s->pairs->n, Lambda, o->u));
+  if (o->kept.same) PetscCall(HycoBodiesKeptDisplace(o, s->n, Lambda, o->u));
   for (PetscInt k = 0; k < b->n && !o->kept.same; k++) {
     const HycoSubstructure *own = &b->body[k];
     PetscReal *u = o->u + b->start[k];
@@ -588,7 +611,7 @@ static void Join(HycoBodiesWork o, const HycoBodiesSurface *s, PetscReal size, P
                  PetscBool *more)
 {
   *more = PETSC_FALSE;
-  for (PetscInt k = 0; k < s->pairs->n; k++) {
+  for (PetscInt k = 0; k < s->n; k++) {
     PetscReal gap = s->rows->gap[k];
 
     if (in[k] || o->row_start[k] == o->row_start[k + 1]) continue;
@@ -608,11 +631,11 @@ static PetscErrorCode SolveRounds(HycoBodiesWork o, const HycoBodiesSurface *s, 
   PetscBool more = PETSC_TRUE;
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < s->pairs->n; k++) {
+  for (PetscInt k = 0; k < s->n; k++) {
     if (o->row_start[k] == o->row_start[k + 1]) continue;
     size = PetscMax(size, PetscAbsReal(o->gap[k]));
   }
-  for (PetscInt k = 0; k < s->pairs->n; k++) {
+  for (PetscInt k = 0; k < s->n; k++) {
     in[k] = (PetscBool)(o->row_start[k] < o->row_start[k + 1] && (b->p || o->gap[k] < -CLOSED * size));
     if (in[k]) p->contact[p->n++] = k;
   }
@@ -636,7 +659,7 @@ PetscErrorCode HycoBodiesPrepare(HycoBodiesWork o, const HycoBodiesSurface *s, c
   PetscCall(Load(o));
   PetscCall(BlendMotions(o));
   PetscCall(TurnRows(o, s));
-  PetscCall(HycoBodiesKeepRows(o, s->pairs->n));
+  PetscCall(HycoBodiesKeepRows(o, s->n));
   PetscCall(HycoBodiesStrain(o, s, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -649,13 +672,12 @@ PetscErrorCode HycoBodiesStrain(HycoBodiesWork o, const HycoBodiesSurface *s, co
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(o->free, o->elastic, b->ns));
   for (PetscInt k = 0; k < b->n && m; k++) {
-    for (PetscInt i = b->start[k]; i < b->start[k + 1]; i++) {
-      const PetscReal *P = b->inelastic->P + (size_t)i * (size_t)m;
+    const PetscBLASInt rows = (PetscBLASInt)b->body[k].n, modes = (PetscBLASInt)m, each = 1;
+    const PetscReal factor = 1 / o->kappa[k], one = 1, *P = b->inelastic->P + (size_t)b->start[k] * (size_t)m;
 
-      for (PetscInt j = 0; j < m; j++) o->free[i] += P[j] * alpha[j] / o->kappa[k];
-    }
+    if (rows) BLASgemv_("T", &modes, &rows, &factor, P, &modes, alpha, &each, &one, o->free + b->start[k], &each);
   }
-  for (PetscInt k = 0; k < s->pairs->n; k++) {
+  for (PetscInt k = 0; k < s->n; k++) {
     o->gap[k] = s->rows->gap[k];
     for (PetscInt j = o->row_start[k]; j < o->row_start[k + 1]; j++) o->gap[k] -= o->row[j] * o->free[o->row_at[j]];
   }
@@ -666,9 +688,9 @@ void HycoBodiesGiven(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscRe
 {
   PetscInt *closed, n = 0;
 
-  PetscCallVoid(PetscMalloc1(s->pairs->n + 1, &closed));
-  for (PetscInt k = 0; k < s->pairs->n; k++) {
-    if (Lambda[k] > 0) closed[n++] = k;
+  PetscCallVoid(PetscMalloc1(s->n + 1, &closed));
+  for (PetscInt k = 0; k < s->n; k++) {
+    if (Lambda[k] != 0) closed[n++] = k;
   }
   PetscCallVoid(HycoBodiesKeep(o, n, closed));
   PetscCallVoid(PetscFree(closed));
@@ -684,8 +706,8 @@ PetscErrorCode HycoBodiesContact(HycoBodiesWork o, const HycoBodiesSurface *s, P
   o->its = 0;
   o->reason = HYCO_CONVERGED;
   PetscCall(PetscStrncpy(o->method, HYCO_SOLVER_ACTIVE_SET, sizeof(o->method)));
-  PetscCall(PetscArrayzero(Lambda, s->pairs->n));
-  PetscCall(PetscMalloc2(s->pairs->n + 1, &in, s->pairs->n + 1, &p.contact));
+  PetscCall(PetscArrayzero(Lambda, s->n));
+  PetscCall(PetscMalloc2(s->n + 1, &in, s->n + 1, &p.contact));
   PetscCall(SolveRounds(o, s, &p, in, Lambda, solved));
   o->n_problem = p.n;
   PetscCall(PetscFree2(in, p.contact));

@@ -93,7 +93,7 @@ PetscErrorCode HycoGalerkinSetUp(HycoROM m)
   PetscFunctionBegin;
   g->model = (HycoGalerkinModel)m->model->data;
   PetscCall(HycoGalerkinCreateOwn(m));
-  PetscCall(HycoFECreate(m->model->scene, g->own, &m->fe));
+  PetscCall(HycoFECreate(m->model->scene, g->own->dm, &m->fe));
   PetscCall(CountUnknowns(m));
   dense = (PetscBool)((m->n <= HYCO_DENSE_MAX && !g->bordered) || (g->model->symmetric && !m->model->n_fe) ||
                       (g->model->G && !g->bordered));

@@ -22,13 +22,14 @@ static PetscErrorCode CountNodes(HycoROM m, PetscInt *n)
   }
   PetscCall(ISGetMinMax(m->model->rid, NULL, &last));
   *n = PetscMax(*n, last + 1);                    /* an empty set has the least integer as its largest node */
-  PetscCall(PetscCalloc1(mesh->n_nodes, &slave)); /* with a measured normal */
+  PetscCall(PetscCalloc1(mesh->n_nodes, &slave)); /* with a measured normal or integrals */
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
     if (!m->model->in_rid[k]) continue;
     *n = PetscMax(*n, m->model->pairs.slave[k] + 1);
     for (PetscInt j = m->model->pairs.master_start[k]; j < m->model->pairs.master_start[k + 1]; j++)
       *n = PetscMax(*n, m->model->pairs.master[j] + 1);
-    if (HycoContactAverages(m->model->scene->contact[m->model->pairs.contact[k]]))
+    if (HycoContactAverages(m->model->scene->contact[m->model->pairs.contact[k]]) ||
+        m->model->scene->contact[m->model->pairs.contact[k]]->integrated)
       slave[m->model->pairs.slave[k]] = PETSC_TRUE;
   }
   for (PetscInt f = 0; f < mesh->n_facets; f++) {
@@ -42,45 +43,6 @@ static PetscErrorCode CountNodes(HycoROM m, PetscInt *n)
       *n = PetscMax(*n, mesh->tied_master[j] + 1);
   }
   PetscCall(PetscFree(slave));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* A view of mesh with its first n nodes: it has its own facets and groups, and shares the rest. */
-static PetscErrorCode ViewMesh(HycoMesh mesh, PetscInt n, HycoMesh *own)
-{
-  HycoMesh o;
-  PetscInt count = 0;
-
-  PetscFunctionBegin;
-  PetscCall(PetscNew(own));
-  o = *own;
-  *o = *mesh;
-  o->n_nodes = n;
-  o->dm = NULL; /* which has other facets */
-  o->facet_point = NULL;
-  while (o->n_tied && o->tied[o->n_tied - 1] >= n) o->n_tied--;
-  o->n_facets = 0;
-  PetscCall(PetscMalloc1(mesh->n_facets * mesh->nf, &o->facets));
-  PetscCall(PetscMalloc1(mesh->n_facets, &o->facet_group));
-  PetscCall(PetscMalloc1(mesh->n_facets, &o->facet_cell));
-  for (PetscInt f = 0; f < mesh->n_facets; f++) {
-    PetscBool inside = PETSC_TRUE;
-
-    for (PetscInt a = 0; a < mesh->nf; a++) inside = (PetscBool)(inside && mesh->facets[f * mesh->nf + a] < n);
-    if (!inside) continue;
-    PetscCall(PetscArraycpy(o->facets + o->n_facets * mesh->nf, mesh->facets + f * mesh->nf, mesh->nf));
-    o->facet_group[o->n_facets] = mesh->facet_group[f];
-    o->facet_cell[o->n_facets++] = mesh->facet_cell[f];
-  }
-  PetscCall(PetscMalloc1(mesh->n_groups + 1, &o->group_start));
-  PetscCall(PetscMalloc1(mesh->group_start[mesh->n_groups], &o->group_node));
-  o->group_start[0] = 0;
-  for (PetscInt g = 0; g < mesh->n_groups; g++) {
-    for (PetscInt k = mesh->group_start[g]; k < mesh->group_start[g + 1]; k++) {
-      if (mesh->group_node[k] < n) o->group_node[count++] = mesh->group_node[k];
-    }
-    o->group_start[g + 1] = count;
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -109,7 +71,7 @@ PetscErrorCode HycoGalerkinCreateOwn(HycoROM m)
 
   PetscFunctionBegin;
   PetscCall(CountNodes(m, &n));
-  PetscCall(ViewMesh(m->model->mesh, n, &g->own));
+  PetscCall(HycoSubmeshFirst(m->model->scene, m->model->mesh, n, &g->own));
   PetscCall(SelectPairs(m));
   PetscCall(HycoRowsCreate(&g->own_pairs, m->model->mesh->dim, &g->own_rows));
   m->of_fe = &g->own_pairs;
@@ -219,20 +181,6 @@ PetscErrorCode HycoGalerkinContactMatrix(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Frees the arrays that the view does not share with the mesh it is of. */
-static PetscErrorCode DestroyView(HycoMesh *mesh)
-{
-  PetscFunctionBegin;
-  if (!*mesh) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscFree((*mesh)->facets));
-  PetscCall(PetscFree((*mesh)->facet_group));
-  PetscCall(PetscFree((*mesh)->facet_cell));
-  PetscCall(PetscFree((*mesh)->group_start));
-  PetscCall(PetscFree((*mesh)->group_node));
-  PetscCall(PetscFree(*mesh));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode HycoGalerkinDestroyOwn(HycoGalerkin g)
 {
   PetscFunctionBegin;
@@ -241,7 +189,7 @@ PetscErrorCode HycoGalerkinDestroyOwn(HycoGalerkin g)
   PetscCall(ISDestroy(&g->sets.is_Ac));
   PetscCall(ISDestroy(&g->sets.is_Ac_all));
   PetscCall(ISDestroy(&g->sets.is_A_lambda));
-  PetscCall(DestroyView(&g->own));
+  PetscCall(HycoMeshDestroy(&g->own));
   PetscCall(HycoPairsDestroy(&g->own_pairs));
   PetscCall(HycoRowsDestroy(&g->own_rows));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -90,11 +90,16 @@ PetscErrorCode HycoROMCreate_Hybrid(HycoROM m)
                                        .stiffness = PETSC_TRUE,
                                        .constrains = PETSC_TRUE,
                                        .resultants = PETSC_TRUE,
-                                       .history = PETSC_TRUE};
+                                       .history = PETSC_TRUE,
+                                       .integrals = PETSC_TRUE};
   static const HycoROMOps ops = {.options = SetFromOptions,
                                  .setup = HycoGalerkinSetUp,
                                  .reset = Reset,
                                  .solve = HycoGalerkinSolve,
+                                 .unknowns = HycoGalerkinUnknowns,
+                                 .residual = HycoGalerkinResidual,
+                                 .jacobian = HycoGalerkinJacobian,
+                                 .expand = HycoGalerkinUnpack,
                                  .reconstruct = HycoHybridReconstruct,
                                  .energy = HycoGalerkinEnergy,
                                  .condition = HycoGalerkinCondition,

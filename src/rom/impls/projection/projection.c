@@ -228,10 +228,15 @@ PetscErrorCode HycoROMCreate_Projection(HycoROM m)
                                        .whole = PETSC_TRUE,
                                        .stiffness = PETSC_TRUE,
                                        .force_basis = PETSC_TRUE,
-                                       .history = PETSC_TRUE};
+                                       .history = PETSC_TRUE,
+                                       .integrals = PETSC_TRUE};
   static const HycoROMOps ops = {.setup = HycoProjectionSetUp,
                                  .reset = HycoGalerkinReset,
                                  .solve = HycoGalerkinSolve,
+                                 .unknowns = HycoGalerkinUnknowns,
+                                 .residual = HycoGalerkinResidual,
+                                 .jacobian = HycoGalerkinJacobian,
+                                 .expand = HycoGalerkinUnpack,
                                  .energy = HycoGalerkinEnergy,
                                  .condition = HycoGalerkinCondition,
                                  .local = HycoGalerkinLocal,

@@ -385,3 +385,12 @@ PetscErrorCode HycoSolverFormCreate_Dual(HycoSolver s, HycoSolverForm form)
                                            .destroy = Destroy};
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+void HycoSolverGetCondensed(HycoSolver s, PetscInt *m, PetscInt *p, const PetscReal *S[])
+{
+  const Dual *d = (const Dual *)HycoSolverFindForm(s, "dual")->data;
+
+  *m = d->m;
+  *p = d->p;
+  *S = d->S;
+}

@@ -52,7 +52,9 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   HycoLCP lcp = {.n = y->m,
                  .symmetric = PETSC_TRUE,
                  .blocks = y->blocks,
+                 .sign = y->blocks ? &s->sign : NULL,
                  .warm = s->warm,
+                 .given = (PetscBool)(y->blocks != NULL),
                  .monitor = s->monitor,
                  .monitor_ctx = s->monitor_ctx};
   PetscScalar *l;

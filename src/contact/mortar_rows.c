@@ -7,7 +7,8 @@
   acts as its consistent nodal forces on both sides, at borders of the master too.
 */
 #include "mortar.h"
-#include "../../facing.h"
+#include "facing.h"
+#include <hycocarriers.h>
 #include <hycokinematics.h>
 #include <petscblaslapack.h>
 
@@ -20,6 +21,8 @@
 #define TWICE 1.05
 /* Weights below are round-off. */
 #define SNAP 1e-14
+/* Pivots over a facet's radius below which its nodes do not determine a linear function. */
+#define UNDETERMINED 1e-3
 
 /* The integrals of a slave's facet with one facet of the master. */
 typedef struct {
@@ -39,10 +42,13 @@ typedef struct {
   HycoRule rule;
   PetscInt corners;
   PetscReal reach;
-  PetscInt *row; /* by node: its place among the slaves, -1: none */
-  PetscReal *D;  /* by row: of all facets */
+  PetscInt *row;             /* by node: its place among the slaves, -1: none */
+  PetscReal *D;              /* by row: of all facets */
+  const HycoProjection *pin; /* by node: the point that a slave without a row follows (n = 0: none); NULL: no ties */
+  PetscInt *taker;           /* with pin, by node: the row that takes its forces where no node of a facet can, or -1 */
   PetscInt n_near, *near;
   /* of the current facet */
+  HycoPlane plane;
   PetscReal size, facing; /* its area; of the part that faces the master */
   PetscReal M[HYCO_FACET_NODES][HYCO_FACET_NODES], own[HYCO_FACET_NODES]; /* integrals of N_i N_k, of N_i */
   PetscInt n_blocks, room_blocks;
@@ -52,8 +58,8 @@ typedef struct {
 } Mortar;
 
 /* Second-order quadrilaterals have products of degree 8, triangles of degree 4; on a circle the radius is one more. */
-static PetscErrorCode MortarCreate(HycoContact c, HycoFE fe, PetscReal reach, PetscInt n, const PetscInt slave[],
-                                   Mortar *s)
+static PetscErrorCode MortarCreate(HycoFE fe, PetscInt slaves, PetscInt masters, PetscReal reach, PetscInt n,
+                                   const PetscInt slave[], Mortar *s)
 {
   HycoMesh m = fe->mesh;
   const PetscInt order = HycoMeshIsQuadratic(m) ? 2 : 1;
@@ -65,7 +71,7 @@ static PetscErrorCode MortarCreate(HycoContact c, HycoFE fe, PetscReal reach, Pe
   s->corners = HycoCellKinds[m->type].corners;
   PetscCall(
       HycoRuleCreate(m->dim, 2 * order * (s->corners == 4 ? 2 : 1) + (fe->formulation == HYCO_AXISYMMETRIC), &s->rule));
-  PetscCall(HycoMasterSearchCreate(fe, c, PETSC_FALSE, &s->t));
+  PetscCall(HycoMasterSearchCreateOn(fe, slaves, masters, PETSC_FALSE, &s->t));
   PetscCall(PetscMalloc3(m->n_nodes, &s->row, n, &s->D, s->t.n, &s->near));
   PetscCall(PetscArrayzero(s->D, n));
   for (PetscInt i = 0; i < m->n_nodes; i++) s->row[i] = -1;
@@ -78,6 +84,7 @@ static PetscErrorCode MortarDestroy(Mortar *s)
 {
   PetscFunctionBegin;
   PetscCall(PetscFree3(s->row, s->D, s->near));
+  PetscCall(PetscFree(s->taker));
   PetscCall(HycoPatchesDestroy(&s->patches));
   PetscCall(HycoMasterSearchDestroy(&s->t));
   HycoFreeAll(&s->block, &s->term);
@@ -195,8 +202,8 @@ static PetscErrorCode FindPieces(Mortar *s, PetscInt f, HycoSide *slave)
   const PetscInt *node = m->facets + f * m->nf, corners = HycoFacetCorners(s->corners, node);
   const PetscReal *X[4];
   PetscReal normal[3], limit;
+  HycoPlane *plane = &s->plane;
   HycoProjection at;
-  HycoPlane plane;
   HycoPrism prism;
 
   PetscFunctionBegin;
@@ -205,20 +212,20 @@ static PetscErrorCode FindPieces(Mortar *s, PetscInt f, HycoSide *slave)
   PetscCall(HycoFacetVector(s->fe, f, normal));
   HycoNormalise(normal);
   if (!(HycoDot(normal, normal) > 0)) PetscFunctionReturn(PETSC_SUCCESS); /* on the axis */
-  HycoPlaneSet(m->dim, corners, X, normal, &plane);
-  HycoSideSet(&plane, m->nf, s->corners, node, s->fe->X, slave);
+  HycoPlaneSet(m->dim, corners, X, normal, plane);
+  HycoSideSet(plane, m->nf, s->corners, node, s->fe->X, slave);
   s->size = SizeOf(m->dim, slave);
-  HycoPatchesProject(s->patches, plane.centre, NULL, &at);
-  limit = PetscMin(s->reach, (at.distance + plane.radius) / -HYCO_OPPOSED);
-  prism.radius = plane.radius;
-  prism.along = limit + plane.radius; /* the facet may be warped */
-  PetscCall(PetscArraycpy(prism.centre, plane.centre, 3));
-  PetscCall(PetscArraycpy(prism.normal, plane.normal, 3));
+  HycoPatchesProject(s->patches, plane->centre, NULL, &at);
+  limit = PetscMin(s->reach, (at.distance + plane->radius) / -HYCO_OPPOSED);
+  prism.radius = plane->radius;
+  prism.along = limit + plane->radius; /* the facet may be warped */
+  PetscCall(PetscArraycpy(prism.centre, plane->centre, 3));
+  PetscCall(PetscArraycpy(prism.normal, plane->normal, 3));
   PetscCall(HycoPatchesWithin(s->patches, &prism, &s->n_near, s->near));
   do {
-    PetscCall(AddPieces(s, &plane, slave, limit));
+    PetscCall(AddPieces(s, plane, slave, limit));
     limit /= 2;
-  } while (s->facing > TWICE * s->size && limit > ROUND_OFF * plane.radius);
+  } while (s->facing > TWICE * s->size && limit > ROUND_OFF * plane->radius);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -250,8 +257,106 @@ static PetscErrorCode MakeDual(Mortar *s, const HycoSide *slave, PetscBool *usab
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds a facet's part to the rows of its nodes, in proportion to the nodes' integrals; a node on the axis of cells of
-   second order, which has none, takes the facet's. */
+static PetscErrorCode AddTerm(Mortar *s, PetscInt row, PetscInt node, PetscReal value)
+{
+  PetscFunctionBegin;
+  if (s->n_terms == s->room_terms) {
+    s->room_terms = 2 * s->room_terms + 1024;
+    PetscCall(PetscRealloc((size_t)s->room_terms * sizeof(Term), &s->term));
+  }
+  s->term[s->n_terms++] = (Term){row, node, value};
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds `value` times the dual mean over node i's part of the facet to a row. */
+static PetscErrorCode AddMean(Mortar *s, PetscInt i, PetscInt row, PetscReal value)
+{
+  PetscFunctionBegin;
+  for (PetscInt b = 0; b < s->n_blocks; b++) {
+    for (PetscInt j = 0; j < s->block[b].nf; j++)
+      PetscCall(AddTerm(s, row, s->block[b].node[j], value * s->block[b].P[i][j]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether a facet's node a has a function of positive integral, by which forces act on it. */
+static PetscBool Carries(const Mortar *s, PetscInt a, PetscInt node)
+{
+  return (PetscBool)(a >= HycoMeshFirstCarrier(s->fe->mesh) && !HycoNodeHasNoArea(s->fe, node));
+}
+
+/* Node i of the facet follows its own point v_i instead of its dual mean p_i. So that the forces on both sides stay in
+   balance, other nodes k of the facet take its function: psi_k + c_k psi_i, with sum of c_k = 1, and row k gets
+   c_k D_i (p_i - v_i). c: in proportion to D_k; for second order extrapolated linearly, if the nodes k determine that. */
+static PetscErrorCode AddPinned(Mortar *s, const HycoSide *slave, PetscInt i, const PetscReal c[])
+{
+  const HycoProjection *at = &s->pin[slave->node[i]];
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k <= slave->nf; k++) {
+    const PetscInt row = k < slave->nf ? s->row[slave->node[k]] : s->taker[slave->node[i]];
+    const PetscReal value = c[k] * s->own[i];
+
+    if (c[k] == 0 || row < 0) continue;
+    PetscCall(AddMean(s, i, row, value));
+    for (PetscInt a = 0; a < at->n; a++) PetscCall(AddTerm(s, row, at->node[a], -value * at->weight[a]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The shares c of node i for second order: of least squares among those with sum c_k = 1 and sum c_k (x_k - x_i) = 0; false
+   if the nodes do not determine them. */
+static PetscBool Extrapolate(const Mortar *s, const HycoSide *slave, PetscInt i, const PetscBool takes[], PetscReal c[])
+{
+  const PetscInt size = s->plane.dim;
+  PetscReal d[HYCO_FACET_NODES][3];
+  PetscScalar A[9] = {0}, b[3] = {1, 0, 0};
+  PetscBLASInt n = (PetscBLASInt)size, one = 1, info;
+
+  for (PetscInt k = 0; k < slave->nf; k++) {
+    PetscReal r[3];
+
+    for (PetscInt e = 0; e < 3; e++)
+      r[e] = (s->fe->X[3 * slave->node[k] + e] - s->fe->X[3 * slave->node[i] + e]) / s->plane.radius;
+    d[k][0] = 1;
+    for (PetscInt e = 1; e < size; e++) d[k][e] = HycoDot(r, s->plane.axis[e - 1]);
+    for (PetscInt e = 0; takes[k] && e < size * size; e++) A[e] += d[k][e / size] * d[k][e % size];
+  }
+  LAPACKpotrf_("L", &n, A, &n, &info);
+  for (PetscInt e = 0; e < size && !info; e++) info = PetscRealPart(A[e * size + e]) < UNDETERMINED;
+  if (info) return PETSC_FALSE;
+  LAPACKpotrs_("L", &n, &one, A, &n, b, &n, &info);
+  for (PetscInt k = 0; k < slave->nf; k++) {
+    c[k] = 0;
+    for (PetscInt e = 0; takes[k] && e < size; e++) c[k] += PetscRealPart(b[e]) * d[k][e];
+  }
+  return PETSC_TRUE;
+}
+
+/* What the facet's nodes without a row leave to those with one; c[nf]: to another facet. */
+static PetscErrorCode AddPins(Mortar *s, const HycoSide *slave)
+{
+  PetscBool takes[HYCO_FACET_NODES];
+  PetscReal c[HYCO_FACET_NODES + 1], sum = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < slave->nf; k++) {
+    takes[k] = (PetscBool)(s->row[slave->node[k]] >= 0 && Carries(s, k, slave->node[k]));
+    if (takes[k]) sum += s->own[k];
+  }
+  for (PetscInt i = 0; i < slave->nf; i++) {
+    if (!s->pin[slave->node[i]].n || s->row[slave->node[i]] >= 0) continue;
+    c[slave->nf] = !(sum > 0);
+    if (slave->nf == slave->corners || !Extrapolate(s, slave, i, takes, c)) {
+      for (PetscInt k = 0; k < slave->nf; k++) c[k] = takes[k] && sum > 0 ? s->own[k] / sum : 0;
+    }
+    PetscCall(AddPinned(s, slave, i, c));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds a facet's part to the rows of its nodes, in proportion to the nodes' integrals; a node without an integral takes
+   the facet's: on the axis of cells of second order, and, in ties, the corners of their triangles. */
 static PetscErrorCode AddFacet(Mortar *s, PetscInt f)
 {
   HycoSide slave;
@@ -262,20 +367,13 @@ static PetscErrorCode AddFacet(Mortar *s, PetscInt f)
   if (s->n_blocks) PetscCall(MakeDual(s, &slave, &usable));
   for (PetscInt i = 0; usable && i < slave.nf; i++) {
     const PetscInt row = s->row[slave.node[i]];
-    const PetscReal share = HycoNodeHasNoArea(s->fe, slave.node[i]) ? s->size : s->own[i];
+    const PetscReal share = Carries(s, i, slave.node[i]) ? s->own[i] : s->size;
 
     if (row < 0) continue;
     s->D[row] += share;
-    for (PetscInt b = 0; b < s->n_blocks; b++) {
-      for (PetscInt j = 0; j < s->block[b].nf; j++) {
-        if (s->n_terms == s->room_terms) {
-          s->room_terms = 2 * s->room_terms + 1024;
-          PetscCall(PetscRealloc((size_t)s->room_terms * sizeof(Term), &s->term));
-        }
-        s->term[s->n_terms++] = (Term){row, s->block[b].node[j], share * s->block[b].P[i][j]};
-      }
-    }
+    PetscCall(AddMean(s, i, row, share));
   }
+  if (usable && s->pin) PetscCall(AddPins(s, &slave));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -338,13 +436,38 @@ static PetscErrorCode Append(const Mortar *s, PetscInt index, PetscInt n, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* By node of the slave without a row: the row of the nearest node that shares a facet with it, or with such a node. */
+static PetscErrorCode FindTakers(Mortar *s)
+{
+  HycoMesh m = s->fe->mesh;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(m->n_nodes, &s->taker));
+  for (PetscInt i = 0; i < m->n_nodes; i++) s->taker[i] = -1;
+  for (PetscInt k = 0; k < 2 * m->n_facets; k++) { /* facets of nodes with rows, then the others */
+    const PetscInt f = k % m->n_facets, *node = m->facets + f * m->nf;
+    PetscInt row = -1;
+
+    if (m->facet_group[f] != s->t.slave) continue;
+    for (PetscInt a = 0; a < m->nf; a++) {
+      const PetscInt own = Carries(s, a, node[a]) ? s->row[node[a]] : -1;
+
+      if (row < 0) row = own >= 0 || k < m->n_facets ? own : s->taker[node[a]];
+    }
+    for (PetscInt a = 0; a < m->nf; a++) {
+      if (s->taker[node[a]] < 0) s->taker[node[a]] = row;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Integrate(Mortar *s, PetscInt index, PetscInt n, const PetscInt slave[], HycoPairs *pairs)
 {
   HycoMesh m = s->fe->mesh;
 
   PetscFunctionBegin;
   for (PetscInt f = 0; f < m->n_facets && s->patches; f++) {
-    PetscBool any = PETSC_FALSE;
+    PetscBool any = (PetscBool)(s->pin != NULL);
 
     if (m->facet_group[f] != s->t.slave) continue;
     for (PetscInt a = 0; a < m->nf; a++) any = (PetscBool)(any || s->row[m->facets[f * m->nf + a]] >= 0);
@@ -354,18 +477,45 @@ static PetscErrorCode Integrate(Mortar *s, PetscInt index, PetscInt n, const Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The slave's and the master's groups are those of t. */
+static PetscErrorCode Run(Mortar *s, PetscInt index, PetscInt n, const PetscInt slave[], HycoPairs *pairs)
+{
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  ierr = Integrate(s, index, n, slave, pairs);
+  PetscCall(MortarDestroy(s));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoMortarRows(HycoContact c, HycoFE fe, PetscInt index, PetscReal reach, PetscInt n,
                               const PetscInt slave[], HycoPairs *pairs)
 {
+  PetscInt slaves, masters;
   Mortar s;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
+  PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->slave, &slaves));
+  PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->master, &masters));
   PetscCall(HycoLogEvent(HYCO_EVENT_SEARCH, PETSC_TRUE));
-  PetscCall(MortarCreate(c, fe, reach, n, slave, &s));
-  ierr = Integrate(&s, index, n, slave, pairs);
+  PetscCall(MortarCreate(fe, slaves, masters, reach, n, slave, &s));
+  ierr = Run(&s, index, n, slave, pairs);
   PetscCall(HycoLogEvent(HYCO_EVENT_SEARCH, PETSC_FALSE));
-  PetscCall(MortarDestroy(&s));
   PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMortarTie(HycoFE fe, PetscInt slaves, PetscInt masters, const HycoProjection pin[], PetscInt n,
+                             const PetscInt slave[], HycoPairs *pairs)
+{
+  Mortar s;
+
+  PetscFunctionBegin;
+  PetscCall(MortarCreate(fe, slaves, masters, PETSC_MAX_REAL, n, slave, &s));
+  s.pin = pin;
+  PetscCall(FindTakers(&s));
+  PetscCall(Run(&s, 0, n, slave, pairs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,7 +1,7 @@
-/* Mortar contacts: private to their type. */
+/* Mortar contacts and ties: private to contact/. */
 #ifndef HYCO_MORTAR_H
 #define HYCO_MORTAR_H
-#include "../../master_search.h"
+#include "master_search.h"
 
 /* Most points of a rule on a triangle. */
 #define HYCO_MORTAR_POINTS 25
@@ -45,5 +45,9 @@ void HycoPieceCut(PetscInt dim, const HycoSide *slave, const HycoSide *master, H
 /* Appends the n slaves of contact number `index` to pairs, with their masters at fe's nodes at most `reach` away. */
 PetscErrorCode HycoMortarRows(HycoContact contact, HycoFE fe, PetscInt index, PetscReal reach, PetscInt n,
                               const PetscInt slave[], HycoPairs *pairs);
+/* The same for a tie of two groups on fe's nodes: rows of the n slaves; the slave group's other nodes follow the points
+   pin[] (by node), and the rows around them take over the forces of their functions. */
+PetscErrorCode HycoMortarTie(HycoFE fe, PetscInt slaves, PetscInt masters, const HycoProjection pin[], PetscInt n,
+                             const PetscInt slave[], HycoPairs *pairs);
 
 #endif

@@ -1,0 +1,51 @@
+/* Derivatives of outputs with respect to the parameters: the data are differentiated by differences along one parameter,
+   the solution by the linear system of its closed contacts. */
+#ifndef HYCOGRADIENT_H
+#define HYCOGRADIENT_H
+
+#include <hycofomimpl.h>
+#include <hycosceneimpl.h>
+
+/* Contacts with more than this share of the largest force count as closed where their masters are compared. */
+#define HYCO_GRADIENT_FORCE 1e-7
+
+/* Fails for a scene without outputs or parameters, and for one with a history. */
+PetscErrorCode HycoGradientCheckScene(HycoScene scene);
+
+/* The points of a difference along a parameter: mu + step[k], the first with step 0, weight[k] of the data there. */
+typedef struct {
+  PetscInt parameter;
+  PetscReal step[3], weight[3];
+  int sign; /* the direction of one-sided derivatives: 1; at the upper end of the range -1 */
+} HycoDifference;
+
+/* Central where the range has room for it, else of the same order to the inside. */
+void HycoDifferenceSet(HycoScene scene, const PetscReal mu[], PetscInt parameter, HycoDifference *difference);
+/* The one-sided difference in the direction `sign`. */
+void HycoDifferenceTakeSide(HycoDifference *difference);
+/* mu + step[k], at[n_variables]. */
+void HycoDifferencePoint(const HycoDifference *difference, HycoScene scene, const PetscReal mu[], PetscInt k,
+                         PetscReal at[]);
+/* The same difference with a quarter of its step. */
+void HycoDifferenceShrink(HycoDifference *difference);
+/* By how much the slopes to the two sides differ; 0: by no more than a small share of `slope` (0: of the larger one), or
+   by the round-off of values of this size. */
+PetscReal HycoDifferenceJump(const HycoDifference *difference, PetscReal size, PetscReal slope,
+                             const PetscReal value[3]);
+/* Whether such a jump is a kink, and not curvature: it stays at a quarter of the step, with the values `closer`. */
+PetscBool HycoDifferenceKinks(const HycoDifference *difference, PetscReal jump, const PetscReal closer[3]);
+
+/* Allocates for the scene's outputs and parameters. */
+PetscErrorCode HycoGradientCreate(HycoScene scene, HycoGradientStore *store, HycoGradient *gradient);
+/* NULL-safe. */
+PetscErrorCode HycoGradientDestroy(HycoGradientStore *store);
+/* Whether an output has different slopes to the two sides, from the outputs at the three points (3 x n_outputs): then
+   closer ones are needed to know a kink from curvature. */
+PetscBool HycoGradientNeedsCloser(const HycoGradient *gradient, const HycoDifference *difference,
+                                  const PetscReal value[]);
+/* Sets the column of the difference's parameter; closer: NULL, or the outputs at the points of the shrunk difference;
+   kink: the solution has one. */
+void HycoGradientSet(HycoGradient *gradient, HycoGradientStore *store, const HycoDifference *difference,
+                     const PetscReal value[], const PetscReal closer[], PetscBool kink);
+
+#endif

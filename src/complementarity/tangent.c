@@ -1,0 +1,215 @@
+/*
+  The derivative of the solution z = (x, L) of a dense complementarity problem: w = q + M z, w = 0 in the rows of x,
+  0 <= L complementary to w in the others. Where q changes by q', closed contacts keep w' = 0 and open ones L' = 0. For
+  contacts with neither force nor gap, which are undecided, it is one-sided: 0 <= L' complementary to w' >= 0, a problem
+  of these contacts alone once the others are eliminated.
+*/
+#include <hycolcp.h>
+#include <petscblaslapack.h>
+
+#define NEAR      1e-7  /* forces and gaps below this share of the largest are near zero */
+#define DEPENDENT 1e-10 /* share of its flexibility that a contact has left, if its row depends on closed ones */
+#define NOTHING   1e-9  /* share of its terms below which the change of a gap is round-off */
+#define REGULAR   1e-14 /* smallest pivot over the largest of the scaled matrix */
+
+struct _n_HycoTangent {
+  PetscInt p, n;             /* unknowns x; contacts */
+  PetscInt n_set, *set;      /* x and the closed contacts */
+  PetscInt n_open, *open;    /* undecided contacts that may close */
+  PetscReal *lu, *scale;     /* n_set square, column major, of the scaled matrix; n_set */
+  PetscReal *S, *out, *into; /* Schur complement of the undecided; M_open,set; M_set^-1 M_set,open; by columns */
+  PetscReal *v;              /* n_set */
+  PetscBLASInt *ipiv;
+};
+
+PetscErrorCode HycoTangentDestroy(HycoTangent *tangent)
+{
+  HycoTangent t = *tangent;
+
+  PetscFunctionBegin;
+  if (!t) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoFreeAll(&t->set, &t->open, &t->lu, &t->scale, &t->S, &t->out, &t->into, &t->v, &t->ipiv);
+  PetscCall(PetscFree(*tangent));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTangentStates(PetscInt n, const PetscReal L[], const PetscReal w[], PetscReal size,
+                                 const PetscReal flexibility[], PetscInt state[])
+{
+  PetscReal most = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < n; i++) most = PetscMax(most, L[i]);
+  for (PetscInt i = 0; i < n; i++) {
+    const PetscBool closed =
+        (PetscBool)(L[i] > NEAR * most && (flexibility[i] <= 0 || L[i] * flexibility[i] > NEAR * size));
+
+    state[i] = closed ? HYCO_TANGENT_CLOSED : w[i] <= NEAR * size ? HYCO_TANGENT_UNDECIDED : HYCO_TANGENT_OPEN;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscBool HycoTangentMayTouch(PetscReal L, PetscReal w, PetscReal size)
+{
+  return (PetscBool)(L > 0 || w <= NEAR * size);
+}
+
+/* The columns of M of the set, scaled to entries of order 1: the rows of x and of contacts have different units. */
+static PetscErrorCode Factor(HycoTangent t, const PetscReal M[], PetscBool *regular)
+{
+  const size_t n = (size_t)(t->p + t->n), m = (size_t)t->n_set;
+  PetscBLASInt mb, info;
+  PetscReal least = PETSC_MAX_REAL, most = 0;
+
+  PetscFunctionBegin;
+  *regular = PETSC_TRUE;
+  if (!m) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscBLASIntCast(t->n_set, &mb));
+  for (size_t j = 0; j < m; j++) {
+    const PetscReal diagonal = PetscAbsReal(M[(size_t)t->set[j] * n + (size_t)t->set[j]]);
+
+    t->scale[j] = diagonal > 0 ? 1 / PetscSqrtReal(diagonal) : 0;
+  }
+  for (size_t j = 0; j < m; j++) { /* without a diagonal: by the largest entry of the row, once the others are scaled */
+    PetscReal largest = 0;
+
+    if (t->scale[j] > 0) continue;
+    for (size_t i = 0; i < m; i++)
+      largest =
+          PetscMax(largest, PetscAbsReal(M[(size_t)t->set[i] * n + (size_t)t->set[j]]) * PetscMax(t->scale[i], 0));
+    t->scale[j] = largest > 0 ? -1 / largest : -1;
+  }
+  for (size_t j = 0; j < m; j++) t->scale[j] = PetscAbsReal(t->scale[j]);
+  for (size_t j = 0; j < m; j++) {
+    for (size_t i = 0; i < m; i++)
+      t->lu[j * m + i] = M[(size_t)t->set[j] * n + (size_t)t->set[i]] * t->scale[i] * t->scale[j];
+  }
+  LAPACKgetrf_(&mb, &mb, t->lu, &mb, t->ipiv, &info);
+  for (size_t j = 0; j < m; j++) {
+    least = PetscMin(least, PetscAbsReal(t->lu[j * m + j]));
+    most = PetscMax(most, PetscAbsReal(t->lu[j * m + j]));
+  }
+  *regular = (PetscBool)(!info && least > REGULAR * most);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* x = M_set^-1 x */
+static void Solve(HycoTangent t, PetscReal x[])
+{
+  const PetscBLASInt m = (PetscBLASInt)t->n_set, one = 1;
+  PetscBLASInt info;
+
+  if (!m) return;
+  for (PetscBLASInt i = 0; i < m; i++) x[i] *= t->scale[i];
+  LAPACKgetrs_("N", &m, &one, t->lu, &m, t->ipiv, x, &m, &info);
+  for (PetscBLASInt i = 0; i < m; i++) x[i] *= t->scale[i];
+}
+
+/* Without the contacts whose rows depend on closed ones, which these decide. */
+static PetscErrorCode Condense(HycoTangent t, const PetscReal M[])
+{
+  const size_t n = (size_t)(t->p + t->n), m = (size_t)t->n_set;
+  PetscInt kept = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(m * (size_t)t->n_open + 1, &t->into));
+  PetscCall(PetscMalloc1(m * (size_t)t->n_open + 1, &t->out));
+  PetscCall(PetscMalloc1((size_t)t->n_open * (size_t)t->n_open + 1, &t->S));
+  for (PetscInt k = 0; k < t->n_open; k++) {
+    const size_t at = (size_t)t->open[k];
+    PetscReal *into = t->into + m * (size_t)kept, *out = t->out + m * (size_t)kept, left = M[at * n + at],
+              size = PetscAbsReal(left);
+
+    for (size_t i = 0; i < m; i++) {
+      into[i] = M[at * n + (size_t)t->set[i]];
+      out[i] = M[(size_t)t->set[i] * n + at];
+    }
+    Solve(t, into);
+    for (size_t i = 0; i < m; i++) left -= out[i] * into[i];
+    for (size_t i = 0; i < m; i++) size += PetscAbsReal(out[i] * into[i]);
+    if (left > DEPENDENT * size) t->open[kept++] = t->open[k];
+  }
+  t->n_open = kept;
+  for (PetscInt j = 0; j < kept; j++) {
+    for (PetscInt i = 0; i < kept; i++) {
+      PetscReal sum = M[(size_t)t->open[j] * n + (size_t)t->open[i]];
+
+      for (size_t k = 0; k < m; k++) sum -= t->out[m * (size_t)i + k] * t->into[m * (size_t)j + k];
+      t->S[j * kept + i] = sum;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTangentCreate(PetscInt p, PetscInt n, const PetscReal M[], const PetscInt state[],
+                                 HycoTangent *tangent, PetscBool *regular)
+{
+  HycoTangent t;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(tangent));
+  t = *tangent;
+  t->p = p;
+  t->n = n;
+  PetscCall(PetscMalloc1(p + n + 1, &t->set));
+  PetscCall(PetscMalloc1(n + 1, &t->open));
+  for (PetscInt i = 0; i < p; i++) t->set[t->n_set++] = i;
+  for (PetscInt i = 0; i < n; i++) {
+    if (state[i] == HYCO_TANGENT_CLOSED) t->set[t->n_set++] = p + i;
+    if (state[i] == HYCO_TANGENT_UNDECIDED) t->open[t->n_open++] = p + i;
+  }
+  PetscCall(PetscMalloc1((size_t)t->n_set * (size_t)t->n_set + 1, &t->lu));
+  PetscCall(PetscMalloc1(t->n_set + 1, &t->scale));
+  PetscCall(PetscMalloc1(t->n_set + 1, &t->v));
+  PetscCall(PetscMalloc1(t->n_set + 1, &t->ipiv));
+  PetscCall(Factor(t, M, regular));
+  if (*regular) PetscCall(Condense(t, M));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscInt HycoTangentUndecided(HycoTangent t)
+{
+  return t->n_open;
+}
+
+/* The undecided contacts: q becomes their gaps' change, which is 0 where it is round-off; *kink: some are not. */
+static void Gaps(HycoTangent t, const PetscReal q[], int sign, PetscReal change[], PetscBool *kink)
+{
+  *kink = PETSC_FALSE;
+  for (PetscInt k = 0; k < t->n_open; k++) {
+    const PetscReal *out = t->out + (size_t)k * (size_t)t->n_set;
+    PetscReal size;
+
+    change[k] = sign * q[t->open[k]];
+    size = PetscAbsReal(change[k]);
+    for (PetscInt i = 0; i < t->n_set; i++) {
+      change[k] += sign * out[i] * t->v[i];
+      size += PetscAbsReal(out[i] * t->v[i]);
+    }
+    if (PetscAbsReal(change[k]) <= NOTHING * size) change[k] = 0;
+    *kink = (PetscBool)(*kink || change[k] != 0);
+  }
+}
+
+PetscErrorCode HycoTangentSolve(HycoTangent t, const PetscReal q[], int sign, PetscReal z[], PetscBool *kink)
+{
+  PetscReal *change, *force;
+  PetscInt its = 0;
+  HycoLCPStatus status = HYCO_LCP_SOLVED;
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < t->n_set; i++) t->v[i] = -q[t->set[i]];
+  Solve(t, t->v);
+  PetscCall(PetscArrayzero(z, t->p + t->n));
+  PetscCall(PetscCalloc2(t->n_open + 1, &change, t->n_open + 1, &force));
+  Gaps(t, q, sign, change, kink);
+  if (*kink) PetscCall(HycoLCPLemke(t->n_open, t->S, change, 50 + 10 * t->n_open, force, &its, &status));
+  for (PetscInt k = 0; k < t->n_open && status == HYCO_LCP_SOLVED; k++) {
+    z[t->open[k]] = sign * force[k];
+    for (PetscInt i = 0; i < t->n_set; i++)
+      t->v[i] -= t->into[(size_t)k * (size_t)t->n_set + (size_t)i] * sign * force[k];
+  }
+  for (PetscInt i = 0; i < t->n_set; i++) z[t->set[i]] = t->v[i];
+  PetscCall(PetscFree2(change, force));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,139 @@
+/* Differences of data along a parameter, and the gradients that they give. */
+#include <hycogradient.h>
+
+#define STEP 3e-5 /* share of the range: the error of the central difference is about 1e-9, that of round-off less */
+#define KINK 1e-3 /* share of a slope by which those to the two sides differ, if it is no curvature */
+#define STAYS                                                                                                          \
+  0.5 /* share of that difference which remains at a quarter of the step, where curvature leaves a quarter */
+#define ROUND 1e-9 /* share of a value below which a difference may be round-off */
+
+PetscErrorCode HycoGradientCheckScene(HycoScene s)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoSceneRefuseHistory(s, "a gradient"));
+  HycoCheck(s->n_quantities, "a gradient is that of the scene's outputs, and it has none; add an entry output");
+  HycoCheck(s->n_parameters, "a gradient is with respect to the scene's parameters, and it has none");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void HycoDifferenceSet(HycoScene scene, const PetscReal mu[], PetscInt p, HycoDifference *d)
+{
+  const PetscReal width = scene->hi[p] - scene->lo[p];
+  PetscReal h = STEP * (width > 0 ? width : PetscMax(PetscAbsReal(mu[p]), 1));
+  const PetscBool inside = (PetscBool)(mu[p] >= scene->lo[p] && mu[p] <= scene->hi[p] && width > 0);
+
+  h = (mu[p] + h) - mu[p]; /* representable */
+  *d = (HycoDifference){.parameter = p, .step = {0, h, -h}, .weight = {0, 0.5 / h, -0.5 / h}, .sign = 1};
+  if (!inside || (mu[p] - h >= scene->lo[p] && mu[p] + h <= scene->hi[p])) return;
+  if (mu[p] + h > scene->hi[p]) d->sign = -1;
+  h *= d->sign;
+  *d = (HycoDifference){.parameter = p, .step = {0, h, 2 * h}, .weight = {-1.5 / h, 2 / h, -0.5 / h}, .sign = d->sign};
+}
+
+void HycoDifferenceTakeSide(HycoDifference *d)
+{
+  d->weight[0] = -1 / d->step[1];
+  d->weight[1] = 1 / d->step[1];
+  d->weight[2] = 0;
+}
+
+void HycoDifferencePoint(const HycoDifference *d, HycoScene scene, const PetscReal mu[], PetscInt k, PetscReal at[])
+{
+  for (PetscInt p = 0; p < scene->n_variables; p++) at[p] = mu[p] + (p == d->parameter ? d->step[k] : 0);
+}
+
+void HycoDifferenceShrink(HycoDifference *d)
+{
+  for (PetscInt k = 0; k < 3; k++) {
+    d->step[k] /= 4;
+    d->weight[k] *= 4;
+  }
+}
+
+/* The slopes to the two sides, or of the two parts of a one-sided difference. */
+static void Slopes(const HycoDifference *d, const PetscReal v[3], PetscReal slope[2])
+{
+  const PetscReal *s = d->step;
+
+  slope[0] = (v[1] - v[0]) / (s[1] - s[0]);
+  slope[1] = s[2] * s[1] < 0 ? (v[0] - v[2]) / (s[0] - s[2]) : (v[2] - v[1]) / (s[2] - s[1]);
+}
+
+PetscReal HycoDifferenceJump(const HycoDifference *d, PetscReal size, PetscReal slope, const PetscReal v[3])
+{
+  PetscReal s[2], jump;
+
+  Slopes(d, v, s);
+  jump = PetscAbsReal(s[0] - s[1]);
+  if (slope <= 0) slope = PetscMax(PetscAbsReal(s[0]), PetscAbsReal(s[1]));
+  return jump > KINK * slope && jump * PetscAbsReal(d->step[1]) > ROUND * size ? jump : 0;
+}
+
+PetscBool HycoDifferenceKinks(const HycoDifference *d, PetscReal jump, const PetscReal closer[3])
+{
+  HycoDifference near = *d;
+  PetscReal s[2];
+
+  HycoDifferenceShrink(&near);
+  Slopes(&near, closer, s);
+  return (PetscBool)(jump > 0 && PetscAbsReal(s[0] - s[1]) > STAYS * jump);
+}
+
+PetscErrorCode HycoGradientCreate(HycoScene scene, HycoGradientStore *store, HycoGradient *g)
+{
+  const PetscInt n = scene->n_quantities * scene->n_parameters;
+
+  PetscFunctionBegin;
+  PetscCall(HycoGradientDestroy(store));
+  PetscCall(PetscCalloc1(n + 1, &store->value));
+  PetscCall(PetscCalloc1(n + 1, &store->kink));
+  *g = (HycoGradient){.n_outputs = scene->n_quantities,
+                      .n_parameters = scene->n_parameters,
+                      .value = store->value,
+                      .kink = store->kink};
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoGradientDestroy(HycoGradientStore *store)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscFree(store->value));
+  PetscCall(PetscFree(store->kink));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The jump of the slopes of output q. */
+static PetscReal Jump(const HycoGradient *g, const HycoDifference *d, const PetscReal value[], PetscInt q)
+{
+  const PetscReal v[3] = {value[q], value[g->n_outputs + q], value[2 * g->n_outputs + q]};
+
+  return HycoDifferenceJump(d, PetscMax(PetscAbsReal(v[0]), PetscAbsReal(v[1])), 0, v);
+}
+
+PetscBool HycoGradientNeedsCloser(const HycoGradient *g, const HycoDifference *d, const PetscReal value[])
+{
+  for (PetscInt q = 0; q < g->n_outputs; q++) {
+    if (Jump(g, d, value, q) > 0) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
+void HycoGradientSet(HycoGradient *g, HycoGradientStore *store, const HycoDifference *d, const PetscReal value[],
+                     const PetscReal closer[], PetscBool kink)
+{
+  const PetscInt n = g->n_outputs;
+
+  for (PetscInt q = 0; q < n; q++) {
+    const PetscInt at = q * g->n_parameters + d->parameter;
+    HycoDifference side = *d;
+    PetscBool turns = PETSC_FALSE;
+
+    if (closer)
+      turns = HycoDifferenceKinks(d, Jump(g, d, value, q),
+                                  (const PetscReal[]){closer[q], closer[n + q], closer[2 * n + q]});
+    if (turns) HycoDifferenceTakeSide(&side);
+    store->value[at] = 0;
+    for (PetscInt k = 0; k < 3; k++) store->value[at] += side.weight[k] * value[k * n + q];
+    store->kink[at] = (PetscBool)(kink || turns);
+  }
+}

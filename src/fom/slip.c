@@ -1,0 +1,128 @@
+/* Contacts with friction, at full order and in a model (hycoslip.h). */
+#include <hycoentries.h>
+#include <hycosceneimpl.h>
+#include <hycoslip.h>
+
+/* The shares of mu r_n above which a contact counts as slipping. */
+#define SLIPS (1 - 1e-8)
+/* Slips below this share of the largest displacement are round-off, and do no work. */
+#define ROUNDING 1e-12
+
+/* The rows of the contacts and their cones. */
+static PetscErrorCode CountRows(HycoSlip *s, HycoScene scene, const HycoPairs *pairs)
+{
+  const PetscInt n = s->n;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc3(n + 1, &s->row, n, &s->of, n, &s->mu));
+  PetscCall(PetscMalloc2(2 * n, &s->data, 6 * n, &s->tangent));
+  s->row[0] = 0;
+  for (PetscInt k = 0; k < n; k++) {
+    s->of[k] = scene->contact[pairs->contact[k]]->friction != NULL;
+    s->row[k + 1] = s->row[k] + (s->of[k] ? s->dim : 1);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSlipCreate(MPI_Comm comm, HycoScene scene, const HycoPairs *pairs, PetscInt dim, HycoSlip *s)
+{
+  const PetscInt n = pairs->n;
+
+  PetscFunctionBegin;
+  s->n = n;
+  s->dim = dim;
+  PetscCall(CountRows(s, scene, pairs));
+  for (PetscInt c = 0; c < 2; c++) {
+    PetscCall(HycoConeCreate(comm, &s->cone[c]));
+    PetscCall(HycoConeSetSize(s->cone[c], c ? dim : 1));
+    PetscCall(HycoConeSetType(s->cone[c], c ? HYCO_CONE_COULOMB : HYCO_CONE_NONNEGATIVE));
+  }
+  PetscCall(PetscCalloc4(3 * n, &s->shear.force, 3 * n, &s->shear.slip, n, &s->shear.work, n, &s->shear.state));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSlipDestroy(HycoSlip *s)
+{
+  PetscFunctionBegin;
+  for (PetscInt c = 0; c < 2; c++) PetscCall(HycoConeDestroy(&s->cone[c]));
+  PetscCall(PetscFree3(s->row, s->of, s->mu));
+  PetscCall(PetscFree2(s->data, s->tangent));
+  PetscCall(PetscFree4(s->shear.force, s->shear.slip, s->shear.work, s->shear.state));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSlipBegin(HycoSlip *s)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(s->shear.force, 3 * s->n));
+  PetscCall(PetscArrayzero(s->shear.slip, 3 * s->n));
+  PetscCall(PetscArrayzero(s->shear.work, s->n));
+  PetscCall(PetscArrayzero(s->shear.state, s->n));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSlipCoefficients(HycoSlip *s, HycoFE fe, const HycoPairs *pairs)
+{
+  PetscInt n = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < s->n; k++) {
+    HycoExpr friction = fe->scene->contact[pairs->contact[k]]->friction;
+    const PetscReal *x = fe->X + 3 * pairs->slave[k];
+    char place[HYCO_LINE];
+
+    s->mu[k] = 0;
+    if (!friction) continue;
+    PetscCall(HycoExprEval(friction, fe->mu, 1, x, &s->mu[k]));
+    if (s->mu[k] < 0) {
+      PetscCall(HycoExprPlace(friction, fe->mu, x, place));
+      HycoFail("%s is %g at %s; a coefficient of friction must be 0 or more", HycoExprKey(friction), (double)s->mu[k],
+               place);
+    }
+    s->data[n++] = s->mu[k];
+    s->data[n++] = 0;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscBool HycoSlipRubs(const HycoSlip *s)
+{
+  for (PetscInt k = 0; k < s->n; k++) {
+    if (s->mu[k] > 0) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
+/* Of contact k, with the forces r and w of its rows. */
+static void Add(HycoSlip *h, PetscInt k, const PetscReal r[], const PetscReal w[], PetscReal most)
+{
+  const HycoShear *s = &h->shear;
+  const PetscReal *t = h->tangent + 6 * k;
+  PetscReal size = 0, work = 0;
+
+  for (PetscInt c = 0; c < 3; c++) s->force[3 * k + c] = 0;
+  for (PetscInt j = 0; j + 1 < h->dim && h->of[k]; j++) {
+    size += r[j + 1] * r[j + 1];
+    if (r[0] > 0) work -= r[j + 1] * w[j + 1];
+    for (PetscInt c = 0; c < 3; c++) {
+      s->force[3 * k + c] -= r[j + 1] * t[3 * j + c];
+      if (r[0] > 0) s->slip[3 * k + c] -= w[j + 1] * t[3 * j + c];
+    }
+  }
+  s->state[k] = !(r[0] > 0) ? HYCO_OPEN : PetscSqrtReal(size) < SLIPS * h->mu[k] * r[0] ? HYCO_STICK : HYCO_SLIP;
+  if (PetscAbsReal(work) > ROUNDING * PetscSqrtReal(size) * most) s->work[k] += work;
+}
+
+void HycoSlipAdd(HycoSlip *s, const PetscReal L[], const PetscReal w[], PetscReal most)
+{
+  for (PetscInt k = 0; k < s->n; k++) Add(s, k, L + s->row[k], w + s->row[k], most);
+}
+
+void HycoSlipSum(const HycoSlip *s, PetscReal sum[2])
+{
+  sum[0] = sum[1] = 0;
+  for (PetscInt k = 0; k < s->n; k++) {
+    sum[0] += s->shear.work[k];
+    sum[1] += s->of[k] && s->shear.state[k] == HYCO_SLIP;
+  }
+}

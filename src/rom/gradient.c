@@ -1,0 +1,276 @@
+/*
+  The gradient of a prediction. A type's problem is w = q + M z, z = (x, L); with the set of closed contacts M z' + q' = 0
+  there, with q' the change of w at fixed z: differences of the type's data. An output's derivative is its difference along
+  z + h z' with the data at mu + h.
+*/
+#include <hycogradient.h>
+#include <hycolcp.h>
+#include <hycoromimpl.h>
+
+typedef struct {
+  HycoROM m;
+  PetscReal mu[HYCO_MAX_PARAMETERS];
+  PetscInt p, n, k, *contact; /* unknowns x, contacts; those that are closed or undecided */
+  PetscReal *z, *dz, *moved;  /* p + n */
+  PetscReal *w[5];            /* p + n: at the three points, and at closer ones */
+  PetscReal *q, *v;           /* p + k */
+  PetscReal size;
+  HycoTangent tangent;
+  PetscReal *output; /* 6 x n_outputs: at the three points, at closer ones */
+  /* the prediction */
+  HycoPrediction prediction;
+  PetscReal remainder, *gamma, *U, *Lambda;
+  PetscBool whole_current;
+} Work;
+
+/* The state of z at mu, as a prediction would leave it. */
+static PetscErrorCode Move(Work *o, const PetscReal mu[], const PetscReal z[])
+{
+  HycoROM m = o->m;
+  PetscReal size;
+
+  PetscFunctionBegin;
+  PetscUseTypeMethod(m, residual, mu, z, NULL, &size);
+  PetscUseTypeMethod(m, expand);
+  if (m->ops->reconstruct && m->reconstruct) PetscCall((*m->ops->reconstruct)(m));
+  PetscCall(HycoFloatingBalance(m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The outputs at mu of the state moved by step times its change. */
+static PetscErrorCode Measure(Work *o, const PetscReal mu[], PetscReal step, PetscReal output[])
+{
+  HycoPrediction p = {0};
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < o->p + o->n; i++) o->moved[i] = o->z[i] + step * o->dz[i];
+  PetscCall(Move(o, mu, o->moved));
+  PetscCall(HycoROMMeasureQuantities(o->m, &p));
+  PetscCall(PetscArraycpy(output, p.quantity, o->m->model->scene->n_quantities));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The derivative's matrix, of the closed and the undecided contacts. */
+static PetscErrorCode Close(Work *o)
+{
+  PetscReal *M, *L, *w, *flexibility;
+  PetscInt *state;
+  PetscBool regular;
+  const size_t n = (size_t)(o->p + o->k);
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n * n + 1, &M));
+  PetscCall(PetscMalloc4(o->k, &L, o->k, &w, o->k, &flexibility, o->k, &state));
+  PetscCall((*o->m->ops->jacobian)(o->m, o->k, o->contact, M));
+  for (PetscInt j = 0; j < o->k; j++) {
+    const size_t at = (size_t)(o->p + j);
+
+    L[j] = o->z[o->p + o->contact[j]];
+    w[j] = o->w[0][o->p + o->contact[j]];
+    flexibility[j] = M[at * n + at];
+  }
+  PetscCall(HycoTangentStates(o->k, L, w, o->size, flexibility, state));
+  PetscCall(HycoTangentCreate(o->p, o->k, M, state, &o->tangent, &regular));
+  PetscCall(PetscFree4(L, w, flexibility, state));
+  PetscCall(PetscFree(M));
+  HycoCheck(regular, "the forces of the model's closed contacts are not unique here, so that they have no derivative");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Create(Work *o)
+{
+  HycoROM m = o->m;
+  const PetscInt n_dof = m->model->mesh->n_nodes * m->model->mesh->dim;
+  PetscReal largest;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArraycpy(o->mu, m->fe->mu, m->model->scene->n_variables));
+  o->prediction = m->prediction;
+  o->remainder = m->remainder;
+  o->whole_current = m->whole_current;
+  HycoDuplicate(m->model->l, m->gamma, &o->gamma);
+  HycoDuplicate(n_dof, m->U, &o->U);
+  HycoDuplicate(m->model->pairs.n, m->Lambda, &o->Lambda);
+  PetscUseTypeMethod(m, unknowns, &o->p, &o->n, NULL);
+  PetscCall(PetscMalloc3(o->p + o->n + 1, &o->z, o->p + o->n + 1, &o->dz, o->p + o->n + 1, &o->moved));
+  for (PetscInt j = 0; j < 5; j++) PetscCall(PetscMalloc1(o->p + o->n + 1, &o->w[j]));
+  PetscCall(PetscMalloc3(o->n + 1, &o->contact, o->p + o->n + 1, &o->q, o->p + o->n + 1, &o->v));
+  PetscCall(PetscCalloc1(6 * m->model->scene->n_quantities + 1, &o->output));
+  PetscUseTypeMethod(m, unknowns, &o->p, &o->n, o->z);
+  PetscCall((*m->ops->residual)(m, o->mu, o->z, o->w[0], &largest));
+  o->size = largest;
+  for (PetscInt i = 0; i < o->n; i++) {
+    if (HycoTangentMayTouch(o->z[o->p + i], o->w[0][o->p + i], o->size)) o->contact[o->k++] = i;
+  }
+  PetscCall(Close(o));
+  PetscCall(PetscArrayzero(o->dz, o->p + o->n));
+  PetscCall(Measure(o, o->mu, 0, o->output));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Destroy(Work *o)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoTangentDestroy(&o->tangent));
+  PetscCall(PetscFree3(o->z, o->dz, o->moved));
+  for (PetscInt j = 0; j < 5; j++) PetscCall(PetscFree(o->w[j]));
+  PetscCall(PetscFree3(o->contact, o->q, o->v));
+  HycoFreeAll(&o->output, &o->gamma, &o->U, &o->Lambda);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the gap of a closed contact has different slopes to the two sides: its master changes. closer: the gaps
+   nearer to mu are known too; otherwise it may be curvature. */
+static PetscBool Turns(const Work *o, const HycoDifference *d, PetscBool closer)
+{
+  PetscReal most = 0, slope = 0;
+
+  for (PetscInt i = 0; i < o->n; i++) most = PetscMax(most, o->z[o->p + i]);
+  for (PetscInt j = 0; j < o->k; j++) {
+    const PetscInt at = o->p + o->contact[j];
+
+    if (o->z[at] > HYCO_GRADIENT_FORCE * most)
+      slope = PetscMax(slope, PetscAbsReal((o->w[1][at] - o->w[0][at]) / d->step[1]));
+  }
+  for (PetscInt j = 0; j < o->k; j++) {
+    const PetscInt at = o->p + o->contact[j];
+    const PetscReal v[3] = {o->w[0][at], o->w[1][at], o->w[2][at]}, near[3] = {o->w[0][at], o->w[3][at], o->w[4][at]};
+    PetscReal jump;
+
+    if (o->z[at] <= HYCO_GRADIENT_FORCE * most) continue;
+    jump = HycoDifferenceJump(d, o->size, slope, v);
+    if (closer ? HycoDifferenceKinks(d, jump, near) : jump > 0) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
+/* The same, with the gaps nearer to mu only where they are needed. */
+static PetscErrorCode FindTurns(Work *o, const HycoDifference *d, PetscBool *turns)
+{
+  HycoROM m = o->m;
+  HycoDifference near = *d;
+  PetscReal at[HYCO_MAX_PARAMETERS], size;
+
+  PetscFunctionBegin;
+  *turns = Turns(o, d, PETSC_FALSE);
+  if (!*turns) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoDifferenceShrink(&near);
+  for (PetscInt j = 1; j < 3; j++) {
+    HycoDifferencePoint(&near, m->model->scene, o->mu, j, at);
+    PetscCall((*m->ops->residual)(m, at, o->z, o->w[2 + j], &size));
+  }
+  *turns = Turns(o, d, PETSC_TRUE);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* dz along the parameter of d. */
+static PetscErrorCode Differentiate(Work *o, HycoDifference *d, PetscBool *kink)
+{
+  HycoROM m = o->m;
+  PetscReal at[HYCO_MAX_PARAMETERS], size;
+  PetscBool turns;
+
+  PetscFunctionBegin;
+  for (PetscInt j = 1; j < 3; j++) {
+    HycoDifferencePoint(d, m->model->scene, o->mu, j, at);
+    PetscCall((*m->ops->residual)(m, at, o->z, o->w[j], &size));
+  }
+  PetscCall(FindTurns(o, d, &turns));
+  if (turns) HycoDifferenceTakeSide(d);
+  for (PetscInt i = 0; i < o->p + o->k; i++) {
+    const PetscInt row = i < o->p ? i : o->p + o->contact[i - o->p];
+
+    o->q[i] = 0;
+    for (PetscInt j = 0; j < 3; j++) o->q[i] += d->weight[j] * o->w[j][row];
+  }
+  PetscCall(HycoTangentSolve(o->tangent, o->q, d->sign, o->v, kink));
+  *kink = (PetscBool)(*kink || turns);
+  PetscCall(PetscArrayzero(o->dz, o->p + o->n));
+  for (PetscInt i = 0; i < o->p + o->k; i++) o->dz[i < o->p ? i : o->p + o->contact[i - o->p]] = o->v[i];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The outputs at the difference's points beside mu. */
+static PetscErrorCode MeasureBeside(Work *o, const HycoDifference *d, PetscReal output[])
+{
+  const HycoScene scene = o->m->model->scene;
+  PetscReal at[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  for (PetscInt j = 1; j < 3; j++) {
+    HycoDifferencePoint(d, scene, o->mu, j, at);
+    PetscCall(Measure(o, at, d->step[j], output + j * scene->n_quantities));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Column(Work *o, PetscInt p, HycoGradient *gradient)
+{
+  HycoDifference d, near;
+  PetscReal *closer = o->output + 3 * gradient->n_outputs;
+  PetscBool kink, more;
+
+  PetscFunctionBegin;
+  HycoDifferenceSet(o->m->model->scene, o->mu, p, &d);
+  PetscCall(Differentiate(o, &d, &kink));
+  near = d;
+  PetscCall(MeasureBeside(o, &d, o->output));
+  more = HycoGradientNeedsCloser(gradient, &d, o->output);
+  if (more) {
+    HycoDifferenceShrink(&near);
+    PetscCall(PetscArraycpy(closer, o->output, gradient->n_outputs));
+    PetscCall(MeasureBeside(o, &near, closer));
+  }
+  HycoGradientSet(gradient, &o->m->gradient, &d, o->output, more ? closer : NULL, kink);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The model's data and state are again those of the prediction. */
+static PetscErrorCode Restore(Work *o)
+{
+  HycoROM m = o->m;
+
+  PetscFunctionBegin;
+  PetscCall(Move(o, o->mu, o->z));
+  m->prediction = o->prediction;
+  m->remainder = o->remainder;
+  m->whole_current = o->whole_current;
+  PetscCall(PetscArraycpy(m->gamma, o->gamma, m->model->l));
+  PetscCall(HycoROMComplete(m));
+  PetscCall(PetscArraycpy(m->U, o->U, m->model->mesh->n_nodes * m->model->mesh->dim));
+  PetscCall(PetscArraycpy(m->Lambda, o->Lambda, m->model->pairs.n));
+  m->solved = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Check(HycoROM m)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoGradientCheckScene(m->model->scene));
+  HycoCheck(m->ops->residual,
+            "a model of type %s has no gradients; train one with -hyco_model_type bodies, hybrid or projection",
+            m->model->type);
+  PetscCheck(m->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoROMPredict() before HycoROMGetGradient()");
+  HycoCheck(m->prediction.reason > 0, "there is no gradient: %s", HycoReasonName(m->prediction.reason));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMGetGradient(HycoROM m, HycoGradient *gradient)
+{
+  Work o = {.m = m};
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  PetscCall(Check(m));
+  PetscCall(HycoROMComplete(m));
+  PetscCall(HycoGradientCreate(m->model->scene, &m->gradient, gradient));
+  ierr = Create(&o);
+  if (!ierr) gradient->n_undecided = HycoTangentUndecided(o.tangent);
+  for (PetscInt p = 0; !ierr && p < gradient->n_parameters; p++) ierr = Column(&o, p, gradient);
+  if (!ierr) ierr = Restore(&o);
+  if (ierr) m->solved = PETSC_FALSE;
+  PetscCall(Destroy(&o));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,136 @@
+/* The derivative of a solution by the system of its closed contacts, with the factor and the flexibility of the dual
+   form: one forward and one back substitution for each change of the data. */
+#include <hycosolverimpl.h>
+
+struct _n_HycoSolverTangent {
+  HycoSolver s; /* borrowed */
+  PetscInt m, p;
+  HycoTangent tangent; /* NULL without contacts */
+  VecScatter scatter;  /* of the contacts to every rank */
+  Vec all;
+  PetscReal *q, *z; /* p + m */
+};
+
+PetscErrorCode HycoSolverTangentDestroy(HycoSolverTangent *tangent)
+{
+  HycoSolverTangent t = *tangent;
+
+  PetscFunctionBegin;
+  if (!t) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoTangentDestroy(&t->tangent));
+  PetscCall(VecScatterDestroy(&t->scatter));
+  PetscCall(VecDestroy(&t->all));
+  HycoFreeAll(&t->q, &t->z);
+  PetscCall(PetscFree(*tangent));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscInt HycoSolverTangentUndecided(HycoSolverTangent t)
+{
+  return t->tangent ? HycoTangentUndecided(t->tangent) : 0;
+}
+
+/* value[m] of all ranks. */
+static PetscErrorCode GatherAll(HycoSolverTangent t, Vec v, PetscReal value[])
+{
+  const PetscScalar *all;
+
+  PetscFunctionBegin;
+  PetscCall(VecScatterBegin(t->scatter, v, t->all, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecScatterEnd(t->scatter, v, t->all, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecGetArrayRead(t->all, &all));
+  PetscCall(PetscArraycpy(value, all, t->m));
+  PetscCall(VecRestoreArrayRead(t->all, &all));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The states of the contacts in the solution, and the matrix of the closed ones. */
+static PetscErrorCode Close(HycoSolverTangent t, Vec x, Vec L)
+{
+  HycoSystem y = t->s->system;
+  PetscReal *force, *gap, *flexibility, sizes[2];
+  const PetscReal *S;
+  PetscInt *state;
+  PetscBool regular;
+  const PetscInt n = t->p + t->m;
+
+  PetscFunctionBegin;
+  HycoSolverGetCondensed(t->s, &t->m, &t->p, &S);
+  PetscCall(PetscMalloc4(t->m, &force, t->m, &gap, t->m, &flexibility, t->m, &state));
+  PetscCall(HycoSystemWork(y));
+  PetscCall(MatMult(y->B, x, y->work_L));
+  PetscCall(VecNorm(y->work_L, NORM_INFINITY, &sizes[0]));
+  PetscCall(VecNorm(y->D, NORM_INFINITY, &sizes[1]));
+  PetscCall(VecAYPX(y->work_L, -1, y->D));
+  PetscCall(GatherAll(t, y->work_L, gap));
+  PetscCall(GatherAll(t, L, force));
+  for (PetscInt i = 0; i < t->m; i++) flexibility[i] = S[(size_t)(t->p + i) * (size_t)n + (size_t)(t->p + i)];
+  PetscCall(HycoTangentStates(t->m, force, gap, PetscMax(sizes[0], sizes[1]), flexibility, state));
+  PetscCall(HycoTangentCreate(t->p, t->m, S, state, &t->tangent, &regular));
+  PetscCall(PetscFree4(force, gap, flexibility, state));
+  PetscCheck(regular, HycoComm(t->s), PETSC_ERR_USER,
+             "the forces of the closed contacts are not unique here, so that they have no derivative; remove contacts "
+             "whose gaps follow from those of others");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode SetUp(HycoSolverTangent t, Vec x, Vec L)
+{
+  HycoSolver s = t->s;
+  PetscBool singular;
+
+  PetscFunctionBegin;
+  PetscCheck(!s->iterative, HycoComm(s), PETSC_ERR_USER,
+             "a gradient at full order needs a factor of the stiffness, and the solver chose iterations%s; allow more "
+             "memory (-hyco_memory), or use -hyco_linear direct",
+             s->why_iterative);
+  PetscCall(HycoSolverFactor(s, &singular));
+  PetscCheck(!singular, HycoComm(s), PETSC_ERR_USER,
+             "the stiffness is singular, so that there is no gradient; check that supports hold every body");
+  if (!s->system->m) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecScatterCreateToAll(L, &t->scatter, &t->all));
+  t->m = s->system->m;
+  PetscCall(HycoKernelSize(s->system->K, &t->p));
+  PetscCall(PetscMalloc1(t->m + t->p, &t->q));
+  PetscCall(PetscMalloc1(t->m + t->p, &t->z));
+  PetscCall(Close(t, x, L));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverTangentCreate(HycoSolver s, Vec x, Vec L, HycoSolverTangent *tangent)
+{
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
+  PetscCall(PetscNew(tangent));
+  (*tangent)->s = s;
+  ierr = SetUp(*tangent, x, L);
+  if (ierr) PetscCall(HycoSolverTangentDestroy(tangent));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverTangentSolve(HycoSolverTangent t, Vec r, Vec g, int sign, Vec dx, Vec dL, PetscBool *kink)
+{
+  HycoDirect direct = t->s->stiffness.direct;
+  PetscScalar *l;
+  PetscInt lo, hi;
+
+  PetscFunctionBegin;
+  *kink = PETSC_FALSE;
+  if (!t->tangent) {
+    PetscCall(HycoStiffnessSolve(t->s, r, dx));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCheck(direct, HycoComm(t->s), PETSC_ERR_SUP, "the derivative of a solution is for a sparse K");
+  PetscCall(GatherAll(t, g, t->z));
+  PetscCall(HycoDirectReduce(direct, r, t->z, t->q));
+  PetscCall(HycoTangentSolve(t->tangent, t->q, sign, t->z, kink));
+  PetscCall(HycoDirectExpand(direct, t->z, dx));
+  PetscCall(VecGetOwnershipRange(dL, &lo, &hi));
+  PetscCall(VecGetArray(dL, &l));
+  PetscCall(PetscArraycpy(l, t->z + t->p + lo, hi - lo));
+  PetscCall(VecRestoreArray(dL, &l));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

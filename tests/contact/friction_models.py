@@ -1,0 +1,145 @@
+"""Models of bodies with friction: the path of full order where nothing is interpolated, to the interpolation's error elsewhere; fields, outputs,
+several ranks, batches, refusals; the lap joint of the examples."""
+import os
+import sys
+import unittest
+
+import h5py
+import numpy as np
+
+from common import SOURCE, Case
+
+sys.path.insert(0, os.path.join(SOURCE, 'tests', 'verify'))
+from grids import Grid  # noqa: E402
+
+# A pad on a floor, pressed and pushed to and fro: loads, coefficient, stiffness and gap change, none of which needs a sample
+PAD = """
+scene: {mesh: mesh.msh, parameters: [m, press, soft, tilt]}
+parameter: {m: {range: [0.1, 0.5]}, press: {range: [0.5, 1.5]}, soft: {range: [0.5, 2]}, tilt: {range: [0, 1]}}
+body: {pad: {LAW}}
+fixed: {top: {x: "0.01*s", y: "-0.004*press*min(t, 1)"}}
+contact: {floor: {group: base, normal: {y: -1}, gap: "0.0005*tilt*x", friction: "m*(1 + 0.2*x)"}}
+history: {times: [0, 1, 1.5, 2, 2.4, 3], tables: {s: [[0, 0], [1, 0], [2, 1], [3, -1]]}}
+output: {T: {friction: x, contact: floor}, N: {force: y}, W: {friction: work}, R: {reaction: x, group: top}}
+"""
+ELASTIC = 'young: 1000*soft, poisson: 0.3'
+NORTON = 'law: norton, young: 1000, poisson: 0.3, rate: 1e-3, exponent: 2'
+# Two blocks; the ratio of one's moduli changes, so that its flexibility is interpolated; in 2D and 3D
+TWO = """
+scene: {mesh: mesh.msh, parameters: [m, hard]}
+parameter: {m: {range: [0.1, 0.3]}, hard: {range: [0, 3]}}
+body: {low: {young: 1000*(1 + hard*x), poisson: 0.3}, high: {young: 500, poisson: 0.2}}
+fixed: {base: {HELD}, top: {x: "0.02*s", MORE LAST: "-0.01*min(t, 1)"}}
+contact: {joint: {type: TYPE, slave: face, master: back, friction: m}}
+history: {times: [0, 1, 1.5, 2, 3], tables: {s: [[0, 0], [1, 0], [2, 1], [3, 0]]}}
+output: {T: {friction: x, contact: joint}, W: {friction: work}}
+"""
+COLUMNS = ('total_contact_force', 'friction_work', 'n_slipping', 'n_active')
+
+
+class FrictionModels(Case):
+    def pad(self, name='scene.yaml', law=ELASTIC, *changes):
+        grid = Grid()
+        grid.box('quad4', [np.linspace(0, 2, 13), np.linspace(0, 1, 7)], lambda x: x, 'pad', {'y0': 'base', 'y1': 'top'})
+        grid.write(self.path('mesh.msh'))
+        return self.changed(name, PAD.replace('LAW', law), changes)
+
+    def two(self, dim, kind):
+        last = 'yz'[dim - 2]
+        grid = Grid()
+        flat = lambda n: [np.linspace(0, 1, n)] * (dim - 1)
+        cell = 'quad4' if dim == 2 else 'hex8'
+        grid.box(cell, [*flat(5), np.linspace(-0.5, 0, 3)], lambda x: x, 'low', {last + '0': 'base', last + '1': 'back'})
+        grid.box(cell, [*flat(4), np.linspace(0, 0.5, 3)], lambda x: x, 'high', {last + '0': 'face', last + '1': 'top'})
+        grid.write(self.path('mesh.msh'))
+        held = 'x: 0, y: 0' + ', z: 0' * (dim - 2)
+        text = TWO.replace('LAST', last).replace('HELD', held).replace('MORE', 'y: 0,' * (dim - 2)).replace('TYPE', kind)
+        return self.changed('scene.yaml', text, ())
+
+    def train(self, scene, *args, grid='2,1,1,1', **options):
+        return self.hyco('train', '-scene', scene, '-model', self.path('m.h5'), '-grid', grid, '-hyco_validation', '2', *args, **options)
+
+    def columns(self, command, point, *args, **options):
+        history = self.hyco(command, '-mu', point, *args, **options)['history']
+        return {name: np.array(history['outputs'].get(name, history.get(name))) for name in (*COLUMNS, *history['outputs'])}
+
+    def alike(self, scene, point, limit, **options):
+        """The listed times of full order and model at an unseen point; friction matters there."""
+        full = self.columns('solve', point, '-scene', scene)
+        found = self.columns('predict', point, '-model', self.path('m.h5'), **options)
+        self.assertGreater(abs(full['T']).max(), 0.1 * full['total_contact_force'].max())
+        self.assertGreater(full['n_slipping'].max(), 0)
+        self.assertGreater(full['W'][-1], 0)
+        for name in full:
+            self.assertLessEqual(abs(found[name] - full[name]).max(), limit * abs(full[name]).max(), name)
+
+    def test_exact(self):
+        """Loads, coefficient, modulus and gap change: the path of full order at unseen points; the type is found by default; estimates, batches."""
+        scene = self.pad()
+        report = self.train(scene)
+        self.assertEqual(report['model_type'], 'bodies')
+        for point in ('0.17,1.3,0.7,0.4', '0.44,0.6,1.9,0.9'):
+            self.alike(scene, point, 1e-8)
+        self.alike(scene, '0.3,1,1,0.5', 1e-8, ranks=2)
+        compared = self.hyco('compare', '-scene', scene, '-model', self.path('m.h5'), '-mu', '0.17,1.3,0.7,0.4')
+        for kind in ('lambda', 'sigma'):
+            self.assertLess(compared['worst_' + kind]['max'], 1e-8, kind)
+        self.assertLess(compared['worst_u']['max'], 1e-3)
+        points = np.array([[0.17, 1.3, 0.7, 0.4], [0.44, 0.6, 1.9, 0.9], [0.17, 1.3, 0.7, 0.4]])
+        np.savetxt(self.path('points.csv'), points, delimiter=',', header='m,press,soft,tilt', comments='')
+        self.hyco('predict', '-model', self.path('m.h5'), '-points', self.path('points.csv'), '-table', self.path('batch.csv'))
+        batch = np.genfromtxt(self.path('batch.csv'), delimiter=',', names=True)
+        for name in batch.dtype.names:
+            if 'seconds' not in name:
+                np.testing.assert_equal(batch[name][0], batch[name][2], name)
+
+    def test_fields(self):
+        """Traction, slip, state and forces at the contacts' nodes are those of full order; equilibrium and balance on the whole mesh include friction."""
+        scene, point = self.pad(), ['-mu', '0.17,1.3,0.7,0.4']
+        self.train(scene)
+        self.hyco('solve', '-scene', scene, *point, '-output', self.path('full.xdmf'))
+        report = self.hyco('predict', '-model', self.path('m.h5'), *point, '-output', self.path('found.xdmf'), '-hyco_residual')
+        self.assertLess(report['equilibrium']['worst'], 1e-3)
+        with h5py.File(self.path('full.h5')) as full, h5py.File(self.path('found.h5')) as found:
+            for name in ('contact_traction', 'contact_slip', 'contact_state', 'contact_force', 'contact_pressure'):
+                most = max(abs(full[f'step-{k:04d}/nodes/{name}'][:]).max() for k in range(6))
+                self.assertGreater(most, 0)
+                for k in range(6):
+                    a, b = (f[f'step-{k:04d}/nodes/{name}'][:] for f in (full, found))
+                    self.assertLessEqual(abs(a - b).max(), 1e-8 * most, (name, k))
+
+    def test_interpolated(self):
+        """A body whose moduli change their ratio: forces, slip and work to the error of its interpolated flexibility; surfaces and mortar, 2D and 3D."""
+        for dim, kind in ((2, 'surface'), (2, 'mortar'), (3, 'surface')):
+            scene = self.two(dim, kind)
+            self.train(scene, '-hyco_snapshots', self.path(f'{kind}{dim}'), grid='2,2', ranks=2 if kind == 'mortar' else 0)
+            self.alike(scene, '0.22,1.7', 1e-4)
+
+    def test_refused(self):
+        """Other types, and bodies that creep, in one line that names contact or body; no type drops the friction."""
+        for words, scene, args in ((('floor', 'friction', 'hybrid', 'bodies'), self.pad(), ['-hyco_model_type', 'hybrid']),
+                                   (('floor', 'friction', 'projection', 'bodies'), self.pad(), ['-hyco_model_type', 'projection']),
+                                   (('floor', 'friction', 'cubature', 'bodies'), self.pad(), ['-hyco_model_type', 'cubature']),
+                                   (('friction', 'body pad', 'hyco solve'), self.pad('creeps.yaml', NORTON), ['-hyco_model_type', 'bodies']),
+                                   (('friction', 'body pad', 'hyco solve'), self.pad('creeps.yaml', NORTON), [])):
+            run = self.run_raw('train', '-scene', scene, '-model', self.path('none.h5'), '-grid', '2,1,1,1', *args)
+            self.assertEqual(run.returncode, 1, run.stderr)
+            self.assertEqual(len(run.stderr.strip().splitlines()), 1, run.stderr)
+            for word in words:
+                self.assertIn(word, run.stderr)
+            self.assertFalse(os.path.exists(self.path('none.h5')))
+
+    def test_lap_joint(self):
+        """The example: hysteresis loop and dissipated work at an unseen point."""
+        scene = os.path.join(SOURCE, 'examples', 'lapjoint', 'scene.yaml')
+        self.train(scene, '-hyco_snapshots', self.path('lap'), grid='2,1,1')
+        point = '1300,0.17,0.06'
+        full = self.columns('solve', point, '-scene', scene)
+        found = self.columns('predict', point, '-model', self.path('m.h5'))
+        self.assertGreater(full['friction_work'][-1], 1)
+        for name, limit in (('pull', 1e-6), ('shear_force', 1e-6), ('friction_work', 1e-6), ('n_slipping', 0)):
+            self.assertLessEqual(abs(found[name] - full[name]).max(), limit * abs(full[name]).max(), name)
+
+
+if __name__ == '__main__':
+    unittest.main()

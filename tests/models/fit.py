@@ -1,0 +1,61 @@
+"""hyco fit: parameters whose outputs at full order are given are found again, by both types, on several ranks; targets that cannot be reached end at the ends
+of the ranges; what is refused."""
+import os
+import unittest
+
+from common import SOURCE, Case
+
+ROLLER = ('-scene', os.path.join(SOURCE, 'examples', 'roller'), '-output_lift_force', 'y', '-output_lift_contact', 'under', '-output_peak_max', 'mises',
+          '-output_peak_group', 'block', '-output_turn_moment', 'z', '-output_turn_contact', 'under')
+TRUE = {'place': 1.7, 'press': 0.63, 'modulus': 11.3}
+
+
+class Fit(Case):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.hyco('train', *ROLLER, '-hyco_model_type', 'bodies', '-scatter', '3', '-model', 'm.h5')
+        cls.outputs = cls.hyco('solve', *ROLLER, '-mu', ','.join(map(str, TRUE.values())))['outputs']
+        cls.targets = [word for name, value in cls.outputs.items() for word in (f'-target_{name}', repr(value))]
+
+    def test_found(self):
+        """Three outputs of a full-order solution determine the three parameters, which the training has not seen; the check solves at the answer."""
+        found = []
+        for args, ranks in (((), 0), ((), 2), (('-fit_type', 'blmvm'), 0), (('-mu', '0.5,0.5,9'), 0)):
+            r = self.hyco('fit', '-model', 'm.h5', *self.targets, *ROLLER, *args, ranks=ranks)
+            self.assertTrue(r['converged'])
+            self.assertEqual(r['at_ends'], [])
+            for name, value in TRUE.items():
+                self.near(r['mu'][name], value, 1e-3, name)  # the model's stresses have errors of modes
+            self.assertLess(r['misfit_model'], 1e-6)
+            self.assertLess(r['misfit_full_order'], 1e-4)
+            again = self.hyco('solve', *ROLLER, '-mu', ','.join(repr(v) for v in r['mu'].values()))
+            for name, of in r['targets'].items():
+                self.assertEqual(of['target'], self.outputs[name])
+                self.near(of['full_order'], again['outputs'][name], 1e-9)
+            found.append(r)
+        for name in TRUE:
+            self.near(found[1]['mu'][name], found[0]['mu'][name], 1e-9, name)
+
+    def test_ends(self):
+        """A force that is out of reach: the answer is at the ends of the ranges, is a minimum, and its misfit is reported."""
+        r = self.hyco('fit', '-model', 'm.h5', '-target_lift', '100')
+        self.assertTrue(r['converged'])
+        self.assertLessEqual({'press', 'modulus'}, set(r['at_ends']))
+        self.assertEqual((r['mu']['press'], r['mu']['modulus']), (1, 20))
+        self.near(r['misfit_model'], 1 - r['targets']['lift']['model'] / 100, 1e-6)
+        self.assertNotIn('misfit_full_order', r)
+
+    def test_refused(self):
+        """One line that names what is wrong, and no report."""
+        for words, args in ((('target_foo', 'lift'), ('-target_foo', '1')), (('-target_', 'lift', 'peak'), ()), (('target_lift', 'number'), ('-target_lift', 'x')),
+                            (('place', 'range'), ('-target_lift', '5', '-mu', '9,0.5,9')), (('output', 'turn'), (*self.targets, *ROLLER[:-4]))):
+            run = self.run_raw('fit', '-model', 'm.h5', *args, '-report', 'none.json')
+            self.assertEqual((run.returncode, len(run.stderr.strip().splitlines())), (1, 1), run.stderr)
+            for word in words:
+                self.assertIn(word, run.stderr)
+            self.assertFalse(os.path.exists(self.path('none.json')))
+
+
+if __name__ == '__main__':
+    unittest.main()
