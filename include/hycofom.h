@@ -127,7 +127,7 @@ PetscErrorCode HycoFOMGetSolver(HycoFOM fom, HycoSolver *solver);
 PetscErrorCode HycoFOMSolve(HycoFOM fom, PetscInt n, const PetscReal mu[]);
 /*
   Solves K U = F - B^T Lambda at mu (length n) with given contact forces Lambda (n_contacts, read on rank 0, in the
-  order of HycoFOMGetSolution()), for example those predicted by a condensed model. It needs one factor of K, which is
+  order of HycoFOMGetSolution()), for example those predicted by a model of bodies. It needs one factor of K, which is
   kept while K does not change. The results are available as after HycoFOMSolve(), with Lambda as given. The summary's
   residuals are those of (16): penetration and complementarity show the errors of Lambda. Its reason is that of the
   linear solve. Collective.

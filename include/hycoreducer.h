@@ -1,5 +1,5 @@
 /* HycoReducer: snapshots -> POD, DEIM -> reduced integration domain -> hybrid model in a file (sections 4 and 5); or
-   snapshots -> POD, NNMF -> projection-based model in a file (6.3); or snapshots -> POD, B K^-1 B^T -> condensed model.
+   snapshots -> POD, NNMF -> projection-based model in a file (6.3); or bodies condensed to their surfaces.
  */
 #ifndef HYCOREDUCER_H
 #define HYCOREDUCER_H
@@ -78,7 +78,7 @@ void HycoReducerSettingsDescribe(const HycoReducerSettings *settings, size_t len
 typedef struct {
   PetscInt number, of; /* number, from 1 (0: no search); for the chosen settings also the total */
   HycoReducerSettings settings;
-  PetscInt n_modes, n_fe_dofs, n_flexibilities, rid_nodes, rid_elements, rid_contacts;
+  PetscInt n_modes, n_fe_dofs, rid_nodes, rid_elements, rid_contacts;
   PetscInt n_unknowns; /* hybrid: displacements in A that are not fixed */
   PetscReal rid_fraction;
   PetscReal cost;          /* operations of an online solve at a new stiffness, estimated */
@@ -128,9 +128,7 @@ typedef struct {
   char summary[1024];            /* text of the type about bases and RID; "": none */
   HycoFact fact[HYCO_MAX_FACTS]; /* quantities of the type */
   PetscInt n_facts;
-  PetscBool stiffness;      /* whether there is a reduced stiffness, with a condition */
-  char missed[1024];        /* if the type chose the points: the tolerance that was missed, and the remedy; "": none */
-  PetscInt n_flexibilities; /* condensed: points at which B K^-1 B^T was factored */
+  PetscBool stiffness; /* whether there is a reduced stiffness, with a condition */
   PetscInt n_samples, n_modes, n_dual_modes, n_stress_modes, n_force_modes; /* l_u and the sizes of the other bases */
   PetscInt n_fe_dofs, rid_nodes, rid_elements, rid_a_nodes, rid_contacts; /* FE unknowns, RID, nodes of A, |A_lambda| */
   PetscReal rid_fraction;                                                 /* share of the elements */
@@ -173,20 +171,16 @@ PetscErrorCode HycoReducerGetType(HycoReducer reducer, HycoROMType *type);
 PetscErrorCode HycoReducerTries(HycoReducer reducer, const char types[], PetscBool *tries);
 /* Sets the folder of the snapshots (default: the model's name with .snapshots appended). */
 PetscErrorCode HycoReducerSetSnapshotFolder(HycoReducer reducer, const char folder[]);
-/* Whether HycoReducerRun() chooses the points itself when it is given none: for a condensed model. */
-PetscErrorCode HycoReducerChooses(HycoReducer reducer, PetscBool *chooses);
 /* Called as snapshots are solved. */
 PetscErrorCode HycoReducerSetProgress(HycoReducer reducer, HycoProgress progress, void *ctx);
-/* Called on one rank in the other long phases (flexibilities of condensed models, the search for settings): `done` of
+/* Called on one rank in the other long phases (the samples of bodies, the search for settings): `done` of
    n, where n is 0 if it is not known. */
 typedef PetscErrorCode (*HycoPhaseMonitor)(const char phase[], PetscInt done, PetscInt n, void *ctx);
 PetscErrorCode HycoReducerSetPhaseMonitor(HycoReducer reducer, HycoPhaseMonitor monitor, void *ctx);
 /* Solves the held-out points (HycoReducerSetValidation()) and, unless a type is accurate without them, the missing
-   samples, reduces, and writes the model to
-   `path` (under a temporary name, then renamed). Collective. `training` may be NULL. `samples` may be NULL for a
-   condensed model, which then chooses points until its estimate of the forces' error is below -hyco_condensed_tol; if
-   that is not reached, `missed` says so. Fails if the errors of the model on its training solutions reach one half and,
-   unless -hyco_keep_singular, if its reduced stiffness is singular inside the parameters' ranges. */
+   samples, reduces, and writes the model to `path` (under a temporary name, then renamed). Collective. `training` may be
+   NULL. Fails if the errors of the model on its training solutions reach one half and, unless -hyco_keep_singular, if
+   its reduced stiffness is singular inside the parameters' ranges. */
 PetscErrorCode HycoReducerRun(HycoReducer reducer, HycoSamples samples, const char path[], HycoTraining *training);
 
 /* Sets the held-out points, none of which may be a training point; they must outlive the training. NULL (the default):

@@ -1,6 +1,6 @@
 /* HycoROM: a reduced model from a file. Types: hybrid hyper-reduced (38)-(41), which needs only the RID online;
-   projection-based (44), on the whole mesh; cubature, on few weighted cells; condensed on the contact forces,
-   interpolated over the parameters; regression over the parameters. */
+   projection-based (44), on the whole mesh; cubature, on few weighted cells; bodies, condensed to their
+   surfaces; regression over the parameters. */
 #ifndef HYCOROM_H
 #define HYCOROM_H
 
@@ -16,7 +16,6 @@ typedef struct _p_HycoROM *HycoROM;
 typedef const char *HycoROMType;
 #define HYCO_ROM_HYBRID     "hybrid"
 #define HYCO_ROM_PROJECTION "projection"
-#define HYCO_ROM_CONDENSED  "condensed"
 #define HYCO_ROM_CUBATURE   "cubature"
 #define HYCO_ROM_REGRESSION "regression"
 #define HYCO_ROM_BODIES     "bodies"
@@ -61,7 +60,6 @@ typedef struct {
   PetscReal estimated_error_u, estimated_error_sigma, estimated_error_lambda;
   PetscReal estimated_error_quantity[HYCO_MAX_QUANTITIES]; /* the same for the absolute error of quantity[], in its
                                                               unit; of a path at all of its listed times */
-  PetscReal estimated_error_u_full; /* condensed: of u by HycoFOMSolveForces() with these forces; otherwise < 0 */
   /* What the displacement misses at contacts with a force: |B u - D|, weighted by the forces, relative to the largest
      displacement of the contacts' surfaces; < 0: not known. inconsistent: it is larger than at the held-out points by
      more than HYCO_UNSEEN, so that displacements, stresses and reactions do not follow the forces. */
@@ -74,9 +72,8 @@ typedef struct {
   PetscInt unseen_feature;
   PetscReal beyond;       /* largest distance of a parameter from the region of training, as a share of its range */
   PetscBool gives_forces; /* HycoROMGivesForces() */
-  PetscReal interpolation_error; /* condensed: of the forces, relative, one training value left out, more outside
-                                    the values; else 0 */
-  HycoKKT kkt; /* of the reduced system (38) or (44); condensed: of w = g + G L, equilibrium (0) holding by its form */
+  PetscReal interpolation_error; /* bodies: bound of the forces' relative error; else 0 */
+  HycoKKT kkt;     /* of the reduced system (38) or (44); bodies: of the contacts, and of floating bodies */
   char method[64]; /* name of the method */
   HycoReason reason;
   HycoSeconds seconds;
@@ -115,7 +112,7 @@ PetscErrorCode HycoROMGetScene(HycoROM model, HycoScene *scene);
    of the mesh file). Collective on the scene's communicator. */
 PetscErrorCode HycoROMCheckScene(HycoROM model, HycoScene scene);
 
-/* Solves (38), (44) or the condensed problem at mu (length n) and reconstructs the contact forces, (41) or V_lambda.
+/* Solves (38), (44) or the problem of the bodies at mu (length n), and reconstructs the contact forces, (41), V_lambda.
    Not collective. Fails outside the ranges of the training. A solve that does not converge is not an error: see
    HycoPrediction.reason. */
 PetscErrorCode HycoROMPredict(HycoROM model, PetscInt n, const PetscReal mu[]);
@@ -126,7 +123,7 @@ PetscErrorCode HycoROMSetExtrapolate(HycoROM model, PetscBool extrapolate);
    output may be NULL. */
 PetscErrorCode HycoROMGetSizes(HycoROM model, PetscInt *n_contacts, PetscInt *n_nodes, PetscInt *dim);
 /*
-  Predicts at n points, mu n x n_parameters. The results are bitwise those of HycoROMPredict() (for a condensed model to
+  Predicts at n points, mu n x n_parameters. The results are bitwise those of HycoROMPredict() (for a model of bodies to
   round-off), in the caller's order; points that share a stiffness share its factor. The caller's arrays, each of which
   may be NULL: prediction (n), Lambda (n x n_contacts), U (n x n_nodes x dim, as in HycoROMGetRID()). A solve that does
   not converge is not an error: see HycoPrediction.reason. Afterwards there is no last prediction. Not collective. Fails

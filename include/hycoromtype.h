@@ -1,13 +1,13 @@
 /*
-  A type of reduced model: its operations for HycoROM and HycoReducer. A program adds a type by HycoROMRegister() before
-  it trains or loads such models. They are then trained, saved, loaded, predicted and compared by the same functions and
-  commands as the types of the library (examples/ladder/model.c).
+  A type of reduced model: its operations for HycoROM. A program adds a type by HycoROMRegister(), and its training by
+  HycoTrainerRegister() (hycotrainer.h), before it trains or loads such models. They are then trained, saved, loaded,
+  predicted and compared by the same functions and commands as the types of the library (examples/ladder/model.c).
 */
 #ifndef HYCOROMTYPE_H
 #define HYCOROMTYPE_H
 
 #include <hycoh5.h>
-#include <hycoreducer.h>
+#include <hycorom.h>
 
 #if defined(__cplusplus)
 extern "C" {
@@ -52,30 +52,6 @@ typedef struct {
 
 /* An operation that a type does not have is NULL. Not collective, unless stated. */
 typedef struct _HycoROMOps {
-  /* -- training; the state of the reducer is on rank 0 -- */
-  PetscErrorCode (*setfromoptions)(HycoReducer); /* its options of the training, on every rank */
-  PetscErrorCode (*resettraining)(HycoReducer);  /* frees what these options and a run have allocated, on every rank */
-  PetscErrorCode (*begin)(HycoReducer); /* before any solve: refuses unsupported scenes and options. Collective */
-  PetscErrorCode (*startpoints)(HycoReducer, HycoSamples *);                 /* chooses the first training points: */
-  PetscErrorCode (*choosepoints)(HycoReducer, HycoSnapshots, HycoSamples *); /* and further ones. Collective */
-  PetscErrorCode (*modes)(HycoReducer,
-                          HycoSnapshots); /* modes in addition to or instead of the solutions' POD. Collective */
-  PetscErrorCode (*build)(HycoROM,
-                          HycoReducer); /* builds the model, on rank 0, where its mesh, contacts and modes exist */
-  PetscErrorCode (*finish)(HycoReducer, HycoROM,
-                           HycoTraining *); /* checks over the ranges; may change the model, on rank 0. Collective */
-  PetscErrorCode (*report)(HycoReducer, HycoROM, HycoTraining *); /* summary and facts. Rank 0 */
-  PetscReal (*cost)(HycoReducer, const HycoAttempt *);            /* operations of an online solve at a new stiffness */
-  PetscBool (*offers)(HycoReducer, PetscBool targets, size_t length,
-                      char why[]); /* whether a search tries it by default, with or without -target_...; if not,
-                                      `why` may get a reason for the user. Of types with own_modes `begin` is called
-                                      before, and its refusal is the reason */
-  PetscReal (*work)(HycoReducer);  /* operations of making a model, if they are many, from the sizes of the scene */
-  const char *const *(*variants)(
-      HycoReducer); /* ways to make a model, of which a search tries one after the other until
-                                                  one meets the targets: their names, then NULL; NULL: one way */
-  PetscErrorCode (*setvariant)(HycoReducer, const char name[]);
-  /* -- online -- */
   PetscErrorCode (*options)(HycoROM);                     /* its options of a model */
   PetscErrorCode (*setup)(HycoROM);                       /* default: HycoROMSetUpDefault() */
   PetscErrorCode (*reset)(HycoROM);                       /* frees what setup and solve have allocated */
@@ -122,11 +98,6 @@ PetscErrorCode HycoROMSetUpDefault(HycoROM model);
    in the model), and computes the residuals of (16) at the contacts. */
 PetscErrorCode HycoROMSetSolution(HycoROM model, const PetscReal mu[], const PetscReal gamma[],
                                   const PetscReal Lambda[]);
-
-/* In build: gets the training points (n x n_parameters), the contact forces there (n_contacts x n column major) and the
-   modes' coefficients (n_modes x n column major). Any output may be NULL. Borrowed. Rank 0. */
-PetscErrorCode HycoReducerGetSolutions(HycoReducer reducer, PetscInt *n, const PetscReal *mu[],
-                                       const PetscReal *Lambda[], const PetscReal *gamma[]);
 
 #if defined(__cplusplus)
 }

@@ -25,7 +25,7 @@ PetscErrorCode HycoSamplesAddGrid(HycoSamples samples, const PetscInt counts[], 
 /* Appends the closed grid, the default of hyco train; of a parameter with counts[i] = 1 the middle of its range. */
 PetscErrorCode HycoSamplesAddTrainingGrid(HycoSamples samples, const PetscInt counts[]);
 /* Appends the tensor grid of the roots of Chebyshev polynomials over each range, counts[i] >= 1 of them: nodes for
-   interpolation by polynomials, as in a condensed model. */
+   interpolation by polynomials. */
 PetscErrorCode HycoSamplesAddChebyshev(HycoSamples samples, const PetscInt counts[]);
 /* Appends `count` >= 1 points spread over the ranges: a quarter of them at corners, with up to three parameters half,
    until there are all; a quarter on faces (one parameter at an end of its range); the rest inside, as Halton's

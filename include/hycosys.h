@@ -19,7 +19,7 @@ typedef struct {
   const char *initial; /* the default, as text */
   const char *meaning; /* one line */
   const char *owner;   /* the class whose objects read it: "HycoReducer" */
-  const char *only;    /* the types that read it, "hybrid or condensed", or for what: "full order"; "": all */
+  const char *only;    /* the types that read it, "hybrid or cubature", or for what: "full order"; "": all */
 } HycoOption;
 
 /* hyco's classes are PETSc objects, with reference counts, names, options prefixes, composed data and

@@ -6,6 +6,7 @@
 */
 #include <hyco.h>
 #include <hycoromtype.h>
+#include <hycotrainer.h>
 #include <stdlib.h>
 
 typedef struct {
@@ -150,11 +151,18 @@ static PetscErrorCode Destroy(HycoROM model)
   PetscFunctionReturn(0);
 }
 
+static PetscErrorCode TrainNearest(HycoTrainerOps *ops)
+{
+  PetscFunctionBegin;
+  ops->build = Build;
+  PetscFunctionReturn(0);
+}
+
 static PetscErrorCode CreateNearest(HycoROM model)
 {
   static const HycoROMTraits traits = {.title = "nearest solutions", .whole = PETSC_TRUE};
   static const HycoROMOps ops = {
-      .build = Build, .setup = SetUp, .reset = Reset, .solve = Solve, .save = Save, .load = Load, .destroy = Destroy};
+      .setup = SetUp, .reset = Reset, .solve = Solve, .save = Save, .load = Load, .destroy = Destroy};
   Nearest *d;
 
   PetscFunctionBegin;
@@ -176,6 +184,7 @@ static PetscErrorCode Run(const char *folder, const char *file, PetscInt n, cons
 
   PetscFunctionBegin;
   PetscCall(HycoROMRegister("nearest", CreateNearest)); /* before a reducer or a file uses it */
+  PetscCall(HycoTrainerRegister("nearest", TrainNearest));
   PetscCall(PetscOptionsSetValue(NULL, "-hyco_model_type", "nearest"));
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, folder, &scene));
   PetscCall(HycoSamplesCreate(scene, &samples));

@@ -57,7 +57,7 @@ static PetscErrorCode Begin(HycoReducer t)
             "contacts' nodes) or rank (one for each contact)");
   HycoCheck(t->sizes[3] > 1, "-hyco_model_type cubature is for 2D and 3D; in 1D use hybrid or projection");
   HycoCheck(!t->scene->n_ties,
-            "-hyco_model_type cubature is for scenes without ties; use hybrid, projection, condensed or regression");
+            "-hyco_model_type cubature is for scenes without ties; use bodies, hybrid, projection or regression");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -216,15 +216,7 @@ static PetscErrorCode Create(HycoROM m)
                                        .force_basis = PETSC_TRUE,
                                        .history = PETSC_TRUE,
                                        .cells = PETSC_TRUE};
-  static const HycoROMOps ops = {.setfromoptions = SetFromOptions,
-                                 .resettraining = ResetTraining,
-                                 .begin = Begin,
-                                 .modes = Modes,
-                                 .build = Build,
-                                 .finish = HycoGalerkinFinish,
-                                 .report = Report,
-                                 .cost = HycoGalerkinCost,
-                                 .setup = SetUp,
+  static const HycoROMOps ops = {.setup = SetUp,
                                  .reset = HycoGalerkinReset,
                                  .solve = HycoGalerkinSolve,
                                  .energy = HycoGalerkinEnergy,
@@ -242,4 +234,26 @@ static PetscErrorCode Create(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-HycoDefineExtension(cubature, HycoROMRegister(HYCO_ROM_CUBATURE, Create))
+static PetscErrorCode CreateTrainer(HycoTrainerOps *ops)
+{
+  PetscFunctionBegin;
+  *ops = (HycoTrainerOps){.setfromoptions = SetFromOptions,
+                          .reset = ResetTraining,
+                          .begin = Begin,
+                          .modes = Modes,
+                          .build = Build,
+                          .finish = HycoGalerkinFinish,
+                          .report = Report,
+                          .cost = HycoGalerkinCost};
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Register(void)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoROMRegister(HYCO_ROM_CUBATURE, Create));
+  PetscCall(HycoTrainerRegister(HYCO_ROM_CUBATURE, CreateTrainer));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+HycoDefineExtension(cubature, Register())

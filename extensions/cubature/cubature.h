@@ -3,7 +3,7 @@
 #ifndef HYCOCUBATURE_H
 #define HYCOCUBATURE_H
 
-#include <hycoprojection.h>
+#include <hycoprojectiontraining.h>
 
 /* Every node of the model's mesh is in A: the mesh has the chosen cells, and the surfaces of contacts and loads. */
 typedef struct {

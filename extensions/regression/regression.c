@@ -368,17 +368,8 @@ static PetscErrorCode Create(HycoROM m)
                                        .settings = HYCO_SETTINGS_NONE,
                                        .history = PETSC_TRUE,
                                        .integrals = PETSC_TRUE};
-  static const HycoROMOps ops = {.setfromoptions = SetFromOptions,
-                                 .modes = Modes,
-                                 .build = Build,
-                                 .report = Report,
-                                 .setup = SetUp,
-                                 .reset = Reset,
-                                 .solve = Solve,
-                                 .view = View,
-                                 .save = Move,
-                                 .load = Move,
-                                 .destroy = Destroy};
+  static const HycoROMOps ops = {
+      .setup = SetUp, .reset = Reset, .solve = Solve, .view = View, .save = Move, .load = Move, .destroy = Destroy};
   Regression r;
 
   PetscFunctionBegin;
@@ -387,4 +378,19 @@ static PetscErrorCode Create(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-HycoDefineExtension(regression, HycoROMRegister(HYCO_ROM_REGRESSION, Create))
+static PetscErrorCode CreateTrainer(HycoTrainerOps *ops)
+{
+  PetscFunctionBegin;
+  *ops = (HycoTrainerOps){.setfromoptions = SetFromOptions, .modes = Modes, .build = Build, .report = Report};
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Register(void)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoROMRegister(HYCO_ROM_REGRESSION, Create));
+  PetscCall(HycoTrainerRegister(HYCO_ROM_REGRESSION, CreateTrainer));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+HycoDefineExtension(regression, Register())

@@ -154,28 +154,12 @@ typedef struct {
 /* The n roots of the Chebyshev polynomial on [lo, hi], ascending: nearly optimal nodes for interpolation. */
 PetscErrorCode HycoChebyshevNodes(PetscInt n, PetscReal lo, PetscReal hi, PetscReal x[]);
 /* weight[k] of node k in the value at `at` of the least-squares polynomial of that degree (interpolation: n - 1), or
-   of the highest degree that the nodes allow; node `skip` is left out, with weight 0 (-1: none). */
-PetscErrorCode HycoPolynomialWeights(PetscInt n, const PetscReal x[], PetscInt degree, PetscInt skip, PetscReal at,
+   of the highest degree that the nodes allow. */
+PetscErrorCode HycoPolynomialWeights(PetscInt n, const PetscReal x[], PetscInt degree, PetscReal at,
                                      PetscReal weight[]);
-/* Growth of the interpolation remainder from the nodes' interval to a point outside: the product of the distances to
-   the nodes over its largest value inside; 1 inside. */
-PetscReal HycoPolynomialGrowth(PetscInt n, const PetscReal x[], PetscReal at);
-/* Newton's form of that remainder is f[x_0 .. x_n-1, at] times a product. Returns the product over the nodes except
-   `skip` (-1: all) of 4 |at - x| over their range, which neither grows nor falls with n for Chebyshev nodes. */
-PetscReal HycoPolynomialProduct(PetscInt n, const PetscReal x[], PetscInt skip, PetscReal at);
-/* The ratio of the next divided difference along `axis` to the last one, in that scale, from the differences of the
-   three highest orders (the larger of their ratios); 2-norms over all data; 1 where the differences are round-off of
-   the data. */
-PetscErrorCode HycoTensorDecay(const HycoTensor *t, PetscInt axis, PetscInt rows, const PetscReal data[],
-                               PetscReal *decay);
 PetscInt HycoTensorSize(const HycoTensor *t);
-/* The weights of all grid nodes, without those with number `skip` along `axis` (-1, -1: all). */
-PetscErrorCode HycoTensorWeights(const HycoTensor *t, const PetscReal at[], PetscInt axis, PetscInt skip,
-                                 PetscReal weight[]);
-/* Sets degree[axis] by the leave-one-out error (of inner nodes if there are few): the highest degree, unless a lower
-   one halves the error. Returns the error of all. */
-PetscErrorCode HycoTensorChooseDegree(HycoTensor *t, PetscInt axis, PetscInt rows, const PetscReal data[],
-                                      PetscReal *error);
+/* The weights of all grid nodes. */
+PetscErrorCode HycoTensorWeights(const HycoTensor *t, const PetscReal at[], PetscReal weight[]);
 
 /* Values on a grid, rows x nodes column major. An axis on which they do not depend has one node. */
 typedef struct {
@@ -185,8 +169,7 @@ typedef struct {
 } HycoGridField;
 /* The sum of the nodes' columns, each multiplied by its weight. */
 PetscErrorCode HycoGridFieldSum(const HycoGridField *field, const PetscReal weight[], PetscReal value[]);
-/* All rows at `at`, without the nodes with number `skip` along `axis` (-1, -1: all). */
-PetscErrorCode HycoGridFieldEvaluate(const HycoGridField *field, const PetscReal at[], PetscInt axis, PetscInt skip,
-                                     PetscReal value[]);
+/* All rows at `at`. */
+PetscErrorCode HycoGridFieldEvaluate(const HycoGridField *field, const PetscReal at[], PetscReal value[]);
 
 #endif

@@ -160,13 +160,4 @@ PetscErrorCode HycoFOMGetForces(HycoFOM fom, PetscReal forces[]);
 /* Sets strain_energy, external_work, gap_work and energy_defect from the last solution. Collective. */
 PetscErrorCode HycoFOMEnergy(HycoFOM fom, HycoSummary *summary);
 
-/*
-  The flexibility at mu for condensed models: on rank 0, G = B K^-1 B^T as the columns of its lower triangle (m (m + 1)
-  / 2). Also solves at mu in the dual form. Collective.
-*/
-PetscErrorCode HycoFOMFlexibility(HycoFOM fom, const PetscReal mu[], PetscReal G[]);
-/* Displacement responses to contact forces at mu: X = K^-1 B^T P for q patterns P (n_contacts x q column major, read
-   on rank 0), at the part's unknowns, n_dof x q row major. Factors only K. Collective. */
-PetscErrorCode HycoFOMResponses(HycoFOM fom, const PetscReal mu[], PetscInt q, const PetscReal P[], PetscReal X[]);
-
 #endif

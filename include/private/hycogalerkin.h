@@ -1,12 +1,12 @@
 /*
-  Common to hybrid, projection-based, cubature models and to the condensed ones of paths: a reduced system made from K, F,
+  Common to hybrid, projection-based and cubature models: a reduced system made from K, F,
   B and D on the RID by the modes, which a HycoSolver solves. What is constant is the first part of their `data`, what a
   prediction changes of their `work`. All on one process.
 */
 #ifndef HYCOGALERKIN_H
 #define HYCOGALERKIN_H
 
-#include <hycoreducerimpl.h>
+#include <hycoromimpl.h>
 
 typedef struct _n_HycoReduced *HycoReduced;
 typedef struct _n_HycoLoads *HycoLoads;
@@ -34,10 +34,6 @@ typedef struct _n_HycoGalerkinModel {
   /* functions of the type: Br and Btr, and Dr, from own_rows; Lambda from L. NULL: each contact of A_lambda has a
      multiplier */
   PetscErrorCode (*contact)(HycoROM), (*gap)(HycoROM), (*expand)(HycoROM);
-  /* for a path, in place of sums over the RID's cells: Kr at fe's tangents; a contribution added to Fr; f_int at U
-     and the state of the laws, and the magnitude of the terms it is a difference of. NULL: sums over the cells */
-  PetscErrorCode (*stiffness)(HycoROM), (*add_loads)(HycoROM),
-      (*forces)(HycoROM, HycoFEState, Vec f_int, PetscReal *summands);
   PetscBool symmetric;
   PetscReal *G;    /* l x n_fe row major (hybrid all), else NULL */
   PetscReal ridge; /* of G, relative to sigma_1^2 */
@@ -77,13 +73,6 @@ PetscErrorCode HycoGalerkinView(HycoROM model, PetscViewer viewer);
 PetscErrorCode HycoGalerkinMove(HycoROM model, HycoH5 file);
 /* Parts that are not fields of the ops; NULL-safe. */
 PetscErrorCode HycoGalerkinDestroy(HycoGalerkinModel galerkin);
-/* Scans the ranges for a singular reduced stiffness, with the points distributed over the ranks: the result is
-   stored in the model, or the model is refused; then makes the table. `model` on every rank; changed on rank 0.
-   Collective. */
-PetscErrorCode HycoGalerkinFinish(HycoReducer reducer, HycoROM model, HycoTraining *report);
-/* Creates a table of the reduced stiffness if that is a polynomial of the parameters on which it depends. */
-PetscErrorCode HycoGalerkinTabulate(HycoROM model, const PetscBool reaches[]);
-PetscReal HycoGalerkinCost(HycoReducer reducer, const HycoAttempt *attempt);
 /* K, F and the rows of A_lambda's contacts on the RID before reduction, borrowed, as the last solve assembled them. */
 PetscErrorCode HycoGalerkinLocal(HycoROM model, HycoLocal *local);
 

@@ -4,19 +4,7 @@
 #ifndef HYCOINELASTICPOINTS_H
 #define HYCOINELASTICPOINTS_H
 
-#include <hycomaterialimpl.h>
-#include <hycoreducerimpl.h>
-
-/* Whether a cell's body may deform inelastically. */
-static inline PetscBool HycoInelasticFlows(HycoFE fe, PetscInt cell)
-{
-  return (PetscBool)!fe->scene->body[fe->mesh->cell_body[cell]].law->linear;
-}
-/* The unknown of fe's mesh that is unknown i of cell e. */
-static inline PetscInt HycoCellUnknown(HycoMesh m, PetscInt e, PetscInt i)
-{
-  return m->cells[e * m->nv + i / m->dim] * m->dim + i % m->dim;
-}
+#include <hycobodiestraining.h>
 
 PetscInt HycoPointRows(HycoReducer reducer);
 /* The modes; tol: of their energy. The caller owns them. Collective. */

@@ -37,8 +37,6 @@ PetscErrorCode HycoDirectExpand(HycoDirect direct, const PetscReal L[], Vec x);
 /* The same for k right-hand sides, D = 0: g and L are m x k column major. */
 PetscErrorCode HycoDirectReduceMany(HycoDirect direct, PetscInt k, const Vec F[], PetscReal g[]);
 PetscErrorCode HycoDirectExpandMany(HycoDirect direct, PetscInt k, const Vec F[], const PetscReal L[], Vec x[]);
-/* x[j] = K^-1 r[j] for k right-hand sides at once, which read the factor once; K without a null space. */
-PetscErrorCode HycoDirectSolveMany(HycoDirect direct, PetscInt k, Vec r[], Vec x[]);
 /* x = K^-1 r */
 PetscErrorCode HycoDirectSolve(HycoDirect direct, Vec r, Vec x);
 

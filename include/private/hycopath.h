@@ -92,7 +92,6 @@ struct _n_HycoPath {
   Vec F, f_int, r, U_old, work, diagonal;
   Vec L_old, gap_work;     /* like Lambda; NULL without contact */
   PetscReal *f_local, *u0; /* length: fe's n_dof */
-  PetscReal summands;      /* 2-norm of the terms of which f_int is a small difference, from ops->step; 0: none */
   PetscBool tangent;       /* K is a tangent, not the elastic stiffness */
   PetscInt kept;           /* number of contact systems solved with this K */
   PetscBool flows;         /* some body's law is inelastic */

@@ -4,7 +4,7 @@
 
 #include <hycoromimpl.h>
 #include <hycosnapshotsimpl.h>
-#include <hycoreducer.h>
+#include <hycotrainer.h>
 #include <slepcsvd.h>
 
 enum {
@@ -83,6 +83,7 @@ struct _p_HycoReducer {
   PetscReal target[HYCO_N_ERRORS]; /* 0: none */
   PetscInt budget;                 /* largest number of solutions added to meet the targets */
   HycoROM prototype;               /* an empty model of the type to be trained, with its ops. Every rank */
+  HycoTrainerOps trainer;          /* of its type */
   void *training;                  /* the type's options, and the data of a run */
   HycoProgress progress;
   HycoPhaseMonitor phase;
@@ -122,15 +123,12 @@ struct _p_HycoReducer {
   PetscReal *V_rid;       /* the rows of V there */
   PetscInt *surface_node; /* by node of the contacts' surfaces: its node of the model's mesh, or -1 */
   PetscBool *fixed;       /* by unknown of the model's mesh */
-  PetscInt *contact_row;  /* by node of the contacts' surfaces: its row in U_contact, or -1 */
-  PetscReal *U_contact;   /* the rows of the contacts' nodes, column major; NULL: not fetched */
-  PetscInt n_contact_nodes;
-  PetscReal *Lambda;     /* n_contacts x n_s column major */
-  PetscReal *VtU;        /* l x n_s column major: V^T of the snapshots minus their lifting */
-  PetscReal *U_norm;     /* n_s: of the whole snapshot */
-  PetscInt n_s;          /* number of snapshot columns: one for each sample, with a history one for each listed time
+  PetscReal *Lambda;      /* n_contacts x n_s column major */
+  PetscReal *VtU;         /* l x n_s column major: V^T of the snapshots minus their lifting */
+  PetscReal *U_norm;      /* n_s: of the whole snapshot */
+  PetscInt n_s;           /* number of snapshot columns: one for each sample, with a history one for each listed time
                             of each sample */
-  PetscInt *taken_start; /* rank 0, with a history: n_samples + 1, where the times of each path's steps begin in */
+  PetscInt *taken_start;  /* rank 0, with a history: n_samples + 1, where the times of each path's steps begin in */
   PetscReal *taken;
   HycoJudged *judged; /* rank 0, by sample: results of HycoReducerJudge(); NULL: not called */
   unsigned long long fingerprint;
@@ -155,7 +153,7 @@ static inline PetscBool HycoReducerOwnModes(HycoReducer t, const HycoROM type)
 /* The ways to make a model of the type that is set, which a search tries; NULL: one. */
 static inline const char *const *HycoReducerVariants(HycoReducer t)
 {
-  return t->prototype->ops->variants ? (*t->prototype->ops->variants)(t) : NULL;
+  return t->trainer.variants ? (*t->trainer.variants)(t) : NULL;
 }
 /* Sets t->columns, and t->n_s from it. */
 PetscErrorCode HycoReducerSetColumns(HycoReducer t, HycoSamples columns);
@@ -164,6 +162,9 @@ PetscErrorCode HycoReducerSolve(HycoReducer t, HycoSnapshots store, HycoSamples 
 /* Frees the data of one run. */
 PetscErrorCode HycoReducerReset(HycoReducer t);
 /* Sets a registered type, with its options; the present one may stay. */
+/* The training of a type; fails without one. The names of the types with one, in order; NULL ends. */
+PetscErrorCode HycoTrainerNames(const char *const **names);
+PetscErrorCode HycoTrainerFind(HycoROMType type, HycoTrainerOps *ops);
 PetscErrorCode HycoReducerSetType(HycoReducer t, HycoROMType type);
 /* Empirical cubature (cubature_weights.c): from the left singular vectors W (n_cells x n, rows in the file's order) and
    singular values of the cells' contributions. The weights of all cells of the whole mesh (w: n_cells, on rank 0; `fixed` in the cells of the part that are `near`,
@@ -231,9 +232,6 @@ PetscErrorCode HycoReducerFindFloating(HycoReducer t, HycoROM model);
 PetscErrorCode HycoReducerFetchRows(HycoReducer t, Mat S, PetscInt n_columns, PetscInt n, const PetscInt node[],
                                     PetscReal rows[]);
 PetscErrorCode HycoReducerFetchSnapshots(HycoReducer t, PetscInt n, const PetscInt node[], PetscReal **rows);
-/* Sets U_contact, contact_row and n_contact_nodes, unless these snapshots' are there: for types that need them, as
-   they are a share of all snapshots on one rank. Collective. */
-PetscErrorCode HycoReducerFetchContacts(HycoReducer t);
 /* Calls use(t, first, S, ctx) for all displacements, in batches of columns from `first` on: all of them, or with
    pod_memory as many as fit. S must not be changed. Collective. */
 typedef PetscErrorCode (*HycoBatchUse)(HycoReducer t, PetscInt first, Mat S, void *ctx);

@@ -6,7 +6,6 @@
 
 PetscErrorCode HycoROMCreate_Hybrid(HycoROM model);
 PetscErrorCode HycoROMCreate_Projection(HycoROM model);
-PetscErrorCode HycoROMCreate_Condensed(HycoROM model);
 PetscErrorCode HycoROMCreate_Bodies(HycoROM model);
 
 #endif

@@ -182,9 +182,6 @@ PetscErrorCode HycoSolverSetStartSet(HycoSolver s, const PetscBool active[]);
 PetscErrorCode HycoSolverSetTarget(HycoSolver s, PetscReal residual);
 /* Gets the iterations of conjugate gradients in the last solve, and most of one linear solve; 0 with a factor. */
 PetscErrorCode HycoSolverGetLinearIterations(HycoSolver s, PetscInt *its, PetscInt *most);
-/* S = B K^-1 Bt of the last solve, which was in the dual form with a factor of a regular K: m x m column major, the
-   same on every rank. Borrowed until a matrix changes. Collective. */
-PetscErrorCode HycoSolverGetFlexibility(HycoSolver s, PetscInt *m, const PetscReal *S[]);
 /* The matrix of the dual problem after HycoSolverFactor(): S, p + m square, p unknowns pinned before the m contacts. Borrowed. */
 void HycoSolverGetCondensed(HycoSolver s, PetscInt *m, PetscInt *p, const PetscReal *S[]);
 /*
@@ -198,7 +195,5 @@ PetscErrorCode HycoSolverTangentDestroy(HycoSolverTangent *tangent);
 PetscErrorCode HycoSolverTangentSolve(HycoSolverTangent tangent, Vec r, Vec g, int sign, Vec dx, Vec dL,
                                       PetscBool *kink);
 PetscInt HycoSolverTangentUndecided(HycoSolverTangent tangent);
-/* x[j] = K^-1 r[j] with the factor of the last solve, for k right-hand sides. Collective. */
-PetscErrorCode HycoSolverApplyInverse(HycoSolver s, PetscInt k, Vec r[], Vec x[]);
 
 #endif

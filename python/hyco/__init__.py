@@ -13,7 +13,6 @@ Arrays in, arrays out; only NumPy is needed. Under mpiexec every process runs th
 together, and many points are divided over them. Errors are hyco.Error with hyco's one line.
 """
 import ctypes
-import warnings
 from functools import cached_property
 
 import numpy as np
@@ -265,9 +264,9 @@ class Scene(_Handle):
 
     def train(self, path, grid=None, points=None, scatter=None, validation=None, progress=None):
         """Trains a model, writes it to `path` and returns it. Training points: `grid` of so many values per parameter, ends included;
-        `points` (n, parameters); `scatter` points over the ranges; or none for types that choose them. validation: held-out points
+        `points` (n, parameters); or `scatter` points over the ranges. validation: held-out points
         (n, parameters). progress(done, n): called as points are solved. Settings are those of hyco train, as entries of the Scene:
-        hyco_model_type, hyco_pod_tol, ... Solutions are kept in PATH.snapshots. Warns if the model misses its limits."""
+        hyco_model_type, hyco_pod_tol, ... Solutions are kept in PATH.snapshots."""
         handle, interrupted = self._open, []
         reducer, samples, held = ctypes.c_void_p(), self._samples(grid, points, scatter), self._samples(None, validation, None)
         report = np.zeros(1, c.struct('HycoTraining'))
@@ -297,8 +296,6 @@ class Scene(_Handle):
             c.call('HycoReducerDestroy', ctypes.byref(reducer))
             for each in (samples, held):
                 c.call('HycoSamplesDestroy', ctypes.byref(each))
-        if report['missed'][0] and not World.rank:
-            warnings.warn(report['missed'][0].decode('utf-8', 'replace'), stacklevel=2)
         model = Model(path)
         model.training = report[0]
         return model
@@ -437,7 +434,7 @@ class Model(_Handle):
     parameters  {name: (lo, hi)} of its training
     outputs     names of the outputs
     contacts    names of the contacts
-    type        'hybrid', 'condensed', 'bodies', ...
+    type        'hybrid', 'bodies', ...
     n_contacts  number of contact forces
     """
     _destroy = 'HycoROMDestroy'

@@ -51,7 +51,7 @@ def rope(nodes, mesh, quick):
                 [("u 0.01 % and the RID's forces 1 %, means", {"u_mean": 1e-4, "lambda_rid_mean": 1e-2})])
     if quick:
         case.settings = [*combine("hybrid", "10 x 12", pod_tol=["1e-7", "1e-11"], hybrid=["all"]),
-                         *combine("projection", "10 x 12", pod_tol=["1e-7"]), Setting("condensed", "20 x 8 Chebyshev")]
+                         *combine("projection", "10 x 12", pod_tol=["1e-7"]), Setting("bodies", "20 x 8 Chebyshev")]
         return case
     tolerances = ["1e-5", "1e-7", "1e-9", "1e-11", "1e-13"]
     deim, hybrid = ["deim", "qdeim"], ["all", "rank"] if nodes <= 1000 else ["all"]
@@ -59,8 +59,7 @@ def rope(nodes, mesh, quick):
                      *combine("projection", "10 x 12", pod_tol=tolerances),
                      *combine("projection", "10 x 12", pod_tol=tolerances, dual=["snapshots"])]
     if nodes <= 1000:
-        case.settings += [*(Setting("condensed", name) for name in list(case.training)[1:]),
-                          *(Setting("condensed", name, (("pod_tol", "1e-13"),)) for name in list(case.training)[1:])]
+        case.settings += [Setting("bodies", name) for name in list(case.training)[1:]]
     return case
 
 
@@ -88,14 +87,13 @@ def pellet(name, mesh, quick):
     case.batch, case.ramp = radii(4.033, 4.06, 4.045, 4.087), ("radius", 4.06)
     if quick:
         case.training["5 radii"] = ["-values_radius", "4.02,4.04,4.07,4.1", "-values_load", "0.2,0.5,0.7,0.85,1"]
-        case.settings = [*combine("hybrid", "5 radii", pod_tol=["1e-7", "1e-10"]), Setting("condensed", "4 Chebyshev radii")]
+        case.settings = [*combine("hybrid", "5 radii", pod_tol=["1e-7", "1e-10"]), Setting("bodies", "4 Chebyshev radii")]
         return case
-    condensed = [*(Setting("condensed", f"{n} Chebyshev radii") for n in (2, 4)),
-                 *(Setting("condensed", f"{n} Chebyshev radii", (("pod_tol", "1e-14"),)) for n in (4, 6, 8))]
+    bodies = [Setting("bodies", f"{n} Chebyshev radii") for n in (2, 4, 6, 8)]
     tolerances = ["1e-5", "1e-7", "1e-9", "1e-10", "1e-12"]
     if name == "C":
         case.settings = [*combine("hybrid", "9 radii", pod_tol=["1e-10", "1e-12"], rid_layers=[1]),
-                         *combine("hybrid", "9 radii", pod_tol=["1e-12"], rid_layers=[2]), *condensed[1:3]]
+                         *combine("hybrid", "9 radii", pod_tol=["1e-12"], rid_layers=[2]), bodies[1]]
         return case
     case.settings = [
         *combine("hybrid", "9 radii", pod_tol=tolerances, rid_layers=[1, 2]),
@@ -104,5 +102,5 @@ def pellet(name, mesh, quick):
         *combine("hybrid", "9 radii", pod_tol=tolerances[1::2], deim_type=["qdeim"]),
         *combine("hybrid", "9 radii", pod_tol=tolerances[1::2], hybrid=["rank"]),
         *combine("hybrid", "5 radii", pod_tol=tolerances[1::2]),
-        *combine("projection", "9 radii", pod_tol=tolerances[1::2]), *condensed]
+        *combine("projection", "9 radii", pod_tol=tolerances[1::2]), *bodies]
     return case

@@ -45,7 +45,7 @@ class Bench:
 
     def train(self, setting, model):
         """Trains; offline seconds count shared solutions for each setting."""
-        kind = "condensed" if setting.type == "condensed" else "solutions"
+        kind = "bodies" if setting.type == "bodies" else "solutions"
         key = (setting.training, kind)
         folder = self.path("-".join(key).replace(" ", ""))
         r, _ = self.hyco("train", *self.case.scene, *self.case.training[setting.training], *setting.arguments(), "-model", model,

@@ -43,7 +43,7 @@ RANK, VECTORS = ("hybrid", "rank"), ("dual", "nnmf")
 TRAINING = {name: ["-scatter", "12"] for name in ("", "searched")}
 SEARCHED = Setting("hybrid", "searched")  # no option: the settings that train finds
 BASELINES = [Setting("projection", "", TIGHT), *(cubature(tol, *contact) for contact in ([], [RANK], [VECTORS]) for tol in ("1e-4", "1e-6"))]
-CONDENSED = [Setting("condensed", ""), Setting("condensed", "", (("condensed_inelastic_tol", "1e-14"),))]
+BODIES = [Setting("bodies", "")]
 
 
 @dataclass
@@ -65,7 +65,7 @@ def case_of(mesh):
     if mesh == "slice":
         return Case("rod, a slice", ["-scene", "examples/rod"], TRAINING | {"grid 5,2,2": ["-grid", "5,2,2", "-grid_type", "centred"]}, SLICE,
                     [SEARCHED, Setting("hybrid", "grid 5,2,2", (*TIGHT, *LAYER)), Setting("hybrid", "", (("pod_tol", "1e-9"), *LAYER)), Setting("hybrid", "", (*TIGHT, *LAYER)), *BASELINES,
-                     *CONDENSED, Setting("regression", "", (*TIGHT, ("rid_layers", 1)))], SLICE[::7])
+                     *BODIES, Setting("regression", "", (*TIGHT, ("rid_layers", 1)))], SLICE[::7])
     scene = ["-scene", "examples/rod/3d.yaml", "-scene_mesh", f"examples/pellet/{mesh}.msh"]
     planes = [Setting("hybrid", "", (("pod_tol", tol), *PLANE)) for tol in ("1e-8", "1e-10", "1e-12", "1e-14")]
     if mesh == "C":  # half an hour for the references, ten minutes for each setting
@@ -74,7 +74,7 @@ def case_of(mesh):
         return Case("rod, mesh C", scene, TRAINING | {"grid 3,2,2": ["-grid", "3,2,2", "-grid_type", "centred"]}, SOLID, [*planes, cubature("1e-4", RANK)], SOLID[1:2])
     return Case(f"rod, mesh {mesh}", scene, TRAINING | {"grid 3,2,2": ["-grid", "3,2,2", "-grid_type", "centred"]}, SOLID,
                 [SEARCHED, *planes, Setting("hybrid", "grid 3,2,2", (*TIGHT, *PLANE)), Setting("hybrid", "", (*TIGHT, *PLANE, ("rid_layers", 1))), *BASELINES[:4], BASELINES[5],
-                 *CONDENSED, Setting("regression", "", (*TIGHT, PLANE[0], PLANE[2]))], SOLID[:3])
+                 *BODIES, Setting("regression", "", (*TIGHT, PLANE[0], PLANE[2]))], SOLID[:3])
 
 
 class Bench:

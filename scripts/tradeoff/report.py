@@ -8,12 +8,17 @@ PLAIN = "a factor per iteration"
 LEVELS = [0.1, 0.01, 0.001, 0.0001]
 QUANTITIES = [("u", "displacement"), ("sigma", "stress of the RID's cells"), ("lambda_rid", "forces on the RID's contacts"),
               ("lambda", "all contact forces")]
-COLORS = {"hybrid": "#2c5aa0", "projection": "#c8352c", "condensed": "#3a9a4e"}
-MARKS = {"hybrid": "o", "projection": "s", "condensed": "^"}
+COLORS = {"hybrid": "#2c5aa0", "projection": "#c8352c", "bodies": "#3a9a4e"}
+MARKS = {"hybrid": "o", "projection": "s", "bodies": "^"}
 SHOWN = 1e-4  # per cent: smaller errors tell nothing
 PUBLISHED = ["id", "label", "type", "modes", "rid_fraction", "offline_s", "train_s", "model_bytes", "memory_mb", "path_s",
              *(f"{name}_s{end}" for name in ("batch", "single") for end in ("", "_min", "_max")), "ramp_s", "ramp_n",
              *(f"{name}_{which}" for name in ("u", "sigma", "inelastic", "lambda_rid", "lambda") for which in ("mean", "median", "max")), "bounded", "ratio", "status"]
+
+
+def kinds(rows):
+    """Types with settings, in the order of the tables."""
+    return [kind for kind in COLORS if kind in {r["type"] for r in rows}]
 
 
 def good(rows):
@@ -37,7 +42,7 @@ def cheapest(rows, error, level, time="batch_s"):
 def recommended(rows):
     """(quantity, type, level): the cheapest row whose largest error is within the level, or None."""
     return {(q, kind, level): cheapest([r for r in rows if r["type"] == kind], f"{q}_max", level) for q, _ in QUANTITIES
-            for kind in COLORS for level in LEVELS}
+            for kind in kinds(rows) for level in LEVELS}
 
 
 def joint(rows, bounds, kind=None):
@@ -50,7 +55,7 @@ def finalists(case, rows):
     """All rows of the tables: the recommended ones, the fronts of the mean errors, the combined requirements. Among rows with equal times in the
     sweep, paired timing may change the order; a row that it has not timed shows a single time."""
     named = [*recommended(rows).values(), *(r for q, _ in QUANTITIES for r in pareto(rows, f"{q}_mean")),
-             *(joint(rows, bounds, kind) for _, bounds in case.wanted for kind in COLORS)]
+             *(joint(rows, bounds, kind) for _, bounds in case.wanted for kind in kinds(rows))]
     named = [r for r in named if r]
     return list({r["id"]: r for r in named}.values())
 
@@ -80,7 +85,7 @@ def answer(rows, full):
     found = recommended(rows)
     lines = []
     for q, words in QUANTITIES:
-        each = [[found[q, kind, level] for kind in COLORS] for level in LEVELS]
+        each = [[found[q, kind, level] for kind in kinds(rows)] for level in LEVELS]
         lines.append([words, *(", ".join(speedup(full["batch_s"] / r["batch_s"]) if r else "-" for r in cell) for cell in each)])
     return table(["largest error of", *(f"{100 * level:g} %" for level in LEVELS)], lines)
 
@@ -94,7 +99,7 @@ def wanted(case, rows, full):
 
     names = ["batch_s", "single_s", *(["ramp_s"] if case.ramp else [])]
     for words, bounds in case.wanted:
-        for kind in COLORS:
+        for kind in kinds(rows):
             r = joint(rows, bounds, kind)
             if r:
                 lines.append(["" if words in (line[0] for line in lines) else words, f"{kind} {r['id']}", *(cell(r, n) for n in names), speedup(full[PLAIN]["single_s"] / r["single_s"])])
@@ -135,7 +140,7 @@ def number(axis, marks):
 def plot(case, rows, full, path):
     figure, axes = plt.subplots(2, 2, figsize=(11, 8.2), layout="constrained", sharex=True)
     for axis, (q, words) in zip(axes.flat, QUANTITIES):
-        for kind in COLORS:
+        for kind in kinds(rows):
             mine = [r for r in good(rows) if r["type"] == kind]
             axis.scatter([r["batch_s"] for r in mine], [shown(r, q) for r in mine], s=22, alpha=0.55,
                          marker=MARKS[kind], color=COLORS[kind], label=kind if mine else None)
@@ -161,5 +166,5 @@ def section(case, rows, full, words, picture):
     failed = [r for r in rows if r["status"] != "ok"]
     return [words, "", f"![error against online time, {case.name}]({picture})", "",
             f"{len(rows)} settings ([csv]({picture.removesuffix('.png')}.csv)" + (f"; {len(failed)} of them gave no model or no converged solution" if failed else "")
-            + f"). Speed-up, in a set, of the cheapest {', '.join(COLORS)} setting that is accurate enough at all unseen points:", "",
+            + f"). Speed-up, in a set, of the cheapest {', '.join(kinds(rows))} setting that is accurate enough at all unseen points:", "",
             *answer(rows, full["warm"]), "", "In brackets the speed-up over warm full order:", "", *wanted(case, rows, full)]

@@ -118,8 +118,7 @@ PetscErrorCode CheckReportMotions(Check *check)
     CheckReportWarning(
         check,
         "%d rigid motion%s prevented only by contact: full order can solve this if the loads press the bodies "
-        "together, and so can models of bodies, hybrid and projection-based ones; a condensed model needs a support or "
-        "a soft spring",
+        "together, and so can models of bodies, hybrid and projection-based ones",
         (int)in->loose, in->loose > 1 ? "s are" : " is");
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -25,10 +25,9 @@ static PetscErrorCode ReportRange(Check *check, const HycoVariableInspection *v,
   PetscFunctionBegin;
   if (does[HYCO_AFFECTS_STIFFNESS] && !does[HYCO_AFFECTS_MAPS] && lo > 0 && hi >= WIDE * lo) {
     cJSON_AddItemToArray(cJSON_GetObjectItem(check->json, "wide_ranges"), cJSON_CreateString(v->name));
-    PetscCall(DriverPrint(
-        "  for a hybrid or condensed model, let its logarithm be the parameter: q from %.4g to %.4g, and 10^q in "
-        "place of %s\n",
-        log10((double)lo), log10((double)hi), v->name));
+    PetscCall(DriverPrint("  for a hybrid model, let its logarithm be the parameter: q from %.4g to %.4g, and 10^q in "
+                          "place of %s\n",
+                          log10((double)lo), log10((double)hi), v->name));
   }
   if (lo == hi) CheckReportWarning(check, "the range of the parameter %s is a single value", v->name);
   PetscFunctionReturn(PETSC_SUCCESS);

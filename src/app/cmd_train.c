@@ -107,7 +107,7 @@ static PetscErrorCode CheckKind(PetscBool greedy, const Search *search)
 }
 
 /* Refuses an option of the command line that this training does not read, according to the reducer's declarations. */
-static PetscErrorCode CheckRead(HycoReducer reducer, PetscBool given, PetscBool greedy)
+static PetscErrorCode CheckRead(HycoReducer reducer, PetscBool greedy)
 {
   const HycoOption *table;
   PetscInt n;
@@ -117,7 +117,7 @@ static PetscErrorCode CheckRead(HycoReducer reducer, PetscBool given, PetscBool 
   PetscCall(HycoReducerGetType(reducer, &type));
   PetscCall(HycoGetOptionTable(&n, &table));
   for (PetscInt k = 0; k < n; k++) {
-    const char *only = table[k].only, *where = strstr(only, " where");
+    const char *only = table[k].only;
     char dashed[DRIVER_LINE];
     PetscBool set, read;
 
@@ -130,9 +130,7 @@ static PetscErrorCode CheckRead(HycoReducer reducer, PetscBool given, PetscBool 
       continue;
     }
     PetscCall(HycoReducerTries(reducer, only, &read));
-    HycoCheck(read, "%s has no effect here: it is for -hyco_model_type %.*s, and the model is %s", dashed,
-              where ? (int)(where - only) : (int)strlen(only), only, type);
-    HycoCheck(!given || !where, "%s has no effect here: it chooses points only if none are given", dashed);
+    HycoCheck(read, "%s has no effect here: it is for -hyco_model_type %s, and the model is %s", dashed, only, type);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -193,7 +191,7 @@ PetscErrorCode CommandTrain(void)
   HycoTraining t;
   GreedyLog log = {0};
   Search search = {0};
-  PetscBool given, chooses, greedy;
+  PetscBool given, greedy;
   PetscInt n;
   char path[PETSC_MAX_PATH_LEN], model[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN], word[] = "snapshots:";
   char folder[PETSC_MAX_PATH_LEN];
@@ -214,9 +212,8 @@ PetscErrorCode CommandTrain(void)
   PetscCall(HycoReducerSetFromOptions(reducer));
   PetscCall(TakeOnce(samples, "training"));
   PetscCall(TakeOnce(validation, "validation"));
-  PetscCall(CheckRead(reducer, given, greedy));
-  PetscCall(HycoReducerChooses(reducer, &chooses));
-  HycoCheck(given || greedy || chooses,
+  PetscCall(CheckRead(reducer, greedy));
+  HycoCheck(given || greedy,
             "give the training points: -grid N,N,..., or -values_NAME V,V,... for each parameter, or -points FILE.csv");
   PetscCall(HycoReducerSetProgress(reducer, DriverProgress, word));
   PetscCall(HycoReducerSetPhaseMonitor(reducer, DriverPhase, NULL));
@@ -230,9 +227,8 @@ PetscErrorCode CommandTrain(void)
   if (greedy)
     PetscCall(HycoReducerRunGreedy(reducer, given ? samples : NULL, training, model, &t));
   else
-    PetscCall(HycoReducerRun(reducer, given ? samples : NULL, model, &t));
+    PetscCall(HycoReducerRun(reducer, samples, model, &t));
   PetscCall(DriverPrint("%s", t.summary));
-  if (t.missed[0]) PetscCall(DriverMissed("%s", t.missed));
   if (t.error_u >= 0) {
     PetscCall(DriverPrint("mean training errors: u %.2e, %sforces %.2e", (double)t.error_u,
                           t.chosen.settings.rid ? "RID " : "", (double)t.error_lambda));

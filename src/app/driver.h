@@ -299,7 +299,7 @@ void DriverWantsFullOrder(const Fallback *fallback, const HycoPrediction *p, cha
 /* Solves at mu (length n); the results replace the prediction's, u over the whole mesh. Collective. */
 PetscErrorCode DriverSolveFullOrder(Fallback *fallback, PetscInt n, const PetscReal mu[], HycoPrediction *p);
 
-/* One full-order solve at mu (length n) with the forces of the condensed model's last prediction, which are on rank
+/* One full-order solve at mu (length n) with the forces of the model's last prediction, which are on rank
    0: u over the whole mesh replaces the prediction's, and the residuals of (16) replace its own. Collective. */
 PetscErrorCode DriverSolveDisplacement(Fallback *fallback, HycoROM model, PetscInt n, const PetscReal mu[],
                                        HycoPrediction *p);

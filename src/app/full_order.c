@@ -1,5 +1,5 @@
 /* hyco predict with the scene: -hyco_fallback, full order where the reduced model is not accurate enough;
-   -hyco_full_displacement, one full-order solve with a condensed model's forces. */
+   -hyco_full_displacement, one full-order solve with a model's forces. */
 #include "driver.h"
 #include <math.h>
 #include <stdio.h>
@@ -42,8 +42,9 @@ PetscErrorCode DriverReadFallback(HycoROM model, PetscBool extrapolate, Fallback
   PetscCall(HycoROMGetType(model, &type));
   PetscCall(HycoROMGivesForces(model, &forces));
   HycoCheck(!f->displacement || forces,
-            "-hyco_full_displacement needs the contact forces of a condensed model, and this model is %s, whose forces "
-            "are not accurate enough; use -hyco_fallback",
+            "-hyco_full_displacement needs accurate forces of all contacts, which models of bodies without a history "
+            "have, and "
+            "this model is %s; use -hyco_fallback",
             type);
   PetscCall(DriverReadTarget(HYCO_ERROR_U, &f->target_u));
   PetscCall(DriverReadTarget(HYCO_ERROR_LAMBDA, &f->target_lambda));
@@ -135,7 +136,7 @@ PetscErrorCode DriverSolveDisplacement(Fallback *f, HycoROM model, PetscInt n, c
   PetscCall(HycoFOMSolveForces(f->fom, n, mu, Lambda));
   PetscCall(HycoFOMGetSummary(f->fom, &s));
   TakeDisplacement(f, &s, p);
-  p->estimated_error_u = p->estimated_error_u_full;
+  p->estimated_error_u = -1;                                                              /* that of the modes */
   for (PetscInt k = 0; k < HYCO_MAX_QUANTITIES; k++) p->estimated_error_quantity[k] = -1; /* of other displacements */
   if (s.reason > 0) p->reason = reason; /* the reason of the forces' solve */
   p->seconds.setup += s.seconds.setup;

@@ -53,7 +53,7 @@ static const struct {
     {"modes", "hyco_pod_"},
     {"the reduced integration domain, hybrid models", "hyco_rid_ hyco_deim_ hyco_hybrid hyco_scan hyco_keep_"},
     {"models of bodies", "hyco_bodies_"},
-    {"baselines", "hyco_dual hyco_nnmf_ hyco_cubature_ hyco_regression_ hyco_condensed_"},
+    {"baselines", "hyco_dual hyco_nnmf_ hyco_cubature_ hyco_regression_"},
     {"predictions", "hyco_reconstruct hyco_fallback hyco_full_ hyco_residual hyco_rom_"},
     {"solver", "hyco_solver_ hyco_tao_ hyco_linear hyco_memory hyco_monitor"},
     {"histories", "hyco_newton hyco_step_ hyco_substeps hyco_checkpoint hyco_resume"},

@@ -91,7 +91,7 @@ static PetscErrorCode ReadGridType(PetscInt *type)
   PetscOptionsBegin(PETSC_COMM_WORLD, NULL, "hyco", NULL);
   PetscCall(HycoOptionsWord("-grid_type",
                             "positions of the values: cell centres; with both ends of the ranges, the default of "
-                            "training; or roots of Chebyshev polynomials (for a condensed model)",
+                            "training; or roots of Chebyshev polynomials",
                             types, &word, &given));
   PetscOptionsEnd();
   if (given) *type = word;

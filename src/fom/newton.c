@@ -29,7 +29,7 @@ typedef struct {
 } Progress;
 
 /* Evaluates the law at U: state `end`, f_int, r = F - f_int - B^T L, with `tangent` the consistent tangents; and the
-   magnitudes of the terms of r. floor: 16 eps (|diag(K) U| + summands): below it the residual is round-off of U. */
+   magnitudes of the terms of r. floor: 16 eps |diag(K) U|: below it the residual is round-off of U. */
 static PetscErrorCode Evaluate(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tangent, HycoStepAttempt *a,
                                Progress *now)
 {
@@ -54,7 +54,7 @@ static PetscErrorCode Evaluate(HycoPath p, PetscReal t0, PetscReal t1, PetscBool
   PetscCall(VecNorm(p->r, NORM_2, &now->residual[2]));
   PetscCall(VecPointwiseMult(p->work, p->diagonal, p->U));
   PetscCall(VecNorm(p->work, NORM_2, &now->floor));
-  now->floor = 16 * PETSC_MACHINE_EPSILON * (now->floor + p->summands);
+  now->floor *= 16 * PETSC_MACHINE_EPSILON;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,11 +1,9 @@
 /*
   Displacements under given contact forces: K U = F - B^T Lambda, (16) without its inequalities, for models that predict
-  only forces; and K^-1 B^T for many forces at once. The factor is that of K, without contacts, and is kept while K is
+  only forces. The factor is that of K, without contacts, and is kept while K is
   unchanged.
 */
 #include <hycofomimpl.h>
-
-#define BLOCK 32 /* right-hand sides solved at once */
 
 /* Creates a solver without contacts; in the other one they are unknowns. The factor of the contact solver may be
    that of another form. */
@@ -61,46 +59,5 @@ PetscErrorCode HycoFOMSolveForces(HycoFOM f, PetscInt n, const PetscReal mu[], c
   PetscCall(HycoFOMGather(f));
   t->total = HycoNow() - begin;
   f->solved = f->given = PETSC_TRUE;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Solves a block of n patterns, from P to their columns of X (stride q). In blocks, because a triangular solve of 32
-   right-hand sides costs little more than a few, and memory stays bounded. */
-static PetscErrorCode RespondBlock(HycoFOM f, PetscInt n, const PetscReal P[], PetscInt q, PetscReal X[])
-{
-  PetscReal *local;
-  Vec r[BLOCK], x[BLOCK];
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1(f->fe->n_dof, &local));
-  for (PetscInt j = 0; j < n; j++) {
-    PetscCall(VecDuplicate(f->U, &r[j]));
-    PetscCall(VecDuplicate(f->U, &x[j]));
-    PetscCall(HycoFOMSetLambda(f, P + (f->rank ? 0 : j * f->n_contacts)));
-    PetscCall(MatMult(f->Bt, f->Lambda, r[j]));
-  }
-  PetscCall(HycoSolverApplyInverse(f->given_solver, n, r, x));
-  for (PetscInt j = 0; j < n; j++) {
-    PetscCall(HycoFOMToLocal(f, x[j], local));
-    for (PetscInt i = 0; i < f->fe->n_dof; i++) X[(size_t)i * (size_t)q + (size_t)j] = local[i];
-    PetscCall(VecDestroy(&r[j]));
-    PetscCall(VecDestroy(&x[j]));
-  }
-  PetscCall(PetscFree(local));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* X[n_dof][q] = K^-1 B^T P, P of n_contacts x q by columns on rank 0. Overwrites U and Lambda of f. Collective. */
-PetscErrorCode HycoFOMResponses(HycoFOM f, const PetscReal mu[], PetscInt q, const PetscReal P[], PetscReal X[])
-{
-  PetscFunctionBegin;
-  PetscCall(HycoSceneRefuseHistory(f->scene, "HycoFOMResponses()"));
-  HycoCheckHandle(f, HYCO_FOM_CLASSID);
-  PetscCall(SetUp(f));
-  PetscCall(HycoFOMAssemble(f, mu));
-  PetscCall(VecCopy(f->F, f->given_F));
-  PetscCall(SolveGiven(f)); /* creates its factor */
-  for (PetscInt j = 0; j < q; j += BLOCK)
-    PetscCall(RespondBlock(f, PetscMin(BLOCK, q - j), P + (f->rank ? 0 : j * f->n_contacts), q, X + j));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,6 +1,6 @@
 /* The inspection of a scene: assembles at points of its ranges, as a solve does, and measures. */
 #include "inspect.h"
-#include <hycobodies.h>
+#include <hycobodiestraining.h>
 #include <hycoquantities.h>
 #include <string.h>
 

@@ -513,31 +513,6 @@ PetscErrorCode HycoDirectExpandMany(HycoDirect d, PetscInt k, const Vec F[], con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Many right-hand sides at once: their triangular solves are matrix products. Collective. */
-PetscErrorCode HycoDirectSolveMany(HycoDirect d, PetscInt k, Vec r[], Vec x[])
-{
-  const size_t rows = (size_t)(d->n + d->m);
-  PetscReal *all = NULL;
-
-  PetscFunctionBegin;
-  if (!k) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCheck(!d->n_pinned, d->comm, PETSC_ERR_SUP, "several right-hand sides with a fixed null space");
-  if (d->rank == 0) PetscCall(PetscCalloc1(rows * (size_t)k, &all));
-  for (PetscInt j = 0; j < k; j++) {
-    PetscCall(Fetch(d, r[j]));
-    if (d->rank == 0) PetscCall(PetscArraycpy(all + rows * (size_t)j, d->rhs, d->n));
-  }
-  d->id.rhs = all;
-  d->id.nrhs = (MUMPS_INT)k;
-  PetscCall(Run(d, 0));
-  for (PetscInt j = 0; j < k; j++) {
-    if (d->rank == 0) PetscCall(PetscArraycpy(d->rhs, all + rows * (size_t)j, d->n));
-    PetscCall(Deliver(d, x[j]));
-  }
-  PetscCall(PetscFree(all));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* x = K^-1 r with pinned unknowns 0. Collective. */
 PetscErrorCode HycoDirectSolve(HycoDirect d, Vec r, Vec x)
 {

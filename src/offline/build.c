@@ -383,7 +383,7 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
   r->condition = m->model->numbers[0];
   r->error_u = m->model->numbers[1];
   r->error_lambda = m->model->numbers[2];
-  if (m->ops->report) PetscCall((*m->ops->report)(t, m, r));
+  if (t->trainer.report) PetscCall((*t->trainer.report)(t, m, r));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -445,7 +445,7 @@ static PetscErrorCode BuildModel(HycoReducer t, PetscBool useful, HycoROM m, Hyc
 {
   PetscFunctionBegin;
   PetscCall(FillModel(t, m));
-  PetscCall((*m->ops->build)(m, t));
+  PetscCall((*t->trainer.build)(m, t));
   PetscCall(TakeClosed(t, m));
   if (useful) PetscCall(CheckUseful(t, m));
   PetscCall(Report(t, m, report));
@@ -560,9 +560,9 @@ PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, HycoROM *model,
   PetscCallMPI(MPI_Bcast(report, sizeof(*report), MPI_BYTE, 0, HycoComm(t)));
   report->type = report->chosen.settings.type = t->prototype->model->type; /* set on each rank */
   PetscCall(HycoROMBroadcast(HycoComm(t), model));
-  if (!useful || !t->prototype->ops->finish) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!useful || !t->trainer.finish) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoLogEvent(HYCO_EVENT_SCAN, PETSC_TRUE));
-  ierr = (*t->prototype->ops->finish)(t, *model, report);
+  ierr = (*t->trainer.finish)(t, *model, report);
   PetscCall(HycoLogEvent(HYCO_EVENT_SCAN, PETSC_FALSE));
   if (ierr) (void)!HycoROMDestroy(model);
   PetscCall(ierr);
@@ -757,7 +757,7 @@ static PetscErrorCode DecideLate(HycoReducer t)
   const char *const *types;
 
   PetscFunctionBegin;
-  PetscCall(HycoROMTypeNames(&types));
+  PetscCall(HycoTrainerNames(&types));
   t->late = PETSC_FALSE;
   for (PetscInt k = 0; types[k] && t->scene->n_parameters && (t->validation || t->n_validation); k++) {
     HycoROM type;
@@ -792,36 +792,25 @@ PetscErrorCode HycoReducerCheckContacts(HycoReducer t, const HycoROM type)
 PetscErrorCode HycoReducerRun(HycoReducer t, HycoSamples samples, const char path[], HycoTraining *training)
 {
   HycoSnapshots store;
-  HycoSamples chosen = NULL;
   HycoTraining report = {0};
   PetscReal begin = HycoNow(), solved;
-  const PetscBool choose = (PetscBool)!samples;
 
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
-  HycoCheck(samples || t->prototype->ops->choosepoints, "give the training points");
+  HycoCheck(samples, "give the training points");
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++)
     HycoCheck(!(t->target[j] > 0) || t->validation || t->n_validation,
               "-target_%s needs held-out points, and -hyco_validation is 0; remove one of the two", HycoErrorKinds[j]);
   if (t->pinned[HYCO_CHOICE_TYPE] || !t->search) PetscCall(HycoReducerCheckContacts(t, t->prototype));
-  if (choose) {
-    PetscCall((*t->prototype->ops->startpoints)(t, &chosen));
-    samples = chosen;
-  }
   PetscCall(HycoReducerOpen(t, samples, path, &store));
-  if (t->prototype->ops->begin) PetscCall((*t->prototype->ops->begin)(t));
-  if (choose)
-    HycoStaged(HYCO_STAGE_FULL_ORDER, (*t->prototype->ops->choosepoints)(t, store, &chosen));
-  else
-    PetscCall(DecideLate(t));
-  if (!choose && !t->late) PetscCall(HycoReducerSolve(t, store, samples));
+  if (t->trainer.begin) PetscCall((*t->trainer.begin)(t));
+  PetscCall(DecideLate(t));
+  if (!t->late) PetscCall(HycoReducerSolve(t, store, samples));
   PetscCall(HycoReducerHoldOut(t, store));
   solved = HycoNow() - t->solving;
-  if (choose && t->prototype->ops->modes) HycoStaged(HYCO_STAGE_FULL_ORDER, (*t->prototype->ops->modes)(t, store));
-  HycoStaged(HYCO_STAGE_REDUCTION, HycoReducerFinish(t, store, path, (PetscBool)!choose, &report));
+  HycoStaged(HYCO_STAGE_REDUCTION, HycoReducerFinish(t, store, path, PETSC_TRUE, &report));
   PetscCall(HycoReducerReset(t));
   PetscCall(HycoReducerClose(t, &store));
-  PetscCall(HycoSamplesDestroy(&chosen));
   report.seconds_snapshots = solved - begin + t->solving;
   report.seconds_reduction = HycoNow() - solved - t->solving;
   if (training) *training = report;

@@ -100,7 +100,7 @@ static PetscErrorCode BuildModel(HycoReducer t, Loop *loop, PetscInt iteration, 
   PetscCall(HycoSnapshotsFill(loop->store, loop->samples, iteration ? NULL : t->progress, t->progress_ctx));
   PetscCall(HycoReducerResetBases(t));
   PetscCall(HycoReducerReduce(t, loop->store, PETSC_FALSE));
-  if (t->prototype->ops->modes) PetscCall((*t->prototype->ops->modes)(t, loop->store));
+  if (t->trainer.modes) PetscCall((*t->trainer.modes)(t, loop->store));
   PetscCall(HycoReducerBuild(t, PETSC_FALSE, &loop->model, report));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -363,8 +363,6 @@ PetscErrorCode HycoReducerRunGreedy(HycoReducer t, HycoSamples start, HycoSample
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
   PetscCall(CheckIndicator(t));
-  HycoCheck(!t->prototype->ops->choosepoints, "a condensed model needs a tensor grid of training points, which -greedy "
-                                              "does not make; use -grid or -values_NAME");
   HycoCheck(!t->prototype->model->traits.cells,
             "train -greedy adds cells to the previous RID, and a %s model chooses all of its cells anew; train it on a "
             "grid or on points",

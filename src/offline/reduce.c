@@ -451,31 +451,6 @@ PetscErrorCode HycoReducerFetchSnapshots(HycoReducer t, PetscInt n, const PetscI
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerFetchContacts(HycoReducer t)
-{
-  HycoMesh surface = t->fom->surface;
-  const PetscInt n_nodes = surface ? surface->n_nodes : 0;
-  PetscInt *node;
-  PetscBool *contact;
-
-  PetscFunctionBegin;
-  if (t->U_contact) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscFree(t->contact_row));
-  PetscCall(PetscCalloc1(n_nodes, &contact));
-  PetscCall(PetscMalloc1(n_nodes, &t->contact_row));
-  PetscCall(PetscMalloc1(n_nodes, &node));
-  t->n_contact_nodes = 0;
-  if (surface) PetscCall(HycoPairsMarkSurfaces(t->scene, surface, &t->fom->pairs, contact));
-  for (PetscInt i = 0; i < n_nodes; i++) {
-    t->contact_row[i] = contact[i] ? t->n_contact_nodes : -1;
-    if (contact[i]) node[t->n_contact_nodes++] = surface->node_whole ? surface->node_whole[i] : i;
-  }
-  PetscCall(HycoReducerFetchSnapshots(t, t->n_contact_nodes, node, &t->U_contact));
-  PetscCall(PetscFree(node));
-  PetscCall(PetscFree(contact));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* A HycoBatchUse: norms of displacements minus their lifting, and V^T of these. */
 static PetscErrorCode ProjectBatch(HycoReducer t, PetscInt first, Mat S, void *ctx)
 {

@@ -32,7 +32,7 @@ static PetscErrorCode Create(MPI_Comm comm, HycoReducer *reducer)
 static PetscErrorCode EndTraining(HycoReducer t)
 {
   PetscFunctionBegin;
-  if (t->training && t->prototype->ops->resettraining) PetscCall((*t->prototype->ops->resettraining)(t));
+  if (t->training && t->trainer.reset) PetscCall((*t->trainer.reset)(t));
   PetscCall(PetscFree(t->training));
   PetscCall(HycoROMDestroy(&t->prototype));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -41,6 +41,7 @@ static PetscErrorCode EndTraining(HycoReducer t)
 PetscErrorCode HycoReducerSetType(HycoReducer t, HycoROMType name)
 {
   PetscBool same = PETSC_FALSE;
+  HycoTrainerOps trainer;
   HycoROM type;
   PetscErrorCode ierr;
 
@@ -49,11 +50,13 @@ PetscErrorCode HycoReducerSetType(HycoReducer t, HycoROMType name)
   if (same) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoROMCreate(&type));
   ierr = HycoROMSetType(type, name);
+  if (!ierr) ierr = HycoTrainerFind(name, &trainer);
   if (ierr) (void)!HycoROMDestroy(&type);
   PetscCall(ierr);
   PetscCall(EndTraining(t));
   t->prototype = type;
-  if (type->ops->setfromoptions) PetscCall((*type->ops->setfromoptions)(t));
+  t->trainer = trainer;
+  if (trainer.setfromoptions) PetscCall((*trainer.setfromoptions)(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -78,7 +81,7 @@ PetscErrorCode HycoReducerReset(HycoReducer t)
 {
   PetscFunctionBegin;
   PetscCall(HycoReducerResetBases(t));
-  if (t->training && t->prototype->ops->resettraining) PetscCall((*t->prototype->ops->resettraining)(t));
+  if (t->training && t->trainer.reset) PetscCall((*t->trainer.reset)(t));
   PetscCall(HycoFOMDestroy(&t->fom));
   PetscCall(HycoMetDestroy(&t->met));
   HycoFreeAll(&t->grown, &t->surface_node, &t->fixed);
@@ -106,8 +109,8 @@ PetscErrorCode HycoReducerResetBases(HycoReducer t)
     t->basis[k].l = t->basis[k].n_sigma = 0;
   }
   PetscCall(MatDestroy(&t->S));
-  HycoFreeAll(&t->U_rid, &t->rid_row, &t->V_rid, &t->U_contact, &t->contact_row, &t->Lambda, &t->U_norm, &t->dual_seeds,
-              &t->taken_start, &t->taken, &t->judged, &t->judged_held);
+  HycoFreeAll(&t->U_rid, &t->rid_row, &t->V_rid, &t->Lambda, &t->U_norm, &t->dual_seeds, &t->taken_start, &t->taken,
+              &t->judged, &t->judged_held);
   t->n_dual_seeds = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -131,8 +134,6 @@ PetscErrorCode HycoReducerDestroy(HycoReducer *reducer)
 
 HycoDefineMethod(HycoReducerSetSnapshotFolder, (HycoReducer t, const char folder[]), t, HYCO_REDUCER_CLASSID,
                  PetscCall(PetscStrncpy(t->folder, folder, sizeof(t->folder))))
-HycoDefineMethod(HycoReducerChooses, (HycoReducer t, PetscBool *chooses), t, HYCO_REDUCER_CLASSID,
-                 *chooses = (PetscBool)(t->prototype->ops->choosepoints != NULL))
 HycoDefineMethod(HycoReducerGetSolved, (HycoReducer t, PetscInt *n_groups, const PetscInt *solved[]), t,
                  HYCO_REDUCER_CLASSID, *n_groups = t->n_solvers;
                  *solved = t->solved)
@@ -253,18 +254,17 @@ static PetscErrorCode ReadTraining(HycoReducer t)
   const char *const *types;
 
   PetscFunctionBegin;
-  PetscCall(HycoROMTypeNames(&types));
+  PetscCall(HycoTrainerNames(&types));
   while (types[type] && strcmp(types[type], t->prototype ? t->prototype->model->type : HYCO_ROM_HYBRID)) type++;
   PetscObjectOptionsBegin((PetscObject)t);
   PetscCall(HycoOptionsFor(""));
   PetscCall(HycoOptionsString("-hyco_snapshots", "<folder> where full-order solutions are stored [MODEL.snapshots]",
                               t->folder, sizeof(t->folder), NULL));
-  PetscCall(HycoOptionsWord(
-      "-hyco_model_type",
-      "hybrid hyper-reduced (38) on an RID; projection-based (44) on the whole mesh, or with a "
-      "cubature on some of its cells; condensed on the contact forces; bodies condensed to their surfaces; "
-      "regression without a solve [train searches: bodies, then hybrid]",
-      types, &type, &t->pinned[HYCO_CHOICE_TYPE]));
+  PetscCall(HycoOptionsWord("-hyco_model_type",
+                            "hybrid hyper-reduced (38) on an RID; projection-based (44) on the whole mesh, or with a "
+                            "cubature on some of its cells; bodies condensed to their surfaces; "
+                            "regression without a solve [train searches: bodies, then hybrid]",
+                            types, &type, &t->pinned[HYCO_CHOICE_TYPE]));
   PetscCall(HycoOptionsReal("-hyco_pod_tol", "energy left out of the displacement basis, epsilon of (18)", 0, 1,
                             &t->tol[HYCO_SEED_DISPLACEMENT], &t->pinned[HYCO_CHOICE_TOLERANCE]));
   PetscCall(HycoOptionsReal("-hyco_pod_noise", "singular values below this share of the first are treated as round-off",
@@ -302,7 +302,7 @@ static PetscErrorCode ReadTraining(HycoReducer t)
   PetscCall(HycoOptionsBool("-hyco_greedy_keep",
                             "train -greedy stores the model of each iteration beside the snapshots", &t->greedy.keep,
                             NULL));
-  PetscCall(HycoOptionsFor("hybrid, projection, cubature or condensed"));
+  PetscCall(HycoOptionsFor("hybrid, projection or cubature"));
   PetscCall(HycoOptionsInt(
       "-hyco_scan",
       "points per parameter at which training looks for a singular reduced stiffness (0: some hundred in all)", 0,
@@ -370,7 +370,7 @@ static PetscErrorCode ReadRID(HycoReducer t)
   PetscCall(PetscStrArrayDestroy(&t->groups));
   t->tol[HYCO_SEED_STRESS] = t->tol[HYCO_SEED_FORCE] = t->tol[HYCO_SEED_DISPLACEMENT];
   PetscObjectOptionsBegin((PetscObject)t);
-  PetscCall(HycoOptionsFor("hybrid, condensed or regression"));
+  PetscCall(HycoOptionsFor("hybrid or regression"));
   PetscCall(HycoOptionsList("-hyco_rid_modes",
                             "bases whose DEIM points seed the RID: displacement, stress, force, dual and, with a "
                             "history, inelastic [displacement,stress,force,inelastic]",
@@ -456,7 +456,7 @@ static PetscErrorCode DeclareAll(HycoReducer t)
 
   PetscFunctionBegin;
   PetscCall(ReadAll(t));
-  PetscCall(HycoROMTypeNames(&types));
+  PetscCall(HycoTrainerNames(&types));
   for (PetscInt k = 0; types[k]; k++) PetscCall(HycoReducerSetType(t, types[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -483,15 +483,13 @@ PetscErrorCode HycoReducerTries(HycoReducer t, const char types[], PetscBool *tr
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
   *tries = (PetscBool)(strstr(types, t->prototype->model->type) != NULL);
-  PetscCall(HycoROMTypeNames(&names));
+  PetscCall(HycoTrainerNames(&names));
   for (PetscInt k = 0; names[k] && searches && !*tries; k++) {
-    HycoROM type;
+    HycoTrainerOps trainer;
 
     if (!strstr(types, names[k])) continue;
-    PetscCall(HycoROMCreate(&type));
-    PetscCall(HycoROMSetType(type, names[k]));
-    *tries = (PetscBool)(type->ops->offers != NULL);
-    PetscCall(HycoROMDestroy(&type));
+    PetscCall(HycoTrainerFind(names[k], &trainer));
+    *tries = (PetscBool)(trainer.offers != NULL);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

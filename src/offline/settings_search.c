@@ -116,7 +116,7 @@ static PetscErrorCode SetSettings(HycoReducer t, const HycoReducerSettings *r)
   t->whole_rid = (PetscBool)(r->whole || t->prototype->model->traits.whole);
   t->plane = r->plane;
   t->ridge = r->ridge;
-  if (r->variant) PetscCall((*t->prototype->ops->setvariant)(t, r->variant));
+  if (r->variant) PetscCall((*t->trainer.setvariant)(t, r->variant));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -261,8 +261,8 @@ static PetscErrorCode TakeModes(HycoReducer t, HycoSnapshots store)
 {
   PetscFunctionBegin;
   PetscCall(HycoReducerTakeBases(t));
-  if (t->prototype->ops->begin) PetscCall((*t->prototype->ops->begin)(t));
-  if (t->prototype->ops->modes) HycoStaged(HYCO_STAGE_FULL_ORDER, (*t->prototype->ops->modes)(t, store));
+  if (t->trainer.begin) PetscCall((*t->trainer.begin)(t));
+  if (t->trainer.modes) HycoStaged(HYCO_STAGE_FULL_ORDER, (*t->trainer.modes)(t, store));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -294,12 +294,11 @@ static void TakeSizes(HycoReducer t, const HycoTraining *report, HycoAttempt *a)
 {
   a->n_modes = report->n_modes;
   a->n_fe_dofs = report->n_fe_dofs;
-  a->n_flexibilities = report->n_flexibilities;
   a->rid_nodes = report->rid_nodes;
   a->rid_elements = report->rid_elements;
   a->rid_contacts = report->rid_contacts;
   a->rid_fraction = report->rid_fraction;
-  a->cost = t->prototype->ops->cost ? (*t->prototype->ops->cost)(t, a) : 0;
+  a->cost = t->trainer.cost ? (*t->trainer.cost)(t, a) : 0;
 }
 
 /* Makes bases, RID and model for the current settings, and judges the model unless its cost excludes it. Without
@@ -377,7 +376,7 @@ static PetscErrorCode Count(Search *s, HycoAttempt *a)
   PetscCall(Predictions(t, t->samples, numbers[0], a, &judging));
   PetscCall(Predictions(t, t->held, repeats * held, a, &testing));
   s->last = judging + testing + whole * ((PetscReal)t->n_s + held * (PetscReal)HycoSnapshotsSteps(t->scene));
-  if (t->prototype->ops->work && !a->failure[0]) s->last += (*t->prototype->ops->work)(t);
+  if (t->trainer.work && !a->failure[0]) s->last += (*t->trainer.work)(t);
   s->spent += s->last;
   s->n_models += !a->failure[0] && (a->beaten_by || a->held_out.largest[HYCO_ERROR_U] < USELESS);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -689,17 +688,19 @@ static PetscBool Ends(const Search *s, const HycoAttempt *best)
 /* Lets a type refuse the scene's contacts, one with modes of its own the scene: why. Collective. */
 static PetscErrorCode Refuse(HycoReducer t, const HycoROM type, char why[HYCO_LINE])
 {
+  HycoTrainerOps trainer;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
+  PetscCall(HycoTrainerFind(type->model->type, &trainer));
   PetscCall(HycoCatchBegin());
   ierr = HycoReducerCheckContacts(t, type);
   PetscCall(HycoCatchEnd(ierr, why));
   PetscCall(HycoCatchNoModel(ierr, why));
-  if (why[0] || !type->model->traits.own_modes || !type->ops->begin) PetscFunctionReturn(PETSC_SUCCESS);
+  if (why[0] || !type->model->traits.own_modes || !trainer.begin) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoReducerSetType(t, type->model->type));
   PetscCall(HycoCatchBegin());
-  ierr = (*type->ops->begin)(t);
+  ierr = (*trainer.begin)(t);
   PetscCall(HycoCatchEnd(ierr, why));
   PetscCall(HycoCatchNoModel(ierr, why));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -712,13 +713,15 @@ static PetscErrorCode Offers(Search *s, const HycoROM type, PetscBool *offered, 
 {
   HycoReducer t = s->t;
   PetscReal work = 0, most = s->budget;
+  HycoTrainerOps trainer;
 
   PetscFunctionBegin;
+  PetscCall(HycoTrainerFind(type->model->type, &trainer));
   PetscCall(Refuse(t, type, why));
   *possible = (PetscBool)!why[0];
   if (why[0]) PetscFunctionReturn(PETSC_SUCCESS);
-  *offered = (*type->ops->offers)(t, s->targets, HYCO_LINE, why);
-  if (*offered && type->ops->work) work = (*type->ops->work)(t);
+  *offered = (*trainer.offers)(t, s->targets, HYCO_LINE, why);
+  if (*offered && trainer.work) work = (*trainer.work)(t);
   if (t->late) most *= 2; /* for it may save the training solutions */
   if (work > most)
     HycoFormat(why,
@@ -735,11 +738,13 @@ static PetscErrorCode Wants(Search *s, const HycoROM type, PetscBool *wanted)
   const HycoAttempt *best = HycoAttemptsChoose(s->n, s->attempt);
   char why[HYCO_LINE] = "";
   PetscBool possible = PETSC_TRUE;
+  HycoTrainerOps trainer;
 
   PetscFunctionBegin;
   *wanted = (PetscBool)(strcmp(type->model->type, s->given.type) == 0);
   if (t->pinned[HYCO_CHOICE_TYPE]) PetscFunctionReturn(PETSC_SUCCESS);
-  *wanted = (PetscBool)(type->ops->offers != NULL);
+  PetscCall(HycoTrainerFind(type->model->type, &trainer));
+  *wanted = (PetscBool)(trainer.offers != NULL);
   if (*wanted && !type->model->traits.history && t->scene->n_times) {
     *wanted = possible = PETSC_FALSE;
     if (type->model->traits.own_modes) HycoFormat(why, "it does not support scenes with a history");
@@ -1231,7 +1236,7 @@ PetscErrorCode HycoReducerLearn(HycoReducer t, HycoSnapshots store, HycoROM *mod
   PetscCall(PetscNew(&s));
   s->t = t;
   s->store = store;
-  PetscCall(HycoROMTypeNames(&s->types));
+  PetscCall(HycoTrainerNames(&s->types));
   ierr = Learn(s, model, grown, report);
   Forget(s);
   (void)!HycoROMDestroy(&s->kept);

@@ -64,7 +64,7 @@ static const HycoMember prediction[] = {
   F(rid_fraction), F(covered_force), F(total_contact_force), F(lambda_max), F(lambda_norm2), F(u_norm2), F(u_min),
   F(u_max), F(quantity), F(condition), F(path_quantity), F(path_force), F(path_mises), F(path_inelastic), F(residual),
   F(contact_residual), F(estimated_error_u), F(estimated_error_sigma), F(estimated_error_lambda),
-  F(estimated_error_quantity), F(estimated_error_u_full), F(inconsistency), F(inconsistent), F(unseen),
+  F(estimated_error_quantity), F(inconsistency), F(inconsistent), F(unseen),
   F(unseen_feature), F(beyond), F(gives_forces), F(interpolation_error), F(kkt.stationarity), F(kkt.penetration),
   F(kkt.adhesion), F(kkt.complementarity), F(kkt.rounding), F(method), F(reason), F(seconds.setup),
   F(seconds.assemble), F(seconds.factor), F(seconds.solve), F(seconds.total), F(n_dependent)};
@@ -77,7 +77,7 @@ static const HycoMember gradient[] = {
 
 #define F(member) FIELD(HycoTraining, member)
 static const HycoMember training[] = {
-  F(type), F(summary), F(missed), F(next), F(n_samples), F(n_modes), F(n_dual_modes), F(n_stress_modes),
+  F(type), F(summary), F(next), F(n_samples), F(n_modes), F(n_dual_modes), F(n_stress_modes),
   F(n_force_modes), F(n_fe_dofs), F(rid_nodes), F(rid_elements), F(rid_contacts), F(rid_fraction), F(error_u),
   F(error_lambda), F(held_out.n), F(n_held), F(seconds_snapshots), F(seconds_reduction)};
 #undef F

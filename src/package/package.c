@@ -7,6 +7,7 @@
 #include <hycoextensions.h>
 #include <hycomaterialimpl.h>
 #include <hycoromtypes.h>
+#include <hycotrainers.h>
 #include <hycosolverimpl.h>
 #include <hycosnapshots.h>
 
@@ -72,8 +73,10 @@ static PetscErrorCode RegisterModels(void)
   PetscFunctionBegin;
   PetscCall(HycoROMRegister(HYCO_ROM_HYBRID, HycoROMCreate_Hybrid));
   PetscCall(HycoROMRegister(HYCO_ROM_PROJECTION, HycoROMCreate_Projection));
-  PetscCall(HycoROMRegister(HYCO_ROM_CONDENSED, HycoROMCreate_Condensed));
   PetscCall(HycoROMRegister(HYCO_ROM_BODIES, HycoROMCreate_Bodies));
+  PetscCall(HycoTrainerRegister(HYCO_ROM_HYBRID, HycoTrainerCreate_Hybrid));
+  PetscCall(HycoTrainerRegister(HYCO_ROM_PROJECTION, HycoTrainerCreate_Projection));
+  PetscCall(HycoTrainerRegister(HYCO_ROM_BODIES, HycoTrainerCreate_Bodies));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -2,9 +2,8 @@
   An estimate of the error of a prediction from quantities known online, calibrated in training on held-out solutions
   (calibrate.c). log e = c_0 + sum_j c_j log(1 + f_j / floor_j), c_j >= 0, of five features:
 
-    0  misfit       relative distance of the full-order displacements from the values that the modes alone give there;
-                    condensed: the estimate of the forces' interpolation error (condensed_estimate.c)
-    1  penetration  at the contacts that (38) does not constrain, relative to B U; condensed: the estimate for u
+    0  misfit       relative distance of the full-order displacements from the values that the modes alone give there
+    1  penetration  at the contacts that (38) does not constrain, relative to B U
     2  adhesion     forces of these contacts where the predicted displacement leaves a gap, relative to the forces
     3  distance     to the nearest training point, each parameter scaled to its range
     4  tail         the last quarter of the modes' coefficients relative to all: indicates the error of truncation
@@ -330,7 +329,6 @@ PetscErrorCode HycoEstimatesEvaluate(HycoROM m, HycoPrediction *p)
   p->unseen_feature = -1;
   PetscCall(FindReach(m));
   p->beyond = Beyond(m, m->fe->mu, nearest);
-  p->estimated_error_u_full = -1;
   if (p->reason > 0) PetscTryTypeMethod(m, estimate, p);
   if (p->reason <= 0 || (m->ops->reconstruct && !m->reconstruct)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoEstimatesFeatures(m, feature));

@@ -57,7 +57,7 @@ PetscErrorCode HycoROMSetFromOptions(HycoROM m)
       "predict solves full order on -scene if the reduced solve fails or an estimated error is above its -target_...",
       &m->full_order, NULL));
   PetscCall(HycoOptionsBool("-hyco_full_displacement",
-                            "predict, condensed: compute displacements and stresses by one full-order solve on -scene "
+                            "predict, bodies: compute displacements and stresses by one full-order solve on -scene "
                             "with the predicted forces",
                             &m->full_displacement, NULL));
   PetscCall(

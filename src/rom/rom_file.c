@@ -7,7 +7,7 @@
 #include <string.h>
 
 /* The file's format version, raised when a reader of older versions must not read the file. 2: contacts have
-   weighted masters. 3: problem/type; a file without it is hybrid. 4: the type may be condensed. 5: masters are
+   weighted masters. 3: problem/type; a file without it is hybrid. 4: further types. 5: masters are
    searched on surfaces that a map moves, and a slave node may face none; models without such surfaces are written as
    4. 6: models of scenes with a history. The kind is common to all types, so that an older reader can report the
    format. */

@@ -5,6 +5,7 @@
 #include <string.h>
 
 static HycoRegistry types = {.sorted = PETSC_TRUE};
+static const char former[] = "condensed"; /* a type of earlier versions, whose models have files */
 
 HycoDefineRegister(HycoROMRegister, types, PetscErrorCode (*create)(HycoROM))
 
@@ -23,6 +24,11 @@ PetscErrorCode HycoROMSetType(HycoROM m, HycoROMType type)
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
   PetscCall(HycoRegistryFind(&types, type, &create));
+  HycoCheck(
+      create || strcmp(type, former),
+      "%s%sa model of the former type %s, which models of bodies replace: train the scene again (-hyco_model_type "
+      "bodies, or without this option)",
+      m->model->path, m->model->path[0] ? ": " : "", former);
   HycoCheck(create, "%s%sthe type of reduced model \"%s\" is unknown; a program can add a type by HycoROMRegister()",
             m->model->path, m->model->path[0] ? ": problem/type is damaged, or another program's: " : "", type);
   PetscCheck(!m->model->data, PETSC_COMM_SELF, PETSC_ERR_ORDER, "HycoROMSetType: the model has a type");

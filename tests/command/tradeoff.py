@@ -32,14 +32,14 @@ class Tradeoff(Case):
         """The table of the rope has a row for each setting."""
         words = self.bench('tradeoff', 'rope', '--quick', '--repeat', '1')
         rows = self.rows('rope-100')
-        self.assertEqual([r['type'] for r in rows], ['hybrid', 'hybrid', 'projection', 'condensed', 'full', 'full'])
+        self.assertEqual([r['type'] for r in rows], ['hybrid', 'hybrid', 'projection', 'bodies', 'full', 'full'])
         for row in rows[:4]:
             self.assertEqual(row['status'], 'ok', row['label'])
             self.assertGreater(float(row['offline_s']), 0)
             self.assertGreater(float(row['single_s']), 0)
         self.assertLess(float(rows[1]['u_mean']), float(rows[0]['u_mean']))
-        self.assertLess(float(rows[3]['lambda_max']), 1e-4)  # condensed: forces as full order's
-        self.assertRegex(words, r"\| all contact forces \| [\d.-]+, [\d.-]+, [\d.]+ \|")  # condensed: accurate
+        self.assertLess(float(rows[3]['lambda_max']), 1e-4)  # bodies: forces as full order's
+        self.assertRegex(words, r"\| all contact forces \| [\d.-]+, [\d.-]+, [\d.]+ \|")  # bodies: accurate
 
     def test_rod(self):
         """One setting, one unseen path: the errors are those of a model that was judged, the times those of both full orders."""

@@ -158,7 +158,7 @@ class VTKHDF(Case):
                 self.assertEqual(h['mu/radius'][:, 0].tolist(), [4.02, 4.06, 4.1])
         grids = ET.parse(self.path('set.xdmf')).getroot().findall('.//Grid[@CollectionType="Temporal"]/Grid')
         self.assertEqual([g.find('Geometry/DataItem').text for g in grids], [f'set.h5:/step-{k:04d}/xyz' for k in range(3)])
-        self.hyco('train', *PELLET[:2], '-values_radius', '4.02,4.1', '-values_load', '0.5,1', '-hyco_model_type', 'condensed', '-model', 'm.h5', status=None)
+        self.hyco('train', *PELLET[:2], '-values_radius', '4.02,4.1', '-values_load', '0.5,1', '-hyco_model_type', 'hybrid', '-hyco_search', 'false', '-model', 'm.h5', status=None)
         for ending in ('.xdmf', '.vtkhdf'):
             self.hyco('predict', '-model', 'm.h5', *grid, '-output', 'low' + ending, '-table', 'low.csv')
         self.hyco('predict', '-model', 'm.h5', *PELLET[2:], '-output', 'one.xdmf')

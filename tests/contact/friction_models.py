@@ -119,7 +119,7 @@ class FrictionModels(Case):
         """Other types, and bodies that creep, in one line that names contact or body; no type drops the friction."""
         for words, scene, args in ((('floor', 'friction', 'hybrid', 'bodies'), self.pad(), ['-hyco_model_type', 'hybrid']),
                                    (('floor', 'friction', 'projection', 'bodies'), self.pad(), ['-hyco_model_type', 'projection']),
-                                   (('floor', 'friction', 'condensed', 'bodies'), self.pad(), ['-hyco_model_type', 'condensed']),
+                                   (('floor', 'friction', 'cubature', 'bodies'), self.pad(), ['-hyco_model_type', 'cubature']),
                                    (('friction', 'body pad', 'hyco solve'), self.pad('creeps.yaml', NORTON), ['-hyco_model_type', 'bodies']),
                                    (('friction', 'body pad', 'hyco solve'), self.pad('creeps.yaml', NORTON), [])):
             run = self.run_raw('train', '-scene', scene, '-model', self.path('none.h5'), '-grid', '2,1,1,1', *args)

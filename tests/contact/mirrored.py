@@ -57,7 +57,7 @@ class Orientation(Case):
 
     def test_reduced(self):
         """A model of the mirrored scene predicts what the model of the scene as drawn does."""
-        for kind, mu in (('hybrid', '0.05,0.06'), ('projection', '0.05,0.06'), ('condensed', '0.05,0.06')):
+        for kind, mu in (('hybrid', '0.05,0.06'), ('projection', '0.05,0.06'), ('bodies', '0.05,0.06')):
             with self.subTest(kind=kind):
                 found = []
                 for turned in ((), TURNED):

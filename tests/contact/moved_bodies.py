@@ -183,14 +183,10 @@ class Reduced(Moved):
             self.near(float(row[3]), self.hyco('predict', '-model', 'm.h5', '-mu', ','.join(row[:3]))['total_contact_force'], 1e-7)
 
     def test_types(self):
-        """Projection works; a condensed model would interpolate kinks, and is refused."""
+        """A projection-based model of these bodies reproduces its training solutions."""
         self.hyco('train', '-scene', 'moved.yaml', *self.TRAIN, '-model', 'p.h5', '-hyco_model_type', 'projection', '-hyco_dual', 'snapshots', '-hyco_pod_tol', '1e-18')
         c = self.hyco('compare', '-scene', 'moved.yaml', '-model', 'p.h5', *self.TRAIN)
         self.assertLess(c['error_u']['max'], 1e-6)
-        run = self.run_raw('train', '-scene', 'moved.yaml', *self.TRAIN[:2], '-values_press', '0.3,0.9', '-values_modulus', '5,10', '-model', 'c.h5', '-hyco_model_type', 'condensed')
-        self.assertEqual(run.returncode, 1)
-        self.assertIn('changes the facet of upper that it faces as the parameters move it', run.stderr)
-        self.assertFalse(os.path.exists(self.path('c.h5')))
 
     def test_older_model(self):
         """A model from before the search loads, with its masters; damage to the data of the search is detected."""

@@ -97,20 +97,6 @@ class Rigid(Case):
         for name, value in full.items():
             self.near(model[name], value, 1e-3, name)
 
-    def test_condensed(self):
-        """It needs a definite stiffness: refused, and right with a soft spring on the body, which takes its share of the load."""
-        self.mesh()
-        train = ('train', '-grid', '4,4', '-model', 'c.h5', '-hyco_model_type', 'condensed')
-        run = self.run_raw(*train, '-scene', self.scene())
-        self.assertEqual(run.returncode, 1)
-        self.assertIn('no support keeps body tool', run.stderr)
-        self.assertIn('give the master of the rigid body (tip) a soft spring', run.stderr)
-        self.assertEqual(run.stderr.count('\n'), 1, run.stderr)
-        self.hyco(*train, '-scene', self.scene(more='spring: {tip: {y: 1e-3}}\n'))
-        found, full = (self.hyco(*args, '-mu', '17,9.3')['outputs'] for args in (('predict', '-model', 'c.h5'), ('solve', '-scene', self.scene())))
-        self.near(found['push'], -17, 1e-5)
-        self.near(found['depth'], full['depth'], 1e-3)
-
     def test_history(self):
         """The body sinks into a block that creeps; its load stays. A model of the path."""
         self.mesh(n=8)

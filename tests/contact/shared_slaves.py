@@ -58,7 +58,7 @@ class Corners(Case):
         """In a V-groove whose sides open in turn: forces of both contacts at the node, compared with full order at other points."""
         self.block('quad4', 45, 6)
         scene = self.written(MODEL)
-        bounds = {'hybrid': 0.05, 'condensed': 1e-4, 'projection': 0.05}
+        bounds = {'hybrid': 0.05, 'bodies': 1e-4, 'projection': 0.05}
         for kind, bound in bounds.items():
             for more in (('contact', 'all') if kind == 'hybrid' else (None,)):
                 with self.subTest(kind=kind, hybrid=more):

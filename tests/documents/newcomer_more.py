@@ -172,7 +172,7 @@ class Scenes(Case):
         for name, value in outputs.items():
             self.near(full['outputs'][name], value, 1e-9, name)
         self.assertEqual((self.plot('full.h5', '--surface', '3'), 'contact surfaces: 3' in self.plot('full.h5', '--surface', '4')), ('', True))
-        self.assertNotIn('missed', self.hyco('train', '-scene', 'plate', '-grid', '3,3,3', '-grid_type', 'closed', '-hyco_model_type', 'condensed', '-model', 'plate.h5'))
+        self.assertNotIn('missed', self.hyco('train', '-scene', 'plate', '-grid', '3,3,3', '-grid_type', 'closed', '-hyco_model_type', 'bodies', '-model', 'plate.h5'))
         self.hyco('predict', '-model', 'plate.h5', '-values_load', '0,2000', '-values_radius', '60', '-values_bed', '2', '-table', 'study.csv', '-output', 'study.xdmf')
         with open(self.path('study.csv'), encoding='ascii') as f:
             rest, low = csv.DictReader(f)
@@ -263,7 +263,7 @@ class DiscOverStop(Case):
         """Errors of the size of round-off: the quotients of errors and estimates agree with the share that is bounded. The largest errors are also those
         of corners among the training points."""
         self.write(self.text)
-        trained = self.run_raw('train', '-scene', 'scene.yaml', '-grid', '8,6', '-hyco_model_type', 'condensed', '-model', 'm.h5')
+        trained = self.run_raw('train', '-scene', 'scene.yaml', '-grid', '8,6', '-hyco_model_type', 'bodies', '-hyco_bodies_pod_tol', '1e-18', '-model', 'm.h5')
         self.assertEqual(trained.returncode, 0, trained.stderr)
         self.assertIn('largest, also at corners of the training, u', trained.stdout)
         report = self.hyco('compare', '-scene', 'scene.yaml', '-model', 'm.h5', '-scatter', 60)

@@ -2,7 +2,7 @@
 can support. (Singular values down to 1e-12 of the first: tests/unit/pod.c.)"""
 import unittest
 
-from extreme import CONDENSED, SEEN, TRAIN, UNSEEN, Extreme, blocks, points
+from extreme import BODIES, SEEN, TRAIN, UNSEEN, Extreme, blocks, points
 
 PROJECTION = ('-hyco_model_type', 'projection', '-hyco_dual', 'snapshots')
 AWAY = ('-hyco_rid_modes', 'displacement', '-hyco_pod_max_modes', 1, '-hyco_rid_region', 'y > 1.5 ? 1 : -1')
@@ -20,9 +20,9 @@ class Bases(Extreme):
             self.row(case, f"{model}: error with {t['n_modes']} modes", self.worst(self.compare(scene, *test)), bound)
 
     def forces(self, case, scene, train, test, *options, bound=1e-9):
-        """The condensed model's forces, which do not depend on a basis."""
-        self.train(scene, *train, '-hyco_model_type', 'condensed', *options)
-        self.row(case, 'condensed: error of the forces', self.compare(scene, *test)['error_lambda']['max'] or 0, bound)
+        """The forces of a model of bodies, which do not depend on a basis."""
+        self.train(scene, *train, *BODIES, *options)
+        self.row(case, 'bodies: error of the forces', self.compare(scene, *test)['error_lambda']['max'] or 0, bound)
 
     def test_tolerance(self):
         """POD tolerances from 1 to 1e-16: no modes are refused, many are accurate."""
@@ -51,8 +51,6 @@ class Bases(Extreme):
         for case, train in (('no gap: solutions of rank one', (0.02, 0.04, 0.08)), ('a zero solution among them', (0, 0.04)),
                             ('one solution', (0.04,))):
             self.both(case, scene, points(train, (0,)), points((0.05,), (0,)), 1e-9, 1e-9)
-        self.refused('condensed, one solution', 'train', '-scene', scene, '-model', 'm.h5', *points((0.04,), (0,)),
-                     *CONDENSED, says='needs at least two')
         for model, more in (('hybrid', WHOLE), ('projection', PROJECTION)):
             self.refused(f'{model}, zero solutions alone', 'train', '-scene', scene, '-model', 'm.h5',
                          *points((0,), (0, 0.2)), *more, says='zero displacement')
@@ -67,8 +65,8 @@ class Bases(Extreme):
         scene = self.scene(*blocks(press=(0, 0.1), gaps=(0, 0.2)))
         train = points((0.02, 0.04), (0.1, 0.2))
         self.both('no force in any solution, none tested', scene, train, points((0.05,), (0.12,)), 1e-9, 1e-9)
-        self.row('no force in any solution, contact tested', 'condensed: error of the forces',
-                 self.condensed(scene, train, points((0.04,), (0.1,)), points((0.05,), (0.02,))), 1e-9)
+        self.row('no force in any solution, contact tested', 'bodies: error of the forces',
+                 self.bodies(scene, train, points((0.05,), (0.02,))), 1e-9)
         self.train(scene, *train, '-hyco_rid_whole', 'true', '-hyco_hybrid', 'all')
         self.row('no force in any solution, contact tested', 'hybrid, all displacements full order: error',
                  self.worst(self.compare(scene, *points((0.05,), (0.02,)))), 1e-9)

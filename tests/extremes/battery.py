@@ -1,13 +1,13 @@
 """Random scenes with fixed seeds: cells, sizes, materials, gaps, loads, units, kinds of contact, distorted meshes. Full order is
 checked by its KKT residuals; the model with the whole mesh and all displacements full order must agree with full order at an
-unseen point, to 1e-8; and so must the condensed model's forces. `battery.py 20260101 500` runs 500 from that seed, with a table
+unseen point, to 1e-8; and so must the forces of a model of bodies. `battery.py 20260101 500` runs 500 from that seed, with a table
 of its own; without arguments some dozens."""
 import sys
 import unittest
 
 import numpy as np
 
-from extreme import CONDENSED, Extreme, blocks, points
+from extreme import BODIES, Extreme, blocks, points
 
 SEED, COUNT = 20180701, 32
 
@@ -38,7 +38,7 @@ class Battery(Extreme):
     def test_battery(self):
         """Random scenes: KKT residuals at full order, errors of each type of model."""
         worst = {'full order: worst KKT residual': 0, 'hybrid, whole domain: error': 0,
-                 'condensed: error of the forces': 0, 'projection, at a training point: error': 0}
+                 'bodies: error of the forces': 0, 'projection, at a training point: error': 0}
         active, done = [], 0
         for seed in range(self.seed, self.seed + self.count):
             what, (grid, scene), train, test = self.draw(seed)
@@ -52,7 +52,7 @@ class Battery(Extreme):
                 self.solved(report)
                 active.append((report['n_active'] > 0) + (report['n_active'] == report['n_contacts']))
                 found[0] = max(report['kkt'].values())
-                self.train(folder, *train, *CONDENSED)
+                self.train(folder, *train, *BODIES)
                 found.append(self.compare(folder, *test)['error_lambda']['max'] or 0)
                 if seed % 3 == 0:
                     self.train(folder, *train, '-hyco_model_type', 'projection', '-hyco_dual', 'snapshots', *common)

@@ -19,7 +19,7 @@ FOLDER = 'extremes'
 HEAD = ('case', 'what', 'found', 'bound', 'verdict')
 DIM = {'line2': 1, 'tri3': 2, 'quad4': 2, 'tet4': 3, 'hex8': 3}
 ERRORS = ('error_u', 'error_lambda')
-CONDENSED = ('-hyco_model_type', 'condensed', '-hyco_pod_tol', '0', '-hyco_pod_noise', '1e-15')
+BODIES = ('-hyco_model_type', 'bodies')
 
 
 class Extreme(Case):
@@ -95,11 +95,11 @@ class Extreme(Case):
     def worst(self, c):
         return max(c[e]['max'] or 0 for e in ERRORS if e in c)
 
-    def models(self, case, scene, train, seen, unseen, bound=1e-8, condensed=None):
+    def models(self, case, scene, train, seen, unseen, bound=1e-8, bodies=None):
         """Full order by its KKT residuals and energies; the hybrid model with all displacements full order on the whole
         mesh, which must agree with full order; the projection onto the solutions and their forces, which must reproduce a
-        training point; the condensed model, whose forces are exact if all parameters are loads and gaps, and which must
-        reproduce a training point (condensed: its bound, if it differs; or the line with which it is refused)."""
+        training point; the model of bodies, whose forces are exact if all parameters are loads and gaps (bodies: its bound, if
+        it differs)."""
         report = self.fields(scene, '-mu', ','.join(unseen[1::2]))[0]
         self.row(case, 'full order: worst KKT residual', max(report['kkt'].values()), 1e-8)
         common = (*train, '-hyco_pod_tol', '0', '-hyco_pod_noise', '1e-15')
@@ -108,17 +108,13 @@ class Extreme(Case):
                 ('projection, at a training point', ('-hyco_model_type', 'projection', '-hyco_dual', 'snapshots'), seen)):
             self.train(scene, *common, *options)
             self.row(case, f'{name}: error', self.worst(self.compare(scene, *points_)), bound)
-        if isinstance(condensed, str):
-            self.refused(f'{case}, condensed', 'train', '-scene', scene, '-model', 'm.h5', '-hyco_snapshots',
-                         self.path(f's{self.written}'), *train, *CONDENSED, says=condensed)
-        else:
-            self.row(case, 'condensed: error', self.condensed(scene, train, seen, unseen), condensed or bound)
+        self.row(case, 'bodies: error of the forces', self.bodies(scene, train, unseen), bodies or bound)
         return report
 
-    def condensed(self, scene, train, seen, unseen):
-        """The largest error of its forces at unseen points, and of all quantities at training points."""
-        self.train(scene, *train, *CONDENSED)
-        return max(self.compare(scene, *unseen)['error_lambda']['max'] or 0, self.worst(self.compare(scene, *seen)))
+    def bodies(self, scene, train, points_):
+        """The largest error of the forces of a model of bodies at points."""
+        self.train(scene, *train, *BODIES)
+        return self.compare(scene, *points_)['error_lambda']['max'] or 0
 
 
 def blocks(kind='quad4', n=(4, 4), length=1, stress=1, young=(100, 40), poisson=(0.3, 0.2), contact='pair', gap='gap',

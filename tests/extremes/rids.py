@@ -3,7 +3,7 @@ stiffness."""
 import unittest
 
 from common import ROPE
-from extreme import CONDENSED, SEEN, TRAIN, UNSEEN, Extreme, blocks
+from extreme import SEEN, TRAIN, UNSEEN, Extreme, blocks
 
 
 class Rids(Extreme):
@@ -20,9 +20,6 @@ class Rids(Extreme):
         c = self.compare(scene, *SEEN)
         self.assertEqual((t['n_modes'], t['rid_contacts']), (1, 0))
         self.row(f"the same, displacements alone, {t['rid_nodes']} nodes", 'hybrid: error of u', c['error_u']['max'], 0.1)
-        self.train(scene, *one, *CONDENSED)
-        self.row('one mode, one DEIM point', 'condensed: error of the forces between training points',
-                 self.compare(scene, *UNSEEN)['error_lambda']['max'], 1e-9)
         t = self.train(scene, *one, '-hyco_rid_groups', 'b_y0,a_y1', '-hyco_rid_layers', 1)
         self.row(f"one mode, the contact's elements and a layer, {t['rid_nodes']} nodes", 'hybrid: error of u',
                  self.compare(scene, *SEEN)['error_u']['max'], 0.1)

@@ -5,7 +5,7 @@ import unittest
 import h5py
 import numpy as np
 
-from extreme import DIM, Extreme, blocks, points
+from extreme import BODIES, DIM, Extreme, blocks, points
 from grids import Grid
 
 TWO, TEN = ((2**-30, 1), (2**10, 1), (1, 2**40), (2**-30, 2**40)), ((1e-9, 1), (1e3, 1), (1, 1e12), (1e-9, 1e12))
@@ -29,7 +29,7 @@ class Units(Extreme):
 
     def answers(self, kind, length, stress):
         """u over the length and forces over stress times area: of full order, of a hybrid model on an RID, of a
-        projection and of a condensed model at an unseen point."""
+        projection and of a model of bodies at an unseen point."""
         if kind == 'line2':
             scene, press = self.scene(*string(length, stress)), stress / length
             train = ('-values_press', ','.join(repr(v * press) for v in (0.5, 1, 1.5, 2)), '-values_gap',
@@ -43,7 +43,7 @@ class Units(Extreme):
         _, u, lam = self.fields(scene, '-mu', mu)
         out = {'full order': (u / length, lam / force)}
         for model, options in (('hybrid', more), ('projection', ('-hyco_model_type', 'projection', '-hyco_dual', 'snapshots')),
-                               ('condensed', ('-hyco_model_type', 'condensed'))):
+                               ('bodies', BODIES)):
             t = self.train(scene, *train, *options)
             self.hyco('predict', '-model', 'm.h5', '-mu', mu, '-output', self.path('p.xdmf'))
             with h5py.File(self.path('p.h5')) as f:
@@ -59,7 +59,7 @@ class Units(Extreme):
                 for length, stress in factors if kind == 'quad4' else factors[::3]:
                     case = f'{kind}, lengths x {length:.3g}, stresses x {stress:.3g}'
                     out = self.answers(kind, length, stress)
-                    for model in ('full order', 'hybrid', 'projection', 'condensed'):
+                    for model in ('full order', 'hybrid', 'projection', 'bodies'):
                         if model != 'full order':
                             self.assertEqual(out[model + ' sizes'], base[model + ' sizes'], case)
                         apart = max(abs(a - b).max() / abs(b).max() for a, b in zip(out[model], base[model]))

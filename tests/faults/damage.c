@@ -163,7 +163,7 @@ static PetscErrorCode TestSealTime(void)
 }
 
 /* Trained in /tmp, in the current format. */
-static PetscErrorCode Train(const char source[], const char model[])
+static PetscErrorCode Train(const char source[], const char type[], const char model[])
 {
   const PetscInt grid[] = {3, 3};
   char folder[PETSC_MAX_PATH_LEN];
@@ -176,6 +176,7 @@ static PetscErrorCode Train(const char source[], const char model[])
   PetscCall(HycoSceneLoad(PETSC_COMM_SELF, folder, &scene));
   PetscCall(HycoSamplesCreate(scene, &samples));
   PetscCall(HycoSamplesAddGrid(samples, grid, PETSC_FALSE));
+  PetscCall(PetscOptionsSetValue(NULL, "-hyco_model_type", type));
   PetscCall(HycoReducerCreate(PETSC_COMM_SELF, scene, &reducer));
   PetscCall(HycoReducerSetFromOptions(reducer));
   PetscCall(HycoReducerRun(reducer, samples, model, NULL));
@@ -204,15 +205,16 @@ static PetscErrorCode Test(void)
   snprintf(path, sizeof(path), "%s/damaged.h5", folder);
   PetscCall(TestSealTime());
   snprintf(name, sizeof(name), "%s/model.h5", folder);
-  PetscCall(Train(source, name));
+  PetscCall(Train(source, HYCO_ROM_HYBRID, name));
   PetscCall(ReadBytes(name, &b));
   PetscCall(TestCuts("a hybrid model", &b, 97));
   PetscCall(TestFlips("a hybrid model", &b, 3000, PETSC_TRUE));
   PetscCall(PetscFree(b.bytes));
-  snprintf(name, sizeof(name), "%s/tests/data/rope-condensed-4.h5", source);
+  snprintf(name, sizeof(name), "%s/model.h5", folder);
+  PetscCall(Train(source, HYCO_ROM_BODIES, name));
   PetscCall(ReadBytes(name, &b));
-  PetscCall(TestCuts("a condensed model", &b, 997));
-  PetscCall(TestFlips("a condensed model", &b, 2000, PETSC_TRUE));
+  PetscCall(TestCuts("a model of bodies", &b, 997));
+  PetscCall(TestFlips("a model of bodies", &b, 2000, PETSC_TRUE));
   PetscCall(PetscFree(b.bytes));
   snprintf(name, sizeof(name), "%s/tests/data/rope-hybrid-3.h5", source);
   PetscCall(ReadBytes(name, &b));

@@ -22,12 +22,11 @@ KEPT = {
     'rope-projection-3.h5': ('projection', 0.350993482, 19),
     'rope-hybrid-4.h5': ('hybrid', 0.32557839822027457, 20),
     'rope-projection-4.h5': ('projection', 0.35099348195512448, 19),
-    'rope-condensed-4.h5': ('condensed', 0.32059636509212763, 14),
+    'rope-bodies-4.h5': ('bodies', 0.3486818615477193, 5),
     'rope-hybrid-4-table.h5': ('hybrid', 0.3255783982202313, 20),
-    'rope-condensed-4-modes.h5': ('condensed', 0.3205963650921275, 14),
 }
 ROWS = Rows('files')
-CONDENSED = ['train', '-scene', ROPE, '-grid', '2,3', '-grid_type', 'centred', '-hyco_model_type', 'condensed', '-model', 'c.h5']
+BODIES = ['train', '-scene', ROPE, '-grid', '2,3', '-grid_type', 'centred', '-hyco_model_type', 'bodies', '-model', 'b.h5']
 
 
 class Files(Case):
@@ -36,7 +35,7 @@ class Files(Case):
         super().setUpClass()
         cls.hyco('train', '-scene', ROPE, '-grid', '4,4', '-grid_type', 'centred', '-model', 'good.h5')
         cls.hyco('train', '-scene', ROPE, '-grid', '4,4', '-model', 'held.h5', '-hyco_validation', 12, status=None)
-        cls.hyco(*CONDENSED)
+        cls.hyco(*BODIES, status=None)
 
     def refused(self, name, text, command='predict', *more):
         """One line, status 1, in an address space of 2 GB (a size that a file declares must not be allocated)."""
@@ -55,7 +54,7 @@ class Files(Case):
             self.assertEqual((report['model_type'], report['n_active']), (kind, active))
             self.near(report['total_contact_force'], force, 1e-9)
             self.solved(report)
-        ROWS.add(f'{len(KEPT)} models of formats 3 and 4, hybrid, projection, condensed, kept in tests/data', 'give the same numbers as before')
+        ROWS.add(f'{len(KEPT)} models of formats 3 and 4, hybrid, projection, bodies, kept in tests/data', 'give the same numbers as before')
 
     def test_same_bytes(self):
         """The same training twice: the same bytes."""
@@ -97,30 +96,36 @@ class Files(Case):
         sizes = (('problem/V', (1 << 40, 8), 'f8'), ('problem/V', (50, 1 << 40), 'f8'),
                  ('mesh/xyz', (1 << 28, 3), 'f8'), ('mesh/xyz', (1 << 31, 3), 'f8'),
                  ('mesh/node_id', (1 << 40, 1), 'i4'), ('problem/scene', (1 << 33, 1), 'i1'),
-                 ('training/points', (1 << 30, 2), 'f8'), ('condensed/G', (1 << 20, 1 << 20), 'f8'),
-                 ('condensed/values_0', (1 << 40, 1), 'f8'), ('condensed/values_1', (1 << 28, 1), 'f8'),
-                 ('condensed/settled', (1 << 28, 98), 'f8'), ('condensed/lambda', (6, 1 << 40), 'f8'))
+                 ('training/points', (1 << 30, 2), 'f8'), ('bodies/A', (1 << 20, 1 << 20), 'f8'),
+                 ('bodies/start', (1 << 40, 1), 'i4'), ('bodies/body_0/C', (1 << 20, 1 << 20), 'f8'),
+                 ('bodies/body_0/responses', (1 << 28, 98), 'f8'), ('bodies/dof', (1 << 40, 1), 'i4'))
         for name, shape, kind in sizes:
             with self.subTest(name=name, shape=shape):
-                self.refused(self.edited(put(name, shape, kind), 'c.h5' if 'condensed' in name else 'good.h5'), f'{name} is damaged')
+                self.refused(self.edited(put(name, shape, kind), 'b.h5' if 'bodies' in name else 'good.h5'), f'{name} is damaged')
         ROWS.add(f'sizes that are larger than the file ({len(sizes)}), in 2 GB of address space', "refused by the dataset's name")
 
-    def test_condensed_values(self):
-        """Numbers of a condensed model that no training writes."""
+    def test_bodies_values(self):
+        """Numbers of a model of bodies that no training writes."""
 
         def put(name, at, value):
             def change(f):
-                f['condensed/' + name][at] = value
+                f['bodies/' + name][at] = value
             return change
 
-        values = (('values_0', (0, 0), np.nan), ('values_0', (1, 0), 0.05), ('values_1', (2, 0), -np.inf), ('G', (1, 7), np.inf),
-                  ('settled', (0, 0), np.nan), ('H', (0, 0), np.nan), ('a', (0, 0), np.nan), ('degree_G', (0, 0), 2),
-                  ('degree_g', (1, 0), -1), ('stiff', (0, 0), 2), ('stiff', (0, 0), 0), ('affine', (1, 0), -1), ('bounds', (0, 0), -1),
-                  ('bounds', (0, 1), 0), ('bounds', (0, 0), np.nan))
+        values = (('A', (0, 0), np.nan), ('body_0/C', (1, 7), np.inf), ('body_0/R', (0, 0), np.nan), ('body_0/responses', (0, 0), -np.inf), ('dof', (0, 0), 10**6),
+                  ('at', (0, 0), -1), ('cell', (0, 0), 10**6), ('head', (0, 0), 0), ('start', (1, 0), 10**6))
         for name, at, value in values:
             with self.subTest(name=name, at=at, value=value):
-                self.refused(self.edited(put(name, at, value), 'c.h5'), f'bad.h5: condensed/({name} (is damaged|contains)|bounds is 2 x 2, and)')
-        ROWS.add(f'invalid numbers in a condensed model ({len(values)})', "refused by the dataset's name")
+                self.refused(self.edited(put(name, at, value), 'b.h5'), f'bad.h5: (bodies/({name}|head) (is damaged|contains)|the sizes of bodies/ are damaged|bodies/\\S+ is )')
+        ROWS.add(f'invalid numbers in a model of bodies ({len(values)})', "refused by the dataset's name")
+
+    def test_former_type(self):
+        """A model of a type that is gone: one line with the type that replaces it and what to do."""
+
+        def change(f):
+            del f['problem/type']
+            f['problem/type'] = np.frombuffer(b'condensed', 'i1').reshape(-1, 1)
+        self.refused(self.edited(change), 'bad.h5: .*condensed, which models of bodies replace: train the scene again')
 
     def test_elsewhere(self):
         """A model with links to other files, or with filters, which HDF5 would load as code."""
@@ -219,13 +224,10 @@ class Files(Case):
                 f.write(good)
 
     def test_snapshots(self):
-        """Each byte of a snapshot, a flexibility and its responses counts."""
-        draw = random.Random(6)
+        """Each byte of a snapshot counts."""
         rope = ['train', '-scene', ROPE, '-grid', '4,4', '-grid_type', 'centred', '-model', 'good.h5']
-        self.damaged(sorted(glob.glob(self.path('good.h5.snapshots', '*.h5')))[2], 16, draw, rope)
-        for kind in ('flexibility', 'responses'):
-            self.damaged(glob.glob(self.path('c.h5.snapshots', kind + '-*.h5'))[0], 10, draw, CONDENSED)
-        ROWS.add('a snapshot (16), a flexibility (10), its responses (10): one bit flipped, or cut', 'refused by its name')
+        self.damaged(sorted(glob.glob(self.path('good.h5.snapshots', '*.h5')))[2], 16, random.Random(6), rope)
+        ROWS.add('a snapshot (16): one bit flipped, or cut', 'refused by its name')
 
     def test_snapshots_of_other_sizes(self):
         """Sound files whose sizes do not go together: the same line on one rank and on two."""
@@ -259,24 +261,11 @@ class Files(Case):
         ROWS.add('snapshots with inconsistent sizes (6), on 1 and 2 ranks', 'refused by their names')
 
     def test_snapshots_of_another(self):
-        """Solutions and flexibilities of other materials, under the names of these."""
-        other = ['-body_rope_young', '2*mu1+x', '-model', 'o.h5']
-        self.hyco(*CONDENSED, *other)
-        run = self.run_raw(*CONDENSED, *other, '-hyco_snapshots', 'c.h5.snapshots')
+        """Solutions of other materials in the folder."""
+        run = self.run_raw('train', '-scene', ROPE, '-grid', '4,4', '-grid_type', 'centred', '-body_rope_young', '2*mu1+x', '-model', 'o.h5', '-hyco_snapshots', 'good.h5.snapshots')
         self.assertEqual(run.returncode, 1)
         self.assertIn('another scene', run.stderr)
-        path = glob.glob(self.path('c.h5.snapshots', 'flexibility-*.h5'))[0]
-        with open(path, 'rb') as f:
-            good = f.read()
-        shutil.copy(self.path('o.h5.snapshots', os.path.basename(path)), path)
-        try:
-            run = self.run_raw(*CONDENSED)
-            self.assertEqual(run.returncode, 1)
-            self.assertIn('belongs to another scene or mesh', run.stderr)
-        finally:
-            with open(path, 'wb') as f:
-                f.write(good)
-        ROWS.add('snapshots or a flexibility of another scene in the folder; a model of another', 'refused')
+        ROWS.add('snapshots of another scene in the folder; a model of another', 'refused')
 
     @unittest.skipUnless(shutil.which('strace'), 'there is no strace (scripts/setup test)')
     def test_writes_only_what_is_named(self):

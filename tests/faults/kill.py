@@ -16,8 +16,7 @@ from rows import Rows
 TRAIN = ['train', '-scene', ROPE, '-grid', '12,12', '-model', 'm.h5']
 PATHS = ['train', '-scene', os.path.join(SOURCE, 'examples', 'rod'), '-grid', '2,2,1', '-hyco_pod_tol', '1e-9', '-hyco_rid_layers', '1',
          '-hyco_rid_contact_extension', '1', '-model', 'm.h5']
-CONDENSED = ['train', '-scene', ROPE, '-grid', '20,4', '-hyco_model_type', 'condensed', '-model', 'm.h5']
-KILLS = {'hybrid': 5, 'condensed': 3, 'hybrid with a history': 3}
+KILLS = {'hybrid': 5, 'hybrid with a history': 3}
 ROWS = Rows('kill')
 
 
@@ -128,14 +127,6 @@ class Kill(Case):
         """A path in progress is solved again, those before it are not."""
         self.check_kills(1, 'hybrid with a history', PATHS)
 
-    def test_condensed(self):
-        """Flexibilities are kept like solutions: one for each value of the stiffness, and one for the modes."""
-        self.check_kills(1, 'condensed', CONDENSED)
-        self.assertEqual(len(glob.glob(self.path('m.h5.snapshots', 'flexibility-*.h5'))), 20)
-        self.assertEqual(len(glob.glob(self.path('m.h5.snapshots', 'responses-*.h5'))), 20)
-        self.setUp()
-        self.check_kills(2, 'condensed', CONDENSED)
-
     def limited(self, kilobytes, train=TRAIN, ranks=1, alone=0):
         """A run in which, once it solves, no file can grow beyond a size, which emulates a full disk. `alone`: that rank only, or all."""
         run = subprocess.Popen(self.command(ranks, train), cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
@@ -170,17 +161,6 @@ class Kill(Case):
         subprocess.run([HYCO, *settled(TRAIN)], cwd=self.folder, check=True, capture_output=True, timeout=100 * PATIENCE)
         self.assertEqual(self.content(), right)
         ROWS.add('disk full while a snapshot or the model is written', 'one line; the old model is untouched, no file is half-written; the next run continues')
-
-    def test_full_disk_condensed(self):
-        """Full while flexibilities are written, which are larger than solutions, on 1 and 2 ranks."""
-        # long enough to be killed in time; two ranks on one solution need more time for each
-        for ranks, alone, more, grid, n in ((1, 0, [], '40,8', 320), (2, 1, [], '40,8', 320), (2, 0, ['-hyco_groups', '1'], '10,8', 80)):
-            train = [a if a != '20,4' else grid for a in CONDENSED]
-            self.refused(self.limited(16, train + more, ranks, alone), 'flexibility-')
-            self.assertFalse(os.path.exists(self.path('m.h5')))
-            self.assertEqual(len([f for f in os.listdir(self.path('m.h5.snapshots')) if '-' not in f]), n)
-            self.setUp()
-        ROWS.add('disk full while a flexibility is written, on 1 and 2 ranks', 'one line, no model; the solutions are kept for the next run')
 
     def full(self, kilobytes, *args):
         """A run in which no file can grow beyond a size once it reads its options: from a pipe, which waits until the limit is set."""

@@ -28,7 +28,7 @@ history:
   times: [0, 1, 2]
   tables: {q: [[0, 0], [1, 1], [2, 0.2]]}
 """
-KINDS = ('hybrid', 'projection', 'condensed', 'cubature', 'regression')
+KINDS = ('hybrid', 'projection', 'bodies', 'cubature', 'regression')
 MEMCHECK = ('valgrind', '-q', '--leak-check=full', '--show-leak-kinds=definite', '--errors-for-leak-kinds=definite', '--num-callers=50',
             '--error-exitcode=99', f'--suppressions={SOURCE}/tests/valgrind.supp')
 
@@ -53,8 +53,8 @@ class Memory(FlowingRing):
         return self.written(BLOCK.replace('STIFF', name).replace('YOUNG', young).replace('WAVES', '1' if stiff else 'waves'), square(4)) + '/scene.yaml'
 
     def test_gaps(self):
-        """The condensed model of a scene whose parameters change gaps only, judged at held-out solutions."""
-        self.model('gaps', self.block(False), 'condensed', '0.021,1.7', '-values_push', '0.015,0.03', '-values_waves', '1,3', '-hyco_validation', 2)
+        """The model of bodies of a scene whose parameters change gaps only, judged at held-out solutions."""
+        self.model('gaps', self.block(False), 'bodies', '0.021,1.7', '-values_push', '0.015,0.03', '-values_waves', '1,3', '-hyco_validation', 2)
 
     def test_types(self):
         """Every type of model of a block: trained, predicts."""

@@ -115,10 +115,10 @@ class Laws(Case):
             self.same(one[1:], self.fields(BOTH, 'hex8', 3, n=4, ranks=ranks)[1:], 1e-9)
 
     def test_reduced(self):
-        """A linear scene with heat trains as others do: the condensed model has the forces of full order."""
+        """A linear scene with heat trains as others do: a model of bodies has the forces of full order."""
         blocks = ('-scene', os.path.join(SOURCE, 'examples', 'blocks'), '-body_block_temperature', '293+3000*press*(1+x/20)',
                   '-body_block_reference_temperature', '293', '-body_block_expansion', '1.2e-5')
-        self.hyco('train', *blocks, '-grid', '3,3', '-hyco_model_type', 'condensed', '-model', self.path('m.h5'), status=None)
+        self.hyco('train', *blocks, '-grid', '3,3', '-hyco_model_type', 'bodies', '-model', self.path('m.h5'), status=None)
         report = self.hyco('compare', *blocks, '-model', self.path('m.h5'), '-grid', '3,3')
         for error, bound in (('error_u', 1e-5), ('error_sigma', 1e-4), ('error_lambda', 1e-8)):
             self.assertLess(report[error]['max'], bound, error)

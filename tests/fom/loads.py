@@ -190,7 +190,7 @@ output: {wall: {reaction: x, group: side}, low: {min: u_y}}
     def test_models(self):
         """Contact on a foundation whose stiffness is a parameter: every type of model, and its reactions."""
         scene = self.written(self.CONTACT, self.pair())
-        for kind, bound in (('hybrid', 0.02), ('projection', 0.01), ('condensed', 5e-3)):
+        for kind, bound in (('hybrid', 0.02), ('projection', 0.01), ('bodies', 5e-3)):
             with self.subTest(kind=kind):
                 self.hyco('train', '-scene', scene, '-grid', '5,4', '-grid_type', 'centred', '-model', 'm.h5', '-hyco_model_type', kind, '-hyco_pod_tol', 1e-11,
                           *(('-hyco_rid_layers', 1, '-hyco_rid_modes', 'displacement,stress,force,dual') if kind == 'hybrid' else ()))

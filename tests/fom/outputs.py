@@ -62,7 +62,7 @@ class Quantities(Case):
 
     def test_predict(self):
         """In the RID and outside it; the same in tables, from 1 and 2 ranks."""
-        for kind in ('hybrid', 'condensed'):
+        for kind in ('hybrid', 'bodies'):
             self.hyco('train', '-scene', self.scene, '-grid', '5,5', '-model', f'{kind}.h5', '-hyco_model_type', kind, '-hyco_pod_tol', 1e-11)
             for mu in ('0.045,0.055', '0.07,0.03'):
                 full = self.hyco('solve', '-scene', self.scene, '-mu', mu)['outputs']

@@ -133,7 +133,7 @@ class Ties(Case):
             self.assertLess(found['balance'], 1e-9)
             for name in ('strain_energy', 'total_contact_force', 'lambda_max'):
                 self.near(found[name], full[0][name], 1e-8, name)
-        for kind, bound in (('hybrid', 0.01), ('projection', 0.01), ('condensed', 1e-3), ('regression', 0.02)):
+        for kind, bound in (('hybrid', 0.01), ('projection', 0.01), ('bodies', 1e-3), ('regression', 0.02)):
             with self.subTest(kind=kind):
                 self.hyco('train', '-scene', scene, '-grid', '4,4', '-grid_type', 'centred', '-model', 'm.h5', '-hyco_model_type', kind, '-hyco_pod_tol', 1e-11,
                           *(('-hyco_rid_layers', 1, '-hyco_rid_modes', 'displacement,stress,force,dual') if kind == 'hybrid' else ()))

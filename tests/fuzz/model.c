@@ -9,7 +9,7 @@
 #include <hycocompat.h>
 #include <hycoromimpl.h>
 
-#define N_MODELS 5
+#define N_MODELS 4
 #define RECORD   12
 
 typedef struct {
@@ -73,9 +73,8 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
   FuzzPath("model.h5", path);
   ReadGood("rope-hybrid-3.h5", &good[0]);
   ReadGood("rope-projection-3.h5", &good[1]);
-  ReadGood("rope-condensed-4.h5", &good[2]);
-  ReadGood("rope-hybrid-4-table.h5", &good[3]);
-  ReadGood("rope-condensed-4-modes.h5", &good[4]);
+  ReadGood("rope-hybrid-4-table.h5", &good[2]);
+  ReadGood("rope-bodies-4.h5", &good[3]);
   return 0;
 }
 

@@ -107,7 +107,7 @@ class Mixed(Case):
                 sizes.append((t['n_rid_cells'] if 'n_rid_cells' in t else len(cells), cells.tolist()))
                 self.assertTrue(0 < (cells[:, 2] == cells[:, 3]).sum() < len(cells) < len(f['whole/cells']))
         self.assertEqual(sizes[0], sizes[1])
-        for kind in ('projection', 'condensed'):
+        for kind in ('projection', 'bodies'):
             self.hyco('train', '-scene', scene, *grid, '-model', 'k.h5', '-hyco_model_type', kind, '-hyco_snapshots', 's0.snapshots', '-hyco_pod_tol', '1e-9', status=None)
             self.assertLess(self.errors(scene, 'k.h5', '-values_press', '0.03,0.07', '-values_gap', '0.04,0.08')['u'], 2e-2, kind)
         self.hyco('predict', '-model', 'm0.h5', '-mu', '0.05,0.05', '-output', 'p.xdmf')
@@ -172,7 +172,7 @@ class Mixed(Case):
             self.near(found[1][name][-1], found[0][name][-1], 1e-7, name)
             self.near(found[0][name][-1], found[2][name][-1], 0.05, name)
         scene = self.path('both.yaml')
-        for kind, limit, settings in (('hybrid', 1e-6, ('-grid', '1,1', '-hyco_rid_whole', '-hyco_hybrid', 'all')), ('condensed', 5e-2, ('-grid', '3,3'))):
+        for kind, limit, settings in (('hybrid', 1e-6, ('-grid', '1,1', '-hyco_rid_whole', '-hyco_hybrid', 'all')), ('bodies', 5e-2, ('-grid', '3,3'))):
             self.hyco('train', '-scene', scene, '-model', f'{kind}.h5', '-hyco_model_type', kind, *settings)
             c = self.hyco('compare', '-scene', scene, '-model', f'{kind}.h5', '-mu', '9,1.5')
             self.assertLess(c['worst_u']['max'], limit, kind)

@@ -53,7 +53,7 @@ class Estimates(Case):
         """On the rope, on blocks in 2D, on the pellet in 3D; every type of model."""
         for model in ('rough.h5', 'fine.h5'):
             self.bounds(ROPE, model, '13,12')
-        for kind, more in (('hybrid', ('-hyco_hybrid', 'contact', '-hyco_rid_layers', 1, '-hyco_rid_contact_extension', 2)), ('condensed', ()),
+        for kind, more in (('hybrid', ('-hyco_hybrid', 'contact', '-hyco_rid_layers', 1, '-hyco_rid_contact_extension', 2)), ('bodies', ()),
                            ('projection', ('-hyco_pod_tol', '1e-10'))):
             run = self.run_raw('train', '-scene', BLOCKS, '-grid', '5,5', '-grid_type', 'closed', '-hyco_model_type', kind, '-model', f'{kind}.h5',
                                '-hyco_snapshots', 'blocks.snapshots', *more)

@@ -200,7 +200,7 @@ class Rope(Case):
         """Options of the dual basis that do not fit the type of model are refused."""
         for words, line in ((('-hyco_dual', 'snapshots'), '-hyco_dual snapshots is for -hyco_model_type projection'),
                             ((*TYPE, '-hyco_dual', 'fe'), 'use nnmf or snapshots'),
-                            (('-hyco_model_type', 'galerkin'), 'it must be one of: bodies, condensed, cubature, hybrid, projection, regression'),
+                            (('-hyco_model_type', 'galerkin'), 'it must be one of: bodies, cubature, hybrid, projection, regression'),
                             ((*TYPE, '-hyco_nnmf_max_its', '0'), 'it must be a whole number, at least 1')):
             run = self.run_raw('train', '-scene', ROPE, '-grid', '2,2', '-model', 'no.h5', *words)
             self.assertNotEqual(run.returncode, 0)

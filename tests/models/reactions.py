@@ -1,5 +1,5 @@
 """Reactions of models that follow from balance: with the contact forces and the loads of their bodies they sum to zero, as those of full order do; of
-types other than condensed, if contact acts only between the bodies."""
+types other than bodies, if contact acts only between the bodies."""
 import os
 import subprocess
 import sys
@@ -12,8 +12,8 @@ from common import SOURCE, Case
 sys.path.insert(0, os.path.join(SOURCE, 'tests', 'verify'))
 from grids import GMSH, Grid  # noqa: E402
 
-# A seat on a foot that is tied to it, and a block pressed onto it; loads of every kind. The stiffness changes, so that a condensed model interpolates
-# its forces.
+# A seat on a foot that is tied to it, and a block pressed onto it; loads of every kind. The stiffness changes, so that a model of bodies interpolates
+# its flexibility.
 SCENE = """
 scene: {mesh: mesh.msh, parameters: [press, load]MORE}
 parameter: {press: {range: [0.02, 0.06]}, load: {range: [1, 3]}}
@@ -68,7 +68,7 @@ class Balance(Case):
 
     def test_models(self):
         """At unseen points, in the plane, around an axis and in space; the error is that of the contact force."""
-        for space, kind in (('plane', 'hybrid'), ('plane', 'condensed'), ('ring', 'hybrid'), ('ring', 'condensed'), ('space', 'hybrid'), ('space', 'condensed')):
+        for space, kind in (('plane', 'hybrid'), ('plane', 'bodies'), ('ring', 'hybrid'), ('ring', 'bodies'), ('space', 'hybrid'), ('space', 'bodies')):
             scene = self.scene(space)
             self.hyco('train', '-scene', scene, '-grid', '3,3', '-grid_type', 'centred', '-model', 'm.h5', '-hyco_model_type', kind, '-hyco_snapshots', space,
                       *(('-hyco_pod_tol', 1e-4, '-hyco_rid_layers', 1) if kind == 'hybrid' else ()))
@@ -87,10 +87,10 @@ class Balance(Case):
         """At each listed time of a path."""
         same = [('seat: {young: 300, poisson: 0.3, density: 0.5}', 'seat: {law: norton, young: 300, poisson: 0.3, rate: 1e-3, exponent: 2, density: 0.5}'),
                 ('-press}', '-press*t}'), ('gravity: {y: -load}', 'gravity: {y: -load*t}\nhistory: {times: [0, 0.5, 1]}')]
-        # a condensed model of paths needs one stiffness, and has no ties and no forces on points
+        # a model of bodies of paths needs one stiffness, and has no ties
         plain = [('100*(1 + load)', '200'), ('corner: {y: 0.3*load}, ', ''), ('tie: {glue: {slave: below, master: bed}}\n', ''),
                  ('fixed: {', 'fixed: {below: {x: 0, y: 0}, '), ('group: base', 'group: below')]
-        for kind, more, point in (('hybrid', [], 0.3), ('condensed', plain, 0)):
+        for kind, more, point in (('hybrid', [], 0.3), ('bodies', plain, 0)):
             scene = self.scene('plane', [*same, *more])
             self.hyco('train', '-scene', scene, '-grid', '2,2', '-model', f'{kind}.h5', '-hyco_model_type', kind, '-hyco_snapshots', kind,
                       *(('-hyco_pod_tol', 1e-4) if kind == 'hybrid' else ()))
@@ -108,7 +108,7 @@ class Balance(Case):
         """The held-out errors of reactions are those of the contact force, on one rank and on three."""
         scene = self.scene('plane')
         for ranks in (0, 3):
-            held = self.hyco('train', '-scene', scene, '-grid', '3,3', '-model', f'{ranks}.h5', '-hyco_model_type', 'condensed',
+            held = self.hyco('train', '-scene', scene, '-grid', '3,3', '-model', f'{ranks}.h5', '-hyco_model_type', 'bodies',
                              '-hyco_validation', 8, '-hyco_snapshots', 'held', ranks=ranks, status=None)['held_out']['outputs']
             for what in ('median', 'largest'):
                 self.assertGreater(held['carry'][what], 1e-6)
@@ -124,7 +124,7 @@ class Balance(Case):
                                 (('fixed: {', 'fixed: {corner: {normal: 0, direction: {x: 1, y: 0}}, '), ('push', 'both', 'hold')))):
             with self.subTest(change=change[1]):
                 scene = self.scene('plane', [change])
-                self.hyco('train', '-scene', scene, '-grid', '3,3', '-grid_type', 'centred', '-model', f'{k}.h5', '-hyco_model_type', 'condensed')
+                self.hyco('train', '-scene', scene, '-grid', '3,3', '-grid_type', 'centred', '-model', f'{k}.h5', '-hyco_model_type', 'bodies')
                 at = ('-mu', '0.033,1.7')
                 full, model = self.hyco('solve', '-scene', scene, *at)['outputs'], self.hyco('predict', '-model', f'{k}.h5', *at)['outputs']
                 for name in ('hold', 'push', 'both'):

@@ -58,7 +58,7 @@ class Histories(Case):
     def test_gap(self):
         """A gap that closes and opens while the ring creeps: on two ranks as on one; every unknown of the whole mesh is full order; an RID is near it."""
         rings = [('core', 2, 4, ('bore', 'shaft')), ('ring', 4, 5, ('sleeve', 'rim'))]
-        for kind, types in (('quad8', ('hybrid', 'cubature')), ('tet10', ('hybrid', 'condensed')), ('hex20', ())):
+        for kind, types in (('quad8', ('hybrid', 'cubature')), ('tet10', ('hybrid', 'bodies')), ('hex20', ())):
             scene = self.rings(kind, GAP, rings, 1, 1)
             full = [self.hyco('solve', '-scene', scene, '-mu', '0.0052,0.93', ranks=ranks)['history'] for ranks in (0, 2)]
             self.assertGreater(max(full[0]['n_active']), 4)

@@ -123,6 +123,27 @@ class Sources(unittest.TestCase):
                 if 'extensions' in os.path.relpath(other, SOURCE):
                     self.assertEqual(os.path.dirname(other), os.path.dirname(path), path)
 
+    def test_online(self):
+        """What loads and predicts (rom/) includes no header of the training, directly or through others, and calls no function of offline/."""
+        header = {os.path.basename(p): p for p in glob.glob(os.path.join(SOURCE, 'include', '**', '*.h'), recursive=True)}
+        included = {}
+
+        def closure(path):
+            if path not in included:
+                included[path] = set()
+                for name in re.findall(r'#include\s*[<"](hyco\w*\.h)[>"]', text(path)):
+                    if name in header:
+                        included[path] |= {name} | closure(header[name])
+            return included[path]
+
+        training = {name for name in header if re.match(r'hyco(reducer|trainer|snapshots)|hyco\w*training\.h|hycoinelasticmodes', name)}
+        self.assertGreater(len(training), 6)
+        for path in sources('rom'):
+            self.assertEqual(closure(path) & training, set(), path)
+        for path, others in calls().items():
+            if os.sep + 'rom' + os.sep in path:
+                self.assertEqual([other for other in others if os.sep + 'offline' + os.sep in other], [], path)
+
     def test_types(self):
         """Laws and discretisations of contact are named only in their own folders and in the package, which registers all types; a scene
         names the default one."""
@@ -136,16 +157,16 @@ class Sources(unittest.TestCase):
 
     def test_model_types(self):
         """A type of reduced model is named only in its own folder, and no code queries a type by name."""
-        own = re.compile(r'#include\s*[<"](hybrid|hycoprojection|hycocondensed|hycogalerkin|table)\.h')
+        own = re.compile(r'#include\s*[<"](hybrid|hycoprojection|hycobodies|hycogalerkin|table)\.h')
         for path in sources():
             if os.sep + 'impls' + os.sep in path or path in extensions():
                 continue
             self.assertNotRegex(text(path), own, path)
-            self.assertNotRegex(code(path), r'[=!]=\s*HYCO_ROM_[A-Z]+|str(case)?cmp\([^;]*HYCO_ROM_(HYBRID|PROJECTION|CONDENSED|CUBATURE|REGRESSION)\)\s*[=!]', path)
+            self.assertNotRegex(code(path), r'[=!]=\s*HYCO_ROM_[A-Z]+|str(case)?cmp\([^;]*HYCO_ROM_(HYBRID|PROJECTION|BODIES|CUBATURE|REGRESSION)\)\s*[=!]', path)
 
     def test_registration(self):
         """Only the package, which registers all types, and its own file name the function that creates a type; nothing calls the package."""
-        create = re.compile(r'\bHyco(?:Material|Contact|Cone|ROM|SolverForm)Create_\w+')
+        create = re.compile(r'\bHyco(?:Material|Contact|Cone|ROM|Trainer|SolverForm)Create_\w+')
         own = {}
         for path in sources():
             if os.sep + 'package' + os.sep in path:

@@ -39,12 +39,6 @@ class Pod(Case):
                     np.testing.assert_allclose(found, sigma, rtol=1e-6)
                     np.testing.assert_array_equal(of, cells)
 
-    def test_condensed(self):
-        """Condensed models by another type have the same singular values."""
-        sigma, _, _ = self.model('-hyco_model_type', 'condensed')
-        found, _, _ = self.model('-hyco_model_type', 'condensed', '-hyco_pod_svd_type', 'trlanczos', ranks=2)
-        np.testing.assert_allclose(found, sigma, rtol=1e-6)
-
     def test_accuracy(self):
         """A tolerance beyond the accuracy of the cross-product matrix; triplets that are too few."""
         line = self.refused('-hyco_pod_svd_type', 'cross', '-hyco_pod_tol', '1e-18')

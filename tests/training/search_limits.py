@@ -46,12 +46,12 @@ class SearchLimits(Ring):
         solved. With all settings tried they are, and the model of bodies is still chosen, or one with fewer operations."""
         report, rows = self.search(BLOCKS, 'blocks', '-grid', '5,5')
         self.assertEqual([r['model_type'] for r in rows], ['bodies'])
-        self.assertEqual(set(report['search']['not_tried']), {'condensed', 'hybrid'})
+        self.assertEqual(set(report['search']['not_tried']), {'hybrid'})
         for why in report['search']['not_tried'].values():
             self.assertIn('settings 1 are accurate enough, without training solutions', why)
         self.assertEqual((sum(report['solved_by_group']), report['n_samples']), (6 + 2, 0))  # held-out points, the corners of the training among them
         report, rows = self.search(BLOCKS, 'every', '-grid', '5,5', '-hyco_search_exhaustive')
-        self.assertEqual({r['model_type'] for r in rows}, {'bodies', 'condensed', 'hybrid'})
+        self.assertEqual({r['model_type'] for r in rows}, {'bodies', 'hybrid'})
         self.assertEqual(sum(report['solved_by_group']), 25 + 25)
         self.assertLess(report['held_out']['lambda']['largest'], 1e-2)
 
@@ -96,12 +96,6 @@ class SearchLimits(Ring):
         report, rows = self.search('strip', 'many', '-grid', '3,3')
         self.assertEqual((rows[0]['model_type'], report['model_type']), ('bodies', 'bodies'))
         self.assertLess(report['held_out']['lambda']['largest'], 1e-6)
-
-    def test_scattered(self):
-        """Scattered points exclude a condensed model: if the hybrid misses, the message names one that chooses its points."""
-        report, _ = self.search(ROPE, 'scattered', '-scatter', 5, '-target_lambda', 1e-15, '-target_max_added', 0, status=3)
-        self.assertNotEqual(report['model_type'], 'condensed')
-        self.assertRegex(report['missed'][0], 'let a condensed model choose its points: -hyco_model_type condensed')
 
     def test_paths(self):
         """Paths: models of bodies are tried first, their laws by interpolation before a cubature."""

@@ -126,17 +126,6 @@ class Targets(Case):
         self.assertTrue(all(r['meets'] == '0' for r in rows))
         self.hyco('predict', '-model', 'none.h5', '-mu', '0.1,0.2')
 
-    def test_no_grid(self):
-        """Points that are not a tensor grid: a condensed model is a failed attempt, if the search comes to it, and another type is chosen."""
-        points = [(a, b) for a in (0.05, 0.1, 0.15, 0.2, 0.25) for b in (0.0, 0.1, 0.2, 0.3, 0.4)]
-        with open(self.path('line.csv'), 'w', encoding='ascii') as f:
-            f.write('mu1,mu2\n' + ''.join(f'{a},{b}\n' for a, b in points[:-1]))
-        run = self.run_raw('train', '-scene', ROPE, '-points', 'line.csv', '-model', 'g.h5', '-target_u', 0.2, '-table', 'g.csv', '-hyco_search_exhaustive')
-        self.assertEqual(run.returncode, 0, run.stderr)
-        row = next(r for r in self.rows('g.csv') if r['model_type'] == 'condensed')
-        self.assertRegex(row['failure'], 'the 24 training points do not form a tensor grid')
-        self.assertEqual(row['meets'], '0')
-
     def test_complaints(self):
         """Targets outside (0, 1], and with options that they exclude, are refused."""
         for args, words in ((('-target_u', 0), 'a relative error above 0 and at most 1'), (('-target_sigma', -0.1), 'a relative error above 0 and at most 1'),

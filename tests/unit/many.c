@@ -157,7 +157,7 @@ static PetscErrorCode TestOnePoint(void)
 
 static PetscErrorCode Test(void)
 {
-  static const HycoROMType types[] = {HYCO_ROM_HYBRID, HYCO_ROM_PROJECTION, HYCO_ROM_CONDENSED};
+  static const HycoROMType types[] = {HYCO_ROM_HYBRID, HYCO_ROM_PROJECTION, HYCO_ROM_BODIES};
   PetscMPIInt size;
 
   PetscFunctionBegin;

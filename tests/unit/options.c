@@ -3,6 +3,7 @@
 #include <hyco.h>
 #include <hycoromtype.h>
 #include <hycosolverimpl.h>
+#include <hycotrainer.h>
 #include <unistd.h>
 
 /* Whether an invalid value is refused when it is read: a folder, a group or a viewer may be any word. */
@@ -49,10 +50,17 @@ static PetscErrorCode LateSetFromOptions(HycoReducer reducer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode TrainLate(HycoTrainerOps *ops)
+{
+  PetscFunctionBegin;
+  ops->setfromoptions = LateSetFromOptions;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode CreateLate(HycoROM model)
 {
   static const HycoROMTraits traits = {.title = "late"};
-  static const HycoROMOps ops = {.setfromoptions = LateSetFromOptions};
+  static const HycoROMOps ops = {NULL};
 
   PetscFunctionBegin;
   PetscCall(HycoROMSetOps(model, &ops, &traits, NULL));
@@ -70,11 +78,14 @@ static PetscErrorCode TestLate(void)
   CHECK(!HycoOptionFind("hyco_late"), "-hyco_late is there before its type");
   PetscCall(HycoROMRegister("late", CreateLate));
   PetscCall(HycoGetOptionTable(&n, &table));
+  CHECK(n == before && !HycoOptionFind("hyco_late"), "a type without a training has options of it");
+  PetscCall(HycoTrainerRegister("late", TrainLate));
+  PetscCall(HycoGetOptionTable(&n, &table));
   CHECK(n == before + 1, "%d options, %d before the type was registered", (int)n, (int)before);
   CHECK(HycoOptionFind("hyco_late"), "-hyco_late is not there");
   types = HycoOptionFind("hyco_model_type");
-  CHECK(types && strcmp(types->value, "<bodies|condensed|cubature|hybrid|late|projection|regression>") == 0,
-        "the types are %s", types->value);
+  CHECK(types && strcmp(types->value, "<bodies|cubature|hybrid|late|projection|regression>") == 0, "the types are %s",
+        types->value);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

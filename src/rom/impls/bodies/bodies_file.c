@@ -130,6 +130,46 @@ static PetscErrorCode MoveBody(HycoH5 h, HycoSubstructures b, PetscInt k)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What is inelastic. */
+static PetscErrorCode MoveInelastic(HycoROM m, HycoH5 h)
+{
+  HycoSubstructures b = (HycoSubstructures)m->model->data;
+  HycoBodiesInelastic in;
+  const PetscInt nq = HycoElementGet(m->model->mesh->type)->nq;
+  PetscInt head[4], columns, rows = 0;
+
+  PetscFunctionBegin;
+  if (HycoH5Reads(h)) PetscCall(PetscNew(&b->inelastic));
+  in = b->inelastic;
+  HycoCheck(!HycoH5Reads(h) || HycoH5Has(h, "bodies/inelastic/point"),
+            "%s has laws in whole cells, as models of bodies of an earlier version; train it again", m->model->path);
+  head[0] = in->m;
+  head[1] = in->nd;
+  head[2] = in->n_points;
+  head[3] = in->weighted;
+  PetscCall(HycoH5Ints(h, "bodies/inelastic/head", 0, PETSC_MAX_INT, 4, head));
+  in->weighted = (PetscBool)head[3];
+  in->m = head[0];
+  in->nd = head[1];
+  in->n_points = head[2];
+  columns = in->n_points * HycoStrainSize(b->dim);
+  for (PetscInt k = 0; k < b->n; k++)
+    rows += b->body[k].n_samples * (b->turn_start[k + 1] - b->turn_start[k]) * b->body[k].l;
+  PetscCall(HycoH5Reals(h, "bodies/inelastic/amplification", 1, &in->amplification));
+  PetscCall(HycoH5Int(h, "bodies/inelastic/point", 0, m->model->whole_cells * nq - 1, &in->n_points, 1, &in->point));
+  PetscCall(HycoH5Real(h, "bodies/inelastic/weight", &in->n_points, 1, &in->weight));
+  PetscCall(HycoH5Real(h, "bodies/inelastic/T", &columns, in->m, &in->T));
+  PetscCall(HycoH5Real(h, "bodies/inelastic/there", &columns, in->m, &in->there));
+  PetscCall(HycoH5Real(h, "bodies/inelastic/P", &b->ns, in->m, &in->P));
+  PetscCall(HycoH5Real(h, "bodies/inelastic/fields", &rows, in->m, &in->fields));
+  PetscCall(HycoH5Int(h, "bodies/inelastic/dof", 0, m->model->whole_nodes * b->dim - 1, &in->nd, 1, &in->dof));
+  PetscCall(HycoH5Int(h, "bodies/inelastic/body", 0, b->n - 1, &in->nd, 1, &in->body));
+  PetscCall(HycoH5Real(h, "bodies/inelastic/C", &in->nd, b->ns, &in->C));
+  PetscCall(HycoH5Real(h, "bodies/inelastic/R", &in->nd, b->r, &in->R));
+  PetscCall(HycoH5Real(h, "bodies/inelastic/A", &in->nd, in->m, &in->A));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoBodiesFile(HycoROM m, HycoH5 h)
 {
   HycoSubstructures b = (HycoSubstructures)m->model->data;
@@ -140,6 +180,6 @@ PetscErrorCode HycoBodiesFile(HycoROM m, HycoH5 h)
   PetscCall(MoveTheta(h, m, b));
   PetscCall(MoveProbe(h, m, b));
   for (PetscInt k = 0; k < b->n; k++) PetscCall(MoveBody(h, b, k));
-  if (m->model->scene->n_times) PetscCall(HycoBodiesInelasticFile(m, h));
+  if (m->model->scene->n_times) PetscCall(MoveInelastic(m, h));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -2,8 +2,6 @@
 #include "bodies_path.h"
 #include <petscviewer.h>
 
-#define USELESS 0.5 /* mean error of the training displacements */
-
 /* -- ops of the path -- */
 
 /* Sets the displacements of the surfaces and of the points' cells. */
@@ -411,44 +409,6 @@ static PetscErrorCode Features(HycoROM m, PetscReal misfit[2])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -- training and report -- */
-
-static PetscErrorCode Build(HycoROM m, HycoReducer t)
-{
-  char worst[HYCO_LINE] = "";
-  HycoBodiesInelastic in;
-
-  PetscFunctionBegin;
-  PetscCall(HycoBodiesBuild(m, t));
-  in = ((HycoSubstructures)m->model->data)->inelastic;
-  if (!(m->model->numbers[1] < USELESS)) HycoReducerNameWorst(t, worst);
-  HycoCheckModel(
-      m->model->numbers[1] < USELESS,
-      "the model of bodies misses its own training displacements by %.0f %% on average (%d inelastic modes, "
-      "%d points)%s: use more points (-hyco_bodies_cells), fewer modes (-hyco_bodies_inelastic_tol), or train "
-      "a hybrid model",
-      100 * (double)m->model->numbers[1], (int)in->m, (int)in->n_points, worst);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
-{
-  HycoSubstructures b = (HycoSubstructures)m->model->data;
-
-  PetscFunctionBegin;
-  (void)t;
-  PetscCall(HycoTrainingAddFact(r, "n_bodies", (PetscReal)b->n));
-  PetscCall(HycoTrainingAddFact(r, "n_surface_unknowns", (PetscReal)b->ns));
-  PetscCall(HycoTrainingAddFact(r, "n_inelastic_modes", (PetscReal)b->inelastic->m));
-  PetscCall(HycoTrainingAddFact(r, "inelastic_amplification", b->inelastic->amplification));
-  snprintf(r->summary, sizeof(r->summary),
-           "bodies: %d, with %d unknowns on the surfaces that may touch; %d vectors of loads; %d inelastic modes, laws "
-           "at %d points, in %d of %d elements; %d displacement modes\n",
-           (int)b->n, (int)b->ns, (int)b->r, (int)b->inelastic->m, (int)b->inelastic->n_points,
-           (int)m->model->mesh->n_cells, (int)m->model->whole_cells, (int)r->n_modes);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode View(HycoROM m, PetscViewer viewer)
 {
   HycoBodiesInelastic in = ((HycoSubstructures)m->model->data)->inelastic;
@@ -464,16 +424,6 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Operations of an iteration: the laws in the cells, the tangent, and its factor. */
-static PetscReal Cost(HycoReducer t, const HycoAttempt *a)
-{
-  const PetscReal m = (PetscReal)HycoTrainingOfBodies(t)->strains.l, ns = (PetscReal)t->fom->fe->n_sigma,
-                  points = (PetscReal)(HycoTrainingOfBodies(t)->cells * HycoTrainingOfBodies(t)->strains.l);
-
-  (void)a;
-  return points * (2 * ns * ns * m + 2 * ns * m * m) + m * m * m;
-}
-
 PetscErrorCode HycoBodiesTakePath(HycoROM m)
 {
   static const HycoROMTraits traits = {.title = "condensed bodies",
@@ -486,18 +436,7 @@ PetscErrorCode HycoBodiesTakePath(HycoROM m)
                                        .integrals = PETSC_TRUE,
                                        .work = sizeof(struct _n_HycoBodiesPath),
                                        .resultants = PETSC_TRUE};
-  static const HycoROMOps ops = {.setfromoptions = HycoBodiesOptions,
-                                 .resettraining = HycoBodiesResetTraining,
-                                 .begin = HycoBodiesBegin,
-                                 .modes = HycoBodiesModes,
-                                 .build = Build,
-                                 .report = Report,
-                                 .cost = Cost,
-                                 .offers = HycoBodiesOffers,
-                                 .work = HycoBodiesOperations,
-                                 .variants = HycoBodiesVariants,
-                                 .setvariant = HycoBodiesSetVariant,
-                                 .setup = SetUp,
+  static const HycoROMOps ops = {.setup = SetUp,
                                  .reset = Reset,
                                  .solve = Solve,
                                  .features = Features,

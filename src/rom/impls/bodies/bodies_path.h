@@ -3,7 +3,6 @@
 #define BODIES_PATH_H
 
 #include <hycobodies.h>
-#include <hycoinelasticpoints.h>
 #include <hycopath.h>
 
 typedef struct _n_HycoBodiesPath {

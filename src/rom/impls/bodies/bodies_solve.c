@@ -87,7 +87,7 @@ PetscErrorCode HycoBodiesWeights(HycoSubstructures b, PetscInt k, const PetscRea
 
   PetscFunctionBegin;
   for (PetscInt p = 0; p < b->n_theta; p++) at[p] = b->logarithm[p] ? PetscLogReal(mu[b->theta[p]]) : mu[b->theta[p]];
-  PetscCall(HycoTensorWeights(&b->body[k].tensor, at, -1, -1, weight));
+  PetscCall(HycoTensorWeights(&b->body[k].tensor, at, weight));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -4,7 +4,7 @@
   that it is a polynomial too, determined by its values at few parameter values without the cells of the RID. Training
   finds the degrees, checks them, and stores the values in the file (affine_fit.c).
 */
-#include "table.h"
+#include <hycotable.h>
 #include <petsc/private/petscimpl.h> /* PetscObjectStateIncrease() */
 #include <petscviewer.h>
 
@@ -86,7 +86,7 @@ PetscErrorCode HycoTableFill(HycoROM m, const PetscReal mu[])
   HycoCheck(n == g->model->table->values.rows,
             "%s: the table of the reduced stiffness has %d entries, the matrix %d: train the model again",
             m->model->path, (int)g->model->table->values.rows, (int)n);
-  PetscCall(HycoGridFieldEvaluate(&g->model->table->values, mu, -1, -1, a));
+  PetscCall(HycoGridFieldEvaluate(&g->model->table->values, mu, a));
   PetscCall(PetscObjectStateIncrease((PetscObject)g->Kr));
   PetscCall(MatAssemblyBegin(g->Kr, MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(g->Kr, MAT_FINAL_ASSEMBLY));

@@ -9,7 +9,7 @@
   one, with these as equations, and the matrix is sparse.) reduced_system.c fills the system.
 */
 #include <hycoalgorithms.h>
-#include "table.h"
+#include <hycotable.h>
 #include <petscblaslapack.h>
 
 /* With more unknowns the reduced matrix is stored sparse (with a dense border of l modes). */
@@ -95,9 +95,8 @@ PetscErrorCode HycoGalerkinSetUp(HycoROM m)
   PetscCall(HycoGalerkinCreateOwn(m));
   PetscCall(HycoFECreate(m->model->scene, g->own->dm, &m->fe));
   PetscCall(CountUnknowns(m));
-  dense =
-      (PetscBool)((m->n <= HYCO_DENSE_MAX && !g->bordered) ||
-                  ((g->model->symmetric || g->model->stiffness) && !m->model->n_fe) || (g->model->G && !g->bordered));
+  dense = (PetscBool)((m->n <= HYCO_DENSE_MAX && !g->bordered) || (g->model->symmetric && !m->model->n_fe) ||
+                      (g->model->G && !g->bordered));
   if (!g->model->table) PetscCall(HycoFECreateMatrix(m->fe, PETSC_COMM_SELF, g->own->n_nodes, 0, &g->K));
   PetscCall(VecCreateSeq(PETSC_COMM_SELF, m->fe->n_dof, &g->F));
   PetscCall(g->model->table && !dense ? HycoTableCreateSparse(m) : CreateReduced(m->n, m->n, dense, 0, &g->Kr));

@@ -1,5 +1,5 @@
 /* The data of hybrid and projection-based models in the model file, and their description. */
-#include "table.h"
+#include <hycotable.h>
 #include <petscviewer.h>
 
 /* The result of the scan: absent, and then not written either, in models that were not scanned. */

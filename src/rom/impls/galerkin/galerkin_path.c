@@ -28,10 +28,6 @@ static PetscErrorCode Stiffness(HycoPath p)
   HycoGalerkin g = (HycoGalerkin)m->work;
 
   PetscFunctionBegin;
-  if (g->model->stiffness) {
-    HycoLogged(HYCO_EVENT_REDUCE, (*g->model->stiffness)(m));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
   PetscCall(HycoFEAssembleStiffness(m->fe, g->K));
   if (!g->reduced) PetscCall(HycoFEAssembleStiffness(m->fe, g->K));
   HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillStiffness(m));
@@ -50,7 +46,6 @@ static PetscErrorCode Loads(HycoPath p)
   HycoLogged(HYCO_EVENT_FORCE, HycoFEAssembleForce(m->fe, g->F));
   m->fe->lifted = lifted;
   HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillVectors(m));
-  if (g->model->add_loads) HycoLogged(HYCO_EVENT_REDUCE, (*g->model->add_loads)(m));
   PetscCall(VecCopy(g->Fr, p->F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -66,11 +61,11 @@ static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elast
   PetscFunctionBegin;
   PetscCall(HycoFESetParameters(fe, mu));
   PetscCall(HycoGalerkinCreateSets(m));
-  fe->ready = PETSC_FALSE;                                /* until everything that depends on it is assembled */
-  g->path->moved = (PetscBool)(g->model->forces != NULL); /* their loads include all effects of supports */
+  fe->ready = PETSC_FALSE; /* until everything that depends on it is assembled */
+  g->path->moved = PETSC_FALSE;
   m->beyond_current = PETSC_FALSE;
   if (fe->stiffness_changed && (elastic || !p->n_taken)) PetscCall(Stiffness(p)); /* the first is the elastic one */
-  if (!g->model->forces) PetscCall(HycoLinearForceSet(g->path->linear, fe->stiffness_changed));
+  PetscCall(HycoLinearForceSet(g->path->linear, fe->stiffness_changed));
   if (fe->contact_changed) g->current_B = PETSC_FALSE;
   if (fe->contact_changed || fe->gap_changed) HycoLogged(HYCO_EVENT_CONTACT, HycoGalerkinOwnRows(m));
   if (m->n_L && fe->contact_changed) HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillContact(m));
@@ -109,13 +104,9 @@ static PetscErrorCode Step(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tan
   PetscCall(HycoFEStepBodies(m->fe, HYCO_BODIES_FLOWING, q->u, t0, t1, p->begin, p->end, p->f_local, tangent, report));
   report->has_potential = PETSC_FALSE;
   if (report->failed) PetscFunctionReturn(PETSC_SUCCESS);
-  if (((HycoGalerkin)m->work)->model->forces)
-    PetscCall((*((HycoGalerkin)m->work)->model->forces)(m, p->end, p->f_int, &p->summands));
-  else {
-    HycoLinearForceAdd(q->linear, q->u, p->f_local);
-    HycoFEPassTied(m->fe, p->f_local);
-    PetscCall(HycoReducedTest(m, p->f_local, p->f_int));
-  }
+  HycoLinearForceAdd(q->linear, q->u, p->f_local);
+  HycoFEPassTied(m->fe, p->f_local);
+  PetscCall(HycoReducedTest(m, p->f_local, p->f_int));
   PetscCall(VecWAXPY(p->r, -1, p->f_int, p->F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -130,7 +121,6 @@ static PetscErrorCode Moves(HycoPath p, Vec rhs)
   PetscBool moved;
 
   PetscFunctionBegin;
-  if (g->model->forces) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoPathMoves(p, g->path->u, g->F, &moved));
   g->path->moved = PETSC_TRUE;
   if (!moved) PetscFunctionReturn(PETSC_SUCCESS);
@@ -266,7 +256,7 @@ PetscErrorCode HycoGalerkinPathCreate(HycoROM m)
   PetscCall(HycoPathSetUp(p));
   PetscCall(HycoSolverSetRefine(m->solver, PETSC_FALSE));
   PetscCall(PetscMalloc2(m->fe->n_dof, &g->path->held, m->fe->n_dof, &g->path->u));
-  if (!g->model->forces) PetscCall(CreateLinear(m));
+  PetscCall(CreateLinear(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

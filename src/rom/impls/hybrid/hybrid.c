@@ -1,28 +1,8 @@
 /* The hybrid hyper-reduced model (38)-(41): the reduced system with the finite-element multipliers of the RID's
    contacts. */
-#include "hybrid.h"
+#include <hycohybrid.h>
 #include <hycoromtypes.h>
 #include <petscviewer.h>
-
-/* The default type. */
-static PetscBool Offers(HycoReducer t, PetscBool targets, size_t length, char why[])
-{
-  (void)t, (void)targets, (void)length, (void)why;
-  return PETSC_TRUE;
-}
-
-static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
-{
-  PetscFunctionBegin;
-  (void)t, (void)m;
-  snprintf(r->summary, sizeof(r->summary),
-           "%d snapshots; modes: %d displacement, %d stress, %d force, %d dual\n"
-           "RID: %d elements (%.1f %%), %d nodes, %d in A, %d contacts; %d full-order displacements\n",
-           (int)r->n_samples, (int)r->n_modes, (int)r->n_stress_modes, (int)r->n_force_modes, (int)r->n_dual_modes,
-           (int)r->rid_elements, 100 * (double)r->rid_fraction, (int)r->rid_nodes, (int)r->rid_a_nodes,
-           (int)r->rid_contacts, (int)r->n_fe_dofs);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 static PetscErrorCode SetFromOptions(HycoROM m)
 {
@@ -112,13 +92,7 @@ PetscErrorCode HycoROMCreate_Hybrid(HycoROM m)
                                        .resultants = PETSC_TRUE,
                                        .history = PETSC_TRUE,
                                        .integrals = PETSC_TRUE};
-  static const HycoROMOps ops = {.setfromoptions = HycoHybridSetFromOptions,
-                                 .build = HycoHybridBuild,
-                                 .finish = HycoGalerkinFinish,
-                                 .report = Report,
-                                 .cost = HycoGalerkinCost,
-                                 .offers = Offers,
-                                 .options = SetFromOptions,
+  static const HycoROMOps ops = {.options = SetFromOptions,
                                  .setup = HycoGalerkinSetUp,
                                  .reset = Reset,
                                  .solve = HycoGalerkinSolve,

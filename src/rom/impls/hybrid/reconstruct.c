@@ -5,7 +5,7 @@
   selects one close to the least norm.
 */
 #include <hycoalgorithms.h>
-#include "hybrid.h"
+#include <hycohybrid.h>
 
 const char *const HycoReconstructSolvers[] = {"auto", "nnls", "tao", NULL};
 enum { SOLVER_AUTO, SOLVER_NNLS, SOLVER_TAO };

@@ -394,29 +394,3 @@ void HycoSolverGetCondensed(HycoSolver s, PetscInt *m, PetscInt *p, const PetscR
   *p = d->p;
   *S = d->S;
 }
-
-/* Borrowed until the next solve: S by columns, m x m, on every rank. */
-PetscErrorCode HycoSolverGetFlexibility(HycoSolver s, PetscInt *m, const PetscReal *S[])
-{
-  HycoSolverForm form;
-  const Dual *d;
-
-  PetscFunctionBegin;
-  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
-  PetscCheck(!s->iterative, HycoComm(s), HYCO_ERR_NO_MODEL,
-             "the flexibility B K^-1 B^T needs a factor of the stiffness, and the solver chose iterations%s; allow "
-             "more memory (-hyco_memory), or use -hyco_linear direct",
-             s->why_iterative);
-  form = HycoSolverFindForm(s, "dual");
-  d = (const Dual *)form->data;
-  PetscCheck(!d->p, HycoComm(s), HYCO_ERR_NO_MODEL,
-             "a body is held by contact only, so that K^-1 does not exist and there is no flexibility B K^-1 B^T; add "
-             "a support");
-  PetscCheck(
-      d->S && s->stiffness.of.K && s->stiffness.of.B && s->reason != HYCO_DIVERGED_SINGULAR, HycoComm(s),
-      HYCO_ERR_NO_MODEL,
-      "the stiffness is singular, so that there is no flexibility B K^-1 B^T; check that supports hold every body");
-  *m = d->m;
-  *S = d->S;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}

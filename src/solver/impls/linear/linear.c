@@ -96,21 +96,3 @@ PetscErrorCode HycoSolverFormCreate_Linear(HycoSolver s, HycoSolverForm form)
   *form->ops = (struct _HycoSolverFormOps){.accepts = Accepts, .setup = SetUp, .solve = Solve, .destroy = Destroy};
   PetscFunctionReturn(PETSC_SUCCESS);
 }
-
-/* K^-1 r for k vectors, with the factor of the last solve in the dual form. Collective. */
-PetscErrorCode HycoSolverApplyInverse(HycoSolver s, PetscInt k, Vec r[], Vec x[])
-{
-  PetscInt p;
-
-  PetscFunctionBegin;
-  HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
-  PetscCheck(!s->iterative, HycoComm(s), HYCO_ERR_NO_MODEL,
-             "a condensed model needs a factor of the stiffness, and the solver chose iterations%s; allow more memory "
-             "(-hyco_memory), or use -hyco_linear direct",
-             s->why_iterative);
-  PetscCall(HycoKernelSize(s->system->K, &p));
-  PetscCheck(s->stiffness.direct && s->stiffness.of.K && !p, HycoComm(s), PETSC_ERR_ORDER,
-             "call HycoSolverSolve() in the dual form on a regular, sparse K first");
-  PetscCall(HycoDirectSolveMany(s->stiffness.direct, k, r, x));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}

@@ -1,0 +1,131 @@
+/* The training of models of bodies: how parameters enter the bodies, samples, loads, fields, inelastic modes. */
+#ifndef HYCOBODIESTRAINING_H
+#define HYCOBODIESTRAINING_H
+
+#include <hycobodies.h>
+#include <hycoreducerimpl.h>
+
+/* How a parameter enters a body: the sum of these. */
+enum {
+  HYCO_ENTERS_LOADS = 1,  /* loads, prescribed displacements */
+  HYCO_ENTERS_FACTOR = 2, /* one factor of the stiffness */
+  HYCO_ENTERS_PLACE = 4,  /* a rigid motion or a mirror */
+  HYCO_ENTERS_SIZE = 8,   /* a uniform scaling */
+  HYCO_ENTERS_SHAPE = 16  /* anything else that changes the stiffness */
+};
+
+/* The bodies of a mesh, and how each parameter enters each; on every rank. */
+typedef struct {
+  PetscInt n, n_parameters;
+  char (*name)[64];    /* of the scene's bodies in it: "block", "block + plate" */
+  PetscInt *of;        /* by node of the process's part: its body */
+  PetscInt *enters;    /* n x n_parameters */
+  PetscBool *together; /* by body: similar to itself where all other parameters change at once */
+} HycoBodyParts;
+
+/* Finds them by evaluation at points of the ranges, with changes from the point mu; leaves fom's element loop without
+   parameters. Collective. */
+PetscErrorCode HycoBodyPartsFind(HycoFOM fom, const PetscReal mu[], HycoBodyParts *parts);
+PetscErrorCode HycoBodyPartsDestroy(HycoBodyParts *parts);
+/* "place: moves body cylinder rigidly; modulus: scales body block; nothing needs a sample" */
+PetscErrorCode HycoBodyPartsDescribe(HycoScene scene, const HycoBodyParts *parts, char text[HYCO_LINE]);
+/* The number of parameters that change the shape of some body (of body b; b < 0: of any), and which. */
+PetscInt HycoBodyPartsShapes(const HycoBodyParts *parts, PetscInt b, PetscInt parameter[]);
+/* The first body that is not similar to itself at the same values of these; -1: none. */
+PetscInt HycoBodyPartsFail(const HycoBodyParts *parts);
+
+/* K condensed at a point of theta: the blocks of all bodies, in their order. Rank 0. */
+typedef struct {
+  PetscReal *theta;            /* n_theta, on every rank */
+  PetscReal *C, *R, *Z, *work; /* n x n by body; ns x r; ns x p; p x r */
+} HycoBodiesRecord;
+
+/* How laws in few cells give the coefficients of the inelastic forces. */
+enum { HYCO_BODIES_AUTO, HYCO_BODIES_INTERPOLATION, HYCO_BODIES_CUBATURE };
+
+/* Training: options and the data of a run. */
+typedef struct {
+  PetscReal pod_tol, tol, inelastic_tol, cubature_tol;
+  PetscInt samples, most_samples, cells, laws; /* laws: how they are evaluated in few cells */
+  PetscBool named;                             /* by an option */
+  HycoBasis strains;                           /* modes of the inelastic forces; V is NULL without a history */
+  HycoBodyParts parts;
+  HycoSubstructures bodies; /* complete on rank 0 */
+  PetscBool filled;         /* modes are still many for the largest number of samples */
+} * HycoBodiesTraining;
+
+static inline HycoBodiesTraining HycoTrainingOfBodies(HycoReducer t)
+{
+  return (HycoBodiesTraining)t->training;
+}
+
+/* The factor of K at a point of theta with the unknowns of the surfaces last. Every rank. */
+typedef struct {
+  HycoFOM fom;
+  Mat N;             /* selects them */
+  HycoDirect direct; /* the present factor, borrowed from: */
+  PetscInt n_kept;
+  struct {
+    HycoDirect direct;
+    PetscReal *theta;
+  } * kept;
+  PetscReal bytes;  /* of one */
+  PetscReal *theta; /* of the present factor */
+  PetscInt *pins;   /* of the first factor */
+  PetscReal *z;     /* p + ns */
+  PetscInt n_basis;
+  Vec *basis; /* of the turned loads, orthonormal */
+  PetscInt n_strains;
+  Vec *strain; /* K^-1 times the modes of the inelastic forces */
+  PetscInt n_records;
+  HycoBodiesRecord *record;
+  PetscReal *score;   /* by cell of the part */
+  PetscReal *moved;   /* by unknown of the part: largest sampled displacement */
+  PetscBool *known;   /* by unknown of the part: on the surfaces; */
+  PetscBool *bare;    /* the same: no mode has it, because the model's mesh does */
+  PetscBool *in_mesh; /* ns: the model's mesh has its node, whatever its cells */
+  PetscInt *row;      /* of the unknowns inside in the distributed vectors */
+} HycoBodiesFactor;
+
+/* Whether the model has modes of inelastic forces; bodies without a history, or with friction, are elastic. */
+static inline PetscBool HycoBodiesFlow(HycoReducer t)
+{
+  return (PetscBool)(t->scene->n_times && !HycoSceneHasFriction(t->scene));
+}
+PetscErrorCode HycoBodiesBegin(HycoReducer reducer);
+PetscErrorCode HycoBodiesModes(HycoReducer reducer, HycoSnapshots store);
+/* Operations of the training, after HycoBodiesBegin(); whether a search tries the type. */
+PetscReal HycoBodiesOperations(HycoReducer reducer);
+PetscBool HycoBodiesOffers(HycoReducer reducer, PetscBool targets, size_t length, char why[]);
+/* Factors K at theta, unless it is the present factor. Collective. */
+PetscErrorCode HycoBodiesRefactor(HycoReducer reducer, HycoBodiesFactor *factor, const PetscReal theta[]);
+/* The number of the record at theta, condensed if there is none. Collective. */
+PetscErrorCode HycoBodiesCondense(HycoReducer reducer, HycoBodiesFactor *factor, const PetscReal theta[],
+                                  PetscInt *record);
+/* The basis of the loads and the cells by which they are evaluated. Collective. */
+PetscErrorCode HycoBodiesLoads(HycoReducer reducer, HycoBodiesFactor *factor);
+/* The values of theta and the bodies' samples there. Collective. */
+PetscErrorCode HycoBodiesSample(HycoReducer reducer, HycoBodiesFactor *factor);
+/* Raises factor->score by the stresses of the displacements u (n_dof of the part, without prescribed ones) relative to
+   the largest in their body. Collective. */
+PetscErrorCode HycoBodiesAddScores(HycoReducer reducer, HycoBodiesFactor *factor, const PetscReal u[]);
+/* The cells whose displacements are exact: t->seeds_cell, the unknowns inside, factor->known and row. Collective. */
+PetscErrorCode HycoBodiesChooseCells(HycoReducer reducer, HycoBodiesFactor *factor);
+/* The modes, as t->V, and H, a, g. Collective. */
+PetscErrorCode HycoBodiesFields(HycoReducer reducer, HycoSnapshots store, HycoBodiesFactor *factor);
+/* For n loads F: the displacements of the surfaces without contact (ns x n), and the work on the motions (p x n).
+   Collective. */
+PetscErrorCode HycoBodiesReduce(HycoSubstructures bodies, HycoBodiesFactor *factor, PetscInt n, const Vec F[],
+                                PetscReal u[], PetscReal work[]);
+/* Before the factor: modes of inelastic forces. After the samples: the cells of the model, and what the modes displace.
+   Collective. */
+PetscErrorCode HycoBodiesStrainModes(HycoReducer reducer, HycoSnapshots store);
+PetscErrorCode HycoBodiesStrains(HycoReducer reducer, HycoBodiesFactor *factor);
+/* Refuses scenes with a history that the model does not represent. Collective. */
+PetscErrorCode HycoBodiesCheckPath(HycoReducer reducer);
+/* theta of node k of the grid of all values, exactly as it was condensed. */
+void HycoBodiesPoint(HycoReducer reducer, PetscInt k, PetscReal theta[]);
+/* Which sample of a body node k of the grid of all values is, -1: none. */
+PetscInt HycoBodiesSampleOf(HycoSubstructures bodies, PetscInt body, PetscInt k);
+
+#endif

@@ -1,0 +1,299 @@
+/*
+  The cells in which a model of bodies has displacements, and so stresses, without modes: a row of H, a and g for each
+  unknown. First those that the scene's outputs need, output by output, then those with the largest stresses at the
+  sampled contact problems, as many as there is room for.
+*/
+#include <hycobodiestraining.h>
+#include <hycofields.h>
+#include <hycoquantities.h>
+
+#define MOST_INNER   2400 /* unknowns: a row and a solve each */
+#define MOST_NUMBERS 6e6  /* of their rows in the file */
+#define LEAST_SCORE  0.1
+
+PetscErrorCode HycoBodiesAddScores(HycoReducer t, HycoBodiesFactor *factor, const PetscReal u[])
+{
+  HycoFE fe = factor->fom->fe;
+  HycoMesh m = fe->mesh;
+  const HycoBodyParts *parts = &HycoTrainingOfBodies(t)->parts;
+  PetscReal *all, *sigma, *mises, *principal, *most;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc5(fe->n_dof, &all, m->n_cells * fe->n_sigma, &sigma, m->n_cells, &mises, 3 * m->n_cells,
+                         &principal, parts->n, &most));
+  for (PetscInt i = 0; i < fe->n_dof; i++) {
+    all[i] = fe->fixed[i] ? fe->u0[i] : u[i];
+    factor->moved[i] = PetscMax(factor->moved[i], PetscAbsReal(u[i]));
+  }
+  HycoFEComplete(fe, all);
+  HycoOnEach(HycoComm(t), HycoFEStress(fe, all, sigma));
+  PetscCall(HycoStressInvariants(m->n_cells, fe->dim, sigma, mises, principal));
+  PetscCall(PetscArrayzero(most, parts->n));
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    PetscReal *own = &most[parts->of[m->cells[e * m->nv]]];
+
+    for (PetscInt k = 0; k < m->nv * fe->dim; k++) { /* of other prescribed displacements at other points */
+      const PetscInt i = m->cells[e * m->nv + k / fe->dim] * fe->dim + k % fe->dim;
+
+      if (fe->fixed[i] && fe->u0[i] != 0) mises[e] = 0;
+    }
+    *own = PetscMax(*own, mises[e]);
+  }
+  HycoAllreduce(most, parts->n, MPIU_REAL, MPI_MAX, HycoComm(t));
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    const PetscReal own = most[parts->of[m->cells[e * m->nv]]];
+
+    if (own > 0) factor->score[e] = PetscMax(factor->score[e], mises[e] / own);
+  }
+  PetscCall(PetscFree5(all, sigma, mises, principal, most));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* inner[n_dof]: the free unknowns of the cells in[] that are not on the surfaces; *fits: there is room for their rows.
+   Collective. */
+static PetscErrorCode MarkInner(HycoReducer t, HycoBodiesFactor *factor, const PetscBool in[], PetscBool inner[],
+                                PetscBool *fits)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  HycoFE fe = factor->fom->fe;
+  HycoMesh m = fe->mesh;
+  PetscReal *n, rows = 0, numbers = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(b->n, &n));
+  PetscCall(PetscArrayzero(inner, fe->n_dof));
+  for (PetscInt k = 0; k < m->n_cells * m->nv * fe->dim; k++) {
+    const PetscInt i = m->cells[k / fe->dim] * fe->dim + k % fe->dim;
+
+    if (!in[k / (m->nv * fe->dim)] || inner[i] || fe->fixed[i] || factor->known[i]) continue;
+    inner[i] = PETSC_TRUE;
+    if (HycoMeshOwned(m, i / fe->dim) >= 0) n[HycoTrainingOfBodies(t)->parts.of[i / fe->dim]]++;
+  }
+  HycoAllreduce(n, b->n, MPIU_REAL, MPI_SUM, HycoComm(t));
+  for (PetscInt k = 0; k < b->n; k++) {
+    rows += n[k];
+    numbers += n[k] * b->body[k].n * b->body[k].n_samples;
+  }
+  *fits = (PetscBool)(rows <= MOST_INNER && numbers <= MOST_NUMBERS);
+  PetscCall(PetscFree(n));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Joins more[] to in[], if there is room. Collective. */
+static PetscErrorCode Join(HycoReducer t, HycoBodiesFactor *factor, PetscBool in[], PetscBool more[], PetscBool inner[],
+                           PetscBool *fits)
+{
+  const PetscInt n = factor->fom->part->n_cells;
+
+  PetscFunctionBegin;
+  for (PetscInt e = 0; e < n; e++) more[e] = (PetscBool)(more[e] || in[e]);
+  PetscCall(MarkInner(t, factor, more, inner, fits));
+  if (*fits) PetscCall(PetscArraycpy(in, more, n));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The cells of this rank's part. Collective. */
+static PetscErrorCode Choose(HycoReducer t, HycoBodiesFactor *factor, PetscBool in[], PetscBool inner[])
+{
+  HycoMesh m = factor->fom->part;
+  PetscBool *more, fits = PETSC_TRUE;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(m->n_cells + 1, &more));
+  for (PetscInt k = 0; k < t->scene->n_quantities; k++) {
+    HycoOnEach(HycoComm(t), HycoQuantityMarkCells(t->scene, m, k, more));
+    PetscCall(Join(t, factor, in, more, inner, &fits));
+  }
+  fits = PETSC_TRUE;
+  for (PetscReal least = 0.9; fits && least > LEAST_SCORE; least -= 0.1) {
+    for (PetscInt e = 0; e < m->n_cells; e++) more[e] = (PetscBool)(factor->score[e] > least);
+    PetscCall(Join(t, factor, in, more, inner, &fits));
+  }
+  PetscCall(PetscFree(more));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The numbers of all ranks, n of this one: *all, *n_all. Collective. */
+static PetscErrorCode GatherAll(MPI_Comm comm, PetscInt n, const PetscInt own[], PetscInt *n_all, PetscInt **all)
+{
+  PetscMPIInt size, mine, *count, *first;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  PetscCall(PetscMPIIntCast(n, &mine));
+  PetscCall(PetscMalloc2(size, &count, size + 1, &first));
+  PetscCallMPI(MPI_Allgather(&mine, 1, MPI_INT, count, 1, MPI_INT, comm));
+  first[0] = 0;
+  for (PetscMPIInt k = 0; k < size; k++) first[k + 1] = first[k] + count[k];
+  *n_all = first[size];
+  PetscCall(PetscMalloc1(*n_all + 1, all));
+  PetscCallMPI(MPI_Allgatherv(own, mine, MPIU_INT, *all, count, first, MPIU_INT, comm));
+  PetscCall(PetscFree2(count, first));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* t->seeds_cell: the cells of all ranks, ascending, at least one; in[]: those of this rank's part. Collective. */
+static PetscErrorCode ShareCells(HycoReducer t, HycoMesh m, PetscBool in[])
+{
+  PetscInt *own, n = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(m->n_cells + 1, &own));
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    if (in[e]) own[n++] = m->cell_whole ? m->cell_whole[e] : e;
+  }
+  PetscCall(PetscFree(t->seeds_cell));
+  PetscCall(GatherAll(HycoComm(t), n, own, &t->n_seeds_cell, &t->seeds_cell));
+  if (!t->n_seeds_cell) t->seeds_cell[t->n_seeds_cell++] = 0;
+  PetscCall(PetscSortRemoveDupsInt(&t->n_seeds_cell, t->seeds_cell));
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    PetscInt at;
+
+    PetscCall(PetscFindInt(m->cell_whole ? m->cell_whole[e] : e, t->n_seeds_cell, t->seeds_cell, &at));
+    in[e] = (PetscBool)(at >= 0);
+  }
+  PetscCall(PetscFree(own));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* b->inner by body, and factor->row, from the marked unknowns. Collective. */
+static PetscErrorCode List(HycoReducer t, HycoBodiesFactor *factor, const PetscBool inner[])
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  HycoMesh m = factor->fom->part;
+  PetscInt *own, *all, *dof, *at, n = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(3 * m->n_owned * b->dim + 1, &own));
+  for (PetscInt i = 0; i < m->n_nodes * b->dim; i++) {
+    const PetscInt node = i / b->dim, place = HycoMeshOwned(m, node);
+
+    if (!inner[i] || place < 0) continue;
+    own[n++] = (m->node_whole ? m->node_whole[node] : node) * b->dim + i % b->dim;
+    own[n++] = HycoTrainingOfBodies(t)->parts.of[node];
+    own[n++] = (m->first + place) * b->dim + i % b->dim;
+  }
+  PetscCall(GatherAll(HycoComm(t), n, own, &n, &all));
+  n /= 3;
+  HycoFreeAll(&b->inner_start, &b->inner, &factor->row);
+  PetscCall(PetscMalloc2(n + 1, &dof, n + 1, &at));
+  PetscCall(PetscMalloc1(n + 1, &b->inner));
+  PetscCall(PetscMalloc1(n + 1, &factor->row));
+  PetscCall(PetscCalloc1(b->n + 1, &b->inner_start));
+  for (PetscInt k = 0; k < n; k++) {
+    dof[k] = all[3 * k];
+    at[k] = k;
+  }
+  PetscCall(PetscSortIntWithArray(n, dof, at));
+  b->ni = 0;
+  for (PetscInt k = 0; k < b->n; k++) {
+    for (PetscInt i = 0; i < n; i++) {
+      if (all[3 * at[i] + 1] != k) continue;
+      b->inner[b->ni] = dof[i];
+      factor->row[b->ni++] = all[3 * at[i] + 2];
+    }
+    b->inner_start[k + 1] = b->ni;
+    b->body[k].m = b->inner_start[k + 1] - b->inner_start[k];
+  }
+  PetscCall(PetscFree2(dof, at));
+  PetscCall(PetscFree(own));
+  PetscCall(PetscFree(all));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* known[]: the unknowns of the surfaces in this rank's part; bare[]: those that the model's mesh has with its contacts.
+   The others, of masters that no slave meets, have modes outside the chosen cells. */
+static PetscErrorCode MarkSurfaces(HycoReducer t, HycoBodiesFactor *factor)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  HycoMesh m = factor->fom->part;
+  PetscInt *sorted, *place;
+
+  PetscFunctionBegin;
+  HycoDuplicate(b->ns + 1, b->dof, &sorted);
+  PetscCall(PetscMalloc1(b->ns + 1, &place));
+  for (PetscInt k = 0; k < b->ns; k++) place[k] = k;
+  PetscCall(PetscSortIntWithArray(b->ns, sorted, place));
+  for (PetscInt i = 0; i < m->n_nodes * b->dim; i++) {
+    const PetscInt node = m->node_whole ? m->node_whole[i / b->dim] : i / b->dim;
+    PetscInt at;
+
+    PetscCall(PetscFindInt(node * b->dim + i % b->dim, b->ns, sorted, &at));
+    factor->known[i] = (PetscBool)(at >= 0);
+    factor->bare[i] = (PetscBool)(at >= 0 && factor->in_mesh[place[at]]);
+  }
+  PetscCall(PetscFree(place));
+  PetscCall(PetscFree(sorted));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* bare[]: also the unknowns of the surfaces in the cells in[], which the model's mesh has. */
+static void MarkBare(HycoBodiesFactor *factor, const PetscBool in[])
+{
+  HycoMesh m = factor->fom->part;
+  const PetscInt dim = factor->fom->fe->dim, n = m->nv * dim;
+
+  for (PetscInt k = 0; k < m->n_cells * n; k++) {
+    const PetscInt i = m->cells[k / dim] * dim + k % dim;
+
+    if (in[k / n] && factor->known[i]) factor->bare[i] = PETSC_TRUE;
+  }
+}
+
+/* Whether an unknown is left to the modes. Collective. */
+static PetscErrorCode AnyLeft(HycoReducer t, HycoFE fe, const PetscBool bare[], const PetscBool inner[], PetscBool *any)
+{
+  PetscFunctionBegin;
+  *any = PETSC_FALSE;
+  for (PetscInt i = 0; i < fe->n_dof; i++) *any = (PetscBool)(*any || !(fe->fixed[i] || bare[i] || inner[i]));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, any, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(t)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Leaves a node to the modes, of which a model has one at least: that which moves most. It is exact too, because its
+   modes are all of its displacements. *released: there is one. Collective. */
+static PetscErrorCode Release(HycoReducer t, HycoBodiesFactor *factor, PetscBool inner[], PetscBool *released)
+{
+  HycoMesh m = factor->fom->part;
+  const PetscInt dim = factor->fom->fe->dim;
+  PetscReal most = 0;
+  PetscInt node = PETSC_MAX_INT;
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < m->n_nodes * dim; i++) most = PetscMax(most, inner[i] ? factor->moved[i] : 0);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_REAL, MPI_MAX, HycoComm(t)));
+  for (PetscInt i = 0; i < m->n_nodes * dim && most > 0; i++) {
+    if (inner[i] && factor->moved[i] >= most * (1 - 1e-6))
+      node = PetscMin(node, m->node_whole ? m->node_whole[i / dim] : i / dim);
+  }
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &node, 1, MPIU_INT, MPI_MIN, HycoComm(t)));
+  for (PetscInt i = 0; i < m->n_nodes * dim; i++)
+    inner[i] = (PetscBool)(inner[i] && (m->node_whole ? m->node_whole[i / dim] : i / dim) != node);
+  *released = (PetscBool)(node < PETSC_MAX_INT);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBodiesChooseCells(HycoReducer t, HycoBodiesFactor *factor)
+{
+  HycoFE fe = factor->fom->fe;
+  PetscBool *in, *inner, fits, left, released = PETSC_TRUE;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(factor->fom->part->n_cells + 1, &in));
+  PetscCall(PetscMalloc1(fe->n_dof + 1, &inner));
+  PetscCall(MarkSurfaces(t, factor));
+  PetscCall(Choose(t, factor, in, inner));
+  PetscCall(ShareCells(t, factor->fom->part, in));
+  PetscCall(MarkInner(t, factor, in, inner, &fits));
+  MarkBare(factor, in);
+  PetscCall(AnyLeft(t, fe, factor->bare, inner, &left));
+  if (!fits) PetscCall(PetscArrayzero(inner, fe->n_dof)); /* of the cell that stands for none */
+  if (fits && !left) PetscCall(Release(t, factor, inner, &released));
+  if (!released) PetscCall(PetscArrayzero(factor->known, fe->n_dof));
+  if (!released) PetscCall(PetscArrayzero(factor->bare, fe->n_dof));
+  PetscCall(List(t, factor, inner));
+  for (PetscInt i = 0; i < fe->n_dof; i++) factor->bare[i] = (PetscBool)(factor->bare[i] || inner[i]);
+  PetscCall(PetscFree(inner));
+  PetscCall(PetscFree(in));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

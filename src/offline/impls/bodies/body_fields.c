@@ -1,0 +1,840 @@
+/*
+  Displacements inside the bodies: modes of their own solutions. The contact problem is solved on the surfaces at points
+  of the ranges, which costs no full-order solution; the displacements of each body under these forces and loads, in all
+  its turns, give its modes by POD; their coefficients are exact for any forces and loads, because H = N K^-1 V comes
+  from a solve for each mode. On the surfaces the model has the displacements themselves.
+*/
+#include <hycoalgorithms.h>
+#include <hycobodiestraining.h>
+#include <petscblaslapack.h>
+
+#define MOST_NUMBERS 6e7  /* entries of the sampled displacements on all ranks */
+#define LEAST        20   /* samples */
+#define MOST_COLUMNS 600  /* of training paths */
+#define FULL         0.5  /* modes for each sample: with more of them the samples do not show all displacements */
+#define DOUBLINGS    4    /* of the samples then */
+#define SPREAD       3    /* nodes of theta at which the displacements of each are computed */
+#define SMALL        1e-7 /* of the largest sample: smaller ones count as much as this */
+#define SCORED       24   /* displacements at all nodes of theta whose stresses show which cells matter */
+#define MANY         64   /* right-hand sides at once */
+#define SEEN         4    /* times of a path with friction whose forces are samples */
+#define CHECKS       32   /* points at which the displacements that the modes miss are measured, no samples */
+
+/* Samples: the loads' coefficients and the surfaces' forces, a column each; the last n_checks are
+   checks. */
+typedef struct {
+  PetscInt n, n_checks;
+  PetscReal *c, *f;       /* r x n, ns x n column major */
+  PetscInt tried;         /* points, solved or not: a larger set begins with them */
+  PetscInt expanded, n_U; /* samples whose displacements U has, n_U columns of this rank's part */
+  PetscReal *U;
+} Sampled;
+
+/* -- forces -- */
+
+/* One point: *solved if its contact problem is. Rank 0. */
+static PetscErrorCode SolveOne(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal mu[], PetscReal Lambda[],
+                               PetscBool *solved)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoFESetParameters(s->fe, mu));
+  PetscCall(HycoRowsFill(s->fe, s->pairs, s->rows));
+  PetscCall(HycoBodiesSolve(o, s, mu, Lambda, solved));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A share for point k of a sequence: irregular, and any. */
+static PetscReal SomeShare(PetscInt k)
+{
+  const PetscReal share = (k + 1) * 0.6180339887;
+
+  return share - (PetscInt)share;
+}
+
+/* A path with friction at mu: the forces at some of its times are samples. It takes the steps between the stops of the
+   history, and ends where one has no solution. Rank 0. */
+static PetscErrorCode SolvePath(HycoBodiesFriction f, HycoBodiesWork o, HycoScene scene, HycoFE fe, PetscInt k,
+                                const PetscReal mu[], Sampled *sampled, PetscBool *solved)
+{
+  const HycoSubstructures b = o->bodies;
+  const PetscReal first = scene->times[0], last = scene->times[scene->n_times - 1];
+  PetscReal t = first;
+  PetscInt seen = 0, its;
+  HycoKKT kkt;
+
+  PetscFunctionBegin;
+  PetscCall(HycoBodiesFrictionBegin(f));
+  for (PetscInt step = 0; t <= last; step++) {
+    PetscReal all[HYCO_MAX_PARAMETERS];
+
+    HycoSceneSetTime(scene, mu, t, all);
+    PetscCall(HycoFESetParameters(fe, all));
+    PetscCall(HycoBodiesFrictionPrepare(f, o, all));
+    PetscCall(HycoBodiesFrictionSolve(f, o, &kkt, &its, solved));
+    if (!*solved) break;
+    PetscCall(HycoBodiesFrictionAccept(f));
+    if (t >= first + (last - first) * (seen + SomeShare(k)) / SEEN && seen < SEEN) {
+      PetscCall(PetscArraycpy(sampled->c + sampled->n * b->r, o->c, b->r));
+      PetscCall(PetscArraycpy(sampled->f + sampled->n * b->ns, o->f, b->ns));
+      sampled->n++;
+      seen++;
+    }
+    if (t >= last) break;
+    t = HycoSceneNextStop(scene, t);
+  }
+  *solved = (PetscBool)(seen > 0);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A time of the history for point k of the sequence. */
+static PetscReal SomeTime(HycoScene s, PetscInt k)
+{
+  return s->n_times ? s->times[0] + SomeShare(k) * (s->times[s->n_times - 1] - s->times[0]) : 0;
+}
+
+/* friction: NULL, or of paths. */
+static PetscErrorCode SolvePoints(HycoReducer t, HycoBodiesWork o, const HycoBodiesSurface *s,
+                                  HycoBodiesFriction friction, HycoSamples points, Sampled *sampled)
+{
+  const HycoSubstructures b = o->bodies;
+  const PetscInt p = t->scene->n_parameters;
+  PetscReal *Lambda, *bound, *norm, most = 0;
+  const PetscReal *mu;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(points, &n, NULL, &mu));
+  if (n > sampled->tried) sampled->n_checks = 0;
+  PetscCall(PetscMalloc3(s->pairs->n + 1, &Lambda, n, &bound, n, &norm));
+  for (PetscInt k = sampled->tried; k < n; k++) {
+    char message[HYCO_LINE];
+    PetscReal all[HYCO_MAX_PARAMETERS];
+    PetscBool solved = PETSC_FALSE;
+    PetscErrorCode ierr;
+
+    HycoSceneSetTime(t->scene, mu + k * p, SomeTime(t->scene, k), all);
+    PetscCall(HycoCatchBegin()); /* points that full order would refuse, too */
+    if (friction)
+      ierr = SolvePath(friction, o, t->scene, s->fe, k, mu + k * p, sampled, &solved);
+    else
+      ierr = SolveOne(o, s, all, Lambda, &solved);
+    PetscCall(HycoCatchEnd(ierr, message));
+    bound[k] = norm[k] = 0;
+    if (ierr || !solved) continue;
+    bound[k] = HycoBodiesBound(o, &norm[k]);
+    most = PetscMax(most, norm[k]);
+    if (friction) continue;
+    PetscCall(PetscArraycpy(sampled->c + sampled->n * b->r, o->c, b->r));
+    PetscCall(PetscArraycpy(sampled->f + sampled->n * b->ns, o->f, b->ns));
+    sampled->n++;
+    sampled->n_checks += p && !t->scene->n_times && k >= n - CHECKS;
+  }
+  if (!sampled->tried) b->forces = 0;
+  for (PetscInt k = sampled->tried; k < n && most > 0; k++)
+    b->forces = PetscMax(b->forces, bound[k] * norm[k] / PetscMax(norm[k], HYCO_SMALL_FORCE * most));
+  sampled->tried = n;
+  PetscCall(PetscFree3(Lambda, bound, norm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One of so many columns of the training paths is taken. */
+static PetscInt PathStride(HycoReducer t)
+{
+  return 1 + (t->n_s - 1) / MOST_COLUMNS;
+}
+
+/* Adds the elastic part of the training paths: their loads and contact forces at the listed times. */
+static PetscErrorCode TakePaths(HycoReducer t, HycoBodiesWork o, const HycoBodiesSurface *s, PetscInt every,
+                                Sampled *sampled)
+{
+  const HycoSubstructures b = o->bodies;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < t->n_s; k += every) {
+    PetscReal mu[HYCO_MAX_PARAMETERS];
+
+    PetscCall(HycoReducerColumn(t, k, mu));
+    PetscCall(HycoFESetParameters(s->fe, mu));
+    PetscCall(HycoRowsFill(s->fe, s->pairs, s->rows));
+    PetscCall(HycoBodiesPrepare(o, s, mu));
+    HycoBodiesGiven(o, s, t->Lambda + (size_t)k * (size_t)s->pairs->n);
+    PetscCall(PetscArraycpy(sampled->c + sampled->n * b->r, o->c, b->r));
+    PetscCall(PetscArraycpy(sampled->f + sampled->n * b->ns, o->f, b->ns));
+    sampled->n++;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Rank 0. */
+static PetscErrorCode SampleForces(HycoReducer t, HycoFOM f, HycoSamples points, Sampled *sampled)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  struct _n_HycoBodiesWork work = {0};
+  HycoRows rows;
+  const HycoBodiesSurface s = HycoBodiesSurfaceNormal(f->fe_surface, &f->pairs, &rows);
+  HycoBodiesFriction friction = NULL;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoRowsCreate(&f->pairs, b->dim, &rows));
+  if (HycoSceneHasFriction(t->scene)) PetscCall(HycoBodiesFrictionCreate(t->scene, &s, &friction));
+  ierr = HycoBodiesSetUp(&work, b, t->scene, friction ? HycoBodiesFrictionSurface(friction) : &s, NULL);
+  if (!ierr) ierr = SolvePoints(t, &work, &s, friction, points, sampled);
+  if (!ierr && t->scene->n_times && !friction && !sampled->expanded)
+    ierr = TakePaths(t, &work, &s, PathStride(t), sampled);
+  PetscCall(HycoBodiesReset(&work));
+  PetscCall(HycoBodiesFrictionDestroy(&friction));
+  PetscCall(HycoRowsDestroy(&rows));
+  f->fe_surface->ready = PETSC_FALSE;
+  PetscCall(ierr);
+  HycoCheckModel(sampled->n > sampled->n_checks,
+                 "the contact problem of the bodies is solved at none of the points of the ranges");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The samples on every rank, at `wanted` points or as many as there is room for: *all. Collective. */
+static PetscErrorCode Sample(HycoReducer t, HycoFOM f, PetscInt wanted, PetscBool *all, Sampled *sampled)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  const PetscInt nodes = PetscMin(SPREAD, HycoBodiesGrid(b, 0, NULL));
+  const PetscReal most = MOST_NUMBERS / ((PetscReal)t->sizes[0] * t->sizes[3] * nodes);
+  HycoSamples points;
+  PetscInt n = PetscMax(LEAST, PetscMin(wanted, (PetscInt)PetscMin(most, 1e6)));
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  *all = (PetscBool)(n >= wanted && t->scene->n_parameters);
+  PetscCall(HycoSamplesCreate(t->scene, &points));
+  PetscCall(HycoSamplesAddPoint(points, b->first));
+  if (t->scene->n_parameters) PetscCall(HycoSamplesAddScattered(points, n + CHECKS));
+  PetscCall(HycoSamplesGet(points, &n, NULL, NULL));
+  if (HycoSceneHasFriction(t->scene))
+    n *= SEEN;
+  else if (t->scene->n_times)
+    n += 1 + t->n_s / PathStride(t);
+  PetscCall(PetscRealloc(((size_t)n * (size_t)b->r + 1) * sizeof(PetscReal), &sampled->c));
+  PetscCall(PetscRealloc(((size_t)n * (size_t)b->ns + 1) * sizeof(PetscReal), &sampled->f));
+  {
+    char message[HYCO_LINE] = "";
+    PetscErrorCode caught = PETSC_SUCCESS;
+
+    PetscCall(HycoCatchBegin());
+    if (f->rank == 0) caught = SampleForces(t, t->fom, points, sampled);
+    PetscCall(HycoCatchEnd(caught, message));
+    ierr = HycoErrorSync(HycoComm(t), caught, message);
+  }
+  PetscCall(HycoSamplesDestroy(&points));
+  PetscCall(ierr);
+  PetscCallMPI(MPI_Bcast(&sampled->n, 1, MPIU_INT, 0, HycoComm(t)));
+  PetscCallMPI(MPI_Bcast(&sampled->n_checks, 1, MPIU_INT, 0, HycoComm(t)));
+  HycoBcast(sampled->c, sampled->n * b->r, MPIU_REAL, HycoComm(t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- displacements -- */
+
+/* n vectors like the loads. */
+static PetscErrorCode CreateVectors(HycoBodiesFactor *factor, PetscInt n, Vec v[])
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < n; k++) PetscCall(VecDuplicate(factor->fom->F, &v[k]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode DestroyVectors(PetscInt n, Vec v[])
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < n; k++) PetscCall(VecDestroy(&v[k]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The displacements of this rank's part, n columns, at most MANY, for loads with coefficients c (r x n; NULL: none) and
+   the z of the dense problem (p + ns, n columns; read on rank 0). Collective. */
+static PetscErrorCode Expand(HycoSubstructures b, HycoBodiesFactor *factor, PetscInt n, const PetscReal c[],
+                             const PetscReal z[], PetscReal u[])
+{
+  HycoFOM f = factor->fom;
+  Vec F[MANY], x[MANY];
+
+  PetscFunctionBegin;
+  PetscCall(CreateVectors(factor, n, F));
+  PetscCall(CreateVectors(factor, n, x));
+  for (PetscInt j = 0; j < n; j++) {
+    PetscCall(VecZeroEntries(F[j]));
+    for (PetscInt k = 0; c && k < b->r; k++) PetscCall(VecAXPY(F[j], c[j * b->r + k], factor->basis[k]));
+  }
+  PetscCall(HycoDirectExpandMany(factor->direct, n, F, z, x));
+  for (PetscInt j = 0; j < n; j++, u += f->fe->n_dof) {
+    PetscCall(HycoFOMToLocal(f, x[j], u));
+    for (PetscInt i = 0; i < f->fe->n_dof; i++) u[i] = f->fe->fixed[i] ? 0 : u[i];
+  }
+  PetscCall(DestroyVectors(n, F));
+  PetscCall(DestroyVectors(n, x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the displacements of sample k are computed at node j of n. */
+static PetscBool Visits(PetscInt k, PetscInt j, PetscInt n)
+{
+  return (PetscBool)(n <= SPREAD || (j + k) % (n / SPREAD) == 0);
+}
+
+/* The displacements of these samples, where the factor is, n columns. Collective. */
+static PetscErrorCode ExpandSamples(HycoSubstructures b, HycoBodiesFactor *factor, const Sampled *sampled, PetscInt n,
+                                    const PetscInt sample[], PetscReal u[])
+{
+  const PetscInt n_z = b->p + b->ns;
+  PetscReal *c, *z;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc2(MANY * b->r + 1, &c, (size_t)MANY * (size_t)n_z + 1, &z)); /* z of motions: 0 */
+  for (PetscInt first = 0; first < n; first += MANY) {
+    const PetscInt many = PetscMin(MANY, n - first);
+
+    for (PetscInt j = 0; j < many; j++) {
+      const size_t k = (size_t)sample[first + j];
+
+      PetscCall(PetscArraycpy(c + j * b->r, sampled->c + k * (size_t)b->r, b->r));
+      PetscCall(PetscArraycpy(z + (size_t)j * (size_t)n_z + b->p, sampled->f + k * (size_t)b->ns, b->ns));
+    }
+    PetscCall(Expand(b, factor, many, c, z, u + (size_t)first * (size_t)factor->fom->fe->n_dof));
+  }
+  PetscCall(PetscFree2(c, z));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The rigid motions at the present factor. Collective. */
+static PetscErrorCode ExpandMotions(HycoSubstructures b, HycoBodiesFactor *factor, PetscReal u[])
+{
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(factor->z, b->p + b->ns));
+  for (PetscInt k = 0; k < b->p; k++, u += factor->fom->fe->n_dof) {
+    factor->z[k] = 1;
+    PetscCall(Expand(b, factor, 1, NULL, factor->z, u));
+    factor->z[k] = 0;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds to sampled->U the displacements of the samples that it has not at node j, and at first the rigid motions there.
+   Collective. */
+static PetscErrorCode ExpandNode(HycoReducer t, HycoBodiesFactor *factor, PetscInt j, Sampled *sampled)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  const size_t n_dof = (size_t)factor->fom->fe->n_dof;
+  const PetscInt last = sampled->n - sampled->n_checks, nodes = HycoBodiesGrid(b, 0, NULL);
+  PetscReal theta[HYCO_MAX_PARAMETERS], *U;
+  PetscInt *sample, n = 0;
+
+  PetscFunctionBegin;
+  HycoBodiesPoint(t, j, theta);
+  PetscCall(HycoBodiesRefactor(t, factor, theta));
+  PetscCall(PetscMalloc1(sampled->n + 1, &sample));
+  for (PetscInt k = sampled->expanded; k < last; k++) {
+    if (Visits(k, j, nodes)) sample[n++] = k;
+  }
+  PetscCall(PetscRealloc((n_dof * (size_t)(sampled->n_U + n + b->p) + 1) * sizeof(PetscReal), &sampled->U));
+  U = sampled->U + n_dof * (size_t)sampled->n_U;
+  PetscCall(ExpandSamples(b, factor, sampled, n, sample, U));
+  for (PetscInt k = 0; k < n && !HycoBodiesFlow(t); k += 1 + n * nodes / SCORED)
+    PetscCall(HycoBodiesAddScores(t, factor, U + n_dof * (size_t)k));
+  sampled->n_U += n;
+  if (!sampled->expanded) {
+    PetscCall(ExpandMotions(b, factor, U + n_dof * (size_t)n));
+    sampled->n_U += b->p;
+  }
+  PetscCall(PetscFree(sample));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds the displacements of the modes of inelastic forces. */
+static PetscErrorCode ExpandStrains(HycoBodiesFactor *factor, Sampled *sampled)
+{
+  const size_t n_dof = (size_t)factor->fom->fe->n_dof;
+
+  PetscFunctionBegin;
+  PetscCall(PetscRealloc((n_dof * (size_t)(sampled->n_U + factor->n_strains) + 1) * sizeof(PetscReal), &sampled->U));
+  for (PetscInt k = 0; k < factor->n_strains; k++)
+    PetscCall(HycoFOMToLocal(factor->fom, factor->strain[k], sampled->U + n_dof * (size_t)sampled->n_U++));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The forces are those of any theta, so that there are all patterns. Collective. */
+static PetscErrorCode ExpandAll(HycoReducer t, HycoBodiesFactor *factor, Sampled *sampled)
+{
+  const PetscInt nodes = HycoBodiesGrid(HycoTrainingOfBodies(t)->bodies, 0, NULL);
+
+  PetscFunctionBegin;
+  for (PetscInt j = 0; j < nodes; j++) {
+    PetscCall(ExpandNode(t, factor, j, sampled));
+    PetscCall(HycoReducerTell(t, "displacements of the bodies", j + 1, nodes));
+  }
+  if (!sampled->expanded) PetscCall(ExpandStrains(factor, sampled));
+  sampled->expanded = sampled->n - sampled->n_checks;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* value = G u at the unknowns of a body that have modes, else 0. */
+static void TurnField(HycoReducer t, const HycoBodiesFactor *factor, PetscInt body, const PetscReal G[], PetscBool back,
+                      const PetscReal u[], PetscReal value[])
+{
+  HycoFOM f = factor->fom;
+  const PetscInt dim = f->fe->dim;
+
+  for (PetscInt i = 0; i < f->part->n_nodes; i++) {
+    PetscReal turned[3] = {0, 0, 0};
+
+    if (HycoTrainingOfBodies(t)->parts.of[i] == body) HycoPoseTurn(G, dim, back, u + i * dim, turned);
+    for (PetscInt c = 0; c < dim; c++)
+      value[i * dim + c] = f->fe->fixed[i * dim + c] || factor->bare[i * dim + c] ? 0 : turned[c];
+  }
+}
+
+/* An empty dense matrix with n columns in the file's order. */
+static PetscErrorCode CreateColumns(HycoReducer t, HycoFOM f, PetscInt n, Mat *S)
+{
+  const PetscInt dim = t->sizes[3];
+  const HycoFileOrder *order;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMGetRows(f, &order));
+  PetscCall(MatCreateDense(HycoComm(t), dim * (order ? order->n[HYCO_ON_NODES] : f->part->n_nodes), PETSC_DECIDE,
+                           t->sizes[0] * dim, n, NULL, S));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The columns of one body in all of its turns. Collective. */
+static PetscErrorCode BodyColumns(HycoReducer t, const HycoBodiesFactor *factor, PetscInt body, PetscInt n,
+                                  const PetscReal U[], Mat *S)
+{
+  HycoFOM f = factor->fom;
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  const PetscInt first = b->turn_start[body], turns = b->turn_start[body + 1] - first;
+  PetscReal *value;
+  PetscScalar *s;
+  PetscInt lda;
+
+  PetscFunctionBegin;
+  PetscCall(CreateColumns(t, f, n * turns, S));
+  PetscCall(MatDenseGetLDA(*S, &lda));
+  PetscCall(PetscMalloc1(f->fe->n_dof + 1, &value));
+  PetscCall(MatDenseGetArray(*S, &s));
+  for (PetscInt k = 0; k < n * turns; k++) {
+    TurnField(t, factor, body, b->G + 9 * (first + k % turns), PETSC_FALSE,
+              U + (size_t)(k / turns) * (size_t)f->fe->n_dof, value);
+    PetscCall(HycoFOMToRows(f, HYCO_ON_NODES, MPIU_REAL, b->dim, value, s + (size_t)k * (size_t)lda));
+  }
+  PetscCall(MatDenseRestoreArray(*S, &s));
+  PetscCall(PetscFree(value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Scales the columns to length 1 if they are not small. Collective. */
+static PetscErrorCode ScaleColumns(Mat S)
+{
+  PetscReal *norm, most = 0;
+  PetscScalar *s;
+  PetscInt n, lda, rows;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetSize(S, NULL, &n));
+  PetscCall(MatDenseGetLDA(S, &lda));
+  PetscCall(MatGetLocalSize(S, &rows, NULL));
+  PetscCall(PetscMalloc1(n + 1, &norm));
+  PetscCall(MatGetColumnNorms(S, NORM_2, norm));
+  for (PetscInt k = 0; k < n; k++) most = PetscMax(most, norm[k]);
+  PetscCall(MatDenseGetArray(S, &s));
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscReal scale = most > 0 ? 1 / PetscMax(norm[k], SMALL * most) : 0;
+
+    for (PetscInt i = 0; i < rows; i++) s[(size_t)k * (size_t)lda + (size_t)i] *= scale;
+  }
+  PetscCall(MatDenseRestoreArray(S, &s));
+  PetscCall(PetscFree(norm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The modes of all bodies in V, and their singular values in sigma. Collective. */
+static PetscErrorCode FindModes(HycoReducer t, const HycoBodiesFactor *factor, PetscInt n, const PetscReal U[], Mat *V,
+                                PetscReal **sigma)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+
+  PetscFunctionBegin;
+  *V = NULL;
+  *sigma = NULL;
+  PetscCall(PetscCalloc1(b->n + 1, &b->mode_start));
+  for (PetscInt k = 0; k < b->n; k++) {
+    const PetscInt columns = n * (b->turn_start[k + 1] - b->turn_start[k]);
+    PetscReal *own, norm;
+    PetscInt l = 0;
+    Mat S, W = NULL, joined;
+
+    PetscCall(BodyColumns(t, factor, k, n, U, &S));
+    PetscCall(ScaleColumns(S));
+    PetscCall(MatNorm(S, NORM_FROBENIUS, &norm));
+    PetscCall(PetscCalloc1(columns + 1, &own));
+    if (norm > 0) PetscCall(HycoReducerPOD(t, S, HycoTrainingOfBodies(t)->pod_tol, t->max_modes, &W, &l, own));
+    PetscCall(MatDestroy(&S));
+    b->mode_start[k + 1] = b->mode_start[k] + l;
+    PetscCall(PetscRealloc((size_t)(b->mode_start[k + 1] + 1) * sizeof(PetscReal), sigma));
+    PetscCall(PetscArraycpy(*sigma + b->mode_start[k], own, l));
+    PetscCall(PetscFree(own));
+    if (!l) PetscCall(MatDestroy(&W));
+    if (!l) continue;
+    if (*V) {
+      PetscCall(HycoJoinColumns(V, &W, &joined));
+      *V = joined;
+    } else
+      *V = W;
+  }
+  b->l = b->mode_start[b->n];
+  HycoCheckModel(b->l, "the bodies have no displacement at any point of the ranges; check the loads");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* norm: of the columns of S that the modes V miss. Collective. */
+static PetscErrorCode Miss(HycoReducer t, Mat V, Mat S, PetscReal norm[])
+{
+  PetscBLASInt m, l, n, ld[2];
+  const PetscReal one = 1, minus = -1;
+  const PetscScalar *v;
+  PetscScalar *s;
+  PetscReal *c;
+  PetscInt rows, modes, columns, lda[2];
+
+  PetscFunctionBegin;
+  PetscCall(MatGetLocalSize(V, &rows, NULL));
+  PetscCall(MatGetSize(V, NULL, &modes));
+  PetscCall(MatGetSize(S, NULL, &columns));
+  PetscCall(PetscMalloc1((size_t)modes * (size_t)columns + 1, &c));
+  PetscCall(HycoReducerMultiply(t, V, S, c));
+  PetscCall(MatDenseGetLDA(V, &lda[0]));
+  PetscCall(MatDenseGetLDA(S, &lda[1]));
+  PetscCall(PetscBLASIntCast(rows, &m));
+  PetscCall(PetscBLASIntCast(modes, &l));
+  PetscCall(PetscBLASIntCast(columns, &n));
+  for (int k = 0; k < 2; k++) PetscCall(PetscBLASIntCast(PetscMax(1, lda[k]), &ld[k]));
+  PetscCall(MatDenseGetArrayRead(V, &v));
+  PetscCall(MatDenseGetArray(S, &s));
+  if (rows) BLASgemm_("N", "N", &m, &n, &l, &minus, v, &ld[0], c, &l, &one, s, &ld[1]);
+  PetscCall(MatDenseRestoreArray(S, &s));
+  PetscCall(MatDenseRestoreArrayRead(V, &v));
+  PetscCall(MatGetColumnNorms(S, NORM_2, norm));
+  PetscCall(PetscFree(c));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* square[n]: of the displacements U (n_dof x n) of all ranks. Collective. */
+static PetscErrorCode Squares(HycoFOM f, PetscInt n, const PetscReal U[], PetscReal square[])
+{
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(square, n));
+  for (PetscInt i = 0; i < f->fe->n_dof; i++) {
+    if (HycoMeshOwned(f->part, i / f->fe->dim) < 0) continue;
+    for (PetscInt k = 0; k < n; k++) square[k] += PetscSqr(U[(size_t)k * (size_t)f->fe->n_dof + (size_t)i]);
+  }
+  HycoAllreduce(square, n, MPIU_REAL, MPI_SUM, HycoComm(f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* b->left at the checks. A turned field is the sum of q_j G_j u with |q|^2 = dim. Collective. */
+static PetscErrorCode MeasureLeft(HycoReducer t, HycoBodiesFactor *factor, const Sampled *sampled, Mat V)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  const PetscInt n = sampled->n_checks;
+  const size_t n_dof = (size_t)factor->fom->fe->n_dof;
+  PetscReal *U, *all, *lost, *norm;
+  PetscInt *sample;
+
+  PetscFunctionBegin;
+  b->left = b->l ? PetscSqrtReal(HycoTrainingOfBodies(t)->pod_tol) : 0; /* what the modes may leave out elsewhere */
+  PetscCall(PetscMalloc3(n_dof * (size_t)n + 1, &U, n, &all, b->dim * b->dim * n, &norm));
+  PetscCall(PetscCalloc1(n, &lost));
+  PetscCall(PetscMalloc1(n + 1, &sample));
+  for (PetscInt k = 0; k < n; k++) sample[k] = sampled->n - n + k;
+  if (b->n_theta) PetscCall(HycoBodiesRefactor(t, factor, factor->record[factor->n_records - 1].theta)); /* no sample */
+  PetscCall(ExpandSamples(b, factor, sampled, n, sample, U));
+  PetscCall(PetscFree(sample));
+  PetscCall(Squares(factor->fom, n, U, all));
+  for (PetscInt k = 0; k < b->n && n; k++) {
+    const PetscInt turns = b->turn_start[k + 1] - b->turn_start[k];
+    Mat S;
+
+    PetscCall(BodyColumns(t, factor, k, n, U, &S));
+    PetscCall(Miss(t, V, S, norm));
+    PetscCall(MatDestroy(&S));
+    for (PetscInt i = 0; i < n * turns; i++) lost[i / turns] += (turns > 1 ? b->dim : 1) * PetscSqr(norm[i]);
+  }
+  for (PetscInt k = 0; k < n; k++) {
+    if (all[k] > 0) b->left = PetscMax(b->left, PetscSqrtReal(lost[k] / all[k]));
+  }
+  PetscCall(PetscFree(lost));
+  PetscCall(PetscFree3(U, all, norm));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- coefficients -- */
+
+/* The displacements K^-1 F of the basis of the loads. Collective. */
+static PetscErrorCode LoadFields(HycoSubstructures b, HycoBodiesFactor *factor, Vec x[])
+{
+  PetscReal *z;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1((size_t)(b->p + b->ns) * (size_t)b->r + 1, &z));
+  PetscCall(CreateVectors(factor, b->r, x));
+  PetscCall(HycoDirectExpandMany(factor->direct, b->r, factor->basis, z, x));
+  PetscCall(PetscFree(z));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The turned mode back in the body's axes, as a load: v = G^T V_i. Collective. */
+static PetscErrorCode TurnMode(HycoReducer t, const HycoBodiesFactor *factor, PetscInt body, PetscInt turn,
+                               const PetscScalar column[], Vec v)
+{
+  HycoFOM f = factor->fom;
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  PetscReal *local, *turned;
+  PetscScalar *a;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(f->fe->n_dof + 1, &local, f->fe->n_dof + 1, &turned));
+  PetscCall(HycoFOMFromRows(f, HYCO_ON_NODES, b->dim, column, local));
+  TurnField(t, factor, body, b->G + 9 * turn, PETSC_TRUE, local, turned);
+  PetscCall(VecGetArray(v, &a));
+  for (PetscInt i = 0; i < f->fe->n_dof; i++) {
+    const PetscInt own = HycoMeshOwned(f->part, i / b->dim);
+
+    if (own >= 0) a[own * b->dim + i % b->dim] = turned[i];
+  }
+  PetscCall(VecRestoreArray(v, &a));
+  PetscCall(PetscFree2(local, turned));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* v = 1 at an unknown, else 0. */
+static PetscErrorCode SetUnit(PetscInt row, Vec v)
+{
+  PetscInt lo, hi;
+  PetscScalar *a;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetOwnershipRange(v, &lo, &hi));
+  PetscCall(VecZeroEntries(v));
+  PetscCall(VecGetArray(v, &a));
+  if (row >= lo && row < hi) a[row - lo] = 1;
+  PetscCall(VecRestoreArray(v, &a));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Allocates H, a and g. */
+static PetscErrorCode AllocateCoefficients(HycoSubstructures b)
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < b->n; k++) {
+    HycoSubstructure *s = &b->body[k];
+    size_t rows;
+
+    s->l = b->mode_start[k + 1] - b->mode_start[k];
+    rows = (size_t)s->n_samples * (size_t)((b->turn_start[k + 1] - b->turn_start[k]) * s->l + s->m);
+    PetscCall(PetscCalloc1(rows * (size_t)s->n + 1, &s->H));
+    PetscCall(PetscCalloc1(rows * (size_t)b->r + 1, &s->a));
+    PetscCall(PetscCalloc1(rows * (size_t)b->p + 1, &s->g));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The first row of a body among those of the inelastic fields. */
+static size_t StrainRows(HycoSubstructures b, PetscInt body)
+{
+  size_t rows = 0;
+
+  for (PetscInt k = 0; k < body; k++)
+    rows += (size_t)b->body[k].n_samples * (size_t)(b->turn_start[k + 1] - b->turn_start[k]) * (size_t)b->body[k].l;
+  return rows;
+}
+
+/* Row i of a body as a load: one of its modes in one of its turns, or an unknown inside. Collective. */
+static PetscErrorCode SetRow(HycoReducer t, HycoBodiesFactor *factor, PetscInt k, PetscInt i, Mat V, Vec v)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  const PetscInt l = b->body[k].l, turned = l * (b->turn_start[k + 1] - b->turn_start[k]);
+  const PetscScalar *columns;
+  PetscInt lda;
+
+  PetscFunctionBegin;
+  if (i >= turned) {
+    PetscCall(SetUnit(factor->row[b->inner_start[k] + i - turned], v));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(MatDenseGetLDA(V, &lda));
+  PetscCall(MatDenseGetArrayRead(V, &columns));
+  PetscCall(
+      TurnMode(t, factor, k, b->turn_start[k] + i / l, columns + (size_t)(b->mode_start[k] + i % l) * (size_t)lda, v));
+  PetscCall(MatDenseRestoreArrayRead(V, &columns));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* H, a and g of a body at one of its samples, where the factor is. x: the loads' displacements. Collective. */
+static PetscErrorCode BodyCoefficients(HycoReducer t, HycoBodiesFactor *factor, PetscInt k, PetscInt sample, Mat V,
+                                       const Vec x[])
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  HycoSubstructure *s = &b->body[k];
+  const PetscInt rows = s->l * (b->turn_start[k + 1] - b->turn_start[k]) + s->m;
+  PetscReal *u, *g;
+  Vec v[MANY];
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(MANY * b->ns + 1, &u, MANY * b->p + 1, &g));
+  PetscCall(CreateVectors(factor, MANY, v));
+  for (PetscInt first = 0; first < rows; first += MANY) {
+    const PetscInt many = PetscMin(MANY, rows - first);
+
+    for (PetscInt j = 0; j < many; j++) PetscCall(SetRow(t, factor, k, first + j, V, v[j]));
+    PetscCall(HycoBodiesReduce(b, factor, many, v, u, g));
+    for (PetscInt j = 0; j < many; j++) {
+      const size_t row = (size_t)(sample * rows + first + j);
+
+      for (PetscInt d = 0; d < s->n; d++)
+        s->H[(size_t)(sample * s->n + d) * (size_t)rows + (size_t)(first + j)] = u[j * b->ns + b->start[k] + d];
+      PetscCall(PetscArraycpy(s->g + row * (size_t)b->p, g + j * b->p, b->p));
+      for (PetscInt d = 0; d < b->r; d++) PetscCall(VecDot(v[j], x[d], &s->a[row * (size_t)b->r + (size_t)d]));
+      for (PetscInt d = 0; d < factor->n_strains; d++)
+        PetscCall(VecDot(v[j], factor->strain[d],
+                         &b->inelastic->fields[(StrainRows(b, k) + row) * (size_t)factor->n_strains + (size_t)d]));
+    }
+  }
+  PetscCall(DestroyVectors(MANY, v));
+  PetscCall(PetscFree2(u, g));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Coefficients(HycoReducer t, HycoBodiesFactor *factor, Mat V)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  const PetscInt nodes = HycoBodiesGrid(b, 0, NULL);
+  Vec *x;
+
+  PetscFunctionBegin;
+  PetscCall(AllocateCoefficients(b));
+  if (b->inelastic) PetscCall(PetscCalloc1(StrainRows(b, b->n) * (size_t)factor->n_strains + 1, &b->inelastic->fields));
+  PetscCall(PetscMalloc1(b->r + 1, &x));
+  for (PetscInt j = nodes - 1; j >= 0; j--) { /* the last factor is there */
+    PetscReal theta[HYCO_MAX_PARAMETERS];
+
+    HycoBodiesPoint(t, j, theta);
+    PetscCall(HycoBodiesRefactor(t, factor, theta));
+    PetscCall(LoadFields(b, factor, x));
+    for (PetscInt k = 0; k < b->n; k++) {
+      const PetscInt sample = HycoBodiesSampleOf(b, k, j);
+
+      if (sample >= 0) PetscCall(BodyCoefficients(t, factor, k, sample, V, x));
+    }
+    for (PetscInt d = 0; d < b->r; d++) PetscCall(VecDestroy(&x[d]));
+    PetscCall(HycoReducerTell(t, "coefficients of the modes", nodes - j, nodes));
+  }
+  PetscCall(PetscFree(x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Replaces the modes of the training solutions. Collective. */
+static PetscErrorCode TakeModes(HycoReducer t, HycoSnapshots store, Mat V, PetscReal sigma[])
+{
+  Mat S;
+
+  PetscFunctionBegin;
+  t->l = HycoTrainingOfBodies(t)->bodies->l;
+  PetscCall(PetscFree(t->sigma));
+  t->sigma = sigma;
+  PetscCall(PetscFree(t->VtU));
+  PetscCall(PetscMalloc1(t->l * t->n_s, &t->VtU));
+  PetscCall(HycoReducerGetDisplacements(t, store, &S));
+  PetscCall(HycoReducerMultiply(t, V, S, t->VtU));
+  PetscCall(MatDestroy(&S));
+  PetscCall(MatDestroy(&t->V));
+  t->V = V;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* factor->in_mesh. Rank 0. */
+static PetscErrorCode FindInMesh(HycoReducer t, HycoBodiesFactor *factor)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  HycoMesh surface = t->fom->surface;
+  PetscBool *contact;
+  PetscInt *node, n = 0, at;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(surface->n_nodes, &contact));
+  PetscCall(PetscMalloc1(surface->n_nodes, &node));
+  PetscCall(HycoReducerMarkContacts(t, contact));
+  for (PetscInt i = 0; i < surface->n_nodes; i++) {
+    if (contact[i]) node[n++] = surface->node_whole ? surface->node_whole[i] : i;
+  }
+  PetscCall(PetscSortInt(n, node));
+  for (PetscInt k = 0; k < b->ns; k++) {
+    PetscCall(PetscFindInt(b->dof[k] / b->dim, n, node, &at));
+    factor->in_mesh[k] = (PetscBool)(at >= 0);
+  }
+  PetscCall(PetscFree(node));
+  PetscCall(PetscFree(contact));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The modes of `wanted` samples; *enough: the samples are many more than the modes of any body, or there is no room for
+   more. Collective. */
+static PetscErrorCode ModesOf(HycoReducer t, HycoBodiesFactor *factor, PetscInt wanted, Sampled *sampled, Mat *V,
+                              PetscReal **sigma, PetscBool *enough)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  PetscBool all;
+
+  PetscFunctionBegin;
+  PetscCall(Sample(t, factor->fom, wanted, &all, sampled));
+  PetscCall(ExpandAll(t, factor, sampled));
+  if (!HycoBodiesFlow(t)) PetscCall(HycoBodiesChooseCells(t, factor)); /* else those with laws are chosen */
+  PetscCall(PetscFree(b->mode_start));
+  PetscCall(FindModes(t, factor, sampled->n_U, sampled->U, V, sigma));
+  *enough = PETSC_TRUE;
+  for (PetscInt k = 0; k < b->n; k++)
+    *enough = (PetscBool)(*enough && b->mode_start[k + 1] - b->mode_start[k] <= FULL * sampled->expanded);
+  HycoTrainingOfBodies(t)->filled = (PetscBool) !*enough;
+  *enough = (PetscBool)(*enough || !all);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBodiesFields(HycoReducer t, HycoSnapshots store, HycoBodiesFactor *factor)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  PetscReal *sigma = NULL;
+  Mat V = NULL;
+  Sampled sampled = {0};
+  PetscBool enough = PETSC_FALSE;
+  PetscErrorCode ierr = PETSC_SUCCESS;
+
+  PetscFunctionBegin;
+  if (t->scene->n_times) {
+    PetscCall(PetscFree(b->inner_start));
+    PetscCall(PetscCalloc1(b->n + 1, &b->inner_start));
+  }
+  PetscCall(PetscCalloc1(factor->fom->part->n_cells + 1, &factor->score));
+  PetscCall(PetscCalloc1(factor->fom->fe->n_dof + 1, &factor->known));
+  PetscCall(PetscCalloc1(factor->fom->fe->n_dof + 1, &factor->bare));
+  PetscCall(PetscCalloc1(b->ns + 1, &factor->in_mesh));
+  HycoOnRoot(HycoComm(t), FindInMesh(t, factor));
+  HycoBcast(factor->in_mesh, b->ns, HYCO_MPI_BOOL, HycoComm(t));
+  PetscCall(PetscCalloc1(factor->fom->fe->n_dof + 1, &factor->moved));
+  for (PetscInt n = HycoTrainingOfBodies(t)->samples, k = 0; !ierr && !enough && k <= DOUBLINGS; n *= 2, k++) {
+    PetscCall(MatDestroy(&V));
+    PetscCall(PetscFree(sigma));
+    ierr = ModesOf(t, factor, n, &sampled, &V, &sigma, &enough);
+  }
+  if (!ierr && !t->scene->n_times) ierr = MeasureLeft(t, factor, &sampled, V);
+  HycoFreeAll(&sampled.c, &sampled.f, &sampled.U);
+  PetscCall(ierr);
+  PetscCall(Coefficients(t, factor, V));
+  PetscCall(TakeModes(t, store, V, sigma));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

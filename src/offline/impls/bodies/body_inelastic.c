@@ -1,0 +1,675 @@
+/*
+  Training of bodies that deform inelastically. Elastic responses to loads and contact forces are exact, so that modes
+  are needed for what the stresses lack of the elastic ones alone, s = sum of alpha_k s_k: the displacements K^-1 q_k of
+  their nodal forces on the surfaces (P), in the cells of the points at which the laws are evaluated (A), and in the modes
+  of fields. In these cells displacements are exact too: rows of K^-1 for surface forces (C) and loads (R).
+*/
+#include <hycoalgorithms.h>
+#include <hycobodiestraining.h>
+#include <hycoinelasticpoints.h>
+#include <hycokinematics.h>
+
+#define MANY  64  /* right-hand sides at once */
+#define LARGE 0.3 /* displacements under which laws are asked whether they yield, as a share of the mesh's length */
+
+/* -- unsupported scenes -- */
+
+/* Whether the stiffness, or a body that flows, changes in a way that the modes do not follow. */
+static PetscErrorCode CheckChanges(HycoReducer t)
+{
+  const HycoBodyParts *parts = &HycoTrainingOfBodies(t)->parts;
+  const HycoScene s = t->scene;
+  HycoMesh m = t->fom->part;
+  PetscBool *flows;
+
+  PetscFunctionBegin;
+  for (PetscInt p = s->n_parameters; p < s->n_variables; p++) {
+    PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE};
+    HycoChanges c;
+
+    changed[p] = PETSC_TRUE;
+    c = HycoSceneChanges(s, changed);
+    HycoCheckModel(!c.stiffness && !c.rows && !c.nodes,
+                   "%s affects %s, and bodies of a model of bodies have one stiffness and one place along a path; use "
+                   "-hyco_model_type hybrid",
+                   s->parameter[p], c.stiffness ? "the stiffness" : "the contacts' directions");
+  }
+  PetscCall(PetscCalloc1(parts->n, &flows));
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    if (HycoInelasticFlows(t->fom->fe, e)) flows[parts->of[m->cells[e * m->nv]]] = PETSC_TRUE;
+  }
+  HycoAllreduce(flows, parts->n, HYCO_MPI_BOOL, MPI_LOR, HycoComm(t));
+  for (PetscInt k = 0; k < parts->n; k++) {
+    PetscInt shape[HYCO_MAX_PARAMETERS];
+
+    HycoCheckModel(!flows[k] || !HycoBodyPartsShapes(parts, k, shape),
+                   "%s changes the shape or the ratio of moduli of body %s, which deforms inelastically; a model of "
+                   "bodies does not support that: train a hybrid model",
+                   s->parameter[shape[0]], parts->name[k]);
+  }
+  for (PetscInt k = 0; k < parts->n; k++)
+    HycoCheckModel(!flows[k] || !HycoSceneHasFriction(s),
+                   "the scene has friction, and body %s deforms inelastically; models of bodies with friction are for "
+                   "elastic bodies: use hyco solve",
+                   parts->name[k]);
+  PetscCall(PetscFree(flows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBodiesCheckPath(HycoReducer t)
+{
+  const HycoScene s = t->scene;
+  PetscBool oblique = PETSC_FALSE, rigid = PETSC_FALSE;
+  HycoMotions motions;
+  char name[HYCO_LINE] = "";
+  PetscInt free;
+
+  PetscFunctionBegin;
+  HycoCheckModel(t->sizes[3] > 1, "-hyco_model_type bodies with a history is for 2D and 3D; in 1D use hybrid");
+  for (PetscInt k = 0; k < s->n_fixed; k++) oblique = (PetscBool)(oblique || s->fixed[k].normal);
+  for (PetscInt k = 0; k < s->n_contacts; k++) rigid = (PetscBool)(rigid || s->contact[k]->rigid);
+  HycoCheckModel(!s->n_ties && !oblique && !rigid,
+                 "the scene has %s, which a model of bodies with a history does not support; train a hybrid model",
+                 s->n_ties ? "ties"
+                 : rigid   ? "a contact of type rigid"
+                           : "a support along a direction");
+  PetscCall(HycoFEFreeMotions(HycoComm(t), t->fom->fe, &motions));
+  free = motions.n;
+  if (free) PetscCall(PetscStrncpy(name, motions.name[0], sizeof(name)));
+  PetscCall(HycoMotionsDestroy(&motions));
+  HycoCheckModel(
+      !free,
+      "no support keeps %s, only contact does, which a model of bodies with a history does not support; train "
+      "a hybrid model",
+      name);
+  PetscCall(CheckChanges(t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- modes and points -- */
+
+PetscErrorCode HycoBodiesStrainModes(HycoReducer t, HycoSnapshots store)
+{
+  HycoBodiesTraining s = HycoTrainingOfBodies(t);
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&s->bodies->inelastic));
+  PetscCall(MatDestroy(&s->strains.V));
+  PetscCall(PetscFree(s->strains.sigma));
+  PetscCall(HycoPointsSample(t, store, s->inelastic_tol, &s->strains));
+  s->bodies->inelastic->m = s->strains.l;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Makes these points those of the model, ascending, and their cells its cells; takes ownership. */
+static PetscErrorCode TakePoints(HycoReducer t, PetscInt count, PetscInt point[])
+{
+  HycoBodiesInelastic in = HycoTrainingOfBodies(t)->bodies->inelastic;
+  const PetscInt nq = HycoElementGet(t->fom->part->type)->nq;
+  const size_t size = (size_t)in->m * (size_t)(count * t->fom->fe->n_sigma) + 1;
+  PetscInt *cell;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(count + 1, &cell)); /* a mesh needs a cell */
+  for (PetscInt i = 0; i < count; i++) cell[i] = point[i] / nq;
+  t->n_seeds_cell = PetscMax(count, 1);
+  PetscCall(PetscSortRemoveDupsInt(&t->n_seeds_cell, cell));
+  PetscCall(PetscFree(t->seeds_cell));
+  t->seeds_cell = cell;
+  in->point = point;
+  in->n_points = count;
+  PetscCall(PetscCalloc1(size, &in->T));
+  PetscCall(PetscCalloc1(size, &in->there));
+  PetscCall(PetscCalloc1(count + 1, &in->weight));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The modes at the chosen points and their pseudo-inverse, so far of sqrt(w) s. Collective. */
+static PetscErrorCode TakeThere(HycoReducer t, PetscReal inverse[], PetscReal *smallest)
+{
+  HycoBodiesTraining s = HycoTrainingOfBodies(t);
+  HycoBodiesInelastic in = s->bodies->inelastic;
+
+  PetscFunctionBegin;
+  PetscCall(HycoPointsInverse(&s->strains, t->fom->fe->n_sigma, in->n_points, in->point, inverse, in->there, smallest));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Interpolation: the modes' Q-DEIM points; T is the pseudo-inverse of the modes there. Collective. */
+static PetscErrorCode Interpolate(HycoReducer t)
+{
+  HycoBodiesTraining s = HycoTrainingOfBodies(t);
+  HycoBodiesInelastic in = s->bodies->inelastic;
+  PetscInt *point, count = 0;
+  PetscReal smallest;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(s->cells * in->m + 1, &point));
+  PetscCall(HycoPointsChoose(&s->strains, t->fom->fe->n_sigma, s->cells, &count, point));
+  PetscCall(TakePoints(t, count, point));
+  PetscCall(TakeThere(t, in->T, &smallest));
+  in->amplification = 1 / smallest;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- what the modes displace -- */
+
+/* The free unknowns of the chosen cells. */
+typedef struct {
+  PetscInt n, *dof, *body, *global; /* as in HycoBodiesInelastic; numbers in the distributed vectors */
+} Unknowns;
+
+/* Lists those of this rank's own nodes. */
+static PetscErrorCode ListOwn(HycoReducer t, Unknowns *own)
+{
+  HycoMesh m = t->fom->part;
+  const PetscInt n = m->nv * m->dim;
+  PetscBool *taken;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(m->n_nodes * m->dim + 1, &taken));
+  PetscCall(
+      PetscMalloc3(t->n_seeds_cell * n, &own->dof, t->n_seeds_cell * n, &own->body, t->n_seeds_cell * n, &own->global));
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    PetscInt at;
+
+    PetscCall(PetscFindInt(m->cell_whole ? m->cell_whole[e] : e, t->n_seeds_cell, t->seeds_cell, &at));
+    for (PetscInt i = 0; i < n && at >= 0; i++) {
+      const PetscInt k = HycoCellUnknown(m, e, i), node = k / m->dim, place = HycoMeshOwned(m, node);
+
+      if (place < 0 || taken[k] || t->fom->fe->fixed[k]) continue;
+      taken[k] = PETSC_TRUE;
+      own->dof[own->n] = (m->node_whole ? m->node_whole[node] : node) * m->dim + k % m->dim;
+      own->body[own->n] = HycoTrainingOfBodies(t)->parts.of[node];
+      own->global[own->n++] = (m->first + place) * m->dim + k % m->dim;
+    }
+  }
+  PetscCall(PetscFree(taken));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* All of them, ascending, on every rank. Collective. */
+static PetscErrorCode ListAll(HycoReducer t, Unknowns *all)
+{
+  Unknowns own = {0};
+  PetscMPIInt size, n, *count, *start;
+  PetscInt *order, *packed[3];
+
+  PetscFunctionBegin;
+  HycoOnEach(HycoComm(t), ListOwn(t, &own));
+  PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
+  PetscCall(PetscMalloc2(size, &count, size + 1, &start));
+  PetscCall(PetscMPIIntCast(own.n, &n));
+  PetscCallMPI(MPI_Allgather(&n, 1, MPI_INT, count, 1, MPI_INT, HycoComm(t)));
+  start[0] = 0;
+  for (PetscMPIInt r = 0; r < size; r++) start[r + 1] = start[r] + count[r];
+  all->n = start[size];
+  for (int k = 0; k < 3; k++) {
+    const PetscInt *from = k == 0 ? own.dof : k == 1 ? own.body : own.global;
+
+    PetscCall(PetscMalloc1(all->n + 1, &packed[k]));
+    PetscCallMPI(MPI_Allgatherv(from, n, MPIU_INT, packed[k], count, start, MPIU_INT, HycoComm(t)));
+  }
+  PetscCall(PetscFree2(count, start));
+  PetscCall(PetscFree3(own.dof, own.body, own.global));
+  PetscCall(PetscMalloc1(all->n + 1, &order));
+  PetscCall(PetscMalloc1(all->n + 1, &all->body));
+  PetscCall(PetscMalloc1(all->n + 1, &all->global));
+  for (PetscInt i = 0; i < all->n; i++) order[i] = i;
+  all->dof = packed[0];
+  PetscCall(PetscSortIntWithArray(all->n, all->dof, order));
+  for (PetscInt i = 0; i < all->n; i++) {
+    all->body[i] = packed[1][order[i]];
+    all->global[i] = packed[2][order[i]];
+  }
+  HycoFreeAll(&packed[1], &packed[2], &order);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Column k of a table with n columns: the values of x at the unknowns that this rank has. */
+static PetscErrorCode TakeValues(const Unknowns *at, Vec x, PetscInt k, PetscInt n, PetscReal table[])
+{
+  const PetscScalar *a;
+  PetscInt lo, hi;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetOwnershipRange(x, &lo, &hi));
+  PetscCall(VecGetArrayRead(x, &a));
+  for (PetscInt i = 0; i < at->n; i++) {
+    if (at->global[i] >= lo && at->global[i] < hi) table[(size_t)i * (size_t)n + (size_t)k] = a[at->global[i] - lo];
+  }
+  PetscCall(VecRestoreArrayRead(x, &a));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* x = K^-1 F; the surfaces' displacements u. Collective. */
+static PetscErrorCode Displace(HycoSubstructures b, HycoBodiesFactor *factor, Vec F, PetscReal u[], Vec *x)
+{
+  PetscReal *work;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(b->p + b->ns + 1, &work));
+  PetscCall(HycoBodiesReduce(b, factor, 1, &F, u, work));
+  PetscCall(PetscArrayzero(work, b->p + b->ns));
+  PetscCall(VecDuplicate(F, x));
+  PetscCall(HycoDirectExpandMany(factor->direct, 1, &F, work, x));
+  PetscCall(PetscFree(work));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* F = the nodal forces of mode k, 0 where fixed. Collective. */
+static PetscErrorCode ForceOfMode(HycoReducer t, HycoFOM f, PetscInt k, Vec F)
+{
+  const PetscInt dim = f->part->dim;
+  PetscReal *value, *force;
+  PetscScalar *v;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(f->part->n_cells * HycoPointRows(t) + 1, &value));
+  PetscCall(PetscCalloc1(f->fe->n_dof + 1, &force));
+  PetscCall(HycoPointsMode(t, &HycoTrainingOfBodies(t)->strains, k, value));
+  HycoOnEach(HycoComm(t), HycoPointsForces(f->fe, value, force));
+  PetscCall(VecGetArray(F, &v));
+  for (PetscInt i = 0; i < f->fe->n_dof; i++) {
+    const PetscInt own = HycoMeshOwned(f->part, i / dim);
+
+    if (own >= 0) v[own * dim + i % dim] = f->fe->fixed[i] ? 0 : force[i];
+  }
+  PetscCall(VecRestoreArray(F, &v));
+  PetscCall(PetscFree(value));
+  PetscCall(PetscFree(force));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The responses to the modes: P and the fields; work[m x m]: of the modes on these, Q^T K^-1 Q. Collective. */
+static PetscErrorCode Respond(HycoReducer t, HycoBodiesFactor *factor, PetscReal u[], PetscReal work[])
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  HycoBodiesInelastic in = b->inelastic;
+  Vec F;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(in->m + 1, &factor->strain));
+  if (!in->m) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecDuplicate(factor->fom->F, &F));
+  for (PetscInt k = 0; k < in->m; k++) {
+    PetscCall(ForceOfMode(t, factor->fom, k, F));
+    PetscCall(Displace(b, factor, F, u, &factor->strain[k]));
+    factor->n_strains++;
+    for (PetscInt i = 0; i < b->ns; i++) in->P[(size_t)i * (size_t)in->m + (size_t)k] = u[i];
+    for (PetscInt i = 0; i <= k; i++) {
+      PetscCall(VecDot(F, factor->strain[i], &work[i * in->m + k]));
+      work[k * in->m + i] = work[i * in->m + k];
+    }
+  }
+  PetscCall(VecDestroy(&F));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The rows of the cells' unknowns for forces on the surfaces, C: K is symmetric. Collective. */
+static PetscErrorCode FillForces(HycoReducer t, HycoBodiesFactor *factor, const Unknowns *at)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  PetscReal *work;
+  PetscScalar *v;
+  PetscInt lo, hi;
+  Vec e[MANY];
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(MANY * b->p + 1, &work));
+  for (PetscInt j = 0; j < MANY; j++) PetscCall(VecDuplicate(factor->fom->F, &e[j]));
+  PetscCall(VecGetOwnershipRange(e[0], &lo, &hi));
+  for (PetscInt first = 0; first < at->n; first += MANY) {
+    const PetscInt many = PetscMin(MANY, at->n - first);
+
+    for (PetscInt j = 0; j < many; j++) {
+      const PetscInt row = at->global[first + j];
+
+      PetscCall(VecZeroEntries(e[j]));
+      PetscCall(VecGetArray(e[j], &v));
+      if (row >= lo && row < hi) v[row - lo] = 1;
+      PetscCall(VecRestoreArray(e[j], &v));
+    }
+    PetscCall(HycoBodiesReduce(b, factor, many, e, b->inelastic->C + (size_t)first * (size_t)b->ns, work));
+    PetscCall(HycoReducerTell(t, "displacements of the cells with laws", first + many, at->n));
+  }
+  for (PetscInt j = 0; j < MANY; j++) PetscCall(VecDestroy(&e[j]));
+  PetscCall(PetscFree(work));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The same for loads, R. Collective. */
+static PetscErrorCode FillLoads(HycoReducer t, HycoBodiesFactor *factor, const Unknowns *at, PetscReal u[])
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < b->r; k++) {
+    Vec x;
+
+    PetscCall(Displace(b, factor, factor->basis[k], u, &x));
+    PetscCall(TakeValues(at, x, k, b->r, b->inelastic->R));
+    PetscCall(VecDestroy(&x));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- laws at few points -- */
+
+/* Whether a law deforms inelastically at once, as in yielding: under large strains in no time. Collective. */
+static PetscErrorCode Yields(HycoReducer t, PetscBool *yields)
+{
+  HycoFE fe = t->fom->fe;
+  const PetscReal size = LARGE * HycoMeshLength(t->fom->part), now = t->scene->times[0];
+  HycoFEStepReport report;
+  HycoFEState begin, end;
+  PetscReal *u, *f;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(fe->n_dof, &u, fe->n_dof, &f));
+  for (PetscInt i = 0; i < fe->n_dof; i++) u[i] = size * PetscSinReal(1.7 * i * i + i);
+  PetscCall(PetscArrayzero(f, fe->n_dof));
+  PetscCall(HycoFEStateCreate(fe, &begin));
+  PetscCall(HycoFEStateCreate(fe, &end));
+  ierr = HycoFEStepBodies(fe, HYCO_BODIES_FLOWING, u, now, now, begin, end, f, PETSC_FALSE, &report);
+  PetscCall(HycoFEStateDestroy(&begin));
+  PetscCall(HycoFEStateDestroy(&end));
+  PetscCall(PetscFree2(u, f));
+  PetscCall(ierr);
+  *yields = (PetscBool)(report.failed || report.increment > 0);
+  HycoAllreduce(yields, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Columns of X become X M, with M m x l column major; x: their number, then l. Collective. */
+static PetscErrorCode Combine(PetscInt m, PetscInt l, const PetscReal M[], Vec X[])
+{
+  Vec *Y;
+
+  PetscFunctionBegin;
+  PetscCall(VecDuplicateVecs(X[0], l, &Y));
+  for (PetscInt j = 0; j < l; j++) PetscCall(VecMAXPY(Y[j], m, M + j * m, X));
+  for (PetscInt k = 0; k < m; k++) {
+    PetscCall(VecDestroy(&X[k]));
+    if (k < l) X[k] = Y[k];
+  }
+  PetscCall(PetscFree(Y));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Takes the modes' displacements that have energy, orthonormal in it: the inelastic forces of the paths are sums of
+   sigma_k q_k, so that the eigenvectors of their displacements' Gram matrix are those of a POD of the displacements.
+   work[m x m]: Q^T K^-1 Q. The modes of the forces stay. Collective. */
+static PetscErrorCode Orthogonalise(HycoReducer t, HycoBodiesFactor *factor, const PetscReal work[])
+{
+  HycoBodiesTraining s = HycoTrainingOfBodies(t);
+  HycoSubstructures b = s->bodies;
+  HycoBodiesInelastic in = b->inelastic;
+  const PetscInt m = in->m;
+  const PetscReal *scale = s->strains.sigma;
+  PetscReal *gram, *M, *sigma, *P;
+  PetscInt l;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(m * m, &gram, m, &sigma));
+  for (PetscInt i = 0; i < m * m; i++) gram[i] = scale[i / m] * work[i] * scale[i % m];
+  PetscCall(HycoPODGram(m, gram, s->inelastic_tol, 0, &M, &l, sigma));
+  for (PetscInt i = 0; i < m * l; i++) M[i] *= scale[i % m];
+  PetscCall(Combine(m, l, M, factor->strain));
+  PetscCall(PetscCalloc1((size_t)b->ns * (size_t)l + 1, &P));
+  for (PetscInt i = 0; i < b->ns; i++) {
+    for (PetscInt d = 0; d < l * m; d++) P[i * l + d / m] += in->P[i * m + d % m] * M[d];
+  }
+  PetscCall(PetscFree(in->P));
+  in->P = P;
+  in->m = factor->n_strains = l;
+  PetscCall(PetscFree(M));
+  PetscCall(PetscFree2(gram, sigma));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The work of values sqrt(w) s in the cells of the part on m displacements (n_dof each): work, n_cells x m. */
+static PetscErrorCode WorkOnModes(HycoFE fe, const PetscReal value[], PetscInt m, const PetscReal u[], PetscReal work[])
+{
+  const PetscInt n = fe->mesh->nv * fe->dim, size = HycoElementGet(fe->mesh->type)->nq * fe->n_sigma;
+  PetscReal force[HYCO_MAX_CELL_DOFS];
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(work, fe->mesh->n_cells * m));
+  for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
+    if (!HycoInelasticFlows(fe, e)) continue;
+    PetscCall(PetscArrayzero(force, n));
+    PetscCall(HycoPointsCellForce(fe, e, value + e * size, force));
+    for (PetscInt k = 0; k < n; k++) {
+      const PetscInt unknown = HycoCellUnknown(fe->mesh, e, k);
+
+      for (PetscInt d = 0; d < m && !fe->fixed[unknown] && force[k] != 0; d++)
+        work[e * m + d] += force[k] * u[(size_t)d * (size_t)fe->n_dof + (size_t)unknown];
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The work of the largest n_k modes of the stresses on the modes' displacements in each cell, a column for each pair, by
+   the stresses' sizes: rows in the file's order. Collective. */
+static PetscErrorCode Contributions(HycoReducer t, HycoBodiesFactor *factor, PetscInt n_k, Mat *S)
+{
+  const HycoBasis *modes = &HycoTrainingOfBodies(t)->strains;
+  HycoFE fe = t->fom->fe;
+  const PetscInt m = factor->n_strains, n_cells = fe->mesh->n_cells;
+  const HycoFileOrder *order;
+  PetscReal *u, *value, *work, *rows;
+  PetscScalar *s;
+  PetscInt lds, n_rows;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMGetRows(t->fom, &order));
+  n_rows = order ? order->n[HYCO_ON_CELLS] : n_cells;
+  PetscCall(MatCreateDense(HycoComm(t), n_rows, PETSC_DECIDE, t->sizes[1], m * n_k, NULL, S));
+  PetscCall(PetscMalloc4((size_t)m * (size_t)fe->n_dof + 1, &u, n_cells * HycoPointRows(t) + 1, &value, n_cells * m + 1,
+                         &work, n_rows * m + 1, &rows));
+  for (PetscInt i = 0; i < m; i++)
+    PetscCall(HycoFOMToLocal(factor->fom, factor->strain[i], u + (size_t)i * (size_t)fe->n_dof));
+  PetscCall(MatDenseGetLDA(*S, &lds));
+  PetscCall(MatDenseGetArray(*S, &s));
+  for (PetscInt k = 0; k < n_k; k++) {
+    PetscCall(HycoPointsMode(t, modes, k, value));
+    HycoOnEach(HycoComm(t), WorkOnModes(fe, value, m, u, work));
+    PetscCall(HycoFOMToRows(t->fom, HYCO_ON_CELLS, MPIU_REAL, m, work, rows));
+    for (PetscInt i = 0; i < n_rows * m; i++)
+      s[(size_t)(k * m + i % m) * (size_t)lds + (size_t)(i / m)] = modes->sigma[k] * rows[i];
+  }
+  PetscCall(MatDenseRestoreArray(*S, &s));
+  PetscCall(MatAssemblyBegin(*S, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(*S, MAT_FINAL_ASSEMBLY));
+  PetscCall(PetscFree4(u, value, work, rows));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* All points of the cells with weights w (rank 0) as those of the model; weight[] ordered as they are. Single points would
+   do for the training paths, but where an unseen plastic front decides, whole cells are much more accurate. Collective. */
+static PetscErrorCode TakeWeighted(HycoReducer t, const PetscReal w[], PetscReal **weight)
+{
+  const PetscInt nq = HycoElementGet(t->fom->part->type)->nq;
+  PetscInt *point, count = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt e = 0; !t->rank && e < t->sizes[1]; e++) count += w[e] > 0 ? nq : 0;
+  PetscCallMPI(MPI_Bcast(&count, 1, MPIU_INT, 0, HycoComm(t)));
+  PetscCall(PetscMalloc1(count + 1, &point));
+  PetscCall(PetscMalloc1(count + 1, weight));
+  for (PetscInt i = 0, n = 0; !t->rank && i < t->sizes[1] * nq; i++) {
+    if (!(w[i / nq] > 0)) continue;
+    (*weight)[n] = w[i / nq];
+    point[n++] = i;
+  }
+  HycoBcast(point, count, MPIU_INT, HycoComm(t));
+  HycoBcast(*weight, count, MPIU_REAL, HycoComm(t));
+  PetscCall(TakePoints(t, count, point));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Which cells of the part are elastic. */
+static PetscErrorCode MarkElastic(HycoReducer t, PetscBool **elastic)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(t->fom->part->n_cells + 1, elastic));
+  for (PetscInt e = 0; e < t->fom->part->n_cells; e++) (*elastic)[e] = (PetscBool)!HycoInelasticFlows(t->fom->fe, e);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Galerkin's method on the modes' displacements A, orthonormal in energy, with a cubature: alpha = sum over points of
+   weight w (B A)^T s. Collective. */
+static PetscErrorCode Cubature(HycoReducer t, HycoBodiesFactor *factor, PetscReal **weight)
+{
+  HycoBodiesTraining s = HycoTrainingOfBodies(t);
+  HycoBodiesInelastic in = s->bodies->inelastic;
+  PetscReal *sigma, *w, error[2];
+  PetscBool *elastic;
+  PetscInt n_k = 0, n;
+  Mat S, W;
+
+  PetscFunctionBegin;
+  while (n_k < s->strains.l && s->strains.sigma[n_k] > s->cubature_tol * s->strains.sigma[0]) n_k++;
+  PetscCall(Contributions(t, factor, n_k, &S));
+  PetscCall(PetscCalloc1(in->m * n_k + 1, &sigma));
+  PetscCall(HycoReducerPOD(t, S, s->cubature_tol * s->cubature_tol, 0, &W, &n, sigma));
+  PetscCall(MatDestroy(&S));
+  PetscCall(MarkElastic(t, &elastic));
+  PetscCall(PetscCalloc1(t->rank ? 1 : t->sizes[1], &w));
+  PetscCall(HycoCubatureFind(t, elastic, 0, s->cubature_tol, W, n, sigma, w, error));
+  PetscCall(MatDestroy(&W));
+  PetscCall(PetscFree(elastic));
+  PetscCall(PetscFree(sigma));
+  PetscCall(TakeWeighted(t, w, weight));
+  PetscCall(PetscFree(w));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The weight of point p, point q of the part's cell e, and with a cubature its rows of T, weight w B A. */
+static PetscErrorCode FillPoint(HycoReducer t, const Unknowns *at, const PetscReal weight[], PetscInt e, PetscInt q,
+                                PetscInt p)
+{
+  HycoBodiesInelastic in = HycoTrainingOfBodies(t)->bodies->inelastic;
+  HycoFE fe = t->fom->fe;
+  HycoMesh part = fe->mesh;
+  const PetscInt m = in->m, n = part->nv * part->dim, ns = fe->n_sigma;
+  PetscReal B[6 * HYCO_MAX_CELL_DOFS];
+
+  PetscFunctionBegin;
+  PetscCall(HycoFEPointRows(fe, e, q, B, &in->weight[p]));
+  for (PetscInt i = 0; i < n && weight; i++) {
+    const PetscInt k = HycoCellUnknown(part, e, i), node = k / part->dim;
+    PetscInt row;
+
+    PetscCall(PetscFindInt((part->node_whole ? part->node_whole[node] : node) * part->dim + k % part->dim, at->n,
+                           at->dof, &row));
+    for (PetscInt c = 0; c < ns && row >= 0; c++) {
+      for (PetscInt d = 0; d < m; d++)
+        in->T[(p * ns + c) * m + d] += weight[p] * in->weight[p] * B[c * n + i] * in->A[row * m + d];
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode FillOwnPoints(HycoReducer t, const Unknowns *at, const PetscReal weight[])
+{
+  HycoBodiesInelastic in = HycoTrainingOfBodies(t)->bodies->inelastic;
+  HycoMesh part = t->fom->part;
+  const PetscInt nq = HycoElementGet(part->type)->nq;
+
+  PetscFunctionBegin;
+  for (PetscInt e = 0; e < part->n_cells; e++) {
+    for (PetscInt q = 0; q < nq && HycoMeshOwned(part, part->cells[e * part->nv]) >= 0; q++) {
+      PetscInt p;
+
+      PetscCall(PetscFindInt((part->cell_whole ? part->cell_whole[e] : e) * nq + q, in->n_points, in->point, &p));
+      if (p >= 0) PetscCall(FillPoint(t, at, weight, e, q, p));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Weights and T of the points; T and the modes there are of s. weight: of the cubature, NULL: interpolation. Collective. */
+static PetscErrorCode FillPoints(HycoReducer t, const Unknowns *at, const PetscReal weight[])
+{
+  HycoBodiesInelastic in = HycoTrainingOfBodies(t)->bodies->inelastic;
+  const PetscInt size = t->fom->fe->n_sigma * in->m;
+
+  PetscFunctionBegin;
+  HycoOnEach(HycoComm(t), FillOwnPoints(t, at, weight));
+  HycoAllreduce(in->weight, in->n_points, MPIU_REAL, MPI_SUM, HycoComm(t));
+  if (weight) HycoAllreduce(in->T, in->n_points * size, MPIU_REAL, MPI_SUM, HycoComm(t));
+  for (PetscInt i = 0; i < in->n_points * size && !weight; i++) {
+    in->T[i] *= PetscSqrtReal(in->weight[i / size]);
+    in->there[i] /= PetscSqrtReal(in->weight[i / size]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The points and their cells' rows for forces, loads and modes. weight: of the cubature, NULL: interpolation. Collective. */
+static PetscErrorCode FillCells(HycoReducer t, HycoBodiesFactor *factor, const PetscReal weight[], PetscReal u[])
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  HycoBodiesInelastic in = b->inelastic;
+  Unknowns at = {0};
+
+  PetscFunctionBegin;
+  PetscCall(ListAll(t, &at));
+  in->nd = at.n;
+  in->dof = at.dof;
+  in->body = at.body;
+  PetscCall(PetscCalloc1((size_t)at.n * (size_t)in->m + 1, &in->A));
+  PetscCall(PetscCalloc1((size_t)at.n * (size_t)b->ns + 1, &in->C));
+  PetscCall(PetscCalloc1((size_t)at.n * (size_t)b->r + 1, &in->R));
+  for (PetscInt k = 0; k < in->m; k++) PetscCall(TakeValues(&at, factor->strain[k], k, in->m, in->A));
+  PetscCall(FillForces(t, factor, &at));
+  PetscCall(FillLoads(t, factor, &at, u));
+  HycoAllreduce(in->A, at.n * in->m, MPIU_REAL, MPI_SUM, HycoComm(t));
+  HycoAllreduce(in->R, at.n * b->r, MPIU_REAL, MPI_SUM, HycoComm(t));
+  PetscCall(FillPoints(t, &at, weight));
+  PetscCall(PetscFree(at.global));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The laws at few points by the method that fits them. weight: of the cubature, NULL: interpolation. Collective. */
+static PetscErrorCode ChoosePoints(HycoReducer t, HycoBodiesFactor *factor, const PetscReal work[], PetscReal **weight)
+{
+  HycoBodiesTraining s = HycoTrainingOfBodies(t);
+  HycoBodiesInelastic in = s->bodies->inelastic;
+  PetscBool yields = (PetscBool)(s->laws == HYCO_BODIES_CUBATURE);
+
+  PetscFunctionBegin;
+  *weight = NULL;
+  if (s->laws == HYCO_BODIES_AUTO && in->m) PetscCall(Yields(t, &yields));
+  if (!yields || !in->m) {
+    PetscCall(Interpolate(t));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(Orthogonalise(t, factor, work));
+  PetscCall(Cubature(t, factor, weight));
+  in->amplification = 1;
+  in->weighted = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBodiesStrains(HycoReducer t, HycoBodiesFactor *factor)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  HycoBodiesInelastic in = b->inelastic;
+  PetscReal theta[HYCO_MAX_PARAMETERS], *u, *work, *weight = NULL;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMSetParameters(t->fom, b->first));
+  HycoBodiesPoint(t, 0, theta);
+  PetscCall(HycoBodiesRefactor(t, factor, theta));
+  PetscCall(PetscCalloc1((size_t)b->ns * (size_t)in->m + 1, &in->P));
+  PetscCall(PetscMalloc2(b->ns + 1, &u, in->m * in->m + 1, &work));
+  PetscCall(Respond(t, factor, u, work));
+  PetscCall(ChoosePoints(t, factor, work, &weight));
+  PetscCall(FillCells(t, factor, weight, u));
+  PetscCall(PetscFree(weight));
+  PetscCall(PetscFree2(u, work));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,317 @@
+/*
+  The samples of theta, the parameters that change the shape of bodies or the ratio of their moduli: a tensor grid of the
+  extrema of Chebyshev polynomials, whose finer grids contain the coarser ones. If -e C <= C~ - C <= e C for every body,
+  the same holds for W, and the two variational inequalities give |L~ - L|_W <= e |L~|_W, whatever touches. e is measured
+  where the next finer grid has its nodes, so that these are not lost if that is needed; between these points it is an
+  estimate.
+*/
+#include <hycobodiestraining.h>
+#include <petscblaslapack.h>
+
+#define MOST_VALUES 17
+#define HOPELESS    0.3 /* e above which the model is refused */
+#define ITERATIONS  30  /* of the power method */
+
+/* Node k of n along parameter p, in its own variable. */
+static PetscReal Node(HycoReducer t, HycoSubstructures b, PetscInt p, PetscInt n, PetscInt k)
+{
+  const PetscReal share = (1 - PetscCosReal(PETSC_PI * ((PetscReal)k / (PetscReal)(n - 1)))) / 2;
+  PetscReal lo = t->scene->lo[b->theta[p]], hi = t->scene->hi[b->theta[p]];
+
+  if (!k) return lo;
+  if (k == n - 1) return hi;
+  return b->logarithm[p] ? lo * PetscPowReal(hi / lo, share) : lo + share * (hi - lo);
+}
+
+/* Which axes of theta a body has. */
+static PetscErrorCode FindAxes(HycoReducer t, HycoSubstructures b)
+{
+  const HycoBodyParts *parts = &HycoTrainingOfBodies(t)->parts;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < b->n; k++) {
+    for (PetscInt p = 0; p < b->n_theta; p++)
+      b->body[k].tensor.n[p] =
+          parts->enters[k * parts->n_parameters + b->theta[p]] & HYCO_ENTERS_SHAPE ? b->n_nodes[p] : 1;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscInt HycoBodiesSampleOf(HycoSubstructures b, PetscInt body, PetscInt k)
+{
+  const HycoTensor *t = &b->body[body].tensor;
+  PetscInt index[HYCO_TENSOR_MAX_DIM], sample = 0;
+
+  for (PetscInt p = b->n_theta - 1; p >= 0; p--) {
+    index[p] = k % b->n_nodes[p];
+    k /= b->n_nodes[p];
+  }
+  for (PetscInt p = 0; p < b->n_theta; p++) {
+    if (t->n[p] == 1 && index[p]) return -1;
+    sample = sample * t->n[p] + (t->n[p] > 1 ? index[p] : 0);
+  }
+  return sample;
+}
+
+/* Sets the values of theta from their numbers, and the bodies' tensors. */
+static PetscErrorCode SetGrid(HycoReducer t, HycoSubstructures b)
+{
+  PetscInt n = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt p = 0; p < b->n_theta; p++) n += b->n_nodes[p];
+  PetscCall(PetscFree(b->node));
+  PetscCall(PetscMalloc1(n + 1, &b->node));
+  n = 0;
+  for (PetscInt p = 0; p < b->n_theta; p++) {
+    for (PetscInt k = 0; k < b->n_nodes[p]; k++) {
+      b->node[n] = Node(t, b, p, b->n_nodes[p], k);
+      if (b->logarithm[p]) b->node[n] = PetscLogReal(b->node[n]);
+      n++;
+    }
+  }
+  PetscCall(FindAxes(t, b));
+  HycoBodiesSetTensors(b);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void HycoBodiesPoint(HycoReducer t, PetscInt k, PetscReal theta[])
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+
+  for (PetscInt p = b->n_theta - 1; p >= 0; p--) {
+    theta[p] = Node(t, b, p, b->n_nodes[p], k % b->n_nodes[p]);
+    k /= b->n_nodes[p];
+  }
+}
+
+/* The offset of a body's block among all. */
+static size_t BlockAt(HycoSubstructures b, PetscInt body)
+{
+  size_t at = 0;
+
+  for (PetscInt k = 0; k < body; k++) at += (size_t)PetscSqr(b->body[k].n);
+  return at;
+}
+
+/* Copies the records of the grid to the bodies. Rank 0. */
+static PetscErrorCode TakeRecords(HycoSubstructures b, const HycoBodiesFactor *factor, const PetscInt record[])
+{
+  const PetscInt n = HycoBodiesGrid(b, 0, NULL);
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < b->n; k++) {
+    HycoSubstructure *s = &b->body[k];
+    const size_t C = (size_t)PetscSqr(s->n), R = (size_t)(s->n * b->r), Z = (size_t)(s->n * b->p),
+                 work = (size_t)(b->p * b->r), samples = (size_t)s->n_samples;
+
+    HycoFreeAll(&s->C, &s->R, &s->Z, &s->work, &s->gram);
+    PetscCall(PetscCalloc1(b->r * b->r + 1, &s->gram));
+    PetscCall(PetscMalloc1(samples * C + 1, &s->C));
+    PetscCall(PetscMalloc1(samples * R + 1, &s->R));
+    PetscCall(PetscMalloc1(samples * Z + 1, &s->Z));
+    PetscCall(PetscCalloc1(samples * work + 1, &s->work));
+    for (PetscInt j = 0; j < n; j++) {
+      const HycoBodiesRecord *r = &factor->record[record[j]];
+      const PetscInt at = HycoBodiesSampleOf(b, k, j);
+
+      if (at < 0) continue;
+      PetscCall(PetscArraycpy(s->C + (size_t)at * C, r->C + BlockAt(b, k), C));
+      PetscCall(PetscArraycpy(s->R + (size_t)at * R, r->R + b->start[k] * b->r, R));
+      PetscCall(PetscArraycpy(s->Z + (size_t)at * Z, r->Z + b->start[k] * b->p, Z));
+      for (PetscInt i = 0; i < b->p; i++) { /* a motion's work belongs to the body that it moves */
+        PetscBool moves = PETSC_FALSE;
+
+        for (PetscInt d = b->start[k]; d < b->start[k + 1]; d++) moves = (PetscBool)(moves || r->Z[d * b->p + i] != 0);
+        if (moves) PetscCall(PetscArraycpy(s->work + (size_t)at * work + i * b->r, r->work + i * b->r, b->r));
+      }
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- the bound -- */
+
+/* The Cholesky factor of C (n x n, overwritten) in its lower triangle. */
+static PetscErrorCode Factor(PetscInt n, PetscReal C[])
+{
+  PetscBLASInt m, info;
+  PetscReal most = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscBLASIntCast(n, &m));
+  for (PetscInt i = 0; i < n; i++) most = PetscMax(most, C[(size_t)i * (size_t)(n + 1)]);
+  for (PetscInt i = 0; i < n; i++) C[(size_t)i * (size_t)(n + 1)] += 1e-13 * most; /* pinned unknowns do not move */
+  LAPACKpotrf_("L", &m, C, &m, &info);
+  PetscCheck(!info, PETSC_COMM_SELF, PETSC_ERR_LIB, "the flexibility of a body is not positive definite");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The largest |eigenvalue| of (D, C), D symmetric, from the factor L of C (both n x n). */
+static PetscErrorCode Largest(PetscInt n, const PetscReal L[], const PetscReal D[], PetscReal *largest)
+{
+  PetscBLASInt m, one = 1;
+  const PetscReal unit = 1, zero = 0;
+  PetscReal *x, *y;
+
+  PetscFunctionBegin;
+  *largest = 0;
+  PetscCall(PetscBLASIntCast(n, &m));
+  PetscCall(PetscMalloc2(n, &x, n, &y));
+  for (PetscInt i = 0; i < n; i++) x[i] = PetscSinReal(1.0 + i);
+  for (PetscInt k = 0; k < ITERATIONS; k++) { /* x <- L^-1 D L^-T x */
+    PetscReal size = 0;
+
+    for (PetscInt i = 0; i < n; i++) size += x[i] * x[i];
+    size = PetscSqrtReal(size);
+    if (!(size > 0)) break;
+    if (k) *largest = size;
+    for (PetscInt i = 0; i < n; i++) x[i] /= size;
+    BLAStrsm_("L", "L", "T", "N", &m, &one, &unit, L, &m, x, &m);
+    BLASsymm_("L", "L", &m, &one, &unit, D, &m, x, &m, &zero, y, &m);
+    BLAStrsm_("L", "L", "N", "N", &m, &one, &unit, L, &m, y, &m);
+    PetscCall(PetscArraycpy(x, y, n));
+  }
+  PetscCall(PetscFree2(x, y));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds the products of the columns of R~ - R (R: n x r row major) in the norm of C^-1, C = L L^T. */
+static PetscErrorCode AddGram(const HycoSubstructure *s, const PetscReal weight[], PetscInt r, const PetscReal L[],
+                              const PetscReal R[])
+{
+  PetscBLASInt m, columns;
+  const PetscReal unit = 1;
+  PetscReal *D;
+
+  PetscFunctionBegin;
+  PetscCall(PetscBLASIntCast(s->n, &m));
+  PetscCall(PetscBLASIntCast(r, &columns));
+  PetscCall(PetscMalloc1(s->n * r + 1, &D));
+  for (PetscInt i = 0; i < s->n * r; i++) {
+    PetscReal *d = D + i % r * s->n + i / r;
+
+    *d = -R[i];
+    for (PetscInt q = 0; q < s->n_samples; q++) *d += weight[q] * s->R[(size_t)q * (size_t)(s->n * r) + (size_t)i];
+  }
+  if (r) BLAStrsm_("L", "L", "N", "N", &m, &columns, &unit, L, &m, D, &m);
+  for (PetscInt i = 0; i < r * r; i++) {
+    for (PetscInt k = 0; k < s->n; k++) s->gram[i] += D[i / r * s->n + k] * D[i % r * s->n + k];
+  }
+  PetscCall(PetscFree(D));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* e of all bodies at a record that is no sample. Rank 0. */
+static PetscErrorCode Bound(HycoSubstructures b, const PetscReal mu[], const HycoBodiesRecord *record, PetscReal *e)
+{
+  PetscFunctionBegin;
+  *e = 0;
+  for (PetscInt k = 0; k < b->n; k++) {
+    const HycoSubstructure *s = &b->body[k];
+    const size_t n = (size_t)PetscSqr(s->n);
+    PetscReal *C, *D, *weight, own;
+
+    if (s->n_samples == 1 || !s->n) continue;
+    PetscCall(PetscMalloc3(n + 1, &C, n + 1, &D, s->n_samples, &weight));
+    PetscCall(HycoBodiesWeights(b, k, mu, weight));
+    PetscCall(PetscArraycpy(C, record->C + BlockAt(b, k), n));
+    for (size_t i = 0; i < n; i++) {
+      D[i] = -C[i];
+      for (PetscInt q = 0; q < s->n_samples; q++) D[i] += weight[q] * s->C[(size_t)q * n + i];
+    }
+    PetscCall(Factor(s->n, C));
+    PetscCall(Largest(s->n, C, D, &own));
+    PetscCall(AddGram(s, weight, b->r, C, record->R + b->start[k] * b->r));
+    *e = PetscMax(*e, own);
+    PetscCall(PetscFree3(C, D, weight));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* e along axis p: at two nodes of the next finer grid, with the other parameters at a middle node. Collective. */
+static PetscErrorCode BoundAlong(HycoReducer t, HycoBodiesFactor *factor, PetscInt axis, PetscReal *e)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+
+  PetscFunctionBegin;
+  *e = 0;
+  for (PetscInt side = 0; side < 2; side++) {
+    const PetscInt finer = 2 * b->n_nodes[axis] - 1;
+    PetscReal theta[HYCO_MAX_PARAMETERS], mu[HYCO_MAX_PARAMETERS] = {0}, own = 0;
+    PetscInt record;
+
+    for (PetscInt p = 0; p < b->n_theta; p++) {
+      theta[p] =
+          p == axis ? Node(t, b, p, finer, side ? finer - 2 : 1) : Node(t, b, p, b->n_nodes[p], b->n_nodes[p] / 2);
+      mu[b->theta[p]] = theta[p];
+    }
+    PetscCall(HycoBodiesCondense(t, factor, theta, &record));
+    HycoOnRoot(HycoComm(t), Bound(b, mu, &factor->record[record], &own));
+    PetscCallMPI(MPI_Bcast(&own, 1, MPIU_REAL, 0, HycoComm(t)));
+    *e = PetscMax(*e, own);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Condenses at all nodes of the grid. Collective. */
+static PetscErrorCode CondenseGrid(HycoReducer t, HycoBodiesFactor *factor)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  PetscInt n, *record;
+
+  PetscFunctionBegin;
+  PetscCall(SetGrid(t, b));
+  n = HycoBodiesGrid(b, 0, NULL);
+  PetscCall(PetscMalloc1(n, &record));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscReal theta[HYCO_MAX_PARAMETERS];
+
+    HycoBodiesPoint(t, k, theta);
+    PetscCall(HycoBodiesCondense(t, factor, theta, &record[k]));
+  }
+  HycoOnRoot(HycoComm(t), TakeRecords(b, factor, record));
+  PetscCall(PetscFree(record));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The axis with the largest e that a finer grid may reduce, -1: none. */
+static PetscInt Worst(HycoReducer t, HycoSubstructures b, const PetscReal e[])
+{
+  const HycoBodiesTraining s = HycoTrainingOfBodies(t);
+  PetscInt worst = -1;
+
+  for (PetscInt p = 0; p < b->n_theta; p++) {
+    const PetscInt finer = 2 * b->n_nodes[p] - 1;
+    const PetscInt n = HycoBodiesGrid(b, 0, NULL) / b->n_nodes[p] * finer;
+
+    if (e[p] <= s->tol / b->n_theta || finer > MOST_VALUES || n > s->most_samples) continue;
+    if (worst < 0 || e[p] > e[worst]) worst = p;
+  }
+  return worst;
+}
+
+PetscErrorCode HycoBodiesSample(HycoReducer t, HycoBodiesFactor *factor)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  PetscReal e[HYCO_MAX_PARAMETERS] = {0};
+  PetscInt worst;
+
+  PetscFunctionBegin;
+  for (PetscInt p = 0; p < b->n_theta; p++) b->n_nodes[p] = 3;
+  do {
+    PetscCall(CondenseGrid(t, factor));
+    for (PetscInt p = 0; p < b->n_theta; p++) PetscCall(BoundAlong(t, factor, p, &e[p]));
+    worst = Worst(t, b, e);
+    if (worst >= 0) b->n_nodes[worst] = 2 * b->n_nodes[worst] - 1;
+  } while (worst >= 0);
+  b->bound = 0;
+  for (PetscInt p = 0; p < b->n_theta; p++) {
+    b->bound += e[p];
+    HycoCheckModel(e[p] <= HOPELESS,
+                   "the flexibility of a body cannot be interpolated over %s: with %d values its relative error is "
+                   "%.2g; train a hybrid model",
+                   t->scene->parameter[b->theta[p]], (int)b->n_nodes[p], (double)e[p]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

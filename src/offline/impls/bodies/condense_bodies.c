@@ -1,0 +1,598 @@
+/*
+  Training of the model of bodies: a factorisation of K at each sample of theta with the unknowns of the contacts'
+  surfaces last. K couples no bodies, so that its Schur complement on these unknowns consists of the blocks C_b; the
+  unknowns that MUMPS pins for bodies that contact alone holds are their isostatic supports, and give the rigid motions.
+*/
+#include <hycobodiestraining.h>
+
+#define MOST_UNKNOWNS 4000 /* of the surfaces of a body: C_b is dense */
+#define MANY_UNKNOWNS 1500 /* of a body: masters that no slave meets are left out */
+#define MOST_ALL      8000 /* of all surfaces: the Schur complement is dense until its blocks are taken */
+#define RINGS         2    /* of facets around those that slaves met at some points of the ranges */
+#define SEARCHED      200  /* such points */
+#define KEPT          0.3  /* share of the memory for the factors of samples that are kept */
+#define MOST_THETA    3    /* parameters that change the shape of bodies */
+
+/* -- before the solves -- */
+
+/* Refuses bodies that would need too many samples. */
+static PetscErrorCode CheckParts(HycoReducer t)
+{
+  const HycoBodyParts *parts = &HycoTrainingOfBodies(t)->parts;
+  const PetscInt fail = HycoBodyPartsFail(parts);
+  PetscInt shape[HYCO_MAX_PARAMETERS];
+  char list[HYCO_LINE] = "", bodies[HYCO_LINE] = "";
+  const PetscInt n = HycoBodyPartsShapes(parts, -1, shape);
+
+  PetscFunctionBegin;
+  HycoCheckModel(fail < 0,
+                 "body %s: its parameters together change it by more than a rigid motion, a uniform scaling and a "
+                 "factor of its stiffness, though none does alone, which a model of bodies does not support; train a "
+                 "hybrid model",
+                 fail < 0 ? "" : parts->name[fail]);
+  for (PetscInt p = 0; p < n; p++) PetscCall(HycoListAdd(list, ", ", t->scene->parameter[shape[p]]));
+  for (PetscInt k = 0; k < parts->n; k++) {
+    PetscInt own[HYCO_MAX_PARAMETERS];
+
+    if (HycoBodyPartsShapes(parts, k, own)) PetscCall(HycoListAdd(bodies, ", ", parts->name[k]));
+  }
+  HycoCheckModel(n <= MOST_THETA,
+                 "body %s: %d parameters change shapes or ratios of moduli (%s), and a model of bodies samples at most "
+                 "%d; train a hybrid model",
+                 bodies, (int)n, list, MOST_THETA);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the scene has what the model does not represent. */
+static PetscErrorCode CheckScene(HycoReducer t)
+{
+  PetscBool regularise = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  HycoCheckModel(!t->scan && !t->keep_singular, "-hyco_scan and -hyco_keep_singular have no effect on "
+                                                "-hyco_model_type bodies; remove them");
+  HycoCheckModel(t->sizes[2] > 0, "the scene has no contact, and a model of bodies represents the surfaces that touch; "
+                                  "train a hybrid model");
+  PetscCall(PetscOptionsGetBool(t->scene->options, NULL, "-hyco_regularise", &regularise, NULL));
+  HycoCheckModel(!regularise, "-hyco_regularise is not supported by a model of bodies; train a hybrid model");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBodiesBegin(HycoReducer t)
+{
+  PetscReal mu[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  PetscCall(CheckScene(t));
+  if (HycoTrainingOfBodies(t)->parts.n) PetscFunctionReturn(PETSC_SUCCESS); /* they do not depend on the solutions */
+  PetscCall(HycoReducerColumn(t, 0, mu));
+  PetscCall(HycoBodyPartsFind(t->fom, mu, &HycoTrainingOfBodies(t)->parts));
+  PetscCall(CheckParts(t));
+  if (t->scene->n_times) PetscCall(HycoBodiesCheckPath(t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+#define SAMPLES 5  /* assumed nodes along each axis of theta */
+#define SOLVES  12 /* assumed solves for each load, mode and sample of the fields */
+#define STRAINS 40 /* assumed modes of the inelastic forces, each with unknowns of its cells of the model */
+
+PetscReal HycoBodiesOperations(HycoReducer t)
+{
+  HycoBodiesTraining s = HycoTrainingOfBodies(t);
+  PetscInt shape[HYCO_MAX_PARAMETERS];
+  const PetscInt n = HycoBodyPartsShapes(&s->parts, -1, shape);
+  const PetscReal unknowns = 2 * (PetscReal)t->sizes[2] * t->sizes[3], /* slaves and about as many masters */
+      samples = PetscMin(PetscPowRealInt(SAMPLES, n), (PetscReal)s->most_samples),
+                  strains = t->scene->n_times ? STRAINS * (PetscReal)(s->cells * t->fom->part->nv * t->sizes[3]) : 0;
+
+  return samples * (HycoReducerFactorWork(t) + unknowns * unknowns * unknowns / 3) +
+         (SOLVES * (PetscReal)s->samples + strains) * HycoReducerSolveWork(t);
+}
+
+PetscBool HycoBodiesOffers(HycoReducer t, PetscBool targets, size_t length, char why[])
+{
+  (void)targets;
+  if (t->pod_memory > 0)
+    snprintf(why, length,
+             "its columns are not read in batches, and -hyco_pod_memory is given; name the type to train it");
+  return (PetscBool)!why[0];
+}
+
+/* -- the surfaces' unknowns -- */
+
+/* of[i]: the body of each node of the surfaces, on rank 0. Collective. */
+static PetscErrorCode BodiesOfSurface(HycoFOM f, const HycoBodyParts *parts, PetscInt **of)
+{
+  const PetscInt n = f->surface ? f->surface->n_nodes : 0;
+  PetscInt *own, *global;
+  PetscSF sf;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n + 1, of));
+  PetscCall(PetscMalloc2(f->part->n_owned + f->part->n_nodes, &own, n + 1, &global));
+  for (PetscInt i = 0; i < n; i++) global[i] = f->surface->node_global ? f->surface->node_global[i] : i;
+  for (PetscInt i = 0; i < f->part->n_nodes; i++) {
+    if (HycoMeshOwned(f->part, i) >= 0) own[HycoMeshOwned(f->part, i)] = parts->of[i];
+  }
+  PetscCall(HycoMeshNodeSF(HycoComm(f), f->part, n, global, &sf));
+  PetscCall(HycoSFBcast(sf, MPIU_INT, 1, own, *of));
+  PetscCall(PetscSFDestroy(&sf));
+  PetscCall(PetscFree2(own, global));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* near[i]: also the nodes of the facets of a group that have a node in near[]. */
+static PetscErrorCode AddRing(HycoMesh m, PetscInt group, PetscBool near[])
+{
+  PetscBool *on;
+
+  PetscFunctionBegin;
+  HycoDuplicate(m->n_nodes + 1, near, &on);
+  for (PetscInt f = 0; f < m->n_facets; f++) {
+    const PetscInt *node = m->facets + f * m->nf;
+    PetscBool meets = PETSC_FALSE;
+
+    if (m->facet_group[f] != group) continue;
+    for (PetscInt a = 0; a < m->nf; a++) meets = (PetscBool)(meets || on[node[a]]);
+    for (PetscInt a = 0; a < m->nf && meets; a++) near[node[a]] = PETSC_TRUE;
+  }
+  PetscCall(PetscFree(on));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Takes from in[] the masters of moved surfaces that no slave meets over the ranges: a part slides on a small part of a
+   large one. A prediction that meets another one is refused. Rank 0. */
+static PetscErrorCode LeaveOut(HycoReducer t, PetscBool in[])
+{
+  HycoFOM f = t->fom;
+  HycoMesh m = f->surface;
+  HycoSamples points;
+  HycoMet met;
+  PetscBool *near;
+  const PetscReal *mu;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesCreate(t->scene, &points));
+  PetscCall(HycoSamplesAddScattered(points, SEARCHED));
+  PetscCall(HycoSamplesGet(points, &n, NULL, &mu));
+  PetscCall(HycoMetFind(t->scene, m, &f->pairs, n, mu, NULL, &met));
+  PetscCall(PetscCalloc1(m->n_nodes + 1, &near));
+  HycoPairsMark(&met.rows, near);
+  for (PetscInt k = 0; k < t->scene->n_contacts; k++) {
+    PetscInt g = 0;
+
+    if (!HycoPairsFollows(&f->pairs, k)) continue;
+    PetscCall(HycoMeshFindGroup(m, "contact", t->scene->contact[k]->slave, &g));
+    for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) near[m->group_node[j]] = PETSC_TRUE;
+    PetscCall(HycoMeshFindGroup(m, "contact", t->scene->contact[k]->master, &g));
+    for (PetscInt ring = 0; ring < RINGS; ring++) PetscCall(AddRing(m, g, near));
+  }
+  for (PetscInt i = 0; i < m->n_nodes; i++) in[i] = (PetscBool)(in[i] && near[i]);
+  PetscCall(PetscFree(near));
+  PetscCall(HycoMetDestroy(&met));
+  PetscCall(HycoSamplesDestroy(&points));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Lists the free unknowns of the surfaces by body, with their numbers in the distributed vectors. Rank 0. */
+static PetscErrorCode List(HycoFOM f, const PetscInt of[], const PetscBool in[], HycoSubstructures b, PetscInt global[])
+{
+  HycoMesh m = f->surface;
+
+  PetscFunctionBegin;
+  b->ns = 0;
+  for (PetscInt k = 0; k < b->n; k++) {
+    for (PetscInt i = 0; i < m->n_nodes * b->dim; i++) {
+      const PetscInt node = i / b->dim;
+
+      if (!in[node] || of[node] != k || f->fe_surface->fixed[i]) continue;
+      b->dof[b->ns] = (m->node_whole ? m->node_whole[node] : node) * b->dim + i % b->dim;
+      global[b->ns++] = (m->node_global ? m->node_global[node] : node) * b->dim + i % b->dim;
+    }
+    b->start[k + 1] = b->ns;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The same for the nodes of the surfaces that may touch. Rank 0. */
+static PetscErrorCode ListReached(HycoReducer t, const PetscInt of[], HycoSubstructures b, PetscInt global[])
+{
+  HycoFOM f = t->fom;
+  PetscInt most = 0;
+  PetscBool *in;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(f->surface->n_nodes + 1, &in));
+  PetscCall(HycoPairsMarkSurfaces(f->scene, f->surface, &f->pairs, in));
+  PetscCall(List(f, of, in, b, global));
+  for (PetscInt k = 0; k < b->n; k++) most = PetscMax(most, b->start[k + 1] - b->start[k]);
+  if (most > MANY_UNKNOWNS && f->searches && t->scene->n_parameters) {
+    PetscCall(LeaveOut(t, in));
+    PetscCall(List(f, of, in, b, global));
+  }
+  PetscCall(PetscFree(in));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode CheckSizes(const HycoBodyParts *parts, HycoSubstructures b)
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < b->n; k++)
+    HycoCheckModel(b->start[k + 1] - b->start[k] <= MOST_UNKNOWNS,
+                   "body %s has %d unknowns on the surfaces that may touch; a model of bodies stores the square of "
+                   "their number, and is limited to %d: train a hybrid model",
+                   parts->name[k], (int)(b->start[k + 1] - b->start[k]), MOST_UNKNOWNS);
+  HycoCheckModel(b->ns <= MOST_ALL,
+                 "the surfaces that may touch have %d unknowns, and a model of bodies is limited to %d: train a hybrid "
+                 "model",
+                 (int)b->ns, MOST_ALL);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The unknowns on every rank, and N, whose rows select them. Collective. */
+static PetscErrorCode Select(HycoReducer t, HycoSubstructures b, Mat *N)
+{
+  HycoFOM f = t->fom;
+  const HycoBodyParts *parts = &HycoTrainingOfBodies(t)->parts;
+  const PetscInt n = f->surface ? f->surface->n_nodes * b->dim : 0;
+  PetscInt *of, *global;
+
+  PetscFunctionBegin;
+  PetscCall(BodiesOfSurface(f, parts, &of));
+  PetscCall(PetscCalloc1(b->n + 1, &b->start));
+  PetscCall(PetscMalloc1(n + 1, &b->dof));
+  PetscCall(PetscMalloc1(n + 1, &global));
+  HycoOnRoot(HycoComm(f), ListReached(t, of, b, global));
+  HycoBcast(b->start, b->n + 1, MPIU_INT, HycoComm(f));
+  b->ns = b->start[b->n];
+  if (f->rank) PetscCall(PetscFree(b->dof));
+  if (f->rank) PetscCall(PetscMalloc1(b->ns + 1, &b->dof));
+  HycoBcast(b->dof, b->ns, MPIU_INT, HycoComm(f));
+  PetscCall(CheckSizes(parts, b));
+  PetscCall(MatCreateAIJ(HycoComm(f), PETSC_DECIDE, f->part->n_owned * b->dim, b->ns, f->n_nodes * b->dim, 1, NULL, 1,
+                         NULL, N));
+  for (PetscInt k = 0; k < b->ns && f->rank == 0; k++) PetscCall(MatSetValue(*N, k, global[k], 1, INSERT_VALUES));
+  PetscCall(MatAssemblyBegin(*N, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(*N, MAT_FINAL_ASSEMBLY));
+  PetscCall(PetscFree(global));
+  PetscCall(PetscFree(of));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- factors -- */
+
+/* The blocks of the Schur complement M, by columns, and the rigid motions. Rank 0. */
+static PetscErrorCode TakeBlocks(HycoSubstructures b, const PetscReal M[], HycoBodiesRecord *record)
+{
+  const size_t n = (size_t)(b->p + b->ns), p = (size_t)b->p;
+  size_t at = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < b->n; k++) at += (size_t)PetscSqr(b->start[k + 1] - b->start[k]);
+  PetscCall(PetscMalloc1(at + 1, &record->C));
+  PetscCall(PetscMalloc1((size_t)b->ns * p + 1, &record->Z));
+  at = 0;
+  for (PetscInt k = 0; k < b->n; k++) {
+    for (PetscInt j = b->start[k]; j < b->start[k + 1]; j++) {
+      const PetscReal *column = M + (p + (size_t)j) * n + p;
+
+      for (PetscInt i = b->start[k]; i < b->start[k + 1]; i++) record->C[at++] = column[i];
+    }
+  }
+  for (size_t j = 0; j < (size_t)b->ns; j++) {
+    for (size_t i = 0; i < p; i++) record->Z[j * p + i] = M[(p + j) * n + i];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The isostatic supports are the same at all samples: their motions are unknowns. Collective. */
+static PetscErrorCode CheckPins(HycoReducer t, HycoSubstructures b, HycoBodiesFactor *factor)
+{
+  PetscInt *pins;
+  PetscBool same = PETSC_TRUE;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(b->p + 1, &pins));
+  PetscCall(HycoKernelPins(HycoComm(t), factor->fom->K, b->p, pins));
+  for (PetscInt i = 0; i < b->p && factor->pins; i++) same = (PetscBool)(same && pins[i] == factor->pins[i]);
+  if (factor->pins)
+    PetscCall(PetscFree(pins));
+  else
+    factor->pins = pins;
+  HycoCheckModel(same, "a body that contact alone holds changes its shape so that its rigid motions need other "
+                       "unknowns, which a model of bodies does not support; train a hybrid model");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Refuses bodies that need more memory than there is: the factor, of which the analysis has the size, the Schur
+   complement on every rank, the flexibilities at the first samples and at those beside them, and the sampled
+   displacements. Collective. */
+static PetscErrorCode CheckMemory(HycoReducer t, HycoBodiesFactor *factor, PetscReal bytes)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  const PetscReal n = b->p + b->ns, samples = PetscPowReal(3, (PetscReal)b->n_theta) + 2 * b->n_theta;
+  PetscReal limit, all, flexibilities = 0;
+  HycoSolver solver;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < b->n; k++) flexibilities += samples * PetscSqr((PetscReal)b->body[k].n);
+  all = bytes + 8 * (n * n * factor->fom->size + flexibilities +
+                     (PetscReal)t->sizes[0] * b->dim * HycoTrainingOfBodies(t)->samples);
+  PetscCall(HycoFOMGetSolver(factor->fom, &solver));
+  PetscCall(HycoSolverMemory(solver, &limit));
+  HycoCheckModel(all <= limit,
+                 "a model of bodies needs %.3g GB to be made (the factor %.3g GB, flexibilities of %d unknowns on "
+                 "surfaces %.3g GB), and %.3g GB are available (-hyco_memory); train a hybrid model",
+                 (double)(1e-9 * all), (double)(1e-9 * bytes), (int)b->ns, (double)(8e-9 * flexibilities),
+                 (double)(1e-9 * limit));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The stiffness at theta. Collective. */
+static PetscErrorCode AssembleAt(HycoReducer t, HycoBodiesFactor *factor, const PetscReal theta[])
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  PetscReal mu[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  PetscCall(PetscArraycpy(mu, b->first, b->n_variables));
+  for (PetscInt p = 0; p < b->n_theta; p++) mu[b->theta[p]] = theta[p];
+  factor->fom->fe->ready = PETSC_FALSE;
+  PetscCall(HycoFOMAssemble(factor->fom, mu));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A further factor beside those that are kept, or in the place of the last one if they would take more than a share of
+   the memory. Collective. */
+static PetscErrorCode NextFactor(HycoBodiesFactor *factor)
+{
+  PetscReal limit;
+  HycoSolver solver;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMGetSolver(factor->fom, &solver));
+  PetscCall(HycoSolverMemory(solver, &limit));
+  if (factor->n_kept && (factor->n_kept + 1) * factor->bytes > KEPT * limit) {
+    PetscCall(PetscFree(factor->kept[factor->n_kept - 1].theta));
+  } else {
+    PetscCall(PetscRealloc((size_t)(factor->n_kept + 1) * sizeof(*factor->kept), &factor->kept));
+    factor->kept[factor->n_kept].theta = NULL;
+    PetscCall(HycoDirectCreate(HycoComm(factor->fom), &factor->kept[factor->n_kept++].direct));
+  }
+  factor->direct = factor->kept[factor->n_kept - 1].direct;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* record: takes the blocks; NULL: they are not needed. Collective. */
+static PetscErrorCode Factor(HycoReducer t, HycoBodiesFactor *factor, const PetscReal theta[], HycoBodiesRecord *record)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  HycoFOM f = factor->fom;
+  PetscReal bytes, *M;
+  PetscInt kernel;
+  PetscBool singular;
+  size_t n;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(PetscFree(factor->theta));
+  PetscCall(AssembleAt(t, factor, theta));
+  PetscCall(HycoKernelSize(f->K, &kernel));
+  if (!factor->pins) b->p = kernel;
+  HycoCheckModel(kernel == b->p, "the number of rigid motions that contact alone prevents changes with the parameters, "
+                                 "which a model of bodies does not support; train a hybrid model");
+  PetscCall(CheckPins(t, b, factor));
+  PetscCall(NextFactor(factor));
+  PetscCall(HycoDirectPinKernel(factor->direct, f->K));
+  PetscCall(HycoDirectAnalyse(factor->direct, f->K, NULL, factor->N, PETSC_TRUE, &bytes));
+  if (!factor->z) PetscCall(CheckMemory(t, factor, bytes)); /* before the first factor */
+  factor->bytes = bytes;
+  n = (size_t)(b->p + b->ns);
+  PetscCall(PetscCalloc1(n * n + 1, &M));
+  ierr = HycoDirectFactor(factor->direct, f->K, NULL, factor->N, M, &singular);
+  if (!ierr && record && !t->rank) ierr = TakeBlocks(b, M, record);
+  PetscCall(PetscFree(M));
+  PetscCall(ierr);
+  HycoCheckModel(!singular, "the stiffness of the bodies is singular; check supports and springs");
+  if (!factor->z) PetscCall(PetscCalloc1(b->p + b->ns + 1, &factor->z));
+  HycoDuplicate(b->n_theta + 1, theta, &factor->theta);
+  HycoDuplicate(b->n_theta + 1, theta, &factor->kept[factor->n_kept - 1].theta);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscBool Same(PetscInt n, const PetscReal a[], const PetscReal b[])
+{
+  for (PetscInt p = 0; p < n; p++) {
+    if (a[p] != b[p]) return PETSC_FALSE;
+  }
+  return PETSC_TRUE;
+}
+
+PetscErrorCode HycoBodiesRefactor(HycoReducer t, HycoBodiesFactor *factor, const PetscReal theta[])
+{
+  const PetscInt n = HycoTrainingOfBodies(t)->bodies->n_theta;
+
+  PetscFunctionBegin;
+  if (factor->theta && Same(n, theta, factor->theta)) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt k = 0; k < factor->n_kept; k++) {
+    if (!factor->kept[k].theta || !Same(n, theta, factor->kept[k].theta)) continue;
+    PetscCall(AssembleAt(t, factor, theta));
+    PetscCall(PetscFree(factor->theta));
+    HycoDuplicate(n + 1, theta, &factor->theta);
+    factor->direct = factor->kept[k].direct;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(Factor(t, factor, theta, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBodiesReduce(HycoSubstructures b, HycoBodiesFactor *factor, PetscInt n, const Vec F[], PetscReal u[],
+                                PetscReal work[])
+{
+  const PetscInt n_q = b->p + b->ns;
+  PetscReal *q;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1((size_t)n_q * (size_t)n + 1, &q));
+  PetscCall(HycoDirectReduceMany(factor->direct, n, F, q));
+  for (PetscInt j = 0; j < n; j++) {
+    for (PetscInt i = 0; i < b->p; i++) work[j * b->p + i] = -q[j * n_q + i];
+    for (PetscInt k = 0; k < b->ns; k++) u[j * b->ns + k] = -q[j * n_q + b->p + k];
+  }
+  PetscCall(PetscFree(q));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* R and the work of each vector of the basis of the loads. Collective. */
+static PetscErrorCode Respond(HycoSubstructures b, HycoBodiesFactor *factor, HycoBodiesRecord *record)
+{
+  PetscReal *u, *work;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(b->ns * b->r + 1, &u, b->p * b->r + 1, &work));
+  PetscCall(PetscMalloc1((size_t)b->ns * (size_t)b->r + 1, &record->R));
+  PetscCall(PetscMalloc1(b->p * b->r + 1, &record->work));
+  PetscCall(HycoBodiesReduce(b, factor, b->r, factor->basis, u, work));
+  for (PetscInt k = 0; k < b->r; k++) {
+    for (PetscInt i = 0; i < b->ns; i++) record->R[i * b->r + k] = u[k * b->ns + i];
+    for (PetscInt i = 0; i < b->p; i++) record->work[i * b->r + k] = work[k * b->p + i];
+  }
+  PetscCall(PetscFree2(u, work));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBodiesCondense(HycoReducer t, HycoBodiesFactor *factor, const PetscReal theta[], PetscInt *at)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  HycoBodiesRecord *record;
+
+  PetscFunctionBegin;
+  for (*at = 0; *at < factor->n_records; (*at)++) {
+    if (Same(b->n_theta, theta, factor->record[*at].theta)) PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(PetscRealloc((size_t)(factor->n_records + 1) * sizeof(*record), &factor->record));
+  record = &factor->record[factor->n_records++];
+  PetscCall(PetscMemzero(record, sizeof(*record)));
+  HycoDuplicate(b->n_theta + 1, theta, &record->theta);
+  PetscCall(Factor(t, factor, theta, record));
+  PetscCall(Respond(b, factor, record));
+  PetscCall(HycoReducerTell(t, "flexibilities of the bodies", factor->n_records, 0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- the model -- */
+
+/* The parameters theta. The logarithm of one that moves nothing and varies much is interpolated. */
+static PetscErrorCode TakeTheta(HycoReducer t, HycoSubstructures b)
+{
+  const HycoBodyParts *parts = &HycoTrainingOfBodies(t)->parts;
+  const HycoScene s = t->scene;
+  PetscInt shape[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  b->n_theta = HycoBodyPartsShapes(parts, -1, shape);
+  HycoDuplicate(HYCO_MAX_PARAMETERS, shape, &b->theta);
+  PetscCall(PetscCalloc1(b->n_theta + 1, &b->logarithm));
+  PetscCall(PetscCalloc1(b->n_theta + 1, &b->n_nodes));
+  for (PetscInt p = 0; p < b->n_theta; p++) {
+    PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE};
+
+    changed[shape[p]] = PETSC_TRUE;
+    b->logarithm[p] =
+        s->lo[shape[p]] > 0 && s->hi[shape[p]] > 2 * s->lo[shape[p]] && !HycoSceneChanges(s, changed).nodes;
+  }
+  PetscCall(PetscCalloc1(b->n, &b->body));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Friction: a history of elastic bodies. */
+static PetscErrorCode TakeNoStrains(HycoReducer t)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  HycoBodiesInelastic in;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&b->inelastic));
+  in = b->inelastic;
+  in->amplification = 1;
+  PetscCall(PetscCalloc1(1, &in->T));
+  PetscCall(PetscCalloc1(1, &in->there));
+  PetscCall(PetscCalloc1(1, &in->P));
+  PetscCall(PetscCalloc1(1, &in->dof));
+  PetscCall(PetscCalloc1(1, &in->body));
+  PetscCall(PetscCalloc1(1, &in->C));
+  PetscCall(PetscCalloc1(1, &in->R));
+  PetscCall(PetscCalloc1(1, &in->A));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Condense(HycoReducer t, HycoSnapshots store, HycoBodiesFactor *factor)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMAssemble(factor->fom, b->first));
+  factor->fom->fe->heat_is_load = PETSC_TRUE;
+  PetscCheck(factor->fom->part->n_nodes == t->fom->part->n_nodes && factor->fom->part->first == t->fom->part->first,
+             PETSC_COMM_SELF, PETSC_ERR_PLIB, "two meshes of one scene differ");
+  PetscCall(HycoFOMSetParameters(t->fom, b->first));
+  PetscCall(Select(t, b, &factor->N));
+  for (PetscInt k = 0; k < b->n; k++) b->body[k].n = b->start[k + 1] - b->start[k];
+  PetscCall(HycoBodiesLoads(t, factor));
+  PetscCall(HycoBodiesSample(t, factor));
+  if (HycoBodiesFlow(t)) PetscCall(HycoBodiesStrains(t, factor));
+  PetscCall(HycoBodiesFields(t, store, factor));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Release(HycoBodiesFactor *factor)
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < factor->n_kept; k++) {
+    PetscCall(HycoDirectDestroy(&factor->kept[k].direct));
+    PetscCall(PetscFree(factor->kept[k].theta));
+  }
+  PetscCall(PetscFree(factor->kept));
+  PetscCall(MatDestroy(&factor->N));
+  for (PetscInt k = 0; k < factor->n_basis; k++) PetscCall(VecDestroy(&factor->basis[k]));
+  for (PetscInt k = 0; k < factor->n_strains; k++) PetscCall(VecDestroy(&factor->strain[k]));
+  for (PetscInt k = 0; k < factor->n_records; k++) {
+    HycoBodiesRecord *r = &factor->record[k];
+
+    HycoFreeAll(&r->theta, &r->C, &r->R, &r->Z, &r->work);
+  }
+  HycoFreeAll(&factor->basis, &factor->record, &factor->theta, &factor->pins, &factor->score, &factor->moved,
+              &factor->known, &factor->bare, &factor->in_mesh, &factor->row);
+  PetscCall(PetscFree(factor->z));
+  PetscCall(HycoFOMDestroy(&factor->fom));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBodiesModes(HycoReducer t, HycoSnapshots store)
+{
+  HycoBodiesFactor factor = {0};
+  PetscReal mu[HYCO_MAX_PARAMETERS];
+  HycoSubstructures b;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoBodiesDestroy(&HycoTrainingOfBodies(t)->bodies));
+  PetscCall(HycoBodiesCreate(&b));
+  HycoTrainingOfBodies(t)->bodies = b;
+  b->dim = t->sizes[3];
+  b->n = HycoTrainingOfBodies(t)->parts.n;
+  b->n_variables = t->scene->n_variables;
+  PetscCall(HycoReducerColumn(t, 0, mu));
+  HycoDuplicate(b->n_variables + 1, mu, &b->first);
+  PetscCall(TakeTheta(t, b));
+  if (HycoBodiesFlow(t))
+    PetscCall(HycoBodiesStrainModes(t, store));
+  else if (t->scene->n_times)
+    PetscCall(TakeNoStrains(t));
+  PetscCall(HycoFOMCreate(HycoComm(t), t->scene, &factor.fom));
+  ierr = Condense(t, store, &factor);
+  PetscCall(Release(&factor));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

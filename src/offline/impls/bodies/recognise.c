@@ -1,0 +1,446 @@
+/*
+  How the parameters enter the bodies, by evaluation. At each of some points the nodes of a body are compared with
+  those at a first point, by the similar map nearest to them (Procrustes), and the forces of a random displacement that
+  is turned with the body, K(mu) Q v, with Q K v: they are proportional if and only if K(mu) = kappa Q K Q^T, whatever
+  the laws, springs, supports and formulation are. So a body whose supports do not turn with it is not called rigidly
+  moved.
+*/
+#include <hycobodiestraining.h>
+#include <string.h>
+
+#define SIMILAR 1e-11 /* relative residual of a map and of a stiffness: above it the body changes */
+#define SAME    1e-10 /* relative change below which a quantity is the same */
+#define JOINT   3     /* points at which all parameters change */
+
+/* -- the bodies -- */
+
+PetscErrorCode HycoBodyPartsDestroy(HycoBodyParts *parts)
+{
+  PetscFunctionBegin;
+  HycoFreeAll(&parts->name, &parts->of, &parts->enters, &parts->together);
+  parts->n = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The connected parts, and the scene's bodies in each. Collective. */
+static PetscErrorCode FindParts(HycoFOM f, HycoBodyParts *parts)
+{
+  const PetscInt n_bodies = f->scene->n_bodies;
+  HycoMotions motions;
+  PetscBool *in;
+
+  PetscFunctionBegin;
+  parts->n_parameters = f->scene->n_parameters;
+  PetscCall(HycoFEFreeMotions(HycoComm(f), f->fe, &motions));
+  parts->of = motions.part;
+  motions.part = NULL;
+  PetscCall(HycoMotionsDestroy(&motions));
+  parts->n = 0;
+  for (PetscInt i = 0; i < f->part->n_nodes; i++) parts->n = PetscMax(parts->n, parts->of[i] + 1);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &parts->n, 1, MPIU_INT, MPI_MAX, HycoComm(f)));
+  PetscCall(PetscCalloc1(parts->n, &parts->name));
+  PetscCall(PetscCalloc1(parts->n * parts->n_parameters + 1, &parts->enters));
+  PetscCall(PetscMalloc1(parts->n, &parts->together));
+  PetscCall(PetscCalloc1(parts->n * n_bodies, &in));
+  for (PetscInt e = 0; e < f->part->n_cells; e++)
+    in[parts->of[f->part->cells[e * f->part->nv]] * n_bodies + f->part->cell_body[e]] = PETSC_TRUE;
+  HycoAllreduce(in, parts->n * n_bodies, HYCO_MPI_BOOL, MPI_LOR, HycoComm(f));
+  for (PetscInt k = 0; k < parts->n * n_bodies; k++) {
+    char *name = parts->name[k / n_bodies];
+    const size_t length = strlen(name);
+
+    parts->together[k / n_bodies] = PETSC_TRUE;
+    if (in[k]) snprintf(name + length, 64 - length, "%s%s", length ? " + " : "", f->scene->body[k % n_bodies].name);
+  }
+  PetscCall(PetscFree(in));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* State of a comparison. */
+typedef struct {
+  HycoFOM f;
+  HycoBodyParts *parts;
+  PetscReal *X0;                 /* the nodes at the first point */
+  Mat K;                         /* at the current point */
+  Vec v, y, now, product, F0, F; /* at the first point: v, K v, F */
+  HycoPose *pose;
+  PetscReal *kappa, *off; /* by body: the factor of the stiffness, the relative distance from it; < 0: no stiffness */
+  PetscReal *load;        /* n x 2: change of the load with and without that factor, relative */
+} Compared;
+
+static PetscErrorCode MoveTo(HycoFOM f, const PetscReal mu[])
+{
+  PetscFunctionBegin;
+  HycoOnEach(HycoComm(f), HycoFESetParameters(f->fe, mu));
+  if (f->size > 1) PetscCall(HycoFEAgreeOnMirrors(HycoComm(f), f->fe));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* to = Q from (back: Q^T from) on this rank's unknowns, by body. */
+static PetscErrorCode Turn(const Compared *c, PetscBool back, Vec from, Vec to)
+{
+  HycoMesh m = c->f->part;
+  const PetscInt dim = m->dim;
+  const PetscScalar *a;
+  PetscScalar *b;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetArrayRead(from, &a));
+  PetscCall(VecGetArray(to, &b));
+  for (PetscInt i = 0; i < m->n_nodes; i++) {
+    const PetscInt own = HycoMeshOwned(m, i);
+
+    if (own >= 0) HycoPoseTurn(c->pose[c->parts->of[i]].Q, dim, back, a + own * dim, b + own * dim);
+  }
+  PetscCall(VecRestoreArray(to, &b));
+  PetscCall(VecRestoreArrayRead(from, &a));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A displacement that is 0 where fixed, of this rank's unknowns. */
+static PetscErrorCode SetProbe(Compared *c)
+{
+  HycoMesh m = c->f->part;
+  const PetscInt dim = m->dim;
+  PetscScalar *v;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetArray(c->v, &v));
+  for (PetscInt k = 0; k < m->n_nodes * dim; k++) {
+    const PetscInt own = HycoMeshOwned(m, k / dim), whole = m->node_whole ? m->node_whole[k / dim] : k / dim;
+    const PetscReal number = (PetscReal)(whole * dim + k % dim + 1);
+
+    if (own >= 0) v[own * dim + k % dim] = c->f->fe->fixed[k] ? 0 : PetscSinReal(1.7 * number * number + number);
+  }
+  PetscCall(VecRestoreArray(c->v, &v));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+enum { AA, AB, BB, AT_FIXED, F00, F0F, FF, SUMS };
+
+/* Sums over the free unknowns of each body of a = Q K v and b = K(mu) Q v, and of the loads. */
+static PetscErrorCode Sums(Compared *c, PetscReal sum[])
+{
+  HycoMesh m = c->f->part;
+  const PetscInt dim = m->dim;
+  const PetscScalar *a, *b, *v, *F0, *F;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(sum, SUMS * c->parts->n));
+  PetscCall(VecGetArrayRead(c->y, &a));
+  PetscCall(VecGetArrayRead(c->product, &b));
+  PetscCall(VecGetArrayRead(c->now, &v));
+  PetscCall(VecGetArrayRead(c->F0, &F0));
+  PetscCall(VecGetArrayRead(c->F, &F));
+  for (PetscInt i = 0; i < m->n_nodes; i++) {
+    const PetscInt own = HycoMeshOwned(m, i);
+    PetscReal *s = sum + SUMS * c->parts->of[i], Qa[3], QF[3];
+
+    if (own < 0) continue;
+    HycoPoseTurn(c->pose[c->parts->of[i]].Q, dim, PETSC_FALSE, a + own * dim, Qa);
+    HycoPoseTurn(c->pose[c->parts->of[i]].Q, dim, PETSC_FALSE, F0 + own * dim, QF);
+    for (PetscInt d = 0; d < dim; d++) {
+      const PetscInt k = own * dim + d;
+
+      s[AT_FIXED] += c->f->fe->fixed[i * dim + d] ? PetscAbsReal(v[k]) : 0;
+      if (c->f->fe->fixed[i * dim + d]) continue;
+      s[AA] += Qa[d] * Qa[d];
+      s[AB] += Qa[d] * b[k];
+      s[BB] += b[k] * b[k];
+      s[F00] += QF[d] * QF[d];
+      s[F0F] += QF[d] * F[k];
+      s[FF] += F[k] * F[k];
+    }
+  }
+  PetscCall(VecRestoreArrayRead(c->y, &a));
+  PetscCall(VecRestoreArrayRead(c->product, &b));
+  PetscCall(VecRestoreArrayRead(c->now, &v));
+  PetscCall(VecRestoreArrayRead(c->F0, &F0));
+  PetscCall(VecRestoreArrayRead(c->F, &F));
+  HycoAllreduce(sum, SUMS * c->parts->n, MPIU_REAL, MPI_SUM, HycoComm(c->f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The largest entry of K(mu) Q v - kappa Q K v relative to the root of the mean square, by body: |b - kappa a| from
+   the sums alone would be exact to the root of the round-off only. */
+static PetscErrorCode Distances(Compared *c, const PetscReal sum[])
+{
+  HycoMesh m = c->f->part;
+  const PetscInt dim = m->dim, n = c->parts->n;
+  const PetscScalar *a, *b, *F0, *F;
+  PetscReal *rest;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(3 * n, &rest));
+  PetscCall(VecGetArrayRead(c->y, &a));
+  PetscCall(VecGetArrayRead(c->product, &b));
+  PetscCall(VecGetArrayRead(c->F0, &F0));
+  PetscCall(VecGetArrayRead(c->F, &F));
+  for (PetscInt i = 0; i < m->n_nodes; i++) {
+    const PetscInt own = HycoMeshOwned(m, i), body = c->parts->of[i];
+    PetscReal Qa[3], QF[3], *r = rest + 3 * body;
+
+    if (own < 0) continue;
+    HycoPoseTurn(c->pose[body].Q, dim, PETSC_FALSE, a + own * dim, Qa);
+    HycoPoseTurn(c->pose[body].Q, dim, PETSC_FALSE, F0 + own * dim, QF);
+    for (PetscInt d = 0; d < dim; d++) {
+      const PetscInt k = own * dim + d;
+
+      if (c->f->fe->fixed[i * dim + d]) continue;
+      r[0] += PetscSqr(b[k] - c->kappa[body] * Qa[d]);
+      r[1] += PetscSqr(F[k] - QF[d]);
+      r[2] += PetscSqr(F[k] - c->kappa[body] * QF[d]);
+    }
+  }
+  PetscCall(VecRestoreArrayRead(c->y, &a));
+  PetscCall(VecRestoreArrayRead(c->product, &b));
+  PetscCall(VecRestoreArrayRead(c->F0, &F0));
+  PetscCall(VecRestoreArrayRead(c->F, &F));
+  HycoAllreduce(rest, 3 * n, MPIU_REAL, MPI_SUM, HycoComm(c->f));
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscReal size = PetscMax(sum[SUMS * k + F00], sum[SUMS * k + FF]);
+
+    c->off[k] = sum[SUMS * k + BB] > 0 ? PetscSqrtReal(rest[3 * k] / sum[SUMS * k + BB]) : 0;
+    if (sum[SUMS * k + AT_FIXED] > SIMILAR * c->f->n_nodes) c->off[k] = 1; /* supports that do not turn */
+    c->load[2 * k] = size > 0 ? PetscSqrtReal(rest[3 * k + 1] / size) : 0;
+    c->load[2 * k + 1] = size > 0 ? PetscSqrtReal(rest[3 * k + 2] / size) : 0;
+  }
+  PetscCall(PetscFree(rest));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Poses, factors and changes of the loads at mu relative to the first point. Collective. */
+static PetscErrorCode Compare(Compared *c, const PetscReal mu[])
+{
+  PetscReal *sum;
+
+  PetscFunctionBegin;
+  PetscCall(MoveTo(c->f, mu));
+  PetscCall(HycoBodyPoses(c->f, c->parts->n, c->parts->of, c->X0, c->pose));
+  HycoOnEach(HycoComm(c->f), HycoFEAssembleStiffness(c->f->fe, c->K));
+  HycoOnEach(HycoComm(c->f), HycoFEAssembleForce(c->f->fe, c->F));
+  PetscCall(Turn(c, PETSC_FALSE, c->v, c->now));
+  PetscCall(MatMult(c->K, c->now, c->product));
+  PetscCall(PetscMalloc1(SUMS * c->parts->n, &sum));
+  PetscCall(Sums(c, sum));
+  for (PetscInt k = 0; k < c->parts->n; k++)
+    c->kappa[k] = sum[SUMS * k + AA] > 0 ? sum[SUMS * k + AB] / sum[SUMS * k + AA] : 1;
+  PetscCall(Distances(c, sum));
+  PetscCall(PetscFree(sum));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The ways in which body k differs from the first point. */
+static PetscInt Ways(const Compared *c, PetscInt k)
+{
+  const HycoPose *pose = &c->pose[k];
+  const PetscReal scaled = PetscPowReal(pose->s, (PetscReal)HycoPosePower(c->f->fe));
+  PetscReal turned = 0;
+  PetscInt ways = 0;
+
+  if (pose->residual > SIMILAR || c->off[k] > SIMILAR || !(c->kappa[k] > 0)) return HYCO_ENTERS_SHAPE;
+  for (PetscInt d = 0; d < 9; d++) turned = PetscMax(turned, PetscAbsReal(pose->Q[d] - (d % 4 == 0)));
+  if (turned > SAME) ways |= HYCO_ENTERS_PLACE;
+  if (PetscAbsReal(pose->s - 1) > SAME) ways |= HYCO_ENTERS_SIZE;
+  if (PetscAbsReal(c->kappa[k] / scaled - 1) > SAME) ways |= HYCO_ENTERS_FACTOR;
+  if (PetscMin(c->load[2 * k], c->load[2 * k + 1]) > SAME) ways |= HYCO_ENTERS_LOADS;
+  return ways;
+}
+
+/* Whether the nodes of each body have moved, beyond turning and scaling. Collective. */
+static PetscErrorCode Shifted(Compared *c, PetscBool moved[])
+{
+  const PetscReal length = HycoMeshLength(c->f->part);
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(moved, c->parts->n));
+  for (PetscInt i = 0; i < 3 * c->f->part->n_nodes; i++) {
+    if (PetscAbsReal(c->f->fe->X[i] - c->X0[i]) > 1e-12 * length) moved[c->parts->of[i / 3]] = PETSC_TRUE;
+  }
+  HycoAllreduce(moved, c->parts->n, HYCO_MPI_BOOL, MPI_LOR, HycoComm(c->f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Stores nodes, K v and F at this point, with which the others are compared. Collective. */
+static PetscErrorCode SetReference(Compared *c, const PetscReal mu[])
+{
+  PetscFunctionBegin;
+  PetscCall(MoveTo(c->f, mu));
+  PetscCall(PetscArraycpy(c->X0, c->f->fe->X, 3 * c->f->part->n_nodes));
+  HycoOnEach(HycoComm(c->f), HycoFEAssembleStiffness(c->f->fe, c->K));
+  HycoOnEach(HycoComm(c->f), HycoFEAssembleForce(c->f->fe, c->F0));
+  PetscCall(SetProbe(c));
+  PetscCall(MatMult(c->K, c->v, c->y));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* All parameters at once, compared with points that have the same values of those that change shapes. Collective. */
+static PetscErrorCode VisitTogether(Compared *c, const PetscReal first[])
+{
+  HycoScene s = c->f->scene;
+  PetscReal mu[HYCO_MAX_PARAMETERS], from[HYCO_MAX_PARAMETERS];
+  PetscInt shape[HYCO_MAX_PARAMETERS];
+  const PetscInt n = HycoBodyPartsShapes(c->parts, -1, shape);
+
+  PetscFunctionBegin;
+  for (PetscInt q = 0; s->n_parameters > 1 && q < JOINT; q++) {
+    PetscCall(PetscArraycpy(from, first, s->n_variables));
+    PetscCall(PetscArraycpy(mu, first, s->n_variables));
+    for (PetscInt p = 0; p < s->n_parameters; p++) {
+      const PetscReal at = (q + 1) * 0.6180339887 + p * 0.7548776662;
+
+      mu[p] = s->lo[p] + (at - (PetscInt)at) * (s->hi[p] - s->lo[p]);
+    }
+    for (PetscInt k = 0; k < n; k++) from[shape[k]] = mu[shape[k]];
+    if (n) PetscCall(SetReference(c, from));
+    PetscCall(Compare(c, mu));
+    for (PetscInt k = 0; k < c->parts->n; k++)
+      if (Ways(c, k) & HYCO_ENTERS_SHAPE) c->parts->together[k] = PETSC_FALSE;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Each parameter alone at two points. Collective. */
+static PetscErrorCode Visit(Compared *c, const PetscReal first[])
+{
+  static const PetscReal share[2] = {0.137, 0.829};
+  HycoScene s = c->f->scene;
+  PetscReal mu[HYCO_MAX_PARAMETERS];
+  PetscBool *moved;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(c->parts->n, &moved));
+  for (PetscInt q = 0; q < 2 * s->n_parameters; q++) {
+    const PetscInt p = q / 2;
+
+    if (!(s->hi[p] > s->lo[p])) continue;
+    PetscCall(PetscArraycpy(mu, first, s->n_variables));
+    mu[p] = s->lo[p] + share[q % 2] * (s->hi[p] - s->lo[p]);
+    PetscCall(Compare(c, mu));
+    PetscCall(Shifted(c, moved));
+    for (PetscInt k = 0; k < c->parts->n; k++) {
+      PetscInt ways = Ways(c, k);
+
+      if (moved[k] && !(ways & (HYCO_ENTERS_SHAPE | HYCO_ENTERS_SIZE))) ways |= HYCO_ENTERS_PLACE;
+      c->parts->enters[k * s->n_parameters + p] |= ways;
+    }
+  }
+  PetscCall(PetscFree(moved));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode CompareAll(Compared *c, const PetscReal first[])
+{
+  PetscFunctionBegin;
+  PetscCall(SetReference(c, first));
+  PetscCall(Visit(c, first));
+  PetscCall(VisitTogether(c, first));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBodyPartsFind(HycoFOM f, const PetscReal first[], HycoBodyParts *parts)
+{
+  Compared c = {.f = f, .parts = parts};
+  Vec *const all[6] = {&c.y, &c.now, &c.product, &c.F0, &c.F, &c.v};
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMemzero(parts, sizeof(*parts)));
+  PetscCall(MoveTo(f, first));
+  PetscCall(FindParts(f, parts));
+  PetscCall(HycoFECreateMatrix(f->fe, HycoComm(f), f->part->n_owned, f->part->first, &c.K));
+  PetscCall(MatCreateVecs(c.K, &c.v, NULL));
+  for (int k = 0; k < 5; k++) PetscCall(VecDuplicate(c.v, all[k]));
+  PetscCall(PetscMalloc1(3 * f->part->n_nodes, &c.X0));
+  PetscCall(PetscMalloc4(parts->n, &c.pose, parts->n, &c.kappa, parts->n, &c.off, 2 * parts->n, &c.load));
+  ierr = CompareAll(&c, first);
+  PetscCall(PetscFree4(c.pose, c.kappa, c.off, c.load));
+  PetscCall(PetscFree(c.X0));
+  for (int k = 0; k < 6; k++) PetscCall(VecDestroy(all[k]));
+  PetscCall(MatDestroy(&c.K));
+  f->fe->ready = PETSC_FALSE; /* matrices of fom do not belong to its present parameters */
+  if (ierr) PetscCall(HycoBodyPartsDestroy(parts));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- in words -- */
+
+/* "moves body cylinder rigidly, changes the loads of body block"; "" if the parameter enters no body. Loads of a path depend
+   on time, and are not told. */
+static PetscErrorCode DescribeOne(const HycoBodyParts *parts, PetscInt p, PetscBool path, char text[HYCO_LINE])
+{
+  static const struct {
+    PetscInt way;
+    const char *before, *after;
+  } words[] = {{HYCO_ENTERS_PLACE, "moves", " rigidly"},
+               {HYCO_ENTERS_SIZE, "enlarges", " uniformly"},
+               {HYCO_ENTERS_FACTOR, "scales the stiffness of", ""},
+               {HYCO_ENTERS_LOADS, "changes loads or given displacements of", ""},
+               {HYCO_ENTERS_SHAPE, "changes the shape or the material of", ", which needs samples"}};
+
+  PetscFunctionBegin;
+  text[0] = '\0';
+  for (size_t w = 0; w < sizeof(words) / sizeof(words[0]); w++) {
+    char names[HYCO_LINE] = "", one[HYCO_LINE];
+
+    if (path && words[w].way == HYCO_ENTERS_LOADS) continue;
+    for (PetscInt k = 0; k < parts->n; k++) {
+      const PetscInt enters = parts->enters[k * parts->n_parameters + p];
+
+      if (!(enters & words[w].way) || (words[w].way != HYCO_ENTERS_SHAPE && enters & HYCO_ENTERS_SHAPE)) continue;
+      PetscCall(HycoListAdd(names, ", ", parts->name[k]));
+    }
+    if (!names[0]) continue;
+    HycoFormat(one, "%s body %s%s", words[w].before, names, words[w].after);
+    PetscCall(HycoListAdd(text, ", ", one));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscInt HycoBodyPartsShapes(const HycoBodyParts *parts, PetscInt b, PetscInt parameter[])
+{
+  PetscInt n = 0;
+
+  for (PetscInt p = 0; p < parts->n_parameters; p++) {
+    PetscBool any = PETSC_FALSE;
+
+    for (PetscInt k = 0; k < parts->n; k++) {
+      if ((b < 0 || k == b) && parts->enters[k * parts->n_parameters + p] & HYCO_ENTERS_SHAPE) any = PETSC_TRUE;
+    }
+    if (any) parameter[n++] = p;
+  }
+  return n;
+}
+
+PetscInt HycoBodyPartsFail(const HycoBodyParts *parts)
+{
+  for (PetscInt k = 0; k < parts->n; k++) {
+    if (!parts->together[k]) return k;
+  }
+  return -1;
+}
+
+PetscErrorCode HycoBodyPartsDescribe(HycoScene s, const HycoBodyParts *parts, char text[HYCO_LINE])
+{
+  PetscInt shape[HYCO_MAX_PARAMETERS], body;
+  char one[HYCO_LINE], line[HYCO_LINE];
+
+  PetscFunctionBegin;
+  text[0] = '\0';
+  for (PetscInt p = 0; p < s->n_parameters; p++) {
+    PetscCall(DescribeOne(parts, p, (PetscBool)(s->n_times > 0), one));
+    HycoFormat(line, "%s: %s", s->parameter[p],
+               one[0]       ? one
+               : s->n_times ? "leaves places and elastic stiffness as they are"
+                            : "enters no body");
+    PetscCall(HycoListAdd(text, "; ", line));
+  }
+  body = HycoBodyPartsFail(parts);
+  if (body >= 0) {
+    HycoFormat(line, "body %s changes its shape where parameters change together", parts->name[body]);
+    PetscCall(HycoListAdd(text, "; ", line));
+  } else if (!HycoBodyPartsShapes(parts, -1, shape))
+    PetscCall(HycoListAdd(text, "; ", "nothing needs a sample"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,526 @@
+/*
+  The choice of full-order displacements (section 5.2). Full row rank is not a sufficient criterion: choices that
+  satisfy it differ a hundredfold in error. A choice is judged by the condition of its basis and by the model's error on
+  the training snapshots.
+
+  rank: the smallest number that gives B[A_lambda, A_c] Vbar[A_c,:] full row rank. Start: the contacts whose balance
+  rows K V depend on those of others; then exchanges one by one while the mean training error of u decreases. all: the
+  modes' coefficients follow from U[A] by ridge regression, whose ridge is chosen by the same error.
+*/
+#include <hycoalgorithms.h>
+#include <hycogalerkintraining.h>
+#include <hycohybrid.h>
+#include <hycotrainers.h>
+
+#define WORST HYCO_JUDGED_WORST
+
+/* The options of this type. */
+typedef struct {
+  PetscInt trials; /* rank: largest number of choices that are judged; 0: automatic */
+  PetscReal ridge; /* all; < 0: automatic */
+} * Training;
+
+static PetscErrorCode SetFromOptions(HycoReducer t)
+{
+  Training s;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&s));
+  t->training = s;
+  s->ridge = -1;
+  PetscObjectOptionsBegin((PetscObject)t);
+  PetscCall(HycoOptionsFor("hybrid"));
+  PetscCall(HycoOptionsInt(
+      "-hyco_hybrid_trials",
+      "with -hyco_hybrid rank: number of candidate sets that are judged by their training error (0: from the size)", 0,
+      PETSC_MAX_INT / 8, &s->trials, NULL));
+  PetscCall(HycoOptionsReal("-hyco_hybrid_ridge",
+                            "with -hyco_hybrid all: strength of the ridge regression for the modes (-1: by the "
+                            "training error; 0: plain least squares)",
+                            -1, 1, &s->ridge, NULL));
+  PetscOptionsEnd();
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The unknown of each contact of A_lambda that may be full order: its largest entry in A not taken by another. */
+static PetscErrorCode Candidates(HycoROM m, PetscInt candidate[])
+{
+  HycoGalerkin g = (HycoGalerkin)m->work;
+  const PetscInt dim = m->model->mesh->dim;
+  PetscInt *sets;
+  PetscBool *taken;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc2(m->model->mesh->n_nodes * dim, &taken, m->model->mesh->n_nodes, &sets));
+  PetscCall(HycoROMGetDomain(m, sets));
+  for (PetscInt k = 0; k < m->m; k++) candidate[k] = -1;
+  for (PetscInt pass = 0; pass < 2; pass++) { /* first those with slave in A: the others have only shared masters */
+    for (PetscInt k = 0; k < m->m; k++) {
+      const PetscInt slave = HycoPairsSlave(&m->model->pairs, m->contact[k]);
+      PetscReal best = 0;
+
+      if ((sets[slave] == 2) != (pass == 0)) continue;
+      for (PetscInt t = g->own_rows.start[k]; t < g->own_rows.start[k + 1]; t++) {
+        const PetscInt dof = g->own_rows.dof[t];
+
+        if (taken[dof] || sets[dof / dim] < 2) continue;
+        if (PetscAbsReal(g->own_rows.value[t]) <= best * (1 + 1e-12)) continue;
+        best = PetscAbsReal(g->own_rows.value[t]);
+        candidate[k] = dof;
+      }
+      if (candidate[k] >= 0) taken[candidate[k]] = PETSC_TRUE;
+    }
+  }
+  PetscCall(PetscFree2(taken, sets));
+  for (PetscInt k = 0; k < m->m; k++)
+    HycoCheckModel(candidate[k] >= 0,
+                   "the contact of node %d has no displacement of its own in A that could stay full order; use "
+                   "-hyco_hybrid contact",
+                   (int)m->slave_id[m->contact[k]]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Smallest singular value of B[A_lambda, A_c] Vbar[A_c,:] over its largest, for the current choice. */
+static PetscErrorCode RowRank(HycoROM m, PetscReal *ratio)
+{
+  HycoGalerkin g = (HycoGalerkin)m->work;
+  Mat dense;
+  PetscScalar *b;
+  PetscReal smallest, largest;
+
+  PetscFunctionBegin;
+  *ratio = 1;
+  if (!m->m) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(MatConvert(g->Br, MATSEQDENSE, MAT_INITIAL_MATRIX, &dense));
+  PetscCall(MatDenseGetArray(dense, &b));
+  PetscCall(HycoExtremeSingularValues(m->m, m->n, b, &smallest, &largest));
+  PetscCall(MatDenseRestoreArray(dense, &b));
+  PetscCall(MatDestroy(&dense));
+  *ratio = m->m > m->n || largest == 0 ? 0 : smallest / largest;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The model at the middle of the parameters' ranges, without full-order unknowns, to inspect its rows. */
+static PetscErrorCode Assembled(HycoReducer t, HycoROM m)
+{
+  PetscInt n_par;
+  const PetscReal *mu;
+  PetscReal middle[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
+  for (PetscInt p = 0; p < n_par; p++) middle[p] = (t->scene->lo[p] + t->scene->hi[p]) / 2;
+  m->reconstruct = PETSC_FALSE;
+  PetscCall(HycoROMPredict(m, n_par, middle));
+  m->reconstruct = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A V on some rows and columns of A: P[k * l + j] for row k and mode j. */
+static PetscErrorCode TimesModes(HycoROM m, Mat A, IS rows, IS columns, PetscReal P[])
+{
+  Mat Vt, V, part, modes, product;
+  IS all;
+  const PetscScalar *p;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, m->model->l, m->fe->n_dof, m->model->V, &Vt));
+  PetscCall(MatTranspose(Vt, MAT_INITIAL_MATRIX, &V));
+  PetscCall(ISCreateStride(PETSC_COMM_SELF, m->model->l, 0, 1, &all));
+  PetscCall(MatCreateSubMatrix(A, rows, columns, MAT_INITIAL_MATRIX, &part));
+  PetscCall(MatCreateSubMatrix(V, columns, all, MAT_INITIAL_MATRIX, &modes));
+  PetscCall(MatMatMult(part, modes, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &product));
+  PetscCall(ISGetLocalSize(rows, &n));
+  PetscCall(MatDenseGetArrayRead(product, &p));
+  for (PetscInt k = 0; k < n; k++) {
+    for (PetscInt j = 0; j < m->model->l; j++) P[k * m->model->l + j] = p[j * n + k];
+  }
+  PetscCall(MatDenseRestoreArrayRead(product, &p));
+  PetscCall(MatDestroy(&product));
+  PetscCall(MatDestroy(&modes));
+  PetscCall(MatDestroy(&part));
+  PetscCall(ISDestroy(&all));
+  PetscCall(MatDestroy(&V));
+  PetscCall(MatDestroy(&Vt));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* B[A_lambda, A_c] V[A_c,:], and the candidates' rows of K V. */
+static PetscErrorCode ContactRows(HycoROM m, const PetscInt candidate[], PetscReal BV[], PetscReal KV[])
+{
+  HycoGalerkin g = (HycoGalerkin)m->work;
+  IS candidates, unknowns;
+
+  PetscFunctionBegin;
+  PetscCall(HycoGalerkinContactMatrix(m));
+  PetscCall(ISCreateStride(PETSC_COMM_SELF, m->fe->n_dof, 0, 1, &unknowns));
+  PetscCall(ISCreateGeneral(PETSC_COMM_SELF, m->m, candidate, PETSC_COPY_VALUES, &candidates));
+  PetscCall(TimesModes(m, g->B, g->sets.is_A_lambda, g->sets.is_Ac, BV));
+  PetscCall(TimesModes(m, g->K, candidates, unknowns, KV));
+  PetscCall(ISDestroy(&candidates));
+  PetscCall(ISDestroy(&unknowns));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Numerical rank of B[A_lambda, A_c] V[A_c,:] and the contacts that the modes resolve best (first `rank` of pivot), by
+   their balance rows K V or by their rows B V weighted with the singular values. */
+static PetscErrorCode ResolvedContacts(HycoROM m, const PetscInt candidate[], PetscBool balance, PetscInt *rank,
+                                       PetscInt pivot[])
+{
+  const PetscInt l = m->model->l;
+  PetscReal *BV, *KV;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc2(l * m->m, &BV, l * m->m, &KV));
+  PetscCall(ContactRows(m, candidate, BV, KV));
+  *rank = 0;
+  {
+    PetscReal smallest = 0, largest = 1;
+
+    for (PetscInt r = PetscMin(l, m->m); r > 0 && !*rank;
+         r--) { /* the first r modes that are independent on the contacts */
+      PetscReal *first;
+
+      PetscCall(PetscMalloc1(r * m->m, &first));
+      for (PetscInt k = 0; k < m->m; k++) PetscCall(PetscArraycpy(first + k * r, BV + k * l, r));
+      PetscCall(HycoExtremeSingularValues(r, m->m, first, &smallest, &largest));
+      if (smallest > 1e-10 * largest) *rank = r;
+      PetscCall(PetscFree(first));
+    }
+  }
+  for (PetscInt k = 0; k < m->m * l; k++) BV[k] *= m->model->sigma[k % l] / m->model->sigma[0];
+  PetscCall(HycoPivotColumns(l, m->m, balance ? KV : BV, *rank, pivot));
+  PetscCall(PetscFree2(BV, KV));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A judged set of candidates; stored by its hash, so that none is judged twice. */
+typedef struct {
+  PetscReal u, lambda, rank;
+} Verdict;
+
+#define SAME 1e-6 /* relative difference of equal errors */
+
+/* most: a mean error of u above it is of no interest. */
+static PetscErrorCode JudgeSet(HycoReducer t, HycoROM m, PetscInt n, const PetscInt dof[], PetscReal most, Verdict *v)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoROMSetFE(m, HYCO_HYBRID_RANK, n, dof));
+  PetscCall(Assembled(t, m));
+  PetscCall(RowRank(m, &v->rank));
+  v->u = v->lambda = WORST;
+  if (v->rank > 1e-10) PetscCall(HycoReducerJudgeMeans(t, m, most, &v->u, &v->lambda));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscBool Better(const Verdict *a, const Verdict *b)
+{
+  if (a->u < b->u * (1 - SAME)) return PETSC_TRUE;
+  return (PetscBool)(a->u <= b->u * (1 + SAME) && a->rank > b->rank * (1 + SAME));
+}
+
+/* Exchanges one full-order unknown for one candidate while the error decreases. chosen[k]: candidate k is full
+   order. */
+static PetscErrorCode Exchange(HycoReducer t, HycoROM m, PetscInt n, const PetscInt candidate[], PetscBool chosen[],
+                               Verdict *best)
+{
+  const PetscInt N = m->m;
+  /* a trial solves every snapshot: their number is limited by the work, so that a large model does not take hours */
+  const PetscInt limit = ((Training)t->training)->trials ? ((Training)t->training)->trials
+                                                         : 1 + (PetscInt)(1e6 / ((PetscReal)t->n_s * (PetscReal)m->n));
+  PetscInt trials = 1, n_seen = 0, *dof;
+  unsigned long long *seen;
+  PetscBool improved = PETSC_TRUE;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(n, &dof, limit + 1, &seen));
+  while (improved && trials < limit) {
+    PetscInt out = -1, in = -1;
+    Verdict verdict, round = *best;
+
+    improved = PETSC_FALSE;
+    for (PetscInt i = 0; i < N; i++) {
+      for (PetscInt j = 0; j < N && trials < limit; j++) {
+        PetscInt k = 0;
+        PetscBool past = PETSC_FALSE;
+        unsigned long long hash;
+
+        if (!chosen[i] || chosen[j]) continue;
+        chosen[i] = PETSC_FALSE;
+        chosen[j] = PETSC_TRUE;
+        hash = HycoSetHash(N, chosen);
+        for (PetscInt s = 0; s < n_seen; s++) past = (PetscBool)(past || seen[s] == hash);
+        for (PetscInt c = 0; c < N; c++) {
+          if (chosen[c]) dof[k++] = candidate[c];
+        }
+        if (!past) {
+          seen[n_seen++] = hash;
+          PetscCall(HycoReducerTell(t, "choices of full-order displacements", trials, limit));
+          trials++;
+          PetscCall(JudgeSet(t, m, n, dof, round.u * (1 + SAME), &verdict));
+          if (Better(&verdict, &round)) {
+            round = verdict;
+            out = i;
+            in = j;
+          }
+        }
+        chosen[i] = PETSC_TRUE;
+        chosen[j] = PETSC_FALSE;
+      }
+    }
+    if (out >= 0) {
+      chosen[out] = PETSC_FALSE;
+      chosen[in] = PETSC_TRUE;
+      *best = round;
+      improved = PETSC_TRUE;
+    }
+  }
+  PetscCall(PetscFree2(dof, seen));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One start, then exchanges. Starts 0 and 1: the contacts that the modes do not resolve, by balance rows and by
+   contact rows; later ones: the same number, evenly distributed. */
+static PetscErrorCode SearchFrom(HycoReducer t, HycoROM m, PetscInt start, PetscInt *n, PetscInt dof[],
+                                 Verdict *verdict)
+{
+  PetscInt rank = 0, N, *candidate, *pivot;
+  PetscBool *chosen;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMSetFE(m, HYCO_HYBRID_RANK, 0, NULL));
+  PetscCall(Assembled(t, m));
+  N = m->m;
+  PetscCall(PetscMalloc3(N, &candidate, N, &pivot, N, &chosen));
+  PetscCall(Candidates(m, candidate));
+  PetscCall(ResolvedContacts(m, candidate, (PetscBool)(start == 0), &rank, pivot));
+  for (PetscInt k = 0; k < N; k++) chosen[k] = (PetscBool)(start < 2);
+  for (PetscInt k = 0; k < rank && start < 2; k++) chosen[pivot[k]] = PETSC_FALSE;
+  for (PetscInt k = 0; k < N - rank && start >= 2; k++) chosen[(k * N / (N - rank) + start - 2) % N] = PETSC_TRUE;
+  for (PetscInt pass = 0; pass < 2; pass++) {
+    *n = 0;
+    for (PetscInt k = 0; k < N; k++) {
+      if (chosen[k]) dof[(*n)++] = candidate[k];
+    }
+    if (pass) break;
+    PetscCall(JudgeSet(t, m, *n, dof, PETSC_INFINITY, verdict));
+    if (*n && *n < N) PetscCall(Exchange(t, m, *n, candidate, chosen, verdict));
+  }
+  PetscCall(PetscFree3(candidate, pivot, chosen));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The best result of several starts; of one if a trial is expensive. */
+static PetscErrorCode ChooseRank(HycoReducer t, HycoROM m, Verdict *best)
+{
+  const PetscInt room = m->model->pairs.n, starts = (PetscReal)t->n_s * (PetscReal)m->model->l < 1e4 ? 5 : 1;
+  PetscInt n = 0, other = 0, *dof, *trial;
+  Verdict verdict;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(room, &dof, room, &trial));
+  for (PetscInt start = 0; start < starts; start++) {
+    PetscCall(SearchFrom(t, m, start, &other, trial, &verdict));
+    if (start && !Better(&verdict, best)) continue;
+    *best = verdict;
+    n = other;
+    PetscCall(PetscArraycpy(dof, trial, n));
+  }
+  PetscCall(HycoROMSetFE(m, HYCO_HYBRID_RANK, n, dof));
+  PetscCall(PetscFree2(dof, trial));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Marks nodes of the model's mesh that belong to a contact, on moved surfaces at any parameters. */
+static PetscErrorCode MarkContact(HycoReducer t, HycoROM m, PetscBool contact[])
+{
+  const PetscInt n = t->fom->surface->n_nodes;
+  PetscBool *met;
+
+  PetscFunctionBegin;
+  if (!t->fom->searches) {
+    HycoPairsMark(&m->model->pairs, contact);
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(PetscCalloc1(n, &met));
+  HycoPairsMark(&t->met.rows, met);
+  for (PetscInt i = 0; i < n; i++) {
+    if (met[i]) contact[t->surface_node[i]] = PETSC_TRUE;
+  }
+  PetscCall(PetscFree(met));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The free unknowns of the nodes of A: all, or those of contact nodes. */
+static PetscErrorCode FreeUnknowns(HycoReducer t, HycoROM m, PetscBool contact_only, PetscInt *n, PetscInt dof[])
+{
+  const PetscInt dim = m->model->mesh->dim, *node;
+  PetscInt n_A;
+  PetscBool *contact;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(m->model->mesh->n_nodes, &contact));
+  PetscCall(MarkContact(t, m, contact));
+  *n = 0;
+  PetscCall(ISGetLocalSize(m->model->inside, &n_A));
+  PetscCall(ISGetIndices(m->model->inside, &node));
+  for (PetscInt k = 0; k < n_A * dim; k++) {
+    const PetscInt i = node[k / dim] * dim + k % dim;
+
+    if (!t->fixed[i] && (contact[i / dim] || !contact_only)) dof[(*n)++] = i;
+  }
+  PetscCall(ISRestoreIndices(m->model->inside, &node));
+  PetscCall(PetscFree(contact));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+#define USELESS 0.5 /* mean training error from which a model is refused */
+#define LOST                                                                                                           \
+  3 /* number of successive worse ridges that end the race of paths: above the best the errors grow                    \
+       with the ridge */
+
+/* The ridge for paths: each trial takes seconds, and some of the paths suffice to reject a ridge that is worse than
+   the best. Fails if an attempt of the search has training errors of one half with any ridge. */
+static PetscErrorCode RaceRidges(HycoReducer t, HycoROM m, PetscReal *strength)
+{
+  HycoJudged *judged, *its;
+  PetscInt n, in_a_row = 0;
+  PetscReal least = PETSC_MAX_REAL;
+  PetscBool any = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(t->samples, &n, NULL, NULL));
+  PetscCall(PetscMalloc2(n, &judged, n, &its));
+  for (PetscReal ridge = 1e-14; ridge < 1e-5 && in_a_row < LOST; ridge *= 10) {
+    PetscReal u;
+    PetscBool lost;
+
+    PetscCall(HycoGalerkinSetRidge(m, ridge));
+    PetscCall(HycoReducerJudgeRace(t, m, any ? its : NULL, t->trying ? USELESS : PETSC_INFINITY, judged, &u, &lost));
+    in_a_row += any;
+    if (lost || !(u < least)) continue;
+    PetscCall(PetscArraycpy(its, judged, n));
+    least = u;
+    *strength = ridge;
+    in_a_row = 0;
+    any = PETSC_TRUE;
+  }
+  PetscCall(PetscFree2(judged, its));
+  HycoCheckModel(any, "the model misses its own training displacements by half or more");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+#define RIDGES 10
+
+/* The ridge with the least mean training error. */
+static PetscErrorCode TryRidges(HycoReducer t, HycoROM m, PetscReal *strength)
+{
+  PetscReal least = PETSC_MAX_REAL, u, lambda;
+  PetscInt tried = 0;
+
+  PetscFunctionBegin;
+  *strength = 0;
+  for (PetscReal ridge = 1e-14; ridge < 1e-5; ridge *= 10) {
+    PetscCall(HycoReducerTell(t, "ridges", tried++, RIDGES));
+    PetscCall(HycoGalerkinSetRidge(m, ridge));
+    PetscCall(HycoReducerJudgeMeans(t, m, least, &u, &lambda));
+    if (!(u < least)) continue;
+    least = u;
+    *strength = ridge;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Takes all of A, with the ridge of the least training error. Without an interface there is no regression. */
+static PetscErrorCode ChooseAll(HycoReducer t, HycoROM m, PetscInt n, const PetscInt dof[])
+{
+  const PetscReal given = ((Training)t->training)->ridge;
+  PetscReal strength = given >= 0 ? given : t->ridge;
+  PetscInt n_rid, n_A;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMSetFE(m, HYCO_HYBRID_ALL, n, dof));
+  PetscCall(ISGetLocalSize(m->model->rid, &n_rid));
+  PetscCall(ISGetLocalSize(m->model->inside, &n_A));
+  if (n_rid == n_A) PetscFunctionReturn(PETSC_SUCCESS);
+  if (strength < 0) PetscCall(t->scene->n_times ? RaceRidges(t, m, &strength) : TryRidges(t, m, &strength));
+  PetscCall(HycoGalerkinSetRidge(m, strength));
+  if (t->trying) t->ridge = strength;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Chooses the full-order displacements; sets the training errors with this choice. */
+static PetscErrorCode ChooseUnknowns(HycoReducer t, HycoROM m)
+{
+  PetscInt n_all, n_contact, *all, *contact;
+  HycoHybrid kind = t->hybrid;
+  Verdict v = {0, 0, 1};
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(m->model->mesh->n_nodes * m->model->mesh->dim, &all,
+                         m->model->mesh->n_nodes * m->model->mesh->dim, &contact));
+  PetscCall(FreeUnknowns(t, m, PETSC_FALSE, &n_all, all));
+  PetscCall(FreeUnknowns(t, m, PETSC_TRUE, &n_contact, contact));
+  t->n_unknowns = n_all;
+  HycoCheckModel(n_all, "the RID has no interior node; enlarge it: -hyco_rid_layers 1, or smaller tolerances");
+  if (!n_contact && kind != HYCO_HYBRID_ALL)
+    kind = HYCO_HYBRID_CONTACT; /* no contact in the RID: plain hyper-reduction (31) */
+  if (kind == HYCO_HYBRID_AUTO) kind = n_contact < n_all ? HYCO_HYBRID_CONTACT : HYCO_HYBRID_ALL;
+  if (kind == HYCO_HYBRID_CONTACT && n_contact == n_all && n_contact) {
+    HycoFailNoModel("-hyco_hybrid contact leaves no equation for the modes, because every unknown of A belongs to a "
+                    "contact; use rank, all or auto");
+  }
+  HycoCheckModel(kind != HYCO_HYBRID_ALL || !t->most_full_order || n_all <= t->most_full_order,
+                 "the RID has %d unknowns, too many to keep all of them full order in a dense matrix; use -hyco_hybrid "
+                 "contact or rank",
+                 (int)n_all);
+  if (kind == HYCO_HYBRID_RANK) PetscCall(ChooseRank(t, m, &v));
+  if (kind == HYCO_HYBRID_ALL) PetscCall(ChooseAll(t, m, n_all, all));
+  if (kind == HYCO_HYBRID_CONTACT) PetscCall(HycoROMSetFE(m, HYCO_HYBRID_CONTACT, n_contact, contact));
+  PetscCall(HycoReducerJudge(t, m));
+  PetscCall(PetscFree2(all, contact));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Build(HycoROM m, HycoReducer t)
+{
+  HycoHybridModel h = (HycoHybridModel)m->model->data;
+
+  PetscFunctionBegin;
+  PetscCall(HycoReducerDualSnapshots(t, &h->n_dual, &h->S_lambda));
+  PetscCall(ChooseUnknowns(t, m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The default type. */
+static PetscBool Offers(HycoReducer t, PetscBool targets, size_t length, char why[])
+{
+  (void)t, (void)targets, (void)length, (void)why;
+  return PETSC_TRUE;
+}
+
+static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
+{
+  PetscFunctionBegin;
+  (void)t, (void)m;
+  snprintf(r->summary, sizeof(r->summary),
+           "%d snapshots; modes: %d displacement, %d stress, %d force, %d dual\n"
+           "RID: %d elements (%.1f %%), %d nodes, %d in A, %d contacts; %d full-order displacements\n",
+           (int)r->n_samples, (int)r->n_modes, (int)r->n_stress_modes, (int)r->n_force_modes, (int)r->n_dual_modes,
+           (int)r->rid_elements, 100 * (double)r->rid_fraction, (int)r->rid_nodes, (int)r->rid_a_nodes,
+           (int)r->rid_contacts, (int)r->n_fe_dofs);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTrainerCreate_Hybrid(HycoTrainerOps *ops)
+{
+  PetscFunctionBegin;
+  *ops = (HycoTrainerOps){.setfromoptions = SetFromOptions,
+                          .build = Build,
+                          .finish = HycoGalerkinFinish,
+                          .report = Report,
+                          .cost = HycoGalerkinCost,
+                          .offers = Offers};
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
