@@ -723,7 +723,9 @@ static PetscErrorCode Offers(Search *s, const HycoROM type, PetscBool *offered, 
   *offered = (*trainer.offers)(t, s->targets, HYCO_LINE, why);
   if (*offered && trainer.work) work = (*trainer.work)(t);
   if (t->late) most *= 2; /* for it may save the training solutions */
-  if (work > most)
+  if (work > most && most <= 0)
+    HycoFormat(why, "its training would take %.1e operations, and -hyco_search_budget 0 allows none", (double)work);
+  else if (work > most)
     HycoFormat(why,
                "its training would take %.1e operations, and the search may take %.1e; -hyco_search_budget %.2g allows "
                "it",

@@ -103,14 +103,16 @@ static void Contacts(HycoROM m, PetscReal *penetration, PetscReal *adhesion)
   *adhesion = Quotient(stuck, force);
 }
 
-/* What the displacement misses of the gaps at contacts with a force. */
+/* What the displacement misses of the gaps at contacts with a force, relative to the largest displacement of the
+   contacts' nodes, along the surface too: where contacts close without a gap, that across it is round-off. */
 static PetscReal Inconsistency(HycoROM m)
 {
+  const PetscInt dim = m->fe->dim;
   PetscReal lost = 0, force = 0, size = 0;
 
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
-    for (PetscInt j = m->rows.start[k]; j < m->rows.start[k + 1]; j++)
-      size = PetscMax(size, PetscAbsReal(m->U[m->rows.dof[j]]));
+    for (PetscInt j = m->rows.start[k] * dim; j < m->rows.start[k + 1] * dim; j++)
+      size = PetscMax(size, PetscAbsReal(m->U[m->rows.dof[j / dim] / dim * dim + j % dim]));
     if (!(m->Lambda[k] > 0)) continue;
     lost += m->Lambda[k] * PetscSqr(HycoROMAddRow(m, k, -m->rows.gap[k]));
     force += m->Lambda[k];

@@ -72,6 +72,12 @@ class Carried(Case):
             rows = list(csv.DictReader(f))
         return {column: np.array([float(row[column]) for row in rows]) for column in rows[0]}
 
+    def test_no_gap(self):
+        """Where all contacts close without a gap, the residual is no share of displacements that are round-off: models of bodies are full order's."""
+        self.hyco('train', '-scene', self.corner(), '-grid', '3,3', '-model', 'b.h5', '-hyco_model_type', 'bodies')
+        found, full = (self.hyco(*args, '-mu', '1,0') for args in (('predict', '-model', 'b.h5'), ('solve', '-scene', self.corner())))
+        self.agree(found['contacts'], full['contacts'], 1e-9)
+
     def test_whole(self):
         """All displacements full order on the whole mesh: agrees with full order where the map moves nodes and turns normals, in 2D and 3D."""
         for scene, train, mu in ((BLOCKS, ('-grid', '2,2'), '0.043,0.067'), (self.corner(), ('-grid', '2,2'), '1.3,0.0007')):
