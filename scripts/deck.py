@@ -692,7 +692,7 @@ class Draft:
         """The draft; afterwards `left` is complete."""
         self.history = self.inelastic() or self.rubs() or len(self.steps) > 1
         if self.rubs():
-            self.notes.append("friction is solved at full order only; reduced models need a draft made with --frictionless. More listed times follow its path more closely.")
+            self.notes.append("friction is solved at full order and by models of bodies; other models need a draft made with --frictionless. More listed times follow its path more closely.")
         self.steps = self.steps or [{"period": 1.0, "kind": "", "ramp": True}]
         sections = list(self.entries())
         lines = [f"# Draft from {self.name}. Displacements are small; bodies are in the deck's units.",
