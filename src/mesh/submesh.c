@@ -339,8 +339,9 @@ PetscErrorCode HycoSubmeshGetPoints(DM dm, IS *points)
 }
 
 /* Selects the nodes: those of cells first, then those of facets, the others and the masters of tied nodes. The
-   unknowns of assembled cells are then a leading block of the submesh. */
-static PetscErrorCode SelectNodes(Cut *c, PetscInt n_extra, const PetscInt extra[])
+   unknowns of assembled cells are then a leading block of the submesh. Or all ascending, as model files of former
+   formats may have them. */
+static PetscErrorCode SelectNodes(Cut *c, PetscBool ascending, PetscInt n_extra, const PetscInt extra[])
 {
   enum { NOT, ALSO, IN_CELL };
   HycoMesh m = c->of;
@@ -354,7 +355,7 @@ static PetscErrorCode SelectNodes(Cut *c, PetscInt n_extra, const PetscInt extra
   for (PetscInt e = 0; e < c->n_cells; e++) {
     const PetscInt n = HycoMeshCellNodes(m, c->cell[e], node);
 
-    for (PetscInt v = 0; v < n; v++) how[node[v]] = IN_CELL;
+    for (PetscInt v = 0; v < n; v++) how[node[v]] = ascending ? ALSO : IN_CELL;
   }
   for (PetscInt k = 0; k < m->n_tied; k++) {
     for (PetscInt j = m->tied_start[k]; how[m->tied[k]] && j < m->tied_start[k + 1]; j++)
@@ -401,7 +402,7 @@ static PetscErrorCode Select(Cut *c, PetscInt n_keep, const PetscInt keep[], Pet
     if (m->facet_cell[f] >= 0 && c->cell_at[m->facet_cell[f]] >= 0) continue;
     if (Takes(m, f, n_extra, n_all, all_facets)) c->facet[c->n_facets++] = f;
   }
-  PetscCall(SelectNodes(c, n_extra, extra));
+  PetscCall(SelectNodes(c, (PetscBool)(n_all == ALL_BETWEEN), n_extra, extra));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

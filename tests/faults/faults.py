@@ -69,7 +69,7 @@ CASES = [
     (['train', *T, *N, '-validation_grid', '2,2', '-validation_points', 'p.csv', '-target_u', '1e-2'], 'there are two sets of held-out points'),
     (['train', *T, *N, '-validation_grid', '2,2', '-grid_type', 'centred'], 'is also a training point'),
     (['train', *T, '-greedy', '-training_grid', '3,3', '-target_u', '1e-2'], 'for train -greedy use -target'),
-    (['train', *T, *N, '-hyco_model_type', 'condensed'], 'condensed; it must be one of: bodies'),
+    (['train', *T, *N, '-hyco_model_type', 'condensed'], '"condensed"; it must be one of: bodies'),
     (['train', *T, *N, '-hyco_dual', 'nnmf'], '-hyco_dual nnmf is for -hyco_model_type projection'),
     (['train', *T, *N, '-hyco_dual', 'fe', '-hyco_model_type', 'projection'], '-hyco_dual fe leaves a projection-based model'),
     (['train', *T, *N, '-hyco_hybrid', 'contact'], '-hyco_hybrid contact leaves no equation for the modes'),

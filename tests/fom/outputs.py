@@ -126,7 +126,7 @@ class Quantities(Case):
         """Outputs with an unknown quantity, component or group: the message lists the valid ones."""
         for outputs, said in (('output: {peak: {max: mises, min: u}}\n', 'one of max, min, mean'), ('output: {peak: {max: stress}}\n', 'must be one of'),
                               ('output: {peak: {max: u_z}}\n', 'no u_z'), ('output: {peak: {group: block}}\n', 'has no field'),
-                              ('output: {peak: {max: u, group: blok}}\n', 'blok'), ('output: {press: {max: u}}\n', 'name of a parameter'), ('output: {peak: {largest: u}}\n', 'max, min, mean, reaction, force, moment, friction, group, contact')):
+                              ('output: {peak: {max: u, group: blok}}\n', 'blok'), ('output: {press: {max: u}}\n', 'name of a parameter'), ('output: {peak: {largest: u}}\n', 'max, min, mean, reaction, force, moment, friction, area, group, contact')):
             for ranks in (0, 2):
                 run = self.run_raw('solve', '-scene', self.written(outputs, 'bad'), '-mu', '0.05,0.05', ranks=ranks)
                 self.assertEqual(run.returncode, 1, run.stdout)

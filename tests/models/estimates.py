@@ -50,10 +50,10 @@ class Estimates(Case):
             self.assertTrue(1 <= found <= ratio, (model, error, found))
 
     def test_bounds_the_error(self):
-        """On the rope, on blocks in 2D, on the pellet in 3D; every type of model."""
+        """On the rope, on blocks in 2D, on the pellet in 3D; hybrid and projection-based models (of bodies: models/bodies.py)."""
         for model in ('rough.h5', 'fine.h5'):
             self.bounds(ROPE, model, '13,12')
-        for kind, more in (('hybrid', ('-hyco_hybrid', 'contact', '-hyco_rid_layers', 1, '-hyco_rid_contact_extension', 2)), ('bodies', ()),
+        for kind, more in (('hybrid', ('-hyco_hybrid', 'contact', '-hyco_rid_layers', 1, '-hyco_rid_contact_extension', 2)),
                            ('projection', ('-hyco_pod_tol', '1e-10'))):
             run = self.run_raw('train', '-scene', BLOCKS, '-grid', '5,5', '-grid_type', 'closed', '-hyco_model_type', kind, '-model', f'{kind}.h5',
                                '-hyco_snapshots', 'blocks.snapshots', *more)
