@@ -425,11 +425,13 @@ static PetscErrorCode Deliver(HycoDirect d, Vec v)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* part: 0 without Schur variables, 1 reduction to them, 2 expansion from them (ICNTL(26)). */
+/* part: 0 without Schur variables, 1 reduction to them, 2 expansion from them (ICNTL(26)). If there are none, the
+   expansion alone solves. */
 static PetscErrorCode Run(HycoDirect d, int part)
 {
   PetscFunctionBegin;
-  ICNTL(d, 26) = part;
+  if (part == 1 && !d->n_schur) PetscFunctionReturn(PETSC_SUCCESS);
+  ICNTL(d, 26) = d->n_schur ? part : 0;
   Call(d, SOLVE);
   PetscCheck(INFOG(d, 1) >= 0, d->comm, PETSC_ERR_LIB, "MUMPS could not solve (INFOG(1) = %d, INFOG(2) = %d)",
              (int)INFOG(d, 1), (int)INFOG(d, 2));

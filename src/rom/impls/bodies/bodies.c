@@ -86,14 +86,18 @@ void HycoBodiesMeasure(HycoROM m, HycoKKT *kkt)
     most = PetscMax(most, PetscAbsReal(m->Lambda[k]));
     in = PetscMax(in, -left);
     pulls = PetscMax(pulls, -m->Lambda[k]);
-    both = PetscMax(both, PetscAbsReal(left * m->Lambda[k]));
   }
   gaps = PetscMax(gaps, u);
+  /* Quotients first: products may overflow. */
+  for (PetscInt k = 0; k < m->model->pairs.n && gaps > 0 && most > 0; k++) {
+    if (m->rows.start[k] == m->rows.start[k + 1]) continue;
+    both = PetscMax(both, PetscAbsReal((m->rows.gap[k] - HycoROMAddRow(m, k, 0)) / gaps * (m->Lambda[k] / most)));
+  }
   kkt->rounding = 0;
   kkt->stationarity = Unbalanced(o);
   kkt->penetration = gaps > 0 ? in / gaps : 0;
   kkt->adhesion = most > 0 ? pulls / most : 0;
-  kkt->complementarity = gaps > 0 && most > 0 ? both / (gaps * most) : 0;
+  kkt->complementarity = both;
 }
 
 /* The modes where displacements are not exact. */
