@@ -108,7 +108,7 @@ class Balance(Case):
         """The held-out errors of reactions are those of the contact force, on one rank and on three."""
         scene = self.scene('plane')
         for ranks in (0, 3):
-            held = self.hyco('train', '-scene', scene, '-grid', '3,3', '-model', f'{ranks}.h5', '-hyco_pod_tol', 1e-4,
+            held = self.hyco('train', '-scene', scene, '-grid', '3,3', '-model', f'{ranks}.h5', '-hyco_pod_tol', 1e-4, '-hyco_rid_layers', 2,
                              '-hyco_validation', 8, '-hyco_snapshots', 'held', ranks=ranks, status=None)['held_out']['outputs']
             for what in ('median', 'largest'):
                 self.assertGreater(held['carry'][what], 1e-6)
