@@ -252,7 +252,7 @@ static PetscErrorCode FactorEach(HycoROM m)
 static PetscErrorCode Factor(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
-  PetscBool independent;
+  PetscBool independent = PETSC_FALSE;
 
   PetscFunctionBegin;
   PetscCall(PetscFree(w->U));
