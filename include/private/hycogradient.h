@@ -39,13 +39,13 @@ PetscBool HycoDifferenceKinks(const HycoDifference *difference, PetscReal jump, 
 PetscErrorCode HycoGradientCreate(HycoScene scene, HycoGradientStore *store, HycoGradient *gradient);
 /* NULL-safe. */
 PetscErrorCode HycoGradientDestroy(HycoGradientStore *store);
-/* Whether an output has different slopes to the two sides, from the outputs at the three points (3 x n_outputs): then
-   closer ones are needed to know a kink from curvature. */
-PetscBool HycoGradientNeedsCloser(const HycoGradient *gradient, const HycoDifference *difference,
-                                  const PetscReal value[]);
-/* Sets the column of the difference's parameter; closer: NULL, or the outputs at the points of the shrunk difference;
-   kink: the solution has one. */
-void HycoGradientSet(HycoGradient *gradient, HycoGradientStore *store, const HycoDifference *difference,
-                     const PetscReal value[], const PetscReal closer[], PetscBool kink);
+/* Sets output[n_outputs] at the point `at` (n_variables) of a parameter's difference, which lies `step` from mu. */
+typedef PetscErrorCode (*HycoGradientMeasure)(void *context, const PetscReal at[], PetscReal step, PetscReal output[]);
+/* Sets the column of the difference's parameter from the outputs at its points beside mu, and where their slopes differ
+   also at those of a quarter of the step, which tell a kink from curvature. value: room for 6 n_outputs, the first
+   n_outputs those at mu; kink: the solution has one. As collective as `measure`. */
+PetscErrorCode HycoGradientColumn(HycoGradient *gradient, HycoGradientStore *store, HycoScene scene,
+                                  const PetscReal mu[], const HycoDifference *difference, PetscBool kink,
+                                  HycoGradientMeasure measure, void *context, PetscReal value[]);
 
 #endif

@@ -110,7 +110,8 @@ static PetscReal Jump(const HycoGradient *g, const HycoDifference *d, const Pets
   return HycoDifferenceJump(d, PetscMax(PetscAbsReal(v[0]), PetscAbsReal(v[1])), 0, v);
 }
 
-PetscBool HycoGradientNeedsCloser(const HycoGradient *g, const HycoDifference *d, const PetscReal value[])
+/* Whether an output has different slopes to the two sides. */
+static PetscBool NeedsCloser(const HycoGradient *g, const HycoDifference *d, const PetscReal value[])
 {
   for (PetscInt q = 0; q < g->n_outputs; q++) {
     if (Jump(g, d, value, q) > 0) return PETSC_TRUE;
@@ -118,8 +119,9 @@ PetscBool HycoGradientNeedsCloser(const HycoGradient *g, const HycoDifference *d
   return PETSC_FALSE;
 }
 
-void HycoGradientSet(HycoGradient *g, HycoGradientStore *store, const HycoDifference *d, const PetscReal value[],
-                     const PetscReal closer[], PetscBool kink)
+/* closer: NULL, or the outputs at the points of the shrunk difference. */
+static void Set(HycoGradient *g, HycoGradientStore *store, const HycoDifference *d, const PetscReal value[],
+                const PetscReal closer[], PetscBool kink)
 {
   const PetscInt n = g->n_outputs;
 
@@ -136,4 +138,38 @@ void HycoGradientSet(HycoGradient *g, HycoGradientStore *store, const HycoDiffer
     for (PetscInt k = 0; k < 3; k++) store->value[at] += side.weight[k] * value[k * n + q];
     store->kink[at] = (PetscBool)(kink || turns);
   }
+}
+
+/* The outputs at the two points beside mu. */
+static PetscErrorCode MeasureBeside(HycoScene scene, const PetscReal mu[], const HycoDifference *d,
+                                    HycoGradientMeasure measure, void *context, PetscReal value[])
+{
+  PetscReal at[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  for (PetscInt j = 1; j < 3; j++) {
+    HycoDifferencePoint(d, scene, mu, j, at);
+    PetscCall((*measure)(context, at, d->step[j], value + j * scene->n_quantities));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoGradientColumn(HycoGradient *g, HycoGradientStore *store, HycoScene scene, const PetscReal mu[],
+                                  const HycoDifference *d, PetscBool kink, HycoGradientMeasure measure, void *context,
+                                  PetscReal value[])
+{
+  PetscReal *closer = NULL;
+
+  PetscFunctionBegin;
+  PetscCall(MeasureBeside(scene, mu, d, measure, context, value));
+  if (NeedsCloser(g, d, value)) {
+    HycoDifference near = *d;
+
+    HycoDifferenceShrink(&near);
+    closer = value + 3 * g->n_outputs;
+    PetscCall(PetscArraycpy(closer, value, g->n_outputs));
+    PetscCall(MeasureBeside(scene, mu, &near, measure, context, closer));
+  }
+  Set(g, store, d, value, closer, kink);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -100,8 +100,9 @@ static PetscErrorCode Data(Work *o, const PetscReal mu[], Vec R, Vec W)
 }
 
 /* The outputs at mu of the solution moved by step times its change. Collective. */
-static PetscErrorCode Measure(Work *o, const PetscReal mu[], PetscReal step, PetscReal output[])
+static PetscErrorCode Measure(void *context, const PetscReal mu[], PetscReal step, PetscReal output[])
 {
+  Work *o = (Work *)context;
   HycoFOM f = o->f;
   const PetscInt dim = f->fe->dim;
   PetscScalar *u;
@@ -194,39 +195,18 @@ static PetscErrorCode Differentiate(Work *o, HycoDifference *d, PetscBool *turns
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The outputs at the difference's points beside mu. Collective. */
-static PetscErrorCode MeasureBeside(Work *o, const HycoDifference *d, PetscReal output[])
-{
-  PetscReal at[HYCO_MAX_PARAMETERS];
-
-  PetscFunctionBegin;
-  for (PetscInt j = 1; j < 3; j++) {
-    HycoDifferencePoint(d, o->f->scene, o->mu, j, at);
-    PetscCall(Measure(o, at, d->step[j], output + j * o->f->scene->n_quantities));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* One column of the gradient. Collective. */
 static PetscErrorCode Column(Work *o, PetscInt p, HycoGradient *gradient)
 {
-  HycoDifference d, near;
-  PetscReal *closer = o->output + 3 * gradient->n_outputs;
-  PetscBool turns, kink, more;
+  HycoDifference d;
+  PetscBool turns, kink;
 
   PetscFunctionBegin;
   HycoDifferenceSet(o->f->scene, o->mu, p, &d);
   PetscCall(Differentiate(o, &d, &turns));
-  near = d;
   PetscCall(HycoSolverTangentSolve(o->tangent, o->r, o->g, d.sign, o->dU, o->dL, &kink));
-  PetscCall(MeasureBeside(o, &d, o->output));
-  more = HycoGradientNeedsCloser(gradient, &d, o->output);
-  if (more) {
-    HycoDifferenceShrink(&near);
-    PetscCall(PetscArraycpy(closer, o->output, gradient->n_outputs));
-    PetscCall(MeasureBeside(o, &near, closer));
-  }
-  HycoGradientSet(gradient, o->store, &d, o->output, more ? closer : NULL, (PetscBool)(turns || kink));
+  PetscCall(HycoGradientColumn(gradient, o->store, o->f->scene, o->mu, &d, (PetscBool)(turns || kink), Measure, o,
+                               o->output));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

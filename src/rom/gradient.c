@@ -38,8 +38,9 @@ static PetscErrorCode Move(Work *o, const PetscReal mu[], const PetscReal z[])
 }
 
 /* The outputs at mu of the state moved by step times its change. */
-static PetscErrorCode Measure(Work *o, const PetscReal mu[], PetscReal step, PetscReal output[])
+static PetscErrorCode Measure(void *context, const PetscReal mu[], PetscReal step, PetscReal output[])
 {
+  Work *o = (Work *)context;
   HycoPrediction p = {0};
 
   PetscFunctionBegin;
@@ -190,38 +191,15 @@ static PetscErrorCode Differentiate(Work *o, HycoDifference *d, PetscBool *kink)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The outputs at the difference's points beside mu. */
-static PetscErrorCode MeasureBeside(Work *o, const HycoDifference *d, PetscReal output[])
-{
-  const HycoScene scene = o->m->model->scene;
-  PetscReal at[HYCO_MAX_PARAMETERS];
-
-  PetscFunctionBegin;
-  for (PetscInt j = 1; j < 3; j++) {
-    HycoDifferencePoint(d, scene, o->mu, j, at);
-    PetscCall(Measure(o, at, d->step[j], output + j * scene->n_quantities));
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 static PetscErrorCode Column(Work *o, PetscInt p, HycoGradient *gradient)
 {
-  HycoDifference d, near;
-  PetscReal *closer = o->output + 3 * gradient->n_outputs;
-  PetscBool kink, more;
+  HycoDifference d;
+  PetscBool kink;
 
   PetscFunctionBegin;
   HycoDifferenceSet(o->m->model->scene, o->mu, p, &d);
   PetscCall(Differentiate(o, &d, &kink));
-  near = d;
-  PetscCall(MeasureBeside(o, &d, o->output));
-  more = HycoGradientNeedsCloser(gradient, &d, o->output);
-  if (more) {
-    HycoDifferenceShrink(&near);
-    PetscCall(PetscArraycpy(closer, o->output, gradient->n_outputs));
-    PetscCall(MeasureBeside(o, &near, closer));
-  }
-  HycoGradientSet(gradient, &o->m->gradient, &d, o->output, more ? closer : NULL, kink);
+  PetscCall(HycoGradientColumn(gradient, &o->m->gradient, o->m->model->scene, o->mu, &d, kink, Measure, o, o->output));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
