@@ -167,8 +167,6 @@ typedef struct {
   PetscInt rows;
   PetscReal *data;
 } HycoGridField;
-/* The sum of the nodes' columns, each multiplied by its weight. */
-PetscErrorCode HycoGridFieldSum(const HycoGridField *field, const PetscReal weight[], PetscReal value[]);
 /* All rows at `at`. */
 PetscErrorCode HycoGridFieldEvaluate(const HycoGridField *field, const PetscReal at[], PetscReal value[]);
 

@@ -193,16 +193,9 @@ PetscErrorCode HycoReducerFinish(HycoReducer t, HycoSnapshots store, const char 
 /* Creates the SVD of its PODs, which the caller owns: with the reducer's type, and options -hyco_pod_svd_... to be
    read. */
 PetscErrorCode HycoReducerCreateSVD(HycoReducer t, MPI_Comm comm, SVD *svd);
-/* HycoPOD() with that SVD; and how many of the `found` modes the tolerance takes: fails if it takes more, for lack
-   of accuracy. Collective on S; not collective. */
+/* HycoPOD() with that SVD. Collective on S. */
 PetscErrorCode HycoReducerPOD(HycoReducer t, Mat S, PetscReal tol, PetscInt max_modes, Mat *V, PetscInt *l,
                               PetscReal sigma[]);
-/* The same; leading modes that dominate the energy by far, in a scene with springs, come first, and the others are a
-   POD of what is behind them. Collective on S. */
-PetscErrorCode HycoReducerDisplacementPOD(HycoReducer t, Mat S, PetscReal tol, PetscInt max_modes, Mat *V, PetscInt *l,
-                                          PetscReal sigma[]);
-PetscErrorCode HycoReducerPODRank(HycoReducer t, PetscInt n_sigma, const PetscReal sigma[], PetscReal tol,
-                                  PetscInt max_modes, PetscInt found, PetscInt *l);
 /*
   The POD of paths: first of each path, then of these modes, each path scaled to the size of the largest, so that a path
   with small displacements has the same weight. HycoPathModesAdd(): adds a path's columns, which are kept; the modes

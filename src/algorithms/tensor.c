@@ -92,7 +92,7 @@ PetscErrorCode HycoTensorWeights(const HycoTensor *t, const PetscReal at[], Pets
 }
 
 /* value[rows] = data weight, data rows x nodes by columns. */
-PetscErrorCode HycoGridFieldSum(const HycoGridField *f, const PetscReal weight[], PetscReal value[])
+static PetscErrorCode Sum(const HycoGridField *f, const PetscReal weight[], PetscReal value[])
 {
   const PetscReal one = 1, zero = 0;
   const PetscBLASInt step = 1;
@@ -115,7 +115,7 @@ PetscErrorCode HycoGridFieldEvaluate(const HycoGridField *f, const PetscReal at[
   if (!f->rows) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(HycoTensorSize(&f->tensor), &w));
   PetscCall(HycoTensorWeights(&f->tensor, at, w));
-  PetscCall(HycoGridFieldSum(f, w, value));
+  PetscCall(Sum(f, w, value));
   PetscCall(PetscFree(w));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

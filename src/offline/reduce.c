@@ -169,8 +169,10 @@ static PetscErrorCode Deflate(Mat V, Mat S, Mat *rest)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerDisplacementPOD(HycoReducer t, Mat S, PetscReal tol, PetscInt max_modes, Mat *V, PetscInt *l,
-                                          PetscReal sigma[])
+/* HycoReducerPOD(); leading modes that dominate the energy by far, in a scene with springs, come first, and the others
+   are a POD of what is behind them. Collective on S. */
+static PetscErrorCode DisplacementPOD(HycoReducer t, Mat S, PetscReal tol, PetscInt max_modes, Mat *V, PetscInt *l,
+                                      PetscReal sigma[])
 {
   PetscInt first, more, N, n;
   PetscReal *behind;
@@ -198,8 +200,9 @@ PetscErrorCode HycoReducerDisplacementPOD(HycoReducer t, Mat S, PetscReal tol, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerPODRank(HycoReducer t, PetscInt n_sigma, const PetscReal sigma[], PetscReal tol,
-                                  PetscInt max_modes, PetscInt found, PetscInt *l)
+/* How many of the `found` modes the tolerance takes: fails if it takes more, for lack of accuracy. */
+static PetscErrorCode PODRank(HycoReducer t, PetscInt n_sigma, const PetscReal sigma[], PetscReal tol,
+                              PetscInt max_modes, PetscInt found, PetscInt *l)
 {
   PetscInt first;
 
@@ -297,7 +300,7 @@ PetscErrorCode HycoReducerTakeBasis(HycoReducer t, Mat S, PetscReal tol, PetscIn
   PetscCall(MatGetSize(S, &N, &n));
   PetscCall(PetscCalloc1(PetscMax(t->n_s, n) + 1, &basis->sigma));
   basis->n_sigma = PetscMin(N, n);
-  PetscCall(HycoReducerDisplacementPOD(t, S, tol, most, &basis->V, &basis->l, basis->sigma));
+  PetscCall(DisplacementPOD(t, S, tol, most, &basis->V, &basis->l, basis->sigma));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -382,7 +385,7 @@ static PetscErrorCode CutBasis(HycoReducer t, PetscInt kind, Mat *V, PetscInt *l
 
   PetscFunctionBegin;
   *V = NULL;
-  PetscCall(HycoReducerPODRank(t, basis->n_sigma, basis->sigma, t->tol[kind], most, basis->l, l));
+  PetscCall(PODRank(t, basis->n_sigma, basis->sigma, t->tol[kind], most, basis->l, l));
   t->counts[kind] = *l;
   if (!*l) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatDenseGetSubMatrix(basis->V, PETSC_DECIDE, PETSC_DECIDE, 0, *l, &part));
