@@ -78,7 +78,7 @@ static const Written written[] = {
     {"report", "solve", "n_without_effect", "count", "-", "contacts between fixed displacements"},
     {"report", "solve predict", "forces_unique", "flag", "-",
      "no closed contact depends linearly on others (if known)"},
-    {"report", "solve", "n_dependent", "count", "-", "closed contacts that do"},
+    {"report", "solve", "n_dependent", "count", "-", "closed contacts that depend linearly on others"},
     {"report", "solve", "regularised", "text", "-", "motions that -hyco_regularise removed"},
     {"report", "solve", "loose", "text", "-",
      "a rigid motion that no contact force prevents: its position is arbitrary"},
