@@ -337,7 +337,7 @@ static const Written written[] = {
     {"table", "solve predict", "OUTPUT", "number", "output",
      "outputs of the scene; output.OUTPUT if its name is that of a column"},
     {"table", "solve predict", "CONTACT.n_active", "count", "-", "as in reports; of predict NaN where not known"},
-    {"table", "solve predict", "CONTACT.force_x", "number", "force", "on the slave's side; also _y, _z"},
+    {"table", "solve predict", "CONTACT.force_x", "number", "force", "on the slave's side"},
     {"table", "solve predict", "CONTACT.force_y", "number", "force", "the same"},
     {"table", "solve predict", "CONTACT.force_z", "number", "force", "the same"},
     {"table", "solve predict", "CONTACT.moment_x", "number", "moment", "about the origin; in 2D moment_z only"},
