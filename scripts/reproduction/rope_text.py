@@ -20,12 +20,10 @@ stated otherwise. The paper's curves and maps are pictures without data, of whic
 The last two columns count test points without a converged solution, and those that needed the fallback solver.
 
 {numbers}
-- **Regular grid.** The RID has the paper's size: {nodes} nodes, {a} of them in A. The mean error of its forces is close to the paper's, that of the displacement
-  is larger: this RID contains {covered} % of the contact force on average ({least} % at least). More modes, Q-DEIM and a layer give far smaller errors than the
-  paper's with the same 120 solutions.
+- **Regular grid.** The RID has the paper's size, {nodes} nodes, {a} of them in A, and contains {covered} % of the contact force on average ({least} % at least).
+  More modes, Q-DEIM and a layer give far smaller errors than the paper's with the same 120 solutions.
 - **Baselines.** The projection on the dual snapshots themselves (the reduced basis of Haasdonk et al.), {pb_dual_modes} modes with supremizers and
   {pb_dual_vectors} force vectors, is exact at its training points. Nonnegative factorisation has many local minima: read the projection-based rows as ranges.
-- **Greedy.** With the paper's threshold 1e-10 our errors are above the paper's, at 1e-12 below them, and smallest with a layer.
 
 ## Figures 3 to 6: solutions, bases, RID
 
@@ -33,14 +31,13 @@ The last two columns count test points without a converged solution, and those t
 
 ![figure 4]({folder}/figure-04.png)
 
-As in the paper, displacements need few vectors and forces many. The error of NNMF departs from that of POD as k grows; {slow} iterations
-help only for large k. Both POD curves end at round-off.
+As in the paper, displacements need few vectors and forces many; {slow} iterations help NNMF only for large k. Both POD curves end at round-off.
 
 ![figure 5]({folder}/figure-05.png)
 
 ![figure 6]({folder}/figure-06.png)
 
-The counts are those of the paper. The signs of the modes are arbitrary.
+The counts are those of the paper.
 
 ## Figure 7: errors of the regular grid's model
 
@@ -60,10 +57,10 @@ Ours, and the paper's in brackets; unknowns are the displacements and forces of 
 solve on 100 nodes, which leaves nothing to gain (the paper's: over a plain active set):
 
 {table_1}
-The RID contains {point_covered} % of the force here; the rest is reconstructed (41) from forces that already have errors. We do not reach the paper's 12 %.
-The paper's argument for the hybrid model, smaller errors of the forces at this point than a projection with as many unknowns, 13 against 23, is not found: ours are {at_rid} in the
-RID, {at_all} everywhere, against {at_pb14}; over the test points {rid_force} and {all_force} against {pb_force}, in displacement {all_u} against {pb_u}.
-Our projection-based forces are better than the paper's, perhaps by another local minimum of the factorisation.
+The RID contains {point_covered} % of the force here; the rest is reconstructed (41) from forces that already have errors. The paper's argument for the hybrid model,
+smaller errors of the forces at this point than a projection with as many unknowns, 13 against 23, is not found: ours are {at_rid} in the RID, {at_all} everywhere,
+against {at_pb14}; over the test points {rid_force} and {all_force} against {pb_force}, in displacement {all_u} against {pb_u}. Perhaps our factorisation has a better local
+minimum.
 
 ## Figure 10: greedy training by the indicator (43)
 
@@ -81,8 +78,7 @@ Mean errors at the end, in percent:
 
 In the paper the hybrid model is also better in displacement, and equal in the dual norm; ours with the paper's thresholds only in the 2-norm of the forces, with the
 accurate settings in all four. The indicator's mean at 1e-10 is above the mean error at {above_u} of the {judged} evaluated iterations for the displacement, at
-{above_lambda} for the forces; in the paper it overestimates both. (It refers to A with interpolated interface values, the error to the whole rope.) The decrease
-is not monotone: a new solution changes modes, RID and full-order displacements at once.
+{above_lambda} for the forces; in the paper it overestimates both.
 
 ## Figure 11: greedy training by the indicator (45), projection-based
 
@@ -91,8 +87,8 @@ The hybrid models have the same solutions, each with its own RID (in the paper i
 ![figure 11]({folder}/figure-11.png)
 
 At the end the error of the displacement is {u_greedy_pb} (projection-based) and {u_hr_on_pb} (hybrid), of the forces {lambda_rid_greedy_pb} and {lambda_rid_hr_on_pb};
-in the paper the hybrid model is much better in both. The indicator (45) is a length whose scaling the paper does not give: it has its own axis, and falls with the error,
-as in the paper. In all histories together, {failed} predictions did not converge; the means exclude them.
+in the paper the hybrid model is much better in both. The indicator (45), a length, falls with the error, as in the paper. In all histories together, {failed} predictions
+did not converge; the means exclude them.
 
 ## Figure 12: errors after the greedy training
 
