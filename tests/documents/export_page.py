@@ -13,8 +13,8 @@ class Page(unittest.TestCase):
     def test_page(self):
         """Its commands run, its program has the results of predict, and what they print."""
         with tempfile.TemporaryDirectory(prefix='hyco-export-') as folder:
-            environment = {'TREE': SOURCE, 'PATH': ':'.join([BUILD, os.environ['PATH']])}
-            self.assertEqual(document.run(os.path.join(SOURCE, 'docs', 'export.md'), folder, environment), 2)
+            environment = {'TREE': SOURCE, 'HYCO': os.environ['HYCO'], 'PATH': ':'.join([BUILD, os.environ['PATH']])}
+            self.assertEqual(document.run(os.path.join(SOURCE, 'docs', 'export.md'), folder, environment), 3)
 
 
 if __name__ == '__main__':

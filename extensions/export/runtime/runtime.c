@@ -315,6 +315,9 @@ static void principal(const double s[6], double out[3])
   double a[3][3] = {{s[0], s[3], s[5]}, {s[3], s[1], s[4]}, {s[5], s[4], s[2]}};
 
   for (int sweep = 0; sweep < 30; sweep++) {
+    const double shear = fabs(a[0][1]) + fabs(a[0][2]) + fabs(a[1][2]);
+
+    if (shear <= 1e-17 * (fabs(a[0][0]) + fabs(a[1][1]) + fabs(a[2][2]))) break;
     for (int i = 0; i < 2; i++) {
       for (int j = i + 1; j < 3; j++) {
         const int k = 3 - i - j;
