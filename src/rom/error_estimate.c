@@ -276,14 +276,19 @@ static PetscBool IsInconsistent(HycoROM m, PetscReal inconsistency)
 }
 
 /* A formula fitted to few points may grow or fall without measure between them: in regimes that held-out points had, no
-   more than a multiple of their largest error, and no less than a share of it. */
-#define MOST_OVER  3
-#define MANY       20.
-#define MOST_UNDER 30
+   more than a multiple of their largest error, and no less than a share of it. Along paths errors also peak between
+   training points (where a body begins to collapse) without a sign in the features: there, an error of twice the
+   largest is within five estimates. */
+#define MOST_OVER       3
+#define MANY            20.
+#define MOST_UNDER      30
+#define MOST_UNDER_PATH 2.5
 
-static PetscReal Clamped(PetscReal estimate, PetscReal largest)
+static PetscReal Clamped(HycoROM m, PetscReal estimate, PetscReal largest)
 {
-  return largest > 0 ? PetscMax(PetscMin(estimate, MOST_OVER * largest), largest / MOST_UNDER) : estimate;
+  const PetscReal under = m->trace.n_listed ? MOST_UNDER_PATH : MOST_UNDER;
+
+  return largest > 0 ? PetscMax(PetscMin(estimate, MOST_OVER * largest), largest / under) : estimate;
 }
 
 /* From a formula, or for a type whose errors do not follow the features from their largest: the largest of few is a
@@ -292,7 +297,7 @@ static PetscReal EstimateError(HycoROM m, const PetscReal law[], const PetscReal
 {
   const PetscReal few = PetscSqrtReal(PetscMax(1, MANY / (PetscReal)m->model->estimates.n));
 
-  return m->model->traits.uniform ? MOST_OVER * few * largest : Clamped(Estimate(law, term), largest);
+  return m->model->traits.uniform ? MOST_OVER * few * largest : Clamped(m, Estimate(law, term), largest);
 }
 
 /* The estimates of the calibrated formulas, times `factor`. */

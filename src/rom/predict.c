@@ -60,9 +60,8 @@ PetscErrorCode HycoROMPredict(HycoROM m, PetscInt n, const PetscReal mu[])
   begin = HycoNow();
   m->remainder = 0;
   PetscUseTypeMethod(m, solve, mu);
-  if (m->ops->reconstruct && m->reconstruct && p->reason > 0 &&
-      !m->model->scene->n_times) /* a path is reconstructed at its
-                                                                                       listed times */
+  /* a path is reconstructed at its listed times */
+  if (m->ops->reconstruct && m->reconstruct && p->reason > 0 && !m->model->scene->n_times)
     HycoLogged(HYCO_EVENT_RECONSTRUCT, (*m->ops->reconstruct)(m));
   if (p->reason > 0 && !m->model->scene->n_times) PetscCall(HycoFloatingBalance(m));
   p->seconds.total = HycoNow() - begin;
@@ -82,12 +81,14 @@ static void MeasureContacts(HycoROM m, HycoKKT *kkt)
     size = PetscMax(size, PetscMax(PetscAbsReal(bu), PetscAbsReal(m->rows.gap[k])));
     in = PetscMax(in, bu - m->rows.gap[k]);
     pulls = PetscMax(pulls, -m->Lambda[k]);
-    both = PetscMax(both, PetscAbsReal((m->rows.gap[k] - bu) * m->Lambda[k]));
   }
+  /* Quotients first: products may overflow. */
+  for (PetscInt k = 0; k < m->model->pairs.n && size > 0 && most > 0; k++)
+    both = PetscMax(both, PetscAbsReal(HycoROMAddRow(m, k, -m->rows.gap[k]) / size * (m->Lambda[k] / most)));
   kkt->stationarity = kkt->rounding = 0;
   kkt->penetration = size > 0 ? in / size : 0;
   kkt->adhesion = most > 0 ? pulls / most : 0;
-  kkt->complementarity = size > 0 && most > 0 ? both / (size * most) : 0;
+  kkt->complementarity = both;
 }
 
 PetscErrorCode HycoROMSetSolution(HycoROM m, const PetscReal mu[], const PetscReal gamma[], const PetscReal Lambda[])

@@ -77,6 +77,19 @@ class Regime(Case):
         compare = self.hyco('compare', '-scene', scene, '-model', self.path('w.h5'), '-scatter', 40)
         self.assertLess(compare['estimates']['sigma']['worst_error_over_estimate'], 5)
 
+    def test_soft_spring(self):
+        """A block that its load presses on a round floor, held otherwise by a spring of 1e-7 of its stiffness. Displacements without contact are
+        rigid motions of ten million times the deformation: rounding them is no penetration."""
+        scene = self.written('scene: {title: soft, mesh: mesh.msh, parameters: [press, crown]}\nparameter: {press: {range: [1, 3]}, crown: {range: [0.001, 0.004]}}\n'
+                             'body: {block: {young: 1000, poisson: 0.3}}\nfixed: {left: {x: 0}}\nspring: {high: {y: 1e-4}}\ntraction: {high: {y: -press*(1+x)}}\n'
+                             'contact: {floor: {type: obstacle, group: low, normal: {y: -1}, gap: crown*(x-0.4)^2}}\n', square(8))
+        train = self.hyco('train', '-scene', scene, '-grid', '3,3', '-model', self.path('s.h5'))
+        self.assertEqual(train['model_type'], 'bodies')
+        compare = self.hyco('compare', '-scene', scene, '-model', self.path('s.h5'), '-scatter', 100)
+        self.assertEqual(compare['not_converged'], 0)
+        for error in ('u', 'sigma', 'lambda'):
+            self.assertLess(compare['error_' + error]['max'], 1e-6, error)
+
 
 if __name__ == '__main__':
     unittest.main()

@@ -26,6 +26,17 @@ class SearchPaths(Ring):
         self.assertIn('hybrid', found['search']['not_tried'])
         self.assertLess(found['held_out']['u']['largest'], 0.01)
 
+    def estimated(self, found):
+        """Estimates at training points, where errors are small: errors peak between such points, so that an error of twice the largest held-out one
+        stays within five estimates."""
+        self.hyco('predict', '-model', self.path('raced.h5'), '-grid', '3,3', '-table', self.path('estimates.csv'))
+        with open(self.path('estimates.csv'), newline='', encoding='utf-8') as f:
+            rows = list(csv.DictReader(f))
+        for kind in ('u', 'sigma', 'lambda'):
+            largest = found['held_out'][kind]['largest']
+            least = min(float(row['estimated_error_' + kind]) for row in rows)
+            self.assertGreaterEqual(5 * least, 2 * largest * (1 - 1e-9), kind)
+
     def test_same_choice(self):
         """Same settings, same errors, fewer paths; on two ranks the same settings are dropped at the same paths."""
         grid = ('-grid', '3,3')
@@ -44,6 +55,7 @@ class SearchPaths(Ring):
                 self.near(found['held_out'][kind][size], every['held_out'][kind][size], 1e-9, kind)
             for row, whole in zip(rows, full):  # at some of the paths: a lower bound
                 self.assertLessEqual(float(row['error_' + kind]), float(whole['error_' + kind]) * (1 + 1e-9))
+        self.estimated(found)
         report, two = self.search('two', *grid, ranks=2)
         self.assertEqual(report['search']['chosen'], found['search']['chosen'])
         # of modes near round-off, models on other numbers of ranks differ

@@ -67,6 +67,25 @@ static PetscReal Unbalanced(HycoBodiesWork o)
   return most;
 }
 
+#define ROUNDED 1e-6 /* most of a residual that may be the effect of rounding */
+
+/* What is left of the gap of contact k, without the effect of rounding the terms whose sum the displacements are: a body
+   on a soft spring moves far without contact and is pushed back as far. At most ROUNDED of `gaps`: more is an error. */
+static PetscReal Left(HycoROM m, PetscInt k, PetscReal gaps)
+{
+  const HycoBodiesWork o = (HycoBodiesWork)m->work;
+  const PetscReal left = m->rows.gap[k] - HycoROMAddRow(m, k, 0);
+  PetscReal terms = 0, rounding;
+
+  for (PetscInt j = o->row_start[k]; j < o->row_start[k + 1]; j++) {
+    const PetscInt at = o->row_at[j];
+
+    terms += PetscAbsReal(o->row[j]) * (PetscAbsReal(o->free[at]) + PetscAbsReal(o->u[at] - o->free[at]));
+  }
+  rounding = PetscMin(16 * PETSC_MACHINE_EPSILON * terms, ROUNDED * gaps);
+  return left > 0 ? PetscMax(left - rounding, 0) : PetscMin(left + rounding, 0);
+}
+
 void HycoBodiesMeasure(HycoROM m, HycoKKT *kkt)
 {
   const HycoBodiesWork o = (HycoBodiesWork)m->work;
@@ -75,7 +94,6 @@ void HycoBodiesMeasure(HycoROM m, HycoKKT *kkt)
   /* Displacements along the surfaces too: where all contacts close without a gap, the others are round-off. */
   for (PetscInt i = 0; i < o->bodies->ns; i++) u = PetscMax(u, PetscAbsReal(o->u[i]));
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
-    const PetscReal left = m->rows.gap[k] - HycoROMAddRow(m, k, 0);
     PetscReal sum = 0;
 
     if (m->rows.start[k] == m->rows.start[k + 1]) continue;
@@ -84,14 +102,16 @@ void HycoBodiesMeasure(HycoROM m, HycoKKT *kkt)
     u = PetscMax(u, sum);
     gaps = PetscMax(gaps, PetscAbsReal(m->rows.gap[k]));
     most = PetscMax(most, PetscAbsReal(m->Lambda[k]));
-    in = PetscMax(in, -left);
     pulls = PetscMax(pulls, -m->Lambda[k]);
   }
   gaps = PetscMax(gaps, u);
   /* Quotients first: products may overflow. */
-  for (PetscInt k = 0; k < m->model->pairs.n && gaps > 0 && most > 0; k++) {
+  for (PetscInt k = 0; k < m->model->pairs.n && gaps > 0; k++) {
+    const PetscReal left = Left(m, k, gaps);
+
     if (m->rows.start[k] == m->rows.start[k + 1]) continue;
-    both = PetscMax(both, PetscAbsReal((m->rows.gap[k] - HycoROMAddRow(m, k, 0)) / gaps * (m->Lambda[k] / most)));
+    in = PetscMax(in, -left);
+    if (most > 0) both = PetscMax(both, PetscAbsReal(left / gaps * (m->Lambda[k] / most)));
   }
   kkt->rounding = 0;
   kkt->stationarity = Unbalanced(o);
