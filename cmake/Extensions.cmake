@@ -10,6 +10,7 @@ foreach(name ${HYCO_EXTENSIONS})
   endif()
   file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/extensions/${name}/*.c)
   list(APPEND HYCO_SOURCES ${sources})
+  include(${PROJECT_SOURCE_DIR}/extensions/${name}/extension.cmake OPTIONAL) # what else it needs
   string(APPEND HYCO_DECLARED_EXTENSIONS "PetscErrorCode HycoExtension_${name}(void);\n")
   string(APPEND HYCO_CALLED_EXTENSIONS "  PetscCall(HycoExtension_${name}());\n")
 endforeach()

@@ -243,6 +243,15 @@ typedef struct {
    must have been solved at the same parameters, on the same mesh. */
 PetscErrorCode HycoROMCompare(HycoROM model, HycoFOM fom, HycoErrors *errors);
 
+/*
+  A program of its own for the predictions of a model, in a format of an extension or of a caller: an exporter writes it to
+  `path`, completely or not at all, and describes it in lines of text that the caller frees (PetscFree). HycoROMExport() fails
+  where the format is not known, and in one line that names what the format cannot hold of this model. Not collective.
+*/
+typedef PetscErrorCode (*HycoExporter)(HycoROM model, const char path[], char **description);
+PetscErrorCode HycoExporterRegister(const char format[], HycoExporter write);
+PetscErrorCode HycoROMExport(HycoROM model, const char format[], const char path[], char **description);
+
 /* Describes the model on an ASCII viewer. */
 PetscErrorCode HycoROMView(HycoROM model, PetscViewer viewer);
 

@@ -251,6 +251,8 @@ PetscErrorCode HycoROMSetOutputCells(HycoROM model, HycoMesh mesh, PetscReal V[]
                                      HycoMesh loaded);
 /* On that mesh; NULL: the quantities need only results of contacts. Borrowed. */
 HycoFE HycoROMGetOutputCells(HycoROM model);
+/* The displacements and cell stresses there, of the last HycoROMMeasureQuantities() without a history; NULL as above. */
+void HycoROMGetOutputFields(HycoROM model, const PetscReal *u[], const PetscReal *sigma[]);
 /* The quantities of another solution at the last prediction's parameters, mu[] with the time of a history: u and sigma
    at the nodes and cells of the output cells (NULL: the model has none), Lambda of all contacts. reaction: for a path the
    supports' forces at these nodes (NULL: not known, NaN); else not needed. */

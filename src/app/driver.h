@@ -422,6 +422,7 @@ PetscErrorCode CommandTrain(void);
 PetscErrorCode CommandPredict(void);
 PetscErrorCode CommandCompare(void);
 PetscErrorCode CommandFit(void);
+PetscErrorCode CommandExport(void);
 PetscErrorCode CommandView(void);
 PetscErrorCode DeclareCheck(PetscOptions options);
 PetscErrorCode DeclareSolve(PetscOptions options);
@@ -429,6 +430,7 @@ PetscErrorCode DeclareTrain(PetscOptions options);
 PetscErrorCode DeclarePredict(PetscOptions options);
 PetscErrorCode DeclareCompare(PetscOptions options);
 PetscErrorCode DeclareFit(PetscOptions options);
+PetscErrorCode DeclareExport(PetscOptions options);
 PetscErrorCode DeclareView(PetscOptions options);
 
 #endif

@@ -37,6 +37,9 @@ static const Page pages[] = {
      {"model", "target_", "scene", "mu", "mu_", "fit_starts", "fit_type", "report", "quiet"},
      {"hyco fit -model roller.h5 -target_lift 6.5 -target_peak 1.1 -scene examples/roller",
       "hyco fit -model roller.h5 -target_lift 6.5 -mu 0,0.5,10 -fit_type blmvm -report fit.json"}},
+    {"export",
+     {"model", "c", "quiet"},
+     {"hyco export -model strip.h5 -c strip.c", "cc -std=c99 -O2 main.c strip.c -lm"}},
     {"view", {"model", "scene"}, {"hyco view -model rope.h5", "hyco view -scene examples/rope"}},
 };
 
@@ -44,7 +47,7 @@ static const Page pages[] = {
 static const struct {
   const char *subject, *beginnings;
 } subjects[] = {
-    {"files and text", "scene model output report table quiet progress"},
+    {"files and text", "scene model output report table c quiet progress"},
     {"points", "mu grid values_ points scatter extrapolate check_solve gradient"},
     {"accuracy of a training", "target_ hyco_validation validation_ hyco_search hyco_model_type"},
     {"fits", "fit_"},

@@ -31,6 +31,8 @@ const Command commands[] = {
      "find the parameter values at which a model's outputs are closest to targets, within its ranges and by its "
      "gradients; with -scene FOLDER the answer is checked by one full-order solve",
      "HycoFOM HycoSolver HycoROM"},
+    {"export", CommandExport, DeclareExport, "hyco export -model M.h5 -c FILE.c",
+     "write the predictions of a model of bodies as C99 without dependencies, and compare it with the model", ""},
     {"view", CommandView, DeclareView, "hyco view -model M.h5 | -scene FOLDER",
      "describe the contents of a model or a scene", ""},
     {NULL, NULL, NULL, NULL, NULL, NULL},
@@ -129,13 +131,16 @@ static int AnswerAtOnce(int argc, char **argv)
 
     for (; commands[n].name; n++) names[n] = commands[n].name;
     near = HycoNearest(argv[1], n, names);
-    fprintf(stderr,
-            "hyco: error: there is no command \"%s\"; the commands are check, solve, train, predict, compare and "
-            "view%s%s%s\n",
-            argv[1], near ? "; did you mean " : "", near ? near : "", near ? "?" : "");
+    fprintf(
+        stderr,
+        "hyco: error: there is no command \"%s\"; the commands are check, solve, train, predict, compare, fit, export "
+        "and view%s%s%s\n",
+        argv[1], near ? "; did you mean " : "", near ? near : "", near ? "?" : "");
   } else
-    fprintf(stderr,
-            "hyco: error: give a command: check, solve, train, predict, compare or view (hyco -help explains them)\n");
+    fprintf(
+        stderr,
+        "hyco: error: give a command: check, solve, train, predict, compare, fit, export or view (hyco -help explains "
+        "them)\n");
   return 1;
 }
 

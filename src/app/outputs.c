@@ -101,7 +101,7 @@ static PetscErrorCode CheckSceneFile(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static const char *const written[] = {"-report", "-table", "-output", NULL};
+static const char *const written[] = {"-report", "-table", "-output", "-c", NULL};
 
 /* Checks the written files against those that are read. */
 static PetscErrorCode CheckNames(PetscBool trains)

@@ -348,6 +348,12 @@ HycoFE HycoROMGetOutputCells(HycoROM m)
   return m->output_cells ? m->output_cells->fe : NULL;
 }
 
+void HycoROMGetOutputFields(HycoROM m, const PetscReal *u[], const PetscReal *sigma[])
+{
+  *u = m->output_cells ? m->output_cells->u : NULL;
+  *sigma = m->output_cells ? m->output_cells->sigma : NULL;
+}
+
 PetscErrorCode HycoROMMeasureSolution(HycoROM m, const PetscReal mu[], const PetscReal u[], const PetscReal sigma[],
                                       const PetscReal reaction[], const PetscReal Lambda[], PetscReal value[])
 {

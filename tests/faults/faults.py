@@ -23,7 +23,7 @@ OUT = ['-output', 'out.xdmf', '-report', 'out.json']
 CASES = [
     # the command line
     (['slve', *R], 'there is no command "slve"'),
-    ([], 'give a command: check, solve, train, predict, compare or view'),
+    ([], 'give a command: check, solve, train, predict, compare, fit, export or view'),
     (['solve', *R, '-hyco_solver_typ', 'tao'], 'has no option -hyco_solver_typ; did you mean -hyco_solver_type?'),
     (['solve', *R, '-zzz', '1'], 'has no option -zzz'),
     (['solve', *R, '-model', 'm.h5'], 'hyco solve has no option -model'),

@@ -1,0 +1,827 @@
+/*
+  hyco export: the predictions of a model as one file of C99. The model's problem is probed through the operations that
+  gradients use: w = q + M z, and the values from which the outputs follow, are affine in z, and functions of the parameters are
+  found for their coefficients (functions.c). The runtime that the file has is also compiled here: before anything is
+  written, its predictions are compared with the model's.
+*/
+#include "export.h"
+#include "runtime/runtime.c"
+#include <hycoextensions.h>
+#include <hycomaterialimpl.h>
+#include <hycoquantities.h>
+#include <math.h>
+#include <string.h>
+
+#define EXACT      1e-11 /* error of a function at points that were not fitted */
+#define CHECKED    64    /* points at which the runtime is compared with the model */
+#define AGREES     1e-9  /* difference there, of an output's largest value */
+#define PLACES     6     /* at which expressions in space are functions of the parameters */
+#define MOST       6000000
+#define MOST_ITEMS 3000
+#define SAMPLES    120 /* points for the functions, of which a third checks them */
+
+/* A value: of an output, of a contact's force along an axis, of a stress in a cell, of a displacement. */
+typedef struct {
+  enum { QUANTITY, FORCE, CELL, NODE } from;
+  PetscInt index, axis, group; /* group: the output to which it belongs */
+  PetscReal coefficient[6];    /* of a cell's stresses */
+} Row;
+
+typedef struct {
+  HycoROM m;
+  HycoScene s;
+  PetscInt p, n, k, *contact; /* motions and contacts of the model's problem; the contacts with a row */
+  PetscReal *z, *unit;        /* p + n; their sizes */
+  PetscReal *w;
+  PetscInt n_atoms, n_rows, room, ny, n_groups, *group;
+  HycoAtom *atom;
+  Row *row;
+  PetscReal *area, *pressure; /* by contact of the model */
+  HycoFit base, response;
+  HycoExportModel out;
+} Export;
+
+/* -- probing -- */
+
+/* y = (w, values) at mu for z: motions, then the contacts of e->contact in units of e->unit; NULL: 0. */
+static PetscErrorCode Probe(Export *e, const PetscReal mu[], const PetscReal z[], PetscReal y[])
+{
+  HycoROM m = e->m;
+  HycoPrediction prediction = {0};
+  const HycoContactResult *result;
+  const PetscReal *u, *sigma;
+  PetscReal size;
+  PetscInt n_sigma;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(e->z, e->p + e->n));
+  for (PetscInt i = 0; z && i < e->p + e->k; i++) {
+    const PetscInt at = i < e->p ? i : e->p + e->contact[i - e->p];
+
+    e->z[at] = z[i] * e->unit[i < e->p ? 0 : 1];
+  }
+  PetscUseTypeMethod(m, residual, mu, e->z, e->w, &size);
+  PetscUseTypeMethod(m, expand);
+  PetscCall(HycoROMMeasureQuantities(m, &prediction));
+  PetscCall(HycoROMSumContacts(m, m->Lambda, &result));
+  HycoROMGetOutputFields(m, &u, &sigma);
+  n_sigma = HycoStrainSize(m->model->mesh->dim);
+  for (PetscInt i = 0; i < e->p; i++) y[i] = e->w[i];
+  for (PetscInt i = 0; i < e->k; i++) y[e->p + i] = e->w[e->p + e->contact[i]];
+  for (PetscInt i = 0; i < e->n_rows; i++) {
+    const Row *r = &e->row[i];
+    PetscReal *value = &y[e->p + e->k + i];
+
+    *value = r->from == QUANTITY ? prediction.quantity[r->index]
+             : r->from == FORCE  ? result[r->index].force[r->axis]
+             : r->from == NODE   ? u[r->index]
+                                 : 0;
+    for (PetscInt c = 0; r->from == CELL && c < n_sigma; c++)
+      *value += r->coefficient[c] * sigma[r->index * n_sigma + c];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- the outputs -- */
+
+static PetscErrorCode AddRow(Export *e, Row row)
+{
+  PetscFunctionBegin;
+  if (e->n_rows == e->room) {
+    e->room = 2 * e->room + 64;
+    PetscCall(PetscRealloc((size_t)e->room * sizeof(*e->row), &e->row));
+  }
+  e->row[e->n_rows++] = row;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One number of the fields u, sigma as the scene's outputs are measured. */
+static PetscErrorCode MeasureOne(HycoFE fe, HycoQuantity q, HycoQuantityKind kind, PetscInt field, const PetscReal u[],
+                                 const PetscReal sigma[], PetscReal *value)
+{
+  const HycoScene s = fe->scene;
+  HycoQuantity *const all = s->quantity;
+  const PetscInt n = s->n_quantities;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  q.kind = kind;
+  q.field = field;
+  s->quantity = &q;
+  s->n_quantities = 1;
+  ierr = HycoQuantitiesMeasure(PETSC_COMM_SELF, fe, u, sigma, NULL, NULL, value);
+  s->quantity = all;
+  s->n_quantities = n;
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscInt FieldOf(const char name[])
+{
+  PetscInt k = 0;
+
+  while (strcmp(HycoQuantityFields[k], name)) k++;
+  return k;
+}
+
+/* The items of an output of kind max, min or mean: its nodes or cells, found by fields that are 1 in one of them. */
+static PetscErrorCode AddItems(Export *e, PetscInt quantity, Output *o)
+{
+  const HycoQuantity *q = &e->s->quantity[quantity];
+  const char *field = HycoQuantityFields[q->field];
+  const PetscBool cells = (PetscBool)(field[0] != 'u');
+  const HycoFE fe = HycoROMGetOutputCells(e->m);
+  const PetscInt each = cells ? fe->n_sigma : fe->dim, n = cells ? fe->mesh->n_cells : fe->mesh->n_nodes;
+  const PetscInt one = FieldOf(cells ? "sigma_xx" : "u_x");
+  PetscReal *u, *sigma, in, weight, c[6];
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc2(fe->n_dof, &u, fe->mesh->n_cells * fe->n_sigma, &sigma));
+  for (PetscInt i = 0; i < n; i++) {
+    PetscReal *const at = (cells ? sigma : u) + i * each;
+    Row row = {.from = cells ? CELL : NODE, .index = cells ? i : i * each};
+
+    at[0] = 1;
+    PetscCall(MeasureOne(fe, *q, HYCO_QUANTITY_MAX, one, u, sigma, &in));
+    PetscCall(MeasureOne(fe, *q, HYCO_QUANTITY_MEAN, one, u, sigma, &weight));
+    at[0] = 0;
+    if (in <= 0) continue;
+    HycoCheck(
+        o->n < MOST_ITEMS,
+        "the output %s is over more than %d nodes or cells, which is too much for a program of its own; give it a "
+        "smaller group",
+        q->name, MOST_ITEMS);
+    o->n++;
+    if (q->kind == HYCO_QUANTITY_MEAN) PetscCall(HycoExportAddWeight(&e->out, weight));
+    o->width = o->of == COMPONENT ? 1 : each;
+    for (PetscInt d = 0; d < (o->of == COMPONENT ? 1 : each); d++) {
+      for (PetscInt j = 0; j < 6; j++) row.coefficient[j] = j == d;
+      if (!cells) row.index = i * each + (o->of == COMPONENT ? q->field - one : d);
+      for (PetscInt j = 0; cells && o->of == COMPONENT && j < each; j++) {
+        at[j] = 1;
+        PetscCall(MeasureOne(fe, *q, HYCO_QUANTITY_MEAN, q->field, u, sigma, &c[j]));
+        at[j] = 0;
+        row.coefficient[j] = c[j] / weight;
+      }
+      PetscCall(AddRow(e, row));
+    }
+  }
+  PetscCall(PetscFree2(u, sigma));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The contacts of an output: of one contact of the scene; -1: all. */
+static PetscErrorCode AddContacts(Export *e, PetscInt contact, const PetscReal weight[], Output *o)
+{
+  const HycoPairs *pairs = &e->m->model->pairs;
+
+  PetscFunctionBegin;
+  o->first = e->out.n_contact;
+  o->weight = e->out.n_weights;
+  for (PetscInt k = 0; k < pairs->n; k++) {
+    PetscInt at = 0;
+
+    if (contact >= 0 && pairs->contact[k] != contact) continue;
+    while (at < e->k && e->contact[at] != k) at++;
+    if (at == e->k && (o->kind != PRESSURE_SMALLEST || !e->k)) continue; /* it is always open */
+    PetscCall(HycoExportAddContact(&e->out, at < e->k ? at : 0));
+    PetscCall(HycoExportAddWeight(&e->out, at < e->k ? weight[k] : 0));
+    o->n++;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Area and pressure per force of each contact, measured one by one. */
+static PetscErrorCode MeasureContacts(Export *e)
+{
+  const HycoPairs *pairs = &e->m->model->pairs;
+  const HycoContactResult *result;
+  PetscReal *L;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(pairs->n + 1, &L));
+  PetscCall(PetscCalloc1(pairs->n + 1, &e->area));
+  PetscCall(PetscCalloc1(pairs->n + 1, &e->pressure));
+  for (PetscInt k = 0; k < pairs->n; k++) {
+    L[k] = 1;
+    PetscCall(HycoROMSumContacts(e->m, L, &result));
+    L[k] = 0;
+    e->area[k] = result[pairs->contact[k]].area;
+    e->pressure[k] = result[pairs->contact[k]].pressure;
+  }
+  PetscCall(PetscFree(L));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode AddOutput(Export *e, const Output *o, const char name[], const char unit[])
+{
+  PetscFunctionBegin;
+  PetscCall(
+      HycoExportAddOutput(&e->out, (const int[6]){o->kind, o->of, o->n, o->width, o->first, o->weight}, name, unit));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode AddQuantity(Export *e, PetscInt k)
+{
+  const HycoQuantity *q = &e->s->quantity[k];
+  const HycoQuantityKind kind = q->kind;
+  const char *field = kind < HYCO_QUANTITY_REACTION ? HycoQuantityFields[q->field] : "";
+  const PetscBool linear = (PetscBool)(!strncmp(field, "u_", 2) || !strncmp(field, "sigma_", 6));
+  Output o = {.kind = SUM, .of = COMPONENT, .width = 1, .weight = -1};
+  PetscInt contact = -1;
+
+  PetscFunctionBegin;
+  for (PetscInt c = 0; q->contact && c < e->s->n_contacts; c++) {
+    if (!strcmp(e->s->contact[c]->name, q->contact)) contact = c;
+  }
+  o.first = e->n_rows;
+  if (kind < HYCO_QUANTITY_MEAN || (kind == HYCO_QUANTITY_MEAN && !linear)) {
+    if (!linear) o.of = !strcmp(field, "u") ? NORM : !strcmp(field, "mises") ? MISES : PRINCIPAL + field[10] - '1';
+    o.kind = kind == HYCO_QUANTITY_MAX ? LARGEST : kind == HYCO_QUANTITY_MIN ? SMALLEST : SUM;
+    if (o.kind == SUM) o.weight = e->out.n_weights;
+    PetscCall(AddItems(e, k, &o));
+    for (PetscInt i = o.first; i < e->n_rows; i++) e->row[i].group = e->out.n_outputs;
+  } else if (kind >= HYCO_QUANTITY_AREA) {
+    o.kind = kind == HYCO_QUANTITY_AREA ? CLOSED : kind == HYCO_QUANTITY_PRESSURE ? PRESSURE : PRESSURE_SMALLEST;
+    PetscCall(AddContacts(e, contact, kind == HYCO_QUANTITY_AREA ? e->area : e->pressure, &o));
+  } else {
+    o.n = 1;
+    PetscCall(AddRow(e, (Row){.from = QUANTITY, .index = k, .group = e->out.n_outputs}));
+  }
+  PetscCall(AddOutput(e, &o, q->name, HycoExportUnit(e->s, q)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The outputs of the scene, then CONTACT.force_x, ..., CONTACT.area, CONTACT.pressure_max of each contact. */
+static PetscErrorCode FindOutputs(Export *e)
+{
+  const HycoScene s = e->s;
+  HycoQuantity q = {0};
+  char name[HYCO_LINE];
+
+  PetscFunctionBegin;
+  PetscCall(MeasureContacts(e));
+  for (PetscInt k = 0; k < s->n_quantities; k++) PetscCall(AddQuantity(e, k));
+  for (PetscInt c = 0; c < s->n_contacts; c++) {
+    for (PetscInt a = 0; a < e->m->model->mesh->dim; a++) {
+      const Output o = {.kind = SUM, .of = COMPONENT, .n = 1, .width = 1, .first = e->n_rows, .weight = -1};
+
+      PetscCall(AddRow(e, (Row){.from = FORCE, .index = c, .axis = a, .group = e->out.n_outputs}));
+      HycoFormat(name, "%s.force_%c", s->contact[c]->name, "xyz"[a]);
+      q.kind = HYCO_QUANTITY_FORCE;
+      PetscCall(AddOutput(e, &o, name, HycoExportUnit(s, &q)));
+    }
+    for (PetscInt a = 0; a < 2; a++) {
+      Output o = {.kind = a ? PRESSURE : CLOSED};
+
+      PetscCall(AddContacts(e, c, a ? e->pressure : e->area, &o));
+      HycoFormat(name, "%s.%s", s->contact[c]->name, a ? "pressure_max" : "area");
+      q.kind = a ? HYCO_QUANTITY_PRESSURE : HYCO_QUANTITY_AREA;
+      PetscCall(AddOutput(e, &o, name, HycoExportUnit(s, &q)));
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- the problem -- */
+
+/* The contacts with a row of B, and the sizes of z; M must be [0 A; -A^T W]. */
+static PetscErrorCode FindProblem(Export *e, const PetscReal mu[])
+{
+  HycoROM m = e->m;
+  PetscReal *M, size, held = 0, most = 0;
+  PetscInt *all;
+  size_t n;
+
+  PetscFunctionBegin;
+  PetscUseTypeMethod(m, unknowns, &e->p, &e->n, NULL);
+  n = (size_t)(e->p + e->n);
+  PetscCall(PetscMalloc4(n + 1, &e->z, n + 1, &e->w, 2, &e->unit, e->n + 1, &e->contact));
+  PetscUseTypeMethod(m, unknowns, &e->p, &e->n, e->z);
+  e->unit[0] = e->unit[1] = 0;
+  for (PetscInt i = 0; i < e->p + e->n; i++) e->unit[i >= e->p] = PetscMax(e->unit[i >= e->p], PetscAbsReal(e->z[i]));
+  for (PetscInt i = 0; i < 2; i++) e->unit[i] = e->unit[i] > 0 ? e->unit[i] : 1;
+  PetscCall(PetscMalloc2(n * n + 1, &M, e->n + 1, &all));
+  PetscUseTypeMethod(m, residual, mu, e->z, e->w, &size);
+  for (PetscInt i = 0; i < e->n; i++) all[i] = i;
+  PetscUseTypeMethod(m, jacobian, e->n, all, M);
+  for (size_t j = 0; j < n; j++) {
+    for (size_t i = 0; i < n; i++) {
+      const PetscBool x = (PetscBool)(i < (size_t)e->p), y = (PetscBool)(j < (size_t)e->p);
+      const PetscReal other = x == y ? M[i * n + j] : -M[i * n + j];
+
+      most = PetscMax(most, PetscAbsReal(M[j * n + i]));
+      held = PetscMax(held, x && y ? PetscAbsReal(M[j * n + i]) : PetscAbsReal(M[j * n + i] - other));
+    }
+  }
+  for (PetscInt i = 0; i < e->n; i++) {
+    if (M[(size_t)(e->p + i) * (n + 1)] > 0) e->contact[e->k++] = i;
+  }
+  PetscCall(PetscFree2(M, all));
+  HycoCheck(held <= 1e-10 * most,
+            "a model of type %s cannot be exported, as its unknowns are not contact forces alone; train one with "
+            "-hyco_model_type bodies",
+            m->model->type);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- functions of the parameters -- */
+
+/* Some forces and motions without regularity; all forces press. */
+static void Irregular(PetscInt n, PetscInt which, PetscReal z[])
+{
+  const PetscReal step = which ? 0.75487766624669276 : 0.61803398874989485;
+
+  for (PetscInt i = 0; i < n; i++) z[i] = 0.1 + (i + 1) * step - floor((i + 1) * step);
+}
+
+/* Samples for a fit: y at z = 0, and what two z add; fixed: a parameter that stays in the middle of its range; -1: none. */
+typedef struct {
+  PetscInt n;
+  const PetscReal *mu;
+  PetscReal *own, *y, *added; /* n x ny; n x 2 ny */
+} Samples;
+
+static PetscErrorCode Sample(Export *e, PetscInt n, PetscInt fixed, Samples *o)
+{
+  HycoSamples samples;
+  const PetscReal *mu;
+  PetscReal *z;
+  const PetscInt n_par = e->s->n_parameters;
+  PetscErrorCode ierr = 0;
+
+  PetscFunctionBegin;
+  o->n = n;
+  PetscCall(HycoSamplesCreate(e->s, &samples));
+  PetscCall(HycoSamplesAddScattered(samples, n));
+  PetscCall(HycoSamplesGet(samples, NULL, NULL, &mu));
+  HycoDuplicate(n * n_par, mu, &o->own);
+  PetscCall(HycoSamplesDestroy(&samples));
+  for (PetscInt i = 0; fixed >= 0 && i < n; i++) o->own[i * n_par + fixed] = (e->s->lo[fixed] + e->s->hi[fixed]) / 2;
+  o->mu = o->own;
+  PetscCall(PetscMalloc1((size_t)n * (size_t)e->ny + 1, &o->y));
+  PetscCall(PetscMalloc1(2 * (size_t)n * (size_t)e->ny + 1, &o->added));
+  PetscCall(PetscMalloc1(e->p + e->k + 1, &z));
+  for (PetscInt i = 0; i < n && !ierr; i++) {
+    PetscReal *y = o->y + (size_t)i * (size_t)e->ny, *added = o->added + 2 * (size_t)i * (size_t)e->ny;
+
+    ierr = Probe(e, o->mu + i * n_par, NULL, y);
+    for (PetscInt j = 0; j < 2 && !ierr; j++) {
+      Irregular(e->p + e->k, j, z);
+      ierr = Probe(e, o->mu + i * n_par, z, added + j * e->ny);
+      for (PetscInt r = 0; r < e->ny; r++) added[j * e->ny + r] -= y[r];
+    }
+  }
+  PetscCall(PetscFree(z));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode FreeSamples(Samples *o)
+{
+  PetscFunctionBegin;
+  HycoFreeAll(&o->y, &o->added, &o->own);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode FreeFit(HycoFit *fit)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscFree(fit->function));
+  PetscCall(PetscFree(fit->coefficient));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The scale of each group: its largest value in the samples, without forces or by them. */
+static void Scale(const Export *e, const Samples *o, PetscReal scale[])
+{
+  for (PetscInt g = 0; g < e->n_groups; g++) scale[g] = 0;
+  for (PetscInt i = 0; i < o->n; i++) {
+    const PetscReal *y = o->y + (size_t)i * (size_t)e->ny, *added = o->added + 2 * (size_t)i * (size_t)e->ny;
+
+    for (PetscInt r = 0; r < e->ny; r++)
+      scale[e->group[r]] = PetscMax(scale[e->group[r]], PetscMax(PetscAbsReal(y[r]), PetscAbsReal(added[r])));
+  }
+}
+
+/* Functions of the first level that suffices, up to the last one; else of that. */
+static PetscErrorCode Fit(Export *e, PetscInt last, const HycoFitData *data, HycoFit *fit)
+{
+  PetscFunctionBegin;
+  fit->worst = PETSC_MAX_REAL;
+  for (PetscInt level = 0; level <= last && fit->worst > EXACT; level++) {
+    PetscCall(FreeFit(fit));
+    PetscCall(HycoFitFunctions(e->s, e->n_atoms, e->atom, level, EXACT, data, fit));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Both fits; that of the response needs no products. */
+static PetscErrorCode FitBoth(Export *e, PetscInt fixed)
+{
+  Samples o;
+  PetscReal *scale;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(e->n_groups, &scale));
+  PetscCall(Sample(e, SAMPLES, fixed, &o));
+  Scale(e, &o, scale);
+  PetscCall(Fit(e, 1, &(HycoFitData){o.n, 2 * e->ny, o.mu, o.added, e->group, scale}, &e->response));
+  PetscCall(Fit(e, e->response.worst > EXACT ? 0 : HYCO_FIT_LEVELS - 1,
+                &(HycoFitData){o.n, e->ny, o.mu, o.y, e->group, scale}, &e->base));
+  PetscCall(FreeSamples(&o));
+  PetscCall(PetscFree(scale));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The line of a refusal: what has no such functions, and the parameters without which it would. */
+static PetscErrorCode Refuse(Export *e)
+{
+  const PetscBool response = (PetscBool)(e->response.worst > EXACT);
+  const PetscInt row = (response ? e->response.worst_row : e->base.worst_row) % e->ny, at = row - e->p - e->k;
+  char of[HYCO_LINE], list[HYCO_LINE] = "";
+
+  PetscFunctionBegin;
+  if (at < 0)
+    HycoFormat(of, "%s", row < e->p ? "the loads on bodies that contact alone holds" : "the gaps");
+  else
+    HycoFormat(of, "the output %s", e->out.name[e->row[at].group]);
+  for (PetscInt p = 0; p < e->s->n_parameters; p++) {
+    PetscCall(FitBoth(e, p));
+    if (e->base.worst <= EXACT && e->response.worst <= EXACT) PetscCall(HycoListAdd(list, " and ", e->s->parameter[p]));
+  }
+  if (response)
+    HycoFail("export: the directions of contacts or the stiffness change with %s otherwise than by factors of moduli; "
+             "contacts that travel or turn, shapes and ratios of moduli within a body cannot be exported",
+             list[0] ? list : "several parameters");
+  HycoFail("export: %s change%s with %s otherwise than by sums of products of the scene's expressions", of,
+           row == e->p + e->k || at >= 0 ? "s" : "", list[0] ? list : "several parameters");
+}
+
+/* -- the arrays -- */
+
+/* The functions of both fits, each once; place[n]: where those of a fit are. */
+static PetscErrorCode Merge(Export *e, const HycoFit *fit, PetscInt place[])
+{
+  HycoExportModel *o = &e->out;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < fit->n; k++) {
+    const HycoFunction *f = &fit->function[k];
+    PetscInt at = 0;
+
+    while (at < o->n_functions && (o->function[at].a != f->a || o->function[at].b != f->b || o->function[at].c != f->c))
+      at++;
+    if (at == o->n_functions) {
+      PetscCall(PetscRealloc((size_t)(at + 1) * sizeof(*o->function), &o->function));
+      o->function[o->n_functions++] = *f;
+    }
+    place[k] = at;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Points at which the functions of the response are independent (n x n_par), and the inverse of their values there. */
+static PetscErrorCode ChoosePoints(Export *e, PetscReal point[], PetscReal inverse[])
+{
+  const PetscInt n = e->response.n, N = 4 * n + 16, n_par = e->s->n_parameters;
+  HycoSamples samples;
+  const PetscReal *mu;
+  PetscReal *value, *chosen, *scale;
+  PetscInt *pivot;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesCreate(e->s, &samples));
+  PetscCall(HycoSamplesAddScattered(samples, N));
+  PetscCall(HycoSamplesGet(samples, NULL, NULL, &mu));
+  PetscCall(PetscMalloc4(n * N, &value, n * n, &chosen, n, &scale, N, &pivot));
+  PetscCall(PetscArrayzero(scale, n));
+  for (PetscInt i = 0; i < N; i++) {
+    PetscCall(HycoFunctionsEvaluate(e->s, e->atom, n, e->response.function, mu + i * n_par, value + i * n));
+    for (PetscInt k = 0; k < n; k++) scale[k] = PetscMax(scale[k], PetscAbsReal(value[i * n + k]));
+  }
+  for (PetscInt i = 0; i < N * n; i++) value[i] /= scale[i % n];
+  PetscCall(HycoPivotColumns(n, N, value, n, pivot));
+  for (PetscInt i = 0; i < n; i++) {
+    PetscCall(PetscArraycpy(point + i * n_par, mu + pivot[i] * n_par, n_par));
+    PetscCall(HycoFunctionsEvaluate(e->s, e->atom, n, e->response.function, point + i * n_par, chosen + i * n));
+    for (PetscInt k = 0; k < n; k++) chosen[i * n + k] /= scale[k];
+  }
+  PetscCall(HycoPseudoInverse(n, n, chosen, 1e-15, inverse)); /* inverse[k * n + i]: of function k at point i */
+  for (PetscInt k = 0; k < n * n; k++) inverse[k] /= scale[k / n];
+  PetscCall(PetscFree4(value, chosen, scale, pivot));
+  PetscCall(HycoSamplesDestroy(&samples));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds M at a point of the response, share[n] of it for each function, to W and A. */
+static PetscErrorCode AddMatrix(Export *e, const PetscReal mu[], const PetscReal share[], PetscReal *M)
+{
+  HycoExportModel *o = &e->out;
+  const size_t p = (size_t)e->p, k = (size_t)e->k, n = p + k, size = k * (k + 1) / 2;
+  PetscReal largest;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(e->z, e->p + e->n));
+  PetscUseTypeMethod(e->m, residual, mu, e->z, e->w, &largest);
+  PetscUseTypeMethod(e->m, jacobian, e->k, e->contact, M);
+  for (PetscInt f = 0; f < e->response.n; f++) {
+    for (size_t i = 0; i < k; i++) {
+      for (size_t j = 0; j <= i; j++) o->W[(size_t)f * size + i * (i + 1) / 2 + j] += share[f] * M[(p + i) * n + p + j];
+      for (size_t j = 0; j < p; j++) o->A[((size_t)f * p + j) * k + i] += share[f] * M[(p + i) * n + j];
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The same of the values: by unit forces and motions, one after the other. T: functions x rows x (p + k). */
+static PetscErrorCode AddValues(Export *e, const PetscReal mu[], const PetscReal share[], PetscReal T[])
+{
+  const PetscInt n = e->p + e->k;
+  PetscReal *z, *y, *y0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc3(n + 1, &z, e->ny, &y, e->ny, &y0));
+  PetscCall(Probe(e, mu, NULL, y0));
+  for (PetscInt c = 0; c < n && e->n_rows; c++) {
+    z[c] = 1;
+    PetscCall(Probe(e, mu, z, y));
+    z[c] = 0;
+    for (PetscInt r = 0; r < e->n_rows; r++) {
+      const PetscReal change = (y[n + r] - y0[n + r]) / e->unit[c >= e->p];
+
+      for (PetscInt f = 0; f < e->response.n; f++)
+        T[((size_t)f * (size_t)e->n_rows + (size_t)r) * (size_t)n + (size_t)c] += share[f] * change;
+    }
+  }
+  PetscCall(PetscFree3(z, y, y0));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The rows of T that are more than round-off beside the others of their value, as terms. */
+static PetscErrorCode KeepTerms(Export *e, const PetscInt place[], const PetscReal T[])
+{
+  const size_t n = (size_t)(e->p + e->k);
+  const PetscInt n_f = e->response.n;
+  PetscReal *scale, *value, *size, mu[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc3(n_f, &scale, n_f, &value, n_f, &size));
+  for (PetscInt end = 0; end < 3; end++) {
+    for (PetscInt p = 0; p < e->s->n_parameters; p++) mu[p] = e->s->lo[p] + (e->s->hi[p] - e->s->lo[p]) * end / 2;
+    PetscCall(HycoFunctionsEvaluate(e->s, e->atom, n_f, e->response.function, mu, value));
+    for (PetscInt f = 0; f < n_f; f++) scale[f] = PetscMax(scale[f], PetscAbsReal(value[f]));
+  }
+  for (PetscInt r = 0; r < e->n_rows; r++) {
+    PetscReal most = 0;
+
+    for (PetscInt f = 0; f < n_f; f++) {
+      size[f] = 0;
+      for (size_t c = 0; c < n; c++)
+        size[f] = PetscMax(size[f], scale[f] * e->unit[c >= (size_t)e->p] *
+                                        PetscAbsReal(T[((size_t)f * (size_t)e->n_rows + (size_t)r) * n + c]));
+      most = PetscMax(most, size[f]);
+    }
+    for (PetscInt f = 0; f < n_f; f++) {
+      if (size[f] > 1e-13 * most)
+        PetscCall(
+            HycoExportAddTerm(&e->out, r, place[f], (PetscInt)n, T + ((size_t)f * (size_t)e->n_rows + (size_t)r) * n));
+    }
+  }
+  PetscCall(PetscFree3(scale, value, size));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* All arrays of the program from the functions. */
+static PetscErrorCode Fill(Export *e)
+{
+  HycoExportModel *o = &e->out;
+  const size_t k = (size_t)e->k, n = (size_t)(e->p + e->k), f = (size_t)e->response.n;
+  const PetscReal numbers = (PetscReal)f * ((PetscReal)k * (PetscReal)k / 2 + (PetscReal)e->n_rows * (PetscReal)n) + 1;
+  PetscInt *place;
+  PetscReal *point, *inverse, *T, *M, *share;
+
+  PetscFunctionBegin;
+  HycoCheck(
+      numbers <= MOST,
+      "export: the program would have %.2g numbers, at most %.2g are written; use fewer contacts or smaller groups "
+      "of outputs",
+      (double)numbers, (double)MOST);
+  PetscCall(PetscMalloc1(e->base.n + e->response.n + 1, &place));
+  PetscCall(Merge(e, &e->base, place));
+  PetscCall(Merge(e, &e->response, place + e->base.n));
+  PetscCall(PetscCalloc1((size_t)e->ny * (size_t)o->n_functions + 1, &o->offset));
+  for (PetscInt r = 0; r < e->ny; r++) {
+    for (PetscInt j = 0; j < e->base.n; j++)
+      o->offset[(size_t)r * (size_t)o->n_functions + (size_t)place[j]] =
+          e->base.coefficient[(size_t)r * (size_t)e->base.n + (size_t)j];
+  }
+  o->n_motions = e->p;
+  o->n_contacts = e->k;
+  o->n_values = e->n_rows;
+  o->n_stiffness = e->response.n;
+  PetscCall(PetscMalloc1(e->response.n + 1, &o->stiffness));
+  for (PetscInt i = 0; i < e->response.n; i++) o->stiffness[i] = (int)place[e->base.n + i];
+  PetscCall(PetscCalloc1(f * k * (k + 1) / 2 + 1, &o->W));
+  PetscCall(PetscCalloc1(f * (size_t)e->p * k + 1, &o->A));
+  PetscCall(PetscCalloc5(f * (size_t)e->s->n_parameters + 1, &point, f * f + 1, &inverse, f * (size_t)e->n_rows * n + 1,
+                         &T, n * n + 1, &M, f + 1, &share));
+  PetscCall(ChoosePoints(e, point, inverse));
+  for (PetscInt i = 0; i < e->response.n; i++) {
+    for (PetscInt j = 0; j < e->response.n; j++) share[j] = inverse[(size_t)j * f + (size_t)i];
+    PetscCall(AddMatrix(e, point + i * e->s->n_parameters, share, M));
+    PetscCall(AddValues(e, point + i * e->s->n_parameters, share, T));
+  }
+  PetscCall(KeepTerms(e, place + e->base.n, T));
+  PetscCall(PetscFree5(point, inverse, T, M, share));
+  PetscCall(PetscFree(place));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- comparison with the model -- */
+
+/* The program's results at a point as it has them: its functions in the library's arithmetic. */
+static PetscErrorCode RunHere(Export *e, const Model *model, Work *o, const PetscReal mu[], PetscReal out[],
+                              PetscBool *solved)
+{
+  double kkt;
+  int its;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFunctionsEvaluate(e->s, e->atom, e->out.n_functions, e->out.function, mu, o->f));
+  e->out.seconds -= HycoNow();
+  *solved = (PetscBool)(predict(model, o, out, &kkt, &its) == OK);
+  e->out.seconds += HycoNow();
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The model's results in the order of the outputs. *solved: its problem is. */
+static PetscErrorCode RunModel(Export *e, const PetscReal mu[], PetscReal out[], PetscBool *solved)
+{
+  const HycoContactResult *result;
+  HycoPrediction prediction;
+  PetscInt at = 0, n;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMPredict(e->m, e->s->n_parameters, mu));
+  PetscCall(HycoROMGetPrediction(e->m, &prediction));
+  *solved = (PetscBool)(prediction.reason > 0);
+  for (PetscInt k = 0; k < e->s->n_quantities; k++) out[at++] = prediction.quantity[k];
+  PetscCall(HycoROMGetContacts(e->m, &n, &result));
+  for (PetscInt c = 0; c < n; c++) {
+    for (PetscInt a = 0; a < e->m->model->mesh->dim; a++) out[at++] = result[c].force[a];
+    out[at++] = result[c].area;
+    out[at++] = result[c].pressure;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Sets e->out.difference: of an output relative to its largest value, at points over the ranges; fails if it is no
+   round-off. */
+static PetscErrorCode Compare(Export *e, const Model *model, void *memory)
+{
+  const PetscInt n = e->out.n_outputs;
+  HycoSamples samples;
+  const PetscReal *mu;
+  PetscReal *mine, *theirs, *most, *worst;
+  PetscBool solved = PETSC_FALSE, theirs_solved = PETSC_FALSE;
+  Work o;
+
+  PetscFunctionBegin;
+  place(model, memory, &o);
+  PetscCall(HycoSamplesCreate(e->s, &samples));
+  PetscCall(HycoSamplesAddScattered(samples, CHECKED));
+  PetscCall(HycoSamplesGet(samples, &e->out.checked, NULL, &mu));
+  PetscCall(PetscCalloc4(n + 1, &mine, n + 1, &theirs, n + 1, &most, n + 1, &worst));
+  for (PetscInt i = 0; i < e->out.checked; i++) {
+    PetscCall(RunModel(e, mu + i * e->s->n_parameters, theirs, &theirs_solved));
+    PetscCall(RunHere(e, model, &o, mu + i * e->s->n_parameters, mine, &solved));
+    HycoCheck(
+        solved == theirs_solved,
+        "export: at a point the program's problem has %s solution, unlike the model's; the forces may not be unique",
+        solved ? "a" : "no");
+    for (PetscInt k = 0; k < n && solved; k++) {
+      most[k] = PetscMax(most[k], PetscAbsReal(theirs[k]));
+      worst[k] = PetscMax(worst[k], PetscAbsReal(mine[k] - theirs[k]));
+    }
+  }
+  for (PetscInt k = 0; k < n; k++) {
+    HycoCheck(worst[k] <= AGREES * most[k],
+              "export: the output %s of the program differs from the model's by %.1e of its largest value; the forces "
+              "may not be unique",
+              e->out.name[k], (double)(worst[k] / most[k]));
+    if (most[k] > 0) e->out.difference = PetscMax(e->out.difference, worst[k] / most[k]);
+  }
+  PetscCall(PetscFree4(mine, theirs, most, worst));
+  PetscCall(HycoSamplesDestroy(&samples));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode CompareHere(Export *e)
+{
+  const HycoExportModel *o = &e->out;
+  const Model model = {.n_parameters = (int)e->s->n_parameters,
+                       .n_functions = (int)o->n_functions,
+                       .n_motions = (int)o->n_motions,
+                       .n_contacts = (int)o->n_contacts,
+                       .n_stiffness = (int)o->n_stiffness,
+                       .n_values = (int)o->n_values,
+                       .n_terms = (int)o->n_terms,
+                       .n_outputs = (int)o->n_outputs,
+                       .tolerance = o->tolerance,
+                       .lo = e->s->lo,
+                       .hi = e->s->hi,
+                       .offset = o->offset,
+                       .stiffness = o->stiffness,
+                       .W = o->W,
+                       .A = o->A,
+                       .value = o->value,
+                       .factor = o->factor,
+                       .term = o->term,
+                       .output = (const Output *)(const void *)o->output, /* a struct of ints alone */
+                       .contact = o->contact,
+                       .weight = o->weight};
+  char *memory;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(work_size(&model) + 1, &memory));
+  ierr = Compare(e, &model, memory);
+  PetscCall(PetscFree(memory));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- the exporter -- */
+
+static PetscErrorCode Prepare(Export *e)
+{
+  const HycoROM m = e->m;
+  PetscReal mu[HYCO_MAX_PARAMETERS], x[3 * PLACES];
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneRefuseHistory(e->s, "hyco export"));
+  HycoCheck(m->ops->unknowns && m->ops->residual && m->ops->jacobian && m->ops->expand,
+            "a model of type %s cannot be exported; train one with -hyco_model_type bodies", m->model->type);
+  for (PetscInt p = 0; p < e->s->n_parameters; p++) mu[p] = (e->s->lo[p] + e->s->hi[p]) / 2;
+  PetscCall(HycoROMPredict(m, e->s->n_parameters, mu));
+  PetscCall(FindProblem(e, mu));
+  e->out.tolerance = m->solver->rtol;
+  PetscCall(HycoROMMeasureQuantities(m, &(HycoPrediction){0}));
+  PetscCall(FindOutputs(e));
+  for (PetscInt i = 0; i < PLACES; i++) /* nodes without regularity */
+    PetscCall(PetscArraycpy(x + 3 * i, m->fe->X + 3 * ((i * 7919 + 13) % m->fe->mesh->n_nodes), 3));
+  PetscCall(HycoAtomsFind(e->s, PLACES, x, &e->n_atoms, &e->atom));
+  e->out.n_atoms = e->n_atoms;
+  e->out.atom = e->atom;
+  e->ny = e->p + e->k + e->n_rows;
+  e->n_groups = 2 + e->out.n_outputs;
+  PetscCall(PetscMalloc1(2 * e->ny + 1, &e->group));
+  for (PetscInt r = 0; r < 2 * e->ny; r++) {
+    const PetscInt at = r % e->ny;
+
+    e->group[r] = at < e->p ? 0 : at < e->p + e->k ? 1 : 2 + e->row[at - e->p - e->k].group;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Destroy(Export *e)
+{
+  PetscFunctionBegin;
+  PetscCall(FreeFit(&e->base));
+  PetscCall(FreeFit(&e->response));
+  if (e->z) PetscCall(PetscFree4(e->z, e->w, e->unit, e->contact));
+  HycoFreeAll(&e->group, &e->atom, &e->row, &e->area, &e->pressure);
+  PetscCall(HycoExportModelFree(&e->out));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Build(Export *e)
+{
+  PetscFunctionBegin;
+  PetscCall(Prepare(e));
+  PetscCall(FitBoth(e, -1));
+  if (e->base.worst > EXACT || e->response.worst > EXACT) PetscCall(Refuse(e));
+  PetscCall(Fill(e));
+  PetscCall(CompareHere(e));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode ExportC(HycoROM m, const char path[], char **description)
+{
+  Export e = {.m = m, .s = m->model->scene};
+  PetscErrorCode ierr;
+
+  const size_t n = strlen(path);
+
+  PetscFunctionBegin;
+  HycoCheck(n > 2 && n < PETSC_MAX_PATH_LEN && !strcmp(path + n - 2, ".c"), "-c %s: the file's name must end in .c",
+            path);
+  ierr = Build(&e);
+  if (!ierr) ierr = HycoExportWrite(&e.out, e.s, m->model->path, path, description);
+  PetscCall(Destroy(&e));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+HycoDefineExtension(export, HycoExporterRegister("c", ExportC))

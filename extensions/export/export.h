@@ -1,0 +1,85 @@
+/* Export of a model's predictions to C99: what the files of the extension share. */
+#ifndef HYCOEXPORT_H
+#define HYCOEXPORT_H
+
+#include <hycoalgorithms.h>
+#include <hycoromimpl.h>
+
+/* An expression of the scene in the parameters alone: its text at a place x, which is fixed. */
+typedef struct {
+  const char *key, *text; /* borrowed from the scene */
+  PetscReal x[3];
+} HycoAtom;
+
+/* A function of the parameters: the product of atoms a and b over atom c; each -1: 1. */
+typedef struct {
+  PetscInt a, b, c;
+} HycoFunction;
+
+/* Texts that grow. */
+typedef struct {
+  char *text;
+  size_t n, room;
+} HycoText;
+PetscErrorCode HycoTextAdd(HycoText *text, const char format[], ...) PETSC_ATTRIBUTE_FORMAT(2, 3);
+/* Inserts words at a position. */
+PetscErrorCode HycoTextInsert(HycoText *text, size_t at, const char words[]);
+
+/* Evaluates an expression of the scene, and writes it in C (c: NULL: does not) with the parameters in mu[]. *valid: it is
+   one, in names that are known; *uses: it has a parameter; *space: x, y or z. */
+PetscErrorCode HycoTranslate(HycoScene scene, const char text[], const PetscReal x[3], const PetscReal mu[],
+                             PetscReal *value, HycoText *c, PetscBool *valid, PetscBool *uses, PetscBool *space);
+
+/* The atoms of a scene: its parameters, and each entry's expression that has one, at some places x (n x 3) if it varies in
+   space. */
+PetscErrorCode HycoAtomsFind(HycoScene scene, PetscInt n, const PetscReal x[], PetscInt *n_atoms, HycoAtom **atom);
+
+/* Linear combinations of functions of the parameters that give data at points exactly: a subset of candidates. */
+typedef struct {
+  PetscInt n_points, n_rows; /* y: n_points x n_rows */
+  const PetscReal *mu, *y;
+  const PetscInt *group;  /* by row: its group, */
+  const PetscReal *scale; /* which has a scale of errors; 0: all is 0 */
+} HycoFitData;
+typedef struct {
+  PetscInt n;
+  HycoFunction *function;
+  PetscReal *coefficient; /* n_rows x n */
+  PetscReal worst;        /* error at the points that were not fitted (each third), relative to the group */
+  PetscInt worst_row;
+} HycoFit;
+/* The functions are those of a level: 1, a; from 1 on 1/c, a/c; from 2 on a b; from 3 on a b / c. worst > tol: they do not
+   suffice. The caller frees both arrays. */
+PetscErrorCode HycoFitFunctions(HycoScene scene, PetscInt n_atoms, const HycoAtom atom[], PetscInt level, PetscReal tol,
+                                const HycoFitData *data, HycoFit *fit);
+#define HYCO_FIT_LEVELS 4
+/* value[n]: of the functions at mu. */
+PetscErrorCode HycoFunctionsEvaluate(HycoScene scene, const HycoAtom atom[], PetscInt n, const HycoFunction f[],
+                                     const PetscReal mu[], PetscReal value[]);
+
+/* The arrays of a program, as the runtime's Model has them, and its names. */
+typedef struct {
+  PetscInt n_functions, n_motions, n_contacts, n_stiffness, n_values, n_terms, n_outputs, n_contact, n_weights;
+  PetscReal tolerance;
+  PetscReal difference, seconds; /* largest difference from the model at the points that were checked; their time */
+  PetscInt n_atoms, checked;
+  const HycoAtom *atom; /* borrowed */
+  HycoFunction *function;
+  PetscReal *offset, *W, *A, *term, *weight;
+  int *stiffness, *value, *factor, *contact;
+  int *output;         /* 6 each: the members of the runtime's Output */
+  char **name, **unit; /* of outputs */
+} HycoExportModel;
+PetscErrorCode HycoExportAddOutput(HycoExportModel *model, const int output[6], const char name[], const char unit[]);
+PetscErrorCode HycoExportAddContact(HycoExportModel *model, PetscInt contact);
+PetscErrorCode HycoExportAddWeight(HycoExportModel *model, PetscReal weight);
+PetscErrorCode HycoExportAddTerm(HycoExportModel *model, PetscInt value, PetscInt function, PetscInt n,
+                                 const PetscReal term[]);
+PetscErrorCode HycoExportModelFree(HycoExportModel *model);
+/* The unit of an output of the scene, "" where the scene has none. Borrowed, until the next call. */
+const char *HycoExportUnit(HycoScene scene, const HycoQuantity *quantity);
+/* Writes FILE.c and FILE.h beside it; describes them. */
+PetscErrorCode HycoExportWrite(const HycoExportModel *model, HycoScene scene, const char name[], const char path[],
+                               char **description);
+
+#endif

@@ -1,0 +1,376 @@
+/*
+  Data of a model as functions of the parameters: exact sums of products of the scene's expressions. Which products, a fit
+  at points over the ranges finds; a third of the points shows that it is exact.
+*/
+#include "export.h"
+#include <math.h>
+#include <string.h>
+
+#define INDEPENDENT 1e-4 /* of a function beside the former ones, relative to its own size */
+#define MIXED       12   /* combinations of the rows by which functions are chosen */
+#define MOST        40   /* functions */
+#define SAME        1e-13
+
+/* -- atoms -- */
+
+/* Whether muParser has the same values at the ends and the middle of the ranges. */
+static PetscErrorCode Agrees(HycoScene s, const HycoAtom *atom, PetscBool *agrees)
+{
+  PetscReal mu[HYCO_MAX_PARAMETERS], mine, theirs;
+  HycoExpr e;
+  PetscErrorCode ierr = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneExpression(s, atom->key, atom->text, &e));
+  *agrees = PETSC_TRUE;
+  for (PetscInt k = 0; k < 3 && !ierr && *agrees; k++) {
+    PetscBool valid;
+
+    for (PetscInt p = 0; p < s->n_parameters; p++) mu[p] = s->lo[p] + (s->hi[p] - s->lo[p]) * (PetscReal)k / 2;
+    PetscCall(HycoTranslate(s, atom->text, atom->x, mu, &mine, NULL, &valid, NULL, NULL));
+    if (PetscIsInfOrNanReal(mine)) *agrees = PETSC_FALSE;
+    if (*agrees) ierr = HycoExprEval(e, mu, 1, atom->x, &theirs);
+    if (*agrees && !ierr) *agrees = (PetscBool)(PetscAbsReal(mine - theirs) <= SAME * PetscAbsReal(theirs));
+  }
+  PetscCall(HycoExprDestroy(&e));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Add(HycoScene s, const char key[], const char text[], const PetscReal x[3], PetscInt *n,
+                          HycoAtom **atom)
+{
+  HycoAtom one = {.key = key, .text = text, .x = {x[0], x[1], x[2]}};
+  PetscBool agrees = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  PetscCall(Agrees(s, &one, &agrees));
+  if (!agrees) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscRealloc((size_t)(*n + 1) * sizeof(**atom), atom));
+  (*atom)[(*n)++] = one;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether a text was taken, or is a parameter's name. */
+static PetscBool Known(HycoScene s, const char text[], PetscInt n, const HycoAtom atom[])
+{
+  for (PetscInt k = 0; k < n; k++) {
+    if (!strcmp(atom[k].text, text)) return PETSC_TRUE;
+  }
+  (void)s;
+  return PETSC_FALSE;
+}
+
+PetscErrorCode HycoAtomsFind(HycoScene s, PetscInt n, const PetscReal x[], PetscInt *n_atoms, HycoAtom **atom)
+{
+  PetscReal value;
+  PetscBool valid, uses, space;
+
+  PetscFunctionBegin;
+  *n_atoms = 0;
+  *atom = NULL;
+  for (PetscInt p = 0; p < s->n_parameters; p++) PetscCall(Add(s, s->parameter[p], s->parameter[p], x, n_atoms, atom));
+  for (PetscInt k = 0; k < s->n_entries; k++) {
+    if (!strncmp(s->key[k], "output_", 7) || !strncmp(s->key[k], "scene_", 6) || !strncmp(s->key[k], "constant_", 9) ||
+        Known(s, s->value[k], *n_atoms, *atom))
+      continue;
+    PetscCall(HycoTranslate(s, s->value[k], x, s->lo, &value, NULL, &valid, &uses, &space));
+    for (PetscInt i = 0; valid && uses && i < (space ? n : 1); i++)
+      PetscCall(Add(s, s->key[k], s->value[k], x + 3 * i, n_atoms, atom));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- candidates -- */
+
+PetscErrorCode HycoFunctionsEvaluate(HycoScene s, const HycoAtom atom[], PetscInt n, const HycoFunction f[],
+                                     const PetscReal mu[], PetscReal value[])
+{
+  PetscBool valid;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscInt of[3] = {f[k].a, f[k].b, f[k].c};
+
+    value[k] = 1;
+    for (PetscInt j = 0; j < 3; j++) {
+      PetscReal one = 1;
+
+      if (of[j] >= 0) PetscCall(HycoTranslate(s, atom[of[j]].text, atom[of[j]].x, mu, &one, NULL, &valid, NULL, NULL));
+      value[k] = j < 2 ? value[k] * one : value[k] / one;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* All candidates of a level, the simpler ones first; f NULL: counts them. */
+static PetscInt Candidates(PetscInt m, PetscInt level, HycoFunction f[])
+{
+  PetscInt n = 0;
+
+#define CANDIDATE(...)                                                                                                 \
+  do {                                                                                                                 \
+    if (f) f[n] = (HycoFunction){__VA_ARGS__};                                                                         \
+    n++;                                                                                                               \
+  } while (0)
+  CANDIDATE(-1, -1, -1);
+  for (PetscInt a = 0; a < m; a++) CANDIDATE(a, -1, -1);
+  for (PetscInt a = -1; level > 0 && a < m; a++) {
+    for (PetscInt c = 0; c < m; c++) {
+      if (a != c) CANDIDATE(a, -1, c);
+    }
+  }
+  for (PetscInt c = -1; level > 1 && c < (level > 2 ? m : 0); c++) {
+    for (PetscInt a = 0; a < m; a++) {
+      for (PetscInt b = a; b < m; b++) {
+        if (a != c && b != c) CANDIDATE(a, b, c);
+      }
+    }
+  }
+#undef CANDIDATE
+  return n;
+}
+
+/* -- the fit -- */
+
+/* Whether a point is one of those that check the fit. */
+static PetscBool Held(PetscInt k)
+{
+  return (PetscBool)(k % 3 == 2);
+}
+
+/* values[k * N + i] of the functions at all N points. */
+static PetscErrorCode Tabulate(HycoScene s, PetscInt n_atoms, const HycoAtom atom[], const HycoFitData *d, PetscInt n,
+                               const HycoFunction f[], PetscReal value[])
+{
+  PetscReal *at;
+  PetscBool valid;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n_atoms + 1, &at));
+  for (PetscInt i = 0; i < d->n_points; i++) {
+    for (PetscInt a = 0; a < n_atoms; a++)
+      PetscCall(
+          HycoTranslate(s, atom[a].text, atom[a].x, d->mu + i * s->n_parameters, &at[a], NULL, &valid, NULL, NULL));
+    for (PetscInt k = 0; k < n; k++)
+      value[(size_t)k * (size_t)d->n_points + (size_t)i] =
+          (f[k].a < 0 ? 1 : at[f[k].a]) * (f[k].b < 0 ? 1 : at[f[k].b]) / (f[k].c < 0 ? 1 : at[f[k].c]);
+  }
+  PetscCall(PetscFree(at));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Combinations of the rows at the fitted points, in units of their groups: target[MIXED * N], other points 0. */
+static void Mix(const HycoFitData *d, PetscReal target[])
+{
+  for (PetscInt i = 0; i < MIXED * d->n_points; i++) target[i] = 0;
+  for (PetscInt i = 0; i < d->n_points; i++) {
+    const PetscReal *y = d->y + (size_t)i * (size_t)d->n_rows;
+
+    for (PetscInt r = 0; r < d->n_rows && !Held(i); r++) {
+      if (d->scale[d->group[r]] == 0) continue;
+      for (PetscInt c = 0; c < MIXED; c++) {
+        const PetscReal share = (r + 1) * (0.61803398874989485 + 0.075 * c);
+
+        target[c * d->n_points + i] += (share - PetscFloorReal(share) - 0.5) * y[r] / d->scale[d->group[r]];
+      }
+    }
+  }
+}
+
+static PetscReal Product(PetscInt n, const PetscReal a[], const PetscReal b[])
+{
+  PetscReal sum = 0;
+
+  for (PetscInt i = 0; i < n; i++) sum += a[i] * b[i];
+  return sum;
+}
+
+/* v -= its part along q, of length 1. */
+static void Deflate(PetscInt n, const PetscReal q[], PetscReal v[])
+{
+  const PetscReal sum = Product(n, v, q);
+
+  for (PetscInt i = 0; i < n; i++) v[i] -= sum * q[i];
+}
+
+/* What the targets lose by a function that is orthogonal to the chosen ones, relative to its square; 0: it depends on
+   them. */
+static PetscReal Gain(PetscInt N, const PetscReal v[], PetscReal size, const PetscReal target[])
+{
+  const PetscReal left = Product(N, v, v);
+  PetscReal gain = 0;
+
+  if (!(left > PetscSqr(INDEPENDENT) * size) || PetscIsInfOrNanReal(left)) return 0;
+  for (PetscInt c = 0; c < MIXED; c++) gain += PetscSqr(Product(N, v, target + c * N));
+  return gain / left;
+}
+
+/* Orthogonal matching pursuit: the n candidates by which the targets are lost, one after the other, to round-off; the simpler
+   ones first where they do as much. */
+static PetscErrorCode Choose(const HycoFitData *d, PetscInt *n, HycoFunction f[], PetscReal value[])
+{
+  const PetscInt N = d->n_points, most = PetscMin(*n, PetscMin(MOST, N / 3));
+  PetscReal *v, *target, *size, *q, all;
+  PetscInt *chosen, m = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc5((size_t)*n * (size_t)N, &v, MIXED * N, &target, *n, &size, N, &q, most + 1, &chosen));
+  Mix(d, target);
+  all = Product(MIXED * N, target, target);
+  PetscCall(PetscArraycpy(v, value, (size_t)*n * (size_t)N));
+  for (PetscInt k = 0; k < *n; k++) {
+    for (PetscInt i = 2; i < N; i += 3) v[(size_t)k * (size_t)N + (size_t)i] = 0; /* not fitted */
+    size[k] = Product(N, v + (size_t)k * (size_t)N, v + (size_t)k * (size_t)N);
+  }
+  while (m < most && Product(MIXED * N, target, target) > 1e-28 * all) {
+    PetscReal best = 0;
+
+    chosen[m] = -1;
+    for (PetscInt k = 0; k < *n; k++) {
+      const PetscReal gain = Gain(N, v + (size_t)k * (size_t)N, size[k], target);
+
+      if (gain <= (1 + 1e-9) * best) continue;
+      best = gain;
+      chosen[m] = k;
+    }
+    if (chosen[m] < 0) break;
+    PetscCall(PetscArraycpy(q, v + (size_t)chosen[m] * (size_t)N, N));
+    best = PetscSqrtReal(Product(N, q, q));
+    for (PetscInt i = 0; i < N; i++) q[i] /= best;
+    for (PetscInt k = 0; k < *n; k++) Deflate(N, q, v + (size_t)k * (size_t)N);
+    for (PetscInt c = 0; c < MIXED; c++) Deflate(N, q, target + c * N);
+    m++;
+  }
+  if (!m) chosen[m++] = 0; /* all is 0 */
+  PetscCall(PetscSortInt(m, chosen));
+  for (PetscInt k = 0; k < m; k++) {
+    PetscCall(PetscArraymove(value + (size_t)k * (size_t)N, value + (size_t)chosen[k] * (size_t)N, N));
+    f[k] = f[chosen[k]];
+  }
+  *n = m;
+  PetscCall(PetscFree5(v, target, size, q, chosen));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Least squares at the fitted points: coefficient (n_rows x n), and the error at the others. */
+static PetscErrorCode Solve(const HycoFitData *d, PetscInt n, const PetscReal value[], HycoFit *fit)
+{
+  const PetscInt N = d->n_points;
+  PetscReal *A, *P, *scale;
+  PetscInt *at, m = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc4((size_t)n * (size_t)N, &A, (size_t)n * (size_t)N, &P, n, &scale, N, &at));
+  for (PetscInt i = 0; i < N; i++) {
+    if (!Held(i)) at[m++] = i;
+  }
+  for (PetscInt k = 0; k < n; k++) {
+    scale[k] = 0;
+    for (PetscInt i = 0; i < N; i++)
+      scale[k] = PetscMax(scale[k], PetscAbsReal(value[(size_t)k * (size_t)N + (size_t)i]));
+    for (PetscInt i = 0; i < m; i++) A[k * m + i] = value[(size_t)k * (size_t)N + (size_t)at[i]] / scale[k];
+  }
+  PetscCall(HycoPseudoInverse(m, n, A, 1e-15, P)); /* n x m by columns */
+  PetscCall(PetscArrayzero(fit->coefficient, (size_t)n * (size_t)d->n_rows));
+  for (PetscInt i = 0; i < m; i++) {
+    const PetscReal *y = d->y + (size_t)at[i] * (size_t)d->n_rows;
+
+    for (PetscInt r = 0; r < d->n_rows; r++) {
+      for (PetscInt k = 0; k < n; k++) fit->coefficient[(size_t)r * (size_t)n + (size_t)k] += P[i * n + k] * y[r];
+    }
+  }
+  for (PetscInt r = 0; r < d->n_rows; r++) {
+    for (PetscInt k = 0; k < n; k++) fit->coefficient[(size_t)r * (size_t)n + (size_t)k] /= scale[k];
+  }
+  fit->worst = 0;
+  fit->worst_row = 0;
+  for (PetscInt i = 0; i < N; i++) {
+    for (PetscInt r = 0; Held(i) && r < d->n_rows; r++) {
+      PetscReal error = -d->y[(size_t)i * (size_t)d->n_rows + (size_t)r];
+
+      for (PetscInt k = 0; k < n; k++)
+        error += fit->coefficient[(size_t)r * (size_t)n + (size_t)k] * value[(size_t)k * (size_t)N + (size_t)i];
+      if (PetscAbsReal(error) <= fit->worst * d->scale[d->group[r]]) continue;
+      fit->worst = PetscAbsReal(error) / d->scale[d->group[r]];
+      fit->worst_row = r;
+    }
+  }
+  PetscCall(PetscFree4(A, P, scale, at));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The functions whose largest part of any row exceeds a share of the row's group; n: their number. */
+static PetscErrorCode Prune(const HycoFitData *d, const HycoFit *fit, PetscReal share, const PetscReal value[],
+                            PetscInt *n, PetscInt keep[])
+{
+  PetscReal *part;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(fit->n, &part));
+  *n = 0;
+  for (PetscInt k = 0; k < fit->n; k++) {
+    PetscReal size = 0;
+
+    for (PetscInt i = 0; i < d->n_points; i++)
+      size = PetscMax(size, PetscAbsReal(value[(size_t)k * (size_t)d->n_points + (size_t)i]));
+    for (PetscInt r = 0; r < d->n_rows; r++) {
+      const PetscReal here = size * PetscAbsReal(fit->coefficient[(size_t)r * (size_t)fit->n + (size_t)k]);
+
+      if (d->scale[d->group[r]] > 0) part[k] = PetscMax(part[k], here / d->scale[d->group[r]]);
+    }
+    if (part[k] > share) keep[(*n)++] = k;
+  }
+  PetscCall(PetscFree(part));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Leaves out the functions that are round-off, as long as the fit is as good. */
+static PetscErrorCode Reduce(const HycoFitData *d, PetscReal tol, PetscReal value[], HycoFit *fit)
+{
+  static const PetscReal share[] = {1e-6, 1e-9, 1e-12};
+  PetscInt *keep;
+  PetscReal *less;
+  HycoFit trial;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(fit->n, &keep, (size_t)fit->n * (size_t)d->n_points, &less));
+  for (size_t j = 0; j < sizeof(share) / sizeof(share[0]); j++) {
+    trial = *fit;
+    PetscCall(Prune(d, fit, share[j], value, &trial.n, keep));
+    PetscCall(PetscMalloc1((size_t)trial.n * (size_t)d->n_rows + 1, &trial.coefficient));
+    for (PetscInt k = 0; k < trial.n; k++)
+      PetscCall(PetscArraycpy(less + (size_t)k * (size_t)d->n_points, value + (size_t)keep[k] * (size_t)d->n_points,
+                              d->n_points));
+    if (trial.n) PetscCall(Solve(d, trial.n, less, &trial));
+    if (trial.n && trial.worst <= tol) {
+      for (PetscInt k = 0; k < trial.n; k++) trial.function[k] = trial.function[keep[k]];
+      PetscCall(PetscFree(fit->coefficient));
+      *fit = trial;
+      break;
+    }
+    PetscCall(PetscFree(trial.coefficient));
+  }
+  PetscCall(PetscFree2(keep, less));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFitFunctions(HycoScene s, PetscInt n_atoms, const HycoAtom atom[], PetscInt level, PetscReal tol,
+                                const HycoFitData *d, HycoFit *fit)
+{
+  const PetscInt most = Candidates(n_atoms, level, NULL);
+  PetscReal *value;
+
+  PetscFunctionBegin;
+  fit->n = most;
+  PetscCall(PetscMalloc1(most, &fit->function));
+  PetscCall(PetscMalloc1((size_t)most * (size_t)d->n_points, &value));
+  (void)Candidates(n_atoms, level, fit->function);
+  PetscCall(Tabulate(s, n_atoms, atom, d, fit->n, fit->function, value));
+  PetscCall(Choose(d, &fit->n, fit->function, value));
+  PetscCall(PetscMalloc1((size_t)fit->n * (size_t)d->n_rows + 1, &fit->coefficient));
+  PetscCall(Solve(d, fit->n, value, fit));
+  if (fit->worst <= tol) PetscCall(Reduce(d, tol, value, fit));
+  PetscCall(PetscFree(value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,383 @@
+/* The file of a model's program: declarations in FILE.h; the runtime, the arrays, the functions of the parameters in
+   FILE.c. */
+#include "export.h"
+#include <hycofile.h>
+#include <ctype.h>
+#include <string.h>
+
+extern const char HycoExportRuntime[]; /* runtime/runtime.c, by extension.cmake */
+
+#define ADD(...) PetscCall(HycoTextAdd(__VA_ARGS__))
+
+/* -- the arrays grow -- */
+
+/* Room for one more block of `size` bytes behind n others; the room is a power of 2. */
+static PetscErrorCode Grow(PetscInt n, size_t size, void *array)
+{
+  PetscFunctionBegin;
+  if ((n & (n - 1)) == 0) PetscCall(PetscRealloc((size_t)PetscMax(1, 2 * n) * size, (void **)array));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoExportAddOutput(HycoExportModel *m, const int output[6], const char name[], const char unit[])
+{
+  PetscFunctionBegin;
+  PetscCall(Grow(m->n_outputs, 6 * sizeof(*m->output), &m->output));
+  PetscCall(Grow(m->n_outputs, sizeof(*m->name), &m->name));
+  PetscCall(Grow(m->n_outputs, sizeof(*m->unit), &m->unit));
+  PetscCall(PetscArraycpy(m->output + 6 * m->n_outputs, output, 6));
+  PetscCall(PetscStrallocpy(name, &m->name[m->n_outputs]));
+  PetscCall(PetscStrallocpy(unit, &m->unit[m->n_outputs++]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoExportAddContact(HycoExportModel *m, PetscInt contact)
+{
+  PetscFunctionBegin;
+  PetscCall(Grow(m->n_contact, sizeof(*m->contact), &m->contact));
+  m->contact[m->n_contact++] = (int)contact;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoExportAddWeight(HycoExportModel *m, PetscReal weight)
+{
+  PetscFunctionBegin;
+  PetscCall(Grow(m->n_weights, sizeof(*m->weight), &m->weight));
+  m->weight[m->n_weights++] = weight;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoExportAddTerm(HycoExportModel *m, PetscInt value, PetscInt function, PetscInt n,
+                                 const PetscReal term[])
+{
+  PetscFunctionBegin;
+  PetscCall(Grow(m->n_terms, sizeof(*m->value), &m->value));
+  PetscCall(Grow(m->n_terms, sizeof(*m->factor), &m->factor));
+  PetscCall(Grow(m->n_terms, (size_t)PetscMax(1, n) * sizeof(*m->term), &m->term));
+  m->value[m->n_terms] = (int)value;
+  m->factor[m->n_terms] = (int)function;
+  PetscCall(PetscArraycpy(m->term + (size_t)m->n_terms * (size_t)n, term, n));
+  m->n_terms++;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoExportModelFree(HycoExportModel *m)
+{
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < m->n_outputs; k++) HycoFreeAll(&m->name[k], &m->unit[k]);
+  HycoFreeAll(&m->function, &m->offset, &m->W, &m->A, &m->term, &m->weight, &m->stiffness, &m->value, &m->factor,
+              &m->contact, &m->output, &m->name, &m->unit);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- names -- */
+
+const char *HycoExportUnit(HycoScene s, const HycoQuantity *q)
+{
+  static char text[HYCO_LINE];
+  const char *length = s->unit[HYCO_UNIT_LENGTH], *force = s->unit[HYCO_UNIT_FORCE];
+
+  if (q->kind == HYCO_QUANTITY_REACTION || q->kind == HYCO_QUANTITY_FORCE) return force;
+  if (q->kind == HYCO_QUANTITY_PRESSURE || q->kind == HYCO_QUANTITY_PRESSURE_MIN) return s->unit[HYCO_UNIT_STRESS];
+  if (q->kind < HYCO_QUANTITY_REACTION)
+    return HycoQuantityFields[q->field][0] == 'u' ? length : s->unit[HYCO_UNIT_STRESS];
+  text[0] = '\0';
+  if (q->kind == HYCO_QUANTITY_MOMENT && force[0] && length[0]) HycoFormat(text, "%s %s", force, length);
+  return text;
+}
+
+/* "parameter_NAME_unit", or "". */
+static const char *UnitOf(HycoScene s, const char parameter[])
+{
+  char key[HYCO_LINE];
+
+  HycoFormat(key, "parameter_%s_unit", parameter);
+  for (PetscInt k = 0; k < s->n_entries; k++) {
+    if (!strcmp(s->key[k], key)) return s->value[k];
+  }
+  return "";
+}
+
+/* The beginning of all names: that of the model's file, as an identifier. */
+static void PrefixOf(const char path[], char prefix[64])
+{
+  const char *name = strrchr(path, '/');
+  size_t n = 0;
+
+  name = name ? name + 1 : path;
+  if (!isalpha((unsigned char)name[0])) prefix[n++] = 'm';
+  for (; *name && *name != '.' && n < 40; name++) prefix[n++] = isalnum((unsigned char)*name) ? *name : '_';
+  prefix[n] = '\0';
+}
+
+/* A text within quotes, or (comment) in a comment. */
+static PetscErrorCode AddWords(HycoText *t, const char words[], PetscBool comment)
+{
+  PetscFunctionBegin;
+  for (; *words; words++) {
+    const char c = *words;
+
+    if (!comment && (c == '"' || c == '\\')) ADD(t, "\\");
+    ADD(t, "%c", isprint((unsigned char)c) && !(comment && (c == '*' || c == '/')) ? c : c < 0 ? c : ' ');
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- the header -- */
+
+static const char declarations[] =
+    "/* Names and units; ranges of the parameters, in which the model was trained. */\n"
+    "extern const char *const @_parameter_name[@_N_PARAMETERS], *const @_parameter_unit[@_N_PARAMETERS];\n"
+    "extern const char *const @_output_name[@_N_OUTPUTS], *const @_output_unit[@_N_OUTPUTS];\n"
+    "extern const double @_lo[@_N_PARAMETERS], @_hi[@_N_PARAMETERS];\n\n"
+    "typedef struct {\n"
+    "  double output[@_N_OUTPUTS];\n"
+    "  double kkt;     /* the largest residual of the contact problem, recomputed, relative */\n"
+    "  int iterations; /* of the active set */\n"
+    "} @_result;\n\n"
+    "/* @_OK; @_OUTSIDE: parameters outside the ranges, results are those of the equations there, untested;\n"
+    "   @_DIVERGED: no solution was found, results are of no use; @_NO_MEMORY: no results. */\n"
+    "enum { @_OK, @_OUTSIDE, @_DIVERGED, @_NO_MEMORY };\n\n"
+    "/* Results at mu. work: @_work_size() bytes, aligned as malloc() does, for this call alone; NULL: allocated\n"
+    "   for the call. Several threads may call it at the same time, each with its own work and result. */\n"
+    "int @_predict(const double mu[@_N_PARAMETERS], @_result *result, void *work);\n"
+    "size_t @_work_size(void);\n";
+
+static const char functions[] =
+    "size_t @_work_size(void)\n{\n  return work_size(&model);\n}\n\n"
+    "int @_predict(const double mu[@_N_PARAMETERS], @_result *result, void *work)\n{\n"
+    "  void *memory = work ? work : malloc(work_size(&model));\n"
+    "  int status, outside = 0;\n"
+    "  Work o;\n\n"
+    "  if (!memory) return @_NO_MEMORY;\n"
+    "  for (int p = 0; p < @_N_PARAMETERS; p++) outside = outside || !(mu[p] >= @_lo[p] && mu[p] <= @_hi[p]);\n"
+    "  place(&model, memory, &o);\n"
+    "  functions(mu, o.f);\n"
+    "  status = predict(&model, &o, result->output, &result->kkt, &result->iterations);\n"
+    "  if (!work) free(memory);\n"
+    "  return status == OK && outside ? OUTSIDE : status;\n}\n";
+
+/* A text with @ replaced by the prefix. */
+static PetscErrorCode AddNamed(HycoText *t, const char text[], const char prefix[])
+{
+  PetscFunctionBegin;
+  for (; *text; text++) {
+    if (*text == '@')
+      ADD(t, "%s", prefix);
+    else
+      ADD(t, "%c", *text);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode WriteHeader(const HycoExportModel *m, HycoScene s, const char prefix[], HycoText *t)
+{
+  PetscFunctionBegin;
+  ADD(t, "/* Predictions of a model of hyco %s: ", HycoVersion());
+  PetscCall(AddWords(t, s->title, PETSC_TRUE));
+  ADD(t, ".\n\n   Parameters:\n");
+  for (PetscInt p = 0; p < s->n_parameters; p++)
+    ADD(t, "     %d %s %s, %.10g to %.10g\n", (int)p, s->parameter[p], UnitOf(s, s->parameter[p]), (double)s->lo[p],
+        (double)s->hi[p]);
+  ADD(t, "   Outputs:\n");
+  for (PetscInt k = 0; k < m->n_outputs; k++) ADD(t, "     %d %s %s\n", (int)k, m->name[k], m->unit[k]);
+  ADD(t, "*/\n#ifndef HYCO_%s_H\n#define HYCO_%s_H\n\n#include <stddef.h>\n\n", prefix, prefix);
+  ADD(t, "#if defined(__cplusplus)\nextern \"C\" {\n#endif\n\n");
+  ADD(t, "enum { %s_N_PARAMETERS = %d, %s_N_OUTPUTS = %d };\n\n", prefix, (int)s->n_parameters, prefix,
+      (int)m->n_outputs);
+  PetscCall(AddNamed(t, declarations, prefix));
+  ADD(t, "\n#if defined(__cplusplus)\n}\n#endif\n#endif\n");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- the program -- */
+
+/* The numbers are exact when they are read again. */
+static PetscErrorCode WriteReals(HycoText *t, const char name[], size_t n, const PetscReal v[])
+{
+  PetscFunctionBegin;
+  ADD(t, "%s = {", name);
+  for (size_t i = 0; i < n; i++) ADD(t, "%s%s%.17g", i ? "," : "", i % 6 ? " " : "\n  ", (double)v[i]);
+  ADD(t, "%s};\n", n ? "" : "0");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode WriteInts(HycoText *t, const char name[], PetscInt n, const int v[])
+{
+  PetscFunctionBegin;
+  ADD(t, "%s = {", name);
+  for (PetscInt i = 0; i < n; i++) ADD(t, "%s%s%d", i ? "," : "", i % 20 ? " " : "\n  ", v[i]);
+  ADD(t, "%s};\n", n ? "" : "0");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* parameter: units are those of the scene's parameters. */
+static PetscErrorCode WriteNames(HycoText *t, HycoScene parameter, const char prefix[], const char of[], PetscInt n,
+                                 char *const name[], char *const unit[])
+{
+  PetscFunctionBegin;
+  for (PetscInt pass = 0; pass < 2; pass++) {
+    ADD(t, "const char *const %s_%s_%s[%d] = {", prefix, of, pass ? "unit" : "name", (int)n);
+    for (PetscInt k = 0; k < n; k++) {
+      ADD(t, "%s\"", k ? ", " : "");
+      PetscCall(AddWords(t, !pass ? name[k] : parameter ? UnitOf(parameter, name[k]) : unit[k], PETSC_FALSE));
+      ADD(t, "\"");
+    }
+    ADD(t, "};\n");
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode WriteArrays(const HycoExportModel *m, HycoText *t)
+{
+  const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts, f = (size_t)m->n_stiffness;
+
+  PetscFunctionBegin;
+  PetscCall(
+      WriteReals(t, "static const double offset[]", (p + n + (size_t)m->n_values) * (size_t)m->n_functions, m->offset));
+  PetscCall(WriteInts(t, "static const int stiffness[]", m->n_stiffness, m->stiffness));
+  PetscCall(WriteReals(t, "static const double flexibility[]", f * n * (n + 1) / 2, m->W));
+  PetscCall(WriteReals(t, "static const double work_on_motions[]", f * p * n, m->A));
+  PetscCall(WriteInts(t, "static const int term_value[]", m->n_terms, m->value));
+  PetscCall(WriteInts(t, "static const int term_factor[]", m->n_terms, m->factor));
+  PetscCall(WriteReals(t, "static const double term[]", (size_t)m->n_terms * (p + n), m->term));
+  PetscCall(WriteInts(t, "static const int contact[]", m->n_contact, m->contact));
+  PetscCall(WriteReals(t, "static const double weight[]", (size_t)m->n_weights, m->weight));
+  ADD(t, "static const Output outputs[] = {");
+  for (PetscInt k = 0; k < m->n_outputs; k++) {
+    const int *o = m->output + 6 * k;
+
+    ADD(t, "%s\n  {%d, %d, %d, %d, %d, %d}", k ? "," : "", o[0], o[1], o[2], o[3], o[4], o[5]);
+  }
+  ADD(t, "};\n");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode WriteModel(const HycoExportModel *m, HycoScene s, const char prefix[], HycoText *t)
+{
+  char name[HYCO_LINE];
+
+  PetscFunctionBegin;
+  HycoFormat(name, "const double %s_lo[%d]", prefix, (int)s->n_parameters);
+  PetscCall(WriteReals(t, name, (size_t)s->n_parameters, s->lo));
+  HycoFormat(name, "const double %s_hi[%d]", prefix, (int)s->n_parameters);
+  PetscCall(WriteReals(t, name, (size_t)s->n_parameters, s->hi));
+  PetscCall(WriteNames(t, s, prefix, "parameter", s->n_parameters, s->parameter, NULL));
+  PetscCall(WriteNames(t, NULL, prefix, "output", m->n_outputs, m->name, m->unit));
+  PetscCall(WriteArrays(m, t));
+  ADD(t, "\nstatic const Model model = {%d, %d, %d, %d, %d, %d, %d, %d, %.17g, %s_lo, %s_hi, offset, stiffness,\n",
+      (int)s->n_parameters, (int)m->n_functions, (int)m->n_motions, (int)m->n_contacts, (int)m->n_stiffness,
+      (int)m->n_values, (int)m->n_terms, (int)m->n_outputs, (double)m->tolerance, prefix, prefix);
+  ADD(t, "                            flexibility, work_on_motions, term_value, term_factor, term, outputs, contact,\n"
+         "                            weight};\n\n");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The functions of the parameters: each expression once. */
+static PetscErrorCode WriteFunctions(const HycoExportModel *m, HycoScene s, HycoText *t)
+{
+  PetscBool valid, *used;
+  PetscReal value;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(m->n_atoms + 1, &used));
+  for (PetscInt k = 0; k < m->n_functions; k++) {
+    const PetscInt of[3] = {m->function[k].a, m->function[k].b, m->function[k].c};
+
+    for (PetscInt j = 0; j < 3; j++) {
+      if (of[j] >= 0) used[of[j]] = PETSC_TRUE;
+    }
+  }
+  ADD(t, "static void functions(const double mu[], double f[])\n{\n");
+  for (PetscInt k = 0; k < m->n_atoms; k++) {
+    if (!used[k]) continue;
+    ADD(t, "  const double e%d = ", (int)k);
+    PetscCall(HycoTranslate(s, m->atom[k].text, m->atom[k].x, s->lo, &value, t, &valid, NULL, NULL));
+    ADD(t, "; /* ");
+    PetscCall(AddWords(t, m->atom[k].key, PETSC_TRUE));
+    ADD(t, " */\n");
+  }
+  ADD(t, "\n  (void)mu;\n");
+  for (PetscInt k = 0; k < m->n_functions; k++) {
+    const HycoFunction *f = &m->function[k];
+
+    ADD(t, "  f[%d] = ", (int)k);
+    if (f->a < 0) ADD(t, "1.0");
+    if (f->a >= 0) ADD(t, "e%d", (int)f->a);
+    if (f->b >= 0) ADD(t, " * e%d", (int)f->b);
+    if (f->c >= 0) ADD(t, " / e%d", (int)f->c);
+    ADD(t, ";\n");
+  }
+  ADD(t, "}\n\n");
+  PetscCall(PetscFree(used));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode WriteProgram(const HycoExportModel *m, HycoScene s, const char prefix[], const char header[],
+                                   HycoText *t)
+{
+  PetscFunctionBegin;
+  ADD(t,
+      "/* Written by hyco export; %s declares what it offers. C99, with libc and libm alone. */\n#include \"%s\"\n\n",
+      header, header);
+  ADD(t, "%s\n/* -- the model -- */\n\n", HycoExportRuntime);
+  PetscCall(WriteModel(m, s, prefix, t));
+  PetscCall(WriteFunctions(m, s, t));
+  PetscCall(AddNamed(t, functions, prefix));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- the files -- */
+
+static PetscErrorCode Describe(const HycoExportModel *m, HycoScene s, const char path[], const char header[],
+                               const char prefix[], size_t bytes, HycoText *t)
+{
+  PetscFunctionBegin;
+  ADD(t, "%s, %s: %s_predict(), %.3g MB; %d contacts, %d motions that contact holds, %d functions of the parameters\n",
+      path, header, prefix, (double)bytes / 1e6, (int)m->n_contacts, (int)m->n_motions, (int)m->n_functions);
+  for (PetscInt p = 0; p < s->n_parameters; p++)
+    ADD(t, "%s%s%s%s, %.6g to %.6g", p ? "; " : "parameters: ", s->parameter[p],
+        UnitOf(s, s->parameter[p])[0] ? " " : "", UnitOf(s, s->parameter[p]), (double)s->lo[p], (double)s->hi[p]);
+  for (PetscInt k = 0; k < m->n_outputs; k++)
+    ADD(t, "%s%s%s%s", k ? ", " : "\noutputs: ", m->name[k], m->unit[k][0] ? " " : "", m->unit[k]);
+  ADD(t, "\nat %d points: largest difference from the model %.1e of an output's largest value; %.3g ms a prediction\n",
+      (int)m->checked, (double)m->difference, 1e3 * (double)m->seconds / (double)m->checked);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Put(const char path[], const HycoText *t)
+{
+  HycoFile file;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFileCreate(path, HYCO_FILE_TEXT, &file));
+  (void)!fwrite(t->text, 1, t->n, HycoFileStream(file)); /* Close reports a failure */
+  PetscCall(HycoFileClose(&file, PETSC_TRUE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoExportWrite(const HycoExportModel *m, HycoScene s, const char name[], const char path[],
+                               char **description)
+{
+  HycoText header = {0}, program = {0}, words = {0};
+  char beside[PETSC_MAX_PATH_LEN], prefix[64];
+  const char *file;
+  const size_t n = strlen(path);
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(PetscStrncpy(beside, path, sizeof(beside)));
+  beside[n - 1] = 'h';
+  file = strrchr(beside, '/') ? strrchr(beside, '/') + 1 : beside;
+  PrefixOf(name, prefix);
+  ierr = WriteHeader(m, s, prefix, &header);
+  if (!ierr) ierr = WriteProgram(m, s, prefix, file, &program);
+  if (!ierr) ierr = Put(beside, &header);
+  if (!ierr) ierr = Put(path, &program);
+  if (!ierr) ierr = Describe(m, s, path, beside, prefix, program.n, &words);
+  PetscCall(PetscFree(header.text));
+  PetscCall(PetscFree(program.text));
+  *description = words.text;
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -1,0 +1,201 @@
+"""hyco export: C99 programs of models of bodies in 2D, 3D and with an axis, with floating bodies, gaps, loads and moduli: they compile without a warning, have
+the model's results in two threads at once, say what is outside the ranges; what cannot be exported is named in one line."""
+import os
+import subprocess
+import unittest
+
+import h5py
+import numpy as np
+
+from common import PATIENCE, ROPE, SOURCE, Case
+
+FLOATING = f"""
+scene:
+  title: a block that a foundation alone holds
+  mesh: {os.path.join(SOURCE, 'examples', 'blocks', 'blocks.msh')}
+  parameters: [soft, press, tip]
+  unit: {{length: mm, force: N/mm, stress: MPa}}
+parameter: {{soft: {{range: [1, 4]}}, press: {{range: [50, 400], unit: MPa}}, tip: {{range: [-2, 2]}}}}
+body:
+  block: {{young: 2e5, poisson: 0.3, expansion: 1e-5, temperature: 5*soft, reference_temperature: 0}}
+  foundation: {{young: 1e5/soft, poisson: 0.3}}
+fixed: {{block_sym: {{x: 0}}, foundation_sym: {{x: 0}}, foundation_base: {{y: 0}}}}
+pressure: {{block_top: press*(1 + tip*x/20)}}
+contact: {{under: {{type: surface, slave: block_under, master: foundation_top, tolerance: 0.3}}}}
+output:
+  peak: {{max: mises, group: block_under}}
+  sink: {{mean: u_y, group: block_top}}
+  corner: {{max: u, group: block_top}}
+  spread: {{mean: u, group: block_top}}
+  base: {{reaction: y, group: foundation_base}}
+  turn: {{moment: z, contact: under}}
+  most: {{max: contact_pressure}}
+  least: {{min: contact_pressure}}
+  tension: {{max: principal_1, group: block_top}}
+  hoop: {{min: sigma_rr, group: foundation_base}}
+"""
+PAD = ("""
+scene: {title: a pad on two plates, mesh: drawn_pad.msh, parameters: [press, lift, soft, weight]}
+parameter: {press: {range: [0.01, 0.05]}, lift: {range: [0, 0.02]}, soft: {range: [1, 2]}, weight: {range: [0, 1]}}
+constant: {pressure: 0.5*weight^2}
+body:
+  plate: {young: "soft < 1.5 ? 500*soft : 10^(soft + 1)", poisson: 0.3}
+  pad: {young: 100, poisson: 0.3}
+fixed: {base: {x: 0, y: 0, z: 0}, press: {x: 0, y: 0, z: -press}}
+pressure: {side: pressure}
+contact: {under: {type: surface, slave: sole, master: top, gap: "lift + 0.01*(x^2 + y^2)"}}
+output: {stress: {max: mises, group: sole}, push: {reaction: z, group: base}, mean: {mean: sigma_zz, group: pad}, area: {area: under}}
+""".replace('{area: under}', '{contact: under, force: z}'), """SetFactory("OpenCASCADE"); Box(1) = {-2, -2, -1, 4, 4, 1}; Box(2) = {-1, -1, 0, 2, 2, 1};
+Transfinite Curve{:} = 7; Transfinite Curve{1, 3, 5, 7} = 2; Transfinite Curve{13:24} = 5; Transfinite Surface{:}; Recombine Surface{:};
+Transfinite Volume{:};
+Physical Volume("plate") = {1}; Physical Volume("pad") = {2}; Physical Surface("base") = {5}; Physical Surface("top") = {6};
+Physical Surface("sole") = {11}; Physical Surface("press") = {12}; Physical Surface("side") = {7};
+""")
+PUNCH = ("""
+scene: {title: a punch over a disc, mesh: drawn_punch.msh, formulation: axisymmetric, parameters: [clear, load, ratio]}
+parameter: {clear: {range: [0, 0.01]}, load: {range: [0.5, 2]}, ratio: {range: [-1, 1]}}
+body: {disc: {young: 1000, poisson: 0.3}, punch: {young: 1000*10^ratio, poisson: 0.2}}
+fixed: {base: {y: 0}, punch_top: {y: -0.01*load}}
+pressure: {rim: 3*load}
+contact: {face: {type: pair, slave: sole, master: top, gap: "clear + 0.002*x^2", tolerance: 0.01}}
+output: {deep: {min: u_y, group: top}, hard: {max: contact_pressure, contact: face}, hoop: {max: sigma_tt, group: disc}, base: {reaction: y, group: base}}
+""", """Point(1) = {0, 0, 0}; Point(2) = {2, 0, 0}; Point(3) = {2, 1, 0}; Point(4) = {0, 1, 0}; Point(5) = {0, 2, 0}; Point(6) = {2, 2, 0};
+Point(7) = {2, 1, 0}; Point(8) = {0, 1, 0};
+Line(1) = {1, 2}; Line(2) = {2, 3}; Line(3) = {3, 4}; Line(4) = {4, 1}; Line(5) = {8, 7}; Line(6) = {7, 6}; Line(7) = {6, 5}; Line(8) = {5, 8};
+Curve Loop(1) = {1:4}; Plane Surface(1) = {1}; Curve Loop(2) = {5:8}; Plane Surface(2) = {2};
+Transfinite Curve{1, 3, 5, 7} = 9; Transfinite Curve{2, 4, 6, 8} = 5; Transfinite Surface{:}; Recombine Surface{:};
+Physical Surface("disc") = {1}; Physical Surface("punch") = {2}; Physical Curve("base") = {1}; Physical Curve("top") = {3};
+Physical Curve("sole") = {5}; Physical Curve("punch_top") = {7}; Physical Curve("rim") = {2};
+""")
+# Two threads predict all points, one with its own memory; a line for each point, from the first thread.
+MAIN = """#include "NAME.h"
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MOST = 200 };
+static double mu[MOST][NAME_N_PARAMETERS];
+static NAME_result result[2][MOST];
+static int status[2][MOST], n;
+
+static void *all(void *which)
+{
+  const int k = *(const int *)which;
+  void *work = k ? NULL : malloc(NAME_work_size());
+
+  for (int i = 0; i < n; i++) status[k][i] = NAME_predict(mu[i], &result[k][i], work);
+  free(work);
+  return NULL;
+}
+
+int main(void)
+{
+  int which[2] = {0, 1}, at = 0;
+  pthread_t thread[2];
+
+  while (scanf("%lf", &mu[at / NAME_N_PARAMETERS][at % NAME_N_PARAMETERS]) == 1) at++;
+  n = at / NAME_N_PARAMETERS;
+  for (int k = 0; k < 2; k++) pthread_create(&thread[k], NULL, all, &which[k]);
+  for (int k = 0; k < 2; k++) pthread_join(thread[k], NULL);
+  if (memcmp(status[0], status[1], sizeof(int) * (size_t)n)) return 1;
+  for (int k = 0; k < NAME_N_OUTPUTS; k++) printf("%s ", NAME_output_name[k]);
+  for (int i = 0; i < n; i++) {
+    printf("\\n%d %.17g", status[0][i], result[0][i].kkt);
+    for (int k = 0; k < NAME_N_OUTPUTS; k++) {
+      if (memcmp(&result[0][i].output[k], &result[1][i].output[k], sizeof(double))) return 2;
+      printf(" %.17g", result[0][i].output[k]);
+    }
+  }
+  return 0;
+}
+"""
+FLAGS = ['-std=c99', '-Wall', '-Wextra', '-Werror', '-pedantic', '-O2']
+
+
+class Export(Case):
+    def compiled(self, name):
+        """The program of NAME.c, compiled with the strictest usual flags; the main program needs POSIX for its threads alone."""
+        with open(self.path('main.c'), 'w', encoding='ascii') as f:
+            f.write(MAIN.replace('NAME', name))
+        for words in (['-c', name + '.c'], ['-D_POSIX_C_SOURCE=200809L', 'main.c', name + '.o', '-o', name, '-lm', '-pthread']):
+            run = subprocess.run(['cc', *FLAGS, *words], cwd=self.folder, timeout=60 * PATIENCE, capture_output=True, text=True, check=False)
+            self.assertEqual((run.returncode, run.stderr), (0, ''))
+        return self.path(name)
+
+    def ran(self, name, points):
+        """(names of the outputs, rows of status, KKT residual, outputs) at the points."""
+        text = '\n'.join(' '.join(repr(float(v)) for v in p) for p in points)
+        run = subprocess.run([self.path(name)], input=text, timeout=60 * PATIENCE, capture_output=True, text=True, check=True)
+        names, *rows = run.stdout.splitlines()
+        return names.split(), np.array([[float(v) for v in row.split()] for row in rows])
+
+    def judge(self, name, scene, outputs):
+        """The program of a model of the scene against predict, at 64 points with corners and faces; its outputs begin with those of the scene."""
+        self.hyco('train', '-scene', scene, '-hyco_model_type', 'bodies', '-scatter', '2', '-model', name + '.h5')
+        said = self.run_raw('export', '-model', name + '.h5', '-c', name + '.c')
+        self.assertEqual((said.returncode, said.stderr), (0, ''))
+        self.run_raw('predict', '-model', name + '.h5', '-scatter', '64', '-table', 't.h5')
+        self.compiled(name)
+        with h5py.File(self.path('t.h5')) as t:
+            table = {key: np.array(t[key]) for key in t}
+        with open(self.path(name + '.h'), encoding='ascii') as f:
+            parameters = [line.split()[1] for line in f.read().split('Parameters:\n')[1].split('   Outputs:')[0].splitlines()]
+        points = np.array([table[p] for p in parameters]).T
+        names, rows = self.ran(name, points)
+        self.assertEqual(sorted(names[:len(outputs)]), sorted(outputs))
+        self.assertTrue(table['converged'].all() and not rows[:, 0].any())
+        self.assertLess(rows[:, 1].max(), 1e-10)
+        for k, of in enumerate(names):
+            size = abs(table[of]).max()
+            self.assertLessEqual(abs(rows[:, 2 + k] - table[of]).max(), 1e-10 * size, of)
+            self.assertIn(of, said.stdout)
+            if k < len(outputs):
+                self.assertGreater(size, 0, of)
+        closed = table['n_active']
+        self.assertLess(closed.min(), closed.max())  # the set of closed contacts changes over the points
+        return points, names
+
+    def test_floating(self):
+        """A block that contact alone holds, under a load that varies in space with the parameters, heated; each kind of output; a state outside the ranges is said."""
+        with open(self.path('float.yaml'), 'w', encoding='ascii') as f:
+            f.write(FLOATING)
+        points, names = self.judge('floating', self.path('float.yaml'),
+                                   ['peak', 'sink', 'corner', 'spread', 'base', 'turn', 'most', 'least', 'tension', 'hoop'])
+        mu = points[0].copy()
+        for value, status in ((2, 0), (4.001, 1), (float('nan'), None)):
+            mu[0] = value
+            self.assertIn(self.ran('floating', [mu])[1][0, 0], [status] if status is not None else [1, 2])
+        with open(self.path('floating.h'), encoding='ascii') as f:
+            self.assertIn(f'{names.index("under.force_y")} under.force_y N/mm', f.read())
+        self.assertEqual(subprocess.run(['nm', '-g', '--defined-only', self.path('floating.o')], capture_output=True, text=True, check=True)
+                         .stdout.count(' floating_'), 8)  # no other names
+        self.assertNotRegex(subprocess.run(['nm', self.path('floating.o')], capture_output=True, text=True, check=True).stdout, r' [bBC] ')  # no variables
+
+    def test_pad(self):
+        """3D: an opening gap, a modulus with a kink, a pressure by a constant of the scene."""
+        self.drawn('drawn_pad', 3, PAD[1], PAD[0])
+        self.judge('pad', self.path('drawn_pad'), ['stress', 'push', 'mean', 'area'])
+
+    def test_punch(self):
+        """A body of revolution with a gap, a given displacement, a pressure and the logarithm of a modulus as parameters."""
+        self.drawn('drawn_punch', 2, PUNCH[1], PUNCH[0])
+        self.judge('punch', self.path('drawn_punch'), ['deep', 'hard', 'hoop', 'base'])
+
+    def test_refused(self):
+        """One line names what cannot be exported, and no file is written."""
+        roller = ('-scene', os.path.join(SOURCE, 'examples', 'roller'))
+        self.hyco('train', *roller, '-hyco_model_type', 'bodies', '-scatter', '2', '-model', 'roller.h5')
+        self.hyco('train', '-scene', ROPE, '-grid', '4,5', '-model', 'hybrid.h5')
+        for words, args in ((('contacts', 'place', 'travel'), ('-model', 'roller.h5', '-c', 'no.c')),
+                            (('hybrid', 'bodies'), ('-model', 'hybrid.h5', '-c', 'no.c')), (('-c', '.c'), ('-model', 'roller.h5', '-c', 'no.txt')),
+                            (('-c',), ('-model', 'roller.h5'))):
+            run = self.run_raw('export', *args)
+            self.assertEqual((run.returncode, len(run.stderr.strip().splitlines())), (1, 1), run.stderr)
+            for word in words:
+                self.assertIn(word, run.stderr)
+            self.assertFalse([f for f in os.listdir(self.folder) if f.startswith('no.')])
+
+
+if __name__ == '__main__':
+    unittest.main()
