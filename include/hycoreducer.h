@@ -112,7 +112,7 @@ typedef struct {
   PetscInt n;
   PetscReal value[3];
 } HycoFact;
-#define HYCO_MAX_FACTS 4
+#define HYCO_MAX_FACTS 5
 
 /* Errors of an output of the scene (HycoSceneGetQuantities()) at the held-out points, in its unit; of a path the
    largest of its listed times. Points whose prediction did not converge are left out. < 0: not known. */

@@ -96,8 +96,7 @@ typedef struct {
 typedef struct _n_HycoSubstructures {
   PetscInt dim, n;      /* bodies */
   PetscInt n_variables; /* of the scene: its parameters, the time and tables of a history */
-  PetscReal *first;     /* the parameters at which the bodies' axes are those of the scene, with those in theta as
-                              they are */
+  PetscReal *first;     /* the parameters at which the bodies' axes are those of the scene (HycoBodiesReference()) */
   PetscInt n_theta, *theta, *logarithm, *n_nodes; /* the parameters that change the shape of a body; whether their
                                                      logarithm is interpolated; values of each */
   PetscReal *node;  /* the values, one parameter after the other, ascending (their logarithms) */
@@ -137,9 +136,11 @@ typedef struct {
 typedef struct _n_HycoBodiesWork {
   HycoSubstructures bodies; /* borrowed */
   PetscReal **weight;       /* by body: of its samples */
-  HycoFE fe;                /* on probe */
-  PetscReal *X0, *E0;       /* by body: nodes of its cell and the largest entry of its tangents in its own axes */
-  PetscInt *E_at;           /* which entry */
+  PetscReal **blend;  /* by body with several samples: the columns of its flexibility with these weights, n x n; */
+  PetscBool *blended; /* by place: whether they are there */
+  HycoFE fe;          /* on probe */
+  PetscReal *X0, *E0; /* by body: nodes of its cell and the largest entry of its tangents in its own axes */
+  PetscInt *E_at;     /* which entry */
   HycoPose *pose;
   PetscReal *kappa, *c, *elastic, *free, *u, *f, *x; /* elastic: free, without inelastic strains */
   PetscReal *Z, *work;                               /* ns x p, p x r row major: of all bodies, interpolated */
@@ -160,9 +161,15 @@ typedef struct _n_HycoBodiesWork {
 PetscErrorCode HycoBodiesCreate(HycoSubstructures *bodies);
 /* NULL-safe. */
 PetscErrorCode HycoBodiesDestroy(HycoSubstructures *bodies);
-/* Points the bodies' tensors to the values of theta; the parameters at which the axes are those of the scene. */
+/* Points the bodies' tensors to the values of theta. */
 void HycoBodiesSetTensors(HycoSubstructures bodies);
-void HycoBodiesReference(HycoSubstructures bodies, const PetscReal mu[], PetscReal reference[]);
+/* Whether axis p of theta changes the shape of body k. */
+static inline PetscBool HycoBodiesAxis(HycoSubstructures bodies, PetscInt k, PetscInt p)
+{
+  return (PetscBool)(bodies->body[k].tensor.n[p] > 1);
+}
+/* The parameters at which the axes of body k are those of the scene: `first`, with those that change its shape as in mu. */
+void HycoBodiesReference(HycoSubstructures bodies, PetscInt k, const PetscReal mu[], PetscReal reference[]);
 /* weight[n_samples]: of the samples of body k at mu. */
 PetscErrorCode HycoBodiesWeights(HycoSubstructures bodies, PetscInt k, const PetscReal mu[], PetscReal weight[]);
 /* Prepares solves with contacts on this mesh, whose nodes have their numbers in the whole mesh. *work is all zero;

@@ -34,11 +34,12 @@ PetscInt HycoBodyPartsShapes(const HycoBodyParts *parts, PetscInt b, PetscInt pa
 /* The first body that is not similar to itself at the same values of these; -1: none. */
 PetscInt HycoBodyPartsFail(const HycoBodyParts *parts);
 
-/* K condensed at a point of theta: the blocks of all bodies, in their order. Rank 0. */
+/* A body condensed at its own theta: that of `first` where it does not change the body. theta on every rank, else rank
+   0. */
 typedef struct {
-  PetscReal *theta;            /* n_theta, on every rank */
-  PetscReal *C, *R, *Z, *work; /* n x n by body; ns x r; ns x p; p x r */
-} HycoBodiesRecord;
+  PetscReal *theta;            /* n_theta */
+  PetscReal *C, *R, *Z, *work; /* n x n; n x r; n x p; p x r, where the body has none of the p motions 0 */
+} HycoBodyRecord;
 
 /* How laws in few cells give the coefficients of the inelastic forces. */
 enum { HYCO_BODIES_AUTO, HYCO_BODIES_INTERPOLATION, HYCO_BODIES_CUBATURE };
@@ -51,6 +52,7 @@ typedef struct {
   HycoBasis strains;                           /* modes of the inelastic forces; V is NULL without a history */
   HycoBodyParts parts;
   HycoSubstructures bodies; /* complete on rank 0 */
+  PetscInt n_factors;       /* of single bodies */
   PetscBool filled;         /* modes are still many for the largest number of samples */
 } * HycoBodiesTraining;
 
@@ -59,26 +61,38 @@ static inline HycoBodiesTraining HycoTrainingOfBodies(HycoReducer t)
   return (HycoBodiesTraining)t->training;
 }
 
-/* The factor of K at a point of theta with the unknowns of the surfaces last. Every rank. */
+/* A body's block of K and its factors, with the unknowns of its surfaces last. Every rank. */
 typedef struct {
-  HycoFOM fom;
-  Mat N;             /* selects them */
-  HycoDirect direct; /* the present factor, borrowed from: */
-  PetscInt n_kept;
+  PetscInt n_rows, *row; /* this rank's unknowns of the body, among all of this rank */
+  IS global;             /* the same in the distributed vectors */
+  Mat K, N;              /* its block; N selects the unknowns of the surfaces, NULL: none */
+  PetscInt p, *motion;   /* its rigid motions, by their numbers among all */
+  PetscInt *pin;         /* its isostatic supports: unknowns of the block */
+  HycoDirect direct;     /* the present factor, borrowed from: */
+  PetscInt now, n_kept;  /* now: which one */
   struct {
     HycoDirect direct;
-    PetscReal *theta;
+    PetscReal *theta; /* NULL: not factored */
   } * kept;
-  PetscReal bytes;  /* of one */
-  PetscReal *theta; /* of the present factor */
-  PetscInt *pins;   /* of the first factor */
-  PetscReal *z;     /* p + ns */
+  PetscReal bytes; /* of one */
+  PetscInt n_records;
+  HycoBodyRecord *record;
+} HycoBodyFactor;
+
+/* The factors of K, body by body, at a point of theta. Every rank. */
+typedef struct {
+  HycoFOM fom;
+  PetscInt n, *owner; /* bodies; by node of this rank: its body */
+  HycoBodyFactor *body;
+  PetscReal *theta;       /* present, and of the nodes */
+  PetscReal *between;     /* the last that was condensed to judge the samples */
+  PetscBool assembled;    /* K is there, too */
+  PetscInt n_condensed;   /* points */
+  PetscInt n_pins, *pins; /* of the first factor */
   PetscInt n_basis;
   Vec *basis; /* of the turned loads, orthonormal */
   PetscInt n_strains;
-  Vec *strain; /* K^-1 times the modes of the inelastic forces */
-  PetscInt n_records;
-  HycoBodiesRecord *record;
+  Vec *strain;        /* K^-1 times the modes of the inelastic forces */
   PetscReal *score;   /* by cell of the part */
   PetscReal *moved;   /* by unknown of the part: largest sampled displacement */
   PetscBool *known;   /* by unknown of the part: on the surfaces; */
@@ -97,11 +111,15 @@ PetscErrorCode HycoBodiesModes(HycoReducer reducer, HycoSnapshots store);
 /* Operations of the training, after HycoBodiesBegin(); whether a search tries the type. */
 PetscReal HycoBodiesOperations(HycoReducer reducer);
 PetscBool HycoBodiesOffers(HycoReducer reducer, PetscBool targets, size_t length, char why[]);
-/* Factors K at theta, unless it is the present factor. Collective. */
+/* The bodies' blocks, from the matrix N of the unknowns of all surfaces, whose columns are those of K. Collective. */
+PetscErrorCode HycoBodiesSplit(HycoReducer reducer, Mat N, HycoBodiesFactor *factor);
+/* Frees everything in it. Collective. */
+PetscErrorCode HycoBodiesReleaseFactor(HycoBodiesFactor *factor);
+/* Nodes and factors at theta; only bodies that theta changes are factored. Collective. */
 PetscErrorCode HycoBodiesRefactor(HycoReducer reducer, HycoBodiesFactor *factor, const PetscReal theta[]);
-/* The number of the record at theta, condensed if there is none. Collective. */
+/* record[n]: of each body its record at theta, condensed if there is none. Collective. */
 PetscErrorCode HycoBodiesCondense(HycoReducer reducer, HycoBodiesFactor *factor, const PetscReal theta[],
-                                  PetscInt *record);
+                                  PetscInt record[]);
 /* The basis of the loads and the cells by which they are evaluated. Collective. */
 PetscErrorCode HycoBodiesLoads(HycoReducer reducer, HycoBodiesFactor *factor);
 /* The values of theta and the bodies' samples there. Collective. */
@@ -113,10 +131,14 @@ PetscErrorCode HycoBodiesAddScores(HycoReducer reducer, HycoBodiesFactor *factor
 PetscErrorCode HycoBodiesChooseCells(HycoReducer reducer, HycoBodiesFactor *factor);
 /* The modes, as t->V, and H, a, g. Collective. */
 PetscErrorCode HycoBodiesFields(HycoReducer reducer, HycoSnapshots store, HycoBodiesFactor *factor);
-/* For n loads F: the displacements of the surfaces without contact (ns x n), and the work on the motions (p x n).
-   Collective. */
+/* For n loads F: the displacements of the surfaces without contact (ns x n), and the work on the motions (p x n). Bodies
+   without load are not solved. Collective. */
 PetscErrorCode HycoBodiesReduce(HycoSubstructures bodies, HycoBodiesFactor *factor, PetscInt n, const Vec F[],
                                 PetscReal u[], PetscReal work[]);
+/* x = K^-1 F for n loads, with given motions and forces of the contacts z ((p + ns) x n; read on rank 0; NULL: 0).
+   Collective. */
+PetscErrorCode HycoBodiesExtend(HycoSubstructures bodies, HycoBodiesFactor *factor, PetscInt n, const Vec F[],
+                                const PetscReal z[], Vec x[]);
 /* Before the factor: modes of inelastic forces. After the samples: the cells of the model, and what the modes displace.
    Collective. */
 PetscErrorCode HycoBodiesStrainModes(HycoReducer reducer, HycoSnapshots store);

@@ -23,6 +23,8 @@ PetscErrorCode HycoDirectCreate(MPI_Comm comm, HycoDirect *direct);
 PetscErrorCode HycoDirectDestroy(HycoDirect *direct);
 /* Moves as many unknowns as K's null space has dimensions to the dense problem, z = (x_pinned, L). */
 PetscErrorCode HycoDirectPinKernel(HycoDirect direct, Mat K);
+/* The same for n given unknowns of K, ascending. */
+PetscErrorCode HycoDirectPin(HycoDirect direct, PetscInt n, const PetscInt pinned[]);
 /* Orders and analyses [K Bt; B 0] (B and Bt may be NULL) unless the pattern is the last one's; bytes: the estimated
    memory of the factor on all ranks together. */
 PetscErrorCode HycoDirectAnalyse(HycoDirect direct, Mat K, Mat Bt, Mat B, PetscBool symmetric, PetscReal *bytes);

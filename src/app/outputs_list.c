@@ -236,6 +236,7 @@ static const Written written[] = {
     {"report", "train", "n_bodies", "count", "-", "bodies: substructures"},
     {"report", "train", "n_surface_unknowns", "count", "-", "bodies: displacements at contacts"},
     {"report", "train", "n_body_samples", "count", "-", "bodies: samples of the parameters"},
+    {"report", "train", "n_body_factors", "count", "-", "bodies: factorisations of the stiffness of one body"},
     {"report", "train", "force_bound", "number", "-", "bodies: bound of the forces' error by interpolation"},
     {"report", "train", "n_inelastic_modes", "count", "-", "paths: modes of inelastic forces"},
     {"report", "train", "inelastic_amplification", "number", "-", "paths: of errors, by the choice of cells"},

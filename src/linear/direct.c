@@ -78,26 +78,32 @@ PetscErrorCode HycoDirectDestroy(HycoDirect *d)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The unknowns of a singular K that become Schur variables; other ones invalidate the analysis. Collective. */
+/* Other pinned unknowns invalidate the analysis. */
+PetscErrorCode HycoDirectPin(HycoDirect d, PetscInt n, const PetscInt pinned[])
+{
+  PetscBool same = (PetscBool)(n == d->n_pinned);
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; same && k < n; k++) same = (PetscBool)(pinned[k] == d->pinned[k]);
+  if (same) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(Release(d));
+  PetscCall(PetscFree(d->pinned));
+  HycoDuplicate(n + 1, pinned, &d->pinned);
+  d->n_pinned = n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The unknowns of a singular K that become Schur variables. Collective. */
 PetscErrorCode HycoDirectPinKernel(HycoDirect d, Mat K)
 {
   PetscInt n, *pinned;
-  PetscBool same;
 
   PetscFunctionBegin;
   PetscCall(HycoKernelSize(K, &n));
-  PetscCall(PetscMalloc1(n, &pinned));
+  PetscCall(PetscMalloc1(n + 1, &pinned));
   PetscCall(HycoKernelPins(d->comm, K, n, pinned));
-  same = (PetscBool)(n == d->n_pinned);
-  for (PetscInt k = 0; same && k < n; k++) same = (PetscBool)(pinned[k] == d->pinned[k]);
-  if (same)
-    PetscCall(PetscFree(pinned));
-  else {
-    PetscCall(Release(d));
-    PetscCall(PetscFree(d->pinned));
-    d->pinned = pinned;
-    d->n_pinned = n;
-  }
+  PetscCall(HycoDirectPin(d, n, pinned));
+  PetscCall(PetscFree(pinned));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

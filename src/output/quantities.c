@@ -6,6 +6,7 @@
 */
 #include <hycofields.h>
 #include <hycokinematics.h>
+#include <hycomaterialimpl.h>
 #include <hycoquantities.h>
 #include <math.h>
 #include <string.h>
@@ -153,9 +154,10 @@ static PetscErrorCode OfCell(HycoFE fe, PetscInt field, const PetscReal sigma[],
     else
       *value = n[1] * n[1] * s[0] + n[0] * n[0] * s[1] - 2 * n[0] * n[1] * s[3];
   }
-  if (field >= MISES) {
+  if (field == MISES) *value = HycoMises(fe->dim, s);
+  if (field > MISES) {
     PetscCall(HycoStressInvariants(1, fe->dim, s, &mises, principal));
-    *value = field == MISES ? mises : principal[field - FIRST];
+    *value = principal[field - FIRST];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -166,19 +168,21 @@ static void Extend(Sum *s, PetscReal value)
   s->least = PetscMin(s->least, value);
 }
 
-/* Adds a cell or facet with these nodes and the value of the cell (stress), or those of its nodes (NULL). */
-static PetscErrorCode AddEntity(HycoFE fe, PetscInt field, const PetscReal u[], PetscInt cell, PetscInt facet,
-                                const PetscReal *value, Sum *s)
+/* Adds a cell or facet with these nodes and the value of the cell (stress), or those of its nodes (NULL); the sums are
+   integrals for a mean, which alone needs them, otherwise the weight counts. */
+static PetscErrorCode AddEntity(HycoFE fe, const HycoQuantity *quantity, const PetscReal u[], PetscInt cell,
+                                PetscInt facet, const PetscReal *value, Sum *s)
 {
   HycoMesh m = fe->mesh;
   const HycoElement *el = facet < 0 ? HycoElementGet(m->type) : HycoElementGetFacet(m->type);
-  const PetscInt *node = facet < 0 ? m->cells + cell * m->nv : m->facets + facet * m->nf;
+  const PetscInt *node = facet < 0 ? m->cells + cell * m->nv : m->facets + facet * m->nf, field = quantity->field;
 
   PetscFunctionBegin;
   if (value) Extend(s, *value);
   for (PetscInt a = 0; a < el->nv && !value; a++) Extend(s, OfNode(fe, field, u, node[a]));
   if (HycoMeshOwned(m, node[0]) < 0) PetscFunctionReturn(PETSC_SUCCESS); /* added by another process */
-  for (PetscInt q = 0; q < el->nq; q++) {
+  s->weight += quantity->kind != HYCO_QUANTITY_MEAN;
+  for (PetscInt q = 0; q < el->nq && quantity->kind == HYCO_QUANTITY_MEAN; q++) {
     PetscReal g[HYCO_CELL_NODES][3], n[3], w = 0, here = value ? *value : 0;
 
     if (facet < 0) {
@@ -196,10 +200,11 @@ static PetscErrorCode AddEntity(HycoFE fe, PetscInt field, const PetscReal u[], 
 }
 
 /* Adds a group of points or lines: its nodes, or the cells around them. */
-static PetscErrorCode AddNodes(HycoFE fe, PetscInt field, const PetscReal u[], const PetscReal sigma[], const Place *p,
-                               Sum *s)
+static PetscErrorCode AddNodes(HycoFE fe, const HycoQuantity *q, const PetscReal u[], const PetscReal sigma[],
+                               const Place *p, Sum *s)
 {
   HycoMesh m = fe->mesh;
+  const PetscInt field = q->field;
   PetscBool *in;
 
   PetscFunctionBegin;
@@ -219,7 +224,7 @@ static PetscErrorCode AddNodes(HycoFE fe, PetscInt field, const PetscReal u[], c
 
     if (!in[e]) continue;
     PetscCall(OfCell(fe, field, sigma, e, &value));
-    PetscCall(AddEntity(fe, field, u, e, -1, &value, s));
+    PetscCall(AddEntity(fe, q, u, e, -1, &value, s));
   }
   PetscCall(PetscFree(in));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -311,7 +316,7 @@ static PetscErrorCode Measure(HycoFE fe, const HycoQuantity *q, const PetscReal 
             HycoQuantityFields[q->field]);
   PetscCall(FindPlace(fe->scene, m, q, &p));
   if (p.dim < m->dim - 1) {
-    PetscCall(AddNodes(fe, q->field, u, sigma, &p, s));
+    PetscCall(AddNodes(fe, q, u, sigma, &p, s));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(PetscCalloc1(m->n_cells, &in));
@@ -322,7 +327,7 @@ static PetscErrorCode Measure(HycoFE fe, const HycoQuantity *q, const PetscReal 
 
     if (facet < 0 ? !in[k] : p.dim == m->dim || m->facet_group[facet] != p.group || cell < 0) continue;
     if (q->field >= XX) PetscCall(OfCell(fe, q->field, sigma, cell, &value));
-    PetscCall(AddEntity(fe, q->field, u, cell, facet, q->field >= XX ? &value : NULL, s));
+    PetscCall(AddEntity(fe, q, u, cell, facet, q->field >= XX ? &value : NULL, s));
   }
   PetscCall(PetscFree(in));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -319,7 +319,16 @@ class Bodies(Case):
         scene = self.write('stiff.yaml', STIFF)
         self.assertIn('soft: changes the shape or the material of body foundation',
                       self.hyco('check', '-scene', scene)['bodies_by_parameter'])
-        self.judge(scene, ('-values_soft', '0.61,1.7,4.4', '-values_press', '0.03,0.05'), forces=1e-5)
+        points = ('-values_soft', '0.61,1.7,4.4', '-values_press', '0.03,0.05')
+        self.judge(scene, points, forces=1e-5)
+        scaled = self.write('scaled.yaml', STIFF.replace('2e5,', '2e5*soft,'))  # the same parameter scales the other body
+        self.judge(scaled, points, forces=1e-5)
+
+    def test_factors(self):
+        """A body is factored once for each sample of its own parameters: the other one once."""
+        for scene in (HERTZ, self.write('stiff.yaml', STIFF)):
+            t = self.hyco('train', '-scene', scene, *TYPE, '-scatter', '2', '-model', 'm.h5', '-hyco_bodies_tol', '1e-3')
+            self.assertEqual(t['n_body_factors'], t['n_body_samples'] + 2 + 1)  # two are held out
 
     def test_check(self):
         """How each parameter enters each body, found by evaluation."""
@@ -339,7 +348,7 @@ class Bodies(Case):
         """Every method that is asked for solves the contact problem of a prediction, and is named; it is refused with floating bodies; tolerance and
         fallback act."""
         self.hyco('train', '-scene', ROLLER, *TYPE, '-scatter', '2', '-model', 'v.h5')
-        at = ('-model', 'v.h5', '-mu', '1.3,0.7,9')
+        at = ('-model', 'v.h5', '-mu', '1.3,0.5,9')
         force = self.hyco('predict', *at)['total_contact_force']
         for name in ('lemke', 'semismooth', 'tao'):
             r = self.hyco('predict', *at, '-hyco_solver_type', name)

@@ -202,6 +202,7 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
   PetscCall(HycoTrainingAddFact(r, "n_bodies", (PetscReal)b->n));
   PetscCall(HycoTrainingAddFact(r, "n_surface_unknowns", (PetscReal)b->ns));
   PetscCall(HycoTrainingAddFact(r, "n_body_samples", (PetscReal)HycoBodiesGrid(b, 0, NULL)));
+  PetscCall(HycoTrainingAddFact(r, "n_body_factors", (PetscReal)HycoTrainingOfBodies(t)->n_factors));
   PetscCall(HycoTrainingAddFact(r, "force_bound", b->forces));
   if (b->n_theta)
     snprintf(bound, sizeof(bound),

@@ -5,6 +5,7 @@
 */
 #include <hycobodiestraining.h>
 #include <hycofields.h>
+#include <hycomaterialimpl.h>
 #include <hycoquantities.h>
 
 #define MOST_INNER   2400 /* unknowns: a row and a solve each */
@@ -16,18 +17,17 @@ PetscErrorCode HycoBodiesAddScores(HycoReducer t, HycoBodiesFactor *factor, cons
   HycoFE fe = factor->fom->fe;
   HycoMesh m = fe->mesh;
   const HycoBodyParts *parts = &HycoTrainingOfBodies(t)->parts;
-  PetscReal *all, *sigma, *mises, *principal, *most;
+  PetscReal *all, *sigma, *mises, *most;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc5(fe->n_dof, &all, m->n_cells * fe->n_sigma, &sigma, m->n_cells, &mises, 3 * m->n_cells,
-                         &principal, parts->n, &most));
+  PetscCall(PetscMalloc4(fe->n_dof, &all, m->n_cells * fe->n_sigma, &sigma, m->n_cells, &mises, parts->n, &most));
   for (PetscInt i = 0; i < fe->n_dof; i++) {
     all[i] = fe->fixed[i] ? fe->u0[i] : u[i];
     factor->moved[i] = PetscMax(factor->moved[i], PetscAbsReal(u[i]));
   }
   HycoFEComplete(fe, all);
   HycoOnEach(HycoComm(t), HycoFEStress(fe, all, sigma));
-  PetscCall(HycoStressInvariants(m->n_cells, fe->dim, sigma, mises, principal));
+  for (PetscInt e = 0; e < m->n_cells; e++) mises[e] = HycoMises(fe->dim, sigma + e * fe->n_sigma);
   PetscCall(PetscArrayzero(most, parts->n));
   for (PetscInt e = 0; e < m->n_cells; e++) {
     PetscReal *own = &most[parts->of[m->cells[e * m->nv]]];
@@ -45,7 +45,7 @@ PetscErrorCode HycoBodiesAddScores(HycoReducer t, HycoBodiesFactor *factor, cons
 
     if (own > 0) factor->score[e] = PetscMax(factor->score[e], mises[e] / own);
   }
-  PetscCall(PetscFree5(all, sigma, mises, principal, most));
+  PetscCall(PetscFree4(all, sigma, mises, most));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

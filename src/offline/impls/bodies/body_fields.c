@@ -265,7 +265,7 @@ static PetscErrorCode Expand(HycoSubstructures b, HycoBodiesFactor *factor, Pets
     PetscCall(VecZeroEntries(F[j]));
     for (PetscInt k = 0; c && k < b->r; k++) PetscCall(VecAXPY(F[j], c[j * b->r + k], factor->basis[k]));
   }
-  PetscCall(HycoDirectExpandMany(factor->direct, n, F, z, x));
+  PetscCall(HycoBodiesExtend(b, factor, n, F, z, x));
   for (PetscInt j = 0; j < n; j++, u += f->fe->n_dof) {
     PetscCall(HycoFOMToLocal(f, x[j], u));
     for (PetscInt i = 0; i < f->fe->n_dof; i++) u[i] = f->fe->fixed[i] ? 0 : u[i];
@@ -308,13 +308,16 @@ static PetscErrorCode ExpandSamples(HycoSubstructures b, HycoBodiesFactor *facto
 /* The rigid motions at the present factor. Collective. */
 static PetscErrorCode ExpandMotions(HycoSubstructures b, HycoBodiesFactor *factor, PetscReal u[])
 {
+  PetscReal *z;
+
   PetscFunctionBegin;
-  PetscCall(PetscArrayzero(factor->z, b->p + b->ns));
+  PetscCall(PetscCalloc1(b->p + b->ns + 1, &z));
   for (PetscInt k = 0; k < b->p; k++, u += factor->fom->fe->n_dof) {
-    factor->z[k] = 1;
-    PetscCall(Expand(b, factor, 1, NULL, factor->z, u));
-    factor->z[k] = 0;
+    z[k] = 1;
+    PetscCall(Expand(b, factor, 1, NULL, z, u));
+    z[k] = 0;
   }
+  PetscCall(PetscFree(z));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -555,7 +558,7 @@ static PetscErrorCode MeasureLeft(HycoReducer t, HycoBodiesFactor *factor, const
   PetscCall(PetscCalloc1(n, &lost));
   PetscCall(PetscMalloc1(n + 1, &sample));
   for (PetscInt k = 0; k < n; k++) sample[k] = sampled->n - n + k;
-  if (b->n_theta) PetscCall(HycoBodiesRefactor(t, factor, factor->record[factor->n_records - 1].theta)); /* no sample */
+  if (b->n_theta) PetscCall(HycoBodiesRefactor(t, factor, factor->between)); /* no sample */
   PetscCall(ExpandSamples(b, factor, sampled, n, sample, U));
   PetscCall(PetscFree(sample));
   PetscCall(Squares(factor->fom, n, U, all));
@@ -581,13 +584,9 @@ static PetscErrorCode MeasureLeft(HycoReducer t, HycoBodiesFactor *factor, const
 /* The displacements K^-1 F of the basis of the loads. Collective. */
 static PetscErrorCode LoadFields(HycoSubstructures b, HycoBodiesFactor *factor, Vec x[])
 {
-  PetscReal *z;
-
   PetscFunctionBegin;
-  PetscCall(PetscCalloc1((size_t)(b->p + b->ns) * (size_t)b->r + 1, &z));
   PetscCall(CreateVectors(factor, b->r, x));
-  PetscCall(HycoDirectExpandMany(factor->direct, b->r, factor->basis, z, x));
-  PetscCall(PetscFree(z));
+  PetscCall(HycoBodiesExtend(b, factor, b->r, factor->basis, NULL, x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

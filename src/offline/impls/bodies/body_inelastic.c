@@ -248,11 +248,10 @@ static PetscErrorCode Displace(HycoSubstructures b, HycoBodiesFactor *factor, Ve
   PetscReal *work;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc1(b->p + b->ns + 1, &work));
+  PetscCall(PetscMalloc1(b->p + 1, &work));
   PetscCall(HycoBodiesReduce(b, factor, 1, &F, u, work));
-  PetscCall(PetscArrayzero(work, b->p + b->ns));
   PetscCall(VecDuplicate(F, x));
-  PetscCall(HycoDirectExpandMany(factor->direct, 1, &F, work, x));
+  PetscCall(HycoBodiesExtend(b, factor, 1, &F, NULL, x));
   PetscCall(PetscFree(work));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

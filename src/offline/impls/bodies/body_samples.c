@@ -23,20 +23,6 @@ static PetscReal Node(HycoReducer t, HycoSubstructures b, PetscInt p, PetscInt n
   return b->logarithm[p] ? lo * PetscPowReal(hi / lo, share) : lo + share * (hi - lo);
 }
 
-/* Which axes of theta a body has. */
-static PetscErrorCode FindAxes(HycoReducer t, HycoSubstructures b)
-{
-  const HycoBodyParts *parts = &HycoTrainingOfBodies(t)->parts;
-
-  PetscFunctionBegin;
-  for (PetscInt k = 0; k < b->n; k++) {
-    for (PetscInt p = 0; p < b->n_theta; p++)
-      b->body[k].tensor.n[p] =
-          parts->enters[k * parts->n_parameters + b->theta[p]] & HYCO_ENTERS_SHAPE ? b->n_nodes[p] : 1;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscInt HycoBodiesSampleOf(HycoSubstructures b, PetscInt body, PetscInt k)
 {
   const HycoTensor *t = &b->body[body].tensor;
@@ -70,7 +56,9 @@ static PetscErrorCode SetGrid(HycoReducer t, HycoSubstructures b)
       n++;
     }
   }
-  PetscCall(FindAxes(t, b));
+  for (PetscInt k = 0; k < b->n; k++) {
+    for (PetscInt p = 0; p < b->n_theta; p++) b->body[k].tensor.n[p] = HycoBodiesAxis(b, k, p) ? b->n_nodes[p] : 1;
+  }
   HycoBodiesSetTensors(b);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -85,16 +73,7 @@ void HycoBodiesPoint(HycoReducer t, PetscInt k, PetscReal theta[])
   }
 }
 
-/* The offset of a body's block among all. */
-static size_t BlockAt(HycoSubstructures b, PetscInt body)
-{
-  size_t at = 0;
-
-  for (PetscInt k = 0; k < body; k++) at += (size_t)PetscSqr(b->body[k].n);
-  return at;
-}
-
-/* Copies the records of the grid to the bodies. Rank 0. */
+/* Copies the records of the grid (n for each node) to the bodies. Rank 0. */
 static PetscErrorCode TakeRecords(HycoSubstructures b, const HycoBodiesFactor *factor, const PetscInt record[])
 {
   const PetscInt n = HycoBodiesGrid(b, 0, NULL);
@@ -110,21 +89,16 @@ static PetscErrorCode TakeRecords(HycoSubstructures b, const HycoBodiesFactor *f
     PetscCall(PetscMalloc1(samples * C + 1, &s->C));
     PetscCall(PetscMalloc1(samples * R + 1, &s->R));
     PetscCall(PetscMalloc1(samples * Z + 1, &s->Z));
-    PetscCall(PetscCalloc1(samples * work + 1, &s->work));
+    PetscCall(PetscMalloc1(samples * work + 1, &s->work));
     for (PetscInt j = 0; j < n; j++) {
-      const HycoBodiesRecord *r = &factor->record[record[j]];
+      const HycoBodyRecord *r = &factor->body[k].record[record[j * b->n + k]];
       const PetscInt at = HycoBodiesSampleOf(b, k, j);
 
       if (at < 0) continue;
-      PetscCall(PetscArraycpy(s->C + (size_t)at * C, r->C + BlockAt(b, k), C));
-      PetscCall(PetscArraycpy(s->R + (size_t)at * R, r->R + b->start[k] * b->r, R));
-      PetscCall(PetscArraycpy(s->Z + (size_t)at * Z, r->Z + b->start[k] * b->p, Z));
-      for (PetscInt i = 0; i < b->p; i++) { /* a motion's work belongs to the body that it moves */
-        PetscBool moves = PETSC_FALSE;
-
-        for (PetscInt d = b->start[k]; d < b->start[k + 1]; d++) moves = (PetscBool)(moves || r->Z[d * b->p + i] != 0);
-        if (moves) PetscCall(PetscArraycpy(s->work + (size_t)at * work + i * b->r, r->work + i * b->r, b->r));
-      }
+      PetscCall(PetscArraycpy(s->C + (size_t)at * C, r->C, C));
+      PetscCall(PetscArraycpy(s->R + (size_t)at * R, r->R, R));
+      PetscCall(PetscArraycpy(s->Z + (size_t)at * Z, r->Z, Z));
+      PetscCall(PetscArraycpy(s->work + (size_t)at * work, r->work, work));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -202,27 +176,29 @@ static PetscErrorCode AddGram(const HycoSubstructure *s, const PetscReal weight[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* e of all bodies at a record that is no sample. Rank 0. */
-static PetscErrorCode Bound(HycoSubstructures b, const PetscReal mu[], const HycoBodiesRecord *record, PetscReal *e)
+/* e of all bodies at a point that is no sample. Rank 0. */
+static PetscErrorCode Bound(HycoSubstructures b, const PetscReal mu[], const HycoBodiesFactor *factor,
+                            const PetscInt at[], PetscReal *e)
 {
   PetscFunctionBegin;
   *e = 0;
   for (PetscInt k = 0; k < b->n; k++) {
     const HycoSubstructure *s = &b->body[k];
+    const HycoBodyRecord *record = &factor->body[k].record[at[k]];
     const size_t n = (size_t)PetscSqr(s->n);
     PetscReal *C, *D, *weight, own;
 
     if (s->n_samples == 1 || !s->n) continue;
     PetscCall(PetscMalloc3(n + 1, &C, n + 1, &D, s->n_samples, &weight));
     PetscCall(HycoBodiesWeights(b, k, mu, weight));
-    PetscCall(PetscArraycpy(C, record->C + BlockAt(b, k), n));
+    PetscCall(PetscArraycpy(C, record->C, n));
     for (size_t i = 0; i < n; i++) {
       D[i] = -C[i];
       for (PetscInt q = 0; q < s->n_samples; q++) D[i] += weight[q] * s->C[(size_t)q * n + i];
     }
     PetscCall(Factor(s->n, C));
     PetscCall(Largest(s->n, C, D, &own));
-    PetscCall(AddGram(s, weight, b->r, C, record->R + b->start[k] * b->r));
+    PetscCall(AddGram(s, weight, b->r, C, record->R));
     *e = PetscMax(*e, own);
     PetscCall(PetscFree3(C, D, weight));
   }
@@ -234,23 +210,28 @@ static PetscErrorCode BoundAlong(HycoReducer t, HycoBodiesFactor *factor, PetscI
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
 
+  PetscInt *record;
+
   PetscFunctionBegin;
   *e = 0;
+  PetscCall(PetscMalloc1(b->n, &record));
   for (PetscInt side = 0; side < 2; side++) {
     const PetscInt finer = 2 * b->n_nodes[axis] - 1;
     PetscReal theta[HYCO_MAX_PARAMETERS], mu[HYCO_MAX_PARAMETERS] = {0}, own = 0;
-    PetscInt record;
 
     for (PetscInt p = 0; p < b->n_theta; p++) {
       theta[p] =
           p == axis ? Node(t, b, p, finer, side ? finer - 2 : 1) : Node(t, b, p, b->n_nodes[p], b->n_nodes[p] / 2);
       mu[b->theta[p]] = theta[p];
     }
-    PetscCall(HycoBodiesCondense(t, factor, theta, &record));
-    HycoOnRoot(HycoComm(t), Bound(b, mu, &factor->record[record], &own));
+    PetscCall(HycoBodiesCondense(t, factor, theta, record));
+    HycoOnRoot(HycoComm(t), Bound(b, mu, factor, record, &own));
     PetscCallMPI(MPI_Bcast(&own, 1, MPIU_REAL, 0, HycoComm(t)));
     *e = PetscMax(*e, own);
+    PetscCall(PetscFree(factor->between));
+    HycoDuplicate(b->n_theta, theta, &factor->between);
   }
+  PetscCall(PetscFree(record));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -263,12 +244,12 @@ static PetscErrorCode CondenseGrid(HycoReducer t, HycoBodiesFactor *factor)
   PetscFunctionBegin;
   PetscCall(SetGrid(t, b));
   n = HycoBodiesGrid(b, 0, NULL);
-  PetscCall(PetscMalloc1(n, &record));
+  PetscCall(PetscMalloc1(n * b->n, &record));
   for (PetscInt k = 0; k < n; k++) {
     PetscReal theta[HYCO_MAX_PARAMETERS];
 
     HycoBodiesPoint(t, k, theta);
-    PetscCall(HycoBodiesCondense(t, factor, theta, &record[k]));
+    PetscCall(HycoBodiesCondense(t, factor, theta, record + k * b->n));
   }
   HycoOnRoot(HycoComm(t), TakeRecords(b, factor, record));
   PetscCall(PetscFree(record));
@@ -298,7 +279,6 @@ PetscErrorCode HycoBodiesSample(HycoReducer t, HycoBodiesFactor *factor)
   PetscInt worst;
 
   PetscFunctionBegin;
-  for (PetscInt p = 0; p < b->n_theta; p++) b->n_nodes[p] = 3;
   do {
     PetscCall(CondenseGrid(t, factor));
     for (PetscInt p = 0; p < b->n_theta; p++) PetscCall(BoundAlong(t, factor, p, &e[p]));

@@ -1,16 +1,12 @@
-/*
-  Training of the model of bodies: a factorisation of K at each sample of theta with the unknowns of the contacts'
-  surfaces last. K couples no bodies, so that its Schur complement on these unknowns consists of the blocks C_b; the
-  unknowns that MUMPS pins for bodies that contact alone holds are their isostatic supports, and give the rigid motions.
-*/
+/* Training of the model of bodies: what the type refuses, the unknowns of the contacts' surfaces, and the order of the
+   steps. */
 #include <hycobodiestraining.h>
 
 #define MOST_UNKNOWNS 4000 /* of the surfaces of a body: C_b is dense */
 #define MANY_UNKNOWNS 1500 /* of a body: masters that no slave meets are left out */
-#define MOST_ALL      8000 /* of all surfaces: the Schur complement is dense until its blocks are taken */
 #define RINGS         2    /* of facets around those that slaves met at some points of the ranges */
 #define SEARCHED      200  /* such points */
-#define KEPT          0.3  /* share of the memory for the factors of samples that are kept */
+#define LEAST         3    /* values of each of the parameters theta */
 #define MOST_THETA    3    /* parameters that change the shape of bodies */
 
 /* -- before the solves -- */
@@ -223,10 +219,6 @@ static PetscErrorCode CheckSizes(const HycoBodyParts *parts, HycoSubstructures b
                    "body %s has %d unknowns on the surfaces that may touch; a model of bodies stores the square of "
                    "their number, and is limited to %d: train a hybrid model",
                    parts->name[k], (int)(b->start[k + 1] - b->start[k]), MOST_UNKNOWNS);
-  HycoCheckModel(b->ns <= MOST_ALL,
-                 "the surfaces that may touch have %d unknowns, and a model of bodies is limited to %d: train a hybrid "
-                 "model",
-                 (int)b->ns, MOST_ALL);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -260,230 +252,9 @@ static PetscErrorCode Select(HycoReducer t, HycoSubstructures b, Mat *N)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -- factors -- */
-
-/* The blocks of the Schur complement M, by columns, and the rigid motions. Rank 0. */
-static PetscErrorCode TakeBlocks(HycoSubstructures b, const PetscReal M[], HycoBodiesRecord *record)
-{
-  const size_t n = (size_t)(b->p + b->ns), p = (size_t)b->p;
-  size_t at = 0;
-
-  PetscFunctionBegin;
-  for (PetscInt k = 0; k < b->n; k++) at += (size_t)PetscSqr(b->start[k + 1] - b->start[k]);
-  PetscCall(PetscMalloc1(at + 1, &record->C));
-  PetscCall(PetscMalloc1((size_t)b->ns * p + 1, &record->Z));
-  at = 0;
-  for (PetscInt k = 0; k < b->n; k++) {
-    for (PetscInt j = b->start[k]; j < b->start[k + 1]; j++) {
-      const PetscReal *column = M + (p + (size_t)j) * n + p;
-
-      for (PetscInt i = b->start[k]; i < b->start[k + 1]; i++) record->C[at++] = column[i];
-    }
-  }
-  for (size_t j = 0; j < (size_t)b->ns; j++) {
-    for (size_t i = 0; i < p; i++) record->Z[j * p + i] = M[(p + j) * n + i];
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The isostatic supports are the same at all samples: their motions are unknowns. Collective. */
-static PetscErrorCode CheckPins(HycoReducer t, HycoSubstructures b, HycoBodiesFactor *factor)
-{
-  PetscInt *pins;
-  PetscBool same = PETSC_TRUE;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1(b->p + 1, &pins));
-  PetscCall(HycoKernelPins(HycoComm(t), factor->fom->K, b->p, pins));
-  for (PetscInt i = 0; i < b->p && factor->pins; i++) same = (PetscBool)(same && pins[i] == factor->pins[i]);
-  if (factor->pins)
-    PetscCall(PetscFree(pins));
-  else
-    factor->pins = pins;
-  HycoCheckModel(same, "a body that contact alone holds changes its shape so that its rigid motions need other "
-                       "unknowns, which a model of bodies does not support; train a hybrid model");
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Refuses bodies that need more memory than there is: the factor, of which the analysis has the size, the Schur
-   complement on every rank, the flexibilities at the first samples and at those beside them, and the sampled
-   displacements. Collective. */
-static PetscErrorCode CheckMemory(HycoReducer t, HycoBodiesFactor *factor, PetscReal bytes)
-{
-  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
-  const PetscReal n = b->p + b->ns, samples = PetscPowReal(3, (PetscReal)b->n_theta) + 2 * b->n_theta;
-  PetscReal limit, all, flexibilities = 0;
-  HycoSolver solver;
-
-  PetscFunctionBegin;
-  for (PetscInt k = 0; k < b->n; k++) flexibilities += samples * PetscSqr((PetscReal)b->body[k].n);
-  all = bytes + 8 * (n * n * factor->fom->size + flexibilities +
-                     (PetscReal)t->sizes[0] * b->dim * HycoTrainingOfBodies(t)->samples);
-  PetscCall(HycoFOMGetSolver(factor->fom, &solver));
-  PetscCall(HycoSolverMemory(solver, &limit));
-  HycoCheckModel(all <= limit,
-                 "a model of bodies needs %.3g GB to be made (the factor %.3g GB, flexibilities of %d unknowns on "
-                 "surfaces %.3g GB), and %.3g GB are available (-hyco_memory); train a hybrid model",
-                 (double)(1e-9 * all), (double)(1e-9 * bytes), (int)b->ns, (double)(8e-9 * flexibilities),
-                 (double)(1e-9 * limit));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The stiffness at theta. Collective. */
-static PetscErrorCode AssembleAt(HycoReducer t, HycoBodiesFactor *factor, const PetscReal theta[])
-{
-  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
-  PetscReal mu[HYCO_MAX_PARAMETERS];
-
-  PetscFunctionBegin;
-  PetscCall(PetscArraycpy(mu, b->first, b->n_variables));
-  for (PetscInt p = 0; p < b->n_theta; p++) mu[b->theta[p]] = theta[p];
-  factor->fom->fe->ready = PETSC_FALSE;
-  PetscCall(HycoFOMAssemble(factor->fom, mu));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* A further factor beside those that are kept, or in the place of the last one if they would take more than a share of
-   the memory. Collective. */
-static PetscErrorCode NextFactor(HycoBodiesFactor *factor)
-{
-  PetscReal limit;
-  HycoSolver solver;
-
-  PetscFunctionBegin;
-  PetscCall(HycoFOMGetSolver(factor->fom, &solver));
-  PetscCall(HycoSolverMemory(solver, &limit));
-  if (factor->n_kept && (factor->n_kept + 1) * factor->bytes > KEPT * limit) {
-    PetscCall(PetscFree(factor->kept[factor->n_kept - 1].theta));
-  } else {
-    PetscCall(PetscRealloc((size_t)(factor->n_kept + 1) * sizeof(*factor->kept), &factor->kept));
-    factor->kept[factor->n_kept].theta = NULL;
-    PetscCall(HycoDirectCreate(HycoComm(factor->fom), &factor->kept[factor->n_kept++].direct));
-  }
-  factor->direct = factor->kept[factor->n_kept - 1].direct;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* record: takes the blocks; NULL: they are not needed. Collective. */
-static PetscErrorCode Factor(HycoReducer t, HycoBodiesFactor *factor, const PetscReal theta[], HycoBodiesRecord *record)
-{
-  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
-  HycoFOM f = factor->fom;
-  PetscReal bytes, *M;
-  PetscInt kernel;
-  PetscBool singular;
-  size_t n;
-  PetscErrorCode ierr;
-
-  PetscFunctionBegin;
-  PetscCall(PetscFree(factor->theta));
-  PetscCall(AssembleAt(t, factor, theta));
-  PetscCall(HycoKernelSize(f->K, &kernel));
-  if (!factor->pins) b->p = kernel;
-  HycoCheckModel(kernel == b->p, "the number of rigid motions that contact alone prevents changes with the parameters, "
-                                 "which a model of bodies does not support; train a hybrid model");
-  PetscCall(CheckPins(t, b, factor));
-  PetscCall(NextFactor(factor));
-  PetscCall(HycoDirectPinKernel(factor->direct, f->K));
-  PetscCall(HycoDirectAnalyse(factor->direct, f->K, NULL, factor->N, PETSC_TRUE, &bytes));
-  if (!factor->z) PetscCall(CheckMemory(t, factor, bytes)); /* before the first factor */
-  factor->bytes = bytes;
-  n = (size_t)(b->p + b->ns);
-  PetscCall(PetscCalloc1(n * n + 1, &M));
-  ierr = HycoDirectFactor(factor->direct, f->K, NULL, factor->N, M, &singular);
-  if (!ierr && record && !t->rank) ierr = TakeBlocks(b, M, record);
-  PetscCall(PetscFree(M));
-  PetscCall(ierr);
-  HycoCheckModel(!singular, "the stiffness of the bodies is singular; check supports and springs");
-  if (!factor->z) PetscCall(PetscCalloc1(b->p + b->ns + 1, &factor->z));
-  HycoDuplicate(b->n_theta + 1, theta, &factor->theta);
-  HycoDuplicate(b->n_theta + 1, theta, &factor->kept[factor->n_kept - 1].theta);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscBool Same(PetscInt n, const PetscReal a[], const PetscReal b[])
-{
-  for (PetscInt p = 0; p < n; p++) {
-    if (a[p] != b[p]) return PETSC_FALSE;
-  }
-  return PETSC_TRUE;
-}
-
-PetscErrorCode HycoBodiesRefactor(HycoReducer t, HycoBodiesFactor *factor, const PetscReal theta[])
-{
-  const PetscInt n = HycoTrainingOfBodies(t)->bodies->n_theta;
-
-  PetscFunctionBegin;
-  if (factor->theta && Same(n, theta, factor->theta)) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt k = 0; k < factor->n_kept; k++) {
-    if (!factor->kept[k].theta || !Same(n, theta, factor->kept[k].theta)) continue;
-    PetscCall(AssembleAt(t, factor, theta));
-    PetscCall(PetscFree(factor->theta));
-    HycoDuplicate(n + 1, theta, &factor->theta);
-    factor->direct = factor->kept[k].direct;
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCall(Factor(t, factor, theta, NULL));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoBodiesReduce(HycoSubstructures b, HycoBodiesFactor *factor, PetscInt n, const Vec F[], PetscReal u[],
-                                PetscReal work[])
-{
-  const PetscInt n_q = b->p + b->ns;
-  PetscReal *q;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1((size_t)n_q * (size_t)n + 1, &q));
-  PetscCall(HycoDirectReduceMany(factor->direct, n, F, q));
-  for (PetscInt j = 0; j < n; j++) {
-    for (PetscInt i = 0; i < b->p; i++) work[j * b->p + i] = -q[j * n_q + i];
-    for (PetscInt k = 0; k < b->ns; k++) u[j * b->ns + k] = -q[j * n_q + b->p + k];
-  }
-  PetscCall(PetscFree(q));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* R and the work of each vector of the basis of the loads. Collective. */
-static PetscErrorCode Respond(HycoSubstructures b, HycoBodiesFactor *factor, HycoBodiesRecord *record)
-{
-  PetscReal *u, *work;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc2(b->ns * b->r + 1, &u, b->p * b->r + 1, &work));
-  PetscCall(PetscMalloc1((size_t)b->ns * (size_t)b->r + 1, &record->R));
-  PetscCall(PetscMalloc1(b->p * b->r + 1, &record->work));
-  PetscCall(HycoBodiesReduce(b, factor, b->r, factor->basis, u, work));
-  for (PetscInt k = 0; k < b->r; k++) {
-    for (PetscInt i = 0; i < b->ns; i++) record->R[i * b->r + k] = u[k * b->ns + i];
-    for (PetscInt i = 0; i < b->p; i++) record->work[i * b->r + k] = work[k * b->p + i];
-  }
-  PetscCall(PetscFree2(u, work));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoBodiesCondense(HycoReducer t, HycoBodiesFactor *factor, const PetscReal theta[], PetscInt *at)
-{
-  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
-  HycoBodiesRecord *record;
-
-  PetscFunctionBegin;
-  for (*at = 0; *at < factor->n_records; (*at)++) {
-    if (Same(b->n_theta, theta, factor->record[*at].theta)) PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCall(PetscRealloc((size_t)(factor->n_records + 1) * sizeof(*record), &factor->record));
-  record = &factor->record[factor->n_records++];
-  PetscCall(PetscMemzero(record, sizeof(*record)));
-  HycoDuplicate(b->n_theta + 1, theta, &record->theta);
-  PetscCall(Factor(t, factor, theta, record));
-  PetscCall(Respond(b, factor, record));
-  PetscCall(HycoReducerTell(t, "flexibilities of the bodies", factor->n_records, 0));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* -- the model -- */
 
-/* The parameters theta. The logarithm of one that moves nothing and varies much is interpolated. */
+/* The parameters theta, and which bodies each changes, with values enough to begin with. The logarithm of one that moves nothing and varies much is interpolated. */
 static PetscErrorCode TakeTheta(HycoReducer t, HycoSubstructures b)
 {
   const HycoBodyParts *parts = &HycoTrainingOfBodies(t)->parts;
@@ -503,6 +274,12 @@ static PetscErrorCode TakeTheta(HycoReducer t, HycoSubstructures b)
         s->lo[shape[p]] > 0 && s->hi[shape[p]] > 2 * s->lo[shape[p]] && !HycoSceneChanges(s, changed).nodes;
   }
   PetscCall(PetscCalloc1(b->n, &b->body));
+  for (PetscInt k = 0; k < b->n; k++) {
+    for (PetscInt p = 0; p < b->n_theta; p++) {
+      b->n_nodes[p] = LEAST;
+      b->body[k].tensor.n[p] = parts->enters[k * parts->n_parameters + shape[p]] & HYCO_ENTERS_SHAPE ? LEAST : 1;
+    }
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -530,6 +307,7 @@ static PetscErrorCode TakeNoStrains(HycoReducer t)
 static PetscErrorCode Condense(HycoReducer t, HycoSnapshots store, HycoBodiesFactor *factor)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  Mat N;
 
   PetscFunctionBegin;
   PetscCall(HycoFOMAssemble(factor->fom, b->first));
@@ -537,35 +315,14 @@ static PetscErrorCode Condense(HycoReducer t, HycoSnapshots store, HycoBodiesFac
   PetscCheck(factor->fom->part->n_nodes == t->fom->part->n_nodes && factor->fom->part->first == t->fom->part->first,
              PETSC_COMM_SELF, PETSC_ERR_PLIB, "two meshes of one scene differ");
   PetscCall(HycoFOMSetParameters(t->fom, b->first));
-  PetscCall(Select(t, b, &factor->N));
+  PetscCall(Select(t, b, &N));
   for (PetscInt k = 0; k < b->n; k++) b->body[k].n = b->start[k + 1] - b->start[k];
+  PetscCall(HycoBodiesSplit(t, N, factor));
+  PetscCall(MatDestroy(&N));
   PetscCall(HycoBodiesLoads(t, factor));
   PetscCall(HycoBodiesSample(t, factor));
   if (HycoBodiesFlow(t)) PetscCall(HycoBodiesStrains(t, factor));
   PetscCall(HycoBodiesFields(t, store, factor));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode Release(HycoBodiesFactor *factor)
-{
-  PetscFunctionBegin;
-  for (PetscInt k = 0; k < factor->n_kept; k++) {
-    PetscCall(HycoDirectDestroy(&factor->kept[k].direct));
-    PetscCall(PetscFree(factor->kept[k].theta));
-  }
-  PetscCall(PetscFree(factor->kept));
-  PetscCall(MatDestroy(&factor->N));
-  for (PetscInt k = 0; k < factor->n_basis; k++) PetscCall(VecDestroy(&factor->basis[k]));
-  for (PetscInt k = 0; k < factor->n_strains; k++) PetscCall(VecDestroy(&factor->strain[k]));
-  for (PetscInt k = 0; k < factor->n_records; k++) {
-    HycoBodiesRecord *r = &factor->record[k];
-
-    HycoFreeAll(&r->theta, &r->C, &r->R, &r->Z, &r->work);
-  }
-  HycoFreeAll(&factor->basis, &factor->record, &factor->theta, &factor->pins, &factor->score, &factor->moved,
-              &factor->known, &factor->bare, &factor->in_mesh, &factor->row);
-  PetscCall(PetscFree(factor->z));
-  PetscCall(HycoFOMDestroy(&factor->fom));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -580,6 +337,7 @@ PetscErrorCode HycoBodiesModes(HycoReducer t, HycoSnapshots store)
   PetscCall(HycoBodiesDestroy(&HycoTrainingOfBodies(t)->bodies));
   PetscCall(HycoBodiesCreate(&b));
   HycoTrainingOfBodies(t)->bodies = b;
+  HycoTrainingOfBodies(t)->n_factors = 0;
   b->dim = t->sizes[3];
   b->n = HycoTrainingOfBodies(t)->parts.n;
   b->n_variables = t->scene->n_variables;
@@ -592,7 +350,7 @@ PetscErrorCode HycoBodiesModes(HycoReducer t, HycoSnapshots store)
     PetscCall(TakeNoStrains(t));
   PetscCall(HycoFOMCreate(HycoComm(t), t->scene, &factor.fom));
   ierr = Condense(t, store, &factor);
-  PetscCall(Release(&factor));
+  PetscCall(HycoBodiesReleaseFactor(&factor));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

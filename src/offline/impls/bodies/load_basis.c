@@ -120,10 +120,12 @@ static PetscErrorCode AddPoint(HycoReducer t, HycoBodiesFactor *factor, Survey *
   Vec F;
 
   PetscFunctionBegin;
-  HycoBodiesReference(b, mu, reference);
-  if (b->n_theta) {
+  for (PetscInt k = 0; k < n && b->n_theta; k++) {
+    HycoBodiesReference(b, k, mu, reference);
     HycoOnEach(HycoComm(t), HycoFESetParameters(factor->fom->fe, reference));
-    PetscCall(PetscArraycpy(s->X0, factor->fom->fe->X, 3 * factor->fom->part->n_nodes));
+    for (PetscInt i = 0; i < 3 * factor->fom->part->n_nodes; i++) {
+      if (HycoTrainingOfBodies(t)->parts.of[i / 3] == k) s->X0[i] = factor->fom->fe->X[i];
+    }
   }
   PetscCall(VecDuplicate(factor->fom->F, &F));
   PetscCall(TurnedLoad(t, factor->fom, s->X0, mu, s->pose, F));

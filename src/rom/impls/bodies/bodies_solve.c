@@ -10,6 +10,7 @@
 #include <string.h>
 
 #define ROUNDS 60    /* of joining contacts */
+#define DEEP   0.5   /* share of the deepest penetration without forces */
 #define CLOSED 1e-13 /* share of the largest gap: smaller penetrations are round-off */
 
 PetscErrorCode HycoBodiesCreate(HycoSubstructures *bodies)
@@ -26,9 +27,10 @@ PetscErrorCode HycoBodiesReset(HycoBodiesWork o)
   PetscCall(HycoFEDestroy(&o->fe));
   PetscCall(HycoTaoDestroy(&o->tao));
   PetscCall(HycoSolverDestroy(&o->own));
-  for (PetscInt k = 0; o->weight && k < o->bodies->n; k++) PetscCall(PetscFree(o->weight[k]));
-  HycoFreeAll(&o->weight, &o->X0, &o->E0, &o->E_at, &o->pose, &o->kappa, &o->c, &o->elastic, &o->free, &o->u, &o->f,
-              &o->x, &o->loc, &o->row_start, &o->row_at, &o->row, &o->gap, &o->active, &o->Z, &o->work);
+  for (PetscInt k = 0; o->weight && k < o->bodies->n; k++) HycoFreeAll(&o->weight[k], &o->blend[k]);
+  HycoFreeAll(&o->weight, &o->blend, &o->blended, &o->X0, &o->E0, &o->E_at, &o->pose, &o->kappa, &o->c, &o->elastic,
+              &o->free, &o->u, &o->f, &o->x, &o->loc, &o->row_start, &o->row_at, &o->row, &o->gap, &o->active, &o->Z,
+              &o->work);
   PetscCall(PetscMemzero(o, sizeof(*o)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -75,10 +77,12 @@ void HycoBodiesSetTensors(HycoSubstructures b)
   }
 }
 
-void HycoBodiesReference(HycoSubstructures b, const PetscReal mu[], PetscReal reference[])
+void HycoBodiesReference(HycoSubstructures b, PetscInt k, const PetscReal mu[], PetscReal reference[])
 {
   for (PetscInt p = 0; p < b->n_variables; p++) reference[p] = b->first[p];
-  for (PetscInt p = 0; p < b->n_theta; p++) reference[b->theta[p]] = mu[b->theta[p]];
+  for (PetscInt p = 0; p < b->n_theta; p++) {
+    if (HycoBodiesAxis(b, k, p)) reference[b->theta[p]] = mu[b->theta[p]];
+  }
 }
 
 PetscErrorCode HycoBodiesWeights(HycoSubstructures b, PetscInt k, const PetscReal mu[], PetscReal weight[])
@@ -138,26 +142,23 @@ static PetscErrorCode FindPlaces(HycoBodiesWork o, HycoMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The nodes and moduli of the bodies' cells where their axes are those of the scene. */
-static PetscErrorCode TakeReference(HycoBodiesWork o, const PetscReal mu[])
+/* The nodes and modulus of a body's cell at mu, where its axes are those of the scene. */
+static PetscErrorCode TakeReference(HycoBodiesWork o, PetscInt k, const PetscReal mu[])
 {
-  const HycoSubstructures b = o->bodies;
-  HycoMesh m = b->probe;
+  HycoMesh m = o->bodies->probe;
+  const PetscInt e = o->bodies->cell[k], size = o->fe->tangent_size[m->cell_body[e]];
+  const PetscReal *tangent;
 
   PetscFunctionBegin;
   PetscCall(HycoFESetParameters(o->fe, mu));
-  for (PetscInt k = 0; k < b->n; k++) {
-    const PetscInt e = b->cell[k], size = o->fe->tangent_size[m->cell_body[e]];
-    const PetscReal *tangent = o->fe->tangent + o->fe->tangent_start[e];
-
-    for (PetscInt v = 0; v < m->nv; v++)
-      PetscCall(PetscArraycpy(o->X0 + 3 * (k * m->nv + v), o->fe->X + 3 * m->cells[e * m->nv + v], 3));
-    o->E_at[k] = 0;
-    for (PetscInt i = 1; i < size; i++) {
-      if (PetscAbsReal(tangent[i]) > PetscAbsReal(tangent[o->E_at[k]])) o->E_at[k] = i;
-    }
-    o->E0[k] = tangent[o->E_at[k]];
+  tangent = o->fe->tangent + o->fe->tangent_start[e];
+  for (PetscInt v = 0; v < m->nv; v++)
+    PetscCall(PetscArraycpy(o->X0 + 3 * (k * m->nv + v), o->fe->X + 3 * m->cells[e * m->nv + v], 3));
+  o->E_at[k] = 0;
+  for (PetscInt i = 1; i < size; i++) {
+    if (PetscAbsReal(tangent[i]) > PetscAbsReal(tangent[o->E_at[k]])) o->E_at[k] = i;
   }
+  o->E0[k] = tangent[o->E_at[k]];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -182,13 +183,15 @@ PetscErrorCode HycoBodiesSetUp(HycoBodiesWork o, HycoSubstructures b, HycoScene 
   if (!solver) PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &o->own));
   o->solver = solver ? solver : o->own;
   PetscCall(PetscCalloc1(b->n, &o->weight));
-  for (PetscInt k = 0; k < b->n; k++) PetscCall(PetscMalloc1(b->body[k].n_samples, &o->weight[k]));
+  PetscCall(PetscCalloc1(b->n, &o->blend));
+  PetscCall(PetscCalloc1(b->ns + 1, &o->blended));
+  for (PetscInt k = 0; k < b->n; k++) PetscCall(PetscCalloc1(b->body[k].n_samples, &o->weight[k]));
   PetscCall(HycoFECreate(scene, b->probe->dm, &o->fe));
   o->fe->heat_is_load = PETSC_TRUE;
   PetscCall(PetscMalloc1(3 * b->probe->nv * b->n, &o->X0));
   PetscCall(PetscMalloc1(b->n, &o->E0));
   PetscCall(PetscMalloc1(b->n, &o->E_at));
-  PetscCall(TakeReference(o, b->first));
+  for (PetscInt k = 0; k < b->n; k++) PetscCall(TakeReference(o, k, b->first));
   PetscCall(FindPlaces(o, s->fe->mesh));
   PetscCall(PetscMalloc1(b->n, &o->pose));
   PetscCall(PetscMalloc1(b->n, &o->kappa));
@@ -219,8 +222,10 @@ static PetscErrorCode Place(HycoBodiesWork o, const PetscReal mu[])
   PetscReal x[3 * HYCO_CELL_NODES], reference[HYCO_MAX_PARAMETERS];
 
   PetscFunctionBegin;
-  HycoBodiesReference(b, mu, reference);
-  if (b->n_theta) PetscCall(TakeReference(o, reference));
+  for (PetscInt k = 0; k < b->n; k++) {
+    HycoBodiesReference(b, k, mu, reference);
+    if (b->body[k].n_samples > 1) PetscCall(TakeReference(o, k, reference));
+  }
   PetscCall(HycoFESetParameters(o->fe, mu));
   for (PetscInt k = 0; k < b->n; k++) {
     const PetscInt e = b->cell[k];
@@ -354,6 +359,52 @@ static PetscErrorCode TurnRows(HycoBodiesWork o, const HycoBodiesSurface *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* -- flexibilities -- */
+
+/* The weights of the samples at mu; columns with other ones are forgotten. */
+static PetscErrorCode TakeWeights(HycoBodiesWork o, const PetscReal mu[])
+{
+  const HycoSubstructures b = o->bodies;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < b->n; k++) {
+    const PetscInt n = b->body[k].n_samples;
+    PetscReal *weight;
+    PetscBool same;
+
+    PetscCall(PetscMalloc1(n, &weight));
+    PetscCall(HycoBodiesWeights(b, k, mu, weight));
+    PetscCall(PetscArraycmp(weight, o->weight[k], n, &same));
+    if (!same) PetscCall(PetscArrayzero(o->blended + b->start[k], b->body[k].n));
+    PetscCall(PetscFree(o->weight[k]));
+    o->weight[k] = weight;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The column of an unknown of body k in its flexibility, without kappa; made when it is needed for the first time. */
+static PetscErrorCode GetColumn(HycoBodiesWork o, PetscInt k, PetscInt unknown, const PetscReal **column)
+{
+  const HycoSubstructure *own = &o->bodies->body[k];
+  const size_t n = (size_t)own->n, at = (size_t)unknown * n;
+  PetscBool *there = &o->blended[o->bodies->start[k] + unknown];
+
+  PetscFunctionBegin;
+  *column = own->C + at;
+  if (own->n_samples == 1) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!o->blend[k]) PetscCall(PetscMalloc1(n * n, &o->blend[k]));
+  if (!*there) {
+    const PetscBLASInt rows = (PetscBLASInt)n, samples = (PetscBLASInt)own->n_samples, apart = (PetscBLASInt)(n * n),
+                       each = 1;
+    const PetscReal one = 1, zero = 0;
+
+    BLASgemv_("N", &rows, &samples, &one, own->C + at, &apart, o->weight[k], &each, &zero, o->blend[k] + at, &each);
+    *there = PETSC_TRUE;
+  }
+  *column = o->blend[k] + at;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* -- the complementarity problem of some contacts -- */
 
 /* The contacts in the problem, and the places that their rows touch, ascending. */
@@ -390,27 +441,18 @@ static PetscErrorCode Gather(HycoBodiesWork o, Problem *p)
   PetscCall(PetscMalloc2(b->n + 1, &p->first, b->n, &p->C));
   p->first[0] = 0;
   for (PetscInt k = 0, i = 0; k < b->n; k++) {
-    const HycoSubstructure *own = &b->body[k];
     const PetscInt lo = b->start[k];
+    PetscReal *to;
 
     while (i < p->n_place && p->place[i] < b->start[k + 1]) i++;
     p->first[k + 1] = i;
-    PetscCall(PetscCalloc1(PetscSqr(i - p->first[k]) + 1, &p->C[k]));
-    for (PetscInt s = 0; s < own->n_samples; s++) {
-      const PetscReal weight = o->weight[k][s] / o->kappa[k], *C = own->C + (size_t)s * (size_t)PetscSqr(own->n);
-      PetscReal *to = p->C[k];
+    PetscCall(PetscMalloc1(PetscSqr((size_t)(i - p->first[k])) + 1, &p->C[k]));
+    to = p->C[k];
+    for (PetscInt j = p->first[k]; j < i; j++) {
+      const PetscReal *column;
 
-      for (PetscInt j = p->first[k]; j < i; j++) {
-        const PetscReal *column = C + (size_t)(p->place[j] - lo) * (size_t)own->n;
-
-        to += j - p->first[k]; /* the lower triangle */
-        for (PetscInt d = j; d < i; d++) *to++ += weight * column[p->place[d] - lo];
-      }
-    }
-    for (PetscInt j = 0; j < i - p->first[k]; j++) {
-      const size_t n = (size_t)(i - p->first[k]);
-
-      for (size_t d = (size_t)j + 1; d < n; d++) p->C[k][d * n + (size_t)j] = p->C[k][(size_t)j * n + d];
+      PetscCall(GetColumn(o, k, p->place[j] - lo, &column));
+      for (PetscInt d = p->first[k]; d < i; d++) *to++ = column[p->place[d] - lo] / o->kappa[k];
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -593,11 +635,11 @@ static PetscErrorCode Displace(HycoBodiesWork o, const HycoBodiesSurface *s, con
     for (PetscInt j = 0; j < own->n; j++) {
       const PetscReal force = o->f[b->start[k] + j] / o->kappa[k];
 
-      for (PetscInt q = 0; force != 0 && q < own->n_samples; q++) {
-        const PetscReal *column = own->C + ((size_t)q * (size_t)own->n + (size_t)j) * (size_t)own->n;
+      const PetscReal *column;
 
-        Add(own->n, -o->weight[k][q] * force, column, u);
-      }
+      if (force == 0) continue;
+      PetscCall(GetColumn(o, k, j, &column));
+      Add(own->n, -force, column, u);
     }
   }
   for (PetscInt i = 0; i < b->ns; i++) {
@@ -622,6 +664,26 @@ static void Join(HycoBodiesWork o, const HycoBodiesSurface *s, PetscReal size, P
   }
 }
 
+/* The first problem: all contacts if they alone hold a body, otherwise those that the displacements without contact close
+   at least half as deep as the deepest one of their surfaces. These are about the contacts that stay closed on a rounded
+   surface; others join them. */
+static PetscErrorCode Begin(HycoBodiesWork o, const HycoBodiesSurface *s, PetscReal size, PetscBool in[], Problem *p)
+{
+  PetscReal *deepest;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(s->fe->scene->n_contacts, &deepest));
+  for (PetscInt k = 0; k < s->n; k++) deepest[s->contact[k]] = PetscMax(deepest[s->contact[k]], -o->gap[k]);
+  for (PetscInt k = 0; k < s->n; k++) {
+    const PetscReal least = PetscMax(CLOSED * size, DEEP * deepest[s->contact[k]]);
+
+    in[k] = (PetscBool)(o->row_start[k] < o->row_start[k + 1] && (o->bodies->p || -o->gap[k] > least));
+    if (in[k]) p->contact[p->n++] = k;
+  }
+  PetscCall(PetscFree(deepest));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Rounds of the problem, from the contacts that the displacements without contact close. */
 static PetscErrorCode SolveRounds(HycoBodiesWork o, const HycoBodiesSurface *s, Problem *p, PetscBool in[],
                                   PetscReal Lambda[], PetscBool *solved)
@@ -635,10 +697,7 @@ static PetscErrorCode SolveRounds(HycoBodiesWork o, const HycoBodiesSurface *s, 
     if (o->row_start[k] == o->row_start[k + 1]) continue;
     size = PetscMax(size, PetscAbsReal(o->gap[k]));
   }
-  for (PetscInt k = 0; k < s->n; k++) {
-    in[k] = (PetscBool)(o->row_start[k] < o->row_start[k + 1] && (b->p || o->gap[k] < -CLOSED * size));
-    if (in[k]) p->contact[p->n++] = k;
-  }
+  PetscCall(Begin(o, s, size, in, p));
   *solved = PETSC_TRUE;
   PetscCall(PetscArrayzero(o->x, b->p));
   for (PetscInt round = 0; more && *solved && round < ROUNDS; round++) {
@@ -654,7 +713,7 @@ static PetscErrorCode SolveRounds(HycoBodiesWork o, const HycoBodiesSurface *s, 
 PetscErrorCode HycoBodiesPrepare(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal mu[])
 {
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < o->bodies->n; k++) PetscCall(HycoBodiesWeights(o->bodies, k, mu, o->weight[k]));
+  PetscCall(TakeWeights(o, mu));
   PetscCall(Place(o, mu));
   PetscCall(Load(o));
   PetscCall(BlendMotions(o));
