@@ -107,15 +107,15 @@ PetscErrorCode HycoMarchEnd(HycoMarch *march);
 /* The internal forces of one cell from the state's stresses, the integral of B^T sigma (f: nv x dim, overwritten). */
 PetscErrorCode HycoFEStateForce(HycoFE fe, HycoFEState state, PetscInt cell, PetscReal f[]);
 
-/*
-  The same for some bodies only: those with inelastic laws, or those with linear laws, whose stress and energy do not
-  depend on the past. The other cells are neither read nor written, and are not in the report. Springs are included with
-  the inelastic bodies.
-*/
-typedef enum { HYCO_BODIES_ALL, HYCO_BODIES_FLOWING, HYCO_BODIES_LINEAR } HycoBodies;
+/* The same for the bodies with inelastic laws only, with the springs. The other cells are neither read nor written, and
+   are not in the report. */
+typedef enum { HYCO_BODIES_ALL, HYCO_BODIES_FLOWING } HycoBodies;
 PetscErrorCode HycoFEStepBodies(HycoFE fe, HycoBodies bodies, const PetscReal u[], PetscReal t0, PetscReal t1,
                                 HycoFEState begin, HycoFEState end, PetscReal f_int[], PetscBool tangent,
                                 HycoFEStepReport *report);
+/* Stresses and energies of the cells with linear laws at u, which do not depend on the past, in the state; stored: their
+   energy, without springs. For a mesh that one process has. */
+PetscErrorCode HycoFELinearStress(HycoFE fe, const PetscReal u[], HycoFEState state, PetscReal *stored);
 
 /*
   Laws at some integration points, each the number of its cell times the points of a cell plus its own; all in bodies with

@@ -10,6 +10,15 @@ PetscReal HycoDeterminant(const HycoElement *el, const PetscInt node[], const Pe
    weight is multiplied by the cell's in a cubature (fe->cell_weight). */
 PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscInt q,
                              PetscReal g[HYCO_CELL_NODES][3], PetscReal *weight);
+/* Whether they are kept for fe's nodes (HycoFEKeepGradients()); then dN/dX, followed by the weight. */
+static inline PetscBool HycoGradientsKept(HycoFE fe)
+{
+  return (PetscBool)(fe->kept && fe->kept_place == fe->place);
+}
+static inline PetscReal *HycoKeptGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscInt q)
+{
+  return fe->kept + (size_t)(cell * el->nq + q) * (size_t)(3 * el->nv + 1);
+}
 /* Means over the cell of the dilatation of unit displacements, for the element bbar. */
 PetscErrorCode HycoMeanGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal g[HYCO_CELL_NODES][3]);
 /* The dilatation of a unit displacement of node a of a cell along c. */

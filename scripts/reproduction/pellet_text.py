@@ -13,26 +13,22 @@ forces, the top of the pellet, contact nodes within 0.1 mm (without: *no extensi
 {numbers}
 The RID's share of the force is that of S3's full-order contact force, at the loads 0.6 / 0.8 / 1. The
 speed-up is the median over the steps, relative to a full order that keeps its factor ({full_ms} ms per step here, {ms} ms
-reduced), and {ramp} over the whole ramp with its one factorisation. The paper's 10 is relative to an active set
-that solves with a new matrix in each iteration (and so is its 8.5 on the rope).
+reduced), and {ramp} over the whole ramp with its one factorisation; the paper's 10 (8.5 on the rope) is relative to an active set with a new matrix in each iteration.
 
-The accuracy is not monotone in modes, radii or layers, because DEIM's few elements change with each of them, and with them the share of the contact that
-is computed. According to the paper, the model is half as accurate without the extension; here the extension adds contacts, and the error over another, larger RID need not fall.
+The accuracy is not monotone in modes, radii or layers, because DEIM's few elements change with each of them. According to the paper, the model is half as accurate without
+the extension; here the error over a larger RID need not fall.
 
 ## Why the paper's 1 % and 5 % cannot come from S1 and S2
 
-- **S1** has no gap: proportional pressures give multiples of one solution (the second singular value of its 25 snapshots is {second} of the first), one mode.
-- **S2** is in contact in its last {touching} of 25 steps; before, its snapshots are multiples of one solution too.
-- Together they span {dimension} dimensions. At 1e-5 these are {paper_modes} modes of displacement, stress and force; the paper has 17, 20 and 21
-  from the same two. Elastic bodies, one ramp and frictionless contact cannot give more.
-- S3 is not in that span. The table has the error of its projection on the whole span, and for the
-  RID the smallest maximum error that any coefficients can reach, for displacement and stress separately: over the unknowns that the modes describe (those on the contact are
-  full order), and over the stress of the cladding's elements that depend on these alone.
+S1 has no gap: proportional pressures give multiples of one solution (the second singular value of its 25 snapshots is {second} of the first). S2 is in contact in its
+last {touching} of 25 steps; before, its snapshots are multiples of one solution too. Together they span {dimension} dimensions, at 1e-5 {paper_modes} modes of
+displacement, stress and force; the paper has 17, 20 and 21 from the same two. S3 is not in that span. The table has the error of its projection on the whole span, and the
+smallest maximum error in the RID that any coefficients can reach, for displacement (over the unknowns that the modes describe) and stress (over the cladding's
+elements that depend on these alone) separately:
 
 {bounds}
 No model with these modes has a displacement error over the RID below {least} %, whereas the paper states 1, or a stress error
-below {least_sigma} %, whereas the paper states 5: the bounds exclude its number for {excluded}. The paper's snapshots probably include more than its
-text states. With 9 radii at 1e-10, the same settings give {fine_u} and {fine_sigma} %. Crosses at the bottom mark steps that did not converge:
+below {least_sigma} %, whereas the paper states 5: the bounds exclude its number for {excluded}. With 9 radii at 1e-10, the same settings give {fine_u} and {fine_sigma} %. Crosses at the bottom mark steps that did not converge:
 
 ![errors by step]({folder}/pellet-errors.png)
 
@@ -40,15 +36,14 @@ text states. With 9 radii at 1e-10, the same settings give {fine_u} and {fine_si
 
 ![figure 13]({folder}/figure-13.png)
 
-9 radii at 1e-10, with {modes} modes of displacement, stress and generalised force (the paper: 17, 20 and 21). As in the paper, displacement points lie all over both bodies,
-and force points on the contact, the symmetry planes and the loaded surfaces. The RID has {rid} of {all_cells} elements ({fraction} %). A separate numpy script makes these
+9 radii at 1e-10, with {modes} modes of displacement, stress and generalised force. The RID has {rid} of {all_cells} elements ({fraction} %). A separate numpy script makes these
 pictures from the snapshots; {outside} of the elements that it finds are outside the RID that hyco chose.
 
 ## Figure 14: displacement modes over the cladding
 
 ![figure 14]({folder}/figure-14.png)
 
-Component 1 of the first six modes and of the last, each scaled to the value that one node in a hundred exceeds. As in the paper, later modes have larger gradients.
+Component 1 of the first six modes and of the last, each scaled to the value that one node in a hundred exceeds.
 
 ## Figures 15 and 16: S3 at full load, reduced model and full order
 

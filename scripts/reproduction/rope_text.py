@@ -4,30 +4,26 @@ TEXT = """\
 # Reproduction of the paper's figures and tables: the rope (section 6)
 
 `scripts/reproduce` writes this page from its runs. Errors are relative, in percent, mean / max over {test_grid} points in the cell centres of the parameter box, unless
-stated otherwise. The curves and maps of the paper (J. Fauque, I. Ramière, D. Ryckelynck, Int. J. Numer. Meth. Engng 115 (2018) 117-139) are pictures without data, of
-which only the shapes can be compared; its numbers are shown beside ours.
+stated otherwise. The paper's curves and maps are pictures without data, of which only the shapes can be compared; its numbers are shown beside ours.
 
 ## What the paper does not specify
 
-- **Which displacements are full order.** It gives their number (5 on the regular grid). The choice determines how the values on the interface follow from those inside
-  the RID, and so every error. We show the fewest that give full row rank, selected by the training errors (`rank`, here {rank_fe}), and all of A (`all`).
-- **Signs and ends.** The rope hangs down onto an obstacle at height -d(x); with the printed signs there is never contact. The 100 nodes
-  include both ends. The element across x = 0.5 has the average of the two stiffnesses.
-- **The 10 x 12 snapshots.** The cell centres (`-grid_type centred`) give the paper's sizes: 9 modes at 1e-7 (ours: {modes}), 14 at 6e-9 (ours: {pb14}).
-- **The norm of the dual POD for the RID.** The dual norm of H1 gives the paper's one vector at 1e-1 (ours: {dual}).
+| | here |
+| --- | --- |
+| which displacements are full order (their number is 5 on the regular grid); every error depends on it | the fewest that give full row rank, selected by the training errors (`rank`: {rank_fe}), and all of A (`all`) |
+| signs and ends | the rope hangs down onto an obstacle at height -d(x); with the printed signs there is never contact. The 100 nodes include both ends; the element across x = 0.5 has the average of the two stiffnesses |
+| the 10 x 12 snapshots | in the cell centres (`-grid_type centred`): {modes} modes at 1e-7 (paper: 9), {pb14} at 6e-9 (14) |
+| norm of the dual POD for the RID | the dual norm of H1: {dual} vector at 1e-1 (paper: 1) |
 
 ## The numbers
 
 The last two columns count test points without a converged solution, and those that needed the fallback solver.
 
 {numbers}
-- **Regular grid.** The RID has the paper's size: {nodes} nodes, {a} of them in A. The mean error of the forces in the RID is close to the paper's, that of the displacement
-  is larger with either choice of full-order displacements: this RID contains {covered} % of the contact force on average ({least} % at least), and 9 modes carry no more
-  information. More modes, Q-DEIM and a layer around the RID give far smaller errors than the paper's with the same 120 solutions.
-- **Baselines.** The projection on the dual snapshots themselves (the reduced basis of Haasdonk et al.) has supremizers among its modes: {pb_dual_modes}
-  modes and {pb_dual_vectors} force vectors, more than the rope has contacts. It is exact at its training points.
-- **Greedy.** With the paper's threshold 1e-10 our errors are above the paper's, at 1e-12 below them, and smallest with a layer. Nonnegative factorisation has many local
-  minima: read the projection-based rows as ranges.
+- **Regular grid.** The RID has the paper's size, {nodes} nodes, {a} of them in A, and contains {covered} % of the contact force on average ({least} % at least).
+  More modes, Q-DEIM and a layer give far smaller errors than the paper's with the same 120 solutions.
+- **Baselines.** The projection on the dual snapshots themselves (the reduced basis of Haasdonk et al.), {pb_dual_modes} modes with supremizers and
+  {pb_dual_vectors} force vectors, is exact at its training points. Nonnegative factorisation has many local minima: read the projection-based rows as ranges.
 
 ## Figures 3 to 6: solutions, bases, RID
 
@@ -35,14 +31,11 @@ The last two columns count test points without a converged solution, and those t
 
 ![figure 4]({folder}/figure-04.png)
 
-As in the paper, displacements need few vectors and forces many. The error of NNMF departs from that of POD as k grows; {slow} iterations
-help only for large k. Both POD curves end at round-off: the solutions span a small space, and the forces one dimension for each node that is ever in contact.
+As in the paper, displacements need few vectors and forces many; {slow} iterations help NNMF only for large k. Both POD curves end at round-off.
 
 ![figure 5]({folder}/figure-05.png)
 
 ![figure 6]({folder}/figure-06.png)
-
-The counts are those of the paper. The signs of the modes are arbitrary.
 
 ## Figure 7: errors of the regular grid's model
 
@@ -58,15 +51,13 @@ With the paper's settings and all of A full order, then with the accurate settin
 
 ![figure 9]({folder}/figure-09.png)
 
-Ours, and the paper's in brackets; our speed-up is the median over the test grid, with reconstruction:
+Ours, and the paper's in brackets; unknowns are the displacements and forces of A; our speed-up is the median over the test grid, with reconstruction, over a tridiagonal
+solve on 100 nodes, which leaves nothing to gain (the paper's: over a plain active set):
 
 {table_1}
-- **Unknowns** are the displacements and forces of A, if all of A is full order: the coefficients of the modes follow.
-- **Speed-up.** The paper's is relative to a plain active set, ours to a tridiagonal solve on 100 nodes, which leaves nothing to gain.
-- **Forces.** The RID contains {point_covered} % of the force here; the rest is reconstructed (41) from forces that already have errors. We do not reach the paper's 12 %.
-- **The paper's argument** for the hybrid model at this point, smaller errors of the forces than a projection with as many unknowns, 13 against 23, is not found here: ours are {at_rid} in the
-  RID, {at_all} everywhere, against {at_pb14}. Over the test points the means are {rid_force} in the RID and {all_force} everywhere against {pb_force}, and {all_u} against {pb_u} in
-  displacement. Our projection-based forces are better than the paper's, perhaps by another local minimum of the factorisation.
+The RID contains {point_covered} % of the force here; the rest is reconstructed (41) from forces that already have errors. The paper's argument for the hybrid model,
+smaller errors of the forces at this point than a projection with as many unknowns, 13 against 23, is not found: ours are {at_rid} in the RID, {at_all} everywhere,
+against {at_pb14}; over the test points {rid_force} and {all_force} against {pb_force}, in displacement {all_u} against {pb_u}.
 
 ## Figure 10: greedy training by the indicator (43)
 
@@ -82,11 +73,9 @@ Mean errors at the end, in percent:
 | hybrid, 1e-14 and a layer | {u_h1_greedy_fine} | {u_greedy_fine} | {lambda_rid_dual_greedy_fine} | {lambda_rid_greedy_fine} |
 | projection-based | {u_h1_pb_on_paper} | {u_pb_on_paper} | {lambda_rid_dual_pb_on_paper} | {lambda_rid_pb_on_paper} |
 
-In the paper the hybrid model is also better in displacement, and equal in the dual norm. Ours is better in the 2-norm of the forces only with the paper's thresholds, and in all four
-norms with the accurate settings, probably because what the thresholds leave out of the modes affects everything inside the RID through the interface.
-The indicator's mean at 1e-10 is above the mean error at {above_u} of the {judged} evaluated iterations for the displacement, and at
-{above_lambda} for the forces; in the paper it overestimates both. (The indicator refers to A with interpolated interface values, the error to the whole rope.) The decrease
-is not monotone: a new solution changes modes, RID and full-order displacements at once.
+In the paper the hybrid model is also better in displacement, and equal in the dual norm; ours with the paper's thresholds only in the 2-norm of the forces, with the
+accurate settings in all four. The indicator's mean at 1e-10 is above the mean error at {above_u} of the {judged} evaluated iterations for the displacement, at
+{above_lambda} for the forces; in the paper it overestimates both.
 
 ## Figure 11: greedy training by the indicator (45), projection-based
 
@@ -94,14 +83,13 @@ The hybrid models have the same solutions, each with its own RID (in the paper i
 
 ![figure 11]({folder}/figure-11.png)
 
-At the end the error of the displacement is {u_greedy_pb} (projection-based) and {u_hr_on_pb} (hybrid); that of the forces is {lambda_rid_greedy_pb} and {lambda_rid_hr_on_pb}.
-In the paper the hybrid model is much better in both; ours at 1e-10 in the forces only, as at figure 10. The indicator (45) is a length whose scaling the paper
-does not give: here it has its own axis. It falls with the error, as in the paper. In all histories together, {failed} predictions did not converge; the means exclude them.
+At the end the error of the displacement is {u_greedy_pb} (projection-based) and {u_hr_on_pb} (hybrid), of the forces {lambda_rid_greedy_pb} and {lambda_rid_hr_on_pb};
+in the paper the hybrid model is much better in both. The indicator (45), a length, falls with the error, as in the paper. In all histories together, {failed} predictions
+did not converge; the means exclude them.
 
 ## Figure 12: errors after the greedy training
 
-In the paper the errors are largest where mu1 is small and most nodes are in contact. Our largest error of the displacement is at
-mu = {worst_fine} with the accurate settings, and at {worst_paper} with the paper's thresholds, which come first:
+In the paper the errors are largest where mu1 is small. Our largest error of the displacement is at mu = {worst_fine} with the accurate settings, and at {worst_paper} with the paper's thresholds, which come first:
 
 ![figure 12]({folder}/figure-12.png)
 

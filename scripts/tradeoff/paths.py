@@ -161,7 +161,7 @@ class Bench:
 
 def full_orders(bench, arguments):
     """Their rows; `status` says where and how all was measured."""
-    words = (f"{machine()}, {time.strftime('%Y-%m-%d')}; CPU seconds of one core, other programs add tens of per cent; trained on `-scatter 12` unless a grid is named, "
+    words = (f"{machine()}, {time.strftime('%Y-%m-%d')}; "
              f"judged on {len(bench.case.unseen)} unseen paths." + (" Full order: `scripts/bench history`, at the scene's listed times." if arguments.full_order else ""))
     known = map(float, arguments.full_order.split(",")) if arguments.full_order else map(bench.full_order, ("tangent", "elastic"))
     return [{"id": 0, "type": "full", "label": name, "status": words, "path_s": cpu}
@@ -221,7 +221,7 @@ def section(mesh, rows, picture):
     notes += [f"- No model, or a path that does not reach its end: {r['label']}: {r['status']}" for r in failed]
     return [full[0]["status"], "", f"![error against online time, {case_of(mesh).name}]({picture})", "",
             f"Full order takes {' and '.join(seconds(f['path_s']) for f in full)} ({', '.join(f['label'].removeprefix('full order, ') for f in full)}) for a path. "
-            f"Of {len(ok) + len(failed)} settings ([csv]({picture.removesuffix('.png')}.csv)) the most accurate of each type, and the cheapest within limits of these errors, with their largest errors, each path at its worst listed time:", "",
+            f"Of {len(ok) + len(failed)} settings ([csv]({picture.removesuffix('.png')}.csv)):", "",
             *table(["", "setting", "cells %", *(f"{words.split(' of the')[0].split(' on the')[0]} %" for words in KINDS.values()), "a path", *EXTRA], lines),
             *([""] if notes else []), *notes]
 

@@ -166,5 +166,4 @@ def section(case, rows, full, words, picture):
     failed = [r for r in rows if r["status"] != "ok"]
     return [words, "", f"![error against online time, {case.name}]({picture})", "",
             f"{len(rows)} settings ([csv]({picture.removesuffix('.png')}.csv)" + (f"; {len(failed)} of them gave no model or no converged solution" if failed else "")
-            + f"). Speed-up, in a set, of the cheapest {', '.join(kinds(rows))} setting that is accurate enough at all unseen points:", "",
-            *answer(rows, full["warm"]), "", "In brackets the speed-up over warm full order:", "", *wanted(case, rows, full)]
+            + "):", "", *answer(rows, full["warm"]), "", *wanted(case, rows, full)]

@@ -15,8 +15,7 @@
   start from the displacements that close the contacts with a force: otherwise every contact looks open. The sweeps are
   replaced by the solution in which every contact is closed and sticks.
 */
-#include <hycoconeimpl.h>
-#include <hycolcp.h>
+#include "semismooth.h"
 #include <petscblaslapack.h>
 
 #define MOST_ITS    100   /* of Newton's method from one start */
@@ -24,30 +23,36 @@
 #define MOST_STEPS  100   /* of the proximal point method */
 #define MOST_FROZEN 3     /* steps with frozen admissible forces before a start */
 #define MOST_LEAST  1000  /* rows up to which a singular J is solved by least squares */
-#define RANK_TOL    1e-10 /* of these: singular values relative to the largest that count as 0 */
-#define GAPS        1e-4  /* share of the forces that would close the gaps, whose round-off the forces have */
+#define RANK_TOL    1e-10 /* of motions: singular values relative to the largest that count as 0 */
+#define GAPS        1e-4  /* share of the forces that would close the gaps or were there before: round-off of these */
 #define SHIFT       1e-3  /* alpha relative to M's diagonal: the proximal point method's rate of convergence */
 #define TIGHT       1e-14 /* |F| relative to the forces: nothing is left to gain */
 #define SOLVED      1e-10 /* the same: solved, if the steps gain nothing more */
+#define NEAR        1e-6  /* the same: near a solution, */
+#define ROUNDING    1e-12 /* and round-off, if a step does not halve it */
 #define LEAST_STEP  (1. / 64)
-#define BLOCK       (HYCO_MAX_BLOCK * HYCO_MAX_BLOCK)
 
 typedef struct {
   const HycoLCP *lcp;
   const HycoBlocks *blocks;
-  PetscInt n, p;                       /* length of z; free unknowns before the forces */
-  const PetscReal *M, *q;              /* of the problem that is solved now: `M0`, or a proximal step's */
-  const PetscReal *M0, *q0;            /* lcp's, scaled if p > 0 */
-  PetscReal *scaled, flexibility;      /* of a typical contact; p > 0 */
-  PetscReal *rho, *w, *y, *F;          /* n each; y = z - rho w */
-  PetscReal *step, *trial;             /* n each */
-  PetscReal *DP;                       /* BLOCK for each block */
-  PetscInt n_kept, *kept, *kept_block; /* rows that are not eliminated, and their blocks; -1: a free unknown */
-  PetscBool *in;                       /* n: kept */
-  PetscReal *J;                        /* n_kept x n_kept, column major */
-  PetscBLASInt *pivot;
+  PetscInt n, p;                  /* length of z; free unknowns before the forces */
+  const PetscReal *M, *q;         /* of the problem that is solved now: `M0`, or a proximal step's */
+  const PetscReal *M0, *q0;       /* lcp's, scaled if p > 0 */
+  PetscReal *scaled, flexibility; /* of a typical contact; p > 0 */
+  PetscReal *rho, *w, *y, *F;     /* n each; y = z - rho w */
+  PetscReal *step, *trial;        /* n; 3 n: z, w and the change of w */
+  PetscReal start;                /* the largest force at the start */
+  HycoConeStep linear;
   PetscInt its;
 } Newton;
+
+/* The problem that is solved now. */
+static void Pose(Newton *h, const PetscReal M[], const PetscReal q[])
+{
+  if (M != h->M) HycoConeStepSetMatrix(&h->linear, M);
+  h->M = M;
+  h->q = q;
+}
 
 /* The scales, by block; a row without flexibility has that of the stiffest one. */
 static PetscErrorCode SetScales(Newton *h)
@@ -71,26 +76,21 @@ static PetscErrorCode SetScales(Newton *h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* w = q + M z Columns of zero forces are skipped. */
+/* w = q + M z */
 static PetscErrorCode Slack(Newton *h, const PetscReal z[])
 {
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(h->w, h->q, h->n));
-  for (PetscInt j = 0; j < h->n; j++) { /* few forces are nonzero */
-    const PetscReal *column = h->M + (size_t)j * (size_t)h->n;
-
-    for (PetscInt i = 0; z[j] != 0 && i < h->n; i++) h->w[i] += column[i] * z[j];
-  }
+  PetscCall(HycoAddDenseProduct(h->n, h->M, z, h->w));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* w, y and F at z; *norm = |F|_2, *size: the size of the forces, to which it is compared. */
-static PetscErrorCode Residual(Newton *h, const PetscReal z[], PetscReal *norm, PetscReal *size)
+/* y and F at z with the slacks w; *norm = |F|_2, *size: the size of the forces, to which it is compared. */
+static PetscErrorCode Evaluate(Newton *h, const PetscReal z[], PetscReal *norm, PetscReal *size)
 {
   PetscReal sum = 0, most = 0, least = 0;
 
   PetscFunctionBegin;
-  PetscCall(Slack(h, z));
   for (PetscInt i = 0; i < h->n; i++) h->y[i] = z[i] - h->rho[i] * h->w[i];
   for (PetscInt i = 0; i < h->p; i++) h->F[i] = h->y[i];
   for (PetscInt k = 0; k < h->blocks->n; k++) {
@@ -105,143 +105,63 @@ static PetscErrorCode Residual(Newton *h, const PetscReal z[], PetscReal *norm, 
     least = PetscMax(least, PetscAbsReal(h->rho[i] * h->q[i]));
   }
   *norm = PetscSqrtReal(sum);
-  *size = most > 0 ? PetscMax(most, GAPS * least) : least;
+  *size = most > 0 ? PetscMax(most, GAPS * PetscMax(least, h->start)) : PetscMax(least, GAPS * h->start);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The derivatives of P at y, and the rows that are kept; *changes: how many rows joined or left them. */
-static PetscErrorCode Derive(Newton *h, PetscInt *changes)
+/* w, y and F at z. */
+static PetscErrorCode Residual(Newton *h, const PetscReal z[], PetscReal *norm, PetscReal *size)
 {
   PetscFunctionBegin;
-  h->n_kept = *changes = 0;
-  for (PetscInt i = 0; i < h->p; i++) {
-    h->in[i] = PETSC_TRUE;
-    h->kept[h->n_kept] = i;
-    h->kept_block[h->n_kept++] = -1;
-  }
-  for (PetscInt k = 0; k < h->blocks->n; k++) {
-    const PetscInt first = h->p + h->blocks->row[k], size = h->blocks->row[k + 1] - h->blocks->row[k];
-    PetscReal *D = h->DP + (size_t)k * BLOCK;
-
-    PetscCall(HycoBlockDerivative(h->blocks, k, h->y + first, D));
-    for (PetscInt i = 0; i < size; i++) {
-      PetscBool in = PETSC_FALSE;
-
-      for (PetscInt j = 0; j < size; j++) in = (PetscBool)(in || D[i * size + j] != 0);
-      *changes += in != h->in[first + i];
-      h->in[first + i] = in;
-      if (!in) continue;
-      h->kept[h->n_kept] = first + i;
-      h->kept_block[h->n_kept++] = k;
-    }
-  }
+  PetscCall(Slack(h, z));
+  PetscCall(Evaluate(h, z, norm, size));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Column c of J on the kept rows. J = I - DP (I - rho M), rows of one block share DP. */
-static void Column(const Newton *h, PetscInt c, PetscReal column[])
-{
-  const PetscReal *M = h->M + (size_t)c * (size_t)h->n;
-
-  for (PetscInt a = 0; a < h->n_kept; a++) {
-    const PetscInt k = h->kept_block[a], first = k < 0 ? 0 : h->p + h->blocks->row[k],
-                   size = k < 0 ? 0 : h->blocks->row[k + 1] - h->blocks->row[k];
-    const PetscReal *D = h->DP + (size_t)PetscMax(k, 0) * BLOCK + (h->kept[a] - first) * size;
-    PetscReal sum = k < 0 ? h->rho[a] * M[a] : h->kept[a] == c ? 1 : 0;
-
-    for (PetscInt j = 0; j < size; j++) sum += D[j] * (h->rho[first + j] * M[first + j] - (first + j == c ? 1 : 0));
-    column[a] = sum;
-  }
-}
-
-/* J on the kept rows and columns. rhs (NULL: only J): -F there, with what the eliminated rows, s = -F, move to it. */
-static void Jacobian(Newton *h, PetscReal rhs[])
-{
-  const size_t m = (size_t)h->n_kept;
-  PetscReal *other = h->J + m * m; /* the last column is the room of those that are not kept */
-
-  for (PetscInt i = 0; rhs && i < h->n_kept; i++) rhs[i] = -h->F[h->kept[i]];
-  for (PetscInt c = 0, a = 0; c < h->n; c++) {
-    if (h->in[c])
-      Column(h, c, h->J + (size_t)a++ * m);
-    else if (rhs && h->F[c] != 0 && m) {
-      Column(h, c, other);
-      for (PetscInt i = 0; i < h->n_kept; i++) rhs[i] += other[i] * h->F[c];
-    }
-  }
-}
-
-/* The shortest s of the least squares of a J without full rank. */
-static PetscErrorCode LeastSquares(Newton *h, PetscBLASInt m, PetscReal rhs[], PetscBLASInt *info)
-{
-  const PetscBLASInt one = 1, lwork = 5 * m + 5 * 64 * m;
-  PetscReal *value, *work, tol = RANK_TOL;
-  PetscBLASInt rank;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc2(m, &value, lwork, &work));
-  LAPACKgelss_(&m, &m, &one, h->J, &m, rhs, &m, value, &tol, &rank, work, (PetscBLASInt *)&lwork, info);
-  PetscCall(PetscFree2(value, work));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The step J s = -F, by least squares if `least`; *regular: J has a factor, and s is finite. */
-static PetscErrorCode Step(Newton *h, PetscBool least, PetscBool *regular)
-{
-  const PetscBLASInt one = 1;
-  PetscBLASInt m, info = 0;
-  PetscReal *rhs = h->trial, size = 0;
-
-  PetscFunctionBegin;
-  PetscCall(PetscBLASIntCast(h->n_kept, &m));
-  for (PetscInt i = 0; i < h->n; i++) h->step[i] = -h->F[i];
-  Jacobian(h, rhs);
-  if (m && least) PetscCall(LeastSquares(h, m, rhs, &info));
-  if (m && !least) LAPACKgetrf_(&m, &m, h->J, &m, h->pivot, &info);
-  if (m && !least && info == 0) LAPACKgetrs_("N", &m, &one, h->J, &m, h->pivot, rhs, &m, &info);
-  for (PetscInt a = 0; a < m; a++) h->step[h->kept[a]] = rhs[a];
-  for (PetscInt i = 0; i < h->n; i++) size += PetscAbsReal(h->step[i]);
-  *regular = (PetscBool)(info == 0 && !PetscIsInfOrNanReal(size));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The sign of the determinant of J at z, a solution; 0: J is singular. That of the eliminated rows is 1. */
+/* The sign of the determinant of J at z, a solution; 0: J is singular. */
 static PetscErrorCode Sign(Newton *h, const PetscReal z[], PetscInt *sign)
 {
   PetscReal norm, size;
-  PetscBLASInt m, info = 0;
   PetscInt changes;
 
   PetscFunctionBegin;
   PetscCall(Residual(h, z, &norm, &size));
-  PetscCall(Derive(h, &changes));
-  PetscCall(PetscBLASIntCast(h->n_kept, &m));
-  Jacobian(h, NULL);
-  if (m) LAPACKgetrf_(&m, &m, h->J, &m, h->pivot, &info);
-  *sign = info == 0;
-  for (PetscInt a = 0; a < m; a++) {
-    if (h->J[(size_t)a * (size_t)(m + 1)] < 0) *sign = -*sign;
-    if (h->pivot[a] != a + 1) *sign = -*sign;
-  }
+  PetscCall(HycoConeStepDerive(&h->linear, h->blocks, h->y, &changes));
+  PetscCall(HycoConeStepSign(&h->linear, sign));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* z + t s with the first t = 1, 1/2, ..., 1/64 that decreases |F|; *less: there is one. Else z is unchanged. */
+/* z + t s with the first t = 1, 1/2, ..., 1/64 that decreases |F|; *less: there is one. Else z is unchanged. w changes by
+   t M s; near the solution it is computed anew, without the round-off of former changes. Where |F| is round-off it is
+   not searched for a lucky decrease. */
 static PetscErrorCode Search(Newton *h, PetscReal z[], PetscReal *norm, PetscReal *size, PetscBool *less)
 {
-  const PetscReal before = *norm;
+  const PetscReal before = *norm, least = before <= ROUNDING * *size ? 1 : LEAST_STEP;
+  const PetscReal share = before <= ROUNDING * *size ? 0.5 : 1e-4;
+  const PetscBool near = (PetscBool)(before <= NEAR * *size);
+  PetscReal *trial = h->trial, *w = h->trial + h->n, *change = h->trial + 2 * h->n;
 
   PetscFunctionBegin;
   *less = PETSC_FALSE;
-  for (PetscReal t = 1; t >= LEAST_STEP && !*less; t /= 2) {
-    for (PetscInt i = 0; i < h->n; i++) h->trial[i] = z[i] + t * h->step[i];
-    PetscCall(Residual(h, h->trial, norm, size));
-    *less = (PetscBool)(*norm < (1 - 1e-4 * t) * before);
+  PetscCall(PetscArraycpy(w, h->w, h->n));
+  PetscCall(PetscArrayzero(change, h->n));
+  if (!near) PetscCall(HycoAddDenseProduct(h->n, h->M, h->step, change));
+  for (PetscReal t = 1; t >= least && !*less; t /= 2) {
+    for (PetscInt i = 0; i < h->n; i++) {
+      trial[i] = z[i] + t * h->step[i];
+      h->w[i] = w[i] + t * change[i];
+    }
+    if (near) PetscCall(Slack(h, trial));
+    PetscCall(Evaluate(h, trial, norm, size));
+    *less = (PetscBool)(*norm < (1 - share * t) * before);
   }
-  if (*less)
-    PetscCall(PetscArraycpy(z, h->trial, h->n));
-  else
-    PetscCall(Residual(h, z, norm, size));
+  if (*less) {
+    PetscCall(PetscArraycpy(z, trial, h->n));
+    if (!near && *norm <= NEAR * *size) PetscCall(Residual(h, z, norm, size));
+  } else {
+    PetscCall(PetscArraycpy(h->w, w, h->n));
+    PetscCall(Evaluate(h, z, norm, size));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -268,10 +188,11 @@ static PetscErrorCode Improve(Newton *h, PetscReal z[], PetscReal *norm, PetscRe
 {
   PetscFunctionBegin;
   *less = PETSC_FALSE;
-  PetscCall(Step(h, PETSC_FALSE, regular));
+  PetscCall(HycoConeStepSolve(&h->linear, h->F, PETSC_FALSE, h->step, regular));
   if (*regular) PetscCall(Search(h, z, norm, size, less));
-  if (*less || *norm <= SOLVED * *size || !h->n_kept || h->n_kept > MOST_LEAST) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(Step(h, PETSC_TRUE, regular));
+  if (*less || !h->linear.nearly_singular || *norm <= ROUNDING * *size) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!h->linear.m || h->linear.m > MOST_LEAST) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoConeStepSolve(&h->linear, h->F, PETSC_TRUE, h->step, regular));
   if (*regular) PetscCall(Search(h, z, norm, size, less));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -288,7 +209,7 @@ static PetscErrorCode Iterate(Newton *h, PetscReal z[], HycoLCPStatus *status)
   for (PetscInt k = 0; k < most && norm > TIGHT * size && regular && less; k++) {
     PetscInt changes;
 
-    PetscCall(Derive(h, &changes));
+    PetscCall(HycoConeStepDerive(&h->linear, h->blocks, h->y, &changes));
     PetscCall(Improve(h, z, &norm, &size, &regular, &less));
     h->its++;
     PetscCall(Show(h, z, changes));
@@ -402,22 +323,28 @@ static PetscErrorCode Restart(Newton *h, PetscReal z[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* From the given forces. Floating bodies have no start without any, as every contact would look open: without loads
-   either, they stay where they are. */
-static PetscErrorCode FromForces(Newton *h, PetscReal z[], HycoLCPStatus *status)
+/* Whether no force is a solution, which z is then: floating bodies without loads stay where they are. */
+static PetscErrorCode Unloaded(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
-  PetscBool any = PETSC_FALSE;
   PetscReal norm, size;
 
   PetscFunctionBegin;
-  for (PetscInt i = h->p; i < h->n; i++) any = (PetscBool)(any || z[i] != 0);
-  if (h->p && !any) {
-    PetscCall(PetscArrayzero(z, h->p));
-    PetscCall(Residual(h, z, &norm, &size));
-    *status = norm <= SOLVED * size ? HYCO_LCP_SOLVED : HYCO_LCP_LIMIT;
-    PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscArrayzero(h->step, h->n));
+  PetscCall(Residual(h, h->step, &norm, &size));
+  *status = norm <= SOLVED * size ? HYCO_LCP_SOLVED : HYCO_LCP_LIMIT;
+  if (*status == HYCO_LCP_SOLVED) PetscCall(PetscArrayzero(z, h->n));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* From the given forces. Floating bodies have no start without any, as every contact would look open. */
+static PetscErrorCode FromForces(Newton *h, PetscReal z[], HycoLCPStatus *status)
+{
+  PetscFunctionBegin;
+  if (h->p) {
+    PetscCall(Unloaded(h, z, status));
+    if (*status == HYCO_LCP_SOLVED || !(h->start > 0)) PetscFunctionReturn(PETSC_SUCCESS);
+    PetscCall(Consistent(h, z));
   }
-  if (h->p) PetscCall(Consistent(h, z));
   PetscCall(Iterate(h, z, status));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -465,26 +392,10 @@ static PetscErrorCode FromStick(Newton *h, PetscReal z[], HycoLCPStatus *status)
   PetscReal *stuck;
 
   PetscFunctionBegin;
-  PetscCall(PetscArrayzero(z, h->n));
-  PetscCall(Slack(h, z));
-  h->n_kept = 0;
-  for (PetscInt i = 0; i < h->n; i++) {
-    h->F[i] = h->rho[i] * h->w[i];
-    h->in[i] = (PetscBool)(i < h->p || h->M[(size_t)i * (size_t)(h->n + 1)] > 0);
-    if (!h->in[i]) h->F[i] = 0;
-  }
-  for (PetscInt k = -1; k < h->blocks->n; k++) { /* DP = 1 */
-    const PetscInt first = k < 0 ? 0 : h->p + h->blocks->row[k],
-                   size = k < 0 ? 0 : h->blocks->row[k + 1] - h->blocks->row[k];
-
-    for (PetscInt i = 0; i < size * size; i++) h->DP[(size_t)k * BLOCK + (size_t)i] = i % (size + 1) == 0;
-    for (PetscInt i = first; i < (k < 0 ? h->p : first + size); i++) {
-      if (!h->in[i]) continue;
-      h->kept[h->n_kept] = i;
-      h->kept_block[h->n_kept++] = k;
-    }
-  }
-  PetscCall(Step(h, (PetscBool)(h->n_kept <= MOST_LEAST), &regular));
+  for (PetscInt i = 0; i < h->n; i++)
+    h->F[i] = i < h->p || h->M[(size_t)i * (size_t)(h->n + 1)] > 0 ? h->rho[i] * h->q[i] : 0;
+  PetscCall(HycoConeStepStick(&h->linear));
+  PetscCall(HycoConeStepSolve(&h->linear, h->F, (PetscBool)(h->linear.m <= MOST_LEAST), h->step, &regular));
   for (PetscInt i = 0; i < h->n; i++) z[i] = regular ? h->step[i] : 0;
   HycoDuplicate(h->n, z, &stuck);
   PetscCall(Iterate(h, z, status));
@@ -560,12 +471,10 @@ static PetscErrorCode Proximal(Newton *h, PetscReal z[], HycoLCPStatus *status)
     PetscReal norm, size;
 
     for (size_t i = 0; i < n; i++) q[i] = h->q0[i] - alpha[i] * z[i];
-    h->M = M;
-    h->q = q;
+    Pose(h, M, q);
     PetscCall(Starts(h, z, status));
     done = (PetscBool)(*status != HYCO_LCP_SOLVED);
-    h->M = h->M0;
-    h->q = h->q0;
+    Pose(h, h->M0, h->q0);
     PetscCall(Residual(h, z, &norm, &size));
     *status = norm <= SOLVED * size ? HYCO_LCP_SOLVED : HYCO_LCP_LIMIT;
     done = (PetscBool)(done || norm <= TIGHT * size || (*status == HYCO_LCP_SOLVED && norm > before / 2));
@@ -623,15 +532,15 @@ static PetscErrorCode ScaleFree(Newton *h, PetscReal z[])
     h->M0 = M;
     h->q0 = q;
   }
-  h->M = h->M0;
-  h->q = h->q0;
+  Pose(h, h->M0, h->q0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Without loads all forces may be round-off, with which nothing is in equilibrium: they are 0 then. */
+/* Without loads all forces may be round-off, also of the forces before, with which nothing is in equilibrium: they are
+   0 then. */
 static void DropRounding(const Newton *h, PetscReal z[])
 {
-  PetscReal most = 0, least = 0;
+  PetscReal most = 0, least = h->start;
 
   for (PetscInt i = h->p; i < h->n; i++) {
     most = PetscMax(most, PetscAbsReal(z[i]));
@@ -650,11 +559,10 @@ PetscErrorCode HycoLCPSemismooth(const HycoLCP *lcp, PetscReal z[], PetscInt *it
   PetscFunctionBegin;
   if (!lcp->blocks) PetscCall(HycoBlocksCreateNonnegative(lcp->n, &nonnegative));
   if (!lcp->blocks) h.blocks = nonnegative;
-  PetscCall(PetscMalloc6(n, &h.rho, n, &h.w, n, &h.y, n, &h.F, n, &h.step, n, &h.trial));
-  PetscCall(PetscMalloc5((size_t)h.blocks->n * BLOCK + 1, &h.DP, n, &h.kept, n, &h.kept_block,
-                         (size_t)(n + 1) * (size_t)n, &h.J, n, &h.pivot));
-  PetscCall(PetscCalloc1(n, &h.in));
+  PetscCall(PetscMalloc6(n, &h.rho, n, &h.w, n, &h.y, n, &h.F, n, &h.step, 3 * n, &h.trial));
+  PetscCall(HycoConeStepCreate(lcp->p, h.blocks, h.rho, &h.linear));
   PetscCall(ScaleFree(&h, z));
+  for (PetscInt i = h.p; i < n; i++) h.start = PetscMax(h.start, PetscAbsReal(z[i]));
   PetscCall(Chain(&h, z, status));
   if (lcp->sign) *lcp->sign = 0;
   if (lcp->sign && *status == HYCO_LCP_SOLVED) PetscCall(Sign(&h, z, lcp->sign));
@@ -662,8 +570,7 @@ PetscErrorCode HycoLCPSemismooth(const HycoLCP *lcp, PetscReal z[], PetscInt *it
   for (PetscInt i = 0; i < h.p; i++) z[i] *= h.flexibility;
   *its = h.its;
   PetscCall(PetscFree6(h.rho, h.w, h.y, h.F, h.step, h.trial));
-  PetscCall(PetscFree5(h.DP, h.kept, h.kept_block, h.J, h.pivot));
-  PetscCall(PetscFree(h.in));
+  PetscCall(HycoConeStepDestroy(&h.linear));
   PetscCall(PetscFree(h.scaled));
   PetscCall(HycoBlocksDestroy(&nonnegative));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -395,7 +395,7 @@ static PetscErrorCode StepAll(HycoFE fe, HycoBodies bodies, Batch *b)
   for (PetscInt e = 0; e < m->n_cells; e++) {
     const PetscBool linear = fe->scene->body[m->cell_body[e]].law->linear;
 
-    if (bodies != HYCO_BODIES_ALL && linear != (PetscBool)(bodies == HYCO_BODIES_LINEAR)) continue;
+    if (bodies == HYCO_BODIES_FLOWING && linear) continue;
     if (b->n == BATCH || (b->n && m->cell_body[e] != m->cell_body[b->cell[0]])) PetscCall(Step(fe, el, b));
     b->cell[b->n++] = e;
   }
@@ -403,7 +403,7 @@ static PetscErrorCode StepAll(HycoFE fe, HycoBodies bodies, Batch *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One step from t0 to t1 for all, linear or inelastic bodies: adds internal forces to f_int[n_dof] (N), writes state
+/* One step from t0 to t1 for all or for inelastic bodies: adds internal forces to f_int[n_dof] (N), writes state
    `end`, optionally replaces fe's tangents by the consistent ones. Complete at owned nodes; report sums are those of
    this process. Not collective. */
 PetscErrorCode HycoFEStepBodies(HycoFE fe, HycoBodies bodies, const PetscReal u[], PetscReal t0, PetscReal t1,
@@ -425,7 +425,7 @@ PetscErrorCode HycoFEStepBodies(HycoFE fe, HycoBodies bodies, const PetscReal u[
   ierr = StepAll(fe, bodies, &b);
   PetscCall(BatchDestroy(&b));
   PetscCall(ierr);
-  if (fe->springs && bodies != HYCO_BODIES_LINEAR && !report->failed) { /* once for all bodies */
+  if (fe->springs && !report->failed) { /* once for all bodies */
     const PetscReal energy = HycoSpringsEnergy(fe, u);
 
     HycoSpringsAddForces(fe, -1, u, f_int);
@@ -433,6 +433,38 @@ PetscErrorCode HycoFEStepBodies(HycoFE fe, HycoBodies bodies, const PetscReal u[
     report->potential += energy;
   }
   HycoFEPassTied(fe, f_int);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Stress and energy of linear laws at displacements u: they do not depend on the past. */
+PetscErrorCode HycoFELinearStress(HycoFE fe, const PetscReal u[], HycoFEState state, PetscReal *stored)
+{
+  const HycoElement *el = HycoElementGet(fe->mesh->type);
+  const PetscInt ns = fe->n_sigma;
+
+  PetscFunctionBegin;
+  *stored = 0;
+  PetscCall(HycoFEKeepGradients(fe));
+  for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
+    const PetscInt body = fe->mesh->cell_body[e], size = fe->tangent_size[body];
+    PetscReal mean[HYCO_CELL_NODES][3];
+
+    if (!fe->scene->body[body].law->linear) continue;
+    if (fe->bbar[body]) PetscCall(HycoMeanGradients(fe, el, e, mean));
+    for (PetscInt q = 0; q < el->nq; q++) {
+      const PetscReal *C = fe->tangent + fe->tangent_start[e] + q * size;
+      const PetscReal hot = fe->thermal ? fe->thermal[e * el->nq + q] : 0;
+      const Point to = PointAt(fe, state, e, q);
+      PetscReal *g = HycoKeptGradients(fe, el, e, q), strain[6];
+
+      HycoPointStrain(fe, el, e, u, (PetscReal(*)[3])g, fe->bbar[body] ? mean : NULL, strain);
+      for (PetscInt c = 0; c < 3; c++) strain[c] -= hot;
+      HycoTangentApply((PetscBool)(size == 2), fe->dim, C, strain, to.stress);
+      *to.stored = 0;
+      for (PetscInt c = 0; c < ns; c++) *to.stored += to.stress[c] * strain[c] / 2;
+      *stored += g[3 * el->nv] * *to.stored;
+    }
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -607,7 +639,10 @@ PetscErrorCode HycoFEStateFields(HycoFE fe, HycoFEState state, PetscReal sigma[]
       const Point p = PointAt(fe, state, e, q);
       PetscReal g[HYCO_CELL_NODES][3], w;
 
-      PetscCall(HycoGradients(fe, el, e, q, g, &w));
+      if (HycoGradientsKept(fe))
+        w = HycoKeptGradients(fe, el, e, q)[3 * el->nv];
+      else
+        PetscCall(HycoGradients(fe, el, e, q, g, &w));
       volume += w;
       for (PetscInt c = 0; c < ns; c++) sum[c] += w * p.stress[c];
       sum[6] += w * HycoMises(fe->dim, p.stress);

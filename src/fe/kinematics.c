@@ -34,8 +34,8 @@ PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, Pe
   PetscReal J[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, inv[3][3], det, size = 1;
 
   PetscFunctionBegin;
-  if (fe->kept && fe->kept_place == fe->place) {
-    const PetscReal *kept = fe->kept + (size_t)(cell * el->nq + q) * (size_t)(3 * el->nv + 1);
+  if (HycoGradientsKept(fe)) {
+    const PetscReal *kept = HycoKeptGradients(fe, el, cell, q);
 
     PetscCall(PetscArraycpy(&g[0][0], kept, 3 * el->nv));
     *weight = kept[3 * el->nv];
@@ -114,7 +114,7 @@ PetscErrorCode HycoFEKeepGradients(HycoFE fe)
   PetscReal *kept = fe->kept;
 
   PetscFunctionBegin;
-  if (kept && fe->kept_place == fe->place) PetscFunctionReturn(PETSC_SUCCESS);
+  if (HycoGradientsKept(fe)) PetscFunctionReturn(PETSC_SUCCESS);
   if (!kept) PetscCall(PetscMalloc1(n * size + 1, &kept));
   fe->kept = NULL; /* computed below */
   for (size_t k = 0; k < n; k++) {
@@ -235,7 +235,13 @@ void HycoPointStrain(HycoFE fe, const HycoElement *el, PetscInt cell, const Pets
   const PetscInt *node = m->cells + cell * m->nv;
   PetscReal h[3][3] = {{0}}, excess = 0;
 
-  for (PetscInt a = 0; a < el->nv; a++) {
+  for (PetscInt a = 0; a < el->nv && m->dim == 2; a++) {
+    const PetscReal *own = u + node[a] * 2;
+
+    for (PetscInt d = 0; d < 3; d++) h[0][d] += own[0] * g[a][d];
+    for (PetscInt d = 0; d < 3; d++) h[1][d] += own[1] * g[a][d];
+  }
+  for (PetscInt a = 0; a < el->nv && m->dim != 2; a++) {
     const PetscReal *own = u + node[a] * m->dim;
 
     for (PetscInt c = 0; c < m->dim; c++) {

@@ -13,10 +13,11 @@
 #include <hycopath.h>
 
 #define ARMIJO    1e-4
-#define SHORTENED 8    /* largest number of halvings of a step */
-#define WORTH     8    /* expected number of further iterations above which a new tangent is made (modified) */
-#define FEW       5    /* iterations of a step of elastic bodies with friction, beyond which only round-off is left */
-#define FORCING   1e-3 /* residual of a solve without a factor, as a share of that of the iterate */
+#define SHORTENED 8     /* largest number of halvings of a step */
+#define WORTH     8     /* expected number of further iterations above which a new tangent is made (modified) */
+#define FEW       5     /* iterations of a step of elastic bodies with friction, beyond which only round-off is left */
+#define NOTHING   1e-14 /* loads relative to K U: round-off */
+#define FORCING   1e-3  /* residual of a solve without a factor, as a share of that of the iterate */
 
 /* Data of the previous iteration. */
 typedef struct {
@@ -87,14 +88,19 @@ PetscErrorCode HycoPathMoves(HycoPath p, const PetscScalar u[], Vec work, PetscB
 }
 
 /* rhs = K U + F - f_int: the right-hand side of the contact system. r is F - f_int - B^T L on entry, so that B^T L
-   is added back. */
+   is added back. Where all loads vanish, their sum is round-off, which no contact forces of a floating body balance:
+   with friction it is 0 then. */
 static PetscErrorCode RightSide(HycoPath p)
 {
+  PetscReal before = 0, after = 1;
 
   PetscFunctionBegin;
   PetscCall(MatMult(p->K, p->U, p->rhs));
+  if (p->rubs) PetscCall(VecNorm(p->rhs, NORM_INFINITY, &before));
   PetscCall(VecAXPY(p->rhs, 1, p->r));
   if (p->n_contacts) PetscCall(MatMultAdd(p->Bt, p->Lambda, p->rhs, p->rhs));
+  if (p->rubs) PetscCall(VecNorm(p->rhs, NORM_INFINITY, &after));
+  if (after <= NOTHING * before) PetscCall(VecSet(p->rhs, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

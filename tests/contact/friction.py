@@ -41,6 +41,14 @@ contact: {plane: {group: base, normal: {x: "sin(0.3)", y: "-cos(0.3)"}, gap: 0, 
 history: {times: [0, 1, 2]}
 output: {N: {force: y, contact: plane}, T: {friction: x, contact: plane}}
 """
+UNLOADED = """
+scene: {mesh: mesh.msh}
+body: {block: {young: 1e4, poisson: 0.3}}
+traction: {top: {x: "h", y: "-v"}}
+contact: {plane: {group: base, normal: {y: -1}, gap: "GAP", friction: 0.5}}
+history: {times: [0, 1, 2, 3, 4, 5], tables: {v: [[0, 0], [1, 2], [2, 2], [3, 1], [4, 0], [5, 2]], h: [[1, 0], [2, 0.2], [3, -0.1], [4, 0]]}}
+output: {N: {force: y, contact: plane}, T: {friction: x, contact: plane}}
+"""
 RING = """
 scene: {mesh: mesh.msh, formulation: axisymmetric}
 body: {ring: {young: 1000, poisson: 0.3}}
@@ -117,6 +125,17 @@ class Friction(Case):
         self.assertEqual(run.returncode, 1)
         self.assertIn('with this friction', run.stderr)
         self.assertIn('body block', run.stderr)
+
+    def test_unloaded(self):
+        """The block that friction holds, with its load taken away and applied again: no forces at the time without a load."""
+        grid = Grid()
+        grid.box('quad4', [np.linspace(0, 2, 9), np.linspace(0, 1, 5)], lambda x: x, 'block', {'y0': 'base', 'y1': 'top'})
+        grid.write(self.path('mesh.msh'))
+        for gap in ('0', '0.001*(x - 1)^2'):
+            rows = self.rows(self.changed('scene.yaml', UNLOADED.replace('GAP', gap), ()))
+            for row, normal, tangential in zip(rows, (0, 4, 4, 2, 0, 4), (0, 0, -0.4, 0.2, 0, 0)):
+                self.assertLess(abs(row['N'] - normal), 1e-8)
+                self.assertLess(abs(row['T'] - tangential), 1e-8)
 
     def test_ring(self):
         """A ring in a bore that is too small, pushed along it: the resultant is mu times the radial force, and balances the support's."""

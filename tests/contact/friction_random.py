@@ -122,6 +122,14 @@ class Random(Case):
             self.law(self.path('out.h5'), mu, dim, where)
         return True
 
+    def test_hard(self):
+        """Boxes near the limit of friction, which statics places after t = 1 (N and T of the highest box): not refused before."""
+        for seed, limit in ((3056, 1.36), (1026, 1.82)):
+            with self.subTest(seed=seed):
+                self.one(seed)
+                with open(self.path('t.csv'), encoding='ascii', newline='') as file:
+                    self.assertGreater(max(float(row['t']) for row in csv.DictReader(file)), limit)
+
     def test_scenes(self):
         """Solved or refused by name; the law, computed again; more than half of them are solved, and some slip."""
         solved = 0

@@ -86,6 +86,12 @@ class Docs(unittest.TestCase):
         """The README is short."""
         self.assertLessEqual(text('README.md').count('\n'), 90)
 
+    def test_words(self):
+        """All documents together have at most 40,000 words, not counting what separates the cells of tables."""
+        others = [os.path.join(SOURCE, name) for name in ('CHANGELOG.md', 'CONTRIBUTING.md', 'extensions/README.md', 'examples/ladder/README.md')]
+        words = {path: sum(bool(re.search(r'\w', word)) for word in text(path).split()) for path in [*PAGES, *others]}
+        self.assertLessEqual(sum(words.values()), 40000, words)
+
 
 if __name__ == '__main__':
     unittest.main()

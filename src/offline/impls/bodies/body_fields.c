@@ -12,7 +12,9 @@
 #define LEAST        20   /* samples */
 #define MOST_COLUMNS 600  /* of training paths */
 #define FULL         0.5  /* modes for each sample: with more of them the samples do not show all displacements */
-#define DOUBLINGS    4    /* of the samples then */
+#define DOUBLINGS    4    /* of the samples then, */
+#define MISSED       2e-4 /* or, at most UNTIL_SEEN times, while the modes miss this share of the displacements at a */
+#define UNTIL_SEEN   2    /* check: the estimate of u is then above what the search takes as accurate enough */
 #define SPREAD       3    /* nodes of theta at which the displacements of each are computed */
 #define SMALL        1e-7 /* of the largest sample: smaller ones count as much as this */
 #define SCORED       24   /* displacements at all nodes of theta whose stresses show which cells matter */
@@ -783,10 +785,16 @@ static PetscErrorCode FindInMesh(HycoReducer t, HycoBodiesFactor *factor)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The modes of `wanted` samples; *enough: the samples are many more than the modes of any body, or there is no room for
-   more. Collective. */
-static PetscErrorCode ModesOf(HycoReducer t, HycoBodiesFactor *factor, PetscInt wanted, Sampled *sampled, Mat *V,
-                              PetscReal **sigma, PetscBool *enough)
+/* What modes may miss at a check; a tolerance of the user's that leaves out more is no reason for more samples. */
+static PetscReal Missed(HycoReducer t)
+{
+  return PetscMax(MISSED, 10 * PetscSqrtReal(HycoTrainingOfBodies(t)->pod_tol));
+}
+
+/* The modes of `wanted` samples, the number `doubled` of doublings; *enough: the samples are many more than the modes of
+   any body, which miss little at the checks, or there is no room for more. Collective. */
+static PetscErrorCode ModesOf(HycoReducer t, HycoBodiesFactor *factor, PetscInt wanted, PetscInt doubled,
+                              Sampled *sampled, Mat *V, PetscReal **sigma, PetscBool *enough)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   PetscBool all;
@@ -797,10 +805,12 @@ static PetscErrorCode ModesOf(HycoReducer t, HycoBodiesFactor *factor, PetscInt 
   if (!HycoBodiesFlow(t)) PetscCall(HycoBodiesChooseCells(t, factor)); /* else those with laws are chosen */
   PetscCall(PetscFree(b->mode_start));
   PetscCall(FindModes(t, factor, sampled->n_U, sampled->U, V, sigma));
+  if (!t->scene->n_times) PetscCall(MeasureLeft(t, factor, sampled, *V));
   *enough = PETSC_TRUE;
   for (PetscInt k = 0; k < b->n; k++)
     *enough = (PetscBool)(*enough && b->mode_start[k + 1] - b->mode_start[k] <= FULL * sampled->expanded);
   HycoTrainingOfBodies(t)->filled = (PetscBool) !*enough;
+  if (sampled->n_checks && doubled < UNTIL_SEEN) *enough = (PetscBool)(*enough && b->left <= Missed(t));
   *enough = (PetscBool)(*enough || !all);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -829,9 +839,8 @@ PetscErrorCode HycoBodiesFields(HycoReducer t, HycoSnapshots store, HycoBodiesFa
   for (PetscInt n = HycoTrainingOfBodies(t)->samples, k = 0; !ierr && !enough && k <= DOUBLINGS; n *= 2, k++) {
     PetscCall(MatDestroy(&V));
     PetscCall(PetscFree(sigma));
-    ierr = ModesOf(t, factor, n, &sampled, &V, &sigma, &enough);
+    ierr = ModesOf(t, factor, n, k, &sampled, &V, &sigma, &enough);
   }
-  if (!ierr && !t->scene->n_times) ierr = MeasureLeft(t, factor, &sampled, V);
   HycoFreeAll(&sampled.c, &sampled.f, &sampled.U);
   PetscCall(ierr);
   PetscCall(Coefficients(t, factor, V));

@@ -204,7 +204,7 @@ static PetscErrorCode Record(HycoPath p)
   HycoROM m = (HycoROM)p->ctx;
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   const PetscScalar *alpha, *L;
-  HycoFEStepReport report;
+  PetscReal stored;
 
   PetscFunctionBegin;
   PetscCall(VecGetArrayRead(p->Lambda, &L));
@@ -219,9 +219,8 @@ static PetscErrorCode Record(HycoPath p)
   PetscCall(VecGetArrayRead(p->U, &alpha));
   w->misfit = PetscMax(w->misfit, Misfit(m, alpha));
   PetscCall(VecRestoreArrayRead(p->U, &alpha));
-  PetscCall(HycoFEStepBodies(m->fe, HYCO_BODIES_LINEAR, m->U, p->t, p->t, p->end, p->begin, p->f_local, PETSC_FALSE,
-                             &report));
-  p->now.stored += report.stored;
+  PetscCall(HycoFELinearStress(m->fe, m->U, p->begin, &stored));
+  p->now.stored += stored;
   PetscCall(HycoTraceRecord(m, p->begin, &p->now));
   if (w->friction) PetscCall(RecordFriction(m, &p->now));
   p->steps[p->n_steps++] = p->now;
