@@ -51,13 +51,12 @@ static PetscErrorCode Add(HycoScene s, const char key[], const char text[], cons
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a text was taken, or is a parameter's name. */
-static PetscBool Known(HycoScene s, const char text[], PetscInt n, const HycoAtom atom[])
+/* Whether a text was taken. */
+static PetscBool Known(const char text[], PetscInt n, const HycoAtom atom[])
 {
   for (PetscInt k = 0; k < n; k++) {
     if (!strcmp(atom[k].text, text)) return PETSC_TRUE;
   }
-  (void)s;
   return PETSC_FALSE;
 }
 
@@ -72,7 +71,7 @@ PetscErrorCode HycoAtomsFind(HycoScene s, PetscInt n, const PetscReal x[], Petsc
   for (PetscInt p = 0; p < s->n_parameters; p++) PetscCall(Add(s, s->parameter[p], s->parameter[p], x, n_atoms, atom));
   for (PetscInt k = 0; k < s->n_entries; k++) {
     if (!strncmp(s->key[k], "output_", 7) || !strncmp(s->key[k], "scene_", 6) || !strncmp(s->key[k], "constant_", 9) ||
-        Known(s, s->value[k], *n_atoms, *atom))
+        Known(s->value[k], *n_atoms, *atom))
       continue;
     PetscCall(HycoTranslate(s, s->value[k], x, s->lo, &value, NULL, &valid, &uses, &space));
     for (PetscInt i = 0; valid && uses && i < (space ? n : 1); i++)

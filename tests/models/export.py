@@ -37,7 +37,7 @@ output:
 PAD = ("""
 scene: {title: a pad on two plates, mesh: drawn_pad.msh, parameters: [press, lift, soft, weight]}
 parameter: {press: {range: [0.01, 0.05]}, lift: {range: [0, 0.02]}, soft: {range: [1, 2]}, weight: {range: [0, 1]}}
-constant: {pressure: 0.5*weight^2}
+constant: {half: 4^-2^-1, pressure: "min(half, half*weight^2, 2) - -2^2*1e-2*(weight > 0.5 && rint(weight) == 1 ? exp(-weight) : log10(1 + weight))"}
 body:
   plate: {young: "soft < 1.5 ? 500*soft : 10^(soft + 1)", poisson: 0.3}
   pad: {young: 100, poisson: 0.3}

@@ -38,18 +38,16 @@ typedef struct {
 
 /* Arrays in the caller's memory. */
 typedef struct {
-  double *f, *q, *w, *z, *value; /* functions; n_motions + n_contacts; values */
-  double *W, *A, *L, *V, *S, *b, *last,
-      *y;                     /* L: factor of W on the closed contacts; V = L^-1 A^T; S: factor of V^T V */
-  int *closed, *at, n_closed; /* by contact; the closed ones */
+  double *f, *q, *w, *z, *value;        /* functions; n_motions + n_contacts; values */
+  double *W, *A, *L, *V, *S, *last, *y; /* L: factor of W on the closed contacts; V = L^-1 A^T; S: factor of V^T V */
+  int *closed, *at, n_closed;           /* by contact; the closed ones */
 } Work;
 
 static size_t work_doubles(const Model *m)
 {
   const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts;
 
-  return (size_t)m->n_functions + (size_t)m->n_values + 3 * (p + n) + n * (n + 1) / 2 + n * n + 2 * p * n + p * p +
-         2 * p + n;
+  return (size_t)m->n_functions + (size_t)m->n_values + 4 * (p + n) + n * (n + 1) / 2 + n * n + 2 * p * n + p * p + n;
 }
 
 static size_t work_size(const Model *m)
@@ -80,19 +78,23 @@ static void place(const Model *m, void *memory, Work *o)
   o->L = take(&next, n * n);
   o->V = take(&next, p * n);
   o->S = take(&next, p * p);
-  o->b = take(&next, p);
-  o->last = take(&next, p);
+  o->last = take(&next, p + n);
   o->y = take(&next, n);
   o->closed = (int *)(void *)next;
   o->at = o->closed + n;
 }
 
+/* Four sums, which a compiler may add side by side. */
 static double dot(size_t n, const double a[], const double b[])
 {
-  double sum = 0;
+  double s[4] = {0, 0, 0, 0};
+  size_t i = 0;
 
-  for (size_t i = 0; i < n; i++) sum += a[i] * b[i];
-  return sum;
+  for (; i + 4 <= n; i += 4) {
+    for (size_t k = 0; k < 4; k++) s[k] += a[i + k] * b[i + k];
+  }
+  for (; i < n; i++) s[0] += a[i] * b[i];
+  return s[0] + s[1] + (s[2] + s[3]);
 }
 
 /* W between two contacts. */
@@ -152,9 +154,9 @@ static void backward(size_t n, const double a[], double x[])
   }
 }
 
-/* z with the closed contacts at gap 0 and the others without force; epsilon: of epsilon (x - last) added to w_x.
-   Returns 0 if the closed contacts do not hold the bodies. */
-static int solve_set(const Model *m, Work *o, double epsilon)
+/* z with the closed contacts at gap 0 and the others without force; epsilon, delta: of epsilon (x - last) added to w_x, and
+   delta (L - last) to w_L. Returns 0 if the closed contacts do not hold the bodies. */
+static int solve_set(const Model *m, Work *o, double epsilon, double delta)
 {
   const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts;
   double *x = o->z, *L = o->z + p;
@@ -171,7 +173,8 @@ static int solve_set(const Model *m, Work *o, double epsilon)
 
     for (size_t j = 0; j <= i; j++) o->L[i * k + j] = entry(o->W, a, (size_t)o->at[j]);
     for (size_t j = 0; j < p; j++) o->V[j * k + i] = o->A[j * n + a];
-    o->y[i] = -o->q[p + a];
+    o->L[i * k + i] += delta;
+    o->y[i] = delta * o->last[p + a] - o->q[p + a];
   }
   factorise(k, o->L);
   forward(k, o->L, o->y);
@@ -232,13 +235,13 @@ static int change(const Model *m, Work *o, double gap, double force, int one)
 
 /* The active set method, from the present set; after a number of iterations it changes one contact at a time (Murty's rule),
    which ends. Returns 0 if it does not, or if the contacts do not hold the bodies. */
-static int search(const Model *m, Work *o, double epsilon, int *iterations)
+static int search(const Model *m, Work *o, double epsilon, double delta, int *iterations)
 {
   double gap, force;
 
   for (int i = 0; i < 100 + 20 * m->n_contacts; i++) {
     ++*iterations;
-    if (!solve_set(m, o, epsilon)) return 0;
+    if (!solve_set(m, o, epsilon, delta)) return 0;
     residual(m, o, &gap, &force);
     if (!change(m, o, gap, force, i >= 40)) return 1;
   }
@@ -248,33 +251,7 @@ static int search(const Model *m, Work *o, double epsilon, int *iterations)
 static void start(const Model *m, Work *o)
 {
   for (int i = 0; i < m->n_contacts; i++) o->closed[i] = m->n_motions > 0 || o->q[i] < 0;
-  for (int i = 0; i < m->n_motions; i++) o->last[i] = 0;
-}
-
-/* Bodies that the sets of the search let go: the same with a small stiffness towards the last motions, which vanishes
-   as these converge. */
-static int search_held(const Model *m, Work *o, int *iterations)
-{
-  const size_t p = (size_t)m->n_motions;
-  double epsilon = 0;
-
-  start(m, o);
-  solve_set(m, o, 1);
-  for (size_t i = 0; i < p; i++)
-    epsilon =
-        fmax(epsilon, 1e-6 * dot((size_t)o->n_closed, o->V + i * (size_t)o->n_closed, o->V + i * (size_t)o->n_closed));
-  for (int i = 0; i < 60; i++) {
-    double moved = 0, size = 0;
-
-    if (!search(m, o, epsilon, iterations)) return 0;
-    for (size_t j = 0; j < p; j++) {
-      moved = fmax(moved, fabs(o->z[j] - o->last[j]));
-      size = fmax(size, fabs(o->z[j]));
-      o->last[j] = o->z[j];
-    }
-    if (moved <= 1e-13 * size) return 1;
-  }
-  return 0;
+  for (int i = 0; i < m->n_motions + m->n_contacts; i++) o->last[i] = 0;
 }
 
 /* The largest KKT residual of z, recomputed from q, A and W, relative as in the library. */
@@ -283,7 +260,10 @@ static double kkt_residual(const Model *m, Work *o)
   const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts;
   double gap, force, most = 0;
 
-  for (size_t i = 0; i < n; i++) o->z[p + i] = o->closed[i] ? fmax(o->z[p + i], 0) : 0;
+  residual(m, o, &gap, &force);
+  for (size_t i = 0; i < n; i++) { /* forces that move no gap by more than round-off are 0, as without loads */
+    if (!o->closed[i] || o->z[p + i] * entry(o->W, i, i) <= 1e-15 * gap) o->z[p + i] = 0;
+  }
   residual(m, o, &gap, &force);
   for (size_t i = 0; i < p; i++) {
     double size = fabs(o->q[i]);
@@ -296,6 +276,24 @@ static double kkt_residual(const Model *m, Work *o)
     if (force > 0) most = fmax(most, fabs(o->w[i] / gap * (o->z[i] / force)));
   }
   return most;
+}
+
+/* Where sets of the search let bodies go, or contacts depend on each other: the same with a small stiffness towards the last
+   motions and forces, which vanishes as these converge. Returns the KKT residual. */
+static double search_held(const Model *m, Work *o, int *iterations)
+{
+  const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts;
+  double epsilon = 0, delta = 0, kkt = HUGE_VAL;
+
+  for (size_t i = 0; i < n; i++) delta = fmax(delta, 1e-8 * entry(o->W, i, i));
+  for (size_t i = 0; i < p * n; i++) epsilon = fmax(epsilon, 1e-2 * o->A[i] * o->A[i] * (1e-8 / delta));
+  start(m, o);
+  for (int i = 0; i < 40 && kkt > 1e-13; i++) {
+    if (!search(m, o, epsilon, delta, iterations)) return kkt_residual(m, o);
+    kkt = kkt_residual(m, o);
+    memcpy(o->last, o->z, (p + n) * sizeof(double));
+  }
+  return kkt;
 }
 
 /* -- outputs -- */
@@ -374,20 +372,18 @@ static double output(const Model *m, const Work *o, const Output *q, double leas
   return sum == HUGE_VAL ? 0 : sum;
 }
 
-/* The prediction for the functions' values in o->f. */
+/* The prediction for the functions' values in o->f. Residuals say whether it is solved. */
 static int predict(const Model *m, Work *o, double out[], double *kkt, int *iterations)
 {
   double least = 0;
-  int solved;
 
   *iterations = 0;
   assemble(m, o);
   start(m, o);
-  solved = search(m, o, 0, iterations);
-  if (!solved && m->n_motions) solved = search_held(m, o, iterations);
-  *kkt = kkt_residual(m, o);
+  *kkt = search(m, o, 0, 0, iterations) ? kkt_residual(m, o) : HUGE_VAL;
+  if (*kkt > m->tolerance) *kkt = search_held(m, o, iterations);
   for (int i = 0; i < m->n_contacts; i++) least = fmax(least, 1e-10 * o->z[m->n_motions + i]);
   evaluate(m, o);
   for (int i = 0; i < m->n_outputs; i++) out[i] = output(m, o, &m->output[i], least);
-  return solved && *kkt <= m->tolerance ? OK : DIVERGED;
+  return *kkt <= m->tolerance ? OK : DIVERGED;
 }
