@@ -194,6 +194,10 @@ PetscErrorCode HycoBodiesKeepRows(HycoBodiesWork work, PetscInt m);
 PetscErrorCode HycoBodiesForgetKept(HycoBodiesWork work);
 /* If the rows are the last ones: P and W of n contacts, unless they need too much memory (kept.same is false then). */
 PetscErrorCode HycoBodiesKeep(HycoBodiesWork work, PetscInt n, const PetscInt contact[]);
+/* to[n] = the sum over the samples of body k, `stride` apart, with its weights and without kappa: always in the same
+   order, so that products that are kept give the same bits as those that are not. */
+void HycoBodiesBlend(HycoBodiesWork work, PetscInt k, PetscInt n, size_t stride, const PetscReal from[],
+                     PetscReal to[]);
 /* row[n]: of the matrix W at the present parameters, contact k with n contacts; u -= C B^T Lambda. */
 void HycoBodiesKeptRow(HycoBodiesWork work, PetscInt k, PetscInt n, const PetscInt contact[], PetscReal row[]);
 PetscErrorCode HycoBodiesKeptDisplace(HycoBodiesWork work, PetscInt m, const PetscReal Lambda[], PetscReal u[]);

@@ -567,8 +567,9 @@ PetscErrorCode HycoBodiesReleaseFactor(HycoBodiesFactor *factor)
   for (PetscInt k = 0; k < factor->n; k++) PetscCall(ReleaseBody(&factor->body[k]));
   for (PetscInt k = 0; k < factor->n_basis; k++) PetscCall(VecDestroy(&factor->basis[k]));
   for (PetscInt k = 0; k < factor->n_strains; k++) PetscCall(VecDestroy(&factor->strain[k]));
-  HycoFreeAll(&factor->body, &factor->owner, &factor->basis, &factor->theta, &factor->between, &factor->pins,
-              &factor->score, &factor->moved, &factor->known, &factor->bare, &factor->in_mesh, &factor->row);
+  HycoFreeAll(&factor->body, &factor->owner, &factor->basis, &factor->strain, &factor->theta, &factor->between,
+              &factor->pins, &factor->score, &factor->moved, &factor->known, &factor->bare, &factor->in_mesh,
+              &factor->row);
   PetscCall(HycoFOMDestroy(&factor->fom));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

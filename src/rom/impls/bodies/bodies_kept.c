@@ -127,12 +127,13 @@ void HycoBodiesKeptRow(HycoBodiesWork o, PetscInt k, PetscInt n, const PetscInt 
 
   for (PetscInt i = 0; i < n; i++) row[i] = 0;
   for (PetscInt j = 0; j < b->n; j++) {
-    const PetscReal *W = o->kept.W[k * b->n + j];
+    const PetscReal *W = o->kept.W[k * b->n + j], scale = 1 / o->kappa[j];
 
-    for (PetscInt s = 0; W && s < b->body[j].n_samples; s++, W += o->kept.m) {
-      const PetscReal weight = o->weight[j][s] / o->kappa[j];
+    for (PetscInt i = 0; W && i < n; i++) {
+      PetscReal blended;
 
-      for (PetscInt i = 0; i < n; i++) row[i] += weight * W[contact[i]];
+      HycoBodiesBlend(o, j, 1, (size_t)o->kept.m, W + contact[i], &blended);
+      row[i] += scale * blended;
     }
   }
 }
@@ -145,18 +146,19 @@ PetscErrorCode HycoBodiesKeptDisplace(HycoBodiesWork o, PetscInt m, const PetscR
   PetscFunctionBegin;
   for (PetscInt j = 0; j < b->n; j++) {
     const HycoSubstructure *own = &b->body[j];
+    PetscReal *blended;
     PetscBLASInt size;
 
     PetscCall(PetscBLASIntCast(own->n, &size));
+    PetscCall(PetscMalloc1(own->n + 1, &blended));
     for (PetscInt k = 0; k < m; k++) {
-      const PetscReal *P = o->kept.P[k * b->n + j];
+      const PetscReal *P = o->kept.P[k * b->n + j], force = -Lambda[k] / o->kappa[j];
 
-      for (PetscInt s = 0; s < own->n_samples && P && Lambda[k] != 0; s++, P += own->n) {
-        const PetscReal force = -Lambda[k] * o->weight[j][s] / o->kappa[j];
-
-        BLASaxpy_(&size, &force, P, &one, u + b->start[j], &one);
-      }
+      if (!P || Lambda[k] == 0) continue;
+      HycoBodiesBlend(o, j, own->n, (size_t)own->n, P, blended);
+      BLASaxpy_(&size, &force, blended, &one, u + b->start[j], &one);
     }
+    PetscCall(PetscFree(blended));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

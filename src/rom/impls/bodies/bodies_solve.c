@@ -382,6 +382,16 @@ static PetscErrorCode TakeWeights(HycoBodiesWork o, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+void HycoBodiesBlend(HycoBodiesWork o, PetscInt k, PetscInt n, size_t stride, const PetscReal from[], PetscReal to[])
+{
+  for (PetscInt i = 0; i < n; i++) to[i] = o->weight[k][0] * from[i];
+  for (PetscInt q = 1; q < o->bodies->body[k].n_samples; q++) {
+    const PetscReal weight = o->weight[k][q], *sample = from + (size_t)q * stride;
+
+    for (PetscInt i = 0; i < n; i++) to[i] += weight * sample[i];
+  }
+}
+
 /* The column of an unknown of body k in its flexibility, without kappa; made when it is needed for the first time. */
 static PetscErrorCode GetColumn(HycoBodiesWork o, PetscInt k, PetscInt unknown, const PetscReal **column)
 {
@@ -394,11 +404,7 @@ static PetscErrorCode GetColumn(HycoBodiesWork o, PetscInt k, PetscInt unknown, 
   if (own->n_samples == 1) PetscFunctionReturn(PETSC_SUCCESS);
   if (!o->blend[k]) PetscCall(PetscMalloc1(n * n, &o->blend[k]));
   if (!*there) {
-    const PetscBLASInt rows = (PetscBLASInt)n, samples = (PetscBLASInt)own->n_samples, apart = (PetscBLASInt)(n * n),
-                       each = 1;
-    const PetscReal one = 1, zero = 0;
-
-    BLASgemv_("N", &rows, &samples, &one, own->C + at, &apart, o->weight[k], &each, &zero, o->blend[k] + at, &each);
+    HycoBodiesBlend(o, k, own->n, n * n, own->C + at, o->blend[k] + at);
     *there = PETSC_TRUE;
   }
   *column = o->blend[k] + at;
@@ -442,6 +448,7 @@ static PetscErrorCode Gather(HycoBodiesWork o, Problem *p)
   p->first[0] = 0;
   for (PetscInt k = 0, i = 0; k < b->n; k++) {
     const PetscInt lo = b->start[k];
+    const PetscReal scale = 1 / o->kappa[k];
     PetscReal *to;
 
     while (i < p->n_place && p->place[i] < b->start[k + 1]) i++;
@@ -452,7 +459,7 @@ static PetscErrorCode Gather(HycoBodiesWork o, Problem *p)
       const PetscReal *column;
 
       PetscCall(GetColumn(o, k, p->place[j] - lo, &column));
-      for (PetscInt d = p->first[k]; d < i; d++) *to++ = column[p->place[d] - lo] / o->kappa[k];
+      for (PetscInt d = p->first[k]; d < i; d++) *to++ = scale * column[p->place[d] - lo];
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
