@@ -11,6 +11,7 @@
 
 #define MOST    64   /* parameters */
 #define EXACT   1e-9 /* a misfit below it is round-off */
+#define UNMET   1e-3 /* a misfit above it means that the targets are not met */
 #define MINIMUM 1e-5 /* of the slope of the misfit, relative to what the derivatives allow */
 #define WEIGHT  1e-6 /* of the regularisation of Gauss-Newton steps: for targets that do not determine all parameters */
 
@@ -439,6 +440,9 @@ static PetscErrorCode Report(Fit *f, const PetscReal mu[], const PetscReal full[
     PetscCall(DriverPrint("%s is at the end of its range\n", names[p]));
   }
   PetscCall(DriverPrint("%d predictions (%s)\n", (int)f->evaluations, method));
+  if (minimum && Size(f->n, f->r) > UNMET * PetscSqrtReal((PetscReal)f->n))
+    PetscCall(DriverPrint("the targets are not met; the misfit may have lower minima elsewhere: other starts (-mu, "
+                          "-fit_starts) may find them\n"));
   if (!minimum)
     PetscCall(DriverMissed("the fit ended%s, where the misfit %.2g is no minimum by its slope; start elsewhere (-mu, "
                            "-fit_starts)",

@@ -45,6 +45,7 @@ class Fit(Case):
         self.assertEqual((r['mu']['press'], r['mu']['modulus']), (1, 20))
         self.near(r['misfit_model'], 1 - r['targets']['lift']['model'] / 100, 1e-6)
         self.assertNotIn('misfit_full_order', r)
+        self.assertIn('the targets are not met', self.run_raw('fit', '-model', 'm.h5', '-target_lift', '100').stdout)
 
     def test_refused(self):
         """One line that names what is wrong, and no report."""
