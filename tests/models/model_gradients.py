@@ -73,7 +73,10 @@ class ModelGradients(gradients.Gradients):
                 tables.append([{k: v for k, v in row.items() if k != 'seconds'} for row in csv.DictReader(f)])
         self.assertEqual(len(tables[0]), 7)
         self.assertIn('d_push_d_at', tables[0][0])
-        self.assertEqual(tables[0], tables[1])
+        for one, two in zip(*tables):
+            self.assertEqual(one.keys(), two.keys())
+            for key, value in one.items():  # derivatives that vanish are round-off
+                self.assertTrue(value == two[key] or abs(float(value) - float(two[key])) <= 1e-12 * max(1, abs(float(value))), key)
 
     def test_refused(self):
         """A type without gradients, and a prediction that full order may replace."""
