@@ -225,8 +225,9 @@ static PetscErrorCode AddQuantity(Export *e, PetscInt k)
 {
   const HycoQuantity *q = &e->s->quantity[k];
   const HycoQuantityKind kind = q->kind;
-  const char *field = kind < HYCO_QUANTITY_REACTION ? HycoQuantityFields[q->field] : "";
-  const PetscBool linear = (PetscBool)(!strncmp(field, "u_", 2) || !strncmp(field, "sigma_", 6));
+  const PetscBool of_field = (PetscBool)(kind < HYCO_QUANTITY_REACTION);
+  const char *field = HycoQuantityFields[of_field ? q->field : 0];
+  const PetscBool linear = (PetscBool)(of_field && (!strncmp(field, "u_", 2) || !strncmp(field, "sigma_", 6)));
   Output o = {.kind = SUM, .of = COMPONENT, .width = 1, .weight = -1};
   PetscInt contact = -1;
 
