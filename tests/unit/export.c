@@ -57,6 +57,8 @@ static PetscErrorCode Solve(const Problem *o, int *status, double *kkt, double *
   int its;
 
   PetscFunctionBegin;
+  *status = DIVERGED;
+  *kkt = *error = 1;
   PetscCall(PetscMalloc1(work_size(&o->model), &memory));
   place(&o->model, memory, &work);
   work.f[0] = 1;
