@@ -63,13 +63,12 @@ static inline HycoBodiesTraining HycoTrainingOfBodies(HycoReducer t)
 
 /* A body's block of K and its factors, with the unknowns of its surfaces last. Every rank. */
 typedef struct {
-  PetscInt n_rows, *row; /* this rank's unknowns of the body, among all of this rank */
-  IS global;             /* the same in the distributed vectors */
-  Mat K, N;              /* its block; N selects the unknowns of the surfaces, NULL: none */
-  PetscInt p, *motion;   /* its rigid motions, by their numbers among all */
-  PetscInt *pin;         /* its isostatic supports: unknowns of the block */
-  HycoDirect direct;     /* the present factor, borrowed from: */
-  PetscInt now, n_kept;  /* now: which one */
+  IS global;            /* its unknowns on this rank, in the distributed vectors */
+  Mat K, N;             /* its block; N selects the unknowns of the surfaces, NULL: none */
+  PetscInt p, *motion;  /* its rigid motions, by their numbers among all */
+  PetscInt *pin;        /* its isostatic supports: unknowns of the block */
+  HycoDirect direct;    /* the present factor, borrowed from: */
+  PetscInt now, n_kept; /* now: which one */
   struct {
     HycoDirect direct;
     PetscReal *theta; /* NULL: not factored */
@@ -84,11 +83,11 @@ typedef struct {
   HycoFOM fom;
   PetscInt n, *owner; /* bodies; by node of this rank: its body */
   HycoBodyFactor *body;
-  PetscReal *theta;       /* present, and of the nodes */
-  PetscReal *between;     /* the last that was condensed to judge the samples */
-  PetscBool assembled;    /* K is there, too */
-  PetscInt n_condensed;   /* points */
-  PetscInt n_pins, *pins; /* of the first factor */
+  PetscReal *theta;     /* present, and of the nodes */
+  PetscReal *between;   /* the last that was condensed to judge the samples */
+  PetscBool assembled;  /* K is there, too */
+  PetscInt n_condensed; /* points */
+  PetscInt *pins;       /* of the first factor */
   PetscInt n_basis;
   Vec *basis; /* of the turned loads, orthonormal */
   PetscInt n_strains;

@@ -17,7 +17,7 @@ static PetscBool Same(PetscInt n, const PetscReal a[], const PetscReal b[])
 
 /* -- blocks -- */
 
-/* The unknowns of each body among those of this rank. */
+/* The unknowns of each body on this rank. */
 static PetscErrorCode TakeRows(HycoReducer t, HycoBodiesFactor *factor)
 {
   HycoMesh m = factor->fom->part;
@@ -28,15 +28,16 @@ static PetscErrorCode TakeRows(HycoReducer t, HycoBodiesFactor *factor)
   for (PetscInt i = 0; i < m->n_nodes; i++) {
     if (HycoMeshOwned(m, i) >= 0) factor->owner[HycoMeshOwned(m, i)] = HycoTrainingOfBodies(t)->parts.of[i];
   }
-  for (PetscInt i = 0; i < m->n_owned; i++) factor->body[factor->owner[i]].n_rows += dim;
   for (PetscInt k = 0; k < factor->n; k++) {
-    PetscCall(PetscMalloc1(factor->body[k].n_rows + 1, &factor->body[k].row));
-    factor->body[k].n_rows = 0;
-  }
-  for (PetscInt i = 0; i < m->n_owned * dim; i++) {
-    HycoBodyFactor *body = &factor->body[factor->owner[i / dim]];
+    PetscInt *global, n = 0;
 
-    body->row[body->n_rows++] = i;
+    PetscCall(PetscMalloc1(m->n_owned * dim + 1, &global));
+    for (PetscInt i = 0; i < m->n_owned * dim; i++) {
+      if (factor->owner[i / dim] == k) global[n++] = m->first * dim + i;
+    }
+    PetscCall(ISCreateGeneral(HycoComm(t), n, global, PETSC_COPY_VALUES, &factor->body[k].global));
+    PetscCall(ISSetBlockSize(factor->body[k].global, dim)); /* its matrix is ordered by node */
+    PetscCall(PetscFree(global));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -44,7 +45,6 @@ static PetscErrorCode TakeRows(HycoReducer t, HycoBodiesFactor *factor)
 PetscErrorCode HycoBodiesSplit(HycoReducer t, Mat N, HycoBodiesFactor *factor)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
-  const PetscInt first = factor->fom->part->first * b->dim;
   PetscInt lo, hi;
 
   PetscFunctionBegin;
@@ -55,13 +55,8 @@ PetscErrorCode HycoBodiesSplit(HycoReducer t, Mat N, HycoBodiesFactor *factor)
   for (PetscInt k = 0; k < b->n; k++) {
     HycoBodyFactor *body = &factor->body[k];
     const PetscInt begin = PetscMax(lo, b->start[k]), end = PetscMin(hi, b->start[k + 1]);
-    PetscInt *global;
     IS surface;
 
-    PetscCall(PetscMalloc1(body->n_rows, &global));
-    for (PetscInt i = 0; i < body->n_rows; i++) global[i] = first + body->row[i];
-    PetscCall(ISCreateGeneral(HycoComm(t), body->n_rows, global, PETSC_OWN_POINTER, &body->global));
-    PetscCall(ISSetBlockSize(body->global, b->dim)); /* its matrix is ordered by node */
     if (b->start[k] == b->start[k + 1]) continue;
     PetscCall(ISCreateStride(HycoComm(t), PetscMax(end - begin, 0), begin, 1, &surface));
     PetscCall(MatCreateSubMatrix(N, surface, body->global, MAT_INITIAL_MATRIX, &body->N));
@@ -347,35 +342,6 @@ static PetscErrorCode FindLoaded(HycoSubstructures b, HycoBodiesFactor *factor, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Between a vector of all unknowns and one of a body. */
-static PetscErrorCode Restrict(const HycoBodyFactor *body, Vec all, Vec own)
-{
-  const PetscScalar *a;
-  PetscScalar *v;
-
-  PetscFunctionBegin;
-  PetscCall(VecGetArrayRead(all, &a));
-  PetscCall(VecGetArrayWrite(own, &v));
-  for (PetscInt i = 0; i < body->n_rows; i++) v[i] = a[body->row[i]];
-  PetscCall(VecRestoreArrayWrite(own, &v));
-  PetscCall(VecRestoreArrayRead(all, &a));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode Prolong(const HycoBodyFactor *body, Vec own, Vec all)
-{
-  const PetscScalar *v;
-  PetscScalar *a;
-
-  PetscFunctionBegin;
-  PetscCall(VecGetArray(all, &a));
-  PetscCall(VecGetArrayRead(own, &v));
-  for (PetscInt i = 0; i < body->n_rows; i++) a[body->row[i]] = v[i];
-  PetscCall(VecRestoreArrayRead(own, &v));
-  PetscCall(VecRestoreArray(all, &a));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The loads of a body: *many of n, number[many], restricted to it in v[many]. Collective. */
 static PetscErrorCode TakeLoaded(const HycoBodyFactor *body, PetscInt n, const Vec F[], const PetscBool in[],
                                  PetscInt *many, PetscInt **number, Vec **v)
@@ -393,7 +359,7 @@ static PetscErrorCode TakeLoaded(const HycoBodyFactor *body, PetscInt n, const V
   PetscCall(MatCreateVecs(body->K, &first, NULL));
   PetscCall(VecDuplicateVecs(first, *many, v));
   PetscCall(VecDestroy(&first));
-  for (PetscInt j = 0; j < *many; j++) PetscCall(Restrict(body, F[(*number)[j]], (*v)[j]));
+  for (PetscInt j = 0; j < *many; j++) PetscCall(VecISCopy(F[(*number)[j]], body->global, SCATTER_REVERSE, (*v)[j]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -459,7 +425,7 @@ static PetscErrorCode ExtendBody(HycoSubstructures b, HycoBodiesFactor *factor, 
     PetscCall(PetscArraycpy(own + body->p, all + b->p + b->start[k], b->body[k].n));
   }
   PetscCall(HycoDirectExpandMany(body->direct, many, v, q, v));
-  for (PetscInt j = 0; j < many; j++) PetscCall(Prolong(body, v[j], x[number[j]]));
+  for (PetscInt j = 0; j < many; j++) PetscCall(VecISCopy(x[number[j]], body->global, SCATTER_FORWARD, v[j]));
   PetscCall(PetscFree(q));
   PetscCall(VecDestroyVecs(many, &v));
   PetscCall(PetscFree(number));
@@ -553,7 +519,7 @@ static PetscErrorCode ReleaseBody(HycoBodyFactor *body)
 
     HycoFreeAll(&r->theta, &r->C, &r->R, &r->Z, &r->work);
   }
-  HycoFreeAll(&body->kept, &body->record, &body->row);
+  HycoFreeAll(&body->kept, &body->record);
   PetscCall(PetscFree2(body->motion, body->pin));
   PetscCall(ISDestroy(&body->global));
   PetscCall(MatDestroy(&body->K));
