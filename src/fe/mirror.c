@@ -34,6 +34,7 @@ PetscErrorCode HycoMirrorCreate(HycoFE fe)
 static PetscErrorCode MapTurns(HycoFE fe, PetscInt body, PetscBool *turns)
 {
   HycoMesh m = fe->mesh;
+  /* The sign alone is wanted: an error of the difference does not matter. */
   const PetscReal step = 1e-5 * HycoMeshLength(m);
   PetscReal sum = 0;
   PetscInt n = 0;
@@ -120,6 +121,7 @@ PetscErrorCode HycoMirrorFind(HycoFE fe)
   for (PetscInt b = 0; b < fe->scene->n_bodies && !ierr; b++) {
     HycoExpr *map = fe->scene->body[b].map;
 
+    /* turn = 0: no cell here. */
     fe->mirrored[b] = (PetscBool)(turn[b] < 0);
     if (!turn[b] && (map[0] || map[1] || map[2])) ierr = MapTurns(fe, b, &fe->mirrored[b]);
   }
