@@ -50,6 +50,7 @@ PetscErrorCode HycoFOMSolveForces(HycoFOM f, PetscInt n, const PetscReal mu[], c
   if (f->n_contacts) {
     PetscCall(HycoFOMSetLambda(f, Lambda));
     PetscCall(MatMult(f->Bt, f->Lambda, f->given_F));
+    /* given_F = F - B^T L. */
     PetscCall(VecAYPX(f->given_F, -1, f->F));
   }
   t->assemble = HycoNow() - begin;
