@@ -161,6 +161,7 @@ PetscErrorCode HycoNNLSMonitored(PetscInt m, PetscInt n, const PetscReal A[], co
     Gradient(&f, A, b, r, w);
     if (monitor) PetscCall((*monitor)(ctx, f.k, most));
   }
+  /* r is that of the last gradient, thus of the present x. */
   if (residual) {
     *residual = 0;
     for (PetscInt i = 0; i < m; i++) *residual += r[i] * r[i];

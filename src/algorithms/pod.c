@@ -29,6 +29,7 @@ PetscInt HycoPODRank(PetscInt k, const PetscReal s[], PetscReal tol, PetscReal n
   PetscReal total = 0, tail = 0;
   PetscInt l = k;
 
+  /* From the smallest, so that their sum is not lost in that of the large ones. */
   for (PetscInt j = k - 1; j >= 0; j--) total += s[j] * s[j];
   while (l > 0 && tail + s[l - 1] * s[l - 1] <= tol * total) {
     tail += s[l - 1] * s[l - 1];
@@ -186,6 +187,7 @@ static PetscErrorCode SolveAccurate(SVD svd, Mat S, PetscReal size, PetscReal to
     PetscCall(MatDestroy(&V));
     PetscCall(PetscInfo(svd, "%d singular values of %d, %d of them accurate\n", (int)found, (int)k, (int)*accurate));
     for (PetscInt j = 0; j < *accurate; j++) rest -= sigma[j] * sigma[j];
+    /* The energy that no accurate mode has: the criterion then counts it as left out. */
     if (*accurate < k) sigma[*accurate] = PetscSqrtReal(PetscMax(rest, 0));
     if (*accurate < k) PetscCall(PetscArrayzero(sigma + *accurate + 1, k - *accurate - 1));
     more = (PetscBool)(!fixed && most < limit && *accurate >= PetscMin(most, found) &&

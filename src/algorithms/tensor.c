@@ -61,6 +61,7 @@ PetscErrorCode HycoPolynomialWeights(PetscInt n, const PetscReal x[], PetscInt d
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* An empty product for no axis: a constant has one node. */
 PetscInt HycoTensorSize(const HycoTensor *t)
 {
   PetscInt size = 1;

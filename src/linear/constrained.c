@@ -79,6 +79,7 @@ static PetscErrorCode ReadLevels(HycoConstrained c, Mat K)
     PetscCall(VecDuplicate(v->z, &v->r));
     PetscCall(VecDuplicate(v->z, &v->d));
     PetscCall(VecDuplicate(v->z, &v->w));
+    /* The coarsest level is solved, not smoothed. */
     if (l + 1 < c->n) PetscCall(LargestEigenvalue(v->K, &v->largest));
     if (l + 1 < c->n) PetscCall(HycoUpperBlocks(v->K, &v->product));
     if (!v->product) PetscCall(PetscObjectReference((PetscObject)v->K));
@@ -184,6 +185,7 @@ static PetscErrorCode Cycle(HycoConstrained c, PetscInt l, Vec r, Vec z)
   PetscFunctionBegin;
   if (l + 1 == c->n) {
     PetscCall(SolveCoarsest(c, v, r, z));
+    /* With a single level the shift of S leaves an error, and the finest level must satisfy the constraints exactly. */
     if (l == 0) PetscCall(HycoLevelProject(v, z));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -221,6 +223,7 @@ static PetscErrorCode Apply(PC shell, Vec r, Vec z)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Of the multigrid inside: the shell has nothing to show. */
 static PetscErrorCode View(PC shell, PetscViewer viewer)
 {
   HycoConstrained c;
@@ -249,6 +252,7 @@ PetscErrorCode HycoConstrainedCreate(MPI_Comm comm, const char prefix[], Mat K, 
   PetscCall(MatCreateVecs(K, &c->correction, &c->residual));
   PetscCall(KSPGetPC(c->ksp, &c->pc));
   PetscCall(PetscObjectReference((PetscObject)c->pc));
+  /* Makes the hierarchy; the shell then takes the place of the multigrid, which c->pc keeps alive. */
   PetscCall(KSPSetUp(c->ksp));
   PetscCall(PCGetType(c->pc, &type));
   PetscCall(ReadLevels(c, K));
@@ -265,6 +269,7 @@ PetscErrorCode HycoConstrainedCreate(MPI_Comm comm, const char prefix[], Mat K, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The levels' K, P and coarse solver are the multigrid's, which goes last. */
 PetscErrorCode HycoConstrainedDestroy(HycoConstrained *constrained)
 {
   HycoConstrained c = *constrained;
@@ -333,6 +338,7 @@ PetscErrorCode HycoConstrainedSolve(HycoConstrained c, Vec f, Vec d, PetscReal a
   HycoLogged(HYCO_EVENT_ITERATE, KSPSolve(c->ksp, c->residual, c->correction));
   PetscCall(VecAXPY(x, 1, c->correction));
   PetscCall(KSPGetResidualHistory(c->ksp, &history, &n));
+  /* Without loads the size of the forces is 0, and no relative accuracy could be reached. */
   if (n) *size = PetscMax(*size, HYCO_START * history[0]);
   PetscCall(KSPGetIterationNumber(c->ksp, its));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -57,6 +57,7 @@ static PetscErrorCode FindNodes(HycoSystem y, Projected *f)
   PetscCall(PetscMalloc1(hi - lo, &f->node));
   PetscCall(PetscMalloc1(hi - lo, &f->contact));
   PetscCall(PetscMalloc1(hi - lo, &pivot));
+  /* The pivots are not used as coordinates here: their existence proves that any closed rows are independent. */
   PetscCall(HycoGapPivots(y, pivot, &f->possible));
   PetscCall(PetscObjectQuery((PetscObject)y->B, HYCO_SLAVES, (PetscObject *)&slave));
   if (slave) PetscCall(VecGetArrayRead(slave, &s));
@@ -91,6 +92,7 @@ static PetscErrorCode SetConstraints(Run *p, const PetscBool active[], PetscBool
 
   PetscFunctionBegin;
   *singular = PETSC_FALSE;
+  /* Coarsening the constraints costs several products, and a sharpened solve of the same set needs none of it. */
   for (PetscInt k = 0; k < f->n; k++) differs = differs || p->solved[k] != active[k];
   PetscCallMPI(MPI_Allreduce(&differs, &any, 1, MPI_INT, MPI_MAX, HycoComm(p->s)));
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
@@ -259,6 +261,7 @@ static PetscErrorCode RunCreate(HycoSolver s, Projected *f, Vec x, Run *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The multigrid and its constraints stay with the form. */
 static PetscErrorCode RunDestroy(Run *p)
 {
   PetscFunctionBegin;
@@ -374,6 +377,7 @@ static PetscErrorCode Destroy(HycoSolverForm form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Only forces >= 0 (no cones), by the active set method. */
 PetscErrorCode HycoSolverFormCreate_Projected(HycoSolver s, HycoSolverForm form)
 {
   Projected *f;
