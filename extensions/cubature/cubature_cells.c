@@ -25,6 +25,7 @@ static PetscErrorCode Take(HycoReducer t, const PetscReal w[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* On every rank alike; without sampling, thus exact. */
 PetscErrorCode HycoCubatureChooseAll(HycoReducer t)
 {
   HycoCubatureTraining c = (HycoCubatureTraining)t->training;
@@ -39,6 +40,8 @@ PetscErrorCode HycoCubatureChooseAll(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Fails if the weights miss the tolerance by a factor of 10, since a model from them would be wrong without a sign
+   of it online. */
 PetscErrorCode HycoCubatureChoose(HycoReducer t, Mat W, PetscInt n, const PetscReal sigma[])
 {
   HycoCubatureTraining c = (HycoCubatureTraining)t->training;

@@ -123,6 +123,7 @@ static PetscErrorCode Record(void *ctx, PetscInt k)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Room for the whole part, cells and modes, as each listed time needs all of them at once. */
 static PetscErrorCode Create(HycoReducer t, Sampler *s)
 {
   const HycoFileOrder *order;
@@ -245,6 +246,7 @@ static PetscErrorCode Join(Sampler *s, HycoSnapshots store, PetscReal tol, Mat *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The tolerance of the truncation is a share of that of the cells, since it applies twice, to each path and to all. */
 PetscErrorCode HycoCubatureSample(HycoReducer t, HycoSnapshots store, PetscReal tol, Mat *W, PetscInt *n,
                                   PetscReal **sigma)
 {

@@ -55,6 +55,7 @@ static const int deadly[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
 #define N_DEADLY ((int)(sizeof(deadly) / sizeof(deadly[0])))
 static sigjmp_buf alive;
 
+/* Back to Open(): a static initialiser of the library has crashed. */
 static void Escape(int signal)
 {
   siglongjmp(alive, signal);
@@ -76,6 +77,7 @@ static void *Open(const char path[], int *died)
   return library;
 }
 
+/* The object of a law has the name of its body. */
 static const char *BodyName(HycoMaterial law)
 {
   return ((PetscObject)law)->name;
@@ -118,6 +120,7 @@ static const void *Find(const MFront *m, const char hypothesis[], const char wha
   return found;
 }
 
+/* Symbols of numbers are unsigned short in the interface. */
 static unsigned Number(const MFront *m, const char hypothesis[], const char what[], unsigned absent)
 {
   const unsigned short *value = (const unsigned short *)Find(m, hypothesis, what);
@@ -205,6 +208,7 @@ static PetscInt TypeSize(int type, PetscInt dim)
   return type >= 0 && type < 4 ? size[type][dim - 2] : 0;
 }
 
+/* Tensors are split into their components, so that outputs have a name for each number. */
 static PetscErrorCode SetState(HycoMaterial law, const MFront *m, const char hypothesis[], PetscInt dim)
 {
   const char *const *names, *list[MAX_INTERNAL];
@@ -235,6 +239,7 @@ static PetscErrorCode SetState(HycoMaterial law, const MFront *m, const char hyp
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The hypothesis is known only here, with the mesh's dimension; plane stress has been refused by the class. */
 static PetscErrorCode SetUp(HycoMaterial law, PetscInt dim)
 {
   MFront *m = (MFront *)law->data;
@@ -306,6 +311,7 @@ static PetscBool Integrate(const MFront *m, HycoMaterialPoints *p, PetscInt i, P
   return PETSC_TRUE;
 }
 
+/* The first point that fails ends the batch: the step is repeated with a smaller time anyway. */
 static PetscErrorCode Update(HycoMaterial law, HycoMaterialPoints *p)
 {
   MFront *m = (MFront *)law->data;
@@ -332,6 +338,7 @@ static PetscErrorCode Destroy(HycoMaterial law)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The constants of the behaviour are declared later, by Declare(), when the scene has named the library. */
 static PetscErrorCode Create(HycoMaterial law)
 {
   static const struct _HycoMaterialOps ops = {.declare = Declare, .setup = SetUp, .update = Update, .destroy = Destroy};
@@ -339,6 +346,7 @@ static PetscErrorCode Create(HycoMaterial law)
 
   PetscFunctionBegin;
   PetscCall(PetscNew(&m));
+  /* First, so that Destroy() finds it also after an error below. */
   PetscCall(HycoMaterialSetData(law, m));
   PetscCall(HycoMaterialDeclareText(law, "library", "the file of a shared library"));
   PetscCall(HycoMaterialDeclareText(law, "behaviour", "the behaviour's name"));

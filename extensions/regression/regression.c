@@ -40,6 +40,7 @@ typedef struct {
 
 /* -- training -- */
 
+/* The kernel is one of the library's enum, in the order of the words. */
 static PetscErrorCode SetFromOptions(HycoReducer t)
 {
   Training s;
@@ -56,6 +57,7 @@ static PetscErrorCode SetFromOptions(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The modes are those of displacements, which the reducer has; only the store is kept for Build(). */
 static PetscErrorCode Modes(HycoReducer t, HycoSnapshots store)
 {
   PetscFunctionBegin;
@@ -85,6 +87,7 @@ static PetscErrorCode ReadCells(HycoReducer t, HycoROM m, const char field[], Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Columns by training point and, with a history, by listed time: the same weights serve all of its times. */
 static PetscErrorCode Build(HycoROM m, HycoReducer t)
 {
   Regression r = (Regression)m->model->data;
@@ -107,6 +110,7 @@ static PetscErrorCode Build(HycoROM m, HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Without errors of its own: at the training points it has none. */
 static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *out)
 {
   PetscFunctionBegin;
@@ -122,6 +126,8 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *out)
 
 static PetscReal Kernel(PetscInt kernel, PetscReal r)
 {
+  /* All three are conditionally positive definite of order 2 at most: the linear polynomial makes the system
+     regular. */
   if (kernel == KERNEL_CUBIC) return r * r * r;
   if (kernel == KERNEL_LINEAR) return r;
   return r > 0 ? r * r * PetscLogReal(r) : 0;
@@ -164,6 +170,7 @@ static PetscErrorCode Invert(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The system depends on the points alone: it is inverted once, and a prediction is a product. */
 static PetscErrorCode SetUp(HycoROM m)
 {
   Regression r = (Regression)m->model->data;
@@ -183,6 +190,7 @@ static PetscErrorCode SetUp(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Of the work data alone: the model's values stay. */
 static PetscErrorCode Reset(HycoROM m)
 {
   const Work w = (Work)m->work;
@@ -301,6 +309,7 @@ static PetscErrorCode Path(HycoROM m, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Weights once for the whole path: they depend on mu and not on time. */
 static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
 {
   PetscReal all[HYCO_MAX_PARAMETERS];
@@ -351,6 +360,7 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The work data belong to the class. */
 static PetscErrorCode Destroy(HycoROM m)
 {
   Regression r = (Regression)m->model->data;
@@ -361,6 +371,7 @@ static PetscErrorCode Destroy(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* No settings: neither modes nor tolerances may be reduced online, since each value is a function of its own. */
 static PetscErrorCode Create(HycoROM m)
 {
   static const HycoROMTraits traits = {.title = "regression",
