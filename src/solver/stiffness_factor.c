@@ -53,6 +53,9 @@ static PetscErrorCode FactorSparse(HycoSolver s, Mat Bt, Mat B, PetscReal S[], P
   PetscInt p;
 
   PetscFunctionBegin;
+  /* Solves go by the factor that exists: that of a dense K before is given up. */
+  HycoFreeAll(&f->lu, &f->ipiv);
+  f->n = 0;
   if (!f->direct) PetscCall(HycoDirectCreate(HycoComm(s), &f->direct));
   PetscCall(HycoDirectPinKernel(f->direct, y->K));
   PetscCall(HycoDirectAnalyse(f->direct, y->K, Bt, B, y->symmetric, &f->bytes));
@@ -223,6 +226,7 @@ PetscErrorCode HycoStiffnessFactor(HycoSolver s, Mat Bt, Mat B, PetscReal S[], P
   PetscFunctionBegin;
   *singular = PETSC_FALSE;
   PetscCall(HycoOperatorStateUpdate(&f->of, K, B, &same));
+  if (same && !f->lu) PetscCall(HycoNameLinear(s, NULL));
   if (same) PetscFunctionReturn(PETSC_SUCCESS);
   f->of.K = 0; /* invalid until completed */
   PetscCall(PetscObjectTypeCompare((PetscObject)K, MATSEQDENSE, &dense));
