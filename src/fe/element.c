@@ -235,7 +235,7 @@ static void Hex(HycoElement *e, PetscInt nv)
   }
 }
 
-/* At the first use: 13 small tables, constant afterwards. */
+/* At the first use; constant afterwards. */
 static void Tabulate(void)
 {
   Tensor(&table[HYCO_LINE2], 1);

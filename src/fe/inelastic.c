@@ -620,23 +620,25 @@ PetscErrorCode HycoFEStepPoints(HycoFE fe, PetscInt n, const PetscInt point[], c
   const HycoElement *el = HycoElementGet(fe->mesh->type);
   const PetscInt ns = fe->n_sigma, *of = fe->mesh->cell_body;
   Batch b = {.t0 = t0, .t1 = t1, .begin = begin, .tangents = (PetscBool)(tangent != NULL), .report = report};
+  PetscErrorCode ierr = 0;
 
   PetscFunctionBegin;
   *report = fresh;
   PetscCall(BatchCreate(fe, &b));
-  for (PetscInt from = 0, more = 0; from < n; from += more, more = 0) {
+  for (PetscInt from = 0, more = 0; from < n && !ierr; from += more, more = 0) {
     const PetscInt body = of[point[from] / el->nq];
-    PetscBool failed;
+    PetscBool failed = PETSC_TRUE;
 
     /* Points of one body that follow each other share an evaluation. */
     while (from + more < n && more < BATCH * el->nq && of[point[from + more] / el->nq] == body) more++;
     GatherPoints(fe, el, more, point + from, strain + from * ns, &b);
-    PetscCall(Update(fe, body, more, &b, &failed));
-    if (!failed)
+    ierr = Update(fe, body, more, &b, &failed);
+    if (!ierr && !failed)
       ScatterPoints(fe, el, more, point + from, &b, s + from * ns, size + from,
                     tangent ? tangent + from * ns * ns : NULL);
   }
   PetscCall(BatchDestroy(&b));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -34,9 +34,14 @@ static PetscErrorCode AddSlaves(HycoFOM f)
     PetscInt g = 0;
 
     PetscCall(HycoMeshFindGroup(m, "contact", f->scene->contact[k]->slave, &g));
-    room += m->group_start[g + 1] - m->group_start[g];
+    /* A tied slave counts with its masters, of which a mean over facets has any number. */
+    for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) {
+      const PetscInt tied = HycoMeshTied(m, m->group_node[j]);
+
+      room += 1 + (tied < 0 ? 0 : m->tied_start[tied + 1] - m->tied_start[tied]);
+    }
   }
-  PetscCall(PetscMalloc1(room * (1 + HYCO_FACET_NODES), &node));
+  PetscCall(PetscMalloc1(room, &node));
   for (PetscInt k = 0; k < f->scene->n_contacts; k++) {
     PetscInt g = 0;
 

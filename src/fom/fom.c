@@ -285,9 +285,9 @@ PetscErrorCode HycoFOMCreateMesh(MPI_Comm comm, HycoScene scene, HycoFOM *fom)
   PetscCall(PetscObjectReference((PetscObject)scene));
   (*fom)->scene = scene;
   PetscCall(PetscObjectSetOptions((PetscObject)*fom, scene->options));
-  PetscCall(SetFromOptions(*fom));
+  ierr = SetFromOptions(*fom);
   (*fom)->mesh_write[0] = '\0'; /* only for solves */
-  ierr = ReadMesh(*fom);
+  if (!ierr) ierr = ReadMesh(*fom);
   if (!ierr && (*fom)->size > 1) ierr = HycoFOMKeepOnRoot(*fom);
   if (!ierr && (*fom)->size > 1) ierr = HycoFOMSetUpSurface(*fom);
   if (ierr) PetscCall(HycoFOMDestroy(fom));

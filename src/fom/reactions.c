@@ -253,15 +253,17 @@ static PetscErrorCode Balance(HycoFOM f, PetscInt n, Sums *s, PetscReal *balance
    their balance, in f->reaction (borrowed). Collective. */
 PetscErrorCode HycoFOMGetReactions(HycoFOM f, PetscInt *n, const HycoReaction *result[], PetscReal *balance)
 {
-  const HycoScene scene = f->scene;
-  const PetscInt n_springs = scene->n_springs, all = scene->n_fixed + n_springs + 2, n_dof = f->fe->n_dof;
-  PetscInt *support;
+  HycoScene scene;
+  PetscInt all, n_dof, *support;
   PetscReal *work;
   Sums s = {0};
 
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
   PetscCheck(f->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoFOMSolve() before HycoFOMGetReactions()");
+  scene = f->scene;
+  n_dof = f->fe->n_dof;
+  all = scene->n_fixed + scene->n_springs + 2;
   if (!f->reaction) PetscCall(PetscMalloc1(all, &f->reaction));
   PetscCall(PetscArrayzero(f->reaction, all));
   PetscCall(PetscMalloc2(3 * n_dof, &work, n_dof, &support));

@@ -21,7 +21,7 @@ static PetscErrorCode SetUp(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* K U = given_F Without contacts the system is linear: one factorisation as long as K is unchanged. */
+/* K U = given_F. Without contacts the system is linear: one factorisation as long as K is unchanged. */
 static PetscErrorCode SolveGiven(HycoFOM f)
 {
   PetscFunctionBegin;

@@ -179,6 +179,7 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
   PetscCall(MeasureContacts(f, s));
   for (PetscInt k = 0; f->path && k < f->path->n_steps; k++)
     s->sliding = PetscMax(s->sliding, f->path->steps[k].sliding); /* contacts may be open at the end */
+  s->n_dependent = 0;
   if (s->reason > 0 && f->n_contacts) PetscCall(HycoFOMCountDependent(f, &s->n_dependent));
   PetscCall(HycoFOMMeasureQuantities(f, s->quantity));
   PetscCallMPI(MPI_Bcast(s, sizeof(*s), MPI_BYTE, 0, HycoComm(f)));
