@@ -80,7 +80,7 @@ static PetscErrorCode ReadCells(HycoReducer t, HycoROM m, const char field[], Pe
   for (PetscInt k = 0; k < t->n_s; k++) {
     PetscCall(HycoSnapshotsReadRows(store, mu + k / steps * n_par, k % steps, field, 0, t->sizes[1] * width, all));
     for (PetscInt e = 0; e < n_cells; e++)
-      PetscCall(PetscArraycpy(value + (size_t)(k * n_cells + e) * (size_t)width,
+      PetscCall(PetscArraycpy(value + ((size_t)k * (size_t)n_cells + (size_t)e) * (size_t)width,
                               all + m->model->mesh->cell_whole[e] * width, width));
   }
   PetscCall(PetscFree(all));

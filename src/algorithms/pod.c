@@ -54,16 +54,17 @@ static PetscErrorCode FixSigns(Mat V, PetscInt l)
   for (PetscInt j = 0; j < l; j++) {
     PetscReal largest = 0, all, sign = 0, sum;
     PetscInt at = PETSC_MAX_INT, first;
+    PetscScalar *column = v + (size_t)j * (size_t)lda;
 
-    for (PetscInt i = 0; i < hi - lo; i++) largest = PetscMax(largest, PetscAbsScalar(v[j * lda + i]));
+    for (PetscInt i = 0; i < hi - lo; i++) largest = PetscMax(largest, PetscAbsScalar(column[i]));
     PetscCallMPI(MPI_Allreduce(&largest, &all, 1, MPIU_REAL, MPI_MAX, comm));
     for (PetscInt i = hi - lo - 1; i >= 0; i--) {
-      if (PetscAbsScalar(v[j * lda + i]) >= all * (1 - 1e-6)) at = lo + i;
+      if (PetscAbsScalar(column[i]) >= all * (1 - 1e-6)) at = lo + i;
     }
     PetscCallMPI(MPI_Allreduce(&at, &first, 1, MPIU_INT, MPI_MIN, comm));
-    if (at == first && at != PETSC_MAX_INT) sign = v[j * lda + at - lo] < 0 ? -1 : 1;
+    if (at == first && at != PETSC_MAX_INT) sign = column[at - lo] < 0 ? -1 : 1;
     PetscCallMPI(MPI_Allreduce(&sign, &sum, 1, MPIU_REAL, MPI_SUM, comm));
-    for (PetscInt i = 0; sum < 0 && i < hi - lo; i++) v[j * lda + i] = -v[j * lda + i];
+    for (PetscInt i = 0; sum < 0 && i < hi - lo; i++) column[i] = -column[i];
   }
   PetscCall(MatDenseRestoreArray(V, &v));
   PetscFunctionReturn(PETSC_SUCCESS);

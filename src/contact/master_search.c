@@ -83,21 +83,12 @@ PetscErrorCode HycoMasterSearchReady(HycoMasterSearch *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Drops the tree and the border, for other patches or positions. */
-PetscErrorCode HycoMasterSearchForget(HycoMasterSearch *t)
-{
-  PetscFunctionBegin;
-  PetscCall(HycoPatchesDestroy(&t->patches));
-  HycoFreeAll(&t->border, &t->at_border);
-  t->n_border = 0;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode HycoMasterSearchDestroy(HycoMasterSearch *t)
 {
   PetscFunctionBegin;
-  PetscCall(HycoMasterSearchForget(t));
-  HycoFreeAll(&t->node, &t->normal, &t->outward);
+  PetscCall(HycoPatchesDestroy(&t->patches));
+  HycoFreeAll(&t->border, &t->at_border, &t->node, &t->normal, &t->outward);
+  t->n_border = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -19,7 +19,7 @@ void HycoAddProduct(PetscReal a, PetscReal b, PetscReal sum[2])
   sum[0] = high;
 }
 
-/* r = b + low - K x Rounded once at the end. */
+/* r = b + low - K x, rounded once at the end. */
 static void Residual(PetscBLASInt n, const PetscReal K[], PetscBLASInt lda, const PetscReal b[], const PetscReal low[],
                      const PetscReal x[], PetscReal r[])
 {

@@ -10,7 +10,7 @@
 
 enum { RATE, FACTOR, ACTIVATION, MODULUS, N_CONSTANTS };
 
-/* scratch: dt rate E'/T exp(-Q/RT), factor / E' What does not depend on q, once per point and step. */
+/* scratch: dt rate E'/T exp(-Q/RT), factor / E'. What does not depend on q, once per point and step. */
 static void Prepare(HycoFlowPoint *p, const char **why)
 {
   const PetscReal T = p->temperature, modulus = p->c[MODULUS] < 0 ? 1.148e5 - 59.9 * T : p->c[MODULUS];
