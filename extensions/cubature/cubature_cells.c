@@ -13,6 +13,7 @@ static PetscErrorCode Take(HycoReducer t, const PetscReal w[])
   PetscCall(PetscFree(t->seeds_cell));
   PetscCall(PetscMalloc1(n_cells, &c->weight));
   PetscCall(PetscMalloc1(n_cells, &t->seeds_cell));
+  /* w NULL: another rank than 0, which gets the list below. */
   for (PetscInt e = 0; w && e < n_cells; e++) {
     if (!(w[e] > 0)) continue;
     t->seeds_cell[n] = e;

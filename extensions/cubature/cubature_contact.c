@@ -76,6 +76,7 @@ static PetscErrorCode ListFull(HycoReducer t, PetscInt *n, PetscInt node[])
 
     if (!take[k]) continue;
     c->full[c->n_full++] = k;
+    /* The unknowns of a node follow each other. */
     if (!*n || node[*n - 1] != whole) node[(*n)++] = whole;
   }
   PetscCall(PetscFree(take));

@@ -93,6 +93,7 @@ static PetscErrorCode Project(Sampler *s)
     PetscReal f[HYCO_MAX_CELL_DOFS], load[HYCO_MAX_CELL_DOFS] = {0}, *g = s->g + (size_t)e * (size_t)l;
 
     for (PetscInt j = 0; j < l; j++) g[j] = 0;
+    /* Cells of weight 1 take no part in the fit: theirs is exact. */
     if (near && near[e]) continue;
     PetscCall(HycoFEStateForce(s->fe, s->replay.march.state, e, f));
     PetscCall(HycoFEBodyForce(s->fe, e, load));

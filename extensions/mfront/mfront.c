@@ -295,7 +295,9 @@ static PetscBool Integrate(const MFront *m, HycoMaterialPoints *p, PetscInt i, P
     e1[theirs[c]] = p->strain[i * ns + c] / Root(c);
     s0[theirs[c]] = s1[theirs[c]] = p->stress0[i * ns + c] * Root(c);
   }
+  /* The interface updates the state at the end in place, starting from that at the begin. */
   for (PetscInt k = 0; k < n_state; k++) p->state[i * n_state + k] = p->state0[i * n_state + k];
+  /* At rest the class asks for the elastic tangent alone, and nothing is integrated. */
   K[0] = at_rest ? ELASTIC : p->tangent ? CONSISTENT : 0;
   d.s0 = (StateBegin){e0, s0, &density, properties, p->state0 + i * n_state, &stored0, &dissipated0, &T0};
   d.s1 = (StateEnd){e1, s1, &density, properties, p->state + i * n_state, &stored1, &dissipated1, &T1};

@@ -163,6 +163,7 @@ static PetscErrorCode Invert(HycoROM m)
     PetscReal *column = A + (size_t)k * (size_t)size;
 
     Column(m, m->model->points + k * m->model->scene->n_parameters, column);
+    /* Beside the kernels the same numbers as below them: the system is symmetric, with zeros in its last block. */
     for (PetscInt i = n; i < size; i++) A[(size_t)i * (size_t)size + (size_t)k] = column[i];
   }
   PetscCall(HycoPseudoInverse(size, size, A, SINGULAR, w->inverse));

@@ -130,6 +130,7 @@ PetscErrorCode HycoQDEIMRank(Mat V, PetscInt index[], PetscInt *found)
     const PetscInt k = *found;
     PetscReal size2 = 0;
 
+    /* Computed anew at each step: updated squares would lose their digits by cancellation. */
     PetscCall(PetscArrayzero(length2, hi - lo));
     PetscCall(MatDenseGetArray(R, &r));
     for (PetscInt j = 0; j < l; j++) {

@@ -257,6 +257,7 @@ PetscErrorCode HycoPODGram(PetscInt n, const PetscReal G[], PetscReal tol, Petsc
   LAPACKsyev_("V", "U", &nb, A, &nb, values, work, &lwork, &info);
   PetscCheck(info == 0, PETSC_COMM_SELF, PETSC_ERR_LIB,
              "the eigenvalues of the Gram matrix did not converge (LAPACK syev: %d)", (int)info);
+  /* LAPACK's values ascend, and round-off makes the smallest ones negative. */
   for (PetscInt j = 0; j < n; j++) sigma[j] = PetscSqrtReal(PetscMax(values[n - 1 - j], 0));
   *l = HycoPODRank(n, sigma, tol, PetscMax(noise, 1e-7), 0);
   PetscCall(PetscMalloc1(n * *l, W));

@@ -66,6 +66,7 @@ static PetscErrorCode ReadLevels(HycoConstrained c, Mat K)
     KSP smoother;
 
     v->K = K;
+    /* PETSc's default of Chebyshev steps, where no multigrid says another. */
     v->smooths = 2;
     if (multigrid) {
       PetscCall(PCMGGetSmoother(c->pc, c->n - 1 - l, &smoother));
@@ -143,6 +144,8 @@ static PetscErrorCode Smooth(HycoLevel *v, PetscBool residual, Vec r, Vec z)
     if (k == 0)
       PetscCall(VecAXPBY(v->d, 1 / theta, 0, v->w));
     else {
+      /* Chebyshev's recurrence on [lo, hi] (Y. Saad, Iterative Methods for Sparse Linear Systems (2003), algorithm
+         12.1). */
       rho = 1 / (2 * theta / delta - before);
       PetscCall(VecAXPBY(v->d, 2 * rho / delta, rho * before, v->w));
     }

@@ -55,6 +55,7 @@ PetscErrorCode HycoDirectSolver(MPI_Comm comm, const char prefix[], Mat K, Petsc
   PetscCall(KSPSetType(*ksp, KSPPREONLY));
   PetscCall(KSPGetPC(*ksp, &pc));
   PetscCall(PCSetType(pc, symmetric ? PCCHOLESKY : PCLU));
+  /* A small matrix has little fill in any order. */
   if (symmetric && n > 3000) PetscCall(HycoBanded(K, &thin));
   if (thin)
     PetscCall(HycoBandedSolver(pc));

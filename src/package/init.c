@@ -12,6 +12,7 @@ static PetscBool began_petsc = PETSC_FALSE, handles = PETSC_FALSE;
 static void Compose(char said[HYCO_LINE], int line, const char function[], const char file[], PetscErrorCode code,
                     const char message[])
 {
+  /* Codes of messages that are written for the user; others need PETSc's location. */
   const PetscBool own = (PetscBool)(code == PETSC_ERR_USER || code == PETSC_ERR_ORDER || code == HYCO_ERR_NO_MODEL ||
                                     code == PETSC_ERR_ARG_NULL || code == PETSC_ERR_ARG_WRONG);
   char text[HYCO_LINE];

@@ -134,6 +134,7 @@ PetscErrorCode HycoChooseLinear(HycoSolver s, HycoSolverForm *form)
   if (same) PetscFunctionReturn(PETSC_SUCCESS);
   s->iterative = PETSC_FALSE;
   s->why_iterative[0] = '\0';
+  /* A dense K has a factor of its own size, and no multigrid. */
   if (!aij) PetscFunctionReturn(PETSC_SUCCESS);
   if (s->linear == HYCO_LINEAR_AUTO) PetscCall(DecideByMemory(s, form));
   if (s->linear == HYCO_LINEAR_ITERATIVE) PetscCall(TakeIterative(s, form));

@@ -494,6 +494,7 @@ static PetscErrorCode Attempts(HycoSolver s, Vec x, Vec L)
   for (int k = 0; k < N_CANDIDATES; k++) {
     if (!IsNext(s, k, tried, chosen)) continue;
     PetscCall(Try(s, &order[k], x, L, &tried[k]));
+    /* The type for which an empty entry stood: it must not be tried twice. */
     if (!chosen[0]) PetscCall(PetscStrncpy(chosen, s->now.type, sizeof(chosen)));
     if (!tried[k]) continue;
     if (s->reason > 0 || s->reason == HYCO_DIVERGED_SINGULAR || !s->fallback || !s->system->m) break;

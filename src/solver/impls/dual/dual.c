@@ -262,6 +262,7 @@ static PetscErrorCode Shift(HycoSolver s, const PetscReal dL[], Vec x, Vec L)
   PetscCall(PetscArraycpy(c, dL + lo, hi - lo));
   PetscCall(VecRestoreArray(change, &c));
   PetscCall(MatMult(s->system->Bt, change, force));
+  /* x follows the forces: dx = -K^-1 Bt dL. */
   PetscCall(HycoStiffnessSolve(s, force, move));
   PetscCall(VecAXPY(x, -1, move));
   PetscCall(VecAXPY(L, 1, change));
@@ -318,6 +319,7 @@ static PetscErrorCode Refine(HycoSolver s, HycoSolverForm form, PetscBool *bette
   PetscFunctionBegin;
   *better = PETSC_FALSE;
   if (!f->lu || !f->of.K || f->refined) PetscFunctionReturn(PETSC_SUCCESS);
+  /* For the comparison, and as the result where refinement changes nothing. */
   HycoDuplicate(entries, d->S, &before);
   f->refined = PETSC_TRUE;
   HycoLogged(HYCO_EVENT_FACTOR, HycoStiffnessCondense(s, s->system->Bt, s->system->B, d->S));

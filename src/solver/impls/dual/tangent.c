@@ -60,6 +60,7 @@ static PetscErrorCode Close(HycoSolverTangent t, Vec x, Vec L)
   PetscCall(PetscMalloc4(t->m, &force, t->m, &gap, t->m, &flexibility, t->m, &state));
   PetscCall(HycoSystemWork(y));
   PetscCall(MatMult(y->B, x, y->work_L));
+  /* The size of the terms of D - B x, against which open and closed are told apart. */
   PetscCall(VecNorm(y->work_L, NORM_INFINITY, &sizes[0]));
   PetscCall(VecNorm(y->D, NORM_INFINITY, &sizes[1]));
   PetscCall(VecAYPX(y->work_L, -1, y->D));

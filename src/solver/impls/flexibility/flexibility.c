@@ -70,6 +70,7 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
     PetscCall(PetscArraycpy(f->active, s->start_set, f->m));
   else if (!s->start_set && (!s->warm || !f->started))
     PetscCall(PetscArrayzero(f->active, f->m));
+  /* Kept over the solves with one G: it belongs to the form, not to the problem. */
   lcp.factor = f->factor;
   PetscCall(MatDenseGetArrayRead(y->G, &lcp.M));
   PetscCall(VecGetArrayRead(y->D, &lcp.q));

@@ -324,6 +324,7 @@ PetscErrorCode HycoGapSetUp(HycoSolver s, Gap *g)
   }
   PetscCall(DropIdle(g, hi - lo));
   PetscCall(MatSetOption(g->Kg, MAT_SYMMETRIC, PETSC_TRUE));
+  /* Kw is changed for each set; Kg stays for the residuals, which are the forces. */
   PetscCall(MatDuplicate(g->Kg, MAT_COPY_VALUES, &g->Kw));
   PetscCall(HycoGapWork(g->Kw));
   PetscCall(RenewSolver(s, g));

@@ -460,6 +460,7 @@ static PetscErrorCode GatherMatrix(MPI_Comm comm, Mat K, Mat *whole)
   PetscCall(MatGetSize(K, &n, NULL));
   PetscCall(ISCreateStride(PETSC_COMM_SELF, rank ? 0 : n, 0, 1, &all));
   PetscCall(MatCreateSubMatrices(K, 1, &all, &all, MAT_INITIAL_MATRIX, &part));
+  /* MatDestroySubMatrices() gives up the other reference. */
   PetscCall(PetscObjectReference((PetscObject)part[0]));
   *whole = part[0];
   PetscCall(MatDestroySubMatrices(1, &part));

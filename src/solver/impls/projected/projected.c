@@ -106,6 +106,7 @@ static PetscErrorCode SetConstraints(Run *p, const PetscBool active[], PetscBool
     p->at[n++] = f->node[k];
   }
   PetscCall(ISCreateGeneral(HycoComm(B), n, row, PETSC_OWN_POINTER, &is));
+  /* On each rank the rows of its own contacts, in their order, like d and l. */
   PetscCall(MatCreateSubMatrix(B, is, NULL, MAT_INITIAL_MATRIX, &rows));
   PetscCall(HycoConstrainedSet(f->constrained, rows, p->at, singular));
   PetscCall(VecDestroy(&p->d));
