@@ -40,6 +40,7 @@ static PetscErrorCode SolveActiveSet(Tao tao)
     PetscCall(HycoTaoNewton(tao, PETSC_FALSE));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+  /* Without a watcher the loop is spared a count of contacts over all ranks in each iteration. */
   watched = (PetscBool)(t->monitor || tao->numbermonitors || tao->hist_max);
   if (t->lcp) {
     HycoLCP lcp = *t->lcp;
@@ -86,8 +87,10 @@ static PetscErrorCode RunSemismooth(HycoTao t, const HycoLCP *lcp)
   } else if (lcp->warm && t->n_last == lcp->p + lcp->n && t->last)
     PetscCall(PetscArraycpy(t->z, t->last, t->n_last));
   else
+    /* Without a start that fits, none: the chain of starts then begins with the normal forces. */
     PetscCall(PetscArrayzero(t->z, lcp->p + lcp->n));
   PetscCall(HycoLCPSemismooth(lcp, t->z, &t->its, &t->status));
+  /* Forces of a failed solve would be a bad start: the last good ones stay. */
   if (t->status != HYCO_LCP_SOLVED) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree(t->last));
   t->n_last = lcp->p + lcp->n;
@@ -143,6 +146,7 @@ static PetscErrorCode CreateActiveSet(Tao tao)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* No KSP: pivots need none. */
 static PetscErrorCode CreateLemke(Tao tao)
 {
   PetscFunctionBegin;
@@ -152,6 +156,7 @@ static PetscErrorCode CreateLemke(Tao tao)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Only with a HycoTao as data, which has the blocks. */
 static PetscErrorCode CreateSemismooth(Tao tao)
 {
   PetscFunctionBegin;

@@ -59,6 +59,7 @@ static PetscErrorCode UpdateAll(HycoFE fe, PetscBool all, Batch *b)
 
   PetscFunctionBegin;
   for (PetscInt e = 0; e < m->n_cells; e++) {
+    /* Neither nodes nor law change: the tangents of the first call stay. */
     if (fe->constant[e] && !all) continue;
     if (b->n == BATCH || (b->n && m->cell_body[e] != m->cell_body[b->cell[0]])) PetscCall(Update(fe, b));
     b->cell[b->n++] = e;

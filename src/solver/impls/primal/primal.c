@@ -241,6 +241,7 @@ static PetscErrorCode BoundQP(Primal *p, Gap *g, PetscBool *solved)
   for (PetscInt k = 0; k < p->n; k++) PetscCall(VecSetValue(hi, g->pivot[k], p->bound[k], INSERT_VALUES));
   PetscCall(VecAssemblyBegin(hi));
   PetscCall(VecAssemblyEnd(hi));
+  /* The start must be feasible: y is 0, and bounds of drawn overlaps are negative. */
   PetscCall(VecPointwiseMin(p->y, p->y, hi));
   PetscCall(VecCopy(p->f, p->rhs));
   if (g->H)
@@ -292,6 +293,7 @@ static PetscErrorCode PrimalCreate(HycoSolver s, const Gap *g, Vec x, Primal *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The form's matrices and its solver stay for the next solve. */
 static PetscErrorCode PrimalDestroy(Primal *p)
 {
   PetscFunctionBegin;
@@ -381,6 +383,7 @@ static PetscErrorCode Destroy(HycoSolverForm form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Of this form, yet a field of the solver: HycoSolverSetMultilevel() sets the same one. */
 static PetscErrorCode SetFromOptions(HycoSolver s, HycoSolverForm form, HycoOptionItems PetscOptionsObject)
 {
   PetscFunctionBegin;
@@ -391,6 +394,7 @@ static PetscErrorCode SetFromOptions(HycoSolver s, HycoSolverForm form, HycoOpti
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Only forces >= 0 (no cones): a bound is on one unknown each. */
 PetscErrorCode HycoSolverFormCreate_Primal(HycoSolver s, HycoSolverForm form)
 {
   Gap *g;
