@@ -37,7 +37,7 @@ typedef struct {
   HycoAtom *atom;
   Row *row;
   PetscReal *area, *pressure; /* by contact of the model */
-  HycoFit base, response;
+  HycoExportFit base, response;
   HycoExportModel out;
 } Export;
 
@@ -385,7 +385,7 @@ static PetscErrorCode FreeSamples(Samples *o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode FreeFit(HycoFit *fit)
+static PetscErrorCode FreeFit(HycoExportFit *fit)
 {
   PetscFunctionBegin;
   PetscCall(PetscFree(fit->function));
@@ -406,7 +406,7 @@ static void Scale(const Export *e, const Samples *o, PetscReal scale[])
 }
 
 /* Functions of the first level that suffices, up to the last one; else of that. */
-static PetscErrorCode Fit(Export *e, PetscInt last, const HycoFitData *data, HycoFit *fit)
+static PetscErrorCode Fit(Export *e, PetscInt last, const HycoFitData *data, HycoExportFit *fit)
 {
   PetscFunctionBegin;
   fit->worst = PETSC_MAX_REAL;
@@ -462,7 +462,7 @@ static PetscErrorCode Refuse(Export *e)
 /* -- the arrays -- */
 
 /* The functions of both fits, each once; place[n]: where those of a fit are. */
-static PetscErrorCode Merge(Export *e, const HycoFit *fit, PetscInt place[])
+static PetscErrorCode Merge(Export *e, const HycoExportFit *fit, PetscInt place[])
 {
   HycoExportModel *o = &e->out;
 
