@@ -54,7 +54,7 @@ PetscErrorCode HycoROMPredict(HycoROM m, PetscInt n, const PetscReal mu[])
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
   p = &m->prediction;
   PetscCall(HycoSceneCheckParameters(m->model->scene, n, mu));
-  m->solved = m->whole_current = m->balanced = PETSC_FALSE;
+  m->solved = m->measured = m->whole_current = m->balanced = PETSC_FALSE;
   HycoLogged(HYCO_EVENT_SETUP, HycoROMSetUp(m));
   p->seconds.setup = HycoNow() - begin;
   begin = HycoNow();
@@ -117,6 +117,7 @@ PetscErrorCode HycoROMReset(HycoROM m)
   if (m->work || !m->model->traits.work) PetscTryTypeMethod(m, reset);
   PetscCall(PetscFree(m->work));
   PetscCall(HycoOutputCellsDestroy(&m->output_cells));
+  PetscCall(HycoOutputCellsDestroy(&m->few));
   PetscCall(HycoCarriedDestroy(&m->carried));
   PetscCall(HycoFEDestroy(&m->fe_floating));
   PetscCall(HycoSolverDestroy(&m->solver));
