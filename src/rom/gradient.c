@@ -30,6 +30,7 @@ static PetscErrorCode Move(Work *o, const PetscReal mu[], const PetscReal z[])
   PetscReal size;
 
   PetscFunctionBegin;
+  /* w NULL: the type's data and state alone. */
   PetscUseTypeMethod(m, residual, mu, z, NULL, &size);
   PetscUseTypeMethod(m, expand);
   if (m->ops->reconstruct && m->reconstruct) PetscCall((*m->ops->reconstruct)(m));
@@ -78,6 +79,7 @@ static PetscErrorCode Close(Work *o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Keeps the prediction: differences move the model's state, and Restore() puts it back. */
 static PetscErrorCode Create(Work *o)
 {
   HycoROM m = o->m;
@@ -101,6 +103,7 @@ static PetscErrorCode Create(Work *o)
   PetscCall((*m->ops->residual)(m, o->mu, o->z, o->w[0], &largest));
   o->size = largest;
   for (PetscInt i = 0; i < o->n; i++) {
+    /* Closed or undecided contacts; open ones do not change at first order. */
     if (HycoTangentMayTouch(o->z[o->p + i], o->w[0][o->p + i], o->size)) o->contact[o->k++] = i;
   }
   PetscCall(Close(o));
@@ -177,6 +180,7 @@ static PetscErrorCode Differentiate(Work *o, HycoDifference *d, PetscBool *kink)
     PetscCall((*m->ops->residual)(m, at, o->z, o->w[j], &size));
   }
   PetscCall(FindTurns(o, d, &turns));
+  /* A one-sided difference: across the change of masters the central one is of neither side. */
   if (turns) HycoDifferenceTakeSide(d);
   for (PetscInt i = 0; i < o->p + o->k; i++) {
     const PetscInt row = i < o->p ? i : o->p + o->contact[i - o->p];
@@ -191,6 +195,7 @@ static PetscErrorCode Differentiate(Work *o, HycoDifference *d, PetscBool *kink)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One parameter: its tangent first, then the outputs along it. */
 static PetscErrorCode Column(Work *o, PetscInt p, HycoGradient *gradient)
 {
   HycoDifference d;
@@ -203,7 +208,8 @@ static PetscErrorCode Column(Work *o, PetscInt p, HycoGradient *gradient)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The model's data and state are again those of the prediction. */
+/* The model's data and state are again those of the prediction. U after HycoROMComplete(), which would overwrite
+   it with the modes' values. */
 static PetscErrorCode Restore(Work *o)
 {
   HycoROM m = o->m;
@@ -233,6 +239,7 @@ static PetscErrorCode Check(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* After an error the model has no current solution: its state may be that of a difference. */
 PetscErrorCode HycoROMGetGradient(HycoROM m, HycoGradient *gradient)
 {
   Work o = {.m = m};
