@@ -56,6 +56,7 @@ static PetscErrorCode ReadSettings(Settings *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* An empty meaning: the option is declared once, as target_, in DeclareFit(). */
 static PetscErrorCode ReadTarget(Fit *f, PetscInt output, const char name[])
 {
   char key[DRIVER_LINE], text[PETSC_MAX_PATH_LEN], *end;
@@ -108,12 +109,14 @@ static PetscErrorCode ReadTargets(Fit *f)
 
 /* -- the misfit -- */
 
+/* Clipped after the product: lo + 1 (hi - lo) may exceed hi by round-off, which the scene would refuse. */
 static void ToParameters(const Fit *f, const PetscReal x[], PetscReal mu[])
 {
   for (PetscInt p = 0; p < f->n_par; p++)
     mu[p] = PetscMin(PetscMax(f->lo[p] + x[p] * (f->hi[p] - f->lo[p]), f->lo[p]), f->hi[p]);
 }
 
+/* The 2-norm. */
 static PetscReal Size(PetscInt n, const PetscReal v[])
 {
   PetscReal sum = 0;
@@ -136,7 +139,9 @@ static PetscErrorCode Evaluate(Fit *f, const PetscReal x[])
 
   PetscFunctionBegin;
   for (PetscInt p = 0; p < f->n_par; p++) same = (PetscBool)(same && x[p] == f->x[p]);
+  /* TAO asks for residual and Jacobian separately: one prediction and gradient serve both. */
   if (same) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Until all of r, J and x belong together. */
   f->known = PETSC_FALSE;
   ToParameters(f, x, mu);
   PetscCall(HycoROMPredict(f->model, f->n_par, mu));
@@ -149,6 +154,7 @@ static PetscErrorCode Evaluate(Fit *f, const PetscReal x[])
     for (PetscInt p = 0; p < f->n_par; p++) {
       const PetscInt at = f->output[k] * f->n_par + p;
 
+      /* In shares of the ranges and of the targets: TAO's tolerances and steps then have a scale. */
       f->J[k * f->n_par + p] = g.value[at] * (f->hi[p] - f->lo[p]) / f->scale[k];
       f->kink = (PetscBool)(f->kink || g.kink[at]);
     }
@@ -159,6 +165,7 @@ static PetscErrorCode Evaluate(Fit *f, const PetscReal x[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The array is restored after an error too. */
 static PetscErrorCode EvaluateVec(Fit *f, Vec X)
 {
   const PetscScalar *x;
@@ -248,6 +255,7 @@ static PetscErrorCode Start(Fit *f, const Settings *s, PetscReal x[])
   PetscCall(HycoROMSolveMany(f->model, n, n_par, mu, p, NULL, NULL));
   f->evaluations = n;
   for (PetscInt k = 0; k < f->n; k++) {
+    /* Relative to the target; a target of 0 has no scale of its own. */
     f->scale[k] = PetscAbsReal(f->target[k]);
     for (PetscInt i = 0; i < n && f->target[k] == 0; i++)
       f->scale[k] = PetscMax(f->scale[k], PetscAbsReal(p[i].quantity[f->output[k]]));
@@ -255,6 +263,7 @@ static PetscErrorCode Start(Fit *f, const Settings *s, PetscReal x[])
   }
   for (PetscInt i = 0; i < n; i++) {
     Misfit(f, &p[i], r);
+    /* `>=`: of equal starts the first. */
     if (p[i].reason <= 0 || Size(f->n, r) >= least) continue;
     least = Size(f->n, r);
     for (PetscInt q = 0; q < n_par; q++)
@@ -266,7 +275,8 @@ static PetscErrorCode Start(Fit *f, const Settings *s, PetscReal x[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Minimises from X by a type. */
+/* Minimises from X by a type. Bounds 0 and 1; tolerances far below what is judged afterwards, so that IsMinimum()
+   decides. */
 static PetscErrorCode Minimise(Fit *f, const char type[], Vec X)
 {
   const PetscBool squares = (PetscBool)(strcmp(type, TAOBRGN) == 0);
@@ -308,6 +318,7 @@ static PetscBool IsMinimum(const Fit *f)
 
   Slope(f, g);
   for (PetscInt p = 0; p < f->n_par; p++) {
+    /* At an end of the range with the slope pointing outside: the first-order condition holds. */
     const PetscBool held = (PetscBool)((f->x[p] <= 0 && g[p] > 0) || (f->x[p] >= 1 && g[p] < 0));
 
     if (!held) most = PetscMax(most, PetscAbsReal(g[p]));
@@ -315,7 +326,8 @@ static PetscBool IsMinimum(const Fit *f)
   return (PetscBool)(Size(f->n, f->r) <= EXACT || most <= MINIMUM * Size(f->n * f->n_par, f->J) * Size(f->n, f->r));
 }
 
-/* The requested type, and after it the other one if that ends at no minimum. *minimum: the last point is one. */
+/* The requested type, and after it the other one if that ends at no minimum. *minimum: the last point is one. On
+   each rank the same work: a model predicts on one process, and sharing gradients is not worth the messages. */
 static PetscErrorCode Run(Fit *f, const Settings *s, PetscReal mu[], PetscBool *minimum, char method[64])
 {
   PetscScalar *x;
@@ -344,7 +356,8 @@ static PetscErrorCode Run(Fit *f, const Settings *s, PetscReal mu[], PetscBool *
 
 /* -- the answer -- */
 
-/* The scene for the check: the model's, with the outputs that have targets. Collective. */
+/* The scene for the check: the model's, with the outputs that have targets. Collective. The full-order scene may
+   have other outputs, in another order: at[] maps those with targets. */
 static PetscErrorCode LoadScene(const Fit *f, const char path[], HycoScene *scene, PetscInt at[])
 {
   const char *names[HYCO_MAX_QUANTITIES];
@@ -362,7 +375,8 @@ static PetscErrorCode LoadScene(const Fit *f, const char path[], HycoScene *scen
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One full-order solve at the answer: full[k], the outputs with targets. Collective. */
+/* One full-order solve at the answer: full[k], the outputs with targets. Collective. Fails before anything is
+   written: an answer that full order cannot confirm is none. */
 static PetscErrorCode Check(const Fit *f, HycoScene scene, const PetscInt at[], const PetscReal mu[], PetscReal full[])
 {
   HycoFOM fom;
@@ -419,6 +433,7 @@ static PetscErrorCode PrintAnswer(const Fit *f, const PetscReal mu[], const Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A fit that ended at no minimum is a miss (exit status 3), with its report written. */
 static PetscErrorCode Report(Fit *f, const PetscReal mu[], const PetscReal full[], PetscBool minimum,
                              const char method[])
 {
@@ -451,7 +466,7 @@ static PetscErrorCode Report(Fit *f, const PetscReal mu[], const PetscReal full[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -mu or -mu_NAME as the start. */
+/* -mu or -mu_NAME as the start. Without -mu the start is searched; DriverGetPoint() would require all parameters. */
 static PetscErrorCode ReadStart(const Fit *f, Settings *s)
 {
   const char *const *names;
@@ -492,6 +507,7 @@ PetscErrorCode DeclareFit(PetscOptions options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The scene, if given, is loaded and checked before the fit, so that a mismatch is not found only after it. */
 PetscErrorCode CommandFit(void)
 {
   Fit f = {0};
