@@ -37,7 +37,7 @@ typedef struct {
   HycoAtom *atom;
   Row *row;
   PetscReal *area, *pressure; /* by contact of the model */
-  HycoFit base, response;
+  HycoExportFit base, response;
   HycoExportModel out;
 } Export;
 
@@ -401,7 +401,7 @@ static PetscErrorCode FreeSamples(Samples *o)
 }
 
 /* Sets the arrays to NULL, so that a fit may be tried again. */
-static PetscErrorCode FreeFit(HycoFit *fit)
+static PetscErrorCode FreeFit(HycoExportFit *fit)
 {
   PetscFunctionBegin;
   PetscCall(PetscFree(fit->function));
@@ -422,7 +422,7 @@ static void Scale(const Export *e, const Samples *o, PetscReal scale[])
 }
 
 /* Functions of the first level that suffices, up to the last one; else of that. */
-static PetscErrorCode Fit(Export *e, PetscInt last, const HycoFitData *data, HycoFit *fit)
+static PetscErrorCode Fit(Export *e, PetscInt last, const HycoFitData *data, HycoExportFit *fit)
 {
   PetscFunctionBegin;
   fit->worst = PETSC_MAX_REAL;
@@ -480,7 +480,7 @@ static PetscErrorCode Refuse(Export *e)
 /* -- the arrays -- */
 
 /* The functions of both fits, each once; place[n]: where those of a fit are. */
-static PetscErrorCode Merge(Export *e, const HycoFit *fit, PetscInt place[])
+static PetscErrorCode Merge(Export *e, const HycoExportFit *fit, PetscInt place[])
 {
   HycoExportModel *o = &e->out;
 

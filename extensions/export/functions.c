@@ -263,7 +263,7 @@ static PetscErrorCode Choose(const HycoFitData *d, PetscInt *n, HycoFunction f[]
 }
 
 /* Least squares at the fitted points: coefficient (n_rows x n), and the error at the others. */
-static PetscErrorCode Solve(const HycoFitData *d, PetscInt n, const PetscReal value[], HycoFit *fit)
+static PetscErrorCode Solve(const HycoFitData *d, PetscInt n, const PetscReal value[], HycoExportFit *fit)
 {
   const PetscInt N = d->n_points;
   PetscReal *A, *P, *scale;
@@ -311,7 +311,7 @@ static PetscErrorCode Solve(const HycoFitData *d, PetscInt n, const PetscReal va
 }
 
 /* The functions whose largest part of any row exceeds a share of the row's group; n: their number. */
-static PetscErrorCode Prune(const HycoFitData *d, const HycoFit *fit, PetscReal share, const PetscReal value[],
+static PetscErrorCode Prune(const HycoFitData *d, const HycoExportFit *fit, PetscReal share, const PetscReal value[],
                             PetscInt *n, PetscInt keep[])
 {
   PetscReal *part;
@@ -336,12 +336,12 @@ static PetscErrorCode Prune(const HycoFitData *d, const HycoFit *fit, PetscReal 
 }
 
 /* Leaves out the functions that are round-off, as long as the fit is as good. */
-static PetscErrorCode Reduce(const HycoFitData *d, PetscReal tol, PetscReal value[], HycoFit *fit)
+static PetscErrorCode Reduce(const HycoFitData *d, PetscReal tol, PetscReal value[], HycoExportFit *fit)
 {
   static const PetscReal share[] = {1e-6, 1e-9, 1e-12};
   PetscInt *keep;
   PetscReal *less;
-  HycoFit trial;
+  HycoExportFit trial;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(fit->n, &keep, (size_t)fit->n * (size_t)d->n_points, &less));
@@ -368,7 +368,7 @@ static PetscErrorCode Reduce(const HycoFitData *d, PetscReal tol, PetscReal valu
 
 /* Both arrays are the caller's, also when worst > tol. */
 PetscErrorCode HycoFitFunctions(HycoScene s, PetscInt n_atoms, const HycoAtom atom[], PetscInt level, PetscReal tol,
-                                const HycoFitData *d, HycoFit *fit)
+                                const HycoFitData *d, HycoExportFit *fit)
 {
   const PetscInt most = Candidates(n_atoms, level, NULL);
   PetscReal *value;

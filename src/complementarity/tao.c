@@ -458,15 +458,46 @@ PetscErrorCode HycoTaoSolve(HycoTao t, Mat H, Vec f, Vec lo, Vec hi, Vec y, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The bounds of a dense problem's z: none of its p free unknowns and of blocks whose law is no sign, 0 and infinity of
+   the others. They are kept with the Tao. */
+static PetscErrorCode SetForceBounds(HycoTao t, Vec z)
+{
+  const HycoBlocks *blocks = t->lcp->blocks;
+  Vec lo, hi;
+  PetscScalar *l;
+
+  PetscFunctionBegin;
+  if (t->tao->XL && !blocks && t->n_free == t->lcp->p) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecDuplicate(z, &lo));
+  PetscCall(VecDuplicate(z, &hi));
+  PetscCall(VecSet(hi, PETSC_INFINITY));
+  PetscCall(VecGetArrayWrite(lo, &l));
+  for (PetscInt i = 0; i < t->lcp->p + t->lcp->n; i++) l[i] = i < t->lcp->p ? PETSC_NINFINITY : 0;
+  for (PetscInt k = 0; blocks && k < blocks->n; k++) {
+    for (PetscInt i = blocks->row[k]; i < blocks->row[k + 1] && !blocks->cone[blocks->of[k]]->nonnegative; i++)
+      l[t->lcp->p + i] = PETSC_NINFINITY;
+  }
+  PetscCall(VecRestoreArrayWrite(lo, &l));
+  PetscCall(TaoSetVariableBounds(t->tao, lo, hi));
+  t->n_free = blocks ? -1 : t->lcp->p;
+  PetscCall(VecDestroy(&lo));
+  PetscCall(VecDestroy(&hi));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Solves by hyco's own types, unscaled; y: the Tao's solution. Compared with a direct call, an online solve of the
    rope's models (the smallest ones) takes 1 us more, of 10 to 15 us. */
-static PetscErrorCode SolveOwn(HycoTao t, Vec y, PetscInt max_its)
+static PetscErrorCode SolveOwn(HycoTao t, Vec hi, Vec y, PetscInt max_its)
 {
   PetscBool made;
 
   PetscFunctionBegin;
   PetscCall(Prepare(t, y, max_its, &made));
   if (made) PetscCall(ReadOptions(t));
+  if (t->set)
+    PetscCall(TaoSetVariableBounds(t->tao, NULL, hi));
+  else
+    PetscCall(SetForceBounds(t, y));
   PetscCall(TaoSetMaximumIterations(t->tao, max_its)); /* -hyco_tao_max_it is for TAO's types, which this type may
                                                           replace as a fallback */
   PetscCall(TaoSetSolution(t->tao, y));
@@ -474,8 +505,8 @@ static PetscErrorCode SolveOwn(HycoTao t, Vec y, PetscInt max_its)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* hyco's active set with the functions of a form; y has the size of the unknowns only. Collective. */
-PetscErrorCode HycoTaoSolveSet(HycoTao t, const HycoActiveSet *set, PetscBool active[], Vec y, PetscInt *its,
+/* hyco's active set with the functions of a form. Collective. */
+PetscErrorCode HycoTaoSolveSet(HycoTao t, const HycoActiveSet *set, PetscBool active[], Vec hi, Vec y, PetscInt *its,
                                HycoLCPStatus *status)
 {
   PetscFunctionBegin;
@@ -484,7 +515,8 @@ PetscErrorCode HycoTaoSolveSet(HycoTao t, const HycoActiveSet *set, PetscBool ac
   t->active = active;
   t->monitor = set->monitor;
   t->monitor_ctx = set->monitor_ctx;
-  PetscCall(SolveOwn(t, y, set->max_its));
+  PetscCall(SolveOwn(t, hi, y, set->max_its));
+  PetscCall(TaoSetVariableBounds(t->tao, NULL, NULL)); /* hi is as large as y: not kept */
   *its = t->its;
   *status = t->status;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -577,7 +609,7 @@ PetscErrorCode HycoTaoSolveLCP(HycoTao t, const HycoLCP *lcp, PetscBool active[]
     t->monitor = lcp->monitor;
     t->monitor_ctx = lcp->monitor_ctx;
     PetscCall(PlaceSolution(t, lcp->p + lcp->n, z));
-    PetscCall(SolveOwn(t, t->placed, t->traits & HYCO_TAO_DENSE ? 50 * (lcp->n + 10) : limit));
+    PetscCall(SolveOwn(t, NULL, t->placed, t->traits & HYCO_TAO_DENSE ? 50 * (lcp->n + 10) : limit));
     /* Before z goes out of scope in the caller. */
     PetscCall(VecResetArray(t->placed));
     *its = t->its;

@@ -33,6 +33,8 @@ PetscErrorCode HycoFEDestroy(HycoFE *fe)
   PetscCall(PetscFree((*fe)->u0));
   PetscCall(PetscFree((*fe)->kept));
   PetscCall(PetscFree((*fe)->kept_mean));
+  PetscCall(PetscFree((*fe)->weight));
+  PetscCall(PetscFree((*fe)->weighed_at));
   PetscCall(PetscFree((*fe)->tangent));
   PetscCall(PetscFree((*fe)->tangent_start));
   PetscCall(PetscFree((*fe)->tangent_size));
@@ -401,6 +403,24 @@ HycoChanges HycoSceneChanges(HycoScene s, const PetscBool changed[])
   return c;
 }
 
+static PetscBool AnyChanges(HycoExpr const e[3], const PetscBool changed[])
+{
+  return (PetscBool)(HycoExprChanges(e[0], changed) || HycoExprChanges(e[1], changed) ||
+                     HycoExprChanges(e[2], changed));
+}
+
+PetscBool HycoSceneLoadsChange(HycoScene s, const PetscBool changed[])
+{
+  PetscBool any = PETSC_FALSE;
+
+  for (PetscInt k = 0; k < s->n_loads; k++)
+    any = (PetscBool)(any || HycoExprChanges(s->load[k].pressure, changed) || AnyChanges(s->load[k].traction, changed));
+  for (PetscInt k = 0; k < s->n_point_loads; k++) any = (PetscBool)(any || AnyChanges(s->point_load[k].force, changed));
+  for (PetscInt b = 0; b < s->n_bodies; b++)
+    any = (PetscBool)(any || AnyChanges(s->body[b].force, changed) || HycoSceneHasInertia(s, &s->body[b], changed));
+  return any;
+}
+
 /* By parameter: whether K or B depends on it; others act on F and D only, so that a factor of K stays valid. */
 void HycoSceneReaches(HycoScene scene, PetscBool reaches[])
 {
@@ -443,9 +463,24 @@ PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
   }
   /* After the nodes: values and directions may depend on the position. */
   if (first || !fe->fixed_constant) PetscCall(SetSupports(fe));
-  if (fe->temperature) PetscCall(HycoFESetHeat(fe, (PetscBool)(first || c.nodes), changed));
-  if (fe->stiffness_changed) PetscCall(HycoFESetTangents(fe, first));
-  if (fe->stiffness_changed) PetscCall(HycoSpringsSet(fe));
+  if (!fe->without_cells) {
+    if (fe->temperature) PetscCall(HycoFESetHeat(fe, (PetscBool)(first || c.nodes), changed));
+    if (fe->stiffness_changed) PetscCall(HycoFESetTangents(fe, first, c.nodes, changed));
+    if (fe->stiffness_changed) PetscCall(HycoSpringsSet(fe));
+  }
   fe->ready = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFEUseCells(HycoFE fe, PetscBool use)
+{
+  const PetscBool late = (PetscBool)(use && fe->without_cells);
+
+  PetscFunctionBegin;
+  fe->without_cells = (PetscBool)!use;
+  if (!late) PetscFunctionReturn(PETSC_SUCCESS);
+  if (fe->temperature) PetscCall(HycoFESetHeat(fe, PETSC_TRUE, NULL));
+  PetscCall(HycoFESetTangents(fe, PETSC_TRUE, PETSC_TRUE, NULL));
+  PetscCall(HycoSpringsSet(fe));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -493,7 +493,7 @@ PetscErrorCode HycoFEStep(HycoFE fe, const PetscReal u[], PetscReal t0, PetscRea
 PetscErrorCode HycoFEElasticTangent(HycoFE fe)
 {
   PetscFunctionBegin;
-  PetscCall(HycoFESetTangents(fe, PETSC_FALSE));
+  PetscCall(HycoFESetTangents(fe, PETSC_FALSE, PETSC_TRUE, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

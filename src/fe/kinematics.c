@@ -87,6 +87,27 @@ PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoPointWeights(HycoFE fe, const HycoElement *el, PetscInt cell, const PetscReal *weight[])
+{
+  const PetscInt *node = fe->mesh->cells + cell * fe->mesh->nv;
+  PetscReal *w;
+
+  PetscFunctionBegin;
+  if (!fe->weight) {
+    PetscCall(PetscMalloc1(fe->mesh->n_cells * el->nq, &fe->weight));
+    PetscCall(PetscCalloc1(fe->mesh->n_cells, &fe->weighed_at));
+  }
+  *weight = w = fe->weight + cell * el->nq;
+  if (fe->weighed_at[cell] == fe->place) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt q = 0; q < el->nq; q++) {
+    w[q] = PetscAbsReal(HycoDeterminant(el, node, fe->X, q)) * el->w[q];
+    if (fe->formulation == HYCO_AXISYMMETRIC) w[q] *= 2 * PETSC_PI * Radius(fe, el->nv, node, el->N[q]);
+    if (fe->cell_weight) w[q] *= fe->cell_weight[cell];
+  }
+  fe->weighed_at[cell] = fe->place;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Mean gradients of the cells of bodies with bbar, from the stored gradients. */
 static PetscErrorCode KeepMeans(HycoFE fe, const HycoElement *el)
 {

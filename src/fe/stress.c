@@ -34,8 +34,14 @@ static PetscErrorCode AtPoint(HycoFE fe, const HycoElement *el, PetscInt cell, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Volume means by cell, sigma[n_cells][n_sigma], of the elastic stress C (e - e_thermal). */
 PetscErrorCode HycoFEStress(HycoFE fe, const PetscReal u[], PetscReal sigma[])
+{
+  PetscFunctionBegin;
+  PetscCall(HycoFEStressIn(fe, NULL, u, sigma));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFEStressIn(HycoFE fe, const PetscBool in[], const PetscReal u[], PetscReal sigma[])
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
 
@@ -45,6 +51,7 @@ PetscErrorCode HycoFEStress(HycoFE fe, const PetscReal u[], PetscReal sigma[])
     PetscReal volume = 0;
     Mean mean;
 
+    if (in && !in[cell]) continue;
     PetscCall(GetMean(fe, el, cell, &mean));
     for (PetscInt q = 0; q < el->nq; q++) {
       PetscReal e[6], s[6], w;

@@ -6,6 +6,8 @@
 #define STAYS                                                                                                          \
   0.5 /* share of that difference which remains at a quarter of the step, where curvature leaves a quarter */
 #define ROUND 1e-9 /* share of a value below which a difference may be round-off */
+#define NOISE                                                                                                          \
+  3e-13 /* share of a value below which its change over a step is round-off: as a derivative 1e-8 of it over the range */
 
 /* For gradients at full order and of models. A history's outputs depend on the whole path. */
 PetscErrorCode HycoGradientCheckScene(HycoScene s)
@@ -147,6 +149,7 @@ static void Set(HycoGradient *g, HycoGradientStore *store, const HycoDifference 
     if (turns) HycoDifferenceTakeSide(&side);
     store->value[at] = 0;
     for (PetscInt k = 0; k < 3; k++) store->value[at] += side.weight[k] * value[k * n + q];
+    if (PetscAbsReal(store->value[at] * d->step[1]) <= NOISE * PetscAbsReal(value[q])) store->value[at] = 0;
     store->kink[at] = (PetscBool)(kink || turns);
   }
 }
@@ -163,6 +166,14 @@ static PetscErrorCode MeasureBeside(HycoScene scene, const PetscReal mu[], const
     PetscCall((*measure)(context, at, d->step[j], value + j * scene->n_quantities));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscBool HycoGradientSetSmooth(HycoGradient *g, HycoGradientStore *store, const HycoDifference *d, PetscBool kink,
+                                const PetscReal value[])
+{
+  if (NeedsCloser(g, d, value)) return PETSC_FALSE;
+  Set(g, store, d, value, NULL, kink);
+  return PETSC_TRUE;
 }
 
 PetscErrorCode HycoGradientColumn(HycoGradient *g, HycoGradientStore *store, HycoScene scene, const PetscReal mu[],

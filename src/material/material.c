@@ -213,6 +213,16 @@ PetscBool HycoMaterialChanges(HycoMaterial material, const PetscBool changed[])
   return any && material->ops->depends ? (*material->ops->depends)(material, constant) : any;
 }
 
+PetscBool HycoMaterialInSpace(HycoMaterial material)
+{
+  for (PetscInt j = 0; j < material->constants.n; j++) {
+    const HycoExpr expr = material->constants.entry[j].expr;
+
+    if (HycoExprInSpace(expr) || HycoExprInHeat(expr)) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
 /* Whether the law consists only of Lame's constants. */
 static PetscBool IsLame(HycoMaterial material)
 {
