@@ -34,7 +34,7 @@ static const Page pages[] = {
      {"hyco compare -scene examples/rope -model rope.h5 -grid 20,24 -table c.csv",
       "hyco compare -scene examples/rope -model rope.h5 -scatter 200 -report c.json"}},
     {"fit",
-     {"model", "target_", "scene", "mu", "mu_", "fit_starts", "fit_type", "report", "quiet"},
+     {"model", "target_", "scene", "mu", "mu_", "starts", "fit_starts", "fit_type", "report", "quiet"},
      {"hyco fit -model roller.h5 -target_lift 6.5 -target_peak 1.1 -scene examples/roller",
       "hyco fit -model roller.h5 -target_lift 6.5 -mu 0,0.5,10 -fit_type blmvm -report fit.json"}},
     {"export",

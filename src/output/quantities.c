@@ -107,6 +107,28 @@ PetscErrorCode HycoQuantitiesMarkCells(HycoScene scene, HycoMesh m, PetscBool ne
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether a quantity is one of a stress. */
+static PetscBool OfStress(const HycoQuantity *q)
+{
+  return (PetscBool)(q->kind <= HYCO_QUANTITY_MEAN && q->field >= XX);
+}
+
+PetscErrorCode HycoQuantitiesMarkStressed(HycoScene scene, HycoMesh m, PetscBool stressed[])
+{
+  PetscBool *in;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(m->n_cells, &in));
+  PetscCall(PetscArrayzero(stressed, m->n_cells));
+  for (PetscInt k = 0; k < scene->n_quantities; k++) {
+    if (!OfStress(&scene->quantity[k])) continue;
+    PetscCall(HycoQuantityMarkCells(scene, m, k, in));
+    for (PetscInt e = 0; e < m->n_cells; e++) stressed[e] = (PetscBool)(stressed[e] || in[e]);
+  }
+  PetscCall(PetscFree(in));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* field: U is the length of the displacement, UX .. its components. */
 static PetscReal OfNode(HycoFE fe, PetscInt field, const PetscReal u[], PetscInt node)
 {
@@ -166,6 +188,80 @@ static PetscErrorCode OfCell(HycoFE fe, PetscInt field, const PetscReal sigma[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+#define CLOSE 0.01 /* share of an extreme, within which the field may become it by a small change */
+
+/* Keeps the marked cells in which the field is close to the extreme `value`. */
+static PetscErrorCode KeepClose(HycoFE fe, const HycoQuantity *q, const PetscReal u[], const PetscReal sigma[],
+                                PetscReal value, PetscBool in[])
+{
+  HycoMesh m = fe->mesh;
+  PetscInt node[HYCO_MAX_CELL_NODES];
+
+  PetscFunctionBegin;
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    const PetscInt n = in[e] ? HycoMeshCellNodes(m, e, node) : 0;
+    PetscReal least = PETSC_MAX_REAL, here;
+
+    for (PetscInt v = 0; v < n && q->field < XX; v++)
+      least = PetscMin(least, PetscAbsReal(OfNode(fe, q->field, u, node[v]) - value));
+    if (n && q->field >= XX) {
+      PetscCall(OfCell(fe, q->field, sigma, e, &here));
+      least = PetscAbsReal(here - value);
+    }
+    in[e] = (PetscBool)(in[e] && least <= CLOSE * PetscAbsReal(value));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Keeps one marked cell, at a node of the group that a support holds along the axis. */
+static PetscErrorCode KeepSupported(HycoFE fe, const HycoQuantity *q, PetscBool in[])
+{
+  HycoMesh m = fe->mesh;
+  PetscInt of[HYCO_MAX_CELL_NODES], n, held = -1, kept = -1;
+  Place p;
+
+  PetscFunctionBegin;
+  PetscCall(FindPlace(fe->scene, m, q, &p));
+  n = p.group < 0 ? m->n_nodes : m->group_start[p.group + 1] - m->group_start[p.group];
+  for (PetscInt k = 0; k < n && held < 0; k++) {
+    const PetscInt i = p.group < 0 ? k : m->group_node[m->group_start[p.group] + k];
+
+    if (HycoFESupports(fe, i * m->dim + q->field)) held = i;
+  }
+  for (PetscInt e = 0; e < m->n_cells && kept < 0; e++) {
+    const PetscInt n_of = in[e] ? HycoMeshCellNodes(m, e, of) : 0;
+
+    for (PetscInt v = 0; v < n_of; v++) kept = of[v] == held ? e : kept;
+  }
+  for (PetscInt e = 0; e < m->n_cells && kept >= 0; e++) in[e] = (PetscBool)(e == kept);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoQuantitiesMarkDecisive(HycoFE fe, const PetscReal u[], const PetscReal sigma[],
+                                          const PetscReal value[], PetscBool balanced, PetscBool needed[],
+                                          PetscBool stressed[])
+{
+  const HycoScene scene = fe->scene;
+  HycoMesh m = fe->mesh;
+  PetscBool *in;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(m->n_cells, &in));
+  PetscCall(PetscArrayzero(needed, m->n_cells));
+  PetscCall(PetscArrayzero(stressed, m->n_cells));
+  for (PetscInt k = 0; k < scene->n_quantities; k++) {
+    const HycoQuantity *q = &scene->quantity[k];
+
+    PetscCall(HycoQuantityMarkCells(scene, m, k, in));
+    if (q->kind < HYCO_QUANTITY_MEAN) PetscCall(KeepClose(fe, q, u, sigma, value[k], in));
+    if (q->kind == HYCO_QUANTITY_REACTION && balanced && !fe->n_oblique) PetscCall(KeepSupported(fe, q, in));
+    for (PetscInt e = 0; e < m->n_cells; e++) needed[e] = (PetscBool)(needed[e] || in[e]);
+    for (PetscInt e = 0; e < m->n_cells && OfStress(q); e++) stressed[e] = (PetscBool)(stressed[e] || in[e]);
+  }
+  PetscCall(PetscFree(in));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Over all processes' copies: extremes need no owner. */
 static void Extend(Sum *s, PetscReal value)
 {
@@ -182,18 +278,18 @@ static PetscErrorCode AddEntity(HycoFE fe, const HycoQuantity *quantity, const P
   HycoMesh m = fe->mesh;
   const HycoElement *el = facet < 0 ? HycoElementGet(m->type) : HycoElementGetFacet(m->type);
   const PetscInt *node = facet < 0 ? m->cells + cell * m->nv : m->facets + facet * m->nf, field = quantity->field;
+  const PetscReal *weight = NULL;
 
   PetscFunctionBegin;
   if (value) Extend(s, *value);
   for (PetscInt a = 0; a < el->nv && !value; a++) Extend(s, OfNode(fe, field, u, node[a]));
   if (HycoMeshOwned(m, node[0]) < 0) PetscFunctionReturn(PETSC_SUCCESS); /* added by another process */
   s->weight += quantity->kind != HYCO_QUANTITY_MEAN;
+  if (facet < 0 && quantity->kind == HYCO_QUANTITY_MEAN) PetscCall(HycoPointWeights(fe, el, cell, &weight));
   for (PetscInt q = 0; q < el->nq && quantity->kind == HYCO_QUANTITY_MEAN; q++) {
-    PetscReal g[HYCO_CELL_NODES][3], n[3], w = 0, here = value ? *value : 0;
+    PetscReal n[3], w = facet < 0 ? weight[q] : 0, here = value ? *value : 0;
 
-    if (facet < 0) {
-      PetscCall(HycoGradients(fe, el, cell, q, g, &w));
-    } else {
+    if (facet >= 0) {
       PetscCall(HycoFacetNormal(fe, el, facet, q, n));
       for (PetscInt c = 0; c < 3; c++) w += n[c] * n[c];
       /* The length of the normal is the weighted area. */

@@ -59,7 +59,7 @@ PetscErrorCode HycoROMPredict(HycoROM m, PetscInt n, const PetscReal mu[])
   p = &m->prediction;
   PetscCall(HycoSceneCheckParameters(m->model->scene, n, mu));
   /* Before the set-up, so that after an error no getter returns the results of the prediction before. */
-  m->solved = m->whole_current = m->balanced = PETSC_FALSE;
+  m->solved = m->measured = m->whole_current = m->balanced = PETSC_FALSE;
   HycoLogged(HYCO_EVENT_SETUP, HycoROMSetUp(m));
   p->seconds.setup = HycoNow() - begin;
   begin = HycoNow();
@@ -127,6 +127,7 @@ PetscErrorCode HycoROMReset(HycoROM m)
   if (m->work || !m->model->traits.work) PetscTryTypeMethod(m, reset);
   PetscCall(PetscFree(m->work));
   PetscCall(HycoOutputCellsDestroy(&m->output_cells));
+  PetscCall(HycoOutputCellsDestroy(&m->few));
   PetscCall(HycoCarriedDestroy(&m->carried));
   PetscCall(HycoFEDestroy(&m->fe_floating));
   PetscCall(HycoSolverDestroy(&m->solver));

@@ -146,6 +146,7 @@ PetscErrorCode HycoROMGetPrediction(HycoROM m, HycoPrediction *out)
   PetscCall(MeasureDisplacements(m, p));
   PetscCall(MeasureContacts(m, p));
   PetscCall(HycoROMMeasureQuantities(m, p));
+  m->measured = PETSC_TRUE;
   PetscCall(HycoEstimatesEvaluate(m, p));
   PetscCall(MeasureEquilibrium(m, p));
   *out = *p;

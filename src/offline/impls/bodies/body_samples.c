@@ -16,11 +16,13 @@
 static PetscReal Node(HycoReducer t, HycoSubstructures b, PetscInt p, PetscInt n, PetscInt k)
 {
   const PetscReal share = (1 - PetscCosReal(PETSC_PI * ((PetscReal)k / (PetscReal)(n - 1)))) / 2;
-  PetscReal lo = t->scene->lo[b->theta[p]], hi = t->scene->hi[b->theta[p]];
+  const PetscInt variable = b->variable[p];
+  const PetscReal lo = t->scene->lo[b->theta[p]], hi = t->scene->hi[b->theta[p]];
+  const PetscReal first = HycoBodiesVariable(variable, lo), last = HycoBodiesVariable(variable, hi);
 
   if (!k) return lo;
   if (k == n - 1) return hi;
-  return b->logarithm[p] ? lo * PetscPowReal(hi / lo, share) : lo + share * (hi - lo);
+  return HycoBodiesValue(variable, first + share * (last - first));
 }
 
 /* A node of the grid is a sample of the body only at the first value of the axes that do not change it, so that
@@ -54,11 +56,8 @@ static PetscErrorCode SetGrid(HycoReducer t, HycoSubstructures b)
   PetscCall(PetscMalloc1(n + 1, &b->node));
   n = 0;
   for (PetscInt p = 0; p < b->n_theta; p++) {
-    for (PetscInt k = 0; k < b->n_nodes[p]; k++) {
-      b->node[n] = Node(t, b, p, b->n_nodes[p], k);
-      if (b->logarithm[p]) b->node[n] = PetscLogReal(b->node[n]);
-      n++;
-    }
+    for (PetscInt k = 0; k < b->n_nodes[p]; k++)
+      b->node[n++] = HycoBodiesVariable(b->variable[p], Node(t, b, p, b->n_nodes[p], k));
   }
   for (PetscInt k = 0; k < b->n; k++) {
     for (PetscInt p = 0; p < b->n_theta; p++) b->body[k].tensor.n[p] = HycoBodiesAxis(b, k, p) ? b->n_nodes[p] : 1;

@@ -8,6 +8,8 @@
 #define SEARCHED      200  /* such points */
 #define LEAST         3    /* values of each of the parameters theta */
 #define MOST_THETA    3    /* parameters that change the shape of bodies */
+#define BENDS         4    /* parts of a parameter's range over which nodes move along lines or not */
+#define STRAIGHTER    0.1  /* share of the squared distance from a line from which another variable is better */
 
 /* -- before the solves -- */
 
@@ -266,25 +268,93 @@ static PetscErrorCode Select(HycoReducer t, HycoSubstructures b, Mat *N)
 
 /* -- the model -- */
 
-/* The parameters theta, and which bodies each changes, with values enough to begin with. The logarithm of one that moves nothing and varies much is interpolated. */
+/* The nodes at mu with parameter p at a share of its range: X (3 a node of the part). Collective. */
+static PetscErrorCode NodesAt(HycoReducer t, const PetscReal first[], PetscInt p, PetscReal value, PetscReal X[])
+{
+  HycoFOM f = t->fom;
+  PetscReal mu[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  PetscCall(PetscArraycpy(mu, first, t->scene->n_variables));
+  mu[p] = value;
+  HycoOnEach(HycoComm(f), HycoFESetParameters(f->fe, mu));
+  PetscCall(PetscArraycpy(X, f->fe->X, 3 * f->part->n_nodes));
+  f->fe->ready = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* distance[]: by variable, how far the nodes of the bodies whose shape parameter p changes are from straight lines over
+   its range, squared. Collective. */
+static PetscErrorCode Bends(HycoReducer t, const PetscReal mu[], PetscInt p, PetscReal distance[])
+{
+  const HycoBodyParts *parts = &HycoTrainingOfBodies(t)->parts;
+  const PetscReal lo = t->scene->lo[p], hi = t->scene->hi[p];
+  const PetscInt n = t->fom->part->n_nodes;
+  PetscReal *X, *from, *to;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc3(3 * n + 1, &X, 3 * n + 1, &from, 3 * n + 1, &to));
+  PetscCall(NodesAt(t, mu, p, lo, from));
+  PetscCall(NodesAt(t, mu, p, hi, to));
+  PetscCall(PetscArrayzero(distance, HYCO_BODIES_VARIABLES));
+  for (PetscInt k = 1; k < BENDS; k++) {
+    const PetscReal value = lo + (hi - lo) * k / BENDS;
+
+    PetscCall(NodesAt(t, mu, p, value, X));
+    for (PetscInt g = 0; g < HYCO_BODIES_VARIABLES; g++) {
+      const PetscReal first = HycoBodiesVariable(g, lo);
+      const PetscReal share = (HycoBodiesVariable(g, value) - first) / (HycoBodiesVariable(g, hi) - first);
+
+      for (PetscInt i = 0; i < 3 * n; i++) {
+        const PetscInt body = parts->of[i / 3];
+
+        if (HycoMeshOwned(t->fom->part, i / 3) < 0) continue;
+        if (!(parts->enters[body * parts->n_parameters + p] & HYCO_ENTERS_SHAPE)) continue;
+        distance[g] += PetscSqr(X[i] - from[i] - share * (to[i] - from[i]));
+      }
+    }
+  }
+  PetscCall(PetscFree3(X, from, to));
+  HycoAllreduce(distance, HYCO_BODIES_VARIABLES, MPIU_REAL, MPI_SUM, HycoComm(t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What of parameter p is interpolated: the logarithm of one that moves nothing and varies much; of one that moves nodes
+   that in which they move nearly along straight lines, because the stiffness is smooth in the places of the nodes.
+   Collective. */
+static PetscErrorCode ChooseVariable(HycoReducer t, const PetscReal mu[], PetscInt p, PetscInt *variable)
+{
+  const HycoScene s = t->scene;
+  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE};
+  PetscReal distance[HYCO_BODIES_VARIABLES];
+
+  PetscFunctionBegin;
+  *variable = HYCO_BODIES_PLAIN;
+  if (s->lo[p] <= 0 || s->hi[p] <= s->lo[p]) PetscFunctionReturn(PETSC_SUCCESS);
+  changed[p] = PETSC_TRUE;
+  if (!HycoSceneChanges(s, changed).nodes) {
+    if (s->hi[p] > 2 * s->lo[p]) *variable = HYCO_BODIES_LOGARITHM;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(Bends(t, mu, p, distance));
+  for (PetscInt g = 0; g < HYCO_BODIES_VARIABLES; g++) {
+    if (distance[g] < STRAIGHTER * distance[*variable]) *variable = g;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The parameters theta, and which bodies each changes, with values enough to begin with. Collective. */
 static PetscErrorCode TakeTheta(HycoReducer t, HycoSubstructures b)
 {
   const HycoBodyParts *parts = &HycoTrainingOfBodies(t)->parts;
-  const HycoScene s = t->scene;
   PetscInt shape[HYCO_MAX_PARAMETERS];
 
   PetscFunctionBegin;
   b->n_theta = HycoBodyPartsShapes(parts, -1, shape);
   HycoDuplicate(HYCO_MAX_PARAMETERS, shape, &b->theta);
-  PetscCall(PetscCalloc1(b->n_theta + 1, &b->logarithm));
+  PetscCall(PetscCalloc1(b->n_theta + 1, &b->variable));
   PetscCall(PetscCalloc1(b->n_theta + 1, &b->n_nodes));
-  for (PetscInt p = 0; p < b->n_theta; p++) {
-    PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE};
-
-    changed[shape[p]] = PETSC_TRUE;
-    b->logarithm[p] =
-        s->lo[shape[p]] > 0 && s->hi[shape[p]] > 2 * s->lo[shape[p]] && !HycoSceneChanges(s, changed).nodes;
-  }
+  for (PetscInt p = 0; p < b->n_theta; p++) PetscCall(ChooseVariable(t, b->first, shape[p], &b->variable[p]));
   PetscCall(PetscCalloc1(b->n, &b->body));
   for (PetscInt k = 0; k < b->n; k++) {
     for (PetscInt p = 0; p < b->n_theta; p++) {

@@ -209,8 +209,7 @@ PetscInt HycoBodiesGrid(HycoSubstructures b, PetscInt k, PetscReal theta[])
   }
   for (PetscInt p = b->n_theta - 1; theta && p >= 0; p--) {
     node -= b->n_nodes[p];
-    theta[p] = node[k % b->n_nodes[p]];
-    if (b->logarithm[p]) theta[p] = PetscExpReal(theta[p]);
+    theta[p] = HycoBodiesValue(b->variable[p], node[k % b->n_nodes[p]]);
     k /= b->n_nodes[p];
   }
   return n;

@@ -41,7 +41,7 @@ static PetscErrorCode MoveTheta(HycoH5 h, HycoROM m, HycoSubstructures b)
   /* One code for both directions: written from, or read into, the same fields. */
   if (HycoH5Reads(h)) PetscCall(PetscCalloc1(b->n, &b->body));
   PetscCall(HycoH5Int(h, "bodies/theta", 0, m->model->scene->n_parameters - 1, &b->n_theta, 1, &b->theta));
-  PetscCall(HycoH5Int(h, "bodies/logarithm", 0, 1, &b->n_theta, 1, &b->logarithm));
+  PetscCall(HycoH5Int(h, "bodies/logarithm", 0, HYCO_BODIES_VARIABLES - 1, &b->n_theta, 1, &b->variable));
   PetscCall(HycoH5Int(h, "bodies/n_nodes", 1, PETSC_MAX_INT / 64, &b->n_theta, 1, &b->n_nodes));
   for (PetscInt p = 0; p < b->n_theta; p++) nodes += b->n_nodes[p];
   PetscCall(HycoH5Real(h, "bodies/node", &nodes, 1, &b->node));

@@ -46,8 +46,8 @@ PetscErrorCode HycoBodiesResidual(HycoROM m, const PetscReal mu[], const PetscRe
   const HycoBodiesSurface s = SurfaceOf(m);
 
   PetscFunctionBegin;
-  PetscCall(HycoROMBringRows(m, mu));
-  PetscCall(HycoBodiesPrepare(o, &s, mu));
+  if (mu) PetscCall(HycoROMBringRows(m, mu));
+  if (mu) PetscCall(HycoBodiesPrepare(o, &s, mu));
   PetscCall(PetscArraycpy(o->x, z, b->p));
   PetscCall(PetscArraycpy(m->Lambda, z + b->p, m->model->pairs.n));
   HycoBodiesGiven(o, &s, m->Lambda);

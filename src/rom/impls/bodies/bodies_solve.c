@@ -51,7 +51,7 @@ PetscErrorCode HycoBodiesDestroy(HycoSubstructures *bodies)
 
     HycoFreeAll(&s->C, &s->R, &s->Z, &s->work, &s->H, &s->a, &s->g, &s->gram);
   }
-  HycoFreeAll(&b->first, &b->theta, &b->logarithm, &b->n_nodes, &b->node, &b->body, &b->start, &b->dof, &b->inner_start,
+  HycoFreeAll(&b->first, &b->theta, &b->variable, &b->n_nodes, &b->node, &b->body, &b->start, &b->dof, &b->inner_start,
               &b->inner, &b->cell, &b->at, &b->at_body, &b->A, &b->mode_start, &b->turn_start, &b->G);
   if (b->inelastic) {
     HycoBodiesInelastic s = b->inelastic;
@@ -99,7 +99,7 @@ PetscErrorCode HycoBodiesWeights(HycoSubstructures b, PetscInt k, const PetscRea
   PetscReal at[HYCO_MAX_PARAMETERS];
 
   PetscFunctionBegin;
-  for (PetscInt p = 0; p < b->n_theta; p++) at[p] = b->logarithm[p] ? PetscLogReal(mu[b->theta[p]]) : mu[b->theta[p]];
+  for (PetscInt p = 0; p < b->n_theta; p++) at[p] = HycoBodiesVariable(b->variable[p], mu[b->theta[p]]);
   PetscCall(HycoTensorWeights(&b->body[k].tensor, at, weight));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

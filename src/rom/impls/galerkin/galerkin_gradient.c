@@ -53,7 +53,7 @@ PetscErrorCode HycoGalerkinResidual(HycoROM m, const PetscReal mu[], const Petsc
   Vec r, s;
 
   PetscFunctionBegin;
-  PetscCall(HycoGalerkinAssemble(m, mu));
+  if (mu) PetscCall(HycoGalerkinAssemble(m, mu));
   PetscCall(Put(m->n, z, g->x));
   if (m->n_L) PetscCall(Put(m->n_L, z + m->n, g->L));
   if (!w) PetscFunctionReturn(PETSC_SUCCESS);
