@@ -177,24 +177,28 @@ static PetscErrorCode AddItems(Export *e, PetscInt quantity, Output *o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The contacts of an output: of one contact of the scene; -1: all. */
-static PetscErrorCode AddContacts(Export *e, PetscInt contact, const PetscReal weight[], Output *o)
+/* The contacts of an output. */
+static PetscErrorCode AddContacts(Export *e, const HycoQuantity *q, const PetscReal weight[], Output *o)
 {
   const HycoPairs *pairs = &e->m->model->pairs;
+  PetscBool *of;
 
   PetscFunctionBegin;
+  PetscCall(PetscMalloc1(pairs->n, &of));
+  PetscCall(HycoPairsOfQuantity(e->s, e->m->model->mesh, pairs, q, of));
   o->first = e->out.n_contact;
   o->weight = e->out.n_weights;
   for (PetscInt k = 0; k < pairs->n; k++) {
     PetscInt at = 0;
 
-    if (contact >= 0 && pairs->contact[k] != contact) continue;
+    if (!of[k]) continue;
     while (at < e->k && e->contact[at] != k) at++;
     if (at == e->k && (o->kind != PRESSURE_SMALLEST || !e->k)) continue; /* it is always open */
     PetscCall(HycoExportAddContact(&e->out, at < e->k ? at : 0));
     PetscCall(HycoExportAddWeight(&e->out, at < e->k ? weight[k] : 0));
     o->n++;
   }
+  PetscCall(PetscFree(of));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -238,12 +242,8 @@ static PetscErrorCode AddQuantity(Export *e, PetscInt k)
   const char *field = HycoQuantityFields[of_field ? q->field : 0];
   const PetscBool linear = (PetscBool)(of_field && (!strncmp(field, "u_", 2) || !strncmp(field, "sigma_", 6)));
   Output o = {.kind = SUM, .of = COMPONENT, .width = 1, .weight = -1};
-  PetscInt contact = -1;
 
   PetscFunctionBegin;
-  for (PetscInt c = 0; q->contact && c < e->s->n_contacts; c++) {
-    if (!strcmp(e->s->contact[c]->name, q->contact)) contact = c;
-  }
   o.first = e->n_rows;
   /* Extremes and nonlinear means need each item; a linear mean is one affine value. */
   if (kind < HYCO_QUANTITY_MEAN || (kind == HYCO_QUANTITY_MEAN && !linear)) {
@@ -254,7 +254,7 @@ static PetscErrorCode AddQuantity(Export *e, PetscInt k)
     for (PetscInt i = o.first; i < e->n_rows; i++) e->row[i].group = e->out.n_outputs;
   } else if (kind >= HYCO_QUANTITY_AREA) {
     o.kind = kind == HYCO_QUANTITY_AREA ? CLOSED : kind == HYCO_QUANTITY_PRESSURE ? PRESSURE : PRESSURE_SMALLEST;
-    PetscCall(AddContacts(e, contact, kind == HYCO_QUANTITY_AREA ? e->area : e->pressure, &o));
+    PetscCall(AddContacts(e, q, kind == HYCO_QUANTITY_AREA ? e->area : e->pressure, &o));
   } else {
     o.n = 1;
     PetscCall(AddRow(e, (Row){.from = QUANTITY, .index = k, .group = e->out.n_outputs}));
@@ -285,9 +285,10 @@ static PetscErrorCode FindOutputs(Export *e)
     for (PetscInt a = 0; a < 2; a++) {
       Output o = {.kind = a ? PRESSURE : CLOSED};
 
-      PetscCall(AddContacts(e, c, a ? e->pressure : e->area, &o));
-      HycoFormat(name, "%s.%s", s->contact[c]->name, a ? "pressure_max" : "area");
       q.kind = a ? HYCO_QUANTITY_PRESSURE : HYCO_QUANTITY_AREA;
+      q.contact = (char *)s->contact[c]->name; /* borrowed */
+      PetscCall(AddContacts(e, &q, a ? e->pressure : e->area, &o));
+      HycoFormat(name, "%s.%s", s->contact[c]->name, a ? "pressure_max" : "area");
       PetscCall(AddOutput(e, &o, name, HycoExportUnit(s, &q)));
     }
   }

@@ -222,11 +222,28 @@ PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, PetscReal are
    cells of second order, has the mean pressure of itself and the middle of its facet. Collective. */
 PetscErrorCode HycoContactPressures(MPI_Comm comm, HycoFE fe, const HycoPairs *pairs, const PetscReal area[],
                                     const PetscReal lambda[], PetscReal pressure[]);
-/* Results of each contact of the scene (result: room for all; names borrowed from the scene) at fe's mu, from the
-   normals, areas, forces and pressures (pairs->n) of its potential contacts; a force of at most `least` counts as zero. */
-void HycoContactResults(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], const PetscReal area[],
-                        const PetscReal lambda[], const PetscReal pressure[], PetscReal least,
-                        HycoContactResult result[]);
+/* Whether a quantity is of the part of a contact at the nodes of a group. */
+static inline PetscBool HycoQuantityOfPart(const HycoQuantity *q)
+{
+  return (PetscBool)(q->kind >= HYCO_QUANTITY_FORCE && q->group);
+}
+/* How many results a scene has: of each contact, then of the part that each quantity is of. */
+static inline PetscInt HycoSceneResults(HycoScene scene)
+{
+  return scene->n_contacts + scene->n_quantities;
+}
+/* Whether each potential contact (pairs->n) belongs to a quantity of contacts: its slave is of the quantity's contact and
+   group. */
+PetscErrorCode HycoPairsOfQuantity(HycoScene scene, HycoMesh mesh, const HycoPairs *pairs, const HycoQuantity *q,
+                                   PetscBool of[]);
+/* Fails if a quantity is of a part without contacts on all processes. Collective. */
+PetscErrorCode HycoPairsCheckQuantities(MPI_Comm comm, HycoScene scene, HycoMesh mesh, const HycoPairs *pairs);
+/* Results (result: HycoSceneResults(); names borrowed from the scene) at fe's mu, from the normals, areas, forces and
+   pressures (pairs->n) of this process's potential contacts; a force of at most `least` counts as zero; without contacts
+   the smallest pressure is PETSC_MAX_REAL. Not collective: the caller adds the processes. */
+PetscErrorCode HycoContactResults(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], const PetscReal area[],
+                                  const PetscReal lambda[], const PetscReal pressure[], PetscReal least,
+                                  HycoContactResult result[]);
 /* Marks the nodes of the contacts and, where masters lie between nodes, all of the master's group. */
 PetscErrorCode HycoPairsMarkSurfaces(HycoScene scene, HycoMesh mesh, const HycoPairs *pairs, PetscBool node[]);
 

@@ -50,7 +50,7 @@ struct _p_HycoFOM {
      part's cells, on request; forces and gaps of the rank's contacts; on rank 0 the forces of all, on request */
   PetscReal *u, *u_surface, *sigma, *lambda, *gap, *lambda_all;
   struct _n_HycoFieldFile *set;      /* HycoFOMWriteBegin() */
-  HycoContactResult *contact_result; /* by contact of the scene, on request */
+  HycoContactResult *contact_result; /* HycoSceneResults(), on request */
   HycoReaction *reaction;            /* HycoFOMGetReactions() */
   PetscReal *u_all, *sigma_all;      /* on rank 0, on request, in the file's order; on one rank u and sigma */
   PetscBool solved, sigma_ready, all_ready;

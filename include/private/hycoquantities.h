@@ -6,7 +6,7 @@
 
 /* value[scene->n_quantities] from displacements u (n_dof) and cell stresses sigma (n_cells x n_sigma) on fe's mesh,
    or on the processes' parts of it; these three are needed if HycoSceneHasFieldOutputs(). reaction: n_dof, the supports'
-   forces, if HycoSceneHasReactions(). contact: results of each contact of the scene, the same on all processes;
+   forces, if HycoSceneHasReactions(). contact: HycoContactResults(), the same on all processes;
    NULL: not known (NaN). Fails if a group is empty, or for a component that the mesh does not have. Collective. */
 PetscErrorCode HycoQuantitiesMeasure(MPI_Comm comm, HycoFE fe, const PetscReal u[], const PetscReal sigma[],
                                      const PetscReal reaction[], const HycoContactResult contact[], PetscReal value[]);

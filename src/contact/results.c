@@ -99,22 +99,74 @@ static void Add(HycoFE fe, const PetscReal x[3], const PetscReal normal[3], Pets
   }
 }
 
-/* Results by contact of the scene, sums over this process's contacts; lambda > least counts as active; without contacts
-   here the smallest pressure is PETSC_MAX_REAL. Not collective: the caller adds the ranks. */
-void HycoContactResults(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], const PetscReal area[],
-                        const PetscReal lambda[], const PetscReal pressure[], PetscReal least,
-                        HycoContactResult result[])
+/* The nodes of a group are sorted. */
+PetscErrorCode HycoPairsOfQuantity(HycoScene scene, HycoMesh m, const HycoPairs *pairs, const HycoQuantity *q,
+                                   PetscBool of[])
 {
-  for (PetscInt c = 0; c < fe->scene->n_contacts; c++)
-    result[c] = (HycoContactResult){.name = fe->scene->contact[c]->name, .pressure_min = PETSC_MAX_REAL};
-  for (PetscInt k = 0; k < pairs->n; k++) {
-    const PetscReal none[3] = {0, 0, 0}, *shear = pairs->shear ? pairs->shear->force + 3 * k : none;
-    HycoContactResult *r = &result[pairs->contact[k]];
+  PetscInt g = -1;
 
-    r->n++;
-    if (pairs->shear) r->friction_work += pairs->shear->work[k];
-    r->pressure_min = PetscMin(r->pressure_min, lambda[k] > least ? pressure[k] : 0);
-    if (lambda[k] > least)
-      Add(fe, fe->X + 3 * pairs->slave[k], normal + 3 * k, area[k], lambda[k], shear, pressure[k], r);
+  PetscFunctionBegin;
+  if (q->group) PetscCall(HycoMeshFindGroup(m, "output", q->group, &g));
+  for (PetscInt k = 0; k < pairs->n; k++) {
+    PetscInt at = 0;
+
+    if (g >= 0)
+      PetscCall(PetscFindInt(pairs->slave[k], m->group_start[g + 1] - m->group_start[g],
+                             m->group_node + m->group_start[g], &at));
+    of[k] = (PetscBool)(at >= 0 && (!q->contact || !strcmp(q->contact, scene->contact[pairs->contact[k]]->name)));
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A group that no slave node is in would have results of 0. */
+PetscErrorCode HycoPairsCheckQuantities(MPI_Comm comm, HycoScene scene, HycoMesh m, const HycoPairs *pairs)
+{
+  PetscFunctionBegin;
+  for (PetscInt q = 0; q < scene->n_quantities; q++) {
+    const HycoQuantity *quantity = &scene->quantity[q];
+    PetscBool *of;
+    PetscInt n = 0;
+
+    if (!HycoQuantityOfPart(quantity)) continue;
+    PetscCall(PetscMalloc1(pairs->n, &of));
+    PetscCall(HycoPairsOfQuantity(scene, m, pairs, quantity, of));
+    for (PetscInt k = 0; k < pairs->n; k++) n += of[k];
+    PetscCall(PetscFree(of));
+    HycoAllreduce(&n, 1, MPIU_INT, MPI_SUM, comm);
+    HycoCheck(n, "the output %s: no node of the group %s is a slave of %s%s; give a part of a slave surface",
+              quantity->name, quantity->group, quantity->contact ? "the contact " : "a contact",
+              quantity->contact ? quantity->contact : "");
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoContactResults(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], const PetscReal area[],
+                                  const PetscReal lambda[], const PetscReal pressure[], PetscReal least,
+                                  HycoContactResult result[])
+{
+  const HycoScene scene = fe->scene;
+  PetscBool *of;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(pairs->n, &of));
+  for (PetscInt c = 0; c < HycoSceneResults(scene); c++) {
+    const HycoQuantity *q = c < scene->n_contacts ? NULL : &scene->quantity[c - scene->n_contacts];
+    HycoContactResult *r = &result[c];
+
+    *r = (HycoContactResult){.name = q ? q->name : scene->contact[c]->name, .pressure_min = PETSC_MAX_REAL};
+    if (q && !HycoQuantityOfPart(q)) continue;
+    if (q) PetscCall(HycoPairsOfQuantity(scene, fe->mesh, pairs, q, of));
+    for (PetscInt k = 0; k < pairs->n; k++) {
+      const PetscReal none[3] = {0, 0, 0}, *shear = pairs->shear ? pairs->shear->force + 3 * k : none;
+
+      if (q ? !of[k] : pairs->contact[k] != c) continue;
+      r->n++;
+      if (pairs->shear) r->friction_work += pairs->shear->work[k];
+      r->pressure_min = PetscMin(r->pressure_min, lambda[k] > least ? pressure[k] : 0);
+      if (lambda[k] > least)
+        Add(fe, fe->X + 3 * pairs->slave[k], normal + 3 * k, area[k], lambda[k], shear, pressure[k], r);
+    }
+  }
+  PetscCall(PetscFree(of));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }

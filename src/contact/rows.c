@@ -3,6 +3,8 @@
 #include <hycokinematics.h>
 #include <hycovector.h>
 
+#define SMOOTH 30 /* degrees between normals of one surface, at most */
+
 /* The row B T of a node's unknowns for a normal. A force lambda n at the node has these components on the unknowns
    that remain after oblique supports. */
 static void OfUnknowns(HycoFE fe, PetscInt node, const PetscReal normal[3], PetscReal along[3])
@@ -82,6 +84,41 @@ static PetscErrorCode CheckCorner(HycoFE fe, const HycoPairs *pairs, PetscInt k,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether contacts k and j of one slave are parts of one smooth surface: normals averaged over each part differ there by
+   the angle between facets, and the rows, although independent, would leave the force to either contact. Normals that
+   the scene gives for both are taken as they are. */
+static PetscBool AreSmooth(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscInt j, const PetscReal normal[])
+{
+  const HycoContact *of = fe->scene->contact;
+
+  return (PetscBool)((HycoContactAverages(of[pairs->contact[k]]) || HycoContactAverages(of[pairs->contact[j]])) &&
+                     HycoDot(normal + 3 * k, normal + 3 * j) > PetscCosReal(SMOOTH * PETSC_PI / 180));
+}
+
+/* Names the first two contacts that share nodes of a smooth surface, and counts these. */
+static PetscErrorCode CheckSmooth(HycoFE fe, const HycoPairs *pairs, const PetscInt before[], const PetscReal normal[])
+{
+  PetscInt a = -1, b = -1, n = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < pairs->n; k++) {
+    for (PetscInt j = before[k]; j >= 0; j = before[j]) {
+      if (!AreSmooth(fe, pairs, k, j, normal)) continue;
+      a = n ? a : pairs->contact[j];
+      b = n ? b : pairs->contact[k];
+      n += pairs->contact[j] == a && pairs->contact[k] == b;
+    }
+  }
+  HycoCheck(
+      !n,
+      "%d node%s of the contacts %s and %s, whose normals there differ by less than %d degrees, so that one of the "
+      "two would carry the whole force; make one contact of both surfaces (outputs may name a group of it), or, where "
+      "the surface has a corner, give both contacts a normal",
+      (int)n, n == 1 ? " is a slave" : "s are slaves", fe->scene->contact[a]->name, fe->scene->contact[b]->name,
+      SMOOTH);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Contacts with the same slave are chained from the last to the first. */
 static PetscErrorCode CheckCorners(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[])
 {
@@ -91,11 +128,14 @@ static PetscErrorCode CheckCorners(HycoFE fe, const HycoPairs *pairs, const Pets
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(fe->mesh->n_nodes, &last, pairs->n, &before));
   for (PetscInt i = 0; i < fe->mesh->n_nodes; i++) last[i] = -1;
-  for (PetscInt k = 0; k < pairs->n && !ierr; k++) {
+  for (PetscInt k = 0; k < pairs->n; k++) {
     before[k] = -1;
     if (HycoPairsAlone(fe->scene, pairs, k)) continue;
     before[k] = last[pairs->slave[k]];
     last[pairs->slave[k]] = k;
+  }
+  ierr = CheckSmooth(fe, pairs, before, normal);
+  for (PetscInt k = 0; k < pairs->n && !ierr; k++) {
     if (before[k] >= 0) ierr = CheckCorner(fe, pairs, k, before, normal);
   }
   PetscCall(PetscFree2(last, before));

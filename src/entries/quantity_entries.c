@@ -127,8 +127,8 @@ PetscBool HycoSceneHasContactOutputs(HycoScene s)
   return HycoSceneHasOutputs(s, HYCO_QUANTITY_FORCE, HYCO_QUANTITY_PRESSURE_MIN);
 }
 
-/* A quantity of contacts has a contact of the scene or none, and no group; one of a field has no contact. After
-   all contacts are read. */
+/* A quantity of contacts has a contact of the scene or none; one of a field has no contact. After all contacts are
+   read. */
 static PetscErrorCode CheckContact(HycoScene s, const HycoQuantity *q)
 {
   char list[HYCO_LINE] = "";
@@ -139,8 +139,6 @@ static PetscErrorCode CheckContact(HycoScene s, const HycoQuantity *q)
             "a group instead",
             q->name, q->contact);
   if (q->kind < HYCO_QUANTITY_FORCE) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoCheck(!q->group, "the output %s is for a contact and names the group %s; write contact: NAME instead", q->name,
-            q->group);
   HycoCheck(s->n_contacts, "the output %s is for a contact, and the scene has none; remove it", q->name);
   for (PetscInt c = 0; c < s->n_contacts; c++) {
     if (q->contact && strcmp(q->contact, s->contact[c]->name) == 0) PetscFunctionReturn(PETSC_SUCCESS);

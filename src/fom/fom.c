@@ -100,6 +100,7 @@ static PetscErrorCode ReadMesh(HycoFOM f)
   if (f->size > 1) HycoOnEach(HycoComm(f), HycoFECreate(f->scene, f->part->dm, &f->fe));
   f->contact_cpu -= HycoCPU();
   PetscCall(HycoFOMFindContacts(f));
+  PetscCall(HycoPairsCheckQuantities(HycoComm(f), f->scene, f->surface, &f->pairs));
   f->contact_cpu += HycoCPU();
   if (f->size > 1) PetscFunctionReturn(PETSC_SUCCESS);
   HycoOnEach(HycoComm(f), HycoFECreate(f->scene, f->part->dm, &f->fe));

@@ -87,10 +87,10 @@ static PetscErrorCode SumResult(HycoFOM f, HycoContactResult *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Collective. Results by contact of the scene in f->contact_result. */
+/* Collective. Results of contacts and their parts in f->contact_result. */
 static PetscErrorCode SumContacts(HycoFOM f)
 {
-  const PetscInt n = f->scene->n_contacts;
+  const PetscInt n = HycoSceneResults(f->scene);
   HycoContactFields c;
   PetscErrorCode ierr;
 
@@ -98,7 +98,8 @@ static PetscErrorCode SumContacts(HycoFOM f)
   if (!f->contact_result) PetscCall(PetscMalloc1(n, &f->contact_result));
   ierr = HycoContactFieldsCreate(HycoComm(f), f->fe_surface, &f->pairs, f->u_surface, f->lambda, &c);
   if (!ierr)
-    HycoContactResults(f->fe_surface, &f->pairs, c.normal, c.area, f->lambda, c.pressure_of, 0, f->contact_result);
+    ierr =
+        HycoContactResults(f->fe_surface, &f->pairs, c.normal, c.area, f->lambda, c.pressure_of, 0, f->contact_result);
   PetscCall(HycoContactFieldsDestroy(&c));
   PetscCall(ierr);
   for (PetscInt k = 0; k < n; k++) PetscCall(SumResult(f, &f->contact_result[k]));

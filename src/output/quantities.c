@@ -373,10 +373,12 @@ static PetscErrorCode AddReactions(HycoFE fe, const HycoQuantity *q, const Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the results of one contact, or of all of them. contact NULL: the scene is only checked, and the value is
-   not a number. */
-static PetscErrorCode AddContacts(HycoFE fe, const HycoQuantity *q, const HycoContactResult contact[], PetscReal *value)
+/* Adds the results of one contact, or of all of them, or takes those of the part of quantity i. contact NULL: the scene
+   is only checked, and the value is not a number. */
+static PetscErrorCode AddContacts(HycoFE fe, PetscInt i, const HycoContactResult contact[], PetscReal *value)
 {
+  const HycoQuantity *q = &fe->scene->quantity[i];
+  const PetscInt n = fe->scene->n_contacts, part = HycoQuantityOfPart(q) ? n + i : -1;
   const PetscBool turns = (PetscBool)(fe->dim == 3 || (fe->dim == 2 && q->field == 2));
   const PetscBool axisymmetric = (PetscBool)(fe->formulation == HYCO_AXISYMMETRIC);
 
@@ -389,10 +391,10 @@ static PetscErrorCode AddContacts(HycoFE fe, const HycoQuantity *q, const HycoCo
             : fe->dim == 2 ? " in 2D; use z"
                            : " in 1D");
   *value = !contact ? NAN : q->kind == HYCO_QUANTITY_PRESSURE_MIN ? PETSC_MAX_REAL : 0;
-  for (PetscInt c = 0; contact && c < fe->scene->n_contacts; c++) {
+  for (PetscInt c = part < 0 ? 0 : part; contact && c < (part < 0 ? n : part + 1); c++) {
     const HycoContactResult *r = &contact[c];
 
-    if (q->contact && strcmp(q->contact, r->name)) continue;
+    if (part < 0 && q->contact && strcmp(q->contact, r->name)) continue;
     if (q->kind == HYCO_QUANTITY_PRESSURE)
       *value = PetscMax(*value, r->pressure);
     else if (q->kind == HYCO_QUANTITY_PRESSURE_MIN)
@@ -477,7 +479,7 @@ PetscErrorCode HycoQuantitiesMeasure(MPI_Comm comm, HycoFE fe, const PetscReal u
   PetscFunctionBegin;
   for (PetscInt k = 0; k < scene->n_quantities; k++) {
     if (scene->quantity[k].kind >= HYCO_QUANTITY_FORCE)
-      HycoOnEach(comm, AddContacts(fe, &scene->quantity[k], contact, &value[k]));
+      HycoOnEach(comm, AddContacts(fe, k, contact, &value[k]));
     else
       PetscCall(MeasureBodies(comm, fe, &scene->quantity[k], u, sigma, reaction, &value[k]));
   }

@@ -9,7 +9,7 @@ struct _n_HycoCarried {
   PetscBool ready; /* the geometry is that of the current mu */
   PetscReal mu[HYCO_MAX_PARAMETERS];
   PetscReal *normal, *gap, *area; /* by potential contact */
-  HycoContactResult *result;      /* by contact of the scene */
+  HycoContactResult *result;      /* HycoSceneResults() */
 };
 
 PetscErrorCode HycoCarriedDestroy(HycoCarried *carried)
@@ -33,7 +33,7 @@ static PetscErrorCode Make(HycoROM m)
   PetscCall(PetscMalloc1(3 * m->model->pairs.n, &c->normal));
   PetscCall(PetscMalloc1(m->model->pairs.n, &c->gap));
   PetscCall(PetscMalloc1(m->model->pairs.n, &c->area));
-  PetscCall(PetscMalloc1(m->model->scene->n_contacts, &c->result));
+  PetscCall(PetscMalloc1(HycoSceneResults(m->model->scene), &c->result));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -90,9 +90,9 @@ PetscErrorCode HycoROMSumContacts(HycoROM m, const PetscReal Lambda[], const Hyc
   PetscCall(Prepare(m, Lambda, &fe, &least));
   PetscCall(PetscMalloc1(m->model->pairs.n, &pressure));
   PetscCall(HycoContactPressures(PETSC_COMM_SELF, fe, &m->model->pairs, m->carried->area, Lambda, pressure));
-  HycoContactResults(fe, &m->model->pairs, m->carried->normal, m->carried->area, Lambda, pressure, least,
-                     m->carried->result);
-  for (PetscInt c = 0; c < m->model->scene->n_contacts; c++) {
+  PetscCall(HycoContactResults(fe, &m->model->pairs, m->carried->normal, m->carried->area, Lambda, pressure, least,
+                               m->carried->result));
+  for (PetscInt c = 0; c < HycoSceneResults(m->model->scene); c++) {
     /* A minimum over nothing would be the largest number. */
     if (!m->carried->result[c].n) m->carried->result[c].pressure_min = 0;
   }

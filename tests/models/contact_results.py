@@ -172,7 +172,7 @@ class Carried(Case):
 
     def test_refused(self):
         """Outputs with a wrong contact, group or quantity: the message lists the valid ones."""
-        for outputs, said in (('{a: {force: y, contact: roof}}', 'the contacts of the scene are: '), ('{a: {force: y, group: low}}', 'write contact: NAME'),
+        for outputs, said in (('{a: {force: y, contact: roof}}', 'the contacts of the scene are: '), ('{a: {force: y, contact: floor, group: high}}', 'no node of the group high'),
                               ('{a: {max: mises, contact: wall}}', 'give a group instead'), ('{a: {force: z}}', 'no force along z'), ('{a: {moment: x}}', 'use z'),
                               ('{a: {mean: contact_pressure}}', 'min: contact_pressure'), ('{a: {area: open}}', 'closed'), ('{a: {force: up}}', 'one of x, y and z'), ('{a: {contact: wall}}', 'has no field')):
             for ranks in (0,) if outputs[4:7] != 'for' else (0, 2):
