@@ -150,6 +150,7 @@ typedef struct {
   PetscInt n_fresh; /* of the held-out points those drawn after solutions were added near others; 0: none was added */
   HycoScan scan;    /* singularity inside the parameters' ranges */
   PetscReal seconds_snapshots, seconds_reduction;
+  PetscReal sliding; /* the largest of all solutions, as in HycoSummary */
 } HycoTraining;
 
 /* Gets solved[n_groups]: how many points each group of ranks has solved full order in the last run; those found in the
@@ -173,6 +174,8 @@ PetscErrorCode HycoReducerTries(HycoReducer reducer, const char types[], PetscBo
 PetscErrorCode HycoReducerSetSnapshotFolder(HycoReducer reducer, const char folder[]);
 /* Called as snapshots are solved. */
 PetscErrorCode HycoReducerSetProgress(HycoReducer reducer, HycoProgress progress, void *ctx);
+/* Gets which solutions are solved, "snapshots" or "held-out solutions", for the progress. Not collective. */
+PetscErrorCode HycoReducerGetSolving(HycoReducer reducer, const char *what[]);
 /* Called on one rank in the other long phases (the samples of bodies, the search for settings): `done` of
    n, where n is 0 if it is not known. */
 typedef PetscErrorCode (*HycoPhaseMonitor)(const char phase[], PetscInt done, PetscInt n, void *ctx);

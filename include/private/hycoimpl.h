@@ -96,6 +96,7 @@ typedef enum {
   HYCO_EVENT_SETUP, /* online */
   HYCO_EVENT_SOLVE, /* the solve of any contact system */
   HYCO_EVENT_RECONSTRUCT,
+  HYCO_EVENT_BODIES, /* modes of a model of bodies */
   HYCO_N_EVENTS
 } HycoEvent;
 PetscErrorCode HycoLogEvent(HycoEvent event, PetscBool begin);

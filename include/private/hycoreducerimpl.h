@@ -133,12 +133,14 @@ struct _p_HycoReducer {
   HycoJudged *judged; /* rank 0, by sample: results of HycoReducerJudge(); NULL: not called */
   unsigned long long fingerprint;
   PetscInt n_solvers, *solved; /* of the last run, every rank: number of groups of ranks, and of solutions of each */
+  PetscReal sliding;           /* of the last run's solutions */
   PetscInt unsolved;           /* of the last run, every rank: HycoSnapshotsGetBalance() */
   PetscReal *written;
-  PetscReal solving; /* seconds of its full-order solutions */
-  PetscBool late;    /* the training points are solved when a type needs them; every rank */
-  PetscBool few;     /* the held-out points are those for types that are tried before; every rank */
-  PetscBool *grown;  /* every rank, greedy: cells of its part that belong to the RIDs so far; else NULL */
+  PetscReal solving;     /* seconds of its full-order solutions */
+  PetscBool late;        /* the training points are solved when a type needs them; every rank */
+  PetscBool solves_held; /* the solutions that are, or were last, solved are held out */
+  PetscBool few;         /* the held-out points are those for types that are tried before; every rank */
+  PetscBool *grown;      /* every rank, greedy: cells of its part that belong to the RIDs so far; else NULL */
 };
 /* Fails (no model) if the scene has contacts whose rows the type does not take. */
 PetscErrorCode HycoReducerCheckContacts(HycoReducer t, const HycoROM type);

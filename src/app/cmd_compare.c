@@ -30,12 +30,14 @@ static PetscErrorCode CommonOutputs(HycoScene scene, HycoROM model, Outputs *out
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The columns that points and paths have in common. */
-static void FillCommon(const DriverColumns *c, const HycoSummary *s, const HycoPrediction *p, PetscReal row[])
+/* The columns that points and paths have in common; *sliding: the largest so far. */
+static void FillCommon(const DriverColumns *c, const HycoSummary *s, const HycoPrediction *p, PetscReal row[],
+                       PetscReal *sliding)
 {
   const PetscReal estimate[] = {p->estimated_error_u, p->estimated_error_sigma, p->estimated_error_lambda};
   PetscReal *v = row + c->n_errors, *judged = row + c->estimates;
 
+  *sliding = PetscMax(*sliding, PetscMax(s->sliding, p->sliding));
   v[DRIVER_CONVERGED] = p->reason > 0;
   v[DRIVER_KKT] = HycoKKTMax(&p->kkt);
   v[DRIVER_SECONDS_FOM] = s->seconds.total;
@@ -47,7 +49,7 @@ static void FillCommon(const DriverColumns *c, const HycoSummary *s, const HycoP
 /* One point on one group: both solutions, and their difference. Both on this group's ranks. A failed full-order
    solution ends the command: there is nothing to compare with. */
 static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, PetscInt n_par, const PetscReal mu[],
-                                   const Outputs *outputs, const DriverColumns *c, PetscReal v[])
+                                   const Outputs *outputs, const DriverColumns *c, PetscReal v[], PetscReal *sliding)
 {
   HycoSummary s;
   HycoPrediction p;
@@ -73,7 +75,7 @@ static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, 
   v[DRIVER_LAMBDA_RID_DUAL] = e.lambda_rid_dual;
   v[DRIVER_LAMBDA] = e.lambda;
   v[DRIVER_LAMBDA_DUAL] = e.lambda_dual;
-  FillCommon(c, &s, &p, v);
+  FillCommon(c, &s, &p, v, sliding);
   v[c->n_errors + DRIVER_FALLBACK] = p.reason == HYCO_CONVERGED_FALLBACK;
   v[c->n_errors + DRIVER_COVERED] = p.covered_force;
   v[c->n_errors + DRIVER_LAMBDA_NORM] = s.lambda_norm2;
@@ -108,7 +110,7 @@ static PetscErrorCode CompareOutputs(HycoFOM fom, HycoROM model, const Outputs *
 
 /* The full-order path and the model's, and their difference; root: the rank that predicts and whose v is used. */
 static PetscErrorCode ComparePath(HycoFOM fom, HycoROM model, PetscBool root, PetscInt n_par, const PetscReal mu[],
-                                  const Outputs *outputs, const DriverColumns *c, PetscReal v[])
+                                  const Outputs *outputs, const DriverColumns *c, PetscReal v[], PetscReal *sliding)
 {
   HycoSummary s;
   HycoPrediction p = {0};
@@ -123,7 +125,7 @@ static PetscErrorCode ComparePath(HycoFOM fom, HycoROM model, PetscBool root, Pe
     v[j] = e.worst[j];
     v[HYCO_N_ERRORS + j] = e.end[j];
   }
-  FillCommon(c, &s, &p, v);
+  FillCommon(c, &s, &p, v, sliding);
   v[c->n_errors + DRIVER_REACHED] = e.n;
   v[c->n_errors + DRIVER_ITERATIONS] = p.iterations;
   if (root && outputs->n) PetscCall(CompareOutputs(fom, model, outputs, v + c->outputs));
@@ -137,7 +139,7 @@ typedef struct {
   HycoQueue queue;
   PetscInt n, n_par;
   const PetscReal *mu;
-  PetscReal *value;
+  PetscReal *value, *sliding; /* the largest of this rank's points */
   Outputs outputs;
   DriverColumns columns;
 } Points;
@@ -162,9 +164,10 @@ static PetscErrorCode CompareQueued(const Points *p, HycoFOM fom, PetscBool root
     }
     if (k < 0) PetscFunctionReturn(PETSC_SUCCESS);
     v = root ? p->value + k * p->columns.n : unused;
-    PetscCall(p->columns.paths
-                  ? ComparePath(fom, p->model, root, p->n_par, p->mu + k * p->n_par, &p->outputs, &p->columns, v)
-                  : ComparePoint(p->scene, fom, p->model, p->n_par, p->mu + k * p->n_par, &p->outputs, &p->columns, v));
+    PetscCall(p->columns.paths ? ComparePath(fom, p->model, root, p->n_par, p->mu + k * p->n_par, &p->outputs,
+                                             &p->columns, v, p->sliding)
+                               : ComparePoint(p->scene, fom, p->model, p->n_par, p->mu + k * p->n_par, &p->outputs,
+                                              &p->columns, v, p->sliding));
   }
 }
 
@@ -240,6 +243,7 @@ PetscErrorCode CommandCompare(void)
   DriverPiece all;
   DriverRows rows;
   PetscBool given, contact;
+  PetscReal sliding = 0;
   PetscInt n_times;
   char path[PETSC_MAX_PATH_LEN], file[PETSC_MAX_PATH_LEN], table[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN];
 
@@ -263,9 +267,12 @@ PetscErrorCode CommandCompare(void)
   PetscCall(CommonOutputs(scene, model, &p.outputs));
   PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
   PetscCall(DriverCompareColumns((PetscBool)(n_times > 0), p.outputs.n, p.outputs.names, &p.columns));
+  p.sliding = &sliding;
   PetscCall(CompareAll(&p));
+  HycoAllreduce(&sliding, 1, MPIU_REAL, MPI_MAX, PETSC_COMM_WORLD);
   rows = DriverRowsOfRoot(p.n, p.columns.n, p.value, &all);
   if (table[0]) PetscCall(DriverWriteTable(table, scene, p.mu, p.columns.names, &rows));
+  PetscCall(DriverWarnSliding(sliding));
   PetscCall(DriverReportComparison(scene, contact, &p.columns, p.n, p.value));
   PetscCall(PetscFree(p.value));
   PetscCall(HycoSamplesDestroy(&samples));

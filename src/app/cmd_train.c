@@ -187,6 +187,19 @@ PetscErrorCode DeclareTrain(PetscOptions options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A HycoProgress with the reducer, which knows what it solves. */
+static PetscErrorCode ShowSolutions(PetscInt done, PetscInt n, void *ctx)
+{
+  const char *what;
+  char word[64];
+
+  PetscFunctionBegin;
+  PetscCall(HycoReducerGetSolving((HycoReducer)ctx, &what));
+  snprintf(word, sizeof(word), "%s:", what);
+  PetscCall(DriverProgress(done, n, word));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Everything that can be wrong in options and files is checked before the first solution, which may be hours
    before the last. */
 PetscErrorCode CommandTrain(void)
@@ -199,7 +212,7 @@ PetscErrorCode CommandTrain(void)
   Search search = {0};
   PetscBool given, greedy;
   PetscInt n;
-  char path[PETSC_MAX_PATH_LEN], model[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN], word[] = "snapshots:";
+  char path[PETSC_MAX_PATH_LEN], model[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN];
   char folder[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBegin;
@@ -221,7 +234,7 @@ PetscErrorCode CommandTrain(void)
   PetscCall(CheckRead(reducer, greedy));
   HycoCheck(given || greedy,
             "give the training points: -grid N,N,..., or -values_NAME V,V,... for each parameter, or -points FILE.csv");
-  PetscCall(HycoReducerSetProgress(reducer, DriverProgress, word));
+  PetscCall(HycoReducerSetProgress(reducer, ShowSolutions, reducer));
   PetscCall(HycoReducerSetPhaseMonitor(reducer, DriverPhase, NULL));
   PetscCall(DriverSnapshotFolder(model, folder));
   /* From here on an interrupt says where the solutions are kept. */
@@ -246,6 +259,7 @@ PetscErrorCode CommandTrain(void)
     PetscCall(DriverPrint("scan of the ranges: %d points, smallest singular value %.1e of the largest%s\n",
                           (int)t.scan.n, (double)t.scan.smallest,
                           t.scan.n_singular ? "; SINGULAR inside, kept by -hyco_keep_singular" : ""));
+  PetscCall(DriverWarnSliding(t.sliding));
   PetscCall(DriverJudgeModel(&search, &t));
   PetscCall(PrintGain(reducer, &t));
   PetscCall(DriverPrint("seconds: %.2f snapshots, %.2f reduction; model in %s\n", (double)t.seconds_snapshots,

@@ -43,6 +43,17 @@ void ReportNumbers_Private(cJSON *json, PetscInt n, const ReportNumber number[])
   for (PetscInt k = 0; k < n; k++) cJSON_AddNumberToObject(json, number[k].name, number[k].value);
 }
 
+PetscErrorCode DriverWarnSliding(PetscReal sliding)
+{
+  PetscFunctionBegin;
+  if (sliding > 1)
+    PetscCall(
+        DriverPrint("LARGE SLIDING: a closed contact moves by %.2g facets along its surface; contact pairs are found "
+                    "before displacement, and are valid for less than one facet\n",
+                    (double)sliding));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Remarks that concern the validity of any result, full order or reduced. */
 PetscErrorCode ReportContacts(cJSON *json, PetscInt n_contacts, PetscInt n_facing, PetscReal overlap, PetscReal sliding)
 {
@@ -51,11 +62,7 @@ PetscErrorCode ReportContacts(cJSON *json, PetscInt n_contacts, PetscInt n_facin
   if (n_contacts && !n_facing)
     PetscCall(DriverPrint("NO CONTACT: no slave node faces a master at these parameter values\n"));
   if (overlap > 0) PetscCall(DriverPrint("largest initial overlap %.4g\n", (double)overlap));
-  if (sliding > 1)
-    PetscCall(
-        DriverPrint("LARGE SLIDING: a closed contact moves by %.2g facets along its surface; contact pairs are found "
-                    "before displacement, and are valid for less than one facet\n",
-                    (double)sliding));
+  PetscCall(DriverWarnSliding(sliding));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

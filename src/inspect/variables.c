@@ -2,8 +2,8 @@
 #include "inspect.h"
 #include <hycomaterialimpl.h>
 
-const char *const HycoAffectedNames[HYCO_N_AFFECTED] = {"maps",         "stiffness", "laws",  "temperatures",
-                                                        "contact rows", "gaps",      "loads", "supports"};
+const char *const HycoAffectedNames[HYCO_N_AFFECTED] = {"maps", "stiffness", "laws",  "temperatures", "contact rows",
+                                                        "gaps", "friction",  "loads", "supports"};
 
 /* Components that are not given are NULL, and never change. */
 static PetscBool AnyChanges(HycoExpr const e[3], const PetscBool changed[])
@@ -23,7 +23,15 @@ static void FindReach(HycoScene s, PetscInt p, PetscBool does[HYCO_N_AFFECTED])
   does[HYCO_AFFECTS_MAPS] = c.nodes;
   does[HYCO_AFFECTS_STIFFNESS] = c.stiffness;
   does[HYCO_AFFECTS_ROWS] = (PetscBool)(c.rows && s->n_contacts);
-  does[HYCO_AFFECTS_GAPS] = (PetscBool)(c.gaps && s->n_contacts);
+  for (PetscInt k = 0; k < s->n_contacts; k++) {
+    const HycoContact contact = s->contact[k];
+
+    /* The coefficient of friction is an entry of a contact too, but none of its gap; no entry is named "". */
+    does[HYCO_AFFECTS_GAPS] =
+        (PetscBool)(does[HYCO_AFFECTS_GAPS] || c.nodes || HycoDeclaredChanges(&contact->entries, "", changed));
+    does[HYCO_AFFECTS_FRICTION] =
+        (PetscBool)(does[HYCO_AFFECTS_FRICTION] || HycoExprChanges(contact->friction, changed));
+  }
   does[HYCO_AFFECTS_LOADS] = HycoSceneLoadsChange(s, changed);
   for (PetscInt b = 0; b < s->n_bodies; b++) {
     const HycoMaterial law = s->body[b].law;

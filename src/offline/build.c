@@ -661,6 +661,7 @@ PetscErrorCode HycoReducerClose(HycoReducer t, HycoSnapshots *store)
   PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
   PetscCall(HycoSnapshotsGetSolved(*store, &t->n_solvers, &solved));
   PetscCall(HycoSnapshotsGetBalance(*store, &t->unsolved, &written));
+  t->sliding = (*store)->sliding;
   HycoFreeAll(&t->solved, &t->written);
   HycoDuplicate(t->n_solvers, solved, &t->solved);
   HycoDuplicate(size, written, &t->written);
@@ -675,10 +676,14 @@ PetscErrorCode HycoReducerSolve(HycoReducer t, HycoSnapshots store, HycoSamples 
   const PetscReal begin = HycoNow();
 
   PetscFunctionBegin;
+  t->solves_held = (PetscBool)(points != t->samples);
   HycoStaged(HYCO_STAGE_FULL_ORDER, HycoSnapshotsFill(store, points, t->progress, t->progress_ctx));
   t->solving += HycoNow() - begin;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+HycoDefineMethod(HycoReducerGetSolving, (HycoReducer t, const char *what[]), t, HYCO_REDUCER_CLASSID,
+                 *what = t->solves_held ? "held-out solutions" : "snapshots")
 
 /* Default number of held-out points: enough for a bound for 95 % of future points if the training is large enough to
    justify their cost. */
@@ -843,6 +848,7 @@ PetscErrorCode HycoReducerRun(HycoReducer t, HycoSamples samples, const char pat
   HycoStaged(HYCO_STAGE_REDUCTION, HycoReducerFinish(t, store, path, PETSC_TRUE, &report));
   PetscCall(HycoReducerReset(t));
   PetscCall(HycoReducerClose(t, &store));
+  report.sliding = t->sliding;
   report.seconds_snapshots = solved - begin + t->solving;
   report.seconds_reduction = HycoNow() - solved - t->solving;
   if (training) *training = report;

@@ -389,6 +389,7 @@ PetscErrorCode HycoReducerRunGreedy(HycoReducer t, HycoSamples start, HycoSample
   report.seconds_reduction = HycoNow() - loop.begin;
   PetscCall(HycoReducerReset(t));
   PetscCall(HycoReducerClose(t, &loop.store));
+  report.sliding = t->sliding;
   PetscCall(HycoSamplesDestroy(&loop.samples));
   PetscCall(PetscFree(loop.value));
   if (training_report) *training_report = report;

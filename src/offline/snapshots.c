@@ -165,14 +165,31 @@ static PetscErrorCode FindMissing(HycoSnapshots s, PetscInt n, PetscInt n_par, c
       continue;
     }
     PetscCall(OpenSample(s, mu + k * n_par, &h));
+    if (HycoH5Has(h, "sliding")) {
+      PetscReal sliding;
+
+      PetscCall(HycoH5ReadReal(h, "sliding", 1, 1, &sliding));
+      s->sliding = PetscMax(s->sliding, sliding);
+    }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The largest sliding of the last solution, whose summary has been made if it is no path. */
+static PetscReal SlidingOf(HycoFOM fom)
+{
+  PetscReal sliding = fom->path ? 0 : fom->summary.sliding;
+
+  for (PetscInt k = 0; fom->path && k < fom->path->n_steps; k++)
+    sliding = PetscMax(sliding, fom->path->steps[k].sliding);
+  return sliding;
+}
+
 /* Writes the data of a solution that are on rank 0. The fingerprint first, without which a file is not read;
    `history` lets a message say what changed. */
-static PetscErrorCode WriteHead(HycoSnapshots s, HycoH5 h, const PetscReal mu[])
+static PetscErrorCode WriteHead(HycoSnapshots s, HycoFOM fom, HycoH5 h, const PetscReal mu[])
 {
+  const PetscReal sliding = SlidingOf(fom);
   char fingerprint[32], *history;
   PetscErrorCode ierr = PETSC_SUCCESS;
 
@@ -184,6 +201,8 @@ static PetscErrorCode WriteHead(HycoSnapshots s, HycoH5 h, const PetscReal mu[])
   PetscCall(PetscFree(history));
   PetscCall(ierr);
   PetscCall(HycoH5WriteReal(h, "mu", s->scene->n_parameters, 1, mu));
+  PetscCall(HycoH5WriteReal(h, "sliding", 1, 1, &sliding));
+  s->sliding = PetscMax(s->sliding, sliding);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -213,7 +232,7 @@ static PetscErrorCode WriteFields(HycoSnapshots s, HycoFOM fom, HycoH5 h, const 
   const HycoFileOrder *rows;
 
   PetscFunctionBegin;
-  HycoOnRoot(HycoComm(fom), WriteHead(s, h, mu));
+  HycoOnRoot(HycoComm(fom), WriteHead(s, fom, h, mu));
   PetscCall(HycoFOMWriteForces(fom, h, "lambda"));
   PetscCall(HycoFOMGetRows(fom, &rows));
   PetscCall(HycoFieldWrite(h, rows, fom->n_nodes, "U", HYCO_ON_NODES, MPIU_REAL, dim, 1, fom->u));
@@ -375,7 +394,7 @@ static PetscErrorCode WritePath(PathWriter *w, HycoFOM fom, const PetscReal mu[]
   HycoSceneNamePoint(w->s->scene, mu, at);
   HycoCheck(history.ended, "the path at %s ends at t = %.10g, because its steps became too small: %s", at,
             (double)history.t, history.why);
-  HycoOnRoot(HycoComm(fom), WriteHead(w->s, w->h, mu));
+  HycoOnRoot(HycoComm(fom), WriteHead(w->s, fom, w->h, mu));
   HycoOnRoot(HycoComm(fom), HycoH5WriteReal(w->h, "taken", history.n_taken, 1, history.taken));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -555,6 +574,7 @@ PetscErrorCode HycoSnapshotsFill(HycoSnapshots s, HycoSamples samples, HycoProgr
     PetscCall(SolveMissing(s, &m));
     if (rank == 0 && progress) PetscCall(progress(m.n_all, m.n_all, ctx));
   }
+  HycoAllreduce(&s->sliding, 1, MPIU_REAL, MPI_MAX, HycoComm(s)); /* each group's first rank knows its own */
   PetscCall(PetscFree(m.missing));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

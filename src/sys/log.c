@@ -2,9 +2,9 @@
 #include <hycoimpl.h>
 
 static const char *const event_names[HYCO_N_EVENTS] = {
-    "HycoMesh",   "HycoAssemble", "HycoForce", "HycoContact", "HycoSearch",  "HycoReduce", "HycoFactor",
-    "HycoForces", "HycoIterate",  "HycoKKT",   "HycoPOD",     "HycoDEIM",    "HycoRID",    "HycoROM",
-    "HycoScan",   "HycoLoad",     "HycoSetUp", "HycoSolve",   "HycoReconstr"};
+    "HycoMesh",   "HycoAssemble", "HycoForce", "HycoContact", "HycoSearch",   "HycoReduce", "HycoFactor",
+    "HycoForces", "HycoIterate",  "HycoKKT",   "HycoPOD",     "HycoDEIM",     "HycoRID",    "HycoROM",
+    "HycoScan",   "HycoLoad",     "HycoSetUp", "HycoSolve",   "HycoReconstr", "HycoBodies"};
 static const char *const event_words[HYCO_N_EVENTS] = {"the mesh",
                                                        "assembling the stiffness",
                                                        "assembling the loads",
@@ -23,7 +23,8 @@ static const char *const event_words[HYCO_N_EVENTS] = {"the mesh",
                                                        "loading",
                                                        "set-up of a prediction",
                                                        "solving",
-                                                       "reconstruction of forces"};
+                                                       "reconstruction of forces",
+                                                       "samples of bodies"};
 static const char *const stage_names[HYCO_N_STAGES] = {"hyco full order", "hyco reduction", "hyco online"};
 static PetscLogEvent events[HYCO_N_EVENTS];
 static PetscLogStage stages[HYCO_N_STAGES];

@@ -211,6 +211,7 @@ class Check(Case):
             self.assertNotIn('n_training', found['estimate'])
             self.assertEqual(found['unused_groups'], ['ring_outside'])
         self.assertEqual(self.hyco('check', '-scene', ring, '-output_out_mean', 'u_x', '-output_out_group', 'ring_outside')['unused_groups'], [])
+        self.assertEqual(self.hyco('check', '-scene', os.path.join(EXAMPLES, 'lapjoint'))['parameters']['mu'], ['friction'])
         self.near(found['contacts'][0]['gap_min'], -0.02, 1e-12)
         found = self.hyco('check', '-scene', ring, '-history_times', '0,1,2', '-history_tables_q', '0 0,2 1', '-contact_fit_gap',
                           '0.1*q - interference', '-check_solve')

@@ -51,6 +51,18 @@ class Progress(Case):
         lines = run.stderr.splitlines()
         self.assertTrue(any(line.startswith('settings tried: ') for line in lines), lines)
 
+    def test_bodies(self):
+        """Models of bodies solve held-out points, which are called so, and the problems of their modes, which are counted."""
+        type(self).newcomer = True
+        try:
+            run = self.run_raw('train', '-scene', BLOCKS, '-grid', '3,3', '-model', 'b.h5', '-hyco_bodies_samples', 800, '-progress', '0.01')
+        finally:
+            type(self).newcomer = False
+        self.assertEqual(run.returncode, 0, run.stderr)
+        for words in (r'(?m)^held-out solutions: \d of 6', r'samples of bodies: \d+ of 8\d\d'):
+            self.assertRegex(run.stderr, words)
+        self.assertNotIn('snapshots: ', run.stderr)
+
     def test_types(self):
         """The choice of full-order displacements, and of the cells of a cubature, show a count: they may take most of the time."""
         for scene, grid, settings, words in ((ROPE, '6,6', ('-hyco_hybrid', 'rank', '-hyco_hybrid_trials', 200), r'choices of full-order displacements: \d+ of 200'),

@@ -132,6 +132,18 @@ class FullOrder(Moved):
         run = self.run_raw('solve', '-scene', 'push.yaml', '-mu', f'1,{POINT}', '-report', 'r.json')
         self.assertIn('LARGE SLIDING: a closed contact moves by 2.', run.stdout)
 
+    def test_sliding_of_points(self):
+        """Training, also from stored solutions, and comparison name the largest sliding of their points, if it is large."""
+        scene(self.path('pushed.yaml'), 'm.msh', push='2.2*press')
+        points = ('-values_place', 1, '-values_press', '0.3,0.5', '-values_modulus', 10)
+        train = ('train', *points, '-model', 'p.h5', '-hyco_model_type', 'projection', '-hyco_dual', 'snapshots', '-hyco_validation', 0)
+        for command, ranks in ((train, 2), (train, 0), (('compare', *points, '-model', 'p.h5'), 2)):
+            run = self.run_raw(command[0], '-scene', 'pushed.yaml', *command[1:], ranks=ranks)
+            self.assertEqual(run.returncode, 0, run.stderr)
+            self.assertEqual(run.stdout.count('LARGE SLIDING: a closed contact moves by 2.'), 1, run.stdout)
+        run = self.run_raw('compare', '-scene', 'pushed.yaml', '-model', 'p.h5', '-mu', '1,0.1,10')
+        self.assertNotIn('LARGE SLIDING', run.stdout)
+
     def test_sliding_path(self):
         """A cylinder that is pushed along and then lifted: the path has slid, although no contact is closed at its end."""
         scene(self.path('lift.yaml'), 'm.msh', moved=False, push='1.1*q')

@@ -97,7 +97,7 @@ class Kill(Case):
             whole = time.monotonic() - begin if ended else whole
             k += 1
             complete = glob.glob(self.path('m.h5.snapshots', '*.h5'))
-            told = max((int(n) for n in re.findall(r'snapshots: (\d+) of', said)), default=0)
+            told = max((int(n) for n in re.findall(r'(?:snapshots|held-out solutions): (\d+) of', said)), default=0)
             self.assertGreaterEqual(len(complete), told, 'a solution that was told is lost')
             times = {f: os.stat(f).st_mtime_ns for f in complete}
             subprocess.run(command, cwd=self.folder, check=True, capture_output=True, timeout=100 * PATIENCE)

@@ -119,6 +119,7 @@ static PetscErrorCode SolvePoints(HycoReducer t, HycoBodiesWork o, const HycoBod
     PetscBool solved = PETSC_FALSE;
     PetscErrorCode ierr;
 
+    PetscCall(HycoReducerTell(t, "samples of bodies", k, n));
     HycoSceneSetTime(t->scene, mu + k * p, SomeTime(t->scene, k), all);
     PetscCall(HycoCatchBegin()); /* points that full order would refuse, too */
     if (friction)

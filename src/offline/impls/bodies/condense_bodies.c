@@ -413,7 +413,7 @@ static PetscErrorCode Condense(HycoReducer t, HycoSnapshots store, HycoBodiesFac
 
 /* A new HycoFOM, whose K is factored body by body; released with all factors before an error returns, because a
    search goes on. */
-PetscErrorCode HycoBodiesModes(HycoReducer t, HycoSnapshots store)
+static PetscErrorCode MakeModes(HycoReducer t, HycoSnapshots store)
 {
   HycoBodiesFactor factor = {0};
   PetscReal mu[HYCO_MAX_PARAMETERS];
@@ -439,5 +439,12 @@ PetscErrorCode HycoBodiesModes(HycoReducer t, HycoSnapshots store)
   ierr = Condense(t, store, &factor);
   PetscCall(HycoBodiesReleaseFactor(&factor));
   PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBodiesModes(HycoReducer t, HycoSnapshots store)
+{
+  PetscFunctionBegin;
+  HycoLogged(HYCO_EVENT_BODIES, MakeModes(t, store));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -124,6 +124,7 @@ static PetscErrorCode FollowAll(Sampler *s, HycoSnapshots store, PetscReal tol, 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(s->t->samples, &n, NULL, NULL));
   for (PetscInt k = 0; k < n; k++) {
+    PetscCall(HycoReducerTell(s->t, "inelastic strains of the paths", k, n));
     PetscCall(HycoTrainingReplayFollow(&s->replay, store, k));
     PetscCall(MatAssemblyBegin(s->S, MAT_FINAL_ASSEMBLY));
     PetscCall(MatAssemblyEnd(s->S, MAT_FINAL_ASSEMBLY));
