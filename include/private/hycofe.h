@@ -87,6 +87,7 @@ struct _n_HycoFE {
   PetscReal *X;         /* n_nodes x 3, moved nodes */
   PetscBool *mirrored;  /* by body: its map reverses orientation */
   PetscInt place;       /* of the nodes: a number that is unique on this process for each position of the nodes */
+  PetscInt drawn;       /* the same, of the nodes, normals and gaps of contacts; 0: not at a parameter value */
   PetscReal *kept;      /* gradients (nv x 3) and weight of each point, computed at kept_place:
                            HycoFEKeepGradients(); or NULL */
   PetscReal *kept_mean; /* mean gradients of each cell, nv x 3; NULL: no body uses bbar */

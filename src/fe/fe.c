@@ -197,6 +197,7 @@ PetscErrorCode HycoFESetDrawn(HycoFE fe)
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(fe->X, fe->mesh->xyz, 3 * fe->mesh->n_nodes));
   fe->place = ++places;
+  fe->drawn = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -403,6 +404,7 @@ void HycoSceneReaches(HycoScene scene, PetscBool reaches[])
    everything. Not collective. */
 PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
 {
+  static PetscInt drawn = 0;
   PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, first = (PetscBool)!fe->ready;
   HycoChanges c;
 
@@ -423,6 +425,7 @@ PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
     PetscCall(HycoMirrorFind(fe));
     for (PetscInt k = 0; k < fe->n_loads; k++) fe->shares[k].ready = PETSC_FALSE;
   }
+  if (first || c.rows || c.gaps) fe->drawn = ++drawn;
   if (first || !fe->fixed_constant) PetscCall(SetSupports(fe));
   if (fe->temperature) PetscCall(HycoFESetHeat(fe, (PetscBool)(first || c.nodes), changed));
   if (fe->stiffness_changed) PetscCall(HycoFESetTangents(fe, first));
