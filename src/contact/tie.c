@@ -257,7 +257,7 @@ static PetscErrorCode FindAllMeans(HycoScene s, HycoMesh m, Found *found)
   for (PetscInt k = 0; k < s->n_ties; k++) any = (PetscBool)(any || s->tie[k].mortar);
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt f = 0; f < m->n_facets; f++) HycoMeshTurnFacet(m, m->facet_cell[f], m->facets + f * m->nf);
-  PetscCall(HycoFECreateRead(s, m, &fe));
+  PetscCall(HycoFECreateOn(s, m, &fe));
   PetscCall(HycoFESetDrawn(fe));
   PetscCall(SharedCreate(s, m, &shared));
   for (PetscInt k = 0; k < s->n_ties; k++) {

@@ -164,10 +164,10 @@ PetscErrorCode HycoFECreate(HycoScene scene, DM dm, HycoFE *fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFECreateRead(HycoScene scene, HycoMesh mesh, HycoFE *fe)
+PetscErrorCode HycoFECreateOn(HycoScene scene, HycoMesh mesh, HycoFE *fe)
 {
   PetscFunctionBegin;
-  PetscCall(Create(scene, NULL, mesh, fe));
+  PetscCall(Create(scene, mesh->dm, mesh, fe));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
