@@ -150,8 +150,10 @@ static PetscErrorCode DenseSemismooth(HycoTao t, const HycoLCP *of)
   } else if (lcp->warm && t->n_last == lcp->p + lcp->n && t->last)
     PetscCall(PetscArraycpy(t->z, t->last, t->n_last));
   else
+    /* Without a start that fits, none: the chain of starts then begins with the normal forces. */
     PetscCall(PetscArrayzero(t->z, lcp->p + lcp->n));
   PetscCall(HycoLCPSemismooth(lcp, t->z, &t->its, &t->status));
+  /* Forces of a failed solve would be a bad start: the last good ones stay. */
   if (t->status != HYCO_LCP_SOLVED) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree(t->last));
   t->n_last = lcp->p + lcp->n;
@@ -208,11 +210,13 @@ static PetscErrorCode CreateActiveSet(Tao tao)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* No KSP: pivots need none. */
 static PetscErrorCode CreateLemke(Tao tao)
 {
   return Create(tao, SolveLemke);
 }
 
+/* Only with a HycoTao as data, which has the blocks. */
 static PetscErrorCode CreateSemismooth(Tao tao)
 {
   return Create(tao, SolveSemismooth);

@@ -1,4 +1,5 @@
-/* Forms of HycoSolver: a system with a given flexibility, and a form that the program registers. */
+/* Forms of HycoSolver: a system with a given flexibility, a dense and a sparse K, and a form that the program
+   registers. */
 #include "check.h"
 #include <hycosolverimpl.h>
 #include <petsc/private/taoimpl.h>
@@ -50,6 +51,51 @@ static PetscErrorCode TestFlexibility(void)
   PetscCall(VecDestroy(&free_gap));
   PetscCall(VecDestroy(&forces));
   PetscCall(MatDestroy(&matrix));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* One solver for a dense and a sparse K = 2, 4: the former factor must not serve the latter. A factor that is kept is
+   named as well as a new one. */
+static PetscErrorCode TestFactors(void)
+{
+  Mat K[2];
+  Vec F, x;
+  HycoSystem system;
+  HycoSolver solver;
+  HycoReason reason;
+  const char *linear;
+  const PetscScalar *value;
+
+  PetscFunctionBegin;
+  PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, 1, 1, NULL, &K[0]));
+  PetscCall(MatCreateSeqAIJ(PETSC_COMM_SELF, 1, 1, 1, NULL, &K[1]));
+  PetscCall(MatCreateVecs(K[0], &x, &F));
+  PetscCall(VecSet(F, 8));
+  PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &system));
+  PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &solver));
+  PetscCall(HycoSolverSetSystem(solver, system));
+  for (int k = 0; k < 2; k++) {
+    PetscCall(MatSetValue(K[k], 0, 0, 2 + 2 * k, INSERT_VALUES));
+    PetscCall(MatAssemblyBegin(K[k], MAT_FINAL_ASSEMBLY));
+    PetscCall(MatAssemblyEnd(K[k], MAT_FINAL_ASSEMBLY));
+    PetscCall(HycoSystemSetMatrices(system, K[k], NULL, NULL, PETSC_TRUE));
+    PetscCall(HycoSystemSetVectors(system, F, NULL));
+    for (int again = 0; again < 2; again++) {
+      PetscCall(HycoSolverSolve(solver, x, NULL));
+      PetscCall(HycoSolverGetReason(solver, &reason));
+      PetscCall(HycoSolverGetLinear(solver, &linear));
+      PetscCall(VecGetArrayRead(x, &value));
+      CHECK(reason == HYCO_CONVERGED, "K %d: %s", k, HycoReasonName(reason));
+      CHECK_NEAR(value[0], 4. / (1 + k), 1e-14);
+      PetscCall(VecRestoreArrayRead(x, &value));
+      CHECK(!k || strncmp(linear, "direct: mumps", 13) == 0, "solve %d: \"%s\"", again, linear);
+    }
+  }
+  PetscCall(HycoSolverDestroy(&solver));
+  PetscCall(HycoSystemDestroy(&system));
+  for (int k = 0; k < 2; k++) PetscCall(MatDestroy(&K[k]));
+  PetscCall(VecDestroy(&F));
+  PetscCall(VecDestroy(&x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -251,6 +297,7 @@ static PetscErrorCode TestBounds(void)
 static PetscErrorCode Test(void)
 {
   PetscFunctionBegin;
+  PetscCall(TestFactors());
   PetscCall(TestFlexibility());
   PetscCall(TestRegistered());
   PetscCall(TestBounds());

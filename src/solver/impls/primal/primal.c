@@ -242,6 +242,7 @@ static PetscErrorCode BoundQP(Primal *p, Gap *g, PetscBool *solved)
   PetscFunctionBegin;
   PetscCall(VecDuplicate(p->y, &lo));
   PetscCall(VecSet(lo, PETSC_NINFINITY));
+  /* The start must be feasible: y is 0, and bounds of drawn overlaps are negative. */
   PetscCall(VecPointwiseMin(p->y, p->y, p->hi));
   PetscCall(VecCopy(p->f, p->rhs));
   if (g->H)
@@ -299,6 +300,7 @@ static PetscErrorCode PrimalCreate(HycoSolver s, const Gap *g, Vec x, Primal *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The form's matrices and its solver stay for the next solve. */
 static PetscErrorCode PrimalDestroy(Primal *p)
 {
   PetscFunctionBegin;
@@ -389,6 +391,7 @@ static PetscErrorCode Destroy(HycoSolverForm form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Of this form, yet a field of the solver: HycoSolverSetMultilevel() sets the same one. */
 static PetscErrorCode SetFromOptions(HycoSolver s, HycoSolverForm form, HycoOptionItems PetscOptionsObject)
 {
   PetscFunctionBegin;
@@ -399,6 +402,7 @@ static PetscErrorCode SetFromOptions(HycoSolver s, HycoSolverForm form, HycoOpti
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Only forces >= 0 (no cones): a bound is on one unknown each. */
 PetscErrorCode HycoSolverFormCreate_Primal(HycoSolver s, HycoSolverForm form)
 {
   Gap *g;

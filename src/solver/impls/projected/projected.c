@@ -57,6 +57,7 @@ static PetscErrorCode FindNodes(HycoSystem y, Projected *f)
   PetscCall(PetscMalloc1(hi - lo, &f->node));
   PetscCall(PetscMalloc1(hi - lo, &f->contact));
   PetscCall(PetscMalloc1(hi - lo, &pivot));
+  /* The pivots are not used as coordinates here: their existence proves that any closed rows are independent. */
   PetscCall(HycoGapPivots(y, pivot, &f->possible));
   PetscCall(PetscObjectQuery((PetscObject)y->B, HYCO_SLAVES, (PetscObject *)&slave));
   if (slave) PetscCall(VecGetArrayRead(slave, &s));
@@ -105,6 +106,7 @@ static PetscErrorCode SetConstraints(Run *p, const PetscBool active[], PetscBool
 
   PetscFunctionBegin;
   *singular = PETSC_FALSE;
+  /* Coarsening the constraints costs several products, and a sharpened solve of the same set needs none of it. */
   for (PetscInt k = 0; k < f->n; k++) differs = differs || p->solved[k] != active[k];
   PetscCallMPI(MPI_Allreduce(&differs, &any, 1, MPI_INT, MPI_MAX, HycoComm(p->s)));
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
@@ -118,6 +120,7 @@ static PetscErrorCode SetConstraints(Run *p, const PetscBool active[], PetscBool
     p->at[n++] = f->node[k];
   }
   PetscCall(ISCreateGeneral(HycoComm(B), n, row, PETSC_OWN_POINTER, &is));
+  /* On each rank the rows of its own contacts, in their order, like d and l. */
   PetscCall(MatCreateSubMatrix(B, is, NULL, MAT_INITIAL_MATRIX, &rows));
   PetscCall(HycoConstrainedSet(f->constrained, rows, p->at, singular));
   PetscCall(VecDestroy(&p->d));
@@ -267,6 +270,7 @@ static PetscErrorCode RunCreate(HycoSolver s, Projected *f, Vec x, Run *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The multigrid and its constraints stay with the form. */
 static PetscErrorCode RunDestroy(Run *p)
 {
   PetscFunctionBegin;
@@ -384,6 +388,7 @@ static PetscErrorCode Destroy(HycoSolverForm form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Only forces >= 0 (no cones), by the active set method. */
 PetscErrorCode HycoSolverFormCreate_Projected(HycoSolver s, HycoSolverForm form)
 {
   Projected *f;
