@@ -3,7 +3,7 @@
 #include <hycomaterialimpl.h>
 #include "assembly_map.h"
 
-/* NULL-safe. The tables belong to the DM, of which fe has a reference; those of HycoFECreateRead() to the caller. */
+/* NULL-safe. The tables belong to the DM, of which fe has a reference; those of HycoFECreateOn() without a DM to the caller. */
 PetscErrorCode HycoFEDestroy(HycoFE *fe)
 {
   PetscFunctionBegin;
@@ -172,11 +172,11 @@ PetscErrorCode HycoFECreate(HycoScene scene, DM dm, HycoFE *fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Without a DM: only for the search of ties, whose weights the DM's cones need. */
-PetscErrorCode HycoFECreateRead(HycoScene scene, HycoMesh mesh, HycoFE *fe)
+/* Without a DM for the search of ties, whose weights the DM's cones need, and for received surfaces. */
+PetscErrorCode HycoFECreateOn(HycoScene scene, HycoMesh mesh, HycoFE *fe)
 {
   PetscFunctionBegin;
-  PetscCall(Create(scene, NULL, mesh, fe));
+  PetscCall(Create(scene, mesh->dm, mesh, fe));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
