@@ -84,7 +84,7 @@ static void Push(HycoBodiesWork o, PetscInt k, PetscReal y[])
     const HycoSubstructure *own = &b->body[body];
 
     for (PetscInt q = 0; q < own->n_samples; q++) {
-      const PetscReal *C = own->C + ((size_t)q * (size_t)own->n + (size_t)(o->row_at[e] - lo)) * (size_t)own->n;
+      const PetscReal *C = own->C + HycoBodiesColumn(own, q, o->row_at[e] - lo, own->n);
       const PetscReal share = o->weight[body][q] * o->row[e] / o->kappa[body];
 
       for (PetscInt i = 0; i < own->n; i++) y[lo + i] -= share * C[i];
