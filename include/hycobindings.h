@@ -20,7 +20,7 @@ typedef struct {
 
 /*
   Gets the size in bytes of a type of the library, and the n members of a struct in their order. Types: HycoSummary,
-  HycoStep, HycoHistory, HycoReaction, HycoContactResult, HycoPrediction, HycoGradient with all of their members; HycoTraining with
+  HycoStep, HycoHistory, HycoReaction, HycoContactResult, HycoPrediction, HycoGradient, HycoFit with all of their members; HycoTraining with
   those of its members that are numbers or texts of the whole training; PetscInt, PetscReal, PetscBool and MPI_Comm with n = 0. Fails
   for another name. `n` and `fields` may be NULL. Not collective. Borrowed from the library.
 */

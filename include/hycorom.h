@@ -193,6 +193,29 @@ PetscErrorCode HycoROMGetPrediction(HycoROM model, HycoPrediction *prediction);
   forces of closed contacts are not unique; after an error there is no last prediction.
 */
 PetscErrorCode HycoROMGetGradient(HycoROM model, HycoGradient *gradient);
+
+/* A fit: mu[] is the caller's. */
+typedef struct {
+  PetscReal misfit;                     /* root mean square of the relative differences from the targets */
+  PetscReal scale[HYCO_MAX_QUANTITIES]; /* by target: what its difference is divided by */
+  PetscBool converged, kink;  /* the slope of the misfit vanishes within the ranges; derivatives are one-sided */
+  PetscInt evaluations;       /* predictions */
+  PetscInt n_starts, n_least; /* minimisations; those that ended at the least misfit */
+  char method[64];            /* TAO types of the best one */
+} HycoFit;
+#define HYCO_FIT_BRGN  "brgn"
+#define HYCO_FIT_BLMVM "blmvm"
+/*
+  Finds the parameters within the ranges at which n outputs of the model are closest to targets, output[n] their indices:
+  the least squares of (output - target) / |target| (a target of 0: over the largest output at the samples), on the model's
+  gradients by the TAO type `type`, then by the other one if that ends at no minimum. It minimises from the n_starts best
+  of n_samples predictions over the ranges, or (start: not NULL) from there alone. mu[n_parameters] is the best answer, and
+  the last prediction the one there. Not collective; on several ranks answers may differ in the last bits. Fails where
+  HycoROMGetGradient() does, and if no prediction at a start converges.
+*/
+PetscErrorCode HycoROMFit(HycoROM model, PetscInt n, const PetscInt output[], const PetscReal target[],
+                          const PetscReal start[], PetscInt n_samples, PetscInt n_starts, const char type[],
+                          PetscReal mu[], HycoFit *fit);
 /* Gets the strain energy of the last prediction on the RID's cells; this may cost as much as the prediction. */
 PetscErrorCode HycoROMGetStrainEnergy(HycoROM model, PetscReal *energy);
 

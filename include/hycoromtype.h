@@ -68,8 +68,8 @@ typedef struct _HycoROMOps {
   PetscErrorCode (*unknowns)(HycoROM, PetscInt *p, PetscInt *n, PetscReal z[]); /* z (p + n) of the last solve; NULL:
                                                                                    only the sizes */
   PetscErrorCode (*residual)(HycoROM, const PetscReal mu[], const PetscReal z[], PetscReal w[],
-                             PetscReal *size); /* moves the data to mu and takes z; w (p + n; NULL: not needed); size:
-                                                  of gaps and displacements of the contacts */
+                             PetscReal *size); /* moves the data to mu (NULL: they are there) and takes z; w (p + n;
+                                                  NULL: not needed); size: of gaps and displacements of the contacts */
   PetscErrorCode (*jacobian)(HycoROM, PetscInt k, const PetscInt contact[],
                              PetscReal M[]); /* of x and these k forces, p + k square by columns, at the last mu */
   PetscErrorCode (*expand)(HycoROM);         /* sets what a solve sets (modes, displacements, forces) from that z */

@@ -47,11 +47,11 @@ typedef struct {
   PetscReal *coefficient; /* n_rows x n */
   PetscReal worst;        /* error at the points that were not fitted (each third), relative to the group */
   PetscInt worst_row;
-} HycoFit;
+} HycoExportFit;
 /* The functions are those of a level: 1, a; from 1 on 1/c, a/c; from 2 on a b; from 3 on a b / c. worst > tol: they do not
    suffice. The caller frees both arrays. */
 PetscErrorCode HycoFitFunctions(HycoScene scene, PetscInt n_atoms, const HycoAtom atom[], PetscInt level, PetscReal tol,
-                                const HycoFitData *data, HycoFit *fit);
+                                const HycoFitData *data, HycoExportFit *fit);
 #define HYCO_FIT_LEVELS 4
 /* value[n]: of the functions at mu. */
 PetscErrorCode HycoFunctionsEvaluate(HycoScene scene, const HycoAtom atom[], PetscInt n, const HycoFunction f[],

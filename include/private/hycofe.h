@@ -70,6 +70,7 @@ struct _n_HycoFE {
      forces of thermal strains are loads, with elastic tangents */
   const PetscReal *cell_weight;
   PetscBool all_facets, heat_is_load;
+  PetscBool without_cells; /* tangents, heat and springs stay those of a former mu: HycoFEUseCells() */
   /* kept from one parameter value to the next */
   HycoAssemblyMap places; /* positions of the element entries in K; created by the second assembly */
   PetscInt n_loads;
@@ -91,6 +92,8 @@ struct _n_HycoFE {
                            HycoFEKeepGradients(); or NULL */
   PetscReal *kept_mean; /* mean gradients of each cell, nv x 3; NULL: no body uses bbar */
   PetscInt kept_place;
+  PetscReal *weight; /* of each point, and by cell the place at which HycoPointWeights() found them; or NULL */
+  PetscInt *weighed_at;
   /* supports at mu */
   PetscBool *fixed; /* n_dof */
   PetscReal *u0;    /* n_dof: prescribed displacement, 0 where free; the offset of an oblique support */
@@ -128,6 +131,9 @@ PetscErrorCode HycoFECreateSurface(HycoScene scene, DM dm, HycoFE *fe);
 /* On the tables of a file just read (borrowed), before they become a DM: a tie's weights are part of the topology. */
 PetscErrorCode HycoFECreateRead(HycoScene scene, HycoMesh mesh, HycoFE *fe);
 PetscErrorCode HycoFEDestroy(HycoFE *fe);
+/* While cells are not used, HycoFESetParameters() leaves what belongs to them as it is. Brings them to the present mu when
+   they are used again. */
+PetscErrorCode HycoFEUseCells(HycoFE fe, PetscBool use);
 /* Keeps the gradients of the shape functions until the nodes move: for paths, which evaluate the same nodes many
    times. */
 PetscErrorCode HycoFEKeepGradients(HycoFE fe);
@@ -145,6 +151,8 @@ typedef struct {
   PetscBool nodes, stiffness, rows, gaps;
 } HycoChanges;
 HycoChanges HycoSceneChanges(HycoScene scene, const PetscBool changed[]);
+/* Whether they change the entries of the loads, inertia included. */
+PetscBool HycoSceneLoadsChange(HycoScene scene, const PetscBool changed[]);
 /* Which parameters (room for n_parameters) affect the stiffness or the contacts' rows. */
 void HycoSceneReaches(HycoScene scene, PetscBool reaches[]);
 
@@ -227,9 +235,10 @@ PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M);
 /* Stress of u (n_dof, local order) from the elastic tangents, without the stress of thermal strain, averaged over
    each cell: sigma n_cells x n_sigma. */
 PetscErrorCode HycoFEStress(HycoFE fe, const PetscReal u[], PetscReal sigma[]);
-/* The same for many u and parameters: *kept (the caller's, NULL at first, freed with PetscFree()) has the nodes and the
+/* The same in the marked cells (in: NULL: all; 0 in others) for many u and parameters: *kept (the caller's, NULL at first, freed with PetscFree()) has the nodes and the
    mean gradients of the cells, 6 nv numbers each, so that those of cells whose nodes do not move are computed once. */
-PetscErrorCode HycoFEStressKept(HycoFE fe, const PetscReal u[], PetscReal **kept, PetscReal sigma[]);
+PetscErrorCode HycoFEStressKept(HycoFE fe, const PetscBool in[], const PetscReal u[], PetscReal **kept,
+                                PetscReal sigma[]);
 /* The volumes of the cells, of the full circle in an axisymmetric scene. */
 PetscErrorCode HycoFEVolumes(HycoFE fe, PetscReal volume[]);
 /* Adds the nodal forces of body forces to a cell's unknowns (f: nv x dim). */

@@ -10,6 +10,8 @@ PetscReal HycoDeterminant(const HycoElement *el, const PetscInt node[], const Pe
    weight is multiplied by the cell's in a cubature (fe->cell_weight). */
 PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscInt q,
                              PetscReal g[HYCO_CELL_NODES][3], PetscReal *weight);
+/* The weights of a cell's points (borrowed), computed once for each position of the nodes. */
+PetscErrorCode HycoPointWeights(HycoFE fe, const HycoElement *el, PetscInt cell, const PetscReal *weight[]);
 /* Whether they are kept for fe's nodes (HycoFEKeepGradients()); then dN/dX, followed by the weight. */
 static inline PetscBool HycoGradientsKept(HycoFE fe)
 {
@@ -67,7 +69,7 @@ PetscErrorCode HycoSpringsDestroy(HycoSprings *springs);
 /* Allocates the tangents. */
 PetscErrorCode HycoTangentsCreate(HycoFE fe);
 /* Evaluates the tangents at fe's nodes and mu; all: also in cells that no parameter changes. */
-PetscErrorCode HycoFESetTangents(HycoFE fe, PetscBool all);
+PetscErrorCode HycoFESetTangents(HycoFE fe, PetscBool all, PetscBool moved, const PetscBool changed[]);
 /* Outward normal times area weight (n dS, of the full circle in an axisymmetric scene) at point q of a facet of the
    moved body; in 1D the sign of the direction away from its cell. */
 PetscErrorCode HycoFacetNormal(HycoFE fe, const HycoElement *el, PetscInt facet, PetscInt q, PetscReal n[3]);

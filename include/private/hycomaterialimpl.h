@@ -34,6 +34,8 @@ PetscErrorCode HycoMaterialSetUp(HycoMaterial material, PetscInt dim, HycoFormul
                                  PetscBool has_history);
 /* Whether the tangent changes with the parameters p with changed[p]. */
 PetscBool HycoMaterialChanges(HycoMaterial material, const PetscBool changed[]);
+/* Whether a constant varies in space, itself or by the temperature. */
+PetscBool HycoMaterialInSpace(HycoMaterial material);
 /* The constants at n points x (n x 3), their temperatures (NULL: none) and mu; work: room for n reals a constant.
    Fails if a constant is outside its interval. */
 PetscErrorCode HycoMaterialConstants(HycoMaterial material, const PetscReal mu[], PetscInt n, const PetscReal x[],

@@ -13,6 +13,14 @@ PetscErrorCode HycoQuantitiesMeasure(MPI_Comm comm, HycoFE fe, const PetscReal u
 /* Marks the cells (n_cells) that quantity k of the scene needs, or all quantities. */
 PetscErrorCode HycoQuantityMarkCells(HycoScene scene, HycoMesh mesh, PetscInt k, PetscBool needed[]);
 PetscErrorCode HycoQuantitiesMarkCells(HycoScene scene, HycoMesh mesh, PetscBool needed[]);
+/* Marks the cells that decide the quantities near a solution with these values: those of an extreme, and where the field is
+   close to it; of a mean all; of reactions all, or (balanced: they follow from balance) one with a support. stressed: those of
+   them whose stresses are needed. */
+PetscErrorCode HycoQuantitiesMarkDecisive(HycoFE fe, const PetscReal u[], const PetscReal sigma[],
+                                          const PetscReal value[], PetscBool balanced, PetscBool needed[],
+                                          PetscBool stressed[]);
+/* Marks the cells whose stresses the quantities need. */
+PetscErrorCode HycoQuantitiesMarkStressed(HycoScene scene, HycoMesh mesh, PetscBool stressed[]);
 /* Which reactions follow from balance (balance.c): balanced[k * n_bodies + b], for each quantity k the bodies b of
    whose loads and contact forces it is minus the sum; for no body: it does not follow. mesh: whole, or the processes'
    parts. Collective. */

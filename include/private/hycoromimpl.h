@@ -140,12 +140,14 @@ struct _p_HycoROM {
   HycoFE fe_whole;              /* on whole */
   HycoFE fe_floating;           /* on the loaded cells of the bodies that contact alone holds */
   HycoOutputCells output_cells; /* of the scene's quantities */
+  HycoOutputCells few;          /* those of them that decide the quantities near a prediction; NULL: not needed yet */
   HycoCarried carried;          /* results of the contacts (contact_results.c) */
   HycoBalance balance;          /* data kept by HycoROMGetEquilibrium() */
   HycoGradientStore gradient;   /* of HycoROMGetGradient() */
   HycoRows rows;                /* of B over dofs of mesh, all contacts; current after HycoROMComplete() */
   /* the last prediction */
   PetscBool solved;
+  PetscBool measured;       /* its quantities are in `prediction` */
   PetscBool beyond_current; /* U on all nodes of mesh and the rows of all contacts are current: HycoROMComplete() was
                                called */
   PetscBool whole_current;  /* U_whole is current */
@@ -249,6 +251,10 @@ PetscErrorCode HycoROMMeasurePath(HycoROM model);
    ownership of all. */
 PetscErrorCode HycoROMSetOutputCells(HycoROM model, HycoMesh mesh, PetscReal V[], PetscBool balanced[],
                                      HycoMesh loaded);
+/* Until HycoROMUnfocusOutputs() the quantities are measured on the cells that decide them near the last prediction, whose
+   quantities are value[], just measured. *focused: they are on cells, not only of contacts. */
+PetscErrorCode HycoROMFocusOutputs(HycoROM model, const PetscReal value[], PetscBool *focused);
+PetscErrorCode HycoROMUnfocusOutputs(HycoROM model);
 /* On that mesh; NULL: the quantities need only results of contacts. Borrowed. */
 HycoFE HycoROMGetOutputCells(HycoROM model);
 /* The displacements and cell stresses there, of the last HycoROMMeasureQuantities() without a history; NULL as above. */

@@ -20,7 +20,7 @@ import numpy as np
 from . import _library as c
 from ._library import Error, NotConverged, World
 
-__all__ = ['Scene', 'Model', 'Solution', 'Prediction', 'Gradient', 'Error', 'NotConverged', 'version', 'rank', 'size']
+__all__ = ['Scene', 'Model', 'Solution', 'Prediction', 'Gradient', 'Fit', 'Error', 'NotConverged', 'version', 'rank', 'size']
 
 
 def version():
@@ -118,6 +118,24 @@ class Gradient:
 
     def __getitem__(self, name):
         return self.value[..., list(self.outputs).index(name), :]
+
+
+class Fit:
+    """An answer of Model.fit().
+
+    mu           parameter values, an array; parameters: the same by name
+    outputs      {name: value} there
+    misfit       root mean square of the relative differences from the targets
+    converged    it is a minimum within the ranges, by its slope
+    kink         derivatives there are one-sided
+    starts, at_least  minimisations, and those that ended at the least misfit
+    evaluations  predictions
+    """
+
+    def __init__(self, mu, outputs, names, found):
+        self.mu, self.outputs, self.parameters = mu, outputs, dict(zip(names, mu.tolist()))
+        self.misfit, self.converged, self.kink = float(found['misfit']), bool(found['converged']), bool(found['kink'])
+        self.starts, self.at_least, self.evaluations = (int(found[name]) for name in ('n_starts', 'n_least', 'evaluations'))
 
 
 def _gradient(function, handle):
@@ -497,6 +515,21 @@ class Model(_Handle):
         shape = mu.shape[:-1]
         named = {name: outputs[:, k].reshape(shape)[()] for k, name in enumerate(self.outputs)}
         return Gradient(mu, named, value.reshape(shape + size[1:]), kink.reshape(shape + size[1:]), undecided.reshape(shape)[()])
+
+    def fit(self, targets, start=None, starts=1, samples=64, kind='brgn'):
+        """The Fit of {output: target}: the parameters within the ranges at which the outputs are closest to the targets, as hyco fit.
+        It minimises from the `starts` best of `samples` predictions over the ranges, or from `start` alone, by the TAO type `kind`
+        (brgn, blmvm). Under mpiexec each process does the same."""
+        handle, lacking = self._open, [name for name in targets if name not in self.outputs]
+        if lacking or not targets:
+            raise Error(f'the targets name {", ".join(lacking) or "no output"}; the outputs are {", ".join(self.outputs)}')
+        output = np.array([self.outputs.index(name) for name in targets], c.integer()[1])
+        target = np.array(list(targets.values()), float)
+        mu, found = np.zeros(len(self.parameters)), np.zeros(1, c.struct('HycoFit'))
+        start = None if start is None else _one(start, self.parameters)
+        c.call('HycoROMFit', handle, c.count(len(output)), c.address(output), c.address(target), c.address(start), c.count(samples),
+               c.count(starts), kind.encode(), c.address(mu), c.address(found))
+        return Fit(mu, self.predict(mu, check=False).outputs, self.parameters, found[0])
 
     # ---- of the last prediction at one point
 

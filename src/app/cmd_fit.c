@@ -1,39 +1,31 @@
 /*
-  hyco fit: the parameter values at which a model's outputs are closest to targets, min 1/2 |r|^2 within the ranges with
-  r_k = (output_k - target_k) / scale_k, by a TAO type on the model's gradients; the answer is solved once at full order.
-  A fit starts at the best of some points over the ranges, since there may be several minima.
+  hyco fit: the parameter values at which a model's outputs are closest to targets, HycoROMFit(); the answer is solved once
+  at full order.
 */
 #include "driver.h"
-#include <petsctao.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
-#define MOST    64   /* parameters */
-#define EXACT   1e-9 /* a misfit below it is round-off */
-#define UNMET   1e-3 /* a misfit above it means that the targets are not met */
-#define MINIMUM 1e-5 /* of the slope of the misfit, relative to what the derivatives allow */
-#define WEIGHT  1e-6 /* of the regularisation of Gauss-Newton steps: for targets that do not determine all parameters */
+#define MOST  64   /* parameters */
+#define UNMET 1e-3 /* a misfit above it means that the targets are not met */
 
 typedef struct {
   HycoROM model;
   HycoScene scene; /* the model's */
   PetscInt n, n_par;
   PetscInt output[HYCO_MAX_QUANTITIES]; /* by target: its output */
-  PetscReal target[HYCO_MAX_QUANTITIES], scale[HYCO_MAX_QUANTITIES];
+  PetscReal target[HYCO_MAX_QUANTITIES];
   const PetscReal *lo, *hi;
-  PetscInt evaluations;
-  /* at the last point: */
-  PetscReal x[MOST], r[HYCO_MAX_QUANTITIES], J[HYCO_MAX_QUANTITIES * MOST]; /* shares of the ranges; J: n x n_par */
-  PetscBool known, kink;
-  HycoPrediction prediction;
+  HycoFit fit;
+  PetscReal mu[MOST], value[HYCO_MAX_QUANTITIES]; /* the answer, the outputs there */
 } Fit;
 
 /* -- options -- */
 
-/* -fit_type, -fit_starts, and whether -mu gives the start. */
+/* -fit_type, -fit_starts, -starts, and whether -mu gives the start. */
 typedef struct {
-  PetscInt type, starts;
+  PetscInt type, samples, starts;
   PetscBool given;
   PetscReal mu[MOST];
 } Settings;
@@ -41,7 +33,7 @@ static const char *const types[] = {"brgn", "blmvm", NULL};
 
 static PetscErrorCode ReadSettings(Settings *s)
 {
-  *s = (Settings){.starts = 64};
+  *s = (Settings){.samples = 64, .starts = 1};
 
   PetscFunctionBegin;
   PetscOptionsBegin(PETSC_COMM_WORLD, NULL, "hyco", NULL);
@@ -50,12 +42,15 @@ static PetscErrorCode ReadSettings(Settings *s)
                       "TAO type of the fit: regularised Gauss-Newton steps within the ranges, or a limited-memory "
                       "quasi-Newton method",
                       types, &s->type, NULL));
-  PetscCall(HycoOptionsInt("-fit_starts", "predictions over the ranges, the best of which is the start without -mu", 1,
-                           1000000, &s->starts, NULL));
+  PetscCall(HycoOptionsInt("-fit_starts", "predictions over the ranges, the best of which are starts without -mu", 1,
+                           1000000, &s->samples, NULL));
+  PetscCall(HycoOptionsInt("-starts", "fits from so many of them; the least misfit is the answer", 1, 1000, &s->starts,
+                           NULL));
   PetscOptionsEnd();
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* An empty meaning: the option is declared once, as target_, in DeclareFit(). */
 static PetscErrorCode ReadTarget(Fit *f, PetscInt output, const char name[])
 {
   char key[DRIVER_LINE], text[PETSC_MAX_PATH_LEN], *end;
@@ -106,245 +101,24 @@ static PetscErrorCode ReadTargets(Fit *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -- the misfit -- */
-
-static void ToParameters(const Fit *f, const PetscReal x[], PetscReal mu[])
-{
-  for (PetscInt p = 0; p < f->n_par; p++)
-    mu[p] = PetscMin(PetscMax(f->lo[p] + x[p] * (f->hi[p] - f->lo[p]), f->lo[p]), f->hi[p]);
-}
-
-static PetscReal Size(PetscInt n, const PetscReal v[])
-{
-  PetscReal sum = 0;
-
-  for (PetscInt k = 0; k < n; k++) sum += v[k] * v[k];
-  return PetscSqrtReal(sum);
-}
-
-static void Misfit(const Fit *f, const HycoPrediction *p, PetscReal r[])
-{
-  for (PetscInt k = 0; k < f->n; k++) r[k] = (p->quantity[f->output[k]] - f->target[k]) / f->scale[k];
-}
-
-/* r and J at x. */
-static PetscErrorCode Evaluate(Fit *f, const PetscReal x[])
-{
-  HycoGradient g;
-  PetscReal mu[MOST];
-  PetscBool same = f->known;
-
-  PetscFunctionBegin;
-  for (PetscInt p = 0; p < f->n_par; p++) same = (PetscBool)(same && x[p] == f->x[p]);
-  if (same) PetscFunctionReturn(PETSC_SUCCESS);
-  f->known = PETSC_FALSE;
-  ToParameters(f, x, mu);
-  PetscCall(HycoROMPredict(f->model, f->n_par, mu));
-  PetscCall(HycoROMGetPrediction(f->model, &f->prediction));
-  HycoCheck(f->prediction.reason > 0, "a prediction of the fit failed: %s", HycoReasonName(f->prediction.reason));
-  PetscCall(HycoROMGetGradient(f->model, &g));
-  Misfit(f, &f->prediction, f->r);
-  f->kink = PETSC_FALSE;
-  for (PetscInt k = 0; k < f->n; k++) {
-    for (PetscInt p = 0; p < f->n_par; p++) {
-      const PetscInt at = f->output[k] * f->n_par + p;
-
-      f->J[k * f->n_par + p] = g.value[at] * (f->hi[p] - f->lo[p]) / f->scale[k];
-      f->kink = (PetscBool)(f->kink || g.kink[at]);
-    }
-  }
-  PetscCall(PetscArraycpy(f->x, x, f->n_par));
-  f->known = PETSC_TRUE;
-  f->evaluations++;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode EvaluateVec(Fit *f, Vec X)
-{
-  const PetscScalar *x;
-  PetscErrorCode ierr;
-
-  PetscFunctionBegin;
-  PetscCall(VecGetArrayRead(X, &x));
-  ierr = Evaluate(f, x);
-  PetscCall(VecRestoreArrayRead(X, &x));
-  PetscCall(ierr);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode Residual(Tao tao, Vec X, Vec R, void *ctx)
-{
-  Fit *f = (Fit *)ctx;
-  PetscScalar *r;
-
-  PetscFunctionBegin;
-  (void)tao;
-  PetscCall(EvaluateVec(f, X));
-  PetscCall(VecGetArrayWrite(R, &r));
-  PetscCall(PetscArraycpy(r, f->r, f->n));
-  PetscCall(VecRestoreArrayWrite(R, &r));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode Jacobian(Tao tao, Vec X, Mat J, Mat P, void *ctx)
-{
-  Fit *f = (Fit *)ctx;
-
-  PetscFunctionBegin;
-  (void)tao;
-  (void)P;
-  PetscCall(EvaluateVec(f, X));
-  for (PetscInt k = 0; k < f->n; k++) {
-    for (PetscInt p = 0; p < f->n_par; p++) PetscCall(MatSetValue(J, k, p, f->J[k * f->n_par + p], INSERT_VALUES));
-  }
-  PetscCall(MatAssemblyBegin(J, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(J, MAT_FINAL_ASSEMBLY));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* J^T r */
-static void Slope(const Fit *f, PetscReal g[])
-{
-  for (PetscInt p = 0; p < f->n_par; p++) {
-    g[p] = 0;
-    for (PetscInt k = 0; k < f->n; k++) g[p] += f->J[k * f->n_par + p] * f->r[k];
-  }
-}
-
-static PetscErrorCode Objective(Tao tao, Vec X, PetscReal *value, Vec G, void *ctx)
-{
-  Fit *f = (Fit *)ctx;
-  PetscScalar *g;
-
-  PetscFunctionBegin;
-  (void)tao;
-  PetscCall(EvaluateVec(f, X));
-  *value = PetscSqr(Size(f->n, f->r)) / 2;
-  PetscCall(VecGetArrayWrite(G, &g));
-  Slope(f, g);
-  PetscCall(VecRestoreArrayWrite(G, &g));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* -- the fit, the same on each rank -- */
 
-/* The best of the points over the ranges; scales of targets that are 0 are the largest outputs there. */
-static PetscErrorCode Start(Fit *f, const Settings *s, PetscReal x[])
+static PetscErrorCode Run(Fit *f, const Settings *s)
 {
-  HycoSamples samples = NULL;
-  HycoPrediction *p;
-  const PetscReal *mu;
-  PetscReal least = PETSC_MAX_REAL, r[HYCO_MAX_QUANTITIES];
-  PetscInt n, n_par;
+  HycoPrediction at;
 
   PetscFunctionBegin;
-  PetscCall(HycoSamplesCreate(f->scene, &samples));
-  if (s->given)
-    PetscCall(HycoSamplesAddPoint(samples, s->mu));
-  else
-    PetscCall(HycoSamplesAddScattered(samples, s->starts));
-  PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
-  PetscCall(PetscCalloc1(n, &p));
-  PetscCall(HycoROMSolveMany(f->model, n, n_par, mu, p, NULL, NULL));
-  f->evaluations = n;
-  for (PetscInt k = 0; k < f->n; k++) {
-    f->scale[k] = PetscAbsReal(f->target[k]);
-    for (PetscInt i = 0; i < n && f->target[k] == 0; i++)
-      f->scale[k] = PetscMax(f->scale[k], PetscAbsReal(p[i].quantity[f->output[k]]));
-    if (f->scale[k] == 0) f->scale[k] = 1;
-  }
-  for (PetscInt i = 0; i < n; i++) {
-    Misfit(f, &p[i], r);
-    if (p[i].reason <= 0 || Size(f->n, r) >= least) continue;
-    least = Size(f->n, r);
-    for (PetscInt q = 0; q < n_par; q++)
-      x[q] = f->hi[q] > f->lo[q] ? (mu[i * n_par + q] - f->lo[q]) / (f->hi[q] - f->lo[q]) : 0;
-  }
-  PetscCall(PetscFree(p));
-  PetscCall(HycoSamplesDestroy(&samples));
-  HycoCheck(least < PETSC_MAX_REAL, "no prediction at the start of the fit converged; give another -mu");
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Minimises from X by a type. */
-static PetscErrorCode Minimise(Fit *f, const char type[], Vec X)
-{
-  const PetscBool squares = (PetscBool)(strcmp(type, TAOBRGN) == 0);
-  Tao tao;
-  Vec lo, hi, r;
-  Mat J;
-
-  PetscFunctionBegin;
-  PetscCall(VecDuplicate(X, &lo));
-  PetscCall(VecDuplicate(X, &hi));
-  PetscCall(VecSet(hi, 1));
-  PetscCall(VecCreateSeq(PETSC_COMM_SELF, f->n, &r));
-  PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, f->n, f->n_par, NULL, &J));
-  PetscCall(TaoCreate(PETSC_COMM_SELF, &tao));
-  PetscCall(TaoSetType(tao, type));
-  if (squares) {
-    PetscCall(TaoSetResidualRoutine(tao, r, Residual, f));
-    PetscCall(TaoSetJacobianResidualRoutine(tao, J, J, Jacobian, f));
-    PetscCall(TaoBRGNSetRegularizerWeight(tao, WEIGHT));
-  } else
-    PetscCall(TaoSetObjectiveAndGradient(tao, NULL, Objective, f));
-  PetscCall(TaoSetSolution(tao, X));
-  PetscCall(TaoSetVariableBounds(tao, lo, hi));
-  PetscCall(TaoSetTolerances(tao, 1e-14, 0, 0));
-  PetscCall(TaoSetMaximumIterations(tao, 200));
-  PetscCall(TaoSolve(tao));
-  PetscCall(TaoDestroy(&tao));
-  PetscCall(MatDestroy(&J));
-  PetscCall(VecDestroy(&r));
-  PetscCall(VecDestroy(&lo));
-  PetscCall(VecDestroy(&hi));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Whether the last point is a minimum within the ranges, by the recomputed slope: a solver's flag is no evidence. */
-static PetscBool IsMinimum(const Fit *f)
-{
-  PetscReal g[MOST], most = 0;
-
-  Slope(f, g);
-  for (PetscInt p = 0; p < f->n_par; p++) {
-    const PetscBool held = (PetscBool)((f->x[p] <= 0 && g[p] > 0) || (f->x[p] >= 1 && g[p] < 0));
-
-    if (!held) most = PetscMax(most, PetscAbsReal(g[p]));
-  }
-  return (PetscBool)(Size(f->n, f->r) <= EXACT || most <= MINIMUM * Size(f->n * f->n_par, f->J) * Size(f->n, f->r));
-}
-
-/* The requested type, and after it the other one if that ends at no minimum. *minimum: the last point is one. */
-static PetscErrorCode Run(Fit *f, const Settings *s, PetscReal mu[], PetscBool *minimum, char method[64])
-{
-  PetscScalar *x;
-  Vec X;
-
-  PetscFunctionBegin;
-  PetscCall(VecCreateSeq(PETSC_COMM_SELF, f->n_par, &X));
-  PetscCall(VecGetArray(X, &x));
-  PetscCall(Start(f, s, x));
-  PetscCall(VecRestoreArray(X, &x));
-  *minimum = PETSC_FALSE;
-  method[0] = '\0';
-  for (PetscInt k = 0; k < 2 && !*minimum; k++) {
-    const char *type = types[k ? !s->type : s->type];
-
-    PetscCall(Minimise(f, type, X));
-    PetscCall(EvaluateVec(f, X));
-    *minimum = IsMinimum(f);
-    PetscCall(PetscStrlcat(method, k ? ", then " : "", 64));
-    PetscCall(PetscStrlcat(method, type, 64));
-  }
-  ToParameters(f, f->x, mu);
-  PetscCall(VecDestroy(&X));
+  PetscCall(HycoROMFit(f->model, f->n, f->output, f->target, s->given ? s->mu : NULL, s->samples, s->starts,
+                       types[s->type], f->mu, &f->fit));
+  PetscCall(HycoROMGetPrediction(f->model, &at));
+  for (PetscInt k = 0; k < f->n; k++) f->value[k] = at.quantity[f->output[k]];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* -- the answer -- */
 
-/* The scene for the check: the model's, with the outputs that have targets. Collective. */
+/* The scene for the check: the model's, with the outputs that have targets. Collective. The full-order scene may
+   have other outputs, in another order: at[] maps those with targets. */
 static PetscErrorCode LoadScene(const Fit *f, const char path[], HycoScene *scene, PetscInt at[])
 {
   const char *names[HYCO_MAX_QUANTITIES];
@@ -362,7 +136,8 @@ static PetscErrorCode LoadScene(const Fit *f, const char path[], HycoScene *scen
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One full-order solve at the answer: full[k], the outputs with targets. Collective. */
+/* One full-order solve at the answer: full[k], the outputs with targets. Collective. Fails before anything is
+   written: an answer that full order cannot confirm is none. */
 static PetscErrorCode Check(const Fit *f, HycoScene scene, const PetscInt at[], const PetscReal mu[], PetscReal full[])
 {
   HycoFOM fom;
@@ -381,28 +156,27 @@ static PetscErrorCode Check(const Fit *f, HycoScene scene, const PetscInt at[], 
 /* The root mean square of the relative differences from the targets. */
 static PetscReal Mean(const Fit *f, const PetscReal value[])
 {
-  PetscReal r[HYCO_MAX_QUANTITIES];
+  PetscReal sum = 0;
 
-  for (PetscInt k = 0; k < f->n; k++) r[k] = (value[k] - f->target[k]) / f->scale[k];
-  return Size(f->n, r) / PetscSqrtReal((PetscReal)f->n);
+  for (PetscInt k = 0; k < f->n; k++) sum += PetscSqr((value[k] - f->target[k]) / f->fit.scale[k]);
+  return PetscSqrtReal(sum / (PetscReal)f->n);
 }
 
-static PetscErrorCode PrintAnswer(const Fit *f, const PetscReal mu[], const PetscReal full[], cJSON *json)
+static PetscErrorCode PrintAnswer(const Fit *f, const PetscReal full[], cJSON *json)
 {
   const char *names[HYCO_MAX_QUANTITIES];
   char words[DRIVER_LINE];
-  PetscReal value[HYCO_MAX_QUANTITIES];
+  const PetscReal *value = f->value;
   PetscInt n;
   cJSON *targets = cJSON_AddObjectToObject(json, "targets");
 
   PetscFunctionBegin;
-  PetscCall(DriverFormatPoint(f->scene, mu, words, NULL));
+  PetscCall(DriverFormatPoint(f->scene, f->mu, words, NULL));
   PetscCall(DriverPrint("found: %s\n", words));
   PetscCall(HycoSceneGetQuantities(f->scene, &n, names));
   for (PetscInt k = 0; k < f->n; k++) {
     cJSON *of = cJSON_AddObjectToObject(targets, names[f->output[k]]);
 
-    value[k] = f->prediction.quantity[f->output[k]];
     ReportNumbers(of, {"target", f->target[k]}, {"model", value[k]});
     PetscCall(DriverPrint("%s: target %.6g, model %.6g", names[f->output[k]], (double)f->target[k], (double)value[k]));
     if (full) cJSON_AddNumberToObject(of, "full_order", full[k]);
@@ -419,19 +193,22 @@ static PetscErrorCode PrintAnswer(const Fit *f, const PetscReal mu[], const Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Report(Fit *f, const PetscReal mu[], const PetscReal full[], PetscBool minimum,
-                             const char method[])
+/* A fit that ended at no minimum is a miss (exit status 3), with its report written. */
+static PetscErrorCode Report(const Fit *f, const PetscReal full[])
 {
+  const HycoFit *fit = &f->fit;
+  const PetscReal *mu = f->mu;
   const char *const *names;
   cJSON *json, *ends;
 
   PetscFunctionBegin;
   PetscCall(ReportCreate("fit", f->scene, mu, &json));
-  PetscCall(PrintAnswer(f, mu, full, json));
-  cJSON_AddNumberToObject(json, "evaluations", f->evaluations);
-  cJSON_AddStringToObject(json, "solver", method);
-  cJSON_AddBoolToObject(json, "converged", minimum);
-  cJSON_AddBoolToObject(json, "kink", f->kink);
+  PetscCall(PrintAnswer(f, full, json));
+  cJSON_AddNumberToObject(json, "evaluations", fit->evaluations);
+  cJSON_AddStringToObject(json, "solver", fit->method);
+  cJSON_AddBoolToObject(json, "converged", fit->converged);
+  cJSON_AddBoolToObject(json, "kink", fit->kink);
+  ReportNumbers(json, {"starts", (PetscReal)fit->n_starts}, {"starts_at_least", (PetscReal)fit->n_least});
   ends = cJSON_AddArrayToObject(json, "at_ends");
   PetscCall(HycoSceneGetParameters(f->scene, NULL, &names, NULL, NULL));
   for (PetscInt p = 0; p < f->n_par; p++) {
@@ -439,19 +216,21 @@ static PetscErrorCode Report(Fit *f, const PetscReal mu[], const PetscReal full[
     cJSON_AddItemToArray(ends, cJSON_CreateString(names[p]));
     PetscCall(DriverPrint("%s is at the end of its range\n", names[p]));
   }
-  PetscCall(DriverPrint("%d predictions (%s)\n", (int)f->evaluations, method));
-  if (minimum && Size(f->n, f->r) > UNMET * PetscSqrtReal((PetscReal)f->n))
+  PetscCall(DriverPrint("%d predictions (%s)\n", (int)fit->evaluations, fit->method));
+  if (fit->n_starts > 1)
+    PetscCall(DriverPrint("%d of %d starts ended at the least misfit\n", (int)fit->n_least, (int)fit->n_starts));
+  if (fit->converged && fit->misfit > UNMET)
     PetscCall(DriverPrint("the targets are not met; the misfit may have lower minima elsewhere: other starts (-mu, "
-                          "-fit_starts) may find them\n"));
-  if (!minimum)
+                          "-starts, -fit_starts) may find them\n"));
+  if (!fit->converged)
     PetscCall(DriverMissed("the fit ended%s, where the misfit %.2g is no minimum by its slope; start elsewhere (-mu, "
-                           "-fit_starts)",
-                           f->kink ? " at a kink" : "", (double)(Size(f->n, f->r) / PetscSqrtReal((PetscReal)f->n))));
+                           "-starts, -fit_starts)",
+                           fit->kink ? " at a kink" : "", (double)fit->misfit));
   PetscCall(ReportWrite(&json));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -mu or -mu_NAME as the start. */
+/* -mu or -mu_NAME as the start. Without -mu the start is searched; DriverGetPoint() would require all parameters. */
 static PetscErrorCode ReadStart(const Fit *f, Settings *s)
 {
   const char *const *names;
@@ -469,12 +248,12 @@ static PetscErrorCode ReadStart(const Fit *f, Settings *s)
 }
 
 /* The answer is that of rank 0: others may differ in the last bits. Collective. */
-static PetscErrorCode RunOnEach(Fit *f, const Settings *s, PetscReal mu[], PetscBool *minimum, char method[64])
+static PetscErrorCode RunOnEach(Fit *f, const Settings *s)
 {
   PetscFunctionBegin;
-  HycoOnEach(PETSC_COMM_WORLD, Run(f, s, mu, minimum, method));
-  PetscCallMPI(MPI_Bcast(mu, MOST, MPIU_REAL, 0, PETSC_COMM_WORLD));
-  PetscCallMPI(MPI_Bcast(minimum, 1, HYCO_MPI_BOOL, 0, PETSC_COMM_WORLD));
+  HycoOnEach(PETSC_COMM_WORLD, Run(f, s));
+  PetscCallMPI(MPI_Bcast(f->mu, MOST, MPIU_REAL, 0, PETSC_COMM_WORLD));
+  PetscCallMPI(MPI_Bcast(&f->fit.converged, 1, HYCO_MPI_BOOL, 0, PETSC_COMM_WORLD));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -492,15 +271,15 @@ PetscErrorCode DeclareFit(PetscOptions options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The scene, if given, is loaded and checked before the fit, so that a mismatch is not found only after it. */
 PetscErrorCode CommandFit(void)
 {
   Fit f = {0};
   Settings s;
-  PetscReal mu[MOST] = {0}, full[HYCO_MAX_QUANTITIES];
-  PetscBool minimum;
+  PetscReal full[HYCO_MAX_QUANTITIES];
   PetscInt at[HYCO_MAX_QUANTITIES];
   HycoScene scene = NULL;
-  char own[PETSC_MAX_PATH_LEN], path[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN], method[64] = "";
+  char own[PETSC_MAX_PATH_LEN], path[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBegin;
   PetscCall(DriverReadFiles(own, path, NULL, report, NULL));
@@ -517,10 +296,10 @@ PetscErrorCode CommandFit(void)
   else
     PetscCall(DriverRefuseOnly("full order", "it is for full order, which fit solves only with -scene"));
   PetscCall(DriverCheckLeftEarly());
-  HycoStaged(HYCO_STAGE_ONLINE, RunOnEach(&f, &s, mu, &minimum, method));
-  if (scene) HycoStaged(HYCO_STAGE_FULL_ORDER, Check(&f, scene, at, mu, full));
+  HycoStaged(HYCO_STAGE_ONLINE, RunOnEach(&f, &s));
+  if (scene) HycoStaged(HYCO_STAGE_FULL_ORDER, Check(&f, scene, at, f.mu, full));
   PetscCall(DriverCheckLeft());
-  PetscCall(Report(&f, mu, scene ? full : NULL, minimum, method));
+  PetscCall(Report(&f, scene ? full : NULL));
   PetscCall(HycoSceneDestroy(&scene));
   PetscCall(HycoROMDestroy(&f.model));
   PetscFunctionReturn(PETSC_SUCCESS);

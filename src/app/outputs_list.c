@@ -145,6 +145,8 @@ static const Written written[] = {
     {"report", "fit", "solver", "text", "-", "TAO types"},
     {"report", "fit", "converged", "flag", "-", "the slope of the misfit vanishes within the ranges"},
     {"report", "fit", "kink", "flag", "-", "derivatives at the answer are one-sided"},
+    {"report", "fit", "starts", "count", "-", "minimisations"},
+    {"report", "fit", "starts_at_least", "count", "-", "of these, those that ended at the least misfit"},
     {"report", "fit", "at_ends", "texts", "-", "parameters at the end of their range"},
     {"report", "solve predict", "n_facing", "count", "-", "contacts that may close; predict: of the RID"},
     {"report", "solve predict", "overlap", "number", "length", "largest initial overlap, >= 0"},
@@ -475,6 +477,7 @@ static const Written written[] = {
     {"fields", "all", "sealed", "1 x 1", "-", "1: the file was written to its end"},
 };
 
+/* Tab-separated, for scripts: no layout. */
 PetscErrorCode DriverHelpOutput(void)
 {
   PetscFunctionBegin;

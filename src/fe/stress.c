@@ -102,7 +102,8 @@ static PetscErrorCode KeepMean(HycoFE fe, const HycoElement *el, PetscInt cell, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFEStressKept(HycoFE fe, const PetscReal u[], PetscReal **kept, PetscReal sigma[])
+PetscErrorCode HycoFEStressKept(HycoFE fe, const PetscBool in[], const PetscReal u[], PetscReal **kept,
+                                PetscReal sigma[])
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
   const PetscInt n = fe->mesh->n_cells, size = 3 * el->nv;
@@ -116,6 +117,7 @@ PetscErrorCode HycoFEStressKept(HycoFE fe, const PetscReal u[], PetscReal **kept
   for (PetscInt cell = 0; cell < n; cell++) {
     PetscReal *own = *kept + (size_t)cell * (size_t)(2 * size), *of = sigma + cell * fe->n_sigma, e[6], s[6] = {0};
 
+    if (in && !in[cell]) continue;
     if (!IsUniform(fe, el, cell)) {
       PetscCall(AddMean(fe, el, cell, u, of));
       continue;

@@ -53,13 +53,14 @@ static PetscErrorCode Update(HycoFE fe, Batch *b)
 }
 
 /* Batches of one body: a law is called for up to 64 cells at once. */
-static PetscErrorCode UpdateAll(HycoFE fe, PetscBool all, Batch *b)
+static PetscErrorCode UpdateAll(HycoFE fe, PetscBool all, const PetscBool same[], Batch *b)
 {
   HycoMesh m = fe->mesh;
 
   PetscFunctionBegin;
   for (PetscInt e = 0; e < m->n_cells; e++) {
-    if (fe->constant[e] && !all) continue;
+    /* Neither nodes nor law change: the tangents of the call before stay. */
+    if (!all && (fe->constant[e] || same[m->cell_body[e]])) continue;
     if (b->n == BATCH || (b->n && m->cell_body[e] != m->cell_body[b->cell[0]])) PetscCall(Update(fe, b));
     b->cell[b->n++] = e;
   }
@@ -67,18 +68,26 @@ static PetscErrorCode UpdateAll(HycoFE fe, PetscBool all, Batch *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Elastic tangents at mu; all: also those of cells that no parameter changes. Not collective. */
-PetscErrorCode HycoFESetTangents(HycoFE fe, PetscBool all)
+/* Elastic tangents at mu; all: also those of cells that no parameter changes. Otherwise those of bodies whose law has
+   changed[] parameters (NULL: any), or varies in space where nodes have moved. Not collective. */
+PetscErrorCode HycoFESetTangents(HycoFE fe, PetscBool all, PetscBool moved, const PetscBool changed[])
 {
   const PetscInt n = BATCH * HycoElementGet(fe->mesh->type)->nq, ns = fe->n_sigma;
+  PetscBool *same;
   Batch b = {.n = 0};
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc4(3 * n, &b.x, n, &b.temperature, HYCO_MAX_DECLARED * n, &b.constant, PetscMax(2, ns * ns) * n,
-                         &b.tangent));
-  ierr = UpdateAll(fe, all, &b);
-  PetscCall(PetscFree4(b.x, b.temperature, b.constant, b.tangent));
+  PetscCall(PetscMalloc5(3 * n, &b.x, n, &b.temperature, HYCO_MAX_DECLARED * n, &b.constant, PetscMax(2, ns * ns) * n,
+                         &b.tangent, fe->scene->n_bodies, &same));
+  for (PetscInt k = 0; k < fe->scene->n_bodies; k++) {
+    const HycoMaterial law = fe->scene->body[k].law;
+
+    same[k] = (PetscBool)(changed && law->linear && !HycoMaterialChanges(law, changed) &&
+                          !(moved && HycoMaterialInSpace(law)));
+  }
+  ierr = UpdateAll(fe, all, same, &b);
+  PetscCall(PetscFree5(b.x, b.temperature, b.constant, b.tangent, same));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -5,6 +5,7 @@
 const char *const HycoAffectedNames[HYCO_N_AFFECTED] = {"maps",         "stiffness", "laws",  "temperatures",
                                                         "contact rows", "gaps",      "loads", "supports"};
 
+/* Components that are not given are NULL, and never change. */
 static PetscBool AnyChanges(HycoExpr const e[3], const PetscBool changed[])
 {
   return (PetscBool)(HycoExprChanges(e[0], changed) || HycoExprChanges(e[1], changed) ||
@@ -23,18 +24,13 @@ static void FindReach(HycoScene s, PetscInt p, PetscBool does[HYCO_N_AFFECTED])
   does[HYCO_AFFECTS_STIFFNESS] = c.stiffness;
   does[HYCO_AFFECTS_ROWS] = (PetscBool)(c.rows && s->n_contacts);
   does[HYCO_AFFECTS_GAPS] = (PetscBool)(c.gaps && s->n_contacts);
-  for (PetscInt k = 0; k < s->n_loads; k++)
-    does[HYCO_AFFECTS_LOADS] = (PetscBool)(does[HYCO_AFFECTS_LOADS] || HycoExprChanges(s->load[k].pressure, changed) ||
-                                           AnyChanges(s->load[k].traction, changed));
-  for (PetscInt k = 0; k < s->n_point_loads; k++)
-    does[HYCO_AFFECTS_LOADS] = (PetscBool)(does[HYCO_AFFECTS_LOADS] || AnyChanges(s->point_load[k].force, changed));
+  does[HYCO_AFFECTS_LOADS] = HycoSceneLoadsChange(s, changed);
   for (PetscInt b = 0; b < s->n_bodies; b++) {
     const HycoMaterial law = s->body[b].law;
     HycoExpr const heat[3] = {s->body[b].temperature, s->body[b].reference, s->body[b].expansion};
 
-    does[HYCO_AFFECTS_LOADS] = (PetscBool)(does[HYCO_AFFECTS_LOADS] || AnyChanges(s->body[b].force, changed) ||
-                                           HycoSceneHasInertia(s, &s->body[b], changed));
     does[HYCO_AFFECTS_TEMPERATURES] = (PetscBool)(does[HYCO_AFFECTS_TEMPERATURES] || AnyChanges(heat, changed));
+    /* What changes the stiffness is listed as that; constants of plastic laws change the stress alone. */
     for (PetscInt j = 0; j < law->constants.n && !c.stiffness; j++)
       does[HYCO_AFFECTS_LAWS] =
           (PetscBool)(does[HYCO_AFFECTS_LAWS] || HycoExprChanges(law->constants.entry[j].expr, changed));

@@ -38,7 +38,8 @@ static PetscErrorCode FindPlace(HycoScene scene, HycoMesh m, const HycoQuantity 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* in[n_cells]: marks the cells of a place that consists of cells. */
+/* in[n_cells]: marks the cells of a place that consists of cells. A body's cells by its number, and those of a
+   group of cells by its list: a name can be both. */
 static void MarkCells(HycoMesh m, const Place *p, PetscBool in[])
 {
   for (PetscInt e = 0; e < m->n_cells; e++) in[e] = (PetscBool)(p->group < 0 || m->cell_body[e] == p->body);
@@ -67,6 +68,8 @@ static PetscErrorCode MarkAround(HycoMesh m, const Place *p, PetscBool in[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Reactions need all cells around their nodes, displacements and stresses the cells or facets of the group.
+   Quantities of contacts need none. */
 PetscErrorCode HycoQuantityMarkCells(HycoScene scene, HycoMesh m, PetscInt k, PetscBool in[])
 {
   const HycoQuantity *q = &scene->quantity[k];
@@ -104,6 +107,29 @@ PetscErrorCode HycoQuantitiesMarkCells(HycoScene scene, HycoMesh m, PetscBool ne
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether a quantity is one of a stress. */
+static PetscBool OfStress(const HycoQuantity *q)
+{
+  return (PetscBool)(q->kind <= HYCO_QUANTITY_MEAN && q->field >= XX);
+}
+
+PetscErrorCode HycoQuantitiesMarkStressed(HycoScene scene, HycoMesh m, PetscBool stressed[])
+{
+  PetscBool *in;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(m->n_cells, &in));
+  PetscCall(PetscArrayzero(stressed, m->n_cells));
+  for (PetscInt k = 0; k < scene->n_quantities; k++) {
+    if (!OfStress(&scene->quantity[k])) continue;
+    PetscCall(HycoQuantityMarkCells(scene, m, k, in));
+    for (PetscInt e = 0; e < m->n_cells; e++) stressed[e] = (PetscBool)(stressed[e] || in[e]);
+  }
+  PetscCall(PetscFree(in));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* field: U is the length of the displacement, UX .. its components. */
 static PetscReal OfNode(HycoFE fe, PetscInt field, const PetscReal u[], PetscInt node)
 {
   PetscReal sum = 0;
@@ -162,6 +188,81 @@ static PetscErrorCode OfCell(HycoFE fe, PetscInt field, const PetscReal sigma[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+#define CLOSE 0.01 /* share of an extreme, within which the field may become it by a small change */
+
+/* Keeps the marked cells in which the field is close to the extreme `value`. */
+static PetscErrorCode KeepClose(HycoFE fe, const HycoQuantity *q, const PetscReal u[], const PetscReal sigma[],
+                                PetscReal value, PetscBool in[])
+{
+  HycoMesh m = fe->mesh;
+  PetscInt node[HYCO_MAX_CELL_NODES];
+
+  PetscFunctionBegin;
+  for (PetscInt e = 0; e < m->n_cells; e++) {
+    const PetscInt n = in[e] ? HycoMeshCellNodes(m, e, node) : 0;
+    PetscReal least = PETSC_MAX_REAL, here;
+
+    for (PetscInt v = 0; v < n && q->field < XX; v++)
+      least = PetscMin(least, PetscAbsReal(OfNode(fe, q->field, u, node[v]) - value));
+    if (n && q->field >= XX) {
+      PetscCall(OfCell(fe, q->field, sigma, e, &here));
+      least = PetscAbsReal(here - value);
+    }
+    in[e] = (PetscBool)(in[e] && least <= CLOSE * PetscAbsReal(value));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Keeps one marked cell, at a node of the group that a support holds along the axis. */
+static PetscErrorCode KeepSupported(HycoFE fe, const HycoQuantity *q, PetscBool in[])
+{
+  HycoMesh m = fe->mesh;
+  PetscInt of[HYCO_MAX_CELL_NODES], n, held = -1, kept = -1;
+  Place p;
+
+  PetscFunctionBegin;
+  PetscCall(FindPlace(fe->scene, m, q, &p));
+  n = p.group < 0 ? m->n_nodes : m->group_start[p.group + 1] - m->group_start[p.group];
+  for (PetscInt k = 0; k < n && held < 0; k++) {
+    const PetscInt i = p.group < 0 ? k : m->group_node[m->group_start[p.group] + k];
+
+    if (HycoFESupports(fe, i * m->dim + q->field)) held = i;
+  }
+  for (PetscInt e = 0; e < m->n_cells && kept < 0; e++) {
+    const PetscInt n_of = in[e] ? HycoMeshCellNodes(m, e, of) : 0;
+
+    for (PetscInt v = 0; v < n_of; v++) kept = of[v] == held ? e : kept;
+  }
+  for (PetscInt e = 0; e < m->n_cells && kept >= 0; e++) in[e] = (PetscBool)(e == kept);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoQuantitiesMarkDecisive(HycoFE fe, const PetscReal u[], const PetscReal sigma[],
+                                          const PetscReal value[], PetscBool balanced, PetscBool needed[],
+                                          PetscBool stressed[])
+{
+  const HycoScene scene = fe->scene;
+  HycoMesh m = fe->mesh;
+  PetscBool *in;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(m->n_cells, &in));
+  PetscCall(PetscArrayzero(needed, m->n_cells));
+  PetscCall(PetscArrayzero(stressed, m->n_cells));
+  for (PetscInt k = 0; k < scene->n_quantities; k++) {
+    const HycoQuantity *q = &scene->quantity[k];
+
+    PetscCall(HycoQuantityMarkCells(scene, m, k, in));
+    if (q->kind < HYCO_QUANTITY_MEAN) PetscCall(KeepClose(fe, q, u, sigma, value[k], in));
+    if (q->kind == HYCO_QUANTITY_REACTION && balanced && !fe->n_oblique) PetscCall(KeepSupported(fe, q, in));
+    for (PetscInt e = 0; e < m->n_cells; e++) needed[e] = (PetscBool)(needed[e] || in[e]);
+    for (PetscInt e = 0; e < m->n_cells && OfStress(q); e++) stressed[e] = (PetscBool)(stressed[e] || in[e]);
+  }
+  PetscCall(PetscFree(in));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Over all processes' copies: extremes need no owner. */
 static void Extend(Sum *s, PetscReal value)
 {
   s->most = PetscMax(s->most, value);
@@ -169,27 +270,29 @@ static void Extend(Sum *s, PetscReal value)
 }
 
 /* Adds a cell or facet with these nodes and the value of the cell (stress), or those of its nodes (NULL); the sums are
-   integrals for a mean, which alone needs them, otherwise the weight counts. */
+   integrals for a mean, which alone needs them, otherwise the weight counts. The owner of its first node adds it,
+   so that each counts once over all processes. */
 static PetscErrorCode AddEntity(HycoFE fe, const HycoQuantity *quantity, const PetscReal u[], PetscInt cell,
                                 PetscInt facet, const PetscReal *value, Sum *s)
 {
   HycoMesh m = fe->mesh;
   const HycoElement *el = facet < 0 ? HycoElementGet(m->type) : HycoElementGetFacet(m->type);
   const PetscInt *node = facet < 0 ? m->cells + cell * m->nv : m->facets + facet * m->nf, field = quantity->field;
+  const PetscReal *weight = NULL;
 
   PetscFunctionBegin;
   if (value) Extend(s, *value);
   for (PetscInt a = 0; a < el->nv && !value; a++) Extend(s, OfNode(fe, field, u, node[a]));
   if (HycoMeshOwned(m, node[0]) < 0) PetscFunctionReturn(PETSC_SUCCESS); /* added by another process */
   s->weight += quantity->kind != HYCO_QUANTITY_MEAN;
+  if (facet < 0 && quantity->kind == HYCO_QUANTITY_MEAN) PetscCall(HycoPointWeights(fe, el, cell, &weight));
   for (PetscInt q = 0; q < el->nq && quantity->kind == HYCO_QUANTITY_MEAN; q++) {
-    PetscReal g[HYCO_CELL_NODES][3], n[3], w = 0, here = value ? *value : 0;
+    PetscReal n[3], w = facet < 0 ? weight[q] : 0, here = value ? *value : 0;
 
-    if (facet < 0) {
-      PetscCall(HycoGradients(fe, el, cell, q, g, &w));
-    } else {
+    if (facet >= 0) {
       PetscCall(HycoFacetNormal(fe, el, facet, q, n));
       for (PetscInt c = 0; c < 3; c++) w += n[c] * n[c];
+      /* The length of the normal is the weighted area. */
       w = PetscSqrtReal(w);
     }
     for (PetscInt a = 0; a < el->nv && !value; a++) here += el->N[q][a] * OfNode(fe, field, u, node[a]);
@@ -241,7 +344,8 @@ static PetscErrorCode CheckAxis(HycoFE fe, const HycoQuantity *q, const char wha
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the supports' force along an axis at the nodes of a group, or at all; the weight counts the fixed unknowns. */
+/* Adds the supports' force along an axis at the nodes of a group, or at all; the weight counts the fixed unknowns.
+   reaction: by unknown, along an oblique direction with the opposite sign. */
 static PetscErrorCode AddReactions(HycoFE fe, const HycoQuantity *q, const PetscReal reaction[], Sum *s)
 {
   HycoMesh m = fe->mesh;
@@ -269,7 +373,8 @@ static PetscErrorCode AddReactions(HycoFE fe, const HycoQuantity *q, const Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the results of one contact, or of all of them. */
+/* Adds the results of one contact, or of all of them. contact NULL: the scene is only checked, and the value is
+   not a number. */
 static PetscErrorCode AddContacts(HycoFE fe, const HycoQuantity *q, const HycoContactResult contact[], PetscReal *value)
 {
   const PetscBool turns = (PetscBool)(fe->dim == 3 || (fe->dim == 2 && q->field == 2));
@@ -325,6 +430,7 @@ static PetscErrorCode Measure(HycoFE fe, const HycoQuantity *q, const PetscReal 
     const PetscInt facet = k < m->n_cells ? -1 : k - m->n_cells, cell = facet < 0 ? k : m->facet_cell[facet];
     PetscReal value = 0;
 
+    /* cell < 0: another process has the facet's cell. */
     if (facet < 0 ? !in[k] : p.dim == m->dim || m->facet_group[facet] != p.group || cell < 0) continue;
     if (q->field >= XX) PetscCall(OfCell(fe, q->field, sigma, cell, &value));
     PetscCall(AddEntity(fe, q, u, cell, facet, q->field >= XX ? &value : NULL, s));
@@ -333,7 +439,8 @@ static PetscErrorCode Measure(HycoFE fe, const HycoQuantity *q, const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A quantity from fields or reactions, summed over the processes. Collective. */
+/* A quantity from fields or reactions, summed over the processes. Collective. The least is negated, so that one
+   MPI_MAX serves both ends. */
 static PetscErrorCode MeasureBodies(MPI_Comm comm, HycoFE fe, const HycoQuantity *q, const PetscReal u[],
                                     const PetscReal sigma[], const PetscReal reaction[], PetscReal *value)
 {
@@ -350,6 +457,7 @@ static PetscErrorCode MeasureBodies(MPI_Comm comm, HycoFE fe, const HycoQuantity
   sums[1] = s.weight;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ends, 2, MPIU_REAL, MPI_MAX, comm));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sums, 2, MPIU_REAL, MPI_SUM, comm));
+  /* After the sums: every process raises the same error. */
   HycoCheck(sums[1] > 0 || !is_reaction, "output_%s: no support fixes %c on %s", q->name, "xyz"[q->field], group);
   HycoCheck(sums[1] > 0, "output_%s: the group %s has no cell, facet or node", q->name,
             q->group ? q->group : "of all cells");
@@ -360,6 +468,7 @@ static PetscErrorCode MeasureBodies(MPI_Comm comm, HycoFE fe, const HycoQuantity
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* value[n_quantities] is the same on all ranks. */
 PetscErrorCode HycoQuantitiesMeasure(MPI_Comm comm, HycoFE fe, const PetscReal u[], const PetscReal sigma[],
                                      const PetscReal reaction[], const HycoContactResult contact[], PetscReal value[])
 {

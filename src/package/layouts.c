@@ -75,6 +75,11 @@ static const HycoMember gradient[] = {
   F(n_outputs), F(n_parameters), F(n_undecided), F(value), F(kink)};
 #undef F
 
+#define F(member) FIELD(HycoFit, member)
+static const HycoMember fit[] = {
+  F(misfit), F(scale), F(converged), F(kink), F(evaluations), F(n_starts), F(n_least), F(method)};
+#undef F
+
 #define F(member) FIELD(HycoTraining, member)
 static const HycoMember training[] = {
   F(type), F(summary), F(next), F(n_samples), F(n_modes), F(n_dual_modes), F(n_stress_modes),
@@ -97,6 +102,7 @@ static const struct {
     STRUCT(HycoContactResult, contact_result),
     STRUCT(HycoPrediction, prediction),
     STRUCT(HycoGradient, gradient),
+    STRUCT(HycoFit, fit),
     STRUCT(HycoTraining, training),
     {"PetscInt", sizeof(PetscInt), 0, NULL},
     {"PetscReal", sizeof(PetscReal), 0, NULL},
@@ -104,6 +110,8 @@ static const struct {
     {"MPI_Comm", sizeof(MPI_Comm), 0, NULL},
 };
 
+/* Bindings compare these with their own declarations at the start, so that a mismatch of versions is an error and
+   not wrong numbers. */
 PetscErrorCode HycoGetLayout(const char type[], size_t *size, PetscInt *n, const HycoMember *fields[])
 {
   const size_t all = sizeof(layouts) / sizeof(layouts[0]);

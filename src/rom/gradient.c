@@ -1,20 +1,32 @@
 /*
   The gradient of a prediction. A type's problem is w = q + M z, z = (x, L); with the set of closed contacts M z' + q' = 0
-  there, with q' the change of w at fixed z: differences of the type's data. An output's derivative is its difference along
-  z + h z' with the data at mu + h.
+  there, with q' the change of w at fixed z: differences of the type's data. An output's derivative is the sum of its
+  differences with the data at mu + h and fixed z, and along z + h z' with the data at mu; where these have a kink, its
+  difference along both. Outputs are measured on the cells that decide them.
 */
 #include <hycogradient.h>
 #include <hycolcp.h>
 #include <hycoromimpl.h>
 
+/* Of a parameter. */
+typedef struct {
+  HycoDifference d;
+  PetscBool kink;
+  PetscReal *dz;     /* p + n */
+  PetscReal *output; /* 3 n_outputs: at the three points with fixed z */
+} Along;
+
 typedef struct {
   HycoROM m;
   PetscReal mu[HYCO_MAX_PARAMETERS];
   PetscInt p, n, k, *contact; /* unknowns x, contacts; those that are closed or undecided */
-  PetscReal *z, *dz, *moved;  /* p + n */
+  PetscReal *z, *moved;       /* p + n */
+  Along *along;               /* by parameter */
+  PetscReal *dz;              /* of the parameter in hand; borrowed */
   PetscReal *w[5];            /* p + n: at the three points, and at closer ones */
   PetscReal *q, *v;           /* p + k */
   PetscReal size;
+  PetscBool focused, moved_on; /* the outputs' cells are few; the data are not at mu */
   HycoTangent tangent;
   PetscReal *output; /* 6 x n_outputs: at the three points, at closer ones */
   /* the prediction */
@@ -23,17 +35,30 @@ typedef struct {
   PetscBool whole_current;
 } Work;
 
-/* The state of z at mu, as a prediction would leave it. */
-static PetscErrorCode Move(Work *o, const PetscReal mu[], const PetscReal z[])
+/* The state of z at mu (NULL: the data are there), as a prediction would leave it; w: NULL, or its w. */
+static PetscErrorCode Move(Work *o, const PetscReal mu[], const PetscReal z[], PetscReal w[])
 {
   HycoROM m = o->m;
   PetscReal size;
 
   PetscFunctionBegin;
-  PetscUseTypeMethod(m, residual, mu, z, NULL, &size);
+  PetscUseTypeMethod(m, residual, mu, z, w, &size);
   PetscUseTypeMethod(m, expand);
   if (m->ops->reconstruct && m->reconstruct) PetscCall((*m->ops->reconstruct)(m));
   PetscCall(HycoFloatingBalance(m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The outputs there. */
+static PetscErrorCode MoveAndMeasure(Work *o, const PetscReal mu[], const PetscReal z[], PetscReal w[],
+                                     PetscReal output[])
+{
+  HycoPrediction p = {0};
+
+  PetscFunctionBegin;
+  PetscCall(Move(o, mu, z, w));
+  PetscCall(HycoROMMeasureQuantities(o->m, &p));
+  PetscCall(PetscArraycpy(output, p.quantity, o->m->model->scene->n_quantities));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -41,13 +66,10 @@ static PetscErrorCode Move(Work *o, const PetscReal mu[], const PetscReal z[])
 static PetscErrorCode Measure(void *context, const PetscReal mu[], PetscReal step, PetscReal output[])
 {
   Work *o = (Work *)context;
-  HycoPrediction p = {0};
 
   PetscFunctionBegin;
   for (PetscInt i = 0; i < o->p + o->n; i++) o->moved[i] = o->z[i] + step * o->dz[i];
-  PetscCall(Move(o, mu, o->moved));
-  PetscCall(HycoROMMeasureQuantities(o->m, &p));
-  PetscCall(PetscArraycpy(output, p.quantity, o->m->model->scene->n_quantities));
+  PetscCall(MoveAndMeasure(o, mu, o->moved, NULL, output));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -78,6 +100,7 @@ static PetscErrorCode Close(Work *o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Keeps the prediction: differences move the model's state, and Restore() puts it back. */
 static PetscErrorCode Create(Work *o)
 {
   HycoROM m = o->m;
@@ -93,19 +116,27 @@ static PetscErrorCode Create(Work *o)
   HycoDuplicate(n_dof, m->U, &o->U);
   HycoDuplicate(m->model->pairs.n, m->Lambda, &o->Lambda);
   PetscUseTypeMethod(m, unknowns, &o->p, &o->n, NULL);
-  PetscCall(PetscMalloc3(o->p + o->n + 1, &o->z, o->p + o->n + 1, &o->dz, o->p + o->n + 1, &o->moved));
+  PetscCall(PetscMalloc2(o->p + o->n + 1, &o->z, o->p + o->n + 1, &o->moved));
+  PetscCall(PetscCalloc1(m->model->scene->n_parameters, &o->along));
+  for (PetscInt k = 0; k < m->model->scene->n_parameters; k++)
+    PetscCall(PetscCalloc2(o->p + o->n + 1, &o->along[k].dz, 3 * m->model->scene->n_quantities, &o->along[k].output));
   for (PetscInt j = 0; j < 5; j++) PetscCall(PetscMalloc1(o->p + o->n + 1, &o->w[j]));
   PetscCall(PetscMalloc3(o->n + 1, &o->contact, o->p + o->n + 1, &o->q, o->p + o->n + 1, &o->v));
   PetscCall(PetscCalloc1(6 * m->model->scene->n_quantities + 1, &o->output));
   PetscUseTypeMethod(m, unknowns, &o->p, &o->n, o->z);
-  PetscCall((*m->ops->residual)(m, o->mu, o->z, o->w[0], &largest));
+  PetscCall((*m->ops->residual)(m, NULL, o->z, o->w[0], &largest));
   o->size = largest;
   for (PetscInt i = 0; i < o->n; i++) {
+    /* Closed or undecided contacts; open ones do not change at first order. */
     if (HycoTangentMayTouch(o->z[o->p + i], o->w[0][o->p + i], o->size)) o->contact[o->k++] = i;
   }
   PetscCall(Close(o));
-  PetscCall(PetscArrayzero(o->dz, o->p + o->n));
-  PetscCall(Measure(o, o->mu, 0, o->output));
+  if (m->measured)
+    PetscCall(PetscArraycpy(o->output, m->prediction.quantity, m->model->scene->n_quantities));
+  else
+    PetscCall(MoveAndMeasure(o, NULL, o->z, NULL, o->output));
+  PetscCall(HycoROMFocusOutputs(m, o->output, &o->focused));
+  if (o->focused) PetscCall(MoveAndMeasure(o, NULL, o->z, NULL, o->output));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -113,7 +144,10 @@ static PetscErrorCode Destroy(Work *o)
 {
   PetscFunctionBegin;
   PetscCall(HycoTangentDestroy(&o->tangent));
-  PetscCall(PetscFree3(o->z, o->dz, o->moved));
+  for (PetscInt k = 0; o->along && k < o->m->model->scene->n_parameters; k++)
+    PetscCall(PetscFree2(o->along[k].dz, o->along[k].output));
+  PetscCall(PetscFree(o->along));
+  PetscCall(PetscFree2(o->z, o->moved));
   for (PetscInt j = 0; j < 5; j++) PetscCall(PetscFree(o->w[j]));
   PetscCall(PetscFree3(o->contact, o->q, o->v));
   HycoFreeAll(&o->output, &o->gamma, &o->U, &o->Lambda);
@@ -164,52 +198,86 @@ static PetscErrorCode FindTurns(Work *o, const HycoDifference *d, PetscBool *tur
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* dz along the parameter of d. */
-static PetscErrorCode Differentiate(Work *o, HycoDifference *d, PetscBool *kink)
+/* dz along a parameter, and the outputs with fixed z. */
+static PetscErrorCode Differentiate(Work *o, Along *a)
 {
   HycoROM m = o->m;
-  PetscReal at[HYCO_MAX_PARAMETERS], size;
+  const PetscInt n_outputs = m->model->scene->n_quantities;
+  PetscReal at[HYCO_MAX_PARAMETERS];
   PetscBool turns;
 
   PetscFunctionBegin;
+  PetscCall(PetscArraycpy(a->output, o->output, n_outputs));
   for (PetscInt j = 1; j < 3; j++) {
-    HycoDifferencePoint(d, m->model->scene, o->mu, j, at);
-    PetscCall((*m->ops->residual)(m, at, o->z, o->w[j], &size));
+    HycoDifferencePoint(&a->d, m->model->scene, o->mu, j, at);
+    PetscCall(MoveAndMeasure(o, at, o->z, o->w[j], a->output + j * n_outputs));
   }
-  PetscCall(FindTurns(o, d, &turns));
-  if (turns) HycoDifferenceTakeSide(d);
+  PetscCall(FindTurns(o, &a->d, &turns));
+  /* A one-sided difference: across the change of masters the central one is of neither side. */
+  if (turns) HycoDifferenceTakeSide(&a->d);
   for (PetscInt i = 0; i < o->p + o->k; i++) {
     const PetscInt row = i < o->p ? i : o->p + o->contact[i - o->p];
 
     o->q[i] = 0;
-    for (PetscInt j = 0; j < 3; j++) o->q[i] += d->weight[j] * o->w[j][row];
+    for (PetscInt j = 0; j < 3; j++) o->q[i] += a->d.weight[j] * o->w[j][row];
   }
-  PetscCall(HycoTangentSolve(o->tangent, o->q, d->sign, o->v, kink));
-  *kink = (PetscBool)(*kink || turns);
-  PetscCall(PetscArrayzero(o->dz, o->p + o->n));
-  for (PetscInt i = 0; i < o->p + o->k; i++) o->dz[i < o->p ? i : o->p + o->contact[i - o->p]] = o->v[i];
+  PetscCall(HycoTangentSolve(o->tangent, o->q, a->d.sign, o->v, &a->kink));
+  a->kink = (PetscBool)(a->kink || turns);
+  for (PetscInt i = 0; i < o->p + o->k; i++) a->dz[i < o->p ? i : o->p + o->contact[i - o->p]] = o->v[i];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Column(Work *o, PetscInt p, HycoGradient *gradient)
+/* Adds to the outputs what they change along z, with the data at mu. */
+static PetscErrorCode Follow(Work *o, const Along *a)
 {
-  HycoDifference d;
-  PetscBool kink;
+  const PetscInt n = o->m->model->scene->n_quantities;
+  PetscReal *change = o->output + 3 * n;
 
   PetscFunctionBegin;
-  HycoDifferenceSet(o->m->model->scene, o->mu, p, &d);
-  PetscCall(Differentiate(o, &d, &kink));
-  PetscCall(HycoGradientColumn(gradient, &o->m->gradient, o->m->model->scene, o->mu, &d, kink, Measure, o, o->output));
+  o->dz = a->dz;
+  for (PetscInt j = 1; j < 3; j++) {
+    PetscCall(Measure(o, NULL, a->d.step[j], change));
+    for (PetscInt q = 0; q < n; q++) a->output[j * n + q] += change[q] - o->output[q];
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The model's data and state are again those of the prediction. */
+/* All columns: the data move along each parameter, and come back to mu once. */
+static PetscErrorCode Columns(Work *o, HycoGradient *gradient)
+{
+  HycoROM m = o->m;
+  PetscReal size;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFEUseCells(m->fe, (PetscBool)!m->model->traits.surfaces));
+  for (PetscInt p = 0; p < gradient->n_parameters; p++) {
+    HycoDifferenceSet(m->model->scene, o->mu, p, &o->along[p].d);
+    PetscCall(Differentiate(o, &o->along[p]));
+  }
+  PetscCall((*m->ops->residual)(m, o->mu, o->z, NULL, &size));
+  for (PetscInt p = 0; p < gradient->n_parameters; p++) PetscCall(Follow(o, &o->along[p]));
+  for (PetscInt p = 0; p < gradient->n_parameters; p++) {
+    const Along *a = &o->along[p];
+
+    if (HycoGradientSetSmooth(gradient, &m->gradient, &a->d, a->kink, a->output)) continue;
+    o->dz = a->dz;
+    o->moved_on = PETSC_TRUE;
+    PetscCall(
+        HycoGradientColumn(gradient, &m->gradient, m->model->scene, o->mu, &a->d, a->kink, Measure, o, o->output));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The model's data and state are again those of the prediction. U after HycoROMComplete(), which would overwrite
+   it with the modes' values. */
 static PetscErrorCode Restore(Work *o)
 {
   HycoROM m = o->m;
 
   PetscFunctionBegin;
-  PetscCall(Move(o, o->mu, o->z));
+  if (o->focused) PetscCall(HycoROMUnfocusOutputs(m));
+  PetscCall(Move(o, o->moved_on ? o->mu : NULL, o->z, NULL));
+  PetscCall(HycoFEUseCells(m->fe, PETSC_TRUE));
   m->prediction = o->prediction;
   m->remainder = o->remainder;
   m->whole_current = o->whole_current;
@@ -233,6 +301,7 @@ static PetscErrorCode Check(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* After an error the model has no current solution: its state may be that of a difference. */
 PetscErrorCode HycoROMGetGradient(HycoROM m, HycoGradient *gradient)
 {
   Work o = {.m = m};
@@ -245,9 +314,9 @@ PetscErrorCode HycoROMGetGradient(HycoROM m, HycoGradient *gradient)
   PetscCall(HycoGradientCreate(m->model->scene, &m->gradient, gradient));
   ierr = Create(&o);
   if (!ierr) gradient->n_undecided = HycoTangentUndecided(o.tangent);
-  for (PetscInt p = 0; !ierr && p < gradient->n_parameters; p++) ierr = Column(&o, p, gradient);
+  if (!ierr) ierr = Columns(&o, gradient);
   if (!ierr) ierr = Restore(&o);
-  if (ierr) m->solved = PETSC_FALSE;
+  if (ierr) m->solved = m->ready = PETSC_FALSE;
   PetscCall(Destroy(&o));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -13,6 +13,7 @@ struct _n_HycoOutputCells {
   HycoFE fe;
   PetscReal *V, *u, *sigma;  /* n_dof x l; n_dof; n_cells x n_sigma */
   PetscReal *means;          /* of HycoFEStressKept() */
+  PetscBool *stressed;       /* by cell: sigma is needed there, elsewhere it is 0 */
   PetscInt *fe_at;           /* by full-order displacement: its index in u; -1: none */
   PetscReal *reaction;       /* n_dof, of supports; NULL: no quantity needs them */
   PetscInt *surface_node;    /* by node: its number on fe_surface; -1: in no contact. Allocated with reaction */
@@ -28,9 +29,20 @@ PetscErrorCode HycoOutputCellsDestroy(HycoOutputCells *cells)
   PetscCall(HycoFEDestroy(&(*cells)->fe_surface));
   PetscCall(HycoResultantsDestroy(&(*cells)->resultants));
   PetscCall(HycoMeshDestroy(&(*cells)->mesh));
-  HycoFreeAll(&(*cells)->V, &(*cells)->u, &(*cells)->sigma, &(*cells)->means, &(*cells)->fe_at, &(*cells)->reaction,
-              &(*cells)->surface_node);
+  HycoFreeAll(&(*cells)->V, &(*cells)->u, &(*cells)->sigma, &(*cells)->means, &(*cells)->stressed, &(*cells)->fe_at,
+              &(*cells)->reaction, &(*cells)->surface_node);
   PetscCall(PetscFree(*cells));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The numbers of the cells that are needed. */
+static PetscErrorCode List(PetscInt n_cells, const PetscBool needed[], PetscInt *n, PetscInt keep[])
+{
+  PetscFunctionBegin;
+  *n = 0;
+  for (PetscInt e = 0; e < n_cells; e++) {
+    if (needed[e]) keep[(*n)++] = e;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -39,14 +51,12 @@ static PetscErrorCode Extract(HycoROM m, HycoOutputCells p)
 {
   const PetscInt width = m->model->whole->dim * m->model->l;
   PetscBool *needed;
-  PetscInt *keep, n = 0;
+  PetscInt *keep, n;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(m->model->whole->n_cells, &needed, m->model->whole->n_cells, &keep));
   PetscCall(HycoQuantitiesMarkCells(m->model->scene, m->model->whole, needed));
-  for (PetscInt e = 0; e < m->model->whole->n_cells; e++) {
-    if (needed[e]) keep[n++] = e;
-  }
+  PetscCall(List(m->model->whole->n_cells, needed, &n, keep));
   PetscCall(HycoSubmesh(m->model->scene, m->model->whole, n, keep, 0, NULL, 0, NULL, &p->mesh));
   PetscCall(PetscFree2(needed, keep));
   PetscCall(PetscMalloc1(p->mesh->n_nodes * width, &p->V));
@@ -79,6 +89,7 @@ static PetscErrorCode PrepareReactions(HycoROM m, HycoOutputCells p)
   PetscCall(PetscMalloc1(m->model->whole_nodes, &place));
   for (PetscInt i = 0; i < m->model->whole_nodes; i++) place[i] = -1;
   ierr = HycoPairsMarkSurfaces(m->model->scene, m->model->mesh, &m->model->pairs, in);
+  /* By number in the whole mesh, the only one that the two meshes share. */
   for (PetscInt i = 0; i < m->model->mesh->n_nodes; i++) place[m->model->mesh->node_whole[i]] = in[i] ? i : -1;
   for (PetscInt i = 0; i < p->mesh->n_nodes; i++) p->surface_node[i] = place[p->mesh->node_whole[i]];
   PetscCall(PetscFree(place));
@@ -130,6 +141,7 @@ static PetscErrorCode ReactPredicted(HycoROM m, HycoOutputCells p, const PetscRe
 {
   PetscFunctionBegin;
   if (!p->reaction) PetscFunctionReturn(PETSC_SUCCESS);
+  /* They replace the sums over the supports' nodes, which need not be computed then. */
   if (HycoResultantsSuffice(m, p->resultants))
     PetscCall(PetscArrayzero(p->reaction, p->fe->n_dof));
   else
@@ -137,7 +149,8 @@ static PetscErrorCode ReactPredicted(HycoROM m, HycoOutputCells p, const PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Once mesh and V are set. */
+/* Once mesh and V are set. Full-order displacements replace the modes' at the unknowns that these cells share with
+   the model's mesh. */
 static PetscErrorCode Fill(HycoROM m, HycoOutputCells p)
 {
   const PetscInt dim = m->model->mesh->dim;
@@ -147,6 +160,8 @@ static PetscErrorCode Fill(HycoROM m, HycoOutputCells p)
   PetscCall(HycoFECreate(m->model->scene, p->mesh->dm, &p->fe));
   PetscCall(PetscMalloc1(p->fe->n_dof, &p->u));
   PetscCall(PetscMalloc1(p->mesh->n_cells * p->fe->n_sigma, &p->sigma));
+  PetscCall(PetscMalloc1(p->mesh->n_cells, &p->stressed));
+  PetscCall(HycoQuantitiesMarkStressed(m->model->scene, p->mesh, p->stressed));
   PetscCall(PetscMalloc1(m->model->n_fe, &p->fe_at));
   PetscCall(PetscMalloc1(m->model->whole_nodes, &place));
   for (PetscInt i = 0; i < m->model->whole_nodes; i++) place[i] = -1;
@@ -212,6 +227,7 @@ static PetscErrorCode March(HycoOutputCells p, HycoReplay *r)
   for (PetscInt k = 0, j = 0; k < trace->n; k++) {
     PetscCall(HycoReplayMove(r, k));
     Displace(m, p, trace->gamma + (size_t)k * (size_t)m->model->l, trace->U_fe + (size_t)k * (size_t)m->model->n_fe);
+    /* Every accepted step, because states depend on those before; outputs at the listed ones only. */
     PetscCall(HycoReplayStep(r, k, p->u));
     if (j == trace->n_listed || trace->at[j] != k) continue;
     PetscCall(HycoFEStateFields(p->fe, r->march.state, p->sigma, NULL, NULL, NULL));
@@ -253,7 +269,7 @@ static PetscErrorCode Follow(HycoROM m, HycoOutputCells p)
   PetscCall(HycoFESetParameters(p->fe, m->fe->mu));
   Displace(m, p, m->gamma, U_fe);
   PetscCall(PetscFree(U_fe));
-  PetscCall(HycoFEStressKept(p->fe, p->u, &p->means, p->sigma));
+  PetscCall(HycoFEStressKept(p->fe, p->stressed, p->u, &p->means, p->sigma));
   PetscCall(ReactPredicted(m, p, NULL, m->Lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -275,6 +291,8 @@ static PetscErrorCode Make(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Ownership is taken before anything can fail, as the header says; `balanced` and `loaded` by
+   HycoResultantsCreate(), also after an error of Fill(). */
 PetscErrorCode HycoROMSetOutputCells(HycoROM m, HycoMesh mesh, PetscReal V[], PetscBool balanced[], HycoMesh loaded)
 {
   PetscErrorCode ierr, taken = PETSC_SUCCESS;
@@ -312,6 +330,8 @@ static PetscErrorCode MeasureTimes(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* In a copy of the history's steps: the path's own have no outputs. NULL until they are evaluated, so that a
+   failure is tried again. */
 PetscErrorCode HycoROMMeasurePath(HycoROM m)
 {
   HycoTrace *trace = &m->trace;
@@ -344,6 +364,88 @@ PetscErrorCode HycoROMMeasureQuantities(HycoROM m, HycoPrediction *out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* -- few cells, near a prediction -- */
+
+/* Whether a mesh has a cell of the whole mesh; *at, ascending from call to call: where. */
+static PetscBool Find(HycoMesh mesh, PetscInt cell, PetscInt *at)
+{
+  while (*at < mesh->n_cells && mesh->cell_whole[*at] < cell) ++*at;
+  return (PetscBool)(*at < mesh->n_cells && mesh->cell_whole[*at] == cell);
+}
+
+/* m->few with these cells of `all`; kept as long as it has the needed ones. Stresses are needed in those of `stressed`. */
+static PetscErrorCode MakeFew(HycoROM m, HycoOutputCells all, PetscInt n, const PetscInt keep[],
+                              const PetscBool stressed[])
+{
+  const PetscInt width = m->model->mesh->dim * m->model->l;
+  PetscBool has = (PetscBool)(m->few != NULL);
+  PetscInt *node;
+  HycoOutputCells p;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0, at = 0; k < n && has; k++) {
+    has = Find(m->few->mesh, all->mesh->cell_whole[keep[k]], &at);
+    if (has && stressed[keep[k]]) m->few->stressed[at] = PETSC_TRUE;
+  }
+  if (has) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoOutputCellsDestroy(&m->few));
+  PetscCall(PetscNew(&m->few));
+  p = m->few;
+  PetscCall(HycoSubmesh(m->model->scene, all->mesh, n, keep, 0, NULL, 0, NULL, &p->mesh));
+  PetscCall(PetscMalloc1(p->mesh->n_nodes * width, &p->V));
+  PetscCall(PetscMalloc1(p->mesh->n_nodes, &node));
+  PetscCall(HycoSubmeshNodes(p->mesh, all->mesh, node));
+  for (PetscInt i = 0; i < p->mesh->n_nodes; i++)
+    PetscCall(PetscArraycpy(p->V + i * width, all->V + node[i] * width, width));
+  PetscCall(PetscFree(node));
+  PetscCall(Fill(m, p));
+  for (PetscInt k = 0; k < n; k++) p->stressed[k] = stressed[keep[k]];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Exchange(HycoROM m)
+{
+  const HycoOutputCells all = m->output_cells;
+  HycoResultants resultants = all->resultants;
+
+  PetscFunctionBegin;
+  m->output_cells = m->few;
+  m->few = all;
+  all->resultants = NULL;
+  m->output_cells->resultants = resultants;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMFocusOutputs(HycoROM m, const PetscReal value[], PetscBool *focused)
+{
+  HycoOutputCells p = m->output_cells;
+  PetscInt *keep, n;
+  PetscBool *needed, *stressed;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  *focused = PETSC_FALSE;
+  if (!p) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc3(p->mesh->n_cells, &needed, p->mesh->n_cells, &stressed, p->mesh->n_cells, &keep));
+  ierr = HycoQuantitiesMarkDecisive(p->fe, p->u, p->sigma, value, HycoResultantsSuffice(m, p->resultants), needed,
+                                    stressed);
+  if (!ierr) ierr = List(p->mesh->n_cells, needed, &n, keep);
+  if (!ierr) ierr = MakeFew(m, p, n, keep, stressed);
+  *focused = (PetscBool)!ierr;
+  if (ierr) PetscCall(HycoOutputCellsDestroy(&m->few));
+  PetscCall(PetscFree3(needed, stressed, keep));
+  PetscCall(ierr);
+  if (*focused) PetscCall(Exchange(m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMUnfocusOutputs(HycoROM m)
+{
+  PetscFunctionBegin;
+  PetscCall(Exchange(m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 HycoFE HycoROMGetOutputCells(HycoROM m)
 {
   return m->output_cells ? m->output_cells->fe : NULL;
@@ -366,6 +468,8 @@ PetscErrorCode HycoROMMeasureSolution(HycoROM m, const PetscReal mu[], const Pet
     PetscCall(PetscArraycpy(p->u, u, p->fe->n_dof));
     PetscCall(PetscArraycpy(p->sigma, sigma, p->mesh->n_cells * p->fe->n_sigma));
     if (!m->trace.n_listed) PetscCall(React(m, p, NULL, Lambda));
+    /* Reactions of a path need the internal forces, which a stored solution does not give: NaN marks them as
+       unknown. */
     for (PetscInt k = 0; m->trace.n_listed && p->reaction && k < p->fe->n_dof; k++)
       p->reaction[k] = reaction ? reaction[k] : NAN;
   }

@@ -13,7 +13,9 @@ struct _n_HycoResultants {
   PetscBool pushed[HYCO_MAX_QUANTITIES]; /* contact acts on these bodies from outside */
   HycoMesh mesh;                         /* the cells with the loads of these bodies */
   HycoFE fe;
-  PetscReal *load; /* n_dof: on the nodes */
+  PetscReal *load; /* n_dof: on the nodes; */
+  PetscBool ready; /* those at these parameters */
+  PetscReal mu[HYCO_MAX_PARAMETERS];
 };
 
 PetscErrorCode HycoResultantsDestroy(HycoResultants *resultants)
@@ -61,6 +63,7 @@ static PetscErrorCode FindPushed(HycoROM m, HycoResultants r)
         in = (PetscBool)(in || (body[b] && r->balanced[q * scene->n_bodies + b]));
         out = (PetscBool)(out || (body[b] && !r->balanced[q * scene->n_bodies + b]));
       }
+      /* A contact between two bodies of the quantity exerts forces that cancel. */
       r->pushed[q] = (PetscBool)(r->pushed[q] || (in && out));
     }
   }
@@ -68,6 +71,8 @@ static PetscErrorCode FindPushed(HycoROM m, HycoResultants r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Takes ownership first. `pushed` decides online, since it depends on the type whether its contact forces may
+   serve. */
 PetscErrorCode HycoResultantsCreate(HycoROM m, PetscBool balanced[], HycoMesh loaded, HycoResultants *resultants)
 {
   HycoResultants r;
@@ -118,6 +123,7 @@ static const PetscBool *Bodies(HycoROM m, HycoResultants r, PetscInt q)
   return NULL;
 }
 
+/* One quantity that does not follow makes the sums over supports necessary. */
 PetscBool HycoResultantsSuffice(HycoROM m, HycoResultants r)
 {
   for (PetscInt q = 0; q < m->model->scene->n_quantities; q++) {
@@ -135,11 +141,33 @@ static PetscReal Load(HycoResultants r, const PetscBool of[], PetscInt axis)
   return sum;
 }
 
+/* The loads at mu, unless they are there or no change affects them. */
+static PetscErrorCode BringLoads(HycoResultants r, const PetscReal mu[])
+{
+  const HycoScene s = r->fe->scene;
+  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, heat = PETSC_FALSE;
+  HycoChanges c;
+
+  PetscFunctionBegin;
+  for (PetscInt p = 0; p < s->n_variables; p++) changed[p] = (PetscBool)(!r->ready || mu[p] != r->mu[p]);
+  for (PetscInt b = 0; b < s->n_bodies; b++)
+    heat =
+        (PetscBool)(heat || HycoExprChanges(s->body[b].temperature, changed) ||
+                    HycoExprChanges(s->body[b].reference, changed) || HycoExprChanges(s->body[b].expansion, changed));
+  c = HycoSceneChanges(s, changed);
+  if (r->ready && !c.nodes && !c.stiffness && !heat && !HycoSceneLoadsChange(s, changed))
+    PetscFunctionReturn(PETSC_SUCCESS);
+  r->ready = PETSC_FALSE;
+  PetscCall(HycoFESetParameters(r->fe, mu));
+  PetscCall(HycoFELoads(r->fe, r->load));
+  PetscCall(PetscArraycpy(r->mu, mu, s->n_variables));
+  r->ready = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoResultantsSet(HycoROM m, HycoResultants r, const PetscReal mu[], const PetscReal Lambda[],
                                  PetscReal value[])
 {
-  PetscBool first = PETSC_TRUE;
-
   PetscFunctionBegin;
   for (PetscInt q = 0; r && q < m->model->scene->n_quantities; q++) {
     const PetscInt axis = m->model->scene->quantity[q].field;
@@ -147,10 +175,9 @@ PetscErrorCode HycoResultantsSet(HycoROM m, HycoResultants r, const PetscReal mu
     PetscReal push = 0;
 
     if (!of) continue;
-    if (first) PetscCall(HycoFESetParameters(r->fe, mu));
-    if (first) PetscCall(HycoFELoads(r->fe, r->load));
-    first = PETSC_FALSE;
+    PetscCall(BringLoads(r, mu));
     if (r->pushed[q]) PetscCall(HycoROMPushBodies(m, Lambda, of, axis, &push));
+    /* 0 - x: no negative zero in reports. */
     value[q] = 0 - push - Load(r, of, axis);
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -47,6 +47,17 @@ class Fit(Case):
         self.assertNotIn('misfit_full_order', r)
         self.assertIn('the targets are not met', self.run_raw('fit', '-model', 'm.h5', '-target_lift', '100').stdout)
 
+    def test_starts(self):
+        """A moment that two places have: with several starts the least misfit is the answer, at most that of one start, and counts say how many reached it."""
+        one = self.hyco('fit', '-model', 'm.h5', *self.targets, '-fit_starts', '8')
+        self.assertEqual((one['starts'], one['starts_at_least']), (1, 1))
+        r = self.hyco('fit', '-model', 'm.h5', *self.targets, '-fit_starts', '8', '-starts', '5')
+        self.assertEqual(r['starts'], 5)
+        self.assertTrue(1 <= r['starts_at_least'] <= 5)
+        self.assertLessEqual(r['misfit_model'], max(one['misfit_model'], 1e-9))
+        self.assertGreater(r['evaluations'], one['evaluations'])
+        self.assertIn(f"{r['starts_at_least']} of 5 starts", self.run_raw('fit', '-model', 'm.h5', *self.targets, '-fit_starts', '8', '-starts', '5').stdout)
+
     def test_refused(self):
         """One line that names what is wrong, and no report."""
         for words, args in ((('target_foo', 'lift'), ('-target_foo', '1')), (('-target_', 'lift', 'peak'), ()), (('target_lift', 'number'), ('-target_lift', 'x')),

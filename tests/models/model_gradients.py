@@ -35,6 +35,15 @@ class ModelGradients(gradients.Gradients):
         for key in ('outputs', 'contacts', 'estimated_error_outputs', 'kkt', 'rid_strain_energy'):
             self.assertEqual(report[key], plain[key])
 
+    def test_vanishing(self):
+        """Derivatives that vanish are 0, not round-off: a force in balance with a load, a displacement that the obstacle gives."""
+        for scene, mu, output, parameter in ((gradients.FLOATING, '2.1,230,0.2', 'lift', 'soft'), (gradients.BUMP, '1.3,0.21,12', 'low', 'modulus')):
+            predict = self.model('bodies', ('-scene', self.scene(scene)), '-scatter', '2')
+            by = self.hyco(*predict, '-mu', mu, '-gradient')['gradient'][output]
+            self.assertEqual([name for name, value in by.items() if value == 0], [parameter])
+            by = self.hyco('solve', '-scene', self.path('scene.yaml'), '-mu', mu, '-gradient')['gradient'][output]
+            self.assertEqual([name for name, value in by.items() if value == 0], [parameter])
+
     def test_floating(self):
         """A body that contact alone holds."""
         predict = self.model('bodies', ('-scene', self.scene(gradients.FLOATING)), '-scatter', '3')

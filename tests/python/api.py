@@ -173,6 +173,29 @@ class Python(Case):
                 lo, hi = (model.predict(np.array([0.031, 1100]) + s * shift).outputs['lift'] for s in (-1, 1))
                 self.near(one['lift'][j], (hi - lo) / (2 * h[j]), 1e-6)
 
+    def test_fit(self):
+        """Model.fit() finds what hyco fit finds; wrong targets are one line."""
+        with self.hyco_py.Scene('block.yaml', hyco_model_type='bodies', hyco_validation=0) as scene:
+            model = scene.train('fitted.h5', scatter=3)
+        with model:
+            true = [0.034, 900]
+            targets = model.predict(true).outputs
+            found = model.fit(targets, starts=2, samples=16)
+            report = self.hyco('fit', '-model', 'fitted.h5', '-starts', '2', '-fit_starts', '16',
+                               *(word for name, value in targets.items() for word in (f'-target_{name}', repr(value))))
+            self.assertEqual((found.converged, found.starts, found.at_least), (report['converged'], report['starts'], report['starts_at_least']))
+            self.assertLess(found.misfit, 1e-6)
+            for name, value in report['mu'].items():
+                self.near(found.parameters[name], value, 1e-6)
+            np.testing.assert_allclose(model.predict(found.mu).outputs[list(targets)[0]], list(targets.values())[0], rtol=1e-6)
+            again = model.fit(targets, start=[0.03, 1000], kind='blmvm')
+            self.assertEqual(again.starts, 1)
+            self.assertLess(again.misfit, 1e-5)
+            for bad in (lambda: model.fit({'nothing': 1}), lambda: model.fit({}), lambda: model.fit(targets, kind='newton')):
+                with self.assertRaises(self.hyco_py.Error) as error:
+                    bad()
+                self.assertEqual(len(str(error.exception).splitlines()), 1)
+
     def test_paths(self):
         """The listed times of a history, at full order."""
         report = self.hyco('solve', '-scene', 'bar.yaml', '-mu', '0.9', '-table', 'bar.csv')

@@ -41,7 +41,8 @@ static PetscErrorCode CheckParts(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the scene has what the model does not represent. */
+/* Whether the scene has what the model does not represent. What follows from options and the mesh; parameters and
+   paths are checked once the bodies are known. */
 static PetscErrorCode CheckScene(HycoReducer t)
 {
   PetscBool regularise = PETSC_FALSE;
@@ -56,6 +57,7 @@ static PetscErrorCode CheckScene(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Before any solution, so that a search refuses the type at no cost; called again in each attempt. */
 PetscErrorCode HycoBodiesBegin(HycoReducer t)
 {
   PetscReal mu[HYCO_MAX_PARAMETERS];
@@ -74,6 +76,8 @@ PetscErrorCode HycoBodiesBegin(HycoReducer t)
 #define SOLVES  12 /* assumed solves for each load, mode and sample of the fields */
 #define STRAINS 40 /* assumed modes of the inelastic forces, each with unknowns of its cells of the model */
 
+/* In floating-point operations, for the search's budget: only the order of magnitude counts. The flexibilities
+   cost n^3 / 3 of their unknowns. */
 PetscReal HycoBodiesOperations(HycoReducer t)
 {
   HycoBodiesTraining s = HycoTrainingOfBodies(t);
@@ -98,7 +102,8 @@ PetscBool HycoBodiesOffers(HycoReducer t, PetscBool targets, size_t length, char
 
 /* -- the surfaces' unknowns -- */
 
-/* of[i]: the body of each node of the surfaces, on rank 0. Collective. */
+/* of[i]: the body of each node of the surfaces, on rank 0. Collective. The surfaces are on rank 0, their nodes'
+   bodies on the owners: a star forest from owned nodes to the surface's fetches them. */
 static PetscErrorCode BodiesOfSurface(HycoFOM f, const HycoBodyParts *parts, PetscInt **of)
 {
   const PetscInt n = f->surface ? f->surface->n_nodes : 0;
@@ -125,6 +130,7 @@ static PetscErrorCode AddRing(HycoMesh m, PetscInt group, PetscBool near[])
   PetscBool *on;
 
   PetscFunctionBegin;
+  /* near[] grows while facets are visited; one ring is the facets around the nodes before. */
   HycoDuplicate(m->n_nodes + 1, near, &on);
   for (PetscInt f = 0; f < m->n_facets; f++) {
     const PetscInt *node = m->facets + f * m->nf;
@@ -160,10 +166,12 @@ static PetscErrorCode LeaveOut(HycoReducer t, PetscBool in[])
   for (PetscInt k = 0; k < t->scene->n_contacts; k++) {
     PetscInt g = 0;
 
+    /* Masters that stay with their slaves are all met. */
     if (!HycoPairsFollows(&f->pairs, k)) continue;
     PetscCall(HycoMeshFindGroup(m, "contact", t->scene->contact[k]->slave, &g));
     for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) near[m->group_node[j]] = PETSC_TRUE;
     PetscCall(HycoMeshFindGroup(m, "contact", t->scene->contact[k]->master, &g));
+    /* A margin: the points searched are a sample of the ranges. */
     for (PetscInt ring = 0; ring < RINGS; ring++) PetscCall(AddRing(m, g, near));
   }
   for (PetscInt i = 0; i < m->n_nodes; i++) in[i] = (PetscBool)(in[i] && near[i]);
@@ -193,7 +201,8 @@ static PetscErrorCode List(HycoFOM f, const PetscInt of[], const PetscBool in[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same for the nodes of the surfaces that may touch. Rank 0. */
+/* The same for the nodes of the surfaces that may touch. Rank 0. Leaving out costs SEARCHED searches, and saves
+   the square of the unknowns: only for bodies with many. */
 static PetscErrorCode ListReached(HycoReducer t, const PetscInt of[], HycoSubstructures b, PetscInt global[])
 {
   HycoFOM f = t->fom;
@@ -213,6 +222,7 @@ static PetscErrorCode ListReached(HycoReducer t, const PetscInt of[], HycoSubstr
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The same on every rank, after the broadcast. */
 static PetscErrorCode CheckSizes(const HycoBodyParts *parts, HycoSubstructures b)
 {
   PetscFunctionBegin;
@@ -240,10 +250,12 @@ static PetscErrorCode Select(HycoReducer t, HycoSubstructures b, Mat *N)
   HycoOnRoot(HycoComm(f), ListReached(t, of, b, global));
   HycoBcast(b->start, b->n + 1, MPIU_INT, HycoComm(f));
   b->ns = b->start[b->n];
+  /* Other ranks have allocated by their own surface, of which they have none. */
   if (f->rank) PetscCall(PetscFree(b->dof));
   if (f->rank) PetscCall(PetscMalloc1(b->ns + 1, &b->dof));
   HycoBcast(b->dof, b->ns, MPIU_INT, HycoComm(f));
   PetscCall(CheckSizes(parts, b));
+  /* Columns as K's rows; one entry in each row, set by rank 0, which has the list. */
   PetscCall(MatCreateAIJ(HycoComm(f), PETSC_DECIDE, f->part->n_owned * b->dim, b->ns, f->n_nodes * b->dim, 1, NULL, 1,
                          NULL, N));
   for (PetscInt k = 0; k < b->ns && f->rank == 0; k++) PetscCall(MatSetValue(*N, k, global[k], 1, INSERT_VALUES));
@@ -374,6 +386,8 @@ static PetscErrorCode TakeNoStrains(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Each step needs those before: the surfaces, the factors' blocks, the loads' basis (R), samples, inelastic
+   responses, modes. factor->fom has its own K: t->fom's fe serves the points meanwhile. */
 static PetscErrorCode Condense(HycoReducer t, HycoSnapshots store, HycoBodiesFactor *factor)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
@@ -384,6 +398,7 @@ static PetscErrorCode Condense(HycoReducer t, HycoSnapshots store, HycoBodiesFac
   factor->fom->fe->heat_is_load = PETSC_TRUE;
   PetscCheck(factor->fom->part->n_nodes == t->fom->part->n_nodes && factor->fom->part->first == t->fom->part->first,
              PETSC_COMM_SELF, PETSC_ERR_PLIB, "two meshes of one scene differ");
+  /* Supports of the surfaces' mesh are known at parameters only. */
   PetscCall(HycoFOMSetParameters(t->fom, b->first));
   PetscCall(Select(t, b, &N));
   for (PetscInt k = 0; k < b->n; k++) b->body[k].n = b->start[k + 1] - b->start[k];
@@ -396,6 +411,8 @@ static PetscErrorCode Condense(HycoReducer t, HycoSnapshots store, HycoBodiesFac
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A new HycoFOM, whose K is factored body by body; released with all factors before an error returns, because a
+   search goes on. */
 PetscErrorCode HycoBodiesModes(HycoReducer t, HycoSnapshots store)
 {
   HycoBodiesFactor factor = {0};

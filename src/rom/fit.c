@@ -1,0 +1,344 @@
+/*
+  The parameter values at which a model's outputs are closest to targets, min 1/2 |r|^2 within the ranges with
+  r_k = (output_k - target_k) / scale_k, by a TAO type on the model's gradients. There may be several minima: it starts at
+  the best of some points over the ranges.
+*/
+#include <hycoromimpl.h>
+#include <hycosamples.h>
+#include <petsctao.h>
+#include <string.h>
+
+#define EXACT   1e-9 /* a misfit below it is round-off */
+#define MINIMUM 1e-5 /* of the slope of the misfit, relative to what the derivatives allow */
+#define WEIGHT  1e-6 /* of the regularisation of Gauss-Newton steps: for targets that do not determine all parameters */
+#define SAME    1e-4 /* relative difference of misfits that are one minimum's */
+
+typedef struct {
+  HycoROM model;
+  PetscInt n, n_par;
+  const PetscInt *output; /* by target: its output */
+  const PetscReal *target;
+  PetscReal scale[HYCO_MAX_QUANTITIES];
+  const PetscReal *lo, *hi;
+  PetscInt evaluations;
+  /* at the last point: */
+  PetscReal x[HYCO_MAX_PARAMETERS], r[HYCO_MAX_QUANTITIES],
+      J[HYCO_MAX_QUANTITIES * HYCO_MAX_PARAMETERS]; /* shares of the ranges; J: n x n_par */
+  PetscBool known, kink;
+  HycoPrediction prediction;
+} Fit;
+
+static void ToParameters(const Fit *f, const PetscReal x[], PetscReal mu[])
+{
+  for (PetscInt p = 0; p < f->n_par; p++)
+    mu[p] = PetscMin(PetscMax(f->lo[p] + x[p] * (f->hi[p] - f->lo[p]), f->lo[p]), f->hi[p]);
+}
+
+static PetscReal Size(PetscInt n, const PetscReal v[])
+{
+  PetscReal sum = 0;
+
+  for (PetscInt k = 0; k < n; k++) sum += v[k] * v[k];
+  return PetscSqrtReal(sum);
+}
+
+static void Misfit(const Fit *f, const HycoPrediction *p, PetscReal r[])
+{
+  for (PetscInt k = 0; k < f->n; k++) r[k] = (p->quantity[f->output[k]] - f->target[k]) / f->scale[k];
+}
+
+/* r and J at x. */
+static PetscErrorCode Evaluate(Fit *f, const PetscReal x[])
+{
+  HycoGradient g;
+  PetscReal mu[HYCO_MAX_PARAMETERS];
+  PetscBool same = f->known;
+
+  PetscFunctionBegin;
+  for (PetscInt p = 0; p < f->n_par; p++) same = (PetscBool)(same && x[p] == f->x[p]);
+  if (same) PetscFunctionReturn(PETSC_SUCCESS);
+  f->known = PETSC_FALSE;
+  ToParameters(f, x, mu);
+  PetscCall(HycoROMPredict(f->model, f->n_par, mu));
+  PetscCall(HycoROMGetPrediction(f->model, &f->prediction));
+  HycoCheck(f->prediction.reason > 0, "a prediction of the fit failed: %s", HycoReasonName(f->prediction.reason));
+  PetscCall(HycoROMGetGradient(f->model, &g));
+  Misfit(f, &f->prediction, f->r);
+  f->kink = PETSC_FALSE;
+  for (PetscInt k = 0; k < f->n; k++) {
+    for (PetscInt p = 0; p < f->n_par; p++) {
+      const PetscInt at = f->output[k] * f->n_par + p;
+
+      f->J[k * f->n_par + p] = g.value[at] * (f->hi[p] - f->lo[p]) / f->scale[k];
+      f->kink = (PetscBool)(f->kink || g.kink[at]);
+    }
+  }
+  PetscCall(PetscArraycpy(f->x, x, f->n_par));
+  f->known = PETSC_TRUE;
+  f->evaluations++;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode EvaluateVec(Fit *f, Vec X)
+{
+  const PetscScalar *x;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetArrayRead(X, &x));
+  ierr = Evaluate(f, x);
+  PetscCall(VecRestoreArrayRead(X, &x));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Residual(Tao tao, Vec X, Vec R, void *ctx)
+{
+  Fit *f = (Fit *)ctx;
+  PetscScalar *r;
+
+  PetscFunctionBegin;
+  (void)tao;
+  PetscCall(EvaluateVec(f, X));
+  PetscCall(VecGetArrayWrite(R, &r));
+  PetscCall(PetscArraycpy(r, f->r, f->n));
+  PetscCall(VecRestoreArrayWrite(R, &r));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Jacobian(Tao tao, Vec X, Mat J, Mat P, void *ctx)
+{
+  Fit *f = (Fit *)ctx;
+
+  PetscFunctionBegin;
+  (void)tao;
+  (void)P;
+  PetscCall(EvaluateVec(f, X));
+  for (PetscInt k = 0; k < f->n; k++) {
+    for (PetscInt p = 0; p < f->n_par; p++) PetscCall(MatSetValue(J, k, p, f->J[k * f->n_par + p], INSERT_VALUES));
+  }
+  PetscCall(MatAssemblyBegin(J, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(J, MAT_FINAL_ASSEMBLY));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* J^T r */
+static void Slope(const Fit *f, PetscReal g[])
+{
+  for (PetscInt p = 0; p < f->n_par; p++) {
+    g[p] = 0;
+    for (PetscInt k = 0; k < f->n; k++) g[p] += f->J[k * f->n_par + p] * f->r[k];
+  }
+}
+
+static PetscErrorCode Objective(Tao tao, Vec X, PetscReal *value, Vec G, void *ctx)
+{
+  Fit *f = (Fit *)ctx;
+  PetscScalar *g;
+
+  PetscFunctionBegin;
+  (void)tao;
+  PetscCall(EvaluateVec(f, X));
+  *value = PetscSqr(Size(f->n, f->r)) / 2;
+  PetscCall(VecGetArrayWrite(G, &g));
+  Slope(f, g);
+  PetscCall(VecRestoreArrayWrite(G, &g));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The samples with their misfits; scales of targets that are 0 are the largest outputs there. */
+static PetscErrorCode Sample(Fit *f, PetscInt n, const PetscReal mu[], PetscReal misfit[])
+{
+  HycoPrediction *p;
+  PetscReal r[HYCO_MAX_QUANTITIES];
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(n, &p));
+  PetscCall(HycoROMSolveMany(f->model, n, f->n_par, mu, p, NULL, NULL));
+  f->evaluations = n;
+  for (PetscInt k = 0; k < f->n; k++) {
+    f->scale[k] = PetscAbsReal(f->target[k]);
+    for (PetscInt i = 0; i < n && f->target[k] == 0; i++)
+      f->scale[k] = PetscMax(f->scale[k], PetscAbsReal(p[i].quantity[f->output[k]]));
+    if (f->scale[k] == 0) f->scale[k] = 1;
+  }
+  for (PetscInt i = 0; i < n; i++) {
+    Misfit(f, &p[i], r);
+    misfit[i] = p[i].reason > 0 ? Size(f->n, r) : PETSC_MAX_REAL;
+  }
+  PetscCall(PetscFree(p));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Sets the n_starts points with the smallest misfits, starts[] (shares of the ranges), the best first. */
+static PetscErrorCode Start(Fit *f, const PetscReal start[], PetscInt n_samples, PetscInt *n_starts, PetscReal starts[])
+{
+  HycoSamples samples = NULL;
+  const PetscReal *mu;
+  PetscReal *misfit;
+  PetscInt n, *order, kept = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesCreate(f->model->model->scene, &samples));
+  if (start)
+    PetscCall(HycoSamplesAddPoint(samples, start));
+  else
+    PetscCall(HycoSamplesAddScattered(samples, n_samples));
+  PetscCall(HycoSamplesGet(samples, &n, NULL, &mu));
+  PetscCall(PetscMalloc2(n, &misfit, n, &order));
+  PetscCall(Sample(f, n, mu, misfit));
+  for (PetscInt i = 0; i < n; i++) order[i] = i;
+  PetscCall(PetscSortRealWithArrayInt(n, misfit, order));
+  for (PetscInt i = 0; i < n && kept < *n_starts && misfit[i] < PETSC_MAX_REAL; i++, kept++) {
+    for (PetscInt q = 0; q < f->n_par; q++)
+      starts[kept * f->n_par + q] =
+          f->hi[q] > f->lo[q] ? (mu[order[i] * f->n_par + q] - f->lo[q]) / (f->hi[q] - f->lo[q]) : 0;
+  }
+  *n_starts = kept;
+  PetscCall(PetscFree2(misfit, order));
+  PetscCall(HycoSamplesDestroy(&samples));
+  HycoCheck(kept, "no prediction at the start of the fit converged; give another -mu");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Minimises from X by a type. */
+static PetscErrorCode Minimise(Fit *f, const char type[], Vec X)
+{
+  const PetscBool squares = (PetscBool)(strcmp(type, TAOBRGN) == 0);
+  Tao tao;
+  Vec lo, hi, r;
+  Mat J;
+
+  PetscFunctionBegin;
+  PetscCall(VecDuplicate(X, &lo));
+  PetscCall(VecDuplicate(X, &hi));
+  PetscCall(VecSet(hi, 1));
+  PetscCall(VecCreateSeq(PETSC_COMM_SELF, f->n, &r));
+  PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, f->n, f->n_par, NULL, &J));
+  PetscCall(TaoCreate(PETSC_COMM_SELF, &tao));
+  PetscCall(TaoSetType(tao, type));
+  if (squares) {
+    PetscCall(TaoSetResidualRoutine(tao, r, Residual, f));
+    PetscCall(TaoSetJacobianResidualRoutine(tao, J, J, Jacobian, f));
+    PetscCall(TaoBRGNSetRegularizerWeight(tao, WEIGHT));
+  } else
+    PetscCall(TaoSetObjectiveAndGradient(tao, NULL, Objective, f));
+  PetscCall(TaoSetSolution(tao, X));
+  PetscCall(TaoSetVariableBounds(tao, lo, hi));
+  PetscCall(TaoSetTolerances(tao, 1e-14, 0, 0));
+  PetscCall(TaoSetMaximumIterations(tao, 200));
+  PetscCall(TaoSolve(tao));
+  PetscCall(TaoDestroy(&tao));
+  PetscCall(MatDestroy(&J));
+  PetscCall(VecDestroy(&r));
+  PetscCall(VecDestroy(&lo));
+  PetscCall(VecDestroy(&hi));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the last point is a minimum within the ranges, by the recomputed slope: a solver's flag is no evidence. */
+static PetscBool IsMinimum(const Fit *f)
+{
+  PetscReal g[HYCO_MAX_PARAMETERS], most = 0;
+
+  Slope(f, g);
+  for (PetscInt p = 0; p < f->n_par; p++) {
+    const PetscBool held = (PetscBool)((f->x[p] <= 0 && g[p] > 0) || (f->x[p] >= 1 && g[p] < 0));
+
+    if (!held) most = PetscMax(most, PetscAbsReal(g[p]));
+  }
+  return (PetscBool)(Size(f->n, f->r) <= EXACT || most <= MINIMUM * Size(f->n * f->n_par, f->J) * Size(f->n, f->r));
+}
+
+/* From one start, by the requested type, and after it by the other one if that ends at no minimum. *minimum: the last point is
+   one. */
+static PetscErrorCode RunFrom(Fit *f, const PetscReal start[], const char type[], PetscBool *minimum, char method[64])
+{
+  const char *const types[2] = {type, strcmp(type, HYCO_FIT_BRGN) ? HYCO_FIT_BRGN : HYCO_FIT_BLMVM};
+  PetscScalar *x;
+  Vec X;
+
+  PetscFunctionBegin;
+  PetscCall(VecCreateSeq(PETSC_COMM_SELF, f->n_par, &X));
+  PetscCall(VecGetArrayWrite(X, &x));
+  PetscCall(PetscArraycpy(x, start, f->n_par));
+  PetscCall(VecRestoreArrayWrite(X, &x));
+  *minimum = PETSC_FALSE;
+  method[0] = '\0';
+  for (PetscInt k = 0; k < 2 && !*minimum; k++) {
+    PetscCall(Minimise(f, types[k], X));
+    PetscCall(EvaluateVec(f, X));
+    *minimum = IsMinimum(f);
+    PetscCall(PetscStrlcat(method, k ? ", then " : "", 64));
+    PetscCall(PetscStrlcat(method, types[k], 64));
+  }
+  PetscCall(VecDestroy(&X));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A minimum is better than a point that is none; then the misfit decides. */
+static PetscBool IsBetter(const HycoFit *fit, PetscReal misfit, PetscBool minimum)
+{
+  if (minimum != fit->converged) return minimum;
+  return (PetscBool)(misfit < fit->misfit);
+}
+
+/* From each start; fit and x are the best one's. */
+static PetscErrorCode RunAll(Fit *f, const PetscReal starts[], const char type[], HycoFit *fit, PetscReal x[])
+{
+  PetscReal *ends;
+
+  PetscFunctionBegin;
+  fit->misfit = PETSC_MAX_REAL;
+  PetscCall(PetscMalloc1(fit->n_starts, &ends));
+  for (PetscInt s = 0; s < fit->n_starts; s++) {
+    char method[64];
+    PetscBool minimum = PETSC_FALSE;
+
+    PetscCall(RunFrom(f, starts + s * f->n_par, type, &minimum, method));
+    ends[s] = Size(f->n, f->r) / PetscSqrtReal((PetscReal)f->n);
+    if (s && !IsBetter(fit, ends[s], minimum)) continue;
+    fit->misfit = ends[s];
+    fit->converged = minimum;
+    PetscCall(PetscStrncpy(fit->method, method, sizeof(fit->method)));
+    PetscCall(PetscArraycpy(x, f->x, f->n_par));
+  }
+  for (PetscInt s = 0; s < fit->n_starts; s++) fit->n_least += ends[s] <= (1 + SAME) * fit->misfit + EXACT;
+  PetscCall(PetscFree(ends));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMFit(HycoROM m, PetscInt n, const PetscInt output[], const PetscReal target[],
+                          const PetscReal start[], PetscInt n_samples, PetscInt n_starts, const char type[],
+                          PetscReal mu[], HycoFit *fit)
+{
+  const HycoScene scene = m->model->scene;
+  Fit f = {.model = m, .n = n, .output = output, .target = target, .n_par = scene->n_parameters};
+  PetscReal x[HYCO_MAX_PARAMETERS], *starts;
+
+  PetscFunctionBegin;
+  HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  PetscCall(HycoSceneRefuseHistory(scene, "a fit"));
+  HycoCheck(n > 0 && n <= HYCO_MAX_QUANTITIES && n_samples > 0 && n_starts > 0,
+            "a fit has %d targets, %d samples and %d starts; at least 1 of each is expected", (int)n, (int)n_samples,
+            (int)n_starts);
+  HycoCheck(!strcmp(type, HYCO_FIT_BRGN) || !strcmp(type, HYCO_FIT_BLMVM),
+            "the type of a fit is \"%s\"; it must be " HYCO_FIT_BRGN " or " HYCO_FIT_BLMVM, type);
+  for (PetscInt k = 0; k < n; k++)
+    HycoCheck(output[k] >= 0 && output[k] < scene->n_quantities, "there is no output %d; the model has %d",
+              (int)output[k], (int)scene->n_quantities);
+  f.lo = scene->lo;
+  f.hi = scene->hi;
+  *fit = (HycoFit){.n_starts = n_starts};
+  PetscCall(PetscMalloc1(n_starts * f.n_par + 1, &starts));
+  PetscCall(Start(&f, start, n_samples, &fit->n_starts, starts));
+  PetscCall(RunAll(&f, starts, type, fit, x));
+  PetscCall(PetscFree(starts));
+  f.known = PETSC_FALSE;
+  PetscCall(Evaluate(&f, x));
+  ToParameters(&f, x, mu);
+  fit->kink = f.kink;
+  fit->evaluations = f.evaluations;
+  PetscCall(PetscArraycpy(fit->scale, f.scale, n));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
