@@ -237,8 +237,10 @@ PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M);
 /* Stress of u (n_dof, local order) from the elastic tangents, without the stress of thermal strain, averaged over
    each cell: sigma n_cells x n_sigma. */
 PetscErrorCode HycoFEStress(HycoFE fe, const PetscReal u[], PetscReal sigma[]);
-/* The same in the marked cells, 0 in others (in: NULL: in all). */
-PetscErrorCode HycoFEStressIn(HycoFE fe, const PetscBool in[], const PetscReal u[], PetscReal sigma[]);
+/* The same in the marked cells (in: NULL: all; 0 in others) for many u and parameters: *kept (the caller's, NULL at first, freed with PetscFree()) has the nodes and the
+   mean gradients of the cells, 6 nv numbers each, so that those of cells whose nodes do not move are computed once. */
+PetscErrorCode HycoFEStressKept(HycoFE fe, const PetscBool in[], const PetscReal u[], PetscReal **kept,
+                                PetscReal sigma[]);
 /* The volumes of the cells, of the full circle in an axisymmetric scene. */
 PetscErrorCode HycoFEVolumes(HycoFE fe, PetscReal volume[]);
 /* Adds the nodal forces of body forces to a cell's unknowns (f: nv x dim). */
