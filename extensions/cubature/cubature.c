@@ -16,6 +16,8 @@
 #include <hycoromtype.h>
 #include <petscviewer.h>
 
+/* Finite-element multipliers by default, as in the hybrid model; the object lives as long as the reducer, for all of
+   its runs. */
 static PetscErrorCode SetFromOptions(HycoReducer t)
 {
   HycoCubatureTraining c;
@@ -35,6 +37,7 @@ static PetscErrorCode SetFromOptions(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The data of a run, not the options. */
 static PetscErrorCode ResetTraining(HycoReducer t)
 {
   HycoCubatureTraining c = (HycoCubatureTraining)t->training;
@@ -47,6 +50,7 @@ static PetscErrorCode ResetTraining(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* All checks before the first solution is computed, which may take hours. */
 static PetscErrorCode Begin(HycoReducer t)
 {
   const PetscBool vectors = (PetscBool)(((HycoCubatureTraining)t->training)->forces.dual != HYCO_DUAL_FE);
@@ -109,6 +113,7 @@ static PetscErrorCode Build(HycoROM m, HycoReducer t)
   for (PetscInt e = 0; e < m->model->mesh->n_cells; e++) {
     PetscInt at = -1;
 
+    /* The mesh of the model has exactly the chosen cells, in an order of its own; t->seeds_cell is ascending. */
     PetscCall(PetscFindInt(m->model->mesh->cell_whole[e], c->n, t->seeds_cell, &at));
     PetscCheck(at >= 0, PETSC_COMM_SELF, PETSC_ERR_PLIB, "a cell of the model has no weight");
     r->weight[e] = c->weight[at];
@@ -135,6 +140,7 @@ static void DescribeContact(HycoROM m, char text[WORDS])
     (void)snprintf(text, WORDS, "%d force vectors for %d contacts", (int)p->l_lambda, (int)m->model->pairs.n);
 }
 
+/* On the rank that has the model. */
 static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
 {
   const HycoCubatureModel c = (HycoCubatureModel)m->model->data;
@@ -152,6 +158,8 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Weights are borrowed by fe. Facets of loads and contacts belong to no chosen cell in general, and are all
+   integrated. */
 static PetscErrorCode SetUp(HycoROM m)
 {
   PetscFunctionBegin;
@@ -161,6 +169,7 @@ static PetscErrorCode SetUp(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The range of the weights shows whether few cells stand for many: a cell may represent thousands. */
 static PetscErrorCode View(HycoROM m, PetscViewer viewer)
 {
   const HycoCubatureModel c = (HycoCubatureModel)m->model->data;
@@ -207,6 +216,7 @@ static PetscErrorCode Destroy(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* With a stiffness and a history, like the hybrid model; cells: its mesh is not a connected part. */
 static PetscErrorCode Create(HycoROM m)
 {
   static const HycoROMTraits traits = {.title = "cubature",
@@ -234,6 +244,7 @@ static PetscErrorCode Create(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Finish and cost are those of all Galerkin models. */
 static PetscErrorCode CreateTrainer(HycoTrainerOps *ops)
 {
   PetscFunctionBegin;

@@ -13,6 +13,7 @@ static PetscErrorCode Take(HycoReducer t, const PetscReal w[])
   PetscCall(PetscFree(t->seeds_cell));
   PetscCall(PetscMalloc1(n_cells, &c->weight));
   PetscCall(PetscMalloc1(n_cells, &t->seeds_cell));
+  /* w NULL: another rank than 0, which gets the list below. */
   for (PetscInt e = 0; w && e < n_cells; e++) {
     if (!(w[e] > 0)) continue;
     t->seeds_cell[n] = e;
@@ -25,6 +26,7 @@ static PetscErrorCode Take(HycoReducer t, const PetscReal w[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* On every rank alike; without sampling, thus exact. */
 PetscErrorCode HycoCubatureChooseAll(HycoReducer t)
 {
   HycoCubatureTraining c = (HycoCubatureTraining)t->training;
@@ -39,6 +41,8 @@ PetscErrorCode HycoCubatureChooseAll(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Fails if the weights miss the tolerance by a factor of 10, since a model from them would be wrong without a sign
+   of it online. */
 PetscErrorCode HycoCubatureChoose(HycoReducer t, Mat W, PetscInt n, const PetscReal sigma[])
 {
   HycoCubatureTraining c = (HycoCubatureTraining)t->training;

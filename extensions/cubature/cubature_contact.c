@@ -76,6 +76,7 @@ static PetscErrorCode ListFull(HycoReducer t, PetscInt *n, PetscInt node[])
 
     if (!take[k]) continue;
     c->full[c->n_full++] = k;
+    /* The unknowns of a node follow each other. */
     if (!*n || node[*n - 1] != whole) node[(*n)++] = whole;
   }
   PetscCall(PetscFree(take));
@@ -111,6 +112,8 @@ static PetscErrorCode MarkSprings(HycoReducer t, PetscBool near[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* At the parameters of the first training point: with the option rank the choice depends on the normals there. Node
+   lists are needed on every rank, because each marks its own cells. */
 PetscErrorCode HycoCubatureFindContacts(HycoReducer t)
 {
   HycoCubatureTraining c = (HycoCubatureTraining)t->training;
@@ -139,6 +142,7 @@ PetscErrorCode HycoCubatureFindContacts(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* From numbers on the contacts' surface to those of the model's mesh, which has all of that surface's nodes. */
 PetscErrorCode HycoCubatureSetFullOrder(HycoROM m, HycoReducer t)
 {
   const HycoCubatureTraining c = (HycoCubatureTraining)t->training;

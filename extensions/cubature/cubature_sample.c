@@ -93,6 +93,7 @@ static PetscErrorCode Project(Sampler *s)
     PetscReal f[HYCO_MAX_CELL_DOFS], load[HYCO_MAX_CELL_DOFS] = {0}, *g = s->g + (size_t)e * (size_t)l;
 
     for (PetscInt j = 0; j < l; j++) g[j] = 0;
+    /* Cells of weight 1 take no part in the fit: theirs is exact. */
     if (near && near[e]) continue;
     PetscCall(HycoFEStateForce(s->fe, s->replay.march.state, e, f));
     PetscCall(HycoFEBodyForce(s->fe, e, load));
@@ -123,6 +124,7 @@ static PetscErrorCode Record(void *ctx, PetscInt k)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Room for the whole part, cells and modes, as each listed time needs all of them at once. */
 static PetscErrorCode Create(HycoReducer t, Sampler *s)
 {
   const HycoFileOrder *order;
@@ -245,6 +247,7 @@ static PetscErrorCode Join(Sampler *s, HycoSnapshots store, PetscReal tol, Mat *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The tolerance of the truncation is a share of that of the cells, since it applies twice, to each path and to all. */
 PetscErrorCode HycoCubatureSample(HycoReducer t, HycoSnapshots store, PetscReal tol, Mat *W, PetscInt *n,
                                   PetscReal **sigma)
 {

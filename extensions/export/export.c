@@ -58,8 +58,10 @@ static PetscErrorCode Probe(Export *e, const PetscReal mu[], const PetscReal z[]
   for (PetscInt i = 0; z && i < e->p + e->k; i++) {
     const PetscInt at = i < e->p ? i : e->p + e->contact[i - e->p];
 
+    /* Contacts without a row stay 0. */
     e->z[at] = z[i] * e->unit[i < e->p ? 0 : 1];
   }
+  /* Order: the residual sets the parameters, expand the fields of z, from which the outputs follow. */
   PetscUseTypeMethod(m, residual, mu, e->z, e->w, &size);
   PetscUseTypeMethod(m, expand);
   PetscCall(HycoROMMeasureQuantities(m, &prediction));
@@ -88,6 +90,7 @@ static PetscErrorCode AddRow(Export *e, Row row)
 {
   PetscFunctionBegin;
   if (e->n_rows == e->room) {
+    /* Rows of one output are contiguous; they only grow. */
     e->room = 2 * e->room + 64;
     PetscCall(PetscRealloc((size_t)e->room * sizeof(*e->row), &e->row));
   }
@@ -105,6 +108,7 @@ static PetscErrorCode MeasureOne(HycoFE fe, HycoQuantity q, HycoQuantityKind kin
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
+  /* q is a copy. The scene has this one output during the call: the same code as for predictions measures it. */
   q.kind = kind;
   q.field = field;
   s->quantity = &q;
@@ -116,6 +120,7 @@ static PetscErrorCode MeasureOne(HycoFE fe, HycoQuantity q, HycoQuantityKind kin
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Only for names that are in the list. */
 static PetscInt FieldOf(const char name[])
 {
   PetscInt k = 0;
@@ -142,6 +147,7 @@ static PetscErrorCode AddItems(Export *e, PetscInt quantity, Output *o)
     Row row = {.from = cells ? CELL : NODE, .index = cells ? i : i * each};
 
     at[0] = 1;
+    /* 0 outside of the output's group, 1 in it; the mean of the same field is the item's weight. */
     PetscCall(MeasureOne(fe, *q, HYCO_QUANTITY_MAX, one, u, sigma, &in));
     PetscCall(MeasureOne(fe, *q, HYCO_QUANTITY_MEAN, one, u, sigma, &weight));
     at[0] = 0;
@@ -161,6 +167,7 @@ static PetscErrorCode AddItems(Export *e, PetscInt quantity, Output *o)
         at[j] = 1;
         PetscCall(MeasureOne(fe, *q, HYCO_QUANTITY_MEAN, q->field, u, sigma, &c[j]));
         at[j] = 0;
+        /* A component along a direction is linear in those of the stress: its coefficients by unit stresses. */
         row.coefficient[j] = c[j] / weight;
       }
       PetscCall(AddRow(e, row));
@@ -203,6 +210,7 @@ static PetscErrorCode MeasureContacts(Export *e)
   PetscCall(PetscCalloc1(pairs->n + 1, &e->area));
   PetscCall(PetscCalloc1(pairs->n + 1, &e->pressure));
   for (PetscInt k = 0; k < pairs->n; k++) {
+    /* A unit force on one contact: the results of its contact then are those of this row alone. */
     L[k] = 1;
     PetscCall(HycoROMSumContacts(e->m, L, &result));
     L[k] = 0;
@@ -213,6 +221,7 @@ static PetscErrorCode MeasureContacts(Export *e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The six numbers are the members of the runtime's Output, in their order. */
 static PetscErrorCode AddOutput(Export *e, const Output *o, const char name[], const char unit[])
 {
   PetscFunctionBegin;
@@ -236,6 +245,7 @@ static PetscErrorCode AddQuantity(Export *e, PetscInt k)
     if (!strcmp(e->s->contact[c]->name, q->contact)) contact = c;
   }
   o.first = e->n_rows;
+  /* Extremes and nonlinear means need each item; a linear mean is one affine value. */
   if (kind < HYCO_QUANTITY_MEAN || (kind == HYCO_QUANTITY_MEAN && !linear)) {
     if (!linear) o.of = !strcmp(field, "u") ? NORM : !strcmp(field, "mises") ? MISES : PRINCIPAL + field[10] - '1';
     o.kind = kind == HYCO_QUANTITY_MAX ? LARGEST : kind == HYCO_QUANTITY_MIN ? SMALLEST : SUM;
@@ -299,6 +309,7 @@ static PetscErrorCode FindProblem(Export *e, const PetscReal mu[])
   n = (size_t)(e->p + e->n);
   PetscCall(PetscMalloc4(n + 1, &e->z, n + 1, &e->w, 2, &e->unit, e->n + 1, &e->contact));
   PetscUseTypeMethod(m, unknowns, &e->p, &e->n, e->z);
+  /* Sizes of motions and forces at the solution, by which probing stays above round-off. */
   e->unit[0] = e->unit[1] = 0;
   for (PetscInt i = 0; i < e->p + e->n; i++) e->unit[i >= e->p] = PetscMax(e->unit[i >= e->p], PetscAbsReal(e->z[i]));
   for (PetscInt i = 0; i < 2; i++) e->unit[i] = e->unit[i] > 0 ? e->unit[i] : 1;
@@ -312,10 +323,12 @@ static PetscErrorCode FindProblem(Export *e, const PetscReal mu[])
       const PetscReal other = x == y ? M[i * n + j] : -M[i * n + j];
 
       most = PetscMax(most, PetscAbsReal(M[j * n + i]));
+      /* The block of the motions must be 0, W symmetric, and the two blocks of A opposite. */
       held = PetscMax(held, x && y ? PetscAbsReal(M[j * n + i]) : PetscAbsReal(M[j * n + i] - other));
     }
   }
   for (PetscInt i = 0; i < e->n; i++) {
+    /* A contact without flexibility never touches: its slave faces nothing. */
     if (M[(size_t)(e->p + i) * (n + 1)] > 0) e->contact[e->k++] = i;
   }
   PetscCall(PetscFree2(M, all));
@@ -370,6 +383,7 @@ static PetscErrorCode Sample(Export *e, PetscInt n, PetscInt fixed, Samples *o)
     for (PetscInt j = 0; j < 2 && !ierr; j++) {
       Irregular(e->p + e->k, j, z);
       ierr = Probe(e, o->mu + i * n_par, z, added + j * e->ny);
+      /* y is affine in z: the difference is M z, and T z of the values. */
       for (PetscInt r = 0; r < e->ny; r++) added[j * e->ny + r] -= y[r];
     }
   }
@@ -378,6 +392,7 @@ static PetscErrorCode Sample(Export *e, PetscInt n, PetscInt fixed, Samples *o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* mu is own[] and not freed again. */
 static PetscErrorCode FreeSamples(Samples *o)
 {
   PetscFunctionBegin;
@@ -385,6 +400,7 @@ static PetscErrorCode FreeSamples(Samples *o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Sets the arrays to NULL, so that a fit may be tried again. */
 static PetscErrorCode FreeFit(HycoExportFit *fit)
 {
   PetscFunctionBegin;
@@ -428,6 +444,7 @@ static PetscErrorCode FitBoth(Export *e, PetscInt fixed)
   PetscCall(Sample(e, SAMPLES, fixed, &o));
   Scale(e, &o, scale);
   PetscCall(Fit(e, 1, &(HycoFitData){o.n, 2 * e->ny, o.mu, o.added, e->group, scale}, &e->response));
+  /* If the response has no functions the export is refused anyway: the costly levels are left out. */
   PetscCall(Fit(e, e->response.worst > EXACT ? 0 : HYCO_FIT_LEVELS - 1,
                 &(HycoFitData){o.n, e->ny, o.mu, o.y, e->group, scale}, &e->base));
   PetscCall(FreeSamples(&o));
@@ -448,6 +465,7 @@ static PetscErrorCode Refuse(Export *e)
   else
     HycoFormat(of, "the output %s", e->out.name[e->row[at].group]);
   for (PetscInt p = 0; p < e->s->n_parameters; p++) {
+    /* With parameter p fixed: if the fits are exact then, p is what has no such functions. */
     PetscCall(FitBoth(e, p));
     if (e->base.worst <= EXACT && e->response.worst <= EXACT) PetscCall(HycoListAdd(list, " and ", e->s->parameter[p]));
   }
@@ -502,6 +520,7 @@ static PetscErrorCode ChoosePoints(Export *e, PetscReal point[], PetscReal inver
     for (PetscInt k = 0; k < n; k++) scale[k] = PetscMax(scale[k], PetscAbsReal(value[i * n + k]));
   }
   for (PetscInt i = 0; i < N * n; i++) value[i] /= scale[i % n];
+  /* The points are the columns; the first n pivots are well conditioned. */
   PetscCall(HycoPivotColumns(n, N, value, n, pivot));
   for (PetscInt i = 0; i < n; i++) {
     PetscCall(PetscArraycpy(point + i * n_par, mu + pivot[i] * n_par, n_par));
@@ -524,6 +543,7 @@ static PetscErrorCode AddMatrix(Export *e, const PetscReal mu[], const PetscReal
 
   PetscFunctionBegin;
   PetscCall(PetscArrayzero(e->z, e->p + e->n));
+  /* z = 0; sets the parameters for the jacobian. */
   PetscUseTypeMethod(e->m, residual, mu, e->z, e->w, &largest);
   PetscUseTypeMethod(e->m, jacobian, e->k, e->contact, M);
   for (PetscInt f = 0; f < e->response.n; f++) {
@@ -544,6 +564,7 @@ static PetscErrorCode AddValues(Export *e, const PetscReal mu[], const PetscReal
   PetscFunctionBegin;
   PetscCall(PetscCalloc3(n + 1, &z, e->ny, &y, e->ny, &y0));
   PetscCall(Probe(e, mu, NULL, y0));
+  /* n probes at each point of the response: the values need no Jacobian of their own. */
   for (PetscInt c = 0; c < n && e->n_rows; c++) {
     z[c] = 1;
     PetscCall(Probe(e, mu, z, y));
@@ -568,6 +589,7 @@ static PetscErrorCode KeepTerms(Export *e, const PetscInt place[], const PetscRe
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc3(n_f, &scale, n_f, &value, n_f, &size));
+  /* Sizes of the functions at the ends and the middle of the ranges. */
   for (PetscInt end = 0; end < 3; end++) {
     for (PetscInt p = 0; p < e->s->n_parameters; p++) mu[p] = e->s->lo[p] + (e->s->hi[p] - e->s->lo[p]) * end / 2;
     PetscCall(HycoFunctionsEvaluate(e->s, e->atom, n_f, e->response.function, mu, value));
@@ -598,6 +620,7 @@ static PetscErrorCode Fill(Export *e)
 {
   HycoExportModel *o = &e->out;
   const size_t k = (size_t)e->k, n = (size_t)(e->p + e->k), f = (size_t)e->response.n;
+  /* As a real: the product may exceed PetscInt. It bounds the file's size and the memory below. */
   const PetscReal numbers = (PetscReal)f * ((PetscReal)k * (PetscReal)k / 2 + (PetscReal)e->n_rows * (PetscReal)n) + 1;
   PetscInt *place;
   PetscReal *point, *inverse, *T, *M, *share;
@@ -650,6 +673,7 @@ static PetscErrorCode RunHere(Export *e, const Model *model, Work *o, const Pets
 
   PetscFunctionBegin;
   PetscCall(HycoFunctionsEvaluate(e->s, e->atom, e->out.n_functions, e->out.function, mu, o->f));
+  /* Time of the runtime alone, for the description. */
   e->out.seconds -= HycoNow();
   *solved = (PetscBool)(predict(model, o, out, &kkt, &its) == OK);
   e->out.seconds += HycoNow();
@@ -689,6 +713,7 @@ static PetscErrorCode Compare(Export *e, const Model *model, void *memory)
   Work o;
 
   PetscFunctionBegin;
+  /* Once for all points: the runtime needs no state between predictions. */
   place(model, memory, &o);
   PetscCall(HycoSamplesCreate(e->s, &samples));
   PetscCall(HycoSamplesAddScattered(samples, CHECKED));
@@ -755,6 +780,7 @@ static PetscErrorCode CompareHere(Export *e)
 
 /* -- the exporter -- */
 
+/* A prediction in the middle of the ranges comes first: the operations need a model that is set up. */
 static PetscErrorCode Prepare(Export *e)
 {
   const HycoROM m = e->m;
@@ -797,6 +823,7 @@ static PetscErrorCode Destroy(Export *e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Nothing is written before the comparison has passed. */
 static PetscErrorCode Build(Export *e)
 {
   PetscFunctionBegin;
@@ -808,6 +835,7 @@ static PetscErrorCode Build(Export *e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The arrays are freed after an error, too; *description is the caller's. */
 static PetscErrorCode ExportC(HycoROM m, const char path[], char **description)
 {
   Export e = {.m = m, .s = m->model->scene};

@@ -8,6 +8,7 @@
 #include <string.h>
 #include <strings.h>
 
+/* The first pass only measures; the room doubles, so that a text of n bytes is copied O(1) times per byte. */
 PetscErrorCode HycoTextAdd(HycoText *t, const char format[], ...)
 {
   va_list list;
@@ -27,6 +28,7 @@ PetscErrorCode HycoTextAdd(HycoText *t, const char format[], ...)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Added at the end first, which makes the room; then the tail moves over it. */
 PetscErrorCode HycoTextInsert(HycoText *t, size_t at, const char words[])
 {
   const size_t n = strlen(words);
@@ -59,6 +61,7 @@ static size_t Here(const Parser *p)
   return p->c ? p->c->n : 0;
 }
 
+/* Operators are known after their left operand is written: what precedes it is inserted. */
 static void WriteBefore(Parser *p, size_t at, const char words[])
 {
   if (p->c) PetscCallVoid(HycoTextInsert(p->c, at, words));
@@ -69,6 +72,7 @@ static void WriteNumber(Parser *p, PetscReal value)
   char text[64];
 
   snprintf(text, sizeof(text), "%.17g", (double)value);
+  /* A double constant in C: an integer one would divide as integers do. */
   if (!strpbrk(text, ".e")) strcat(text, ".0");
   Write(p, value < 0 ? "(" : "");
   Write(p, text);
@@ -115,6 +119,7 @@ static PetscReal Several(Parser *p, const char before[], const char between[], s
     Write(p, between);
     next = Ternary(p);
     Write(p, ")");
+    /* By the text: "(" of a sum, fm[i]n or fm[a]x. */
     value = before[0] == '(' ? value + next : before[2] == 'i' ? PetscMin(value, next) : PetscMax(value, next);
   }
   if (!Take(p, ")")) return Invalid(p);
@@ -146,6 +151,7 @@ static PetscReal Constant(Parser *p, const char text[])
   const char *after = p->at;
   PetscReal value;
 
+  /* A constant that refers to itself would not end. */
   if (++p->depth > 100) return Invalid(p);
   p->at = text;
   value = Ternary(p);
@@ -155,6 +161,7 @@ static PetscReal Constant(Parser *p, const char text[])
   return value;
 }
 
+/* Parameters before constants before pi. Keys of constants are stored without regard to case. */
 static PetscReal Name(Parser *p)
 {
   const HycoScene s = p->scene;
@@ -221,6 +228,7 @@ static PetscReal Signed(Parser *p, PetscBool exponent)
   }
   if (Take(p, "+")) return Signed(p, exponent);
   value = Primary(p);
+  /* Powers associate from the right: the exponent is read by this function again. */
   if (!p->valid || !Take(p, "^")) return value;
   WriteBefore(p, begin, "pow(");
   Write(p, ", ");
@@ -268,12 +276,14 @@ static PetscReal Binary(Parser *p, int level)
     const char *op = operators[level][k];
 
     if (!Take(p, op)) continue;
+    /* Comparisons are int in C, and 0 or 1 of a real in muParser. */
     WriteBefore(p, begin, level < 3 ? "(double)(" : "(");
     Write(p, " ");
     Write(p, op);
     Write(p, " ");
     value = Apply(op, value, level == TIGHTEST ? Signed(p, PETSC_FALSE) : Binary(p, level + 1));
     Write(p, ")");
+    /* Further operators of this level follow from the left, beginning with the longest name. */
     k = -1;
   }
   return value;
@@ -295,6 +305,7 @@ static PetscReal Ternary(Parser *p)
   return value != 0 ? yes : no;
 }
 
+/* c NULL evaluates only. On invalid text the value is 0 and c has a part of a text, which callers drop. */
 PetscErrorCode HycoTranslate(HycoScene scene, const char text[], const PetscReal x[3], const PetscReal mu[],
                              PetscReal *value, HycoText *c, PetscBool *valid, PetscBool *uses, PetscBool *space)
 {

@@ -28,6 +28,7 @@ static PetscErrorCode Agrees(HycoScene s, const HycoAtom *atom, PetscBool *agree
 
     for (PetscInt p = 0; p < s->n_parameters; p++) mu[p] = s->lo[p] + (s->hi[p] - s->lo[p]) * (PetscReal)k / 2;
     PetscCall(HycoTranslate(s, atom->text, atom->x, mu, &mine, NULL, &valid, NULL, NULL));
+    /* An atom that is not finite somewhere in the ranges is no candidate. */
     if (PetscIsInfOrNanReal(mine)) *agrees = PETSC_FALSE;
     if (*agrees) ierr = HycoExprEval(e, mu, 1, atom->x, &theirs);
     if (*agrees && !ierr) *agrees = (PetscBool)(PetscAbsReal(mine - theirs) <= SAME * PetscAbsReal(theirs));
@@ -37,6 +38,7 @@ static PetscErrorCode Agrees(HycoScene s, const HycoAtom *atom, PetscBool *agree
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Atoms on which muParser and this parser differ are left out silently: the fit then decides without them. */
 static PetscErrorCode Add(HycoScene s, const char key[], const char text[], const PetscReal x[3], PetscInt *n,
                           HycoAtom **atom)
 {
@@ -70,6 +72,7 @@ PetscErrorCode HycoAtomsFind(HycoScene s, PetscInt n, const PetscReal x[], Petsc
   *atom = NULL;
   for (PetscInt p = 0; p < s->n_parameters; p++) PetscCall(Add(s, s->parameter[p], s->parameter[p], x, n_atoms, atom));
   for (PetscInt k = 0; k < s->n_entries; k++) {
+    /* Entries that cannot change K, F, B or D, and constants, which occur within other entries. */
     if (!strncmp(s->key[k], "output_", 7) || !strncmp(s->key[k], "scene_", 6) || !strncmp(s->key[k], "constant_", 9) ||
         Known(s->value[k], *n_atoms, *atom))
       continue;
@@ -82,6 +85,7 @@ PetscErrorCode HycoAtomsFind(HycoScene s, PetscInt n, const PetscReal x[], Petsc
 
 /* -- candidates -- */
 
+/* value[k] = a b / c; not finite where c is 0. */
 PetscErrorCode HycoFunctionsEvaluate(HycoScene s, const HycoAtom atom[], PetscInt n, const HycoFunction f[],
                                      const PetscReal mu[], PetscReal value[])
 {
@@ -112,6 +116,7 @@ static PetscInt Candidates(PetscInt m, PetscInt level, HycoFunction f[])
     if (f) f[n] = (HycoFunction){__VA_ARGS__};                                                                         \
     n++;                                                                                                               \
   } while (0)
+  /* The constant first: the choice prefers earlier candidates. */
   CANDIDATE(-1, -1, -1);
   for (PetscInt a = 0; a < m; a++) CANDIDATE(a, -1, -1);
   for (PetscInt a = -1; level > 0 && a < m; a++) {
@@ -169,6 +174,8 @@ static void Mix(const HycoFitData *d, PetscReal target[])
     for (PetscInt r = 0; r < d->n_rows && !Held(i); r++) {
       if (d->scale[d->group[r]] == 0) continue;
       for (PetscInt c = 0; c < MIXED; c++) {
+        /* Irregular weights: no row cancels in all combinations. The cost of a choice is then that of MIXED rows,
+           not of all. */
         const PetscReal share = (r + 1) * (0.61803398874989485 + 0.075 * c);
 
         target[c * d->n_points + i] += (share - PetscFloorReal(share) - 0.5) * y[r] / d->scale[d->group[r]];
@@ -200,6 +207,7 @@ static PetscReal Gain(PetscInt N, const PetscReal v[], PetscReal size, const Pet
   const PetscReal left = Product(N, v, v);
   PetscReal gain = 0;
 
+  /* A function that depends on the chosen ones would fit round-off with large coefficients. */
   if (!(left > PetscSqr(INDEPENDENT) * size) || PetscIsInfOrNanReal(left)) return 0;
   for (PetscInt c = 0; c < MIXED; c++) gain += PetscSqr(Product(N, v, target + c * N));
   return gain / left;
@@ -229,6 +237,7 @@ static PetscErrorCode Choose(const HycoFitData *d, PetscInt *n, HycoFunction f[]
     for (PetscInt k = 0; k < *n; k++) {
       const PetscReal gain = Gain(N, v + (size_t)k * (size_t)N, size[k], target);
 
+      /* Not for a difference of round-off: the simpler one comes first. */
       if (gain <= (1 + 1e-9) * best) continue;
       best = gain;
       chosen[m] = k;
@@ -237,6 +246,7 @@ static PetscErrorCode Choose(const HycoFitData *d, PetscInt *n, HycoFunction f[]
     PetscCall(PetscArraycpy(q, v + (size_t)chosen[m] * (size_t)N, N));
     best = PetscSqrtReal(Product(N, q, q));
     for (PetscInt i = 0; i < N; i++) q[i] /= best;
+    /* Gram-Schmidt for all candidates at once. */
     for (PetscInt k = 0; k < *n; k++) Deflate(N, q, v + (size_t)k * (size_t)N);
     for (PetscInt c = 0; c < MIXED; c++) Deflate(N, q, target + c * N);
     m++;
@@ -290,6 +300,7 @@ static PetscErrorCode Solve(const HycoFitData *d, PetscInt n, const PetscReal va
 
       for (PetscInt k = 0; k < n; k++)
         error += fit->coefficient[(size_t)r * (size_t)n + (size_t)k] * value[(size_t)k * (size_t)N + (size_t)i];
+      /* Also where the scale is 0 and the error, too; otherwise the division gives infinity, which is refused. */
       if (PetscAbsReal(error) <= fit->worst * d->scale[d->group[r]]) continue;
       fit->worst = PetscAbsReal(error) / d->scale[d->group[r]];
       fit->worst_row = r;
@@ -343,6 +354,7 @@ static PetscErrorCode Reduce(const HycoFitData *d, PetscReal tol, PetscReal valu
                               d->n_points));
     if (trial.n) PetscCall(Solve(d, trial.n, less, &trial));
     if (trial.n && trial.worst <= tol) {
+      /* In place (fit's own array): keep ascends. */
       for (PetscInt k = 0; k < trial.n; k++) trial.function[k] = trial.function[keep[k]];
       PetscCall(PetscFree(fit->coefficient));
       *fit = trial;
@@ -354,6 +366,7 @@ static PetscErrorCode Reduce(const HycoFitData *d, PetscReal tol, PetscReal valu
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Both arrays are the caller's, also when worst > tol. */
 PetscErrorCode HycoFitFunctions(HycoScene s, PetscInt n_atoms, const HycoAtom atom[], PetscInt level, PetscReal tol,
                                 const HycoFitData *d, HycoExportFit *fit)
 {

@@ -20,6 +20,7 @@ static PetscErrorCode Grow(PetscInt n, size_t size, void *array)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Copies the names. */
 PetscErrorCode HycoExportAddOutput(HycoExportModel *m, const int output[6], const char name[], const char unit[])
 {
   PetscFunctionBegin;
@@ -48,6 +49,7 @@ PetscErrorCode HycoExportAddWeight(HycoExportModel *m, PetscReal weight)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* T is sparse in (value, function): only rows above round-off are written. */
 PetscErrorCode HycoExportAddTerm(HycoExportModel *m, PetscInt value, PetscInt function, PetscInt n,
                                  const PetscReal term[])
 {
@@ -62,6 +64,7 @@ PetscErrorCode HycoExportAddTerm(HycoExportModel *m, PetscInt value, PetscInt fu
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Not the atoms, which are borrowed. */
 PetscErrorCode HycoExportModelFree(HycoExportModel *m)
 {
   PetscFunctionBegin;
@@ -73,6 +76,7 @@ PetscErrorCode HycoExportModelFree(HycoExportModel *m)
 
 /* -- names -- */
 
+/* A moment's unit is put together in static memory, valid until the next call. */
 const char *HycoExportUnit(HycoScene s, const HycoQuantity *q)
 {
   static char text[HYCO_LINE];
@@ -119,6 +123,7 @@ static PetscErrorCode AddWords(HycoText *t, const char words[], PetscBool commen
     const char c = *words;
 
     if (!comment && (c == '"' || c == '\\')) ADD(t, "\\");
+    /* Bytes of UTF-8 pass; in a comment nothing may end it. */
     ADD(t, "%c", isprint((unsigned char)c) && !(comment && (c == '*' || c == '/')) ? c : c < 0 ? c : ' ');
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -199,6 +204,7 @@ static PetscErrorCode WriteReals(HycoText *t, const char name[], size_t n, const
   PetscFunctionBegin;
   ADD(t, "%s = {", name);
   for (size_t i = 0; i < n; i++) ADD(t, "%s%s%.17g", i ? "," : "", i % 6 ? " " : "\n  ", (double)v[i]);
+  /* C99 has no empty initialiser. */
   ADD(t, "%s};\n", n ? "" : "0");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -293,11 +299,13 @@ static PetscErrorCode WriteFunctions(const HycoExportModel *m, HycoScene s, Hyco
   for (PetscInt k = 0; k < m->n_atoms; k++) {
     if (!used[k]) continue;
     ADD(t, "  const double e%d = ", (int)k);
+    /* Values do not matter here; the text was valid when the atom was found. */
     PetscCall(HycoTranslate(s, m->atom[k].text, m->atom[k].x, s->lo, &value, t, &valid, NULL, NULL));
     ADD(t, "; /* ");
     PetscCall(AddWords(t, m->atom[k].key, PETSC_TRUE));
     ADD(t, " */\n");
   }
+  /* A model whose functions are constant would be compiled with a warning otherwise. */
   ADD(t, "\n  (void)mu;\n");
   for (PetscInt k = 0; k < m->n_functions; k++) {
     const HycoFunction *f = &m->function[k];
@@ -346,6 +354,7 @@ static PetscErrorCode Describe(const HycoExportModel *m, HycoScene s, const char
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* By a temporary file: an existing program stays complete if the disk is full. */
 static PetscErrorCode Put(const char path[], const HycoText *t)
 {
   HycoFile file;
@@ -398,6 +407,7 @@ PetscErrorCode HycoExportWrite(const HycoExportModel *m, HycoScene s, const char
 
   PetscFunctionBegin;
   PetscCall(PetscStrncpy(beside, path, sizeof(beside)));
+  /* ExportC() has checked that the path ends in .c. */
   beside[n - 1] = 'h';
   file = strrchr(beside, '/') ? strrchr(beside, '/') + 1 : beside;
   PrefixOf(name, prefix);

@@ -55,6 +55,7 @@ static const int deadly[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
 #define N_DEADLY ((int)(sizeof(deadly) / sizeof(deadly[0])))
 static sigjmp_buf alive;
 
+/* Back to Open(): a static initialiser of the library has crashed. */
 static void Escape(int signal)
 {
   siglongjmp(alive, signal);
@@ -76,6 +77,7 @@ static void *Open(const char path[], int *died)
   return library;
 }
 
+/* The object of a law has the name of its body. */
 static const char *BodyName(HycoMaterial law)
 {
   return ((PetscObject)law)->name;
@@ -118,6 +120,7 @@ static const void *Find(const MFront *m, const char hypothesis[], const char wha
   return found;
 }
 
+/* Symbols of numbers are unsigned short in the interface. */
 static unsigned Number(const MFront *m, const char hypothesis[], const char what[], unsigned absent)
 {
   const unsigned short *value = (const unsigned short *)Find(m, hypothesis, what);
@@ -205,6 +208,7 @@ static PetscInt TypeSize(int type, PetscInt dim)
   return type >= 0 && type < 4 ? size[type][dim - 2] : 0;
 }
 
+/* Tensors are split into their components, so that outputs have a name for each number. */
 static PetscErrorCode SetState(HycoMaterial law, const MFront *m, const char hypothesis[], PetscInt dim)
 {
   const char *const *names, *list[MAX_INTERNAL];
@@ -235,6 +239,7 @@ static PetscErrorCode SetState(HycoMaterial law, const MFront *m, const char hyp
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The hypothesis is known only here, with the mesh's dimension; plane stress has been refused by the class. */
 static PetscErrorCode SetUp(HycoMaterial law, PetscInt dim)
 {
   MFront *m = (MFront *)law->data;
@@ -290,7 +295,9 @@ static PetscBool Integrate(const MFront *m, HycoMaterialPoints *p, PetscInt i, P
     e1[theirs[c]] = p->strain[i * ns + c] / Root(c);
     s0[theirs[c]] = s1[theirs[c]] = p->stress0[i * ns + c] * Root(c);
   }
+  /* The interface updates the state at the end in place, starting from that at the begin. */
   for (PetscInt k = 0; k < n_state; k++) p->state[i * n_state + k] = p->state0[i * n_state + k];
+  /* At rest the class asks for the elastic tangent alone, and nothing is integrated. */
   K[0] = at_rest ? ELASTIC : p->tangent ? CONSISTENT : 0;
   d.s0 = (StateBegin){e0, s0, &density, properties, p->state0 + i * n_state, &stored0, &dissipated0, &T0};
   d.s1 = (StateEnd){e1, s1, &density, properties, p->state + i * n_state, &stored1, &dissipated1, &T1};
@@ -306,6 +313,7 @@ static PetscBool Integrate(const MFront *m, HycoMaterialPoints *p, PetscInt i, P
   return PETSC_TRUE;
 }
 
+/* The first point that fails ends the batch: the step is repeated with a smaller time anyway. */
 static PetscErrorCode Update(HycoMaterial law, HycoMaterialPoints *p)
 {
   MFront *m = (MFront *)law->data;
@@ -332,6 +340,7 @@ static PetscErrorCode Destroy(HycoMaterial law)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The constants of the behaviour are declared later, by Declare(), when the scene has named the library. */
 static PetscErrorCode Create(HycoMaterial law)
 {
   static const struct _HycoMaterialOps ops = {.declare = Declare, .setup = SetUp, .update = Update, .destroy = Destroy};
@@ -339,6 +348,7 @@ static PetscErrorCode Create(HycoMaterial law)
 
   PetscFunctionBegin;
   PetscCall(PetscNew(&m));
+  /* First, so that Destroy() finds it also after an error below. */
   PetscCall(HycoMaterialSetData(law, m));
   PetscCall(HycoMaterialDeclareText(law, "library", "the file of a shared library"));
   PetscCall(HycoMaterialDeclareText(law, "behaviour", "the behaviour's name"));

@@ -40,6 +40,7 @@ typedef struct {
 
 /* -- training -- */
 
+/* The kernel is one of the library's enum, in the order of the words. */
 static PetscErrorCode SetFromOptions(HycoReducer t)
 {
   Training s;
@@ -56,6 +57,7 @@ static PetscErrorCode SetFromOptions(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The modes are those of displacements, which the reducer has; only the store is kept for Build(). */
 static PetscErrorCode Modes(HycoReducer t, HycoSnapshots store)
 {
   PetscFunctionBegin;
@@ -78,13 +80,14 @@ static PetscErrorCode ReadCells(HycoReducer t, HycoROM m, const char field[], Pe
   for (PetscInt k = 0; k < t->n_s; k++) {
     PetscCall(HycoSnapshotsReadRows(store, mu + k / steps * n_par, k % steps, field, 0, t->sizes[1] * width, all));
     for (PetscInt e = 0; e < n_cells; e++)
-      PetscCall(PetscArraycpy(value + (size_t)(k * n_cells + e) * (size_t)width,
+      PetscCall(PetscArraycpy(value + ((size_t)k * (size_t)n_cells + (size_t)e) * (size_t)width,
                               all + m->model->mesh->cell_whole[e] * width, width));
   }
   PetscCall(PetscFree(all));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Columns by training point and, with a history, by listed time: the same weights serve all of its times. */
 static PetscErrorCode Build(HycoROM m, HycoReducer t)
 {
   Regression r = (Regression)m->model->data;
@@ -107,6 +110,7 @@ static PetscErrorCode Build(HycoROM m, HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Without errors of its own: at the training points it has none. */
 static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *out)
 {
   PetscFunctionBegin;
@@ -122,6 +126,8 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *out)
 
 static PetscReal Kernel(PetscInt kernel, PetscReal r)
 {
+  /* All three are conditionally positive definite of order 2 at most: the linear polynomial makes the system
+     regular. */
   if (kernel == KERNEL_CUBIC) return r * r * r;
   if (kernel == KERNEL_LINEAR) return r;
   return r > 0 ? r * r * PetscLogReal(r) : 0;
@@ -157,6 +163,7 @@ static PetscErrorCode Invert(HycoROM m)
     PetscReal *column = A + (size_t)k * (size_t)size;
 
     Column(m, m->model->points + k * m->model->scene->n_parameters, column);
+    /* Beside the kernels the same numbers as below them: the system is symmetric, with zeros in its last block. */
     for (PetscInt i = n; i < size; i++) A[(size_t)i * (size_t)size + (size_t)k] = column[i];
   }
   PetscCall(HycoPseudoInverse(size, size, A, SINGULAR, w->inverse));
@@ -164,6 +171,7 @@ static PetscErrorCode Invert(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The system depends on the points alone: it is inverted once, and a prediction is a product. */
 static PetscErrorCode SetUp(HycoROM m)
 {
   Regression r = (Regression)m->model->data;
@@ -183,6 +191,7 @@ static PetscErrorCode SetUp(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Of the work data alone: the model's values stay. */
 static PetscErrorCode Reset(HycoROM m)
 {
   const Work w = (Work)m->work;
@@ -301,6 +310,7 @@ static PetscErrorCode Path(HycoROM m, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Weights once for the whole path: they depend on mu and not on time. */
 static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
 {
   PetscReal all[HYCO_MAX_PARAMETERS];
@@ -351,6 +361,7 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The work data belong to the class. */
 static PetscErrorCode Destroy(HycoROM m)
 {
   Regression r = (Regression)m->model->data;
@@ -361,6 +372,7 @@ static PetscErrorCode Destroy(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* No settings: neither modes nor tolerances may be reduced online, since each value is a function of its own. */
 static PetscErrorCode Create(HycoROM m)
 {
   static const HycoROMTraits traits = {.title = "regression",

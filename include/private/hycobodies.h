@@ -93,13 +93,26 @@ typedef struct {
   PetscReal *C, *R, *A;     /* their displacements: nd x ns, nd x r, nd x m */
 } * HycoBodiesInelastic;
 
+/* What of a parameter is interpolated: itself, its logarithm, or -1 over it. */
+enum { HYCO_BODIES_PLAIN, HYCO_BODIES_LOGARITHM, HYCO_BODIES_RECIPROCAL, HYCO_BODIES_VARIABLES };
+static inline PetscReal HycoBodiesVariable(PetscInt variable, PetscReal value)
+{
+  if (variable == HYCO_BODIES_LOGARITHM) return PetscLogReal(value);
+  return variable == HYCO_BODIES_RECIPROCAL ? -1 / value : value;
+}
+static inline PetscReal HycoBodiesValue(PetscInt variable, PetscReal x)
+{
+  if (variable == HYCO_BODIES_LOGARITHM) return PetscExpReal(x);
+  return variable == HYCO_BODIES_RECIPROCAL ? -1 / x : x;
+}
+
 typedef struct _n_HycoSubstructures {
   PetscInt dim, n;      /* bodies */
   PetscInt n_variables; /* of the scene: its parameters, the time and tables of a history */
   PetscReal *first;     /* the parameters at which the bodies' axes are those of the scene (HycoBodiesReference()) */
-  PetscInt n_theta, *theta, *logarithm, *n_nodes; /* the parameters that change the shape of a body; whether their
-                                                     logarithm is interpolated; values of each */
-  PetscReal *node;  /* the values, one parameter after the other, ascending (their logarithms) */
+  PetscInt n_theta, *theta, *variable, *n_nodes; /* the parameters that change the shape of a body; HYCO_BODIES_PLAIN,
+                                                    ...: what of each is interpolated; values of each */
+  PetscReal *node;  /* the values of these variables, one parameter after the other, ascending */
   PetscReal forces; /* HycoBodiesBound(), the largest at the sampled points of the ranges; forces below a tenth of the
                        largest relative to that tenth */
   PetscReal bound;  /* of |C~ - C| relative to C at held-out samples; 0: nothing is interpolated */

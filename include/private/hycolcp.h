@@ -23,6 +23,8 @@ typedef struct {
   PetscInt first, n, max_its;
   PetscBool one_by_one; /* after a set repeats, contacts change one at a time; otherwise a repeated set ends the loop */
   void *ctx;
+  /* May be NULL. Called by the type of a Tao before the first solve, with the bounds of its solution, NULL: none. */
+  PetscErrorCode (*bounds)(void *ctx, Vec lo, Vec hi);
   /* Solves with the contacts of the set closed and the others open. May remove contacts from the set that depend on
      others. */
   PetscErrorCode (*solve)(void *ctx, PetscBool active[], PetscBool *singular);
@@ -160,8 +162,8 @@ PetscErrorCode HycoTaoSetType(HycoTao tao, const char type[], PetscInt max_its);
   again. An error inside TAO is caught: *solved is false.
 */
 PetscErrorCode HycoTaoSolve(HycoTao tao, Mat H, Vec f, Vec lo, Vec hi, Vec y, PetscInt *its, PetscBool *solved);
-/* By HYCO_TAO_ACTIVE_SET; y: the vector that the set's functions compute. */
-PetscErrorCode HycoTaoSolveSet(HycoTao tao, const HycoActiveSet *set, PetscBool active[], Vec y, PetscInt *its,
+/* By HYCO_TAO_ACTIVE_SET; y: the vector that the set's functions compute, y <= hi (referenced). */
+PetscErrorCode HycoTaoSolveSet(HycoTao tao, const HycoActiveSet *set, PetscBool active[], Vec hi, Vec y, PetscInt *its,
                                HycoLCPStatus *status);
 /* A dense problem by any type; hyco's active set starts from `active` and returns it, the others leave it unchanged. */
 PetscErrorCode HycoTaoSolveLCP(HycoTao tao, const HycoLCP *lcp, PetscBool active[], PetscReal z[], PetscInt *its,

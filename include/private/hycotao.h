@@ -22,7 +22,7 @@ struct _n_HycoTao {
   const HycoActiveSet *set; /* if it is not a dense problem */
   PetscReal *z;
   PetscBool *active;
-  PetscInt its;
+  PetscInt its, n_free; /* n_free: leading unknowns of z without bounds in the Tao */
   HycoLCPStatus status;
   PetscReal *last; /* n_last forces of the last solution by a type for any cone */
   PetscInt n_last;

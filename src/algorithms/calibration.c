@@ -64,6 +64,7 @@ static PetscErrorCode Limit(PetscInt n, PetscInt independent, PetscReal value[],
 
   PetscFunctionBegin;
   PetscCall(PetscSortReal(n, value));
+  /* The (n + 1)-rule: of later values of the same distribution this share lies below on average. */
   *limit = value[PetscMin((PetscInt)PetscCeilReal(share * (PetscReal)(n + 1) * (1 - 1e-12)), n) - 1];
   *limit = PetscMax(*limit, value[n - 1] - FAR);
   if (n < 2 || (PetscReal)independent * (1 - share) >= MANY_ABOVE) PetscFunctionReturn(PETSC_SUCCESS);

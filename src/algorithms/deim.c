@@ -61,6 +61,7 @@ PetscErrorCode HycoDEIM(Mat V, PetscInt index[])
     PetscReal largest = 0, all;
     PetscInt at = PETSC_MAX_INT;
 
+    /* On every rank alike, from the rows that all have gathered. */
     if (k) PetscCall(Interpolate(k, l, rows, c));
     PetscCall(MatDenseGetArrayRead(V, &v));
     for (PetscInt i = 0; i < hi - lo; i++) {
@@ -129,6 +130,7 @@ PetscErrorCode HycoQDEIMRank(Mat V, PetscInt index[], PetscInt *found)
     const PetscInt k = *found;
     PetscReal size2 = 0;
 
+    /* Computed anew at each step: updated squares would lose their digits by cancellation. */
     PetscCall(PetscArrayzero(length2, hi - lo));
     PetscCall(MatDenseGetArray(R, &r));
     for (PetscInt j = 0; j < l; j++) {
@@ -142,6 +144,7 @@ PetscErrorCode HycoQDEIMRank(Mat V, PetscInt index[], PetscInt *found)
     PetscCall(LongestRow(R, length2, &index[k]));
     PetscCall(HycoGatherRows(R, 1, &index[k], pivot));
     for (PetscInt j = 0; j < l; j++) size2 += pivot[j] * pivot[j];
+    /* The rest is zero: V has no more independent columns. */
     if (!(size2 > 0)) break;
     PetscCall(MatDenseGetArray(R, &r));
     for (PetscInt i = 0; i < hi - lo; i++) {

@@ -25,6 +25,7 @@ PetscErrorCode HycoPivotColumns(PetscInt m, PetscInt n, PetscReal A[], PetscInt 
     for (PetscInt j = 0; j < n; j++) {
       PetscReal dot = 0;
 
+      /* A zero column may still be taken, if no other is left; it removes nothing. */
       if (taken[j] || norm[best] == 0) continue;
       for (PetscInt i = 0; i < m; i++) dot += A[j * m + i] * A[best * m + i];
       for (PetscInt i = 0; i < m; i++) A[j * m + i] -= dot / norm[best] * A[best * m + i];

@@ -100,6 +100,7 @@ static PetscErrorCode FindGrid(HycoInterpolant it)
       PetscReal t;
       const PetscInt i = Place(it->count[p], it->axis[p], it->x[k * it->dim + p], &t);
 
+      /* The value is a node of the axis, so that t is 0 or 1. */
       node = node * it->count[p] + i + (t > 0.5);
     }
     it->at[node] = k;
@@ -122,6 +123,7 @@ static PetscErrorCode AddSimplex(HycoInterpolant it, const PetscInt vertex[])
   }
   LAPACKgetrf_(&n, &n, edge, &n, pivot, &info);
   for (PetscInt p = 0; p < dim; p++) volume *= edge[p * dim + p];
+  /* Triangulated points on a common circle (Qt) may give flat simplices; they cover nothing. */
   if (info || PetscAbsReal(volume) < FLAT) PetscFunctionReturn(PETSC_SUCCESS);
   LAPACKgetri_(&n, edge, &n, pivot, work, &room, &info);
   if (info) PetscFunctionReturn(PETSC_SUCCESS);
@@ -208,6 +210,7 @@ PetscErrorCode HycoInterpolantCreate(PetscInt dim, PetscInt n, const PetscReal p
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Also after an error of the creation, as its arrays start as NULL. */
 PetscErrorCode HycoInterpolantDestroy(HycoInterpolant *interpolant)
 {
   HycoInterpolant it;
@@ -283,6 +286,7 @@ static void SimplexWeights(HycoInterpolant it, const PetscReal x[], PetscReal we
     at = s;
     for (PetscInt i = 0; i <= dim; i++) best[i] = b[i];
   }
+  /* Outside, the clipped coordinates are scaled to the sum 1 again: a point of a face. */
   for (PetscInt i = 0; i <= dim; i++) sum += best[i] = PetscMax(best[i], 0);
   for (PetscInt i = 0; i <= dim; i++) weight[it->own[it->simplex[at * (dim + 1) + i]]] = best[i] / sum;
 }

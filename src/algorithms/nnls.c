@@ -141,6 +141,7 @@ PetscErrorCode HycoNNLSMonitored(PetscInt m, PetscInt n, const PetscReal A[], co
   Gradient(&f, A, b, r, w);
   /* Gradients below round-off of the first one are zero. */
   for (PetscInt j = 0; j < n; j++) tol = PetscMax(tol, 1e-12 * PetscAbsReal(w[j]));
+  /* Lawson and Hanson's limit: the method is finite, but round-off could make it cycle. */
   for (PetscInt it = 0; it < 3 * n + 10 && f.k < most; it++) {
     PetscInt best = -1;
 
@@ -156,11 +157,13 @@ PetscErrorCode HycoNNLSMonitored(PetscInt m, PetscInt n, const PetscReal A[], co
       continue;
     }
     passive[best] = PETSC_TRUE;
+    /* Lawson and Hanson's inner loop, which ends because each round removes a column. */
     while (!MoveTowards(&f, A, b, z, x, passive)) BackSolve(&f, z);
     PetscCall(PetscArrayzero(banned, n));
     Gradient(&f, A, b, r, w);
     if (monitor) PetscCall((*monitor)(ctx, f.k, most));
   }
+  /* r is that of the last gradient, thus of the present x. */
   if (residual) {
     *residual = 0;
     for (PetscInt i = 0; i < m; i++) *residual += r[i] * r[i];

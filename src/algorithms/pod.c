@@ -29,6 +29,7 @@ PetscInt HycoPODRank(PetscInt k, const PetscReal s[], PetscReal tol, PetscReal n
   PetscReal total = 0, tail = 0;
   PetscInt l = k;
 
+  /* From the smallest, so that their sum is not lost in that of the large ones. */
   for (PetscInt j = k - 1; j >= 0; j--) total += s[j] * s[j];
   while (l > 0 && tail + s[l - 1] * s[l - 1] <= tol * total) {
     tail += s[l - 1] * s[l - 1];
@@ -53,16 +54,17 @@ static PetscErrorCode FixSigns(Mat V, PetscInt l)
   for (PetscInt j = 0; j < l; j++) {
     PetscReal largest = 0, all, sign = 0, sum;
     PetscInt at = PETSC_MAX_INT, first;
+    PetscScalar *column = v + (size_t)j * (size_t)lda;
 
-    for (PetscInt i = 0; i < hi - lo; i++) largest = PetscMax(largest, PetscAbsScalar(v[j * lda + i]));
+    for (PetscInt i = 0; i < hi - lo; i++) largest = PetscMax(largest, PetscAbsScalar(column[i]));
     PetscCallMPI(MPI_Allreduce(&largest, &all, 1, MPIU_REAL, MPI_MAX, comm));
     for (PetscInt i = hi - lo - 1; i >= 0; i--) {
-      if (PetscAbsScalar(v[j * lda + i]) >= all * (1 - 1e-6)) at = lo + i;
+      if (PetscAbsScalar(column[i]) >= all * (1 - 1e-6)) at = lo + i;
     }
     PetscCallMPI(MPI_Allreduce(&at, &first, 1, MPIU_INT, MPI_MIN, comm));
-    if (at == first && at != PETSC_MAX_INT) sign = v[j * lda + at - lo] < 0 ? -1 : 1;
+    if (at == first && at != PETSC_MAX_INT) sign = column[at - lo] < 0 ? -1 : 1;
     PetscCallMPI(MPI_Allreduce(&sign, &sum, 1, MPIU_REAL, MPI_SUM, comm));
-    for (PetscInt i = 0; sum < 0 && i < hi - lo; i++) v[j * lda + i] = -v[j * lda + i];
+    for (PetscInt i = 0; sum < 0 && i < hi - lo; i++) column[i] = -column[i];
   }
   PetscCall(MatDenseRestoreArray(V, &v));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -186,6 +188,7 @@ static PetscErrorCode SolveAccurate(SVD svd, Mat S, PetscReal size, PetscReal to
     PetscCall(MatDestroy(&V));
     PetscCall(PetscInfo(svd, "%d singular values of %d, %d of them accurate\n", (int)found, (int)k, (int)*accurate));
     for (PetscInt j = 0; j < *accurate; j++) rest -= sigma[j] * sigma[j];
+    /* The energy that no accurate mode has: the criterion then counts it as left out. */
     if (*accurate < k) sigma[*accurate] = PetscSqrtReal(PetscMax(rest, 0));
     if (*accurate < k) PetscCall(PetscArrayzero(sigma + *accurate + 1, k - *accurate - 1));
     more = (PetscBool)(!fixed && most < limit && *accurate >= PetscMin(most, found) &&
@@ -254,6 +257,7 @@ PetscErrorCode HycoPODGram(PetscInt n, const PetscReal G[], PetscReal tol, Petsc
   LAPACKsyev_("V", "U", &nb, A, &nb, values, work, &lwork, &info);
   PetscCheck(info == 0, PETSC_COMM_SELF, PETSC_ERR_LIB,
              "the eigenvalues of the Gram matrix did not converge (LAPACK syev: %d)", (int)info);
+  /* LAPACK's values ascend, and round-off makes the smallest ones negative. */
   for (PetscInt j = 0; j < n; j++) sigma[j] = PetscSqrtReal(PetscMax(values[n - 1 - j], 0));
   *l = HycoPODRank(n, sigma, tol, PetscMax(noise, 1e-7), 0);
   PetscCall(PetscMalloc1(n * *l, W));

@@ -47,6 +47,7 @@ PetscErrorCode HycoPolynomialWeights(PetscInt n, const PetscReal x[], PetscInt d
   PetscCall(PetscArrayzero(weight, n));
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
   middle = (x[0] + x[n - 1]) / 2;
+  /* To [-1, 1], where the polynomials are of one size whatever the parameter's unit. */
   half = x[n - 1] > x[0] ? (x[n - 1] - x[0]) / 2 : 1;
   PetscCall(PetscMalloc2(n + 1, &s, (top + 1) * (n + 1), &P));
   for (PetscInt k = 0; k < n; k++) s[k] = (x[k] - middle) / half;
@@ -61,6 +62,7 @@ PetscErrorCode HycoPolynomialWeights(PetscInt n, const PetscReal x[], PetscInt d
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* An empty product for no axis: a constant has one node. */
 PetscInt HycoTensorSize(const HycoTensor *t)
 {
   PetscInt size = 1;

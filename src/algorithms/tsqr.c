@@ -63,6 +63,7 @@ static PetscErrorCode DecomposeTriangle(PetscInt n, PetscScalar R[], PetscReal s
 
   PetscFunctionBegin;
   PetscCall(PetscBLASIntCast(n, &nb));
+  /* Of the factor only the upper triangle counts. */
   for (PetscInt j = 0; j < n; j++) PetscCall(PetscArrayzero(R + j * n + j + 1, n - j - 1));
   LAPACKgesvd_("O", "S", &nb, &nb, R, &nb, s, &none, &one, Vt, &nb, &size, &lwork, &info);
   lwork = (PetscBLASInt)size;
@@ -139,6 +140,7 @@ static PetscErrorCode Solve(SVD svd)
   PetscCall(MatDenseGetArray(R, &r));
   PetscCall(DecomposeTriangle(n, r, svd->sigma, Vt));
   PetscCall(MatDenseRestoreArray(R, &r));
+  /* R has been overwritten by U. */
   PetscCall(BVMultInPlace(Q, R, 0, n));
   if (Q != svd->U) {
     PetscCall(BVSetActiveColumns(svd->U, 0, n));

@@ -40,6 +40,7 @@ PetscErrorCode HycoWeightedCreate(PetscInt m, PetscInt n, const PetscReal S[], P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* S is borrowed and stays. */
 PetscErrorCode HycoWeightedDestroy(HycoWeighted *weighted)
 {
   HycoWeighted f = *weighted;
@@ -91,6 +92,7 @@ static PetscBool Append(HycoWeighted f, PetscInt j)
     r[i] /= other[i];
     rest -= r[i] * r[i];
   }
+  /* In squares: a column of which less than 1e-7 is independent, the limit of normal equations. */
   if (!(rest > 1e-14 * column[j])) return PETSC_FALSE;
   r[f->k] = PetscSqrtReal(rest);
   f->p[f->k++] = j;
@@ -215,6 +217,7 @@ PetscErrorCode HycoWeightedNNLS(HycoWeighted f, const PetscReal d[], const Petsc
   for (PetscInt it = 0; it < 3 * f->n + 10; it++) {
     PetscInt best = Steepest(f, 1e-12 * size);
 
+    /* The refinement costs two products with S, and is made only when the cheap gradient finds no column. */
     if (best < 0) { /* first by the normal equations, then by S */
       worst = Refine(f, x);
       best = Steepest(f, 1e-12 * size);

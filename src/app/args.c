@@ -41,6 +41,7 @@ static const char *const foreign[] = {OWN_SOLVERS,
                                       "device_",
                                       NULL};
 
+/* PETSc compares names of options without regard to case. */
 static PetscBool BeginsAs(const char *const beginnings[], const char name[])
 {
   for (PetscInt k = 0; beginnings[k]; k++) {
@@ -55,7 +56,8 @@ static PetscBool IsSceneEntry(const char name[])
   return (PetscBool)(HycoIsSceneKey(name) && strncasecmp(name, "hyco_", 5));
 }
 
-/* The commands that have an option that this one lacks: "solve, predict"; "" if none has. */
+/* The commands that have an option that this one lacks: "solve, predict"; "" if none has. Each command's Declare
+   function says what it reads: there is no second list that could differ. */
 static PetscErrorCode ListTakers(const char name[], char list[DRIVER_LINE])
 {
   PetscFunctionBegin;
@@ -70,6 +72,7 @@ static PetscErrorCode ListTakers(const char name[], char list[DRIVER_LINE])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The most helpful reason first: an option of another command, then a near name, then that there is none. */
 static PetscErrorCode Unknown(const Command *command, const HycoOptionList *own, const char name[])
 {
   const char *near;
@@ -86,6 +89,7 @@ static PetscErrorCode Unknown(const Command *command, const HycoOptionList *own,
   HycoFail("hyco %s has no option -%s (hyco %s -help lists them)", command->name, name, command->name);
 }
 
+/* By the class that declares it; options of HycoROM also say for which commands (HycoOption.only). */
 PetscBool DriverReads(const Command *command, const HycoOption *option)
 {
   if (!strstr(command->classes, option->owner)) return PETSC_FALSE;
@@ -106,6 +110,7 @@ static PetscErrorCode CheckReaders(const Command *command, const HycoOption *opt
            strcmp(readers, "train") ? "" : " (it sets the model in training)");
 }
 
+/* A dash and a letter: "-1.5" is a value. */
 static PetscBool IsKey(const char word[])
 {
   return (PetscBool)(word[0] == '-' &&
@@ -123,6 +128,7 @@ static PetscErrorCode CheckName(const Command *command, const HycoOptionList *ow
   if (option || HycoOptionListFind(own, name) || BeginsAs(foreign, name) ||
       (IsSceneEntry(name) && HycoOptionListFind(own, "scene")))
     PetscFunctionReturn(PETSC_SUCCESS);
+  /* "-title -x" would be read as two options: an expression may begin with a dash and a letter. */
   HycoCheck(!previous || !IsKey(previous) || !IsSceneEntry(previous + 1),
             "%s follows %s, which expects a value, and looks like an option; write a value that begins with a dash and "
             "a letter with a blank first, %s \" %s\", or in scene.yaml",
@@ -143,12 +149,14 @@ PetscErrorCode DriverCheckArguments(const Command *command, int argc, char **arg
                "commas, without spaces)",
                argv[k]);
     PetscCall(CheckName(command, &own, argv[k] + (argv[k][1] == '-' ? 2 : 1), argv[k], k > 2 ? argv[k - 1] : NULL));
+    /* The value, which is not checked here. */
     if (k + 1 < argc && !IsKey(argv[k + 1])) k++;
   }
   PetscCall(HycoOptionListDestroy(&own));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* From the command line alone: an option of the scene's hyco: section may serve other commands. */
 PetscErrorCode DriverRefuseOnly(const char only[], const char reason[])
 {
   int argc;
@@ -172,6 +180,7 @@ static PetscBool IsReadLate(const char name[])
   return (PetscBool)(BeginsAs(own_solvers, name) && (shows || strncasecmp(name, "hyco_pod_", 9)));
 }
 
+/* An option that nobody has read is a typing error or has no effect here; both would go unnoticed. */
 static PetscErrorCode CheckLeft(PetscBool early)
 {
   PetscInt n;
@@ -196,6 +205,7 @@ PetscErrorCode DriverCheckLeft(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Before long work: what a solver reads at its first solve is not counted yet. */
 PetscErrorCode DriverCheckLeftEarly(void)
 {
   PetscFunctionBegin;
@@ -203,6 +213,7 @@ PetscErrorCode DriverCheckLeftEarly(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Also declares it: the same call reads an option and lists it in the help. A margin of 32 is left for suffixes. */
 PetscErrorCode DriverGet(const char name[], const char text[], char value[PETSC_MAX_PATH_LEN])
 {
   char dashed[DRIVER_LINE];
@@ -216,6 +227,7 @@ PetscErrorCode DriverGet(const char name[], const char text[], char value[PETSC_
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* NULL: the command has no such file. The texts are those of the help, in one place for all commands. */
 PetscErrorCode DriverReadFiles(char scene[], char model[], char output[], char report[], char table[])
 {
   PetscFunctionBegin;

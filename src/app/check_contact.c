@@ -6,6 +6,7 @@
 /* A smallest gap above this share of the mesh's extent does not close by small displacements. */
 #define FAR 0.1
 
+/* Rank 0, as the other parts of the report: the inspection is complete there. */
 PetscErrorCode CheckReportTies(Check *check)
 {
   cJSON *list = cJSON_AddArrayToObject(check->json, "ties");
@@ -30,6 +31,7 @@ PetscErrorCode CheckReportTies(Check *check)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What is probably a mistake, not what is an error: the scene can be solved. */
 static void Warn(Check *check, const HycoContactInspection *c)
 {
   const PetscReal length = check->in.length;
@@ -101,6 +103,8 @@ PetscErrorCode CheckReportContacts(Check *check)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Motions that contact alone prevents are no warning by themselves, but the user should know that loads must press
+   the bodies together. */
 PetscErrorCode CheckReportMotions(Check *check)
 {
   const HycoInspection *in = &check->in;

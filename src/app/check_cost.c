@@ -2,6 +2,7 @@
 #include "check.h"
 #include <stdio.h>
 
+/* At the centre of the ranges, where contact is most probably as the user means it. */
 PetscErrorCode CheckReportSolve(Check *check, HycoFOM fom)
 {
   const PetscReal *lo, *hi;
@@ -32,6 +33,7 @@ PetscErrorCode CheckReportSolve(Check *check, HycoFOM fom)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Two digits: estimates are no better. */
 static void Seconds(PetscReal t, char text[32])
 {
   if (t < 60)
@@ -51,6 +53,7 @@ static PetscErrorCode PrintTraining(Check *check, HycoSamples samples, cJSON *ob
 
   PetscFunctionBegin;
   PetscCall(HycoInspectionCountTraining(check->scene, samples, &n, &n_stiff));
+  /* A new stiffness needs a factor; the others share one. */
   training = n_stiff * in->first + (n - n_stiff) * in->next;
   snapshots = 8 * in->n_values * n;
   Seconds(training, all);

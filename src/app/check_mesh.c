@@ -42,6 +42,7 @@ PetscErrorCode CheckReportMesh(Check *check)
                         (int)in->n_nodes, (int)in->n_cells, (int)in->n_free, (int)in->n_fixed,
                         in->n_ties ? " and ties" : ""));
   PetscCall(CheckReportTies(check));
+  /* The solver counts unknowns of tied nodes as fixed; the report does not. */
   for (PetscInt t = 0; t < in->n_ties; t++) n_tied += in->tie[t].n_nodes;
   cJSON_AddNumberToObject(check->json, "dimension", in->dim);
   cJSON_AddStringToObject(check->json, "cell_type", in->cell_type);
@@ -111,6 +112,7 @@ static void WarnOfAlike(Check *check, const HycoAlikeGroups *a)
                        a->name[1], (int)a->n[1], (int)a->common);
 }
 
+/* Unused groups in one line: a mesh may have many that are not meant for the scene. */
 PetscErrorCode CheckReportGroups(Check *check)
 {
   const HycoInspection *in = &check->in;

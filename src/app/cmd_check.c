@@ -6,6 +6,7 @@
 
 #define WIDE 10 /* ratio of a range's ends from which polynomials in its logarithm interpolate better */
 
+/* Collected, and printed at the end: among the other lines they would be overlooked. */
 void CheckReportWarning(Check *check, const char format[], ...)
 {
   char line[HYCO_LINE];
@@ -33,7 +34,8 @@ static PetscErrorCode ReportRange(Check *check, const HycoVariableInspection *v,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A parameter, or the time of a history, or one of its tables. */
+/* A parameter, or the time of a history, or one of its tables. A parameter that affects nothing is probably a
+   misspelt name in an expression. */
 static PetscErrorCode ReportVariable(Check *check, PetscInt p, cJSON *reaches)
 {
   const HycoVariableInspection *v = &check->in.variable[p];
@@ -93,6 +95,7 @@ static PetscErrorCode Describe(Check *check)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Declared by the same call in DeclareCheck() and read in CommandCheck(). */
 static PetscErrorCode ReadSolve(PetscBool *solve)
 {
   PetscFunctionBegin;
@@ -116,7 +119,8 @@ PetscErrorCode DeclareCheck(PetscOptions options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Prints the warnings and writes the report. */
+/* Prints the warnings and writes the report. All ranks have created `json`; ReportWrite() is collective and writes
+   on rank 0. */
 static PetscErrorCode Finish(Check *check)
 {
   const int n = cJSON_GetArraySize(check->warnings);
@@ -131,6 +135,7 @@ static PetscErrorCode Finish(Check *check)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Options are checked before the inspection, which takes as long as assembling all points. */
 PetscErrorCode CommandCheck(void)
 {
   HycoSamples samples = NULL;

@@ -9,6 +9,7 @@ typedef struct {
   const char *names[HYCO_MAX_QUANTITIES];
 } Outputs;
 
+/* By definition, not by name alone: the scene may have outputs that the model was not trained with. */
 static PetscErrorCode CommonOutputs(HycoScene scene, HycoROM model, Outputs *outputs)
 {
   const char *names[HYCO_MAX_QUANTITIES];
@@ -43,7 +44,8 @@ static void FillCommon(const DriverColumns *c, const HycoSummary *s, const HycoP
   judged[DRIVER_ESTIMATES] = p->unseen;
 }
 
-/* One point on one group: both solutions, and their difference. */
+/* One point on one group: both solutions, and their difference. Both on this group's ranks. A failed full-order
+   solution ends the command: there is nothing to compare with. */
 static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, PetscInt n_par, const PetscReal mu[],
                                    const Outputs *outputs, const DriverColumns *c, PetscReal v[])
 {
@@ -97,6 +99,7 @@ static PetscErrorCode CompareOutputs(HycoFOM fom, HycoROM model, const Outputs *
     *worst = *end = both ? 0 : PETSC_INFINITY;
     for (PetscInt k = 0; k < both; k++) {
       *end = PetscAbsReal(full.step[k].quantity[outputs->full[q]] - reduced.step[k].quantity[outputs->reduced[q]]);
+      /* The form keeps NaN, which a maximum would drop. */
       *worst = *end <= *worst ? *worst : *end;
     }
   }
@@ -114,6 +117,7 @@ static PetscErrorCode ComparePath(HycoFOM fom, HycoROM model, PetscBool root, Pe
   PetscFunctionBegin;
   PetscCall(HycoROMComparePath(model, fom, n_par, mu, &e));
   PetscCall(HycoFOMGetSummary(fom, &s));
+  /* The first rank of the group predicts; the others only compare their rows. */
   if (root) PetscCall(HycoROMGetPrediction(model, &p));
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
     v[j] = e.worst[j];
@@ -138,6 +142,8 @@ typedef struct {
   DriverColumns columns;
 } Points;
 
+/* Every rank of a group takes the same point from the queue; rows are kept by its first rank, and `unused` takes
+   those of the others. */
 static PetscErrorCode CompareQueued(const Points *p, HycoFOM fom, PetscBool root, PetscReal unused[])
 {
   PetscInt k, n_done;
@@ -162,6 +168,7 @@ static PetscErrorCode CompareQueued(const Points *p, HycoFOM fom, PetscBool root
   }
 }
 
+/* A full-order model of its own for each group, whose factor it keeps from point to point. */
 static PetscErrorCode CompareMine(const Points *p)
 {
   HycoFOM fom;
@@ -190,6 +197,7 @@ static PetscErrorCode CompareAll(Points *p)
   for (PetscInt k = 0; k < p->n; k++) list[k] = k;
   PetscCall(HycoSnapshotsCreateQueue(PETSC_COMM_WORLD, p->scene, p->n_par, p->mu, p->n, list, p->n, &p->queue));
   PetscCall(PetscFree(list));
+  /* Zero for points of other groups: the sum over ranks is the table. */
   PetscCall(PetscCalloc1(p->n * p->columns.n, &p->value));
   HycoOnEach(PETSC_COMM_WORLD, HycoQueueEnd(p->queue, CompareMine(p)));
   HycoAllreduce(p->value, p->n * p->columns.n, MPIU_REAL, MPI_SUM, PETSC_COMM_WORLD);
@@ -222,6 +230,7 @@ PetscErrorCode DeclareCompare(PetscOptions options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The scene and the model must belong together, which is checked before any solve. */
 PetscErrorCode CommandCompare(void)
 {
   HycoScene scene;

@@ -37,6 +37,7 @@ static PetscErrorCode Export(const char model[], const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The export compares what it wrote with the model: an error there must reach every rank. */
 PetscErrorCode CommandExport(void)
 {
   char model[PETSC_MAX_PATH_LEN], path[PETSC_MAX_PATH_LEN];

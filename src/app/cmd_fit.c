@@ -50,6 +50,7 @@ static PetscErrorCode ReadSettings(Settings *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* An empty meaning: the option is declared once, as target_, in DeclareFit(). */
 static PetscErrorCode ReadTarget(Fit *f, PetscInt output, const char name[])
 {
   char key[DRIVER_LINE], text[PETSC_MAX_PATH_LEN], *end;
@@ -116,7 +117,8 @@ static PetscErrorCode Run(Fit *f, const Settings *s)
 
 /* -- the answer -- */
 
-/* The scene for the check: the model's, with the outputs that have targets. Collective. */
+/* The scene for the check: the model's, with the outputs that have targets. Collective. The full-order scene may
+   have other outputs, in another order: at[] maps those with targets. */
 static PetscErrorCode LoadScene(const Fit *f, const char path[], HycoScene *scene, PetscInt at[])
 {
   const char *names[HYCO_MAX_QUANTITIES];
@@ -134,7 +136,8 @@ static PetscErrorCode LoadScene(const Fit *f, const char path[], HycoScene *scen
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One full-order solve at the answer: full[k], the outputs with targets. Collective. */
+/* One full-order solve at the answer: full[k], the outputs with targets. Collective. Fails before anything is
+   written: an answer that full order cannot confirm is none. */
 static PetscErrorCode Check(const Fit *f, HycoScene scene, const PetscInt at[], const PetscReal mu[], PetscReal full[])
 {
   HycoFOM fom;
@@ -190,6 +193,7 @@ static PetscErrorCode PrintAnswer(const Fit *f, const PetscReal full[], cJSON *j
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A fit that ended at no minimum is a miss (exit status 3), with its report written. */
 static PetscErrorCode Report(const Fit *f, const PetscReal full[])
 {
   const HycoFit *fit = &f->fit;
@@ -226,7 +230,7 @@ static PetscErrorCode Report(const Fit *f, const PetscReal full[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -mu or -mu_NAME as the start. */
+/* -mu or -mu_NAME as the start. Without -mu the start is searched; DriverGetPoint() would require all parameters. */
 static PetscErrorCode ReadStart(const Fit *f, Settings *s)
 {
   const char *const *names;
@@ -267,6 +271,7 @@ PetscErrorCode DeclareFit(PetscOptions options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The scene, if given, is loaded and checked before the fit, so that a mismatch is not found only after it. */
 PetscErrorCode CommandFit(void)
 {
   Fit f = {0};

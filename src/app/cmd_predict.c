@@ -8,6 +8,7 @@
 #define PIECES      16 /* number of pieces of a set for each rank: expensive points delay the end by at most one piece */
 #define LEAST_PIECE 64 /* number of points in a piece, unless a rank has fewer */
 
+/* Negative: there is none, null in JSON. */
 static void Estimate(cJSON *json, const char name[], PetscReal estimate)
 {
   if (estimate >= 0)
@@ -87,6 +88,7 @@ static PetscErrorCode PrintEstimates(HycoScene scene, const HycoPrediction *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Not reported with full order, which has no RID. */
 static void ReportRID(cJSON *json, const HycoPrediction *p)
 {
   ReportNumbers(json, {"rid_nodes", p->rid_nodes}, {"rid_elements", p->rid_elements}, {"rid_fraction", p->rid_fraction},
@@ -136,6 +138,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The words depend on what the type's numbers say, not on its name. */
 static PetscErrorCode PrintReduced(const HycoPrediction *p)
 {
   PetscFunctionBegin;
@@ -190,6 +193,7 @@ static PetscErrorCode One(HycoROM model, HycoScene scene, Fallback *fallback, co
   HycoCheck(p.reason > 0, "%s (KKT residuals: %.1e, %.1e, %.1e, %.1e); nothing was written", HycoReasonName(p.reason),
             (double)p.kkt.stationarity, (double)p.kkt.penetration, (double)p.kkt.adhesion,
             (double)p.kkt.complementarity);
+  /* After the check of convergence, which a gradient requires. */
   if (derives) HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetGradient(model, &gradient));
   if (output[0] && (why[0] || fallback->displacement))
     PetscCall(HycoFOMWrite(fallback->fom, output));
@@ -317,7 +321,8 @@ typedef struct {
   const char **names;
 } Shape;
 
-/* The caller frees the names, by DestroyShape(). */
+/* The caller frees the names, by DestroyShape(). Groups of columns follow each other; each number is the end of a
+   group and the begin of the next. */
 static PetscErrorCode ShapeOf(HycoROM model, HycoScene scene, Shape *s)
 {
   PetscInt n_times, dim;
@@ -369,6 +374,7 @@ static PetscReal Known(PetscReal estimate)
   return estimate >= 0 ? estimate : NAN;
 }
 
+/* p's arrays follow the scene's order of quantities, as the columns do. */
 static void FillRow(const HycoPrediction *p, PetscInt n_carried, const HycoContactResult carried[], const Shape *s,
                     PetscReal v[])
 {
@@ -412,6 +418,8 @@ typedef struct {
   PetscInt n_unseen, n_inconsistent;
 } Taken;
 
+/* A HycoPointMonitor: called after each point of a batch, whatever the order of the batch. It serves the queue, so
+   that other ranks do not wait for this one. */
 static PetscErrorCode TakePoint(HycoROM model, PetscInt k, void *ctx)
 {
   Taken *t = (Taken *)ctx;
@@ -427,6 +435,7 @@ static PetscErrorCode TakePoint(HycoROM model, PetscInt k, void *ctx)
   PetscCall(HycoROMGetPrediction(model, &p));
   PetscCall(HycoROMGetContacts(model, &n, &carried));
   FillRow(&p, n, carried, t->shape, v);
+  /* Gradients of points that did not converge. */
   for (PetscInt c = t->shape->with_carried; c < t->shape->width; c++) v[c] = NAN;
   if (t->shape->gradients.on && p.reason > 0) {
     PetscCall(HycoROMGetGradient(model, &gradient));
@@ -448,7 +457,8 @@ static PetscInt PieceSize(PetscInt n, PetscInt size, PetscBool paths)
   return size == 1 ? PetscMax(1, n) : PetscMax((share + PIECES - 1) / PIECES, PetscMin(least, share));
 }
 
-/* Predicts the pieces that this rank takes from the queue. */
+/* Predicts the pieces that this rank takes from the queue. A rank that takes no piece sets up all the same, so that
+   every rank reads the same options. */
 static PetscErrorCode PredictQueued(HycoROM model, PetscInt each, PetscInt n_par, const PetscReal mu[], Taken *t,
                                     DriverRows *rows)
 {
@@ -489,7 +499,8 @@ static PetscErrorCode PrintDoubts(PetscInt n, const Taken *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Predicts all points; each rank keeps the rows of those that it took. */
+/* Predicts all points; each rank keeps the rows of those that it took. HycoQueueEnd() is called with errors too:
+   other ranks would wait for this one's answers. */
 static PetscErrorCode PredictAll(HycoROM model, const Fallback *fallback, PetscInt n_par, const PetscReal mu[],
                                  const Shape *s, DriverRows *rows)
 {
@@ -507,7 +518,8 @@ static PetscErrorCode PredictAll(HycoROM model, const Fallback *fallback, PetscI
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The points of all ranks that are to be solved at full order, ascending. The caller frees them. */
+/* The points of all ranks that are to be solved at full order, ascending. The caller frees them. Rank 0 has the
+   list, then every rank: full order is solved by all together, in the same order. */
 static PetscErrorCode ListRest(const DriverRows *rows, PetscInt *n, PetscInt **list)
 {
   const MPI_Comm comm = PETSC_COMM_WORLD;
@@ -547,7 +559,8 @@ static PetscReal *FindRow(const DriverRows *rows, PetscInt k)
   return NULL;
 }
 
-/* Solves by all ranks together the points where the reduced model was not sufficient. */
+/* Solves by all ranks together the points where the reduced model was not sufficient. After all predictions, so
+   that the full-order model and its factor are made once. */
 static PetscErrorCode SolveRest(Fallback *fallback, PetscInt n_par, const PetscReal mu[], const Shape *s,
                                 const DriverRows *rows)
 {
@@ -563,6 +576,7 @@ static PetscErrorCode SolveRest(Fallback *fallback, PetscInt n_par, const PetscR
 
     PetscCall(DriverSolveFullOrder(fallback, n_par, mu + list[i] * n_par, &p));
     PetscCall(HycoFOMGetContacts(fallback->fom, &n_carried, &carried));
+    /* The row is another rank's: it has taken part in the solve alone. */
     if (!v) continue;
     p.estimated_error_u = v[ESTIMATE_U]; /* the model's estimate, which required full order */
     p.estimated_error_sigma = v[ESTIMATE_SIGMA];
@@ -579,6 +593,7 @@ static PetscErrorCode SolveRest(Fallback *fallback, PetscInt n_par, const PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The seconds are those of the predictions and solves, without the fields. */
 static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, HycoSamples samples, const char output[],
                            PetscBool derives)
 {
@@ -607,6 +622,7 @@ static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, H
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Outside the region of training no estimate is tested: the user must say that this is meant. */
 static PetscErrorCode ReadExtrapolate(PetscBool *extrapolate)
 {
   PetscFunctionBegin;
@@ -638,6 +654,8 @@ PetscErrorCode DeclarePredict(PetscOptions options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Every rank loads the model: for a set each predicts its share. Combinations of options that make no sense are
+   refused before the first prediction. */
 PetscErrorCode CommandPredict(void)
 {
   HycoROM model = NULL;

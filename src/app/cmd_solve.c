@@ -56,7 +56,8 @@ static PetscErrorCode PrintReactions(cJSON *json, HycoFOM fom, PetscInt dim)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* gradient: NULL, or that of the solution. */
+/* gradient: NULL, or that of the solution. Text and JSON together, so that both have the same numbers in the same
+   order. */
 static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom, const HycoSummary *s,
                              const HycoGradient *gradient)
 {
@@ -120,7 +121,8 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A scene with a history: its path. */
+/* A scene with a history: its path. The report is written for a path that reached its end; DriverEndHistory()
+   fails for others, after the table. */
 static PetscErrorCode Path(HycoFOM fom, HycoScene scene, const PetscReal mu[], const char output[], const char table[])
 {
   HycoSummary summary;
@@ -139,6 +141,7 @@ static PetscErrorCode Path(HycoFOM fom, HycoScene scene, const PetscReal mu[], c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Not converged: nothing is written, neither fields nor report. */
 static PetscErrorCode One(HycoFOM fom, HycoScene scene, const PetscReal mu[], const char output[], PetscBool derives)
 {
   HycoSummary summary;
@@ -174,7 +177,7 @@ typedef struct {
   PetscReal *value;
 } Table;
 
-/* For n points, once dim is known. */
+/* For n points, once dim is known. Room for all quantities first; the width is then that of the columns there are. */
 static PetscErrorCode CreateTable(HycoScene scene, PetscInt dim, PetscInt n, Table *t)
 {
   PetscFunctionBegin;
@@ -247,8 +250,10 @@ static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, co
 
     PetscCall(HycoFOMSolve(fom, n_par, mu + k * n_par));
     PetscCall(HycoFOMGetSummary(fom, &s));
+    /* Solvers read their options at the first solve. */
     if (k == 0) PetscCall(DriverCheckLeft());
     if (k == 0) PetscCall(Remarks(&s));
+    /* The dimension is known from the first solution. */
     if (k == 0) PetscCall(CreateTable(scene, s.dim, n, &t));
     PetscCall(FillRow(fom, &s, &t, t.value + k * t.width));
     if (s.reason > 0) u_relative = PetscMax(u_relative, s.u_relative);
@@ -278,6 +283,7 @@ PetscErrorCode DeclareSolve(PetscOptions options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* -table is read for sets and paths alone: given for a single point it is reported as unused. */
 PetscErrorCode CommandSolve(void)
 {
   HycoScene scene;

@@ -60,6 +60,7 @@ static PetscErrorCode PrintGain(HycoReducer reducer, const HycoTraining *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The keys are those of docs/output.md, which is made from outputs_list.c. */
 static PetscErrorCode Report(HycoScene scene, HycoReducer reducer, const HycoTraining *t, const GreedyLog *log,
                              const Search *search)
 {
@@ -106,7 +107,9 @@ static PetscErrorCode CheckKind(PetscBool greedy, const Search *search)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Refuses an option of the command line that this training does not read, according to the reducer's declarations. */
+/* Refuses an option of the command line that this training does not read, according to the reducer's declarations.
+   By the reducer's own declarations (HycoOption.only): an option of a type that is not tried would silently do
+   nothing. */
 static PetscErrorCode CheckRead(HycoReducer reducer, PetscBool greedy)
 {
   const HycoOption *table;
@@ -150,6 +153,7 @@ static PetscErrorCode TakeOnce(HycoSamples samples, const char what[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Its own function, so that the help lists it from the same call. */
 static PetscErrorCode ReadGreedy(PetscBool *greedy)
 {
   PetscFunctionBegin;
@@ -183,6 +187,8 @@ PetscErrorCode DeclareTrain(PetscOptions options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Everything that can be wrong in options and files is checked before the first solution, which may be hours
+   before the last. */
 PetscErrorCode CommandTrain(void)
 {
   HycoScene scene;
@@ -218,6 +224,7 @@ PetscErrorCode CommandTrain(void)
   PetscCall(HycoReducerSetProgress(reducer, DriverProgress, word));
   PetscCall(HycoReducerSetPhaseMonitor(reducer, DriverPhase, NULL));
   PetscCall(DriverSnapshotFolder(model, folder));
+  /* From here on an interrupt says where the solutions are kept. */
   PetscCall(DriverCatchInterrupt(folder));
   PetscCall(HycoReducerSetValidation(reducer, validation));
   PetscCall(HycoSamplesGet(samples, &n, NULL, NULL));

@@ -21,6 +21,7 @@ PetscErrorCode CommandView(void)
 
   PetscFunctionBegin;
   PetscCall(DriverReadFiles(path, file, NULL, NULL, NULL));
+  /* Exactly one of the two. */
   HycoCheck(!path[0] != !file[0], "give -model FILE.h5 or -scene FOLDER");
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   if (file[0]) {

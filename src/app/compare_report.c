@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Appends names; the text is kept in the struct, since tables borrow it. */
 static PetscErrorCode Add(DriverColumns *c, PetscInt n, const char before[], const char *const names[])
 {
   PetscFunctionBegin;
@@ -14,6 +15,7 @@ static PetscErrorCode Add(DriverColumns *c, PetscInt n, const char before[], con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The order must be that of the enums DRIVER_... in driver.h, by which rows are filled. */
 PetscErrorCode DriverCompareColumns(PetscBool paths, PetscInt n_outputs, const char *const outputs[], DriverColumns *c)
 {
   static const char *const errors[] = {
@@ -40,6 +42,7 @@ PetscErrorCode DriverCompareColumns(PetscBool paths, PetscInt n_outputs, const c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For qsort(), ascending; NaN is excluded before. */
 static int CompareReal(const void *a, const void *b)
 {
   const PetscReal x = *(const PetscReal *)a, y = *(const PetscReal *)b;
@@ -96,8 +99,10 @@ static PetscErrorCode JudgeEstimates(cJSON *json, const DriverColumns *c, PetscI
     for (PetscInt k = 0; k < n; k++) {
       const PetscReal estimate = value[k * c->n + c->estimates + e];
 
+      /* No estimate, or no defined error: not a point of this statistic. */
       if (isnan(estimate) || !isfinite(error[k])) continue;
       bounded += error[k] <= estimate;
+      /* Both quotients may have 0 below. */
       worst = PetscMax(worst, error[k] / PetscMax(estimate, PETSC_MIN_REAL));
       ratio[m++] = estimate / PetscMax(error[k], PETSC_MIN_REAL);
     }
@@ -124,6 +129,8 @@ typedef struct {
   PetscInt undefined, failed, fallback;
 } Totals;
 
+/* The speed-up's mean and median are those of the quotients, not the quotient of means, which slow points
+   dominate. */
 static PetscErrorCode Sum(const DriverColumns *c, PetscInt n, const PetscReal value[], Totals *t)
 {
   PetscReal *ratio;
@@ -181,6 +188,8 @@ static PetscErrorCode ReportPaths(cJSON *json, const Totals *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Guards a copy: the table has been written with the errors as they are. A prediction that failed makes the
+   command fail, after its report. */
 PetscErrorCode DriverReportComparison(HycoScene scene, PetscBool contact, const DriverColumns *c, PetscInt n,
                                       const PetscReal given[])
 {

@@ -24,6 +24,8 @@ PetscErrorCode DriverReportCarried(cJSON *json, PetscInt dim, PetscInt n, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The model and its results are on rank 0; names are borrowed from each rank's scene, since addresses cannot be
+   sent. */
 PetscErrorCode DriverGetCarried(HycoROM model, HycoScene scene, PetscInt *n, HycoContactResult **result)
 {
   const HycoContactResult *r = NULL;
@@ -47,6 +49,7 @@ PetscErrorCode DriverGetCarried(HycoROM model, HycoScene scene, PetscInt *n, Hyc
 
 /* The columns of a contact in a table; their names follow the contact's name and a dot. */
 enum { WIDTH = 10 };
+/* One function for names and values: they cannot get out of step. */
 static PetscInt List(PetscInt dim, const HycoContactResult *r, const char *name[WIDTH], PetscReal value[WIDTH])
 {
   static const char *const force[] = {"force_x", "force_y", "force_z"}, *const moment[] = {"moment_x", "moment_y",
@@ -82,6 +85,7 @@ PetscErrorCode DriverCarriedColumns(HycoScene scene, PetscInt dim, DriverCarried
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* n = 0: the model does not have all forces (NaN in tables). */
 void DriverCarriedFill(const DriverCarried *columns, PetscInt n, const HycoContactResult r[], PetscReal v[])
 {
   const char *name[WIDTH];

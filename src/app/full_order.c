@@ -30,6 +30,7 @@ PetscErrorCode DriverReadTarget(HycoErrorKind kind, PetscReal *target)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The scene is read only if full order may be solved: a model needs no scene otherwise. */
 PetscErrorCode DriverReadFallback(HycoROM model, PetscBool extrapolate, Fallback *f)
 {
   HycoROMType type;
@@ -82,6 +83,7 @@ PetscErrorCode DriverEndFallback(Fallback *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The first reason that applies, the strongest first; estimates only against targets that are given. */
 void DriverWantsFullOrder(const Fallback *f, const HycoPrediction *p, char why[DRIVER_LINE])
 {
   why[0] = '\0';
@@ -124,6 +126,7 @@ static void TakeDisplacement(Fallback *f, const HycoSummary *s, HycoPrediction *
   }
 }
 
+/* Rank 0 has the forces. The forces' own estimate stays, those of displacements do not apply any more. */
 PetscErrorCode DriverSolveDisplacement(Fallback *f, HycoROM model, PetscInt n, const PetscReal mu[], HycoPrediction *p)
 {
   const PetscReal *Lambda = NULL;
@@ -147,6 +150,7 @@ PetscErrorCode DriverSolveDisplacement(Fallback *f, HycoROM model, PetscInt n, c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Fills the prediction's fields from full order, so that reports and tables have one form. */
 PetscErrorCode DriverSolveFullOrder(Fallback *f, PetscInt n, const PetscReal mu[], HycoPrediction *p)
 {
   HycoSummary s;

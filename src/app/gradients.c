@@ -2,6 +2,7 @@
 #include "driver.h"
 #include <string.h>
 
+/* scene NULL: only declares the option. */
 PetscErrorCode DriverReadGradient(HycoScene scene, PetscBool *gradient)
 {
   PetscFunctionBegin;
@@ -48,6 +49,7 @@ PetscErrorCode DriverReportGradient(cJSON *json, HycoScene scene, const HycoGrad
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One more column counts the one-sided derivatives of the row. */
 PetscErrorCode DriverGradientColumns(HycoScene scene, DriverGradients *columns)
 {
   const char *outputs[HYCO_MAX_QUANTITIES];

@@ -64,7 +64,8 @@ static const struct {
 };
 #define N_SUBJECTS ((int)(sizeof(subjects) / sizeof(subjects[0])))
 
-/* The length of the longest word of a list with which a name begins. */
+/* The length of the longest word of a list with which a name begins. Words of a list, separated by blanks; the
+   length lets the most specific subject win. */
 static size_t Begins(const char list[], const char name[])
 {
   size_t longest = 0;
@@ -94,6 +95,7 @@ static int SubjectOf(const char name[])
   return best;
 }
 
+/* A name that ends with an underscore stands for many: a NAME follows. */
 static void HelpLine(const HycoOption *o)
 {
   char left[128];
@@ -134,6 +136,7 @@ static void PrintPage(const Page *page, PetscInt n, const HycoOption *list[])
   for (int i = 0; i < 2; i++) printf("    %s\n", page->example[i]);
 }
 
+/* What PrintPage() has printed is NULL in the list. */
 static void PrintSubjects(PetscInt n, const HycoOption *list[])
 {
   for (int s = 0; s < N_SUBJECTS; s++) {
@@ -158,6 +161,7 @@ static void PrintNotes(void)
   printf("Under MPI: mpiexec -n 2 hyco ...\n");
 }
 
+/* command NULL: all commands. Rank 0. */
 PetscErrorCode DriverHelp(const Command *command)
 {
   HycoOptionList own = {0};

@@ -15,6 +15,7 @@ static const char *const sizes[] = {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOC
 /* The value of one of them before MPI begins, which sets some itself: "NAME=VALUE"; "": one rank, or no launcher. */
 static char launched[DRIVER_LINE];
 
+/* PMIX_RANK > 0 shows several processes where no size is given. */
 void DriverNoteLaunch(void)
 {
   const char *rank = getenv("PMIX_RANK");
@@ -27,6 +28,7 @@ void DriverNoteLaunch(void)
   if (!launched[0] && rank && atol(rank) > 0) snprintf(launched, sizeof(launched), "PMIX_RANK=%s", rank);
 }
 
+/* Before MPI, so that rank 0 is known from the launcher's variables only; the nap lets it speak first. */
 PetscBool DriverRefuseEarly(const char text[])
 {
   static const char *const ranks[] = {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", NULL};
@@ -44,7 +46,8 @@ PetscBool DriverRefuseEarly(const char text[])
   return PETSC_FALSE;
 }
 
-/* Whether a folder can be created in this one. */
+/* Whether a folder can be created in this one. By trying: permissions, quotas and read-only mounts have no other
+   common test. */
 static int HoldsFolders(const char *folder)
 {
   char path[DRIVER_LINE];
@@ -81,6 +84,7 @@ PetscBool DriverHasStack(char **argv)
 
   if (getrlimit(RLIMIT_STACK, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY || limit.rlim_cur >= STACK)
     return PETSC_TRUE;
+  /* The limit may be raised by the process itself. */
   if (limit.rlim_max == RLIM_INFINITY || limit.rlim_max >= STACK) {
     limit.rlim_cur = limit.rlim_max == RLIM_INFINITY || limit.rlim_max > USUAL ? USUAL : limit.rlim_max;
     if (setrlimit(RLIMIT_STACK, &limit) == 0) { /* started again, because threads keep the limit of the start */
@@ -93,6 +97,7 @@ PetscBool DriverHasStack(char **argv)
   return DriverRefuseEarly(text);
 }
 
+/* Only where no launcher has set its variables; values that the user has set stay (setenv without overwriting). */
 void DriverStartAlone(void)
 {
   static const char *const launched_by[] = {"OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK", "PMI_FD", "PMI_ID", NULL};
@@ -117,6 +122,7 @@ void DriverStartAlone(void)
   ChooseTemporary();
 }
 
+/* MPI_Init() of the wrong MPI makes N separate runs, which would write the same files. */
 PetscErrorCode DriverCheckLaunch(void)
 {
   PetscMPIInt size;
@@ -143,6 +149,7 @@ static const char *KernelsOfProcessor(void)
   return NULL;
 }
 
+/* OpenBLAS takes its oldest kernels on processors that it does not know. */
 void DriverChooseKernels(char **argv)
 {
   static const char choice[] = "OPENBLAS_CORETYPE";
@@ -158,6 +165,8 @@ void DriverChooseKernels(char **argv)
   execv("/proc/self/exe", argv); /* returns only after a failure: hyco then continues unchanged */
 }
 
+/* One thread for each rank unless the user asks for more: threads of all ranks together would exceed the cores. By
+   dlsym(), as any BLAS may be linked. */
 void DriverOneThread(void)
 {
   static const char *const asked[] = {"OPENBLAS_NUM_THREADS", "GOTO_NUM_THREADS", "MKL_NUM_THREADS",

@@ -95,6 +95,7 @@ static void Stop(void)
   }
 }
 
+/* NULL: there is no such command. */
 static const Command *FindCommand(const char name[])
 {
   for (PetscInt k = 0; commands[k].name; k++) {
@@ -103,6 +104,7 @@ static const Command *FindCommand(const char name[])
   return NULL;
 }
 
+/* Before PETSc, which would print its own help for -help. */
 static PetscBool AsksHelp(int argc, char **argv)
 {
   for (int k = 1; k < argc; k++) {
@@ -144,6 +146,8 @@ static int AnswerAtOnce(int argc, char **argv)
   return 1;
 }
 
+/* Checks that cost nothing come first; DriverProgressBegin() starts the thread after them, since a refused run
+   needs none. */
 static PetscErrorCode Run(const Command *command, int argc, char **argv)
 {
   PetscFunctionBegin;
@@ -155,6 +159,7 @@ static PetscErrorCode Run(const Command *command, int argc, char **argv)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* In place of PetscErrorPrintf while PETSc starts: Start() prints one line instead of a trace. */
 static PetscErrorCode PrintNothing(const char format[], ...)
 {
   (void)format;

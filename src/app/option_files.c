@@ -10,7 +10,8 @@
 
 static PetscBool Follow(const char path[], PetscBool yaml, int depth, char problem[HYCO_LINE]);
 
-/* Follows the option files that a line of options names; a quoted name is not followed. */
+/* Follows the option files that a line of options names; a quoted name is not followed. strtok_r() changes the
+   line: callers give a copy. */
 static PetscBool FollowLine(char line[], int depth, char problem[HYCO_LINE])
 {
   const char *before = "";
@@ -55,6 +56,8 @@ static PetscBool Follow(const char path[], PetscBool yaml, int depth, char probl
   return good;
 }
 
+/* The same sources in the same order as PETSc reads them: ~/.petscrc, .petscrc, petscrc, the environment, the
+   command line. */
 PetscBool DriverCheckOptionFiles(int argc, char **argv)
 {
   static const char *const files[] = {".petscrc", "petscrc"};
@@ -80,7 +83,8 @@ PetscBool DriverCheckOptionFiles(int argc, char **argv)
   return good ? good : DriverRefuseEarly(problem);
 }
 
-/* "NAME": the options in the file, if it exists and has any. */
+/* "NAME": the options in the file, if it exists and has any. What the file says belongs to the report: results
+   must be reproducible from it. */
 static void AddFile(cJSON *object, const char path[])
 {
   FILE *file = fopen(path, "r");
@@ -94,6 +98,7 @@ static void AddFile(cJSON *object, const char path[])
   if (n && !cJSON_HasObjectItem(object, path)) cJSON_AddStringToObject(object, path, text);
 }
 
+/* Blank values are none. */
 static void AddEnvironment(cJSON *object, const char name[])
 {
   const char *text = getenv(name);
@@ -101,6 +106,7 @@ static void AddEnvironment(cJSON *object, const char name[])
   if (text && text[strspn(text, " ")]) cJSON_AddStringToObject(object, name, text);
 }
 
+/* Only if there are any: the key is absent in most reports. */
 PetscErrorCode DriverReportOptionFiles(cJSON *json)
 {
   cJSON *object = cJSON_CreateObject();

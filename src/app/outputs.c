@@ -44,6 +44,7 @@ static PetscErrorCode Take(const char what[], const char path[], PetscBool outpu
   taken->what = what;
   PetscCall(PetscStrncpy(taken->path, path, sizeof(taken->path)));
   HycoFileIdentify(path, &taken->identity);
+  /* Compared by device and inode where they exist: links and other names of one file are found. */
   for (const Named *other = outputs; other < taken; other++) {
     const Named *a = output ? other : taken, *b = output ? taken : other;
 
@@ -103,7 +104,8 @@ static PetscErrorCode CheckSceneFile(void)
 
 static const char *const written[] = {"-report", "-table", "-output", "-c", NULL};
 
-/* Checks the written files against those that are read. */
+/* Checks the written files against those that are read. Outputs first, then what is read: each input is compared
+   with all outputs. Called before any file is opened. */
 static PetscErrorCode CheckNames(PetscBool trains)
 {
   static const char *const read[] = {"-points", "-validation_points"};
@@ -134,7 +136,8 @@ static PetscErrorCode CheckNames(PetscBool trains)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Checks that a file can be written at `path`: its folder exists and is writable, or it is a device. */
+/* Checks that a file can be written at `path`: its folder exists and is writable, or it is a device. A precious
+   file is a model or a snapshot: -report m.h5 must not replace hours of work. */
 static PetscErrorCode CheckPlace(const char name[], const char path[], HycoFileKind kind)
 {
   char folder[PETSC_MAX_PATH_LEN];
@@ -182,6 +185,7 @@ PetscErrorCode DriverCheckOutputs(const Command *command)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The mesh is named by the scene, so that it is known only after the scene is read. */
 PetscErrorCode DriverCheckMesh(HycoScene scene)
 {
   const char *mesh;

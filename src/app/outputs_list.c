@@ -477,6 +477,7 @@ static const Written written[] = {
     {"fields", "all", "sealed", "1 x 1", "-", "1: the file was written to its end"},
 };
 
+/* Tab-separated, for scripts: no layout. */
 PetscErrorCode DriverHelpOutput(void)
 {
   PetscFunctionBegin;

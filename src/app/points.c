@@ -11,6 +11,7 @@ static PetscErrorCode ParseNumbers(const char name[], const char text[], PetscIn
 
   PetscFunctionBegin;
   *n = 0;
+  /* A number and a comma take two characters at least. */
   PetscCall(PetscMalloc1(strlen(text) / 2 + 2, values));
   for (;;) {
     char *end;
@@ -25,6 +26,7 @@ static PetscErrorCode ParseNumbers(const char name[], const char text[], PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For messages: "a,b,c". */
 static PetscErrorCode ListNames(HycoScene scene, char list[HYCO_LINE])
 {
   PetscInt n;
@@ -80,7 +82,8 @@ static PetscErrorCode ListRanges(HycoScene scene, char list[DRIVER_LINE])
 /* The positions of a grid's values. TRAINING: the default of training, closed, with the middle for one value. */
 enum { CENTRED, CLOSED, CHEBYSHEV, TRAINING };
 
-/* Sets *type if -grid_type is given. */
+/* Sets *type if -grid_type is given. TRAINING is no word of the option: it is the default of training, which
+   differs from closed for one value. */
 static PetscErrorCode ReadGridType(PetscInt *type)
 {
   static const char *const types[] = {"centred", "closed", "chebyshev", NULL};
@@ -98,7 +101,8 @@ static PetscErrorCode ReadGridType(PetscInt *type)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The numbers of -prefixNAME for each parameter, in new memory, or NULL; how many are given, and a name without. */
+/* The numbers of -prefixNAME for each parameter, in new memory, or NULL; how many are given, and a name without.
+   scene NULL: only declares. `missing` is the last name without a value, for the message. */
 static PetscErrorCode GetNamed(HycoScene scene, const char prefix[], const char meaning[], PetscInt count[],
                                PetscReal *values[], PetscInt *given, const char **missing)
 {
@@ -128,6 +132,7 @@ static PetscErrorCode GetNamed(HycoScene scene, const char prefix[], const char 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Either -mu with all or a -mu_NAME for each: a mixture is refused, since it would not be clear which counts. */
 PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[])
 {
   PetscInt n, m, count[64], given;
@@ -189,6 +194,7 @@ PetscErrorCode DriverHasPoint(HycoScene scene, PetscBool *given)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* By presence alone: the values are read, and checked, later. */
 PetscErrorCode DriverHasSamples(HycoScene scene, PetscBool *given)
 {
   PetscFunctionBegin;
@@ -198,7 +204,8 @@ PetscErrorCode DriverHasSamples(HycoScene scene, PetscBool *given)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The grid that the option `name` gives as `text`; `type` applies unless -grid_type is given. */
+/* The grid that the option `name` gives as `text`; `type` applies unless -grid_type is given. -grid_type applies
+   to any of the grids on the command line. */
 static PetscErrorCode AddGrid(HycoScene scene, HycoSamples samples, const char name[], PetscInt type, const char text[])
 {
   PetscInt n, m, counts[64];
@@ -263,7 +270,8 @@ PetscErrorCode DriverGetValidation(HycoScene scene, HycoSamples *samples)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All combinations of -values_NAME for every parameter. */
+/* All combinations of -values_NAME for every parameter. The order of the points is that of the scene's parameters,
+   the last one fastest. */
 static PetscErrorCode AddValues(HycoScene scene, HycoSamples samples, PetscInt *n_sets)
 {
   PetscInt n, count[64], given;
@@ -284,6 +292,7 @@ static PetscErrorCode AddValues(HycoScene scene, HycoSamples samples, PetscInt *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One number, read as a list so that "3,4" is refused with a message. */
 static PetscErrorCode AddScattered(HycoSamples samples, const char text[])
 {
   PetscInt m;
@@ -299,6 +308,7 @@ static PetscErrorCode AddScattered(HycoSamples samples, const char text[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Exactly one kind of set. closed: the default of training, where the ends of the ranges must be solved. */
 PetscErrorCode DriverGetSamples(HycoScene scene, PetscBool closed, HycoSamples *samples, PetscBool *given)
 {
   char grid[PETSC_MAX_PATH_LEN], points[PETSC_MAX_PATH_LEN], scatter[PETSC_MAX_PATH_LEN];

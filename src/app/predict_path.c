@@ -1,6 +1,8 @@
 /* hyco predict for a model of paths: its output as text, table and report. */
 #include "driver.h"
 
+/* The history is broadcast, since all ranks write the report's arrays; the equilibrium stays on rank 0, which
+   prints it. */
 PetscErrorCode DriverGetReducedPath(HycoROM model, DriverReducedPath *path)
 {
   HycoHistory h = {0};
@@ -22,6 +24,7 @@ PetscErrorCode DriverGetReducedPath(HycoROM model, DriverReducedPath *path)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What the path reached is printed and written, also if it ended early. */
 PetscErrorCode DriverPrintReducedPath(HycoScene scene, const PetscReal mu[], const DriverReducedPath *path,
                                       const char table[])
 {
@@ -71,6 +74,7 @@ static void ReportEquilibrium(cJSON *json, const DriverReducedPath *path)
   ReportVector(object, "contact", e->n, e->contact);
 }
 
+/* Keys as in solve; those on the RID have a prefix. */
 PetscErrorCode DriverReportReducedPath(cJSON *json, HycoScene scene, const DriverReducedPath *path)
 {
   cJSON *history = cJSON_AddObjectToObject(json, "history");

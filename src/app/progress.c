@@ -13,6 +13,7 @@ PetscBool DriverIsQuiet(void)
   return quiet;
 }
 
+/* Called by every command with a report; -progress belongs to the same lines. */
 PetscErrorCode DriverReadQuiet(void)
 {
   PetscReal seconds = 60;
@@ -32,6 +33,7 @@ static char kept_in[PETSC_MAX_PATH_LEN], last_words[2][PETSC_MAX_PATH_LEN + 256]
 static const char *volatile words;
 static volatile sig_atomic_t speaks;
 
+/* Two buffers in turn: a signal may arrive while one is written. */
 static void SetLastWords(const char what[])
 {
   static int next;
@@ -43,12 +45,14 @@ static void SetLastWords(const char what[])
   words = last_words[next];
 }
 
+/* Async-signal-safe: only write() and _exit(). The solutions are on disk already. */
 static void Interrupted(int number)
 {
   if (speaks && words) (void)!write(STDERR_FILENO, words, strlen(words));
   _exit(128 + number);
 }
 
+/* Rank 0 speaks for all; every rank ends. */
 PetscErrorCode DriverCatchInterrupt(const char folder[])
 {
   PetscMPIInt rank;
@@ -63,6 +67,7 @@ PetscErrorCode DriverCatchInterrupt(const char folder[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Holds the progress line first, which would otherwise be in the middle of the text. */
 PetscErrorCode DriverPrint(const char format[], ...)
 {
   PetscMPIInt rank;
@@ -80,6 +85,7 @@ PetscErrorCode DriverPrint(const char format[], ...)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whole per cent where digits would only pretend accuracy, otherwise two digits. */
 void DriverPercent(PetscReal share, char text[32])
 {
   const double percent = 100 * (double)share;
@@ -102,6 +108,7 @@ static void Show(const char word[], PetscInt done, PetscInt n, PetscBool ends)
   char share[64] = "", left[64] = "";
 
   if (last < 0) last = now;
+  /* Another step: the time left is estimated from its own begin. */
   if (begin < 0 || done < first || strcmp(word, before)) {
     begin = now;
     first = done;
@@ -124,6 +131,7 @@ static void Show(const char word[], PetscInt done, PetscInt n, PetscBool ends)
   if (done == n) begin = -1;
 }
 
+/* A HycoProgress of solutions: it also renews the last words. */
 PetscErrorCode DriverProgress(PetscInt done, PetscInt n, void *ctx)
 {
   char share[64];
@@ -146,6 +154,7 @@ PetscErrorCode DriverPhase(const char phase[], PetscInt done, PetscInt n, void *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For a loop of the command itself, on rank 0. */
 PetscErrorCode DriverSetPhase(PetscInt done, PetscInt n)
 {
   PetscMPIInt rank;

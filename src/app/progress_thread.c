@@ -14,6 +14,7 @@ static struct {
   double begin, last, period;
 } progress = {.lock = PTHREAD_MUTEX_INITIALIZER, .ends = PTHREAD_COND_INITIALIZER, .period = 60};
 
+/* The realtime clock, which pthread_cond_timedwait() uses. */
 static double Now(void)
 {
   struct timespec now;
@@ -29,6 +30,7 @@ static void Clear(void)
   progress.bar = PETSC_FALSE;
 }
 
+/* In the thread, with the lock held. HycoLogDoing() is the event of -log_view that the main thread is in. */
 static void PrintStep(double now)
 {
   const char *doing = HycoLogDoing();
@@ -42,6 +44,7 @@ static void PrintStep(double now)
   if (!terminal) progress.last = now;
 }
 
+/* Wakes up at most once a second, so that the end does not wait for it longer. */
 static void *Run(void *unused)
 {
   pthread_mutex_lock(&progress.lock);
@@ -79,6 +82,7 @@ PetscReal DriverProgressPeriod(void)
   return (PetscReal)progress.period;
 }
 
+/* Before any other output: removes an unfinished line, and delays the next. */
 void DriverProgressHold(void)
 {
   pthread_mutex_lock(&progress.lock);
@@ -87,6 +91,7 @@ void DriverProgressHold(void)
   pthread_mutex_unlock(&progress.lock);
 }
 
+/* Joined before MPI ends: the thread must not print afterwards. */
 void DriverProgressEnd(void)
 {
   if (!progress.runs) return;

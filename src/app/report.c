@@ -14,6 +14,7 @@ typedef struct {
   PetscInt used, undefined; /* rows where it is finite, and where it is not */
 } Column;
 
+/* Collective only in that all ranks call it: each has the object, rank 0 writes. */
 PetscErrorCode ReportCreate(const char command[], HycoScene scene, const PetscReal mu[], cJSON **json)
 {
   PetscInt n;
@@ -42,6 +43,7 @@ void ReportNumbers_Private(cJSON *json, PetscInt n, const ReportNumber number[])
   for (PetscInt k = 0; k < n; k++) cJSON_AddNumberToObject(json, number[k].name, number[k].value);
 }
 
+/* Remarks that concern the validity of any result, full order or reduced. */
 PetscErrorCode ReportContacts(cJSON *json, PetscInt n_contacts, PetscInt n_facing, PetscReal overlap, PetscReal sliding)
 {
   PetscFunctionBegin;
@@ -74,6 +76,7 @@ PetscErrorCode ReportQuantities(cJSON *json, HycoScene scene, const PetscReal va
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A quantity whose name is a column's gets a prefix: names of columns must be unique. */
 PetscErrorCode ReportColumns(HycoScene scene, PetscInt n, const char *const columns[], PetscInt *n_all,
                              const char *names[])
 {
@@ -138,6 +141,7 @@ static void AddColumn(cJSON *json, const char name[], PetscInt n, PetscInt n_col
     const PetscReal e = value[k * n_columns + column];
 
     if (value[k * n_columns + converged] < 0.5) continue;
+    /* Infinite, the library's largest numbers and NaN alike. */
     c->undefined += !(e <= PETSC_MAX_REAL / 8);
     if (!(e <= PETSC_MAX_REAL / 8)) continue;
     c->mean += e;
@@ -184,6 +188,7 @@ static PetscInt FindConverged(PetscInt n_columns, const char *const columns[])
   return 0;
 }
 
+/* The table is written even if points failed; the command fails after it, with the number. */
 PetscErrorCode ReportSet(const char command[], const char table[], HycoScene scene, HycoSamples samples,
                          const char *const columns[], const DriverRows *rows, PetscReal seconds)
 {
@@ -212,6 +217,7 @@ PetscErrorCode ReportSet(const char command[], const char table[], HycoScene sce
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Memory is the largest of the run so far, which is why the report is written last. */
 PetscErrorCode ReportWrite(cJSON **json)
 {
   char path[PETSC_MAX_PATH_LEN], *text;

@@ -19,6 +19,7 @@ static PetscErrorCode Append(GreedyLog *log, const char text[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* columns NULL: only the words. mu NULL: empty columns, for a step without a next point. */
 PetscErrorCode DriverFormatPoint(HycoScene scene, const PetscReal mu[], char words[DRIVER_LINE],
                                  char columns[DRIVER_LINE])
 {
@@ -84,6 +85,7 @@ static PetscErrorCode Monitor(const HycoGreedyStep *s, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* scene NULL: only declares the options. */
 PetscErrorCode DriverReadGreedy(HycoScene scene, HycoReducer reducer, HycoSamples *training, GreedyLog *log)
 {
   PetscReal target = 1e-3, max_seconds = 0;
@@ -110,6 +112,7 @@ PetscErrorCode DriverReadGreedy(HycoScene scene, HycoReducer reducer, HycoSample
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A miss only if -target was given, or if there are no points left to add. */
 PetscErrorCode DriverJudgeGreedy(const GreedyLog *log)
 {
   PetscBool asked;

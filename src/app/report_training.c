@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <string.h>
 
+/* Its own function: read only with targets, declared always. The default -1 is not shown. */
 PetscErrorCode DriverReadBudget(PetscInt *budget)
 {
   PetscFunctionBegin;
@@ -57,7 +58,8 @@ static void DescribeErrors(PetscBool path, const PetscReal error[], char text[DR
   }
 }
 
-/* Whether the scene has a history, and thus inelastic strain. */
+/* Whether the scene has a history, and thus inelastic strain. An error of the getter, which has none here, counts
+   as no history. */
 static PetscBool IsPath(const Search *s)
 {
   PetscInt n = 0;
@@ -72,6 +74,7 @@ static PetscInt CountKinds(const Search *s)
   return IsPath(s) ? HYCO_N_ERRORS : HYCO_ERROR_INELASTIC;
 }
 
+/* The table is kept as text and written anew after each attempt: a run that ends early leaves the rows so far. */
 static PetscErrorCode Append(Search *s, const char text[])
 {
   const size_t n = strlen(text);
@@ -105,6 +108,7 @@ static PetscErrorCode AppendRow(Search *s, const HycoAttempt *a)
     }
     PetscCall(Append(s, ",not_converged,seconds,operations,meets,failure\n"));
   }
+  /* No model, or one that was not judged: NaN, not 0. */
   none = (PetscBool)(a->failure[0] || !a->held_out.n);
   at = (size_t)snprintf(row, sizeof(row), "%d,%d,%s,%s,%g,%d,%g,%s,%d,%d,%d,%.6g,%d", (int)++s->n, (int)s->n_points,
                         r->type, r->variant ? r->variant : "", (double)r->pod_tol, (int)r->layers,
@@ -156,7 +160,7 @@ static PetscErrorCode PrintAim(const Search *s, PetscInt n_held)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A HycoAttemptMonitor. */
+/* A HycoAttemptMonitor. Rank 0: HycoAttemptMonitor is called there only. */
 static PetscErrorCode Attempted(const HycoAttempt *a, void *ctx)
 {
   Search *s = (Search *)ctx;
@@ -201,6 +205,7 @@ static PetscErrorCode Added(PetscInt n, PetscInt parameter, PetscBool former, vo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The aim is the library's: the user's targets, or its defaults and limits. */
 PetscErrorCode DriverSetSearch(Search *s, HycoScene scene, HycoReducer reducer, PetscInt n_points)
 {
   PetscFunctionBegin;
@@ -212,7 +217,8 @@ PetscErrorCode DriverSetSearch(Search *s, HycoScene scene, HycoReducer reducer, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reports targets that are not met: a line and the exit status of a miss. */
+/* Reports targets that are not met: a line and the exit status of a miss. One line for each error above its limit,
+   each with what the user can do. */
 static PetscErrorCode Misses(const Search *s, const HycoTraining *t)
 {
   const PetscReal *limit = s->limit;
@@ -281,6 +287,7 @@ static PetscErrorCode PrintOutputs(const Search *s, const HycoTraining *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Errors of the model that is written, at all held-out points, not those of its attempt. */
 PetscErrorCode DriverJudgeModel(const Search *s, const HycoTraining *t)
 {
   char what[DRIVER_LINE], median[DRIVER_LINE], largest[DRIVER_LINE], end[DRIVER_LINE], fresh[DRIVER_LINE] = "";

@@ -3,6 +3,7 @@
 
 #define ADVISED 50 /* steps from which a path is long enough for advice */
 
+/* A HycoStepMonitor: after the first listed time all solvers have read their options. */
 PetscErrorCode DriverMonitorStep(HycoFOM fom, const HycoStep *s, void *ctx)
 {
   DriverPath *path = (DriverPath *)ctx;
@@ -60,6 +61,7 @@ static PetscErrorCode PrintEnd(const HycoHistory *h)
                         (int)cuts, (int)iterations, h->newton, (int)factors));
   if (h->n_orders)
     PetscCall(DriverPrint("; order of convergence %.2f (median of %d)", (double)h->order, (int)h->n_orders));
+  /* Most steps were limited by accuracy, not by convergence: the user may trade one for the other. */
   if (2 * h->n_bound > substeps && substeps >= ADVISED)
     PetscCall(
         DriverPrint("\n%d steps could be longer without -hyco_step_inelastic (1e-3 if not given): a larger one is "
@@ -71,6 +73,7 @@ static PetscErrorCode PrintEnd(const HycoHistory *h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The table of what was reached is written before the failure is reported. */
 PetscErrorCode DriverEndHistory(HycoFOM fom, HycoScene scene, const PetscReal mu[], const char table[])
 {
   HycoHistory h;

@@ -25,6 +25,7 @@ PetscErrorCode DriverMissed(const char format[], ...)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A copy: the list is needed for the status afterwards. */
 void DriverReportMissed(cJSON *json)
 {
   if (missed) cJSON_AddItemToObject(json, "missed", cJSON_Duplicate(missed, cJSON_True));

@@ -55,16 +55,19 @@ static const Column columns[] = {
 };
 enum { N_COLUMNS = sizeof(columns) / sizeof(columns[0]), N_FRICTION = 3 };
 
+/* Those of friction are the last ones. */
 static PetscInt CountColumns(HycoScene scene)
 {
   return HycoSceneHasFriction(scene) ? N_COLUMNS : N_COLUMNS - N_FRICTION;
 }
 
+/* NULL: the quantity has no meaning for that kind of path. */
 static const char *NameOf(const Column *c, PetscBool reduced)
 {
   return reduced ? c->reduced : c->full;
 }
 
+/* By offset: one table describes columns, report and struct. */
 static PetscReal ValueOf(const Column *c, const HycoStep *s)
 {
   const char *at = (const char *)s + c->at;
@@ -83,6 +86,7 @@ PetscErrorCode DriverPrintStep(const HycoStep *s, PetscInt n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* mu in each row: tables of several paths can be put together. */
 PetscErrorCode DriverWriteSteps(const char table[], HycoScene scene, const PetscReal mu[], PetscBool reduced,
                                 PetscInt n, const HycoStep step[])
 {

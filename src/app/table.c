@@ -18,6 +18,7 @@ typedef struct {
   const DriverRows *rows;
 } Table;
 
+/* Zero rows: a point that is not reached has converged = 0. */
 PetscErrorCode DriverRowsAdd(DriverRows *rows, PetscInt first, PetscInt n, PetscReal **value)
 {
   PetscFunctionBegin;
@@ -36,6 +37,7 @@ PetscErrorCode DriverRowsFree(DriverRows *rows)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For results that every rank has: rank 0's are written. */
 DriverRows DriverRowsOfRoot(PetscInt n, PetscInt width, PetscReal value[], DriverPiece *piece)
 {
   PetscMPIInt rank;
@@ -57,7 +59,8 @@ static size_t FormatRow(const Table *t, PetscInt k, const PetscReal value[], cha
   return at;
 }
 
-/* Writes a piece of the rank `owner` (NULL on the others) on rank 0. */
+/* Writes a piece of the rank `owner` (NULL on the others) on rank 0. Point to point between the owner and rank 0,
+   block by block: no rank needs room for another's rows. */
 static PetscErrorCode WritePiece(const Table *t, PetscMPIInt owner, const DriverPiece *piece, FILE *stream)
 {
   const MPI_Comm comm = PETSC_COMM_WORLD;
@@ -99,7 +102,8 @@ static void WriteHead(const Table *t, FILE *stream)
     fprintf(stream, "%s%c", t->names[c], c < t->rows->width - 1 ? ',' : '\n');
 }
 
-/* CSV, piece by piece in the order of their rows. */
+/* CSV, piece by piece in the order of their rows. Ranks agree on the piece with the smallest first row, by
+   MPI_MINLOC: a rank's own pieces ascend. */
 static PetscErrorCode WriteText(const char path[], const Table *t)
 {
   const DriverRows *rows = t->rows;
@@ -126,7 +130,8 @@ static PetscErrorCode WriteText(const char path[], const Table *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Parameter `par`, or column `c` if par < 0, as a dataset; each rank writes its rows. */
+/* Parameter `par`, or column `c` if par < 0, as a dataset; each rank writes its rows. Collective writes: as many
+   rounds as the rank with the most pieces has, with empty ones for the others. */
 static PetscErrorCode WriteColumn(HycoH5 file, const Table *t, PetscInt rounds, PetscInt par, PetscInt c)
 {
   const DriverRows *rows = t->rows;
@@ -164,6 +169,7 @@ static PetscErrorCode WriteColumns(const char path[], const Table *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* By the ending of the name. */
 PetscErrorCode DriverWriteTable(const char path[], HycoScene scene, const PetscReal mu[], const char *const names[],
                                 const DriverRows *rows)
 {

@@ -36,6 +36,8 @@ static PetscErrorCode SetHash(const HycoActiveSet *e, const PetscBool active[], 
   PetscFunctionBegin;
   mine = *hash = HycoSetHash(e->n, active);
   if (e->comm == MPI_COMM_NULL) PetscFunctionReturn(PETSC_SUCCESS);
+  /* The first contact's number tells the ranks apart: without it, equal sets on two ranks would cancel in the
+     exclusive or. */
   mine = HycoHash(mine, &e->first, sizeof(e->first));
   PetscCallMPI(MPI_Allreduce(&mine, hash, 1, MPI_UNSIGNED_LONG_LONG, MPI_BXOR, e->comm));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -51,6 +53,7 @@ static PetscErrorCode Met(const HycoActiveSet *e, const PetscBool active[], Pets
   }
   PetscCall(SetHash(e, active, &h->past[its]));
   *met = PETSC_FALSE;
+  /* All hashes are compared: iterations are tens, and a solve on a set costs much more. */
   for (PetscInt t = h->since; t < its; t++) *met = (PetscBool)(*met || h->past[t] == h->past[its]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -72,6 +75,7 @@ static PetscErrorCode Change(const HycoActiveSet *e, const History *h, PetscBool
   PetscFunctionBegin;
   *changes = 0;
   if (h->one) {
+    /* Numbers over all ranks: which contact changes does not depend on the partition. */
     for (PetscInt i = 0; i < e->n; i++) last = h->violates[i] ? e->first + i : last;
     PetscCall(Reduce(e, MPI_MAX, &last));
   }
@@ -131,8 +135,10 @@ PetscErrorCode HycoActiveSetRun(const HycoActiveSet *e, PetscBool active[], Pets
     (*its)++;
     PetscCall(Step(e, *its, &h, active, &changes, &singular));
     if (singular) *status = HYCO_LCP_SINGULAR;
+    /* Singular: the status ends the loop. Changes: the next set is solved. */
     if (singular || changes) continue;
     more = PETSC_FALSE;
+    /* A form may have solved a coarser or an inexact problem: more says that another round of sets follows. */
     if (e->settled) PetscCall(e->settled(e->ctx, &more));
     if (more)
       h.since = *its;

@@ -57,6 +57,7 @@ PetscErrorCode HycoBlocksCreateNonnegative(PetscInt n, HycoBlocks **blocks)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The cones by reference; NULL-safe. */
 PetscErrorCode HycoBlocksDestroy(HycoBlocks **blocks)
 {
   HycoBlocks *b = *blocks;
@@ -85,6 +86,7 @@ static PetscErrorCode GatherAll(MPI_Comm comm, PetscInt n, const void *mine, MPI
     offsets[r] = total;
     total += counts[r];
   }
+  /* At least one byte, so that an empty list has an array to free. */
   PetscCall(PetscMalloc((size_t)total * size + 1, &items));
   PetscCallMPI(MPI_Allgatherv(mine, count, type, items, counts, offsets, type, comm));
   PetscCall(PetscFree2(counts, offsets));
@@ -117,6 +119,7 @@ PetscErrorCode HycoBlockProject(const HycoBlocks *b, PetscInt k, const PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* J: size x size, row by row. */
 PetscErrorCode HycoBlockDerivative(const HycoBlocks *b, PetscInt k, const PetscReal y[], PetscReal J[])
 {
   const HycoCone cone = b->cone[b->of[k]];
@@ -160,6 +163,7 @@ PetscErrorCode HycoBlocksNaturalMap(const HycoBlocks *b, PetscReal rho, const Pe
     for (PetscInt i = 0; i < size; i++) y[i] = r[first + i] - rho * w[first + i];
     PetscCall(HycoBlockProject(b, k, y, z));
     PetscCall(HycoBlockProject(b, k, r + first, own));
+    /* The first component is the normal force: by how much the law would raise it, where contacts penetrate. */
     map->missing = Most(map->missing, z[0] - r[first]);
     for (PetscInt i = 0; i < size; i++) {
       map->map = Most(map->map, PetscAbsReal(z[i] - r[first + i]));

@@ -25,6 +25,7 @@ PetscErrorCode HycoSetFactorCreate(PetscInt n, HycoSetFactor *factor)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* NULL-safe. */
 PetscErrorCode HycoSetFactorDestroy(HycoSetFactor *factor)
 {
   HycoSetFactor f = *factor;
@@ -86,6 +87,8 @@ static PetscErrorCode Append(HycoSetFactor f, const PetscReal M[], PetscInt k, P
     for (PetscInt i = PetscMax(j, f->k); i < k; i++) f->L[(size_t)j * n + (size_t)i] = column[f->a[i]];
   }
   if (old) {
+    /* New rows X of L: X L_old^T = M_new,old; then the corner's Schur complement M_new,new - X X^T, whose factor
+       completes L. */
     BLAStrsm_("R", "L", "T", "N", &more, &old, &one, f->L, &ld, rows, &ld);
     BLASsyrk_("L", "N", &more, &old, &minus, rows, &ld, &one, corner, &ld);
   }
@@ -94,8 +97,10 @@ static PetscErrorCode Append(HycoSetFactor f, const PetscReal M[], PetscInt k, P
   for (PetscInt j = f->k; j < k && *regular; j++) {
     const PetscReal pivot = f->L[(size_t)j * n + (size_t)j], diagonal = M[(size_t)f->a[j] * n + (size_t)f->a[j]];
 
+    /* The pivot squared is what is left of M_jj once the contacts before are closed. */
     *regular = (PetscBool)(pivot * pivot > tol * diagonal); /* false for NaN */
   }
+  /* After a failure the caller changes the set by pivoting; what potrf has overwritten is of no use. */
   f->k = *regular ? k : 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -112,6 +117,7 @@ PetscErrorCode HycoSetFactorSolve(HycoSetFactor f, const PetscReal M[], const Pe
   *regular = PETSC_TRUE;
   if (count > f->k) PetscCall(Append(f, M, count, tol, regular));
   if (!*regular) PetscFunctionReturn(PETSC_SUCCESS);
+  /* In the order of the factor: f->a has all k contacts of the set, since count = k. */
   for (PetscInt j = 0; j < k; j++) f->x[j] = -q[f->a[j]];
   PetscCall(PetscBLASIntCast(k, &n));
   PetscCall(PetscBLASIntCast(f->n, &ld));

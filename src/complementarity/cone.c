@@ -17,6 +17,7 @@ PetscErrorCode HycoConeCreate(MPI_Comm comm, HycoCone *cone)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* NULL-safe; one reference, as of any PETSc object. */
 PetscErrorCode HycoConeDestroy(HycoCone *cone)
 {
   PetscFunctionBegin;
@@ -41,6 +42,7 @@ PetscErrorCode HycoConeSetSize(HycoCone cone, PetscInt size)
 
 HycoDefineMethod(HycoConeGetSize, (HycoCone cone, PetscInt *size), cone, HYCO_CONE_CLASSID, *size = cone->size)
 
+/* Once for each cone: data and size of blocks that were made with it would no longer fit. */
 PetscErrorCode HycoConeSetType(HycoCone cone, HycoConeType type)
 {
   PetscErrorCode (*create)(HycoCone);
@@ -81,6 +83,7 @@ PetscErrorCode HycoConeSetOps(HycoCone cone, const struct _HycoConeOps *ops, Pet
 HycoDefineMethod(HycoConeSetData, (HycoCone cone, void *data), cone, HYCO_CONE_CLASSID, cone->data = data)
 HycoDefineMethod(HycoConeGetData, (HycoCone cone, void *data), cone, HYCO_CONE_CLASSID, *(void **)data = cone->data)
 
+/* Collective on the viewer. */
 PetscErrorCode HycoConeView(HycoCone cone, PetscViewer viewer)
 {
   PetscFunctionBegin;
@@ -95,6 +98,7 @@ HycoDefineViewFromOptions(HycoCone, HYCO_CONE_CLASSID)
 
 /* -- each component is nonnegative -- */
 
+/* The nearest point of the orthant. */
 static PetscErrorCode Project(HycoCone cone, const PetscReal data[], const PetscReal y[], PetscReal z[])
 {
   PetscFunctionBegin;

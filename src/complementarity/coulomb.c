@@ -8,6 +8,7 @@
 */
 #include <hycoconeimpl.h>
 
+/* |y_t|, 0 in a block of the normal component alone. */
 static PetscReal Tangential(PetscInt size, const PetscReal y[])
 {
   PetscReal sum = 0;
@@ -16,6 +17,7 @@ static PetscReal Tangential(PetscInt size, const PetscReal y[])
   return PetscSqrtReal(sum);
 }
 
+/* Not the projection onto a fixed convex set: the radius depends on y_n itself, so that J is not symmetric. */
 static PetscErrorCode Project(HycoCone cone, const PetscReal data[], const PetscReal y[], PetscReal z[])
 {
   const PetscReal length = Tangential(cone->size, y);
@@ -42,6 +44,8 @@ static PetscErrorCode Derivative(HycoCone cone, const PetscReal data[], const Pe
       J[i * size + i] = 1;
       continue;
     }
+    /* Slip: dz_t/dy_n = mu y_t / |y_t|; along the direction of slip z_t does not change with y_t, so that in 2D this
+       is the row's only entry. */
     J[i * size] = y[0] > 0 ? data[0] * (y[i] / length) : 0;
     for (PetscInt j = 1; j < size && size > 2; j++)
       J[i * size + j] = radius / length * ((i == j) - (y[i] / length) * (y[j] / length));
@@ -49,6 +53,7 @@ static PetscErrorCode Derivative(HycoCone cone, const PetscReal data[], const Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* mu = 0 and the threshold of the last forces (Tresca's law): with it P is the projection onto a fixed convex set. */
 static PetscErrorCode Freeze(HycoCone cone, const PetscReal data[], const PetscReal r[], PetscReal frozen[])
 {
   PetscFunctionBegin;

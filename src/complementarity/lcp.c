@@ -21,6 +21,8 @@ static PetscReal Slack(const Dense *d, const PetscBool active[])
     d->w[i] = q[i];
     size = PetscMax(size, PetscAbsReal(q[i]));
   }
+  /* Only the slacks of open contacts count: with most contacts closed, their few rows cost less than the set's
+     columns. */
   if (d->lcp->symmetric && d->k > n - d->k) { /* few rows, read as columns of the symmetric M */
     for (PetscInt i = 0; i < n; i++) {
       const PetscReal *row = M + (size_t)i * (size_t)n;
@@ -47,6 +49,8 @@ static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool 
   PetscFunctionBegin;
   for (PetscInt i = 0; i < d->lcp->n; i++) size_z = PetscMax(size_z, PetscAbsReal(d->z[i]));
   for (PetscInt i = 0; i < d->lcp->n; i++) {
+    /* 1e-9 is far above the pivots that count as dependent (1e-12): a contact that was set aside would otherwise
+       come back for round-off, and cycle. */
     const PetscReal tol = d->aside[i] ? 1e-9 : 1e-13;
 
     violates[i] = (PetscBool)(active[i] ? d->z[i] < -tol * size_z : d->w[i] < -tol * size_w);
@@ -70,6 +74,7 @@ static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singu
   for (PetscInt i = 0; i < lcp->n; i++) d->aside[i] = active[i];
   for (PetscInt j = 0; j < d->k; j++) d->aside[d->a[j]] = PETSC_FALSE;
   for (PetscInt i = 0; i < lcp->n; i++) {
+    /* Open for the loop, so that its gap is watched: it must be closed by the others. */
     if (d->aside[i]) active[i] = PETSC_FALSE;
     d->n_aside += d->aside[i];
   }

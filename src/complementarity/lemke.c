@@ -57,6 +57,7 @@ static PetscErrorCode DictionaryCreate(PetscInt n, const PetscReal M[], const Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Also of one whose run ended early: no state is left outside it. */
 static PetscErrorCode DictionaryDestroy(Dictionary *d)
 {
   PetscFunctionBegin;
@@ -136,6 +137,7 @@ static PetscErrorCode Pivot(Dictionary *d, PetscInt r, PetscInt c)
   PetscFunctionBegin;
   PetscCall(FetchRow(d, r));
   for (PetscInt k = 0; k < d->waiting; k++)
+    /* Row r and column c are replaced below as a whole: the collected pivots must not act on their new entries. */
     d->U[(size_t)k * (size_t)n + (size_t)r] = d->V[(size_t)k * (size_t)(n + 1) + (size_t)c] = 0;
   for (PetscInt j = 0; j <= n; j++) d->T[(size_t)j * (size_t)n + (size_t)r] = -d->row[j] / p;
   for (PetscInt i = 0; i < n; i++) {
@@ -195,6 +197,7 @@ static PetscInt Leaving(Dictionary *d)
     largest = PetscMax(largest, PetscAbsReal(d->value[i]));
   }
   for (PetscInt i = 0; i < d->n; i++) {
+    /* Values below 0 are round-off of degenerate rows: their step is 0, not negative. */
     if (d->column[i] < -1e-11 * size) step = PetscMin(step, PetscMax(d->value[i], 0) / -d->column[i]);
   }
   for (PetscInt i = 0; i < d->n; i++) {
@@ -220,6 +223,7 @@ static PetscErrorCode Run(Dictionary *d, PetscInt row, PetscInt max_its, PetscIn
       *status = HYCO_LCP_SOLVED;
       break;
     }
+    /* w_i left: z_i enters; z_i left: w_i enters. */
     col = -1 - d->where[left < n ? left + n : left - n]; /* the complement of the variable that left enters */
     PetscCall(FetchColumn(d, col));
     row = Leaving(d);
@@ -265,6 +269,7 @@ static PetscErrorCode Unpack(const Dictionary *d, const PetscReal M[], const Pet
     z[i] = 0;
     if (d->where[d->n + i] < 0) continue;
     z[i] = PetscMax(d->value[d->where[d->n + i]], 0) * scale;
+    /* The support of z alone: degenerate contacts, basic with the value 0, may make M_aa singular. */
     if (z[i] > 0) a[k++] = i;
   }
   PetscCall(HycoLCPSolveOnSet(d->n, M, q, PETSC_FALSE, NULL, &k, a, fresh, &singular));
@@ -291,9 +296,11 @@ PetscErrorCode HycoLCPLemke(PetscInt n, const PetscReal M[], const PetscReal q[]
   for (PetscInt i = 0; i < n; i++) {
     size_M = PetscMax(size_M, PetscAbsReal(M[(size_t)i * (size_t)n + (size_t)i]));
     size_q = PetscMax(size_q, PetscAbsReal(q[i]));
+    /* z0 enters with the value at which all of q + Cover z0 are >= 0; the row that then is 0 leaves. */
     if (q[i] < 0 && (row < 0 || q[i] / Cover(i) <= q[row] / Cover(row)))
       row = i; /* the last of equal ones: lexicographic rule */
   }
+  /* q >= 0: z = 0 is the solution. */
   if (row < 0) PetscFunctionReturn(PETSC_SUCCESS);
   if (size_M == 0) size_M = 1;
   PetscCall(DictionaryCreate(n, M, q, size_M, size_q, &d));

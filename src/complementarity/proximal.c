@@ -50,11 +50,13 @@ static void SetSprings(Proximal *h)
     for (PetscInt j = 0; j < h->m; j++) {
       const PetscReal *A = Column(h, j), *S = A + h->p;
 
+      /* 1 / S_jj is the stiffness of contact j, A_ij its arm on unknown i. */
       if (S[j] > 0) h->kappa[i] = PetscMax(h->kappa[i], SOFT * A[i] * A[i] / S[j]);
     }
     most = PetscMax(most, h->kappa[i]);
   }
   for (PetscInt i = 0; i < h->p; i++) {
+    /* An unknown that no contact moves: any spring does, as the load on it must be 0 for an equilibrium. */
     if (h->kappa[i] == 0) h->kappa[i] = most > 0 ? most : 1;
   }
 }
@@ -114,6 +116,7 @@ static PetscErrorCode SolveForces(Proximal *h, PetscBool active[], PetscReal L[]
   }
   PetscCall(HycoLCPActiveSet(&held, active, L, &more, status));
   *its += more;
+  /* S + A^T A / kappa is semidefinite at least, for which Lemke's method ends with a solution if there is one. */
   if (*status != HYCO_LCP_SOLVED) {
     PetscCall(HycoLCPLemke(h->m, h->S, h->gap, 50 * (h->m + 10), L, &more, status));
     *its += more;
@@ -133,6 +136,7 @@ static PetscBool Balanced(const Proximal *h, const PetscReal L[])
   PetscReal most = 0;
   PetscBool all = PETSC_TRUE;
 
+  /* The first pass finds the largest size, with which the second one compares. */
   for (PetscInt pass = 0; pass < 2; pass++) {
     for (PetscInt i = 0; i < h->p; i++) {
       PetscReal size = PetscAbsReal(h->lcp->q[i]);
@@ -170,6 +174,7 @@ static PetscBool Escapes(Proximal *h, const PetscReal L[], PetscReal *far)
     if (closing <= TANGENT * size) continue;
     none = PETSC_FALSE;
     for (PetscInt k = 0; k < h->m; k++) w += S[k] * L[k];
+    /* A closed contact that the step would close further forbids any extra way. */
     *far = L[j] > 0 ? 0 : PetscMin(*far, PetscMax(w, 0) / closing);
   }
   if (none) *far = 0;
@@ -187,6 +192,7 @@ static PetscErrorCode Iterate(Proximal *h, PetscBool active[], PetscReal L[], Pe
   for (PetscInt k = 0; k < MOST_ITS; k++) {
     PetscCall(SolveForces(h, active, L, its, status));
     if (*status != HYCO_LCP_SOLVED || Balanced(h, L)) PetscFunctionReturn(PETSC_SUCCESS);
+    /* LIMIT stands until a further step balances the forces; it is what the caller sees after MOST_ITS. */
     *status = Escapes(h, L, &far) ? HYCO_LCP_RAY : HYCO_LCP_LIMIT;
     if (*status == HYCO_LCP_RAY) PetscFunctionReturn(PETSC_SUCCESS);
     for (PetscInt i = 0; i < h->p; i++) h->centre[i] = h->x[i] + far * h->step[i];

@@ -46,6 +46,7 @@ static PetscErrorCode Solve(PetscInt k, PetscReal A[], PetscBool symmetric, Pets
   for (PetscInt j = 0; j < k; j++) {
     const PetscReal pivot = PetscAbsReal(A[(size_t)j * (size_t)k + (size_t)j]);
 
+    /* Squares of Cholesky's diagonal are the pivots that LU has: one tolerance serves both. */
     least = PetscMin(least, symmetric ? pivot * pivot : pivot);
     most = PetscMax(most, symmetric ? pivot * pivot : pivot);
   }
@@ -87,6 +88,7 @@ static PetscErrorCode Reveal(PetscInt k, PetscReal A[], const PetscReal gap[], P
     const PetscReal *column = A + (size_t)p * (size_t)k, pivot = column[p];
 
     kept[p] = PETSC_TRUE;
+    /* Kept columns are not read again. */
     for (PetscInt j = 0; j < k; j++) row[j] = kept[j] ? 0 : A[(size_t)j * (size_t)k + (size_t)p] / pivot;
     for (PetscInt j = 0; j < k; j++) {
       if (row[j] == 0) continue;
@@ -114,6 +116,7 @@ PetscErrorCode HycoGramRank(PetscInt k, PetscReal A[], PetscInt *rank)
   for (PetscInt j = 0; j < k; j++) {
     for (PetscInt i = 0; i < k; i++) A[(size_t)j * (size_t)k + (size_t)i] *= d[i] * d[j];
   }
+  /* All gaps 0 from here: the order of pivots follows from the diagonal alone. */
   PetscCall(PetscArrayzero(d, k));
   PetscCall(Reveal(k, A, d, kept));
   for (PetscInt j = 0; j < k; j++) *rank += kept[j];
@@ -157,6 +160,8 @@ PetscErrorCode HycoLCPSolveOnSet(PetscInt n, const PetscReal M[], const PetscRea
   if (!regular) {
     PetscCall(PetscMalloc2(*k, &d, *k, &kept));
     CopyScaled(n, M, *k, a, A, d);
+    /* The gaps in the scale of the matrix; equal pivots with different gaps are repeated contacts, of which the
+       smallest gap binds. */
     for (PetscInt j = 0; j < *k; j++) d[j] *= q[a[j]];
     PetscCall(Reveal(*k, A, d, kept));
     for (PetscInt j = 0; j < *k; j++) {
@@ -164,6 +169,7 @@ PetscErrorCode HycoLCPSolveOnSet(PetscInt n, const PetscReal M[], const PetscRea
     }
     PetscCall(PetscFree2(d, kept));
     *k = n_kept;
+    /* Tolerance 0: the pivoting has chosen the set already; only a failed factor counts. */
     if (n_kept) PetscCall(TrySet(n, M, q, symmetric, 0, n_kept, a, A, z, &regular));
     *singular = (PetscBool)(n_kept && !regular);
   }

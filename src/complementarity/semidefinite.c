@@ -61,6 +61,7 @@ static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singu
     least = PetscMin(least, PetscAbsReal(A[j * k + j]));
     most = PetscMax(most, PetscAbsReal(A[j * k + j]));
   }
+  /* The scaled matrix has entries of order one; the negation also catches NaN. */
   *singular = (PetscBool)(info != 0 || !(least > 1e-13 * PetscMax(most, 1)));
   PetscCall(PetscArrayzero(h->z, h->n));
   if (!*singular) {
@@ -85,6 +86,7 @@ static PetscReal Slack(const Floating *h)
 
     for (PetscInt i = h->p; i < h->n; i++) h->w[i] += column[i] * h->z[h->a[j]];
   }
+  /* Gaps may all be 0 while bodies move: round-off of w is then that of the motions. */
   for (PetscInt i = 0; i < h->p; i++) size = PetscMax(size, PetscAbsReal(h->z[i]));
   return size;
 }
@@ -123,6 +125,7 @@ static PetscErrorCode Continue(const HycoActiveSet *e, const HycoLCP *lcp, Petsc
   exact = (PetscBool)!exact;
   if (exact) PetscCall(Violations(h, active, violates));
   for (PetscInt i = 0; exact && i < h->m; i++) exact = (PetscBool)!violates[i];
+  /* SolveOnSet() has overwritten both z and, of idle contacts, the set. */
   if (!exact) PetscCall(PetscArraycpy(z, found, h->n));
   if (!exact) PetscCall(PetscArraycpy(active, set, h->m));
   HycoFreeAll(&found, &set, &violates);

@@ -49,6 +49,7 @@ typedef struct {
 /* The problem that is solved now. */
 static void Pose(Newton *h, const PetscReal M[], const PetscReal q[])
 {
+  /* A factor stays valid while only q changes. */
   if (M != h->M) HycoConeStepSetMatrix(&h->linear, M);
   h->M = M;
   h->q = q;
@@ -70,6 +71,8 @@ static PetscErrorCode SetScales(Newton *h)
     PetscReal mean = 0;
 
     for (PetscInt i = 1; i < size; i++) mean += h->rho[first + i] / (PetscReal)(size - 1);
+    /* One rho for both tangents: the disk of tangential forces is isotropic, and P would depend on the choice of the
+       tangents otherwise. */
     for (PetscInt i = 1; i < size; i++) h->rho[first + i] = mean;
   }
   for (PetscInt i = 0; i < h->n; i++) h->rho[i] = h->rho[i] > 0 ? 1 / h->rho[i] : most > 0 ? 1 / most : 1;
@@ -105,6 +108,8 @@ static PetscErrorCode Evaluate(Newton *h, const PetscReal z[], PetscReal *norm, 
     least = PetscMax(least, PetscAbsReal(h->rho[i] * h->q[i]));
   }
   *norm = PetscSqrtReal(sum);
+  /* Forces that cancel, or vanish, leave round-off of the size of those that would close the gaps, or were there
+     before. */
   *size = most > 0 ? PetscMax(most, GAPS * PetscMax(least, h->start)) : PetscMax(least, GAPS * h->start);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -190,6 +195,7 @@ static PetscErrorCode Improve(Newton *h, PetscReal z[], PetscReal *norm, PetscRe
   *less = PETSC_FALSE;
   PetscCall(HycoConeStepSolve(&h->linear, h->F, PETSC_FALSE, h->step, regular));
   if (*regular) PetscCall(Search(h, z, norm, size, less));
+  /* Nothing to gain from least squares: the step was good, J is regular, or |F| is round-off already. */
   if (*less || !h->linear.nearly_singular || *norm <= ROUNDING * *size) PetscFunctionReturn(PETSC_SUCCESS);
   if (!h->linear.m || h->linear.m > MOST_LEAST) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoConeStepSolve(&h->linear, h->F, PETSC_TRUE, h->step, regular));
@@ -214,6 +220,7 @@ static PetscErrorCode Iterate(Newton *h, PetscReal z[], HycoLCPStatus *status)
     h->its++;
     PetscCall(Show(h, z, changes));
   }
+  /* By the residual alone, whatever ended the loop. */
   *status = norm <= SOLVED * size ? HYCO_LCP_SOLVED : regular ? HYCO_LCP_LIMIT : HYCO_LCP_SINGULAR;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -232,6 +239,7 @@ static PetscErrorCode Sweep(Newton *h, PetscInt sweeps, PetscReal z[])
       const PetscInt first = b->row[k], size = b->row[k + 1] - first;
       PetscReal bound = 0;
 
+      /* The largest row sum bounds the block's largest eigenvalue, so that the step is not longer than its inverse. */
       for (PetscInt i = first; i < first + size; i++) {
         PetscReal sum = 0;
 
@@ -270,6 +278,7 @@ static PetscErrorCode FitMotions(Newton *h, const PetscBool in[], const PetscRea
     for (PetscInt c = 0; c < h->p; c++) A[c * n + m] = h->M[(size_t)c * (size_t)h->n + (size_t)i];
     rhs[m++] = target[i];
   }
+  /* Rows of A beyond m are 0 and change nothing: the dimensions stay those of the arrays. */
   if (m) LAPACKgelss_(&n, &p, &one, A, &n, rhs, &n, value, &tol, &rank, work, &room, &info);
   for (PetscInt c = 0; c < h->p; c++) z[c] = m && info == 0 ? rhs[c] : 0;
   PetscCall(PetscFree4(A, rhs, value, work));
@@ -289,6 +298,7 @@ static PetscErrorCode Consistent(Newton *h, PetscReal z[])
   for (PetscInt k = 0; k < b->n; k++) {
     for (PetscInt i = h->p + b->row[k]; i < h->p + b->row[k + 1]; i++) {
       in[i] = (PetscBool)(z[h->p + b->row[k]] > 0);
+      /* A x = -w closes the gaps that the given forces leave. */
       h->w[i] = -h->w[i];
     }
   }
@@ -306,6 +316,7 @@ static PetscErrorCode ShortenMotions(Newton *h, PetscReal z[])
   PetscCall(PetscCalloc1(h->n, &in));
   for (PetscInt k = 0; k < h->blocks->n; k++) in[h->p + h->blocks->row[k]] = PETSC_TRUE;
   PetscCall(PetscArrayzero(h->w, h->n));
+  /* The gaps that the motions close are kept exactly, by the shortest motions that do so. */
   for (PetscInt c = 0; c < h->p; c++) {
     for (PetscInt i = h->p; i < h->n; i++) h->w[i] += h->M[(size_t)c * (size_t)h->n + (size_t)i] * z[c];
   }
@@ -369,6 +380,7 @@ static PetscErrorCode FromNormal(Newton *h, PetscReal z[], HycoLCPStatus *status
     for (PetscInt i = 0; i < m; i++)
       M[(size_t)j * (size_t)m + (size_t)i] = h->M[(size_t)row[j] * (size_t)h->n + (size_t)row[i]];
   }
+  /* Floating bodies start with all contacts closed (semidefinite.c); others from the contacts with a force. */
   for (PetscInt k = 0; k < b->n; k++) active[k] = (PetscBool)(p > 0 || z[row[k]] > 0);
   normal.M = M;
   normal.q = q;
@@ -394,6 +406,7 @@ static PetscErrorCode FromStick(Newton *h, PetscReal z[], HycoLCPStatus *status)
   PetscFunctionBegin;
   for (PetscInt i = 0; i < h->n; i++)
     h->F[i] = i < h->p || h->M[(size_t)i * (size_t)(h->n + 1)] > 0 ? h->rho[i] * h->q[i] : 0;
+  /* DP = 1: the step from z = 0 is then the solution of w = 0 on all rows. */
   PetscCall(HycoConeStepStick(&h->linear));
   PetscCall(HycoConeStepSolve(&h->linear, h->F, (PetscBool)(h->linear.m <= MOST_LEAST), h->step, &regular));
   for (PetscInt i = 0; i < h->n; i++) z[i] = regular ? h->step[i] : 0;
@@ -419,6 +432,7 @@ static PetscErrorCode FromFrozen(Newton *h, PetscReal z[], HycoLCPStatus *status
   for (PetscInt c = 0; c < b->n_cones; c++)
     all = (PetscBool)(all && (b->cone[c]->nonnegative || b->cone[c]->ops->freeze));
   if (!all) PetscFunctionReturn(PETSC_SUCCESS);
+  /* A copy with its own data; the cones are shared. */
   PetscCall(HycoBlocksCreate(b->n_cones, b->cone, b->n, b->of, b->data, &frozen));
   h->blocks = frozen;
   for (PetscInt s = 0; s < MOST_FROZEN; s++) {
@@ -476,6 +490,7 @@ static PetscErrorCode Proximal(Newton *h, PetscReal z[], HycoLCPStatus *status)
     done = (PetscBool)(*status != HYCO_LCP_SOLVED);
     Pose(h, h->M0, h->q0);
     PetscCall(Residual(h, z, &norm, &size));
+    /* The status of the original problem, not of the proximal one. */
     *status = norm <= SOLVED * size ? HYCO_LCP_SOLVED : HYCO_LCP_LIMIT;
     done = (PetscBool)(done || norm <= TIGHT * size || (*status == HYCO_LCP_SOLVED && norm > before / 2));
     before = norm;
@@ -523,6 +538,7 @@ static PetscErrorCode ScaleFree(Newton *h, PetscReal z[])
     PetscCall(PetscArraycpy(M, h->M0, n * n));
     PetscCall(PetscArraycpy(q, h->q0, n));
     for (size_t i = 0; i < p; i++) {
+      /* Rows and columns of the free unknowns: M stays [0 A; -A^T W] in structure. */
       q[i] *= h->flexibility;
       z[i] /= h->flexibility;
       for (size_t j = 0; j < n; j++) M[i * n + j] *= h->flexibility;
@@ -565,6 +581,7 @@ PetscErrorCode HycoLCPSemismooth(const HycoLCP *lcp, PetscReal z[], PetscInt *it
   for (PetscInt i = h.p; i < n; i++) h.start = PetscMax(h.start, PetscAbsReal(z[i]));
   PetscCall(Chain(&h, z, status));
   if (lcp->sign) *lcp->sign = 0;
+  /* Before DropRounding() and the scaling back: z is that of h's problem. */
   if (lcp->sign && *status == HYCO_LCP_SOLVED) PetscCall(Sign(&h, z, lcp->sign));
   DropRounding(&h, z);
   for (PetscInt i = 0; i < h.p; i++) z[i] *= h.flexibility;

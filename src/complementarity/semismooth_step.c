@@ -6,6 +6,7 @@
 #define SINGULAR 1e-8  /* least pivot of A relative to the largest: below, least squares may give another step */
 #define ROUNDING 1e-13 /* rows of DP relative to the longest that count as 0 */
 
+/* Room for m = n unknowns: A is n x n at most. blocks and rho are borrowed until Destroy. */
 PetscErrorCode HycoConeStepCreate(PetscInt p, const HycoBlocks *blocks, const PetscReal rho[], HycoConeStep *t)
 {
   const PetscInt n = p + blocks->row[blocks->n];
@@ -26,12 +27,14 @@ PetscErrorCode HycoConeStepDestroy(HycoConeStep *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* M is borrowed; its size is that of Create. */
 void HycoConeStepSetMatrix(HycoConeStep *t, const PetscReal M[])
 {
   t->M = M;
   t->factored = PETSC_FALSE;
 }
 
+/* Runs of nonzero entries are multiplied at once: forces are 0 at open contacts, which are often most. */
 PetscErrorCode HycoAddDenseProduct(PetscInt n, const PetscReal M[], const PetscReal x[], PetscReal y[])
 {
   const PetscBLASInt rows = (PetscBLASInt)n, each = 1;
@@ -41,6 +44,7 @@ PetscErrorCode HycoAddDenseProduct(PetscInt n, const PetscReal M[], const PetscR
   for (PetscInt j = 0, end; j < n; j = end + 1) {
     PetscBLASInt columns;
 
+    /* x[end] is 0 or beyond the end: the next run starts after it. */
     for (end = j; end < n && x[end] != 0; end++) continue;
     columns = (PetscBLASInt)(end - j);
     if (columns) BLASgemv_("N", &rows, &columns, &one, M + (size_t)j * (size_t)n, &rows, x + j, &each, &one, y, &each);
@@ -132,6 +136,8 @@ static PetscInt FindUnknowns(HycoConeStep *t)
   return changes;
 }
 
+/* Entries of DP are compared exactly: a step between the same states of contacts without slip in 3D has the same DP,
+   and keeps the factor. */
 PetscErrorCode HycoConeStepDerive(HycoConeStep *t, const HycoBlocks *blocks, const PetscReal y[], PetscInt *changes)
 {
   PetscBool same = t->factored;
@@ -159,6 +165,7 @@ PetscErrorCode HycoConeStepStick(HycoConeStep *t)
     const PetscInt first = t->p + t->blocks->row[k], size = t->blocks->row[k + 1] - t->blocks->row[k];
 
     for (PetscInt i = 0; i < size; i++)
+      /* A row without flexibility stays out: its equation w = 0 could not be met by its own force. */
       t->DP[k * HYCO_BLOCK + i * (size + 1)] = t->M[(size_t)(first + i) * (size_t)(t->n + 1)] > 0;
   }
   (void)FindUnknowns(t);
@@ -167,9 +174,11 @@ PetscErrorCode HycoConeStepStick(HycoConeStep *t)
 
 /* -- A and its factor -- */
 
+/* Column by column; each entry has at most size^2 products, as rows of L^T and columns of E are those of one block. */
 static void Assemble(HycoConeStep *t)
 {
   const PetscInt m = t->m;
+  /* Free unknowns have E = L = 1: 1 - L^T E is 0 there. */
   PetscInt a = t->p;
 
   for (PetscInt c = 0; c < m; c++) {
@@ -210,6 +219,7 @@ static void Factor(HycoConeStep *t)
   const PetscBLASInt m = (PetscBLASInt)t->m;
   PetscReal least = PETSC_MAX_REAL, most = 0;
 
+  /* Kept while DP and M are the same. */
   if (t->factored) return;
   Assemble(t);
   t->info = 0;
@@ -233,6 +243,7 @@ static PetscErrorCode LeastSquares(HycoConeStep *t, PetscBLASInt *info)
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(m, &value, lwork, &work));
   Assemble(t);
+  /* gelss overwrites A. */
   t->factored = PETSC_FALSE;
   LAPACKgelss_(&m, &m, &one, t->A, &m, t->rhs, &m, value, &tol, &rank, work, (PetscBLASInt *)&lwork, info);
   PetscCall(PetscFree2(value, work));
@@ -282,6 +293,7 @@ PetscErrorCode HycoConeStepSign(HycoConeStep *t, PetscInt *sign)
 {
   PetscFunctionBegin;
   Factor(t);
+  /* det A is the product of U's diagonal, with a change of sign for each exchange of rows; det A = det J. */
   *sign = t->info == 0;
   for (PetscInt a = 0; a < t->m; a++) {
     if (t->A[(size_t)a * (size_t)(t->m + 1)] < 0) *sign = -*sign;

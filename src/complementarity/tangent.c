@@ -22,6 +22,7 @@ struct _n_HycoTangent {
   PetscBLASInt *ipiv;
 };
 
+/* NULL-safe; also of one whose creation found a singular set. */
 PetscErrorCode HycoTangentDestroy(HycoTangent *tangent)
 {
   HycoTangent t = *tangent;
@@ -33,6 +34,8 @@ PetscErrorCode HycoTangentDestroy(HycoTangent *tangent)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* L >= 0, w: gaps, n each. size: the scale of gaps and displacements. A force counts if it is not small beside the
+   largest, and its flexibility moves the gap by more than round-off. state: n. */
 PetscErrorCode HycoTangentStates(PetscInt n, const PetscReal L[], const PetscReal w[], PetscReal size,
                                  const PetscReal flexibility[], PetscInt state[])
 {
@@ -49,6 +52,7 @@ PetscErrorCode HycoTangentStates(PetscInt n, const PetscReal L[], const PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A looser question than the state: contacts for which it is false need no row of the derivative. */
 PetscBool HycoTangentMayTouch(PetscReal L, PetscReal w, PetscReal size)
 {
   return (PetscBool)(L > 0 || w <= NEAR * size);
@@ -77,6 +81,7 @@ static PetscErrorCode Factor(HycoTangent t, const PetscReal M[], PetscBool *regu
     for (size_t i = 0; i < m; i++)
       largest =
           PetscMax(largest, PetscAbsReal(M[(size_t)t->set[i] * n + (size_t)t->set[j]]) * PetscMax(t->scale[i], 0));
+    /* Negative marks a row scaled here, so that it does not count as scaled for the others of the loop. */
     t->scale[j] = largest > 0 ? -1 / largest : -1;
   }
   for (size_t j = 0; j < m; j++) t->scale[j] = PetscAbsReal(t->scale[j]);
@@ -99,6 +104,7 @@ static void Solve(HycoTangent t, PetscReal x[])
   const PetscBLASInt m = (PetscBLASInt)t->n_set, one = 1;
   PetscBLASInt info;
 
+  /* No unknown and no closed contact. */
   if (!m) return;
   for (PetscBLASInt i = 0; i < m; i++) x[i] *= t->scale[i];
   LAPACKgetrs_("N", &m, &one, t->lu, &m, t->ipiv, x, &m, &info);
@@ -127,6 +133,7 @@ static PetscErrorCode Condense(HycoTangent t, const PetscReal M[])
     Solve(t, into);
     for (size_t i = 0; i < m; i++) left -= out[i] * into[i];
     for (size_t i = 0; i < m; i++) size += PetscAbsReal(out[i] * into[i]);
+    /* A dropped contact's columns are overwritten by the next one's: into and out hold the kept ones, contiguous. */
     if (left > DEPENDENT * size) t->open[kept++] = t->open[k];
   }
   t->n_open = kept;
@@ -141,6 +148,7 @@ static PetscErrorCode Condense(HycoTangent t, const PetscReal M[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* *regular false: the closed contacts do not determine the solution; only Destroy may follow. M is read here alone. */
 PetscErrorCode HycoTangentCreate(PetscInt p, PetscInt n, const PetscReal M[], const PetscInt state[],
                                  HycoTangent *tangent, PetscBool *regular)
 {
@@ -167,6 +175,7 @@ PetscErrorCode HycoTangentCreate(PetscInt p, PetscInt n, const PetscReal M[], co
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Those that are left after the dependent ones were dropped. */
 PetscInt HycoTangentUndecided(HycoTangent t)
 {
   return t->n_open;
@@ -191,6 +200,8 @@ static void Gaps(HycoTangent t, const PetscReal q[], int sign, PetscReal change[
   }
 }
 
+/* q: change of q along the parameter, p + n; sign: -1 for the derivative to the left, whose conditions 0 <= L' hold
+   for the opposite change. *kink: undecided contacts change with the side. */
 PetscErrorCode HycoTangentSolve(HycoTangent t, const PetscReal q[], int sign, PetscReal z[], PetscBool *kink)
 {
   PetscReal *change, *force;
@@ -204,6 +215,7 @@ PetscErrorCode HycoTangentSolve(HycoTangent t, const PetscReal q[], int sign, Pe
   PetscCall(PetscCalloc2(t->n_open + 1, &change, t->n_open + 1, &force));
   Gaps(t, q, sign, change, kink);
   if (*kink) PetscCall(HycoLCPLemke(t->n_open, t->S, change, 50 + 10 * t->n_open, force, &its, &status));
+  /* Without a solution of the small problem the undecided contacts stay open. */
   for (PetscInt k = 0; k < t->n_open && status == HYCO_LCP_SOLVED; k++) {
     z[t->open[k]] = sign * force[k];
     for (PetscInt i = 0; i < t->n_set; i++)

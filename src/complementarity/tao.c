@@ -101,6 +101,7 @@ static PetscErrorCode ResetDense(HycoTao t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* NULL-safe. Collective on the communicator of Create. */
 PetscErrorCode HycoTaoDestroy(HycoTao *t)
 {
   PetscFunctionBegin;
@@ -180,6 +181,7 @@ static PetscErrorCode ReadOptions(HycoTao t)
    where round-off dominates; larger above, and for first-order types, which may stagnate for a while. */
 static PetscInt Patience(const HycoTao t)
 {
+  /* The scaled problem has a size of one: this is its round-off. */
   if (t->best <= 1e-10) return 5;
   return t->traits & HYCO_TAO_NEWTON && t->best <= 1e-8 ? 20 : 300;
 }
@@ -200,6 +202,7 @@ static PetscErrorCode Objective(Tao tao, Vec y, PetscReal *value, Vec gradient, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* H is set by TaoSetHessian() and the same at all y. */
 static PetscErrorCode Hessian(Tao tao, Vec y, Mat H, Mat P, void *ctx)
 {
   PetscFunctionBegin;
@@ -239,6 +242,7 @@ static PetscErrorCode Converged(Tao tao, void *ctx)
   PetscReal residual;
 
   PetscFunctionBegin;
+  /* First: it has the user's tolerances and the limit of iterations. */
   PetscCall(TaoDefaultConvergenceTest(tao, NULL));
   PetscCall(TaoGetSolutionStatus(tao, &it, NULL, &residual, NULL, NULL, &why));
   if (why != TAO_CONTINUE_ITERATING) PetscFunctionReturn(PETSC_SUCCESS);
@@ -333,6 +337,7 @@ static PetscErrorCode Scale(Mat H, Vec f, Vec lo, Vec hi, Vec y, Vec d, PetscRea
   PetscReal mine = 0, largest = 0, most;
 
   PetscFunctionBegin;
+  /* One loop over the five arrays; d is filled by it. */
   all[0] = f, all[1] = lo, all[2] = hi, all[3] = y, all[4] = d;
   PetscCall(MatGetDiagonal(H, d));
   PetscCall(VecNorm(d, NORM_INFINITY, &most));
@@ -371,6 +376,7 @@ static PetscErrorCode CatchRun(HycoTao t, Vec lo, Vec hi, Vec y, PetscBool krylo
   *solved = PETSC_FALSE;
   PetscCall(HycoCatchBegin());
   caught = Run(t, lo, hi, y, krylov, its, solved);
+  /* After a failure its state is unknown; a Krylov solve was set up for this problem alone. */
   if (caught || !*solved || krylov) {
     const PetscErrorCode more = TaoDestroy(&t->tao);
 
@@ -383,6 +389,7 @@ static PetscErrorCode CatchRun(HycoTao t, Vec lo, Vec hi, Vec y, PetscBool krylo
   *failed = (PetscBool)(caught != 0);
   PetscCall(VecNorm(y, NORM_2, &norm));
   if (PetscIsInfOrNanReal(norm)) PetscCall(VecSet(y, 0));
+  /* TAO may stop at an iterate outside the bounds by round-off. */
   PetscCall(VecMedian(lo, y, hi, y));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -414,9 +421,11 @@ static PetscErrorCode SecondStart(HycoTao t, Vec lo, Vec hi, Vec y, PetscBool kr
 
   PetscFunctionBegin;
   PetscCall(Projected(t, lo, hi, y, &before));
+  /* As good as it gets, in spite of TAO's word. */
   if (before < 1e-10) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecDuplicate(y, &first));
   PetscCall(VecCopy(y, first));
+  /* The interior: all contacts with a force of the scaled problem's size. */
   PetscCall(VecSet(y, 1));
   PetscCall(VecMedian(lo, y, hi, y));
   PetscCall(CatchRun(t, lo, hi, y, krylov, its, solved, &failed));
@@ -449,15 +458,46 @@ PetscErrorCode HycoTaoSolve(HycoTao t, Mat H, Vec f, Vec lo, Vec hi, Vec y, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The bounds of a dense problem's z: none of its p free unknowns and of blocks whose law is no sign, 0 and infinity of
+   the others. They are kept with the Tao. */
+static PetscErrorCode SetForceBounds(HycoTao t, Vec z)
+{
+  const HycoBlocks *blocks = t->lcp->blocks;
+  Vec lo, hi;
+  PetscScalar *l;
+
+  PetscFunctionBegin;
+  if (t->tao->XL && !blocks && t->n_free == t->lcp->p) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecDuplicate(z, &lo));
+  PetscCall(VecDuplicate(z, &hi));
+  PetscCall(VecSet(hi, PETSC_INFINITY));
+  PetscCall(VecGetArrayWrite(lo, &l));
+  for (PetscInt i = 0; i < t->lcp->p + t->lcp->n; i++) l[i] = i < t->lcp->p ? PETSC_NINFINITY : 0;
+  for (PetscInt k = 0; blocks && k < blocks->n; k++) {
+    for (PetscInt i = blocks->row[k]; i < blocks->row[k + 1] && !blocks->cone[blocks->of[k]]->nonnegative; i++)
+      l[t->lcp->p + i] = PETSC_NINFINITY;
+  }
+  PetscCall(VecRestoreArrayWrite(lo, &l));
+  PetscCall(TaoSetVariableBounds(t->tao, lo, hi));
+  t->n_free = blocks ? -1 : t->lcp->p;
+  PetscCall(VecDestroy(&lo));
+  PetscCall(VecDestroy(&hi));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Solves by hyco's own types, unscaled; y: the Tao's solution. Compared with a direct call, an online solve of the
    rope's models (the smallest ones) takes 1 us more, of 10 to 15 us. */
-static PetscErrorCode SolveOwn(HycoTao t, Vec y, PetscInt max_its)
+static PetscErrorCode SolveOwn(HycoTao t, Vec hi, Vec y, PetscInt max_its)
 {
   PetscBool made;
 
   PetscFunctionBegin;
   PetscCall(Prepare(t, y, max_its, &made));
   if (made) PetscCall(ReadOptions(t));
+  if (t->set)
+    PetscCall(TaoSetVariableBounds(t->tao, NULL, hi));
+  else
+    PetscCall(SetForceBounds(t, y));
   PetscCall(TaoSetMaximumIterations(t->tao, max_its)); /* -hyco_tao_max_it is for TAO's types, which this type may
                                                           replace as a fallback */
   PetscCall(TaoSetSolution(t->tao, y));
@@ -465,8 +505,8 @@ static PetscErrorCode SolveOwn(HycoTao t, Vec y, PetscInt max_its)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* hyco's active set with the functions of a form; y has the size of the unknowns only. Collective. */
-PetscErrorCode HycoTaoSolveSet(HycoTao t, const HycoActiveSet *set, PetscBool active[], Vec y, PetscInt *its,
+/* hyco's active set with the functions of a form. Collective. */
+PetscErrorCode HycoTaoSolveSet(HycoTao t, const HycoActiveSet *set, PetscBool active[], Vec hi, Vec y, PetscInt *its,
                                HycoLCPStatus *status)
 {
   PetscFunctionBegin;
@@ -475,7 +515,8 @@ PetscErrorCode HycoTaoSolveSet(HycoTao t, const HycoActiveSet *set, PetscBool ac
   t->active = active;
   t->monitor = set->monitor;
   t->monitor_ctx = set->monitor_ctx;
-  PetscCall(SolveOwn(t, y, set->max_its));
+  PetscCall(SolveOwn(t, hi, y, set->max_its));
+  PetscCall(TaoSetVariableBounds(t->tao, NULL, NULL)); /* hi is as large as y: not kept */
   *its = t->its;
   *status = t->status;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -495,6 +536,7 @@ static void Clean(const HycoLCP *lcp, PetscReal z[])
   for (PetscInt i = 0; i < n; i++) {
     PetscReal w = lcp->q[i];
 
+    /* Only small forces are doubtful; larger ones are judged by the residuals. */
     if (z[i] == 0 || z[i] > 1e-9 * size_z) continue;
     for (PetscInt j = 0; j < n; j++) w += lcp->M[(size_t)j * (size_t)n + (size_t)i] * z[j];
     if (w * size_z > z[i] * size_q) z[i] = 0;
@@ -522,6 +564,7 @@ static PetscErrorCode CopyDense(HycoTao t, const HycoLCP *lcp)
   PetscCall(MatDenseRestoreArray(t->dense, &h));
   PetscCall(MatAssemblyBegin(t->dense, MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(t->dense, MAT_FINAL_ASSEMBLY));
+  /* The matrix is used again for a problem of the same size, which may have another symmetry. */
   PetscCall(MatSetOption(t->dense, MAT_SYMMETRIC, lcp->symmetric));
   PetscCall(VecSet(t->y, 0));
   PetscCall(VecSet(t->lo, 0));
@@ -566,7 +609,8 @@ PetscErrorCode HycoTaoSolveLCP(HycoTao t, const HycoLCP *lcp, PetscBool active[]
     t->monitor = lcp->monitor;
     t->monitor_ctx = lcp->monitor_ctx;
     PetscCall(PlaceSolution(t, lcp->p + lcp->n, z));
-    PetscCall(SolveOwn(t, t->placed, t->traits & HYCO_TAO_DENSE ? 50 * (lcp->n + 10) : limit));
+    PetscCall(SolveOwn(t, NULL, t->placed, t->traits & HYCO_TAO_DENSE ? 50 * (lcp->n + 10) : limit));
+    /* Before z goes out of scope in the caller. */
     PetscCall(VecResetArray(t->placed));
     *its = t->its;
     *solved = (PetscBool)(t->status == HYCO_LCP_SOLVED);

@@ -70,6 +70,7 @@ static PetscErrorCode SetBlock(const Model *m, IS is)
   PetscCall(MatHasOperation(m->H, MATOP_GET_ROW, &rows));
   PetscCall(PetscObjectTypeCompare((PetscObject)block, MATMPIDENSE, &dense));
   if (dense) PetscCall(MatConvert(block, MATAIJ, MAT_INPLACE_MATRIX, &block));
+  /* The size of the block differs from that of the last set. */
   PetscCall(KSPReset(ksp));
   PetscCall(KSPSetOperators(ksp, block, block));
   PetscCall(KSPGetPC(ksp, &pc));
@@ -98,6 +99,7 @@ static PetscErrorCode SolveFree(const Model *m, IS is, PetscBool *singular)
   PetscCall(VecRestoreSubVector(m->w, is, &rhs));
   PetscCall(KSPGetConvergedReason(m->tao->ksp, &why));
   PetscCall(VecNorm(y, NORM_2, &size));
+  /* An iteration limit leaves an inexact step, which the line search judges. */
   *singular = (PetscBool)((why < 0 && why != KSP_DIVERGED_ITS) || PetscIsInfOrNanReal(size));
   PetscCall(VecScale(y, -1));
   if (!*singular) PetscCall(VecISCopy(m->d, is, SCATTER_FORWARD, y));
@@ -119,6 +121,7 @@ static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singu
   *singular = PETSC_FALSE;
   if (n_free) PetscCall(SolveFree(m, is, singular));
   PetscCall(ISDestroy(&is));
+  /* d has changed on the free unknowns; n_free is the number over all ranks, so that all take the same branch. */
   if (n_free) PetscCall(MatMultAdd(m->H, m->d, m->g, m->w));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -144,6 +147,7 @@ static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool 
   for (PetscInt i = 0; i < m->n; i++) {
     const PetscBool below = active[2 * i], above = active[2 * i + 1];
 
+    /* Equal bounds fix the unknown, whose multiplier may have either sign. */
     violates[2 * i] = (PetscBool)(below ? w[i] < -size_w && lo[i] < hi[i] : !above && p[i] < lo[i] - size_x);
     violates[2 * i + 1] = (PetscBool)(above ? w[i] > size_w && lo[i] < hi[i] : !below && p[i] > hi[i] + size_x);
   }
@@ -189,6 +193,7 @@ static PetscErrorCode Monitor(PetscInt its, PetscInt n_active, PetscInt changes,
   PetscFunctionBegin;
   (void)its, (void)n_active;
   m->tao->niter++;
+  /* The last set's step is measured by Move() on f itself. */
   if (!changes) PetscFunctionReturn(PETSC_SUCCESS); /* shown after the step */
   PetscCall(VecDuplicate(m->x, &y));
   PetscCall(VecWAXPY(y, 1, m->d, m->x));
@@ -280,6 +285,7 @@ static PetscErrorCode StepByLemke(Model *m, HycoLCPStatus *status)
   PetscCall(VecGetSize(m->x, &N));
   PetscCall(PetscCalloc2((size_t)N * (size_t)N, &M, N, &z));
   PetscCall(GatherHessian(m->H, N, M));
+  /* d = lo - x: then w = g + H (lo - x) is q. */
   PetscCall(VecWAXPY(m->d, -1, m->x, m->lo));
   PetscCall(MatMultAdd(m->H, m->d, m->g, m->w));
   PetscCall(VecScatterCreateToAll(m->w, &to_all, &every));
@@ -329,6 +335,7 @@ static PetscErrorCode Move(Model *m, PetscReal *step, PetscBool *small)
   for (*step = 1; m->objective && *step > 1e-10; *step /= 2) {
     PetscCall(VecWAXPY(m->x, *step, m->d, m->p));
     PetscCall(TaoComputeObjective(m->tao, m->x, &m->f));
+    /* Armijo's condition; near the solution decreases are below the round-off of f. */
     if (m->f <= before + 1e-4 * *step * PetscMin(slope, 0) + 1e-13 * PetscAbsReal(before)) break;
   }
   if (*step <= 1e-10) {
@@ -348,6 +355,7 @@ static PetscErrorCode Iterate(Model *m, PetscErrorCode (*minimise)(Model *, Hyco
   PetscBool small = PETSC_FALSE;
 
   PetscFunctionBegin;
+  /* The user's hook of TaoSetUpdate(), as in TAO's own types. */
   if (tao->ops->update) PetscCall((*tao->ops->update)(tao, tao->niter, tao->user_update));
   PetscCall(TaoComputeHessian(tao, m->x, tao->hessian, tao->hessian_pre));
   PetscCall(minimise(m, &status));
@@ -387,6 +395,7 @@ static PetscErrorCode Read(Tao tao, PetscBool lemke, Model *m)
     PetscCall(VecDuplicate(m->x, &tao->XU));
     PetscCall(VecSet(tao->XU, PETSC_INFINITY));
   }
+  /* After the defaults: a routine of the user's may set bounds at each solve. */
   PetscCall(TaoComputeVariableBounds(tao));
   m->g = tao->gradient;
   m->lo = tao->XL;

@@ -34,6 +34,7 @@ PetscErrorCode HycoNNLSCheck(PetscInt m, PetscInt n, const PetscReal A[], const 
       g += a * r[i];
       length += a * a;
     }
+    /* Written with negations, so that NaN counts as unsolved. */
     if (!(x[j] >= 0) || !((x[j] > 0 ? PetscAbsReal(g) : g) <= rtol * PetscSqrtReal(length * size)))
       *solved = PETSC_FALSE;
   }
@@ -63,6 +64,7 @@ PetscErrorCode HycoTaoNNLS(PetscInt m, PetscInt n, const PetscReal A[], const Pe
   lcp.q = q;
   PetscCall(HycoTaoCreate(PETSC_COMM_SELF, NULL, &tao));
   PetscCall(HycoTaoSetType(tao, type, 0));
+  /* active NULL: only TAO's bound-constrained types may be asked for here. */
   PetscCall(HycoTaoSolveLCP(tao, &lcp, NULL, x, &its, solved));
   PetscCall(HycoTaoDestroy(&tao));
   PetscCall(HycoNNLSCheck(m, n, A, b, x, rtol, residual, solved));

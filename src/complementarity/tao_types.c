@@ -2,8 +2,9 @@
   hyco's complementarity methods as Tao types: HYCO_TAO_ACTIVE_SET and HYCO_TAO_LEMKE, and HYCO_TAO_SEMISMOOTH_NEWTON
   for the blocks of contact systems. In any program the first two solve the problem of the Tao (tao_newton.c). A form of HycoSolver knows more than a Hessian says: how to solve on a set with a
   factor, multigrid or coarser problems that it keeps. It therefore attaches a HycoTao as the type's data, whose
-  functions take the place of the general ones; its problem is unscaled, and its monitor shows the number of active
-  contacts as the function value and the number of changes as the residual.
+  functions take the place of the general ones: they solve, and the bounds are those of the Tao here too. The problem is
+  unscaled; the monitor shows the number of active contacts as the function value and the number of changes as the
+  residual.
 */
 #include <hycotao.h>
 
@@ -29,38 +30,98 @@ static void SetReason(const HycoTao t)
                                                  : TAO_DIVERGED_USER;
 }
 
+/* Reads the bounds lo <= z of a form's dense problem from the Tao. *q: its constant term for z - lo where a bound is not
+   0, otherwise NULL. */
+static PetscErrorCode ReadBounds(Tao tao, const HycoLCP *lcp, PetscReal **q)
+{
+  const PetscInt n = lcp->p + lcp->n;
+  const PetscScalar *lo, *hi;
+  PetscInt bad = -1;
+
+  PetscFunctionBegin;
+  *q = NULL;
+  PetscCall(VecGetArrayRead(tao->XL, &lo));
+  PetscCall(VecGetArrayRead(tao->XU, &hi));
+  for (PetscInt i = 0; i < n; i++) {
+    if (hi[i] < PETSC_INFINITY || (lo[i] > PETSC_NINFINITY) != (i >= lcp->p)) bad = i;
+    if (i >= lcp->p && lo[i] != 0 && !*q) HycoDuplicate((size_t)n, lcp->q, q);
+  }
+  PetscCheck(bad < 0, PetscObjectComm((PetscObject)tao), PETSC_ERR_SUP,
+             "%s on a dense problem: unknown %d of %d has the bounds %g and %g; expected: no bounds of the first %d, a "
+             "finite lower one and no upper one of the others",
+             ((PetscObject)tao)->type_name, (int)bad, (int)n, (double)lo[bad], (double)hi[bad], (int)lcp->p);
+  for (PetscInt j = lcp->p; j < n && *q; j++) {
+    for (PetscInt i = 0; i < n; i++) (*q)[i] += lcp->M[(size_t)j * (size_t)n + (size_t)i] * lo[j];
+  }
+  PetscCall(VecRestoreArrayRead(tao->XL, &lo));
+  PetscCall(VecRestoreArrayRead(tao->XU, &hi));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A form's dense problem by one of the methods, within the bounds of the Tao; cones have their own laws. */
+static PetscErrorCode SolveDense(Tao tao, PetscErrorCode (*method)(HycoTao, const HycoLCP *))
+{
+  const HycoTao t = (HycoTao)tao->data;
+  HycoLCP lcp = *t->lcp;
+  PetscReal *q = NULL;
+  const PetscScalar *lo;
+
+  PetscFunctionBegin;
+  if (!lcp.blocks) PetscCall(ReadBounds(tao, &lcp, &q));
+  if (q) lcp.q = q;
+  lcp.monitor = t->monitor || tao->numbermonitors || tao->hist_max ? Monitor : NULL;
+  lcp.monitor_ctx = t;
+  PetscCall(method(t, &lcp));
+  SetReason(t);
+  if (!q) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecGetArrayRead(tao->XL, &lo));
+  for (PetscInt i = lcp.p; i < lcp.p + lcp.n; i++) t->z[i] += lo[i];
+  PetscCall(VecRestoreArrayRead(tao->XL, &lo));
+  PetscCall(PetscFree(q));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode DenseActiveSet(HycoTao t, const HycoLCP *lcp)
+{
+  HycoLCP limited = *lcp;
+
+  PetscFunctionBegin;
+  limited.max_its = t->tao->max_it;
+  PetscCall(HycoLCPActiveSet(&limited, t->active, t->z, &t->its, &t->status));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* With a HycoTao as data the form's problem, otherwise that of the Tao. */
 static PetscErrorCode SolveActiveSet(Tao tao)
 {
   const HycoTao t = (HycoTao)tao->data;
-  PetscBool watched;
 
   PetscFunctionBegin;
-  if (!t) {
+  if (!t)
     PetscCall(HycoTaoNewton(tao, PETSC_FALSE));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  watched = (PetscBool)(t->monitor || tao->numbermonitors || tao->hist_max);
-  if (t->lcp) {
-    HycoLCP lcp = *t->lcp;
-
-    lcp.max_its = tao->max_it;
-    lcp.monitor = watched ? Monitor : NULL;
-    lcp.monitor_ctx = t;
-    PetscCall(HycoLCPActiveSet(&lcp, t->active, t->z, &t->its, &t->status));
-  } else {
+  else if (t->lcp)
+    PetscCall(SolveDense(tao, DenseActiveSet));
+  else {
     HycoActiveSet set = *t->set;
 
     set.max_its = tao->max_it;
-    set.monitor = watched ? Monitor : NULL;
+    set.monitor = t->monitor || tao->numbermonitors || tao->hist_max ? Monitor : NULL;
     set.monitor_ctx = t;
+    if (set.bounds) PetscCall(set.bounds(set.ctx, tao->XL, tao->XU));
     PetscCall(HycoActiveSetRun(&set, t->active, &t->its, &t->status));
+    SetReason(t);
   }
-  SetReason(t);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The iteration limit counts pivots. */
+static PetscErrorCode DenseLemke(HycoTao t, const HycoLCP *lcp)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoLCPLemke(lcp->n, lcp->M, lcp->q, t->tao->max_it, t->z, &t->its, &t->status));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode SolveLemke(Tao tao)
 {
   const HycoTao t = (HycoTao)tao->data;
@@ -72,22 +133,27 @@ static PetscErrorCode SolveLemke(Tao tao)
   }
   PetscCheck(t->lcp && !t->lcp->p, PetscObjectComm((PetscObject)tao), PETSC_ERR_SUP,
              "Lemke's method needs a dense matrix, and no free unknowns");
-  PetscCall(HycoLCPLemke(t->lcp->n, t->lcp->M, t->lcp->q, tao->max_it, t->z, &t->its, &t->status));
-  SetReason(t);
+  PetscCall(SolveDense(tao, DenseLemke));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Starts from the forces of the last solution, or from none; the new ones are kept. */
-static PetscErrorCode RunSemismooth(HycoTao t, const HycoLCP *lcp)
+static PetscErrorCode DenseSemismooth(HycoTao t, const HycoLCP *of)
 {
+  HycoLCP limited = *of;
+  const HycoLCP *lcp = &limited;
+
   PetscFunctionBegin;
+  limited.max_its = t->max_its;
   if (lcp->given && lcp->warm) {
     /* z is the start */
   } else if (lcp->warm && t->n_last == lcp->p + lcp->n && t->last)
     PetscCall(PetscArraycpy(t->z, t->last, t->n_last));
   else
+    /* Without a start that fits, none: the chain of starts then begins with the normal forces. */
     PetscCall(PetscArrayzero(t->z, lcp->p + lcp->n));
   PetscCall(HycoLCPSemismooth(lcp, t->z, &t->its, &t->status));
+  /* Forces of a failed solve would be a bad start: the last good ones stay. */
   if (t->status != HYCO_LCP_SOLVED) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree(t->last));
   t->n_last = lcp->p + lcp->n;
@@ -99,17 +165,11 @@ static PetscErrorCode RunSemismooth(HycoTao t, const HycoLCP *lcp)
 static PetscErrorCode SolveSemismooth(Tao tao)
 {
   const HycoTao t = (HycoTao)tao->data;
-  HycoLCP lcp;
 
   PetscFunctionBegin;
   PetscCheck(t && t->lcp, PetscObjectComm((PetscObject)tao), PETSC_ERR_SUP,
              HYCO_TAO_SEMISMOOTH_NEWTON " solves contact systems of a HycoSolver; for bounds use " HYCO_TAO_ACTIVE_SET);
-  lcp = *t->lcp;
-  lcp.max_its = t->max_its;
-  lcp.monitor = t->monitor || tao->numbermonitors || tao->hist_max ? Monitor : NULL;
-  lcp.monitor_ctx = t;
-  PetscCall(RunSemismooth(t, &lcp));
-  SetReason(t);
+  PetscCall(SolveDense(tao, DenseSemismooth));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -143,6 +203,7 @@ static PetscErrorCode CreateActiveSet(Tao tao)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* No KSP: pivots need none. */
 static PetscErrorCode CreateLemke(Tao tao)
 {
   PetscFunctionBegin;
@@ -152,6 +213,7 @@ static PetscErrorCode CreateLemke(Tao tao)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Only with a HycoTao as data, which has the blocks. */
 static PetscErrorCode CreateSemismooth(Tao tao)
 {
   PetscFunctionBegin;

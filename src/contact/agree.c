@@ -11,6 +11,7 @@ static PetscErrorCode IsShared(MPI_Comm comm, HycoMesh part, HycoMesh m, const H
   PetscFunctionBegin;
   PetscCall(PetscCalloc2(m->n_nodes, &count, part->n_owned, &all));
   for (PetscInt k = 0; k < p->n; k++) {
+    /* At this rank's copies; the star forest adds those of all ranks at the owner. */
     for (PetscInt j = p->master_start[k]; p->contact[k] == c && j < p->master_start[k + 1]; j++) count[p->master[j]]++;
   }
   PetscCall(HycoMeshNodeSF(comm, part, m->n_nodes, m->node_global, &sf));

@@ -31,6 +31,7 @@ static PetscReal LeastOff(HycoPatches s, PetscInt t, const Line *l)
     rr += PetscMax(r[c][0] * r[c][0], r[c][1] * r[c][1]);
     mm += PetscMax(mean[c][0] * mean[c][0], mean[c][1] * mean[c][1]);
   }
+  /* No node of the box can give a line: a little less than the bound, against round-off. */
   if (mm < 0.99 * NO_LINE) return PETSC_MAX_REAL;
   for (PetscInt c = 0; c < 3; c++) { /* of the cross product */
     const PetscInt i = (c + 1) % 3, j = (c + 2) % 3;
@@ -60,6 +61,7 @@ static void TryAlong(HycoPatches s, PetscInt patch, Line *l)
   const PetscReal rr = HycoDot(r, r), mm = HycoDot(mean, mean), along = HycoDot(r, mean);
   PetscReal off;
 
+  /* Nodes without a normal (cancelling facets), or normals that do not face each other. */
   if (HycoDot(n, n) == 0 || mm < NO_LINE) return;
   off = PetscMax(rr - along * along / mm, 0);
   if (off > l->off) return;
@@ -80,6 +82,7 @@ static void SearchAlong(HycoPatches s, PetscInt t, PetscReal least, PetscInt lo,
   for (PetscInt k = lo; k < hi && hi - lo <= HYCO_LEAF; k++) TryAlong(s, s->item[k].index, l);
   if (hi - lo <= HYCO_LEAF) return;
   for (PetscInt child = 0; child < 2; child++) of[child] = LeastOff(s, 2 * t + 1 + child, l);
+  /* The child with the smaller bound first: the other one is then mostly skipped. */
   right = (PetscBool)(of[1] < of[0]);
   for (PetscInt child = 0; child < 2; child++, right = (PetscBool)!right)
     SearchAlong(s, 2 * t + 1 + right, of[right], right ? mid : lo, right ? hi : mid, l);

@@ -67,7 +67,9 @@ static void Halve(HycoPoint point[], PetscInt lo, PetscInt hi, PetscInt b, Box t
     }
     axis = hi > lo && box->hi[c] - box->lo[c] > box->hi[axis] - box->lo[axis] ? c : axis;
   }
+  /* A leaf. */
   if (b >= BLOCKS - 1) return;
+  /* Empty halves still get their boxes: the tree is complete. */
   if (hi > lo) HycoPointsSplit(point, lo, mid, hi, axis);
   Halve(point, lo, mid, 2 * b + 1, tree);
   Halve(point, mid, hi, 2 * b + 2, tree);
@@ -135,6 +137,7 @@ static PetscErrorCode FindReach(Candidates *s)
   }
   PetscCall(PetscMalloc1((size_t)s->size * BOXES, &reach));
   for (PetscInt b = 0; b < s->size * BOXES; b++) reach[b] = s->tree[b].reach;
+  /* Any rank's nodes of the master bound the distance. */
   HycoAllreduce(reach, s->size * BOXES, MPIU_REAL, MPI_MIN, s->comm);
   for (PetscInt b = s->size * BOXES - 1; b >= 0; b--) { /* children before their parents, whose reach is theirs */
     const PetscInt place = b % BOXES;
@@ -143,6 +146,7 @@ static PetscErrorCode FindReach(Candidates *s)
     if (IsEmpty(box)) continue;
     box->reach = s->stretch * reach[b] + s->margin + ROUND_OFF * (HycoLength(box->lo) + HycoLength(box->hi));
     if (place >= BLOCKS - 1) continue;
+    /* Its tree begins at b - place, where child 2 place + 1 lies place + 1 behind the box. */
     child = box + place + 1; /* 2 place + 1 in its tree */
     box->reach = PetscMax(IsEmpty(&child[0]) ? 0 : child[0].reach, IsEmpty(&child[1]) ? 0 : child[1].reach);
   }
@@ -173,6 +177,7 @@ static PetscBool IsNear(const Box tree[], PetscInt b, const PetscReal centre[3],
 
   if (IsEmpty(&tree[b])) return PETSC_FALSE;
   Distances(&tree[b], centre, &least, &most);
+  /* Farther than any nearest point under this box can be. */
   if (least - radius > tree[b].reach) return PETSC_FALSE;
   if (b >= BLOCKS - 1) return PETSC_TRUE;
   return (PetscBool)(IsNear(tree, 2 * b + 1, centre, radius) || IsNear(tree, 2 * b + 2, centre, radius));
@@ -205,6 +210,7 @@ static PetscErrorCode WidenMargin(Candidates *s)
     if (m->facet_group[f] == s->slave) most = PetscMax(most, Ball(s->fe, f, centre));
   }
   HycoAllreduce(&most, 1, MPIU_REAL, MPI_MAX, s->comm);
+  /* HYCO_OPPOSED is negative: the cosine of the largest angle at which normals face each other. */
   s->stretch = 1 / -HYCO_OPPOSED;
   s->margin += (3 + 3 * s->stretch) * most;
   PetscFunctionReturn(PETSC_SUCCESS);

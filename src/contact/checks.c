@@ -40,6 +40,7 @@ static PetscErrorCode AllowedOverlap(HycoFE fe, const HycoPairs *p, PetscInt k, 
   /* A gap given by the scene is no overlap of drawn surfaces. */
   if (c->gap || c->ops->gap || gap >= 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoContactGetLength(c, "overlap", allowed));
+  /* The scene gives none: half of the facets around the slave. */
   if (*allowed < 0) {
     PetscCall(SizeAt(fe, c->slave, p->slave[k], sizes, &size));
     *allowed = size > 0 ? HYCO_OVERLAP_SHARE * size : PETSC_MAX_REAL;
@@ -91,9 +92,11 @@ PetscErrorCode HycoContactCheck(HycoFE fe, const HycoPairs *pairs, const PetscRe
   for (PetscInt k = 0, next; k < pairs->n; k = next) {
     HycoContact c = fe->scene->contact[pairs->contact[k]];
 
+    /* The pairs of one contact are contiguous: verify() gets all of them at once. */
     next = HycoPairsRun(pairs, k);
     if (c->ops->verify) PetscCall((*c->ops->verify)(c, fe, pairs, k, next, normal));
   }
+  /* After verify(): normals that do not face each other may be the cause. */
   if (deepest >= 0) PetscCall(RefuseOverlap(fe, pairs, deepest, worst, allowed));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -108,6 +111,7 @@ static PetscErrorCode SlidingOf(HycoFE fe, const HycoPairs *p, PetscInt k, const
   PetscFunctionBegin;
   HycoPairsJump(p, k, fe->dim, u, r);
   PetscCall(SizeAt(fe, c->master, p->master[p->master_start[k]], &sizes[0], &size));
+  /* A master of single nodes has no facets. */
   if (!(size > 0)) PetscCall(SizeAt(fe, c->slave, p->slave[k], &sizes[1], &size));
   *sliding = size > 0 ? HycoTangentialLength(r, normal) / size : 0;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -128,6 +132,7 @@ PetscErrorCode HycoContactMeasure(HycoFE fe, HycoPairs *pairs, const PetscReal u
   for (PetscInt k = 0; k < pairs->n; k++) {
     PetscReal sliding = 0;
 
+    /* It faces no master: there is nothing to measure. */
     if (HycoPairsAlone(fe->scene, pairs, k)) continue;
     state->n_facing++;
     state->overlap = PetscMax(state->overlap, -gap[k]);

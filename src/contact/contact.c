@@ -3,10 +3,13 @@
 #include <hycoregistry.h>
 #include <string.h>
 
+/* Sorted by name, so that the list of a message does not depend on the order in which extensions register. */
 static HycoRegistry types = {.sorted = PETSC_TRUE};
 
 HycoDefineRegister(HycoContactRegister, types, PetscErrorCode (*create)(HycoContact))
 
+/* Without a type: HycoContactSetType() gives the methods and the entries, and HycoContactComplete() checks them once
+   the scene has been read. */
 PetscErrorCode HycoContactCreate(MPI_Comm comm, HycoContact *contact)
 {
   PetscFunctionBegin;
@@ -16,6 +19,7 @@ PetscErrorCode HycoContactCreate(MPI_Comm comm, HycoContact *contact)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The type's destroy comes first: it may still read the entries. */
 PetscErrorCode HycoContactDestroy(HycoContact *contact)
 {
   PetscFunctionBegin;
@@ -55,6 +59,8 @@ PetscErrorCode HycoContactSetType(HycoContact contact, HycoContactType type)
              ((PetscObject)contact)->name ? ((PetscObject)contact)->name : "(none)", type, list);
   }
   PetscCall(PetscObjectChangeTypeName((PetscObject)contact, type));
+  /* The type name is set before, since errors of the constructor name the type. Friction is declared after it, so
+     that a type may take the name for itself. */
   PetscCall((*create)(contact));
   PetscCall(DeclareFriction(contact));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -73,6 +79,7 @@ PetscErrorCode HycoContactView(HycoContact contact, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For constructors of types only: the scene reads the entries right after the type is set, and rejects others. */
 PetscErrorCode HycoContactDeclare(HycoContact contact, const char name[], const char title[], HycoEntryKind kind,
                                   PetscBool required)
 {
@@ -84,6 +91,8 @@ PetscErrorCode HycoContactDeclare(HycoContact contact, const char name[], const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Three scalar entries, and not a vector: an absent component is 0, and all absent mean the surface's averaged
+   normal. */
 PetscErrorCode HycoContactDeclareNormal(HycoContact contact)
 {
   static const char *const names[] = {"normal_x", "normal_y", "normal_z"};
@@ -136,6 +145,7 @@ PetscErrorCode HycoContactComplete(HycoContact contact)
   HycoEntry *e;
 
   PetscFunctionBegin;
+  /* Borrowed from the object, whose name the scene sets before the entries are read. */
   contact->name = ((PetscObject)contact)->name;
   for (PetscInt j = 0; j < d->n; j++)
     HycoCheck(!d->entry[j].required || d->entry[j].expr || d->entry[j].text || d->entry[j].value >= 0,
@@ -146,6 +156,7 @@ PetscErrorCode HycoContactComplete(HycoContact contact)
     if ((e = HycoDeclaredFind(d, normals[k]))) contact->normal[k] = e->expr;
   }
   if ((e = HycoDeclaredFind(d, "gap"))) contact->gap = e->expr;
+  /* An entry of this name that the type declares itself is no coefficient of Coulomb's law. */
   if ((e = HycoDeclaredFind(d, "friction")) && e->law) contact->friction = e->expr;
   PetscCheck(contact->slave, PETSC_COMM_SELF, PETSC_ERR_ARG_WRONG,
              "the contact type %s declares neither group nor slave as required", ((PetscObject)contact)->type_name);

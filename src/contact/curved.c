@@ -40,11 +40,13 @@ static PetscReal Step(const HycoCurved *f, const PetscReal r[3], PetscReal tange
   const PetscReal det = f->corners > 2 ? a * d - b * b : a;
   PetscReal length;
 
+  /* Negated, so that NaN counts as degenerate as well; the caller then keeps the present point. */
   if (!(det > (f->corners > 2 ? 1e-28 * a * d : 0))) return 0;
   /* -(T^T T)^-1 T^T r for the tangents T. */
   step[0] = f->corners > 2 ? (b * g1 - d * g0) / det : -g0 / det;
   step[1] = f->corners > 2 ? (b * g0 - a * g1) / det : 0;
   length = PetscMax(PetscAbsReal(step[0]), PetscAbsReal(step[1]));
+  /* Half of the reference facet's width at most: beyond it the quadratic functions fold back. */
   for (PetscInt k = 0; k < 2; k++) step[k] /= PetscMax(length, 1);
   return PetscMin(length, 1);
 }
@@ -73,6 +75,7 @@ static PetscReal Descend(const HycoCurved *f, const PetscReal x[3], PetscReal at
   return Evaluate(f, x, at, r, tangent, w);
 }
 
+/* Without a tolerance: a minimum on a side is found by the search along the sides, with exact zeros as weights. */
 static PetscBool IsInside(const HycoCurved *f, const PetscReal at[2])
 {
   if (f->corners == 3) return (PetscBool)(at[0] >= 0 && at[1] >= 0 && at[0] + at[1] <= 1);
@@ -133,6 +136,8 @@ void HycoCurvedBox(const HycoCurved *f, PetscReal lo[3], PetscReal hi[3])
       hi[c] = PetscMax(hi[c], f->X[k][c]);
       middle -= f->X[k][c] / 4;
     }
+    /* In the hierarchical basis a side's function is between 0 and 1, so that `off` bounds what the side adds to the
+       linear facet. */
     for (PetscInt k = 0; k < sides; k++) {
       const PetscReal off = f->X[corners + k][c] - (f->X[k][c] + f->X[(k + 1) % corners][c]) / 2;
 
@@ -140,6 +145,8 @@ void HycoCurvedBox(const HycoCurved *f, PetscReal lo[3], PetscReal hi[3])
       down -= PetscMin(off, 0);
       middle += f->X[corners + k][c] / 2;
     }
+    /* The bubble of the middle node is the last in the hierarchy: `middle` is where the eight functions before it
+       place its point. */
     if (f->nf > corners + sides) {
       up += PetscMax(f->X[f->nf - 1][c] - middle, 0);
       down -= PetscMin(f->X[f->nf - 1][c] - middle, 0);

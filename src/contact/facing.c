@@ -20,6 +20,8 @@ void HycoSurfaceCarriers(HycoMesh m, PetscInt group, PetscBool carries[])
   for (PetscInt i = 0; i < m->n_nodes; i++) carries[i] = PETSC_FALSE;
   for (PetscInt k = m->group_start[group]; k < m->group_start[group + 1]; k++) carries[m->group_node[k]] = PETSC_TRUE;
   for (PetscInt f = 0; f < m->n_facets; f++) {
+    /* A corner of a six-node triangle has a zero integral, one of an eight-node quadrilateral a negative one: a
+       pressure would give it no force, or one in the wrong direction. */
     for (PetscInt v = 0; v < HycoMeshFirstCarrier(m) && m->facet_group[f] == group; v++)
       carries[m->facets[f * m->nf + v]] = PETSC_FALSE;
   }
@@ -145,6 +147,7 @@ PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, PetscReal are
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(fe->mesh->n_nodes, &share));
   for (PetscInt k = 0; k < pairs->n; k++) {
+    /* The contacts of one scene entry are contiguous: the shares of a surface are integrated once. */
     if (last != pairs->contact[k]) {
       PetscInt g = 0;
 

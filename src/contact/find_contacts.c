@@ -72,8 +72,11 @@ PetscErrorCode HycoPairsSetSearch(HycoScene scene, HycoMesh m, HycoPairs *pairs)
       search->moved = pairs->facts[k].moved;
     else
       PetscCall(IsSurfaceMoved(scene, m, c, &search->moved));
+    /* A later search may find any point of a facet, which has at most nf masters; mortar rows raise it in
+       HycoPairsMove(). */
     if (search->moved) pairs->room = m->nf;
   }
+  /* No room and no search: nothing is moved, and HycoPairsMove() returns at once. */
   if (!pairs->room) PetscCall(PetscFree(pairs->search));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -93,6 +96,7 @@ static PetscErrorCode FindRun(HycoFE fe, HycoPairs *p, PetscInt k, PetscInt next
   PetscInt widest = 0;
 
   PetscFunctionBegin;
+  /* The whole run is passed at once, so that the type builds one tree for all of its slaves. */
   if (HycoPairsMoved(p, k)) {
     p->queries += next - k;
     PetscCall((*c->ops->find)(c, fe, index, p->search[index].reach, next - k, p->slave + k, found));
@@ -120,13 +124,16 @@ PetscErrorCode HycoPairsMove(HycoFE fe, HycoPairs *p)
     next = HycoPairsRun(p, k);
     ierr = FindRun(fe, p, k, next, &found);
   }
+  /* After an error the old masters stay, and so does the place: the next call searches again. */
   if (ierr) PetscCall(HycoPairsDestroy(&found));
   PetscCall(ierr);
+  /* Slaves and their order do not change, only their masters: rows of B and lambda keep their numbers. */
   HycoFreeAll(&p->master_start, &p->master, &p->weight, &found.slave, &found.contact);
   p->master_start = found.master_start;
   p->master = found.master;
   p->weight = found.weight;
   p->place = fe->place;
+  /* Mortar rows may be wider than a facet. The room only grows: arrays that were made for it stay large enough. */
   for (PetscInt k = 0; k < p->n; k++) p->room = PetscMax(p->room, p->master_start[k + 1] - p->master_start[k]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -151,6 +158,7 @@ static PetscErrorCode CountHeld(HycoScene scene, HycoMesh m, PetscInt held[])
     held[i] = 0;
     for (PetscInt c = 0; c < m->dim; c++) held[i] += fixed[i * m->dim + c];
   }
+  /* One component for each such support, whatever its direction. */
   for (PetscInt k = 0; k < scene->n_fixed; k++) { /* along other directions */
     PetscInt g = 0;
 
@@ -195,6 +203,7 @@ static PetscErrorCode AppendNodes(HycoFE fe, PetscInt index, const PetscInt held
 
   PetscFunctionBegin;
   PetscCall(HycoMeshFindGroup(m, "contact", c->slave, &g));
+  /* With facts this is a rank's part, on which a group may be empty. */
   HycoCheck(p->facts || m->group_start[g + 1] > m->group_start[g], "contact %s: the group %s is empty", c->name,
             m->group_name[g]);
   PetscCall(HycoPairsReserve(p, m->group_start[g + 1] - m->group_start[g], 0));
@@ -253,6 +262,7 @@ static PetscErrorCode FindAll(HycoFE fe, HycoPairs *pairs)
   PetscCall(PetscFree(held));
   PetscCall(ierr);
   if (pairs->facts) PetscCall(KeepOwned(fe->mesh, pairs));
+  /* After the slaves of other ranks are dropped: their masters need not be here. */
   PetscCall(HycoPairsMove(fe, pairs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -269,6 +279,7 @@ PetscErrorCode HycoPairsFind(HycoScene scene, DM dm, const HycoSurfaceFacts fact
   PetscCall(HycoPairsReserve(pairs, 0, 0));
   if (!scene->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoFECreate(scene, dm, &fe));
+  /* Borrowed for the setup alone: the facts end with the caller. */
   pairs->facts = facts;
   ierr = FindAll(fe, pairs);
   pairs->facts = NULL;

@@ -16,6 +16,7 @@ void HycoTurnNormal(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscReal n[3
   for (PetscInt a = 0; a < fe->n_turned && n_units + 1 < fe->dim; a++) {
     PetscReal *d = unit[n_units], before;
 
+    /* The relative motion of slave and master under the a-th released rigid motion; common motion is no sliding. */
     HycoPairsJump(pairs, k, fe->dim, fe->released + (size_t)a * (size_t)fe->n_dof, d);
     before = HycoDot(d, d);
     for (PetscInt b = 0; b < n_units; b++) {
@@ -78,6 +79,7 @@ static PetscErrorCode Normals(HycoFE fe, HycoContact c, const HycoPairs *pairs, 
 
     for (PetscInt d = 0; d < fe->dim; d++) length += n[d] * n[d];
     length = PetscSqrtReal(length);
+    /* Only the mesh's components count: an expression for the third one in 2D would shorten the row of B. */
     HycoCheck(length > 0, "contact %s: the normal at node %d has length zero", c->name,
               (int)fe->mesh->node_id[pairs->slave[first + i]]);
     for (PetscInt d = 0; d < 3; d++) n[d] /= length;
@@ -95,6 +97,7 @@ PetscReal HycoContactNoGap(HycoFE fe)
 static PetscErrorCode Gaps(HycoFE fe, HycoContact c, const HycoPairs *pairs, PetscInt first,
                            const HycoContactPoints *points, const PetscReal normal[], PetscReal gap[])
 {
+  /* Else -1: no gap is at most that, so that other types keep theirs to the last bit. */
   const PetscReal zero = c->integrated ? ROUND_OFF * HycoMeshLength(fe->mesh) : -1;
 
   PetscFunctionBegin;
@@ -102,6 +105,8 @@ static PetscErrorCode Gaps(HycoFE fe, HycoContact c, const HycoPairs *pairs, Pet
   for (PetscInt i = 0; i < points->n; i++) {
     const PetscReal *n = normal + 3 * i, *x = points->master + 3 * i;
 
+    /* In this order: no master at all, the type's gap (set above), the scene's expression, the distance along the
+       normal. */
     if (HycoPairsAlone(fe->scene, pairs, first + i)) {
       gap[i] = HycoContactNoGap(fe);
     } else if (!c->ops->gap && c->gap) {

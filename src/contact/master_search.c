@@ -44,6 +44,7 @@ static PetscErrorCode FindPatches(HycoMasterSearch *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The groups of a contact by name: on a rank's part they may be empty, and the search then has no patches. */
 PetscErrorCode HycoMasterSearchCreate(HycoFE fe, HycoContact c, PetscBool nodes, HycoMasterSearch *t)
 {
   PetscInt slave, master;
@@ -55,6 +56,8 @@ PetscErrorCode HycoMasterSearchCreate(HycoFE fe, HycoContact c, PetscBool nodes,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Only borrowed: fe stays at its nodes as long as the search exists. The tree and the border are made when they are
+   needed. */
 PetscErrorCode HycoMasterSearchCreateOn(HycoFE fe, PetscInt slave, PetscInt master, PetscBool nodes,
                                         HycoMasterSearch *t)
 {
@@ -80,21 +83,12 @@ PetscErrorCode HycoMasterSearchReady(HycoMasterSearch *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Drops the tree and the border, for other patches or positions. */
-PetscErrorCode HycoMasterSearchForget(HycoMasterSearch *t)
-{
-  PetscFunctionBegin;
-  PetscCall(HycoPatchesDestroy(&t->patches));
-  HycoFreeAll(&t->border, &t->at_border);
-  t->n_border = 0;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 PetscErrorCode HycoMasterSearchDestroy(HycoMasterSearch *t)
 {
   PetscFunctionBegin;
-  PetscCall(HycoMasterSearchForget(t));
-  HycoFreeAll(&t->node, &t->normal, &t->outward);
+  PetscCall(HycoPatchesDestroy(&t->patches));
+  HycoFreeAll(&t->border, &t->at_border, &t->node, &t->normal, &t->outward);
+  t->n_border = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -127,6 +121,8 @@ void HycoMasterSearchProject(const HycoMasterSearch *t, PetscInt slave, PetscBoo
   HycoPatchesProject(t->patches, x, NULL, &nearest);
   *at = nearest;
   if (any_side || !out || !at->n || HycoDot(out, t->normal + 3 * at->patch) <= HYCO_OPPOSED) return;
+  /* The second search has the condition on normals inside, and its result may be a far one, which is why distances
+     are compared. */
   HycoPatchesProject(t->patches, x, out, at); /* at a corner: of the facets that contain the point */
   if (at->n && at->distance > nearest.distance + HYCO_SAME_POINT * ShortestEdge(t, at->patch)) at->n = 0;
 }
@@ -164,6 +160,7 @@ static PetscErrorCode FindBorder(HycoMasterSearch *t)
     t->border[2 * k + 1] = PetscMax(a, b);
   }
   if (edges) qsort(t->border, (size_t)edges, 2 * sizeof(PetscInt), CompareEdges);
+  /* After sorting, equal edges are neighbours: a run of one is a border. The array is compacted in place. */
   for (PetscInt k = 0, next; k < edges; k = next) {
     for (next = k + 1; next < edges && !CompareEdges(t->border + 2 * k, t->border + 2 * next);) next++;
     if (next > k + 1 || (nf > 2 && t->border[2 * k] == t->border[2 * k + 1])) continue; /* or a triangle's last side */

@@ -12,6 +12,7 @@
 /* Gauss' rule in one direction, on triangles in two of which the second has the length that the first leaves. */
 PetscErrorCode HycoRuleCreate(PetscInt dim, PetscInt degree, HycoRule *rule)
 {
+  /* n points are exact up to degree 2 n - 1; the factor 1 - x of the collapsed square costs one degree more. */
   const PetscInt n = dim == 2 ? degree / 2 + 1 : (degree + 3) / 2;
   PetscReal x[5], w[5];
 
@@ -55,6 +56,8 @@ void HycoPlaneSet(PetscInt dim, PetscInt corners, const PetscReal *const X[], co
   }
 }
 
+/* Coordinates in the plane and heights above it. A collapsed quadrilateral (last corner repeated) becomes a
+   triangle, since its bilinear map is singular. */
 void HycoSideSet(const HycoPlane *plane, PetscInt nf, PetscInt corners, const PetscInt node[], const PetscReal X[],
                  HycoSide *side)
 {
@@ -112,6 +115,8 @@ static void InQuadrilateral(const HycoSide *s, const PetscReal p[2], PetscReal x
   }
 }
 
+/* At a point of the plane, thus after the projection along the slave's normal: the reference point of a
+   quadrilateral is found by Newton's method on the straight-sided cell. */
 void HycoSideFunctions(const HycoSide *s, const PetscReal p[2], PetscReal N[HYCO_FACET_NODES])
 {
   PetscReal xi[2] = {0, 0}, slope[HYCO_FACET_NODES][3];
@@ -164,6 +169,8 @@ static PetscInt Keep(const PetscReal a[2], const PetscReal b[2], PetscInt n, Pet
   return kept;
 }
 
+/* Sutherland and Hodgman clip by one side of the slave after the other. Each cut adds at most one corner to a convex
+   polygon: 4 + 4 are the 8 of HycoPiece. */
 void HycoPieceCut(PetscInt dim, const HycoSide *slave, const HycoSide *master, HycoPiece *piece)
 {
   PetscInt n = master->corners;

@@ -80,6 +80,7 @@ static PetscErrorCode MortarCreate(HycoFE fe, PetscInt slaves, PetscInt masters,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Also of a partly filled one; the search goes last, because the patches borrow its arrays. */
 static PetscErrorCode MortarDestroy(Mortar *s)
 {
   PetscFunctionBegin;
@@ -105,6 +106,7 @@ static void AddSimplex(Mortar *s, const HycoPlane *plane, const HycoSide *slave,
       at[c] = share[0] * vertex[0][c] + share[1] * vertex[1][c] + share[2] * vertex[2][c];
     HycoSideFunctions(slave, at, N);
     HycoSideFunctions(master, at, other);
+    /* 2 pi r dr dz: the radius at the point, on the slave's side; round-off on the axis may make it negative. */
     if (s->fe->formulation == HYCO_AXISYMMETRIC) {
       PetscReal r = plane->centre[0] + at[0] * plane->axis[0][0];
 
@@ -148,6 +150,7 @@ static PetscErrorCode AddPiece(Mortar *s, const HycoPlane *plane, const HycoSide
   PetscFunctionBegin;
   HycoSideSet(plane, s->t.nf, s->corners, s->t.node + patch * s->t.nf, s->t.X, &master);
   HycoPieceCut(plane->dim, slave, &master, &piece);
+  /* The nearer of two layers is kept by the limit on the height, and slivers of round-off would only add masters. */
   if (!(piece.size > ROUND_OFF * s->size) || Height(slave, &master, &piece) > limit) PetscFunctionReturn(PETSC_SUCCESS);
   if (s->n_blocks == s->room_blocks) {
     s->room_blocks = 2 * s->room_blocks + 16;
@@ -157,6 +160,7 @@ static PetscErrorCode AddPiece(Mortar *s, const HycoPlane *plane, const HycoSide
   b->nf = master.nf;
   PetscCall(PetscArraycpy(b->node, master.node, master.nf));
   PetscCall(PetscMemzero(b->P, sizeof(b->P)));
+  /* A fan of triangles from the first corner: pieces are convex. In 2D one round, over the interval. */
   for (PetscInt k = 1; k + 1 < PetscMax(piece.n, 3); k++) {
     const PetscReal *a = piece.at[0], *p = piece.at[k], *q = plane->dim == 2 ? piece.at[0] : piece.at[k + 1];
     const PetscReal *const vertex[3] = {a, p, q};
@@ -243,6 +247,8 @@ static PetscErrorCode MakeDual(Mortar *s, const HycoSide *slave, PetscBool *usab
   for (PetscInt i = 0; i < slave->nf; i++) {
     for (PetscInt k = 0; k < slave->nf; k++) A[i * slave->nf + k] = s->M[i][k];
   }
+  /* M is the mass matrix of the facing part, thus positive definite there; info = 1 (its initial value) selects the
+     slivers' branch below. */
   if (s->facing > SLIVER * s->size) LAPACKpotrf_("L", &n, A, &n, &info);
   for (PetscInt b = 0; b < s->n_blocks; b++) {
     PetscScalar *P = &s->block[b].P[0][0], column[HYCO_FACET_NODES];
@@ -257,6 +263,8 @@ static PetscErrorCode MakeDual(Mortar *s, const HycoSide *slave, PetscBool *usab
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Terms of all facets are collected first and merged by row at the end: how many masters a row has is not known
+   before. */
 static PetscErrorCode AddTerm(Mortar *s, PetscInt row, PetscInt node, PetscReal value)
 {
   PetscFunctionBegin;
@@ -345,6 +353,7 @@ static PetscErrorCode AddPins(Mortar *s, const HycoSide *slave)
     if (takes[k]) sum += s->own[k];
   }
   for (PetscInt i = 0; i < slave->nf; i++) {
+    /* A node with a row has its own mean, and keeps its forces. */
     if (!s->pin[slave->node[i]].n || s->row[slave->node[i]] >= 0) continue;
     c[slave->nf] = !(sum > 0);
     if (slave->nf == slave->corners || !Extrapolate(s, slave, i, takes, c)) {
@@ -400,6 +409,8 @@ static PetscErrorCode Merge(const Mortar *s, PetscInt n, PetscInt place[], Petsc
     weight[merged++] = s->term[place[k]].value / D;
   }
   for (PetscInt k = 0; k < merged; k++) {
+    /* Round-off would couple nodes that only share a corner with the facing part. The rest is scaled to the sum 1,
+       so that rigid motions have no gap. */
     if (PetscAbsReal(weight[k]) < SNAP) continue;
     node[kept] = node[k];
     weight[kept] = weight[k];
@@ -461,6 +472,8 @@ static PetscErrorCode FindTakers(Mortar *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* In the order of the mesh's facets. A facet without rows of this rank is skipped, except in ties, whose pinned
+   nodes give to rows of other facets. */
 static PetscErrorCode Integrate(Mortar *s, PetscInt index, PetscInt n, const PetscInt slave[], HycoPairs *pairs)
 {
   HycoMesh m = s->fe->mesh;
@@ -489,6 +502,8 @@ static PetscErrorCode Run(Mortar *s, PetscInt index, PetscInt n, const PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Slaves of this rank only, with all facets around them here: a row is then complete without communication. Not
+   collective. */
 PetscErrorCode HycoMortarRows(HycoContact c, HycoFE fe, PetscInt index, PetscReal reach, PetscInt n,
                               const PetscInt slave[], HycoPairs *pairs)
 {
@@ -507,6 +522,8 @@ PetscErrorCode HycoMortarRows(HycoContact c, HycoFE fe, PetscInt index, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* On the whole mesh, before it is distributed. No limit of the distance: the ties' tolerance has been checked at the
+   nearest points. */
 PetscErrorCode HycoMortarTie(HycoFE fe, PetscInt slaves, PetscInt masters, const HycoProjection pin[], PetscInt n,
                              const PetscInt slave[], HycoPairs *pairs)
 {

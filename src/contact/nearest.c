@@ -53,6 +53,7 @@ void HycoPointsSplit(HycoPoint point[], PetscInt lo, PetscInt mid, PetscInt hi, 
   }
 }
 
+/* Borrows the coordinates; the corners come first among the nodes, then the middles of sides. */
 static HycoCurved Curved(HycoPatches s, PetscInt patch)
 {
   HycoCurved facet = {.nf = s->nf, .corners = s->corners};
@@ -140,6 +141,8 @@ PetscErrorCode HycoPatchesCreate(const PetscReal X[], PetscInt n, PetscInt nf, P
   s->nf = nf;
   s->corners = corners;
   s->node = node;
+  /* A complete binary tree in an array, of the depth of the larger half at each split: no pointers, and children by
+     2 t + 1. */
   for (PetscInt most = n; most > HYCO_LEAF; most = (most + 1) / 2) boxes = 2 * boxes + 1;
   PetscCall(PetscMalloc1(n, &s->item));
   PetscCall(PetscMalloc1(boxes, &s->box));
@@ -157,6 +160,7 @@ PetscErrorCode HycoPatchesCreate(const PetscReal X[], PetscInt n, PetscInt nf, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Coordinates, nodes and normals are borrowed and stay. */
 PetscErrorCode HycoPatchesDestroy(HycoPatches *patches)
 {
   PetscFunctionBegin;
@@ -279,6 +283,7 @@ static PetscReal OnPatch(HycoPatches s, PetscInt patch, const PetscReal x[3], Pe
   return best;
 }
 
+/* A lower bound for all patches in the box, 0 inside it: what is larger than the best so far is not searched. */
 static PetscReal BoxDistance2(const HycoBox *b, const PetscReal x[3])
 {
   PetscReal sum = 0;
@@ -307,6 +312,8 @@ typedef struct {
   PetscInt patch;
 } Query;
 
+/* The limit is a little larger than the best: a patch at the same distance but for round-off must still be visited,
+   so that ties go to the smaller number on any tree. */
 static void SetBest(Query *q, PetscReal best, PetscInt patch, const PetscReal w[])
 {
   const PetscReal limit = PetscSqrtReal(best) + q->round_off;
@@ -340,6 +347,7 @@ static void Search(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi, Query *q
   }
 }
 
+/* The round-off of a distance is relative to the coordinates, not to the distance itself. */
 static PetscReal LargestCoordinate(const PetscReal lo[3], const PetscReal hi[3])
 {
   PetscReal most = 0;
@@ -368,6 +376,8 @@ void HycoPatchesProject(HycoPatches s, const PetscReal x[3], const PetscReal aga
   for (PetscInt a = 0; a < s->nf; a++) {
     PetscInt at = p->n;
 
+    /* A projection onto an edge or a node must have only its nodes as masters: HycoMasterSearchAtBorder() reads the
+       number. */
     if (PetscAbsReal(w[a]) < SNAP) continue;
     for (; at > 0 && p->node[at - 1] > s->node[patch * s->nf + a]; at--) {
       p->node[at] = p->node[at - 1];

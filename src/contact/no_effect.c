@@ -89,6 +89,7 @@ static PetscErrorCode CheckObstacles(HycoFE fe, HycoPairs *still, PetscReal norm
       const HycoOblique *oblique = HycoFEOblique(fe, still->slave[k] * fe->dim + c);
       PetscReal u = fe->u0[still->slave[k] * fe->dim + c];
 
+      /* An obliquely supported component follows the others: u_c = u0_c + sum of a_d u_d. */
       for (PetscInt d = 0; oblique && d < fe->dim; d++) u += oblique->a[d] * fe->u0[still->slave[k] * fe->dim + d];
       left -= normal[3 * k + c] * u;
     }

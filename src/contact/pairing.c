@@ -232,6 +232,7 @@ PetscErrorCode HycoMasterSearchMatch(HycoContact c, HycoFE fe, PetscInt index, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The same for pair, surface and mortar, so that a scene may change between them by the type alone. */
 PetscErrorCode HycoMasterSearchDeclare(HycoContact c)
 {
   PetscFunctionBegin;

@@ -31,6 +31,7 @@ void HycoPairsAppend(HycoPairs *p, PetscInt contact, PetscInt slave, PetscInt n,
   }
 }
 
+/* Ready for use again after HycoPairsReserve(). facts are borrowed, and queries, a count for the report, stay. */
 PetscErrorCode HycoPairsDestroy(HycoPairs *pairs)
 {
   PetscFunctionBegin;
@@ -71,6 +72,7 @@ PetscErrorCode HycoPairsSelect(const HycoPairs *all, PetscInt n, const PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A copy with all contacts, on a mesh with other numbers of nodes. */
 PetscErrorCode HycoPairsRenumber(const HycoPairs *pairs, const PetscInt index[], HycoPairs *out)
 {
   PetscInt *which;
@@ -94,6 +96,7 @@ void HycoPairsJump(const HycoPairs *p, PetscInt k, PetscInt dim, const PetscReal
   }
 }
 
+/* Adds to what is marked already: callers join the nodes of several sets. */
 void HycoPairsMark(const HycoPairs *pairs, PetscBool node[])
 {
   for (PetscInt k = 0; k < pairs->n; k++) {

@@ -17,6 +17,7 @@ static PetscBool MayMeet(const HycoBox *b, const HycoPrism *p)
   return (PetscBool)(HycoTangentialLength(r, p->normal) <= p->radius + radius);
 }
 
+/* No order and no exact test: the caller cuts polygons anyway, and a missed patch would be an error. */
 static void Collect(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi, const HycoPrism *p, PetscInt *n,
                     PetscInt patch[])
 {

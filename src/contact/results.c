@@ -29,7 +29,9 @@ static void AddMiddles(HycoFE fe, const HycoPairs *pairs, PetscInt c, const Pets
     const PetscInt slave = pairs->slave[k];
     PetscReal all[2] = {size[slave], force[slave]};
 
+    /* p = (sum of lambda) / (sum of areas) of the node and its facets' middles. */
     if (pairs->contact[k] != c || !HycoNodeHasNoArea(fe, slave)) continue;
+    /* Few nodes are on the axis: the search over all facets needs no table. */
     for (PetscInt f = 0; f < m->n_facets; f++) {
       const PetscInt *node = m->facets + f * m->nf;
 

@@ -30,6 +30,8 @@ static void AddToRow(HycoFE fe, PetscInt node, PetscReal scale, const PetscReal 
     if (fe->fixed[i]) {
       *gap -= entry * fe->u0[i];
     } else if (PetscAbsReal(entry) > 1e-14) {
+      /* Normals have unit length: smaller components are round-off of their computation, and would widen rows and
+         patterns. */
       dof[*n] = i;
       value[(*n)++] = entry;
     }
@@ -55,6 +57,8 @@ static PetscErrorCode CheckCorner(HycoFE fe, const HycoPairs *pairs, PetscInt k,
   PetscInt n = 0;
 
   PetscFunctionBegin;
+  /* Three directions fill the space: CheckSlaves() in find_contacts.c has refused more contacts than free
+     displacements. */
   for (PetscInt j = k; j >= 0 && n < 3; j = before[j], n++) { /* k's own last: Gram-Schmidt in reverse order */
     OfUnknowns(fe, slave, normal + 3 * j, base[n]);
     for (PetscInt c = 0; c < 3; c++) base[n][c] = c < fe->dim && !fe->fixed[slave * fe->dim + c] ? base[n][c] : 0;
@@ -112,6 +116,7 @@ static PetscErrorCode Rows(HycoFE fe, const HycoPairs *pairs, const PetscReal no
 
     AddRow(fe, pairs, k, normal + 3 * k, &n, dof, value, &gap[k]);
     start[k + 1] = n;
+    /* An empty row has no unknown: its gap is a statement about prescribed displacements. */
     if (start[k + 1] == start[k] && !HycoPairsAlone(fe->scene, pairs, k))
       PetscCall(HycoContactCheckStill(fe, pairs, k, drawn, &gap[k]));
   }
@@ -149,6 +154,8 @@ static void Tangents(PetscInt dim, const PetscReal n[3], PetscReal t[6])
     t[1] = n[0];
     return;
   }
+  /* With a margin: two components that are equal but for round-off must give the same axis on all ranks and at all
+     steps. */
   for (PetscInt c = 1; c < 3; c++) least = PetscAbsReal(n[c]) < PetscAbsReal(n[least]) - 1e-6 ? c : least;
   axis[least] = 1;
   for (PetscInt c = 0; c < 3; c++) t[c] = axis[(c + 1) % 3] * n[(c + 2) % 3] - axis[(c + 2) % 3] * n[(c + 1) % 3];
@@ -156,6 +163,8 @@ static void Tangents(PetscInt dim, const PetscReal n[3], PetscReal t[6])
   for (PetscInt c = 0; c < 3; c++) t[3 + c] = n[(c + 1) % 3] * t[(c + 2) % 3] - n[(c + 2) % 3] * t[(c + 1) % 3];
 }
 
+/* The first row of a contact is that of HycoContactRows(), which has refused parallel normals at one slave before.
+   The gap of a tangent is the displacement along it in u. */
 PetscErrorCode HycoContactTangentRows(HycoFE fe, HycoPairs *pairs, const PetscInt row[], const PetscReal u[],
                                       PetscReal tangent[], PetscInt start[], PetscInt dof[], PetscReal value[],
                                       PetscReal gap[])

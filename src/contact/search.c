@@ -19,6 +19,7 @@ PetscErrorCode HycoMasterSearchJudge(HycoMasterSearch *t, PetscInt slave, PetscR
     *why = HYCO_TURNED;
     HycoMasterSearchProject(t, slave, PETSC_TRUE, at);
   }
+  /* Turned away is reported before the distance, because a larger tolerance would not help. */
   if (*why == HYCO_FOUND && at->distance > tolerance) *why = HYCO_FAR;
   if (*why != HYCO_FOUND || !out || at->distance <= small) PetscFunctionReturn(PETSC_SUCCESS);
   HycoMasterSearchAcross(t, slave, at, r);
@@ -59,6 +60,7 @@ static PetscErrorCode AnswerAll(HycoMasterSearch *t, const HycoQuery *q, PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Logged as a whole: an event per node would cost more than the projection. */
 PetscErrorCode HycoMasterSearchFind(HycoMasterSearch *t, const HycoQuery *q, PetscInt n, const PetscInt slave[],
                                     HycoProjection at[], HycoVerdict why[])
 {

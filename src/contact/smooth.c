@@ -20,6 +20,7 @@ static PetscReal Weight(HycoFE fe, PetscInt nf, const PetscInt node[], PetscInt 
   const PetscReal *x = fe->X + 3 * node[v];
   const PetscReal a = HycoDistance(fe->X + 3 * next, x), b = HycoDistance(fe->X + 3 * last, x),
                   c = HycoDistance(fe->X + 3 * next, fe->X + 3 * last);
+  /* By the law of cosines from the three lengths; clipped below, since round-off of a straight angle exceeds 1. */
   const PetscReal cosine = nf > 2 ? (a * a + b * b - c * c) / (2 * a * b) : 0;
 
   return nf == 2 ? 1 / a : PetscSqrtReal(PetscMax(1 - cosine * cosine, 0)) / (a * b);
@@ -147,6 +148,7 @@ PetscErrorCode HycoSmoothNormals(HycoFE fe, PetscInt group, PetscReal normal[], 
   PetscCall(FindBends(fe, group, &s, bend));
   for (PetscInt i = 0; i < m->n_nodes; i++) {
     doubt[i] = FLAT;
+    /* On an edge of the body each facet is its own surface: there is no smooth normal to be in doubt about. */
     if (s.bend[i] >= EDGE) continue;
     if (s.fan[i] || HycoMeshIsQuadratic(m))
       doubt[i] += bend[i];

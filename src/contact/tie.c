@@ -134,6 +134,7 @@ typedef struct {
   PetscInt n_groups, *group, *held;
 } Shared;
 
+/* Bits by component; on the axis component 0 is held by symmetry, as if by a support. */
 static PetscErrorCode SharedCreate(HycoScene s, HycoMesh m, Shared *shared)
 {
   PetscFunctionBegin;
@@ -163,6 +164,8 @@ static PetscErrorCode SharedDestroy(Shared *shared)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A group's nodes are ascending. The only possible error of the search is a wrong argument, hence the abort in a
+   function without an error code. */
 static PetscBool IsIn(HycoMesh m, PetscInt group, PetscInt node)
 {
   PetscInt at = -1;
@@ -211,6 +214,7 @@ static PetscErrorCode TryMeans(HycoFE fe, PetscInt k, const Shared *shared, Hyco
   PetscCall(HycoMortarTie(fe, slaves, masters, pin, n, slave, &found->mean));
   *refused = 0;
   for (PetscInt j = 0; j < n; j++) {
+    /* Before CanFollow(), which reads the masters through it; a refused one gets its nearest point back. */
     found->row[slave[j]] = first + j;
     if (CanFollow(m, shared, found, slave[j])) continue;
     pin[slave[j]] = found->at[slave[j]];
@@ -238,6 +242,7 @@ static PetscErrorCode FindMeans(HycoFE fe, PetscInt k, const Shared *shared, Fou
 
     if (found->tie[i] != k) pin[i] = (HycoProjection){.n = 1, .node = {i}, .weight = {1}};
   }
+  /* Ends, because each round pins at least one node more, and pins are never released. */
   do {
     found->mean.n = first;
     PetscCall(TryMeans(fe, k, shared, pin, found, &refused));
@@ -256,6 +261,7 @@ static PetscErrorCode FindAllMeans(HycoScene s, HycoMesh m, Found *found)
   PetscFunctionBegin;
   for (PetscInt k = 0; k < s->n_ties; k++) any = (PetscBool)(any || s->tie[k].mortar);
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
+  /* The integrals need outward normals; a mesh just read has its facets in the order of the file. */
   for (PetscInt f = 0; f < m->n_facets; f++) HycoMeshTurnFacet(m, m->facet_cell[f], m->facets + f * m->nf);
   PetscCall(HycoFECreateRead(s, m, &fe));
   PetscCall(HycoFESetDrawn(fe));
@@ -286,6 +292,8 @@ static PetscErrorCode CheckRoom(HycoScene s, HycoMesh m, const Found *found)
       const PetscInt masters = Masters(found, i, &node, &weight);
 
       if (masters) tie = found->tie[i];
+      /* A master that several nodes of the cell follow counts once. Marked afterwards, with the number of the cell,
+         so that nothing is reset. */
       for (PetscInt a = 0; a < masters; a++) n += seen[node[a]] != e + 1;
       for (PetscInt a = 0; a < masters; a++) seen[node[a]] = e + 1;
     }
@@ -421,6 +429,7 @@ static PetscErrorCode Choose(HycoScene s, HycoMesh m, const HycoPairs *p, PetscI
       const PetscInt tied = HycoMeshTied(m, p->slave[j]);
 
       if (tied < 0) which[(*n)++] = j;
+      /* Its masters' contacts may be on the owner only. */
       if (HycoMeshOwned(m, p->slave[j]) < 0) continue; /* of another rank */
       HycoCheck(tied < 0 || Followed(m, tied, p->contact[k], has),
                 "contact %s: node %d is a slave of the tie %s, and its master nodes do not have this contact; exchange "

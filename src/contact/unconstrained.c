@@ -12,6 +12,8 @@
 enum { GIVEN, SLAVE, MASTER, N_SENSES };
 #define MOST_CONTACTS 3 /* contacts whose normals are chosen independently; more have a common choice */
 
+/* Arrays are by contact of this rank; decisions are taken on sums over all ranks, so that all ranks follow the same
+   branches. */
 typedef struct {
   MPI_Comm comm;
   HycoFE fe, wide;       /* of this rank's contacts; with all facets around their neighbours */

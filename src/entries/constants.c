@@ -25,7 +25,8 @@ static PetscErrorCode CheckName(HycoScene s, const char key[], const char name[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Appends `text` with its constants substituted, in brackets. depth: nesting of constants, to detect cycles. */
+/* Appends `text` with its constants substituted, in brackets. depth: nesting of constants, to detect cycles. A
+   chain of constants that refers to no one twice is at most n_constants deep. */
 static PetscErrorCode Expand(HycoScene s, const char key[], const char text[], PetscInt depth, char out[LONGEST])
 {
   size_t at = strlen(out);
@@ -43,6 +44,7 @@ static PetscErrorCode Expand(HycoScene s, const char key[], const char text[], P
     } else if (isdigit((unsigned char)*text) || *text == '.') { /* the e5 of 1e5 is not a name */
       while (isalnum((unsigned char)text[n]) || text[n] == '.') n++;
     }
+    /* Two brackets and the zero at the end. */
     HycoCheck(at + n + 3 < LONGEST, "%s: with its constants inserted, the expression is longer than %d characters", key,
               LONGEST);
     if (c < s->n_constants) {
@@ -62,6 +64,8 @@ static PetscErrorCode Expand(HycoScene s, const char key[], const char text[], P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Substituted as text, in brackets, because muParser's own constants are numbers and could not depend on
+   parameters. */
 PetscErrorCode HycoSceneExpression(HycoScene s, const char key[], const char text[], HycoExpr *expr)
 {
   const char *const *names = (const char *const *)s->parameter;
@@ -81,6 +85,7 @@ PetscErrorCode HycoSceneExpression(HycoScene s, const char key[], const char tex
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* All are listed before one is expanded: they may refer to each other in any order. */
 PetscErrorCode HycoSceneReadConstants(HycoScene s)
 {
   HycoExpr tried = NULL;

@@ -3,6 +3,7 @@
 #include <petscviewer.h>
 #include <string.h>
 
+/* value -1: a length that was not given. *entry stays valid, since the array does not grow. */
 PetscErrorCode HycoDeclaredAdd(HycoDeclared *d, const char name[], const char title[], HycoEntryKind kind,
                                PetscBool required, HycoEntry **entry)
 {
@@ -31,6 +32,7 @@ HycoEntry *HycoDeclaredFind(HycoDeclared *d, const char name[])
   return NULL;
 }
 
+/* A length is a number without parameters: the search for masters depends on it. */
 PetscErrorCode HycoDeclaredRead(HycoScene s, const char key[], const char text[], HycoEntry *e)
 {
   char *end;
@@ -54,6 +56,7 @@ PetscErrorCode HycoDeclaredRead(HycoScene s, const char key[], const char text[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* except: the entry of that name is left out, and with it those of the law; NULL: none is. */
 PetscBool HycoDeclaredChanges(const HycoDeclared *d, const char except[], const PetscBool changed[])
 {
   for (PetscInt j = 0; j < d->n; j++) {

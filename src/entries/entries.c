@@ -12,6 +12,7 @@ static const char *const sections[] = {"scene_",    "parameter_", "constant_", "
                                        "traction_", "force_",     "spring_",   "gravity_", "rotation_", "contact_",
                                        "hyco_",     "output_",    "history_",  "tie_"};
 
+/* PETSc's own options share the database: the prefix decides. */
 PetscBool HycoIsSceneKey(const char name[])
 {
   for (size_t s = 0; s < sizeof(sections) / sizeof(sections[0]); s++) {
@@ -29,6 +30,8 @@ static PetscErrorCode ListKeys(PetscOptions options, PetscBool method_only, Pets
   PetscFunctionBegin;
   *n = 0;
   *keys = NULL;
+  /* One text of all options and values; a word that begins with a dash may also be a value, which HasName()
+     excludes. */
   PetscCall(PetscOptionsGetAll(options, &all));
   for (word = all; *word; word++) room += *word == '-';
   PetscCall(PetscCalloc1(room + 1, keys));
@@ -47,7 +50,7 @@ static PetscErrorCode ListKeys(PetscOptions options, PetscBool method_only, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads an option of any length. */
+/* Reads an option of any length. PetscOptionsGetString() needs the length beforehand, and cuts longer ones. */
 static PetscErrorCode GetLong(PetscOptions options, const char key[], char **value)
 {
   char dashed[HYCO_LINE];
@@ -86,12 +89,14 @@ PetscErrorCode HycoEntriesOverride(PetscOptions options, PetscBool method_only)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* By key: the order in which the database lists them is no property of the scene. */
 static int CompareEntries(const void *a, const void *b)
 {
   return strcmp(*(char *const *)a, *(char *const *)b);
 }
 
-/* Refuses entries that were not read: those of no known section, and those whose name has a blank. */
+/* Refuses entries that were not read: those of no known section, and those whose name has a blank. After all known
+   entries have been read, PETSc's list of unused ones has the rest. */
 static PetscErrorCode RefuseOthers(PetscOptions options)
 {
   PetscInt n;
@@ -109,6 +114,8 @@ static PetscErrorCode RefuseOthers(PetscOptions options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* scene->key takes over the array; the number of entries grows as values are read, so that a scene that fails is
+   freed to that point. */
 PetscErrorCode HycoEntriesList(HycoScene scene)
 {
   PetscInt n;
@@ -153,6 +160,7 @@ static PetscErrorCode FindFile(const char path[], char file[PETSC_MAX_PATH_LEN],
   } else {
     snprintf(file, PETSC_MAX_PATH_LEN, "%s", path);
   }
+  /* Paths in the scene are relative to its file. */
   snprintf(folder, PETSC_MAX_PATH_LEN, "%s", file);
   slash = strrchr(folder, '/');
   if (slash)
@@ -175,7 +183,8 @@ static PetscBool IsText(const char file[])
   return (PetscBool)(byte == EOF);
 }
 
-/* The file's text, terminated by a byte 0; NULL if it has none. The caller frees it. */
+/* The file's text, terminated by a byte 0; NULL if it has none. The caller frees it. By its size, so the file must
+   be seekable; a pipe gives NULL, and PETSc reads it. */
 static PetscErrorCode ReadText(const char file[], char **text)
 {
   FILE *f = fopen(file, "rb");
@@ -230,6 +239,8 @@ static PetscErrorCode ReadYAML(PetscOptions options, const char file[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Every rank reads the file: it is small, and PETSc's options are local to a rank. Collective by the check of
+   errors. */
 PetscErrorCode HycoEntriesRead(MPI_Comm comm, const char path[], PetscOptions *options, char folder[PETSC_MAX_PATH_LEN])
 {
   char file[PETSC_MAX_PATH_LEN] = "";

@@ -32,6 +32,8 @@ static void Quiet(muParserHandle_t parser)
   (void)parser;
 }
 
+/* By text: equal expressions in other words count as different, which costs time but is never wrong. Both NULL are
+   alike. */
 PetscBool HycoExprAlike(HycoExpr a, HycoExpr b)
 {
   return a && b ? (PetscBool)(strcmp(a->text, b->text) == 0) : (PetscBool)(!a && !b);
@@ -72,6 +74,7 @@ static PetscErrorCode FindVariables(HycoExpr e, PetscInt n, const char *const na
     double *address = NULL;
 
     mupGetExprVar(e->parser, (unsigned)k, &name, &address);
+    /* A variable is known by its address alone. */
     if (address >= e->x && address < e->x + 3) {
       e->in_space = PETSC_TRUE;
     } else if (address >= e->mu && address < e->mu + n) {
@@ -117,6 +120,7 @@ static PetscErrorCode Parse(HycoExpr e, PetscInt n, const char *const names[])
 
   PetscFunctionBegin;
   e->n_parameters = n;
+  /* "inf" and "nan" are numbers for strtod(), but have no digit. */
   e->constant = HycoNumber(e->text, &end);
   while (*end == ' ') end++;
   if (end != e->text && *end == '\0' && strpbrk(e->text, "0123456789")) PetscFunctionReturn(PETSC_SUCCESS);
@@ -154,6 +158,7 @@ PetscErrorCode HycoExprCreate(const char key[], const char text[], PetscInt n, c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For messages: the place, and those parameters that the expression uses. */
 PetscErrorCode HycoExprPlace(HycoExpr e, const PetscReal mu[], const PetscReal xyz[3], char place[HYCO_LINE])
 {
   size_t length;
@@ -179,6 +184,8 @@ PetscErrorCode HycoExprEval(HycoExpr e, const PetscReal mu[], PetscInt n, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* value[k] at xyz[3 k .. 3 k + 2] and temperature[k]; NULL: the expression must not use it. Not for several
+   threads: the variables are fields of e. What does not vary in space is evaluated once. */
 PetscErrorCode HycoExprEvalHot(HycoExpr e, const PetscReal mu[], PetscInt n, const PetscReal xyz[],
                                const PetscReal temperature[], PetscReal value[])
 {
@@ -231,6 +238,7 @@ PetscErrorCode HycoExprRefuseHeat(HycoExpr e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* changed[]: for each variable. NULL, an entry that was not given, never changes. */
 PetscBool HycoExprChanges(HycoExpr e, const PetscBool changed[])
 {
   if (!e) return PETSC_FALSE;
@@ -245,6 +253,7 @@ const char *HycoExprKey(HycoExpr e)
   return e->key;
 }
 
+/* As muParser permits, but without _ at the beginning, which its own constants have. */
 PetscBool HycoIsVariableName(const char word[])
 {
   static const char *const taken[] = {"x", "y", "z", "pi"};

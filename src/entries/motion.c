@@ -14,12 +14,14 @@ static HycoExpr *Find(HycoScene s, const char key[])
     const size_t n = strlen(vectors[k]);
 
     for (PetscInt c = 0; c < 3; c++) {
+      /* | 32: lower case in ASCII. */
       if (strncasecmp(key, vectors[k], n) == 0 && (key[n] | 32) == "xyz"[c] && !key[n + 1]) return &at[k][c];
     }
   }
   return NULL;
 }
 
+/* Accelerations are integrated over cells with one value: a field of them would not be a rigid motion. */
 PetscErrorCode HycoSceneReadMotion(HycoScene s, PetscInt entry)
 {
   const char *key = s->key[entry];
@@ -46,6 +48,8 @@ static HycoExpr *At(HycoScene s, PetscInt k)
   return k < 3 ? &m->gravity[k] : k == 3 ? &m->speed : k < 7 ? &m->axis[k - 4] : &m->through[k - 7];
 }
 
+/* changed NULL: whether there is any; else whether the changed variables affect it. A body without density has
+   none. */
 PetscBool HycoSceneHasInertia(HycoScene s, const HycoBody *body, const PetscBool changed[])
 {
   const HycoMotion *m = &s->motion;
@@ -57,6 +61,7 @@ PetscBool HycoSceneHasInertia(HycoScene s, const HycoBody *body, const PetscBool
   return (PetscBool)(changes || HycoExprChanges(body->density, changed));
 }
 
+/* An acceleration without a density would silently do nothing. */
 PetscErrorCode HycoSceneCheckMotion(HycoScene s)
 {
   const char *given = NULL, *place = NULL;

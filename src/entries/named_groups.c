@@ -1,6 +1,8 @@
 /* The groups of the mesh that a scene names. */
 #include <hycocontactimpl.h>
 
+/* The one list of entries that name groups: the checks of a mesh and the inspection both use it. A group may be
+   visited several times. */
 PetscErrorCode HycoSceneVisitGroups(HycoScene s, HycoGroupVisitor visit, void *context)
 {
   PetscFunctionBegin;

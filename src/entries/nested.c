@@ -14,7 +14,8 @@ static char *SkipQuoted(char *c)
   return *c ? c + 1 : c;
 }
 
-/* Whether a scalar, a list or a mapping may begin here: after a separator and blanks. */
+/* Whether a scalar, a list or a mapping may begin here: after a separator and blanks. Elsewhere brackets and
+   quotes are part of a plain scalar. */
 static PetscBool Begins(const char text[], const char *c)
 {
   while (c > text && (c[-1] == ' ' || c[-1] == '\t')) c--;
@@ -28,6 +29,7 @@ static PetscBool IsItem(const char line[])
   return (PetscBool)(line[0] == '-' && strchr(" \t", line[1]) && line[1 + strspn(line + 1, " \t")] == '[');
 }
 
+/* Changes the text in place; true if it changed anything. Comments and quoted texts stay as they are. */
 PetscBool HycoEntriesFlatten(char text[])
 {
   PetscInt depth = 0; /* of open brackets */

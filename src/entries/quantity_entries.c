@@ -7,6 +7,7 @@ const char *const HycoQuantityFields[] = {
     "sigma_zz", "sigma_xy",    "sigma_yz",    "sigma_xz",    "sigma_rr",         "sigma_tt",
     "mises",    "principal_1", "principal_2", "principal_3", "contact_pressure", NULL};
 
+/* The index in HycoQuantityFields is the field's number in output/quantities.c. */
 static PetscErrorCode FindField(const char key[], const char text[], PetscInt *field)
 {
   char list[HYCO_LINE] = "";
@@ -27,6 +28,8 @@ static PetscErrorCode FindAxis(const char key[], const char axis[], PetscInt *fi
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* field: index in the scene's output_fields, whose order is that of HycoQuantityKind up to AREA; after it come
+   group and contact. */
 PetscErrorCode HycoSceneReadQuantity(HycoScene s, PetscInt entry, const char name[], PetscInt field)
 {
   HycoQuantity *q = NULL;
@@ -76,11 +79,14 @@ PetscErrorCode HycoSceneReadQuantity(HycoScene s, PetscInt entry, const char nam
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* NULL: not given. */
 static PetscBool SameText(const char a[], const char b[])
 {
   return (PetscBool)(a && b ? !strcmp(a, b) : a == b);
 }
 
+/* at[k]: which of the other scene's outputs is the same as k; -1: none. By what is measured, not by name alone: a
+   model's scene may be older. */
 void HycoSceneMatchQuantities(HycoScene s, HycoScene other, PetscInt at[])
 {
   for (PetscInt k = 0; k < s->n_quantities; k++) {
@@ -97,6 +103,7 @@ void HycoSceneMatchQuantities(HycoScene s, HycoScene other, PetscInt at[])
   }
 }
 
+/* From kind `first` to `last`, in their order. */
 PetscBool HycoSceneHasOutputs(HycoScene s, HycoQuantityKind first, HycoQuantityKind last)
 {
   for (PetscInt k = 0; k < s->n_quantities; k++) {
@@ -120,7 +127,8 @@ PetscBool HycoSceneHasContactOutputs(HycoScene s)
   return HycoSceneHasOutputs(s, HYCO_QUANTITY_FORCE, HYCO_QUANTITY_PRESSURE_MIN);
 }
 
-/* A quantity of contacts has a contact of the scene or none, and no group; one of a field has no contact. */
+/* A quantity of contacts has a contact of the scene or none, and no group; one of a field has no contact. After
+   all contacts are read. */
 static PetscErrorCode CheckContact(HycoScene s, const HycoQuantity *q)
 {
   char list[HYCO_LINE] = "";
@@ -143,6 +151,7 @@ static PetscErrorCode CheckContact(HycoScene s, const HycoQuantity *q)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Outputs and parameters are columns of one table. */
 PetscErrorCode HycoSceneCheckQuantities(HycoScene s)
 {
   PetscFunctionBegin;

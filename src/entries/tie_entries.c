@@ -3,6 +3,7 @@
 #include <hycosceneimpl.h>
 #include <string.h>
 
+/* field: index in the scene's tie_fields. tolerance -1: the default, from the size of the mesh. */
 PetscErrorCode HycoSceneReadTie(HycoScene s, PetscInt entry, const char name[], PetscInt field)
 {
   HycoTie *tie = NULL;

@@ -18,7 +18,8 @@ static int LineAt(const char text[], size_t at)
   return line;
 }
 
-/* What is wrong, after the parser has stopped. */
+/* What is wrong, after the parser has stopped. Also where the open bracket or quote began, which is often the real
+   mistake. */
 static void Describe(const yaml_parser_t *p, const char text[], char problem[HYCO_LINE])
 {
   const PetscBool bytes = (PetscBool)(p->error == YAML_READER_ERROR);
@@ -69,6 +70,8 @@ static void CheckEvents(yaml_parser_t *parser, const char text[], char problem[H
   }
 }
 
+/* Twice, because events know no aliases: the second pass builds the document, after the first has bounded its
+   depth. */
 PetscBool HycoYAMLHasProblem(const char text[], char problem[HYCO_LINE])
 {
   yaml_parser_t parser;
@@ -106,7 +109,8 @@ typedef struct {
   PetscInt *line_of;
 } Scan;
 
-/* A key: its path becomes s->path. */
+/* A key: its path becomes s->path. The path is compared, not the key: "young" of two bodies is no repetition.
+   Without letter case, as in PETSc's database. */
 static PetscErrorCode TakeKey(Scan *s, const char word[])
 {
   const size_t length = strlen(s->path);
@@ -155,7 +159,7 @@ static PetscErrorCode TakeValue(Scan *s, PetscBool scalar, PetscBool list, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The last list or mapping ends. */
+/* The last list or mapping ends. The path's end is cut at the next key. */
 static PetscErrorCode TakeEnd(Scan *s)
 {
   const Level *ended = &s->level[--s->depth];

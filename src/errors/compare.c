@@ -7,6 +7,7 @@ typedef struct {
   PetscReal lost2, size2, lost, size;
 } Norms;
 
+/* lost2 and size2 are sums of squares, lost and size maxima. */
 static void Add(Norms *n, PetscReal value, PetscReal reference)
 {
   n->lost2 += (value - reference) * (value - reference);
@@ -15,6 +16,8 @@ static void Add(Norms *n, PetscReal value, PetscReal reference)
   n->size = PetscMax(n->size, PetscAbsReal(reference));
 }
 
+/* U, u: displacements of the RID's nodes; sigma: (cells of the RID) x (components); Lambda, lambda: forces of all
+   contacts, also of those outside the RID, which are reconstructed. NULL sigma or inelastic: not compared. */
 PetscErrorCode HycoROMMeasureRID(HycoROM m, const PetscReal u[], const PetscReal sigma[], const PetscReal inelastic[],
                                  const PetscReal lambda[], HycoLost lost[])
 {
@@ -53,6 +56,7 @@ PetscErrorCode HycoROMMeasureRID(HycoROM m, const PetscReal u[], const PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The relative errors of the paper's section 3, without those of the whole mesh, which need its rows. */
 PetscErrorCode HycoROMCompareRID(HycoROM m, const PetscReal u[], const PetscReal sigma[], const PetscReal lambda[],
                                  HycoErrors *e, HycoForceErrors *forces)
 {
@@ -81,6 +85,7 @@ typedef struct {
 
 #define COMPARED "HycoCompared" /* they are composed with the full-order model */
 
+/* PETSc calls it when the full-order model is destroyed, or another is composed under the name. */
 static PetscErrorCode DestroyCompared(HycoContained contained)
 {
   HycoCompared k = (HycoCompared)HycoContainedContext(contained);
@@ -107,6 +112,7 @@ static PetscErrorCode ReadModes(HycoCompared k, const char path[])
   PetscCall(HycoH5OpenOr(path, "train the model again", &h));
   ierr = HycoH5ReadRows(h, "whole/V", k->rows.first[0] * dim, n, l, V);
   PetscCall(HycoH5Close(&h, PETSC_FALSE));
+  /* The file has a row per unknown; the sum over modes runs along columns. */
   for (PetscInt i = 0; !ierr && i < n; i++) {
     for (PetscInt j = 0; j < l; j++) k->V[(size_t)j * (size_t)n + (size_t)i] = V[(size_t)i * (size_t)l + (size_t)j];
   }
@@ -129,7 +135,8 @@ static PetscErrorCode Fill(HycoROM m, HycoFOM f, HycoCompared k)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Those for this model. Collective. */
+/* Those for this model. Collective. Compared by the id, because a new model may have the address of a destroyed
+   one. Reading the modes and the norm's factor takes longer than a comparison. */
 static PetscErrorCode Keep(HycoROM m, HycoFOM f, HycoCompared *k)
 {
   PetscObjectId id = 0;
@@ -144,6 +151,7 @@ static PetscErrorCode Keep(HycoROM m, HycoFOM f, HycoCompared *k)
     PetscCall(PetscContainerGetPointer(container, (void **)k));
     if ((*k)->id == id) PetscFunctionReturn(PETSC_SUCCESS);
   }
+  /* Frees the former model's before the new one's are allocated. */
   PetscCall(PetscObjectCompose((PetscObject)f, COMPARED, NULL));
   PetscCall(PetscNew(k));
   (*k)->id = id;
@@ -157,7 +165,7 @@ static PetscErrorCode Keep(HycoROM m, HycoFOM f, HycoCompared *k)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rank 0. */
+/* Rank 0. The same number of nodes and cells is taken for the same mesh. */
 static PetscErrorCode Check(HycoROM m, HycoFOM f)
 {
   PetscFunctionBegin;
@@ -171,7 +179,8 @@ static PetscErrorCode Check(HycoROM m, HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The errors in H1 and its dual. Collective. */
+/* The errors in H1 and its dual. Collective. m and lambda are NULL on the other ranks, and AddForces() uses them
+   on rank 0 only. */
 static PetscErrorCode CompareH1(HycoROM m, const PetscReal lambda[], HycoCompared k, HycoErrors *e)
 {
   PetscReal lost, size;
@@ -188,6 +197,8 @@ static PetscErrorCode CompareH1(HycoROM m, const PetscReal lambda[], HycoCompare
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Each rank compares its rows of the whole mesh; the RID and the contacts are compared on rank 0, which has the
+   model. */
 PetscErrorCode HycoROMCompare(HycoROM m, HycoFOM f, HycoErrors *e)
 {
   HycoErrors found = {0};

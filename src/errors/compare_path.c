@@ -2,7 +2,8 @@
 #include <hycopath.h>
 #include <hycoreducerimpl.h>
 
-/* Each kind of error at its worst time and at the end. */
+/* Each kind of error at its worst time and at the end. Relative to at least HYCO_SMALL_FORCE of the path's largest
+   value: at times without load the relative error of a value near 0 would be large and mean nothing. */
 void HycoPathErrorsJudge(PetscInt n, const HycoLost lost[], HycoPathErrors *e)
 {
   const HycoPathErrors none = {.n = n};
@@ -36,11 +37,13 @@ static PetscReal *At(const Kept *kept, PetscInt k)
   return kept->value + (size_t)k * (size_t)(kept->n_dof + kept->n_sigma + kept->n_cells + kept->n_contacts);
 }
 
-/* A HycoStepMonitor. */
+/* A HycoStepMonitor. HycoFOMGetSolution() gathers on rank 0 and is collective; the inelastic strains are of this
+   rank's cells and are sent by the file's order. */
 static PetscErrorCode Keep(HycoFOM f, const HycoStep *step, void *ctx)
 {
   Kept *kept = (Kept *)ctx;
   const PetscReal *u, *sigma, *lambda;
+  /* Only rank 0 allocated the room. */
   PetscReal *to = f->rank ? NULL : At(kept, step->index), *mine;
   HycoFileOrder *all;
 
@@ -65,7 +68,8 @@ static PetscErrorCode Keep(HycoFOM f, const HycoStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The errors of the model at listed time k: U on the whole mesh, the others on the RID and the contacts. */
+/* The errors of the model at listed time k: U on the whole mesh, the others on the RID and the contacts. From the
+   whole mesh's fields to those of the RID by its maps node_whole and cell_whole. */
 static PetscErrorCode Measure(HycoROM m, const Kept *kept, PetscInt k, HycoLost lost[])
 {
   const PetscInt dim = m->model->mesh->dim, ns = m->fe->n_sigma;
@@ -104,15 +108,18 @@ static PetscErrorCode Compare(HycoROM m, PetscInt n, const PetscReal mu[], const
 
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
+  /* Else At() would be read beyond its end. */
   HycoCheck(m->model->whole_nodes * m->model->mesh->dim == kept->n_dof && m->model->whole_cells == kept->n_cells &&
                 m->model->pairs.n == kept->n_contacts,
             "the model was trained on a mesh of %d nodes and %d cells, and the scene's mesh has %d cells; compare on "
             "the training mesh",
             (int)m->model->whole_nodes, (int)m->model->whole_cells, (int)kept->n_cells);
+  /* The same steps: else the difference would contain the error of time integration. */
   PetscCall(HycoROMSetSteps(m, h->n_taken, h->taken));
   ierr = HycoROMPredict(m, n, mu);
   PetscCall(HycoROMSetSteps(m, 0, NULL));
   PetscCall(ierr);
+  /* A prediction may end before the path does. */
   reached = PetscMin(kept->n, m->trace.n_listed);
   PetscCall(PetscMalloc1(reached * HYCO_N_ERRORS, &lost));
   for (PetscInt k = 0; k < reached; k++) PetscCall(Measure(m, kept, k, lost + k * HYCO_N_ERRORS));
@@ -144,6 +151,7 @@ PetscErrorCode HycoROMComparePath(HycoROM m, HycoFOM f, PetscInt n, const PetscR
   PetscCall(HycoFOMSetStepMonitor(f, NULL, NULL));
   PetscCall(ierr);
   PetscCall(HycoFOMGetHistory(f, &h));
+  /* The monitor is removed first, on success and failure, as `kept` is on this stack. */
   HycoCheck(h.ended, "the full-order path ends at t = %.10g: %s; no comparison is possible", (double)h.t, h.why);
   HycoOnRoot(HycoComm(f), Compare(m, n, mu, &h, &kept, e));
   PetscCall(PetscFree(kept.value));

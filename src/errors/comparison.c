@@ -1,6 +1,8 @@
 /* Comparison by rows of the whole mesh, for held-out points in training and for the command. */
 #include <hycocomparison.h>
 
+/* Rows are dealt out in the file's order, in equal shares, independent of the partition: so each rank reads one
+   contiguous part of the modes. m: on rank 0; NULL on the others, whose star forests have no leaves. */
 PetscErrorCode HycoComparisonCreate(HycoFOM f, HycoROM m, HycoComparison *c)
 {
   const PetscInt all[HYCO_COMPARED] = {f->n_nodes, f->n_cells, f->n_cells}, dim = f->part->dim;
@@ -28,6 +30,7 @@ PetscErrorCode HycoComparisonCreate(HycoFOM f, HycoROM m, HycoComparison *c)
                                         : m->model->mesh->node_whole));
     PetscCall(PetscLayoutDestroy(&layout));
   }
+  /* l modes and n_fe unknowns of the RID that are taken as computed, with hybrid models. */
   PetscCallMPI(MPI_Bcast(head, 2, MPIU_INT, 0, HycoComm(f)));
   c->l = head[0];
   c->n_fe = head[1];
@@ -51,6 +54,7 @@ PetscErrorCode HycoComparisonDestroy(HycoComparison *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* From the ranks' rows to the RID on rank 0. */
 PetscErrorCode HycoComparisonBring(HycoComparison *c)
 {
   PetscFunctionBegin;
@@ -68,6 +72,7 @@ static PetscErrorCode Complete(HycoComparison *c)
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &any, 1, MPIU_INT, MPI_MAX, HycoComm(c->f)));
+  /* All ranks agree: FromRows and ToRows are collective. */
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(fe->n_dof, &u));
   PetscCall(HycoFOMFromRows(c->f, HYCO_ON_NODES, fe->dim, c->U, u));
@@ -77,7 +82,8 @@ static PetscErrorCode Complete(HycoComparison *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* U = r(u0) + V gamma (30), with the full-order values. */
+/* U = r(u0) + V gamma (30), with the full-order values. of: the rank that has the model. lda: rows of V on this
+   rank, which may be more than those of the comparison. */
 PetscErrorCode HycoComparisonPredict(HycoComparison *c, HycoROM m, PetscMPIInt of, const PetscReal V[], PetscInt lda)
 {
   const PetscInt n = c->n[0] * c->width[0], first = c->first[0] * c->width[0];
@@ -86,6 +92,7 @@ PetscErrorCode HycoComparisonPredict(HycoComparison *c, HycoROM m, PetscMPIInt o
   PetscFunctionBegin;
   if (c->f->rank == of) {
     PetscCall(PetscArraycpy(c->coefficient, m->gamma, c->l));
+    /* Appended, so that one broadcast sends both. */
     for (PetscInt k = 0; k < c->n_fe; k++) c->coefficient[c->l + k] = m->U[m->model->fe_dof[k]];
   }
   PetscCall(PetscMPIIntCast(c->l + c->n_fe, &count));
@@ -101,6 +108,7 @@ PetscErrorCode HycoComparisonPredict(HycoComparison *c, HycoROM m, PetscMPIInt o
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* square: |U - u|^2 and |u|^2 over the whole mesh, on all ranks. */
 PetscErrorCode HycoComparisonSquares(const HycoComparison *c, PetscReal square[2])
 {
   PetscFunctionBegin;

@@ -15,7 +15,8 @@ struct _n_HycoNorms {
   KSP ksp;
 };
 
-/* The H1 norm's matrix, scaled by the mesh's length so that both parts have one unit. */
+/* The H1 norm's matrix, scaled by the mesh's length so that both parts have one unit. Scaled by the length
+   squared: a gradient times a length has the unit of the displacement. */
 static PetscErrorCode AssembleNorm(HycoNorms h, Mat *A)
 {
   HycoMesh part = h->f->part;
@@ -40,7 +41,9 @@ PetscErrorCode HycoNormsCreate(HycoFOM f, HycoNorms *norms)
   HycoOnEach(HycoComm(f), HycoFECreate(scene, f->part->dm, &h->fe));
   HycoOnEach(HycoComm(f), HycoFESetParameters(h->fe, mu));
   PetscCall(AssembleNorm(h, &h->M));
+  /* M is assembled with the supports, H without; the order matters, as both use one FE. */
   PetscCall(PetscArrayzero(h->fe->fixed, h->fe->n_dof)); /* prescribed displacements are included in the norm */
+  /* Without conditions along oblique directions and ties. */
   h->fe->plain = PETSC_TRUE;
   PetscCall(AssembleNorm(h, &h->H));
   PetscCall(MatCreateVecs(h->M, &h->x, &h->y));
@@ -64,7 +67,7 @@ PetscErrorCode HycoNormsDestroy(HycoNorms *norms)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* sqrt(x.y) */
+/* sqrt(x.y). Round-off can make a square of 0 slightly negative. */
 static PetscErrorCode Root(HycoNorms h, PetscReal *norm)
 {
   PetscScalar square;
@@ -75,7 +78,8 @@ static PetscErrorCode Root(HycoNorms h, PetscReal *norm)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets x from values by node in the file's order, of which this rank has its rows. */
+/* Sets x from values by node in the file's order, of which this rank has its rows. Each rank sets the nodes that
+   it owns. */
 static PetscErrorCode SetFromRows(HycoNorms h, const PetscReal rows[])
 {
   HycoMesh part = h->f->part;
@@ -97,6 +101,7 @@ static PetscErrorCode SetFromRows(HycoNorms h, const PetscReal rows[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* |u - minus|, or |u| if minus is NULL; both by rows in the file's order. */
 PetscErrorCode HycoNormH1(HycoNorms h, const PetscReal u[], const PetscReal minus[], PetscReal *norm)
 {
   HycoMesh part = h->f->part;
@@ -116,7 +121,8 @@ PetscErrorCode HycoNormH1(HycoNorms h, const PetscReal u[], const PetscReal minu
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds B^T (L - minus) to a vector in the file's order. Rank 0. */
+/* Adds B^T (L - minus) to a vector in the file's order. Rank 0. By the contact rows of the current positions,
+   which HycoROMComplete() fills for the contacts outside the RID as well. */
 static PetscErrorCode AddForces(HycoNorms h, HycoROM m, PetscBool rid_only, const PetscReal L[],
                                 const PetscReal minus[], Vec file, PetscBool *any)
 {
@@ -139,6 +145,7 @@ static PetscErrorCode AddForces(HycoNorms h, HycoROM m, PetscBool rid_only, cons
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Only rank 0 has forces to add; the assembly sends them to the owners of the rows. */
 PetscErrorCode HycoNormDual(HycoNorms h, HycoROM m, PetscBool rid_only, const PetscReal L[], const PetscReal minus[],
                             PetscReal *norm)
 {
@@ -161,6 +168,7 @@ PetscErrorCode HycoNormDual(HycoNorms h, HycoROM m, PetscBool rid_only, const Pe
   PetscCall(VecRestoreArrayRead(file, &rows));
   PetscCall(VecDestroy(&file));
   PetscCallMPI(MPI_Bcast(&any, 1, HYCO_MPI_BOOL, 0, HycoComm(h->f)));
+  /* No force: a solve with a zero right-hand side is spared, on all ranks alike. */
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(KSPSolve(h->ksp, h->x, h->y));
   PetscCall(Root(h, norm));

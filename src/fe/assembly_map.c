@@ -13,6 +13,7 @@ struct _n_HycoAssemblyMap {
   PetscScalar *constant; /* sum of the cells that no parameter changes; NULL: there are none */
 };
 
+/* Called where the fixed unknowns change, too: the offsets and the constant sum depend on them. */
 PetscErrorCode HycoAssemblyMapDestroy(HycoAssemblyMap *places)
 {
   PetscFunctionBegin;
@@ -46,8 +47,10 @@ static PetscBool FindOffsets(HycoFE fe, const PetscInt ia[], const PetscInt ja[]
       const PetscInt row = FirstFree(fe, node[k / n]), col = FirstFree(fe, node[k % n]);
       PetscInt at = 0;
 
+      /* A pair without a free unknown is not used by Add(): any value does. */
       *offset = 0;
       if (row < 0 || col < 0) continue;
+      /* A linear search: rows have some tens of entries, and it is done once. */
       while (ia[row] + at < ia[row + 1] && ja[ia[row] + at] != col) at++;
       if (ia[row] + at == ia[row + 1]) return PETSC_FALSE;
       *offset = at;
@@ -66,6 +69,7 @@ static void Add(HycoFE fe, const PetscInt offset[], PetscInt cell, const PetscRe
   for (PetscInt r = 0; r < n; r++) {
     const PetscInt row = node[r / dim] * dim + r % dim;
 
+    /* The row of a fixed unknown has its diagonal alone. */
     if (fe->fixed[row]) {
       a[ia[row]] += Ae[r * n + r];
       continue;
@@ -76,6 +80,7 @@ static void Add(HycoFE fe, const PetscInt offset[], PetscInt cell, const PetscRe
       const PetscReal *from = Ae + r * n + b * dim;
 
       for (PetscInt d = 0; d < dim; d++) {
+        /* Fixed columns have no entries in a free row, so that free ones are contiguous. */
         if (!fixed[d]) *to++ += from[d];
       }
     }
@@ -142,6 +147,7 @@ PetscErrorCode HycoAssemblyMapAssemble(HycoFE fe, Mat K, PetscBool *done)
   *done = PETSC_FALSE;
   PetscCall(MatAssembled(K, &assembled));
   PetscCall(PetscObjectTypeCompare((PetscObject)K, MATSEQAIJ, &sequential));
+  /* The first assembly makes the pattern by MatSetValues(). */
   if (!assembled || !sequential || fe->mesh->node_global) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscObjectGetId((PetscObject)K, &id));
   PetscCall(MatGetNonzeroState(K, &pattern));
@@ -152,6 +158,7 @@ PetscErrorCode HycoAssemblyMapAssemble(HycoFE fe, Mat K, PetscBool *done)
   if (fe->places) {
     fe->places->matrix = id;
     fe->places->pattern = pattern;
+    /* Write access: the old values are not needed (nor copied from a device). */
     PetscCall(MatSeqAIJGetArrayWrite(K, &a));
     if (fe->places->constant)
       PetscCall(PetscArraycpy(a, fe->places->constant, ia[n]));

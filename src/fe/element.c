@@ -25,6 +25,7 @@ static void Tensor(HycoElement *e, PetscInt dim)
       for (PetscInt c = 0; c < dim; c++) {
         e->N[q][a] *= f[c];
         e->dN[q][a][c] = corner[a][c] / 2;
+        /* The slope along c times the values along the others. */
         for (PetscInt d = 0; d < dim; d++) e->dN[q][a][c] *= d == c ? 1 : f[d];
       }
     }
@@ -34,6 +35,7 @@ static void Tensor(HycoElement *e, PetscInt dim)
 /* Barycentric functions on the unit simplex; points of degree 2 on the lines from the centre to the corners. */
 static void Simplex(HycoElement *e, PetscInt dim)
 {
+  /* Barycentric coordinates of the points: one near its corner, the others far from theirs. */
   const PetscReal near = dim == 2 ? 2.0 / 3 : 0.58541019662496845446, far = dim == 2 ? 1.0 / 6 : 0.13819660112501051518;
 
   e->dim = dim;
@@ -53,6 +55,7 @@ static PetscReal Quadratic(PetscInt at, PetscReal x)
   return at ? x * (x + at) / 2 : 1 - x * x;
 }
 
+/* The derivative of Quadratic(). */
 static PetscReal QuadraticSlope(PetscInt at, PetscReal x)
 {
   return at ? x + at / 2.0 : -2 * x;
@@ -232,7 +235,7 @@ static void Hex(HycoElement *e, PetscInt nv)
   }
 }
 
-/* At the first use: 13 small tables, constant afterwards. */
+/* At the first use; constant afterwards. */
 static void Tabulate(void)
 {
   Tensor(&table[HYCO_LINE2], 1);
@@ -250,11 +253,13 @@ static void Tabulate(void)
   Line3(&line3_nodes, PETSC_TRUE);
   Tri6(&tri6_nodes, PETSC_TRUE);
   Quad(&quad9_nodes, 9, PETSC_TRUE);
+  /* A facet of a line: its area is 1. */
   point.nv = point.nq = 1;
   point.w[0] = point.N[0][0] = 1;
   ready = PETSC_TRUE;
 }
 
+/* Valid for the process's life. The tables are made by the first call, which must not come from two threads at once. */
 const HycoElement *HycoElementGet(HycoCellType type)
 {
   if (!ready) Tabulate();

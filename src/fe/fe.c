@@ -3,6 +3,7 @@
 #include <hycomaterialimpl.h>
 #include "assembly_map.h"
 
+/* NULL-safe. The tables belong to the DM, of which fe has a reference; those of HycoFECreateRead() to the caller. */
 PetscErrorCode HycoFEDestroy(HycoFE *fe)
 {
   PetscFunctionBegin;
@@ -61,6 +62,7 @@ static PetscErrorCode FindConstant(HycoFE fe)
   for (PetscInt e = 0; e < m->n_cells; e++) {
     const HycoMaterial law = s->body[m->cell_body[e]].law;
 
+    /* An inelastic law's tangents change from step to step without any parameter. */
     fe->constant[e] = (PetscBool)(law->linear && !HycoMaterialChanges(law, every));
     for (PetscInt a = 0; a < m->nv; a++) {
       if (moves[m->node_body[m->cells[e * m->nv + a]]]) fe->constant[e] = PETSC_FALSE;
@@ -69,6 +71,7 @@ static PetscErrorCode FindConstant(HycoFE fe)
       if (moves[m->node_body[m->follow[k]]]) fe->constant[e] = PETSC_FALSE;
     }
   }
+  /* Before constant cells are counted. */
   HycoSpringsMarkVarying(fe, every);
   for (PetscInt e = 0; e < m->n_cells; e++) fe->n_constant += fe->constant[e];
   fe->fixed_constant = PETSC_TRUE;
@@ -88,6 +91,7 @@ static PetscErrorCode FindConstant(HycoFE fe)
    the scene allows them. */
 static PetscErrorCode ChooseElements(HycoScene scene, HycoMesh mesh, PetscBool bbar[])
 {
+  /* Cells whose dilatation is neither constant (simplices) nor of second order. */
   const PetscBool has_mean = (PetscBool)(mesh->type == HYCO_QUAD4 || mesh->type == HYCO_HEX8);
 
   PetscFunctionBegin;
@@ -127,6 +131,7 @@ static PetscErrorCode Create(HycoScene scene, DM dm, HycoMesh mesh, HycoFE *fe)
   PetscCall(PetscMalloc1(scene->n_bodies, &bbar));
   ierr = ChooseElements(scene, mesh, bbar);
   for (PetscInt b = 0; b < scene->n_bodies && !ierr; b++)
+    /* Laws belong to the scene, and are set up by each fe on it: the same dimension and formulation each time. */
     ierr = HycoMaterialSetUp(scene->body[b].law, mesh->dim, scene->formulation, (PetscBool)(scene->n_times > 0));
   if (ierr) PetscCall(PetscFree(bbar));
   PetscCall(ierr);
@@ -143,6 +148,7 @@ static PetscErrorCode Create(HycoScene scene, DM dm, HycoMesh mesh, HycoFE *fe)
   PetscCall(PetscMalloc1(3 * mesh->n_nodes, &f->X));
   PetscCall(PetscCalloc1(f->n_dof, &f->fixed));
   PetscCall(PetscCalloc1(f->n_dof, &f->u0));
+  /* The order: FindConstant() needs the springs, which need the tables alone. */
   PetscCall(HycoTangentsCreate(f));
   PetscCall(HycoHeatCreate(f));
   PetscCall(PetscCalloc1(mesh->n_cells, &f->constant));
@@ -166,6 +172,7 @@ PetscErrorCode HycoFECreate(HycoScene scene, DM dm, HycoFE *fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Without a DM: only for the search of ties, whose weights the DM's cones need. */
 PetscErrorCode HycoFECreateRead(HycoScene scene, HycoMesh mesh, HycoFE *fe)
 {
   PetscFunctionBegin;
@@ -173,6 +180,8 @@ PetscErrorCode HycoFECreateRead(HycoScene scene, HycoMesh mesh, HycoFE *fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A copy of the tables' struct with no cells; its arrays are those of the DM's tables, so that only the struct is
+   freed. */
 PetscErrorCode HycoFECreateSurface(HycoScene scene, DM dm, HycoFE *fe)
 {
   struct _n_HycoMesh *surface;
@@ -198,6 +207,7 @@ PetscErrorCode HycoFESetDrawn(HycoFE fe)
 
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(fe->X, fe->mesh->xyz, 3 * fe->mesh->n_nodes));
+  /* Unique in the process, not only in fe. */
   fe->place = ++places;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -217,6 +227,7 @@ static PetscErrorCode MoveNodes(HycoFE fe)
       HycoCheck(m->dim > c, "%s: the mesh has %d space dimension%s and no component %c; remove the entry",
                 HycoExprKey(map), (int)m->dim, m->dim == 1 ? "" : "s", "xyz"[c]);
       for (PetscInt i = 0; i < m->n_nodes; i++) {
+        /* A component without a map keeps its drawn coordinate (HycoFESetDrawn()). */
         if (m->node_body[i] == b) PetscCall(HycoExprEval(map, fe->mu, 1, m->xyz + 3 * i, fe->X + 3 * i + c));
       }
     }
@@ -250,6 +261,7 @@ static PetscErrorCode CheckAxis(HycoFE fe)
 
     HycoCheck(r >= -zero, "node %d lies at x = %g; an axisymmetric scene must be drawn at x >= 0",
               (int)fe->mesh->node_id[i], (double)r);
+    /* Nodes on the axis have no radial unknown: which nodes these are must not depend on a parameter. */
     HycoCheck((r <= zero) == OnAxis(fe, i),
               "the map of body %s moves node %d from x = %g to x = %g; in an axisymmetric scene nodes on the axis x = "
               "0 must stay there, and other nodes must stay off it",
@@ -283,6 +295,7 @@ static PetscErrorCode SetOblique(HycoFE fe)
       for (PetscInt c = 0; c < 3; c++) {
         if (c < m->dim && fixed->direction[c])
           PetscCall(HycoExprEval(fixed->direction[c], fe->mu, 1, fe->X + 3 * i, &n[c]));
+        /* Of the components that the mesh has: an entry for z in 2D was refused with the mesh. */
         size += n[c] * n[c];
       }
       if (HycoMeshTied(m, i) >= 0) {
@@ -297,6 +310,7 @@ static PetscErrorCode SetOblique(HycoFE fe)
           HycoExprKey(fixed->normal), body->name, (int)m->node_id[i]);
       PetscCall(HycoExprEval(fixed->normal, fe->mu, 1, fe->X + 3 * i, &value));
       PetscCall(HycoObliqueAdd(fe, k, i, n, value, HycoExprKey(fixed->normal)));
+      /* Without prescribed values the loop over cells for K u0 is left out. */
       fe->lifted = (PetscBool)(fe->lifted || value != 0);
     }
   }
@@ -350,6 +364,7 @@ PetscErrorCode HycoFESetPins(HycoFE fe, PetscInt n, const PetscInt tag[], const 
   HycoMesh m = fe->mesh;
 
   PetscFunctionBegin;
+  /* A pin is never on a supported unknown, so that its release frees no support. */
   for (PetscInt k = 0; k < fe->n_pins; k++) fe->fixed[fe->pin[k]] = PETSC_FALSE;
   if (n != fe->n_pins) {
     PetscCall(PetscFree(fe->pin));
@@ -375,6 +390,7 @@ HycoChanges HycoSceneChanges(HycoScene s, const PetscBool changed[])
   for (PetscInt b = 0; b < s->n_bodies; b++) {
     for (PetscInt d = 0; d < 3; d++) c.nodes = (PetscBool)(c.nodes || HycoExprChanges(s->body[b].map[d], changed));
   }
+  /* Everything is integrated over, or evaluated at, the moved nodes. */
   c.stiffness = c.rows = c.gaps = c.nodes;
   for (PetscInt b = 0; b < s->n_bodies; b++)
     c.stiffness = (PetscBool)(c.stiffness || HycoMaterialChanges(s->body[b].law, changed));
@@ -428,12 +444,14 @@ PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
 
   PetscFunctionBegin;
   for (PetscInt p = 0; p < fe->scene->n_variables; p++) {
+    /* Exact comparison: a change within round-off is a change. Variables include the time of a history. */
     changed[p] = (PetscBool)(!fe->ready || mu[p] != fe->mu[p]);
     fe->mu[p] = mu[p];
   }
   c = HycoSceneChanges(fe->scene, changed);
   fe->stiffness_changed = (PetscBool)(first || c.stiffness);
   fe->contact_changed = (PetscBool)(first || c.rows);
+  /* Supports that change move D by B u0. */
   fe->gap_changed = (PetscBool)(first || c.gaps || !fe->fixed_constant);
   fe->ready = PETSC_FALSE; /* until everything is updated */
   if (first || c.nodes) {
@@ -443,6 +461,7 @@ PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
     PetscCall(HycoMirrorFind(fe));
     for (PetscInt k = 0; k < fe->n_loads; k++) fe->shares[k].ready = PETSC_FALSE;
   }
+  /* After the nodes: values and directions may depend on the position. */
   if (first || !fe->fixed_constant) PetscCall(SetSupports(fe));
   if (!fe->without_cells) {
     if (fe->temperature) PetscCall(HycoFESetHeat(fe, (PetscBool)(first || c.nodes), changed));

@@ -28,9 +28,11 @@ static PetscErrorCode AddNode(HycoFE fe, PetscInt node, PetscInt c, PetscReal va
     const PetscReal *weight = fe->mesh->ties->weight + fe->mesh->tied_entry[tied];
 
     for (PetscInt j = first; j < fe->mesh->tied_start[tied + 1]; j++)
+      /* Recursion of one level: a master is not tied, but may have a support. */
       PetscCall(AddNode(fe, fe->mesh->tied_master[j], c, weight[j - first] * value, F));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+  /* The force on a fixed unknown goes to the support. */
   if (!fe->fixed[node * fe->dim + c]) PetscCall(VecSetValue(F.vec, global * fe->dim + c, value, ADD_VALUES));
   oblique = HycoFEOblique(fe, node * fe->dim + c);
   for (PetscInt d = 0; oblique && d < fe->dim; d++) {
@@ -115,6 +117,7 @@ static PetscErrorCode AddFacetLoad(HycoFE fe, const HycoLoad *load, PetscInt fac
     PetscReal n[3], x[3] = {0, 0, 0}, p = 0, area;
 
     PetscCall(HycoFacetNormal(fe, el, facet, q, n));
+    /* dS times the weight of the point, since n has this length. */
     area = PetscSqrtReal(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
     for (PetscInt a = 0; a < m->nf; a++) {
       for (PetscInt c = 0; c < 3; c++) x[c] += el->N[q][a] * fe->X[3 * m->facets[facet * m->nf + a] + c];
@@ -180,6 +183,7 @@ static PetscErrorCode AddUniformLoad(HycoFE fe, const HycoLoad *load, PetscInt g
   PetscFunctionBegin;
   if (!s->ready) PetscCall(SetShares(fe, group, s));
   if (!s->n) PetscFunctionReturn(PETSC_SUCCESS);
+  /* At any node: the value does not depend on the place. */
   if (load->pressure) PetscCall(HycoExprEval(load->pressure, fe->mu, 1, fe->X + 3 * s->node[0], &p));
   for (PetscInt c = 0; c < 3 && c < fe->dim; c++) {
     if (load->traction[c]) PetscCall(HycoExprEval(load->traction[c], fe->mu, 1, fe->X + 3 * s->node[0], &t[c]));
@@ -210,6 +214,7 @@ static PetscErrorCode AddLifting(HycoFE fe, PetscInt cell, Into F)
   PetscCall(HycoFEElementRoom(fe, cell, &Ke));
   PetscCall(HycoFEElementStiffness(fe, cell, Ke));
   for (PetscInt k = 0; k < n; k++) {
+    /* u0 has the offsets of oblique supports, too: Ke is that of the eliminated unknowns. */
     const PetscInt i = node[k / m->dim], c = k % m->dim, global = m->node_global ? m->node_global[i] : i;
 
     /* The row of a fixed unknown is its diagonal alone (K is reduced in the same way), so that the solution there is
@@ -238,6 +243,7 @@ PetscErrorCode HycoCellHeat(HycoFE fe, PetscInt cell, PetscReal push[])
   PetscFunctionBegin;
   if (bbar) PetscCall(HycoMeanGradients(fe, el, cell, mean));
   for (PetscInt q = 0; q < el->nq; q++) {
+    /* Isotropic expansion: equal normal strains, no shear. */
     const PetscReal hot = fe->thermal[cell * el->nq + q], strain[6] = {hot, hot, hot, 0, 0, 0};
     PetscReal stress[6];
 
@@ -302,6 +308,7 @@ static PetscErrorCode AddPointLoad(HycoFE fe, const HycoPointLoad *load, Into F)
 
   PetscFunctionBegin;
   PetscCall(HycoMeshFindGroup(m, "force", load->group, &g));
+  /* A point's force acts once, at its owner's row: entries of ghosts are dropped at the assembly. */
   if (m->group_dim[g] == 0) {
     for (PetscInt k = m->group_start[g]; k < m->group_start[g + 1]; k++) {
       const PetscInt i = m->group_node[k];
@@ -345,6 +352,7 @@ static PetscErrorCode AddForces(HycoFE fe, Into F)
 
     PetscCall(HycoMeshFindGroup(m, "load", load->group, &g));
     for (PetscInt c = 0; c < m->dim; c++) in_space = (PetscBool)(in_space || HycoExprInSpace(load->traction[c]));
+    /* Shares are kept by load, as each may act on another surface. */
     if (!in_space) PetscCall(AddUniformLoad(fe, load, g, &fe->shares[k], F));
     for (PetscInt f = 0; f < m->n_facets && in_space; f++) {
       if (m->facet_group[f] == g && Acts(fe, f)) PetscCall(AddFacetLoad(fe, load, f, F));
@@ -362,6 +370,7 @@ PetscErrorCode HycoFEAssembleForce(HycoFE fe, Vec F)
 
   PetscFunctionBegin;
   PetscCall(VecSet(F, 0));
+  /* Without it ghost entries would be sent, and added to those of the owner. */
   PetscCall(VecSetOption(F, VEC_IGNORE_OFF_PROC_ENTRIES, PETSC_TRUE));
   ierr = AddForces(fe, (Into){F, NULL});
   PetscCall(VecAssemblyBegin(F));
@@ -391,6 +400,7 @@ static PetscErrorCode AddElastic(HycoFE fe, const PetscReal u[], PetscBool held,
     const PetscInt n = m->dim * HycoMeshCellNodes(m, e, node);
     PetscBool holds = (PetscBool)!held;
 
+    /* Other cells do not contribute to the rows that are wanted. */
     for (PetscInt k = 0; k < n; k++) holds = (PetscBool)(holds || fe->fixed[node[k / m->dim] * m->dim + k % m->dim]);
     if (!holds) continue;
     PetscCall(HycoFEElementRoom(fe, e, &Ke));
@@ -398,6 +408,7 @@ static PetscErrorCode AddElastic(HycoFE fe, const PetscReal u[], PetscBool held,
     for (PetscInt k = 0; k < n * n; k++) {
       const PetscInt j = node[k % n / m->dim] * m->dim + k % n % m->dim;
 
+      /* u may be without prescribed values: fixed unknowns take those at fe's parameters. */
       r[node[k / n / m->dim] * m->dim + k / n % m->dim] += Ke[k] * (fe->fixed[j] ? fe->u0[j] : u[j]);
     }
   }
@@ -418,6 +429,7 @@ PetscErrorCode HycoFEReactions(HycoFE fe, const PetscReal u[], const PetscReal f
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For derivatives at fixed free unknowns: unlike the residual of K U = F it needs no assembled K. Not collective. */
 PetscErrorCode HycoFEImbalance(HycoFE fe, const PetscReal u[], PetscReal r[])
 {
   PetscFunctionBegin;

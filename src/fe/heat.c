@@ -29,6 +29,7 @@ static PetscErrorCode SetCell(HycoFE fe, const HycoElement *el, PetscInt cell)
   for (PetscInt q = 0; q < el->nq; q++) {
     char place[HYCO_LINE];
 
+    /* Also NaN fails here: laws take logarithms and exponentials of T. */
     if (T[q] >= 0) continue;
     PetscCall(HycoExprPlace(body->temperature, fe->mu, x + 3 * q, place));
     HycoFail("%s is %g at %s; a temperature is in kelvin and not below 0", HycoExprKey(body->temperature), (double)T[q],
@@ -36,6 +37,7 @@ static PetscErrorCode SetCell(HycoFE fe, const HycoElement *el, PetscInt cell)
   }
   if (!body->expansion) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoExprEval(body->reference, fe->mu, el->nq, x, reference));
+  /* The coefficient may depend on T: it is the mean one from the reference to T, not the slope at T. */
   PetscCall(HycoExprEvalHot(body->expansion, fe->mu, el->nq, x, T, expansion));
   for (PetscInt q = 0; q < el->nq; q++)
     HycoCheck(reference[q] >= 0, "%s is %g; a temperature is in kelvin and not below 0", HycoExprKey(body->reference),

@@ -27,6 +27,7 @@ typedef struct {
   PetscReal *strain, *stress, *temperature, *thermal, *stored, *accumulated, *variable;
 } Point;
 
+/* Laws of different bodies have different numbers of variables; a cell has one law. */
 static PetscInt PointSize(HycoFE fe, PetscInt cell)
 {
   return 2 * fe->n_sigma + N_PLAIN + fe->scene->body[fe->mesh->cell_body[cell]].law->n_state;
@@ -42,6 +43,7 @@ static Point PointAt(HycoFE fe, HycoFEState state, PetscInt cell, PetscInt q)
   return p;
 }
 
+/* NULL-safe, also for no address. */
 PetscErrorCode HycoFEStateDestroy(HycoFEState *state)
 {
   PetscFunctionBegin;
@@ -106,6 +108,7 @@ PetscErrorCode HycoFEStateCopy(HycoFEState from, HycoFEState to)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Borrowed; start: n_cells + 1 offsets. Files write the reals as they are. */
 PetscErrorCode HycoFEStateGet(HycoFEState state, const PetscInt **start, PetscReal **values)
 {
   PetscFunctionBegin;
@@ -181,6 +184,7 @@ static PetscErrorCode BatchCreate(HycoFE fe, Batch *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* All work arrays are parts of one block. */
 static PetscErrorCode BatchDestroy(Batch *b)
 {
   PetscFunctionBegin;
@@ -214,10 +218,13 @@ static PetscErrorCode Gather(HycoFE fe, const HycoElement *el, Batch *b)
       for (PetscInt c = 0; c < ns; c++) {
         to.strain[c] = strain[c];
         b->strain[i * ns + c] = strain[c] - (c < 3 ? hot : 0);
+        /* Of a virgin point both are 0: its thermal strain at the first time acts as a strain from the stress-free
+           state. */
         b->strain0[i * ns + c] = from.strain[c] - (c < 3 ? *from.thermal : 0);
         b->stress0[i * ns + c] = from.stress[c];
       }
       for (PetscInt j = 0; j < n_state; j++) b->state0[i * n_state + j] = from.variable[j];
+      /* The first step begins at the temperature at which it ends. */
       b->temperature0[i] = *from.temperature == VIRGIN ? T : *from.temperature;
       b->temperature[i] = *to.temperature = T;
       *to.thermal = hot;
@@ -256,6 +263,7 @@ static void Complete(HycoFE fe, const HycoElement *el, Batch *b)
 
     if (!stores) b->stored[i] = 0;
     for (PetscInt c = 0; c < ns; c++) mean[c] = (b->stress0[i * ns + c] + b->stress[i * ns + c]) / 2;
+    /* The balance: work of the step (trapezoidal rule) less the change of the stored energy. */
     if (PetscIsNanReal(b->dissipated[i])) {
       b->dissipated[i] = *PointAt(fe, b->begin, b->cell[i / el->nq], i % el->nq).stored - b->stored[i];
       for (PetscInt c = 0; c < ns; c++) b->dissipated[i] += mean[c] * (b->strain[i * ns + c] - b->strain0[i * ns + c]);
@@ -298,6 +306,7 @@ static PetscErrorCode Update(HycoFE fe, PetscInt of, PetscInt n, Batch *b, Petsc
   PetscCall(HycoMaterialUpdate(body->law, &p));
   b->report->dt_factor = PetscMin(b->report->dt_factor, p.dt_factor);
   *failed = (PetscBool)(p.failed >= 0);
+  /* The first point that fails is named. */
   if (*failed && !b->report->failed)
     HycoFormat(b->report->why, "body %s, law %s: %s at x = %g, y = %g, z = %g", body->name,
                ((PetscObject)body->law)->type_name, p.why ? p.why : "no answer", (double)b->x[3 * p.failed],
@@ -325,6 +334,7 @@ static void Count(HycoFE fe, Batch *b, PetscInt i, const Point *from, const Poin
   r->dissipated += b->w[i] * b->dissipated[i];
   r->thermal += b->w[i] * thermal;
   r->moduli += b->w[i] * (work - thermal - b->dissipated[i] - (b->stored[i] - *from->stored));
+  /* One law without a potential is enough: the line search then has no function to minimise. */
   if (PetscIsNanReal(b->potential[i]))
     r->has_potential = PETSC_FALSE;
   else
@@ -420,11 +430,13 @@ PetscErrorCode HycoFEStepBodies(HycoFE fe, HycoBodies bodies, const PetscReal u[
              (double)t1);
   *report = fresh;
   b.report = report;
+  /* Iterations of a step evaluate the same nodes. */
   PetscCall(HycoFEKeepGradients(fe));
   PetscCall(BatchCreate(fe, &b));
   ierr = StepAll(fe, bodies, &b);
   PetscCall(BatchDestroy(&b));
   PetscCall(ierr);
+  /* Springs are in no batch; their stored energy is counted by their owners. */
   if (fe->springs && !report->failed) { /* once for all bodies */
     const PetscReal energy = HycoSpringsEnergy(fe, u);
 
@@ -507,6 +519,8 @@ PetscErrorCode HycoFEStateForce(HycoFE fe, HycoFEState state, PetscInt cell, Pet
 
 /* -- laws at some points -- */
 
+/* B: n_sigma x (nv dim), row major: the strain of unit displacements, or their work with unit stresses. By
+   HycoPointForce(), so that bbar is in it. */
 PetscErrorCode HycoFEPointRows(HycoFE fe, PetscInt cell, PetscInt q, PetscReal B[], PetscReal *weight)
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
@@ -540,6 +554,7 @@ static PetscReal Lost(HycoFE fe, PetscInt cell, PetscInt q, const PetscReal elas
     s[c] -= stress[c];
     most = PetscMax(most, PetscAbsReal(s[c]));
   }
+  /* An elastic point must have exactly no inelastic stress: modes of round-off would enter the bases. */
   if (most <= ROUNDING * PETSC_MACHINE_EPSILON * terms)
     for (PetscInt c = 0; c < ns; c++) s[c] = 0;
   return terms;
@@ -551,6 +566,7 @@ void HycoFEInelasticStress(HycoFE fe, HycoFEState state, PetscInt cell, PetscInt
   PetscReal elastic[6];
 
   for (PetscInt c = 0; c < fe->n_sigma; c++) elastic[c] = p.strain[c] - (c < 3 ? *p.thermal : 0);
+  /* The tangents must be elastic here (HycoFEElasticTangent()). */
   (void)Lost(fe, cell, q, elastic, p.stress, s);
 }
 
@@ -604,22 +620,25 @@ PetscErrorCode HycoFEStepPoints(HycoFE fe, PetscInt n, const PetscInt point[], c
   const HycoElement *el = HycoElementGet(fe->mesh->type);
   const PetscInt ns = fe->n_sigma, *of = fe->mesh->cell_body;
   Batch b = {.t0 = t0, .t1 = t1, .begin = begin, .tangents = (PetscBool)(tangent != NULL), .report = report};
+  PetscErrorCode ierr = 0;
 
   PetscFunctionBegin;
   *report = fresh;
   PetscCall(BatchCreate(fe, &b));
-  for (PetscInt from = 0, more = 0; from < n; from += more, more = 0) {
+  for (PetscInt from = 0, more = 0; from < n && !ierr; from += more, more = 0) {
     const PetscInt body = of[point[from] / el->nq];
-    PetscBool failed;
+    PetscBool failed = PETSC_TRUE;
 
+    /* Points of one body that follow each other share an evaluation. */
     while (from + more < n && more < BATCH * el->nq && of[point[from + more] / el->nq] == body) more++;
     GatherPoints(fe, el, more, point + from, strain + from * ns, &b);
-    PetscCall(Update(fe, body, more, &b, &failed));
-    if (!failed)
+    ierr = Update(fe, body, more, &b, &failed);
+    if (!ierr && !failed)
       ScatterPoints(fe, el, more, point + from, &b, s + from * ns, size + from,
                     tangent ? tangent + from * ns * ns : NULL);
   }
   PetscCall(BatchDestroy(&b));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -647,6 +666,7 @@ PetscErrorCode HycoFEStateFields(HycoFE fe, HycoFEState state, PetscReal sigma[]
       for (PetscInt c = 0; c < ns; c++) sum[c] += w * p.stress[c];
       sum[6] += w * HycoMises(fe->dim, p.stress);
       sum[7] += w * *p.accumulated;
+      /* A virgin point counts as 0. */
       sum[8] += w * PetscMax(*p.temperature, 0);
     }
     for (PetscInt c = 0; sigma && c < ns; c++) sigma[e * ns + c] = sum[c] / volume;

@@ -48,6 +48,7 @@ PetscErrorCode HycoAccelerationSet(HycoFE fe, const HycoBody *body, HycoAccelera
 
   PetscFunctionBegin;
   PetscCall(PetscMemzero(a, sizeof(*a)));
+  /* A body without density has no weight. */
   a->any = HycoSceneHasInertia(fe->scene, body, NULL);
   if (!a->any) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(Vector(fe, m->gravity, a->gravity));
@@ -72,6 +73,7 @@ PetscErrorCode HycoInertiaForce(HycoFE fe, const HycoBody *body, const HycoAccel
   PetscCall(HycoExprEval(body->density, fe->mu, 1, x, &density));
   HycoCheck(density >= 0, "%s is %g at x = %g, y = %g, z = %g; a density must be 0 or more", HycoExprKey(body->density),
             (double)density, (double)x[0], (double)x[1], (double)x[2]);
+  /* The distance vector is what is left of x - through without its part along the axis. */
   for (PetscInt c = 0; c < 3; c++) along += (x[c] - a->through[c]) * a->axis[c];
   for (PetscInt c = 0; c < 3; c++)
     force[c] = density * (a->gravity[c] + a->square * (x[c] - a->through[c] - along * a->axis[c]));

@@ -4,6 +4,7 @@
 /* det dX/dxi at point q, with its sign. */
 PetscReal HycoDeterminant(const HycoElement *el, const PetscInt node[], const PetscReal X[], PetscInt q)
 {
+  /* Directions that the mesh does not have keep 1, so that one formula serves all dimensions. */
   PetscReal J[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
 
   for (PetscInt c = 0; c < el->dim; c++) {
@@ -34,6 +35,7 @@ PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, Pe
   PetscReal J[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, inv[3][3], det, size = 1;
 
   PetscFunctionBegin;
+  /* Kept values have the factors of the weight in them. */
   if (HycoGradientsKept(fe)) {
     const PetscReal *kept = HycoKeptGradients(fe, el, cell, q);
 
@@ -75,6 +77,7 @@ PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, Pe
   }
   *weight = PetscAbsReal(det) * el->w[q];
   if (fe->formulation == HYCO_AXISYMMETRIC) {
+    /* Above 0 at a quadrature point: CheckAxis() keeps the cells on one side of the axis. */
     const PetscReal r = Radius(fe, el->nv, node, el->N[q]);
 
     for (PetscInt a = 0; a < el->nv; a++) g[a][2] = el->N[q][a] / r;
@@ -137,6 +140,7 @@ PetscErrorCode HycoFEKeepGradients(HycoFE fe)
   PetscFunctionBegin;
   if (HycoGradientsKept(fe)) PetscFunctionReturn(PETSC_SUCCESS);
   if (!kept) PetscCall(PetscMalloc1(n * size + 1, &kept));
+  /* Or HycoGradients() would read what is not written yet. */
   fe->kept = NULL; /* computed below */
   for (size_t k = 0; k < n; k++) {
     PetscReal g[HYCO_CELL_NODES][3];
@@ -157,6 +161,7 @@ PetscErrorCode HycoFEKeepGradients(HycoFE fe)
 PetscErrorCode HycoMeshCheckCells(HycoMesh m)
 {
   const HycoElement *el = HycoElementGet(m->type);
+  /* A fe without a scene: only the mesh and the coordinates are read. */
   struct _n_HycoFE drawn = {.mesh = m, .dim = m->dim, .X = m->xyz};
   PetscReal g[HYCO_CELL_NODES][3], weight;
 
@@ -174,6 +179,7 @@ PetscErrorCode HycoMeanGradients(HycoFE fe, const HycoElement *el, PetscInt cell
   PetscReal g[HYCO_CELL_NODES][3], w, volume = 0;
 
   PetscFunctionBegin;
+  /* Written by KeepMeans() for bodies with bbar only, which alone ask for it. */
   if (fe->kept_mean && fe->kept_place == fe->place) {
     PetscCall(PetscArraycpy(&mean[0][0], fe->kept_mean + (size_t)cell * (size_t)(3 * el->nv), 3 * el->nv));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -238,6 +244,7 @@ PetscErrorCode HycoFacetNormal(HycoFE fe, const HycoElement *el, PetscInt facet,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Moved coordinates: expressions in space are those of the moved body. */
 void HycoPointPlace(HycoFE fe, const HycoElement *el, PetscInt cell, PetscInt q, PetscReal x[3])
 {
   const PetscInt *node = fe->mesh->cells + cell * fe->mesh->nv;
@@ -270,6 +277,7 @@ void HycoPointStrain(HycoFE fe, const HycoElement *el, PetscInt cell, const Pets
     }
   }
   if (fe->formulation == HYCO_AXISYMMETRIC) {
+    /* g[a][2] = N_a / r times the radial displacement is the hoop strain; nothing else has a third component. */
     h[2][2] = h[0][2];
     h[0][2] = h[1][2] = 0;
   }

@@ -14,6 +14,7 @@ struct _n_HycoLinearForce {
   PetscReal *K, *heat;                     /* dim x dim for each block, row major; dim for each row */
 };
 
+/* NULL-safe. */
 PetscErrorCode HycoLinearForceDestroy(HycoLinearForce *force)
 {
   HycoLinearForce f = *force;
@@ -127,6 +128,7 @@ static PetscErrorCode SetStiffness(HycoLinearForce f)
       for (PetscInt b = 0; b < nv && row >= 0; b++) {
         PetscInt at = f->start[row];
 
+        /* It is there: the column list has all nodes of all linear cells around the row's node. */
         while (f->column[at] != node[b]) at++;
         for (PetscInt c = 0; c < dim * dim; c++)
           f->K[at * dim * dim + c] += Ke[(a * dim + c / dim) * n + b * dim + c % dim];

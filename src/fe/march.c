@@ -20,11 +20,13 @@ PetscErrorCode HycoMarchStep(HycoMarch *m, const PetscReal u[], PetscReal t0, Pe
   PetscFunctionBegin;
   PetscCall(PetscArrayzero(m->f_int, m->fe->n_dof));
   PetscCall(HycoFEStep(m->fe, u, t0, t1, m->state, m->end, m->f_int, PETSC_FALSE, report));
+  /* The accepted state becomes the begin of the next step; the old one is overwritten by it. */
   m->state = m->end;
   m->end = state;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Frees what HycoMarchBegin() allocated, also after a failed step. */
 PetscErrorCode HycoMarchEnd(HycoMarch *m)
 {
   PetscFunctionBegin;

@@ -34,6 +34,7 @@ PetscErrorCode HycoMirrorCreate(HycoFE fe)
 static PetscErrorCode MapTurns(HycoFE fe, PetscInt body, PetscBool *turns)
 {
   HycoMesh m = fe->mesh;
+  /* The sign alone is wanted: an error of the difference does not matter. */
   const PetscReal step = 1e-5 * HycoMeshLength(m);
   PetscReal sum = 0;
   PetscInt n = 0;
@@ -64,14 +65,12 @@ static PetscErrorCode MapTurns(HycoFE fe, PetscInt body, PetscBool *turns)
 }
 
 /* The sign from the cells of bodies with a map: turn[b] = +-1, or 0 without a cell; fails if they differ. */
-static PetscErrorCode CellsTurn(HycoFE fe, PetscInt turn[])
+static PetscErrorCode CellsTurn(HycoFE fe, PetscInt turn[], PetscInt first[])
 {
   HycoMesh m = fe->mesh;
   const HycoElement *el = HycoElementGet(m->type);
-  PetscInt *first;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(fe->scene->n_bodies, &first));
   for (PetscInt e = 0; e < m->n_cells; e++) {
     const PetscInt b = m->cell_body[e];
     HycoExpr *map = fe->scene->body[b].map;
@@ -86,7 +85,6 @@ static PetscErrorCode CellsTurn(HycoFE fe, PetscInt turn[])
               fe->scene->body[b].name, (int)m->cell_id[sign < 0 ? e : first[b]],
               (int)m->cell_id[sign < 0 ? first[b] : e]);
   }
-  PetscCall(PetscFree(first));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -115,11 +113,12 @@ PetscErrorCode HycoMirrorFind(HycoFE fe)
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc1(fe->scene->n_bodies, &turn));
-  ierr = CellsTurn(fe, turn);
+  PetscCall(PetscCalloc1(2 * fe->scene->n_bodies, &turn));
+  ierr = CellsTurn(fe, turn, turn + fe->scene->n_bodies);
   for (PetscInt b = 0; b < fe->scene->n_bodies && !ierr; b++) {
     HycoExpr *map = fe->scene->body[b].map;
 
+    /* turn = 0: no cell here. */
     fe->mirrored[b] = (PetscBool)(turn[b] < 0);
     if (!turn[b] && (map[0] || map[1] || map[2])) ierr = MapTurns(fe, b, &fe->mirrored[b]);
   }

@@ -16,6 +16,7 @@
 #define NOTHING  1e-9
 #define PARALLEL 1e-2
 
+/* The room stays for the next parameters. */
 void HycoObliqueClear(HycoFE fe)
 {
   fe->n_oblique = 0;
@@ -32,6 +33,7 @@ static void Substitute(HycoFE fe, PetscInt node, PetscReal n[3], PetscReal *v)
     share = n[o->c];
     n[o->c] = 0;
     for (PetscInt d = 0; d < fe->dim; d++) n[d] += share * o->a[d];
+    /* The offset of the other support moves to the right-hand side. */
     *v -= share * fe->u0[node * fe->dim + o->c];
   }
 }
@@ -44,6 +46,7 @@ static PetscErrorCode CheckSame(HycoFE fe, PetscInt node, const PetscReal n[3], 
 
   PetscFunctionBegin;
   for (PetscInt d = 0; d < fe->dim; d++) {
+    /* All components with an entry of n are fixed here. */
     rest -= n[d] * fe->u0[node * fe->dim + d];
     size = PetscMax(size, PetscAbsReal(fe->u0[node * fe->dim + d]));
   }
@@ -72,6 +75,7 @@ PetscErrorCode HycoObliqueAdd(HycoFE fe, PetscInt support, PetscInt node, const 
     best = PetscAbsReal(n[d]);
     c = d;
   }
+  /* The direction depends on supports before: it must ask for the same value. */
   if (best <= NOTHING) {
     PetscCall(CheckSame(fe, node, n, v, PetscAbsReal(value), key));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -87,6 +91,7 @@ PetscErrorCode HycoObliqueAdd(HycoFE fe, PetscInt support, PetscInt node, const 
   *o = (HycoOblique){.node = node, .c = c, .support = support};
   PetscCall(PetscArraycpy(o->n, direction, 3));
   HycoNormalise(o->n);
+  /* Fixed components keep their coefficient: their u0 enters the sum (HycoFEComplete()). */
   for (PetscInt d = 0; d < fe->dim; d++) o->a[d] = d == c ? 0 : -n[d] / n[c];
   fe->fixed[node * fe->dim + c] = PETSC_TRUE;
   fe->u0[node * fe->dim + c] = v / n[c];
@@ -116,6 +121,7 @@ PetscErrorCode HycoObliqueIndex(HycoFE fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* At fe's parameters; NULL for all other unknowns. */
 const HycoOblique *HycoFEOblique(HycoFE fe, PetscInt dof)
 {
   return fe->n_oblique && fe->oblique_at[dof] >= 0 ? &fe->oblique[fe->oblique_at[dof]] : NULL;
@@ -136,6 +142,7 @@ void HycoObliqueStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
     for (PetscInt d = 0; o && d < dim; d++) {
       const PetscInt to = k - k % dim + d;
 
+      /* Rows, then columns: the columns' loop takes the new entries of row `to`, which gives a^2 on the diagonal. */
       for (PetscInt j = 0; o->a[d] != 0 && j < n; j++) Ke[to * n + j] += o->a[d] * Ke[k * n + j];
       for (PetscInt j = 0; o->a[d] != 0 && j < n; j++) Ke[j * n + to] += o->a[d] * Ke[j * n + k];
     }

@@ -76,6 +76,7 @@ static PetscErrorCode Put(HycoFE fe, PetscInt spring, PetscInt cell, PetscInt fa
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* NULL-safe. */
 PetscErrorCode HycoSpringsDestroy(HycoSprings *springs)
 {
   HycoSprings s = *springs;
@@ -101,6 +102,7 @@ PetscErrorCode HycoSpringsCreate(HycoFE fe)
   fe->springs = s;
   PetscCall(PetscMalloc1(m->n_nodes, &around));
   for (PetscInt i = 0; i < m->n_nodes; i++) around[i] = -1;
+  /* Descending: the cell with the smallest tag is written last. */
   for (PetscInt k = m->n_cells * m->nv - 1; k >= 0; k--) around[m->cells[k]] = k / m->nv;
   PetscCall(PetscCalloc1(m->n_cells + 2, &s->start));
   PetscCall(ForEach(fe, around, Count, s));
@@ -112,6 +114,7 @@ PetscErrorCode HycoSpringsCreate(HycoFE fe)
   PetscCall(PetscMalloc1(s->n, &s->node));
   PetscCall(PetscMalloc1(s->n * s->size, &s->K));
   PetscCall(ForEach(fe, around, Put, s));
+  /* Put() has moved each start to the end of its cell: back by one. */
   for (PetscInt e = m->n_cells; e > 0; e--) s->start[e] = s->start[e - 1];
   s->start[0] = 0;
   PetscCall(PetscFree(around));
@@ -151,6 +154,7 @@ static PetscErrorCode PointMatrix(HycoFE fe, const HycoSpring *spring, PetscInt 
   PetscFunctionBegin;
   PetscCall(Evaluate(fe, spring, fe->X + 3 * node, k));
   for (PetscInt c = 0; c < fe->dim; c++) K[c * fe->dim + c] = k[c];
+  /* The normal of an end of a line is its axis. */
   if (fe->dim == 1) K[0] += k[3];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -231,6 +235,7 @@ void HycoSpringsAddStiffness(HycoFE fe, PetscInt cell, PetscBool counted, PetscR
 
     if (counted && !IsOwn(fe, k)) continue;
     for (PetscInt a = 0; a < n_nodes; a++) {
+      /* The first place of a repeated node: SumRepeated() adds the others. */
       for (at[a] = 0; corner[at[a]] != node[a];) at[a]++;
     }
     for (PetscInt r = 0; r < size; r++) {

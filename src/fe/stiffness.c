@@ -14,6 +14,7 @@ static void AddProducts(PetscInt nv, PetscInt dim, const PetscReal p[], const Pe
   const PetscInt n = nv * dim;
 
   for (PetscInt r = 0; r < n; r++) {
+    /* From the diagonal block on: the lower blocks follow by symmetry. */
     for (PetscInt t = r / dim * dim; t < n; t++) P[r * n + t] += p[r] * s[t];
   }
 }
@@ -75,8 +76,10 @@ static PetscErrorCode AddIsotropic(HycoFE fe, const HycoElement *el, PetscInt ce
       s[r] = g[r / dim][r % dim];
       p[r] = w * s[r];
     }
+    /* lambda + 2 mu / 3 of each point, over the volume. */
     bulk += w * (lame[0] - own[0]);
     AddProducts(el->nv, dim, p, s, P);
+    /* lame[2], lame[3]: the next point's moduli. */
     if (q + 1 < el->nq && lame[0] == lame[2] && lame[1] == lame[3]) continue; /* the next point has the same material */
     AddMaterial(el->nv, dim, own, P, Ke);
     PetscCall(PetscArrayzero(P, n * n));
@@ -183,6 +186,7 @@ static void SumRepeated(HycoMesh m, PetscInt cell, PetscReal Ke[])
 
   if (size == n) return;
   for (PetscInt r = 0, at = 0; r < n; r++) {
+    /* Repeated nodes of a collapsed cell are next to each other. */
     at += r && r % m->dim == 0 && node[r / m->dim] != node[r / m->dim - 1];
     row[r] = at * m->dim + r % m->dim;
   }
@@ -225,6 +229,7 @@ PetscErrorCode HycoFECountedStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Number in the distributed vectors. */
 static PetscInt Global(HycoMesh m, PetscInt node)
 {
   return m->node_global ? m->node_global[node] : node;
@@ -278,6 +283,7 @@ PetscErrorCode HycoFECreateMatrix(HycoFE fe, MPI_Comm comm, PetscInt n_owned, Pe
   PetscCall(CountNeighbours(fe->mesh, n_owned, first, on, off));
   PetscCall(MatCreate(comm, A));
   PetscCall(MatSetSizes(*A, n_owned * fe->dim, n_owned * fe->dim, PETSC_DETERMINE, PETSC_DETERMINE));
+  /* For preconditioners (rigid motions) and block preallocation; fixed unknowns keep their rows. */
   PetscCall(MatSetBlockSize(*A, fe->dim));
   PetscCall(MatSetType(*A, MATAIJ));
   PetscCall(MatXAIJSetPreallocation(*A, fe->dim, on, off, NULL, NULL));
@@ -306,6 +312,7 @@ static PetscErrorCode AddElement(HycoFE fe, PetscInt cell, const PetscReal Ae[],
       index[k] = row;
       if (fe->fixed[i * m->dim + c]) {
         PetscCall(MatSetValue(A, row, row, Ae[k * n + k], ADD_VALUES));
+        /* Only after its diagonal is added. */
         index[k] = -1;
       }
     }

@@ -8,6 +8,7 @@ typedef struct {
   PetscReal g[HYCO_CELL_NODES][3];
 } Mean;
 
+/* Once for each cell, not for each point. */
 static PetscErrorCode GetMean(HycoFE fe, const HycoElement *el, PetscInt cell, Mean *mean)
 {
   PetscFunctionBegin;
@@ -26,6 +27,7 @@ static PetscErrorCode AtPoint(HycoFE fe, const HycoElement *el, PetscInt cell, P
   PetscFunctionBegin;
   PetscCall(HycoGradients(fe, el, cell, q, g, w));
   HycoPointStrain(fe, el, cell, u, g, mean->used ? mean->g : NULL, e);
+  /* What is left causes stress. */
   for (PetscInt k = 0; k < 3 && fe->thermal; k++) e[k] -= fe->thermal[cell * el->nq + q];
   for (PetscInt k = 0; k < 6; k++) s[k] = 0;
   HycoTangentApply(HycoFEIsIsotropic(fe, cell), fe->dim, fe->tangent + fe->tangent_start[cell] + q * size, e, s);
@@ -58,6 +60,7 @@ PetscErrorCode HycoFEStressIn(HycoFE fe, const PetscBool in[], const PetscReal u
       for (PetscInt k = 0; k < fe->n_sigma; k++) sigma[cell * fe->n_sigma + k] += w * s[k];
       volume += w;
     }
+    /* A cell that passes HycoGradients() has a volume. */
     for (PetscInt k = 0; k < fe->n_sigma; k++) sigma[cell * fe->n_sigma + k] /= volume;
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -31,6 +31,7 @@ static PetscErrorCode JoinPieces(MPI_Comm comm, HycoMesh m, const PetscInt piece
   while (change) {
     change = PETSC_FALSE;
     for (PetscInt i = 0; i < m->n_nodes; i++) node[i] = label[piece[i]];
+    /* Neutral for the minimum. */
     for (PetscInt i = 0; i < m->n_owned; i++) own[i] = PETSC_MAX_INT;
     PetscCall(PetscSFReduceBegin(sf, MPIU_INT, node, own, MPI_MIN));
     PetscCall(PetscSFReduceEnd(sf, MPIU_INT, node, own, MPI_MIN));
@@ -72,11 +73,13 @@ static PetscErrorCode FindParts(MPI_Comm comm, HycoMesh m, PetscInt part[], Pets
   PetscCall(PetscMalloc2(m->n_nodes, &label, m->n_nodes, &number));
   for (PetscInt i = 0; i < m->n_nodes; i++) { /* representatives come first */
     if (part[i] == i) label[n] = m->node_global ? m->node_whole[i] : i;
+    /* In place: part[part[i]] is a number already, since the representative comes first. */
     part[i] = part[i] == i ? n++ : part[part[i]];
   }
   *n_parts = n;
   if (size > 1) {
     PetscCall(JoinPieces(comm, m, part, label));
+    /* Labels that JoinPieces() has made equal get one number, in the order of the mesh file. */
     PetscCall(HycoRankInts(comm, n, label, number, n_parts));
     for (PetscInt i = 0; i < m->n_nodes; i++) part[i] = number[part[i]];
   }
@@ -148,6 +151,7 @@ static PetscInt RigidRow(PetscInt dim, const PetscReal x[3], PetscInt c, PetscRe
   const PetscInt n = dim == 1 ? 1 : dim == 2 ? 3 : 6;
 
   for (PetscInt j = 0; j < 6; j++) row[j] = j == c;
+  /* A turn about z: (-y, x). */
   if (dim == 2) row[2] = c == 0 ? -x[1] : x[0];
   if (dim == 3) { /* omega x X */
     const PetscInt d = (c + 1) % 3, e = (c + 2) % 3;
@@ -192,6 +196,7 @@ static void Name(HycoFE fe, const HycoRigid *r, const char others[], char name[H
 
     d[c] = move > 400 * turn ? t[c] : omega[c];
     size += d[c] * d[c];
+    /* x = centre + size times the point: motions are relative to both. */
     at[c] = turn > 0 ? r->centre[c] + r->size * (omega[e] * t[f] - omega[f] * t[e]) / turn : 0;
     if (PetscAbsReal(at[c]) < 1e-6 * r->size) at[c] = 0; /* round-off */
   }
@@ -237,6 +242,7 @@ void HycoMotionsName(HycoFE fe, const HycoMotions *motions, const PetscReal coef
   for (PetscInt k = 0; k < motions->n; k++) {
     const PetscReal share = OfPart(motions, coefficient, k, &r);
 
+    /* Of equal shares the first, whatever round-off does. */
     if (share > most * (1 + 1e-8)) best = r;
     most = PetscMax(most, share);
   }
@@ -273,6 +279,7 @@ static PetscErrorCode AddMotion(MPI_Comm comm, HycoFE fe, const PetscInt part[],
   HycoRigid *own;
 
   PetscFunctionBegin;
+  /* At most 6 for each part: growing by one is cheap. */
   PetscCall(PetscRealloc(((size_t)(k + 1) * (size_t)n + 1) * sizeof(PetscReal), &motions->motion));
   PetscCall(PetscRealloc((size_t)(k + 1) * sizeof(*motions->name), &motions->name));
   PetscCall(PetscRealloc((size_t)(k + 1) * sizeof(*motions->rigid), &motions->rigid));
@@ -297,6 +304,7 @@ static PetscErrorCode AddMotion(MPI_Comm comm, HycoFE fe, const PetscInt part[],
   for (PetscInt j = first; j < k; j++) {
     const PetscReal *w = motions->motion + (size_t)j * (size_t)n;
 
+    /* Eigenvectors are orthogonal in the coefficients, not over the nodes. */
     PetscCall(Product(comm, fe, u, w, &dot));
     for (PetscInt i = 0; i < n; i++) u[i] -= dot * w[i];
     for (PetscInt i = 0; i < 6; i++) own->rigid[i] -= dot * motions->rigid[j].rigid[i];
@@ -319,6 +327,7 @@ static PetscErrorCode PartMotions(MPI_Comm comm, HycoFE fe, const PetscInt part[
   const PetscInt first = motions->n;
 
   PetscFunctionBegin;
+  /* Eigenvalues ascend; gram[j] becomes the j-th eigenvector (columns in LAPACK's order). */
   LAPACKsyev_("V", "U", &n, &p->gram[0][0], &ld, values, work, &lwork, &info);
   PetscCheck(info == 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "LAPACK syev: %d", (int)info);
   for (PetscInt j = 0; j < n && values[j] <= 1e-13 * PetscMax(values[n - 1], 1); j++)
@@ -342,6 +351,7 @@ static PetscErrorCode PlaceParts(MPI_Comm comm, HycoFE fe, const PetscInt part[]
     const PetscInt64 node = m->node_global ? m->node_whole[i] : i;
 
     if (HycoMeshOwned(m, i) < 0) continue;
+    /* The node's place first, then the body: one maximum gives the body of the last node. */
     last[part[i]] = PetscMax(last[part[i]], node * n_bodies + m->node_body[i]);
     Add(&sum[4 * part[i]], 1);
     for (PetscInt c = 0; c < 3; c++) Add(&sum[4 * part[i] + 1 + c], fe->X[3 * i + c]);
@@ -414,6 +424,7 @@ static PetscErrorCode MeasureParts(MPI_Comm comm, HycoFE fe, const PetscInt part
     PetscReal x[3], row[6];
     PetscInt n;
 
+    /* Ties hold nothing: slave and masters are one part. */
     if (!HycoFESupports(fe, k) || HycoMeshOwned(fe->mesh, i) < 0) continue;
     for (PetscInt c = 0; c < 3; c++) x[c] = (fe->X[3 * i + c] - p->centre[c]) / p->size;
     n = RigidRow(fe->dim, x, k % fe->dim, row);

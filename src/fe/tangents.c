@@ -59,6 +59,7 @@ static PetscErrorCode UpdateAll(HycoFE fe, PetscBool all, const PetscBool same[]
 
   PetscFunctionBegin;
   for (PetscInt e = 0; e < m->n_cells; e++) {
+    /* Neither nodes nor law change: the tangents of the call before stay. */
     if (!all && (fe->constant[e] || same[m->cell_body[e]])) continue;
     if (b->n == BATCH || (b->n && m->cell_body[e] != m->cell_body[b->cell[0]])) PetscCall(Update(fe, b));
     b->cell[b->n++] = e;

@@ -21,6 +21,7 @@ PetscErrorCode HycoTiedPlace(HycoFE fe)
     for (PetscInt j = m->tied_start[k]; j < m->tied_start[k + 1]; j++) {
       for (PetscInt c = 0; c < 3; c++) at[c] += weight[j - m->tied_start[k]] * fe->X[3 * m->tied_master[j] + c];
     }
+    /* A map that is common to both sides moves the slave with its masters. */
     HycoCheck(HycoDistance(X, at) <= m->ties->reach[entry],
               "tie %s: maps move node %d of %s %g away from its master, farther than the tolerance %g; move both "
               "bodies in the same way there",
@@ -41,6 +42,7 @@ static PetscBool MastersHold(HycoFE fe, PetscInt k, PetscInt c)
   for (PetscInt j = m->tied_start[k]; j < m->tied_start[k + 1]; j++) {
     const PetscInt dof = m->tied_master[j] * fe->dim + c;
 
+    /* An oblique support fixes another quantity under this unknown's name. */
     if (!fe->fixed[dof] || HycoFEOblique(fe, dof)) return PETSC_FALSE;
     u += weight[j - m->tied_start[k]] * fe->u0[dof];
     size += PetscAbsReal(fe->u0[dof]);
@@ -121,6 +123,7 @@ void HycoTiedStiffness(HycoFE fe, PetscInt cell, PetscReal Ke[])
       const PetscReal w = m->ties->weight[m->tied_entry[k] + j - m->tied_start[k]];
       PetscInt b = 0;
 
+      /* It is there: HycoMeshCellNodes() lists the masters of all tied nodes of the cell. */
       while (node[b] != m->tied_master[j]) b++;
       for (PetscInt c = 0; c < dim; c++) {
         for (PetscInt t = 0; t < size; t++) Ke[(b * dim + c) * size + t] += w * Ke[(a * dim + c) * size + t];

@@ -30,6 +30,7 @@ static PetscErrorCode Relative(HycoFOM f, const PetscReal u[], PetscReal *relati
     }
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, most, 8, MPIU_REAL, MPI_MAX, HycoComm(f)));
+  /* Both in lengths: a body that is pushed far is judged by how far it is pushed. */
   extent = most[6];
   for (PetscInt c = 0; c < dim; c++) extent = PetscMax(extent, most[c] + most[3 + c]);
   *relative = most[7] / extent;
@@ -50,6 +51,7 @@ static PetscErrorCode NameLifted(HycoFOM f, Vec L, char name[HYCO_LINE])
   PetscCall(HycoFOMMotionVectors(f, &motions, &v));
   PetscCall(VecDuplicate(f->F, &rest));
   PetscCall(VecCopy(f->F, rest));
+  /* On a path with friction L has the rows with tangents. */
   if (L) PetscCall(MatMult(f->path ? f->path->Bt : f->Bt, L, rest));
   if (L) PetscCall(VecAYPX(rest, -1, f->F));
   PetscCall(PetscMalloc1(motions.n, &coefficient));
@@ -119,6 +121,8 @@ PetscErrorCode HycoFOMNameLoose(HycoFOM f, char name[HYCO_LINE])
   /* Squares: a share of 1e-7 of the motion. */
   if (value[0] <= 1e-14 * size) {
     PetscCall(HycoFEFreeMotions(HycoComm(f), f->fe, &motions));
+    /* The same motions in the same order as the vectors of the null space: SetKernel() (rigid_modes.c) made these
+       from them. */
     if (motions.n == p) HycoMotionsName(f->fe, &motions, gram, name);
     PetscCall(HycoMotionsDestroy(&motions));
   }
@@ -135,6 +139,7 @@ PetscErrorCode HycoFOMJudge(HycoFOM f, const PetscReal u[], Vec L, PetscReal ene
 
   PetscFunctionBegin;
   PetscCall(Relative(f, u, relative));
+  /* Written so that NaN diverges. */
   if (*reason > 0 && !(*relative <= HYCO_MOST))
     *reason = HYCO_DIVERGED_DISPLACEMENT;
   else if (*reason > 0 && !(energy_defect <= HYCO_MOST_DEFECT))

@@ -69,6 +69,7 @@ static void RealsToMembers(PetscInt n, const Member m[], const PetscReal v[], Hy
   }
 }
 
+/* A row of the file: members, outputs, then what later versions added, so that older rows are a beginning of it. */
 static void StepToReals(HycoFOM f, const HycoStep *s, PetscReal v[])
 {
   const PetscInt n = f->scene->n_quantities;
@@ -78,6 +79,7 @@ static void StepToReals(HycoFOM f, const HycoStep *s, PetscReal v[])
   MembersToReals(N_LATER, later, s, v + N_MEMBERS + n);
 }
 
+/* Missing columns of older files are 0 (LoadSteps()). */
 static void RealsToStep(HycoFOM f, const PetscReal v[], HycoStep *s)
 {
   const PetscInt n = f->scene->n_quantities;
@@ -237,6 +239,7 @@ static PetscErrorCode WriteItems(HycoFOM f, HycoH5 h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* All ranks take part in each dataset but the content, which rank 0 writes alone. */
 static PetscErrorCode WriteAll(HycoFOM f, HycoH5 h, const Content *c, const char key[])
 {
   PetscFunctionBegin;
@@ -247,6 +250,7 @@ static PetscErrorCode WriteAll(HycoFOM f, HycoH5 h, const Content *c, const char
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Also of a content that was read in part. */
 static PetscErrorCode FreeContent(Content *c)
 {
   PetscFunctionBegin;
@@ -272,6 +276,7 @@ static PetscErrorCode CheckPlace(const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Before the path is computed, not after it. Collective. */
 PetscErrorCode HycoPathCheckPlace(HycoFOM f)
 {
   PetscFunctionBegin;
@@ -316,6 +321,7 @@ static PetscErrorCode LoadSteps(HycoFOM f, HycoH5 h, PetscInt *rows, PetscReal *
 
   PetscFunctionBegin;
   PetscCall(HycoH5GetSize(h, "steps", rows, &cols));
+  /* A width that no version has: the load below reports it. */
   if (cols < full - N_LATER || cols > full) cols = full;
   PetscCall(HycoH5LoadReal(h, "steps", rows, &cols, &found));
   PetscCall(PetscCalloc1(*rows * full + 1, steps));
@@ -345,10 +351,12 @@ static PetscErrorCode ReadOpened(HycoFOM f, HycoH5 h, const char key[], Content 
   PetscCall(HycoH5LoadReal(h, "head", &rows, &one, &c->head));
   PetscCall(LoadSteps(f, h, &rows, &c->steps));
   c->n_steps = rows - 1;
+  /* Before any allocation by these numbers. */
   HycoCheck(c->n_steps >= 0 && c->n_steps <= f->scene->n_times && c->head[2] >= 0 &&
                 c->head[2] <= (PetscReal)f->scene->n_times && c->head[3] == (PetscReal)c->n_steps,
             "the checkpoint %s is damaged", f->path->checkpoint);
   rows = -1;
+  /* Missing if no order was observed. */
   if (HycoH5Has(h, "orders")) PetscCall(HycoH5LoadReal(h, "orders", &rows, &one, &c->orders));
   c->n_orders = PetscMax(0, rows);
   rows = -1;
@@ -466,6 +474,7 @@ static PetscErrorCode TakeContent(HycoFOM f, const Content *c)
   RealsToStep(f, c->steps + c->n_steps * STEP_COLS(f), &p->now);
   PetscCall(PetscFree(p->orders));
   HycoDuplicate(c->n_orders, c->orders, &p->orders);
+  /* Room without spare: the next entry makes more. */
   p->n_orders = p->room_orders = c->n_orders;
   PetscCall(PetscFree(p->taken));
   HycoDuplicate(c->n_taken, c->taken, &p->taken);
@@ -492,6 +501,7 @@ PetscErrorCode HycoPathLoad(HycoFOM f)
   PetscCall(SpreadContent(f, &c));
   PetscCall(TakeContent(f, &c));
   PetscCall(FreeContent(&c));
+  /* Before the contacts' forces are used: B and the masters are those of the resumed time. */
   PetscCall(HycoPathAssemble(p, p->t)); /* quantities available without another step */
   if (f->friction) PetscCall(HycoFrictionLoad(f));
   PetscCall(HycoFOMGather(f));

@@ -34,9 +34,14 @@ static PetscErrorCode AddSlaves(HycoFOM f)
     PetscInt g = 0;
 
     PetscCall(HycoMeshFindGroup(m, "contact", f->scene->contact[k]->slave, &g));
-    room += m->group_start[g + 1] - m->group_start[g];
+    /* A tied slave counts with its masters, of which a mean over facets has any number. */
+    for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) {
+      const PetscInt tied = HycoMeshTied(m, m->group_node[j]);
+
+      room += 1 + (tied < 0 ? 0 : m->tied_start[tied + 1] - m->tied_start[tied]);
+    }
   }
-  PetscCall(PetscMalloc1(room * (1 + HYCO_FACET_NODES), &node));
+  PetscCall(PetscMalloc1(room, &node));
   for (PetscInt k = 0; k < f->scene->n_contacts; k++) {
     PetscInt g = 0;
 
@@ -128,6 +133,7 @@ static PetscErrorCode PlacesCreate(HycoMesh m, Places *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* -1: the mesh does not have the node. */
 static PetscInt PlaceOf(const Places *p, PetscInt global)
 {
   PetscInt at = -1;
@@ -180,10 +186,12 @@ static PetscErrorCode PlaceGathered(HycoFOM f, HycoMesh mesh, PetscInt n, const 
   PetscCall(PetscMalloc1(n, &sorted));
   for (PetscInt k = 0; k < n; k++) place[sent[k].number + 1]++;
   for (PetscInt k = 0; k < f->n_contacts; k++) place[k + 1] += place[k];
+  /* A counting sort, which is stable: pieces keep their order. */
   for (PetscInt k = 0; k < n; k++) sorted[place[sent[k].number]++] = sent[k];
   PetscCall(UnpackContacts(mesh, n, sorted, p));
   PetscCall(PetscFree(sorted));
   PetscCall(PetscFree(place));
+  /* So that the gathered contacts find masters on moved positions as the ranks' own do. */
   PetscCall(HycoPairsSetSearch(f->scene, mesh, p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -266,6 +274,7 @@ static PetscErrorCode FindOnRoot(HycoFOM f, const HycoSurfaceFacts facts[])
   PetscCall(HycoMeshDestroy(&f->surface));
   PetscCall(FetchSurface(f, &f->surface));
   PetscCall(UnpackContacts(f->surface, n_got, got, &f->pairs));
+  /* Facts that a search on one rank would find itself; only for this call. */
   f->pairs.facts = facts;
   PetscCall(HycoPairsSetSearch(f->scene, f->surface, &f->pairs));
   f->pairs.facts = NULL;
@@ -317,6 +326,7 @@ static PetscErrorCode Search(HycoFOM f, HycoSurfaceFacts facts[])
   PetscFunctionBegin;
   PetscCall(HycoContactsFacts(HycoComm(f), f->scene, f->part, facts));
   for (PetscInt k = 0; k < f->scene->n_contacts; k++) moved = (PetscBool)(moved || facts[k].moved);
+  /* Without maps positions never change, and no slack is needed. */
   PetscCall(HycoContactsCandidates(HycoComm(f), f->fe, moved ? SLACK : 0, &n, &near));
   PetscCall(AddSlaves(f));
   PetscCall(AddNeeded(f, n, near));
@@ -339,6 +349,7 @@ static PetscErrorCode CountPatches(HycoFOM f)
     HycoContact c = f->scene->contact[k];
     PetscInt g = 0, here = 0, whole = 0;
 
+    /* Obstacles and rigid masters have no facets to fetch. */
     if (!c->master || c->rigid) continue;
     PetscCall(HycoMeshFindGroup(f->part, "contact", c->master, &g));
     for (PetscInt i = 0; i < f->surface->n_facets; i++) here += f->surface->facet_group[i] == g;
@@ -362,6 +373,7 @@ static PetscErrorCode FindContacts(HycoFOM f)
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
+  /* The pairing is that of the drawing, whatever the first parameters are. */
   PetscCall(HycoFESetDrawn(f->fe));
   PetscCall(PetscMalloc1(f->scene->n_contacts, &facts));
   PetscCall(HycoLogEvent(HYCO_EVENT_SEARCH, PETSC_TRUE));
@@ -382,10 +394,12 @@ PetscErrorCode HycoFOMFindContacts(HycoFOM f)
 {
   PetscFunctionBegin;
   if (f->size == 1) {
+    /* One rank has everything: no copy, and node indices are those of the part. */
     f->surface = f->part;
     HycoOnRoot(HycoComm(f), HycoPairsFind(f->scene, f->part->dm, NULL, &f->pairs));
     f->n_contacts = f->pairs.n;
     f->width = HycoPairsWidth(&f->pairs);
+    /* Some contact follows its master on moved surfaces. */
     f->searches = (PetscBool)(f->pairs.room > 0);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -436,6 +450,7 @@ static PetscErrorCode FetchMasters(HycoFOM f)
   PetscBool has;
 
   PetscFunctionBegin;
+  /* Noted first: one question for each set of positions. */
   f->place = f->fe->place;
   PetscCall(HycoContactsCandidates(HycoComm(f), f->fe, 0, &n, &near));
   PetscCall(HycoSortUnique(&n, near));
@@ -455,6 +470,7 @@ static PetscErrorCode FetchMasters(HycoFOM f)
 PetscErrorCode HycoFOMFetchMasters(HycoFOM f)
 {
   PetscFunctionBegin;
+  /* Fixed masters; all surfaces are here; or the nodes have not moved since. */
   if (!f->searches || f->gathered || f->place == f->fe->place) PetscFunctionReturn(PETSC_SUCCESS);
   HycoLogged(HYCO_EVENT_SEARCH, FetchMasters(f));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -475,6 +491,7 @@ PetscErrorCode HycoFOMWiden(HycoFOM f, HycoMesh *mesh, HycoFE *fe, PetscInt **in
   PetscCall(PetscFree(in));
   PetscCall(HycoFECreate(f->scene, (*mesh)->dm, fe));
   PetscCall(HycoFESetParameters(*fe, f->fe->mu));
+  /* The signs on which all ranks agree: this mesh has no cells to tell them. */
   PetscCall(PetscArraycpy((*fe)->mirrored, f->fe->mirrored, f->scene->n_bodies));
   PetscCall(PlacesCreate(*mesh, &places));
   PetscCall(PetscMalloc1(m->n_nodes, index));
@@ -522,6 +539,7 @@ PetscErrorCode HycoFOMSetUpSurface(HycoFOM f)
 
   PetscFunctionBegin;
   HycoOnEach(HycoComm(f), f->surface ? HycoFECreate(f->scene, f->surface->dm, &f->fe_surface) : PETSC_SUCCESS);
+  /* Without U there is nothing to scatter. */
   if (f->gathered) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecScatterDestroy(&f->to_surface));
   PetscCall(VecDestroy(&f->U_surface));

@@ -9,6 +9,7 @@
 #define NOISE                                                                                                          \
   3e-13 /* share of a value below which its change over a step is round-off: as a derivative 1e-8 of it over the range */
 
+/* For gradients at full order and of models. A history's outputs depend on the whole path. */
 PetscErrorCode HycoGradientCheckScene(HycoScene s)
 {
   PetscFunctionBegin;
@@ -18,6 +19,8 @@ PetscErrorCode HycoGradientCheckScene(HycoScene s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Central, or of second order to one side where the range ends (sign: the side); the points stay in the range, since
+   expressions may be invalid beyond it. */
 void HycoDifferenceSet(HycoScene scene, const PetscReal mu[], PetscInt p, HycoDifference *d)
 {
   const PetscReal width = scene->hi[p] - scene->lo[p];
@@ -32,6 +35,7 @@ void HycoDifferenceSet(HycoScene scene, const PetscReal mu[], PetscInt p, HycoDi
   *d = (HycoDifference){.parameter = p, .step = {0, h, 2 * h}, .weight = {-1.5 / h, 2 / h, -0.5 / h}, .sign = d->sign};
 }
 
+/* From the second order to the first: only the nearer point is on the same side of the kink. */
 void HycoDifferenceTakeSide(HycoDifference *d)
 {
   d->weight[0] = -1 / d->step[1];
@@ -39,11 +43,13 @@ void HycoDifferenceTakeSide(HycoDifference *d)
   d->weight[2] = 0;
 }
 
+/* k = 0 is mu itself. Variables beyond the parameters (the time) keep their values. */
 void HycoDifferencePoint(const HycoDifference *d, HycoScene scene, const PetscReal mu[], PetscInt k, PetscReal at[])
 {
   for (PetscInt p = 0; p < scene->n_variables; p++) at[p] = mu[p] + (p == d->parameter ? d->step[k] : 0);
 }
 
+/* Kink or curvature: a jump of slopes stays, a difference by curvature is a quarter. */
 void HycoDifferenceShrink(HycoDifference *d)
 {
   for (PetscInt k = 0; k < 3; k++) {
@@ -61,6 +67,8 @@ static void Slopes(const HycoDifference *d, const PetscReal v[3], PetscReal slop
   slope[1] = s[2] * s[1] < 0 ? (v[0] - v[2]) / (s[0] - s[2]) : (v[2] - v[1]) / (s[2] - s[1]);
 }
 
+/* 0: no jump beyond what a smooth function has, or round-off. slope: the scale of slopes (0: this value's own),
+   size: of the values. */
 PetscReal HycoDifferenceJump(const HycoDifference *d, PetscReal size, PetscReal slope, const PetscReal v[3])
 {
   PetscReal s[2], jump;
@@ -71,6 +79,7 @@ PetscReal HycoDifferenceJump(const HycoDifference *d, PetscReal size, PetscReal 
   return jump > KINK * slope && jump * PetscAbsReal(d->step[1]) > ROUND * size ? jump : 0;
 }
 
+/* closer: at mu, and at the two points of the shrunk difference. */
 PetscBool HycoDifferenceKinks(const HycoDifference *d, PetscReal jump, const PetscReal closer[3])
 {
   HycoDifference near = *d;
@@ -81,6 +90,7 @@ PetscBool HycoDifferenceKinks(const HycoDifference *d, PetscReal jump, const Pet
   return (PetscBool)(jump > 0 && PetscAbsReal(s[0] - s[1]) > STAYS * jump);
 }
 
+/* The store owns the arrays, which g borrows: a former gradient of the same object becomes invalid. */
 PetscErrorCode HycoGradientCreate(HycoScene scene, HycoGradientStore *store, HycoGradient *g)
 {
   const PetscInt n = scene->n_quantities * scene->n_parameters;
@@ -96,6 +106,7 @@ PetscErrorCode HycoGradientCreate(HycoScene scene, HycoGradientStore *store, Hyc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* NULL-safe in its arrays. */
 PetscErrorCode HycoGradientDestroy(HycoGradientStore *store)
 {
   PetscFunctionBegin;
@@ -177,6 +188,7 @@ PetscErrorCode HycoGradientColumn(HycoGradient *g, HycoGradientStore *store, Hyc
     HycoDifference near = *d;
 
     HycoDifferenceShrink(&near);
+    /* The room's second half: value is 6 x n_outputs. */
     closer = value + 3 * g->n_outputs;
     PetscCall(PetscArraycpy(closer, value, g->n_outputs));
     PetscCall(MeasureBeside(scene, mu, &near, measure, context, closer));

@@ -25,6 +25,7 @@ static PetscErrorCode FreeWork(HycoFOM f, PetscReal *work)
     const PetscInt row = HycoMeshOwned(f->part, i);
 
     for (PetscInt c = 0; row >= 0 && c < dim; c++) {
+      /* Rows of fixed unknowns have K_ii u0_i in F, which is no load. */
       if (!f->fe->fixed[i * dim + c]) *work += F[row * dim + c] * u[i * dim + c];
     }
   }
@@ -55,6 +56,7 @@ static PetscErrorCode LiftingWork(HycoFE fe, PetscInt cell, const PetscReal u[],
     for (PetscInt j = 0; u0 != 0 && j < n; j++) {
       const PetscInt dof = node[j / m->dim] * m->dim + j % m->dim;
 
+      /* u0 of oblique supports and ties are offsets: Ke is that of the eliminated unknowns. */
       *work += u0 * Ke[k * n + j] * (2 * (fe->fixed[dof] ? fe->u0[dof] : u[dof]) - fe->u0[dof]);
     }
   }
@@ -79,6 +81,7 @@ static PetscErrorCode CellSums(HycoFOM f, PetscReal *strain, PetscReal *lifting)
     PetscCall(HycoFEHeatWork(f->fe, u, heat));
   }
   for (PetscInt e = 0; e < f->part->n_cells; e++) {
+    /* For all cells here: those of other owners may have springs that this rank counts. */
     PetscCall(LiftingWork(f->fe, e, u, &one));
     *lifting += one;
     if (HycoMeshOwned(f->part, f->part->cells[e * f->part->nv]) < 0) continue;
@@ -103,6 +106,7 @@ static PetscErrorCode ContactSums(HycoFOM f, PetscReal *gap_work, PetscReal *fix
   *gap_work = *fixed_work = 0;
   for (PetscInt k = 0; k < f->pairs.n; k++) {
     *gap_work += f->lambda[k] * gap[k];
+    /* f->gap is D, from which B u0 of fixed unknowns is taken away. */
     *fixed_work += f->lambda[k] * (gap[k] - f->gap[k]);
   }
   PetscCall(PetscFree2(normal, gap));

@@ -3,6 +3,8 @@
 #include <hycogradient.h>
 #include <hycopath.h>
 
+/* NULL-safe; the last reference frees. Friction before the path: it gives the path's vectors back. What is aliased
+   on one rank (surface, fe_surface, u_surface) is freed once. */
 PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
 {
   HycoFOM f;
@@ -76,6 +78,7 @@ static PetscErrorCode Distribute(HycoFOM f)
   /* the file's first bad cell is named; refined cells are checked later */
   if (!f->scene->refine) HycoOnEach(HycoComm(f), HycoMeshCheckCells(mesh));
   if (mesh->n_cells) PetscCall(HycoContactsNeighbours(f->scene, mesh, &n, &pairs));
+  /* The tables outlive the DM, which Distribute() replaces: the partitioner needs them. */
   PetscCall(HycoMeshDetach(mesh)); /* so that it does not live beside the distributed one */
   PetscCall(HycoMeshDistribute(&f->dm, f->scene, mesh, n, pairs, cut, f->mesh_write));
   PetscCall(PetscFree(pairs));
@@ -156,6 +159,7 @@ static PetscErrorCode CreateB(HycoFOM f)
   PetscCall(MatSetType(f->B, MATAIJ));
   PetscCall(MatSeqAIJSetPreallocation(f->B, entries, NULL));
   PetscCall(MatMPIAIJSetPreallocation(f->B, entries, NULL, entries, NULL));
+  /* A row may get nodes that it had not at the first parameters. */
   PetscCall(MatSetOption(f->B, MAT_NEW_NONZERO_LOCATION_ERR, PETSC_FALSE));
   PetscCall(MatSetOption(f->B, MAT_NO_OFF_PROC_ENTRIES, PETSC_TRUE));
   PetscCall(TellSlaves(f));
@@ -199,6 +203,7 @@ static PetscErrorCode SetFromOptions(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* On defaults alone, without a scene; also for the declaration of options. */
 static PetscErrorCode Create(MPI_Comm comm, HycoFOM *fom)
 {
   PetscFunctionBegin;
@@ -247,6 +252,7 @@ static PetscErrorCode SetUp(HycoFOM f)
   if (f->size == 1) f->u_surface = f->u;
   PetscCall(PetscCalloc1(f->pairs.n + 1, &f->lambda));
   PetscCall(PetscCalloc1(f->pairs.n + 1, &f->gap));
+  /* Last: it borrows K, the vectors, system and solver. */
   if (f->path) PetscCall(HycoFOMPathCreate(f));
   f->summary.seconds.setup += HycoNow();
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -279,9 +285,9 @@ PetscErrorCode HycoFOMCreateMesh(MPI_Comm comm, HycoScene scene, HycoFOM *fom)
   PetscCall(PetscObjectReference((PetscObject)scene));
   (*fom)->scene = scene;
   PetscCall(PetscObjectSetOptions((PetscObject)*fom, scene->options));
-  PetscCall(SetFromOptions(*fom));
+  ierr = SetFromOptions(*fom);
   (*fom)->mesh_write[0] = '\0'; /* only for solves */
-  ierr = ReadMesh(*fom);
+  if (!ierr) ierr = ReadMesh(*fom);
   if (!ierr && (*fom)->size > 1) ierr = HycoFOMKeepOnRoot(*fom);
   if (!ierr && (*fom)->size > 1) ierr = HycoFOMSetUpSurface(*fom);
   if (ierr) PetscCall(HycoFOMDestroy(fom));
@@ -289,6 +295,7 @@ PetscErrorCode HycoFOMCreateMesh(MPI_Comm comm, HycoScene scene, HycoFOM *fom)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Borrowed: for options and reports of a calling program. */
 PetscErrorCode HycoFOMGetSolver(HycoFOM f, HycoSolver *solver)
 {
   PetscFunctionBegin;
@@ -351,6 +358,7 @@ static PetscErrorCode RaiseWhole(HycoFOM f)
   PetscFunctionBegin;
   if (f->n_turned || f->size == 1) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoFOMGatherContacts(f, &mesh, &pairs));
+  /* The other ranks wait in the reductions below: the error is raised by all, later. */
   PetscCall(HycoCatchBegin());
   if (mesh) ierr = ComputeWhole(f, mesh, &pairs);
   PetscCall(HycoCatchEnd(ierr, message));
@@ -417,6 +425,7 @@ static PetscErrorCode FindMasters(HycoFOM f, PetscBool *wider)
   width = HycoPairsWidth(&f->pairs);
   HycoAllreduce(&width, 1, MPIU_INT, MPI_MAX, HycoComm(f));
   *wider = (PetscBool)(width > f->width);
+  /* Never narrower, so that the room of B does not change back and forth. */
   f->width = PetscMax(f->width, width);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -494,6 +503,7 @@ PetscErrorCode HycoFOMSetParameters(HycoFOM f, const PetscReal mu[])
   PetscFunctionBegin;
   HycoOnEach(HycoComm(f), HycoFESetParameters(f->fe, mu));
   if (f->size == 1) PetscFunctionReturn(PETSC_SUCCESS);
+  /* The flag is the same on all ranks: it follows from the parameters. */
   if (f->fe->contact_changed) PetscCall(HycoFEAgreeOnMirrors(HycoComm(f), f->fe));
   f->contact_cpu -= HycoCPU();
   PetscCall(HycoFOMFetchMasters(f));
@@ -509,6 +519,7 @@ PetscErrorCode HycoFOMAssemble(HycoFOM f, const PetscReal mu[])
   PetscFunctionBegin;
   f->solved = f->given = f->sigma_ready = f->all_ready = PETSC_FALSE;
   PetscCall(HycoFOMSetParameters(f, mu));
+  /* An error in what follows makes the next call assemble everything. */
   f->fe->ready = PETSC_FALSE; /* until everything that depends on it is assembled */
   if (f->fe->stiffness_changed || f->fe->contact_changed) PetscCall(HycoFOMRelease(f));
   if (!f->n_free) PetscCall(CountFree(f));
@@ -516,6 +527,7 @@ PetscErrorCode HycoFOMAssemble(HycoFOM f, const PetscReal mu[])
     PetscCall(HycoLogEvent(HYCO_EVENT_ASSEMBLE, PETSC_TRUE));
     HycoOnEach(HycoComm(f), HycoFEAssembleStiffness(f->fe, f->K));
     PetscCall(HycoLogEvent(HYCO_EVENT_ASSEMBLE, PETSC_FALSE));
+    /* At each assembly: a path may have left a tangent in K, and new values reset the knowledge of definiteness. */
     PetscCall(MatSetOption(f->K, MAT_SPD, PETSC_TRUE));
     PetscCall(HycoFOMSetMotions(f));
   }
@@ -546,6 +558,7 @@ static PetscErrorCode CheckPoint(HycoFOM f, PetscInt n, const PetscReal mu[])
   }
   HycoAllreduce(bounds, 2 * n, MPIU_REAL, MPI_MAX, HycoComm(f));
   for (PetscInt p = 0; p < n; p++) {
+    /* The largest value, and minus the smallest. */
     HycoCheck(bounds[p] == -bounds[n + p],
               "%s is %.10g on one rank and %.10g on another; all ranks need the same point", f->scene->parameter[p],
               (double)-bounds[n + p], (double)bounds[p]);
@@ -573,6 +586,7 @@ PetscErrorCode HycoFOMSolve(HycoFOM f, PetscInt n, const PetscReal mu[])
   PetscCall(HycoSolverSetSystem(f->solver, f->system));
   HycoLogged(HYCO_EVENT_SOLVE, HycoSolverSolve(f->solver, f->U, f->Lambda));
   PetscCall(HycoSolverGetSeconds(f->solver, &t->factor, &t->solve));
+  /* Only with -hyco_regularise has it something to check. */
   PetscCall(HycoFOMCheckContactBalance(f));
   PetscCall(HycoFOMGather(f));
   t->total = HycoNow() - begin;
@@ -581,6 +595,7 @@ PetscErrorCode HycoFOMSolve(HycoFOM f, PetscInt n, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Borrowed; its matrices are those of the last assembly. */
 PetscErrorCode HycoFOMGetSystem(HycoFOM f, HycoSystem *system)
 {
   PetscFunctionBegin;
@@ -605,6 +620,7 @@ static PetscErrorCode LargestPart(HycoFOM f, PetscInt largest[3])
   largest[2] = 0;
   for (PetscInt i = 0; i < f->part->n_nodes; i++) {
     if (HycoMeshOwned(f->part, i) >= 0) continue;
+    /* The owner by bisection of the ranges. */
     PetscCall(PetscFindInt(f->part->node_global[i] * dim, f->size + 1, start, &rank));
     if (rank < 0) rank = -rank - 2; /* between two ranks' first unknowns */
     largest[2] += !neighbour[rank];
@@ -638,6 +654,7 @@ static PetscErrorCode ViewContacts(HycoFOM f, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Collective; after the set-up, whose sizes it prints. */
 PetscErrorCode HycoFOMView(HycoFOM f, PetscViewer viewer)
 {
   PetscInt largest[3] = {0, 0, 0};

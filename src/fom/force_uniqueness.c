@@ -28,6 +28,7 @@ static PetscErrorCode MarkClosed(MPI_Comm comm, const Rows *r, const PetscReal u
         size += PetscAbsReal(r->value[j] * u[r->dof[j]]);
       }
       scale = PetscMax(scale, size);
+      /* A row without entries resists nothing. */
       in[k] = (PetscBool)(r->start[k + 1] > r->start[k] && (lambda[k] > 0 || left <= 1e-9 * scale));
     }
     if (!pass) HycoAllreduce(&scale, 1, MPIU_REAL, MPI_MAX, comm);
@@ -47,6 +48,7 @@ static PetscErrorCode CountRows(HycoFOM f, const Rows *r, const PetscBool in[], 
   for (PetscInt k = 0; k < r->m; k++) {
     for (PetscInt j = r->start[k]; in[k] && j < r->start[k + 1]; j++) count[r->dof[j]]++;
   }
+  /* One rank: the counts are complete. */
   if (!f->to_surface) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecDuplicate(f->U, &all));
   PetscCall(VecSet(all, 0));
@@ -74,6 +76,7 @@ static PetscBool PeelOwn(const Rows *r, PetscReal count[], PetscBool in[])
       for (PetscInt j = r->start[k]; j < r->start[k + 1]; j++)
         own = (PetscBool)(own || (count[r->dof[j]] == 1 && PetscAbsReal(r->value[j]) > 1e-6));
       if (!own) continue;
+      /* A row less: its other unknowns may now be the own ones of further rows. */
       for (PetscInt j = r->start[k]; j < r->start[k + 1]; j++) count[r->dof[j]]--;
       in[k] = PETSC_FALSE;
       change = any = PETSC_TRUE;
@@ -147,6 +150,7 @@ static PetscErrorCode Dependent(const Rows *r, PetscInt *dependent)
   PetscCall(PetscCalloc1(n_dof, &full));
   PetscCall(PetscMalloc1((size_t)n * (size_t)n, &G));
   for (PetscInt a = 0; a < n; a++) {
+    /* Row a as a full vector, cleared again below: products with all others cost only their entries. */
     for (PetscInt j = r->start[a]; j < r->start[a + 1]; j++) full[at[j]] = r->value[j];
     for (PetscInt b = 0; b < n; b++) {
       PetscReal sum = 0;
@@ -174,6 +178,7 @@ static PetscErrorCode CountRest(HycoFOM f, const Rows *r, const PetscBool in[], 
   *dependent = 0;
   for (PetscInt k = 0; k < r->m; k++) pressed = (PetscBool)(pressed || (in[k] && f->lambda[k] > 0));
   HycoAllreduce(&pressed, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(f));
+  /* Dependent rows without any force: forces 0 are unique. */
   if (!pressed) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(GatherRest(f, r, in, &rest));
   HycoOnRoot(HycoComm(f), Dependent(&rest, dependent));

@@ -50,6 +50,8 @@ static PetscErrorCode CopyNormal(HycoFOM f, Vec from, PetscBool with, Vec to)
   PetscCall(VecSet(to, 0));
   PetscCall(VecGetArrayRead(from, &a));
   PetscCall(VecGetArray(to, &b));
+  /* with: `from` has the rows with tangents and `to` one per contact; else the reverse. slip.row[k]: the normal row
+     of contact k. */
   for (PetscInt k = 0; k < f->pairs.n; k++) b[with ? k : r->slip.row[k]] = a[with ? r->slip.row[k] : k];
   PetscCall(VecRestoreArray(to, &b));
   PetscCall(VecRestoreArrayRead(from, &a));
@@ -65,6 +67,8 @@ static PetscErrorCode Use(HycoFOM f, PetscBool use)
 
   PetscFunctionBegin;
   PerRow(p, at);
+  /* The path's vectors are exchanged for those of the other size. The first two are forces, which both systems have;
+     the others are work space and the history of the acceleration. */
   for (PetscInt j = 0; j < N_PER_ROW && use != r->used; j++) {
     Vec before = *at[j];
 
@@ -81,6 +85,8 @@ static PetscErrorCode Use(HycoFOM f, PetscBool use)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For the pairs of f, whose number of contacts stays along a path. The solver is one for blocks with cones; the
+   user's options come after it, so that they may replace the type. Collective. */
 PetscErrorCode HycoFrictionCreate(HycoFOM f)
 {
   HycoFriction r;
@@ -107,6 +113,7 @@ PetscErrorCode HycoFrictionCreate(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The path gets its own vectors back first: each is freed by its owner. NULL-safe. */
 PetscErrorCode HycoFrictionDestroy(HycoFOM f)
 {
   HycoFriction r = f->friction;
@@ -130,6 +137,8 @@ PetscErrorCode HycoFrictionDestroy(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A new path: no forces and no slip yet; u_old = 0, so that the slip of the first step counts from the undeformed
+   bodies. */
 PetscErrorCode HycoFrictionBegin(HycoFOM f)
 {
   HycoFriction r = f->friction;
@@ -152,6 +161,7 @@ typedef struct {
   PetscReal *value, *gap;
 } Rows;
 
+/* Local: the coefficients may be invalid on one rank only, so that the caller wraps it in HycoOnEach(). */
 static PetscErrorCode ComputeRows(HycoFOM f, HycoFriction r, Rows *rows)
 {
   PetscFunctionBegin;
@@ -181,6 +191,7 @@ static PetscErrorCode FillB(HycoFOM f, HycoFriction r, const Rows *rows)
     for (PetscInt j = 0; j < n; j++) {
       const PetscInt node = rows->dof[lo + j] / dim;
 
+      /* From the unknowns of the surface's tables to those of the distributed vectors. */
       column[j] = (global ? global[node] : node) * dim + rows->dof[lo + j] % dim;
     }
     PetscCall(MatSetValues(r->B, 1, &at, n, column, rows->value + lo, INSERT_VALUES));
@@ -201,6 +212,7 @@ static PetscErrorCode Rubs(HycoFOM f, PetscBool *rubs)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The order matters: rows need the coefficients, Use() needs the matrices of the system to which it may change. */
 static PetscErrorCode Assemble(HycoFOM f, HycoFriction r, Rows *rows)
 {
   PetscScalar *D;
@@ -208,6 +220,7 @@ static PetscErrorCode Assemble(HycoFOM f, HycoFriction r, Rows *rows)
 
   PetscFunctionBegin;
   HycoOnEach(HycoComm(f), ComputeRows(f, r, rows));
+  /* Gaps change with each step (u_old), B only with the nodes of the contacts. */
   if (!r->B || f->fe->contact_changed) PetscCall(FillB(f, r, rows));
   PetscCall(VecGetArray(r->D, &D));
   PetscCall(PetscArraycpy(D, rows->gap, r->rows));
@@ -224,6 +237,7 @@ static PetscErrorCode Assemble(HycoFOM f, HycoFriction r, Rows *rows)
 PetscErrorCode HycoFrictionAssemble(HycoFOM f)
 {
   HycoFriction r = f->friction;
+  /* width: the most nodes of a contact. */
   const PetscInt entries = f->width * f->fe->dim * r->rows;
   Rows rows;
   PetscErrorCode ierr;
@@ -244,6 +258,7 @@ static PetscErrorCode TakeForces(HycoFOM f)
 
   PetscFunctionBegin;
   if (r->used) {
+    /* The path's Lambda is the vector with tangents now; f->Lambda has the normal components for outputs and files. */
     PetscCall(VecCopy(f->path->Lambda, r->L));
     PetscCall(CopyNormal(f, r->L, PETSC_TRUE, f->Lambda));
   } else
@@ -261,6 +276,7 @@ PetscErrorCode HycoFrictionWork(HycoFOM f, PetscReal *sum)
   PetscFunctionBegin;
   PetscCall(TakeForces(f));
   PetscCall(VecWAXPY(p->work, -1, p->U_old, f->U));
+  /* The trapezoidal rule over the step, exact where forces change linearly. */
   PetscCall(MatMult(r->B, p->work, r->work));
   PetscCall(VecDot(r->L, r->work, &both[0]));
   PetscCall(VecDot(r->L_old, r->work, &both[1]));
@@ -268,6 +284,8 @@ PetscErrorCode HycoFrictionWork(HycoFOM f, PetscReal *sum)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* After HycoFrictionWork(), which sets L. w = D - B U with the old D: its tangential part is minus the slip of the
+   step. Afterwards u_old is the accepted surface. Collective. */
 PetscErrorCode HycoFrictionAccept(HycoFOM f)
 {
   HycoFriction r = f->friction;
@@ -286,10 +304,13 @@ PetscErrorCode HycoFrictionAccept(HycoFOM f)
   PetscCall(VecCopy(r->L, r->L_old));
   PetscCall(HycoFOMToSurface(f, f->U, r->u_old));
   HycoFEComplete(f->fe_surface, r->u_old);
+  /* A negative sign of det J at the solution: the step has several solutions (force_uniqueness.c). */
   f->path->now.disproven += r->used && r->solver->sign < 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Sums over the contacts of all ranks: the work since the path began and the number of contacts that slip now.
+   Collective. */
 PetscErrorCode HycoFrictionMeasure(HycoFOM f, HycoStep *s)
 {
   HycoFriction r = f->friction;
@@ -311,6 +332,7 @@ static PetscReal *Column(const HycoShear *s, PetscInt c, PetscInt *stride)
   return c < 3 ? s->force + c : c < 6 ? s->slip + (c - 3) : c < 7 ? s->work : s->state;
 }
 
+/* Each column in the order of one rank, so that a checkpoint resumes on any number of ranks. Collective. */
 PetscErrorCode HycoFrictionSave(HycoFOM f, HycoH5 h)
 {
   PetscReal *value;
@@ -332,6 +354,7 @@ PetscErrorCode HycoFrictionSave(HycoFOM f, HycoH5 h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rank 0 alone. The file is closed also after an error; columns that were read stay for the caller to free. */
 static PetscErrorCode ReadColumns(HycoFOM f, PetscReal *value[N_STATE])
 {
   HycoH5 h;
@@ -364,6 +387,7 @@ static PetscErrorCode TakeColumns(HycoFOM f, PetscReal *const value[N_STATE])
     PetscInt stride;
     PetscReal *to = Column(&f->friction->slip.shear, c, &stride);
 
+    /* Its scatter from rank 0 is the only one in the order of the contacts, hence the detour. */
     PetscCall(HycoFOMSetLambda(f, value[c]));
     PetscCall(VecGetArrayRead(f->Lambda, &mine));
     for (PetscInt k = 0; k < f->pairs.n; k++) to[k * stride] = mine[k];
@@ -374,6 +398,7 @@ static PetscErrorCode TakeColumns(HycoFOM f, PetscReal *const value[N_STATE])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The tangential components follow from the saved vectors of force and this run's tangents. Collective. */
 PetscErrorCode HycoFrictionLoad(HycoFOM f)
 {
   HycoFriction r = f->friction;
@@ -390,6 +415,7 @@ PetscErrorCode HycoFrictionLoad(HycoFOM f)
     for (PetscInt j = r->slip.row[k] + 1; j < r->slip.row[k + 1]; j++) {
       const PetscReal *t = r->slip.tangent + 6 * k + 3 * (j - r->slip.row[k] - 1), *force = r->slip.shear.force + 3 * k;
 
+      /* The saved force is the one on the slave, the opposite of the multiplier (Add() in slip.c). */
       L[j] = -(force[0] * t[0] + force[1] * t[1] + force[2] * t[2]);
     }
   }

@@ -36,6 +36,7 @@ static PetscErrorCode AddContacts(HycoFOM f, const PetscReal U[], const PetscRea
   ierr = HycoContactRows(f->fe_surface, &f->pairs, start, dof, value, w);
   for (PetscInt k = 0; !ierr && k < f->pairs.n; k++) {
     for (PetscInt j = start[k]; j < start[k + 1]; j++) {
+      /* A sum over the contacts of this rank; several may share a node. */
       force[dof[j]] += value[j] * lambda[k];
       w[k] -= value[j] * U[dof[j]];
     }
@@ -52,6 +53,7 @@ static PetscErrorCode ContactData(Work *o, Vec R, Vec W)
   const PetscScalar *lambda;
   PetscScalar *w, *force;
   PetscReal *U;
+  /* Room of the surface's size: o->r is free until Differentiate() fills it. */
   Vec at = f->to_surface ? f->U_surface : o->r;
 
   PetscFunctionBegin;
@@ -83,6 +85,7 @@ static PetscErrorCode Data(Work *o, const PetscReal mu[], Vec R, Vec W)
   PetscScalar *r;
 
   PetscFunctionBegin;
+  /* Moves the mesh and the supports to mu; o->U keeps the free unknowns of the solution. */
   PetscCall(HycoFOMSetParameters(f, mu));
   PetscCall(PetscMalloc2(f->fe->n_dof, &u, f->fe->n_dof, &local));
   PetscCall(HycoFOMToLocal(f, o->U, u));
@@ -91,6 +94,7 @@ static PetscErrorCode Data(Work *o, const PetscReal mu[], Vec R, Vec W)
   for (PetscInt k = 0; k < f->fe->n_dof; k++) {
     const PetscInt at = HycoMeshOwned(f->part, k / dim);
 
+    /* Complete at owned nodes, as the part has all cells around these. */
     if (at >= 0) r[at * dim + k % dim] = local[k];
   }
   PetscCall(VecRestoreArray(R, &r));
@@ -114,10 +118,12 @@ static PetscErrorCode Measure(void *context, const PetscReal mu[], PetscReal ste
   for (PetscInt k = 0; k < f->fe->n_dof; k++) {
     const PetscInt at = HycoMeshOwned(f->part, k / dim);
 
+    /* Supports follow the parameter exactly, not by a derivative. */
     if (at >= 0 && f->fe->fixed[k]) u[at * dim + k % dim] = f->fe->u0[k];
   }
   PetscCall(VecRestoreArray(f->U, &u));
   if (f->n_contacts) PetscCall(VecWAXPY(f->Lambda, step, o->dL, o->L));
+  /* Stresses are computed anew where an output needs them. */
   f->sigma_ready = PETSC_FALSE;
   PetscCall(HycoFOMGather(f));
   PetscCall(HycoFOMMeasureQuantities(f, output));
@@ -138,6 +144,7 @@ static PetscErrorCode Turns(Work *o, const HycoDifference *d, PetscBool closer, 
   PetscCall(VecGetArrayRead(o->L, &L));
   for (PetscInt j = 0; j < 5; j++) PetscCall(VecGetArrayRead(o->W[j], &w[j]));
   for (PetscInt k = 0; k < f->pairs.n; k++) {
+    /* The largest rate of all gaps is the scale of a jump: a gap that does not change has only round-off. */
     if (L[k] > HYCO_GRADIENT_FORCE * most) slope = PetscMax(slope, PetscAbsReal((w[1][k] - w[0][k]) / d->step[1]));
   }
   HycoAllreduce(&slope, 1, MPIU_REAL, MPI_MAX, HycoComm(f));
@@ -164,9 +171,11 @@ static PetscErrorCode FindTurns(Work *o, const HycoDifference *d, PetscBool *tur
   PetscFunctionBegin;
   PetscCall(Turns(o, d, PETSC_FALSE, turns));
   if (!*turns) PetscFunctionReturn(PETSC_SUCCESS);
+  /* The size of a jump between slopes stays when the points come closer; that of curvature shrinks with them. */
   HycoDifferenceShrink(&near);
   for (PetscInt j = 1; j < 3; j++) {
     HycoDifferencePoint(&near, o->f->scene, o->mu, j, at);
+    /* o->dU receives an imbalance that is not needed; it is set anew by the solve. */
     PetscCall(Data(o, at, o->dU, o->W[2 + j]));
   }
   PetscCall(Turns(o, d, PETSC_TRUE, turns));
@@ -186,8 +195,10 @@ static PetscErrorCode Differentiate(Work *o, HycoDifference *d, PetscBool *turns
     PetscCall(Data(o, at, o->R[j], o->W[j]));
   }
   if (f->n_contacts) PetscCall(FindTurns(o, d, turns));
+  /* A difference across a change of masters would mix two slopes. */
   if (*turns) HycoDifferenceTakeSide(d);
   PetscCall(VecSet(o->r, 0));
+  /* Minus: R = K U - F + B^T L, and r is the change of its negative. */
   for (PetscInt j = 0; j < 3; j++) PetscCall(VecAXPY(o->r, -d->weight[j], o->R[j]));
   if (!f->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecSet(o->g, 0));
@@ -236,6 +247,7 @@ static PetscErrorCode Create(Work *o)
     PetscCall(VecNorm(o->g, NORM_INFINITY, &bu));
     o->size = PetscMax(d, bu);
   }
+  /* Before Data() moves the mesh: the factor and B are those of the solution. */
   PetscCall(HycoSolverTangentCreate(f->solver, o->U, o->L, &o->tangent));
   PetscCall(Data(o, o->mu, o->R[0], o->W[0]));
   PetscCall(HycoFOMMeasureQuantities(f, o->output));
@@ -256,10 +268,12 @@ static PetscErrorCode Restore(Work *o)
   f->sigma_ready = PETSC_FALSE;
   PetscCall(HycoFOMGather(f));
   if (o->stress) PetscCall(HycoFOMStress(f));
+  /* The caller may hold the array, which must have the solution's values again. */
   if (f->contact_result) PetscCall(HycoFOMGetContacts(f, &n, &results));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Also after an error: all handles start as NULL. */
 static PetscErrorCode Destroy(Work *o)
 {
   PetscFunctionBegin;
@@ -305,6 +319,7 @@ PetscErrorCode HycoFOMGetGradient(HycoFOM f, HycoGradient *gradient)
   if (!ierr) gradient->n_undecided = HycoSolverTangentUndecided(o.tangent);
   for (PetscInt p = 0; !ierr && p < gradient->n_parameters; p++) ierr = Column(&o, p, gradient);
   if (!ierr) ierr = Restore(&o);
+  /* The model may stand at mu + h: its solution is not to be used. */
   if (ierr) f->solved = PETSC_FALSE;
   PetscCall(Destroy(&o));
   PetscCall(ierr);

@@ -51,6 +51,7 @@ PetscErrorCode HycoPathSetUp(HycoPath p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* NULL-safe. U, Lambda, K and the system belong to the model of the path. */
 PetscErrorCode HycoPathFree(HycoPath *path)
 {
   HycoPath p = *path;
@@ -76,6 +77,7 @@ PetscErrorCode HycoPathFree(HycoPath *path)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For paths at full order and of models; PetscOptionsObject: that of the caller's PetscObjectOptionsBegin(). */
 PetscErrorCode HycoPathSetFromOptions(HycoPath p, HycoOptionItems PetscOptionsObject)
 {
   PetscFunctionBegin;
@@ -113,7 +115,8 @@ PetscErrorCode HycoPathBegin(HycoPath p, const PetscReal mu[])
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(p->mu, mu, p->scene->n_parameters));
   p->t = p->scene->times[0];
-  p->step = p->n_steps = p->n_orders = p->n_taken = p->n_cuts = 0;
+  p->step = p->n_steps = p->n_orders = p->n_taken = p->n_cuts = p->n_bound = 0;
+  /* The first step goes as far as the listed times and the kinks allow. */
   p->dt = PETSC_MAX_REAL;
   p->ended = PETSC_FALSE;
   p->why[0] = '\0';
@@ -204,6 +207,7 @@ static PetscErrorCode TryStep(HycoPath p, PetscReal stop)
   PetscCall(HycoPathAttempt(p, p->t, n > 1 ? p->t + h : stop, &a));
   if (a.converged && a.law.increment > p->bound && !p->given) {
     a.converged = PETSC_FALSE;
+    /* A converged step is rejected for its accuracy: what it found is undone. */
     HycoFormat(a.why, "the increment of inelastic strain is %.1e in one step", (double)a.law.increment);
     PetscCall(HycoPathRestore(p));
   }
@@ -223,6 +227,7 @@ static PetscErrorCode TryStep(HycoPath p, PetscReal stop)
   else if (GROWTH * a.law.increment <= p->bound && a.easy)
     p->dt = PetscMax(p->dt, GROWTH * h);
   else
+    /* Converged easily, but the bound on the inelastic increment forbids growth: counted for the report. */
     p->n_bound += a.easy;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -248,9 +253,11 @@ static PetscErrorCode Reach(HycoPath p, PetscReal end, PetscBool *reached)
   while (p->t < end && *reached) {
     const PetscReal t = p->t, stop = PetscMin(HycoSceneNextStop(s, p->t), NextGiven(p));
 
+    /* Prescribed times replace the request. */
     if (p->substeps > 1 && !p->given) p->dt = PetscMin(p->dt, (end - s->times[p->step - 1]) / (PetscReal)p->substeps);
     PetscCall(TryStep(p, stop));
     if (p->t == t && (p->dt < least || (p->most_cuts && p->n_cuts > p->most_cuts))) *reached = PETSC_FALSE;
+    /* At the listed time itself Advance() saves, after the time is recorded. */
     if (p->t > t && p->t < end && p->ops->save) PetscCall((*p->ops->save)(p));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -316,6 +323,7 @@ PetscErrorCode HycoPathRun(HycoPath p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Reals, for the median. */
 static int Ascending(const void *a, const void *b)
 {
   const PetscReal x = *(const PetscReal *)a, y = *(const PetscReal *)b;

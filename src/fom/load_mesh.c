@@ -52,6 +52,7 @@ PetscErrorCode HycoMeshLoad(MPI_Comm comm, HycoScene scene, DM *dm)
     PetscCallMPI(MPI_Comm_compare(comm, HycoComm(scene->dm), &same));
     HycoCheck(same == MPI_IDENT || same == MPI_CONGRUENT,
               "the scene's DM lives on other processes than the model; for training give -hyco_groups 1");
+    /* The tags that HycoPlexComplete() composes belong to the clone; the caller's DM stays without. */
     PetscCall(DMClone(scene->dm, dm));
     PetscCall(HycoPlexComplete(*dm));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -81,6 +82,7 @@ PetscErrorCode HycoMeshCreate(MPI_Comm comm, HycoScene scene, HycoMesh *mesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Everything that reading checks, without a model: the mesh is made and dropped. Collective. */
 PetscErrorCode HycoSceneCheckMesh(MPI_Comm comm, HycoScene scene)
 {
   HycoMesh mesh;

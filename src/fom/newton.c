@@ -42,6 +42,7 @@ static PetscErrorCode Evaluate(HycoPath p, PetscReal t0, PetscReal t1, PetscBool
   a->seconds_law += HycoNow() - begin;
   now->residual[0] = now->residual[1]; /* also where a law fails: Shorten() takes one back for each evaluation */
   now->residual[1] = now->residual[2];
+  /* Stays where a law fails: such a step counts as diverged, not as stagnating. */
   now->residual[2] = PETSC_INFINITY;
   if (a->law.failed) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecNorm(p->f_int, NORM_2, &size[0]));
@@ -49,6 +50,7 @@ static PetscErrorCode Evaluate(HycoPath p, PetscReal t0, PetscReal t1, PetscBool
   if (p->n_contacts) {
     PetscCall(MatMult(p->Bt, p->Lambda, p->work));
     PetscCall(VecNorm(p->work, NORM_2, &size[2]));
+    /* ops->step left F - f_int in r. */
     PetscCall(VecAXPY(p->r, -1, p->work));
   }
   now->size = PetscMax(size[0], PetscMax(size[1], size[2]));
@@ -135,12 +137,14 @@ static PetscErrorCode SolveSystem(HycoPath p, PetscBool first, const Progress *n
 
   PetscFunctionBegin;
   PetscCall(RightSide(p));
+  /* Only the first system of a step moves the supports; later iterates have their new values. */
   if (first) PetscCall((*p->ops->moves)(p, p->rhs));
   PetscCall(HycoSystemSetVectors(p->system, p->rhs, p->D));
   PetscCall(HycoSolverSetSystem(p->solver, p->system));
   PetscCall(VecCopy(p->U, p->G));
   if (p->n_contacts) PetscCall(VecCopy(p->Lambda, p->L_new));
   if (p->cold) PetscCall(HycoSolverSetWarmStart(p->solver, PETSC_FALSE));
+  /* A solver with a factor ignores it. */
   PetscCall(HycoSolverSetTarget(p->solver, Target(p, now)));
   HycoLogged(HYCO_EVENT_SOLVE, HycoSolverSolve(p->solver, p->G, p->L_new));
   if (p->cold) PetscCall(HycoSolverSetWarmStart(p->solver, PETSC_TRUE));
@@ -151,6 +155,7 @@ static PetscErrorCode SolveSystem(HycoPath p, PetscBool first, const Progress *n
   PetscCall(HycoSolverGetLinearIterations(p->solver, &linear, &most));
   p->kept++;
   a->iterations++;
+  /* Seconds of a new factor; 0: a kept one. */
   a->factors += factor > 0;
   a->active_its += its;
   a->linear_its += linear;
@@ -172,6 +177,7 @@ static PetscErrorCode Advance(HycoPath p, PetscBool feasible, const HycoStepAtte
   PetscCall(VecCopy(p->U, p->U_last));
   if (p->n_contacts) PetscCall(VecCopy(p->Lambda, p->L_last));
   now->feasible = feasible;
+  /* Friction has no potential: its forces depend on the normal ones. */
   now->search = (PetscBool)(feasible && a->law.has_potential && !p->rubs);
   now->share = 1;
   if (now->search) { /* r + B^T L = F - f_int on the free unknowns; on the others U does not change */
@@ -221,6 +227,7 @@ static PetscErrorCode Shorten(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAt
     now->share /= 2;
     PetscCall(VecAXPBY(p->U, 0.5, 0.5, p->U_last));
     if (p->n_contacts) PetscCall(VecAXPBY(p->Lambda, 0.5, 0.5, p->L_last));
+    /* Evaluate() shifts the residuals: those of the refused point are taken out of the history. */
     now->residual[2] = now->residual[1]; /* the previous one */
     now->residual[1] = now->residual[0];
     PetscCall(Evaluate(p, t0, t1, PETSC_TRUE, a, now));
@@ -258,6 +265,7 @@ static PetscErrorCode Push(PetscInt n, Vec store[], Vec vector, Vec last)
   Vec oldest = store[0];
 
   PetscFunctionBegin;
+  /* Full: the oldest vector becomes the newest. */
   if (n == HYCO_ANDERSON) {
     for (PetscInt k = 1; k < n; k++) store[k - 1] = store[k];
     store[n - 1] = oldest;
@@ -342,6 +350,7 @@ static PetscErrorCode Judge(HycoPath p, const Progress *now, HycoStepAttempt *a,
   *worst = PetscMax(kkt->penetration, PetscMax(kkt->adhesion, kkt->complementarity));
   a->residual = now->residual[2] / size;
   kkt->rounding = now->residual[2] <= now->floor ? a->residual : 0;
+  /* Below the floor the residual is no measure of equilibrium. */
   kkt->stationarity = kkt->rounding > 0 ? 0 : a->residual;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -402,12 +411,14 @@ static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoNewton
     if (tangent && !a->linear_its) Observe(&now, k, a); /* else what the solves leave decides */
     if (k && now.residual[2] <= PetscMax(p->rtol * now.size, now.floor)) {
       PetscCall(Judge(p, &now, a, &worst));
+      /* Of the contacts' residuals, which are relative. */
       a->converged = (PetscBool)(worst <= 1e-8);
       if (a->converged && p->ops->judge) PetscCall((*p->ops->judge)(p, HYCO_CONVERGED, a->why));
       a->converged = (PetscBool)(a->converged && !a->why[0]);
       if (a->converged || a->why[0]) break;
     }
     if (k) least = PetscMin(least, now.residual[2] / (now.size > 0 ? now.size : 1));
+    /* Or the iterates run away; NaN ends here too. */
     if (k == most || !(now.residual[2] <= 1e4 * PetscMax(now.size, now.floor))) {
       HycoFormat(a->why, "the residual of equilibrium is %.1e after %d iterations (%s)%s", (double)least, (int)k,
                  HycoNewtons[method], one ? ", as at the largest load that friction balances" : "");
@@ -474,6 +485,7 @@ PetscErrorCode HycoPathAttempt(HycoPath p, PetscReal t0, PetscReal t1, HycoStepA
   PetscCall(VecCopy(p->U, p->U_old));
   if (p->n_contacts) PetscCall(VecCopy(p->Lambda, p->L_old));
   PetscCall(HycoPathAssemble(p, t1));
+  /* Models with an iteration of their own (bodies) need neither K nor its tangents here. */
   if (p->ops->iterate) {
     PetscCall((*p->ops->iterate)(p, t0, t1, a));
     a->easy = (PetscBool)(a->iterations <= usual_its[HycoPathMethod(p)] / 2);
@@ -488,6 +500,7 @@ PetscErrorCode HycoPathAttempt(HycoPath p, PetscReal t0, PetscReal t1, HycoStepA
   PetscCall(MatGetDiagonal(p->K, p->diagonal));
   PetscCall(Iterate(p, t0, t1, method, a));
   if (!a->converged && p->flows && method != HYCO_NEWTON_TANGENT && p->method != HYCO_NEWTON_ELASTIC) {
+    /* The first failure is forgotten; the second one is the reason. */
     a->why[0] = '\0';
     PetscCall(HycoPathRestore(p));
     PetscCall(Iterate(p, t0, t1, HYCO_NEWTON_TANGENT, a));

@@ -27,7 +27,9 @@ PetscErrorCode HycoPathRefuseOptions(HycoFOM f)
 static PetscErrorCode ReduceReport(HycoFOM f, HycoFEStepReport *r)
 {
   PetscReal sum[6] = {r->work, r->stored, r->dissipated, r->thermal, r->moduli, r->potential};
+  /* dt_factor is a minimum: negated for MPI_MAX. */
   PetscReal most[4] = {-r->dt_factor, r->increment, (PetscReal)r->failed, (PetscReal)!r->has_potential};
+  /* size: this rank has not failed. */
   PetscMPIInt lowest = r->failed ? f->rank : f->size;
 
   PetscFunctionBegin;
@@ -93,6 +95,8 @@ static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elast
   p->B = f->B;
   p->Bt = f->Bt;
   p->n_free = f->n_free;
+  /* HycoFOMAssemble() has the lifting of all prescribed displacements in f->F, which the iterations overwrite as
+     their right-hand side; p->F has the loads alone. */
   lifted = f->fe->lifted;
   f->fe->lifted = PETSC_FALSE;
   HycoOnEach(p->comm, HycoFEAssembleForce(f->fe, p->F));
@@ -108,6 +112,7 @@ static PetscErrorCode Step(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tan
   PetscScalar *u;
 
   PetscFunctionBegin;
+  /* At each evaluation of the laws, the most frequent point that all ranks reach together. */
   if (p->interrupt) PetscCall((*p->interrupt)(p->interrupt_ctx));
   PetscCall(VecScatterBegin(f->to_local, f->U, f->U_local, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(VecScatterEnd(f->to_local, f->U, f->U_local, INSERT_VALUES, SCATTER_FORWARD));
@@ -121,6 +126,7 @@ static PetscErrorCode Step(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tan
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* With the tangents that the last step() left in fe. */
 static PetscErrorCode Stiffness(HycoPath p)
 {
   PetscFunctionBegin;
@@ -141,6 +147,7 @@ static PetscErrorCode Moves(HycoPath p, Vec rhs)
   PetscCall(VecRestoreArrayRead(f->U_local, &u));
   if (!moved) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecAXPY(rhs, 1, p->work));
+  /* HycoPathMoves() assembled the loads together with the lifting: only the latter is wanted. */
   PetscCall(VecAXPY(rhs, -1, p->F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -250,6 +257,7 @@ static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
   PetscCall(VecCopy(p->f_int, p->f_old));
   if (((HycoFOM)p->ctx)->friction) PetscCall(HycoFrictionAccept((HycoFOM)p->ctx));
   p->now.energy_defect = PetscMax(p->now.energy_defect, defect);
+  /* At the listed time Record() gathers, and calls the monitor. */
   if (p->between && p->t < p->scene->times[p->step]) {
     PetscCall(HycoFOMGather((HycoFOM)p->ctx));
     PetscCall((*p->between)((HycoFOM)p->ctx, p->monitor_ctx));
@@ -336,6 +344,7 @@ static PetscErrorCode Record(HycoPath p)
   f->sigma_ready = f->all_ready = PETSC_FALSE;
   PetscCall(MeasureSliding(f, &s->sliding));
   PetscCall(HycoFOMMeasureQuantities(f, s->quantity));
+  /* HycoPathSetUp() has room for all listed times and one more, the end of an incomplete path. */
   p->steps[p->n_steps++] = *s;
   PetscCall(PetscMemzero(&p->now, sizeof(p->now)));
   PetscCall(HycoSeriesAdd(f));
@@ -343,6 +352,7 @@ static PetscErrorCode Record(HycoPath p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* After each accepted step; does nothing without -hyco_checkpoint. */
 static PetscErrorCode Save(HycoPath p)
 {
   PetscFunctionBegin;

@@ -25,6 +25,7 @@ static PetscErrorCode ContactForces(HycoFOM f, PetscReal force[])
   PetscCall(ierr);
   PetscCall(VecDuplicate(f->U, &all));
   PetscCall(VecSet(all, 0));
+  /* U_surface serves as a work vector; f->u_surface keeps the solution. */
   at = f->to_surface ? f->U_surface : all;
   PetscCall(VecGetArray(at, &v));
   for (PetscInt k = 0; k < f->fe_surface->n_dof; k++) v[k] = c.force[3 * (k / dim) + k % dim];
@@ -60,6 +61,7 @@ static PetscErrorCode Reactions(HycoFOM f, PetscReal contact[], PetscReal r[])
   PetscCall(PetscMalloc1(f->fe->n_dof, &along));
   PetscCall(PetscArraycpy(along, contact, f->fe->n_dof));
   HycoFEGeneralise(f->fe, along);
+  /* contact is -B^T L, the force on the bodies: what they press on the support is its opposite. */
   for (PetscInt k = 0; k < f->fe->n_dof; k++) r[k] -= HycoFESupports(f->fe, k) ? along[k] : 0;
   PetscCall(PetscFree(along));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -178,6 +180,7 @@ static void AddSupports(HycoFE fe, PetscInt node, const PetscReal r[], const Pet
 
     force[c] += r[dof];
     plain[c] = (PetscBool)(fe->fixed[dof] && !oblique);
+    /* T^-T: the other components of the support's force. */
     for (PetscInt d = 0; oblique && d < fe->dim; d++) force[d] -= oblique->a[d] * r[dof];
     if (oblique) o[n++] = oblique;
   }
@@ -250,15 +253,17 @@ static PetscErrorCode Balance(HycoFOM f, PetscInt n, Sums *s, PetscReal *balance
    their balance, in f->reaction (borrowed). Collective. */
 PetscErrorCode HycoFOMGetReactions(HycoFOM f, PetscInt *n, const HycoReaction *result[], PetscReal *balance)
 {
-  const HycoScene scene = f->scene;
-  const PetscInt n_springs = scene->n_springs, all = scene->n_fixed + n_springs + 2, n_dof = f->fe->n_dof;
-  PetscInt *support;
+  HycoScene scene;
+  PetscInt all, n_dof, *support;
   PetscReal *work;
   Sums s = {0};
 
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
   PetscCheck(f->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoFOMSolve() before HycoFOMGetReactions()");
+  scene = f->scene;
+  n_dof = f->fe->n_dof;
+  all = scene->n_fixed + scene->n_springs + 2;
   if (!f->reaction) PetscCall(PetscMalloc1(all, &f->reaction));
   PetscCall(PetscArrayzero(f->reaction, all));
   PetscCall(PetscMalloc2(3 * n_dof, &work, n_dof, &support));

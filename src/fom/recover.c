@@ -21,7 +21,7 @@ static PetscErrorCode SetUp(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* K U = given_F Without contacts the system is linear: one factorisation as long as K is unchanged. */
+/* K U = given_F. Without contacts the system is linear: one factorisation as long as K is unchanged. */
 static PetscErrorCode SolveGiven(HycoFOM f)
 {
   PetscFunctionBegin;
@@ -50,6 +50,7 @@ PetscErrorCode HycoFOMSolveForces(HycoFOM f, PetscInt n, const PetscReal mu[], c
   if (f->n_contacts) {
     PetscCall(HycoFOMSetLambda(f, Lambda));
     PetscCall(MatMult(f->Bt, f->Lambda, f->given_F));
+    /* given_F = F - B^T L. */
     PetscCall(VecAYPX(f->given_F, -1, f->F));
   }
   t->assemble = HycoNow() - begin;

@@ -51,6 +51,7 @@ static void Names(HycoFOM f, const HycoMotions *free, PetscInt n, const PetscRea
     char name[HYCO_LINE];
 
     HycoMotionsName(f->fe, free, unconstrained + k * free->n, name);
+    /* The first ones are enough for a message. */
     if (strlen(list) + strlen(name) + strlen(between) + 1 > room) break;
     if (k) strcat(list, between);
     strcat(list, name);
@@ -143,6 +144,7 @@ static PetscErrorCode FindReleased(HycoFOM f, const HycoMotions *free)
   PetscCall(ToSurface(f, free->n, motion, &at_surface.motion));
   ierr = FindUnconstrained(f, &at_surface, &z);
   if (!ierr) PetscCall(PetscMalloc1(z.n + z.n_alike, &f->released));
+  /* Only if something is to be released at all. */
   for (PetscInt k = 0; !ierr && k < z.n_alike && z.n; k++)
     PetscCall(AddReleased(f, free->n, motion, z.alike + k * free->n));
   f->n_turned = f->n_released;
@@ -189,6 +191,7 @@ static PetscErrorCode ReleasedRows(HycoFOM f, PetscReal row[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The squared length. */
 static PetscReal RowSize(PetscInt n, const PetscReal row[])
 {
   PetscReal size = 0;
@@ -218,6 +221,7 @@ static PetscErrorCode LongestRow(HycoFOM f, const PetscInt tag[], const PetscRea
     at = i;
   }
   PetscCallMPI(MPI_Allreduce(&key, &all, 1, MPIU_INT64, MPI_MIN, HycoComm(f)));
+  /* One rank has it, the others add 0: the sum broadcasts it without knowing the rank. */
   for (PetscInt k = 0; k < n; k++) longest[k] = at >= 0 && key == all ? row[at * n + k] : 0;
   HycoAllreduce(longest, n, MPIU_REAL, MPI_SUM, HycoComm(f));
   *pin = (PetscInt)(all / dim);
@@ -280,6 +284,7 @@ PetscErrorCode HycoFOMRelease(HycoFOM f)
   PetscErrorCode ierr = 0;
 
   PetscFunctionBegin;
+  /* The motions are those without pins. */
   PetscCall(SetPins(f, 0));
   for (PetscInt k = 0; k < f->n_released; k++) PetscCall(VecDestroy(&f->released[k]));
   PetscCall(PetscFree(f->released));
@@ -291,6 +296,7 @@ PetscErrorCode HycoFOMRelease(HycoFOM f)
   PetscCall(ierr);
   HycoCheck(f->n_released <= HYCO_MAX_PINS, "%d rigid motions are unconstrained; at most %d can be regularised",
             (int)f->n_released, HYCO_MAX_PINS);
+  /* The matrix's pattern and the factor's size depend on the pins. */
   HycoCheck(!f->pinned || f->n_pins == f->n_released,
             "%d rigid motions are unconstrained at this point, and %d at the last one; solve such points separately",
             (int)f->n_released, (int)f->n_pins);
@@ -340,6 +346,7 @@ PetscErrorCode HycoFOMBalance(HycoFOM f)
     PetscCall(VecAXPY(f->F, -on, f->released[k]));
     worst = PetscMax(worst, all > 0 ? PetscAbsReal(on) / all : 0);
   }
+  /* After all motions: the message names the whole set. */
   PetscCall(CheckBalance(f, "loads", worst));
   for (PetscInt k = 0; k < f->fe->n_pins; k++) { /* row of a support */
     const PetscInt own = HycoMeshOwned(f->part, f->fe->pin[k] / dim);
@@ -367,6 +374,7 @@ PetscErrorCode HycoFOMCheckContactBalance(HycoFOM f)
   for (PetscInt k = 0; k < f->n_pins; k++) {
     PetscCall(VecNorm(f->released[k], NORM_INFINITY, &all));
     PetscCall(VecDot(force, f->released[k], &on));
+    /* Relative to all contact forces on the largest displacement of the motion. */
     if (size > 0) worst = PetscMax(worst, PetscAbsReal(on) / (size * all));
   }
   PetscCall(VecDestroy(&force));
@@ -403,6 +411,7 @@ static PetscErrorCode SetKernel(HycoFOM f)
     PetscCall(MatNullSpaceDestroy(&kernel));
     PetscCall(VecDestroyVecs(motions.n, &v));
   } else
+    /* A null space of former parameters would stay. */
     PetscCall(MatSetNullSpace(f->K, NULL));
   PetscCall(HycoMotionsDestroy(&motions));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -449,6 +458,7 @@ static PetscErrorCode SetNearKernel(HycoFOM f)
 
   PetscFunctionBegin;
   PetscCall(VecDuplicate(f->U, &x));
+  /* MatNullSpaceCreateRigidBody() takes the dimension from it. */
   PetscCall(VecSetBlockSize(x, dim));
   for (PetscInt i = 0; i < f->part->n_nodes; i++) {
     const PetscInt own = HycoMeshOwned(f->part, i);
@@ -462,6 +472,7 @@ static PetscErrorCode SetNearKernel(HycoFOM f)
   PetscCall(MatNullSpaceGetVecs(rigid, NULL, &n, &v)); /* borrowed */
   PetscCall(PetscMalloc1(n, &moves));
   for (PetscInt k = 0; k < n; k++) {
+    /* Vectors of a null space are locked for reading: they are copied. */
     PetscCall(VecDuplicate(v[k], &moves[k]));
     PetscCall(VecCopy(v[k], moves[k]));
     for (PetscInt i = 0; i < f->part->n_nodes * dim; i++) {

@@ -160,6 +160,7 @@ PetscErrorCode HycoSeriesOpen(HycoSeries s, const HycoSeriesSource *from)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* At the path's first time: the mesh is that of the moved nodes there. Collective. */
 PetscErrorCode HycoSeriesBegin(HycoFOM f)
 {
   HycoSeriesSource from;
@@ -216,6 +217,7 @@ static PetscErrorCode CopyField(HycoFOM f, HycoSeries s, HycoH5 h, const char na
 
   PetscFunctionBegin;
   PetscCall(HycoFOMGetRows(f, &order));
+  /* The name contains the place. */
   HycoFieldName(&field, k, set);
   if (!HycoH5Has(h, set)) field.place = HYCO_ON_CELLS;
   HycoFieldName(&field, k, set);
@@ -267,6 +269,7 @@ PetscErrorCode HycoSeriesRestore(HycoFOM f)
     HycoH5 h = NULL;
     PetscErrorCode ierr;
 
+    /* Times of the checkpoint's steps, in order: the series continues where the first run's did. */
     PetscCall(HycoFieldFileBeginTime(s->file, f->path->steps[k].t));
     HycoOnEach(HycoComm(f), OpenPart(f, k, &h));
     ierr = CopyFields(f, s, h, k);
@@ -277,6 +280,7 @@ PetscErrorCode HycoSeriesRestore(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The list of fields last: it makes the separate file complete. */
 static PetscErrorCode AddFields(HycoSeries s)
 {
   PetscFunctionBegin;
@@ -310,6 +314,7 @@ PetscErrorCode HycoSeriesAdd(HycoFOM f)
   if (!s) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(Look(f, &from));
   if (f->path->checkpoint[0]) {
+    /* By the number of times so far: a resumed run continues the numbers. */
     NamePart(f, s->file->n, path);
     PetscCall(HycoH5CreateShared(HycoComm(f), path, &s->part));
   }
@@ -327,6 +332,7 @@ PetscErrorCode HycoSeriesClose(HycoSeries s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Collective. The file appears under its name only here. */
 PetscErrorCode HycoSeriesEnd(HycoFOM f)
 {
   PetscFunctionBegin;
@@ -334,6 +340,7 @@ PetscErrorCode HycoSeriesEnd(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* NULL-safe. A series that was not closed leaves no file. */
 PetscErrorCode HycoSeriesDestroy(HycoSeries *series)
 {
   HycoSeries s = *series;

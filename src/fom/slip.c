@@ -24,6 +24,7 @@ static PetscErrorCode CountRows(HycoSlip *s, HycoScene scene, const HycoPairs *p
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* cone[0] for contacts without friction, cone[1] for those with; of[k] tells which. Collective on comm (the cones). */
 PetscErrorCode HycoSlipCreate(MPI_Comm comm, HycoScene scene, const HycoPairs *pairs, PetscInt dim, HycoSlip *s)
 {
   const PetscInt n = pairs->n;
@@ -51,6 +52,7 @@ PetscErrorCode HycoSlipDestroy(HycoSlip *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Forces, slip, work and state are those since the path began. */
 PetscErrorCode HycoSlipBegin(HycoSlip *s)
 {
   PetscFunctionBegin;
@@ -61,6 +63,7 @@ PetscErrorCode HycoSlipBegin(HycoSlip *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* At the moved slave nodes X. Local: a negative coefficient is an error on the rank that has the contact. */
 PetscErrorCode HycoSlipCoefficients(HycoSlip *s, HycoFE fe, const HycoPairs *pairs)
 {
   PetscInt n = 0;
@@ -80,11 +83,14 @@ PetscErrorCode HycoSlipCoefficients(HycoSlip *s, HycoFE fe, const HycoPairs *pai
                place);
     }
     s->data[n++] = s->mu[k];
+    /* g = 0: friction without a threshold (coulomb.c). Only contacts with friction have data, in the order of the
+       blocks. */
     s->data[n++] = 0;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Local: the caller reduces over the ranks. */
 PetscBool HycoSlipRubs(const HycoSlip *s)
 {
   for (PetscInt k = 0; k < s->n; k++) {
@@ -103,6 +109,7 @@ static void Add(HycoSlip *h, PetscInt k, const PetscReal r[], const PetscReal w[
   for (PetscInt c = 0; c < 3; c++) s->force[3 * k + c] = 0;
   for (PetscInt j = 0; j + 1 < h->dim && h->of[k]; j++) {
     size += r[j + 1] * r[j + 1];
+    /* -w_t is the slip and -r_t the force on the slave: the work is what friction dissipates, >= 0. */
     if (r[0] > 0) work -= r[j + 1] * w[j + 1];
     for (PetscInt c = 0; c < 3; c++) {
       s->force[3 * k + c] -= r[j + 1] * t[3 * j + c];
@@ -110,14 +117,17 @@ static void Add(HycoSlip *h, PetscInt k, const PetscReal r[], const PetscReal w[
     }
   }
   s->state[k] = !(r[0] > 0) ? HYCO_OPEN : PetscSqrtReal(size) < SLIPS * h->mu[k] * r[0] ? HYCO_STICK : HYCO_SLIP;
+  /* Sticking contacts have slips of round-off, whose work would add up over many steps. */
   if (PetscAbsReal(work) > ROUNDING * PetscSqrtReal(size) * most) s->work[k] += work;
 }
 
+/* L, w: by row of this rank, w = D - B U. most: the largest displacement, the scale of round-off. */
 void HycoSlipAdd(HycoSlip *s, const PetscReal L[], const PetscReal w[], PetscReal most)
 {
   for (PetscInt k = 0; k < s->n; k++) Add(s, k, L + s->row[k], w + s->row[k], most);
 }
 
+/* sum: the work, and the number of slipping contacts as a real, so that one reduction serves both. Local. */
 void HycoSlipSum(const HycoSlip *s, PetscReal sum[2])
 {
   sum[0] = sum[1] = 0;

@@ -53,6 +53,7 @@ static PetscErrorCode MeasureDisplacements(HycoFOM f, HycoSummary *s)
   s->u_norm2 = PetscSqrtReal(sum);
   for (PetscInt c = 0; c < dim; c++) {
     s->u_max[c] = ends[c];
+    /* Not -0. */
     s->u_min[c] = ends[3 + c] == 0 ? 0 : -ends[3 + c];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -80,6 +81,7 @@ static PetscErrorCode SumResult(HycoFOM f, HycoContactResult *r)
   PetscCall(PetscArraycpy(r->friction, sum + 7, 3));
   r->friction_work = sum[10];
   r->n = n[0];
+  /* The minimum over no contact is the neutral element. */
   if (!r->n) r->pressure_min = 0;
   r->n_active = n[1];
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -135,6 +137,7 @@ static void SumPath(HycoFOM f, HycoSummary *s)
     s->seconds.solve += p->steps[k].seconds_solve;
   }
   s->kkt = p->kkt;
+  /* Each step was judged when it was accepted. */
   s->reason = p->ended ? HYCO_CONVERGED : HYCO_DIVERGED_STEP;
   s->strain_energy = p->work_done.stored;
   s->external_work = p->work_done.loads + p->work_done.supports;
@@ -156,6 +159,7 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
   s->dim = f->fe->dim;
   s->n_dof = f->n_free;
   s->n_contacts = f->n_contacts;
+  /* given: forces were prescribed, and another solver was used. */
   PetscCall(HycoSolverGetIterations(f->given ? f->given_solver : f->solver, &s->iterations));
   PetscCall(HycoSolverGetKKT(f->solver, &s->kkt));
   PetscCall(HycoSolverGetReason(f->given ? f->given_solver : f->solver, &s->reason));
@@ -175,6 +179,7 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
   PetscCall(MeasureContacts(f, s));
   for (PetscInt k = 0; f->path && k < f->path->n_steps; k++)
     s->sliding = PetscMax(s->sliding, f->path->steps[k].sliding); /* contacts may be open at the end */
+  s->n_dependent = 0;
   if (s->reason > 0 && f->n_contacts) PetscCall(HycoFOMCountDependent(f, &s->n_dependent));
   PetscCall(HycoFOMMeasureQuantities(f, s->quantity));
   PetscCallMPI(MPI_Bcast(s, sizeof(*s), MPI_BYTE, 0, HycoComm(f)));
@@ -182,6 +187,7 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Borrowed until the next solve. Collective. */
 PetscErrorCode HycoFOMGetContacts(HycoFOM f, PetscInt *n, const HycoContactResult *result[])
 {
   PetscFunctionBegin;
@@ -307,6 +313,7 @@ PetscErrorCode HycoFOMWriteBegin(HycoFOM f, const char path[], PetscInt n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Collective; may be called once for each solve of the batch. */
 PetscErrorCode HycoFOMWriteAdd(HycoFOM f)
 {
   HycoSolution solution;
@@ -320,6 +327,7 @@ PetscErrorCode HycoFOMWriteAdd(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The set is destroyed also if the file cannot be put in place. */
 PetscErrorCode HycoFOMWriteEnd(HycoFOM f)
 {
   PetscErrorCode ierr;

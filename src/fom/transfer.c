@@ -8,6 +8,7 @@ PetscErrorCode HycoFOMToLocal(HycoFOM f, Vec v, PetscReal value[])
   Vec local;
 
   PetscFunctionBegin;
+  /* The scatter writes into value[] itself. */
   PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, f->fe->n_dof, value, &local));
   PetscCall(VecScatterBegin(f->to_local, v, local, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(VecScatterEnd(f->to_local, v, local, INSERT_VALUES, SCATTER_FORWARD));
@@ -44,6 +45,7 @@ PetscErrorCode HycoFOMGather(HycoFOM f)
   PetscCall(VecScatterBegin(f->to_local, f->U, f->U_local, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(VecScatterEnd(f->to_local, f->U, f->U_local, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(VecGetArray(f->U_local, &local));
+  /* The vectors have the eliminated unknowns' offsets; arrays have displacements. */
   HycoFEComplete(f->fe, local);
   PetscCall(VecRestoreArray(f->U_local, &local));
   if (f->n_turned) {
@@ -89,6 +91,7 @@ PetscErrorCode HycoFOMGetLambda(HycoFOM f, const PetscReal *lambda[])
   PetscCall(HycoConcatenate(HycoComm(f), f->pairs.n, mine, MPIU_REAL, sizeof(PetscReal), &n, &all));
   PetscCall(VecRestoreArrayRead(f->Lambda, &mine));
   if (f->rank == 0 && !f->lambda_all) PetscCall(PetscMalloc1(f->n_contacts, &f->lambda_all));
+  /* n is 0 on the other ranks. */
   for (PetscInt k = 0; k < n; k++) f->lambda_all[number[k]] = all[k];
   HycoFreeAll(&number, &all);
   *lambda = f->lambda_all;

@@ -7,7 +7,8 @@
 /* Share of the mesh's length up to which two nodes are at the same place. */
 #define SAME_PLACE 1e-8
 
-/* From the reference simplex to the regular one, inverted. */
+/* From the reference simplex to the regular one, inverted. Column by column: J maps from the element's reference
+   simplex, whose edges are not alike; a regular cell must have the ratio 1. */
 static void ToRegular(PetscInt dim, PetscReal J[3][3])
 {
   const PetscReal a = 1 / PetscSqrtReal(3), b = 1 / PetscSqrtReal(6);
@@ -20,7 +21,8 @@ static void ToRegular(PetscInt dim, PetscReal J[3][3])
   }
 }
 
-/* The map from the regular pyramid or prism at its axis. */
+/* The map from the regular pyramid or prism at its axis. They are stored as hexahedra with repeated nodes, and
+   measured by dN a regular one would seem stretched where nodes coincide. */
 static void FromAxis(HycoCellType shape, const PetscInt node[], const PetscReal X[], PetscReal J[3][3])
 {
   for (PetscInt c = 0; c < 3; c++) {
@@ -59,6 +61,7 @@ static PetscReal Stretch(HycoCellType shape, const PetscInt node[], const PetscR
   for (PetscInt c = 0; c < dim; c++) {
     for (PetscInt d = 0; d < dim; d++) {
       const PetscInt c1 = (c + 1) % 3, c2 = (c + 2) % 3, d1 = (d + 1) % 3, d2 = (d + 2) % 3;
+      /* In 1D and 2D the rest of J is the identity: the cofactors are those of the smaller matrix. */
       const PetscReal minor = J[c1][d1] * J[c2][d2] - J[c1][d2] * J[c2][d1];
 
       norm += J[c][d] * J[c][d];
@@ -71,6 +74,8 @@ static PetscReal Stretch(HycoCellType shape, const PetscInt node[], const PetscR
   return k + PetscSqrtReal(k * k - 1);
 }
 
+/* The ratio varies inside a cell that is no simplex: the worst quadrature point counts. A one-dimensional cell has
+   no shape. */
 void HycoInspectCells(HycoInspection *in, HycoFE fe)
 {
   HycoMesh m = fe->mesh;
@@ -91,13 +96,15 @@ void HycoInspectCells(HycoInspection *in, HycoFE fe)
   }
 }
 
+/* Halves the paths on the way: the trees stay flat. */
 static PetscInt Root(PetscInt part[], PetscInt i)
 {
   while (part[i] != i) i = part[i] = part[part[i]];
   return i;
 }
 
-/* The number of parts of each body that share no node. */
+/* The number of parts of each body that share no node. By union of the nodes of each cell, in turn for each body,
+   so that bodies that share nodes do not join. */
 static PetscErrorCode CountParts(HycoMesh m, PetscInt n_bodies, PetscInt n[])
 {
   PetscInt *part;
@@ -134,6 +141,7 @@ static PetscErrorCode MarkSurfaces(HycoScene s, HycoMesh m, PetscBool of_surface
   PetscFunctionBegin;
   for (PetscInt k = 0; k < 2 * (s->n_contacts + s->n_ties); k++) {
     const PetscInt c = k / 2;
+    /* An obstacle has no master. */
     const char *name = c < s->n_contacts ? (k % 2 ? s->contact[c]->slave : s->contact[c]->master)
                                          : (k % 2 ? s->tie[c - s->n_contacts].slave : s->tie[c - s->n_contacts].master);
 
@@ -162,7 +170,8 @@ static int ComparePlaces(const void *a, const void *b)
 }
 
 /* By body, the number of its nodes that lie on another of its nodes, away from contacts and ties, and the first pair:
-   the body is open there, like at a crack, though its cells may hang together elsewhere. */
+   the body is open there, like at a crack, though its cells may hang together elsewhere. After sorting by place,
+   equal ones are neighbours: O(n log n). */
 static PetscErrorCode CountDoubled(HycoScene s, HycoMesh m, HycoBodyInspection body[])
 {
   const PetscReal step = SAME_PLACE * HycoMeshLength(m);
@@ -193,7 +202,8 @@ static PetscErrorCode CountDoubled(HycoScene s, HycoMesh m, HycoBodyInspection b
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The types of cells that occur, with their numbers. */
+/* The types of cells that occur, with their numbers. A mixed mesh stores all cells as hexahedra with repeated
+   nodes: HycoMeshShape() gives what they are. */
 static PetscErrorCode CountTypes(HycoInspection *in, HycoMesh m)
 {
   PetscInt n[HYCO_N_CELL_TYPES] = {0};
@@ -209,6 +219,7 @@ static PetscErrorCode CountTypes(HycoInspection *in, HycoMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rank 0, on the whole mesh: parts of ranks would cut bodies. */
 PetscErrorCode HycoInspectBodies(HycoInspection *in)
 {
   HycoMesh m = in->whole->part;

@@ -31,6 +31,7 @@ static PetscErrorCode FacetSizes(HycoFE fe, const char key[], const char slave[]
 /* The median over the contacts of one entry; for types with a search, whose meshes need not match. */
 static PetscErrorCode CompareFacets(HycoInspection *in, HycoFE fe, PetscInt contact)
 {
+  /* `between` counts slaves that face a facet rather than a node: their meshes do not match. */
   const HycoPairs *p = &in->whole->pairs;
   HycoContact c = fe->scene->contact[contact];
   PetscReal *size, *ratio;
@@ -43,6 +44,7 @@ static PetscErrorCode CompareFacets(HycoInspection *in, HycoFE fe, PetscInt cont
   for (PetscInt k = 0; k < p->n; k++) {
     if (p->contact[k] != contact || p->master_start[k] == p->master_start[k + 1]) continue;
     ratio[n++] = Coarseness(p, k, fe->mesh->n_nodes, size);
+    /* Integrated contacts have several masters even where the meshes match. */
     in->contact[contact].between += !c->integrated && p->master_start[k + 1] > p->master_start[k] + 1;
   }
   PetscCall(PetscSortReal(n, ratio));
@@ -51,7 +53,7 @@ static PetscErrorCode CompareFacets(HycoInspection *in, HycoFE fe, PetscInt cont
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same over the nodes of a tie. */
+/* The same over the nodes of a tie. By the largest of its masters, since mortar ties have many of small weight. */
 static PetscErrorCode CompareTie(HycoFE fe, PetscInt tie, PetscReal *coarse)
 {
   HycoMesh m = fe->mesh;
@@ -75,6 +77,7 @@ static PetscErrorCode CompareTie(HycoFE fe, PetscInt tie, PetscReal *coarse)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A node has one entry for each of its masters; it is counted once. */
 PetscErrorCode HycoInspectTies(HycoInspection *in)
 {
   HycoFE fe = in->whole->fe;
@@ -94,6 +97,7 @@ PetscErrorCode HycoInspectTies(HycoInspection *in)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The extremes start reversed, and are narrowed at each inspected point. */
 PetscErrorCode HycoInspectContactsBegin(HycoInspection *in)
 {
   HycoScene s = in->whole->scene;
@@ -133,8 +137,10 @@ PetscErrorCode HycoInspectGaps(HycoInspection *in, HycoFE fe, PetscBool first)
     for (PetscInt k = 0; k < p->n; k++) {
       if (p->contact[k] != c) continue;
       r->n++;
+      /* No master is opposite: the gap means nothing. */
       if (HycoPairsAlone(s, p, k)) continue;
       facing++;
+      /* Surfaces that touch are reported as touching, not as penetrating by 1e-17. */
       if (PetscAbsReal(gap[k]) <= ROUNDING * length) gap[k] = 0;
       r->gap_min = PetscMin(r->gap_min, gap[k]);
       r->gap_max = PetscMax(r->gap_max, gap[k]);

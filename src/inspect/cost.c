@@ -8,7 +8,7 @@
 /* Speed of a sparse factorisation as a share of a matrix product's. */
 #define SPARSE_SHARE 0.5
 
-/* Memory of the process now, summed over all ranks. */
+/* Memory of the process now, summed over all ranks. ru_maxrss is in kilobytes on Linux, and is the largest so far. */
 static PetscErrorCode Resident(MPI_Comm comm, PetscReal *bytes)
 {
   struct rusage usage;
@@ -32,6 +32,7 @@ static PetscErrorCode Speed(PetscReal *flops)
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(3 * n * n, &a));
   for (PetscInt k = 0; k < 3 * n * n; k++) a[k] = 1;
+  /* The first product also loads the kernels: the maximum leaves it out. */
   *flops = 0;
   for (PetscInt k = 0; k < 10; k++) { /* the fastest, because others may use the machine */
     begin = HycoNow();
@@ -42,6 +43,8 @@ static PetscErrorCode Speed(PetscReal *flops)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Only the symbolic analysis is done: MUMPS then knows the size of the factor and the operations, and nothing of
+   that size is allocated. */
 PetscErrorCode HycoInspectCost(HycoFOM f, PetscReal assembly, HycoInspection *in)
 {
   HycoDirect probe;
@@ -60,6 +63,8 @@ PetscErrorCode HycoInspectCost(HycoFOM f, PetscReal assembly, HycoInspection *in
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A solution whose stiffness was factorised before costs no factor: those that differ in loads or gaps alone share
+   one. */
 PetscErrorCode HycoInspectionCountTraining(HycoScene s, HycoSamples samples, PetscInt *n_training,
                                            PetscInt *n_stiffness)
 {

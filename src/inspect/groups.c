@@ -18,8 +18,9 @@ static PetscInt Common(HycoMesh m, PetscInt g, PetscInt h)
   return n;
 }
 
-/* Pairs of groups that a user may have confused: the same nodes under two names, or two names that differ in letter case
-   alone, which options do not distinguish. */
+/* Pairs of groups that a user may have confused: the same nodes under two names, or two names that differ in letter
+   case alone, which options do not distinguish. Nodes are compared within one dimension: a body's group has the nodes
+   of its surfaces too. */
 static PetscErrorCode FindAlike(HycoInspection *in, HycoMesh m)
 {
   PetscFunctionBegin;
@@ -41,7 +42,7 @@ static PetscErrorCode FindAlike(HycoInspection *in, HycoMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets used[] for the group `name`; fails if there is none. */
+/* Sets used[] for the group `name`; fails if there is none. A HycoGroupVisitor. */
 static PetscErrorCode Use(const char key[], const char name[], void *context)
 {
   HycoInspection *in = (HycoInspection *)context;

@@ -28,7 +28,8 @@ static PetscErrorCode ListPoints(HycoScene s, PetscInt *n, PetscReal **mu)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On rank 0, on the whole model, since shapes and gaps need whole surfaces. */
+/* On rank 0, on the whole model, since shapes and gaps need whole surfaces. Where one rank runs, in->whole is the
+   model just assembled. */
 static PetscErrorCode Measure(HycoFOM fom, HycoInspection *in, const PetscReal mu[], PetscBool first)
 {
   HycoFE fe = in->whole->fe;
@@ -37,6 +38,7 @@ static PetscErrorCode Measure(HycoFOM fom, HycoInspection *in, const PetscReal m
   if (in->whole != fom) PetscCall(HycoFOMAssemble(in->whole, mu));
   HycoInspectCells(in, fe);
   PetscCall(HycoInspectGaps(in, fe, first));
+  /* The worst of the points. */
   in->n_without = PetscMax(in->n_without, fom->summary.n_still);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -58,7 +60,8 @@ static PetscErrorCode NamePoint(HycoScene s, const PetscReal v[], char place[HYC
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Assembles K, F, B and D for the variables v as solve does; its errors are reported with the point. Collective. */
+/* Assembles K, F, B and D for the variables v as solve does; its errors are reported with the point. Collective. A
+   failure must name the point: the user gave ranges, not values. */
 static PetscErrorCode Assemble(HycoFOM f, HycoInspection *in, const PetscReal v[], PetscBool first)
 {
   char message[HYCO_LINE], place[HYCO_LINE];
@@ -74,7 +77,8 @@ static PetscErrorCode Assemble(HycoFOM f, HycoInspection *in, const PetscReal v[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A point of the ranges: with a history at the end and at the begin. Collective. */
+/* A point of the ranges: with a history at the end and at the begin. Collective. The end first: loads are complete
+   there, and the first call also compares the facets. */
 static PetscErrorCode InspectPoint(HycoFOM f, HycoInspection *in, const PetscReal mu[], PetscBool first)
 {
   HycoScene s = f->scene;
@@ -104,6 +108,7 @@ static PetscBool IsRigidBodys(HycoFOM f, const PetscReal motion[])
     PetscInt g = 0;
 
     if (!contact->rigid) continue;
+    /* A rigid body is one node in a group of its own, the master. */
     while (strcmp(m->group_name[g], contact->master)) g++; /* it is there: the contacts are set up */
     for (PetscInt c = 0; c < m->dim; c++)
       at = PetscMax(at, PetscAbsReal(motion[m->group_node[m->group_start[g]] * m->dim + c]));
@@ -111,7 +116,8 @@ static PetscBool IsRigidBodys(HycoFOM f, const PetscReal motion[])
   return (PetscBool)(at > 1e-6 * most);
 }
 
-/* Evaluates the outputs of a body at rest: refuses groups and components that solve would refuse. */
+/* Evaluates the outputs of a body at rest: refuses groups and components that solve would refuse. contact is NULL:
+   contact quantities are checked but have no value. */
 static PetscErrorCode CheckOutputs(HycoFOM whole)
 {
   HycoFE fe = whole->fe;
@@ -148,7 +154,8 @@ static PetscErrorCode FindMotions(HycoInspection *in)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What needs no further assembly, on rank 0. */
+/* What needs no further assembly, on rank 0. After the centre was assembled, whose positions the lengths and
+   motions refer to. */
 static PetscErrorCode Describe(HycoInspection *in)
 {
   HycoFOM f = in->whole;
@@ -202,7 +209,8 @@ static PetscErrorCode Visit(HycoFOM f, HycoInspection *in)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Room for what is found; names are those of the scene. */
+/* Room for what is found; names are those of the scene. The other ranks have no in->whole; what they allocate here
+   stays empty. */
 static PetscErrorCode Begin(HycoFOM f, HycoInspection *in)
 {
   HycoScene s = f->scene;
@@ -233,6 +241,7 @@ PetscErrorCode HycoInspect(HycoFOM f, HycoInspection *in)
   PetscCall(PetscMemzero(in, sizeof(*in)));
   HycoOnEach(HycoComm(f), Begin(f, in));
   ierr = Visit(f, in);
+  /* HycoInspectionDestroy() releases in->whole in either case. */
   if (in->whole == f) PetscCall(PetscObjectReference((PetscObject)f));
   if (ierr) (void)!HycoInspectionDestroy(in);
   PetscCall(ierr);

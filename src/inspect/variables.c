@@ -5,6 +5,7 @@
 const char *const HycoAffectedNames[HYCO_N_AFFECTED] = {"maps",         "stiffness", "laws",  "temperatures",
                                                         "contact rows", "gaps",      "loads", "supports"};
 
+/* Components that are not given are NULL, and never change. */
 static PetscBool AnyChanges(HycoExpr const e[3], const PetscBool changed[])
 {
   return (PetscBool)(HycoExprChanges(e[0], changed) || HycoExprChanges(e[1], changed) ||
@@ -29,6 +30,7 @@ static void FindReach(HycoScene s, PetscInt p, PetscBool does[HYCO_N_AFFECTED])
     HycoExpr const heat[3] = {s->body[b].temperature, s->body[b].reference, s->body[b].expansion};
 
     does[HYCO_AFFECTS_TEMPERATURES] = (PetscBool)(does[HYCO_AFFECTS_TEMPERATURES] || AnyChanges(heat, changed));
+    /* What changes the stiffness is listed as that; constants of plastic laws change the stress alone. */
     for (PetscInt j = 0; j < law->constants.n && !c.stiffness; j++)
       does[HYCO_AFFECTS_LAWS] =
           (PetscBool)(does[HYCO_AFFECTS_LAWS] || HycoExprChanges(law->constants.entry[j].expr, changed));

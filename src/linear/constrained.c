@@ -66,6 +66,7 @@ static PetscErrorCode ReadLevels(HycoConstrained c, Mat K)
     KSP smoother;
 
     v->K = K;
+    /* PETSc's default of Chebyshev steps, where no multigrid says another. */
     v->smooths = 2;
     if (multigrid) {
       PetscCall(PCMGGetSmoother(c->pc, c->n - 1 - l, &smoother));
@@ -79,6 +80,7 @@ static PetscErrorCode ReadLevels(HycoConstrained c, Mat K)
     PetscCall(VecDuplicate(v->z, &v->r));
     PetscCall(VecDuplicate(v->z, &v->d));
     PetscCall(VecDuplicate(v->z, &v->w));
+    /* The coarsest level is solved, not smoothed. */
     if (l + 1 < c->n) PetscCall(LargestEigenvalue(v->K, &v->largest));
     if (l + 1 < c->n) PetscCall(HycoUpperBlocks(v->K, &v->product));
     if (!v->product) PetscCall(PetscObjectReference((PetscObject)v->K));
@@ -142,6 +144,8 @@ static PetscErrorCode Smooth(HycoLevel *v, PetscBool residual, Vec r, Vec z)
     if (k == 0)
       PetscCall(VecAXPBY(v->d, 1 / theta, 0, v->w));
     else {
+      /* Chebyshev's recurrence on [lo, hi] (Y. Saad, Iterative Methods for Sparse Linear Systems (2003), algorithm
+         12.1). */
       rho = 1 / (2 * theta / delta - before);
       PetscCall(VecAXPBY(v->d, 2 * rho / delta, rho * before, v->w));
     }
@@ -184,6 +188,7 @@ static PetscErrorCode Cycle(HycoConstrained c, PetscInt l, Vec r, Vec z)
   PetscFunctionBegin;
   if (l + 1 == c->n) {
     PetscCall(SolveCoarsest(c, v, r, z));
+    /* With a single level the shift of S leaves an error, and the finest level must satisfy the constraints exactly. */
     if (l == 0) PetscCall(HycoLevelProject(v, z));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -221,6 +226,7 @@ static PetscErrorCode Apply(PC shell, Vec r, Vec z)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Of the multigrid inside: the shell has nothing to show. */
 static PetscErrorCode View(PC shell, PetscViewer viewer)
 {
   HycoConstrained c;
@@ -249,6 +255,7 @@ PetscErrorCode HycoConstrainedCreate(MPI_Comm comm, const char prefix[], Mat K, 
   PetscCall(MatCreateVecs(K, &c->correction, &c->residual));
   PetscCall(KSPGetPC(c->ksp, &c->pc));
   PetscCall(PetscObjectReference((PetscObject)c->pc));
+  /* Makes the hierarchy; the shell then takes the place of the multigrid, which c->pc keeps alive. */
   PetscCall(KSPSetUp(c->ksp));
   PetscCall(PCGetType(c->pc, &type));
   PetscCall(ReadLevels(c, K));
@@ -265,6 +272,7 @@ PetscErrorCode HycoConstrainedCreate(MPI_Comm comm, const char prefix[], Mat K, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The levels' K, P and coarse solver are the multigrid's, which goes last. */
 PetscErrorCode HycoConstrainedDestroy(HycoConstrained *constrained)
 {
   HycoConstrained c = *constrained;
@@ -333,6 +341,7 @@ PetscErrorCode HycoConstrainedSolve(HycoConstrained c, Vec f, Vec d, PetscReal a
   HycoLogged(HYCO_EVENT_ITERATE, KSPSolve(c->ksp, c->residual, c->correction));
   PetscCall(VecAXPY(x, 1, c->correction));
   PetscCall(KSPGetResidualHistory(c->ksp, &history, &n));
+  /* Without loads the size of the forces is 0, and no relative accuracy could be reached. */
   if (n) *size = PetscMax(*size, HYCO_START * history[0]);
   PetscCall(KSPGetIterationNumber(c->ksp, its));
   PetscFunctionReturn(PETSC_SUCCESS);

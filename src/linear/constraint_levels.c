@@ -20,6 +20,7 @@ typedef struct {
   PetscReal *normal;
 } Known;
 
+/* m = 0 as well, so that it may be called twice. */
 static PetscErrorCode KnownFree(Known *k)
 {
   PetscFunctionBegin;
@@ -29,6 +30,7 @@ static PetscErrorCode KnownFree(Known *k)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* K's hierarchy and the estimates of its eigenvalues stay: they do not depend on the set. */
 PetscErrorCode HycoConstraintsFree(HycoConstrained c)
 {
   PetscFunctionBegin;
@@ -70,6 +72,7 @@ static PetscErrorCode NodeAggregate(Mat P, PetscInt row, PetscInt rows, PetscInt
       PetscInt j = 0;
 
       while (j < n_nodes && node[j] != col[k] / coarse_size) j++;
+      /* A node that many aggregates reach is far inside the first ones, whose weights are the largest. */
       if (j == MOST) continue;
       if (j == n_nodes) {
         node[n_nodes] = col[k] / coarse_size;
@@ -203,6 +206,7 @@ static PetscInt Basis(PetscInt n, const PetscInt i[], const PetscReal normal[], 
         if (made == 0) weight[3 * i[k] + j] = normal[3 * i[k] + j];
         size += PetscSqr(weight[3 * i[k] + j]);
       }
+      /* Equal columns (symmetric surfaces) are taken in their order on any machine. */
       if (size > best * (1 + 1e-10)) {
         best = size;
         column = j;
@@ -250,6 +254,7 @@ static PetscErrorCode Coarsen(const HycoLevel *fine, PetscInt coarse_size, const
     PetscInt made = 0;
 
     for (end = begin + 1; end < known->m && aggregate[order[end]] == aggregate[order[begin]];) end++;
+    /* Constraints on decoupled rows have no coarse displacement, and end here. */
     if (aggregate[order[begin]] >= 0)
       made = Basis(end - begin, order + begin, known->normal, weight, coarse->normal + 3 * coarse->m);
     for (PetscInt k = begin; k < end; k++) {
@@ -348,6 +353,7 @@ static PetscErrorCode PrepareG(HycoLevel *v, PetscReal shift, PetscBool *singula
   PetscCall(MatGetInfo(G, MAT_GLOBAL_SUM, &info));
   PetscCall(VecMin(diagonal, NULL, &least));
   *singular = (PetscBool) !(least > 0);
+  /* One entry per row: no two constraints share an unknown, and G is its diagonal. */
   if (*singular || info.nz_used <= v->m) {
     PetscCall(VecReciprocal(diagonal));
     v->G_diagonal = diagonal;

@@ -68,6 +68,7 @@ PetscErrorCode HycoDirectCreate(MPI_Comm comm, HycoDirect *d)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Collective, as the end of a MUMPS instance is. */
 PetscErrorCode HycoDirectDestroy(HycoDirect *d)
 {
   PetscFunctionBegin;
@@ -84,6 +85,7 @@ PetscErrorCode HycoDirectPin(HycoDirect d, PetscInt n, const PetscInt pinned[])
   PetscBool same = (PetscBool)(n == d->n_pinned);
 
   PetscFunctionBegin;
+  /* Both lists are ascending. */
   for (PetscInt k = 0; same && k < n; k++) same = (PetscBool)(pinned[k] == d->pinned[k]);
   if (same) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(Release(d));
@@ -122,6 +124,7 @@ static PetscErrorCode Entries(HycoDirect d, Mat A, PetscInt row0, PetscInt col0,
 
     PetscCall(MatGetRow(A, r, &n, &cols, &vals));
     for (PetscInt k = 0; k < n; k++) {
+      /* The lower triangle: MUMPS would add both entries of a symmetric pair. */
       if (d->symmetric && col0 + cols[k] > row0 + r) continue;
       if (pattern) {
         d->id.irn_loc[*at] = (MUMPS_INT)(row0 + r + 1);
@@ -183,6 +186,7 @@ static PetscErrorCode PlaceLast(HycoDirect d, const PetscInt place[])
   for (PetscInt i = 0; i < d->n; i++) at[place[i]] = i;
   for (PetscInt k = 0; k < d->n_pinned; k++) at[place[d->pinned[k]]] = -1;
   for (PetscInt p = 0; p < d->n; p++) {
+    /* Among the rest the order of the dissection stays, which keeps its fill. */
     if (at[p] >= 0) d->id.perm_in[at[p]] = (MUMPS_INT)(++next);
   }
   for (PetscInt k = 0; k < d->n_pinned; k++) d->id.perm_in[d->pinned[k]] = (MUMPS_INT)(++next);
@@ -480,6 +484,7 @@ static PetscErrorCode CondenseMany(HycoDirect d, PetscInt k, const Vec F[], Pets
     PetscCall(Fetch(d, F[j]));
     if (d->rank == 0) PetscCall(PetscArraycpy(*all + rows * (size_t)j, d->rhs, d->n));
   }
+  /* Not d->rhs, whose room is for one; the next Fetch() sets it back. */
   d->id.rhs = *all;
   d->id.redrhs = *reduced;
   d->id.nrhs = (MUMPS_INT)k;
@@ -487,6 +492,7 @@ static PetscErrorCode CondenseMany(HycoDirect d, PetscInt k, const Vec F[], Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One call of MUMPS for all right-hand sides: its substitutions then use matrix products (BLAS 3). */
 PetscErrorCode HycoDirectReduceMany(HycoDirect d, PetscInt k, const Vec F[], PetscReal q[])
 {
   PetscReal *all, *reduced;
@@ -502,6 +508,7 @@ PetscErrorCode HycoDirectReduceMany(HycoDirect d, PetscInt k, const Vec F[], Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Condenses the same F again, because MUMPS keeps the reduced right-hand sides of its last call only. */
 PetscErrorCode HycoDirectExpandMany(HycoDirect d, PetscInt k, const Vec F[], const PetscReal z[], Vec x[])
 {
   const size_t rows = (size_t)(d->n + d->m);
@@ -528,6 +535,7 @@ PetscErrorCode HycoDirectSolve(HycoDirect d, Vec r, Vec x)
   PetscCall(Fetch(d, r));
   if (d->rank == 0) PetscCall(PetscArrayzero(d->rhs + d->n, d->m));
   PetscCall(Run(d, 0));
+  /* Pinned unknowns are Schur variables, and no part of this solve. */
   for (PetscInt k = 0; k < d->n_pinned && d->rank == 0; k++) d->rhs[d->pinned[k]] = 0;
   PetscCall(Deliver(d, x));
   PetscFunctionReturn(PETSC_SUCCESS);

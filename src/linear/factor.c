@@ -55,6 +55,7 @@ PetscErrorCode HycoDirectSolver(MPI_Comm comm, const char prefix[], Mat K, Petsc
   PetscCall(KSPSetType(*ksp, KSPPREONLY));
   PetscCall(KSPGetPC(*ksp, &pc));
   PetscCall(PCSetType(pc, symmetric ? PCCHOLESKY : PCLU));
+  /* A small matrix has little fill in any order. */
   if (symmetric && n > 3000) PetscCall(HycoBanded(K, &thin));
   if (thin)
     PetscCall(HycoBandedSolver(pc));
@@ -65,6 +66,8 @@ PetscErrorCode HycoDirectSolver(MPI_Comm comm, const char prefix[], Mat K, Petsc
     PetscCall(PCFactorSetMatOrderingType(pc, MATORDERINGND));
   }
   PetscCall(KSPSetFromOptions(*ksp));
+  /* A singular matrix is an answer for the callers, and must not end a program that sets
+     -ksp_error_if_not_converged. */
   PetscCall(KSPSetErrorIfNotConverged(*ksp, PETSC_FALSE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -86,6 +89,7 @@ static PetscErrorCode ScaleZeroPivot(KSP ksp, PC pc)
   PetscCall(VecGetLocalSize(diagonal, &n));
   PetscCall(VecGetArrayRead(diagonal, &d));
   for (PetscInt i = 0; i < n; i++) {
+    /* A zero on the diagonal says nothing about the unit. */
     if (d[i] != 0) least = PetscMin(least, PetscAbsScalar(d[i]));
   }
   PetscCall(VecRestoreArrayRead(diagonal, &d));

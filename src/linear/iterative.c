@@ -5,6 +5,8 @@
 */
 #include <hycolinear.h>
 
+/* The accuracy is far below that of a solution, as active set methods read signs from residuals. The limit of 2000
+   iterations ends stagnation; the caller judges by the residual. */
 PetscErrorCode HycoIterativeSolver(MPI_Comm comm, const char prefix[], Mat K, KSP *ksp)
 {
   PC pc;

@@ -59,6 +59,7 @@ static PetscErrorCode Longest(MPI_Comm comm, PetscInt first, PetscInt rows, Pets
     }
   }
   PetscCallMPI(MPI_Allreduce(&best, &largest, 1, MPIU_REAL, MPI_MAX, comm));
+  /* Only ranks with a longest row take part; the lowest unknown of them is the same on any number of ranks. */
   if (best < largest * (1 - 1e-10)) mine = PETSC_MAX_INT;
   PetscCallMPI(MPI_Allreduce(&mine, at, 1, MPIU_INT, MPI_MIN, comm));
   for (PetscInt k = 0; k < n; k++)

@@ -30,6 +30,7 @@ static PetscErrorCode LocalGraph(Mat K, PetscInt bs, PetscInt *n_nodes, PetscInt
     for (PetscInt k = 0; k < nc; k++) {
       const PetscInt other = cols[k] / bs;
 
+      /* Marked with the number of the node, so that nothing is reset between nodes. */
       if (other == node || seen[other] == node + 1) continue;
       seen[other] = node + 1;
       (*next)[at++] = other;

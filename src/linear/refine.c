@@ -12,13 +12,14 @@
 /* Two-product by fma and two-sum: sum[0] + sum[1] has about 32 digits. */
 void HycoAddProduct(PetscReal a, PetscReal b, PetscReal sum[2])
 {
+  /* Compilers must not reorder this: the build sets no -ffast-math. */
   const PetscReal product = a * b, high = sum[0] + product, moved = high - sum[0];
 
   sum[1] += ((sum[0] - (high - moved)) + (product - moved)) + fma(a, b, -product);
   sum[0] = high;
 }
 
-/* r = b + low - K x Rounded once at the end. */
+/* r = b + low - K x, rounded once at the end. */
 static void Residual(PetscBLASInt n, const PetscReal K[], PetscBLASInt lda, const PetscReal b[], const PetscReal low[],
                      const PetscReal x[], PetscReal r[])
 {

@@ -82,6 +82,7 @@ PetscErrorCode HycoUpperBlocks(Mat K, Mat *upper)
   PetscCall(LongestRow(K, &longest));
   PetscCall(PetscCalloc2((hi - lo) / bs, &here, (hi - lo) / bs, &there));
   PetscCall(PetscMalloc2(bs * longest + 1, &column, bs * bs * (bs * longest + 1), &value));
+  /* Exact counts by block row, of this rank's and of later columns: an estimate would make the insertion slow. */
   for (PetscInt b = lo / bs; b < hi / bs; b++) {
     PetscCall(RowBlocks(K, b, bs, &blocks, column));
     for (PetscInt k = 0; k < blocks; k++) (column[k] < hi / bs ? here : there)[b - lo / bs]++;

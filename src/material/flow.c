@@ -26,11 +26,13 @@ static PetscBool Advance(Bracket *b, PetscReal newton, PetscReal *q)
   const PetscReal old = *q;
   const PetscBool inside = (PetscBool)(newton > b->lo && newton < b->hi);
 
+  /* The end of a bracket is allowed here: a root at the yield stress or at q_tr is one. */
   if (newton >= b->lo && newton <= b->hi && PetscAbsReal(newton - old) <= CLOSE * old) {
     *q = newton;
     return PETSC_TRUE;
   }
   *q = inside && ++b->iterations % 8 ? newton : b->lo + (b->hi - b->lo) / 2;
+  /* The midpoint equals an end when no number is left between them. */
   return (PetscBool)(*q == b->lo || *q == b->hi || b->iterations > ITERATIONS);
 }
 
@@ -117,6 +119,7 @@ static PetscReal SolveYield(const HycoFlowRule *rule, const Work *w, PetscReal y
     if (rule->creep) f->creep = (*rule->creep)(&w->p, q, slope);
     f->plastic = PetscMax((w->trial - q) / w->H - f->creep, 0);
     excess = q - (*rule->yield)(&w->p, w->p.plastic0 + f->plastic, hardening);
+    /* After the last iterate the flow is evaluated once more, so that strain and stress belong to the same q. */
     if (done || excess == 0) return q;
     if (excess > 0)
       b.hi = q;
@@ -133,10 +136,14 @@ static Flow Solve(const HycoFlowRule *rule, const Work *w)
   Flow f = {w->q, w->creep, 0, 0};
   PetscReal slope = w->slope, hardening = 0, yield = -1;
 
+  /* No deviator has no direction of flow; negated, so that NaN ends here too and is reported by its stress. */
   if (!(w->trial > 0)) return f;
   if (rule->yield) yield = (*rule->yield)(&w->p, w->p.plastic0, &hardening);
+  /* Plastic flow only where the stress under creep alone exceeds the yield stress; a negative one means that the law
+     has none. */
   if (yield >= 0 && f.q > yield) {
     f.q = SolveYield(rule, w, yield, &f, &slope, &hardening);
+    /* The derivative of the two equations for q and dp by q_tr, with q eliminated. */
     f.slope = 1 / (w->H + hardening / (1 + slope * hardening));
   } else
     f.slope = slope / (1 + w->H * slope);

@@ -2,6 +2,7 @@
 #include <hycomaterialimpl.h>
 #include <hycoregistry.h>
 
+/* Sorted by name: extensions register in any order, and messages list all laws. */
 static HycoRegistry laws = {.sorted = PETSC_TRUE};
 
 HycoDefineRegister(HycoMaterialRegister, laws, PetscErrorCode (*create)(HycoMaterial))
@@ -17,6 +18,7 @@ PetscErrorCode HycoMaterialCreate(MPI_Comm comm, HycoMaterial *material)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The law's destroy comes first, while its data and constants still exist. */
 PetscErrorCode HycoMaterialDestroy(HycoMaterial *material)
 {
   PetscFunctionBegin;
@@ -43,6 +45,7 @@ PetscErrorCode HycoMaterialSetType(HycoMaterial material, HycoMaterialType type)
     HycoFail("body %s: the law \"%s\" is unknown; it must be %s",
              ((PetscObject)material)->name ? ((PetscObject)material)->name : "(none)", type, list);
   }
+  /* Before the constructor, whose checks name the law. */
   PetscCall(PetscObjectChangeTypeName((PetscObject)material, type));
   PetscCall((*create)(material));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -85,6 +88,7 @@ PetscErrorCode HycoMaterialDeclare(HycoMaterial material, const char name[], con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A required text, such as the name of a library; it is no expression and has no value at points. */
 PetscErrorCode HycoMaterialDeclareText(HycoMaterial material, const char name[], const char title[])
 {
   HycoEntry *entry;
@@ -95,6 +99,7 @@ PetscErrorCode HycoMaterialDeclareText(HycoMaterial material, const char name[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Borrowed from the scene's entry; NULL before the scene is read. */
 PetscErrorCode HycoMaterialGetText(HycoMaterial material, const char name[], const char **text)
 {
   const HycoEntry *entry;
@@ -106,6 +111,8 @@ PetscErrorCode HycoMaterialGetText(HycoMaterial material, const char name[], con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* update for laws with a history or any tangent, isotropic for those whose elastic part is Lame's: at least one is
+   needed to have a stiffness. */
 PetscErrorCode HycoMaterialSetOps(HycoMaterial material, const struct _HycoMaterialOps *ops)
 {
   PetscFunctionBegin;
@@ -139,6 +146,7 @@ PetscErrorCode HycoMaterialSetStateNames(HycoMaterial material, PetscInt n_state
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The scene then demands a temperature for each body of this law, even if no constant depends on it. */
 PetscErrorCode HycoMaterialSetHeat(HycoMaterial material, PetscBool heat)
 {
   PetscFunctionBegin;
@@ -147,6 +155,7 @@ PetscErrorCode HycoMaterialSetHeat(HycoMaterial material, PetscBool heat)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A linear law is evaluated by its tangents alone, and needs no history. */
 PetscErrorCode HycoMaterialSetLinear(HycoMaterial material, PetscBool linear)
 {
   PetscFunctionBegin;
@@ -286,6 +295,7 @@ PetscErrorCode HycoMaterialUpdate(HycoMaterial material, HycoMaterialPoints *p)
   p->dt_factor = 1;
   p->failed = -1;
   if (!IsLame(material)) {
+    /* A linear law of its own sets tangents, and the class multiplies: p->tangent is then never NULL. */
     PetscCall((*material->ops->update)(material, p));
     for (PetscInt i = 0; material->linear && p->stress && i < p->n; i++)
       HycoTangentApply(PETSC_FALSE, p->dim, p->tangent + i * ns * ns, p->strain + i * ns, p->stress + i * ns);
@@ -329,6 +339,7 @@ static PetscBool IsDefinite(PetscInt dim, const PetscReal C[])
   const PetscInt n = HycoStrainSize(dim), m = dim * (dim + 1) / 2;
   PetscReal L[6][6];
 
+  /* By hand: the matrix is at most 6 x 6, and the symmetry test needs the same loop. The test runs at each point. */
   for (PetscInt r = 0; r < m; r++) {
     for (PetscInt c = 0; c <= r; c++) {
       const PetscInt i = seen[dim - 1][r], j = seen[dim - 1][c];

@@ -11,6 +11,7 @@ PetscErrorCode HycoPlexSendTags(DM from, PetscSF sf, DM to)
   IS tags;
 
   PetscFunctionBegin;
+  /* Point p of the chart is entry p of the IS: charts of this library start at 0. */
   PetscCall(PetscObjectQuery((PetscObject)from, HYCO_TAGS, (PetscObject *)&tags));
   PetscCall(DMPlexGetChart(to, &first, &last));
   PetscCall(PetscCalloc1(last, &tag));
@@ -28,6 +29,8 @@ static PetscErrorCode Replace(DM *dm, PetscSF sf, DM by)
 
   PetscFunctionBegin;
   if (!by) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Ties are known by tags on every rank, so that the new DM shares the list; tags need the star forest, before it
+     is destroyed. */
   PetscCall(HycoTiesOf(*dm, &ties));
   PetscCall(HycoTiesAttach(by, ties));
   PetscCall(HycoPlexSendTags(*dm, sf, by));
@@ -46,6 +49,7 @@ static PetscErrorCode CheckParts(DM dm)
 
   PetscFunctionBegin;
   PetscCall(DMPlexGetHeightStratum(dm, 0, &start, &end));
+  /* Both reductions precede the check: all ranks fail together, with the same numbers. */
   least = all = end - start;
   PetscCallMPI(MPI_Comm_size(HycoComm(dm), &size));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &least, 1, MPIU_INT, MPI_MIN, HycoComm(dm)));
@@ -73,6 +77,7 @@ PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, Petsc
   HycoCheck(!overlap || !scene->refine, "scene_refine: the DM has an overlap; refine it before the overlap is added");
   if (!done) {
     PetscCall(DMPlexGetPartitioner(*dm, &partitioner));
+    /* Without overlap: it follows below, once the cells are refined. */
     PetscCall(HycoPartitionerSetMesh(partitioner, whole, n_pairs, pairs, by));
     PetscCall(DMPlexDistribute(*dm, 0, &sf, &next));
     PetscCall(Replace(dm, sf, next));
@@ -82,6 +87,7 @@ PetscErrorCode HycoMeshDistribute(DM *dm, HycoScene scene, HycoMesh whole, Petsc
   HycoCheck(!overlap || !write[0],
             "hyco_mesh_write: the DM has an overlap, and would have cells twice; write it before the overlap is added");
   if (overlap) PetscFunctionReturn(PETSC_SUCCESS);
+  /* The file would have no ties, but the cones of tied cells with the masters at their end. */
   HycoCheck(!write[0] || !scene->n_ties, "hyco_mesh_write: a mesh with ties (%s) cannot be written as a DMPlex",
             scene->tie[0].name);
   /* Written before the overlap is added: the file has each cell once. */
@@ -107,6 +113,7 @@ static PetscErrorCode NumberPoints(DM dm)
   PetscFunctionBegin;
   PetscCall(DMPlexGetChart(dm, NULL, &last));
   PetscCall(PetscCalloc1(last, &tag));
+  /* Only cells and vertices have tags; the tags of edges and faces stay 0, which no order depends on. */
   PetscCall(DMPlexGetHeightStratum(dm, 0, &start[0], &end[0]));
   PetscCall(DMPlexGetDepthStratum(dm, 0, &start[1], &end[1]));
   PetscCall(DMPlexGetCellNumbering(dm, &numbers[0]));

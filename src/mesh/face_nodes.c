@@ -28,6 +28,7 @@ static int Compare(const void *a, const void *b)
   return 0;
 }
 
+/* Two requests for the same new node: that of a face comes from both of its cells, and from the facet of a group. */
 static PetscBool AreOne(const Wanted *a, const Wanted *b)
 {
   for (int k = 0; k < CORNERS; k++) {
@@ -42,6 +43,8 @@ static PetscInt Around(const HycoMsh *mesh, const Wanted *w, PetscInt node[20], 
   const HycoMshGroup *g = &mesh->group[w->group];
   const PetscInt *of = g->node + w->element * g->nv, n = w->face == MIDDLE ? 8 : 4;
 
+  /* A hex20 has its 8 corners and 12 middles of edges in this order, a quad8 its 4 and 4; a face lists its own in
+     the same way. */
   *n_sides = w->face == MIDDLE ? 12 : 4;
   for (PetscInt k = 0; k < n + *n_sides; k++)
     node[k] = of[w->face == MIDDLE || w->face == ITSELF ? k : HycoFacetNodes(HYCO_HEX20, w->face)[k]];
@@ -104,6 +107,8 @@ static PetscErrorCode Widen(HycoMshGroup *g)
 
   PetscFunctionBegin;
   if (nv == g->nv) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Old nodes keep their places; the new ones follow them, as in gmsh's order of hex27 and quad9. The caller fills
+     them in. */
   PetscCall(PetscMalloc1(g->n * nv, &node));
   for (PetscInt e = 0; e < g->n; e++) PetscCall(PetscArraycpy(node + e * nv, g->node + e * g->nv, g->nv));
   PetscCall(PetscFree(g->node));
@@ -124,6 +129,7 @@ PetscErrorCode HycoMshAddFaceNodes(const char path[], HycoMsh *mesh)
   PetscFunctionBegin;
   PetscCall(Collect(mesh, &n, &list));
   for (PetscInt k = 0; k < n; k++) added += !k || !AreOne(&list[k], &list[k - 1]);
+  /* Before anything is changed: PETSC_MAX_INT itself is a sentinel (AddNode() in msh.c). */
   if (at && mesh->tag[at - 1] >= PETSC_MAX_INT - 1 - added) {
     PetscCall(PetscFree(list));
     HycoFail("%s: the nodes that its hex20 cells need for contact would have tags beyond %lld; renumber the mesh", path,
@@ -137,6 +143,7 @@ PetscErrorCode HycoMshAddFaceNodes(const char path[], HycoMsh *mesh)
     mesh->tag[at] = mesh->tag[at - 1] + 1;
     at++;
   }
+  /* Not earlier: Place() reads groups of the old width. */
   for (PetscInt k = 0; k < mesh->n_groups; k++) PetscCall(Widen(&mesh->group[k]));
   /* The second pass counts positions as the first one did, and so finds each new node's index. */
   at = mesh->n_nodes - 1;

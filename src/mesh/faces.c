@@ -43,6 +43,7 @@ void HycoFacetRepeatLast(PetscInt nf, PetscInt node[])
   PetscInt turned[4], k = 0;
 
   if (nf != 4) return;
+  /* k: the first of the two equal places, which must become place 2; a rotation keeps the orientation. */
   while (k < 4 && node[k] != node[(k + 1) % 4]) k++;
   if (k == 4) return;
   for (PetscInt v = 0; v < 4; v++) turned[v] = node[(k + 2 + v) % 4];
@@ -91,6 +92,7 @@ PetscInt HycoCellFace(HycoMesh m, PetscInt cell, const PetscInt node[])
   return -1;
 }
 
+/* Only for facets whose cell is in the mesh; FacetNumber() (submesh.c) serves the others. */
 PetscInt HycoMeshFacetNumber(HycoMesh m, PetscInt facet)
 {
   return HycoCellFace(m, m->facet_cell[facet], m->facets + facet * m->nf);

@@ -11,6 +11,8 @@ static PetscErrorCode CreateSF(HycoFileOrder *o, HycoPlace place, PetscInt n, co
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_rank(o->comm, &rank));
+  /* PETSC_DECIDE balances the rows; with `root` rank 0 has all and the other blocks are empty, as for formats that
+     one process writes. */
   PetscCall(PetscLayoutCreateFromSizes(o->comm,
                                        !root       ? PETSC_DECIDE
                                        : rank == 0 ? o->all[place]
@@ -38,6 +40,7 @@ PetscErrorCode HycoFileOrderCreate(MPI_Comm comm, HycoMesh m, PetscBool root, Hy
   o->all[HYCO_ON_CELLS] = m->n_whole_cells;
   PetscCall(PetscMalloc2(PetscMax(m->n_nodes, m->n_cells), &leaf, PetscMax(m->n_nodes, m->n_cells), &row));
   for (PetscInt on_cells = 0; on_cells < 2; on_cells++) {
+    /* Row: the place of the tag among all tags (HycoRankInts()), the same on any number of ranks. */
     const PetscInt *whole = on_cells ? m->cell_whole : m->node_whole;
     PetscInt n = 0;
 
@@ -53,6 +56,7 @@ PetscErrorCode HycoFileOrderCreate(MPI_Comm comm, HycoMesh m, PetscBool root, Hy
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* NULL-safe; the communicator is borrowed and stays. */
 PetscErrorCode HycoFileOrderDestroy(HycoFileOrder **order)
 {
   PetscFunctionBegin;
@@ -100,6 +104,7 @@ PetscErrorCode HycoSFSend(PetscSF sf, MPI_Datatype type, PetscInt width, const v
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Roots without a leaf do not occur: every node and every cell of the mesh has an owner. */
 PetscErrorCode HycoFileOrderSend(const HycoFileOrder *o, HycoPlace place, MPI_Datatype type, PetscInt components,
                                  const void *value, void *rows)
 {
@@ -120,6 +125,7 @@ PetscErrorCode HycoFileOrderFetch(const HycoFileOrder *o, HycoMesh m, HycoPlace 
   PetscFunctionBegin;
   PetscCall(PetscLayoutCreateFromSizes(o->comm, o->n[place], o->all[place], 1, &layout));
   PetscCall(PetscSFCreate(o->comm, &sf));
+  /* ilocal NULL: leaves are contiguous, entry k of value[]. */
   PetscCall(PetscSFSetGraphLayout(sf, layout, on_cells ? m->n_cells : m->n_nodes, NULL, PETSC_OWN_POINTER,
                                   on_cells ? m->cell_whole : m->node_whole));
   PetscCall(HycoSFBcast(sf, MPIU_REAL, components, rows, value));

@@ -32,6 +32,8 @@ static PetscErrorCode Agree(const Gather *g, MPI_Op op, PetscInt value[])
   PetscCall(PetscSFGetGraph(sf, &n_roots, NULL, NULL, NULL));
   /* No star forest is set on one rank. */
   if (n_roots < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Leaves (copies of a point) to its owner with the operation, then the owner's result back: every copy has the
+     same value. */
   PetscCall(PetscSFReduceBegin(sf, MPIU_INT, value, value, op));
   PetscCall(PetscSFReduceEnd(sf, MPIU_INT, value, value, op));
   PetscCall(PetscSFBcastBegin(sf, MPIU_INT, value, value, MPI_REPLACE));
@@ -50,6 +52,7 @@ static PetscErrorCode Choose(Gather *g)
   PetscCall(PetscCalloc1(g->n, &g->kind));
   kind = g->kind;
   for (PetscInt f = 0; f < m->n_facets; f++) {
+    /* A facet travels as a label value of its cell, so that the cell is needed though it is not chosen itself. */
     if (g->in && g->in[m->facet_group[f]]) kind[m->cell_point[m->facet_cell[f]]] = NEEDED;
   }
   for (PetscInt e = 0; e < m->n_cells; e++) {
@@ -87,6 +90,7 @@ static PetscErrorCode CutShare(Gather *g)
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(m->n_cells, &keep, m->n_nodes, &extra));
   for (PetscInt e = 0; e < m->n_cells; e++) {
+    /* One sender per cell: of the ranks that have it in their overlap only the owner of its first node. */
     if (g->kind[m->cell_point[e]] && HycoMeshOwned(m, m->cells[e * m->nv]) >= 0) keep[n_keep++] = e;
   }
   for (PetscInt i = 0; i < m->n_nodes; i++) {
@@ -144,11 +148,13 @@ static PetscErrorCode SetPointSF(const Gather *g, PetscInt n, const PetscInt poi
   PetscCall(DMPlexGetDepthStratum(g->share, 0, &v0, NULL));
   PetscCall(PetscMalloc2(g->n, &at, n, &leaf));
   PetscCall(PetscMalloc1(n, &remote));
+  /* at[p]: the point of the share that is point p of the part, or -1. */
   for (PetscInt p = 0; p < g->n; p++) at[p] = -1;
   for (PetscInt k = 0; k < n; k++) at[point[k]] = k;
   for (PetscInt j = 0; j < n_leaves; j++) {
     const PetscInt p = local ? local[j] : j;
 
+    /* Also -1, points that the share does not have, since v0 >= 0. */
     if (at[p] < v0) continue; /* a cell is sent by one rank */
     own[at[p]] = PETSC_FALSE;
     leaf[n_mine] = at[p];
@@ -192,6 +198,7 @@ static PetscErrorCode CreateSF(const Gather *g, PetscInt n, const PetscBool own[
   }
   PetscCall(PetscFree(mine));
   PetscCall(PetscSFCreate(g->comm, sf));
+  /* Roots: the n points of each share; leaves: the gathered points, contiguous, on rank 0 alone. */
   PetscCall(PetscSFSetGraph(*sf, n, n_all[0] + n_all[1], NULL, PETSC_OWN_POINTER, remote, PETSC_OWN_POINTER));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -211,6 +218,8 @@ static PetscErrorCode SendColumns(Gather *g, PetscSF sf, PetscInt n, const Petsc
     value[WHOLE][m->node_point[i]] = m->node_whole[i];
   }
   for (PetscInt e = 0; e < m->n_cells; e++) {
+    /* Cells have no unknowns. The arrays have entries for points of the overlap without tables too, which no share
+       takes. */
     value[GLOBAL][m->cell_point[e]] = -1;
     value[WHOLE][m->cell_point[e]] = m->cell_whole[e];
   }
@@ -243,6 +252,7 @@ static PetscErrorCode Migrate(Gather *g)
   PetscCall(AddFacets(g, n, point));
   PetscCall(SetPointSF(g, n, point, own));
   PetscCall(CreateSF(g, n, own, &sf));
+  /* On the communicator of the part, as DMPlexMigrate() needs it; only rank 0 gets points. */
   PetscCall(DMPlexCreate(g->comm, &g->root));
   PetscCall(DMPlexMigrate(g->share, sf, g->root));
   PetscCall(HycoPlexSendTags(g->share, sf, g->root));
@@ -278,6 +288,8 @@ static PetscErrorCode Number(const Gather *g, HycoMesh sub)
   for (PetscInt e = 0; e < sub->n_cells; e++) sub->cell_whole[e] = g->of[WHOLE][point[sub->cell_point[e]]];
   PetscCall(ISRestoreIndices(points, &point));
   PetscCall(HycoSubmeshSetPoints(sub->dm, n, number));
+  /* first stays 0: rank 0 counts as the owner of all nodes of a gathered mesh, so that HycoMeshOwned() holds for
+     each. */
   sub->n_owned = sub->n_whole_nodes = m->n_whole_nodes;
   sub->n_whole_cells = m->n_whole_cells;
   sub->whole_length = m->whole_length;
@@ -304,6 +316,8 @@ static PetscErrorCode MakeSubmesh(const Gather *g, HycoMesh *sub)
     m->group_dim[k] = g->part->group_dim[k]; /* also of groups without points here */
     if (g->in && g->in[k]) all[n_all++] = k;
   }
+  /* The gathered points include cells that were only needed for their facets; the submesh drops them and makes their
+     facets points. */
   ierr = HycoSubmesh(g->scene, m, n_keep, keep, n_extra, extra, n_all, all, sub);
   PetscCall(PetscFree3(keep, extra, all));
   PetscCall(HycoMeshDestroy(&m));

@@ -34,6 +34,7 @@ static PetscErrorCode OrderTags(DM dm, IS *ordered)
     to[n++] = number[p];
   }
   PetscCallMPI(MPI_Allreduce(&n, &all, 1, MPIU_INT, MPI_SUM, comm));
+  /* The layout of the file's points, which ISView() writes in order; no rank has more than its block. */
   PetscCall(PetscLayoutCreateFromSizes(comm, PETSC_DECIDE, all, 1, &layout));
   PetscCall(PetscSFCreate(comm, &sf));
   PetscCall(PetscSFSetGraphLayout(sf, layout, n, leaf, PETSC_COPY_VALUES, to));
@@ -59,6 +60,7 @@ PetscErrorCode HycoPlexWrite(DM dm, const char path[])
 
   PetscFunctionBegin;
   PetscCall(OrderTags(dm, &tags));
+  /* The viewer takes the group's name from the object; FindTopology() finds any name. */
   PetscCall(PetscObjectSetName((PetscObject)dm, TOPOLOGY));
   PetscCall(PetscViewerHDF5Open(PetscObjectComm((PetscObject)dm), path, FILE_MODE_WRITE, &viewer));
   PetscCall(PetscViewerPushFormat(viewer, PETSC_VIEWER_HDF5_PETSC));
@@ -109,6 +111,7 @@ static PetscErrorCode LoadTags(DM dm, PetscViewer viewer, PetscSF from_file)
   PetscFunctionBegin;
   PetscCall(PetscViewerHDF5HasDataset(viewer, HYCO_TAGS, &has));
   if (!has) PetscFunctionReturn(PETSC_SUCCESS);
+  /* n: this rank's block of the file's points, the roots. */
   PetscCall(PetscSFGetGraph(from_file, &n, NULL, NULL, NULL));
   PetscCall(ISCreate(PetscObjectComm((PetscObject)dm), &tags));
   PetscCall(ISSetType(tags, ISGENERAL));

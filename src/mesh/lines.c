@@ -11,6 +11,7 @@ typedef struct {
   PetscInt middle;
 } Edge;
 
+/* By keys alone: equal keys are the same edge, with the same middle node. */
 static int Ascending(const void *a, const void *b)
 {
   const PetscInt64 x = ((const Edge *)a)->key, y = ((const Edge *)b)->key;
@@ -34,6 +35,7 @@ static Edge EdgeOf(HycoMesh m, PetscInt cell, PetscInt number, PetscInt k)
 /* The edges with all nodes in the group, by ascending key, without repetition. */
 static PetscErrorCode FindEdges(HycoMesh m, const PetscBool in[], PetscInt *n, Edge **edge)
 {
+  /* Each edge of a cell occurs in two of its faces and in all cells around it; duplicates go after the sort. */
   const PetscInt corners = HycoCellKinds[m->type].corners, sides = HycoFacetCount(m->type) * corners;
   PetscInt room = 0, count = 0;
 
@@ -62,6 +64,8 @@ static PetscErrorCode FindEdges(HycoMesh m, const PetscBool in[], PetscInt *n, E
 static PetscErrorCode CheckPath(HycoMesh m, PetscInt group, PetscInt n, const Edge edge[], PetscInt next[])
 {
   PetscFunctionBegin;
+  /* next: two neighbours of each node along the line, -1: none. A node of another owner may lack cells here, and is
+     checked there. */
   for (PetscInt i = 0; i < 2 * m->n_nodes; i++) next[i] = -1;
   for (PetscInt k = 0; k < 2 * n; k++) {
     const PetscInt ends[2] = {(PetscInt)(edge[k / 2].key / m->n_nodes), (PetscInt)(edge[k / 2].key % m->n_nodes)};

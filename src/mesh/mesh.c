@@ -13,6 +13,8 @@ const HycoCellKind HycoCellKinds[HYCO_N_CELL_TYPES] = {
 /* The container, composed with a DM, of its tables. */
 #define TABLES "HycoTables"
 
+/* The destructor of the container on the DM, and for tables without a DM; also of half-made tables, whose other
+   arrays are NULL. */
 static PetscErrorCode FreeTables(void *tables)
 {
   HycoMesh m = (HycoMesh)tables;
@@ -45,6 +47,7 @@ static PetscErrorCode FreeTables(void *tables)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A caller has a reference to the DM, not to the tables: they go when the DM's last reference does. */
 PetscErrorCode HycoMeshDestroy(HycoMesh *mesh)
 {
   HycoMesh m = *mesh;
@@ -74,6 +77,7 @@ PetscErrorCode HycoMeshSetDM(HycoMesh m, DM dm)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The tables that a DM already has (borrowed), NULL: none. Not collective. */
 PetscErrorCode HycoMeshQuery(DM dm, HycoMesh *mesh)
 {
   PetscContainer container;
@@ -85,6 +89,7 @@ PetscErrorCode HycoMeshQuery(DM dm, HycoMesh *mesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The container must not free the tables when it goes, hence the destructor is removed first. */
 PetscErrorCode HycoMeshDetach(HycoMesh m)
 {
   PetscContainer container;
@@ -284,6 +289,7 @@ PetscErrorCode HycoMeshSetNodeBodies(HycoScene scene, HycoMesh m)
       hi = PetscMax(hi, m->xyz[3 * i + c]);
       size = PetscMax(size, PetscAbsReal(m->xyz[3 * i] - m->xyz[0]));
     }
+    /* Round-off of the file's decimals is allowed, relative to the mesh's extent in x. */
     HycoCheck(hi - lo <= 1e-9 * size, "%s has cells of dimension %d, but its %c coordinates run from %g to %g",
               scene->mesh_path, (int)m->dim, "xyz"[c], (double)lo, (double)hi);
   }
@@ -334,6 +340,7 @@ PetscErrorCode HycoMeshNodeSF(MPI_Comm comm, HycoMesh part, PetscInt n, const Pe
   PetscLayout layout;
 
   PetscFunctionBegin;
+  /* PETSC_DETERMINE needs a reduction, so that ranks without nodes must call this too. */
   PetscCall(PetscLayoutCreateFromSizes(comm, part->n_owned, PETSC_DETERMINE, 1, &layout));
   PetscCall(PetscSFCreate(comm, sf));
   PetscCall(PetscSFSetGraphLayout(*sf, layout, n, NULL, PETSC_OWN_POINTER, global));
@@ -369,6 +376,7 @@ PetscErrorCode HycoMeshNodeCells(HycoMesh m, PetscInt **start, PetscInt **cell)
   for (PetscInt e = 0; e < m->n_cells; e++) {
     const PetscInt n = HycoMeshCellNodes(m, e, node);
 
+    /* Counts at node + 1; the sums below turn them into starts. */
     for (PetscInt v = 0; v < n; v++) (*start)[node[v] + 1]++;
   }
   for (PetscInt i = 0; i < m->n_nodes; i++) (*start)[i + 1] += (*start)[i];

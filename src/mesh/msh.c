@@ -12,6 +12,8 @@
 /* Nodes and dimension of gmsh's element types 1 to 31; 0: a type that hyco does not know. */
 static const signed char type_nodes[32] = {0, 2,  3,  4,  4, 8,  6,  5,  3,  6,  9, 10, 27, 18, 14, 1,
                                            8, 20, 15, 13, 9, 10, 12, 15, 15, 21, 4, 5,  6,  20, 35, 56};
+/* By gmsh's number of a type; unsupported types have their numbers of nodes so that the messages name them, not the
+   end of the file. */
 static const signed char type_dim[32] = {0, 1, 2, 2, 3, 3, 3, 3, 1, 2, 2, 3, 3, 3, 3, 0,
                                          2, 3, 3, 3, 2, 2, 2, 2, 2, 2, 1, 1, 1, 3, 3, 3};
 
@@ -94,6 +96,7 @@ static PetscErrorCode ReadCount(Msh *m, size_t bytes, const char what[], size_t 
   const long long value = ReadInt(m, 8);
 
   PetscFunctionBegin;
+  /* Before any allocation. The division cannot overflow, whereas value * bytes could. */
   HycoCheck(!m->failed && value >= 0 && (unsigned long long)value <= (size_t)(m->end - m->at) / bytes,
             "the mesh %s is damaged: it declares %lld %s, more than the file contains", m->path, value, what);
   HycoCheck(value <= PETSC_MAX_INT / 8,
@@ -114,6 +117,8 @@ static PetscErrorCode ReadCountLine(Msh *m, size_t bytes, const char what[], siz
   ierr = ReadCount(m, bytes, what, n);
   m->binary = binary;
   PetscCall(ierr);
+  /* The binary data begin after the line's end, of which exactly one is skipped: their first byte may be a newline
+     too. */
   if (binary && m->at < m->end && *m->at == '\r') m->at++;
   if (binary && m->at < m->end && *m->at == '\n') m->at++;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -213,6 +218,7 @@ static PetscErrorCode ReadNodes4(Msh *m)
     }
     for (size_t k = 0; k < n; k++) {
       PetscCall(AddCoordinates(m, done + k));
+      /* Parametric coordinates on the entity, one per dimension of it. */
       for (long long p = 0; parametric && p < dim; p++) (void)ReadDouble(m);
     }
   }
@@ -272,6 +278,7 @@ static PetscInt FindNode(const HycoMsh *mesh, long long tag)
   PetscInt at;
 
   if (!n || tag < mesh->tag[0] || tag > mesh->tag[n - 1]) return -1;
+  /* Tags ascend and are distinct, so that this means no gaps: the usual file, whose search then costs nothing. */
   if (mesh->tag[n - 1] - mesh->tag[0] == n - 1) return (PetscInt)tag - mesh->tag[0]; /* the tags are consecutive */
   return PetscFindInt((PetscInt)tag, n, mesh->tag, &at) || at < 0 ? -1 : at;
 }
@@ -290,6 +297,7 @@ static PetscErrorCode FindGroup(HycoMsh *mesh, int dim, int tag, PetscInt *index
   *index = k;
   if (k < mesh->n_groups && mesh->group[k].dim == dim && mesh->group[k].tag == tag) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscRealloc(((size_t)mesh->n_groups + 1) * sizeof(*mesh->group), &mesh->group));
+  /* Insertion among tens of groups. Pointers to groups become invalid here, hence the callers keep indices. */
   memmove(mesh->group + k + 1, mesh->group + k, (size_t)(mesh->n_groups - k) * sizeof(*mesh->group));
   mesh->n_groups++;
   memset(&mesh->group[k], 0, sizeof(*mesh->group));
@@ -356,7 +364,10 @@ static PetscErrorCode AddElement(Msh *m, HycoMshGroup *g, long long tag, long lo
             "%s: group \"%s\" has elements of gmsh type %lld (%s); " TAKES, m->path, GroupName(m, g), type,
             TypeName(type));
   PetscCall(PetscArraycpy(node, of, nv));
+  /* The true shape, before elements are widened; points have none and set the bit of HYCO_N_CELL_TYPES, which no
+     body reads. */
   g->shapes |= (PetscInt)1 << HycoMshType(g->dim, nv);
+  /* Either the group or the element gets wider, so that all rows of node[] have one length. */
   if (g->n && g->nv != nv) PetscCall(Match(m, g, nv, node));
   if (!g->n) g->nv = nv;
   nv = g->nv;
@@ -390,6 +401,7 @@ static PetscErrorCode ReadElement(Msh *m, size_t bytes, long long tag, long long
     for (int w = 0; w < v; w++) repeated = (PetscBool)(repeated || node[w] == node[v]);
   }
   if (repeated) {
+    /* 0: no known collapse, which is an error. */
     *of = HycoMshReduce(type, node);
     HycoCheck(
         *of,
@@ -448,6 +460,7 @@ static PetscErrorCode ReadElements2(Msh *m)
       long long own = type;
       PetscInt node[64], at;
 
+      /* In text the tag is the first number of the line, before the type. */
       if (m->binary) tag = ReadInt(m, 4);
       PetscCall(ReadTags2(m, n_tags, &group));
       PetscCall(ReadElement(m, 4, tag, &own, node));
@@ -542,6 +555,8 @@ static PetscErrorCode ReadList(Msh *m, PetscBool groups, int dim, long long enti
   PetscCall(ReadCount(m, m->binary ? 4 : 2, "groups of an entity", &n));
   for (size_t k = 0; k < n; k++) {
     const long long tag = ReadInt(m, 4);
+    /* Physical tags of 4.1 are negative where the entity is reversed; facets are oriented by their cells later, so
+       that the sign is dropped. */
     const Member member = {dim, (int)entity, (int)(tag < 0 ? -tag : tag)};
     PetscInt at;
 
@@ -565,6 +580,7 @@ static PetscErrorCode ReadEntities(Msh *m)
   size_t n[4];
 
   PetscFunctionBegin;
+  /* Elements of 4.1 refer to entities, which give their groups: this section must be read first. */
   HycoCheck(m->four && !m->has_nodes, "the mesh %s is damaged: a section $Entities after its nodes", m->path);
   for (int d = 0; d < 4; d++) PetscCall(ReadCount(m, 4, "entities", &n[d]));
   for (int d = 0; d < 4; d++) {
@@ -639,6 +655,7 @@ static PetscErrorCode ReadNames(Msh *m)
 /* The format of a file that is not gmsh's, by its content, or else by its name; NULL: unknown. */
 static const char *OtherFormat(const Msh *m)
 {
+  /* Extensions last: content is the better evidence, but most of these formats have no mark at their beginning. */
   static const char *const names[][2] = {
       {"inp", "Abaqus"},  {"unv", "I-DEAS (.unv)"}, {"med", "MED"},  {"vtu", "VTK"},     {"vtk", "VTK"},
       {"cgns", "CGNS"},   {"exo", "Exodus"},        {"e", "Exodus"}, {"bdf", "Nastran"}, {"nas", "Nastran"},
@@ -670,6 +687,7 @@ static PetscErrorCode RefuseOther(const Msh *m)
   HycoFail("%s is not a gmsh mesh: it does not begin with $MeshFormat", m->path);
 }
 
+/* gmsh 4.0, whose sections differ from those of 4.1, is refused like any other version. */
 static PetscErrorCode ReadFormat(Msh *m)
 {
   const char *line = NextLine(m);
@@ -713,6 +731,7 @@ static PetscErrorCode ReadSections(Msh *m)
     else if (strncmp(line, "$PhysicalNames", 14) == 0)
       PetscCall(ReadNames(m));
     else
+      /* Partitioned files repeat nodes and cells for each part. Lines that are not of a section, as $End..., pass. */
       HycoCheck(strncmp(line, "$MeshFormat", 11) && strncmp(line, "$Parti", 6) && strncmp(line, "$Ghost", 6),
                 "the mesh %s has a section %.*s that hyco does not support", m->path,
                 (int)PetscMin(strcspn(line, "\r\n"), 40), line);
@@ -741,6 +760,7 @@ static PetscErrorCode ReadAll(Msh *m)
             m->path);
   if (fseek(file, 0, SEEK_END) == 0) size = ftell(file);
   rewind(file);
+  /* A directory has a negative or a huge size; both end in the message below, not in an error of PETSc. */
   if (size < 0 || PetscMalloc1((size_t)size + 1, &m->text)) size = 0;
   got = size ? fread(m->text, 1, (size_t)size, file) : 0;
   fclose(file);
@@ -768,6 +788,7 @@ PetscErrorCode HycoMshRead(const char path[], HycoMsh *mesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Also of tables that a failed HycoMshRead() left incomplete: it has set them to 0 first. */
 PetscErrorCode HycoMshDestroy(HycoMsh *mesh)
 {
   PetscFunctionBegin;

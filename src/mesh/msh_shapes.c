@@ -38,8 +38,11 @@ int HycoMshReduce(long long type, PetscInt node[])
   PetscInt own[8], wide[8], n = 0;
 
   if (type != 3 && type != 5) return 0;
+  /* Read from places that the caller's file may fill otherwise, so that the result is only a guess until it is
+     checked below. */
   if (type == 5) shape = HycoShapeOf(HYCO_HEX8, node);
   for (PetscInt v = 0; v < nv; v++) {
+    /* Cyclic: in a quadrilateral the repeated pair may be the last and the first. */
     if (node[v] != node[(v + nv - 1) % nv]) own[n++] = node[v];
   }
   if (n != HycoCellKinds[shape].nv) return 0;

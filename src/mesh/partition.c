@@ -7,6 +7,7 @@
 #include <petsc/private/partitionerimpl.h>
 #include <petscmat.h>
 
+/* A cut contact costs as much as 1000 cut facets (METIS has integer weights). */
 #define HEAVY 1000
 
 /* Neighbours of each cell in CSR, with the weight of each edge. */
@@ -59,6 +60,7 @@ static PetscErrorCode CellGraph(HycoMesh m, PetscInt n_pairs, const PetscInt pai
       graph->weight[at] = 1;
     }
     graph->xadj[e + 1] = at + (idx_t)extra_of[e];
+    /* From here on the next free place of cell e's heavy edges, no longer their number. */
     extra_of[e] = (PetscInt)at;
   }
   for (PetscInt k = 0; k < n_extra; k++) {
@@ -86,6 +88,7 @@ static PetscErrorCode ByMetis(PetscInt n, const Graph *g, PetscInt n_parts, Pets
   PetscCall(PetscCalloc1(n, &p));
   *done = (PetscBool)(METIS_PartGraphKway(&ne, &ncon, g->xadj, g->adjncy, NULL, NULL, g->weight, &parts, NULL, NULL,
                                           NULL, &cut, p) == METIS_OK);
+  /* idx_t is METIS's integer, of 32 or 64 bits, and need not be PetscInt. */
   for (PetscInt e = 0; e < n; e++) part[e] = (PetscInt)p[e];
   PetscCall(PetscFree(p));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -141,6 +144,7 @@ static PetscErrorCode FillParts(PetscInt n, PetscInt n_parts, PetscInt part[])
       if (size[k] > size[largest]) largest = k;
     }
     if (size[p] || size[largest] < 2) continue;
+    /* Ends: the largest part has at least two cells. */
     for (PetscInt c = n - 1; !size[p]; c--) {
       if (part[c] == largest) part[c] = p, size[p] = 1, size[largest]--;
     }
@@ -199,6 +203,7 @@ static PetscErrorCode Partition(PetscPartitioner partitioner, PetscInt n_parts, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Only the copy of Data is owned, not what it points to. */
 static PetscErrorCode Destroy(PetscPartitioner partitioner)
 {
   PetscFunctionBegin;
@@ -206,6 +211,7 @@ static PetscErrorCode Destroy(PetscPartitioner partitioner)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Called by PetscPartitionerSetType(), before HycoPartitionerSetMesh() fills the data. */
 static PetscErrorCode Create(PetscPartitioner partitioner)
 {
   Data *d;
@@ -227,6 +233,8 @@ PetscErrorCode HycoPartitionerSetMesh(PetscPartitioner partitioner, HycoMesh mes
   const Data data = {mesh, n_pairs, pairs, by};
 
   PetscFunctionBegin;
+  /* PETSc replaces an entry of the same name. The type is set in code, so that -petscpartitioner_type has no effect
+     here. */
   PetscCall(PetscPartitionerRegister(HYCO_PARTITIONER, Create));
   PetscCall(PetscPartitionerSetType(partitioner, HYCO_PARTITIONER));
   *(Data *)partitioner->data = data;

@@ -38,6 +38,7 @@ PetscErrorCode HycoPlexShape(DM dm, HycoCellType type, PetscInt cell, HycoCellTy
   PetscFunctionBegin;
   *shape = type;
   if (type != HYCO_QUAD4 && type != HYCO_HEX8) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Of the several types with one polytope only first-order ones can be in a mesh of quad4 or hex8. */
   PetscCall(DMPlexGetCellType(dm, cell, &of));
   for (int t = 0; t < HYCO_N_CELL_TYPES; t++) {
     if (HycoPlexTypes[t] == of && !HycoCellKinds[t].quadratic) *shape = (HycoCellType)t;
@@ -69,6 +70,7 @@ PetscErrorCode HycoPlexVertices(DM dm, PetscBool interpolated, HycoCellType type
     const PetscInt v = closure[2 * k];
 
     if (v < v0 || v >= v1) continue;
+    /* The permutation is its own inverse, so that it also maps from DMPlex's place to gmsh's. */
     vertex[HycoConePlace(shape, at)] = v;
     at++;
   }
@@ -178,6 +180,7 @@ PetscErrorCode HycoPlexLabelName(const char group[], size_t room, char name[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* *label: borrowed; NULL if the DM has no such group. */
 PetscErrorCode HycoPlexGroupLabel(DM dm, const char group[], DMLabel *label)
 {
   char name[HYCO_LINE];
@@ -263,6 +266,7 @@ static PetscErrorCode FindOwned(Builder *b)
   PetscCall(PetscMalloc1(b->v1 - b->v0, &b->owned));
   for (PetscInt v = b->v0; v < b->v1; v++) b->owned[v - b->v0] = PETSC_TRUE;
   PetscCall(DMGetPointSF(b->dm, &sf));
+  /* n is negative where no graph is set (one process), and then all is owned. */
   PetscCall(PetscSFGetGraph(sf, NULL, &n, &leaf, NULL));
   b->all_owned = (PetscBool)(n <= 0);
   for (PetscInt k = 0; k < n; k++) {
@@ -302,6 +306,7 @@ static PetscErrorCode TakeCells(Builder *b)
     const PetscInt *followed;
     PetscBool mine = b->all_owned;
 
+    /* On one process the closure of every cell would be computed twice for nothing. */
     if (!mine) PetscCall(HycoPlexVertices(b->dm, b->facets_are_points, m->type, c, m->nv, vertex));
     for (PetscInt v = 0; v < m->nv && !mine; v++) mine = (PetscBool)(mine || b->owned[vertex[v] - b->v0]);
     if (b->ties && !mine) {
@@ -323,6 +328,7 @@ static PetscErrorCode TakeCells(Builder *b)
     b->m->cell_point[e] = keep[place[e]];
     b->cell[b->m->cell_point[e] - b->c0] = e;
     m->cell_id[e] = key[place[e]];
+    /* Points of vertices for now: node indices follow from the nodes that these cells need (TakeNodes()). */
     PetscCall(HycoPlexVertices(b->dm, b->facets_are_points, m->type, b->m->cell_point[e], m->nv, m->cells + e * m->nv));
   }
   PetscCall(PetscFree3(keep, key, place));
@@ -361,6 +367,7 @@ static PetscErrorCode TakeNodes(Builder *b)
   PetscCall(PetscMalloc1(n, &b->m->node_point));
   PetscCall(PetscMalloc1(n, &m->node_id));
   PetscCall(PetscMalloc1(3 * n, &m->xyz));
+  /* 3 for a mesh that was read, also of a plane; a DM of another program may have its own dimension. */
   PetscCall(DMGetCoordinateDim(b->dm, &dim));
   PetscCall(DMGetCoordinateSection(b->dm, &section));
   PetscCall(DMGetCoordinatesLocal(b->dm, &x));
@@ -408,6 +415,7 @@ static void TurnOutward(HycoMesh m, PetscInt cell, PetscInt facet[])
   PetscReal inside[3] = {0, 0, 0}, normal[3] = {0, 0, 0}, out = 0;
   const PetscReal *p = m->xyz + 3 * facet[0], *q, *s = m->xyz + 3 * facet[HycoCellKinds[m->type].corners - 1];
 
+  /* A facet is a node: its normal follows from the cell where it is needed. */
   if (m->dim == 1) return;
   q = m->xyz + 3 * facet[1];
   for (PetscInt c = 0; c < 3; c++) {
@@ -422,10 +430,13 @@ static void TurnOutward(HycoMesh m, PetscInt cell, PetscInt facet[])
 
     normal[c] = (q[d] - p[d]) * (s[e] - p[e]) - (q[e] - p[e]) * (s[d] - p[d]);
   }
+  /* Against the cell's mean node: true for convex cells, and independent of the file's orientation, which gmsh does
+     not guarantee. */
   for (PetscInt c = 0; c < 3; c++) out += normal[c] * (p[c] - inside[c]);
   if (out < 0) Reverse(m->type, facet);
 }
 
+/* Outward for facets with a cell here; one without it keeps the order that it got when it had the cell. */
 void HycoMeshTurnFacet(HycoMesh m, PetscInt cell, PetscInt facet[])
 {
   if (cell >= 0) TurnOutward(m, cell, facet);
@@ -475,6 +486,8 @@ static PetscErrorCode AddNode(Builder *b, PetscInt group, PetscInt node)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* As AddNode(), for cells; in both a point may come several times, by several values, and is sorted out in
+   TakeGroup(). */
 static PetscErrorCode AddCell(Builder *b, PetscInt group, PetscInt cell)
 {
   HycoMesh m = b->m;
@@ -507,6 +520,7 @@ static PetscErrorCode AddFacetPoint(Builder *b, PetscInt group, PetscInt p, cons
     HycoCheck(strcmp(b->scene->spring[k].group, m->group_name[group]),
               "the spring on %s: one of its facets lies between two cells; give a group on the boundary",
               m->group_name[group]);
+  /* An inner facet is no boundary; its nodes are in the group by the closure of the label. */
   if (n != 1) PetscFunctionReturn(PETSC_SUCCESS);
   cell = b->cell[support[0] - b->c0];
   /* A number in the DM's cone, not in gmsh's order: it only makes the order of facets unique. */
@@ -558,6 +572,7 @@ static PetscErrorCode AddPoint(Builder *b, PetscInt group, PetscInt value, Petsc
       PetscCall(AddFacetPoint(b, group, p, node));
     }
   }
+  /* A label has no dimension of its own: it is the largest of what it contains, over all ranks (AgreeOnGroups()). */
   m->group_dim[group] = PetscMax(m->group_dim[group], of);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -581,6 +596,7 @@ static PetscErrorCode PlaceFacets(Builder *b, PetscInt group)
 
   PetscFunctionBegin;
   if (b->n_facets) qsort(b->facet, (size_t)b->n_facets, sizeof(*b->facet), CompareFacets);
+  /* One more than needed: PetscRealloc() to 0 bytes frees. */
   PetscCall(PetscRealloc((size_t)(n * m->nf + 1) * sizeof(PetscInt), &m->facets));
   PetscCall(PetscRealloc((size_t)(n + 1) * sizeof(PetscInt), &m->facet_group));
   PetscCall(PetscRealloc((size_t)(n + 1) * sizeof(PetscInt), &m->facet_cell));
@@ -654,6 +670,7 @@ static PetscErrorCode TakeGroups(Builder *b)
     PetscCall(DMGetLabelName(b->dm, k, &name));
     if (HycoPlexOwnLabel(name)) continue;
     PetscCall(DMGetLabel(b->dm, name, &label));
+    /* The prefix of HycoPlexLabelName(). */
     if (strncmp(name, "group ", 6) == 0) name += 6;
     PetscCall(PetscStrallocpy(name, &m->group_name[m->n_groups]));
     PetscCall(TakeGroup(b, m->n_groups++, label));
@@ -724,6 +741,8 @@ static PetscErrorCode TakeNodeBodies(Builder *b)
   HycoMesh m = b->m;
 
   PetscFunctionBegin;
+  /* Descending, so that the first body is written last and stays, as HycoMeshSetNodeBodies() chooses for nodes with
+     cells. */
   for (PetscInt k = b->sub ? b->scene->n_bodies - 1 : -1; k >= 0; k--) {
     PetscInt g = 0;
 
@@ -768,6 +787,7 @@ static PetscErrorCode Number(Builder *b)
   PetscCall(PetscSectionSetChart(section, b->v0, b->v1));
   for (PetscInt v = b->v0; v < b->v1; v++) PetscCall(PetscSectionSetDof(section, v, m->dim));
   PetscCall(PetscSectionSetUp(section));
+  /* The DM's own section is replaced: the numbers are those of the vectors that DMCreateGlobalVector() would give. */
   PetscCall(DMSetLocalSection(b->dm, section));
   PetscCall(PetscSectionDestroy(&section));
   PetscCall(DMGetGlobalSection(b->dm, &global));
@@ -781,6 +801,7 @@ static PetscErrorCode Number(Builder *b)
     PetscInt at;
 
     PetscCall(PetscSectionGetOffset(global, b->m->node_point[i], &at));
+    /* Negative: of another owner, whose offset it encodes. */
     m->node_global[i] = (at < 0 ? -(at + 1) : at) / m->dim;
   }
   PetscCall(HycoRankInts(comm, m->n_nodes, m->node_id, m->node_whole, &m->n_whole_nodes));
@@ -844,6 +865,7 @@ PetscErrorCode HycoPlexToTables(DM dm, MPI_Comm comm, HycoScene scene, HycoMesh 
   PetscCallMPI(MPI_Comm_size(comm, &size));
   PetscCall(PetscNew(&b.m));
   PetscCall(FindType(&b));
+  /* User errors (a cell of two bodies) occur on the rank that has the cell; all ranks return together. */
   HycoOnEach(comm, MakeTables(&b));
   if (size == 1) b.m->n_owned = b.m->n_nodes;
   if (size > 1) PetscCall(AgreeOnGroups(comm, b.m));
@@ -863,6 +885,7 @@ PetscErrorCode HycoPlexToTables(DM dm, MPI_Comm comm, HycoScene scene, HycoMesh 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For a DM with points on all ranks of its own communicator. Collective. */
 PetscErrorCode HycoPlexToMesh(DM dm, HycoScene scene, HycoMesh *mesh)
 {
   PetscFunctionBegin;

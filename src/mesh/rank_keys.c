@@ -3,6 +3,7 @@
 #include "plex.h"
 #include <stdlib.h>
 
+/* By comparison: a difference would overflow for keys that are products of tags. */
 static int Compare(const void *a, const void *b)
 {
   const PetscInt64 x = *(const PetscInt64 *)a, y = *(const PetscInt64 *)b;
@@ -50,6 +51,7 @@ PetscErrorCode HycoRankKeys(MPI_Comm comm, PetscInt n, const PetscInt64 key[], P
   PetscCallMPI(MPI_Comm_size(comm, &size));
   for (PetscInt k = 0; k < n; k++) most = PetscMax(most, key[k]);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_INT64, MPI_MAX, comm));
+  /* At least 1, and most / share < size: every key has a process. */
   share = most / size + 1;
   PetscCall(PetscCalloc4(size, &n_send, size, &n_receive, size + 1, &send, size + 1, &receive));
   for (PetscInt k = 0; k < n; k++) n_send[key[k] / share]++;
@@ -65,6 +67,8 @@ PetscErrorCode HycoRankKeys(MPI_Comm comm, PetscInt n, const PetscInt64 key[], P
   Offsets(size, n_send, send);
   PetscCallMPI(MPI_Alltoallv(out, n_send, send, MPIU_INT64, in, n_receive, receive, MPIU_INT64, comm));
   PetscCall(RankOwn(receive[size], in, ranked, &n_own));
+  /* Process r has the r-th part of the range, so that the number of different keys before it is a sum over lower
+     ranks. On rank 0 MPI leaves it undefined, hence 0 from the start. */
   PetscCallMPI(MPI_Exscan(&n_own, &before, 1, MPIU_INT, MPI_SUM, comm));
   for (PetscInt k = 0; k < receive[size]; k++) ranked[k] += before;
   PetscCallMPI(MPI_Alltoallv(ranked, n_receive, receive, MPIU_INT, back, n_send, send, MPIU_INT, comm));
@@ -76,6 +80,7 @@ PetscErrorCode HycoRankKeys(MPI_Comm comm, PetscInt n, const PetscInt64 key[], P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Tags are PetscInt; the search itself works on 64 bits for keys of two tags (refine_mesh.c). */
 PetscErrorCode HycoRankInts(MPI_Comm comm, PetscInt n, const PetscInt key[], PetscInt place[], PetscInt *total)
 {
   PetscInt64 *wide;

@@ -27,6 +27,7 @@ static PetscErrorCode ChooseType(HycoScene scene, Reader *r, HycoMesh m, PetscIn
                                                        uniform pressure */
     PetscCall(HycoMshAddFaceNodes(scene->mesh_path, &r->file));
     m->type = HYCO_HEX27;
+    /* Reported by hyco check: the mesh has nodes that are not in the file. */
     scene->face_nodes = PETSC_TRUE;
   }
   m->nv = HycoCellKinds[m->type].nv;
@@ -36,6 +37,8 @@ static PetscErrorCode ChooseType(HycoScene scene, Reader *r, HycoMesh m, PetscIn
     const PetscInt nv = g->dim == m->dim ? m->nv : g->dim == 2 ? m->nf : g->nv;
     const HycoCellType shape = HycoMshType(g->dim, g->nv);
 
+    /* A group outside the bodies may be of second order: it stays as it is, and AddMembers() takes none of its
+       cells. */
     if (g->n && shape < HYCO_N_CELL_TYPES && !HycoCellKinds[shape].quadratic) PetscCall(HycoMshWiden(g, nv));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -110,6 +113,7 @@ static PetscErrorCode CollectCells(HycoScene scene, Reader *r, HycoMesh m)
     const Group *g = &r->group[k];
 
     for (PetscInt e = 0; g->body >= 0 && e < g->n; e++, n++) {
+      /* All groups of bodies have m->nv nodes by now (ChooseType()). */
       source[n] = g->node + e * m->nv;
       tag[n] = g->id[e];
       body[n] = g->body;
@@ -139,6 +143,7 @@ static PetscErrorCode CollectNodes(Reader *r, HycoMesh m)
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(file->n_nodes, &r->index));
   for (PetscInt i = 0; i < file->n_nodes; i++) r->index[i] = -1;
+  /* First marks, then the indices: nodes without a cell (centres of arcs) would make K singular and are left out. */
   for (PetscInt k = 0; k < m->n_cells * m->nv; k++) r->index[m->cells[k]] = 0;
   for (PetscInt i = 0; i < file->n_nodes; i++) m->n_nodes += r->index[i] == 0;
   PetscCall(PetscMalloc1(3 * m->n_nodes, &m->xyz));
@@ -232,6 +237,7 @@ static PetscErrorCode AddFacets(HycoScene scene, Reader *r, HycoMesh m, Group *g
       missing = (PetscBool)(missing || facet[v] < 0);
     }
     for (PetscInt k = missing ? 0 : start[facet[0]]; k < (missing ? 0 : start[facet[0] + 1]); k++) {
+      /* The first test is cheap; the second one excludes diagonals, whose nodes the cell has too. */
       if (CellHas(m, around[k], m->nf, facet) && HycoCellFace(m, around[k], facet) >= 0) {
         cell = around[k];
         n++;
@@ -275,6 +281,7 @@ static PetscErrorCode AddMembers(Reader *r, HycoMesh m, Group *g, PetscInt group
   for (PetscInt e = 0; g->dim == m->dim && g->nv == m->nv && e < g->n; e++) {
     PetscInt cell = -1, node[HYCO_CELL_NODES];
 
+    /* Cells outside the bodies have nodes -1, which CellHas() finds in no cell. */
     for (PetscInt v = 0; v < m->nv; v++) node[v] = r->index[g->node[e * m->nv + v]];
     for (PetscInt k = start[PetscMax(node[0], 0)]; node[0] >= 0 && k < start[node[0] + 1]; k++) {
       if (CellHas(m, around[k], m->nv, node)) cell = around[k];
@@ -422,6 +429,7 @@ PetscErrorCode HycoMeshRead(HycoScene scene, HycoMesh *mesh)
   PetscCall(PetscFree(r.before));
   PetscCall(PetscFree(r.start));
   PetscCall(PetscFree(r.around));
+  /* The file's tables and the reader's are freed in any case; the mesh only after an error. */
   if (ierr) PetscCall(HycoMeshDestroy(&m));
   PetscCall(ierr);
   *mesh = m;

@@ -14,6 +14,7 @@ static PetscErrorCode FacetPoint(DM dm, HycoCellType type, PetscInt nv, PetscInt
 {
   const PetscInt *cone;
   const signed char *of = HycoFacetNodes(type, number);
+  /* Room for first order alone: Interpolate() refuses other meshes. */
   PetscInt vertex[8], n;
 
   PetscFunctionBegin;
@@ -83,6 +84,7 @@ typedef struct {
   PetscBool named;
 } Asked;
 
+/* A visitor of HycoSceneVisitGroups(): groups that the scene does not name may be of any kind. */
 static PetscErrorCode Compare(const char key[], const char name[], void *context)
 {
   Asked *asked = (Asked *)context;
@@ -104,6 +106,7 @@ static PetscErrorCode CheckVertices(DM dm, HycoScene scene, const char name[], D
   PetscCall(HycoSceneVisitGroups(scene, Compare, &asked));
   if (!asked.named) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(DMPlexGetDepthStratum(dm, 0, &v0, &v1));
+  /* Values 1 + dimension of groups of lines, surfaces and volumes; points (1) are kept as they are. */
   for (PetscInt k = 2; k <= 4; k++) {
     IS points;
 
@@ -151,6 +154,7 @@ static PetscErrorCode Interpolate(DM *dm, HycoScene scene)
   PetscCall(PetscCalloc1(last, &tag));
   PetscCall(ISGetLocalSize(tags, &n));
   PetscCall(ISGetIndices(tags, &had));
+  /* DMPlexInterpolate() appends faces and edges after the old points, which keep their numbers. */
   PetscCall(PetscArraycpy(tag, had, n));
   PetscCall(ISRestoreIndices(tags, &had));
   PetscCall(HycoPlexSetTags(full, tag));
@@ -168,6 +172,8 @@ static PetscErrorCode Interpolate(DM *dm, HycoScene scene)
     PetscCall(DMGetLabel(full, name, &to));
     PetscCall(AddOwnPoints(full, (HycoCellType)type, HycoCellKinds[type].nv, HycoCellKinds[type].nf, from, to));
     PetscCall(DMPlexLabelComplete(full, to));
+    /* After the completion, whose closure brings back the vertices of facets and cells; what is then missing has
+       neither. */
     HycoOnEach(comm, CheckVertices(full, scene, name, from, to));
   }
   PetscCall(DMDestroy(dm));
@@ -184,6 +190,7 @@ static PetscErrorCode CountChildren(DMPlexTransform transform, PetscInt p, DMPol
 
   PetscFunctionBegin;
   *n = 0;
+  /* Borrowed tables of the transform: the numbers of children by type. */
   PetscCall(DMPlexTransformCellTransform(transform, from, p, NULL, &n_types, &types, &size, &cone, &orientation));
   for (PetscInt k = 0; k < n_types; k++) {
     if (types[k] == type) *n = size[k];
@@ -228,6 +235,7 @@ static PetscErrorCode TagMiddles(DM dm, DMPlexTransform transform, const PetscIn
     PetscCall(DMPlexGetCellType(dm, p, &type));
     PetscCall(CountChildren(transform, p, type, DM_POLYTOPE_POINT, &has));
     if (!has) continue;
+    /* Triangles and tetrahedra have no vertex in their middle and are skipped above. */
     PetscCall(DMPlexTransformGetTargetPoint(transform, type, DM_POLYTOPE_POINT, p, 0, &child[n]));
     PetscCall(Key(dm, tag, p, depth, dim, &key[n++]));
   }
@@ -300,6 +308,7 @@ static PetscErrorCode RefineOnce(DM *dm)
     new_tag[child] = tag[v];
     last = PetscMax(last, tag[v]);
   }
+  /* New tags follow the largest of all ranks, so that they are the same for any partition. */
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &last, 1, MPIU_INT, MPI_MAX, comm));
   for (PetscInt depth = 1; depth <= dim; depth++) PetscCall(TagMiddles(*dm, transform, tag, depth, &last, new_tag));
   PetscCall(TagCells(*dm, transform, tag, new_tag));

@@ -48,6 +48,7 @@ static PetscErrorCode Exchange(MPI_Comm comm, Rows *r)
   PetscCall(HycoSendRows(comm, r->n, r->to, (size_t)r->width * sizeof(PetscInt), r->row, &n_got, &got));
   if (n_got) qsort(got, (size_t)n_got, (size_t)r->width * sizeof(PetscInt), CompareThree);
   for (PetscInt k = 0; k < n_got; k++) {
+    /* Source and target may overlap once rows were dropped, hence PetscArraymove(). */
     if (n && !CompareThree(got + k * r->width, got + (n - 1) * r->width)) continue;
     PetscCall(PetscArraymove(got + n++ * r->width, got + k * r->width, r->width));
   }
@@ -95,6 +96,7 @@ static void NoteFacets(Packing *p)
   }
 }
 
+/* Not only the groups of in[]: the receiver looks up others by node too, for instance those of supports. */
 static void NoteGroups(Packing *p)
 {
   HycoMesh m = p->part;
@@ -113,6 +115,7 @@ static PetscErrorCode MakeList(Packing *p, List *list, void (*note)(Packing *))
   PetscCall(PetscCalloc1(n + 1, &list->start));
   note(p);
   for (PetscInt i = 0; i < n; i++) list->start[i + 1] += list->start[i];
+  /* Never of 0 entries: the second pass is recognised by item != NULL. */
   PetscCall(PetscMalloc1(list->start[n] + 1, &list->item));
   note(p); /* start[i] advances to the end of i's items */
   for (PetscInt i = n; i > 0; i--) list->start[i] = list->start[i - 1];
@@ -146,6 +149,7 @@ static PetscErrorCode PackNode(Packing *p, PetscMPIInt to, PetscInt i)
     row[2] = 0;
   }
   for (PetscInt j = tied < 0 ? 0 : m->tied_start[tied]; tied >= 0 && j < m->tied_start[tied + 1]; j++)
+    /* Recursion of one level: a master is not tied itself. */
     PetscCall(PackNode(p, to, m->tied_master[j]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -195,6 +199,7 @@ static PetscErrorCode Pack(Packing *p, PetscInt n, const PetscInt request[])
     const PetscInt i = p->at[request[2 * k + 1] - m->first];
 
     PetscCall(PackNode(p, (PetscMPIInt)request[2 * k], i));
+    /* The requested node is sent even if no facet is around it. */
     for (PetscInt j = p->facets.start[i]; j < p->facets.start[i + 1]; j++)
       PetscCall(PackFacet(p, (PetscMPIInt)request[2 * k], p->facets.item[j]));
   }
@@ -274,6 +279,8 @@ static PetscErrorCode PlaceFacets(HycoMesh m, const Rows *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Every rank has all groups in the same order, though perhaps without nodes: the indices of groups agree with the
+   part's. */
 static PetscErrorCode PlaceGroups(HycoMesh m, HycoMesh part, const Rows *r)
 {
   PetscFunctionBegin;
@@ -306,6 +313,7 @@ static PetscErrorCode MakeMesh(const Packing *p, HycoMesh *mesh)
   m->nf = part->nf;
   m->type = part->type;
   m->mixed = part->mixed;
+  /* The part's own range of numbers, so that HycoMeshOwned() tells which nodes of the ring this rank owns. */
   m->n_owned = part->n_owned;
   m->first = part->first;
   m->n_whole_nodes = part->n_whole_nodes;
@@ -339,6 +347,7 @@ PetscErrorCode HycoMeshRings(MPI_Comm comm, HycoScene scene, HycoMesh part, cons
   }
   PetscCall(HycoSendRows(comm, n, to, 2 * sizeof(PetscInt), ask, &n_asked, &asked));
   PetscCall(PetscFree2(to, ask));
+  /* Three reals need 6 integers of 32 bits, 3 of 64: rounded up. */
   p.node.width = 6 + (PetscInt)((3 * sizeof(PetscReal) + sizeof(PetscInt) - 1) / sizeof(PetscInt));
   p.member.width = 3;
   p.facet.width = 3 + part->nf;

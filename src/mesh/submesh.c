@@ -21,6 +21,7 @@ typedef struct {
   PetscInt *cell_at, *node_at;   /* by cell and node of `of`: its index here, or -1 */
 } Cut;
 
+/* The lists only; `of` and `scene` are borrowed. */
 static PetscErrorCode CutDestroy(Cut *c)
 {
   PetscFunctionBegin;
@@ -28,6 +29,7 @@ static PetscErrorCode CutDestroy(Cut *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* 0..n-1; the caller frees it. */
 static PetscErrorCode Identity(PetscInt n, PetscInt **a)
 {
   PetscFunctionBegin;
@@ -57,6 +59,7 @@ static PetscInt CellPoint(HycoMesh m, PetscInt e)
 {
   return m->cell_point ? m->cell_point[e] : e;
 }
+/* Vertices follow the cells in DMPlexCreateFromCellListPetsc(), hence the offset. */
 static PetscInt NodePoint(HycoMesh m, PetscInt i)
 {
   return m->node_point ? m->node_point[i] : m->n_cells + i;
@@ -97,11 +100,13 @@ static PetscErrorCode SetCones(DM dm, const Cut *c)
     PetscCall(DMPlexSetConeSize(dm, e, HycoMeshCellNodes(m, c->cell[e], node)));
   for (PetscInt f = 0; c && f < c->n_facets; f++)
     PetscCall(DMPlexSetConeSize(dm, c->n_cells + f, HycoFacetCorners(m->nf, m->facets + c->facet[f] * m->nf)));
+  /* Allocates the cones by the sizes set before; the cones themselves come after it. */
   PetscCall(DMSetUp(dm));
   for (PetscInt e = 0; c && e < c->n_cells; e++) {
     const HycoCellType shape = HycoMeshShape(m, c->cell[e]);
     const PetscInt n = HycoMeshCellNodes(m, c->cell[e], node), own = HycoCellKinds[shape].nv;
 
+    /* Masters keep their order at the end of the cone; only the cell's own nodes are permuted. */
     for (PetscInt k = 0; k < n; k++) cone[k < own ? HycoConePlace(shape, k) : k] = first + c->node_at[node[k]];
     PetscCall(DMPlexSetCone(dm, e, cone));
   }
@@ -146,6 +151,7 @@ static PetscErrorCode SetTypes(DM dm, const Cut *c)
   DMLabel label;
 
   PetscFunctionBegin;
+  /* With ties a cell's cone has any size, and a facet without its cell has that of a smaller cell. */
   PetscCall(DMCreateLabel(dm, "celltype"));
   PetscCall(DMPlexGetCellTypeLabel(dm, &label));
   for (PetscInt p = 0; p < last; p++) n[TypeOf(c, p)]++;
@@ -171,6 +177,7 @@ static PetscErrorCode FromCones(MPI_Comm comm, PetscInt dim, const Cut *c, DM *d
   PetscCall(DMPlexCreate(comm, dm));
   PetscCall(DMSetDimension(*dm, dim));
   PetscCall(SetCones(*dm, c));
+  /* Supports from cones, then the strata: a facet without its cell has height 0, as a cell. */
   PetscCall(DMPlexSymmetrize(*dm));
   PetscCall(DMPlexStratify(*dm));
   PetscCall(SetTypes(*dm, c));
@@ -210,6 +217,7 @@ static PetscErrorCode FillMembers(DMLabel label, const Cut *c, PetscInt g)
   for (PetscInt k = m->group_start[g]; k < m->group_start[g + 1]; k++) {
     if (c->node_at[m->group_node[k]] >= 0) point[n++] = first + c->node_at[m->group_node[k]];
   }
+  /* In a submesh an empty stratum still tells the group's dimension (TakeGroup()). */
   if (n || c->scene) PetscCall(SetStratum(label, 1 + m->group_dim[g], n, point));
   PetscCall(PetscFree(point));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -266,6 +274,7 @@ static PetscErrorCode AddLabels(DM dm, const Cut *c)
     PetscCall(DMCreateLabel(dm, name));
     PetscCall(DMGetLabel(dm, name, &label));
     if (c) PetscCall(FillMembers(label, c, g));
+    /* In 1D a facet is a vertex, which is a point of the group already. */
     if (c && (c->of->dim > 1 || c->scene)) PetscCall(FillFacets(label, c, g));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -308,6 +317,7 @@ PetscErrorCode HycoPlexFromMesh(MPI_Comm comm, HycoMesh m, DM *dm)
 
   PetscFunctionBegin;
   if (m) PetscCall(CutAll(m, c));
+  /* Which constructor is called must be the same on all ranks: each is collective. */
   PetscCallMPI(MPI_Bcast(head, 3, MPIU_INT, 0, comm));
   PetscCall(HycoTiesBcast(comm, &ties));
   if (m && !ties && !head[2]) {
@@ -322,6 +332,7 @@ PetscErrorCode HycoPlexFromMesh(MPI_Comm comm, HycoMesh m, DM *dm)
                                             cone, 3, m ? m->xyz : NULL, dm));
   PetscCall(PetscFree(cone));
   PetscCall(HycoTiesAttach(*dm, ties));
+  /* The received list belongs to this call; rank 0's belongs to the mesh. */
   if (!m) PetscCall(HycoTiesDestroy(&ties));
   PetscCall(AddLabels(*dm, c));
   PetscCall(AddTags(*dm, c));
@@ -331,6 +342,7 @@ PetscErrorCode HycoPlexFromMesh(MPI_Comm comm, HycoMesh m, DM *dm)
 
 /* -- submeshes -- */
 
+/* Borrowed; NULL: a whole mesh. The same IS tells plex.c that a DM is a submesh. */
 PetscErrorCode HycoSubmeshGetPoints(DM dm, IS *points)
 {
   PetscFunctionBegin;
@@ -359,6 +371,8 @@ static PetscErrorCode SelectNodes(Cut *c, PetscBool ascending, PetscInt n_extra,
   }
   for (PetscInt k = 0; k < m->n_tied; k++) {
     for (PetscInt j = m->tied_start[k]; how[m->tied[k]] && j < m->tied_start[k + 1]; j++)
+      /* Masters of tied nodes that no kept cell has: the nodes' displacements are sums over them. Those of kept
+         cells' nodes are IN_CELL already. */
       how[m->tied_master[j]] = PetscMax(how[m->tied_master[j]], ALSO);
   }
   PetscCall(PetscMalloc1(m->n_nodes, &c->node));
@@ -406,6 +420,7 @@ static PetscErrorCode Select(Cut *c, PetscInt n_keep, const PetscInt keep[], Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Not collective: each process has the IS of its own points. */
 PetscErrorCode HycoSubmeshSetPoints(DM sub, PetscInt n, PetscInt point[])
 {
   IS points;
@@ -472,6 +487,7 @@ static PetscErrorCode Make(const Cut *c, HycoMesh *sub)
 
   PetscFunctionBegin;
   PetscCall(MakeDM(PETSC_COMM_SELF, c, &dm));
+  /* The tables hold the reference that counts; this function's own is released also after an error. */
   ierr = HycoPlexToMesh(dm, c->scene, sub);
   PetscCall(DMDestroy(&dm));
   PetscCall(ierr);
@@ -511,6 +527,7 @@ PetscErrorCode HycoSubmeshFirst(HycoScene scene, HycoMesh of, PetscInt n, HycoMe
   PetscCall(HycoSubmesh(scene, of, of->n_cells, first, n, first, ALL_BETWEEN, NULL, sub));
   PetscCall(PetscFree(first));
   m = *sub;
+  /* A node of a cell beyond the first n would have been added. */
   PetscCheck(m->n_nodes == n, PETSC_COMM_SELF, PETSC_ERR_PLIB, "%d nodes of %d", (int)m->n_nodes, (int)n);
   m->n_whole_nodes = of->n_whole_nodes;
   m->n_whole_cells = of->n_whole_cells;
@@ -518,6 +535,8 @@ PetscErrorCode HycoSubmeshFirst(HycoScene scene, HycoMesh of, PetscInt n, HycoMe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For tables that came by a message or from a model file: nodes and cells keep their order, and the DM gets what
+   MakeTables() would read back. */
 PetscErrorCode HycoMeshCreateDM(HycoScene scene, HycoMesh m)
 {
   Cut cut = {0};

@@ -1,6 +1,8 @@
 /* The tables of any DM, which HycoFE and contacts work on: made when they are first asked for. */
 #include "plex.h"
 
+/* Not only for DMs of this library: HycoPlexComplete() adds what another program's DM lacks, and does nothing to one
+   with tags. */
 PetscErrorCode HycoMeshOf(DM dm, HycoScene scene, HycoMesh *mesh)
 {
   PetscFunctionBegin;

@@ -29,6 +29,7 @@ PetscErrorCode HycoTiesCreate(PetscInt n, HycoCellType type, HycoTies *ties)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Releases one reference; NULL-safe. */
 PetscErrorCode HycoTiesDestroy(HycoTies *ties)
 {
   HycoTies t = *ties;
@@ -63,6 +64,7 @@ PetscErrorCode HycoTiesBcast(MPI_Comm comm, HycoTies *ties)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The container's destructor in the form of PETSc's version (hycocompat.h). */
 static PetscErrorCode DestroyAttached(HycoContained contained)
 {
   HycoTies ties = (HycoTies)HycoContainedContext(contained);
@@ -88,6 +90,7 @@ PetscErrorCode HycoTiesAttach(DM dm, HycoTies ties)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Borrowed: valid as long as the DM, or a reference of the caller's own. */
 PetscErrorCode HycoTiesOf(DM dm, HycoTies *ties)
 {
   PetscContainer container;
@@ -120,6 +123,7 @@ static PetscErrorCode FindTied(HycoMesh m, const PetscInt tag[], const PetscInt 
   for (PetscInt k = 0; k < t->n; k = End(t, k)) {
     PetscInt at;
 
+    /* A negative `at`: the slave is in another part of the mesh. */
     PetscCall(PetscFindInt(t->slave[k], m->n_nodes, tag, &at));
     if (at >= 0) entry[node[at]] = k;
     m->n_tied += at >= 0;
@@ -128,6 +132,7 @@ static PetscErrorCode FindTied(HycoMesh m, const PetscInt tag[], const PetscInt 
   PetscCall(PetscMalloc1(m->n_tied, &m->tied_entry));
   PetscCall(PetscMalloc1(m->n_tied + 1, &m->tied_start));
   PetscCall(PetscMalloc1(t->n, &m->tied_master));
+  /* Counted again while the lists are filled, in the order of the nodes, not of the ties. */
   m->n_tied = m->tied_start[0] = 0;
   for (PetscInt i = 0; i < m->n_nodes; i++) {
     const PetscInt k = m->n_tied;
@@ -168,6 +173,7 @@ static PetscInt Follow(HycoMesh m, PetscInt cell, PetscInt follow[])
       for (PetscInt w = 0; w < m->nv; w++) known = (PetscBool)(known || own[w] == master);
       for (PetscInt w = 0; w < n; w++) known = (PetscBool)(known || follow[w] == master);
       if (known) continue;
+      /* Insertion: a cell follows tens of nodes at most. */
       for (; at > 0 && follow[at - 1] > master; at--) follow[at] = follow[at - 1];
       follow[at] = master;
       n++;

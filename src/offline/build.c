@@ -28,12 +28,14 @@ static PetscErrorCode ReadMesh(HycoReducer t)
   t->sizes[1] = f->n_cells;
   t->sizes[2] = f->n_contacts;
   t->sizes[3] = f->part->dim;
+  /* Supports and contacts of the mesh are known at parameters only; the first column's serve. */
   PetscCall(HycoFOMSetParameters(f, mu));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* For moved surfaces, finds in t->met every contact's masters at the training points and over the ranges, as far as
-   contacts may close. Rank 0. */
+   contacts may close. Rank 0. The reach comes first: it limits the search of the second to masters that a closing
+   contact may meet. */
 static PetscErrorCode Meet(HycoReducer t, HycoROM m)
 {
   HycoFOM f = t->fom;
@@ -67,6 +69,7 @@ static PetscErrorCode SurfacesOf(HycoReducer t, PetscBool contact[], PetscInt *n
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* 3 groups a contact: slave and master of a moved one, and every slave. */
 PetscErrorCode HycoReducerMarkContacts(HycoReducer t, PetscBool contact[])
 {
   PetscInt *all, n_all;
@@ -88,16 +91,19 @@ static PetscErrorCode FindCells(HycoReducer t, PetscBool in[])
   DMLabel rid;
 
   PetscFunctionBegin;
+  /* Moved contacts have as many rows as masters that they meet over the ranges: the RID must have all of these. */
   HycoLogged(HYCO_EVENT_RID, HycoRIDBuild(t->fom, t->fom->searches ? &t->met.rows : &t->fom->pairs, &settings, &rid));
   for (PetscInt e = 0; e < part->n_cells; e++) {
     PetscCall(DMLabelStratumHasPoint(rid, HYCO_RID, part->cell_point[e], &in[e]));
+    /* Greedy: an RID that loses cells from one iteration to the next would make the indicator jump. */
     if (t->grown) t->grown[e] = in[e] = (PetscBool)(in[e] || t->grown[e]);
   }
   PetscCall(DMLabelDestroy(&rid));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the model's mesh has the surfaces of loads. */
+/* Whether the model's mesh has the surfaces of loads. A cubature takes the work of surface loads from all of their
+   facets, whether or not their cells have weights. */
 static PetscBool LoadedSurfaces(HycoReducer t)
 {
   return (PetscBool)(t->prototype->model->traits.cells && !t->prototype->model->traits.surfaces);
@@ -123,7 +129,8 @@ static PetscErrorCode GatherCells(HycoReducer t, const PetscBool in[], HycoMesh 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* node[i]: the node of m that is node i of the contacts' surfaces, or -1. Rank 0. */
+/* node[i]: the node of m that is node i of the contacts' surfaces, or -1. Rank 0. Through the numbers in the whole
+   mesh, by which both meshes know their nodes. */
 static PetscErrorCode FindSurface(HycoMesh surface, HycoMesh m, PetscInt node[])
 {
   PetscInt *whole, *at;
@@ -169,6 +176,7 @@ static PetscErrorCode CutMesh(HycoReducer t, HycoMesh from, const PetscBool in[]
   PetscCall(HycoSubmesh(t->scene, from, n_keep, keep, n_extra, extra, n_all, all, &m->model->mesh));
   PetscCall(PetscMalloc1(m->model->mesh->n_nodes, global));
   PetscCall(HycoSubmeshNodes(m->model->mesh, from, *global));
+  /* On one rank local and global numbers are the same, and there is no table. */
   for (PetscInt i = 0; i < m->model->mesh->n_nodes && from->node_global; i++)
     (*global)[i] = from->node_global[(*global)[i]];
   PetscCall(PetscFree(t->surface_node));
@@ -194,6 +202,8 @@ static PetscErrorCode FetchNotes(HycoReducer t, const PetscBool in[], PetscInt n
   PetscSF sf;
 
   PetscFunctionBegin;
+  /* By owned node; a cell of Omega_B at a node of this rank is always in its part, because parts overlap by a
+     layer. */
   PetscCall(PetscCalloc2(part->n_nodes, &of, part->n_owned, &own));
   for (PetscInt k = 0; k < fe->n_dof; k++) of[k / fe->dim] |= fe->fixed[k] ? 1 << k % fe->dim : 0;
   for (PetscInt e = 0; e < part->n_cells; e++) {
@@ -258,6 +268,7 @@ static PetscErrorCode CutDomain(HycoReducer t, HycoROM m)
   if (m) n = m->model->mesh->n_nodes;
   PetscCall(PetscMalloc1(n, &note));
   PetscCall(FetchNotes(t, in, n, global, note));
+  /* Only rank 0 has m: the sets are of a mesh on one process. */
   HycoOnRoot(HycoComm(t), TakeSets(t, m, note));
   PetscCall(PetscFree(note));
   PetscCall(PetscFree(global));
@@ -267,6 +278,7 @@ static PetscErrorCode CutDomain(HycoReducer t, HycoROM m)
 
 PetscErrorCode HycoReducerDualSnapshots(HycoReducer t, PetscInt *n, PetscReal **S)
 {
+  /* Columns without any force would only slow down NNMF and NNLS. */
   const size_t N = (size_t)t->sizes[2];
 
   PetscFunctionBegin;
@@ -306,7 +318,9 @@ PetscErrorCode HycoTrainingAddFact(HycoTraining *r, const char name[], PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Greedy: with more modes than unknowns in A, some would have no equation. Collective; m: on rank 0. */
+/* Greedy: with more modes than unknowns in A, some would have no equation. Collective; m: on rank 0. The matrix of
+   (31), V[A]^T K[A,A+I] V[A+I], has at most the rank |A|. VtU's columns are moved to the new length from the first
+   on. */
 static PetscErrorCode LimitModes(HycoReducer t, HycoROM m)
 {
   const PetscInt dim = t->sizes[3], l = t->l, *node;
@@ -337,6 +351,7 @@ static PetscErrorCode FillModel(HycoReducer t, HycoROM m)
   char line[2 * HYCO_LINE];
 
   PetscFunctionBegin;
+  /* The points, not the columns: the region of training is theirs. */
   PetscCall(HycoSamplesGet(t->samples, &m->model->n_points, &n_par, &mu));
   m->model->l = t->l;
   HycoDuplicate(t->l, t->sigma, &m->model->sigma);
@@ -361,7 +376,9 @@ static PetscErrorCode FillModel(HycoReducer t, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fills the report from the built model; the numbers of the last iteration of a greedy training are overwritten. */
+/* Fills the report from the built model; the numbers of the last iteration of a greedy training are overwritten.
+   t->columns differs from t->samples if the bases are those of held-out points: then there is no training
+   solution. */
 static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
 {
   PetscFunctionBegin;
@@ -411,6 +428,7 @@ static PetscErrorCode CheckUseful(HycoReducer t, HycoROM m)
   char worst[HYCO_LINE] = "";
 
   PetscFunctionBegin;
+  /* `!(x < 0.5)` also refuses NaN. */
   if (!(m->model->numbers[1] < 0.5)) HycoReducerNameWorst(t, worst);
   HycoCheckModel(m->model->numbers[1] < 0.5,
                  "the model misses its own training displacements by %.0f %% on average (RID %d elements, %d modes, "
@@ -440,7 +458,8 @@ static PetscErrorCode TakeClosed(HycoReducer t, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rank 0: builds the model on its RID, without online data. */
+/* Rank 0: builds the model on its RID, without online data. The model has been set up for judging: HycoROMReset()
+   frees its online data, of which the file needs nothing, and a first prediction makes them again. */
 static PetscErrorCode BuildModel(HycoReducer t, PetscBool useful, HycoROM m, HycoTraining *report)
 {
   PetscFunctionBegin;
@@ -548,6 +567,8 @@ PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, HycoROM *model,
   *model = NULL;
   PetscCall(HycoLogEvent(HYCO_EVENT_MODEL, PETSC_TRUE));
   HycoOnRoot(HycoComm(t), BeginOnRoot(t, model));
+  /* From here on collective calls: an error is the same on every rank, and the model of rank 0 is destroyed before
+     it returns. */
   ierr = CutDomain(t, *model);
   if (!ierr) ierr = LimitModes(t, *model);
   if (!ierr) ierr = FetchOnModel(t, *model);
@@ -571,6 +592,7 @@ PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, HycoROM *model,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One write at the very end: whatever fails before it leaves a model file of an earlier run as it was. */
 PetscErrorCode HycoReducerFinish(HycoReducer t, HycoSnapshots store, const char path[], PetscBool learn,
                                  HycoTraining *report)
 {
@@ -603,6 +625,7 @@ static PetscErrorCode CheckWritable(const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The file is tried before hours of solutions; the mesh is read before the store, whose fingerprint contains it. */
 PetscErrorCode HycoReducerOpen(HycoReducer t, HycoSamples samples, const char path[], HycoSnapshots *store)
 {
   char folder[PETSC_MAX_PATH_LEN];
@@ -627,6 +650,7 @@ PetscErrorCode HycoReducerOpen(HycoReducer t, HycoSamples samples, const char pa
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Counts are copied, because the store owns them and ends here. */
 PetscErrorCode HycoReducerClose(HycoReducer t, HycoSnapshots *store)
 {
   const PetscInt *solved;
@@ -645,6 +669,7 @@ PetscErrorCode HycoReducerClose(HycoReducer t, HycoSnapshots *store)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Solved points are in the store already and cost a look at their files. */
 PetscErrorCode HycoReducerSolve(HycoReducer t, HycoSnapshots store, HycoSamples points)
 {
   const PetscReal begin = HycoNow();
@@ -676,16 +701,20 @@ static PetscErrorCode DrawHeld(HycoReducer t, PetscInt count, PetscInt together,
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->samples, &n, &n_par, NULL));
   if (count < 0) count = HeldByDefault(n);
+  /* Rank 0 decides: points drawn must be the same everywhere. */
   if (t->rank == 0) HycoSceneReaches(t->scene, reaches);
   for (PetscInt p = 0; p < n_par; p++) slow[p] = t->rank == 0 && reaches[p];
   HycoBcast(slow, n_par, MPIU_INT, HycoComm(t));
   for (PetscInt p = 0; p < n_par; p++) reaches[p] = (PetscBool)slow[p];
+  /* Whole cycles, so that a later draw begins with the same places and none is drawn twice. */
   t->drawn = (t->drawn + CYCLE - 1) / CYCLE * CYCLE;
   PetscCall(HycoSamplesUnseen(t->samples, t->drawn, count, together, reaches, held));
   t->drawn += count;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* FEW_HELD where types with modes of their own are tried first (t->few): the others come by
+   HycoReducerHoldOutMore() if those do not suffice. */
 PetscErrorCode HycoReducerHoldOut(HycoReducer t, HycoSnapshots store)
 {
   PetscInt n, m;
@@ -724,6 +753,7 @@ PetscErrorCode HycoReducerHoldOutMore(HycoReducer t, HycoSnapshots store)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* t->held is replaced before the solve, so that an error leaves a set that the reducer owns. */
 PetscErrorCode HycoReducerHoldOutFresh(HycoReducer t, HycoSnapshots store, HycoSamples *former, PetscInt *n_fresh)
 {
   HycoSamples fresh, held, others, last = t->held;
@@ -789,6 +819,8 @@ PetscErrorCode HycoReducerCheckContacts(HycoReducer t, const HycoROM type)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The order: refuse, open, let the type refuse, solve, hold out, reduce. Every step is collective; an error is
+   raised on all ranks. */
 PetscErrorCode HycoReducerRun(HycoReducer t, HycoSamples samples, const char path[], HycoTraining *training)
 {
   HycoSnapshots store;

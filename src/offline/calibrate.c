@@ -20,7 +20,8 @@
 /* The estimated errors, in the order of HycoEstimateKind. */
 static const HycoErrorKind errors[HYCO_N_ESTIMATES] = {HYCO_ERROR_U, HYCO_ERROR_SIGMA, HYCO_ERROR_LAMBDA};
 
-/* Median of the positive ones of value[0], value[stride], ..., or `otherwise`. */
+/* Median of the positive ones of value[0], value[stride], ..., or `otherwise`. Positive ones only: errors and
+   features that are exactly zero would pull a floor to zero, by which they are divided. */
 static PetscErrorCode Median(PetscInt n, const PetscReal value[], PetscInt stride, PetscReal otherwise,
                              PetscReal *median)
 {
@@ -38,7 +39,8 @@ static PetscErrorCode Median(PetscInt n, const PetscReal value[], PetscInt strid
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The median distance of a training point from the nearest other: the floor of the feature "distance". */
+/* The median distance of a training point from the nearest other: the floor of the feature "distance". Twins have
+   no distance from each other (d > 0), and count by their next neighbour. */
 static PetscErrorCode Spacing(HycoReducer t, PetscReal *spacing)
 {
   PetscInt n, n_par;
@@ -99,6 +101,7 @@ static PetscErrorCode Fit(PetscInt n, const HycoHeldOut rows[], const PetscReal 
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc3(n * p, &X, n, &y, n, &group));
+  /* Two passes put the telling ones first, as HycoUpperBound() expects. */
   for (PetscInt pass = 0; pass < 2; pass++) {
     for (PetscInt i = 0; i < n; i++) {
       if ((error[i] > least) != (pass == 0)) continue;
@@ -115,7 +118,8 @@ static PetscErrorCode Fit(PetscInt n, const HycoHeldOut rows[], const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One kind of error; no estimate if one is not finite. */
+/* One kind of error; no estimate if one is not finite. An error that is infinite (not converged, x/0) has no
+   logarithm; an estimate without it would bound less than it says. */
 static PetscErrorCode FitError(PetscInt n, const HycoHeldOut rows[], HycoEstimateKind kind, HycoEstimates *estimates)
 {
   PetscReal *error, median;
@@ -175,7 +179,8 @@ static PetscInt Least(const HycoROM m)
   return m->model->traits.uniform ? HYCO_FEW_HELD : LEAST;
 }
 
-/* Fits the formulas to converged predictions. */
+/* Fits the formulas to converged predictions. The features' floors come before the formulas, whose terms are log(1
+   + feature / floor). */
 static PetscErrorCode FitAll(HycoReducer t, PetscInt n, PetscInt least, const HycoHeldOut rows[],
                              HycoEstimates *estimates)
 {
@@ -192,7 +197,8 @@ static PetscErrorCode FitAll(HycoReducer t, PetscInt n, PetscInt least, const Hy
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The largest values of the features. */
+/* The largest values of the features. -1: unknown. With few points the largest values say nothing about what is
+   usual. */
 static void Reach(PetscInt n, PetscInt least, const HycoHeldOut rows[], PetscReal reached[])
 {
   for (PetscInt j = 0; j < HYCO_FEATURES; j++) {
@@ -210,6 +216,7 @@ static PetscErrorCode Group(HycoReducer t, HycoSamples points, PetscInt n, HycoH
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(points, NULL, &n_par, &mu));
+  /* Points of one stiffness share the error of its interpolation or modes: the formula leaves out whole groups. */
   HycoSceneReaches(t->scene, reaches);
   for (PetscInt p = 0; p < n_par; p++) n_stiff += reaches[p];
   for (PetscInt i = 0; i < n; i++) {
@@ -260,7 +267,8 @@ static PetscErrorCode NameSettings(const HycoTraining *report, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fits the formulas, and stores the errors in the model. Rank 0. */
+/* Fits the formulas, and stores the errors in the model. Rank 0. Rank 0 alone has the model's online data; the
+   caller broadcasts what other ranks report. */
 static PetscErrorCode Conclude(HycoReducer t, HycoSamples points, PetscInt n, HycoHeldOut rows[],
                                HycoOutputErrors outputs[], HycoROM m, HycoTraining *report)
 {
@@ -275,6 +283,7 @@ static PetscErrorCode Conclude(HycoReducer t, HycoSamples points, PetscInt n, Hy
   }
   estimates.force = HycoHeldOutForce(n, rows);
   PetscCall(Group(t, points, n, rows));
+  /* After Group(), whose numbers are those of all points. */
   n = KeepConverged(n, rows, outputs);
   Reach(n, Least(m), rows, estimates.reached);
   PetscCall(FitAll(t, n, Least(m), rows, &estimates));
@@ -313,12 +322,14 @@ static PetscErrorCode TrainingCorners(HycoReducer t, PetscInt most, HycoSamples 
     if (corner) at[found++] = k;
   }
   most = PetscMin(most, found);
+  /* k found / most: evenly over the list, in which the last parameter changes fastest. */
   for (PetscInt k = 0; k < most; k++) PetscCall(HycoSamplesAddPoint(*corners, mu + at[k * found / most] * n_par));
   PetscCall(PetscFree(at));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Judges at n_corners corners too: their rows follow those of the held-out points. */
+/* Judges at n_corners corners too: their rows follow those of the held-out points. They enter the largest errors,
+   not the medians: the held-out points are distributed like a user's, corners are not. */
 static PetscErrorCode JudgeCorners(HycoReducer t, HycoSamples corners, PetscInt n, PetscInt n_corners, HycoROM model,
                                    HycoSnapshots store, HycoHeldOut rows[], HycoValidation *held_out)
 {
@@ -364,7 +375,9 @@ PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, HycoROM 
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(TrainingCorners(t, t->validation || n < Least(model) ? 0 : n / CORNERS, &corners));
   PetscCall(HycoSamplesGet(corners, &n_corners, NULL, NULL));
+  /* The training points were not solved: their corners are now. */
   if (t->late && n_corners) PetscCall(HycoReducerSolve(t, store, corners));
+  /* A search over paths has kept the rows of the chosen attempt. */
   if (!rows) {
     PetscCall(PetscMalloc1(n, &rows));
     PetscCall(HycoReducerPredictHeldOut(t, t->held, model, store, NULL, rows));

@@ -32,6 +32,8 @@ static PetscReal Bound(PetscInt n, const HycoAttempt attempt[], const HycoAttemp
                                        : LITTLE * (*best)->ratio;
 }
 
+/* Continuous and increasing: 1 at the target, HYCO_MISSES at the limit, so that one number orders errors with and
+   without limits. Without a limit it stays below HYCO_MISSES. */
 PetscReal HycoAttemptsQuotient(PetscReal target, PetscReal limit, PetscReal error)
 {
   const PetscReal q = error / target, most = limit / target;
@@ -41,6 +43,7 @@ PetscReal HycoAttemptsQuotient(PetscReal target, PetscReal limit, PetscReal erro
   return q <= most ? 1 + (HYCO_MISSES - 1) * (q - 1) / (most - 1) : HYCO_MISSES * q / most;
 }
 
+/* Of equal costs the first: attempts come in the order of their kinds. */
 HycoAttempt *HycoAttemptsChoose(PetscInt n, HycoAttempt attempt[])
 {
   HycoAttempt *chosen = NULL;
@@ -60,6 +63,7 @@ PetscReal HycoAttemptsLimit(PetscInt n, const HycoAttempt attempt[], PetscReal c
   PetscReal limit = Bound(n, attempt, &by);
 
   for (PetscInt k = 0; k < n; k++) {
+    /* Below 1 all are equal: an attempt that meets the targets excludes dearer ones by its cost (MetFor()). */
     const PetscReal ratio = PetscMax(1, attempt[k].ratio);
 
     if (!Complete(&attempt[k]) || attempt[k].cost > cost || ratio >= limit) continue;
@@ -79,6 +83,8 @@ static PetscBool IsMet(PetscInt n, const HycoAttempt attempt[], PetscReal cost)
   return PETSC_FALSE;
 }
 
+/* An attempt was dropped for one that was refused later (scan, own training solutions): nothing excludes it any
+   more. Each is reopened once. */
 HycoAttempt *HycoAttemptsReopen(PetscInt n, HycoAttempt attempt[])
 {
   PetscInt beaten;

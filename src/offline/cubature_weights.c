@@ -12,7 +12,8 @@
 #include <hycoalgorithms.h>
 #include <hycoreducerimpl.h>
 
-/* Gathers column j of A (rows distributed) on rank 0. Collective. */
+/* Gathers column j of A (rows distributed) on rank 0. Collective. A column at a time: A may have hundreds, and
+   rank 0 takes them into one array. */
 static PetscErrorCode GatherColumn(Mat A, PetscInt j, PetscReal column[])
 {
   const PetscScalar *value;
@@ -38,7 +39,8 @@ static PetscErrorCode GatherColumn(Mat A, PetscInt j, PetscReal column[])
 /* Data of a cell: its volume, 0 if its weight is fixed to 1; its body; whether its weight is fixed to 1. */
 #define N_NOTES 3
 
-/* By cell of the part. */
+/* By cell of the part. Volumes of fixed cells are 0: they contribute the same to both sides of the body's
+   equation. */
 static PetscErrorCode FillNotes(HycoFE fe, const PetscBool near[], PetscReal value[])
 {
   const PetscInt n = fe->mesh->n_cells;
@@ -94,6 +96,7 @@ static void FillSystem(PetscInt n_cells, PetscInt n, const PetscReal vectors[], 
     PetscReal size = 0;
 
     b[i] = 0;
+    /* Volumes over their 2-norm: rows of length 1, as the singular vectors have. */
     for (PetscInt e = 0; e < n_cells && i >= n; e++) size += (PetscInt)body[e] == i - n ? volume[e] * volume[e] : 0;
     for (PetscInt e = 0; e < n_cells; e++) {
       PetscReal *a = A + (size_t)e * (size_t)m + (size_t)i;
@@ -137,6 +140,7 @@ static void Measure(PetscInt n_cells, PetscInt n, const PetscReal vectors[], con
   }
 }
 
+/* A monitor of NNLS: k cells so far. */
 static PetscErrorCode ShowCells(void *ctx, PetscInt k, PetscInt most)
 {
   PetscFunctionBegin;
@@ -150,6 +154,7 @@ static PetscErrorCode FindWeights(HycoReducer t, PetscReal fixed, PetscReal tol,
 {
   const PetscInt n_cells = t->sizes[1], n_bodies = t->scene->n_bodies;
   const PetscReal *volume = notes, *body = notes + n_cells, *near = notes + 2 * n_cells;
+  /* The POD's energy is a square, tol an error: tol^2 of the energy may be left. */
   const PetscInt leading = HycoPODRank(n, sigma, tol * tol, t->noise, 0), m = leading + n_bodies;
   PetscReal *A, *b;
 

@@ -33,11 +33,13 @@ static PetscErrorCode AddCorners(HycoReducer t, HycoSamples samples)
   HycoCheck(n_par <= 8, "the parameters' ranges have 2^%d corners; give the greedy training points to start from",
             (int)n_par);
   for (PetscInt p = 0; p < n_par; p++) counts[p] = 2;
+  /* Two values each, ends included. (42) then interpolates in the whole box. */
   PetscCall(HycoSamplesAddGrid(samples, counts, PETSC_TRUE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Creates the loop's own set of samples, which will grow: each point once. */
+/* Creates the loop's own set of samples, which will grow: each point once. Its own copy, because the loop adds
+   points; (42) needs distinct points. */
 static PetscErrorCode Start(HycoReducer t, HycoSamples start, HycoSamples *samples)
 {
   PetscInt n, n_par;
@@ -87,12 +89,14 @@ static PetscErrorCode CheckStart(HycoReducer t, PetscBool corners, HycoSamples s
             "the greedy training starts from %d point%s, and its indicator interpolates over %d parameters, which "
             "needs at least %d; give more points, or none (the corners are used)",
             (int)n, n == 1 ? "" : "s", (int)n_par, (int)n_par + 1);
+  /* Tried and destroyed: it fails for points on a line or plane, before any solve. */
   PetscCall(HycoInterpolantCreate(n_par, n, mu, &interpolant));
   PetscCall(HycoInterpolantDestroy(&interpolant));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves missing points, makes the bases and the model. The mesh is kept from one iteration to the next. */
+/* Solves missing points, makes the bases and the model. The mesh is kept from one iteration to the next. Bases and
+   model are made anew: an added solution changes all modes. Solved points are taken from the store. */
 static PetscErrorCode BuildModel(HycoReducer t, Loop *loop, PetscInt iteration, HycoTraining *report)
 {
   PetscFunctionBegin;
@@ -130,7 +134,8 @@ static PetscReal Infinite(PetscReal value)
   return value >= PETSC_INFINITY ? INFINITY : value;
 }
 
-/* Evaluates this rank's share of the training points. */
+/* Evaluates this rank's share of the training points. Not collective: points are dealt out in turn, and each value
+   does not depend on earlier ones (no warm start). */
 static PetscErrorCode EvaluateShare(HycoReducer t, Loop *loop, HycoROM m, const PetscReal U_at[])
 {
   const PetscReal length = HycoMeshLength(t->fom->part);
@@ -168,6 +173,7 @@ static PetscErrorCode Evaluate(HycoReducer t, Loop *loop)
   if (HycoIndicatorInterpolates(t->greedy.indicator)) PetscCall(SpreadSnapshots(t, m, &U_at));
   PetscCall(PetscArrayzero(loop->value, 4 * loop->n_points));
   HycoOnEach(HycoComm(t), EvaluateShare(t, loop, m, U_at));
+  /* Others' entries are 0. Infinite ones stay so in the sum. */
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, loop->value, count, MPIU_REAL, MPI_SUM, HycoComm(t)));
   PetscCall(PetscFree(U_at));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -186,6 +192,7 @@ static PetscErrorCode EvaluateModel(HycoReducer t, Loop *loop, PetscInt iteratio
   if (t->greedy.keep || whole) PetscCall(HycoROMSave(loop->model, t->fom, t->l, t->V, path));
   if (whole) PetscCall(PetscStrncpy(loop->model->model->path, path, sizeof(loop->model->model->path)));
   ierr = Evaluate(t, loop);
+  /* With an error too: it was written to be read by Evaluate() alone. */
   if (whole && !t->greedy.keep && t->rank == 0) remove(path);
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -199,7 +206,8 @@ static PetscBool Worse(const PetscReal a[], const PetscReal b[])
   return (PetscBool)(PetscIsInfReal(b[by]) ? PETSC_FALSE : a[by] > b[by] * (1 + TIE));
 }
 
-/* Distance from training point k to the nearest solution. */
+/* Distance from training point k to the nearest solution. Scaled to the ranges; only orders points, so that an
+   error of HycoSamplesGet(), which has none here, gives 0. */
 static PetscReal Distance(HycoReducer t, const Loop *loop, PetscInt k)
 {
   const PetscReal *solved;
@@ -257,6 +265,7 @@ static PetscErrorCode Choose(HycoReducer t, Loop *loop, PetscInt *worst, HycoGre
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* NULL: go on. The order matters for what is reported: a target that is met counts before a limit. */
 static const char *WhyStop(HycoReducer t, const HycoGreedyStep *step)
 {
   if (step->max_eta <= t->greedy.target) return "target";
@@ -326,7 +335,8 @@ static PetscErrorCode SetSettings(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Builds the model from the chosen solutions, and judges it by held-out ones. */
+/* Builds the model from the chosen solutions, and judges it by held-out ones. The held-out points are drawn now,
+   apart from the solutions that the loop has chosen. */
 static PetscErrorCode Conclude(HycoReducer t, Loop *loop, const char path[], HycoTraining *report)
 {
   const PetscBool learn = (PetscBool)(t->search && t->n_validation && t->scene->n_parameters);
@@ -341,7 +351,7 @@ static PetscErrorCode Conclude(HycoReducer t, Loop *loop, const char path[], Hyc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Iterates until the loop ends. */
+/* Iterates until the loop ends. The last model is destroyed here: the final one is built with other settings. */
 static PetscErrorCode RunLoop(HycoReducer t, Loop *loop, HycoTraining *report)
 {
   PetscBool last = PETSC_FALSE;

@@ -49,6 +49,8 @@ PetscBool HycoIndicatorOnWhole(HycoIndicatorKind kind)
   return (PetscBool)(kind == HYCO_INDICATOR_RESIDUAL);
 }
 
+/* Reconstruction of forces outside the RID is off, except for residuals: (43) compares in A_lambda only, and (45)
+   displacements. */
 PetscErrorCode HycoIndicatorCreate(HycoROM model, HycoIndicatorKind kind, PetscInt n, const PetscReal points[],
                                    const PetscReal U_at[], PetscReal length, HycoIndicator *indicator)
 {
@@ -127,7 +129,8 @@ static PetscErrorCode SetUp(HycoIndicator d)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Assembles the norm of H1 on A if the nodes have moved. */
+/* Assembles the norm of H1 on A if the nodes have moved. By a hash of the coordinates: parameters that do not move
+   nodes leave M and its factor. */
 static PetscErrorCode AssembleNorm(HycoIndicator d)
 {
   HycoROM m = d->model;
@@ -159,6 +162,7 @@ static PetscErrorCode Interpolate(HycoIndicator d, const PetscReal mu[])
   PetscCall(ISGetLocalSize(d->local.is_I, &n_I));
   PetscCall(ISGetIndices(d->local.is_I, &dof));
   for (PetscInt i = 0; i < n_I; i++) {
+    /* Rows of U_at are unknowns, so that the sum over snapshots is contiguous. */
     for (PetscInt k = 0; k < d->n; k++) u[dof[i]] += d->weight[k] * d->U_at[(size_t)dof[i] * (size_t)d->n + (size_t)k];
   }
   PetscCall(ISRestoreIndices(d->local.is_I, &dof));
@@ -180,6 +184,7 @@ static PetscErrorCode SolveLocal(HycoIndicator d, HycoReason *reason)
     PetscCall(MatDestroy(&d->B));
     PetscCall(MatDestroy(&d->Bt));
     PetscCall(MatCreateSubMatrix(y->K, y->is_A, y->is_A, MAT_INITIAL_MATRIX, &d->K));
+    /* K[A,A] with the interface prescribed is definite: I holds the RID. */
     PetscCall(MatSetOption(d->K, MAT_SPD, PETSC_TRUE));
   }
   if (m->m && !same) {
@@ -188,6 +193,7 @@ static PetscErrorCode SolveLocal(HycoIndicator d, HycoReason *reason)
   }
   PetscCall(MatMult(y->K, d->interface, d->whole)); /* F[A] - K[A,I] U_I, D - B[:,I] U_I */
   PetscCall(VecAYPX(d->whole, -1, y->F));
+  /* SCATTER_REVERSE: from the long vector to that of the index set. */
   PetscCall(VecISCopy(d->whole, y->is_A, SCATTER_REVERSE, d->F_A));
   if (m->m) {
     PetscCall(MatMult(y->B, d->interface, d->gap));
@@ -214,7 +220,8 @@ static PetscErrorCode NormOfDisplacement(HycoIndicator d, Vec v, PetscReal *norm
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* |L| in the dual of H1 on A: of the functional v -> L . B v. */
+/* |L| in the dual of H1 on A: of the functional v -> L . B v. sqrt((B^T L) . M^-1 (B^T L)), by one solve with the
+   factor of M on A. */
 static PetscErrorCode NormOfForce(HycoIndicator d, Vec L, PetscReal *norm)
 {
   PetscScalar square;
@@ -237,6 +244,7 @@ static PetscErrorCode Distances(HycoIndicator d, HycoIndication *v)
   PetscInt n_A;
 
   PetscFunctionBegin;
+  /* The norm of the local solution first: x becomes the difference. */
   PetscCall(NormOfDisplacement(d, d->x, &size));
   PetscCall(VecGetArray(d->x, &a));
   PetscCall(ISGetLocalSize(d->local.is_A, &n_A));
@@ -269,6 +277,7 @@ static PetscReal Penetration(HycoROM m)
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
     const PetscReal deep = HycoROMAddRow(m, k, -m->rows.gap[k]);
 
+    /* B V gamma - D, positive where the contact penetrates. */
     if (deep > 0) sum += deep * deep;
   }
   return PetscSqrtReal(sum);
@@ -305,6 +314,7 @@ static PetscErrorCode EvaluateResidual(HycoIndicator d, HycoIndication *v)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whatever is not solved gets infinity in all four: HycoIndication.size then orders by distance (greedy.c). */
 PetscErrorCode HycoIndicatorEvaluate(HycoIndicator d, const PetscReal mu[], HycoIndication *v)
 {
   HycoROM m = d->model;

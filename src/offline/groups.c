@@ -9,6 +9,7 @@ static PetscErrorCode ReadGroups(MPI_Comm comm, PetscOptions options, PetscInt *
 {
   PetscFunctionBegin;
   PetscOptionsBegin(comm, NULL, "HycoSnapshots", NULL);
+  /* PetscOptionsBegin() takes the global database; a scene may have its own. */
   PetscOptionsObject->options = options;
   PetscCall(HycoOptionsInt(
       "-hyco_groups",
@@ -21,6 +22,7 @@ static PetscErrorCode ReadGroups(MPI_Comm comm, PetscOptions options, PetscInt *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For the table of options: reads into variables that nobody uses. */
 PetscErrorCode HycoSnapshotsDeclare(PetscOptions options)
 {
   PetscInt groups = 0;
@@ -47,11 +49,14 @@ PetscErrorCode HycoSnapshotsChooseGroups(MPI_Comm comm, HycoScene scene, PetscIn
   if (*groups) PetscFunctionReturn(PETSC_SUCCESS);
   *groups = PetscMax(1, PetscMin((PetscInt)size, n));
   if (stat(scene->mesh_path, &info) == 0) {
+    /* An estimate from the mesh file's size, eightfold with each refinement: a group takes about 400 times the
+       file. All groups may take half of the memory. */
     const double factor = 400.0 * (double)info.st_size * (double)((size_t)1 << 3 * scene->refine),
                  memory = (double)sysconf(_SC_PHYS_PAGES) * (double)sysconf(_SC_PAGE_SIZE);
 
     while (*groups > 1 && *groups * factor > memory / 2) (*groups)--;
   }
+  /* Nodes of a cluster may have other memory: rank 0 decides. */
   PetscCallMPI(MPI_Bcast(groups, 1, MPIU_INT, 0, comm));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -93,11 +98,13 @@ PetscErrorCode HycoSnapshotsCreateQueue(MPI_Comm comm, HycoScene scene, PetscInt
   PetscCall(PetscMalloc1(n, &kind));
   HycoOnRoot(comm, FindKinds(scene, n_par, mu, n, list, kind));
   HycoBcast(kind, n, MPIU_INT, comm);
+  /* Points of one kind go to one group as far as possible, which keeps the factor. */
   PetscCall(HycoQueueCreate(comm, groups, n, kind, queue));
   PetscCall(PetscFree(kind));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Read when solves begin, after the program has set its options. */
 PetscErrorCode HycoSnapshotsReadMonitor(HycoSnapshots s)
 {
   PetscInt groups = 0;
@@ -121,6 +128,7 @@ PetscErrorCode HycoSnapshotsNote(HycoSnapshots s, HycoQueue queue, const char fo
   if (!s->monitor) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoQueueGetGroup(queue, &group));
   PetscCallMPI(MPI_Comm_rank(group, &rank));
+  /* One line for each group. The number orders lines of groups that print at the same time. */
   if (rank) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoQueueNumber(queue, &number, &color));
   va_start(args, format);

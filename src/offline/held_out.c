@@ -18,7 +18,8 @@ typedef struct {
 
 static const char *const fields[HYCO_COMPARED] = {"U", "sigma", "inelastic"};
 
-/* Reads a solution; step: the listed time, with a history. */
+/* Reads a solution; step: the listed time, with a history. Each rank its rows of the fields; all ranks have the
+   file open. */
 static PetscErrorCode Read(Rows *r, const PetscReal mu[], PetscInt step)
 {
   HycoComparison *c = &r->c;
@@ -30,7 +31,8 @@ static PetscErrorCode Read(Rows *r, const PetscReal mu[], PetscInt step)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The comparison on the RID, on the predicting process. */
+/* The comparison on the RID, on the predicting process. Only where the prediction was made: the model's mesh and
+   its contacts are on one process. Forces' errors stay absolute until the largest of all points is known. */
 static PetscErrorCode CompareRID(Rows *r, const PetscReal mu[], HycoHeldOut *row)
 {
   HycoROM m = r->m;
@@ -56,7 +58,7 @@ static PetscErrorCode CompareRID(Rows *r, const PetscReal mu[], HycoHeldOut *row
 }
 
 /* The squares of the displacement's error, and of the solution, over the whole mesh; and the solution on the RID.
-   Collective. */
+   Collective. The part's fe is moved to mu: its lifting and supports are those of the point. */
 static PetscErrorCode MeasureU(Rows *r, const PetscReal mu[], PetscInt step, PetscMPIInt of, PetscReal square[2])
 {
   HycoReducer t = r->t;
@@ -107,6 +109,7 @@ static PetscErrorCode ConcludePath(HycoROM m, PetscInt n, const HycoLost lost[],
                                                          : 0,
                     by = force > 0 ? force : 1;
 
+    /* HycoPathErrors divides by the path's own forces; here that is taken back. */
     row->error[j] = e.worst[j] * by;
     row->end[j] = e.end[j] * by;
   }
@@ -123,11 +126,13 @@ static PetscErrorCode ComparePath(Rows *r, const PetscReal mu[], PetscMPIInt of,
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Bcast(&n, 1, MPIU_INT, of, HycoComm(r->t)));
+  /* A path that ended early was compared as far as it came. */
   n = PetscMin(n, r->t->scene->n_times);
   PetscCall(PetscCalloc1(n * HYCO_N_ERRORS, &lost));
   for (PetscInt k = 0; k < n; k++) {
     PetscReal square[2];
 
+    /* An error of the one rank that predicts must end the comparison on all. */
     HycoOnEach(HycoComm(r->t), mine ? HycoROMSetStep(r->m, k) : PETSC_SUCCESS);
     PetscCall(MeasureU(r, mu, k, of, square));
     HycoOnEach(HycoComm(r->t), mine ? MeasureStep(r, mu, k, square, lost + k * HYCO_N_ERRORS) : PETSC_SUCCESS);
@@ -149,6 +154,7 @@ static PetscErrorCode Compare(Rows *r, const PetscReal mu[], PetscMPIInt of, Hyc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The steps are reset also after an error: they are borrowed from `taken`, which is freed here. */
 PetscErrorCode HycoHeldOutPredict(HycoROM m, HycoSnapshots store, const PetscReal mu[])
 {
   PetscReal *taken = NULL;
@@ -217,6 +223,7 @@ static PetscErrorCode PredictPoints(Rows *r, HycoHeldOut rows[])
   PetscCall(HycoSamplesGet(r->points, &n, &n_par, &mu));
   PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
   PetscCall(PetscMPIIntCast(n * (PetscInt)(sizeof(*rows) / sizeof(PetscReal)), &count));
+  /* Blocks of neighbours: they share a stiffness, whose factor the rank keeps. */
   first = t->rank * n / size;
   last = (t->rank + 1) * n / size;
   for (PetscInt step = 0; step * size < n + size; step++) {
@@ -224,12 +231,14 @@ static PetscErrorCode PredictPoints(Rows *r, HycoHeldOut rows[])
 
     HycoOnEach(HycoComm(t), k < last ? Predict(r->m, r->store, mu + k * n_par, 0, &rows[k]) : PETSC_SUCCESS);
     for (PetscMPIInt of = 0; of < size; of++) {
+      /* Every rank compares every point: its rows of the whole mesh. */
       const PetscInt j = of * n / size + step;
 
       if (j < (of + 1) * n / size) PetscCall(Compare(r, mu + j * n_par, of, &rows[j]));
     }
   }
   HycoOnEach(HycoComm(t), PredictAgain(r->m, r->store, first, last, mu, rows));
+  /* HycoHeldOut consists of PetscReal alone; rows of other ranks are 0 here. */
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, rows, count, MPIU_REAL, MPI_SUM, HycoComm(t)));
   GuardStress(n, rows);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -264,6 +273,7 @@ static PetscErrorCode PredictPaths(Rows *r, HycoHeldOutRace *race, HycoHeldOut r
                    mine = t->rank < here ? point[t->rank] : -1;
 
     HycoOnRoot(HycoComm(t), HycoReducerTell(t, "held-out paths", race->n, n));
+    /* As many paths at once as ranks; those after a lost one were predicted in vain. */
     HycoOnEach(HycoComm(t), mine < 0 ? PETSC_SUCCESS : Predict(r->m, r->store, mu + mine * n_par, 0, &rows[mine]));
     for (PetscMPIInt of = 0; of < here; of++) {
       HycoHeldOut *row = &rows[point[of]];
@@ -281,7 +291,7 @@ static PetscErrorCode PredictPaths(Rows *r, HycoHeldOutRace *race, HycoHeldOut r
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All of them, in their order. */
+/* All of them, in their order. A race without an end, in the order of the points. */
 static PetscErrorCode PredictAllPaths(Rows *r, PetscInt n, HycoHeldOut rows[])
 {
   HycoHeldOutRace race = {.all = PETSC_TRUE};
@@ -339,6 +349,7 @@ PetscReal HycoHeldOutError(const HycoHeldOut *row, HycoErrorKind kind, PetscReal
   return Divided(row, kind, force, row->error[kind]);
 }
 
+/* Infinite errors make the mean infinite, the median of the others stays. */
 PetscErrorCode HycoHeldOutSummarise(PetscInt n, const HycoHeldOut rows[], PetscReal force, HycoValidation *v)
 {
   PetscReal *error;

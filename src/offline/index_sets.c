@@ -8,7 +8,8 @@ typedef struct {
   PetscInt n, *sets;     /* of the reduced mesh, as in HycoRIDSets() */
 } Sets;
 
-/* The nodes of contact k: j = -1 the slave, then its masters. */
+/* The nodes of contact k: j = -1 the slave, then its masters. `rows` of a moved contact lists it once for each set
+   of masters. */
 static PetscInt ContactNode(const HycoPairs *pairs, PetscInt k, PetscInt j)
 {
   return j < 0 ? pairs->slave[k] : pairs->master[pairs->master_start[k] + j];
@@ -33,6 +34,7 @@ static void CloseIncomplete(const Sets *s)
 
     for (PetscInt j = -1; j < masters; j++) missing = (PetscBool)(missing || *SetsOf(s, k, j) == 0);
     for (PetscInt j = -1; missing && j < masters; j++) {
+      /* Nodes outside the RID (0) stay outside: the interface is part of it. */
       if (*SetsOf(s, k, j) == 2) *SetsOf(s, k, j) = 1;
     }
   }
@@ -62,6 +64,7 @@ static PetscErrorCode CloseDependent(const Sets *s, PetscInt *lost)
     if (masters == 1 && !taken[SetsOf(s, k, 0) - s->sets] && !HycoPairsMoved(s->pairs, k))
       taken[SetsOf(s, k, 0) - s->sets] = PETSC_TRUE;
     else {
+      /* Collected first, applied after the loop: the result does not depend on the order of contacts. */
       for (PetscInt j = 0; j < masters; j++) close[SetsOf(s, k, j) - s->sets] = (PetscBool)(*SetsOf(s, k, j) == 2);
     }
   }
@@ -105,6 +108,8 @@ static void FindMovedContacts(HycoFE fe, const Sets *s, const PetscInt of[], Pet
   }
 }
 
+/* The order is that of the definitions: incomplete contacts join I, then masters that would make B rank deficient,
+   as long as that makes others so; A_lambda follows from the A that is left. */
 PetscErrorCode HycoRIDSets(HycoFE fe, HycoPairs *pairs, const HycoPairs *rows, const PetscInt of[],
                            const PetscInt index[], PetscInt n, PetscInt sets[], PetscInt in_rid[])
 {

@@ -13,6 +13,7 @@ static void SnapshotErrors(HycoReducer t, HycoROM m, PetscInt k, PetscReal *u, P
   PetscReal sum, lost = 0, size = 0;
 
   sum = t->U_norm[k] * t->U_norm[k];
+  /* |U - V gamma|^2 = |U|^2 - |c|^2 + |gamma - c|^2 with c = V^T U and orthonormal V: no loop over the mesh. */
   for (PetscInt j = 0; j < t->l; j++) sum += (m->gamma[j] - c[j]) * (m->gamma[j] - c[j]) - c[j] * c[j];
   for (PetscInt f = 0; f < m->model->n_fe; f++) {
     const PetscInt dof = m->model->fe_dof[f];
@@ -20,6 +21,7 @@ static void SnapshotErrors(HycoReducer t, HycoROM m, PetscInt k, PetscReal *u, P
     PetscReal by_modes = 0;
 
     for (PetscInt j = 0; j < m->model->l; j++) by_modes += m->model->V[dof * m->model->l + j] * m->gamma[j];
+    /* Unknowns kept full order have their own values instead of the modes'. */
     sum += (m->U[dof] - exact) * (m->U[dof] - exact) - (by_modes - exact) * (by_modes - exact);
   }
   *u = t->U_norm[k] > 0 ? PetscSqrtReal(PetscMax(sum, 0)) / t->U_norm[k] : 0;
@@ -54,13 +56,15 @@ static PetscErrorCode PathErrors(HycoReducer t, HycoROM m, PetscInt k, PetscReal
     SnapshotErrors(t, m, first + j, &eu, &el);
     if (size[0] > 0) *u = PetscMax(*u, eu * t->U_norm[first + j] / PetscMax(t->U_norm[first + j], 0.1 * size[0]));
     if (force[j] > 0) el *= force[j] / PetscMax(force[j], HYCO_SMALL_FORCE * size[1]);
+    /* Without a force in the path's solution at this time there is nothing to compare with. */
     if (force[j] > 0) *lambda = PetscMax(*lambda, el);
   }
   PetscCall(PetscFree(force));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Evaluates the current model at training point k. */
+/* Evaluates the current model at training point k. A failure counts as HYCO_JUDGED_WORST, so that means stay
+   finite and comparable. `solved` is for the message. */
 static PetscErrorCode JudgeSample(HycoReducer t, HycoROM m, PetscInt k, const PetscReal mu[], HycoJudged *j)
 {
   const PetscBool path = (PetscBool)(m->model->scene->n_times > 0);
@@ -112,7 +116,8 @@ static PetscErrorCode JudgeAll(HycoReducer t, HycoROM m, PetscReal most, HycoJud
 #define RACED 3
 
 /* Predicts the training paths one by one, and stops when this model has lost: its sum of errors reaches that of the best
-   settings over all paths, or, from RACED paths on, theirs over the same paths. */
+   settings over all paths, or, from RACED paths on, theirs over the same paths. A mean over all paths is compared,
+   so that the sum may stop as soon as it is reached: errors are not negative. */
 static PetscErrorCode Race(HycoReducer t, HycoROM m, PetscInt n, const PetscInt order[], const HycoJudged best[],
                            PetscReal most, HycoJudged judged[], PetscBool *lost)
 {
@@ -167,6 +172,8 @@ PetscErrorCode HycoReducerJudgeMeans(HycoReducer t, HycoROM m, PetscReal most, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* An attempt of a search is judged by held-out points: its training errors would cost as much again. -1: not
+   known. */
 PetscErrorCode HycoReducerJudge(HycoReducer t, HycoROM m)
 {
   PetscInt n;
@@ -187,6 +194,7 @@ PetscErrorCode HycoReducerJudge(HycoReducer t, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rank 0. Not an error without a monitor. */
 PetscErrorCode HycoReducerTell(HycoReducer t, const char what[], PetscInt done, PetscInt n)
 {
   char phase[2 * HYCO_LINE];

@@ -47,7 +47,9 @@ static PetscErrorCode GatherCells(HycoReducer t, HycoMesh *mesh, PetscBool **bal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Makes the model's output cells from these cells and the modes at their nodes. Collective; m: on rank 0. */
+/* Makes the model's output cells from these cells and the modes at their nodes. Collective; m: on rank 0. In
+   training there is no file with the whole mesh: the model gets the cells and modes that it would read from it.
+   HycoROMSetOutputCells() takes the arrays over. */
 static PetscErrorCode MakeProbe(HycoReducer t, HycoROM m)
 {
   HycoMesh mesh, loaded;
@@ -85,7 +87,8 @@ static PetscInt Places(const Outputs *o, int k, const PetscInt **at)
   return k == STRESS ? o->fe->mesh->n_cells : o->fe->mesh->n_nodes;
 }
 
-/* The ranges of rows of each field that the outputs' cells need: only these are read from the snapshots. */
+/* The ranges of rows of each field that the outputs' cells need: only these are read from the snapshots. Rows from
+   the first to the last that is needed, one read for each field: outputs are often at one place of the mesh. */
 static PetscErrorCode Begin(Outputs *o)
 {
   PetscFunctionBegin;
@@ -107,6 +110,7 @@ static PetscErrorCode Begin(Outputs *o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* After an error too. The friction of the last shown time returns to the contacts, which borrowed o->shear. */
 static PetscErrorCode End(Outputs *o)
 {
   PetscFunctionBegin;
@@ -124,6 +128,7 @@ static PetscErrorCode ReadField(Outputs *o, const PetscReal mu[], PetscInt step,
 
   PetscFunctionBegin;
   *has = PETSC_TRUE;
+  /* Files of earlier versions have none. */
   if (k == REACTION) PetscCall(HycoSnapshotsHas(o->store, mu, step, fields[k], has));
   if (!*has) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoSnapshotsReadRows(o->store, mu, step, fields[k], o->first[k] * width, o->n[k] * width, o->rows[k]));
@@ -141,6 +146,7 @@ static PetscErrorCode ReadFriction(Outputs *o, const PetscReal mu[], PetscInt st
   if (!HycoSceneHasFriction(o->m->model->scene)) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt c = 0; c < HYCO_SNAPSHOT_FRICTION; c++) {
     PetscCall(HycoSnapshotsReadRows(o->store, mu, step, HycoSnapshotFriction[c], 0, n, o->lambda));
+    /* o->lambda serves as room for each component. */
     for (PetscInt k = 0; k < n; k++) *(c < 3 ? o->shear.force + 3 * k + c : o->shear.work + k) = o->lambda[k];
   }
   HycoTraceShowOther(o->m, &o->shear);
@@ -201,6 +207,7 @@ static PetscErrorCode JudgeOne(Outputs *o, const PetscReal mu[], HycoOutputError
     for (PetscInt q = 0; q < n_q; q++) {
       const PetscReal error = PetscAbsReal(found[q] - value[q]), size = PetscAbsReal(value[q]);
 
+      /* A comparison with NaN is false: it must be kept by name. */
       e->error[q] = error > e->error[q] || PetscIsInfOrNanReal(error) ? error : e->error[q];
       e->size[q] = size > e->size[q] || PetscIsInfOrNanReal(size) ? size : e->size[q];
     }

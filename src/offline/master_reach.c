@@ -32,6 +32,7 @@ static PetscErrorCode SurfacesDestroy(Surfaces *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Slave and master of each contact that follows its master; pairs->room 0: no surface moves. */
 PetscErrorCode HycoMovedGroups(HycoScene scene, HycoMesh m, const HycoPairs *pairs, PetscInt *n, PetscInt group[])
 {
   PetscFunctionBegin;
@@ -61,13 +62,15 @@ static PetscErrorCode CutSurfaces(HycoScene scene, HycoMesh whole, const HycoPai
   for (PetscInt i = 0; i < whole->n_nodes; i++) {
     if (on[i]) extra[n_extra++] = i;
   }
+  /* No cell, all facets of the groups. */
   PetscCall(HycoSubmesh(scene, whole, 0, NULL, n_extra, extra, n_groups, group, mesh));
   PetscCall(PetscFree(on));
   PetscCall(PetscFree2(group, extra));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The moved contacts on a mesh of their surfaces, which is moved to many parameter values at little cost. */
+/* The moved contacts on a mesh of their surfaces, which is moved to many parameter values at little cost. One fe
+   for thousands of parameter values: a full one would evaluate laws and loads each time. */
 static PetscErrorCode SurfacesCreate(HycoScene scene, HycoMesh whole, const HycoPairs *all, Surfaces *s)
 {
   PetscInt *index, n = 0;
@@ -98,7 +101,8 @@ static PetscReal Way(const Surfaces *s, PetscInt k)
   return HycoLength(r);
 }
 
-/* The longest edge of a group's facets, as drawn. */
+/* The longest edge of a group's facets, as drawn. An edge of nf nodes in a cycle; of facets of second order half
+   edges, or diagonals. */
 static PetscReal LongestEdge(HycoMesh m, PetscInt group)
 {
   PetscReal longest = 0;
@@ -125,6 +129,7 @@ PetscErrorCode HycoMetReach(HycoScene scene, HycoMesh whole, const HycoPairs *pa
     for (PetscInt k = 0; k < s.pairs.n; k++) {
       const PetscInt c = s.pairs.contact[k];
 
+      /* Only contacts that carry a force: others may be at any distance. */
       if (Lambda[(size_t)q * (size_t)pairs->n + (size_t)s.of[k]] > 0 && !HycoPairsAlone(scene, &s.pairs, k))
         reach[c] = PetscMax(reach[c], Way(&s, k));
     }
@@ -133,6 +138,7 @@ PetscErrorCode HycoMetReach(HycoScene scene, HycoMesh whole, const HycoPairs *pa
     PetscInt g = 0;
 
     if (reach[c] < 0) {
+      /* No solution closes it: nothing is known, and nothing is left out. */
       reach[c] = PETSC_MAX_REAL;
       continue;
     }
@@ -164,6 +170,7 @@ static PetscErrorCode Note(const HycoPairs *p, Lists *l, PetscInt *grown)
 
     HycoPairsMasters(p, k, &n, &node, &weight);
     if (!n) continue;
+    /* Few sets for each slave: a linear search of its list. */
     for (; r >= 0 && !same; r = l->row[r].next) {
       same = (PetscBool)(l->row[r].n == n);
       for (PetscInt a = 0; a < n && same; a++) same = (PetscBool)(l->node[l->row[r].first + a] == node[a]);
@@ -212,7 +219,8 @@ static PetscBool Moves(HycoScene scene, PetscInt p)
   return moves;
 }
 
-/* Adds points of the ranges, in the parameters that move something; the others as in mu. */
+/* Adds points of the ranges, in the parameters that move something; the others as in mu. A Halton sequence in the
+   parameters that move bodies; it ends when FRUITLESS points give no new master. */
 static PetscErrorCode NoteBetween(Surfaces *s, HycoScene scene, const PetscReal mu[], Lists *l)
 {
   const PetscInt n_par = scene->n_parameters;
@@ -262,6 +270,7 @@ static PetscErrorCode Collect(const Surfaces *s, const HycoPairs *pairs, const L
     for (PetscInt r = moved ? l->head[at] : -1; r >= 0; r = l->row[r].next) {
       for (PetscInt a = 0; a < l->row[r].n; a++) {
         node[a] = s->node[l->node[l->row[r].first + a]];
+        /* Weights do not matter for the RID: only which nodes a row may read. */
         shares[a] = 1 / (PetscReal)l->row[r].n;
       }
       met->of[out->n] = k;
@@ -273,6 +282,8 @@ static PetscErrorCode Collect(const Surfaces *s, const HycoPairs *pairs, const L
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Training points first, which are certain to be visited; met->of: the contact of each row, since a moved one has
+   several. */
 PetscErrorCode HycoMetFind(HycoScene scene, HycoMesh whole, const HycoPairs *pairs, PetscInt n, const PetscReal mu[],
                            const PetscReal reach[], HycoMet *met)
 {

@@ -17,6 +17,7 @@ PetscErrorCode HycoReducerSetColumns(HycoReducer t, HycoSamples columns)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Columns are ordered sample by sample, and within a sample by listed time. */
 PetscErrorCode HycoReducerColumn(HycoReducer t, PetscInt k, PetscReal mu[])
 {
   const PetscInt n_steps = HycoSnapshotsSteps(t->scene);
@@ -51,6 +52,7 @@ static PetscErrorCode RemoveLifting(HycoReducer t, Mat S)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* `divide`: rows of a basis to their node or cell. One entry is kept free, for a list that is never NULL. */
 static PetscErrorCode AddSeeds(PetscInt n, const PetscInt add[], PetscInt divide, PetscInt *n_seeds, PetscInt **seeds)
 {
   PetscFunctionBegin;
@@ -59,6 +61,8 @@ static PetscErrorCode AddSeeds(PetscInt n, const PetscInt add[], PetscInt divide
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The product is small and needed whole: X^T Y is distributed by its rows, and MatCreateRedundantMatrix() gives it
+   to every rank. */
 PetscErrorCode HycoReducerMultiply(HycoReducer t, Mat X, Mat Y, PetscReal product[])
 {
   Mat P, whole = NULL;
@@ -93,6 +97,8 @@ PetscErrorCode HycoReducerGetDisplacements(HycoReducer t, HycoSnapshots store, M
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Without the lifting modes vanish where displacements are fixed, so that U = r(u0) + V gamma meets any prescribed
+   values (30). */
 PetscErrorCode HycoReducerReadField(HycoReducer t, HycoSnapshots store, PetscInt kind, PetscInt first, PetscInt n,
                                     Mat *S)
 {
@@ -119,6 +125,7 @@ PetscErrorCode HycoReducerCreateSVD(HycoReducer t, MPI_Comm comm, SVD *svd)
   PetscCall(HycoPODCreateSVD(comm, svd));
   PetscCall(SVDSetType(*svd, t->svd_type));
   PetscCall(PetscObjectGetOptionsPrefix((PetscObject)t, &prefix));
+  /* -hyco_pod_svd_... : SLEPc adds "svd_" to the prefix. */
   PetscCall(SVDSetOptionsPrefix(*svd, prefix));
   PetscCall(SVDAppendOptionsPrefix(*svd, "hyco_pod_"));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -143,6 +150,7 @@ PetscErrorCode HycoReducerPOD(HycoReducer t, Mat S, PetscReal tol, PetscInt max_
    deforms: the energy is that of rigid motions, and a small share of it, or of its round-off, is all deformation. */
 static PetscInt CountDominant(const HycoScene scene, PetscInt n, const PetscReal sigma[])
 {
+  /* A body has six rigid motions at most; the next value is compared, hence n - 1. */
   const PetscInt most = PetscMin(6 * scene->n_bodies, n - 1);
   PetscInt first = 0;
 
@@ -159,6 +167,7 @@ static PetscErrorCode Deflate(Mat V, Mat S, Mat *rest)
 
   PetscFunctionBegin;
   PetscCall(MatDuplicate(S, MAT_COPY_VALUES, rest));
+  /* Dominant modes are larger by orders of magnitude: one projection would leave their round-off. */
   for (int twice = 0; twice < 2; twice++) {
     PetscCall(MatTransposeMatMult(V, *rest, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &C));
     PetscCall(MatMatMult(V, C, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &part));
@@ -184,6 +193,7 @@ static PetscErrorCode DisplacementPOD(HycoReducer t, Mat S, PetscReal tol, Petsc
   PetscCall(MatGetSize(S, &N, &n));
   first = PetscMin(CountDominant(t->scene, PetscMin(N, n), sigma), *l);
   if (!first || first == max_modes) PetscFunctionReturn(PETSC_SUCCESS);
+  /* A copy, since *V is destroyed: the submatrix shares its array. */
   PetscCall(MatDenseGetSubMatrix(*V, PETSC_DECIDE, PETSC_DECIDE, 0, first, &part));
   PetscCall(MatDuplicate(part, MAT_COPY_VALUES, &W));
   PetscCall(MatDenseRestoreSubMatrix(*V, &part));
@@ -239,6 +249,7 @@ PetscErrorCode HycoPathModesAdd(HycoReducer t, Mat path, PetscReal tol, HycoPath
   if (!l) PetscCall(MatDestroy(&V));
   if (l) {
     PetscCall(MatCreateVecs(V, &scale, NULL));
+    /* Singular values are on every rank: rank 0 alone adds them. */
     for (PetscInt k = 0; k < l; k++) PetscCall(VecSetValue(scale, k, t->rank ? 0 : sigma[k], ADD_VALUES));
     PetscCall(VecAssemblyBegin(scale));
     PetscCall(VecAssemblyEnd(scale));
@@ -247,6 +258,7 @@ PetscErrorCode HycoPathModesAdd(HycoReducer t, Mat path, PetscReal tol, HycoPath
   }
   PetscCall(PetscRealloc((size_t)(modes->n + 1) * sizeof(*modes->V), &modes->V));
   PetscCall(PetscRealloc((size_t)(modes->n + 1) * sizeof(*modes->first), &modes->first));
+  /* A path without displacement counts with first = 0, and gives no column. */
   modes->V[modes->n] = l ? V : NULL;
   modes->first[modes->n++] = sigma[0];
   PetscCall(PetscFree(sigma));
@@ -304,6 +316,7 @@ PetscErrorCode HycoReducerTakeBasis(HycoReducer t, Mat S, PetscReal tol, PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The modes of the paths are freed before the POD, which needs as much memory again. */
 PetscErrorCode HycoPathModesJoin(HycoReducer t, HycoPathModes *modes, PetscInt N, PetscInt n_rows, PetscReal tol,
                                  PetscInt max_modes, HycoBasis *basis)
 {
@@ -326,6 +339,7 @@ PetscErrorCode HycoReducerReadPath(HycoReducer t, HycoSnapshots store, PetscInt 
   PetscFunctionBegin;
   PetscCall(HycoReducerReadField(t, store, kind, j, 1, &listed));
   *path = listed;
+  /* Steps between listed times are stored for displacements alone. */
   if (kind != HYCO_SEED_DISPLACEMENT) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoSamplesGet(t->columns, NULL, &n_par, &mu));
   PetscCall(MatGetSize(listed, &N, NULL));
@@ -364,6 +378,7 @@ static PetscErrorCode FindBasis(HycoReducer t, HycoSnapshots store, PetscInt kin
   Mat S;
 
   PetscFunctionBegin;
+  /* Batches first: they have an own way for paths. */
   if (t->pod_memory > 0) {
     PetscCall(HycoReducerStreamBasis(t, store, kind, tol, most));
   } else if (t->scene->n_times) {
@@ -376,7 +391,8 @@ static PetscErrorCode FindBasis(HycoReducer t, HycoSnapshots store, PetscInt kin
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The first modes of a basis, by the tolerance: V (NULL: none; the caller owns it), and their number. */
+/* The first modes of a basis, by the tolerance: V (NULL: none; the caller owns it), and their number. A basis of
+   the search has every mode: a smaller tolerance takes more of its first columns, without another POD. */
 static PetscErrorCode CutBasis(HycoReducer t, PetscInt kind, Mat *V, PetscInt *l)
 {
   const HycoBasis *basis = &t->basis[kind];
@@ -397,6 +413,7 @@ static PetscErrorCode CutBasis(HycoReducer t, PetscInt kind, Mat *V, PetscInt *l
 PetscErrorCode HycoReducerFetchRows(HycoReducer t, Mat S, PetscInt n_columns, PetscInt n, const PetscInt node[],
                                     PetscReal rows[])
 {
+  /* A star forest whose leaves are on rank 0: the other ranks only send, and give no nodes. */
   const PetscInt dim = t->sizes[3], n_rows = t->rank ? 0 : n * dim;
   const PetscScalar *s;
   PetscLayout layout;
@@ -411,6 +428,7 @@ PetscErrorCode HycoReducerFetchRows(HycoReducer t, Mat S, PetscInt n_columns, Pe
   PetscCall(PetscSFSetGraphLayout(sf, layout, n_rows, NULL, PETSC_OWN_POINTER, row));
   PetscCall(MatDenseGetLDA(S, &lda));
   PetscCall(MatDenseGetArrayRead(S, &s));
+  /* Column by column: the data of a star forest are contiguous, and a message stays small. */
   for (PetscInt k = 0; k < n_columns; k++) {
     PetscReal *column = rows + (size_t)k * (size_t)n_rows;
 
@@ -465,6 +483,7 @@ static PetscErrorCode ProjectBatch(HycoReducer t, PetscInt first, Mat S, void *c
   PetscCall(MatDuplicate(S, MAT_COPY_VALUES, &X));
   PetscCall(RemoveLifting(t, X));
   PetscCall(MatGetColumnNorms(X, NORM_2, t->U_norm + first));
+  /* All modes of the basis: any truncation takes the first rows of a column. */
   PetscCall(HycoReducerMultiply(t, basis->V, X, basis->coefficients + (size_t)first * (size_t)basis->l));
   PetscCall(MatDestroy(&X));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -478,6 +497,7 @@ static PetscErrorCode ReduceDisplacements(HycoReducer t, HycoSnapshots store, Pe
   const PetscInt n = t->n_s / HycoSnapshotsSteps(t->scene);
 
   PetscFunctionBegin;
+  /* Kept with the lifting: rows of it are fetched for every attempt of a search. */
   if (!(t->pod_memory > 0)) PetscCall(HycoSnapshotsGetField(store, t->columns, 0, n, "U", t->sizes[3], &t->S));
   PetscCall(FindBasis(t, store, HYCO_SEED_DISPLACEMENT, all));
   HycoCheckModel(basis->l || !(basis->sigma[0] > 0), "-hyco_pod_tol %g leaves no mode; give a smaller value",
@@ -553,7 +573,8 @@ static PetscErrorCode TakeField(HycoReducer t, PetscInt kind, PetscInt divide, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Column k of B^T Lambda, by nodes in the distributed vectors' order. */
+/* Column k of B^T Lambda, by nodes in the distributed vectors' order. Rank 0 has the contacts and adds into rows
+   of other ranks; MatAssembly sends them. */
 static PetscErrorCode SetForces(HycoReducer t, PetscInt k, Mat R)
 {
   HycoFOM f = t->fom;
@@ -591,6 +612,7 @@ PetscErrorCode HycoReducerUnitRows(HycoReducer t, Mat X, Mat *scaled)
   rows = dim * (order ? order->n[HYCO_ON_NODES] : part->n_nodes);
   PetscCall(MatGetSize(X, NULL, &n));
   PetscCall(MatCreateDense(HycoComm(t), rows, PETSC_DECIDE, t->sizes[0] * dim, n, NULL, scaled));
+  /* From the distributed vectors' order to the file's, through values at the part's nodes. */
   PetscCall(PetscMalloc2(n, &size, part->n_nodes * dim, &value));
   PetscCall(MatGetColumnNorms(X, NORM_2, size));
   PetscCall(MatDenseGetLDA(X, &lda[0]));
@@ -624,6 +646,7 @@ PetscErrorCode HycoReducerSupremizers(HycoReducer t, Mat *forces, Mat *supremize
   for (PetscInt k = 0; k < n; k++) {
     PetscCall(HycoReducerColumn(t, k, mu));
     PetscCall(HycoFOMSetParameters(f, mu));
+    /* B is that of the column's own parameters: rows turn and move with the bodies. */
     HycoOnRoot(HycoComm(t), SetForces(t, k, R));
   }
   PetscCall(MatAssemblyBegin(R, MAT_FINAL_ASSEMBLY));
@@ -646,6 +669,7 @@ static PetscErrorCode DualGram(HycoReducer t, PetscReal G[])
   PetscCall(HycoReducerSupremizers(t, &R, &X));
   PetscCall(HycoReducerMultiply(t, R, X, G));
   for (PetscInt j = 0; j < n; j++) {
+    /* Symmetric up to round-off: made so, as the eigensolver reads one triangle. */
     for (PetscInt i = 0; i <= j; i++) G[j * n + i] = G[i * n + j] = (G[j * n + i] + G[i * n + j]) / 2;
   }
   PetscCall(MatDestroy(&X));
@@ -653,7 +677,8 @@ static PetscErrorCode DualGram(HycoReducer t, PetscReal G[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Moves surfaces to the training point with the largest force of contact k. Collective; k: on rank 0. */
+/* Moves surfaces to the training point with the largest force of contact k. Collective; k: on rank 0. A contact of
+   moved surfaces has other masters at each point: its seeds are those where it presses most. */
 static PetscErrorCode MoveWherePresses(HycoReducer t, PetscInt k)
 {
   const size_t m = (size_t)t->sizes[2];
@@ -682,6 +707,7 @@ static PetscErrorCode DualPoints(HycoReducer t, const PetscReal G[], PetscInt *l
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(n, &sigma));
+  /* V = Lambda W: DEIM looks at values of contact forces, the norm at their effect. */
   PetscCall(HycoPODGram(n, G, t->tol[HYCO_SEED_DUAL], t->noise, &W, l, sigma));
   if (*l) {
     PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, m, *l, NULL, &V));
@@ -716,7 +742,8 @@ static void AddContactNodes(HycoReducer t, PetscInt k, PetscInt *n, PetscInt nod
   }
 }
 
-/* The nodes of the contacts that DEIM selects from the dual snapshots, on every rank. Collective. */
+/* The nodes of the contacts that DEIM selects from the dual snapshots, on every rank. Collective. Every rank goes
+   through the loop, since MoveWherePresses() is collective; contacts are known on rank 0 alone. */
 static PetscErrorCode DualSeeds(HycoReducer t, PetscInt *n_nodes, PetscInt nodes[])
 {
   PetscReal *G;
@@ -766,6 +793,7 @@ static PetscErrorCode ReduceForces(HycoReducer t, HycoSnapshots store)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Only truncates: called for each attempt of a search, with the tolerances of its settings. */
 PetscErrorCode HycoReducerTakeBases(HycoReducer t)
 {
   const PetscInt dim = t->sizes[3], n_sigma = dim == 1 ? 1 : dim == 2 ? 4 : 6;
@@ -782,7 +810,8 @@ PetscErrorCode HycoReducerTakeBases(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads the times of the steps of the training paths. */
+/* Reads the times of the steps of the training paths. Judging replays the training paths in the steps of full
+   order, so that errors of time stepping do not count as the model's. */
 static PetscErrorCode ReadTaken(HycoReducer t, HycoSnapshots store)
 {
   PetscInt n, n_par;
@@ -804,6 +833,8 @@ static PetscErrorCode ReadTaken(HycoReducer t, HycoSnapshots store)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Displacements first, which must give a mode; forces of contacts last, whose norm needs the mesh at each column's
+   parameters. */
 PetscErrorCode HycoReducerReduce(HycoReducer t, HycoSnapshots store, PetscBool all)
 {
   PetscFunctionBegin;

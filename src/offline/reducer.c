@@ -28,7 +28,8 @@ static PetscErrorCode Create(MPI_Comm comm, HycoReducer *reducer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Frees the type's options and data. */
+/* Frees the type's options and data. The type's reset frees data that `training` points to, before `training`
+   itself. */
 static PetscErrorCode EndTraining(HycoReducer t)
 {
   PetscFunctionBegin;
@@ -51,6 +52,7 @@ PetscErrorCode HycoReducerSetType(HycoReducer t, HycoROMType name)
   PetscCall(HycoROMCreate(&type));
   ierr = HycoROMSetType(type, name);
   if (!ierr) ierr = HycoTrainerFind(name, &trainer);
+  /* The present type stays if the new one is unknown. */
   if (ierr) (void)!HycoROMDestroy(&type);
   PetscCall(ierr);
   PetscCall(EndTraining(t));
@@ -60,6 +62,7 @@ PetscErrorCode HycoReducerSetType(HycoReducer t, HycoROMType name)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Defaults that depend on the scene: the options override them in HycoReducerSetFromOptions(). */
 PetscErrorCode HycoReducerCreate(MPI_Comm comm, HycoScene scene, HycoReducer *reducer)
 {
   PetscFunctionBegin;
@@ -77,6 +80,7 @@ PetscErrorCode HycoReducerCreate(MPI_Comm comm, HycoScene scene, HycoReducer *re
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The store is not the reducer's. The type's options survive: HycoReducerSetType() alone ends them. */
 PetscErrorCode HycoReducerReset(HycoReducer t)
 {
   PetscFunctionBegin;
@@ -98,6 +102,7 @@ PetscErrorCode HycoReducerDropBases(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For other training solutions; HycoReducerDropBases() only takes back what one attempt cut from the bases. */
 PetscErrorCode HycoReducerResetBases(HycoReducer t)
 {
   PetscFunctionBegin;
@@ -161,6 +166,7 @@ static const PetscReal usual[HYCO_N_ERRORS] = {
     [HYCO_ERROR_U] = 2e-3, [HYCO_ERROR_SIGMA] = 2e-2, [HYCO_ERROR_LAMBDA] = 1e-2, [HYCO_ERROR_INELASTIC] = 2e-2};
 static const PetscReal limits[HYCO_N_ERRORS] = {[HYCO_ERROR_U] = 5e-3, [HYCO_ERROR_LAMBDA] = 3e-2};
 
+/* With a target of the user's, errors without one have none, and each target is its own limit. */
 PetscErrorCode HycoReducerGetTargets(HycoReducer t, PetscReal target[], PetscReal limit[])
 {
   PetscBool given = PETSC_FALSE;
@@ -228,6 +234,7 @@ static PetscErrorCode ReadSVDType(HycoReducer t, HycoOptionItems PetscOptionsObj
                          "<tsqr|trlanczos|cross|cyclic|lapack|randomized|...> SVD of the POD: tall-skinny QR, or one "
                          "of SLEPc's (-hyco_pod_svd_... sets its own options)",
                          types, &type, NULL);
+  /* A copy: the list of names is freed. */
   if (!ierr) ierr = PetscStrncpy(t->svd_type, types[type], sizeof(t->svd_type));
   PetscCall(PetscFree(types));
   PetscCall(ierr);
@@ -255,6 +262,7 @@ static PetscErrorCode ReadTraining(HycoReducer t)
 
   PetscFunctionBegin;
   PetscCall(HycoTrainerNames(&types));
+  /* The present type is the default of the option. */
   while (types[type] && strcmp(types[type], t->prototype ? t->prototype->model->type : HYCO_ROM_HYBRID)) type++;
   PetscObjectOptionsBegin((PetscObject)t);
   PetscCall(HycoOptionsFor(""));
@@ -316,7 +324,7 @@ static PetscErrorCode ReadTraining(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -hyco_rid_modes */
+/* -hyco_rid_modes. The wrong word is reported after the list is freed. Springs are not a word: they follow forces. */
 static PetscErrorCode TakeSeedKinds(HycoReducer t, PetscInt n, char ***list)
 {
   static const char *const words[] = {"displacement", "stress", "force", "dual", "inelastic"};
@@ -368,6 +376,7 @@ static PetscErrorCode ReadRID(HycoReducer t)
 
   PetscFunctionBegin;
   PetscCall(PetscStrArrayDestroy(&t->groups));
+  /* The default of both is the value of -hyco_pod_tol, which ReadTraining() has read. */
   t->tol[HYCO_SEED_STRESS] = t->tol[HYCO_SEED_FORCE] = t->tol[HYCO_SEED_DISPLACEMENT];
   PetscObjectOptionsBegin((PetscObject)t);
   PetscCall(HycoOptionsFor("hybrid or regression"));
@@ -417,6 +426,7 @@ static PetscErrorCode CheckType(HycoReducer t)
   char dual[32] = "fe";
 
   PetscFunctionBegin;
+  /* Read here too, where the wrong type would otherwise leave it unread. */
   PetscCall(PetscOptionsGetString(((PetscObject)t)->options, NULL, "-hyco_dual", dual, sizeof(dual), NULL));
   HycoCheckModel(t->prototype->model->traits.force_basis || strcmp(dual, "fe") == 0,
                  "-hyco_dual %s is for -hyco_model_type projection and cubature; the other models have no vectors of "
@@ -449,7 +459,8 @@ PetscErrorCode HycoReducerSetFromOptions(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Declares the reducer's options and those of all types. */
+/* Declares the reducer's options and those of all types. Each type's SetFromOptions declares its own options: all
+   are set once. */
 static PetscErrorCode DeclareAll(HycoReducer t)
 {
   const char *const *types;
@@ -474,6 +485,7 @@ PetscErrorCode HycoReducerDeclare(PetscOptions options)
 HycoDefineMethod(HycoReducerGetType, (HycoReducer t, HycoROMType *type), t, HYCO_REDUCER_CLASSID,
                  *type = t->prototype->model->type)
 
+/* Without a search, or without held-out points to judge by, the present type is the only one. */
 PetscErrorCode HycoReducerTries(HycoReducer t, const char types[], PetscBool *tries)
 {
   const PetscBool searches =

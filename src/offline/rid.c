@@ -48,6 +48,7 @@ static PetscErrorCode RidCreate(HycoFOM f, Rid *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* By point of the DM: a label is of points, whatever local numbers the tables have. */
 static PetscErrorCode Add(Rid *r, PetscInt cell)
 {
   PetscFunctionBegin;
@@ -80,6 +81,7 @@ static PetscErrorCode ToSurface(Rid *r, const PetscBool node[], PetscInt on[])
   for (PetscInt i = 0; i < r->part->n_nodes; i++) {
     const PetscInt place = HycoMeshOwned(r->part, i);
 
+    /* Owned nodes only: the roots of both star forests. */
     if (place >= 0) r->own[place] = node[i];
   }
   if (r->f->size == 1) {
@@ -99,13 +101,14 @@ static PetscErrorCode FromSurface(Rid *r, const PetscInt on[], PetscInt node[])
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(PetscArrayzero(r->own, r->part->n_owned));
+  /* From rank 0 to the owners, then to every part that has the node. */
   PetscCall(HycoSFSend(r->to_surface, MPIU_INT, 1, on, r->own));
   PetscCall(HycoSFBcast(r->to_part, MPIU_INT, 1, r->own, node));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Index in the part of a node or cell of the whole mesh; -1: not in the part. `of`: the part's numbers in the whole
-   mesh, ascending. */
+   mesh, ascending. A serial mesh has no table: its numbers are those of the whole. */
 static PetscErrorCode FindInPart(PetscInt n, const PetscInt of[], PetscInt whole, PetscInt *at)
 {
   PetscFunctionBegin;
@@ -138,6 +141,7 @@ static PetscErrorCode AddSupports(Rid *r, const HycoRIDSettings *settings)
   for (PetscInt e = 0; e < m->n_cells; e++) {
     PetscBool all = PETSC_TRUE;
 
+    /* Beside the supports' own cells those enclosed by them: Omega_A has no holes of one cell. */
     for (PetscInt v = 0; v < m->nv; v++) all = (PetscBool)(all && covered[m->cells[e * m->nv + v]]);
     if (all) PetscCall(Add(r, e));
   }
@@ -176,6 +180,7 @@ static PetscErrorCode AddRegion(Rid *r, const char text[])
   PetscFunctionBegin;
   PetscCall(HycoExprCreate("hyco_rid_region", text, 0, NULL, &expr));
   PetscCall(PetscMalloc1(m->n_nodes, &value));
+  /* In the coordinates as drawn: a region does not depend on parameters. */
   PetscCall(HycoExprEval(expr, NULL, m->n_nodes, m->xyz, value));
   for (PetscInt i = 0; i < m->n_nodes; i++) {
     if (value[i] > 0) PetscCall(AddAround(r, i));
@@ -221,7 +226,8 @@ static PetscInt SmallestFacet(HycoMesh m, PetscInt cell)
   return HycoMeshShape(m, cell) == m->type ? m->nf : PetscMin(m->nf, 3);
 }
 
-/* Section 7.2: adds cells on Gamma^C with a node closer than d to a node of Gamma^C in Omega_A. */
+/* Section 7.2: adds cells on Gamma^C with a node closer than d to a node of Gamma^C in Omega_A. Two star-forest
+   trips: the distance is computed on rank 0, which has all of Gamma^C, cells are added where they are. */
 static PetscErrorCode ExtendContact(Rid *r, const HycoPairs *pairs, PetscReal d)
 {
   HycoMesh m = r->part;
@@ -241,6 +247,7 @@ static PetscErrorCode ExtendContact(Rid *r, const HycoPairs *pairs, PetscReal d)
       const PetscInt n = HycoMeshOwnNodes(m, r->around[j], of);
 
       for (PetscInt v = 0; v < n; v++) on += near[of[v]] > 0;
+      /* A cell with a facet on Gamma^C, not one that touches it in a node or an edge. */
       if (on >= SmallestFacet(m, r->around[j]) - HycoMeshFirstCarrier(m)) PetscCall(Add(r, r->around[j]));
     }
   }
@@ -280,6 +287,7 @@ static PetscErrorCode AddBehind(Rid *r, const PetscInt master[])
   PetscFunctionBegin;
   for (; n < MOST_MASTERS && master[n] >= 0; n++) {
     PetscCall(FindInPart(m->n_nodes, m->node_whole, master[n], &node[n]));
+    /* The cell behind a facet has all of its nodes: it is in another part. */
     if (node[n] < 0) PetscFunctionReturn(PETSC_SUCCESS);
   }
   for (PetscInt j = r->start[node[0]]; j < r->start[node[0] + 1]; j++) {
@@ -348,6 +356,7 @@ static PetscErrorCode CompleteMoved(Rid *r, const HycoPairs *pairs)
     PetscCall(ToSurface(r, node, in));
     if (r->f->rank == 0) MarkMet(r->f, pairs, in, on);
     PetscCall(FromSurface(r, on, take));
+    /* Growth on any rank goes on: the label is complete over ranks only after MarkNodes(). */
     PetscCall(DMLabelGetStratumSize(r->label, HYCO_RID, &before));
     for (PetscInt i = 0; i < r->part->n_nodes; i++) {
       if (take[i]) PetscCall(AddAround(r, i));
@@ -360,7 +369,8 @@ static PetscErrorCode CompleteMoved(Rid *r, const HycoPairs *pairs)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the cells that share a node with Omega_A. */
+/* Adds the cells that share a node with Omega_A. MarkNodes() completes the label first: the layer grows from cells
+   of other ranks as well. */
 static PetscErrorCode AddLayer(Rid *r)
 {
   PetscBool *node;
@@ -418,6 +428,7 @@ PetscErrorCode HycoRIDBuild(HycoFOM f, const HycoPairs *pairs, const HycoRIDSett
   Rid r;
 
   PetscFunctionBegin;
+  /* Room for the masters' list on every rank; the pairs are rank 0's. */
   PetscCallMPI(MPI_Bcast(&n_rows, 1, MPIU_INT, 0, HycoComm(f)));
   PetscCall(RidCreate(f, &r));
   HycoOnEach(HycoComm(f), AddRegions(&r, settings));
@@ -426,6 +437,7 @@ PetscErrorCode HycoRIDBuild(HycoFOM f, const HycoPairs *pairs, const HycoRIDSett
     if (settings->extension > 0) PetscCall(ExtendContact(&r, pairs, settings->extension));
     PetscCall(CompleteSlaves(&r, pairs, n_rows));
     PetscCall(CompleteMoved(&r, pairs));
+    /* The contacts are completed before and after: layers count from complete contacts, and may cut others. */
     for (PetscInt k = 0; k < settings->layers; k++) PetscCall(AddLayer(&r));
     PetscCall(CompleteSlaves(&r, pairs, n_rows));
     PetscCall(CompleteMoved(&r, pairs));

@@ -84,7 +84,8 @@ typedef struct {
   char remedy[HYCO_LINE]; /* of a type that gave no model: HycoReducer's remedy */
 } Search;
 
-/* Notes what the search does not try; the first reason counts. */
+/* Notes what the search does not try; the first reason counts. Void, with PETSc's error codes dropped: notes for
+   the report may be cut short, they must not end a search. */
 static void LeaveOut(Search *s, const char what[], PetscBool possible, const char why[])
 {
   HycoLeftOut *next = &s->left_out[s->n_left_out];
@@ -103,6 +104,7 @@ static void LeaveOut(Search *s, const char what[], PetscBool possible, const cha
 static PetscErrorCode SetSettings(HycoReducer t, const HycoReducerSettings *r)
 {
   PetscFunctionBegin;
+  /* The type first: the options of a new one are read, and its traits decide on the RID. */
   PetscCall(HycoReducerSetType(t, r->type));
   for (PetscInt k = HYCO_SEED_STRESS; k <= HYCO_SEED_FORCE; k++) {
     if (t->tol[k] == t->tol[HYCO_SEED_DISPLACEMENT]) t->tol[k] = r->pod_tol;
@@ -129,7 +131,8 @@ static PetscReal EdgeLength(HycoMesh m, PetscInt a, PetscInt b)
   return PetscSqrtReal(sum);
 }
 
-/* Mean length of an edge of the slave surfaces' facets; 0 without any. Rank 0. */
+/* Mean length of an edge of the slave surfaces' facets; 0 without any. Rank 0. The contact extension is a length;
+   as a multiple of an edge it does not depend on the unit or the size of the scene. */
 static PetscErrorCode SurfaceEdge(HycoReducer t, PetscReal *mean)
 {
   const HycoMesh m = t->fom->surface;
@@ -177,11 +180,13 @@ static PetscErrorCode Summarise(Search *s, const HycoHeldOutRace *race, const Hy
   PetscReal force = s->force;
 
   PetscFunctionBegin;
+  /* Of a race only the first points of its order were predicted. */
   PetscCall(PetscMalloc1(race->n, &some));
   for (PetscInt k = 0; k < race->n; k++) some[k] = race->n == a->n_held ? rows[k] : rows[race->order[k]];
   if (race->n == a->n_held || !(force > 0)) force = HycoHeldOutForce(race->n, some);
   PetscCall(HycoHeldOutSummarise(race->n, some, force, &a->held_out));
   PetscCall(PetscFree(some));
+  /* The size of forces is the full-order solutions': known once all points were compared. */
   if (race->n == a->n_held && !a->held_out.not_converged) s->force = force;
   a->ratio = 0;
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
@@ -205,6 +210,7 @@ static PetscErrorCode Reorder(Search *s, const HycoHeldOutRace *race, const Hyco
   if (race->n < n) {
     const PetscInt point = order[last];
 
+    /* The point that dropped this attempt probably drops the next: it comes first. */
     PetscCall(PetscArraymove(order + 1, order, last));
     order[0] = point;
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -220,7 +226,8 @@ static PetscErrorCode Reorder(Search *s, const HycoHeldOutRace *race, const Hyco
 }
 
 /* Judges the model at the held-out points; for paths only until it is clear that the settings will not be chosen,
-   unless `all` is set. */
+   unless `all` is set. Results of paths are kept (s->rows) if all points were predicted: the chosen attempt is
+   then not judged again. */
 static PetscErrorCode Judge(Search *s, HycoROM model, PetscBool all, HycoAttempt *a)
 {
   HycoReducer t = s->t;
@@ -235,6 +242,7 @@ static PetscErrorCode Judge(Search *s, HycoROM model, PetscBool all, HycoAttempt
 
   PetscFunctionBegin;
   a->ratio = PETSC_INFINITY;
+  /* Of the attempts before this one, which is the last in the list. */
   race.most = HycoAttemptsLimit(s->n - 1, s->attempt, a->cost, &beaten);
   PetscCall(PetscCalloc1(n, &rows));
   s->rows[s->n - 1] = rows;
@@ -256,7 +264,8 @@ static PetscErrorCode Judge(Search *s, HycoROM model, PetscBool all, HycoAttempt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Makes the bases for the current settings, and the type's own modes. */
+/* Makes the bases for the current settings, and the type's own modes. After the bases, because a type may derive
+   its modes from them (supremizers, orthogonalised modes). */
 static PetscErrorCode TakeModes(HycoReducer t, HycoSnapshots store)
 {
   PetscFunctionBegin;
@@ -316,6 +325,7 @@ static PetscErrorCode BuildAndJudge(Search *s, PetscBool all, HycoAttempt *a)
   PetscCall(TakeModes(t, s->store));
   PetscCall(HycoReducerBuild(t, final, &model, &report));
   TakeSizes(t, &report, a);
+  /* Rank 0 has chosen the ridge while it built the model; the chosen attempt is built again with the same. */
   PetscCallMPI(MPI_Bcast(&t->ridge, 1, MPIU_REAL, 0, HycoComm(t)));
   a->settings.ridge = t->ridge;
   a->beaten_by = all || t->exhaustive ? 0 : MetFor(s, a->cost);
@@ -329,7 +339,8 @@ static PetscErrorCode BuildAndJudge(Search *s, PetscBool all, HycoAttempt *a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the budget has room for an attempt like the last one. */
+/* Whether the budget has room for an attempt like the last one. By the last attempt's work: later ones of a kind
+   are larger, so that this errs to the side of one more attempt. */
 static PetscBool Affords(Search *s, const HycoReducerSettings *settings)
 {
   char why[HYCO_LINE];
@@ -354,6 +365,7 @@ static PetscErrorCode Predictions(HycoReducer t, HycoSamples points, PetscReal n
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(points, &n_points, NULL, NULL));
   PetscCall(HycoReducerCountStiffnesses(t, points, PETSC_TRUE, &stiffnesses));
+  /* Points in order: a factor serves successive points of one stiffness. */
   if (!t->scene->n_times) share = (PetscReal)stiffnesses / (PetscReal)PetscMax(n_points, 1);
   *work = n * HycoReducerSolvesOf(t) * (share * a->cost + 2 * unknowns * unknowns);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -383,7 +395,8 @@ static PetscErrorCode Count(Search *s, HycoAttempt *a)
 }
 
 /* Builds a model with these settings and judges it, at all held-out points or as far as necessary; an error becomes
-   a failed attempt. Collective. */
+   a failed attempt. Collective. Errors of other kinds than "no model" (HYCO_ERR_NO_MODEL) end the search:
+   HycoCatchNoModel() raises them again. */
 static PetscErrorCode Make(Search *s, const HycoReducerSettings *settings, PetscBool all, HycoAttempt *a)
 {
   HycoReducer t = s->t;
@@ -412,7 +425,8 @@ static PetscErrorCode Make(Search *s, const HycoReducerSettings *settings, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The next attempt; none if the budget is used up. Collective. */
+/* The next attempt; none if the budget is used up. Collective. The order of events is that of the monitor:
+   attempt, counts, report. `all`: a dropped attempt is judged to its end, whatever is spent. */
 static PetscErrorCode Try(Search *s, const HycoReducerSettings *settings, PetscBool all)
 {
   HycoReducer t = s->t;
@@ -423,6 +437,7 @@ static PetscErrorCode Try(Search *s, const HycoReducerSettings *settings, PetscB
     s->ended = PETSC_TRUE;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+  /* Only the last attempt's model is kept: it may be as large as all training data. */
   PetscCall(HycoROMDestroy(&s->kept));
   PetscCall(PetscMemzero(a, sizeof(*a)));
   a->number = ++s->n;
@@ -505,7 +520,8 @@ static PetscInt CountStale(const Search *s, PetscInt first, PetscReal least, Pet
   return slow || HasNoEffect(s, first) ? stale + 1 : 0;
 }
 
-/* The settings of a kind for a size. */
+/* The settings of a kind for a size. For types without an RID its settings are the given ones, so that sizes which
+   differ in them alone are found to be the same. */
 static HycoReducerSettings KindFor(const Search *s, const HycoROM type, HycoHybrid hybrid, const Size *size)
 {
   HycoReducerSettings r = SettingsFor(s, size);
@@ -531,6 +547,7 @@ static PetscErrorCode TrySizes(Search *s, const HycoROM type, HycoHybrid hybrid,
 
   PetscFunctionBegin;
   *met = PETSC_FALSE;
+  /* Without the user's targets the smallest sizes are not worth an attempt. */
   for (PetscInt k = s->targets ? 0 : FIRST_USUAL; k < N_SIZES && stale < most && !*met; k++) {
     const HycoReducerSettings r = KindFor(s, type, hybrid, &sizes[k]);
     PetscBool done = PETSC_FALSE;
@@ -570,7 +587,8 @@ static PetscErrorCode CountContacts(HycoReducer t, const char group[], PetscInt 
 }
 
 /* The support that is most probably a plane of symmetry across the contacts: it fixes one component at 0, and most
-   of the contacts have nodes on it; the first among equals; -1: none. Rank 0. */
+   of the contacts have nodes on it; the first among equals; -1: none. Rank 0. A support whose value depends on
+   space, a parameter or time is no plane of symmetry. */
 static PetscErrorCode FindPlane(HycoReducer t, PetscInt *plane)
 {
   const HycoScene s = t->scene;
@@ -581,6 +599,7 @@ static PetscErrorCode FindPlane(HycoReducer t, PetscInt *plane)
   *plane = -1;
   for (PetscInt p = 0; p < HYCO_MAX_PARAMETERS; p++) every[p] = PETSC_TRUE;
   for (PetscInt k = 0; k < s->n_fixed; k++) {
+    /* The value does not depend on space here, so that any point serves. */
     const PetscReal origin[3] = {0, 0, 0};
     PetscInt held = 0, n;
     PetscReal value = 0;
@@ -685,7 +704,8 @@ static PetscBool Ends(const Search *s, const HycoAttempt *best)
   return (PetscBool)(best && best->ratio <= (best->number <= s->n_own ? 1 : MARGIN) && !s->t->exhaustive);
 }
 
-/* Lets a type refuse the scene's contacts, one with modes of its own the scene: why. Collective. */
+/* Lets a type refuse the scene's contacts, one with modes of its own the scene: why. Collective. begin() needs the
+   type's options: the type is set, and a refusal is caught with its message. */
 static PetscErrorCode Refuse(HycoReducer t, const HycoROM type, char why[HYCO_LINE])
 {
   HycoTrainerOps trainer;
@@ -733,7 +753,8 @@ static PetscErrorCode Offers(Search *s, const HycoROM type, PetscBool *offered, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a type is tried; otherwise, if the user should know, it is noted with the reason. */
+/* Whether a type is tried; otherwise, if the user should know, it is noted with the reason. HycoAttemptsChoose()
+   on the attempts so far: whether they end the search is asked before a type is set up. */
 static PetscErrorCode Wants(Search *s, const HycoROM type, PetscBool *wanted)
 {
   HycoReducer t = s->t;
@@ -797,7 +818,8 @@ static PetscErrorCode TryAll(Search *s, PetscBool own)
 }
 
 /* The solutions of the bases: those at the training points, which are solved now if they were not; for types with modes
-   of their own those at the held-out points, if there are enough and training points are not solved. */
+   of their own those at the held-out points, if there are enough and training points are not solved. Every later
+   HycoReducerReduce() uses these; the caller notes that earlier bases are stale. */
 static PetscErrorCode TakeColumns(HycoReducer t, HycoSnapshots store, PetscBool own)
 {
   PetscInt n = 0;
@@ -823,6 +845,7 @@ static PetscErrorCode Choose(Search *s, HycoAttempt **chosen)
   while (s->n < MAX_ATTEMPTS && (again = HycoAttemptsReopen(s->n, s->attempt))) {
     const HycoReducerSettings settings = again->settings;
 
+    /* Before the attempt, which gets a number of its own: a loop must not find this one again. */
     again->reopened = PETSC_TRUE;
     PetscCall(Try(s, &settings, PETSC_TRUE));
   }
@@ -851,6 +874,7 @@ static PetscReal Correlation(const Search *s, PetscInt n, const PetscReal held[]
   for (PetscInt pass = 0; pass < 2; pass++) {
     for (PetscInt k = 0; k < n; k++) {
       PetscReal x = PETSC_MAX_REAL;
+      /* Errors scatter over decades: their logarithm, cut where points did not converge. */
       const PetscReal y = PetscLogReal(PetscMin(PetscMax(s->ratio[k], 1e-6), 1e6));
 
       for (PetscInt i = 0; i < n_train; i++) x = PetscMin(x, PetscAbsReal(train[i * n_par + p] - held[k * n_par + p]));
@@ -905,6 +929,7 @@ static PetscErrorCode AddPoints(Search *s, HycoSamples samples, PetscInt n_add, 
   *added = 0;
   PetscCall(HycoSamplesGet(t->held, &n, NULL, &held));
   PetscCall(FindTelling(s, samples, by));
+  /* Eight times as many candidates as points: each added one can be near a bad held-out point without being it. */
   PetscCall(HycoSamplesUnseen(samples, t->drawn, among, 1, NULL, &drawn));
   t->drawn += among;
   PetscCall(HycoSamplesExcept(drawn, t->held, &unseen));
@@ -939,7 +964,8 @@ static PetscErrorCode AddPoints(Search *s, HycoSamples samples, PetscInt n_add, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Frees the data of attempts. */
+/* Frees the data of attempts. Also frees rows of attempts that were never chosen; ratio and order belong to the
+   held-out points of these. */
 static void Forget(Search *s)
 {
   for (PetscInt k = 0; k < s->n; k++) (void)!PetscFree(s->rows[k]);
@@ -954,7 +980,8 @@ static PetscBool IsOwn(HycoReducer t)
   return (PetscBool)(t->pinned[HYCO_CHOICE_TYPE] && HycoReducerOwnModes(t, t->prototype));
 }
 
-/* The ratios and the order of the held-out points before the first attempt that is judged at them. */
+/* The ratios and the order of the held-out points before the first attempt that is judged at them. Again when
+   held-out points are added: the arrays have their number. */
 static PetscErrorCode BeginHeld(Search *s)
 {
   PetscInt n;
@@ -991,6 +1018,7 @@ static PetscErrorCode Attempts(Search *s)
     PetscCall(HycoReducerHoldOutMore(s->t, s->store));
     if (few) PetscCall(BeginHeld(s));
     PetscCall(TakeColumns(s->t, s->store, PETSC_FALSE));
+    /* Bases of held-out points are not those of the training points. */
     s->reduced = (PetscBool)(s->reduced && s->t->columns == before);
     PetscCall(Reduce(s));
   }
@@ -999,7 +1027,8 @@ static PetscErrorCode Attempts(Search *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Begins *grown with the first training points, unless it has begun. The caller owns it. */
+/* Begins *grown with the first training points, unless it has begun. The caller owns it. A copy: the given set is
+   the caller's, who may use it again. */
 static PetscErrorCode BeginGrown(Search *s, HycoSamples *grown)
 {
   PetscFunctionBegin;
@@ -1023,7 +1052,8 @@ static PetscErrorCode TrainOn(Search *s, HycoSamples grown)
 }
 
 /* Attempts, and solutions added until the targets are met or the budget is used up: in *grown, with the first ones
-   (NULL: none was added; the caller owns it). */
+   (NULL: none was added; the caller owns it). The list of attempts begins anew with each round; what they have
+   spent adds up, and the budget grows with the solutions. */
 static PetscErrorCode Rounds(Search *s, HycoSamples *grown, HycoTraining *report)
 {
   HycoReducer t = s->t;
@@ -1078,7 +1108,8 @@ static PetscErrorCode Advise(Search *s, HycoTraining *report)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Puts into the report what the search has done. */
+/* Puts into the report what the search has done. After BuildChosen(), whose report is overwritten by what belongs
+   to the search. */
 static PetscErrorCode Tell(Search *s, const HycoAttempt *best, HycoTraining *report)
 {
   PetscFunctionBegin;
@@ -1096,6 +1127,7 @@ static PetscErrorCode Tell(Search *s, const HycoAttempt *best, HycoTraining *rep
 static PetscErrorCode BuildChosen(Search *s, const HycoAttempt *best, HycoROM *model, HycoTraining *built)
 {
   PetscFunctionBegin;
+  /* The pointer moves: s->kept must not be destroyed with the search. */
   if (s->kept && best->number == s->n) {
     *model = s->kept;
     *built = s->kept_report;
@@ -1137,6 +1169,7 @@ static PetscErrorCode BuildBest(Search *s, HycoROM *model, HycoTraining *report)
     built.n_fresh = report->n_fresh;
     *report = built;
     PetscCall(Tell(s, best, report));
+    /* The reducer owns them now, and calibrates with them. */
     t->judged_held = s->rows[best->number - 1];
     s->rows[best->number - 1] = NULL;
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -1203,6 +1236,7 @@ static PetscErrorCode Learn(Search *s, HycoROM *model, HycoSamples *grown, HycoT
   PetscBool again = PETSC_TRUE;
 
   PetscFunctionBegin;
+  /* Before any attempt changes them. */
   HycoReducerGetSettings(t, &s->given);
   HycoOnRoot(HycoComm(t), SurfaceEdge(t, &edge));
   PetscCallMPI(MPI_Bcast(&edge, 1, MPIU_REAL, 0, HycoComm(t)));

@@ -10,7 +10,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* An existing folder is used as it is: solutions in it are kept. What killed runs left is removed. */
+/* An existing folder is used as it is: solutions in it are kept. What killed runs left is removed. Rank 0. An
+   existing folder is the usual case: a run that was killed goes on where it was. */
 static PetscErrorCode MakeFolder(const char folder[])
 {
   struct stat info;
@@ -36,6 +37,7 @@ static PetscErrorCode Begin(HycoSnapshots s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Every rank computes the fingerprint after the folder is there; an error destroys the object before it returns. */
 PetscErrorCode HycoSnapshotsOpen(MPI_Comm comm, HycoScene scene, const char folder[], HycoSnapshots *snapshots)
 {
   HycoSnapshots s;
@@ -79,6 +81,7 @@ PetscErrorCode HycoSnapshotsDestroy(HycoSnapshots *snapshots)
 /* The path of the file of a parameter value. */
 static PetscErrorCode SamplePath(HycoSnapshots s, const PetscReal mu[], char path[PETSC_MAX_PATH_LEN])
 {
+  /* By the bits of mu: equal values are the same file, and a change of the last digit is another solution. */
   const unsigned long long hash = HycoHash(HYCO_HASH_START, mu, (size_t)s->scene->n_parameters * sizeof(PetscReal));
 
   PetscFunctionBegin;
@@ -141,7 +144,8 @@ static PetscErrorCode OpenSample(HycoSnapshots s, const PetscReal mu[], HycoH5 *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* missing[]: the samples without a file, in order. On rank 0. */
+/* missing[]: the samples without a file, in order. On rank 0. Twins in the list are solved once. Files that exist
+   are opened: one of another scene is refused before hours of solves. */
 static PetscErrorCode FindMissing(HycoSnapshots s, PetscInt n, PetscInt n_par, const PetscReal mu[],
                                   PetscInt *n_missing, PetscInt missing[])
 {
@@ -165,7 +169,8 @@ static PetscErrorCode FindMissing(HycoSnapshots s, PetscInt n, PetscInt n_par, c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Writes the data of a solution that are on rank 0. */
+/* Writes the data of a solution that are on rank 0. The fingerprint first, without which a file is not read;
+   `history` lets a message say what changed. */
 static PetscErrorCode WriteHead(HycoSnapshots s, HycoH5 h, const PetscReal mu[])
 {
   char fingerprint[32], *history;
@@ -218,7 +223,8 @@ static PetscErrorCode WriteFields(HycoSnapshots s, HycoFOM fom, HycoH5 h, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Writes the solution, each rank its rows. Collective on the group. */
+/* Writes the solution, each rank its rows. Collective on the group. HDF5 of the group, each rank its rows; the
+   file is renamed into place when complete (HycoH5Close()), or removed. */
 static PetscErrorCode WriteSample(HycoSnapshots s, HycoFOM fom, const PetscReal mu[], const PetscReal force[])
 {
   char path[PETSC_MAX_PATH_LEN];
@@ -269,6 +275,7 @@ static PetscErrorCode WriteBetween(HycoFOM fom, void *ctx)
   PathWriter *w = (PathWriter *)ctx;
   const HycoPath p = fom->path;
   const PetscReal *times = fom->scene->times + p->step - 1;
+  /* p->step is the next listed time: its interval begins with times[0] here. */
   const PetscInt slot = p->step * MOST_BETWEEN + (PetscInt)(MOST_BETWEEN * (p->t - times[0]) / (times[1] - times[0]));
   const HycoFileOrder *rows;
   char name[HYCO_LINE];
@@ -352,7 +359,9 @@ static PetscErrorCode WriteStep(HycoFOM fom, const HycoStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves the path and writes its file; a path that does not reach its end is an error. */
+/* Solves the path and writes its file; a path that does not reach its end is an error. Fields are written while
+   the path is solved, by the monitor: no listed time is held in memory. `taken` follows at the end, when the
+   number of steps is known. */
 static PetscErrorCode WritePath(PathWriter *w, HycoFOM fom, const PetscReal mu[])
 {
   HycoHistory history;
@@ -371,7 +380,8 @@ static PetscErrorCode WritePath(PathWriter *w, HycoFOM fom, const PetscReal mu[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves and stores one path by one group, with the fields of its listed times. Collective on the group. */
+/* Solves and stores one path by one group, with the fields of its listed times. Collective on the group. The file
+   is shared by the group and stays incomplete, and is removed, if the path fails. */
 static PetscErrorCode SolvePath(HycoSnapshots s, HycoFOM fom, const PetscReal mu[], PetscReal force[])
 {
   PathWriter w = {.s = s, .force = force};
@@ -404,6 +414,7 @@ static PetscErrorCode SolveSample(HycoSnapshots s, HycoFOM fom, const PetscReal 
   }
   PetscCall(HycoFOMSolve(fom, s->scene->n_parameters, mu));
   PetscCall(HycoFOMGetSummary(fom, &summary));
+  /* Full order has added a spring to a body that nothing holds; a reduced stiffness has no such term. */
   HycoCheck(!summary.regularised[0],
             "neither supports nor contact keep %s: full order can be regularised, but a reduced model cannot; fix a "
             "component",
@@ -420,7 +431,8 @@ static PetscErrorCode SolveSample(HycoSnapshots s, HycoFOM fom, const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A HycoPath's interrupt, because a path may take hours. */
+/* A HycoPath's interrupt, because a path may take hours. Called between steps: raises the error of another group,
+   so that this one does not go on for hours. */
 static PetscErrorCode Hear(void *ctx)
 {
   PetscFunctionBegin;
@@ -436,7 +448,8 @@ typedef struct {
   void *ctx;
 } Missing;
 
-/* This rank's group solves samples from the queue. Rank 0 reports how many are stored. */
+/* This rank's group solves samples from the queue. Rank 0 reports how many are stored. Rank 0 of the communicator
+   reports for all groups; k < 0: the queue is empty, the only way out without an error. */
 static PetscErrorCode SolveQueued(HycoSnapshots s, HycoQueue queue, const Missing *m, HycoFOM fom, PetscReal force[])
 {
   PetscInt k, n_stored;
@@ -482,7 +495,8 @@ static PetscErrorCode SolveGroup(HycoSnapshots s, HycoQueue queue, const Missing
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Returns the group's error after the other groups were told of it. */
+/* Returns the group's error after the other groups were told of it. HycoQueueEnd() is called on every rank, with
+   an error too: the other groups wait for it. */
 static PetscErrorCode SolveAndTell(HycoSnapshots s, HycoQueue queue, const Missing *m)
 {
   const PetscErrorCode ierr = HycoQueueEnd(queue, SolveGroup(s, queue, m));
@@ -507,7 +521,8 @@ static PetscErrorCode CountWork(HycoSnapshots s, HycoQueue queue)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The queue orders the points by stiffness; an error of one group ends the work of all. */
+/* The queue orders the points by stiffness; an error of one group ends the work of all. A queue and groups exist
+   for one call; HycoOnEach() raises the first error on every rank. */
 static PetscErrorCode SolveMissing(HycoSnapshots s, const Missing *m)
 {
   HycoQueue queue;
@@ -521,6 +536,7 @@ static PetscErrorCode SolveMissing(HycoSnapshots s, const Missing *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Points that are stored are not solved again, whatever their order or number was in an earlier run. */
 PetscErrorCode HycoSnapshotsFill(HycoSnapshots s, HycoSamples samples, HycoProgress progress, void *ctx)
 {
   Missing m = {.progress = progress, .ctx = ctx};
@@ -609,6 +625,7 @@ PetscErrorCode HycoSnapshotsGetField(HycoSnapshots s, HycoSamples samples, Petsc
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(samples, NULL, &n_par, &mu));
   PetscCall(HycoSnapshotsGetRows(s, samples, field, &total));
+  /* Rows of a node or cell stay on one rank: `block` rows belong together. */
   blocks = total / block;
   PetscCall(PetscSplitOwnership(HycoComm(s), &own, &blocks));
   PetscCall(MatCreateDense(HycoComm(s), own * block, PETSC_DECIDE, total, n * HycoSnapshotsSteps(s->scene), NULL, S));
@@ -622,7 +639,8 @@ PetscErrorCode HycoSnapshotsGetField(HycoSnapshots s, HycoSamples samples, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The number of steps between listed times in the file of mu; 0 for older versions. */
+/* The number of steps between listed times in the file of mu; 0 for older versions. Numbered without a gap: the
+   first name that is missing ends the list. */
 static PetscErrorCode CountBetween(HycoSnapshots s, const PetscReal mu[], PetscInt *n)
 {
   char name[HYCO_LINE];
@@ -653,6 +671,7 @@ static PetscErrorCode ReadBetween(HycoSnapshots s, const PetscReal mu[], PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rank 0 counts, so that all ranks create the same matrix; each reads its rows. */
 PetscErrorCode HycoSnapshotsGetBetween(HycoSnapshots s, const PetscReal mu[], PetscInt rows, PetscInt total, Mat *U)
 {
   PetscInt n = 0, lo, hi, lda;

@@ -17,6 +17,7 @@ static PetscInt Room(HycoReducer t, PetscInt N)
   return (PetscInt)PetscMin(1e6 * t->pod_memory / (COPIES * sizeof(PetscReal) * PetscMax(1, (PetscReal)N)), 1e9);
 }
 
+/* One call with t->S if it is kept. A batch has whole paths, and at least one. */
 PetscErrorCode HycoReducerEachBatch(HycoReducer t, HycoBatchUse use, void *ctx)
 {
   const PetscInt n_steps = HycoSnapshotsSteps(t->scene), n = t->n_s / n_steps;
@@ -74,6 +75,7 @@ static PetscErrorCode CheckRoom(const Stream *s, PetscInt n)
 static PetscErrorCode Merge(Stream *s, PetscReal share, Mat *S)
 {
   PetscFunctionBegin;
+  /* Losses add up over the batches: each may lose its share. */
   HycoLogged(HYCO_EVENT_POD, HycoPODMerge(s->svd, PetscSqr(LOSS * s->t->noise) * share, &s->merged, S));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -87,6 +89,7 @@ static PetscErrorCode MergePoints(Stream *s, HycoSnapshots store)
 
   PetscFunctionBegin;
   for (PetscInt first = 0; first < n; first += count) {
+    /* The modes so far stay in memory: they leave less room from batch to batch. */
     PetscCall(CheckRoom(s, 1));
     PetscCall(CountModes(s, &l));
     count = PetscMin(s->room - l, n - first);
@@ -113,7 +116,8 @@ static PetscErrorCode ReadModes(const Stream *s, HycoSnapshots store, PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Merges paths one by one: first the size of each, then their modes, scaled by it. */
+/* Merges paths one by one: first the size of each, then their modes, scaled by it. Two passes read every path
+   twice: their scale needs the largest of all, and keeping them is what there is no memory for. */
 static PetscErrorCode MergePaths(Stream *s, HycoSnapshots store, PetscReal tol)
 {
   const PetscInt n = s->t->n_s / HycoSnapshotsSteps(s->t->scene);
@@ -145,6 +149,7 @@ static PetscErrorCode EndStream(Stream *s, PetscReal tol, PetscInt most)
   if (s->merged)
     PetscCall(HycoReducerTakeBasis(s->t, s->merged, tol, most, basis));
   else
+    /* l = 0: the caller says that there is no mode. */
     PetscCall(PetscCalloc1(s->t->n_s + 1, &basis->sigma));
   PetscCall(MatDestroy(&s->merged));
   PetscCall(SVDDestroy(&s->svd));

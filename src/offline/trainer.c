@@ -13,6 +13,7 @@ PetscErrorCode HycoTrainerNames(const char *const **names)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Types without training are known to HycoROMRegister() alone: a program that only predicts links no training. */
 PetscErrorCode HycoTrainerFind(HycoROMType type, HycoTrainerOps *ops)
 {
   PetscErrorCode (*create)(HycoTrainerOps *);

@@ -31,15 +31,18 @@ static PetscErrorCode Displace(HycoTrainingReplay *r, PetscInt k, PetscReal time
 
   PetscFunctionBegin;
   if (scene->n_times > 1) {
+    /* The interval with `time`; the last one for its end. */
     while (at + 2 < n && scene->times[at + 1] < time) at++;
     share = PetscMin(1, (time - scene->times[at]) / (scene->times[at + 1] - scene->times[at]));
   }
+  /* Both ends are kept over the steps of an interval: reading is collective and costs a message. */
   if (r->column != k * n + at) {
     PetscCall((*r->displacement)(r->ctx, k * n + at, r->before));
     if (n > 1) PetscCall((*r->displacement)(r->ctx, k * n + at + 1, r->after));
   }
   r->column = k * n + at;
   for (PetscInt i = 0; i < r->fe->n_dof; i++)
+    /* Prescribed displacements are those of this very time, the rest is interpolated. */
     r->u[i] = r->fe->u0[i] + (share > 0 ? (1 - share) * r->before[i] + share * r->after[i] : r->before[i]);
   HycoFEComplete(r->fe, r->u);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -58,7 +61,8 @@ static PetscErrorCode Step(HycoTrainingReplay *r, PetscReal t0, PetscReal t1)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Integrates the laws at the n times taken[]. */
+/* Integrates the laws at the n times taken[]. The march begins anew for each path; a listed time is one of
+   `taken`, to the bit. */
 static PetscErrorCode Follow(HycoTrainingReplay *r, PetscInt k, const PetscReal mu[], PetscInt n,
                              const PetscReal taken[])
 {

@@ -20,8 +20,10 @@ static PetscErrorCode JoinBodies(MPI_Comm comm, HycoScene scene, HycoMesh m, Pet
     for (PetscInt j = m->tied_start[k]; j < m->tied_start[k + 1]; j++)
       joined[m->node_body[m->tied[k]] * n + m->node_body[m->tied_master[j]]] = PETSC_TRUE;
   }
+  /* A rank's part may contain none of the nodes that two bodies share. */
   HycoAllreduce(joined, n * n, HYCO_MPI_BOOL, MPI_LOR, comm);
   for (PetscInt b = 0; b < n; b++) part[b] = b;
+  /* The least number spreads along chains of bodies, until nothing changes. */
   while (change) {
     change = PETSC_FALSE;
     for (PetscInt k = 0; k < n * n; k++) {
@@ -36,7 +38,8 @@ static PetscErrorCode JoinBodies(MPI_Comm comm, HycoScene scene, HycoMesh m, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a support can have a force along an axis. */
+/* Whether a support can have a force along an axis. A direction that varies in space is taken to act: the answer
+   then errs to the safe side. */
 static PetscErrorCode SupportActs(const HycoFixed *fixed, PetscInt axis, PetscBool *acts)
 {
   const PetscReal mu[HYCO_MAX_PARAMETERS] = {0}, x[3] = {0, 0, 0}; /* a direction does not change with parameters */
@@ -67,7 +70,8 @@ static PetscErrorCode MarkGroup(HycoMesh m, const char key[], const char name[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Marks the parts that supports of the quantity's group hold along its axis, and those that something else holds. */
+/* Marks the parts that supports of the quantity's group hold along its axis, and those that something else holds.
+   A spring's force is a reaction of none of the groups, so it always counts as outside. */
 static PetscErrorCode MarkHeld(HycoScene scene, HycoMesh m, const HycoQuantity *q, const PetscInt part[],
                                const PetscBool in[], PetscBool inside[], PetscBool outside[])
 {
@@ -119,6 +123,8 @@ static PetscErrorCode MarkAll(HycoScene scene, HycoMesh m, const PetscInt part[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* balanced: n_quantities x n_bodies: whether quantity k follows from the balance of body b. It does for none of
+   them if a body is also held from outside the group, since only the sum of both is known. */
 PetscErrorCode HycoQuantitiesBalance(MPI_Comm comm, HycoScene scene, HycoMesh m, PetscBool balanced[])
 {
   const PetscInt n = scene->n_bodies;
@@ -143,7 +149,7 @@ PetscErrorCode HycoQuantitiesBalance(MPI_Comm comm, HycoScene scene, HycoMesh m,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Marks the cells around the points and lines of a load. */
+/* Marks the cells around the points and lines of a load. node[]: room for the nodes. */
 static PetscErrorCode MarkPoints(HycoMesh m, const HycoPointLoad *load, PetscBool node[], PetscBool needed[])
 {
   PetscInt g = 0;
@@ -158,6 +164,8 @@ static PetscErrorCode MarkPoints(HycoMesh m, const HycoPointLoad *load, PetscBoo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* needed[n_cells]: cells at which loads must be integrated. of[]: the bodies whose volume forces count; loads on
+   groups count on all. */
 PetscErrorCode HycoMarkLoads(HycoScene scene, HycoMesh m, const PetscBool of[], PetscBool needed[])
 {
   PetscBool *node;
@@ -185,6 +193,7 @@ PetscErrorCode HycoMarkLoads(HycoScene scene, HycoMesh m, const PetscBool of[], 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* So that the RID contains them: the reduced model integrates its loads there. */
 PetscErrorCode HycoQuantitiesMarkLoads(HycoScene scene, HycoMesh m, const PetscBool balanced[], PetscBool needed[])
 {
   PetscBool *of;

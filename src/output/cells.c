@@ -2,7 +2,8 @@
 #include <hycofields.h>
 #include <hycoh5.h>
 
-/* The gmsh node of a cell that is VTK's k-th. */
+/* The gmsh node of a cell that is VTK's k-th. gmsh and VTK number middle nodes of edges and faces in different
+   orders. */
 static PetscInt FromGmsh(HycoCellType type, PetscInt k)
 {
   static const signed char tet10[10] = {0, 1, 2, 3, 4, 5, 6, 7, 9, 8},
@@ -13,7 +14,8 @@ static PetscInt FromGmsh(HycoCellType type, PetscInt k)
   return type == HYCO_HEX20 || type == HYCO_HEX27 ? hex27[k] : k;
 }
 
-/* The nodes of the cells (n_cells x nv) in the whole mesh. The caller frees them. */
+/* The nodes of the cells (n_cells x nv) in the whole mesh. The caller frees them. With an order, numbers of the
+   whole mesh, else those of the part. */
 static PetscErrorCode Nodes(const HycoFileOrder *order, HycoMesh m, PetscBool vtk, PetscInt **cells)
 {
   PetscFunctionBegin;
@@ -37,7 +39,8 @@ PetscErrorCode HycoFieldsWriteCells(HycoH5 h, const char name[], const HycoFileO
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Lists the rows of this process. */
+/* Lists the rows of this process. Repeated nodes, which pad the shapes of a mixed mesh, are left out. item: the
+   shape's code, if codes are given, then its nodes. */
 static PetscErrorCode ListRows(HycoMesh m, const unsigned char code[], PetscInt n, const PetscInt row[],
                                HycoCellList *l)
 {
@@ -71,6 +74,7 @@ PetscErrorCode HycoCellListCreate(const HycoFileOrder *order, HycoMesh m, const 
   PetscCall(ListRows(m, code, order ? order->n[HYCO_ON_CELLS] : m->n_cells, (const PetscInt *)rows, l));
   if (rows != cells) PetscCall(PetscFree(rows));
   PetscCall(PetscFree(cells));
+  /* Inclusive: this rank's own items are subtracted again. */
   PetscCallMPI(MPI_Scan(&l->start[l->n], &l->first, 1, MPIU_INT, MPI_SUM, comm));
   l->first -= l->start[l->n];
   PetscCallMPI(MPI_Allreduce(&l->start[l->n], &l->all, 1, MPIU_INT, MPI_SUM, comm));

@@ -36,6 +36,7 @@ static size_t Ending(const char path[])
   return n > 7 && strcmp(path + n - 7, ".vtkhdf") == 0 ? 7 : 0;
 }
 
+/* The margin of 16 is for endings that are added to it. */
 PetscErrorCode HycoFieldsNumbers(const char path[], char numbers[PETSC_MAX_PATH_LEN])
 {
   const size_t ending = Ending(path);
@@ -52,6 +53,7 @@ PetscErrorCode HycoFieldsNumbers(const char path[], char numbers[PETSC_MAX_PATH_
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Before the solution is computed, which may take hours: a model must not be overwritten by a mistyped -o. */
 PetscErrorCode HycoFieldsCheckPath(const char path[])
 {
   char h5[PETSC_MAX_PATH_LEN];
@@ -72,6 +74,7 @@ PetscErrorCode HycoFieldsCheckPath(const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* most: of times or points; 0: one solution, without times. Nothing is written until HycoFieldFileOpen(). */
 PetscErrorCode HycoFieldFileCreate(MPI_Comm comm, const char path[], PetscInt most, PetscBool points,
                                    HycoFieldFile *file)
 {
@@ -107,7 +110,8 @@ static PetscErrorCode WriteHead(HycoFieldFile f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A mixed mesh's cells by shape, for the .xdmf. Collective with an order. */
+/* A mixed mesh's cells by shape, for the .xdmf. Collective with an order. XDMF has no connectivity with offsets: a
+   mixed topology is one list with a code before each cell's nodes. */
 static PetscErrorCode WriteTopology(HycoFieldFile f)
 {
   HycoCellList cells;
@@ -122,6 +126,8 @@ static PetscErrorCode WriteTopology(HycoFieldFile f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* order, mesh, scene and X are borrowed until the file is committed. Opening again starts anew: a file that was
+   not committed is discarded. */
 PetscErrorCode HycoFieldFileOpen(HycoFieldFile f, const HycoFileOrder *order, HycoMesh mesh, HycoScene scene,
                                  const PetscReal X[], const PetscReal mu[])
 {
@@ -161,7 +167,8 @@ void HycoFieldName(const HycoField *field, PetscInt k, char name[HYCO_LINE])
   HycoFormat(name, "step-%04d/%s/%s", (int)k, field->place == HYCO_ON_CELLS ? "cells" : "nodes", field->name);
 }
 
-/* The attribute names of an existing dataset: those of the contacts in their order, with blanks between. */
+/* The attribute names of an existing dataset: those of the contacts in their order, with blanks between. The field
+   `contact` has the number of a contact; the names make it readable. */
 static PetscErrorCode NameContacts(HycoFieldFile f, const char set[])
 {
   size_t length = 1, at = 0;
@@ -178,7 +185,7 @@ static PetscErrorCode NameContacts(HycoFieldFile f, const char set[])
 }
 
 /* Writes the unit of a field, as given in the scene, and the names of its components, to an existing dataset. On one
-   process. */
+   process. Units are the scene's text; without them only the components are described. */
 static PetscErrorCode Describe(HycoFieldFile f, const char set[], const HycoField *field)
 {
   static const char *const lengths[] = {"displacement", "gap", "contact_slip", NULL},
@@ -204,6 +211,7 @@ static PetscErrorCode Describe(HycoFieldFile f, const char set[], const HycoFiel
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* rows: this rank's, in the file's order. The names are noted for the .xdmf, which is written at the end. */
 PetscErrorCode HycoFieldFileAddRows(HycoFieldFile f, const HycoField *field, const PetscReal rows[])
 {
   const PetscInt all = HycoFieldFileCount(f, field->place), own = f->order ? f->order->n[field->place] : all,
@@ -227,6 +235,8 @@ PetscErrorCode HycoFieldFileAddRows(HycoFieldFile f, const HycoField *field, con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* As HycoFieldFileAddRows(), for data at the nodes or cells of the part, which it sends to the ranks that write
+   them. */
 PetscErrorCode HycoFieldFileAdd(HycoFieldFile f, const HycoField *field)
 {
   const PetscInt n = HycoFieldFileCount(f, field->place);
@@ -241,6 +251,7 @@ PetscErrorCode HycoFieldFileAdd(HycoFieldFile f, const HycoField *field)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The list of fields starts anew: every time has the same ones. */
 PetscErrorCode HycoFieldFileBeginTime(HycoFieldFile f, PetscReal t)
 {
   PetscFunctionBegin;
@@ -251,6 +262,7 @@ PetscErrorCode HycoFieldFileBeginTime(HycoFieldFile f, PetscReal t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A point's number is its time: viewers show several meshes of one topology as a series. */
 PetscErrorCode HycoFieldFileBeginPoint(HycoFieldFile f, const PetscReal X[], const PetscReal mu[])
 {
   const PetscInt n_par = f->scene->n_parameters;
@@ -294,7 +306,8 @@ static void Escape(const char name[], char out[6 * PETSC_MAX_PATH_LEN])
   *out = '\0';
 }
 
-/* cols 0: a dataset of one dimension. */
+/* cols 0: a dataset of one dimension. The path of the .h5 is relative to the .xdmf, so that both can be moved
+   together. */
 static void WriteItem(FILE *out, const char kind[], PetscInt rows, PetscInt cols, const char h5[], const char name[])
 {
   fprintf(out, "    <DataItem Format=\"HDF\" %s Dimensions=\"%ld", kind, (long)rows);
@@ -350,6 +363,7 @@ static PetscErrorCode WriteText(HycoFieldFile f, HycoFile *out)
   text = HycoFileStream(*out);
   fprintf(text, "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n <Domain>\n");
   if (f->most) fprintf(text, "  <Grid Name=\"history\" GridType=\"Collection\" CollectionType=\"Temporal\">\n");
+  /* One grid if no times were declared. */
   for (PetscInt k = 0; k < PetscMax(f->n, !f->most); k++) WriteGrid(f, text, h5, k);
   fprintf(text, "%s </Domain>\n</Xdmf>\n", f->most ? "  </Grid>\n" : "");
   PetscCall(HycoFileFlush(*out));
@@ -359,6 +373,7 @@ static PetscErrorCode WriteText(HycoFieldFile f, HycoFile *out)
 
 /* ------------------------------------------------------------------------------------------ end */
 
+/* A function, since HycoOnRoot() returns from the one that calls it. */
 static PetscErrorCode EndText(HycoFieldFile f, HycoFile *out)
 {
   PetscFunctionBegin;
@@ -399,11 +414,13 @@ static PetscErrorCode Place(HycoFieldFile f, HycoFile *out)
     HycoOnRoot(f->comm, WriteText(f, out));
   PetscCall(HycoH5Close(&f->h, PETSC_TRUE));
   if (!f->vtk) ierr = EndText(f, out);
+  /* Numbers without their .xdmf cannot be opened by a viewer. */
   if (ierr) (void)remove(f->h5_path);
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* `out` is closed on every path: an error in between leaves no temporary file. */
 PetscErrorCode HycoFieldFileCommit(HycoFieldFile f)
 {
   HycoFile out = NULL;

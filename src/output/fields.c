@@ -4,6 +4,8 @@
 #include <hycomaterialimpl.h>
 #include <petscblaslapack.h>
 
+/* Without an order the values are already rows, and *rows points to them: the caller frees *rows only if it
+   differs from value. */
 PetscErrorCode HycoFieldRows(const HycoFileOrder *order, PetscInt n, HycoPlace place, MPI_Datatype type,
                              PetscInt components, const void *value, void **rows)
 {
@@ -21,6 +23,7 @@ PetscErrorCode HycoFieldRows(const HycoFileOrder *order, PetscInt n, HycoPlace p
 PetscErrorCode HycoFieldWrite(HycoH5 h, const HycoFileOrder *order, PetscInt n, const char name[], HycoPlace place,
                               MPI_Datatype type, PetscInt components, PetscInt cols, const void *value)
 {
+  /* components of one node or cell are `lines` lines of cols numbers. */
   const PetscInt all = order ? order->all[place] : n, own = order ? order->n[place] : n,
                  first = order ? order->first[place] : 0, lines = components / PetscAbsInt(cols);
   void *rows = NULL;
@@ -58,6 +61,7 @@ PetscErrorCode HycoFieldsWriteMesh(HycoH5 h, const char folder[], const HycoFile
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* From xx, yy, zz, xy, yz, xz to the file's rows xx, xy, xz, yy, yz, zz; in 2D the shear in z is 0. */
 void HycoTensor6(PetscInt n_cells, PetscInt ns, const PetscReal sigma[], PetscReal tensor[])
 {
   static const PetscInt place[6] = {0, 3, 5, 1, 4, 2};
@@ -67,6 +71,7 @@ void HycoTensor6(PetscInt n_cells, PetscInt ns, const PetscReal sigma[], PetscRe
   }
 }
 
+/* principal: descending, where LAPACK's order is ascending. */
 PetscErrorCode HycoStressInvariants(PetscInt n_cells, PetscInt dim, const PetscReal sigma[], PetscReal mises[],
                                     PetscReal principal[])
 {
@@ -114,7 +119,8 @@ static PetscErrorCode FillCorners(HycoFE fe, PetscReal sum[], PetscReal pressure
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of this process's contacts. */
+/* Of this process's contacts. force: on both bodies, on the slave +shear - lambda n, on its masters by their
+   weights the opposite, so that the sum is 0. gap: the current one, (g - n u_slave + n u_master). */
 static PetscErrorCode FillContacts(HycoFE fe, HycoPairs *pairs, const PetscReal u[], const PetscReal lambda[],
                                    HycoContactFields *f)
 {
@@ -142,6 +148,7 @@ static PetscErrorCode FillContacts(HycoFE fe, HycoPairs *pairs, const PetscReal 
     if (HycoPairsAlone(fe->scene, pairs, k)) f->gap[k] = NAN;
     if (!(f->gap_node[s] <= f->gap[k])) /* for a node in several contacts the smallest */
       f->gap_node[s] = f->gap[k];
+    /* Not a number compares false, and is replaced. */
     if (!(f->which[s] <= pairs->contact[k])) f->which[s] = pairs->contact[k];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -168,6 +175,8 @@ static PetscErrorCode FillFriction(HycoFE fe, const HycoPairs *pairs, HycoContac
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* On the surfaces that this rank has; pairs, lambda: its contacts. Collective, since areas of nodes are summed
+   over the ranks. */
 PetscErrorCode HycoContactFieldsCreate(MPI_Comm comm, HycoFE surface, HycoPairs *pairs, const PetscReal u[],
                                        const PetscReal lambda[], HycoContactFields *f)
 {
@@ -191,7 +200,8 @@ PetscErrorCode HycoContactFieldsCreate(MPI_Comm comm, HycoFE surface, HycoPairs 
 }
 
 /* Combines values, `width` at each node of a surface, over the ranks, from `start` on, at the nodes of each rank's
-   part: one component at a time, as PETSc's star forests add up no vectors. */
+   part: one component at a time, as PETSc's star forests add up no vectors. to_owner: from the surface's nodes to
+   the owners of the part's; to_part: from there to all copies in parts. */
 static PetscErrorCode Combine(PetscSF to_owner, PetscSF to_part, HycoMesh part, PetscInt n, PetscInt width, MPI_Op op,
                               PetscReal start, const PetscReal value[], PetscReal at_part[])
 {
@@ -211,7 +221,8 @@ static PetscErrorCode Combine(PetscSF to_owner, PetscSF to_part, HycoMesh part, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The smallest values, not a number where there is none: it cannot be compared. */
+/* The smallest values, not a number where there is none: it cannot be compared. MPI_MIN of a number and not a
+   number is undefined, hence the replacement by the largest number. */
 static PetscErrorCode CombineLeast(PetscSF to_owner, PetscSF to_part, HycoMesh part, PetscInt n, PetscReal value[],
                                    PetscReal at_part[])
 {
@@ -226,7 +237,8 @@ static PetscErrorCode CombineLeast(PetscSF to_owner, PetscSF to_part, HycoMesh p
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same for what friction adds. */
+/* The same for what friction adds. Replaces the fields of f, which are at the surface's nodes before and at the
+   part's after. */
 static PetscErrorCode FrictionToPart(PetscSF to_owner, PetscSF to_part, HycoMesh part, PetscInt n, HycoContactFields *f)
 {
   PetscReal *traction, *slip, *state;
@@ -269,6 +281,7 @@ static PetscErrorCode ToPart(MPI_Comm comm, HycoMesh part, HycoMesh surface, Hyc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* On one rank surface and part have the same nodes: only corners are left to fill. */
 PetscErrorCode HycoContactFieldsToPart(MPI_Comm comm, HycoFE fe, HycoMesh surface, HycoContactFields *f)
 {
   PetscReal *sum;
@@ -292,6 +305,8 @@ PetscErrorCode HycoContactFieldsDestroy(HycoContactFields *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* By volume, of the cells of one body: at an interface the stress jumps, and the body of least number counts.
+   sigma: n_cells x ns. */
 PetscErrorCode HycoNodalStress(HycoFE fe, const PetscReal sigma[], PetscReal tensor[], PetscReal mises[])
 {
   HycoMesh m = fe->mesh;
@@ -315,6 +330,7 @@ PetscErrorCode HycoNodalStress(HycoFE fe, const PetscReal sigma[], PetscReal ten
   }
   for (PetscInt k = 0; k < m->n_nodes * ns; k++) mean[k] = weight[k / ns] > 0 ? mean[k] / weight[k / ns] : 0;
   HycoTensor6(m->n_nodes, ns, mean, tensor);
+  /* Of the mean tensor: a mean of invariants would not be that of any stress. */
   PetscCall(HycoStressInvariants(m->n_nodes, fe->dim, mean, mises, principal));
   PetscCall(PetscFree2(volume, body));
   PetscCall(PetscFree3(weight, mean, principal));
@@ -338,6 +354,7 @@ static PetscErrorCode AddBodies(HycoFieldFile file, HycoFE fe, const PetscReal u
   PetscCall(HycoStressInvariants(m->n_cells, fe->dim, sigma, mises, principal));
   PetscCall(HycoNodalStress(fe, sigma, nodal, nodal_mises));
   for (PetscInt e = 0; e < m->n_cells; e++) body[e] = m->cell_body[e];
+  /* In 2D the third component is 0: viewers expect vectors of three. */
   const HycoField field[] = {{"displacement", HYCO_ON_NODES, 3, u3},
                              {"stress", HYCO_ON_CELLS, 6, tensor},
                              {"mises", HYCO_ON_CELLS, 1, mises},
@@ -353,6 +370,7 @@ static PetscErrorCode AddBodies(HycoFieldFile file, HycoFE fe, const PetscReal u
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Each rank has its contacts in any order; pairs->number gives their place in the file. */
 PetscErrorCode HycoContactsWrite(MPI_Comm comm, HycoH5 h, const char name[], const HycoPairs *pairs, PetscInt n,
                                  MPI_Datatype type, const void *value)
 {
@@ -363,6 +381,7 @@ PetscErrorCode HycoContactsWrite(MPI_Comm comm, HycoH5 h, const char name[], con
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
+  /* An empty dataset is created without rows. */
   if (!pairs->number || !n) { /* one process has all */
     HycoOnRoot(comm, type == MPIU_INT ? HycoH5WriteInt(h, name, n, 1, value) : HycoH5WriteReal(h, name, n, 1, value));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -403,6 +422,7 @@ static PetscErrorCode AddContactFields(HycoFieldFile file, const HycoSolution *s
                               {"contact", HYCO_ON_NODES, 1, f->which}};
 
   PetscFunctionBegin;
+  /* VTKHDF has no place for a table, and a series would need one for each time. */
   if (!file->vtk && !file->most) PetscCall(WriteContacts(file, s, f));
   for (PetscInt k = 0; k < 4; k++) PetscCall(HycoFieldFileAdd(file, &field[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -456,6 +476,7 @@ PetscErrorCode HycoSolutionWrite(const char path[], const HycoSolution *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The first one opens the file, with the mesh, which all share. */
 PetscErrorCode HycoSolutionAdd(HycoFieldFile file, const HycoSolution *s)
 {
   PetscFunctionBegin;

@@ -38,7 +38,8 @@ static PetscErrorCode FindPlace(HycoScene scene, HycoMesh m, const HycoQuantity 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* in[n_cells]: marks the cells of a place that consists of cells. */
+/* in[n_cells]: marks the cells of a place that consists of cells. A body's cells by its number, and those of a
+   group of cells by its list: a name can be both. */
 static void MarkCells(HycoMesh m, const Place *p, PetscBool in[])
 {
   for (PetscInt e = 0; e < m->n_cells; e++) in[e] = (PetscBool)(p->group < 0 || m->cell_body[e] == p->body);
@@ -67,6 +68,8 @@ static PetscErrorCode MarkAround(HycoMesh m, const Place *p, PetscBool in[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Reactions need all cells around their nodes, displacements and stresses the cells or facets of the group.
+   Quantities of contacts need none. */
 PetscErrorCode HycoQuantityMarkCells(HycoScene scene, HycoMesh m, PetscInt k, PetscBool in[])
 {
   const HycoQuantity *q = &scene->quantity[k];
@@ -126,6 +129,7 @@ PetscErrorCode HycoQuantitiesMarkStressed(HycoScene scene, HycoMesh m, PetscBool
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* field: U is the length of the displacement, UX .. its components. */
 static PetscReal OfNode(HycoFE fe, PetscInt field, const PetscReal u[], PetscInt node)
 {
   PetscReal sum = 0;
@@ -258,6 +262,7 @@ PetscErrorCode HycoQuantitiesMarkDecisive(HycoFE fe, const PetscReal u[], const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Over all processes' copies: extremes need no owner. */
 static void Extend(Sum *s, PetscReal value)
 {
   s->most = PetscMax(s->most, value);
@@ -265,7 +270,8 @@ static void Extend(Sum *s, PetscReal value)
 }
 
 /* Adds a cell or facet with these nodes and the value of the cell (stress), or those of its nodes (NULL); the sums are
-   integrals for a mean, which alone needs them, otherwise the weight counts. */
+   integrals for a mean, which alone needs them, otherwise the weight counts. The owner of its first node adds it,
+   so that each counts once over all processes. */
 static PetscErrorCode AddEntity(HycoFE fe, const HycoQuantity *quantity, const PetscReal u[], PetscInt cell,
                                 PetscInt facet, const PetscReal *value, Sum *s)
 {
@@ -286,6 +292,7 @@ static PetscErrorCode AddEntity(HycoFE fe, const HycoQuantity *quantity, const P
     if (facet >= 0) {
       PetscCall(HycoFacetNormal(fe, el, facet, q, n));
       for (PetscInt c = 0; c < 3; c++) w += n[c] * n[c];
+      /* The length of the normal is the weighted area. */
       w = PetscSqrtReal(w);
     }
     for (PetscInt a = 0; a < el->nv && !value; a++) here += el->N[q][a] * OfNode(fe, field, u, node[a]);
@@ -337,7 +344,8 @@ static PetscErrorCode CheckAxis(HycoFE fe, const HycoQuantity *q, const char wha
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the supports' force along an axis at the nodes of a group, or at all; the weight counts the fixed unknowns. */
+/* Adds the supports' force along an axis at the nodes of a group, or at all; the weight counts the fixed unknowns.
+   reaction: by unknown, along an oblique direction with the opposite sign. */
 static PetscErrorCode AddReactions(HycoFE fe, const HycoQuantity *q, const PetscReal reaction[], Sum *s)
 {
   HycoMesh m = fe->mesh;
@@ -365,7 +373,8 @@ static PetscErrorCode AddReactions(HycoFE fe, const HycoQuantity *q, const Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the results of one contact, or of all of them. */
+/* Adds the results of one contact, or of all of them. contact NULL: the scene is only checked, and the value is
+   not a number. */
 static PetscErrorCode AddContacts(HycoFE fe, const HycoQuantity *q, const HycoContactResult contact[], PetscReal *value)
 {
   const PetscBool turns = (PetscBool)(fe->dim == 3 || (fe->dim == 2 && q->field == 2));
@@ -421,6 +430,7 @@ static PetscErrorCode Measure(HycoFE fe, const HycoQuantity *q, const PetscReal 
     const PetscInt facet = k < m->n_cells ? -1 : k - m->n_cells, cell = facet < 0 ? k : m->facet_cell[facet];
     PetscReal value = 0;
 
+    /* cell < 0: another process has the facet's cell. */
     if (facet < 0 ? !in[k] : p.dim == m->dim || m->facet_group[facet] != p.group || cell < 0) continue;
     if (q->field >= XX) PetscCall(OfCell(fe, q->field, sigma, cell, &value));
     PetscCall(AddEntity(fe, q, u, cell, facet, q->field >= XX ? &value : NULL, s));
@@ -429,7 +439,8 @@ static PetscErrorCode Measure(HycoFE fe, const HycoQuantity *q, const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A quantity from fields or reactions, summed over the processes. Collective. */
+/* A quantity from fields or reactions, summed over the processes. Collective. The least is negated, so that one
+   MPI_MAX serves both ends. */
 static PetscErrorCode MeasureBodies(MPI_Comm comm, HycoFE fe, const HycoQuantity *q, const PetscReal u[],
                                     const PetscReal sigma[], const PetscReal reaction[], PetscReal *value)
 {
@@ -446,6 +457,7 @@ static PetscErrorCode MeasureBodies(MPI_Comm comm, HycoFE fe, const HycoQuantity
   sums[1] = s.weight;
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, ends, 2, MPIU_REAL, MPI_MAX, comm));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, sums, 2, MPIU_REAL, MPI_SUM, comm));
+  /* After the sums: every process raises the same error. */
   HycoCheck(sums[1] > 0 || !is_reaction, "output_%s: no support fixes %c on %s", q->name, "xyz"[q->field], group);
   HycoCheck(sums[1] > 0, "output_%s: the group %s has no cell, facet or node", q->name,
             q->group ? q->group : "of all cells");
@@ -456,6 +468,7 @@ static PetscErrorCode MeasureBodies(MPI_Comm comm, HycoFE fe, const HycoQuantity
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* value[n_quantities] is the same on all ranks. */
 PetscErrorCode HycoQuantitiesMeasure(MPI_Comm comm, HycoFE fe, const PetscReal u[], const PetscReal sigma[],
                                      const PetscReal reaction[], const HycoContactResult contact[], PetscReal value[])
 {

@@ -24,7 +24,7 @@ static PetscErrorCode WriteSequence(HycoH5 h, const char name[], PetscInt n, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On one process. */
+/* On one process. One piece: the numbers of points, cells and ids are lists of length 1. */
 static PetscErrorCode WriteHead(HycoFieldFile f, const HycoCellList *cells)
 {
   static const PetscInt version[2] = {2, 0};
@@ -40,7 +40,8 @@ static PetscErrorCode WriteHead(HycoFieldFile f, const HycoCellList *cells)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Writes rows of nodes or cells at the current time, in a dataset that concatenates those of all times. */
+/* Writes rows of nodes or cells at the current time, in a dataset that concatenates those of all times. Row f->n of
+   times: `first` counts from the beginning of the dataset. Its size is fixed by the times declared at creation. */
 static PetscErrorCode WriteRows(HycoFieldFile f, const char set[], HycoPlace place, PetscInt cols,
                                 const PetscReal rows[])
 {
@@ -86,6 +87,7 @@ static PetscErrorCode WriteCells(HycoFieldFile f, const HycoCellList *cells)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Points that move are written by HycoVTKWritePoints() for each time. */
 PetscErrorCode HycoVTKWriteMesh(HycoFieldFile f, const PetscReal X[])
 {
   HycoMesh m = f->mesh;
@@ -129,6 +131,7 @@ static void Permute(PetscInt n, const PetscReal tensor[], PetscReal out[])
   }
 }
 
+/* set: the dataset's name, for its attributes. */
 PetscErrorCode HycoVTKWriteField(HycoFieldFile f, const HycoField *field, const PetscReal rows[], char set[HYCO_LINE])
 {
   const PetscInt n = f->order ? f->order->n[field->place] : HycoFieldFileCount(f, field->place);
@@ -180,6 +183,7 @@ static PetscErrorCode WriteSteps(HycoFieldFile f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A file of one solution has no group Steps. */
 PetscErrorCode HycoVTKWriteTimes(HycoFieldFile f)
 {
   PetscFunctionBegin;

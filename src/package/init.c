@@ -12,6 +12,7 @@ static PetscBool began_petsc = PETSC_FALSE, handles = PETSC_FALSE;
 static void Compose(char said[HYCO_LINE], int line, const char function[], const char file[], PetscErrorCode code,
                     const char message[])
 {
+  /* Codes of messages that are written for the user; others need PETSc's location. */
   const PetscBool own = (PetscBool)(code == PETSC_ERR_USER || code == PETSC_ERR_ORDER || code == HYCO_ERR_NO_MODEL ||
                                     code == PETSC_ERR_ARG_NULL || code == PETSC_ERR_ARG_WRONG);
   char text[HYCO_LINE];
@@ -39,8 +40,10 @@ static void Tell(MPI_Comm comm, int line, const char function[], const char file
   fflush(stderr);
 }
 
+/* One text for the process, as PETSc's stack of error handlers is. */
 static char kept[HYCO_LINE];
 
+/* Only the first error of a chain has the message: the others are the callers' lines of the trace. */
 static PetscErrorCode Keep(MPI_Comm comm, int line, const char *function, const char *file, PetscErrorCode code,
                            PetscErrorType type, const char *text, void *ctx)
 {
@@ -49,6 +52,7 @@ static PetscErrorCode Keep(MPI_Comm comm, int line, const char *function, const 
   return code;
 }
 
+/* For bindings, which raise the text as an exception of their language. Calls with true and false must be paired. */
 PetscErrorCode HycoKeepErrors(PetscBool keep)
 {
   kept[0] = '\0';
@@ -77,6 +81,9 @@ static PetscErrorCode OneLine(MPI_Comm comm, int line, const char *function, con
   return code;
 }
 
+/* PETSc or SLEPc may run already, started by the program: then they are used, and not ended by HycoFinalize(). The
+   error handler is replaced in programs that leave the start to hyco only. Errors before PETSc runs cannot use its
+   macros. */
 PetscErrorCode HycoInitialize(int *argc, char ***argv)
 {
   PetscBool petsc, slepc;
@@ -95,6 +102,7 @@ PetscErrorCode HycoInitialize(int *argc, char ***argv)
   return ierr ? ierr : HycoInitializePackage();
 }
 
+/* In the reverse order of the start; the handler is removed while PETSc still exists. */
 PetscErrorCode HycoFinalize(void)
 {
   PetscErrorCode ierr = SlepcFinalize();

@@ -110,6 +110,8 @@ static const struct {
     {"MPI_Comm", sizeof(MPI_Comm), 0, NULL},
 };
 
+/* Bindings compare these with their own declarations at the start, so that a mismatch of versions is an error and
+   not wrong numbers. */
 PetscErrorCode HycoGetLayout(const char type[], size_t *size, PetscInt *n, const HycoMember *fields[])
 {
   const size_t all = sizeof(layouts) / sizeof(layouts[0]);

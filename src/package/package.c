@@ -33,6 +33,7 @@ PetscErrorCode HycoDeclareClasses(PetscOptions options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The names are those of body_NAME_law in the scene. */
 static PetscErrorCode RegisterLaws(void)
 {
   PetscFunctionBegin;
@@ -44,6 +45,7 @@ static PetscErrorCode RegisterLaws(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The names are those of contact_NAME_type in the scene. */
 static PetscErrorCode RegisterContacts(void)
 {
   PetscFunctionBegin;
@@ -68,6 +70,8 @@ static PetscErrorCode RegisterForms(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A type of model, which is solved, and its trainer, which makes it: the latter needs the parts of the library for
+   training. */
 static PetscErrorCode RegisterModels(void)
 {
   PetscFunctionBegin;
@@ -80,6 +84,7 @@ static PetscErrorCode RegisterModels(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The flag is set first, so that nothing below may start a second registration. */
 PetscErrorCode HycoInitializePackage(void)
 {
   PetscFunctionBegin;

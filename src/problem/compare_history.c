@@ -11,6 +11,7 @@ static PetscBool OfHistory(const char key[])
   return (PetscBool)(strncasecmp(key, "history_", 8) == 0);
 }
 
+/* A line for each entry: "key value". Ends of lines inside a value become blanks, so that lines stay entries. */
 PetscErrorCode HycoSceneWriteHistory(HycoScene s, char **text)
 {
   size_t room = 1;
@@ -31,7 +32,8 @@ PetscErrorCode HycoSceneWriteHistory(HycoScene s, char **text)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The value in the line of `text` that begins with the key, and its length; NULL: there is no such line. */
+/* The value in the line of `text` that begins with the key, and its length; NULL: there is no such line. *length
+   is then that of the word "missing", which the message prints. */
 static const char *FindValue(const char text[], const char key[], int n_key, int *length)
 {
   for (const char *line = text; *line; line += *line == '\n') {
@@ -55,7 +57,8 @@ static int FirstDifference(const char a[], int n_a, const char b[], int n_b)
   return from;
 }
 
-/* Compares the line at `line` of one of two texts in both; what[]: the difference, or empty. */
+/* Compares the line at `line` of one of two texts in both; what[]: the difference, or empty. The precision limits
+   both parts: an array of thousands of times must not fill the message. */
 static void CompareLine(const char line[], const char made[], const char here[], char what[HYCO_LINE])
 {
   const int n_key = (int)strcspn(line, " \n");
@@ -76,6 +79,7 @@ PetscErrorCode HycoSceneCompareHistory(HycoScene scene, const char made[], const
 
   PetscFunctionBegin;
   PetscCall(HycoSceneWriteHistory(scene, &here));
+  /* Both texts' lines, to find entries that only one has. */
   for (int j = 0; j < 2; j++) {
     for (const char *line = j ? made : here; *line && !what[0]; line += strcspn(line, "\n") + 1)
       CompareLine(line, made, here, what);

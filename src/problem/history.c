@@ -16,7 +16,8 @@ static PetscBool TakeNumber(const char **text, PetscReal *value)
   return PETSC_TRUE;
 }
 
-/* "0 1,2 3": rows of `width` numbers separated by commas; *n is -1 if the text has another form. */
+/* "0 1,2 3": rows of `width` numbers separated by commas; *n is -1 if the text has another form. YAML's [[0, 1],
+   [2, 3]] arrives in this form from HycoEntriesFlatten(). The caller frees *value, also if *n is -1. */
 static PetscErrorCode ReadRows(const char text[], PetscInt width, PetscInt *n, PetscReal **value)
 {
   PetscInt room = 1;
@@ -36,13 +37,12 @@ static PetscErrorCode ReadRows(const char text[], PetscInt width, PetscInt *n, P
 }
 
 /* Times must increase strictly: a step of no length has no rate. */
-static PetscErrorCode CheckTimes(const char key[], PetscInt n, const PetscReal t[], PetscInt stride)
+static PetscErrorCode CheckTimes(const char key[], PetscInt n, const PetscReal t[])
 {
   PetscFunctionBegin;
   for (PetscInt k = 1; k < n; k++)
-    HycoCheck(t[k * stride] > t[(k - 1) * stride], "%s goes %s: %.10g follows %.10g; times must increase", key,
-              t[k * stride] < t[(k - 1) * stride] ? "back in time" : "on without time", (double)t[k * stride],
-              (double)t[(k - 1) * stride]);
+    HycoCheck(t[k] > t[k - 1], "%s goes %s: %.10g follows %.10g; times must increase", key,
+              t[k] < t[k - 1] ? "back in time" : "on without time", (double)t[k], (double)t[k - 1]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -56,7 +56,7 @@ static PetscErrorCode ReadTimes(HycoScene s, const char key[], const char text[]
   PetscCall(ReadRows(text, 1, &n, &s->times));
   HycoCheck(n >= 2, "%s is \"%.200s\"; at least two numbers are expected, with the beginning of the path first", key,
             text);
-  PetscCall(CheckTimes(key, n, s->times, 1));
+  PetscCall(CheckTimes(key, n, s->times));
   s->n_times = n;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -109,10 +109,11 @@ static PetscErrorCode ReadTable(HycoScene s, const char key[], const char text[]
   PetscCall(PetscFree(row));
   HycoCheck(n > 0, "%s is \"%.200s\"; a table needs rows of two numbers, time and value: [[0, 1], [10, 2.5]]", key,
             text);
-  PetscCall(CheckTimes(key, n, table->t, 1));
+  PetscCall(CheckTimes(key, n, table->t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* First the times, then the variable t, then the tables: HycoSceneSetTime() relies on this order of variables. */
 PetscErrorCode HycoSceneReadHistory(HycoScene s)
 {
   const char *table = NULL;
@@ -139,6 +140,8 @@ PetscBool HycoSceneHasFriction(HycoScene s)
   return PETSC_FALSE;
 }
 
+/* After all entries are read, which may come in any order. What a model precomputes must not change along the
+   path. */
 PetscErrorCode HycoSceneCheckHistory(HycoScene s)
 {
   PetscBool in_time[HYCO_MAX_PARAMETERS] = {PETSC_FALSE};
@@ -186,6 +189,7 @@ static PetscReal ValueAt(const HycoTimeTable *table, PetscReal t)
 {
   PetscInt k = 0;
 
+  /* At a row's time its value exactly. */
   while (k < table->n && table->t[k] <= t) k++;
   if (k == 0) return table->value[0];
   if (k == table->n) return table->value[k - 1];
@@ -193,6 +197,7 @@ static PetscReal ValueAt(const HycoTimeTable *table, PetscReal t)
          (table->value[k] - table->value[k - 1]) * ((t - table->t[k - 1]) / (table->t[k] - table->t[k - 1]));
 }
 
+/* out: parameters, then the time, then the tables' values; without a history only the parameters. */
 void HycoSceneSetTime(HycoScene s, const PetscReal mu[], PetscReal t, PetscReal out[])
 {
   for (PetscInt p = 0; p < s->n_parameters; p++) out[p] = mu[p];
@@ -201,6 +206,8 @@ void HycoSceneSetTime(HycoScene s, const PetscReal mu[], PetscReal t, PetscReal 
   for (PetscInt k = 0; k < s->n_tables; k++) out[s->n_parameters + 1 + k] = ValueAt(&s->table[k], t);
 }
 
+/* A step ends at each listed time and at each row of a table, where a load's rate jumps. PETSC_MAX_REAL: there is
+   none left. */
 PetscReal HycoSceneNextStop(HycoScene s, PetscReal t)
 {
   PetscReal next = PETSC_MAX_REAL;
@@ -225,6 +232,7 @@ PetscErrorCode HycoSceneGetHistory(HycoScene s, PetscInt *n, const PetscReal *ti
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* what: the method that cannot follow a path. */
 PetscErrorCode HycoSceneRefuseHistory(HycoScene s, const char what[])
 {
   PetscFunctionBegin;

@@ -88,9 +88,12 @@ PetscErrorCode HycoSamplesAddScattered(HycoSamples samples, PetscInt count)
   FindAxes(n_par, s->lo, s->hi, NULL, &axes);
   for (PetscInt k = 0; k < count; k++) {
     const Place place = (Place)(k % N_PLACES);
+    /* On a single axis a face is a corner. */
     const PetscBool face = (PetscBool)(place == FACE && axes.n > 1),
                     corner = (PetscBool)((place == CORNER || (place == AGAIN && axes.n <= FEW)) &&
                                          n_corners < Corners(axes.n));
+    /* Each face has its own part of the sequence, else points on neighbouring faces would be projections of each
+       other. */
     const PetscInt faces = 2 * axes.n, number = face ? n_faces / faces + n_faces % faces * BETWEEN : n_inside;
 
     for (PetscInt p = 0; p < n_par; p++) mu[p] = s->lo[p] + (s->hi[p] - s->lo[p]) * HycoHalton(1 + number, p);
@@ -105,6 +108,8 @@ PetscErrorCode HycoSamplesAddScattered(HycoSamples samples, PetscInt count)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* lo, hi: half a step beyond the outermost training values, within the ranges. step: the largest gap between
+   values of a parameter; 1e-9 so that the middle of two is inside. */
 PetscErrorCode HycoSamplesReach(HycoScene s, PetscInt n, const PetscReal mu[], PetscReal lo[], PetscReal hi[])
 {
   const PetscInt n_par = s->n_parameters;
@@ -126,7 +131,8 @@ PetscErrorCode HycoSamplesReach(HycoScene s, PetscInt n, const PetscReal mu[], P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The root of x^(dim + 1) = x + 1 that is greater than 1. */
+/* The root of x^(dim + 1) = x + 1 that is greater than 1. The iteration contracts: 60 steps reach round-off for
+   any dimension. */
 static PetscReal Ratio(PetscInt dim)
 {
   PetscReal x = 2;
@@ -143,6 +149,7 @@ static PetscReal Coordinate(PetscInt dim, PetscInt j, PetscInt k)
   return x - PetscFloorReal(x);
 }
 
+/* Exactly equal: training points and those of a repeated run are the same numbers. */
 static PetscErrorCode Has(PetscInt n, PetscInt n_par, const PetscReal mu[], const PetscReal point[], PetscBool *has)
 {
   PetscFunctionBegin;
@@ -173,7 +180,8 @@ static PetscErrorCode IsTaken(const Drawing *d, const PetscReal point[], PetscBo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Moves the axes that a group does not share to the first of their corners that is not taken. */
+/* Moves the axes that a group does not share to the first of their corners that is not taken. Corners that
+   training has say nothing about unseen points. */
 static PetscErrorCode SeekCorner(const Drawing *d, PetscReal point[], PetscBool *found)
 {
   const Axes *axes = &d->axes;
@@ -188,7 +196,8 @@ static PetscErrorCode SeekCorner(const Drawing *d, PetscReal point[], PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Finds a corner of the shared axes, from number `first` on, that has one which is not taken. */
+/* Finds a corner of the shared axes, from number `first` on, that has one which is not taken. d->corner is -1 if
+   training and earlier draws have all of them. */
 static PetscErrorCode SeekGroupCorner(Drawing *d, PetscInt first)
 {
   const PetscInt n = Corners(d->axes.n_lead);
@@ -218,6 +227,7 @@ static void Recur(const Drawing *d, PetscInt k, PetscInt turn, PetscReal point[]
   for (PetscInt p = 0; p < d->n_par; p++) point[p] = d->lo[p];
   for (PetscInt j = 0; j < d->axes.n; j++) {
     const PetscInt p = d->axes.of[j], n = j < d->axes.n_lead ? number : number * d->together + k % d->together;
+    /* Within a group the shared axes stay: they cost a factor. */
     const PetscInt later = j < d->axes.n_lead && d->axes.n_lead < d->axes.n ? 0 : 3 * turn * BETWEEN;
 
     point[p] = d->lo[p] + (d->hi[p] - d->lo[p]) * Coordinate(d->n_par, p, 1 + n + later);
@@ -251,6 +261,9 @@ static PetscErrorCode Draw(const Drawing *d, PetscInt k, PetscReal point[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Points first .. first + count - 1 of the sequence: continued, it gives the same points as if drawn at once.
+   slow[]: parameters that change the stiffness, of which `together` points share a value. The caller owns *unseen,
+   also after an error. */
 PetscErrorCode HycoSamplesUnseen(HycoSamples samples, PetscInt first, PetscInt count, PetscInt together,
                                  const PetscBool slow[], HycoSamples *unseen)
 {
@@ -290,6 +303,7 @@ PetscErrorCode HycoSamplesAddSet(HycoSamples samples, HycoSamples other)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The caller owns *rest. */
 PetscErrorCode HycoSamplesExcept(HycoSamples samples, HycoSamples seen, HycoSamples *rest)
 {
   PetscInt n, m, n_par;

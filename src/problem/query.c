@@ -43,6 +43,7 @@ HycoDefineMethod(HycoSceneHasContact, (HycoScene scene, PetscBool *contact), sce
 HycoDefineMethod(HycoSceneGetOptions, (HycoScene scene, PetscOptions *options), scene, HYCO_SCENE_CLASSID,
                  *options = scene->options)
 
+/* "radius = 4, load = 0.1"; cut at the end of the line. */
 void HycoSceneNamePoint(HycoScene s, const PetscReal mu[], char at[HYCO_LINE])
 {
   at[0] = '\0';
@@ -66,6 +67,7 @@ PetscErrorCode HycoSceneCheckParameters(HycoScene scene, PetscInt n, const Petsc
              list[0] ? list : "none");
   }
   for (PetscInt p = 0; p < n; p++) {
+    /* A grid's last value may exceed its range by round-off. */
     const PetscReal slack = 1e-12 * PetscMax(PetscAbsReal(scene->lo[p]), PetscAbsReal(scene->hi[p]));
 
     HycoCheck(!PetscIsInfOrNanReal(mu[p]), "%s is not a finite number", scene->parameter[p]);
@@ -80,6 +82,8 @@ PetscErrorCode HycoSceneCheckParameters(HycoScene scene, PetscInt n, const Petsc
 HycoDefineMethod(HycoSceneSetExtrapolate, (HycoScene scene, PetscBool extrapolate), scene, HYCO_SCENE_CLASSID,
                  scene->extrapolate = extrapolate)
 
+/* The scene shares the DM with the caller. A former one is released after the new one is referenced, since both
+   may be the same. */
 PetscErrorCode HycoSceneSetDM(HycoScene scene, DM dm)
 {
   PetscBool is_plex;
@@ -94,8 +98,9 @@ PetscErrorCode HycoSceneSetDM(HycoScene scene, DM dm)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Hashes the vertices' coordinates of the calling program's mesh, in an order independent of the number of
-   processes. Collective. */
+/* Hashes the vertices' coordinates of the calling program's mesh, in an order independent of the number of processes.
+   Collective. By exclusive or of one hash for each vertex: any order and partition gives the same. The global vector
+   has each vertex once. */
 static PetscErrorCode HashDM(HycoScene scene, unsigned long long *hash)
 {
   unsigned long long all = 0, one;
@@ -141,11 +146,14 @@ static PetscBool MayMoveSurfaces(HycoScene scene)
   return (PetscBool)(surface && map);
 }
 
+/* Scenes of one fingerprint have the same solutions at given parameters. The entries are sorted by key. Collective.
+   */
 PetscErrorCode HycoSceneFingerprint(HycoScene scene, unsigned long long *hash)
 {
   PetscFunctionBegin;
   *hash = HYCO_HASH_START;
   for (PetscInt k = 0; k < scene->n_entries; k++) {
+    /* What does not change a solution at given parameters: method, ranges, outputs, texts. */
     if (strncasecmp(scene->key[k], "hyco_", 5) == 0 || strncasecmp(scene->key[k], "parameter_", 10) == 0 ||
         strncasecmp(scene->key[k], "output_", 7) == 0 || strcasecmp(scene->key[k], "scene_mesh") == 0 ||
         strcasecmp(scene->key[k], "scene_title") == 0 || strncasecmp(scene->key[k], "scene_unit_", 11) == 0)

@@ -36,6 +36,7 @@ PetscErrorCode HycoSamplesDestroy(HycoSamples *samples)
 
 HycoDefineMethod(HycoSamplesGetScene, (HycoSamples s, HycoScene *scene), s, HYCO_SAMPLES_CLASSID, *scene = s->scene)
 
+/* All ranks add the same points; nothing is communicated. */
 PetscErrorCode HycoSamplesAddPoint(HycoSamples s, const PetscReal mu[])
 {
   PetscInt P;
@@ -54,6 +55,7 @@ PetscErrorCode HycoSamplesAddPoint(HycoSamples s, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The last parameter changes fastest. The count is checked before each product, which could overflow. */
 PetscErrorCode HycoSamplesAddProduct(HycoSamples s, const PetscInt counts[], const PetscReal *const values[])
 {
   PetscReal mu[HYCO_MAX_PARAMETERS];
@@ -91,7 +93,8 @@ static PetscErrorCode TakeProduct(HycoSamples s, const PetscInt counts[], PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The tensor grid with at least `least` values of each parameter that has a range; of one value the middle. */
+/* The tensor grid with at least `least` values of each parameter that has a range; of one value the middle. All
+   counts are checked before memory is allocated. closed: with both ends, else midpoints of equal cells. */
 static PetscErrorCode AddGrid(HycoSamples s, const PetscInt counts[], PetscBool closed, PetscInt least)
 {
   PetscReal *values[HYCO_MAX_PARAMETERS];
@@ -112,6 +115,7 @@ static PetscErrorCode AddGrid(HycoSamples s, const PetscInt counts[], PetscBool 
 
     PetscCall(PetscMalloc1(n, &values[p]));
     for (PetscInt k = 0; k < n; k++) {
+      /* The last one is exactly hi: round-off could put it outside the range. */
       values[p][k] = ends ? (k == n - 1 ? hi : lo + k * (hi - lo) / (n - 1)) : lo + (k + 0.5) * (hi - lo) / n;
     }
   }
@@ -126,6 +130,7 @@ PetscErrorCode HycoSamplesAddGrid(HycoSamples s, const PetscInt counts[], PetscB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One value, the middle of the range, is permitted, unlike in a closed grid. */
 PetscErrorCode HycoSamplesAddTrainingGrid(HycoSamples s, const PetscInt counts[])
 {
   PetscFunctionBegin;
@@ -152,7 +157,8 @@ PetscErrorCode HycoSamplesAddChebyshev(HycoSamples s, const PetscInt counts[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The header's columns: column[c] = parameter of column c. */
+/* The header's columns: column[c] = parameter of column c. column[] has room for all parameters; names are
+   compared with their letter case. */
 static PetscErrorCode ReadHeader(HycoSamples s, const char path[], char *line, PetscInt column[])
 {
   const PetscInt P = s->scene->n_parameters;
@@ -233,6 +239,7 @@ typedef struct {
   PetscInt at;
 } Keyed;
 
+/* By hash, then by place, so that of equal points the first comes first. */
 static int CompareKeyed(const void *a, const void *b)
 {
   const Keyed *x = (const Keyed *)a, *y = (const Keyed *)b;
@@ -240,7 +247,8 @@ static int CompareKeyed(const void *a, const void *b)
   return x->hash != y->hash ? (x->hash > y->hash) - (x->hash < y->hash) : (x->at > y->at) - (x->at < y->at);
 }
 
-/* twin[k]: an earlier point has the same values as point k. */
+/* twin[k]: an earlier point has the same values as point k. By hashes: comparing all pairs of a million points
+   would take hours. Points of equal hash are compared themselves. */
 static PetscErrorCode FindTwins(HycoSamples s, PetscBool twin[])
 {
   const PetscInt P = s->scene->n_parameters;
@@ -264,6 +272,7 @@ static PetscErrorCode FindTwins(HycoSamples s, PetscBool twin[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The order of the others stays. */
 PetscErrorCode HycoSamplesDropTwins(HycoSamples s, PetscInt *n_dropped)
 {
   PetscInt kept = 0;
@@ -285,6 +294,7 @@ PetscErrorCode HycoSamplesDropTwins(HycoSamples s, PetscInt *n_dropped)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* mu is borrowed, until the next point is added. */
 PetscErrorCode HycoSamplesGet(HycoSamples s, PetscInt *n_points, PetscInt *n_parameters, const PetscReal *mu[])
 {
   PetscFunctionBegin;

@@ -31,6 +31,7 @@ static PetscBool SplitKey(const char *rest, const char *const fields[], char nam
   for (PetscInt f = 0; fields[f]; f++) {
     size_t tail = strlen(fields[f]);
 
+    /* The longest field that fits: "reference_temperature", not "temperature" of "body_a_reference". */
     if (tail > best && length > tail + 1 && rest[length - tail - 1] == '_' &&
         strcasecmp(rest + length - tail, fields[f]) == 0) {
       best = tail;
@@ -43,7 +44,7 @@ static PetscBool SplitKey(const char *rest, const char *const fields[], char nam
   return PETSC_TRUE;
 }
 
-/* declared: further fields, those of a law or a contact type; or NULL. */
+/* declared: further fields, those of a law or a contact type; or NULL. Always fails. */
 static PetscErrorCode UnknownKey(const char key[], const char what[], const HycoDeclared *declared,
                                  const char *const others[])
 {
@@ -64,7 +65,8 @@ static PetscErrorCode UnknownKey(const char key[], const char what[], const Hyco
   HycoFail("the scene's entry %s is unknown; %s has: %s", key, what, list);
 }
 
-/* Finds or adds the member `name` of an array of structs whose first field is its name. */
+/* Finds or adds the member `name` of an array of structs whose first field is its name. Pointers to members are
+   invalid afterwards: the array may move. New members are zero: all their expressions are not given. */
 static PetscErrorCode Member(const char name[], size_t size, PetscInt *n, void **array, PetscInt *index)
 {
   char *items = (char *)*array;
@@ -113,7 +115,8 @@ static PetscErrorCode NewColdExpr(HycoScene s, PetscInt entry, HycoExpr *expr)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Two finite numbers separated by a comma. PETSc's own reader of arrays leaks memory when it fails. */
+/* Two finite numbers separated by a comma. PETSc's own reader of arrays leaks memory when it fails. Strict: what
+   follows the second number is an error. */
 static PetscBool SplitRange(const char text[], PetscReal range[2])
 {
   char *end;
@@ -173,6 +176,7 @@ static PetscErrorCode ReadParameters(HycoScene s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* `element` says that the entry was given. */
 static PetscErrorCode ReadElement(HycoScene s, PetscInt entry, HycoBody *body)
 {
   const char *value = s->value[entry];
@@ -193,7 +197,7 @@ typedef struct {
                            PetscBool *given);
 } Section;
 
-/* The type's name given in the scene for a member. */
+/* The type's name given in the scene for a member. The last value given, as PETSc's database keeps it. */
 static PetscErrorCode GetType(HycoScene s, const char section[], const char name[], const char field[],
                               const char **type, PetscBool *given)
 {
@@ -215,6 +219,7 @@ static PetscErrorCode ReadTexts(HycoScene s, const char name[], HycoMaterial law
     const char *text = NULL;
     PetscBool set;
 
+    /* Declared as texts; numbers are read with the other entries. */
     if (e->kind != HYCO_ENTRY_GROUP) continue;
     HycoFormat(field, "law_%s", e->name);
     PetscCall(GetType(s, "body", name, field, &text, &set));
@@ -226,7 +231,8 @@ static PetscErrorCode ReadTexts(HycoScene s, const char name[], HycoMaterial law
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Creates the law given in the scene for the body `name`. The caller owns it. */
+/* Creates the law given in the scene for the body `name`. The caller owns it. Also for names that are only tried
+   by SplitDeclared(): *given tells whether the scene names a type. */
 static PetscErrorCode CreateLaw(HycoScene s, const char name[], PetscObject *object, HycoDeclared **declared,
                                 PetscBool *given)
 {
@@ -379,7 +385,8 @@ static PetscErrorCode FindContact(HycoScene s, const char name[], HycoContact *c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* `type` has been read when the contact was created; all other fields are those that the type declares. */
+/* `type` has been read when the contact was created; all other fields are those that the type declares. The type may
+   come after the entries that it declares. */
 static PetscErrorCode ReadContact(HycoScene s, PetscInt entry, const char rest[])
 {
   const char *key = s->key[entry], *field;
@@ -418,7 +425,8 @@ static PetscBool IsBody(HycoScene s, const char name[])
   return PETSC_FALSE;
 }
 
-/* A force per unit volume of a body, or on a group of points or lines. */
+/* A force per unit volume of a body, or on a group of points or lines. A name is a body's if there is one, else a
+   group's: entries are sorted, and body_ comes before force_. */
 static PetscErrorCode ReadForce(HycoScene s, PetscInt entry, const char name[], PetscInt field)
 {
   PetscInt k = 0;
@@ -435,7 +443,8 @@ static PetscErrorCode ReadForce(HycoScene s, PetscInt entry, const char name[], 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads an entry of a section whose members are groups: its expression, for each of its groups. */
+/* Reads an entry of a section whose members are groups: its expression, for each of its groups. strtok_r() changes
+   names[], which is the caller's copy. */
 static PetscErrorCode ReadGroups(HycoScene s, PetscInt entry, char names[], PetscInt field)
 {
   const char *key = s->key[entry];
@@ -464,7 +473,7 @@ static PetscErrorCode ReadGroups(HycoScene s, PetscInt entry, char names[], Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads one entry of a section with members. */
+/* Reads one entry of a section with members. field -1: a pressure, which has no field. */
 static PetscErrorCode ReadMember(HycoScene s, PetscInt entry)
 {
   const char *key = s->key[entry], *rest = strchr(key, '_') + 1, *what = NULL;
@@ -502,7 +511,8 @@ static PetscErrorCode ReadMember(HycoScene s, PetscInt entry)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* scene_, parameter_ and hyco_ entries are read elsewhere; this checks their names. */
+/* scene_, parameter_ and hyco_ entries are read elsewhere; this checks their names. Read before, by PETSc's
+   database; unknown names would have no effect without a message. */
 static PetscErrorCode CheckPlainEntry(HycoScene s, PetscInt entry)
 {
   const char *key = s->key[entry];
@@ -540,7 +550,8 @@ static PetscErrorCode CheckHistoryEntry(const char key[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Checks thermal entries that require each other; sets the temperature of the law. */
+/* Checks thermal entries that require each other; sets the temperature of the law. An expansion needs the
+   temperature of no strain. The law borrows the expression, which the body owns. */
 static PetscErrorCode CheckHeat(HycoBody *body)
 {
   PetscBool reads = body->law->heat;
@@ -590,7 +601,8 @@ static PetscErrorCode CheckSupports(HycoScene s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Refuses scenes that cannot be solved, before a mesh is read. */
+/* Refuses scenes that cannot be solved, before a mesh is read. Only what needs no mesh: groups are checked when
+   the mesh is read. */
 static PetscErrorCode CheckScene(HycoScene s)
 {
   PetscFunctionBegin;
@@ -661,6 +673,7 @@ static PetscErrorCode ReadFormulation(HycoScene s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The mesh may be missing: a program may give a DM. */
 static PetscErrorCode FindMesh(HycoScene s, const char folder[])
 {
   char *mesh = NULL, path[PETSC_MAX_PATH_LEN];
@@ -679,7 +692,8 @@ static PetscErrorCode FindMesh(HycoScene s, const char folder[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads everything from the entries in scene->options. */
+/* Reads everything from the entries in scene->options. The order matters: variables and constants before the
+   expressions that use them. */
 static PetscErrorCode Build(HycoScene s, const char folder[])
 {
   PetscFunctionBegin;
@@ -746,6 +760,7 @@ static PetscErrorCode FillFromEntries(HycoScene s, PetscInt n, char *const key[]
                                       const char folder[])
 {
   PetscFunctionBegin;
+  /* Here alone if the scene comes from a model's text. */
   PetscCall(HycoReserveBLAS());
   PetscCall(PetscOptionsCreate(&s->options));
   for (PetscInt k = 0; k < n; k++) {
@@ -760,6 +775,8 @@ static PetscErrorCode FillFromEntries(HycoScene s, PetscInt n, char *const key[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Every rank builds it from the same entries. Only options of the method are taken from the command line, since a
+   model's scene is fixed. */
 PetscErrorCode HycoSceneFromEntries(MPI_Comm comm, PetscInt n, char *const key[], char *const value[],
                                     const char folder[], HycoScene *scene)
 {
@@ -775,6 +792,7 @@ PetscErrorCode HycoSceneFromEntries(MPI_Comm comm, PetscInt n, char *const key[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* key, tab, value, end of line; GetLong() has replaced tabs and ends of lines in values. The caller frees it. */
 PetscErrorCode HycoSceneToText(HycoScene scene, char **text)
 {
   size_t length = 1;
@@ -792,7 +810,7 @@ PetscErrorCode HycoSceneToText(HycoScene scene, char **text)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Splits the text into keys and values. */
+/* Splits the text into keys and values. Changes the text: keys and values point into it. */
 static PetscErrorCode SplitText(char text[], PetscInt *lines, char *key[], char *value[])
 {
   char *line, *rest;
@@ -831,6 +849,7 @@ PetscErrorCode HycoSceneFromText(MPI_Comm comm, const char text[], HycoScene *sc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Also of a scene that is half built: what was not reached is zero. */
 PetscErrorCode HycoSceneDestroy(HycoScene *scene)
 {
   HycoScene s;

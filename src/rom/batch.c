@@ -46,6 +46,7 @@ static PetscErrorCode Sort(HycoROM m, PetscInt n, const PetscReal mu[], PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Sizes of the arrays that HycoROMSolveMany() fills; NULL: not wanted. */
 PetscErrorCode HycoROMGetSizes(HycoROM m, PetscInt *n_contacts, PetscInt *n_nodes, PetscInt *dim)
 {
   PetscFunctionBegin;
@@ -62,18 +63,21 @@ static PetscErrorCode SolveEach(HycoROM m, PetscInt n, const Point point[], Hyco
 {
   PetscFunctionBegin;
   for (PetscInt k = 0; k < n; k++) {
+    /* Results go to the caller's place of the point, whatever the order of the solves. */
     const size_t at = (size_t)point[k].at, n_dof = (size_t)(m->model->mesh->n_nodes * m->model->mesh->dim);
 
     PetscCall(HycoROMPredict(m, m->model->scene->n_parameters, point[k].mu));
     if (m->point_monitor) PetscCall((*m->point_monitor)(m, point[k].at, m->point_ctx));
     if (prediction) PetscCall(HycoROMGetPrediction(m, &prediction[at]));
     if (Lambda) PetscCall(PetscArraycpy(Lambda + at * (size_t)m->model->pairs.n, m->Lambda, m->model->pairs.n));
+    /* Displacements outside the reduced problem's part are computed only if they are wanted. */
     if (U) PetscCall(HycoROMComplete(m));
     if (U) PetscCall(PetscArraycpy(U + at * n_dof, m->U, n_dof));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* All points are checked before the first is solved: a wrong one must not cost the time of those before it. */
 PetscErrorCode HycoROMSolveMany(HycoROM m, PetscInt n, PetscInt n_parameters, const PetscReal mu[],
                                 HycoPrediction prediction[], PetscReal Lambda[], PetscReal U[])
 {
@@ -103,6 +107,7 @@ static PetscErrorCode Share(MPI_Comm comm, size_t bytes, const PetscMPIInt count
 
   PetscFunctionBegin;
   if (!rows || !bytes) PetscFunctionReturn(PETSC_SUCCESS);
+  /* One row as a datatype: counts stay small, where bytes may exceed an int. */
   PetscCallMPI(MPI_Type_contiguous((int)bytes, MPI_BYTE, &row));
   PetscCallMPI(MPI_Type_commit(&row));
   PetscCallMPI(MPI_Allgatherv(MPI_IN_PLACE, 0, row, rows, count, first, row, comm));
@@ -110,6 +115,8 @@ static PetscErrorCode Share(MPI_Comm comm, size_t bytes, const PetscMPIInt count
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Contiguous shares, n r / size in 64 bits. Every rank has the model and gets all results; an error of one rank is
+   raised on all. */
 PetscErrorCode HycoROMSolveShared(MPI_Comm comm, HycoROM m, PetscInt n, PetscInt n_parameters, const PetscReal mu[],
                                   HycoPrediction prediction[], PetscReal Lambda[], PetscReal U[])
 {

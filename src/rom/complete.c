@@ -2,6 +2,7 @@
    problem uses. */
 #include <hycoromimpl.h>
 
+/* Room for the widest row: entries of B are rewritten at each mu without another allocation. */
 PetscErrorCode HycoRowsCreate(const HycoPairs *pairs, PetscInt dim, HycoRows *rows)
 {
   PetscFunctionBegin;
@@ -13,6 +14,7 @@ PetscErrorCode HycoRowsCreate(const HycoPairs *pairs, PetscInt dim, HycoRows *ro
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The search for masters first, which may widen rows of mortars. */
 PetscErrorCode HycoRowsFill(HycoFE fe, HycoPairs *pairs, HycoRows *rows)
 {
   PetscInt entries;
@@ -36,7 +38,8 @@ PetscErrorCode HycoRowsDestroy(HycoRows *rows)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Creates fe_beyond without the mesh's cells: their materials are not needed. */
+/* Creates fe_beyond without the mesh's cells: their materials are not needed. Created on demand: a prediction of
+   displacements in the RID alone needs nothing beyond it. */
 static PetscErrorCode CreateBeyond(HycoROM m)
 {
   PetscFunctionBegin;
@@ -50,6 +53,7 @@ static PetscErrorCode BringRows(HycoROM m, HycoFE fe, const PetscReal mu[])
 {
   PetscFunctionBegin;
   PetscCall(HycoFESetParameters(fe, mu));
+  /* fe knows whether its parameters since the last rows affect these. */
   if (!fe->contact_changed && !fe->gap_changed) PetscFunctionReturn(PETSC_SUCCESS);
   fe->ready = PETSC_FALSE; /* until its rows are computed */
   PetscCall(HycoRowsFill(fe, &m->model->pairs, &m->rows));
@@ -85,6 +89,7 @@ PetscErrorCode HycoROMExpand(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* If the reduced problem is on the whole of the model's mesh, its own rows are those of all contacts. */
 PetscErrorCode HycoROMBringContacts(HycoROM m, HycoFE *fe)
 {
   PetscFunctionBegin;
@@ -96,6 +101,7 @@ PetscErrorCode HycoROMBringContacts(HycoROM m, HycoFE *fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Idempotent until the next prediction. The first unknowns are already set by the solve. */
 PetscErrorCode HycoROMComplete(HycoROM m)
 {
   HycoFE fe;

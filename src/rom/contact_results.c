@@ -49,6 +49,7 @@ static PetscErrorCode Bring(HycoROM m, HycoFE fe)
     changed[p] = (PetscBool)(!c->ready || fe->mu[p] != c->mu[p]);
   changes = HycoSceneChanges(m->model->scene, changed);
   if (c->ready && !changes.nodes && !changes.rows) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Until all three arrays belong to mu. */
   c->ready = PETSC_FALSE;
   PetscCall(HycoContactGeometry(fe, &m->model->pairs, c->normal, c->gap));
   PetscCall(HycoContactAreas(fe, &m->model->pairs, c->area));
@@ -57,6 +58,8 @@ static PetscErrorCode Bring(HycoROM m, HycoFE fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Without reconstruction a hybrid model has those of A_lambda alone, and sums over a contact of the scene would
+   lack the others. */
 PetscBool HycoROMHasAllForces(HycoROM m)
 {
   return (PetscBool)(!m->ops->reconstruct || m->reconstruct || m->m == m->model->pairs.n);
@@ -90,6 +93,7 @@ PetscErrorCode HycoROMSumContacts(HycoROM m, const PetscReal Lambda[], const Hyc
   HycoContactResults(fe, &m->model->pairs, m->carried->normal, m->carried->area, Lambda, pressure, least,
                      m->carried->result);
   for (PetscInt c = 0; c < m->model->scene->n_contacts; c++) {
+    /* A minimum over nothing would be the largest number. */
     if (!m->carried->result[c].n) m->carried->result[c].pressure_min = 0;
   }
   PetscCall(PetscFree(pressure));
@@ -111,6 +115,7 @@ PetscErrorCode HycoROMPushBodies(HycoROM m, const PetscReal Lambda[], const Pets
   *force = 0;
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
     const HycoShear *shear = m->model->pairs.shear;
+    /* The normal points out of the slave: the force on the slave is against it, that of friction as it is. */
     const PetscReal along = Lambda[k] * m->carried->normal[3 * k + axis] - (shear ? shear->force[3 * k + axis] : 0);
 
     if (Lambda[k] <= least || HycoPairsAlone(m->model->scene, &m->model->pairs, k)) continue;
@@ -121,6 +126,7 @@ PetscErrorCode HycoROMPushBodies(HycoROM m, const PetscReal Lambda[], const Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* n = 0: the model does not have all forces. */
 PetscErrorCode HycoROMGetContacts(HycoROM m, PetscInt *n, const HycoContactResult *result[])
 {
   PetscFunctionBegin;

@@ -77,6 +77,7 @@ static PetscErrorCode HoldFloating(HycoFE fe, Mat K)
   PetscCall(HycoFEAssembleH1(fe, HycoMeshLength(fe->mesh), M));
   PetscCall(MatGetTrace(K, &of_K));
   PetscCall(MatGetTrace(M, &of_M));
+  /* By the quotient of the traces: the norm keeps its unit, and no body is much softer or stiffer than another. */
   PetscCall(MatAXPY(K, of_K / of_M, M, DIFFERENT_NONZERO_PATTERN));
   PetscCall(MatDestroy(&M));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -159,6 +160,7 @@ static PetscErrorCode MeasureTime(HycoROM m, HycoBalance b, HycoReplay *replay, 
   AddContact(m, b, j, r);
   HycoTraceShow(m, j);
   if (m->model->whole_pairs.shear) AddFriction(m, r);
+  /* Reactions balance whatever is left at supports. */
   for (PetscInt k = 0; k < fe->n_dof; k++) r[k] = fe->fixed[k] ? 0 : r[k];
   PetscCall(VecRestoreArray(b->r, &r));
   PetscCall(KSPSolve(b->ksp, b->r, b->x));
@@ -166,6 +168,7 @@ static PetscErrorCode MeasureTime(HycoROM m, HycoBalance b, HycoReplay *replay, 
   b->residual[j] = PetscSqrtReal(PetscMax(square, 0));
   PetscCall(HycoFEEnergy(fe, m->U_whole, b->energy));
   for (PetscInt e = 0; e < fe->mesh->n_cells; e++) sum += b->energy[e];
+  /* The strain energy of elastic laws is |u|^2 / 2 in the norm of K: the same norm as the residual's. */
   b->size[j] = PetscSqrtReal(2 * PetscMax(sum + HycoSpringsEnergy(fe, m->U_whole), 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -215,7 +218,8 @@ static PetscReal ContactResidual(HycoROM m, const HycoBalance b, PetscInt j, Pet
   return PetscSqrtReal(sum);
 }
 
-/* Sets the results from all times, relative to the path's largest values. */
+/* Sets the results from all times, relative to the path's largest values. Relative to the largest of the path, as
+   held-out errors are: early steps with small loads would dominate otherwise. */
 static void Summarise(HycoROM m, HycoBalance b, HycoEquilibrium *e)
 {
   const PetscInt n = m->trace.n_listed;
@@ -254,6 +258,8 @@ static PetscErrorCode Measure(HycoROM m, HycoBalance b, HycoEquilibrium *e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* After an error the data are destroyed: a factor or matrices may be half made. The result is kept until the next
+   prediction. */
 PetscErrorCode HycoROMGetEquilibrium(HycoROM m, HycoEquilibrium *e)
 {
   PetscErrorCode ierr;

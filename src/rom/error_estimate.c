@@ -59,6 +59,7 @@ static const PetscReal slight[HYCO_FEATURES] = {1e-6, 1e-6, 1e-3, 0, 0, 1e-7, 0.
 #define INCONSISTENT 1e-3 /* smaller differences are none in practice; */
 #define UNJUDGED     1e-2 /* likewise in a model without held-out points */
 
+/* Of sums of squares; x / 0 counts as 1, a full error, and stays finite for the formulas. */
 static PetscReal Quotient(PetscReal part2, PetscReal size2)
 {
   return size2 > 0 ? PetscSqrtReal(part2 / size2) : part2 > 0 ? 1 : 0;
@@ -93,6 +94,7 @@ static void Contacts(HycoROM m, PetscReal *penetration, PetscReal *adhesion)
 
     moved += bu * bu;
     force += m->Lambda[k] * m->Lambda[k];
+    /* Contacts of A_lambda satisfy (38) by the solve. */
     if (m->model->in_rid[k] && m->model->traits.constrains) continue;
     if (bu > m->rows.gap[k])
       in += (bu - m->rows.gap[k]) * (bu - m->rows.gap[k]);
@@ -138,6 +140,7 @@ static void Shares(HycoROM m, PetscReal *fresh, PetscReal *outside)
   *outside /= sum;
 }
 
+/* A parameter without a range counts by its own unit. */
 PetscReal HycoEstimatesDistance(HycoScene s, const PetscReal a[], const PetscReal b[])
 {
   PetscReal sum = 0;
@@ -191,7 +194,8 @@ static PetscErrorCode MeasureOne(HycoROM m, PetscReal feature[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* For a path the largest values over its listed times. */
+/* For a path the largest values over its listed times. The selected time is restored: the caller's getters refer
+   to it. */
 PetscErrorCode HycoEstimatesFeatures(HycoROM m, PetscReal feature[])
 {
   const PetscInt shown = m->trace.shown;
@@ -212,7 +216,8 @@ PetscErrorCode HycoEstimatesFeatures(HycoROM m, PetscReal feature[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The range of each parameter covered by training. */
+/* The range of each parameter covered by training. Once for a model: it depends on the training points alone, and
+   clones share it. */
 static PetscErrorCode FindReach(HycoROM m)
 {
   const PetscInt n_par = m->model->scene->n_parameters;
@@ -272,6 +277,7 @@ static PetscBool IsInconsistent(HycoROM m, PetscReal inconsistency)
   const HycoEstimates *t = &m->model->estimates;
 
   if (!t->n || t->reached[INCONSISTENCY] < 0) return (PetscBool)(m->model->traits.forces && inconsistency > UNJUDGED);
+  /* An error that the held-out points had too is in their estimates already. */
   return (PetscBool)(inconsistency > PetscMax(INCONSISTENT, HYCO_UNSEEN * t->reached[INCONSISTENCY]));
 }
 
@@ -335,8 +341,10 @@ PetscErrorCode HycoEstimatesEvaluate(HycoROM m, HycoPrediction *p)
   p->unseen = 1;
   p->unseen_feature = -1;
   PetscCall(FindReach(m));
+  /* Reported whether or not there are estimates. */
   p->beyond = Beyond(m, m->fe->mu, nearest);
   if (p->reason > 0) PetscTryTypeMethod(m, estimate, p);
+  /* Features of forces outside the RID need the reconstruction. */
   if (p->reason <= 0 || (m->ops->reconstruct && !m->reconstruct)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoEstimatesFeatures(m, feature));
   p->inconsistency = feature[INCONSISTENCY];

@@ -6,6 +6,7 @@ static HycoRegistry formats = {.sorted = PETSC_TRUE};
 
 HycoDefineRegister(HycoExporterRegister, formats, HycoExporter create)
 
+/* The registry is empty unless an extension has filled it. */
 PetscErrorCode HycoROMExport(HycoROM m, const char format[], const char path[], char **description)
 {
   HycoExporter write;

@@ -29,6 +29,7 @@ PetscErrorCode HycoFloatingDestroy(HycoFloating *floating)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* f->mesh is set first, so that HycoFloatingDestroy() frees it after an error. */
 PetscErrorCode HycoFloatingCreate(PetscInt n, const HycoRigid rigid[], PetscInt n_bodies, const PetscInt of[],
                                   HycoMesh loaded, HycoFloating *floating)
 {
@@ -47,6 +48,8 @@ PetscErrorCode HycoFloatingCreate(PetscInt n, const HycoRigid rigid[], PetscInt 
 
 enum { NUMBERS = 3 + 1 + 6 }; /* of a motion in the file: centre, size, coefficients */
 
+/* The number of motions follows from the dataset's rows (-1: not known yet). The mesh may be absent: a floating
+   body without loads. */
 PetscErrorCode HycoFloatingMove(HycoH5 h, HycoROM m)
 {
   const PetscBool reads = HycoH5Reads(h);
@@ -103,6 +106,7 @@ static PetscErrorCode LoadWork(HycoROM m, HycoFloating f, const PetscReal mu[], 
   ierr = HycoFELoads(m->fe_floating, load);
   if (!ierr) HycoFEGeneralise(m->fe_floating, load);
   for (PetscInt k = 0; !ierr && k < m->fe_floating->n_dof; k++) {
+    /* The mesh has all cells with loads of these bodies, so that its nodal loads are complete. */
     for (PetscInt j = 0; load[k] != 0 && j < f->n; j++)
       work[j] += load[k] * At(f, m->fe_floating, j, k / m->fe_floating->dim, k % m->fe_floating->dim);
   }
@@ -125,6 +129,7 @@ static PetscErrorCode FillDual(HycoROM m, HycoFloating f, HycoFE fe, Dual *d)
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
     PetscReal *work = d->work + d->n * d->p;
 
+    /* Zero forces stay zero in the relative entropy; a slave without master has no partner to balance with. */
     if (!(m->Lambda[k] > 0) || HycoPairsAlone(m->model->scene, &m->model->pairs, k)) continue;
     PetscCall(PetscArrayzero(work, d->p));
     for (PetscInt e = m->rows.start[k]; e < m->rows.start[k + 1]; e++) {
@@ -187,6 +192,7 @@ static PetscErrorCode Minimise(const Dual *d, PetscReal c[], PetscBool *met)
     for (PetscInt i = 0; i < p; i++) most = PetscMax(most, PetscAbsReal(gradient[i]));
     *met = (PetscBool)(most <= BALANCED * size);
     if (*met) break;
+    /* Singular where contacts do not act on a motion: the step has no part in it. */
     PetscCall(HycoPseudoInverse(p, p, hessian, ACTS, inverse));
     for (PetscInt i = 0; i < p; i++) {
       step[i] = 0;
@@ -194,6 +200,8 @@ static PetscErrorCode Minimise(const Dual *d, PetscReal c[], PetscBool *met)
       slope += gradient[i] * step[i];
     }
     do {
+      /* Armijo's condition; below, t is halved already, hence 2 t. exp() may overflow to infinity, which `!(<=)`
+         refuses. */
       for (PetscInt i = 0; i < p; i++) trial[i] = c[i] + t * step[i];
       next = Evaluate(d, trial, gradient, hessian, &size);
       t /= 2;
@@ -225,6 +233,7 @@ PetscErrorCode HycoFloatingBalance(HycoROM m)
   PetscCall(LoadWork(m, f, m->fe->mu, load));
   PetscCall(FillDual(m, f, fe, &d));
   if (d.n) PetscCall(Minimise(&d, c, &met));
+  /* Only if all works agree: forces in between would be neither the model's nor in balance. */
   for (PetscInt k = 0; met && k < d.n; k++) {
     PetscReal power = 0;
 

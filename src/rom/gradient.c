@@ -100,6 +100,7 @@ static PetscErrorCode Close(Work *o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Keeps the prediction: differences move the model's state, and Restore() puts it back. */
 static PetscErrorCode Create(Work *o)
 {
   HycoROM m = o->m;
@@ -126,6 +127,7 @@ static PetscErrorCode Create(Work *o)
   PetscCall((*m->ops->residual)(m, NULL, o->z, o->w[0], &largest));
   o->size = largest;
   for (PetscInt i = 0; i < o->n; i++) {
+    /* Closed or undecided contacts; open ones do not change at first order. */
     if (HycoTangentMayTouch(o->z[o->p + i], o->w[0][o->p + i], o->size)) o->contact[o->k++] = i;
   }
   PetscCall(Close(o));
@@ -211,6 +213,7 @@ static PetscErrorCode Differentiate(Work *o, Along *a)
     PetscCall(MoveAndMeasure(o, at, o->z, o->w[j], a->output + j * n_outputs));
   }
   PetscCall(FindTurns(o, &a->d, &turns));
+  /* A one-sided difference: across the change of masters the central one is of neither side. */
   if (turns) HycoDifferenceTakeSide(&a->d);
   for (PetscInt i = 0; i < o->p + o->k; i++) {
     const PetscInt row = i < o->p ? i : o->p + o->contact[i - o->p];
@@ -265,7 +268,8 @@ static PetscErrorCode Columns(Work *o, HycoGradient *gradient)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The model's data and state are again those of the prediction. */
+/* The model's data and state are again those of the prediction. U after HycoROMComplete(), which would overwrite
+   it with the modes' values. */
 static PetscErrorCode Restore(Work *o)
 {
   HycoROM m = o->m;
@@ -297,6 +301,7 @@ static PetscErrorCode Check(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* After an error the model has no current solution: its state may be that of a difference. */
 PetscErrorCode HycoROMGetGradient(HycoROM m, HycoGradient *gradient)
 {
   Work o = {.m = m};

@@ -88,6 +88,7 @@ static PetscErrorCode PrepareReactions(HycoROM m, HycoOutputCells p)
   PetscCall(PetscMalloc1(m->model->whole_nodes, &place));
   for (PetscInt i = 0; i < m->model->whole_nodes; i++) place[i] = -1;
   ierr = HycoPairsMarkSurfaces(m->model->scene, m->model->mesh, &m->model->pairs, in);
+  /* By number in the whole mesh, the only one that the two meshes share. */
   for (PetscInt i = 0; i < m->model->mesh->n_nodes; i++) place[m->model->mesh->node_whole[i]] = in[i] ? i : -1;
   for (PetscInt i = 0; i < p->mesh->n_nodes; i++) p->surface_node[i] = place[p->mesh->node_whole[i]];
   PetscCall(PetscFree(place));
@@ -139,6 +140,7 @@ static PetscErrorCode ReactPredicted(HycoROM m, HycoOutputCells p, const PetscRe
 {
   PetscFunctionBegin;
   if (!p->reaction) PetscFunctionReturn(PETSC_SUCCESS);
+  /* They replace the sums over the supports' nodes, which need not be computed then. */
   if (HycoResultantsSuffice(m, p->resultants))
     PetscCall(PetscArrayzero(p->reaction, p->fe->n_dof));
   else
@@ -146,7 +148,8 @@ static PetscErrorCode ReactPredicted(HycoROM m, HycoOutputCells p, const PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Once mesh and V are set. */
+/* Once mesh and V are set. Full-order displacements replace the modes' at the unknowns that these cells share with
+   the model's mesh. */
 static PetscErrorCode Fill(HycoROM m, HycoOutputCells p)
 {
   const PetscInt dim = m->model->mesh->dim;
@@ -223,6 +226,7 @@ static PetscErrorCode March(HycoOutputCells p, HycoReplay *r)
   for (PetscInt k = 0, j = 0; k < trace->n; k++) {
     PetscCall(HycoReplayMove(r, k));
     Displace(m, p, trace->gamma + (size_t)k * (size_t)m->model->l, trace->U_fe + (size_t)k * (size_t)m->model->n_fe);
+    /* Every accepted step, because states depend on those before; outputs at the listed ones only. */
     PetscCall(HycoReplayStep(r, k, p->u));
     if (j == trace->n_listed || trace->at[j] != k) continue;
     PetscCall(HycoFEStateFields(p->fe, r->march.state, p->sigma, NULL, NULL, NULL));
@@ -286,6 +290,8 @@ static PetscErrorCode Make(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Ownership is taken before anything can fail, as the header says; `balanced` and `loaded` by
+   HycoResultantsCreate(), also after an error of Fill(). */
 PetscErrorCode HycoROMSetOutputCells(HycoROM m, HycoMesh mesh, PetscReal V[], PetscBool balanced[], HycoMesh loaded)
 {
   PetscErrorCode ierr, taken = PETSC_SUCCESS;
@@ -323,6 +329,8 @@ static PetscErrorCode MeasureTimes(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* In a copy of the history's steps: the path's own have no outputs. NULL until they are evaluated, so that a
+   failure is tried again. */
 PetscErrorCode HycoROMMeasurePath(HycoROM m)
 {
   HycoTrace *trace = &m->trace;
@@ -459,6 +467,8 @@ PetscErrorCode HycoROMMeasureSolution(HycoROM m, const PetscReal mu[], const Pet
     PetscCall(PetscArraycpy(p->u, u, p->fe->n_dof));
     PetscCall(PetscArraycpy(p->sigma, sigma, p->mesh->n_cells * p->fe->n_sigma));
     if (!m->trace.n_listed) PetscCall(React(m, p, NULL, Lambda));
+    /* Reactions of a path need the internal forces, which a stored solution does not give: NaN marks them as
+       unknown. */
     for (PetscInt k = 0; m->trace.n_listed && p->reaction && k < p->fe->n_dof; k++)
       p->reaction[k] = reaction ? reaction[k] : NAN;
   }

@@ -1,6 +1,8 @@
 /* A prediction: checks the parameters, solves by the type's op, reconstructs; and functions common to the types. */
 #include <hycoromimpl.h>
 
+/* Sizes of the model's mesh, not of fe's, which may have fewer nodes. The solver reads the options of the scene in
+   the file. */
 PetscErrorCode HycoROMSetUpFields(HycoROM m)
 {
   PetscFunctionBegin;
@@ -16,6 +18,7 @@ PetscErrorCode HycoROMSetUpFields(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For types without a reduced mesh: every contact has a multiplier of its own, Lambda is complete (spread). */
 PetscErrorCode HycoROMSetUpDefault(HycoROM m)
 {
   PetscFunctionBegin;
@@ -31,6 +34,7 @@ PetscErrorCode HycoROMSetUpDefault(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Once; a refusal (an error of options, say) leaves `ready` false, and the next call begins anew. */
 PetscErrorCode HycoROMSetUp(HycoROM m)
 {
   PetscFunctionBegin;
@@ -54,6 +58,7 @@ PetscErrorCode HycoROMPredict(HycoROM m, PetscInt n, const PetscReal mu[])
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
   p = &m->prediction;
   PetscCall(HycoSceneCheckParameters(m->model->scene, n, mu));
+  /* Before the set-up, so that after an error no getter returns the results of the prediction before. */
   m->solved = m->measured = m->whole_current = m->balanced = PETSC_FALSE;
   HycoLogged(HYCO_EVENT_SETUP, HycoROMSetUp(m));
   p->seconds.setup = HycoNow() - begin;
@@ -63,6 +68,7 @@ PetscErrorCode HycoROMPredict(HycoROM m, PetscInt n, const PetscReal mu[])
   /* a path is reconstructed at its listed times */
   if (m->ops->reconstruct && m->reconstruct && p->reason > 0 && !m->model->scene->n_times)
     HycoLogged(HYCO_EVENT_RECONSTRUCT, (*m->ops->reconstruct)(m));
+  /* After the reconstruction: it scales all forces. */
   if (p->reason > 0 && !m->model->scene->n_times) PetscCall(HycoFloatingBalance(m));
   p->seconds.total = HycoNow() - begin;
   m->solved = PETSC_TRUE;
@@ -91,6 +97,8 @@ static void MeasureContacts(HycoROM m, HycoKKT *kkt)
   kkt->complementarity = both;
 }
 
+/* For types without a system (regression): gamma and Lambda are given, and residuals are measured all the same. A
+   NaN in either is a diverged prediction. */
 PetscErrorCode HycoROMSetSolution(HycoROM m, const PetscReal mu[], const PetscReal gamma[], const PetscReal Lambda[])
 {
   HycoPrediction *p = &m->prediction;
@@ -110,6 +118,8 @@ PetscErrorCode HycoROMSetSolution(HycoROM m, const PetscReal mu[], const PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The type's op reads `work`; for a type without work it is called regardless. Only what setup makes goes:
+   options, the model and its whole mesh stay. */
 PetscErrorCode HycoROMReset(HycoROM m)
 {
   PetscFunctionBegin;

@@ -12,6 +12,7 @@ static PetscErrorCode CheckSolved(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A path's is that of the selected time; a type may know it from its matrices, otherwise it is the cells' sum. */
 PetscErrorCode HycoROMGetStrainEnergy(HycoROM m, PetscReal *energy)
 {
   PetscReal *each;
@@ -50,6 +51,7 @@ static void SumForces(HycoROM m, HycoPrediction *p)
     p->lambda_norm2 += m->Lambda[k] * m->Lambda[k];
   }
   for (PetscInt i = 0; i < n; i++) {
+    /* The threshold needs the largest force: a second loop. */
     const PetscInt k = m->spread ? i : m->contact[i], presses = m->Lambda[k] > HYCO_PRESSES * p->lambda_max;
 
     p->n_active += presses;
@@ -116,7 +118,8 @@ static PetscErrorCode MeasureEquilibrium(HycoROM m, HycoPrediction *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Completes the stresses of the RID's cells and the results that need them or the reconstruction. */
+/* Completes the stresses of the RID's cells and the results that need them or the reconstruction. Computed when
+   asked for, not in HycoROMPredict(): a program that wants forces alone does not pay for estimates and outputs. */
 PetscErrorCode HycoROMGetPrediction(HycoROM m, HycoPrediction *out)
 {
   HycoPrediction *p;
@@ -150,6 +153,7 @@ PetscErrorCode HycoROMGetPrediction(HycoROM m, HycoPrediction *out)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Stresses of a path are those of the state, stored at its listed times. */
 PetscErrorCode HycoROMGetRID(HycoROM m, PetscInt *n_nodes, const PetscInt *node_ids[], const PetscReal *U[],
                              PetscInt *n_cells, const PetscInt *cell_ids[], const PetscReal *sigma[])
 {
@@ -191,6 +195,7 @@ PetscErrorCode HycoROMGetWholeU(HycoROM m, PetscInt *n_nodes, const PetscReal *U
   if (!m->whole_current) {
     const PetscInt dim = m->fe->dim;
 
+    /* The lifting r(u0) is that of mu, with the time of a path's selected step. */
     PetscCall(HycoFESetParameters(m->fe_whole, m->fe->mu));
     for (PetscInt k = 0; k < m->fe_whole->n_dof; k++) {
       PetscReal sum = m->fe_whole->u0[k];
@@ -217,6 +222,7 @@ static PetscErrorCode Look(HycoROM m, HycoSolution *solution, PetscReal **rid)
   PetscFunctionBegin;
   PetscCall(HycoROMGetWholeU(m, NULL, &U));
   PetscCall(PetscCalloc1(m->model->whole->n_cells, rid));
+  /* A field that marks the RID in the output. */
   for (PetscInt e = 0; e < m->model->mesh->n_cells; e++) (*rid)[m->model->mesh->cell_whole[e]] = 1;
   *solution = (HycoSolution){.fe = m->fe_whole,
                              .surface = m->fe_whole,
@@ -275,6 +281,7 @@ PetscErrorCode HycoROMWriteMany(HycoROM m, PetscInt n, PetscInt n_parameters, co
     PetscCall(HycoSceneCheckParameters(m->model->scene, n_parameters, mu + k * n_parameters));
   PetscCall(HycoFieldFileCreate(PETSC_COMM_SELF, path, n, PETSC_TRUE, &file));
   for (PetscInt k = 0; k < n && !ierr; k++) ierr = WritePoint(m, mu + k * n_parameters, file);
+  /* Destroyed without it, the file is removed: it is complete or absent. */
   if (!ierr && n) ierr = HycoFieldFileCommit(file);
   PetscCall(HycoFieldFileDestroy(&file));
   PetscCall(ierr);

@@ -5,6 +5,7 @@
 #include <hycopath.h>
 #include <hycoromimpl.h>
 
+/* fe's parameters hold the point; the time and the tables follow from the step. */
 PetscErrorCode HycoReplayMove(HycoReplay *r, PetscInt k)
 {
   PetscReal mu[HYCO_MAX_PARAMETERS];
@@ -33,6 +34,7 @@ PetscErrorCode HycoReplayTry(HycoReplay *r, PetscInt k, const PetscReal u[], Hyc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The first step has no duration: it gives the state at the path's begin. */
 PetscErrorCode HycoReplayStep(HycoReplay *r, PetscInt k, const PetscReal u[])
 {
   HycoFEStepReport report;
@@ -94,6 +96,7 @@ static PetscErrorCode WriteTimes(HycoReplay *r, HycoSeries series)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The series is destroyed after an error, which removes what was written of it. */
 PetscErrorCode HycoTraceWrite(HycoROM m, const char path[])
 {
   HycoReplay r = {0};

@@ -63,6 +63,7 @@ static PetscErrorCode FindPushed(HycoROM m, HycoResultants r)
         in = (PetscBool)(in || (body[b] && r->balanced[q * scene->n_bodies + b]));
         out = (PetscBool)(out || (body[b] && !r->balanced[q * scene->n_bodies + b]));
       }
+      /* A contact between two bodies of the quantity exerts forces that cancel. */
       r->pushed[q] = (PetscBool)(r->pushed[q] || (in && out));
     }
   }
@@ -70,6 +71,8 @@ static PetscErrorCode FindPushed(HycoROM m, HycoResultants r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Takes ownership first. `pushed` decides online, since it depends on the type whether its contact forces may
+   serve. */
 PetscErrorCode HycoResultantsCreate(HycoROM m, PetscBool balanced[], HycoMesh loaded, HycoResultants *resultants)
 {
   HycoResultants r;
@@ -120,6 +123,7 @@ static const PetscBool *Bodies(HycoROM m, HycoResultants r, PetscInt q)
   return NULL;
 }
 
+/* One quantity that does not follow makes the sums over supports necessary. */
 PetscBool HycoResultantsSuffice(HycoROM m, HycoResultants r)
 {
   for (PetscInt q = 0; q < m->model->scene->n_quantities; q++) {
@@ -173,6 +177,7 @@ PetscErrorCode HycoResultantsSet(HycoROM m, HycoResultants r, const PetscReal mu
     if (!of) continue;
     PetscCall(BringLoads(r, mu));
     if (r->pushed[q]) PetscCall(HycoROMPushBodies(m, Lambda, of, axis, &push));
+    /* 0 - x: no negative zero in reports. */
     value[q] = 0 - push - Load(r, of, axis);
   }
   PetscFunctionReturn(PETSC_SUCCESS);

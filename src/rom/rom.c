@@ -27,6 +27,7 @@ PetscErrorCode HycoROMCreate(HycoROM *rom)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The model is shared and counted; work, fields and solver are the clone's own, made at its first prediction. */
 PetscErrorCode HycoROMClone(HycoROM m, HycoROM *clone)
 {
   HycoROM c;
@@ -134,6 +135,7 @@ static PetscErrorCode DestroyModel(HycoROM rom)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The type's destroy op is called for the last handle alone, before the ops go with the header. */
 PetscErrorCode HycoROMDestroy(HycoROM *model)
 {
   PetscFunctionBegin;
@@ -202,6 +204,7 @@ PetscErrorCode HycoROMGetDomain(HycoROM m, PetscInt sets[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The number of unknowns changes: online data are made again. Ascending order is that of the file and of searches. */
 PetscErrorCode HycoROMSetFE(HycoROM m, HycoHybrid hybrid, PetscInt n, const PetscInt dof[])
 {
   PetscFunctionBegin;
@@ -216,6 +219,7 @@ PetscErrorCode HycoROMSetFE(HycoROM m, HycoHybrid hybrid, PetscInt n, const Pets
 
 HycoDefineMethod(HycoROMGetScene, (HycoROM m, HycoScene *scene), m, HYCO_ROM_CLASSID, *scene = m->model->scene)
 
+/* The history first, whose message says what differs; the fingerprint covers all else. */
 PetscErrorCode HycoROMCheckScene(HycoROM m, HycoScene scene)
 {
   unsigned long long hash;
@@ -245,6 +249,7 @@ HycoDefineMethod(HycoROMSetPointMonitor, (HycoROM m, HycoPointMonitor monitor, v
 HycoDefineMethod(HycoROMSetExtrapolate, (HycoROM m, PetscBool extrapolate), m, HYCO_ROM_CLASSID,
                  PetscCall(HycoSceneSetExtrapolate(m->model->scene, extrapolate)))
 
+/* The solver exists after set-up only. */
 PetscErrorCode HycoROMSetMonitor(HycoROM m, HycoMonitor monitor, void *ctx)
 {
   PetscFunctionBegin;

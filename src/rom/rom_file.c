@@ -27,6 +27,7 @@ static PetscErrorCode MoveTies(HycoH5 h, HycoROM m)
   if (HycoH5Reads(h) ? !HycoH5Has(h, "ties/slave") : !t) PetscFunctionReturn(PETSC_SUCCESS);
   if (HycoH5Reads(h)) {
     PetscCall(HycoTiesCreate(0, m->model->mesh->type, &t));
+    /* HycoH5Int() allocates what it reads; -1: the number follows from the file. */
     HycoFreeAll(&t->slave, &t->master, &t->tie, &t->body, &t->weight, &t->reach);
     t->n = -1;
   }
@@ -153,6 +154,7 @@ static PetscErrorCode SaveEstimates(HycoH5 h, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Before the cast: a damaged number outside int's range would be undefined behaviour. */
 static PetscBool IsCount(PetscReal x)
 {
   return (PetscBool)(x >= 1 && x <= (PetscReal)PETSC_MAX_INT);
@@ -204,6 +206,7 @@ static PetscErrorCode LoadReached(HycoH5 h, HycoROM m)
 /* training/trust of older files: no tail, no stress; count, floors, coefficients of u and of the forces, force. */
 static PetscErrorCode LoadOldEstimates(HycoH5 h, HycoROM m)
 {
+  /* The tail is the last feature, which these files lack: its floor is 1 and its coefficient 0. */
   const PetscInt features = HYCO_ESTIMATE_FEATURES - 1;
   HycoEstimates *t = &m->model->estimates;
   PetscReal *numbers, *at;
@@ -416,6 +419,8 @@ static PetscErrorCode MoveProblem(HycoH5 h, HycoROM m)
   PetscCall(HycoMeshMove(h, "mesh", m->model->scene->n_bodies, &m->model->mesh));
   PetscCall(MoveTies(h, m));
   PetscCall(MoveSizes(h, m));
+  /* Every index is checked against sizes that were read before it: the order of this function is the order of the
+     checks. */
   nodes = &m->model->mesh->n_nodes;
   n_dof = *nodes * m->model->mesh->dim;
   PetscCall(HycoH5Int(h, "mesh/node_whole", 0, m->model->whole_nodes - 1, nodes, 1, &m->model->mesh->node_whole));
@@ -459,6 +464,7 @@ static PetscErrorCode SaveProblem(HycoH5 h, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rank 0 has the problem; the whole mesh is written by rows from all ranks. */
 static PetscErrorCode SaveAll(HycoH5 h, HycoROM m, HycoFOM mesh, PetscInt l, Mat V)
 {
   PetscFunctionBegin;
@@ -467,6 +473,7 @@ static PetscErrorCode SaveAll(HycoH5 h, HycoROM m, HycoFOM mesh, PetscInt l, Mat
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Committed only if all went well on every rank; an error of the write counts before that of the close. */
 PetscErrorCode HycoROMSave(HycoROM m, HycoFOM mesh, PetscInt l, Mat V, const char path[])
 {
   HycoH5 h;
@@ -527,6 +534,7 @@ static PetscErrorCode Load(HycoH5 *h, const char path[], HycoROM *model)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Not collective. The whole-mesh part stays in the file, whose path the model keeps. */
 PetscErrorCode HycoROMLoad(const char path[], HycoROM *model)
 {
   HycoH5 h;
@@ -590,6 +598,7 @@ PetscErrorCode HycoROMBroadcast(MPI_Comm comm, HycoROM *model)
   for (size_t at = 0; at < (size_t)bytes; at += MOST_BYTES)
     PetscCallMPI(
         MPI_Bcast((char *)image + at, (PetscMPIInt)PetscMin(MOST_BYTES, (size_t)bytes - at), MPI_BYTE, 0, comm));
+  /* An earlier model of this rank, from before the scan. */
   if (rank) PetscCall(HycoROMDestroy(model));
   PetscCall(HycoCatchBegin());
   if (rank) ierr = FromImage(image, (size_t)bytes, model);

@@ -3,6 +3,8 @@
 #include <hycopath.h>
 #include <hycoromimpl.h>
 
+/* What the caller has set (times of steps, cuts) stays; contacts must not keep the address of `seen`, which goes
+   with the handle. */
 PetscErrorCode HycoTraceFree(HycoROM m)
 {
   HycoTrace *r = &m->trace;
@@ -16,6 +18,7 @@ PetscErrorCode HycoTraceFree(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Arrays are kept from path to path; `room` and the accepted steps grow in HycoTraceAdd(). */
 PetscErrorCode HycoTraceBegin(HycoROM m)
 {
   const PetscInt n_times = m->model->scene->n_times;
@@ -41,6 +44,7 @@ PetscErrorCode HycoTraceAdd(HycoROM m, PetscReal t)
   HycoTrace *r = &m->trace;
 
   PetscFunctionBegin;
+  /* The number of accepted steps is not known in advance: cuts add some. */
   if (r->n == r->room) {
     r->room = 2 * r->room + 64;
     PetscCall(PetscRealloc((size_t)r->room * sizeof(PetscReal), &r->t));
@@ -87,6 +91,7 @@ PetscErrorCode HycoTraceMeasure(HycoROM m, HycoStep *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* At an accepted, listed time with the state there. */
 PetscErrorCode HycoTraceRecord(HycoROM m, HycoFEState state, HycoStep *s)
 {
   PetscReal *sigma, *inelastic, *mises;
@@ -138,6 +143,7 @@ PetscErrorCode HycoTraceFollow(HycoROM m, HycoPath p, const PetscReal mu[])
   p->n_given = m->trace.n_given;
   p->given = m->trace.given;
   p->most_cuts = m->trace.most_cuts;
+  /* A prediction must not depend on the path before it. */
   p->cold = PETSC_TRUE;
   PetscCall(HycoTraceBegin(m));
   PetscCall(HycoPathBegin(p, mu));
@@ -147,6 +153,7 @@ PetscErrorCode HycoTraceFollow(HycoROM m, HycoPath p, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The lifting is fe_whole's: the caller has moved it to the step (HycoReplayMove()). */
 void HycoTraceWholeU(HycoROM m, PetscInt k, PetscReal U[])
 {
   const HycoTrace *r = &m->trace;
@@ -194,6 +201,7 @@ PetscErrorCode HycoROMGetHistory(HycoROM m, HycoHistory *history)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Later getters, and features, refer to this time: rows, forces, friction and displacements are moved together. */
 PetscErrorCode HycoROMSetStep(HycoROM m, PetscInt k)
 {
   HycoTrace *r = &m->trace;
@@ -222,6 +230,7 @@ PetscErrorCode HycoROMSetStep(HycoROM m, PetscInt k)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* t is borrowed until it is replaced: predictions read it. */
 PetscErrorCode HycoROMSetSteps(HycoROM m, PetscInt n, const PetscReal t[])
 {
   PetscFunctionBegin;

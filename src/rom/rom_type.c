@@ -16,6 +16,7 @@ PetscErrorCode HycoROMTypeNames(const char *const **names)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The name that is kept is the registry's own string, which outlives the caller's. */
 PetscErrorCode HycoROMSetType(HycoROM m, HycoROMType type)
 {
   PetscErrorCode (*create)(HycoROM);

@@ -10,6 +10,7 @@ static HycoShear ShearAt(HycoROM m, PetscInt k)
   return (HycoShear){.force = at, .slip = at + 3 * n, .work = at + 6 * n, .state = at + 7 * n};
 }
 
+/* After HycoTraceList(), which has made that time the shown one. */
 PetscErrorCode HycoTraceListShear(HycoROM m, const HycoShear *shear)
 {
   const HycoShear at = ShearAt(m, m->trace.shown);
@@ -23,6 +24,8 @@ PetscErrorCode HycoTraceListShear(HycoROM m, const HycoShear *shear)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Both lists of contacts point to `seen`, a copy of the four addresses: the arrays are the trace's or the
+   caller's. */
 void HycoTraceShowOther(HycoROM m, const HycoShear *shear)
 {
   m->trace.seen = *shear;

@@ -20,6 +20,7 @@ static PetscErrorCode WritePlaced(MPI_Comm comm, HycoH5 h, const char name[], Pe
   PetscCall(PetscLayoutGetRange(layout, &first, &last));
   PetscCall(PetscMalloc1((last - first) * width, &rows));
   PetscCall(PetscSFCreate(comm, &sf));
+  /* Rows go to the rank that writes their place: a block of rows each, one write of HDF5. */
   PetscCall(PetscSFSetGraphLayout(sf, layout, n, NULL, PETSC_OWN_POINTER, place));
   PetscCall(HycoSFSend(sf, MPIU_INT, width, value, rows));
   PetscCall(PetscSFDestroy(&sf));
@@ -46,6 +47,7 @@ static PetscErrorCode WriteGroupNodes(MPI_Comm comm, HycoH5 h, HycoMesh m, Petsc
 
       if (HycoMeshOwned(m, i) < 0) continue;
       node[n] = m->node_whole ? m->node_whole[i] : i;
+      /* 64 bits: groups times nodes exceed 32 on large meshes. Sorted by group, then by number in the whole mesh. */
       key[n] = (PetscInt64)g * n_nodes + node[n];
       n++;
       start[g + 1]++;
@@ -126,6 +128,7 @@ static PetscErrorCode WriteModes(HycoH5 h, PetscInt l, Mat V)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Groups and facets are sorted by keys, fields by the file's order: the bytes do not depend on the partition. */
 PetscErrorCode HycoROMWriteWhole(HycoH5 h, HycoFOM f, PetscInt l, Mat V)
 {
   HycoMesh m = f->part;
@@ -184,6 +187,7 @@ static PetscErrorCode OpenWhole(HycoModel m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Of this handle; the mesh and its modes belong to the model that clones share. */
 PetscErrorCode HycoROMFreeWhole(HycoROM m)
 {
   PetscFunctionBegin;
@@ -192,6 +196,7 @@ PetscErrorCode HycoROMFreeWhole(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Per handle an fe and U; the mesh is read by the first that asks. */
 PetscErrorCode HycoROMLoadWhole(HycoROM m)
 {
   PetscFunctionBegin;

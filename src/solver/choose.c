@@ -16,6 +16,8 @@ static PetscReal Available(void)
   char line[128];
   double kb = 0;
 
+  /* MemAvailable counts what the kernel can reclaim, which MemFree does not. Without it, half of the physical
+     memory. */
   while (file && kb == 0 && fgets(line, sizeof(line), file)) {
     if (sscanf(line, "MemAvailable: %lf kB", &kb) != 1) kb = 0;
   }
@@ -36,6 +38,7 @@ PetscErrorCode HycoSolverMemory(HycoSolver s, PetscReal *bytes)
   if (*bytes > 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCallMPI(MPI_Comm_split_type(HycoComm(s), MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &node));
   PetscCallMPI(MPI_Comm_rank(node, &rank));
+  /* One rank per machine reads it: the sum over all ranks would count a machine's memory as often as it has ranks. */
   mine = rank == 0 ? 0.8 * Available() : 0;
   PetscCallMPI(MPI_Allreduce(&mine, bytes, 1, MPIU_REAL, MPI_SUM, HycoComm(s)));
   PetscCallMPI(MPI_Comm_free(&node));
@@ -71,6 +74,7 @@ static PetscErrorCode TakeIterative(HycoSolver s, HycoSolverForm *form)
 
   PetscFunctionBegin;
   s->iterative = PETSC_TRUE;
+  /* Restored below: the choice is of this K, and the next one is again made with the user's form. */
   PetscCall(PetscStrncpy(asked, s->form_name, sizeof(asked)));
   /* An automatic choice may leave the user's form; a stated choice may not. */
   if (s->linear == HYCO_LINEAR_AUTO) s->form_name[0] = '\0';
@@ -123,11 +127,14 @@ PetscErrorCode HycoChooseLinear(HycoSolver s, HycoSolverForm *form)
   PetscCall(PetscObjectTypeCompareAny((PetscObject)s->system->K, &aij, MATSEQAIJ, MATMPIAIJ, ""));
   PetscCall(PetscObjectGetId((PetscObject)s->system->K, &id));
   same = (PetscBool)(s->chosen_for == id && s->linear == HYCO_LINEAR_AUTO);
+  /* By the identity of the object and not by its state: a K with other values has the same pattern and memory. */
   s->chosen_for = id;
+  /* The form was found as for a direct solver, and is replaced again. */
   if (same && s->iterative) PetscCall(TakeIterative(s, form));
   if (same) PetscFunctionReturn(PETSC_SUCCESS);
   s->iterative = PETSC_FALSE;
   s->why_iterative[0] = '\0';
+  /* A dense K has a factor of its own size, and no multigrid. */
   if (!aij) PetscFunctionReturn(PETSC_SUCCESS);
   if (s->linear == HYCO_LINEAR_AUTO) PetscCall(DecideByMemory(s, form));
   if (s->linear == HYCO_LINEAR_ITERATIVE) PetscCall(TakeIterative(s, form));

@@ -36,6 +36,7 @@ static PetscErrorCode Fill(HycoSystem y, PetscInt p, const Vec z[], PetscReal M[
     }
     PetscCall(VecRestoreArrayRead(all, &row));
   }
+  /* Any definite block would do: feasibility does not depend on it. */
   for (size_t j = (size_t)p; j < n; j++) M[j * n + j] = 1;
   PetscCall(VecScatterDestroy(&scatter));
   PetscCall(VecDestroy(&all));
@@ -61,6 +62,7 @@ PetscErrorCode HycoSolverLifts(HycoSolver s, PetscBool *lifts)
   if (!y->K) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatGetNullSpace(y->K, &kernel));
   if (kernel) PetscCall(MatNullSpaceGetVecs(kernel, NULL, &lcp.p, &motion));
+  /* For too many contacts, where the dense problem is not set up: the residual of equilibrium says it approximately. */
   *lifts = (PetscBool)(lcp.p > 0 && s->kkt.stationarity > s->rtol);
   if (!lcp.p || !y->m || y->m > HYCO_MOST_CONTACTS) PetscFunctionReturn(PETSC_SUCCESS);
   n = lcp.p + y->m;

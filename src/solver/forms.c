@@ -26,6 +26,7 @@ PetscErrorCode HycoSolverCreateForms(HycoSolver s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A linear search: there are about six forms, and it is called a few times per solve. */
 HycoSolverForm HycoSolverFindForm(HycoSolver s, const char name[])
 {
   for (PetscInt k = 0; k < s->n_forms; k++) {

@@ -48,6 +48,7 @@ PetscErrorCode HycoSolverCreate(MPI_Comm comm, HycoSolver *solver)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Forms go before the factor that they share. */
 PetscErrorCode HycoSolverDestroy(HycoSolver *solver)
 {
   HycoSolver s;
@@ -78,6 +79,7 @@ PetscErrorCode HycoSolverSetSystem(HycoSolver s, HycoSystem system)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A word of -hyco_solver_type, in any case; a Tao type's name is for HycoSolverSetTaoType(). */
 PetscErrorCode HycoSolverSetType(HycoSolver s, HycoSolverType type)
 {
   PetscFunctionBegin;
@@ -120,10 +122,12 @@ PetscErrorCode HycoSolverSetLinear(HycoSolver s, HycoLinear linear, PetscReal gi
   HycoCheck(gigabytes >= 0, "the memory is %g GB; it must be 0 (the free memory) or more", (double)gigabytes);
   s->linear = linear;
   s->memory = 1e9 * gigabytes;
+  /* The choice is made anew at the next solve, even if K is the same. */
   s->chosen_for = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Of each of the four relative residuals, all recomputed: no method's own measure decides. */
 PetscErrorCode HycoSolverSetTolerance(HycoSolver s, PetscReal rtol)
 {
   PetscFunctionBegin;
@@ -239,6 +243,7 @@ PetscErrorCode HycoSolverSetFromOptions(HycoSolver s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Of an object that exists for its options alone, so that help and checks of unknown options have them all. */
 PetscErrorCode HycoSolverDeclare(PetscOptions options)
 {
   HycoSolver s;
@@ -255,6 +260,7 @@ PetscBool HycoSolverNeedsSymmetry(HycoSolver s)
   return (PetscBool)(s->type == TAO && HycoTaoTraits(s->tao_type) & HYCO_TAO_SYMMETRIC);
 }
 
+/* A Tao type that is the library's own has the word of the solver type; TAO's are named in addition. */
 PetscErrorCode HycoSolverNameMethod(HycoSolver s, const char form[])
 {
   PetscFunctionBegin;
@@ -326,6 +332,7 @@ PetscErrorCode HycoSolverAcceptingForm(HycoSolver s, HycoSolverForm stay, HycoSo
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   for (PetscInt k = 0; k < s->n_forms; k++) {
+    /* The cheapest; a form that refuses may say why, for the case that none accepts. */
     PetscCall(Accepts(s, s->forms[k], &cost, why));
     if (cost < 0 || cost >= least) continue;
     least = cost;
@@ -350,6 +357,7 @@ static PetscErrorCode FirstForm(HycoSolver s, HycoSolverForm *form)
             "TAO's %s needs a symmetric system, and this one is not symmetric; use -hyco_tao_type ssils, asils, ssfls "
             "or asfls",
             s->now.type);
+  /* Asked as for a direct solver: forms answer by s->iterative, which the choice below needs first. */
   s->iterative = PETSC_FALSE;
   PetscCall(HycoSolverAcceptingForm(s, NULL, form, why));
   s->iterative = iterative;
@@ -384,6 +392,7 @@ static PetscErrorCode Attempt(HycoSolver s, HycoSolverForm form, Vec x, Vec L)
   PetscFunctionBegin;
   s->form = form;
   s->its = 0;
+  /* For forms that say nothing: Judge() decides by the residuals. */
   s->reason = HYCO_DIVERGED_RESIDUAL;
   s->by_factor = PETSC_TRUE;
   PetscCall(form->ops->solve(s, form, x, L, &solved));
@@ -485,6 +494,7 @@ static PetscErrorCode Attempts(HycoSolver s, Vec x, Vec L)
   for (int k = 0; k < N_CANDIDATES; k++) {
     if (!IsNext(s, k, tried, chosen)) continue;
     PetscCall(Try(s, &order[k], x, L, &tried[k]));
+    /* The type for which an empty entry stood: it must not be tried twice. */
     if (!chosen[0]) PetscCall(PetscStrncpy(chosen, s->now.type, sizeof(chosen)));
     if (!tried[k]) continue;
     if (s->reason > 0 || s->reason == HYCO_DIVERGED_SINGULAR || !s->fallback || !s->system->m) break;
@@ -509,6 +519,7 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
   PetscCheck(s->system && (s->system->F || s->system->G), PETSC_COMM_SELF, PETSC_ERR_ORDER,
              "call HycoSolverSetSystem(), with a system whose matrices and vectors are set, before HycoSolverSolve()");
   PetscCall(HycoSystemCheckBlocks(s->system));
+  /* A factor made ahead by HycoSolverFactor() belongs to this solve. */
   s->seconds_factor = s->seconds_before;
   s->its = s->linear_its = s->linear_solves = s->linear_most = 0;
   s->falling_back = PETSC_FALSE;
@@ -520,6 +531,7 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
   if (s->reason < 0 && s->system->K) PetscCall(HycoKernelSize(s->system->K, &n_free));
   if (n_free) PetscCall(HycoSolverLifts(s, &lifts));
   if (n_free) s->reason = lifts ? HYCO_DIVERGED_FLOATING : HYCO_DIVERGED_HELD;
+  /* What was passed for one solve ends here, whether or not it was used. */
   s->free = NULL;
   s->start_set = NULL;
   s->target = 0;
@@ -597,6 +609,7 @@ HycoDefineMethod(HycoSolverGetMethod, (HycoSolver s, const char *method[]), s, H
 HycoDefineMethod(HycoSolverGetLinear, (HycoSolver s, const char *linear[]), s, HYCO_SOLVER_CLASSID,
                  *linear = s->linear_method)
 
+/* Of the last solve: the factor's part is 0 if it was kept. */
 PetscErrorCode HycoSolverGetSeconds(HycoSolver s, PetscReal *factor, PetscReal *solve)
 {
   PetscFunctionBegin;
@@ -606,6 +619,8 @@ PetscErrorCode HycoSolverGetSeconds(HycoSolver s, PetscReal *factor, PetscReal *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Sentences for the user, who needs to know what to do: the reasons of a model's and of a path's solves are among
+   them. */
 const char *HycoReasonName(HycoReason reason)
 {
   switch (reason) {
@@ -636,6 +651,7 @@ const char *HycoReasonName(HycoReason reason)
   }
 }
 
+/* Also before the first solve: reason 0 means that there was none. */
 PetscErrorCode HycoSolverView(HycoSolver s, PetscViewer viewer)
 {
   const char *tao = "";

@@ -5,6 +5,7 @@
 /* A residual below this share of F needs no refinement: the tolerance of the residuals is 1e-8. */
 #define REFINE 1e-10
 
+/* The members of the solver's struct; the struct itself is part of the solver. */
 PetscErrorCode HycoStiffnessDestroy(HycoStiffness *f)
 {
   PetscFunctionBegin;
@@ -37,6 +38,7 @@ static PetscErrorCode FactorDense(HycoStiffness *f, Mat K, PetscBool *singular)
   for (PetscInt j = 0; j < n; j++)
     PetscCall(PetscArraycpy(f->lu + (size_t)j * (size_t)n, k + (size_t)j * (size_t)lda, n));
   PetscCall(MatDenseRestoreArrayRead(K, &k));
+  /* LU also for a symmetric K: that of a reduced model need not be definite. */
   LAPACKgetrf_(&f->n, &f->n, f->lu, &f->n, f->ipiv, &info);
   *singular = (PetscBool)(info != 0);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -51,6 +53,9 @@ static PetscErrorCode FactorSparse(HycoSolver s, Mat Bt, Mat B, PetscReal S[], P
   PetscInt p;
 
   PetscFunctionBegin;
+  /* Solves go by the factor that exists: that of a dense K before is given up. */
+  HycoFreeAll(&f->lu, &f->ipiv);
+  f->n = 0;
   if (!f->direct) PetscCall(HycoDirectCreate(HycoComm(s), &f->direct));
   PetscCall(HycoDirectPinKernel(f->direct, y->K));
   PetscCall(HycoDirectAnalyse(f->direct, y->K, Bt, B, y->symmetric, &f->bytes));
@@ -109,6 +114,7 @@ PetscErrorCode HycoStiffnessCondense(HycoSolver s, Mat Bt, Mat B, PetscReal S[])
 
   PetscFunctionBegin;
   PetscCall(PetscBLASIntCast(s->system->m, &m));
+  /* Grows only: reduced models solve thousands of systems of the same size. */
   if (f->room < entries) {
     PetscCall(PetscFree(f->X));
     PetscCall(PetscMalloc1(entries, &f->X));
@@ -202,6 +208,7 @@ PetscErrorCode HycoStiffnessCorrect(HycoSolver s, Vec L, Vec x)
   PetscCall(MatMult(y->K, x, Kx));
   PetscCall(VecAXPY(r, -1, Kx));
   PetscCall(VecNorm(r, NORM_2, &residual));
+  /* Mostly here. One step suffices, since the factor is that of K itself, with round-off as its only error. */
   if (residual <= REFINE * size) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoStiffnessSolve(s, r, Kx));
   PetscCall(VecAXPY(x, 1, Kx));
@@ -219,6 +226,7 @@ PetscErrorCode HycoStiffnessFactor(HycoSolver s, Mat Bt, Mat B, PetscReal S[], P
   PetscFunctionBegin;
   *singular = PETSC_FALSE;
   PetscCall(HycoOperatorStateUpdate(&f->of, K, B, &same));
+  if (same && !f->lu) PetscCall(HycoNameLinear(s, NULL));
   if (same) PetscFunctionReturn(PETSC_SUCCESS);
   f->of.K = 0; /* invalid until completed */
   PetscCall(PetscObjectTypeCompare((PetscObject)K, MATSEQDENSE, &dense));

@@ -1,6 +1,7 @@
 /* HycoSystem: references K, Bt, B, F, D; recomputes the KKT residuals. */
 #include <hycosolverimpl.h>
 
+/* References only: matrices and vectors stay the caller's, and may change between solves. */
 PetscErrorCode HycoSystemCreate(MPI_Comm comm, HycoSystem *system)
 {
   PetscFunctionBegin;
@@ -10,6 +11,7 @@ PetscErrorCode HycoSystemCreate(MPI_Comm comm, HycoSystem *system)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Created again from the new vectors, whose layout may differ. */
 static PetscErrorCode FreeWork(HycoSystem s)
 {
   PetscFunctionBegin;
@@ -31,6 +33,7 @@ PetscErrorCode HycoSystemWork(HycoSystem s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Gives up the references; the objects live as long as their owners keep them. */
 PetscErrorCode HycoSystemDestroy(HycoSystem *system)
 {
   HycoSystem s;
@@ -74,6 +77,7 @@ PetscErrorCode HycoSystemSetMatrices(HycoSystem s, Mat K, Mat Bt, Mat B, PetscBo
     PetscCall(PetscObjectReference((PetscObject)B));
     PetscCall(PetscObjectReference((PetscObject)Bt));
   }
+  /* References first, then the old ones are given up: the new object may be the old one. */
   PetscCall(PetscObjectReference((PetscObject)K));
   PetscCall(MatDestroy(&s->K));
   PetscCall(MatDestroy(&s->B));
@@ -86,6 +90,7 @@ PetscErrorCode HycoSystemSetMatrices(HycoSystem s, Mat K, Mat Bt, Mat B, PetscBo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Borrowed; any pointer may be NULL. */
 PetscErrorCode HycoSystemGetMatrices(HycoSystem s, Mat *K, Mat *Bt, Mat *B)
 {
   PetscFunctionBegin;
@@ -118,6 +123,7 @@ PetscErrorCode HycoSystemSetVectors(HycoSystem s, Vec F, Vec D)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Borrowed; F is NULL where the flexibility is given, and D is then the gap without forces. */
 PetscErrorCode HycoSystemGetVectors(HycoSystem s, Vec *F, Vec *D)
 {
   PetscFunctionBegin;
@@ -406,6 +412,7 @@ PetscErrorCode HycoSystemComputeKKT(HycoSystem s, Vec x, Vec L, HycoKKT *kkt)
   PetscCall(VecNorm(x, NORM_INFINITY, &size_x));
   PetscCall(VecNorm(s->D, NORM_INFINITY, &size_D));
   PetscCall(VecNorm(L, NORM_INFINITY, &size_L));
+  /* The size of the terms of D - B x, whose cancellation limits what any solver can reach. */
   size_gap = PetscMax(size_D, s->size_B * size_x);
   if (s->blocks) {
     PetscCall(GapKKT(s, gap, L, size_gap, size_L, kkt));
@@ -428,6 +435,7 @@ PetscErrorCode HycoSystemComputeKKT(HycoSystem s, Vec x, Vec L, HycoKKT *kkt)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Matrices by their sizes alone (ASCII_INFO): their entries would fill the screen. */
 PetscErrorCode HycoSystemView(HycoSystem s, PetscViewer viewer)
 {
   PetscFunctionBegin;

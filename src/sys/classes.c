@@ -32,6 +32,7 @@ PetscErrorCode HycoClassesRegister(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* At PetscFinalize(): the numbers are PETSc's, and HycoPackageCheck() must fail until they are registered again. */
 PetscErrorCode HycoClassesForget(void)
 {
   PetscFunctionBegin;
@@ -47,6 +48,7 @@ PetscErrorCode HycoPackageCheck(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A freed handle may still be readable: PetscHeaderDestroy() clears the class id, so that this finds most of them. */
 PetscErrorCode HycoHandleCheck(const void *handle, const PetscClassId *classid, const char function[])
 {
   size_t k = 0;
@@ -61,6 +63,7 @@ PetscErrorCode HycoHandleCheck(const void *handle, const PetscClassId *classid, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The caller pops the tab. */
 PetscErrorCode HycoViewBegin_Private(PetscObject object, PetscViewer *viewer, PetscBool *ascii)
 {
   PetscFunctionBegin;

@@ -1,6 +1,8 @@
 /* Rows of all ranks on rank 0, and rows from each rank to each other. */
 #include <hycoimpl.h>
 
+/* Ordered by rank. *all is allocated on rank 0, with room for one more so that it is never NULL there; NULL on the
+   others. */
 PetscErrorCode HycoConcatenate(MPI_Comm comm, PetscInt n, const void *mine, MPI_Datatype type, size_t size,
                                PetscInt *n_all, void *all)
 {
@@ -21,6 +23,8 @@ PetscErrorCode HycoConcatenate(MPI_Comm comm, PetscInt n, const void *mine, MPI_
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Row k goes to rank to[k]; rows of one sender keep their order. A row is one element of an MPI type, so that
+   counts fit into an int. */
 PetscErrorCode HycoSendRows(MPI_Comm comm, PetscInt n, const PetscMPIInt to[], size_t size, const void *row,
                             PetscInt *n_got, void *got)
 {

@@ -19,6 +19,7 @@ static PetscErrorCode CatchHandler(MPI_Comm comm, int line, const char *function
                                    PetscErrorType type, const char *message, void *ctx)
 {
   (void)comm, (void)line, (void)function, (void)file, (void)ctx;
+  /* PETSc calls the handler again in each function on the way up. */
   if (type == PETSC_ERROR_INITIAL) {
     if (message && message[0]) {
       snprintf(caught_line, sizeof(caught_line), "%s", message);
@@ -52,6 +53,7 @@ void HycoMakePrintable(char text[])
   }
 }
 
+/* With a decimal point in any locale: the calling program may have set another. */
 void HycoFormat(char line[HYCO_LINE], const char format[], ...)
 {
   void *before = HycoPointBegin();
@@ -71,6 +73,8 @@ PetscErrorCode HycoListAdd(char list[HYCO_LINE], const char between[], const cha
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Until HycoCatchEnd(), on every path: handlers form a stack. Catching may be nested, but only the last message is
+   kept. */
 PetscErrorCode HycoCatchBegin(void)
 {
   PetscFunctionBegin;
@@ -88,6 +92,7 @@ PetscErrorCode HycoCatchEnd(PetscErrorCode caught, char message[HYCO_LINE])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The message was caught without printing; an error other than "no model" is raised again with it. */
 PetscErrorCode HycoCatchNoModel(PetscErrorCode caught, const char message[])
 {
   PetscFunctionBegin;
@@ -95,9 +100,11 @@ PetscErrorCode HycoCatchNoModel(PetscErrorCode caught, const char message[])
   SETERRQ(PETSC_COMM_SELF, caught, "%s", message);
 }
 
+/* Collective, also without an error. The first rank that failed is heard: others often fail as a consequence. */
 PetscErrorCode HycoErrorSync(MPI_Comm comm, PetscErrorCode caught, const char message[])
 {
   PetscMPIInt rank, size, mine, first;
+  /* Broadcast as bytes: the ranks run the same program. */
   struct {
     PetscBool no_model;
     char line[HYCO_LINE];
@@ -118,6 +125,7 @@ PetscErrorCode HycoErrorSync(MPI_Comm comm, PetscErrorCode caught, const char me
   SETERRQ(comm, said.no_model ? HYCO_ERR_NO_MODEL : PETSC_ERR_USER, "%s", said.line);
 }
 
+/* FNV-1a; also used to continue a hash. */
 unsigned long long HycoHash(unsigned long long hash, const void *data, size_t bytes)
 {
   const unsigned char *byte = (const unsigned char *)data;
@@ -126,6 +134,7 @@ unsigned long long HycoHash(unsigned long long hash, const void *data, size_t by
   return hash;
 }
 
+/* Of all threads of the process. */
 PetscReal HycoCPU(void)
 {
   struct timespec now;

@@ -43,7 +43,8 @@ static unsigned Node(void)
   return node;
 }
 
-/* The position of ".hyco-NODE-PID-NUMBER." in a file's name, with its numbers; NULL: not found. */
+/* The position of ".hyco-NODE-PID-NUMBER." in a file's name, with its numbers; NULL: not found. Names may contain
+   ".hyco-" themselves: the next occurrence is tried. */
 static const char *FindTag(const char name[], unsigned *node, long *pid)
 {
   unsigned number;
@@ -65,6 +66,7 @@ void HycoFileOwner(const char name[], char owner[HYCO_FILE_NAME])
   snprintf(owner, HYCO_FILE_NAME, "%.*s", (int)(tag ? (size_t)(tag - name) : strlen(name)), name);
 }
 
+/* In the folder of the final file: rename() is atomic only within a file system. */
 static void Temporary(const char place[], const char kind[], char name[HYCO_FILE_NAME])
 {
   static unsigned number;
@@ -72,7 +74,8 @@ static void Temporary(const char place[], const char kind[], char name[HYCO_FILE
   snprintf(name, HYCO_FILE_NAME, "%s.hyco-%08x-%ld-%u.%s", place, Node(), (long)getpid(), number++, kind);
 }
 
-/* Whether the file of that name was left by a process that no longer exists. */
+/* Whether the file of that name was left by a process that no longer exists. kill() with signal 0 only asks
+   whether the process exists; process ids of another machine cannot be asked, so age decides. */
 static PetscBool IsLeft(const char path[], unsigned node, long pid)
 {
   struct stat info;
@@ -81,6 +84,8 @@ static PetscBool IsLeft(const char path[], unsigned node, long pid)
   return (PetscBool)(stat(path, &info) == 0 && S_ISREG(info.st_mode) && time(NULL) - info.st_mtime > OLD);
 }
 
+/* Called before writing: a killed run leaves its temporary file, which has the size of a model. An empty name
+   sweeps the folder. Failures are ignored, since another process may sweep too. */
 PetscErrorCode HycoFileSweep(const char path[])
 {
   char place[PETSC_MAX_PATH_LEN], file[2 * PETSC_MAX_PATH_LEN];
@@ -109,6 +114,7 @@ PetscErrorCode HycoFileSweep(const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One name for all ranks, made on rank 0. */
 PetscErrorCode HycoFileScratch(MPI_Comm comm, const char path[], const char kind[], char scratch[HYCO_FILE_NAME])
 {
   char place[PETSC_MAX_PATH_LEN];
@@ -130,6 +136,7 @@ PetscErrorCode HycoFileKeep(const char scratch[], const char path[])
 
   PetscFunctionBegin;
   HycoFileFollow(path, place);
+  /* errno is saved: unlink() may change it. */
   if (rename(scratch, place) != 0) {
     const int failed = errno;
 
@@ -139,6 +146,7 @@ PetscErrorCode HycoFileKeep(const char scratch[], const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Before long work. A file that does not exist is checked when it is opened. */
 PetscErrorCode HycoFileCheckPlace(const char option[], const char path[], HycoFileKind kind, PetscBool *direct)
 {
   const char *dash = option[0] ? "-" : "", *blank = option[0] ? " " : "";
@@ -159,6 +167,7 @@ PetscErrorCode HycoFileCheckPlace(const char option[], const char path[], HycoFi
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* errno is that of the caller's failed call. */
 static PetscErrorCode CheckOpen(const char path[], PetscBool good)
 {
   PetscFunctionBegin;
@@ -189,6 +198,7 @@ static PetscErrorCode OpenPlace(HycoFile f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Follows links: a link in place of the output stays, and its target is replaced. */
 PetscErrorCode HycoFileCreate(const char path[], HycoFileKind kind, HycoFile *file)
 {
   HycoFile f;
@@ -214,7 +224,8 @@ FILE *HycoFileStream(HycoFile file)
   return file->stream;
 }
 
-/* Flushes everything written to the file. Returns 0, or errno. */
+/* Flushes everything written to the file. Returns 0, or errno. Only numbers are forced to the disk: text is
+   written again in seconds. */
 static int Flush(HycoFile f)
 {
   errno = 0;
@@ -223,6 +234,7 @@ static int Flush(HycoFile f)
   return 0;
 }
 
+/* pwrite() may write less than asked, for example at a limit of 2 GB. */
 PetscErrorCode HycoFilePut(int fd, const char path[], const void *data, size_t bytes, size_t place)
 {
   PetscFunctionBegin;
@@ -252,6 +264,8 @@ PetscErrorCode HycoFileFlush(HycoFile file)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Without commit the temporary file is removed, and a former file of the name stays as it was. fclose() can fail
+   too: the last bytes are written there. */
 PetscErrorCode HycoFileClose(HycoFile *file, PetscBool commit)
 {
   HycoFile f = *file;

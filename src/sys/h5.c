@@ -60,6 +60,7 @@ static PetscErrorCode New(const char path[], HycoH5 *file)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Closing the file is the caller's. */
 static PetscErrorCode Free(HycoH5 *file)
 {
   PetscFunctionBegin;
@@ -99,7 +100,8 @@ static PetscErrorCode MarkSealed(HycoH5 f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A file in memory: HDF5 cannot close a file on a full disk, but memory can be discarded. */
+/* A file in memory: HDF5 cannot close a file on a full disk, but memory can be discarded. Nothing reaches the
+   disk: backing store is off in InMemory(). */
 static PetscErrorCode CreateImage(const char name[], PetscBool table, HycoH5 *file)
 {
   hid_t access;
@@ -124,6 +126,7 @@ PetscErrorCode HycoH5CreateImage(const char name[], HycoH5 *file)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The output is opened first: a place that cannot be written to is an error before the numbers are computed. */
 static PetscErrorCode Create(const char path[], PetscBool table, HycoH5 *file)
 {
   HycoFile out;
@@ -150,13 +153,14 @@ static PetscErrorCode MakeRoom(HycoH5 f, size_t bytes)
   const off_t end = lseek(f->fd, 0, SEEK_END);
 
   PetscFunctionBegin;
+  /* Really written: a sparse file of that length would not reserve the blocks on every file system. */
   PetscCall(HycoFilePut(f->fd, f->path, zeros, ROOM, (size_t)end));
   if (ftruncate(f->fd, end + (off_t)bytes + ROOM) != 0) PetscCall(HycoFileComplain(f->path, errno));
   (void)!ftruncate(f->fd, end);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On rank 0. */
+/* On rank 0. O_EXCL in HycoFileOpenScratch() claims the name, then HDF5 truncates the same file. */
 static PetscErrorCode BeginShared(HycoH5 f)
 {
   PetscBool direct;
@@ -174,7 +178,8 @@ static PetscErrorCode BeginShared(HycoH5 f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On the other ranks. */
+/* On the other ranks. Rank 0 already has it open. On a cluster whose ranks do not share the folder, this fails
+   with a message. */
 static PetscErrorCode JoinShared(HycoH5 f)
 {
   PetscFunctionBegin;
@@ -219,6 +224,7 @@ static PetscErrorCode CreateShared(MPI_Comm comm, const char path[], PetscBool t
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Collective. Datasets are then created by all ranks in the same order. */
 PetscErrorCode HycoH5CreateShared(MPI_Comm comm, const char path[], HycoH5 *file)
 {
   PetscFunctionBegin;
@@ -233,6 +239,7 @@ PetscErrorCode HycoH5CreateTable(MPI_Comm comm, const char path[], HycoH5 *file)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* HDF5 copies the image: the caller may free it. */
 PetscErrorCode HycoH5OpenImage(const char name[], void *image, size_t size, HycoH5 *file)
 {
   hid_t access = InMemory();
@@ -250,6 +257,7 @@ PetscErrorCode HycoH5OpenImage(const char name[], void *image, size_t size, Hyco
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The checksum is verified before HDF5 parses anything: a damaged structure can crash it. */
 PetscErrorCode HycoH5Open(const char path[], HycoH5 *file)
 {
   HycoH5 f;
@@ -278,6 +286,7 @@ PetscErrorCode HycoH5Open(const char path[], HycoH5 *file)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What cannot be opened is not hyco's; a model has `kind`, a snapshot a fingerprint. */
 PetscErrorCode HycoH5IsPrecious(const char path[], PetscBool *precious)
 {
   HycoH5 h = NULL;
@@ -295,6 +304,7 @@ PetscErrorCode HycoH5IsPrecious(const char path[], PetscBool *precious)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* remedy: appended if the file is damaged, not if it is missing. */
 PetscErrorCode HycoH5OpenOr(const char path[], const char remedy[], HycoH5 *file)
 {
   PetscErrorCode caught;
@@ -309,6 +319,7 @@ PetscErrorCode HycoH5OpenOr(const char path[], const char remedy[], HycoH5 *file
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The caller frees *image. */
 PetscErrorCode HycoH5GetImage(HycoH5 f, void **image, size_t *size)
 {
   ssize_t bytes = H5Fflush(f->id, H5F_SCOPE_GLOBAL) < 0 ? -1 : H5Fget_file_image(f->id, NULL, 0);
@@ -373,9 +384,11 @@ static PetscErrorCode Place(HycoH5 f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rank 0's HDF5 has created all datasets. */
+/* Rank 0's HDF5 has created all datasets. Before the other ranks' data are synced, because HDF5 writes its
+   metadata at the close. */
 static PetscErrorCode EndLayout(HycoH5 f)
 {
+  /* Cleared first: after a failed close CloseShared() must not close it again. */
   const hid_t id = f->id;
 
   PetscFunctionBegin;
@@ -384,6 +397,7 @@ static PetscErrorCode EndLayout(HycoH5 f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The order matters: layout, then all numbers, then the checksum over both. */
 static PetscErrorCode Commit(HycoH5 f)
 {
   PetscFunctionBegin;
@@ -407,6 +421,7 @@ static PetscErrorCode CloseShared(HycoH5 f, PetscBool commit)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Frees *file on errors too, and sets it to NULL. commit false: nothing stays on the disk. */
 PetscErrorCode HycoH5Close(HycoH5 *file, PetscBool commit)
 {
   HycoH5 f = *file;
@@ -435,7 +450,7 @@ PetscReal HycoH5Written(HycoH5 f)
   return (PetscReal)f->written;
 }
 
-/* The number of bytes of a row. */
+/* The number of bytes of a row. HYCO_H5_LINE is a dataset of one dimension. */
 static size_t Width(hid_t type, PetscInt cols)
 {
   return (cols == HYCO_H5_LINE ? 1 : (size_t)cols) * H5Tget_size(type);
@@ -444,6 +459,7 @@ static size_t Width(hid_t type, PetscInt cols)
 /* Creates a dataset of rows x cols numbers, or of one dimension. For a shared file, reserves its space on the disk. */
 static PetscErrorCode CreateSet(HycoH5 f, const char name[], hid_t type, PetscInt rows, PetscInt cols, hid_t *set)
 {
+  /* For a line the second one is not read. */
   hsize_t dims[2] = {(hsize_t)rows, (hsize_t)cols};
   hid_t space, links, made;
 
@@ -454,6 +470,7 @@ static PetscErrorCode CreateSet(HycoH5 f, const char name[], hid_t type, PetscIn
   H5Pset_create_intermediate_group(links, 1);
   made = H5Pcreate(H5P_DATASET_CREATE);
   H5Pset_obj_track_times(made, 0); /* the same model must give the same file, byte for byte */
+  /* Its offset must be known before anything is written, and HDF5 must not overwrite it with fill values. */
   if (f->shared) H5Pset_alloc_time(made, H5D_ALLOC_TIME_EARLY);
   if (f->shared) H5Pset_fill_time(made, H5D_FILL_TIME_NEVER);
   *set = H5Dcreate2(f->id, name, type, space, links, made, H5P_DEFAULT);
@@ -466,7 +483,8 @@ static PetscErrorCode CreateSet(HycoH5 f, const char name[], hid_t type, PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The dataset of that name, created if it does not exist. For a shared file, its position on the disk. */
+/* The dataset of that name, created if it does not exist. For a shared file, its position on the disk. An empty
+   dataset has no offset. */
 static PetscErrorCode FindSet(HycoH5 f, const char name[], hid_t type, PetscInt rows, PetscInt cols, hid_t *set,
                               long long *place)
 {
@@ -477,7 +495,8 @@ static PetscErrorCode FindSet(HycoH5 f, const char name[], hid_t type, PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Writes the rows first .. first + n - 1 of a dataset into the file in memory. */
+/* Writes the rows first .. first + n - 1 of a dataset into the file in memory. Writes to parts of a dataset one
+   after another: rows of several times, or of several points. */
 static herr_t PutRows(hid_t set, hid_t type, PetscInt cols, PetscInt first, PetscInt n, const void *data)
 {
   const hsize_t start[2] = {(hsize_t)first, 0}, count[2] = {(hsize_t)n, (hsize_t)cols};
@@ -528,6 +547,8 @@ static PetscErrorCode LayOut(HycoH5 f, const char name[], MPI_Datatype type, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Collective if the file is shared: first and n are this rank's, all else equal on all. Only rank 0 has HDF5's
+   file open. */
 PetscErrorCode HycoH5WriteRows(HycoH5 f, const char name[], MPI_Datatype type, PetscInt rows, PetscInt cols,
                                PetscInt first, PetscInt n, const void *data)
 {
@@ -567,7 +588,8 @@ PetscErrorCode HycoH5WriteText(HycoH5 file, const char name[], const char text[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Writes an attribute; an existing one is kept. */
+/* Writes an attribute; an existing one is kept. Kept, because a dataset of several times is described at each of
+   them. */
 static PetscErrorCode WriteAttribute(HycoH5 f, const char at[], const char name[], hid_t type, hid_t space,
                                      const void *value)
 {
@@ -584,6 +606,7 @@ static PetscErrorCode WriteAttribute(HycoH5 f, const char at[], const char name[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* HDF5 has no strings of length 0: an empty one is a single zero byte. */
 PetscErrorCode HycoH5WriteAttribute(HycoH5 f, const char at[], const char name[], const char text[])
 {
   hid_t space = H5Screate(H5S_SCALAR), type = H5Tcopy(H5T_C_S1);
@@ -625,7 +648,7 @@ static PetscBool IsPlain(hid_t set)
   return plain;
 }
 
-/* Opens a two-dimensional dataset of the wanted class and returns its size. */
+/* Opens a two-dimensional dataset of the wanted class and returns its size. The caller closes the set. */
 static PetscErrorCode OpenSet(HycoH5 f, const char name[], H5T_class_t wanted, hid_t *set, hsize_t dims[2])
 {
   const hsize_t most = PetscMin((hsize_t)PETSC_MAX_INT, (hsize_t)f->size);
@@ -653,6 +676,7 @@ static PetscErrorCode OpenSet(HycoH5 f, const char name[], H5T_class_t wanted, h
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Closes the set on errors too. */
 static PetscErrorCode ReadSet(HycoH5 f, const char name[], hid_t set, hid_t type, hid_t memory, hid_t space, void *data)
 {
   herr_t status = H5Dread(set, type, memory, space, H5P_DEFAULT, data);
@@ -677,6 +701,7 @@ static PetscErrorCode CheckSize(HycoH5 f, const char name[], const hsize_t dims[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* H5Lexists() fails, and is no error, if a folder of the name is missing. */
 PetscBool HycoH5Has(HycoH5 file, const char name[])
 {
   return (PetscBool)(H5Lexists(file->id, name, file->access) > 0);
@@ -695,6 +720,7 @@ PetscErrorCode HycoH5GetSize(HycoH5 file, const char name[], PetscInt *rows, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Once here, so that no later check is needed: not a number would pass through every comparison. */
 static PetscErrorCode CheckFinite(HycoH5 f, const char name[], size_t n, const PetscReal data[])
 {
   PetscFunctionBegin;
@@ -749,6 +775,7 @@ PetscErrorCode HycoH5LoadReal(HycoH5 file, const char name[], PetscInt *rows, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* lo, hi: the permitted range. Indices from a file are used without further checks. */
 PetscErrorCode HycoH5LoadInt(HycoH5 file, const char name[], PetscInt lo, PetscInt hi, PetscInt *rows, PetscInt *cols,
                              PetscInt **data)
 {
@@ -765,6 +792,7 @@ PetscErrorCode HycoH5LoadInt(HycoH5 file, const char name[], PetscInt lo, PetscI
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* No row: the ranks that have none need not open the dataset. */
 PetscErrorCode HycoH5ReadRows(HycoH5 file, const char name[], PetscInt start, PetscInt n, PetscInt cols,
                               PetscReal *data)
 {
@@ -801,6 +829,7 @@ PetscBool HycoH5Reads(HycoH5 file)
   return file->reads;
 }
 
+/* One function reads and writes, so that both directions of a format are the same code; see HycoH5Reads(). */
 PetscErrorCode HycoH5Real(HycoH5 file, const char name[], PetscInt *rows, PetscInt cols, PetscReal **data)
 {
   PetscFunctionBegin;
@@ -825,6 +854,7 @@ PetscErrorCode HycoH5Reals(HycoH5 file, const char name[], PetscInt n, PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Reads into the caller's array, after the range check in memory of its own. */
 PetscErrorCode HycoH5Ints(HycoH5 file, const char name[], PetscInt lo, PetscInt hi, PetscInt n, PetscInt data[])
 {
   PetscInt *read = data;
@@ -837,6 +867,8 @@ PetscErrorCode HycoH5Ints(HycoH5 file, const char name[], PetscInt lo, PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Offsets of a compressed list: ascending from 0, else its users would read beyond their arrays. The last one is
+   the caller's to check. */
 PetscErrorCode HycoH5Starts(HycoH5 file, const char name[], PetscInt n, PetscInt **start)
 {
   PetscInt rows = n + 1;

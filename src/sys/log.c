@@ -40,6 +40,7 @@ const char *HycoLogDoing(void)
   return n > 0 && n <= DEEPEST ? event_words[running[n - 1]] : stage_runs;
 }
 
+/* Deeper events are counted but not noted, so that begin and end stay paired. */
 static void Note(HycoEvent event, PetscBool begin)
 {
   if (begin && depth < DEEPEST) running[depth] = (int)event;
@@ -59,6 +60,7 @@ static PetscErrorCode Register(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Without PETSc's objects: an event of hyco spans several. */
 PetscErrorCode HycoLogEvent(HycoEvent event, PetscBool begin)
 {
   PetscFunctionBegin;

@@ -7,6 +7,7 @@
 /* OpenBLAS allocates this much address space at its first call, and tries without end if it cannot. */
 #define BLAS_BUFFER (((size_t)136) << 20)
 
+/* For this thread alone, and cheaply: setlocale() would change the whole program. NULL: nothing is to be restored. */
 void *HycoPointBegin(void)
 {
   static locale_t plain;
@@ -20,6 +21,7 @@ void HycoPointEnd(void *before)
   if (before) (void)uselocale((locale_t)before);
 }
 
+/* strtod() stops at a point if the locale has a decimal comma: 0.5 would be read as 0. */
 double HycoNumber(const char text[], char **end)
 {
   void *before = HycoPointBegin();
@@ -29,6 +31,7 @@ double HycoNumber(const char text[], char **end)
   return number;
 }
 
+/* The factorisation makes BLAS allocate its buffers now, where a lack of memory can be reported. */
 PetscErrorCode HycoReserveBLAS(void)
 {
   static PetscBool done;

@@ -24,6 +24,7 @@ static HycoOptionList *recording; /* list that receives declarations instead of 
 static const char *readers = "";  /* HycoOptionsFor() */
 static PetscErrorCode (*declare_all)(PetscOptions) = NULL;
 
+/* Registered once for each list; destroying an empty list does nothing. */
 static PetscErrorCode ForgetTable(void)
 {
   PetscFunctionBegin;
@@ -43,6 +44,7 @@ PetscErrorCode HycoOptionListDestroy(HycoOptionList *list)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Declarations may record others inside: the former list is restored, on errors too. */
 PetscErrorCode HycoOptionsRecord(HycoOptionList *list, PetscErrorCode (*declare)(PetscOptions))
 {
   PetscErrorCode ierr;
@@ -60,6 +62,7 @@ PetscErrorCode HycoOptionsRecord(HycoOptionList *list, PetscErrorCode (*declare)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A new type may declare options. Not while recording, which would free the list in use. */
 PetscErrorCode HycoOptionsForgetTable(void)
 {
   PetscFunctionBegin;
@@ -72,6 +75,7 @@ void HycoOptionsSetDeclare(PetscErrorCode (*declare)(PetscOptions))
   declare_all = declare;
 }
 
+/* Made at the first use: programs that only solve never need it. */
 PetscErrorCode HycoGetOptionTable(PetscInt *n, const HycoOption *options[])
 {
   PetscFunctionBegin;
@@ -85,6 +89,7 @@ PetscErrorCode HycoGetOptionTable(PetscInt *n, const HycoOption *options[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* An entry that ends with _ is a prefix: the rest of the name is the user's. */
 const HycoOption *HycoOptionListFind(const HycoOptionList *list, const char name[])
 {
   for (PetscInt k = 0; k < list->n; k++) {
@@ -98,6 +103,7 @@ const HycoOption *HycoOptionListFind(const HycoOptionList *list, const char name
   return NULL;
 }
 
+/* Case-insensitive, as PETSc's database is; without the dash. */
 const HycoOption *HycoOptionFind(const char name[])
 {
   (void)!HycoGetOptionTable(NULL, NULL);
@@ -113,7 +119,8 @@ PetscErrorCode HycoOptionsCheckName(const char name[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Levenshtein distance of two words of fewer than 128 letters, letter case ignored. */
+/* Levenshtein distance of two words of fewer than 128 letters, letter case ignored. One row of the table is
+   enough: `diagonal` keeps the entry that was overwritten. */
 static PetscInt EditDistance(const char *a, const char *b)
 {
   PetscInt row[129];
@@ -135,6 +142,7 @@ static PetscInt EditDistance(const char *a, const char *b)
   return row[n];
 }
 
+/* A third of the letters may differ, at least two: more would suggest unrelated words. */
 const char *HycoNearest(const char *word, PetscInt n, const char *const names[])
 {
   const char *nearest = NULL;
@@ -167,6 +175,7 @@ const char *HycoOptionNearest(const char word[], const HycoOptionList *more)
   return HycoNearest(word, n, names);
 }
 
+/* The text is borrowed; "" ends it. */
 PetscErrorCode HycoOptionsFor(const char only[])
 {
   PetscFunctionBegin;
@@ -187,6 +196,7 @@ static PetscErrorCode MakeOption(const char name[], const char text[], const cha
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(size, &block));
   at = block;
+/* The name comes first: it is the block's address, by which it is freed. */
 #define Put(field, ...) o->field = at, at += snprintf(at, size - (size_t)(at - block), __VA_ARGS__) + 1
   Put(name, "%s", name[0] == '-' ? name + 1 : name);
   while (*meaning == ' ') meaning++;
@@ -240,6 +250,7 @@ static PetscErrorCode Find(HycoOptionItems items, const char name[], const char 
   *set = PETSC_FALSE;
   *value = NULL;
   if (!recording) PetscCall(PetscOptionsHasHelp(NULL, &help)); /* the options of a scene do not contain -help */
+  /* count: PETSc passes through the declarations more than once. */
   if (recording || (help && items->count == 1 && (items->prefix || !HycoOptionListFind(&told, name + 1)))) {
     PetscCall(MakeOption(name, text, form, initial, owner, &option));
     if (help && !told.n) PetscCall(PetscRegisterFinalize(ForgetTable));
@@ -250,6 +261,7 @@ static PetscErrorCode Find(HycoOptionItems items, const char name[], const char 
   }
   if (recording) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscOptionsFindPair(items->options, items->prefix, name, value, set));
+  /* A caller's prefix is set on the command line, not in the scene. */
   if (!*set && items->options && items->prefix) PetscCall(PetscOptionsFindPair(NULL, items->prefix, name, value, set));
   if (*set && !*value) *value = "";
   HycoCheck(!*set || strlen(*value) < room, "-%s%s is longer than %d characters", NAMED(items, name), (int)room - 1);
@@ -271,6 +283,7 @@ PetscErrorCode HycoOptionsReal_Private(HycoOptionItems items, const char name[],
   PetscCall(Find(items, name, text, "<real>", initial, HYCO_LINE, &word, &given));
   if (set) *set = given;
   if (!given) PetscFunctionReturn(PETSC_SUCCESS);
+  /* The negated comparison also refuses not a number. */
   number = HycoNumber(word, &end);
   if (end == word || *end != '\0' || !(number >= lo && number <= hi))
     HycoFail("-%s%s is \"%.500s\"; it must be a number from %g to %g", NAMED(items, name), word, (double)lo,
@@ -279,6 +292,7 @@ PetscErrorCode HycoOptionsReal_Private(HycoOptionItems items, const char name[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The whole text must be a number: "3.7" and "3x" are refused. */
 PetscErrorCode HycoOptionsInt_Private(HycoOptionItems items, const char name[], const char text[], PetscInt lo,
                                       PetscInt hi, PetscInt *value, PetscBool *set)
 {
@@ -318,6 +332,7 @@ static PetscErrorCode FindWord(HycoOptionItems items, const char name[], const c
   HycoFail("-%s%s is \"%.200s\"; it must be one of: %s", NAMED(items, name), word, list);
 }
 
+/* An option without a value is true. */
 PetscErrorCode HycoOptionsBool_Private(HycoOptionItems items, const char name[], const char text[], PetscBool *value,
                                        PetscBool *set)
 {
@@ -373,6 +388,7 @@ PetscErrorCode HycoOptionsString_Private(HycoOptionItems items, const char name[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The caller frees *list and its texts. "none" clears a list that a scene sets. */
 PetscErrorCode HycoOptionsList_Private(HycoOptionItems items, const char name[], const char text[], PetscInt *n,
                                        char ***list, PetscBool *set)
 {
@@ -397,6 +413,7 @@ PetscErrorCode HycoOptionsList_Private(HycoOptionItems items, const char name[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Only declares: PETSc reads viewers itself. */
 PetscErrorCode HycoOptionsName_Private(HycoOptionItems items, const char name[], const char text[])
 {
   const char *word;

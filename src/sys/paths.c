@@ -7,7 +7,8 @@
 
 #define LINKS 40 /* the system's limit on links */
 
-/* The target of a link at `at`, relative to the same folder as `at`; false: it is not a link. */
+/* The target of a link at `at`, relative to the same folder as `at`; false: it is not a link. `at` and `end` may
+   be the same array, hence the copy of the target. */
 static PetscBool ReadLink(const char at[], char end[PETSC_MAX_PATH_LEN])
 {
   char target[PETSC_MAX_PATH_LEN];
@@ -24,6 +25,7 @@ static PetscBool ReadLink(const char at[], char end[PETSC_MAX_PATH_LEN])
   return PETSC_TRUE;
 }
 
+/* Links in /proc name open descriptors, which must not be replaced by a name. */
 void HycoFileFollow(const char path[], char end[PETSC_MAX_PATH_LEN])
 {
   snprintf(end, PETSC_MAX_PATH_LEN, "%s", path);
@@ -32,6 +34,8 @@ void HycoFileFollow(const char path[], char end[PETSC_MAX_PATH_LEN])
   }
 }
 
+/* A file that does not exist is identified by its folder and name, so that two options that would create the same
+   file are found. */
 void HycoFileIdentify(const char path[], HycoFileIdentity *identity)
 {
   char end[PETSC_MAX_PATH_LEN];
@@ -55,6 +59,7 @@ void HycoFileIdentify(const char path[], HycoFileIdentity *identity)
   identity->inode = (unsigned long long)info.st_ino;
 }
 
+/* Two outputs may go to one open device, such as /dev/null. */
 PetscBool HycoFileSame(const HycoFileIdentity *a, const HycoFileIdentity *b)
 {
   return (PetscBool)(a->exists == b->exists && a->device == b->device && a->inode == b->inode && !a->open_device &&

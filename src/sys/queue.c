@@ -19,7 +19,8 @@ struct _HycoQueue {
   PetscInt *counter;    /* N_COUNTERS + n_kinds; with a window only on rank 0 of comm */
 };
 
-/* Orders the tasks by kind, the kinds by their first tasks. */
+/* Orders the tasks by kind, the kinds by their first tasks. A group that keeps to one kind reuses what it has set
+   up for it, for example a factor. O(n times kinds). */
 static PetscErrorCode SortKinds(HycoQueue q, PetscInt n, const PetscInt kind[])
 {
   PetscInt at = 0;
@@ -58,6 +59,7 @@ static PetscErrorCode OpenWindow(HycoQueue q)
   PetscCallMPI(MPI_Comm_rank(q->comm, &rank));
   PetscCallMPI(MPI_Win_allocate(rank ? 0 : n * (MPI_Aint)sizeof(PetscInt), sizeof(PetscInt), MPI_INFO_NULL, q->comm,
                                 &q->counter, &q->window));
+  /* Once for the queue's life: passive target, so that rank 0 need not take part. */
   PetscCallMPI(MPI_Win_lock_all(0, q->window));
   if (rank == 0) PetscCall(PetscArrayzero(q->counter, n));
   PetscCallMPI(MPI_Win_sync(q->window));
@@ -65,6 +67,7 @@ static PetscErrorCode OpenWindow(HycoQueue q)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Contiguous ranks form a group, which usually share a node. kind NULL: all tasks are of one kind. Collective. */
 PetscErrorCode HycoQueueCreate(MPI_Comm comm, PetscInt n_groups, PetscInt n, const PetscInt kind[], HycoQueue *queue)
 {
   PetscMPIInt rank, size;
@@ -86,6 +89,7 @@ PetscErrorCode HycoQueueCreate(MPI_Comm comm, PetscInt n_groups, PetscInt n, con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Collective: freeing a window waits for all ranks. */
 PetscErrorCode HycoQueueDestroy(HycoQueue *queue)
 {
   HycoQueue q = *queue;
@@ -110,7 +114,7 @@ PetscErrorCode HycoQueueGetGroup(HycoQueue q, MPI_Comm *group)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds to a counter atomically; returns its former value. */
+/* Adds to a counter atomically; returns its former value. more = 0 reads. */
 static PetscErrorCode Add(HycoQueue q, PetscInt counter, PetscInt more, PetscInt *before)
 {
   PetscFunctionBegin;
@@ -125,7 +129,7 @@ static PetscErrorCode Add(HycoQueue q, PetscInt counter, PetscInt more, PetscInt
 }
 
 /* Chooses the next kind for this group: one that no group has begun, or the one with most tasks left; -1: none has
-   any. */
+   any. The first choice spreads the groups over the kinds; later they help where most is left. */
 static PetscErrorCode NextKind(HycoQueue q)
 {
   PetscInt begun, most = 0;
@@ -152,6 +156,7 @@ static PetscErrorCode TakeTask(HycoQueue q, PetscInt *task)
 
   PetscFunctionBegin;
   *task = -1;
+  /* Taking the next task says that the former is done. */
   if (q->busy) PetscCall(Add(q, DONE, 1, &done));
   PetscCall(Add(q, FAILED, 0, &failed));
   if (failed) PetscFunctionReturn(PETSC_SUCCESS);
@@ -169,6 +174,7 @@ static PetscErrorCode TakeTask(HycoQueue q, PetscInt *task)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Collective on the group, all of whose ranks get the same task. */
 PetscErrorCode HycoQueueTake(HycoQueue q, PetscInt *task)
 {
   PetscFunctionBegin;
@@ -186,6 +192,7 @@ PetscErrorCode HycoQueueDone(HycoQueue q, PetscInt *n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Numbers from 1 in the order in which events happen over all groups, for the log. */
 PetscErrorCode HycoQueueNumber(HycoQueue q, PetscInt *number, PetscInt *group)
 {
   PetscFunctionBegin;
@@ -195,6 +202,7 @@ PetscErrorCode HycoQueueNumber(HycoQueue q, PetscInt *number, PetscInt *group)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Between tasks: with some networks, MPI serves other ranks' accesses only while this rank calls it. */
 PetscErrorCode HycoQueueServe(HycoQueue q)
 {
   int found;
@@ -205,6 +213,7 @@ PetscErrorCode HycoQueueServe(HycoQueue q)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Collective on the group: all its ranks fail together, so that none waits for another. */
 PetscErrorCode HycoQueueHear(HycoQueue q)
 {
   PetscInt failed = 0;
@@ -217,6 +226,7 @@ PetscErrorCode HycoQueueHear(HycoQueue q)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Not after an error that only says that another group failed: that group reports its own. */
 PetscErrorCode HycoQueueEnd(HycoQueue q, PetscErrorCode error)
 {
   PetscInt before;
@@ -228,6 +238,7 @@ PetscErrorCode HycoQueueEnd(HycoQueue q, PetscErrorCode error)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Collective; more than 0 means that some tasks were taken by groups that had not finished them. */
 PetscErrorCode HycoQueueLeft(HycoQueue q, PetscInt *n)
 {
   PetscFunctionBegin;
@@ -235,6 +246,7 @@ PetscErrorCode HycoQueueLeft(HycoQueue q, PetscInt *n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* done[]: added to what is there; one rank of each group counts. */
 PetscErrorCode HycoQueueCount(HycoQueue q, PetscInt *n_groups, PetscInt done[])
 {
   PetscInt *count;

@@ -49,6 +49,7 @@ static PetscErrorCode Begin(HycoRegistry *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The table of options is made anew, as the new type may declare some. */
 PetscErrorCode HycoRegistryAdd(HycoRegistry *r, const char name[], HycoVoidFn *create)
 {
   PetscFunctionBegin;
@@ -66,6 +67,7 @@ PetscErrorCode HycoRegistryFind_Private(HycoRegistry *r, const char name[], Hyco
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Borrowed; ends with NULL. */
 PetscErrorCode HycoRegistryNames(HycoRegistry *r, PetscInt *n, const char *const **names)
 {
   PetscFunctionBegin;
@@ -75,6 +77,7 @@ PetscErrorCode HycoRegistryNames(HycoRegistry *r, PetscInt *n, const char *const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* "a, b or c", with a suggestion, for messages about an unknown name. */
 PetscErrorCode HycoRegistryList(HycoRegistry *r, const char name[], char list[HYCO_LINE])
 {
   const char *near;

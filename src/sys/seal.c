@@ -10,6 +10,7 @@
 
 static const char magic[8] = {'h', 'y', 'c', 'o', '-', 's', 'u', 'm'};
 
+/* By bytes, so that files are the same on any machine. */
 static unsigned long long LoadWord(const unsigned char byte[8])
 {
   unsigned long long word = 0;
@@ -50,7 +51,8 @@ static PetscBool ReadSeal(FILE *file, long long size, unsigned char seal[HYCO_SE
                      fread(seal, 1, HYCO_SEAL, file) == HYCO_SEAL && memcmp(seal, magic, 8) == 0);
 }
 
-/* The checksum of the first `left` bytes of an open file. */
+/* The checksum of the first `left` bytes of an open file. In pieces, since a model may be larger than the memory
+   left; the piece's size is a multiple of 8, as Sum() needs. */
 static unsigned long long SumFile(FILE *file, size_t left)
 {
   unsigned char buffer[65536];
@@ -58,6 +60,7 @@ static unsigned long long SumFile(FILE *file, size_t left)
   size_t n = 1;
 
   rewind(file);
+  /* A file that became shorter ends the loop; its sum then differs. */
   while (left && n) {
     n = fread(buffer, 1, PetscMin(left, sizeof(buffer)), file);
     sum = Sum(sum, buffer, n);
@@ -95,6 +98,7 @@ PetscErrorCode HycoSealFile(const char path[], size_t *size, unsigned char seal[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A file without a seal is valid here: HycoH5Open() decides whether it should have one. */
 PetscErrorCode HycoSealCheck(const char path[], size_t *size, PetscBool *sealed)
 {
   unsigned char seal[HYCO_SEAL];

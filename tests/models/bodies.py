@@ -289,20 +289,22 @@ class Bodies(Case):
         self.judge(scene, ('-values_at', '-5.1,0.3,4.4', '-values_depth', '0.07,0.28', '-values_modulus', '6,17'))
 
     def test_shape(self):
-        """A radius: more samples reduce the errors of the forces, which stay within the bound; points between the samples."""
+        """A radius: more samples reduce the errors of the forces, which stay within the bound; points between the samples. Three are accurate,
+        because its curvature is interpolated, in which the nodes move along lines."""
         with open(os.path.join(HERTZ, 'scene.yaml'), encoding='ascii') as f:
             ranges = {k: [float(v) for v in re.search(k + r': \{range: \[(.*?)\]', text)[1].split(',')]
                       for text in [f.read()] for k in ('press', 'stiffness', 'radius')}
         points = [w for k, share in (('press', (0.31, 0.87)), ('stiffness', (0.43,)), ('radius', (0.09, 0.37, 0.83)))
                   for w in ('-values_' + k, ','.join(f'{ranges[k][0] + s * (ranges[k][1] - ranges[k][0])!r}' for s in share))]
         errors, bounds = [], []
-        for tol in ('0.1', '1e-5', '1e-9'):
+        for tol in ('0.1', '1e-6', '1e-9'):
             c = self.judge(HERTZ, points, forces=1e-2, u=1e-2, options=('-hyco_bodies_tol', tol))
             errors.append(c['error_lambda']['max'])
             found = re.search(r'contact forces within (\S+) \(bound at held-out samples of the bodies, (\d+) samples\)',
                               self.run_raw('view', '-model', 'm.h5').stdout)
             bounds.append(float(found[1]))
             self.assertLess(errors[-1], max(bounds[-1], 1e-10))
+        self.assertLess(errors[0], 1e-4)
         self.assertLess(errors[1], errors[0] / 10)
         self.assertLess(errors[2], errors[1] / 10)
         self.assertLess(bounds[2], 1e-8)

@@ -30,12 +30,14 @@ typedef struct {
   Log log;
 } Instance;
 
+/* The importer's log, if it gave one; the status is passed on. */
 static Status report(Instance *o, Status status, const char message[])
 {
   if (o->log) o->log(o->environment, status, "results", message);
   return status;
 }
 
+/* At the first output that is read after a change of an input: importers set and get variables one by one. */
 static Status evaluate(Instance *o)
 {
   int status;
@@ -51,6 +53,7 @@ static Status evaluate(Instance *o)
   return o->status;
 }
 
+/* The middle of the ranges, where the model is valid, until inputs are set. */
 static void begin(Instance *o)
 {
   o->time = 0;

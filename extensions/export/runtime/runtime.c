@@ -50,6 +50,7 @@ static size_t work_doubles(const Model *m)
   return (size_t)m->n_functions + (size_t)m->n_values + 4 * (p + n) + n * (n + 1) / 2 + n * n + 2 * p * n + p * p + n;
 }
 
+/* The ints follow the doubles, so that both are aligned. */
 static size_t work_size(const Model *m)
 {
   return work_doubles(m) * sizeof(double) + 2 * (size_t)m->n_contacts * sizeof(int);
@@ -63,6 +64,7 @@ static double *take(double **from, size_t n)
   return taken;
 }
 
+/* The order of the arrays does not matter, but that doubles come first. */
 static void place(const Model *m, void *memory, Work *o)
 {
   const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts;
@@ -141,11 +143,13 @@ static int factorise(size_t n, double a[])
   return dependent;
 }
 
+/* x = L^-1 x; an infinite pivot gives 0. */
 static void forward(size_t n, const double a[], double x[])
 {
   for (size_t i = 0; i < n; i++) x[i] = (x[i] - dot(i, a + i * n, x)) / a[i * n + i];
 }
 
+/* x = L^-T x. */
 static void backward(size_t n, const double a[], double x[])
 {
   for (size_t i = n; i-- > 0;) {
@@ -226,6 +230,7 @@ static int change(const Model *m, Work *o, double gap, double force, int one)
   int n = 0;
 
   for (size_t i = (size_t)m->n_contacts; i-- > 0;) {
+    /* Beyond round-off of the largest force, of the largest gap. */
     if (o->closed[i] ? o->z[p + i] >= -1e-14 * force : o->w[p + i] >= -1e-14 * gap) continue;
     if (!one || !n) o->closed[i] = !o->closed[i];
     n++;
@@ -248,6 +253,7 @@ static int search(const Model *m, Work *o, double epsilon, double delta, int *it
   return 0;
 }
 
+/* With motions all contacts are closed at first: an open set would let the bodies go. */
 static void start(const Model *m, Work *o)
 {
   for (int i = 0; i < m->n_contacts; i++) o->closed[i] = m->n_motions > 0 || o->q[i] < 0;
@@ -289,6 +295,7 @@ static double search_held(const Model *m, Work *o, int *iterations)
   for (size_t i = 0; i < p * n; i++) epsilon = fmax(epsilon, 1e-2 * o->A[i] * o->A[i] * (1e-8 / delta));
   start(m, o);
   for (int i = 0; i < 40 && kkt > 1e-13; i++) {
+    /* The residual of the original problem, which says that it is not solved. */
     if (!search(m, o, epsilon, delta, iterations)) return kkt_residual(m, o);
     kkt = kkt_residual(m, o);
     memcpy(o->last, o->z, (p + n) * sizeof(double));
@@ -298,6 +305,7 @@ static double search_held(const Model *m, Work *o, int *iterations)
 
 /* -- outputs -- */
 
+/* A value is its offset's functions plus the terms, each linear in z. */
 static void evaluate(const Model *m, Work *o)
 {
   const size_t first = (size_t)m->n_motions + (size_t)m->n_contacts, d = (size_t)m->n_functions;
@@ -350,6 +358,7 @@ static double item(int of, int width, const double value[])
   return out[of - PRINCIPAL];
 }
 
+/* least: forces below it are none, as in the library. An output over no item is 0. */
 static double output(const Model *m, const Work *o, const Output *q, double least)
 {
   double sum = q->kind == LARGEST ? -HUGE_VAL : q->kind == SMALLEST || q->kind == PRESSURE_SMALLEST ? HUGE_VAL : 0;
@@ -382,6 +391,7 @@ static int predict(const Model *m, Work *o, double out[], double *kkt, int *iter
   start(m, o);
   *kkt = search(m, o, 0, 0, iterations) ? kkt_residual(m, o) : HUGE_VAL;
   if (*kkt > m->tolerance) *kkt = search_held(m, o, iterations);
+  /* 1e-10 of the largest force. */
   for (int i = 0; i < m->n_contacts; i++) least = fmax(least, 1e-10 * o->z[m->n_motions + i]);
   evaluate(m, o);
   for (int i = 0; i < m->n_outputs; i++) out[i] = output(m, o, &m->output[i], least);

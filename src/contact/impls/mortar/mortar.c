@@ -65,6 +65,7 @@ static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs 
     PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->slave, &g));
     tolerance = pairs->facts ? pairs->facts[index].small : HycoSurfaceTolerance(fe->mesh, g);
   }
+  /* A copy: appending reallocates pairs->slave, of which these are the last n. */
   HycoDuplicate(n, pairs->slave + first, &slave);
   pairs->n = first;
   pairs->queries += n;
@@ -75,6 +76,7 @@ static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* At moved nodes. A slave without facing facets has no masters, and no error: it may come back. */
 static PetscErrorCode Find(HycoContact c, HycoFE fe, PetscInt index, PetscReal reach, PetscInt n,
                            const PetscInt slave[], HycoPairs *found)
 {
@@ -83,6 +85,7 @@ static PetscErrorCode Find(HycoContact c, HycoFE fe, PetscInt index, PetscReal r
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* integrated: gaps are sums over many nodes, so that touching surfaces need a threshold for zero. */
 PetscErrorCode HycoContactCreate_Mortar(HycoContact contact)
 {
   static const struct _HycoContactOps ops = {.setup = SetUp, .find = Find};

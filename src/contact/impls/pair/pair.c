@@ -133,6 +133,7 @@ static PetscErrorCode Remedy(HycoMasterSearch *t, HycoContact c, PetscInt n, con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Without a find method: a pair keeps its two nodes, and Verify() refuses maps that move them apart. */
 static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs *pairs)
 {
   PetscFunctionBegin;
@@ -176,6 +177,7 @@ static PetscErrorCode Verify(HycoContact c, HycoFE fe, const HycoPairs *p, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* matched: masters are one to one, which the ranks of a distributed mesh must check together. */
 PetscErrorCode HycoContactCreate_Pair(HycoContact contact)
 {
   static const struct _HycoContactOps ops = {.setup = SetUp, .verify = Verify};

@@ -20,6 +20,7 @@ static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs 
             "contact %s: its master is the one node that the rigid body moves with, and %s has %d nodes; give a group "
             "of one point",
             c->name, c->master, (int)(m->group_start[g + 1] - m->group_start[g]));
+  /* Of the contact's own group, and by its number in this mesh: each rank with slaves has a copy of the node. */
   body = m->group_node[m->group_start[g]];
   PetscCall(HycoMeshFindGroup(m, "contact", c->slave, &g));
   PetscCall(HycoPairsReserve(pairs, m->group_start[g + 1] - m->group_start[g], 1));
@@ -35,6 +36,7 @@ static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* rigid: the gap is measured from the slave's position, since the master node is not on the surface. */
 PetscErrorCode HycoContactCreate_Rigid(HycoContact contact)
 {
   static const struct _HycoContactOps ops = {.setup = SetUp};

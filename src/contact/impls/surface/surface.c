@@ -47,6 +47,8 @@ static PetscErrorCode Remedy(HycoMasterSearch *t, HycoContact c, PetscInt n, con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* On moved surfaces the position as drawn need not face anything: only the slaves are listed, without the judgement
+   that Settle() belongs to. */
 static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs *pairs)
 {
   PetscFunctionBegin;

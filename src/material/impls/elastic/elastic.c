@@ -1,6 +1,7 @@
 /* Isotropic linear elasticity. */
 #include <hycomaterialimpl.h>
 
+/* Only Lame's constants: stresses and tangents are evaluated by the class, with kernels of their own. */
 PetscErrorCode HycoMaterialCreate_Elastic(HycoMaterial material)
 {
   static const struct _HycoMaterialOps ops = {.isotropic = HycoElasticLame};

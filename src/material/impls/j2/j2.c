@@ -23,6 +23,8 @@ static PetscReal YieldIntegral(const HycoFlowPoint *p, PetscReal dp)
   return sum;
 }
 
+/* Without hardening and saturation perfect plasticity, whose tangent is singular along the flow: allowed, since the
+   structure may still carry the load. */
 PetscErrorCode HycoMaterialCreate_J2(HycoMaterial material)
 {
   static const HycoFlowRule rule = {.n_constants = N_CONSTANTS, .yield = Yield, .yield_integral = YieldIntegral};

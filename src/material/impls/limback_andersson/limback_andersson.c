@@ -10,12 +10,13 @@
 
 enum { RATE, FACTOR, ACTIVATION, MODULUS, N_CONSTANTS };
 
-/* scratch: dt rate E'/T exp(-Q/RT), factor / E' What does not depend on q, once per point and step. */
+/* scratch: dt rate E'/T exp(-Q/RT), factor / E'. What does not depend on q, once per point and step. */
 static void Prepare(HycoFlowPoint *p, const char **why)
 {
   const PetscReal T = p->temperature, modulus = p->c[MODULUS] < 0 ? 1.148e5 - 59.9 * T : p->c[MODULUS];
 
   if (!(T > 0)) *why = "creep of Limback and Andersson needs a temperature above 0 K";
+  /* Above about 1643 degrees C, far outside of the law's range. */
   if (!(modulus > 0)) *why = "the temperature is too high: the modulus 1.148e5 - 59.9 T is not positive";
   p->scratch[0] = *why ? 0 : p->dt * p->c[RATE] * modulus / T * PetscExpReal(-p->c[ACTIVATION] / (GAS_CONSTANT * T));
   p->scratch[1] = *why ? 0 : p->c[FACTOR] / modulus;
@@ -24,6 +25,7 @@ static void Prepare(HycoFlowPoint *p, const char **why)
 /* Creep strain of the step at q, and its derivative. */
 static PetscReal Creep(const HycoFlowPoint *p, PetscReal q, PetscReal *slope)
 {
+  /* cosh from sinh: one exponential fewer; both overflow to infinity, which the bracket of the iteration takes. */
   const PetscReal sh = sinh(p->scratch[1] * q), ch = PetscSqrtReal(1 + sh * sh);
 
   *slope = 2 * p->scratch[0] * p->scratch[1] * sh * ch;
@@ -40,6 +42,7 @@ static PetscReal CreepIntegral(const HycoFlowPoint *p, PetscReal q)
   return x > 0 ? p->scratch[0] / p->scratch[1] * sum : 0;
 }
 
+/* The constants are those of the paper, for MPa and hours: a scene in other units must give rate and modulus. */
 PetscErrorCode HycoMaterialCreate_LimbackAndersson(HycoMaterial material)
 {
   static const HycoFlowRule rule = {

@@ -25,11 +25,13 @@ static PetscReal Yield(const HycoFlowPoint *p, PetscReal x, PetscReal *slope)
   return p->c[YIELD] < 0 ? -1 : p->c[YIELD] + p->c[HARDENING] * x;
 }
 
+/* Of the linear Y, exact: yield dp + hardening (p0 dp + dp^2 / 2). */
 static PetscReal YieldIntegral(const HycoFlowPoint *p, PetscReal dp)
 {
   return dp * (p->c[YIELD] + p->c[HARDENING] * (p->plastic0 + dp / 2));
 }
 
+/* The exponent is at least 1: below, the slope of the creep rate is infinite at q = 0. */
 PetscErrorCode HycoMaterialCreate_Norton(HycoMaterial material)
 {
   static const HycoFlowRule rule = {.n_constants = N_CONSTANTS,

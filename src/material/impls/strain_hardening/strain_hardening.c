@@ -32,6 +32,7 @@ static PetscReal Creep(const HycoFlowPoint *p, PetscReal q, PetscReal *slope)
   return before > more ? p->creep0 * expm1(m * log1p(more / before)) : after - p->creep0;
 }
 
+/* Without an integral of creep, which has no closed form: the law has no potential. */
 PetscErrorCode HycoMaterialCreate_StrainHardening(HycoMaterial material)
 {
   static const HycoFlowRule rule = {.n_constants = N_CONSTANTS, .prepare = Prepare, .creep = Creep};

@@ -60,10 +60,12 @@ static PetscErrorCode SetFromOptions(HycoReducer t)
   for (int k = 0; k < 4; k++)
     HycoCheck(!set[k] || !t->scene || t->scene->n_times,
               "%s is for scenes with a history, and this scene has none; remove it", of_history[k]);
+  /* The prototype answers for the type before a model exists (traits, ops): of a history they are those of paths. */
   if (t->scene && t->scene->n_times) PetscCall(HycoBodiesTakePath(t->prototype));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The data of a run; the options, in the same struct, stay. */
 static PetscErrorCode Reset(HycoReducer t)
 {
   HycoBodiesTraining s = (HycoBodiesTraining)t->training;
@@ -76,7 +78,8 @@ static PetscErrorCode Reset(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Over paths the laws in few cells, unless an option names how. */
+/* Over paths the laws in few cells, unless an option names how. Which laws serve better shows only at held-out
+   paths, so that a search tries both; "auto" would be one of them. */
 static const char *const *Variants(HycoReducer t)
 {
   static const char *const variants[] = {"interpolation", "cubature", NULL};
@@ -103,6 +106,7 @@ static PetscErrorCode TakeExact(HycoROM m, HycoSubstructures b)
   PetscCall(PetscArraycpy(sorted, b->dof, b->ns));
   PetscCall(PetscArraycpy(sorted + b->ns, b->inner, b->ni));
   if (cells) PetscCall(PetscArraycpy(sorted + b->ns + b->ni, b->inelastic->dof, cells));
+  /* A cell with laws may share nodes with the surfaces or with the cells of the outputs. */
   PetscCall(PetscSortRemoveDupsInt(&all, sorted));
   PetscCall(PetscMalloc1(mesh->n_nodes * mesh->dim + 1, &dof));
   for (PetscInt i = 0; i < mesh->n_nodes * mesh->dim; i++) {
@@ -117,6 +121,8 @@ static PetscErrorCode TakeExact(HycoROM m, HycoSubstructures b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The model takes over what training has made: `bodies` moves, and the empty data of the new model go. Every
+   contact is in A_lambda, since every force is exact or an unknown. */
 static PetscErrorCode Take(HycoROM m, HycoReducer t)
 {
   HycoBodiesTraining s = (HycoBodiesTraining)t->training;
@@ -129,6 +135,7 @@ static PetscErrorCode Take(HycoROM m, HycoReducer t)
   PetscCall(HycoFloatingDestroy(&m->model->floating)); /* their equilibrium is an equation of the model */
   for (PetscInt k = 0; k < m->model->pairs.n; k++) m->model->in_rid[k] = 1;
   PetscCall(TakeExact(m, (HycoSubstructures)m->model->data));
+  /* Displacements in the cells with laws are exact: all of their nodes belong to A. */
   if (t->scene->n_times) PetscCall(HycoROMSetDomain(m, NULL));
   PetscCall(HycoReducerJudge(t, m));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -151,6 +158,7 @@ static PetscErrorCode CheckPath(HycoROM m, HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rank 0. The ops of paths before the data, because HycoReducerJudge() predicts with them. */
 static PetscErrorCode Build(HycoROM m, HycoReducer t)
 {
   PetscFunctionBegin;
@@ -220,6 +228,8 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Of a prediction, so that a search can compare types: W of the closed contacts and its factor, then the modes on
+   the model's mesh. */
 static PetscReal Cost(HycoReducer t, const HycoAttempt *a)
 {
   const PetscReal active = ACTIVE * (PetscReal)t->sizes[2], row = ENTRIES * active;

@@ -22,6 +22,7 @@ PetscErrorCode HycoBodiesAddScores(HycoReducer t, HycoBodiesFactor *factor, cons
   PetscFunctionBegin;
   PetscCall(PetscMalloc4(fe->n_dof, &all, m->n_cells * fe->n_sigma, &sigma, m->n_cells, &mises, parts->n, &most));
   for (PetscInt i = 0; i < fe->n_dof; i++) {
+    /* u lacks the prescribed displacements, without which stresses at supports would be those of a torn mesh. */
     all[i] = fe->fixed[i] ? fe->u0[i] : u[i];
     factor->moved[i] = PetscMax(factor->moved[i], PetscAbsReal(u[i]));
   }
@@ -43,6 +44,7 @@ PetscErrorCode HycoBodiesAddScores(HycoReducer t, HycoBodiesFactor *factor, cons
   for (PetscInt e = 0; e < m->n_cells; e++) {
     const PetscReal own = most[parts->of[m->cells[e * m->nv]]];
 
+    /* Relative to the body's largest: a stiff body would otherwise take all the room. */
     if (own > 0) factor->score[e] = PetscMax(factor->score[e], mises[e] / own);
   }
   PetscCall(PetscFree4(all, sigma, mises, most));
@@ -65,8 +67,10 @@ static PetscErrorCode MarkInner(HycoReducer t, HycoBodiesFactor *factor, const P
   for (PetscInt k = 0; k < m->n_cells * m->nv * fe->dim; k++) {
     const PetscInt i = m->cells[k / fe->dim] * fe->dim + k % fe->dim;
 
+    /* Unknowns of the surfaces have displacements of their own, fixed ones are prescribed. */
     if (!in[k / (m->nv * fe->dim)] || inner[i] || fe->fixed[i] || factor->known[i]) continue;
     inner[i] = PETSC_TRUE;
+    /* Marked in all parts, counted by the owner alone. */
     if (HycoMeshOwned(m, i / fe->dim) >= 0) n[HycoTrainingOfBodies(t)->parts.of[i / fe->dim]]++;
   }
   HycoAllreduce(n, b->n, MPIU_REAL, MPI_SUM, HycoComm(t));
@@ -92,7 +96,8 @@ static PetscErrorCode Join(HycoReducer t, HycoBodiesFactor *factor, PetscBool in
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The cells of this rank's part. Collective. */
+/* The cells of this rank's part. Collective. Outputs are in their order in the scene: one that does not fit is
+   left out, the next may fit. Stress levels stop at the first that does not, since the lower ones contain it. */
 static PetscErrorCode Choose(HycoReducer t, HycoBodiesFactor *factor, PetscBool in[], PetscBool inner[])
 {
   HycoMesh m = factor->fom->part;
@@ -105,6 +110,7 @@ static PetscErrorCode Choose(HycoReducer t, HycoBodiesFactor *factor, PetscBool 
     PetscCall(Join(t, factor, in, more, inner, &fits));
   }
   fits = PETSC_TRUE;
+  /* By levels and not cell by cell: the same choice on any number of ranks. */
   for (PetscReal least = 0.9; fits && least > LEAST_SCORE; least -= 0.1) {
     for (PetscInt e = 0; e < m->n_cells; e++) more[e] = (PetscBool)(factor->score[e] > least);
     PetscCall(Join(t, factor, in, more, inner, &fits));
@@ -144,6 +150,7 @@ static PetscErrorCode ShareCells(HycoReducer t, HycoMesh m, PetscBool in[])
   }
   PetscCall(PetscFree(t->seeds_cell));
   PetscCall(GatherAll(HycoComm(t), n, own, &t->n_seeds_cell, &t->seeds_cell));
+  /* A mesh needs a cell. GatherAll() allocates one entry more. */
   if (!t->n_seeds_cell) t->seeds_cell[t->n_seeds_cell++] = 0;
   PetscCall(PetscSortRemoveDupsInt(&t->n_seeds_cell, t->seeds_cell));
   for (PetscInt e = 0; e < m->n_cells; e++) {
@@ -156,7 +163,8 @@ static PetscErrorCode ShareCells(HycoReducer t, HycoMesh m, PetscBool in[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* b->inner by body, and factor->row, from the marked unknowns. Collective. */
+/* b->inner by body, and factor->row, from the marked unknowns. Collective. Ascending by number in the whole mesh
+   within each body, whatever the partition: the order is that of the file. */
 static PetscErrorCode List(HycoReducer t, HycoBodiesFactor *factor, const PetscBool inner[])
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
@@ -171,6 +179,7 @@ static PetscErrorCode List(HycoReducer t, HycoBodiesFactor *factor, const PetscB
     if (!inner[i] || place < 0) continue;
     own[n++] = (m->node_whole ? m->node_whole[node] : node) * b->dim + i % b->dim;
     own[n++] = HycoTrainingOfBodies(t)->parts.of[node];
+    /* Three numbers for each: in the whole mesh, body, in the distributed vectors. */
     own[n++] = (m->first + place) * b->dim + i % b->dim;
   }
   PetscCall(GatherAll(HycoComm(t), n, own, &n, &all));
@@ -227,7 +236,8 @@ static PetscErrorCode MarkSurfaces(HycoReducer t, HycoBodiesFactor *factor)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* bare[]: also the unknowns of the surfaces in the cells in[], which the model's mesh has. */
+/* bare[]: also the unknowns of the surfaces in the cells in[], which the model's mesh has. A surface node in a
+   chosen cell is in the model's mesh through that cell, whether or not a slave meets it. */
 static void MarkBare(HycoBodiesFactor *factor, const PetscBool in[])
 {
   HycoMesh m = factor->fom->part;
@@ -264,6 +274,7 @@ static PetscErrorCode Release(HycoReducer t, HycoBodiesFactor *factor, PetscBool
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_REAL, MPI_MAX, HycoComm(t)));
   for (PetscInt i = 0; i < m->n_nodes * dim && most > 0; i++) {
     if (inner[i] && factor->moved[i] >= most * (1 - 1e-6))
+      /* Ties within 1e-6 go to the smallest number: displacements on other numbers of ranks differ by round-off. */
       node = PetscMin(node, m->node_whole ? m->node_whole[i / dim] : i / dim);
   }
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &node, 1, MPIU_INT, MPI_MIN, HycoComm(t)));
@@ -273,6 +284,8 @@ static PetscErrorCode Release(HycoReducer t, HycoBodiesFactor *factor, PetscBool
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* MarkInner() runs again after ShareCells(): cells of other ranks may share nodes with this part. `released`
+   false: nothing moves, and the surfaces' unknowns get modes instead. */
 PetscErrorCode HycoBodiesChooseCells(HycoReducer t, HycoBodiesFactor *factor)
 {
   HycoFE fe = factor->fom->fe;

@@ -7,6 +7,7 @@
 
 #define KEPT 0.3 /* share of the memory for the factors of samples that are kept */
 
+/* Exact equality: theta comes from Node() each time, by the same operations, and a factor serves no other point. */
 static PetscBool Same(PetscInt n, const PetscReal a[], const PetscReal b[])
 {
   for (PetscInt p = 0; p < n; p++) {
@@ -26,6 +27,7 @@ static PetscErrorCode TakeRows(HycoReducer t, HycoBodiesFactor *factor)
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(m->n_owned + 1, &factor->owner));
   for (PetscInt i = 0; i < m->n_nodes; i++) {
+    /* By owned node, in the order of the distributed vectors; `of` is by local node with ghosts. */
     if (HycoMeshOwned(m, i) >= 0) factor->owner[HycoMeshOwned(m, i)] = HycoTrainingOfBodies(t)->parts.of[i];
   }
   for (PetscInt k = 0; k < factor->n; k++) {
@@ -42,6 +44,8 @@ static PetscErrorCode TakeRows(HycoReducer t, HycoBodiesFactor *factor)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The rows of N are body after body, so that those of one are a stride on each rank; a body without surfaces has
+   no N and no C, and takes part by its factor alone. */
 PetscErrorCode HycoBodiesSplit(HycoReducer t, Mat N, HycoBodiesFactor *factor)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
@@ -76,9 +80,11 @@ static PetscErrorCode SharePins(HycoSubstructures b, HycoBodiesFactor *factor)
   for (PetscInt i = 0; i < b->p; i++) {
     PetscInt first;
 
+    /* The owner alone knows the pin's body and place; the maximum over ranks passes them on. */
     at[2 * i] = at[2 * i + 1] = -1;
     if (factor->pins[i] < lo || factor->pins[i] >= hi) continue;
     at[2 * i] = factor->owner[(factor->pins[i] - lo) / b->dim];
+    /* Not collective: only the rank that has the pin asks. */
     PetscCall(MatGetOwnershipRange(factor->body[at[2 * i]].K, &first, NULL));
     PetscCall(ISLocate(factor->body[at[2 * i]].global, factor->pins[i], &at[2 * i + 1]));
     at[2 * i + 1] += first;
@@ -107,6 +113,8 @@ static PetscErrorCode TakePins(HycoReducer t, HycoBodiesFactor *factor)
 
   PetscFunctionBegin;
   PetscCall(HycoKernelSize(factor->fom->K, &kernel));
+  /* The first factor decides; later samples must have the same motions, because Z and the work are interpolated
+     entry by entry. */
   if (!factor->pins) b->p = kernel;
   HycoCheckModel(kernel == b->p, "the number of rigid motions that contact alone prevents changes with the parameters, "
                                  "which a model of bodies does not support; train a hybrid model");
@@ -152,7 +160,8 @@ static PetscErrorCode MoveTo(HycoReducer t, HycoBodiesFactor *factor, const Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* K, and the blocks of the bodies, at theta. Collective. */
+/* K, and the blocks of the bodies, at theta. Collective. K of all bodies, though only one may be factored:
+   assembly is cheap beside a factor, and at one theta it is done once. The null space is attached for TakePins(). */
 static PetscErrorCode AssembleAt(HycoReducer t, HycoBodiesFactor *factor, const PetscReal theta[])
 {
   HycoFOM f = factor->fom;
@@ -212,11 +221,13 @@ static PetscErrorCode NextFactor(HycoBodiesFactor *factor, HycoBodyFactor *body)
 
   PetscFunctionBegin;
   body->now = body->n_kept - 1;
+  /* The last one was analysed but not factored yet: it is still free. */
   if (body->n_kept && !body->kept[body->now].theta) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoFOMGetSolver(factor->fom, &solver));
   PetscCall(HycoSolverMemory(solver, &limit));
   for (PetscInt k = 0; k < factor->n; k++) bytes += factor->body[k].n_kept * factor->body[k].bytes;
   if (body->n_kept && bytes > KEPT * limit) {
+    /* theta NULL: not factored, so that Recall() does not find the old one while it is replaced. */
     PetscCall(PetscFree(body->kept[body->now].theta));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -227,7 +238,8 @@ static PetscErrorCode NextFactor(HycoBodiesFactor *factor, HycoBodyFactor *body)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Before the factor. Collective. */
+/* Before the factor. Collective. The pins before the analysis, which orders them into the Schur complement beside
+   the surfaces' unknowns. A kept analysis of the same pattern is used again. */
 static PetscErrorCode Analyse(HycoBodiesFactor *factor, HycoBodyFactor *body)
 {
   PetscFunctionBegin;
@@ -248,6 +260,7 @@ static PetscErrorCode TakeBlock(HycoSubstructures b, const HycoBodyFactor *body,
   PetscCall(PetscMalloc1(n * n + 1, &record->C));
   PetscCall(PetscCalloc1(n * (size_t)b->p + 1, &record->Z));
   for (size_t j = 0; j < n; j++) {
+    /* M is by columns with the p pins first: rows of a surface column are its work on the motions, then C. */
     const PetscReal *column = M + (p + j) * (p + n);
 
     PetscCall(PetscArraycpy(record->C + j * n, column + p, n));
@@ -270,11 +283,13 @@ static PetscErrorCode Factor(HycoReducer t, HycoBodiesFactor *factor, PetscInt k
 
   PetscFunctionBegin;
   PetscCall(AssembleAt(t, factor, theta));
+  /* Before the first factor of all: their sizes are needed for CheckMemory(), which refuses before any factor. */
   for (PetscInt j = 0; j < b->n && first; j++) PetscCall(Analyse(factor, &factor->body[j]));
   if (first) PetscCall(CheckMemory(t, factor));
   PetscCall(Analyse(factor, body));
   n = (size_t)(body->p + b->body[k].n);
   PetscCall(PetscCalloc1(n * n + 1, &M));
+  /* M is on every rank, and freed before an error returns: it is the largest array here. */
   ierr = HycoDirectFactor(body->direct, body->K, NULL, body->N, M, &singular);
   if (!ierr && record && !t->rank) ierr = TakeBlock(b, body, b->body[k].n, M, record);
   PetscCall(PetscFree(M));
@@ -297,6 +312,7 @@ static PetscBool Recall(HycoBodyFactor *body, PetscInt n, const PetscReal theta[
   return PETSC_FALSE;
 }
 
+/* Afterwards every body has its factor at theta; no body is condensed, its record stays. */
 PetscErrorCode HycoBodiesRefactor(HycoReducer t, HycoBodiesFactor *factor, const PetscReal theta[])
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
@@ -338,6 +354,7 @@ static PetscErrorCode FindLoaded(HycoSubstructures b, HycoBodiesFactor *factor, 
         in[k * n + j] = (PetscBool)(in[k * n + j] || own[b->p + i] != 0);
     }
   }
+  /* Every rank must make the same solves: which loads a body has is known after this only. */
   HycoAllreduce(in, n * factor->n, HYCO_MPI_BOOL, MPI_LOR, HycoComm(factor->fom));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -363,6 +380,8 @@ static PetscErrorCode TakeLoaded(const HycoBodyFactor *body, PetscInt n, const V
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* HycoDirectReduceMany() gives -N K^-1 F (D = 0): u and the work have the opposite sign. A body without surfaces
+   and motions has nothing to give. */
 static PetscErrorCode ReduceBody(HycoSubstructures b, HycoBodiesFactor *factor, PetscInt k, PetscInt n, const Vec F[],
                                  const PetscBool in[], PetscReal u[], PetscReal work[])
 {
@@ -405,6 +424,7 @@ PetscErrorCode HycoBodiesReduce(HycoSubstructures b, HycoBodiesFactor *factor, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* x is zero where a body is not loaded. q is read on rank 0 only, z NULL: no forces of contacts. */
 static PetscErrorCode ExtendBody(HycoSubstructures b, HycoBodiesFactor *factor, PetscInt k, PetscInt n, const Vec F[],
                                  const PetscReal z[], const PetscBool in[], Vec x[])
 {
@@ -424,6 +444,7 @@ static PetscErrorCode ExtendBody(HycoSubstructures b, HycoBodiesFactor *factor, 
     for (PetscInt i = 0; i < body->p; i++) own[i] = all[body->motion[i]];
     PetscCall(PetscArraycpy(own + body->p, all + b->p + b->start[k], b->body[k].n));
   }
+  /* In place: v holds the loads, then the displacements. */
   PetscCall(HycoDirectExpandMany(body->direct, many, v, q, v));
   for (PetscInt j = 0; j < many; j++) PetscCall(VecISCopy(x[number[j]], body->global, SCATTER_FORWARD, v[j]));
   PetscCall(PetscFree(q));
@@ -471,7 +492,8 @@ static PetscErrorCode Respond(HycoSubstructures b, HycoBodiesFactor *factor, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* *at: the record of body k at theta, condensed if there is none (*fresh). Collective. */
+/* *at: the record of body k at theta, condensed if there is none (*fresh). Collective. Records are found by the
+   body's own theta: another value of a parameter that does not change it is no further sample. */
 static PetscErrorCode CondenseBody(HycoReducer t, HycoBodiesFactor *factor, PetscInt k, const PetscReal theta[],
                                    PetscInt *at, PetscBool *fresh)
 {
@@ -486,6 +508,7 @@ static PetscErrorCode CondenseBody(HycoReducer t, HycoBodiesFactor *factor, Pets
     if (Same(b->n_theta, own, body->record[*at].theta)) PetscFunctionReturn(PETSC_SUCCESS);
   }
   *fresh = PETSC_TRUE;
+  /* record[] holds numbers, not addresses, since the array moves. */
   PetscCall(PetscRealloc((size_t)(body->n_records + 1) * sizeof(*record), &body->record));
   record = &body->record[body->n_records++];
   PetscCall(PetscMemzero(record, sizeof(*record)));
@@ -495,6 +518,7 @@ static PetscErrorCode CondenseBody(HycoReducer t, HycoBodiesFactor *factor, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Every rank has the records with theta, R and work; C and Z are on rank 0. */
 PetscErrorCode HycoBodiesCondense(HycoReducer t, HycoBodiesFactor *factor, const PetscReal theta[], PetscInt record[])
 {
   PetscBool fresh = PETSC_FALSE;

@@ -34,7 +34,8 @@ typedef struct {
 
 /* -- forces -- */
 
-/* One point: *solved if its contact problem is. Rank 0. */
+/* One point: *solved if its contact problem is. Rank 0. The order of a prediction: fe at mu, rows there, then the
+   bodies. */
 static PetscErrorCode SolveOne(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal mu[], PetscReal Lambda[],
                                PetscBool *solved)
 {
@@ -75,6 +76,7 @@ static PetscErrorCode SolvePath(HycoBodiesFriction f, HycoBodiesWork o, HycoScen
     PetscCall(HycoBodiesFrictionSolve(f, o, &kkt, &its, solved));
     if (!*solved) break;
     PetscCall(HycoBodiesFrictionAccept(f));
+    /* Another time within each quarter for each point: all times are seen, not four of them. */
     if (t >= first + (last - first) * (seen + SomeShare(k)) / SEEN && seen < SEEN) {
       PetscCall(PetscArraycpy(sampled->c + sampled->n * b->r, o->c, b->r));
       PetscCall(PetscArraycpy(sampled->f + sampled->n * b->ns, o->f, b->ns));
@@ -88,7 +90,8 @@ static PetscErrorCode SolvePath(HycoBodiesFriction f, HycoBodiesWork o, HycoScen
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A time of the history for point k of the sequence. */
+/* A time of the history for point k of the sequence. Elastic bodies have no past: a point of a history is solved
+   at one of its times as if it were none. */
 static PetscReal SomeTime(HycoScene s, PetscInt k)
 {
   return s->n_times ? s->times[0] + SomeShare(k) * (s->times[s->n_times - 1] - s->times[0]) : 0;
@@ -106,6 +109,8 @@ static PetscErrorCode SolvePoints(HycoReducer t, HycoBodiesWork o, const HycoBod
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(points, &n, NULL, &mu));
+  /* The former checks become samples, the last CHECKS points are the new ones: the points of a larger set begin
+     with those of a smaller. */
   if (n > sampled->tried) sampled->n_checks = 0;
   PetscCall(PetscMalloc3(s->pairs->n + 1, &Lambda, n, &bound, n, &norm));
   for (PetscInt k = sampled->tried; k < n; k++) {
@@ -125,6 +130,7 @@ static PetscErrorCode SolvePoints(HycoReducer t, HycoBodiesWork o, const HycoBod
     if (ierr || !solved) continue;
     bound[k] = HycoBodiesBound(o, &norm[k]);
     most = PetscMax(most, norm[k]);
+    /* SolvePath() has stored its samples. */
     if (friction) continue;
     PetscCall(PetscArraycpy(sampled->c + sampled->n * b->r, o->c, b->r));
     PetscCall(PetscArraycpy(sampled->f + sampled->n * b->ns, o->f, b->ns));
@@ -133,6 +139,7 @@ static PetscErrorCode SolvePoints(HycoReducer t, HycoBodiesWork o, const HycoBod
   }
   if (!sampled->tried) b->forces = 0;
   for (PetscInt k = sampled->tried; k < n && most > 0; k++)
+    /* A bound relative to tiny forces would say nothing about those that matter. */
     b->forces = PetscMax(b->forces, bound[k] * norm[k] / PetscMax(norm[k], HYCO_SMALL_FORCE * most));
   sampled->tried = n;
   PetscCall(PetscFree3(Lambda, bound, norm));
@@ -158,6 +165,7 @@ static PetscErrorCode TakePaths(HycoReducer t, HycoBodiesWork o, const HycoBodie
     PetscCall(HycoReducerColumn(t, k, mu));
     PetscCall(HycoFESetParameters(s->fe, mu));
     PetscCall(HycoRowsFill(s->fe, s->pairs, s->rows));
+    /* Forces of the training paths are given: no contact problem, only f = B^T L in the bodies' axes. */
     PetscCall(HycoBodiesPrepare(o, s, mu));
     HycoBodiesGiven(o, s, t->Lambda + (size_t)k * (size_t)s->pairs->n);
     PetscCall(PetscArraycpy(sampled->c + sampled->n * b->r, o->c, b->r));
@@ -167,7 +175,8 @@ static PetscErrorCode TakePaths(HycoReducer t, HycoBodiesWork o, const HycoBodie
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rank 0. */
+/* Rank 0. Online code on the surfaces' mesh, which rank 0 alone has: the samples are those that a prediction would
+   find. The work is freed before an error returns. */
 static PetscErrorCode SampleForces(HycoReducer t, HycoFOM f, HycoSamples points, Sampled *sampled)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
@@ -187,6 +196,7 @@ static PetscErrorCode SampleForces(HycoReducer t, HycoFOM f, HycoSamples points,
   PetscCall(HycoBodiesReset(&work));
   PetscCall(HycoBodiesFrictionDestroy(&friction));
   PetscCall(HycoRowsDestroy(&rows));
+  /* It is at the last point's parameters. */
   f->fe_surface->ready = PETSC_FALSE;
   PetscCall(ierr);
   HycoCheckModel(sampled->n > sampled->n_checks,
@@ -199,6 +209,7 @@ static PetscErrorCode Sample(HycoReducer t, HycoFOM f, PetscInt wanted, PetscBoo
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   const PetscInt nodes = PetscMin(SPREAD, HycoBodiesGrid(b, 0, NULL));
+  /* Of samples, so that U, nodes x samples on all ranks, has no more than MOST_NUMBERS entries. */
   const PetscReal most = MOST_NUMBERS / ((PetscReal)t->sizes[0] * t->sizes[3] * nodes);
   HycoSamples points;
   PetscInt n = PetscMax(LEAST, PetscMin(wanted, (PetscInt)PetscMin(most, 1e6)));
@@ -221,6 +232,7 @@ static PetscErrorCode Sample(HycoReducer t, HycoFOM f, PetscInt wanted, PetscBoo
     PetscErrorCode caught = PETSC_SUCCESS;
 
     PetscCall(HycoCatchBegin());
+    /* Not HycoOnRoot(): the points are destroyed on every rank before the error returns. */
     if (f->rank == 0) caught = SampleForces(t, t->fom, points, sampled);
     PetscCall(HycoCatchEnd(caught, message));
     ierr = HycoErrorSync(HycoComm(t), caught, message);
@@ -229,6 +241,7 @@ static PetscErrorCode Sample(HycoReducer t, HycoFOM f, PetscInt wanted, PetscBoo
   PetscCall(ierr);
   PetscCallMPI(MPI_Bcast(&sampled->n, 1, MPIU_INT, 0, HycoComm(t)));
   PetscCallMPI(MPI_Bcast(&sampled->n_checks, 1, MPIU_INT, 0, HycoComm(t)));
+  /* The loads' coefficients only: the forces are read on rank 0. */
   HycoBcast(sampled->c, sampled->n * b->r, MPIU_REAL, HycoComm(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -275,7 +288,8 @@ static PetscErrorCode Expand(HycoSubstructures b, HycoBodiesFactor *factor, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the displacements of sample k are computed at node j of n. */
+/* Whether the displacements of sample k are computed at node j of n. With many nodes of theta each sample is
+   computed at about SPREAD of them, shifted from sample to sample: every node sees some samples. */
 static PetscBool Visits(PetscInt k, PetscInt j, PetscInt n)
 {
   return (PetscBool)(n <= SPREAD || (j + k) % (n / SPREAD) == 0);
@@ -338,9 +352,12 @@ static PetscErrorCode ExpandNode(HycoReducer t, HycoBodiesFactor *factor, PetscI
   for (PetscInt k = sampled->expanded; k < last; k++) {
     if (Visits(k, j, nodes)) sample[n++] = k;
   }
+  /* Columns of earlier rounds stay: doubling the samples computes the new ones only. */
   PetscCall(PetscRealloc((n_dof * (size_t)(sampled->n_U + n + b->p) + 1) * sizeof(PetscReal), &sampled->U));
   U = sampled->U + n_dof * (size_t)sampled->n_U;
   PetscCall(ExpandSamples(b, factor, sampled, n, sample, U));
+  /* Stresses of about SCORED samples show where cells matter; with inelastic bodies the cells follow from the
+     laws. */
   for (PetscInt k = 0; k < n && !HycoBodiesFlow(t); k += 1 + n * nodes / SCORED)
     PetscCall(HycoBodiesAddScores(t, factor, U + n_dof * (size_t)k));
   sampled->n_U += n;
@@ -379,7 +396,8 @@ static PetscErrorCode ExpandAll(HycoReducer t, HycoBodiesFactor *factor, Sampled
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* value = G u at the unknowns of a body that have modes, else 0. */
+/* value = G u at the unknowns of a body that have modes, else 0. Zero outside the body and at unknowns that need
+   no modes, so that POD spends none on them. Modes of different bodies have disjoint rows. */
 static void TurnField(HycoReducer t, const HycoBodiesFactor *factor, PetscInt body, const PetscReal G[], PetscBool back,
                       const PetscReal u[], PetscReal value[])
 {
@@ -434,7 +452,8 @@ static PetscErrorCode BodyColumns(HycoReducer t, const HycoBodiesFactor *factor,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Scales the columns to length 1 if they are not small. Collective. */
+/* Scales the columns to length 1 if they are not small. Collective. POD weighs by energy: samples with small loads
+   would leave no mode, though the error is judged relative to each. */
 static PetscErrorCode ScaleColumns(Mat S)
 {
   PetscReal *norm, most = 0;
@@ -479,6 +498,7 @@ static PetscErrorCode FindModes(HycoReducer t, const HycoBodiesFactor *factor, P
     PetscCall(ScaleColumns(S));
     PetscCall(MatNorm(S, NORM_FROBENIUS, &norm));
     PetscCall(PetscCalloc1(columns + 1, &own));
+    /* A body that does not move, or has no unknown of its own left, has no modes. */
     if (norm > 0) PetscCall(HycoReducerPOD(t, S, HycoTrainingOfBodies(t)->pod_tol, t->max_modes, &W, &l, own));
     PetscCall(MatDestroy(&S));
     b->mode_start[k + 1] = b->mode_start[k] + l;
@@ -488,6 +508,7 @@ static PetscErrorCode FindModes(HycoReducer t, const HycoBodiesFactor *factor, P
     if (!l) PetscCall(MatDestroy(&W));
     if (!l) continue;
     if (*V) {
+      /* Disjoint rows: the joined columns are orthonormal without another QR factorisation. */
       PetscCall(HycoJoinColumns(V, &W, &joined));
       *V = joined;
     } else
@@ -513,6 +534,7 @@ static PetscErrorCode Miss(HycoReducer t, Mat V, Mat S, PetscReal norm[])
   PetscCall(MatGetSize(V, NULL, &modes));
   PetscCall(MatGetSize(S, NULL, &columns));
   PetscCall(PetscMalloc1((size_t)modes * (size_t)columns + 1, &c));
+  /* S - V V^T S: its columns' norms by difference of matrices, since 1 - |V^T s|^2 would lose half of the digits. */
   PetscCall(HycoReducerMultiply(t, V, S, c));
   PetscCall(MatDenseGetLDA(V, &lda[0]));
   PetscCall(MatDenseGetLDA(S, &lda[1]));
@@ -569,6 +591,7 @@ static PetscErrorCode MeasureLeft(HycoReducer t, HycoBodiesFactor *factor, const
     PetscCall(BodyColumns(t, factor, k, n, U, &S));
     PetscCall(Miss(t, V, S, norm));
     PetscCall(MatDestroy(&S));
+    /* |sum of q_j r_j|^2 <= |q|^2 sum of |r_j|^2 (Cauchy-Schwarz). */
     for (PetscInt i = 0; i < n * turns; i++) lost[i / turns] += (turns > 1 ? b->dim : 1) * PetscSqr(norm[i]);
   }
   for (PetscInt k = 0; k < n; k++) {
@@ -590,7 +613,8 @@ static PetscErrorCode LoadFields(HycoSubstructures b, HycoBodiesFactor *factor, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The turned mode back in the body's axes, as a load: v = G^T V_i. Collective. */
+/* The turned mode back in the body's axes, as a load: v = G^T V_i. Collective. V_i . (G u) = (G^T V_i) . u: one
+   solve with this load gives the mode's coefficient for any forces, by reciprocity (K is symmetric). */
 static PetscErrorCode TurnMode(HycoReducer t, const HycoBodiesFactor *factor, PetscInt body, PetscInt turn,
                                const PetscScalar column[], Vec v)
 {
@@ -683,6 +707,8 @@ static PetscErrorCode BodyCoefficients(HycoReducer t, HycoBodiesFactor *factor, 
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   HycoSubstructure *s = &b->body[k];
+  /* Modes in each turn, then the unknowns inside; MANY right-hand sides at once, since MUMPS is several times
+     faster on blocks. */
   const PetscInt rows = s->l * (b->turn_start[k + 1] - b->turn_start[k]) + s->m;
   PetscReal *u, *g;
   Vec v[MANY];
@@ -696,6 +722,8 @@ static PetscErrorCode BodyCoefficients(HycoReducer t, HycoBodiesFactor *factor, 
     for (PetscInt j = 0; j < many; j++) PetscCall(SetRow(t, factor, k, first + j, V, v[j]));
     PetscCall(HycoBodiesReduce(b, factor, many, v, u, g));
     for (PetscInt j = 0; j < many; j++) {
+      /* H = -N K^-1 v has a column for each row of a and g: stored by surface unknown, so that a prediction adds
+         whole columns of the few loaded ones. */
       const size_t row = (size_t)(sample * rows + first + j);
 
       for (PetscInt d = 0; d < s->n; d++)
@@ -712,6 +740,8 @@ static PetscErrorCode BodyCoefficients(HycoReducer t, HycoBodiesFactor *factor, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* From the last node to the first: its factor is still there after ExpandAll(), and the kept ones are those used
+   last. */
 static PetscErrorCode Coefficients(HycoReducer t, HycoBodiesFactor *factor, Mat V)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
@@ -731,6 +761,7 @@ static PetscErrorCode Coefficients(HycoReducer t, HycoBodiesFactor *factor, Mat 
     for (PetscInt k = 0; k < b->n; k++) {
       const PetscInt sample = HycoBodiesSampleOf(b, k, j);
 
+      /* Nodes that differ only in parameters that do not change the body are no samples of it. */
       if (sample >= 0) PetscCall(BodyCoefficients(t, factor, k, sample, V, x));
     }
     for (PetscInt d = 0; d < b->r; d++) PetscCall(VecDestroy(&x[d]));
@@ -740,7 +771,8 @@ static PetscErrorCode Coefficients(HycoReducer t, HycoBodiesFactor *factor, Mat 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Replaces the modes of the training solutions. Collective. */
+/* Replaces the modes of the training solutions. Collective. The reducer takes V and sigma over. VtU, the
+   coefficients of the training solutions, must be those of these modes: the model is judged by them. */
 static PetscErrorCode TakeModes(HycoReducer t, HycoSnapshots store, Mat V, PetscReal sigma[])
 {
   Mat S;
@@ -759,7 +791,8 @@ static PetscErrorCode TakeModes(HycoReducer t, HycoSnapshots store, Mat V, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* factor->in_mesh. Rank 0. */
+/* factor->in_mesh. Rank 0. By number in the whole mesh, because the surfaces' mesh and the model's have different
+   local ones. */
 static PetscErrorCode FindInMesh(HycoReducer t, HycoBodiesFactor *factor)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
@@ -814,6 +847,7 @@ static PetscErrorCode ModesOf(HycoReducer t, HycoBodiesFactor *factor, PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Samples are doubled until the modes are few beside them and miss little. Only the last V and sigma survive. */
 PetscErrorCode HycoBodiesFields(HycoReducer t, HycoSnapshots store, HycoBodiesFactor *factor)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;

@@ -27,6 +27,7 @@ static PetscErrorCode CheckChanges(HycoReducer t)
     PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE};
     HycoChanges c;
 
+    /* Variables beyond the parameters: the time and the tables of the history. */
     changed[p] = PETSC_TRUE;
     c = HycoSceneChanges(s, changed);
     HycoCheckModel(!c.stiffness && !c.rows && !c.nodes,
@@ -42,6 +43,7 @@ static PetscErrorCode CheckChanges(HycoReducer t)
   for (PetscInt k = 0; k < parts->n; k++) {
     PetscInt shape[HYCO_MAX_PARAMETERS];
 
+    /* One stiffness for all paths: P, A and C below are computed at one theta. */
     HycoCheckModel(!flows[k] || !HycoBodyPartsShapes(parts, k, shape),
                    "%s changes the shape or the ratio of moduli of body %s, which deforms inelastically; a model of "
                    "bodies does not support that: train a hybrid model",
@@ -56,6 +58,7 @@ static PetscErrorCode CheckChanges(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Before the solutions of training are spent on the type: all of it follows from the scene and mesh. */
 PetscErrorCode HycoBodiesCheckPath(HycoReducer t)
 {
   const HycoScene s = t->scene;
@@ -88,6 +91,8 @@ PetscErrorCode HycoBodiesCheckPath(HycoReducer t)
 
 /* -- modes and points -- */
 
+/* From the training solutions alone, before any factor of the bodies; called again after the training set has
+   grown. */
 PetscErrorCode HycoBodiesStrainModes(HycoReducer t, HycoSnapshots store)
 {
   HycoBodiesTraining s = HycoTrainingOfBodies(t);
@@ -101,7 +106,8 @@ PetscErrorCode HycoBodiesStrainModes(HycoReducer t, HycoSnapshots store)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Makes these points those of the model, ascending, and their cells its cells; takes ownership. */
+/* Makes these points those of the model, ascending, and their cells its cells; takes ownership. Every rank has the
+   same points; all of a model's cells with laws are seeds, and t->seeds_cell makes them the model's mesh. */
 static PetscErrorCode TakePoints(HycoReducer t, PetscInt count, PetscInt point[])
 {
   HycoBodiesInelastic in = HycoTrainingOfBodies(t)->bodies->inelastic;
@@ -148,6 +154,7 @@ static PetscErrorCode Interpolate(HycoReducer t)
   PetscCall(HycoPointsChoose(&s->strains, t->fom->fe->n_sigma, s->cells, &count, point));
   PetscCall(TakePoints(t, count, point));
   PetscCall(TakeThere(t, in->T, &smallest));
+  /* An error of s at the points enters alpha with the norm of the pseudo-inverse at most. */
   in->amplification = 1 / smallest;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -177,6 +184,7 @@ static PetscErrorCode ListOwn(HycoReducer t, Unknowns *own)
     for (PetscInt i = 0; i < n && at >= 0; i++) {
       const PetscInt k = HycoCellUnknown(m, e, i), node = k / m->dim, place = HycoMeshOwned(m, node);
 
+      /* Each unknown once, by the owner of its node; cells at the border of a part are in several. */
       if (place < 0 || taken[k] || t->fom->fe->fixed[k]) continue;
       taken[k] = PETSC_TRUE;
       own->dof[own->n] = (m->node_whole ? m->node_whole[node] : node) * m->dim + k % m->dim;
@@ -188,7 +196,8 @@ static PetscErrorCode ListOwn(HycoReducer t, Unknowns *own)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All of them, ascending, on every rank. Collective. */
+/* All of them, ascending, on every rank. Collective. Three gathers in the same order of ranks, then one sort:
+   numbers, bodies and rows stay together. */
 static PetscErrorCode ListAll(HycoReducer t, Unknowns *all)
 {
   Unknowns own = {0};
@@ -236,6 +245,7 @@ static PetscErrorCode TakeValues(const Unknowns *at, Vec x, PetscInt k, PetscInt
   PetscCall(VecGetOwnershipRange(x, &lo, &hi));
   PetscCall(VecGetArrayRead(x, &a));
   for (PetscInt i = 0; i < at->n; i++) {
+    /* The other rows stay 0, and the sum over ranks completes the table (FillCells()). */
     if (at->global[i] >= lo && at->global[i] < hi) table[(size_t)i * (size_t)n + (size_t)k] = a[at->global[i] - lo];
   }
   PetscCall(VecRestoreArrayRead(x, &a));
@@ -296,6 +306,7 @@ static PetscErrorCode Respond(HycoReducer t, HycoBodiesFactor *factor, PetscReal
     PetscCall(Displace(b, factor, F, u, &factor->strain[k]));
     factor->n_strains++;
     for (PetscInt i = 0; i < b->ns; i++) in->P[(size_t)i * (size_t)in->m + (size_t)k] = u[i];
+    /* Q^T K^-1 Q is symmetric: half of the products. */
     for (PetscInt i = 0; i <= k; i++) {
       PetscCall(VecDot(F, factor->strain[i], &work[i * in->m + k]));
       work[k * in->m + i] = work[i * in->m + k];
@@ -305,7 +316,9 @@ static PetscErrorCode Respond(HycoReducer t, HycoBodiesFactor *factor, PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The rows of the cells' unknowns for forces on the surfaces, C: K is symmetric. Collective. */
+/* The rows of the cells' unknowns for forces on the surfaces, C: K is symmetric. Collective. N K^-1 e_j for each
+   unknown j, by reciprocity: as many solves as unknowns in the cells, instead of one for each unknown of the
+   surfaces. Each row is complete on every rank. */
 static PetscErrorCode FillForces(HycoReducer t, HycoBodiesFactor *factor, const Unknowns *at)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
@@ -367,6 +380,7 @@ static PetscErrorCode Yields(HycoReducer t, PetscBool *yields)
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(fe->n_dof, &u, fe->n_dof, &f));
+  /* In no time (t0 = t1) creep does nothing: what deforms or fails now yields. */
   for (PetscInt i = 0; i < fe->n_dof; i++) u[i] = size * PetscSinReal(1.7 * i * i + i);
   PetscCall(PetscArrayzero(f, fe->n_dof));
   PetscCall(HycoFEStateCreate(fe, &begin));
@@ -381,7 +395,8 @@ static PetscErrorCode Yields(HycoReducer t, PetscBool *yields)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Columns of X become X M, with M m x l column major; x: their number, then l. Collective. */
+/* Columns of X become X M, with M m x l column major; x: their number, then l. Collective. MAXPY into new vectors,
+   since X is needed until the last column. */
 static PetscErrorCode Combine(PetscInt m, PetscInt l, const PetscReal M[], Vec X[])
 {
   Vec *Y;
@@ -413,6 +428,7 @@ static PetscErrorCode Orthogonalise(HycoReducer t, HycoBodiesFactor *factor, con
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(m * m, &gram, m, &sigma));
   for (PetscInt i = 0; i < m * m; i++) gram[i] = scale[i / m] * work[i] * scale[i % m];
+  /* By the Gram matrix: m is some tens, and vectors of the mesh's length are not factored again. */
   PetscCall(HycoPODGram(m, gram, s->inelastic_tol, 0, &M, &l, sigma));
   for (PetscInt i = 0; i < m * l; i++) M[i] *= scale[i % m];
   PetscCall(Combine(m, l, M, factor->strain));
@@ -443,6 +459,7 @@ static PetscErrorCode WorkOnModes(HycoFE fe, const PetscReal value[], PetscInt m
     for (PetscInt k = 0; k < n; k++) {
       const PetscInt unknown = HycoCellUnknown(fe->mesh, e, k);
 
+      /* Work on prescribed displacements is no equation of the model. */
       for (PetscInt d = 0; d < m && !fe->fixed[unknown] && force[k] != 0; d++)
         work[e * m + d] += force[k] * u[(size_t)d * (size_t)fe->n_dof + (size_t)unknown];
     }
@@ -451,7 +468,8 @@ static PetscErrorCode WorkOnModes(HycoFE fe, const PetscReal value[], PetscInt m
 }
 
 /* The work of the largest n_k modes of the stresses on the modes' displacements in each cell, a column for each pair, by
-   the stresses' sizes: rows in the file's order. Collective. */
+   the stresses' sizes: rows in the file's order. Collective. J of the empirical cubature: the sum over all cells
+   is what the weights must reproduce. sigma_k scales each stress mode to its share in the training paths. */
 static PetscErrorCode Contributions(HycoReducer t, HycoBodiesFactor *factor, PetscInt n_k, Mat *S)
 {
   const HycoBasis *modes = &HycoTrainingOfBodies(t)->strains;
@@ -503,13 +521,15 @@ static PetscErrorCode TakeWeighted(HycoReducer t, const PetscReal w[], PetscReal
     (*weight)[n] = w[i / nq];
     point[n++] = i;
   }
+  /* Weights are on rank 0; all ranks list the same points, in the order of the whole mesh. */
   HycoBcast(point, count, MPIU_INT, HycoComm(t));
   HycoBcast(*weight, count, MPIU_REAL, HycoComm(t));
   PetscCall(TakePoints(t, count, point));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Which cells of the part are elastic. */
+/* Which cells of the part are elastic. For HycoCubatureFind(), whose `near` cells are in no equation and get the
+   weight 0 here. */
 static PetscErrorCode MarkElastic(HycoReducer t, PetscBool **elastic)
 {
   PetscFunctionBegin;
@@ -530,6 +550,7 @@ static PetscErrorCode Cubature(HycoReducer t, HycoBodiesFactor *factor, PetscRea
   Mat S, W;
 
   PetscFunctionBegin;
+  /* Modes below the tolerance of the cubature would only add columns. */
   while (n_k < s->strains.l && s->strains.sigma[n_k] > s->cubature_tol * s->strains.sigma[0]) n_k++;
   PetscCall(Contributions(t, factor, n_k, &S));
   PetscCall(PetscCalloc1(in->m * n_k + 1, &sigma));
@@ -546,7 +567,8 @@ static PetscErrorCode Cubature(HycoReducer t, HycoBodiesFactor *factor, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The weight of point p, point q of the part's cell e, and with a cubature its rows of T, weight w B A. */
+/* The weight of point p, point q of the part's cell e, and with a cubature its rows of T, weight w B A. T_p =
+   weight w B A: alpha = sum over points of T_p^T s_p. A fixed unknown is not listed, and its row of A is 0. */
 static PetscErrorCode FillPoint(HycoReducer t, const Unknowns *at, const PetscReal weight[], PetscInt e, PetscInt q,
                                 PetscInt p)
 {
@@ -572,6 +594,7 @@ static PetscErrorCode FillPoint(HycoReducer t, const Unknowns *at, const PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A cell counts on the rank that owns its first node: on others its copy would be summed again. */
 static PetscErrorCode FillOwnPoints(HycoReducer t, const Unknowns *at, const PetscReal weight[])
 {
   HycoBodiesInelastic in = HycoTrainingOfBodies(t)->bodies->inelastic;
@@ -601,6 +624,7 @@ static PetscErrorCode FillPoints(HycoReducer t, const Unknowns *at, const PetscR
   HycoAllreduce(in->weight, in->n_points, MPIU_REAL, MPI_SUM, HycoComm(t));
   if (weight) HycoAllreduce(in->T, in->n_points * size, MPIU_REAL, MPI_SUM, HycoComm(t));
   for (PetscInt i = 0; i < in->n_points * size && !weight; i++) {
+    /* From sqrt(w) s, in which the modes are orthonormal, to s, which the laws give. */
     in->T[i] *= PetscSqrtReal(in->weight[i / size]);
     in->there[i] /= PetscSqrtReal(in->weight[i / size]);
   }
@@ -625,6 +649,7 @@ static PetscErrorCode FillCells(HycoReducer t, HycoBodiesFactor *factor, const P
   for (PetscInt k = 0; k < in->m; k++) PetscCall(TakeValues(&at, factor->strain[k], k, in->m, in->A));
   PetscCall(FillForces(t, factor, &at));
   PetscCall(FillLoads(t, factor, &at, u));
+  /* C is complete already, A and R have the rows of this rank. */
   HycoAllreduce(in->A, at.n * in->m, MPIU_REAL, MPI_SUM, HycoComm(t));
   HycoAllreduce(in->R, at.n * b->r, MPIU_REAL, MPI_SUM, HycoComm(t));
   PetscCall(FillPoints(t, &at, weight));
@@ -642,6 +667,7 @@ static PetscErrorCode ChoosePoints(HycoReducer t, HycoBodiesFactor *factor, cons
   PetscFunctionBegin;
   *weight = NULL;
   if (s->laws == HYCO_BODIES_AUTO && in->m) PetscCall(Yields(t, &yields));
+  /* Creep is smooth in space, so that few points interpolate it; plastic fronts need Galerkin's method. */
   if (!yields || !in->m) {
     PetscCall(Interpolate(t));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -653,6 +679,8 @@ static PetscErrorCode ChoosePoints(HycoReducer t, HycoBodiesFactor *factor, cons
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* At `first`, the only place: CheckChanges() has refused what would change the stiffness or shape of a body that
+   flows. */
 PetscErrorCode HycoBodiesStrains(HycoReducer t, HycoBodiesFactor *factor)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;

@@ -16,13 +16,17 @@
 static PetscReal Node(HycoReducer t, HycoSubstructures b, PetscInt p, PetscInt n, PetscInt k)
 {
   const PetscReal share = (1 - PetscCosReal(PETSC_PI * ((PetscReal)k / (PetscReal)(n - 1)))) / 2;
-  PetscReal lo = t->scene->lo[b->theta[p]], hi = t->scene->hi[b->theta[p]];
+  const PetscInt variable = b->variable[p];
+  const PetscReal lo = t->scene->lo[b->theta[p]], hi = t->scene->hi[b->theta[p]];
+  const PetscReal first = HycoBodiesVariable(variable, lo), last = HycoBodiesVariable(variable, hi);
 
   if (!k) return lo;
   if (k == n - 1) return hi;
-  return b->logarithm[p] ? lo * PetscPowReal(hi / lo, share) : lo + share * (hi - lo);
+  return HycoBodiesValue(variable, first + share * (last - first));
 }
 
+/* A node of the grid is a sample of the body only at the first value of the axes that do not change it, so that
+   none is stored twice. */
 PetscInt HycoBodiesSampleOf(HycoSubstructures b, PetscInt body, PetscInt k)
 {
   const HycoTensor *t = &b->body[body].tensor;
@@ -39,7 +43,9 @@ PetscInt HycoBodiesSampleOf(HycoSubstructures b, PetscInt body, PetscInt k)
   return sample;
 }
 
-/* Sets the values of theta from their numbers, and the bodies' tensors. */
+/* Sets the values of theta from their numbers, and the bodies' tensors. Logarithms are interpolated where
+   `logarithm` says so; HycoBodiesPoint() gives theta back without a round trip through them, exactly as it was
+   condensed. */
 static PetscErrorCode SetGrid(HycoReducer t, HycoSubstructures b)
 {
   PetscInt n = 0;
@@ -50,11 +56,8 @@ static PetscErrorCode SetGrid(HycoReducer t, HycoSubstructures b)
   PetscCall(PetscMalloc1(n + 1, &b->node));
   n = 0;
   for (PetscInt p = 0; p < b->n_theta; p++) {
-    for (PetscInt k = 0; k < b->n_nodes[p]; k++) {
-      b->node[n] = Node(t, b, p, b->n_nodes[p], k);
-      if (b->logarithm[p]) b->node[n] = PetscLogReal(b->node[n]);
-      n++;
-    }
+    for (PetscInt k = 0; k < b->n_nodes[p]; k++)
+      b->node[n++] = HycoBodiesVariable(b->variable[p], Node(t, b, p, b->n_nodes[p], k));
   }
   for (PetscInt k = 0; k < b->n; k++) {
     for (PetscInt p = 0; p < b->n_theta; p++) b->body[k].tensor.n[p] = HycoBodiesAxis(b, k, p) ? b->n_nodes[p] : 1;
@@ -116,6 +119,7 @@ static PetscErrorCode Factor(PetscInt n, PetscReal C[])
   PetscCall(PetscBLASIntCast(n, &m));
   for (PetscInt i = 0; i < n; i++) most = PetscMax(most, C[(size_t)i * (size_t)(n + 1)]);
   for (PetscInt i = 0; i < n; i++) C[(size_t)i * (size_t)(n + 1)] += 1e-13 * most; /* pinned unknowns do not move */
+  /* The shift is far below any bound that matters, and pinned unknowns have zero rows. */
   LAPACKpotrf_("L", &m, C, &m, &info);
   PetscCheck(!info, PETSC_COMM_SELF, PETSC_ERR_LIB, "the flexibility of a body is not positive definite");
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -139,6 +143,7 @@ static PetscErrorCode Largest(PetscInt n, const PetscReal L[], const PetscReal D
     for (PetscInt i = 0; i < n; i++) size += x[i] * x[i];
     size = PetscSqrtReal(size);
     if (!(size > 0)) break;
+    /* After an iteration on a vector of length 1, its length tends to the largest |eigenvalue|. */
     if (k) *largest = size;
     for (PetscInt i = 0; i < n; i++) x[i] /= size;
     BLAStrsm_("L", "L", "T", "N", &m, &one, &unit, L, &m, x, &m);
@@ -170,6 +175,7 @@ static PetscErrorCode AddGram(const HycoSubstructure *s, const PetscReal weight[
   }
   if (r) BLAStrsm_("L", "L", "N", "N", &m, &columns, &unit, L, &m, D, &m);
   for (PetscInt i = 0; i < r * r; i++) {
+    /* Summed over the held-out points, so that the quadratic form bounds the error at each of them. */
     for (PetscInt k = 0; k < s->n; k++) s->gram[i] += D[i / r * s->n + k] * D[i % r * s->n + k];
   }
   PetscCall(PetscFree(D));
@@ -188,6 +194,7 @@ static PetscErrorCode Bound(HycoSubstructures b, const PetscReal mu[], const Hyc
     const size_t n = (size_t)PetscSqr(s->n);
     PetscReal *C, *D, *weight, own;
 
+    /* Nothing of this body is interpolated. */
     if (s->n_samples == 1 || !s->n) continue;
     PetscCall(PetscMalloc3(n + 1, &C, n + 1, &D, s->n_samples, &weight));
     PetscCall(HycoBodiesWeights(b, k, mu, weight));
@@ -229,6 +236,7 @@ static PetscErrorCode BoundAlong(HycoReducer t, HycoBodiesFactor *factor, PetscI
     PetscCallMPI(MPI_Bcast(&own, 1, MPIU_REAL, 0, HycoComm(t)));
     *e = PetscMax(*e, own);
     PetscCall(PetscFree(factor->between));
+    /* Kept for MeasureLeft(): a point that is no sample, with a factor that may still be there. */
     HycoDuplicate(b->n_theta, theta, &factor->between);
   }
   PetscCall(PetscFree(record));
@@ -249,6 +257,7 @@ static PetscErrorCode CondenseGrid(HycoReducer t, HycoBodiesFactor *factor)
     PetscReal theta[HYCO_MAX_PARAMETERS];
 
     HycoBodiesPoint(t, k, theta);
+    /* Nodes of the coarser grid, and those at which it was judged, are found among the records. */
     PetscCall(HycoBodiesCondense(t, factor, theta, record + k * b->n));
   }
   HycoOnRoot(HycoComm(t), TakeRecords(b, factor, record));
@@ -266,12 +275,15 @@ static PetscInt Worst(HycoReducer t, HycoSubstructures b, const PetscReal e[])
     const PetscInt finer = 2 * b->n_nodes[p] - 1;
     const PetscInt n = HycoBodiesGrid(b, 0, NULL) / b->n_nodes[p] * finer;
 
+    /* The axes' errors add up: each may use its share of the tolerance. */
     if (e[p] <= s->tol / b->n_theta || finer > MOST_VALUES || n > s->most_samples) continue;
     if (worst < 0 || e[p] > e[worst]) worst = p;
   }
   return worst;
 }
 
+/* One axis is refined at a time, the worst: a tensor grid that is fine in all of them would cost the product. What
+   remains above the tolerance is no failure, it is in the bound. */
 PetscErrorCode HycoBodiesSample(HycoReducer t, HycoBodiesFactor *factor)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;

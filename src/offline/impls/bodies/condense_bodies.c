@@ -8,6 +8,8 @@
 #define SEARCHED      200  /* such points */
 #define LEAST         3    /* values of each of the parameters theta */
 #define MOST_THETA    3    /* parameters that change the shape of bodies */
+#define BENDS         4    /* parts of a parameter's range over which nodes move along lines or not */
+#define STRAIGHTER    0.1  /* share of the squared distance from a line from which another variable is better */
 
 /* -- before the solves -- */
 
@@ -39,7 +41,8 @@ static PetscErrorCode CheckParts(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the scene has what the model does not represent. */
+/* Whether the scene has what the model does not represent. What follows from options and the mesh; parameters and
+   paths are checked once the bodies are known. */
 static PetscErrorCode CheckScene(HycoReducer t)
 {
   PetscBool regularise = PETSC_FALSE;
@@ -54,6 +57,7 @@ static PetscErrorCode CheckScene(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Before any solution, so that a search refuses the type at no cost; called again in each attempt. */
 PetscErrorCode HycoBodiesBegin(HycoReducer t)
 {
   PetscReal mu[HYCO_MAX_PARAMETERS];
@@ -72,6 +76,8 @@ PetscErrorCode HycoBodiesBegin(HycoReducer t)
 #define SOLVES  12 /* assumed solves for each load, mode and sample of the fields */
 #define STRAINS 40 /* assumed modes of the inelastic forces, each with unknowns of its cells of the model */
 
+/* In floating-point operations, for the search's budget: only the order of magnitude counts. The flexibilities
+   cost n^3 / 3 of their unknowns. */
 PetscReal HycoBodiesOperations(HycoReducer t)
 {
   HycoBodiesTraining s = HycoTrainingOfBodies(t);
@@ -96,7 +102,8 @@ PetscBool HycoBodiesOffers(HycoReducer t, PetscBool targets, size_t length, char
 
 /* -- the surfaces' unknowns -- */
 
-/* of[i]: the body of each node of the surfaces, on rank 0. Collective. */
+/* of[i]: the body of each node of the surfaces, on rank 0. Collective. The surfaces are on rank 0, their nodes'
+   bodies on the owners: a star forest from owned nodes to the surface's fetches them. */
 static PetscErrorCode BodiesOfSurface(HycoFOM f, const HycoBodyParts *parts, PetscInt **of)
 {
   const PetscInt n = f->surface ? f->surface->n_nodes : 0;
@@ -123,6 +130,7 @@ static PetscErrorCode AddRing(HycoMesh m, PetscInt group, PetscBool near[])
   PetscBool *on;
 
   PetscFunctionBegin;
+  /* near[] grows while facets are visited; one ring is the facets around the nodes before. */
   HycoDuplicate(m->n_nodes + 1, near, &on);
   for (PetscInt f = 0; f < m->n_facets; f++) {
     const PetscInt *node = m->facets + f * m->nf;
@@ -158,10 +166,12 @@ static PetscErrorCode LeaveOut(HycoReducer t, PetscBool in[])
   for (PetscInt k = 0; k < t->scene->n_contacts; k++) {
     PetscInt g = 0;
 
+    /* Masters that stay with their slaves are all met. */
     if (!HycoPairsFollows(&f->pairs, k)) continue;
     PetscCall(HycoMeshFindGroup(m, "contact", t->scene->contact[k]->slave, &g));
     for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) near[m->group_node[j]] = PETSC_TRUE;
     PetscCall(HycoMeshFindGroup(m, "contact", t->scene->contact[k]->master, &g));
+    /* A margin: the points searched are a sample of the ranges. */
     for (PetscInt ring = 0; ring < RINGS; ring++) PetscCall(AddRing(m, g, near));
   }
   for (PetscInt i = 0; i < m->n_nodes; i++) in[i] = (PetscBool)(in[i] && near[i]);
@@ -191,7 +201,8 @@ static PetscErrorCode List(HycoFOM f, const PetscInt of[], const PetscBool in[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same for the nodes of the surfaces that may touch. Rank 0. */
+/* The same for the nodes of the surfaces that may touch. Rank 0. Leaving out costs SEARCHED searches, and saves
+   the square of the unknowns: only for bodies with many. */
 static PetscErrorCode ListReached(HycoReducer t, const PetscInt of[], HycoSubstructures b, PetscInt global[])
 {
   HycoFOM f = t->fom;
@@ -211,6 +222,7 @@ static PetscErrorCode ListReached(HycoReducer t, const PetscInt of[], HycoSubstr
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The same on every rank, after the broadcast. */
 static PetscErrorCode CheckSizes(const HycoBodyParts *parts, HycoSubstructures b)
 {
   PetscFunctionBegin;
@@ -238,10 +250,12 @@ static PetscErrorCode Select(HycoReducer t, HycoSubstructures b, Mat *N)
   HycoOnRoot(HycoComm(f), ListReached(t, of, b, global));
   HycoBcast(b->start, b->n + 1, MPIU_INT, HycoComm(f));
   b->ns = b->start[b->n];
+  /* Other ranks have allocated by their own surface, of which they have none. */
   if (f->rank) PetscCall(PetscFree(b->dof));
   if (f->rank) PetscCall(PetscMalloc1(b->ns + 1, &b->dof));
   HycoBcast(b->dof, b->ns, MPIU_INT, HycoComm(f));
   PetscCall(CheckSizes(parts, b));
+  /* Columns as K's rows; one entry in each row, set by rank 0, which has the list. */
   PetscCall(MatCreateAIJ(HycoComm(f), PETSC_DECIDE, f->part->n_owned * b->dim, b->ns, f->n_nodes * b->dim, 1, NULL, 1,
                          NULL, N));
   for (PetscInt k = 0; k < b->ns && f->rank == 0; k++) PetscCall(MatSetValue(*N, k, global[k], 1, INSERT_VALUES));
@@ -254,25 +268,93 @@ static PetscErrorCode Select(HycoReducer t, HycoSubstructures b, Mat *N)
 
 /* -- the model -- */
 
-/* The parameters theta, and which bodies each changes, with values enough to begin with. The logarithm of one that moves nothing and varies much is interpolated. */
+/* The nodes at mu with parameter p at a share of its range: X (3 a node of the part). Collective. */
+static PetscErrorCode NodesAt(HycoReducer t, const PetscReal first[], PetscInt p, PetscReal value, PetscReal X[])
+{
+  HycoFOM f = t->fom;
+  PetscReal mu[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  PetscCall(PetscArraycpy(mu, first, t->scene->n_variables));
+  mu[p] = value;
+  HycoOnEach(HycoComm(f), HycoFESetParameters(f->fe, mu));
+  PetscCall(PetscArraycpy(X, f->fe->X, 3 * f->part->n_nodes));
+  f->fe->ready = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* distance[]: by variable, how far the nodes of the bodies whose shape parameter p changes are from straight lines over
+   its range, squared. Collective. */
+static PetscErrorCode Bends(HycoReducer t, const PetscReal mu[], PetscInt p, PetscReal distance[])
+{
+  const HycoBodyParts *parts = &HycoTrainingOfBodies(t)->parts;
+  const PetscReal lo = t->scene->lo[p], hi = t->scene->hi[p];
+  const PetscInt n = t->fom->part->n_nodes;
+  PetscReal *X, *from, *to;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc3(3 * n + 1, &X, 3 * n + 1, &from, 3 * n + 1, &to));
+  PetscCall(NodesAt(t, mu, p, lo, from));
+  PetscCall(NodesAt(t, mu, p, hi, to));
+  PetscCall(PetscArrayzero(distance, HYCO_BODIES_VARIABLES));
+  for (PetscInt k = 1; k < BENDS; k++) {
+    const PetscReal value = lo + (hi - lo) * k / BENDS;
+
+    PetscCall(NodesAt(t, mu, p, value, X));
+    for (PetscInt g = 0; g < HYCO_BODIES_VARIABLES; g++) {
+      const PetscReal first = HycoBodiesVariable(g, lo);
+      const PetscReal share = (HycoBodiesVariable(g, value) - first) / (HycoBodiesVariable(g, hi) - first);
+
+      for (PetscInt i = 0; i < 3 * n; i++) {
+        const PetscInt body = parts->of[i / 3];
+
+        if (HycoMeshOwned(t->fom->part, i / 3) < 0) continue;
+        if (!(parts->enters[body * parts->n_parameters + p] & HYCO_ENTERS_SHAPE)) continue;
+        distance[g] += PetscSqr(X[i] - from[i] - share * (to[i] - from[i]));
+      }
+    }
+  }
+  PetscCall(PetscFree3(X, from, to));
+  HycoAllreduce(distance, HYCO_BODIES_VARIABLES, MPIU_REAL, MPI_SUM, HycoComm(t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* What of parameter p is interpolated: the logarithm of one that moves nothing and varies much; of one that moves nodes
+   that in which they move nearly along straight lines, because the stiffness is smooth in the places of the nodes.
+   Collective. */
+static PetscErrorCode ChooseVariable(HycoReducer t, const PetscReal mu[], PetscInt p, PetscInt *variable)
+{
+  const HycoScene s = t->scene;
+  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE};
+  PetscReal distance[HYCO_BODIES_VARIABLES];
+
+  PetscFunctionBegin;
+  *variable = HYCO_BODIES_PLAIN;
+  if (s->lo[p] <= 0 || s->hi[p] <= s->lo[p]) PetscFunctionReturn(PETSC_SUCCESS);
+  changed[p] = PETSC_TRUE;
+  if (!HycoSceneChanges(s, changed).nodes) {
+    if (s->hi[p] > 2 * s->lo[p]) *variable = HYCO_BODIES_LOGARITHM;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(Bends(t, mu, p, distance));
+  for (PetscInt g = 0; g < HYCO_BODIES_VARIABLES; g++) {
+    if (distance[g] < STRAIGHTER * distance[*variable]) *variable = g;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The parameters theta, and which bodies each changes, with values enough to begin with. Collective. */
 static PetscErrorCode TakeTheta(HycoReducer t, HycoSubstructures b)
 {
   const HycoBodyParts *parts = &HycoTrainingOfBodies(t)->parts;
-  const HycoScene s = t->scene;
   PetscInt shape[HYCO_MAX_PARAMETERS];
 
   PetscFunctionBegin;
   b->n_theta = HycoBodyPartsShapes(parts, -1, shape);
   HycoDuplicate(HYCO_MAX_PARAMETERS, shape, &b->theta);
-  PetscCall(PetscCalloc1(b->n_theta + 1, &b->logarithm));
+  PetscCall(PetscCalloc1(b->n_theta + 1, &b->variable));
   PetscCall(PetscCalloc1(b->n_theta + 1, &b->n_nodes));
-  for (PetscInt p = 0; p < b->n_theta; p++) {
-    PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE};
-
-    changed[shape[p]] = PETSC_TRUE;
-    b->logarithm[p] =
-        s->lo[shape[p]] > 0 && s->hi[shape[p]] > 2 * s->lo[shape[p]] && !HycoSceneChanges(s, changed).nodes;
-  }
+  for (PetscInt p = 0; p < b->n_theta; p++) PetscCall(ChooseVariable(t, b->first, shape[p], &b->variable[p]));
   PetscCall(PetscCalloc1(b->n, &b->body));
   for (PetscInt k = 0; k < b->n; k++) {
     for (PetscInt p = 0; p < b->n_theta; p++) {
@@ -304,6 +386,8 @@ static PetscErrorCode TakeNoStrains(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Each step needs those before: the surfaces, the factors' blocks, the loads' basis (R), samples, inelastic
+   responses, modes. factor->fom has its own K: t->fom's fe serves the points meanwhile. */
 static PetscErrorCode Condense(HycoReducer t, HycoSnapshots store, HycoBodiesFactor *factor)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
@@ -314,6 +398,7 @@ static PetscErrorCode Condense(HycoReducer t, HycoSnapshots store, HycoBodiesFac
   factor->fom->fe->heat_is_load = PETSC_TRUE;
   PetscCheck(factor->fom->part->n_nodes == t->fom->part->n_nodes && factor->fom->part->first == t->fom->part->first,
              PETSC_COMM_SELF, PETSC_ERR_PLIB, "two meshes of one scene differ");
+  /* Supports of the surfaces' mesh are known at parameters only. */
   PetscCall(HycoFOMSetParameters(t->fom, b->first));
   PetscCall(Select(t, b, &N));
   for (PetscInt k = 0; k < b->n; k++) b->body[k].n = b->start[k + 1] - b->start[k];
@@ -326,6 +411,8 @@ static PetscErrorCode Condense(HycoReducer t, HycoSnapshots store, HycoBodiesFac
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A new HycoFOM, whose K is factored body by body; released with all factors before an error returns, because a
+   search goes on. */
 PetscErrorCode HycoBodiesModes(HycoReducer t, HycoSnapshots store)
 {
   HycoBodiesFactor factor = {0};

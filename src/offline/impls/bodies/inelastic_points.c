@@ -20,6 +20,7 @@ typedef struct {
   Mat S, U;                 /* of a path, a column for each listed time; displacements minus their lifting */
 } Sampler;
 
+/* The rows of a cell in the matrices of this file: n_sigma numbers for each integration point. */
 PetscInt HycoPointRows(HycoReducer t)
 {
   return HycoElementGet(t->fom->part->type)->nq * t->fom->fe->n_sigma;
@@ -37,7 +38,8 @@ static PetscErrorCode DestroySampler(Sampler *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The displacements of column k of the snapshots. Collective. */
+/* The displacements of column k of the snapshots. Collective. The columns are in the file's order, the part's
+   nodes with ghosts: rows travel between ranks. */
 static PetscErrorCode Displacement(void *ctx, PetscInt k, PetscReal u[])
 {
   Sampler *s = (Sampler *)ctx;
@@ -78,8 +80,10 @@ static PetscErrorCode Record(void *ctx, PetscInt k)
   PetscInt lda;
 
   PetscFunctionBegin;
+  /* At the path's own parameters: bodies of other paths may be larger. */
   if (step == 0) HycoOnEach(HycoComm(s->t), Weigh(s->fe, s->scale));
   for (PetscInt i = 0; i < s->fe->mesh->n_cells * nq; i++) {
+    /* Points of elastic bodies stay 0: no mode has them, and Q-DEIM does not choose them. */
     if (!(s->scale[i] > 0)) continue;
     HycoFEInelasticStress(s->fe, s->replay.march.state, i / nq, i % nq, s->value + i * ns);
     for (PetscInt c = 0; c < ns; c++) s->value[i * ns + c] *= s->scale[i];
@@ -91,6 +95,7 @@ static PetscErrorCode Record(void *ctx, PetscInt k)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The part's fe must be at parameters before displacements can be read, since their lifting is subtracted. */
 static PetscErrorCode CreateSampler(HycoReducer t, HycoSnapshots store, Sampler *s)
 {
   HycoMesh part = t->fom->part;
@@ -138,6 +143,7 @@ PetscErrorCode HycoPointsSample(HycoReducer t, HycoSnapshots store, PetscReal to
   PetscCall(CreateSampler(t, store, &s));
   PetscCall(MatGetSize(s.S, &N, NULL));
   PetscCall(MatGetLocalSize(s.S, &n_rows, NULL));
+  /* The sampler's matrices go before the join, which needs as much memory again. */
   ierr = FollowAll(&s, store, tol, &modes);
   PetscCall(DestroySampler(&s));
   if (!ierr) ierr = HycoPathModesJoin(t, &modes, N, n_rows, tol, 0, basis);
@@ -168,12 +174,14 @@ PetscErrorCode HycoPointsCellForce(HycoFE fe, PetscInt e, const PetscReal value[
 
   PetscFunctionBegin;
   for (PetscInt q = 0; q < nq; q++) {
+    /* value = sqrt(w) s, and the force of s is w B^T s: the factor left is sqrt(w). */
     PetscCall(HycoFEPointRows(fe, e, q, B, &w));
     for (PetscInt d = 0; d < ns * n; d++) force[d % n] += PetscSqrtReal(w) * B[d] * value[q * ns + d / n];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Sums of this rank's cells, ghosts included: nodes of its own have all of theirs. */
 PetscErrorCode HycoPointsForces(HycoFE fe, const PetscReal value[], PetscReal force[])
 {
   const PetscInt n = fe->mesh->nv * fe->dim, size = HycoElementGet(fe->mesh->type)->nq * fe->n_sigma;
@@ -191,7 +199,8 @@ PetscErrorCode HycoPointsForces(HycoFE fe, const PetscReal value[], PetscReal fo
 
 /* -- points -- */
 
-/* Sets the rows of some points to 0, n each. */
+/* Sets the rows of some points to 0, n each. All components of a point leave together, since a law gives them
+   together. */
 static PetscErrorCode ZeroPoints(Mat V, PetscInt n, PetscInt count, const PetscInt point[])
 {
   PetscInt lo, hi, l, lda;
@@ -211,6 +220,8 @@ static PetscErrorCode ZeroPoints(Mat V, PetscInt n, PetscInt count, const PetscI
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Q-DEIM on what is left, round after round: each round gives up to l further points, so that the system at the
+   points is overdetermined and noise is averaged. */
 PetscErrorCode HycoPointsChoose(const HycoBasis *modes, PetscInt n, PetscInt rounds, PetscInt *count, PetscInt point[])
 {
   PetscInt found = 1;
@@ -223,6 +234,7 @@ PetscErrorCode HycoPointsChoose(const HycoBasis *modes, PetscInt n, PetscInt rou
   for (PetscInt k = 0; k < rounds && found; k++) {
     PetscInt *index = point + *count;
 
+    /* Rank-revealing: rows of which nothing is left give no points, and the rounds end. */
     HycoLogged(HYCO_EVENT_DEIM, HycoQDEIMRank(rest, index, &found));
     for (PetscInt j = 0; j < found; j++) index[j] /= n;
     PetscCall(ZeroPoints(rest, n, found, index));
@@ -241,6 +253,7 @@ PetscErrorCode HycoPointsInverse(const HycoBasis *modes, PetscInt n, PetscInt co
   PetscInt *row;
 
   PetscFunctionBegin;
+  /* Its inverse is the amplification of errors; no mode amplifies nothing. */
   *smallest = 1;
   if (!l) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc2(rows, &row, rows * l, &columns));

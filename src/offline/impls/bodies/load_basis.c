@@ -34,6 +34,7 @@ static PetscErrorCode TurnedLoad(HycoReducer t, HycoFOM f, const PetscReal X0[],
 
     if (own < 0) continue;
     for (PetscInt c = 0; c < dim; c++) v[own * dim + c] = f->fe->fixed[i * dim + c] ? 0 : v[own * dim + c];
+    /* Fixed components are zero before and after the turn, as Load() has them online. */
     HycoPoseTurn(pose[parts->of[i]].Q, dim, PETSC_TRUE, v + own * dim, turned);
     for (PetscInt c = 0; c < dim; c++) v[own * dim + c] = f->fe->fixed[i * dim + c] ? 0 : turned[c];
   }
@@ -45,6 +46,7 @@ static PetscErrorCode TurnedLoad(HycoReducer t, HycoFOM f, const PetscReal X0[],
 static PetscErrorCode TakeOut(const HycoBodiesFactor *factor, Vec v, PetscReal *rest)
 {
   PetscFunctionBegin;
+  /* Gram-Schmidt twice: once leaves parts of the basis in a nearly dependent load. */
   for (PetscInt k = 0; k < 2 * factor->n_basis; k++) {
     Vec q = factor->basis[k % factor->n_basis];
     PetscScalar dot;
@@ -62,6 +64,7 @@ static PetscErrorCode AddTurn(PetscInt dim, const HycoPose *pose, PetscInt *n, P
   PetscReal *own = G + 9 * *n, size = 0;
 
   PetscFunctionBegin;
+  /* The turns span all matrices already. */
   if (*n == dim * dim) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt d = 0; d < 9; d++) own[d] = d / 3 < dim && d % 3 < dim ? pose->Q[d] : 0;
   for (PetscInt j = 0; j < 2 * *n; j++) {
@@ -72,6 +75,7 @@ static PetscErrorCode AddTurn(PetscInt dim, const HycoPose *pose, PetscInt *n, P
     for (PetscInt d = 0; d < 9; d++) own[d] -= dot * other[d];
   }
   for (PetscInt d = 0; d < 9; d++) size += own[d] * own[d];
+  /* size is a square: turns that differ by less than 1e-8 are one. */
   if (!(size > 1e-16)) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt d = 0; d < 9; d++) own[d] /= PetscSqrtReal(size);
   (*n)++;
@@ -110,7 +114,9 @@ static PetscErrorCode CheckTurns(HycoReducer t, const HycoPose pose[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the load at mu to the basis, if it is not in its span; check: refuses it then. Collective. */
+/* Adds the load at mu to the basis, if it is not in its span; check: refuses it then. Collective. Also collects
+   the turns of each body. With `check` nothing is added: loads at further points must lie in the span, up to what
+   sampling of shapes allows. */
 static PetscErrorCode AddPoint(HycoReducer t, HycoBodiesFactor *factor, Survey *s, const PetscReal mu[],
                                PetscBool check)
 {
@@ -124,6 +130,7 @@ static PetscErrorCode AddPoint(HycoReducer t, HycoBodiesFactor *factor, Survey *
     HycoBodiesReference(b, k, mu, reference);
     HycoOnEach(HycoComm(t), HycoFESetParameters(factor->fom->fe, reference));
     for (PetscInt i = 0; i < 3 * factor->fom->part->n_nodes; i++) {
+      /* Each body is compared with itself at the same shape, not with `first`. */
       if (HycoTrainingOfBodies(t)->parts.of[i / 3] == k) s->X0[i] = factor->fom->fe->X[i];
     }
   }
@@ -138,6 +145,7 @@ static PetscErrorCode AddPoint(HycoReducer t, HycoBodiesFactor *factor, Survey *
     PetscCall(VecScale(F, 1 / rest));
     PetscCall(TakeOut(factor, F, &rest));
     PetscCall(VecScale(F, 1 / rest));
+    /* F is destroyed below in any case. */
     PetscCall(PetscObjectReference((PetscObject)F));
     factor->basis[factor->n_basis++] = F;
   }
@@ -149,7 +157,8 @@ static PetscErrorCode AddPoint(HycoReducer t, HycoBodiesFactor *factor, Survey *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The loads at parameters mu; of a history at its listed times and between them. Collective. */
+/* The loads at parameters mu; of a history at its listed times and between them. Collective. Between listed times
+   too, at an irrational share: tables of a history may have values there that no listed time shows. */
 static PetscErrorCode AddPath(HycoReducer t, HycoBodiesFactor *factor, Survey *s, const PetscReal mu[], PetscBool check)
 {
   const HycoScene scene = t->scene;
@@ -166,6 +175,8 @@ static PetscErrorCode AddPath(HycoReducer t, HycoBodiesFactor *factor, Survey *s
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The last MORE points check, the others build. Without parameters there is nothing to check: `first` is every
+   point. */
 static PetscErrorCode SurveyPoints(HycoReducer t, HycoBodiesFactor *factor, Survey *s)
 {
   const PetscInt p = t->scene->n_parameters;
@@ -180,6 +191,7 @@ static PetscErrorCode SurveyPoints(HycoReducer t, HycoBodiesFactor *factor, Surv
   PetscCall(HycoSamplesCreate(t->scene, &points));
   PetscCall(HycoSamplesAddScattered(points, POINTS(p, HycoTrainingOfBodies(t)->bodies->n_theta) + MORE));
   PetscCall(HycoSamplesGet(points, &n, NULL, &mu));
+  /* An error is kept until the points are destroyed: a search goes on after it. */
   for (PetscInt k = 0; k < n && !ierr; k++) ierr = AddPath(t, factor, s, mu + k * p, (PetscBool)(k >= n - MORE));
   PetscCall(HycoSamplesDestroy(&points));
   PetscCall(ierr);
@@ -201,6 +213,7 @@ static PetscErrorCode TakeTurns(HycoSubstructures b, const Survey *s)
 
 /* -- DEIM -- */
 
+/* Collective: every rank gets the value of the one that has it. */
 static PetscErrorCode ValueAt(Vec v, PetscInt i, PetscReal *value)
 {
   PetscInt lo, hi;
@@ -223,6 +236,7 @@ static PetscErrorCode Invert(PetscInt k, PetscInt r, const PetscReal D[], PetscR
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(k * k + 1, &block));
   for (PetscInt i = 0; i < k * k; i++) block[i] = D[i % k * r + i / k]; /* column major */
+  /* A pseudo-inverse: nearly dependent rows must not blow up the coefficients. */
   PetscCall(HycoPseudoInverse(k, k, block, 1e-14, P));
   PetscCall(PetscArraycpy(block, P, k * k));
   for (PetscInt i = 0; i < k * k; i++) P[i] = block[i % k * k + i / k];
@@ -230,7 +244,8 @@ static PetscErrorCode Invert(PetscInt k, PetscInt r, const PetscReal D[], PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The unknowns where the basis is evaluated, and the inverse of its values there. Collective. */
+/* The unknowns where the basis is evaluated, and the inverse of its values there. Collective. DEIM with the
+   vectors distributed: only k x k values are on every rank. VecMax() takes the smallest index of equal values. */
 static PetscErrorCode FindPoints(HycoSubstructures b, const HycoBodiesFactor *factor, PetscInt point[])
 {
   const PetscInt r = b->r;
@@ -274,6 +289,7 @@ static PetscErrorCode NamePoints(HycoReducer t, HycoFOM f, const PetscInt point[
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(b->r + 1, &b->at_body));
   for (PetscInt k = 0; k < b->r; k++) {
+    /* -1 on ranks that do not own the node; the maximum is the owner's. */
     node[k] = b->at_body[k] = -1;
     for (PetscInt i = 0; i < f->part->n_nodes; i++) {
       if (HycoMeshOwned(f->part, i) < 0 || HycoMeshOwned(f->part, i) + f->part->first != point[k] / b->dim) continue;
@@ -286,7 +302,8 @@ static PetscErrorCode NamePoints(HycoReducer t, HycoFOM f, const PetscInt point[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* cell[b]: the number in the whole mesh of the largest cell of each body. Collective. */
+/* cell[b]: the number in the whole mesh of the largest cell of each body. Collective. The largest, since a pose
+   from few nodes close together loses digits. Equal ones within 1e-10: the smallest number, on any partition. */
 static PetscErrorCode LargestCells(HycoReducer t, const PetscReal first[], PetscInt cell[])
 {
   HycoMesh m = t->fom->part;
@@ -338,7 +355,8 @@ static PetscErrorCode TakeProbe(HycoSubstructures b, const PetscInt point[], con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Gathers the cells around the points and the bodies' largest. Collective. */
+/* Gathers the cells around the points and the bodies' largest. Collective. The cells around each DEIM point (F of
+   an unknown sums over them), with facets for pressures, and one cell of each body for its pose and modulus. */
 static PetscErrorCode GatherProbe(HycoReducer t, HycoBodiesFactor *factor, const PetscInt point[])
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
@@ -365,6 +383,7 @@ static PetscErrorCode GatherProbe(HycoReducer t, HycoBodiesFactor *factor, const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Before the samples: each record needs R for the whole basis. */
 PetscErrorCode HycoBodiesLoads(HycoReducer t, HycoBodiesFactor *factor)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;

@@ -32,6 +32,7 @@ static PetscErrorCode FindParts(HycoFOM f, HycoBodyParts *parts)
   PetscFunctionBegin;
   parts->n_parameters = f->scene->n_parameters;
   PetscCall(HycoFEFreeMotions(HycoComm(f), f->fe, &motions));
+  /* HycoFEFreeMotions() has found the connected parts, over all ranks and ties; the array changes its owner. */
   parts->of = motions.part;
   motions.part = NULL;
   PetscCall(HycoMotionsDestroy(&motions));
@@ -43,6 +44,7 @@ static PetscErrorCode FindParts(HycoFOM f, HycoBodyParts *parts)
   PetscCall(PetscMalloc1(parts->n, &parts->together));
   PetscCall(PetscCalloc1(parts->n * n_bodies, &in));
   for (PetscInt e = 0; e < f->part->n_cells; e++)
+    /* All nodes of a cell are in one part: the first one stands for it. */
     in[parts->of[f->part->cells[e * f->part->nv]] * n_bodies + f->part->cell_body[e]] = PETSC_TRUE;
   HycoAllreduce(in, parts->n * n_bodies, HYCO_MPI_BOOL, MPI_LOR, HycoComm(f));
   for (PetscInt k = 0; k < parts->n * n_bodies; k++) {
@@ -68,6 +70,7 @@ typedef struct {
   PetscReal *load;        /* n x 2: change of the load with and without that factor, relative */
 } Compared;
 
+/* Ranks that see no more than a part of a plane of symmetry must agree on whether a map mirrors. */
 static PetscErrorCode MoveTo(HycoFOM f, const PetscReal mu[])
 {
   PetscFunctionBegin;
@@ -97,7 +100,8 @@ static PetscErrorCode Turn(const Compared *c, PetscBool back, Vec from, Vec to)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A displacement that is 0 where fixed, of this rank's unknowns. */
+/* A displacement that is 0 where fixed, of this rank's unknowns. Deterministic and the same on any number of
+   ranks: a function of the node's number in the whole mesh. */
 static PetscErrorCode SetProbe(Compared *c)
 {
   HycoMesh m = c->f->part;
@@ -230,7 +234,9 @@ static PetscErrorCode Compare(Compared *c, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The ways in which body k differs from the first point. */
+/* The ways in which body k differs from the first point. A ratio kappa / s^p apart from 1 is a change of moduli;
+   without it, kappa is that of the size alone. Loads count as unchanged if they are F or kappa F: prescribed
+   displacements act by K. */
 static PetscInt Ways(const Compared *c, PetscInt k)
 {
   const HycoPose *pose = &c->pose[k];
@@ -238,6 +244,7 @@ static PetscInt Ways(const Compared *c, PetscInt k)
   PetscReal turned = 0;
   PetscInt ways = 0;
 
+  /* Not similar in nodes or stiffness: the other ways have no meaning then. */
   if (pose->residual > SIMILAR || c->off[k] > SIMILAR || !(c->kappa[k] > 0)) return HYCO_ENTERS_SHAPE;
   for (PetscInt d = 0; d < 9; d++) turned = PetscMax(turned, PetscAbsReal(pose->Q[d] - (d % 4 == 0)));
   if (turned > SAME) ways |= HYCO_ENTERS_PLACE;
@@ -247,7 +254,8 @@ static PetscInt Ways(const Compared *c, PetscInt k)
   return ways;
 }
 
-/* Whether the nodes of each body have moved, beyond turning and scaling. Collective. */
+/* Whether the nodes of each body have moved, beyond turning and scaling. Collective. A pose has no translation,
+   which changes neither K nor its axes but the place of the contacts. */
 static PetscErrorCode Shifted(Compared *c, PetscBool moved[])
 {
   const PetscReal length = HycoMeshLength(c->f->part);
@@ -287,6 +295,7 @@ static PetscErrorCode VisitTogether(Compared *c, const PetscReal first[])
     PetscCall(PetscArraycpy(from, first, s->n_variables));
     PetscCall(PetscArraycpy(mu, first, s->n_variables));
     for (PetscInt p = 0; p < s->n_parameters; p++) {
+      /* Irrational steps: no two parameters move in proportion, at which joint changes might cancel. */
       const PetscReal at = (q + 1) * 0.6180339887 + p * 0.7548776662;
 
       mu[p] = s->lo[p] + (at - (PetscInt)at) * (s->hi[p] - s->lo[p]);
@@ -300,7 +309,8 @@ static PetscErrorCode VisitTogether(Compared *c, const PetscReal first[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Each parameter alone at two points. Collective. */
+/* Each parameter alone at two points. Collective. Two points inside the range: one could be a mirror or a period
+   of an expression, at which nothing seems to change. */
 static PetscErrorCode Visit(Compared *c, const PetscReal first[])
 {
   static const PetscReal share[2] = {0.137, 0.829};
@@ -329,6 +339,7 @@ static PetscErrorCode Visit(Compared *c, const PetscReal first[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Each parameter alone first: VisitTogether() needs to know which ones change shapes. */
 static PetscErrorCode CompareAll(Compared *c, const PetscReal first[])
 {
   PetscFunctionBegin;
@@ -359,6 +370,7 @@ PetscErrorCode HycoBodyPartsFind(HycoFOM f, const PetscReal first[], HycoBodyPar
   for (int k = 0; k < 6; k++) PetscCall(VecDestroy(all[k]));
   PetscCall(MatDestroy(&c.K));
   f->fe->ready = PETSC_FALSE; /* matrices of fom do not belong to its present parameters */
+  /* An attempt of a search may fail here and go on with another type: nothing may leak. */
   if (ierr) PetscCall(HycoBodyPartsDestroy(parts));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -398,6 +410,7 @@ static PetscErrorCode DescribeOne(const HycoBodyParts *parts, PetscInt p, PetscB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* parameter[] may not be NULL; a caller that wants the number alone gives room for all. */
 PetscInt HycoBodyPartsShapes(const HycoBodyParts *parts, PetscInt b, PetscInt parameter[])
 {
   PetscInt n = 0;

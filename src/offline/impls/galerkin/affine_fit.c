@@ -36,6 +36,7 @@ static PetscErrorCode Agrees(HycoROM m, HycoTable t, const PetscReal mu[], Petsc
   PetscCall(PetscMalloc3(entries, &here, entries, &there, m->n, &largest));
   PetscCall(PetscMalloc1(entries, &row));
   PetscCall(Sample(m, mu, entries, here));
+  /* Relative to the largest entry of its row: full-order rows and modes' rows differ by orders of magnitude. */
   PetscCall(HycoReducedRows(m, row));
   PetscCall(HycoGridFieldEvaluate(&t->values, mu, there));
   PetscCall(PetscArrayzero(largest, m->n));
@@ -111,6 +112,7 @@ static PetscErrorCode CountValues(HycoROM m, PetscInt p, PetscInt entries, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rank 0. Not finding a table is no failure: predictions then assemble. */
 PetscErrorCode HycoGalerkinTabulate(HycoROM m, const PetscBool reaches[])
 {
   HycoGalerkinModel g = (HycoGalerkinModel)m->model->data;
@@ -127,6 +129,7 @@ PetscErrorCode HycoGalerkinTabulate(HycoROM m, const PetscBool reaches[])
     varying += reaches[p];
     mu[p] = (s->lo[p] + s->hi[p]) / 2;
   }
+  /* Two values of each parameter are the least. */
   if (!varying || PetscPowInt(2, (int)varying) > HYCO_TABLE_NODES) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoGalerkinAssemble(m, mu));
   PetscCall(HycoReducedEntries(m, &entries, &a));

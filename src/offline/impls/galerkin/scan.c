@@ -67,6 +67,7 @@ static PetscErrorCode ScanMine(HycoROM m, const PetscBool reaches[], PetscInt ea
     PetscInt s;
 
     GridPoint(m->model->scene, reaches, each, k, mu);
+    /* Without a solve, which might not converge just there. */
     PetscCall(HycoGalerkinAssemble(m, mu));
     PetscCall(MatConvert(((HycoGalerkin)m->work)->Kr, MATSEQDENSE, MAT_INITIAL_MATRIX, &dense));
     PetscCall(MatDenseGetArray(dense, &a));
@@ -130,6 +131,7 @@ static PetscErrorCode ScanMyPaths(HycoReducer t, HycoROM m, PetscInt first, Pets
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
+  /* Only tangents matter: forces outside the RID would double the time. */
   m->reconstruct = PETSC_FALSE;
   for (PetscInt k = first; k < last && !ierr; k++) {
     g->watch = (HycoWatch){stride, sign + k * each, ratio + k * each};
@@ -219,6 +221,8 @@ static PetscErrorCode Scan(HycoReducer t, HycoROM m, PetscBool reaches[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The table last, on rank 0: the scan assembles, as it needs points everywhere. The caller broadcasts the model
+   with both. */
 PetscErrorCode HycoGalerkinFinish(HycoReducer t, HycoROM m, HycoTraining *report)
 {
   PetscBool reaches[HYCO_MAX_PARAMETERS];
@@ -235,6 +239,7 @@ PetscErrorCode HycoGalerkinFinish(HycoReducer t, HycoROM m, HycoTraining *report
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A sparse factor (bordered paths) is linear in n; then the cells' laws, and the modes' products. */
 PetscReal HycoGalerkinCost(HycoReducer t, const HycoAttempt *a)
 {
   const PetscReal dim = t->sizes[3],

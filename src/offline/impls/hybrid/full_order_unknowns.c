@@ -64,6 +64,7 @@ static PetscErrorCode Candidates(HycoROM m, PetscInt candidate[])
         const PetscInt dof = g->own_rows.dof[t];
 
         if (taken[dof] || sets[dof / dim] < 2) continue;
+        /* Equal entries: the first, whatever round-off says. */
         if (PetscAbsReal(g->own_rows.value[t]) <= best * (1 + 1e-12)) continue;
         best = PetscAbsReal(g->own_rows.value[t]);
         candidate[k] = dof;
@@ -93,6 +94,7 @@ static PetscErrorCode RowRank(HycoROM m, PetscReal *ratio)
   if (!m->m) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatConvert(g->Br, MATSEQDENSE, MAT_INITIAL_MATRIX, &dense));
   PetscCall(MatDenseGetArray(dense, &b));
+  /* More rows than columns cannot have full row rank, whatever the smallest singular value. */
   PetscCall(HycoExtremeSingularValues(m->m, m->n, b, &smallest, &largest));
   PetscCall(MatDenseRestoreArray(dense, &b));
   PetscCall(MatDestroy(&dense));
@@ -111,6 +113,7 @@ static PetscErrorCode Assembled(HycoReducer t, HycoROM m)
   PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
   for (PetscInt p = 0; p < n_par; p++) middle[p] = (t->scene->lo[p] + t->scene->hi[p]) / 2;
   m->reconstruct = PETSC_FALSE;
+  /* The result does not matter: only rows and matrices are read. */
   PetscCall(HycoROMPredict(m, n_par, middle));
   m->reconstruct = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -189,6 +192,7 @@ static PetscErrorCode ResolvedContacts(HycoROM m, const PetscInt candidate[], Pe
       PetscCall(PetscFree(first));
     }
   }
+  /* A contact that only weak modes resolve is not resolved by a truncated basis. */
   for (PetscInt k = 0; k < m->m * l; k++) BV[k] *= m->model->sigma[k % l] / m->model->sigma[0];
   PetscCall(HycoPivotColumns(l, m->m, balance ? KV : BV, *rank, pivot));
   PetscCall(PetscFree2(BV, KV));
@@ -210,10 +214,12 @@ static PetscErrorCode JudgeSet(HycoReducer t, HycoROM m, PetscInt n, const Petsc
   PetscCall(Assembled(t, m));
   PetscCall(RowRank(m, &v->rank));
   v->u = v->lambda = WORST;
+  /* A rank-deficient choice is not worth a prediction of every snapshot. */
   if (v->rank > 1e-10) PetscCall(HycoReducerJudgeMeans(t, m, most, &v->u, &v->lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Of equal errors the better conditioned, so that round-off does not choose. */
 static PetscBool Better(const Verdict *a, const Verdict *b)
 {
   if (a->u < b->u * (1 - SAME)) return PETSC_TRUE;
@@ -311,7 +317,8 @@ static PetscErrorCode SearchFrom(HycoReducer t, HycoROM m, PetscInt start, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The best result of several starts; of one if a trial is expensive. */
+/* The best result of several starts; of one if a trial is expensive. Exchanges end in local minima: several starts
+   where trials are cheap. */
 static PetscErrorCode ChooseRank(HycoReducer t, HycoROM m, Verdict *best)
 {
   const PetscInt room = m->model->pairs.n, starts = (PetscReal)t->n_s * (PetscReal)m->model->l < 1e4 ? 5 : 1;
@@ -446,11 +453,13 @@ static PetscErrorCode ChooseAll(HycoReducer t, HycoROM m, PetscInt n, const Pets
   if (n_rid == n_A) PetscFunctionReturn(PETSC_SUCCESS);
   if (strength < 0) PetscCall(t->scene->n_times ? RaceRidges(t, m, &strength) : TryRidges(t, m, &strength));
   PetscCall(HycoGalerkinSetRidge(m, strength));
+  /* The attempt's choice: the final model is built with it, without another race. */
   if (t->trying) t->ridge = strength;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Chooses the full-order displacements; sets the training errors with this choice. */
+/* Chooses the full-order displacements; sets the training errors with this choice. Rank 0. `auto` takes the
+   contacts' displacements, and all of A only where A has no others. */
 static PetscErrorCode ChooseUnknowns(HycoReducer t, HycoROM m)
 {
   PetscInt n_all, n_contact, *all, *contact;
@@ -483,6 +492,7 @@ static PetscErrorCode ChooseUnknowns(HycoReducer t, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The dual snapshots first: judging does not reconstruct, but the file and predictions need them. */
 static PetscErrorCode Build(HycoROM m, HycoReducer t)
 {
   HycoHybridModel h = (HycoHybridModel)m->model->data;

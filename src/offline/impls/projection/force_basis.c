@@ -10,6 +10,7 @@
 #include <hycotrainers.h>
 #include <petscblaslapack.h>
 
+/* Shared by projection and cubature, whose defaults of `dual` the caller has set. */
 PetscErrorCode HycoForceBasisSetFromOptions(HycoReducer t)
 {
   HycoForceBasis s = (HycoForceBasis)t->training;
@@ -49,7 +50,8 @@ static PetscErrorCode SetFromOptions(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Offered as a last resort if targets are given. */
+/* Offered as a last resort if targets are given. It may need more modes than a hybrid model and assembles the
+   whole mesh: only for a user who insists on targets. */
 static PetscBool Offers(HycoReducer t, PetscBool targets, size_t length, char why[])
 {
   (void)t, (void)length, (void)why;
@@ -79,6 +81,7 @@ static PetscErrorCode RemoveModes(HycoReducer t, Mat X)
   PetscCall(PetscBLASIntCast(t->l, &l));
   for (int k = 0; k < 2; k++) PetscCall(PetscBLASIntCast(PetscMax(1, ld[k]), &lda[k]));
   PetscCall(PetscMalloc1(t->l * n_columns, &C));
+  /* Once leaves round-off of the large part, of which a nearly dependent column would consist. */
   for (PetscInt pass = 0; pass < 2; pass++) {
     PetscCall(HycoReducerMultiply(t, t->V, X, C));
     PetscCall(MatDenseGetArrayRead(t->V, &v));
@@ -131,6 +134,7 @@ static PetscErrorCode Append(HycoReducer t, PetscInt q, Mat Q, PetscInt n_q, con
     PetscCall(PetscArraycpy(VtU + k * both, t->VtU + k * l, l));
     PetscCall(PetscArraycpy(VtU + k * both + l, QtU + k * n_q, q));
   }
+  /* Zero marks them as no modes of the POD (HycoROMCountPOD()). */
   for (PetscInt j = 0; j < both; j++) sigma[j] = j < l ? t->sigma[j] : 0;
   PetscCall(MatDestroy(&t->V));
   PetscCall(PetscFree(t->VtU));
@@ -176,6 +180,7 @@ static PetscErrorCode Enrich(HycoReducer t)
   PetscCall(RemoveModes(t, X));
   PetscCall(PetscMalloc1(t->n_s + 1, &size));
   PetscCall(HycoReducerPOD(t, X, 0, 0, &Q, &found, size));
+  /* Columns had unit length: singular values are shares. */
   while (q < found && size[q] > NEW * PetscMax(1, size[0])) q++;
   PetscCall(PetscFree(size));
   PetscCall(MatDestroy(&X));
@@ -190,6 +195,7 @@ static PetscErrorCode Enrich(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Before the RID: modes and coefficients must be complete when the model is made. */
 PetscErrorCode HycoProjectionModes(HycoReducer t, HycoSnapshots store)
 {
   HycoForceBasis s = (HycoForceBasis)t->training;
@@ -218,6 +224,7 @@ static PetscErrorCode FromSnapshots(HycoROM m, PetscInt n, const PetscReal S[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* As many vectors as displacement modes by default: with more, V_lambda^T B V would have dependent rows. */
 PetscErrorCode HycoProjectionMakeBasis(HycoROM m, HycoReducer t)
 {
   HycoProjectionModel p = (HycoProjectionModel)m->model->data;
@@ -259,6 +266,7 @@ PetscErrorCode HycoProjectionJudge(HycoROM m, HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* No full-order unknown: HYCO_HYBRID_CONTACT with an empty set. */
 static PetscErrorCode Build(HycoROM m, HycoReducer t)
 {
   PetscFunctionBegin;

@@ -18,6 +18,7 @@ static HycoBodiesSurface SurfaceOf(HycoROM m)
   return HycoBodiesSurfaceNormal(m->fe, &m->model->pairs, &m->rows);
 }
 
+/* HycoROMSetUpDefault() makes fe and rows, which the surface borrows. */
 static PetscErrorCode SetUp(HycoROM m)
 {
   HycoBodiesSurface s;
@@ -146,6 +147,8 @@ static PetscErrorCode ExpandAll(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Assembly is the rows' search and gaps; a factor does not exist. The reason of the solver counts only if the
+   recomputed residuals agree. */
 static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
 {
   HycoBodiesWork o = (HycoBodiesWork)m->work;
@@ -194,6 +197,7 @@ static PetscErrorCode Estimate(HycoROM m, HycoPrediction *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The last axis is the fastest, as in HycoTensor. theta NULL: only the number of nodes. */
 PetscInt HycoBodiesGrid(HycoSubstructures b, PetscInt k, PetscReal theta[])
 {
   PetscInt n = 1;
@@ -205,8 +209,7 @@ PetscInt HycoBodiesGrid(HycoSubstructures b, PetscInt k, PetscReal theta[])
   }
   for (PetscInt p = b->n_theta - 1; theta && p >= 0; p--) {
     node -= b->n_nodes[p];
-    theta[p] = node[k % b->n_nodes[p]];
-    if (b->logarithm[p]) theta[p] = PetscExpReal(theta[p]);
+    theta[p] = HycoBodiesValue(b->variable[p], node[k % b->n_nodes[p]]);
     k /= b->n_nodes[p];
   }
   return n;
@@ -235,6 +238,8 @@ PetscErrorCode HycoBodiesView(HycoROM m, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The traits and ops without a history; HycoBodiesTakePath() replaces both when a file or a scene has one. `data`
+   exists from the beginning, since load and training fill it. */
 PetscErrorCode HycoROMCreate_Bodies(HycoROM m)
 {
   static const HycoROMTraits traits = {.title = "condensed bodies",

@@ -16,6 +16,7 @@ static PetscErrorCode MoveSizes(HycoH5 h, HycoROM m, HycoSubstructures b)
   b->dim = m->model->mesh->dim;
   b->l = m->model->l;
   b->n_variables = m->model->scene->n_variables;
+  /* Checked before the loops over theta: a damaged file must not index beyond the tensors' fixed arrays. */
   HycoCheck(b->n > 0 && b->n_theta <= HYCO_TENSOR_MAX_DIM, "%s: bodies/head is damaged", m->model->path);
   PetscCall(HycoH5Starts(h, "bodies/start", b->n, &b->start));
   PetscCall(HycoH5Starts(h, "bodies/inner_start", b->n, &b->inner_start));
@@ -37,12 +38,14 @@ static PetscErrorCode MoveTheta(HycoH5 h, HycoROM m, HycoSubstructures b)
   PetscCall(HycoH5Reals(h, "bodies/bound", 1, &b->bound));
   PetscCall(HycoH5Reals(h, "bodies/forces", 1, &b->forces));
   PetscCall(HycoH5Reals(h, "bodies/left", 1, &b->left));
+  /* One code for both directions: written from, or read into, the same fields. */
   if (HycoH5Reads(h)) PetscCall(PetscCalloc1(b->n, &b->body));
   PetscCall(HycoH5Int(h, "bodies/theta", 0, m->model->scene->n_parameters - 1, &b->n_theta, 1, &b->theta));
-  PetscCall(HycoH5Int(h, "bodies/logarithm", 0, 1, &b->n_theta, 1, &b->logarithm));
+  PetscCall(HycoH5Int(h, "bodies/logarithm", 0, HYCO_BODIES_VARIABLES - 1, &b->n_theta, 1, &b->variable));
   PetscCall(HycoH5Int(h, "bodies/n_nodes", 1, PETSC_MAX_INT / 64, &b->n_theta, 1, &b->n_nodes));
   for (PetscInt p = 0; p < b->n_theta; p++) nodes += b->n_nodes[p];
   PetscCall(HycoH5Real(h, "bodies/node", &nodes, 1, &b->node));
+  /* Which bodies have an axis is not stored as tensors but as flags, from which their sizes follow. */
   n = b->n * b->n_theta;
   PetscCall(PetscCalloc1(n + 1, &axes));
   for (PetscInt i = 0; i < n && !HycoH5Reads(h); i++) axes[i] = b->body[i / b->n_theta].tensor.n[i % b->n_theta] > 1;
@@ -61,6 +64,7 @@ static PetscErrorCode MoveProbe(HycoH5 h, HycoROM m, HycoSubstructures b)
 {
   PetscFunctionBegin;
   PetscCall(HycoMeshMove(h, "bodies/mesh", m->model->scene->n_bodies, &b->probe));
+  /* Ties are not stored with the probe's mesh: they are those of the model's. */
   if (HycoH5Reads(h)) PetscCall(HycoMeshSetTies(b->probe, m->model->mesh->ties));
   if (HycoH5Reads(h)) PetscCall(HycoMeshCreateDM(m->model->scene, b->probe));
   PetscCall(HycoH5Int(h, "bodies/cell", 0, b->probe->n_cells - 1, &b->n, 1, &b->cell));
@@ -74,6 +78,7 @@ static PetscErrorCode MoveProbe(HycoH5 h, HycoROM m, HycoSubstructures b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One path of a dataset at a time: `path` is overwritten by the next call. */
 static const char *At(PetscInt k, const char name[], char path[64])
 {
   (void)snprintf(path, 64, "bodies/body_%d/%s", (int)k, name);
@@ -152,6 +157,7 @@ static PetscErrorCode MoveInelastic(HycoROM m, HycoH5 h)
   in->m = head[0];
   in->nd = head[1];
   in->n_points = head[2];
+  /* After the bodies: the modes of each give the rows of `fields`. */
   columns = in->n_points * HycoStrainSize(b->dim);
   for (PetscInt k = 0; k < b->n; k++)
     rows += b->body[k].n_samples * (b->turn_start[k + 1] - b->turn_start[k]) * b->body[k].l;
@@ -170,6 +176,8 @@ static PetscErrorCode MoveInelastic(HycoROM m, HycoH5 h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A file whose scene has a history makes this a model of paths. Sizes before theta before the probe before blocks:
+   each part's lengths come from the one before. */
 PetscErrorCode HycoBodiesFile(HycoROM m, HycoH5 h)
 {
   HycoSubstructures b = (HycoSubstructures)m->model->data;

@@ -42,6 +42,8 @@ static PetscErrorCode CreateRows(HycoBodiesFriction f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The solver is always semismooth: the active set of other scenes has no cone. An error leaves a handle that
+   HycoBodiesFrictionDestroy() frees. */
 PetscErrorCode HycoBodiesFrictionCreate(HycoScene scene, const HycoBodiesSurface *surface, HycoBodiesFriction *friction)
 {
   HycoBodiesFriction f;
@@ -87,6 +89,7 @@ const HycoBodiesSurface *HycoBodiesFrictionSurface(HycoBodiesFriction f)
   return &f->all;
 }
 
+/* U_old = 0 is the unloaded state, from which the first step measures slip. */
 PetscErrorCode HycoBodiesFrictionBegin(HycoBodiesFriction f)
 {
   PetscFunctionBegin;
@@ -148,13 +151,16 @@ PetscErrorCode HycoBodiesFrictionPrepare(HycoBodiesFriction f, HycoBodiesWork o,
   PetscCall(HycoSlipCoefficients(&f->slip, s->fe, s->pairs));
   PetscCall(HycoPairsMove(s->fe, s->pairs));
   PetscCall(GrowRows(f));
+  /* Tangents' gaps are B_t U_old, so that D - B U is the slip of the step. */
   PetscCall(HycoContactTangentRows(s->fe, s->pairs, f->slip.row, f->U_old, f->slip.tangent, f->rows.start, f->rows.dof,
                                    f->rows.value, f->rows.gap));
   PetscCall(HycoBodiesPrepare(o, &f->all, mu));
+  /* W is constant along a path; gaps and coefficients change with every step. */
   if (!f->W) PetscCall(Flexibility(f, o));
   PetscCall(VecGetArray(f->g, &g));
   PetscCall(PetscArraycpy(g, o->gap, f->all.n));
   PetscCall(VecRestoreArray(f->g, &g));
+  /* After the coefficients: the cones' data are copied with the blocks. */
   PetscCall(HycoSystemSetBlocks(f->system, 2, f->slip.cone, f->slip.n, f->slip.of, f->slip.data));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -181,6 +187,7 @@ static PetscErrorCode Measure(HycoBodiesFriction f, const PetscReal L[], HycoKKT
   for (PetscInt i = 0; i < f->normal.fe->n_dof; i++) f->most = PetscMax(f->most, PetscAbsReal(f->U[i]));
   *kkt = (HycoKKT){0};
   if (!(force > 0)) force = 1;
+  /* rho = force / gap makes both arguments of the projection equally large in the units of forces. */
   PetscCall(HycoBlocksNaturalMap(f->system->blocks, size > 0 ? force / size : 1, L, f->w, &map));
   kkt->penetration = map.missing / force;
   kkt->adhesion = map.outside / force;
@@ -202,6 +209,7 @@ PetscErrorCode HycoBodiesFrictionSolve(HycoBodiesFriction f, HycoBodiesWork o, H
   PetscCall(HycoSolverSetSystem(f->solver, f->system));
   PetscCall(HycoSolverSolve(f->solver, NULL, f->L));
   PetscCall(HycoSolverGetReason(f->solver, &reason));
+  /* What follows is done for forces that did not converge too: their residuals are reported. */
   PetscCall(HycoSolverGetIterations(f->solver, its));
   PetscCall(VecGetArray(f->L, &L));
   HycoBodiesGiven(o, &f->all, L);
@@ -214,6 +222,7 @@ PetscErrorCode HycoBodiesFrictionSolve(HycoBodiesFriction f, HycoBodiesWork o, H
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Slip, forces and displacements change here only, so that a halved step repeats from the same state. */
 PetscErrorCode HycoBodiesFrictionAccept(HycoBodiesFriction f)
 {
   const PetscScalar *L;
@@ -237,6 +246,7 @@ void HycoBodiesFrictionRestore(HycoBodiesFriction f, HycoBodiesWork o)
   PetscCallVoid(VecRestoreArray(f->L, &L));
 }
 
+/* The first row of each contact is its normal one. */
 void HycoBodiesFrictionNormal(HycoBodiesFriction f, PetscReal Lambda[])
 {
   const PetscScalar *L;
@@ -251,6 +261,7 @@ const HycoSlip *HycoBodiesFrictionSlip(HycoBodiesFriction f)
   return &f->slip;
 }
 
+/* sign < 0: the determinant of the last Newton matrix is negative, so that the solution is one of several. */
 PetscBool HycoBodiesFrictionDisproven(HycoBodiesFriction f)
 {
   return (PetscBool)(f->solver->sign < 0);

@@ -7,6 +7,7 @@ static HycoBodiesSurface SurfaceOf(HycoROM m)
   return HycoBodiesSurfaceNormal(m->fe, &m->model->pairs, &m->rows);
 }
 
+/* z NULL: the caller wants the sizes alone. */
 PetscErrorCode HycoBodiesUnknowns(HycoROM m, PetscInt *p, PetscInt *n, PetscReal z[])
 {
   HycoBodiesWork o = (HycoBodiesWork)m->work;
@@ -36,6 +37,8 @@ static void Gaps(HycoROM m, PetscReal w[], PetscReal *size)
   }
 }
 
+/* Moves the model to mu and to the forces z, also where no solution is there: finite differences of w by mu. w
+   NULL: only the state, for HycoROMOps.expand. */
 PetscErrorCode HycoBodiesResidual(HycoROM m, const PetscReal mu[], const PetscReal z[], PetscReal w[], PetscReal *size)
 {
   HycoBodiesWork o = (HycoBodiesWork)m->work;
@@ -58,6 +61,7 @@ PetscErrorCode HycoBodiesResidual(HycoROM m, const PetscReal mu[], const PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* At the parameters of the last HycoBodiesResidual(), and only for the k contacts of the active set. */
 PetscErrorCode HycoBodiesJacobian(HycoROM m, PetscInt k, const PetscInt contact[], PetscReal M[])
 {
   PetscFunctionBegin;

@@ -24,6 +24,7 @@ static PetscBool Same(HycoBodiesWork o, PetscInt m)
   return PETSC_TRUE;
 }
 
+/* The arrays P and W stay, with NULL entries: the next rows have as many. */
 static PetscErrorCode ForgetColumns(HycoBodiesKept *kept, PetscInt n)
 {
   PetscFunctionBegin;
@@ -32,6 +33,7 @@ static PetscErrorCode ForgetColumns(HycoBodiesKept *kept, PetscInt n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* After Reset() `bodies` is NULL, and there is nothing to count. */
 PetscErrorCode HycoBodiesForgetKept(HycoBodiesWork o)
 {
   HycoBodiesKept *kept = &o->kept;
@@ -42,6 +44,7 @@ PetscErrorCode HycoBodiesForgetKept(HycoBodiesWork o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The first prediction only takes the rows; columns are worth their memory once the same rows have come twice. */
 PetscErrorCode HycoBodiesKeepRows(HycoBodiesWork o, PetscInt m)
 {
   HycoBodiesKept *kept = &o->kept;
@@ -88,6 +91,8 @@ static PetscErrorCode KeepInBody(HycoBodiesWork o, PetscInt k, PetscInt b)
   PetscFunctionBegin;
   PetscCall(PetscBLASIntCast(own->n, &size));
   for (PetscInt e = o->row_start[k]; e < o->row_start[k + 1]; e++) {
+    /* P sums C's columns over the row's entries in this body, then W multiplies by all rows: n + m numbers for
+       each sample. */
     const PetscInt place = o->row_at[e] - lo;
 
     if (place < 0 || place >= own->n) continue;
@@ -114,13 +119,18 @@ PetscErrorCode HycoBodiesKeep(HycoBodiesWork o, PetscInt n, const PetscInt conta
   for (PetscInt i = 0; i < n && kept->same; i++) {
     PetscBool known = PETSC_FALSE;
 
+    /* A contact's column is there if any body has it; a row with no entry at all is looked at again each time, at
+       no cost. */
     for (PetscInt b = 0; b < bodies; b++) known = (PetscBool)(known || kept->P[contact[i] * bodies + b]);
     for (PetscInt b = 0; b < bodies && !known; b++) PetscCall(KeepInBody(o, contact[i], b));
+    /* The columns so far stay allocated until the rows change; from here on the callers compute without them. */
     if (kept->bytes > MOST_BYTES) kept->same = PETSC_FALSE;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* 1 / kappa and the weights are applied here, so that the kept columns serve any stiffness and shape at these
+   rows. */
 void HycoBodiesKeptRow(HycoBodiesWork o, PetscInt k, PetscInt n, const PetscInt contact[], PetscReal row[])
 {
   const HycoSubstructures b = o->bodies;

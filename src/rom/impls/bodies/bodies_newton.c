@@ -47,6 +47,7 @@ static void Add(PetscInt n, PetscReal factor, const PetscReal from[], PetscReal 
 
 /* -- responses of contacts -- */
 
+/* n_set = -1 equals no set, so that ChooseSet() factors again; the columns stay valid. */
 void HycoBodiesRestart(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
@@ -55,6 +56,7 @@ void HycoBodiesRestart(HycoROM m)
   w->fresh = PETSC_TRUE;
 }
 
+/* The columns contain B, C and kappa: any change of rows, poses or stiffness makes all of them stale. */
 PetscErrorCode HycoBodiesForget(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
@@ -84,6 +86,7 @@ static void Push(HycoBodiesWork o, PetscInt k, PetscReal y[])
     const HycoSubstructure *own = &b->body[body];
 
     for (PetscInt q = 0; q < own->n_samples; q++) {
+      /* C is symmetric, so that a stored column is the row that the unit force needs. */
       const PetscReal *C = own->C + ((size_t)q * (size_t)own->n + (size_t)(o->row_at[e] - lo)) * (size_t)own->n;
       const PetscReal share = o->weight[body][q] * o->row[e] / o->kappa[body];
 
@@ -104,6 +107,7 @@ static void TakeStrains(HycoROM m, PetscInt k, const PetscReal cells[], PetscRea
     const PetscInt *at = w->cell_at + w->point[r / ns] / nq * n;
 
     for (PetscInt i = 0; i < n; i++) {
+      /* A prescribed displacement: AddSupports() adds its strain. */
       if (at[i] < 0) continue;
       if (k == 1)
         strain[r] += w->B[r * n + i] * cells[at[i]];
@@ -125,6 +129,8 @@ static PetscErrorCode Column(HycoROM m, PetscInt k)
 
   PetscFunctionBegin;
   if (w->column[k]) PetscFunctionReturn(PETSC_SUCCESS);
+  /* One array of three parts: gaps of all contacts (W_kj, positive on the diagonal), strains of the points,
+     displacements of their cells. */
   PetscCall(PetscCalloc1(n + w->n_rows + in->nd + 1, &w->column[k]));
   PetscCall(PetscMalloc1(b->ns + 1, &y));
   Push(o, k, y);
@@ -158,6 +164,8 @@ static PetscErrorCode TakePoints(HycoROM m)
     PetscReal weight, factor, sum = 0;
 
     PetscCall(HycoFEPointRows(m->fe, w->point[p] / nq, w->point[p] % nq, w->B + p * ns * n, &weight));
+    /* w ~ s^of and B ~ 1/s, so that w B, the force of a unit stress, grows as s^(of - 1) = (w / w_0)^((of - 1) /
+       of) when the body is scaled by s. */
     factor = PetscPowReal(weight / in->weight[p], (of - 1) / of);
     for (PetscInt i = p * size; i < (p + 1) * size; i++) {
       w->T[i] = in->T[i] * factor;
@@ -169,6 +177,8 @@ static PetscErrorCode TakePoints(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What does not depend on the set or the time: B P / kappa and the points' strains by alpha and by loads. Done
+   again only if rows, poses or stiffness have changed (Unchanged()). */
 PetscErrorCode HycoBodiesScale(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
@@ -211,11 +221,13 @@ static PetscErrorCode FactorAll(HycoROM m, PetscBool *independent)
     for (PetscInt i = 0; i < n; i++) w->U[k * n + i] = i <= k ? w->column[w->set[k]][w->set[i]] : 0;
   }
   PetscCall(PetscBLASIntCast(n, &nb));
+  /* Only the upper triangle is filled; zeros below let FactorEach() share the layout. */
   if (n) LAPACKpotrf_("U", &nb, w->U, &nb, &info);
   *independent = (PetscBool)!info;
   for (PetscInt k = 0; k < n && *independent; k++) {
     const PetscReal u = w->U[k * n + k];
 
+    /* potrf accepts pivots of round-off size; their forces would be noise of any size. */
     *independent = (PetscBool)(u * u > DEPENDENT * w->column[w->set[k]][w->set[k]]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -245,10 +257,13 @@ static PetscErrorCode FactorEach(HycoROM m)
     u[rank] = PetscSqrtReal(pivot);
     w->set[w->n_set++] = contact;
   }
+  /* The leading dimension shrinks from n to the rank; columns move down in order, so that none is overwritten
+     before it is read. */
   for (PetscInt j = 0; j < w->n_set; j++) PetscCall(PetscArraymove(w->U + j * w->n_set, w->U + j * n, j + 1));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The fast LAPACK factor first: dependent contacts (equal rows of B, as at shared corners) are rare. */
 static PetscErrorCode Factor(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
@@ -309,12 +324,15 @@ static PetscErrorCode TakeSet(HycoROM m)
   PetscCall(Factor(m));
   PetscCall(PetscFree(w->Z));
   PetscCall(PetscMalloc1(w->n_set * l + 1, &w->Z));
+  /* L = W_aa^-1 (B P alpha - w): Z is its derivative by alpha. */
   for (PetscInt i = 0; i < w->n_set; i++) PetscCall(PetscArraycpy(w->Z + i * l, w->BP + w->set[i] * l, l));
   SolveOnSet(w, l, w->Z);
   PetscCall(AddForces(w, l, n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The displacements of the points' cells are exact, so that the laws of whole cells can be stepped at them
+   (Settle()). Forces off the set are 0 and need no column. */
 PetscErrorCode HycoBodiesMoveCells(HycoROM m, const PetscReal alpha[], const PetscReal Lambda[])
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
@@ -363,6 +381,7 @@ static PetscErrorCode TakeLoads(HycoROM m)
   PetscCall(PetscMalloc1(w->n_set + 1, &w->z));
   PetscCall(HycoBodiesStrain(o, &s, NULL));
   PetscCall(PetscArraycpy(w->gap, o->gap, m->model->pairs.n));
+  /* At alpha = 0 the set's forces close the gaps that the loads leave: W_aa z = -w. */
   for (PetscInt i = 0; i < w->n_set; i++) w->z[i] = -o->gap[w->set[i]];
   SolveOnSet(w, 1, w->z);
   PetscCall(PetscArrayzero(w->e0, w->n_rows));
@@ -380,6 +399,7 @@ static PetscErrorCode ChooseSet(HycoROM m, const PetscReal Lambda[], PetscBool *
   PetscInt count = 0, kept = 0;
 
   PetscFunctionBegin;
+  /* Both counts equal: the set has the same members, whatever their order. */
   for (PetscInt k = 0; k < n; k++) count += Lambda[k] > 0;
   for (PetscInt i = 0; i < w->n_set; i++) kept += Lambda[w->set[i]] > 0;
   *same = (PetscBool)(!w->fresh && w->n_set == count && kept == count);
@@ -442,6 +462,7 @@ static PetscErrorCode Evaluate(HycoROM m, PetscReal t0, PetscReal t1, const Pets
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(w->e, w->e0, w->n_rows));
   PetscCall(Multiply(PETSC_FALSE, w->n_rows, in->m, w->S, alpha, 1, 1, w->e));
+  /* The state at t0 is only read: a refused or repeated step starts from it again. */
   PetscCall(HycoFEStepPoints(m->fe, in->n_points, w->point, w->e, t0, t1, w->path->begin, w->s, w->size,
                              tangent ? w->lost : NULL, &a->law));
   a->seconds_law += HycoNow() - begin;
@@ -454,7 +475,10 @@ static PetscErrorCode Evaluate(HycoROM m, PetscReal t0, PetscReal t1, const Pets
     sum[1] += PetscSqr(alpha[k]);
     w->r[k] -= alpha[k];
   }
+  /* Relative to the larger of alpha and T^T s: from alpha = 0 on, as at first yield, one of them alone would be 0. */
   w->norm = PetscSqrtReal(PetscMax(sum[0], sum[1]));
+  /* s is a difference of elastic and true stresses: where a point is nearly elastic, its round-off is that of the
+     terms. */
   w->floor = 16 * PETSC_MACHINE_EPSILON * PetscSqrtReal(terms);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -479,12 +503,14 @@ static PetscErrorCode Tangent(HycoROM m, HycoStepAttempt *a)
     for (PetscInt c = 0; c < ns; c++) {
       const PetscReal lost = w->lost[i * ns + c], *S = w->S + (i / ns * ns + c) * l;
 
+      /* C - C_t is 0 at points that stay elastic. */
       for (PetscInt k = 0; k < l && lost != 0; k++) X[k] += lost * S[k];
     }
   }
   if (l && rows) BLASgemm_("N", "T", &lb, &lb, &rows, &minus, w->X, &lb, w->T, &lb, &one, w->J, &lb);
   LAPACKgetrf_(&lb, &lb, w->J, &lb, w->pivot, &info);
   w->factored = (PetscBool)!info;
+  /* No error: the path halves the step. */
   if (info) HycoFormat(a->why, "the tangent of the inelastic strains is singular");
   a->factors++;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -500,6 +526,7 @@ static PetscErrorCode Advance(HycoROM m, PetscReal alpha[], HycoStepAttempt *a)
   PetscFunctionBegin;
   if (a->why[0]) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscBLASIntCast(l, &lb));
+  /* J lies by rows, LAPACK has factored J^T; r becomes the step, so that Evaluate() must run before the next one. */
   LAPACKgetrs_("T", &lb, &one, w->J, &lb, w->pivot, w->r, &lb, &info);
   for (PetscInt k = 0; k < l; k++) alpha[k] += w->r[k];
   a->iterations++;
@@ -523,6 +550,7 @@ static PetscErrorCode EvaluateOrRenew(HycoROM m, PetscReal t0, PetscReal t1, con
     PetscCall(Evaluate(m, t0, t1, alpha, tangent, a));
     for (PetscInt i = 0; i < l; i++) norm += PetscSqr(w->r[i]);
     norm = PetscSqrtReal(norm);
+    /* At most two passes: the second has the tangent and is always accepted. */
     if (tangent || norm <= CONTRACTS * *before || norm <= PetscMax(w->path->rtol * w->norm, w->floor)) {
       *before = norm;
       break;
@@ -554,6 +582,7 @@ static PetscErrorCode Newton(HycoROM m, PetscReal t0, PetscReal t1, PetscReal al
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   const PetscInt most = w->path->max_its ? w->path->max_its : MOST_ITS;
+  /* PETSC_MAX_REAL: the first residual contracts from it, and the tangent of the last step stays. */
   PetscReal norm = PETSC_MAX_REAL, *last;
 
   PetscFunctionBegin;
@@ -580,6 +609,7 @@ static PetscErrorCode Newton(HycoROM m, PetscReal t0, PetscReal t1, PetscReal al
 
 /* -- sets -- */
 
+/* Without a force there is no set to begin with, as in the first step of a path or after a contact has opened. */
 static PetscBool Presses(HycoROM m, const PetscReal Lambda[])
 {
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
@@ -603,6 +633,7 @@ static PetscErrorCode Contacts(HycoROM m, const PetscReal alpha[], PetscReal Lam
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The set of the last step first: in most steps it holds, and no contact problem is solved at all. */
 PetscErrorCode HycoBodiesSearch(HycoROM m, PetscReal t0, PetscReal t1, PetscReal alpha[], PetscReal Lambda[],
                                 HycoStepAttempt *a)
 {

@@ -25,6 +25,8 @@ static PetscErrorCode Settle(HycoROM m, PetscReal t0, PetscReal t1, const PetscR
 
   PetscFunctionBegin;
   PetscCall(HycoBodiesMoveCells(m, alpha, Lambda));
+  /* Now the laws of all points in the cells, which gives the state at t1; the search has evaluated them at the
+     chosen points only and stored nothing. */
   PetscCall(PetscArrayzero(p->f_local, m->fe->n_dof));
   PetscCall(
       HycoFEStepBodies(m->fe, HYCO_BODIES_FLOWING, w->u, t0, t1, p->begin, p->end, p->f_local, PETSC_FALSE, &a->law));
@@ -38,7 +40,9 @@ static PetscErrorCode Settle(HycoROM m, PetscReal t0, PetscReal t1, const PetscR
   HycoBodiesGiven(&w->bodies, &s, Lambda);
   MoveAll(m);
   HycoBodiesMeasure(m, &p->kkt);
+  /* Equilibrium holds by condensation; what is left of it is Newton's residual of alpha. */
   p->kkt.stationarity = a->residual;
+  /* Recomputed from U and Lambda: the search's own word is not enough. */
   a->converged = (PetscBool)(HycoKKTMax(&p->kkt) <= 1e-8);
   if (!a->converged) HycoFormat(a->why, "the residual of the contacts is %.1e", (double)HycoKKTMax(&p->kkt));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -82,6 +86,8 @@ static PetscErrorCode Rub(HycoROM m, HycoPath p, HycoStepAttempt *a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* First with the tangent that is kept while it contracts; if that fails, once more from the last accepted time
+   with a new tangent in each iteration, before the path halves the step. */
 static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAttempt *a)
 {
   HycoROM m = (HycoROM)p->ctx;
@@ -130,6 +136,8 @@ static PetscBool Unchanged(HycoROM m)
   return same;
 }
 
+/* Rows at mu first, then the bodies that they turn with. Nothing of Newton's tables is computed again if rows,
+   places and stiffness stay, as in most steps. */
 static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elastic)
 {
   HycoROM m = (HycoROM)p->ctx;
@@ -150,6 +158,8 @@ static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elast
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The trace and the listed times need gamma, which is expanded for accepted steps only. With friction Rub() has
+   done so, and there are no strains. */
 static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
 {
   HycoROM m = (HycoROM)p->ctx;
@@ -199,6 +209,8 @@ static PetscErrorCode RecordFriction(HycoROM m, HycoStep *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* p->why is set if the path ended early: the work then has the refused step, and the listed time is that of the
+   last accepted one. */
 static PetscErrorCode Record(HycoPath p)
 {
   HycoROM m = (HycoROM)p->ctx;
@@ -246,6 +258,7 @@ static PetscErrorCode FindUnknowns(HycoROM m)
     const PetscInt local = HycoCellUnknown(mesh, k / n, k % n);
     PetscInt at;
 
+    /* A file's numbers are those of the whole mesh; the model's mesh has its own. */
     PetscCall(PetscFindInt(mesh->node_whole[local / mesh->dim] * mesh->dim + local % mesh->dim, in->nd, in->dof, &at));
     w->cell_at[k] = PetscMax(at, -1);
     if (at >= 0) w->at[at] = local;
@@ -280,6 +293,7 @@ static PetscErrorCode FindPoints(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Sizes are those of HycoBodiesPath; the columns of contacts follow on demand. */
 static PetscErrorCode Allocate(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
@@ -317,6 +331,8 @@ static PetscErrorCode Allocate(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* p borrows alpha and L as its unknowns: for the path driver alpha is the "displacement", n_free its length. With
+   elastic tangents J would be 1, and Newton's method a fixed-point iteration. */
 static PetscErrorCode CreatePath(HycoROM m)
 {
   static const HycoPathOps ops = {.assemble = Assemble, .iterate = Iterate, .accept = Accept, .record = Record};
@@ -353,6 +369,7 @@ static PetscErrorCode SetUp(HycoROM m)
   PetscCall(HycoROMSetUpDefault(m));
   w->bodies.bodies = (HycoSubstructures)m->model->data;
   m->n = w->bodies.bodies->inelastic->m;
+  /* The mesh has few cells: pressures act on facets of the surfaces whose cells it lacks. */
   m->fe->all_facets = PETSC_TRUE;
   s = HycoBodiesSurfaceOf(m);
   if (HycoSceneHasFriction(m->model->scene)) PetscCall(HycoBodiesFrictionCreate(m->model->scene, &s, &w->friction));
@@ -365,6 +382,7 @@ static PetscErrorCode SetUp(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Also after a set-up that failed half-way: all parts are NULL-safe, and `bodies` is set first. */
 static PetscErrorCode Reset(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;

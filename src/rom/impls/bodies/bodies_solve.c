@@ -20,6 +20,8 @@ PetscErrorCode HycoBodiesCreate(HycoSubstructures *bodies)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* `weight` and `blend` hold one array per body, and `bodies` has their number; the zeros afterwards make a second
+   call, and HycoBodiesSetUp() on the same work, safe. */
 PetscErrorCode HycoBodiesReset(HycoBodiesWork o)
 {
   PetscFunctionBegin;
@@ -35,6 +37,8 @@ PetscErrorCode HycoBodiesReset(HycoBodiesWork o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Arrays that training or a file has not filled yet are NULL, so that an error in the middle of either frees what
+   is there. */
 PetscErrorCode HycoBodiesDestroy(HycoSubstructures *bodies)
 {
   HycoSubstructures b = *bodies;
@@ -47,7 +51,7 @@ PetscErrorCode HycoBodiesDestroy(HycoSubstructures *bodies)
 
     HycoFreeAll(&s->C, &s->R, &s->Z, &s->work, &s->H, &s->a, &s->g, &s->gram);
   }
-  HycoFreeAll(&b->first, &b->theta, &b->logarithm, &b->n_nodes, &b->node, &b->body, &b->start, &b->dof, &b->inner_start,
+  HycoFreeAll(&b->first, &b->theta, &b->variable, &b->n_nodes, &b->node, &b->body, &b->start, &b->dof, &b->inner_start,
               &b->inner, &b->cell, &b->at, &b->at_body, &b->A, &b->mode_start, &b->turn_start, &b->G);
   if (b->inelastic) {
     HycoBodiesInelastic s = b->inelastic;
@@ -61,6 +65,8 @@ PetscErrorCode HycoBodiesDestroy(HycoSubstructures *bodies)
 
 /* -- theta -- */
 
+/* A body has one node along an axis of theta that does not change it, so that its tensor is smaller than the grid
+   of all values. The values x are those of `node`, borrowed by all bodies. */
 void HycoBodiesSetTensors(HycoSubstructures b)
 {
   for (PetscInt k = 0; k < b->n; k++) {
@@ -77,6 +83,8 @@ void HycoBodiesSetTensors(HycoSubstructures b)
   }
 }
 
+/* Parameters outside theta stay at `first`: they move, scale or stiffen the body as a whole, which pose and kappa
+   represent, and would otherwise be applied twice. */
 void HycoBodiesReference(HycoSubstructures b, PetscInt k, const PetscReal mu[], PetscReal reference[])
 {
   for (PetscInt p = 0; p < b->n_variables; p++) reference[p] = b->first[p];
@@ -85,12 +93,13 @@ void HycoBodiesReference(HycoSubstructures b, PetscInt k, const PetscReal mu[], 
   }
 }
 
+/* The nodes of a logarithmic axis are stored as logarithms (SetGrid() in training). */
 PetscErrorCode HycoBodiesWeights(HycoSubstructures b, PetscInt k, const PetscReal mu[], PetscReal weight[])
 {
   PetscReal at[HYCO_MAX_PARAMETERS];
 
   PetscFunctionBegin;
-  for (PetscInt p = 0; p < b->n_theta; p++) at[p] = b->logarithm[p] ? PetscLogReal(mu[b->theta[p]]) : mu[b->theta[p]];
+  for (PetscInt p = 0; p < b->n_theta; p++) at[p] = HycoBodiesVariable(b->variable[p], mu[b->theta[p]]);
   PetscCall(HycoTensorWeights(&b->body[k].tensor, at, weight));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -128,6 +137,7 @@ static PetscErrorCode FindPlaces(HycoBodiesWork o, HycoMesh m)
     place[k] = k;
     sorted[k] = k < b->ns ? b->dof[k] : b->inner[k - b->ns];
   }
+  /* dof and inner ascend within each body, not over all of them: sort, and keep where each was. */
   PetscCall(PetscSortIntWithArray(n, sorted, place));
   o->n_loc = m->n_nodes * b->dim;
   PetscCall(PetscMalloc1(o->n_loc, &o->loc));
@@ -154,6 +164,8 @@ static PetscErrorCode TakeReference(HycoBodiesWork o, PetscInt k, const PetscRea
   tangent = o->fe->tangent + o->fe->tangent_start[e];
   for (PetscInt v = 0; v < m->nv; v++)
     PetscCall(PetscArraycpy(o->X0 + 3 * (k * m->nv + v), o->fe->X + 3 * m->cells[e * m->nv + v], 3));
+  /* The largest entry of the tangents gives kappa as a quotient: no small denominator, and the same entry at every
+     mu. */
   o->E_at[k] = 0;
   for (PetscInt i = 1; i < size; i++) {
     if (PetscAbsReal(tangent[i]) > PetscAbsReal(tangent[o->E_at[k]])) o->E_at[k] = i;
@@ -187,6 +199,7 @@ PetscErrorCode HycoBodiesSetUp(HycoBodiesWork o, HycoSubstructures b, HycoScene 
   PetscCall(PetscCalloc1(b->ns + 1, &o->blended));
   for (PetscInt k = 0; k < b->n; k++) PetscCall(PetscCalloc1(b->body[k].n_samples, &o->weight[k]));
   PetscCall(HycoFECreate(scene, b->probe->dm, &o->fe));
+  /* Of a history too, thermal strains are loads here: the laws' s = C (e - e_th) - sigma leaves them out. */
   o->fe->heat_is_load = PETSC_TRUE;
   PetscCall(PetscMalloc1(3 * b->probe->nv * b->n, &o->X0));
   PetscCall(PetscMalloc1(b->n, &o->E0));
@@ -208,6 +221,8 @@ PetscErrorCode HycoBodiesSetUp(HycoBodiesWork o, HycoSubstructures b, HycoScene 
   PetscCall(PetscMalloc1(m + 1, &o->gap));
   PetscCall(PetscMalloc1(m + 1, &o->active));
   PetscCall(HycoTaoCreate(PETSC_COMM_SELF, NULL, &o->tao));
+  /* Beside the solver of contact systems: the active set works on the dense M itself, and takes the rigid motions,
+     which a flexibility alone does not have. */
   PetscCall(HycoTaoSetType(o->tao, HYCO_TAO_ACTIVE_SET, o->solver->max_its));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -224,6 +239,7 @@ static PetscErrorCode Place(HycoBodiesWork o, const PetscReal mu[])
   PetscFunctionBegin;
   for (PetscInt k = 0; k < b->n; k++) {
     HycoBodiesReference(b, k, mu, reference);
+    /* Only a body with samples has another shape at this mu; the reference of the others, taken in set-up, stays. */
     if (b->body[k].n_samples > 1) PetscCall(TakeReference(o, k, reference));
   }
   PetscCall(HycoFESetParameters(o->fe, mu));
@@ -233,6 +249,7 @@ static PetscErrorCode Place(HycoBodiesWork o, const PetscReal mu[])
 
     for (PetscInt v = 0; v < m->nv; v++) PetscCall(PetscArraycpy(x + 3 * v, o->fe->X + 3 * m->cells[e * m->nv + v], 3));
     HycoPoseFit(b->dim, m->nv, o->X0 + 3 * k * m->nv, x, &o->pose[k]);
+    /* Stiffness scales as the moduli times s^p with p = 1 in 3D and axisymmetric, 0 in 2D, -1 in 1D. */
     o->kappa[k] = tangent[o->E_at[k]] / o->E0[k] * PetscPowReal(o->pose[k].s, (PetscReal)HycoPosePower(o->fe));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -257,6 +274,8 @@ static PetscErrorCode Load(HycoBodiesWork o)
     const PetscInt node = b->at[k] / b->dim;
     PetscReal force[3], turned[3];
 
+    /* K has no rows for fixed unknowns, and training set them to zero before the turn, so that the DEIM points see
+       the same vectors. */
     for (PetscInt c = 0; c < b->dim; c++) force[c] = o->fe->fixed[node * b->dim + c] ? 0 : F[node * b->dim + c];
     HycoPoseTurn(o->pose[b->at_body[k]].Q, b->dim, PETSC_TRUE, force, turned);
     value[k] = turned[b->at[k] % b->dim];
@@ -272,6 +291,8 @@ static PetscErrorCode Load(HycoBodiesWork o)
     const HycoSubstructure *own = &b->body[k];
     PetscReal *u = o->elastic + b->start[k];
 
+    /* R's rows of all samples one after the other: i / n is the sample, i % n the unknown. u = sum of weights R c
+       / kappa. */
     for (PetscInt i = 0; i < own->n_samples * own->n; i++) {
       const PetscReal weight = o->weight[k][i / own->n] / o->kappa[k];
 
@@ -342,6 +363,8 @@ static PetscErrorCode TurnRows(HycoBodiesWork o, const HycoBodiesSurface *s)
       const PetscInt place = o->loc[rows->dof[e]], node = rows->dof[e] / dim, c = rows->dof[e] % dim;
       PetscInt body;
 
+      /* Training leaves out masters that no slave met; a prediction that meets one has no flexibility there and
+         must not go on. */
       HycoCheck(place >= 0 && place < b->ns,
                 "contact %s: node %d is not among the surfaces on which the model of bodies was trained",
                 s->fe->scene->contact[s->contact[k]]->name, (int)s->fe->mesh->node_id[node]);
@@ -349,6 +372,8 @@ static PetscErrorCode TurnRows(HycoBodiesWork o, const HycoBodiesSurface *s)
       for (PetscInt d = 0; d < dim; d++) {
         const PetscReal value = o->pose[body].Q[3 * c + d] * rows->value[e];
 
+        /* A fixed component has no place: its displacement is prescribed and in the gap. value == 0 keeps rows of
+           unturned bodies as sparse as in B. */
         if (value != 0 && o->loc[node * dim + d] >= 0) AddEntry(o, o->row_start[k], &n, o->loc[node * dim + d], value);
       }
     }
@@ -402,6 +427,8 @@ static PetscErrorCode GetColumn(HycoBodiesWork o, PetscInt k, PetscInt unknown, 
   PetscFunctionBegin;
   *column = own->C + at;
   if (own->n_samples == 1) PetscFunctionReturn(PETSC_SUCCESS);
+  /* All n x n at first use, each column filled only on demand: most columns belong to unknowns that no closed
+     contact reads. */
   if (!o->blend[k]) PetscCall(PetscMalloc1(n * n, &o->blend[k]));
   if (!*there) {
     HycoBodiesBlend(o, k, own->n, n * n, own->C + at, o->blend[k] + at);
@@ -421,6 +448,8 @@ typedef struct {
   PetscReal **C;   /* by body: its flexibility between these places */
 } Problem;
 
+/* First marks, then numbers in ascending order, so that the places of one body are contiguous, as Gather() and
+   Respond() expect. */
 static PetscErrorCode FindTouched(HycoBodiesWork o, Problem *p)
 {
   const HycoSubstructures b = o->bodies;
@@ -453,6 +482,8 @@ static PetscErrorCode Gather(HycoBodiesWork o, Problem *p)
 
     while (i < p->n_place && p->place[i] < b->start[k + 1]) i++;
     p->first[k + 1] = i;
+    /* A copy, contiguous in the touched places: Respond() then adds whole columns by BLAS instead of indexed
+       entries of the n x n block. */
     PetscCall(PetscMalloc1(PetscSqr((size_t)(i - p->first[k])) + 1, &p->C[k]));
     to = p->C[k];
     for (PetscInt j = p->first[k]; j < i; j++) {
@@ -503,6 +534,7 @@ static PetscErrorCode Fill(HycoBodiesWork o, Problem *p)
   const size_t n = (size_t)(b->p + p->n);
 
   PetscFunctionBegin;
+  /* May turn kept.same off (memory); only then the touched places are needed. */
   PetscCall(HycoBodiesKeep(o, p->n, p->contact));
   if (!o->kept.same) PetscCall(FindTouched(o, p));
   if (!o->kept.same) PetscCall(Gather(o, p));
@@ -517,6 +549,7 @@ static PetscErrorCode Fill(HycoBodiesWork o, Problem *p)
 
     p->q[column] = o->gap[contact];
     FillRow(o, p, k, p->M + column * n + column);
+    /* FillRow() computes row k from the diagonal on; W is symmetric, and copying keeps it so to the last digit. */
     for (size_t j = column; j < n; j++) p->M[j * n + column] = p->M[column * n + j];
     for (PetscInt i = 0; i < b->p; i++) {
       PetscReal sum = 0;
@@ -544,6 +577,7 @@ static PetscErrorCode SolveSystem(HycoBodiesWork o, Problem *p, PetscBool *solve
   PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, p->n, p->q, &g));
   PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, p->n, p->z, &L));
   PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &system));
+  /* Without rigid motions M is W alone, so that p->M, q and z serve as arrays of the PETSc objects (borrowed). */
   PetscCall(HycoSystemSetFlexibility(system, G, g));
   PetscCall(HycoSolverSetSystem(o->solver, system));
   PetscCall(HycoSolverSetStartSet(o->solver, o->active));
@@ -587,6 +621,8 @@ static PetscErrorCode Release(HycoBodiesWork o, Problem *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One problem with the contacts of p. The start is all closed: most contacts of the problem are, and with rigid
+   motions the first matrix would be singular otherwise. Lambda of contacts outside p stays as it is, 0. */
 static PetscErrorCode SolveProblem(HycoBodiesWork o, Problem *p, PetscReal Lambda[], PetscBool *solved)
 {
   const HycoSubstructures b = o->bodies;
@@ -598,6 +634,8 @@ static PetscErrorCode SolveProblem(HycoBodiesWork o, Problem *p, PetscReal Lambd
       "-hyco_solver_type: contact alone holds a body, and a model of bodies solves such problems by active_set");
   PetscCall(Fill(o, p));
   for (PetscInt k = 0; k < p->n; k++) o->active[k] = PETSC_TRUE;
+  /* The active set may cycle (W need not be an M-matrix); the solver's other methods then take over if its
+     fallback is allowed. */
   *solved = PETSC_FALSE;
   if (set) PetscCall(SolveSet(o, p, solved));
   if (!*solved && !b->p && (!set || o->solver->fallback)) PetscCall(SolveSystem(o, p, solved));
@@ -634,6 +672,8 @@ static PetscErrorCode Displace(HycoBodiesWork o, const HycoBodiesSurface *s, con
       o->f[o->row_at[j]] += o->row[j] * Lambda[k];
   }
   PetscCall(PetscArraycpy(o->u, o->free, b->ns));
+  /* Kept products P = C B^T give u contact by contact, otherwise u comes column by column of C from the summed
+     forces f. */
   if (o->kept.same) PetscCall(HycoBodiesKeptDisplace(o, s->n, Lambda, o->u));
   for (PetscInt k = 0; k < b->n && !o->kept.same; k++) {
     const HycoSubstructure *own = &b->body[k];
@@ -663,6 +703,7 @@ static void Join(HycoBodiesWork o, const HycoBodiesSurface *s, PetscReal size, P
   for (PetscInt k = 0; k < s->n; k++) {
     PetscReal gap = s->rows->gap[k];
 
+    /* An empty row is a contact without a master at this mu. */
     if (in[k] || o->row_start[k] == o->row_start[k + 1]) continue;
     for (PetscInt j = o->row_start[k]; j < o->row_start[k + 1]; j++) gap -= o->row[j] * o->u[o->row_at[j]];
     if (gap >= -CLOSED * size) continue;
@@ -707,16 +748,20 @@ static PetscErrorCode SolveRounds(HycoBodiesWork o, const HycoBodiesSurface *s, 
   PetscCall(Begin(o, s, size, in, p));
   *solved = PETSC_TRUE;
   PetscCall(PetscArrayzero(o->x, b->p));
+  /* Contacts only join, so that the rounds end; those that need no force get none from the problem itself. */
   for (PetscInt round = 0; more && *solved && round < ROUNDS; round++) {
     if (p->n) PetscCall(SolveProblem(o, p, Lambda, solved));
     PetscCall(Displace(o, s, Lambda));
     Join(o, s, size, in, p, &more);
   }
+  /* Penetrating contacts were left out of the last problem: its forces are no solution. */
   if (*solved && more) o->reason = HYCO_DIVERGED_ITERATIONS;
   *solved = (PetscBool)(*solved && !more);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The order matters: weights before Load() and BlendMotions(), the pose and kappa before both, all displacements
+   without contact before TurnRows(), which subtracts them from the gaps. */
 PetscErrorCode HycoBodiesPrepare(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal mu[])
 {
   PetscFunctionBegin;
@@ -730,6 +775,8 @@ PetscErrorCode HycoBodiesPrepare(HycoBodiesWork o, const HycoBodiesSurface *s, c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Starts again from `elastic`, so that repeated calls with other alpha do not accumulate. P is stored with the
+   surfaces' unknowns as rows: the "transposed" of BLAS. */
 PetscErrorCode HycoBodiesStrain(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal alpha[])
 {
   const HycoSubstructures b = o->bodies;
@@ -750,6 +797,8 @@ PetscErrorCode HycoBodiesStrain(HycoBodiesWork o, const HycoBodiesSurface *s, co
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Columns of contacts with a force are kept first: HycoBodiesKeptDisplace() passes over those that are not, which
+   would lose their displacement. */
 void HycoBodiesGiven(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal Lambda[])
 {
   PetscInt *closed, n = 0;
@@ -763,6 +812,7 @@ void HycoBodiesGiven(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscRe
   PetscCallVoid(Displace(o, s, Lambda));
 }
 
+/* Needs HycoBodiesPrepare(), and HycoBodiesStrain() for inelastic strains. Rank-local: models live on one process. */
 PetscErrorCode HycoBodiesContact(HycoBodiesWork o, const HycoBodiesSurface *s, PetscReal Lambda[], PetscBool *solved)
 {
   Problem p = {0};
@@ -789,6 +839,8 @@ PetscErrorCode HycoBodiesSolve(HycoBodiesWork o, const HycoBodiesSurface *s, con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* |L~|_W^2 = sum of f.(C f / kappa), from the displacements by the forces. `gram` holds the errors of R in the
+   norm of C^-1: that is the term |B (R~ - R) c|_{W^-1} of the bound, kappa scaling C and R alike. */
 PetscReal HycoBodiesBound(HycoBodiesWork o, PetscReal *norm)
 {
   const HycoSubstructures b = o->bodies;
@@ -811,6 +863,8 @@ PetscReal HycoBodiesBound(HycoBodiesWork o, PetscReal *norm)
 
 /* -- displacements -- */
 
+/* Turns vectors by node, not components: a node may have fixed components, whose displacement in the body's axes
+   counts as 0 and which are not written. */
 void HycoBodiesMove(HycoBodiesWork o, const HycoBodiesSurface *s, PetscReal U[])
 {
   const HycoSubstructures b = o->bodies;
@@ -870,6 +924,7 @@ static PetscErrorCode ExpandBody(HycoBodiesWork o, PetscInt k, PetscReal gamma[]
     for (PetscInt j = 0; j < turns; j++) {
       PetscReal share = 0;
 
+      /* Q = sum of q_j G_j with the orthonormal G_j of training: q_j is their inner product with Q. */
       for (PetscInt d = 0; d < 9; d++) share += b->G[9 * (b->turn_start[k] + j) + d] * o->pose[k].Q[d];
       Add(own->l, share * o->weight[k][s], row + j * own->l, gamma + b->mode_start[k]);
     }
@@ -879,6 +934,8 @@ static PetscErrorCode ExpandBody(HycoBodiesWork o, PetscInt k, PetscReal gamma[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* After the forces are known: H, a and g are exact for any f, c and x, so that only the modes' span is an
+   approximation. */
 PetscErrorCode HycoBodiesExpand(HycoBodiesWork o, PetscReal gamma[])
 {
   const HycoSubstructures b = o->bodies;
@@ -899,6 +956,8 @@ static void AddProduct(PetscInt l, PetscInt m, const PetscReal F[], const PetscR
   }
 }
 
+/* After HycoBodiesExpand(), which overwrites gamma. The rows of `fields` run over bodies, samples, turns and
+   modes, in this order. */
 void HycoBodiesAddStrains(HycoBodiesWork o, const PetscReal alpha[], PetscReal gamma[])
 {
   const HycoSubstructures b = o->bodies;

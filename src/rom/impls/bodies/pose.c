@@ -2,6 +2,8 @@
 #include <hycobodies.h>
 #include <petscblaslapack.h>
 
+/* K ~ integral of B^T C B with B ~ 1/s: the volume's s^3 in 3D, s^2 in 2D (per unit thickness) and s in 1D times
+   s^-2; axisymmetric as in 3D, because the radius scales too. */
 PetscInt HycoPosePower(HycoFE fe)
 {
   return fe->dim == 3 || fe->formulation == HYCO_AXISYMMETRIC ? 1 : fe->dim == 1 ? -1 : 0;
@@ -29,6 +31,7 @@ static void FromMoments(PetscInt dim, const Moments *m, HycoPose *pose)
   LAPACKgesv_(&n, &n, M, &lda, ipiv, A, &lda, &info);
   pose->residual = info ? 1 : 0;
   for (PetscInt k = 0; k < 9; k++) M[k] = A[k];
+  /* The polar factor V U^T may be a reflection: mirrored bodies are allowed. */
   LAPACKgesvd_("A", "A", &n, &n, M, &lda, s, U, &lda, Vt, &lda, work, &lwork, &info);
   pose->s = 0;
   for (PetscInt c = 0; c < dim; c++) pose->s += s[c] / dim;
@@ -38,6 +41,7 @@ static void FromMoments(PetscInt dim, const Moments *m, HycoPose *pose)
     for (PetscInt d = 0; d < dim; d++) {
       pose->Q[3 * c + d] = 0;
       for (PetscInt k = 0; k < dim; k++) pose->Q[3 * c + d] += Vt[3 * c + k] * U[3 * k + d];
+      /* Exact zeros keep the rows of B of unturned bodies sparse and the same from one mu to the next. */
       if (PetscAbsReal(pose->Q[3 * c + d]) < 1e-15) pose->Q[3 * c + d] = 0;
     }
   }
@@ -57,6 +61,8 @@ static void AddDistance(PetscInt dim, const HycoPose *pose, const PetscReal X[],
   }
 }
 
+/* x X^T as well as X X^T: their quotient is the linear map of least squares, before its orthogonal factor is
+   taken. */
 static void AddSecond(PetscInt dim, const PetscReal X[], const PetscReal x[], Moments *m)
 {
   for (PetscInt c = 0; c < dim; c++) {
@@ -67,6 +73,7 @@ static void AddSecond(PetscInt dim, const PetscReal X[], const PetscReal x[], Mo
   }
 }
 
+/* The local counterpart of HycoBodyPoses(), for the nodes of one cell. */
 void HycoPoseFit(PetscInt dim, PetscInt n, const PetscReal X[], const PetscReal x[], HycoPose *pose)
 {
   Moments m = {.n = n};
@@ -81,6 +88,8 @@ void HycoPoseFit(PetscInt dim, PetscInt n, const PetscReal X[], const PetscReal 
   if (m.size > 0) pose->residual = PetscMax(pose->residual, m.off / m.size);
 }
 
+/* Three passes because second moments need the centres, and distances the map. Each pass reduces over ranks, so
+   that every rank makes the same pose from the same sums; a node counts once, on its owner. */
 PetscErrorCode HycoBodyPoses(HycoFOM f, PetscInt n, const PetscInt of[], const PetscReal X0[], HycoPose pose[])
 {
   const PetscInt dim = f->fe->dim, width = (PetscInt)(sizeof(Moments) / sizeof(PetscReal));

@@ -8,6 +8,7 @@
 #include <petsc/private/petscimpl.h> /* PetscObjectStateIncrease() */
 #include <petscviewer.h>
 
+/* Copies the values x. The degree is n - 1: the table interpolates. */
 PetscErrorCode HycoTableCreate(const PetscInt n[], PetscReal *x[], PetscInt dim, PetscInt entries, HycoTable *table)
 {
   HycoTable t;
@@ -42,6 +43,7 @@ PetscErrorCode HycoTableDestroy(HycoTable *table)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A file without the RID's K cannot derive the pattern: it is stored with the entries. */
 PetscErrorCode HycoTableKeepPattern(HycoROM m, HycoTable t)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -87,6 +89,7 @@ PetscErrorCode HycoTableFill(HycoROM m, const PetscReal mu[])
             "%s: the table of the reduced stiffness has %d entries, the matrix %d: train the model again",
             m->model->path, (int)g->model->table->values.rows, (int)n);
   PetscCall(HycoGridFieldEvaluate(&g->model->table->values, mu, a));
+  /* Entries were written behind PETSc's back: solvers see the new state and factor again. */
   PetscCall(PetscObjectStateIncrease((PetscObject)g->Kr));
   PetscCall(MatAssemblyBegin(g->Kr, MAT_FINAL_ASSEMBLY));
   PetscCall(MatAssemblyEnd(g->Kr, MAT_FINAL_ASSEMBLY));

@@ -31,6 +31,7 @@ PetscErrorCode HycoGalerkinSetRidge(HycoROM m, PetscReal ridge)
   PetscCall(
       PetscMalloc1(l * n, &g->G)); /* row major l x n is column major n x l: solve N Z = X^T, l x n column major */
   PetscCall(PetscMalloc3(l * n, &X, l * l, &N, l, &weight));
+  /* Modes with small singular values are penalised more: they are less certain. */
   for (PetscInt j = 0; j < l; j++) weight[j] = ridge > 0 ? m->model->sigma[j] / m->model->sigma[0] : 1;
   for (PetscInt k = 0; k < n; k++) {
     for (PetscInt j = 0; j < l; j++) X[k * l + j] = m->model->V[m->model->fe_dof[k] * l + j] * weight[j];
@@ -55,7 +56,8 @@ PetscErrorCode HycoGalerkinSetRidge(HycoROM m, PetscReal ridge)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The numbers of unknowns. */
+/* The numbers of unknowns. Bordered: gamma is kept as an unknown, so that Kr = K[A,A] with a border stays sparse
+   instead of K[A,A] + (K V) G. */
 static PetscErrorCode CountUnknowns(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -97,6 +99,7 @@ PetscErrorCode HycoGalerkinSetUp(HycoROM m)
   PetscCall(CountUnknowns(m));
   dense = (PetscBool)((m->n <= HYCO_DENSE_MAX && !g->bordered) || (g->model->symmetric && !m->model->n_fe) ||
                       (g->model->G && !g->bordered));
+  /* With a table K is never assembled. */
   if (!g->model->table) PetscCall(HycoFECreateMatrix(m->fe, PETSC_COMM_SELF, g->own->n_nodes, 0, &g->K));
   PetscCall(VecCreateSeq(PETSC_COMM_SELF, m->fe->n_dof, &g->F));
   PetscCall(g->model->table && !dense ? HycoTableCreateSparse(m) : CreateReduced(m->n, m->n, dense, 0, &g->Kr));
@@ -163,6 +166,7 @@ static PetscErrorCode Assemble(HycoROM m, const PetscReal mu[])
   PetscCall(HycoFESetParameters(m->fe, mu));
   PetscCall(HycoGalerkinCreateSets(m));
   m->fe->ready = PETSC_FALSE; /* until everything that depends on it is assembled */
+  /* Before anything can fail: solutions of another stiffness must not be used. */
   if (m->fe->stiffness_changed) HycoLoadsForget(g->loads);
   if (m->fe->stiffness_changed && g->model->table) {
     PetscCall(HycoReducedPrepare(m));
@@ -207,6 +211,7 @@ PetscErrorCode HycoGalerkinExpand(HycoROM m)
   PetscFunctionBegin;
   PetscCall(VecGetArrayRead(g->x, &x));
   for (PetscInt j = 0; j < m->model->l; j++) {
+    /* With G (hybrid all) gamma follows from U[A], also where it is an unknown beside it. */
     m->gamma[j] = g->n_free && !g->model->G ? x[j] : 0;
     for (PetscInt f = 0; g->model->G && f < m->model->n_fe; f++)
       m->gamma[j] += g->model->G[j * m->model->n_fe + f] * x[g->n_free + f];
@@ -333,6 +338,8 @@ PetscErrorCode HycoGalerkinEnergy(HycoROM m, PetscReal *energy, PetscBool *known
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Borrowed objects, at the last solve's parameters; D has all contacts; those outside A_lambda are not set, as B's
+   rows there are empty. */
 PetscErrorCode HycoGalerkinLocal(HycoROM m, HycoLocal *local)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;

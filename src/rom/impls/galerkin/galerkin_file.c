@@ -18,6 +18,7 @@ static PetscErrorCode MoveScan(HycoROM m, HycoH5 h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* G, scan and table are each optional; what is absent is not needed by the model or was not made. */
 PetscErrorCode HycoGalerkinMove(HycoROM m, HycoH5 h)
 {
   HycoGalerkinModel g = (HycoGalerkinModel)m->model->data;

@@ -2,6 +2,7 @@
    w = (K x + Bt L - F, D - B x). */
 #include <hycogalerkin.h>
 
+/* z NULL: the sizes alone. */
 PetscErrorCode HycoGalerkinUnknowns(HycoROM m, PetscInt *p, PetscInt *n, PetscReal z[])
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -43,6 +44,7 @@ static PetscErrorCode Take(PetscInt n, Vec from, PetscReal to[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Assembles at mu without a solve; w NULL: the state is moved, nothing is computed. */
 PetscErrorCode HycoGalerkinResidual(HycoROM m, const PetscReal mu[], const PetscReal z[], PetscReal w[],
                                     PetscReal *size)
 {
@@ -100,6 +102,7 @@ static PetscErrorCode AddTo(Mat A, PetscReal scale, size_t n, const PetscInt to_
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* M = [K Bt; -B 0] of the k contacts, by columns: w of contacts is D - B x. */
 PetscErrorCode HycoGalerkinJacobian(HycoROM m, PetscInt k, const PetscInt contact[], PetscReal M[])
 {
   HycoGalerkin g = (HycoGalerkin)m->work;

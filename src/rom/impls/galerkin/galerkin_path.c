@@ -42,6 +42,7 @@ static PetscErrorCode Loads(HycoPath p)
   const PetscBool lifted = m->fe->lifted;
 
   PetscFunctionBegin;
+  /* HycoFEAssembleForce() would subtract K u0; here f_int contains the whole displacement. */
   m->fe->lifted = PETSC_FALSE;
   HycoLogged(HYCO_EVENT_FORCE, HycoFEAssembleForce(m->fe, g->F));
   m->fe->lifted = lifted;
@@ -253,6 +254,7 @@ PetscErrorCode HycoGalerkinPathCreate(HycoROM m)
   p->n_contacts = m->n_L;
   p->n_free = m->n;
   PetscCall(HycoPathSetUp(p));
+  /* Newton's next iteration corrects what a refinement would. */
   PetscCall(HycoSolverSetRefine(m->solver, PETSC_FALSE));
   PetscCall(PetscMalloc2(m->fe->n_dof, &g->path->held, m->fe->n_dof, &g->path->u));
   PetscCall(CreateLinear(m));
@@ -270,6 +272,7 @@ PetscErrorCode HycoGalerkinPathDestroy(HycoGalerkinPath *path)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* held = 0: at the path's begin no support has moved. */
 PetscErrorCode HycoGalerkinPathSolve(HycoROM m, const PetscReal mu[])
 {
   HycoGalerkinPath q = ((HycoGalerkin)m->work)->path;

@@ -36,6 +36,7 @@ PetscErrorCode HycoLoadsDestroy(HycoLoads *loads)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* None, or too many parameters of this kind: g->loads stays NULL, and each load is solved. */
 PetscErrorCode HycoLoadsCreate(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -174,6 +175,7 @@ static PetscErrorCode Renew(HycoROM m, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A solution set for another mu is taken back first, also where the loads turn out not to be affine. */
 PetscErrorCode HycoLoadsSetFree(HycoROM m, const PetscReal mu[])
 {
   HycoGalerkin g = (HycoGalerkin)m->work;

@@ -4,6 +4,7 @@
 */
 #include <hycogalerkin.h>
 
+/* Not asked if the caller wants displacements only (-hyco_reconstruct false). */
 PetscErrorCode HycoGalerkinCheckContactBasis(HycoROM m)
 {
   HycoPrediction *p = &m->prediction;

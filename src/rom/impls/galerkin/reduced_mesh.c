@@ -64,6 +64,8 @@ static PetscErrorCode SelectPairs(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The submesh has the first n nodes, so that unknowns have the same numbers in both: V, fe_dof and sets serve for
+   both. */
 PetscErrorCode HycoGalerkinCreateOwn(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -100,6 +102,7 @@ static PetscErrorCode CreateUnknowns(HycoFE fe, IS nodes, IS *unknowns)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Once: which components are fixed does not depend on parameters, but is known at some only. */
 PetscErrorCode HycoGalerkinCreateSets(HycoROM m)
 {
   HycoIndexSets *s = &((HycoGalerkin)m->work)->sets;
@@ -151,6 +154,7 @@ static PetscErrorCode CreateContactMatrix(HycoROM m, Mat *B)
   PetscCall(PetscCalloc1(m->model->pairs.n, &entries));
   for (PetscInt k = 0; k < m->m; k++) entries[m->contact[k]] = width;
   PetscCall(MatCreateSeqAIJ(PETSC_COMM_SELF, m->model->pairs.n, m->fe->n_dof, 0, entries, B));
+  /* Mortars may meet more masters than at first. */
   PetscCall(MatSetOption(*B, MAT_NEW_NONZERO_ALLOCATION_ERR, PETSC_FALSE));
   PetscCall(PetscFree(entries));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -195,6 +199,7 @@ PetscErrorCode HycoGalerkinDestroyOwn(HycoGalerkin g)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rows are packed in place, from the front: n never overtakes the entry that is read. */
 PetscErrorCode HycoGalerkinOwnRows(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;

@@ -107,6 +107,7 @@ static PetscErrorCode CreateModes(HycoROM m, HycoReduced r)
 
   PetscFunctionBegin;
   PetscCall(CreateRowMajor(m->fe->n_dof, m->model->l, m->model->V, &r->V));
+  /* Full-order unknowns are represented by E alone. */
   PetscCall(MatZeroRows(r->V, m->model->n_fe, m->model->fe_dof, 0, NULL, NULL));
   PetscCall(ISGetLocalSize(g->sets.is_A, &n_A));
   for (PetscInt i = 0; i < m->fe->n_dof; i++) n_A += m->fe->fixed[i];
@@ -159,6 +160,7 @@ static PetscErrorCode CreateP(HycoROM m, IS unknowns, PetscBool with_G, Mat *P)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The vectors u and gamma get arrays of the caller by VecPlaceArray(): no copies in each residual. */
 PetscErrorCode HycoReducedPrepare(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -257,6 +259,7 @@ static PetscErrorCode Multiply(HycoROM m, MatReuse reuse, Rows *s)
   if (s->tested) {
     PetscCall(MatCreateSubMatrix(g->K, s->tested, r->all, reuse, &s->K_m));
     PetscCall(MatMatMult(s->K_m, r->V, reuse, PETSC_DETERMINE, &s->KV));
+    /* An inner dimension of 0 would leave M stale in some releases of PETSc: `tested` is NULL then. */
     PetscCall(MatTransposeMatMult(s->V_m, s->KV, reuse, PETSC_DETERMINE, &s->M));
   }
   if (!s->n_full) PetscFunctionReturn(PETSC_SUCCESS);
@@ -414,6 +417,7 @@ static PetscErrorCode PutAll(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The first call makes all matrices and products, later ones reuse their patterns: K's must not change. */
 PetscErrorCode HycoReducedFillStiffness(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -561,6 +565,7 @@ PetscErrorCode HycoReducedFillContact(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rows of fixed unknowns are zero in V_A: F may have reactions there. */
 PetscErrorCode HycoReducedTest(HycoROM m, const PetscScalar F[], Vec Fr)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;

@@ -4,6 +4,7 @@
 #include <hycoromtypes.h>
 #include <petscviewer.h>
 
+/* Into the model's data: the solver of (41) is the user's choice, not a part of the file. */
 static PetscErrorCode SetFromOptions(HycoROM m)
 {
   HycoHybridModel h = (HycoHybridModel)m->model->data;
@@ -82,6 +83,7 @@ static PetscErrorCode Destroy(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* .reconstruct makes it a type whose forces outside A_lambda follow from (41). */
 PetscErrorCode HycoROMCreate_Hybrid(HycoROM m)
 {
   static const HycoROMTraits traits = {.title = "hybrid hyper-reduced",

@@ -109,8 +109,10 @@ static PetscErrorCode SolveWrittenOut(HycoROM m)
         b[row] = m->Lambda[r->contact[k]];
         a[row++] = s[k];
       }
+      /* [B U - D]- times the combined force: its right-hand side is 0. */
       if (r->open[k] < 0) a[row++] = r->open[k] * s[k];
     }
+    /* The small weight on each coefficient, a row each. */
     a[row + j] = SMALL * r->scale;
   }
   PetscCall(Solve(h->reconstruct_solver, rows, n, A, b, r->c));
@@ -145,6 +147,7 @@ PetscErrorCode HycoHybridReconstruct(HycoROM m)
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < m->m; k++) force += m->Lambda[m->contact[k]];
+  /* Nothing is outside, nothing to combine, or no force in the RID that says how much. */
   if (m->m == N || !h->n_dual || !m->m || force == 0) PetscFunctionReturn(PETSC_SUCCESS);
   if (!((HycoHybridWork)m->work)->reconstruction) PetscCall(SetUp(m));
   PetscCall(HycoROMComplete(m));
@@ -156,6 +159,8 @@ PetscErrorCode HycoHybridReconstruct(HycoROM m)
     r->d[i] = (m->model->in_rid[k] ? 1 : 0) + (r->open[i] < 0 ? r->open[i] * r->open[i] : 0);
     r->h[i] = m->model->in_rid[k] ? m->Lambda[k] : 0;
   }
+  /* By the normal equations with changing weights: no matrix of all rows is formed. It may stop early, then the
+     explicit problem decides. */
   if (h->reconstruct_solver != SOLVER_TAO && r->scale > 0)
     PetscCall(HycoWeightedNNLS(r->weighted, r->d, r->h, RTOL, r->c, &solved));
   if (!solved) PetscCall(SolveWrittenOut(m));

@@ -72,6 +72,7 @@ static PetscErrorCode FillContact(HycoROM m)
   }
   DropRoundoff(m, largest, b);
   for (PetscInt j = 0; j < l; j++) {
+    /* The transpose after round-off was dropped: both must have the same zeros. */
     for (PetscInt i = 0; i < n; i++) bt[i * l + j] = b[j * n + i];
   }
   PetscCall(MatDenseRestoreArray(g->Btr, &bt));
@@ -121,7 +122,7 @@ static PetscErrorCode FillGap(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Lambda = V_lambda Lambda_r */
+/* Lambda = V_lambda Lambda_r. Adds, since HycoGalerkinUnpack() has cleared Lambda. */
 static PetscErrorCode Expand(HycoROM m)
 {
   HycoProjectionModel p = (HycoProjectionModel)m->model->data;
@@ -164,6 +165,7 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* n_L first: HycoGalerkinSetUp() allocates by it. */
 PetscErrorCode HycoProjectionSetUp(HycoROM m)
 {
   PetscFunctionBegin;
@@ -193,6 +195,7 @@ PetscErrorCode HycoProjectionMove(HycoROM m, HycoH5 h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Files of cubature models may have fe; a projection-based one has more forces than modes with it. */
 static PetscErrorCode Load(HycoROM m, HycoH5 h)
 {
   PetscFunctionBegin;
@@ -212,6 +215,7 @@ PetscErrorCode HycoProjectionDestroy(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Shared with the type cubature, which sets it up with its own traits. */
 void HycoProjectionInit(HycoProjectionModel p)
 {
   p->galerkin.contact = FillContact;

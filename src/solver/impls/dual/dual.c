@@ -83,6 +83,7 @@ static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singul
   PetscCall(HycoKernelSize(y->K, &p));
   if (!d->S || d->m != y->m || d->p != p) {
     PetscCall(Resize(d, y->m, p));
+    /* S has to be computed into the new array, thus K factored again, even if it is unchanged. */
     s->stiffness.of.K = 0;
   }
   PetscCall(HycoStiffnessFactor(s, y->Bt, y->B, d->S, singular));
@@ -166,6 +167,7 @@ static PetscErrorCode SolveForces(HycoSolver s, Dual *d, Vec start, PetscBool *s
   PetscCall(HycoSolverNameMethod(s, name));
   /* A cold start: no contact closed, or all for floating bodies, which are otherwise singular. */
   for (PetscInt i = 0; i < d->m && (!s->warm || !d->started); i++) d->active[i] = (PetscBool)(d->p > 0);
+  /* At each attempt: a fallback uses another method with the same object. */
   PetscCall(HycoTaoSetType(d->tao, s->now.type, s->max_its));
   if (s->system->blocks) PetscCall(HycoBlocksGather(HycoComm(s), s->system->blocks, &blocks));
   if (blocks)
@@ -178,6 +180,8 @@ static PetscErrorCode SolveForces(HycoSolver s, Dual *d, Vec start, PetscBool *s
   for (PetscInt i = 0; i < d->m && !blocks; i++) {
     PetscReal *L = d->L + d->p + i;
 
+    /* Active forces of floating bodies may be 0 at a degenerate vertex, so that the set is kept as it is; without
+       them it follows from the forces. */
     *L = d->p && !d->active[i] ? 0 : PetscMax(*L, 0);
     if (!d->p) d->active[i] = (PetscBool)(*L > 0);
   }
@@ -208,6 +212,7 @@ static PetscErrorCode AddForces(HycoSolver s, Vec x, Vec L)
   PetscReal most;
 
   PetscFunctionBegin;
+  /* Saves the solve if no contact is closed, as at the first steps of a path. */
   PetscCall(VecNorm(L, NORM_INFINITY, &most));
   if (most > 0) {
     PetscCall(MatMult(y->Bt, L, y->work_x[0]));
@@ -257,6 +262,7 @@ static PetscErrorCode Shift(HycoSolver s, const PetscReal dL[], Vec x, Vec L)
   PetscCall(PetscArraycpy(c, dL + lo, hi - lo));
   PetscCall(VecRestoreArray(change, &c));
   PetscCall(MatMult(s->system->Bt, change, force));
+  /* x follows the forces: dx = -K^-1 Bt dL. */
   PetscCall(HycoStiffnessSolve(s, force, move));
   PetscCall(VecAXPY(x, -1, move));
   PetscCall(VecAXPY(L, 1, change));
@@ -284,6 +290,7 @@ static PetscErrorCode CloseGaps(HycoSolver s, const Dual *d, Vec x, Vec L)
   PetscCall(GatherVec(HycoComm(s), gap, d->g));
   PetscCall(VecDestroy(&gap));
   PetscCall(PetscMalloc2(d->m, &a, d->m, &change));
+  /* Of the closed contacts only: the others have no force to correct. */
   for (PetscInt i = 0; i < d->m; i++) {
     if (d->L[i] <= 0) continue;
     a[k++] = i;
@@ -312,6 +319,7 @@ static PetscErrorCode Refine(HycoSolver s, HycoSolverForm form, PetscBool *bette
   PetscFunctionBegin;
   *better = PETSC_FALSE;
   if (!f->lu || !f->of.K || f->refined) PetscFunctionReturn(PETSC_SUCCESS);
+  /* For the comparison, and as the result where refinement changes nothing. */
   HycoDuplicate(entries, d->S, &before);
   f->refined = PETSC_TRUE;
   HycoLogged(HYCO_EVENT_FACTOR, HycoStiffnessCondense(s, s->system->Bt, s->system->B, d->S));
@@ -367,6 +375,8 @@ static PetscErrorCode Destroy(HycoSolverForm form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The dense problem is the same on every rank and solved by each alone: the communicator of its Tao object is that
+   of one process. */
 PetscErrorCode HycoSolverFormCreate_Dual(HycoSolver s, HycoSolverForm form)
 {
   Dual *d;
@@ -386,6 +396,7 @@ PetscErrorCode HycoSolverFormCreate_Dual(HycoSolver s, HycoSolverForm form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Valid until the next factorisation. */
 void HycoSolverGetCondensed(HycoSolver s, PetscInt *m, PetscInt *p, const PetscReal *S[])
 {
   const Dual *d = (const Dual *)HycoSolverFindForm(s, "dual")->data;

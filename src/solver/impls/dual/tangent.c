@@ -11,6 +11,7 @@ struct _n_HycoSolverTangent {
   PetscReal *q, *z; /* p + m */
 };
 
+/* Also of a partly created one. The solver and its factor are borrowed. */
 PetscErrorCode HycoSolverTangentDestroy(HycoSolverTangent *tangent)
 {
   HycoSolverTangent t = *tangent;
@@ -59,6 +60,7 @@ static PetscErrorCode Close(HycoSolverTangent t, Vec x, Vec L)
   PetscCall(PetscMalloc4(t->m, &force, t->m, &gap, t->m, &flexibility, t->m, &state));
   PetscCall(HycoSystemWork(y));
   PetscCall(MatMult(y->B, x, y->work_L));
+  /* The size of the terms of D - B x, against which open and closed are told apart. */
   PetscCall(VecNorm(y->work_L, NORM_INFINITY, &sizes[0]));
   PetscCall(VecNorm(y->D, NORM_INFINITY, &sizes[1]));
   PetscCall(VecAYPX(y->work_L, -1, y->D));
@@ -74,6 +76,8 @@ static PetscErrorCode Close(HycoSolverTangent t, Vec x, Vec L)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* HycoSolverFactor() factors only if K and B have changed since the solve; the primal form has no factor of K alone,
+   and gets one here. */
 static PetscErrorCode SetUp(HycoSolverTangent t, Vec x, Vec L)
 {
   HycoSolver s = t->s;
@@ -97,6 +101,7 @@ static PetscErrorCode SetUp(HycoSolverTangent t, Vec x, Vec L)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* x and L must be the solution of the present system: the states of the contacts are read from its gaps and forces. */
 PetscErrorCode HycoSolverTangentCreate(HycoSolver s, Vec x, Vec L, HycoSolverTangent *tangent)
 {
   PetscErrorCode ierr;
@@ -111,6 +116,9 @@ PetscErrorCode HycoSolverTangentCreate(HycoSolver s, Vec x, Vec L, HycoSolverTan
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Condensation of (r, g) to the contacts, the system of the closed ones, and expansion: the steps of the dual form,
+   with the active set given. MUMPS keeps the reduced right-hand side between the two, so that no other solve may
+   come between. */
 PetscErrorCode HycoSolverTangentSolve(HycoSolverTangent t, Vec r, Vec g, int sign, Vec dx, Vec dL, PetscBool *kink)
 {
   HycoDirect direct = t->s->stiffness.direct;
@@ -119,6 +127,7 @@ PetscErrorCode HycoSolverTangentSolve(HycoSolverTangent t, Vec r, Vec g, int sig
 
   PetscFunctionBegin;
   *kink = PETSC_FALSE;
+  /* Without contacts, x' = K^-1 r. */
   if (!t->tangent) {
     PetscCall(HycoStiffnessSolve(t->s, r, dx));
     PetscFunctionReturn(PETSC_SUCCESS);

@@ -22,6 +22,7 @@ static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* *singular stays false: a singular block of G appears only once a set is solved. */
 static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singular)
 {
   Flexibility *f = (Flexibility *)form->data;
@@ -64,10 +65,12 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   (void)x;
   PetscCall(SetUp(s, form, &singular));
   PetscCall(HycoSolverNameMethod(s, "condensed"));
+  /* A given set counts for the first method alone: a fallback starts from none, as the set may be what has failed. */
   if (s->start_set && !s->falling_back)
     PetscCall(PetscArraycpy(f->active, s->start_set, f->m));
   else if (!s->start_set && (!s->warm || !f->started))
     PetscCall(PetscArrayzero(f->active, f->m));
+  /* Kept over the solves with one G: it belongs to the form, not to the problem. */
   lcp.factor = f->factor;
   PetscCall(MatDenseGetArrayRead(y->G, &lcp.M));
   PetscCall(VecGetArrayRead(y->D, &lcp.q));
@@ -95,6 +98,7 @@ static PetscErrorCode Destroy(HycoSolverForm form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Its Tao object is of one process, as G is. */
 PetscErrorCode HycoSolverFormCreate_Flexibility(HycoSolver s, HycoSolverForm form)
 {
   Flexibility *f;

@@ -16,6 +16,7 @@ static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The factor is that of the solver, and shared with the other forms. */
 static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singular)
 {
   PetscFunctionBegin;
@@ -33,6 +34,7 @@ static PetscErrorCode SolveIterative(HycoSolver s, Linear *l, Vec x, PetscBool *
   PetscReal size;
 
   PetscFunctionBegin;
+  /* A changed K gets a new hierarchy: its aggregates may depend on the values. */
   PetscCall(HycoOperatorStateUpdate(&l->of, s->system->K, NULL, &same));
   if (!same) {
     PetscCall(KSPDestroy(&l->ksp));
@@ -41,6 +43,7 @@ static PetscErrorCode SolveIterative(HycoSolver s, Linear *l, Vec x, PetscBool *
   if (s->target > 0) {
     PetscCall(VecNorm(s->system->F, NORM_2, &size));
     PetscCall(KSPSetNormType(l->ksp, KSP_NORM_UNPRECONDITIONED));
+    /* Absolute, since the target is; but never above what the final check of the residual demands. */
     PetscCall(KSPSetTolerances(l->ksp, 0, PetscMin(s->target, 0.3 * s->rtol * size), PETSC_DEFAULT, PETSC_DEFAULT));
   } else
     PetscCall(VecSet(x, 0));

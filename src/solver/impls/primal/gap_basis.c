@@ -33,6 +33,7 @@ PetscErrorCode HycoGapPivots(HycoSystem y, PetscInt pivot[], PetscBool *all)
   }
   PetscCall(VecRestoreArray(count, &c));
   PetscCall(MatGetOwnershipRange(y->B, &lo, &hi));
+  /* The columns of this rank's rows of B: counted, then listed. Their counts may be on other ranks. */
   for (PetscInt pass = 0; pass < 2; pass++) {
     if (pass) PetscCall(PetscMalloc1(n_need, &need));
     n_need = 0;
@@ -63,6 +64,8 @@ PetscErrorCode HycoGapPivots(HycoSystem y, PetscInt pivot[], PetscBool *all)
     PetscCall(MatGetRow(y->B, r, &n, &cols, &vals));
     pivot[r - lo] = n ? HYCO_NO_PIVOT : HYCO_IDLE;
     for (PetscInt k = 0; k < n; k++, at++) {
+      /* The margin makes the choice among equal entries the first one on any number of ranks. The largest entry
+         keeps 1 / B_ip, and thus the condition of T, small. */
       if (shared[at] < 1.5 && PetscAbsScalar(vals[k]) > best * (1 + 1e-12)) {
         best = PetscAbsScalar(vals[k]);
         pivot[r - lo] = cols[k];
@@ -170,6 +173,7 @@ static PetscErrorCode BuildT(HycoSystem y, Gap *s)
     Mat A = pass ? s->T : shape;
 
     if (pass) PetscCall(MatPreallocatorPreallocate(shape, PETSC_TRUE, A));
+    /* The flush orders the two: a pivot's row, which another rank may set, must overwrite this 1. */
     for (PetscInt r = first; r < last; r++) PetscCall(MatSetValue(A, r, r, 1, INSERT_VALUES));
     PetscCall(MatAssemblyBegin(A, MAT_FLUSH_ASSEMBLY));
     PetscCall(MatAssemblyEnd(A, MAT_FLUSH_ASSEMBLY));
@@ -248,6 +252,7 @@ static PetscErrorCode NearKernel(HycoSystem s, const Gap *g)
   PetscCall(VecDuplicateVecs(x[0], n, &y));
   for (PetscInt k = 0; k < n; k++) {
     PetscCall(ToGaps(s, g, x[k], y[k]));
+    /* Modified Gram-Schmidt; the modes are few and nearly independent. */
     for (PetscInt j = 0; j < k; j++) {
       PetscScalar dot;
 
@@ -303,6 +308,7 @@ PetscErrorCode HycoGapSetUp(HycoSolver s, Gap *g)
   PetscCall(PetscFree(g->pivot));
   PetscCall(PetscMalloc1(hi - lo, &g->pivot));
   PetscCall(HycoGapPivots(y, g->pivot, &possible));
+  /* Else the next call would find the operators unchanged, and use the old T. */
   if (!possible) g->transformed.K = 0;
   PetscCheck(possible, HycoComm(s), PETSC_ERR_USER,
              "the primal form needs an unknown of its own for each contact; use -hyco_solver_form dual");
@@ -318,9 +324,11 @@ PetscErrorCode HycoGapSetUp(HycoSolver s, Gap *g)
   }
   PetscCall(DropIdle(g, hi - lo));
   PetscCall(MatSetOption(g->Kg, MAT_SYMMETRIC, PETSC_TRUE));
+  /* Kw is changed for each set; Kg stays for the residuals, which are the forces. */
   PetscCall(MatDuplicate(g->Kg, MAT_COPY_VALUES, &g->Kw));
   PetscCall(HycoGapWork(g->Kw));
   PetscCall(RenewSolver(s, g));
+  /* A rank's number may be the same while another's has changed: all drop their sets together. */
   before = (PetscInt)(!g->active || g->m != y->m || before != g->n);
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &before, 1, MPIU_INT, MPI_MAX, HycoComm(s)));
   if (before) {

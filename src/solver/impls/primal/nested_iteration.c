@@ -52,6 +52,7 @@ static PetscErrorCode RowsGet(Mat K, Rows *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* In the reverse order of RowsGet(); PETSc counts the borrowed arrays. */
 static PetscErrorCode RowsRestore(Rows *r)
 {
   PetscBool done;
@@ -76,6 +77,7 @@ static PetscErrorCode FindSigns(const Rows *r, const PetscReal bound[], PetscRea
     for (PetscInt s = 0; s < r->n; s++) {
       PetscInt head = 0, tail = 0;
 
+      /* Signs of unknowns with a bound are fixed to 1, because y <= bound would become a lower bound. */
       if (sign[s] != 0 || (pass == 0 && bound[s] >= PETSC_INFINITY)) continue;
       sign[s] = 1;
       queue[tail++] = s;
@@ -202,6 +204,7 @@ static PetscErrorCode Interpolate(const Rows *r, const PetscInt coarse_of[], Pet
       col[n] = coarse_of[j];
       weight[n++] = r->value[k];
     }
+    /* n > 0 means taken < 0; rows without coarse neighbours stay empty, and interpolate 0. */
     for (PetscInt k = 0; k < n; k++) weight[k] *= -all / taken / diagonal;
     PetscCall(MatSetValues(*P, 1, &i, n, col, weight, INSERT_VALUES));
   }
@@ -224,6 +227,7 @@ static PetscErrorCode Coarsen(Level *fine, Level *coarse, PetscBool *made)
   PetscCall(RowsGet(fine->K, &r));
   PetscCall(PetscMalloc1(fine->n, &fine->coarse_of));
   PetscCall(Split(&r, fine->coarse_of, &coarse->n));
+  /* A level that hardly shrinks would cost as much as the finer one. */
   *made = (PetscBool)(coarse->n > 0 && coarse->n <= 0.8 * fine->n);
   if (*made) PetscCall(Interpolate(&r, fine->coarse_of, coarse->n, &fine->P));
   PetscCall(RowsRestore(&r));
@@ -359,6 +363,7 @@ static PetscErrorCode Prolong(Level *fine, const Level *coarse, Vec y)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Also of a level that Coarsen() has begun and given up. */
 static PetscErrorCode LevelDestroy(Level *l)
 {
   PetscFunctionBegin;
@@ -455,6 +460,7 @@ static PetscErrorCode GatherMatrix(MPI_Comm comm, Mat K, Mat *whole)
   PetscCall(MatGetSize(K, &n, NULL));
   PetscCall(ISCreateStride(PETSC_COMM_SELF, rank ? 0 : n, 0, 1, &all));
   PetscCall(MatCreateSubMatrices(K, 1, &all, &all, MAT_INITIAL_MATRIX, &part));
+  /* MatDestroySubMatrices() gives up the other reference. */
   PetscCall(PetscObjectReference((PetscObject)part[0]));
   *whole = part[0];
   PetscCall(MatDestroySubMatrices(1, &part));

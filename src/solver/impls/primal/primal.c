@@ -38,8 +38,8 @@ typedef struct {
   PetscReal *bound, *value, *force, *diagonal, *at_d;
   PetscReal noise; /* error of iterative solves, as a share of the largest force and gap */
   PetscInt *at;
-  Vec x, L; /* the caller's */
-  Vec y, f, rhs, residual, work;
+  Vec x, L;                          /* the caller's */
+  Vec y, hi, f, rhs, residual, work; /* y <= hi: D at the pivots, infinite elsewhere */
   VecScatter scatter;
   PetscBool cold;
 } Primal;
@@ -52,6 +52,17 @@ static PetscErrorCode Evaluate(const Primal *p)
   PetscCall(VecAYPX(p->residual, -1, p->f));
   PetscCall(AtPivots(p->y, p->scatter, p->work, p->n, p->value));
   PetscCall(AtPivots(p->residual, p->scatter, p->work, p->n, p->force));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The bounds of the contacts' unknowns are those of the Tao. */
+static PetscErrorCode Bounds(void *ctx, Vec lo, Vec hi)
+{
+  const Primal *p = (const Primal *)ctx;
+
+  PetscFunctionBegin;
+  (void)lo;
+  PetscCall(AtPivots(hi, p->scatter, p->work, p->n, p->bound));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -101,23 +112,17 @@ static PetscErrorCode StartFromCoarse(const Primal *p, PetscBool active[], Petsc
 {
   HycoSolver s = p->s;
   const Gap *g = p->gap;
-  Vec bound, set;
+  Vec set;
 
   PetscFunctionBegin;
   *made = PETSC_FALSE;
   if (!s->multilevel || 4 * s->system->m <= s->system->n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecDuplicate(p->f, &bound));
   PetscCall(VecDuplicate(p->f, &set));
-  PetscCall(VecSet(bound, PETSC_INFINITY));
-  for (PetscInt k = 0; k < p->n; k++) PetscCall(VecSetValue(bound, g->pivot[k], p->bound[k], INSERT_VALUES));
-  PetscCall(VecAssemblyBegin(bound));
-  PetscCall(VecAssemblyEnd(bound));
-  PetscCall(HycoMultilevelStart(g->Kg, p->f, bound, set, made));
+  PetscCall(HycoMultilevelStart(g->Kg, p->f, p->hi, set, made));
   if (*made) {
     PetscCall(AtPivots(set, p->scatter, p->work, p->n, p->value));
     for (PetscInt k = 0; k < p->n; k++) active[k] = (PetscBool)(p->value[k] > 0.5);
   }
-  PetscCall(VecDestroy(&bound));
   PetscCall(VecDestroy(&set));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -206,6 +211,7 @@ static PetscErrorCode ActiveSet(Primal *p, Gap *g, PetscBool *solved)
                        .max_its = s->max_its ? s->max_its : 100 + s->system->m,
                        .one_by_one = PETSC_TRUE,
                        .ctx = p,
+                       .bounds = Bounds,
                        .solve = SolveOnSet,
                        .violations = Violations,
                        .restart = Restart,
@@ -220,7 +226,7 @@ static PetscErrorCode ActiveSet(Primal *p, Gap *g, PetscBool *solved)
   p->cold = (PetscBool)(!s->warm || !g->started);
   if (p->cold) PetscCall(StartCold(p, g->active));
   PetscCall(HycoTaoSetType(g->tao, s->now.type, set.max_its));
-  PetscCall(HycoTaoSolveSet(g->tao, &set, g->active, p->y, &s->its, &status));
+  PetscCall(HycoTaoSolveSet(g->tao, &set, g->active, p->hi, p->y, &s->its, &status));
   if (status == HYCO_LCP_SINGULAR) s->reason = HYCO_DIVERGED_SINGULAR;
   g->started = *solved = (PetscBool)(status == HYCO_LCP_SOLVED);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -231,17 +237,13 @@ static PetscErrorCode ActiveSet(Primal *p, Gap *g, PetscBool *solved)
 static PetscErrorCode BoundQP(Primal *p, Gap *g, PetscBool *solved)
 {
   HycoSolver s = p->s;
-  Vec lo, hi;
+  Vec lo;
 
   PetscFunctionBegin;
   PetscCall(VecDuplicate(p->y, &lo));
-  PetscCall(VecDuplicate(p->y, &hi));
   PetscCall(VecSet(lo, PETSC_NINFINITY));
-  PetscCall(VecSet(hi, PETSC_INFINITY));
-  for (PetscInt k = 0; k < p->n; k++) PetscCall(VecSetValue(hi, g->pivot[k], p->bound[k], INSERT_VALUES));
-  PetscCall(VecAssemblyBegin(hi));
-  PetscCall(VecAssemblyEnd(hi));
-  PetscCall(VecPointwiseMin(p->y, p->y, hi));
+  /* The start must be feasible: y is 0, and bounds of drawn overlaps are negative. */
+  PetscCall(VecPointwiseMin(p->y, p->y, p->hi));
   PetscCall(VecCopy(p->f, p->rhs));
   if (g->H)
     PetscCall(MatCopy(g->Kg, g->H, SAME_NONZERO_PATTERN));
@@ -249,7 +251,7 @@ static PetscErrorCode BoundQP(Primal *p, Gap *g, PetscBool *solved)
     PetscCall(MatDuplicate(g->Kg, MAT_COPY_VALUES, &g->H));
   PetscCall(MatSetOption(g->H, MAT_SYMMETRIC, PETSC_TRUE));
   PetscCall(HycoTaoSetType(g->tao, s->now.type, s->max_its));
-  PetscCall(HycoTaoSolve(g->tao, g->H, p->rhs, lo, hi, p->y, &s->its, solved));
+  PetscCall(HycoTaoSolve(g->tao, g->H, p->rhs, lo, p->hi, p->y, &s->its, solved));
   PetscCall(Evaluate(p));
   for (PetscInt k = 0; k < p->n; k++) { /* scaling and its inverse may have moved a value from its bound */
     const PetscReal ulps = 8 * PETSC_MACHINE_EPSILON * PetscAbsReal(p->bound[k]);
@@ -257,7 +259,6 @@ static PetscErrorCode BoundQP(Primal *p, Gap *g, PetscBool *solved)
     g->active[k] = (PetscBool)(p->value[k] >= p->bound[k] - ulps);
   }
   PetscCall(VecDestroy(&lo));
-  PetscCall(VecDestroy(&hi));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -275,7 +276,14 @@ static PetscErrorCode PrimalCreate(HycoSolver s, const Gap *g, Vec x, Primal *p)
   PetscCall(PetscCalloc6(p->n, &p->bound, p->n, &p->value, p->n, &p->force, p->n, &p->diagonal, p->n, &p->at_d, p->n,
                          &p->at));
   PetscCall(VecGetArrayRead(y->D, &d));
-  for (PetscInt k = 0; k < p->n; k++) p->bound[k] = d[g->contact[k]];
+  PetscCall(VecDuplicate(x, &p->hi));
+  PetscCall(VecSet(p->hi, PETSC_INFINITY));
+  for (PetscInt k = 0; k < p->n; k++) {
+    p->bound[k] = d[g->contact[k]];
+    PetscCall(VecSetValue(p->hi, g->pivot[k], p->bound[k], INSERT_VALUES));
+  }
+  PetscCall(VecAssemblyBegin(p->hi));
+  PetscCall(VecAssemblyEnd(p->hi));
   PetscCall(VecRestoreArrayRead(y->D, &d));
   PetscCall(VecDuplicate(x, &p->y));
   PetscCall(VecSet(p->y, 0));
@@ -292,11 +300,13 @@ static PetscErrorCode PrimalCreate(HycoSolver s, const Gap *g, Vec x, Primal *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The form's matrices and its solver stay for the next solve. */
 static PetscErrorCode PrimalDestroy(Primal *p)
 {
   PetscFunctionBegin;
   PetscCall(PetscFree6(p->bound, p->value, p->force, p->diagonal, p->at_d, p->at));
   PetscCall(VecDestroy(&p->y));
+  PetscCall(VecDestroy(&p->hi));
   PetscCall(VecDestroy(&p->f));
   PetscCall(VecDestroy(&p->rhs));
   PetscCall(VecDestroy(&p->residual));
@@ -381,6 +391,7 @@ static PetscErrorCode Destroy(HycoSolverForm form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Of this form, yet a field of the solver: HycoSolverSetMultilevel() sets the same one. */
 static PetscErrorCode SetFromOptions(HycoSolver s, HycoSolverForm form, HycoOptionItems PetscOptionsObject)
 {
   PetscFunctionBegin;
@@ -391,6 +402,7 @@ static PetscErrorCode SetFromOptions(HycoSolver s, HycoSolverForm form, HycoOpti
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Only forces >= 0 (no cones): a bound is on one unknown each. */
 PetscErrorCode HycoSolverFormCreate_Primal(HycoSolver s, HycoSolverForm form)
 {
   Gap *g;

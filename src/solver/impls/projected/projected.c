@@ -37,7 +37,7 @@ typedef struct {
   PetscInt *at;             /* work */
   PetscBool *solved;        /* the set of the last solve */
   PetscInt n_sets;          /* number of sets so far */
-  Vec x, d, l, r, gap;      /* d, l: for the active rows */
+  Vec x, d, l, r, gap, L;   /* d, l: for the active rows; gap: B x, the unknowns of the Tao, whose bounds are D */
 } Run;
 
 /* The node of each contact: its slave if B has one, else that of an entry that no other contact has. `possible` is
@@ -57,6 +57,7 @@ static PetscErrorCode FindNodes(HycoSystem y, Projected *f)
   PetscCall(PetscMalloc1(hi - lo, &f->node));
   PetscCall(PetscMalloc1(hi - lo, &f->contact));
   PetscCall(PetscMalloc1(hi - lo, &pivot));
+  /* The pivots are not used as coordinates here: their existence proves that any closed rows are independent. */
   PetscCall(HycoGapPivots(y, pivot, &f->possible));
   PetscCall(PetscObjectQuery((PetscObject)y->B, HYCO_SLAVES, (PetscObject *)&slave));
   if (slave) PetscCall(VecGetArrayRead(slave, &s));
@@ -78,6 +79,20 @@ static PetscErrorCode FindNodes(HycoSystem y, Projected *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The bounds of B x are those of the Tao. */
+static PetscErrorCode Bounds(void *ctx, Vec lo, Vec hi)
+{
+  const Run *p = (const Run *)ctx;
+  const PetscScalar *d;
+
+  PetscFunctionBegin;
+  (void)lo;
+  PetscCall(VecGetArrayRead(hi, &d));
+  for (PetscInt k = 0; k < p->form->n; k++) p->bound[k] = d[p->form->contact[k]];
+  PetscCall(VecRestoreArrayRead(hi, &d));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Sets the active rows of B and their nodes as constraints. Only if the set differs from that of the last solve on
    any rank. */
 static PetscErrorCode SetConstraints(Run *p, const PetscBool active[], PetscBool *singular)
@@ -91,6 +106,7 @@ static PetscErrorCode SetConstraints(Run *p, const PetscBool active[], PetscBool
 
   PetscFunctionBegin;
   *singular = PETSC_FALSE;
+  /* Coarsening the constraints costs several products, and a sharpened solve of the same set needs none of it. */
   for (PetscInt k = 0; k < f->n; k++) differs = differs || p->solved[k] != active[k];
   PetscCallMPI(MPI_Allreduce(&differs, &any, 1, MPI_INT, MPI_MAX, HycoComm(p->s)));
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
@@ -104,6 +120,7 @@ static PetscErrorCode SetConstraints(Run *p, const PetscBool active[], PetscBool
     p->at[n++] = f->node[k];
   }
   PetscCall(ISCreateGeneral(HycoComm(B), n, row, PETSC_OWN_POINTER, &is));
+  /* On each rank the rows of its own contacts, in their order, like d and l. */
   PetscCall(MatCreateSubMatrix(B, is, NULL, MAT_INITIAL_MATRIX, &rows));
   PetscCall(HycoConstrainedSet(f->constrained, rows, p->at, singular));
   PetscCall(VecDestroy(&p->d));
@@ -187,7 +204,7 @@ static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets L to the forces of the set, without negative ones. p->gap serves as a work vector of the length of L. */
+/* Sets L to the forces of the set, without negative ones. */
 static PetscErrorCode FillForces(const Run *p, PetscBool clean, const PetscBool active[], Vec L)
 {
   PetscScalar *l;
@@ -232,8 +249,8 @@ static PetscErrorCode Settled(void *ctx, PetscBool *more)
     p->accuracy = PetscMax(HYCO_LAST, HYCO_SHARPEN * p->accuracy);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(FillForces(p, PETSC_TRUE, p->solved, p->gap));
-  PetscCall(HycoSystemComputeKKT(s->system, p->x, p->gap, &kkt));
+  PetscCall(FillForces(p, PETSC_TRUE, p->solved, p->L));
+  PetscCall(HycoSystemComputeKKT(s->system, p->x, p->L, &kkt));
   missing = kkt.stationarity / (0.3 * s->rtol);
   if (s->target > 0) missing = PetscMax(missing, s->system->residual / s->target);
   *more = (PetscBool)(missing > 1 && p->accuracy > HYCO_LEAST);
@@ -244,21 +261,16 @@ static PetscErrorCode Settled(void *ctx, PetscBool *more)
 /* Without a target the start is 0, so that equal problems have equal iterations. */
 static PetscErrorCode RunCreate(HycoSolver s, Projected *f, Vec x, Run *p)
 {
-  HycoSystem y = s->system;
-  const PetscScalar *d;
-
   PetscFunctionBegin;
   *p = (Run){.s = s, .form = f, .accuracy = HYCO_FIRST, .size = -1, .x = x};
   PetscCall(PetscCalloc5(f->n, &p->bound, f->n, &p->value, f->n, &p->force, f->n, &p->at, f->n, &p->solved));
-  PetscCall(VecGetArrayRead(y->D, &d));
-  for (PetscInt k = 0; k < f->n; k++) p->bound[k] = d[f->contact[k]];
-  PetscCall(VecRestoreArrayRead(y->D, &d));
   if (!(s->target > 0)) PetscCall(VecSet(x, 0));
   PetscCall(VecDuplicate(x, &p->r));
-  PetscCall(VecDuplicate(y->D, &p->gap));
+  PetscCall(VecDuplicate(s->system->D, &p->gap));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The multigrid and its constraints stay with the form. */
 static PetscErrorCode RunDestroy(Run *p)
 {
   PetscFunctionBegin;
@@ -337,6 +349,7 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
                        .n = f->n,
                        .max_its = s->max_its ? s->max_its : 100 + s->system->m,
                        .one_by_one = PETSC_TRUE,
+                       .bounds = Bounds,
                        .solve = SolveOnSet,
                        .violations = Violations,
                        .settled = Settled,
@@ -350,11 +363,12 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   PetscCall(HycoSolverNameMethod(s, "projected"));
   PetscCall(SetUp(s, form, &singular));
   PetscCall(RunCreate(s, f, x, &p));
+  p.L = L;
   set.ctx = &p;
   PetscCall(VecGetOwnershipRange(s->system->D, &set.first, NULL));
   if (!s->warm || !f->started) PetscCall(PetscArrayzero(f->active, f->n));
   PetscCall(HycoTaoSetType(f->tao, s->now.type, set.max_its));
-  PetscCall(HycoTaoSolveSet(f->tao, &set, f->active, x, &s->its, &status));
+  PetscCall(HycoTaoSolveSet(f->tao, &set, f->active, s->system->D, p.gap, &s->its, &status));
   if (status == HYCO_LCP_SINGULAR) s->reason = HYCO_DIVERGED_SINGULAR;
   f->started = *solved = (PetscBool)(status == HYCO_LCP_SOLVED);
   PetscCall(NameSolves(s, f));
@@ -374,6 +388,7 @@ static PetscErrorCode Destroy(HycoSolverForm form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Only forces >= 0 (no cones), by the active set method. */
 PetscErrorCode HycoSolverFormCreate_Projected(HycoSolver s, HycoSolverForm form)
 {
   Projected *f;

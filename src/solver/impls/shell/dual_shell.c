@@ -52,6 +52,7 @@ static PetscErrorCode MultS(Mat S, Vec v, Vec Sv)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* An estimate is enough: it only scales TAO's unknowns. */
 static PetscErrorCode DiagonalS(Mat S, Vec d)
 {
   Shell *f;
@@ -124,6 +125,7 @@ static PetscErrorCode EstimateDiagonal(Mat S, Shell *f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The factor alone, without Schur variables: S is never formed. */
 static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singular)
 {
   PetscFunctionBegin;
@@ -221,6 +223,7 @@ static PetscErrorCode Destroy(HycoSolverForm form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* L is distributed here, in contrast to the dual form, and so is its Tao object. */
 PetscErrorCode HycoSolverFormCreate_Shell(HycoSolver s, HycoSolverForm form)
 {
   Shell *f;
