@@ -56,7 +56,7 @@ PetscErrorCode HycoMasterSearchCreate(HycoFE fe, HycoContact c, PetscBool nodes,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Only borrowed: fe stays at its nodes as long as the search exists. The tree and the border are made when they are
+/* The nodes are borrowed: fe stays there as long as the search exists. The tree and the border are made when they are
    needed. */
 PetscErrorCode HycoMasterSearchCreateOn(HycoFE fe, PetscInt slave, PetscInt master, PetscBool nodes,
                                         HycoMasterSearch *t)
@@ -83,12 +83,21 @@ PetscErrorCode HycoMasterSearchReady(HycoMasterSearch *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoMasterSearchDestroy(HycoMasterSearch *t)
+/* Drops the tree and the border, for other patches or positions. */
+PetscErrorCode HycoMasterSearchForget(HycoMasterSearch *t)
 {
   PetscFunctionBegin;
   PetscCall(HycoPatchesDestroy(&t->patches));
-  HycoFreeAll(&t->border, &t->at_border, &t->node, &t->normal, &t->outward);
+  HycoFreeAll(&t->border, &t->at_border);
   t->n_border = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMasterSearchDestroy(HycoMasterSearch *t)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoMasterSearchForget(t));
+  HycoFreeAll(&t->node, &t->normal, &t->outward);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -30,6 +30,8 @@ PetscErrorCode HycoMasterSearchCreateOn(HycoFE fe, PetscInt slave, PetscInt mast
 PetscErrorCode HycoMasterSearchDestroy(HycoMasterSearch *search);
 /* Creates the tree of the patches, unless it exists: before the first projection. */
 PetscErrorCode HycoMasterSearchReady(HycoMasterSearch *search);
+/* Frees what was created when it was needed: the tree and the border. */
+PetscErrorCode HycoMasterSearchForget(HycoMasterSearch *search);
 /* The slave node's outward normal; NULL: unknown, because its group is not a surface. */
 const PetscReal *HycoMasterSearchOutward(const HycoMasterSearch *search, PetscInt slave);
 /* The nearest point of the master; n = 0 if its normal does not oppose the slave's, unless any_side. */

@@ -726,25 +726,29 @@ static PetscErrorCode DualPoints(HycoReducer t, const PetscReal G[], PetscInt *l
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The nodes of contact k, by their numbers in the whole mesh. Rank 0. */
-static void AddContactNodes(HycoReducer t, PetscInt k, PetscInt *n, PetscInt nodes[])
+/* The nodes of contact k, by their numbers in the whole mesh. The list grows: a contact of a mortar surface or of
+   quadratic facets may have any number of masters. Rank 0. */
+static PetscErrorCode AddContactNodes(HycoReducer t, PetscInt k, PetscInt *n, PetscInt **nodes)
 {
   HycoFOM f = t->fom;
   const PetscInt *master;
   const PetscReal *weight;
   PetscInt masters;
 
+  PetscFunctionBegin;
   HycoPairsMasters(&f->pairs, k, &masters, &master, &weight);
+  PetscCall(PetscRealloc((size_t)(*n + masters + 1) * sizeof(**nodes), nodes));
   for (PetscInt j = -1; j < masters; j++) {
     const PetscInt node = j < 0 ? HycoPairsSlave(&f->pairs, k) : master[j];
 
-    nodes[(*n)++] = f->surface->node_whole ? f->surface->node_whole[node] : node;
+    (*nodes)[(*n)++] = f->surface->node_whole ? f->surface->node_whole[node] : node;
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The nodes of the contacts that DEIM selects from the dual snapshots, on every rank. Collective. Every rank goes
    through the loop, since MoveWherePresses() is collective; contacts are known on rank 0 alone. */
-static PetscErrorCode DualSeeds(HycoReducer t, PetscInt *n_nodes, PetscInt nodes[])
+static PetscErrorCode DualSeeds(HycoReducer t, PetscInt *n_nodes, PetscInt **nodes)
 {
   PetscReal *G;
   PetscInt l = 0, *index;
@@ -758,10 +762,11 @@ static PetscErrorCode DualSeeds(HycoReducer t, PetscInt *n_nodes, PetscInt nodes
   t->counts[HYCO_SEED_DUAL] = l;
   for (PetscInt k = 0; k < l; k++) {
     PetscCall(MoveWherePresses(t, index[k]));
-    if (t->rank == 0) AddContactNodes(t, index[k], n_nodes, nodes);
+    if (t->rank == 0) PetscCall(AddContactNodes(t, index[k], n_nodes, nodes));
   }
   PetscCallMPI(MPI_Bcast(n_nodes, 1, MPIU_INT, 0, HycoComm(t)));
-  HycoBcast(nodes, *n_nodes, MPIU_INT, HycoComm(t));
+  if (t->rank) PetscCall(PetscMalloc1(*n_nodes, nodes));
+  HycoBcast(*nodes, *n_nodes, MPIU_INT, HycoComm(t));
   PetscCall(PetscFree2(G, index));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -788,8 +793,7 @@ static PetscErrorCode ReduceForces(HycoReducer t, HycoSnapshots store)
   PetscFunctionBegin;
   HycoOnRoot(HycoComm(t), ReadForces(t, store));
   if (!t->seed[HYCO_SEED_DUAL] || !t->sizes[2]) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc1(5 * t->n_s, &t->dual_seeds));
-  PetscCall(DualSeeds(t, &t->n_dual_seeds, t->dual_seeds));
+  PetscCall(DualSeeds(t, &t->n_dual_seeds, &t->dual_seeds));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

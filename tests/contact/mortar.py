@@ -72,6 +72,19 @@ class Mortar(Case):
             self.refused('train', '-scene', scene, '-model', self.path('other.h5'), '-grid', '2,2,2', '-hyco_model_type', kind,
                          texts=('contact under has type mortar', f'a model of type {kind} does not take them', 'type: surface'))
 
+    def test_dual_seeds(self):
+        """A model whose contacts, of many masters each, are seeds of the reduced domain, with as many points as solutions; on one rank and two."""
+        roller.mesh(self.path('moved.msh'), 3, n=16, m=10)
+        scene, found = self.path('scene.yaml'), []
+        roller.scene(scene, 'moved.msh', 3, kind='mortar', **RANGES)
+        for ranks in (1, 2):
+            report = self.hyco('train', '-scene', scene, '-model', self.path(f'm{ranks}.h5'), '-values_place', '-4,-2,0,2,4', '-values_press', '1,2',
+                               '-values_modulus', '5', '-hyco_model_type', 'hybrid', '-hyco_rid_modes', 'displacement,dual', '-hyco_rid_dual_tol', '1e-9',
+                               '-hyco_rid_layers', '1', '-hyco_validation', '0', '-hyco_scan', '0', ranks=ranks)
+            found.append(report['rid_fraction'])
+        self.assertLess(found[0], 0.9)
+        self.assertEqual(*found)
+
     def test_check(self):
         """check names the contacts without a node opposite, and the type for these; a mortar has no such line."""
         roller.mesh(self.path('moved.msh'), 2)

@@ -45,14 +45,14 @@ PetscErrorCode HycoGalerkinSetRidge(HycoROM m, PetscReal ridge)
   PetscCall(PetscBLASIntCast(l, &lb));
   PetscCall(PetscBLASIntCast(n, &nb));
   LAPACKpotrf_("U", &lb, N, &lb, &info);
-  HycoCheckModel(!info || ridge > 0,
-                 "-hyco_hybrid_ridge 0: the %d modes are not linearly independent on the %d unknowns of A; use -1",
-                 (int)l, (int)n);
   if (!info) LAPACKpotrs_("U", &lb, &nb, N, &lb, X, &lb, &info);
   for (PetscInt k = 0; k < n; k++) {
     for (PetscInt j = 0; j < l; j++) g->G[j * n + k] = info ? 0 : X[k * l + j] * weight[j];
   }
   PetscCall(PetscFree3(X, N, weight));
+  HycoCheckModel(!info || ridge > 0,
+                 "-hyco_hybrid_ridge 0: the %d modes are not linearly independent on the %d unknowns of A; use -1",
+                 (int)l, (int)n);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
