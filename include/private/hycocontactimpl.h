@@ -81,12 +81,12 @@ typedef struct _n_HycoPairs {
                      far; 0: none is moved, all masters are final */
   PetscInt place; /* place number (HycoFE) of the nodes at the last search */
   PetscInt n_searches;
-  HycoSearch *search;     /* by contact of the scene; NULL where room is 0 */
-  PetscInt *number;       /* of a rank's contacts: their numbers among those of all ranks; NULL: their own indices */
-  PetscInt64 queries;     /* searches for a master so far */
-  PetscReal *geometry;    /* normals and gaps at the last HycoContactGeometry(), of fe->drawn; NULL: none */
+  HycoSearch *search;  /* by contact of the scene; NULL where room is 0 */
+  PetscInt *number;    /* of a rank's contacts: their numbers among those of all ranks; NULL: their own indices */
+  PetscInt64 queries;  /* searches for a master so far */
+  PetscReal *geometry; /* normals and gaps at the last HycoContactGeometry(), of fe->drawn; NULL: none */
   PetscInt drawn;
-  const HycoShear *shear; /* of the last solution; borrowed, not copied with the pairs; NULL: no friction */
+  const HycoShear *shear;        /* of the last solution; borrowed, not copied with the pairs; NULL: no friction */
   const HycoSurfaceFacts *facts; /* while the contacts of a rank's slaves are found (borrowed); else NULL */
 } HycoPairs;
 

@@ -16,8 +16,8 @@ typedef struct {
   PetscBool *active;
   PetscBool started; /* active is the set of a solution */
   HycoConeFactor cone;
-  PetscInt made;     /* the factor of K that it belongs to: HycoStiffness */
-  HycoTao tao;       /* on each rank alone, because the problem is replicated */
+  PetscInt made; /* the factor of K that it belongs to: HycoStiffness */
+  HycoTao tao;   /* on each rank alone, because the problem is replicated */
 } Dual;
 
 /* The usual form: one factorisation, then a dense problem. Cost 2: others are cheaper only for many contacts. */
