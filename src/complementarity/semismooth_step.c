@@ -8,6 +8,7 @@
   3 /* the base changes once a third of its unknowns would be updated: a solve with each costs a factor then */
 #define HOMOGENEOUS 1e-14 /* P(y) - DP y relative to y: round-off */
 #define ROUNDING    1e-13 /* rows of DP relative to the longest that count as 0 */
+#define INFLEXIBLE  1e-12 /* diagonal entry of M relative to its block's largest that counts as 0 */
 
 /* Room for m = n unknowns: A is n x n at most. blocks and rho are borrowed until Destroy. */
 PetscErrorCode HycoConeStepCreate(PetscInt p, const HycoBlocks *blocks, const PetscReal rho[], HycoConeStep *t)
@@ -174,6 +175,17 @@ static PetscInt Compare(HycoConeStep *t)
   return missing;
 }
 
+/* Whether row i of block k has no flexibility, as the tangential one along the normal of a plane of symmetry. It stays
+   out of DP: its equation w = 0 could not be met by its own force, and A would be singular. */
+static PetscBool Inflexible(const HycoConeStep *t, PetscInt k, PetscInt i)
+{
+  const PetscInt first = t->p + t->blocks->row[k], end = t->p + t->blocks->row[k + 1];
+  PetscReal most = 0;
+
+  for (PetscInt j = first; j < end; j++) most = PetscMax(most, t->M[(size_t)j * (size_t)(t->n + 1)]);
+  return (PetscBool) !(t->M[(size_t)(first + i) * (size_t)(t->n + 1)] > INFLEXIBLE * most);
+}
+
 /* Entries of DP are compared exactly: a step between the same states of contacts without slip in 3D has the same DP,
    and keeps the factor. */
 PetscErrorCode HycoConeStepDerive(HycoConeStep *t, const HycoBlocks *blocks, const PetscReal y[], PetscInt *changes)
@@ -188,6 +200,10 @@ PetscErrorCode HycoConeStepDerive(HycoConeStep *t, const HycoBlocks *blocks, con
     PetscBool equal = PETSC_TRUE;
 
     PetscCall(HycoBlockDerivative(blocks, k, y + t->p + blocks->row[k], D));
+    for (PetscInt i = 1; i < size; i++) {
+      if (!Inflexible(t, k, i)) continue;
+      for (PetscInt j = 0; j < size; j++) D[i * size + j] = D[j * size + i] = 0;
+    }
     for (PetscInt i = 0; i < size * size; i++) {
       equal = (PetscBool)(equal && D[i] == last[i]);
       last[i] = D[i];
@@ -213,11 +229,9 @@ PetscErrorCode HycoConeStepStick(HycoConeStep *t)
   PetscFunctionBegin;
   PetscCall(PetscArrayzero(t->DP, (size_t)t->blocks->n * HYCO_BLOCK));
   for (PetscInt k = 0; k < t->blocks->n; k++) {
-    const PetscInt first = t->p + t->blocks->row[k], size = t->blocks->row[k + 1] - t->blocks->row[k];
+    const PetscInt size = t->blocks->row[k + 1] - t->blocks->row[k];
 
-    for (PetscInt i = 0; i < size; i++)
-      /* A row without flexibility stays out: its equation w = 0 could not be met by its own force. */
-      t->DP[k * HYCO_BLOCK + i * (size + 1)] = t->M[(size_t)(first + i) * (size_t)(t->n + 1)] > 0;
+    for (PetscInt i = 0; i < size; i++) t->DP[k * HYCO_BLOCK + i * (size + 1)] = !Inflexible(t, k, i);
   }
   PetscCall(TakeBase(t));
   PetscFunctionReturn(PETSC_SUCCESS);

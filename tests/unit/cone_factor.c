@@ -1,6 +1,8 @@
 /* The factor of semismooth Newton's method that is kept along a path (HycoConeFactor), with Coulomb's law in 2D: the
-   forces are those of a new factor at each step, and after HycoConeFactorForget() those of another matrix. */
+   forces are those of a new factor at each step, and after HycoConeFactorForget() those of another matrix. Contacts on a
+   plane of symmetry, without tangential flexibility, leave the step regular. */
 #include "check.h"
+#include "semismooth.h"
 #include <hycoconeimpl.h>
 #include <hycolcp.h>
 #include <math.h>
@@ -87,6 +89,31 @@ static PetscErrorCode TestPath(Problem *p, HycoBlocks *blocks, HycoConeFactor fa
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* All contacts closed and at rest; every second one has no tangential flexibility. */
+static PetscErrorCode TestPlane(Problem *p, HycoBlocks *blocks)
+{
+  PetscReal rho[ROWS], y[ROWS], b[ROWS], s[ROWS];
+  HycoConeStep step;
+  PetscInt changes;
+  PetscBool regular;
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < ROWS; i++) {
+    rho[i] = 1;
+    y[i] = i % 2 == 0;
+    b[i] = i % 4 != 3;
+    for (PetscInt j = 3; j < ROWS; j += 4) p->M[i * ROWS + j] = p->M[j * ROWS + i] = 0;
+  }
+  PetscCall(HycoConeStepCreate(0, blocks, rho, &step));
+  HycoConeStepSetMatrix(&step, p->M);
+  PetscCall(HycoConeStepDerive(&step, blocks, y, &changes));
+  PetscCall(HycoConeStepSolve(&step, b, PETSC_FALSE, s, &regular));
+  CHECK(regular, "a step with contacts on a plane of symmetry is regular");
+  for (PetscInt i = 3; i < ROWS; i += 4) CHECK(s[i] == 0, "row %d: no force from a step of %g", (int)i, (double)s[i]);
+  PetscCall(HycoConeStepDestroy(&step));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Test(void)
 {
   static Problem p;
@@ -111,6 +138,7 @@ static PetscErrorCode Test(void)
   HycoConeFactorForget(factor);
   PetscCall(TestPath(&p, blocks, factor));
   PetscCall(HycoConeFactorDestroy(&factor));
+  PetscCall(TestPlane(&p, blocks));
   PetscCall(HycoBlocksDestroy(&blocks));
   PetscCall(HycoConeDestroy(&cone));
   PetscFunctionReturn(PETSC_SUCCESS);
