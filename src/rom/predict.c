@@ -136,6 +136,6 @@ PetscErrorCode HycoROMReset(HycoROM m)
   PetscCall(HycoFEDestroy(&m->fe));
   m->of_fe = NULL;
   PetscCall(HycoTraceFree(m));
-  HycoFreeAll(&m->contact, &m->gamma, &m->U, &m->Lambda, &m->stress, &m->slave_id);
+  HycoFreeAll(&m->contact, &m->gamma, &m->U, &m->Lambda, &m->stress, &m->slave_id, &m->modal);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
