@@ -207,7 +207,7 @@ static PetscReal Primary(Parser *p)
   }
   if (isalpha((unsigned char)*p->at) || *p->at == '_') return Name(p);
   if (!isdigit((unsigned char)*p->at) && *p->at != '.') return Invalid(p);
-  value = HycoNumber(p->at, &end);
+  value = strtod(p->at, &end);
   if (end == p->at) return Invalid(p);
   p->at = end;
   WriteNumber(p, value);

@@ -130,8 +130,7 @@ static PetscErrorCode Compare(HycoROM m, PetscInt n, const PetscReal mu[], const
 }
 
 /* The path is solved, and kept on rank 0. Collective. */
-static PetscErrorCode CompareKept(HycoROM m, HycoFOM f, PetscInt n, const PetscReal mu[], Kept *kept,
-                                  HycoPathErrors *e)
+static PetscErrorCode CompareKept(HycoROM m, HycoFOM f, PetscInt n, const PetscReal mu[], Kept *kept, HycoPathErrors *e)
 {
   HycoHistory h;
 

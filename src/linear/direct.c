@@ -297,7 +297,9 @@ static PetscErrorCode Analyse(HycoDirect d, Mat K, Mat Bt, Mat B)
   PetscCall(Order(d, K));
   PetscCall(ReadControls(d));
   Call(d, ANALYSE);
-  PetscCheck(INFOG(d, 1) >= 0, d->comm, PETSC_ERR_LIB, "MUMPS could not analyse K (INFOG(1) = %d, INFOG(2) = %d); use -hyco_linear iterative, or other -hyco_mumps_icntl_...",
+  PetscCheck(INFOG(d, 1) >= 0, d->comm, PETSC_ERR_LIB,
+             "MUMPS could not analyse K (INFOG(1) = %d, INFOG(2) = %d); use -hyco_linear iterative, or other "
+             "-hyco_mumps_icntl_...",
              (int)INFOG(d, 1), (int)INFOG(d, 2));
   PetscCall(PetscFree(d->id.perm_in));
   PetscCall(MatCreateVecs(K, &x, NULL));
@@ -403,7 +405,9 @@ PetscErrorCode HycoDirectFactor(HycoDirect d, Mat K, Mat Bt, Mat B, PetscReal M[
              "more ranks on more machines",
              (int)INFOG(d, 17));
   PetscCheck(INFOG(d, 1) >= 0 || *singular, d->comm, PETSC_ERR_LIB,
-             "MUMPS could not factor K (INFOG(1) = %d, INFOG(2) = %d); use -hyco_linear iterative, or other -hyco_mumps_icntl_...", (int)INFOG(d, 1), (int)INFOG(d, 2));
+             "MUMPS could not factor K (INFOG(1) = %d, INFOG(2) = %d); use -hyco_linear iterative, or other "
+             "-hyco_mumps_icntl_...",
+             (int)INFOG(d, 1), (int)INFOG(d, 2));
   if (!*singular) PetscCall(SpreadSchur(d, M));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

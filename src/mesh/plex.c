@@ -862,7 +862,8 @@ static PetscErrorCode FillTables(Builder *b, MPI_Comm comm)
   if (size > 1) PetscCall(AgreeOnGroups(comm, b->m));
   DropInnerFacets(b->m);
   PetscCall(PetscStrlen(scene->mesh_path, &length));
-  if (!b->part && (scene->dm || (length > 3 && strcmp(scene->mesh_path + length - 3, ".h5") == 0))) /* not yet checked */
+  if (!b->part &&
+      (scene->dm || (length > 3 && strcmp(scene->mesh_path + length - 3, ".h5") == 0))) /* not yet checked */
     PetscCall(CheckGroups(comm, b->m, scene));
   if (size > 1) PetscCall(Number(b));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -269,9 +269,7 @@ static PetscErrorCode ListMasters(HycoFOM f, const HycoPairs *pairs, const Petsc
     HycoPairsMasters(pairs, k, &masters, &master, &weight);
     if (masters < 2 || !in[HycoPairsSlave(pairs, k)]) continue;
     for (PetscInt j = 0; j < width; j++)
-      list[*n * width + j] = j >= masters             ? -1
-                             : f->surface->node_whole ? f->surface->node_whole[master[j]]
-                                                      : master[j];
+      list[*n * width + j] = j >= masters ? -1 : f->surface->node_whole ? f->surface->node_whole[master[j]] : master[j];
     (*n)++;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -289,8 +287,7 @@ static PetscErrorCode AddBehind(Rid *r, PetscInt i, PetscInt n, const PetscBool 
     const PetscInt own = HycoMeshOwnNodes(m, r->around[j], of);
 
     for (PetscInt v = 0; v < own; v++) has += marked[of[v]];
-    if (has >= PetscMin(n, SmallestFacet(m, r->around[j])))
-      PetscCall(Add(r, r->around[j]));
+    if (has >= PetscMin(n, SmallestFacet(m, r->around[j]))) PetscCall(Add(r, r->around[j]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

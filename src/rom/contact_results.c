@@ -90,8 +90,7 @@ PetscErrorCode HycoROMSumContacts(HycoROM m, const PetscReal Lambda[], const Hyc
   PetscCall(Prepare(m, Lambda, &fe, &least));
   PetscCall(PetscMalloc1(m->model->pairs.n, &pressure));
   PetscCall(HycoContactPressures(PETSC_COMM_SELF, fe, &m->pairs, m->carried->area, Lambda, pressure));
-  HycoContactResults(fe, &m->pairs, m->carried->normal, m->carried->area, Lambda, pressure, least,
-                     m->carried->result);
+  HycoContactResults(fe, &m->pairs, m->carried->normal, m->carried->area, Lambda, pressure, least, m->carried->result);
   for (PetscInt c = 0; c < m->model->scene->n_contacts; c++) {
     /* A minimum over nothing would be the largest number. */
     if (!m->carried->result[c].n) m->carried->result[c].pressure_min = 0;

@@ -2,7 +2,7 @@
 #include <hycosolverimpl.h>
 
 typedef struct {
-  KSP ksp; /* iterative */
+  KSP ksp;          /* iterative */
   KSPNormType norm; /* its own measure, without a target */
   PetscReal rtol, atol;
   HycoOperatorState of;
