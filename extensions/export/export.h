@@ -78,6 +78,8 @@ PetscErrorCode HycoExportAddTerm(HycoExportModel *model, PetscInt value, PetscIn
 PetscErrorCode HycoExportModelFree(HycoExportModel *model);
 /* The unit of an output of the scene, "" where the scene has none. Borrowed, until the next call. */
 const char *HycoExportUnit(HycoScene scene, const HycoQuantity *quantity);
+/* Fails if FILE.c or FILE.h exists and was not written by an export. */
+PetscErrorCode HycoExportCheckFiles(const char path[]);
 /* Writes FILE.c and FILE.h beside it; describes them. */
 PetscErrorCode HycoExportWrite(const HycoExportModel *model, HycoScene scene, const char name[], const char path[],
                                char **description);

@@ -3,6 +3,7 @@
 #include "export.h"
 #include <hycofile.h>
 #include <ctype.h>
+#include <stdio.h>
 #include <string.h>
 
 extern const char HycoExportRuntime[]; /* runtime/runtime.c, by extension.cmake */
@@ -362,6 +363,36 @@ static PetscErrorCode Put(const char path[], const HycoText *t)
   PetscCall(HycoFileCreate(path, HYCO_FILE_TEXT, &file));
   (void)!fwrite(t->text, 1, t->n, HycoFileStream(file)); /* Close reports a failure */
   PetscCall(HycoFileClose(&file, PETSC_TRUE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+#define HEADER  "/* Predictions of a model of hyco" /* beginnings of the two files */
+#define PROGRAM "/* Written by hyco export"
+
+/* Fails if a file is there that begins otherwise. */
+static PetscErrorCode CheckOwn(const char path[], const char begins[])
+{
+  char line[sizeof(HEADER) + sizeof(PROGRAM)] = "";
+  FILE *file = fopen(path, "r");
+
+  PetscFunctionBegin;
+  if (!file) PetscFunctionReturn(PETSC_SUCCESS);
+  line[fread(line, 1, sizeof(line) - 1, file)] = '\0';
+  (void)fclose(file);
+  HycoCheck(!line[0] || !strncmp(line, begins, strlen(begins)),
+            "-c: %s exists, and hyco export has not written it; remove it, or give another name", path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoExportCheckFiles(const char path[])
+{
+  char beside[PETSC_MAX_PATH_LEN];
+
+  PetscFunctionBegin;
+  PetscCall(PetscStrncpy(beside, path, sizeof(beside)));
+  beside[strlen(path) - 1] = 'h';
+  PetscCall(CheckOwn(path, PROGRAM));
+  PetscCall(CheckOwn(beside, HEADER));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

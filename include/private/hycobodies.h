@@ -57,15 +57,21 @@ static inline HycoBodiesSurface HycoBodiesSurfaceNormal(HycoFE fe, HycoPairs *pa
   return (HycoBodiesSurface){fe, pairs, rows, pairs->n, pairs->contact};
 }
 
-/* One body: its blocks at each of its samples (tensor), one sample after the other. All row major, except C. */
+/* One body: its blocks at each of its samples (tensor), one sample after the other. All row major, except C and H: an
+   unknown of the surfaces has its columns at all samples side by side, because a prediction reads them together. */
 typedef struct {
   HycoTensor tensor;           /* over the parameters theta; one node along those that do not change its shape */
   PetscInt n_samples, n, l;    /* n: unknowns of its surfaces; l: modes */
   PetscInt m;                  /* unknowns inside whose displacements are exact */
   PetscReal *C, *R, *Z, *work; /* n x n; n x r; n x p; p x r, the work of the loads on the rigid motions */
-  PetscReal *H, *a, *g;        /* l rows for each turn, then m rows: of n (column after column), of r, of p */
+  PetscReal *H, *a, *g;        /* l rows for each turn, then m rows: of n, of r, of p */
   PetscReal *gram;             /* r x r: of the errors of R at held-out samples in the norm of C^-1, summed; 0 */
 } HycoSubstructure;
+/* The first entry of the column of an unknown at a sample, `rows` long, in C or H. */
+static inline size_t HycoBodiesColumn(const HycoSubstructure *s, PetscInt sample, PetscInt unknown, PetscInt rows)
+{
+  return ((size_t)unknown * (size_t)s->n_samples + (size_t)sample) * (size_t)rows;
+}
 
 /* Whether a cell's body may deform inelastically. */
 static inline PetscBool HycoInelasticFlows(HycoFE fe, PetscInt cell)

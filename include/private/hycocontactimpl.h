@@ -81,10 +81,12 @@ typedef struct _n_HycoPairs {
                      far; 0: none is moved, all masters are final */
   PetscInt place; /* place number (HycoFE) of the nodes at the last search */
   PetscInt n_searches;
-  HycoSearch *search;     /* by contact of the scene; NULL where room is 0 */
-  PetscInt *number;       /* of a rank's contacts: their numbers among those of all ranks; NULL: their own indices */
-  PetscInt64 queries;     /* searches for a master so far */
-  const HycoShear *shear; /* of the last solution; borrowed, not copied with the pairs; NULL: no friction */
+  HycoSearch *search;  /* by contact of the scene; NULL where room is 0 */
+  PetscInt *number;    /* of a rank's contacts: their numbers among those of all ranks; NULL: their own indices */
+  PetscInt64 queries;  /* searches for a master so far */
+  PetscReal *geometry; /* normals and gaps at the last HycoContactGeometry(), of fe->drawn; NULL: none */
+  PetscInt drawn;
+  const HycoShear *shear;        /* of the last solution; borrowed, not copied with the pairs; NULL: no friction */
   const HycoSurfaceFacts *facts; /* while the contacts of a rank's slaves are found (borrowed); else NULL */
 } HycoPairs;
 
@@ -93,6 +95,8 @@ typedef struct _n_HycoPairs {
    of the surfaces; what all ranks must decide together is then left to HycoContactsAgree(), and what this rank alone
    cannot decide is an error. NULL: the DM has the whole surfaces. */
 PetscErrorCode HycoPairsFind(HycoScene scene, DM dm, const HycoSurfaceFacts facts[], HycoPairs *pairs);
+/* The same on tables, which need not have a DM (HycoFECreateOn()). */
+PetscErrorCode HycoPairsFindOn(HycoScene scene, HycoMesh mesh, const HycoSurfaceFacts facts[], HycoPairs *pairs);
 /* The facts about the surfaces of each contact of the scene (facts: scene->n_contacts). Collective. */
 PetscErrorCode HycoContactsFacts(MPI_Comm comm, HycoScene scene, HycoMesh part, HycoSurfaceFacts facts[]);
 /* The masters' nodes (numbers in the distributed vectors, perhaps repeated) that this rank's slaves may meet at the

@@ -53,7 +53,7 @@ typedef struct {
 
 struct _n_HycoFE {
   HycoScene scene;  /* borrowed */
-  DM dm;            /* NULL: of HycoFECreateRead() */
+  DM dm;            /* NULL: of tables without one */
   HycoMesh mesh;    /* its tables, borrowed from it; or surface */
   HycoMesh surface; /* of HycoFECreateSurface(): the tables without cells, whose arrays are the DM's; else NULL */
   /* sizes: space dimension, n_nodes * dim, stress components */
@@ -88,6 +88,7 @@ struct _n_HycoFE {
   PetscReal *X;         /* n_nodes x 3, moved nodes */
   PetscBool *mirrored;  /* by body: its map reverses orientation */
   PetscInt place;       /* of the nodes: a number that is unique on this process for each position of the nodes */
+  PetscInt drawn;       /* the same, of the nodes, normals and gaps of contacts; 0: not at a parameter value */
   PetscReal *kept;      /* gradients (nv x 3) and weight of each point, computed at kept_place:
                            HycoFEKeepGradients(); or NULL */
   PetscReal *kept_mean; /* mean gradients of each cell, nv x 3; NULL: no body uses bbar */
@@ -128,8 +129,9 @@ static inline PetscInt HycoFEUnknowns(HycoFE fe)
 PetscErrorCode HycoFECreate(HycoScene scene, DM dm, HycoFE *fe);
 /* On its nodes and facets alone, without the cells and their materials. */
 PetscErrorCode HycoFECreateSurface(HycoScene scene, DM dm, HycoFE *fe);
-/* On the tables of a file just read (borrowed), before they become a DM: a tie's weights are part of the topology. */
-PetscErrorCode HycoFECreateRead(HycoScene scene, HycoMesh mesh, HycoFE *fe);
+/* On tables which need not have a DM, and are borrowed then: those of a file just read, since a tie's weights are part of
+   the topology, or of surfaces that were received. Not collective. */
+PetscErrorCode HycoFECreateOn(HycoScene scene, HycoMesh mesh, HycoFE *fe);
 PetscErrorCode HycoFEDestroy(HycoFE *fe);
 /* While cells are not used, HycoFESetParameters() leaves what belongs to them as it is. Brings them to the present mu when
    they are used again. */
@@ -235,8 +237,10 @@ PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M);
 /* Stress of u (n_dof, local order) from the elastic tangents, without the stress of thermal strain, averaged over
    each cell: sigma n_cells x n_sigma. */
 PetscErrorCode HycoFEStress(HycoFE fe, const PetscReal u[], PetscReal sigma[]);
-/* The same in the marked cells, 0 in others (in: NULL: in all). */
-PetscErrorCode HycoFEStressIn(HycoFE fe, const PetscBool in[], const PetscReal u[], PetscReal sigma[]);
+/* The same in the marked cells (in: NULL: all; 0 in others) for many u and parameters: *kept (the caller's, NULL at first, freed with PetscFree()) has the nodes and the
+   mean gradients of the cells, 6 nv numbers each, so that those of cells whose nodes do not move are computed once. */
+PetscErrorCode HycoFEStressKept(HycoFE fe, const PetscBool in[], const PetscReal u[], PetscReal **kept,
+                                PetscReal sigma[]);
 /* The volumes of the cells, of the full circle in an axisymmetric scene. */
 PetscErrorCode HycoFEVolumes(HycoFE fe, PetscReal volume[]);
 /* Adds the nodal forces of body forces to a cell's unknowns (f: nv x dim). */

@@ -116,6 +116,10 @@ PetscErrorCode HycoFEStepBodies(HycoFE fe, HycoBodies bodies, const PetscReal u[
 /* Stresses and energies of the cells with linear laws at u, which do not depend on the past, in the state; stored: their
    energy, without springs. For a mesh that one process has. */
 PetscErrorCode HycoFELinearStress(HycoFE fe, const PetscReal u[], HycoFEState state, PetscReal *stored);
+/* The stored energy, and the volume means of stress (n_cells x n_sigma) and von Mises stress (n_cells) at u, without a
+   state; *served: false, and nothing is computed, unless all bodies are linear, isotropic and without an axis. */
+PetscErrorCode HycoFELinearFields(HycoFE fe, const PetscReal u[], PetscReal sigma[], PetscReal mises[],
+                                  PetscReal *stored, PetscBool *served);
 
 /*
   Laws at some integration points, each the number of its cell times the points of a cell plus its own; all in bodies with

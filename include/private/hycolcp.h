@@ -58,6 +58,14 @@ void HycoSetFactorForget(HycoSetFactor factor);
 PetscErrorCode HycoSetFactorSolve(HycoSetFactor factor, const PetscReal M[], const PetscReal q[], PetscInt k,
                                   const PetscInt a[], PetscReal tol, PetscReal z[], PetscBool *regular);
 /*
+  The factor of semismooth Newton's method, kept from one problem to the next while M, its free unknowns and the rows of
+  its blocks are the same; HycoConeFactorForget() after a change of M. NULL-safe.
+*/
+typedef struct _n_HycoConeFactor *HycoConeFactor;
+PetscErrorCode HycoConeFactorCreate(HycoConeFactor *factor);
+PetscErrorCode HycoConeFactorDestroy(HycoConeFactor *factor);
+void HycoConeFactorForget(HycoConeFactor factor);
+/*
   A dense problem: M column major, n x n. `symmetric`: M is positive semidefinite; then `factor` may be that of M's last
   set, or one after HycoSetFactorForget(); NULL: each set is factored anew. With p free unknowns before the n contacts
   (floating bodies) z = (x_pinned, L), M and q as returned by HycoDirectFactor() and HycoDirectReduce(). `blocks`: the
@@ -69,10 +77,11 @@ typedef struct {
   PetscBool symmetric;
   HycoSetFactor factor;
   const HycoBlocks *blocks;
-  PetscBool warm;   /* HYCO_TAO_CONES types start from the last solution of their Tao */
-  PetscBool given;  /* these start from z instead */
-  PetscInt *sign;   /* NULL, or from these: the sign of the determinant of J at the solution; 0: not known */
-  PetscInt max_its; /* iterations of the active set; 0: 50 + 4 n */
+  HycoConeFactor cone; /* of HYCO_TAO_CONES types; NULL: none is kept */
+  PetscBool warm;      /* HYCO_TAO_CONES types start from the last solution of their Tao */
+  PetscBool given;     /* these start from z instead */
+  PetscInt *sign;      /* NULL, or from these: the sign of the determinant of J at the solution; 0: not known */
+  PetscInt max_its;    /* iterations of the active set; 0: 50 + 4 n */
   HycoLCPMonitor monitor;
   void *monitor_ctx;
 } HycoLCP;

@@ -156,7 +156,8 @@ struct _p_HycoROM {
   PetscBool balanced;       /* balance belongs to it */
   PetscReal remainder;      /* of (41): the relative difference of the forces in the RID; of a path the largest */
   PetscReal *gamma, *U, *Lambda, *stress, *U_whole;
-  HycoTrace trace; /* of a scene with a history */
+  PetscInt n_modal, *modal; /* the unknowns of fe that are not full-order ones; NULL: not needed yet */
+  HycoTrace trace;          /* of a scene with a history */
   HycoPrediction prediction;
 };
 
@@ -175,11 +176,12 @@ void HycoTraceShowOther(HycoROM model, const HycoShear *shear);
 /* For that listed time, once m->Lambda has all contacts: its forces, and the norm of U in the RID. */
 PetscErrorCode HycoTraceMeasure(HycoROM model, HycoStep *step);
 /* In a type that steps along paths: reads the options of paths; solves the path at mu, and sets the prediction; at a
-   listed time, its results over the model's cells and all contacts, with U and Lambda set. */
+   listed time, its results over the model's cells and all contacts, with U and Lambda set (linear: `state` lacks the
+   bodies with linear laws, whose energy is added). */
 struct _n_HycoPath;
 PetscErrorCode HycoTraceOptions(HycoROM model, struct _n_HycoPath *path);
 PetscErrorCode HycoTraceFollow(HycoROM model, struct _n_HycoPath *path, const PetscReal mu[]);
-PetscErrorCode HycoTraceRecord(HycoROM model, HycoFEState state, HycoStep *step);
+PetscErrorCode HycoTraceRecord(HycoROM model, PetscBool linear, HycoFEState state, HycoStep *step);
 PetscErrorCode HycoTraceFree(HycoROM model);
 /* HycoROMSetSteps() for a path that training judges: it ends if too many of these steps are halved. */
 PetscErrorCode HycoROMSetJudgedSteps(HycoROM model, PetscInt n, const PetscReal t[]);
@@ -216,6 +218,8 @@ PetscErrorCode HycoROMSetUpFields(HycoROM model);
    gamma. */
 PetscErrorCode HycoROMBringRows(HycoROM model, const PetscReal mu[]);
 PetscErrorCode HycoROMExpand(HycoROM model);
+/* The same at the unknowns that are not full-order ones alone; the others, then HycoFEComplete(), are the caller's. */
+PetscErrorCode HycoROMExpandModal(HycoROM model);
 /* The number of modes with a singular value: those of a POD. */
 PetscInt HycoROMCountPOD(HycoROM model);
 /* Creates the sets of nodes from their number at each node of mesh: 0, 1 (on the interface I), or 2 (in A); NULL: all

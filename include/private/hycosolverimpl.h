@@ -72,6 +72,7 @@ typedef struct {
   size_t room;
   PetscBool refined; /* solves are refined in twice the working precision, and so is S */
   HycoOperatorState of;
+  PetscInt made; /* number of factors so far */
 } HycoStiffness;
 
 struct _p_HycoSolver {

@@ -42,7 +42,7 @@ typedef struct {
   PetscReal *rho, *w, *y, *F;     /* n each; y = z - rho w */
   PetscReal *step, *trial;        /* n; 3 n: z, w and the change of w */
   PetscReal start;                /* the largest force at the start */
-  HycoConeStep linear;
+  HycoConeStep *linear;
   PetscInt its;
 } Newton;
 
@@ -50,7 +50,7 @@ typedef struct {
 static void Pose(Newton *h, const PetscReal M[], const PetscReal q[])
 {
   /* A factor stays valid while only q changes. */
-  if (M != h->M) HycoConeStepSetMatrix(&h->linear, M);
+  if (M != h->linear->M) HycoConeStepSetMatrix(h->linear, M);
   h->M = M;
   h->q = q;
 }
@@ -131,8 +131,8 @@ static PetscErrorCode Sign(Newton *h, const PetscReal z[], PetscInt *sign)
 
   PetscFunctionBegin;
   PetscCall(Residual(h, z, &norm, &size));
-  PetscCall(HycoConeStepDerive(&h->linear, h->blocks, h->y, &changes));
-  PetscCall(HycoConeStepSign(&h->linear, sign));
+  PetscCall(HycoConeStepDerive(h->linear, h->blocks, h->y, &changes));
+  PetscCall(HycoConeStepSign(h->linear, sign));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -187,18 +187,41 @@ static PetscErrorCode Show(const Newton *h, const PetscReal z[], PetscInt change
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The step to the solution on the present states: far from a solution directly, with fewer products with M, near it by
+   its residual, which takes round-off away; `least`: by least squares. */
+static PetscErrorCode Step(Newton *h, const PetscReal z[], PetscBool near, PetscBool least, PetscBool *regular)
+{
+  PetscBool served = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  if (!near && !least) PetscCall(HycoConeStepPoint(h->linear, h->q, h->y, h->step, regular, &served));
+  if (served) {
+    for (PetscInt i = 0; i < h->n; i++) h->step[i] -= z[i];
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  for (PetscInt i = 0; i < h->n; i++) h->F[i] = -h->F[i];
+  PetscCall(HycoConeStepSolve(h->linear, h->F, least, h->step, regular));
+  for (PetscInt i = 0; i < h->n; i++) h->F[i] = -h->F[i];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* One step from z, and its search; a J without full rank, or one that is nearly singular, by least squares. */
 static PetscErrorCode Improve(Newton *h, PetscReal z[], PetscReal *norm, PetscReal *size, PetscBool *regular,
                               PetscBool *less)
 {
   PetscFunctionBegin;
   *less = PETSC_FALSE;
-  PetscCall(HycoConeStepSolve(&h->linear, h->F, PETSC_FALSE, h->step, regular));
+  PetscCall(Step(h, z, (PetscBool)(*norm <= NEAR * *size), PETSC_FALSE, regular));
   if (*regular) PetscCall(Search(h, z, norm, size, less));
+  if (!*less && *norm > ROUNDING * *size) { /* by the residual, with a factor of J itself */
+    PetscCall(HycoConeStepRenew(h->linear));
+    PetscCall(Step(h, z, PETSC_TRUE, PETSC_FALSE, regular));
+    if (*regular) PetscCall(Search(h, z, norm, size, less));
+  }
   /* Nothing to gain from least squares: the step was good, J is regular, or |F| is round-off already. */
-  if (*less || !h->linear.nearly_singular || *norm <= ROUNDING * *size) PetscFunctionReturn(PETSC_SUCCESS);
-  if (!h->linear.m || h->linear.m > MOST_LEAST) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoConeStepSolve(&h->linear, h->F, PETSC_TRUE, h->step, regular));
+  if (*less || !h->linear->nearly_singular || *norm <= ROUNDING * *size) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!h->linear->m || h->linear->m > MOST_LEAST) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(Step(h, z, PETSC_TRUE, PETSC_TRUE, regular));
   if (*regular) PetscCall(Search(h, z, norm, size, less));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -215,7 +238,7 @@ static PetscErrorCode Iterate(Newton *h, PetscReal z[], HycoLCPStatus *status)
   for (PetscInt k = 0; k < most && norm > TIGHT * size && regular && less; k++) {
     PetscInt changes;
 
-    PetscCall(HycoConeStepDerive(&h->linear, h->blocks, h->y, &changes));
+    PetscCall(HycoConeStepDerive(h->linear, h->blocks, h->y, &changes));
     PetscCall(Improve(h, z, &norm, &size, &regular, &less));
     h->its++;
     PetscCall(Show(h, z, changes));
@@ -405,10 +428,10 @@ static PetscErrorCode FromStick(Newton *h, PetscReal z[], HycoLCPStatus *status)
 
   PetscFunctionBegin;
   for (PetscInt i = 0; i < h->n; i++)
-    h->F[i] = i < h->p || h->M[(size_t)i * (size_t)(h->n + 1)] > 0 ? h->rho[i] * h->q[i] : 0;
+    h->F[i] = i < h->p || h->M[(size_t)i * (size_t)(h->n + 1)] > 0 ? -h->rho[i] * h->q[i] : 0;
   /* DP = 1: the step from z = 0 is then the solution of w = 0 on all rows. */
-  PetscCall(HycoConeStepStick(&h->linear));
-  PetscCall(HycoConeStepSolve(&h->linear, h->F, (PetscBool)(h->linear.m <= MOST_LEAST), h->step, &regular));
+  PetscCall(HycoConeStepStick(h->linear));
+  PetscCall(HycoConeStepSolve(h->linear, h->F, (PetscBool)(h->linear->m <= MOST_LEAST), h->step, &regular));
   for (PetscInt i = 0; i < h->n; i++) z[i] = regular ? h->step[i] : 0;
   HycoDuplicate(h->n, z, &stuck);
   PetscCall(Iterate(h, z, status));
@@ -565,18 +588,79 @@ static void DropRounding(const Newton *h, PetscReal z[])
   for (PetscInt i = h->p; i < h->n && most <= TIGHT * least; i++) z[i] = 0;
 }
 
+struct _n_HycoConeFactor {
+  HycoConeStep step;
+  PetscInt n_blocks, *row; /* of the blocks that it is for; NULL: none yet */
+  PetscReal *rho;
+};
+
+PetscErrorCode HycoConeFactorCreate(HycoConeFactor *factor)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscNew(factor));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The room for a problem. */
+static PetscErrorCode Release(HycoConeFactor f)
+{
+  PetscFunctionBegin;
+  if (!f->row) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoConeStepDestroy(&f->step));
+  HycoFreeAll(&f->row, &f->rho);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoConeFactorDestroy(HycoConeFactor *factor)
+{
+  PetscFunctionBegin;
+  if (!*factor) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(Release(*factor));
+  PetscCall(PetscFree(*factor));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void HycoConeFactorForget(HycoConeFactor f)
+{
+  if (f && f->row) HycoConeStepSetMatrix(&f->step, NULL);
+}
+
+/* Makes the factor one for problems with these blocks. */
+static PetscErrorCode Adapt(HycoConeFactor f, PetscInt p, const HycoBlocks *blocks)
+{
+  PetscBool same = (PetscBool)(f->row && f->step.p == p && f->n_blocks == blocks->n);
+
+  PetscFunctionBegin;
+  if (same) PetscCall(PetscArraycmp(f->row, blocks->row, blocks->n + 1, &same));
+  if (!same) {
+    PetscCall(Release(f));
+    f->n_blocks = blocks->n;
+    HycoDuplicate(blocks->n + 1, blocks->row, &f->row);
+    PetscCall(PetscMalloc1(p + blocks->row[blocks->n] + 1, &f->rho));
+    PetscCall(HycoConeStepCreate(p, blocks, f->rho, &f->step));
+  }
+  HycoConeStepSetBlocks(&f->step, blocks);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* z: start and solution (p + n); lcp->blocks NULL: forces >= 0. On one process, or alike on every rank. */
 PetscErrorCode HycoLCPSemismooth(const HycoLCP *lcp, PetscReal z[], PetscInt *its, HycoLCPStatus *status)
 {
   const PetscInt n = lcp->p + lcp->n;
   HycoBlocks *nonnegative = NULL;
+  HycoConeFactor own = NULL, f = lcp->cone;
   Newton h = {.lcp = lcp, .blocks = lcp->blocks, .n = n, .p = lcp->p};
 
   PetscFunctionBegin;
   if (!lcp->blocks) PetscCall(HycoBlocksCreateNonnegative(lcp->n, &nonnegative));
   if (!lcp->blocks) h.blocks = nonnegative;
-  PetscCall(PetscMalloc6(n, &h.rho, n, &h.w, n, &h.y, n, &h.F, n, &h.step, 3 * n, &h.trial));
-  PetscCall(HycoConeStepCreate(lcp->p, h.blocks, h.rho, &h.linear));
+  if (!f || lcp->p) PetscCall(HycoConeFactorCreate(&own)); /* M with free unknowns is scaled anew */
+  if (own) f = own;
+  PetscCall(Adapt(f, lcp->p, h.blocks));
+  h.linear = &f->step;
+  h.linear->symmetric = (PetscBool)(lcp->symmetric && !lcp->p);
+  h.rho = f->rho;
+  PetscCall(PetscMalloc5(n, &h.w, n, &h.y, n, &h.F, n, &h.step, 3 * n, &h.trial));
   PetscCall(ScaleFree(&h, z));
   for (PetscInt i = h.p; i < n; i++) h.start = PetscMax(h.start, PetscAbsReal(z[i]));
   PetscCall(Chain(&h, z, status));
@@ -586,8 +670,8 @@ PetscErrorCode HycoLCPSemismooth(const HycoLCP *lcp, PetscReal z[], PetscInt *it
   DropRounding(&h, z);
   for (PetscInt i = 0; i < h.p; i++) z[i] *= h.flexibility;
   *its = h.its;
-  PetscCall(PetscFree6(h.rho, h.w, h.y, h.F, h.step, h.trial));
-  PetscCall(HycoConeStepDestroy(&h.linear));
+  PetscCall(PetscFree5(h.w, h.y, h.F, h.step, h.trial));
+  PetscCall(HycoConeFactorDestroy(&own));
   PetscCall(PetscFree(h.scaled));
   PetscCall(HycoBlocksDestroy(&nonnegative));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -14,25 +14,41 @@ typedef struct {
 } HycoConeTerms;
 
 /*
-  The step J s = -F, J = I - DP (I - rho M). Each block's DP = E L^T has a small rank, L orthonormal, so that
+  The step J s = b, J = I - DP (I - rho M). Each block's DP = E L^T has a small rank, L orthonormal, so that
 
-      s = -F + E a,     A a = L^T (rho M F - F),     A = L^T rho M E + I - L^T E,     det A = det J.
+      s = b + E a,     A a = L^T (b - rho M b),     A = L^T rho M E + I - L^T E,     det A = det J.
 
   Unknowns a: none of an open contact, one of a contact that slips in 2D, all components of one that sticks. A free
-  unknown (p) has E = L = 1. The factor of A is kept while DP is unchanged.
+  unknown (p) has E = L = 1.
+
+  A is factored for a base DP. J then differs from its base J0 in the rows of the blocks whose DP has changed, which are
+  c rows P:  J = J0 + P R,  s = s0 - Z (I + R Z)^-1 R s0,  J0 s0 = b,  J0 Z = P. Columns of Z are kept with the factor, as
+  is the factor with the HycoConeStep, from one problem of a path to the next. Where too many rows have changed, or
+  I + R Z is nearly singular, the present DP becomes the base.
 */
 typedef struct {
   PetscInt n, p;                /* rows, and free unknowns before those of the blocks */
   const HycoBlocks *blocks;     /* borrowed, as M and rho */
   const PetscReal *M, *rho;     /* M column major, n x n */
-  PetscReal *DP;                /* HYCO_BLOCK for each block, row by row */
-  PetscInt m, *rank;            /* unknowns a, of all blocks and of each */
+  PetscBool symmetric;          /* M is, as it is not with free unknowns */
+  PetscReal *DP, *base;         /* HYCO_BLOCK for each block, row by row: now, and of the factor */
+  PetscInt *rank;               /* of each block's DP */
+  PetscInt m, *base_rank;       /* unknowns a of the base, of all blocks and of each */
   HycoConeTerms *left, *right;  /* m each: L^T rho, E */
   PetscReal *A, *rhs, *product; /* m x m column major; m; n */
   PetscBLASInt *pivot, info;
-  PetscBool factored; /* A is the factor for DP, or singular: info */
+  PetscBool factored; /* A is the factor for the base, or singular: info */
   PetscBool nearly_singular;
+  PetscInt c, *changed, *block; /* rows whose DP has changed since the base, and their blocks */
+  PetscInt n_columns, *column;  /* of Z; by row: its column, or -1 */
+  PetscReal *Z, *Q;             /* n x HYCO_CONE_CHANGES; rows of (I - rho M) Z, row by row, as far as known: */
+  PetscInt *known;              /* by row: the number of columns */
+  PetscReal *S, *small;         /* c x c: the factor of I + R Z; c */
+  PetscBLASInt *small_pivot;
+  PetscBool updated; /* S is that of the present DP */
 } HycoConeStep;
+
+#define HYCO_CONE_CHANGES 64 /* most rows by which J differs from its base */
 
 /* n_blocks, p + rows of the blocks; nothing is derived yet. */
 PetscErrorCode HycoConeStepCreate(PetscInt p, const HycoBlocks *blocks, const PetscReal rho[], HycoConeStep *step);
@@ -43,9 +59,17 @@ void HycoConeStepSetMatrix(HycoConeStep *step, const PetscReal M[]);
 PetscErrorCode HycoConeStepDerive(HycoConeStep *step, const HycoBlocks *blocks, const PetscReal y[], PetscInt *changes);
 /* DP = 1 for rows with a diagonal entry, and 0 for others. */
 PetscErrorCode HycoConeStepStick(HycoConeStep *step);
-/* s; `least`: A by least squares. *regular: A has a factor, and s is finite. */
-PetscErrorCode HycoConeStepSolve(HycoConeStep *step, const PetscReal F[], PetscBool least, PetscReal s[],
+/* s of b; `least`: A by least squares. *regular: J has a factor, and s is finite. */
+PetscErrorCode HycoConeStepSolve(HycoConeStep *step, const PetscReal b[], PetscBool least, PetscReal s[],
                                  PetscBool *regular);
+/* z = DP (z - rho (q + M z)), which is the point z + s of the step from y, if P(y) = DP y in all blocks (*served), as
+   where the cones are Coulomb's; else nothing. */
+PetscErrorCode HycoConeStepPoint(HycoConeStep *step, const PetscReal q[], const PetscReal y[], PetscReal z[],
+                                 PetscBool *regular, PetscBool *served);
+/* The present DP becomes the base, if it is not. */
+PetscErrorCode HycoConeStepRenew(HycoConeStep *step);
+/* Other blocks of the same rows, for the problems that follow. */
+void HycoConeStepSetBlocks(HycoConeStep *step, const HycoBlocks *blocks);
 /* The sign of det J; 0: singular. */
 PetscErrorCode HycoConeStepSign(HycoConeStep *step, PetscInt *sign);
 /* y += M x; columns of zero entries are skipped. */

@@ -4,26 +4,37 @@
 
 #define RANK_TOL 1e-10 /* singular values of A relative to the largest that count as 0 */
 #define SINGULAR 1e-8  /* least pivot of A relative to the largest: below, least squares may give another step */
-#define ROUNDING 1e-13 /* rows of DP relative to the longest that count as 0 */
+#define LEAST_SHARE                                                                                                    \
+  3 /* the base changes once a third of its unknowns would be updated: a solve with each costs a factor then */
+#define HOMOGENEOUS 1e-14 /* P(y) - DP y relative to y: round-off */
+#define ROUNDING    1e-13 /* rows of DP relative to the longest that count as 0 */
+#define INFLEXIBLE  1e-12 /* diagonal entry of M relative to its block's largest that counts as 0 */
 
 /* Room for m = n unknowns: A is n x n at most. blocks and rho are borrowed until Destroy. */
 PetscErrorCode HycoConeStepCreate(PetscInt p, const HycoBlocks *blocks, const PetscReal rho[], HycoConeStep *t)
 {
   const PetscInt n = p + blocks->row[blocks->n];
+  const size_t most = HYCO_CONE_CHANGES;
 
   PetscFunctionBegin;
   *t = (HycoConeStep){.n = n, .p = p, .blocks = blocks, .rho = rho};
-  PetscCall(PetscCalloc2((size_t)blocks->n * HYCO_BLOCK + 1, &t->DP, blocks->n + 1, &t->rank));
+  PetscCall(PetscCalloc4((size_t)blocks->n * HYCO_BLOCK + 1, &t->DP, (size_t)blocks->n * HYCO_BLOCK + 1, &t->base,
+                         blocks->n + 1, &t->rank, blocks->n + 1, &t->base_rank));
   PetscCall(
       PetscMalloc6(n, &t->left, n, &t->right, (size_t)n * (size_t)n, &t->A, n, &t->rhs, n, &t->product, n, &t->pivot));
+  PetscCall(PetscMalloc4(n + 1, &t->changed, n + 1, &t->block, n + 1, &t->column, n + 1, &t->known));
+  PetscCall(PetscMalloc5((size_t)n * most, &t->Z, (size_t)n * most, &t->Q, most * most, &t->S, most, &t->small, most,
+                         &t->small_pivot));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoConeStepDestroy(HycoConeStep *t)
 {
   PetscFunctionBegin;
-  PetscCall(PetscFree2(t->DP, t->rank));
+  PetscCall(PetscFree4(t->DP, t->base, t->rank, t->base_rank));
   PetscCall(PetscFree6(t->left, t->right, t->A, t->rhs, t->product, t->pivot));
+  PetscCall(PetscFree4(t->changed, t->block, t->column, t->known));
+  PetscCall(PetscFree5(t->Z, t->Q, t->S, t->small, t->small_pivot));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -32,6 +43,11 @@ void HycoConeStepSetMatrix(HycoConeStep *t, const PetscReal M[])
 {
   t->M = M;
   t->factored = PETSC_FALSE;
+}
+
+void HycoConeStepSetBlocks(HycoConeStep *t, const HycoBlocks *blocks)
+{
+  t->blocks = blocks;
 }
 
 /* Runs of nonzero entries are multiplied at once: forces are 0 at open contacts, which are often most. */
@@ -73,9 +89,9 @@ static void AddUnknown(HycoConeStep *t, PetscInt first, PetscInt size, const Pet
   t->m++;
 }
 
-/* The longest of the rows R without their parts along the k columns of L; returns its length. */
-static PetscReal Longest(PetscInt size, const PetscReal R[], PetscInt k, PetscReal L[][HYCO_MAX_BLOCK],
-                         PetscReal longest[])
+/* Column k of L: the direction of the longest of the rows R without their parts along the columns before; returns its
+   length. */
+static PetscReal Longest(PetscInt size, const PetscReal R[], PetscInt k, PetscReal L[HYCO_MAX_BLOCK][HYCO_MAX_BLOCK])
 {
   PetscReal most = 0;
 
@@ -92,13 +108,13 @@ static PetscReal Longest(PetscInt size, const PetscReal R[], PetscInt k, PetscRe
     for (PetscInt j = 0; j < size; j++) square += v[j] * v[j];
     if (!(PetscSqrtReal(square) > most)) continue;
     most = PetscSqrtReal(square);
-    for (PetscInt j = 0; j < size; j++) longest[j] = v[j] / most;
+    for (PetscInt j = 0; j < size; j++) L[k][j] = v[j] / most;
   }
   return most;
 }
 
-/* The unknowns of block k: L spans the rows of DP, E = DP L. Returns their number. */
-static PetscInt Factorise(HycoConeStep *t, PetscInt k)
+/* The rank of block k's DP: L spans its rows, E = DP L, whose columns become unknowns if `add`. */
+static PetscInt Factorise(HycoConeStep *t, PetscInt k, PetscBool add)
 {
   const PetscInt first = t->p + t->blocks->row[k], size = t->blocks->row[k + 1] - t->blocks->row[k];
   const PetscReal *D = t->DP + (size_t)k * HYCO_BLOCK;
@@ -106,54 +122,105 @@ static PetscInt Factorise(HycoConeStep *t, PetscInt k)
 
   for (PetscInt a = 0; a < size; a++) {
     PetscReal E[HYCO_MAX_BLOCK] = {0};
-    const PetscReal length = Longest(size, D, a, L, L[a]);
+    const PetscReal length = Longest(size, D, a, L);
 
     if (!a) most = length;
     if (!(length > ROUNDING * most)) return a;
-    for (PetscInt i = 0; i < size; i++) {
+    for (PetscInt i = 0; i < size && add; i++) {
       for (PetscInt j = 0; j < size; j++) E[i] += D[i * size + j] * L[a][j];
     }
-    AddUnknown(t, first, size, L[a], E);
+    if (add) AddUnknown(t, first, size, L[a], E);
   }
   return size;
 }
 
-/* Returns how many joined or left. */
-static PetscInt FindUnknowns(HycoConeStep *t)
+/* The present DP becomes the base, to be factored. */
+static PetscErrorCode TakeBase(HycoConeStep *t)
 {
   const PetscReal one = 1;
-  PetscInt changes = 0;
 
-  t->factored = PETSC_FALSE;
-  t->m = 0;
+  PetscFunctionBegin;
+  t->factored = t->updated = PETSC_FALSE;
+  t->m = t->c = t->n_columns = 0;
+  PetscCall(PetscArraycpy(t->base, t->DP, (size_t)t->blocks->n * HYCO_BLOCK));
   for (PetscInt i = 0; i < t->p; i++) AddUnknown(t, i, 1, &one, &one);
-  for (PetscInt k = 0; k < t->blocks->n; k++) {
-    const PetscInt before = t->rank[k];
-
-    t->rank[k] = Factorise(t, k);
-    changes += PetscAbsInt(t->rank[k] - before);
+  for (PetscInt k = 0; k < t->blocks->n; k++) t->rank[k] = t->base_rank[k] = Factorise(t, k, PETSC_TRUE);
+  for (PetscInt i = 0; i < t->n; i++) {
+    t->column[i] = -1;
+    t->known[i] = 0;
   }
-  return changes;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Lists the rows of DP that differ from the base; returns how many columns of Z are missing for them. */
+static PetscInt Compare(HycoConeStep *t)
+{
+  PetscInt missing = 0;
+
+  t->c = 0;
+  for (PetscInt k = 0; k < t->blocks->n; k++) {
+    const PetscInt first = t->p + t->blocks->row[k], size = t->blocks->row[k + 1] - t->blocks->row[k];
+    const PetscReal *now = t->DP + (size_t)k * HYCO_BLOCK, *base = t->base + (size_t)k * HYCO_BLOCK;
+
+    for (PetscInt i = 0; i < size; i++) {
+      PetscBool same = PETSC_TRUE;
+
+      for (PetscInt j = 0; j < size; j++) same = (PetscBool)(same && now[i * size + j] == base[i * size + j]);
+      if (same) continue;
+      missing += t->column[first + i] < 0;
+      t->block[t->c] = k;
+      t->changed[t->c++] = first + i;
+    }
+  }
+  return missing;
+}
+
+/* Whether row i of block k has no flexibility, as the tangential one along the normal of a plane of symmetry. It stays
+   out of DP: its equation w = 0 could not be met by its own force, and A would be singular. */
+static PetscBool Inflexible(const HycoConeStep *t, PetscInt k, PetscInt i)
+{
+  const PetscInt first = t->p + t->blocks->row[k], end = t->p + t->blocks->row[k + 1];
+  PetscReal most = 0;
+
+  for (PetscInt j = first; j < end; j++) most = PetscMax(most, t->M[(size_t)j * (size_t)(t->n + 1)]);
+  return (PetscBool) !(t->M[(size_t)(first + i) * (size_t)(t->n + 1)] > INFLEXIBLE * most);
 }
 
 /* Entries of DP are compared exactly: a step between the same states of contacts without slip in 3D has the same DP,
    and keeps the factor. */
 PetscErrorCode HycoConeStepDerive(HycoConeStep *t, const HycoBlocks *blocks, const PetscReal y[], PetscInt *changes)
 {
-  PetscBool same = t->factored;
+  PetscBool same = PETSC_TRUE;
 
   PetscFunctionBegin;
+  *changes = 0;
   for (PetscInt k = 0; k < blocks->n; k++) {
-    const PetscInt size = blocks->row[k + 1] - blocks->row[k];
+    const PetscInt size = blocks->row[k + 1] - blocks->row[k], before = t->rank[k];
     PetscReal D[HYCO_BLOCK], *last = t->DP + (size_t)k * HYCO_BLOCK;
+    PetscBool equal = PETSC_TRUE;
 
     PetscCall(HycoBlockDerivative(blocks, k, y + t->p + blocks->row[k], D));
+    for (PetscInt i = 1; i < size; i++) {
+      if (!Inflexible(t, k, i)) continue;
+      for (PetscInt j = 0; j < size; j++) D[i * size + j] = D[j * size + i] = 0;
+    }
     for (PetscInt i = 0; i < size * size; i++) {
-      same = (PetscBool)(same && D[i] == last[i]);
+      equal = (PetscBool)(equal && D[i] == last[i]);
       last[i] = D[i];
     }
+    if (equal) continue;
+    same = PETSC_FALSE;
+    t->rank[k] = Factorise(t, k, PETSC_FALSE);
+    *changes += PetscAbsInt(t->rank[k] - before);
   }
-  *changes = same ? 0 : FindUnknowns(t);
+  if (t->factored && same) PetscFunctionReturn(PETSC_SUCCESS);
+  t->updated = PETSC_FALSE;
+  if (t->factored && t->info == 0) {
+    const PetscInt missing = Compare(t), most = PetscMin(HYCO_CONE_CHANGES, t->m / LEAST_SHARE);
+
+    if (t->c <= most && t->n_columns + missing <= most) PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(TakeBase(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -162,13 +229,11 @@ PetscErrorCode HycoConeStepStick(HycoConeStep *t)
   PetscFunctionBegin;
   PetscCall(PetscArrayzero(t->DP, (size_t)t->blocks->n * HYCO_BLOCK));
   for (PetscInt k = 0; k < t->blocks->n; k++) {
-    const PetscInt first = t->p + t->blocks->row[k], size = t->blocks->row[k + 1] - t->blocks->row[k];
+    const PetscInt size = t->blocks->row[k + 1] - t->blocks->row[k];
 
-    for (PetscInt i = 0; i < size; i++)
-      /* A row without flexibility stays out: its equation w = 0 could not be met by its own force. */
-      t->DP[k * HYCO_BLOCK + i * (size + 1)] = t->M[(size_t)(first + i) * (size_t)(t->n + 1)] > 0;
+    for (PetscInt i = 0; i < size; i++) t->DP[k * HYCO_BLOCK + i * (size + 1)] = !Inflexible(t, k, i);
   }
-  (void)FindUnknowns(t);
+  PetscCall(TakeBase(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -197,9 +262,9 @@ static void Assemble(HycoConeStep *t)
       }
     }
   }
-  for (PetscInt k = 0; k < t->blocks->n; a += t->rank[k++]) { /* 1 - L^T E of each block */
-    for (PetscInt r = a; r < a + t->rank[k]; r++) {
-      for (PetscInt c = a; c < a + t->rank[k]; c++) {
+  for (PetscInt k = 0; k < t->blocks->n; a += t->base_rank[k++]) { /* 1 - L^T E of each block */
+    for (PetscInt r = a; r < a + t->base_rank[k]; r++) {
+      for (PetscInt c = a; c < a + t->base_rank[k]; c++) {
         PetscReal sum = r == c;
 
         for (PetscInt i = 0; i < t->left[r].n; i++) {
@@ -250,54 +315,283 @@ static PetscErrorCode LeastSquares(HycoConeStep *t, PetscBLASInt *info)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* L^T (rho M F - F) */
-static PetscErrorCode RightHandSide(HycoConeStep *t, const PetscReal F[])
+/* L^T (b - rho M b) */
+static PetscErrorCode RightHandSide(HycoConeStep *t, const PetscReal b[])
 {
   PetscFunctionBegin;
   PetscCall(PetscArrayzero(t->product, t->n));
-  PetscCall(HycoAddDenseProduct(t->n, t->M, F, t->product));
+  PetscCall(HycoAddDenseProduct(t->n, t->M, b, t->product));
   for (PetscInt a = 0; a < t->m; a++) {
     t->rhs[a] = 0;
     for (PetscInt i = 0; i < t->left[a].n; i++) {
       const PetscInt row = t->left[a].row[i];
 
-      t->rhs[a] += t->left[a].value[i] * (t->product[row] - F[row] / t->rho[row]);
+      t->rhs[a] += t->left[a].value[i] * (b[row] / t->rho[row] - t->product[row]);
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoConeStepSolve(HycoConeStep *t, const PetscReal F[], PetscBool least, PetscReal s[],
+/* s += E a */
+static void AddForces(const HycoConeStep *t, const PetscReal a[], PetscReal s[])
+{
+  for (PetscInt k = 0; k < t->m; k++) {
+    for (PetscInt i = 0; i < t->right[k].n; i++) s[t->right[k].row[i]] += t->right[k].value[i] * a[k];
+  }
+}
+
+/* -- the update of the base -- */
+
+/* The columns of Z that are missing: b is a unit vector. */
+static PetscErrorCode AddColumns(HycoConeStep *t)
+{
+  const PetscInt n = t->n, before = t->n_columns;
+  const PetscBLASInt m = (PetscBLASInt)t->m;
+  PetscBLASInt count, info = 0;
+  PetscReal *rhs;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < t->c; k++) {
+    if (t->column[t->changed[k]] < 0) t->column[t->changed[k]] = t->n_columns++;
+  }
+  count = (PetscBLASInt)(t->n_columns - before);
+  if (!count) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1((size_t)t->m * (size_t)count + 1, &rhs));
+  PetscCall(PetscArrayzero(t->Z + (size_t)before * (size_t)n, (size_t)n * (size_t)count));
+  for (PetscInt k = 0; k < t->c; k++) {
+    const PetscInt row = t->changed[k], column = t->column[row];
+    const PetscReal *M = t->M + (size_t)row * (size_t)n;
+
+    if (column < before) continue;
+    t->Z[(size_t)column * (size_t)n + (size_t)row] = 1;
+    for (PetscInt a = 0; a < t->m; a++) {
+      PetscReal sum = 0;
+
+      for (PetscInt i = 0; i < t->left[a].n; i++) {
+        const PetscInt at = t->left[a].row[i];
+
+        sum += t->left[a].value[i] * ((at == row ? 1 / t->rho[at] : 0) - M[at]);
+      }
+      rhs[(size_t)(column - before) * (size_t)t->m + (size_t)a] = sum;
+    }
+  }
+  if (m) LAPACKgetrs_("N", &m, &count, t->A, &m, t->pivot, rhs, &m, &info);
+  for (PetscInt k = 0; k < count; k++)
+    AddForces(t, rhs + (size_t)k * (size_t)t->m, t->Z + (size_t)(before + k) * (size_t)n);
+  PetscCall(PetscFree(rhs));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* (M v)_row */
+static PetscReal RowTimes(const HycoConeStep *t, PetscInt row, const PetscReal v[])
+{
+  const PetscBLASInt n = (PetscBLASInt)t->n, one = 1;
+  const PetscInt stride = t->symmetric ? 1 : t->n;
+  const PetscBLASInt step = (PetscBLASInt)stride;
+
+  return BLASdot_(&n, t->M + (size_t)row * (t->symmetric ? (size_t)t->n : 1), &step, v, &one);
+}
+
+/* ((I - rho M) Z)_row for all columns. */
+static const PetscReal *RowOfQ(HycoConeStep *t, PetscInt row)
+{
+  PetscReal *Q = t->Q + (size_t)row * HYCO_CONE_CHANGES;
+
+  for (PetscInt c = t->known[row]; c < t->n_columns; c++) {
+    const PetscReal *z = t->Z + (size_t)c * (size_t)t->n;
+
+    Q[c] = z[row] - t->rho[row] * RowTimes(t, row, z);
+  }
+  t->known[row] = t->n_columns;
+  return Q;
+}
+
+/* The change of row k's DP: *first row and size of its block. */
+static PetscInt Change(const HycoConeStep *t, PetscInt k, PetscInt *first, PetscReal change[HYCO_MAX_BLOCK])
+{
+  const PetscInt b = t->block[k], size = t->blocks->row[b + 1] - t->blocks->row[b];
+  const size_t at = (size_t)b * HYCO_BLOCK + (size_t)((t->changed[k] - t->p - t->blocks->row[b]) * size);
+
+  *first = t->p + t->blocks->row[b];
+  for (PetscInt j = 0; j < size; j++) change[j] = t->DP[at + (size_t)j] - t->base[at + (size_t)j];
+  return size;
+}
+
+/* The factor of I + R Z; *regular: it is not nearly singular. */
+static PetscErrorCode Update(HycoConeStep *t, PetscBool *regular)
+{
+  const PetscBLASInt c = (PetscBLASInt)t->c;
+  PetscBLASInt info = 0;
+  PetscReal least = PETSC_MAX_REAL, most = 0;
+
+  PetscFunctionBegin;
+  *regular = PETSC_TRUE;
+  if (t->updated || !t->c) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(AddColumns(t));
+  for (PetscInt r = 0; r < c; r++) {
+    PetscReal change[HYCO_MAX_BLOCK];
+    PetscInt first;
+    const PetscInt size = Change(t, r, &first, change);
+
+    for (PetscInt k = 0; k < c; k++) t->S[k * c + r] = r == k;
+    for (PetscInt j = 0; j < size; j++) {
+      const PetscReal *Q = change[j] != 0 ? RowOfQ(t, first + j) : NULL;
+
+      for (PetscInt k = 0; Q && k < c; k++) t->S[k * c + r] -= change[j] * Q[t->column[t->changed[k]]];
+    }
+  }
+  LAPACKgetrf_(&c, &c, t->S, &c, t->small_pivot, &info);
+  for (PetscInt k = 0; k < c; k++) {
+    least = PetscMin(least, PetscAbsReal(t->S[k * (c + 1)]));
+    most = PetscMax(most, PetscAbsReal(t->S[k * (c + 1)]));
+  }
+  *regular = t->updated = (PetscBool)(info == 0 && least >= SINGULAR * PetscMax(most, 1));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* s -= Z (I + R Z)^-1 R s; with q (b NULL) the right-hand side has changed with DP, too: s is a point, not a step. Rows in
+   which DP is now 0 are those of b without round-off: open contacts have no force. */
+static PetscErrorCode Correct(HycoConeStep *t, const PetscReal q[], const PetscReal b[], PetscReal s[])
+{
+  const PetscBLASInt one = 1, c = (PetscBLASInt)t->c, n = (PetscBLASInt)t->n;
+  PetscBLASInt info = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt r = 0; r < c; r++) {
+    PetscReal change[HYCO_MAX_BLOCK];
+    PetscInt first;
+    const PetscInt size = Change(t, r, &first, change);
+
+    t->small[r] = 0;
+    for (PetscInt j = 0; j < size; j++) {
+      if (change[j] != 0)
+        t->small[r] -=
+            change[j] * (s[first + j] - t->rho[first + j] * (RowTimes(t, first + j, s) + (q ? q[first + j] : 0)));
+    }
+  }
+  if (c) LAPACKgetrs_("N", &c, &one, t->S, &c, t->small_pivot, t->small, &c, &info);
+  for (PetscInt r = 0; r < c; r++) {
+    const PetscReal share = -t->small[r];
+
+    BLASaxpy_(&n, &share, t->Z + (size_t)t->column[t->changed[r]] * (size_t)n, &one, s, &one);
+  }
+  for (PetscInt r = 0; r < c; r++) {
+    const PetscInt k = t->block[r], row = t->changed[r], size = t->blocks->row[k + 1] - t->blocks->row[k];
+    const PetscReal *D = t->DP + (size_t)k * HYCO_BLOCK + (row - t->p - t->blocks->row[k]) * size;
+    PetscBool zero = PETSC_TRUE;
+
+    for (PetscInt j = 0; j < size; j++) zero = (PetscBool)(zero && D[j] == 0);
+    if (zero) s[row] = b ? b[row] : 0;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The base is factored, and its update; if that is nearly singular the present DP becomes the base. */
+static PetscErrorCode Prepare(HycoConeStep *t)
+{
+  PetscBool regular;
+
+  PetscFunctionBegin;
+  Factor(t);
+  PetscCall(Update(t, &regular));
+  if (regular) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(TakeBase(t));
+  Factor(t);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoConeStepRenew(HycoConeStep *t)
+{
+  PetscFunctionBegin;
+  if (t->c) PetscCall(TakeBase(t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoConeStepSolve(HycoConeStep *t, const PetscReal b[], PetscBool least, PetscReal s[],
                                  PetscBool *regular)
 {
-  const PetscBLASInt one = 1, m = (PetscBLASInt)t->m;
-  PetscBLASInt info = 0;
+  const PetscBLASInt one = 1;
+  PetscBLASInt m, info = 0;
   PetscReal size = 0;
 
   PetscFunctionBegin;
-  PetscCall(RightHandSide(t, F));
-  for (PetscInt i = 0; i < t->n; i++) s[i] = -F[i];
+  if (least && t->c) PetscCall(TakeBase(t));
+  if (!least) PetscCall(Prepare(t));
+  m = (PetscBLASInt)t->m;
+  PetscCall(RightHandSide(t, b));
+  PetscCall(PetscArraycpy(s, b, t->n));
   if (least && m) PetscCall(LeastSquares(t, &info));
-  if (!least) Factor(t);
   if (!least) info = t->info;
   if (!least && m && !info) LAPACKgetrs_("N", &m, &one, t->A, &m, t->pivot, t->rhs, &m, &info);
-  for (PetscInt a = 0; a < m && !info; a++) {
-    for (PetscInt i = 0; i < t->right[a].n; i++) s[t->right[a].row[i]] += t->right[a].value[i] * t->rhs[a];
-  }
+  if (!info) AddForces(t, t->rhs, s);
+  if (!least && !info) PetscCall(Correct(t, NULL, b, s));
   for (PetscInt i = 0; i < t->n; i++) size += PetscAbsReal(s[i]);
   *regular = (PetscBool)(info == 0 && !PetscIsInfOrNanReal(size));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether P(y) = DP y in all blocks. */
+static PetscErrorCode IsHomogeneous(const HycoConeStep *t, const PetscReal y[], PetscBool *is)
+{
+  PetscFunctionBegin;
+  *is = PETSC_TRUE;
+  for (PetscInt k = 0; k < t->blocks->n && *is; k++) {
+    const PetscInt first = t->p + t->blocks->row[k], size = t->blocks->row[k + 1] - t->blocks->row[k];
+    const PetscReal *D = t->DP + (size_t)k * HYCO_BLOCK;
+    PetscReal z[HYCO_MAX_BLOCK], rest = 0, most = 0;
+
+    PetscCall(HycoBlockProject(t->blocks, k, y + first, z));
+    for (PetscInt i = 0; i < size; i++) {
+      for (PetscInt j = 0; j < size; j++) z[i] -= D[i * size + j] * y[first + j];
+      rest = PetscMax(rest, PetscAbsReal(z[i]));
+      most = PetscMax(most, PetscAbsReal(y[first + i]));
+    }
+    *is = (PetscBool)(rest <= HOMOGENEOUS * most);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoConeStepPoint(HycoConeStep *t, const PetscReal q[], const PetscReal y[], PetscReal z[],
+                                 PetscBool *regular, PetscBool *served)
+{
+  const PetscBLASInt one = 1;
+  PetscBLASInt m, info;
+  PetscReal size = 0;
+
+  PetscFunctionBegin;
+  *regular = PETSC_TRUE;
+  PetscCall(IsHomogeneous(t, y, served));
+  if (!*served) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(Prepare(t));
+  m = (PetscBLASInt)t->m;
+  info = t->info;
+  for (PetscInt a = 0; a < t->m; a++) {
+    t->rhs[a] = 0;
+    for (PetscInt i = 0; i < t->left[a].n; i++) t->rhs[a] -= t->left[a].value[i] * q[t->left[a].row[i]];
+  }
+  if (m && !info) LAPACKgetrs_("N", &m, &one, t->A, &m, t->pivot, t->rhs, &m, &info);
+  PetscCall(PetscArrayzero(z, t->n));
+  if (!info) AddForces(t, t->rhs, z);
+  if (!info) PetscCall(Correct(t, q, NULL, z));
+  for (PetscInt i = 0; i < t->n; i++) size += PetscAbsReal(z[i]);
+  *regular = (PetscBool)(info == 0 && !PetscIsInfOrNanReal(size));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of det A times that of the update. */
 PetscErrorCode HycoConeStepSign(HycoConeStep *t, PetscInt *sign)
 {
   PetscFunctionBegin;
-  Factor(t);
+  PetscCall(Prepare(t));
   /* det A is the product of U's diagonal, with a change of sign for each exchange of rows; det A = det J. */
   *sign = t->info == 0;
   for (PetscInt a = 0; a < t->m; a++) {
     if (t->A[(size_t)a * (size_t)(t->m + 1)] < 0) *sign = -*sign;
     if (t->pivot[a] != a + 1) *sign = -*sign;
+  }
+  for (PetscInt k = 0; k < t->c; k++) {
+    if (t->S[k * (t->c + 1)] < 0) *sign = -*sign;
+    if (t->small_pivot[k] != k + 1) *sign = -*sign;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

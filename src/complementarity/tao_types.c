@@ -192,13 +192,20 @@ static PetscErrorCode CreateKSP(Tao tao)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode Create(Tao tao, PetscErrorCode (*solve)(Tao))
+{
+  PetscFunctionBegin;
+  PetscCall(TaoParametersInitialize(tao));
+  tao->ops->solve = solve;
+  tao->data = NULL;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* For any program: -tao_type with this name. */
 static PetscErrorCode CreateActiveSet(Tao tao)
 {
   PetscFunctionBegin;
-  PetscCall(TaoParametersInitialize(tao));
-  tao->ops->solve = SolveActiveSet;
-  tao->data = NULL;
+  PetscCall(Create(tao, SolveActiveSet));
   PetscCall(CreateKSP(tao));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -206,21 +213,13 @@ static PetscErrorCode CreateActiveSet(Tao tao)
 /* No KSP: pivots need none. */
 static PetscErrorCode CreateLemke(Tao tao)
 {
-  PetscFunctionBegin;
-  PetscCall(TaoParametersInitialize(tao));
-  tao->ops->solve = SolveLemke;
-  tao->data = NULL;
-  PetscFunctionReturn(PETSC_SUCCESS);
+  return Create(tao, SolveLemke);
 }
 
 /* Only with a HycoTao as data, which has the blocks. */
 static PetscErrorCode CreateSemismooth(Tao tao)
 {
-  PetscFunctionBegin;
-  PetscCall(TaoParametersInitialize(tao));
-  tao->ops->solve = SolveSemismooth;
-  tao->data = NULL;
-  PetscFunctionReturn(PETSC_SUCCESS);
+  return Create(tao, SolveSemismooth);
 }
 
 /* Once, by the package's start; a second registration replaces the first. */

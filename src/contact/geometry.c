@@ -144,19 +144,39 @@ static PetscErrorCode Geometry(HycoFE fe, const HycoPairs *pairs, PetscReal work
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Keeps what was computed for the state of fe; not normals that are turned, which is no part of it. */
+static PetscErrorCode KeepGeometry(HycoFE fe, HycoPairs *pairs, const PetscReal normal[], const PetscReal gap[])
+{
+  PetscFunctionBegin;
+  pairs->drawn = 0;
+  if (!fe->drawn || fe->n_turned) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscRealloc((size_t)(4 * pairs->n + 1) * sizeof(PetscReal), &pairs->geometry));
+  PetscCall(PetscArraycpy(pairs->geometry, normal, 3 * pairs->n));
+  PetscCall(PetscArraycpy(pairs->geometry + 3 * pairs->n, gap, pairs->n));
+  pairs->drawn = fe->drawn;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Unit normals (n x 3, from slave to master) and gaps D (n, length) at the current parameters; searches masters
-   first if surfaces have moved. Not collective. */
+   first if surfaces have moved. Along a path in which nothing of them changes they are computed once. Not
+   collective. */
 PetscErrorCode HycoContactGeometry(HycoFE fe, HycoPairs *pairs, PetscReal normal[], PetscReal gap[])
 {
   PetscReal *work;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
+  if (fe->drawn && pairs->drawn == fe->drawn && !fe->n_turned) {
+    PetscCall(PetscArraycpy(normal, pairs->geometry, 3 * pairs->n));
+    PetscCall(PetscArraycpy(gap, pairs->geometry + 3 * pairs->n, pairs->n));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(HycoPairsMove(fe, pairs));
   PetscCall(PetscMalloc1(3 * fe->mesh->n_nodes + 6 * pairs->n, &work));
   ierr = Geometry(fe, pairs, work, normal, gap);
   PetscCall(PetscFree(work));
   PetscCall(ierr);
   PetscCall(HycoContactCheck(fe, pairs, normal, gap));
+  PetscCall(KeepGeometry(fe, pairs, normal, gap));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -36,8 +36,8 @@ PetscErrorCode HycoPairsDestroy(HycoPairs *pairs)
 {
   PetscFunctionBegin;
   HycoFreeAll(&pairs->slave, &pairs->contact, &pairs->master_start, &pairs->master, &pairs->weight, &pairs->search,
-              &pairs->number);
-  pairs->n = pairs->room = pairs->place = 0;
+              &pairs->number, &pairs->geometry);
+  pairs->n = pairs->room = pairs->place = pairs->drawn = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

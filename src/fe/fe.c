@@ -3,7 +3,7 @@
 #include <hycomaterialimpl.h>
 #include "assembly_map.h"
 
-/* NULL-safe. The tables belong to the DM, of which fe has a reference; those of HycoFECreateRead() to the caller. */
+/* NULL-safe. The tables belong to the DM, of which fe has a reference; those of HycoFECreateOn() without a DM to the caller. */
 PetscErrorCode HycoFEDestroy(HycoFE *fe)
 {
   PetscFunctionBegin;
@@ -172,11 +172,11 @@ PetscErrorCode HycoFECreate(HycoScene scene, DM dm, HycoFE *fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Without a DM: only for the search of ties, whose weights the DM's cones need. */
-PetscErrorCode HycoFECreateRead(HycoScene scene, HycoMesh mesh, HycoFE *fe)
+/* Without a DM for the search of ties, whose weights the DM's cones need, and for received surfaces. */
+PetscErrorCode HycoFECreateOn(HycoScene scene, HycoMesh mesh, HycoFE *fe)
 {
   PetscFunctionBegin;
-  PetscCall(Create(scene, NULL, mesh, fe));
+  PetscCall(Create(scene, mesh->dm, mesh, fe));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -209,6 +209,7 @@ PetscErrorCode HycoFESetDrawn(HycoFE fe)
   PetscCall(PetscArraycpy(fe->X, fe->mesh->xyz, 3 * fe->mesh->n_nodes));
   /* Unique in the process, not only in fe. */
   fe->place = ++places;
+  fe->drawn = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -439,6 +440,7 @@ void HycoSceneReaches(HycoScene scene, PetscBool reaches[])
    everything. Not collective. */
 PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
 {
+  static PetscInt drawn = 0;
   PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, first = (PetscBool)!fe->ready;
   HycoChanges c;
 
@@ -461,6 +463,7 @@ PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
     PetscCall(HycoMirrorFind(fe));
     for (PetscInt k = 0; k < fe->n_loads; k++) fe->shares[k].ready = PETSC_FALSE;
   }
+  if (first || c.rows || c.gaps) fe->drawn = ++drawn;
   /* After the nodes: values and directions may depend on the position. */
   if (first || !fe->fixed_constant) PetscCall(SetSupports(fe));
   if (!fe->without_cells) {

@@ -263,13 +263,7 @@ void HycoPointStrain(HycoFE fe, const HycoElement *el, PetscInt cell, const Pets
   const PetscInt *node = m->cells + cell * m->nv;
   PetscReal h[3][3] = {{0}}, excess = 0;
 
-  for (PetscInt a = 0; a < el->nv && m->dim == 2; a++) {
-    const PetscReal *own = u + node[a] * 2;
-
-    for (PetscInt d = 0; d < 3; d++) h[0][d] += own[0] * g[a][d];
-    for (PetscInt d = 0; d < 3; d++) h[1][d] += own[1] * g[a][d];
-  }
-  for (PetscInt a = 0; a < el->nv && m->dim != 2; a++) {
+  for (PetscInt a = 0; a < el->nv; a++) {
     const PetscReal *own = u + node[a] * m->dim;
 
     for (PetscInt c = 0; c < m->dim; c++) {

@@ -1,6 +1,7 @@
 /* Stresses and energies of a displacement field, cell by cell. */
 #include <hycokinematics.h>
 #include <hycomaterialimpl.h>
+#include <math.h>
 
 /* The mean gradients of the shape functions in a cell, if its dilatation uses them. */
 typedef struct {
@@ -8,7 +9,6 @@ typedef struct {
   PetscReal g[HYCO_CELL_NODES][3];
 } Mean;
 
-/* Once for each cell, not for each point. */
 static PetscErrorCode GetMean(HycoFE fe, const HycoElement *el, PetscInt cell, Mean *mean)
 {
   PetscFunctionBegin;
@@ -27,41 +27,105 @@ static PetscErrorCode AtPoint(HycoFE fe, const HycoElement *el, PetscInt cell, P
   PetscFunctionBegin;
   PetscCall(HycoGradients(fe, el, cell, q, g, w));
   HycoPointStrain(fe, el, cell, u, g, mean->used ? mean->g : NULL, e);
-  /* What is left causes stress. */
   for (PetscInt k = 0; k < 3 && fe->thermal; k++) e[k] -= fe->thermal[cell * el->nq + q];
   for (PetscInt k = 0; k < 6; k++) s[k] = 0;
   HycoTangentApply(HycoFEIsIsotropic(fe, cell), fe->dim, fe->tangent + fe->tangent_start[cell] + q * size, e, s);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFEStress(HycoFE fe, const PetscReal u[], PetscReal sigma[])
+/* sigma[n_sigma] += the volume mean over a cell of the elastic stress C (e - e_thermal). */
+static PetscErrorCode AddMean(HycoFE fe, const HycoElement *el, PetscInt cell, const PetscReal u[], PetscReal sigma[])
 {
+  PetscReal volume = 0, sum[6] = {0};
+  Mean mean;
+
   PetscFunctionBegin;
-  PetscCall(HycoFEStressIn(fe, NULL, u, sigma));
+  PetscCall(GetMean(fe, el, cell, &mean));
+  for (PetscInt q = 0; q < el->nq; q++) {
+    PetscReal e[6], s[6], w;
+
+    PetscCall(AtPoint(fe, el, cell, q, u, &mean, e, s, &w));
+    for (PetscInt k = 0; k < fe->n_sigma; k++) sum[k] += w * s[k];
+    volume += w;
+  }
+  for (PetscInt k = 0; k < fe->n_sigma; k++) sigma[k] += sum[k] / volume;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoFEStressIn(HycoFE fe, const PetscBool in[], const PetscReal u[], PetscReal sigma[])
+/* Volume means by cell, sigma[n_cells][n_sigma]. */
+PetscErrorCode HycoFEStress(HycoFE fe, const PetscReal u[], PetscReal sigma[])
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
 
   PetscFunctionBegin;
   PetscCall(PetscArrayzero(sigma, fe->mesh->n_cells * fe->n_sigma));
-  for (PetscInt cell = 0; cell < fe->mesh->n_cells; cell++) {
-    PetscReal volume = 0;
-    Mean mean;
+  for (PetscInt cell = 0; cell < fe->mesh->n_cells; cell++)
+    PetscCall(AddMean(fe, el, cell, u, sigma + cell * fe->n_sigma));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the mean stress of a cell is its tangent times the mean strain: one tangent, and strains that are gradients.
+   The element bbar changes no mean. */
+static PetscBool IsUniform(HycoFE fe, const HycoElement *el, PetscInt cell)
+{
+  const PetscInt size = fe->tangent_size[fe->mesh->cell_body[cell]];
+  const PetscReal *tangent = fe->tangent + fe->tangent_start[cell];
+
+  if (fe->formulation == HYCO_AXISYMMETRIC || fe->thermal) return PETSC_FALSE;
+  for (PetscInt k = size; k < el->nq * size; k++) {
+    if (tangent[k] != tangent[k % size]) return PETSC_FALSE;
+  }
+  return PETSC_TRUE;
+}
+
+/* The mean gradients g (3 nv) of a cell, unless they are those of the same nodes X (3 nv). */
+static PetscErrorCode KeepMean(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal X[], PetscReal g[])
+{
+  const PetscInt *node = fe->mesh->cells + cell * el->nv;
+  PetscReal volume = 0;
+  PetscBool same = PETSC_TRUE;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < 3 * el->nv; k++) same = (PetscBool)(same && X[k] == fe->X[3 * node[k / 3] + k % 3]);
+  if (same) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscArrayzero(g, 3 * el->nv));
+  X[0] = NAN; /* not kept after an error */
+  for (PetscInt q = 0; q < el->nq; q++) {
+    PetscReal own[HYCO_CELL_NODES][3], w;
+
+    PetscCall(HycoGradients(fe, el, cell, q, own, &w));
+    for (PetscInt k = 0; k < 3 * el->nv; k++) g[k] += w * own[k / 3][k % 3];
+    volume += w;
+  }
+  for (PetscInt k = 0; k < 3 * el->nv; k++) g[k] /= volume;
+  for (PetscInt k = 0; k < 3 * el->nv; k++) X[k] = fe->X[3 * node[k / 3] + k % 3];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFEStressKept(HycoFE fe, const PetscBool in[], const PetscReal u[], PetscReal **kept,
+                                PetscReal sigma[])
+{
+  const HycoElement *el = HycoElementGet(fe->mesh->type);
+  const PetscInt n = fe->mesh->n_cells, size = 3 * el->nv;
+
+  PetscFunctionBegin;
+  if (!*kept) {
+    PetscCall(PetscMalloc1((size_t)n * (size_t)(2 * size) + 1, kept));
+    for (PetscInt cell = 0; cell < n; cell++) (*kept)[(size_t)cell * (size_t)(2 * size)] = NAN;
+  }
+  PetscCall(PetscArrayzero(sigma, n * fe->n_sigma));
+  for (PetscInt cell = 0; cell < n; cell++) {
+    PetscReal *own = *kept + (size_t)cell * (size_t)(2 * size), *of = sigma + cell * fe->n_sigma, e[6], s[6] = {0};
 
     if (in && !in[cell]) continue;
-    PetscCall(GetMean(fe, el, cell, &mean));
-    for (PetscInt q = 0; q < el->nq; q++) {
-      PetscReal e[6], s[6], w;
-
-      PetscCall(AtPoint(fe, el, cell, q, u, &mean, e, s, &w));
-      for (PetscInt k = 0; k < fe->n_sigma; k++) sigma[cell * fe->n_sigma + k] += w * s[k];
-      volume += w;
+    if (!IsUniform(fe, el, cell)) {
+      PetscCall(AddMean(fe, el, cell, u, of));
+      continue;
     }
-    /* A cell that passes HycoGradients() has a volume. */
-    for (PetscInt k = 0; k < fe->n_sigma; k++) sigma[cell * fe->n_sigma + k] /= volume;
+    PetscCall(KeepMean(fe, el, cell, own, own + size));
+    HycoPointStrain(fe, el, cell, u, (PetscReal(*)[3])(own + size), NULL, e);
+    HycoTangentApply(HycoFEIsIsotropic(fe, cell), fe->dim, fe->tangent + fe->tangent_start[cell], e, s);
+    PetscCall(PetscArraycpy(of, s, fe->n_sigma));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -236,7 +236,8 @@ PetscReal HycoMises(PetscInt dim, const PetscReal s[])
 
   if (dim == 1) return PetscAbsReal(s[0]);
   mean = (s[0] + s[1] + s[2]) / 3;
-  for (PetscInt c = 0; c < HycoStrainSize(dim); c++) sum += c < 3 ? (s[c] - mean) * (s[c] - mean) : 2 * s[c] * s[c];
+  for (PetscInt c = 0; c < 3; c++) sum += (s[c] - mean) * (s[c] - mean);
+  for (PetscInt c = 3; c < (dim == 2 ? 4 : 6); c++) sum += 2 * s[c] * s[c];
   return PetscSqrtReal(1.5 * sum);
 }
 
@@ -258,7 +259,8 @@ void HycoTangentApply(PetscBool isotropic, PetscInt dim, const PetscReal tangent
   } else if (isotropic) {
     const PetscReal volume = tangent[0] * (strain[0] + strain[1] + strain[2]);
 
-    for (PetscInt c = 0; c < n; c++) stress[c] = c < 3 ? volume + 2 * tangent[1] * strain[c] : tangent[1] * strain[c];
+    for (PetscInt c = 0; c < 3; c++) stress[c] = volume + 2 * tangent[1] * strain[c];
+    for (PetscInt c = 3; c < n; c++) stress[c] = tangent[1] * strain[c];
   } else {
     for (PetscInt r = 0; r < n; r++) {
       stress[r] = 0;

@@ -89,6 +89,37 @@ PetscErrorCode HycoROMExpand(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The unknowns of fe that are not full-order ones, whose displacements the modes give. */
+static PetscErrorCode FindModal(HycoROM m)
+{
+  PetscInt n = 0, f = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(m->fe->n_dof + 1, &m->modal));
+  for (PetscInt i = 0; i < m->fe->n_dof; i++) {
+    while (f < m->model->n_fe && m->model->fe_dof[f] < i) f++;
+    if (f == m->model->n_fe || m->model->fe_dof[f] != i) m->modal[n++] = i;
+  }
+  m->n_modal = n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMExpandModal(HycoROM m)
+{
+  const PetscInt l = m->model->l;
+
+  PetscFunctionBegin;
+  if (!m->modal) PetscCall(FindModal(m));
+  for (PetscInt k = 0; k < m->n_modal; k++) {
+    const PetscInt i = m->modal[k];
+    const PetscReal *v = m->model->V + (size_t)i * (size_t)l;
+
+    m->U[i] = m->fe->u0[i];
+    for (PetscInt j = 0; j < l; j++) m->U[i] += v[j] * m->gamma[j];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* If the reduced problem is on the whole of the model's mesh, its own rows are those of all contacts. */
 PetscErrorCode HycoROMBringContacts(HycoROM m, HycoFE *fe)
 {

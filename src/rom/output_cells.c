@@ -12,6 +12,7 @@ struct _n_HycoOutputCells {
   HycoMesh mesh; /* with these cells */
   HycoFE fe;
   PetscReal *V, *u, *sigma;  /* n_dof x l; n_dof; n_cells x n_sigma */
+  PetscReal *means;          /* of HycoFEStressKept() */
   PetscBool *stressed;       /* by cell: sigma is needed there, elsewhere it is 0 */
   PetscInt *fe_at;           /* by full-order displacement: its index in u; -1: none */
   PetscReal *reaction;       /* n_dof, of supports; NULL: no quantity needs them */
@@ -28,8 +29,8 @@ PetscErrorCode HycoOutputCellsDestroy(HycoOutputCells *cells)
   PetscCall(HycoFEDestroy(&(*cells)->fe_surface));
   PetscCall(HycoResultantsDestroy(&(*cells)->resultants));
   PetscCall(HycoMeshDestroy(&(*cells)->mesh));
-  HycoFreeAll(&(*cells)->V, &(*cells)->u, &(*cells)->sigma, &(*cells)->stressed, &(*cells)->fe_at, &(*cells)->reaction,
-              &(*cells)->surface_node);
+  HycoFreeAll(&(*cells)->V, &(*cells)->u, &(*cells)->sigma, &(*cells)->means, &(*cells)->stressed, &(*cells)->fe_at,
+              &(*cells)->reaction, &(*cells)->surface_node);
   PetscCall(PetscFree(*cells));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -268,7 +269,7 @@ static PetscErrorCode Follow(HycoROM m, HycoOutputCells p)
   PetscCall(HycoFESetParameters(p->fe, m->fe->mu));
   Displace(m, p, m->gamma, U_fe);
   PetscCall(PetscFree(U_fe));
-  PetscCall(HycoFEStressIn(p->fe, p->stressed, p->u, p->sigma));
+  PetscCall(HycoFEStressKept(p->fe, p->stressed, p->u, &p->means, p->sigma));
   PetscCall(ReactPredicted(m, p, NULL, m->Lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

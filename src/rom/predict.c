@@ -156,6 +156,6 @@ PetscErrorCode HycoROMReset(HycoROM m)
   m->of_fe = NULL;
   PetscCall(HycoROMDropPairs(&m->pairs));
   PetscCall(HycoTraceFree(m));
-  HycoFreeAll(&m->contact, &m->gamma, &m->U, &m->Lambda, &m->stress, &m->slave_id);
+  HycoFreeAll(&m->contact, &m->gamma, &m->U, &m->Lambda, &m->stress, &m->slave_id, &m->modal);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -89,15 +89,31 @@ PetscErrorCode HycoTraceMeasure(HycoROM m, HycoStep *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The fields of the cells; with `linear` bodies at U, in `state` too only if it is needed for that. */
+static PetscErrorCode ComputeFields(HycoROM m, PetscBool linear, HycoFEState state, PetscReal sigma[],
+                                    PetscReal mises[], PetscReal inelastic[], HycoStep *s)
+{
+  PetscReal stored = 0;
+  PetscBool served = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  if (linear) PetscCall(HycoFELinearFields(m->fe, m->U, sigma, mises, &stored, &served));
+  if (served) PetscCall(PetscArrayzero(inelastic, m->model->mesh->n_cells));
+  if (linear && !served) PetscCall(HycoFELinearStress(m->fe, m->U, state, &stored));
+  if (!served) PetscCall(HycoFEStateFields(m->fe, state, sigma, mises, inelastic, NULL));
+  s->stored += stored;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* At an accepted, listed time with the state there. */
-PetscErrorCode HycoTraceRecord(HycoROM m, HycoFEState state, HycoStep *s)
+PetscErrorCode HycoTraceRecord(HycoROM m, PetscBool linear, HycoFEState state, HycoStep *s)
 {
   PetscReal *sigma, *inelastic, *mises;
 
   PetscFunctionBegin;
   PetscCall(HycoTraceList(m, &sigma, &inelastic));
   PetscCall(PetscMalloc1(m->model->mesh->n_cells, &mises));
-  PetscCall(HycoFEStateFields(m->fe, state, sigma, mises, inelastic, NULL));
+  PetscCall(ComputeFields(m, linear, state, sigma, mises, inelastic, s));
   for (PetscInt e = 0; e < m->model->mesh->n_cells; e++) {
     s->mises = PetscMax(s->mises, mises[e]);
     s->inelastic = PetscMax(s->inelastic, inelastic[e]);
@@ -218,9 +234,10 @@ PetscErrorCode HycoROMSetStep(HycoROM m, PetscInt k)
     PetscCall(HycoFESetParameters(m->fe, mu));
   PetscCall(PetscArraycpy(m->gamma, r->gamma + (size_t)at * (size_t)m->model->l, m->model->l));
   PetscCall(PetscArraycpy(m->Lambda, r->Lambda + (size_t)k * (size_t)m->model->pairs.n, m->model->pairs.n));
-  PetscCall(HycoROMExpand(m));
+  PetscCall(HycoROMExpandModal(m));
   for (PetscInt f = 0; f < m->model->n_fe; f++)
     m->U[m->model->fe_dof[f]] = r->U_fe[(size_t)at * (size_t)m->model->n_fe + (size_t)f];
+  HycoFEComplete(m->fe, m->U);
   HycoTraceShow(m, k);
   m->spread = PETSC_TRUE;
   m->whole_current = m->beyond_current = PETSC_FALSE;

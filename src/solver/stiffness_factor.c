@@ -229,6 +229,7 @@ PetscErrorCode HycoStiffnessFactor(HycoSolver s, Mat Bt, Mat B, PetscReal S[], P
   if (same && !f->lu) PetscCall(HycoNameLinear(s, NULL));
   if (same) PetscFunctionReturn(PETSC_SUCCESS);
   f->of.K = 0; /* invalid until completed */
+  f->made++;
   PetscCall(PetscObjectTypeCompare((PetscObject)K, MATSEQDENSE, &dense));
   if (!dense)
     HycoLogged(HYCO_EVENT_FACTOR, FactorSparse(s, Bt, B, S, singular));

@@ -61,6 +61,18 @@ fixed: {{block_sym: {{x: 0}}, foundation_sym: {{x: 0}}, block_top: {{y: -press}}
 contact: {{under: {{type: pair, slave: block_under, master: foundation_top, tolerance: 0.1}}}}
 """
 
+SPRUNG = f"""
+scene: {{title: a cylinder that a soft spring holds above a block, mesh: {MESH.format('roller')}, parameters: [place, press]}}
+parameter: {{place: {{range: [-4, 4]}}, press: {{range: [0.2, 1]}}}}
+body:
+  block: {{young: 10, poisson: 0.4}}
+  cylinder: {{young: 100, poisson: 0.3, map: {{x: x + place}}}}
+fixed: {{block_base: {{x: 0, y: 0}}, cylinder_top: {{x: 0}}}}
+spring: {{cylinder_top: {{y: 1e-4}}}}
+pressure: {{cylinder_top: press}}
+contact: {{under: {{type: surface, slave: cylinder_round, master: block_top}}}}
+"""
+
 LEAF = ("""scene:
   title: a leaf over a bump at any place
   mesh: leaf.msh
@@ -287,6 +299,12 @@ class Bodies(Case):
         """One body under an obstacle that moves, on springs that soften with it."""
         scene = self.write('obstacle.yaml', OBSTACLE)
         self.judge(scene, ('-values_at', '-5.1,0.3,4.4', '-values_depth', '0.07,0.28', '-values_modulus', '6,17'))
+
+    def test_sprung(self):
+        """A body that only a soft spring holds: without contact all of its surface is closed, deeply, and the first problem is of the few nearest ones."""
+        scene = self.write('sprung.yaml', SPRUNG)
+        self.judge(scene, ('-values_place', '-2.3,3.1', '-values_press', '0.4,0.9'), forces=1e-8, model='sprung.h5')
+        self.assertLess(self.hyco('predict', '-model', 'sprung.h5', '-mu', '1.3,0.5')['active_set_iterations'], 5)
 
     def test_shape(self):
         """A radius: more samples reduce the errors of the forces, which stay within the bound; points between the samples. Three are accurate,

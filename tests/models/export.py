@@ -196,6 +196,19 @@ class Export(Case):
                 self.assertIn(word, run.stderr)
             self.assertFalse([f for f in os.listdir(self.folder) if f.startswith('no.')])
 
+    def test_existing(self):
+        """A file of another origin is not overwritten, neither FILE.c nor FILE.h; own ones are."""
+        self.hyco('train', '-scene', os.path.join(SOURCE, 'examples', 'roller'), '-hyco_model_type', 'bodies', '-scatter', '2', '-model', 'roller.h5')
+        for name in ('mine.h', 'mine.c'):
+            with open(self.path(name), 'w', encoding='ascii') as f:
+                f.write('int mine;\n')
+            run = self.run_raw('export', '-model', 'roller.h5', '-c', 'mine.c')
+            self.assertEqual((run.returncode, len(run.stderr.strip().splitlines())), (1, 1), run.stderr)
+            self.assertIn(name, run.stderr)
+            with open(self.path(name), encoding='ascii') as f:
+                self.assertEqual(f.read(), 'int mine;\n')
+            os.remove(self.path(name))
+
 
 if __name__ == '__main__':
     unittest.main()

@@ -5,6 +5,7 @@ import os
 import re
 import subprocess
 import sys
+import tempfile
 import unittest
 
 from common import PATIENCE
@@ -87,10 +88,25 @@ class Docs(unittest.TestCase):
         self.assertLessEqual(text('README.md').count('\n'), 90)
 
     def test_words(self):
-        """All documents together have at most 40,000 words, not counting what separates the cells of tables."""
+        """All documents together have at most 40,000 words, not counting what separates the cells of tables, nor pages made from the headers."""
         others = [os.path.join(SOURCE, name) for name in ('CHANGELOG.md', 'CONTRIBUTING.md', 'extensions/README.md', 'examples/ladder/README.md')]
-        words = {path: sum(bool(re.search(r'\w', word)) for word in text(path).split()) for path in [*PAGES, *others]}
+        words = {path: sum(bool(re.search(r'\w', word)) for word in text(path).split()) for path in [*PAGES, *others]
+                 if os.sep + 'api' + os.sep not in path}
         self.assertLessEqual(sum(words.values()), 40000, words)
+
+    def test_api(self):
+        """docs/api is what scripts/api-pages makes of the headers, and has every function that they declare with a comment."""
+        with tempfile.TemporaryDirectory() as folder:
+            subprocess.run([os.path.join(SOURCE, 'scripts', 'api-pages'), folder], check=True)
+            pages = os.listdir(folder)
+            self.assertEqual(sorted(pages), sorted(os.listdir(os.path.join(SOURCE, 'docs', 'api'))))
+            for name in pages:
+                with open(os.path.join(folder, name), encoding='utf-8') as f:
+                    made = f.read()
+                self.assertEqual(made, text(f'docs/api/{name}'), f'{name}: run scripts/api-pages')
+                header = text(f'include/{name[:-3]}.h')
+                for function in re.findall(r'^PetscErrorCode (Hyco\w+)\(', header, re.M):
+                    self.assertIn(f' {function}(', made)
 
 
 if __name__ == '__main__':

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import zipfile
 
 from common import PATIENCE, library_path
 
@@ -55,6 +56,32 @@ class Installed(unittest.TestCase):
         self.assertFalse(self.found('**/*impl.h'))
         soname = re.search(r'soname: \[(\S+)\]', run('readelf', '-d', self.library)).group(1)
         self.assertTrue(os.path.exists(os.path.join(os.path.dirname(self.library), soname)))
+
+    def test_fmu(self):
+        """The installed scripts/fmu finds the installed command and its wrapper: an FMU of a model of bodies."""
+        scene = """scene: {title: bar, mesh: mesh.msh, parameters: [p]}
+parameter: {p: {range: [0.25, 1]}}
+body: {bar: {young: 1, poisson: 0}}
+fixed: {left: {x: 0}}
+force: {right: {x: p}}
+contact: {stop: {type: obstacle, group: right, normal: {x: 1}, gap: 0.5}}
+output: {push: {force: x, contact: stop}}
+"""
+        sys.path.insert(0, os.path.join(SOURCE, 'tests', 'verify'))
+        from grids import Grid  # pylint: disable=import-outside-toplevel
+        with tempfile.TemporaryDirectory() as folder:
+            grid = Grid()
+            grid.box('line2', [[0, 0.5, 1]], lambda x: x, 'bar', {'x0': 'left', 'x1': 'right'})
+            grid.write(os.path.join(folder, 'mesh.msh'))
+            with open(os.path.join(folder, 'scene.yaml'), 'w', encoding='ascii') as f:
+                f.write(scene)
+            model, fmu = os.path.join(folder, 'm.h5'), os.path.join(folder, 'm.fmu')
+            hyco, = self.found('bin/hyco')
+            run(hyco, 'train', '-scene', folder, '-hyco_model_type', 'bodies', '-scatter', '2', '-model', model, '-quiet', cwd=folder)
+            script, = self.found('share/doc/hyco/scripts/fmu')
+            run(sys.executable, script, model, fmu, env={k: v for k, v in os.environ.items() if k != 'HYCO'})
+            with zipfile.ZipFile(fmu) as made:
+                self.assertIn('modelDescription.xml', made.namelist())
 
     def test_symbols(self):
         """The library exports the declarations of the installed headers, all of them and nothing else."""

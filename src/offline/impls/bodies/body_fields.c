@@ -727,7 +727,7 @@ static PetscErrorCode BodyCoefficients(HycoReducer t, HycoBodiesFactor *factor, 
       const size_t row = (size_t)(sample * rows + first + j);
 
       for (PetscInt d = 0; d < s->n; d++)
-        s->H[(size_t)(sample * s->n + d) * (size_t)rows + (size_t)(first + j)] = u[j * b->ns + b->start[k] + d];
+        s->H[HycoBodiesColumn(s, sample, d, rows) + (size_t)(first + j)] = u[j * b->ns + b->start[k] + d];
       PetscCall(PetscArraycpy(s->g + row * (size_t)b->p, g + j * b->p, b->p));
       for (PetscInt d = 0; d < b->r; d++) PetscCall(VecDot(v[j], x[d], &s->a[row * (size_t)b->r + (size_t)d]));
       for (PetscInt d = 0; d < factor->n_strains; d++)

@@ -98,7 +98,8 @@ static PetscErrorCode TakeRecords(HycoSubstructures b, const HycoBodiesFactor *f
       const PetscInt at = HycoBodiesSampleOf(b, k, j);
 
       if (at < 0) continue;
-      PetscCall(PetscArraycpy(s->C + (size_t)at * C, r->C, C));
+      for (PetscInt d = 0; d < s->n; d++)
+        PetscCall(PetscArraycpy(s->C + HycoBodiesColumn(s, at, d, s->n), r->C + (size_t)d * (size_t)s->n, s->n));
       PetscCall(PetscArraycpy(s->R + (size_t)at * R, r->R, R));
       PetscCall(PetscArraycpy(s->Z + (size_t)at * Z, r->Z, Z));
       PetscCall(PetscArraycpy(s->work + (size_t)at * work, r->work, work));
@@ -199,9 +200,12 @@ static PetscErrorCode Bound(HycoSubstructures b, const PetscReal mu[], const Hyc
     PetscCall(PetscMalloc3(n + 1, &C, n + 1, &D, s->n_samples, &weight));
     PetscCall(HycoBodiesWeights(b, k, mu, weight));
     PetscCall(PetscArraycpy(C, record->C, n));
-    for (size_t i = 0; i < n; i++) {
-      D[i] = -C[i];
-      for (PetscInt q = 0; q < s->n_samples; q++) D[i] += weight[q] * s->C[(size_t)q * n + i];
+    for (size_t i = 0; i < n; i++) D[i] = -C[i];
+    for (PetscInt d = 0; d < s->n * s->n_samples; d++) {
+      const PetscReal *column = s->C + (size_t)d * (size_t)s->n, share = weight[d % s->n_samples];
+      PetscReal *to = D + (size_t)(d / s->n_samples) * (size_t)s->n;
+
+      for (PetscInt i = 0; i < s->n; i++) to[i] += share * column[i];
     }
     PetscCall(Factor(s->n, C));
     PetscCall(Largest(s->n, C, D, &own));

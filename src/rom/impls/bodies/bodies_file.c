@@ -87,25 +87,58 @@ static const char *At(PetscInt k, const char name[], char path[64])
   return path;
 }
 
-/* H of body k, by surface unknown. Older files have its transpose in each sample, as the dataset H. */
+/* to[b][a] = from[a][b], blocks of `length` numbers. */
+static void Swap(PetscInt n_a, PetscInt n_b, PetscInt length, const PetscReal from[], PetscReal to[])
+{
+  for (PetscInt a = 0; a < n_a; a++) {
+    for (PetscInt b = 0; b < n_b; b++, from += length)
+      PetscCallVoid(PetscArraycpy(to + ((size_t)b * (size_t)n_a + (size_t)a) * (size_t)length, from, length));
+  }
+}
+
+/* C or H of a body, columns of `length` numbers by unknown; in the file sample after sample. */
+static PetscErrorCode MoveColumns(HycoH5 h, const char path[], const HycoSubstructure *s, PetscInt length,
+                                  PetscReal **data)
+{
+  PetscInt rows = s->n_samples * s->n;
+  PetscReal *file = NULL;
+
+  PetscFunctionBegin;
+  if (s->n_samples == 1) {
+    PetscCall(HycoH5Real(h, path, &rows, length, data));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (!HycoH5Reads(h)) {
+    PetscCall(PetscMalloc1((size_t)rows * (size_t)length + 1, &file));
+    Swap(s->n, s->n_samples, length, *data, file);
+  }
+  PetscCall(HycoH5Real(h, path, &rows, length, &file));
+  if (HycoH5Reads(h)) {
+    PetscCall(PetscMalloc1((size_t)rows * (size_t)length + 1, data));
+    Swap(s->n_samples, s->n, length, file, *data);
+  }
+  PetscCall(PetscFree(file));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* H of body k. Older files have its transpose in each sample, as the dataset H. */
 static PetscErrorCode MoveResponses(HycoH5 h, HycoSubstructure *s, PetscInt k, PetscInt columns)
 {
-  PetscInt rows = s->n_samples * s->n, old = s->n_samples * columns;
+  PetscInt old = s->n_samples * columns;
   PetscReal *H = NULL;
   char path[64];
 
   PetscFunctionBegin;
   if (!HycoH5Reads(h) || !HycoH5Has(h, At(k, "H", path))) {
-    PetscCall(HycoH5Real(h, At(k, "responses", path), &rows, columns, &s->H));
+    PetscCall(MoveColumns(h, At(k, "responses", path), s, columns, &s->H));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(HycoH5Real(h, path, &old, s->n, &H));
-  PetscCall(PetscMalloc1((size_t)rows * (size_t)columns + 1, &s->H));
+  PetscCall(PetscMalloc1((size_t)old * (size_t)s->n + 1, &s->H));
   for (PetscInt i = 0; i < old; i++) {
-    const size_t sample = (size_t)(i / columns) * (size_t)s->n * (size_t)columns, column = (size_t)(i % columns);
-
     for (PetscInt j = 0; j < s->n; j++)
-      s->H[sample + (size_t)j * (size_t)columns + column] = H[(size_t)i * (size_t)s->n + (size_t)j];
+      s->H[HycoBodiesColumn(s, i / columns, j, columns) + (size_t)(i % columns)] =
+          H[(size_t)i * (size_t)s->n + (size_t)j];
   }
   PetscCall(PetscFree(H));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -124,7 +157,7 @@ static PetscErrorCode MoveBody(HycoH5 h, HycoSubstructures b, PetscInt k)
   s->m = b->inner_start[k + 1] - b->inner_start[k];
   rows = s->n_samples * s->n;
   columns = s->n_samples * b->p;
-  PetscCall(HycoH5Real(h, At(k, "C", path), &rows, s->n, &s->C));
+  PetscCall(MoveColumns(h, At(k, "C", path), s, s->n, &s->C));
   PetscCall(HycoH5Real(h, At(k, "R", path), &rows, b->r, &s->R));
   PetscCall(HycoH5Real(h, At(k, "Z", path), &rows, b->p, &s->Z));
   PetscCall(HycoH5Real(h, At(k, "work", path), &columns, b->r, &s->work));

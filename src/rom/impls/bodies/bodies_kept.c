@@ -102,7 +102,7 @@ static PetscErrorCode KeepInBody(HycoBodiesWork o, PetscInt k, PetscInt b)
       kept->bytes += 8 * (PetscReal)own->n_samples * (PetscReal)(own->n + kept->m);
     }
     for (PetscInt s = 0; s < own->n_samples; s++)
-      BLASaxpy_(&size, &o->row[e], own->C + ((size_t)s * n + (size_t)place) * n, &one, kept->P[at] + (size_t)s * n,
+      BLASaxpy_(&size, &o->row[e], own->C + HycoBodiesColumn(own, s, place, own->n), &one, kept->P[at] + (size_t)s * n,
                 &one);
   }
   for (PetscInt s = 0; s < own->n_samples && kept->P[at]; s++)

@@ -87,7 +87,7 @@ static void Push(HycoBodiesWork o, PetscInt k, PetscReal y[])
 
     for (PetscInt q = 0; q < own->n_samples; q++) {
       /* C is symmetric, so that a stored column is the row that the unit force needs. */
-      const PetscReal *C = own->C + ((size_t)q * (size_t)own->n + (size_t)(o->row_at[e] - lo)) * (size_t)own->n;
+      const PetscReal *C = own->C + HycoBodiesColumn(own, q, o->row_at[e] - lo, own->n);
       const PetscReal share = o->weight[body][q] * o->row[e] / o->kappa[body];
 
       for (PetscInt i = 0; i < own->n; i++) y[lo + i] -= share * C[i];

@@ -67,7 +67,6 @@ static PetscErrorCode Retry(HycoPath p, PetscReal alpha[], PetscReal Lambda[])
 static PetscErrorCode Rub(HycoROM m, HycoPath p, HycoStepAttempt *a)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
-  const HycoBodiesSurface s = HycoBodiesSurfaceOf(m);
   PetscScalar *L;
   PetscBool solved;
 
@@ -81,8 +80,6 @@ static PetscErrorCode Rub(HycoROM m, HycoPath p, HycoStepAttempt *a)
   HycoBodiesFrictionNormal(w->friction, L);
   PetscCall(PetscArraycpy(m->Lambda, L, m->model->pairs.n));
   PetscCall(VecRestoreArray(p->Lambda, &L));
-  PetscCall(HycoBodiesExpand(&w->bodies, m->gamma));
-  HycoBodiesMove(&w->bodies, &s, m->U);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -164,11 +161,13 @@ static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
 {
   HycoROM m = (HycoROM)p->ctx;
   HycoBodiesPath w = (HycoBodiesPath)m->work;
+  const HycoBodiesSurface s = HycoBodiesSurfaceOf(m);
   const PetscScalar *alpha;
 
   PetscFunctionBegin;
   PetscCall(VecGetArrayRead(p->U, &alpha));
-  if (!w->friction) PetscCall(HycoBodiesExpand(&w->bodies, m->gamma));
+  PetscCall(HycoBodiesExpand(&w->bodies, m->gamma));
+  if (w->friction) HycoBodiesMove(&w->bodies, &s, m->U);
   if (!w->friction) HycoBodiesAddStrains(&w->bodies, alpha, m->gamma);
   PetscCall(VecRestoreArrayRead(p->U, &alpha));
   PetscCall(HycoTraceAdd(m, p->t));
@@ -216,7 +215,6 @@ static PetscErrorCode Record(HycoPath p)
   HycoROM m = (HycoROM)p->ctx;
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   const PetscScalar *alpha, *L;
-  PetscReal stored;
 
   PetscFunctionBegin;
   PetscCall(VecGetArrayRead(p->Lambda, &L));
@@ -226,14 +224,13 @@ static PetscErrorCode Record(HycoPath p)
     HycoBodiesFrictionRestore(w->friction, &w->bodies);
     PetscCall(HycoBodiesExpand(&w->bodies, m->gamma));
   }
-  PetscCall(HycoROMExpand(m));
+  PetscCall(HycoROMExpandModal(m));
   MoveAll(m);
+  HycoFEComplete(m->fe, m->U);
   PetscCall(VecGetArrayRead(p->U, &alpha));
   w->misfit = PetscMax(w->misfit, Misfit(m, alpha));
   PetscCall(VecRestoreArrayRead(p->U, &alpha));
-  PetscCall(HycoFELinearStress(m->fe, m->U, p->begin, &stored));
-  p->now.stored += stored;
-  PetscCall(HycoTraceRecord(m, p->begin, &p->now));
+  PetscCall(HycoTraceRecord(m, PETSC_TRUE, p->begin, &p->now));
   if (w->friction) PetscCall(RecordFriction(m, &p->now));
   p->steps[p->n_steps++] = p->now;
   PetscCall(PetscMemzero(&p->now, sizeof(p->now)));

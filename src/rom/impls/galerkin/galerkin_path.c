@@ -199,7 +199,7 @@ static PetscErrorCode Record(HycoPath p)
   PetscCall(CompleteState(m, p));
   if (m->ops->reconstruct && m->reconstruct) HycoLogged(HYCO_EVENT_RECONSTRUCT, (*m->ops->reconstruct)(m));
   PetscCall(HycoFloatingBalance(m));
-  PetscCall(HycoTraceRecord(m, p->begin, &p->now));
+  PetscCall(HycoTraceRecord(m, PETSC_FALSE, p->begin, &p->now));
   p->steps[p->n_steps++] = p->now;
   PetscCall(PetscMemzero(&p->now, sizeof(p->now)));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -15,7 +15,9 @@ typedef struct {
   PetscReal *S, *g, *L;
   PetscBool *active;
   PetscBool started; /* active is the set of a solution */
-  HycoTao tao;       /* on each rank alone, because the problem is replicated */
+  HycoConeFactor cone;
+  PetscInt made; /* the factor of K that it belongs to: HycoStiffness */
+  HycoTao tao;   /* on each rank alone, because the problem is replicated */
 } Dual;
 
 /* The usual form: one factorisation, then a dense problem. Cost 2: others are cheaper only for many contacts. */
@@ -87,6 +89,8 @@ static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singul
     s->stiffness.of.K = 0;
   }
   PetscCall(HycoStiffnessFactor(s, y->Bt, y->B, d->S, singular));
+  if (d->made != s->stiffness.made) HycoConeFactorForget(d->cone);
+  d->made = s->stiffness.made;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -173,7 +177,9 @@ static PetscErrorCode SolveForces(HycoSolver s, Dual *d, Vec start, PetscBool *s
   if (blocks)
     PetscCall(PetscArrayzero(d->L, d->p)); /* the path decides between several solutions: by its last forces */
   if (blocks) PetscCall(GatherVec(HycoComm(s), start, d->L + d->p));
+  if (blocks && !d->cone) PetscCall(HycoConeFactorCreate(&d->cone));
   lcp.blocks = blocks;
+  lcp.cone = d->cone;
   PetscCall(HycoTaoSolveLCP(d->tao, &lcp, d->active, d->L, &s->its, solved));
   if (blocks)
     PetscCall(HycoBlocksAdmit(blocks, d->L + d->p)); /* inadmissible by round-off; the residuals are recomputed */
@@ -321,6 +327,7 @@ static PetscErrorCode Refine(HycoSolver s, HycoSolverForm form, PetscBool *bette
   if (!f->lu || !f->of.K || f->refined) PetscFunctionReturn(PETSC_SUCCESS);
   /* For the comparison, and as the result where refinement changes nothing. */
   HycoDuplicate(entries, d->S, &before);
+  HycoConeFactorForget(d->cone);
   f->refined = PETSC_TRUE;
   HycoLogged(HYCO_EVENT_FACTOR, HycoStiffnessCondense(s, s->system->Bt, s->system->B, d->S));
   for (size_t k = 0; k < entries; k++) {
@@ -371,6 +378,7 @@ static PetscErrorCode Destroy(HycoSolverForm form)
 
   PetscFunctionBegin;
   PetscCall(HycoTaoDestroy(&d->tao));
+  PetscCall(HycoConeFactorDestroy(&d->cone));
   HycoFreeAll(&d->S, &d->g, &d->L, &d->active, &form->data);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -9,6 +9,7 @@ typedef struct {
   PetscBool *active;
   PetscBool started; /* active is the set of a solution */
   HycoSetFactor factor;
+  HycoConeFactor cone;
   HycoOperatorState of;
   HycoTao tao;
 } Flexibility;
@@ -42,6 +43,7 @@ static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singul
   /* The factor of the active set belongs to the former G. */
   PetscCall(HycoOperatorStateUpdate(&f->of, y->G, NULL, &same));
   if (!same) HycoSetFactorForget(f->factor);
+  if (!same) HycoConeFactorForget(f->cone);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -70,8 +72,10 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
     PetscCall(PetscArraycpy(f->active, s->start_set, f->m));
   else if (!s->start_set && (!s->warm || !f->started))
     PetscCall(PetscArrayzero(f->active, f->m));
+  if (y->blocks && !f->cone) PetscCall(HycoConeFactorCreate(&f->cone));
   /* Kept over the solves with one G: it belongs to the form, not to the problem. */
   lcp.factor = f->factor;
+  lcp.cone = f->cone;
   PetscCall(MatDenseGetArrayRead(y->G, &lcp.M));
   PetscCall(VecGetArrayRead(y->D, &lcp.q));
   PetscCall(VecGetArray(L, &l));
@@ -93,6 +97,7 @@ static PetscErrorCode Destroy(HycoSolverForm form)
   PetscFunctionBegin;
   PetscCall(HycoTaoDestroy(&f->tao));
   PetscCall(HycoSetFactorDestroy(&f->factor));
+  PetscCall(HycoConeFactorDestroy(&f->cone));
   PetscCall(PetscFree(f->active));
   PetscCall(PetscFree(form->data));
   PetscFunctionReturn(PETSC_SUCCESS);
