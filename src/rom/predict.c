@@ -41,12 +41,15 @@ PetscErrorCode HycoROMTakePairs(const HycoPairs *of, HycoPairs *own)
     PetscCall(HycoPairsRenumber(of, NULL, own));
   else
     *own = *of;
+  own->geometry = NULL; /* what is kept of it is the handle's */
+  own->drawn = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoROMDropPairs(HycoPairs *own)
 {
   PetscFunctionBegin;
+  PetscCall(PetscFree(own->geometry));
   if (own->room) PetscCall(HycoPairsDestroy(own));
   PetscCall(PetscMemzero(own, sizeof(*own)));
   PetscFunctionReturn(PETSC_SUCCESS);
