@@ -840,16 +840,18 @@ static PetscErrorCode Build(Export *e)
 static PetscErrorCode ExportC(HycoROM m, const char path[], char **description)
 {
   Export e = {.m = m, .s = m->model->scene};
-  PetscErrorCode ierr;
-
   const size_t n = strlen(path);
+  PetscErrorCode ierr;
+  void *point;
 
   PetscFunctionBegin;
   HycoCheck(n > 2 && n < PETSC_MAX_PATH_LEN && !strcmp(path + n - 2, ".c"), "-c %s: the file's name must end in .c",
             path);
   PetscCall(HycoExportCheckFiles(path));
+  point = HycoPointBegin(); /* C has a decimal point in any locale */
   ierr = Build(&e);
   if (!ierr) ierr = HycoExportWrite(&e.out, e.s, m->model->path, path, description);
+  HycoPointEnd(point);
   PetscCall(Destroy(&e));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -131,6 +131,7 @@ struct _p_HycoROM {
   PetscInt n, n_L;      /* numbers of unknowns and multipliers of the reduced problem */
   PetscInt m, *contact; /* the contacts of A_lambda: index in pairs */
   HycoPairs *of_fe;     /* the same contacts on fe's mesh */
+  HycoPairs pairs;      /* the model's, with what predictions change: masters on moved surfaces, and friction */
   PetscInt *slave_id;   /* mesh-file tag of each contact's slave */
   PetscBool spread;     /* Lambda may be nonzero outside A_lambda */
   HycoSolver solver;
@@ -138,6 +139,7 @@ struct _p_HycoROM {
   /* created when needed */
   HycoFE fe_beyond;             /* on mesh without its cells */
   HycoFE fe_whole;              /* on whole */
+  HycoPairs whole_pairs;        /* as `pairs`, on whole */
   HycoFE fe_floating;           /* on the loaded cells of the bodies that contact alone holds */
   HycoOutputCells output_cells; /* of the scene's quantities */
   HycoOutputCells few;          /* those of them that decide the quantities near a prediction; NULL: not needed yet */
@@ -227,6 +229,9 @@ PetscErrorCode HycoROMGetDomain(HycoROM model, PetscInt sets[]);
 /* Sets the full-order unknowns (dofs of mesh, any order). */
 PetscErrorCode HycoROMSetFE(HycoROM model, HycoHybrid hybrid, PetscInt n, const PetscInt dof[]);
 
+/* The contacts of a handle: a copy where predictions search for masters, else the model's arrays. Drop frees the copy. */
+PetscErrorCode HycoROMTakePairs(const HycoPairs *of, HycoPairs *own);
+PetscErrorCode HycoROMDropPairs(HycoPairs *own);
 /* Allocates the rows of contacts. */
 PetscErrorCode HycoRowsCreate(const HycoPairs *pairs, PetscInt dim, HycoRows *rows);
 PetscErrorCode HycoRowsDestroy(HycoRows *rows);

@@ -40,7 +40,8 @@ const Command commands[] = {
 
 static char message[DRIVER_LINE];
 
-/* Keeps the first error's text; Stop() prints it as one line. */
+/* Keeps the text of an error where it is raised, not of the calls that it passes through; of several errors the last is
+   the one that ends the run. Stop() prints it as one line. */
 static PetscErrorCode KeepMessage(MPI_Comm comm, int line, const char *function, const char *file, PetscErrorCode code,
                                   PetscErrorType type, const char *text, void *ctx)
 {

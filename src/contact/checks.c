@@ -124,12 +124,13 @@ PetscErrorCode HycoContactMeasure(HycoFE fe, HycoPairs *pairs, const PetscReal u
 {
   Sizes sizes[2] = {{NULL, NULL}, {NULL, NULL}};
   PetscReal *normal, *gap;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(PetscMemzero(state, sizeof(*state)));
   PetscCall(PetscMalloc2(3 * pairs->n, &normal, pairs->n, &gap));
-  PetscCall(HycoContactGeometry(fe, pairs, normal, gap));
-  for (PetscInt k = 0; k < pairs->n; k++) {
+  ierr = HycoContactGeometry(fe, pairs, normal, gap);
+  for (PetscInt k = 0; !ierr && k < pairs->n; k++) {
     PetscReal sliding = 0;
 
     /* It faces no master: there is nothing to measure. */
@@ -137,12 +138,13 @@ PetscErrorCode HycoContactMeasure(HycoFE fe, HycoPairs *pairs, const PetscReal u
     state->n_facing++;
     state->overlap = PetscMax(state->overlap, -gap[k]);
     if (pairs->master_start[k] == pairs->master_start[k + 1] || !(L[index ? index[k] : k] > 0)) continue;
-    PetscCall(SlidingOf(fe, pairs, k, normal + 3 * k, u, sizes, &sliding));
+    ierr = SlidingOf(fe, pairs, k, normal + 3 * k, u, sizes, &sliding);
     state->sliding = PetscMax(state->sliding, sliding);
   }
   if (state->overlap <= HYCO_ROUNDING * HycoMeshLength(fe->mesh)) state->overlap = 0;
   PetscCall(PetscFree2(normal, gap));
   PetscCall(PetscFree(sizes[0].size));
   PetscCall(PetscFree(sizes[1].size));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

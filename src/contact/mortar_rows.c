@@ -515,8 +515,8 @@ PetscErrorCode HycoMortarRows(HycoContact c, HycoFE fe, PetscInt index, PetscRea
   PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->slave, &slaves));
   PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->master, &masters));
   PetscCall(HycoLogEvent(HYCO_EVENT_SEARCH, PETSC_TRUE));
-  PetscCall(MortarCreate(fe, slaves, masters, reach, n, slave, &s));
-  ierr = Run(&s, index, n, slave, pairs);
+  ierr = MortarCreate(fe, slaves, masters, reach, n, slave, &s);
+  if (!ierr) ierr = Run(&s, index, n, slave, pairs);
   PetscCall(HycoLogEvent(HYCO_EVENT_SEARCH, PETSC_FALSE));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

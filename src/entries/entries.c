@@ -129,8 +129,13 @@ PetscErrorCode HycoEntriesList(HycoScene scene)
   for (PetscInt k = 0; k < n; k++) { /* a model file stores key, tab, value, end of line */
     char **value = &scene->value[scene->n_entries];
 
-    HycoCheck(!keys[k][strcspn(keys[k], "\t\r\n\f\v")], "the scene's entry \"%.200s\" has a blank in its name",
-              keys[k]);
+    if (keys[k][strcspn(keys[k], "\t\r\n\f\v")]) {
+      char name[HYCO_LINE];
+
+      snprintf(name, sizeof(name), "%.200s", keys[k]);
+      for (; k < n; k++) PetscCall(PetscFree(keys[k]));
+      HycoFail("the scene's entry \"%s\" has a blank in its name", name);
+    }
     PetscCall(GetLong(scene->options, keys[k], value));
     keys[scene->n_entries] = keys[k];
     if (strlen(keys[k]) > 5 && strcmp(keys[k] + strlen(keys[k]) - 5, "_view") == 0 &&

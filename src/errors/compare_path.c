@@ -129,10 +129,21 @@ static PetscErrorCode Compare(HycoROM m, PetscInt n, const PetscReal mu[], const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The path is solved, and kept on rank 0. Collective. */
+static PetscErrorCode CompareKept(HycoROM m, HycoFOM f, PetscInt n, const PetscReal mu[], Kept *kept, HycoPathErrors *e)
+{
+  HycoHistory h;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMGetHistory(f, &h));
+  HycoCheck(h.ended, "the full-order path ends at t = %.10g: %s; no comparison is possible", (double)h.t, h.why);
+  HycoOnRoot(HycoComm(f), Compare(m, n, mu, &h, kept, e));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoROMComparePath(HycoROM m, HycoFOM f, PetscInt n, const PetscReal mu[], HycoPathErrors *e)
 {
   Kept kept = {0};
-  HycoHistory h;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
@@ -148,12 +159,10 @@ PetscErrorCode HycoROMComparePath(HycoROM m, HycoFOM f, PetscInt n, const PetscR
                            &kept.value));
   PetscCall(HycoFOMSetStepMonitor(f, Keep, &kept));
   ierr = HycoFOMSolve(f, n, mu);
-  PetscCall(HycoFOMSetStepMonitor(f, NULL, NULL));
-  PetscCall(ierr);
-  PetscCall(HycoFOMGetHistory(f, &h));
   /* The monitor is removed first, on success and failure, as `kept` is on this stack. */
-  HycoCheck(h.ended, "the full-order path ends at t = %.10g: %s; no comparison is possible", (double)h.t, h.why);
-  HycoOnRoot(HycoComm(f), Compare(m, n, mu, &h, &kept, e));
+  PetscCall(HycoFOMSetStepMonitor(f, NULL, NULL));
+  if (!ierr) ierr = CompareKept(m, f, n, mu, &kept, e);
   PetscCall(PetscFree(kept.value));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

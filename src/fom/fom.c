@@ -472,6 +472,13 @@ static PetscErrorCode CountFree(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+static PetscErrorCode AssembleStiffness(HycoFOM f)
+{
+  PetscFunctionBegin;
+  HycoOnEach(HycoComm(f), HycoFEAssembleStiffness(f->fe, f->K));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Adds the loads at the pinned unknowns, which belong to the balance. Pins are no supports: without them the loads
    there would be lost from the balance. */
 static PetscErrorCode AssembleForce(HycoFOM f)
@@ -525,16 +532,12 @@ PetscErrorCode HycoFOMAssemble(HycoFOM f, const PetscReal mu[])
   if (f->fe->stiffness_changed || f->fe->contact_changed) PetscCall(HycoFOMRelease(f));
   if (!f->n_free) PetscCall(CountFree(f));
   if (f->fe->stiffness_changed) {
-    PetscCall(HycoLogEvent(HYCO_EVENT_ASSEMBLE, PETSC_TRUE));
-    HycoOnEach(HycoComm(f), HycoFEAssembleStiffness(f->fe, f->K));
-    PetscCall(HycoLogEvent(HYCO_EVENT_ASSEMBLE, PETSC_FALSE));
+    HycoLogged(HYCO_EVENT_ASSEMBLE, AssembleStiffness(f));
     /* At each assembly: a path may have left a tangent in K, and new values reset the knowledge of definiteness. */
     PetscCall(MatSetOption(f->K, MAT_SPD, PETSC_TRUE));
     PetscCall(HycoFOMSetMotions(f));
   }
-  PetscCall(HycoLogEvent(HYCO_EVENT_FORCE, PETSC_TRUE));
-  PetscCall(AssembleForce(f));
-  PetscCall(HycoLogEvent(HYCO_EVENT_FORCE, PETSC_FALSE));
+  HycoLogged(HYCO_EVENT_FORCE, AssembleForce(f));
   f->contact_cpu -= HycoCPU();
   HycoLogged(HYCO_EVENT_CONTACT, AssembleContact(f, f->fe->contact_changed));
   f->contact_cpu += HycoCPU();

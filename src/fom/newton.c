@@ -274,8 +274,8 @@ static PetscErrorCode Push(PetscInt n, Vec store[], Vec vector, Vec last)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* gamma of min |g - sum of gamma_j dG_j|, by normal equations with a small ridge; n <= HYCO_ANDERSON. n is at most
-   HYCO_ANDERSON: dense elimination; the ridge keeps dependent differences harmless. */
+/* gamma of min |g - sum of gamma_j dG_j|, by normal equations, n <= HYCO_ANDERSON, and dense elimination; a small ridge
+   keeps dependent differences harmless. */
 static PetscErrorCode LeastSquares(PetscInt n, Vec dG[], Vec g, PetscReal gamma[])
 {
   PetscReal A[HYCO_ANDERSON][HYCO_ANDERSON], trace = 0;

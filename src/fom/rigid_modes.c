@@ -112,15 +112,16 @@ static PetscErrorCode NameUnconstrained(HycoFOM f, const HycoMotions *free, cons
    neighbours of each contact's nodes too. */
 static PetscErrorCode FindUnconstrained(HycoFOM f, const HycoMotions *free, Unconstrained *z)
 {
-  HycoFE wide = f->fe_surface;
+  HycoFE wide = f->size > 1 ? NULL : f->fe_surface;
   HycoMesh mesh = NULL;
   PetscInt *index = NULL;
-  PetscErrorCode ierr;
+  PetscErrorCode ierr = PETSC_SUCCESS;
 
   PetscFunctionBegin;
-  if (f->size > 1) PetscCall(HycoFOMWiden(f, &mesh, &wide, &index));
-  ierr = HycoFEFindUnconstrained(HycoComm(f), f->fe_surface, wide, index, &f->pairs, free, &z->n, &z->all, &z->n_alike,
-                                 &z->alike);
+  if (f->size > 1) ierr = HycoFOMWiden(f, &mesh, &wide, &index);
+  if (!ierr)
+    ierr = HycoFEFindUnconstrained(HycoComm(f), f->fe_surface, wide, index, &f->pairs, free, &z->n, &z->all,
+                                   &z->n_alike, &z->alike);
   if (f->size > 1) PetscCall(HycoFEDestroy(&wide));
   PetscCall(HycoMeshDestroy(&mesh));
   PetscCall(PetscFree(index));

@@ -266,6 +266,20 @@ static PetscErrorCode DeclareSchur(HycoDirect d)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* After an analysis: a failed one is no pattern. Object and nonzero state: values may change without a new one. */
+static PetscErrorCode NotePattern(HycoDirect d, Mat K, Mat B)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscObjectGetId((PetscObject)K, &d->K_id));
+  PetscCall(MatGetNonzeroState(K, &d->K_pattern));
+  d->B_id = 0;
+  d->B_pattern = 0;
+  if (!B) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscObjectGetId((PetscObject)B, &d->B_id));
+  PetscCall(MatGetNonzeroState(B, &d->B_pattern));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Analysis of the pattern, with the room for right-hand sides on rank 0. */
 static PetscErrorCode Analyse(HycoDirect d, Mat K, Mat Bt, Mat B)
 {
@@ -283,7 +297,9 @@ static PetscErrorCode Analyse(HycoDirect d, Mat K, Mat Bt, Mat B)
   PetscCall(Order(d, K));
   PetscCall(ReadControls(d));
   Call(d, ANALYSE);
-  PetscCheck(INFOG(d, 1) >= 0, d->comm, PETSC_ERR_LIB, "MUMPS could not analyse K (INFOG(1) = %d, INFOG(2) = %d)",
+  PetscCheck(INFOG(d, 1) >= 0, d->comm, PETSC_ERR_LIB,
+             "MUMPS could not analyse K (INFOG(1) = %d, INFOG(2) = %d); use -hyco_linear iterative, or other "
+             "-hyco_mumps_icntl_...",
              (int)INFOG(d, 1), (int)INFOG(d, 2));
   PetscCall(PetscFree(d->id.perm_in));
   PetscCall(MatCreateVecs(K, &x, NULL));
@@ -293,11 +309,11 @@ static PetscErrorCode Analyse(HycoDirect d, Mat K, Mat Bt, Mat B)
     PetscCall(PetscMalloc1(d->n + d->m, &d->rhs));
     PetscCall(PetscMalloc1(d->n_schur + 1, &d->reduced));
   }
+  PetscCall(NotePattern(d, K, B));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether K and B have the analysed pattern; stores their identity. Object and nonzero state: values may change
-   without a new analysis. */
+/* Whether K and B have the analysed pattern; releases what is analysed if not. */
 static PetscErrorCode SamePattern(HycoDirect d, Mat K, Mat B, PetscBool *same)
 {
   PetscObjectId K_id, B_id = 0;
@@ -313,10 +329,6 @@ static PetscErrorCode SamePattern(HycoDirect d, Mat K, Mat B, PetscBool *same)
   *same = (PetscBool)(d->begun && d->K_id == K_id && d->B_id == B_id && d->K_pattern == K_pattern &&
                       d->B_pattern == B_pattern);
   if (!*same) PetscCall(Release(d));
-  d->K_id = K_id;
-  d->B_id = B_id;
-  d->K_pattern = K_pattern;
-  d->B_pattern = B_pattern;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -393,7 +405,9 @@ PetscErrorCode HycoDirectFactor(HycoDirect d, Mat K, Mat Bt, Mat B, PetscReal M[
              "more ranks on more machines",
              (int)INFOG(d, 17));
   PetscCheck(INFOG(d, 1) >= 0 || *singular, d->comm, PETSC_ERR_LIB,
-             "MUMPS could not factor K (INFOG(1) = %d, INFOG(2) = %d)", (int)INFOG(d, 1), (int)INFOG(d, 2));
+             "MUMPS could not factor K (INFOG(1) = %d, INFOG(2) = %d); use -hyco_linear iterative, or other "
+             "-hyco_mumps_icntl_...",
+             (int)INFOG(d, 1), (int)INFOG(d, 2));
   if (!*singular) PetscCall(SpreadSchur(d, M));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -149,15 +149,12 @@ PetscErrorCode HycoDefiniteSolver(Mat A, const char name[], KSP *ksp)
 PetscErrorCode HycoSolveColumns(Mat A, const char name[], Mat R, Mat *X)
 {
   KSP ksp;
-  Mat factor;
-  PC pc;
 
   PetscFunctionBegin;
   PetscCall(HycoDefiniteSolver(A, name, &ksp));
-  PetscCall(KSPGetPC(ksp, &pc));
-  PetscCall(PCFactorGetMatrix(pc, &factor));
   PetscCall(MatDuplicate(R, MAT_DO_NOT_COPY_VALUES, X));
-  PetscCall(MatMatSolve(factor, R, *X));
+  /* By the solver, not its factor: a thin matrix on several ranks has none of its own (HycoBandedSolver()). */
+  PetscCall(KSPMatSolve(ksp, R, *X));
   PetscCall(KSPDestroy(&ksp));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -67,7 +67,7 @@ static PetscErrorCode LongestRow(Mat K, PetscInt *longest)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* *upper is NULL for matrices without blocks. Half the memory traffic of products with K. Collective. */
+/* *upper is NULL for matrices without blocks. Products with K take a third of the memory traffic. Collective. */
 PetscErrorCode HycoUpperBlocks(Mat K, Mat *upper)
 {
   PetscInt bs, lo, hi, n, blocks, longest, *here, *there, *column;

@@ -287,9 +287,9 @@ PetscErrorCode HycoMeshSetNodeBodies(HycoScene scene, HycoMesh m)
     for (PetscInt i = 0; i < m->n_nodes; i++) {
       lo = PetscMin(lo, m->xyz[3 * i + c]);
       hi = PetscMax(hi, m->xyz[3 * i + c]);
-      size = PetscMax(size, PetscAbsReal(m->xyz[3 * i] - m->xyz[0]));
+      for (PetscInt d = 0; d < m->dim; d++) size = PetscMax(size, PetscAbsReal(m->xyz[3 * i + d] - m->xyz[d]));
     }
-    /* Round-off of the file's decimals is allowed, relative to the mesh's extent in x. */
+    /* Round-off of the file's decimals is allowed, relative to the mesh's extent. */
     HycoCheck(hi - lo <= 1e-9 * size, "%s has cells of dimension %d, but its %c coordinates run from %g to %g",
               scene->mesh_path, (int)m->dim, "xyz"[c], (double)lo, (double)hi);
   }

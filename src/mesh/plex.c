@@ -846,15 +846,36 @@ static PetscErrorCode CheckGroups(MPI_Comm comm, HycoMesh m, HycoScene scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Fills the new tables b->m. Collective on comm. */
+static PetscErrorCode FillTables(Builder *b, MPI_Comm comm)
+{
+  HycoScene scene = b->scene;
+  PetscMPIInt size;
+  size_t length;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_size(comm, &size));
+  PetscCall(FindType(b));
+  /* User errors (a cell of two bodies) occur on the rank that has the cell; all ranks return together. */
+  HycoOnEach(comm, MakeTables(b));
+  if (size == 1) b->m->n_owned = b->m->n_nodes;
+  if (size > 1) PetscCall(AgreeOnGroups(comm, b->m));
+  DropInnerFacets(b->m);
+  PetscCall(PetscStrlen(scene->mesh_path, &length));
+  if (!b->part &&
+      (scene->dm || (length > 3 && strcmp(scene->mesh_path + length - 3, ".h5") == 0))) /* not yet checked */
+    PetscCall(CheckGroups(comm, b->m, scene));
+  if (size > 1) PetscCall(Number(b));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The local tables of a DM's part: nodes and cells by tag, groups, facets outward, bodies; with several ranks also
    global numbers. The caller gets a reference to the DM. Collective on comm, which is PETSC_COMM_SELF for a DM that one rank
    alone uses. */
 PetscErrorCode HycoPlexToTables(DM dm, MPI_Comm comm, HycoScene scene, HycoMesh *mesh)
 {
   Builder b = {.dm = dm, .scene = scene};
-  PetscMPIInt size;
-  PetscErrorCode ierr = 0;
-  size_t length;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoMeshQuery(dm, mesh));
@@ -862,22 +883,13 @@ PetscErrorCode HycoPlexToTables(DM dm, MPI_Comm comm, HycoScene scene, HycoMesh 
     PetscCall(PetscObjectReference((PetscObject)dm));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCallMPI(MPI_Comm_size(comm, &size));
   PetscCall(PetscNew(&b.m));
-  PetscCall(FindType(&b));
-  /* User errors (a cell of two bodies) occur on the rank that has the cell; all ranks return together. */
-  HycoOnEach(comm, MakeTables(&b));
-  if (size == 1) b.m->n_owned = b.m->n_nodes;
-  if (size > 1) PetscCall(AgreeOnGroups(comm, b.m));
-  DropInnerFacets(b.m);
-  PetscCall(PetscStrlen(scene->mesh_path, &length));
-  if (!b.part && (scene->dm || (length > 3 && strcmp(scene->mesh_path + length - 3, ".h5") == 0))) /* not yet checked */
-    ierr = CheckGroups(comm, b.m, scene);
-  if (size > 1 && !ierr) ierr = Number(&b);
+  ierr = FillTables(&b, comm);
   PetscCall(PetscFree(b.owned));
   PetscCall(PetscFree(b.node));
   PetscCall(PetscFree(b.cell));
   PetscCall(PetscFree(b.facet));
+  if (ierr) PetscCall(HycoMeshDestroy(&b.m));
   PetscCall(ierr);
   PetscCall(PetscObjectReference((PetscObject)dm));
   PetscCall(HycoMeshSetDM(b.m, dm));

@@ -11,7 +11,7 @@ static int Compare(const void *a, const void *b)
   return (x > y) - (x < y);
 }
 
-/* counts[r] and start[r] of the items for process r, in n items sorted by `to`. */
+/* start[r]: the first item of process r, which has counts[r]; start[size]: their number. */
 static void Offsets(PetscMPIInt size, const PetscMPIInt counts[], PetscMPIInt start[])
 {
   start[0] = 0;

@@ -225,6 +225,8 @@ static PetscErrorCode TagMiddles(DM dm, DMPlexTransform transform, const PetscIn
   PetscInt64 *key;
 
   PetscFunctionBegin;
+  /* Key() has 31 bits for a tag. */
+  HycoCheck(*last <= 0x7fffffff, "the mesh has node numbers above 2147483647 and is not refined; refine the file");
   PetscCall(DMGetDimension(dm, &dim));
   PetscCall(DMPlexGetDepthStratum(dm, depth, &first, &end));
   PetscCall(PetscMalloc3(end - first, &key, end - first, &place, end - first, &child));
@@ -250,15 +252,11 @@ static PetscErrorCode TagMiddles(DM dm, DMPlexTransform transform, const PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Assigns tags to the cells in the order of their parents'. */
-static PetscErrorCode TagCells(DM dm, DMPlexTransform transform, const PetscInt tag[], PetscInt new_tag[])
+/* Assigns tags to the children of this rank's cells c0 to c1 - 1, whose places are given. */
+static PetscErrorCode TagChildren(DM dm, DMPlexTransform transform, PetscInt c0, PetscInt c1, const PetscInt place[],
+                                  PetscInt new_tag[])
 {
-  PetscInt c0, c1, *place, total;
-
   PetscFunctionBegin;
-  PetscCall(DMPlexGetHeightStratum(dm, 0, &c0, &c1));
-  PetscCall(PetscMalloc1(c1 - c0, &place));
-  PetscCall(HycoRankInts(PetscObjectComm((PetscObject)dm), c1 - c0, tag + c0, place, &total));
   for (PetscInt c = c0; c < c1; c++) {
     DMPolytopeType type;
     PetscInt n, child;
@@ -274,6 +272,20 @@ static PetscErrorCode TagCells(DM dm, DMPlexTransform transform, const PetscInt 
       new_tag[child] = 1 + place[c - c0] * n + r;
     }
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Assigns tags to the cells in the order of their parents'. Collective. */
+static PetscErrorCode TagCells(DM dm, DMPlexTransform transform, const PetscInt tag[], PetscInt new_tag[])
+{
+  const MPI_Comm comm = PetscObjectComm((PetscObject)dm);
+  PetscInt c0, c1, *place, total;
+
+  PetscFunctionBegin;
+  PetscCall(DMPlexGetHeightStratum(dm, 0, &c0, &c1));
+  PetscCall(PetscMalloc1(c1 - c0, &place));
+  PetscCall(HycoRankInts(comm, c1 - c0, tag + c0, place, &total));
+  HycoOnEach(comm, TagChildren(dm, transform, c0, c1, place, new_tag));
   PetscCall(PetscFree(place));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -559,13 +559,12 @@ static PetscErrorCode FetchOnModel(HycoReducer t, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, HycoROM *model, HycoTraining *report)
+/* The model of rank 0. Collective. */
+static PetscErrorCode MakeModel(HycoReducer t, PetscBool useful, HycoROM *model, HycoTraining *report)
 {
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  *model = NULL;
-  PetscCall(HycoLogEvent(HYCO_EVENT_MODEL, PETSC_TRUE));
   HycoOnRoot(HycoComm(t), BeginOnRoot(t, model));
   /* From here on collective calls: an error is the same on every rank, and the model of rank 0 is destroyed before
      it returns. */
@@ -577,7 +576,16 @@ PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, HycoROM *model,
   PetscCall(ierr);
   HycoOnRoot(HycoComm(t), BuildOnRoot(t, useful, model, report));
   HycoFreeAll(&t->U_rid, &t->rid_row, &t->V_rid); /* before the other ranks' models, of which rank 0 has one too */
-  PetscCall(HycoLogEvent(HYCO_EVENT_MODEL, PETSC_FALSE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, HycoROM *model, HycoTraining *report)
+{
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  *model = NULL;
+  HycoLogged(HYCO_EVENT_MODEL, MakeModel(t, useful, model, report)); /* ends on an error too: a search goes on */
   PetscCallMPI(MPI_Bcast(report, sizeof(*report), MPI_BYTE, 0, HycoComm(t)));
   report->type = report->chosen.settings.type = t->prototype->model->type; /* set on each rank */
   PetscCall(HycoROMBroadcast(HycoComm(t), model));
@@ -824,13 +832,30 @@ PetscErrorCode HycoReducerCheckContacts(HycoReducer t, const HycoROM type)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Let the type refuse, solve, hold out, reduce. *solved: the seconds of HycoNow() when that is done, without those of
+   solving. */
+static PetscErrorCode RunOn(HycoReducer t, HycoSnapshots store, HycoSamples samples, const char path[],
+                            HycoTraining *report, PetscReal *solved)
+{
+  PetscFunctionBegin;
+  if (t->trainer.begin) PetscCall((*t->trainer.begin)(t));
+  PetscCall(DecideLate(t));
+  if (!t->late) PetscCall(HycoReducerSolve(t, store, samples));
+  PetscCall(HycoReducerHoldOut(t, store));
+  *solved = HycoNow() - t->solving;
+  HycoStaged(HYCO_STAGE_REDUCTION, HycoReducerFinish(t, store, path, PETSC_TRUE, report));
+  PetscCall(HycoReducerReset(t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The order: refuse, open, let the type refuse, solve, hold out, reduce. Every step is collective; an error is
-   raised on all ranks. */
+   raised on all ranks, and the store closes. */
 PetscErrorCode HycoReducerRun(HycoReducer t, HycoSamples samples, const char path[], HycoTraining *training)
 {
   HycoSnapshots store;
   HycoTraining report = {0};
-  PetscReal begin = HycoNow(), solved;
+  PetscReal begin = HycoNow(), solved = 0;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
@@ -840,14 +865,9 @@ PetscErrorCode HycoReducerRun(HycoReducer t, HycoSamples samples, const char pat
               "-target_%s needs held-out points, and -hyco_validation is 0; remove one of the two", HycoErrorKinds[j]);
   if (t->pinned[HYCO_CHOICE_TYPE] || !t->search) PetscCall(HycoReducerCheckContacts(t, t->prototype));
   PetscCall(HycoReducerOpen(t, samples, path, &store));
-  if (t->trainer.begin) PetscCall((*t->trainer.begin)(t));
-  PetscCall(DecideLate(t));
-  if (!t->late) PetscCall(HycoReducerSolve(t, store, samples));
-  PetscCall(HycoReducerHoldOut(t, store));
-  solved = HycoNow() - t->solving;
-  HycoStaged(HYCO_STAGE_REDUCTION, HycoReducerFinish(t, store, path, PETSC_TRUE, &report));
-  PetscCall(HycoReducerReset(t));
+  ierr = RunOn(t, store, samples, path, &report, &solved);
   PetscCall(HycoReducerClose(t, &store));
+  PetscCall(ierr);
   report.sliding = t->sliding;
   report.seconds_snapshots = solved - begin + t->solving;
   report.seconds_reduction = HycoNow() - solved - t->solving;

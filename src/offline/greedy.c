@@ -364,11 +364,25 @@ static PetscErrorCode RunLoop(HycoReducer t, Loop *loop, HycoTraining *report)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* After the loop's store is open. */
+static PetscErrorCode RunOn(HycoReducer t, Loop *loop, const char path[], HycoTraining *report)
+{
+  PetscFunctionBegin;
+  PetscCall(SetSettings(t));
+  PetscCall(PetscCalloc1(t->fom->part->n_cells, &t->grown));
+  PetscCall(RunLoop(t, loop, report));
+  PetscCall(Conclude(t, loop, path, report));
+  report->seconds_reduction = HycoNow() - loop->begin;
+  PetscCall(HycoReducerReset(t));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoReducerRunGreedy(HycoReducer t, HycoSamples start, HycoSamples training, const char path[],
                                     HycoTraining *training_report)
 {
   Loop loop = {0};
   HycoTraining report = {0};
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
@@ -382,16 +396,12 @@ PetscErrorCode HycoReducerRunGreedy(HycoReducer t, HycoSamples start, HycoSample
   PetscCall(Start(t, start, &loop.samples));
   PetscCall(CheckStart(t, (PetscBool)!start, loop.samples));
   PetscCall(HycoReducerOpen(t, loop.samples, path, &loop.store));
-  PetscCall(SetSettings(t));
-  PetscCall(PetscCalloc1(t->fom->part->n_cells, &t->grown));
-  PetscCall(RunLoop(t, &loop, &report));
-  PetscCall(Conclude(t, &loop, path, &report));
-  report.seconds_reduction = HycoNow() - loop.begin;
-  PetscCall(HycoReducerReset(t));
+  ierr = RunOn(t, &loop, path, &report);
   PetscCall(HycoReducerClose(t, &loop.store));
   report.sliding = t->sliding;
   PetscCall(HycoSamplesDestroy(&loop.samples));
   PetscCall(PetscFree(loop.value));
+  PetscCall(ierr);
   if (training_report) *training_report = report;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

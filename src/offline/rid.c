@@ -255,10 +255,9 @@ static PetscErrorCode ExtendContact(Rid *r, const HycoPairs *pairs, PetscReal d)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-#define MOST_MASTERS 4
-
-/* Lists the masters, in the whole mesh, of the slaves in Omega_A (in), MOST_MASTERS each, padded by -1. Rank 0. */
-static PetscErrorCode ListMasters(HycoFOM f, const HycoPairs *pairs, const PetscInt in[], PetscInt *n, PetscInt list[])
+/* Lists the masters, in the whole mesh, of the slaves in Omega_A (in), `width` each, padded by -1. Rank 0. */
+static PetscErrorCode ListMasters(HycoFOM f, const HycoPairs *pairs, const PetscInt in[], PetscInt width, PetscInt *n,
+                                  PetscInt list[])
 {
   PetscFunctionBegin;
   *n = 0;
@@ -269,35 +268,46 @@ static PetscErrorCode ListMasters(HycoFOM f, const HycoPairs *pairs, const Petsc
 
     HycoPairsMasters(pairs, k, &masters, &master, &weight);
     if (masters < 2 || !in[HycoPairsSlave(pairs, k)]) continue;
-    for (PetscInt j = 0; j < MOST_MASTERS; j++)
-      list[*n * MOST_MASTERS + j] = j >= masters             ? -1
-                                    : f->surface->node_whole ? f->surface->node_whole[master[j]]
-                                                             : master[j];
+    for (PetscInt j = 0; j < width; j++)
+      list[*n * width + j] = j >= masters ? -1 : f->surface->node_whole ? f->surface->node_whole[master[j]] : master[j];
     (*n)++;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the cells with all of these masters. */
-static PetscErrorCode AddBehind(Rid *r, const PetscInt master[])
+/* Adds the cells around node i of the part with all n nodes that are marked, or with a facet of them: a mortar's
+   masters are those of many facets. */
+static PetscErrorCode AddBehind(Rid *r, PetscInt i, PetscInt n, const PetscBool marked[])
 {
   HycoMesh m = r->part;
-  PetscInt node[MOST_MASTERS], n = 0;
 
   PetscFunctionBegin;
-  for (; n < MOST_MASTERS && master[n] >= 0; n++) {
-    PetscCall(FindInPart(m->n_nodes, m->node_whole, master[n], &node[n]));
-    /* The cell behind a facet has all of its nodes: it is in another part. */
-    if (node[n] < 0) PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  for (PetscInt j = r->start[node[0]]; j < r->start[node[0] + 1]; j++) {
+  for (PetscInt j = r->start[i]; j < r->start[i + 1]; j++) {
     PetscInt has = 0, of[HYCO_CELL_NODES];
     const PetscInt own = HycoMeshOwnNodes(m, r->around[j], of);
 
-    for (PetscInt v = 0; v < own; v++) {
-      for (PetscInt i = 0; i < n; i++) has += of[v] == node[i];
-    }
-    if (has == n) PetscCall(Add(r, r->around[j]));
+    for (PetscInt v = 0; v < own; v++) has += marked[of[v]];
+    if (has >= PetscMin(n, SmallestFacet(m, r->around[j]))) PetscCall(Add(r, r->around[j]));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds the cells behind these masters, at most `width`; a cell has all of its nodes on its rank. marked: of the part's
+   nodes, false before and after. */
+static PetscErrorCode AddMasters(Rid *r, PetscInt width, const PetscInt master[], PetscInt node[], PetscBool marked[])
+{
+  PetscInt n = 0;
+
+  PetscFunctionBegin;
+  for (; n < width && master[n] >= 0; n++) {
+    PetscCall(FindInPart(r->part->n_nodes, r->part->node_whole, master[n], &node[n]));
+    if (node[n] >= 0) marked[node[n]] = PETSC_TRUE;
+  }
+  for (PetscInt k = 0; k < n; k++) {
+    if (node[k] >= 0) PetscCall(AddBehind(r, node[k], n, marked));
+  }
+  for (PetscInt k = 0; k < n; k++) {
+    if (node[k] >= 0) marked[node[k]] = PETSC_FALSE;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -308,18 +318,21 @@ static PetscErrorCode AddBehind(Rid *r, const PetscInt master[])
 static PetscErrorCode CompleteSlaves(Rid *r, const HycoPairs *pairs, PetscInt n_rows)
 {
   const PetscInt n_surface = r->f->surface ? r->f->surface->n_nodes : 0;
-  PetscBool *node;
-  PetscInt *in, *list, n = 0;
+  PetscInt *in, *list, *at, n = 0, width = r->f->rank ? 0 : HycoPairsWidth(pairs);
+  PetscBool *node, *marked;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc3(r->part->n_nodes, &node, n_surface, &in, MOST_MASTERS * n_rows, &list));
+  PetscCallMPI(MPI_Bcast(&width, 1, MPIU_INT, 0, HycoComm(r->f)));
+  PetscCall(PetscMalloc4(r->part->n_nodes, &node, n_surface, &in, (size_t)width * (size_t)n_rows, &list, width, &at));
+  PetscCall(PetscCalloc1(r->part->n_nodes, &marked));
   PetscCall(MarkNodes(r, r->label, node));
   PetscCall(ToSurface(r, node, in));
-  HycoOnRoot(HycoComm(r->f), ListMasters(r->f, pairs, in, &n, list));
+  HycoOnRoot(HycoComm(r->f), ListMasters(r->f, pairs, in, width, &n, list));
   PetscCallMPI(MPI_Bcast(&n, 1, MPIU_INT, 0, HycoComm(r->f)));
-  HycoBcast(list, MOST_MASTERS * n, MPIU_INT, HycoComm(r->f));
-  for (PetscInt k = 0; k < n; k++) PetscCall(AddBehind(r, list + k * MOST_MASTERS));
-  PetscCall(PetscFree3(node, in, list));
+  HycoBcast(list, (size_t)width * (size_t)n, MPIU_INT, HycoComm(r->f));
+  for (PetscInt k = 0; k < n; k++) PetscCall(AddMasters(r, width, list + (size_t)k * (size_t)width, at, marked));
+  PetscCall(PetscFree(marked));
+  PetscCall(PetscFree4(node, in, list, at));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -73,6 +73,7 @@ typedef struct {
   PetscInt *order;                 /* held-out points, those with the largest errors in the last attempts first */
   PetscReal least, *ratio;         /* least ratio so far; ratios of the best model at its held-out points */
   PetscReal spent, last, budget;   /* operations of all attempts, and of the last one; the largest number of them */
+  PetscReal own;                   /* of `spent`, those of types with modes of their own, which add to the budget */
   PetscInt n_models;               /* attempts with these bases that gave a model of any use */
   PetscInt n_own;                  /* the last attempt of a type with modes of its own */
   PetscBool ended;                 /* by the budget */
@@ -801,7 +802,9 @@ static PetscErrorCode TryType(Search *s, const char name[], PetscBool own)
     PetscCall(TrySizes(s, type, HYCO_HYBRID_AUTO, &met));
   if (wanted && type->model->traits.own_modes) {
     s->n_own = s->n;
-    s->budget = budget + s->spent - spent; /* the other types, which may be the accurate ones, keep theirs */
+    /* The other types, which may be the accurate ones, keep theirs, also in later rounds. */
+    s->own += s->spent - spent;
+    s->budget = budget + s->spent - spent;
     s->n_models = 0;
     s->ended = PETSC_FALSE;
   }
@@ -1009,6 +1012,7 @@ static PetscErrorCode Attempts(Search *s)
   s->ended = PETSC_FALSE;
   s->remedy[0] = '\0';
   PetscCall(HycoReducerSearchBudget(s->t, &s->budget));
+  s->budget += s->own; /* which counts in what is spent */
   PetscCall(TakeColumns(s->t, s->store, PETSC_TRUE));
   PetscCall(TryAll(s, PETSC_TRUE));
   if (!Ends(s, HycoAttemptsChoose(s->n, s->attempt)) && !IsOwn(s->t)) {
@@ -1177,6 +1181,10 @@ static PetscErrorCode BuildBest(Search *s, HycoROM *model, HycoTraining *report)
   for (PetscInt k = s->n - 1; k > 0 && !best; k--) { /* one that is not refused for its cost */
     if (s->attempt[k].settings.hybrid != HYCO_HYBRID_ALL) best = &s->attempt[k];
   }
+  if (!s->n)
+    HycoFail("no type of model was tried%s%s%s%s; give -hyco_model_type", s->n_left_out ? "; " : "",
+             s->n_left_out ? s->left_out[0].what : "", s->n_left_out ? ": " : "",
+             s->n_left_out ? s->left_out[0].why : "");
   HycoFail("none of %d settings gave a model; the error of one of them: %s", (int)s->n,
            (best ? best : &s->attempt[0])->failure);
 }

@@ -220,7 +220,8 @@ PetscErrorCode HycoFieldFileAddRows(HycoFieldFile f, const HycoField *field, con
   char set[HYCO_LINE];
 
   PetscFunctionBegin;
-  if (f->n_fields == HYCO_MOST_FIELDS) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCheck(f->n_fields < HYCO_MOST_FIELDS, f->comm, PETSC_ERR_PLIB,
+             "%s: no room for the field %s; there are %d already", f->path, field->name, HYCO_MOST_FIELDS);
   PetscCall(PetscStrncpy(f->name[f->n_fields], field->name, sizeof(f->name[0])));
   *noted = *field;
   noted->name = f->name[f->n_fields++];

@@ -44,7 +44,7 @@ static PetscErrorCode CreateBeyond(HycoROM m)
 {
   PetscFunctionBegin;
   PetscCall(HycoFECreateSurface(m->model->scene, m->model->mesh->dm, &m->fe_beyond));
-  PetscCall(HycoRowsCreate(&m->model->pairs, m->model->mesh->dim, &m->rows));
+  PetscCall(HycoRowsCreate(&m->pairs, m->model->mesh->dim, &m->rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -56,7 +56,7 @@ static PetscErrorCode BringRows(HycoROM m, HycoFE fe, const PetscReal mu[])
   /* fe knows whether its parameters since the last rows affect these. */
   if (!fe->contact_changed && !fe->gap_changed) PetscFunctionReturn(PETSC_SUCCESS);
   fe->ready = PETSC_FALSE; /* until its rows are computed */
-  PetscCall(HycoRowsFill(fe, &m->model->pairs, &m->rows));
+  PetscCall(HycoRowsFill(fe, &m->pairs, &m->rows));
   fe->ready = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -51,8 +51,8 @@ static PetscErrorCode Bring(HycoROM m, HycoFE fe)
   if (c->ready && !changes.nodes && !changes.rows) PetscFunctionReturn(PETSC_SUCCESS);
   /* Until all three arrays belong to mu. */
   c->ready = PETSC_FALSE;
-  PetscCall(HycoContactGeometry(fe, &m->model->pairs, c->normal, c->gap));
-  PetscCall(HycoContactAreas(fe, &m->model->pairs, c->area));
+  PetscCall(HycoContactGeometry(fe, &m->pairs, c->normal, c->gap));
+  PetscCall(HycoContactAreas(fe, &m->pairs, c->area));
   PetscCall(PetscArraycpy(c->mu, fe->mu, m->model->scene->n_variables));
   c->ready = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -89,8 +89,8 @@ PetscErrorCode HycoROMSumContacts(HycoROM m, const PetscReal Lambda[], const Hyc
   if (!HycoROMHasAllForces(m)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(Prepare(m, Lambda, &fe, &least));
   PetscCall(PetscMalloc1(m->model->pairs.n, &pressure));
-  PetscCall(HycoContactPressures(PETSC_COMM_SELF, fe, &m->model->pairs, m->carried->area, Lambda, pressure));
-  PetscCall(HycoContactResults(fe, &m->model->pairs, m->carried->normal, m->carried->area, Lambda, pressure, least,
+  PetscCall(HycoContactPressures(PETSC_COMM_SELF, fe, &m->pairs, m->carried->area, Lambda, pressure));
+  PetscCall(HycoContactResults(fe, &m->pairs, m->carried->normal, m->carried->area, Lambda, pressure, least,
                                m->carried->result));
   for (PetscInt c = 0; c < HycoSceneResults(m->model->scene); c++) {
     /* A minimum over nothing would be the largest number. */
@@ -114,13 +114,13 @@ PetscErrorCode HycoROMPushBodies(HycoROM m, const PetscReal Lambda[], const Pets
   PetscCall(Prepare(m, Lambda, &fe, &least));
   *force = 0;
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
-    const HycoShear *shear = m->model->pairs.shear;
+    const HycoShear *shear = m->pairs.shear;
     /* The normal points out of the slave: the force on the slave is against it, that of friction as it is. */
     const PetscReal along = Lambda[k] * m->carried->normal[3 * k + axis] - (shear ? shear->force[3 * k + axis] : 0);
 
-    if (Lambda[k] <= least || HycoPairsAlone(m->model->scene, &m->model->pairs, k)) continue;
+    if (Lambda[k] <= least || HycoPairsAlone(m->model->scene, &m->pairs, k)) continue;
     if (of[body[m->model->pairs.slave[k]]]) *force -= along;
-    HycoPairsMasters(&m->model->pairs, k, &n, &master, &weight);
+    HycoPairsMasters(&m->pairs, k, &n, &master, &weight);
     for (PetscInt j = 0; j < n; j++) *force += of[body[master[j]]] ? weight[j] * along : 0;
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -49,7 +49,7 @@ static PetscErrorCode Create(HycoROM m, HycoBalance b)
   PetscFunctionBegin;
   PetscCall(HycoFECreateMatrix(fe, PETSC_COMM_SELF, fe->mesh->n_nodes, 0, &b->K));
   PetscCall(MatCreateVecs(b->K, &b->x, &b->r));
-  PetscCall(HycoRowsCreate(&m->model->whole_pairs, fe->dim, &b->rows));
+  PetscCall(HycoRowsCreate(&m->whole_pairs, fe->dim, &b->rows));
   PetscCall(PetscMalloc1(fe->n_dof, &b->load));
   PetscCall(PetscMalloc1(fe->mesh->n_cells, &b->energy));
   PetscCall(PetscMalloc1((size_t)n_times * (size_t)m->model->pairs.n + 1, &b->gap));
@@ -107,7 +107,7 @@ static PetscErrorCode Factor(HycoROM m, HycoBalance b)
 /* Subtracts the tangential forces of friction on the slaves, and adds those on the masters. */
 static void AddFriction(HycoROM m, PetscReal f[])
 {
-  const HycoPairs *pairs = &m->model->whole_pairs;
+  const HycoPairs *pairs = &m->whole_pairs;
   const PetscInt dim = m->fe_whole->dim, *master;
   const PetscReal *weight;
   PetscInt n;
@@ -152,14 +152,14 @@ static PetscErrorCode MeasureTime(HycoROM m, HycoBalance b, HycoReplay *replay, 
   PetscScalar *r, square;
 
   PetscFunctionBegin;
-  PetscCall(HycoRowsFill(fe, &m->model->whole_pairs, &b->rows));
+  PetscCall(HycoRowsFill(fe, &m->whole_pairs, &b->rows));
   PetscCall(HycoFELoads(fe, b->load));
   HycoFEGeneralise(fe, b->load);
   PetscCall(VecGetArray(b->r, &r));
   for (PetscInt k = 0; k < fe->n_dof; k++) r[k] = replay->march.f_int[k] - b->load[k];
   AddContact(m, b, j, r);
   HycoTraceShow(m, j);
-  if (m->model->whole_pairs.shear) AddFriction(m, r);
+  if (m->whole_pairs.shear) AddFriction(m, r);
   /* Reactions balance whatever is left at supports. */
   for (PetscInt k = 0; k < fe->n_dof; k++) r[k] = fe->fixed[k] ? 0 : r[k];
   PetscCall(VecRestoreArray(b->r, &r));

@@ -130,7 +130,7 @@ static PetscErrorCode FillDual(HycoROM m, HycoFloating f, HycoFE fe, Dual *d)
     PetscReal *work = d->work + d->n * d->p;
 
     /* Zero forces stay zero in the relative entropy; a slave without master has no partner to balance with. */
-    if (!(m->Lambda[k] > 0) || HycoPairsAlone(m->model->scene, &m->model->pairs, k)) continue;
+    if (!(m->Lambda[k] > 0) || HycoPairsAlone(m->model->scene, &m->pairs, k)) continue;
     PetscCall(PetscArrayzero(work, d->p));
     for (PetscInt e = m->rows.start[k]; e < m->rows.start[k + 1]; e++) {
       for (PetscInt j = 0; j < d->p; j++)

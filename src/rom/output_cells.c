@@ -88,7 +88,7 @@ static PetscErrorCode PrepareReactions(HycoROM m, HycoOutputCells p)
   PetscCall(PetscCalloc1(m->model->mesh->n_nodes, &in));
   PetscCall(PetscMalloc1(m->model->whole_nodes, &place));
   for (PetscInt i = 0; i < m->model->whole_nodes; i++) place[i] = -1;
-  ierr = HycoPairsMarkSurfaces(m->model->scene, m->model->mesh, &m->model->pairs, in);
+  ierr = HycoPairsMarkSurfaces(m->model->scene, m->model->mesh, &m->pairs, in);
   /* By number in the whole mesh, the only one that the two meshes share. */
   for (PetscInt i = 0; i < m->model->mesh->n_nodes; i++) place[m->model->mesh->node_whole[i]] = in[i] ? i : -1;
   for (PetscInt i = 0; i < p->mesh->n_nodes; i++) p->surface_node[i] = place[p->mesh->node_whole[i]];
@@ -114,7 +114,7 @@ static PetscErrorCode TakeContact(HycoROM m, HycoOutputCells p, const PetscReal 
   PetscCall(MakeSurface(m, p));
   PetscCall(HycoFESetParameters(p->fe_surface, p->fe->mu));
   PetscCall(PetscCalloc2(p->fe_surface->n_dof, &u, p->fe->n_dof, &force)); /* forces do not depend on u */
-  ierr = HycoContactFieldsCreate(PETSC_COMM_SELF, p->fe_surface, &m->model->pairs, u, Lambda, &c);
+  ierr = HycoContactFieldsCreate(PETSC_COMM_SELF, p->fe_surface, &m->pairs, u, Lambda, &c);
   for (PetscInt k = 0; !ierr && k < p->fe->n_dof; k++) {
     if (p->surface_node[k / dim] >= 0) force[k] = c.force[3 * p->surface_node[k / dim] + k % dim];
   }

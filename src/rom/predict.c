@@ -26,11 +26,32 @@ PetscErrorCode HycoROMSetUpDefault(HycoROM m)
   m->n = m->model->l;
   m->m = m->n_L = m->model->pairs.n;
   m->spread = PETSC_TRUE;
-  m->of_fe = &m->model->pairs;
+  m->of_fe = &m->pairs;
   PetscCall(PetscMalloc1(m->m, &m->contact));
   for (PetscInt k = 0; k < m->m; k++) m->contact[k] = k;
-  PetscCall(HycoRowsCreate(&m->model->pairs, m->model->mesh->dim, &m->rows));
+  PetscCall(HycoRowsCreate(&m->pairs, m->model->mesh->dim, &m->rows));
   PetscCall(HycoROMSetUpFields(m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMTakePairs(const HycoPairs *of, HycoPairs *own)
+{
+  PetscFunctionBegin;
+  if (of->room)
+    PetscCall(HycoPairsRenumber(of, NULL, own));
+  else
+    *own = *of;
+  own->geometry = NULL; /* what is kept of it is the handle's */
+  own->drawn = 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMDropPairs(HycoPairs *own)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscFree(own->geometry));
+  if (own->room) PetscCall(HycoPairsDestroy(own));
+  PetscCall(PetscMemzero(own, sizeof(*own)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -40,6 +61,7 @@ PetscErrorCode HycoROMSetUp(HycoROM m)
   PetscFunctionBegin;
   if (m->ready) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoROMReset(m)); /* removes incomplete data after a refusal */
+  PetscCall(HycoROMTakePairs(&m->model->pairs, &m->pairs));
   if (m->model->traits.work) PetscCall(PetscCalloc1(m->model->traits.work, (char **)&m->work));
   if (m->ops->setup)
     PetscUseTypeMethod(m, setup);
@@ -135,6 +157,7 @@ PetscErrorCode HycoROMReset(HycoROM m)
   PetscCall(HycoRowsDestroy(&m->rows));
   PetscCall(HycoFEDestroy(&m->fe));
   m->of_fe = NULL;
+  PetscCall(HycoROMDropPairs(&m->pairs));
   PetscCall(HycoTraceFree(m));
   HycoFreeAll(&m->contact, &m->gamma, &m->U, &m->Lambda, &m->stress, &m->slave_id, &m->modal);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -226,7 +226,7 @@ static PetscErrorCode Look(HycoROM m, HycoSolution *solution, PetscReal **rid)
   for (PetscInt e = 0; e < m->model->mesh->n_cells; e++) (*rid)[m->model->mesh->cell_whole[e]] = 1;
   *solution = (HycoSolution){.fe = m->fe_whole,
                              .surface = m->fe_whole,
-                             .pairs = &m->model->whole_pairs,
+                             .pairs = &m->whole_pairs,
                              .u = U,
                              .u_surface = U,
                              .lambda = m->Lambda,

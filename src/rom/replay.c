@@ -61,7 +61,7 @@ static HycoSeriesSource Look(const HycoReplay *r, PetscInt j)
                                  .fe = m->fe_whole,
                                  .state = r->march.state,
                                  .fe_surface = m->fe_whole,
-                                 .pairs = &m->model->whole_pairs,
+                                 .pairs = &m->whole_pairs,
                                  .n_nodes = m->model->whole->n_nodes,
                                  .n_cells = m->model->whole->n_cells,
                                  .n_contacts = m->model->pairs.n,

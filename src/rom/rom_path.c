@@ -3,16 +3,14 @@
 #include <hycopath.h>
 #include <hycoromimpl.h>
 
-/* What the caller has set (times of steps, cuts) stays; contacts must not keep the address of `seen`, which goes
-   with the handle. */
+/* What the caller has set (times of steps, cuts) stays. */
 PetscErrorCode HycoTraceFree(HycoROM m)
 {
   HycoTrace *r = &m->trace;
   const HycoTrace empty = {.n_given = r->n_given, .given = r->given, .most_cuts = r->most_cuts};
 
   PetscFunctionBegin;
-  if (m->model && m->model->pairs.shear == &r->seen) m->model->pairs.shear = NULL;
-  if (m->model && m->model->whole_pairs.shear == &r->seen) m->model->whole_pairs.shear = NULL;
+  m->pairs.shear = m->whole_pairs.shear = NULL;
   HycoFreeAll(&r->t, &r->gamma, &r->U_fe, &r->at, &r->Lambda, &r->sigma, &r->inelastic, &r->shear, &r->step);
   *r = empty;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -29,7 +29,7 @@ PetscErrorCode HycoTraceListShear(HycoROM m, const HycoShear *shear)
 void HycoTraceShowOther(HycoROM m, const HycoShear *shear)
 {
   m->trace.seen = *shear;
-  m->model->pairs.shear = m->model->whole_pairs.shear = &m->trace.seen;
+  m->pairs.shear = m->whole_pairs.shear = &m->trace.seen;
 }
 
 void HycoTraceShow(HycoROM m, PetscInt k)

@@ -192,6 +192,7 @@ PetscErrorCode HycoROMFreeWhole(HycoROM m)
 {
   PetscFunctionBegin;
   PetscCall(HycoFEDestroy(&m->fe_whole));
+  PetscCall(HycoROMDropPairs(&m->whole_pairs));
   PetscCall(PetscFree(m->U_whole));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -203,6 +204,8 @@ PetscErrorCode HycoROMLoadWhole(HycoROM m)
   if (m->U_whole) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(OpenWhole(m->model));
   PetscCall(HycoROMFreeWhole(m)); /* what a failed attempt has left */
+  PetscCall(HycoROMTakePairs(&m->model->whole_pairs, &m->whole_pairs));
+  m->whole_pairs.shear = m->pairs.shear;
   PetscCall(HycoFECreate(m->model->scene, m->model->whole->dm, &m->fe_whole));
   PetscCall(PetscMalloc1((size_t)m->model->whole->n_nodes * (size_t)m->model->whole->dim, &m->U_whole));
   PetscFunctionReturn(PETSC_SUCCESS);

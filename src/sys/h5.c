@@ -130,10 +130,13 @@ PetscErrorCode HycoH5CreateImage(const char name[], HycoH5 *file)
 static PetscErrorCode Create(const char path[], PetscBool table, HycoH5 *file)
 {
   HycoFile out;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoFileCreate(path, HYCO_FILE_NUMBERS, &out));
-  PetscCall(CreateImage(path, table, file));
+  ierr = CreateImage(path, table, file);
+  if (ierr) PetscCall(HycoFileClose(&out, PETSC_FALSE));
+  PetscCall(ierr);
   (*file)->out = out;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

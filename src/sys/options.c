@@ -143,36 +143,46 @@ static PetscInt EditDistance(const char *a, const char *b)
 }
 
 /* A third of the letters may differ, at least two: more would suggest unrelated words. */
+static PetscInt TooFar(const char *word)
+{
+  return PetscMax(2, (PetscInt)strlen(word) / 3) + 1;
+}
+
+/* The name becomes the nearest if it is nearer than *best. */
+static void Compare(const char *word, const char *name, PetscInt *best, const char **nearest)
+{
+  const PetscInt distance = EditDistance(word, name);
+
+  if (distance >= *best) return;
+  *best = distance;
+  *nearest = name;
+}
+
 const char *HycoNearest(const char *word, PetscInt n, const char *const names[])
 {
   const char *nearest = NULL;
-  PetscInt best = PetscMax(2, (PetscInt)strlen(word) / 3) + 1;
+  PetscInt best = TooFar(word);
 
-  for (PetscInt k = 0; k < n; k++) {
-    PetscInt distance = EditDistance(word, names[k]);
-
-    if (distance < best) {
-      best = distance;
-      nearest = names[k];
-    }
-  }
+  for (PetscInt k = 0; k < n; k++) Compare(word, names[k], &best, &nearest);
   return nearest;
 }
 
 const char *HycoOptionNearest(const char word[], const HycoOptionList *more)
 {
   const HycoOptionList *lists[] = {&table, more};
-  const char *names[256];
-  PetscInt n = 0;
+  const char *nearest = NULL;
+  PetscInt best = TooFar(word);
 
   (void)!HycoGetOptionTable(NULL, NULL);
   for (int l = 0; l < 2; l++) {
-    for (PetscInt k = 0; lists[l] && k < lists[l]->n && n < 256; k++) {
-      names[n] = lists[l]->option[k].name;
-      if (strncasecmp(names[n++], word, strlen(word)) == 0) return names[n - 1]; /* an abbreviation */
+    for (PetscInt k = 0; lists[l] && k < lists[l]->n; k++) {
+      const char *name = lists[l]->option[k].name;
+
+      if (strncasecmp(name, word, strlen(word)) == 0) return name; /* an abbreviation */
+      Compare(word, name, &best, &nearest);
     }
   }
-  return HycoNearest(word, n, names);
+  return nearest;
 }
 
 /* The text is borrowed; "" ends it. */

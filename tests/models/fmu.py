@@ -82,7 +82,10 @@ class FMU(Case):
         move(lib.fmi3SetFloat64, inputs[:1], [9.0])
         self.assertEqual(move(lib.fmi3GetFloat64, outputs[:1], [0])[0], WARNING)
         self.assertEqual(move(lib.fmi3SetFloat64, outputs[:1], [0])[0], ERROR)
-        self.assertEqual([status for status, _ in said], [WARNING, ERROR])
+        before = move(lib.fmi3GetFloat64, inputs, [0] * len(inputs))[1]
+        self.assertEqual(move(lib.fmi3SetFloat64, [inputs[0], outputs[0]], [before[0] + 1, 0])[0], ERROR)  # all or none is set
+        self.assertEqual(move(lib.fmi3GetFloat64, inputs, [0] * len(inputs))[1], before)
+        self.assertEqual([status for status, _ in said], [WARNING, ERROR, ERROR])
         self.assertIn('range', said[0][1])
         lib.fmi3FreeInstance(instance)
 

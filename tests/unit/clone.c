@@ -17,9 +17,9 @@ static PetscErrorCode SetOptions(const char *const option[], PetscBool set)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Train(const char example[], const char *const option[], const char path[])
+static PetscErrorCode Train(const char example[], const PetscInt counts[], const char *const option[],
+                            const char path[])
 {
-  const PetscInt counts[2] = {3, 3};
   char folder[PETSC_MAX_PATH_LEN];
   HycoScene scene;
   HycoSamples samples;
@@ -175,14 +175,55 @@ static PetscErrorCode TestOptions(const char path[])
 static PetscErrorCode TestCase(const char example[], const char *const option[], const PetscReal mu[4][2])
 {
   const char *const type = option[1];
+  const PetscInt counts[2] = {3, 3};
   char path[64];
 
   PetscFunctionBegin;
   snprintf(path, sizeof(path), "clone-%s-%s-%d.h5", example, type, (int)getpid());
-  PetscCall(Train(example, option, path));
+  PetscCall(Train(example, counts, option, path));
   PetscCall(TestHandles(type, path, mu));
   PetscCall(TestMemory(type, path, mu[0]));
   PetscCall(TestOptions(path));
+  unlink(path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Friction of a handle's path stays its own while another predicts, and when that one is destroyed. */
+static PetscErrorCode TestFriction(void)
+{
+  const char *const option[] = {"-hyco_model_type", HYCO_ROM_BODIES, "-history_times", "0,1,2", NULL};
+  const PetscReal mu[2][3] = {{1300, 0.17, 0.06}, {2200, 0.3, 0.03}};
+  const PetscInt counts[3] = {2, 1, 1};
+  const HycoContactResult *result;
+  PetscReal work[2];
+  PetscInt n;
+  HycoROM handle[2];
+  char path[64];
+
+  PetscFunctionBegin;
+  snprintf(path, sizeof(path), "clone-friction-%d.h5", (int)getpid());
+  PetscCall(Train("lapjoint", counts, option, path));
+  for (int k = 0; k < 2; k++) {
+    PetscCall(HycoROMLoad(path, &handle[0]));
+    PetscCall(HycoROMPredict(handle[0], 3, mu[k]));
+    PetscCall(HycoROMGetContacts(handle[0], &n, &result));
+    work[k] = result[0].friction_work;
+    PetscCall(HycoROMDestroy(&handle[0]));
+  }
+  CHECK(work[0] > 0 && work[1] > 0 && work[0] != work[1], "works of friction %g and %g", (double)work[0],
+        (double)work[1]);
+  PetscCall(HycoROMLoad(path, &handle[0]));
+  PetscCall(HycoROMClone(handle[0], &handle[1]));
+  for (int k = 0; k < 2; k++) PetscCall(HycoROMPredict(handle[k], 3, mu[k]));
+  PetscCall(HycoROMGetContacts(handle[0], &n, &result));
+  CHECK(!handle[0]->model->pairs.shear, "the friction of a prediction is in the model");
+  CHECK(result[0].friction_work == work[0], "beside another handle %g, alone %g", (double)result[0].friction_work,
+        (double)work[0]);
+  PetscCall(HycoROMDestroy(&handle[1]));
+  PetscCall(HycoROMGetContacts(handle[0], &n, &result));
+  CHECK(result[0].friction_work == work[0], "after another handle %g, alone %g", (double)result[0].friction_work,
+        (double)work[0]);
+  PetscCall(HycoROMDestroy(&handle[0]));
   unlink(path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -210,6 +251,7 @@ static PetscErrorCode Test(void)
     if (cases[k].rope) PetscCall(TestCase("rope", still, rope));
     if (cases[k].ring) PetscCall(TestCase("ring", path, ring));
   }
+  PetscCall(TestFriction());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

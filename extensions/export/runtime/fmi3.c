@@ -120,10 +120,11 @@ FUNCTION(SetFloat64, void *instance, const uint32_t at[], size_t n, const double
   Instance *o = instance;
 
   if (n != n_values) return report(o, FMI_ERROR, "a value for each variable is expected");
+  /* All or none is set. */
   for (size_t i = 0; i < n; i++) {
     if (at[i] < 1 || at[i] >= FIRST_OUTPUT) return report(o, FMI_ERROR, "the variable is no input");
-    o->mu[at[i] - 1] = value[i];
   }
+  for (size_t i = 0; i < n; i++) o->mu[at[i] - 1] = value[i];
   o->current = false;
   return FMI_OK;
 }

@@ -67,7 +67,7 @@ static PetscErrorCode SolvePath(HycoBodiesFriction f, HycoBodiesWork o, HycoScen
 
   PetscFunctionBegin;
   PetscCall(HycoBodiesFrictionBegin(f));
-  for (PetscInt step = 0; t <= last; step++) {
+  while (t <= last) {
     PetscReal all[HYCO_MAX_PARAMETERS];
 
     HycoSceneSetTime(scene, mu, t, all);
@@ -876,8 +876,12 @@ PetscErrorCode HycoBodiesFields(HycoReducer t, HycoSnapshots store, HycoBodiesFa
     ierr = ModesOf(t, factor, n, k, &sampled, &V, &sigma, &enough);
   }
   HycoFreeAll(&sampled.c, &sampled.f, &sampled.U);
+  if (!ierr) ierr = Coefficients(t, factor, V);
+  if (ierr) {
+    PetscCall(MatDestroy(&V));
+    PetscCall(PetscFree(sigma));
+  }
   PetscCall(ierr);
-  PetscCall(Coefficients(t, factor, V));
   PetscCall(TakeModes(t, store, V, sigma));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

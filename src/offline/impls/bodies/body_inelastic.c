@@ -368,8 +368,8 @@ static PetscErrorCode FillLoads(HycoReducer t, HycoBodiesFactor *factor, const U
 
 /* -- laws at few points -- */
 
-/* Whether a law deforms inelastically at once, as in yielding: under large strains in no time. Collective. */
-static PetscErrorCode Yields(HycoReducer t, PetscBool *yields)
+/* Whether a law of this rank's cells deforms inelastically at once, as in yielding: under large strains in no time. */
+static PetscErrorCode YieldsHere(HycoReducer t, PetscBool *yields)
 {
   HycoFE fe = t->fom->fe;
   const PetscReal size = LARGE * HycoMeshLength(t->fom->part), now = t->scene->times[0];
@@ -391,6 +391,14 @@ static PetscErrorCode Yields(HycoReducer t, PetscBool *yields)
   PetscCall(PetscFree2(u, f));
   PetscCall(ierr);
   *yields = (PetscBool)(report.failed || report.increment > 0);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The same on any rank. Laws may fail on one rank alone. Collective. */
+static PetscErrorCode Yields(HycoReducer t, PetscBool *yields)
+{
+  PetscFunctionBegin;
+  HycoOnEach(HycoComm(t), YieldsHere(t, yields));
   HycoAllreduce(yields, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

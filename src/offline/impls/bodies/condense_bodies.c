@@ -429,7 +429,8 @@ static PetscErrorCode MakeModes(HycoReducer t, HycoSnapshots store)
   b->n = HycoTrainingOfBodies(t)->parts.n;
   b->n_variables = t->scene->n_variables;
   PetscCall(HycoReducerColumn(t, 0, mu));
-  HycoDuplicate(b->n_variables + 1, mu, &b->first);
+  PetscCall(PetscMalloc1(b->n_variables + 1, &b->first));
+  PetscCall(PetscArraycpy(b->first, mu, b->n_variables));
   PetscCall(TakeTheta(t, b));
   if (HycoBodiesFlow(t))
     PetscCall(HycoBodiesStrainModes(t, store));

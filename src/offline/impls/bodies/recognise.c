@@ -66,8 +66,9 @@ typedef struct {
   Mat K;                         /* at the current point */
   Vec v, y, now, product, F0, F; /* at the first point: v, K v, F */
   HycoPose *pose;
-  PetscReal *kappa, *off; /* by body: the factor of the stiffness, the relative distance from it; < 0: no stiffness */
-  PetscReal *load;        /* n x 2: change of the load with and without that factor, relative */
+  PetscReal *kappa,
+      *off;        /* by body: the factor of the stiffness, the relative distance from it; without stiffness 1, 0 */
+  PetscReal *load; /* n x 2: change of the load with and without that factor, relative */
 } Compared;
 
 /* Ranks that see no more than a part of a plane of symmetry must agree on whether a map mirrors. */

@@ -15,7 +15,7 @@
 
 static HycoBodiesSurface SurfaceOf(HycoROM m)
 {
-  return HycoBodiesSurfaceNormal(m->fe, &m->model->pairs, &m->rows);
+  return HycoBodiesSurfaceNormal(m->fe, &m->pairs, &m->rows);
 }
 
 /* HycoROMSetUpDefault() makes fe and rows, which the surface borrows. */

@@ -53,8 +53,10 @@ static PetscErrorCode MoveTheta(HycoH5 h, HycoROM m, HycoSubstructures b)
   for (PetscInt i = 0; i < n && HycoH5Reads(h); i++)
     b->body[i / b->n_theta].tensor.n[i % b->n_theta] = axes[i] ? b->n_nodes[i % b->n_theta] : 1;
   PetscCall(PetscFree(axes));
-  for (PetscInt k = 1; k < nodes; k++)
-    HycoCheck(b->node[k] == b->node[k], "%s: bodies/node is damaged", m->model->path);
+  for (PetscInt p = 0, k = 0; p < b->n_theta; k += b->n_nodes[p++]) {
+    for (PetscInt i = 1; i < b->n_nodes[p]; i++)
+      HycoCheck(b->node[k + i] > b->node[k + i - 1], "%s: bodies/node is damaged", m->model->path);
+  }
   HycoBodiesSetTensors(b);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

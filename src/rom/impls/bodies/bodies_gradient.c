@@ -4,7 +4,7 @@
 
 static HycoBodiesSurface SurfaceOf(HycoROM m)
 {
-  return HycoBodiesSurfaceNormal(m->fe, &m->model->pairs, &m->rows);
+  return HycoBodiesSurfaceNormal(m->fe, &m->pairs, &m->rows);
 }
 
 /* z NULL: the caller wants the sizes alone. */

@@ -38,7 +38,7 @@ typedef struct _n_HycoBodiesPath {
 
 static inline HycoBodiesSurface HycoBodiesSurfaceOf(HycoROM m)
 {
-  return HycoBodiesSurfaceNormal(m->fe, &m->model->pairs, &m->rows);
+  return HycoBodiesSurfaceNormal(m->fe, &m->pairs, &m->rows);
 }
 
 /* Forgets the responses of the contacts and the set, after a change of rows or stiffness; takes strains and responses of the

@@ -171,7 +171,7 @@ PetscErrorCode HycoHybridReconstruct(HycoROM m)
     if (r->c[j] == 0) continue;
     m->spread = PETSC_TRUE;
     for (PetscInt i = 0; i < r->n; i++) {
-      if (!m->model->in_rid[r->contact[i]] && !HycoPairsAlone(m->model->scene, &m->model->pairs, r->contact[i]))
+      if (!m->model->in_rid[r->contact[i]] && !HycoPairsAlone(m->model->scene, &m->pairs, r->contact[i]))
         m->Lambda[r->contact[i]] += r->c[j] * s[i];
     }
   }

@@ -2,7 +2,9 @@
 #include <hycosolverimpl.h>
 
 typedef struct {
-  KSP ksp; /* iterative */
+  KSP ksp;          /* iterative */
+  KSPNormType norm; /* its own measure, without a target */
+  PetscReal rtol, atol;
   HycoOperatorState of;
 } Linear;
 
@@ -39,14 +41,19 @@ static PetscErrorCode SolveIterative(HycoSolver s, Linear *l, Vec x, PetscBool *
   if (!same) {
     PetscCall(KSPDestroy(&l->ksp));
     PetscCall(HycoIterativeSolver(HycoComm(s), "hyco_primal_", s->system->K, &l->ksp));
+    PetscCall(KSPGetNormType(l->ksp, &l->norm));
+    PetscCall(KSPGetTolerances(l->ksp, &l->rtol, &l->atol, NULL, NULL));
   }
   if (s->target > 0) {
     PetscCall(VecNorm(s->system->F, NORM_2, &size));
     PetscCall(KSPSetNormType(l->ksp, KSP_NORM_UNPRECONDITIONED));
     /* Absolute, since the target is; but never above what the final check of the residual demands. */
     PetscCall(KSPSetTolerances(l->ksp, 0, PetscMin(s->target, 0.3 * s->rtol * size), PETSC_DEFAULT, PETSC_DEFAULT));
-  } else
+  } else {
+    PetscCall(KSPSetNormType(l->ksp, l->norm));
+    PetscCall(KSPSetTolerances(l->ksp, l->rtol, l->atol, PETSC_DEFAULT, PETSC_DEFAULT));
     PetscCall(VecSet(x, 0));
+  }
   PetscCall(KSPSolve(l->ksp, s->system->F, x));
   PetscCall(KSPGetConvergedReason(l->ksp, &why));
   PetscCall(KSPGetIterationNumber(l->ksp, &its));
