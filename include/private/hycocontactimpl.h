@@ -95,8 +95,6 @@ typedef struct _n_HycoPairs {
    of the surfaces; what all ranks must decide together is then left to HycoContactsAgree(), and what this rank alone
    cannot decide is an error. NULL: the DM has the whole surfaces. */
 PetscErrorCode HycoPairsFind(HycoScene scene, DM dm, const HycoSurfaceFacts facts[], HycoPairs *pairs);
-/* The same on tables, which need not have a DM (HycoFECreateOn()). */
-PetscErrorCode HycoPairsFindOn(HycoScene scene, HycoMesh mesh, const HycoSurfaceFacts facts[], HycoPairs *pairs);
 /* The facts about the surfaces of each contact of the scene (facts: scene->n_contacts). Collective. */
 PetscErrorCode HycoContactsFacts(MPI_Comm comm, HycoScene scene, HycoMesh part, HycoSurfaceFacts facts[]);
 /* The masters' nodes (numbers in the distributed vectors, perhaps repeated) that this rank's slaves may meet at the

@@ -53,7 +53,7 @@ typedef struct {
 
 struct _n_HycoFE {
   HycoScene scene;  /* borrowed */
-  DM dm;            /* NULL: of tables without one */
+  DM dm;            /* NULL: of HycoFECreateRead() */
   HycoMesh mesh;    /* its tables, borrowed from it; or surface */
   HycoMesh surface; /* of HycoFECreateSurface(): the tables without cells, whose arrays are the DM's; else NULL */
   /* sizes: space dimension, n_nodes * dim, stress components */
@@ -129,9 +129,8 @@ static inline PetscInt HycoFEUnknowns(HycoFE fe)
 PetscErrorCode HycoFECreate(HycoScene scene, DM dm, HycoFE *fe);
 /* On its nodes and facets alone, without the cells and their materials. */
 PetscErrorCode HycoFECreateSurface(HycoScene scene, DM dm, HycoFE *fe);
-/* On tables which need not have a DM, and are borrowed then: those of a file just read, since a tie's weights are part of
-   the topology, or of surfaces that were received. Not collective. */
-PetscErrorCode HycoFECreateOn(HycoScene scene, HycoMesh mesh, HycoFE *fe);
+/* On the tables of a file just read (borrowed), before they become a DM: a tie's weights are part of the topology. */
+PetscErrorCode HycoFECreateRead(HycoScene scene, HycoMesh mesh, HycoFE *fe);
 PetscErrorCode HycoFEDestroy(HycoFE *fe);
 /* While cells are not used, HycoFESetParameters() leaves what belongs to them as it is. Brings them to the present mu when
    they are used again. */

@@ -163,8 +163,7 @@ static inline HycoCellType HycoMeshShape(HycoMesh m, PetscInt cell)
 /* The tables of a DM (borrowed): those that it has, or, collectively, new ones for the scene. A DM that another program
    made gets tags and complete labels. Scenes that share a DM must have the same bodies. */
 PetscErrorCode HycoMeshOf(DM dm, HycoScene scene, HycoMesh *mesh);
-/* Gives tables that were read or received, with their ties, a DM of their own on this process, unless they have one.
-   Not collective. */
+/* Gives tables that were read or received, with their ties, a DM of their own on this process. Not collective. */
 PetscErrorCode HycoMeshCreateDM(HycoScene scene, HycoMesh mesh);
 /* Releases the caller's reference to the tables' DM; frees tables without a DM. */
 PetscErrorCode HycoMeshDestroy(HycoMesh *mesh);
@@ -274,11 +273,10 @@ PetscErrorCode HycoMeshGather(HycoScene scene, HycoMesh part, const PetscBool in
 /* The nodes node[0..n) (numbers in the distributed vectors, of any ranks, perhaps repeated) with all facets of the
    groups in[] around them, the nodes of these, and the masters of tied ones, as a mesh of this process; around a node
    are also the facets of nodes that are tied to it. The mesh has no cells (1D: those of the facets), knows to which
-   rank each node belongs (HycoMeshOwned()), and has all groups with its own nodes of them. It has no DM before
-   HycoMeshCreateDM(): with many contacts, whose search needs the tables alone, that is a part of their set-up. The caller
-   owns it. Collective. */
-PetscErrorCode HycoMeshRings(MPI_Comm comm, HycoMesh part, const PetscBool in[], PetscInt n, const PetscInt node[],
-                             HycoMesh *mesh);
+   rank each node belongs (HycoMeshOwned()), and has all groups with its own nodes of them. The caller owns it.
+   Collective. */
+PetscErrorCode HycoMeshRings(MPI_Comm comm, HycoScene scene, HycoMesh part, const PetscBool in[], PetscInt n,
+                             const PetscInt node[], HycoMesh *mesh);
 /* The ranks that own nodes (numbers in the distributed vectors). Collective. */
 PetscErrorCode HycoMeshOwners(MPI_Comm comm, HycoMesh part, PetscInt n, const PetscInt global[], PetscMPIInt owner[]);
 /* place[k]: the number of different keys of all processes that are smaller than key[k] >= 0. Collective. */

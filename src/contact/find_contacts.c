@@ -267,7 +267,9 @@ static PetscErrorCode FindAll(HycoFE fe, HycoPairs *pairs)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoPairsFindOn(HycoScene scene, HycoMesh mesh, const HycoSurfaceFacts facts[], HycoPairs *pairs)
+/* All potential contacts on the mesh as drawn. facts: of a distributed mesh, of which dm is a part (NULL: it is the
+   whole mesh, in which an empty group is an error). The caller destroys them, also after an error. Not collective. */
+PetscErrorCode HycoPairsFind(HycoScene scene, DM dm, const HycoSurfaceFacts facts[], HycoPairs *pairs)
 {
   HycoFE fe;
   PetscErrorCode ierr;
@@ -276,24 +278,12 @@ PetscErrorCode HycoPairsFindOn(HycoScene scene, HycoMesh mesh, const HycoSurface
   PetscCall(PetscMemzero(pairs, sizeof(*pairs)));
   PetscCall(HycoPairsReserve(pairs, 0, 0));
   if (!scene->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoFECreateOn(scene, mesh, &fe));
+  PetscCall(HycoFECreate(scene, dm, &fe));
   /* Borrowed for the setup alone: the facts end with the caller. */
   pairs->facts = facts;
   ierr = FindAll(fe, pairs);
   pairs->facts = NULL;
   PetscCall(HycoFEDestroy(&fe));
   PetscCall(ierr);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* All potential contacts on the mesh as drawn. facts: of a distributed mesh, of which dm is a part (NULL: it is the
-   whole mesh, in which an empty group is an error). The caller destroys them, also after an error. Not collective. */
-PetscErrorCode HycoPairsFind(HycoScene scene, DM dm, const HycoSurfaceFacts facts[], HycoPairs *pairs)
-{
-  HycoMesh mesh;
-
-  PetscFunctionBegin;
-  PetscCall(HycoMeshOf(dm, scene, &mesh));
-  PetscCall(HycoPairsFindOn(scene, mesh, facts, pairs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -263,7 +263,7 @@ static PetscErrorCode FindAllMeans(HycoScene s, HycoMesh m, Found *found)
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
   /* The integrals need outward normals; a mesh just read has its facets in the order of the file. */
   for (PetscInt f = 0; f < m->n_facets; f++) HycoMeshTurnFacet(m, m->facet_cell[f], m->facets + f * m->nf);
-  PetscCall(HycoFECreateOn(s, m, &fe));
+  PetscCall(HycoFECreateRead(s, m, &fe));
   PetscCall(HycoFESetDrawn(fe));
   PetscCall(SharedCreate(s, m, &shared));
   for (PetscInt k = 0; k < s->n_ties; k++) {

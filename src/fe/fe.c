@@ -172,11 +172,11 @@ PetscErrorCode HycoFECreate(HycoScene scene, DM dm, HycoFE *fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Without a DM for the search of ties, whose weights the DM's cones need, and for received surfaces. */
-PetscErrorCode HycoFECreateOn(HycoScene scene, HycoMesh mesh, HycoFE *fe)
+/* Without a DM for the search of ties, whose weights the DM's cones need. */
+PetscErrorCode HycoFECreateRead(HycoScene scene, HycoMesh mesh, HycoFE *fe)
 {
   PetscFunctionBegin;
-  PetscCall(Create(scene, mesh->dm, mesh, fe));
+  PetscCall(Create(scene, NULL, mesh, fe));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

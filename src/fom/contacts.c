@@ -68,7 +68,7 @@ static PetscErrorCode FetchSurface(HycoFOM f, HycoMesh *surface)
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(f->part->n_groups, &in));
   PetscCall(HycoMarkContactGroups(f->scene, f->part, in));
-  PetscCall(HycoMeshRings(HycoComm(f), f->part, in, f->n_needed, f->needed, surface));
+  PetscCall(HycoMeshRings(HycoComm(f), f->scene, f->part, in, f->n_needed, f->needed, surface));
   PetscCall(PetscFree(in));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -310,7 +310,7 @@ static PetscErrorCode Try(HycoFOM f, const HycoSurfaceFacts facts[], PetscBool *
 
   PetscFunctionBegin;
   PetscCall(HycoCatchBegin());
-  ierr = HycoPairsFindOn(f->scene, f->surface, facts, &f->pairs);
+  ierr = HycoPairsFind(f->scene, f->surface->dm, facts, &f->pairs);
   PetscCall(HycoCatchEnd(ierr, message));
   *found = (PetscBool)!ierr;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -487,9 +487,9 @@ PetscErrorCode HycoFOMWiden(HycoFOM f, HycoMesh *mesh, HycoFE *fe, PetscInt **in
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(f->part->n_groups, &in));
   PetscCall(HycoMarkContactGroups(f->scene, f->part, in));
-  PetscCall(HycoMeshRings(HycoComm(f), f->part, in, m->n_nodes, m->node_global, mesh));
+  PetscCall(HycoMeshRings(HycoComm(f), f->scene, f->part, in, m->n_nodes, m->node_global, mesh));
   PetscCall(PetscFree(in));
-  PetscCall(HycoFECreateOn(f->scene, *mesh, fe));
+  PetscCall(HycoFECreate(f->scene, (*mesh)->dm, fe));
   PetscCall(HycoFESetParameters(*fe, f->fe->mu));
   /* The signs on which all ranks agree: this mesh has no cells to tell them. */
   PetscCall(PetscArraycpy((*fe)->mirrored, f->fe->mirrored, f->scene->n_bodies));
@@ -538,7 +538,7 @@ PetscErrorCode HycoFOMSetUpSurface(HycoFOM f)
   IS is;
 
   PetscFunctionBegin;
-  HycoOnEach(HycoComm(f), f->surface ? HycoFECreateOn(f->scene, f->surface, &f->fe_surface) : PETSC_SUCCESS);
+  HycoOnEach(HycoComm(f), f->surface ? HycoFECreate(f->scene, f->surface->dm, &f->fe_surface) : PETSC_SUCCESS);
   /* Without U there is nothing to scatter. */
   if (f->gathered) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecScatterDestroy(&f->to_surface));

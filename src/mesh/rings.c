@@ -330,8 +330,8 @@ static PetscErrorCode MakeMesh(const Packing *p, HycoMesh *mesh)
 /* The facets of groups in[] around n nodes (numbers in the distributed vectors, from any rank), as a mesh of this
    rank. Two messages between neighbours: requests, then rows. Memory is that of the rings. Collective; the caller
    destroys the mesh. */
-PetscErrorCode HycoMeshRings(MPI_Comm comm, HycoMesh part, const PetscBool in[], PetscInt n, const PetscInt node[],
-                             HycoMesh *mesh)
+PetscErrorCode HycoMeshRings(MPI_Comm comm, HycoScene scene, HycoMesh part, const PetscBool in[], PetscInt n,
+                             const PetscInt node[], HycoMesh *mesh)
 {
   Packing p = {.part = part, .in = in};
   PetscMPIInt rank, *to;
@@ -359,6 +359,7 @@ PetscErrorCode HycoMeshRings(MPI_Comm comm, HycoMesh part, const PetscBool in[],
   PetscCall(Exchange(comm, &p.facet));
   PetscCall(Exchange(comm, &p.cell));
   PetscCall(MakeMesh(&p, mesh));
+  PetscCall(HycoMeshCreateDM(scene, *mesh));
   HycoFreeAll(&p.node.row, &p.node.to, &p.member.row, &p.member.to, &p.facet.row, &p.facet.to, &p.cell.row, &p.cell.to);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -544,7 +544,6 @@ PetscErrorCode HycoMeshCreateDM(HycoScene scene, HycoMesh m)
   DM dm;
 
   PetscFunctionBegin;
-  if (m->dm) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(CutAll(m, &cut));
   cut.scene = scene;
   PetscCall(MakeDM(PETSC_COMM_SELF, &cut, &dm));
