@@ -3,7 +3,7 @@
 #include <hycomaterialimpl.h>
 #include "assembly_map.h"
 
-/* NULL-safe. The tables belong to the DM, of which fe has a reference; those of HycoFECreateOn() without a DM to the caller. */
+/* NULL-safe. The tables belong to the DM, of which fe has a reference; those of HycoFECreateRead() to the caller. */
 PetscErrorCode HycoFEDestroy(HycoFE *fe)
 {
   PetscFunctionBegin;
