@@ -134,6 +134,31 @@ static PetscErrorCode CreateMine(HycoSolver s, HycoSolverForm form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* x + L = 2, x <= 1; the system has the only references to its matrices and F, D. */
+static PetscErrorCode OneContact(HycoSystem *system, Vec *x, Vec *L)
+{
+  Mat K;
+  Vec F, D;
+
+  PetscFunctionBegin;
+  PetscCall(MatCreateSeqAIJ(PETSC_COMM_SELF, 1, 1, 1, NULL, &K));
+  PetscCall(MatSetValue(K, 0, 0, 1, INSERT_VALUES));
+  PetscCall(MatAssemblyBegin(K, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(K, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatCreateVecs(K, &F, &D));
+  PetscCall(VecDuplicate(F, x));
+  PetscCall(VecDuplicate(D, L));
+  PetscCall(VecSet(F, 2));
+  PetscCall(VecSet(D, 1));
+  PetscCall(HycoSystemCreate(PETSC_COMM_SELF, system));
+  PetscCall(HycoSystemSetMatrices(*system, K, K, K, PETSC_TRUE));
+  PetscCall(HycoSystemSetVectors(*system, F, D));
+  PetscCall(MatDestroy(&K));
+  PetscCall(VecDestroy(&F));
+  PetscCall(VecDestroy(&D));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* x + L = 2, x <= 1: x = L = 1. The cheapest form is chosen; after a wrong result the next method is tried, on
    another form if this one does not accept it. */
 static PetscErrorCode TestRegistered(void)
@@ -147,26 +172,14 @@ static PetscErrorCode TestRegistered(void)
       {1, HYCO_FORM_AUTO, HYCO_CONVERGED, "active_set mine"},
       {3, HYCO_FORM_AUTO, HYCO_CONVERGED_FALLBACK, "active_set mine, then tao gpcg, then tao tron, then lemke"},
       {3, HYCO_FORM_DUAL, HYCO_CONVERGED, "active_set dual"}};
-  Mat K;
-  Vec F, D, x, L;
+  Vec x, L;
   HycoSystem system;
   HycoReason reason;
   const char *method;
 
   PetscFunctionBegin;
   PetscCall(HycoSolverRegister("mine", CreateMine));
-  PetscCall(MatCreateSeqAIJ(PETSC_COMM_SELF, 1, 1, 1, NULL, &K));
-  PetscCall(MatSetValue(K, 0, 0, 1, INSERT_VALUES));
-  PetscCall(MatAssemblyBegin(K, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(K, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatCreateVecs(K, &F, &D));
-  PetscCall(VecDuplicate(F, &x));
-  PetscCall(VecDuplicate(D, &L));
-  PetscCall(VecSet(F, 2));
-  PetscCall(VecSet(D, 1));
-  PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &system));
-  PetscCall(HycoSystemSetMatrices(system, K, K, K, PETSC_TRUE));
-  PetscCall(HycoSystemSetVectors(system, F, D));
+  PetscCall(OneContact(&system, &x, &L));
   for (size_t k = 0; k < sizeof(cases) / sizeof(cases[0]); k++) {
     HycoSolver solver;
 
@@ -182,9 +195,6 @@ static PetscErrorCode TestRegistered(void)
     PetscCall(HycoSolverDestroy(&solver));
   }
   PetscCall(HycoSystemDestroy(&system));
-  PetscCall(MatDestroy(&K));
-  PetscCall(VecDestroy(&F));
-  PetscCall(VecDestroy(&D));
   PetscCall(VecDestroy(&x));
   PetscCall(VecDestroy(&L));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -248,24 +258,11 @@ static PetscErrorCode TestBounds(void)
                {HYCO_TAO_LEMKE, HYCO_SOLVER_LEMKE, "dual", 0, PETSC_INFINITY, 0.5, 1},
                {HYCO_TAO_ACTIVE_SET, HYCO_SOLVER_ACTIVE_SET, "primal", PETSC_NINFINITY, 1, 0.25, 0.75},
                {HYCO_TAO_ACTIVE_SET, HYCO_SOLVER_ACTIVE_SET, "projected", PETSC_NINFINITY, 1, 0.25, 0.75}};
-  const PetscScalar one = 1;
-  Mat K;
-  Vec F, D, x, L;
+  Vec x, L;
   HycoSystem system;
 
   PetscFunctionBegin;
-  PetscCall(MatCreateSeqAIJ(PETSC_COMM_SELF, 1, 1, 1, NULL, &K));
-  PetscCall(MatSetValue(K, 0, 0, one, INSERT_VALUES));
-  PetscCall(MatAssemblyBegin(K, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(K, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatCreateVecs(K, &F, &D));
-  PetscCall(VecDuplicate(F, &x));
-  PetscCall(VecDuplicate(D, &L));
-  PetscCall(VecSet(F, 2));
-  PetscCall(VecSet(D, 1));
-  PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &system));
-  PetscCall(HycoSystemSetMatrices(system, K, K, K, PETSC_TRUE));
-  PetscCall(HycoSystemSetVectors(system, F, D));
+  PetscCall(OneContact(&system, &x, &L));
   for (size_t k = 0; k < sizeof(cases) / sizeof(cases[0]); k++) {
     HycoSolver solver;
 
@@ -286,9 +283,6 @@ static PetscErrorCode TestBounds(void)
     PetscCall(TaoRegister(cases[k].tao, watched.create));
   }
   PetscCall(HycoSystemDestroy(&system));
-  PetscCall(MatDestroy(&K));
-  PetscCall(VecDestroy(&F));
-  PetscCall(VecDestroy(&D));
   PetscCall(VecDestroy(&x));
   PetscCall(VecDestroy(&L));
   PetscFunctionReturn(PETSC_SUCCESS);
