@@ -1,4 +1,4 @@
-"""Scenes drawn from the documents alone: at the centre and at the corners of the ranges (of paths at two) full order's results balance, by identities of statics that
+"""Scenes drawn from the documents alone: at the centre and at the corners of the ranges full order's results balance, by identities of statics that
 were written beside each scene (forces on floating bodies, reactions and contact forces)."""
 import os
 import subprocess
