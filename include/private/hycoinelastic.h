@@ -88,6 +88,9 @@ typedef struct {
 PetscErrorCode HycoFEStep(HycoFE fe, const PetscReal u[], PetscReal t0, PetscReal t1, HycoFEState begin,
                           HycoFEState end, PetscReal f_int[], PetscBool tangent, HycoFEStepReport *report);
 PetscErrorCode HycoFEElasticTangent(HycoFE fe);
+/* Whether a law of fe's cells deforms inelastically at once, as in yielding, under large strains. fe is at the parameters of t.
+   Not collective. */
+PetscErrorCode HycoFEYields(HycoFE fe, PetscReal t, PetscBool *yields);
 
 /*
   Steps on known displacements: HycoMarchBegin() from the initial state, with fe (borrowed) at the parameters of the

@@ -102,9 +102,11 @@ struct _n_HycoPath {
   Vec dL[HYCO_ANDERSON], L_last, L_new;
   /* current position on the path */
   PetscReal mu[HYCO_MAX_PARAMETERS], t, dt;
-  PetscInt step; /* number of listed times reached: the index of the next one */
-  HycoKKT kkt;   /* of the last accepted time */
-  HycoStep now;  /* since the last listed time */
+  PetscReal rate, crept, changed; /* of the largest inelastic strain; its sum; of changes of the rate times the steps */
+  PetscBool yields;               /* a law deforms inelastically at once: rates mean nothing */
+  PetscInt step;                  /* number of listed times reached: the index of the next one */
+  HycoKKT kkt;                    /* of the last accepted time */
+  HycoStep now;                   /* since the last listed time */
   PetscInt
       n_bound; /* number of accepted steps that only -hyco_step_inelastic kept from growing, without those before a resumption */
   PetscInt n_steps;

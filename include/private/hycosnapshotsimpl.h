@@ -18,6 +18,7 @@ struct _p_HycoSnapshots {
   PetscInt unsolved;          /* see HycoSnapshotsGetBalance() */
   PetscReal bytes, *written;  /* bytes of solutions written by this rank, and by each */
   PetscReal sliding;          /* the largest of all points that were filled: HycoSummary */
+  PetscReal rate_change;      /* the same of the paths that were solved: HycoHistory */
   HycoH5 last;                /* the file that was read last, checked and open; or NULL */
   char last_path[PETSC_MAX_PATH_LEN]; /* its name */
 };

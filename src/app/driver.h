@@ -123,6 +123,7 @@ PetscErrorCode DriverReportOptionFiles(cJSON *json);
 PetscErrorCode ReportCreate(const char command[], HycoScene scene, const PetscReal mu[], cJSON **json);
 /* A line if sliding, the largest of all solutions, is above 1. */
 PetscErrorCode DriverWarnSliding(PetscReal sliding);
+PetscErrorCode DriverWarnSteps(PetscReal rate_change);
 /* Adds to the report, and prints where relevant: the largest initial overlap, the sliding, and whether no contact
    faces a master. */
 PetscErrorCode ReportContacts(cJSON *json, PetscInt n_contacts, PetscInt n_facing, PetscReal overlap,

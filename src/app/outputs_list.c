@@ -199,6 +199,8 @@ static const Written written[] = {
     {"report", "solve", "history.newton_orders", "count", "-", "of so many observations"},
     {"report", "solve", "history.steps_limited", "count", "-",
      "steps that only -hyco_step_inelastic kept from growing"},
+    {"report", "solve", "history.rate_change", "number", "-",
+     "change of the rate of creep within a step, over the rate: above 0.2 results may change with shorter steps"},
     {"report", "solve", "history.seconds_factor", "number", "s", "factors, all steps"},
     {"report", "solve", "history.seconds_solve", "number", "s", "solves, all steps"},
     {"report", "solve", "history.seconds_law", "number", "s", "laws, all steps"},

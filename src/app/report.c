@@ -6,6 +6,7 @@
 #include <strings.h>
 #include <sys/resource.h>
 
+#define LONG          0.2
 #define REPORT_FORMAT 1 /* raised when a key changes its meaning or goes; new keys do not raise it */
 
 /* A column of a table: over the rows that converged, its mean and largest value, and their number. */
@@ -51,6 +52,18 @@ PetscErrorCode DriverWarnSliding(PetscReal sliding)
         DriverPrint("LARGE SLIDING: a closed contact moves by %.2g facets along its surface; contact pairs are found "
                     "before displacement, and are valid for less than one facet\n",
                     (double)sliding));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Where the rate changes by LONG of itself in a step, contact forces of examples change by some per cent with shorter steps. */
+PetscErrorCode DriverWarnSteps(PetscReal rate_change)
+{
+  PetscFunctionBegin;
+  if (rate_change > LONG)
+    PetscCall(
+        DriverPrint("LONG TIME STEPS: within one, the rate of inelastic strain changes by %.2g of itself; compare with more of "
+                    "them (-hyco_substeps)\n",
+                    (double)rate_change));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

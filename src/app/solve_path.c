@@ -26,7 +26,8 @@ PetscErrorCode DriverReportHistory(cJSON *json, HycoScene scene, const HycoHisto
   cJSON_AddNumberToObject(history, "t_end", h->t);
   cJSON_AddStringToObject(history, "newton", h->newton);
   ReportNumbers(history, {"factor_in_solves", h->factor_cost}, {"newton_order", h->order},
-                {"newton_orders", h->n_orders}, {"steps_limited", h->n_bound});
+                {"newton_orders", h->n_orders}, {"steps_limited", h->n_bound},
+                {"rate_change", h->rate_change});
   PetscCall(DriverReportSteps(history, scene, PETSC_FALSE, h->n, h->step));
   for (PetscInt k = 0; k < h->n; k++) {
     seconds[0] += h->step[k].seconds_factor;
@@ -67,7 +68,9 @@ static PetscErrorCode PrintEnd(const HycoHistory *h)
         DriverPrint("\n%d steps could be longer without -hyco_step_inelastic (1e-3 if not given): a larger one is "
                     "faster, with a larger error in time; compare the results",
                     (int)h->n_bound));
-  PetscCall(DriverPrint("\nlargest KKT residual %.1e, energy balance to %.1e\n", (double)residual, (double)defect));
+  PetscCall(DriverPrint("\n"));
+  PetscCall(DriverWarnSteps(h->rate_change));
+  PetscCall(DriverPrint("largest KKT residual %.1e, energy balance to %.1e\n", (double)residual, (double)defect));
   PetscCall(DriverPrint("seconds: %.3f in all, %.3f factors, %.3f solves, %.3f laws\n", (double)seconds[0],
                         (double)seconds[1], (double)seconds[2], (double)seconds[3]));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -13,6 +13,7 @@
 #define BATCH    16 /* cells of one body whose points a law evaluates together */
 #define VIRGIN   -1 /* temperature of a point before its first step */
 #define N_PLAIN  4
+#define LARGE    0.3 /* displacements under which laws are asked whether they yield, as a share of the mesh's length */
 #define ROUNDING 256 /* units of round-off in what a stress loses */
 
 struct _n_HycoFEState {
@@ -702,5 +703,29 @@ PetscErrorCode HycoFEStateVariable(HycoFE fe, HycoFEState state, const char name
     }
     if (volume > 0) value[e] /= volume;
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* In no time creep does nothing: what deforms or fails now yields. */
+PetscErrorCode HycoFEYields(HycoFE fe, PetscReal t, PetscBool *yields)
+{
+  const PetscReal size = LARGE * HycoMeshLength(fe->mesh);
+  HycoFEStepReport report;
+  HycoFEState begin, end;
+  PetscReal *u, *f;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(fe->n_dof, &u));
+  PetscCall(PetscCalloc1(fe->n_dof, &f));
+  for (PetscInt i = 0; i < fe->n_dof; i++) u[i] = size * PetscSinReal(1.7 * i * i + i);
+  PetscCall(HycoFEStateCreate(fe, &begin));
+  PetscCall(HycoFEStateCreate(fe, &end));
+  ierr = HycoFEStepBodies(fe, HYCO_BODIES_FLOWING, u, t, t, begin, end, f, PETSC_FALSE, &report);
+  PetscCall(HycoFEStateDestroy(&begin));
+  PetscCall(HycoFEStateDestroy(&end));
+  HycoFreeAll(&u, &f);
+  PetscCall(ierr);
+  *yields = (PetscBool)(report.failed || report.increment > 0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

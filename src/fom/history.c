@@ -116,6 +116,7 @@ PetscErrorCode HycoPathBegin(HycoPath p, const PetscReal mu[])
   PetscCall(PetscArraycpy(p->mu, mu, p->scene->n_parameters));
   p->t = p->scene->times[0];
   p->step = p->n_steps = p->n_orders = p->n_taken = p->n_cuts = p->n_bound = 0;
+  p->rate = p->crept = p->changed = 0;
   /* The first step goes as far as the listed times and the kinks allow. */
   p->dt = PETSC_MAX_REAL;
   p->ended = PETSC_FALSE;
@@ -131,6 +132,9 @@ PetscErrorCode HycoPathBegin(HycoPath p, const PetscReal mu[])
   HycoOnEach(p->comm, HycoFESetParameters(p->fe, all)); /* the initial state depends on the first temperature */
   HycoOnEach(p->comm, HycoFEStateCreate(p->fe, &p->begin));
   HycoOnEach(p->comm, HycoFEStateCreate(p->fe, &p->end));
+  p->yields = PETSC_FALSE;
+  if (p->flows) HycoOnEach(p->comm, HycoFEYields(p->fe, p->t, &p->yields));
+  if (p->flows) HycoAllreduce(&p->yields, 1, HYCO_MPI_BOOL, MPI_LOR, p->comm);
   p->fe->ready = PETSC_FALSE; /* nothing is assembled for it yet */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -158,6 +162,16 @@ static PetscErrorCode NoteTime(HycoPath p)
   }
   p->taken[p->n_taken++] = p->t;
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Strains of creep grow by the rate at the end of a step, so that a change of the rate within it is an error in time. */
+static void NoteRate(HycoPath p, PetscReal h, PetscReal increment)
+{
+  const PetscReal rate = increment / h;
+
+  p->crept += increment;
+  p->changed += PetscAbsReal(rate - p->rate) * h;
+  p->rate = rate;
 }
 
 /* Makes the attempt the state of the path at t1. States are exchanged, not copied: the former begin is the room of
@@ -219,6 +233,7 @@ static PetscErrorCode TryStep(HycoPath p, PetscReal stop)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(Accept(p, n > 1 ? p->t + h : stop, &a));
+  NoteRate(p, h, a.law.increment);
   /* The next size: prescribed times are followed as given; a law's wish to shorten goes before growth. */
   if (p->given)
     p->dt = PetscMax(p->dt, GROWTH * h);
@@ -342,6 +357,7 @@ void HycoPathGetHistory(HycoPath p, HycoHistory *h)
   h->newton = HycoNewtons[HycoPathMethod(p)];
   h->factor_cost = HycoPathFactorCost(p);
   h->n_bound = p->n_bound;
+  h->rate_change = p->crept > 0 && !p->yields ? p->changed / p->crept : 0;
   h->n_orders = p->n_orders;
   h->n_taken = p->n_taken;
   h->taken = p->taken;

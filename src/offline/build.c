@@ -670,6 +670,7 @@ PetscErrorCode HycoReducerClose(HycoReducer t, HycoSnapshots *store)
   PetscCall(HycoSnapshotsGetSolved(*store, &t->n_solvers, &solved));
   PetscCall(HycoSnapshotsGetBalance(*store, &t->unsolved, &written));
   t->sliding = (*store)->sliding;
+  t->rate_change = (*store)->rate_change;
   HycoFreeAll(&t->solved, &t->written);
   HycoDuplicate(t->n_solvers, solved, &t->solved);
   HycoDuplicate(size, written, &t->written);
@@ -869,6 +870,7 @@ PetscErrorCode HycoReducerRun(HycoReducer t, HycoSamples samples, const char pat
   PetscCall(HycoReducerClose(t, &store));
   PetscCall(ierr);
   report.sliding = t->sliding;
+  report.rate_change = t->rate_change;
   report.seconds_snapshots = solved - begin + t->solving;
   report.seconds_reduction = HycoNow() - solved - t->solving;
   if (training) *training = report;

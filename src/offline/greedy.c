@@ -399,6 +399,7 @@ PetscErrorCode HycoReducerRunGreedy(HycoReducer t, HycoSamples start, HycoSample
   ierr = RunOn(t, &loop, path, &report);
   PetscCall(HycoReducerClose(t, &loop.store));
   report.sliding = t->sliding;
+  report.rate_change = t->rate_change;
   PetscCall(HycoSamplesDestroy(&loop.samples));
   PetscCall(PetscFree(loop.value));
   PetscCall(ierr);

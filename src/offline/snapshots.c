@@ -203,6 +203,12 @@ static PetscErrorCode WriteHead(HycoSnapshots s, HycoFOM fom, HycoH5 h, const Pe
   PetscCall(HycoH5WriteReal(h, "mu", s->scene->n_parameters, 1, mu));
   PetscCall(HycoH5WriteReal(h, "sliding", 1, 1, &sliding));
   s->sliding = PetscMax(s->sliding, sliding);
+  if (fom->path) {
+    HycoHistory history_of = {0};
+
+    HycoPathGetHistory(fom->path, &history_of);
+    s->rate_change = PetscMax(s->rate_change, history_of.rate_change);
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -574,7 +580,9 @@ PetscErrorCode HycoSnapshotsFill(HycoSnapshots s, HycoSamples samples, HycoProgr
     PetscCall(SolveMissing(s, &m));
     if (rank == 0 && progress) PetscCall(progress(m.n_all, m.n_all, ctx));
   }
-  HycoAllreduce(&s->sliding, 1, MPIU_REAL, MPI_MAX, HycoComm(s)); /* each group's first rank knows its own */
+  /* Each group's first rank knows its own. */
+  HycoAllreduce(&s->sliding, 1, MPIU_REAL, MPI_MAX, HycoComm(s));
+  HycoAllreduce(&s->rate_change, 1, MPIU_REAL, MPI_MAX, HycoComm(s));
   PetscCall(PetscFree(m.missing));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -43,7 +43,7 @@ static const HycoMember step[] = {
 #define F(member) FIELD(HycoHistory, member)
 static const HycoMember history[] = {
   F(n), F(step), F(ended), F(t), F(why), F(newton), F(factor_cost), F(n_orders), F(order), F(n_taken), F(taken),
-  F(n_bound)};
+  F(n_bound), F(rate_change)};
 #undef F
 
 #define F(member) FIELD(HycoReaction, member)

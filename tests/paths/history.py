@@ -29,7 +29,9 @@ def arrays(path):
 
 class History(Case):
     def test_limited_steps(self):
-        """A path whose steps only -hyco_step_inelastic keeps short says so, with the option to change; one with few steps does not. check tells what enters the bodies."""
+        """A path whose steps only -hyco_step_inelastic keeps short says so, with the option to change; one with few steps says that they are long. check tells
+        what enters the bodies."""
+        changes = []
         for bound, limited in (('2e-6', True), ('1e-2', False)):
             run = self.run_raw('solve', '-scene', RING, '-mu', '0.01,1', '-history_times', '0,1', '-hyco_step_inelastic', bound, '-report', self.path('limited.json'))
             self.assertEqual(run.returncode, 0, run.stderr)
@@ -37,6 +39,10 @@ class History(Case):
             with open(self.path('limited.json'), encoding='utf-8') as f:
                 history = json.load(f)['history']
             self.assertEqual(2 * history['steps_limited'] > sum(history['substeps']), limited, history['steps_limited'])
+            changes.append(history['rate_change'])
+            self.assertEqual('LONG TIME STEPS' in run.stdout, changes[-1] > 0.2, run.stdout)
+        self.assertLess(changes[0], 0.2)
+        self.assertGreater(changes[1], 0.2)
         found = self.hyco('check', '-scene', RING, '-body_core_young', '1e5*creep')
         self.assertIn('creep: scales the stiffness of body core', found['bodies_by_parameter'])
         self.assertIn('interference: leaves', found['bodies_by_parameter'])

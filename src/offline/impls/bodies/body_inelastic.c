@@ -9,8 +9,7 @@
 #include <hycoinelasticpoints.h>
 #include <hycokinematics.h>
 
-#define MANY  64  /* right-hand sides at once */
-#define LARGE 0.3 /* displacements under which laws are asked whether they yield, as a share of the mesh's length */
+#define MANY 64 /* right-hand sides at once */
 
 /* -- unsupported scenes -- */
 
@@ -369,37 +368,11 @@ static PetscErrorCode FillLoads(HycoReducer t, HycoBodiesFactor *factor, const U
 
 /* -- laws at few points -- */
 
-/* Whether a law of this rank's cells deforms inelastically at once, as in yielding: under large strains in no time. */
-static PetscErrorCode YieldsHere(HycoReducer t, PetscBool *yields)
-{
-  HycoFE fe = t->fom->fe;
-  const PetscReal size = LARGE * HycoMeshLength(t->fom->part), now = t->scene->times[0];
-  HycoFEStepReport report;
-  HycoFEState begin, end;
-  PetscReal *u, *f;
-  PetscErrorCode ierr;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc2(fe->n_dof, &u, fe->n_dof, &f));
-  /* In no time (t0 = t1) creep does nothing: what deforms or fails now yields. */
-  for (PetscInt i = 0; i < fe->n_dof; i++) u[i] = size * PetscSinReal(1.7 * i * i + i);
-  PetscCall(PetscArrayzero(f, fe->n_dof));
-  PetscCall(HycoFEStateCreate(fe, &begin));
-  PetscCall(HycoFEStateCreate(fe, &end));
-  ierr = HycoFEStepBodies(fe, HYCO_BODIES_FLOWING, u, now, now, begin, end, f, PETSC_FALSE, &report);
-  PetscCall(HycoFEStateDestroy(&begin));
-  PetscCall(HycoFEStateDestroy(&end));
-  PetscCall(PetscFree2(u, f));
-  PetscCall(ierr);
-  *yields = (PetscBool)(report.failed || report.increment > 0);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The same on any rank. Laws may fail on one rank alone. Collective. */
+/* Whether a law yields, on any rank. Laws may fail on one rank alone. Collective. */
 static PetscErrorCode Yields(HycoReducer t, PetscBool *yields)
 {
   PetscFunctionBegin;
-  HycoOnEach(HycoComm(t), YieldsHere(t, yields));
+  HycoOnEach(HycoComm(t), HycoFEYields(t->fom->fe, t->scene->times[0], yields));
   HycoAllreduce(yields, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
