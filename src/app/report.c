@@ -60,10 +60,10 @@ PetscErrorCode DriverWarnSteps(PetscReal rate_change)
 {
   PetscFunctionBegin;
   if (rate_change > LONG)
-    PetscCall(
-        DriverPrint("LONG TIME STEPS: within one, the rate of inelastic strain changes by %.2g of itself; compare with more of "
-                    "them (-hyco_substeps)\n",
-                    (double)rate_change));
+    PetscCall(DriverPrint(
+        "LONG TIME STEPS: within one, the rate of inelastic strain changes by %.2g of itself; compare with more of "
+        "them (-hyco_substeps)\n",
+        (double)rate_change));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
