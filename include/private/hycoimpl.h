@@ -66,6 +66,18 @@ PetscErrorCode HycoViewBegin_Private(PetscObject object, PetscViewer *viewer, Pe
     }                                                                                                                  \
   } while (0)
 
+/* HycoConcatenate() on every rank. Collective. */
+PetscErrorCode HycoConcatenateAll(MPI_Comm comm, PetscInt n, const void *mine, MPI_Datatype type, size_t size,
+                                  PetscInt *n_all, void *all);
+
+/* All entries of a vector, on every rank. Collective. */
+PetscErrorCode HycoVecGather(Vec v, PetscReal all[]);
+/* Copies this rank's first n entries from or to an array. Not collective. */
+PetscErrorCode HycoVecRead(Vec v, PetscInt n, PetscReal value[]);
+PetscErrorCode HycoVecWrite(Vec v, PetscInt n, const PetscReal value[]);
+/* Begins and ends a forward scatter that inserts. Collective. */
+PetscErrorCode HycoScatter(VecScatter scatter, Vec from, Vec to);
+
 /* Sends n rows of `size` bytes, row k to rank to[k]; *got: the *n_got rows that arrive, by the rank that sent them and
    then in its order. The caller frees it by PetscFree(). Collective. */
 PetscErrorCode HycoSendRows(MPI_Comm comm, PetscInt n, const PetscMPIInt to[], size_t size, const void *row,

@@ -598,7 +598,6 @@ PetscErrorCode HycoTaoSolveLCP(HycoTao t, const HycoLCP *lcp, PetscBool active[]
                                PetscBool *solved)
 {
   const PetscInt limit = t->max_its ? t->max_its : 50 + 4 * lcp->n;
-  const PetscScalar *y;
 
   PetscFunctionBegin;
   if (t->traits & HYCO_TAO_OWN) {
@@ -618,9 +617,7 @@ PetscErrorCode HycoTaoSolveLCP(HycoTao t, const HycoLCP *lcp, PetscBool active[]
   }
   PetscCall(CopyDense(t, lcp));
   PetscCall(HycoTaoSolve(t, t->dense, t->f, t->lo, t->hi, t->y, its, solved));
-  PetscCall(VecGetArrayRead(t->y, &y));
-  PetscCall(PetscArraycpy(z, y, lcp->n));
-  PetscCall(VecRestoreArrayRead(t->y, &y));
+  PetscCall(HycoVecRead(t->y, lcp->n, z));
   Clean(lcp, z);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

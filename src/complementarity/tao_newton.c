@@ -274,33 +274,24 @@ static PetscErrorCode GatherHessian(Mat H, PetscInt N, PetscReal M[])
    takes its part. */
 static PetscErrorCode StepByLemke(Model *m, HycoLCPStatus *status)
 {
-  const PetscScalar *q;
   PetscScalar *d;
-  PetscReal *M, *z;
+  PetscReal *M, *q, *z;
   PetscInt N, its;
-  VecScatter to_all;
-  Vec every;
 
   PetscFunctionBegin;
   PetscCall(VecGetSize(m->x, &N));
-  PetscCall(PetscCalloc2((size_t)N * (size_t)N, &M, N, &z));
+  PetscCall(PetscCalloc3((size_t)N * (size_t)N, &M, N, &q, N, &z));
   PetscCall(GatherHessian(m->H, N, M));
   /* d = lo - x: then w = g + H (lo - x) is q. */
   PetscCall(VecWAXPY(m->d, -1, m->x, m->lo));
   PetscCall(MatMultAdd(m->H, m->d, m->g, m->w));
-  PetscCall(VecScatterCreateToAll(m->w, &to_all, &every));
-  PetscCall(VecScatterBegin(to_all, m->w, every, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecScatterEnd(to_all, m->w, every, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecGetArrayRead(every, &q));
+  PetscCall(HycoVecGather(m->w, q));
   PetscCall(HycoLCPLemke(N, M, q, PetscMax(1, m->tao->max_it - m->tao->niter), z, &its, status));
-  PetscCall(VecRestoreArrayRead(every, &q));
   m->tao->niter += its;
   PetscCall(VecGetArray(m->d, &d));
   for (PetscInt i = 0; i < m->n; i++) d[i] += z[m->first + i];
   PetscCall(VecRestoreArray(m->d, &d));
-  PetscCall(VecScatterDestroy(&to_all));
-  PetscCall(VecDestroy(&every));
-  PetscCall(PetscFree2(M, z));
+  PetscCall(PetscFree3(M, q, z));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -394,12 +394,9 @@ static PetscErrorCode Insert(HycoFOM f, PetscBool rows_changed, const Rows *r)
 {
   const PetscInt dim = f->part->dim;
   PetscInt *column, first;
-  PetscScalar *D;
 
   PetscFunctionBegin;
-  PetscCall(VecGetArray(f->D, &D));
-  PetscCall(PetscArraycpy(D, f->gap, f->pairs.n));
-  PetscCall(VecRestoreArray(f->D, &D));
+  PetscCall(HycoVecWrite(f->D, f->pairs.n, f->gap));
   if (!rows_changed) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatGetOwnershipRange(f->B, &first, NULL));
   PetscCall(PetscMalloc1(f->width * dim, &column));

@@ -215,16 +215,13 @@ static PetscErrorCode Rubs(HycoFOM f, PetscBool *rubs)
 /* The order matters: rows need the coefficients, Use() needs the matrices of the system to which it may change. */
 static PetscErrorCode Assemble(HycoFOM f, HycoFriction r, Rows *rows)
 {
-  PetscScalar *D;
   PetscBool rubs;
 
   PetscFunctionBegin;
   HycoOnEach(HycoComm(f), ComputeRows(f, r, rows));
   /* Gaps change with each step (u_old), B only with the nodes of the contacts. */
   if (!r->B || f->fe->contact_changed) PetscCall(FillB(f, r, rows));
-  PetscCall(VecGetArray(r->D, &D));
-  PetscCall(PetscArraycpy(D, rows->gap, r->rows));
-  PetscCall(VecRestoreArray(r->D, &D));
+  PetscCall(HycoVecWrite(r->D, r->rows, rows->gap));
   PetscCall(HycoSystemSetMatrices(r->system, f->K, r->Bt, r->B, PETSC_TRUE));
   PetscCall(HycoSystemSetVectors(r->system, f->F, r->D));
   PetscCall(HycoSystemSetBlocks(r->system, 2, r->slip.cone, f->pairs.n, r->slip.of, r->slip.data));

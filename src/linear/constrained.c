@@ -162,20 +162,17 @@ static PetscErrorCode Smooth(HycoLevel *v, PetscBool residual, Vec r, Vec z)
 static PetscErrorCode SolveCoarsest(HycoConstrained c, HycoLevel *v, Vec r, Vec z)
 {
   PetscBLASInt m, one = 1, info;
-  PetscScalar *mu;
+  PetscReal *mu = c->mu_all;
 
   PetscFunctionBegin;
   PetscCall(KSPSolve(c->coarse, r, z));
   if (!v->m) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatMult(v->B, z, v->mu));
-  PetscCall(VecScatterBegin(c->all, v->mu, c->mu_all, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecScatterEnd(c->all, v->mu, c->mu_all, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(HycoVecGather(v->mu, mu));
   PetscCall(PetscBLASIntCast(v->m, &m));
-  PetscCall(VecGetArray(c->mu_all, &mu));
   LAPACKpotrs_("L", &m, &one, c->S, &m, mu, &m, &info);
   for (PetscInt k = 0; k < v->m; k++) mu[k] = -mu[k];
   PetscCall(VecMAXPY(z, v->m, mu, c->Y));
-  PetscCall(VecRestoreArray(c->mu_all, &mu));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -416,15 +416,10 @@ PetscErrorCode HycoDirectFactor(HycoDirect d, Mat K, Mat Bt, Mat B, PetscReal M[
    sides. */
 static PetscErrorCode Fetch(HycoDirect d, Vec v)
 {
-  const PetscScalar *r;
-
   PetscFunctionBegin;
-  PetscCall(VecScatterBegin(d->to_root, v, d->root, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecScatterEnd(d->to_root, v, d->root, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(HycoScatter(d->to_root, v, d->root));
   if (d->rank) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecGetArrayRead(d->root, &r));
-  PetscCall(PetscArraycpy(d->rhs, r, d->n));
-  PetscCall(VecRestoreArrayRead(d->root, &r));
+  PetscCall(HycoVecRead(d->root, d->n, d->rhs));
   d->id.rhs = d->rhs;
   d->id.nrhs = 1;
   d->id.lrhs = d->id.n;
@@ -436,13 +431,9 @@ static PetscErrorCode Fetch(HycoDirect d, Vec v)
 /* MUMPS returns the solution on rank 0, from which the ranks get their rows. */
 static PetscErrorCode Deliver(HycoDirect d, Vec v)
 {
-  PetscScalar *r;
-
   PetscFunctionBegin;
   if (d->rank == 0) {
-    PetscCall(VecGetArray(d->root, &r));
-    PetscCall(PetscArraycpy(r, d->rhs, d->n));
-    PetscCall(VecRestoreArray(d->root, &r));
+    PetscCall(HycoVecWrite(d->root, d->n, d->rhs));
   }
   PetscCall(VecScatterBegin(d->to_root, d->root, v, INSERT_VALUES, SCATTER_REVERSE));
   PetscCall(VecScatterEnd(d->to_root, d->root, v, INSERT_VALUES, SCATTER_REVERSE));

@@ -16,7 +16,6 @@
    rank 0 takes them into one array. */
 static PetscErrorCode GatherColumn(Mat A, PetscInt j, PetscReal column[])
 {
-  const PetscScalar *value;
   VecScatter scatter;
   PetscInt n;
   Vec v, all;
@@ -24,13 +23,10 @@ static PetscErrorCode GatherColumn(Mat A, PetscInt j, PetscReal column[])
   PetscFunctionBegin;
   PetscCall(MatDenseGetColumnVecRead(A, j, &v));
   PetscCall(VecScatterCreateToZero(v, &scatter, &all));
-  PetscCall(VecScatterBegin(scatter, v, all, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecScatterEnd(scatter, v, all, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(HycoScatter(scatter, v, all));
   PetscCall(MatDenseRestoreColumnVecRead(A, j, &v));
   PetscCall(VecGetLocalSize(all, &n));
-  PetscCall(VecGetArrayRead(all, &value));
-  PetscCall(PetscArraycpy(column, value, n));
-  PetscCall(VecRestoreArrayRead(all, &value));
+  PetscCall(HycoVecRead(all, n, column));
   PetscCall(VecScatterDestroy(&scatter));
   PetscCall(VecDestroy(&all));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -296,7 +296,7 @@ static PetscErrorCode JoinPaths(HycoReducer t, const HycoPathModes *modes, Petsc
     if (!modes->V[j]) continue;
     PetscCall(MatGetSize(modes->V[j], NULL, &l));
     PetscCall(MatScale(modes->V[j], HycoPathScale(modes->first[j], largest)));
-    PetscCall(HycoCopyColumns(modes->V[j], *joined, at));
+    PetscCall(HycoCopyColumns(modes->V[j], l, *joined, at));
     at += l;
   }
   PetscCall(MatAssemblyBegin(*joined, MAT_FINAL_ASSEMBLY));

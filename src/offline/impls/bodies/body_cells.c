@@ -119,25 +119,6 @@ static PetscErrorCode Choose(HycoReducer t, HycoBodiesFactor *factor, PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The numbers of all ranks, n of this one: *all, *n_all. Collective. */
-static PetscErrorCode GatherAll(MPI_Comm comm, PetscInt n, const PetscInt own[], PetscInt *n_all, PetscInt **all)
-{
-  PetscMPIInt size, mine, *count, *first;
-
-  PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(comm, &size));
-  PetscCall(PetscMPIIntCast(n, &mine));
-  PetscCall(PetscMalloc2(size, &count, size + 1, &first));
-  PetscCallMPI(MPI_Allgather(&mine, 1, MPI_INT, count, 1, MPI_INT, comm));
-  first[0] = 0;
-  for (PetscMPIInt k = 0; k < size; k++) first[k + 1] = first[k] + count[k];
-  *n_all = first[size];
-  PetscCall(PetscMalloc1(*n_all + 1, all));
-  PetscCallMPI(MPI_Allgatherv(own, mine, MPIU_INT, *all, count, first, MPIU_INT, comm));
-  PetscCall(PetscFree2(count, first));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* t->seeds_cell: the cells of all ranks, ascending, at least one; in[]: those of this rank's part. Collective. */
 static PetscErrorCode ShareCells(HycoReducer t, HycoMesh m, PetscBool in[])
 {
@@ -149,8 +130,8 @@ static PetscErrorCode ShareCells(HycoReducer t, HycoMesh m, PetscBool in[])
     if (in[e]) own[n++] = m->cell_whole ? m->cell_whole[e] : e;
   }
   PetscCall(PetscFree(t->seeds_cell));
-  PetscCall(GatherAll(HycoComm(t), n, own, &t->n_seeds_cell, &t->seeds_cell));
-  /* A mesh needs a cell. GatherAll() allocates one entry more. */
+  PetscCall(HycoConcatenateAll(HycoComm(t), n, own, MPIU_INT, sizeof(PetscInt), &t->n_seeds_cell, &t->seeds_cell));
+  /* A mesh needs a cell. HycoConcatenateAll() allocates one entry more. */
   if (!t->n_seeds_cell) t->seeds_cell[t->n_seeds_cell++] = 0;
   PetscCall(PetscSortRemoveDupsInt(&t->n_seeds_cell, t->seeds_cell));
   for (PetscInt e = 0; e < m->n_cells; e++) {
@@ -182,7 +163,7 @@ static PetscErrorCode List(HycoReducer t, HycoBodiesFactor *factor, const PetscB
     /* Three numbers for each: in the whole mesh, body, in the distributed vectors. */
     own[n++] = (m->first + place) * b->dim + i % b->dim;
   }
-  PetscCall(GatherAll(HycoComm(t), n, own, &n, &all));
+  PetscCall(HycoConcatenateAll(HycoComm(t), n, own, MPIU_INT, sizeof(PetscInt), &n, &all));
   n /= 3;
   HycoFreeAll(&b->inner_start, &b->inner, &factor->row);
   PetscCall(PetscMalloc2(n + 1, &dof, n + 1, &at));

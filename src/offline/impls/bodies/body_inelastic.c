@@ -201,25 +201,16 @@ static PetscErrorCode ListOwn(HycoReducer t, Unknowns *own)
 static PetscErrorCode ListAll(HycoReducer t, Unknowns *all)
 {
   Unknowns own = {0};
-  PetscMPIInt size, n, *count, *start;
   PetscInt *order, *packed[3];
 
   PetscFunctionBegin;
   HycoOnEach(HycoComm(t), ListOwn(t, &own));
-  PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
-  PetscCall(PetscMalloc2(size, &count, size + 1, &start));
-  PetscCall(PetscMPIIntCast(own.n, &n));
-  PetscCallMPI(MPI_Allgather(&n, 1, MPI_INT, count, 1, MPI_INT, HycoComm(t)));
-  start[0] = 0;
-  for (PetscMPIInt r = 0; r < size; r++) start[r + 1] = start[r] + count[r];
-  all->n = start[size];
-  for (int k = 0; k < 3; k++) {
-    const PetscInt *from = k == 0 ? own.dof : k == 1 ? own.body : own.global;
-
-    PetscCall(PetscMalloc1(all->n + 1, &packed[k]));
-    PetscCallMPI(MPI_Allgatherv(from, n, MPIU_INT, packed[k], count, start, MPIU_INT, HycoComm(t)));
-  }
-  PetscCall(PetscFree2(count, start));
+  for (int k = 0; k < 3; k++)
+    PetscCall(HycoConcatenateAll(HycoComm(t), own.n,
+                                 k == 0   ? own.dof
+                                 : k == 1 ? own.body
+                                          : own.global,
+                                 MPIU_INT, sizeof(PetscInt), &all->n, &packed[k]));
   PetscCall(PetscFree3(own.dof, own.body, own.global));
   PetscCall(PetscMalloc1(all->n + 1, &order));
   PetscCall(PetscMalloc1(all->n + 1, &all->body));

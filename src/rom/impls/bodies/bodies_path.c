@@ -51,15 +51,9 @@ static PetscErrorCode Settle(HycoROM m, PetscReal t0, PetscReal t1, const PetscR
 /* alpha and the forces of the last accepted time. */
 static PetscErrorCode Retry(HycoPath p, PetscReal alpha[], PetscReal Lambda[])
 {
-  const PetscScalar *old;
-
   PetscFunctionBegin;
-  PetscCall(VecGetArrayRead(p->U_old, &old));
-  PetscCall(PetscArraycpy(alpha, old, p->n_free));
-  PetscCall(VecRestoreArrayRead(p->U_old, &old));
-  PetscCall(VecGetArrayRead(p->L_old, &old));
-  PetscCall(PetscArraycpy(Lambda, old, p->n_contacts));
-  PetscCall(VecRestoreArrayRead(p->L_old, &old));
+  PetscCall(HycoVecRead(p->U_old, p->n_free, alpha));
+  PetscCall(HycoVecRead(p->L_old, p->n_contacts, Lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -214,12 +208,10 @@ static PetscErrorCode Record(HycoPath p)
 {
   HycoROM m = (HycoROM)p->ctx;
   HycoBodiesPath w = (HycoBodiesPath)m->work;
-  const PetscScalar *alpha, *L;
+  const PetscScalar *alpha;
 
   PetscFunctionBegin;
-  PetscCall(VecGetArrayRead(p->Lambda, &L));
-  PetscCall(PetscArraycpy(m->Lambda, L, m->model->pairs.n));
-  PetscCall(VecRestoreArrayRead(p->Lambda, &L));
+  PetscCall(HycoVecRead(p->Lambda, m->model->pairs.n, m->Lambda));
   if (w->friction && p->why[0]) { /* the last step may have been refused */
     HycoBodiesFrictionRestore(w->friction, &w->bodies);
     PetscCall(HycoBodiesExpand(&w->bodies, m->gamma));

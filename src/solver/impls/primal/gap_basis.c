@@ -51,8 +51,7 @@ PetscErrorCode HycoGapPivots(HycoSystem y, PetscInt pivot[], PetscBool *all)
   PetscCall(ISCreateGeneral(PETSC_COMM_SELF, n_need, need, PETSC_OWN_POINTER, &is));
   PetscCall(VecCreateSeq(PETSC_COMM_SELF, n_need, &mine));
   PetscCall(VecScatterCreate(count, is, mine, NULL, &scatter));
-  PetscCall(VecScatterBegin(scatter, count, mine, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecScatterEnd(scatter, count, mine, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(HycoScatter(scatter, count, mine));
   /* Counts are exact in reals; 1.5 allows for none. */
   PetscCall(VecGetArrayRead(mine, &shared));
   for (PetscInt r = lo; r < hi; r++) {

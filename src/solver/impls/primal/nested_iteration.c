@@ -408,7 +408,6 @@ static PetscErrorCode StartOnRoot(Mat K, Vec f, Vec bound, Vec set, PetscBool *m
   Level *level;
   Rows r;
   Vec signs;
-  const PetscScalar *b;
   PetscScalar *sign, *out;
 
   PetscFunctionBegin;
@@ -416,9 +415,7 @@ static PetscErrorCode StartOnRoot(Mat K, Vec f, Vec bound, Vec set, PetscBool *m
   PetscCall(MatGetSize(K, &level->n, NULL));
   PetscCall(PetscMalloc1(level->n, &level->bound));
   PetscCall(PetscCalloc1(level->n, &level->active));
-  PetscCall(VecGetArrayRead(bound, &b));
-  PetscCall(PetscArraycpy(level->bound, b, level->n));
-  PetscCall(VecRestoreArrayRead(bound, &b));
+  PetscCall(HycoVecRead(bound, level->n, level->bound));
   PetscCall(VecDuplicate(f, &signs));
   PetscCall(RowsGet(K, &r));
   PetscCall(VecGetArray(signs, &sign));
@@ -484,10 +481,8 @@ PetscErrorCode HycoMultilevelStart(Mat K, Vec f, Vec bound, Vec set, PetscBool *
   PetscCall(VecScatterCreateToZero(f, &scatter, &f_root));
   PetscCall(VecDuplicate(f_root, &bound_root));
   PetscCall(VecDuplicate(f_root, &set_root));
-  PetscCall(VecScatterBegin(scatter, f, f_root, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecScatterEnd(scatter, f, f_root, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecScatterBegin(scatter, bound, bound_root, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecScatterEnd(scatter, bound, bound_root, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(HycoScatter(scatter, f, f_root));
+  PetscCall(HycoScatter(scatter, bound, bound_root));
   *made = PETSC_FALSE;
   HycoOnRoot(comm, StartOnRoot(whole, f_root, bound_root, set_root, made));
   PetscCallMPI(MPI_Bcast(made, 1, HYCO_MPI_BOOL, 0, comm));

@@ -19,14 +19,9 @@
 /* The value of a distributed vector at this rank's pivots. Pivots may be owned by other ranks. */
 static PetscErrorCode AtPivots(Vec v, VecScatter scatter, Vec work, PetscInt n, PetscReal out[])
 {
-  const PetscScalar *w;
-
   PetscFunctionBegin;
-  PetscCall(VecScatterBegin(scatter, v, work, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecScatterEnd(scatter, v, work, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecGetArrayRead(work, &w));
-  PetscCall(PetscArraycpy(out, w, n));
-  PetscCall(VecRestoreArrayRead(work, &w));
+  PetscCall(HycoScatter(scatter, v, work));
+  PetscCall(HycoVecRead(work, n, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
