@@ -167,8 +167,7 @@ static PetscErrorCode Balance(HycoReducer t, Mat J)
       a[(size_t)k * (size_t)lda + (size_t)i] /= PetscMax(size[k / l], HYCO_SMALL_FORCE * largest);
   }
   PetscCall(MatDenseRestoreArray(J, &a));
-  PetscCall(PetscFree(norm));
-  PetscCall(PetscFree(size));
+  HycoFreeAll(&norm, &size);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -241,8 +240,7 @@ static PetscErrorCode Join(Sampler *s, HycoSnapshots store, PetscReal tol, Mat *
     PetscCall(MatDestroy(&W[k]));
     at += n[k];
   }
-  PetscCall(MatAssemblyBegin(*joined, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(*joined, MAT_FINAL_ASSEMBLY));
+  PetscCall(HycoMatAssemble(*joined));
   PetscCall(PetscFree2(W, n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -78,6 +78,10 @@ PetscErrorCode HycoVecWrite(Vec v, PetscInt n, const PetscReal value[]);
 /* Begins and ends a forward scatter that inserts. Collective. */
 PetscErrorCode HycoScatter(VecScatter scatter, Vec from, Vec to);
 
+/* Begins and ends the assembly. Collective. */
+PetscErrorCode HycoMatAssemble(Mat A);
+PetscErrorCode HycoVecAssemble(Vec v);
+
 /* Sends n rows of `size` bytes, row k to rank to[k]; *got: the *n_got rows that arrive, by the rank that sent them and
    then in its order. The caller frees it by PetscFree(). Collective. */
 PetscErrorCode HycoSendRows(MPI_Comm comm, PetscInt n, const PetscMPIInt to[], size_t size, const void *row,
@@ -120,6 +124,23 @@ PetscErrorCode HycoLogEvent(HycoEvent event, PetscBool begin);
     logged_ = (call);                                                                                                  \
     PetscCall(HycoLogEvent((event), PETSC_FALSE));                                                                     \
     PetscCall(logged_);                                                                                                \
+  } while (0)
+
+/* PetscCall(call) after the statements, which also run after an error of it. */
+#define HycoFinally(call, ...)                                                                                         \
+  do {                                                                                                                 \
+    const PetscErrorCode finally_ = (call);                                                                            \
+    __VA_ARGS__;                                                                                                       \
+    PetscCall(finally_);                                                                                               \
+  } while (0)
+/* PetscCall(call) after the statements, which run only after an error of it. */
+#define HycoOnError(call, ...)                                                                                         \
+  do {                                                                                                                 \
+    const PetscErrorCode failed_ = (call);                                                                             \
+    if (failed_) {                                                                                                     \
+      __VA_ARGS__;                                                                                                     \
+    }                                                                                                                  \
+    PetscCall(failed_);                                                                                                \
   } while (0)
 
 /* The seal of a file with these bytes, to be appended to them. */
@@ -179,5 +200,8 @@ PetscErrorCode HycoROMDeclare(PetscOptions options);
 /* PetscFree() of each pointer, given by its address. */
 #define HycoFreeAll(...) PetscCall(HycoFreeAll_Private((void *[]){__VA_ARGS__, NULL}))
 PetscErrorCode HycoFreeAll_Private(void *const addresses[]);
+/* Destroys each object of PETSc, given by its address, like its class's Destroy function. */
+#define HycoDestroyAll(...) PetscCall(HycoDestroyAll_Private((void *[]){__VA_ARGS__, NULL}))
+PetscErrorCode HycoDestroyAll_Private(void *const addresses[]);
 
 #endif

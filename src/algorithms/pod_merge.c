@@ -49,10 +49,8 @@ PetscErrorCode HycoJoinColumns(Mat *A, Mat *B, Mat *joined)
   PetscCall(MatCreateDense(PetscObjectComm((PetscObject)*A), rows, PETSC_DECIDE, N, n[0] + n[1], NULL, joined));
   PetscCall(HycoCopyColumns(*A, n[0], *joined, 0));
   PetscCall(HycoCopyColumns(*B, n[1], *joined, n[0]));
-  PetscCall(MatAssemblyBegin(*joined, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(*joined, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatDestroy(A));
-  PetscCall(MatDestroy(B));
+  PetscCall(HycoMatAssemble(*joined));
+  HycoDestroyAll(A, B);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

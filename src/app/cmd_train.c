@@ -23,18 +23,17 @@ static PetscErrorCode ReportGroups(cJSON *json, HycoReducer reducer)
 {
   cJSON *array = cJSON_AddArrayToObject(json, "solved_by_group");
   PetscInt n, unsolved;
-  PetscMPIInt size;
   const PetscInt *solved;
   const PetscReal *written;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(HycoReducerGetSolved(reducer, &n, &solved));
   PetscCall(HycoReducerGetBalance(reducer, &unsolved, &written));
   for (PetscInt k = 0; k < n; k++) cJSON_AddItemToArray(array, cJSON_CreateNumber(solved[k]));
   cJSON_AddNumberToObject(json, "unsolved_when_idle", unsolved);
   array = cJSON_AddArrayToObject(json, "written_mb_by_rank");
-  for (PetscMPIInt r = 0; r < size; r++) cJSON_AddItemToArray(array, cJSON_CreateNumber(1e-6 * written[r]));
+  for (PetscMPIInt r = 0; r < HycoSize(PETSC_COMM_WORLD); r++)
+    cJSON_AddItemToArray(array, cJSON_CreateNumber(1e-6 * written[r]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -145,7 +145,6 @@ PetscErrorCode HycoActiveSetRun(const HycoActiveSet *e, PetscBool active[], Pets
     else
       *status = HYCO_LCP_SOLVED;
   }
-  PetscCall(PetscFree(h.violates));
-  PetscCall(PetscFree(h.past));
+  HycoFreeAll(&h.violates, &h.past);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -80,8 +80,7 @@ PetscErrorCode HycoBlocksGather(MPI_Comm comm, const HycoBlocks *b, HycoBlocks *
   PetscCall(HycoConcatenateAll(comm, b->n, b->of, MPIU_INT, sizeof(PetscInt), &n, &of));
   PetscCall(HycoConcatenateAll(comm, b->at[b->n], b->data, MPIU_REAL, sizeof(PetscReal), &n_data, &data));
   PetscCall(HycoBlocksCreate(b->n_cones, b->cone, n, of, data, all));
-  PetscCall(PetscFree(of));
-  PetscCall(PetscFree(data));
+  HycoFreeAll(&of, &data);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -65,16 +65,15 @@ PetscErrorCode HycoTaoFindType(const char type[], char name[HYCO_TAO_NAME], char
 /* owner: its options prefix; quiet: of several ranks that solve the same problem only the first shows monitors. */
 PetscErrorCode HycoTaoCreate(MPI_Comm comm, PetscObject owner, HycoTao *t)
 {
-  PetscMPIInt rank = 0, size;
+  PetscMPIInt rank = 0;
 
   PetscFunctionBegin;
   PetscCall(HycoPackageCheck());
   PetscCall(PetscNew(t));
   (*t)->comm = comm;
-  PetscCallMPI(MPI_Comm_size(comm, &size));
   if (owner) PetscCallMPI(MPI_Comm_rank(PetscObjectComm(owner), &rank));
   (*t)->owner = owner;
-  (*t)->quiet = (PetscBool)(size == 1 && rank > 0);
+  (*t)->quiet = (PetscBool)(HycoSize(comm) == 1 && rank > 0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -82,10 +81,7 @@ PetscErrorCode HycoTaoCreate(MPI_Comm comm, PetscObject owner, HycoTao *t)
 static PetscErrorCode Reset(HycoTao t)
 {
   PetscFunctionBegin;
-  PetscCall(TaoDestroy(&t->tao));
-  PetscCall(MatDestroy(&t->J));
-  PetscCall(VecDestroy(&t->w));
-  PetscCall(VecDestroy(&t->d));
+  HycoDestroyAll(&t->tao, &t->J, &t->w, &t->d);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -93,11 +89,7 @@ static PetscErrorCode Reset(HycoTao t)
 static PetscErrorCode ResetDense(HycoTao t)
 {
   PetscFunctionBegin;
-  PetscCall(MatDestroy(&t->dense));
-  PetscCall(VecDestroy(&t->f));
-  PetscCall(VecDestroy(&t->lo));
-  PetscCall(VecDestroy(&t->hi));
-  PetscCall(VecDestroy(&t->y));
+  HycoDestroyAll(&t->dense, &t->f, &t->lo, &t->hi, &t->y);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -109,8 +101,7 @@ PetscErrorCode HycoTaoDestroy(HycoTao *t)
   PetscCall(Reset(*t));
   PetscCall(ResetDense(*t));
   PetscCall(VecDestroy(&(*t)->placed));
-  PetscCall(PetscFree((*t)->last));
-  PetscCall(PetscFree(*t));
+  HycoFreeAll(&(*t)->last, t);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -480,8 +471,7 @@ static PetscErrorCode SetForceBounds(HycoTao t, Vec z)
   PetscCall(VecRestoreArrayWrite(lo, &l));
   PetscCall(TaoSetVariableBounds(t->tao, lo, hi));
   t->n_free = blocks ? -1 : t->lcp->p;
-  PetscCall(VecDestroy(&lo));
-  PetscCall(VecDestroy(&hi));
+  HycoDestroyAll(&lo, &hi);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -562,8 +552,7 @@ static PetscErrorCode CopyDense(HycoTao t, const HycoLCP *lcp)
   PetscCall(MatDenseGetArray(t->dense, &h));
   PetscCall(PetscArraycpy(h, lcp->M, (size_t)lcp->n * (size_t)lcp->n));
   PetscCall(MatDenseRestoreArray(t->dense, &h));
-  PetscCall(MatAssemblyBegin(t->dense, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(t->dense, MAT_FINAL_ASSEMBLY));
+  PetscCall(HycoMatAssemble(t->dense));
   /* The matrix is used again for a problem of the same size, which may have another symmetry. */
   PetscCall(MatSetOption(t->dense, MAT_SYMMETRIC, lcp->symmetric));
   PetscCall(VecSet(t->y, 0));

@@ -265,8 +265,7 @@ static PetscErrorCode GatherHessian(Mat H, PetscInt N, PetscReal M[])
   PetscCall(PetscArraycpy(M, entries, (size_t)N * (size_t)N));
   PetscCall(MatDenseRestoreArrayRead(whole[0], &entries));
   PetscCall(MatDestroySubMatrices(1, &whole));
-  PetscCall(ISDestroy(&all));
-  PetscCall(MatDestroy(&dense));
+  HycoDestroyAll(&all, &dense);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -425,8 +424,6 @@ PetscErrorCode HycoTaoNewton(Tao tao, PetscBool lemke)
   PetscCall(Show(&m, m.f, residual, 0));
   PetscCall((*tao->ops->convergencetest)(tao, tao->cnvP));
   while (tao->reason == TAO_CONTINUE_ITERATING) PetscCall(Iterate(&m, lemke ? StepByLemke : StepByActiveSet));
-  PetscCall(VecDestroy(&m.d));
-  PetscCall(VecDestroy(&m.w));
-  PetscCall(VecDestroy(&m.p));
+  HycoDestroyAll(&m.d, &m.w, &m.p);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -493,12 +493,8 @@ static PetscErrorCode Integrate(Mortar *s, PetscInt index, PetscInt n, const Pet
 /* The slave's and the master's groups are those of t. */
 static PetscErrorCode Run(Mortar *s, PetscInt index, PetscInt n, const PetscInt slave[], HycoPairs *pairs)
 {
-  PetscErrorCode ierr;
-
   PetscFunctionBegin;
-  ierr = Integrate(s, index, n, slave, pairs);
-  PetscCall(MortarDestroy(s));
-  PetscCall(ierr);
+  HycoFinally(Integrate(s, index, n, slave, pairs), PetscCall(MortarDestroy(s)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -124,16 +124,10 @@ PetscErrorCode HycoFrictionDestroy(HycoFOM f)
   f->pairs.shear = NULL;
   PetscCall(HycoSolverDestroy(&r->solver));
   PetscCall(HycoSystemDestroy(&r->system));
-  PetscCall(MatDestroy(&r->B));
-  PetscCall(MatDestroy(&r->Bt));
-  PetscCall(VecDestroy(&r->D));
-  PetscCall(VecDestroy(&r->L));
-  PetscCall(VecDestroy(&r->L_old));
-  PetscCall(VecDestroy(&r->work));
+  HycoDestroyAll(&r->B, &r->Bt, &r->D, &r->L, &r->L_old, &r->work);
   for (PetscInt j = 0; j < N_PER_ROW; j++) PetscCall(VecDestroy(&r->other[j]));
   PetscCall(HycoSlipDestroy(&r->slip));
-  PetscCall(PetscFree(r->u_old));
-  PetscCall(PetscFree(f->friction));
+  HycoFreeAll(&r->u_old, &f->friction);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -178,8 +172,7 @@ static PetscErrorCode FillB(HycoFOM f, HycoFriction r, const Rows *rows)
   PetscInt first, *column;
 
   PetscFunctionBegin;
-  PetscCall(MatDestroy(&r->B));
-  PetscCall(MatDestroy(&r->Bt));
+  HycoDestroyAll(&r->B, &r->Bt);
   PetscCall(MatCreateAIJ(HycoComm(f), r->rows, f->part->n_owned * dim, PETSC_DETERMINE, f->n_nodes * dim, entries, NULL,
                          entries, NULL, &r->B));
   PetscCall(MatSetOption(r->B, MAT_NO_OFF_PROC_ENTRIES, PETSC_TRUE));
@@ -197,8 +190,7 @@ static PetscErrorCode FillB(HycoFOM f, HycoFriction r, const Rows *rows)
     PetscCall(MatSetValues(r->B, 1, &at, n, column, rows->value + lo, INSERT_VALUES));
   }
   PetscCall(PetscFree(column));
-  PetscCall(MatAssemblyBegin(r->B, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(r->B, MAT_FINAL_ASSEMBLY));
+  PetscCall(HycoMatAssemble(r->B));
   PetscCall(MatTranspose(r->B, MAT_INITIAL_MATRIX, &r->Bt));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -237,14 +229,11 @@ PetscErrorCode HycoFrictionAssemble(HycoFOM f)
   /* width: the most nodes of a contact. */
   const PetscInt entries = f->width * f->fe->dim * r->rows;
   Rows rows;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCheck(r->n_dof == f->fe_surface->n_dof, PETSC_COMM_SELF, PETSC_ERR_PLIB, "the surfaces changed along a path");
   PetscCall(PetscMalloc4(r->rows + 1, &rows.start, entries, &rows.dof, entries, &rows.value, r->rows, &rows.gap));
-  ierr = Assemble(f, r, &rows);
-  PetscCall(PetscFree4(rows.start, rows.dof, rows.value, rows.gap));
-  PetscCall(ierr);
+  HycoFinally(Assemble(f, r, &rows), PetscCall(PetscFree4(rows.start, rows.dof, rows.value, rows.gap)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -281,12 +281,7 @@ static PetscErrorCode Destroy(Work *o)
   PetscCall(PetscFree(o->output));
   for (PetscInt j = 0; j < 3; j++) PetscCall(VecDestroy(&o->R[j]));
   for (PetscInt j = 0; j < 5; j++) PetscCall(VecDestroy(&o->W[j]));
-  PetscCall(VecDestroy(&o->U));
-  PetscCall(VecDestroy(&o->L));
-  PetscCall(VecDestroy(&o->r));
-  PetscCall(VecDestroy(&o->g));
-  PetscCall(VecDestroy(&o->dU));
-  PetscCall(VecDestroy(&o->dL));
+  HycoDestroyAll(&o->U, &o->L, &o->r, &o->g, &o->dU, &o->dL);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -65,15 +65,12 @@ PetscErrorCode HycoPathFree(HycoPath *path)
     for (size_t k = 0; k < sizeof(vec) / sizeof(vec[0]); k++) PetscCall(VecDestroy(vec[k]));
   }
   for (PetscInt j = 0; j < HYCO_ANDERSON; j++) {
-    PetscCall(VecDestroy(&p->dU[j]));
-    PetscCall(VecDestroy(&p->dG[j]));
-    PetscCall(VecDestroy(&p->dL[j]));
+    HycoDestroyAll(&p->dU[j], &p->dG[j], &p->dL[j]);
   }
   PetscCall(HycoSeriesDestroy(&p->series));
   PetscCall(HycoFEStateDestroy(&p->begin));
   PetscCall(HycoFEStateDestroy(&p->end));
-  HycoFreeAll(&p->f_local, &p->u0, &p->steps, &p->orders, &p->taken);
-  PetscCall(PetscFree(*path));
+  HycoFreeAll(&p->f_local, &p->u0, &p->steps, &p->orders, &p->taken, path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -17,12 +17,10 @@ static PetscErrorCode ContactForces(HycoFOM f, PetscReal force[])
   HycoContactFields c;
   Vec all, at;
   PetscScalar *v;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  ierr = HycoContactFieldsCreate(HycoComm(f), f->fe_surface, &f->pairs, f->u_surface, f->lambda, &c);
-  if (ierr) PetscCall(HycoContactFieldsDestroy(&c));
-  PetscCall(ierr);
+  HycoOnError(HycoContactFieldsCreate(HycoComm(f), f->fe_surface, &f->pairs, f->u_surface, f->lambda, &c),
+              PetscCall(HycoContactFieldsDestroy(&c)));
   PetscCall(VecDuplicate(f->U, &all));
   PetscCall(VecSet(all, 0));
   /* U_surface serves as a work vector; f->u_surface keeps the solution. */

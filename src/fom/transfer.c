@@ -99,8 +99,7 @@ PetscErrorCode HycoFOMSetLambda(HycoFOM f, const PetscReal lambda[])
   if (f->size > 1) PetscCall(HycoFOMGetNumbers(f, &number));
   for (PetscInt k = 0; f->rank == 0 && k < f->n_contacts; k++)
     PetscCall(VecSetValue(f->Lambda, k, lambda[number ? number[k] : k], INSERT_VALUES));
-  PetscCall(VecAssemblyBegin(f->Lambda));
-  PetscCall(VecAssemblyEnd(f->Lambda));
+  PetscCall(HycoVecAssemble(f->Lambda));
   PetscCall(PetscFree(number));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

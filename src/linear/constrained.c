@@ -43,9 +43,7 @@ static PetscErrorCode LargestEigenvalue(Mat K, PetscReal *largest)
   PetscCall(PCSetType(pc, PCJACOBI));
   PetscCall(KSPSolve(ksp, b, x));
   PetscCall(KSPComputeExtremeSingularValues(ksp, largest, &least));
-  PetscCall(KSPDestroy(&ksp));
-  PetscCall(VecDestroy(&b));
-  PetscCall(VecDestroy(&x));
+  HycoDestroyAll(&ksp, &b, &x);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -278,19 +276,11 @@ PetscErrorCode HycoConstrainedDestroy(HycoConstrained *constrained)
   if (!c) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoConstraintsFree(c));
   for (PetscInt l = 0; l < c->n; l++) {
-    PetscCall(MatDestroy(&c->level[l].product));
-    PetscCall(VecDestroy(&c->level[l].inverse));
-    PetscCall(VecDestroy(&c->level[l].r));
-    PetscCall(VecDestroy(&c->level[l].z));
-    PetscCall(VecDestroy(&c->level[l].d));
-    PetscCall(VecDestroy(&c->level[l].w));
-    PetscCall(VecDestroy(&c->level[l].aggregate));
+    HycoDestroyAll(&c->level[l].product, &c->level[l].inverse, &c->level[l].r, &c->level[l].z, &c->level[l].d,
+                   &c->level[l].w, &c->level[l].aggregate);
   }
   PetscCall(PetscFree(c->level));
-  PetscCall(VecDestroy(&c->residual));
-  PetscCall(VecDestroy(&c->correction));
-  PetscCall(KSPDestroy(&c->ksp));
-  PetscCall(PCDestroy(&c->pc));
+  HycoDestroyAll(&c->residual, &c->correction, &c->ksp, &c->pc);
   PetscCall(PetscFree(*constrained));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

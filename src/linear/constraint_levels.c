@@ -24,8 +24,7 @@ typedef struct {
 static PetscErrorCode KnownFree(Known *k)
 {
   PetscFunctionBegin;
-  PetscCall(PetscFree(k->at));
-  PetscCall(PetscFree(k->normal));
+  HycoFreeAll(&k->at, &k->normal);
   k->m = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -38,16 +37,10 @@ PetscErrorCode HycoConstraintsFree(HycoConstrained c)
     HycoLevel *v = &c->level[l];
 
     v->m = 0;
-    PetscCall(MatDestroy(&v->B));
-    PetscCall(MatDestroy(&v->DBt));
-    PetscCall(VecDestroy(&v->G_diagonal));
-    PetscCall(KSPDestroy(&v->G));
-    PetscCall(VecDestroy(&v->mu));
-    PetscCall(VecDestroy(&v->mu_work));
+    HycoDestroyAll(&v->B, &v->DBt, &v->G_diagonal, &v->G, &v->mu, &v->mu_work);
   }
   if (c->Y) PetscCall(VecDestroyVecs(c->n_Y, &c->Y));
-  PetscCall(PetscFree(c->S));
-  PetscCall(PetscFree(c->mu_all));
+  HycoFreeAll(&c->S, &c->mu_all);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -138,8 +131,7 @@ static PetscErrorCode KnownOfB(Mat K, Mat B, const PetscInt at[], Known *known)
   }
   PetscCall(HycoConcatenateAll(comm, hi - lo, first, MPIU_INT, sizeof(PetscInt), &n_all, &known->at));
   PetscCall(HycoConcatenateAll(comm, 3 * (hi - lo), normal, MPIU_REAL, sizeof(PetscReal), &n_all, &known->normal));
-  PetscCall(PetscFree(first));
-  PetscCall(PetscFree(normal));
+  HycoFreeAll(&first, &normal);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -159,9 +151,7 @@ static PetscErrorCode AggregatesAt(const HycoLevel *fine, const Known *known, Pe
   PetscCall(VecGetArrayRead(here, &a));
   for (PetscInt i = 0; i < known->m; i++) aggregate[i] = (PetscInt)a[i];
   PetscCall(VecRestoreArrayRead(here, &a));
-  PetscCall(VecScatterDestroy(&scatter));
-  PetscCall(VecDestroy(&here));
-  PetscCall(ISDestroy(&is));
+  HycoDestroyAll(&scatter, &here, &is);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -264,12 +254,10 @@ static PetscErrorCode CoarseB(HycoLevel *fine, const Known *known, Mat coarse_K,
     for (PetscInt j = 0; j < count[i]; j++)
       PetscCall(MatSetValue(A, i, first[i] + j, weight[3 * i + j], INSERT_VALUES));
   }
-  PetscCall(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
+  PetscCall(HycoMatAssemble(A));
   PetscCall(MatMatMult(fine->B, fine->P, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &BP));
   PetscCall(MatTransposeMatMult(A, BP, MAT_INITIAL_MATRIX, PETSC_DEFAULT, B));
-  PetscCall(MatDestroy(&BP));
-  PetscCall(MatDestroy(&A));
+  HycoDestroyAll(&BP, &A);
   PetscCall(PetscFree3(first, count, weight));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -299,13 +287,11 @@ static PetscErrorCode Redundant(Mat G, KSP *ksp)
 static PetscErrorCode SolverForG(Mat G, KSP *ksp)
 {
   MPI_Comm comm = PetscObjectComm((PetscObject)G);
-  PetscMPIInt size;
   PetscInt m;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(comm, &size));
   PetscCall(MatGetSize(G, &m, NULL));
-  if (size > 1 && m <= HYCO_ALIKE)
+  if (HycoSize(comm) > 1 && m <= HYCO_ALIKE)
     PetscCall(Redundant(G, ksp));
   else
     PetscCall(HycoDirectSolver(comm, "hyco_primal_constraints_", G, PETSC_TRUE, ksp));
@@ -371,8 +357,7 @@ static PetscErrorCode PrepareCoarsest(HycoConstrained c, HycoLevel *v, PetscBool
   for (PetscInt j = 0; j < m; j++) {
     PetscCall(VecSet(unit, 0));
     PetscCall(VecSetValue(unit, j, 1, INSERT_VALUES));
-    PetscCall(VecAssemblyBegin(unit));
-    PetscCall(VecAssemblyEnd(unit));
+    PetscCall(HycoVecAssemble(unit));
     PetscCall(MatMultTranspose(v->B, unit, v->r));
     PetscCall(KSPSolve(c->coarse, v->r, c->Y[j]));
     PetscCall(MatMult(v->B, c->Y[j], v->mu));

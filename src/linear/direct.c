@@ -49,22 +49,18 @@ static PetscErrorCode Release(HycoDirect d)
   d->begun = PETSC_FALSE;
   d->K_id = d->B_id = 0;
   HycoFreeAll(&d->id.irn_loc, &d->id.jcn_loc, &d->id.a_loc, &d->id.perm_in, &d->id.listvar_schur, &d->rhs, &d->reduced);
-  PetscCall(VecScatterDestroy(&d->to_root));
-  PetscCall(VecDestroy(&d->root));
+  HycoDestroyAll(&d->to_root, &d->root);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* MUMPS itself is started by the first analysis. */
 PetscErrorCode HycoDirectCreate(MPI_Comm comm, HycoDirect *d)
 {
-  PetscMPIInt size;
-
   PetscFunctionBegin;
   PetscCall(PetscNew(d));
   (*d)->comm = comm;
   PetscCallMPI(MPI_Comm_rank(comm, &(*d)->rank));
-  PetscCallMPI(MPI_Comm_size(comm, &size));
-  (*d)->alone = (PetscBool)(size == 1);
+  (*d)->alone = (PetscBool)(HycoSize(comm) == 1);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -74,8 +70,7 @@ PetscErrorCode HycoDirectDestroy(HycoDirect *d)
   PetscFunctionBegin;
   if (!*d) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(Release(*d));
-  PetscCall(PetscFree((*d)->pinned));
-  PetscCall(PetscFree(*d));
+  HycoFreeAll(&(*d)->pinned, d);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -507,8 +502,7 @@ PetscErrorCode HycoDirectReduceMany(HycoDirect d, PetscInt k, const Vec F[], Pet
   PetscCall(CondenseMany(d, k, F, &all, &reduced));
   for (PetscInt i = 0; i < k * d->n_schur && d->rank == 0; i++)
     q[i] = i % d->n_schur < d->n_pinned ? -reduced[i] : reduced[i];
-  PetscCall(PetscFree(all));
-  PetscCall(PetscFree(reduced));
+  HycoFreeAll(&all, &reduced);
   HycoBcast(q, k * d->n_schur, MPIU_REAL, d->comm);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -528,8 +522,7 @@ PetscErrorCode HycoDirectExpandMany(HycoDirect d, PetscInt k, const Vec F[], con
     if (d->rank == 0) PetscCall(PetscArraycpy(d->rhs, all + rows * (size_t)j, d->n));
     PetscCall(Deliver(d, x[j]));
   }
-  PetscCall(PetscFree(all));
-  PetscCall(PetscFree(reduced));
+  HycoFreeAll(&all, &reduced);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

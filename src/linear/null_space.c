@@ -89,8 +89,7 @@ PetscErrorCode HycoKernelPins(MPI_Comm comm, Mat K, PetscInt n, PetscInt pinned[
     }
   }
   PetscCall(PetscSortInt(n, pinned));
-  PetscCall(PetscFree(row));
-  PetscCall(PetscFree(unit));
+  HycoFreeAll(&row, &unit);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -140,7 +139,6 @@ PetscErrorCode HycoKernelWork(Mat K, Vec x, Vec F, Vec b, PetscReal *share)
     PetscCall(WorkOn(z[k], F, b, Kx, 1e-2 * PetscMax(norm[0], norm[1]), work, &one));
     *share = PetscMax(*share, one);
   }
-  PetscCall(VecDestroy(&work));
-  PetscCall(VecDestroy(&Kx));
+  HycoDestroyAll(&work, &Kx);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -885,10 +885,7 @@ PetscErrorCode HycoPlexToTables(DM dm, MPI_Comm comm, HycoScene scene, HycoMesh 
   }
   PetscCall(PetscNew(&b.m));
   ierr = FillTables(&b, comm);
-  PetscCall(PetscFree(b.owned));
-  PetscCall(PetscFree(b.node));
-  PetscCall(PetscFree(b.cell));
-  PetscCall(PetscFree(b.facet));
+  HycoFreeAll(&b.owned, &b.node, &b.cell, &b.facet);
   if (ierr) PetscCall(HycoMeshDestroy(&b.m));
   PetscCall(ierr);
   PetscCall(PetscObjectReference((PetscObject)dm));

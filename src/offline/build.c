@@ -183,8 +183,7 @@ static PetscErrorCode CutMesh(HycoReducer t, HycoMesh from, const PetscBool in[]
   PetscCall(PetscMalloc1(surface->n_nodes, &t->surface_node));
   PetscCall(FindSurface(surface, m->model->mesh, t->surface_node));
   PetscCall(PetscFree2(keep, extra));
-  PetscCall(PetscFree(all));
-  PetscCall(PetscFree(contact));
+  HycoFreeAll(&all, &contact);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -270,9 +269,7 @@ static PetscErrorCode CutDomain(HycoReducer t, HycoROM m)
   PetscCall(FetchNotes(t, in, n, global, note));
   /* Only rank 0 has m: the sets are of a mesh on one process. */
   HycoOnRoot(HycoComm(t), TakeSets(t, m, note));
-  PetscCall(PetscFree(note));
-  PetscCall(PetscFree(global));
-  PetscCall(PetscFree(in));
+  HycoFreeAll(&note, &global, &in);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -663,16 +660,14 @@ PetscErrorCode HycoReducerClose(HycoReducer t, HycoSnapshots *store)
 {
   const PetscInt *solved;
   const PetscReal *written;
-  PetscMPIInt size;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
   PetscCall(HycoSnapshotsGetSolved(*store, &t->n_solvers, &solved));
   PetscCall(HycoSnapshotsGetBalance(*store, &t->unsolved, &written));
   t->sliding = (*store)->sliding;
   HycoFreeAll(&t->solved, &t->written);
   HycoDuplicate(t->n_solvers, solved, &t->solved);
-  HycoDuplicate(size, written, &t->written);
+  HycoDuplicate(HycoSize(HycoComm(t)), written, &t->written);
   t->store = NULL;
   PetscCall(HycoSnapshotsDestroy(store));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -855,7 +850,6 @@ PetscErrorCode HycoReducerRun(HycoReducer t, HycoSamples samples, const char pat
   HycoSnapshots store;
   HycoTraining report = {0};
   PetscReal begin = HycoNow(), solved = 0;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
@@ -865,9 +859,7 @@ PetscErrorCode HycoReducerRun(HycoReducer t, HycoSamples samples, const char pat
               "-target_%s needs held-out points, and -hyco_validation is 0; remove one of the two", HycoErrorKinds[j]);
   if (t->pinned[HYCO_CHOICE_TYPE] || !t->search) PetscCall(HycoReducerCheckContacts(t, t->prototype));
   PetscCall(HycoReducerOpen(t, samples, path, &store));
-  ierr = RunOn(t, store, samples, path, &report, &solved);
-  PetscCall(HycoReducerClose(t, &store));
-  PetscCall(ierr);
+  HycoFinally(RunOn(t, store, samples, path, &report, &solved), PetscCall(HycoReducerClose(t, &store)));
   report.sliding = t->sliding;
   report.seconds_snapshots = solved - begin + t->solving;
   report.seconds_reduction = HycoNow() - solved - t->solving;

@@ -27,8 +27,7 @@ static PetscErrorCode GatherColumn(Mat A, PetscInt j, PetscReal column[])
   PetscCall(MatDenseRestoreColumnVecRead(A, j, &v));
   PetscCall(VecGetLocalSize(all, &n));
   PetscCall(HycoVecRead(all, n, column));
-  PetscCall(VecScatterDestroy(&scatter));
-  PetscCall(VecDestroy(&all));
+  HycoDestroyAll(&scatter, &all);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -75,8 +74,7 @@ static PetscErrorCode Notes(HycoReducer t, const PetscBool near[], PetscInt n_ro
     for (PetscInt j = 0; j < N_NOTES; j++) x[j * lda + i] = rows[N_NOTES * i + j];
   }
   PetscCall(MatDenseRestoreArray(*X, &x));
-  PetscCall(MatAssemblyBegin(*X, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(*X, MAT_FINAL_ASSEMBLY));
+  PetscCall(HycoMatAssemble(*X));
   PetscCall(PetscFree2(value, rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

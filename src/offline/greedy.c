@@ -141,14 +141,12 @@ static PetscErrorCode EvaluateShare(HycoReducer t, Loop *loop, HycoROM m, const 
   const PetscReal length = HycoMeshLength(t->fom->part);
   const PetscReal *solved;
   PetscInt n;
-  PetscMPIInt size;
   HycoIndicator indicator;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
   PetscCall(HycoSamplesGet(loop->samples, &n, NULL, &solved));
   PetscCall(HycoIndicatorCreate(m, t->greedy.indicator, n, solved, U_at, length, &indicator));
-  for (PetscInt k = t->rank; k < loop->n_points; k += size) {
+  for (PetscInt k = t->rank; k < loop->n_points; k += HycoSize(HycoComm(t))) {
     HycoIndication v;
 
     PetscCall(HycoIndicatorEvaluate(indicator, loop->points + k * loop->n_par, &v));
@@ -382,7 +380,6 @@ PetscErrorCode HycoReducerRunGreedy(HycoReducer t, HycoSamples start, HycoSample
 {
   Loop loop = {0};
   HycoTraining report = {0};
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
@@ -396,12 +393,8 @@ PetscErrorCode HycoReducerRunGreedy(HycoReducer t, HycoSamples start, HycoSample
   PetscCall(Start(t, start, &loop.samples));
   PetscCall(CheckStart(t, (PetscBool)!start, loop.samples));
   PetscCall(HycoReducerOpen(t, loop.samples, path, &loop.store));
-  ierr = RunOn(t, &loop, path, &report);
-  PetscCall(HycoReducerClose(t, &loop.store));
-  report.sliding = t->sliding;
-  PetscCall(HycoSamplesDestroy(&loop.samples));
-  PetscCall(PetscFree(loop.value));
-  PetscCall(ierr);
+  HycoFinally(RunOn(t, &loop, path, &report), PetscCall(HycoReducerClose(t, &loop.store)); report.sliding = t->sliding;
+              PetscCall(HycoSamplesDestroy(&loop.samples)); PetscCall(PetscFree(loop.value)));
   if (training_report) *training_report = report;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -300,8 +300,7 @@ PetscErrorCode HycoMetFind(HycoScene scene, HycoMesh whole, const HycoPairs *pai
   for (PetscInt k = 0; k < n; k++) PetscCall(NoteAt(&s, mu + k * scene->n_parameters, &l, &grown));
   if (n) PetscCall(NoteBetween(&s, scene, mu, &l));
   PetscCall(Collect(&s, pairs, &l, met));
-  PetscCall(PetscFree(l.head));
-  HycoFreeAll(&l.row, &l.node);
+  HycoFreeAll(&l.head, &l.row, &l.node);
   PetscCall(SurfacesDestroy(&s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -20,11 +20,8 @@ typedef struct {
 static PetscErrorCode RidDestroy(Rid *r)
 {
   PetscFunctionBegin;
-  PetscCall(PetscSFDestroy(&r->to_part));
-  PetscCall(PetscSFDestroy(&r->to_surface));
-  PetscCall(PetscFree(r->start));
-  PetscCall(PetscFree(r->around));
-  PetscCall(PetscFree(r->own));
+  HycoDestroyAll(&r->to_part, &r->to_surface);
+  HycoFreeAll(&r->start, &r->around, &r->own);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -82,6 +82,13 @@ PetscErrorCode HycoFreeAll_Private(void *const addresses[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoDestroyAll_Private(void *const addresses[])
+{
+  PetscFunctionBegin;
+  for (; *addresses; addresses++) PetscCall(PetscObjectDestroy((PetscObject *)*addresses));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 const char *HycoVersion(void)
 {
   return HYCO_VERSION;

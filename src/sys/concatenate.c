@@ -5,10 +5,9 @@
 static PetscErrorCode Concatenate(MPI_Comm comm, PetscBool everywhere, PetscInt n, const void *mine, MPI_Datatype type,
                                   size_t size, PetscInt *n_all, void *all)
 {
-  PetscMPIInt rank, ranks, count, *counts, *offsets;
+  PetscMPIInt ranks, count, *counts, *offsets;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
   PetscCallMPI(MPI_Comm_size(comm, &ranks));
   PetscCall(PetscMPIIntCast(n, &count));
   PetscCall(PetscCalloc2(ranks, &counts, ranks + 1, &offsets));
@@ -20,7 +19,7 @@ static PetscErrorCode Concatenate(MPI_Comm comm, PetscBool everywhere, PetscInt 
   for (PetscMPIInt r = 0; r < ranks; r++) offsets[r + 1] = offsets[r] + counts[r];
   *n_all = offsets[ranks];
   *(void **)all = NULL;
-  if (everywhere || rank == 0) PetscCall(PetscMalloc((size_t)(*n_all + 1) * size, (void **)all));
+  if (everywhere || HycoRank(comm) == 0) PetscCall(PetscMalloc((size_t)(*n_all + 1) * size, (void **)all));
   if (everywhere)
     PetscCallMPI(MPI_Allgatherv(mine, count, type, *(void **)all, counts, offsets, type, comm));
   else
@@ -96,6 +95,22 @@ PetscErrorCode HycoScatter(VecScatter scatter, Vec from, Vec to)
   PetscFunctionBegin;
   PetscCall(VecScatterBegin(scatter, from, to, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(VecScatterEnd(scatter, from, to, INSERT_VALUES, SCATTER_FORWARD));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMatAssemble(Mat A)
+{
+  PetscFunctionBegin;
+  PetscCall(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoVecAssemble(Vec v)
+{
+  PetscFunctionBegin;
+  PetscCall(VecAssemblyBegin(v));
+  PetscCall(VecAssemblyEnd(v));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -47,18 +47,13 @@ PetscErrorCode HycoOptionListDestroy(HycoOptionList *list)
 /* Declarations may record others inside: the former list is restored, on errors too. */
 PetscErrorCode HycoOptionsRecord(HycoOptionList *list, PetscErrorCode (*declare)(PetscOptions))
 {
-  PetscErrorCode ierr;
   PetscOptions none;
   HycoOptionList *before = recording;
 
   PetscFunctionBegin;
   PetscCall(PetscOptionsCreate(&none));
   recording = list;
-  ierr = declare(none);
-  recording = before;
-  readers = "";
-  PetscCall(PetscOptionsDestroy(&none));
-  PetscCall(ierr);
+  HycoFinally(declare(none), recording = before; readers = ""; PetscCall(PetscOptionsDestroy(&none)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -51,7 +51,6 @@ static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs 
   const PetscInt first = pairs->n;
   PetscReal tolerance;
   PetscInt n, *slave;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(CheckSupported(c, fe));
@@ -69,9 +68,7 @@ static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs 
   HycoDuplicate(n, pairs->slave + first, &slave);
   pairs->n = first;
   pairs->queries += n;
-  ierr = HycoMortarRows(c, fe, index, tolerance, n, slave, pairs);
-  PetscCall(PetscFree(slave));
-  PetscCall(ierr);
+  HycoFinally(HycoMortarRows(c, fe, index, tolerance, n, slave, pairs), PetscCall(PetscFree(slave)));
   PetscCall(CheckFacing(c, fe, pairs, first, tolerance));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

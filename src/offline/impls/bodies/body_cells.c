@@ -186,8 +186,7 @@ static PetscErrorCode List(HycoReducer t, HycoBodiesFactor *factor, const PetscB
     b->body[k].m = b->inner_start[k + 1] - b->inner_start[k];
   }
   PetscCall(PetscFree2(dof, at));
-  PetscCall(PetscFree(own));
-  PetscCall(PetscFree(all));
+  HycoFreeAll(&own, &all);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -212,8 +211,7 @@ static PetscErrorCode MarkSurfaces(HycoReducer t, HycoBodiesFactor *factor)
     factor->known[i] = (PetscBool)(at >= 0);
     factor->bare[i] = (PetscBool)(at >= 0 && factor->in_mesh[place[at]]);
   }
-  PetscCall(PetscFree(place));
-  PetscCall(PetscFree(sorted));
+  HycoFreeAll(&place, &sorted);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -287,7 +285,6 @@ PetscErrorCode HycoBodiesChooseCells(HycoReducer t, HycoBodiesFactor *factor)
   if (!released) PetscCall(PetscArrayzero(factor->bare, fe->n_dof));
   PetscCall(List(t, factor, inner));
   for (PetscInt i = 0; i < fe->n_dof; i++) factor->bare[i] = (PetscBool)(factor->bare[i] || inner[i]);
-  PetscCall(PetscFree(inner));
-  PetscCall(PetscFree(in));
+  HycoFreeAll(&inner, &in);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

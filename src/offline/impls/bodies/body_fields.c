@@ -786,8 +786,7 @@ static PetscErrorCode TakeModes(HycoReducer t, HycoSnapshots store, Mat V, Petsc
   PetscCall(PetscMalloc1(t->l * t->n_s, &t->VtU));
   PetscCall(HycoReducerGetDisplacements(t, store, &S));
   PetscCall(HycoReducerMultiply(t, V, S, t->VtU));
-  PetscCall(MatDestroy(&S));
-  PetscCall(MatDestroy(&t->V));
+  HycoDestroyAll(&S, &t->V);
   t->V = V;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -813,8 +812,7 @@ static PetscErrorCode FindInMesh(HycoReducer t, HycoBodiesFactor *factor)
     PetscCall(PetscFindInt(b->dof[k] / b->dim, n, node, &at));
     factor->in_mesh[k] = (PetscBool)(at >= 0);
   }
-  PetscCall(PetscFree(node));
-  PetscCall(PetscFree(contact));
+  HycoFreeAll(&node, &contact);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

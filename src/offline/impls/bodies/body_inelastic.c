@@ -276,8 +276,7 @@ static PetscErrorCode ForceOfMode(HycoReducer t, HycoFOM f, PetscInt k, Vec F)
     if (own >= 0) v[own * dim + i % dim] = f->fe->fixed[i] ? 0 : force[i];
   }
   PetscCall(VecRestoreArray(F, &v));
-  PetscCall(PetscFree(value));
-  PetscCall(PetscFree(force));
+  HycoFreeAll(&value, &force);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -367,7 +366,6 @@ static PetscErrorCode YieldsHere(HycoReducer t, PetscBool *yields)
   HycoFEStepReport report;
   HycoFEState begin, end;
   PetscReal *u, *f;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(fe->n_dof, &u, fe->n_dof, &f));
@@ -376,11 +374,9 @@ static PetscErrorCode YieldsHere(HycoReducer t, PetscBool *yields)
   PetscCall(PetscArrayzero(f, fe->n_dof));
   PetscCall(HycoFEStateCreate(fe, &begin));
   PetscCall(HycoFEStateCreate(fe, &end));
-  ierr = HycoFEStepBodies(fe, HYCO_BODIES_FLOWING, u, now, now, begin, end, f, PETSC_FALSE, &report);
-  PetscCall(HycoFEStateDestroy(&begin));
-  PetscCall(HycoFEStateDestroy(&end));
-  PetscCall(PetscFree2(u, f));
-  PetscCall(ierr);
+  HycoFinally(HycoFEStepBodies(fe, HYCO_BODIES_FLOWING, u, now, now, begin, end, f, PETSC_FALSE, &report),
+              PetscCall(HycoFEStateDestroy(&begin));
+              PetscCall(HycoFEStateDestroy(&end)); PetscCall(PetscFree2(u, f)));
   *yields = (PetscBool)(report.failed || report.increment > 0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -497,8 +493,7 @@ static PetscErrorCode Contributions(HycoReducer t, HycoBodiesFactor *factor, Pet
       s[(size_t)(k * m + i % m) * (size_t)lds + (size_t)(i / m)] = modes->sigma[k] * rows[i];
   }
   PetscCall(MatDenseRestoreArray(*S, &s));
-  PetscCall(MatAssemblyBegin(*S, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(*S, MAT_FINAL_ASSEMBLY));
+  PetscCall(HycoMatAssemble(*S));
   PetscCall(PetscFree4(u, value, work, rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -559,8 +554,7 @@ static PetscErrorCode Cubature(HycoReducer t, HycoBodiesFactor *factor, PetscRea
   PetscCall(PetscCalloc1(t->rank ? 1 : t->sizes[1], &w));
   PetscCall(HycoCubatureFind(t, elastic, 0, s->cubature_tol, W, n, sigma, w, error));
   PetscCall(MatDestroy(&W));
-  PetscCall(PetscFree(elastic));
-  PetscCall(PetscFree(sigma));
+  HycoFreeAll(&elastic, &sigma);
   PetscCall(TakeWeighted(t, w, weight));
   PetscCall(PetscFree(w));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -259,10 +259,8 @@ static PetscErrorCode Select(HycoReducer t, HycoSubstructures b, Mat *N)
   PetscCall(MatCreateAIJ(HycoComm(f), PETSC_DECIDE, f->part->n_owned * b->dim, b->ns, f->n_nodes * b->dim, 1, NULL, 1,
                          NULL, N));
   for (PetscInt k = 0; k < b->ns && f->rank == 0; k++) PetscCall(MatSetValue(*N, k, global[k], 1, INSERT_VALUES));
-  PetscCall(MatAssemblyBegin(*N, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(*N, MAT_FINAL_ASSEMBLY));
-  PetscCall(PetscFree(global));
-  PetscCall(PetscFree(of));
+  PetscCall(HycoMatAssemble(*N));
+  HycoFreeAll(&global, &of);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -418,7 +416,6 @@ static PetscErrorCode MakeModes(HycoReducer t, HycoSnapshots store)
   HycoBodiesFactor factor = {0};
   PetscReal mu[HYCO_MAX_PARAMETERS];
   HycoSubstructures b;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoBodiesDestroy(&HycoTrainingOfBodies(t)->bodies));
@@ -437,9 +434,7 @@ static PetscErrorCode MakeModes(HycoReducer t, HycoSnapshots store)
   else if (t->scene->n_times)
     PetscCall(TakeNoStrains(t));
   PetscCall(HycoFOMCreate(HycoComm(t), t->scene, &factor.fom));
-  ierr = Condense(t, store, &factor);
-  PetscCall(HycoBodiesReleaseFactor(&factor));
-  PetscCall(ierr);
+  HycoFinally(Condense(t, store, &factor), PetscCall(HycoBodiesReleaseFactor(&factor)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

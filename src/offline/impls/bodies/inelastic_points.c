@@ -33,8 +33,7 @@ static PetscErrorCode DestroySampler(Sampler *s)
   PetscFunctionBegin;
   PetscCall(HycoTrainingReplayDestroy(&s->replay));
   HycoFreeAll(&s->value, &s->scale);
-  PetscCall(MatDestroy(&s->S));
-  PetscCall(MatDestroy(&s->U));
+  HycoDestroyAll(&s->S, &s->U);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -126,8 +125,7 @@ static PetscErrorCode FollowAll(Sampler *s, HycoSnapshots store, PetscReal tol, 
   for (PetscInt k = 0; k < n; k++) {
     PetscCall(HycoReducerTell(s->t, "inelastic strains of the paths", k, n));
     PetscCall(HycoTrainingReplayFollow(&s->replay, store, k));
-    PetscCall(MatAssemblyBegin(s->S, MAT_FINAL_ASSEMBLY));
-    PetscCall(MatAssemblyEnd(s->S, MAT_FINAL_ASSEMBLY));
+    PetscCall(HycoMatAssemble(s->S));
     PetscCall(HycoPathModesAdd(s->t, s->S, tol, modes));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

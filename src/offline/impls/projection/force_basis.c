@@ -108,8 +108,7 @@ static PetscErrorCode Append(HycoReducer t, PetscInt q, Mat Q, PetscInt n_q, con
   PetscCall(MatCreateDense(HycoComm(t), rows, PETSC_DECIDE, t->sizes[0] * t->sizes[3], both, NULL, &V));
   PetscCall(HycoCopyColumns(t->V, l, V, 0));
   PetscCall(HycoCopyColumns(Q, q, V, l));
-  PetscCall(MatAssemblyBegin(V, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(V, MAT_FINAL_ASSEMBLY));
+  PetscCall(HycoMatAssemble(V));
   PetscCall(PetscMalloc1(both * t->n_s, &VtU));
   PetscCall(PetscMalloc1(both, &sigma));
   for (PetscInt k = 0; k < t->n_s; k++) {
@@ -119,8 +118,7 @@ static PetscErrorCode Append(HycoReducer t, PetscInt q, Mat Q, PetscInt n_q, con
   /* Zero marks them as no modes of the POD (HycoROMCountPOD()). */
   for (PetscInt j = 0; j < both; j++) sigma[j] = j < l ? t->sigma[j] : 0;
   PetscCall(MatDestroy(&t->V));
-  PetscCall(PetscFree(t->VtU));
-  PetscCall(PetscFree(t->sigma));
+  HycoFreeAll(&t->VtU, &t->sigma);
   t->V = V;
   t->VtU = VtU;
   t->sigma = sigma;

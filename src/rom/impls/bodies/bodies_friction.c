@@ -74,13 +74,10 @@ PetscErrorCode HycoBodiesFrictionDestroy(HycoBodiesFriction *friction)
   if (!f) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoSolverDestroy(&f->solver));
   PetscCall(HycoSystemDestroy(&f->system));
-  PetscCall(MatDestroy(&f->W));
-  PetscCall(VecDestroy(&f->g));
-  PetscCall(VecDestroy(&f->L));
+  HycoDestroyAll(&f->W, &f->g, &f->L);
   PetscCall(HycoSlipDestroy(&f->slip));
   PetscCall(HycoRowsDestroy(&f->rows));
-  HycoFreeAll(&f->contact, &f->U, &f->U_old, &f->w, &f->forces);
-  PetscCall(PetscFree(*friction));
+  HycoFreeAll(&f->contact, &f->U, &f->U_old, &f->w, &f->forces, friction);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

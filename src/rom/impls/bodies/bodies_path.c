@@ -382,8 +382,7 @@ static PetscErrorCode Reset(HycoROM m)
   HycoFreeAll(&w->at, &w->cell_at, &w->point, &w->B, &w->T, &w->there, &w->weight, &w->BP, &w->response, &w->loads,
               &w->column, &w->set, &w->U, &w->Z, &w->S, &w->z, &w->e0, &w->gap, &w->last, &w->u, &w->e, &w->s, &w->size,
               &w->lost, &w->X, &w->r, &w->J, &w->pivot);
-  PetscCall(VecDestroy(&w->alpha));
-  PetscCall(VecDestroy(&w->L));
+  HycoDestroyAll(&w->alpha, &w->L);
   PetscCall(HycoPathFree(&w->path));
   if (w->bodies.bodies) PetscCall(HycoBodiesReset(&w->bodies));
   PetscCall(HycoBodiesFrictionDestroy(&w->friction));

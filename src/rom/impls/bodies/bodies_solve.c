@@ -588,9 +588,7 @@ static PetscErrorCode SolveSystem(HycoBodiesWork o, Problem *p, PetscBool *solve
   o->its += its;
   *solved = (PetscBool)(o->reason > 0);
   PetscCall(HycoSystemDestroy(&system));
-  PetscCall(VecDestroy(&L));
-  PetscCall(VecDestroy(&g));
-  PetscCall(MatDestroy(&G));
+  HycoDestroyAll(&L, &g, &G);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -738,8 +736,7 @@ static PetscErrorCode FirstDepth(HycoBodiesWork o, const HycoBodiesSurface *s, P
     if (spread > FLAT * deepest[c] && shallowest[c] > least[c]) least[c] = deepest[c] - NEAREST * spread;
     least[c] = PetscMax(least[c], CLOSED * size);
   }
-  PetscCall(PetscFree(shallowest));
-  PetscCall(PetscFree(deepest));
+  HycoFreeAll(&shallowest, &deepest);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -234,9 +234,7 @@ static PetscErrorCode Shift(HycoSolver s, const PetscReal dL[], Vec x, Vec L)
   PetscCall(HycoStiffnessSolve(s, force, move));
   PetscCall(VecAXPY(x, -1, move));
   PetscCall(VecAXPY(L, 1, change));
-  PetscCall(VecDestroy(&change));
-  PetscCall(VecDestroy(&force));
-  PetscCall(VecDestroy(&move));
+  HycoDestroyAll(&change, &force, &move);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

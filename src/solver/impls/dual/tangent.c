@@ -17,8 +17,7 @@ PetscErrorCode HycoSolverTangentDestroy(HycoSolverTangent *tangent)
   PetscFunctionBegin;
   if (!t) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoTangentDestroy(&t->tangent));
-  HycoFreeAll(&t->q, &t->z);
-  PetscCall(PetscFree(*tangent));
+  HycoFreeAll(&t->q, &t->z, tangent);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -85,15 +84,11 @@ static PetscErrorCode SetUp(HycoSolverTangent t, Vec x, Vec L)
 /* x and L must be the solution of the present system: the states of the contacts are read from its gaps and forces. */
 PetscErrorCode HycoSolverTangentCreate(HycoSolver s, Vec x, Vec L, HycoSolverTangent *tangent)
 {
-  PetscErrorCode ierr;
-
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
   PetscCall(PetscNew(tangent));
   (*tangent)->s = s;
-  ierr = SetUp(*tangent, x, L);
-  if (ierr) PetscCall(HycoSolverTangentDestroy(tangent));
-  PetscCall(ierr);
+  HycoOnError(SetUp(*tangent, x, L), PetscCall(HycoSolverTangentDestroy(tangent)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

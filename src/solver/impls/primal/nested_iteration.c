@@ -158,8 +158,7 @@ static PetscErrorCode Split(const Rows *r, PetscInt coarse_of[], PetscInt *n_coa
   for (PetscInt i = 0; i < r->n; i++) {
     if (coarse_of[i] == 0) coarse_of[i] = (*n_coarse)++;
   }
-  PetscCall(PetscFree(queue));
-  PetscCall(PetscFree(seen));
+  HycoFreeAll(&queue, &seen);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -208,8 +207,7 @@ static PetscErrorCode Interpolate(const Rows *r, const PetscInt coarse_of[], Pet
     for (PetscInt k = 0; k < n; k++) weight[k] *= -all / taken / diagonal;
     PetscCall(MatSetValues(*P, 1, &i, n, col, weight, INSERT_VALUES));
   }
-  PetscCall(MatAssemblyBegin(*P, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(*P, MAT_FINAL_ASSEMBLY));
+  PetscCall(HycoMatAssemble(*P));
   PetscCall(PetscFree(length));
   PetscCall(PetscFree2(col, weight));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -328,11 +326,7 @@ static PetscErrorCode SolveLevel(Level *l, Vec y)
   PetscCall(PetscMalloc2(l->n, &p.at, l->n, &p.at_bound));
   PetscCall(HycoActiveSetRun(&set, l->active, &its, &status));
   PetscCall(PetscFree2(p.at, p.at_bound));
-  PetscCall(VecDestroy(&p.rhs));
-  PetscCall(VecDestroy(&p.residual));
-  PetscCall(VecDestroy(&p.diagonal));
-  PetscCall(MatDestroy(&p.work));
-  PetscCall(KSPDestroy(&p.ksp));
+  HycoDestroyAll(&p.rhs, &p.residual, &p.diagonal, &p.work, &p.ksp);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -358,8 +352,7 @@ static PetscErrorCode Prolong(Level *fine, const Level *coarse, Vec y)
   PetscCall(VecRestoreArrayRead(fine_y, &value));
   PetscCall(VecRestoreArrayRead(fine->f, &f));
   PetscCall(VecRestoreArrayRead(diagonal, &d));
-  PetscCall(VecDestroy(&fine_y));
-  PetscCall(VecDestroy(&diagonal));
+  HycoDestroyAll(&fine_y, &diagonal);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -367,12 +360,8 @@ static PetscErrorCode Prolong(Level *fine, const Level *coarse, Vec y)
 static PetscErrorCode LevelDestroy(Level *l)
 {
   PetscFunctionBegin;
-  PetscCall(MatDestroy(&l->K));
-  PetscCall(MatDestroy(&l->P));
-  PetscCall(VecDestroy(&l->f));
-  PetscCall(PetscFree(l->bound));
-  PetscCall(PetscFree(l->active));
-  PetscCall(PetscFree(l->coarse_of));
+  HycoDestroyAll(&l->K, &l->P, &l->f);
+  HycoFreeAll(&l->bound, &l->active, &l->coarse_of);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -441,21 +430,18 @@ static PetscErrorCode StartOnRoot(Mat K, Vec f, Vec bound, Vec set, PetscBool *m
 /* Gathers the whole matrix on rank 0, an empty one elsewhere. A submatrix of all rows on rank 0. */
 static PetscErrorCode GatherMatrix(MPI_Comm comm, Mat K, Mat *whole)
 {
-  PetscMPIInt rank, size;
   PetscInt n;
   Mat *part;
   IS all;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  PetscCallMPI(MPI_Comm_size(comm, &size));
-  if (size == 1) {
+  if (HycoSize(comm) == 1) {
     PetscCall(PetscObjectReference((PetscObject)K));
     *whole = K;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(MatGetSize(K, &n, NULL));
-  PetscCall(ISCreateStride(PETSC_COMM_SELF, rank ? 0 : n, 0, 1, &all));
+  PetscCall(ISCreateStride(PETSC_COMM_SELF, HycoRank(comm) ? 0 : n, 0, 1, &all));
   PetscCall(MatCreateSubMatrices(K, 1, &all, &all, MAT_INITIAL_MATRIX, &part));
   /* MatDestroySubMatrices() gives up the other reference. */
   PetscCall(PetscObjectReference((PetscObject)part[0]));
@@ -490,10 +476,6 @@ PetscErrorCode HycoMultilevelStart(Mat K, Vec f, Vec bound, Vec set, PetscBool *
     PetscCall(VecScatterBegin(scatter, set_root, set, INSERT_VALUES, SCATTER_REVERSE));
     PetscCall(VecScatterEnd(scatter, set_root, set, INSERT_VALUES, SCATTER_REVERSE));
   }
-  PetscCall(VecScatterDestroy(&scatter));
-  PetscCall(VecDestroy(&f_root));
-  PetscCall(VecDestroy(&bound_root));
-  PetscCall(VecDestroy(&set_root));
-  PetscCall(MatDestroy(&whole));
+  HycoDestroyAll(&scatter, &f_root, &bound_root, &set_root, &whole);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

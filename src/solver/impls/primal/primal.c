@@ -277,8 +277,7 @@ static PetscErrorCode PrimalCreate(HycoSolver s, const Gap *g, Vec x, Primal *p)
     p->bound[k] = d[g->contact[k]];
     PetscCall(VecSetValue(p->hi, g->pivot[k], p->bound[k], INSERT_VALUES));
   }
-  PetscCall(VecAssemblyBegin(p->hi));
-  PetscCall(VecAssemblyEnd(p->hi));
+  PetscCall(HycoVecAssemble(p->hi));
   PetscCall(VecRestoreArrayRead(y->D, &d));
   PetscCall(VecDuplicate(x, &p->y));
   PetscCall(VecSet(p->y, 0));
@@ -300,13 +299,7 @@ static PetscErrorCode PrimalDestroy(Primal *p)
 {
   PetscFunctionBegin;
   PetscCall(PetscFree6(p->bound, p->value, p->force, p->diagonal, p->at_d, p->at));
-  PetscCall(VecDestroy(&p->y));
-  PetscCall(VecDestroy(&p->hi));
-  PetscCall(VecDestroy(&p->f));
-  PetscCall(VecDestroy(&p->rhs));
-  PetscCall(VecDestroy(&p->residual));
-  PetscCall(VecDestroy(&p->work));
-  PetscCall(VecScatterDestroy(&p->scatter));
+  HycoDestroyAll(&p->y, &p->hi, &p->f, &p->rhs, &p->residual, &p->work, &p->scatter);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -377,11 +370,7 @@ static PetscErrorCode Destroy(HycoSolverForm form)
 
   PetscFunctionBegin;
   PetscCall(HycoTaoDestroy(&g->tao));
-  PetscCall(KSPDestroy(&g->ksp));
-  PetscCall(MatDestroy(&g->T));
-  PetscCall(MatDestroy(&g->Kg));
-  PetscCall(MatDestroy(&g->Kw));
-  PetscCall(MatDestroy(&g->H));
+  HycoDestroyAll(&g->ksp, &g->T, &g->Kg, &g->Kw, &g->H);
   HycoFreeAll(&g->pivot, &g->contact, &g->active, &form->data);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

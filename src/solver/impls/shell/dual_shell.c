@@ -92,8 +92,7 @@ static PetscErrorCode LocalDiagonal(HycoSystem y, Vec d)
     PetscCall(MatRestoreRow(y->B, r, &n, NULL, &a));
   }
   PetscCall(VecRestoreArray(d, &out));
-  PetscCall(MatDestroy(&scaled));
-  PetscCall(VecDestroy(&inverse));
+  HycoDestroyAll(&scaled, &inverse);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -120,8 +119,7 @@ static PetscErrorCode EstimateDiagonal(Mat S, Shell *f)
   PetscCall(VecDot(v, Sv, &ratio));
   PetscCall(VecNorm(f->diagonal, NORM_1, &sum));
   if (ratio > 0 && sum > 0) PetscCall(VecScale(f->diagonal, ratio / sum));
-  PetscCall(VecDestroy(&v));
-  PetscCall(VecDestroy(&Sv));
+  HycoDestroyAll(&v, &Sv);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -155,9 +153,7 @@ static PetscErrorCode Forces(const Shell *p, Mat S, Vec x, Vec L, PetscBool *sol
   PetscCall(HycoTaoSetType(p->tao, s->now.type, s->max_its));
   PetscCall(HycoTaoSolve(p->tao, S, f, lo, hi, L, &s->its, solved));
   PetscCall(VecPointwiseMax(L, L, lo)); /* lo is 0 */
-  PetscCall(VecDestroy(&f));
-  PetscCall(VecDestroy(&lo));
-  PetscCall(VecDestroy(&hi));
+  HycoDestroyAll(&f, &lo, &hi);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -208,10 +204,7 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   PetscCall(EstimateDiagonal(S, f));
   PetscCall(Forces(f, S, x, L, solved));
   PetscCall(Displacements(s, f, x, L));
-  PetscCall(VecDestroy(&f->force));
-  PetscCall(VecDestroy(&f->motion));
-  PetscCall(VecDestroy(&f->diagonal));
-  PetscCall(MatDestroy(&S));
+  HycoDestroyAll(&f->force, &f->motion, &f->diagonal, &S);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
