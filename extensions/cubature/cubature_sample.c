@@ -20,14 +20,6 @@ typedef struct {
   Mat J;            /* of the current training point */
 } Sampler;
 
-static PetscErrorCode Destroy(Sampler *s)
-{
-  PetscFunctionBegin;
-  PetscCall(HycoTrainingReplayDestroy(&s->replay));
-  HycoFreeAll(&s->V, &s->g, &s->rows);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Fetches the modes at the nodes of the part. Collective. */
 static PetscErrorCode FetchModes(Sampler *s)
 {
@@ -256,7 +248,8 @@ PetscErrorCode HycoCubatureSample(HycoReducer t, HycoSnapshots store, PetscReal 
   PetscFunctionBegin;
   PetscCall(Create(t, &s));
   ierr = Join(&s, store, SHARE * tol, &J);
-  PetscCall(Destroy(&s));
+  PetscCall(HycoTrainingReplayDestroy(&s.replay));
+  HycoFreeAll(&s.V, &s.g, &s.rows);
   if (!ierr) ierr = Decompose(t, J, SHARE * tol, W, n, sigma);
   PetscCall(MatDestroy(&J));
   PetscCall(ierr);

@@ -185,12 +185,11 @@ typedef struct _n_HycoBodiesWork {
   HycoTao tao;       /* the active set; if it fails, or another method is asked for: */
   HycoSolver solver; /* borrowed, or `own` */
   HycoSolver own;
-  HycoReason reason; /* of the last solve; its iterations, and contacts in its problem */
-  PetscInt its, n_problem;
+  HycoReason reason; /* of the last solve; its iterations */
+  PetscInt its;
   char method[64];
 } * HycoBodiesWork;
 
-PetscErrorCode HycoBodiesCreate(HycoSubstructures *bodies);
 /* NULL-safe. */
 PetscErrorCode HycoBodiesDestroy(HycoSubstructures *bodies);
 /* Points the bodies' tensors to the values of theta. */

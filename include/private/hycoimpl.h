@@ -11,6 +11,14 @@
 /* Raises the caught error again, unless it is HYCO_ERR_NO_MODEL. */
 PetscErrorCode HycoCatchNoModel(PetscErrorCode caught, const char message[]);
 
+/* Catches an error of `call`: its code, 0 if there is none, and its line. */
+#define HycoCatch(call, caught, message)                                                                               \
+  do {                                                                                                                 \
+    PetscCall(HycoCatchBegin());                                                                                       \
+    (caught) = (call);                                                                                                 \
+    PetscCall(HycoCatchEnd((caught), (message)));                                                                      \
+  } while (0)
+
 /* HycoFail() and HycoCheck() with HYCO_ERR_NO_MODEL. */
 #define HycoFailNoModel(...)                                                                                           \
   do {                                                                                                                 \
@@ -203,5 +211,17 @@ PetscErrorCode HycoFreeAll_Private(void *const addresses[]);
 /* Destroys each object of PETSc, given by its address, like its class's Destroy function. */
 #define HycoDestroyAll(...) PetscCall(HycoDestroyAll_Private((void *[]){__VA_ARGS__, NULL}))
 PetscErrorCode HycoDestroyAll_Private(void *const addresses[]);
+
+/* Duplicates of a vector, at the addresses that follow. */
+#define HycoVecDuplicate(v, ...) PetscCall(HycoVecDuplicate_Private((v), (Vec *[]){__VA_ARGS__, NULL}))
+PetscErrorCode HycoVecDuplicate_Private(Vec v, Vec *const copies[]);
+/* Room for entry n of an array with room for `room` entries, which doubles. */
+#define HycoGrow(n, room, array)                                                                                       \
+  do {                                                                                                                 \
+    if ((n) == (room)) {                                                                                               \
+      (room) = 2 * (room) + 64;                                                                                        \
+      PetscCall(PetscRealloc((size_t)(room) * sizeof(*(array)), &(array)));                                            \
+    }                                                                                                                  \
+  } while (0)
 
 #endif

@@ -359,15 +359,6 @@ static PetscErrorCode ShapeOf(HycoROM model, HycoScene scene, Shape *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode DestroyShape(Shape *s)
-{
-  PetscFunctionBegin;
-  PetscCall(PetscFree(s->carried.name));
-  PetscCall(PetscFree(s->gradients.name));
-  PetscCall(PetscFree(s->names));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* NaN: how a table marks that there is no estimate. */
 static PetscReal Known(PetscReal estimate)
 {
@@ -615,7 +606,9 @@ static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, H
   begin = HycoNow() - begin;
   if (output[0]) HycoOnRoot(PETSC_COMM_WORLD, HycoROMWriteMany(model, n, n_par, mu, output));
   PetscCall(ReportSet("predict", table, scene, samples, s.names, &rows, begin));
-  PetscCall(DestroyShape(&s));
+  PetscCall(PetscFree(s.carried.name));
+  PetscCall(PetscFree(s.gradients.name));
+  PetscCall(PetscFree(s.names));
   PetscCall(DriverRowsFree(&rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

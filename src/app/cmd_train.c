@@ -96,16 +96,6 @@ static PetscErrorCode Report(HycoScene scene, HycoReducer reducer, const HycoTra
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Targets choose settings for a given set of points; -greedy has its own target for choosing points. */
-static PetscErrorCode CheckKind(PetscBool greedy, const Search *search)
-{
-  PetscFunctionBegin;
-  HycoCheck(
-      !greedy || !search->on,
-      "-target_u and similar options choose the settings for a given set of points; for train -greedy use -target");
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Refuses an option of the command line that this training does not read, according to the reducer's declarations.
    By the reducer's own declarations (HycoOption.only): an option of a type that is not tried would silently do
    nothing. */
@@ -224,7 +214,10 @@ PetscErrorCode CommandTrain(void)
   PetscCall(ReadGreedy(&greedy));
   PetscCall(DriverReadTargets(&search));
   PetscCall(DriverGetValidation(scene, &validation));
-  PetscCall(CheckKind(greedy, &search));
+  /* Targets choose settings for a given set of points; -greedy has its own target for choosing points. */
+  HycoCheck(
+      !greedy || !search.on,
+      "-target_u and similar options choose the settings for a given set of points; for train -greedy use -target");
   if (!greedy) PetscCall(DriverReadFiles(NULL, NULL, NULL, NULL, search.table));
   PetscCall(HycoReducerCreate(PETSC_COMM_WORLD, scene, &reducer));
   PetscCall(HycoReducerSetFromOptions(reducer));

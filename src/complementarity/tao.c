@@ -459,8 +459,7 @@ static PetscErrorCode SetForceBounds(HycoTao t, Vec z)
 
   PetscFunctionBegin;
   if (t->tao->XL && !blocks && t->n_free == t->lcp->p) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecDuplicate(z, &lo));
-  PetscCall(VecDuplicate(z, &hi));
+  HycoVecDuplicate(z, &lo, &hi);
   PetscCall(VecSet(hi, PETSC_INFINITY));
   PetscCall(VecGetArrayWrite(lo, &l));
   for (PetscInt i = 0; i < t->lcp->p + t->lcp->n; i++) l[i] = i < t->lcp->p ? PETSC_NINFINITY : 0;
@@ -546,8 +545,7 @@ static PetscErrorCode CopyDense(HycoTao t, const HycoLCP *lcp)
     PetscCall(ResetDense(t));
     PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, lcp->n, lcp->n, NULL, &t->dense));
     PetscCall(MatCreateVecs(t->dense, &t->y, &t->f));
-    PetscCall(VecDuplicate(t->y, &t->lo));
-    PetscCall(VecDuplicate(t->y, &t->hi));
+    HycoVecDuplicate(t->y, &t->lo, &t->hi);
   }
   PetscCall(MatDenseGetArray(t->dense, &h));
   PetscCall(PetscArraycpy(h, lcp->M, (size_t)lcp->n * (size_t)lcp->n));

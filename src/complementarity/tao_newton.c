@@ -412,9 +412,7 @@ PetscErrorCode HycoTaoNewton(Tao tao, PetscBool lemke)
 
   PetscFunctionBegin;
   PetscCall(Read(tao, lemke, &m));
-  PetscCall(VecDuplicate(m.x, &m.d));
-  PetscCall(VecDuplicate(m.x, &m.w));
-  PetscCall(VecDuplicate(m.x, &m.p));
+  HycoVecDuplicate(m.x, &m.d, &m.w, &m.p);
   PetscCall(VecMedian(m.lo, m.x, m.hi, m.x));
   PetscCall(PetscObjectStateIncrease((PetscObject)m.x)); /* VecMedian() does not on ranks without rows, whose cached
                                                             norm would then remain, and only there */

@@ -153,13 +153,6 @@ static PetscErrorCode SharedCreate(HycoScene s, HycoMesh m, Shared *shared)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode SharedDestroy(Shared *shared)
-{
-  PetscFunctionBegin;
-  HycoFreeAll(&shared->group, &shared->held);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* A group's nodes are ascending. The only possible error of the search is a wrong argument, hence the abort in a
    function without an error code. */
 static PetscBool IsIn(HycoMesh m, PetscInt group, PetscInt node)
@@ -265,7 +258,7 @@ static PetscErrorCode FindAllMeans(HycoScene s, HycoMesh m, Found *found)
   for (PetscInt k = 0; k < s->n_ties; k++) {
     if (s->tie[k].mortar) PetscCall(FindMeans(fe, k, &shared, found));
   }
-  PetscCall(SharedDestroy(&shared));
+  HycoFreeAll(&shared.group, &shared.held);
   PetscCall(HycoFEDestroy(&fe));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -228,9 +228,7 @@ static PetscErrorCode ReadYAML(PetscOptions options, const char file[])
   HycoCheck(IsText(file), "%s is not valid YAML for hyco: it contains a zero byte, or cannot be read", file);
   PetscCall(ReadText(file, &text));
   HycoOnError(text ? HycoEntriesCheck(text, file) : PETSC_SUCCESS, PetscCall(PetscFree(text)));
-  PetscCall(HycoCatchBegin());
-  caught = Insert(options, file, text);
-  PetscCall(HycoCatchEnd(caught, message));
+  HycoCatch(Insert(options, file, text), caught, message);
   PetscCall(PetscFree(text));
   HycoCheck(!caught || !strstr(message, "max number of options"),
             "%s has more than 512 entries, the limit of this PETSc (%d.%d); combine entries into one expression, or "

@@ -305,9 +305,7 @@ static PetscErrorCode Try(HycoFOM f, const HycoSurfaceFacts facts[], PetscBool *
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(HycoCatchBegin());
-  ierr = HycoPairsFind(f->scene, f->surface->dm, facts, &f->pairs);
-  PetscCall(HycoCatchEnd(ierr, message));
+  HycoCatch(HycoPairsFind(f->scene, f->surface->dm, facts, &f->pairs), ierr, message);
   *found = (PetscBool)!ierr;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -356,9 +356,7 @@ static PetscErrorCode AllRows(HycoFOM f, Rows *r)
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(HycoCatchBegin());
-  ierr = ComputeRows(f->fe_surface, &f->pairs, f->width, r, f->gap, &f->summary.n_still);
-  PetscCall(HycoCatchEnd(ierr, message));
+  HycoCatch(ComputeRows(f->fe_surface, &f->pairs, f->width, r, f->gap, &f->summary.n_still), ierr, message);
   failed = (PetscBool)(message[0] != '\0');
   HycoAllreduce(&failed, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(f));
   if (failed) PetscCall(RaiseWhole(f));

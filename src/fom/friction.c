@@ -101,9 +101,7 @@ PetscErrorCode HycoFrictionCreate(HycoFOM f)
   PetscCall(VecCreate(HycoComm(f), &r->L));
   PetscCall(VecSetSizes(r->L, r->rows, PETSC_DETERMINE));
   PetscCall(VecSetType(r->L, VECSTANDARD));
-  PetscCall(VecDuplicate(r->L, &r->D));
-  PetscCall(VecDuplicate(r->L, &r->L_old));
-  PetscCall(VecDuplicate(r->L, &r->work));
+  HycoVecDuplicate(r->L, &r->D, &r->L_old, &r->work);
   for (PetscInt j = 0; j < N_PER_ROW; j++) PetscCall(VecDuplicate(r->L, &r->other[j]));
   PetscCall(HycoSystemCreate(HycoComm(f), &r->system));
   PetscCall(HycoSolverCreate(HycoComm(f), &r->solver));
@@ -195,15 +193,6 @@ static PetscErrorCode FillB(HycoFOM f, HycoFriction r, const Rows *rows)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a coefficient is above 0 on some rank. */
-static PetscErrorCode Rubs(HycoFOM f, PetscBool *rubs)
-{
-  PetscFunctionBegin;
-  *rubs = HycoSlipRubs(&f->friction->slip);
-  HycoAllreduce(rubs, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(f));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The order matters: rows need the coefficients, Use() needs the matrices of the system to which it may change. */
 static PetscErrorCode Assemble(HycoFOM f, HycoFriction r, Rows *rows)
 {
@@ -217,7 +206,9 @@ static PetscErrorCode Assemble(HycoFOM f, HycoFriction r, Rows *rows)
   PetscCall(HycoSystemSetMatrices(r->system, f->K, r->Bt, r->B, PETSC_TRUE));
   PetscCall(HycoSystemSetVectors(r->system, f->F, r->D));
   PetscCall(HycoSystemSetBlocks(r->system, 2, r->slip.cone, f->pairs.n, r->slip.of, r->slip.data));
-  PetscCall(Rubs(f, &rubs));
+  /* Whether a coefficient is above 0 on some rank. */
+  rubs = HycoSlipRubs(&f->friction->slip);
+  HycoAllreduce(&rubs, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(f));
   PetscCall(Use(f, rubs));
   f->pairs.shear = &r->slip.shear;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -233,14 +233,12 @@ static PetscErrorCode Create(Work *o)
   PetscCall(PetscCalloc1(6 * f->scene->n_quantities + 1, &o->output));
   PetscCall(VecDuplicate(f->U, &o->U));
   PetscCall(VecCopy(f->U, o->U));
-  PetscCall(VecDuplicate(f->U, &o->r));
-  PetscCall(VecDuplicate(f->U, &o->dU));
+  HycoVecDuplicate(f->U, &o->r, &o->dU);
   for (PetscInt j = 0; j < 3; j++) PetscCall(VecDuplicate(f->U, &o->R[j]));
   if (f->n_contacts) {
     PetscCall(VecDuplicate(f->Lambda, &o->L));
     PetscCall(VecCopy(f->Lambda, o->L));
-    PetscCall(VecDuplicate(f->Lambda, &o->g));
-    PetscCall(VecDuplicate(f->Lambda, &o->dL));
+    HycoVecDuplicate(f->Lambda, &o->g, &o->dL);
     for (PetscInt j = 0; j < 5; j++) PetscCall(VecDuplicate(f->Lambda, &o->W[j]));
     PetscCall(VecNorm(f->D, NORM_INFINITY, &d));
     PetscCall(MatMult(f->B, f->U, o->g));

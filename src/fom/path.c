@@ -385,8 +385,7 @@ PetscErrorCode HycoFOMPathCreate(HycoFOM f)
   p->D = f->D;
   p->n_contacts = f->n_contacts;
   PetscCall(HycoPathSetUp(p));
-  PetscCall(VecDuplicate(f->U, &p->F_old));
-  PetscCall(VecDuplicate(f->U, &p->f_old));
+  HycoVecDuplicate(f->U, &p->F_old, &p->f_old);
   if (f->n_contacts && HycoSceneHasFriction(f->scene)) PetscCall(HycoFrictionCreate(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -68,9 +68,7 @@ static PetscErrorCode Assemble(HycoFOM f, HycoInspection *in, const PetscReal v[
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(HycoCatchBegin());
-  ierr = HycoFOMAssemble(f, v);
-  PetscCall(HycoCatchEnd(ierr, message));
+  HycoCatch(HycoFOMAssemble(f, v), ierr, message);
   PetscCall(NamePoint(f->scene, v, place));
   HycoCheck(!ierr, "%s%s", place, message);
   HycoOnRoot(HycoComm(f), Measure(f, in, v, first));

@@ -75,9 +75,7 @@ static PetscErrorCode ReadLevels(HycoConstrained c, Mat K)
     PetscCall(MatCreateVecs(v->K, &v->inverse, &v->z));
     PetscCall(MatGetDiagonal(v->K, v->inverse));
     PetscCall(VecReciprocal(v->inverse));
-    PetscCall(VecDuplicate(v->z, &v->r));
-    PetscCall(VecDuplicate(v->z, &v->d));
-    PetscCall(VecDuplicate(v->z, &v->w));
+    HycoVecDuplicate(v->z, &v->r, &v->d, &v->w);
     /* The coarsest level is solved, not smoothed. */
     if (l + 1 < c->n) PetscCall(LargestEigenvalue(v->K, &v->largest));
     if (l + 1 < c->n) PetscCall(HycoUpperBlocks(v->K, &v->product));

@@ -312,8 +312,7 @@ static PetscErrorCode PrepareG(HycoLevel *v, PetscReal shift, PetscBool *singula
   PetscCall(MatDiagonalScale(v->DBt, v->inverse, NULL));
   PetscCall(MatMatMult(v->B, v->DBt, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &G));
   PetscCall(MatCreateVecs(v->B, NULL, &v->mu));
-  PetscCall(VecDuplicate(v->mu, &v->mu_work));
-  PetscCall(VecDuplicate(v->mu, &diagonal));
+  HycoVecDuplicate(v->mu, &v->mu_work, &diagonal);
   PetscCall(MatGetDiagonal(G, diagonal));
   PetscCall(MatGetInfo(G, MAT_GLOBAL_SUM, &info));
   PetscCall(VecMin(diagonal, NULL, &least));

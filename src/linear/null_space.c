@@ -129,8 +129,7 @@ PetscErrorCode HycoKernelWork(Mat K, Vec x, Vec F, Vec b, PetscReal *share)
   PetscCall(MatGetNullSpace(K, &kernel));
   if (kernel) PetscCall(MatNullSpaceGetVecs(kernel, NULL, &n, &z));
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecDuplicate(F, &work));
-  PetscCall(VecDuplicate(F, &Kx));
+  HycoVecDuplicate(F, &work, &Kx);
   PetscCall(MatGetDiagonal(K, Kx));
   PetscCall(VecPointwiseMult(Kx, Kx, x));
   PetscCall(VecNorm(F, NORM_2, &norm[0]));

@@ -364,8 +364,7 @@ PetscErrorCode HycoMeshNodeCells(HycoMesh m, PetscInt **start, PetscInt **cell)
   }
   for (PetscInt i = 0; i < m->n_nodes; i++) (*start)[i + 1] += (*start)[i];
   PetscCall(PetscMalloc1((*start)[m->n_nodes], cell));
-  PetscCall(PetscMalloc1(m->n_nodes, &next));
-  PetscCall(PetscArraycpy(next, *start, m->n_nodes));
+  HycoDuplicate(m->n_nodes, *start, &next);
   for (PetscInt e = 0; e < m->n_cells; e++) {
     const PetscInt n = HycoMeshCellNodes(m, e, node);
 

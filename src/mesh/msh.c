@@ -559,10 +559,7 @@ static PetscErrorCode ReadList(Msh *m, PetscBool groups, int dim, long long enti
               m->path);
     if (!groups) continue;
     PetscCall(FindGroup(m->mesh, dim, member.group, &at));
-    if (m->n_members == m->room) {
-      m->room = 2 * m->room + 16;
-      PetscCall(PetscRealloc(m->room * sizeof(*m->member), &m->member));
-    }
+    HycoGrow(m->n_members, m->room, m->member);
     m->member[m->n_members++] = member;
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -96,12 +96,9 @@ static PetscErrorCode SetUp(HycoIndicator d)
 
   PetscFunctionBegin;
   PetscCall(ISGetLocalSize(d->local.is_A, &n_A));
-  PetscCall(VecDuplicate(d->local.F, &d->interface));
-  PetscCall(VecDuplicate(d->local.F, &d->whole));
+  HycoVecDuplicate(d->local.F, &d->interface, &d->whole);
   PetscCall(VecCreateSeq(PETSC_COMM_SELF, n_A, &d->x));
-  PetscCall(VecDuplicate(d->x, &d->F_A));
-  PetscCall(VecDuplicate(d->x, &d->work));
-  PetscCall(VecDuplicate(d->x, &d->solution));
+  HycoVecDuplicate(d->x, &d->F_A, &d->work, &d->solution);
   if (m->m) {
     PetscCall(VecCreateSeq(PETSC_COMM_SELF, m->m, &d->L));
     PetscCall(VecDuplicate(d->L, &d->D));

@@ -206,8 +206,7 @@ static PetscErrorCode Minimise(Fit *f, const char type[], Vec X)
   Mat J;
 
   PetscFunctionBegin;
-  PetscCall(VecDuplicate(X, &lo));
-  PetscCall(VecDuplicate(X, &hi));
+  HycoVecDuplicate(X, &lo, &hi);
   PetscCall(VecSet(hi, 1));
   PetscCall(VecCreateSeq(PETSC_COMM_SELF, f->n, &r));
   PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, f->n, f->n_par, NULL, &J));

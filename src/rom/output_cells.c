@@ -398,7 +398,7 @@ static PetscErrorCode MakeFew(HycoROM m, HycoOutputCells all, PetscInt n, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Exchange(HycoROM m)
+PetscErrorCode HycoROMUnfocusOutputs(HycoROM m)
 {
   const HycoOutputCells all = m->output_cells;
   HycoResultants resultants = all->resultants;
@@ -430,14 +430,7 @@ PetscErrorCode HycoROMFocusOutputs(HycoROM m, const PetscReal value[], PetscBool
   if (ierr) PetscCall(HycoOutputCellsDestroy(&m->few));
   PetscCall(PetscFree3(needed, stressed, keep));
   PetscCall(ierr);
-  if (*focused) PetscCall(Exchange(m));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoROMUnfocusOutputs(HycoROM m)
-{
-  PetscFunctionBegin;
-  PetscCall(Exchange(m));
+  if (*focused) PetscCall(HycoROMUnfocusOutputs(m)); /* an exchange, its own inverse */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

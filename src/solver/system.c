@@ -24,8 +24,7 @@ PetscErrorCode HycoSystemWork(HycoSystem s)
 {
   PetscFunctionBegin;
   if (!s->work_x[0]) {
-    PetscCall(VecDuplicate(s->F, &s->work_x[0]));
-    PetscCall(VecDuplicate(s->F, &s->work_x[1]));
+    HycoVecDuplicate(s->F, &s->work_x[0], &s->work_x[1]);
   }
   if (s->m && !s->work_L) PetscCall(VecDuplicate(s->D, &s->work_L));
   PetscFunctionReturn(PETSC_SUCCESS);

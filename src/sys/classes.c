@@ -89,6 +89,13 @@ PetscErrorCode HycoDestroyAll_Private(void *const addresses[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoVecDuplicate_Private(Vec v, Vec *const copies[])
+{
+  PetscFunctionBegin;
+  for (; *copies; copies++) PetscCall(VecDuplicate(v, *copies));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 const char *HycoVersion(void)
 {
   return HYCO_VERSION;

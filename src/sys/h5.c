@@ -290,9 +290,7 @@ PetscErrorCode HycoH5IsPrecious(const char path[], PetscBool *precious)
 
   PetscFunctionBegin;
   *precious = PETSC_FALSE;
-  PetscCall(HycoCatchBegin());
-  caught = HycoH5Open(path, &h);
-  PetscCall(HycoCatchEnd(caught, message));
+  HycoCatch(HycoH5Open(path, &h), caught, message);
   if (caught) PetscFunctionReturn(PETSC_SUCCESS);
   *precious = (PetscBool)(HycoH5Has(h, "kind") || HycoH5Has(h, "fingerprint"));
   PetscCall(HycoH5Close(&h, PETSC_FALSE));
@@ -306,9 +304,7 @@ PetscErrorCode HycoH5OpenOr(const char path[], const char remedy[], HycoH5 *file
   char message[HYCO_LINE];
 
   PetscFunctionBegin;
-  PetscCall(HycoCatchBegin());
-  caught = HycoH5Open(path, file);
-  PetscCall(HycoCatchEnd(caught, message));
+  HycoCatch(HycoH5Open(path, file), caught, message);
   HycoCheck(!message[0], "%s%s%s", message, strstr(message, "damaged") ? "; " : "",
             strstr(message, "damaged") ? remedy : "");
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -231,10 +231,7 @@ static PetscErrorCode Append(HycoOptionList *list, HycoOption *option)
     PetscCall(PetscFree(option->name));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (list->n == list->room) {
-    list->room = 2 * list->room + 32;
-    PetscCall(PetscRealloc((size_t)list->room * sizeof(*list->option), &list->option));
-  }
+  HycoGrow(list->n, list->room, list->option);
   list->option[list->n++] = *option;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -73,19 +73,10 @@ static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* At moved nodes. A slave without facing facets has no masters, and no error: it may come back. */
-static PetscErrorCode Find(HycoContact c, HycoFE fe, PetscInt index, PetscReal reach, PetscInt n,
-                           const PetscInt slave[], HycoPairs *found)
-{
-  PetscFunctionBegin;
-  PetscCall(HycoMortarRows(c, fe, index, reach, n, slave, found));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* integrated: gaps are sums over many nodes, so that touching surfaces need a threshold for zero. */
+/* At moved nodes a slave without facing facets has no masters, and no error: it may come back. integrated: gaps are sums over many nodes, so that touching surfaces need a threshold for zero. */
 PetscErrorCode HycoContactCreate_Mortar(HycoContact contact)
 {
-  static const struct _HycoContactOps ops = {.setup = SetUp, .find = Find};
+  static const struct _HycoContactOps ops = {.setup = SetUp, .find = HycoMortarRows};
 
   PetscFunctionBegin;
   PetscCall(HycoMasterSearchDeclare(contact));

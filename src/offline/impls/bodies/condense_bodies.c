@@ -419,7 +419,7 @@ static PetscErrorCode MakeModes(HycoReducer t, HycoSnapshots store)
 
   PetscFunctionBegin;
   PetscCall(HycoBodiesDestroy(&HycoTrainingOfBodies(t)->bodies));
-  PetscCall(HycoBodiesCreate(&b));
+  PetscCall(PetscNew(&b));
   HycoTrainingOfBodies(t)->bodies = b;
   HycoTrainingOfBodies(t)->n_factors = 0;
   b->dim = t->sizes[3];

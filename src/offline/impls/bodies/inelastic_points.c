@@ -26,17 +26,6 @@ PetscInt HycoPointRows(HycoReducer t)
   return HycoElementGet(t->fom->part->type)->nq * t->fom->fe->n_sigma;
 }
 
-/* -- samples -- */
-
-static PetscErrorCode DestroySampler(Sampler *s)
-{
-  PetscFunctionBegin;
-  PetscCall(HycoTrainingReplayDestroy(&s->replay));
-  HycoFreeAll(&s->value, &s->scale);
-  HycoDestroyAll(&s->S, &s->U);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The displacements of column k of the snapshots. Collective. The columns are in the file's order, the part's
    nodes with ghosts: rows travel between ranks. */
 static PetscErrorCode Displacement(void *ctx, PetscInt k, PetscReal u[])
@@ -144,7 +133,9 @@ PetscErrorCode HycoPointsSample(HycoReducer t, HycoSnapshots store, PetscReal to
   PetscCall(MatGetLocalSize(s.S, &n_rows, NULL));
   /* The sampler's matrices go before the join, which needs as much memory again. */
   ierr = FollowAll(&s, store, tol, &modes);
-  PetscCall(DestroySampler(&s));
+  PetscCall(HycoTrainingReplayDestroy(&s.replay));
+  HycoFreeAll(&s.value, &s.scale);
+  HycoDestroyAll(&s.S, &s.U);
   if (!ierr) ierr = HycoPathModesJoin(t, &modes, N, n_rows, tol, 0, basis);
   PetscCall(HycoPathModesDestroy(&modes));
   PetscCall(ierr);

@@ -254,8 +254,7 @@ static PetscErrorCode FindPoints(HycoSubstructures b, const HycoBodiesFactor *fa
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc4(r * r + 1, &D, r * r + 1, &P, r + 1, &c, r + 1, &at));
-  PetscCall(VecDuplicate(factor->fom->F, &rest));
-  PetscCall(VecDuplicate(factor->fom->F, &size));
+  HycoVecDuplicate(factor->fom->F, &rest, &size);
   for (PetscInt k = 0; k < r; k++) {
     if (k) PetscCall(Invert(k, r, D, P));
     for (PetscInt i = 0; i < k; i++) PetscCall(ValueAt(factor->basis[k], point[i], &at[i]));

@@ -266,7 +266,7 @@ PetscErrorCode HycoROMCreate_Bodies(HycoROM m)
   HycoSubstructures b;
 
   PetscFunctionBegin;
-  PetscCall(HycoBodiesCreate(&b));
+  PetscCall(PetscNew(&b));
   PetscCall(HycoROMSetOps(m, &ops, &traits, b));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

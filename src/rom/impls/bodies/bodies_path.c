@@ -48,15 +48,6 @@ static PetscErrorCode Settle(HycoROM m, PetscReal t0, PetscReal t1, const PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* alpha and the forces of the last accepted time. */
-static PetscErrorCode Retry(HycoPath p, PetscReal alpha[], PetscReal Lambda[])
-{
-  PetscFunctionBegin;
-  PetscCall(HycoVecRead(p->U_old, p->n_free, alpha));
-  PetscCall(HycoVecRead(p->L_old, p->n_contacts, Lambda));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* A step with friction: elastic bodies. */
 static PetscErrorCode Rub(HycoROM m, HycoPath p, HycoStepAttempt *a)
 {
@@ -95,7 +86,9 @@ static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAt
   w->always = (PetscBool)(p->method == HYCO_NEWTON_TANGENT);
   PetscCall(HycoBodiesSearch(m, t0, t1, alpha, L, a));
   if (a->why[0] && !w->always) { /* again from the begin of the step */
-    PetscCall(Retry(p, alpha, L));
+    /* alpha and the forces of the last accepted time. */
+    PetscCall(HycoVecRead(p->U_old, p->n_free, alpha));
+    PetscCall(HycoVecRead(p->L_old, p->n_contacts, L));
     a->why[0] = '\0';
     a->iterations = 0;
     w->always = PETSC_TRUE;

@@ -12,16 +12,8 @@
 #define DEEP    0.5   /* share of the deepest penetration without forces */
 #define CLOSED  1e-13 /* share of the largest gap: smaller penetrations are round-off */
 #define NEAREST 0.1   /* share of the differences of depth, where all contacts are closed without forces */
-#define FLAT    1e-9  /* share of the depth: smaller differences are round-off */
-
-PetscErrorCode HycoBodiesCreate(HycoSubstructures *bodies)
-{
-  PetscFunctionBegin;
-  PetscCall(PetscNew(bodies));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* `weight` and `blend` hold one array per body, and `bodies` has their number; the zeros afterwards make a second
+#define FLAT                                                                                                           \
+  1e-9 /* `weight` and `blend` hold one array per body, and `bodies` has their number; the zeros afterwards make a second
    call, and HycoBodiesSetUp() on the same work, safe. */
 PetscErrorCode HycoBodiesReset(HycoBodiesWork o)
 {
@@ -849,7 +841,6 @@ PetscErrorCode HycoBodiesContact(HycoBodiesWork o, const HycoBodiesSurface *s, P
   PetscCall(PetscArrayzero(Lambda, s->n));
   PetscCall(PetscMalloc2(s->n + 1, &in, s->n + 1, &p.contact));
   PetscCall(SolveRounds(o, s, &p, in, Lambda, solved));
-  o->n_problem = p.n;
   PetscCall(PetscFree2(in, p.contact));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

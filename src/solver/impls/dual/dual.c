@@ -225,8 +225,7 @@ static PetscErrorCode Shift(HycoSolver s, const PetscReal dL[], Vec x, Vec L)
 
   PetscFunctionBegin;
   PetscCall(VecDuplicate(L, &change));
-  PetscCall(VecDuplicate(x, &force));
-  PetscCall(VecDuplicate(x, &move));
+  HycoVecDuplicate(x, &force, &move);
   PetscCall(VecGetOwnershipRange(L, &lo, &hi));
   PetscCall(HycoVecWrite(change, hi - lo, dL + lo));
   PetscCall(MatMult(s->system->Bt, change, force));

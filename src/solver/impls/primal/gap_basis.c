@@ -354,8 +354,7 @@ static PetscErrorCode SolveRefined(Mat Kw, KSP ksp, Vec rhs, Vec y)
   PetscCall(KSPSolve(ksp, rhs, y));
   PetscCall(KSPGetInitialGuessNonzero(ksp, &iterative)); /* an iterative solver has its own accuracy */
   if (iterative) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecDuplicate(y, &r));
-  PetscCall(VecDuplicate(y, &dy));
+  HycoVecDuplicate(y, &r, &dy);
   PetscCall(MatMult(Kw, y, r));
   PetscCall(VecAYPX(r, -1, rhs));
   PetscCall(KSPSolve(ksp, r, dy));

@@ -319,9 +319,7 @@ static PetscErrorCode SolveLevel(Level *l, Vec y)
   PetscCall(MatDuplicate(l->K, MAT_COPY_VALUES, &p.work));
   PetscCall(HycoGapWork(p.work));
   PetscCall(HycoDirectSolver(PETSC_COMM_SELF, "hyco_primal_", p.work, PETSC_TRUE, &p.ksp));
-  PetscCall(VecDuplicate(y, &p.rhs));
-  PetscCall(VecDuplicate(y, &p.residual));
-  PetscCall(VecDuplicate(y, &p.diagonal));
+  HycoVecDuplicate(y, &p.rhs, &p.residual, &p.diagonal);
   PetscCall(MatGetDiagonal(l->K, p.diagonal));
   PetscCall(PetscMalloc2(l->n, &p.at, l->n, &p.at_bound));
   PetscCall(HycoActiveSetRun(&set, l->active, &its, &status));
@@ -465,8 +463,7 @@ PetscErrorCode HycoMultilevelStart(Mat K, Vec f, Vec bound, Vec set, PetscBool *
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   PetscCall(GatherMatrix(comm, K, &whole));
   PetscCall(VecScatterCreateToZero(f, &scatter, &f_root));
-  PetscCall(VecDuplicate(f_root, &bound_root));
-  PetscCall(VecDuplicate(f_root, &set_root));
+  HycoVecDuplicate(f_root, &bound_root, &set_root);
   PetscCall(HycoScatter(scatter, f, f_root));
   PetscCall(HycoScatter(scatter, bound, bound_root));
   *made = PETSC_FALSE;

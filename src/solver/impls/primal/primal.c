@@ -281,9 +281,7 @@ static PetscErrorCode PrimalCreate(HycoSolver s, const Gap *g, Vec x, Primal *p)
   PetscCall(VecRestoreArrayRead(y->D, &d));
   PetscCall(VecDuplicate(x, &p->y));
   PetscCall(VecSet(p->y, 0));
-  PetscCall(VecDuplicate(x, &p->f));
-  PetscCall(VecDuplicate(x, &p->rhs));
-  PetscCall(VecDuplicate(x, &p->residual));
+  HycoVecDuplicate(x, &p->f, &p->rhs, &p->residual);
   PetscCall(MatMultTranspose(g->T, y->F, p->f));
   PetscCall(ISCreateGeneral(PETSC_COMM_SELF, p->n, g->pivot, PETSC_COPY_VALUES, &is));
   PetscCall(VecCreateSeq(PETSC_COMM_SELF, p->n, &p->work));
@@ -291,15 +289,6 @@ static PetscErrorCode PrimalCreate(HycoSolver s, const Gap *g, Vec x, Primal *p)
   PetscCall(ISDestroy(&is));
   PetscCall(MatGetDiagonal(g->Kg, p->rhs));
   PetscCall(AtPivots(p->rhs, p->scatter, p->work, p->n, p->diagonal));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The form's matrices and its solver stay for the next solve. */
-static PetscErrorCode PrimalDestroy(Primal *p)
-{
-  PetscFunctionBegin;
-  PetscCall(PetscFree6(p->bound, p->value, p->force, p->diagonal, p->at_d, p->at));
-  HycoDestroyAll(&p->y, &p->hi, &p->f, &p->rhs, &p->residual, &p->work, &p->scatter);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -360,7 +349,9 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   PetscCall(HycoNameLinear(s, g->ksp));
   /* if not solved, the set has changed since: its last forces show in the residuals */
   PetscCall(Fill(&p, (PetscBool)(*solved || !own)));
-  PetscCall(PrimalDestroy(&p));
+  /* The form's matrices and its solver stay for the next solve. */
+  PetscCall(PetscFree6(p.bound, p.value, p.force, p.diagonal, p.at_d, p.at));
+  HycoDestroyAll(&p.y, &p.hi, &p.f, &p.rhs, &p.residual, &p.work, &p.scatter);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

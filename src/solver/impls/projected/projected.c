@@ -267,15 +267,6 @@ static PetscErrorCode RunCreate(HycoSolver s, Projected *f, Vec x, Run *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The multigrid and its constraints stay with the form. */
-static PetscErrorCode RunDestroy(Run *p)
-{
-  PetscFunctionBegin;
-  PetscCall(PetscFree5(p->bound, p->value, p->force, p->at, p->solved));
-  HycoDestroyAll(&p->d, &p->l, &p->r, &p->gap);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* For solves without a factor, by the active set method; an obstacle along a whole body is left to the primal form,
    which starts from coarser problems. */
 static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost, char why[HYCO_LINE])
@@ -367,7 +358,9 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   f->started = *solved = (PetscBool)(status == HYCO_LCP_SOLVED);
   PetscCall(NameSolves(s, f));
   PetscCall(FillForces(&p, *solved, p.solved, L)); /* if not solved, the set has changed since */
-  PetscCall(RunDestroy(&p));
+  /* The multigrid and its constraints stay with the form. */
+  PetscCall(PetscFree5(p.bound, p.value, p.force, p.at, p.solved));
+  HycoDestroyAll(&p.d, &p.l, &p.r, &p.gap);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -108,8 +108,7 @@ static PetscErrorCode EstimateDiagonal(Mat S, Shell *f)
 
   PetscFunctionBegin;
   PetscCall(LocalDiagonal(f->s->system, f->diagonal));
-  PetscCall(VecDuplicate(f->diagonal, &v));
-  PetscCall(VecDuplicate(f->diagonal, &Sv));
+  HycoVecDuplicate(f->diagonal, &v, &Sv);
   PetscCall(VecGetOwnershipRange(v, &lo, &hi));
   PetscCall(VecGetArray(v, &p));
   for (PetscInt i = lo; i < hi; i++) /* irregular signs, the same on any number of ranks */
@@ -141,9 +140,7 @@ static PetscErrorCode Forces(const Shell *p, Mat S, Vec x, Vec L, PetscBool *sol
   Vec f, lo, hi;
 
   PetscFunctionBegin;
-  PetscCall(VecDuplicate(L, &f));
-  PetscCall(VecDuplicate(L, &lo));
-  PetscCall(VecDuplicate(L, &hi));
+  HycoVecDuplicate(L, &f, &lo, &hi);
   PetscCall(HycoStiffnessSolve(s, y->F, x));
   PetscCall(MatMult(y->B, x, f));
   PetscCall(VecAXPY(f, -1, y->D));
@@ -198,8 +195,7 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   PetscCall(MatShellSetOperation(S, MATOP_MULT_TRANSPOSE, (void (*)(void))MultS)); /* S is symmetric */
   PetscCall(MatShellSetOperation(S, MATOP_GET_DIAGONAL, (void (*)(void))DiagonalS));
   PetscCall(MatSetOption(S, MAT_SYMMETRIC, PETSC_TRUE));
-  PetscCall(VecDuplicate(y->F, &f->force));
-  PetscCall(VecDuplicate(y->F, &f->motion));
+  HycoVecDuplicate(y->F, &f->force, &f->motion);
   PetscCall(VecDuplicate(y->D, &f->diagonal));
   PetscCall(EstimateDiagonal(S, f));
   PetscCall(Forces(f, S, x, L, solved));
