@@ -806,17 +806,6 @@ static PetscErrorCode Prepare(Export *e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Destroy(Export *e)
-{
-  PetscFunctionBegin;
-  PetscCall(FreeFit(&e->base));
-  PetscCall(FreeFit(&e->response));
-  if (e->z) PetscCall(PetscFree4(e->z, e->w, e->unit, e->contact));
-  HycoFreeAll(&e->group, &e->atom, &e->row, &e->area, &e->pressure);
-  PetscCall(HycoExportModelFree(&e->out));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Nothing is written before the comparison has passed. */
 static PetscErrorCode Build(Export *e)
 {
@@ -845,7 +834,11 @@ static PetscErrorCode ExportC(HycoROM m, const char path[], char **description)
   ierr = Build(&e);
   if (!ierr) ierr = HycoExportWrite(&e.out, e.s, m->model->path, path, description);
   HycoPointEnd(point);
-  PetscCall(Destroy(&e));
+  PetscCall(FreeFit(&e.base));
+  PetscCall(FreeFit(&e.response));
+  if (e.z) PetscCall(PetscFree4(e.z, e.w, e.unit, e.contact));
+  HycoFreeAll(&e.group, &e.atom, &e.row, &e.area, &e.pressure);
+  PetscCall(HycoExportModelFree(&e.out));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

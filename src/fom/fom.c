@@ -14,12 +14,8 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
   f = *fom;
   PetscCall(HycoFrictionDestroy(f));
   PetscCall(HycoPathFree(&f->path));
-  PetscCall(HycoSolverDestroy(&f->solver));
-  PetscCall(HycoSystemDestroy(&f->system));
-  PetscCall(HycoSolverDestroy(&f->given_solver));
-  PetscCall(HycoSystemDestroy(&f->given_system));
-  HycoDestroyAll(&f->given_F, &f->K, &f->B, &f->Bt, &f->U, &f->Lambda, &f->F, &f->D, &f->to_local, &f->to_surface,
-                 &f->U_local, &f->U_surface);
+  HycoDestroyAll(&f->solver, &f->system, &f->given_solver, &f->given_system, &f->given_F, &f->K, &f->B, &f->Bt, &f->U,
+                 &f->Lambda, &f->F, &f->D, &f->to_local, &f->to_surface, &f->U_local, &f->U_surface);
   if (f->fe_surface != f->fe) PetscCall(HycoFEDestroy(&f->fe_surface));
   PetscCall(HycoFEDestroy(&f->fe));
   if (f->surface != f->part) PetscCall(HycoMeshDestroy(&f->surface));

@@ -120,9 +120,7 @@ PetscErrorCode HycoFrictionDestroy(HycoFOM f)
   if (!r) PetscFunctionReturn(PETSC_SUCCESS);
   if (r->B) PetscCall(Use(f, PETSC_FALSE)); /* the path frees its own vectors, f Lambda */
   f->pairs.shear = NULL;
-  PetscCall(HycoSolverDestroy(&r->solver));
-  PetscCall(HycoSystemDestroy(&r->system));
-  HycoDestroyAll(&r->B, &r->Bt, &r->D, &r->L, &r->L_old, &r->work);
+  HycoDestroyAll(&r->solver, &r->system, &r->B, &r->Bt, &r->D, &r->L, &r->L_old, &r->work);
   for (PetscInt j = 0; j < N_PER_ROW; j++) PetscCall(VecDestroy(&r->other[j]));
   PetscCall(HycoSlipDestroy(&r->slip));
   HycoFreeAll(&r->u_old, &f->friction);

@@ -274,24 +274,17 @@ PetscErrorCode HycoSeriesRestore(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The list of fields last: it makes the separate file complete. */
-static PetscErrorCode AddFields(HycoSeries s)
-{
-  PetscFunctionBegin;
-  PetscCall(AddDisplacement(s));
-  PetscCall(AddState(s));
-  PetscCall(AddContacts(s));
-  if (s->part) HycoOnRoot(s->from.comm, WriteList(s));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* A time of a path of any model: full order or reduced. Collective. */
 PetscErrorCode HycoSeriesAddTime(HycoSeries s, const HycoSeriesSource *from)
 {
   PetscFunctionBegin;
   s->from = *from;
   PetscCall(HycoFieldFileBeginTime(s->file, from->t));
-  PetscCall(AddFields(s));
+  /* The list of fields last: it makes the separate file complete. */
+  PetscCall(AddDisplacement(s));
+  PetscCall(AddState(s));
+  PetscCall(AddContacts(s));
+  if (s->part) HycoOnRoot(s->from.comm, WriteList(s));
   PetscCall(HycoFieldFileEndTime(s->file));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

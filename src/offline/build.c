@@ -781,9 +781,7 @@ PetscErrorCode HycoReducerHoldOutFresh(HycoReducer t, HycoSnapshots store, HycoS
   PetscCall(HycoSamplesGet(others, n_fresh, NULL, NULL));
   PetscCall(HycoSamplesExcept(last, held, former));
   t->held = held;
-  PetscCall(HycoSamplesDestroy(&others));
-  PetscCall(HycoSamplesDestroy(&fresh));
-  PetscCall(HycoSamplesDestroy(&last));
+  HycoDestroyAll(&others, &fresh, &last);
   PetscCall(HycoReducerSolve(t, store, t->held));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

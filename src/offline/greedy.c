@@ -299,19 +299,6 @@ static PetscErrorCode Iterate(HycoReducer t, Loop *loop, PetscInt iteration, Hyc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Takes and checks the set to be searched. */
-static PetscErrorCode TakeTraining(HycoSamples training, Loop *loop)
-{
-  PetscFunctionBegin;
-  PetscCall(HycoSamplesGet(training, &loop->n_points, &loop->n_par, &loop->points));
-  HycoCheck(
-      loop->n_points > 1,
-      "the greedy training has %d candidate point, and at least two are needed; give -training_grid 20,24, for example",
-      (int)loop->n_points);
-  PetscCall(PetscMalloc1(4 * loop->n_points, &loop->value));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The loop needs settings that are accurate for any points; those of the model itself are searched at the end. For
    paths in 3D it begins with the cells at a plane of symmetry, like that search. Collective. */
 static PetscErrorCode SetSettings(HycoReducer t)
@@ -389,7 +376,13 @@ PetscErrorCode HycoReducerRunGreedy(HycoReducer t, HycoSamples start, HycoSample
             "grid or on points",
             t->prototype->model->traits.title);
   loop.begin = HycoNow();
-  PetscCall(TakeTraining(training, &loop));
+  /* Takes and checks the set to be searched. */
+  PetscCall(HycoSamplesGet(training, &loop.n_points, &loop.n_par, &loop.points));
+  HycoCheck(
+      loop.n_points > 1,
+      "the greedy training has %d candidate point, and at least two are needed; give -training_grid 20,24, for example",
+      (int)loop.n_points);
+  PetscCall(PetscMalloc1(4 * loop.n_points, &loop.value));
   PetscCall(Start(t, start, &loop.samples));
   PetscCall(CheckStart(t, (PetscBool)!start, loop.samples));
   PetscCall(HycoReducerOpen(t, loop.samples, path, &loop.store));

@@ -80,10 +80,8 @@ PetscErrorCode HycoIndicatorDestroy(HycoIndicator *indicator)
   d = *indicator;
   PetscCall(HycoInterpolantDestroy(&d->interpolant));
   PetscCall(PetscFree(d->weight));
-  PetscCall(HycoSolverDestroy(&d->solver));
-  PetscCall(HycoSystemDestroy(&d->system));
-  HycoDestroyAll(&d->K, &d->B, &d->Bt, &d->M, &d->M_A, &d->gap, &d->interface, &d->whole, &d->F_A, &d->D, &d->x, &d->L,
-                 &d->work, &d->solution, &d->norm);
+  HycoDestroyAll(&d->solver, &d->system, &d->K, &d->B, &d->Bt, &d->M, &d->M_A, &d->gap, &d->interface, &d->whole,
+                 &d->F_A, &d->D, &d->x, &d->L, &d->work, &d->solution, &d->norm);
   PetscCall(PetscFree(*indicator));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

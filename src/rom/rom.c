@@ -123,8 +123,7 @@ static PetscErrorCode DestroyModel(HycoROM rom)
   PetscCall(HycoMeshDestroy(&m->whole));
   PetscCall(HycoPairsDestroy(&m->pairs));
   PetscCall(HycoMeshDestroy(&m->mesh));
-  PetscCall(HycoSceneDestroy(&m->scene));
-  HycoDestroyAll(&m->rid, &m->inside);
+  HycoDestroyAll(&m->scene, &m->rid, &m->inside);
   HycoFreeAll(&m->master_reach, &m->in_rid, &m->closed, &m->V, &m->V_whole, &m->sigma, &m->fe_dof, &m->points,
               &m->reach, &m->provenance, &m->search, &rom->model);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -229,16 +229,6 @@ static void MarkBare(HycoBodiesFactor *factor, const PetscBool in[])
   }
 }
 
-/* Whether an unknown is left to the modes. Collective. */
-static PetscErrorCode AnyLeft(HycoReducer t, HycoFE fe, const PetscBool bare[], const PetscBool inner[], PetscBool *any)
-{
-  PetscFunctionBegin;
-  *any = PETSC_FALSE;
-  for (PetscInt i = 0; i < fe->n_dof; i++) *any = (PetscBool)(*any || !(fe->fixed[i] || bare[i] || inner[i]));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, any, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(t)));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Leaves a node to the modes, of which a model has one at least: that which moves most. It is exact too, because its
    modes are all of its displacements. *released: there is one. Collective. */
 static PetscErrorCode Release(HycoReducer t, HycoBodiesFactor *factor, PetscBool inner[], PetscBool *released)
@@ -278,7 +268,10 @@ PetscErrorCode HycoBodiesChooseCells(HycoReducer t, HycoBodiesFactor *factor)
   PetscCall(ShareCells(t, factor->fom->part, in));
   PetscCall(MarkInner(t, factor, in, inner, &fits));
   MarkBare(factor, in);
-  PetscCall(AnyLeft(t, fe, factor->bare, inner, &left));
+  /* Whether an unknown is left to the modes. Collective. */
+  left = PETSC_FALSE;
+  for (PetscInt i = 0; i < fe->n_dof; i++) left = (PetscBool)(left || !(fe->fixed[i] || factor->bare[i] || inner[i]));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &left, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(t)));
   if (!fits) PetscCall(PetscArrayzero(inner, fe->n_dof)); /* of the cell that stands for none */
   if (fits && !left) PetscCall(Release(t, factor, inner, &released));
   if (!released) PetscCall(PetscArrayzero(factor->known, fe->n_dof));

@@ -522,16 +522,6 @@ static PetscErrorCode TakeWeighted(HycoReducer t, const PetscReal w[], PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Which cells of the part are elastic. For HycoCubatureFind(), whose `near` cells are in no equation and get the
-   weight 0 here. */
-static PetscErrorCode MarkElastic(HycoReducer t, PetscBool **elastic)
-{
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1(t->fom->part->n_cells + 1, elastic));
-  for (PetscInt e = 0; e < t->fom->part->n_cells; e++) (*elastic)[e] = (PetscBool)!HycoInelasticFlows(t->fom->fe, e);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Galerkin's method on the modes' displacements A, orthonormal in energy, with a cubature: alpha = sum over points of
    weight w (B A)^T s. Collective. */
 static PetscErrorCode Cubature(HycoReducer t, HycoBodiesFactor *factor, PetscReal **weight)
@@ -550,7 +540,10 @@ static PetscErrorCode Cubature(HycoReducer t, HycoBodiesFactor *factor, PetscRea
   PetscCall(PetscCalloc1(in->m * n_k + 1, &sigma));
   PetscCall(HycoReducerPOD(t, S, s->cubature_tol * s->cubature_tol, 0, &W, &n, sigma));
   PetscCall(MatDestroy(&S));
-  PetscCall(MarkElastic(t, &elastic));
+  /* Which cells of the part are elastic. For HycoCubatureFind(), whose `near` cells are in no equation and get the
+     weight 0 here. */
+  PetscCall(PetscMalloc1(t->fom->part->n_cells + 1, &elastic));
+  for (PetscInt e = 0; e < t->fom->part->n_cells; e++) elastic[e] = (PetscBool)!HycoInelasticFlows(t->fom->fe, e);
   PetscCall(PetscCalloc1(t->rank ? 1 : t->sizes[1], &w));
   PetscCall(HycoCubatureFind(t, elastic, 0, s->cubature_tol, W, n, sigma, w, error));
   PetscCall(MatDestroy(&W));

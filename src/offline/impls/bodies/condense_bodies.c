@@ -222,18 +222,6 @@ static PetscErrorCode ListReached(HycoReducer t, const PetscInt of[], HycoSubstr
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same on every rank, after the broadcast. */
-static PetscErrorCode CheckSizes(const HycoBodyParts *parts, HycoSubstructures b)
-{
-  PetscFunctionBegin;
-  for (PetscInt k = 0; k < b->n; k++)
-    HycoCheckModel(b->start[k + 1] - b->start[k] <= MOST_UNKNOWNS,
-                   "body %s has %d unknowns on the surfaces that may touch; a model of bodies stores the square of "
-                   "their number, and is limited to %d: train a hybrid model",
-                   parts->name[k], (int)(b->start[k + 1] - b->start[k]), MOST_UNKNOWNS);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The unknowns on every rank, and N, whose rows select them. Collective. */
 static PetscErrorCode Select(HycoReducer t, HycoSubstructures b, Mat *N)
 {
@@ -254,7 +242,12 @@ static PetscErrorCode Select(HycoReducer t, HycoSubstructures b, Mat *N)
   if (f->rank) PetscCall(PetscFree(b->dof));
   if (f->rank) PetscCall(PetscMalloc1(b->ns + 1, &b->dof));
   HycoBcast(b->dof, b->ns, MPIU_INT, HycoComm(f));
-  PetscCall(CheckSizes(parts, b));
+  /* The same on every rank, after the broadcast. */
+  for (PetscInt k = 0; k < b->n; k++)
+    HycoCheckModel(b->start[k + 1] - b->start[k] <= MOST_UNKNOWNS,
+                   "body %s has %d unknowns on the surfaces that may touch; a model of bodies stores the square of "
+                   "their number, and is limited to %d: train a hybrid model",
+                   parts->name[k], (int)(b->start[k + 1] - b->start[k]), MOST_UNKNOWNS);
   /* Columns as K's rows; one entry in each row, set by rank 0, which has the list. */
   PetscCall(MatCreateAIJ(HycoComm(f), PETSC_DECIDE, f->part->n_owned * b->dim, b->ns, f->n_nodes * b->dim, 1, NULL, 1,
                          NULL, N));

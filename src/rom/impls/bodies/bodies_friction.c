@@ -72,9 +72,7 @@ PetscErrorCode HycoBodiesFrictionDestroy(HycoBodiesFriction *friction)
 
   PetscFunctionBegin;
   if (!f) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoSolverDestroy(&f->solver));
-  PetscCall(HycoSystemDestroy(&f->system));
-  HycoDestroyAll(&f->W, &f->g, &f->L);
+  HycoDestroyAll(&f->solver, &f->system, &f->W, &f->g, &f->L);
   PetscCall(HycoSlipDestroy(&f->slip));
   PetscCall(HycoRowsDestroy(&f->rows));
   HycoFreeAll(&f->contact, &f->U, &f->U_old, &f->w, &f->forces, friction);

@@ -579,8 +579,7 @@ static PetscErrorCode SolveSystem(HycoBodiesWork o, Problem *p, PetscBool *solve
   PetscCall(PetscStrncpy(o->method, method, sizeof(o->method)));
   o->its += its;
   *solved = (PetscBool)(o->reason > 0);
-  PetscCall(HycoSystemDestroy(&system));
-  HycoDestroyAll(&L, &g, &G);
+  HycoDestroyAll(&system, &L, &g, &G);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -130,8 +130,7 @@ PetscErrorCode HycoGalerkinReset(HycoROM m)
   PetscCall(HycoReducedDestroy(&g->reduced));
   PetscCall(HycoLoadsDestroy(&g->loads));
   PetscCall(HycoGalerkinPathDestroy(&g->path));
-  PetscCall(HycoSystemDestroy(&g->system));
-  HycoDestroyAll(&g->K, &g->B);
+  HycoDestroyAll(&g->system, &g->K, &g->B);
   g->current_B = PETSC_FALSE;
   HycoDestroyAll(&g->Kr, &g->Br, &g->Btr, &g->F, &g->D, &g->Fr, &g->Dr, &g->x, &g->L);
   PetscCall(HycoGalerkinDestroyOwn(g));
