@@ -80,6 +80,21 @@ PetscErrorCode HycoListAdd(char list[HYCO_LINE], const char between[], const cha
 
 /* The communicator of an object of any class. */
 #define HycoComm(object) PetscObjectComm((PetscObject)(object))
+/* This process's rank in a communicator, and the number of its ranks. */
+static inline PetscMPIInt HycoRank(MPI_Comm comm)
+{
+  PetscMPIInt rank = 0;
+
+  (void)MPI_Comm_rank(comm, &rank);
+  return rank;
+}
+static inline PetscMPIInt HycoSize(MPI_Comm comm)
+{
+  PetscMPIInt size = 1;
+
+  (void)MPI_Comm_size(comm, &size);
+  return size;
+}
 /* Concatenates every rank's n items, of an MPI type of `size` bytes, by rank, in *all on rank 0 (elsewhere NULL,
  *n_all 0); the caller frees it by PetscFree(). Collective. */
 PetscErrorCode HycoConcatenate(MPI_Comm comm, PetscInt n, const void *mine, MPI_Datatype type, size_t size,

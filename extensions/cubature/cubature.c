@@ -43,9 +43,7 @@ static PetscErrorCode ResetTraining(HycoReducer t)
   HycoCubatureTraining c = (HycoCubatureTraining)t->training;
 
   PetscFunctionBegin;
-  PetscCall(PetscFree(c->weight));
-  PetscCall(PetscFree(c->near));
-  PetscCall(PetscFree(c->full));
+  HycoFreeAll(&c->weight, &c->near, &c->full);
   c->n = c->n_full = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -9,8 +9,7 @@ static PetscErrorCode Take(HycoReducer t, const PetscReal w[])
   PetscInt n = 0;
 
   PetscFunctionBegin;
-  PetscCall(PetscFree(c->weight));
-  PetscCall(PetscFree(t->seeds_cell));
+  HycoFreeAll(&c->weight, &t->seeds_cell);
   PetscCall(PetscMalloc1(n_cells, &c->weight));
   PetscCall(PetscMalloc1(n_cells, &t->seeds_cell));
   /* w NULL: another rank than 0, which gets the list below. */

@@ -122,8 +122,7 @@ PetscErrorCode HycoCubatureFindContacts(HycoReducer t)
   PetscInt n = 0, *node, at;
 
   PetscFunctionBegin;
-  PetscCall(PetscFree(c->near));
-  PetscCall(PetscFree(c->full));
+  HycoFreeAll(&c->near, &c->full);
   c->n_full = 0;
   PetscCall(PetscCalloc1(part->n_cells, &c->near));
   HycoOnEach(HycoComm(t), MarkSprings(t, c->near));

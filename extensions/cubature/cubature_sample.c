@@ -20,14 +20,6 @@ typedef struct {
   Mat J;            /* of the current training point */
 } Sampler;
 
-static PetscErrorCode Destroy(Sampler *s)
-{
-  PetscFunctionBegin;
-  PetscCall(HycoTrainingReplayDestroy(&s->replay));
-  HycoFreeAll(&s->V, &s->g, &s->rows);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Fetches the modes at the nodes of the part. Collective. */
 static PetscErrorCode FetchModes(Sampler *s)
 {
@@ -167,8 +159,7 @@ static PetscErrorCode Balance(HycoReducer t, Mat J)
       a[(size_t)k * (size_t)lda + (size_t)i] /= PetscMax(size[k / l], HYCO_SMALL_FORCE * largest);
   }
   PetscCall(MatDenseRestoreArray(J, &a));
-  PetscCall(PetscFree(norm));
-  PetscCall(PetscFree(size));
+  HycoFreeAll(&norm, &size);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -241,8 +232,7 @@ static PetscErrorCode Join(Sampler *s, HycoSnapshots store, PetscReal tol, Mat *
     PetscCall(MatDestroy(&W[k]));
     at += n[k];
   }
-  PetscCall(MatAssemblyBegin(*joined, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(*joined, MAT_FINAL_ASSEMBLY));
+  PetscCall(HycoMatAssemble(*joined));
   PetscCall(PetscFree2(W, n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -258,7 +248,8 @@ PetscErrorCode HycoCubatureSample(HycoReducer t, HycoSnapshots store, PetscReal 
   PetscFunctionBegin;
   PetscCall(Create(t, &s));
   ierr = Join(&s, store, SHARE * tol, &J);
-  PetscCall(Destroy(&s));
+  PetscCall(HycoTrainingReplayDestroy(&s.replay));
+  HycoFreeAll(&s.V, &s.g, &s.rows);
   if (!ierr) ierr = Decompose(t, J, SHARE * tol, W, n, sigma);
   PetscCall(MatDestroy(&J));
   PetscCall(ierr);

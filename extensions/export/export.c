@@ -105,7 +105,6 @@ static PetscErrorCode MeasureOne(HycoFE fe, HycoQuantity q, HycoQuantityKind kin
   const HycoScene s = fe->scene;
   HycoQuantity *const all = s->quantity;
   const PetscInt n = s->n_quantities;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   /* q is a copy. The scene has this one output during the call: the same code as for predictions measures it. */
@@ -113,10 +112,8 @@ static PetscErrorCode MeasureOne(HycoFE fe, HycoQuantity q, HycoQuantityKind kin
   q.field = field;
   s->quantity = &q;
   s->n_quantities = 1;
-  ierr = HycoQuantitiesMeasure(PETSC_COMM_SELF, fe, u, sigma, NULL, NULL, value);
-  s->quantity = all;
-  s->n_quantities = n;
-  PetscCall(ierr);
+  HycoFinally(HycoQuantitiesMeasure(PETSC_COMM_SELF, fe, u, sigma, NULL, NULL, value), s->quantity = all;
+              s->n_quantities = n);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -405,8 +402,7 @@ static PetscErrorCode FreeSamples(Samples *o)
 static PetscErrorCode FreeFit(HycoExportFit *fit)
 {
   PetscFunctionBegin;
-  PetscCall(PetscFree(fit->function));
-  PetscCall(PetscFree(fit->coefficient));
+  HycoFreeAll(&fit->function, &fit->coefficient);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -769,13 +765,10 @@ static PetscErrorCode CompareHere(Export *e)
                        .contact = o->contact,
                        .weight = o->weight};
   char *memory;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(work_size(&model) + 1, &memory));
-  ierr = Compare(e, &model, memory);
-  PetscCall(PetscFree(memory));
-  PetscCall(ierr);
+  HycoFinally(Compare(e, &model, memory), PetscCall(PetscFree(memory)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -813,17 +806,6 @@ static PetscErrorCode Prepare(Export *e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Destroy(Export *e)
-{
-  PetscFunctionBegin;
-  PetscCall(FreeFit(&e->base));
-  PetscCall(FreeFit(&e->response));
-  if (e->z) PetscCall(PetscFree4(e->z, e->w, e->unit, e->contact));
-  HycoFreeAll(&e->group, &e->atom, &e->row, &e->area, &e->pressure);
-  PetscCall(HycoExportModelFree(&e->out));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Nothing is written before the comparison has passed. */
 static PetscErrorCode Build(Export *e)
 {
@@ -852,7 +834,11 @@ static PetscErrorCode ExportC(HycoROM m, const char path[], char **description)
   ierr = Build(&e);
   if (!ierr) ierr = HycoExportWrite(&e.out, e.s, m->model->path, path, description);
   HycoPointEnd(point);
-  PetscCall(Destroy(&e));
+  PetscCall(FreeFit(&e.base));
+  PetscCall(FreeFit(&e.response));
+  if (e.z) PetscCall(PetscFree4(e.z, e.w, e.unit, e.contact));
+  HycoFreeAll(&e.group, &e.atom, &e.row, &e.area, &e.pressure);
+  PetscCall(HycoExportModelFree(&e.out));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -416,8 +416,7 @@ PetscErrorCode HycoExportWrite(const HycoExportModel *m, HycoScene s, const char
   if (!ierr) ierr = Put(beside, &header);
   if (!ierr) ierr = Put(path, &program);
   if (!ierr) ierr = Describe(m, s, path, beside, prefix, program.n, &words);
-  PetscCall(PetscFree(header.text));
-  PetscCall(PetscFree(program.text));
+  HycoFreeAll(&header.text, &program.text);
   *description = words.text;
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -335,8 +335,7 @@ static PetscErrorCode Destroy(HycoMaterial law)
 
   PetscFunctionBegin;
   if (m->library) dlclose(m->library);
-  PetscCall(PetscFree(m->behaviour));
-  PetscCall(PetscFree(law->data));
+  HycoFreeAll(&m->behaviour, &law->data);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -367,8 +367,7 @@ static PetscErrorCode Destroy(HycoROM m)
   Regression r = (Regression)m->model->data;
 
   PetscFunctionBegin;
-  HycoFreeAll(&r->gamma, &r->Lambda, &r->sigma, &r->inelastic);
-  PetscCall(PetscFree(m->model->data));
+  HycoFreeAll(&r->gamma, &r->Lambda, &r->sigma, &r->inelastic, &m->model->data);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -34,8 +34,8 @@ PetscErrorCode HycoPOD(SVD svd, Mat S, PetscReal tol, PetscReal noise, PetscInt 
   Collective, as HycoPOD().
 */
 PetscErrorCode HycoPODMerge(SVD svd, PetscReal loss, Mat *merged, Mat *S);
-/* Copies the columns of the dense X into Y, which has the same rows, from column `at` on. Collective. */
-PetscErrorCode HycoCopyColumns(Mat X, Mat Y, PetscInt at);
+/* Copies the first n columns of the dense X into Y, which has the same rows, from column `at` on. Collective. */
+PetscErrorCode HycoCopyColumns(Mat X, PetscInt n, Mat Y, PetscInt at);
 /* Creates [A B] of dense matrices with the same rows on each rank, and destroys both. Collective. */
 PetscErrorCode HycoJoinColumns(Mat *A, Mat *B, Mat *joined);
 

@@ -21,6 +21,7 @@
 #include <hycoromimpl.h>
 #include <hycoslip.h>
 #include <hycosolver.h>
+#include <petscblaslapack.h>
 
 /* Where a body is, relative to its nodes at another point: x = s Q X + t. */
 typedef struct {
@@ -55,6 +56,18 @@ typedef struct {
 static inline HycoBodiesSurface HycoBodiesSurfaceNormal(HycoFE fe, HycoPairs *pairs, HycoRows *rows)
 {
   return (HycoBodiesSurface){fe, pairs, rows, pairs->n, pairs->contact};
+}
+static inline HycoBodiesSurface HycoBodiesSurfaceOf(HycoROM m)
+{
+  return HycoBodiesSurfaceNormal(m->fe, &m->pairs, &m->rows);
+}
+
+/* to += factor times from, n numbers. */
+static inline void HycoBodiesAdd(PetscInt n, PetscReal factor, const PetscReal from[], PetscReal to[])
+{
+  const PetscBLASInt size = (PetscBLASInt)n, one = 1;
+
+  BLASaxpy_(&size, &factor, from, &one, to, &one);
 }
 
 /* One body: its blocks at each of its samples (tensor), one sample after the other. All row major, except C and H: an
@@ -172,12 +185,11 @@ typedef struct _n_HycoBodiesWork {
   HycoTao tao;       /* the active set; if it fails, or another method is asked for: */
   HycoSolver solver; /* borrowed, or `own` */
   HycoSolver own;
-  HycoReason reason; /* of the last solve; its iterations, and contacts in its problem */
-  PetscInt its, n_problem;
+  HycoReason reason; /* of the last solve; its iterations */
+  PetscInt its;
   char method[64];
 } * HycoBodiesWork;
 
-PetscErrorCode HycoBodiesCreate(HycoSubstructures *bodies);
 /* NULL-safe. */
 PetscErrorCode HycoBodiesDestroy(HycoSubstructures *bodies);
 /* Points the bodies' tensors to the values of theta. */
@@ -257,6 +269,8 @@ void HycoBodiesMove(HycoBodiesWork work, const HycoBodiesSurface *surface, Petsc
 /* After a solve: a bound of |L~ - L|_W relative to *norm = |L~|_W, from the errors of flexibilities and loads at held-out
    samples of the bodies; 0 without forces. */
 PetscReal HycoBodiesBound(HycoBodiesWork work, PetscReal *norm);
+/* The body of a place, of the surfaces or, from ns on, inside. */
+PetscInt HycoBodiesAt(HycoSubstructures bodies, PetscInt place);
 /* The coefficients of the modes, and the displacements of the unknowns inside. */
 PetscErrorCode HycoBodiesExpand(HycoBodiesWork work, PetscReal gamma[]);
 /* Adds those of inelastic strains to gamma. */

@@ -35,9 +35,7 @@ typedef struct {
   PetscReal (*yield_integral)(const HycoFlowPoint *, PetscReal dp);
 } HycoFlowRule;
 
-/* In a law's create(): begin declares young and poisson, the law then declares its own constants, and end sets the
-   rule (which must be static). */
-PetscErrorCode HycoFlowBegin(HycoMaterial material);
+/* In a law's create(): after HycoElasticDeclare() for young and poisson, and its own constants; the rule must be static. */
 PetscErrorCode HycoFlowEnd(HycoMaterial material, const HycoFlowRule *rule);
 
 #endif

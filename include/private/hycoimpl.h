@@ -11,6 +11,14 @@
 /* Raises the caught error again, unless it is HYCO_ERR_NO_MODEL. */
 PetscErrorCode HycoCatchNoModel(PetscErrorCode caught, const char message[]);
 
+/* Catches an error of `call`: its code, 0 if there is none, and its line. */
+#define HycoCatch(call, caught, message)                                                                               \
+  do {                                                                                                                 \
+    PetscCall(HycoCatchBegin());                                                                                       \
+    (caught) = (call);                                                                                                 \
+    PetscCall(HycoCatchEnd((caught), (message)));                                                                      \
+  } while (0)
+
 /* HycoFail() and HycoCheck() with HYCO_ERR_NO_MODEL. */
 #define HycoFailNoModel(...)                                                                                           \
   do {                                                                                                                 \
@@ -66,6 +74,22 @@ PetscErrorCode HycoViewBegin_Private(PetscObject object, PetscViewer *viewer, Pe
     }                                                                                                                  \
   } while (0)
 
+/* HycoConcatenate() on every rank. Collective. */
+PetscErrorCode HycoConcatenateAll(MPI_Comm comm, PetscInt n, const void *mine, MPI_Datatype type, size_t size,
+                                  PetscInt *n_all, void *all);
+
+/* All entries of a vector, on every rank. Collective. */
+PetscErrorCode HycoVecGather(Vec v, PetscReal all[]);
+/* Copies this rank's first n entries from or to an array. Not collective. */
+PetscErrorCode HycoVecRead(Vec v, PetscInt n, PetscReal value[]);
+PetscErrorCode HycoVecWrite(Vec v, PetscInt n, const PetscReal value[]);
+/* Begins and ends a forward scatter that inserts. Collective. */
+PetscErrorCode HycoScatter(VecScatter scatter, Vec from, Vec to);
+
+/* Begins and ends the assembly. Collective. */
+PetscErrorCode HycoMatAssemble(Mat A);
+PetscErrorCode HycoVecAssemble(Vec v);
+
 /* Sends n rows of `size` bytes, row k to rank to[k]; *got: the *n_got rows that arrive, by the rank that sent them and
    then in its order. The caller frees it by PetscFree(). Collective. */
 PetscErrorCode HycoSendRows(MPI_Comm comm, PetscInt n, const PetscMPIInt to[], size_t size, const void *row,
@@ -108,6 +132,23 @@ PetscErrorCode HycoLogEvent(HycoEvent event, PetscBool begin);
     logged_ = (call);                                                                                                  \
     PetscCall(HycoLogEvent((event), PETSC_FALSE));                                                                     \
     PetscCall(logged_);                                                                                                \
+  } while (0)
+
+/* PetscCall(call) after the statements, which also run after an error of it. */
+#define HycoFinally(call, ...)                                                                                         \
+  do {                                                                                                                 \
+    const PetscErrorCode finally_ = (call);                                                                            \
+    __VA_ARGS__;                                                                                                       \
+    PetscCall(finally_);                                                                                               \
+  } while (0)
+/* PetscCall(call) after the statements, which run only after an error of it. */
+#define HycoOnError(call, ...)                                                                                         \
+  do {                                                                                                                 \
+    const PetscErrorCode failed_ = (call);                                                                             \
+    if (failed_) {                                                                                                     \
+      __VA_ARGS__;                                                                                                     \
+    }                                                                                                                  \
+    PetscCall(failed_);                                                                                                \
   } while (0)
 
 /* The seal of a file with these bytes, to be appended to them. */
@@ -167,5 +208,20 @@ PetscErrorCode HycoROMDeclare(PetscOptions options);
 /* PetscFree() of each pointer, given by its address. */
 #define HycoFreeAll(...) PetscCall(HycoFreeAll_Private((void *[]){__VA_ARGS__, NULL}))
 PetscErrorCode HycoFreeAll_Private(void *const addresses[]);
+/* Destroys each object of PETSc, given by its address, like its class's Destroy function. */
+#define HycoDestroyAll(...) PetscCall(HycoDestroyAll_Private((void *[]){__VA_ARGS__, NULL}))
+PetscErrorCode HycoDestroyAll_Private(void *const addresses[]);
+
+/* Duplicates of a vector, at the addresses that follow. */
+#define HycoVecDuplicate(v, ...) PetscCall(HycoVecDuplicate_Private((v), (Vec *[]){__VA_ARGS__, NULL}))
+PetscErrorCode HycoVecDuplicate_Private(Vec v, Vec *const copies[]);
+/* Room for entry n of an array with room for `room` entries, which doubles. */
+#define HycoGrow(n, room, array)                                                                                       \
+  do {                                                                                                                 \
+    if ((n) == (room)) {                                                                                               \
+      (room) = 2 * (room) + 64;                                                                                        \
+      PetscCall(PetscRealloc((size_t)(room) * sizeof(*(array)), &(array)));                                            \
+    }                                                                                                                  \
+  } while (0)
 
 #endif

@@ -31,8 +31,7 @@ PetscErrorCode HycoPivotColumns(PetscInt m, PetscInt n, PetscReal A[], PetscInt 
       for (PetscInt i = 0; i < m; i++) A[j * m + i] -= dot / norm[best] * A[best * m + i];
     }
   }
-  PetscCall(PetscFree(norm));
-  PetscCall(PetscFree(taken));
+  HycoFreeAll(&norm, &taken);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

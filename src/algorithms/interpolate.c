@@ -222,9 +222,7 @@ PetscErrorCode HycoInterpolantDestroy(HycoInterpolant *interpolant)
   PetscCall(PetscFree2(it->axis, it->count));
   PetscCall(PetscFree2(it->simplex, it->inverse));
   PetscCall(PetscFree3(it->own, it->lo, it->width));
-  PetscCall(PetscFree(it->x));
-  PetscCall(PetscFree(it->at));
-  PetscCall(PetscFree(*interpolant));
+  HycoFreeAll(&it->x, &it->at, interpolant);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

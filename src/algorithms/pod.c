@@ -149,8 +149,7 @@ static PetscErrorCode CountAccurate(Mat S, Mat V, PetscInt k, const PetscReal si
 
     if (!(PetscAbsReal(stretch[*accurate] - s) <= ACCURATE * s && skew[*accurate] <= ORTHONORMAL)) break;
   }
-  PetscCall(PetscFree(stretch));
-  PetscCall(PetscFree(skew));
+  HycoFreeAll(&stretch, &skew);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -23,18 +23,17 @@ static PetscErrorCode ScaleModes(Mat V, PetscInt l, const PetscReal sigma[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Columns of X to the columns from `at` of Y. Collective. */
-PetscErrorCode HycoCopyColumns(Mat X, Mat Y, PetscInt at)
+PetscErrorCode HycoCopyColumns(Mat X, PetscInt n, Mat Y, PetscInt at)
 {
-  PetscInt n;
-  Mat part;
+  Mat from, to;
 
   PetscFunctionBegin;
-  PetscCall(MatGetSize(X, NULL, &n));
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(MatDenseGetSubMatrix(Y, PETSC_DECIDE, PETSC_DECIDE, at, at + n, &part));
-  PetscCall(MatCopy(X, part, SAME_NONZERO_PATTERN));
-  PetscCall(MatDenseRestoreSubMatrix(Y, &part));
+  PetscCall(MatDenseGetSubMatrix(X, PETSC_DECIDE, PETSC_DECIDE, 0, n, &from));
+  PetscCall(MatDenseGetSubMatrix(Y, PETSC_DECIDE, PETSC_DECIDE, at, at + n, &to));
+  PetscCall(MatCopy(from, to, SAME_NONZERO_PATTERN));
+  PetscCall(MatDenseRestoreSubMatrix(Y, &to));
+  PetscCall(MatDenseRestoreSubMatrix(X, &from));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -48,12 +47,10 @@ PetscErrorCode HycoJoinColumns(Mat *A, Mat *B, Mat *joined)
   PetscCall(MatGetSize(*B, NULL, &n[1]));
   PetscCall(MatGetLocalSize(*A, &rows, NULL));
   PetscCall(MatCreateDense(PetscObjectComm((PetscObject)*A), rows, PETSC_DECIDE, N, n[0] + n[1], NULL, joined));
-  PetscCall(HycoCopyColumns(*A, *joined, 0));
-  PetscCall(HycoCopyColumns(*B, *joined, n[0]));
-  PetscCall(MatAssemblyBegin(*joined, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(*joined, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatDestroy(A));
-  PetscCall(MatDestroy(B));
+  PetscCall(HycoCopyColumns(*A, n[0], *joined, 0));
+  PetscCall(HycoCopyColumns(*B, n[1], *joined, n[0]));
+  PetscCall(HycoMatAssemble(*joined));
+  HycoDestroyAll(A, B);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -152,8 +152,7 @@ static PetscErrorCode Solve(SVD svd)
   }
   PetscCall(StoreRight(svd->V, n, Vt));
   PetscCall(PetscFree(Vt));
-  PetscCall(MatDestroy(&R));
-  PetscCall(BVDestroy(&Q));
+  HycoDestroyAll(&R, &Q);
   svd->its = 1;
   svd->nconv = n;
   svd->reason = SVD_CONVERGED_TOL;

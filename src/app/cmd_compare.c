@@ -149,16 +149,14 @@ typedef struct {
 static PetscErrorCode CompareQueued(const Points *p, HycoFOM fom, PetscBool root, PetscReal unused[])
 {
   PetscInt k, n_done;
-  PetscMPIInt rank;
   char word[] = "points:";
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   for (PetscBool first = PETSC_TRUE;; first = PETSC_FALSE) {
     PetscReal *v;
 
     PetscCall(HycoQueueTake(p->queue, &k));
-    if (!first && rank == 0) {
+    if (!first && HycoRank(PETSC_COMM_WORLD) == 0) {
       PetscCall(HycoQueueDone(p->queue, &n_done));
       PetscCall(DriverProgress(n_done, p->n, word));
     }
@@ -176,15 +174,13 @@ static PetscErrorCode CompareMine(const Points *p)
 {
   HycoFOM fom;
   MPI_Comm group;
-  PetscMPIInt rank;
   PetscReal *unused;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(p->columns.n, &unused));
   PetscCall(HycoQueueGetGroup(p->queue, &group));
   PetscCall(HycoFOMCreate(group, p->scene, &fom));
-  PetscCallMPI(MPI_Comm_rank(group, &rank));
-  PetscCall(CompareQueued(p, fom, (PetscBool)(rank == 0), unused));
+  PetscCall(CompareQueued(p, fom, (PetscBool)(HycoRank(group) == 0), unused));
   PetscCall(PetscFree(unused));
   PetscCall(HycoFOMDestroy(&fom));
   PetscFunctionReturn(PETSC_SUCCESS);

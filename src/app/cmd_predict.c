@@ -359,15 +359,6 @@ static PetscErrorCode ShapeOf(HycoROM model, HycoScene scene, Shape *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode DestroyShape(Shape *s)
-{
-  PetscFunctionBegin;
-  PetscCall(PetscFree(s->carried.name));
-  PetscCall(PetscFree(s->gradients.name));
-  PetscCall(PetscFree(s->names));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* NaN: how a table marks that there is no estimate. */
 static PetscReal Known(PetscReal estimate)
 {
@@ -505,13 +496,12 @@ static PetscErrorCode PredictAll(HycoROM model, const Fallback *fallback, PetscI
                                  const Shape *s, DriverRows *rows)
 {
   Taken taken = {.fallback = fallback, .shape = s};
-  PetscMPIInt size;
   PetscInt each;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  each = PieceSize(rows->n, size, (PetscBool)(s->own > PATH_FORCE));
-  PetscCall(HycoQueueCreate(PETSC_COMM_WORLD, size, (rows->n + each - 1) / each, NULL, &taken.queue));
+  each = PieceSize(rows->n, HycoSize(PETSC_COMM_WORLD), (PetscBool)(s->own > PATH_FORCE));
+  PetscCall(
+      HycoQueueCreate(PETSC_COMM_WORLD, HycoSize(PETSC_COMM_WORLD), (rows->n + each - 1) / each, NULL, &taken.queue));
   HycoOnEach(PETSC_COMM_WORLD, HycoQueueEnd(taken.queue, PredictQueued(model, each, n_par, mu, &taken, rows)));
   PetscCall(HycoQueueDestroy(&taken.queue));
   PetscCall(PrintDoubts(rows->n, &taken));
@@ -523,7 +513,7 @@ static PetscErrorCode PredictAll(HycoROM model, const Fallback *fallback, PetscI
 static PetscErrorCode ListRest(const DriverRows *rows, PetscInt *n, PetscInt **list)
 {
   const MPI_Comm comm = PETSC_COMM_WORLD;
-  PetscMPIInt rank, length;
+  PetscMPIInt length;
   PetscInt count = 0, room = 0, *mine;
 
   PetscFunctionBegin;
@@ -538,9 +528,8 @@ static PetscErrorCode ListRest(const DriverRows *rows, PetscInt *n, PetscInt **l
   }
   PetscCall(HycoConcatenate(comm, count, mine, MPIU_INT, sizeof(PetscInt), n, list));
   PetscCall(PetscFree(mine));
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
   PetscCallMPI(MPI_Bcast(n, 1, MPIU_INT, 0, comm));
-  if (rank) PetscCall(PetscMalloc1(*n, list));
+  if (HycoRank(comm)) PetscCall(PetscMalloc1(*n, list));
   PetscCall(PetscMPIIntCast(*n, &length));
   PetscCallMPI(MPI_Bcast(*list, length, MPIU_INT, 0, comm));
   PetscCall(PetscSortInt(*n, *list));
@@ -617,7 +606,9 @@ static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, H
   begin = HycoNow() - begin;
   if (output[0]) HycoOnRoot(PETSC_COMM_WORLD, HycoROMWriteMany(model, n, n_par, mu, output));
   PetscCall(ReportSet("predict", table, scene, samples, s.names, &rows, begin));
-  PetscCall(DestroyShape(&s));
+  PetscCall(PetscFree(s.carried.name));
+  PetscCall(PetscFree(s.gradients.name));
+  PetscCall(PetscFree(s.names));
   PetscCall(DriverRowsFree(&rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -23,18 +23,17 @@ static PetscErrorCode ReportGroups(cJSON *json, HycoReducer reducer)
 {
   cJSON *array = cJSON_AddArrayToObject(json, "solved_by_group");
   PetscInt n, unsolved;
-  PetscMPIInt size;
   const PetscInt *solved;
   const PetscReal *written;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(HycoReducerGetSolved(reducer, &n, &solved));
   PetscCall(HycoReducerGetBalance(reducer, &unsolved, &written));
   for (PetscInt k = 0; k < n; k++) cJSON_AddItemToArray(array, cJSON_CreateNumber(solved[k]));
   cJSON_AddNumberToObject(json, "unsolved_when_idle", unsolved);
   array = cJSON_AddArrayToObject(json, "written_mb_by_rank");
-  for (PetscMPIInt r = 0; r < size; r++) cJSON_AddItemToArray(array, cJSON_CreateNumber(1e-6 * written[r]));
+  for (PetscMPIInt r = 0; r < HycoSize(PETSC_COMM_WORLD); r++)
+    cJSON_AddItemToArray(array, cJSON_CreateNumber(1e-6 * written[r]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -94,16 +93,6 @@ static PetscErrorCode Report(HycoScene scene, HycoReducer reducer, const HycoTra
   ReportNumbers(seconds, {"snapshots", t->seconds_snapshots}, {"reduction", t->seconds_reduction},
                 {"total", t->seconds_snapshots + t->seconds_reduction});
   PetscCall(ReportWrite(&json));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Targets choose settings for a given set of points; -greedy has its own target for choosing points. */
-static PetscErrorCode CheckKind(PetscBool greedy, const Search *search)
-{
-  PetscFunctionBegin;
-  HycoCheck(
-      !greedy || !search->on,
-      "-target_u and similar options choose the settings for a given set of points; for train -greedy use -target");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -225,7 +214,10 @@ PetscErrorCode CommandTrain(void)
   PetscCall(ReadGreedy(&greedy));
   PetscCall(DriverReadTargets(&search));
   PetscCall(DriverGetValidation(scene, &validation));
-  PetscCall(CheckKind(greedy, &search));
+  /* Targets choose settings for a given set of points; -greedy has its own target for choosing points. */
+  HycoCheck(
+      !greedy || !search.on,
+      "-target_u and similar options choose the settings for a given set of points; for train -greedy use -target");
   if (!greedy) PetscCall(DriverReadFiles(NULL, NULL, NULL, NULL, search.table));
   PetscCall(HycoReducerCreate(PETSC_COMM_WORLD, scene, &reducer));
   PetscCall(HycoReducerSetFromOptions(reducer));

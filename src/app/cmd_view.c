@@ -17,23 +17,21 @@ PetscErrorCode CommandView(void)
   char path[PETSC_MAX_PATH_LEN], file[PETSC_MAX_PATH_LEN];
   HycoROM model = NULL;
   HycoScene scene;
-  PetscMPIInt rank;
 
   PetscFunctionBegin;
   PetscCall(DriverReadFiles(path, file, NULL, NULL, NULL));
   /* Exactly one of the two. */
   HycoCheck(!path[0] != !file[0], "give -model FILE.h5 or -scene FOLDER");
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   if (file[0]) {
     HycoOnRoot(PETSC_COMM_WORLD, HycoROMLoad(file, &model));
     PetscCall(DriverCheckLeft());
-    if (rank == 0) PetscCall(HycoROMView(model, PETSC_VIEWER_STDOUT_SELF));
+    if (HycoRank(PETSC_COMM_WORLD) == 0) PetscCall(HycoROMView(model, PETSC_VIEWER_STDOUT_SELF));
     PetscCall(HycoROMDestroy(&model));
   } else {
     PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
     PetscCall(DriverCheckLeft());
     PetscCall(HycoSceneCheckMesh(PETSC_COMM_WORLD, scene));
-    if (rank == 0) PetscCall(HycoSceneView(scene, PETSC_VIEWER_STDOUT_SELF));
+    if (HycoRank(PETSC_COMM_WORLD) == 0) PetscCall(HycoSceneView(scene, PETSC_VIEWER_STDOUT_SELF));
     PetscCall(HycoSceneDestroy(&scene));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

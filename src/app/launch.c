@@ -125,11 +125,8 @@ void DriverStartAlone(void)
 /* MPI_Init() of the wrong MPI makes N separate runs, which would write the same files. */
 PetscErrorCode DriverCheckLaunch(void)
 {
-  PetscMPIInt size;
-
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
-  HycoCheck(size > 1 || !launched[0],
+  HycoCheck(HycoSize(PETSC_COMM_WORLD) > 1 || !launched[0],
             "the launcher started several processes (%s) that are not connected: it belongs to another MPI than "
             "hyco's; use the mpiexec (or srun --mpi=...) of the MPI that PETSc was built with",
             launched);

@@ -191,14 +191,12 @@ static PetscErrorCode Start(int *argc, char ***argv)
 static int Help(char **argv)
 {
   const Command *command = argv[1] ? FindCommand(argv[1]) : NULL;
-  PetscMPIInt rank;
   PetscErrorCode ierr = 0;
   int argc = 1;
 
   DriverStartAlone();
   if (Start(&argc, &argv)) return DRIVER_FAILED;
-  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
-  if (rank == 0) {
+  if (HycoRank(MPI_COMM_WORLD) == 0) {
     if (!command && argv[1] && argv[2]) command = FindCommand(argv[2]); /* hyco help COMMAND */
     ierr = !command && argv[1] && argv[2] && strcmp(argv[2], "output") == 0 ? DriverHelpOutput() : DriverHelp(command);
   }

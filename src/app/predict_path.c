@@ -6,18 +6,16 @@
 PetscErrorCode DriverGetReducedPath(HycoROM model, DriverReducedPath *path)
 {
   HycoHistory h = {0};
-  PetscMPIInt rank;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
   HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetHistory(model, &h));
   path->ended = h.ended;
   path->t = h.t;
   path->n = h.n;
-  if (rank == 0) PetscCall(PetscStrncpy(path->why, h.why, sizeof(path->why)));
+  if (HycoRank(PETSC_COMM_WORLD) == 0) PetscCall(PetscStrncpy(path->why, h.why, sizeof(path->why)));
   PetscCallMPI(MPI_Bcast(path, sizeof(*path), MPI_BYTE, 0, PETSC_COMM_WORLD));
   PetscCall(PetscMalloc1(path->n, &path->step));
-  if (rank == 0) PetscCall(PetscArraycpy(path->step, h.step, path->n));
+  if (HycoRank(PETSC_COMM_WORLD) == 0) PetscCall(PetscArraycpy(path->step, h.step, path->n));
   HycoBcast(path->step, path->n * (PetscInt)sizeof(*path->step), MPI_BYTE, PETSC_COMM_WORLD);
   PetscCall(HycoROMWantsEquilibrium(model, &path->balanced));
   if (path->n && path->balanced) HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetEquilibrium(model, &path->equilibrium));

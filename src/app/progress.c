@@ -55,11 +55,8 @@ static void Interrupted(int number)
 /* Rank 0 speaks for all; every rank ends. */
 PetscErrorCode DriverCatchInterrupt(const char folder[])
 {
-  PetscMPIInt rank;
-
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  speaks = rank == 0;
+  speaks = HycoRank(PETSC_COMM_WORLD) == 0;
   PetscCall(PetscStrncpy(kept_in, folder, sizeof(kept_in)));
   SetLastWords("the");
   signal(SIGINT, Interrupted);
@@ -70,12 +67,10 @@ PetscErrorCode DriverCatchInterrupt(const char folder[])
 /* Holds the progress line first, which would otherwise be in the middle of the text. */
 PetscErrorCode DriverPrint(const char format[], ...)
 {
-  PetscMPIInt rank;
   va_list args;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (rank == 0 && !quiet) {
+  if (HycoRank(PETSC_COMM_WORLD) == 0 && !quiet) {
     DriverProgressHold();
     va_start(args, format);
     vfprintf(stdout, format, args);
@@ -157,11 +152,8 @@ PetscErrorCode DriverPhase(const char phase[], PetscInt done, PetscInt n, void *
 /* For a loop of the command itself, on rank 0. */
 PetscErrorCode DriverSetPhase(PetscInt done, PetscInt n)
 {
-  PetscMPIInt rank;
-
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (rank == 0) PetscCall(DriverPhase("points", done, n, NULL));
+  if (HycoRank(PETSC_COMM_WORLD) == 0) PetscCall(DriverPhase("points", done, n, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

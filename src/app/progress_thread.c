@@ -61,10 +61,7 @@ static void *Run(void *unused)
 
 void DriverProgressBegin(void)
 {
-  PetscMPIInt rank;
-
-  MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
-  if (rank) return;
+  if (HycoRank(PETSC_COMM_WORLD)) return;
   progress.begin = progress.last = Now();
   progress.runs = (PetscBool)(pthread_create(&progress.thread, NULL, Run, NULL) == 0); /* otherwise there is no such
                                                                                    progress */

@@ -21,20 +21,18 @@ PetscErrorCode ReportCreate(const char command[], HycoScene scene, const PetscRe
   PetscInt n;
   const char *const *names;
   const char *title;
-  PetscMPIInt size;
   cJSON *point;
 
   PetscFunctionBegin;
   *json = cJSON_CreateObject();
   cJSON_AddNumberToObject(*json, "format", REPORT_FORMAT);
-  PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCall(HycoSceneGetTitle(scene, &title));
   PetscCall(HycoSceneGetParameters(scene, &n, &names, NULL, NULL));
   cJSON_AddStringToObject(*json, "command", command);
   cJSON_AddStringToObject(*json, "scene", title);
   point = cJSON_AddObjectToObject(*json, "mu");
   for (PetscInt p = 0; mu && p < n; p++) cJSON_AddNumberToObject(point, names[p], mu[p]);
-  cJSON_AddNumberToObject(*json, "ranks", size);
+  cJSON_AddNumberToObject(*json, "ranks", HycoSize(PETSC_COMM_WORLD));
   PetscCall(DriverReportOptionFiles(*json));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -8,15 +8,13 @@ static cJSON *missed; /* messages of DriverMissed(), an array; NULL: none */
 PetscErrorCode DriverMissed(const char format[], ...)
 {
   char text[DRIVER_LINE];
-  PetscMPIInt rank;
   va_list args;
 
   PetscFunctionBegin;
   va_start(args, format);
   vsnprintf(text, sizeof(text), format, args);
   va_end(args);
-  PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (rank == 0) {
+  if (HycoRank(PETSC_COMM_WORLD) == 0) {
     fprintf(stderr, "hyco: missed: %s\n", text);
     fflush(stderr);
   }

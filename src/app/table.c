@@ -40,10 +40,7 @@ PetscErrorCode DriverRowsFree(DriverRows *rows)
 /* For results that every rank has: rank 0's are written. */
 DriverRows DriverRowsOfRoot(PetscInt n, PetscInt width, PetscReal value[], DriverPiece *piece)
 {
-  PetscMPIInt rank;
-
-  MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
-  *piece = (DriverPiece){0, rank ? 0 : n, value};
+  *piece = (DriverPiece){0, HycoRank(PETSC_COMM_WORLD) ? 0 : n, value};
   return (DriverRows){n, width, 1, piece};
 }
 

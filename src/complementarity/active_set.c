@@ -47,10 +47,7 @@ static PetscErrorCode SetHash(const HycoActiveSet *e, const PetscBool active[], 
 static PetscErrorCode Met(const HycoActiveSet *e, const PetscBool active[], PetscInt its, History *h, PetscBool *met)
 {
   PetscFunctionBegin;
-  if (its == h->room) {
-    h->room = 2 * h->room + 64;
-    PetscCall(PetscRealloc((size_t)h->room * sizeof(*h->past), &h->past));
-  }
+  HycoGrow(its, h->room, h->past);
   PetscCall(SetHash(e, active, &h->past[its]));
   *met = PETSC_FALSE;
   /* All hashes are compared: iterations are tens, and a solve on a set costs much more. */
@@ -145,7 +142,6 @@ PetscErrorCode HycoActiveSetRun(const HycoActiveSet *e, PetscBool active[], Pets
     else
       *status = HYCO_LCP_SOLVED;
   }
-  PetscCall(PetscFree(h.violates));
-  PetscCall(PetscFree(h.past));
+  HycoFreeAll(&h.violates, &h.past);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

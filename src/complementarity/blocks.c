@@ -70,31 +70,6 @@ PetscErrorCode HycoBlocksDestroy(HycoBlocks **blocks)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The n items of each rank, by rank, on every rank. The caller frees *all. */
-static PetscErrorCode GatherAll(MPI_Comm comm, PetscInt n, const void *mine, MPI_Datatype type, size_t size,
-                                PetscInt *n_all, void *all)
-{
-  PetscMPIInt ranks, count, total = 0, *counts, *offsets;
-  void *items;
-
-  PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(comm, &ranks));
-  PetscCall(PetscMPIIntCast(n, &count));
-  PetscCall(PetscMalloc2(ranks, &counts, ranks, &offsets));
-  PetscCallMPI(MPI_Allgather(&count, 1, MPI_INT, counts, 1, MPI_INT, comm));
-  for (PetscMPIInt r = 0; r < ranks; r++) {
-    offsets[r] = total;
-    total += counts[r];
-  }
-  /* At least one byte, so that an empty list has an array to free. */
-  PetscCall(PetscMalloc((size_t)total * size + 1, &items));
-  PetscCallMPI(MPI_Allgatherv(mine, count, type, items, counts, offsets, type, comm));
-  PetscCall(PetscFree2(counts, offsets));
-  *n_all = total;
-  *(void **)all = items;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* All ranks' blocks on every rank, in the order of the ranks, for the dense problem. Collective. */
 PetscErrorCode HycoBlocksGather(MPI_Comm comm, const HycoBlocks *b, HycoBlocks **all)
 {
@@ -102,11 +77,10 @@ PetscErrorCode HycoBlocksGather(MPI_Comm comm, const HycoBlocks *b, HycoBlocks *
   PetscReal *data;
 
   PetscFunctionBegin;
-  PetscCall(GatherAll(comm, b->n, b->of, MPIU_INT, sizeof(PetscInt), &n, &of));
-  PetscCall(GatherAll(comm, b->at[b->n], b->data, MPIU_REAL, sizeof(PetscReal), &n_data, &data));
+  PetscCall(HycoConcatenateAll(comm, b->n, b->of, MPIU_INT, sizeof(PetscInt), &n, &of));
+  PetscCall(HycoConcatenateAll(comm, b->at[b->n], b->data, MPIU_REAL, sizeof(PetscReal), &n_data, &data));
   PetscCall(HycoBlocksCreate(b->n_cones, b->cone, n, of, data, all));
-  PetscCall(PetscFree(of));
-  PetscCall(PetscFree(data));
+  HycoFreeAll(&of, &data);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

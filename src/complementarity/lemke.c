@@ -57,16 +57,6 @@ static PetscErrorCode DictionaryCreate(PetscInt n, const PetscReal M[], const Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Also of one whose run ended early: no state is left outside it. */
-static PetscErrorCode DictionaryDestroy(Dictionary *d)
-{
-  PetscFunctionBegin;
-  PetscCall(PetscFree3(d->T, d->U, d->V));
-  PetscCall(PetscFree3(d->value, d->column, d->row));
-  PetscCall(PetscFree4(d->basic, d->nonbasic, d->where, d->tied));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Entry (i, j) of the current dictionary, with the collected pivots. */
 static PetscReal Entry(const Dictionary *d, PetscInt i, PetscInt j)
 {
@@ -306,6 +296,9 @@ PetscErrorCode HycoLCPLemke(PetscInt n, const PetscReal M[], const PetscReal q[]
   PetscCall(DictionaryCreate(n, M, q, size_M, size_q, &d));
   PetscCall(Run(&d, row, max_its, its, status));
   if (*status == HYCO_LCP_SOLVED) PetscCall(Unpack(&d, M, q, size_q / size_M, z));
-  PetscCall(DictionaryDestroy(&d));
+  /* Also of one whose run ended early: no state is left outside it. */
+  PetscCall(PetscFree3(d.T, d.U, d.V));
+  PetscCall(PetscFree3(d.value, d.column, d.row));
+  PetscCall(PetscFree4(d.basic, d.nonbasic, d.where, d.tied));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -29,8 +29,7 @@ PetscErrorCode HycoTangentDestroy(HycoTangent *tangent)
 
   PetscFunctionBegin;
   if (!t) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoFreeAll(&t->set, &t->open, &t->lu, &t->scale, &t->S, &t->out, &t->into, &t->v, &t->ipiv);
-  PetscCall(PetscFree(*tangent));
+  HycoFreeAll(&t->set, &t->open, &t->lu, &t->scale, &t->S, &t->out, &t->into, &t->v, &t->ipiv, tangent);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -65,16 +65,15 @@ PetscErrorCode HycoTaoFindType(const char type[], char name[HYCO_TAO_NAME], char
 /* owner: its options prefix; quiet: of several ranks that solve the same problem only the first shows monitors. */
 PetscErrorCode HycoTaoCreate(MPI_Comm comm, PetscObject owner, HycoTao *t)
 {
-  PetscMPIInt rank = 0, size;
+  PetscMPIInt rank = 0;
 
   PetscFunctionBegin;
   PetscCall(HycoPackageCheck());
   PetscCall(PetscNew(t));
   (*t)->comm = comm;
-  PetscCallMPI(MPI_Comm_size(comm, &size));
   if (owner) PetscCallMPI(MPI_Comm_rank(PetscObjectComm(owner), &rank));
   (*t)->owner = owner;
-  (*t)->quiet = (PetscBool)(size == 1 && rank > 0);
+  (*t)->quiet = (PetscBool)(HycoSize(comm) == 1 && rank > 0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -82,10 +81,7 @@ PetscErrorCode HycoTaoCreate(MPI_Comm comm, PetscObject owner, HycoTao *t)
 static PetscErrorCode Reset(HycoTao t)
 {
   PetscFunctionBegin;
-  PetscCall(TaoDestroy(&t->tao));
-  PetscCall(MatDestroy(&t->J));
-  PetscCall(VecDestroy(&t->w));
-  PetscCall(VecDestroy(&t->d));
+  HycoDestroyAll(&t->tao, &t->J, &t->w, &t->d);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -93,11 +89,7 @@ static PetscErrorCode Reset(HycoTao t)
 static PetscErrorCode ResetDense(HycoTao t)
 {
   PetscFunctionBegin;
-  PetscCall(MatDestroy(&t->dense));
-  PetscCall(VecDestroy(&t->f));
-  PetscCall(VecDestroy(&t->lo));
-  PetscCall(VecDestroy(&t->hi));
-  PetscCall(VecDestroy(&t->y));
+  HycoDestroyAll(&t->dense, &t->f, &t->lo, &t->hi, &t->y);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -109,8 +101,7 @@ PetscErrorCode HycoTaoDestroy(HycoTao *t)
   PetscCall(Reset(*t));
   PetscCall(ResetDense(*t));
   PetscCall(VecDestroy(&(*t)->placed));
-  PetscCall(PetscFree((*t)->last));
-  PetscCall(PetscFree(*t));
+  HycoFreeAll(&(*t)->last, t);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -468,8 +459,7 @@ static PetscErrorCode SetForceBounds(HycoTao t, Vec z)
 
   PetscFunctionBegin;
   if (t->tao->XL && !blocks && t->n_free == t->lcp->p) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecDuplicate(z, &lo));
-  PetscCall(VecDuplicate(z, &hi));
+  HycoVecDuplicate(z, &lo, &hi);
   PetscCall(VecSet(hi, PETSC_INFINITY));
   PetscCall(VecGetArrayWrite(lo, &l));
   for (PetscInt i = 0; i < t->lcp->p + t->lcp->n; i++) l[i] = i < t->lcp->p ? PETSC_NINFINITY : 0;
@@ -480,8 +470,7 @@ static PetscErrorCode SetForceBounds(HycoTao t, Vec z)
   PetscCall(VecRestoreArrayWrite(lo, &l));
   PetscCall(TaoSetVariableBounds(t->tao, lo, hi));
   t->n_free = blocks ? -1 : t->lcp->p;
-  PetscCall(VecDestroy(&lo));
-  PetscCall(VecDestroy(&hi));
+  HycoDestroyAll(&lo, &hi);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -556,14 +545,12 @@ static PetscErrorCode CopyDense(HycoTao t, const HycoLCP *lcp)
     PetscCall(ResetDense(t));
     PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, lcp->n, lcp->n, NULL, &t->dense));
     PetscCall(MatCreateVecs(t->dense, &t->y, &t->f));
-    PetscCall(VecDuplicate(t->y, &t->lo));
-    PetscCall(VecDuplicate(t->y, &t->hi));
+    HycoVecDuplicate(t->y, &t->lo, &t->hi);
   }
   PetscCall(MatDenseGetArray(t->dense, &h));
   PetscCall(PetscArraycpy(h, lcp->M, (size_t)lcp->n * (size_t)lcp->n));
   PetscCall(MatDenseRestoreArray(t->dense, &h));
-  PetscCall(MatAssemblyBegin(t->dense, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(t->dense, MAT_FINAL_ASSEMBLY));
+  PetscCall(HycoMatAssemble(t->dense));
   /* The matrix is used again for a problem of the same size, which may have another symmetry. */
   PetscCall(MatSetOption(t->dense, MAT_SYMMETRIC, lcp->symmetric));
   PetscCall(VecSet(t->y, 0));
@@ -598,7 +585,6 @@ PetscErrorCode HycoTaoSolveLCP(HycoTao t, const HycoLCP *lcp, PetscBool active[]
                                PetscBool *solved)
 {
   const PetscInt limit = t->max_its ? t->max_its : 50 + 4 * lcp->n;
-  const PetscScalar *y;
 
   PetscFunctionBegin;
   if (t->traits & HYCO_TAO_OWN) {
@@ -618,9 +604,7 @@ PetscErrorCode HycoTaoSolveLCP(HycoTao t, const HycoLCP *lcp, PetscBool active[]
   }
   PetscCall(CopyDense(t, lcp));
   PetscCall(HycoTaoSolve(t, t->dense, t->f, t->lo, t->hi, t->y, its, solved));
-  PetscCall(VecGetArrayRead(t->y, &y));
-  PetscCall(PetscArraycpy(z, y, lcp->n));
-  PetscCall(VecRestoreArrayRead(t->y, &y));
+  PetscCall(HycoVecRead(t->y, lcp->n, z));
   Clean(lcp, z);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

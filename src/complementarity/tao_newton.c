@@ -265,8 +265,7 @@ static PetscErrorCode GatherHessian(Mat H, PetscInt N, PetscReal M[])
   PetscCall(PetscArraycpy(M, entries, (size_t)N * (size_t)N));
   PetscCall(MatDenseRestoreArrayRead(whole[0], &entries));
   PetscCall(MatDestroySubMatrices(1, &whole));
-  PetscCall(ISDestroy(&all));
-  PetscCall(MatDestroy(&dense));
+  HycoDestroyAll(&all, &dense);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -274,33 +273,24 @@ static PetscErrorCode GatherHessian(Mat H, PetscInt N, PetscReal M[])
    takes its part. */
 static PetscErrorCode StepByLemke(Model *m, HycoLCPStatus *status)
 {
-  const PetscScalar *q;
   PetscScalar *d;
-  PetscReal *M, *z;
+  PetscReal *M, *q, *z;
   PetscInt N, its;
-  VecScatter to_all;
-  Vec every;
 
   PetscFunctionBegin;
   PetscCall(VecGetSize(m->x, &N));
-  PetscCall(PetscCalloc2((size_t)N * (size_t)N, &M, N, &z));
+  PetscCall(PetscCalloc3((size_t)N * (size_t)N, &M, N, &q, N, &z));
   PetscCall(GatherHessian(m->H, N, M));
   /* d = lo - x: then w = g + H (lo - x) is q. */
   PetscCall(VecWAXPY(m->d, -1, m->x, m->lo));
   PetscCall(MatMultAdd(m->H, m->d, m->g, m->w));
-  PetscCall(VecScatterCreateToAll(m->w, &to_all, &every));
-  PetscCall(VecScatterBegin(to_all, m->w, every, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecScatterEnd(to_all, m->w, every, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecGetArrayRead(every, &q));
+  PetscCall(HycoVecGather(m->w, q));
   PetscCall(HycoLCPLemke(N, M, q, PetscMax(1, m->tao->max_it - m->tao->niter), z, &its, status));
-  PetscCall(VecRestoreArrayRead(every, &q));
   m->tao->niter += its;
   PetscCall(VecGetArray(m->d, &d));
   for (PetscInt i = 0; i < m->n; i++) d[i] += z[m->first + i];
   PetscCall(VecRestoreArray(m->d, &d));
-  PetscCall(VecScatterDestroy(&to_all));
-  PetscCall(VecDestroy(&every));
-  PetscCall(PetscFree2(M, z));
+  PetscCall(PetscFree3(M, q, z));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -422,9 +412,7 @@ PetscErrorCode HycoTaoNewton(Tao tao, PetscBool lemke)
 
   PetscFunctionBegin;
   PetscCall(Read(tao, lemke, &m));
-  PetscCall(VecDuplicate(m.x, &m.d));
-  PetscCall(VecDuplicate(m.x, &m.w));
-  PetscCall(VecDuplicate(m.x, &m.p));
+  HycoVecDuplicate(m.x, &m.d, &m.w, &m.p);
   PetscCall(VecMedian(m.lo, m.x, m.hi, m.x));
   PetscCall(PetscObjectStateIncrease((PetscObject)m.x)); /* VecMedian() does not on ranks without rows, whose cached
                                                             norm would then remain, and only there */
@@ -434,8 +422,6 @@ PetscErrorCode HycoTaoNewton(Tao tao, PetscBool lemke)
   PetscCall(Show(&m, m.f, residual, 0));
   PetscCall((*tao->ops->convergencetest)(tao, tao->cnvP));
   while (tao->reason == TAO_CONTINUE_ITERATING) PetscCall(Iterate(&m, lemke ? StepByLemke : StepByActiveSet));
-  PetscCall(VecDestroy(&m.d));
-  PetscCall(VecDestroy(&m.w));
-  PetscCall(VecDestroy(&m.p));
+  HycoDestroyAll(&m.d, &m.w, &m.p);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -143,8 +143,7 @@ PetscErrorCode HycoContactMeasure(HycoFE fe, HycoPairs *pairs, const PetscReal u
   }
   if (state->overlap <= HYCO_ROUNDING * HycoMeshLength(fe->mesh)) state->overlap = 0;
   PetscCall(PetscFree2(normal, gap));
-  PetscCall(PetscFree(sizes[0].size));
-  PetscCall(PetscFree(sizes[1].size));
+  HycoFreeAll(&sizes[0].size, &sizes[1].size);
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

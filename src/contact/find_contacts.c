@@ -272,7 +272,6 @@ static PetscErrorCode FindAll(HycoFE fe, HycoPairs *pairs)
 PetscErrorCode HycoPairsFind(HycoScene scene, DM dm, const HycoSurfaceFacts facts[], HycoPairs *pairs)
 {
   HycoFE fe;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(PetscMemzero(pairs, sizeof(*pairs)));
@@ -281,9 +280,6 @@ PetscErrorCode HycoPairsFind(HycoScene scene, DM dm, const HycoSurfaceFacts fact
   PetscCall(HycoFECreate(scene, dm, &fe));
   /* Borrowed for the setup alone: the facts end with the caller. */
   pairs->facts = facts;
-  ierr = FindAll(fe, pairs);
-  pairs->facts = NULL;
-  PetscCall(HycoFEDestroy(&fe));
-  PetscCall(ierr);
+  HycoFinally(FindAll(fe, pairs), pairs->facts = NULL; PetscCall(HycoFEDestroy(&fe)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

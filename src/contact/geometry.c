@@ -163,7 +163,6 @@ static PetscErrorCode KeepGeometry(HycoFE fe, HycoPairs *pairs, const PetscReal 
 PetscErrorCode HycoContactGeometry(HycoFE fe, HycoPairs *pairs, PetscReal normal[], PetscReal gap[])
 {
   PetscReal *work;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   if (fe->drawn && pairs->drawn == fe->drawn && !fe->n_turned) {
@@ -173,9 +172,7 @@ PetscErrorCode HycoContactGeometry(HycoFE fe, HycoPairs *pairs, PetscReal normal
   }
   PetscCall(HycoPairsMove(fe, pairs));
   PetscCall(PetscMalloc1(3 * fe->mesh->n_nodes + 6 * pairs->n, &work));
-  ierr = Geometry(fe, pairs, work, normal, gap);
-  PetscCall(PetscFree(work));
-  PetscCall(ierr);
+  HycoFinally(Geometry(fe, pairs, work, normal, gap), PetscCall(PetscFree(work)));
   PetscCall(HycoContactCheck(fe, pairs, normal, gap));
   PetscCall(KeepGeometry(fe, pairs, normal, gap));
   PetscFunctionReturn(PETSC_SUCCESS);

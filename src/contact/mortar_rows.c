@@ -152,10 +152,7 @@ static PetscErrorCode AddPiece(Mortar *s, const HycoPlane *plane, const HycoSide
   HycoPieceCut(plane->dim, slave, &master, &piece);
   /* The nearer of two layers is kept by the limit on the height, and slivers of round-off would only add masters. */
   if (!(piece.size > ROUND_OFF * s->size) || Height(slave, &master, &piece) > limit) PetscFunctionReturn(PETSC_SUCCESS);
-  if (s->n_blocks == s->room_blocks) {
-    s->room_blocks = 2 * s->room_blocks + 16;
-    PetscCall(PetscRealloc((size_t)s->room_blocks * sizeof(Block), &s->block));
-  }
+  HycoGrow(s->n_blocks, s->room_blocks, s->block);
   b = &s->block[s->n_blocks++];
   b->nf = master.nf;
   PetscCall(PetscArraycpy(b->node, master.node, master.nf));
@@ -268,10 +265,7 @@ static PetscErrorCode MakeDual(Mortar *s, const HycoSide *slave, PetscBool *usab
 static PetscErrorCode AddTerm(Mortar *s, PetscInt row, PetscInt node, PetscReal value)
 {
   PetscFunctionBegin;
-  if (s->n_terms == s->room_terms) {
-    s->room_terms = 2 * s->room_terms + 1024;
-    PetscCall(PetscRealloc((size_t)s->room_terms * sizeof(Term), &s->term));
-  }
+  HycoGrow(s->n_terms, s->room_terms, s->term);
   s->term[s->n_terms++] = (Term){row, node, value};
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -493,12 +487,8 @@ static PetscErrorCode Integrate(Mortar *s, PetscInt index, PetscInt n, const Pet
 /* The slave's and the master's groups are those of t. */
 static PetscErrorCode Run(Mortar *s, PetscInt index, PetscInt n, const PetscInt slave[], HycoPairs *pairs)
 {
-  PetscErrorCode ierr;
-
   PetscFunctionBegin;
-  ierr = Integrate(s, index, n, slave, pairs);
-  PetscCall(MortarDestroy(s));
-  PetscCall(ierr);
+  HycoFinally(Integrate(s, index, n, slave, pairs), PetscCall(MortarDestroy(s)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

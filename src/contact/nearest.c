@@ -165,10 +165,7 @@ PetscErrorCode HycoPatchesDestroy(HycoPatches *patches)
 {
   PetscFunctionBegin;
   if (!*patches) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscFree((*patches)->item));
-  PetscCall(PetscFree((*patches)->box));
-  PetscCall(PetscFree((*patches)->turn));
-  PetscCall(PetscFree(*patches));
+  HycoFreeAll(&(*patches)->item, &(*patches)->box, &(*patches)->turn, patches);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -104,16 +104,13 @@ PetscErrorCode HycoContactCountStill(HycoFE fe, const HycoPairs *pairs, const Pe
 {
   HycoPairs still;
   PetscReal *normal, *gap;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(FixedAtObstacles(fe, pairs, &still));
   *n = still.n;
   for (PetscInt k = 0; k < pairs->n; k++) *n += start[k + 1] == start[k] && !HycoPairsAlone(fe->scene, pairs, k);
   PetscCall(PetscMalloc2(3 * still.n, &normal, still.n, &gap));
-  ierr = CheckObstacles(fe, &still, normal, gap);
-  PetscCall(PetscFree2(normal, gap));
-  PetscCall(HycoPairsDestroy(&still));
-  PetscCall(ierr);
+  HycoFinally(CheckObstacles(fe, &still, normal, gap), PetscCall(PetscFree2(normal, gap));
+              PetscCall(HycoPairsDestroy(&still)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

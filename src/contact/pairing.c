@@ -219,16 +219,13 @@ PetscErrorCode HycoMasterSearchMatch(HycoContact c, HycoFE fe, PetscInt index, P
   HycoMasterSearch t;
   HycoMatch m = {0};
   PetscInt *slave;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoMasterSearchCreate(fe, c, nodes, &t));
   PetscCall(FindSlaves(&t, &m.n, &slave));
   m.slave = slave;
-  ierr = Match(&t, c, index, settle, remedy, &m, pairs);
-  PetscCall(PetscFree(slave));
-  PetscCall(HycoMasterSearchDestroy(&t));
-  PetscCall(ierr);
+  HycoFinally(Match(&t, c, index, settle, remedy, &m, pairs), PetscCall(PetscFree(slave));
+              PetscCall(HycoMasterSearchDestroy(&t)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -51,14 +51,12 @@ PetscErrorCode HycoContactPressures(MPI_Comm comm, HycoFE fe, const HycoPairs *p
 {
   HycoMesh m = fe->mesh;
   PetscReal *size, *force;
-  PetscMPIInt ranks;
   PetscSF sf = NULL;
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < pairs->n; k++) pressure[k] = area[k] > 0 ? lambda[k] / area[k] : 0;
   if (fe->formulation != HYCO_AXISYMMETRIC || !HycoMeshIsQuadratic(m)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCallMPI(MPI_Comm_size(comm, &ranks));
-  if (ranks > 1) PetscCall(HycoMeshNodeSF(comm, m, m->n_nodes, m->node_global, &sf));
+  if (HycoSize(comm) > 1) PetscCall(HycoMeshNodeSF(comm, m, m->n_nodes, m->node_global, &sf));
   PetscCall(PetscMalloc2(m->n_nodes, &size, m->n_nodes, &force));
   for (PetscInt c = 0; c < fe->scene->n_contacts; c++) {
     PetscCall(PetscArrayzero(size, m->n_nodes));

@@ -74,7 +74,6 @@ static PetscErrorCode FindOne(HycoScene s, HycoMesh m, PetscInt k, Found *found)
   PetscInt slave, master, *node;
   PetscBool *on;
   HycoPatches patches;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoMeshFindGroup(m, "tie", tie->slave, &slave));
@@ -85,11 +84,8 @@ static PetscErrorCode FindOne(HycoScene s, HycoMesh m, PetscInt k, Found *found)
   PetscCall(PetscMalloc1(m->n_facets * m->nf, &node));
   PetscCall(PetscCalloc1(m->n_nodes, &on));
   PetscCall(MakePatches(m, master, node, on, &patches));
-  ierr = Project(s, m, k, slave, patches, on, found);
-  PetscCall(HycoPatchesDestroy(&patches));
-  PetscCall(PetscFree(node));
-  PetscCall(PetscFree(on));
-  PetscCall(ierr);
+  HycoFinally(Project(s, m, k, slave, patches, on, found), PetscCall(HycoPatchesDestroy(&patches));
+              HycoFreeAll(&node, &on));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -154,13 +150,6 @@ static PetscErrorCode SharedCreate(HycoScene s, HycoMesh m, Shared *shared)
     PetscCall(HycoMeshFindGroup(m, "contact", s->contact[k]->slave, &shared->group[shared->n_groups++]));
   for (PetscInt i = 0; i < m->n_nodes && s->formulation == HYCO_AXISYMMETRIC; i++)
     shared->held[i] |= m->xyz[3 * i] <= 1e-9 * HycoMeshLength(m);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode SharedDestroy(Shared *shared)
-{
-  PetscFunctionBegin;
-  HycoFreeAll(&shared->group, &shared->held);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -269,7 +258,7 @@ static PetscErrorCode FindAllMeans(HycoScene s, HycoMesh m, Found *found)
   for (PetscInt k = 0; k < s->n_ties; k++) {
     if (s->tie[k].mortar) PetscCall(FindMeans(fe, k, &shared, found));
   }
-  PetscCall(SharedDestroy(&shared));
+  HycoFreeAll(&shared.group, &shared.held);
   PetscCall(HycoFEDestroy(&fe));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -368,7 +357,6 @@ static PetscErrorCode Find(HycoScene s, HycoMesh m, Found *found, HycoTies *ties
 PetscErrorCode HycoTiesFind(HycoScene s, HycoMesh m, HycoTies *ties)
 {
   Found found;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   *ties = NULL;
@@ -377,10 +365,8 @@ PetscErrorCode HycoTiesFind(HycoScene s, HycoMesh m, HycoTies *ties)
   PetscCall(HycoPairsReserve(&found.mean, 0, 0));
   PetscCall(
       PetscMalloc4(m->n_nodes, &found.tie, m->n_nodes, &found.row, m->n_nodes, &found.at, s->n_ties, &found.tolerance));
-  ierr = Find(s, m, &found, ties);
-  PetscCall(PetscFree4(found.tie, found.row, found.at, found.tolerance));
-  PetscCall(HycoPairsDestroy(&found.mean));
-  PetscCall(ierr);
+  HycoFinally(Find(s, m, &found, ties), PetscCall(PetscFree4(found.tie, found.row, found.at, found.tolerance));
+              PetscCall(HycoPairsDestroy(&found.mean)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

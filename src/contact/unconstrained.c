@@ -124,7 +124,6 @@ static PetscErrorCode Spectrum(const Shapes *s, const PetscInt sense[], const Pe
 {
   const PetscInt k = s->k;
   PetscBLASInt n, one = 1, lwork, info;
-  PetscMPIInt rank;
   PetscReal *work;
 
   PetscFunctionBegin;
@@ -133,8 +132,7 @@ static PetscErrorCode Spectrum(const Shapes *s, const PetscInt sense[], const Pe
   PetscCall(PetscMalloc1(lwork, &work));
   PetscCall(PetscArrayzero(A, k * k));
   PetscCall(PetscArrayzero(M, k * k));
-  PetscCallMPI(MPI_Comm_rank(s->comm, &rank));
-  for (PetscInt a = 0; a < k && rank == 0; a++)
+  for (PetscInt a = 0; a < k && HycoRank(s->comm) == 0; a++)
     M[a * k + a] = 1e-3 * (PetscReal)(s->all + 1) / HycoFEUnknowns(s->fe); /* bodies that move together have no
                                                                               relative displacement */
   for (PetscInt i = 0; i < s->m; i++) {

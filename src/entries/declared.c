@@ -79,9 +79,7 @@ PetscErrorCode HycoDeclaredDestroy(HycoDeclared *d)
 {
   PetscFunctionBegin;
   for (PetscInt j = 0; j < d->n; j++) {
-    PetscCall(PetscFree(d->entry[j].name));
-    PetscCall(PetscFree(d->entry[j].title));
-    PetscCall(PetscFree(d->entry[j].text));
+    HycoFreeAll(&d->entry[j].name, &d->entry[j].title, &d->entry[j].text);
     PetscCall(HycoExprDestroy(&d->entry[j].expr));
   }
   d->n = 0;

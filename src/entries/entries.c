@@ -82,8 +82,7 @@ PetscErrorCode HycoEntriesOverride(PetscOptions options, PetscBool method_only)
     PetscCall(GetLong(NULL, keys[k], &value));
     PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-%s", keys[k]));
     PetscCall(PetscOptionsSetValue(options, dashed, value));
-    PetscCall(PetscFree(value));
-    PetscCall(PetscFree(keys[k]));
+    HycoFreeAll(&value, &keys[k]);
   }
   PetscCall(PetscFree(keys));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -140,8 +139,7 @@ PetscErrorCode HycoEntriesList(HycoScene scene)
     keys[scene->n_entries] = keys[k];
     if (strlen(keys[k]) > 5 && strcmp(keys[k] + strlen(keys[k]) - 5, "_view") == 0 &&
         HycoOptionFind(keys[k])) { /* options of this run, not part of the scene's description */
-      PetscCall(PetscFree(*value));
-      PetscCall(PetscFree(keys[scene->n_entries]));
+      HycoFreeAll(value, &keys[scene->n_entries]);
     } else
       scene->n_entries++;
   }
@@ -224,17 +222,13 @@ static PetscErrorCode Insert(PetscOptions options, const char file[], char text[
 static PetscErrorCode ReadYAML(PetscOptions options, const char file[])
 {
   char message[HYCO_LINE], *text;
-  PetscErrorCode caught, ierr;
+  PetscErrorCode caught;
 
   PetscFunctionBegin;
   HycoCheck(IsText(file), "%s is not valid YAML for hyco: it contains a zero byte, or cannot be read", file);
   PetscCall(ReadText(file, &text));
-  ierr = text ? HycoEntriesCheck(text, file) : PETSC_SUCCESS;
-  if (ierr) PetscCall(PetscFree(text));
-  PetscCall(ierr);
-  PetscCall(HycoCatchBegin());
-  caught = Insert(options, file, text);
-  PetscCall(HycoCatchEnd(caught, message));
+  HycoOnError(text ? HycoEntriesCheck(text, file) : PETSC_SUCCESS, PetscCall(PetscFree(text)));
+  HycoCatch(Insert(options, file, text), caught, message);
   PetscCall(PetscFree(text));
   HycoCheck(!caught || !strstr(message, "max number of options"),
             "%s has more than 512 entries, the limit of this PETSc (%d.%d); combine entries into one expression, or "

@@ -20,9 +20,7 @@ PetscErrorCode HycoExprDestroy(HycoExpr *expr)
   PetscFunctionBegin;
   if (!*expr) PetscFunctionReturn(PETSC_SUCCESS);
   if ((*expr)->parser) mupRelease((*expr)->parser);
-  PetscCall(PetscFree((*expr)->key));
-  PetscCall(PetscFree((*expr)->text));
-  PetscCall(PetscFree(*expr));
+  HycoFreeAll(&(*expr)->key, &(*expr)->text, expr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -146,15 +144,11 @@ static PetscErrorCode Parse(HycoExpr e, PetscInt n, const char *const names[])
 PetscErrorCode HycoExprCreate(const char key[], const char text[], PetscInt n, const char *const names[],
                               HycoExpr *expr)
 {
-  PetscErrorCode ierr;
-
   PetscFunctionBegin;
   PetscCall(PetscNew(expr));
   PetscCall(PetscStrallocpy(key, &(*expr)->key));
   PetscCall(PetscStrallocpy(text, &(*expr)->text));
-  ierr = Parse(*expr, n, names);
-  if (ierr) PetscCall(HycoExprDestroy(expr));
-  PetscCall(ierr);
+  HycoOnError(Parse(*expr, n, names), PetscCall(HycoExprDestroy(expr)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -201,14 +201,11 @@ static PetscErrorCode ScanAll(Scan *s, yaml_parser_t *parser)
 {
   PetscBool more = PETSC_TRUE;
   yaml_event_t event;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   while (more && yaml_parser_parse(parser, &event)) {
     more = (PetscBool)(event.type != YAML_STREAM_END_EVENT);
-    ierr = TakeEvent(s, &event);
-    yaml_event_delete(&event);
-    PetscCall(ierr);
+    HycoFinally(TakeEvent(s, &event), yaml_event_delete(&event));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -226,8 +223,7 @@ PetscErrorCode HycoEntriesCheck(const char text[], const char file[])
   ierr = ScanAll(&s, &parser);
   yaml_parser_delete(&parser);
   for (PetscInt k = 0; k < s.n; k++) PetscCall(PetscFree(s.key[k]));
-  PetscCall(PetscFree(s.key));
-  PetscCall(PetscFree(s.line_of));
+  HycoFreeAll(&s.key, &s.line_of);
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

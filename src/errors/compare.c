@@ -93,8 +93,7 @@ static PetscErrorCode DestroyCompared(HycoContained contained)
   PetscFunctionBegin;
   PetscCall(HycoComparisonDestroy(&k->rows));
   PetscCall(HycoNormsDestroy(&k->norms));
-  PetscCall(PetscFree(k->V));
-  PetscCall(PetscFree(k));
+  HycoFreeAll(&k->V, &k);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

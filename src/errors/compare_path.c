@@ -104,7 +104,6 @@ static PetscErrorCode Compare(HycoROM m, PetscInt n, const PetscReal mu[], const
 {
   PetscInt reached;
   HycoLost *lost;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
@@ -116,9 +115,7 @@ static PetscErrorCode Compare(HycoROM m, PetscInt n, const PetscReal mu[], const
             (int)m->model->whole_nodes, (int)m->model->whole_cells, (int)kept->n_cells);
   /* The same steps: else the difference would contain the error of time integration. */
   PetscCall(HycoROMSetSteps(m, h->n_taken, h->taken));
-  ierr = HycoROMPredict(m, n, mu);
-  PetscCall(HycoROMSetSteps(m, 0, NULL));
-  PetscCall(ierr);
+  HycoFinally(HycoROMPredict(m, n, mu), PetscCall(HycoROMSetSteps(m, 0, NULL)));
   /* A prediction may end before the path does. */
   reached = PetscMin(kept->n, m->trace.n_listed);
   PetscCall(PetscMalloc1(reached * HYCO_N_ERRORS, &lost));

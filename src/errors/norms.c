@@ -57,11 +57,7 @@ PetscErrorCode HycoNormsDestroy(HycoNorms *norms)
 
   PetscFunctionBegin;
   if (!h) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(KSPDestroy(&h->ksp));
-  PetscCall(MatDestroy(&h->H));
-  PetscCall(MatDestroy(&h->M));
-  PetscCall(VecDestroy(&h->x));
-  PetscCall(VecDestroy(&h->y));
+  HycoDestroyAll(&h->ksp, &h->H, &h->M, &h->x, &h->y);
   PetscCall(HycoFEDestroy(&h->fe));
   PetscCall(PetscFree(*norms));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -161,8 +157,7 @@ PetscErrorCode HycoNormDual(HycoNorms h, HycoROM m, PetscBool rid_only, const Pe
   PetscCall(VecCreateMPI(HycoComm(h->f), dim * (order ? order->n[HYCO_ON_NODES] : h->f->part->n_nodes), PETSC_DETERMINE,
                          &file));
   HycoOnRoot(HycoComm(h->f), AddForces(h, m, rid_only, L, minus, file, &any));
-  PetscCall(VecAssemblyBegin(file));
-  PetscCall(VecAssemblyEnd(file));
+  PetscCall(HycoVecAssemble(file));
   PetscCall(VecGetArrayRead(file, &rows));
   PetscCall(SetFromRows(h, rows));
   PetscCall(VecRestoreArrayRead(file, &rows));

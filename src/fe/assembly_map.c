@@ -18,10 +18,7 @@ PetscErrorCode HycoAssemblyMapDestroy(HycoAssemblyMap *places)
 {
   PetscFunctionBegin;
   if (!*places) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscFree((*places)->start));
-  PetscCall(PetscFree((*places)->offset));
-  PetscCall(PetscFree((*places)->constant));
-  PetscCall(PetscFree(*places));
+  HycoFreeAll(&(*places)->start, &(*places)->offset, &(*places)->constant, places);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -13,32 +13,12 @@ PetscErrorCode HycoFEDestroy(HycoFE *fe)
   PetscCall(HycoAssemblyMapDestroy(&(*fe)->places));
   PetscCall(HycoSpringsDestroy(&(*fe)->springs));
   for (PetscInt k = 0; k < (*fe)->n_loads; k++) {
-    PetscCall(PetscFree((*fe)->shares[k].node));
-    PetscCall(PetscFree((*fe)->shares[k].share));
+    HycoFreeAll(&(*fe)->shares[k].node, &(*fe)->shares[k].share);
   }
-  PetscCall(PetscFree((*fe)->shares));
-  PetscCall(PetscFree((*fe)->constant));
-  PetscCall(PetscFree((*fe)->bbar));
-  PetscCall(PetscFree((*fe)->temperature));
-  PetscCall(PetscFree((*fe)->thermal));
-  PetscCall(PetscFree((*fe)->pin));
-  PetscCall(PetscFree((*fe)->released));
-  PetscCall(PetscFree((*fe)->X));
-  PetscCall(PetscFree((*fe)->room));
-  PetscCall(PetscFree((*fe)->mirrored));
-  PetscCall(PetscFree((*fe)->drawn_sign));
-  PetscCall(PetscFree((*fe)->fixed));
-  PetscCall(PetscFree((*fe)->oblique));
-  PetscCall(PetscFree((*fe)->oblique_at));
-  PetscCall(PetscFree((*fe)->u0));
-  PetscCall(PetscFree((*fe)->kept));
-  PetscCall(PetscFree((*fe)->kept_mean));
-  PetscCall(PetscFree((*fe)->weight));
-  PetscCall(PetscFree((*fe)->weighed_at));
-  PetscCall(PetscFree((*fe)->tangent));
-  PetscCall(PetscFree((*fe)->tangent_start));
-  PetscCall(PetscFree((*fe)->tangent_size));
-  PetscCall(PetscFree(*fe));
+  HycoFreeAll(&(*fe)->shares, &(*fe)->constant, &(*fe)->bbar, &(*fe)->temperature, &(*fe)->thermal, &(*fe)->pin,
+              &(*fe)->released, &(*fe)->X, &(*fe)->room, &(*fe)->mirrored, &(*fe)->drawn_sign, &(*fe)->fixed,
+              &(*fe)->oblique, &(*fe)->oblique_at, &(*fe)->u0, &(*fe)->kept, &(*fe)->kept_mean, &(*fe)->weight,
+              &(*fe)->weighed_at, &(*fe)->tangent, &(*fe)->tangent_start, &(*fe)->tangent_size, fe);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -186,16 +166,13 @@ PetscErrorCode HycoFECreateSurface(HycoScene scene, DM dm, HycoFE *fe)
 {
   struct _n_HycoMesh *surface;
   HycoMesh mesh;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoMeshOf(dm, scene, &mesh));
   PetscCall(PetscNew(&surface));
   *surface = *mesh;
   surface->n_cells = 0;
-  ierr = Create(scene, dm, surface, fe);
-  if (ierr) PetscCall(PetscFree(surface));
-  PetscCall(ierr);
+  HycoOnError(Create(scene, dm, surface, fe), PetscCall(PetscFree(surface)));
   (*fe)->surface = surface;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -158,8 +158,7 @@ static PetscErrorCode SetShares(HycoFE fe, PetscInt group, HycoLoadShares *s)
   }
   for (PetscInt i = 0; i < m->n_nodes; i++) n += sum[4 * i + 3] != 0; /* the corners of quad8 have negative shares */
   if (n != s->n) {
-    PetscCall(PetscFree(s->node));
-    PetscCall(PetscFree(s->share));
+    HycoFreeAll(&s->node, &s->share);
     PetscCall(PetscMalloc1(n, &s->node));
     PetscCall(PetscMalloc1(4 * n, &s->share));
     s->n = n;
@@ -373,8 +372,7 @@ PetscErrorCode HycoFEAssembleForce(HycoFE fe, Vec F)
   /* Without it ghost entries would be sent, and added to those of the owner. */
   PetscCall(VecSetOption(F, VEC_IGNORE_OFF_PROC_ENTRIES, PETSC_TRUE));
   ierr = AddForces(fe, (Into){F, NULL});
-  PetscCall(VecAssemblyBegin(F));
-  PetscCall(VecAssemblyEnd(F));
+  PetscCall(HycoVecAssemble(F));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

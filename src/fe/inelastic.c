@@ -49,11 +49,9 @@ PetscErrorCode HycoFEStateDestroy(HycoFEState *state)
 {
   PetscFunctionBegin;
   if (!state || !*state) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscFree((*state)->start));
-  PetscCall(PetscFree((*state)->value));
+  HycoFreeAll(&(*state)->start, &(*state)->value);
   for (PetscInt k = 0; k < (*state)->n_names; k++) PetscCall(PetscFree((*state)->name[k]));
-  PetscCall(PetscFree((*state)->name));
-  PetscCall(PetscFree(*state));
+  HycoFreeAll(&(*state)->name, state);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -423,7 +421,6 @@ PetscErrorCode HycoFEStepBodies(HycoFE fe, HycoBodies bodies, const PetscReal u[
 {
   const HycoFEStepReport fresh = {.dt_factor = 1, .has_potential = PETSC_TRUE};
   Batch b = {.u = u, .t0 = t0, .t1 = t1, .begin = begin, .end = end, .f_int = f_int, .tangents = tangent};
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCheck(begin != end, PETSC_COMM_SELF, PETSC_ERR_ARG_IDN, "a step begins and ends in the same state");
@@ -434,9 +431,7 @@ PetscErrorCode HycoFEStepBodies(HycoFE fe, HycoBodies bodies, const PetscReal u[
   /* Iterations of a step evaluate the same nodes. */
   PetscCall(HycoFEKeepGradients(fe));
   PetscCall(BatchCreate(fe, &b));
-  ierr = StepAll(fe, bodies, &b);
-  PetscCall(BatchDestroy(&b));
-  PetscCall(ierr);
+  HycoFinally(StepAll(fe, bodies, &b), PetscCall(BatchDestroy(&b)));
   /* Springs are in no batch; their stored energy is counted by their owners. */
   if (fe->springs && !report->failed) { /* once for all bodies */
     const PetscReal energy = HycoSpringsEnergy(fe, u);

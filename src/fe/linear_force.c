@@ -21,8 +21,7 @@ PetscErrorCode HycoLinearForceDestroy(HycoLinearForce *force)
 
   PetscFunctionBegin;
   if (!f) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoFreeAll(&f->cell, &f->node, &f->start, &f->column, &f->row, &f->K, &f->heat);
-  PetscCall(PetscFree(*force));
+  HycoFreeAll(&f->cell, &f->node, &f->start, &f->column, &f->row, &f->K, &f->heat, force);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -80,9 +79,7 @@ static PetscErrorCode ListRows(HycoLinearForce f, const PetscBool nodes[])
     f->node[f->n_rows++] = i;
     f->start[f->n_rows] = at + n;
   }
-  PetscCall(PetscFree(list));
-  PetscCall(PetscFree(first));
-  PetscCall(PetscFree(around));
+  HycoFreeAll(&list, &first, &around);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

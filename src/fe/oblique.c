@@ -83,10 +83,7 @@ PetscErrorCode HycoObliqueAdd(HycoFE fe, PetscInt support, PetscInt node, const 
   HycoCheck(best > PARALLEL,
             "%s: at node %d its direction is nearly parallel to that of another support; give both the same direction",
             key, (int)fe->mesh->node_id[node]);
-  if (fe->n_oblique == fe->room_oblique) {
-    fe->room_oblique = 2 * fe->room_oblique + 64;
-    PetscCall(PetscRealloc((size_t)fe->room_oblique * sizeof(*fe->oblique), &fe->oblique));
-  }
+  HycoGrow(fe->n_oblique, fe->room_oblique, fe->oblique);
   o = &fe->oblique[fe->n_oblique];
   *o = (HycoOblique){.node = node, .c = c, .support = support};
   PetscCall(PetscArraycpy(o->n, direction, 3));

@@ -83,8 +83,7 @@ PetscErrorCode HycoSpringsDestroy(HycoSprings *springs)
 
   PetscFunctionBegin;
   if (!s) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoFreeAll(&s->start, &s->spring, &s->facet, &s->node, &s->K);
-  PetscCall(PetscFree(*springs));
+  HycoFreeAll(&s->start, &s->spring, &s->facet, &s->node, &s->K, springs);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

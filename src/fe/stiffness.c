@@ -266,9 +266,7 @@ static PetscErrorCode CountNeighbours(HycoMesh m, PetscInt n_owned, PetscInt fir
       }
     }
   }
-  PetscCall(PetscFree(seen));
-  PetscCall(PetscFree(start));
-  PetscCall(PetscFree(around));
+  HycoFreeAll(&seen, &start, &around);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -321,15 +319,6 @@ static PetscErrorCode AddElement(HycoFE fe, PetscInt cell, const PetscReal Ae[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nodes without cells (contact nodes outside an RID) get a zero diagonal entry, so that the matrix is square. */
-static PetscErrorCode Finish(Mat A)
-{
-  PetscFunctionBegin;
-  PetscCall(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Direct addition where the map exists (sequential, second assembly on); else MatSetValues(). */
 static PetscErrorCode AddStiffness(HycoFE fe, Mat K)
 {
@@ -352,12 +341,8 @@ static PetscErrorCode AddStiffness(HycoFE fe, Mat K)
    (N/m), of the current mu and tangents. Collective. */
 PetscErrorCode HycoFEAssembleStiffness(HycoFE fe, Mat K)
 {
-  PetscErrorCode ierr;
-
   PetscFunctionBegin;
-  ierr = AddStiffness(fe, K);
-  PetscCall(Finish(K));
-  PetscCall(ierr);
+  HycoFinally(AddStiffness(fe, K), PetscCall(HycoMatAssemble(K)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -400,13 +385,9 @@ static PetscErrorCode AddH1(HycoFE fe, PetscReal length, Mat M)
 /* M of that norm, for errors of fields. Collective, also where the cells of a rank fail. */
 PetscErrorCode HycoFEAssembleH1(HycoFE fe, PetscReal length, Mat M)
 {
-  PetscErrorCode ierr;
-
   PetscFunctionBegin;
   PetscCall(MatSetOption(M, MAT_IGNORE_ZERO_ENTRIES, PETSC_TRUE)); /* the components are not coupled */
   PetscCall(MatZeroEntries(M));
-  ierr = AddH1(fe, length, M);
-  PetscCall(Finish(M));
-  PetscCall(ierr);
+  HycoFinally(AddH1(fe, length, M), PetscCall(HycoMatAssemble(M)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

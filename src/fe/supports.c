@@ -51,10 +51,8 @@ static PetscErrorCode JoinPieces(MPI_Comm comm, HycoMesh m, const PetscInt piece
 static PetscErrorCode FindParts(MPI_Comm comm, HycoMesh m, PetscInt part[], PetscInt *n_parts)
 {
   PetscInt *label, *number, n = 0;
-  PetscMPIInt size;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(comm, &size));
   for (PetscInt i = 0; i < m->n_nodes; i++) part[i] = i;
   for (PetscInt k = 0; k < m->n_cells * m->nv; k++) {
     const PetscInt a = Root(part, m->cells[k]), b = Root(part, m->cells[k - k % m->nv]);
@@ -77,7 +75,7 @@ static PetscErrorCode FindParts(MPI_Comm comm, HycoMesh m, PetscInt part[], Pets
     part[i] = part[i] == i ? n++ : part[part[i]];
   }
   *n_parts = n;
-  if (size > 1) {
+  if (HycoSize(comm) > 1) {
     PetscCall(JoinPieces(comm, m, part, label));
     /* Labels that JoinPieces() has made equal get one number, in the order of the mesh file. */
     PetscCall(HycoRankInts(comm, n, label, number, n_parts));
@@ -120,16 +118,15 @@ static PetscErrorCode Total(MPI_Comm comm, PetscInt n, Sum sum[])
 {
   MPI_Datatype type;
   MPI_Op op;
-  PetscMPIInt count, rank;
+  PetscMPIInt count;
 
   PetscFunctionBegin;
   PetscCall(PetscMPIIntCast(n, &count));
   PetscCallMPI(MPI_Type_contiguous(2, MPIU_REAL, &type));
   PetscCallMPI(MPI_Type_commit(&type));
   PetscCallMPI(MPI_Op_create(AddSums, 1, &op));
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
   /* Reduce and broadcast, not Allreduce, whose order of sums may differ between ranks. */
-  PetscCallMPI(MPI_Reduce(rank ? (void *)sum : MPI_IN_PLACE, sum, count, type, op, 0, comm));
+  PetscCallMPI(MPI_Reduce(HycoRank(comm) ? (void *)sum : MPI_IN_PLACE, sum, count, type, op, 0, comm));
   PetscCallMPI(MPI_Bcast(sum, count, type, 0, comm));
   PetscCallMPI(MPI_Op_free(&op));
   PetscCallMPI(MPI_Type_free(&type));

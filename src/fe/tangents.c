@@ -75,7 +75,6 @@ PetscErrorCode HycoFESetTangents(HycoFE fe, PetscBool all, PetscBool moved, cons
   const PetscInt n = BATCH * HycoElementGet(fe->mesh->type)->nq, ns = fe->n_sigma;
   PetscBool *same;
   Batch b = {.n = 0};
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc5(3 * n, &b.x, n, &b.temperature, HYCO_MAX_DECLARED * n, &b.constant, PetscMax(2, ns * ns) * n,
@@ -86,8 +85,6 @@ PetscErrorCode HycoFESetTangents(HycoFE fe, PetscBool all, PetscBool moved, cons
     same[k] = (PetscBool)(changed && law->linear && !HycoMaterialChanges(law, changed) &&
                           !(moved && HycoMaterialInSpace(law)));
   }
-  ierr = UpdateAll(fe, all, same, &b);
-  PetscCall(PetscFree5(b.x, b.temperature, b.constant, b.tangent, same));
-  PetscCall(ierr);
+  HycoFinally(UpdateAll(fe, all, same, &b), PetscCall(PetscFree5(b.x, b.temperature, b.constant, b.tangent, same)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -254,11 +254,7 @@ static PetscErrorCode WriteAll(HycoFOM f, HycoH5 h, const Content *c, const char
 static PetscErrorCode FreeContent(Content *c)
 {
   PetscFunctionBegin;
-  PetscCall(PetscFree(c->lambda));
-  PetscCall(PetscFree(c->head));
-  PetscCall(PetscFree(c->steps));
-  PetscCall(PetscFree(c->orders));
-  PetscCall(PetscFree(c->taken));
+  HycoFreeAll(&c->lambda, &c->head, &c->steps, &c->orders, &c->taken);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -375,13 +371,10 @@ static PetscErrorCode ReadOpened(HycoFOM f, HycoH5 h, const char key[], Content 
 static PetscErrorCode ReadContent(HycoFOM f, const char key[], Content *c)
 {
   HycoH5 h;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoH5OpenOr(f->path->checkpoint, "remove -hyco_resume", &h));
-  ierr = ReadOpened(f, h, key, c);
-  PetscCall(HycoH5Close(&h, PETSC_FALSE));
-  PetscCall(ierr);
+  HycoFinally(ReadOpened(f, h, key, c), PetscCall(HycoH5Close(&h, PETSC_FALSE)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -420,13 +413,10 @@ static PetscErrorCode ReadRows(HycoFOM f, const char name[], PetscInt first, Pet
                                PetscReal rows[])
 {
   HycoH5 h;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoH5OpenOr(f->path->checkpoint, "remove -hyco_resume", &h));
-  ierr = HycoH5ReadRows(h, name, first, n, cols, rows);
-  PetscCall(HycoH5Close(&h, PETSC_FALSE));
-  PetscCall(ierr);
+  HycoFinally(HycoH5ReadRows(h, name, first, n, cols, rows), PetscCall(HycoH5Close(&h, PETSC_FALSE)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -189,8 +189,7 @@ static PetscErrorCode PlaceGathered(HycoFOM f, HycoMesh mesh, PetscInt n, const 
   /* A counting sort, which is stable: pieces keep their order. */
   for (PetscInt k = 0; k < n; k++) sorted[place[sent[k].number]++] = sent[k];
   PetscCall(UnpackContacts(mesh, n, sorted, p));
-  PetscCall(PetscFree(sorted));
-  PetscCall(PetscFree(place));
+  HycoFreeAll(&sorted, &place);
   /* So that the gathered contacts find masters on moved positions as the ranks' own do. */
   PetscCall(HycoPairsSetSearch(f->scene, mesh, p));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -253,17 +252,14 @@ static PetscErrorCode FindOnRoot(HycoFOM f, const HycoSurfaceFacts facts[])
   HycoMesh mesh;
   Sent *got;
   PetscInt n_got, n = 0, *master;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(PetscMemzero(&whole, sizeof(whole)));
   /* Those of the failed search. */
   PetscCall(HycoPairsDestroy(&f->pairs));
   PetscCall(HycoFOMGatherSurface(f, &mesh));
-  ierr = FindWhole(f, mesh, &whole, &n_got, &got);
-  PetscCall(HycoPairsDestroy(&whole));
-  PetscCall(HycoMeshDestroy(&mesh));
-  PetscCall(ierr);
+  HycoFinally(FindWhole(f, mesh, &whole, &n_got, &got), PetscCall(HycoPairsDestroy(&whole));
+              PetscCall(HycoMeshDestroy(&mesh)));
   PetscCall(PetscMalloc1(n_got * HYCO_FACET_NODES, &master));
   for (PetscInt k = 0; k < n_got; k++) {
     PetscCall(PetscArraycpy(master + n, got[k].master, got[k].n));
@@ -309,9 +305,7 @@ static PetscErrorCode Try(HycoFOM f, const HycoSurfaceFacts facts[], PetscBool *
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(HycoCatchBegin());
-  ierr = HycoPairsFind(f->scene, f->surface->dm, facts, &f->pairs);
-  PetscCall(HycoCatchEnd(ierr, message));
+  HycoCatch(HycoPairsFind(f->scene, f->surface->dm, facts, &f->pairs), ierr, message);
   *found = (PetscBool)!ierr;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -370,17 +364,13 @@ static PetscErrorCode CountPatches(HycoFOM f)
 static PetscErrorCode FindContacts(HycoFOM f)
 {
   HycoSurfaceFacts *facts;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   /* The pairing is that of the drawing, whatever the first parameters are. */
   PetscCall(HycoFESetDrawn(f->fe));
   PetscCall(PetscMalloc1(f->scene->n_contacts, &facts));
   PetscCall(HycoLogEvent(HYCO_EVENT_SEARCH, PETSC_TRUE));
-  ierr = Search(f, facts);
-  PetscCall(HycoLogEvent(HYCO_EVENT_SEARCH, PETSC_FALSE));
-  PetscCall(PetscFree(facts));
-  PetscCall(ierr);
+  HycoFinally(Search(f, facts), PetscCall(HycoLogEvent(HYCO_EVENT_SEARCH, PETSC_FALSE)); PetscCall(PetscFree(facts)));
   PetscCall(NumberContacts(f));
   PetscCall(CountPatches(f));
   f->width = HycoPairsWidth(&f->pairs);
@@ -541,8 +531,7 @@ PetscErrorCode HycoFOMSetUpSurface(HycoFOM f)
   HycoOnEach(HycoComm(f), f->surface ? HycoFECreate(f->scene, f->surface->dm, &f->fe_surface) : PETSC_SUCCESS);
   /* Without U there is nothing to scatter. */
   if (f->gathered) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecScatterDestroy(&f->to_surface));
-  PetscCall(VecDestroy(&f->U_surface));
+  HycoDestroyAll(&f->to_surface, &f->U_surface);
   PetscCall(VecCreateSeq(PETSC_COMM_SELF, f->fe_surface->n_dof, &f->U_surface));
   PetscCall(ISCreateBlock(PETSC_COMM_SELF, dim, f->surface->n_nodes, f->surface->node_global, PETSC_COPY_VALUES, &is));
   PetscCall(VecScatterCreate(f->U, is, f->U_surface, NULL, &f->to_surface));

@@ -110,8 +110,7 @@ PetscErrorCode HycoGradientCreate(HycoScene scene, HycoGradientStore *store, Hyc
 PetscErrorCode HycoGradientDestroy(HycoGradientStore *store)
 {
   PetscFunctionBegin;
-  PetscCall(PetscFree(store->value));
-  PetscCall(PetscFree(store->kink));
+  HycoFreeAll(&store->value, &store->kink);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

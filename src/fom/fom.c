@@ -14,22 +14,8 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
   f = *fom;
   PetscCall(HycoFrictionDestroy(f));
   PetscCall(HycoPathFree(&f->path));
-  PetscCall(HycoSolverDestroy(&f->solver));
-  PetscCall(HycoSystemDestroy(&f->system));
-  PetscCall(HycoSolverDestroy(&f->given_solver));
-  PetscCall(HycoSystemDestroy(&f->given_system));
-  PetscCall(VecDestroy(&f->given_F));
-  PetscCall(MatDestroy(&f->K));
-  PetscCall(MatDestroy(&f->B));
-  PetscCall(MatDestroy(&f->Bt));
-  PetscCall(VecDestroy(&f->U));
-  PetscCall(VecDestroy(&f->Lambda));
-  PetscCall(VecDestroy(&f->F));
-  PetscCall(VecDestroy(&f->D));
-  PetscCall(VecScatterDestroy(&f->to_local));
-  PetscCall(VecScatterDestroy(&f->to_surface));
-  PetscCall(VecDestroy(&f->U_local));
-  PetscCall(VecDestroy(&f->U_surface));
+  HycoDestroyAll(&f->solver, &f->system, &f->given_solver, &f->given_system, &f->given_F, &f->K, &f->B, &f->Bt, &f->U,
+                 &f->Lambda, &f->F, &f->D, &f->to_local, &f->to_surface, &f->U_local, &f->U_surface);
   if (f->fe_surface != f->fe) PetscCall(HycoFEDestroy(&f->fe_surface));
   PetscCall(HycoFEDestroy(&f->fe));
   if (f->surface != f->part) PetscCall(HycoMeshDestroy(&f->surface));
@@ -40,18 +26,11 @@ PetscErrorCode HycoFOMDestroy(HycoFOM *fom)
   for (PetscInt k = 0; k < f->n_released; k++) PetscCall(VecDestroy(&f->released[k]));
   PetscCall(PetscFree(f->released));
   if (f->u_surface != f->u) PetscCall(PetscFree(f->u_surface));
-  PetscCall(PetscFree(f->u));
-  PetscCall(PetscFree(f->u_all));
-  PetscCall(PetscFree(f->sigma_all));
+  HycoFreeAll(&f->u, &f->u_all, &f->sigma_all);
   PetscCall(HycoFieldFileDestroy(&f->set));
-  PetscCall(PetscFree(f->contact_result));
-  PetscCall(PetscFree(f->reaction));
+  HycoFreeAll(&f->contact_result, &f->reaction);
   PetscCall(HycoGradientDestroy(&f->gradient));
-  PetscCall(PetscFree(f->lambda));
-  PetscCall(PetscFree(f->lambda_all));
-  PetscCall(PetscFree(f->needed));
-  PetscCall(PetscFree(f->sigma));
-  PetscCall(PetscFree(f->gap));
+  HycoFreeAll(&f->lambda, &f->lambda_all, &f->needed, &f->sigma, &f->gap);
   PetscCall(HycoSceneDestroy(&f->scene));
   PetscCall(PetscHeaderDestroy(fom));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -263,16 +242,12 @@ static PetscErrorCode SetUp(HycoFOM f)
    an error *fom is NULL. */
 PetscErrorCode HycoFOMCreate(MPI_Comm comm, HycoScene scene, HycoFOM *fom)
 {
-  PetscErrorCode ierr;
-
   PetscFunctionBegin;
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
   PetscCall(Create(comm, fom));
   PetscCall(PetscObjectReference((PetscObject)scene));
   (*fom)->scene = scene;
-  ierr = SetUp(*fom);
-  if (ierr) PetscCall(HycoFOMDestroy(fom));
-  PetscCall(ierr);
+  HycoOnError(SetUp(*fom), PetscCall(HycoFOMDestroy(fom)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -377,9 +352,7 @@ static PetscErrorCode AllRows(HycoFOM f, Rows *r)
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(HycoCatchBegin());
-  ierr = ComputeRows(f->fe_surface, &f->pairs, f->width, r, f->gap, &f->summary.n_still);
-  PetscCall(HycoCatchEnd(ierr, message));
+  HycoCatch(ComputeRows(f->fe_surface, &f->pairs, f->width, r, f->gap, &f->summary.n_still), ierr, message);
   failed = (PetscBool)(message[0] != '\0');
   HycoAllreduce(&failed, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(f));
   if (failed) PetscCall(RaiseWhole(f));
@@ -394,12 +367,9 @@ static PetscErrorCode Insert(HycoFOM f, PetscBool rows_changed, const Rows *r)
 {
   const PetscInt dim = f->part->dim;
   PetscInt *column, first;
-  PetscScalar *D;
 
   PetscFunctionBegin;
-  PetscCall(VecGetArray(f->D, &D));
-  PetscCall(PetscArraycpy(D, f->gap, f->pairs.n));
-  PetscCall(VecRestoreArray(f->D, &D));
+  PetscCall(HycoVecWrite(f->D, f->pairs.n, f->gap));
   if (!rows_changed) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatGetOwnershipRange(f->B, &first, NULL));
   PetscCall(PetscMalloc1(f->width * dim, &column));
@@ -450,8 +420,7 @@ static PetscErrorCode AssembleContact(HycoFOM f, PetscBool rows_changed)
   PetscCall(PetscFree3(r.start, r.dof, r.value));
   PetscCall(ierr);
   if (!f->n_contacts || !rows_changed) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(MatAssemblyBegin(f->B, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(f->B, MAT_FINAL_ASSEMBLY));
+  PetscCall(HycoMatAssemble(f->B));
   PetscCall(MatDestroy(&f->Bt)); /* a rotated normal may have added an entry to B */
   PetscCall(MatTranspose(f->B, MAT_INITIAL_MATRIX, &f->Bt));
   PetscFunctionReturn(PETSC_SUCCESS);

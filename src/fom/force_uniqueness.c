@@ -163,8 +163,7 @@ static PetscErrorCode Dependent(const Rows *r, PetscInt *dependent)
   PetscCall(HycoGramRank(n, G, &rank));
   *dependent = n - rank;
   PetscCall(PetscFree2(dof, at));
-  PetscCall(PetscFree(full));
-  PetscCall(PetscFree(G));
+  HycoFreeAll(&full, &G);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -205,13 +204,10 @@ PetscErrorCode HycoFOMCountDependent(HycoFOM f, PetscInt *dependent)
   const size_t entries = (size_t)HycoPairsWidth(&f->pairs) * (size_t)f->fe->dim * (size_t)m;
   Rows r = {m, NULL, NULL, NULL, NULL};
   PetscBool *in;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc5(m + 1, &r.start, entries, &r.dof, entries, &r.value, m, &r.gap, m, &in));
-  ierr = Count(f, &r, in, dependent);
-  PetscCall(PetscFree5(r.start, r.dof, r.value, r.gap, in));
-  PetscCall(ierr);
+  HycoFinally(Count(f, &r, in, dependent), PetscCall(PetscFree5(r.start, r.dof, r.value, r.gap, in)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -258,8 +254,6 @@ PetscErrorCode HycoRowsCountDependent(PetscInt m, PetscInt start[], PetscInt dof
     PetscCall(TakeRest(&r, in, &rest));
     PetscCall(Dependent(&rest, dependent));
   }
-  HycoFreeAll(&rest.start, &rest.dof, &rest.value);
-  PetscCall(PetscFree(in));
-  PetscCall(PetscFree(count));
+  HycoFreeAll(&rest.start, &rest.dof, &rest.value, &in, &count);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

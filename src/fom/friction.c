@@ -101,9 +101,7 @@ PetscErrorCode HycoFrictionCreate(HycoFOM f)
   PetscCall(VecCreate(HycoComm(f), &r->L));
   PetscCall(VecSetSizes(r->L, r->rows, PETSC_DETERMINE));
   PetscCall(VecSetType(r->L, VECSTANDARD));
-  PetscCall(VecDuplicate(r->L, &r->D));
-  PetscCall(VecDuplicate(r->L, &r->L_old));
-  PetscCall(VecDuplicate(r->L, &r->work));
+  HycoVecDuplicate(r->L, &r->D, &r->L_old, &r->work);
   for (PetscInt j = 0; j < N_PER_ROW; j++) PetscCall(VecDuplicate(r->L, &r->other[j]));
   PetscCall(HycoSystemCreate(HycoComm(f), &r->system));
   PetscCall(HycoSolverCreate(HycoComm(f), &r->solver));
@@ -122,18 +120,10 @@ PetscErrorCode HycoFrictionDestroy(HycoFOM f)
   if (!r) PetscFunctionReturn(PETSC_SUCCESS);
   if (r->B) PetscCall(Use(f, PETSC_FALSE)); /* the path frees its own vectors, f Lambda */
   f->pairs.shear = NULL;
-  PetscCall(HycoSolverDestroy(&r->solver));
-  PetscCall(HycoSystemDestroy(&r->system));
-  PetscCall(MatDestroy(&r->B));
-  PetscCall(MatDestroy(&r->Bt));
-  PetscCall(VecDestroy(&r->D));
-  PetscCall(VecDestroy(&r->L));
-  PetscCall(VecDestroy(&r->L_old));
-  PetscCall(VecDestroy(&r->work));
+  HycoDestroyAll(&r->solver, &r->system, &r->B, &r->Bt, &r->D, &r->L, &r->L_old, &r->work);
   for (PetscInt j = 0; j < N_PER_ROW; j++) PetscCall(VecDestroy(&r->other[j]));
   PetscCall(HycoSlipDestroy(&r->slip));
-  PetscCall(PetscFree(r->u_old));
-  PetscCall(PetscFree(f->friction));
+  HycoFreeAll(&r->u_old, &f->friction);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -178,8 +168,7 @@ static PetscErrorCode FillB(HycoFOM f, HycoFriction r, const Rows *rows)
   PetscInt first, *column;
 
   PetscFunctionBegin;
-  PetscCall(MatDestroy(&r->B));
-  PetscCall(MatDestroy(&r->Bt));
+  HycoDestroyAll(&r->B, &r->Bt);
   PetscCall(MatCreateAIJ(HycoComm(f), r->rows, f->part->n_owned * dim, PETSC_DETERMINE, f->n_nodes * dim, entries, NULL,
                          entries, NULL, &r->B));
   PetscCall(MatSetOption(r->B, MAT_NO_OFF_PROC_ENTRIES, PETSC_TRUE));
@@ -197,38 +186,27 @@ static PetscErrorCode FillB(HycoFOM f, HycoFriction r, const Rows *rows)
     PetscCall(MatSetValues(r->B, 1, &at, n, column, rows->value + lo, INSERT_VALUES));
   }
   PetscCall(PetscFree(column));
-  PetscCall(MatAssemblyBegin(r->B, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(r->B, MAT_FINAL_ASSEMBLY));
+  PetscCall(HycoMatAssemble(r->B));
   PetscCall(MatTranspose(r->B, MAT_INITIAL_MATRIX, &r->Bt));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Whether a coefficient is above 0 on some rank. */
-static PetscErrorCode Rubs(HycoFOM f, PetscBool *rubs)
-{
-  PetscFunctionBegin;
-  *rubs = HycoSlipRubs(&f->friction->slip);
-  HycoAllreduce(rubs, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The order matters: rows need the coefficients, Use() needs the matrices of the system to which it may change. */
 static PetscErrorCode Assemble(HycoFOM f, HycoFriction r, Rows *rows)
 {
-  PetscScalar *D;
   PetscBool rubs;
 
   PetscFunctionBegin;
   HycoOnEach(HycoComm(f), ComputeRows(f, r, rows));
   /* Gaps change with each step (u_old), B only with the nodes of the contacts. */
   if (!r->B || f->fe->contact_changed) PetscCall(FillB(f, r, rows));
-  PetscCall(VecGetArray(r->D, &D));
-  PetscCall(PetscArraycpy(D, rows->gap, r->rows));
-  PetscCall(VecRestoreArray(r->D, &D));
+  PetscCall(HycoVecWrite(r->D, r->rows, rows->gap));
   PetscCall(HycoSystemSetMatrices(r->system, f->K, r->Bt, r->B, PETSC_TRUE));
   PetscCall(HycoSystemSetVectors(r->system, f->F, r->D));
   PetscCall(HycoSystemSetBlocks(r->system, 2, r->slip.cone, f->pairs.n, r->slip.of, r->slip.data));
-  PetscCall(Rubs(f, &rubs));
+  /* Whether a coefficient is above 0 on some rank. */
+  rubs = HycoSlipRubs(&f->friction->slip);
+  HycoAllreduce(&rubs, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(f));
   PetscCall(Use(f, rubs));
   f->pairs.shear = &r->slip.shear;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -240,14 +218,11 @@ PetscErrorCode HycoFrictionAssemble(HycoFOM f)
   /* width: the most nodes of a contact. */
   const PetscInt entries = f->width * f->fe->dim * r->rows;
   Rows rows;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCheck(r->n_dof == f->fe_surface->n_dof, PETSC_COMM_SELF, PETSC_ERR_PLIB, "the surfaces changed along a path");
   PetscCall(PetscMalloc4(r->rows + 1, &rows.start, entries, &rows.dof, entries, &rows.value, r->rows, &rows.gap));
-  ierr = Assemble(f, r, &rows);
-  PetscCall(PetscFree4(rows.start, rows.dof, rows.value, rows.gap));
-  PetscCall(ierr);
+  HycoFinally(Assemble(f, r, &rows), PetscCall(PetscFree4(rows.start, rows.dof, rows.value, rows.gap)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -233,14 +233,12 @@ static PetscErrorCode Create(Work *o)
   PetscCall(PetscCalloc1(6 * f->scene->n_quantities + 1, &o->output));
   PetscCall(VecDuplicate(f->U, &o->U));
   PetscCall(VecCopy(f->U, o->U));
-  PetscCall(VecDuplicate(f->U, &o->r));
-  PetscCall(VecDuplicate(f->U, &o->dU));
+  HycoVecDuplicate(f->U, &o->r, &o->dU);
   for (PetscInt j = 0; j < 3; j++) PetscCall(VecDuplicate(f->U, &o->R[j]));
   if (f->n_contacts) {
     PetscCall(VecDuplicate(f->Lambda, &o->L));
     PetscCall(VecCopy(f->Lambda, o->L));
-    PetscCall(VecDuplicate(f->Lambda, &o->g));
-    PetscCall(VecDuplicate(f->Lambda, &o->dL));
+    HycoVecDuplicate(f->Lambda, &o->g, &o->dL);
     for (PetscInt j = 0; j < 5; j++) PetscCall(VecDuplicate(f->Lambda, &o->W[j]));
     PetscCall(VecNorm(f->D, NORM_INFINITY, &d));
     PetscCall(MatMult(f->B, f->U, o->g));
@@ -281,12 +279,7 @@ static PetscErrorCode Destroy(Work *o)
   PetscCall(PetscFree(o->output));
   for (PetscInt j = 0; j < 3; j++) PetscCall(VecDestroy(&o->R[j]));
   for (PetscInt j = 0; j < 5; j++) PetscCall(VecDestroy(&o->W[j]));
-  PetscCall(VecDestroy(&o->U));
-  PetscCall(VecDestroy(&o->L));
-  PetscCall(VecDestroy(&o->r));
-  PetscCall(VecDestroy(&o->g));
-  PetscCall(VecDestroy(&o->dU));
-  PetscCall(VecDestroy(&o->dL));
+  HycoDestroyAll(&o->U, &o->L, &o->r, &o->g, &o->dU, &o->dL);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -41,8 +41,7 @@ PetscErrorCode HycoPathSetUp(HycoPath p)
   for (size_t k = 0; k < sizeof(likeL) / sizeof(likeL[0]) && p->n_contacts; k++)
     PetscCall(VecDuplicate(p->Lambda, likeL[k]));
   for (PetscInt j = 0; j < HYCO_ANDERSON; j++) {
-    PetscCall(VecDuplicate(p->U, &p->dU[j]));
-    PetscCall(VecDuplicate(p->U, &p->dG[j]));
+    HycoVecDuplicate(p->U, &p->dU[j], &p->dG[j]);
     if (p->n_contacts) PetscCall(VecDuplicate(p->Lambda, &p->dL[j]));
   }
   PetscCall(PetscMalloc1(p->fe->n_dof, &p->f_local));
@@ -65,15 +64,12 @@ PetscErrorCode HycoPathFree(HycoPath *path)
     for (size_t k = 0; k < sizeof(vec) / sizeof(vec[0]); k++) PetscCall(VecDestroy(vec[k]));
   }
   for (PetscInt j = 0; j < HYCO_ANDERSON; j++) {
-    PetscCall(VecDestroy(&p->dU[j]));
-    PetscCall(VecDestroy(&p->dG[j]));
-    PetscCall(VecDestroy(&p->dL[j]));
+    HycoDestroyAll(&p->dU[j], &p->dG[j], &p->dL[j]);
   }
   PetscCall(HycoSeriesDestroy(&p->series));
   PetscCall(HycoFEStateDestroy(&p->begin));
   PetscCall(HycoFEStateDestroy(&p->end));
-  HycoFreeAll(&p->f_local, &p->u0, &p->steps, &p->orders, &p->taken);
-  PetscCall(PetscFree(*path));
+  HycoFreeAll(&p->f_local, &p->u0, &p->steps, &p->orders, &p->taken, path);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -144,23 +140,8 @@ static PetscErrorCode NoteOrder(HycoPath p, PetscReal order)
 {
   PetscFunctionBegin;
   if (order <= 0) PetscFunctionReturn(PETSC_SUCCESS);
-  if (p->n_orders == p->room_orders) {
-    p->room_orders = 2 * p->room_orders + 64;
-    PetscCall(PetscRealloc((size_t)p->room_orders * sizeof(*p->orders), &p->orders));
-  }
+  HycoGrow(p->n_orders, p->room_orders, p->orders);
   p->orders[p->n_orders++] = order;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Accepted times, which a reduced path may repeat. */
-static PetscErrorCode NoteTime(HycoPath p)
-{
-  PetscFunctionBegin;
-  if (p->n_taken == p->room_taken) {
-    p->room_taken = 2 * p->room_taken + 64;
-    PetscCall(PetscRealloc((size_t)p->room_taken * sizeof(*p->taken), &p->taken));
-  }
-  p->taken[p->n_taken++] = p->t;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -189,7 +170,9 @@ static PetscErrorCode Accept(HycoPath p, PetscReal t1, const HycoStepAttempt *a)
   p->now.kkt = PetscMax(p->now.kkt, HycoKKTMax(&p->kkt));
   p->now.most_iterations = PetscMax(p->now.most_iterations, a->iterations);
   PetscCall(NoteOrder(p, a->order));
-  PetscCall(NoteTime(p));
+  /* Accepted times, which a reduced path may repeat. */
+  HycoGrow(p->n_taken, p->room_taken, p->taken);
+  p->taken[p->n_taken++] = p->t;
   PetscCall((*p->ops->accept)(p, a));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

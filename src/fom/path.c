@@ -114,8 +114,7 @@ static PetscErrorCode Step(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tan
   PetscFunctionBegin;
   /* At each evaluation of the laws, the most frequent point that all ranks reach together. */
   if (p->interrupt) PetscCall((*p->interrupt)(p->interrupt_ctx));
-  PetscCall(VecScatterBegin(f->to_local, f->U, f->U_local, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecScatterEnd(f->to_local, f->U, f->U_local, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(HycoScatter(f->to_local, f->U, f->U_local));
   PetscCall(PetscArrayzero(p->f_local, f->fe->n_dof));
   PetscCall(VecGetArray(f->U_local, &u));
   HycoFEComplete(f->fe, u);
@@ -386,8 +385,7 @@ PetscErrorCode HycoFOMPathCreate(HycoFOM f)
   p->D = f->D;
   p->n_contacts = f->n_contacts;
   PetscCall(HycoPathSetUp(p));
-  PetscCall(VecDuplicate(f->U, &p->F_old));
-  PetscCall(VecDuplicate(f->U, &p->f_old));
+  HycoVecDuplicate(f->U, &p->F_old, &p->f_old);
   if (f->n_contacts && HycoSceneHasFriction(f->scene)) PetscCall(HycoFrictionCreate(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -17,12 +17,10 @@ static PetscErrorCode ContactForces(HycoFOM f, PetscReal force[])
   HycoContactFields c;
   Vec all, at;
   PetscScalar *v;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  ierr = HycoContactFieldsCreate(HycoComm(f), f->fe_surface, &f->pairs, f->u_surface, f->lambda, &c);
-  if (ierr) PetscCall(HycoContactFieldsDestroy(&c));
-  PetscCall(ierr);
+  HycoOnError(HycoContactFieldsCreate(HycoComm(f), f->fe_surface, &f->pairs, f->u_surface, f->lambda, &c),
+              PetscCall(HycoContactFieldsDestroy(&c)));
   PetscCall(VecDuplicate(f->U, &all));
   PetscCall(VecSet(all, 0));
   /* U_surface serves as a work vector; f->u_surface keeps the solution. */
@@ -58,8 +56,7 @@ static PetscErrorCode Reactions(HycoFOM f, PetscReal contact[], PetscReal r[])
   PetscCall(PetscArrayzero(contact, f->fe->n_dof));
   if (!f->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(ContactForces(f, contact));
-  PetscCall(PetscMalloc1(f->fe->n_dof, &along));
-  PetscCall(PetscArraycpy(along, contact, f->fe->n_dof));
+  HycoDuplicate(f->fe->n_dof, contact, &along);
   HycoFEGeneralise(f->fe, along);
   /* contact is -B^T L, the force on the bodies: what they press on the support is its opposite. */
   for (PetscInt k = 0; k < f->fe->n_dof; k++) r[k] -= HycoFESupports(f->fe, k) ? along[k] : 0;

@@ -21,17 +21,6 @@ static PetscErrorCode SetUp(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* K U = given_F. Without contacts the system is linear: one factorisation as long as K is unchanged. */
-static PetscErrorCode SolveGiven(HycoFOM f)
-{
-  PetscFunctionBegin;
-  PetscCall(HycoSystemSetMatrices(f->given_system, f->K, NULL, NULL, PETSC_TRUE));
-  PetscCall(HycoSystemSetVectors(f->given_system, f->given_F, NULL));
-  PetscCall(HycoSolverSetSystem(f->given_solver, f->given_system));
-  HycoLogged(HYCO_EVENT_SOLVE, HycoSolverSolve(f->given_solver, f->U, NULL));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* U under given forces (Lambda on rank 0, in the order of one rank). The KKT residuals are those of (16), thus they
    show what the forces violate. Collective. */
 PetscErrorCode HycoFOMSolveForces(HycoFOM f, PetscInt n, const PetscReal mu[], const PetscReal Lambda[])
@@ -54,7 +43,11 @@ PetscErrorCode HycoFOMSolveForces(HycoFOM f, PetscInt n, const PetscReal mu[], c
     PetscCall(VecAYPX(f->given_F, -1, f->F));
   }
   t->assemble = HycoNow() - begin;
-  PetscCall(SolveGiven(f));
+  /* K U = given_F. Without contacts the system is linear: one factorisation as long as K is unchanged. */
+  PetscCall(HycoSystemSetMatrices(f->given_system, f->K, NULL, NULL, PETSC_TRUE));
+  PetscCall(HycoSystemSetVectors(f->given_system, f->given_F, NULL));
+  PetscCall(HycoSolverSetSystem(f->given_solver, f->given_system));
+  HycoLogged(HYCO_EVENT_SOLVE, HycoSolverSolve(f->given_solver, f->U, NULL));
   PetscCall(HycoSolverGetSeconds(f->given_solver, &t->factor, &t->solve));
   HycoLogged(HYCO_EVENT_KKT, HycoSystemComputeKKT(f->system, f->U, f->Lambda, &f->given_kkt));
   PetscCall(HycoFOMGather(f));

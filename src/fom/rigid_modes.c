@@ -151,9 +151,7 @@ static PetscErrorCode FindReleased(HycoFOM f, const HycoMotions *free)
   f->n_turned = f->n_released;
   for (PetscInt k = 0; !ierr && k < z.n; k++) PetscCall(AddReleased(f, free->n, motion, z.all + k * free->n));
   PetscCall(VecDestroyVecs(free->n, &motion));
-  PetscCall(PetscFree(at_surface.motion));
-  PetscCall(PetscFree(z.all));
-  PetscCall(PetscFree(z.alike));
+  HycoFreeAll(&at_surface.motion, &z.all, &z.alike);
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -179,8 +177,7 @@ static PetscErrorCode ReleasedRows(HycoFOM f, PetscReal row[])
     if (node[i]) PetscCall(VecSetValue(contact, at * f->fe->dim, 1, INSERT_VALUES));
   }
   PetscCall(PetscFree(node));
-  PetscCall(VecAssemblyBegin(contact));
-  PetscCall(VecAssemblyEnd(contact));
+  PetscCall(HycoVecAssemble(contact));
   PetscCall(VecGetArray(contact, &mark));
   for (PetscInt k = 0; k < n; k++) {
     PetscCall(VecGetArrayRead(f->released[k], &v));
@@ -354,8 +351,7 @@ PetscErrorCode HycoFOMBalance(HycoFOM f)
 
     if (own >= 0) PetscCall(VecSetValue(f->F, (f->part->first + own) * dim + f->fe->pin[k] % dim, 0, INSERT_VALUES));
   }
-  PetscCall(VecAssemblyBegin(f->F));
-  PetscCall(VecAssemblyEnd(f->F));
+  PetscCall(HycoVecAssemble(f->F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -467,8 +463,7 @@ static PetscErrorCode SetNearKernel(HycoFOM f)
     for (PetscInt c = 0; c < dim && own >= 0; c++)
       PetscCall(VecSetValue(x, (f->part->first + own) * dim + c, f->fe->X[3 * i + c], INSERT_VALUES));
   }
-  PetscCall(VecAssemblyBegin(x));
-  PetscCall(VecAssemblyEnd(x));
+  PetscCall(HycoVecAssemble(x));
   PetscCall(MatNullSpaceCreateRigidBody(x, &rigid));
   PetscCall(MatNullSpaceGetVecs(rigid, NULL, &n, &v)); /* borrowed */
   PetscCall(PetscMalloc1(n, &moves));
@@ -482,14 +477,12 @@ static PetscErrorCode SetNearKernel(HycoFOM f)
       if (f->fe->fixed[i] && own >= 0)
         PetscCall(VecSetValue(moves[k], (f->part->first + own) * dim + i % dim, 0, INSERT_VALUES));
     }
-    PetscCall(VecAssemblyBegin(moves[k]));
-    PetscCall(VecAssemblyEnd(moves[k]));
+    PetscCall(HycoVecAssemble(moves[k]));
   }
   PetscCall(Orthonormalize(&n, moves));
   PetscCall(MatNullSpaceCreate(HycoComm(f), PETSC_FALSE, n, moves, &near));
   PetscCall(MatSetNearNullSpace(f->K, near));
-  PetscCall(MatNullSpaceDestroy(&near));
-  PetscCall(MatNullSpaceDestroy(&rigid));
+  HycoDestroyAll(&near, &rigid);
   for (PetscInt k = 0; k < n; k++) PetscCall(VecDestroy(&moves[k]));
   PetscCall(PetscFree(moves));
   PetscCall(VecDestroy(&x));

@@ -212,7 +212,6 @@ static PetscErrorCode CopyField(HycoFOM f, HycoSeries s, HycoH5 h, const char na
   const HycoFileOrder *order;
   PetscReal *rows = NULL;
   PetscInt n_rows;
-  PetscErrorCode ierr;
   char set[HYCO_LINE];
 
   PetscFunctionBegin;
@@ -223,9 +222,7 @@ static PetscErrorCode CopyField(HycoFOM f, HycoSeries s, HycoH5 h, const char na
   HycoFieldName(&field, k, set);
   HycoOnEach(HycoComm(f), ReadField(f, h, order, set, &field, &rows));
   PetscCall(HycoH5GetSize(h, set, &n_rows, &field.components));
-  ierr = HycoFieldFileAddRows(s->file, &field, rows);
-  PetscCall(PetscFree(rows));
-  PetscCall(ierr);
+  HycoFinally(HycoFieldFileAddRows(s->file, &field, rows), PetscCall(PetscFree(rows)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -267,27 +264,13 @@ PetscErrorCode HycoSeriesRestore(HycoFOM f)
   PetscFunctionBegin;
   for (PetscInt k = 0; s && k < f->path->n_steps; k++) {
     HycoH5 h = NULL;
-    PetscErrorCode ierr;
 
     /* Times of the checkpoint's steps, in order: the series continues where the first run's did. */
     PetscCall(HycoFieldFileBeginTime(s->file, f->path->steps[k].t));
     HycoOnEach(HycoComm(f), OpenPart(f, k, &h));
-    ierr = CopyFields(f, s, h, k);
-    PetscCall(HycoH5Close(&h, PETSC_FALSE));
-    PetscCall(ierr);
+    HycoFinally(CopyFields(f, s, h, k), PetscCall(HycoH5Close(&h, PETSC_FALSE)));
     PetscCall(HycoFieldFileEndTime(s->file));
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The list of fields last: it makes the separate file complete. */
-static PetscErrorCode AddFields(HycoSeries s)
-{
-  PetscFunctionBegin;
-  PetscCall(AddDisplacement(s));
-  PetscCall(AddState(s));
-  PetscCall(AddContacts(s));
-  if (s->part) HycoOnRoot(s->from.comm, WriteList(s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -297,7 +280,11 @@ PetscErrorCode HycoSeriesAddTime(HycoSeries s, const HycoSeriesSource *from)
   PetscFunctionBegin;
   s->from = *from;
   PetscCall(HycoFieldFileBeginTime(s->file, from->t));
-  PetscCall(AddFields(s));
+  /* The list of fields last: it makes the separate file complete. */
+  PetscCall(AddDisplacement(s));
+  PetscCall(AddState(s));
+  PetscCall(AddContacts(s));
+  if (s->part) HycoOnRoot(s->from.comm, WriteList(s));
   PetscCall(HycoFieldFileEndTime(s->file));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

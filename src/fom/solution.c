@@ -331,13 +331,9 @@ PetscErrorCode HycoFOMWriteAdd(HycoFOM f)
 /* The set is destroyed also if the file cannot be put in place. */
 PetscErrorCode HycoFOMWriteEnd(HycoFOM f)
 {
-  PetscErrorCode ierr;
-
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
   PetscCheck(f->set, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoFOMWriteBegin() before HycoFOMWriteEnd()");
-  ierr = HycoFieldFileCommit(f->set);
-  PetscCall(HycoFieldFileDestroy(&f->set));
-  PetscCall(ierr);
+  HycoFinally(HycoFieldFileCommit(f->set), PetscCall(HycoFieldFileDestroy(&f->set)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -10,8 +10,7 @@ PetscErrorCode HycoFOMToLocal(HycoFOM f, Vec v, PetscReal value[])
   PetscFunctionBegin;
   /* The scatter writes into value[] itself. */
   PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, f->fe->n_dof, value, &local));
-  PetscCall(VecScatterBegin(f->to_local, v, local, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecScatterEnd(f->to_local, v, local, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(HycoScatter(f->to_local, v, local));
   PetscCall(VecDestroy(&local));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -19,17 +18,13 @@ PetscErrorCode HycoFOMToLocal(HycoFOM f, Vec v, PetscReal value[])
 /* value[] of fe_surface's unknowns; on one rank these are all. Collective. */
 PetscErrorCode HycoFOMToSurface(HycoFOM f, Vec v, PetscReal value[])
 {
-  const PetscScalar *from;
   Vec at = f->to_surface ? f->U_surface : v;
 
   PetscFunctionBegin;
   if (f->to_surface) {
-    PetscCall(VecScatterBegin(f->to_surface, v, at, INSERT_VALUES, SCATTER_FORWARD));
-    PetscCall(VecScatterEnd(f->to_surface, v, at, INSERT_VALUES, SCATTER_FORWARD));
+    PetscCall(HycoScatter(f->to_surface, v, at));
   }
-  PetscCall(VecGetArrayRead(at, &from));
-  PetscCall(PetscArraycpy(value, from, f->fe_surface->n_dof));
-  PetscCall(VecRestoreArrayRead(at, &from));
+  PetscCall(HycoVecRead(at, f->fe_surface->n_dof, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -37,13 +32,11 @@ PetscErrorCode HycoFOMToSurface(HycoFOM f, Vec v, PetscReal value[])
    u, as forces are computed from the former. Collective. */
 PetscErrorCode HycoFOMGather(HycoFOM f)
 {
-  const PetscScalar *v;
   PetscScalar *local;
   Vec shown = f->U;
 
   PetscFunctionBegin;
-  PetscCall(VecScatterBegin(f->to_local, f->U, f->U_local, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecScatterEnd(f->to_local, f->U, f->U_local, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(HycoScatter(f->to_local, f->U, f->U_local));
   PetscCall(VecGetArray(f->U_local, &local));
   /* The vectors have the eliminated unknowns' offsets; arrays have displacements. */
   HycoFEComplete(f->fe, local);
@@ -59,9 +52,7 @@ PetscErrorCode HycoFOMGather(HycoFOM f)
   if (f->to_surface) HycoFEComplete(f->fe_surface, f->u_surface);
   if (f->n_turned) PetscCall(VecDestroy(&shown));
   if (!f->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecGetArrayRead(f->Lambda, &v));
-  PetscCall(PetscArraycpy(f->lambda, v, f->pairs.n));
-  PetscCall(VecRestoreArrayRead(f->Lambda, &v));
+  PetscCall(HycoVecRead(f->Lambda, f->pairs.n, f->lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -108,8 +99,7 @@ PetscErrorCode HycoFOMSetLambda(HycoFOM f, const PetscReal lambda[])
   if (f->size > 1) PetscCall(HycoFOMGetNumbers(f, &number));
   for (PetscInt k = 0; f->rank == 0 && k < f->n_contacts; k++)
     PetscCall(VecSetValue(f->Lambda, k, lambda[number ? number[k] : k], INSERT_VALUES));
-  PetscCall(VecAssemblyBegin(f->Lambda));
-  PetscCall(VecAssemblyEnd(f->Lambda));
+  PetscCall(HycoVecAssemble(f->Lambda));
   PetscCall(PetscFree(number));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

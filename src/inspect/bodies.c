@@ -111,8 +111,7 @@ static PetscErrorCode CountParts(HycoMesh m, PetscInt n_bodies, PetscInt n[])
   PetscBool *seen;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(m->n_nodes, &part));
-  PetscCall(PetscMalloc1(m->n_nodes, &seen));
+  PetscCall(PetscMalloc2(m->n_nodes, &part, m->n_nodes, &seen));
   for (PetscInt b = 0; b < n_bodies; b++) {
     n[b] = 0;
     for (PetscInt i = 0; i < m->n_nodes; i++) part[i] = i;
@@ -128,8 +127,7 @@ static PetscErrorCode CountParts(HycoMesh m, PetscInt n_bodies, PetscInt n[])
       n[b]++;
     }
   }
-  PetscCall(PetscFree(part));
-  PetscCall(PetscFree(seen));
+  PetscCall(PetscFree2(part, seen));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -197,8 +195,7 @@ static PetscErrorCode CountDoubled(HycoScene s, HycoMesh m, HycoBodyInspection b
       body[p->body].doubled[1] = m->node_id[q->node];
     }
   }
-  PetscCall(PetscFree(place));
-  PetscCall(PetscFree(of_surface));
+  HycoFreeAll(&place, &of_surface);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

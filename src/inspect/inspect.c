@@ -68,9 +68,7 @@ static PetscErrorCode Assemble(HycoFOM f, HycoInspection *in, const PetscReal v[
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(HycoCatchBegin());
-  ierr = HycoFOMAssemble(f, v);
-  PetscCall(HycoCatchEnd(ierr, message));
+  HycoCatch(HycoFOMAssemble(f, v), ierr, message);
   PetscCall(NamePoint(f->scene, v, place));
   HycoCheck(!ierr, "%s%s", place, message);
   HycoOnRoot(HycoComm(f), Measure(f, in, v, first));
@@ -122,14 +120,12 @@ static PetscErrorCode CheckOutputs(HycoFOM whole)
 {
   HycoFE fe = whole->fe;
   PetscReal *u, *sigma, *reaction, value[HYCO_MAX_QUANTITIES];
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   if (!fe->scene->n_quantities) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscCalloc3(fe->n_dof, &u, fe->mesh->n_cells * fe->n_sigma, &sigma, fe->n_dof, &reaction));
-  ierr = HycoQuantitiesMeasure(HycoComm(whole), fe, u, sigma, reaction, NULL, value);
-  PetscCall(PetscFree3(u, sigma, reaction));
-  PetscCall(ierr);
+  HycoFinally(HycoQuantitiesMeasure(HycoComm(whole), fe, u, sigma, reaction, NULL, value),
+              PetscCall(PetscFree3(u, sigma, reaction)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -259,8 +255,7 @@ PetscErrorCode HycoInspectionDestroy(HycoInspection *in)
 {
   PetscFunctionBegin;
   for (PetscInt k = 0; k < in->n_motions; k++) PetscCall(PetscFree(in->motion[k]));
-  PetscCall(PetscFree(in->motion));
-  PetscCall(PetscFree(in->alike));
+  HycoFreeAll(&in->motion, &in->alike);
   PetscCall(PetscFree3(in->group, in->used, in->empty));
   PetscCall(PetscFree2(in->type, in->cells));
   PetscCall(PetscFree4(in->body, in->contact, in->tie, in->variable));

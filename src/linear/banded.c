@@ -54,14 +54,12 @@ static PetscErrorCode IsLine(Mat K, PetscBool *line)
 PetscErrorCode HycoBandedSolver(PC pc)
 {
   MPI_Comm comm = PetscObjectComm((PetscObject)pc);
-  PetscMPIInt size;
   KSP each;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(comm, &size));
-  if (size > 1) { /* every rank factors all of it, which takes less time than communication */
+  if (HycoSize(comm) > 1) { /* every rank factors all of it, which takes less time than communication */
     PetscCall(PCSetType(pc, PCREDUNDANT));
-    PetscCall(PCRedundantSetNumber(pc, size));
+    PetscCall(PCRedundantSetNumber(pc, HycoSize(comm)));
     PetscCall(PCRedundantGetKSP(pc, &each));
     PetscCall(KSPSetType(each, KSPPREONLY));
     PetscCall(KSPGetPC(each, &pc));
@@ -94,8 +92,7 @@ PetscErrorCode HycoBanded(Mat K, PetscBool *thin)
   if (info.nz_used > HYCO_THIN_ROW * (PetscReal)n) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatGetOrdering(K, MATORDERINGRCM, &row, &col));
   PetscCall(Envelope(K, row, &sum));
-  PetscCall(ISDestroy(&row));
-  PetscCall(ISDestroy(&col));
+  HycoDestroyAll(&row, &col);
   *thin = (PetscBool)(sum <= HYCO_THIN_ENVELOPE * (PetscReal)n);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -43,9 +43,7 @@ static PetscErrorCode LargestEigenvalue(Mat K, PetscReal *largest)
   PetscCall(PCSetType(pc, PCJACOBI));
   PetscCall(KSPSolve(ksp, b, x));
   PetscCall(KSPComputeExtremeSingularValues(ksp, largest, &least));
-  PetscCall(KSPDestroy(&ksp));
-  PetscCall(VecDestroy(&b));
-  PetscCall(VecDestroy(&x));
+  HycoDestroyAll(&ksp, &b, &x);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -77,9 +75,7 @@ static PetscErrorCode ReadLevels(HycoConstrained c, Mat K)
     PetscCall(MatCreateVecs(v->K, &v->inverse, &v->z));
     PetscCall(MatGetDiagonal(v->K, v->inverse));
     PetscCall(VecReciprocal(v->inverse));
-    PetscCall(VecDuplicate(v->z, &v->r));
-    PetscCall(VecDuplicate(v->z, &v->d));
-    PetscCall(VecDuplicate(v->z, &v->w));
+    HycoVecDuplicate(v->z, &v->r, &v->d, &v->w);
     /* The coarsest level is solved, not smoothed. */
     if (l + 1 < c->n) PetscCall(LargestEigenvalue(v->K, &v->largest));
     if (l + 1 < c->n) PetscCall(HycoUpperBlocks(v->K, &v->product));
@@ -162,20 +158,17 @@ static PetscErrorCode Smooth(HycoLevel *v, PetscBool residual, Vec r, Vec z)
 static PetscErrorCode SolveCoarsest(HycoConstrained c, HycoLevel *v, Vec r, Vec z)
 {
   PetscBLASInt m, one = 1, info;
-  PetscScalar *mu;
+  PetscReal *mu = c->mu_all;
 
   PetscFunctionBegin;
   PetscCall(KSPSolve(c->coarse, r, z));
   if (!v->m) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatMult(v->B, z, v->mu));
-  PetscCall(VecScatterBegin(c->all, v->mu, c->mu_all, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecScatterEnd(c->all, v->mu, c->mu_all, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(HycoVecGather(v->mu, mu));
   PetscCall(PetscBLASIntCast(v->m, &m));
-  PetscCall(VecGetArray(c->mu_all, &mu));
   LAPACKpotrs_("L", &m, &one, c->S, &m, mu, &m, &info);
   for (PetscInt k = 0; k < v->m; k++) mu[k] = -mu[k];
   PetscCall(VecMAXPY(z, v->m, mu, c->Y));
-  PetscCall(VecRestoreArray(c->mu_all, &mu));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -281,19 +274,11 @@ PetscErrorCode HycoConstrainedDestroy(HycoConstrained *constrained)
   if (!c) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoConstraintsFree(c));
   for (PetscInt l = 0; l < c->n; l++) {
-    PetscCall(MatDestroy(&c->level[l].product));
-    PetscCall(VecDestroy(&c->level[l].inverse));
-    PetscCall(VecDestroy(&c->level[l].r));
-    PetscCall(VecDestroy(&c->level[l].z));
-    PetscCall(VecDestroy(&c->level[l].d));
-    PetscCall(VecDestroy(&c->level[l].w));
-    PetscCall(VecDestroy(&c->level[l].aggregate));
+    HycoDestroyAll(&c->level[l].product, &c->level[l].inverse, &c->level[l].r, &c->level[l].z, &c->level[l].d,
+                   &c->level[l].w, &c->level[l].aggregate);
   }
   PetscCall(PetscFree(c->level));
-  PetscCall(VecDestroy(&c->residual));
-  PetscCall(VecDestroy(&c->correction));
-  PetscCall(KSPDestroy(&c->ksp));
-  PetscCall(PCDestroy(&c->pc));
+  HycoDestroyAll(&c->residual, &c->correction, &c->ksp, &c->pc);
   PetscCall(PetscFree(*constrained));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -33,8 +33,7 @@ struct _n_HycoConstrained {
   PetscReal *S; /* the Cholesky factor of B K^-1 B^T, on every rank */
   Vec *Y;       /* K^-1 B^T */
   PetscInt n_Y;
-  VecScatter all;
-  Vec mu_all;
+  PetscReal *mu_all; /* a work array for their forces */
 };
 
 /* Converts K, symmetric, to the blocks of its upper triangle, for products: a third of the memory traffic. NULL: K

@@ -24,8 +24,7 @@ typedef struct {
 static PetscErrorCode KnownFree(Known *k)
 {
   PetscFunctionBegin;
-  PetscCall(PetscFree(k->at));
-  PetscCall(PetscFree(k->normal));
+  HycoFreeAll(&k->at, &k->normal);
   k->m = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -38,17 +37,10 @@ PetscErrorCode HycoConstraintsFree(HycoConstrained c)
     HycoLevel *v = &c->level[l];
 
     v->m = 0;
-    PetscCall(MatDestroy(&v->B));
-    PetscCall(MatDestroy(&v->DBt));
-    PetscCall(VecDestroy(&v->G_diagonal));
-    PetscCall(KSPDestroy(&v->G));
-    PetscCall(VecDestroy(&v->mu));
-    PetscCall(VecDestroy(&v->mu_work));
+    HycoDestroyAll(&v->B, &v->DBt, &v->G_diagonal, &v->G, &v->mu, &v->mu_work);
   }
   if (c->Y) PetscCall(VecDestroyVecs(c->n_Y, &c->Y));
-  PetscCall(PetscFree(c->S));
-  PetscCall(VecScatterDestroy(&c->all));
-  PetscCall(VecDestroy(&c->mu_all));
+  HycoFreeAll(&c->S, &c->mu_all);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -111,29 +103,12 @@ static PetscErrorCode FindAggregates(HycoLevel *fine, Mat coarse)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Gathers every rank's part of n numbers on all ranks. Constraints are few against the unknowns. */
-static PetscErrorCode AllGather(MPI_Comm comm, PetscInt n, const void *mine, MPI_Datatype type, void *all)
-{
-  PetscMPIInt size, count, *counts, *starts;
-
-  PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(comm, &size));
-  PetscCall(PetscMPIIntCast(n, &count));
-  PetscCall(PetscMalloc2(size, &counts, size, &starts));
-  PetscCallMPI(MPI_Allgather(&count, 1, MPI_INT, counts, 1, MPI_INT, comm));
-  starts[0] = 0;
-  for (PetscMPIInt r = 1; r < size; r++) starts[r] = starts[r - 1] + counts[r - 1];
-  PetscCallMPI(MPI_Allgatherv(mine, count, type, all, counts, starts, type, comm));
-  PetscCall(PetscFree2(counts, starts));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The constraints on the finest level: the entries of B at the node of unknown at[i] are the normal. Slaves have
    entries of their normal at their own node. */
 static PetscErrorCode KnownOfB(Mat K, Mat B, const PetscInt at[], Known *known)
 {
   MPI_Comm comm = PetscObjectComm((PetscObject)B);
-  PetscInt lo, hi, bs, *first;
+  PetscInt lo, hi, bs, n_all, *first;
   PetscReal *normal;
 
   PetscFunctionBegin;
@@ -154,12 +129,9 @@ static PetscErrorCode KnownOfB(Mat K, Mat B, const PetscInt at[], Known *known)
     }
     PetscCall(MatRestoreRow(B, r, &n, &col, &value));
   }
-  PetscCall(PetscMalloc1(known->m, &known->at));
-  PetscCall(PetscMalloc1(3 * known->m, &known->normal));
-  PetscCall(AllGather(comm, hi - lo, first, MPIU_INT, known->at));
-  PetscCall(AllGather(comm, 3 * (hi - lo), normal, MPIU_REAL, known->normal));
-  PetscCall(PetscFree(first));
-  PetscCall(PetscFree(normal));
+  PetscCall(HycoConcatenateAll(comm, hi - lo, first, MPIU_INT, sizeof(PetscInt), &n_all, &known->at));
+  PetscCall(HycoConcatenateAll(comm, 3 * (hi - lo), normal, MPIU_REAL, sizeof(PetscReal), &n_all, &known->normal));
+  HycoFreeAll(&first, &normal);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -175,14 +147,11 @@ static PetscErrorCode AggregatesAt(const HycoLevel *fine, const Known *known, Pe
   PetscCall(ISCreateGeneral(PETSC_COMM_SELF, known->m, known->at, PETSC_USE_POINTER, &is));
   PetscCall(VecCreateSeq(PETSC_COMM_SELF, known->m, &here));
   PetscCall(VecScatterCreate(fine->aggregate, is, here, NULL, &scatter));
-  PetscCall(VecScatterBegin(scatter, fine->aggregate, here, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecScatterEnd(scatter, fine->aggregate, here, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(HycoScatter(scatter, fine->aggregate, here));
   PetscCall(VecGetArrayRead(here, &a));
   for (PetscInt i = 0; i < known->m; i++) aggregate[i] = (PetscInt)a[i];
   PetscCall(VecRestoreArrayRead(here, &a));
-  PetscCall(VecScatterDestroy(&scatter));
-  PetscCall(VecDestroy(&here));
-  PetscCall(ISDestroy(&is));
+  HycoDestroyAll(&scatter, &here, &is);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -285,12 +254,10 @@ static PetscErrorCode CoarseB(HycoLevel *fine, const Known *known, Mat coarse_K,
     for (PetscInt j = 0; j < count[i]; j++)
       PetscCall(MatSetValue(A, i, first[i] + j, weight[3 * i + j], INSERT_VALUES));
   }
-  PetscCall(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
+  PetscCall(HycoMatAssemble(A));
   PetscCall(MatMatMult(fine->B, fine->P, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &BP));
   PetscCall(MatTransposeMatMult(A, BP, MAT_INITIAL_MATRIX, PETSC_DEFAULT, B));
-  PetscCall(MatDestroy(&BP));
-  PetscCall(MatDestroy(&A));
+  HycoDestroyAll(&BP, &A);
   PetscCall(PetscFree3(first, count, weight));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -320,13 +287,11 @@ static PetscErrorCode Redundant(Mat G, KSP *ksp)
 static PetscErrorCode SolverForG(Mat G, KSP *ksp)
 {
   MPI_Comm comm = PetscObjectComm((PetscObject)G);
-  PetscMPIInt size;
   PetscInt m;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(comm, &size));
   PetscCall(MatGetSize(G, &m, NULL));
-  if (size > 1 && m <= HYCO_ALIKE)
+  if (HycoSize(comm) > 1 && m <= HYCO_ALIKE)
     PetscCall(Redundant(G, ksp));
   else
     PetscCall(HycoDirectSolver(comm, "hyco_primal_constraints_", G, PETSC_TRUE, ksp));
@@ -347,8 +312,7 @@ static PetscErrorCode PrepareG(HycoLevel *v, PetscReal shift, PetscBool *singula
   PetscCall(MatDiagonalScale(v->DBt, v->inverse, NULL));
   PetscCall(MatMatMult(v->B, v->DBt, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &G));
   PetscCall(MatCreateVecs(v->B, NULL, &v->mu));
-  PetscCall(VecDuplicate(v->mu, &v->mu_work));
-  PetscCall(VecDuplicate(v->mu, &diagonal));
+  HycoVecDuplicate(v->mu, &v->mu_work, &diagonal);
   PetscCall(MatGetDiagonal(G, diagonal));
   PetscCall(MatGetInfo(G, MAT_GLOBAL_SUM, &info));
   PetscCall(VecMin(diagonal, NULL, &least));
@@ -380,7 +344,6 @@ static PetscErrorCode PrepareCoarsest(HycoConstrained c, HycoLevel *v, PetscBool
 {
   const PetscInt m = v->m;
   PetscBLASInt n, info;
-  const PetscScalar *column;
   Vec unit;
 
   PetscFunctionBegin;
@@ -388,21 +351,16 @@ static PetscErrorCode PrepareCoarsest(HycoConstrained c, HycoLevel *v, PetscBool
   PetscCall(VecDuplicate(v->mu, &unit));
   PetscCall(VecDuplicateVecs(v->z, m, &c->Y));
   c->n_Y = m;
-  PetscCall(VecScatterCreateToAll(v->mu, &c->all, &c->mu_all));
+  PetscCall(PetscMalloc1(m, &c->mu_all));
   PetscCall(PetscMalloc1((size_t)m * (size_t)m, &c->S));
   for (PetscInt j = 0; j < m; j++) {
     PetscCall(VecSet(unit, 0));
     PetscCall(VecSetValue(unit, j, 1, INSERT_VALUES));
-    PetscCall(VecAssemblyBegin(unit));
-    PetscCall(VecAssemblyEnd(unit));
+    PetscCall(HycoVecAssemble(unit));
     PetscCall(MatMultTranspose(v->B, unit, v->r));
     PetscCall(KSPSolve(c->coarse, v->r, c->Y[j]));
     PetscCall(MatMult(v->B, c->Y[j], v->mu));
-    PetscCall(VecScatterBegin(c->all, v->mu, c->mu_all, INSERT_VALUES, SCATTER_FORWARD));
-    PetscCall(VecScatterEnd(c->all, v->mu, c->mu_all, INSERT_VALUES, SCATTER_FORWARD));
-    PetscCall(VecGetArrayRead(c->mu_all, &column));
-    PetscCall(PetscArraycpy(c->S + (size_t)j * (size_t)m, column, m));
-    PetscCall(VecRestoreArrayRead(c->mu_all, &column));
+    PetscCall(HycoVecGather(v->mu, c->S + (size_t)j * (size_t)m));
     c->S[(size_t)j * (size_t)m + (size_t)j] *= 1 + HYCO_COARSE_SHIFT;
   }
   PetscCall(VecDestroy(&unit));

@@ -49,22 +49,18 @@ static PetscErrorCode Release(HycoDirect d)
   d->begun = PETSC_FALSE;
   d->K_id = d->B_id = 0;
   HycoFreeAll(&d->id.irn_loc, &d->id.jcn_loc, &d->id.a_loc, &d->id.perm_in, &d->id.listvar_schur, &d->rhs, &d->reduced);
-  PetscCall(VecScatterDestroy(&d->to_root));
-  PetscCall(VecDestroy(&d->root));
+  HycoDestroyAll(&d->to_root, &d->root);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* MUMPS itself is started by the first analysis. */
 PetscErrorCode HycoDirectCreate(MPI_Comm comm, HycoDirect *d)
 {
-  PetscMPIInt size;
-
   PetscFunctionBegin;
   PetscCall(PetscNew(d));
   (*d)->comm = comm;
   PetscCallMPI(MPI_Comm_rank(comm, &(*d)->rank));
-  PetscCallMPI(MPI_Comm_size(comm, &size));
-  (*d)->alone = (PetscBool)(size == 1);
+  (*d)->alone = (PetscBool)(HycoSize(comm) == 1);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -74,8 +70,7 @@ PetscErrorCode HycoDirectDestroy(HycoDirect *d)
   PetscFunctionBegin;
   if (!*d) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(Release(*d));
-  PetscCall(PetscFree((*d)->pinned));
-  PetscCall(PetscFree(*d));
+  HycoFreeAll(&(*d)->pinned, d);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -416,15 +411,10 @@ PetscErrorCode HycoDirectFactor(HycoDirect d, Mat K, Mat Bt, Mat B, PetscReal M[
    sides. */
 static PetscErrorCode Fetch(HycoDirect d, Vec v)
 {
-  const PetscScalar *r;
-
   PetscFunctionBegin;
-  PetscCall(VecScatterBegin(d->to_root, v, d->root, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecScatterEnd(d->to_root, v, d->root, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(HycoScatter(d->to_root, v, d->root));
   if (d->rank) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecGetArrayRead(d->root, &r));
-  PetscCall(PetscArraycpy(d->rhs, r, d->n));
-  PetscCall(VecRestoreArrayRead(d->root, &r));
+  PetscCall(HycoVecRead(d->root, d->n, d->rhs));
   d->id.rhs = d->rhs;
   d->id.nrhs = 1;
   d->id.lrhs = d->id.n;
@@ -436,13 +426,9 @@ static PetscErrorCode Fetch(HycoDirect d, Vec v)
 /* MUMPS returns the solution on rank 0, from which the ranks get their rows. */
 static PetscErrorCode Deliver(HycoDirect d, Vec v)
 {
-  PetscScalar *r;
-
   PetscFunctionBegin;
   if (d->rank == 0) {
-    PetscCall(VecGetArray(d->root, &r));
-    PetscCall(PetscArraycpy(r, d->rhs, d->n));
-    PetscCall(VecRestoreArray(d->root, &r));
+    PetscCall(HycoVecWrite(d->root, d->n, d->rhs));
   }
   PetscCall(VecScatterBegin(d->to_root, d->root, v, INSERT_VALUES, SCATTER_REVERSE));
   PetscCall(VecScatterEnd(d->to_root, d->root, v, INSERT_VALUES, SCATTER_REVERSE));
@@ -516,8 +502,7 @@ PetscErrorCode HycoDirectReduceMany(HycoDirect d, PetscInt k, const Vec F[], Pet
   PetscCall(CondenseMany(d, k, F, &all, &reduced));
   for (PetscInt i = 0; i < k * d->n_schur && d->rank == 0; i++)
     q[i] = i % d->n_schur < d->n_pinned ? -reduced[i] : reduced[i];
-  PetscCall(PetscFree(all));
-  PetscCall(PetscFree(reduced));
+  HycoFreeAll(&all, &reduced);
   HycoBcast(q, k * d->n_schur, MPIU_REAL, d->comm);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -537,8 +522,7 @@ PetscErrorCode HycoDirectExpandMany(HycoDirect d, PetscInt k, const Vec F[], con
     if (d->rank == 0) PetscCall(PetscArraycpy(d->rhs, all + rows * (size_t)j, d->n));
     PetscCall(Deliver(d, x[j]));
   }
-  PetscCall(PetscFree(all));
-  PetscCall(PetscFree(reduced));
+  HycoFreeAll(&all, &reduced);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

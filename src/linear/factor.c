@@ -43,11 +43,9 @@ PetscErrorCode HycoDirectSolver(MPI_Comm comm, const char prefix[], Mat K, Petsc
 {
   PC pc;
   PetscInt n;
-  PetscMPIInt size;
   PetscBool thin = PETSC_FALSE;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(comm, &size));
   PetscCall(MatGetSize(K, &n, NULL));
   PetscCall(KSPCreate(comm, ksp));
   PetscCall(KSPSetOptionsPrefix(*ksp, prefix));
@@ -59,7 +57,7 @@ PetscErrorCode HycoDirectSolver(MPI_Comm comm, const char prefix[], Mat K, Petsc
   if (symmetric && n > 3000) PetscCall(HycoBanded(K, &thin));
   if (thin)
     PetscCall(HycoBandedSolver(pc));
-  else if (size > 1 || n > 3000)
+  else if (HycoSize(comm) > 1 || n > 3000)
     PetscCall(PrepareMumps(pc, K, prefix));
   else {
     PetscCall(PCFactorSetMatSolverType(pc, MATSOLVERPETSC));

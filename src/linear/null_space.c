@@ -89,8 +89,7 @@ PetscErrorCode HycoKernelPins(MPI_Comm comm, Mat K, PetscInt n, PetscInt pinned[
     }
   }
   PetscCall(PetscSortInt(n, pinned));
-  PetscCall(PetscFree(row));
-  PetscCall(PetscFree(unit));
+  HycoFreeAll(&row, &unit);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -130,8 +129,7 @@ PetscErrorCode HycoKernelWork(Mat K, Vec x, Vec F, Vec b, PetscReal *share)
   PetscCall(MatGetNullSpace(K, &kernel));
   if (kernel) PetscCall(MatNullSpaceGetVecs(kernel, NULL, &n, &z));
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecDuplicate(F, &work));
-  PetscCall(VecDuplicate(F, &Kx));
+  HycoVecDuplicate(F, &work, &Kx);
   PetscCall(MatGetDiagonal(K, Kx));
   PetscCall(VecPointwiseMult(Kx, Kx, x));
   PetscCall(VecNorm(F, NORM_2, &norm[0]));
@@ -140,7 +138,6 @@ PetscErrorCode HycoKernelWork(Mat K, Vec x, Vec F, Vec b, PetscReal *share)
     PetscCall(WorkOn(z[k], F, b, Kx, 1e-2 * PetscMax(norm[0], norm[1]), work, &one));
     *share = PetscMax(*share, one);
   }
-  PetscCall(VecDestroy(&work));
-  PetscCall(VecDestroy(&Kx));
+  HycoDestroyAll(&work, &Kx);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

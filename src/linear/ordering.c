@@ -67,24 +67,19 @@ static PetscErrorCode Dissect(PetscInt n, const PetscInt degree[], const PetscIn
 PetscErrorCode HycoDissection(MPI_Comm comm, Mat K, PetscInt place[])
 {
   PetscInt bs, n_nodes = 0, *start, *next, n_all = 0, n_edges, *degree, *edges, *node = NULL;
-  PetscMPIInt rank;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
   PetscCall(MatGetBlockSize(K, &bs));
   PetscCall(LocalGraph(K, bs, &n_nodes, &start, &next));
   PetscCall(HycoConcatenate(comm, start[n_nodes], next, MPIU_INT, sizeof(PetscInt), &n_edges, &edges));
   for (PetscInt i = 0; i < n_nodes; i++) start[i] = start[i + 1] - start[i];
   PetscCall(HycoConcatenate(comm, n_nodes, start, MPIU_INT, sizeof(PetscInt), &n_all, &degree));
-  PetscCall(PetscFree(start));
-  PetscCall(PetscFree(next));
-  if (rank == 0) PetscCall(PetscMalloc1(n_all, &node));
+  HycoFreeAll(&start, &next);
+  if (HycoRank(comm) == 0) PetscCall(PetscMalloc1(n_all, &node));
   HycoOnRoot(comm, Dissect(n_all, degree, edges, node));
   for (PetscInt i = 0; i < n_all; i++) {
     for (PetscInt c = 0; c < bs; c++) place[i * bs + c] = node[i] * bs + c;
   }
-  PetscCall(PetscFree(node));
-  PetscCall(PetscFree(degree));
-  PetscCall(PetscFree(edges));
+  HycoFreeAll(&node, &degree, &edges);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -89,8 +89,7 @@ PetscErrorCode HycoUpperBlocks(Mat K, Mat *upper)
   }
   PetscCall(MatCreateSBAIJ(PetscObjectComm((PetscObject)K), bs, hi - lo, hi - lo, n, n, 0, here, 0, there, upper));
   for (PetscInt b = lo / bs; b < hi / bs; b++) PetscCall(CopyRow(K, b, bs, column, value, *upper));
-  PetscCall(MatAssemblyBegin(*upper, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(*upper, MAT_FINAL_ASSEMBLY));
+  PetscCall(HycoMatAssemble(*upper));
   PetscCall(PetscFree2(column, value));
   PetscCall(PetscFree2(here, there));
   PetscFunctionReturn(PETSC_SUCCESS);

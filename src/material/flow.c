@@ -336,14 +336,6 @@ static PetscBool Depends(HycoMaterial material, const PetscBool changed[])
   return (PetscBool)(changed[0] || changed[1]);
 }
 
-/* Declares the elastic constants, first in the order of constants. */
-PetscErrorCode HycoFlowBegin(HycoMaterial material)
-{
-  PetscFunctionBegin;
-  PetscCall(HycoElasticDeclare(material));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* rule: static data of the law, kept by reference. */
 PetscErrorCode HycoFlowEnd(HycoMaterial material, const HycoFlowRule *rule)
 {

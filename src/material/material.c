@@ -383,7 +383,6 @@ static PetscErrorCode RestTangents(HycoMaterial material, HycoMaterialPoints *p)
 {
   const PetscInt n = p->n * (3 * p->n_strain + 2 * material->n_state);
   PetscReal *zero;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(n, &zero));
@@ -391,9 +390,7 @@ static PetscErrorCode RestTangents(HycoMaterial material, HycoMaterialPoints *p)
   p->stress = zero + 2 * p->n * p->n_strain;
   p->state0 = zero + 3 * p->n * p->n_strain;
   p->state = zero + p->n * (3 * p->n_strain + material->n_state);
-  ierr = HycoMaterialUpdate(material, p);
-  PetscCall(PetscFree(zero));
-  PetscCall(ierr);
+  HycoFinally(HycoMaterialUpdate(material, p), PetscCall(PetscFree(zero)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

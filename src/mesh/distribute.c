@@ -34,8 +34,7 @@ static PetscErrorCode Replace(DM *dm, PetscSF sf, DM by)
   PetscCall(HycoTiesOf(*dm, &ties));
   PetscCall(HycoTiesAttach(by, ties));
   PetscCall(HycoPlexSendTags(*dm, sf, by));
-  PetscCall(PetscSFDestroy(&sf));
-  PetscCall(DMDestroy(dm));
+  HycoDestroyAll(&sf, dm);
   *dm = by;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -45,17 +44,15 @@ static PetscErrorCode Replace(DM *dm, PetscSF sf, DM by)
 static PetscErrorCode CheckParts(DM dm)
 {
   PetscInt start, end, least, all;
-  PetscMPIInt size;
 
   PetscFunctionBegin;
   PetscCall(DMPlexGetHeightStratum(dm, 0, &start, &end));
   /* Both reductions precede the check: all ranks fail together, with the same numbers. */
   least = all = end - start;
-  PetscCallMPI(MPI_Comm_size(HycoComm(dm), &size));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &least, 1, MPIU_INT, MPI_MIN, HycoComm(dm)));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &all, 1, MPIU_INT, MPI_SUM, HycoComm(dm)));
   HycoCheck(least, "scene_refine: %d cells leave one of the %d ranks without any; use fewer ranks", (int)all,
-            (int)size);
+            (int)HycoSize(HycoComm(dm)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -6,17 +6,15 @@
 static PetscErrorCode CreateSF(HycoFileOrder *o, HycoPlace place, PetscInt n, const PetscInt leaf[],
                                const PetscInt row[], PetscBool root)
 {
-  PetscMPIInt rank;
   PetscLayout layout;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_rank(o->comm, &rank));
   /* PETSC_DECIDE balances the rows; with `root` rank 0 has all and the other blocks are empty, as for formats that
      one process writes. */
   PetscCall(PetscLayoutCreateFromSizes(o->comm,
-                                       !root       ? PETSC_DECIDE
-                                       : rank == 0 ? o->all[place]
-                                                   : 0,
+                                       !root                    ? PETSC_DECIDE
+                                       : HycoRank(o->comm) == 0 ? o->all[place]
+                                                                : 0,
                                        o->all[place], 1, &layout));
   PetscCall(PetscLayoutGetRange(layout, &o->first[place], &o->n[place]));
   o->n[place] -= o->first[place];

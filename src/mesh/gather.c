@@ -301,7 +301,6 @@ static PetscErrorCode MakeSubmesh(const Gather *g, HycoMesh *sub)
 {
   PetscInt *keep, *extra, *all, n_keep = 0, n_extra = 0, n_all = 0;
   HycoMesh m;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoPlexToTables(g->root, PETSC_COMM_SELF, g->scene, &m));
@@ -318,10 +317,9 @@ static PetscErrorCode MakeSubmesh(const Gather *g, HycoMesh *sub)
   }
   /* The gathered points include cells that were only needed for their facets; the submesh drops them and makes their
      facets points. */
-  ierr = HycoSubmesh(g->scene, m, n_keep, keep, n_extra, extra, n_all, all, sub);
-  PetscCall(PetscFree3(keep, extra, all));
-  PetscCall(HycoMeshDestroy(&m));
-  PetscCall(ierr);
+  HycoFinally(HycoSubmesh(g->scene, m, n_keep, keep, n_extra, extra, n_all, all, sub),
+              PetscCall(PetscFree3(keep, extra, all));
+              PetscCall(HycoMeshDestroy(&m)));
   PetscCall(Number(g, *sub));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -343,7 +341,6 @@ PetscErrorCode HycoMeshGather(HycoScene scene, HycoMesh part, const PetscBool in
   HycoOnRoot(g.comm, MakeSubmesh(&g, mesh));
   for (PetscInt c = 0; c < N_COLUMNS; c++) PetscCall(PetscFree(g.of[c]));
   PetscCall(PetscFree(g.kind));
-  PetscCall(DMDestroy(&g.share));
-  PetscCall(DMDestroy(&g.root));
+  HycoDestroyAll(&g.share, &g.root);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -47,10 +47,7 @@ static PetscErrorCode FindEdges(HycoMesh m, const PetscBool in[], PetscInt *n, E
 
     if (e.key / m->n_nodes == e.key % m->n_nodes) continue; /* a side of a collapsed cell */
     if (!in[e.key / m->n_nodes] || !in[e.key % m->n_nodes] || (e.middle >= 0 && !in[e.middle])) continue;
-    if (count == room) {
-      room = 2 * room + 64;
-      PetscCall(PetscRealloc((size_t)room * sizeof(**edge), edge));
-    }
+    HycoGrow(count, room, *edge);
     (*edge)[count++] = e;
   }
   if (count) qsort(*edge, (size_t)count, sizeof(**edge), Ascending);

@@ -21,27 +21,10 @@ static PetscErrorCode FreeTables(void *tables)
 
   PetscFunctionBegin;
   for (PetscInt g = 0; m->group_name && g < m->n_groups; g++) PetscCall(PetscFree(m->group_name[g]));
-  PetscCall(PetscFree(m->group_name));
-  PetscCall(PetscFree(m->group_dim));
-  PetscCall(PetscFree(m->group_start));
-  PetscCall(PetscFree(m->group_node));
-  PetscCall(PetscFree(m->group_cell_start));
-  PetscCall(PetscFree(m->group_cell));
-  PetscCall(PetscFree(m->xyz));
-  PetscCall(PetscFree(m->node_id));
-  PetscCall(PetscFree(m->node_body));
-  PetscCall(PetscFree(m->node_global));
-  PetscCall(PetscFree(m->node_whole));
-  PetscCall(PetscFree(m->node_point));
-  PetscCall(PetscFree(m->cell_point));
-  PetscCall(PetscFree(m->cells));
-  PetscCall(PetscFree(m->cell_id));
-  PetscCall(PetscFree(m->cell_body));
-  PetscCall(PetscFree(m->cell_whole));
-  PetscCall(PetscFree(m->facets));
-  PetscCall(PetscFree(m->facet_group));
-  PetscCall(PetscFree(m->facet_cell));
-  PetscCall(PetscFree(m->facet_point));
+  HycoFreeAll(&m->group_name, &m->group_dim, &m->group_start, &m->group_node, &m->group_cell_start, &m->group_cell,
+              &m->xyz, &m->node_id, &m->node_body, &m->node_global, &m->node_whole, &m->node_point, &m->cell_point,
+              &m->cells, &m->cell_id, &m->cell_body, &m->cell_whole, &m->facets, &m->facet_group, &m->facet_cell,
+              &m->facet_point);
   PetscCall(HycoMeshSetTies(m, NULL));
   PetscCall(PetscFree(m));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -381,8 +364,7 @@ PetscErrorCode HycoMeshNodeCells(HycoMesh m, PetscInt **start, PetscInt **cell)
   }
   for (PetscInt i = 0; i < m->n_nodes; i++) (*start)[i + 1] += (*start)[i];
   PetscCall(PetscMalloc1((*start)[m->n_nodes], cell));
-  PetscCall(PetscMalloc1(m->n_nodes, &next));
-  PetscCall(PetscArraycpy(next, *start, m->n_nodes));
+  HycoDuplicate(m->n_nodes, *start, &next);
   for (PetscInt e = 0; e < m->n_cells; e++) {
     const PetscInt n = HycoMeshCellNodes(m, e, node);
 

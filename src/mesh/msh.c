@@ -110,13 +110,10 @@ static PetscErrorCode ReadCount(Msh *m, size_t bytes, const char what[], size_t 
 static PetscErrorCode ReadCountLine(Msh *m, size_t bytes, const char what[], size_t *n)
 {
   const int binary = m->binary;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   m->binary = 0;
-  ierr = ReadCount(m, bytes, what, n);
-  m->binary = binary;
-  PetscCall(ierr);
+  HycoFinally(ReadCount(m, bytes, what, n), m->binary = binary);
   /* The binary data begin after the line's end, of which exactly one is skipped: their first byte may be a newline
      too. */
   if (binary && m->at < m->end && *m->at == '\r') m->at++;
@@ -246,9 +243,7 @@ static PetscErrorCode SortNodes(HycoMsh *mesh)
     tag[k] = mesh->tag[order[k]];
     for (PetscInt c = 0; c < 3; c++) xyz[3 * k + c] = mesh->xyz[3 * order[k] + c];
   }
-  PetscCall(PetscFree(order));
-  PetscCall(PetscFree(mesh->tag));
-  PetscCall(PetscFree(mesh->xyz));
+  HycoFreeAll(&order, &mesh->tag, &mesh->xyz);
   mesh->tag = tag;
   mesh->xyz = xyz;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -564,10 +559,7 @@ static PetscErrorCode ReadList(Msh *m, PetscBool groups, int dim, long long enti
               m->path);
     if (!groups) continue;
     PetscCall(FindGroup(m->mesh, dim, member.group, &at));
-    if (m->n_members == m->room) {
-      m->room = 2 * m->room + 16;
-      PetscCall(PetscRealloc(m->room * sizeof(*m->member), &m->member));
-    }
+    HycoGrow(m->n_members, m->room, m->member);
     m->member[m->n_members++] = member;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -781,9 +773,7 @@ PetscErrorCode HycoMshRead(const char path[], HycoMsh *mesh)
   memset(mesh, 0, sizeof(*mesh));
   ierr = ReadAll(&m);
   if (!ierr) ierr = ReadSections(&m);
-  PetscCall(PetscFree(m.text));
-  PetscCall(PetscFree(m.name));
-  PetscCall(PetscFree(m.member));
+  HycoFreeAll(&m.text, &m.name, &m.member);
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -793,11 +783,8 @@ PetscErrorCode HycoMshDestroy(HycoMsh *mesh)
 {
   PetscFunctionBegin;
   for (PetscInt k = 0; k < mesh->n_groups; k++) {
-    PetscCall(PetscFree(mesh->group[k].id));
-    PetscCall(PetscFree(mesh->group[k].node));
+    HycoFreeAll(&mesh->group[k].id, &mesh->group[k].node);
   }
-  PetscCall(PetscFree(mesh->group));
-  PetscCall(PetscFree(mesh->tag));
-  PetscCall(PetscFree(mesh->xyz));
+  HycoFreeAll(&mesh->group, &mesh->tag, &mesh->xyz);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

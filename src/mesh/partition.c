@@ -74,8 +74,7 @@ static PetscErrorCode CellGraph(HycoMesh m, PetscInt n_pairs, const PetscInt pai
   METIS_Free(x);
   METIS_Free(a);
   PetscCall(PetscFree2(extra_of, tie));
-  PetscCall(PetscFree(start));
-  PetscCall(PetscFree(around));
+  HycoFreeAll(&start, &around);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -172,9 +171,7 @@ static PetscErrorCode Cut(const Data *d, PetscInt n_parts, PetscInt part[])
   if (d->by == HYCO_PARTITION_METIS) PetscCall(ByMetis(d->mesh->n_cells, &graph, n_parts, part, &done));
   if (!done) PetscCall(ByScotch(d->mesh->n_cells, &graph, n_parts, part));
   PetscCall(FillParts(d->mesh->n_cells, n_parts, part));
-  PetscCall(PetscFree(graph.xadj));
-  PetscCall(PetscFree(graph.adjncy));
-  PetscCall(PetscFree(graph.weight));
+  HycoFreeAll(&graph.xadj, &graph.adjncy, &graph.weight);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -459,10 +459,7 @@ static PetscErrorCode AddFacet(Builder *b, PetscInt cell, PetscInt point, PetscI
       mine = (PetscBool)(mine || b->owned[m->node_point[m->tied_master[j]] - b->v0]);
   }
   if (!mine) PetscFunctionReturn(PETSC_SUCCESS);
-  if (b->n_facets == b->room) {
-    b->room = 2 * b->room + 64;
-    PetscCall(PetscRealloc((size_t)b->room * sizeof(*b->facet), &b->facet));
-  }
+  HycoGrow(b->n_facets, b->room, b->facet);
   PetscCall(PetscArraycpy(b->facet[b->n_facets].node, node, m->nf));
   b->facet[b->n_facets].cell = cell;
   b->facet[b->n_facets].point = point;
@@ -478,10 +475,7 @@ static PetscErrorCode AddNode(Builder *b, PetscInt group, PetscInt node)
   PetscInt *n = &m->group_start[group + 1];
 
   PetscFunctionBegin;
-  if (*n == b->node_room) {
-    b->node_room = 2 * b->node_room + 64;
-    PetscCall(PetscRealloc((size_t)b->node_room * sizeof(*m->group_node), &m->group_node));
-  }
+  HycoGrow(*n, b->node_room, m->group_node);
   m->group_node[(*n)++] = node;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -494,10 +488,7 @@ static PetscErrorCode AddCell(Builder *b, PetscInt group, PetscInt cell)
   PetscInt *n = &m->group_cell_start[group + 1];
 
   PetscFunctionBegin;
-  if (*n == b->cell_room) {
-    b->cell_room = 2 * b->cell_room + 64;
-    PetscCall(PetscRealloc((size_t)b->cell_room * sizeof(*m->group_cell), &m->group_cell));
-  }
+  HycoGrow(*n, b->cell_room, m->group_cell);
   m->group_cell[(*n)++] = cell;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -885,10 +876,7 @@ PetscErrorCode HycoPlexToTables(DM dm, MPI_Comm comm, HycoScene scene, HycoMesh 
   }
   PetscCall(PetscNew(&b.m));
   ierr = FillTables(&b, comm);
-  PetscCall(PetscFree(b.owned));
-  PetscCall(PetscFree(b.node));
-  PetscCall(PetscFree(b.cell));
-  PetscCall(PetscFree(b.facet));
+  HycoFreeAll(&b.owned, &b.node, &b.cell, &b.facet);
   if (ierr) PetscCall(HycoMeshDestroy(&b.m));
   PetscCall(ierr);
   PetscCall(PetscObjectReference((PetscObject)dm));

@@ -424,11 +424,7 @@ PetscErrorCode HycoMeshRead(HycoScene scene, HycoMesh *mesh)
   PetscCall(PetscNew(&m));
   ierr = MakeTables(scene, &r, m);
   PetscCall(HycoMshDestroy(&r.file));
-  PetscCall(PetscFree(r.index));
-  PetscCall(PetscFree(r.last));
-  PetscCall(PetscFree(r.before));
-  PetscCall(PetscFree(r.start));
-  PetscCall(PetscFree(r.around));
+  HycoFreeAll(&r.index, &r.last, &r.before, &r.start, &r.around);
   /* The file's tables and the reader's are freed in any case; the mesh only after an error. */
   if (ierr) PetscCall(HycoMeshDestroy(&m));
   PetscCall(ierr);

@@ -334,15 +334,14 @@ PetscErrorCode HycoMeshRings(MPI_Comm comm, HycoScene scene, HycoMesh part, cons
                              const PetscInt node[], HycoMesh *mesh)
 {
   Packing p = {.part = part, .in = in};
-  PetscMPIInt rank, *to;
+  PetscMPIInt *to;
   PetscInt *ask, *asked, n_asked;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
   PetscCall(PetscMalloc2(n, &to, 2 * n, &ask));
   PetscCall(HycoMeshOwners(comm, part, n, node, to));
   for (PetscInt k = 0; k < n; k++) {
-    ask[2 * k] = rank;
+    ask[2 * k] = HycoRank(comm);
     ask[2 * k + 1] = node[k];
   }
   PetscCall(HycoSendRows(comm, n, to, 2 * sizeof(PetscInt), ask, &n_asked, &asked));

@@ -483,14 +483,11 @@ static PetscErrorCode Make(const Cut *c, HycoMesh *sub)
 {
   HycoMesh m = c->of;
   DM dm;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(MakeDM(PETSC_COMM_SELF, c, &dm));
   /* The tables hold the reference that counts; this function's own is released also after an error. */
-  ierr = HycoPlexToMesh(dm, c->scene, sub);
-  PetscCall(DMDestroy(&dm));
-  PetscCall(ierr);
+  HycoFinally(HycoPlexToMesh(dm, c->scene, sub), PetscCall(DMDestroy(&dm)));
   PetscCall(PetscMalloc1(c->n_nodes, &(*sub)->node_whole));
   PetscCall(PetscMalloc1(c->n_cells, &(*sub)->cell_whole));
   for (PetscInt i = 0; i < c->n_nodes; i++)
@@ -506,13 +503,10 @@ PetscErrorCode HycoSubmesh(HycoScene scene, HycoMesh of, PetscInt n_keep, const 
                            const PetscInt extra[], PetscInt n_all, const PetscInt all_facets[], HycoMesh *sub)
 {
   Cut cut = {.of = of, .scene = scene};
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(Select(&cut, n_keep, keep, n_extra, extra, n_all, all_facets));
-  ierr = Make(&cut, sub);
-  PetscCall(CutDestroy(&cut));
-  PetscCall(ierr);
+  HycoFinally(Make(&cut, sub), PetscCall(CutDestroy(&cut)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -37,8 +37,7 @@ PetscErrorCode HycoTiesDestroy(HycoTies *ties)
   PetscFunctionBegin;
   *ties = NULL;
   if (!t || --t->references) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoFreeAll(&t->slave, &t->master, &t->tie, &t->body, &t->weight, &t->reach);
-  PetscCall(PetscFree(t));
+  HycoFreeAll(&t->slave, &t->master, &t->tie, &t->body, &t->weight, &t->reach, &t);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -183,8 +183,7 @@ static PetscErrorCode CutMesh(HycoReducer t, HycoMesh from, const PetscBool in[]
   PetscCall(PetscMalloc1(surface->n_nodes, &t->surface_node));
   PetscCall(FindSurface(surface, m->model->mesh, t->surface_node));
   PetscCall(PetscFree2(keep, extra));
-  PetscCall(PetscFree(all));
-  PetscCall(PetscFree(contact));
+  HycoFreeAll(&all, &contact);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -270,9 +269,7 @@ static PetscErrorCode CutDomain(HycoReducer t, HycoROM m)
   PetscCall(FetchNotes(t, in, n, global, note));
   /* Only rank 0 has m: the sets are of a mesh on one process. */
   HycoOnRoot(HycoComm(t), TakeSets(t, m, note));
-  PetscCall(PetscFree(note));
-  PetscCall(PetscFree(global));
-  PetscCall(PetscFree(in));
+  HycoFreeAll(&note, &global, &in);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -663,17 +660,15 @@ PetscErrorCode HycoReducerClose(HycoReducer t, HycoSnapshots *store)
 {
   const PetscInt *solved;
   const PetscReal *written;
-  PetscMPIInt size;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
   PetscCall(HycoSnapshotsGetSolved(*store, &t->n_solvers, &solved));
   PetscCall(HycoSnapshotsGetBalance(*store, &t->unsolved, &written));
   t->sliding = (*store)->sliding;
   t->rate_change = (*store)->rate_change;
   HycoFreeAll(&t->solved, &t->written);
   HycoDuplicate(t->n_solvers, solved, &t->solved);
-  HycoDuplicate(size, written, &t->written);
+  HycoDuplicate(HycoSize(HycoComm(t)), written, &t->written);
   t->store = NULL;
   PetscCall(HycoSnapshotsDestroy(store));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -787,9 +782,7 @@ PetscErrorCode HycoReducerHoldOutFresh(HycoReducer t, HycoSnapshots store, HycoS
   PetscCall(HycoSamplesGet(others, n_fresh, NULL, NULL));
   PetscCall(HycoSamplesExcept(last, held, former));
   t->held = held;
-  PetscCall(HycoSamplesDestroy(&others));
-  PetscCall(HycoSamplesDestroy(&fresh));
-  PetscCall(HycoSamplesDestroy(&last));
+  HycoDestroyAll(&others, &fresh, &last);
   PetscCall(HycoReducerSolve(t, store, t->held));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -856,7 +849,6 @@ PetscErrorCode HycoReducerRun(HycoReducer t, HycoSamples samples, const char pat
   HycoSnapshots store;
   HycoTraining report = {0};
   PetscReal begin = HycoNow(), solved = 0;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
@@ -866,9 +858,7 @@ PetscErrorCode HycoReducerRun(HycoReducer t, HycoSamples samples, const char pat
               "-target_%s needs held-out points, and -hyco_validation is 0; remove one of the two", HycoErrorKinds[j]);
   if (t->pinned[HYCO_CHOICE_TYPE] || !t->search) PetscCall(HycoReducerCheckContacts(t, t->prototype));
   PetscCall(HycoReducerOpen(t, samples, path, &store));
-  ierr = RunOn(t, store, samples, path, &report, &solved);
-  PetscCall(HycoReducerClose(t, &store));
-  PetscCall(ierr);
+  HycoFinally(RunOn(t, store, samples, path, &report, &solved), PetscCall(HycoReducerClose(t, &store)));
   report.sliding = t->sliding;
   report.rate_change = t->rate_change;
   report.seconds_snapshots = solved - begin + t->solving;

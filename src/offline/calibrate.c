@@ -390,8 +390,7 @@ PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, HycoROM 
   PetscCall(HycoSamplesAddSet(all, t->held));
   PetscCall(HycoSamplesAddSet(all, corners));
   PetscCall(Learn(t, all, n + n_corners, rows, model, store, report));
-  PetscCall(HycoSamplesDestroy(&all));
-  PetscCall(HycoSamplesDestroy(&corners));
+  HycoDestroyAll(&all, &corners);
   PetscCall(PetscFree(rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -16,7 +16,6 @@
    rank 0 takes them into one array. */
 static PetscErrorCode GatherColumn(Mat A, PetscInt j, PetscReal column[])
 {
-  const PetscScalar *value;
   VecScatter scatter;
   PetscInt n;
   Vec v, all;
@@ -24,15 +23,11 @@ static PetscErrorCode GatherColumn(Mat A, PetscInt j, PetscReal column[])
   PetscFunctionBegin;
   PetscCall(MatDenseGetColumnVecRead(A, j, &v));
   PetscCall(VecScatterCreateToZero(v, &scatter, &all));
-  PetscCall(VecScatterBegin(scatter, v, all, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecScatterEnd(scatter, v, all, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(HycoScatter(scatter, v, all));
   PetscCall(MatDenseRestoreColumnVecRead(A, j, &v));
   PetscCall(VecGetLocalSize(all, &n));
-  PetscCall(VecGetArrayRead(all, &value));
-  PetscCall(PetscArraycpy(column, value, n));
-  PetscCall(VecRestoreArrayRead(all, &value));
-  PetscCall(VecScatterDestroy(&scatter));
-  PetscCall(VecDestroy(&all));
+  PetscCall(HycoVecRead(all, n, column));
+  HycoDestroyAll(&scatter, &all);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -79,8 +74,7 @@ static PetscErrorCode Notes(HycoReducer t, const PetscBool near[], PetscInt n_ro
     for (PetscInt j = 0; j < N_NOTES; j++) x[j * lda + i] = rows[N_NOTES * i + j];
   }
   PetscCall(MatDenseRestoreArray(*X, &x));
-  PetscCall(MatAssemblyBegin(*X, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(*X, MAT_FINAL_ASSEMBLY));
+  PetscCall(HycoMatAssemble(*X));
   PetscCall(PetscFree2(value, rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

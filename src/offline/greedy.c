@@ -141,14 +141,12 @@ static PetscErrorCode EvaluateShare(HycoReducer t, Loop *loop, HycoROM m, const 
   const PetscReal length = HycoMeshLength(t->fom->part);
   const PetscReal *solved;
   PetscInt n;
-  PetscMPIInt size;
   HycoIndicator indicator;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
   PetscCall(HycoSamplesGet(loop->samples, &n, NULL, &solved));
   PetscCall(HycoIndicatorCreate(m, t->greedy.indicator, n, solved, U_at, length, &indicator));
-  for (PetscInt k = t->rank; k < loop->n_points; k += size) {
+  for (PetscInt k = t->rank; k < loop->n_points; k += HycoSize(HycoComm(t))) {
     HycoIndication v;
 
     PetscCall(HycoIndicatorEvaluate(indicator, loop->points + k * loop->n_par, &v));
@@ -301,19 +299,6 @@ static PetscErrorCode Iterate(HycoReducer t, Loop *loop, PetscInt iteration, Hyc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Takes and checks the set to be searched. */
-static PetscErrorCode TakeTraining(HycoSamples training, Loop *loop)
-{
-  PetscFunctionBegin;
-  PetscCall(HycoSamplesGet(training, &loop->n_points, &loop->n_par, &loop->points));
-  HycoCheck(
-      loop->n_points > 1,
-      "the greedy training has %d candidate point, and at least two are needed; give -training_grid 20,24, for example",
-      (int)loop->n_points);
-  PetscCall(PetscMalloc1(4 * loop->n_points, &loop->value));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The loop needs settings that are accurate for any points; those of the model itself are searched at the end. For
    paths in 3D it begins with the cells at a plane of symmetry, like that search. Collective. */
 static PetscErrorCode SetSettings(HycoReducer t)
@@ -382,7 +367,6 @@ PetscErrorCode HycoReducerRunGreedy(HycoReducer t, HycoSamples start, HycoSample
 {
   Loop loop = {0};
   HycoTraining report = {0};
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
@@ -392,17 +376,19 @@ PetscErrorCode HycoReducerRunGreedy(HycoReducer t, HycoSamples start, HycoSample
             "grid or on points",
             t->prototype->model->traits.title);
   loop.begin = HycoNow();
-  PetscCall(TakeTraining(training, &loop));
+  /* Takes and checks the set to be searched. */
+  PetscCall(HycoSamplesGet(training, &loop.n_points, &loop.n_par, &loop.points));
+  HycoCheck(
+      loop.n_points > 1,
+      "the greedy training has %d candidate point, and at least two are needed; give -training_grid 20,24, for example",
+      (int)loop.n_points);
+  PetscCall(PetscMalloc1(4 * loop.n_points, &loop.value));
   PetscCall(Start(t, start, &loop.samples));
   PetscCall(CheckStart(t, (PetscBool)!start, loop.samples));
   PetscCall(HycoReducerOpen(t, loop.samples, path, &loop.store));
-  ierr = RunOn(t, &loop, path, &report);
-  PetscCall(HycoReducerClose(t, &loop.store));
-  report.sliding = t->sliding;
-  report.rate_change = t->rate_change;
-  PetscCall(HycoSamplesDestroy(&loop.samples));
-  PetscCall(PetscFree(loop.value));
-  PetscCall(ierr);
+  HycoFinally(RunOn(t, &loop, path, &report), PetscCall(HycoReducerClose(t, &loop.store)); report.sliding = t->sliding;
+              report.rate_change = t->rate_change; PetscCall(HycoSamplesDestroy(&loop.samples));
+              PetscCall(PetscFree(loop.value)));
   if (training_report) *training_report = report;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -80,23 +80,8 @@ PetscErrorCode HycoIndicatorDestroy(HycoIndicator *indicator)
   d = *indicator;
   PetscCall(HycoInterpolantDestroy(&d->interpolant));
   PetscCall(PetscFree(d->weight));
-  PetscCall(HycoSolverDestroy(&d->solver));
-  PetscCall(HycoSystemDestroy(&d->system));
-  PetscCall(MatDestroy(&d->K));
-  PetscCall(MatDestroy(&d->B));
-  PetscCall(MatDestroy(&d->Bt));
-  PetscCall(MatDestroy(&d->M));
-  PetscCall(MatDestroy(&d->M_A));
-  PetscCall(VecDestroy(&d->gap));
-  PetscCall(VecDestroy(&d->interface));
-  PetscCall(VecDestroy(&d->whole));
-  PetscCall(VecDestroy(&d->F_A));
-  PetscCall(VecDestroy(&d->D));
-  PetscCall(VecDestroy(&d->x));
-  PetscCall(VecDestroy(&d->L));
-  PetscCall(VecDestroy(&d->work));
-  PetscCall(VecDestroy(&d->solution));
-  PetscCall(KSPDestroy(&d->norm));
+  HycoDestroyAll(&d->solver, &d->system, &d->K, &d->B, &d->Bt, &d->M, &d->M_A, &d->gap, &d->interface, &d->whole,
+                 &d->F_A, &d->D, &d->x, &d->L, &d->work, &d->solution, &d->norm);
   PetscCall(PetscFree(*indicator));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -109,12 +94,9 @@ static PetscErrorCode SetUp(HycoIndicator d)
 
   PetscFunctionBegin;
   PetscCall(ISGetLocalSize(d->local.is_A, &n_A));
-  PetscCall(VecDuplicate(d->local.F, &d->interface));
-  PetscCall(VecDuplicate(d->local.F, &d->whole));
+  HycoVecDuplicate(d->local.F, &d->interface, &d->whole);
   PetscCall(VecCreateSeq(PETSC_COMM_SELF, n_A, &d->x));
-  PetscCall(VecDuplicate(d->x, &d->F_A));
-  PetscCall(VecDuplicate(d->x, &d->work));
-  PetscCall(VecDuplicate(d->x, &d->solution));
+  HycoVecDuplicate(d->x, &d->F_A, &d->work, &d->solution);
   if (m->m) {
     PetscCall(VecCreateSeq(PETSC_COMM_SELF, m->m, &d->L));
     PetscCall(VecDuplicate(d->L, &d->D));
@@ -140,8 +122,7 @@ static PetscErrorCode AssembleNorm(HycoIndicator d)
   PetscFunctionBegin;
   if (d->M_A && now == d->geometry) PetscFunctionReturn(PETSC_SUCCESS);
   d->geometry = now;
-  PetscCall(KSPDestroy(&d->norm));
-  PetscCall(MatDestroy(&d->M_A));
+  HycoDestroyAll(&d->norm, &d->M_A);
   PetscCall(HycoFEAssembleH1(m->fe, d->length, d->M));
   PetscCall(MatCreateSubMatrix(d->M, d->local.is_A, d->local.is_A, MAT_INITIAL_MATRIX, &d->M_A));
   PetscCall(HycoDefiniteSolver(d->M_A, "the H1 norm's matrix", &d->norm));
@@ -180,9 +161,7 @@ static PetscErrorCode SolveLocal(HycoIndicator d, HycoReason *reason)
   PetscFunctionBegin;
   PetscCall(HycoOperatorStateUpdate(&d->seen, y->K, y->B, &same));
   if (!same) {
-    PetscCall(MatDestroy(&d->K));
-    PetscCall(MatDestroy(&d->B));
-    PetscCall(MatDestroy(&d->Bt));
+    HycoDestroyAll(&d->K, &d->B, &d->Bt);
     PetscCall(MatCreateSubMatrix(y->K, y->is_A, y->is_A, MAT_INITIAL_MATRIX, &d->K));
     /* K[A,A] with the interface prescribed is definite: I holds the RID. */
     PetscCall(MatSetOption(d->K, MAT_SPD, PETSC_TRUE));

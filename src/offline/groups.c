@@ -118,7 +118,6 @@ PetscErrorCode HycoSnapshotsReadMonitor(HycoSnapshots s)
 PetscErrorCode HycoSnapshotsNote(HycoSnapshots s, HycoQueue queue, const char format[], ...)
 {
   PetscInt number, color;
-  PetscMPIInt rank;
   MPI_Comm group;
   PetscViewer viewer;
   char what[HYCO_LINE];
@@ -127,9 +126,8 @@ PetscErrorCode HycoSnapshotsNote(HycoSnapshots s, HycoQueue queue, const char fo
   PetscFunctionBegin;
   if (!s->monitor) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoQueueGetGroup(queue, &group));
-  PetscCallMPI(MPI_Comm_rank(group, &rank));
   /* One line for each group. The number orders lines of groups that print at the same time. */
-  if (rank) PetscFunctionReturn(PETSC_SUCCESS);
+  if (HycoRank(group)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoQueueNumber(queue, &number, &color));
   va_start(args, format);
   PetscCall(PetscVSNPrintf(what, sizeof(what), format, NULL, args));

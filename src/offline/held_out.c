@@ -263,13 +263,11 @@ static PetscErrorCode PredictPaths(Rows *r, HycoHeldOutRace *race, HycoHeldOut r
   HycoReducer t = r->t;
   PetscInt n, n_par;
   const PetscReal *mu;
-  PetscMPIInt size;
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(r->points, &n, &n_par, &mu));
-  PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
   while (race->n < n && !race->lost) {
-    const PetscInt here = PetscMin(size, n - race->n), *point = race->order + race->n,
+    const PetscInt here = PetscMin(HycoSize(HycoComm(t)), n - race->n), *point = race->order + race->n,
                    mine = t->rank < here ? point[t->rank] : -1;
 
     HycoOnRoot(HycoComm(t), HycoReducerTell(t, "held-out paths", race->n, n));
@@ -295,14 +293,11 @@ static PetscErrorCode PredictPaths(Rows *r, HycoHeldOutRace *race, HycoHeldOut r
 static PetscErrorCode PredictAllPaths(Rows *r, PetscInt n, HycoHeldOut rows[])
 {
   HycoHeldOutRace race = {.all = PETSC_TRUE};
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(n, &race.order));
   for (PetscInt k = 0; k < n; k++) race.order[k] = k;
-  ierr = PredictPaths(r, &race, rows);
-  PetscCall(PetscFree(race.order));
-  PetscCall(ierr);
+  HycoFinally(PredictPaths(r, &race, rows), PetscCall(PetscFree(race.order)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

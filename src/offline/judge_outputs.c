@@ -180,9 +180,7 @@ static PetscErrorCode MeasurePredicted(Outputs *o, const PetscReal mu[], HycoPre
 
   PetscFunctionBegin;
   PetscCall(HycoHeldOutPredict(o->m, o->store, mu));
-  PetscCall(HycoCatchBegin());
-  ierr = HycoROMMeasureQuantities(o->m, p);
-  PetscCall(HycoCatchEnd(ierr, message));
+  HycoCatch(HycoROMMeasureQuantities(o->m, p), ierr, message);
   *known = (PetscBool)!ierr;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -176,10 +176,7 @@ static PetscErrorCode Note(const HycoPairs *p, Lists *l, PetscInt *grown)
       for (PetscInt a = 0; a < n && same; a++) same = (PetscBool)(l->node[l->row[r].first + a] == node[a]);
     }
     if (same) continue;
-    if (l->n == l->room) {
-      l->room = 2 * l->room + 64;
-      PetscCall(PetscRealloc((size_t)l->room * sizeof(*l->row), &l->row));
-    }
+    HycoGrow(l->n, l->room, l->row);
     if (l->n_nodes + n > l->room_nodes) {
       l->room_nodes = 2 * (l->room_nodes + n) + 256;
       PetscCall(PetscRealloc((size_t)l->room_nodes * sizeof(*l->node), &l->node));
@@ -300,8 +297,7 @@ PetscErrorCode HycoMetFind(HycoScene scene, HycoMesh whole, const HycoPairs *pai
   for (PetscInt k = 0; k < n; k++) PetscCall(NoteAt(&s, mu + k * scene->n_parameters, &l, &grown));
   if (n) PetscCall(NoteBetween(&s, scene, mu, &l));
   PetscCall(Collect(&s, pairs, &l, met));
-  PetscCall(PetscFree(l.head));
-  HycoFreeAll(&l.row, &l.node);
+  HycoFreeAll(&l.head, &l.row, &l.node);
   PetscCall(SurfacesDestroy(&s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

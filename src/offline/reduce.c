@@ -68,13 +68,11 @@ PetscErrorCode HycoReducerMultiply(HycoReducer t, Mat X, Mat Y, PetscReal produc
   Mat P, whole = NULL;
   const PetscScalar *p;
   PetscInt lda, rows, cols;
-  PetscMPIInt size;
 
   PetscFunctionBegin;
   PetscCall(MatTransposeMatMult(X, Y, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &P));
-  PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
-  if (size > 1)
-    PetscCall(MatCreateRedundantMatrix(P, size, PETSC_COMM_SELF, MAT_INITIAL_MATRIX, &whole));
+  if (HycoSize(HycoComm(t)) > 1)
+    PetscCall(MatCreateRedundantMatrix(P, HycoSize(HycoComm(t)), PETSC_COMM_SELF, MAT_INITIAL_MATRIX, &whole));
   else {
     PetscCall(PetscObjectReference((PetscObject)P));
     whole = P;
@@ -85,8 +83,7 @@ PetscErrorCode HycoReducerMultiply(HycoReducer t, Mat X, Mat Y, PetscReal produc
   for (PetscInt k = 0; k < cols; k++)
     PetscCall(PetscArraycpy(product + (size_t)k * (size_t)rows, p + (size_t)k * (size_t)lda, rows));
   PetscCall(MatDenseRestoreArrayRead(whole, &p));
-  PetscCall(MatDestroy(&whole));
-  PetscCall(MatDestroy(&P));
+  HycoDestroyAll(&whole, &P);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -172,8 +169,7 @@ static PetscErrorCode Deflate(Mat V, Mat S, Mat *rest)
     PetscCall(MatTransposeMatMult(V, *rest, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &C));
     PetscCall(MatMatMult(V, C, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &part));
     PetscCall(MatAXPY(*rest, -1, part, SAME_NONZERO_PATTERN));
-    PetscCall(MatDestroy(&C));
-    PetscCall(MatDestroy(&part));
+    HycoDestroyAll(&C, &part);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -251,8 +247,7 @@ PetscErrorCode HycoPathModesAdd(HycoReducer t, Mat path, PetscReal tol, HycoPath
     PetscCall(MatCreateVecs(V, &scale, NULL));
     /* Singular values are on every rank: rank 0 alone adds them. */
     for (PetscInt k = 0; k < l; k++) PetscCall(VecSetValue(scale, k, t->rank ? 0 : sigma[k], ADD_VALUES));
-    PetscCall(VecAssemblyBegin(scale));
-    PetscCall(VecAssemblyEnd(scale));
+    PetscCall(HycoVecAssemble(scale));
     PetscCall(MatDiagonalScale(V, NULL, scale));
     PetscCall(VecDestroy(&scale));
   }
@@ -296,11 +291,10 @@ static PetscErrorCode JoinPaths(HycoReducer t, const HycoPathModes *modes, Petsc
     if (!modes->V[j]) continue;
     PetscCall(MatGetSize(modes->V[j], NULL, &l));
     PetscCall(MatScale(modes->V[j], HycoPathScale(modes->first[j], largest)));
-    PetscCall(HycoCopyColumns(modes->V[j], *joined, at));
+    PetscCall(HycoCopyColumns(modes->V[j], l, *joined, at));
     at += l;
   }
-  PetscCall(MatAssemblyBegin(*joined, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(*joined, MAT_FINAL_ASSEMBLY));
+  PetscCall(HycoMatAssemble(*joined));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -649,8 +643,7 @@ PetscErrorCode HycoReducerSupremizers(HycoReducer t, Mat *forces, Mat *supremize
     /* B is that of the column's own parameters: rows turn and move with the bodies. */
     HycoOnRoot(HycoComm(t), SetForces(t, k, R));
   }
-  PetscCall(MatAssemblyBegin(R, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(R, MAT_FINAL_ASSEMBLY));
+  PetscCall(HycoMatAssemble(R));
   PetscCall(HycoFECreateMatrix(f->fe, HycoComm(t), f->part->n_owned, f->part->first, &M));
   HycoOnEach(HycoComm(t), HycoFEAssembleH1(f->fe, HycoMeshLength(f->part), M));
   PetscCall(HycoSolveColumns(M, "the H1 norm's matrix", R, supremizers));
@@ -672,8 +665,7 @@ static PetscErrorCode DualGram(HycoReducer t, PetscReal G[])
     /* Symmetric up to round-off: made so, as the eigensolver reads one triangle. */
     for (PetscInt i = 0; i <= j; i++) G[j * n + i] = G[i * n + j] = (G[j * n + i] + G[i * n + j]) / 2;
   }
-  PetscCall(MatDestroy(&X));
-  PetscCall(MatDestroy(&R));
+  HycoDestroyAll(&X, &R);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -721,8 +713,7 @@ static PetscErrorCode DualPoints(HycoReducer t, const PetscReal G[], PetscInt *l
     HycoLogged(HYCO_EVENT_DEIM, Points(t, V, index));
     PetscCall(MatDestroy(&V));
   }
-  PetscCall(PetscFree(W));
-  PetscCall(PetscFree(sigma));
+  HycoFreeAll(&W, &sigma);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

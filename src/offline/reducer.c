@@ -109,8 +109,7 @@ PetscErrorCode HycoReducerResetBases(HycoReducer t)
   PetscCall(HycoReducerDropBases(t));
   for (PetscInt k = 0; k < HYCO_N_SEEDS; k++) {
     PetscCall(MatDestroy(&t->basis[k].V));
-    PetscCall(PetscFree(t->basis[k].sigma));
-    PetscCall(PetscFree(t->basis[k].coefficients));
+    HycoFreeAll(&t->basis[k].sigma, &t->basis[k].coefficients);
     t->basis[k].l = t->basis[k].n_sigma = 0;
   }
   PetscCall(MatDestroy(&t->S));
@@ -130,8 +129,7 @@ PetscErrorCode HycoReducerDestroy(HycoReducer *reducer)
   PetscCall(HycoReducerReset(t));
   PetscCall(EndTraining(t));
   PetscCall(PetscStrArrayDestroy(&t->groups));
-  PetscCall(PetscFree(t->region));
-  HycoFreeAll(&t->solved, &t->written);
+  HycoFreeAll(&t->region, &t->solved, &t->written);
   PetscCall(HycoSceneDestroy(&t->scene));
   PetscCall(PetscHeaderDestroy(reducer));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -17,17 +17,6 @@ typedef struct {
   PetscSF to_part, to_surface;
 } Rid;
 
-static PetscErrorCode RidDestroy(Rid *r)
-{
-  PetscFunctionBegin;
-  PetscCall(PetscSFDestroy(&r->to_part));
-  PetscCall(PetscSFDestroy(&r->to_surface));
-  PetscCall(PetscFree(r->start));
-  PetscCall(PetscFree(r->around));
-  PetscCall(PetscFree(r->own));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* On several ranks two star forests connect owned nodes with those of the parts (with their overlap) and of the surfaces,
    so that layers of the label grow across the ranks. */
 static PetscErrorCode RidCreate(HycoFOM f, Rid *r)
@@ -457,6 +446,7 @@ PetscErrorCode HycoRIDBuild(HycoFOM f, const HycoPairs *pairs, const HycoRIDSett
   }
   PetscCall(DMPlexLabelComplete(f->dm, r.label));
   *label = r.label;
-  PetscCall(RidDestroy(&r));
+  HycoDestroyAll(&r.to_part, &r.to_surface);
+  HycoFreeAll(&r.start, &r.around, &r.own);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

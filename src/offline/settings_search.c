@@ -18,6 +18,7 @@
   held-out points become training points, and the search starts again with the fresh ones.
 */
 #include <hycoreducerimpl.h>
+#include <hycovector.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -123,15 +124,6 @@ static PetscErrorCode SetSettings(HycoReducer t, const HycoReducerSettings *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscReal EdgeLength(HycoMesh m, PetscInt a, PetscInt b)
-{
-  PetscReal sum = 0;
-
-  for (PetscInt c = 0; c < 3; c++)
-    sum += (m->xyz[3 * a + c] - m->xyz[3 * b + c]) * (m->xyz[3 * a + c] - m->xyz[3 * b + c]);
-  return PetscSqrtReal(sum);
-}
-
 /* Mean length of an edge of the slave surfaces' facets; 0 without any. Rank 0. The contact extension is a length;
    as a multiple of an edge it does not depend on the unit or the size of the scene. */
 static PetscErrorCode SurfaceEdge(HycoReducer t, PetscReal *mean)
@@ -150,7 +142,8 @@ static PetscErrorCode SurfaceEdge(HycoReducer t, PetscReal *mean)
                      corners = HycoMeshIsQuadratic(m) ? HycoCellKinds[m->type].corners : HycoFacetCorners(m->nf, node);
 
       if (m->facet_group[f] != g || m->nf < 2) continue;
-      for (PetscInt j = 0; j < corners; j++) sum += EdgeLength(m, node[j], node[(j + 1) % corners]);
+      for (PetscInt j = 0; j < corners; j++)
+        sum += HycoDistance(m->xyz + 3 * node[j], m->xyz + 3 * node[(j + 1) % corners]);
       n += corners;
     }
   }
@@ -714,15 +707,11 @@ static PetscErrorCode Refuse(HycoReducer t, const HycoROM type, char why[HYCO_LI
 
   PetscFunctionBegin;
   PetscCall(HycoTrainerFind(type->model->type, &trainer));
-  PetscCall(HycoCatchBegin());
-  ierr = HycoReducerCheckContacts(t, type);
-  PetscCall(HycoCatchEnd(ierr, why));
+  HycoCatch(HycoReducerCheckContacts(t, type), ierr, why);
   PetscCall(HycoCatchNoModel(ierr, why));
   if (why[0] || !type->model->traits.own_modes || !trainer.begin) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoReducerSetType(t, type->model->type));
-  PetscCall(HycoCatchBegin());
-  ierr = (*trainer.begin)(t);
-  PetscCall(HycoCatchEnd(ierr, why));
+  HycoCatch((*trainer.begin)(t), ierr, why);
   PetscCall(HycoCatchNoModel(ierr, why));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -1160,9 +1149,7 @@ static PetscErrorCode BuildBest(Search *s, HycoROM *model, HycoTraining *report)
     PetscCall(Choose(s, &best));
     if (!best) break;
     PetscCall(SetSettings(t, &best->settings));
-    PetscCall(HycoCatchBegin());
-    ierr = BuildChosen(s, best, model, &built);
-    PetscCall(HycoCatchEnd(ierr, message));
+    HycoCatch(BuildChosen(s, best, model, &built), ierr, message);
     PetscCall(HycoCatchNoModel(ierr, message));
     if (message[0]) {
       PetscCall(PetscStrncpy(best->failure, message, sizeof(best->failure)));

@@ -41,8 +41,6 @@ static PetscErrorCode Begin(HycoSnapshots s)
 PetscErrorCode HycoSnapshotsOpen(MPI_Comm comm, HycoScene scene, const char folder[], HycoSnapshots *snapshots)
 {
   HycoSnapshots s;
-  PetscMPIInt size;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
@@ -50,12 +48,9 @@ PetscErrorCode HycoSnapshotsOpen(MPI_Comm comm, HycoScene scene, const char fold
                               HycoSnapshotsDestroy, HycoSnapshotsView));
   PetscCall(PetscObjectReference((PetscObject)scene));
   s->scene = scene;
-  PetscCallMPI(MPI_Comm_size(comm, &size));
-  PetscCall(PetscCalloc2(size, &s->solved, size, &s->written));
+  PetscCall(PetscCalloc2(HycoSize(comm), &s->solved, HycoSize(comm), &s->written));
   PetscCall(PetscStrncpy(s->folder, folder, sizeof(s->folder)));
-  ierr = Begin(s);
-  if (ierr) PetscCall(HycoSnapshotsDestroy(&s));
-  PetscCall(ierr);
+  HycoOnError(Begin(s), PetscCall(HycoSnapshotsDestroy(&s)));
   *snapshots = s;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -92,15 +87,12 @@ static PetscErrorCode SamplePath(HycoSnapshots s, const PetscReal mu[], char pat
 /* Fails if the history differs from that with which the file was made; files of earlier versions do not store it. */
 static PetscErrorCode CheckHistory(HycoSnapshots s, HycoH5 h, const char path[])
 {
-  PetscErrorCode ierr;
   char *made;
 
   PetscFunctionBegin;
   if (!HycoH5Has(h, "history")) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoH5LoadText(h, "history", &made));
-  ierr = HycoSceneCompareHistory(s->scene, made, path);
-  PetscCall(PetscFree(made));
-  PetscCall(ierr);
+  HycoFinally(HycoSceneCompareHistory(s->scene, made, path), PetscCall(PetscFree(made)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -131,14 +123,10 @@ static PetscErrorCode OpenSample(HycoSnapshots s, const PetscReal mu[], HycoH5 *
   PetscFunctionBegin;
   PetscCall(SamplePath(s, mu, path));
   if (!s->last || strcmp(path, s->last_path)) {
-    PetscErrorCode ierr;
-
     PetscCall(CloseSample(s));
     PetscCall(HycoH5OpenOr(path, "remove it and run again", &s->last));
     PetscCall(PetscStrncpy(s->last_path, path, sizeof(s->last_path)));
-    ierr = CheckFingerprint(s, s->last, path);
-    if (ierr) PetscCall(CloseSample(s));
-    PetscCall(ierr);
+    HycoOnError(CheckFingerprint(s, s->last, path), PetscCall(CloseSample(s)));
   }
   *h = s->last;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -217,7 +205,6 @@ static PetscErrorCode WriteSprings(HycoFOM fom, HycoH5 h, const char name[])
 {
   const HycoFileOrder *rows;
   PetscReal *force;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   if (!fom->scene->n_springs) PetscFunctionReturn(PETSC_SUCCESS);
@@ -225,9 +212,8 @@ static PetscErrorCode WriteSprings(HycoFOM fom, HycoH5 h, const char name[])
   PetscCall(PetscCalloc1(fom->fe->n_dof, &force));
   HycoSpringsAddForces(fom->fe, 1, fom->u, force);
   for (PetscInt k = 0; k < fom->fe->n_dof; k++) force[k] = fom->fe->fixed[k] ? 0 : force[k];
-  ierr = HycoFieldWrite(h, rows, fom->n_nodes, name, HYCO_ON_NODES, MPIU_REAL, fom->fe->dim, 1, force);
-  PetscCall(PetscFree(force));
-  PetscCall(ierr);
+  HycoFinally(HycoFieldWrite(h, rows, fom->n_nodes, name, HYCO_ON_NODES, MPIU_REAL, fom->fe->dim, 1, force),
+              PetscCall(PetscFree(force)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -478,14 +464,12 @@ typedef struct {
 static PetscErrorCode SolveQueued(HycoSnapshots s, HycoQueue queue, const Missing *m, HycoFOM fom, PetscReal force[])
 {
   PetscInt k, n_stored;
-  PetscMPIInt rank;
   char at[HYCO_LINE];
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_rank(HycoComm(s), &rank));
   for (PetscBool first = PETSC_TRUE;; first = PETSC_FALSE) {
     PetscCall(HycoQueueTake(queue, &k));
-    if (rank == 0 && m->progress && !first) {
+    if (HycoRank(HycoComm(s)) == 0 && m->progress && !first) {
       PetscCall(HycoQueueDone(queue, &n_stored));
       if (n_stored < m->n) PetscCall(m->progress(m->n_all - m->n + n_stored, m->n_all, m->ctx));
     }
@@ -503,7 +487,6 @@ static PetscErrorCode SolveGroup(HycoSnapshots s, HycoQueue queue, const Missing
   MPI_Comm group;
   HycoFOM fom;
   PetscReal *force;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoQueueGetGroup(queue, &group));
@@ -513,10 +496,7 @@ static PetscErrorCode SolveGroup(HycoSnapshots s, HycoQueue queue, const Missing
     fom->path->interrupt_ctx = queue;
   }
   PetscCall(PetscMalloc1(fom->fe->n_dof, &force));
-  ierr = SolveQueued(s, queue, m, fom, force);
-  PetscCall(PetscFree(force));
-  PetscCall(HycoFOMDestroy(&fom));
-  PetscCall(ierr);
+  HycoFinally(SolveQueued(s, queue, m, fom, force), PetscCall(PetscFree(force)); PetscCall(HycoFOMDestroy(&fom)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -565,20 +545,18 @@ static PetscErrorCode SolveMissing(HycoSnapshots s, const Missing *m)
 PetscErrorCode HycoSnapshotsFill(HycoSnapshots s, HycoSamples samples, HycoProgress progress, void *ctx)
 {
   Missing m = {.progress = progress, .ctx = ctx};
-  PetscMPIInt rank;
 
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SNAPSHOTS_CLASSID);
   PetscCall(HycoSamplesGet(samples, &m.n_all, &m.n_par, &m.mu));
   HycoCheck(m.n_all > 0, "the set of samples is empty");
-  PetscCallMPI(MPI_Comm_rank(HycoComm(s), &rank));
   PetscCall(PetscMalloc1(m.n_all, &m.missing));
   HycoOnRoot(HycoComm(s), FindMissing(s, m.n_all, m.n_par, m.mu, &m.n, m.missing));
   PetscCallMPI(MPI_Bcast(&m.n, 1, MPIU_INT, 0, HycoComm(s)));
   HycoBcast(m.missing, m.n, MPIU_INT, HycoComm(s));
   if (m.n) {
     PetscCall(SolveMissing(s, &m));
-    if (rank == 0 && progress) PetscCall(progress(m.n_all, m.n_all, ctx));
+    if (HycoRank(HycoComm(s)) == 0 && progress) PetscCall(progress(m.n_all, m.n_all, ctx));
   }
   /* Each group's first rank knows its own. */
   HycoAllreduce(&s->sliding, 1, MPIU_REAL, MPI_MAX, HycoComm(s));
@@ -662,8 +640,7 @@ PetscErrorCode HycoSnapshotsGetField(HycoSnapshots s, HycoSamples samples, Petsc
   PetscCall(MatDenseGetArray(*S, &data));
   HycoOnEach(HycoComm(s), ReadColumns(s, n, mu + first * n_par, field, lo, hi - lo, total, data, lda));
   PetscCall(MatDenseRestoreArray(*S, &data));
-  PetscCall(MatAssemblyBegin(*S, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(*S, MAT_FINAL_ASSEMBLY));
+  PetscCall(HycoMatAssemble(*S));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -714,8 +691,7 @@ PetscErrorCode HycoSnapshotsGetBetween(HycoSnapshots s, const PetscReal mu[], Pe
   PetscCall(MatDenseGetArray(*U, &data));
   HycoOnEach(HycoComm(s), ReadBetween(s, mu, n, lo, hi - lo, data, lda));
   PetscCall(MatDenseRestoreArray(*U, &data));
-  PetscCall(MatAssemblyBegin(*U, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(*U, MAT_FINAL_ASSEMBLY));
+  PetscCall(HycoMatAssemble(*U));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

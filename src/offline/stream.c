@@ -151,8 +151,7 @@ static PetscErrorCode EndStream(Stream *s, PetscReal tol, PetscInt most)
   else
     /* l = 0: the caller says that there is no mode. */
     PetscCall(PetscCalloc1(s->t->n_s + 1, &basis->sigma));
-  PetscCall(MatDestroy(&s->merged));
-  PetscCall(SVDDestroy(&s->svd));
+  HycoDestroyAll(&s->merged, &s->svd);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

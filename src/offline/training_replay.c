@@ -90,7 +90,6 @@ PetscErrorCode HycoTrainingReplayFollow(HycoTrainingReplay *r, HycoSnapshots sto
   const PetscReal *mu;
   PetscReal *taken = NULL;
   PetscInt n_par, n = 1;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
@@ -98,8 +97,6 @@ PetscErrorCode HycoTrainingReplayFollow(HycoTrainingReplay *r, HycoSnapshots sto
     HycoOnEach(HycoComm(t), HycoSnapshotsReadTaken(store, mu + k * n_par, &n, &taken));
   else
     PetscCall(PetscCalloc1(1, &taken));
-  ierr = Follow(r, k, mu + k * n_par, n, taken);
-  PetscCall(PetscFree(taken));
-  PetscCall(ierr);
+  HycoFinally(Follow(r, k, mu + k * n_par, n, taken), PetscCall(PetscFree(taken)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -144,8 +144,7 @@ PetscErrorCode HycoQuantitiesBalance(MPI_Comm comm, HycoScene scene, HycoMesh m,
     for (PetscInt b = 0; b < n; b++) follows = (PetscBool)(follows && !(inside[b] && outside[b]));
     for (PetscInt b = 0; b < n; b++) balanced[k * n + b] = (PetscBool)(follows && inside[part[b]]);
   }
-  PetscCall(PetscFree(held));
-  PetscCall(PetscFree(part));
+  HycoFreeAll(&held, &part);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -197,14 +196,11 @@ PetscErrorCode HycoMarkLoads(HycoScene scene, HycoMesh m, const PetscBool of[], 
 PetscErrorCode HycoQuantitiesMarkLoads(HycoScene scene, HycoMesh m, const PetscBool balanced[], PetscBool needed[])
 {
   PetscBool *of;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(scene->n_bodies, &of));
   for (PetscInt k = 0; k < scene->n_quantities * scene->n_bodies; k++)
     of[k % scene->n_bodies] = (PetscBool)(of[k % scene->n_bodies] || balanced[k]);
-  ierr = HycoMarkLoads(scene, m, of, needed);
-  PetscCall(PetscFree(of));
-  PetscCall(ierr);
+  HycoFinally(HycoMarkLoads(scene, m, of, needed), PetscCall(PetscFree(of)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -91,8 +91,6 @@ PetscErrorCode HycoCellListWrite(HycoH5 h, const char name[], const HycoCellList
 PetscErrorCode HycoCellListDestroy(HycoCellList *l)
 {
   PetscFunctionBegin;
-  PetscCall(PetscFree(l->shape));
-  PetscCall(PetscFree(l->start));
-  PetscCall(PetscFree(l->item));
+  HycoFreeAll(&l->shape, &l->start, &l->item);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

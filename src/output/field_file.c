@@ -115,14 +115,11 @@ static PetscErrorCode WriteHead(HycoFieldFile f)
 static PetscErrorCode WriteTopology(HycoFieldFile f)
 {
   HycoCellList cells;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoCellListCreate(f->order, f->mesh, code, &cells));
   f->n_items = cells.all;
-  ierr = HycoCellListWrite(f->h, "mesh/topology", &cells);
-  PetscCall(HycoCellListDestroy(&cells));
-  PetscCall(ierr);
+  HycoFinally(HycoCellListWrite(f->h, "mesh/topology", &cells), PetscCall(HycoCellListDestroy(&cells)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -440,8 +437,6 @@ PetscErrorCode HycoFieldFileDestroy(HycoFieldFile *file)
   PetscFunctionBegin;
   if (!f) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoH5Close(&f->h, PETSC_FALSE));
-  PetscCall(PetscFree(f->t));
-  PetscCall(PetscFree(f->mu));
-  PetscCall(PetscFree(*file));
+  HycoFreeAll(&f->t, &f->mu, file);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

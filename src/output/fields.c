@@ -271,8 +271,7 @@ static PetscErrorCode ToPart(MPI_Comm comm, HycoMesh part, HycoMesh surface, Hyc
   PetscCall(CombineLeast(to_owner, to_part, part, surface->n_nodes, f->gap_node, gap));
   PetscCall(CombineLeast(to_owner, to_part, part, surface->n_nodes, f->which, which));
   if (f->rubs) PetscCall(FrictionToPart(to_owner, to_part, part, surface->n_nodes, f));
-  PetscCall(PetscSFDestroy(&to_owner));
-  PetscCall(PetscSFDestroy(&to_part));
+  HycoDestroyAll(&to_owner, &to_part);
   PetscCall(PetscFree4(f->force, f->pressure, f->gap_node, f->which));
   f->force = force;
   f->pressure = pressure;
@@ -378,7 +377,6 @@ PetscErrorCode HycoContactsWrite(MPI_Comm comm, HycoH5 h, const char name[], con
   PetscLayout rows;
   PetscSF sf;
   char *row;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   /* An empty dataset is created without rows. */
@@ -392,10 +390,9 @@ PetscErrorCode HycoContactsWrite(MPI_Comm comm, HycoH5 h, const char name[], con
   PetscCall(PetscCalloc1((size_t)(rows->rend - rows->rstart) * size, &row));
   PetscCall(HycoSFSend(sf, type, 1, value, row));
   PetscCall(PetscSFDestroy(&sf));
-  ierr = HycoH5WriteRows(h, name, type, n, 1, rows->rstart, rows->rend - rows->rstart, row);
-  PetscCall(PetscFree(row));
-  PetscCall(PetscLayoutDestroy(&rows));
-  PetscCall(ierr);
+  HycoFinally(HycoH5WriteRows(h, name, type, n, 1, rows->rstart, rows->rend - rows->rstart, row),
+              PetscCall(PetscFree(row));
+              PetscCall(PetscLayoutDestroy(&rows)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -466,13 +463,10 @@ static PetscErrorCode Write(HycoFieldFile file, const HycoSolution *s)
 PetscErrorCode HycoSolutionWrite(const char path[], const HycoSolution *s)
 {
   HycoFieldFile file;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoFieldFileCreate(s->order ? s->order->comm : PETSC_COMM_SELF, path, 0, PETSC_FALSE, &file));
-  ierr = Write(file, s);
-  PetscCall(HycoFieldFileDestroy(&file));
-  PetscCall(ierr);
+  HycoFinally(Write(file, s), PetscCall(HycoFieldFileDestroy(&file)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

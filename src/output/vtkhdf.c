@@ -13,14 +13,11 @@ static const unsigned char vtk_type[HYCO_N_CELL_TYPES] = {3, 5, 9, 10, 12, 22, 2
 static PetscErrorCode WriteSequence(HycoH5 h, const char name[], PetscInt n, PetscInt value, PetscInt step)
 {
   PetscInt *all;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(n, &all));
   for (PetscInt k = 0; k < n; k++) all[k] = value + k * step;
-  ierr = HycoH5WriteInt(h, name, n, HYCO_H5_LINE, all);
-  PetscCall(PetscFree(all));
-  PetscCall(ierr);
+  HycoFinally(HycoH5WriteInt(h, name, n, HYCO_H5_LINE, all), PetscCall(PetscFree(all)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -92,13 +89,10 @@ PetscErrorCode HycoVTKWriteMesh(HycoFieldFile f, const PetscReal X[])
 {
   HycoMesh m = f->mesh;
   HycoCellList cells;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoCellListCreate(f->order, m, NULL, &cells));
-  ierr = WriteCells(f, &cells);
-  PetscCall(HycoCellListDestroy(&cells));
-  PetscCall(ierr);
+  HycoFinally(WriteCells(f, &cells), PetscCall(HycoCellListDestroy(&cells)));
   if (!f->points)
     PetscCall(HycoFieldWrite(f->h, f->order, m->n_nodes, ROOT "Points", HYCO_ON_NODES, MPIU_REAL, 3, 3, X));
   PetscCall(HycoFieldWrite(f->h, f->order, m->n_nodes, ROOT "PointData/node_id", HYCO_ON_NODES, MPIU_INT, 1,
@@ -136,7 +130,6 @@ PetscErrorCode HycoVTKWriteField(HycoFieldFile f, const HycoField *field, const 
 {
   const PetscInt n = f->order ? f->order->n[field->place] : HycoFieldFileCount(f, field->place);
   PetscReal *tensor = NULL;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   HycoFormat(set, ROOT "%s/%s", field->place == HYCO_ON_CELLS ? "CellData" : "PointData", field->name);
@@ -145,9 +138,8 @@ PetscErrorCode HycoVTKWriteField(HycoFieldFile f, const HycoField *field, const 
     Permute(n, rows, tensor);
     rows = tensor;
   }
-  ierr = WriteRows(f, set, field->place, field->components == 1 ? HYCO_H5_LINE : field->components, rows);
-  PetscCall(PetscFree(tensor));
-  PetscCall(ierr);
+  HycoFinally(WriteRows(f, set, field->place, field->components == 1 ? HYCO_H5_LINE : field->components, rows),
+              PetscCall(PetscFree(tensor)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -31,10 +31,8 @@ static void Tell(MPI_Comm comm, int line, const char function[], const char file
                  const char message[])
 {
   char said[HYCO_LINE];
-  PetscMPIInt rank = 0;
 
-  MPI_Comm_rank(comm, &rank);
-  if (rank) return;
+  if (HycoRank(comm)) return;
   Compose(said, line, function, file, code, message);
   fprintf(stderr, "hyco: error: %s\n", said);
   fflush(stderr);
@@ -69,12 +67,9 @@ const char *HycoKeptError(void)
 static PetscErrorCode OneLine(MPI_Comm comm, int line, const char *function, const char *file, PetscErrorCode code,
                               PetscErrorType type, const char *text, void *ctx)
 {
-  PetscMPIInt size = 0;
-
   (void)ctx;
   if (type == PETSC_ERROR_INITIAL) Tell(comm, line, function, file, code, text);
-  MPI_Comm_size(PETSC_COMM_WORLD, &size);
-  if (size == 1 && function && strcmp(function, "main") == 0) {
+  if (HycoSize(PETSC_COMM_WORLD) == 1 && function && strcmp(function, "main") == 0) {
     fflush(NULL);
     _exit(1);
   }

@@ -33,30 +33,6 @@ PetscErrorCode HycoDeclareClasses(PetscOptions options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The names are those of body_NAME_law in the scene. */
-static PetscErrorCode RegisterLaws(void)
-{
-  PetscFunctionBegin;
-  PetscCall(HycoMaterialRegister(HYCO_MATERIAL_ELASTIC, HycoMaterialCreate_Elastic));
-  PetscCall(HycoMaterialRegister(HYCO_MATERIAL_J2, HycoMaterialCreate_J2));
-  PetscCall(HycoMaterialRegister(HYCO_MATERIAL_NORTON, HycoMaterialCreate_Norton));
-  PetscCall(HycoMaterialRegister(HYCO_MATERIAL_STRAIN_HARDENING, HycoMaterialCreate_StrainHardening));
-  PetscCall(HycoMaterialRegister(HYCO_MATERIAL_LIMBACK_ANDERSSON, HycoMaterialCreate_LimbackAndersson));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The names are those of contact_NAME_type in the scene. */
-static PetscErrorCode RegisterContacts(void)
-{
-  PetscFunctionBegin;
-  PetscCall(HycoContactRegister(HYCO_CONTACT_OBSTACLE, HycoContactCreate_Obstacle));
-  PetscCall(HycoContactRegister(HYCO_CONTACT_PAIR, HycoContactCreate_Pair));
-  PetscCall(HycoContactRegister(HYCO_CONTACT_SURFACE, HycoContactCreate_Surface));
-  PetscCall(HycoContactRegister(HYCO_CONTACT_MORTAR, HycoContactCreate_Mortar));
-  PetscCall(HycoContactRegister(HYCO_CONTACT_RIGID, HycoContactCreate_Rigid));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* A solver searches the forms in this order. */
 static PetscErrorCode RegisterForms(void)
 {
@@ -95,8 +71,18 @@ PetscErrorCode HycoInitializePackage(void)
   PetscCall(HycoTaoRegisterAll());
   PetscCall(HycoConeRegister(HYCO_CONE_NONNEGATIVE, HycoConeCreate_Nonnegative));
   PetscCall(HycoConeRegister(HYCO_CONE_COULOMB, HycoConeCreate_Coulomb));
-  PetscCall(RegisterLaws());
-  PetscCall(RegisterContacts());
+  /* The names are those of body_NAME_law in the scene. */
+  PetscCall(HycoMaterialRegister(HYCO_MATERIAL_ELASTIC, HycoMaterialCreate_Elastic));
+  PetscCall(HycoMaterialRegister(HYCO_MATERIAL_J2, HycoMaterialCreate_J2));
+  PetscCall(HycoMaterialRegister(HYCO_MATERIAL_NORTON, HycoMaterialCreate_Norton));
+  PetscCall(HycoMaterialRegister(HYCO_MATERIAL_STRAIN_HARDENING, HycoMaterialCreate_StrainHardening));
+  PetscCall(HycoMaterialRegister(HYCO_MATERIAL_LIMBACK_ANDERSSON, HycoMaterialCreate_LimbackAndersson));
+  /* The names are those of contact_NAME_type in the scene. */
+  PetscCall(HycoContactRegister(HYCO_CONTACT_OBSTACLE, HycoContactCreate_Obstacle));
+  PetscCall(HycoContactRegister(HYCO_CONTACT_PAIR, HycoContactCreate_Pair));
+  PetscCall(HycoContactRegister(HYCO_CONTACT_SURFACE, HycoContactCreate_Surface));
+  PetscCall(HycoContactRegister(HYCO_CONTACT_MORTAR, HycoContactCreate_Mortar));
+  PetscCall(HycoContactRegister(HYCO_CONTACT_RIGID, HycoContactCreate_Rigid));
   PetscCall(RegisterForms());
   PetscCall(RegisterModels());
   PetscCall(HycoExtensionsRegister());

@@ -177,8 +177,7 @@ PetscErrorCode HycoSceneDestroyHistory(HycoScene s)
 {
   PetscFunctionBegin;
   for (PetscInt k = 0; k < s->n_tables; k++) {
-    PetscCall(PetscFree(s->table[k].t));
-    PetscCall(PetscFree(s->table[k].value));
+    HycoFreeAll(&s->table[k].t, &s->table[k].value);
   }
   PetscCall(PetscFree(s->times));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -220,13 +220,10 @@ static PetscErrorCode ReadLines(HycoSamples s, const char path[], FILE *file)
 static PetscErrorCode ReadFile(HycoSamples s, const char path[])
 {
   FILE *file = fopen(path, "r");
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   HycoCheck(file, "the file of points %s cannot be opened", path);
-  ierr = ReadLines(s, path, file);
-  fclose(file);
-  PetscCall(ierr);
+  HycoFinally(ReadLines(s, path, file), fclose(file));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -260,15 +260,13 @@ static PetscErrorCode CreateContact(HycoScene s, const char name[], PetscObject 
 {
   const char *type = NULL;
   HycoContact contact;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(GetType(s, "contact", name, "type", &type, given));
   PetscCall(HycoContactCreate(PETSC_COMM_SELF, &contact));
   PetscCall(PetscObjectSetName((PetscObject)contact, name));
-  ierr = HycoContactSetType(contact, *given ? type : HYCO_CONTACT_OBSTACLE);
-  if (ierr) PetscCall(HycoContactDestroy(&contact));
-  PetscCall(ierr);
+  HycoOnError(HycoContactSetType(contact, *given ? type : HYCO_CONTACT_OBSTACLE),
+              PetscCall(HycoContactDestroy(&contact)));
   *declared = &contact->entries;
   *object = (PetscObject)contact;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -741,17 +739,13 @@ static PetscErrorCode LoadInto(HycoScene s, const char path[])
 
 PetscErrorCode HycoSceneLoad(MPI_Comm comm, const char path[], HycoScene *scene)
 {
-  PetscErrorCode ierr;
-
   PetscFunctionBegin;
   PetscCheck(path && scene, PETSC_COMM_SELF, PETSC_ERR_ARG_NULL,
              "HycoSceneLoad: the path or the handle's address is NULL");
   PetscCall(HycoPackageCheck());
   PetscCall(PetscHeaderCreate(*scene, HYCO_SCENE_CLASSID, "HycoScene", "Scene of bodies in contact", "Hyco", comm,
                               HycoSceneDestroy, HycoSceneView));
-  ierr = LoadInto(*scene, path);
-  if (ierr) PetscCall(HycoSceneDestroy(scene));
-  PetscCall(ierr);
+  HycoOnError(LoadInto(*scene, path), PetscCall(HycoSceneDestroy(scene)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -780,15 +774,11 @@ static PetscErrorCode FillFromEntries(HycoScene s, PetscInt n, char *const key[]
 PetscErrorCode HycoSceneFromEntries(MPI_Comm comm, PetscInt n, char *const key[], char *const value[],
                                     const char folder[], HycoScene *scene)
 {
-  PetscErrorCode ierr;
-
   PetscFunctionBegin;
   PetscCall(HycoPackageCheck());
   PetscCall(PetscHeaderCreate(*scene, HYCO_SCENE_CLASSID, "HycoScene", "Scene of bodies in contact", "Hyco", comm,
                               HycoSceneDestroy, HycoSceneView));
-  ierr = FillFromEntries(*scene, n, key, value, folder);
-  if (ierr) PetscCall(HycoSceneDestroy(scene));
-  PetscCall(ierr);
+  HycoOnError(FillFromEntries(*scene, n, key, value, folder), PetscCall(HycoSceneDestroy(scene)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -894,13 +884,10 @@ PetscErrorCode HycoSceneDestroy(HycoScene *scene)
   PetscCall(HycoSceneDestroyMotion(s));
   for (PetscInt k = 0; k < s->n_contacts; k++) PetscCall(HycoContactDestroy(&s->contact[k]));
   for (PetscInt k = 0; k < s->n_entries; k++) {
-    PetscCall(PetscFree(s->key[k]));
-    PetscCall(PetscFree(s->value[k]));
+    HycoFreeAll(&s->key[k], &s->value[k]);
   }
   for (PetscInt k = 0; k < s->n_quantities; k++) {
-    PetscCall(PetscFree(s->quantity[k].name));
-    PetscCall(PetscFree(s->quantity[k].group));
-    PetscCall(PetscFree(s->quantity[k].contact));
+    HycoFreeAll(&s->quantity[k].name, &s->quantity[k].group, &s->quantity[k].contact);
   }
   for (PetscInt p = 0; p < s->n_variables; p++) PetscCall(PetscFree(s->parameter[p]));
   PetscCall(HycoSceneDestroyHistory(s));

@@ -120,13 +120,12 @@ static PetscErrorCode Share(MPI_Comm comm, size_t bytes, const PetscMPIInt count
 PetscErrorCode HycoROMSolveShared(MPI_Comm comm, HycoROM m, PetscInt n, PetscInt n_parameters, const PetscReal mu[],
                                   HycoPrediction prediction[], PetscReal Lambda[], PetscReal U[])
 {
-  PetscMPIInt rank, size, *count, *first;
+  PetscMPIInt size, *count, *first;
   PetscInt n_contacts, n_nodes, dim;
   size_t n_dof, at;
 
   PetscFunctionBegin;
   PetscCall(HycoROMGetSizes(m, &n_contacts, &n_nodes, &dim));
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
   PetscCallMPI(MPI_Comm_size(comm, &size));
   PetscCall(PetscMalloc2(size, &count, size, &first));
   for (PetscMPIInt r = 0; r < size; r++) {
@@ -134,8 +133,8 @@ PetscErrorCode HycoROMSolveShared(MPI_Comm comm, HycoROM m, PetscInt n, PetscInt
     count[r] = (PetscMPIInt)((PetscInt64)n * (r + 1) / size) - first[r];
   }
   n_dof = (size_t)(n_nodes * dim);
-  at = (size_t)first[rank];
-  HycoOnEach(comm, HycoROMSolveMany(m, count[rank], n_parameters, mu + at * (size_t)n_parameters,
+  at = (size_t)first[HycoRank(comm)];
+  HycoOnEach(comm, HycoROMSolveMany(m, count[HycoRank(comm)], n_parameters, mu + at * (size_t)n_parameters,
                                     prediction ? prediction + at : NULL,
                                     Lambda ? Lambda + at * (size_t)n_contacts : NULL, U ? U + at * n_dof : NULL));
   PetscCall(Share(comm, sizeof(*prediction), count, first, prediction));

@@ -16,8 +16,7 @@ PetscErrorCode HycoCarriedDestroy(HycoCarried *carried)
 {
   PetscFunctionBegin;
   if (!*carried) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoFreeAll(&(*carried)->normal, &(*carried)->gap, &(*carried)->area, &(*carried)->result);
-  PetscCall(PetscFree(*carried));
+  HycoFreeAll(&(*carried)->normal, &(*carried)->gap, &(*carried)->area, &(*carried)->result, carried);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -30,13 +30,9 @@ PetscErrorCode HycoBalanceDestroy(HycoBalance *balance)
 
   PetscFunctionBegin;
   if (!b) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(KSPDestroy(&b->ksp));
-  PetscCall(MatDestroy(&b->K));
-  PetscCall(VecDestroy(&b->r));
-  PetscCall(VecDestroy(&b->x));
+  HycoDestroyAll(&b->ksp, &b->K, &b->r, &b->x);
   PetscCall(HycoRowsDestroy(&b->rows));
-  HycoFreeAll(&b->load, &b->energy, &b->gap, &b->size, &b->approach, &b->residual, &b->contact);
-  PetscCall(PetscFree(*balance));
+  HycoFreeAll(&b->load, &b->energy, &b->gap, &b->size, &b->approach, &b->residual, &b->contact, balance);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -82,13 +82,10 @@ static PetscErrorCode Evaluate(Fit *f, const PetscReal x[])
 static PetscErrorCode EvaluateVec(Fit *f, Vec X)
 {
   const PetscScalar *x;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(VecGetArrayRead(X, &x));
-  ierr = Evaluate(f, x);
-  PetscCall(VecRestoreArrayRead(X, &x));
-  PetscCall(ierr);
+  HycoFinally(Evaluate(f, x), PetscCall(VecRestoreArrayRead(X, &x)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -117,8 +114,7 @@ static PetscErrorCode Jacobian(Tao tao, Vec X, Mat J, Mat P, void *ctx)
   for (PetscInt k = 0; k < f->n; k++) {
     for (PetscInt p = 0; p < f->n_par; p++) PetscCall(MatSetValue(J, k, p, f->J[k * f->n_par + p], INSERT_VALUES));
   }
-  PetscCall(MatAssemblyBegin(J, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(J, MAT_FINAL_ASSEMBLY));
+  PetscCall(HycoMatAssemble(J));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -210,8 +206,7 @@ static PetscErrorCode Minimise(Fit *f, const char type[], Vec X)
   Mat J;
 
   PetscFunctionBegin;
-  PetscCall(VecDuplicate(X, &lo));
-  PetscCall(VecDuplicate(X, &hi));
+  HycoVecDuplicate(X, &lo, &hi);
   PetscCall(VecSet(hi, 1));
   PetscCall(VecCreateSeq(PETSC_COMM_SELF, f->n, &r));
   PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, f->n, f->n_par, NULL, &J));
@@ -228,11 +223,7 @@ static PetscErrorCode Minimise(Fit *f, const char type[], Vec X)
   PetscCall(TaoSetTolerances(tao, 1e-14, 0, 0));
   PetscCall(TaoSetMaximumIterations(tao, 200));
   PetscCall(TaoSolve(tao));
-  PetscCall(TaoDestroy(&tao));
-  PetscCall(MatDestroy(&J));
-  PetscCall(VecDestroy(&r));
-  PetscCall(VecDestroy(&lo));
-  PetscCall(VecDestroy(&hi));
+  HycoDestroyAll(&tao, &J, &r, &lo, &hi);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

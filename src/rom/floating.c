@@ -24,8 +24,7 @@ PetscErrorCode HycoFloatingDestroy(HycoFloating *floating)
   PetscFunctionBegin;
   if (!f) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoMeshDestroy(&f->mesh));
-  HycoFreeAll(&f->rigid, &f->of);
-  PetscCall(PetscFree(*floating));
+  HycoFreeAll(&f->rigid, &f->of, floating);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -30,8 +30,7 @@ PetscErrorCode HycoOutputCellsDestroy(HycoOutputCells *cells)
   PetscCall(HycoResultantsDestroy(&(*cells)->resultants));
   PetscCall(HycoMeshDestroy(&(*cells)->mesh));
   HycoFreeAll(&(*cells)->V, &(*cells)->u, &(*cells)->sigma, &(*cells)->means, &(*cells)->stressed, &(*cells)->fe_at,
-              &(*cells)->reaction, &(*cells)->surface_node);
-  PetscCall(PetscFree(*cells));
+              &(*cells)->reaction, &(*cells)->surface_node, cells);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -92,8 +91,7 @@ static PetscErrorCode PrepareReactions(HycoROM m, HycoOutputCells p)
   /* By number in the whole mesh, the only one that the two meshes share. */
   for (PetscInt i = 0; i < m->model->mesh->n_nodes; i++) place[m->model->mesh->node_whole[i]] = in[i] ? i : -1;
   for (PetscInt i = 0; i < p->mesh->n_nodes; i++) p->surface_node[i] = place[p->mesh->node_whole[i]];
-  PetscCall(PetscFree(place));
-  PetscCall(PetscFree(in));
+  HycoFreeAll(&place, &in);
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -335,16 +333,13 @@ static PetscErrorCode MeasureTimes(HycoROM m)
 PetscErrorCode HycoROMMeasurePath(HycoROM m)
 {
   HycoTrace *trace = &m->trace;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   if (!m->model->scene->n_quantities || !trace->n_listed || trace->step) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(Make(m));
   PetscCall(PetscMalloc1(trace->n_listed, &trace->step));
   PetscCall(PetscArraycpy(trace->step, trace->history.step, trace->n_listed));
-  ierr = MeasureTimes(m);
-  if (ierr) PetscCall(PetscFree(trace->step));
-  PetscCall(ierr);
+  HycoOnError(MeasureTimes(m), PetscCall(PetscFree(trace->step)));
   trace->history.step = trace->step;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -403,7 +398,7 @@ static PetscErrorCode MakeFew(HycoROM m, HycoOutputCells all, PetscInt n, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode Exchange(HycoROM m)
+PetscErrorCode HycoROMUnfocusOutputs(HycoROM m)
 {
   const HycoOutputCells all = m->output_cells;
   HycoResultants resultants = all->resultants;
@@ -435,14 +430,7 @@ PetscErrorCode HycoROMFocusOutputs(HycoROM m, const PetscReal value[], PetscBool
   if (ierr) PetscCall(HycoOutputCellsDestroy(&m->few));
   PetscCall(PetscFree3(needed, stressed, keep));
   PetscCall(ierr);
-  if (*focused) PetscCall(Exchange(m));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscErrorCode HycoROMUnfocusOutputs(HycoROM m)
-{
-  PetscFunctionBegin;
-  PetscCall(Exchange(m));
+  if (*focused) PetscCall(HycoROMUnfocusOutputs(m)); /* an exchange, its own inverse */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

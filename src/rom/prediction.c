@@ -238,7 +238,6 @@ PetscErrorCode HycoROMWrite(HycoROM m, const char path[])
 {
   HycoSolution solution;
   PetscReal *rid;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(CheckSolved(m));
@@ -247,9 +246,7 @@ PetscErrorCode HycoROMWrite(HycoROM m, const char path[])
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(Look(m, &solution, &rid));
-  ierr = HycoSolutionWrite(path, &solution);
-  PetscCall(PetscFree(rid));
-  PetscCall(ierr);
+  HycoFinally(HycoSolutionWrite(path, &solution), PetscCall(PetscFree(rid)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -258,14 +255,11 @@ static PetscErrorCode WritePoint(HycoROM m, const PetscReal mu[], HycoFieldFile 
 {
   HycoSolution solution;
   PetscReal *rid;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoROMPredict(m, m->model->scene->n_parameters, mu));
   PetscCall(Look(m, &solution, &rid));
-  ierr = HycoSolutionAdd(file, &solution);
-  PetscCall(PetscFree(rid));
-  PetscCall(ierr);
+  HycoFinally(HycoSolutionAdd(file, &solution), PetscCall(PetscFree(rid)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -24,8 +24,7 @@ PetscErrorCode HycoResultantsDestroy(HycoResultants *resultants)
   if (!*resultants) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoFEDestroy(&(*resultants)->fe));
   PetscCall(HycoMeshDestroy(&(*resultants)->mesh));
-  HycoFreeAll(&(*resultants)->balanced, &(*resultants)->load);
-  PetscCall(PetscFree(*resultants));
+  HycoFreeAll(&(*resultants)->balanced, &(*resultants)->load, resultants);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -84,14 +84,11 @@ static PetscErrorCode DeclareAll(HycoROM m)
   PetscCall(HycoROMTypeNames(&types));
   for (PetscInt k = 0; types[k]; k++) {
     HycoROM each;
-    PetscErrorCode ierr;
 
     PetscCall(HycoROMCreate(&each));
     PetscCall(PetscObjectSetOptions((PetscObject)each, ((PetscObject)m)->options));
     PetscCall(HycoROMSetType(each, types[k]));
-    ierr = each->ops->options ? (*each->ops->options)(each) : PETSC_SUCCESS;
-    PetscCall(HycoROMDestroy(&each));
-    PetscCall(ierr);
+    HycoFinally(each->ops->options ? (*each->ops->options)(each) : PETSC_SUCCESS, PetscCall(HycoROMDestroy(&each)));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -126,12 +123,9 @@ static PetscErrorCode DestroyModel(HycoROM rom)
   PetscCall(HycoMeshDestroy(&m->whole));
   PetscCall(HycoPairsDestroy(&m->pairs));
   PetscCall(HycoMeshDestroy(&m->mesh));
-  PetscCall(HycoSceneDestroy(&m->scene));
-  PetscCall(ISDestroy(&m->rid));
-  PetscCall(ISDestroy(&m->inside));
+  HycoDestroyAll(&m->scene, &m->rid, &m->inside);
   HycoFreeAll(&m->master_reach, &m->in_rid, &m->closed, &m->V, &m->V_whole, &m->sigma, &m->fe_dof, &m->points,
-              &m->reach, &m->provenance, &m->search);
-  PetscCall(PetscFree(rom->model));
+              &m->reach, &m->provenance, &m->search, &rom->model);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -224,7 +218,6 @@ PetscErrorCode HycoROMCheckScene(HycoROM m, HycoScene scene)
 {
   unsigned long long hash;
   char text[32], *history;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
@@ -232,9 +225,7 @@ PetscErrorCode HycoROMCheckScene(HycoROM m, HycoScene scene)
   PetscCall(HycoSceneFingerprint(scene, &hash));
   snprintf(text, sizeof(text), "%016llx", hash);
   PetscCall(HycoSceneWriteHistory(m->model->scene, &history));
-  ierr = HycoSceneCompareHistory(scene, history, m->model->path);
-  PetscCall(PetscFree(history));
-  PetscCall(ierr);
+  HycoFinally(HycoSceneCompareHistory(scene, history, m->model->path), PetscCall(PetscFree(history)));
   HycoCheck(strcmp(text, m->model->fingerprint) == 0,
             "%s was trained on another scene or mesh; give the scene, the mesh and the entries of its training",
             m->model->path);

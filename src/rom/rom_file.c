@@ -21,7 +21,6 @@
 static PetscErrorCode MoveTies(HycoH5 h, HycoROM m)
 {
   HycoTies t = m->model->mesh->ties;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   if (HycoH5Reads(h) ? !HycoH5Has(h, "ties/slave") : !t) PetscFunctionReturn(PETSC_SUCCESS);
@@ -38,9 +37,7 @@ static PetscErrorCode MoveTies(HycoH5 h, HycoROM m)
   PetscCall(HycoH5Real(h, "ties/weight", &t->n, 1, &t->weight));
   PetscCall(HycoH5Real(h, "ties/reach", &t->n, 1, &t->reach));
   if (!HycoH5Reads(h)) PetscFunctionReturn(PETSC_SUCCESS);
-  ierr = HycoMeshSetTies(m->model->mesh, t);
-  PetscCall(HycoTiesDestroy(&t));
-  PetscCall(ierr);
+  HycoFinally(HycoMeshSetTies(m->model->mesh, t), PetscCall(HycoTiesDestroy(&t)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -77,16 +74,13 @@ PetscErrorCode HycoROMLoadWord(HycoROM m, HycoH5 h, const char name[], const cha
 static PetscErrorCode LoadType(HycoH5 h, HycoROM m)
 {
   char *type = NULL;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   if (HycoH5Has(h, "problem/type"))
     PetscCall(HycoH5LoadText(h, "problem/type", &type));
   else
     PetscCall(PetscStrallocpy(HYCO_ROM_HYBRID, &type));
-  ierr = HycoROMSetType(m, type);
-  PetscCall(PetscFree(type));
-  PetscCall(ierr);
+  HycoFinally(HycoROMSetType(m, type), PetscCall(PetscFree(type)));
   PetscTryTypeMethod(m, load, h);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -347,14 +341,12 @@ static PetscErrorCode MoveReach(HycoH5 h, HycoROM m)
 static PetscErrorCode MoveScene(HycoH5 h, HycoROM m)
 {
   char *text;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoH5Reads(h) ? HycoH5LoadText(h, "problem/scene", &text) : HycoSceneToText(m->model->scene, &text));
-  ierr = HycoH5Reads(h) ? HycoSceneFromText(PETSC_COMM_SELF, text, &m->model->scene)
-                        : HycoH5WriteText(h, "problem/scene", text);
-  PetscCall(PetscFree(text));
-  PetscCall(ierr);
+  HycoFinally(HycoH5Reads(h) ? HycoSceneFromText(PETSC_COMM_SELF, text, &m->model->scene)
+                             : HycoH5WriteText(h, "problem/scene", text),
+              PetscCall(PetscFree(text)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -580,7 +572,7 @@ static PetscErrorCode FromImage(void *image, size_t size, HycoROM *model)
 
 PetscErrorCode HycoROMBroadcast(MPI_Comm comm, HycoROM *model)
 {
-  PetscMPIInt rank, ranks;
+  PetscMPIInt rank;
   void *image = NULL;
   size_t size = 0;
   PetscInt64 bytes;
@@ -589,8 +581,7 @@ PetscErrorCode HycoROMBroadcast(MPI_Comm comm, HycoROM *model)
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  PetscCallMPI(MPI_Comm_size(comm, &ranks));
-  if (ranks == 1) PetscFunctionReturn(PETSC_SUCCESS);
+  if (HycoSize(comm) == 1) PetscFunctionReturn(PETSC_SUCCESS);
   HycoOnRoot(comm, MakeImage(*model, &image, &size));
   bytes = (PetscInt64)size;
   PetscCallMPI(MPI_Bcast(&bytes, 1, MPIU_INT64, 0, comm));

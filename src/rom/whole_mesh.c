@@ -13,7 +13,6 @@ static PetscErrorCode WritePlaced(MPI_Comm comm, HycoH5 h, const char name[], Pe
   PetscLayout layout;
   PetscSF sf;
   PetscInt first, last, *rows;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(PetscLayoutCreateFromSizes(comm, PETSC_DECIDE, all, 1, &layout));
@@ -25,9 +24,7 @@ static PetscErrorCode WritePlaced(MPI_Comm comm, HycoH5 h, const char name[], Pe
   PetscCall(HycoSFSend(sf, MPIU_INT, width, value, rows));
   PetscCall(PetscSFDestroy(&sf));
   PetscCall(PetscLayoutDestroy(&layout));
-  ierr = HycoH5WriteRows(h, name, MPIU_INT, all, width, first, last - first, rows);
-  PetscCall(PetscFree(rows));
-  PetscCall(ierr);
+  HycoFinally(HycoH5WriteRows(h, name, MPIU_INT, all, width, first, last - first, rows), PetscCall(PetscFree(rows)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -110,7 +107,6 @@ static PetscErrorCode WriteModes(HycoH5 h, PetscInt l, Mat V)
   PetscInt all, first, last, lda;
   const PetscScalar *v;
   PetscReal *rows;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(MatGetSize(V, &all, NULL));
@@ -122,9 +118,7 @@ static PetscErrorCode WriteModes(HycoH5 h, PetscInt l, Mat V)
     for (PetscInt j = 0; j < l; j++) rows[(size_t)i * (size_t)l + (size_t)j] = v[(size_t)j * (size_t)lda + (size_t)i];
   }
   PetscCall(MatDenseRestoreArrayRead(V, &v));
-  ierr = HycoH5WriteRows(h, IN("V"), MPIU_REAL, all, l, first, last - first, rows);
-  PetscCall(PetscFree(rows));
-  PetscCall(ierr);
+  HycoFinally(HycoH5WriteRows(h, IN("V"), MPIU_REAL, all, l, first, last - first, rows), PetscCall(PetscFree(rows)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

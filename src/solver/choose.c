@@ -30,16 +30,14 @@ static PetscReal Available(void)
 PetscErrorCode HycoSolverMemory(HycoSolver s, PetscReal *bytes)
 {
   MPI_Comm node;
-  PetscMPIInt rank;
   PetscReal mine;
 
   PetscFunctionBegin;
   *bytes = s->memory;
   if (*bytes > 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCallMPI(MPI_Comm_split_type(HycoComm(s), MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &node));
-  PetscCallMPI(MPI_Comm_rank(node, &rank));
   /* One rank per machine reads it: the sum over all ranks would count a machine's memory as often as it has ranks. */
-  mine = rank == 0 ? 0.8 * Available() : 0;
+  mine = HycoRank(node) == 0 ? 0.8 * Available() : 0;
   PetscCallMPI(MPI_Allreduce(&mine, bytes, 1, MPIU_REAL, MPI_SUM, HycoComm(s)));
   PetscCallMPI(MPI_Comm_free(&node));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -15,31 +15,24 @@
 static PetscErrorCode Fill(HycoSystem y, PetscInt p, const Vec z[], PetscReal M[], PetscReal q[])
 {
   const size_t n = (size_t)(p + y->m);
-  VecScatter scatter;
-  Vec all;
+  PetscReal *row;
 
   PetscFunctionBegin;
   PetscCall(HycoSystemWork(y));
-  PetscCall(VecScatterCreateToAll(y->work_L, &scatter, &all));
+  PetscCall(PetscMalloc1(y->m + 1, &row));
   for (PetscInt i = 0; i < p; i++) {
-    const PetscScalar *row;
-
     PetscCall(VecDot(y->F, z[i], &q[i]));
     q[i] = -q[i];
     PetscCall(MatMult(y->B, z[i], y->work_L));
-    PetscCall(VecScatterBegin(scatter, y->work_L, all, INSERT_VALUES, SCATTER_FORWARD));
-    PetscCall(VecScatterEnd(scatter, y->work_L, all, INSERT_VALUES, SCATTER_FORWARD));
-    PetscCall(VecGetArrayRead(all, &row));
+    PetscCall(HycoVecGather(y->work_L, row));
     for (PetscInt j = 0; j < y->m; j++) {
       M[(size_t)(p + j) * n + (size_t)i] = row[j];
       M[(size_t)i * n + (size_t)(p + j)] = -row[j];
     }
-    PetscCall(VecRestoreArrayRead(all, &row));
   }
   /* Any definite block would do: feasibility does not depend on it. */
   for (size_t j = (size_t)p; j < n; j++) M[j * n + j] = 1;
-  PetscCall(VecScatterDestroy(&scatter));
-  PetscCall(VecDestroy(&all));
+  PetscCall(PetscFree(row));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

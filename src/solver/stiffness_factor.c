@@ -10,9 +10,7 @@ PetscErrorCode HycoStiffnessDestroy(HycoStiffness *f)
 {
   PetscFunctionBegin;
   PetscCall(HycoDirectDestroy(&f->direct));
-  PetscCall(PetscFree(f->lu));
-  PetscCall(PetscFree(f->ipiv));
-  PetscCall(PetscFree(f->X));
+  HycoFreeAll(&f->lu, &f->ipiv, &f->X);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -27,8 +25,7 @@ static PetscErrorCode FactorDense(HycoStiffness *f, Mat K, PetscBool *singular)
   PetscFunctionBegin;
   PetscCall(MatGetSize(K, &n, NULL));
   if (f->n != n) {
-    PetscCall(PetscFree(f->lu));
-    PetscCall(PetscFree(f->ipiv));
+    HycoFreeAll(&f->lu, &f->ipiv);
     PetscCall(PetscMalloc1((size_t)n * (size_t)n, &f->lu));
     PetscCall(PetscMalloc1(n, &f->ipiv));
     PetscCall(PetscBLASIntCast(n, &f->n));

@@ -15,9 +15,7 @@ PetscErrorCode HycoSystemCreate(MPI_Comm comm, HycoSystem *system)
 static PetscErrorCode FreeWork(HycoSystem s)
 {
   PetscFunctionBegin;
-  PetscCall(VecDestroy(&s->work_x[0]));
-  PetscCall(VecDestroy(&s->work_x[1]));
-  PetscCall(VecDestroy(&s->work_L));
+  HycoDestroyAll(&s->work_x[0], &s->work_x[1], &s->work_L);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -26,8 +24,7 @@ PetscErrorCode HycoSystemWork(HycoSystem s)
 {
   PetscFunctionBegin;
   if (!s->work_x[0]) {
-    PetscCall(VecDuplicate(s->F, &s->work_x[0]));
-    PetscCall(VecDuplicate(s->F, &s->work_x[1]));
+    HycoVecDuplicate(s->F, &s->work_x[0], &s->work_x[1]);
   }
   if (s->m && !s->work_L) PetscCall(VecDuplicate(s->D, &s->work_L));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -41,12 +38,7 @@ PetscErrorCode HycoSystemDestroy(HycoSystem *system)
   PetscFunctionBegin;
   HycoDestroyBegin(system, HYCO_SYSTEM_CLASSID);
   s = *system;
-  PetscCall(MatDestroy(&s->K));
-  PetscCall(MatDestroy(&s->Bt));
-  PetscCall(MatDestroy(&s->B));
-  PetscCall(MatDestroy(&s->G));
-  PetscCall(VecDestroy(&s->F));
-  PetscCall(VecDestroy(&s->D));
+  HycoDestroyAll(&s->K, &s->Bt, &s->B, &s->G, &s->F, &s->D);
   PetscCall(HycoBlocksDestroy(&s->blocks));
   PetscCall(FreeWork(s));
   PetscCall(PetscHeaderDestroy(system));
@@ -79,10 +71,7 @@ PetscErrorCode HycoSystemSetMatrices(HycoSystem s, Mat K, Mat Bt, Mat B, PetscBo
   }
   /* References first, then the old ones are given up: the new object may be the old one. */
   PetscCall(PetscObjectReference((PetscObject)K));
-  PetscCall(MatDestroy(&s->K));
-  PetscCall(MatDestroy(&s->B));
-  PetscCall(MatDestroy(&s->Bt));
-  PetscCall(MatDestroy(&s->G));
+  HycoDestroyAll(&s->K, &s->B, &s->Bt, &s->G);
   s->K = K;
   s->B = B;
   s->Bt = Bt;
@@ -116,8 +105,7 @@ PetscErrorCode HycoSystemSetVectors(HycoSystem s, Vec F, Vec D)
   PetscCall(PetscObjectReference((PetscObject)F));
   if (D) PetscCall(PetscObjectReference((PetscObject)D));
   if (F != s->F || D != s->D) PetscCall(FreeWork(s));
-  PetscCall(VecDestroy(&s->F));
-  PetscCall(VecDestroy(&s->D));
+  HycoDestroyAll(&s->F, &s->D);
   s->F = F;
   s->D = D;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -150,12 +138,7 @@ PetscErrorCode HycoSystemSetFlexibility(HycoSystem s, Mat G, Vec g)
              (int)cols, (int)m);
   PetscCall(PetscObjectReference((PetscObject)G));
   PetscCall(PetscObjectReference((PetscObject)g));
-  PetscCall(MatDestroy(&s->K));
-  PetscCall(MatDestroy(&s->B));
-  PetscCall(MatDestroy(&s->Bt));
-  PetscCall(MatDestroy(&s->G));
-  PetscCall(VecDestroy(&s->F));
-  PetscCall(VecDestroy(&s->D));
+  HycoDestroyAll(&s->K, &s->B, &s->Bt, &s->G, &s->F, &s->D);
   PetscCall(FreeWork(s));
   s->G = G;
   s->D = g;

@@ -82,6 +82,20 @@ PetscErrorCode HycoFreeAll_Private(void *const addresses[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoDestroyAll_Private(void *const addresses[])
+{
+  PetscFunctionBegin;
+  for (; *addresses; addresses++) PetscCall(PetscObjectDestroy((PetscObject *)*addresses));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoVecDuplicate_Private(Vec v, Vec *const copies[])
+{
+  PetscFunctionBegin;
+  for (; *copies; copies++) PetscCall(VecDuplicate(v, *copies));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 const char *HycoVersion(void)
 {
   return HYCO_VERSION;

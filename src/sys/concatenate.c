@@ -1,25 +1,116 @@
-/* Rows of all ranks on rank 0, and rows from each rank to each other. */
+/* Rows of all ranks on rank 0 or on every rank, and rows from each rank to each other; entries of vectors. */
 #include <hycoimpl.h>
 
-/* Ordered by rank. *all is allocated on rank 0, with room for one more so that it is never NULL there; NULL on the
-   others. */
-PetscErrorCode HycoConcatenate(MPI_Comm comm, PetscInt n, const void *mine, MPI_Datatype type, size_t size,
-                               PetscInt *n_all, void *all)
+/* Ordered by rank. *all is allocated with room for one more, so that it is never NULL where the rows are. */
+static PetscErrorCode Concatenate(MPI_Comm comm, PetscBool everywhere, PetscInt n, const void *mine, MPI_Datatype type,
+                                  size_t size, PetscInt *n_all, void *all)
 {
-  PetscMPIInt rank, ranks, count, *counts, *offsets;
+  PetscMPIInt ranks, count, *counts, *offsets;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
   PetscCallMPI(MPI_Comm_size(comm, &ranks));
   PetscCall(PetscMPIIntCast(n, &count));
   PetscCall(PetscCalloc2(ranks, &counts, ranks + 1, &offsets));
-  PetscCallMPI(MPI_Gather(&count, 1, MPI_INT, counts, 1, MPI_INT, 0, comm));
-  for (PetscMPIInt r = 0; r < ranks && rank == 0; r++) offsets[r + 1] = offsets[r] + counts[r];
+  if (everywhere)
+    PetscCallMPI(MPI_Allgather(&count, 1, MPI_INT, counts, 1, MPI_INT, comm));
+  else
+    PetscCallMPI(MPI_Gather(&count, 1, MPI_INT, counts, 1, MPI_INT, 0, comm));
+  /* The counts stay 0 on the other ranks. */
+  for (PetscMPIInt r = 0; r < ranks; r++) offsets[r + 1] = offsets[r] + counts[r];
   *n_all = offsets[ranks];
   *(void **)all = NULL;
-  if (rank == 0) PetscCall(PetscMalloc((size_t)(*n_all + 1) * size, (void **)all));
-  PetscCallMPI(MPI_Gatherv(mine, count, type, *(void **)all, counts, offsets, type, 0, comm));
+  if (everywhere || HycoRank(comm) == 0) PetscCall(PetscMalloc((size_t)(*n_all + 1) * size, (void **)all));
+  if (everywhere)
+    PetscCallMPI(MPI_Allgatherv(mine, count, type, *(void **)all, counts, offsets, type, comm));
+  else
+    PetscCallMPI(MPI_Gatherv(mine, count, type, *(void **)all, counts, offsets, type, 0, comm));
   PetscCall(PetscFree2(counts, offsets));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoConcatenate(MPI_Comm comm, PetscInt n, const void *mine, MPI_Datatype type, size_t size,
+                               PetscInt *n_all, void *all)
+{
+  return Concatenate(comm, PETSC_FALSE, n, mine, type, size, n_all, all);
+}
+
+PetscErrorCode HycoConcatenateAll(MPI_Comm comm, PetscInt n, const void *mine, MPI_Datatype type, size_t size,
+                                  PetscInt *n_all, void *all)
+{
+  return Concatenate(comm, PETSC_TRUE, n, mine, type, size, n_all, all);
+}
+
+PetscErrorCode HycoVecGather(Vec v, PetscReal all[])
+{
+  PetscMPIInt ranks, count, *counts, *offsets;
+  const PetscInt *ranges;
+  const PetscScalar *mine;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCallMPI(MPI_Comm_size(HycoComm(v), &ranks));
+  PetscCall(VecGetLocalSize(v, &n));
+  if (ranks == 1) {
+    PetscCall(HycoVecRead(v, n, all));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(VecGetOwnershipRanges(v, &ranges));
+  PetscCall(PetscMalloc2(ranks, &counts, ranks, &offsets));
+  for (PetscMPIInt r = 0; r < ranks; r++) {
+    PetscCall(PetscMPIIntCast(ranges[r + 1] - ranges[r], &counts[r]));
+    PetscCall(PetscMPIIntCast(ranges[r], &offsets[r]));
+  }
+  PetscCall(PetscMPIIntCast(n, &count));
+  PetscCall(VecGetArrayRead(v, &mine));
+  PetscCallMPI(MPI_Allgatherv(mine, count, MPIU_REAL, all, counts, offsets, MPIU_REAL, HycoComm(v)));
+  PetscCall(VecRestoreArrayRead(v, &mine));
+  PetscCall(PetscFree2(counts, offsets));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoVecRead(Vec v, PetscInt n, PetscReal value[])
+{
+  const PetscScalar *own;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetArrayRead(v, &own));
+  PetscCall(PetscArraycpy(value, own, n));
+  PetscCall(VecRestoreArrayRead(v, &own));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoVecWrite(Vec v, PetscInt n, const PetscReal value[])
+{
+  PetscScalar *own;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetArray(v, &own));
+  PetscCall(PetscArraycpy(own, value, n));
+  PetscCall(VecRestoreArray(v, &own));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoScatter(VecScatter scatter, Vec from, Vec to)
+{
+  PetscFunctionBegin;
+  PetscCall(VecScatterBegin(scatter, from, to, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecScatterEnd(scatter, from, to, INSERT_VALUES, SCATTER_FORWARD));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoMatAssemble(Mat A)
+{
+  PetscFunctionBegin;
+  PetscCall(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
+  PetscCall(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoVecAssemble(Vec v)
+{
+  PetscFunctionBegin;
+  PetscCall(VecAssemblyBegin(v));
+  PetscCall(VecAssemblyEnd(v));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

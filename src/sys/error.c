@@ -103,7 +103,7 @@ PetscErrorCode HycoCatchNoModel(PetscErrorCode caught, const char message[])
 /* Collective, also without an error. The first rank that failed is heard: others often fail as a consequence. */
 PetscErrorCode HycoErrorSync(MPI_Comm comm, PetscErrorCode caught, const char message[])
 {
-  PetscMPIInt rank, size, mine, first;
+  PetscMPIInt size, mine, first;
   /* Broadcast as bytes: the ranks run the same program. */
   struct {
     PetscBool no_model;
@@ -111,13 +111,12 @@ PetscErrorCode HycoErrorSync(MPI_Comm comm, PetscErrorCode caught, const char me
   } said;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
   PetscCallMPI(MPI_Comm_size(comm, &size));
-  mine = message[0] ? rank : size;
+  mine = message[0] ? HycoRank(comm) : size;
   first = mine;
   if (size > 1) PetscCallMPI(MPI_Allreduce(&mine, &first, 1, MPI_INT, MPI_MIN, comm));
   if (first == size) PetscFunctionReturn(PETSC_SUCCESS);
-  if (rank == first) {
+  if (HycoRank(comm) == first) {
     said.no_model = (PetscBool)(caught == HYCO_ERR_NO_MODEL);
     snprintf(said.line, sizeof(said.line), "%s", message);
   }

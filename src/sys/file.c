@@ -118,11 +118,9 @@ PetscErrorCode HycoFileSweep(const char path[])
 PetscErrorCode HycoFileScratch(MPI_Comm comm, const char path[], const char kind[], char scratch[HYCO_FILE_NAME])
 {
   char place[PETSC_MAX_PATH_LEN];
-  PetscMPIInt rank;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  if (rank == 0) {
+  if (HycoRank(comm) == 0) {
     HycoFileFollow(path, place);
     Temporary(place, kind, scratch);
   }
@@ -202,7 +200,6 @@ static PetscErrorCode OpenPlace(HycoFile f)
 PetscErrorCode HycoFileCreate(const char path[], HycoFileKind kind, HycoFile *file)
 {
   HycoFile f;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   *file = NULL;
@@ -212,9 +209,7 @@ PetscErrorCode HycoFileCreate(const char path[], HycoFileKind kind, HycoFile *fi
   HycoFileOwner(path, f->shown);
   PetscCall(PetscStrncpy(f->path, path, sizeof(f->path)));
   HycoFileFollow(path, f->place);
-  ierr = OpenPlace(f);
-  if (ierr) PetscCall(PetscFree(f));
-  PetscCall(ierr);
+  HycoOnError(OpenPlace(f), PetscCall(PetscFree(f)));
   *file = f;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -130,13 +130,10 @@ PetscErrorCode HycoH5CreateImage(const char name[], HycoH5 *file)
 static PetscErrorCode Create(const char path[], PetscBool table, HycoH5 *file)
 {
   HycoFile out;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoFileCreate(path, HYCO_FILE_NUMBERS, &out));
-  ierr = CreateImage(path, table, file);
-  if (ierr) PetscCall(HycoFileClose(&out, PETSC_FALSE));
-  PetscCall(ierr);
+  HycoOnError(CreateImage(path, table, file), PetscCall(HycoFileClose(&out, PETSC_FALSE)));
   (*file)->out = out;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -203,13 +200,10 @@ static PetscErrorCode OpenShared(HycoH5 f)
 /* One rank needs no shared file. With several, rank 0 allocates the datasets under a temporary name, and all write to it. */
 static PetscErrorCode CreateShared(MPI_Comm comm, const char path[], PetscBool table, HycoH5 *file)
 {
-  PetscErrorCode ierr;
-  PetscMPIInt size;
   HycoH5 f;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(comm, &size));
-  if (size == 1) {
+  if (HycoSize(comm) == 1) {
     PetscCall(Create(path, table, file));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -220,9 +214,7 @@ static PetscErrorCode CreateShared(MPI_Comm comm, const char path[], PetscBool t
   f->fd = -1;
   f->id = H5I_INVALID_HID;
   PetscCall(HycoFileScratch(comm, path, "partial", f->scratch));
-  ierr = OpenShared(f);
-  if (ierr) PetscCall(HycoH5Close(&f, PETSC_FALSE));
-  PetscCall(ierr);
+  HycoOnError(OpenShared(f), PetscCall(HycoH5Close(&f, PETSC_FALSE)));
   *file = f;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -298,9 +290,7 @@ PetscErrorCode HycoH5IsPrecious(const char path[], PetscBool *precious)
 
   PetscFunctionBegin;
   *precious = PETSC_FALSE;
-  PetscCall(HycoCatchBegin());
-  caught = HycoH5Open(path, &h);
-  PetscCall(HycoCatchEnd(caught, message));
+  HycoCatch(HycoH5Open(path, &h), caught, message);
   if (caught) PetscFunctionReturn(PETSC_SUCCESS);
   *precious = (PetscBool)(HycoH5Has(h, "kind") || HycoH5Has(h, "fingerprint"));
   PetscCall(HycoH5Close(&h, PETSC_FALSE));
@@ -314,9 +304,7 @@ PetscErrorCode HycoH5OpenOr(const char path[], const char remedy[], HycoH5 *file
   char message[HYCO_LINE];
 
   PetscFunctionBegin;
-  PetscCall(HycoCatchBegin());
-  caught = HycoH5Open(path, file);
-  PetscCall(HycoCatchEnd(caught, message));
+  HycoCatch(HycoH5Open(path, file), caught, message);
   HycoCheck(!message[0], "%s%s%s", message, strstr(message, "damaged") ? "; " : "",
             strstr(message, "damaged") ? remedy : "");
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -613,15 +601,11 @@ static PetscErrorCode WriteAttribute(HycoH5 f, const char at[], const char name[
 PetscErrorCode HycoH5WriteAttribute(HycoH5 f, const char at[], const char name[], const char text[])
 {
   hid_t space = H5Screate(H5S_SCALAR), type = H5Tcopy(H5T_C_S1);
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   H5Tset_size(type, PetscMax(strlen(text), 1));
   H5Tset_strpad(type, H5T_STR_NULLPAD);
-  ierr = WriteAttribute(f, at, name, type, space, text);
-  H5Tclose(type);
-  H5Sclose(space);
-  PetscCall(ierr);
+  HycoFinally(WriteAttribute(f, at, name, type, space, text), H5Tclose(type); H5Sclose(space));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -629,12 +613,9 @@ PetscErrorCode HycoH5WriteAttributeInt(HycoH5 f, const char at[], const char nam
 {
   const hsize_t size = (hsize_t)n;
   hid_t space = n == 1 ? H5Screate(H5S_SCALAR) : H5Screate_simple(1, &size, NULL);
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  ierr = WriteAttribute(f, at, name, NATIVE_INT, space, value);
-  H5Sclose(space);
-  PetscCall(ierr);
+  HycoFinally(WriteAttribute(f, at, name, NATIVE_INT, space, value), H5Sclose(space));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -752,7 +733,6 @@ static PetscErrorCode LoadSet(HycoH5 f, const char name[], H5T_class_t class, hi
 {
   hid_t set;
   hsize_t dims[2];
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(OpenSet(f, name, class, &set, dims));
@@ -760,21 +740,15 @@ static PetscErrorCode LoadSet(HycoH5 f, const char name[], H5T_class_t class, hi
   *rows = (PetscInt)dims[0];
   *cols = (PetscInt)dims[1];
   PetscCall(PetscMalloc((dims[0] * dims[1] + 1) * size, (void **)data));
-  ierr = ReadSet(f, name, set, type, H5S_ALL, H5S_ALL, *(void **)data);
-  if (ierr) PetscCall(PetscFree(*(void **)data));
-  PetscCall(ierr);
+  HycoOnError(ReadSet(f, name, set, type, H5S_ALL, H5S_ALL, *(void **)data), PetscCall(PetscFree(*(void **)data)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoH5LoadReal(HycoH5 file, const char name[], PetscInt *rows, PetscInt *cols, PetscReal **data)
 {
-  PetscErrorCode ierr;
-
   PetscFunctionBegin;
   PetscCall(LoadSet(file, name, H5T_FLOAT, H5T_NATIVE_DOUBLE, sizeof(PetscReal), rows, cols, data));
-  ierr = CheckFinite(file, name, (size_t)*rows * (size_t)*cols, *data);
-  if (ierr) PetscCall(PetscFree(*data));
-  PetscCall(ierr);
+  HycoOnError(CheckFinite(file, name, (size_t)*rows * (size_t)*cols, *data), PetscCall(PetscFree(*data)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

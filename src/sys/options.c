@@ -47,18 +47,13 @@ PetscErrorCode HycoOptionListDestroy(HycoOptionList *list)
 /* Declarations may record others inside: the former list is restored, on errors too. */
 PetscErrorCode HycoOptionsRecord(HycoOptionList *list, PetscErrorCode (*declare)(PetscOptions))
 {
-  PetscErrorCode ierr;
   PetscOptions none;
   HycoOptionList *before = recording;
 
   PetscFunctionBegin;
   PetscCall(PetscOptionsCreate(&none));
   recording = list;
-  ierr = declare(none);
-  recording = before;
-  readers = "";
-  PetscCall(PetscOptionsDestroy(&none));
-  PetscCall(ierr);
+  HycoFinally(declare(none), recording = before; readers = ""; PetscCall(PetscOptionsDestroy(&none)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -236,10 +231,7 @@ static PetscErrorCode Append(HycoOptionList *list, HycoOption *option)
     PetscCall(PetscFree(option->name));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  if (list->n == list->room) {
-    list->room = 2 * list->room + 32;
-    PetscCall(PetscRealloc((size_t)list->room * sizeof(*list->option), &list->option));
-  }
+  HycoGrow(list->n, list->room, list->option);
   list->option[list->n++] = *option;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -70,16 +70,15 @@ static PetscErrorCode OpenWindow(HycoQueue q)
 /* Contiguous ranks form a group, which usually share a node. kind NULL: all tasks are of one kind. Collective. */
 PetscErrorCode HycoQueueCreate(MPI_Comm comm, PetscInt n_groups, PetscInt n, const PetscInt kind[], HycoQueue *queue)
 {
-  PetscMPIInt rank, size;
+  PetscMPIInt rank;
   HycoQueue q;
 
   PetscFunctionBegin;
   PetscCall(PetscNew(&q));
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  PetscCallMPI(MPI_Comm_size(comm, &size));
   q->comm = comm;
   q->n_groups = n_groups;
-  q->color = (PetscInt)rank * n_groups / size;
+  q->color = (PetscInt)rank * n_groups / HycoSize(comm);
   q->kind = -1;
   PetscCallMPI(MPI_Comm_split(comm, (PetscMPIInt)q->color, rank, &q->group));
   PetscCallMPI(MPI_Comm_rank(q->group, &q->rank));

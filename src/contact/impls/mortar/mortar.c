@@ -51,7 +51,6 @@ static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs 
   const PetscInt first = pairs->n;
   PetscReal tolerance;
   PetscInt n, *slave;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(CheckSupported(c, fe));
@@ -69,26 +68,15 @@ static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs 
   HycoDuplicate(n, pairs->slave + first, &slave);
   pairs->n = first;
   pairs->queries += n;
-  ierr = HycoMortarRows(c, fe, index, tolerance, n, slave, pairs);
-  PetscCall(PetscFree(slave));
-  PetscCall(ierr);
+  HycoFinally(HycoMortarRows(c, fe, index, tolerance, n, slave, pairs), PetscCall(PetscFree(slave)));
   PetscCall(CheckFacing(c, fe, pairs, first, tolerance));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* At moved nodes. A slave without facing facets has no masters, and no error: it may come back. */
-static PetscErrorCode Find(HycoContact c, HycoFE fe, PetscInt index, PetscReal reach, PetscInt n,
-                           const PetscInt slave[], HycoPairs *found)
-{
-  PetscFunctionBegin;
-  PetscCall(HycoMortarRows(c, fe, index, reach, n, slave, found));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* integrated: gaps are sums over many nodes, so that touching surfaces need a threshold for zero. */
+/* At moved nodes a slave without facing facets has no masters, and no error: it may come back. integrated: gaps are sums over many nodes, so that touching surfaces need a threshold for zero. */
 PetscErrorCode HycoContactCreate_Mortar(HycoContact contact)
 {
-  static const struct _HycoContactOps ops = {.setup = SetUp, .find = Find};
+  static const struct _HycoContactOps ops = {.setup = SetUp, .find = HycoMortarRows};
 
   PetscFunctionBegin;
   PetscCall(HycoMasterSearchDeclare(contact));

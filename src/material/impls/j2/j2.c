@@ -30,7 +30,7 @@ PetscErrorCode HycoMaterialCreate_J2(HycoMaterial material)
   static const HycoFlowRule rule = {.n_constants = N_CONSTANTS, .yield = Yield, .yield_integral = YieldIntegral};
 
   PetscFunctionBegin;
-  PetscCall(HycoFlowBegin(material));
+  PetscCall(HycoElasticDeclare(material));
   PetscCall(HycoMaterialDeclare(material, "yield", "the yield stress", HYCO_REQUIRED, 0, PETSC_INFINITY));
   PetscCall(HycoMaterialDeclare(material, "hardening", "the hardening modulus", 0, HYCO_NOT_NEGATIVE, PETSC_INFINITY));
   PetscCall(HycoMaterialDeclare(material, "saturation", "the saturation stress of Voce's hardening", 0,

@@ -49,7 +49,7 @@ PetscErrorCode HycoMaterialCreate_LimbackAndersson(HycoMaterial material)
       .n_constants = N_CONSTANTS, .prepare = Prepare, .creep = Creep, .creep_integral = CreepIntegral};
 
   PetscFunctionBegin;
-  PetscCall(HycoFlowBegin(material));
+  PetscCall(HycoElasticDeclare(material));
   PetscCall(
       HycoMaterialDeclare(material, "rate", "the creep rate (K / (MPa h))", 1.08e9, HYCO_NOT_NEGATIVE, PETSC_INFINITY));
   PetscCall(HycoMaterialDeclare(material, "factor", "the factor of the stress", 650, 0, PETSC_INFINITY));

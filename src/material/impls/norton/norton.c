@@ -41,7 +41,7 @@ PetscErrorCode HycoMaterialCreate_Norton(HycoMaterial material)
                                     .yield_integral = YieldIntegral};
 
   PetscFunctionBegin;
-  PetscCall(HycoFlowBegin(material));
+  PetscCall(HycoElasticDeclare(material));
   PetscCall(HycoMaterialDeclare(material, "rate", "the creep rate at the stress 1", HYCO_REQUIRED, HYCO_NOT_NEGATIVE,
                                 PETSC_INFINITY));
   PetscCall(HycoMaterialDeclare(material, "exponent", "the creep exponent", HYCO_REQUIRED, HYCO_FROM_ONE, 100));

@@ -38,7 +38,7 @@ PetscErrorCode HycoMaterialCreate_StrainHardening(HycoMaterial material)
   static const HycoFlowRule rule = {.n_constants = N_CONSTANTS, .prepare = Prepare, .creep = Creep};
 
   PetscFunctionBegin;
-  PetscCall(HycoFlowBegin(material));
+  PetscCall(HycoElasticDeclare(material));
   PetscCall(HycoMaterialDeclare(material, "rate", "the creep strain at the stress 1 after the time 1", HYCO_REQUIRED,
                                 HYCO_NOT_NEGATIVE, PETSC_INFINITY));
   PetscCall(HycoMaterialDeclare(material, "exponent", "the creep exponent", HYCO_REQUIRED, HYCO_FROM_ONE, 100));

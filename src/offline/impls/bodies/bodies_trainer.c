@@ -116,8 +116,7 @@ static PetscErrorCode TakeExact(HycoROM m, HycoSubstructures b)
     if (at >= 0) dof[n++] = i;
   }
   PetscCall(HycoROMSetFE(m, HYCO_HYBRID_CONTACT, n, dof));
-  PetscCall(PetscFree(dof));
-  PetscCall(PetscFree(sorted));
+  HycoFreeAll(&dof, &sorted);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

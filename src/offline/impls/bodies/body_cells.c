@@ -119,25 +119,6 @@ static PetscErrorCode Choose(HycoReducer t, HycoBodiesFactor *factor, PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The numbers of all ranks, n of this one: *all, *n_all. Collective. */
-static PetscErrorCode GatherAll(MPI_Comm comm, PetscInt n, const PetscInt own[], PetscInt *n_all, PetscInt **all)
-{
-  PetscMPIInt size, mine, *count, *first;
-
-  PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(comm, &size));
-  PetscCall(PetscMPIIntCast(n, &mine));
-  PetscCall(PetscMalloc2(size, &count, size + 1, &first));
-  PetscCallMPI(MPI_Allgather(&mine, 1, MPI_INT, count, 1, MPI_INT, comm));
-  first[0] = 0;
-  for (PetscMPIInt k = 0; k < size; k++) first[k + 1] = first[k] + count[k];
-  *n_all = first[size];
-  PetscCall(PetscMalloc1(*n_all + 1, all));
-  PetscCallMPI(MPI_Allgatherv(own, mine, MPIU_INT, *all, count, first, MPIU_INT, comm));
-  PetscCall(PetscFree2(count, first));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* t->seeds_cell: the cells of all ranks, ascending, at least one; in[]: those of this rank's part. Collective. */
 static PetscErrorCode ShareCells(HycoReducer t, HycoMesh m, PetscBool in[])
 {
@@ -149,8 +130,8 @@ static PetscErrorCode ShareCells(HycoReducer t, HycoMesh m, PetscBool in[])
     if (in[e]) own[n++] = m->cell_whole ? m->cell_whole[e] : e;
   }
   PetscCall(PetscFree(t->seeds_cell));
-  PetscCall(GatherAll(HycoComm(t), n, own, &t->n_seeds_cell, &t->seeds_cell));
-  /* A mesh needs a cell. GatherAll() allocates one entry more. */
+  PetscCall(HycoConcatenateAll(HycoComm(t), n, own, MPIU_INT, sizeof(PetscInt), &t->n_seeds_cell, &t->seeds_cell));
+  /* A mesh needs a cell. HycoConcatenateAll() allocates one entry more. */
   if (!t->n_seeds_cell) t->seeds_cell[t->n_seeds_cell++] = 0;
   PetscCall(PetscSortRemoveDupsInt(&t->n_seeds_cell, t->seeds_cell));
   for (PetscInt e = 0; e < m->n_cells; e++) {
@@ -182,7 +163,7 @@ static PetscErrorCode List(HycoReducer t, HycoBodiesFactor *factor, const PetscB
     /* Three numbers for each: in the whole mesh, body, in the distributed vectors. */
     own[n++] = (m->first + place) * b->dim + i % b->dim;
   }
-  PetscCall(GatherAll(HycoComm(t), n, own, &n, &all));
+  PetscCall(HycoConcatenateAll(HycoComm(t), n, own, MPIU_INT, sizeof(PetscInt), &n, &all));
   n /= 3;
   HycoFreeAll(&b->inner_start, &b->inner, &factor->row);
   PetscCall(PetscMalloc2(n + 1, &dof, n + 1, &at));
@@ -205,8 +186,7 @@ static PetscErrorCode List(HycoReducer t, HycoBodiesFactor *factor, const PetscB
     b->body[k].m = b->inner_start[k + 1] - b->inner_start[k];
   }
   PetscCall(PetscFree2(dof, at));
-  PetscCall(PetscFree(own));
-  PetscCall(PetscFree(all));
+  HycoFreeAll(&own, &all);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -231,8 +211,7 @@ static PetscErrorCode MarkSurfaces(HycoReducer t, HycoBodiesFactor *factor)
     factor->known[i] = (PetscBool)(at >= 0);
     factor->bare[i] = (PetscBool)(at >= 0 && factor->in_mesh[place[at]]);
   }
-  PetscCall(PetscFree(place));
-  PetscCall(PetscFree(sorted));
+  HycoFreeAll(&place, &sorted);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -248,16 +227,6 @@ static void MarkBare(HycoBodiesFactor *factor, const PetscBool in[])
 
     if (in[k / n] && factor->known[i]) factor->bare[i] = PETSC_TRUE;
   }
-}
-
-/* Whether an unknown is left to the modes. Collective. */
-static PetscErrorCode AnyLeft(HycoReducer t, HycoFE fe, const PetscBool bare[], const PetscBool inner[], PetscBool *any)
-{
-  PetscFunctionBegin;
-  *any = PETSC_FALSE;
-  for (PetscInt i = 0; i < fe->n_dof; i++) *any = (PetscBool)(*any || !(fe->fixed[i] || bare[i] || inner[i]));
-  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, any, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(t)));
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Leaves a node to the modes, of which a model has one at least: that which moves most. It is exact too, because its
@@ -299,14 +268,16 @@ PetscErrorCode HycoBodiesChooseCells(HycoReducer t, HycoBodiesFactor *factor)
   PetscCall(ShareCells(t, factor->fom->part, in));
   PetscCall(MarkInner(t, factor, in, inner, &fits));
   MarkBare(factor, in);
-  PetscCall(AnyLeft(t, fe, factor->bare, inner, &left));
+  /* Whether an unknown is left to the modes. Collective. */
+  left = PETSC_FALSE;
+  for (PetscInt i = 0; i < fe->n_dof; i++) left = (PetscBool)(left || !(fe->fixed[i] || factor->bare[i] || inner[i]));
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &left, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(t)));
   if (!fits) PetscCall(PetscArrayzero(inner, fe->n_dof)); /* of the cell that stands for none */
   if (fits && !left) PetscCall(Release(t, factor, inner, &released));
   if (!released) PetscCall(PetscArrayzero(factor->known, fe->n_dof));
   if (!released) PetscCall(PetscArrayzero(factor->bare, fe->n_dof));
   PetscCall(List(t, factor, inner));
   for (PetscInt i = 0; i < fe->n_dof; i++) factor->bare[i] = (PetscBool)(factor->bare[i] || inner[i]);
-  PetscCall(PetscFree(inner));
-  PetscCall(PetscFree(in));
+  HycoFreeAll(&inner, &in);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -545,9 +545,7 @@ static PetscErrorCode ReleaseBody(HycoBodyFactor *body)
   }
   HycoFreeAll(&body->kept, &body->record);
   PetscCall(PetscFree2(body->motion, body->pin));
-  PetscCall(ISDestroy(&body->global));
-  PetscCall(MatDestroy(&body->K));
-  PetscCall(MatDestroy(&body->N));
+  HycoDestroyAll(&body->global, &body->K, &body->N);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -605,15 +605,6 @@ static PetscErrorCode MeasureLeft(HycoReducer t, HycoBodiesFactor *factor, const
 
 /* -- coefficients -- */
 
-/* The displacements K^-1 F of the basis of the loads. Collective. */
-static PetscErrorCode LoadFields(HycoSubstructures b, HycoBodiesFactor *factor, Vec x[])
-{
-  PetscFunctionBegin;
-  PetscCall(CreateVectors(factor, b->r, x));
-  PetscCall(HycoBodiesExtend(b, factor, b->r, factor->basis, NULL, x));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The turned mode back in the body's axes, as a load: v = G^T V_i. Collective. V_i . (G u) = (G^T V_i) . u: one
    solve with this load gives the mode's coefficient for any forces, by reciprocity (K is symmetric). */
 static PetscErrorCode TurnMode(HycoReducer t, const HycoBodiesFactor *factor, PetscInt body, PetscInt turn,
@@ -758,7 +749,9 @@ static PetscErrorCode Coefficients(HycoReducer t, HycoBodiesFactor *factor, Mat 
 
     HycoBodiesPoint(t, j, theta);
     PetscCall(HycoBodiesRefactor(t, factor, theta));
-    PetscCall(LoadFields(b, factor, x));
+    /* The displacements K^-1 F of the basis of the loads. Collective. */
+    PetscCall(CreateVectors(factor, b->r, x));
+    PetscCall(HycoBodiesExtend(b, factor, b->r, factor->basis, NULL, x));
     for (PetscInt k = 0; k < b->n; k++) {
       const PetscInt sample = HycoBodiesSampleOf(b, k, j);
 
@@ -786,8 +779,7 @@ static PetscErrorCode TakeModes(HycoReducer t, HycoSnapshots store, Mat V, Petsc
   PetscCall(PetscMalloc1(t->l * t->n_s, &t->VtU));
   PetscCall(HycoReducerGetDisplacements(t, store, &S));
   PetscCall(HycoReducerMultiply(t, V, S, t->VtU));
-  PetscCall(MatDestroy(&S));
-  PetscCall(MatDestroy(&t->V));
+  HycoDestroyAll(&S, &t->V);
   t->V = V;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -813,8 +805,7 @@ static PetscErrorCode FindInMesh(HycoReducer t, HycoBodiesFactor *factor)
     PetscCall(PetscFindInt(b->dof[k] / b->dim, n, node, &at));
     factor->in_mesh[k] = (PetscBool)(at >= 0);
   }
-  PetscCall(PetscFree(node));
-  PetscCall(PetscFree(contact));
+  HycoFreeAll(&node, &contact);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

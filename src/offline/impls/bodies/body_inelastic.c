@@ -199,25 +199,16 @@ static PetscErrorCode ListOwn(HycoReducer t, Unknowns *own)
 static PetscErrorCode ListAll(HycoReducer t, Unknowns *all)
 {
   Unknowns own = {0};
-  PetscMPIInt size, n, *count, *start;
   PetscInt *order, *packed[3];
 
   PetscFunctionBegin;
   HycoOnEach(HycoComm(t), ListOwn(t, &own));
-  PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
-  PetscCall(PetscMalloc2(size, &count, size + 1, &start));
-  PetscCall(PetscMPIIntCast(own.n, &n));
-  PetscCallMPI(MPI_Allgather(&n, 1, MPI_INT, count, 1, MPI_INT, HycoComm(t)));
-  start[0] = 0;
-  for (PetscMPIInt r = 0; r < size; r++) start[r + 1] = start[r] + count[r];
-  all->n = start[size];
-  for (int k = 0; k < 3; k++) {
-    const PetscInt *from = k == 0 ? own.dof : k == 1 ? own.body : own.global;
-
-    PetscCall(PetscMalloc1(all->n + 1, &packed[k]));
-    PetscCallMPI(MPI_Allgatherv(from, n, MPIU_INT, packed[k], count, start, MPIU_INT, HycoComm(t)));
-  }
-  PetscCall(PetscFree2(count, start));
+  for (int k = 0; k < 3; k++)
+    PetscCall(HycoConcatenateAll(HycoComm(t), own.n,
+                                 k == 0   ? own.dof
+                                 : k == 1 ? own.body
+                                          : own.global,
+                                 MPIU_INT, sizeof(PetscInt), &all->n, &packed[k]));
   PetscCall(PetscFree3(own.dof, own.body, own.global));
   PetscCall(PetscMalloc1(all->n + 1, &order));
   PetscCall(PetscMalloc1(all->n + 1, &all->body));
@@ -283,8 +274,7 @@ static PetscErrorCode ForceOfMode(HycoReducer t, HycoFOM f, PetscInt k, Vec F)
     if (own >= 0) v[own * dim + i % dim] = f->fe->fixed[i] ? 0 : force[i];
   }
   PetscCall(VecRestoreArray(F, &v));
-  PetscCall(PetscFree(value));
-  PetscCall(PetscFree(force));
+  HycoFreeAll(&value, &force);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -480,8 +470,7 @@ static PetscErrorCode Contributions(HycoReducer t, HycoBodiesFactor *factor, Pet
       s[(size_t)(k * m + i % m) * (size_t)lds + (size_t)(i / m)] = modes->sigma[k] * rows[i];
   }
   PetscCall(MatDenseRestoreArray(*S, &s));
-  PetscCall(MatAssemblyBegin(*S, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(*S, MAT_FINAL_ASSEMBLY));
+  PetscCall(HycoMatAssemble(*S));
   PetscCall(PetscFree4(u, value, work, rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -510,16 +499,6 @@ static PetscErrorCode TakeWeighted(HycoReducer t, const PetscReal w[], PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Which cells of the part are elastic. For HycoCubatureFind(), whose `near` cells are in no equation and get the
-   weight 0 here. */
-static PetscErrorCode MarkElastic(HycoReducer t, PetscBool **elastic)
-{
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1(t->fom->part->n_cells + 1, elastic));
-  for (PetscInt e = 0; e < t->fom->part->n_cells; e++) (*elastic)[e] = (PetscBool)!HycoInelasticFlows(t->fom->fe, e);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Galerkin's method on the modes' displacements A, orthonormal in energy, with a cubature: alpha = sum over points of
    weight w (B A)^T s. Collective. */
 static PetscErrorCode Cubature(HycoReducer t, HycoBodiesFactor *factor, PetscReal **weight)
@@ -538,12 +517,14 @@ static PetscErrorCode Cubature(HycoReducer t, HycoBodiesFactor *factor, PetscRea
   PetscCall(PetscCalloc1(in->m * n_k + 1, &sigma));
   PetscCall(HycoReducerPOD(t, S, s->cubature_tol * s->cubature_tol, 0, &W, &n, sigma));
   PetscCall(MatDestroy(&S));
-  PetscCall(MarkElastic(t, &elastic));
+  /* Which cells of the part are elastic. For HycoCubatureFind(), whose `near` cells are in no equation and get the
+     weight 0 here. */
+  PetscCall(PetscMalloc1(t->fom->part->n_cells + 1, &elastic));
+  for (PetscInt e = 0; e < t->fom->part->n_cells; e++) elastic[e] = (PetscBool)!HycoInelasticFlows(t->fom->fe, e);
   PetscCall(PetscCalloc1(t->rank ? 1 : t->sizes[1], &w));
   PetscCall(HycoCubatureFind(t, elastic, 0, s->cubature_tol, W, n, sigma, w, error));
   PetscCall(MatDestroy(&W));
-  PetscCall(PetscFree(elastic));
-  PetscCall(PetscFree(sigma));
+  HycoFreeAll(&elastic, &sigma);
   PetscCall(TakeWeighted(t, w, weight));
   PetscCall(PetscFree(w));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -222,18 +222,6 @@ static PetscErrorCode ListReached(HycoReducer t, const PetscInt of[], HycoSubstr
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same on every rank, after the broadcast. */
-static PetscErrorCode CheckSizes(const HycoBodyParts *parts, HycoSubstructures b)
-{
-  PetscFunctionBegin;
-  for (PetscInt k = 0; k < b->n; k++)
-    HycoCheckModel(b->start[k + 1] - b->start[k] <= MOST_UNKNOWNS,
-                   "body %s has %d unknowns on the surfaces that may touch; a model of bodies stores the square of "
-                   "their number, and is limited to %d: train a hybrid model",
-                   parts->name[k], (int)(b->start[k + 1] - b->start[k]), MOST_UNKNOWNS);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The unknowns on every rank, and N, whose rows select them. Collective. */
 static PetscErrorCode Select(HycoReducer t, HycoSubstructures b, Mat *N)
 {
@@ -254,15 +242,18 @@ static PetscErrorCode Select(HycoReducer t, HycoSubstructures b, Mat *N)
   if (f->rank) PetscCall(PetscFree(b->dof));
   if (f->rank) PetscCall(PetscMalloc1(b->ns + 1, &b->dof));
   HycoBcast(b->dof, b->ns, MPIU_INT, HycoComm(f));
-  PetscCall(CheckSizes(parts, b));
+  /* The same on every rank, after the broadcast. */
+  for (PetscInt k = 0; k < b->n; k++)
+    HycoCheckModel(b->start[k + 1] - b->start[k] <= MOST_UNKNOWNS,
+                   "body %s has %d unknowns on the surfaces that may touch; a model of bodies stores the square of "
+                   "their number, and is limited to %d: train a hybrid model",
+                   parts->name[k], (int)(b->start[k + 1] - b->start[k]), MOST_UNKNOWNS);
   /* Columns as K's rows; one entry in each row, set by rank 0, which has the list. */
   PetscCall(MatCreateAIJ(HycoComm(f), PETSC_DECIDE, f->part->n_owned * b->dim, b->ns, f->n_nodes * b->dim, 1, NULL, 1,
                          NULL, N));
   for (PetscInt k = 0; k < b->ns && f->rank == 0; k++) PetscCall(MatSetValue(*N, k, global[k], 1, INSERT_VALUES));
-  PetscCall(MatAssemblyBegin(*N, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(*N, MAT_FINAL_ASSEMBLY));
-  PetscCall(PetscFree(global));
-  PetscCall(PetscFree(of));
+  PetscCall(HycoMatAssemble(*N));
+  HycoFreeAll(&global, &of);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -419,11 +410,10 @@ static PetscErrorCode MakeModes(HycoReducer t, HycoSnapshots store)
   HycoBodiesFactor factor = {0};
   PetscReal mu[HYCO_MAX_PARAMETERS];
   HycoSubstructures b;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoBodiesDestroy(&HycoTrainingOfBodies(t)->bodies));
-  PetscCall(HycoBodiesCreate(&b));
+  PetscCall(PetscNew(&b));
   HycoTrainingOfBodies(t)->bodies = b;
   HycoTrainingOfBodies(t)->n_factors = 0;
   b->dim = t->sizes[3];
@@ -438,9 +428,7 @@ static PetscErrorCode MakeModes(HycoReducer t, HycoSnapshots store)
   else if (t->scene->n_times)
     PetscCall(TakeNoStrains(t));
   PetscCall(HycoFOMCreate(HycoComm(t), t->scene, &factor.fom));
-  ierr = Condense(t, store, &factor);
-  PetscCall(HycoBodiesReleaseFactor(&factor));
-  PetscCall(ierr);
+  HycoFinally(Condense(t, store, &factor), PetscCall(HycoBodiesReleaseFactor(&factor)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -26,18 +26,6 @@ PetscInt HycoPointRows(HycoReducer t)
   return HycoElementGet(t->fom->part->type)->nq * t->fom->fe->n_sigma;
 }
 
-/* -- samples -- */
-
-static PetscErrorCode DestroySampler(Sampler *s)
-{
-  PetscFunctionBegin;
-  PetscCall(HycoTrainingReplayDestroy(&s->replay));
-  HycoFreeAll(&s->value, &s->scale);
-  PetscCall(MatDestroy(&s->S));
-  PetscCall(MatDestroy(&s->U));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The displacements of column k of the snapshots. Collective. The columns are in the file's order, the part's
    nodes with ghosts: rows travel between ranks. */
 static PetscErrorCode Displacement(void *ctx, PetscInt k, PetscReal u[])
@@ -126,8 +114,7 @@ static PetscErrorCode FollowAll(Sampler *s, HycoSnapshots store, PetscReal tol, 
   for (PetscInt k = 0; k < n; k++) {
     PetscCall(HycoReducerTell(s->t, "inelastic strains of the paths", k, n));
     PetscCall(HycoTrainingReplayFollow(&s->replay, store, k));
-    PetscCall(MatAssemblyBegin(s->S, MAT_FINAL_ASSEMBLY));
-    PetscCall(MatAssemblyEnd(s->S, MAT_FINAL_ASSEMBLY));
+    PetscCall(HycoMatAssemble(s->S));
     PetscCall(HycoPathModesAdd(s->t, s->S, tol, modes));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -146,7 +133,9 @@ PetscErrorCode HycoPointsSample(HycoReducer t, HycoSnapshots store, PetscReal to
   PetscCall(MatGetLocalSize(s.S, &n_rows, NULL));
   /* The sampler's matrices go before the join, which needs as much memory again. */
   ierr = FollowAll(&s, store, tol, &modes);
-  PetscCall(DestroySampler(&s));
+  PetscCall(HycoTrainingReplayDestroy(&s.replay));
+  HycoFreeAll(&s.value, &s.scale);
+  HycoDestroyAll(&s.S, &s.U);
   if (!ierr) ierr = HycoPathModesJoin(t, &modes, N, n_rows, tol, 0, basis);
   PetscCall(HycoPathModesDestroy(&modes));
   PetscCall(ierr);

@@ -254,8 +254,7 @@ static PetscErrorCode FindPoints(HycoSubstructures b, const HycoBodiesFactor *fa
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc4(r * r + 1, &D, r * r + 1, &P, r + 1, &c, r + 1, &at));
-  PetscCall(VecDuplicate(factor->fom->F, &rest));
-  PetscCall(VecDuplicate(factor->fom->F, &size));
+  HycoVecDuplicate(factor->fom->F, &rest, &size);
   for (PetscInt k = 0; k < r; k++) {
     if (k) PetscCall(Invert(k, r, D, P));
     for (PetscInt i = 0; i < k; i++) PetscCall(ValueAt(factor->basis[k], point[i], &at[i]));
@@ -275,8 +274,7 @@ static PetscErrorCode FindPoints(HycoSubstructures b, const HycoBodiesFactor *fa
   }
   PetscCall(PetscMalloc1(r * r + 1, &b->A));
   if (r) PetscCall(Invert(r, r, D, b->A));
-  PetscCall(VecDestroy(&rest));
-  PetscCall(VecDestroy(&size));
+  HycoDestroyAll(&rest, &size);
   PetscCall(PetscFree4(D, P, c, at));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -328,8 +326,7 @@ static PetscErrorCode LargestCells(HycoReducer t, const PetscReal first[], Petsc
     if (volume[e] >= most[b] * (1 - 1e-10)) cell[b] = PetscMin(cell[b], m->cell_whole ? m->cell_whole[e] : e);
   }
   HycoAllreduce(cell, parts->n, MPIU_INT, MPI_MIN, HycoComm(t));
-  PetscCall(PetscFree(volume));
-  PetscCall(PetscFree(most));
+  HycoFreeAll(&volume, &most);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -400,8 +397,7 @@ PetscErrorCode HycoBodiesLoads(HycoReducer t, HycoBodiesFactor *factor)
   ierr = SurveyPoints(t, factor, &s);
   if (!ierr) ierr = TakeTurns(b, &s);
   PetscCall(PetscFree2(s.G, s.turns));
-  PetscCall(PetscFree(s.pose));
-  PetscCall(PetscFree(s.X0));
+  HycoFreeAll(&s.pose, &s.X0);
   f->fe->ready = PETSC_FALSE;
   PetscCall(ierr);
   b->r = factor->n_basis;

@@ -180,16 +180,15 @@ static PetscErrorCode ScanPaths(HycoReducer t, HycoROM m)
   const PetscInt each = t->scene->n_times + 1;
   PetscInt n, stride;
   PetscReal *sign, *ratio;
-  PetscMPIInt size;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
   PetscCall(HycoSamplesGet(t->samples, &n, NULL, NULL));
   HycoOnEach(HycoComm(t), HycoROMSetUp(m));
   if (m->n > LARGEST) PetscFunctionReturn(PETSC_SUCCESS);
   stride = 1 + (PetscInt)((PetscReal)(n * each) * PetscPowReal((PetscReal)m->n, 3) / 5e10);
   PetscCall(PetscCalloc2(n * each, &sign, n * each, &ratio));
-  HycoOnEach(HycoComm(t), ScanMyPaths(t, m, t->rank * n / size, (t->rank + 1) * n / size, each, stride, sign, ratio));
+  HycoOnEach(HycoComm(t), ScanMyPaths(t, m, t->rank * n / HycoSize(HycoComm(t)),
+                                      (t->rank + 1) * n / HycoSize(HycoComm(t)), each, stride, sign, ratio));
   HycoAllreduce(sign, n * each, MPIU_REAL, MPI_SUM, HycoComm(t));
   HycoAllreduce(ratio, n * each, MPIU_REAL, MPI_SUM, HycoComm(t));
   HycoOnRoot(HycoComm(t), ConcludePaths(t, m, n * each, each, sign, ratio));
@@ -204,16 +203,14 @@ static PetscErrorCode Scan(HycoReducer t, HycoROM m, PetscBool reaches[])
   HycoGalerkinModel g = (HycoGalerkinModel)m->model->data;
   PetscInt each = 0;
   PetscReal *sign, *ratio;
-  PetscMPIInt size;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
   HycoOnEach(HycoComm(t), FindParameters(m, reaches));
   if (m->n > LARGEST) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(ChooseGrid(t->scan, m->n, m->model->scene->n_parameters, reaches, &each, &g->scan.n));
   PetscCall(PetscCalloc2(g->scan.n, &sign, g->scan.n, &ratio));
-  HycoOnEach(HycoComm(t),
-             ScanMine(m, reaches, each, t->rank * g->scan.n / size, (t->rank + 1) * g->scan.n / size, sign, ratio));
+  HycoOnEach(HycoComm(t), ScanMine(m, reaches, each, t->rank * g->scan.n / HycoSize(HycoComm(t)),
+                                   (t->rank + 1) * g->scan.n / HycoSize(HycoComm(t)), sign, ratio));
   HycoAllreduce(sign, g->scan.n, MPIU_REAL, MPI_SUM, HycoComm(t));
   HycoAllreduce(ratio, g->scan.n, MPIU_REAL, MPI_SUM, HycoComm(t));
   HycoOnRoot(HycoComm(t), Conclude(t, m, reaches, each, sign, ratio));

@@ -140,12 +140,7 @@ static PetscErrorCode TimesModes(HycoROM m, Mat A, IS rows, IS columns, PetscRea
     for (PetscInt j = 0; j < m->model->l; j++) P[k * m->model->l + j] = p[j * n + k];
   }
   PetscCall(MatDenseRestoreArrayRead(product, &p));
-  PetscCall(MatDestroy(&product));
-  PetscCall(MatDestroy(&modes));
-  PetscCall(MatDestroy(&part));
-  PetscCall(ISDestroy(&all));
-  PetscCall(MatDestroy(&V));
-  PetscCall(MatDestroy(&Vt));
+  HycoDestroyAll(&product, &modes, &part, &all, &V, &Vt);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -161,8 +156,7 @@ static PetscErrorCode ContactRows(HycoROM m, const PetscInt candidate[], PetscRe
   PetscCall(ISCreateGeneral(PETSC_COMM_SELF, m->m, candidate, PETSC_COPY_VALUES, &candidates));
   PetscCall(TimesModes(m, g->B, g->sets.is_A_lambda, g->sets.is_Ac, BV));
   PetscCall(TimesModes(m, g->K, candidates, unknowns, KV));
-  PetscCall(ISDestroy(&candidates));
-  PetscCall(ISDestroy(&unknowns));
+  HycoDestroyAll(&candidates, &unknowns);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -94,26 +94,6 @@ static PetscErrorCode RemoveModes(HycoReducer t, Mat X)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Copies the first n columns of A to B from column `first` on; both have the same rows. */
-static PetscErrorCode CopyColumns(Mat A, PetscInt n, Mat B, PetscInt first)
-{
-  PetscInt rows, lda[2];
-  const PetscScalar *a;
-  PetscScalar *b;
-
-  PetscFunctionBegin;
-  PetscCall(MatGetLocalSize(A, &rows, NULL));
-  PetscCall(MatDenseGetLDA(A, &lda[0]));
-  PetscCall(MatDenseGetLDA(B, &lda[1]));
-  PetscCall(MatDenseGetArrayRead(A, &a));
-  PetscCall(MatDenseGetArray(B, &b));
-  for (PetscInt j = 0; j < n; j++)
-    PetscCall(PetscArraycpy(b + (size_t)(first + j) * (size_t)lda[1], a + (size_t)j * (size_t)lda[0], rows));
-  PetscCall(MatDenseRestoreArray(B, &b));
-  PetscCall(MatDenseRestoreArrayRead(A, &a));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Appends q columns of Q to the reducer's modes, with their singular values and the snapshots' coefficients, of
    which QtU are those of Q (n_q x n_s column major). */
 static PetscErrorCode Append(HycoReducer t, PetscInt q, Mat Q, PetscInt n_q, const PetscReal QtU[])
@@ -126,8 +106,9 @@ static PetscErrorCode Append(HycoReducer t, PetscInt q, Mat Q, PetscInt n_q, con
   PetscFunctionBegin;
   PetscCall(MatGetLocalSize(t->V, &rows, NULL));
   PetscCall(MatCreateDense(HycoComm(t), rows, PETSC_DECIDE, t->sizes[0] * t->sizes[3], both, NULL, &V));
-  PetscCall(CopyColumns(t->V, l, V, 0));
-  PetscCall(CopyColumns(Q, q, V, l));
+  PetscCall(HycoCopyColumns(t->V, l, V, 0));
+  PetscCall(HycoCopyColumns(Q, q, V, l));
+  PetscCall(HycoMatAssemble(V));
   PetscCall(PetscMalloc1(both * t->n_s, &VtU));
   PetscCall(PetscMalloc1(both, &sigma));
   for (PetscInt k = 0; k < t->n_s; k++) {
@@ -137,8 +118,7 @@ static PetscErrorCode Append(HycoReducer t, PetscInt q, Mat Q, PetscInt n_q, con
   /* Zero marks them as no modes of the POD (HycoROMCountPOD()). */
   for (PetscInt j = 0; j < both; j++) sigma[j] = j < l ? t->sigma[j] : 0;
   PetscCall(MatDestroy(&t->V));
-  PetscCall(PetscFree(t->VtU));
-  PetscCall(PetscFree(t->sigma));
+  HycoFreeAll(&t->VtU, &t->sigma);
   t->V = V;
   t->VtU = VtU;
   t->sigma = sigma;

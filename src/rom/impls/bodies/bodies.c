@@ -13,11 +13,6 @@
 #define BEYOND   10
 #define ROUNDING 1e-10 /* relative, of exact results */
 
-static HycoBodiesSurface SurfaceOf(HycoROM m)
-{
-  return HycoBodiesSurfaceNormal(m->fe, &m->pairs, &m->rows);
-}
-
 /* HycoROMSetUpDefault() makes fe and rows, which the surface borrows. */
 static PetscErrorCode SetUp(HycoROM m)
 {
@@ -25,7 +20,7 @@ static PetscErrorCode SetUp(HycoROM m)
 
   PetscFunctionBegin;
   PetscCall(HycoROMSetUpDefault(m));
-  s = SurfaceOf(m);
+  s = HycoBodiesSurfaceOf(m);
   PetscCall(
       HycoBodiesSetUp((HycoBodiesWork)m->work, (HycoSubstructures)m->model->data, m->model->scene, &s, m->solver));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -137,7 +132,7 @@ static void Expand(HycoROM m, const PetscInt loc[])
 static PetscErrorCode ExpandAll(HycoROM m)
 {
   HycoBodiesWork o = (HycoBodiesWork)m->work;
-  const HycoBodiesSurface s = SurfaceOf(m);
+  const HycoBodiesSurface s = HycoBodiesSurfaceOf(m);
 
   PetscFunctionBegin;
   PetscCall(HycoBodiesExpand(o, m->gamma));
@@ -153,7 +148,7 @@ static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
 {
   HycoBodiesWork o = (HycoBodiesWork)m->work;
   HycoPrediction *p = &m->prediction;
-  const HycoBodiesSurface s = SurfaceOf(m);
+  const HycoBodiesSurface s = HycoBodiesSurfaceOf(m);
   PetscReal begin = HycoNow(), solve, norm;
   PetscBool solved;
 
@@ -271,7 +266,7 @@ PetscErrorCode HycoROMCreate_Bodies(HycoROM m)
   HycoSubstructures b;
 
   PetscFunctionBegin;
-  PetscCall(HycoBodiesCreate(&b));
+  PetscCall(PetscNew(&b));
   PetscCall(HycoROMSetOps(m, &ops, &traits, b));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

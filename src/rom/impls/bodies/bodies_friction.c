@@ -72,15 +72,10 @@ PetscErrorCode HycoBodiesFrictionDestroy(HycoBodiesFriction *friction)
 
   PetscFunctionBegin;
   if (!f) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoSolverDestroy(&f->solver));
-  PetscCall(HycoSystemDestroy(&f->system));
-  PetscCall(MatDestroy(&f->W));
-  PetscCall(VecDestroy(&f->g));
-  PetscCall(VecDestroy(&f->L));
+  HycoDestroyAll(&f->solver, &f->system, &f->W, &f->g, &f->L);
   PetscCall(HycoSlipDestroy(&f->slip));
   PetscCall(HycoRowsDestroy(&f->rows));
-  HycoFreeAll(&f->contact, &f->U, &f->U_old, &f->w, &f->forces);
-  PetscCall(PetscFree(*friction));
+  HycoFreeAll(&f->contact, &f->U, &f->U_old, &f->w, &f->forces, friction);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -145,7 +140,6 @@ static PetscErrorCode GrowRows(HycoBodiesFriction f)
 PetscErrorCode HycoBodiesFrictionPrepare(HycoBodiesFriction f, HycoBodiesWork o, const PetscReal mu[])
 {
   const HycoBodiesSurface *s = &f->normal;
-  PetscScalar *g;
 
   PetscFunctionBegin;
   PetscCall(HycoSlipCoefficients(&f->slip, s->fe, s->pairs));
@@ -157,9 +151,7 @@ PetscErrorCode HycoBodiesFrictionPrepare(HycoBodiesFriction f, HycoBodiesWork o,
   PetscCall(HycoBodiesPrepare(o, &f->all, mu));
   /* W is constant along a path; gaps and coefficients change with every step. */
   if (!f->W) PetscCall(Flexibility(f, o));
-  PetscCall(VecGetArray(f->g, &g));
-  PetscCall(PetscArraycpy(g, o->gap, f->all.n));
-  PetscCall(VecRestoreArray(f->g, &g));
+  PetscCall(HycoVecWrite(f->g, f->all.n, o->gap));
   /* After the coefficients: the cones' data are copied with the blocks. */
   PetscCall(HycoSystemSetBlocks(f->system, 2, f->slip.cone, f->slip.n, f->slip.of, f->slip.data));
   PetscFunctionReturn(PETSC_SUCCESS);

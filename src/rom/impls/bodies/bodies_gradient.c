@@ -2,11 +2,6 @@
    motions that contact does not do, with the opposite sign, and the gaps of the displacements under z. */
 #include <hycobodies.h>
 
-static HycoBodiesSurface SurfaceOf(HycoROM m)
-{
-  return HycoBodiesSurfaceNormal(m->fe, &m->pairs, &m->rows);
-}
-
 /* z NULL: the caller wants the sizes alone. */
 PetscErrorCode HycoBodiesUnknowns(HycoROM m, PetscInt *p, PetscInt *n, PetscReal z[])
 {
@@ -43,7 +38,7 @@ PetscErrorCode HycoBodiesResidual(HycoROM m, const PetscReal mu[], const PetscRe
 {
   HycoBodiesWork o = (HycoBodiesWork)m->work;
   const HycoSubstructures b = o->bodies;
-  const HycoBodiesSurface s = SurfaceOf(m);
+  const HycoBodiesSurface s = HycoBodiesSurfaceOf(m);
 
   PetscFunctionBegin;
   if (mu) PetscCall(HycoROMBringRows(m, mu));

@@ -4,7 +4,6 @@
   each is computed when its contact is in a problem for the first time, and kept.
 */
 #include <hycobodies.h>
-#include <petscblaslapack.h>
 
 #define SAME       1e-14 /* of entries of B, which are no larger than 1 */
 #define MOST_BYTES 1e9
@@ -86,10 +85,8 @@ static PetscErrorCode KeepInBody(HycoBodiesWork o, PetscInt k, PetscInt b)
   const HycoSubstructure *own = &o->bodies->body[b];
   const PetscInt lo = o->bodies->start[b], at = k * o->bodies->n + b;
   const size_t n = (size_t)own->n;
-  PetscBLASInt size, one = 1;
 
   PetscFunctionBegin;
-  PetscCall(PetscBLASIntCast(own->n, &size));
   for (PetscInt e = o->row_start[k]; e < o->row_start[k + 1]; e++) {
     /* P sums C's columns over the row's entries in this body, then W multiplies by all rows: n + m numbers for
        each sample. */
@@ -102,8 +99,7 @@ static PetscErrorCode KeepInBody(HycoBodiesWork o, PetscInt k, PetscInt b)
       kept->bytes += 8 * (PetscReal)own->n_samples * (PetscReal)(own->n + kept->m);
     }
     for (PetscInt s = 0; s < own->n_samples; s++)
-      BLASaxpy_(&size, &o->row[e], own->C + HycoBodiesColumn(own, s, place, own->n), &one, kept->P[at] + (size_t)s * n,
-                &one);
+      HycoBodiesAdd(own->n, o->row[e], own->C + HycoBodiesColumn(own, s, place, own->n), kept->P[at] + (size_t)s * n);
   }
   for (PetscInt s = 0; s < own->n_samples && kept->P[at]; s++)
     Multiply(o, b, kept->P[at] + (size_t)s * n, kept->W[at] + (size_t)s * (size_t)kept->m);
@@ -151,22 +147,19 @@ void HycoBodiesKeptRow(HycoBodiesWork o, PetscInt k, PetscInt n, const PetscInt 
 PetscErrorCode HycoBodiesKeptDisplace(HycoBodiesWork o, PetscInt m, const PetscReal Lambda[], PetscReal u[])
 {
   const HycoSubstructures b = o->bodies;
-  const PetscBLASInt one = 1;
 
   PetscFunctionBegin;
   for (PetscInt j = 0; j < b->n; j++) {
     const HycoSubstructure *own = &b->body[j];
     PetscReal *blended;
-    PetscBLASInt size;
 
-    PetscCall(PetscBLASIntCast(own->n, &size));
     PetscCall(PetscMalloc1(own->n + 1, &blended));
     for (PetscInt k = 0; k < m; k++) {
       const PetscReal *P = o->kept.P[k * b->n + j], force = -Lambda[k] / o->kappa[j];
 
       if (!P || Lambda[k] == 0) continue;
       HycoBodiesBlend(o, j, own->n, (size_t)own->n, P, blended);
-      BLASaxpy_(&size, &force, blended, &one, u + b->start[j], &one);
+      HycoBodiesAdd(own->n, force, blended, u + b->start[j]);
     }
     PetscCall(PetscFree(blended));
   }

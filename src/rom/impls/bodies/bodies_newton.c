@@ -18,7 +18,6 @@
   keeps L and moves x by rho f: alone it may be singular where the pins of a body's flexibility are.
 */
 #include "bodies_path.h"
-#include <petscblaslapack.h>
 
 #define ROUNDS    30    /* of sets in a step */
 #define MOST_ITS  30    /* of Newton's method in a step */
@@ -39,14 +38,6 @@ static PetscErrorCode Multiply(PetscBool transposed, PetscInt n, PetscInt l, con
   PetscCall(PetscBLASIntCast(l, &columns));
   BLASgemv_(transposed ? "N" : "T", &columns, &rows, &factor, A, &columns, x, &each, &beta, y, &each);
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* to += factor times from, n numbers. */
-static void Add(PetscInt n, PetscReal factor, const PetscReal from[], PetscReal to[])
-{
-  const PetscBLASInt size = (PetscBLASInt)n, one = 1;
-
-  BLASaxpy_(&size, &factor, from, &one, to, &one);
 }
 
 /* -- responses of contacts -- */
@@ -71,14 +62,6 @@ PetscErrorCode HycoBodiesForget(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscInt BodyOf(HycoSubstructures b, PetscInt place)
-{
-  PetscInt k = 0;
-
-  while (place >= b->start[k + 1]) k++;
-  return k;
-}
-
 /* The displacements of the surfaces by a unit force at contact k, y. */
 static void Push(HycoBodiesWork o, PetscInt k, PetscReal y[])
 {
@@ -86,7 +69,7 @@ static void Push(HycoBodiesWork o, PetscInt k, PetscReal y[])
 
   PetscCallVoid(PetscArrayzero(y, b->ns));
   for (PetscInt e = o->row_start[k]; e < o->row_start[k + 1]; e++) {
-    const PetscInt body = BodyOf(b, o->row_at[e]), lo = b->start[body];
+    const PetscInt body = HycoBodiesAt(b, o->row_at[e]), lo = b->start[body];
     const HycoSubstructure *own = &b->body[body];
 
     for (PetscInt q = 0; q < own->n_samples; q++) {
@@ -116,7 +99,7 @@ static void TakeStrains(HycoROM m, PetscInt k, const PetscReal cells[], PetscRea
       if (k == 1)
         strain[r] += w->B[r * n + i] * cells[at[i]];
       else
-        Add(k, w->B[r * n + i], cells + at[i] * k, strain + r * k);
+        HycoBodiesAdd(k, w->B[r * n + i], cells + at[i] * k, strain + r * k);
     }
   }
 }
@@ -197,7 +180,7 @@ PetscErrorCode HycoBodiesScale(HycoROM m)
   PetscCall(PetscArrayzero(w->BP, m->model->pairs.n * l));
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
     for (PetscInt e = o->row_start[k]; e < o->row_start[k + 1]; e++) {
-      const PetscReal value = o->row[e] / o->kappa[BodyOf(b, o->row_at[e])];
+      const PetscReal value = o->row[e] / o->kappa[HycoBodiesAt(b, o->row_at[e])];
 
       for (PetscInt j = 0; j < l; j++) w->BP[k * l + j] += value * in->P[o->row_at[e] * l + j];
     }
@@ -430,7 +413,7 @@ PetscErrorCode HycoBodiesMoveCells(HycoROM m, const PetscReal alpha[], const Pet
   for (PetscInt i = 0; i < in->nd; i++) cells[i] /= w->bodies.kappa[in->body[i]];
   PetscCall(Multiply(PETSC_FALSE, in->nd, b->p, in->Z, w->bodies.x, 1, 1, cells));
   for (PetscInt i = 0; i < w->n_set; i++) {
-    Add(in->nd, Lambda[w->set[i]], w->column[w->set[i]] + m->model->pairs.n + w->n_rows, cells);
+    HycoBodiesAdd(in->nd, Lambda[w->set[i]], w->column[w->set[i]] + m->model->pairs.n + w->n_rows, cells);
   }
   PetscCall(PetscArraycpy(w->u, m->fe->u0, m->fe->n_dof));
   for (PetscInt i = 0; i < in->nd; i++) w->u[w->at[i]] += cells[i];
@@ -476,7 +459,8 @@ static PetscErrorCode TakeLoads(HycoROM m)
   PetscCall(PetscArrayzero(w->e0, w->n_rows));
   PetscCall(Multiply(PETSC_FALSE, w->n_rows, o->bodies->r, w->loads, o->c, 1, 0, w->e0));
   AddSupports(m, w->e0);
-  for (PetscInt k = 0; k < w->n_set; k++) Add(w->n_rows, w->z[k], w->column[w->set[k]] + m->model->pairs.n, w->e0);
+  for (PetscInt k = 0; k < w->n_set; k++)
+    HycoBodiesAdd(w->n_rows, w->z[k], w->column[w->set[k]] + m->model->pairs.n, w->e0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

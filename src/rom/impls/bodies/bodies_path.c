@@ -48,21 +48,6 @@ static PetscErrorCode Settle(HycoROM m, PetscReal t0, PetscReal t1, const PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* alpha and the forces of the last accepted time. */
-static PetscErrorCode Retry(HycoPath p, PetscReal alpha[], PetscReal Lambda[])
-{
-  const PetscScalar *old;
-
-  PetscFunctionBegin;
-  PetscCall(VecGetArrayRead(p->U_old, &old));
-  PetscCall(PetscArraycpy(alpha, old, p->n_free));
-  PetscCall(VecRestoreArrayRead(p->U_old, &old));
-  PetscCall(VecGetArrayRead(p->L_old, &old));
-  PetscCall(PetscArraycpy(Lambda, old, p->n_contacts));
-  PetscCall(VecRestoreArrayRead(p->L_old, &old));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* A step with friction: elastic bodies. */
 static PetscErrorCode Rub(HycoROM m, HycoPath p, HycoStepAttempt *a)
 {
@@ -101,7 +86,9 @@ static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAt
   w->always = (PetscBool)(p->method == HYCO_NEWTON_TANGENT);
   PetscCall(HycoBodiesSearch(m, t0, t1, alpha, L, a));
   if (a->why[0] && !w->always) { /* again from the begin of the step */
-    PetscCall(Retry(p, alpha, L));
+    /* alpha and the forces of the last accepted time. */
+    PetscCall(HycoVecRead(p->U_old, p->n_free, alpha));
+    PetscCall(HycoVecRead(p->L_old, p->n_contacts, L));
     a->why[0] = '\0';
     a->iterations = 0;
     w->always = PETSC_TRUE;
@@ -214,12 +201,10 @@ static PetscErrorCode Record(HycoPath p)
 {
   HycoROM m = (HycoROM)p->ctx;
   HycoBodiesPath w = (HycoBodiesPath)m->work;
-  const PetscScalar *alpha, *L;
+  const PetscScalar *alpha;
 
   PetscFunctionBegin;
-  PetscCall(VecGetArrayRead(p->Lambda, &L));
-  PetscCall(PetscArraycpy(m->Lambda, L, m->model->pairs.n));
-  PetscCall(VecRestoreArrayRead(p->Lambda, &L));
+  PetscCall(HycoVecRead(p->Lambda, m->model->pairs.n, m->Lambda));
   if (w->friction && p->why[0]) { /* the last step may have been refused */
     HycoBodiesFrictionRestore(w->friction, &w->bodies);
     PetscCall(HycoBodiesExpand(&w->bodies, m->gamma));
@@ -394,8 +379,7 @@ static PetscErrorCode Reset(HycoROM m)
               &w->lost, &w->X, &w->r, &w->J, &w->pivot);
   HycoFreeAll(&w->G, &w->Y, &w->H);
   PetscCall(PetscFree2(w->x, w->x0));
-  PetscCall(VecDestroy(&w->alpha));
-  PetscCall(VecDestroy(&w->L));
+  HycoDestroyAll(&w->alpha, &w->L);
   PetscCall(HycoPathFree(&w->path));
   if (w->bodies.bodies) PetscCall(HycoBodiesReset(&w->bodies));
   PetscCall(HycoBodiesFrictionDestroy(&w->friction));

@@ -40,11 +40,6 @@ typedef struct _n_HycoBodiesPath {
   PetscReal misfit;         /* of s in the span of the modes at the points, the largest of the listed times */
 } * HycoBodiesPath;
 
-static inline HycoBodiesSurface HycoBodiesSurfaceOf(HycoROM m)
-{
-  return HycoBodiesSurfaceNormal(m->fe, &m->pairs, &m->rows);
-}
-
 /* Forgets the responses of the contacts and the set, after a change of rows or stiffness; takes strains and responses of the
    modes at the present ones. */
 PetscErrorCode HycoBodiesForget(HycoROM model);

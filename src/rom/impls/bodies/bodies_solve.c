@@ -6,23 +6,14 @@
 */
 #include <hycobodies.h>
 #include <hycotao.h>
-#include <petscblaslapack.h>
 #include <string.h>
 
 #define ROUNDS  60    /* of joining contacts */
 #define DEEP    0.5   /* share of the deepest penetration without forces */
 #define CLOSED  1e-13 /* share of the largest gap: smaller penetrations are round-off */
 #define NEAREST 0.1   /* share of the differences of depth, where all contacts are closed without forces */
-#define FLAT    1e-9  /* share of the depth: smaller differences are round-off */
-
-PetscErrorCode HycoBodiesCreate(HycoSubstructures *bodies)
-{
-  PetscFunctionBegin;
-  PetscCall(PetscNew(bodies));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* `weight` and `blend` hold one array per body, and `bodies` has their number; the zeros afterwards make a second
+#define FLAT                                                                                                           \
+  1e-9 /* `weight` and `blend` hold one array per body, and `bodies` has their number; the zeros afterwards make a second
    call, and HycoBodiesSetUp() on the same work, safe. */
 PetscErrorCode HycoBodiesReset(HycoBodiesWork o)
 {
@@ -104,14 +95,6 @@ PetscErrorCode HycoBodiesWeights(HycoSubstructures b, PetscInt k, const PetscRea
   for (PetscInt p = 0; p < b->n_theta; p++) at[p] = HycoBodiesVariable(b->variable[p], mu[b->theta[p]]);
   PetscCall(HycoTensorWeights(&b->body[k].tensor, at, weight));
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* to += factor times from, n numbers. */
-static void Add(PetscInt n, PetscReal factor, const PetscReal from[], PetscReal to[])
-{
-  const PetscBLASInt size = (PetscBLASInt)n, one = 1;
-
-  BLASaxpy_(&size, &factor, from, &one, to, &one);
 }
 
 /* sum = the sum of the n_samples of n numbers each, times their weights. */
@@ -326,8 +309,7 @@ static PetscErrorCode BlendMotions(HycoBodiesWork o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The body of a place. */
-static PetscInt BodyOf(HycoSubstructures b, PetscInt place)
+PetscInt HycoBodiesAt(HycoSubstructures b, PetscInt place)
 {
   const PetscInt *start = place < b->ns ? b->start : b->inner_start;
   PetscInt k = 0;
@@ -370,7 +352,7 @@ static PetscErrorCode TurnRows(HycoBodiesWork o, const HycoBodiesSurface *s)
       HycoCheck(place >= 0 && place < b->ns,
                 "contact %s: node %d is not among the surfaces on which the model of bodies was trained",
                 s->fe->scene->contact[s->contact[k]]->name, (int)s->fe->mesh->node_id[node]);
-      body = BodyOf(b, place);
+      body = HycoBodiesAt(b, place);
       for (PetscInt d = 0; d < dim; d++) {
         const PetscReal value = o->pose[body].Q[3 * c + d] * rows->value[e];
 
@@ -512,10 +494,10 @@ static void Respond(HycoBodiesWork o, const Problem *p, PetscInt contact)
 
   PetscCallVoid(PetscArrayzero(p->y, p->n_place));
   for (PetscInt j = o->row_start[contact]; j < o->row_start[contact + 1]; j++) {
-    const PetscInt at = p->at[o->row_at[j]], body = BodyOf(b, o->row_at[j]), lo = p->first[body];
+    const PetscInt at = p->at[o->row_at[j]], body = HycoBodiesAt(b, o->row_at[j]), lo = p->first[body];
     const PetscInt n = p->first[body + 1] - lo;
 
-    Add(n, o->row[j], p->C[body] + (size_t)(at - lo) * (size_t)n, p->y + lo);
+    HycoBodiesAdd(n, o->row[j], p->C[body] + (size_t)(at - lo) * (size_t)n, p->y + lo);
   }
 }
 
@@ -597,10 +579,7 @@ static PetscErrorCode SolveSystem(HycoBodiesWork o, Problem *p, PetscBool *solve
   PetscCall(PetscStrncpy(o->method, method, sizeof(o->method)));
   o->its += its;
   *solved = (PetscBool)(o->reason > 0);
-  PetscCall(HycoSystemDestroy(&system));
-  PetscCall(VecDestroy(&L));
-  PetscCall(VecDestroy(&g));
-  PetscCall(MatDestroy(&G));
+  HycoDestroyAll(&system, &L, &g, &G);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -695,7 +674,7 @@ static PetscErrorCode Displace(HycoBodiesWork o, const HycoBodiesSurface *s, con
 
       if (force == 0) continue;
       PetscCall(GetColumn(o, k, j, &column));
-      Add(own->n, -force, column, u);
+      HycoBodiesAdd(own->n, -force, column, u);
     }
   }
   for (PetscInt i = 0; i < b->ns; i++) {
@@ -748,8 +727,7 @@ static PetscErrorCode FirstDepth(HycoBodiesWork o, const HycoBodiesSurface *s, P
     if (spread > FLAT * deepest[c] && shallowest[c] > least[c]) least[c] = deepest[c] - NEAREST * spread;
     least[c] = PetscMax(least[c], CLOSED * size);
   }
-  PetscCall(PetscFree(shallowest));
-  PetscCall(PetscFree(deepest));
+  HycoFreeAll(&shallowest, &deepest);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -862,7 +840,6 @@ PetscErrorCode HycoBodiesContact(HycoBodiesWork o, const HycoBodiesSurface *s, P
   PetscCall(PetscArrayzero(Lambda, s->n));
   PetscCall(PetscMalloc2(s->n + 1, &in, s->n + 1, &p.contact));
   PetscCall(SolveRounds(o, s, &p, in, Lambda, solved));
-  o->n_problem = p.n;
   PetscCall(PetscFree2(in, p.contact));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -917,7 +894,7 @@ void HycoBodiesMove(HycoBodiesWork o, const HycoBodiesSurface *s, PetscReal U[])
       own[c] = o->u[place];
     }
     if (place < 0) continue;
-    HycoPoseTurn(o->pose[BodyOf(b, place)].Q, dim, PETSC_FALSE, own, turned);
+    HycoPoseTurn(o->pose[HycoBodiesAt(b, place)].Q, dim, PETSC_FALSE, own, turned);
     for (PetscInt c = 0; c < dim; c++) {
       if (o->loc[i * dim + c] >= 0) U[i * dim + c] = s->fe->u0[i * dim + c] + turned[c];
     }
@@ -986,7 +963,7 @@ static PetscErrorCode ExpandBody(HycoBodiesWork o, PetscInt k, PetscReal gamma[]
 
     /* Q = sum of q_j G_j with the orthonormal G_j of training: q_j is their inner product with Q. */
     for (PetscInt d = 0; d < 9; d++) share += b->G[9 * (b->turn_start[k] + j) + d] * o->pose[k].Q[d];
-    Add(own->l, share, row + j * own->l, gamma + b->mode_start[k]);
+    HycoBodiesAdd(own->l, share, row + j * own->l, gamma + b->mode_start[k]);
   }
   PetscCall(PetscArraycpy(o->u + b->ns + b->inner_start[k], row + turns * own->l, own->m));
   PetscCall(PetscFree(row));

@@ -1,6 +1,5 @@
 /* Where bodies are: the similar map nearest to the motion of their nodes (Procrustes). */
 #include <hycobodies.h>
-#include <petscblaslapack.h>
 
 /* K ~ integral of B^T C B with B ~ 1/s: the volume's s^3 in 3D, s^2 in 2D (per unit thickness) and s in 1D times
    s^-2; axisymmetric as in 3D, because the radius scales too. */

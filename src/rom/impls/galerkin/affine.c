@@ -36,10 +36,7 @@ PetscErrorCode HycoTableDestroy(HycoTable *table)
   PetscFunctionBegin;
   if (!t) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt p = 0; p < t->values.tensor.dim; p++) PetscCall(PetscFree(t->x[p]));
-  PetscCall(PetscFree(t->values.data));
-  PetscCall(PetscFree(t->start));
-  PetscCall(PetscFree(t->column));
-  PetscCall(PetscFree(*table));
+  HycoFreeAll(&t->values.data, &t->start, &t->column, table);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -91,8 +88,7 @@ PetscErrorCode HycoTableFill(HycoROM m, const PetscReal mu[])
   PetscCall(HycoGridFieldEvaluate(&g->model->table->values, mu, a));
   /* Entries were written behind PETSc's back: solvers see the new state and factor again. */
   PetscCall(PetscObjectStateIncrease((PetscObject)g->Kr));
-  PetscCall(MatAssemblyBegin(g->Kr, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(g->Kr, MAT_FINAL_ASSEMBLY));
+  PetscCall(HycoMatAssemble(g->Kr));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -196,14 +192,9 @@ PetscErrorCode HycoTableLoad(HycoROM m, HycoH5 h)
 {
   PetscInt *count = NULL;
   PetscReal *x = NULL, *data = NULL;
-  PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  ierr = LoadValues(m, h, &count, &x, &data);
-  PetscCall(PetscFree(data));
-  PetscCall(PetscFree(x));
-  PetscCall(PetscFree(count));
-  PetscCall(ierr);
+  HycoFinally(LoadValues(m, h, &count, &x, &data), HycoFreeAll(&data, &x, &count));
   if (HycoH5Has(h, "table/start")) PetscCall(LoadPattern(m, h));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -130,19 +130,9 @@ PetscErrorCode HycoGalerkinReset(HycoROM m)
   PetscCall(HycoReducedDestroy(&g->reduced));
   PetscCall(HycoLoadsDestroy(&g->loads));
   PetscCall(HycoGalerkinPathDestroy(&g->path));
-  PetscCall(HycoSystemDestroy(&g->system));
-  PetscCall(MatDestroy(&g->K));
-  PetscCall(MatDestroy(&g->B));
+  HycoDestroyAll(&g->system, &g->K, &g->B);
   g->current_B = PETSC_FALSE;
-  PetscCall(MatDestroy(&g->Kr));
-  PetscCall(MatDestroy(&g->Br));
-  PetscCall(MatDestroy(&g->Btr));
-  PetscCall(VecDestroy(&g->F));
-  PetscCall(VecDestroy(&g->D));
-  PetscCall(VecDestroy(&g->Fr));
-  PetscCall(VecDestroy(&g->Dr));
-  PetscCall(VecDestroy(&g->x));
-  PetscCall(VecDestroy(&g->L));
+  HycoDestroyAll(&g->Kr, &g->Br, &g->Btr, &g->F, &g->D, &g->Fr, &g->Dr, &g->x, &g->L);
   PetscCall(HycoGalerkinDestroyOwn(g));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -6,41 +6,14 @@
 PetscErrorCode HycoGalerkinUnknowns(HycoROM m, PetscInt *p, PetscInt *n, PetscReal z[])
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
-  const PetscScalar *v;
 
   PetscFunctionBegin;
   *p = m->n;
   *n = m->n_L;
   if (!z) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecGetArrayRead(g->x, &v));
-  PetscCall(PetscArraycpy(z, v, m->n));
-  PetscCall(VecRestoreArrayRead(g->x, &v));
+  PetscCall(HycoVecRead(g->x, m->n, z));
   if (!m->n_L) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecGetArrayRead(g->L, &v));
-  PetscCall(PetscArraycpy(z + m->n, v, m->n_L));
-  PetscCall(VecRestoreArrayRead(g->L, &v));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode Put(PetscInt n, const PetscReal from[], Vec to)
-{
-  PetscScalar *v;
-
-  PetscFunctionBegin;
-  PetscCall(VecGetArrayWrite(to, &v));
-  PetscCall(PetscArraycpy(v, from, n));
-  PetscCall(VecRestoreArrayWrite(to, &v));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-static PetscErrorCode Take(PetscInt n, Vec from, PetscReal to[])
-{
-  const PetscScalar *v;
-
-  PetscFunctionBegin;
-  PetscCall(VecGetArrayRead(from, &v));
-  PetscCall(PetscArraycpy(to, v, n));
-  PetscCall(VecRestoreArrayRead(from, &v));
+  PetscCall(HycoVecRead(g->L, m->n_L, z + m->n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -54,15 +27,15 @@ PetscErrorCode HycoGalerkinResidual(HycoROM m, const PetscReal mu[], const Petsc
 
   PetscFunctionBegin;
   if (mu) PetscCall(HycoGalerkinAssemble(m, mu));
-  PetscCall(Put(m->n, z, g->x));
-  if (m->n_L) PetscCall(Put(m->n_L, z + m->n, g->L));
+  PetscCall(HycoVecWrite(g->x, m->n, z));
+  if (m->n_L) PetscCall(HycoVecWrite(g->L, m->n_L, z + m->n));
   if (!w) PetscFunctionReturn(PETSC_SUCCESS);
   *size = 0;
   PetscCall(VecDuplicate(g->x, &r));
   PetscCall(MatMult(g->Kr, g->x, r));
   if (m->n_L) PetscCall(MatMultAdd(g->Btr, g->L, r, r));
   PetscCall(VecAXPY(r, -1, g->Fr));
-  PetscCall(Take(m->n, r, w));
+  PetscCall(HycoVecRead(r, m->n, w));
   PetscCall(VecDestroy(&r));
   if (!m->n_L) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecDuplicate(g->L, &s));
@@ -71,7 +44,7 @@ PetscErrorCode HycoGalerkinResidual(HycoROM m, const PetscReal mu[], const Petsc
   PetscCall(VecNorm(g->Dr, NORM_INFINITY, &gap));
   *size = PetscMax(*size, gap);
   PetscCall(VecAYPX(s, -1, g->Dr));
-  PetscCall(Take(m->n_L, s, w + m->n));
+  PetscCall(HycoVecRead(s, m->n_L, w + m->n));
   PetscCall(VecDestroy(&s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -28,8 +28,7 @@ PetscErrorCode HycoLoadsDestroy(HycoLoads *loads)
   PetscFunctionBegin;
   if (!p) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt j = 0; j <= p->n; j++) {
-    PetscCall(VecDestroy(&p->F[j]));
-    PetscCall(VecDestroy(&p->X[j]));
+    HycoDestroyAll(&p->F[j], &p->X[j]);
   }
   PetscCall(VecDestroy(&p->sum));
   PetscCall(PetscFree(*loads));

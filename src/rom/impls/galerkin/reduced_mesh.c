@@ -136,8 +136,7 @@ static PetscErrorCode CreateContactSets(HycoROM m)
     PetscCall(PetscFree(dof));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(ISDestroy(&g->sets.is_Ac));
-  PetscCall(ISDestroy(&g->sets.is_Ac_all));
+  HycoDestroyAll(&g->sets.is_Ac, &g->sets.is_Ac_all);
   PetscCall(ISCreateGeneral(PETSC_COMM_SELF, n, dof, PETSC_OWN_POINTER, &g->sets.is_Ac_all));
   PetscCall(ISIntersect(g->sets.is_Ac_all, g->sets.is_A, &g->sets.is_Ac));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -177,8 +176,7 @@ PetscErrorCode HycoGalerkinContactMatrix(HycoROM m)
   for (PetscInt k = 0; k < m->m; k++)
     PetscCall(MatSetValues(g->B, 1, &m->contact[k], rows->start[k + 1] - rows->start[k], rows->dof + rows->start[k],
                            rows->value + rows->start[k], ADD_VALUES));
-  PetscCall(MatAssemblyBegin(g->B, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(g->B, MAT_FINAL_ASSEMBLY));
+  PetscCall(HycoMatAssemble(g->B));
   PetscCall(MatGetNonzeroState(g->B, &after));
   if (!g->sets.is_Ac || after != before) PetscCall(CreateContactSets(m));
   g->current_B = PETSC_TRUE;
@@ -188,11 +186,7 @@ PetscErrorCode HycoGalerkinContactMatrix(HycoROM m)
 PetscErrorCode HycoGalerkinDestroyOwn(HycoGalerkin g)
 {
   PetscFunctionBegin;
-  PetscCall(ISDestroy(&g->sets.is_A));
-  PetscCall(ISDestroy(&g->sets.is_I));
-  PetscCall(ISDestroy(&g->sets.is_Ac));
-  PetscCall(ISDestroy(&g->sets.is_Ac_all));
-  PetscCall(ISDestroy(&g->sets.is_A_lambda));
+  HycoDestroyAll(&g->sets.is_A, &g->sets.is_I, &g->sets.is_Ac, &g->sets.is_Ac_all, &g->sets.is_A_lambda);
   PetscCall(HycoMeshDestroy(&g->own));
   PetscCall(HycoPairsDestroy(&g->own_pairs));
   PetscCall(HycoRowsDestroy(&g->own_rows));

@@ -46,8 +46,7 @@ static PetscErrorCode DestroyRows(Rows *s)
 
   PetscFunctionBegin;
   for (size_t k = 0; k < PETSC_STATIC_ARRAY_LENGTH(each); k++) PetscCall(MatDestroy(each[k]));
-  PetscCall(ISDestroy(&s->tested));
-  PetscCall(ISDestroy(&s->full));
+  HycoDestroyAll(&s->tested, &s->full);
   PetscCall(PetscFree(s->row));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -55,9 +54,7 @@ static PetscErrorCode DestroyRows(Rows *s)
 static PetscErrorCode DestroyContact(ContactProduct *c)
 {
   PetscFunctionBegin;
-  PetscCall(MatDestroy(&c->B));
-  PetscCall(MatDestroy(&c->P));
-  PetscCall(MatDestroy(&c->BP));
+  HycoDestroyAll(&c->B, &c->P, &c->BP);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -70,16 +67,9 @@ PetscErrorCode HycoReducedDestroy(HycoReduced *reduced)
   PetscCall(DestroyRows(&r->varying));
   PetscCall(DestroyContact(&r->all_c));
   PetscCall(DestroyContact(&r->Ac));
-  PetscCall(ISDestroy(&r->all));
-  PetscCall(MatDestroy(&r->V));
-  PetscCall(MatDestroy(&r->V_A));
-  PetscCall(MatDestroy(&r->P));
-  PetscCall(MatDestroy(&r->constant));
-  PetscCall(MatDestroy(&r->KV));
-  PetscCall(MatDestroy(&r->G));
+  HycoDestroyAll(&r->all, &r->V, &r->V_A, &r->P, &r->constant, &r->KV, &r->G);
   PetscCall(PetscFree2(r->modes, r->index));
-  PetscCall(VecDestroy(&r->u));
-  PetscCall(VecDestroy(&r->gamma));
+  HycoDestroyAll(&r->u, &r->gamma);
   PetscCall(PetscFree(*reduced));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -153,8 +143,7 @@ static PetscErrorCode CreateP(HycoROM m, IS unknowns, PetscBool with_G, Mat *P)
     }
     if (!m->fe->fixed[dof[i]]) PetscCall(MatSetValues(*P, 1, &i, n_modes, g->reduced->index, v, INSERT_VALUES));
   }
-  PetscCall(MatAssemblyBegin(*P, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(*P, MAT_FINAL_ASSEMBLY));
+  PetscCall(HycoMatAssemble(*P));
   PetscCall(PetscFree(v));
   PetscCall(ISRestoreIndices(unknowns, &dof));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -202,8 +191,7 @@ static PetscErrorCode CreateVarying(HycoROM m, IS *unknowns)
     if (varies[i / m->fe->dim]) dof[n++] = i;
   }
   PetscCall(ISCreateGeneral(PETSC_COMM_SELF, n, dof, PETSC_COPY_VALUES, unknowns));
-  PetscCall(PetscFree(dof));
-  PetscCall(PetscFree(varies));
+  HycoFreeAll(&dof, &varies);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -223,8 +211,7 @@ static PetscErrorCode CreateRows(HycoROM m, IS in, PetscErrorCode (*of)(IS, IS, 
   PetscCall(ISDifference(g->sets.is_A, fe, &tested));
   PetscCall((*of)(fe, in, &s->full));
   PetscCall((*of)(tested, in, &s->tested));
-  PetscCall(ISDestroy(&tested));
-  PetscCall(ISDestroy(&fe));
+  HycoDestroyAll(&tested, &fe);
   PetscCall(ISGetLocalSize(s->full, &s->n_full));
   PetscCall(PetscMalloc1(s->n_full, &s->row));
   PetscCall(ISGetIndices(s->full, &dof));
@@ -435,8 +422,7 @@ PetscErrorCode HycoReducedFillStiffness(HycoROM m)
     PetscCall(PutModes(m));
   }
   r->filled = PETSC_TRUE;
-  PetscCall(MatAssemblyBegin(g->Kr, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(g->Kr, MAT_FINAL_ASSEMBLY));
+  PetscCall(HycoMatAssemble(g->Kr));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -509,8 +495,7 @@ static PetscErrorCode PutProduct(Mat product, PetscBool transposed, Mat to)
       PetscCall(MatSetValues(to, 1, &k, n, column, value, INSERT_VALUES));
     PetscCall(MatRestoreRow(product, k, &n, &column, &value));
   }
-  PetscCall(MatAssemblyBegin(to, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(to, MAT_FINAL_ASSEMBLY));
+  PetscCall(HycoMatAssemble(to));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -524,8 +509,7 @@ static PetscErrorCode MultiplyContact(HycoROM m, IS set, PetscBool grown, Contac
   PetscCall(ISGetLocalSize(set, &n));
   if (c->P) PetscCall(MatGetSize(c->P, &n_P, NULL));
   if (grown) {
-    PetscCall(MatDestroy(&c->BP));
-    PetscCall(MatDestroy(&c->B));
+    HycoDestroyAll(&c->BP, &c->B);
   }
   if (n != n_P) {
     PetscCall(MatDestroy(&c->P));

@@ -78,8 +78,7 @@ static PetscErrorCode Destroy(HycoROM m)
 
   PetscFunctionBegin;
   PetscCall(HycoGalerkinDestroy(&h->galerkin));
-  PetscCall(PetscFree(h->S_lambda));
-  PetscCall(PetscFree(m->model->data));
+  HycoFreeAll(&h->S_lambda, &m->model->data);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -80,8 +80,7 @@ PetscErrorCode HycoReconstructionDestroy(HycoReconstruction *reconstruction)
   PetscFunctionBegin;
   if (!r) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoWeightedDestroy(&r->weighted));
-  PetscCall(PetscFree(r->contact));
-  PetscCall(PetscFree(r->S));
+  HycoFreeAll(&r->contact, &r->S);
   PetscCall(PetscFree4(r->open, r->d, r->h, r->c));
   PetscCall(PetscFree(*reconstruction));
   PetscFunctionReturn(PETSC_SUCCESS);

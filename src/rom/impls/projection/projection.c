@@ -210,8 +210,7 @@ PetscErrorCode HycoProjectionDestroy(HycoROM m)
 
   PetscFunctionBegin;
   PetscCall(HycoGalerkinDestroy(&p->galerkin));
-  PetscCall(PetscFree(p->V_lambda));
-  PetscCall(PetscFree(m->model->data));
+  HycoFreeAll(&p->V_lambda, &m->model->data);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -95,38 +95,6 @@ static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singul
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Gathers a distributed vector on every rank. */
-static PetscErrorCode GatherVec(MPI_Comm comm, Vec v, PetscReal all[])
-{
-  PetscMPIInt size, count, *counts, *offsets;
-  const PetscInt *ranges;
-  const PetscScalar *local;
-  PetscInt n;
-
-  PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_size(comm, &size));
-  if (size == 1) {
-    PetscCall(VecGetLocalSize(v, &n));
-    PetscCall(VecGetArrayRead(v, &local));
-    PetscCall(PetscArraycpy(all, local, n));
-    PetscCall(VecRestoreArrayRead(v, &local));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCall(VecGetOwnershipRanges(v, &ranges));
-  PetscCall(PetscMalloc2(size, &counts, size, &offsets));
-  for (PetscMPIInt r = 0; r < size; r++) {
-    PetscCall(PetscMPIIntCast(ranges[r + 1] - ranges[r], &counts[r]));
-    PetscCall(PetscMPIIntCast(ranges[r], &offsets[r]));
-  }
-  PetscCall(VecGetLocalSize(v, &n));
-  PetscCall(PetscMPIIntCast(n, &count));
-  PetscCall(VecGetArrayRead(v, &local));
-  PetscCallMPI(MPI_Allgatherv(local, count, MPIU_REAL, all, counts, offsets, MPIU_REAL, comm));
-  PetscCall(VecRestoreArrayRead(v, &local));
-  PetscCall(PetscFree2(counts, offsets));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* g = D - B K^-1 F, on every rank. */
 static PetscErrorCode FreeGap(HycoSolver s, const Dual *d, Vec x)
 {
@@ -136,7 +104,7 @@ static PetscErrorCode FreeGap(HycoSolver s, const Dual *d, Vec x)
   /* MUMPS reduces F and D to the Schur variables in one forward substitution; with s->free the displacements without
      forces are known. */
   if (!s->stiffness.lu && !s->free) {
-    PetscCall(GatherVec(HycoComm(s), y->D, d->L));
+    PetscCall(HycoVecGather(y->D, d->L));
     PetscCall(HycoDirectReduce(s->stiffness.direct, y->F, d->L, d->g));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -147,7 +115,7 @@ static PetscErrorCode FreeGap(HycoSolver s, const Dual *d, Vec x)
   PetscCall(HycoSystemWork(y));
   PetscCall(MatMult(y->B, x, y->work_L));
   PetscCall(VecAYPX(y->work_L, -1, y->D));
-  PetscCall(GatherVec(HycoComm(s), y->work_L, d->g));
+  PetscCall(HycoVecGather(y->work_L, d->g));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -202,7 +170,7 @@ static PetscErrorCode SolveForces(HycoSolver s, Dual *d, Vec start, PetscBool *s
   if (s->system->blocks) PetscCall(HycoBlocksGather(HycoComm(s), s->system->blocks, &blocks));
   if (blocks)
     PetscCall(PetscArrayzero(d->L, d->p)); /* the path decides between several solutions: by its last forces */
-  if (blocks) PetscCall(GatherVec(HycoComm(s), start, d->L + d->p));
+  if (blocks) PetscCall(HycoVecGather(start, d->L + d->p));
   if (blocks && !d->cone) PetscCall(HycoConeFactorCreate(&d->cone));
   lcp.blocks = blocks;
   lcp.cone = d->cone;
@@ -227,13 +195,10 @@ static PetscErrorCode SolveForces(HycoSolver s, Dual *d, Vec start, PetscBool *s
 static PetscErrorCode SetForces(const Dual *d, Vec L)
 {
   PetscInt lo, hi;
-  PetscScalar *l;
 
   PetscFunctionBegin;
   PetscCall(VecGetOwnershipRange(L, &lo, &hi));
-  PetscCall(VecGetArray(L, &l));
-  PetscCall(PetscArraycpy(l, d->L + d->p + lo, hi - lo));
-  PetscCall(VecRestoreArray(L, &l));
+  PetscCall(HycoVecWrite(L, hi - lo, d->L + d->p + lo));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -283,24 +248,18 @@ static PetscErrorCode Shift(HycoSolver s, const PetscReal dL[], Vec x, Vec L)
 {
   Vec change, force, move;
   PetscInt lo, hi;
-  PetscScalar *c;
 
   PetscFunctionBegin;
   PetscCall(VecDuplicate(L, &change));
-  PetscCall(VecDuplicate(x, &force));
-  PetscCall(VecDuplicate(x, &move));
+  HycoVecDuplicate(x, &force, &move);
   PetscCall(VecGetOwnershipRange(L, &lo, &hi));
-  PetscCall(VecGetArray(change, &c));
-  PetscCall(PetscArraycpy(c, dL + lo, hi - lo));
-  PetscCall(VecRestoreArray(change, &c));
+  PetscCall(HycoVecWrite(change, hi - lo, dL + lo));
   PetscCall(MatMult(s->system->Bt, change, force));
   /* x follows the forces: dx = -K^-1 Bt dL. */
   PetscCall(HycoStiffnessSolve(s, force, move));
   PetscCall(VecAXPY(x, -1, move));
   PetscCall(VecAXPY(L, 1, change));
-  PetscCall(VecDestroy(&change));
-  PetscCall(VecDestroy(&force));
-  PetscCall(VecDestroy(&move));
+  HycoDestroyAll(&change, &force, &move);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -319,7 +278,7 @@ static PetscErrorCode CloseGaps(HycoSolver s, const Dual *d, Vec x, Vec L)
   PetscCall(MatMult(y->B, x, gap));
   PetscCall(VecNorm(gap, NORM_INFINITY, &size));
   PetscCall(VecAYPX(gap, -1, y->D));
-  PetscCall(GatherVec(HycoComm(s), gap, d->g));
+  PetscCall(HycoVecGather(gap, d->g));
   PetscCall(VecDestroy(&gap));
   PetscCall(PetscMalloc2(d->m, &a, d->m, &change));
   /* Of the closed contacts only: the others have no force to correct. */

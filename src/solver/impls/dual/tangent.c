@@ -6,9 +6,7 @@ struct _n_HycoSolverTangent {
   HycoSolver s; /* borrowed */
   PetscInt m, p;
   HycoTangent tangent; /* NULL without contacts */
-  VecScatter scatter;  /* of the contacts to every rank */
-  Vec all;
-  PetscReal *q, *z; /* p + m */
+  PetscReal *q, *z;    /* p + m */
 };
 
 /* Also of a partly created one. The solver and its factor are borrowed. */
@@ -19,30 +17,13 @@ PetscErrorCode HycoSolverTangentDestroy(HycoSolverTangent *tangent)
   PetscFunctionBegin;
   if (!t) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoTangentDestroy(&t->tangent));
-  PetscCall(VecScatterDestroy(&t->scatter));
-  PetscCall(VecDestroy(&t->all));
-  HycoFreeAll(&t->q, &t->z);
-  PetscCall(PetscFree(*tangent));
+  HycoFreeAll(&t->q, &t->z, tangent);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscInt HycoSolverTangentUndecided(HycoSolverTangent t)
 {
   return t->tangent ? HycoTangentUndecided(t->tangent) : 0;
-}
-
-/* value[m] of all ranks. */
-static PetscErrorCode GatherAll(HycoSolverTangent t, Vec v, PetscReal value[])
-{
-  const PetscScalar *all;
-
-  PetscFunctionBegin;
-  PetscCall(VecScatterBegin(t->scatter, v, t->all, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecScatterEnd(t->scatter, v, t->all, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecGetArrayRead(t->all, &all));
-  PetscCall(PetscArraycpy(value, all, t->m));
-  PetscCall(VecRestoreArrayRead(t->all, &all));
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The states of the contacts in the solution, and the matrix of the closed ones. */
@@ -64,8 +45,8 @@ static PetscErrorCode Close(HycoSolverTangent t, Vec x, Vec L)
   PetscCall(VecNorm(y->work_L, NORM_INFINITY, &sizes[0]));
   PetscCall(VecNorm(y->D, NORM_INFINITY, &sizes[1]));
   PetscCall(VecAYPX(y->work_L, -1, y->D));
-  PetscCall(GatherAll(t, y->work_L, gap));
-  PetscCall(GatherAll(t, L, force));
+  PetscCall(HycoVecGather(y->work_L, gap));
+  PetscCall(HycoVecGather(L, force));
   for (PetscInt i = 0; i < t->m; i++) flexibility[i] = S[(size_t)(t->p + i) * (size_t)n + (size_t)(t->p + i)];
   PetscCall(HycoTangentStates(t->m, force, gap, PetscMax(sizes[0], sizes[1]), flexibility, state));
   PetscCall(HycoTangentCreate(t->p, t->m, S, state, &t->tangent, &regular));
@@ -92,7 +73,6 @@ static PetscErrorCode SetUp(HycoSolverTangent t, Vec x, Vec L)
   PetscCheck(!singular, HycoComm(s), PETSC_ERR_USER,
              "the stiffness is singular, so that there is no gradient; check that supports hold every body");
   if (!s->system->m) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecScatterCreateToAll(L, &t->scatter, &t->all));
   t->m = s->system->m;
   PetscCall(HycoKernelSize(s->system->K, &t->p));
   PetscCall(PetscMalloc1(t->m + t->p, &t->q));
@@ -104,15 +84,11 @@ static PetscErrorCode SetUp(HycoSolverTangent t, Vec x, Vec L)
 /* x and L must be the solution of the present system: the states of the contacts are read from its gaps and forces. */
 PetscErrorCode HycoSolverTangentCreate(HycoSolver s, Vec x, Vec L, HycoSolverTangent *tangent)
 {
-  PetscErrorCode ierr;
-
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
   PetscCall(PetscNew(tangent));
   (*tangent)->s = s;
-  ierr = SetUp(*tangent, x, L);
-  if (ierr) PetscCall(HycoSolverTangentDestroy(tangent));
-  PetscCall(ierr);
+  HycoOnError(SetUp(*tangent, x, L), PetscCall(HycoSolverTangentDestroy(tangent)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -122,7 +98,6 @@ PetscErrorCode HycoSolverTangentCreate(HycoSolver s, Vec x, Vec L, HycoSolverTan
 PetscErrorCode HycoSolverTangentSolve(HycoSolverTangent t, Vec r, Vec g, int sign, Vec dx, Vec dL, PetscBool *kink)
 {
   HycoDirect direct = t->s->stiffness.direct;
-  PetscScalar *l;
   PetscInt lo, hi;
 
   PetscFunctionBegin;
@@ -133,13 +108,11 @@ PetscErrorCode HycoSolverTangentSolve(HycoSolverTangent t, Vec r, Vec g, int sig
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCheck(direct, HycoComm(t->s), PETSC_ERR_SUP, "the derivative of a solution is for a sparse K");
-  PetscCall(GatherAll(t, g, t->z));
+  PetscCall(HycoVecGather(g, t->z));
   PetscCall(HycoDirectReduce(direct, r, t->z, t->q));
   PetscCall(HycoTangentSolve(t->tangent, t->q, sign, t->z, kink));
   PetscCall(HycoDirectExpand(direct, t->z, dx));
   PetscCall(VecGetOwnershipRange(dL, &lo, &hi));
-  PetscCall(VecGetArray(dL, &l));
-  PetscCall(PetscArraycpy(l, t->z + t->p + lo, hi - lo));
-  PetscCall(VecRestoreArray(dL, &l));
+  PetscCall(HycoVecWrite(dL, hi - lo, t->z + t->p + lo));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -98,8 +98,7 @@ static PetscErrorCode Destroy(HycoSolverForm form)
   PetscCall(HycoTaoDestroy(&f->tao));
   PetscCall(HycoSetFactorDestroy(&f->factor));
   PetscCall(HycoConeFactorDestroy(&f->cone));
-  PetscCall(PetscFree(f->active));
-  PetscCall(PetscFree(form->data));
+  HycoFreeAll(&f->active, &form->data);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

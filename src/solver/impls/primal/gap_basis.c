@@ -51,8 +51,7 @@ PetscErrorCode HycoGapPivots(HycoSystem y, PetscInt pivot[], PetscBool *all)
   PetscCall(ISCreateGeneral(PETSC_COMM_SELF, n_need, need, PETSC_OWN_POINTER, &is));
   PetscCall(VecCreateSeq(PETSC_COMM_SELF, n_need, &mine));
   PetscCall(VecScatterCreate(count, is, mine, NULL, &scatter));
-  PetscCall(VecScatterBegin(scatter, count, mine, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecScatterEnd(scatter, count, mine, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(HycoScatter(scatter, count, mine));
   /* Counts are exact in reals; 1.5 allows for none. */
   PetscCall(VecGetArrayRead(mine, &shared));
   for (PetscInt r = lo; r < hi; r++) {
@@ -77,10 +76,7 @@ PetscErrorCode HycoGapPivots(HycoSystem y, PetscInt pivot[], PetscBool *all)
   PetscCallMPI(MPI_Allreduce(&bad, &any, 1, MPI_INT, MPI_MAX, HycoComm(y)));
   *all = (PetscBool)!any;
   PetscCall(VecRestoreArrayRead(mine, &shared));
-  PetscCall(VecScatterDestroy(&scatter));
-  PetscCall(ISDestroy(&is));
-  PetscCall(VecDestroy(&mine));
-  PetscCall(VecDestroy(&count));
+  HycoDestroyAll(&scatter, &is, &mine, &count);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -136,8 +132,7 @@ static PetscErrorCode ScaleOnly(HycoSystem y, Gap *s)
     PetscCall(VecSetValue(t, s->pivot[r - lo], 1 / vals[0], INSERT_VALUES));
     PetscCall(MatRestoreRow(y->B, r, &n, NULL, &vals));
   }
-  PetscCall(VecAssemblyBegin(t));
-  PetscCall(VecAssemblyEnd(t));
+  PetscCall(HycoVecAssemble(t));
   PetscCall(VecGetLocalSize(t, &n));
   PetscCall(MatDestroy(&s->T));
   PetscCall(MatCreateAIJ(HycoComm(y), n, n, y->n, y->n, 1, NULL, 0, NULL, &s->T));
@@ -192,8 +187,7 @@ static PetscErrorCode BuildT(HycoSystem y, Gap *s)
         PetscCall(MatSetValue(A, p, cols[k], cols[k] == p ? 1 / Bp : -vals[k] / Bp, INSERT_VALUES));
       PetscCall(MatRestoreRow(y->B, r, &n, &cols, &vals));
     }
-    PetscCall(MatAssemblyBegin(A, MAT_FINAL_ASSEMBLY));
-    PetscCall(MatAssemblyEnd(A, MAT_FINAL_ASSEMBLY));
+    PetscCall(HycoMatAssemble(A));
   }
   PetscCall(MatDestroy(&shape));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -228,8 +222,7 @@ static PetscErrorCode ToGaps(HycoSystem s, const Gap *q, Vec x, Vec y)
   PetscCall(VecGetArrayRead(gap, &g));
   for (PetscInt k = 0; k < q->n; k++) PetscCall(VecSetValue(y, q->pivot[k], g[q->contact[k]], INSERT_VALUES));
   PetscCall(VecRestoreArrayRead(gap, &g));
-  PetscCall(VecAssemblyBegin(y));
-  PetscCall(VecAssemblyEnd(y));
+  PetscCall(HycoVecAssemble(y));
   PetscCall(VecDestroy(&gap));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -312,9 +305,7 @@ PetscErrorCode HycoGapSetUp(HycoSolver s, Gap *g)
   if (!possible) g->transformed.K = 0;
   PetscCheck(possible, HycoComm(s), PETSC_ERR_USER,
              "the primal form needs an unknown of its own for each contact; use -hyco_solver_form dual");
-  PetscCall(MatDestroy(&g->Kg));
-  PetscCall(MatDestroy(&g->Kw));
-  PetscCall(MatDestroy(&g->H));
+  HycoDestroyAll(&g->Kg, &g->Kw, &g->H);
   PetscCall(OneEach(y->B, &diagonal));
   if (diagonal)
     PetscCall(ScaleOnly(y, g));
@@ -363,14 +354,12 @@ static PetscErrorCode SolveRefined(Mat Kw, KSP ksp, Vec rhs, Vec y)
   PetscCall(KSPSolve(ksp, rhs, y));
   PetscCall(KSPGetInitialGuessNonzero(ksp, &iterative)); /* an iterative solver has its own accuracy */
   if (iterative) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(VecDuplicate(y, &r));
-  PetscCall(VecDuplicate(y, &dy));
+  HycoVecDuplicate(y, &r, &dy);
   PetscCall(MatMult(Kw, y, r));
   PetscCall(VecAYPX(r, -1, rhs));
   PetscCall(KSPSolve(ksp, r, dy));
   PetscCall(VecAXPY(y, 1, dy));
-  PetscCall(VecDestroy(&r));
-  PetscCall(VecDestroy(&dy));
+  HycoDestroyAll(&r, &dy);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -389,8 +378,7 @@ PetscErrorCode HycoSolveOnSet(Mat Kg, Mat Kw, KSP ksp, Vec f, PetscInt n, const 
   PetscCall(VecSum(rhs, &mean));
   mean /= size;
   for (PetscInt k = 0; k < n; k++) PetscCall(VecSetValue(y, a[k], d[k], INSERT_VALUES));
-  PetscCall(VecAssemblyBegin(y));
-  PetscCall(VecAssemblyEnd(y));
+  PetscCall(HycoVecAssemble(y));
   PetscCall(VecCopy(f, rhs));
   PetscCall(MatZeroRowsColumns(Kw, n, a, mean, y, rhs));
   PetscCall(KSPSetOperators(ksp, Kw, Kw));

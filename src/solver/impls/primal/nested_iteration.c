@@ -158,8 +158,7 @@ static PetscErrorCode Split(const Rows *r, PetscInt coarse_of[], PetscInt *n_coa
   for (PetscInt i = 0; i < r->n; i++) {
     if (coarse_of[i] == 0) coarse_of[i] = (*n_coarse)++;
   }
-  PetscCall(PetscFree(queue));
-  PetscCall(PetscFree(seen));
+  HycoFreeAll(&queue, &seen);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -208,8 +207,7 @@ static PetscErrorCode Interpolate(const Rows *r, const PetscInt coarse_of[], Pet
     for (PetscInt k = 0; k < n; k++) weight[k] *= -all / taken / diagonal;
     PetscCall(MatSetValues(*P, 1, &i, n, col, weight, INSERT_VALUES));
   }
-  PetscCall(MatAssemblyBegin(*P, MAT_FINAL_ASSEMBLY));
-  PetscCall(MatAssemblyEnd(*P, MAT_FINAL_ASSEMBLY));
+  PetscCall(HycoMatAssemble(*P));
   PetscCall(PetscFree(length));
   PetscCall(PetscFree2(col, weight));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -321,18 +319,12 @@ static PetscErrorCode SolveLevel(Level *l, Vec y)
   PetscCall(MatDuplicate(l->K, MAT_COPY_VALUES, &p.work));
   PetscCall(HycoGapWork(p.work));
   PetscCall(HycoDirectSolver(PETSC_COMM_SELF, "hyco_primal_", p.work, PETSC_TRUE, &p.ksp));
-  PetscCall(VecDuplicate(y, &p.rhs));
-  PetscCall(VecDuplicate(y, &p.residual));
-  PetscCall(VecDuplicate(y, &p.diagonal));
+  HycoVecDuplicate(y, &p.rhs, &p.residual, &p.diagonal);
   PetscCall(MatGetDiagonal(l->K, p.diagonal));
   PetscCall(PetscMalloc2(l->n, &p.at, l->n, &p.at_bound));
   PetscCall(HycoActiveSetRun(&set, l->active, &its, &status));
   PetscCall(PetscFree2(p.at, p.at_bound));
-  PetscCall(VecDestroy(&p.rhs));
-  PetscCall(VecDestroy(&p.residual));
-  PetscCall(VecDestroy(&p.diagonal));
-  PetscCall(MatDestroy(&p.work));
-  PetscCall(KSPDestroy(&p.ksp));
+  HycoDestroyAll(&p.rhs, &p.residual, &p.diagonal, &p.work, &p.ksp);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -358,8 +350,7 @@ static PetscErrorCode Prolong(Level *fine, const Level *coarse, Vec y)
   PetscCall(VecRestoreArrayRead(fine_y, &value));
   PetscCall(VecRestoreArrayRead(fine->f, &f));
   PetscCall(VecRestoreArrayRead(diagonal, &d));
-  PetscCall(VecDestroy(&fine_y));
-  PetscCall(VecDestroy(&diagonal));
+  HycoDestroyAll(&fine_y, &diagonal);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -367,12 +358,8 @@ static PetscErrorCode Prolong(Level *fine, const Level *coarse, Vec y)
 static PetscErrorCode LevelDestroy(Level *l)
 {
   PetscFunctionBegin;
-  PetscCall(MatDestroy(&l->K));
-  PetscCall(MatDestroy(&l->P));
-  PetscCall(VecDestroy(&l->f));
-  PetscCall(PetscFree(l->bound));
-  PetscCall(PetscFree(l->active));
-  PetscCall(PetscFree(l->coarse_of));
+  HycoDestroyAll(&l->K, &l->P, &l->f);
+  HycoFreeAll(&l->bound, &l->active, &l->coarse_of);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -408,7 +395,6 @@ static PetscErrorCode StartOnRoot(Mat K, Vec f, Vec bound, Vec set, PetscBool *m
   Level *level;
   Rows r;
   Vec signs;
-  const PetscScalar *b;
   PetscScalar *sign, *out;
 
   PetscFunctionBegin;
@@ -416,9 +402,7 @@ static PetscErrorCode StartOnRoot(Mat K, Vec f, Vec bound, Vec set, PetscBool *m
   PetscCall(MatGetSize(K, &level->n, NULL));
   PetscCall(PetscMalloc1(level->n, &level->bound));
   PetscCall(PetscCalloc1(level->n, &level->active));
-  PetscCall(VecGetArrayRead(bound, &b));
-  PetscCall(PetscArraycpy(level->bound, b, level->n));
-  PetscCall(VecRestoreArrayRead(bound, &b));
+  PetscCall(HycoVecRead(bound, level->n, level->bound));
   PetscCall(VecDuplicate(f, &signs));
   PetscCall(RowsGet(K, &r));
   PetscCall(VecGetArray(signs, &sign));
@@ -444,21 +428,18 @@ static PetscErrorCode StartOnRoot(Mat K, Vec f, Vec bound, Vec set, PetscBool *m
 /* Gathers the whole matrix on rank 0, an empty one elsewhere. A submatrix of all rows on rank 0. */
 static PetscErrorCode GatherMatrix(MPI_Comm comm, Mat K, Mat *whole)
 {
-  PetscMPIInt rank, size;
   PetscInt n;
   Mat *part;
   IS all;
 
   PetscFunctionBegin;
-  PetscCallMPI(MPI_Comm_rank(comm, &rank));
-  PetscCallMPI(MPI_Comm_size(comm, &size));
-  if (size == 1) {
+  if (HycoSize(comm) == 1) {
     PetscCall(PetscObjectReference((PetscObject)K));
     *whole = K;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(MatGetSize(K, &n, NULL));
-  PetscCall(ISCreateStride(PETSC_COMM_SELF, rank ? 0 : n, 0, 1, &all));
+  PetscCall(ISCreateStride(PETSC_COMM_SELF, HycoRank(comm) ? 0 : n, 0, 1, &all));
   PetscCall(MatCreateSubMatrices(K, 1, &all, &all, MAT_INITIAL_MATRIX, &part));
   /* MatDestroySubMatrices() gives up the other reference. */
   PetscCall(PetscObjectReference((PetscObject)part[0]));
@@ -482,12 +463,9 @@ PetscErrorCode HycoMultilevelStart(Mat K, Vec f, Vec bound, Vec set, PetscBool *
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
   PetscCall(GatherMatrix(comm, K, &whole));
   PetscCall(VecScatterCreateToZero(f, &scatter, &f_root));
-  PetscCall(VecDuplicate(f_root, &bound_root));
-  PetscCall(VecDuplicate(f_root, &set_root));
-  PetscCall(VecScatterBegin(scatter, f, f_root, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecScatterEnd(scatter, f, f_root, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecScatterBegin(scatter, bound, bound_root, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecScatterEnd(scatter, bound, bound_root, INSERT_VALUES, SCATTER_FORWARD));
+  HycoVecDuplicate(f_root, &bound_root, &set_root);
+  PetscCall(HycoScatter(scatter, f, f_root));
+  PetscCall(HycoScatter(scatter, bound, bound_root));
   *made = PETSC_FALSE;
   HycoOnRoot(comm, StartOnRoot(whole, f_root, bound_root, set_root, made));
   PetscCallMPI(MPI_Bcast(made, 1, HYCO_MPI_BOOL, 0, comm));
@@ -495,10 +473,6 @@ PetscErrorCode HycoMultilevelStart(Mat K, Vec f, Vec bound, Vec set, PetscBool *
     PetscCall(VecScatterBegin(scatter, set_root, set, INSERT_VALUES, SCATTER_REVERSE));
     PetscCall(VecScatterEnd(scatter, set_root, set, INSERT_VALUES, SCATTER_REVERSE));
   }
-  PetscCall(VecScatterDestroy(&scatter));
-  PetscCall(VecDestroy(&f_root));
-  PetscCall(VecDestroy(&bound_root));
-  PetscCall(VecDestroy(&set_root));
-  PetscCall(MatDestroy(&whole));
+  HycoDestroyAll(&scatter, &f_root, &bound_root, &set_root, &whole);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

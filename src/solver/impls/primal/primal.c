@@ -19,14 +19,9 @@
 /* The value of a distributed vector at this rank's pivots. Pivots may be owned by other ranks. */
 static PetscErrorCode AtPivots(Vec v, VecScatter scatter, Vec work, PetscInt n, PetscReal out[])
 {
-  const PetscScalar *w;
-
   PetscFunctionBegin;
-  PetscCall(VecScatterBegin(scatter, v, work, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecScatterEnd(scatter, v, work, INSERT_VALUES, SCATTER_FORWARD));
-  PetscCall(VecGetArrayRead(work, &w));
-  PetscCall(PetscArraycpy(out, w, n));
-  PetscCall(VecRestoreArrayRead(work, &w));
+  PetscCall(HycoScatter(scatter, v, work));
+  PetscCall(HycoVecRead(work, n, out));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -282,14 +277,11 @@ static PetscErrorCode PrimalCreate(HycoSolver s, const Gap *g, Vec x, Primal *p)
     p->bound[k] = d[g->contact[k]];
     PetscCall(VecSetValue(p->hi, g->pivot[k], p->bound[k], INSERT_VALUES));
   }
-  PetscCall(VecAssemblyBegin(p->hi));
-  PetscCall(VecAssemblyEnd(p->hi));
+  PetscCall(HycoVecAssemble(p->hi));
   PetscCall(VecRestoreArrayRead(y->D, &d));
   PetscCall(VecDuplicate(x, &p->y));
   PetscCall(VecSet(p->y, 0));
-  PetscCall(VecDuplicate(x, &p->f));
-  PetscCall(VecDuplicate(x, &p->rhs));
-  PetscCall(VecDuplicate(x, &p->residual));
+  HycoVecDuplicate(x, &p->f, &p->rhs, &p->residual);
   PetscCall(MatMultTranspose(g->T, y->F, p->f));
   PetscCall(ISCreateGeneral(PETSC_COMM_SELF, p->n, g->pivot, PETSC_COPY_VALUES, &is));
   PetscCall(VecCreateSeq(PETSC_COMM_SELF, p->n, &p->work));
@@ -297,21 +289,6 @@ static PetscErrorCode PrimalCreate(HycoSolver s, const Gap *g, Vec x, Primal *p)
   PetscCall(ISDestroy(&is));
   PetscCall(MatGetDiagonal(g->Kg, p->rhs));
   PetscCall(AtPivots(p->rhs, p->scatter, p->work, p->n, p->diagonal));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The form's matrices and its solver stay for the next solve. */
-static PetscErrorCode PrimalDestroy(Primal *p)
-{
-  PetscFunctionBegin;
-  PetscCall(PetscFree6(p->bound, p->value, p->force, p->diagonal, p->at_d, p->at));
-  PetscCall(VecDestroy(&p->y));
-  PetscCall(VecDestroy(&p->hi));
-  PetscCall(VecDestroy(&p->f));
-  PetscCall(VecDestroy(&p->rhs));
-  PetscCall(VecDestroy(&p->residual));
-  PetscCall(VecDestroy(&p->work));
-  PetscCall(VecScatterDestroy(&p->scatter));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -372,7 +349,9 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   PetscCall(HycoNameLinear(s, g->ksp));
   /* if not solved, the set has changed since: its last forces show in the residuals */
   PetscCall(Fill(&p, (PetscBool)(*solved || !own)));
-  PetscCall(PrimalDestroy(&p));
+  /* The form's matrices and its solver stay for the next solve. */
+  PetscCall(PetscFree6(p.bound, p.value, p.force, p.diagonal, p.at_d, p.at));
+  HycoDestroyAll(&p.y, &p.hi, &p.f, &p.rhs, &p.residual, &p.work, &p.scatter);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -382,11 +361,7 @@ static PetscErrorCode Destroy(HycoSolverForm form)
 
   PetscFunctionBegin;
   PetscCall(HycoTaoDestroy(&g->tao));
-  PetscCall(KSPDestroy(&g->ksp));
-  PetscCall(MatDestroy(&g->T));
-  PetscCall(MatDestroy(&g->Kg));
-  PetscCall(MatDestroy(&g->Kw));
-  PetscCall(MatDestroy(&g->H));
+  HycoDestroyAll(&g->ksp, &g->T, &g->Kg, &g->Kw, &g->H);
   HycoFreeAll(&g->pivot, &g->contact, &g->active, &form->data);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -52,8 +52,7 @@ static PetscErrorCode FindNodes(HycoSystem y, Projected *f)
 
   PetscFunctionBegin;
   PetscCall(MatGetOwnershipRange(y->B, &lo, &hi));
-  PetscCall(PetscFree(f->node));
-  PetscCall(PetscFree(f->contact));
+  HycoFreeAll(&f->node, &f->contact);
   PetscCall(PetscMalloc1(hi - lo, &f->node));
   PetscCall(PetscMalloc1(hi - lo, &f->contact));
   PetscCall(PetscMalloc1(hi - lo, &pivot));
@@ -123,8 +122,7 @@ static PetscErrorCode SetConstraints(Run *p, const PetscBool active[], PetscBool
   /* On each rank the rows of its own contacts, in their order, like d and l. */
   PetscCall(MatCreateSubMatrix(B, is, NULL, MAT_INITIAL_MATRIX, &rows));
   PetscCall(HycoConstrainedSet(f->constrained, rows, p->at, singular));
-  PetscCall(VecDestroy(&p->d));
-  PetscCall(VecDestroy(&p->l));
+  HycoDestroyAll(&p->d, &p->l);
   PetscCall(MatCreateVecs(rows, NULL, &p->d));
   PetscCall(VecDuplicate(p->d, &p->l));
   PetscCall(VecGetArray(p->d, &d));
@@ -133,8 +131,7 @@ static PetscErrorCode SetConstraints(Run *p, const PetscBool active[], PetscBool
     if (active[k]) d[n++] = p->bound[k];
   }
   PetscCall(VecRestoreArray(p->d, &d));
-  PetscCall(MatDestroy(&rows));
-  PetscCall(ISDestroy(&is));
+  HycoDestroyAll(&rows, &is);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -270,18 +267,6 @@ static PetscErrorCode RunCreate(HycoSolver s, Projected *f, Vec x, Run *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The multigrid and its constraints stay with the form. */
-static PetscErrorCode RunDestroy(Run *p)
-{
-  PetscFunctionBegin;
-  PetscCall(PetscFree5(p->bound, p->value, p->force, p->at, p->solved));
-  PetscCall(VecDestroy(&p->d));
-  PetscCall(VecDestroy(&p->l));
-  PetscCall(VecDestroy(&p->r));
-  PetscCall(VecDestroy(&p->gap));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* For solves without a factor, by the active set method; an obstacle along a whole body is left to the primal form,
    which starts from coarser problems. */
 static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked, PetscReal *cost, char why[HYCO_LINE])
@@ -373,7 +358,9 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   f->started = *solved = (PetscBool)(status == HYCO_LCP_SOLVED);
   PetscCall(NameSolves(s, f));
   PetscCall(FillForces(&p, *solved, p.solved, L)); /* if not solved, the set has changed since */
-  PetscCall(RunDestroy(&p));
+  /* The multigrid and its constraints stay with the form. */
+  PetscCall(PetscFree5(p.bound, p.value, p.force, p.at, p.solved));
+  HycoDestroyAll(&p.d, &p.l, &p.r, &p.gap);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

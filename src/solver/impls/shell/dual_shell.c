@@ -92,8 +92,7 @@ static PetscErrorCode LocalDiagonal(HycoSystem y, Vec d)
     PetscCall(MatRestoreRow(y->B, r, &n, NULL, &a));
   }
   PetscCall(VecRestoreArray(d, &out));
-  PetscCall(MatDestroy(&scaled));
-  PetscCall(VecDestroy(&inverse));
+  HycoDestroyAll(&scaled, &inverse);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -109,8 +108,7 @@ static PetscErrorCode EstimateDiagonal(Mat S, Shell *f)
 
   PetscFunctionBegin;
   PetscCall(LocalDiagonal(f->s->system, f->diagonal));
-  PetscCall(VecDuplicate(f->diagonal, &v));
-  PetscCall(VecDuplicate(f->diagonal, &Sv));
+  HycoVecDuplicate(f->diagonal, &v, &Sv);
   PetscCall(VecGetOwnershipRange(v, &lo, &hi));
   PetscCall(VecGetArray(v, &p));
   for (PetscInt i = lo; i < hi; i++) /* irregular signs, the same on any number of ranks */
@@ -120,8 +118,7 @@ static PetscErrorCode EstimateDiagonal(Mat S, Shell *f)
   PetscCall(VecDot(v, Sv, &ratio));
   PetscCall(VecNorm(f->diagonal, NORM_1, &sum));
   if (ratio > 0 && sum > 0) PetscCall(VecScale(f->diagonal, ratio / sum));
-  PetscCall(VecDestroy(&v));
-  PetscCall(VecDestroy(&Sv));
+  HycoDestroyAll(&v, &Sv);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -143,9 +140,7 @@ static PetscErrorCode Forces(const Shell *p, Mat S, Vec x, Vec L, PetscBool *sol
   Vec f, lo, hi;
 
   PetscFunctionBegin;
-  PetscCall(VecDuplicate(L, &f));
-  PetscCall(VecDuplicate(L, &lo));
-  PetscCall(VecDuplicate(L, &hi));
+  HycoVecDuplicate(L, &f, &lo, &hi);
   PetscCall(HycoStiffnessSolve(s, y->F, x));
   PetscCall(MatMult(y->B, x, f));
   PetscCall(VecAXPY(f, -1, y->D));
@@ -155,9 +150,7 @@ static PetscErrorCode Forces(const Shell *p, Mat S, Vec x, Vec L, PetscBool *sol
   PetscCall(HycoTaoSetType(p->tao, s->now.type, s->max_its));
   PetscCall(HycoTaoSolve(p->tao, S, f, lo, hi, L, &s->its, solved));
   PetscCall(VecPointwiseMax(L, L, lo)); /* lo is 0 */
-  PetscCall(VecDestroy(&f));
-  PetscCall(VecDestroy(&lo));
-  PetscCall(VecDestroy(&hi));
+  HycoDestroyAll(&f, &lo, &hi);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -202,16 +195,12 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   PetscCall(MatShellSetOperation(S, MATOP_MULT_TRANSPOSE, (void (*)(void))MultS)); /* S is symmetric */
   PetscCall(MatShellSetOperation(S, MATOP_GET_DIAGONAL, (void (*)(void))DiagonalS));
   PetscCall(MatSetOption(S, MAT_SYMMETRIC, PETSC_TRUE));
-  PetscCall(VecDuplicate(y->F, &f->force));
-  PetscCall(VecDuplicate(y->F, &f->motion));
+  HycoVecDuplicate(y->F, &f->force, &f->motion);
   PetscCall(VecDuplicate(y->D, &f->diagonal));
   PetscCall(EstimateDiagonal(S, f));
   PetscCall(Forces(f, S, x, L, solved));
   PetscCall(Displacements(s, f, x, L));
-  PetscCall(VecDestroy(&f->force));
-  PetscCall(VecDestroy(&f->motion));
-  PetscCall(VecDestroy(&f->diagonal));
-  PetscCall(MatDestroy(&S));
+  HycoDestroyAll(&f->force, &f->motion, &f->diagonal, &S);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
