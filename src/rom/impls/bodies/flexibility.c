@@ -157,11 +157,15 @@ void HycoFlexibilityShares(const HycoFlexibility *f, PetscInt n_samples, const P
 
 void HycoFlexibilityAdd(const HycoFlexibility *f, PetscInt t, PetscInt unknown, PetscReal factor, PetscReal to[])
 {
-  const PetscReal *wide = f->wide + At(f, f->n_wide, t, unknown);
-  const float *narrow = f->narrow + At(f, f->n_terms - f->n_wide, t - f->n_wide, unknown);
+  if (t < f->n_wide) {
+    const PetscReal *wide = f->wide + At(f, f->n_wide, t, unknown);
 
-  for (PetscInt i = 0; i < f->n && t < f->n_wide; i++) to[i] += factor * wide[i];
-  for (PetscInt i = 0; i < f->n && t >= f->n_wide; i++) to[i] += factor * narrow[i];
+    for (PetscInt i = 0; i < f->n; i++) to[i] += factor * wide[i];
+  } else {
+    const float *narrow = f->narrow + At(f, f->n_terms - f->n_wide, t - f->n_wide, unknown);
+
+    for (PetscInt i = 0; i < f->n; i++) to[i] += factor * narrow[i];
+  }
 }
 
 /* Four terms at a time: `column` is read and written less often. */
