@@ -306,6 +306,14 @@ class Bodies(Case):
         s = self.hyco('solve', '-scene', scene, '-mu', '2.2,123,0.3')
         self.near(r['total_contact_force'], s['total_contact_force'], 1e-11)
 
+    def test_many_floating(self):
+        """A tilting block with 101 contacts, which alone hold it: the first problem has a quarter of them, the forces are those of full order."""
+        scene = SHORT[0].replace('press: {x: 0, y: -press}', 'press: {x: 0}').replace('mesh: short', 'mesh: many').replace(
+            'parameters: [press]', 'parameters: [press, tip]').replace('range: [0.01, 0.05]}', 'range: [1, 5]}\n  tip: {range: [-2, 2]}')
+        self.drawn('many', 2, SHORT[1].replace('Curve{5:8} = 5', 'Curve{5, 7} = 101; Transfinite Curve{6, 8} = 5'),
+                   scene + 'pressure: {press: press*(1 + tip*x)}\n')
+        self.judge('many', ('-values_press', '1.7,4.2', '-values_tip', '-1.8,0.3,1.1'), u=1e-3, model='many.h5')
+
     def test_obstacle(self):
         """One body under an obstacle that moves, on springs that soften with it."""
         scene = self.write('obstacle.yaml', OBSTACLE)
