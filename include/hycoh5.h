@@ -37,6 +37,8 @@ PetscErrorCode HycoH5Close(HycoH5 *file, PetscBool commit);
    ("mesh/cells") are created as needed. */
 PetscErrorCode HycoH5WriteReal(HycoH5 file, const char name[], PetscInt rows, PetscInt cols, const PetscReal *data);
 PetscErrorCode HycoH5WriteInt(HycoH5 file, const char name[], PetscInt rows, PetscInt cols, const PetscInt *data);
+/* The same in single precision; reals are read from it as from the others. */
+PetscErrorCode HycoH5WriteSingle(HycoH5 file, const char name[], PetscInt rows, PetscInt cols, const float *data);
 /* Writes this rank's rows first .. first + n - 1 of a dataset of rows x cols numbers (or HYCO_H5_LINE), of type
    MPIU_REAL, MPIU_INT or MPI_UNSIGNED_CHAR. The dataset is created when its first rows are written. Collective, unless
    the file belongs to one process. */

@@ -160,6 +160,9 @@ PetscErrorCode HycoPolynomialWeights(PetscInt n, const PetscReal x[], PetscInt d
 PetscInt HycoTensorSize(const HycoTensor *t);
 /* The weights of all grid nodes. */
 PetscErrorCode HycoTensorWeights(const HycoTensor *t, const PetscReal at[], PetscReal weight[]);
+/* Q (nodes x nodes row major): at node i polynomial j, orthonormal on the nodes, j as the numbers of its degrees; the
+   first is constant. */
+PetscErrorCode HycoTensorPolynomials(const HycoTensor *t, PetscReal Q[]);
 
 /* Values on a grid, rows x nodes column major. An axis on which they do not depend has one node. */
 typedef struct {

@@ -70,17 +70,44 @@ static inline void HycoBodiesAdd(PetscInt n, PetscReal factor, const PetscReal f
   BLASaxpy_(&size, &factor, from, &one, to, &one);
 }
 
-/* One body: its blocks at each of its samples (tensor), one sample after the other. All row major, except C and H: an
-   unknown of the surfaces has its columns at all samples side by side, because a prediction reads them together. */
+/* The flexibility C of a body, n x n and symmetric: the sum over its terms of share[] C_t, the share of a term its
+   polynomial of theta, one of those that are orthonormal on the samples; the first is constant. An unknown has its
+   columns of all terms side by side, because a prediction reads them together. */
 typedef struct {
-  HycoTensor tensor;           /* over the parameters theta; one node along those that do not change its shape */
-  PetscInt n_samples, n, l;    /* n: unknowns of its surfaces; l: modes */
-  PetscInt m;                  /* unknowns inside whose displacements are exact */
-  PetscReal *C, *R, *Z, *work; /* n x n; n x r; n x p; p x r, the work of the loads on the rigid motions */
-  PetscReal *H, *a, *g;        /* l rows for each turn, then m rows: of n, of r, of p */
-  PetscReal *gram;             /* r x r: of the errors of R at held-out samples in the norm of C^-1, summed; 0 */
+  PetscInt n, n_terms, n_wide; /* unknowns; terms; those in double precision, the first ones */
+  PetscInt *term;              /* their polynomials, ascending */
+  PetscReal *polynomial;       /* samples x terms row major: at the samples */
+  PetscReal *wide;
+  float *narrow;
+} HycoFlexibility;
+/* From the samples at the tensor's nodes. least 0: all terms in double precision; > 0: the first one, the others in
+   single precision, without those whose entries are nowhere as large, relative to the diagonal. */
+PetscErrorCode HycoFlexibilityCreate(const HycoTensor *tensor, PetscInt n, const PetscReal *const sample[],
+                                     PetscReal least, HycoFlexibility *f);
+PetscErrorCode HycoFlexibilityDestroy(HycoFlexibility *f);
+/* Room for n, n_terms, n_wide; the polynomials of `term`; entry i of an unknown's column in a term. */
+PetscErrorCode HycoFlexibilityAllocate(HycoFlexibility *f);
+PetscErrorCode HycoFlexibilityTakePolynomials(HycoFlexibility *f, const HycoTensor *tensor);
+PetscReal HycoFlexibilityEntry(const HycoFlexibility *f, PetscInt t, PetscInt unknown, PetscInt i);
+void HycoFlexibilitySetEntry(HycoFlexibility *f, PetscInt t, PetscInt unknown, PetscInt i, PetscReal value);
+/* share[n_terms] from the weights of the samples. */
+void HycoFlexibilityShares(const HycoFlexibility *f, PetscInt n_samples, const PetscReal weight[], PetscReal share[]);
+/* The column of an unknown; to += factor times that of one term. */
+void HycoFlexibilityColumn(const HycoFlexibility *f, const PetscReal share[], PetscInt unknown, PetscReal column[]);
+void HycoFlexibilityAdd(const HycoFlexibility *f, PetscInt t, PetscInt unknown, PetscReal factor, PetscReal to[]);
+
+/* One body: its blocks at each of its samples (tensor), one sample after the other. All row major, except H: an unknown
+   of the surfaces has its columns at all samples side by side. */
+typedef struct {
+  HycoTensor tensor;        /* over the parameters theta; one node along those that do not change its shape */
+  PetscInt n_samples, n, l; /* n: unknowns of its surfaces; l: modes */
+  PetscInt m;               /* unknowns inside whose displacements are exact */
+  HycoFlexibility C;
+  PetscReal *R, *Z, *work; /* n x r; n x p; p x r, the work of the loads on the rigid motions */
+  PetscReal *H, *a, *g;    /* l rows for each turn, then m rows: of n, of r, of p */
+  PetscReal *gram;         /* r x r: of the errors of R at held-out samples in the norm of C^-1, summed; 0 */
 } HycoSubstructure;
-/* The first entry of the column of an unknown at a sample, `rows` long, in C or H. */
+/* The first entry of the column of an unknown at a sample, `rows` long, in H. */
 static inline size_t HycoBodiesColumn(const HycoSubstructure *s, PetscInt sample, PetscInt unknown, PetscInt rows)
 {
   return ((size_t)unknown * (size_t)s->n_samples + (size_t)sample) * (size_t)rows;
@@ -159,7 +186,7 @@ typedef struct {
   PetscBool same;          /* the rows are the last ones */
   PetscInt m, *start, *at; /* the last rows, of m contacts */
   PetscReal *value;
-  PetscReal **P, **W; /* by contact and body: C_b B_b^T, n x samples; B C_b B_b^T, m x samples; NULL: not yet, or 0 */
+  PetscReal **P, **W; /* by contact and body: C_b B_b^T, n x terms; B C_b B_b^T, m x terms; NULL: not yet, or 0 */
   PetscReal bytes;    /* of all P and W */
 } HycoBodiesKept;
 
@@ -168,6 +195,7 @@ typedef struct {
 typedef struct _n_HycoBodiesWork {
   HycoSubstructures bodies; /* borrowed */
   PetscReal **weight;       /* by body: of its samples */
+  PetscReal **share;        /* by body: of the terms of its flexibility */
   PetscReal **blend;  /* by body with several samples: the columns of its flexibility with these weights, n x n; */
   PetscBool *blended; /* by place: whether they are there */
   HycoFE fe;          /* on probe */
@@ -225,7 +253,7 @@ PetscErrorCode HycoBodiesKeepRows(HycoBodiesWork work, PetscInt m);
 PetscErrorCode HycoBodiesForgetKept(HycoBodiesWork work);
 /* If the rows are the last ones: P and W of n contacts, unless they need too much memory (kept.same is false then). */
 PetscErrorCode HycoBodiesKeep(HycoBodiesWork work, PetscInt n, const PetscInt contact[]);
-/* to[n] = the sum over the samples of body k, `stride` apart, with its weights and without kappa: always in the same
+/* to[n] = the sum over the terms of body k, `stride` apart, with its shares and without kappa: always in the same
    order, so that products that are kept give the same bits as those that are not. */
 void HycoBodiesBlend(HycoBodiesWork work, PetscInt k, PetscInt n, size_t stride, const PetscReal from[],
                      PetscReal to[]);

@@ -76,6 +76,7 @@ typedef struct {
   PetscReal bytes; /* of one */
   PetscInt n_records;
   HycoBodyRecord *record;
+  PetscInt *sample; /* the records of its samples */
 } HycoBodyFactor;
 
 /* The factors of K, body by body, at a point of theta. Every rank. */

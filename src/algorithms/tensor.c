@@ -37,21 +37,27 @@ static void NextPolynomial(PetscInt n, const PetscReal s[], PetscInt d, PetscRea
   for (PetscInt k = 0; k <= n; k++) p[k] /= PetscSqrtReal(length);
 }
 
+/* s[n + 1]: the nodes and the point `at` in [-1, 1], where the polynomials are of one size whatever the parameter's
+   unit. */
+static void Scale(PetscInt n, const PetscReal x[], PetscReal at, PetscReal s[])
+{
+  const PetscReal middle = (x[0] + x[n - 1]) / 2, half = x[n - 1] > x[0] ? (x[n - 1] - x[0]) / 2 : 1;
+
+  for (PetscInt k = 0; k < n; k++) s[k] = (x[k] - middle) / half;
+  s[n] = (at - middle) / half;
+}
+
 /* weight[n] of the polynomial's value at `at` by the nodes' data. The degree is limited by the number of nodes. */
 PetscErrorCode HycoPolynomialWeights(PetscInt n, const PetscReal x[], PetscInt degree, PetscReal at, PetscReal weight[])
 {
   const PetscInt top = PetscMin(degree, n - 1);
-  PetscReal *s, *P, middle, half;
+  PetscReal *s, *P;
 
   PetscFunctionBegin;
   PetscCall(PetscArrayzero(weight, n));
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
-  middle = (x[0] + x[n - 1]) / 2;
-  /* To [-1, 1], where the polynomials are of one size whatever the parameter's unit. */
-  half = x[n - 1] > x[0] ? (x[n - 1] - x[0]) / 2 : 1;
   PetscCall(PetscMalloc2(n + 1, &s, (top + 1) * (n + 1), &P));
-  for (PetscInt k = 0; k < n; k++) s[k] = (x[k] - middle) / half;
-  s[n] = (at - middle) / half;
+  Scale(n, x, at, s);
   for (PetscInt d = 0; d <= top; d++) {
     const PetscReal *p = P + d * (n + 1);
 
@@ -119,5 +125,27 @@ PetscErrorCode HycoGridFieldEvaluate(const HycoGridField *f, const PetscReal at[
   PetscCall(HycoTensorWeights(&f->tensor, at, w));
   PetscCall(Sum(f, w, value));
   PetscCall(PetscFree(w));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The products of the axes' polynomials, the last axis fastest. */
+PetscErrorCode HycoTensorPolynomials(const HycoTensor *t, PetscReal Q[])
+{
+  const PetscInt size = HycoTensorSize(t);
+  PetscReal *s, *P;
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < size * size; i++) Q[i] = 1;
+  for (PetscInt p = 0, after = size; p < t->dim; p++) {
+    const PetscInt n = t->n[p];
+
+    if (n == 1) continue;
+    after /= n; /* nodes of the axes after this one */
+    PetscCall(PetscMalloc2(n + 1, &s, n * (n + 1), &P));
+    Scale(n, t->x[p], t->x[p][0], s);
+    for (PetscInt d = 0; d < n; d++) NextPolynomial(n, s, d, P);
+    for (PetscInt i = 0; i < size * size; i++) Q[i] *= P[i % size / after % n * (n + 1) + i / size / after % n];
+    PetscCall(PetscFree2(s, P));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

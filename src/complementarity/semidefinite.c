@@ -14,6 +14,7 @@
 typedef struct {
   PetscInt p, m, n; /* numbers of pinned unknowns, contacts, both */
   const PetscReal *M, *q;
+  PetscBool symmetric;   /* K' and S */
   PetscReal flexibility; /* a typical S_ii as scale: L = L' / flexibility and K' flexibility are of order one like A */
   PetscInt k, *a;        /* the set: pinned unknowns, then active contacts */
   PetscReal *z, *w;
@@ -31,21 +32,16 @@ static void FindIdle(Floating *h)
   }
 }
 
+#define DEPENDENT 1e-12 /* pivots of a scaled matrix that are no larger are round-off */
+
 /* By LU: the matrix is not symmetric in sign. Rows of unknowns are scaled by the typical flexibility. */
-static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singular)
+static PetscErrorCode SolveByPivots(Floating *h, PetscBool *singular)
 {
-  Floating *h = (Floating *)ctx;
   PetscReal *A, *x, least = PETSC_MAX_REAL, most = 0;
   PetscBLASInt n, one = 1, info, *ipiv;
-  size_t k;
+  const size_t k = (size_t)h->k;
 
   PetscFunctionBegin;
-  for (h->k = 0; h->k < h->p; h->k++) h->a[h->k] = h->k;
-  for (PetscInt i = 0; i < h->m; i++) {
-    active[i] = (PetscBool)(active[i] && !h->idle[i]);
-    if (active[i]) h->a[h->k++] = h->p + i;
-  }
-  k = (size_t)h->k;
   PetscCall(PetscBLASIntCast(h->k, &n));
   PetscCall(PetscMalloc3(k * k, &A, k, &x, k, &ipiv));
   for (size_t j = 0; j < k; j++) {
@@ -69,6 +65,92 @@ static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singu
     for (size_t j = 0; j < k; j++) h->z[h->a[j]] = x[j] / (h->a[j] < h->p ? 1 : h->flexibility);
   }
   PetscCall(PetscFree3(A, x, ipiv));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Factors the n x n matrix S by Cholesky; *regular: no pivot is small beside its diagonal entry. */
+static PetscErrorCode Cholesky(PetscInt n, PetscReal S[], PetscBool *regular)
+{
+  PetscReal *diagonal;
+  PetscBLASInt size, info;
+
+  PetscFunctionBegin;
+  PetscCall(PetscBLASIntCast(n, &size));
+  PetscCall(PetscMalloc1(n + 1, &diagonal));
+  for (PetscInt j = 0; j < n; j++) diagonal[j] = S[(size_t)j * (size_t)(n + 1)];
+  if (n) LAPACKpotrf_("L", &size, S, &size, &info);
+  *regular = (PetscBool)(!n || !info);
+  for (PetscInt j = 0; j < n && *regular; j++) /* false for NaN */
+    *regular = (PetscBool)(PetscSqr(S[(size_t)j * (size_t)(n + 1)]) > DEPENDENT * diagonal[j]);
+  PetscCall(PetscFree(diagonal));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* With the symmetric S of the set regular: its factor, then (K' + A S^-1 A^T) x = f' + A S^-1 g, L = S^-1 (A^T x - g).
+   Half of the operations of LU, and no pivots. *solved: both are regular. */
+static PetscErrorCode SolveByCholesky(Floating *h, PetscBool *solved)
+{
+  const PetscInt p = h->p, n = h->k - p;
+  const PetscReal unit = 1;
+  PetscReal *S, *Y, *H;
+  PetscBLASInt size, columns, motions, one = 1;
+
+  PetscFunctionBegin;
+  PetscCall(PetscBLASIntCast(n, &size));
+  PetscCall(PetscBLASIntCast(p + 1, &columns));
+  PetscCall(PetscBLASIntCast(p, &motions));
+  PetscCall(PetscMalloc3((size_t)n * (size_t)n + 1, &S, n * (p + 1) + 1, &Y, p * (p + 1), &H));
+  for (PetscInt j = 0; j < n; j++) {
+    const PetscReal *column = h->M + (size_t)h->a[p + j] * (size_t)h->n;
+
+    for (PetscInt i = j; i < n; i++) S[(size_t)j * (size_t)n + (size_t)i] = column[h->a[p + i]];
+    for (PetscInt i = 0; i < p; i++) Y[i * n + j] = column[i];
+    Y[p * n + j] = h->q[h->a[p + j]];
+  }
+  PetscCall(Cholesky(n, S, solved));
+  if (*solved) {
+    if (n) BLAStrsm_("L", "L", "N", "N", &size, &columns, &unit, S, &size, Y, &size);
+    for (PetscInt i = 0; i < p; i++) {
+      for (PetscInt j = 0; j <= p; j++) {
+        H[j * p + i] = j < p ? h->M[(size_t)j * (size_t)h->n + (size_t)i] : -h->q[i];
+        for (PetscInt k = 0; k < n; k++) H[j * p + i] += Y[i * n + k] * Y[j * n + k];
+      }
+    }
+    PetscCall(Cholesky(p, H, solved));
+  }
+  if (*solved) {
+    PetscReal *x = H + p * p, *L = Y + p * n;
+
+    BLAStrsm_("L", "L", "N", "N", &motions, &one, &unit, H, &motions, x, &motions);
+    BLAStrsm_("L", "L", "T", "N", &motions, &one, &unit, H, &motions, x, &motions);
+    for (PetscInt k = 0; k < n; k++) {
+      L[k] = -L[k];
+      for (PetscInt i = 0; i < p; i++) L[k] += Y[i * n + k] * x[i];
+    }
+    if (n) BLAStrsm_("L", "L", "T", "N", &size, &one, &unit, S, &size, L, &size);
+    PetscCall(PetscArrayzero(h->z, h->n));
+    for (PetscInt i = 0; i < p; i++) h->z[i] = x[i];
+    for (PetscInt k = 0; k < n; k++) h->z[h->a[p + k]] = L[k];
+  }
+  PetscCall(PetscFree3(S, Y, H));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The solution with the contacts of the set closed. */
+static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singular)
+{
+  Floating *h = (Floating *)ctx;
+  PetscBool solved = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  for (h->k = 0; h->k < h->p; h->k++) h->a[h->k] = h->k;
+  for (PetscInt i = 0; i < h->m; i++) {
+    active[i] = (PetscBool)(active[i] && !h->idle[i]);
+    if (active[i]) h->a[h->k++] = h->p + i;
+  }
+  *singular = PETSC_FALSE;
+  if (h->symmetric) PetscCall(SolveByCholesky(h, &solved));
+  if (!solved) PetscCall(SolveByPivots(h, singular));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -137,7 +219,7 @@ PetscErrorCode HycoLCPSemidefinite(const HycoLCP *lcp, PetscBool active[], Petsc
                                    HycoLCPStatus *status)
 {
   const PetscInt n = lcp->p + lcp->n;
-  Floating h = {.p = lcp->p, .m = lcp->n, .n = n, .M = lcp->M, .q = lcp->q, .z = z};
+  Floating h = {.p = lcp->p, .m = lcp->n, .n = n, .M = lcp->M, .q = lcp->q, .symmetric = lcp->symmetric, .z = z};
   const HycoActiveSet e = {.comm = MPI_COMM_NULL,
                            .n = lcp->n,
                            .max_its = lcp->max_its ? lcp->max_its : 50 + 4 * lcp->n,

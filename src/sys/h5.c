@@ -565,6 +565,13 @@ PetscErrorCode HycoH5WriteReal(HycoH5 file, const char name[], PetscInt rows, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoH5WriteSingle(HycoH5 file, const char name[], PetscInt rows, PetscInt cols, const float *data)
+{
+  PetscFunctionBegin;
+  PetscCall(Write(file, name, H5T_NATIVE_FLOAT, rows, cols, 0, rows, data));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoH5WriteInt(HycoH5 file, const char name[], PetscInt rows, PetscInt cols, const PetscInt *data)
 {
   PetscFunctionBegin;
@@ -638,6 +645,7 @@ static PetscErrorCode OpenSet(HycoH5 f, const char name[], H5T_class_t wanted, h
   const hsize_t most = PetscMin((hsize_t)PETSC_MAX_INT, (hsize_t)f->size);
   hid_t space, type;
   H5T_class_t class;
+  hsize_t size;
   int rank;
 
   PetscFunctionBegin;
@@ -647,13 +655,14 @@ static PetscErrorCode OpenSet(HycoH5 f, const char name[], H5T_class_t wanted, h
   type = H5Dget_type(*set);
   rank = space >= 0 ? H5Sget_simple_extent_ndims(space) : -1;
   class = type >= 0 ? H5Tget_class(type) : H5T_NO_CLASS;
+  size = type >= 0 && H5Tget_size(type) == sizeof(float) ? sizeof(float) : sizeof(PetscReal);
   if (rank == 2) H5Sget_simple_extent_dims(space, dims, NULL);
   if (space >= 0) H5Sclose(space);
   if (type >= 0) H5Tclose(type);
   /* The declared size must fit in the file: a damaged size must not cause a huge allocation. */
   if (rank != 2 || class != wanted || !IsPlain(*set) || dims[0] > most || dims[1] > most ||
       (dims[1] && dims[0] > most / dims[1]) ||
-      H5Dget_storage_size(*set) < dims[0] * dims[1] * (wanted == H5T_FLOAT ? 8 : 1)) {
+      H5Dget_storage_size(*set) < dims[0] * dims[1] * (wanted == H5T_FLOAT ? size : 1)) {
     H5Dclose(*set);
     HycoFail("%s: %s is damaged (its shape or type differs from what hyco writes)", f->path, name);
   }

@@ -69,9 +69,36 @@ static PetscErrorCode Weights(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The polynomials on the grid are orthonormal, the first is constant, and those of degrees above the data's have no
+   part in them. */
+static PetscErrorCode Polynomials(void)
+{
+  const PetscReal x[5] = {-0.4, 0.1, 0.15, 0.9, 2}, y[2] = {1e3, 3e3};
+  HycoTensor t = {3, {5, 1, 2}, {4, 0, 1}, {x, NULL, y}};
+  PetscReal Q[100];
+
+  PetscFunctionBegin;
+  PetscCall(HycoTensorPolynomials(&t, Q));
+  for (PetscInt i = 0; i < 10; i++) {
+    PetscReal part = 0;
+
+    for (PetscInt j = 0; j < 10; j++) {
+      PetscReal dot = 0;
+
+      for (PetscInt k = 0; k < 10; k++) dot += Q[10 * k + i] * Q[10 * k + j];
+      CHECK_NEAR(dot, i == j ? 1 : 0, 1e-13);
+      part += Q[10 * j + i] * Product(x[j / 2], y[j % 2]);
+    }
+    CHECK_NEAR(Q[10 * i], PetscSqrtReal(0.1), 1e-14);
+    CHECK((i >= 8) == (PetscAbsReal(part) < 1e-10 * 1e5), "polynomial %d: %g", (int)i, part);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Test(void)
 {
   PetscFunctionBegin;
+  PetscCall(Polynomials());
   PetscCall(Exact());
   PetscCall(Converges());
   PetscCall(Weights());

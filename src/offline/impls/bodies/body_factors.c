@@ -543,7 +543,7 @@ static PetscErrorCode ReleaseBody(HycoBodyFactor *body)
 
     HycoFreeAll(&r->theta, &r->C, &r->R, &r->Z, &r->work);
   }
-  HycoFreeAll(&body->kept, &body->record);
+  HycoFreeAll(&body->kept, &body->record, &body->sample);
   PetscCall(PetscFree2(body->motion, body->pin));
   HycoDestroyAll(&body->global, &body->K, &body->N);
   PetscFunctionReturn(PETSC_SUCCESS);

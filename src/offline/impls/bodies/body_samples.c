@@ -9,8 +9,10 @@
 #include <petscblaslapack.h>
 
 #define MOST_VALUES 17
-#define HOPELESS    0.3 /* e above which the model is refused */
-#define ITERATIONS  30  /* of the power method */
+#define HOPELESS    0.3  /* e above which the model is refused */
+#define ITERATIONS  30   /* of the power method */
+#define SHORT       0.01 /* share of the tolerance: terms of a flexibility without larger entries are left out */
+#define SHORTENED   0.1  /* share of the tolerance that this and single precision may add to e */
 
 /* Node k of n along parameter p, in its own variable. */
 static PetscReal Node(HycoReducer t, HycoSubstructures b, PetscInt p, PetscInt n, PetscInt k)
@@ -76,34 +78,54 @@ void HycoBodiesPoint(HycoReducer t, PetscInt k, PetscReal theta[])
   }
 }
 
-/* Copies the records of the grid (n for each node) to the bodies. Rank 0. */
-static PetscErrorCode TakeRecords(HycoSubstructures b, const HycoBodiesFactor *factor, const PetscInt record[])
+/* C of body k from its samples, with small terms in single precision and without those that have no effect beside the
+   tolerance, or all in double precision. Rank 0. */
+static PetscErrorCode TakeFlexibility(HycoReducer t, const HycoBodiesFactor *factor, PetscInt k, PetscBool shortened)
 {
+  HycoSubstructure *s = &HycoTrainingOfBodies(t)->bodies->body[k];
+  const HycoBodyFactor *body = &factor->body[k];
+  const PetscReal **C;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(s->n_samples, &C));
+  for (PetscInt j = 0; j < s->n_samples; j++) C[j] = body->record[body->sample[j]].C;
+  PetscCall(HycoFlexibilityDestroy(&s->C));
+  PetscCall(HycoFlexibilityCreate(&s->tensor, s->n, C,
+                                  shortened && s->n_samples > 1 ? SHORT * HycoTrainingOfBodies(t)->tol : 0, &s->C));
+  PetscCall(PetscFree(C));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Gives the records of the grid (n for each node) to the bodies. Rank 0. */
+static PetscErrorCode TakeRecords(HycoReducer t, HycoBodiesFactor *factor, const PetscInt record[])
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   const PetscInt n = HycoBodiesGrid(b, 0, NULL);
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < b->n; k++) {
     HycoSubstructure *s = &b->body[k];
-    const size_t C = (size_t)PetscSqr(s->n), R = (size_t)(s->n * b->r), Z = (size_t)(s->n * b->p),
-                 work = (size_t)(b->p * b->r), samples = (size_t)s->n_samples;
+    HycoBodyFactor *body = &factor->body[k];
+    const size_t R = (size_t)(s->n * b->r), Z = (size_t)(s->n * b->p), work = (size_t)(b->p * b->r),
+                 samples = (size_t)s->n_samples;
 
-    HycoFreeAll(&s->C, &s->R, &s->Z, &s->work, &s->gram);
+    HycoFreeAll(&s->R, &s->Z, &s->work, &s->gram, &body->sample);
     PetscCall(PetscCalloc1(b->r * b->r + 1, &s->gram));
-    PetscCall(PetscMalloc1(samples * C + 1, &s->C));
+    PetscCall(PetscMalloc1(samples, &body->sample));
     PetscCall(PetscMalloc1(samples * R + 1, &s->R));
     PetscCall(PetscMalloc1(samples * Z + 1, &s->Z));
     PetscCall(PetscMalloc1(samples * work + 1, &s->work));
     for (PetscInt j = 0; j < n; j++) {
-      const HycoBodyRecord *r = &factor->body[k].record[record[j * b->n + k]];
+      const HycoBodyRecord *r = &body->record[record[j * b->n + k]];
       const PetscInt at = HycoBodiesSampleOf(b, k, j);
 
       if (at < 0) continue;
-      for (PetscInt d = 0; d < s->n; d++)
-        PetscCall(PetscArraycpy(s->C + HycoBodiesColumn(s, at, d, s->n), r->C + (size_t)d * (size_t)s->n, s->n));
+      body->sample[at] = record[j * b->n + k];
       PetscCall(PetscArraycpy(s->R + (size_t)at * R, r->R, R));
       PetscCall(PetscArraycpy(s->Z + (size_t)at * Z, r->Z, Z));
       PetscCall(PetscArraycpy(s->work + (size_t)at * work, r->work, work));
     }
+    PetscCall(TakeFlexibility(t, factor, k, PETSC_TRUE));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -183,52 +205,70 @@ static PetscErrorCode AddGram(const HycoSubstructure *s, const PetscReal weight[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* e of all bodies at a point that is no sample. Rank 0. */
+/* D = the flexibility of a body at the weights of its samples, from these or as it is stored, minus C. */
+static PetscErrorCode Difference(const HycoSubstructure *s, const HycoBodyFactor *body, const PetscReal weight[],
+                                 PetscBool stored, const PetscReal C[], PetscReal D[])
+{
+  const size_t n = (size_t)s->n;
+  PetscReal *share;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(s->C.n_terms, &share));
+  HycoFlexibilityShares(&s->C, s->n_samples, weight, share);
+  PetscCall(PetscArrayzero(D, n * n));
+  for (PetscInt d = 0; d < s->n && stored; d++) HycoFlexibilityColumn(&s->C, share, d, D + (size_t)d * n);
+  for (PetscInt j = 0; j < s->n_samples && !stored; j++) {
+    const PetscReal *sample = body->record[body->sample[j]].C;
+
+    for (size_t i = 0; i < n * n; i++) D[i] += weight[j] * sample[i];
+  }
+  for (size_t i = 0; i < n * n; i++) D[i] -= C[i];
+  PetscCall(PetscFree(share));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* e of all bodies at a point that is no sample: [0] of the samples, [1] of the flexibility as it is stored. Rank 0. */
 static PetscErrorCode Bound(HycoSubstructures b, const PetscReal mu[], const HycoBodiesFactor *factor,
-                            const PetscInt at[], PetscReal *e)
+                            const PetscInt at[], PetscReal e[2])
 {
   PetscFunctionBegin;
-  *e = 0;
+  e[0] = e[1] = 0;
   for (PetscInt k = 0; k < b->n; k++) {
     const HycoSubstructure *s = &b->body[k];
     const HycoBodyRecord *record = &factor->body[k].record[at[k]];
     const size_t n = (size_t)PetscSqr(s->n);
-    PetscReal *C, *D, *weight, own;
+    PetscReal *L, *D, *weight, own;
 
     /* Nothing of this body is interpolated. */
     if (s->n_samples == 1 || !s->n) continue;
-    PetscCall(PetscMalloc3(n + 1, &C, n + 1, &D, s->n_samples, &weight));
+    PetscCall(PetscMalloc3(n + 1, &L, n + 1, &D, s->n_samples, &weight));
     PetscCall(HycoBodiesWeights(b, k, mu, weight));
-    PetscCall(PetscArraycpy(C, record->C, n));
-    for (size_t i = 0; i < n; i++) D[i] = -C[i];
-    for (PetscInt d = 0; d < s->n * s->n_samples; d++) {
-      const PetscReal *column = s->C + (size_t)d * (size_t)s->n, share = weight[d % s->n_samples];
-      PetscReal *to = D + (size_t)(d / s->n_samples) * (size_t)s->n;
-
-      for (PetscInt i = 0; i < s->n; i++) to[i] += share * column[i];
+    PetscCall(PetscArraycpy(L, record->C, n));
+    PetscCall(Factor(s->n, L));
+    for (int stored = 0; stored < 2; stored++) {
+      PetscCall(Difference(s, &factor->body[k], weight, (PetscBool)stored, record->C, D));
+      PetscCall(Largest(s->n, L, D, &own));
+      e[stored] = PetscMax(e[stored], own);
     }
-    PetscCall(Factor(s->n, C));
-    PetscCall(Largest(s->n, C, D, &own));
-    PetscCall(AddGram(s, weight, b->r, C, record->R));
-    *e = PetscMax(*e, own);
-    PetscCall(PetscFree3(C, D, weight));
+    PetscCall(AddGram(s, weight, b->r, L, record->R));
+    PetscCall(PetscFree3(L, D, weight));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* e along axis p: at two nodes of the next finer grid, with the other parameters at a middle node. Collective. */
-static PetscErrorCode BoundAlong(HycoReducer t, HycoBodiesFactor *factor, PetscInt axis, PetscReal *e)
+static PetscErrorCode BoundAlong(HycoReducer t, HycoBodiesFactor *factor, PetscInt axis, PetscReal e[2])
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
 
   PetscInt *record;
 
   PetscFunctionBegin;
-  *e = 0;
+  e[0] = e[1] = 0;
   PetscCall(PetscMalloc1(b->n, &record));
   for (PetscInt side = 0; side < 2; side++) {
     const PetscInt finer = 2 * b->n_nodes[axis] - 1;
-    PetscReal theta[HYCO_MAX_PARAMETERS], mu[HYCO_MAX_PARAMETERS] = {0}, own = 0;
+    PetscReal theta[HYCO_MAX_PARAMETERS], mu[HYCO_MAX_PARAMETERS] = {0}, own[2] = {0, 0};
 
     for (PetscInt p = 0; p < b->n_theta; p++) {
       theta[p] =
@@ -236,9 +276,9 @@ static PetscErrorCode BoundAlong(HycoReducer t, HycoBodiesFactor *factor, PetscI
       mu[b->theta[p]] = theta[p];
     }
     PetscCall(HycoBodiesCondense(t, factor, theta, record));
-    HycoOnRoot(HycoComm(t), Bound(b, mu, factor, record, &own));
-    PetscCallMPI(MPI_Bcast(&own, 1, MPIU_REAL, 0, HycoComm(t)));
-    *e = PetscMax(*e, own);
+    HycoOnRoot(HycoComm(t), Bound(b, mu, factor, record, own));
+    PetscCallMPI(MPI_Bcast(own, 2, MPIU_REAL, 0, HycoComm(t)));
+    for (int k = 0; k < 2; k++) e[k] = PetscMax(e[k], own[k]);
     PetscCall(PetscFree(factor->between));
     /* Kept for MeasureLeft(): a point that is no sample, with a factor that may still be there. */
     HycoDuplicate(b->n_theta, theta, &factor->between);
@@ -264,13 +304,13 @@ static PetscErrorCode CondenseGrid(HycoReducer t, HycoBodiesFactor *factor)
     /* Nodes of the coarser grid, and those at which it was judged, are found among the records. */
     PetscCall(HycoBodiesCondense(t, factor, theta, record + k * b->n));
   }
-  HycoOnRoot(HycoComm(t), TakeRecords(b, factor, record));
+  HycoOnRoot(HycoComm(t), TakeRecords(t, factor, record));
   PetscCall(PetscFree(record));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The axis with the largest e that a finer grid may reduce, -1: none. */
-static PetscInt Worst(HycoReducer t, HycoSubstructures b, const PetscReal e[])
+static PetscInt Worst(HycoReducer t, HycoSubstructures b, PetscReal e[][2])
 {
   const HycoBodiesTraining s = HycoTrainingOfBodies(t);
   PetscInt worst = -1;
@@ -280,10 +320,26 @@ static PetscInt Worst(HycoReducer t, HycoSubstructures b, const PetscReal e[])
     const PetscInt n = HycoBodiesGrid(b, 0, NULL) / b->n_nodes[p] * finer;
 
     /* The axes' errors add up: each may use its share of the tolerance. */
-    if (e[p] <= s->tol / b->n_theta || finer > MOST_VALUES || n > s->most_samples) continue;
-    if (worst < 0 || e[p] > e[worst]) worst = p;
+    if (e[p][0] <= s->tol / b->n_theta || finer > MOST_VALUES || n > s->most_samples) continue;
+    if (worst < 0 || e[p][0] > e[worst][0]) worst = p;
   }
   return worst;
+}
+
+/* The flexibilities as they are stored, unless that adds more to the error of some axis than it may: then all of their
+   terms stay, in double precision. e, [2] of each axis: [1] becomes that of what is kept. Rank 0. */
+static PetscErrorCode Store(HycoReducer t, const HycoBodiesFactor *factor, PetscReal e[][2])
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  PetscBool fine = PETSC_TRUE;
+
+  PetscFunctionBegin;
+  for (PetscInt p = 0; p < b->n_theta; p++)
+    fine = (PetscBool)(fine && e[p][1] <= e[p][0] + SHORTENED * HycoTrainingOfBodies(t)->tol / b->n_theta);
+  if (fine) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt p = 0; p < b->n_theta; p++) e[p][1] = e[p][0];
+  for (PetscInt k = 0; k < b->n; k++) PetscCall(TakeFlexibility(t, factor, k, PETSC_FALSE));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* One axis is refined at a time, the worst: a tensor grid that is fine in all of them would cost the product. What
@@ -291,23 +347,25 @@ static PetscInt Worst(HycoReducer t, HycoSubstructures b, const PetscReal e[])
 PetscErrorCode HycoBodiesSample(HycoReducer t, HycoBodiesFactor *factor)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
-  PetscReal e[HYCO_MAX_PARAMETERS] = {0};
+  PetscReal e[HYCO_MAX_PARAMETERS][2] = {{0}};
   PetscInt worst;
 
   PetscFunctionBegin;
   do {
     PetscCall(CondenseGrid(t, factor));
-    for (PetscInt p = 0; p < b->n_theta; p++) PetscCall(BoundAlong(t, factor, p, &e[p]));
+    for (PetscInt p = 0; p < b->n_theta; p++) PetscCall(BoundAlong(t, factor, p, e[p]));
     worst = Worst(t, b, e);
     if (worst >= 0) b->n_nodes[worst] = 2 * b->n_nodes[worst] - 1;
   } while (worst >= 0);
+  HycoOnRoot(HycoComm(t), Store(t, factor, e));
+  HycoBcast(&e[0][0], 2 * b->n_theta, MPIU_REAL, HycoComm(t));
   b->bound = 0;
   for (PetscInt p = 0; p < b->n_theta; p++) {
-    b->bound += e[p];
-    HycoCheckModel(e[p] <= HOPELESS,
+    b->bound += e[p][1];
+    HycoCheckModel(e[p][1] <= HOPELESS,
                    "the flexibility of a body cannot be interpolated over %s: with %d values its relative error is "
                    "%.2g; train a hybrid model",
-                   t->scene->parameter[b->theta[p]], (int)b->n_nodes[p], (double)e[p]);
+                   t->scene->parameter[b->theta[p]], (int)b->n_nodes[p], (double)e[p][1]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

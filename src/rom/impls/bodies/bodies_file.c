@@ -96,7 +96,7 @@ static void Swap(PetscInt n_a, PetscInt n_b, PetscInt length, const PetscReal fr
   }
 }
 
-/* C or H of a body, columns of `length` numbers by unknown; in the file sample after sample. */
+/* H of a body, columns of `length` numbers by unknown; in the file sample after sample. */
 static PetscErrorCode MoveColumns(HycoH5 h, const char path[], const HycoSubstructure *s, PetscInt length,
                                   PetscReal **data)
 {
@@ -118,6 +118,112 @@ static PetscErrorCode MoveColumns(HycoH5 h, const char path[], const HycoSubstru
     Swap(s->n_samples, s->n, length, file, *data);
   }
   PetscCall(PetscFree(file));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Entry k of a triangle by columns: its row and column. */
+#define EACH_ENTRY(n, k, i, u)                                                                                         \
+  for (PetscInt u = 0, k = 0; u < (n); u++)                                                                            \
+    for (PetscInt i = u; i < (n); i++, k++)
+
+/* Terms [first, last) of C are a row each of its lower triangle by columns. */
+static PetscErrorCode ReadTerms(HycoH5 h, const char model[], const char path[], HycoFlexibility *C, PetscInt first,
+                                PetscInt last)
+{
+  const PetscInt length = C->n * (C->n + 1) / 2;
+  PetscReal *row;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(length + 1, &row));
+  for (PetscInt t = first; t < last; t++) {
+    PetscCall(HycoH5ReadRows(h, path, t - first, 1, length, row));
+    for (PetscInt k = 0; k < length; k++)
+      HycoCheck(!PetscIsInfOrNanReal(row[k]), "%s: %s contains a value that is not finite: the file is damaged", model,
+                path);
+    EACH_ENTRY(C->n, k, i, u)
+    {
+      HycoFlexibilitySetEntry(C, t, u, i, row[k]);
+      HycoFlexibilitySetEntry(C, t, i, u, row[k]);
+    }
+  }
+  PetscCall(PetscFree(row));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode WriteTerms(HycoH5 h, const char path[], const HycoFlexibility *C)
+{
+  const size_t length = (size_t)C->n * (size_t)(C->n + 1) / 2;
+  PetscReal *wide;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(length * (size_t)C->n_wide + 1, &wide));
+  for (PetscInt t = 0; t < C->n_wide; t++) EACH_ENTRY(C->n, k, i, u)
+  wide[(size_t)t * length + (size_t)k] = HycoFlexibilityEntry(C, t, u, i);
+  PetscCall(HycoH5WriteReal(h, path, C->n_wide, (PetscInt)length, wide));
+  PetscCall(PetscFree(wide));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode WriteShortTerms(HycoH5 h, const char path[], const HycoFlexibility *C)
+{
+  const size_t length = (size_t)C->n * (size_t)(C->n + 1) / 2;
+  const PetscInt terms = C->n_terms - C->n_wide;
+  float *narrow;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(length * (size_t)terms + 1, &narrow));
+  for (PetscInt t = 0; t < terms; t++) EACH_ENTRY(C->n, k, i, u)
+  narrow[(size_t)t * length + (size_t)k] = (float)HycoFlexibilityEntry(C, C->n_wide + t, u, i);
+  if (terms) PetscCall(HycoH5WriteSingle(h, path, terms, (PetscInt)length, narrow));
+  PetscCall(PetscFree(narrow));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* C from its samples, one after the other, as in files of earlier versions. */
+static PetscErrorCode LoadSamples(HycoH5 h, const char path[], HycoSubstructure *s)
+{
+  const size_t square = (size_t)s->n * (size_t)s->n;
+  PetscInt rows = s->n_samples * s->n;
+  const PetscReal **sample;
+  PetscReal *file = NULL;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5Real(h, path, &rows, s->n, &file));
+  PetscCall(PetscMalloc1(s->n_samples, &sample));
+  for (PetscInt k = 0; k < s->n_samples; k++) sample[k] = file + square * (size_t)k;
+  PetscCall(HycoFlexibilityCreate(&s->tensor, s->n, sample, 0, &s->C));
+  PetscCall(PetscFree(sample));
+  PetscCall(PetscFree(file));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The flexibility of body k. */
+static PetscErrorCode MoveFlexibility(HycoH5 h, const char model[], HycoSubstructure *s, PetscInt k)
+{
+  HycoFlexibility *C = &s->C;
+  PetscInt head[2] = {C->n_terms, C->n_wide};
+  char path[64];
+
+  PetscFunctionBegin;
+  if (HycoH5Reads(h) && HycoH5Has(h, At(k, "C", path))) {
+    PetscCall(LoadSamples(h, path, s));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(HycoH5Ints(h, At(k, "flexibility_head", path), 1, s->n_samples, 2, head));
+  C->n = s->n;
+  C->n_terms = head[0];
+  C->n_wide = PetscMin(head[1], head[0]);
+  PetscCall(HycoH5Int(h, At(k, "flexibility_terms", path), 0, s->n_samples - 1, &C->n_terms, 1, &C->term));
+  if (!HycoH5Reads(h)) {
+    PetscCall(WriteTerms(h, At(k, "flexibility", path), C));
+    PetscCall(WriteShortTerms(h, At(k, "flexibility_single", path), C));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(HycoFlexibilityTakePolynomials(C, &s->tensor));
+  PetscCall(HycoFlexibilityAllocate(C));
+  if (!C->n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(ReadTerms(h, model, At(k, "flexibility", path), C, 0, C->n_wide));
+  PetscCall(ReadTerms(h, model, At(k, "flexibility_single", path), C, C->n_wide, C->n_terms));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -145,7 +251,7 @@ static PetscErrorCode MoveResponses(HycoH5 h, HycoSubstructure *s, PetscInt k, P
 }
 
 /* The blocks of body k. */
-static PetscErrorCode MoveBody(HycoH5 h, HycoSubstructures b, PetscInt k)
+static PetscErrorCode MoveBody(HycoH5 h, const char model[], HycoSubstructures b, PetscInt k)
 {
   HycoSubstructure *s = &b->body[k];
   PetscInt rows, columns;
@@ -157,7 +263,7 @@ static PetscErrorCode MoveBody(HycoH5 h, HycoSubstructures b, PetscInt k)
   s->m = b->inner_start[k + 1] - b->inner_start[k];
   rows = s->n_samples * s->n;
   columns = s->n_samples * b->p;
-  PetscCall(MoveColumns(h, At(k, "C", path), s, s->n, &s->C));
+  PetscCall(MoveFlexibility(h, model, s, k));
   PetscCall(HycoH5Real(h, At(k, "R", path), &rows, b->r, &s->R));
   PetscCall(HycoH5Real(h, At(k, "Z", path), &rows, b->p, &s->Z));
   PetscCall(HycoH5Real(h, At(k, "work", path), &columns, b->r, &s->work));
@@ -223,7 +329,7 @@ PetscErrorCode HycoBodiesFile(HycoROM m, HycoH5 h)
   PetscCall(MoveSizes(h, m, b));
   PetscCall(MoveTheta(h, m, b));
   PetscCall(MoveProbe(h, m, b));
-  for (PetscInt k = 0; k < b->n; k++) PetscCall(MoveBody(h, b, k));
+  for (PetscInt k = 0; k < b->n; k++) PetscCall(MoveBody(h, m->model->path, b, k));
   if (m->model->scene->n_times) PetscCall(MoveInelastic(m, h));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,6 +1,6 @@
 /*
   Rows of B that do not change in the bodies' axes from one prediction to the next, as where a stated normal turns with a
-  body or the bodies do not move past each other: C_b B_b^T and B_b C_b B_b^T do not either, at any sample. A column of
+  body or the bodies do not move past each other: C_b B_b^T and B_b C_b B_b^T do not either, in any term of C_b. A column of
   each is computed when its contact is in a problem for the first time, and kept.
 */
 #include <hycobodies.h>
@@ -89,20 +89,20 @@ static PetscErrorCode KeepInBody(HycoBodiesWork o, PetscInt k, PetscInt b)
   PetscFunctionBegin;
   for (PetscInt e = o->row_start[k]; e < o->row_start[k + 1]; e++) {
     /* P sums C's columns over the row's entries in this body, then W multiplies by all rows: n + m numbers for
-       each sample. */
+       each term. */
     const PetscInt place = o->row_at[e] - lo;
 
     if (place < 0 || place >= own->n) continue;
     if (!kept->P[at]) {
-      PetscCall(PetscCalloc1((size_t)own->n_samples * n, &kept->P[at]));
-      PetscCall(PetscMalloc1((size_t)own->n_samples * (size_t)kept->m, &kept->W[at]));
-      kept->bytes += 8 * (PetscReal)own->n_samples * (PetscReal)(own->n + kept->m);
+      PetscCall(PetscCalloc1((size_t)own->C.n_terms * n, &kept->P[at]));
+      PetscCall(PetscMalloc1((size_t)own->C.n_terms * (size_t)kept->m, &kept->W[at]));
+      kept->bytes += 8 * (PetscReal)own->C.n_terms * (PetscReal)(own->n + kept->m);
     }
-    for (PetscInt s = 0; s < own->n_samples; s++)
-      HycoBodiesAdd(own->n, o->row[e], own->C + HycoBodiesColumn(own, s, place, own->n), kept->P[at] + (size_t)s * n);
+    for (PetscInt t = 0; t < own->C.n_terms; t++)
+      HycoFlexibilityAdd(&own->C, t, place, o->row[e], kept->P[at] + (size_t)t * n);
   }
-  for (PetscInt s = 0; s < own->n_samples && kept->P[at]; s++)
-    Multiply(o, b, kept->P[at] + (size_t)s * n, kept->W[at] + (size_t)s * (size_t)kept->m);
+  for (PetscInt t = 0; t < own->C.n_terms && kept->P[at]; t++)
+    Multiply(o, b, kept->P[at] + (size_t)t * n, kept->W[at] + (size_t)t * (size_t)kept->m);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -72,13 +72,9 @@ static void Push(HycoBodiesWork o, PetscInt k, PetscReal y[])
     const PetscInt body = HycoBodiesAt(b, o->row_at[e]), lo = b->start[body];
     const HycoSubstructure *own = &b->body[body];
 
-    for (PetscInt q = 0; q < own->n_samples; q++) {
-      /* C is symmetric, so that a stored column is the row that the unit force needs. */
-      const PetscReal *C = own->C + HycoBodiesColumn(own, q, o->row_at[e] - lo, own->n);
-      const PetscReal share = o->weight[body][q] * o->row[e] / o->kappa[body];
-
-      for (PetscInt i = 0; i < own->n; i++) y[lo + i] -= share * C[i];
-    }
+    /* C is symmetric, so that a stored column is the row that the unit force needs. */
+    for (PetscInt t = 0; t < own->C.n_terms; t++)
+      HycoFlexibilityAdd(&own->C, t, o->row_at[e] - lo, -o->share[body][t] * o->row[e] / o->kappa[body], y + lo);
   }
 }
 

@@ -2,7 +2,7 @@
   The contact problem of bodies as substructures. At mu: where each body is and how stiff (from one of its cells), the
   loads (from the cells at r unknowns), the surfaces' displacements without contact, the gaps they leave. The
   complementarity problem is that of the contacts that these displacements close; those that its solution closes
-  beside them join it. With bodies that contact alone holds it has all contacts from the beginning.
+  beside them join it. With bodies that contact alone holds it begins with some of all contacts.
 */
 #include <hycobodies.h>
 #include <hycotao.h>
@@ -12,8 +12,11 @@
 #define DEEP    0.5   /* share of the deepest penetration without forces */
 #define CLOSED  1e-13 /* share of the largest gap: smaller penetrations are round-off */
 #define NEAREST 0.1   /* share of the differences of depth, where all contacts are closed without forces */
-#define FLAT                                                                                                           \
-  1e-9 /* `weight` and `blend` hold one array per body, and `bodies` has their number; the zeros afterwards make a second
+#define FLAT    1e-9  /* share of the depth: smaller differences are round-off */
+#define COARSE  4     /* one of so many contacts is in the first problem of bodies that contact alone holds */
+#define FEW     64    /* contacts that are all in it */
+
+/* `weight`, `share` and `blend` hold one array per body, and `bodies` has their number; the zeros afterwards make a second
    call, and HycoBodiesSetUp() on the same work, safe. */
 PetscErrorCode HycoBodiesReset(HycoBodiesWork o)
 {
@@ -22,10 +25,10 @@ PetscErrorCode HycoBodiesReset(HycoBodiesWork o)
   PetscCall(HycoFEDestroy(&o->fe));
   PetscCall(HycoTaoDestroy(&o->tao));
   PetscCall(HycoSolverDestroy(&o->own));
-  for (PetscInt k = 0; o->weight && k < o->bodies->n; k++) HycoFreeAll(&o->weight[k], &o->blend[k]);
-  HycoFreeAll(&o->weight, &o->blend, &o->blended, &o->X0, &o->E0, &o->E_at, &o->pose, &o->kappa, &o->c, &o->elastic,
-              &o->free, &o->u, &o->f, &o->x, &o->loc, &o->row_start, &o->row_at, &o->row, &o->gap, &o->active, &o->Z,
-              &o->work);
+  for (PetscInt k = 0; o->weight && k < o->bodies->n; k++) HycoFreeAll(&o->weight[k], &o->share[k], &o->blend[k]);
+  HycoFreeAll(&o->weight, &o->share, &o->blend, &o->blended, &o->X0, &o->E0, &o->E_at, &o->pose, &o->kappa, &o->c,
+              &o->elastic, &o->free, &o->u, &o->f, &o->x, &o->loc, &o->row_start, &o->row_at, &o->row, &o->gap,
+              &o->active, &o->Z, &o->work);
   PetscCall(PetscMemzero(o, sizeof(*o)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -42,7 +45,8 @@ PetscErrorCode HycoBodiesDestroy(HycoSubstructures *bodies)
   for (PetscInt k = 0; b->body && k < b->n; k++) {
     HycoSubstructure *s = &b->body[k];
 
-    HycoFreeAll(&s->C, &s->R, &s->Z, &s->work, &s->H, &s->a, &s->g, &s->gram);
+    PetscCall(HycoFlexibilityDestroy(&s->C));
+    HycoFreeAll(&s->R, &s->Z, &s->work, &s->H, &s->a, &s->g, &s->gram);
   }
   HycoFreeAll(&b->first, &b->theta, &b->variable, &b->n_nodes, &b->node, &b->body, &b->start, &b->dof, &b->inner_start,
               &b->inner, &b->cell, &b->at, &b->at_body, &b->A, &b->mode_start, &b->turn_start, &b->G);
@@ -180,9 +184,13 @@ PetscErrorCode HycoBodiesSetUp(HycoBodiesWork o, HycoSubstructures b, HycoScene 
   if (!solver) PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &o->own));
   o->solver = solver ? solver : o->own;
   PetscCall(PetscCalloc1(b->n, &o->weight));
+  PetscCall(PetscCalloc1(b->n, &o->share));
   PetscCall(PetscCalloc1(b->n, &o->blend));
   PetscCall(PetscCalloc1(b->ns + 1, &o->blended));
-  for (PetscInt k = 0; k < b->n; k++) PetscCall(PetscCalloc1(b->body[k].n_samples, &o->weight[k]));
+  for (PetscInt k = 0; k < b->n; k++) {
+    PetscCall(PetscCalloc1(b->body[k].n_samples, &o->weight[k]));
+    PetscCall(PetscCalloc1(b->body[k].C.n_terms + 1, &o->share[k]));
+  }
   PetscCall(HycoFECreate(scene, b->probe->dm, &o->fe));
   /* Of a history too, thermal strains are loads here: the laws' s = C (e - e_th) - sigma leaves them out. */
   o->fe->heat_is_load = PETSC_TRUE;
@@ -387,23 +395,24 @@ static PetscErrorCode TakeWeights(HycoBodiesWork o, const PetscReal mu[])
     if (!same) PetscCall(PetscArrayzero(o->blended + b->start[k], b->body[k].n));
     PetscCall(PetscFree(o->weight[k]));
     o->weight[k] = weight;
+    HycoFlexibilityShares(&b->body[k].C, n, weight, o->share[k]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 void HycoBodiesBlend(HycoBodiesWork o, PetscInt k, PetscInt n, size_t stride, const PetscReal from[], PetscReal to[])
 {
-  const PetscReal *w = o->weight[k];
-  const PetscInt samples = o->bodies->body[k].n_samples;
+  const PetscReal *w = o->share[k];
+  const PetscInt terms = o->bodies->body[k].C.n_terms;
   PetscInt q;
 
   for (PetscInt i = 0; i < n; i++) to[i] = 0;
-  for (q = 0; q + 4 <= samples; q += 4, from += 4 * stride) { /* four at a time: `to` is read and written less often */
+  for (q = 0; q + 4 <= terms; q += 4, from += 4 * stride) { /* four at a time: `to` is read and written less often */
     const PetscReal *a = from, *b = a + stride, *c = b + stride, *d = c + stride;
 
     for (PetscInt i = 0; i < n; i++) to[i] += w[q] * a[i] + w[q + 1] * b[i] + w[q + 2] * c[i] + w[q + 3] * d[i];
   }
-  for (; q < samples; q++, from += stride) {
+  for (; q < terms; q++, from += stride) {
     for (PetscInt i = 0; i < n; i++) to[i] += w[q] * from[i];
   }
 }
@@ -416,13 +425,13 @@ static PetscErrorCode GetColumn(HycoBodiesWork o, PetscInt k, PetscInt unknown, 
   PetscBool *there = &o->blended[o->bodies->start[k] + unknown];
 
   PetscFunctionBegin;
-  *column = own->C + HycoBodiesColumn(own, 0, unknown, own->n);
+  *column = own->C.wide + at;
   if (own->n_samples == 1) PetscFunctionReturn(PETSC_SUCCESS);
   /* All n x n at first use, each column filled only on demand: most columns belong to unknowns that no closed
      contact reads. */
   if (!o->blend[k]) PetscCall(PetscMalloc1(n * n, &o->blend[k]));
   if (!*there) {
-    HycoBodiesBlend(o, k, own->n, n, *column, o->blend[k] + at);
+    HycoFlexibilityColumn(&own->C, o->share[k], unknown, o->blend[k] + at);
     *there = PETSC_TRUE;
   }
   *column = o->blend[k] + at;
@@ -731,20 +740,53 @@ static PetscErrorCode FirstDepth(HycoBodiesWork o, const HycoBodiesSurface *s, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The first problem: all contacts if they alone hold a body, otherwise the deepest ones; others join them. */
+/* Makes the problem that of every `stride`-th contact with a master. */
+static void TakeEvery(HycoBodiesWork o, const HycoBodiesSurface *s, PetscInt stride, PetscBool in[], Problem *p)
+{
+  PetscInt n = 0;
+
+  p->n = 0;
+  for (PetscInt k = 0; k < s->n; k++) {
+    /* An empty row is a contact without a master at this mu. */
+    in[k] = (PetscBool)(o->row_start[k] < o->row_start[k + 1] && n++ % stride == 0);
+    if (in[k]) p->contact[p->n++] = k;
+  }
+}
+
+/* The first problem: the deepest contacts. Without the contacts that alone hold a body there is no depth: then one of
+   COARSE contacts, whose forces push the bodies together about as those of all do, so that the contacts which these
+   bodies still meet are few more than those that close. */
 static PetscErrorCode Begin(HycoBodiesWork o, const HycoBodiesSurface *s, PetscReal size, PetscBool in[], Problem *p)
 {
   PetscReal *least;
+  PetscInt n = 0;
 
   PetscFunctionBegin;
+  if (o->bodies->p) {
+    for (PetscInt k = 0; k < s->n; k++) n += o->row_start[k] < o->row_start[k + 1];
+    TakeEvery(o, s, n > FEW ? COARSE : 1, in, p);
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(PetscMalloc1(s->fe->scene->n_contacts, &least));
   PetscCall(FirstDepth(o, s, size, least));
   for (PetscInt k = 0; k < s->n; k++) {
-    in[k] = (PetscBool)(o->row_start[k] < o->row_start[k + 1] && (o->bodies->p || -o->gap[k] > least[s->contact[k]]));
+    in[k] = (PetscBool)(o->row_start[k] < o->row_start[k + 1] && -o->gap[k] > least[s->contact[k]]);
     if (in[k]) p->contact[p->n++] = k;
   }
   PetscCall(PetscFree(least));
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Takes from the first problem of some contacts those that it has opened: they stand for others, which may close. */
+static void DropOpen(HycoBodiesWork o, PetscBool in[], Problem *p)
+{
+  PetscInt n = 0;
+
+  for (PetscInt k = 0; k < p->n; k++) {
+    in[p->contact[k]] = o->active[k];
+    if (o->active[k]) p->contact[n++] = p->contact[k];
+  }
+  p->n = n;
 }
 
 /* Rounds of the problem, from the contacts that the displacements without contact close. */
@@ -754,11 +796,13 @@ static PetscErrorCode SolveRounds(HycoBodiesWork o, const HycoBodiesSurface *s, 
   const HycoSubstructures b = o->bodies;
   PetscReal size = 0;
   PetscBool more = PETSC_TRUE;
+  PetscInt n = 0;
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < s->n; k++) {
     if (o->row_start[k] == o->row_start[k + 1]) continue;
     size = PetscMax(size, PetscAbsReal(o->gap[k]));
+    n++;
   }
   PetscCall(Begin(o, s, size, in, p));
   *solved = PETSC_TRUE;
@@ -766,7 +810,15 @@ static PetscErrorCode SolveRounds(HycoBodiesWork o, const HycoBodiesSurface *s, 
   /* Contacts only join, so that the rounds end; those that need no force get none from the problem itself. */
   for (PetscInt round = 0; more && *solved && round < ROUNDS; round++) {
     if (p->n) PetscCall(SolveProblem(o, p, Lambda, solved));
+    if (!*solved && b->p && p->n < n) {
+      /* Some contacts may not hold the bodies that all do. */
+      PetscCall(PetscArrayzero(Lambda, s->n));
+      TakeEvery(o, s, 1, in, p);
+      *solved = PETSC_TRUE;
+      continue;
+    }
     PetscCall(Displace(o, s, Lambda));
+    if (!round && b->p && p->n < n) DropOpen(o, in, p);
     Join(o, s, size, in, p, &more);
   }
   /* Penetrating contacts were left out of the last problem: its forces are no solution. */

@@ -1,0 +1,198 @@
+/*
+  The flexibility of a body as a polynomial of the parameters that change its shape (hycobodies.h). The samples are its
+  values at the nodes of a tensor grid; polynomials that are orthonormal on the nodes give its terms, of which the first
+  is constant and the others become small fast. A prediction is limited by reading them: small ones in single precision
+  are half as long, and those without effect are left out.
+*/
+#include <hycobodies.h>
+#include <petscblaslapack.h>
+
+/* Diagonal of the mean over the samples, square root; 0: an unknown that does not move. */
+static void Scales(const HycoFlexibility *f, PetscInt n_samples, const PetscReal *const sample[], PetscReal scale[])
+{
+  for (PetscInt i = 0; i < f->n; i++) {
+    PetscReal sum = 0;
+
+    for (PetscInt s = 0; s < n_samples; s++) sum += sample[s][(size_t)i * (size_t)(f->n + 1)];
+    scale[i] = PetscSqrtReal(PetscMax(sum, 0) / n_samples);
+  }
+}
+
+/* columns (n x n_samples): of an unknown in all terms. X: n x n_samples. */
+static PetscErrorCode Transform(PetscInt n, PetscInt n_samples, const PetscReal Q[], const PetscReal *const sample[],
+                                PetscInt unknown, PetscReal X[], PetscReal columns[])
+{
+  const PetscReal one = 1, zero = 0;
+  PetscBLASInt rows, terms;
+
+  PetscFunctionBegin;
+  PetscCall(PetscBLASIntCast(n, &rows));
+  PetscCall(PetscBLASIntCast(n_samples, &terms));
+  for (PetscInt s = 0; s < n_samples; s++)
+    PetscCall(PetscArraycpy(X + (size_t)s * (size_t)n, sample[s] + (size_t)unknown * (size_t)n, n));
+  /* Q is by rows: its transpose as BLAS sees it. */
+  if (n) BLASgemm_("N", "T", &rows, &terms, &terms, &one, X, &rows, Q, &terms, &zero, columns, &rows);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Which terms are kept: those with an entry of at least `least` relative to the diagonal, anywhere in the ranges. */
+static PetscErrorCode ChooseTerms(HycoFlexibility *f, PetscInt n_samples, const PetscReal Q[],
+                                  const PetscReal *const sample[], PetscReal least)
+{
+  const size_t length = (size_t)f->n * (size_t)n_samples;
+  PetscReal *scale, *most, *X, *columns;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc4(f->n + 1, &scale, n_samples, &most, length + 1, &X, length + 1, &columns));
+  PetscCall(PetscArrayzero(most, n_samples));
+  Scales(f, n_samples, sample, scale);
+  for (PetscInt u = 0; u < f->n && least > 0; u++) {
+    if (!(scale[u] > 0)) continue;
+    PetscCall(Transform(f->n, n_samples, Q, sample, u, X, columns));
+    for (PetscInt t = 0; t < n_samples; t++) {
+      for (PetscInt i = 0; i < f->n; i++) {
+        if (scale[i] > 0) most[t] = PetscMax(most[t], PetscAbsReal(columns[t * f->n + i]) / (scale[i] * scale[u]));
+      }
+    }
+  }
+  for (PetscInt t = 0; t < n_samples; t++) {
+    PetscReal peak = 0;
+
+    for (PetscInt s = 0; s < n_samples; s++) peak = PetscMax(peak, PetscAbsReal(Q[s * n_samples + t]));
+    if (!t || peak * most[t] >= least) f->term[f->n_terms++] = t;
+  }
+  PetscCall(PetscFree4(scale, most, X, columns));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFlexibilityAllocate(HycoFlexibility *f)
+{
+  const size_t square = (size_t)f->n * (size_t)f->n;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(square * (size_t)f->n_wide + 1, &f->wide));
+  PetscCall(PetscMalloc1(square * (size_t)(f->n_terms - f->n_wide) + 1, &f->narrow));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The polynomials of the kept terms at the samples. */
+PetscErrorCode HycoFlexibilityTakePolynomials(HycoFlexibility *f, const HycoTensor *tensor)
+{
+  const PetscInt n = HycoTensorSize(tensor);
+  PetscReal *Q;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n * n, &Q));
+  PetscCall(HycoTensorPolynomials(tensor, Q));
+  PetscCall(PetscMalloc1(n * f->n_terms, &f->polynomial));
+  for (PetscInt s = 0; s < n; s++) {
+    for (PetscInt t = 0; t < f->n_terms; t++) f->polynomial[s * f->n_terms + t] = Q[s * n + f->term[t]];
+  }
+  PetscCall(PetscFree(Q));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFlexibilityCreate(const HycoTensor *tensor, PetscInt n, const PetscReal *const sample[],
+                                     PetscReal least, HycoFlexibility *f)
+{
+  const PetscInt n_samples = HycoTensorSize(tensor);
+  const size_t length = (size_t)n * (size_t)n_samples;
+  PetscReal *Q, *X, *columns;
+
+  PetscFunctionBegin;
+  *f = (HycoFlexibility){.n = n};
+  PetscCall(PetscMalloc1(n_samples, &f->term));
+  PetscCall(PetscMalloc3(n_samples * n_samples, &Q, length + 1, &X, length + 1, &columns));
+  PetscCall(HycoTensorPolynomials(tensor, Q));
+  PetscCall(ChooseTerms(f, n_samples, Q, sample, least));
+  f->n_wide = least > 0 ? 1 : f->n_terms;
+  PetscCall(HycoFlexibilityTakePolynomials(f, tensor));
+  PetscCall(HycoFlexibilityAllocate(f));
+  for (PetscInt u = 0; u < n; u++) {
+    PetscCall(Transform(n, n_samples, Q, sample, u, X, columns));
+    for (PetscInt t = 0; t < f->n_terms; t++) {
+      for (PetscInt i = 0; i < n; i++)
+        HycoFlexibilitySetEntry(f, t, u, i, columns[(size_t)f->term[t] * (size_t)n + (size_t)i]);
+    }
+  }
+  PetscCall(PetscFree3(Q, X, columns));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFlexibilityDestroy(HycoFlexibility *f)
+{
+  PetscFunctionBegin;
+  HycoFreeAll(&f->term, &f->polynomial, &f->wide, &f->narrow);
+  *f = (HycoFlexibility){0};
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The first entry of an unknown's column in a term among `terms` such columns. */
+static size_t At(const HycoFlexibility *f, PetscInt terms, PetscInt t, PetscInt unknown)
+{
+  return ((size_t)unknown * (size_t)terms + (size_t)t) * (size_t)f->n;
+}
+
+PetscReal HycoFlexibilityEntry(const HycoFlexibility *f, PetscInt t, PetscInt unknown, PetscInt i)
+{
+  if (t < f->n_wide) return f->wide[At(f, f->n_wide, t, unknown) + (size_t)i];
+  return f->narrow[At(f, f->n_terms - f->n_wide, t - f->n_wide, unknown) + (size_t)i];
+}
+
+void HycoFlexibilitySetEntry(HycoFlexibility *f, PetscInt t, PetscInt unknown, PetscInt i, PetscReal value)
+{
+  if (t < f->n_wide)
+    f->wide[At(f, f->n_wide, t, unknown) + (size_t)i] = value;
+  else
+    f->narrow[At(f, f->n_terms - f->n_wide, t - f->n_wide, unknown) + (size_t)i] = (float)value;
+}
+
+void HycoFlexibilityShares(const HycoFlexibility *f, PetscInt n_samples, const PetscReal weight[], PetscReal share[])
+{
+  for (PetscInt t = 0; t < f->n_terms; t++) {
+    share[t] = 0;
+    for (PetscInt s = 0; s < n_samples; s++) share[t] += weight[s] * f->polynomial[s * f->n_terms + t];
+  }
+}
+
+void HycoFlexibilityAdd(const HycoFlexibility *f, PetscInt t, PetscInt unknown, PetscReal factor, PetscReal to[])
+{
+  if (t < f->n_wide) {
+    const PetscReal *wide = f->wide + At(f, f->n_wide, t, unknown);
+
+    for (PetscInt i = 0; i < f->n; i++) to[i] += factor * wide[i];
+  } else {
+    const float *narrow = f->narrow + At(f, f->n_terms - f->n_wide, t - f->n_wide, unknown);
+
+    for (PetscInt i = 0; i < f->n; i++) to[i] += factor * narrow[i];
+  }
+}
+
+/* Four terms at a time: `column` is read and written less often. */
+void HycoFlexibilityColumn(const HycoFlexibility *f, const PetscReal share[], PetscInt unknown, PetscReal column[])
+{
+  const size_t n = (size_t)f->n;
+  const PetscInt narrow = f->n_terms - f->n_wide;
+  const PetscReal *wide = f->wide + At(f, f->n_wide, 0, unknown), *w = share + f->n_wide;
+  const float *a = f->narrow + At(f, narrow, 0, unknown);
+  PetscInt t;
+
+  for (size_t i = 0; i < n; i++) column[i] = share[0] * wide[i];
+  for (t = 1; t < f->n_wide; t++) {
+    wide += n;
+    for (size_t i = 0; i < n; i++) column[i] += share[t] * wide[i];
+  }
+  for (t = 0; t + 4 <= narrow; t += 4, a += 4 * n) {
+    const float *b = a + n, *c = b + n, *d = c + n;
+
+    for (size_t i = 0; i < n; i++) column[i] += w[t] * a[i] + w[t + 1] * b[i] + w[t + 2] * c[i] + w[t + 3] * d[i];
+  }
+  for (; t + 2 <= narrow; t += 2, a += 2 * n) {
+    const float *b = a + n;
+
+    for (size_t i = 0; i < n; i++) column[i] += w[t] * a[i] + w[t + 1] * b[i];
+  }
+  for (; t < narrow; t++, a += n) {
+    for (size_t i = 0; i < n; i++) column[i] += w[t] * a[i];
+  }
+}
