@@ -184,7 +184,7 @@ PetscErrorCode HycoBodiesScale(HycoROM m)
   PetscCall(PetscArrayzero(w->G, m->model->pairs.n * b->p));
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
     for (PetscInt e = o->row_start[k]; e < o->row_start[k + 1]; e++)
-      Add(b->p, o->row[e], o->Z + o->row_at[e] * b->p, w->G + k * b->p);
+      HycoBodiesAdd(b->p, o->row[e], o->Z + o->row_at[e] * b->p, w->G + k * b->p);
   }
   PetscCall(PetscMalloc1(in->nd * PetscMax(l, b->r) + 1, &cells));
   for (PetscInt i = 0; i < in->nd * l; i++) cells[i] = in->A[i] / o->kappa[in->body[i / l]];
