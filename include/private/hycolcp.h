@@ -110,6 +110,10 @@ PetscErrorCode HycoLCPSolveOnSet(PetscInt n, const PetscReal M[], const PetscRea
 PetscErrorCode HycoGramRank(PetscInt k, PetscReal A[], PetscInt *rank);
 /* Semismooth Newton's method for blocks of any cone, z = P(z - rho w), w = q + M z, from z = (x_pinned, forces). */
 PetscErrorCode HycoLCPSemismooth(const HycoLCP *lcp, PetscReal z[], PetscInt *its, HycoLCPStatus *status);
+/* Writes a problem with Coulomb's law, its solution z and a start (both p + n) in FCLIB's layout `fclib_local`; dim:
+   components of a contact there, 2 or 3. On one process. */
+PetscErrorCode HycoLCPWriteFclib(const HycoLCP *lcp, PetscInt dim, const PetscReal z[], const PetscReal start[],
+                                 const char path[]);
 /* Lemke's complementary pivoting. */
 PetscErrorCode HycoLCPLemke(PetscInt n, const PetscReal M[], const PetscReal q[], PetscInt max_its, PetscReal z[],
                             PetscInt *its, HycoLCPStatus *status);

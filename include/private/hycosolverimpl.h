@@ -185,6 +185,8 @@ PetscErrorCode HycoSolverSetTarget(HycoSolver s, PetscReal residual);
 PetscErrorCode HycoSolverGetLinearIterations(HycoSolver s, PetscInt *its, PetscInt *most);
 /* The matrix of the dual problem after HycoSolverFactor(): S, p + m square, p unknowns pinned before the m contacts. Borrowed. */
 void HycoSolverGetCondensed(HycoSolver s, PetscInt *m, PetscInt *p, const PetscReal *S[]);
+/* The dense problem of the last solve with the dual form, and its z = (x_pinned, L). Borrowed, without the blocks. */
+void HycoSolverGetDense(HycoSolver s, HycoLCP *lcp, const PetscReal *z[]);
 /*
   The derivative of the solution x, L of s's system (tangent.c): HycoSolverTangentSolve() gives x' and L' where F - K x -
   Bt L changes by r, and D - B x by g, at fixed x and L; g and dL are not used without contacts. sign, *kink as in

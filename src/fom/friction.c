@@ -11,6 +11,7 @@
 #include <hycofields.h>
 #include <hycopath.h>
 #include <hycoslip.h>
+#include <hycosolverimpl.h>
 
 /* Vectors of a path with an entry for each row of its B. */
 #define N_PER_ROW (5 + HYCO_ANDERSON)
@@ -284,6 +285,52 @@ PetscErrorCode HycoFrictionWork(HycoFOM f, PetscReal *sum)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* On rank 0: the dense problem of the last step, from the forces before it (all rows). */
+static PetscErrorCode WriteProblem(HycoFOM f, const HycoBlocks *blocks, Vec before)
+{
+  const PetscScalar *L;
+  const PetscReal *z;
+  PetscReal *start;
+  HycoLCP lcp;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  HycoSolverGetDense(f->friction->solver, &lcp, &z);
+  lcp.blocks = blocks;
+  PetscCall(PetscCalloc1(lcp.p + lcp.n + 1, &start));
+  PetscCall(VecGetArrayRead(before, &L));
+  PetscCall(PetscArraycpy(start + lcp.p, L, lcp.n));
+  PetscCall(VecRestoreArrayRead(before, &L));
+  ierr = HycoLCPWriteFclib(&lcp, f->fe->dim, z, start, f->path->fclib);
+  PetscCall(PetscFree(start));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The problem of the accepted step as a file of FCLIB. Collective. */
+static PetscErrorCode WriteFclib(HycoFOM f)
+{
+  HycoFriction r = f->friction;
+  HycoBlocks *blocks;
+  VecScatter to_root;
+  Vec before;
+
+  PetscFunctionBegin;
+  PetscCheck(r->used, HycoComm(f), PETSC_ERR_USER,
+             "-hyco_write_fclib: no coefficient of friction is above 0 at t = %g; name another time by "
+             "-hyco_write_fclib_time",
+             (double)f->path->t);
+  PetscCall(HycoBlocksGather(HycoComm(f), r->system->blocks, &blocks));
+  PetscCall(VecScatterCreateToZero(r->L_old, &to_root, &before));
+  PetscCall(VecScatterBegin(to_root, r->L_old, before, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecScatterEnd(to_root, r->L_old, before, INSERT_VALUES, SCATTER_FORWARD));
+  HycoOnRoot(HycoComm(f), WriteProblem(f, blocks, before));
+  PetscCall(VecScatterDestroy(&to_root));
+  PetscCall(VecDestroy(&before));
+  PetscCall(HycoBlocksDestroy(&blocks));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* After HycoFrictionWork(), which sets L. w = D - B U with the old D: its tangential part is minus the slip of the
    step. Afterwards u_old is the accepted surface. Collective. */
 PetscErrorCode HycoFrictionAccept(HycoFOM f)
@@ -301,6 +348,7 @@ PetscErrorCode HycoFrictionAccept(HycoFOM f)
   HycoSlipAdd(&r->slip, L, w, most);
   PetscCall(VecRestoreArrayRead(r->work, &w));
   PetscCall(VecRestoreArrayRead(r->L, &L));
+  if (f->path->fclib[0] && f->path->t == f->path->fclib_time) PetscCall(WriteFclib(f));
   PetscCall(VecCopy(r->L, r->L_old));
   PetscCall(HycoFOMToSurface(f, f->U, r->u_old));
   HycoFEComplete(f->fe_surface, r->u_old);

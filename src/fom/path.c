@@ -7,9 +7,9 @@
 /* A scene without times would ignore these options silently. */
 PetscErrorCode HycoPathRefuseOptions(HycoFOM f)
 {
-  static const char *const name[] = {"-hyco_newton",         "-hyco_newton_rtol",   "-hyco_newton_max_its",
-                                     "-hyco_step_inelastic", "-hyco_step_smallest", "-hyco_substeps",
-                                     "-hyco_checkpoint",     "-hyco_resume"};
+  static const char *const name[] = {
+      "-hyco_newton",   "-hyco_newton_rtol", "-hyco_newton_max_its", "-hyco_step_inelastic", "-hyco_step_smallest",
+      "-hyco_substeps", "-hyco_checkpoint",  "-hyco_resume",         "-hyco_write_fclib",    "-hyco_write_fclib_time"};
 
   PetscFunctionBegin;
   for (size_t k = 0; k < sizeof(name) / sizeof(name[0]); k++) {

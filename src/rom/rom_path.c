@@ -129,8 +129,8 @@ PetscErrorCode HycoTraceOptions(HycoROM m, HycoPath p)
   PetscObjectOptionsBegin((PetscObject)m);
   PetscCall(HycoPathSetFromOptions(p, PetscOptionsObject));
   PetscOptionsEnd();
-  HycoCheck(!p->checkpoint[0] && !p->resume,
-            "-hyco_checkpoint and -hyco_resume are for hyco solve; a reduced path takes seconds");
+  HycoCheck(!p->checkpoint[0] && !p->resume && !p->fclib[0] && !p->fclib_timed,
+            "-hyco_checkpoint, -hyco_resume and -hyco_write_fclib are for hyco solve; a reduced path takes seconds");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

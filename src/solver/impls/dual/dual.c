@@ -413,3 +413,11 @@ void HycoSolverGetCondensed(HycoSolver s, PetscInt *m, PetscInt *p, const PetscR
   *p = d->p;
   *S = d->S;
 }
+
+void HycoSolverGetDense(HycoSolver s, HycoLCP *lcp, const PetscReal *z[])
+{
+  const Dual *d = (const Dual *)HycoSolverFindForm(s, "dual")->data;
+
+  *lcp = (HycoLCP){.n = d->m, .p = d->p, .M = d->S, .q = d->g, .symmetric = s->system->symmetric};
+  *z = d->L;
+}
