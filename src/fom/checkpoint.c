@@ -40,7 +40,8 @@ static const Member member[] = {INT(index),          REAL(t),
 /* Behind the quantities: what older checkpoints do not have. */
 static const Member later[] = {INT(linear_iterations), INT(most_linear_iterations),
                                REAL(friction_work),    INT(n_slipping),
-                               INT(disproven),         REAL(sliding)};
+                               INT(disproven),         REAL(sliding),
+                               INT(n_dependent)};
 #define N_MEMBERS ((PetscInt)(sizeof(member) / sizeof(member[0])))
 #define N_LATER   ((PetscInt)(sizeof(later) / sizeof(later[0])))
 

@@ -343,6 +343,7 @@ static PetscErrorCode Record(HycoPath p)
   f->solved = PETSC_TRUE;
   f->sigma_ready = f->all_ready = PETSC_FALSE;
   PetscCall(MeasureSliding(f, &s->sliding));
+  if (f->n_contacts) PetscCall(HycoFOMCountDependent(f, &s->n_dependent));
   PetscCall(HycoFOMMeasureQuantities(f, s->quantity));
   /* HycoPathSetUp() has room for all listed times and one more, the end of an incomplete path. */
   p->steps[p->n_steps++] = *s;

@@ -76,6 +76,7 @@ PetscErrorCode HycoTraceMeasure(HycoROM m, HycoStep *s)
   PetscInt n;
 
   PetscFunctionBegin;
+  s->n_dependent = -1; /* unless the type knows its surfaces */
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
     s->total_contact_force += m->Lambda[k];
     s->lambda_max = PetscMax(s->lambda_max, m->Lambda[k]);

@@ -232,6 +232,8 @@ static PetscErrorCode Record(HycoPath p)
   PetscCall(VecRestoreArrayRead(p->U, &alpha));
   PetscCall(HycoTraceRecord(m, PETSC_TRUE, p->begin, &p->now));
   if (w->friction) PetscCall(RecordFriction(m, &p->now));
+  PetscCall(HycoRowsCountDependent(m->model->pairs.n, m->rows.start, m->rows.dof, m->rows.value, m->rows.gap,
+                                   m->fe->n_dof, m->U, m->Lambda, &p->now.n_dependent));
   p->steps[p->n_steps++] = p->now;
   PetscCall(PetscMemzero(&p->now, sizeof(p->now)));
   PetscFunctionReturn(PETSC_SUCCESS);
