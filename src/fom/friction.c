@@ -21,6 +21,7 @@ struct _n_HycoFriction {
   HycoSolver solver;
   Mat B, Bt;
   Vec D, L, L_old, work; /* L: forces of the last step; L_old: of the last accepted one */
+  Vec L_before, ahead;   /* of the accepted one before; a start of the next step */
   Vec other[N_PER_ROW];  /* the path's vectors for the system that it does not have now */
   PetscInt rows;         /* of this rank */
   HycoSlip slip;
@@ -104,6 +105,8 @@ PetscErrorCode HycoFrictionCreate(HycoFOM f)
   PetscCall(VecSetType(r->L, VECSTANDARD));
   PetscCall(VecDuplicate(r->L, &r->D));
   PetscCall(VecDuplicate(r->L, &r->L_old));
+  PetscCall(VecDuplicate(r->L, &r->L_before));
+  PetscCall(VecDuplicate(r->L, &r->ahead));
   PetscCall(VecDuplicate(r->L, &r->work));
   for (PetscInt j = 0; j < N_PER_ROW; j++) PetscCall(VecDuplicate(r->L, &r->other[j]));
   PetscCall(HycoSystemCreate(HycoComm(f), &r->system));
@@ -130,6 +133,8 @@ PetscErrorCode HycoFrictionDestroy(HycoFOM f)
   PetscCall(VecDestroy(&r->D));
   PetscCall(VecDestroy(&r->L));
   PetscCall(VecDestroy(&r->L_old));
+  PetscCall(VecDestroy(&r->L_before));
+  PetscCall(VecDestroy(&r->ahead));
   PetscCall(VecDestroy(&r->work));
   for (PetscInt j = 0; j < N_PER_ROW; j++) PetscCall(VecDestroy(&r->other[j]));
   PetscCall(HycoSlipDestroy(&r->slip));
@@ -235,6 +240,26 @@ static PetscErrorCode Assemble(HycoFOM f, HycoFriction r, Rows *rows)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The other start of the step to the time that is assembled. */
+static PetscErrorCode Extrapolate(HycoFOM f)
+{
+  HycoFriction r = f->friction;
+  const PetscScalar *L, *before;
+  PetscScalar *ahead;
+  PetscBool has;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetArrayRead(r->L_old, &L));
+  PetscCall(VecGetArrayRead(r->L_before, &before));
+  PetscCall(VecGetArray(r->ahead, &ahead));
+  has = HycoSlipExtrapolate(&r->slip, f->fe->mu[f->scene->n_parameters], r->rows, L, before, ahead);
+  PetscCall(VecRestoreArray(r->ahead, &ahead));
+  PetscCall(VecRestoreArrayRead(r->L_before, &before));
+  PetscCall(VecRestoreArrayRead(r->L_old, &L));
+  PetscCall(HycoSolverSetOtherStart(r->solver, has ? r->ahead : NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFrictionAssemble(HycoFOM f)
 {
   HycoFriction r = f->friction;
@@ -249,6 +274,7 @@ PetscErrorCode HycoFrictionAssemble(HycoFOM f)
   ierr = Assemble(f, r, &rows);
   PetscCall(PetscFree4(rows.start, rows.dof, rows.value, rows.gap));
   PetscCall(ierr);
+  PetscCall(Extrapolate(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -349,7 +375,9 @@ PetscErrorCode HycoFrictionAccept(HycoFOM f)
   PetscCall(VecRestoreArrayRead(r->work, &w));
   PetscCall(VecRestoreArrayRead(r->L, &L));
   if (f->path->fclib[0] && f->path->t == f->path->fclib_time) PetscCall(WriteFclib(f));
+  PetscCall(VecCopy(r->L_old, r->L_before));
   PetscCall(VecCopy(r->L, r->L_old));
+  HycoSlipTake(&r->slip, f->path->t);
   PetscCall(HycoFOMToSurface(f, f->U, r->u_old));
   HycoFEComplete(f->fe_surface, r->u_old);
   /* A negative sign of det J at the solution: the step has several solutions (force_uniqueness.c). */

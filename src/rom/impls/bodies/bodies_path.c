@@ -64,14 +64,14 @@ static PetscErrorCode Retry(HycoPath p, PetscReal alpha[], PetscReal Lambda[])
 }
 
 /* A step with friction: elastic bodies. */
-static PetscErrorCode Rub(HycoROM m, HycoPath p, HycoStepAttempt *a)
+static PetscErrorCode Rub(HycoROM m, HycoPath p, PetscReal t1, HycoStepAttempt *a)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   PetscScalar *L;
   PetscBool solved;
 
   PetscFunctionBegin;
-  PetscCall(HycoBodiesFrictionSolve(w->friction, &w->bodies, &p->kkt, &a->active_its, &solved));
+  PetscCall(HycoBodiesFrictionSolve(w->friction, &w->bodies, t1, &p->kkt, &a->active_its, &solved));
   a->iterations = 1;
   a->law.dt_factor = 1; /* no law asks for shorter steps */
   a->converged = solved;
@@ -93,7 +93,7 @@ static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAt
 
   PetscFunctionBegin;
   if (w->friction) {
-    PetscCall(Rub(m, p, a));
+    PetscCall(Rub(m, p, t1, a));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(VecGetArray(p->U, &alpha));
@@ -172,7 +172,7 @@ static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
   PetscCall(VecRestoreArrayRead(p->U, &alpha));
   PetscCall(HycoTraceAdd(m, p->t));
   p->now.stored = a->law.stored;
-  if (w->friction) PetscCall(HycoBodiesFrictionAccept(w->friction));
+  if (w->friction) PetscCall(HycoBodiesFrictionAccept(w->friction, p->t));
   if (w->friction) p->now.disproven += HycoBodiesFrictionDisproven(w->friction);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

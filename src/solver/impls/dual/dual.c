@@ -154,6 +154,7 @@ static PetscErrorCode FreeGap(HycoSolver s, const Dual *d, Vec x)
 static PetscErrorCode SolveForces(HycoSolver s, Dual *d, Vec start, PetscBool *solved)
 {
   HycoBlocks *blocks = NULL;
+  PetscReal *other = NULL;
   HycoLCP lcp = {.n = d->m,
                  .p = d->p,
                  .M = d->S,
@@ -178,9 +179,15 @@ static PetscErrorCode SolveForces(HycoSolver s, Dual *d, Vec start, PetscBool *s
     PetscCall(PetscArrayzero(d->L, d->p)); /* the path decides between several solutions: by its last forces */
   if (blocks) PetscCall(GatherVec(HycoComm(s), start, d->L + d->p));
   if (blocks && !d->cone) PetscCall(HycoConeFactorCreate(&d->cone));
+  if (blocks && s->other && !d->p && !s->falling_back) {
+    PetscCall(PetscMalloc1(d->m + 1, &other));
+    PetscCall(GatherVec(HycoComm(s), s->other, other));
+  }
+  lcp.other = other;
   lcp.blocks = blocks;
   lcp.cone = d->cone;
   PetscCall(HycoTaoSolveLCP(d->tao, &lcp, d->active, d->L, &s->its, solved));
+  PetscCall(PetscFree(other));
   if (blocks)
     PetscCall(HycoBlocksAdmit(blocks, d->L + d->p)); /* inadmissible by round-off; the residuals are recomputed */
   for (PetscInt i = 0; i < d->m && !blocks; i++) {
