@@ -151,7 +151,8 @@ PetscErrorCode DriverReportSteps(cJSON *history, HycoScene scene, PetscBool redu
   PetscFunctionBegin;
   for (PetscInt c = 0; c < CountColumns(scene); c++) {
     const char *name = NameOf(&columns[c], reduced);
-    cJSON *array = name ? cJSON_AddArrayToObject(history, name) : NULL;
+    const PetscBool known = (PetscBool) !(n && PetscIsNanReal(ValueOf(&columns[c], &step[0])));
+    cJSON *array = name && known ? cJSON_AddArrayToObject(history, name) : NULL;
 
     for (PetscInt k = 0; array && k < n; k++)
       cJSON_AddItemToArray(array, cJSON_CreateNumber(ValueOf(&columns[c], &step[k])));
