@@ -24,7 +24,8 @@ typedef struct {
 typedef struct {
   PetscInt n_dof, n_contacts, n_active; /* free unknowns N, contacts N_lambda, contacts with L_i > 0 */
   PetscInt n_still;                     /* contacts between fixed unknowns, which have no effect */
-  PetscInt n_dependent; /* closed contacts whose rows depend on those of others; if > 0, Lambda is not unique (U is) */
+  PetscInt n_dependent; /* closed contacts whose rows depend on those of others; if > 0, Lambda is not unique (U is); of
+                           a path the most at a listed time */
   PetscInt iterations, dim;
   PetscReal total_contact_force, lambda_max, lambda_norm2, u_norm2, u_min[3], u_max[3];
   PetscReal u_relative; /* the largest displacement, over the extent of the mesh or the largest prescribed one */
@@ -77,6 +78,7 @@ typedef struct {
   PetscReal friction_work;                 /* dissipated by friction since the start, a part of contact_work; >= 0 */
   PetscInt n_slipping;                     /* closed contacts with friction that slip */
   PetscInt disproven;                      /* substeps in which a determinant proves that there are further solutions */
+  PetscInt n_dependent;                    /* as in HycoSummary, at this time; -1: not known */
   PetscReal quantity[HYCO_MAX_QUANTITIES]; /* those of HycoSceneGetQuantities() */
 } HycoStep;
 

@@ -77,7 +77,7 @@ typedef struct {
   char method[64]; /* name of the method */
   HycoReason reason;
   HycoSeconds seconds;
-  PetscInt n_dependent; /* bodies: as in HycoSummary; else -1 */
+  PetscInt n_dependent; /* bodies: as in HycoSummary; else -1. If > 0, the contact forces have no estimate */
 } HycoPrediction;
 
 /* Result of the scan for a singular reduced stiffness in the parameters' ranges. */

@@ -272,11 +272,12 @@ const HycoBodiesSurface *HycoBodiesFrictionSurface(HycoBodiesFriction friction);
 PetscErrorCode HycoBodiesFrictionBegin(HycoBodiesFriction friction);
 /* HycoBodiesPrepare() with tangents, once the surface's fe is at mu. */
 PetscErrorCode HycoBodiesFrictionPrepare(HycoBodiesFriction friction, HycoBodiesWork work, const PetscReal mu[]);
-/* The forces of the step, and u, f of work; *solved: the residual of the contacts, recomputed from them, is small. */
-PetscErrorCode HycoBodiesFrictionSolve(HycoBodiesFriction friction, HycoBodiesWork work, HycoKKT *kkt, PetscInt *its,
-                                       PetscBool *solved);
-/* The solved step becomes the state of the contacts. */
-PetscErrorCode HycoBodiesFrictionAccept(HycoBodiesFriction friction);
+/* The forces of the step to the time t, and u, f of work; *solved: the residual of the contacts, recomputed from them, is
+   small. */
+PetscErrorCode HycoBodiesFrictionSolve(HycoBodiesFriction friction, HycoBodiesWork work, PetscReal t, HycoKKT *kkt,
+                                       PetscInt *its, PetscBool *solved);
+/* The solved step becomes the state of the contacts at t. */
+PetscErrorCode HycoBodiesFrictionAccept(HycoBodiesFriction friction, PetscReal t);
 /* After a step that was refused, prepared at the last accepted time: its forces, and u, f of work. */
 void HycoBodiesFrictionRestore(HycoBodiesFriction friction, HycoBodiesWork work);
 /* The normal forces of the solved step; the state of the contacts, whose arrays the friction owns; whether the last step

@@ -79,9 +79,11 @@ typedef struct {
   const HycoBlocks *blocks;
   HycoConeFactor cone; /* of HYCO_TAO_CONES types; NULL: none is kept */
   PetscBool warm;      /* HYCO_TAO_CONES types start from the last solution of their Tao */
-  PetscBool given;     /* these start from z instead */
-  PetscInt *sign;      /* NULL, or from these: the sign of the determinant of J at the solution; 0: not known */
-  PetscInt max_its;    /* iterations of the active set; 0: 50 + 4 n */
+  PetscBool given;     /* these start from z instead, */
+  const PetscReal
+      *other;       /* or (NULL: none; without free unknowns) from these forces, where their residual is smaller */
+  PetscInt *sign;   /* NULL, or from these: the sign of the determinant of J at the solution; 0: not known */
+  PetscInt max_its; /* iterations of the active set; 0: 50 + 4 n */
   HycoLCPMonitor monitor;
   void *monitor_ctx;
 } HycoLCP;
@@ -110,6 +112,10 @@ PetscErrorCode HycoLCPSolveOnSet(PetscInt n, const PetscReal M[], const PetscRea
 PetscErrorCode HycoGramRank(PetscInt k, PetscReal A[], PetscInt *rank);
 /* Semismooth Newton's method for blocks of any cone, z = P(z - rho w), w = q + M z, from z = (x_pinned, forces). */
 PetscErrorCode HycoLCPSemismooth(const HycoLCP *lcp, PetscReal z[], PetscInt *its, HycoLCPStatus *status);
+/* Writes a problem with Coulomb's law, its solution z and a start (both p + n) in FCLIB's layout `fclib_local`; dim:
+   components of a contact there, 2 or 3. On one process. */
+PetscErrorCode HycoLCPWriteFclib(const HycoLCP *lcp, PetscInt dim, const PetscReal z[], const PetscReal start[],
+                                 const char path[]);
 /* Lemke's complementary pivoting. */
 PetscErrorCode HycoLCPLemke(PetscInt n, const PetscReal M[], const PetscReal q[], PetscInt max_its, PetscReal z[],
                             PetscInt *its, HycoLCPStatus *status);

@@ -81,6 +81,9 @@ struct _n_HycoPath {
   PetscReal rtol, bound, smallest;
   char checkpoint[PETSC_MAX_PATH_LEN];
   PetscBool resume;
+  char fclib[PETSC_MAX_PATH_LEN]; /* friction: a file for the problem of the step to this time; fclib_timed: given */
+  PetscReal fclib_time;
+  PetscBool fclib_timed;
   /* prescribed times of the steps; NULL: chosen by the path. Borrowed */
   PetscInt n_given;
   const PetscReal *given;
@@ -182,7 +185,7 @@ PetscErrorCode HycoFOMPathCreate(HycoFOM fom);
 PetscErrorCode HycoPathRefuseOptions(HycoFOM fom);
 /* Solves the history at mu; if it does not reach its end, the summary's reason says so. Collective. */
 PetscErrorCode HycoPathSolve(HycoFOM fom, const PetscReal mu[]);
-/* Fails if the checkpoint would overwrite a model. Collective. */
+/* Fails if the checkpoint or a file for FCLIB would overwrite a model, or the latter is for no step. Collective. */
 PetscErrorCode HycoPathCheckPlace(HycoFOM fom);
 /* Writes the checkpoint, if one is requested; resumes from it, if it exists. Collective. */
 PetscErrorCode HycoPathSave(HycoFOM fom);

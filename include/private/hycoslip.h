@@ -15,6 +15,8 @@ typedef struct {
   PetscReal *data, *mu; /* of the blocks (HycoSystemSetBlocks()); n */
   PetscReal *tangent;   /* 6 n */
   HycoShear shear;
+  PetscInt n_taken; /* accepted times so far, and the last two: */
+  PetscReal t, t_before;
 } HycoSlip;
 
 /* For the pairs of a process; no slip yet. Collective on comm. */
@@ -28,6 +30,11 @@ PetscErrorCode HycoSlipCoefficients(HycoSlip *slip, HycoFE fe, const HycoPairs *
 PetscBool HycoSlipRubs(const HycoSlip *slip);
 /* Adds the slips -w_t of an accepted step, with the forces L and w of all rows. most: the largest displacement. */
 void HycoSlipAdd(HycoSlip *slip, const PetscReal L[], const PetscReal w[], PetscReal most);
+/* The time of an accepted step. */
+void HycoSlipTake(HycoSlip *slip, PetscReal t);
+/* r: forces L of the last accepted time, extrapolated with those before to the time t; false: there are not enough times. */
+PetscBool HycoSlipExtrapolate(const HycoSlip *slip, PetscReal t, PetscInt n, const PetscReal L[],
+                              const PetscReal before[], PetscReal r[]);
 /* sum: the work since the start and the number of slipping contacts of this process. */
 void HycoSlipSum(const HycoSlip *slip, PetscReal sum[2]);
 

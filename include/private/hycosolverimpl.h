@@ -98,6 +98,7 @@ struct _p_HycoSolver {
   char linear_method[128], why_iterative[96];
   Vec free;                   /* K^-1 F for the next solve, if known; borrowed */
   const PetscBool *start_set; /* active set for the next solve, if given; borrowed */
+  Vec other;                  /* with blocks: a second start, if given; borrowed */
   PetscReal target;           /* largest residual of the next solve without a factor; 0: by rtol alone */
   /* the current attempt, or the last one */
   HycoSolverForm form;
@@ -178,6 +179,9 @@ PetscErrorCode HycoSolverSetFree(HycoSolver s, Vec x);
 PetscErrorCode HycoSolverSetRefine(HycoSolver s, PetscBool refine);
 /* The m contacts from which the active set of the next solve starts, with a given flexibility. Borrowed until then. */
 PetscErrorCode HycoSolverSetStartSet(HycoSolver s, const PetscBool active[]);
+/* Passes forces from which the next solve with blocks may start as well as from L: from those with the smaller residual.
+   Borrowed until then. */
+PetscErrorCode HycoSolverSetOtherStart(HycoSolver s, Vec L);
 /* Sets the largest 2-norm of F - K x - Bt L of the next solve, beside the tolerance; it then starts from the given x.
    0: the tolerance alone. Only iterative solves use it. */
 PetscErrorCode HycoSolverSetTarget(HycoSolver s, PetscReal residual);
@@ -185,6 +189,8 @@ PetscErrorCode HycoSolverSetTarget(HycoSolver s, PetscReal residual);
 PetscErrorCode HycoSolverGetLinearIterations(HycoSolver s, PetscInt *its, PetscInt *most);
 /* The matrix of the dual problem after HycoSolverFactor(): S, p + m square, p unknowns pinned before the m contacts. Borrowed. */
 void HycoSolverGetCondensed(HycoSolver s, PetscInt *m, PetscInt *p, const PetscReal *S[]);
+/* The dense problem of the last solve with the dual form, and its z = (x_pinned, L). Borrowed, without the blocks. */
+void HycoSolverGetDense(HycoSolver s, HycoLCP *lcp, const PetscReal *z[]);
 /*
   The derivative of the solution x, L of s's system (tangent.c): HycoSolverTangentSolve() gives x' and L' where F - K x -
   Bt L changes by r, and D - B x by g, at fixed x and L; g and dL are not used without contacts. sign, *kink as in

@@ -58,12 +58,14 @@ static PetscErrorCode PrintOutputEstimates(HycoScene scene, const HycoPrediction
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode PrintEstimates(HycoScene scene, const HycoPrediction *p)
+/* path: NULL without a history. */
+static PetscErrorCode PrintEstimates(HycoScene scene, const HycoPrediction *p, const DriverReducedPath *path)
 {
   const PetscReal estimate[3] = {p->estimated_error_u, p->estimated_error_sigma, p->estimated_error_lambda};
   char words[3][32];
 
   PetscFunctionBegin;
+  PetscCall(DriverPrintDependent(p->n_dependent, path ? path->n : 0, path ? path->step : NULL));
   for (PetscInt k = 0; k < 3; k++) {
     if (estimate[k] >= 0)
       DriverPercent(estimate[k], words[k]);
@@ -206,7 +208,7 @@ static PetscErrorCode One(HycoROM model, HycoScene scene, Fallback *fallback, co
   PetscCall(DriverPrint("KKT residuals: stationarity %.1e, penetration %.1e, adhesion %.1e, complementarity %.1e\n",
                         (double)p.kkt.stationarity, (double)p.kkt.penetration, (double)p.kkt.adhesion,
                         (double)p.kkt.complementarity));
-  if (!why[0]) PetscCall(PrintEstimates(scene, &p));
+  if (!why[0]) PetscCall(PrintEstimates(scene, &p, NULL));
   PetscCall(DriverPrint("seconds: %.6f set-up, %.6f prediction\n", (double)p.seconds.setup, (double)p.seconds.total));
   if (why[0] || fallback->displacement)
     energy = fallback->strain_energy;
@@ -248,7 +250,7 @@ static PetscErrorCode Path(HycoROM model, HycoScene scene, const char output[])
       "%d iterations; KKT residuals: stationarity %.1e, penetration %.1e, adhesion %.1e, complementarity %.1e\n",
       (int)p.iterations, (double)p.kkt.stationarity, (double)p.kkt.penetration, (double)p.kkt.adhesion,
       (double)p.kkt.complementarity));
-  PetscCall(PrintEstimates(scene, &p));
+  PetscCall(PrintEstimates(scene, &p, &path));
   PetscCall(DriverPrintEquilibrium(&path));
   PetscCall(DriverPrint("seconds: %.6f set-up, %.6f prediction\n", (double)p.seconds.setup, (double)p.seconds.total));
   HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetStrainEnergy(model, &energy));
@@ -281,6 +283,7 @@ enum {
   BEYOND,
   UNSEEN,
   INCONSISTENCY,
+  FORCES_UNIQUE,
   FULL_ORDER,
   PATH_FORCE, /* only for paths */
   PATH_MISES,
@@ -304,6 +307,7 @@ static const char *const columns[N_COLUMNS] = {"total_contact_force",
                                                "beyond",
                                                "unseen",
                                                "inconsistency",
+                                               "forces_unique",
                                                "full_order",
                                                "largest_contact_force",
                                                "largest_rid_mises",
@@ -384,6 +388,7 @@ static void FillRow(const HycoPrediction *p, PetscInt n_carried, const HycoConta
   v[BEYOND] = p->beyond;
   v[UNSEEN] = p->unseen;
   v[INCONSISTENCY] = Known(p->inconsistency);
+  v[FORCES_UNIQUE] = p->n_dependent < 0 ? NAN : p->n_dependent == 0;
   if (s->own > PATH_FORCE) {
     v[PATH_FORCE] = p->path_force;
     v[PATH_MISES] = p->path_mises;
@@ -574,6 +579,7 @@ static PetscErrorCode SolveRest(Fallback *fallback, PetscInt n_par, const PetscR
     p.beyond = v[BEYOND];
     p.unseen = v[UNSEEN];
     p.inconsistency = v[INCONSISTENCY];
+    p.n_dependent = -1;
     FillRow(&p, n_carried, carried, s, v);
     v[U_NORM] = NAN; /* that of the whole mesh, not of an RID */
   }

@@ -3,7 +3,7 @@
 #include <math.h>
 
 /* Prints remarks that the user should know. */
-static PetscErrorCode Remarks(const HycoSummary *s)
+static PetscErrorCode Remarks(const HycoSummary *s, PetscInt n, const HycoStep step[])
 {
   PetscFunctionBegin;
   if (s->regularised[0]) PetscCall(DriverPrint("regularised: neither supports nor contact keep %s\n", s->regularised));
@@ -11,11 +11,7 @@ static PetscErrorCode Remarks(const HycoSummary *s)
   if (s->n_still)
     PetscCall(DriverPrint("%d contact%s between fixed displacements: without effect\n", (int)s->n_still,
                           s->n_still > 1 ? "s lie" : " lies"));
-  if (s->n_dependent)
-    PetscCall(
-        DriverPrint("contact forces are not unique: %d closed contact%s linearly on the others (more slaves than their "
-                    "masters' unknowns); displacements and resultants are unique\n",
-                    (int)s->n_dependent, s->n_dependent > 1 ? "s depend" : " depends"));
+  PetscCall(DriverPrintDependent(s->n_dependent, n, step));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -98,7 +94,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
   if (history.n) PetscCall(DriverReportHistory(json, scene, &history));
   PetscCall(DriverPrint("%d unknowns, %d contacts, %d active after %d iterations (%s)\n", (int)s->n_dof,
                         (int)s->n_contacts, (int)s->n_active, (int)s->iterations, method));
-  PetscCall(Remarks(s));
+  PetscCall(Remarks(s, history.n, history.step));
   PetscCall(WarnOfUnits(s->u_relative));
   PetscCall(DriverPrint("total contact force %.10g, largest %.6g; strain energy %.10g, identity to %.1e\n",
                         (double)s->total_contact_force, (double)s->lambda_max, (double)s->strain_energy,
@@ -252,7 +248,7 @@ static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, co
     PetscCall(HycoFOMGetSummary(fom, &s));
     /* Solvers read their options at the first solve. */
     if (k == 0) PetscCall(DriverCheckLeft());
-    if (k == 0) PetscCall(Remarks(&s));
+    if (k == 0) PetscCall(Remarks(&s, 0, NULL));
     /* The dimension is known from the first solution. */
     if (k == 0) PetscCall(CreateTable(scene, s.dim, n, &t));
     PetscCall(FillRow(fom, &s, &t, t.value + k * t.width));

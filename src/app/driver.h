@@ -336,6 +336,8 @@ void DriverReportModel(cJSON *json, const Search *search, const HycoTraining *tr
 
 /* Prints a line on rank 0; n: number of listed times of the scene. */
 PetscErrorCode DriverPrintStep(const HycoStep *step, PetscInt n);
+/* Says that contact forces are not unique, if there are dependent contacts: of a path with the listed times. */
+PetscErrorCode DriverPrintDependent(PetscInt n_dependent, PetscInt n, const HycoStep step[]);
 /* A CSV ("": none) with a row for each of n times. Collective. */
 PetscErrorCode DriverWriteSteps(const char table[], HycoScene scene, const PetscReal mu[], PetscBool reduced,
                                 PetscInt n, const HycoStep step[]);

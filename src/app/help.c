@@ -59,7 +59,7 @@ static const struct {
     {"baselines", "hyco_dual hyco_nnmf_ hyco_cubature_ hyco_regression_"},
     {"predictions", "hyco_reconstruct hyco_fallback hyco_full_ hyco_residual hyco_rom_"},
     {"solver", "hyco_solver_ hyco_tao_ hyco_linear hyco_memory hyco_monitor"},
-    {"histories", "hyco_newton hyco_step_ hyco_substeps hyco_checkpoint hyco_resume"},
+    {"histories", "hyco_newton hyco_step_ hyco_substeps hyco_checkpoint hyco_resume hyco_write_fclib"},
     {"others", ""},
 };
 #define N_SUBJECTS ((int)(sizeof(subjects) / sizeof(subjects[0])))

@@ -122,6 +122,8 @@ static PetscErrorCode CheckNames(PetscBool trains)
   }
   PetscCall(Peek("hyco_checkpoint", path));
   PetscCall(Take("-hyco_checkpoint", path, PETSC_TRUE));
+  PetscCall(Peek("hyco_write_fclib", path));
+  PetscCall(Take("-hyco_write_fclib", path, PETSC_TRUE));
   if (trains && model[0]) PetscCall(AddSnapshots(model));
   if (!trains) PetscCall(Take("-model", model, PETSC_FALSE));
   PetscCall(CheckSceneFile());

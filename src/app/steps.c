@@ -1,57 +1,59 @@
 /* The listed times of a path, for solve and predict: a line each, the table, the report's history. */
 #include "driver.h"
+#include <math.h>
 #include <stddef.h>
 
 /* A quantity of a listed time: its column in solve and in predict (NULL: none), its offset in HycoStep. */
 typedef struct {
   const char *full, *reduced;
   size_t at;
-  PetscBool count; /* PetscInt, else PetscReal */
+  enum { REAL, COUNT, NONE } kind; /* PetscReal; PetscInt; whether a PetscInt is 0, NaN below it */
 } Column;
 
-#define BOTH(name, member, count)                                                                                      \
+#define BOTH(name, member, kind)                                                                                       \
   {                                                                                                                    \
-    name, name, offsetof(HycoStep, member), count                                                                      \
+    name, name, offsetof(HycoStep, member), kind                                                                       \
   }
 #define ON_RID(name, member)                                                                                           \
   {                                                                                                                    \
-    name, "rid_" name, offsetof(HycoStep, member), PETSC_FALSE                                                         \
+    name, "rid_" name, offsetof(HycoStep, member), REAL                                                                \
   }
-#define FULL_ONLY(name, member, count)                                                                                 \
+#define FULL_ONLY(name, member, kind)                                                                                  \
   {                                                                                                                    \
-    name, NULL, offsetof(HycoStep, member), count                                                                      \
+    name, NULL, offsetof(HycoStep, member), kind                                                                       \
   }
 
 static const Column columns[] = {
-    BOTH("t", t, PETSC_FALSE),
-    BOTH("substeps", substeps, PETSC_TRUE),
-    BOTH("cuts", cuts, PETSC_TRUE),
-    BOTH("iterations", iterations, PETSC_TRUE),
-    BOTH("most_iterations", most_iterations, PETSC_TRUE),
-    BOTH("factors", factors, PETSC_TRUE),
-    BOTH("active_set_iterations", active_set_iterations, PETSC_TRUE),
-    FULL_ONLY("linear_iterations", linear_iterations, PETSC_TRUE),
-    FULL_ONLY("most_linear_iterations", most_linear_iterations, PETSC_TRUE),
-    BOTH("n_active", n_active, PETSC_TRUE),
-    BOTH("total_contact_force", total_contact_force, PETSC_FALSE),
-    BOTH("lambda_max", lambda_max, PETSC_FALSE),
+    BOTH("t", t, REAL),
+    BOTH("substeps", substeps, COUNT),
+    BOTH("cuts", cuts, COUNT),
+    BOTH("iterations", iterations, COUNT),
+    BOTH("most_iterations", most_iterations, COUNT),
+    BOTH("factors", factors, COUNT),
+    BOTH("active_set_iterations", active_set_iterations, COUNT),
+    FULL_ONLY("linear_iterations", linear_iterations, COUNT),
+    FULL_ONLY("most_linear_iterations", most_linear_iterations, COUNT),
+    BOTH("n_active", n_active, COUNT),
+    BOTH("total_contact_force", total_contact_force, REAL),
+    BOTH("lambda_max", lambda_max, REAL),
     ON_RID("u_norm2", u_norm2),
     ON_RID("mises", mises),
     ON_RID("inelastic", inelastic),
-    BOTH("residual", residual, PETSC_FALSE),
-    BOTH("kkt_max", kkt, PETSC_FALSE),
-    FULL_ONLY("sliding", sliding, PETSC_FALSE),
-    FULL_ONLY("work", work, PETSC_FALSE),
-    FULL_ONLY("contact_work", contact_work, PETSC_FALSE),
-    FULL_ONLY("stored", stored, PETSC_FALSE),
-    FULL_ONLY("dissipated", dissipated, PETSC_FALSE),
-    FULL_ONLY("thermal", thermal, PETSC_FALSE),
-    FULL_ONLY("energy_defect", energy_defect, PETSC_FALSE),
-    BOTH("seconds", seconds, PETSC_FALSE),
+    BOTH("residual", residual, REAL),
+    BOTH("kkt_max", kkt, REAL),
+    BOTH("forces_unique", n_dependent, NONE),
+    FULL_ONLY("sliding", sliding, REAL),
+    FULL_ONLY("work", work, REAL),
+    FULL_ONLY("contact_work", contact_work, REAL),
+    FULL_ONLY("stored", stored, REAL),
+    FULL_ONLY("dissipated", dissipated, REAL),
+    FULL_ONLY("thermal", thermal, REAL),
+    FULL_ONLY("energy_defect", energy_defect, REAL),
+    BOTH("seconds", seconds, REAL),
     /* of scenes with friction */
-    BOTH("friction_work", friction_work, PETSC_FALSE),
-    BOTH("n_slipping", n_slipping, PETSC_TRUE),
-    BOTH("disproven", disproven, PETSC_TRUE),
+    BOTH("friction_work", friction_work, REAL),
+    BOTH("n_slipping", n_slipping, COUNT),
+    BOTH("disproven", disproven, COUNT),
 };
 enum { N_COLUMNS = sizeof(columns) / sizeof(columns[0]), N_FRICTION = 3 };
 
@@ -71,8 +73,11 @@ static const char *NameOf(const Column *c, PetscBool reduced)
 static PetscReal ValueOf(const Column *c, const HycoStep *s)
 {
   const char *at = (const char *)s + c->at;
+  PetscInt n;
 
-  return c->count ? (PetscReal) * (const PetscInt *)(const void *)at : *(const PetscReal *)(const void *)at;
+  if (c->kind == REAL) return *(const PetscReal *)(const void *)at;
+  n = *(const PetscInt *)(const void *)at;
+  return c->kind == COUNT ? (PetscReal)n : n < 0 ? NAN : n == 0;
 }
 
 PetscErrorCode DriverPrintStep(const HycoStep *s, PetscInt n)
@@ -83,6 +88,24 @@ PetscErrorCode DriverPrintStep(const HycoStep *s, PetscInt n)
       (double)s->t, (int)s->index + 1, (int)n, (int)s->substeps, s->substeps == 1 ? "" : "s", (int)s->iterations,
       s->iterations == 1 ? "" : "s", s->cuts ? ", cut" : "", (int)s->n_active, (double)s->total_contact_force,
       (double)s->inelastic, (double)s->mises));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode DriverPrintDependent(PetscInt n_dependent, PetscInt n, const HycoStep step[])
+{
+  const char *before = " at t =";
+
+  PetscFunctionBegin;
+  if (n_dependent <= 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(DriverPrint("contact forces are not unique"));
+  for (PetscInt k = 0; k < n; k++) {
+    if (step[k].n_dependent <= 0) continue;
+    PetscCall(DriverPrint("%s %.10g", before, (double)step[k].t));
+    before = ",";
+  }
+  PetscCall(DriverPrint(": %d closed contact%s linearly on the others (more slaves than their masters' unknowns); "
+                        "without friction, displacements and resultants are unique\n",
+                        (int)n_dependent, n_dependent > 1 ? "s depend" : " depends"));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -128,7 +151,8 @@ PetscErrorCode DriverReportSteps(cJSON *history, HycoScene scene, PetscBool redu
   PetscFunctionBegin;
   for (PetscInt c = 0; c < CountColumns(scene); c++) {
     const char *name = NameOf(&columns[c], reduced);
-    cJSON *array = name ? cJSON_AddArrayToObject(history, name) : NULL;
+    const PetscBool known = (PetscBool) !(n && PetscIsNanReal(ValueOf(&columns[c], &step[0])));
+    cJSON *array = name && known ? cJSON_AddArrayToObject(history, name) : NULL;
 
     for (PetscInt k = 0; array && k < n; k++)
       cJSON_AddItemToArray(array, cJSON_CreateNumber(ValueOf(&columns[c], &step[k])));

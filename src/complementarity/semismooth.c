@@ -370,6 +370,19 @@ static PetscErrorCode Unloaded(Newton *h, PetscReal z[], HycoLCPStatus *status)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Replaces z by the other start if its residual is smaller. */
+static PetscErrorCode ChooseStart(Newton *h, PetscReal z[])
+{
+  PetscReal given, other, size;
+
+  PetscFunctionBegin;
+  if (!h->lcp->other || h->p) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(Residual(h, z, &given, &size));
+  PetscCall(Residual(h, h->lcp->other, &other, &size));
+  if (other < given) PetscCall(PetscArraycpy(z, h->lcp->other, h->n));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* From the given forces. Floating bodies have no start without any, as every contact would look open. */
 static PetscErrorCode FromForces(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
@@ -379,6 +392,7 @@ static PetscErrorCode FromForces(Newton *h, PetscReal z[], HycoLCPStatus *status
     if (*status == HYCO_LCP_SOLVED || !(h->start > 0)) PetscFunctionReturn(PETSC_SUCCESS);
     PetscCall(Consistent(h, z));
   }
+  PetscCall(ChooseStart(h, z));
   PetscCall(Iterate(h, z, status));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -40,7 +40,8 @@ static const Member member[] = {INT(index),          REAL(t),
 /* Behind the quantities: what older checkpoints do not have. */
 static const Member later[] = {INT(linear_iterations), INT(most_linear_iterations),
                                REAL(friction_work),    INT(n_slipping),
-                               INT(disproven),         REAL(sliding)};
+                               INT(disproven),         REAL(sliding),
+                               INT(n_dependent)};
 #define N_MEMBERS ((PetscInt)(sizeof(member) / sizeof(member[0])))
 #define N_LATER   ((PetscInt)(sizeof(later) / sizeof(later[0])))
 
@@ -259,16 +260,35 @@ static PetscErrorCode FreeContent(Content *c)
 }
 
 /* Refuses to overwrite a file that is not a checkpoint. Models and snapshots are expensive to make. */
-static PetscErrorCode CheckPlace(const char path[])
+static PetscErrorCode CheckPlace(const char option[], const char path[])
 {
   PetscBool precious;
 
   PetscFunctionBegin;
   if (access(path, F_OK)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoH5IsPrecious(path, &precious));
-  HycoCheck(!precious,
-            "-hyco_checkpoint %s is a model or a snapshot and is not overwritten; give the checkpoint another name",
+  HycoCheck(!precious, "%s %s is a model or a snapshot and is not overwritten; give the file another name", option,
             path);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The listed time whose step is written for FCLIB. */
+static PetscErrorCode CheckFclib(HycoFOM f)
+{
+  const HycoPath p = f->path;
+  const PetscReal last = f->scene->times[f->scene->n_times - 1], tol = 1e-9 * (last - f->scene->times[0]);
+  PetscBool listed = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  HycoCheck(p->fclib[0], "-hyco_write_fclib_time needs a file; name it by -hyco_write_fclib FILE.h5");
+  HycoCheck(f->friction, "-hyco_write_fclib is for contacts with friction, and this scene has none; remove it");
+  if (!p->fclib_timed) p->fclib_time = last;
+  for (PetscInt k = 0; k < f->scene->n_times && !listed; k++) {
+    listed = (PetscBool)(PetscAbsReal(f->scene->times[k] - p->fclib_time) <= tol);
+    if (listed) p->fclib_time = f->scene->times[k];
+  }
+  HycoCheck(listed, "-hyco_write_fclib_time %g is not one of the history's times", (double)p->fclib_time);
+  PetscCall(CheckPlace("-hyco_write_fclib", p->fclib));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -276,7 +296,8 @@ static PetscErrorCode CheckPlace(const char path[])
 PetscErrorCode HycoPathCheckPlace(HycoFOM f)
 {
   PetscFunctionBegin;
-  if (f->path->checkpoint[0]) HycoOnRoot(HycoComm(f), CheckPlace(f->path->checkpoint));
+  if (f->path->checkpoint[0]) HycoOnRoot(HycoComm(f), CheckPlace("-hyco_checkpoint", f->path->checkpoint));
+  if (f->path->fclib[0] || f->path->fclib_timed) HycoOnEach(HycoComm(f), CheckFclib(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

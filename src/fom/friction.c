@@ -11,6 +11,7 @@
 #include <hycofields.h>
 #include <hycopath.h>
 #include <hycoslip.h>
+#include <hycosolverimpl.h>
 
 /* Vectors of a path with an entry for each row of its B. */
 #define N_PER_ROW (5 + HYCO_ANDERSON)
@@ -20,6 +21,7 @@ struct _n_HycoFriction {
   HycoSolver solver;
   Mat B, Bt;
   Vec D, L, L_old, work; /* L: forces of the last step; L_old: of the last accepted one */
+  Vec L_before, ahead;   /* of the accepted one before; a start of the next step */
   Vec other[N_PER_ROW];  /* the path's vectors for the system that it does not have now */
   PetscInt rows;         /* of this rank */
   HycoSlip slip;
@@ -101,7 +103,7 @@ PetscErrorCode HycoFrictionCreate(HycoFOM f)
   PetscCall(VecCreate(HycoComm(f), &r->L));
   PetscCall(VecSetSizes(r->L, r->rows, PETSC_DETERMINE));
   PetscCall(VecSetType(r->L, VECSTANDARD));
-  HycoVecDuplicate(r->L, &r->D, &r->L_old, &r->work);
+  HycoVecDuplicate(r->L, &r->D, &r->L_old, &r->L_before, &r->ahead, &r->work);
   for (PetscInt j = 0; j < N_PER_ROW; j++) PetscCall(VecDuplicate(r->L, &r->other[j]));
   PetscCall(HycoSystemCreate(HycoComm(f), &r->system));
   PetscCall(HycoSolverCreate(HycoComm(f), &r->solver));
@@ -120,7 +122,7 @@ PetscErrorCode HycoFrictionDestroy(HycoFOM f)
   if (!r) PetscFunctionReturn(PETSC_SUCCESS);
   if (r->B) PetscCall(Use(f, PETSC_FALSE)); /* the path frees its own vectors, f Lambda */
   f->pairs.shear = NULL;
-  HycoDestroyAll(&r->solver, &r->system, &r->B, &r->Bt, &r->D, &r->L, &r->L_old, &r->work);
+  HycoDestroyAll(&r->solver, &r->system, &r->B, &r->Bt, &r->D, &r->L, &r->L_old, &r->L_before, &r->ahead, &r->work);
   for (PetscInt j = 0; j < N_PER_ROW; j++) PetscCall(VecDestroy(&r->other[j]));
   PetscCall(HycoSlipDestroy(&r->slip));
   HycoFreeAll(&r->u_old, &f->friction);
@@ -212,6 +214,26 @@ static PetscErrorCode Assemble(HycoFOM f, HycoFriction r, Rows *rows)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The other start of the step to the time that is assembled. */
+static PetscErrorCode Extrapolate(HycoFOM f)
+{
+  HycoFriction r = f->friction;
+  const PetscScalar *L, *before;
+  PetscScalar *ahead;
+  PetscBool has;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetArrayRead(r->L_old, &L));
+  PetscCall(VecGetArrayRead(r->L_before, &before));
+  PetscCall(VecGetArray(r->ahead, &ahead));
+  has = HycoSlipExtrapolate(&r->slip, f->fe->mu[f->scene->n_parameters], r->rows, L, before, ahead);
+  PetscCall(VecRestoreArray(r->ahead, &ahead));
+  PetscCall(VecRestoreArrayRead(r->L_before, &before));
+  PetscCall(VecRestoreArrayRead(r->L_old, &L));
+  PetscCall(HycoSolverSetOtherStart(r->solver, has ? r->ahead : NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoFrictionAssemble(HycoFOM f)
 {
   HycoFriction r = f->friction;
@@ -223,6 +245,7 @@ PetscErrorCode HycoFrictionAssemble(HycoFOM f)
   PetscCheck(r->n_dof == f->fe_surface->n_dof, PETSC_COMM_SELF, PETSC_ERR_PLIB, "the surfaces changed along a path");
   PetscCall(PetscMalloc4(r->rows + 1, &rows.start, entries, &rows.dof, entries, &rows.value, r->rows, &rows.gap));
   HycoFinally(Assemble(f, r, &rows), PetscCall(PetscFree4(rows.start, rows.dof, rows.value, rows.gap)));
+  PetscCall(Extrapolate(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -259,6 +282,52 @@ PetscErrorCode HycoFrictionWork(HycoFOM f, PetscReal *sum)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* On rank 0: the dense problem of the last step, from the forces before it (all rows). */
+static PetscErrorCode WriteProblem(HycoFOM f, const HycoBlocks *blocks, Vec before)
+{
+  const PetscScalar *L;
+  const PetscReal *z;
+  PetscReal *start;
+  HycoLCP lcp;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  HycoSolverGetDense(f->friction->solver, &lcp, &z);
+  lcp.blocks = blocks;
+  PetscCall(PetscCalloc1(lcp.p + lcp.n + 1, &start));
+  PetscCall(VecGetArrayRead(before, &L));
+  PetscCall(PetscArraycpy(start + lcp.p, L, lcp.n));
+  PetscCall(VecRestoreArrayRead(before, &L));
+  ierr = HycoLCPWriteFclib(&lcp, f->fe->dim, z, start, f->path->fclib);
+  PetscCall(PetscFree(start));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The problem of the accepted step as a file of FCLIB. Collective. */
+static PetscErrorCode WriteFclib(HycoFOM f)
+{
+  HycoFriction r = f->friction;
+  HycoBlocks *blocks;
+  VecScatter to_root;
+  Vec before;
+
+  PetscFunctionBegin;
+  PetscCheck(r->used, HycoComm(f), PETSC_ERR_USER,
+             "-hyco_write_fclib: no coefficient of friction is above 0 at t = %g; name another time by "
+             "-hyco_write_fclib_time",
+             (double)f->path->t);
+  PetscCall(HycoBlocksGather(HycoComm(f), r->system->blocks, &blocks));
+  PetscCall(VecScatterCreateToZero(r->L_old, &to_root, &before));
+  PetscCall(VecScatterBegin(to_root, r->L_old, before, INSERT_VALUES, SCATTER_FORWARD));
+  PetscCall(VecScatterEnd(to_root, r->L_old, before, INSERT_VALUES, SCATTER_FORWARD));
+  HycoOnRoot(HycoComm(f), WriteProblem(f, blocks, before));
+  PetscCall(VecScatterDestroy(&to_root));
+  PetscCall(VecDestroy(&before));
+  PetscCall(HycoBlocksDestroy(&blocks));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* After HycoFrictionWork(), which sets L. w = D - B U with the old D: its tangential part is minus the slip of the
    step. Afterwards u_old is the accepted surface. Collective. */
 PetscErrorCode HycoFrictionAccept(HycoFOM f)
@@ -276,7 +345,10 @@ PetscErrorCode HycoFrictionAccept(HycoFOM f)
   HycoSlipAdd(&r->slip, L, w, most);
   PetscCall(VecRestoreArrayRead(r->work, &w));
   PetscCall(VecRestoreArrayRead(r->L, &L));
+  if (f->path->fclib[0] && f->path->t == f->path->fclib_time) PetscCall(WriteFclib(f));
+  PetscCall(VecCopy(r->L_old, r->L_before));
   PetscCall(VecCopy(r->L, r->L_old));
+  HycoSlipTake(&r->slip, f->path->t);
   PetscCall(HycoFOMToSurface(f, f->U, r->u_old));
   HycoFEComplete(f->fe_surface, r->u_old);
   /* A negative sign of det J at the solution: the step has several solutions (force_uniqueness.c). */

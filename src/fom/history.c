@@ -98,6 +98,12 @@ PetscErrorCode HycoPathSetFromOptions(HycoPath p, HycoOptionItems PetscOptionsOb
   PetscCall(HycoOptionsString("-hyco_checkpoint",
                               "<file.h5> history: store the last accepted step there, for -hyco_resume", p->checkpoint,
                               sizeof(p->checkpoint), NULL));
+  PetscCall(HycoOptionsString("-hyco_write_fclib",
+                              "<file.h5> history: store the problem of the contacts with friction, of the step that "
+                              "ends at a listed time, in FCLIB's layout",
+                              p->fclib, sizeof(p->fclib), NULL));
+  PetscCall(HycoOptionsReal("-hyco_write_fclib_time", "history: that listed time (default: the last)", -PETSC_MAX_REAL,
+                            PETSC_MAX_REAL, &p->fclib_time, &p->fclib_timed));
   PetscCall(
       HycoOptionsBool("-hyco_resume", "history: continue from the checkpoint, if there is one", &p->resume, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -7,9 +7,9 @@
 /* A scene without times would ignore these options silently. */
 PetscErrorCode HycoPathRefuseOptions(HycoFOM f)
 {
-  static const char *const name[] = {"-hyco_newton",         "-hyco_newton_rtol",   "-hyco_newton_max_its",
-                                     "-hyco_step_inelastic", "-hyco_step_smallest", "-hyco_substeps",
-                                     "-hyco_checkpoint",     "-hyco_resume"};
+  static const char *const name[] = {
+      "-hyco_newton",   "-hyco_newton_rtol", "-hyco_newton_max_its", "-hyco_step_inelastic", "-hyco_step_smallest",
+      "-hyco_substeps", "-hyco_checkpoint",  "-hyco_resume",         "-hyco_write_fclib",    "-hyco_write_fclib_time"};
 
   PetscFunctionBegin;
   for (size_t k = 0; k < sizeof(name) / sizeof(name[0]); k++) {
@@ -342,6 +342,7 @@ static PetscErrorCode Record(HycoPath p)
   f->solved = PETSC_TRUE;
   f->sigma_ready = f->all_ready = PETSC_FALSE;
   PetscCall(MeasureSliding(f, &s->sliding));
+  if (f->n_contacts) PetscCall(HycoFOMCountDependent(f, &s->n_dependent));
   PetscCall(HycoFOMMeasureQuantities(f, s->quantity));
   /* HycoPathSetUp() has room for all listed times and one more, the end of an incomplete path. */
   p->steps[p->n_steps++] = *s;

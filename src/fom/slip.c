@@ -60,6 +60,7 @@ PetscErrorCode HycoSlipBegin(HycoSlip *s)
   PetscCall(PetscArrayzero(s->shear.slip, 3 * s->n));
   PetscCall(PetscArrayzero(s->shear.work, s->n));
   PetscCall(PetscArrayzero(s->shear.state, s->n));
+  s->n_taken = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -125,6 +126,24 @@ static void Add(HycoSlip *h, PetscInt k, const PetscReal r[], const PetscReal w[
 void HycoSlipAdd(HycoSlip *s, const PetscReal L[], const PetscReal w[], PetscReal most)
 {
   for (PetscInt k = 0; k < s->n; k++) Add(s, k, L + s->row[k], w + s->row[k], most);
+}
+
+void HycoSlipTake(HycoSlip *s, PetscReal t)
+{
+  s->t_before = s->t;
+  s->t = t;
+  s->n_taken++;
+}
+
+/* Linear. The solver takes it only where its residual is smaller than that of L: not where a load is reversed. */
+PetscBool HycoSlipExtrapolate(const HycoSlip *s, PetscReal t, PetscInt n, const PetscReal L[], const PetscReal before[],
+                              PetscReal r[])
+{
+  const PetscReal ratio = (t - s->t) / (s->t - s->t_before);
+
+  if (s->n_taken < 2 || !(ratio > 0) || PetscIsInfReal(ratio)) return PETSC_FALSE;
+  for (PetscInt i = 0; i < n; i++) r[i] = L[i] + ratio * (L[i] - before[i]);
+  return PETSC_TRUE;
 }
 
 /* sum: the work, and the number of slipping contacts as a real, so that one reduction serves both. Local. */

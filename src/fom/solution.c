@@ -181,7 +181,9 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
   for (PetscInt k = 0; f->path && k < f->path->n_steps; k++)
     s->sliding = PetscMax(s->sliding, f->path->steps[k].sliding); /* contacts may be open at the end */
   s->n_dependent = 0;
-  if (s->reason > 0 && f->n_contacts) PetscCall(HycoFOMCountDependent(f, &s->n_dependent));
+  if (s->reason > 0 && f->n_contacts && !f->path) PetscCall(HycoFOMCountDependent(f, &s->n_dependent));
+  for (PetscInt k = 0; f->path && k < f->path->n_steps; k++)
+    s->n_dependent = PetscMax(s->n_dependent, f->path->steps[k].n_dependent);
   PetscCall(HycoFOMMeasureQuantities(f, s->quantity));
   PetscCallMPI(MPI_Bcast(s, sizeof(*s), MPI_BYTE, 0, HycoComm(f)));
   *out = *s;

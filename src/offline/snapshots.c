@@ -402,6 +402,7 @@ static PetscErrorCode SolvePath(HycoSnapshots s, HycoFOM fom, const PetscReal mu
   PetscFunctionBegin;
   PetscCheck(!fom->path->checkpoint[0], HycoComm(fom), PETSC_ERR_USER,
              "-hyco_checkpoint is for hyco solve; training stores each solved path in its snapshot folder");
+  PetscCheck(!fom->path->fclib[0], HycoComm(fom), PETSC_ERR_USER, "-hyco_write_fclib is for hyco solve; remove it");
   PetscCall(SamplePath(s, mu, path));
   PetscCall(PetscMalloc1(fom->part->n_cells, &w.inelastic));
   PetscCall(HycoH5CreateShared(HycoComm(fom), path, &w.h));

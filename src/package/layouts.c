@@ -37,7 +37,7 @@ static const HycoMember step[] = {
   F(linear_iterations), F(most_linear_iterations), F(n_active), F(total_contact_force), F(lambda_max), F(u_norm2),
   F(mises), F(inelastic), F(residual), F(kkt), F(work), F(contact_work), F(stored), F(dissipated), F(thermal),
   F(energy_defect), F(seconds), F(seconds_factor), F(seconds_solve), F(seconds_law), F(sliding),
-  F(friction_work), F(n_slipping), F(disproven), F(quantity)};
+  F(friction_work), F(n_slipping), F(disproven), F(n_dependent), F(quantity)};
 #undef F
 
 #define F(member) FIELD(HycoHistory, member)

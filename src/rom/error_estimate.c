@@ -358,6 +358,8 @@ PetscErrorCode HycoEstimatesEvaluate(HycoROM m, HycoPrediction *p)
     p->estimated_error_u = PetscMax(p->estimated_error_u, p->inconsistency);
   if (p->inconsistent && p->estimated_error_sigma >= 0)
     p->estimated_error_sigma = PetscMax(p->estimated_error_sigma, p->inconsistency);
+  /* Full order may find other nodal forces, as far away as they are. */
+  if (p->n_dependent > 0) p->estimated_error_lambda = -1;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -87,7 +87,7 @@ static PetscErrorCode MeasureDisplacements(HycoROM m, HycoPrediction *p)
 }
 
 /* Sliding, overlap and facing contacts of the prediction; dependent rows are counted only where surfaces are complete, since
-   an RID cuts rows off. */
+   an RID cuts rows off, and on paths at each listed time. */
 static PetscErrorCode MeasureContacts(HycoROM m, HycoPrediction *p)
 {
   HycoContactState state;
@@ -98,7 +98,9 @@ static PetscErrorCode MeasureContacts(HycoROM m, HycoPrediction *p)
   p->overlap = state.overlap;
   p->sliding = state.sliding;
   p->n_dependent = -1;
-  if (m->model->traits.surfaces && p->reason > 0)
+  for (PetscInt k = 0; k < m->trace.n_listed; k++)
+    p->n_dependent = PetscMax(p->n_dependent, m->trace.history.step[k].n_dependent);
+  if (m->model->traits.surfaces && p->reason > 0 && !m->trace.n_listed)
     PetscCall(HycoRowsCountDependent(m->model->pairs.n, m->rows.start, m->rows.dof, m->rows.value, m->rows.gap,
                                      m->fe->n_dof, m->U, m->Lambda, &p->n_dependent));
   PetscFunctionReturn(PETSC_SUCCESS);

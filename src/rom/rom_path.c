@@ -76,6 +76,7 @@ PetscErrorCode HycoTraceMeasure(HycoROM m, HycoStep *s)
   PetscInt n;
 
   PetscFunctionBegin;
+  s->n_dependent = -1; /* unless the type knows its surfaces */
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
     s->total_contact_force += m->Lambda[k];
     s->lambda_max = PetscMax(s->lambda_max, m->Lambda[k]);
@@ -129,8 +130,8 @@ PetscErrorCode HycoTraceOptions(HycoROM m, HycoPath p)
   PetscObjectOptionsBegin((PetscObject)m);
   PetscCall(HycoPathSetFromOptions(p, PetscOptionsObject));
   PetscOptionsEnd();
-  HycoCheck(!p->checkpoint[0] && !p->resume,
-            "-hyco_checkpoint and -hyco_resume are for hyco solve; a reduced path takes seconds");
+  HycoCheck(!p->checkpoint[0] && !p->resume && !p->fclib[0] && !p->fclib_timed,
+            "-hyco_checkpoint, -hyco_resume and -hyco_write_fclib are for hyco solve; a reduced path takes seconds");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

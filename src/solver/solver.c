@@ -534,6 +534,7 @@ PetscErrorCode HycoSolverSolve(HycoSolver s, Vec x, Vec L)
   /* What was passed for one solve ends here, whether or not it was used. */
   s->free = NULL;
   s->start_set = NULL;
+  s->other = NULL;
   s->target = 0;
   s->seconds_solve = HycoNow() - begin - (s->seconds_factor - s->seconds_before);
   s->seconds_before = 0;
@@ -583,6 +584,13 @@ PetscErrorCode HycoSolverSetStartSet(HycoSolver s, const PetscBool active[])
 {
   PetscFunctionBegin;
   s->start_set = active;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoSolverSetOtherStart(HycoSolver s, Vec L)
+{
+  PetscFunctionBegin;
+  s->other = L;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,5 +1,6 @@
 """Models of bodies with friction: the path of full order where nothing is interpolated, to the interpolation's error elsewhere; fields, outputs,
 several ranks, batches, refusals; the lap joint of the examples."""
+import json
 import os
 import sys
 import unittest
@@ -114,6 +115,39 @@ class FrictionModels(Case):
             scene = self.two(dim, kind)
             self.train(scene, '-hyco_snapshots', self.path(f'{kind}{dim}'), grid='2,2', ranks=2 if kind == 'mortar' else 0)
             self.alike(scene, '0.22,1.7', 1e-4)
+
+    def test_unique(self):
+        """Nodes of a slave that are moved by supports and more than their masters' unknowns can tell apart: at the times when they press, the nodal forces are
+        not unique, in full order and in the model, whose estimate of them is then none; resultants differ by less than 1 %."""
+        grid = Grid()
+        grid.box('quad4', [np.linspace(0, 1, 4), np.linspace(-0.5, 0, 3)], lambda x: x, 'low', {'y0': 'base', 'y1': 'back'})
+        grid.box('quad4', [np.linspace(0.05, 0.95, 9), np.linspace(0, 0.5, 3)], lambda x: x, 'high', {'y0': 'face', 'y1': 'top'})
+        grid.write(self.path('mesh.msh'))
+        text = TWO.replace('HELD', 'x: 0, y: 0').replace('LAST', 'y').replace('MORE', '').replace('TYPE', 'surface').replace('*min(t, 1)', '*p + 0.001*(1 - p)')
+        text = text.replace('top: {', 'face: {').replace('s: [[0, 0]', 'p: [[0, 0], [1, 1], [2, 1], [3, 0]], s: [[0, 0]')
+        scene = self.changed('scene.yaml', text, ())
+        run = self.run_raw('train', '-scene', scene, '-model', self.path('m.h5'), '-grid', '2,2', '-hyco_validation', '2')
+        self.assertEqual(run.returncode, 3, run.stderr)
+        self.assertIn('contact forces', run.stderr)  # it judges nodal forces
+        point = '0.22,1.7'
+        solved = self.hyco('solve', '-scene', scene, '-mu', point, '-table', self.path('solved.csv'))
+        run = self.run_raw('predict', '-model', self.path('m.h5'), '-mu', point, '-table', self.path('found.csv'), '-report', self.path('found.json'))
+        with open(self.path('found.json'), encoding='utf-8') as f:
+            found = json.load(f)
+        self.assertIn('not unique at t = 1, 1.5, 2', run.stdout)
+        for report, table in ((solved, 'solved.csv'), (found, 'found.csv')):
+            self.assertFalse(report['forces_unique'])
+            self.assertEqual(report['history']['forces_unique'], [1, 0, 0, 0, 1])
+            rows = np.genfromtxt(self.path(table), delimiter=',', names=True)
+            self.assertEqual(rows['forces_unique'].tolist(), [1, 0, 0, 0, 1])
+        self.assertIsNone(found['estimated_error_lambda'])
+        for name in ('total_contact_force', 'friction_work'):
+            most = max(solved['history'][name])
+            self.assertLess(max(abs(a - b) for a, b in zip(found['history'][name], solved['history'][name])), 0.01 * most, name)
+        self.hyco('predict', '-model', self.path('m.h5'), '-grid', '1,2', '-table', self.path('batch.csv'))
+        batch = np.genfromtxt(self.path('batch.csv'), delimiter=',', names=True)
+        self.assertEqual(batch['forces_unique'].tolist(), [0, 0])
+        self.assertTrue(np.isnan(batch['estimated_error_lambda']).all())
 
     def test_refused(self):
         """Other types, and bodies that creep, in one line that names contact or body; no type drops the friction."""

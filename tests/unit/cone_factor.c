@@ -89,6 +89,31 @@ static PetscErrorCode TestPath(Problem *p, HycoBlocks *blocks, HycoConeFactor fa
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Of two starts the one with the smaller residual is taken: another one that is the solution, none that is worse. */
+static PetscErrorCode TestStarts(Problem *p, HycoBlocks *blocks)
+{
+  PetscReal solution[ROWS] = {0}, z[ROWS] = {0}, far[ROWS];
+  HycoLCP lcp = {.n = ROWS, .M = p->M, .q = p->q, .symmetric = PETSC_TRUE, .blocks = blocks, .other = solution};
+  HycoLCPStatus status;
+  PetscInt its, own;
+
+  PetscFunctionBegin;
+  Load(p, 4);
+  PetscCall(Solve(p, blocks, NULL, solution, &own));
+  PetscCall(HycoLCPSemismooth(&lcp, z, &its, &status));
+  CHECK(status == HYCO_LCP_SOLVED && its == 0 && own > 0, "%d iterations from the solution, %d without", (int)its,
+        (int)own);
+  CHECK(Difference(z, solution) < 1e-12, "%g", (double)Difference(z, solution));
+  for (PetscInt i = 0; i < ROWS; i++) {
+    far[i] = 100;
+    z[i] = 0;
+  }
+  lcp.other = far;
+  PetscCall(HycoLCPSemismooth(&lcp, z, &its, &status));
+  CHECK(its == own, "%d iterations, and %d without a worse start", (int)its, (int)own);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* All contacts closed and at rest; every second one has no tangential flexibility. */
 static PetscErrorCode TestPlane(Problem *p, HycoBlocks *blocks)
 {
@@ -138,6 +163,7 @@ static PetscErrorCode Test(void)
   HycoConeFactorForget(factor);
   PetscCall(TestPath(&p, blocks, factor));
   PetscCall(HycoConeFactorDestroy(&factor));
+  PetscCall(TestStarts(&p, blocks));
   PetscCall(TestPlane(&p, blocks));
   PetscCall(HycoBlocksDestroy(&blocks));
   PetscCall(HycoConeDestroy(&cone));

@@ -73,9 +73,9 @@ static PetscErrorCode SolvePath(HycoBodiesFriction f, HycoBodiesWork o, HycoScen
     HycoSceneSetTime(scene, mu, t, all);
     PetscCall(HycoFESetParameters(fe, all));
     PetscCall(HycoBodiesFrictionPrepare(f, o, all));
-    PetscCall(HycoBodiesFrictionSolve(f, o, &kkt, &its, solved));
+    PetscCall(HycoBodiesFrictionSolve(f, o, t, &kkt, &its, solved));
     if (!*solved) break;
-    PetscCall(HycoBodiesFrictionAccept(f));
+    PetscCall(HycoBodiesFrictionAccept(f, t));
     /* Another time within each quarter for each point: all times are seen, not four of them. */
     if (t >= first + (last - first) * (seen + SomeShare(k)) / SEEN && seen < SEEN) {
       PetscCall(PetscArraycpy(sampled->c + sampled->n * b->r, o->c, b->r));

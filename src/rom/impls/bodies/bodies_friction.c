@@ -15,8 +15,9 @@ struct _n_HycoBodiesFriction {
   PetscInt *contact; /* by row: of the scene */
   HycoSystem system;
   HycoSolver solver;
-  Mat W; /* NULL: not computed at these parameters yet */
-  Vec g, L;
+  Mat W;                 /* NULL: not computed at these parameters yet */
+  Vec g, L, other;       /* other: a start of the next step */
+  PetscReal *before;     /* by row: forces of the accepted step before the last one */
   PetscReal *U, *U_old;  /* n_dof: of the surface, at the step and at the last accepted time */
   PetscReal *w, *forces; /* by row: of the last accepted step */
   PetscReal most;        /* largest displacement */
@@ -58,8 +59,10 @@ PetscErrorCode HycoBodiesFrictionCreate(HycoScene scene, const HycoBodiesSurface
   PetscCall(PetscCalloc1(surface->fe->n_dof, &f->U_old));
   PetscCall(PetscCalloc1(f->all.n + 1, &f->w));
   PetscCall(PetscCalloc1(f->all.n + 1, &f->forces));
+  PetscCall(PetscCalloc1(f->all.n + 1, &f->before));
   PetscCall(VecCreateSeq(PETSC_COMM_SELF, f->all.n, &f->L));
   PetscCall(VecDuplicate(f->L, &f->g));
+  PetscCall(VecDuplicate(f->L, &f->other));
   PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &f->system));
   PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &f->solver));
   PetscCall(HycoSolverSetType(f->solver, HYCO_SOLVER_SEMISMOOTH));
@@ -72,10 +75,10 @@ PetscErrorCode HycoBodiesFrictionDestroy(HycoBodiesFriction *friction)
 
   PetscFunctionBegin;
   if (!f) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoDestroyAll(&f->solver, &f->system, &f->W, &f->g, &f->L);
+  HycoDestroyAll(&f->solver, &f->system, &f->W, &f->g, &f->L, &f->other);
   PetscCall(HycoSlipDestroy(&f->slip));
   PetscCall(HycoRowsDestroy(&f->rows));
-  HycoFreeAll(&f->contact, &f->U, &f->U_old, &f->w, &f->forces, friction);
+  HycoFreeAll(&f->contact, &f->U, &f->U_old, &f->w, &f->forces, &f->before, friction);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -187,18 +190,23 @@ static PetscErrorCode Measure(HycoBodiesFriction f, const PetscReal L[], HycoKKT
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-PetscErrorCode HycoBodiesFrictionSolve(HycoBodiesFriction f, HycoBodiesWork o, HycoKKT *kkt, PetscInt *its,
+PetscErrorCode HycoBodiesFrictionSolve(HycoBodiesFriction f, HycoBodiesWork o, PetscReal t, HycoKKT *kkt, PetscInt *its,
                                        PetscBool *solved)
 {
   const HycoFE fe = f->normal.fe;
   PetscScalar *L;
   HycoReason reason;
+  PetscBool extrapolated;
 
   PetscFunctionBegin;
+  PetscCall(VecGetArray(f->other, &L));
+  extrapolated = HycoSlipExtrapolate(&f->slip, t, f->all.n, f->forces, f->before, L);
+  PetscCall(VecRestoreArray(f->other, &L));
   PetscCall(VecGetArray(f->L, &L));
   PetscCall(PetscArraycpy(L, f->forces, f->all.n)); /* a step that was refused leaves no trace */
   PetscCall(VecRestoreArray(f->L, &L));
   PetscCall(HycoSolverSetSystem(f->solver, f->system));
+  PetscCall(HycoSolverSetOtherStart(f->solver, extrapolated ? f->other : NULL));
   PetscCall(HycoSolverSolve(f->solver, NULL, f->L));
   PetscCall(HycoSolverGetReason(f->solver, &reason));
   /* What follows is done for forces that did not converge too: their residuals are reported. */
@@ -215,14 +223,16 @@ PetscErrorCode HycoBodiesFrictionSolve(HycoBodiesFriction f, HycoBodiesWork o, H
 }
 
 /* Slip, forces and displacements change here only, so that a halved step repeats from the same state. */
-PetscErrorCode HycoBodiesFrictionAccept(HycoBodiesFriction f)
+PetscErrorCode HycoBodiesFrictionAccept(HycoBodiesFriction f, PetscReal t)
 {
   const PetscScalar *L;
 
   PetscFunctionBegin;
   PetscCall(VecGetArrayRead(f->L, &L));
   HycoSlipAdd(&f->slip, L, f->w, f->most);
+  PetscCall(PetscArraycpy(f->before, f->forces, f->all.n));
   PetscCall(PetscArraycpy(f->forces, L, f->all.n));
+  HycoSlipTake(&f->slip, t);
   PetscCall(VecRestoreArrayRead(f->L, &L));
   PetscCall(PetscArraycpy(f->U_old, f->U, f->normal.fe->n_dof));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -49,14 +49,14 @@ static PetscErrorCode Settle(HycoROM m, PetscReal t0, PetscReal t1, const PetscR
 }
 
 /* A step with friction: elastic bodies. */
-static PetscErrorCode Rub(HycoROM m, HycoPath p, HycoStepAttempt *a)
+static PetscErrorCode Rub(HycoROM m, HycoPath p, PetscReal t1, HycoStepAttempt *a)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   PetscScalar *L;
   PetscBool solved;
 
   PetscFunctionBegin;
-  PetscCall(HycoBodiesFrictionSolve(w->friction, &w->bodies, &p->kkt, &a->active_its, &solved));
+  PetscCall(HycoBodiesFrictionSolve(w->friction, &w->bodies, t1, &p->kkt, &a->active_its, &solved));
   a->iterations = 1;
   a->law.dt_factor = 1; /* no law asks for shorter steps */
   a->converged = solved;
@@ -78,7 +78,7 @@ static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAt
 
   PetscFunctionBegin;
   if (w->friction) {
-    PetscCall(Rub(m, p, a));
+    PetscCall(Rub(m, p, t1, a));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(VecGetArray(p->U, &alpha));
@@ -159,7 +159,7 @@ static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
   PetscCall(VecRestoreArrayRead(p->U, &alpha));
   PetscCall(HycoTraceAdd(m, p->t));
   p->now.stored = a->law.stored;
-  if (w->friction) PetscCall(HycoBodiesFrictionAccept(w->friction));
+  if (w->friction) PetscCall(HycoBodiesFrictionAccept(w->friction, p->t));
   if (w->friction) p->now.disproven += HycoBodiesFrictionDisproven(w->friction);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -217,6 +217,8 @@ static PetscErrorCode Record(HycoPath p)
   PetscCall(VecRestoreArrayRead(p->U, &alpha));
   PetscCall(HycoTraceRecord(m, PETSC_TRUE, p->begin, &p->now));
   if (w->friction) PetscCall(RecordFriction(m, &p->now));
+  PetscCall(HycoRowsCountDependent(m->model->pairs.n, m->rows.start, m->rows.dof, m->rows.value, m->rows.gap,
+                                   m->fe->n_dof, m->U, m->Lambda, &p->now.n_dependent));
   p->steps[p->n_steps++] = p->now;
   PetscCall(PetscMemzero(&p->now, sizeof(p->now)));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -147,6 +147,7 @@ static PetscErrorCode Holds(const Dual *d, PetscBool *holds)
 static PetscErrorCode SolveForces(HycoSolver s, Dual *d, Vec start, PetscBool *solved)
 {
   HycoBlocks *blocks = NULL;
+  PetscReal *other = NULL;
   HycoLCP lcp = {.n = d->m,
                  .p = d->p,
                  .M = d->S,
@@ -172,9 +173,15 @@ static PetscErrorCode SolveForces(HycoSolver s, Dual *d, Vec start, PetscBool *s
     PetscCall(PetscArrayzero(d->L, d->p)); /* the path decides between several solutions: by its last forces */
   if (blocks) PetscCall(HycoVecGather(start, d->L + d->p));
   if (blocks && !d->cone) PetscCall(HycoConeFactorCreate(&d->cone));
+  if (blocks && s->other && !d->p && !s->falling_back) {
+    PetscCall(PetscMalloc1(d->m + 1, &other));
+    PetscCall(HycoVecGather(s->other, other));
+  }
+  lcp.other = other;
   lcp.blocks = blocks;
   lcp.cone = d->cone;
   PetscCall(HycoTaoSolveLCP(d->tao, &lcp, d->active, d->L, &s->its, solved));
+  PetscCall(PetscFree(other));
   if (blocks)
     PetscCall(HycoBlocksAdmit(blocks, d->L + d->p)); /* inadmissible by round-off; the residuals are recomputed */
   for (PetscInt i = 0; i < d->m && !blocks; i++) {
@@ -397,4 +404,12 @@ void HycoSolverGetCondensed(HycoSolver s, PetscInt *m, PetscInt *p, const PetscR
   *m = d->m;
   *p = d->p;
   *S = d->S;
+}
+
+void HycoSolverGetDense(HycoSolver s, HycoLCP *lcp, const PetscReal *z[])
+{
+  const Dual *d = (const Dual *)HycoSolverFindForm(s, "dual")->data;
+
+  *lcp = (HycoLCP){.n = d->m, .p = d->p, .M = d->S, .q = d->g, .symmetric = s->system->symmetric};
+  *z = d->L;
 }

@@ -79,8 +79,10 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   PetscCall(MatDenseGetArrayRead(y->G, &lcp.M));
   PetscCall(VecGetArrayRead(y->D, &lcp.q));
   PetscCall(VecGetArray(L, &l));
+  if (s->other && y->blocks && !s->falling_back) PetscCall(VecGetArrayRead(s->other, &lcp.other));
   PetscCall(HycoTaoSetType(f->tao, s->now.type, s->max_its));
   PetscCall(HycoTaoSolveLCP(f->tao, &lcp, f->active, l, &s->its, solved));
+  if (lcp.other) PetscCall(VecRestoreArrayRead(s->other, &lcp.other));
   if (y->blocks) PetscCall(HycoBlocksAdmit(y->blocks, l)); /* inadmissible by round-off; residuals are recomputed */
   for (PetscInt i = 0; i < f->m && !y->blocks; i++) l[i] = PetscMax(l[i], 0);
   PetscCall(VecRestoreArray(L, &l));
