@@ -38,10 +38,11 @@ typedef struct {
 
 /* Arrays in the caller's memory. */
 typedef struct {
-  double *f, *q, *w, *z, *value;        /* functions; n_motions + n_contacts; values */
-  double *W, *A, *L, *V, *S, *last, *y; /* L: factor of W on the closed contacts, in rows of n_contacts; V = L^-1 A^T; S:
+  double *f, *q, *w, *z, *value; /* functions; n_motions + n_contacts; values */
+  double *W, *A, *L, *V, *S, *last,
+      *y;                     /* L: factor of W on the closed contacts, in rows of n_contacts; V = L^-1 A^T; S:
                                            factor of V^T V */
-  int *closed, *at, n_closed;           /* by contact: 0, open; 2, one of the next; the closed ones, rows of L */
+  int *closed, *at, n_closed; /* by contact: 0, open; 2, one of the next; the closed ones, rows of L */
 } Work;
 
 static size_t work_doubles(const Model *m)
@@ -133,8 +134,7 @@ static int factorise(size_t n, size_t row_length, size_t done, double a[])
   for (size_t i = done; i < n; i++) {
     double *row = a + i * row_length, pivot = row[i];
 
-    for (size_t j = 0; j < i; j++)
-      row[j] = (row[j] - dot(j, row, a + j * row_length)) / a[j * row_length + j];
+    for (size_t j = 0; j < i; j++) row[j] = (row[j] - dot(j, row, a + j * row_length)) / a[j * row_length + j];
     row[i] = pivot - dot(i, row, row);
     if (row[i] > 1e-13 * pivot) {
       row[i] = sqrt(row[i]);
