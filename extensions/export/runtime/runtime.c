@@ -39,9 +39,8 @@ typedef struct {
 /* Arrays in the caller's memory. */
 typedef struct {
   double *f, *q, *w, *z, *value; /* functions; n_motions + n_contacts; values */
-  double *W, *A, *L, *V, *S, *last,
-      *y;                     /* L: factor of W on the closed contacts, in rows of n_contacts; V = L^-1 A^T; S:
-                                           factor of V^T V */
+  /* L: factor of W on the closed contacts, in rows of n_contacts; V = L^-1 A^T; S: factor of V^T V */
+  double *W, *A, *L, *V, *S, *last, *y;
   int *closed, *at, n_closed; /* by contact: 0, open; 2, one of the next; the closed ones, rows of L */
 } Work;
 
