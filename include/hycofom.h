@@ -95,7 +95,9 @@ typedef struct {
   PetscReal order;        /* the median of these; 2 for the tangent */
   PetscInt n_taken;       /* number of accepted time steps, including the first time */
   const PetscReal *taken; /* their ends. Borrowed */
-  PetscInt n_bound;       /* number of steps that only -hyco_step_inelastic kept from growing; since a resumption */
+  /* of each output of the scene the largest (for `min` the smallest) over the listed times that were reached */
+  PetscReal path_quantity[HYCO_MAX_QUANTITIES];
+  PetscInt n_bound; /* number of steps that only -hyco_step_inelastic kept from growing; since a resumption */
   PetscReal
       rate_change; /* change of the largest rate of inelastic strain within a step over the rate, mean over the strain:
                             a sign of errors in time; 0 where a law yields at once; since a resumption */
@@ -104,13 +106,18 @@ typedef struct {
 /* The derivatives of the scene's outputs with respect to its parameters, in the unit of the output over that of the
    parameter. Where the derivatives to the two sides differ, `kink` is true, and the value is that towards larger
    parameter values (at the upper end of the range towards smaller ones): contacts with neither force nor gap, a change of
-   master, cells that share the largest stress. */
+   master, cells that share the largest stress. Of a path, `value` is that at its last listed time. */
 typedef struct {
   PetscInt n_outputs, n_parameters;
-  PetscInt n_undecided;   /* contacts with neither force nor gap */
+  PetscInt n_undecided;   /* contacts with neither force nor gap; 0 for a path */
   const PetscReal *value; /* n_outputs x n_parameters row major, in the orders of HycoSceneGetQuantities() and
                              HycoSceneGetParameters(). Borrowed until the next call */
   const PetscBool *kink;  /* the same shape. Borrowed */
+  PetscInt n_times;       /* listed times; 0 without a history. Then, borrowed too: */
+  const PetscReal *times; /* n_times x n_outputs x n_parameters: at each listed time; */
+  const PetscBool *times_kink;
+  const PetscReal *path; /* n_outputs x n_parameters: of the largest (for `min` the smallest) over the listed times */
+  const PetscBool *path_kink;
 } HycoGradient;
 
 /* Called at each listed time, on every rank; HycoFOMGetSolution() then gives the solution there. */
@@ -150,8 +157,9 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM fom, HycoSummary *summary);
 /*
   Gets the gradient at the last solution, by the linear system of its closed contacts with the factor of K: for each
   parameter one forward and one back substitution, and differences of element sums, contact rows and outputs, never of
-  solutions. The solution stays. Collective; the same values on every rank. Fails without an output or a parameter, for a
-  scene with a history, where a solve did not converge, for a solver without a factor (-hyco_linear), with
+  solutions. With a history: by differences of two paths for each parameter in the steps of this one, with a smaller
+  tolerance of Newton's method. The solution stays. Collective; the same values on every rank. Fails without an output or
+  a parameter, where a solve did not converge or a path did not end, for a solver without a factor (-hyco_linear), with
   -hyco_regularise, and where the forces of closed contacts are not unique; after an error there is no last solution.
 */
 PetscErrorCode HycoFOMGetGradient(HycoFOM fom, HycoGradient *gradient);

@@ -188,9 +188,10 @@ PetscErrorCode HycoROMGetEquilibrium(HycoROM model, HycoEquilibrium *equilibrium
 PetscErrorCode HycoROMGetPrediction(HycoROM model, HycoPrediction *prediction);
 /*
   Gets the gradient of the model's outputs at the last prediction (hycofom.h), by the linear system of its closed contacts
-  and differences of the model's data, never of predictions. The prediction stays. Not collective. Fails without an output
-  or a parameter, for a model of paths, for a type without gradients, where the solve did not converge, and where the
-  forces of closed contacts are not unique; after an error there is no last prediction.
+  and differences of the model's data, never of predictions; of a path, by differences of two paths for each parameter in
+  its steps. The prediction stays. Not collective. Fails without an output or a parameter, for a type without gradients,
+  where the solve did not converge or a path did not end, and where the forces of closed contacts are not unique; after an
+  error there is no last prediction.
 */
 PetscErrorCode HycoROMGetGradient(HycoROM model, HycoGradient *gradient);
 
@@ -206,8 +207,8 @@ typedef struct {
 #define HYCO_FIT_BRGN  "brgn"
 #define HYCO_FIT_BLMVM "blmvm"
 /*
-  Finds the parameters within the ranges at which n outputs of the model are closest to targets, output[n] their indices:
-  the least squares of (output - target) / |target| (a target of 0: over the largest output at the samples), on the model's
+  Finds the parameters within the ranges at which n outputs of the model are closest to targets, output[n] their indices
+  (of a path at its last listed time; n_outputs more: their largest over the listed times, path_quantity): the least squares of (output - target) / |target| (a target of 0: over the largest output at the samples), on the model's
   gradients by the TAO type `type`, then by the other one if that ends at no minimum. It minimises from the n_starts best
   of n_samples predictions over the ranges, or (start: not NULL) from there alone. mu[n_parameters] is the best answer, and
   the last prediction the one there. Not collective; on several ranks answers may differ in the last bits. Fails where

@@ -73,6 +73,7 @@ class Draft:
         self.bodies, self.materials, self.body_of, self.thickness = {}, {}, {}, 1.0
         self.interactions, self.contacts, self.ties, self.rigids, self.loose = {}, {}, {}, [], {}
         self.amplitudes, self.steps, self.values, self.initial, self.reference = {}, [], {}, {}, {}
+        self.held = {}  # by nodes and degree of freedom: the group that holds them
         self.groups, self.tables, self.skipped, self.frictionless = set(), {}, False, frictionless
 
     def leave(self, block, what, why=None):
@@ -401,8 +402,12 @@ class Draft:
             group = None
             for d in dofs:
                 if d <= dim:
-                    group = group or self.node_group(row[0], block, "_".join(map(str, dofs)) + (f"_{said(value)}" if value else ""))
-                    self.put(("fixed", group, AXES[d - 1]), value, block)
+                    # a later value for the same nodes replaces the earlier one, as in the deck
+                    before = self.held.get((frozenset(held), d))
+                    if not before:
+                        group = group or self.node_group(row[0], block, "_".join(map(str, dofs)) + (f"_{said(value)}" if value else ""))
+                        self.held[frozenset(held), d] = group
+                    self.put(("fixed", before or group, AXES[d - 1]), value, block)
                 elif d > 6:
                     self.leave(block, f"*BOUNDARY of degree of freedom {d}", "only displacements are prescribed")
 
@@ -448,6 +453,8 @@ class Draft:
             elif kind in ("BX", "BY", "BZ") and self.body_groups(row[0], block):
                 for title in self.body_groups(row[0], block):
                     self.put(("force", title, kind[1].lower()), item(row, 2), block)
+            elif face and not any(c in self.body_of for c in self.cells(row[0], block)):
+                self.leave(block, "*DLOAD on elements that are no solids")
             elif face:
                 self.put(("pressure", self.pressure_group(row[0], int(face[1]), item(row, 2), block), ""), item(row, 2), block)
             else:
@@ -638,7 +645,8 @@ class Draft:
                 keys.update(facet)
                 edges += [math.dist(self.m.nodes[a], self.m.nodes[b]) for a, b in zip(facet, facet[1:])]
             return keys, edges
-        (mine, edges), (others, _) = nodes(slave), nodes(master)
+        (mine, edges), (others, theirs) = nodes(slave), nodes(master)
+        edges = edges or theirs  # a slave of nodes has none
         if not mine or not others or not edges:
             return None
         place = sorted(self.m.nodes[n] for n in others)
@@ -676,8 +684,10 @@ class Draft:
         slave, master, interaction, reach, row, _ = self.contacts[name]
         kind = "mortar" if self.quadratic() else "surface"
         text, far = f"type: {kind}, slave: {slave}, master: {master}", self.reach(slave, master)
-        if far and max(far[0], reach) > 0.1 * far[1]:
-            text += f", tolerance: {said(float(f'{1.001 * max(far[0], reach):.3g}'))}"
+        if far and max(far[0], reach) > 0.099 * far[1]:
+            least = max(far[0], reach)
+            short = float(f'{1.001 * least:.3g}')
+            text += f", tolerance: {said(short if short > 1.0005 * least else float(f'{1.001 * least:.5g}'))}"
         if (slave, master) in self.loose:
             text += f", gap: {said(self.loose[slave, master])}"
         friction = self.friction(interaction)

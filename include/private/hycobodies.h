@@ -187,7 +187,9 @@ typedef struct {
   PetscInt m, *start, *at; /* the last rows, of m contacts */
   PetscReal *value;
   PetscReal **P, **W; /* by contact and body: C_b B_b^T, n x terms; B C_b B_b^T, m x terms; NULL: not yet, or 0 */
-  PetscReal bytes;    /* of all P and W */
+  PetscReal **blend;  /* by contact and body: P at the weights of its samples; NULL: not made. Of bodies with several */
+  PetscInt *at_weights, *weights; /* by contact and body: which weights; by body: the number of the present ones */
+  PetscReal bytes;                /* of all P, W and blend */
 } HycoBodiesKept;
 
 /* What solves change. In the bodies' axes: c of the loads (r); displacements of the surfaces without contact (free, ns)

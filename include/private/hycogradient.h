@@ -1,5 +1,5 @@
 /* Derivatives of outputs with respect to the parameters: the data are differentiated by differences along one parameter,
-   the solution by the linear system of its closed contacts. */
+   the solution by the linear system of its closed contacts; a path by the paths beside it, in its own steps in time. */
 #ifndef HYCOGRADIENT_H
 #define HYCOGRADIENT_H
 
@@ -9,7 +9,7 @@
 /* Contacts with more than this share of the largest force count as closed where their masters are compared. */
 #define HYCO_GRADIENT_FORCE 1e-7
 
-/* Fails for a scene without outputs or parameters, and for one with a history. */
+/* Fails for a scene without outputs or parameters. */
 PetscErrorCode HycoGradientCheckScene(HycoScene scene);
 
 /* The points of a difference along a parameter: mu + step[k], the first with step 0, weight[k] of the data there. */
@@ -19,8 +19,13 @@ typedef struct {
   int sign; /* the direction of one-sided derivatives: 1; at the upper end of the range -1 */
 } HycoDifference;
 
-/* Central where the range has room for it, else of the same order to the inside. */
-void HycoDifferenceSet(HycoScene scene, const PetscReal mu[], PetscInt parameter, HycoDifference *difference);
+/* Steps as shares of the range: of data, where the error of the central difference is about 1e-9 and that of round-off less;
+   of paths, whose round-off is that of Newton's method. */
+#define HYCO_GRADIENT_STEP      3e-5
+#define HYCO_GRADIENT_PATH_STEP 1e-4
+/* Central where the range has room for it, else of the same order to the inside. share: the step's, of the range. */
+void HycoDifferenceSet(HycoScene scene, const PetscReal mu[], PetscInt parameter, PetscReal share,
+                       HycoDifference *difference);
 /* The one-sided difference in the direction `sign`. */
 void HycoDifferenceTakeSide(HycoDifference *difference);
 /* mu + step[k], at[n_variables]. */
@@ -35,7 +40,7 @@ PetscReal HycoDifferenceJump(const HycoDifference *difference, PetscReal size, P
 /* Whether such a jump is a kink, and not curvature: it stays at a quarter of the step, with the values `closer`. */
 PetscBool HycoDifferenceKinks(const HycoDifference *difference, PetscReal jump, const PetscReal closer[3]);
 
-/* Allocates for the scene's outputs and parameters. */
+/* Allocates for the scene's outputs, parameters and listed times. */
 PetscErrorCode HycoGradientCreate(HycoScene scene, HycoGradientStore *store, HycoGradient *gradient);
 /* NULL-safe. */
 PetscErrorCode HycoGradientDestroy(HycoGradientStore *store);
@@ -46,10 +51,25 @@ typedef PetscErrorCode (*HycoGradientMeasure)(void *context, const PetscReal at[
 PetscBool HycoGradientSetSmooth(HycoGradient *gradient, HycoGradientStore *store, const HycoDifference *difference,
                                 PetscBool kink, const PetscReal value[]);
 /* Sets the column of the difference's parameter from the outputs at its points beside mu, and where their slopes differ
-   also at those of a quarter of the step, which tell a kink from curvature. value: room for 6 n_outputs, the first
-   n_outputs those at mu; kink: the solution has one. As collective as `measure`. */
+   also at those of a quarter of the step, which tell a kink from curvature. value: room for 6 gradient->n_outputs, the
+   first n_outputs those at mu; kink: the solution has one. As collective as `measure`. */
 PetscErrorCode HycoGradientColumn(HycoGradient *gradient, HycoGradientStore *store, HycoScene scene,
                                   const PetscReal mu[], const HycoDifference *difference, PetscBool kink,
                                   HycoGradientMeasure measure, void *context, PetscReal value[]);
+
+/* -- paths -- */
+
+/* Tolerance of Newton's method on the paths beside a solution. */
+#define HYCO_GRADIENT_RTOL 1e-12
+/* Solves the path at mu in the steps of the solution, as far as its end, without monitors and files; *step: at its n_times
+   listed times, with the outputs. Borrowed until the next call. */
+typedef PetscErrorCode (*HycoGradientFollow)(void *context, const PetscReal mu[], const HycoStep *step[]);
+/* Fails if such a path did not end, or halved a step. */
+PetscErrorCode HycoPathCheckBeside(PetscBool ended, PetscInt cuts, const char why[]);
+/* Sets the gradient of a path from the paths at the points beside mu. step: n_times, of the solution, read before `follow`
+   is called. As collective as `follow`. */
+PetscErrorCode HycoGradientOfPath(HycoScene scene, const PetscReal mu[], const HycoStep step[],
+                                  HycoGradientStore *store, HycoGradient *gradient, HycoGradientFollow follow,
+                                  void *context);
 
 #endif

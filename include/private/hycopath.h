@@ -158,6 +158,8 @@ PetscErrorCode HycoPathMoves(HycoPath path, const PetscScalar u[], Vec work, Pet
 PetscReal HycoPathFactorCost(HycoPath path);
 /* The method used for steps; not HYCO_NEWTON_AUTO. */
 HycoNewton HycoPathMethod(HycoPath path);
+/* value[n_quantities]: the largest of each quantity over n >= 1 listed times; for `min` the smallest. */
+void HycoPathExtremes(HycoScene scene, PetscInt n, const HycoStep step[], PetscReal value[]);
 /* Fills the history with the path's results. */
 void HycoPathGetHistory(HycoPath path, HycoHistory *history);
 
@@ -183,6 +185,8 @@ PetscErrorCode HycoFrictionLoad(HycoFOM fom);
 PetscErrorCode HycoFOMPathCreate(HycoFOM fom);
 /* Fails if an option of paths is given and the scene has no history. */
 PetscErrorCode HycoPathRefuseOptions(HycoFOM fom);
+/* The gradient of the last path, by the paths beside it; the path is then solved again. Collective. */
+PetscErrorCode HycoPathGradient(HycoFOM fom, HycoGradient *gradient);
 /* Solves the history at mu; if it does not reach its end, the summary's reason says so. Collective. */
 PetscErrorCode HycoPathSolve(HycoFOM fom, const PetscReal mu[]);
 /* Fails if the checkpoint or a file for FCLIB would overwrite a model, or the latter is for no step. Collective. */

@@ -60,7 +60,8 @@ typedef struct {
 typedef struct {
   PetscInt n_given; /* prescribed times of the steps; NULL: chosen by the path. Borrowed */
   const PetscReal *given;
-  PetscInt most_cuts; /* as in HycoPath; not 0 where training judges */
+  PetscInt most_cuts, n_cuts; /* as in HycoPath; not 0 where training judges; of the last path */
+  PetscReal rtol;             /* 0, or a tolerance of Newton's method below that of the options */
   PetscInt n, room;
   PetscReal *t, *gamma, *U_fe; /* n, n x l, n x n_fe */
   PetscInt n_listed, shown;    /* number of listed times reached; the one to which gamma, U and Lambda belong */
@@ -262,6 +263,8 @@ PetscErrorCode HycoROMSetOutputCells(HycoROM model, HycoMesh mesh, PetscReal V[]
                                      HycoMesh loaded);
 /* Until HycoROMUnfocusOutputs() the quantities are measured on the cells that decide them near the last prediction, whose
    quantities are value[], just measured. *focused: they are on cells, not only of contacts. */
+/* The gradient of a predicted path. */
+PetscErrorCode HycoROMPathGradient(HycoROM model, HycoGradient *gradient);
 PetscErrorCode HycoROMFocusOutputs(HycoROM model, const PetscReal value[], PetscBool *focused);
 PetscErrorCode HycoROMUnfocusOutputs(HycoROM model);
 /* On that mesh; NULL: the quantities need only results of contacts. Borrowed. */

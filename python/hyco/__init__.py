@@ -110,11 +110,13 @@ class Gradient:
     kink       the same shape: the derivatives to the two sides differ, and value is that towards larger parameter values
     undecided  (...) number of contacts with neither force nor gap
     outputs    {name: value} of the outputs there
+    times, path  of a path (else None), whose value is that of the last listed time: (..., times, outputs, parameters), at each listed
+               time; (..., outputs, parameters), of the largest over the listed times (for min the smallest)
     gradient['lift'] is that of one output, (..., parameters)
     """
 
-    def __init__(self, mu, outputs, value, kink, undecided):
-        self.mu, self.outputs, self.value, self.kink, self.undecided = mu, outputs, value, kink, undecided
+    def __init__(self, mu, outputs, value, kink, undecided, times, path):
+        self.mu, self.outputs, self.value, self.kink, self.undecided, self.times, self.path = mu, outputs, value, kink, undecided, times, path
 
     def __getitem__(self, name):
         return self.value[..., list(self.outputs).index(name), :]
@@ -139,13 +141,15 @@ class Fit:
 
 
 def _gradient(function, handle):
-    """value, kink, undecided of the last solution or prediction."""
+    """value, kink, undecided, times, path of the last solution or prediction."""
     g = np.zeros(1, c.struct('HycoGradient'))
     c.call(function, handle, c.address(g))
-    at = [ctypes.c_void_p(int(g[name][0])) for name in ('value', 'kink')]
+    at = [ctypes.c_void_p(int(g[name][0])) for name in ('value', 'kink', 'times', 'path')]
     g = g[0]
     shape = int(g['n_outputs']), int(g['n_parameters'])
-    return c.copied(at[0], shape), c.copied(at[1], shape, f"i{c.layout('PetscBool')[0]}").astype(bool), int(g['n_undecided'])
+    n_times = int(g['n_times'])
+    return (c.copied(at[0], shape), c.copied(at[1], shape, f"i{c.layout('PetscBool')[0]}").astype(bool), int(g['n_undecided']),
+            c.copied(at[2], (n_times, *shape)) if n_times else None, c.copied(at[3], shape) if n_times else None)
 
 
 class _Handle:
@@ -470,6 +474,9 @@ class Model(_Handle):
         self.parameters = _parameters(scene)
         self.outputs = _names('HycoSceneGetQuantities', scene)
         self.contacts = _names('HycoSceneGetContacts', scene)
+        times = c.count()
+        c.call('HycoSceneGetHistory', scene, ctypes.byref(times), None)
+        self._times = times.value
         sizes = [c.count() for _ in range(3)]
         c.call('HycoROMGetSizes', self._handle, *(ctypes.byref(n) for n in sizes))
         self.n_contacts, self._n_nodes, self._dim = (n.value for n in sizes)
@@ -507,23 +514,28 @@ class Model(_Handle):
         mu = _points(mu, self.parameters)
         points = mu.reshape(-1, mu.shape[-1])
         size = (len(points), len(self.outputs), len(self.parameters))
-        value, kink, undecided = np.zeros(size), np.zeros(size, bool), np.zeros(len(points), int)
+        value, kink, undecided, times, path = np.zeros(size), np.zeros(size, bool), np.zeros(len(points), int), [], []
         outputs = np.zeros(size[:2])
         for k, point in enumerate(points):
             outputs[k] = list(self.predict(point, extrapolate=extrapolate).outputs.values())
-            value[k], kink[k], undecided[k] = _gradient('HycoROMGetGradient', self._open)
+            value[k], kink[k], undecided[k], of_times, of_path = _gradient('HycoROMGetGradient', self._open)
+            times.append(of_times)
+            path.append(of_path)
         shape = mu.shape[:-1]
         named = {name: outputs[:, k].reshape(shape)[()] for k, name in enumerate(self.outputs)}
-        return Gradient(mu, named, value.reshape(shape + size[1:]), kink.reshape(shape + size[1:]), undecided.reshape(shape)[()])
+        times, path = (None if any(v is None for v in each) or not each else np.array(each).reshape(shape + each[0].shape) for each in (times, path))
+        return Gradient(mu, named, value.reshape(shape + size[1:]), kink.reshape(shape + size[1:]), undecided.reshape(shape)[()], times, path)
 
     def fit(self, targets, start=None, starts=1, samples=64, kind='brgn'):
-        """The Fit of {output: target}: the parameters within the ranges at which the outputs are closest to the targets, as hyco fit.
+        """The Fit of {output: target}: the parameters within the ranges at which the outputs are closest to the targets, as hyco fit; of
+        a path at its last time, and path_OUTPUT the largest over its listed times.
         It minimises from the `starts` best of `samples` predictions over the ranges, or from `start` alone, by the TAO type `kind`
         (brgn, blmvm). Under mpiexec each process does the same."""
-        handle, lacking = self._open, [name for name in targets if name not in self.outputs]
+        handle, known = self._open, self.outputs + ([f'path_{name}' for name in self.outputs] if self._times else [])
+        lacking = [name for name in targets if name not in known]
         if lacking or not targets:
             raise Error(f'the targets name {", ".join(lacking) or "no output"}; the outputs are {", ".join(self.outputs)}')
-        output = np.array([self.outputs.index(name) for name in targets], c.integer()[1])
+        output = np.array([known.index(name) for name in targets], c.integer()[1])
         target = np.array(list(targets.values()), float)
         mu, found = np.zeros(len(self.parameters)), np.zeros(1, c.struct('HycoFit'))
         start = None if start is None else _one(start, self.parameters)

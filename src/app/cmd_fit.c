@@ -12,9 +12,10 @@
 
 typedef struct {
   HycoROM model;
-  HycoScene scene; /* the model's */
-  PetscInt n, n_par;
-  PetscInt output[HYCO_MAX_QUANTITIES]; /* by target: its output */
+  HycoScene scene;          /* the model's */
+  PetscInt n, n_par, n_all; /* targets, parameters, outputs */
+  PetscBool paths;
+  PetscInt output[HYCO_MAX_QUANTITIES]; /* by target: its output, or n_all + that of its path's extreme */
   PetscReal target[HYCO_MAX_QUANTITIES];
   const PetscReal *lo, *hi;
   HycoFit fit;
@@ -92,9 +93,15 @@ static PetscErrorCode ReadTargets(Fit *f)
   PetscFunctionBegin;
   PetscCall(HycoSceneGetQuantities(f->scene, &n, names));
   for (PetscInt q = 0; q < n; q++) {
+    char path[DRIVER_LINE];
+
     PetscCall(ReadTarget(f, q, names[q]));
     PetscCall(HycoListAdd(list, ", ", names[q]));
+    if (!f->paths) continue;
+    PetscCall(PetscSNPrintf(path, sizeof(path), "path_%s", names[q]));
+    PetscCall(ReadTarget(f, n + q, path));
   }
+  f->n_all = n;
   HycoCheck(n, "the model has no outputs to fit; train it on a scene with an entry output");
   PetscCall(CheckTargets(list));
   HycoCheck(f->n, "give -target_OUTPUT V for one of the model's outputs or more, which are: %s", list);
@@ -111,7 +118,8 @@ static PetscErrorCode Run(Fit *f, const Settings *s)
   PetscCall(HycoROMFit(f->model, f->n, f->output, f->target, s->given ? s->mu : NULL, s->samples, s->starts,
                        types[s->type], f->mu, &f->fit));
   PetscCall(HycoROMGetPrediction(f->model, &at));
-  for (PetscInt k = 0; k < f->n; k++) f->value[k] = at.quantity[f->output[k]];
+  for (PetscInt k = 0; k < f->n; k++)
+    f->value[k] = f->output[k] < f->n_all ? at.quantity[f->output[k]] : at.path_quantity[f->output[k] - f->n_all];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -131,8 +139,9 @@ static PetscErrorCode LoadScene(const Fit *f, const char path[], HycoScene *scen
   PetscCall(HycoSceneGetQuantities(f->scene, &n, names));
   HycoSceneMatchQuantities(f->scene, *scene, at);
   for (PetscInt k = 0; k < f->n; k++)
-    HycoCheck(at[f->output[k]] >= 0, "the scene has no output %s as the model has it; give its entries, as in training",
-              names[f->output[k]]);
+    HycoCheck(at[f->output[k] % n] >= 0,
+              "the scene has no output %s as the model has it; give its entries, as in training",
+              names[f->output[k] % n]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -142,13 +151,17 @@ static PetscErrorCode Check(const Fit *f, HycoScene scene, const PetscInt at[], 
 {
   HycoFOM fom;
   HycoSummary summary;
+  HycoHistory history;
 
   PetscFunctionBegin;
   PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom));
   PetscCall(HycoFOMSolve(fom, f->n_par, mu));
   PetscCall(HycoFOMGetSummary(fom, &summary));
   HycoCheck(summary.reason > 0, "full order at the answer: %s; nothing was written", summary.why);
-  for (PetscInt k = 0; k < f->n; k++) full[k] = summary.quantity[at[f->output[k]]];
+  PetscCall(HycoFOMGetHistory(fom, &history));
+  for (PetscInt k = 0; k < f->n; k++)
+    full[k] = f->output[k] < f->n_all ? summary.quantity[at[f->output[k]]]
+                                      : history.path_quantity[at[f->output[k] - f->n_all]];
   PetscCall(HycoFOMDestroy(&fom));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -175,10 +188,13 @@ static PetscErrorCode PrintAnswer(const Fit *f, const PetscReal full[], cJSON *j
   PetscCall(DriverPrint("found: %s\n", words));
   PetscCall(HycoSceneGetQuantities(f->scene, &n, names));
   for (PetscInt k = 0; k < f->n; k++) {
-    cJSON *of = cJSON_AddObjectToObject(targets, names[f->output[k]]);
+    char name[DRIVER_LINE];
+    cJSON *of;
 
+    PetscCall(PetscSNPrintf(name, sizeof(name), "%s%s", f->output[k] < n ? "" : "path_", names[f->output[k] % n]));
+    of = cJSON_AddObjectToObject(targets, name);
     ReportNumbers(of, {"target", f->target[k]}, {"model", value[k]});
-    PetscCall(DriverPrint("%s: target %.6g, model %.6g", names[f->output[k]], (double)f->target[k], (double)value[k]));
+    PetscCall(DriverPrint("%s: target %.6g, model %.6g", name, (double)f->target[k], (double)value[k]));
     if (full) cJSON_AddNumberToObject(of, "full_order", full[k]);
     if (full) PetscCall(DriverPrint(", full order %.6g", (double)full[k]));
     PetscCall(DriverPrint("\n"));
@@ -266,7 +282,11 @@ PetscErrorCode DeclareFit(PetscOptions options)
   (void)options;
   PetscCall(DriverReadFiles(path, path, NULL, path, NULL));
   PetscCall(DriverGetPoint(NULL, NULL));
-  PetscCall(DriverGet("target_", "<v> value that an output of the model should have: -target_OUTPUT v", path));
+  PetscCall(DriverGet("target_",
+                      "<v> value that an output of the model should have: -target_OUTPUT v; of a path at its last "
+                      "time, -target_path_OUTPUT v "
+                      "for the largest over its listed times",
+                      path));
   PetscCall(ReadSettings(&s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -279,6 +299,7 @@ PetscErrorCode CommandFit(void)
   PetscReal full[HYCO_MAX_QUANTITIES];
   PetscInt at[HYCO_MAX_QUANTITIES];
   HycoScene scene = NULL;
+  PetscInt n_times;
   char own[PETSC_MAX_PATH_LEN], path[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBegin;
@@ -287,8 +308,9 @@ PetscErrorCode CommandFit(void)
   PetscCall(ReadSettings(&s));
   HycoOnEach(PETSC_COMM_WORLD, HycoROMLoad(path, &f.model));
   PetscCall(HycoROMGetScene(f.model, &f.scene));
-  PetscCall(HycoSceneRefuseHistory(f.scene, "hyco fit"));
   PetscCall(HycoSceneGetParameters(f.scene, &f.n_par, NULL, &f.lo, &f.hi));
+  PetscCall(HycoSceneGetHistory(f.scene, &n_times, NULL));
+  f.paths = (PetscBool)(n_times > 0);
   PetscCall(ReadTargets(&f));
   PetscCall(ReadStart(&f, &s));
   if (own[0])

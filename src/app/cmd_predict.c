@@ -224,10 +224,11 @@ static PetscErrorCode One(HycoROM model, HycoScene scene, Fallback *fallback, co
 }
 
 /* One path: writes what it reached, and fails if that is not its end. */
-static PetscErrorCode Path(HycoROM model, HycoScene scene, const char output[])
+static PetscErrorCode Path(HycoROM model, HycoScene scene, const char output[], PetscBool derives)
 {
   DriverReducedPath path = {0};
   HycoPrediction p = {0};
+  HycoGradient gradient = {0};
   HycoContactResult *carried;
   PetscInt n, n_carried;
   PetscReal mu[64], energy = 0;
@@ -255,7 +256,10 @@ static PetscErrorCode Path(HycoROM model, HycoScene scene, const char output[])
   PetscCall(DriverPrint("seconds: %.6f set-up, %.6f prediction\n", (double)p.seconds.setup, (double)p.seconds.total));
   HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetStrainEnergy(model, &energy));
   PetscCall(DriverGetCarried(model, scene, &n_carried, &carried));
-  PetscCall(Report(scene, mu, &p, n_carried, carried, energy, "", PETSC_FALSE, &path, NULL));
+  /* A path that ended early has none, and is an error below. */
+  derives = (PetscBool)(derives && p.reason > 0);
+  if (derives) HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetGradient(model, &gradient));
+  PetscCall(Report(scene, mu, &p, n_carried, carried, energy, "", PETSC_FALSE, &path, derives ? &gradient : NULL));
   PetscCall(PetscFree(carried));
   PetscCall(PetscFree(path.step));
   HycoCheck(
@@ -647,7 +651,7 @@ PetscErrorCode DeclarePredict(PetscOptions options)
   PetscCall(DriverReadTarget(HYCO_ERROR_U, &target));
   PetscCall(DriverReadTarget(HYCO_ERROR_LAMBDA, &target));
   PetscCall(DriverReadMonitor(&flag));
-  PetscCall(DriverReadGradient(NULL, &flag));
+  PetscCall(DriverReadGradient(&flag));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -673,7 +677,7 @@ PetscErrorCode CommandPredict(void)
   PetscCall(HycoROMGetScene(model, &scene));
   PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
   PetscCall(DriverReadFallback(model, extrapolate, &fallback));
-  PetscCall(DriverReadGradient(scene, &derives));
+  PetscCall(DriverReadGradient(&derives));
   HycoCheck(!derives || !fallback.on,
             "-gradient is that of the model, and -hyco_fallback may replace its prediction; give "
             "one of them, or use hyco solve -gradient");
@@ -693,7 +697,8 @@ PetscErrorCode CommandPredict(void)
     PetscCall(DriverGetSamples(scene, PETSC_FALSE, &samples, &set));
     HycoStaged(HYCO_STAGE_ONLINE, Many(model, scene, &fallback, samples, output, derives));
   } else {
-    HycoStaged(HYCO_STAGE_ONLINE, n_times ? Path(model, scene, output) : One(model, scene, &fallback, output, derives));
+    HycoStaged(HYCO_STAGE_ONLINE,
+               n_times ? Path(model, scene, output, derives) : One(model, scene, &fallback, output, derives));
   }
   PetscCall(HycoSamplesDestroy(&samples));
   PetscCall(DriverEndFallback(&fallback));

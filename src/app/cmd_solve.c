@@ -119,10 +119,12 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
 
 /* A scene with a history: its path. The report is written for a path that reached its end; DriverEndHistory()
    fails for others, after the table. */
-static PetscErrorCode Path(HycoFOM fom, HycoScene scene, const PetscReal mu[], const char output[], const char table[])
+static PetscErrorCode Path(HycoFOM fom, HycoScene scene, const PetscReal mu[], const char output[], const char table[],
+                           PetscBool derives)
 {
   HycoSummary summary;
   DriverPath path = {.checked = PETSC_FALSE};
+  HycoGradient gradient;
   PetscInt n;
 
   PetscFunctionBegin;
@@ -132,8 +134,9 @@ static PetscErrorCode Path(HycoFOM fom, HycoScene scene, const PetscReal mu[], c
   PetscCall(HycoFOMSetStepMonitor(fom, DriverMonitorStep, &path));
   PetscCall(HycoFOMSolve(fom, n, mu));
   PetscCall(DriverEndHistory(fom, scene, mu, table));
+  if (derives) PetscCall(HycoFOMGetGradient(fom, &gradient));
   PetscCall(HycoFOMGetSummary(fom, &summary));
-  PetscCall(Report(scene, mu, fom, &summary, NULL));
+  PetscCall(Report(scene, mu, fom, &summary, derives ? &gradient : NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -275,7 +278,7 @@ PetscErrorCode DeclareSolve(PetscOptions options)
   PetscCall(DriverGetPoint(NULL, NULL));
   PetscCall(DriverGetSamples(NULL, PETSC_FALSE, NULL, NULL));
   PetscCall(DriverReadMonitor(&monitor));
-  PetscCall(DriverReadGradient(NULL, &monitor));
+  PetscCall(DriverReadGradient(&monitor));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -298,7 +301,7 @@ PetscErrorCode CommandSolve(void)
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
   PetscCall(DriverCheckMesh(scene));
   PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
-  PetscCall(DriverReadGradient(scene, &derives));
+  PetscCall(DriverReadGradient(&derives));
   PetscCall(DriverHasSamples(scene, &set));
   if (set) PetscCall(HycoSceneRefuseHistory(scene, "a set of points"));
   if (set) {
@@ -310,7 +313,7 @@ PetscErrorCode CommandSolve(void)
   PetscCall(HycoFOMGetSolver(fom, &solver));
   if (monitor) PetscCall(HycoSolverSetMonitor(solver, DriverMonitor, NULL));
   HycoStaged(HYCO_STAGE_FULL_ORDER, set       ? Many(fom, scene, samples, output, table, derives)
-                                    : n_times ? Path(fom, scene, mu, output, table)
+                                    : n_times ? Path(fom, scene, mu, output, table, derives)
                                               : One(fom, scene, mu, output, derives));
   PetscCall(HycoFOMDestroy(&fom));
   PetscCall(HycoSamplesDestroy(&samples));

@@ -209,8 +209,8 @@ void DriverCarriedFill(const DriverCarried *columns, PetscInt n, const HycoConta
 
 /* -- gradients.c: derivatives of the outputs -- */
 
-/* -gradient; fails if the scene (NULL: not known) has a history. */
-PetscErrorCode DriverReadGradient(HycoScene scene, PetscBool *gradient);
+/* -gradient */
+PetscErrorCode DriverReadGradient(PetscBool *gradient);
 /* In the report and in the text. */
 PetscErrorCode DriverReportGradient(cJSON *json, HycoScene scene, const HycoGradient *gradient);
 /* Columns of a table, if `on`: d_OUTPUT_d_PARAMETER, and the number of kinks; the caller frees the names. */

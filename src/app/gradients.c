@@ -2,8 +2,7 @@
 #include "driver.h"
 #include <string.h>
 
-/* scene NULL: only declares the option. */
-PetscErrorCode DriverReadGradient(HycoScene scene, PetscBool *gradient)
+PetscErrorCode DriverReadGradient(PetscBool *gradient)
 {
   PetscFunctionBegin;
   *gradient = PETSC_FALSE;
@@ -11,7 +10,52 @@ PetscErrorCode DriverReadGradient(HycoScene scene, PetscBool *gradient)
   PetscCall(HycoOptionsFlag(
       "-gradient", "derivatives of the outputs with respect to the parameters, in the report and the table", gradient));
   PetscOptionsEnd();
-  if (scene && *gradient) PetscCall(HycoSceneRefuseHistory(scene, "-gradient"));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* t: NULL, or the listed time, if it is not the last. */
+static void AddKink(cJSON *kinks, const char output[], const char parameter[], const PetscReal *t)
+{
+  cJSON *kink = cJSON_CreateObject();
+
+  cJSON_AddStringToObject(kink, "output", output);
+  cJSON_AddStringToObject(kink, "parameter", parameter);
+  if (t) cJSON_AddNumberToObject(kink, "t", *t);
+  cJSON_AddItemToArray(kinks, kink);
+}
+
+/* The derivatives of a path: of its extremes, and of outputs at each listed time. */
+static PetscErrorCode ReportPath(cJSON *json, cJSON *kinks, HycoScene scene, const HycoGradient *g)
+{
+  const PetscInt n = g->n_outputs * g->n_parameters;
+  const char *outputs[HYCO_MAX_QUANTITIES];
+  const char *const *names;
+  const PetscReal *t;
+  PetscInt count;
+  cJSON *path = cJSON_AddObjectToObject(json, "gradient_path"),
+        *times = cJSON_AddObjectToObject(json, "gradient_times");
+
+  PetscFunctionBegin;
+  PetscCall(HycoSceneGetQuantities(scene, &count, outputs));
+  PetscCall(HycoSceneGetParameters(scene, NULL, &names, NULL, NULL));
+  PetscCall(HycoSceneGetHistory(scene, NULL, &t));
+  for (PetscInt q = 0; q < g->n_outputs; q++) {
+    cJSON *of = cJSON_AddObjectToObject(path, outputs[q]), *along = cJSON_AddObjectToObject(times, outputs[q]);
+
+    for (PetscInt p = 0; p < g->n_parameters; p++) {
+      const PetscInt at = q * g->n_parameters + p;
+      cJSON *each = cJSON_AddArrayToObject(along, names[p]);
+      char name[DRIVER_LINE];
+
+      cJSON_AddNumberToObject(of, names[p], g->path[at]);
+      PetscCall(PetscSNPrintf(name, sizeof(name), "path_%s", outputs[q]));
+      if (g->path_kink[at]) AddKink(kinks, name, names[p], NULL);
+      for (PetscInt k = 0; k < g->n_times; k++) {
+        cJSON_AddItemToArray(each, cJSON_CreateNumber(g->times[k * n + at]));
+        if (g->times_kink[k * n + at] && k < g->n_times - 1) AddKink(kinks, outputs[q], names[p], &t[k]);
+      }
+    }
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -33,19 +77,15 @@ PetscErrorCode DriverReportGradient(cJSON *json, HycoScene scene, const HycoGrad
     PetscCall(DriverPrint("gradient of %s:", outputs[q]));
     for (PetscInt p = 0; p < g->n_parameters; p++) {
       const PetscInt at = q * g->n_parameters + p;
-      cJSON *kink;
 
       cJSON_AddNumberToObject(of, names[p], g->value[at]);
       PetscCall(
           DriverPrint("%s %s %.6g%s", p ? "," : "", names[p], (double)g->value[at], g->kink[at] ? " (one-sided)" : ""));
-      if (!g->kink[at]) continue;
-      kink = cJSON_CreateObject();
-      cJSON_AddStringToObject(kink, "output", outputs[q]);
-      cJSON_AddStringToObject(kink, "parameter", names[p]);
-      cJSON_AddItemToArray(kinks, kink);
+      if (g->kink[at]) AddKink(kinks, outputs[q], names[p], NULL);
     }
     PetscCall(DriverPrint("\n"));
   }
+  if (g->n_times) PetscCall(ReportPath(json, kinks, scene, g));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

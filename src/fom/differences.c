@@ -1,7 +1,7 @@
-/* Differences of data along a parameter, and the gradients that they give. */
+/* Differences of data along a parameter, or of paths, and the gradients that they give. */
 #include <hycogradient.h>
+#include <hycopath.h>
 
-#define STEP 3e-5 /* share of the range: the error of the central difference is about 1e-9, that of round-off less */
 #define KINK 1e-3 /* share of a slope by which those to the two sides differ, if it is no curvature */
 #define STAYS                                                                                                          \
   0.5 /* share of that difference which remains at a quarter of the step, where curvature leaves a quarter */
@@ -9,11 +9,10 @@
 #define NOISE                                                                                                          \
   3e-13 /* share of a value below which its change over a step is round-off: as a derivative 1e-8 of it over the range */
 
-/* For gradients at full order and of models. A history's outputs depend on the whole path. */
+/* For gradients at full order and of models. */
 PetscErrorCode HycoGradientCheckScene(HycoScene s)
 {
   PetscFunctionBegin;
-  PetscCall(HycoSceneRefuseHistory(s, "a gradient"));
   HycoCheck(s->n_quantities, "a gradient is that of the scene's outputs, and it has none; add an entry output");
   HycoCheck(s->n_parameters, "a gradient is with respect to the scene's parameters, and it has none");
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -21,10 +20,10 @@ PetscErrorCode HycoGradientCheckScene(HycoScene s)
 
 /* Central, or of second order to one side where the range ends (sign: the side); the points stay in the range, since
    expressions may be invalid beyond it. */
-void HycoDifferenceSet(HycoScene scene, const PetscReal mu[], PetscInt p, HycoDifference *d)
+void HycoDifferenceSet(HycoScene scene, const PetscReal mu[], PetscInt p, PetscReal share, HycoDifference *d)
 {
   const PetscReal width = scene->hi[p] - scene->lo[p];
-  PetscReal h = STEP * (width > 0 ? width : PetscMax(PetscAbsReal(mu[p]), 1));
+  PetscReal h = share * (width > 0 ? width : PetscMax(PetscAbsReal(mu[p]), 1));
   const PetscBool inside = (PetscBool)(mu[p] >= scene->lo[p] && mu[p] <= scene->hi[p] && width > 0);
 
   h = (mu[p] + h) - mu[p]; /* representable */
@@ -93,16 +92,25 @@ PetscBool HycoDifferenceKinks(const HycoDifference *d, PetscReal jump, const Pet
 /* The store owns the arrays, which g borrows: a former gradient of the same object becomes invalid. */
 PetscErrorCode HycoGradientCreate(HycoScene scene, HycoGradientStore *store, HycoGradient *g)
 {
-  const PetscInt n = scene->n_quantities * scene->n_parameters;
+  const PetscInt n = scene->n_quantities * scene->n_parameters, n_times = scene->n_times;
 
   PetscFunctionBegin;
   PetscCall(HycoGradientDestroy(store));
-  PetscCall(PetscCalloc1(n + 1, &store->value));
-  PetscCall(PetscCalloc1(n + 1, &store->kink));
+  PetscCall(PetscCalloc1(n * (n_times + 1) + 1, &store->value));
+  PetscCall(PetscCalloc1(n * (n_times + 1) + 1, &store->kink));
   *g = (HycoGradient){.n_outputs = scene->n_quantities,
                       .n_parameters = scene->n_parameters,
+                      .n_times = n_times,
                       .value = store->value,
                       .kink = store->kink};
+  if (!n_times) PetscFunctionReturn(PETSC_SUCCESS);
+  /* The listed times one after the other, then the extremes over them. */
+  g->times = store->value;
+  g->times_kink = store->kink;
+  g->value += n * (n_times - 1);
+  g->kink += n * (n_times - 1);
+  g->path = store->value + n * n_times;
+  g->path_kink = store->kink + n * n_times;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -153,8 +161,8 @@ static void Set(HycoGradient *g, HycoGradientStore *store, const HycoDifference 
   }
 }
 
-/* The outputs at the two points beside mu. */
-static PetscErrorCode MeasureBeside(HycoScene scene, const PetscReal mu[], const HycoDifference *d,
+/* The n outputs at the two points beside mu. */
+static PetscErrorCode MeasureBeside(PetscInt n, HycoScene scene, const PetscReal mu[], const HycoDifference *d,
                                     HycoGradientMeasure measure, void *context, PetscReal value[])
 {
   PetscReal at[HYCO_MAX_PARAMETERS];
@@ -162,7 +170,7 @@ static PetscErrorCode MeasureBeside(HycoScene scene, const PetscReal mu[], const
   PetscFunctionBegin;
   for (PetscInt j = 1; j < 3; j++) {
     HycoDifferencePoint(d, scene, mu, j, at);
-    PetscCall((*measure)(context, at, d->step[j], value + j * scene->n_quantities));
+    PetscCall((*measure)(context, at, d->step[j], value + j * n));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -182,7 +190,7 @@ PetscErrorCode HycoGradientColumn(HycoGradient *g, HycoGradientStore *store, Hyc
   PetscReal *closer = NULL;
 
   PetscFunctionBegin;
-  PetscCall(MeasureBeside(scene, mu, d, measure, context, value));
+  PetscCall(MeasureBeside(g->n_outputs, scene, mu, d, measure, context, value));
   if (NeedsCloser(g, d, value)) {
     HycoDifference near = *d;
 
@@ -190,8 +198,75 @@ PetscErrorCode HycoGradientColumn(HycoGradient *g, HycoGradientStore *store, Hyc
     /* The room's second half: value is 6 x n_outputs. */
     closer = value + 3 * g->n_outputs;
     PetscCall(PetscArraycpy(closer, value, g->n_outputs));
-    PetscCall(MeasureBeside(scene, mu, &near, measure, context, closer));
+    PetscCall(MeasureBeside(g->n_outputs, scene, mu, &near, measure, context, closer));
   }
   Set(g, store, d, value, closer, kink);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- paths -- */
+
+typedef struct {
+  HycoScene scene;
+  HycoGradientFollow follow;
+  void *context;
+} Beside;
+
+PetscErrorCode HycoPathCheckBeside(PetscBool ended, PetscInt cuts, const char why[])
+{
+  PetscFunctionBegin;
+  HycoCheck(ended && !cuts,
+            "there is no gradient: a path beside this one %s (%s); smaller steps (-hyco_substeps) may avoid it",
+            ended ? "halves its steps" : "ends early", why);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The outputs at all listed times, then their extremes. */
+static void Gather(HycoScene scene, const HycoStep step[], PetscReal output[])
+{
+  const PetscInt n = scene->n_quantities;
+
+  for (PetscInt k = 0; k < scene->n_times; k++) {
+    for (PetscInt q = 0; q < n; q++) output[k * n + q] = step[k].quantity[q];
+  }
+  HycoPathExtremes(scene, scene->n_times, step, output + scene->n_times * n);
+}
+
+static PetscErrorCode MeasurePath(void *context, const PetscReal mu[], PetscReal step, PetscReal output[])
+{
+  const Beside *b = (const Beside *)context;
+  const HycoStep *steps;
+
+  PetscFunctionBegin;
+  (void)step;
+  PetscCall((*b->follow)(b->context, mu, &steps));
+  Gather(b->scene, steps, output);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The steps in time stay those of the solution: with steps that each path chooses, outputs would jump along a parameter.
+   Newton's tolerance is small beside the difference of the paths. */
+PetscErrorCode HycoGradientOfPath(HycoScene scene, const PetscReal mu[], const HycoStep step[],
+                                  HycoGradientStore *store, HycoGradient *g, HycoGradientFollow follow, void *context)
+{
+  Beside beside = {scene, follow, context};
+  HycoGradient all;
+  PetscReal *value;
+  PetscErrorCode ierr = PETSC_SUCCESS;
+
+  PetscFunctionBegin;
+  PetscCall(HycoGradientCreate(scene, store, g));
+  all = *g;
+  all.n_outputs *= scene->n_times + 1;
+  PetscCall(PetscCalloc1(6 * all.n_outputs + 1, &value));
+  Gather(scene, step, value);
+  for (PetscInt p = 0; p < g->n_parameters && !ierr; p++) {
+    HycoDifference d;
+
+    HycoDifferenceSet(scene, mu, p, HYCO_GRADIENT_PATH_STEP, &d);
+    ierr = HycoGradientColumn(&all, store, scene, mu, &d, PETSC_FALSE, MeasurePath, &beside, value);
+  }
+  PetscCall(PetscFree(value));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

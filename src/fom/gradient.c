@@ -9,6 +9,7 @@
 */
 #include <hycofomimpl.h>
 #include <hycogradient.h>
+#include <hycopath.h>
 
 typedef struct {
   HycoFOM f;
@@ -213,7 +214,7 @@ static PetscErrorCode Column(Work *o, PetscInt p, HycoGradient *gradient)
   PetscBool turns, kink;
 
   PetscFunctionBegin;
-  HycoDifferenceSet(o->f->scene, o->mu, p, &d);
+  HycoDifferenceSet(o->f->scene, o->mu, p, HYCO_GRADIENT_STEP, &d);
   PetscCall(Differentiate(o, &d, &turns));
   PetscCall(HycoSolverTangentSolve(o->tangent, o->r, o->g, d.sign, o->dU, o->dL, &kink));
   PetscCall(HycoGradientColumn(gradient, o->store, o->f->scene, o->mu, &d, (PetscBool)(turns || kink), Measure, o,
@@ -293,6 +294,7 @@ static PetscErrorCode Check(HycoFOM f)
   PetscCheck(f->solved && !f->given, PETSC_COMM_SELF, PETSC_ERR_ORDER,
              "call HycoFOMSolve() before HycoFOMGetGradient()");
   HycoCheck(!f->n_pins, "-hyco_regularise: a body that nothing holds has no gradient; add a support");
+  if (f->path) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoSolverGetReason(f->solver, &reason));
   HycoCheck(reason > 0, "there is no gradient: %s", HycoReasonName(reason));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -306,6 +308,10 @@ PetscErrorCode HycoFOMGetGradient(HycoFOM f, HycoGradient *gradient)
   PetscFunctionBegin;
   HycoCheckHandle(f, HYCO_FOM_CLASSID);
   PetscCall(Check(f));
+  if (f->path) {
+    PetscCall(HycoPathGradient(f, gradient));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   o.store = &f->gradient;
   PetscCall(HycoGradientCreate(f->scene, o.store, gradient));
   ierr = Create(&o);

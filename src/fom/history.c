@@ -327,6 +327,18 @@ PetscErrorCode HycoPathRun(HycoPath p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+void HycoPathExtremes(HycoScene scene, PetscInt n, const HycoStep step[], PetscReal value[])
+{
+  for (PetscInt q = 0; q < scene->n_quantities; q++) {
+    const HycoQuantityKind kind = scene->quantity[q].kind;
+    const PetscBool least = (PetscBool)(kind == HYCO_QUANTITY_MIN || kind == HYCO_QUANTITY_PRESSURE_MIN);
+
+    value[q] = step[0].quantity[q];
+    for (PetscInt k = 1; k < n; k++)
+      value[q] = least ? PetscMin(value[q], step[k].quantity[q]) : PetscMax(value[q], step[k].quantity[q]);
+  }
+}
+
 /* Reals, for the median. */
 static int Ascending(const void *a, const void *b)
 {
@@ -350,6 +362,7 @@ void HycoPathGetHistory(HycoPath p, HycoHistory *h)
   h->n_orders = p->n_orders;
   h->n_taken = p->n_taken;
   h->taken = p->taken;
+  if (p->n_steps) HycoPathExtremes(p->scene, p->n_steps, p->steps, h->path_quantity);
   if (p->n_orders) qsort(p->orders, (size_t)p->n_orders, sizeof(*p->orders), Ascending);
   if (p->n_orders) h->order = p->orders[p->n_orders / 2];
 }

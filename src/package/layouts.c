@@ -43,7 +43,7 @@ static const HycoMember step[] = {
 #define F(member) FIELD(HycoHistory, member)
 static const HycoMember history[] = {
   F(n), F(step), F(ended), F(t), F(why), F(newton), F(factor_cost), F(n_orders), F(order), F(n_taken), F(taken),
-  F(n_bound), F(rate_change)};
+  F(path_quantity), F(n_bound), F(rate_change)};
 #undef F
 
 #define F(member) FIELD(HycoReaction, member)
@@ -72,7 +72,8 @@ static const HycoMember prediction[] = {
 
 #define F(member) FIELD(HycoGradient, member)
 static const HycoMember gradient[] = {
-  F(n_outputs), F(n_parameters), F(n_undecided), F(value), F(kink)};
+  F(n_outputs), F(n_parameters), F(n_undecided), F(value), F(kink), F(n_times), F(times), F(times_kink), F(path),
+  F(path_kink)};
 #undef F
 
 #define F(member) FIELD(HycoFit, member)

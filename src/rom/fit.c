@@ -42,9 +42,17 @@ static PetscReal Size(PetscInt n, const PetscReal v[])
   return PetscSqrtReal(sum);
 }
 
+/* The output of target k: those of the end of a path are followed by their extremes. */
+static PetscReal Value(const Fit *f, const HycoPrediction *p, PetscInt k)
+{
+  const PetscInt q = f->output[k], n = f->model->model->scene->n_quantities;
+
+  return q < n ? p->quantity[q] : p->path_quantity[q - n];
+}
+
 static void Misfit(const Fit *f, const HycoPrediction *p, PetscReal r[])
 {
-  for (PetscInt k = 0; k < f->n; k++) r[k] = (p->quantity[f->output[k]] - f->target[k]) / f->scale[k];
+  for (PetscInt k = 0; k < f->n; k++) r[k] = (Value(f, p, k) - f->target[k]) / f->scale[k];
 }
 
 /* r and J at x. */
@@ -67,10 +75,11 @@ static PetscErrorCode Evaluate(Fit *f, const PetscReal x[])
   f->kink = PETSC_FALSE;
   for (PetscInt k = 0; k < f->n; k++) {
     for (PetscInt p = 0; p < f->n_par; p++) {
-      const PetscInt at = f->output[k] * f->n_par + p;
+      const PetscBool path = (PetscBool)(f->output[k] >= g.n_outputs);
+      const PetscInt at = (f->output[k] - (path ? g.n_outputs : 0)) * f->n_par + p;
 
-      f->J[k * f->n_par + p] = g.value[at] * (f->hi[p] - f->lo[p]) / f->scale[k];
-      f->kink = (PetscBool)(f->kink || g.kink[at]);
+      f->J[k * f->n_par + p] = (path ? g.path : g.value)[at] * (f->hi[p] - f->lo[p]) / f->scale[k];
+      f->kink = (PetscBool)(f->kink || (path ? g.path_kink : g.kink)[at]);
     }
   }
   PetscCall(PetscArraycpy(f->x, x, f->n_par));
@@ -155,7 +164,7 @@ static PetscErrorCode Sample(Fit *f, PetscInt n, const PetscReal mu[], PetscReal
   for (PetscInt k = 0; k < f->n; k++) {
     f->scale[k] = PetscAbsReal(f->target[k]);
     for (PetscInt i = 0; i < n && f->target[k] == 0; i++)
-      f->scale[k] = PetscMax(f->scale[k], PetscAbsReal(p[i].quantity[f->output[k]]));
+      f->scale[k] = PetscMax(f->scale[k], PetscAbsReal(Value(f, &p[i], k)));
     if (f->scale[k] == 0) f->scale[k] = 1;
   }
   for (PetscInt i = 0; i < n; i++) {
@@ -309,15 +318,14 @@ PetscErrorCode HycoROMFit(HycoROM m, PetscInt n, const PetscInt output[], const 
 
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
-  PetscCall(HycoSceneRefuseHistory(scene, "a fit"));
   HycoCheck(n > 0 && n <= HYCO_MAX_QUANTITIES && n_samples > 0 && n_starts > 0,
             "a fit has %d targets, %d samples and %d starts; at least 1 of each is expected", (int)n, (int)n_samples,
             (int)n_starts);
   HycoCheck(!strcmp(type, HYCO_FIT_BRGN) || !strcmp(type, HYCO_FIT_BLMVM),
             "the type of a fit is \"%s\"; it must be " HYCO_FIT_BRGN " or " HYCO_FIT_BLMVM, type);
   for (PetscInt k = 0; k < n; k++)
-    HycoCheck(output[k] >= 0 && output[k] < scene->n_quantities, "there is no output %d; the model has %d",
-              (int)output[k], (int)scene->n_quantities);
+    HycoCheck(output[k] >= 0 && output[k] < (scene->n_times ? 2 : 1) * scene->n_quantities,
+              "there is no output %d; the model has %d", (int)output[k], (int)scene->n_quantities);
   f.lo = scene->lo;
   f.hi = scene->hi;
   *fit = (HycoFit){.n_starts = n_starts};

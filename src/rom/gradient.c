@@ -251,7 +251,7 @@ static PetscErrorCode Columns(Work *o, HycoGradient *gradient)
   PetscFunctionBegin;
   PetscCall(HycoFEUseCells(m->fe, (PetscBool)!m->model->traits.surfaces));
   for (PetscInt p = 0; p < gradient->n_parameters; p++) {
-    HycoDifferenceSet(m->model->scene, o->mu, p, &o->along[p].d);
+    HycoDifferenceSet(m->model->scene, o->mu, p, HYCO_GRADIENT_STEP, &o->along[p].d);
     PetscCall(Differentiate(o, &o->along[p]));
   }
   PetscCall((*m->ops->residual)(m, o->mu, o->z, NULL, &size));
@@ -293,7 +293,7 @@ static PetscErrorCode Check(HycoROM m)
 {
   PetscFunctionBegin;
   PetscCall(HycoGradientCheckScene(m->model->scene));
-  HycoCheck(m->ops->residual,
+  HycoCheck(m->ops->residual || m->trace.history.n_taken,
             "a model of type %s has no gradients; train one with -hyco_model_type bodies, hybrid or projection",
             m->model->type);
   PetscCheck(m->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoROMPredict() before HycoROMGetGradient()");
@@ -310,6 +310,10 @@ PetscErrorCode HycoROMGetGradient(HycoROM m, HycoGradient *gradient)
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
   PetscCall(Check(m));
+  if (m->model->scene->n_times) {
+    PetscCall(HycoROMPathGradient(m, gradient));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(HycoROMComplete(m));
   PetscCall(HycoGradientCreate(m->model->scene, &m->gradient, gradient));
   ierr = Create(&o);

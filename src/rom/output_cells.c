@@ -4,6 +4,7 @@
 */
 #include <hycofields.h>
 #include <hycoinelastic.h>
+#include <hycopath.h>
 #include <hycoquantities.h>
 #include <hycoromimpl.h>
 #include <math.h>
@@ -241,19 +242,8 @@ static void CollectPath(HycoROM m, HycoPrediction *out)
 {
   const HycoTrace *trace = &m->trace;
 
-  for (PetscInt q = 0; q < m->model->scene->n_quantities; q++) {
-    const HycoQuantityKind kind = m->model->scene->quantity[q].kind;
-    const PetscBool least = (PetscBool)(kind == HYCO_QUANTITY_MIN || kind == HYCO_QUANTITY_PRESSURE_MIN);
-    PetscReal *most = &out->path_quantity[q];
-
-    out->quantity[q] = trace->step[trace->shown].quantity[q];
-    *most = trace->step[0].quantity[q];
-    for (PetscInt j = 1; j < trace->n_listed; j++) {
-      const PetscReal value = trace->step[j].quantity[q];
-
-      *most = least ? PetscMin(*most, value) : PetscMax(*most, value);
-    }
-  }
+  PetscCallVoid(PetscArraycpy(out->quantity, trace->step[trace->shown].quantity, m->model->scene->n_quantities));
+  HycoPathExtremes(m->model->scene, trace->n_listed, trace->step, out->path_quantity);
 }
 
 /* Sets p->u and p->sigma for a prediction without a history. */
@@ -341,6 +331,7 @@ PetscErrorCode HycoROMMeasurePath(HycoROM m)
   PetscCall(PetscArraycpy(trace->step, trace->history.step, trace->n_listed));
   HycoOnError(MeasureTimes(m), PetscCall(PetscFree(trace->step)));
   trace->history.step = trace->step;
+  HycoPathExtremes(m->model->scene, trace->n_listed, trace->step, trace->history.path_quantity);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

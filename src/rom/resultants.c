@@ -149,13 +149,14 @@ static PetscErrorCode BringLoads(HycoResultants r, const PetscReal mu[])
 
   PetscFunctionBegin;
   for (PetscInt p = 0; p < s->n_variables; p++) changed[p] = (PetscBool)(!r->ready || mu[p] != r->mu[p]);
+  c = HycoSceneChanges(s, changed);
+  /* Moduli act on the forces of heat alone. */
   for (PetscInt b = 0; b < s->n_bodies; b++)
     heat =
-        (PetscBool)(heat || HycoExprChanges(s->body[b].temperature, changed) ||
-                    HycoExprChanges(s->body[b].reference, changed) || HycoExprChanges(s->body[b].expansion, changed));
-  c = HycoSceneChanges(s, changed);
-  if (r->ready && !c.nodes && !c.stiffness && !heat && !HycoSceneLoadsChange(s, changed))
-    PetscFunctionReturn(PETSC_SUCCESS);
+        (PetscBool)(heat || (s->body[b].expansion && (c.stiffness || HycoExprChanges(s->body[b].temperature, changed) ||
+                                                      HycoExprChanges(s->body[b].reference, changed) ||
+                                                      HycoExprChanges(s->body[b].expansion, changed))));
+  if (r->ready && !c.nodes && !heat && !HycoSceneLoadsChange(s, changed)) PetscFunctionReturn(PETSC_SUCCESS);
   r->ready = PETSC_FALSE;
   PetscCall(HycoFESetParameters(r->fe, mu));
   PetscCall(HycoFELoads(r->fe, r->load));

@@ -7,7 +7,7 @@
 PetscErrorCode HycoTraceFree(HycoROM m)
 {
   HycoTrace *r = &m->trace;
-  const HycoTrace empty = {.n_given = r->n_given, .given = r->given, .most_cuts = r->most_cuts};
+  const HycoTrace empty = {.n_given = r->n_given, .given = r->given, .most_cuts = r->most_cuts, .rtol = r->rtol};
 
   PetscFunctionBegin;
   m->pairs.shear = m->whole_pairs.shear = NULL;
@@ -150,6 +150,8 @@ static void Summarise(HycoPath p, HycoPrediction *out)
 PetscErrorCode HycoTraceFollow(HycoROM m, HycoPath p, const PetscReal mu[])
 {
   HycoPrediction *out = &m->prediction;
+  const PetscReal rtol = p->rtol;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
   out->iterations = 0;
@@ -161,8 +163,12 @@ PetscErrorCode HycoTraceFollow(HycoROM m, HycoPath p, const PetscReal mu[])
   /* A prediction must not depend on the path before it. */
   p->cold = PETSC_TRUE;
   PetscCall(HycoTraceBegin(m));
+  if (m->trace.rtol > 0) p->rtol = PetscMin(rtol, m->trace.rtol);
   PetscCall(HycoPathBegin(p, mu));
-  PetscCall(HycoPathRun(p));
+  ierr = HycoPathRun(p);
+  p->rtol = rtol;
+  PetscCall(ierr);
+  m->trace.n_cuts = p->n_cuts;
   HycoPathGetHistory(p, &m->trace.history);
   Summarise(p, out);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -41,7 +41,8 @@ TRAINED = ['-scene', ROPE, '-output_most_max', 'u', '-grid', '4,4']
 ELSEWHERE = {'missed', 'options_from.SOURCE', 'unseen_feature', 'fallback', 'greedy.max_eta', 'n_supremizers', 'dual_misfit', 'cubature_error', 'n_inelastic_modes',
              'inelastic_amplification', 'equilibrium', 'search.variant', 'held_out.ERROR.end', 'ties[].slave_over_master', 'contacts[].slave_over_master', 'contacts[].n_between_nodes',
              'seconds_full_order', 'seconds_reduced', 'equilibrium.worst', 'equilibrium.t', 'equilibrium.worst_contact', 'equilibrium.residual', 'equilibrium.contact',
-             'training_error_u', 'training_error_lambda_rid', 'condition', 'ties[].name', 'ties[].n_nodes', 'gradient_kinks[].output', 'gradient_kinks[].parameter'}
+             'training_error_u', 'training_error_lambda_rid', 'condition', 'ties[].name', 'ties[].n_nodes', 'gradient_kinks[].output', 'gradient_kinks[].parameter',
+             'gradient_kinks[].t'}
 
 
 def listed():
@@ -89,7 +90,7 @@ class Output(Case):
         blocks = os.path.join(EXAMPLES, 'blocks')
         runs = [('check', ['check', '-scene', ROPE, '-check_solve']), ('check', ['check', '-scene', os.path.join(EXAMPLES, 'rod')]), ('check', ['check', '-scene', blocks]),
                 ('solve', ['solve', '-scene', ROPE, '-mu', '0.07,0.17', '-output', 'rope.xdmf']), ('solve', ['solve', '-scene', punch, '-mu', '20', '-gradient', '-output', 'punch.xdmf']),
-                ('solve', ['solve', '-scene', pad, '-mu', '0.3', '-output', 'pad.xdmf', '-table', 'solve-path.csv']),
+                ('solve', ['solve', '-scene', pad, '-mu', '0.3', '-output', 'pad.xdmf', '-table', 'solve-path.csv', '-gradient']),
                 ('solve', ['solve', '-scene', blocks, '-contact_under_type', 'mortar', '-mu', '0.05,0.05', '-output', 'blocks.xdmf']),
                 ('solve', ['solve', '-scene', blocks, '-grid', '2,2', '-table', 'solve-set.h5', '-output', 'set.xdmf']),
                 ('train', ['train', *TRAINED, '-target_u', '0.1', '-model', 'model.h5', '-table', 'train-search.csv']),

@@ -353,6 +353,19 @@ class Decks(Case):
             self.assertEqual(len([line for line in left if words in line]), 1, left)
         self.near(self.solve(folder).total_contact_force, 30, 1e-9)
 
+    def test_renewed(self):
+        """A later *BOUNDARY of the same nodes replaces the earlier one, though it has another value; *DLOAD on shells is left out, not an unknown group; a slave of nodes
+        that is drawn a tenth of an edge away is within the tolerance."""
+        a, b = Box('A', 'C3D8', (0, 0, 0), (1, 1, 1), (2, 2, 2)), Box('B', 'C3D8', (0, 0, 1.05), (1, 1, 2), (2, 2, 2), 1001)
+        shell = '*ELEMENT, TYPE=S4, ELSET=SKIN\n9001, 1, 2, 5, 4\n*SHELL SECTION, ELSET=SKIN, MATERIAL=STEEL\n0.1\n'
+        contact = HARD + '*SURFACE, NAME=POINTS, TYPE=NODE\nB_Z0\n*CONTACT PAIR, INTERACTION=SI, TYPE=NODE TO SURFACE\nPOINTS, A_SZ1\n'
+        left, folder = self.convert('renewed', deck([a, b], shell + contact + SYMMETRY + 'A_Z0, 3, 3\nB_Z1, 3, 3\n',
+                                                    [('', '*STATIC\n1., 1.\n*DLOAD\nSKIN, P, 1.\n9001, P1, 1.\n'), ('', '*STATIC\n1., 1.\n*BOUNDARY\nB_Z1, 3, 3, -0.06\n')]))
+        self.assertTrue(any('*DLOAD on elements that are no solids' in line for line in left), left)
+        solution = self.solve(folder)
+        self.near(solution.displacement[:, 2].min(), -0.06, 1e-9)
+        self.assertGreater(solution.contact_forces.sum(), 0)
+
     def test_page(self):
         """docs/convert.md: the commands of the worked deck, and what they print."""
         tools = self.path('page', 'tools')

@@ -217,6 +217,12 @@ class Python(Case):
             self.near(h['long'][-1], s.outputs['long'], 0.02)
             self.near(p.outputs['long'], h['long'][-1], 1e-12)
             self.near(model.predict([[0.7], [0.9]]).outputs['long'][1], p.outputs['long'], 1e-9)
+            g = model.gradient([[0.7], [0.9]])
+            self.assertEqual((g.value.shape, g.times.shape, g.path.shape), ((2, 1, 1), (2, 3, 1, 1), (2, 1, 1)))
+            np.testing.assert_array_equal(g.times[:, -1], g.value)
+            np.testing.assert_allclose(g.path, g.value, rtol=1e-9)  # it is longest at the end
+            report = self.hyco('predict', '-model', 'bar.h5', '-mu', '0.9', '-gradient')
+            np.testing.assert_allclose(g.times[1, :, 0, 0], report['gradient_times']['long']['pull'], rtol=1e-9)
 
     def test_threads(self):
         """Threads take turns: their predictions are those of one."""

@@ -38,9 +38,10 @@ typedef struct {
 
 /* Arrays in the caller's memory. */
 typedef struct {
-  double *f, *q, *w, *z, *value;        /* functions; n_motions + n_contacts; values */
-  double *W, *A, *L, *V, *S, *last, *y; /* L: factor of W on the closed contacts; V = L^-1 A^T; S: factor of V^T V */
-  int *closed, *at, n_closed;           /* by contact; the closed ones */
+  double *f, *q, *w, *z, *value; /* functions; n_motions + n_contacts; values */
+  /* L: factor of W on the closed contacts, in rows of n_contacts; V = L^-1 A^T; S: factor of V^T V */
+  double *W, *A, *L, *V, *S, *last, *y;
+  int *closed, *at, n_closed; /* by contact: 0, open; 2, one of the next; the closed ones, rows of L */
 } Work;
 
 static size_t work_doubles(const Model *m)
@@ -122,16 +123,17 @@ static void assemble(const Model *m, Work *o)
   }
 }
 
-/* Lower factor, row by row, of the matrix in the lower triangle of a: n x n. A row that depends on the former ones has an
-   infinite pivot, so that its unknown is 0. Returns the number of such rows. */
-static int factorise(size_t n, double a[])
+/* Lower factor, row by row, of the matrix in the lower triangle of a: n rows of the length `row_length`, of which the first
+   `done` are factored. A row that depends on the former ones has an infinite pivot, so that its unknown is 0. Returns the
+   number of such rows. */
+static int factorise(size_t n, size_t row_length, size_t done, double a[])
 {
   int dependent = 0;
 
-  for (size_t i = 0; i < n; i++) {
-    double *row = a + i * n, pivot = row[i];
+  for (size_t i = done; i < n; i++) {
+    double *row = a + i * row_length, pivot = row[i];
 
-    for (size_t j = 0; j < i; j++) row[j] = (row[j] - dot(j, row, a + j * n)) / a[j * n + j];
+    for (size_t j = 0; j < i; j++) row[j] = (row[j] - dot(j, row, a + j * row_length)) / a[j * row_length + j];
     row[i] = pivot - dot(i, row, row);
     if (row[i] > 1e-13 * pivot) {
       row[i] = sqrt(row[i]);
@@ -144,18 +146,39 @@ static int factorise(size_t n, double a[])
 }
 
 /* x = L^-1 x; an infinite pivot gives 0. */
-static void forward(size_t n, const double a[], double x[])
+static void forward(size_t n, size_t row_length, const double a[], double x[])
 {
-  for (size_t i = 0; i < n; i++) x[i] = (x[i] - dot(i, a + i * n, x)) / a[i * n + i];
+  for (size_t i = 0; i < n; i++) x[i] = (x[i] - dot(i, a + i * row_length, x)) / a[i * row_length + i];
 }
 
 /* x = L^-T x. */
-static void backward(size_t n, const double a[], double x[])
+static void backward(size_t n, size_t row_length, const double a[], double x[])
 {
   for (size_t i = n; i-- > 0;) {
-    x[i] /= a[i * n + i];
-    for (size_t j = 0; j < i; j++) x[j] -= a[i * n + j] * x[i];
+    x[i] /= a[i * row_length + i];
+    for (size_t j = 0; j < i; j++) x[j] -= a[i * row_length + j] * x[i];
   }
+}
+
+/* The closed contacts in `at`, those of the last set first and in their order: the rows of the factor stay up to the first
+   that has left. Returns how many. */
+static size_t arrange(const Model *m, Work *o)
+{
+  size_t same = (size_t)o->n_closed;
+  int k = 0;
+
+  for (int i = 0; i < o->n_closed; i++) {
+    if (o->closed[o->at[i]])
+      o->at[k++] = o->at[i];
+    else if (same > (size_t)i)
+      same = (size_t)i;
+  }
+  for (int i = 0; i < m->n_contacts; i++) {
+    if (o->closed[i] == 1) o->at[k++] = i;
+    if (o->closed[i]) o->closed[i] = 2;
+  }
+  o->n_closed = k;
+  return same;
 }
 
 /* z with the closed contacts at gap 0 and the others without force; epsilon, delta: of epsilon (x - last) added to w_x, and
@@ -163,39 +186,35 @@ static void backward(size_t n, const double a[], double x[])
 static int solve_set(const Model *m, Work *o, double epsilon, double delta)
 {
   const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts;
+  const size_t same = arrange(m, o), k = (size_t)o->n_closed;
   double *x = o->z, *L = o->z + p;
-  size_t k = 0;
   int loose;
 
-  for (size_t i = 0; i < n; i++) {
-    L[i] = 0;
-    if (o->closed[i]) o->at[k++] = (int)i;
-  }
-  o->n_closed = (int)k;
+  for (size_t i = 0; i < n; i++) L[i] = 0;
   for (size_t i = 0; i < k; i++) {
     const size_t a = (size_t)o->at[i];
 
-    for (size_t j = 0; j <= i; j++) o->L[i * k + j] = entry(o->W, a, (size_t)o->at[j]);
+    for (size_t j = 0; j <= i && i >= same; j++) o->L[i * n + j] = entry(o->W, a, (size_t)o->at[j]);
+    if (i >= same) o->L[i * n + i] += delta;
     for (size_t j = 0; j < p; j++) o->V[j * k + i] = o->A[j * n + a];
-    o->L[i * k + i] += delta;
     o->y[i] = delta * o->last[p + a] - o->q[p + a];
   }
-  factorise(k, o->L);
-  forward(k, o->L, o->y);
+  factorise(k, n, same, o->L);
+  forward(k, n, o->L, o->y);
   for (size_t i = 0; i < p; i++) {
-    forward(k, o->L, o->V + i * k);
+    forward(k, n, o->L, o->V + i * k);
     for (size_t j = 0; j <= i; j++) o->S[i * p + j] = dot(k, o->V + i * k, o->V + j * k);
     o->S[i * p + i] += epsilon;
     x[i] = -o->q[i] - dot(k, o->V + i * k, o->y) + epsilon * o->last[i];
   }
-  loose = factorise(p, o->S);
+  loose = factorise(p, p, 0, o->S);
   if (loose) return 0;
-  forward(p, o->S, x);
-  backward(p, o->S, x);
+  forward(p, p, o->S, x);
+  backward(p, p, o->S, x);
   for (size_t i = 0; i < k; i++) {
     for (size_t j = 0; j < p; j++) o->y[i] += o->V[j * k + i] * x[j];
   }
-  backward(k, o->L, o->y);
+  backward(k, n, o->L, o->y);
   for (size_t i = 0; i < k; i++) L[o->at[i]] = o->y[i];
   return 1;
 }
@@ -253,10 +272,16 @@ static int search(const Model *m, Work *o, double epsilon, double delta, int *it
   return 0;
 }
 
-/* With motions all contacts are closed at first: an open set would let the bodies go. */
+/* The contacts that are closed at first: those at least half as deep as the deepest without forces, since on rounded surfaces
+   the others open again; with motions all, as an open set would let the bodies go. */
 static void start(const Model *m, Work *o)
 {
-  for (int i = 0; i < m->n_contacts; i++) o->closed[i] = m->n_motions > 0 || o->q[i] < 0;
+  double least = 0;
+
+  for (int i = 0; i < m->n_contacts; i++) least = fmin(least, o->q[m->n_motions + i]);
+  for (int i = 0; i < m->n_contacts; i++)
+    o->closed[i] = m->n_motions > 0 || (o->q[m->n_motions + i] < 0 && o->q[m->n_motions + i] <= least / 2);
+  o->n_closed = 0;
   for (int i = 0; i < m->n_motions + m->n_contacts; i++) o->last[i] = 0;
 }
 
@@ -265,12 +290,15 @@ static double kkt_residual(const Model *m, Work *o)
 {
   const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts;
   double gap, force, most = 0;
+  int dropped = 0;
 
   residual(m, o, &gap, &force);
   for (size_t i = 0; i < n; i++) { /* forces that move no gap by more than round-off are 0, as without loads */
-    if (!o->closed[i] || o->z[p + i] * entry(o->W, i, i) <= 1e-15 * gap) o->z[p + i] = 0;
+    if (o->z[p + i] == 0 || (o->closed[i] && o->z[p + i] * entry(o->W, i, i) > 1e-15 * gap)) continue;
+    o->z[p + i] = 0;
+    dropped = 1;
   }
-  residual(m, o, &gap, &force);
+  if (dropped) residual(m, o, &gap, &force);
   for (size_t i = 0; i < p; i++) {
     double size = fabs(o->q[i]);
 

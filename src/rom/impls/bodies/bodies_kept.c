@@ -27,7 +27,7 @@ static PetscBool Same(HycoBodiesWork o, PetscInt m)
 static PetscErrorCode ForgetColumns(HycoBodiesKept *kept, PetscInt n)
 {
   PetscFunctionBegin;
-  for (PetscInt i = 0; kept->P && i < n; i++) HycoFreeAll(&kept->P[i], &kept->W[i]);
+  for (PetscInt i = 0; kept->P && i < n; i++) HycoFreeAll(&kept->P[i], &kept->W[i], &kept->blend[i]);
   kept->bytes = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -39,7 +39,7 @@ PetscErrorCode HycoBodiesForgetKept(HycoBodiesWork o)
 
   PetscFunctionBegin;
   if (o->bodies) PetscCall(ForgetColumns(kept, kept->m * o->bodies->n));
-  HycoFreeAll(&kept->start, &kept->at, &kept->value, &kept->P, &kept->W);
+  HycoFreeAll(&kept->start, &kept->at, &kept->value, &kept->P, &kept->W, &kept->blend, &kept->at_weights);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -54,6 +54,8 @@ PetscErrorCode HycoBodiesKeepRows(HycoBodiesWork o, PetscInt m)
   if (kept->same && !kept->P) {
     PetscCall(PetscCalloc1(n + 1, &kept->P));
     PetscCall(PetscCalloc1(n + 1, &kept->W));
+    PetscCall(PetscCalloc1(n + 1, &kept->blend));
+    PetscCall(PetscCalloc1(n + 1, &kept->at_weights));
   }
   if (kept->same) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(ForgetColumns(kept, n));
@@ -144,6 +146,28 @@ void HycoBodiesKeptRow(HycoBodiesWork o, PetscInt k, PetscInt n, const PetscInt 
   }
 }
 
+/* P of contact k in body j at the present weights; made once for these. */
+static PetscErrorCode BlendColumn(HycoBodiesWork o, PetscInt k, PetscInt j, const PetscReal **column)
+{
+  HycoBodiesKept *kept = &o->kept;
+  const HycoSubstructure *own = &o->bodies->body[j];
+  const PetscInt at = k * o->bodies->n + j;
+
+  PetscFunctionBegin;
+  *column = kept->P[at];
+  if (own->C.n_terms == 1 && o->share[j][0] == 1) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!kept->blend[at]) {
+    PetscCall(PetscMalloc1(own->n + 1, &kept->blend[at]));
+    kept->bytes += 8 * (PetscReal)own->n;
+    kept->at_weights[at] = -1;
+  }
+  *column = kept->blend[at];
+  if (kept->at_weights[at] == kept->weights[j]) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoBodiesBlend(o, j, own->n, (size_t)own->n, kept->P[at], kept->blend[at]);
+  kept->at_weights[at] = kept->weights[j];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 PetscErrorCode HycoBodiesKeptDisplace(HycoBodiesWork o, PetscInt m, const PetscReal Lambda[], PetscReal u[])
 {
   const HycoSubstructures b = o->bodies;
@@ -151,17 +175,13 @@ PetscErrorCode HycoBodiesKeptDisplace(HycoBodiesWork o, PetscInt m, const PetscR
   PetscFunctionBegin;
   for (PetscInt j = 0; j < b->n; j++) {
     const HycoSubstructure *own = &b->body[j];
-    PetscReal *blended;
-
-    PetscCall(PetscMalloc1(own->n + 1, &blended));
     for (PetscInt k = 0; k < m; k++) {
       const PetscReal *P = o->kept.P[k * b->n + j], force = -Lambda[k] / o->kappa[j];
 
       if (!P || Lambda[k] == 0) continue;
-      HycoBodiesBlend(o, j, own->n, (size_t)own->n, P, blended);
-      HycoBodiesAdd(own->n, force, blended, u + b->start[j]);
+      PetscCall(BlendColumn(o, k, j, &P));
+      HycoBodiesAdd(own->n, force, P, u + b->start[j]);
     }
-    PetscCall(PetscFree(blended));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -26,9 +26,9 @@ PetscErrorCode HycoBodiesReset(HycoBodiesWork o)
   PetscCall(HycoTaoDestroy(&o->tao));
   PetscCall(HycoSolverDestroy(&o->own));
   for (PetscInt k = 0; o->weight && k < o->bodies->n; k++) HycoFreeAll(&o->weight[k], &o->share[k], &o->blend[k]);
-  HycoFreeAll(&o->weight, &o->share, &o->blend, &o->blended, &o->X0, &o->E0, &o->E_at, &o->pose, &o->kappa, &o->c,
-              &o->elastic, &o->free, &o->u, &o->f, &o->x, &o->loc, &o->row_start, &o->row_at, &o->row, &o->gap,
-              &o->active, &o->Z, &o->work);
+  HycoFreeAll(&o->kept.weights, &o->weight, &o->share, &o->blend, &o->blended, &o->X0, &o->E0, &o->E_at, &o->pose,
+              &o->kappa, &o->c, &o->elastic, &o->free, &o->u, &o->f, &o->x, &o->loc, &o->row_start, &o->row_at, &o->row,
+              &o->gap, &o->active, &o->Z, &o->work);
   PetscCall(PetscMemzero(o, sizeof(*o)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -187,6 +187,7 @@ PetscErrorCode HycoBodiesSetUp(HycoBodiesWork o, HycoSubstructures b, HycoScene 
   PetscCall(PetscCalloc1(b->n, &o->share));
   PetscCall(PetscCalloc1(b->n, &o->blend));
   PetscCall(PetscCalloc1(b->ns + 1, &o->blended));
+  PetscCall(PetscCalloc1(b->n, &o->kept.weights));
   for (PetscInt k = 0; k < b->n; k++) {
     PetscCall(PetscCalloc1(b->body[k].n_samples, &o->weight[k]));
     PetscCall(PetscCalloc1(b->body[k].C.n_terms + 1, &o->share[k]));
@@ -393,6 +394,7 @@ static PetscErrorCode TakeWeights(HycoBodiesWork o, const PetscReal mu[])
     PetscCall(HycoBodiesWeights(b, k, mu, weight));
     PetscCall(PetscArraycmp(weight, o->weight[k], n, &same));
     if (!same) PetscCall(PetscArrayzero(o->blended + b->start[k], b->body[k].n));
+    o->kept.weights[k] += !same;
     PetscCall(PetscFree(o->weight[k]));
     o->weight[k] = weight;
     HycoFlexibilityShares(&b->body[k].C, n, weight, o->share[k]);

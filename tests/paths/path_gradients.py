@@ -1,0 +1,127 @@
+"""Gradients of paths (creep, yielding, friction), at full order and of models of bodies and hybrid ones: outputs at each listed time and the extremes over
+them against central differences of paths in the same steps; one-sided and flagged at kinks; the path stays; a fit to outputs of a path."""
+import os
+import sys
+import unittest
+
+import h5py
+
+from common import SOURCE, Case
+
+sys.path.insert(0, os.path.join(SOURCE, 'tests', 'verify'))
+from grids import Grid  # noqa: E402
+
+SCENE = """
+scene: {title: a block that is pressed on a stop while it flows, mesh: mesh.msh, parameters: [push, stop, LAST]}
+parameter: {push: {range: [40, 80]}, stop: {range: [1e-4, 4e-4]}, LAST: {range: RANGE}}
+body: {block: {LAW, young: 1e5, poisson: 0.3}}
+fixed: {left: {x: 0}, low: {y: 0}}
+pressure: {right: -push*q}
+contact: {wall: {type: obstacle, group: high, normal: {y: 1}, gap: -stop*(0.2 + x)FRICTION}}
+output:
+  end: {max: u_x, group: right}
+  held: {force: y, contact: wall}
+  least: {min: sigma_xx, group: block}
+  mean: {mean: mises, group: block}
+history: {times: [0, 1, 4, 8], tables: {q: [[0, 0.2], [1, 1], [4, 1.1], [8, 0.6]]}}
+"""
+BAR = """
+scene: {title: a bar that is pulled to a stop, mesh: mesh.msh, parameters: [p]}
+parameter: {p: {range: [0.25, 1]}}
+body: {bar: {young: 1, poisson: 0}}
+fixed: {left: {x: 0}}
+force: {right: {x: p*q}}
+contact: {stop: {type: obstacle, group: right, normal: {x: 1}, gap: 0.5}}
+output: {push: {force: x, contact: stop}, end: {max: u_x}}
+history: {times: [0, 1, 2], tables: {q: [[0, 0.5], [1, 1], [2, 0.9]]}}
+"""
+CREEP = (('LAST', 'rate'), ('RANGE', '[5e-10, 2e-9]'), ('LAW', 'law: norton, rate: rate, exponent: 3'), ('FRICTION', ''))
+YIELD = (('LAST', 'limit'), ('RANGE', '[35, 45]'), ('LAW', 'law: j2, yield: limit, hardening: 5000'), ('FRICTION', ''))
+RUB = (('LAST', 'rough'), ('RANGE', '[0.1, 0.5]'), ('LAW', 'law: elastic'), ('FRICTION', ', friction: rough'))
+STEPS = ('-hyco_substeps', '4', '-hyco_step_inelastic', '1e3', '-hyco_newton_rtol', '1e-13')
+RANGES = {'push': (40, 80), 'stop': (1e-4, 4e-4), 'rate': (5e-10, 2e-9), 'limit': (35, 45), 'rough': (0.1, 0.5)}
+WIDTH = 2e-4  # of the central differences, as a share of the range
+
+
+class PathGradients(Case):
+    def write(self, laws):
+        text = SCENE
+        for a, b in laws:
+            text = text.replace(a, b)
+        grid = Grid()
+        grid.box('quad4', [[0, 0.3, 0.6, 1], [0, 0.5, 1]], lambda x: x, 'block', {'x0': 'left', 'x1': 'right', 'y0': 'low', 'y1': 'high'})
+        return self.written(text, grid)
+
+    def differ(self, found, low, high, scale, what):
+        """A derivative times its range is the central difference of the values."""
+        self.assertLess(abs(found - (high - low) / WIDTH), 1e-6 * scale, what)
+
+    def test_full_order(self):
+        """Creep, yielding and friction at each listed time; the path itself is that without gradients."""
+        for laws, name, along, mu in ((CREEP, 'rate', ('push', 'rate'), 1.1e-9), (YIELD, 'limit', ('limit',), 39.0), (RUB, 'rough', ('rough',), 0.23)):
+            scene, point = self.write(laws), {'push': 61.0, 'stop': 2.3e-4, name: mu}
+            solve = lambda at, *args, scene=scene: self.hyco('solve', '-scene', scene, *STEPS, '-mu', ','.join(map(repr, at.values())), *args)
+            report = solve(point, '-gradient')
+            self.assertEqual(report['gradient_kinks'], [])
+            for p in along:
+                width = RANGES[p][1] - RANGES[p][0]
+                low, high = (solve({**point, p: point[p] + sign * WIDTH / 2 * width})['history']['outputs'] for sign in (-1, 1))
+                for output, values in report['history']['outputs'].items():
+                    extreme, times = min if output == 'least' else max, report['gradient_times'][output][p]
+                    scale = max(max(map(abs, times)) * width, 1e-3 * max(map(abs, values)))
+                    for k, value in enumerate(times):
+                        self.differ(value * width, low[output][k], high[output][k], scale, (p, output, k))
+                    self.assertEqual(report['gradient'][output][p], times[-1])
+                    self.differ(report['gradient_path'][output][p] * width, extreme(low[output]), extreme(high[output]), scale, (p, output))
+            if laws == CREEP:
+                plain = solve(point)
+                for key in ('outputs', 'contacts', 'supports'):
+                    self.assertEqual(report[key], plain[key], key)
+
+    def test_kink(self):
+        """A gap that closes exactly at a listed time: there, and of the extreme, derivatives are one-sided and flagged, towards larger loads; not elsewhere."""
+        grid = Grid()
+        grid.box('line2', [[0, 0.5, 1]], lambda x: x, 'bar', {'x0': 'left', 'x1': 'right'})
+        r = self.hyco('solve', '-scene', self.written(BAR, grid), '-mu', '0.5', '-gradient')
+        self.assertEqual(sorted((k['output'], k.get('t')) for k in r['gradient_kinks']), [('end', 1), ('path_end', None), ('push', 1)])  # the largest push, with its sign, is 0
+        for output, expected in (('push', [0, 1, 0]), ('end', [0.5, 0, 0.9])):
+            for value, exact in zip(r['gradient_times'][output]['p'], expected):
+                self.assertAlmostEqual(abs(value), exact, 7, output)
+
+    def test_models(self):
+        """Models of bodies (creep, friction) and hybrid ones, at the end and of the extremes; a prediction stays; outputs of a path determine its parameters."""
+        for kind, laws, name, mu in (('hybrid', CREEP, 'rate', 1.1e-9), ('bodies', RUB, 'rough', 0.23), ('bodies', CREEP, 'rate', 1.1e-9)):
+            self.hyco('train', '-scene', self.write(laws), *STEPS, '-hyco_model_type', kind, '-scatter', '6', '-model', 'm.h5', status=None)
+            point = {'push': 61.0, 'stop': 2.3e-4, name: mu}
+            at = ('predict', '-model', 'm.h5', *STEPS, '-mu', ','.join(map(repr, point.values())))
+            report = self.hyco(*at, '-gradient')
+            self.assertEqual(report['gradient_kinks'], [])
+            widths = {p: RANGES[p][1] - RANGES[p][0] for p in point}
+            with open(self.path('points.csv'), 'w', encoding='ascii') as f:
+                f.write(','.join(point) + '\n')
+                for p, width in widths.items():
+                    for sign in (-1, 1):
+                        f.write(','.join(repr(value + sign * WIDTH / 2 * width * (n == p)) for n, value in point.items()) + '\n')
+            self.hyco('predict', '-model', 'm.h5', *STEPS, '-points', 'points.csv', '-table', 'rows.h5')
+            with h5py.File(self.path('rows.h5')) as f:  # all digits
+                rows = {key: f[key][:] for output in report['outputs'] for key in (output, 'path_' + output)}
+            for k, (p, width) in enumerate(widths.items()):
+                for output, values in report['history']['outputs'].items():
+                    for key, column in (('gradient', output), ('gradient_path', 'path_' + output)):
+                        found = report[key][output][p] * width
+                        self.differ(found, *rows[column][2 * k:2 * k + 2], max(abs(found), 1e-2 * max(map(abs, values))), (kind, p, column))
+        plain = self.hyco(*at)
+        for key in ('outputs', 'contacts', 'kkt', 'rid_strain_energy'):
+            self.assertEqual(report[key], plain[key], key)
+        self.assertEqual(report['history']['outputs'], plain['history']['outputs'])
+        held, mean = (plain['history']['outputs'][name] for name in ('held', 'mean'))
+        r = self.hyco('fit', '-model', 'm.h5', *STEPS, '-target_end', repr(plain['outputs']['end']), '-target_held', repr(held[-1]),
+                      '-target_mean', repr(mean[-1]), '-fit_starts', '8', '-target_path_held', repr(max(held)), '-target_path_mean', repr(max(mean)))
+        self.assertTrue(r['converged'])
+        self.assertLess(r['misfit_model'], 1e-6)
+        for name, value in point.items():
+            self.near(r['mu'][name], value, 1e-3, name)
+
+
+if __name__ == '__main__':
+    unittest.main()
