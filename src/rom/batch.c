@@ -32,6 +32,8 @@ static PetscErrorCode Sort(HycoROM m, PetscInt n, const PetscReal mu[], PetscInt
 
   PetscFunctionBegin;
   HycoSceneReaches(m->fe->scene, reaches);
+  /* Parameters that reach the stiffness first: they are the leading keys of the comparison, so that each new factor
+     serves a whole run of points. */
   for (PetscInt pass = 0; pass < 2; pass++) {
     for (PetscInt p = 0; p < n_par; p++) {
       if (reaches[p] == (pass ? PETSC_FALSE : PETSC_TRUE)) order[count++] = p;
@@ -57,7 +59,8 @@ PetscErrorCode HycoROMGetSizes(HycoROM m, PetscInt *n_contacts, PetscInt *n_node
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves the points in their sorted order; the results are in the order of the input. */
+/* Solves the points in their sorted order; the results are in the order of the input. Each point is a cold solve, so
+   that its result does not depend on its place in the batch. */
 static PetscErrorCode SolveEach(HycoROM m, PetscInt n, const Point point[], HycoPrediction prediction[],
                                 PetscReal Lambda[], PetscReal U[])
 {
@@ -93,6 +96,8 @@ PetscErrorCode HycoROMSolveMany(HycoROM m, PetscInt n, PetscInt n_parameters, co
   PetscCall(PetscMalloc1(n, &point));
   ierr = Sort(m, n, mu, order, point);
   if (!ierr) ierr = SolveEach(m, n, point, prediction, Lambda, U);
+  /* Also after an error: the handle's vectors then belong to some point of the batch, which the getters must not
+     show. */
   m->solved = PETSC_FALSE; /* a batch leaves no current solution */
   PetscCall(PetscFree(point));
   PetscCall(ierr);
@@ -134,7 +139,10 @@ PetscErrorCode HycoROMSolveShared(MPI_Comm comm, HycoROM m, PetscInt n, PetscInt
     count[r] = (PetscMPIInt)((PetscInt64)n * (r + 1) / size) - first[r];
   }
   n_dof = (size_t)(n_nodes * dim);
+  /* A rank writes its share where it belongs in the whole arrays, so that the exchange is in place. */
   at = (size_t)first[rank];
+  /* No communication inside: ranks may take very different times, and one that fails must not leave others in a
+     collective call. */
   HycoOnEach(comm, HycoROMSolveMany(m, count[rank], n_parameters, mu + at * (size_t)n_parameters,
                                     prediction ? prediction + at : NULL,
                                     Lambda ? Lambda + at * (size_t)n_contacts : NULL, U ? U + at * n_dof : NULL));

@@ -32,6 +32,8 @@ static PetscErrorCode Make(HycoROM m)
   m->carried = c;
   PetscCall(PetscMalloc1(3 * m->model->pairs.n, &c->normal));
   PetscCall(PetscMalloc1(m->model->pairs.n, &c->gap));
+  /* Areas are those of the slave's nodes on the moved mesh, which a parameter may scale: they are filled per
+     prediction, not here. */
   PetscCall(PetscMalloc1(m->model->pairs.n, &c->area));
   PetscCall(PetscMalloc1(HycoSceneResults(m->model->scene), &c->result));
   PetscFunctionReturn(PETSC_SUCCESS);

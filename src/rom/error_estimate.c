@@ -75,6 +75,7 @@ static PetscReal Misfit(HycoROM m)
     const PetscInt dof = m->model->fe_dof[f];
     PetscReal by_modes = m->fe->u0[dof];
 
+    /* V has rows of full-order unknowns too, in whose place the displacement has the unknowns. */
     for (PetscInt j = 0; j < m->model->l; j++)
       by_modes += m->model->V[(size_t)dof * (size_t)m->model->l + (size_t)j] * m->gamma[j];
     lost += (m->U[dof] - by_modes) * (m->U[dof] - by_modes);
@@ -113,9 +114,12 @@ static PetscReal Inconsistency(HycoROM m)
   PetscReal lost = 0, force = 0, size = 0;
 
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
+    /* All components of the nodes that the rows name, also those along the surface, which the rows themselves do not
+       read. */
     for (PetscInt j = m->rows.start[k] * dim; j < m->rows.start[k + 1] * dim; j++)
       size = PetscMax(size, PetscAbsReal(m->U[m->rows.dof[j / dim] / dim * dim + j % dim]));
     if (!(m->Lambda[k] > 0)) continue;
+    /* B u - D, weighted by the force: an open contact's gap is no inconsistency. */
     lost += m->Lambda[k] * PetscSqr(HycoROMAddRow(m, k, -m->rows.gap[k]));
     force += m->Lambda[k];
   }
@@ -132,6 +136,7 @@ static void Shares(HycoROM m, PetscReal *fresh, PetscReal *outside)
     const PetscReal force = PetscMax(m->Lambda[k], 0);
 
     sum += force;
+    /* Not every model knows which contacts had a force in training. */
     if (m->model->closed && !m->model->closed[k]) *fresh += force;
     if (!m->model->in_rid[k]) *outside += force;
   }
@@ -172,6 +177,7 @@ static PetscErrorCode MeasureOne(HycoROM m, PetscReal feature[])
   const PetscInt n_par = m->model->scene->n_parameters;
 
   PetscFunctionBegin;
+  /* Reconstructed forces and whole displacements first: most features need them. */
   PetscCall(HycoROMComplete(m));
   feature[MISFIT] = feature[PENETRATION] = feature[ADHESION] = 0;
   if (m->ops->features)
@@ -187,6 +193,7 @@ static PetscErrorCode MeasureOne(HycoROM m, PetscReal feature[])
     feature[REMAINDER] = m->remainder;
   }
   feature[TAIL] = Tail(m);
+  /* 0 without stored points or parameters: a feature that is constant drops out of the calibration. */
   feature[DISTANCE] = m->model->n_points && n_par ? PETSC_MAX_REAL : 0;
   for (PetscInt k = 0; n_par && k < m->model->n_points; k++)
     feature[DISTANCE] =
@@ -202,6 +209,7 @@ PetscErrorCode HycoEstimatesFeatures(HycoROM m, PetscReal feature[])
   PetscReal one[HYCO_FEATURES];
 
   PetscFunctionBegin;
+  /* Without a history there is one solution. */
   if (!m->trace.n_listed) {
     PetscCall(MeasureOne(m, feature));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -237,11 +245,13 @@ static PetscReal Beyond(HycoROM m, const PetscReal mu[], PetscReal nearest[])
   PetscReal most = 0;
 
   for (PetscInt p = 0; p < s->n_parameters; p++) {
+    /* A parameter of one value has no width; its distance is then absolute. */
     const PetscReal width = s->hi[p] > s->lo[p] ? s->hi[p] - s->lo[p] : 1;
 
     nearest[p] = PetscMin(PetscMax(mu[p], m->model->reach[p]), m->model->reach[s->n_parameters + p]);
     most = PetscMax(most, PetscAbsReal(mu[p] - nearest[p]) / width);
   }
+  /* Round-off of a range's end that was written in decimal is not outside. */
   return most > 1e-12 ? most : 0;
 }
 
@@ -263,6 +273,8 @@ static PetscReal Unseen(HycoROM m, const PetscReal feature[], PetscInt *which)
   for (PetscInt j = 0; j < HYCO_FEATURES; j++) {
     const PetscReal reached = m->model->estimates.reached[j];
 
+    /* slight: changes below it are round-off of the feature, whatever the held-out values were. A negative `reached` is
+       a feature that no held-out point had. */
     if (!(slight[j] > 0) || reached < 0 || (j <= PENETRATION && m->ops->features)) continue;
     if (!(feature[j] > most * PetscMax(reached, slight[j]))) continue;
     most = feature[j] / PetscMax(reached, slight[j]);
@@ -314,12 +326,15 @@ static void EvaluateFormulas(HycoROM m, const PetscReal feature[], PetscReal fac
                                             &p->estimated_error_lambda};
   PetscReal term[HYCO_ESTIMATE_FEATURES], estimate[HYCO_N_ESTIMATES];
 
+  /* As in the fit of the laws: log(1 + f / floor) is flat for features that are small against their floor and linear in
+     log f above. */
   for (PetscInt j = 0; j < HYCO_ESTIMATE_FEATURES; j++) term[j] = PetscLogReal(1 + feature[j] / t->floor[j]);
   for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++)
     estimate[e] = t->has[e] ? EstimateError(m, t->law[e], term, t->largest[e]) * factor : -1;
   for (PetscInt q = 0; q < t->n_outputs; q++) {
     const HycoOutputEstimate *o = &t->output[q];
 
+    /* An output that nearly vanishes has round-off of its usual size, which no feature shows. */
     if (o->has && !PetscIsInfOrNanReal(p->quantity[q]))
       p->estimated_error_quantity[q] =
           PetscMax(EstimateError(m, o->law, term, o->largest), HYCO_OUTPUT_ROUND_OFF * o->magnitude) * factor;

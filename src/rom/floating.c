@@ -75,10 +75,12 @@ PetscErrorCode HycoFloatingMove(HycoH5 h, HycoROM m)
     PetscCall(PetscArraycpy(f->rigid[k].rigid, number + NUMBERS * k + 4, 6));
   }
   PetscCall(PetscFree(number));
+  /* of[] is a table, motions x bodies. */
   f->n_bodies = m->model->scene->n_bodies;
   PetscCall(HycoH5Int(h, "floating/bodies", 0, 1, &f->n, f->n_bodies, &f->of));
   if (reads ? !HycoH5Has(h, "floating/mesh/head") : !f->mesh) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoMeshMove(h, "floating/mesh", f->n_bodies, &f->mesh));
+  /* Ties belong to the scene's mesh and are not stored twice. */
   if (reads) PetscCall(HycoMeshSetTies(f->mesh, m->model->mesh->ties));
   if (reads) PetscCall(HycoMeshCreateDM(m->model->scene, f->mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -148,6 +150,7 @@ static PetscReal Evaluate(const Dual *d, const PetscReal c[], PetscReal gradient
   const PetscInt p = d->p;
   PetscReal value = 0;
 
+  /* The gradient is a difference of loads and forces' work: its round-off is that of these terms. */
   *size = 0;
   for (PetscInt i = 0; i < p; i++) {
     gradient[i] = -d->load[i];
@@ -157,6 +160,8 @@ static PetscReal Evaluate(const Dual *d, const PetscReal c[], PetscReal gradient
   }
   for (PetscInt k = 0; k < d->n; k++) {
     const PetscReal *w = d->work + k * p;
+    /* The forces are those of the prediction times exp(c.w): positive whatever c is, so that no contact gets a tensile
+       force by the balance. */
     PetscReal power = 0, force;
 
     for (PetscInt i = 0; i < p; i++) power += c[i] * w[i];

@@ -88,6 +88,8 @@ static PetscErrorCode Close(Work *o)
   for (PetscInt j = 0; j < o->k; j++) {
     const size_t at = (size_t)(o->p + j);
 
+    /* Of a contact: its force and its gap at mu. Both nearly 0 is undecided, and gets the state that the derivative
+       itself chooses. */
     L[j] = o->z[o->p + o->contact[j]];
     w[j] = o->w[0][o->p + o->contact[j]];
     flexibility[j] = M[at * n + at];
@@ -96,6 +98,8 @@ static PetscErrorCode Close(Work *o)
   PetscCall(HycoTangentCreate(o->p, o->k, M, state, &o->tangent, &regular));
   PetscCall(PetscFree4(L, w, flexibility, state));
   PetscCall(PetscFree(M));
+  /* A singular matrix means forces that can be redistributed: a derivative of one of many distributions would be
+     arbitrary. */
   HycoCheck(regular, "the forces of the model's closed contacts are not unique here, so that they have no derivative");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -161,6 +165,8 @@ static PetscBool Turns(const Work *o, const HycoDifference *d, PetscBool closer)
   PetscReal most = 0, slope = 0;
 
   for (PetscInt i = 0; i < o->n; i++) most = PetscMax(most, o->z[o->p + i]);
+  /* The slope of the gaps along the parameter is the scale for a jump: a contact that barely moves has slopes of
+     round-off. */
   for (PetscInt j = 0; j < o->k; j++) {
     const PetscInt at = o->p + o->contact[j];
 
@@ -172,6 +178,7 @@ static PetscBool Turns(const Work *o, const HycoDifference *d, PetscBool closer)
     const PetscReal v[3] = {o->w[0][at], o->w[1][at], o->w[2][at]}, near[3] = {o->w[0][at], o->w[3][at], o->w[4][at]};
     PetscReal jump;
 
+    /* A contact without force has no part in the solution, whatever its gap does. */
     if (o->z[at] <= HYCO_GRADIENT_FORCE * most) continue;
     jump = HycoDifferenceJump(d, o->size, slope, v);
     if (closer ? HycoDifferenceKinks(d, jump, near) : jump > 0) return PETSC_TRUE;
@@ -189,6 +196,7 @@ static PetscErrorCode FindTurns(Work *o, const HycoDifference *d, PetscBool *tur
   PetscFunctionBegin;
   *turns = Turns(o, d, PETSC_FALSE);
   if (!*turns) PetscFunctionReturn(PETSC_SUCCESS);
+  /* A jump of the slope stays when the step shrinks, curvature does not. */
   HycoDifferenceShrink(&near);
   for (PetscInt j = 1; j < 3; j++) {
     HycoDifferencePoint(&near, m->model->scene, o->mu, j, at);
@@ -249,16 +257,19 @@ static PetscErrorCode Columns(Work *o, HycoGradient *gradient)
   PetscReal size;
 
   PetscFunctionBegin;
+  /* Stresses are not differenced here: without the cells a model that does not read them moves faster. */
   PetscCall(HycoFEUseCells(m->fe, (PetscBool)!m->model->traits.surfaces));
   for (PetscInt p = 0; p < gradient->n_parameters; p++) {
     HycoDifferenceSet(m->model->scene, o->mu, p, &o->along[p].d);
     PetscCall(Differentiate(o, &o->along[p]));
   }
+  /* Back at mu before the outputs are followed: their differences start from the data there. */
   PetscCall((*m->ops->residual)(m, o->mu, o->z, NULL, &size));
   for (PetscInt p = 0; p < gradient->n_parameters; p++) PetscCall(Follow(o, &o->along[p]));
   for (PetscInt p = 0; p < gradient->n_parameters; p++) {
     const Along *a = &o->along[p];
 
+    /* A smooth column is done by the central difference; the others need one-sided ones, which move the data again. */
     if (HycoGradientSetSmooth(gradient, &m->gradient, &a->d, a->kink, a->output)) continue;
     o->dz = a->dz;
     o->moved_on = PETSC_TRUE;
@@ -279,6 +290,7 @@ static PetscErrorCode Restore(Work *o)
   PetscCall(Move(o, o->moved_on ? o->mu : NULL, o->z, NULL));
   PetscCall(HycoFEUseCells(m->fe, PETSC_TRUE));
   m->prediction = o->prediction;
+  /* Also what getters of the prediction read: the gradient must not be visible in them. */
   m->remainder = o->remainder;
   m->whole_current = o->whole_current;
   PetscCall(PetscArraycpy(m->gamma, o->gamma, m->model->l));
@@ -317,6 +329,7 @@ PetscErrorCode HycoROMGetGradient(HycoROM m, HycoGradient *gradient)
   if (!ierr) ierr = Columns(&o, gradient);
   if (!ierr) ierr = Restore(&o);
   if (ierr) m->solved = m->ready = PETSC_FALSE;
+  /* Before the error is raised, so that a program that catches it leaks nothing. */
   PetscCall(Destroy(&o));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

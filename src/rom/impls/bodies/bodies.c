@@ -60,6 +60,7 @@ static PetscReal Unbalanced(HycoBodiesWork o)
     for (PetscInt j = 0; j < b->r; j++) sum += o->work[i * b->r + j] * o->c[j];
     size = PetscAbsReal(sum);
     for (PetscInt k = 0; k < b->ns; k++) {
+      /* Work of the loads against that of the contact forces on motion i, Z^T (F - B^T L) = 0. */
       sum -= o->Z[k * b->p + i] * o->f[k];
       size += PetscAbsReal(o->Z[k * b->p + i] * o->f[k]);
     }
@@ -81,8 +82,10 @@ static PetscReal Left(HycoROM m, PetscInt k, PetscReal gaps)
   for (PetscInt j = o->row_start[k]; j < o->row_start[k + 1]; j++) {
     const PetscInt at = o->row_at[j];
 
+    /* free and the response to the forces may be huge and opposite, as their sum u is small. */
     terms += PetscAbsReal(o->row[j]) * (PetscAbsReal(o->free[at]) + PetscAbsReal(o->u[at] - o->free[at]));
   }
+  /* Shrinks the residual towards 0 and never past it: a true penetration keeps its sign. */
   rounding = PetscMin(16 * PETSC_MACHINE_EPSILON * terms, ROUNDED * gaps);
   return left > 0 ? PetscMax(left - rounding, 0) : PetscMin(left + rounding, 0);
 }
@@ -165,6 +168,7 @@ static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
   PetscCall(HycoBodiesSolve(o, &s, mu, m->Lambda, &solved));
   PetscCall(ExpandAll(m));
   HycoBodiesMeasure(m, &p->kkt);
+  /* The bound of theory.md: from the samples' error e and the present forces; 0 where nothing is interpolated. */
   p->interpolation_error = HycoBodiesBound(o, &norm);
   p->iterations = o->its;
   p->reason = solved && HycoKKTMax(&p->kkt) > m->solver->rtol ? HYCO_DIVERGED_RESIDUAL : o->reason;
@@ -209,6 +213,7 @@ PetscInt HycoBodiesGrid(HycoSubstructures b, PetscInt k, PetscReal theta[])
   }
   for (PetscInt p = b->n_theta - 1; theta && p >= 0; p--) {
     node -= b->n_nodes[p];
+    /* Nodes are of the interpolated variable, for instance 1/radius; theta is the parameter itself. */
     theta[p] = HycoBodiesValue(b->variable[p], node[k % b->n_nodes[p]]);
     k /= b->n_nodes[p];
   }

@@ -104,12 +104,15 @@ static PetscErrorCode MoveColumns(HycoH5 h, const char path[], const HycoSubstru
   PetscReal *file = NULL;
 
   PetscFunctionBegin;
+  /* Both orders are the same then, and nothing is copied. */
   if (s->n_samples == 1) {
     PetscCall(HycoH5Real(h, path, &rows, length, data));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (!HycoH5Reads(h)) {
     PetscCall(PetscMalloc1((size_t)rows * (size_t)length + 1, &file));
+    /* In memory the samples of one unknown lie side by side, because a prediction blends them; the file keeps the older
+       order. */
     Swap(s->n, s->n_samples, length, *data, file);
   }
   PetscCall(HycoH5Real(h, path, &rows, length, &file));
@@ -161,9 +164,11 @@ static PetscErrorCode MoveBody(HycoH5 h, HycoSubstructures b, PetscInt k)
   PetscCall(HycoH5Real(h, At(k, "R", path), &rows, b->r, &s->R));
   PetscCall(HycoH5Real(h, At(k, "Z", path), &rows, b->p, &s->Z));
   PetscCall(HycoH5Real(h, At(k, "work", path), &columns, b->r, &s->work));
+  /* r is the model's number of loads, which MoveSizes() has read. */
   PetscCall(HycoH5Real(h, At(k, "gram", path), &b->r, b->r, &s->gram));
   columns = (b->turn_start[k + 1] - b->turn_start[k]) * s->l + s->m;
   PetscCall(MoveResponses(h, s, k, columns));
+  /* The same name for another length: a and g have a row for each column of H. */
   rows = s->n_samples * columns;
   PetscCall(HycoH5Real(h, At(k, "a", path), &rows, b->r, &s->a));
   PetscCall(HycoH5Real(h, At(k, "g", path), &rows, b->p, &s->g));

@@ -29,6 +29,7 @@ static PetscErrorCode CreateRows(HycoBodiesFriction f)
   const PetscInt dim = f->slip.dim, n = f->slip.row[f->slip.n];
 
   PetscFunctionBegin;
+  /* Rows of a contact have the same masters, so that the width of its normal row bounds each. */
   f->rows.room = HycoPairsWidth(pairs) * dim * n + 1;
   PetscCall(PetscCalloc1(n + 1, &f->rows.start));
   PetscCall(PetscMalloc1(f->rows.room, &f->rows.dof));
@@ -36,6 +37,7 @@ static PetscErrorCode CreateRows(HycoBodiesFriction f)
   PetscCall(PetscCalloc1(n + 1, &f->rows.gap));
   PetscCall(PetscMalloc1(n + 1, &f->contact));
   for (PetscInt k = 0; k < pairs->n; k++) {
+    /* Every row of a contact has its scene entry: the gap and the normal are found by it. */
     for (PetscInt r = f->slip.row[k]; r < f->slip.row[k + 1]; r++) f->contact[r] = pairs->contact[k];
   }
   f->all = (HycoBodiesSurface){f->normal.fe, f->normal.pairs, &f->rows, n, f->contact};
@@ -110,9 +112,12 @@ static PetscErrorCode Flexibility(HycoBodiesFriction f, HycoBodiesWork o)
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(n + 1, &row));
+  /* All rows, also of open contacts: the path keeps W for all of its steps. */
   for (PetscInt k = 0; k < n; k++) row[k] = k;
+  /* Without this the first step of a path would find that its rows are new and keep nothing. */
   if (!o->kept.same) PetscCall(HycoBodiesKeepRows(o, n)); /* those of now */
   PetscCall(HycoBodiesKeep(o, n, row));
+  /* HycoBodiesKeep() gives up where the columns exceed the memory that is allowed. */
   HycoCheck(o->kept.same,
             "the flexibility of %d contacts with friction needs more memory than a model of bodies takes; "
             "use a coarser mesh there, or hyco solve",

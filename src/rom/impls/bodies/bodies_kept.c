@@ -15,10 +15,12 @@ static PetscBool Same(HycoBodiesWork o, PetscInt m)
   const HycoBodiesKept *kept = &o->kept;
 
   if (!kept->start) return PETSC_FALSE;
+  /* Cheapest first: a contact that has another number of masters differs here. */
   for (PetscInt k = 0; k <= m; k++) {
     if (kept->start[k] != o->row_start[k]) return PETSC_FALSE;
   }
   for (PetscInt e = 0; e < o->row_start[m]; e++) {
+    /* Values within round-off are the same: a point that is computed anew in the body's axes has other last digits. */
     if (kept->at[e] != o->row_at[e] || PetscAbsReal(kept->value[e] - o->row[e]) > SAME) return PETSC_FALSE;
   }
   return PETSC_TRUE;
@@ -57,6 +59,7 @@ PetscErrorCode HycoBodiesKeepRows(HycoBodiesWork o, PetscInt m)
     PetscCall(PetscCalloc1(n + 1, &kept->W));
   }
   if (kept->same) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Columns are products with the old rows. */
   PetscCall(ForgetColumns(kept, n));
   HycoFreeAll(&kept->start, &kept->at, &kept->value);
   kept->m = m;
@@ -137,6 +140,7 @@ void HycoBodiesKeptRow(HycoBodiesWork o, PetscInt k, PetscInt n, const PetscInt 
 
   for (PetscInt i = 0; i < n; i++) row[i] = 0;
   for (PetscInt j = 0; j < b->n; j++) {
+    /* W[k][j] is null where contact k does not touch body j. */
     const PetscReal *W = o->kept.W[k * b->n + j], scale = 1 / o->kappa[j];
 
     for (PetscInt i = 0; W && i < n; i++) {
@@ -164,6 +168,7 @@ PetscErrorCode HycoBodiesKeptDisplace(HycoBodiesWork o, PetscInt m, const PetscR
     for (PetscInt k = 0; k < m; k++) {
       const PetscReal *P = o->kept.P[k * b->n + j], force = -Lambda[k] / o->kappa[j];
 
+      /* Most contacts are open: their columns are neither made nor read. */
       if (!P || Lambda[k] == 0) continue;
       HycoBodiesBlend(o, j, own->n, (size_t)own->n, P, blended);
       BLASaxpy_(&size, &force, blended, &one, u + b->start[j], &one);

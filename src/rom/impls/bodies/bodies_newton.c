@@ -193,6 +193,7 @@ PetscErrorCode HycoBodiesScale(HycoROM m)
   PetscCall(PetscArrayzero(w->BP, m->model->pairs.n * l));
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
     for (PetscInt e = o->row_start[k]; e < o->row_start[k + 1]; e++) {
+      /* kappa is the factor of the body that the unknown belongs to; a row reaches two bodies. */
       const PetscReal value = o->row[e] / o->kappa[BodyOf(b, o->row_at[e])];
 
       for (PetscInt j = 0; j < l; j++) w->BP[k * l + j] += value * in->P[o->row_at[e] * l + j];
@@ -201,6 +202,7 @@ PetscErrorCode HycoBodiesScale(HycoROM m)
   PetscCall(PetscMalloc1(in->nd * PetscMax(l, b->r) + 1, &cells));
   for (PetscInt i = 0; i < in->nd * l; i++) cells[i] = in->A[i] / o->kappa[in->body[i / l]];
   TakeStrains(m, l, cells, w->response);
+  /* The strains by loads are those at c, the coefficients of the loads, and serve all times of a path. */
   for (PetscInt i = 0; i < in->nd * b->r; i++) cells[i] = in->R[i] / o->kappa[in->body[i / b->r]];
   TakeStrains(m, b->r, cells, w->loads);
   PetscCall(PetscFree(cells));
@@ -272,6 +274,7 @@ static PetscErrorCode Factor(HycoROM m)
   PetscFunctionBegin;
   PetscCall(PetscFree(w->U));
   PetscCall(PetscMalloc1((size_t)w->n_set * (size_t)w->n_set + 1, &w->U));
+  /* Columns are kept for the path: a contact that closes again costs nothing. */
   for (PetscInt k = 0; k < w->n_set; k++) PetscCall(Column(m, w->set[k]));
   PetscCall(FactorAll(m, &independent));
   if (!independent) PetscCall(FactorEach(m));
@@ -300,6 +303,7 @@ static PetscErrorCode AddForces(const HycoBodiesPath w, PetscInt l, PetscInt fir
   PetscBLASInt rows, modes, n;
 
   PetscFunctionBegin;
+  /* Without contacts the strains follow alpha alone. */
   PetscCall(PetscArraycpy(w->S, w->response, w->n_rows * l));
   if (!w->n_set || !l || !w->n_rows) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1((size_t)w->n_set * (size_t)w->n_rows, &strain));
@@ -308,6 +312,7 @@ static PetscErrorCode AddForces(const HycoBodiesPath w, PetscInt l, PetscInt fir
   PetscCall(PetscBLASIntCast(w->n_rows, &rows));
   PetscCall(PetscBLASIntCast(l, &modes));
   PetscCall(PetscBLASIntCast(w->n_set, &n));
+  /* One product of n_set rows instead of a loop over contacts: S is the largest table of a step. */
   BLASgemm_("N", "T", &modes, &rows, &n, &one, w->Z, &modes, strain, &rows, &one, w->S, &modes); /* S, Z by rows */
   PetscCall(PetscFree(strain));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -348,6 +353,7 @@ PetscErrorCode HycoBodiesMoveCells(HycoROM m, const PetscReal alpha[], const Pet
   for (PetscInt i = 0; i < w->n_set; i++) {
     Add(in->nd, Lambda[w->set[i]], w->column[w->set[i]] + m->model->pairs.n + w->n_rows, cells);
   }
+  /* Only the points' cells have displacements afterwards; elsewhere u keeps the prescribed values alone. */
   PetscCall(PetscArraycpy(w->u, m->fe->u0, m->fe->n_dof));
   for (PetscInt i = 0; i < in->nd; i++) w->u[w->at[i]] += cells[i];
   HycoFEComplete(m->fe, w->u);
@@ -426,6 +432,7 @@ static PetscErrorCode Check(HycoROM m, const PetscReal alpha[], PetscReal Lambda
   PetscCall(PetscArrayzero(Lambda, m->model->pairs.n));
   PetscCall(PetscArraycpy(o->gap, w->gap, m->model->pairs.n)); /* gap -= B P alpha */
   PetscCall(Multiply(PETSC_FALSE, m->model->pairs.n, l, w->BP, alpha, -1, 1, o->gap));
+  /* The forces are affine in alpha, as the strains are: no solve. */
   for (PetscInt i = 0; i < w->n_set; i++) {
     PetscReal *force = &Lambda[w->set[i]];
 
@@ -434,16 +441,19 @@ static PetscErrorCode Check(HycoROM m, const PetscReal alpha[], PetscReal Lambda
     most = PetscMax(most, PetscAbsReal(*force));
   }
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
+    /* The scale of a violation is the largest gap without forces: near closure all gaps are round-off. */
     if (o->row_start[k] < o->row_start[k + 1]) size = PetscMax(size, PetscAbsReal(o->gap[k]));
   }
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
     PetscReal gap = o->gap[k];
 
     if (Lambda[k] < -VIOLATED * most) *violated = PETSC_TRUE;
+    /* Closed contacts have no gap by construction; contacts without a master have none at all. */
     if (Lambda[k] != 0 || o->row_start[k] == o->row_start[k + 1]) continue;
     for (PetscInt i = 0; i < w->n_set; i++) gap += w->column[w->set[i]][k] * Lambda[w->set[i]];
     if (gap < -VIOLATED * size) *violated = PETSC_TRUE;
   }
+  /* Tensile forces of round-off become 0, so that ChooseSet() does not take them for closed. */
   for (PetscInt i = 0; i < w->n_set; i++) Lambda[w->set[i]] = PetscMax(Lambda[w->set[i]], 0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -571,6 +581,7 @@ static PetscErrorCode EvaluateStep(HycoROM m, PetscReal t0, PetscReal t1, PetscR
   PetscFunctionBegin;
   PetscCall(EvaluateOrRenew(m, t0, t1, alpha, norm, a));
   for (PetscInt k = 0; k < HALVINGS && w->always && (a->law.failed || !(*norm <= before)) && a->iterations; k++) {
+    /* Towards the last point, whose residual is known to be finite. */
     for (PetscInt i = 0; i < w->bodies.bodies->inelastic->m; i++) alpha[i] = (alpha[i] + last[i]) / 2;
     PetscCall(EvaluateOrRenew(m, t0, t1, alpha, norm, a));
   }
@@ -628,6 +639,7 @@ static PetscErrorCode Contacts(HycoROM m, const PetscReal alpha[], PetscReal Lam
   PetscFunctionBegin;
   PetscCall(HycoBodiesStrain(&w->bodies, &s, alpha));
   PetscCall(HycoBodiesContact(&w->bodies, &s, Lambda, &solved));
+  /* Reported as iterations of contact problems, apart from those of Newton's method. */
   a->active_its += w->bodies.its;
   if (!solved) HycoFormat(a->why, "the contact problem has no solution");
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -640,9 +652,12 @@ PetscErrorCode HycoBodiesSearch(HycoROM m, PetscReal t0, PetscReal t1, PetscReal
   PetscBool same, violated = PETSC_TRUE;
 
   PetscFunctionBegin;
+  /* The forces of the contact problem name the next set. Opening and closing single contacts by the sign of their
+     violation would cycle. */
   if (!Presses(m, Lambda)) PetscCall(Contacts(m, alpha, Lambda, a));
   PetscCall(ChooseSet(m, Lambda, &same));
   for (PetscInt round = 0; violated && round < ROUNDS && !a->why[0]; round++) {
+    /* Again in each round: e0 and z belong to the set. */
     PetscCall(TakeLoads(m));
     PetscCall(Newton(m, t0, t1, alpha, a));
     if (a->why[0]) break;

@@ -31,6 +31,7 @@ PetscErrorCode HycoBodiesReset(HycoBodiesWork o)
   PetscCall(HycoFEDestroy(&o->fe));
   PetscCall(HycoTaoDestroy(&o->tao));
   PetscCall(HycoSolverDestroy(&o->own));
+  /* The arrays of arrays after what they hold. */
   for (PetscInt k = 0; o->weight && k < o->bodies->n; k++) HycoFreeAll(&o->weight[k], &o->blend[k]);
   HycoFreeAll(&o->weight, &o->blend, &o->blended, &o->X0, &o->E0, &o->E_at, &o->pose, &o->kappa, &o->c, &o->elastic,
               &o->free, &o->u, &o->f, &o->x, &o->loc, &o->row_start, &o->row_at, &o->row, &o->gap, &o->active, &o->Z,
@@ -78,6 +79,7 @@ void HycoBodiesSetTensors(HycoSubstructures b)
     t->dim = b->n_theta;
     for (PetscInt p = 0; p < b->n_theta; p++) {
       t->x[p] = node;
+      /* Interpolation through all nodes; where one node serves, the degree is 0. */
       t->degree[p] = t->n[p] - 1;
       node += b->n_nodes[p];
     }
@@ -320,6 +322,7 @@ static PetscErrorCode BlendMotions(HycoBodiesWork o)
 
     Blend(own->n_samples, o->weight[k], own->n * b->p, own->Z, o->Z + b->start[k] * b->p);
     Blend(own->n_samples, o->weight[k], b->p * b->r, own->work, work);
+    /* A motion may move several bodies, as tied ones do: the works add up. */
     for (PetscInt i = 0; i < b->p * b->r; i++) o->work[i] += work[i];
   }
   PetscCall(PetscFree(work));
@@ -402,6 +405,7 @@ static PetscErrorCode TakeWeights(HycoBodiesWork o, const PetscReal mu[])
     PetscCall(PetscMalloc1(n, &weight));
     PetscCall(HycoBodiesWeights(b, k, mu, weight));
     PetscCall(PetscArraycmp(weight, o->weight[k], n, &same));
+    /* Columns blended at other weights are stale; a study along a load keeps all of them. */
     if (!same) PetscCall(PetscArrayzero(o->blended + b->start[k], b->body[k].n));
     PetscCall(PetscFree(o->weight[k]));
     o->weight[k] = weight;
@@ -421,6 +425,7 @@ void HycoBodiesBlend(HycoBodiesWork o, PetscInt k, PetscInt n, size_t stride, co
 
     for (PetscInt i = 0; i < n; i++) to[i] += w[q] * a[i] + w[q + 1] * b[i] + w[q + 2] * c[i] + w[q + 3] * d[i];
   }
+  /* What is left of a number of samples that is no multiple of four. */
   for (; q < samples; q++, from += stride) {
     for (PetscInt i = 0; i < n; i++) to[i] += w[q] * from[i];
   }
@@ -469,6 +474,7 @@ static PetscErrorCode FindTouched(HycoBodiesWork o, Problem *p)
   for (PetscInt k = 0; k < p->n; k++) {
     for (PetscInt j = o->row_start[p->contact[k]]; j < o->row_start[p->contact[k] + 1]; j++) p->at[o->row_at[j]] = 0;
   }
+  /* A problem has far fewer unknowns than the surfaces: its columns are gathered at these alone. */
   for (PetscInt i = 0; i < b->ns; i++) {
     if (p->at[i] < 0) continue;
     p->at[i] = p->n_place;
@@ -527,6 +533,7 @@ static void FillRow(HycoBodiesWork o, Problem *p, PetscInt first, PetscReal row[
     return;
   }
   Respond(o, p, p->contact[first]);
+  /* Only the upper triangle: W is symmetric, and the caller mirrors it. */
   for (PetscInt j = 0; j < p->n - first; j++) {
     const PetscInt contact = p->contact[first + j];
 
@@ -663,6 +670,7 @@ PetscErrorCode HycoBodiesMatrix(HycoBodiesWork o, PetscInt n, const PetscInt con
   PetscFunctionBegin;
   HycoDuplicate(n, contact, &p.contact);
   PetscCall(Fill(o, &p));
+  /* As [0 Z^T B^T; -B Z W]: the motions come before the contacts, as in z. */
   PetscCall(PetscArraycpy(M, p.M, size * size));
   PetscCall(Release(o, &p));
   PetscCall(PetscFree(p.contact));
@@ -737,6 +745,7 @@ static PetscErrorCode FirstDepth(HycoBodiesWork o, const HycoBodiesSurface *s, P
   for (PetscInt k = 0; k < s->n; k++) {
     const PetscInt c = s->contact[k];
 
+    /* No master, no depth. */
     if (o->row_start[k] == o->row_start[k + 1]) continue;
     deepest[c] = PetscMax(deepest[c], -o->gap[k]);
     shallowest[c] = PetscMin(shallowest[c], -o->gap[k]);
@@ -746,6 +755,7 @@ static PetscErrorCode FirstDepth(HycoBodiesWork o, const HycoBodiesSurface *s, P
 
     least[c] = DEEP * deepest[c];
     if (spread > FLAT * deepest[c] && shallowest[c] > least[c]) least[c] = deepest[c] - NEAREST * spread;
+    /* Penetration of round-off size must not choose the first contacts. */
     least[c] = PetscMax(least[c], CLOSED * size);
   }
   PetscCall(PetscFree(shallowest));
@@ -762,6 +772,7 @@ static PetscErrorCode Begin(HycoBodiesWork o, const HycoBodiesSurface *s, PetscR
   PetscCall(PetscMalloc1(s->fe->scene->n_contacts, &least));
   PetscCall(FirstDepth(o, s, size, least));
   for (PetscInt k = 0; k < s->n; k++) {
+    /* With floating bodies every contact starts closed: with too few of them the motions would have no solution. */
     in[k] = (PetscBool)(o->row_start[k] < o->row_start[k + 1] && (o->bodies->p || -o->gap[k] > least[s->contact[k]]));
     if (in[k]) p->contact[p->n++] = k;
   }
@@ -825,8 +836,10 @@ PetscErrorCode HycoBodiesStrain(HycoBodiesWork o, const HycoBodiesSurface *s, co
     const PetscBLASInt rows = (PetscBLASInt)b->body[k].n, modes = (PetscBLASInt)m, each = 1;
     const PetscReal factor = 1 / o->kappa[k], one = 1, *P = b->inelastic->P + (size_t)b->start[k] * (size_t)m;
 
+    /* A body without surfaces has no part in the gaps. */
     if (rows) BLASgemv_("T", &modes, &rows, &factor, P, &modes, alpha, &each, &one, o->free + b->start[k], &each);
   }
+  /* The gaps without contact forces: negative ones are where contact must close. */
   for (PetscInt k = 0; k < s->n; k++) {
     o->gap[k] = s->rows->gap[k];
     for (PetscInt j = o->row_start[k]; j < o->row_start[k + 1]; j++) o->gap[k] -= o->row[j] * o->free[o->row_at[j]];
@@ -859,6 +872,7 @@ PetscErrorCode HycoBodiesContact(HycoBodiesWork o, const HycoBodiesSurface *s, P
   o->its = 0;
   o->reason = HYCO_CONVERGED;
   PetscCall(PetscStrncpy(o->method, HYCO_SOLVER_ACTIVE_SET, sizeof(o->method)));
+  /* Contacts outside the last problem keep 0, and so do all if there is no solution. */
   PetscCall(PetscArrayzero(Lambda, s->n));
   PetscCall(PetscMalloc2(s->n + 1, &in, s->n + 1, &p.contact));
   PetscCall(SolveRounds(o, s, &p, in, Lambda, solved));
@@ -889,12 +903,14 @@ PetscReal HycoBodiesBound(HycoBodiesWork o, PetscReal *norm)
     for (PetscInt i = b->start[k]; i < b->start[k + 1]; i++) {
       PetscReal elastic = o->free[i] - o->u[i]; /* C f / kappa */
 
+      /* Rigid motions store no energy: without them the product with f would be the work of the loads too. */
       for (PetscInt j = 0; j < b->p; j++) elastic += o->Z[i * b->p + j] * o->x[j];
       square += o->f[i] * elastic;
     }
     for (PetscInt i = 0; i < b->r * b->r; i++) loads += o->c[i / b->r] * gram[i] * o->c[i % b->r] / o->kappa[k];
   }
   *norm = PetscSqrtReal(PetscMax(square, 0));
+  /* Relative to the forces; without contact there is nothing to bound. */
   return *norm > 0 ? b->bound + PetscSqrtReal(PetscMax(loads, 0)) / *norm : 0;
 }
 
@@ -916,9 +932,11 @@ void HycoBodiesMove(HycoBodiesWork o, const HycoBodiesSurface *s, PetscReal U[])
       place = o->loc[i * dim + c];
       own[c] = o->u[place];
     }
+    /* A node inside: its displacement is that of the modes. */
     if (place < 0) continue;
     HycoPoseTurn(o->pose[BodyOf(b, place)].Q, dim, PETSC_FALSE, own, turned);
     for (PetscInt c = 0; c < dim; c++) {
+      /* u0 has the prescribed values; the place's value comes on top in the scene's axes. */
       if (o->loc[i * dim + c] >= 0) U[i * dim + c] = s->fe->u0[i * dim + c] + turned[c];
     }
   }
@@ -937,6 +955,8 @@ static PetscErrorCode AddResponses(HycoBodiesWork o, PetscInt k, PetscInt n, Pet
   PetscCall(PetscBLASIntCast(n, &rows));
   PetscCall(PetscMalloc1(own->n * own->n_samples + 1, &x));
   for (PetscInt d = 0, end; d < own->n && n; d = end + 1) {
+    /* Runs of unknowns with forces are a few, since contact zones are connected: each run is one product of a
+       contiguous part of H. */
     for (end = d; end < own->n && f[end] != 0; end++) {
       for (PetscInt q = 0; q < own->n_samples; q++)
         x[(end - d) * own->n_samples + q] = factor * f[end] * o->weight[k][q];
@@ -964,6 +984,7 @@ static PetscErrorCode RowsOf(HycoBodiesWork o, PetscInt k, PetscInt n, PetscReal
 
     for (PetscInt d = 0; d < b->r; d++) loads += a[d] * o->c[d];
     for (PetscInt d = 0; d < b->p; d++) motions += g[d] * o->x[d];
+    /* Rows of all samples, blended into one: weights are those of this body alone. */
     row[i % n] += weight * (loads / o->kappa[k] + motions);
   }
   PetscCall(AddResponses(o, k, n, -1 / o->kappa[k], row));
@@ -1030,6 +1051,7 @@ void HycoBodiesAddStrains(HycoBodiesWork o, const PetscReal alpha[], PetscReal g
     for (PetscInt j = 0; j < own->n_samples * turns; j++, F += (size_t)own->l * (size_t)m) {
       PetscReal share = 0;
 
+      /* Fields are stored for a basis of turns G, since a vector field turns linearly with Q. */
       for (PetscInt d = 0; d < 9; d++) share += b->G[9 * (b->turn_start[k] + j % turns) + d] * o->pose[k].Q[d];
       AddProduct(own->l, m, F, alpha, share * o->weight[k][j / turns] / o->kappa[k], gamma + b->mode_start[k]);
     }

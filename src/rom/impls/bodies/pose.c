@@ -82,9 +82,12 @@ void HycoPoseFit(PetscInt dim, PetscInt n, const PetscReal X[], const PetscReal 
     m.X[i % 3] += X[i] / n;
     m.x[i % 3] += x[i] / n;
   }
+  /* Second moments about the centres: the best turn does not depend on the translation. */
   for (PetscInt i = 0; i < n; i++) AddSecond(dim, X + 3 * i, x + 3 * i, &m);
   FromMoments(dim, &m, pose);
   for (PetscInt i = 0; i < n; i++) AddDistance(dim, pose, X + 3 * i, x + 3 * i, &m);
+  /* The largest distance of a node from the fitted map, relative to the body: above round-off the map changes the
+     shape. */
   if (m.size > 0) pose->residual = PetscMax(pose->residual, m.off / m.size);
 }
 
@@ -102,6 +105,7 @@ PetscErrorCode HycoBodyPoses(HycoFOM f, PetscInt n, const PetscInt of[], const P
     for (PetscInt i = 0; i < f->part->n_nodes; i++) {
       Moments *own = &m[of[i]];
 
+      /* Nodes of the overlap are on several ranks. */
       if (HycoMeshOwned(f->part, i) < 0) continue;
       own->n += pass == 0;
       for (PetscInt c = 0; pass == 0 && c < 3; c++) {
@@ -113,6 +117,7 @@ PetscErrorCode HycoBodyPoses(HycoFOM f, PetscInt n, const PetscInt of[], const P
     }
     if (pass == 1) { /* the centres are the same on all ranks */
       for (PetscInt b = 0; b < n; b++) HycoAllreduce(m[b].XX, 18, MPIU_REAL, MPI_SUM, HycoComm(f));
+    /* One reduction for all bodies; distances are maxima, sums otherwise. */
     } else
       HycoAllreduce(&m[0].n, n * width, MPIU_REAL, pass ? MPI_MAX : MPI_SUM, HycoComm(f));
     for (PetscInt b = 0; b < n; b++) {

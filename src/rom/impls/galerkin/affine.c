@@ -16,6 +16,7 @@ PetscErrorCode HycoTableCreate(const PetscInt n[], PetscReal *x[], PetscInt dim,
   PetscFunctionBegin;
   PetscCall(PetscNew(&t));
   *table = t;
+  /* No pattern: a dense matrix, until HycoTableKeepPattern() says otherwise. */
   t->n = -1;
   t->values.rows = entries;
   t->values.tensor.dim = dim;
@@ -54,6 +55,7 @@ PetscErrorCode HycoTableKeepPattern(HycoROM m, HycoTable t)
   PetscFunctionBegin;
   PetscCall(PetscObjectTypeCompare((PetscObject)g->Kr, MATSEQDENSE, &dense));
   if (dense) PetscFunctionReturn(PETSC_SUCCESS);
+  /* The pattern of Kr in the order in which the entries of the table lie. */
   PetscCall(MatGetRowIJ(g->Kr, 0, PETSC_FALSE, PETSC_FALSE, &n, &start, &column, &done));
   t->n = n;
   HycoDuplicate(n + 1, start, &t->start);
@@ -68,6 +70,7 @@ PetscErrorCode HycoTableCreateSparse(HycoROM m)
   const HycoTable t = g->model->table;
 
   PetscFunctionBegin;
+  /* A file of another number of modes would be read out of bounds. */
   HycoCheck(t->n == m->n, "%s: the table of the reduced stiffness has %d rows, the matrix %d: train the model again",
             m->model->path, (int)t->n, (int)m->n);
   PetscCall(MatCreate(PETSC_COMM_SELF, &g->Kr));
@@ -104,6 +107,7 @@ PetscErrorCode HycoTableView(HycoROM m, PetscViewer viewer)
   PetscFunctionBegin;
   PetscCall(PetscViewerASCIIPrintf(viewer, "  the reduced stiffness is a polynomial, tabulated at"));
   for (PetscInt p = 0, n = 0; p < t->dim; p++) {
+    /* Parameters of one node do not change the stiffness. */
     if (t->n[p] > 1)
       PetscCall(PetscViewerASCIIPrintf(viewer, "%s %d values of %s", n++ ? " x" : "", (int)t->n[p],
                                        m->model->scene->parameter[p]));
@@ -131,6 +135,7 @@ PetscErrorCode HycoTableSave(HycoROM m, HycoH5 h)
   if (t->n >= 0) PetscCall(HycoH5WriteInt(h, "table/start", t->n + 1, 1, t->start));
   if (t->n >= 0) PetscCall(HycoH5WriteInt(h, "table/column", t->values.rows, 1, t->column));
   PetscCall(HycoH5WriteReal(h, "table/parameters", all, 1, x));
+  /* A row per node of the grid, so that a reader sees one stiffness as one row. */
   PetscCall(HycoH5WriteReal(h, "table/stiffness", HycoTensorSize(tensor), t->values.rows, t->values.data));
   PetscCall(PetscFree(x));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -160,6 +165,7 @@ static PetscErrorCode LoadPattern(HycoROM m, HycoH5 h)
   t->n = n - 1;
   PetscCall(HycoH5LoadInt(h, "table/column", 0, PetscMax(t->n - 1, 0), entries, &one, &t->column));
   good = (PetscBool)(n > 1 && t->start[0] == 0 && t->start[n - 1] == *entries);
+  /* MatSeqAIJSetPreallocationCSR() takes rows as they are: a wrong one would be memory out of bounds. */
   for (PetscInt i = 0; i < t->n && good; i++) {
     good = (PetscBool)(t->start[i + 1] >= t->start[i]);
     for (PetscInt k = t->start[i] + 1; k < t->start[i + 1] && good; k++)
@@ -181,6 +187,7 @@ static PetscErrorCode LoadValues(HycoROM m, HycoH5 h, PetscInt **count, PetscRea
   for (PetscInt p = 0; p < dim; p++) {
     all += (*count)[p];
     nodes *= (*count)[p];
+    /* Before the product of the counts can overflow or ask for all memory. */
     HycoCheck(nodes <= HYCO_TABLE_NODES, "%s: table/counts is damaged", m->model->path);
   }
   PetscCall(HycoH5LoadReal(h, "table/parameters", &all, &one, x));
@@ -200,6 +207,7 @@ PetscErrorCode HycoTableLoad(HycoROM m, HycoH5 h)
 
   PetscFunctionBegin;
   ierr = LoadValues(m, h, &count, &x, &data);
+  /* Freed here also after a refused file, which LoadValues() leaves half read. */
   PetscCall(PetscFree(data));
   PetscCall(PetscFree(x));
   PetscCall(PetscFree(count));

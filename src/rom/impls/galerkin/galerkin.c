@@ -64,8 +64,11 @@ static PetscErrorCode CountUnknowns(HycoROM m)
   const PetscInt l = m->model->l;
 
   PetscFunctionBegin;
+  /* Below BORDERED_MIN a dense matrix is faster than the sparse border; without a history the product (K V) G is done
+     once per stiffness and pays off. */
   g->bordered = (PetscBool)(g->model->G && m->model->scene->n_times && l + m->model->n_fe > BORDERED_MIN);
   g->n_free = m->model->hybrid == HYCO_HYBRID_ALL && !g->bordered ? 0 : l;
+  /* The modes' coefficients first, then the full-order displacements, in the order of fe_dof. */
   m->n = g->n_free + m->model->n_fe;
   if (!g->model->contact) m->n_L = m->m; /* otherwise set by the type */
   HycoCheckModel(m->n > 0, "the model has no unknowns, because every training solution is zero; check the loads");
@@ -82,6 +85,7 @@ static PetscErrorCode CreateReduced(PetscInt rows, PetscInt cols, PetscBool dens
     PetscCall(MatSetSizes(*A, rows, cols, rows, cols));
     PetscCall(MatSetType(*A, MATSEQAIJ));
     PetscCall(MatSeqAIJSetPreallocation(*A, per_row, NULL));
+    /* Rows of modes and of displacements differ in length: Preallocate() gives the exact room later. */
     PetscCall(MatSetOption(*A, MAT_NEW_NONZERO_ALLOCATION_ERR, PETSC_FALSE));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -234,9 +238,11 @@ PetscErrorCode HycoGalerkinUnpack(HycoROM m)
 
   PetscFunctionBegin;
   PetscCall(HycoGalerkinExpand(m));
+  /* Force vectors reach contacts outside A_lambda: the next solution must not keep their forces there. */
   if (m->spread) PetscCall(PetscArrayzero(m->Lambda, m->model->pairs.n));
   m->spread = PETSC_FALSE;
   if (!m->n_L) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Force vectors: Lambda is their combination. */
   if (g->model->expand) {
     PetscCall(g->model->expand(m));
     m->spread = PETSC_TRUE;
@@ -262,6 +268,7 @@ PetscErrorCode HycoGalerkinSolve(HycoROM m, const PetscReal mu[])
   }
   PetscCall(Assemble(m, mu));
   p->seconds.assemble = HycoNow() - begin;
+  /* Before the solve: the solution without contact comes from the table of loads, if it is affine in them. */
   HycoLogged(HYCO_EVENT_SOLVE, HycoLoadsSetFree(m, mu));
   HycoLogged(HYCO_EVENT_SOLVE, HycoSolverSolve(m->solver, g->x, g->L));
   PetscCall(HycoSolverGetSeconds(m->solver, &p->seconds.factor, &p->seconds.solve));
@@ -285,6 +292,7 @@ PetscErrorCode HycoGalerkinCondition(HycoROM m, PetscReal *condition)
   PetscFunctionBegin;
   *condition = 0;
   if (m->n > 2500) PetscFunctionReturn(PETSC_SUCCESS); /* an SVD would take minutes */
+  /* Densely: the reduced matrix is small, and nonsymmetric, so that no iterative estimate would be safe. */
   PetscCall(MatConvert(g->Kr, MATSEQDENSE, MAT_INITIAL_MATRIX, &dense));
   PetscCall(MatDenseGetArray(dense, &a));
   PetscCall(HycoExtremeSingularValues(m->n, m->n, a, &smallest, &largest));
@@ -310,9 +318,11 @@ static PetscErrorCode QuadraticForm(HycoROM m, PetscReal *energy, PetscReal *siz
   for (PetscInt i = 0; i < n; i++) {
     PetscReal sum = 0;
 
+    /* Most unknowns outside the RID are exactly 0, and their rows of K are empty. */
     if (m->U[i] == 0) continue;
     for (PetscInt k = ia[i]; k < ia[i + 1]; k++) {
       sum += a[k] * m->U[ja[k]];
+      /* The diagonal alone: what the displacements would store node by node, the size of the terms that cancel. */
       if (ja[k] == i) *size += a[k] * m->U[i] * m->U[i] / 2;
     }
     *energy += m->U[i] * sum / 2;
@@ -349,6 +359,7 @@ PetscErrorCode HycoGalerkinLocal(HycoROM m, HycoLocal *local)
   if (m->m) PetscCall(HycoGalerkinContactMatrix(m));
   if (m->m && !g->D) PetscCall(MatCreateVecs(g->B, NULL, &g->D));
   if (m->m) {
+    /* Rows of the RID's contacts; own_rows is in their order. */
     PetscCall(VecGetArrayWrite(g->D, &gap));
     for (PetscInt k = 0; k < m->m; k++) gap[m->contact[k]] = g->own_rows.gap[k];
     PetscCall(VecRestoreArrayWrite(g->D, &gap));

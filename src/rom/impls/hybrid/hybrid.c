@@ -51,6 +51,7 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
   if (m->model->pairs.n)
     PetscCall(PetscViewerASCIIPrintf(viewer, "  full-order displacements: %d (%s)\n", (int)m->model->n_fe,
                                      words[m->model->hybrid]));
+  /* G: the regression of gamma on the unknowns of A. */
   if (m->model->hybrid == HYCO_HYBRID_ALL && h->galerkin.G)
     PetscCall(PetscViewerASCIIPrintf(viewer, "  ridge: %.0e of the first squared singular value\n",
                                      (double)h->galerkin.ridge));
