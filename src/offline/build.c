@@ -60,10 +60,12 @@ static PetscErrorCode SurfacesOf(HycoReducer t, PetscBool contact[], PetscInt *n
   PetscFunctionBegin;
   HycoPairsMark(&t->fom->pairs, contact);
   PetscCall(HycoMovedGroups(t->scene, surface, &t->fom->pairs, n_all, all));
+  /* Moved surfaces whole: a slave may meet any of their facets at some parameter. */
   for (PetscInt g = 0; g < *n_all; g++) {
     for (PetscInt k = surface->group_start[all[g]]; k < surface->group_start[all[g] + 1]; k++)
       contact[surface->group_node[k]] = PETSC_TRUE;
   }
+  /* Slave groups whole as well: areas and averaged normals read all facets around a node. */
   for (PetscInt k = 0; k < t->scene->n_contacts; k++)
     PetscCall(HycoMeshFindGroup(surface, "contact", t->scene->contact[k]->slave, &all[(*n_all)++]));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -118,6 +120,7 @@ static PetscErrorCode GatherCells(HycoReducer t, const PetscBool in[], HycoMesh 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(part->n_groups, &group));
   PetscCall(HycoMarkContactGroups(t->scene, part, group));
+  /* Facets with loads: a model of cells alone must integrate tractions on them. */
   for (PetscInt k = 0; LoadedSurfaces(t) && k < t->scene->n_loads; k++) {
     PetscInt g = 0;
 
@@ -144,6 +147,7 @@ static PetscErrorCode FindSurface(HycoMesh surface, HycoMesh m, PetscInt node[])
   PetscCall(PetscSortIntWithArray(m->n_nodes, whole, at));
   for (PetscInt i = 0; i < surface->n_nodes; i++) {
     PetscCall(PetscFindInt(surface->node_whole ? surface->node_whole[i] : i, m->n_nodes, whole, &node[i]));
+    /* -1: a surface node that the RID does not contain. */
     node[i] = node[i] < 0 ? -1 : at[node[i]];
   }
   PetscCall(PetscFree2(whole, at));
@@ -231,15 +235,18 @@ static PetscErrorCode TakeSets(HycoReducer t, HycoROM m, const PetscInt note[])
   PetscFunctionBegin;
   PetscCall(PetscFree(t->fixed));
   PetscCall(PetscMalloc1(n * dim, &t->fixed));
+  /* The first bits of a node's note say which components are fixed, as found by the rank that owns it. */
   for (PetscInt k = 0; k < n * dim; k++) t->fixed[k] = (PetscBool)((note[k / dim] >> k % dim & 1) != 0);
   PetscCall(PetscCalloc1(n, &sets));
   for (PetscInt e = 0; e < m->model->mesh->n_cells; e++) { /* whether connected to Omega_B */
     PetscInt node[HYCO_MAX_CELL_NODES];
     const PetscInt n_nodes = HycoMeshCellNodes(m->model->mesh, e, node);
 
+    /* A node beside cells of Omega_B is on the interface. */
     for (PetscInt v = 0; v < n_nodes; v++) sets[node[v]] = note[node[v]] & BESIDE ? 1 : 2;
   }
   PetscCall(PetscMalloc1(f->n_contacts, &m->model->in_rid));
+  /* Contacts next: masters outside the RID take their slaves to the interface, (32)-(36). */
   PetscCall(HycoRIDSets(f->fe_surface, &f->pairs, f->searches ? &t->met.rows : &f->pairs,
                         f->searches ? t->met.of : NULL, t->surface_node, n, sets, m->model->in_rid));
   PetscCall(HycoROMSetDomain(m, sets));
@@ -334,6 +341,7 @@ static PetscErrorCode LimitModes(HycoReducer t, HycoROM m)
     for (PetscInt k = 0; k < n * dim; k++) n_A += !t->fixed[node[k / dim] * dim + k % dim];
     PetscCall(ISRestoreIndices(m->model->inside, &node));
   }
+  /* Only rank 0 has the sets, but all ranks have the bases that become shorter. */
   PetscCallMPI(MPI_Bcast(&n_A, 1, MPIU_INT, 0, HycoComm(t)));
   if (n_A >= l || !n_A) PetscFunctionReturn(PETSC_SUCCESS);
   t->l = n_A;
@@ -413,6 +421,7 @@ static PetscErrorCode CheckForces(HycoReducer t, HycoROM m)
   PetscFunctionBegin;
   PetscCall(PetscObjectSetOptions((PetscObject)t->prototype, t->scene->options));
   PetscCall(HycoROMSetFromOptions(t->prototype)); /* as for the model's predictions */
+  /* One contact suffices here: how well the RID covers the force is judged on held-out points. */
   for (PetscInt k = 0; k < m->model->pairs.n; k++) kept = (PetscBool)(kept || m->model->in_rid[k]);
   for (PetscInt k = 0; k < t->n_s * m->model->pairs.n; k++) presses = (PetscBool)(presses || t->Lambda[k] > 0);
   HycoCheckModel(!m->ops->reconstruct || !t->prototype->reconstruct || kept || !presses,
@@ -450,6 +459,7 @@ static PetscErrorCode TakeClosed(HycoReducer t, HycoROM m)
   PetscCall(PetscCalloc1(N, &m->model->closed));
   for (PetscInt k = 0; k < t->n_s; k++) {
     const PetscReal *L = t->Lambda + (size_t)k * (size_t)N;
+    /* Relative to each solution's own largest: small loads close contacts too. */
     PetscReal most = 0;
 
     for (PetscInt i = 0; i < N; i++) most = PetscMax(most, L[i]);
@@ -466,6 +476,7 @@ static PetscErrorCode BuildModel(HycoReducer t, PetscBool useful, HycoROM m, Hyc
   PetscCall(FillModel(t, m));
   PetscCall((*t->trainer.build)(m, t));
   PetscCall(TakeClosed(t, m));
+  /* Only for a model that will be used: a greedy iteration may pass through poor ones. */
   if (useful) PetscCall(CheckUseful(t, m));
   PetscCall(Report(t, m, report));
   PetscCall(HycoROMReset(m));
@@ -511,6 +522,7 @@ static PetscErrorCode MarkJudged(HycoReducer t, HycoROM m, PetscBool judged[])
 
   PetscFunctionBegin;
   for (PetscInt i = 0; i < m->model->mesh->n_nodes; i++) judged[i] = (PetscBool)(traits->cells || all);
+  /* Contact nodes, whose displacements `rank` and `contact` choose from. */
   for (PetscInt i = 0; surface && i < surface->n_nodes; i++) {
     if (t->surface_node[i] >= 0) judged[t->surface_node[i]] = PETSC_TRUE;
   }
@@ -541,6 +553,7 @@ static PetscErrorCode FetchJudged(HycoReducer t, HycoROM m)
     t->rid_row[i] = judged[i] ? t->n_rid_nodes : -1;
     if (judged[i]) node[t->n_rid_nodes++] = m->model->mesh->node_whole[i];
   }
+  /* Rows in the order of the list; rid_row says where each node's are. */
   PetscCall(HycoReducerFetchSnapshots(t, t->n_rid_nodes, node, &t->U_rid));
   PetscCall(PetscFree2(judged, node));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -586,6 +599,7 @@ PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, HycoROM *model,
   PetscFunctionBegin;
   *model = NULL;
   HycoLogged(HYCO_EVENT_MODEL, MakeModel(t, useful, model, report)); /* ends on an error too: a search goes on */
+  /* A report holds numbers and fixed arrays only; pointers in it are set anew below. */
   PetscCallMPI(MPI_Bcast(report, sizeof(*report), MPI_BYTE, 0, HycoComm(t)));
   report->type = report->chosen.settings.type = t->prototype->model->type; /* set on each rank */
   PetscCall(HycoROMBroadcast(HycoComm(t), model));
@@ -593,6 +607,7 @@ PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, HycoROM *model,
   PetscCall(HycoLogEvent(HYCO_EVENT_SCAN, PETSC_TRUE));
   ierr = (*t->trainer.finish)(t, *model, report);
   PetscCall(HycoLogEvent(HYCO_EVENT_SCAN, PETSC_FALSE));
+  /* A refused model (a singular stiffness) is not kept; the search goes on to the next. */
   if (ierr) (void)!HycoROMDestroy(model);
   PetscCall(ierr);
   PetscCall(HycoROMReset(*model));
@@ -613,6 +628,7 @@ PetscErrorCode HycoReducerFinish(HycoReducer t, HycoSnapshots store, const char 
     ierr = HycoReducerLearn(t, store, &model, &grown, report);
   else
     ierr = HycoReducerBuild(t, PETSC_TRUE, &model, report);
+  /* Estimates are part of the model: they come before the file. */
   if (!ierr) ierr = HycoReducerCalibrate(t, store, model, report);
   PetscCall(HycoSamplesDestroy(&grown));
   if (!ierr) ierr = HycoROMSave(model, t->fom, t->l, t->V, path);
@@ -641,6 +657,7 @@ PetscErrorCode HycoReducerOpen(HycoReducer t, HycoSamples samples, const char pa
   PetscFunctionBegin;
   PetscCall(HycoReducerReset(t));
   t->samples = samples;
+  /* The columns of bases are the training points, until types with modes of their own replace them. */
   PetscCall(HycoReducerSetColumns(t, samples));
   t->solving = 0;
   t->late = PETSC_FALSE;
@@ -734,9 +751,11 @@ PetscErrorCode HycoReducerHoldOut(HycoReducer t, HycoSnapshots store)
 
   PetscFunctionBegin;
   t->drawn = 0;
+  /* The user's own points are never reduced. */
   t->few = (PetscBool)(t->late && !t->validation && t->n_validation < 0);
   PetscCall(HycoSamplesDestroy(&t->held));
   if (t->validation) {
+    /* A held-out point must not be trained on: it would judge nothing. */
     PetscCall(HycoSamplesExcept(t->validation, t->samples, &t->held));
     PetscCall(HycoSamplesGet(t->validation, &n, NULL, NULL));
     PetscCall(HycoSamplesGet(t->held, &m, NULL, NULL));
@@ -760,6 +779,7 @@ PetscErrorCode HycoReducerHoldOutMore(HycoReducer t, HycoSnapshots store)
   PetscCall(HycoSamplesGet(t->samples, &n, NULL, NULL));
   PetscCall(DrawHeld(t, HeldByDefault(n) - FEW_HELD, TOGETHER, &more));
   PetscCall(HycoSamplesAddSet(t->held, more));
+  /* Drawn points may meet earlier ones, for instance corners. */
   PetscCall(HycoSamplesDropTwins(t->held, NULL));
   PetscCall(HycoSamplesDestroy(&more));
   PetscCall(HycoReducerSolve(t, store, t->held));
@@ -774,6 +794,7 @@ PetscErrorCode HycoReducerHoldOutFresh(HycoReducer t, HycoSnapshots store, HycoS
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(last, &n, NULL, NULL));
+  /* The user's points stay in the set, and only the drawn ones are replaced. */
   if (t->validation) {
     PetscCall(HycoSamplesExcept(t->validation, t->samples, &held));
     PetscCall(HycoSamplesGet(held, &m, NULL, NULL));
@@ -784,6 +805,7 @@ PetscErrorCode HycoReducerHoldOutFresh(HycoReducer t, HycoSnapshots store, HycoS
   PetscCall(HycoSamplesDropTwins(held, NULL));
   PetscCall(HycoSamplesExcept(held, last, &others));
   PetscCall(HycoSamplesGet(others, n_fresh, NULL, NULL));
+  /* Those that judge no more: they may become training points. */
   PetscCall(HycoSamplesExcept(last, held, former));
   t->held = held;
   PetscCall(HycoSamplesDestroy(&others));
@@ -809,6 +831,7 @@ static PetscErrorCode DecideLate(HycoReducer t)
     PetscCall(HycoReducerTries(t, types[k], &tries));
     PetscCall(HycoROMCreate(&type));
     PetscCall(HycoROMSetType(type, types[k]));
+    /* One such type is enough: if it suffices, no training point is ever solved. */
     if (tries && HycoReducerOwnModes(t, type)) t->late = PETSC_TRUE;
     PetscCall(HycoROMDestroy(&type));
   }
@@ -840,6 +863,7 @@ static PetscErrorCode RunOn(HycoReducer t, HycoSnapshots store, HycoSamples samp
   PetscFunctionBegin;
   if (t->trainer.begin) PetscCall((*t->trainer.begin)(t));
   PetscCall(DecideLate(t));
+  /* Otherwise when the search comes to a type that learns from solutions. */
   if (!t->late) PetscCall(HycoReducerSolve(t, store, samples));
   PetscCall(HycoReducerHoldOut(t, store));
   *solved = HycoNow() - t->solving;
@@ -860,6 +884,7 @@ PetscErrorCode HycoReducerRun(HycoReducer t, HycoSamples samples, const char pat
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
   HycoCheck(samples, "give the training points");
+  /* Before hours of solutions: targets without points to judge by cannot be met. */
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++)
     HycoCheck(!(t->target[j] > 0) || t->validation || t->n_validation,
               "-target_%s needs held-out points, and -hyco_validation is 0; remove one of the two", HycoErrorKinds[j]);
@@ -869,6 +894,7 @@ PetscErrorCode HycoReducerRun(HycoReducer t, HycoSamples samples, const char pat
   PetscCall(HycoReducerClose(t, &store));
   PetscCall(ierr);
   report.sliding = t->sliding;
+  /* Late solves happen inside the reduction: their time is counted with the snapshots. */
   report.seconds_snapshots = solved - begin + t->solving;
   report.seconds_reduction = HycoNow() - solved - t->solving;
   if (training) *training = report;

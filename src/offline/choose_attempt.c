@@ -92,6 +92,7 @@ HycoAttempt *HycoAttemptsReopen(PetscInt n, HycoAttempt attempt[])
   for (PetscInt k = 0; k < n; k++) {
     HycoAttempt *a = &attempt[k];
 
+    /* In the order of the attempts, which is the order of their cost. */
     if (a->beaten_by && !a->reopened && !IsMet(n, attempt, a->cost) &&
         !(a->ratio > HycoAttemptsLimit(n, attempt, a->cost, &beaten)))
       return a;

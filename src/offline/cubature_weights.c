@@ -24,6 +24,7 @@ static PetscErrorCode GatherColumn(Mat A, PetscInt j, PetscReal column[])
   PetscFunctionBegin;
   PetscCall(MatDenseGetColumnVecRead(A, j, &v));
   PetscCall(VecScatterCreateToZero(v, &scatter, &all));
+  /* Rows are in the file's order: rank 0 gets the same column on any number of ranks. */
   PetscCall(VecScatterBegin(scatter, v, all, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(VecScatterEnd(scatter, v, all, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(MatDenseRestoreColumnVecRead(A, j, &v));
@@ -53,6 +54,7 @@ static PetscErrorCode FillNotes(HycoFE fe, const PetscBool near[], PetscReal val
   for (PetscInt e = 0; e < n; e++) {
     value[N_NOTES * e] = near && near[e] ? 0 : volume[e];
     value[N_NOTES * e + 1] = fe->mesh->cell_body[e];
+    /* Cells with a full-order displacement have weight 1, and are not chosen. */
     value[N_NOTES * e + 2] = near && near[e];
   }
   PetscCall(PetscFree(volume));
@@ -70,6 +72,7 @@ static PetscErrorCode Notes(HycoReducer t, const PetscBool near[], PetscInt n_ro
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(N_NOTES * fe->mesh->n_cells, &value, N_NOTES * n_rows, &rows));
+  /* An inverted cell on one rank is an error on all. */
   HycoOnEach(HycoComm(t), FillNotes(fe, near, value));
   PetscCall(HycoFOMToRows(t->fom, HYCO_ON_CELLS, MPIU_REAL, N_NOTES, value, rows));
   PetscCall(MatCreateDense(HycoComm(t), n_rows, PETSC_DECIDE, t->sizes[1], N_NOTES, NULL, X));
@@ -123,6 +126,7 @@ static void Measure(PetscInt n_cells, PetscInt n, const PetscReal vectors[], con
       missed += vectors[(size_t)i * (size_t)n_cells + (size_t)e] * (w[e] - 1);
       all += vectors[(size_t)i * (size_t)n_cells + (size_t)e];
     }
+    /* Vectors are orthonormal: their singular values give each the weight that it has in the contributions. */
     lost += sigma[i] * missed * sigma[i] * missed;
     size += sigma[i] * all * sigma[i] * all;
   }
@@ -136,6 +140,7 @@ static void Measure(PetscInt n_cells, PetscInt n, const PetscReal vectors[], con
       missed += volume[e] * (w[e] - 1);
       all += volume[e];
     }
+    /* A body without any chosen cell would lose its whole volume: the largest, not the mean. */
     error[1] = PetscMax(error[1], HycoRelative(PetscAbsReal(missed), all));
   }
 }
@@ -180,6 +185,7 @@ PetscErrorCode HycoCubatureFind(HycoReducer t, const PetscBool near[], PetscReal
   PetscCall(MatGetLocalSize(W, &rows, NULL));
   PetscCall(Notes(t, near, rows, &X));
   PetscCall(PetscMalloc2((size_t)n * n_cells + 1, &vectors, N_NOTES * n_cells + 1, &notes));
+  /* All cells of n vectors on rank 0: nonnegative least squares is a serial algorithm. */
   for (PetscInt j = 0; j < n; j++) PetscCall(GatherColumn(W, j, vectors + (size_t)j * n_cells));
   for (PetscInt j = 0; j < N_NOTES; j++) PetscCall(GatherColumn(X, j, notes + (size_t)j * n_cells));
   PetscCall(MatDestroy(&X));

@@ -67,6 +67,7 @@ PetscErrorCode HycoIndicatorCreate(HycoROM model, HycoIndicatorKind kind, PetscI
   PetscCall(HycoROMSetReconstruct(model, (PetscBool)(kind == HYCO_INDICATOR_RESIDUAL)));
   if (!HycoIndicatorInterpolates(kind)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(n, &d->weight));
+  /* Once per iteration: the triangulation depends on the solved points alone. */
   PetscCall(HycoInterpolantCreate(model->model->scene->n_parameters, n, points, &d->interpolant));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -120,6 +121,7 @@ static PetscErrorCode SetUp(HycoIndicator d)
     PetscCall(VecDuplicate(d->L, &d->D));
     PetscCall(VecDuplicate(d->local.D, &d->gap));
   }
+  /* The norm's matrix on the model's mesh, of which A is taken. */
   PetscCall(HycoFECreateMatrix(m->fe, PETSC_COMM_SELF, m->fe->mesh->n_nodes, 0, &d->M));
   PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &d->system));
   PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &d->solver));
@@ -142,6 +144,7 @@ static PetscErrorCode AssembleNorm(HycoIndicator d)
   d->geometry = now;
   PetscCall(KSPDestroy(&d->norm));
   PetscCall(MatDestroy(&d->M_A));
+  /* Gradients times the mesh's length, so that both parts of the norm have one unit. */
   PetscCall(HycoFEAssembleH1(m->fe, d->length, d->M));
   PetscCall(MatCreateSubMatrix(d->M, d->local.is_A, d->local.is_A, MAT_INITIAL_MATRIX, &d->M_A));
   PetscCall(HycoDefiniteSolver(d->M_A, "the H1 norm's matrix", &d->norm));
@@ -292,11 +295,13 @@ static PetscErrorCode EvaluateLocal(HycoIndicator d, const PetscReal mu[], HycoR
   HycoCheck(m->ops->local,
             "-hyco_greedy_indicator local needs the system on the RID, which a %s model does not have; use penetration",
             m->model->type);
+  /* Matrices at the last prediction's parameters: no further assembly. */
   PetscUseTypeMethod(m, local, &d->local);
   if (!d->system) PetscCall(SetUp(d));
   PetscCall(AssembleNorm(d));
   PetscCall(Interpolate(d, mu));
   PetscCall(SolveLocal(d, reason));
+  /* Also if the local problem was not solved; the caller then replaces the values. */
   PetscCall(Distances(d, v));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -323,6 +328,7 @@ PetscErrorCode HycoIndicatorEvaluate(HycoIndicator d, const PetscReal mu[], Hyco
   PetscFunctionBegin;
   PetscCall(HycoROMPredict(m, m->model->scene->n_parameters, mu));
   if (d->kind == HYCO_INDICATOR_PENETRATION) {
+    /* Penetration counts at all contacts, also outside the RID. */
     PetscCall(HycoROMComplete(m));
     v->eta = v->eta_u = v->size = Penetration(m);
     v->eta_lambda = 0;

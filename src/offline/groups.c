@@ -78,6 +78,7 @@ static PetscErrorCode FindKinds(HycoScene scene, PetscInt n_par, const PetscReal
       const PetscReal *a = mu + list[first[k]] * n_par, *b = mu + list[i] * n_par;
       PetscInt p = 0;
 
+      /* Equal values of all parameters that the stiffness depends on, bit for bit: the factor is reused only then. */
       while (p < n_par && (!reaches[p] || a[p] == b[p])) p++;
       if (p == n_par) break;
     }

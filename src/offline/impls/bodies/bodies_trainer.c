@@ -148,6 +148,7 @@ static PetscErrorCode CheckPath(HycoROM m, HycoReducer t)
   const HycoBodiesInelastic in = ((HycoSubstructures)m->model->data)->inelastic;
 
   PetscFunctionBegin;
+  /* Negated, so that a NaN is refused too. */
   if (!(m->model->numbers[1] < USELESS)) HycoReducerNameWorst(t, worst);
   HycoCheckModel(
       m->model->numbers[1] < USELESS,
