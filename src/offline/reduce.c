@@ -40,6 +40,7 @@ static PetscErrorCode RemoveLifting(HycoReducer t, Mat S)
   PetscFunctionBegin;
   PetscCall(MatGetLocalSize(S, &n_rows, NULL));
   PetscCall(PetscMalloc1(n_rows, &fixed));
+  /* Which unknowns are fixed is known by parts, snapshots lie by rows of the file. */
   PetscCall(HycoFOMToRows(t->fom, HYCO_ON_NODES, HYCO_MPI_BOOL, t->sizes[3], t->fom->fe->fixed, fixed));
   PetscCall(MatGetSize(S, NULL, &n));
   PetscCall(MatDenseGetLDA(S, &lda));
@@ -73,6 +74,7 @@ PetscErrorCode HycoReducerMultiply(HycoReducer t, Mat X, Mat Y, PetscReal produc
   PetscFunctionBegin;
   PetscCall(MatTransposeMatMult(X, Y, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &P));
   PetscCallMPI(MPI_Comm_size(HycoComm(t), &size));
+  /* Modes and snapshots are tall and thin: the product has the size of their columns. */
   if (size > 1)
     PetscCall(MatCreateRedundantMatrix(P, size, PETSC_COMM_SELF, MAT_INITIAL_MATRIX, &whole));
   else {
@@ -217,8 +219,10 @@ static PetscErrorCode PODRank(HycoReducer t, PetscInt n_sigma, const PetscReal s
   PetscInt first;
 
   PetscFunctionBegin;
+  /* Of a 1D scene nothing is dominant; elsewhere modes far above the rest are taken before the energy is counted. */
   first = CountDominant(t->scene, n_sigma, sigma);
   *l = first + HycoPODRank(n_sigma - first, sigma + first, tol, t->noise, 0);
+  /* The user's limit is no lack of accuracy. */
   if (max_modes > 0) *l = PetscMin(*l, max_modes);
   HycoCheckModel(*l <= found || tol == 0,
                  "-hyco_pod_svd_type %s finds only %d accurate modes, which leave out more than %g of the snapshots' "
@@ -293,8 +297,10 @@ static PetscErrorCode JoinPaths(HycoReducer t, const HycoPathModes *modes, Petsc
   for (PetscInt j = 0; j < modes->n; j++) {
     PetscInt l;
 
+    /* A path without displacement (no load reaches it) has no modes. */
     if (!modes->V[j]) continue;
     PetscCall(MatGetSize(modes->V[j], NULL, &l));
+    /* Modes carry their singular values, so that the second POD sees each path's energy. */
     PetscCall(MatScale(modes->V[j], HycoPathScale(modes->first[j], largest)));
     PetscCall(HycoCopyColumns(modes->V[j], *joined, at));
     at += l;
@@ -364,6 +370,7 @@ static PetscErrorCode FindPathBasis(HycoReducer t, HycoSnapshots store, PetscInt
     PetscCall(MatGetSize(path, &N, NULL));
     PetscCall(MatGetLocalSize(path, &n_rows, NULL));
     PetscCall(HycoPathModesAdd(t, path, tol, &modes));
+    /* One path at a time: all columns of all paths may not fit into memory. */
     PetscCall(MatDestroy(&path));
   }
   PetscCall(HycoPathModesJoin(t, &modes, N, n_rows, tol, most, &t->basis[kind]));
@@ -403,8 +410,10 @@ static PetscErrorCode CutBasis(HycoReducer t, PetscInt kind, Mat *V, PetscInt *l
   *V = NULL;
   PetscCall(PODRank(t, basis->n_sigma, basis->sigma, t->tol[kind], most, basis->l, l));
   t->counts[kind] = *l;
+  /* A field that is zero in all solutions, as stresses of a rigid body. */
   if (!*l) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatDenseGetSubMatrix(basis->V, PETSC_DECIDE, PETSC_DECIDE, 0, *l, &part));
+  /* A copy, because the submatrix borrows the basis' array. */
   PetscCall(MatDuplicate(part, MAT_COPY_VALUES, V));
   PetscCall(MatDenseRestoreSubMatrix(basis->V, &part));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -531,6 +540,7 @@ static PetscErrorCode SeedFrom(HycoReducer t, Mat V, PetscInt l, PetscInt kind, 
   PetscInt *index;
 
   PetscFunctionBegin;
+  /* A basis may serve the modes without placing the RID. */
   if (!l || !Seeds(t, kind)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(l, &index));
   HycoLogged(HYCO_EVENT_DEIM, Points(t, V, index));
@@ -552,6 +562,7 @@ static PetscErrorCode TakeDisplacements(HycoReducer t)
   PetscCall(PetscArraycpy(t->sigma, basis->sigma, PetscMax(t->n_s, basis->n_sigma) + 1));
   PetscCall(SeedFrom(t, V, t->l, HYCO_SEED_DISPLACEMENT, t->sizes[3], &t->n_seeds_node, &t->seeds_node));
   PetscCall(PetscMalloc1(t->l * t->n_s, &t->VtU));
+  /* Coefficients of a truncated basis are the first ones: modes are orthonormal. */
   for (PetscInt k = 0; k < t->n_s; k++)
     PetscCall(PetscArraycpy(t->VtU + k * t->l, basis->coefficients + k * basis->l, t->l));
   t->V = V;
@@ -587,6 +598,7 @@ static PetscErrorCode SetForces(HycoReducer t, PetscInt k, Mat R)
   PetscCall(HycoContactRows(f->fe_surface, &f->pairs, start, dof, value, gap));
   for (PetscInt i = 0; i < m; i++) {
     for (PetscInt j = start[i]; j < start[i + 1]; j++) {
+      /* Rows of B act on the surfaces' mesh; the distributed vectors have global numbers. */
       const PetscInt node = f->surface->node_global ? f->surface->node_global[dof[j] / dim] : dof[j] / dim;
 
       PetscCall(MatSetValue(R, node * dim + dof[j] % dim, k, value[j] * t->Lambda[(size_t)k * (size_t)m + (size_t)i],
@@ -687,6 +699,7 @@ static PetscErrorCode MoveWherePresses(HycoReducer t, PetscInt k)
 
   PetscFunctionBegin;
   if (!t->fom->searches) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Ties go to the first solution, the same on any number of ranks. */
   for (PetscInt q = 1; q < t->n_s && t->rank == 0; q++) {
     if (t->Lambda[(size_t)q * m + (size_t)k] > t->Lambda[(size_t)most * m + (size_t)k]) most = q;
   }
@@ -738,6 +751,7 @@ static PetscErrorCode AddContactNodes(HycoReducer t, PetscInt k, PetscInt *n, Pe
   PetscFunctionBegin;
   HycoPairsMasters(&f->pairs, k, &masters, &master, &weight);
   PetscCall(PetscRealloc((size_t)(*n + masters + 1) * sizeof(**nodes), nodes));
+  /* The slave first, then its masters: all of them must lie in the RID. */
   for (PetscInt j = -1; j < masters; j++) {
     const PetscInt node = j < 0 ? HycoPairsSlave(&f->pairs, k) : master[j];
 
@@ -756,6 +770,7 @@ static PetscErrorCode DualSeeds(HycoReducer t, PetscInt *n_nodes, PetscInt **nod
   PetscFunctionBegin;
   *n_nodes = 0;
   PetscCall(PetscMalloc2(t->n_s * t->n_s, &G, t->n_s, &index));
+  /* The dual norm of H1 between forces: one solve with the norm's matrix per snapshot. */
   PetscCall(DualGram(t, G));
   HycoOnRoot(HycoComm(t), DualPoints(t, G, &l, index));
   PetscCallMPI(MPI_Bcast(&l, 1, MPIU_INT, 0, HycoComm(t)));
@@ -765,6 +780,7 @@ static PetscErrorCode DualSeeds(HycoReducer t, PetscInt *n_nodes, PetscInt **nod
     if (t->rank == 0) PetscCall(AddContactNodes(t, index[k], n_nodes, nodes));
   }
   PetscCallMPI(MPI_Bcast(n_nodes, 1, MPIU_INT, 0, HycoComm(t)));
+  /* Rank 0's list has grown in place; the others get exactly its length. */
   if (t->rank) PetscCall(PetscMalloc1(*n_nodes, nodes));
   HycoBcast(*nodes, *n_nodes, MPIU_INT, HycoComm(t));
   PetscCall(PetscFree2(G, index));
@@ -781,6 +797,7 @@ static PetscErrorCode ReadForces(HycoReducer t, HycoSnapshots store)
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->columns, NULL, &n_par, &mu));
   PetscCall(PetscMalloc1((size_t)m * (size_t)t->n_s + 1, &t->Lambda));
+  /* Contacts are stored in the order of the mesh file: the same for every partition. */
   for (PetscInt k = 0; k < t->n_s; k++)
     PetscCall(HycoSnapshotsReadRows(store, mu + k / steps * n_par, k % steps, HycoSeedFields[HYCO_SEED_DUAL], 0, m,
                                     t->Lambda + (size_t)k * (size_t)m));
@@ -803,11 +820,13 @@ PetscErrorCode HycoReducerTakeBases(HycoReducer t)
   const PetscInt dim = t->sizes[3], n_sigma = dim == 1 ? 1 : dim == 2 ? 4 : 6;
 
   PetscFunctionBegin;
+  /* Of the former attempt; the whole bases stay. */
   PetscCall(HycoReducerDropBases(t));
   PetscCall(TakeDisplacements(t));
   PetscCall(TakeField(t, HYCO_SEED_STRESS, n_sigma, &t->n_seeds_cell, &t->seeds_cell));
   PetscCall(TakeField(t, HYCO_SEED_FORCE, dim, &t->n_seeds_node, &t->seeds_node));
   PetscCall(TakeField(t, HYCO_SEED_SPRING, dim, &t->n_seeds_node, &t->seeds_node));
+  /* One component: the accumulated strain shows where laws act. */
   PetscCall(TakeField(t, HYCO_SEED_INELASTIC, 1, &t->n_seeds_cell, &t->seeds_cell));
   if (Seeds(t, HYCO_SEED_DUAL))
     PetscCall(AddSeeds(t->n_dual_seeds, t->dual_seeds, 1, &t->n_seeds_node, &t->seeds_node));
@@ -831,6 +850,7 @@ static PetscErrorCode ReadTaken(HycoReducer t, HycoSnapshots store)
     PetscCall(HycoSnapshotsReadTaken(store, mu + k * n_par, &count, &taken));
     PetscCall(PetscRealloc((size_t)(t->taken_start[k] + count + 1) * sizeof(PetscReal), &t->taken));
     PetscCall(PetscArraycpy(t->taken + t->taken_start[k], taken, count));
+    /* All paths in one array, since each has its own number of steps. */
     t->taken_start[k + 1] = t->taken_start[k] + count;
     PetscCall(PetscFree(taken));
   }
@@ -848,6 +868,7 @@ PetscErrorCode HycoReducerReduce(HycoReducer t, HycoSnapshots store, PetscBool a
   PetscCall(ReduceField(t, store, HYCO_SEED_SPRING, all));
   PetscCall(ReduceField(t, store, HYCO_SEED_INELASTIC, all));
   if (t->scene->n_times) HycoOnRoot(HycoComm(t), ReadTaken(t, store));
+  /* Also where the RID is not seeded by forces: (41) needs them. */
   PetscCall(ReduceForces(t, store));
   PetscCall(HycoReducerTakeBases(t));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -17,11 +17,13 @@ static PetscErrorCode Create(MPI_Comm comm, HycoReducer *reducer)
   t->noise = 1e-11;
   PetscCall(PetscStrncpy(t->svd_type, HYCO_SVD_TSQR, sizeof(t->svd_type)));
   t->greedy.target = 1e-3;
+  /* -1: by the number of training points. */
   t->n_validation = -1;
   t->search = PETSC_TRUE;
   t->search_budget = 1;
   t->budget = -1;
   t->ridge = -1;
+  /* The paper's thresholds for the rope (section 6). */
   for (PetscInt k = 0; k < HYCO_N_SEEDS; k++) t->tol[k] = k == HYCO_SEED_DUAL ? 1e-1 : 1e-7;
   t->seed[HYCO_SEED_DISPLACEMENT] = t->seed[HYCO_SEED_STRESS] = t->seed[HYCO_SEED_FORCE] = PETSC_TRUE;
   *reducer = t;
@@ -70,7 +72,9 @@ PetscErrorCode HycoReducerCreate(MPI_Comm comm, HycoScene scene, HycoReducer *re
   PetscCall(Create(comm, reducer));
   PetscCall(PetscObjectReference((PetscObject)scene));
   (*reducer)->scene = scene;
+  /* The local problem of (43) would be a path of its own. */
   if (scene->n_times) (*reducer)->greedy.indicator = HYCO_INDICATOR_RESIDUAL;
+  /* Springs act on surfaces whose cells would otherwise be missing from the RID. */
   (*reducer)->seed[HYCO_SEED_SPRING] = (PetscBool)(scene->n_springs > 0);
   for (PetscInt b = 0; b < scene->n_bodies && scene->n_times; b++) {
     if (!scene->body[b].law->linear) (*reducer)->seed[HYCO_SEED_INELASTIC] = PETSC_TRUE;
@@ -114,6 +118,7 @@ PetscErrorCode HycoReducerResetBases(HycoReducer t)
     t->basis[k].l = t->basis[k].n_sigma = 0;
   }
   PetscCall(MatDestroy(&t->S));
+  /* Everything that was cut from these solutions or judged on them. */
   HycoFreeAll(&t->U_rid, &t->rid_row, &t->V_rid, &t->Lambda, &t->U_norm, &t->dual_seeds, &t->taken_start, &t->taken,
               &t->judged, &t->judged_held);
   t->n_dual_seeds = 0;
@@ -128,6 +133,7 @@ PetscErrorCode HycoReducerDestroy(HycoReducer *reducer)
   HycoDestroyBegin(reducer, HYCO_REDUCER_CLASSID);
   t = *reducer;
   PetscCall(HycoReducerReset(t));
+  /* The type's own data before the prototype that names the type. */
   PetscCall(EndTraining(t));
   PetscCall(PetscStrArrayDestroy(&t->groups));
   PetscCall(PetscFree(t->region));
@@ -343,6 +349,7 @@ static PetscErrorCode TakeSeedKinds(HycoReducer t, PetscInt n, char ***list)
       PetscCall(PetscStrncpy(wrong, (*list)[i], sizeof(wrong)));
   }
   PetscCall(PetscStrArrayDestroy(list));
+  /* Force modes that leave out springs would not balance at their nodes. */
   t->seed[HYCO_SEED_SPRING] = (PetscBool)(t->seed[HYCO_SEED_FORCE] && t->scene && t->scene->n_springs);
   HycoCheck(!wrong[0],
             "-hyco_rid_modes has \"%s\"; the possible values are displacement, stress, force, dual and inelastic",
@@ -494,6 +501,7 @@ PetscErrorCode HycoReducerTries(HycoReducer t, const char types[], PetscBool *tr
 
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
+  /* types: a list of names in one text, as in the table of options. */
   *tries = (PetscBool)(strstr(types, t->prototype->model->type) != NULL);
   PetscCall(HycoTrainerNames(&names));
   for (PetscInt k = 0; names[k] && searches && !*tries; k++) {
@@ -501,6 +509,7 @@ PetscErrorCode HycoReducerTries(HycoReducer t, const char types[], PetscBool *tr
 
     if (!strstr(types, names[k])) continue;
     PetscCall(HycoTrainerFind(names[k], &trainer));
+    /* A search takes types that offer settings; others must be named. */
     *tries = (PetscBool)(trainer.offers != NULL);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -527,6 +536,7 @@ void HycoReducerSettingsDescribe(const HycoReducerSettings *r, size_t length, ch
 {
   const char *kind = HycoHybrids[r->hybrid];
 
+  /* As options, so that a line of a search can be repeated by them. */
   if (r->variant)
     snprintf(text, length, "%s, %s", r->type, r->variant);
   else if (!r->pod)

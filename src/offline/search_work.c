@@ -56,6 +56,7 @@ PetscErrorCode HycoReducerCountStiffnesses(HycoReducer t, HycoSamples samples, P
   for (PetscInt k = 0; k < n; k++) {
     PetscBool seen = PETSC_FALSE;
 
+    /* In order a factor is kept only from the point before; otherwise points are grouped by stiffness. */
     for (PetscInt j = in_order ? PetscMax(k - 1, 0) : 0; j < k && !seen; j++)
       seen = Alike(t->scene, reaches, mu + j * n_par, mu + k * n_par);
     *count += !seen;

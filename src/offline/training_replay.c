@@ -72,11 +72,13 @@ static PetscErrorCode Follow(HycoTrainingReplay *r, PetscInt k, const PetscReal 
   PetscInt step = 0;
 
   PetscFunctionBegin;
+  /* States of the former path. */
   PetscCall(HycoMarchEnd(&r->march));
   for (PetscInt i = 0; i < n; i++) {
     HycoSceneSetTime(scene, mu, taken[i], all);
     PetscCall(HycoFOMSetParameters(r->t->fom, all));
     PetscCall(Displace(r, k, taken[i]));
+    /* A law without a solution on one rank ends the replay on all. */
     HycoOnEach(HycoComm(r->t), Step(r, taken[PetscMax(i - 1, 0)], taken[i]));
     if (!scene->n_times || (step < scene->n_times && taken[i] == scene->times[step]))
       PetscCall((*r->record)(r->ctx, k * steps + step++));
@@ -94,8 +96,8 @@ PetscErrorCode HycoTrainingReplayFollow(HycoTrainingReplay *r, HycoSnapshots sto
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
-  if (t->scene->n_times)
-    HycoOnEach(HycoComm(t), HycoSnapshotsReadTaken(store, mu + k * n_par, &n, &taken));
+  if (t->scene->n_times) HycoOnEach(HycoComm(t), HycoSnapshotsReadTaken(store, mu + k * n_par, &n, &taken));
+  /* Without a history one time, 0, at which the laws are linear. */
   else
     PetscCall(PetscCalloc1(1, &taken));
   ierr = Follow(r, k, mu + k * n_par, n, taken);

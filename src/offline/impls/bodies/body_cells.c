@@ -119,7 +119,8 @@ static PetscErrorCode Choose(HycoReducer t, HycoBodiesFactor *factor, PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The numbers of all ranks, n of this one: *all, *n_all. Collective. */
+/* The numbers of all ranks, n of this one: *all, *n_all. Collective. Counts and numbers are of one int per entry: lists
+   of unknowns of surfaces, not of the mesh. */
 static PetscErrorCode GatherAll(MPI_Comm comm, PetscInt n, const PetscInt own[], PetscInt *n_all, PetscInt **all)
 {
   PetscMPIInt size, mine, *count, *first;
@@ -221,9 +222,11 @@ static PetscErrorCode MarkSurfaces(HycoReducer t, HycoBodiesFactor *factor)
   PetscFunctionBegin;
   HycoDuplicate(b->ns + 1, b->dof, &sorted);
   PetscCall(PetscMalloc1(b->ns + 1, &place));
+  /* Sorted by number, so that each unknown of the part is found by bisection. */
   for (PetscInt k = 0; k < b->ns; k++) place[k] = k;
   PetscCall(PetscSortIntWithArray(b->ns, sorted, place));
   for (PetscInt i = 0; i < m->n_nodes * b->dim; i++) {
+    /* Unknowns are known by their number in the whole mesh, which does not depend on the partition. */
     const PetscInt node = m->node_whole ? m->node_whole[i / b->dim] : i / b->dim;
     PetscInt at;
 
@@ -294,6 +297,7 @@ PetscErrorCode HycoBodiesChooseCells(HycoReducer t, HycoBodiesFactor *factor)
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(factor->fom->part->n_cells + 1, &in));
   PetscCall(PetscMalloc1(fe->n_dof + 1, &inner));
+  /* Known unknowns first: the cells are chosen among those that still need something. */
   PetscCall(MarkSurfaces(t, factor));
   PetscCall(Choose(t, factor, in, inner));
   PetscCall(ShareCells(t, factor->fom->part, in));
@@ -301,9 +305,11 @@ PetscErrorCode HycoBodiesChooseCells(HycoReducer t, HycoBodiesFactor *factor)
   MarkBare(factor, in);
   PetscCall(AnyLeft(t, fe, factor->bare, inner, &left));
   if (!fits) PetscCall(PetscArrayzero(inner, fe->n_dof)); /* of the cell that stands for none */
+  /* If something is left outside the cells, modes are needed anyway, and surfaces keep theirs. */
   if (fits && !left) PetscCall(Release(t, factor, inner, &released));
   if (!released) PetscCall(PetscArrayzero(factor->known, fe->n_dof));
   if (!released) PetscCall(PetscArrayzero(factor->bare, fe->n_dof));
+  /* In ascending numbers on every rank: the rows of H are in this order. */
   PetscCall(List(t, factor, inner));
   for (PetscInt i = 0; i < fe->n_dof; i++) factor->bare[i] = (PetscBool)(factor->bare[i] || inner[i]);
   PetscCall(PetscFree(inner));

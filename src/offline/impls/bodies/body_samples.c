@@ -33,10 +33,12 @@ PetscInt HycoBodiesSampleOf(HycoSubstructures b, PetscInt body, PetscInt k)
   PetscInt index[HYCO_TENSOR_MAX_DIM], sample = 0;
 
   for (PetscInt p = b->n_theta - 1; p >= 0; p--) {
+    /* The last axis is the fastest, as in HycoBodiesGrid(). */
     index[p] = k % b->n_nodes[p];
     k /= b->n_nodes[p];
   }
   for (PetscInt p = 0; p < b->n_theta; p++) {
+    /* The body is the same at all nodes along this axis: the first of them is its sample. */
     if (t->n[p] == 1 && index[p]) return -1;
     sample = sample * t->n[p] + (t->n[p] > 1 ? index[p] : 0);
   }
@@ -59,6 +61,7 @@ static PetscErrorCode SetGrid(HycoReducer t, HycoSubstructures b)
     for (PetscInt k = 0; k < b->n_nodes[p]; k++)
       b->node[n++] = HycoBodiesVariable(b->variable[p], Node(t, b, p, b->n_nodes[p], k));
   }
+  /* Each body has the nodes of the axes that change it and one of the others. */
   for (PetscInt k = 0; k < b->n; k++) {
     for (PetscInt p = 0; p < b->n_theta; p++) b->body[k].tensor.n[p] = HycoBodiesAxis(b, k, p) ? b->n_nodes[p] : 1;
   }
@@ -87,6 +90,7 @@ static PetscErrorCode TakeRecords(HycoSubstructures b, const HycoBodiesFactor *f
     const size_t C = (size_t)PetscSqr(s->n), R = (size_t)(s->n * b->r), Z = (size_t)(s->n * b->p),
                  work = (size_t)(b->p * b->r), samples = (size_t)s->n_samples;
 
+    /* Those of a coarser grid. */
     HycoFreeAll(&s->C, &s->R, &s->Z, &s->work, &s->gram);
     PetscCall(PetscCalloc1(b->r * b->r + 1, &s->gram));
     PetscCall(PetscMalloc1(samples * C + 1, &s->C));
@@ -98,6 +102,7 @@ static PetscErrorCode TakeRecords(HycoSubstructures b, const HycoBodiesFactor *f
       const PetscInt at = HycoBodiesSampleOf(b, k, j);
 
       if (at < 0) continue;
+      /* Column by column: in C the samples of an unknown lie side by side. */
       for (PetscInt d = 0; d < s->n; d++)
         PetscCall(PetscArraycpy(s->C + HycoBodiesColumn(s, at, d, s->n), r->C + (size_t)d * (size_t)s->n, s->n));
       PetscCall(PetscArraycpy(s->R + (size_t)at * R, r->R, R));
@@ -299,10 +304,12 @@ PetscErrorCode HycoBodiesSample(HycoReducer t, HycoBodiesFactor *factor)
     PetscCall(CondenseGrid(t, factor));
     for (PetscInt p = 0; p < b->n_theta; p++) PetscCall(BoundAlong(t, factor, p, &e[p]));
     worst = Worst(t, b, e);
+    /* Nested Chebyshev grids: all former samples stay nodes of the finer grid. */
     if (worst >= 0) b->n_nodes[worst] = 2 * b->n_nodes[worst] - 1;
   } while (worst >= 0);
   b->bound = 0;
   for (PetscInt p = 0; p < b->n_theta; p++) {
+    /* Errors along the axes add up: each was measured with the others exact. */
     b->bound += e[p];
     HycoCheckModel(e[p] <= HOPELESS,
                    "the flexibility of a body cannot be interpolated over %s: with %d values its relative error is "

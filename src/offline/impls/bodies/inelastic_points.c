@@ -64,6 +64,8 @@ static PetscErrorCode Weigh(HycoFE fe, PetscReal scale[])
   for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
     for (PetscInt q = 0; q < el->nq && HycoInelasticFlows(fe, e); q++) {
       PetscCall(HycoGradients(fe, el, e, q, g, &w));
+      /* Squares of scaled stresses sum to an integral, so that the POD's norm is L2 and not one that follows the
+         mesh. */
       scale[e * el->nq + q] = PetscSqrtReal(w);
     }
   }
@@ -107,10 +109,12 @@ static PetscErrorCode CreateSampler(HycoReducer t, HycoSnapshots store, Sampler 
   *s = (Sampler){.t = t, .fe = t->fom->fe};
   PetscCall(HycoReducerColumn(t, 0, mu));
   PetscCall(HycoFOMSetParameters(t->fom, mu));
+  /* All columns at once: steps of a path are replayed in order. */
   PetscCall(HycoReducerGetDisplacements(t, store, &s->U));
   PetscCall(HycoFOMGetRows(t->fom, &order));
   PetscCall(PetscCalloc1(part->n_cells * size + 1, &s->value));
   PetscCall(PetscCalloc1(part->n_cells * nq + 1, &s->scale));
+  /* A column for each listed time of one path: paths are merged one by one. */
   PetscCall(MatCreateDense(HycoComm(t), (order ? order->n[HYCO_ON_CELLS] : part->n_cells) * size, PETSC_DECIDE,
                            t->sizes[1] * size, HycoSnapshotsSteps(t->scene), NULL, &s->S));
   PetscCall(HycoTrainingReplayCreate(t, Displacement, Record, s, &s->replay));
@@ -128,6 +132,7 @@ static PetscErrorCode FollowAll(Sampler *s, HycoSnapshots store, PetscReal tol, 
     PetscCall(HycoTrainingReplayFollow(&s->replay, store, k));
     PetscCall(MatAssemblyBegin(s->S, MAT_FINAL_ASSEMBLY));
     PetscCall(MatAssemblyEnd(s->S, MAT_FINAL_ASSEMBLY));
+    /* Each path is compressed before the next is replayed: memory does not grow with their number. */
     PetscCall(HycoPathModesAdd(s->t, s->S, tol, modes));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -191,6 +196,7 @@ PetscErrorCode HycoPointsForces(HycoFE fe, const PetscReal value[], PetscReal fo
   for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
     PetscReal own[HYCO_MAX_CELL_DOFS] = {0};
 
+    /* Elastic cells have no inelastic stress, whatever the modes' rows hold. */
     if (!HycoInelasticFlows(fe, e)) continue;
     PetscCall(HycoPointsCellForce(fe, e, value + e * size, own));
     for (PetscInt k = 0; k < n; k++) force[HycoCellUnknown(fe->mesh, e, k)] += own[k];
@@ -213,6 +219,7 @@ static PetscErrorCode ZeroPoints(Mat V, PetscInt n, PetscInt count, const PetscI
   PetscCall(MatDenseGetLDA(V, &lda));
   PetscCall(MatDenseGetArray(V, &v));
   for (PetscInt k = 0; k < count * n; k++) {
+    /* Points are numbered over the whole mesh, rows over all components. */
     const PetscInt row = point[k / n] * n + k % n;
 
     for (PetscInt j = 0; j < l && row >= lo && row < hi; j++) v[(size_t)j * (size_t)lda + (size_t)(row - lo)] = 0;

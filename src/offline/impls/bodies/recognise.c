@@ -94,6 +94,7 @@ static PetscErrorCode Turn(const Compared *c, PetscBool back, Vec from, Vec to)
   for (PetscInt i = 0; i < m->n_nodes; i++) {
     const PetscInt own = HycoMeshOwned(m, i);
 
+    /* Both vectors have owned unknowns only, by node. */
     if (own >= 0) HycoPoseTurn(c->pose[c->parts->of[i]].Q, dim, back, a + own * dim, b + own * dim);
   }
   PetscCall(VecRestoreArray(to, &b));
@@ -115,6 +116,7 @@ static PetscErrorCode SetProbe(Compared *c)
     const PetscInt own = HycoMeshOwned(m, k / dim), whole = m->node_whole ? m->node_whole[k / dim] : k / dim;
     const PetscReal number = (PetscReal)(whole * dim + k % dim + 1);
 
+    /* A chirp: no two nodes have the same value, and no rigid motion or symmetry hides a change. */
     if (own >= 0) v[own * dim + k % dim] = c->f->fe->fixed[k] ? 0 : PetscSinReal(1.7 * number * number + number);
   }
   PetscCall(VecRestoreArray(c->v, &v));
@@ -141,12 +143,14 @@ static PetscErrorCode Sums(Compared *c, PetscReal sum[])
     const PetscInt own = HycoMeshOwned(m, i);
     PetscReal *s = sum + SUMS * c->parts->of[i], Qa[3], QF[3];
 
+    /* Ghosts are counted on their owner. */
     if (own < 0) continue;
     HycoPoseTurn(c->pose[c->parts->of[i]].Q, dim, PETSC_FALSE, a + own * dim, Qa);
     HycoPoseTurn(c->pose[c->parts->of[i]].Q, dim, PETSC_FALSE, F0 + own * dim, QF);
     for (PetscInt d = 0; d < dim; d++) {
       const PetscInt k = own * dim + d;
 
+      /* A turned probe that does not vanish at a support: the support does not turn with the body. */
       s[AT_FIXED] += c->f->fe->fixed[i * dim + d] ? PetscAbsReal(v[k]) : 0;
       if (c->f->fe->fixed[i * dim + d]) continue;
       s[AA] += Qa[d] * Qa[d];
@@ -162,6 +166,7 @@ static PetscErrorCode Sums(Compared *c, PetscReal sum[])
   PetscCall(VecRestoreArrayRead(c->now, &v));
   PetscCall(VecRestoreArrayRead(c->F0, &F0));
   PetscCall(VecRestoreArrayRead(c->F, &F));
+  /* One reduction for all bodies and sums. */
   HycoAllreduce(sum, SUMS * c->parts->n, MPIU_REAL, MPI_SUM, HycoComm(c->f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -192,6 +197,7 @@ static PetscErrorCode Distances(Compared *c, const PetscReal sum[])
       const PetscInt k = own * dim + d;
 
       if (c->f->fe->fixed[i * dim + d]) continue;
+      /* Entry by entry at the factor that Sums() has found. */
       r[0] += PetscSqr(b[k] - c->kappa[body] * Qa[d]);
       r[1] += PetscSqr(F[k] - QF[d]);
       r[2] += PetscSqr(F[k] - c->kappa[body] * QF[d]);
@@ -207,6 +213,7 @@ static PetscErrorCode Distances(Compared *c, const PetscReal sum[])
 
     c->off[k] = sum[SUMS * k + BB] > 0 ? PetscSqrtReal(rest[3 * k] / sum[SUMS * k + BB]) : 0;
     if (sum[SUMS * k + AT_FIXED] > SIMILAR * c->f->n_nodes) c->off[k] = 1; /* supports that do not turn */
+    /* Loads that turn with the body, with and without its factor. */
     c->load[2 * k] = size > 0 ? PetscSqrtReal(rest[3 * k + 1] / size) : 0;
     c->load[2 * k + 1] = size > 0 ? PetscSqrtReal(rest[3 * k + 2] / size) : 0;
   }
@@ -228,6 +235,7 @@ static PetscErrorCode Compare(Compared *c, const PetscReal mu[])
   PetscCall(MatMult(c->K, c->now, c->product));
   PetscCall(PetscMalloc1(SUMS * c->parts->n, &sum));
   PetscCall(Sums(c, sum));
+  /* The factor in the sense of least squares. */
   for (PetscInt k = 0; k < c->parts->n; k++)
     c->kappa[k] = sum[SUMS * k + AA] > 0 ? sum[SUMS * k + AB] / sum[SUMS * k + AA] : 1;
   PetscCall(Distances(c, sum));
@@ -397,10 +405,12 @@ static PetscErrorCode DescribeOne(const HycoBodyParts *parts, PetscInt p, PetscB
   for (size_t w = 0; w < sizeof(words) / sizeof(words[0]); w++) {
     char names[HYCO_LINE] = "", one[HYCO_LINE];
 
+    /* Of a path every load changes in time: the words would tell nothing. */
     if (path && words[w].way == HYCO_ENTERS_LOADS) continue;
     for (PetscInt k = 0; k < parts->n; k++) {
       const PetscInt enters = parts->enters[k * parts->n_parameters + p];
 
+      /* A body that needs samples has nothing exact to tell of this parameter. */
       if (!(enters & words[w].way) || (words[w].way != HYCO_ENTERS_SHAPE && enters & HYCO_ENTERS_SHAPE)) continue;
       PetscCall(HycoListAdd(names, ", ", parts->name[k]));
     }
@@ -420,6 +430,7 @@ PetscInt HycoBodyPartsShapes(const HycoBodyParts *parts, PetscInt b, PetscInt pa
     PetscBool any = PETSC_FALSE;
 
     for (PetscInt k = 0; k < parts->n; k++) {
+      /* b < 0: any body. */
       if ((b < 0 || k == b) && parts->enters[k * parts->n_parameters + p] & HYCO_ENTERS_SHAPE) any = PETSC_TRUE;
     }
     if (any) parameter[n++] = p;
@@ -450,6 +461,7 @@ PetscErrorCode HycoBodyPartsDescribe(HycoScene s, const HycoBodyParts *parts, ch
                             : "enters no body");
     PetscCall(HycoListAdd(text, "; ", line));
   }
+  /* What no parameter does alone cannot be told by parameter. */
   body = HycoBodyPartsFail(parts);
   if (body >= 0) {
     HycoFormat(line, "body %s changes its shape where parameters change together", parts->name[body]);

@@ -128,6 +128,7 @@ static PetscErrorCode TimesModes(HycoROM m, Mat A, IS rows, IS columns, PetscRea
   PetscInt n;
 
   PetscFunctionBegin;
+  /* V is stored by rows: as a dense matrix of PETSc it is its transpose. */
   PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, m->model->l, m->fe->n_dof, m->model->V, &Vt));
   PetscCall(MatTranspose(Vt, MAT_INITIAL_MATRIX, &V));
   PetscCall(ISCreateStride(PETSC_COMM_SELF, m->model->l, 0, 1, &all));
@@ -137,6 +138,7 @@ static PetscErrorCode TimesModes(HycoROM m, Mat A, IS rows, IS columns, PetscRea
   PetscCall(ISGetLocalSize(rows, &n));
   PetscCall(MatDenseGetArrayRead(product, &p));
   for (PetscInt k = 0; k < n; k++) {
+    /* Back to rows, as the rank revealing factorisation wants them. */
     for (PetscInt j = 0; j < m->model->l; j++) P[k * m->model->l + j] = p[j * n + k];
   }
   PetscCall(MatDenseRestoreArrayRead(product, &p));
@@ -156,6 +158,7 @@ static PetscErrorCode ContactRows(HycoROM m, const PetscInt candidate[], PetscRe
   IS candidates, unknowns;
 
   PetscFunctionBegin;
+  /* B at the training parameters that Assembled() has set. */
   PetscCall(HycoGalerkinContactMatrix(m));
   PetscCall(ISCreateStride(PETSC_COMM_SELF, m->fe->n_dof, 0, 1, &unknowns));
   PetscCall(ISCreateGeneral(PETSC_COMM_SELF, m->m, candidate, PETSC_COPY_VALUES, &candidates));
@@ -295,6 +298,7 @@ static PetscErrorCode SearchFrom(HycoReducer t, HycoROM m, PetscInt start, Petsc
   PetscBool *chosen;
 
   PetscFunctionBegin;
+  /* No full-order unknowns: the rank of (38) is that of the modes alone. */
   PetscCall(HycoROMSetFE(m, HYCO_HYBRID_RANK, 0, NULL));
   PetscCall(Assembled(t, m));
   N = m->m;
@@ -302,8 +306,10 @@ static PetscErrorCode SearchFrom(HycoReducer t, HycoROM m, PetscInt start, Petsc
   PetscCall(Candidates(m, candidate));
   PetscCall(ResolvedContacts(m, candidate, (PetscBool)(start == 0), &rank, pivot));
   for (PetscInt k = 0; k < N; k++) chosen[k] = (PetscBool)(start < 2);
+  /* A pivot is a contact that the modes resolve: it needs no displacement of its own. */
   for (PetscInt k = 0; k < rank && start < 2; k++) chosen[pivot[k]] = PETSC_FALSE;
   for (PetscInt k = 0; k < N - rank && start >= 2; k++) chosen[(k * N / (N - rank) + start - 2) % N] = PETSC_TRUE;
+  /* First the start is judged, then what the exchanges have left is listed. */
   for (PetscInt pass = 0; pass < 2; pass++) {
     *n = 0;
     for (PetscInt k = 0; k < N; k++) {
@@ -329,6 +335,7 @@ static PetscErrorCode ChooseRank(HycoReducer t, HycoROM m, Verdict *best)
   PetscCall(PetscMalloc2(room, &dof, room, &trial));
   for (PetscInt start = 0; start < starts; start++) {
     PetscCall(SearchFrom(t, m, start, &other, trial, &verdict));
+    /* The first start holds unless another is better: an order without ties by chance. */
     if (start && !Better(&verdict, best)) continue;
     *best = verdict;
     n = other;
@@ -346,6 +353,7 @@ static PetscErrorCode MarkContact(HycoReducer t, HycoROM m, PetscBool contact[])
   PetscBool *met;
 
   PetscFunctionBegin;
+  /* Nothing moves: the pairs are the contact nodes. */
   if (!t->fom->searches) {
     HycoPairsMark(&m->model->pairs, contact);
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -353,6 +361,7 @@ static PetscErrorCode MarkContact(HycoReducer t, HycoROM m, PetscBool contact[])
   PetscCall(PetscCalloc1(n, &met));
   HycoPairsMark(&t->met.rows, met);
   for (PetscInt i = 0; i < n; i++) {
+    /* Masters over the whole ranges, not only at one point. */
     if (met[i]) contact[t->surface_node[i]] = PETSC_TRUE;
   }
   PetscCall(PetscFree(met));
@@ -373,6 +382,7 @@ static PetscErrorCode FreeUnknowns(HycoReducer t, HycoROM m, PetscBool contact_o
   PetscCall(ISGetLocalSize(m->model->inside, &n_A));
   PetscCall(ISGetIndices(m->model->inside, &node));
   for (PetscInt k = 0; k < n_A * dim; k++) {
+    /* Nodes of A in ascending order, so that fe_dof is too. */
     const PetscInt i = node[k / dim] * dim + k % dim;
 
     if (!t->fixed[i] && (contact[i / dim] || !contact_only)) dof[(*n)++] = i;
@@ -403,10 +413,13 @@ static PetscErrorCode RaceRidges(HycoReducer t, HycoROM m, PetscReal *strength)
     PetscReal u;
     PetscBool lost;
 
+    /* A new regression of the modes on A's unknowns; the reduced matrix follows. */
     PetscCall(HycoGalerkinSetRidge(m, ridge));
     PetscCall(HycoReducerJudgeRace(t, m, any ? its : NULL, t->trying ? USELESS : PETSC_INFINITY, judged, &u, &lost));
+    /* Errors have one minimum over the ridge as a rule: after LOST worse ones in a row the search ends. */
     in_a_row += any;
     if (lost || !(u < least)) continue;
+    /* The errors of the best so far, by path: the next ridge races against them. */
     PetscCall(PetscArraycpy(its, judged, n));
     least = u;
     *strength = ridge;
@@ -431,6 +444,7 @@ static PetscErrorCode TryRidges(HycoReducer t, HycoROM m, PetscReal *strength)
   for (PetscReal ridge = 1e-14; ridge < 1e-5; ridge *= 10) {
     PetscCall(HycoReducerTell(t, "ridges", tried++, RIDGES));
     PetscCall(HycoGalerkinSetRidge(m, ridge));
+    /* Ends early when the mean exceeds the least so far. */
     PetscCall(HycoReducerJudgeMeans(t, m, least, &u, &lambda));
     if (!(u < least)) continue;
     least = u;
@@ -471,6 +485,7 @@ static PetscErrorCode ChooseUnknowns(HycoReducer t, HycoROM m)
                          m->model->mesh->n_nodes * m->model->mesh->dim, &contact));
   PetscCall(FreeUnknowns(t, m, PETSC_FALSE, &n_all, all));
   PetscCall(FreeUnknowns(t, m, PETSC_TRUE, &n_contact, contact));
+  /* A search limits the size of dense matrices by it. */
   t->n_unknowns = n_all;
   HycoCheckModel(n_all, "the RID has no interior node; enlarge it: -hyco_rid_layers 1, or smaller tolerances");
   if (!n_contact && kind != HYCO_HYBRID_ALL)
@@ -480,6 +495,7 @@ static PetscErrorCode ChooseUnknowns(HycoReducer t, HycoROM m)
     HycoFailNoModel("-hyco_hybrid contact leaves no equation for the modes, because every unknown of A belongs to a "
                     "contact; use rank, all or auto");
   }
+  /* n_all^2 reals and n_all^3 operations for each factor. */
   HycoCheckModel(kind != HYCO_HYBRID_ALL || !t->most_full_order || n_all <= t->most_full_order,
                  "the RID has %d unknowns, too many to keep all of them full order in a dense matrix; use -hyco_hybrid "
                  "contact or rank",
@@ -487,6 +503,7 @@ static PetscErrorCode ChooseUnknowns(HycoReducer t, HycoROM m)
   if (kind == HYCO_HYBRID_RANK) PetscCall(ChooseRank(t, m, &v));
   if (kind == HYCO_HYBRID_ALL) PetscCall(ChooseAll(t, m, n_all, all));
   if (kind == HYCO_HYBRID_CONTACT) PetscCall(HycoROMSetFE(m, HYCO_HYBRID_CONTACT, n_contact, contact));
+  /* After the choice: training errors in the file are those of the final model. */
   PetscCall(HycoReducerJudge(t, m));
   PetscCall(PetscFree2(all, contact));
   PetscFunctionReturn(PETSC_SUCCESS);

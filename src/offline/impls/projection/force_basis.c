@@ -25,6 +25,7 @@ PetscErrorCode HycoForceBasisSetFromOptions(HycoReducer t)
                       "contact forces: finite-element multipliers (hybrid, cubature), or combinations of factorised "
                       "dual snapshots or of the dual snapshots (projection, cubature) [fe; nnmf if projection]",
                       HycoDuals, &dual, NULL));
+  /* The help lists them under these types; others refuse them. */
   PetscCall(HycoOptionsFor("projection or cubature"));
   PetscCall(HycoOptionsInt("-hyco_nnmf_vectors",
                            "number of vectors of the nonnegative factorisation (0: that of the displacement modes)", 0,
@@ -45,6 +46,7 @@ static PetscErrorCode SetFromOptions(HycoReducer t)
   t->training = s;
   s->dual = HYCO_DUAL_NNMF;
   PetscCall(HycoForceBasisSetFromOptions(t));
+  /* With a multiplier per contact V^T B^T has fewer rows than columns: forces would not be unique. */
   HycoCheckModel(s->dual != HYCO_DUAL_FE,
                  "-hyco_dual fe leaves a projection-based model with more forces than modes; use nnmf or snapshots");
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -107,6 +109,7 @@ static PetscErrorCode CopyColumns(Mat A, PetscInt n, Mat B, PetscInt first)
   PetscCall(MatDenseGetLDA(B, &lda[1]));
   PetscCall(MatDenseGetArrayRead(A, &a));
   PetscCall(MatDenseGetArray(B, &b));
+  /* Leading dimensions differ between a matrix and a part of one. */
   for (PetscInt j = 0; j < n; j++)
     PetscCall(PetscArraycpy(b + (size_t)(first + j) * (size_t)lda[1], a + (size_t)j * (size_t)lda[0], rows));
   PetscCall(MatDenseRestoreArray(B, &b));
@@ -219,6 +222,7 @@ static PetscErrorCode FromSnapshots(HycoROM m, PetscInt n, const PetscReal S[])
     PetscReal length = 0;
 
     for (PetscInt i = 0; i < N; i++) length += S[j * N + i] * S[j * N + i];
+    /* Scaling keeps a vector nonnegative, and its coefficient is then a force. */
     for (PetscInt i = 0; i < N; i++) p->V_lambda[j * N + i] = S[j * N + i] / PetscSqrtReal(length);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -235,7 +239,9 @@ PetscErrorCode HycoProjectionMakeBasis(HycoROM m, HycoReducer t)
 
   PetscFunctionBegin;
   p->dual = s->dual;
+  /* Without snapshots that are zero. */
   PetscCall(HycoReducerDualSnapshots(t, &n, &S));
+  /* No more than the rank of the snapshots. */
   k = s->vectors ? PetscMin(s->vectors, PetscMin(N, n)) : m->model->l;
   for (PetscInt i = 0; i < N * n; i++) S[i] = PetscMax(S[i], 0); /* negative by round-off of iterative solves */
   PetscCall(PetscMalloc1(N * PetscMax(n, k) + 1, &p->V_lambda));
@@ -256,6 +262,7 @@ PetscErrorCode HycoProjectionJudge(HycoROM m, HycoReducer t)
 
   PetscFunctionBegin;
   PetscCall(HycoReducerJudge(t, m));
+  /* Negated: an error that is not a number is refused too. */
   if (!(m->model->numbers[1] < 0.5)) HycoReducerNameWorst(t, worst);
   HycoCheckModel(m->model->numbers[1] < 0.5,
                  "the %s model misses its own training displacements by %.0f %% on average (%d modes, %d force "
