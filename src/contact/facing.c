@@ -54,8 +54,10 @@ void HycoSurfaceSizes(HycoFE fe, PetscInt group, PetscReal size[])
     const PetscInt *node = m->facets + k / corners * nf, v = k % corners, ends[2] = {node[v], node[(v + 1) % corners]};
     const PetscReal length = HycoDistance(fe->X + 3 * ends[0], fe->X + 3 * ends[1]);
 
+    /* Facets of all groups lie in one list. */
     if (m->facet_group[k / corners] != group) continue;
     for (PetscInt e = 0; e < 2; e++) size[ends[e]] = PetscMax(size[ends[e]], length);
+    /* Middles of edges and of the facet have the size of the edges around them. */
     for (PetscInt w = corners; w < nf; w++) { /* second order: the middle of the edge, of the facet */
       if (w == corners + v || w == 2 * corners) size[node[w]] = PetscMax(size[node[w]], length);
     }
@@ -110,6 +112,7 @@ PetscErrorCode HycoSurfaceVectors(HycoFE fe, PetscInt group, PetscReal vector[])
       }
     }
   }
+  /* A tied slave node has no contact of its own. */
   PassTied(m, 3, vector);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -130,6 +133,7 @@ static PetscErrorCode Shares(HycoFE fe, PetscInt group, PetscReal share[])
       for (PetscInt a = 0; a < m->nf; a++) {
         const PetscInt node = m->facets[f * m->nf + a];
 
+        /* Nodes on the axis of second-order cells, to which a uniform pressure gives no force. */
         if (!HycoNodeHasNoArea(fe, node)) share[node] += el->N[q][a] * PetscSqrtReal(HycoDot(n, n));
       }
     }
@@ -168,6 +172,7 @@ PetscReal HycoSurfaceTolerance(HycoMesh m, PetscInt group)
   PetscReal shortest = PETSC_MAX_REAL;
 
   for (PetscInt f = 0; f < m->n_facets; f++) {
+    /* A collapsed quadrilateral has an edge of length 0, which must not count. */
     const PetscInt *node = m->facets + f * m->nf, n = HycoFacetCorners(corners, node);
 
     if (m->facet_group[f] != group) continue;

@@ -182,6 +182,7 @@ static PetscErrorCode CheckSlaves(HycoScene scene, HycoMesh m, const PetscInt he
   for (PetscInt k = 0; k < p->n; k++) {
     const PetscInt i = p->slave[k], free = m->dim - held[i];
 
+    /* The first contact, to be named beside the one too many. */
     if (!count[i]++) first[i] = p->contact[k];
     HycoCheck(!free || count[i] <= free,
               "node %d is a slave of %d contacts, among them %s and %s, and has %d free displacement%s, so that the "
@@ -229,6 +230,7 @@ static PetscErrorCode KeepOwned(HycoMesh m, HycoPairs *p)
   for (PetscInt k = 0; k < p->n; k++) {
     if (HycoMeshOwned(m, p->slave[k]) >= 0) which[n++] = k;
   }
+  /* On one rank, and where no slave is in the overlap, nothing is copied. */
   if (n < p->n) {
     PetscCall(HycoPairsSelect(p, n, which, NULL, &kept));
     PetscCall(HycoPairsDestroy(p));

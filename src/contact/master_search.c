@@ -71,6 +71,7 @@ PetscErrorCode HycoMasterSearchCreateOn(HycoFE fe, PetscInt slave, PetscInt mast
   t->master = master;
   PetscCall(FindPatches(t));
   PetscCall(PetscCalloc1(3 * t->n_nodes, &t->outward));
+  /* In 1D a surface is a point, and any master point faces it. */
   if (fe->dim > 1) PetscCall(HycoSurfaceNormals(fe, t->slave, t->outward));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -189,7 +190,9 @@ PetscErrorCode HycoMasterSearchAtBorder(HycoMasterSearch *t, const HycoProjectio
 
   PetscFunctionBegin;
   *border = PETSC_FALSE;
+  /* Facets of one node, or a point inside a facet: no border. */
   if (t->nf == 1 || at->n > 2 || at->n < 1 || (t->nf == 2 && at->n == 2)) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Made for messages alone, and therefore late. */
   if (!t->at_border) PetscCall(FindBorder(t));
   if (at->n == 1)
     *border = t->at_border[at->node[0]];

@@ -31,6 +31,7 @@ static HycoPoint Pivot(const HycoPoint *first, const HycoPoint *middle, const Hy
 void HycoPointsSplit(HycoPoint point[], PetscInt lo, PetscInt mid, PetscInt hi, PetscInt axis)
 {
   while (hi - lo > 1 && lo < mid && mid < hi) { /* Hoare's selection */
+    /* The median of three: sorted input, as nodes of a structured mesh, must not be the worst case. */
     const HycoPoint pivot = Pivot(&point[lo], &point[lo + (hi - lo) / 2], &point[hi - 1], axis);
     PetscInt i = lo, j = hi - 1;
 
@@ -67,6 +68,7 @@ static void Enclose(HycoPatches s, PetscInt patch, HycoBox *b)
 {
   const PetscInt *node = s->node + patch * s->nf;
 
+  /* A curved facet bulges beyond its nodes. */
   if (s->corners < s->nf) {
     const HycoCurved facet = Curved(s, patch);
 
@@ -117,7 +119,9 @@ static void Build(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi)
       b->hi[c] = PetscMax(b->hi[c], one.hi[c]);
     }
   }
+  /* The longest side, so that boxes become cubes and few of them meet a query. */
   for (PetscInt c = 1; c < 3; c++) axis = b->hi[c] - b->lo[c] > b->hi[axis] - b->lo[axis] ? c : axis;
+  /* A box of normals: whole branches that face away are skipped. */
   if (s->turn) s->turn[t] = VectorBox(hi - lo, s->item + lo, s->normal);
   if (hi - lo <= HYCO_LEAF) return;
   HycoPointsSplit(s->item, lo, (lo + hi) / 2, hi, axis);

@@ -117,7 +117,7 @@ PetscErrorCode HycoBodyPoses(HycoFOM f, PetscInt n, const PetscInt of[], const P
     }
     if (pass == 1) { /* the centres are the same on all ranks */
       for (PetscInt b = 0; b < n; b++) HycoAllreduce(m[b].XX, 18, MPIU_REAL, MPI_SUM, HycoComm(f));
-    /* One reduction for all bodies; distances are maxima, sums otherwise. */
+      /* One reduction for all bodies; distances are maxima, sums otherwise. */
     } else
       HycoAllreduce(&m[0].n, n * width, MPIU_REAL, pass ? MPI_MAX : MPI_SUM, HycoComm(f));
     for (PetscInt b = 0; b < n; b++) {
