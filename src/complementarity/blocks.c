@@ -36,6 +36,7 @@ PetscErrorCode HycoBlocksCreate(PetscInt n_cones, const HycoCone cones[], PetscI
   for (PetscInt k = 0; k < n; k++) {
     b->of[k] = of ? of[k] : 0;
     b->row[k + 1] = b->row[k] + cones[b->of[k]]->size;
+    /* Data of a block, as a coefficient of friction, begin at at[k]. */
     b->at[k + 1] = b->at[k] + cones[b->of[k]]->n_data;
   }
   PetscCall(PetscMalloc1(b->at[n] + 1, &b->data));
@@ -102,6 +103,7 @@ PetscErrorCode HycoBlocksGather(MPI_Comm comm, const HycoBlocks *b, HycoBlocks *
   PetscReal *data;
 
   PetscFunctionBegin;
+  /* Rows of a system lie by ranks in the same order. */
   PetscCall(GatherAll(comm, b->n, b->of, MPIU_INT, sizeof(PetscInt), &n, &of));
   PetscCall(GatherAll(comm, b->at[b->n], b->data, MPIU_REAL, sizeof(PetscReal), &n_data, &data));
   PetscCall(HycoBlocksCreate(b->n_cones, b->cone, n, of, data, all));

@@ -52,6 +52,7 @@ static PetscInt Rearrange(HycoSetFactor f, PetscInt k, const PetscInt a[])
 
   for (PetscInt i = 0; i < f->n; i++) f->wanted[i] = f->kept[i] = PETSC_FALSE;
   for (PetscInt j = 0; j < k; j++) f->wanted[a[j]] = PETSC_TRUE;
+  /* The leading factored contacts that stay: their part of the factor is still valid. */
   while (stay < f->k && f->wanted[f->a[stay]]) f->kept[f->a[stay++]] = PETSC_TRUE;
   count = stay;
   for (PetscInt j = stay; j < f->k; j++) { /* in their former order */
@@ -62,6 +63,7 @@ static PetscInt Rearrange(HycoSetFactor f, PetscInt k, const PetscInt a[])
     f->a[count++] = i;
   }
   for (PetscInt j = 0; j < k; j++) {
+    /* New contacts at the end, where appending costs one row each. */
     if (!f->kept[a[j]]) f->a[count++] = a[j];
   }
   f->k = stay;

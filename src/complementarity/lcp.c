@@ -97,6 +97,7 @@ PetscErrorCode HycoLCPActiveSet(const HycoLCP *lcp, PetscBool active[], PetscRea
                      .monitor_ctx = lcp->monitor_ctx};
 
   PetscFunctionBegin;
+  /* Pinned unknowns without bounds: the matrix is semidefinite, and another loop is used. */
   if (lcp->p) {
     PetscCall(HycoLCPSemidefinite(lcp, active, z, its, status));
     PetscFunctionReturn(PETSC_SUCCESS);

@@ -46,6 +46,7 @@ static PetscErrorCode DictionaryCreate(PetscInt n, const PetscReal M[], const Pe
   PetscCall(PetscMalloc4(n, &d->basic, n + 1, &d->nonbasic, 2 * n + 1, &d->where, n, &d->tied));
   for (size_t k = 0; k < (size_t)n * (size_t)n; k++) d->T[k] = M[k] / size_M;
   for (PetscInt i = 0; i < n; i++) {
+    /* The covering vector: slightly different entries break ties of the first pivots. */
     d->T[(size_t)n * (size_t)n + (size_t)i] = Cover(i);
     d->value[i] = q[i] / size_q;
     d->basic[i] = d->where[i] = i;
@@ -245,6 +246,7 @@ static PetscReal Violation(PetscInt n, const PetscReal M[], const PetscReal q[],
     PetscReal w = q[i];
 
     for (PetscInt j = 0; j < n; j++) {
+      /* Most components are 0 on a sparse contact. */
       if (z[j] != 0) w += M[(size_t)j * (size_t)n + (size_t)i] * z[j];
     }
     worst = PetscMax(worst, z[i] > 0 ? PetscAbsReal(w) : -w);

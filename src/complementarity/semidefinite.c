@@ -152,6 +152,7 @@ PetscErrorCode HycoLCPSemidefinite(const HycoLCP *lcp, PetscBool active[], Petsc
   PetscCall(PetscMalloc3(n, &h.a, n, &h.w, lcp->n, &h.idle));
   for (PetscInt i = lcp->p; i < n; i++)
     h.flexibility = PetscMax(h.flexibility, PetscAbsReal(lcp->M[(size_t)i * (size_t)n + (size_t)i]));
+  /* No contact moves anything: any scale serves. */
   if (h.flexibility == 0) h.flexibility = 1;
   FindIdle(&h);
   PetscCall(HycoActiveSetRun(&e, active, its, status));

@@ -141,6 +141,7 @@ static PetscErrorCode Sign(Newton *h, const PetscReal z[], PetscInt *sign)
    not searched for a lucky decrease. */
 static PetscErrorCode Search(Newton *h, PetscReal z[], PetscReal *norm, PetscReal *size, PetscBool *less)
 {
+  /* Near round-off only the full step is tried, and half is enough. */
   const PetscReal before = *norm, least = before <= ROUNDING * *size ? 1 : LEAST_STEP;
   const PetscReal share = before <= ROUNDING * *size ? 0.5 : 1e-4;
   const PetscBool near = (PetscBool)(before <= NEAR * *size);
@@ -158,10 +159,12 @@ static PetscErrorCode Search(Newton *h, PetscReal z[], PetscReal *norm, PetscRea
     }
     if (near) PetscCall(Slack(h, trial));
     PetscCall(Evaluate(h, trial, norm, size));
+    /* Armijo's condition on |F|. */
     *less = (PetscBool)(*norm < (1 - share * t) * before);
   }
   if (*less) {
     PetscCall(PetscArraycpy(z, trial, h->n));
+    /* Passing into the neighbourhood of the solution: w anew, without the drift of updates. */
     if (!near && *norm <= NEAR * *size) PetscCall(Residual(h, z, norm, size));
   } else {
     PetscCall(PetscArraycpy(h->w, w, h->n));
@@ -195,10 +198,12 @@ static PetscErrorCode Step(Newton *h, const PetscReal z[], PetscBool near, Petsc
 
   PetscFunctionBegin;
   if (!near && !least) PetscCall(HycoConeStepPoint(h->linear, h->q, h->y, h->step, regular, &served));
+  /* The point itself was solved for: the step is its difference from z. */
   if (served) {
     for (PetscInt i = 0; i < h->n; i++) h->step[i] -= z[i];
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+  /* The right-hand side of the step is -F; F comes back below. */
   for (PetscInt i = 0; i < h->n; i++) h->F[i] = -h->F[i];
   PetscCall(HycoConeStepSolve(h->linear, h->F, least, h->step, regular));
   for (PetscInt i = 0; i < h->n; i++) h->F[i] = -h->F[i];
@@ -479,10 +484,12 @@ static PetscErrorCode Starts(Newton *h, PetscReal z[], HycoLCPStatus *status)
   PetscFunctionBegin;
   PetscCall(Iterate(h, z, status));
   if (*status == HYCO_LCP_SOLVED) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Sweeps over blocks cannot move a floating body. */
   if (h->p) {
     PetscCall(FromStick(h, z, status));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+  /* Forces of a failed start may lie outside their cones. */
   PetscCall(HycoBlocksAdmit(h->blocks, z));
   PetscCall(Sweep(h, MOST_SWEEPS, z));
   PetscCall(Iterate(h, z, status));
@@ -528,6 +535,7 @@ static PetscErrorCode Chain(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
   PetscFunctionBegin;
   PetscCall(SetScales(h));
+  /* Friction: the forces of the last step first, then the solution without friction. */
   if (h->lcp->blocks) {
     PetscCall(FromForces(h, z, status));
     if (*status != HYCO_LCP_SOLVED) PetscCall(FromNormal(h, z, status));
@@ -540,6 +548,7 @@ static PetscErrorCode Chain(Newton *h, PetscReal z[], HycoLCPStatus *status)
   }
   if (*status == HYCO_LCP_SOLVED) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(Restart(h, z));
+  /* Last: it solves a sequence of problems, each with a full flexibility. */
   PetscCall(Proximal(h, z, status));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -631,6 +640,7 @@ static PetscErrorCode Adapt(HycoConeFactor f, PetscInt p, const HycoBlocks *bloc
   PetscBool same = (PetscBool)(f->row && f->step.p == p && f->n_blocks == blocks->n);
 
   PetscFunctionBegin;
+  /* Equal numbers of blocks may still have other sizes. */
   if (same) PetscCall(PetscArraycmp(f->row, blocks->row, blocks->n + 1, &same));
   if (!same) {
     PetscCall(Release(f));

@@ -44,6 +44,7 @@ PetscErrorCode HycoTangentStates(PetscInt n, const PetscReal L[], const PetscRea
   PetscFunctionBegin;
   for (PetscInt i = 0; i < n; i++) most = PetscMax(most, L[i]);
   for (PetscInt i = 0; i < n; i++) {
+    /* A contact whose own row is flexible must press noticeably: otherwise it may open for a small change. */
     const PetscBool closed =
         (PetscBool)(L[i] > NEAR * most && (flexibility[i] <= 0 || L[i] * flexibility[i] > NEAR * size));
 
@@ -163,6 +164,7 @@ PetscErrorCode HycoTangentCreate(PetscInt p, PetscInt n, const PetscReal M[], co
   PetscCall(PetscMalloc1(n + 1, &t->open));
   for (PetscInt i = 0; i < p; i++) t->set[t->n_set++] = i;
   for (PetscInt i = 0; i < n; i++) {
+    /* Motions first, then closed contacts: the equations that hold to both sides. */
     if (state[i] == HYCO_TANGENT_CLOSED) t->set[t->n_set++] = p + i;
     if (state[i] == HYCO_TANGENT_UNDECIDED) t->open[t->n_open++] = p + i;
   }
@@ -195,6 +197,7 @@ static void Gaps(HycoTangent t, const PetscReal q[], int sign, PetscReal change[
       change[k] += sign * out[i] * t->v[i];
       size += PetscAbsReal(out[i] * t->v[i]);
     }
+    /* A sum of terms that cancel: 0, and no kink. */
     if (PetscAbsReal(change[k]) <= NOTHING * size) change[k] = 0;
     *kink = (PetscBool)(*kink || change[k] != 0);
   }

@@ -52,12 +52,14 @@ PetscErrorCode HycoTaoFindType(const char type[], char name[HYCO_TAO_NAME], char
   PetscFunctionBegin;
   list[0] = name[0] = '\0';
   for (size_t k = 0; k < sizeof(known) / sizeof(known[0]); k++) {
+    /* hyco's own types have options of their own. */
     if (known[k].traits & HYCO_TAO_OWN) continue;
     if (strcasecmp(known[k].name, type) == 0) PetscCall(PetscStrncpy(name, known[k].name, HYCO_TAO_NAME));
     PetscCall(PetscStrlcat(list, list[0] ? ", " : "", HYCO_LINE));
     PetscCall(PetscStrlcat(list, known[k].name, HYCO_LINE));
   }
   PetscCall(PetscFunctionListFind(TaoList, type, &create));
+  /* A type that the program has registered. */
   if (!name[0] && create) PetscCall(PetscStrncpy(name, type, HYCO_TAO_NAME));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -145,6 +147,7 @@ static PetscErrorCode Prepare(HycoTao t, Vec y, PetscInt max_its, PetscBool *mad
   PetscCall(TaoCreate(t->comm, &t->tao));
   PetscCall(TaoSetType(t->tao, t->type));
   if (t->owner) PetscCall(PetscObjectGetOptionsPrefix(t->owner, &prefix));
+  /* The owner's prefix first: several solvers in one program have options of their own. */
   PetscCall(PetscSNPrintf(t->prefix, sizeof(t->prefix), "%shyco_", prefix ? prefix : ""));
   PetscCall(TaoSetOptionsPrefix(t->tao, t->prefix));
   if (t->traits & HYCO_TAO_OWN) { /* the form has its own solver on a set */

@@ -102,7 +102,9 @@ static PetscErrorCode PackContacts(HycoMesh m, const HycoPairs *p, PetscInt *n, 
 
       s->contact = p->contact[k];
       s->slave = m->node_global[p->slave[k]];
+      /* The number of the contact in the order of one rank. */
       s->number = p->number ? p->number[k] : k;
+      /* A mortar row has more masters than a facet: it travels in several pieces of one size. */
       s->more = i > 0;
       s->n = PetscMin(p->master_start[k + 1] - lo, HYCO_FACET_NODES);
       for (PetscInt j = 0; j < s->n; j++) {
@@ -154,6 +156,7 @@ static PetscErrorCode UnpackContacts(HycoMesh m, PetscInt n, const Sent sent[], 
     PetscInt master[HYCO_FACET_NODES];
 
     for (PetscInt j = 0; j < sent[k].n; j++) master[j] = PlaceOf(&places, sent[k].master[j]);
+    /* Append opens a new contact; this one goes on with the last. */
     if (sent[k].more) p->n--; /* to the masters of the contact before */
     HycoPairsAppend(p, sent[k].contact, PlaceOf(&places, sent[k].slave), sent[k].n, master, sent[k].weight);
   }
@@ -209,6 +212,7 @@ PetscErrorCode HycoFOMGatherContacts(HycoFOM f, HycoMesh *mesh, HycoPairs *pairs
   PetscCall(PetscMemzero(pairs, sizeof(*pairs)));
   PetscCall(HycoFOMGatherSurface(f, mesh));
   PetscCall(PackContacts(f->surface, p, &n_mine, &mine));
+  /* One count per contact: counts of bytes would overflow an int. */
   PetscCallMPI(MPI_Type_contiguous((PetscMPIInt)sizeof(Sent), MPI_BYTE, &type));
   PetscCallMPI(MPI_Type_commit(&type));
   PetscCall(HycoConcatenate(HycoComm(f), n_mine, mine, type, sizeof(Sent), &n, &all));
@@ -230,6 +234,7 @@ static PetscErrorCode SendContacts(HycoFOM f, HycoMesh mesh, const HycoPairs *wh
   PetscCall(PackContacts(mesh, whole, &n, &sent));
   PetscCall(PetscMalloc2(n, &slave, n, &to));
   for (PetscInt k = 0; k < n; k++) slave[k] = sent[k].slave;
+  /* To the owner of the slave: there its row of B is assembled. */
   PetscCall(HycoMeshOwners(HycoComm(f), f->part, n, slave, to));
   PetscCall(HycoSendRows(HycoComm(f), n, to, sizeof(Sent), sent, n_got, got));
   PetscCall(PetscFree2(slave, to));
@@ -294,6 +299,7 @@ static PetscErrorCode NumberContacts(HycoFOM f)
   PetscCall(PetscMalloc1(p->n, &key));
   PetscCall(PetscFree(p->number));
   PetscCall(PetscMalloc1(p->n + 1, &p->number));
+  /* 64 bits: contacts times nodes exceed an int. */
   for (PetscInt k = 0; k < p->n; k++)
     key[k] = (PetscInt64)p->contact[k] * f->part->n_whole_nodes + f->surface->node_whole[p->slave[k]];
   PetscCall(HycoRankKeys(HycoComm(f), p->n, key, p->number, &f->n_contacts));
@@ -430,12 +436,14 @@ static PetscErrorCode Renew(HycoFOM f)
   PetscCall(FetchSurface(f, &f->surface));
   PetscCall(PlacesCreate(f->surface, &places));
   PetscCall(PetscMalloc1(before->n_nodes, &index));
+  /* Old nodes in the new surface: nodes are only added. */
   for (PetscInt i = 0; i < before->n_nodes; i++) index[i] = PlaceOf(&places, before->node_global[i]);
   PetscCall(PetscFree2(places.global, places.node));
   PetscCall(HycoPairsRenumber(&f->pairs, index, &renumbered));
   PetscCall(PetscFree(index));
   PetscCall(HycoPairsDestroy(&f->pairs));
   f->pairs = renumbered;
+  /* It refers to the nodes of the former surface. */
   PetscCall(HycoFEDestroy(&f->fe_surface));
   PetscCall(HycoMeshDestroy(&before));
   PetscCall(CountPatches(f));

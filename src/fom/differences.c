@@ -27,9 +27,11 @@ void HycoDifferenceSet(HycoScene scene, const PetscReal mu[], PetscInt p, HycoDi
   PetscReal h = STEP * (width > 0 ? width : PetscMax(PetscAbsReal(mu[p]), 1));
   const PetscBool inside = (PetscBool)(mu[p] >= scene->lo[p] && mu[p] <= scene->hi[p] && width > 0);
 
+  /* So that the step taken is the step divided by. */
   h = (mu[p] + h) - mu[p]; /* representable */
   *d = (HycoDifference){.parameter = p, .step = {0, h, -h}, .weight = {0, 0.5 / h, -0.5 / h}, .sign = 1};
   if (!inside || (mu[p] - h >= scene->lo[p] && mu[p] + h <= scene->hi[p])) return;
+  /* At the upper end downwards, elsewhere upwards: one-sided values are those towards larger parameters. */
   if (mu[p] + h > scene->hi[p]) d->sign = -1;
   h *= d->sign;
   *d = (HycoDifference){.parameter = p, .step = {0, h, 2 * h}, .weight = {-1.5 / h, 2 / h, -0.5 / h}, .sign = d->sign};
@@ -146,9 +148,11 @@ static void Set(HycoGradient *g, HycoGradientStore *store, const HycoDifference 
     if (closer)
       turns = HycoDifferenceKinks(d, Jump(g, d, value, q),
                                   (const PetscReal[]){closer[q], closer[n + q], closer[2 * n + q]});
+    /* At a kink the mean of both slopes would be no derivative at all. */
     if (turns) HycoDifferenceTakeSide(&side);
     store->value[at] = 0;
     for (PetscInt k = 0; k < 3; k++) store->value[at] += side.weight[k] * value[k * n + q];
+    /* Below the noise of the difference: a derivative that is exactly 0 has round-off of any sign. */
     if (PetscAbsReal(store->value[at] * d->step[1]) <= NOISE * PetscAbsReal(value[q])) store->value[at] = 0;
     store->kink[at] = (PetscBool)(kink || turns);
   }

@@ -136,10 +136,12 @@ PetscErrorCode HycoFOMEnergy(HycoFOM f, HycoSummary *s)
   PetscFunctionBegin;
   PetscCall(FreeWork(f, &free_work));
   PetscCall(CellSums(f, &mine[0], &lifting));
+  /* Gaps at the current parameters: they may fail where the search fails. */
   HycoOnEach(HycoComm(f), ContactSums(f, &mine[2], &mine[3]));
   mine[1] = free_work + lifting;
   PetscCallMPI(MPI_Allreduce(mine, all, 4, MPIU_REAL, MPI_SUM, HycoComm(f)));
   s->strain_energy = all[0];
+  /* Loads on free unknowns, supports by the lifting, and moving obstacles. */
   s->external_work = all[1] + all[3];
   s->gap_work = all[2];
   largest = PetscMax(PetscMax(2 * s->strain_energy, PetscAbsReal(s->external_work)), PetscAbsReal(s->gap_work));

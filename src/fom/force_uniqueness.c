@@ -96,6 +96,7 @@ static PetscErrorCode Peel(HycoFOM f, const Rows *r, PetscBool in[])
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(f->fe_surface->n_dof, &count));
   while (change) {
+    /* Over all ranks: a master node may occur in rows of several. */
     PetscCall(CountRows(f, r, in, count));
     change = PeelOwn(r, count, in);
     HycoAllreduce(&change, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(f));
@@ -114,6 +115,7 @@ static PetscErrorCode GatherRest(HycoFOM f, const Rows *r, const PetscBool in[],
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc3(r->m, &end, r->start[r->m], &dof, r->start[r->m], &value));
+  /* Lengths instead of starts: those of several ranks can be concatenated. */
   for (PetscInt k = 0; k < r->m; k++) {
     if (in[k]) end[m++] = r->start[k + 1] - r->start[k];
     for (PetscInt j = r->start[k]; in[k] && j < r->start[k + 1]; j++, n++) {
@@ -209,6 +211,7 @@ PetscErrorCode HycoFOMCountDependent(HycoFOM f, PetscInt *dependent)
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc5(m + 1, &r.start, entries, &r.dof, entries, &r.value, m, &r.gap, m, &in));
+  /* All arrays are freed below, also if a row cannot be made. */
   ierr = Count(f, &r, in, dependent);
   PetscCall(PetscFree5(r.start, r.dof, r.value, r.gap, in));
   PetscCall(ierr);
@@ -230,6 +233,7 @@ static PetscErrorCode TakeRest(const Rows *r, const PetscBool in[], Rows *rest)
       rest->dof[n] = r->dof[j];
       rest->value[n++] = r->value[j];
     }
+    /* After its entries: starts are those of the next row. */
     if (in[k]) rest->start[++rest->m] = n;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -252,8 +256,10 @@ PetscErrorCode HycoRowsCountDependent(PetscInt m, PetscInt start[], PetscInt dof
   for (PetscInt k = 0; k < m; k++) {
     for (PetscInt j = start[k]; in[k] && j < start[k + 1]; j++) count[dof[j]]++;
   }
+  /* Once: on one process rows leave in one sweep, and those that stay are few. */
   (void)PeelOwn(&r, count, in);
   for (PetscInt k = 0; k < m; k++) pressed = (PetscBool)(pressed || (in[k] && lambda[k] > 0));
+  /* Without a force nothing can be redistributed. */
   if (pressed) {
     PetscCall(TakeRest(&r, in, &rest));
     PetscCall(Dependent(&rest, dependent));

@@ -97,6 +97,7 @@ PetscErrorCode HycoFrictionCreate(HycoFOM f)
   PetscCall(PetscNew(&r));
   f->friction = r;
   PetscCall(HycoSlipCreate(HycoComm(f), f->scene, &f->pairs, f->fe->dim, &r->slip));
+  /* A row for the normal and dim - 1 for the tangents of contacts with friction. */
   r->rows = r->slip.row[f->pairs.n];
   PetscCall(VecCreate(HycoComm(f), &r->L));
   PetscCall(VecSetSizes(r->L, r->rows, PETSC_DETERMINE));
@@ -107,6 +108,7 @@ PetscErrorCode HycoFrictionCreate(HycoFOM f)
   for (PetscInt j = 0; j < N_PER_ROW; j++) PetscCall(VecDuplicate(r->L, &r->other[j]));
   PetscCall(HycoSystemCreate(HycoComm(f), &r->system));
   PetscCall(HycoSolverCreate(HycoComm(f), &r->solver));
+  /* The cone of Coulomb is no set of bounds: neither active set nor TAO takes it. */
   PetscCall(HycoSolverSetType(r->solver, HYCO_SOLVER_SEMISMOOTH));
   PetscCall(PetscObjectSetOptions((PetscObject)r->solver, f->scene->options));
   PetscCall(HycoSolverSetFromOptions(r->solver));
@@ -144,6 +146,7 @@ PetscErrorCode HycoFrictionBegin(HycoFOM f)
   HycoFriction r = f->friction;
 
   PetscFunctionBegin;
+  /* The former path may have ended in a system with friction. */
   if (r->B) PetscCall(Use(f, PETSC_FALSE));
   PetscCall(VecSet(r->L, 0));
   PetscCall(VecSet(r->L_old, 0));
@@ -343,6 +346,7 @@ PetscErrorCode HycoFrictionSave(HycoFOM f, HycoH5 h)
   for (PetscInt c = 0; c < N_STATE && !ierr; c++) {
     char name[32];
     PetscInt stride;
+    /* Forces, slips, works and states of contacts in one list of columns. */
     const PetscReal *from = Column(&f->friction->slip.shear, c, &stride);
 
     for (PetscInt k = 0; k < f->pairs.n; k++) value[k] = from[k * stride];

@@ -215,6 +215,7 @@ static PetscErrorCode Column(Work *o, PetscInt p, HycoGradient *gradient)
   PetscFunctionBegin;
   HycoDifferenceSet(o->f->scene, o->mu, p, &d);
   PetscCall(Differentiate(o, &d, &turns));
+  /* kink: an undecided contact takes another state towards the two sides. */
   PetscCall(HycoSolverTangentSolve(o->tangent, o->r, o->g, d.sign, o->dU, o->dL, &kink));
   PetscCall(HycoGradientColumn(gradient, o->store, o->f->scene, o->mu, &d, (PetscBool)(turns || kink), Measure, o,
                                o->output));
@@ -297,9 +298,11 @@ static PetscErrorCode Check(HycoFOM f)
 
   PetscFunctionBegin;
   PetscCall(HycoGradientCheckScene(f->scene));
+  /* Displacements recovered from given forces are no solution of the contact problem. */
   PetscCheck(f->solved && !f->given, PETSC_COMM_SELF, PETSC_ERR_ORDER,
              "call HycoFOMSolve() before HycoFOMGetGradient()");
   HycoCheck(!f->n_pins, "-hyco_regularise: a body that nothing holds has no gradient; add a support");
+  /* Derivatives of an unconverged state would be numbers without meaning. */
   PetscCall(HycoSolverGetReason(f->solver, &reason));
   HycoCheck(reason > 0, "there is no gradient: %s", HycoReasonName(reason));
   PetscFunctionReturn(PETSC_SUCCESS);

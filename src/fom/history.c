@@ -24,6 +24,7 @@ PetscErrorCode HycoPathNew(MPI_Comm comm, HycoScene scene, HycoPath *path)
   p->bound = 1e-3;
   p->smallest = 1e-10;
   p->substeps = 1;
+  /* Without inelastic laws the stiffness is constant and one iteration solves a step. */
   for (PetscInt b = 0; scene && b < scene->n_bodies; b++)
     p->flows = (PetscBool)(p->flows || !scene->body[b].law->linear);
   *path = p;
@@ -33,6 +34,7 @@ PetscErrorCode HycoPathNew(MPI_Comm comm, HycoScene scene, HycoPath *path)
 /* Work vectors like U and Lambda, which the owner has set. Collective. */
 PetscErrorCode HycoPathSetUp(HycoPath p)
 {
+  /* In the layout of the model's unknowns: of the whole mesh, or of a reduced system. */
   Vec *likeU[] = {&p->F, &p->f_int, &p->r, &p->U_old, &p->work, &p->diagonal, &p->U_last, &p->G_last, &p->G};
   Vec *likeL[] = {&p->L_old, &p->gap_work, &p->L_last, &p->L_new};
 
@@ -171,11 +173,13 @@ static PetscErrorCode Accept(HycoPath p, PetscReal t1, const HycoStepAttempt *a)
   p->end = state;
   p->t = t1;
   p->now.substeps++;
+  /* Over the steps since the last listed time, whose row of the table has them. */
   p->now.residual = PetscMax(p->now.residual, a->residual);
   p->now.kkt = PetscMax(p->now.kkt, HycoKKTMax(&p->kkt));
   p->now.most_iterations = PetscMax(p->now.most_iterations, a->iterations);
   PetscCall(NoteOrder(p, a->order));
   PetscCall(NoteTime(p));
+  /* Last: the op may read the accepted time and state. */
   PetscCall((*p->ops->accept)(p, a));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -191,6 +195,7 @@ static void Count(HycoPath p, const HycoStepAttempt *a)
   p->now.seconds_factor += a->seconds_factor;
   p->now.seconds_solve += a->seconds_solve;
   p->now.seconds_law += a->seconds_law;
+  /* A cut is counted once, where it happens. */
   if (a->converged) return;
   p->now.cuts++;
   p->n_cuts++;
@@ -269,6 +274,7 @@ static PetscErrorCode Start(HycoPath p, PetscBool *reached)
   HycoStepAttempt a;
 
   PetscFunctionBegin;
+  /* A step of no length: laws respond elastically, rates have no time. */
   PetscCall(HycoPathAttempt(p, p->t, p->t, &a));
   Count(p, &a);
   *reached = a.converged;
@@ -301,10 +307,12 @@ static PetscErrorCode Advance(HycoPath p, PetscBool *reached)
     PetscCall(Reach(p, s->times[p->step], reached));
   else
     PetscCall(Start(p, reached));
+  /* Before the record is made, which stores it. */
   p->now.seconds += HycoNow() - begin;
   if (!*reached) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(Record(p));
   p->step++;
+  /* After each listed time at the latest; the full order also saves between. */
   if (p->ops->save) PetscCall((*p->ops->save)(p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -345,6 +353,7 @@ void HycoPathGetHistory(HycoPath p, HycoHistory *h)
   h->n_orders = p->n_orders;
   h->n_taken = p->n_taken;
   h->taken = p->taken;
+  /* In place: the order in time is not needed again. */
   if (p->n_orders) qsort(p->orders, (size_t)p->n_orders, sizeof(*p->orders), Ascending);
   if (p->n_orders) h->order = p->orders[p->n_orders / 2];
 }

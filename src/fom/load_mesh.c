@@ -13,6 +13,7 @@ static PetscErrorCode CheckTies(HycoScene scene)
   PetscFunctionBegin;
   if (!scene->n_ties) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscStrlen(scene->mesh_path, &length));
+  /* A DMPlex in memory, or PETSc's file of one. */
   HycoCheck(!scene->dm && (length < 3 || strcmp(scene->mesh_path + length - 3, ".h5")),
             "tie %s: ties need the mesh as a gmsh file, not as a DMPlex", scene->tie[0].name);
   HycoCheck(!scene->refine, "tie %s: scene_refine cannot refine a mesh with ties; refine the file (gmsh -refine)",
@@ -33,6 +34,7 @@ static PetscErrorCode ReadMesh(HycoScene scene, HycoMesh *mesh)
   if (!ierr) ierr = HycoTiesFind(scene, *mesh, &ties);
   if (!ierr) ierr = HycoMeshSetTies(*mesh, ties);
   PetscCall(HycoTiesDestroy(&ties));
+  /* The caller has no handle to free after an error. */
   if (ierr) PetscCall(HycoMeshDestroy(mesh));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

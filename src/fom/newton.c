@@ -70,12 +70,14 @@ PetscErrorCode HycoPathMoves(HycoPath p, const PetscScalar u[], Vec work, PetscB
   PetscInt count = 0;
 
   PetscFunctionBegin;
+  /* The prescribed values come back below: only the assembly sees the differences. */
   PetscCall(PetscArraycpy(p->u0, fe->u0, fe->n_dof));
   for (PetscInt k = 0; k < fe->n_dof; k++) {
     fe->u0[k] = HycoFESupports(fe, k) ? fe->u0[k] - u[k] : 0; /* the difference of a tied node from its masters stays
                                                                  0 */
     count += fe->u0[k] != 0;
   }
+  /* Assembly is collective: all ranks must agree whether it runs. */
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &count, 1, MPIU_INT, MPI_SUM, p->comm));
   *moved = (PetscBool)(count > 0);
   if (*moved) {
@@ -207,6 +209,7 @@ static PetscErrorCode IsLower(HycoPath p, const HycoStepAttempt *a, const Progre
   *lower = PETSC_FALSE;
   if (a->law.failed) PetscFunctionReturn(PETSC_SUCCESS);
   *lower = PETSC_TRUE;
+  /* No potential (contact changes, friction, damage): the residual alone judges. */
   if (!now->search) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecDot(p->F, p->U, &work));
   potential = a->law.potential - work;
@@ -253,6 +256,7 @@ static PetscErrorCode SetChanged(HycoPath p, Vec a, Vec b, PetscBool *changed)
   for (PetscInt k = 0; k < n; k++) count += (x[k] > 0) != (y[k] > 0);
   PetscCall(VecRestoreArrayRead(a, &x));
   PetscCall(VecRestoreArrayRead(b, &y));
+  /* One contact on one rank restarts the mixing on all. */
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &count, 1, MPIU_INT, MPI_SUM, p->comm));
   *changed = (PetscBool)(count > 0);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -286,6 +290,7 @@ static PetscErrorCode LeastSquares(PetscInt n, Vec dG[], Vec g, PetscReal gamma[
     trace += A[i][i];
   }
   PetscCall(VecMDot(g, n, dG, gamma));
+  /* Also positive where all differences vanish. */
   for (PetscInt i = 0; i < n; i++) A[i][i] += 1e-13 * trace + PETSC_SQRT_MACHINE_EPSILON * PETSC_SMALL * PETSC_SMALL;
   for (PetscInt i = 0; i < n; i++) { /* positive definite: no pivoting */
     for (PetscInt r = i + 1; r < n; r++) {
@@ -313,9 +318,11 @@ static PetscErrorCode Mix(HycoPath p, PetscInt k)
   PetscFunctionBegin;
   PetscCall(VecWAXPY(p->work, -1, p->U, p->G)); /* g */
   if (k > 1) PetscCall(SetChanged(p, p->L_new, p->L_last, &changed));
+  /* The differences so far are forgotten. */
   if (k <= 1 || changed)
     p->n_mixed = 0;
   else {
+    /* The newest first; the oldest is overwritten. */
     PetscCall(Push(p->n_mixed, p->dU, p->G, p->U_last));
     PetscCall(Push(p->n_mixed, p->dG, p->work, p->G_last));
     if (p->n_contacts) PetscCall(Push(p->n_mixed, p->dL, p->L_new, p->L_last));
@@ -331,6 +338,7 @@ static PetscErrorCode Mix(HycoPath p, PetscInt k)
   if (p->n_mixed) PetscCall(LeastSquares(p->n_mixed, p->dG, p->work, gamma));
   for (PetscInt j = 0; j < p->n_mixed; j++) {
     PetscCall(VecAXPY(p->U, -gamma[j], p->dU[j]));
+    /* Forces are mixed like displacements: on a fixed set both are affine in the iterate. */
     if (p->n_contacts) PetscCall(VecAXPY(p->Lambda, -gamma[j], p->dL[j]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -86,6 +86,7 @@ static void AddTo(HycoFE fe, PetscInt dof, PetscReal value, HycoReaction *to)
   const PetscReal *x = fe->X + 3 * (dof / fe->dim);
 
   if (fe->formulation == HYCO_AXISYMMETRIC) {
+    /* Radial forces on a ring balance themselves. */
     if (c) to->force[c] += value;
     return;
   }
@@ -102,6 +103,7 @@ static PetscErrorCode FindSupports(HycoFOM f, PetscInt support[])
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < f->fe->n_dof; k++) support[k] = -1;
+  /* From the last to the first, so that the first one stays. */
   for (PetscInt s = f->scene->n_fixed - 1; s >= 0; s--) {
     PetscInt g = 0;
 
@@ -150,6 +152,7 @@ static void Resolve(PetscInt n, const HycoOblique *const o[], const PetscBool pl
   for (PetscInt a = 0; a < n; a++) {
     for (PetscInt b = 0; b <= n; b++) {
       A[a][b] = 0;
+      /* A component with a support of its own takes any force along it: only the others determine rho. */
       for (PetscInt d = 0; d < 3; d++) A[a][b] += plain[d] ? 0 : o[a]->n[d] * (b < n ? o[b]->n[d] : force[d]);
     }
   }
@@ -206,6 +209,7 @@ static PetscErrorCode AddUp(HycoFOM f, PetscReal *work, PetscInt support[], Sums
   HycoReaction *loads = s->result + f->scene->n_fixed + f->scene->n_springs;
 
   PetscFunctionBegin;
+  /* Nodal contact forces and what the supports must add for equilibrium. */
   PetscCall(Reactions(f, contact, r));
   HycoOnEach(HycoComm(f), HycoFELoads(f->fe, load));
   PetscCall(FindSupports(f, support));
@@ -215,6 +219,7 @@ static PetscErrorCode AddUp(HycoFOM f, PetscReal *work, PetscInt support[], Sums
     for (PetscInt k = i * dim; k < (i + 1) * dim; k++) {
       AddTo(f->fe, k, load[k], &loads[0]);
       AddTo(f->fe, k, contact[k], &loads[1]);
+      /* The scale of the balance: magnitudes of all that is summed. */
       s->size += PetscAbsReal(r[k]) + PetscAbsReal(load[k]) + PetscAbsReal(contact[k]);
     }
   }
@@ -232,6 +237,7 @@ static PetscErrorCode Balance(HycoFOM f, PetscInt n, Sums *s, PetscReal *balance
   PetscCall(PetscMalloc1(6 * n + 1, &sum));
   for (PetscInt k = 0; k < 6 * n; k++)
     sum[k] = k % 6 < 3 ? s->result[k / 6].force[k % 6] : s->result[k / 6].moment[k % 6 - 3];
+  /* In the same reduction. */
   sum[6 * n] = s->size;
   HycoAllreduce(sum, 6 * n + 1, MPIU_REAL, MPI_SUM, HycoComm(f));
   for (PetscInt k = 0; k < n; k++) {
@@ -264,6 +270,7 @@ PetscErrorCode HycoFOMGetReactions(HycoFOM f, PetscInt *n, const HycoReaction *r
   scene = f->scene;
   n_dof = f->fe->n_dof;
   all = scene->n_fixed + scene->n_springs + 2;
+  /* Kept: the result borrows it until the next call. */
   if (!f->reaction) PetscCall(PetscMalloc1(all, &f->reaction));
   PetscCall(PetscArrayzero(f->reaction, all));
   PetscCall(PetscMalloc2(3 * n_dof, &work, n_dof, &support));

@@ -26,6 +26,7 @@ PetscErrorCode HycoFOMMotionVectors(HycoFOM f, const HycoMotions *motions, Vec *
     for (PetscInt i = 0; i < f->part->n_nodes; i++) {
       const PetscInt at = HycoMeshOwned(f->part, i);
 
+      /* Each node's motion from its owner. */
       if (at >= 0) PetscCall(PetscArraycpy(own + at * dim, motion + i * dim, dim));
     }
     PetscCall(VecRestoreArray((*v)[k], &own));
@@ -77,6 +78,7 @@ static PetscErrorCode AddReleased(HycoFOM f, PetscInt n, const Vec motion[], con
     PetscCall(VecAXPY(u, -dot, f->released[k % f->n_released]));
   }
   PetscCall(VecNorm(u, NORM_2, &norm));
+  /* Motions are known within the error of the facets: what is left of a tenth would be that error. */
   if (norm < 0.1 * before) {
     PetscCall(VecDestroy(&u));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -126,6 +128,7 @@ static PetscErrorCode FindUnconstrained(HycoFOM f, const HycoMotions *free, Unco
   PetscCall(HycoMeshDestroy(&mesh));
   PetscCall(PetscFree(index));
   PetscCall(ierr);
+  /* The names go into messages, which are the same on every rank. */
   HycoOnRoot(HycoComm(f), NameUnconstrained(f, free, z));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -176,6 +179,7 @@ static PetscErrorCode ReleasedRows(HycoFOM f, PetscReal row[])
   for (PetscInt i = 0; i < f->surface->n_nodes; i++) {
     const PetscInt at = f->surface->node_global ? f->surface->node_global[i] : i;
 
+    /* Surfaces know contact nodes of other ranks: the vector brings the mark to the owner. */
     if (node[i]) PetscCall(VecSetValue(contact, at * f->fe->dim, 1, INSERT_VALUES));
   }
   PetscCall(PetscFree(node));
@@ -246,9 +250,11 @@ static PetscErrorCode ChoosePins(HycoFOM f)
     if (HycoMeshOwned(f->part, i) >= 0) tag[HycoMeshOwned(f->part, i)] = f->part->node_id[i];
   }
   for (PetscInt p = 0; p < n; p++) {
+    /* Over all ranks; equal rows by the smallest tag, so that the choice does not depend on the partition. */
     PetscCall(LongestRow(f, tag, row, &f->pin_tag[p], &f->pin_component[p], unit));
     length = PetscSqrtReal(RowSize(n, unit));
     for (PetscInt k = 0; k < n && length > 0; k++) unit[k] /= length;
+    /* What the pin already holds is taken from the other rows. */
     for (PetscInt i = 0; i < n_own && length > 0; i++) {
       PetscReal dot = 0;
 
@@ -268,6 +274,7 @@ static PetscErrorCode SetPins(HycoFOM f, PetscInt n)
   PetscReal *released;
 
   PetscFunctionBegin;
+  /* Nothing to remove where there were none. */
   if (n || f->fe->n_pins) PetscCall(HycoFESetPins(f->fe, n, f->pin_tag, f->pin_component));
   if (fe != f->fe) PetscCall(HycoFESetPins(fe, n, f->pin_tag, f->pin_component));
   PetscCall(ToSurface(f, n ? f->n_turned : 0, f->released, &released));
@@ -436,6 +443,7 @@ static PetscErrorCode Orthonormalize(PetscInt *n, Vec v[])
       PetscCall(VecAXPY(w, -dot, v[j % kept]));
     }
     PetscCall(VecNorm(w, NORM_2, &size));
+    /* Exact vectors up to round-off: what is left of a dependent one is noise. */
     if (size > 1e-8 * before) {
       PetscCall(VecScale(w, 1 / size));
       v[k] = v[kept];

@@ -68,6 +68,7 @@ static PetscErrorCode AddState(HycoSeries s)
   PetscCall(AddField(s, "nodal_mises", HYCO_ON_NODES, 1, nodal_mises));
   PetscCall(PetscFree2(nodal, nodal_mises));
   PetscCall(HycoFEStateGetNames(state, &n_names, &names));
+  /* Laws' own variables by name; cells of other laws have NaN. */
   for (PetscInt k = 0; k < n_names; k++) {
     PetscCall(HycoFEStateVariable(f->fe, state, names[k], mises));
     PetscCall(AddField(s, names[k], HYCO_ON_CELLS, 1, mises));
@@ -86,6 +87,7 @@ static PetscErrorCode AddContacts(HycoSeries s)
   PetscFunctionBegin;
   if (!f->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
   ierr = HycoContactFieldsCreate(f->comm, f->fe_surface, f->pairs, f->u_surface, f->lambda, &c);
+  /* Contacts live on surfaces, fields on the parts' nodes. */
   if (!ierr) ierr = HycoContactFieldsToPart(f->comm, f->fe, f->fe_surface->mesh, &c);
   if (!ierr) ierr = AddField(s, "contact_force", HYCO_ON_NODES, 3, c.force);
   if (!ierr) ierr = AddField(s, "contact_pressure", HYCO_ON_NODES, 1, c.pressure);
@@ -199,6 +201,7 @@ static PetscErrorCode ReadField(HycoFOM f, HycoH5 h, const HycoFileOrder *order,
 
   PetscFunctionBegin;
   PetscCall(HycoH5GetSize(h, set, &n_rows, &cols));
+  /* A file of another mesh, beside a checkpoint of this one. */
   HycoCheck(n_rows == all, "its field %s has %d rows", field->name, (int)n_rows);
   PetscCall(PetscMalloc1(n * cols, rows));
   PetscCall(HycoH5ReadRows(h, set, order ? order->first[field->place] : 0, n, cols, *rows));
@@ -237,6 +240,7 @@ static PetscErrorCode CopyFields(HycoFOM f, HycoSeries s, HycoH5 h, PetscInt k)
 
   PetscFunctionBegin;
   HycoOnEach(HycoComm(f), HycoH5LoadText(h, "fields", &list));
+  /* The list was written with the fields: laws may have changed since, the file has not. */
   for (word = strtok_r(list, " ", &rest); word && !ierr; word = strtok_r(NULL, " ", &rest))
     ierr = CopyField(f, s, h, word, k);
   PetscCall(PetscFree(list));

@@ -338,6 +338,7 @@ PetscErrorCode HycoMeshGather(HycoScene scene, HycoMesh part, const PetscBool in
   *mesh = NULL;
   PetscCallMPI(MPI_Comm_rank(g.comm, &g.rank));
   PetscCall(Choose(&g));
+  /* Each rank cuts its own points before they travel. */
   PetscCall(CutShare(&g));
   PetscCall(Migrate(&g));
   HycoOnRoot(g.comm, MakeSubmesh(&g, mesh));

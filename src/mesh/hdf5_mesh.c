@@ -153,6 +153,7 @@ PetscErrorCode HycoPlexRead(MPI_Comm comm, const char path[], DM *dm)
   PetscCall(DMPlexTopologyLoad(*dm, viewer, &from_file));
   PetscCall(DMPlexLabelsLoad(*dm, viewer, from_file));
   PetscCall(DMPlexCoordinatesLoad(*dm, viewer, from_file));
+  /* Tags in outputs are those of the file, whatever order PETSc gives the points. */
   PetscCall(LoadTags(*dm, viewer, from_file));
   PetscCall(PetscSFDestroy(&from_file));
   PetscCall(PetscViewerPopFormat(viewer));

@@ -105,10 +105,12 @@ PetscErrorCode HycoMeshLine(HycoMesh m, PetscInt group, PetscInt *n, PetscInt **
   PetscCall(FindEdges(m, in, n, &edge));
   PetscCall(PetscFree(in));
   PetscCall(PetscMalloc1(2 * m->n_nodes, &next));
+  /* A branch has no direction in which a load per length could go on. */
   ierr = CheckPath(m, group, *n, edge, next);
   PetscCall(PetscFree(next));
   if (!ierr) ierr = PetscMalloc1(width * *n, segment);
   for (PetscInt k = 0; k < *n && !ierr; k++) {
+    /* Both nodes of an edge were packed into one key to be sorted. */
     (*segment)[width * k] = (PetscInt)(edge[k].key / m->n_nodes);
     (*segment)[width * k + 1] = (PetscInt)(edge[k].key % m->n_nodes);
     if (width > 2) (*segment)[width * k + 2] = edge[k].middle;

@@ -55,6 +55,7 @@ PetscErrorCode HycoMeshDestroy(HycoMesh *mesh)
 
   PetscFunctionBegin;
   *mesh = NULL;
+  /* The tables go with the DM's last reference. */
   if (dm)
     PetscCall(DMDestroy(&dm));
   else if (m)
@@ -118,6 +119,7 @@ PetscErrorCode HycoMeshFindGroup(HycoMesh mesh, const char key[], const char nam
     }
     PetscCall(HycoListAdd(list, ", ", mesh->group_name[g]));
   }
+  /* A typing error is the usual reason. */
   near = HycoNearest(name, mesh->n_groups, (const char *const *)mesh->group_name);
   if (near) HycoFail("%s: the mesh has no group \"%s\"; its groups are: %s; did you mean %s?", key, name, list, near);
   HycoFail("%s: the mesh has no group \"%s\"; its groups are: %s", key, name, list);
@@ -144,6 +146,7 @@ static PetscErrorCode CheckPointLoad(HycoMesh mesh, const HycoPointLoad *load)
   dim = mesh->group_dim[group];
   HycoCheck(dim < mesh->dim, "the force on %s: that group has cells, and is not a body of the scene; add it under body",
             load->group);
+  /* In 2D a line is the boundary, in 3D it is an edge or a wire. */
   HycoCheck(!dim || dim < mesh->dim - 1,
             "the force on %s: that group is a boundary; write traction: %s: {...} (force per unit %s)", load->group,
             load->group, mesh->dim == 3 ? "area" : "length");
@@ -178,6 +181,7 @@ static PetscErrorCode CheckTie(HycoMesh mesh, const HycoTie *tie)
     PetscInt group = 0;
 
     PetscCall(HycoMeshFindGroup(mesh, "tie", name, &group));
+    /* Both sides are surfaces: points have no facets to project to. */
     HycoCheck(mesh->group_dim[group] == mesh->dim - 1,
               "tie %s: its %s must be a group of dimension %d; %s has dimension %d", tie->name,
               side ? "master" : "slave", (int)mesh->dim - 1, name, (int)mesh->group_dim[group]);
@@ -197,6 +201,7 @@ static PetscErrorCode CheckContact(HycoMesh mesh, HycoContact contact)
             contact->slave);
   if (!contact->master) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoMeshFindGroup(mesh, "contact", contact->master, &group));
+  /* Types that search need facets to project to. */
   HycoCheck(!contact->ops->find || mesh->group_dim[group] == mesh->dim - 1,
             "contact %s: the master group %s has dimension %d; a group of dimension %d is needed", contact->name,
             contact->master, (int)mesh->group_dim[group], (int)mesh->dim - 1);
@@ -239,6 +244,7 @@ PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene)
               "contact %s: type surface needs first-order cells, and the mesh has %s; use type: mortar, matching "
               "meshes with type: pair, or mesh with gmsh -order 1",
               scene->contact[k]->name, HycoCellKinds[mesh->type].name);
+  /* Outputs last: their group alone is checked, its meaning by the outputs. */
   for (PetscInt k = 0; k < scene->n_quantities; k++) {
     if (scene->quantity[k].group) PetscCall(HycoMeshFindGroup(mesh, "output", scene->quantity[k].group, &group));
   }
@@ -357,6 +363,7 @@ PetscErrorCode HycoMeshOwners(MPI_Comm comm, HycoMesh part, PetscInt n, const Pe
   PetscFunctionBegin;
   PetscCall(PetscLayoutCreateFromSizes(comm, part->n_owned, PETSC_DETERMINE, 1, &layout));
   for (PetscInt k = 0; k < n; k++) {
+    /* Bisection only when the owner changes. */
     if (global[k] < layout->range[last] || global[k] >= layout->range[last + 1])
       PetscCall(PetscLayoutFindOwner(layout, global[k], &last));
     owner[k] = last;

@@ -47,11 +47,13 @@ static long long ReadInt(Msh *m, size_t bytes)
 
   if (m->failed) return 0;
   if (m->binary) {
+    /* No read past the end, whatever the file declares. */
     if ((size_t)(m->end - m->at) < bytes) {
       m->failed = PETSC_TRUE;
     } else if (bytes == 4) {
       int word;
 
+      /* Not a cast: numbers of a binary file lie at any address. */
       memcpy(&word, m->at, 4);
       value = word;
     } else {
@@ -83,6 +85,7 @@ static double ReadDouble(Msh *m)
   } else {
     char *end;
 
+    /* Independent of the locale, unlike strtod(). */
     value = HycoNumber(m->at, &end);
     m->failed = (PetscBool)(end == m->at);
     m->at = end;
@@ -159,6 +162,7 @@ static PetscErrorCode AddCoordinates(Msh *m, size_t k)
               (long long)m->mesh->tag[k]);
     m->mesh->xyz[3 * k + c] = x;
   }
+  /* After the three: one check for a node. */
   HycoCheck(!m->failed, "the mesh %s is damaged: the coordinates of node %lld are not numbers", m->path,
             (long long)m->mesh->tag[k]);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -236,6 +240,7 @@ static PetscErrorCode SortNodes(HycoMsh *mesh)
 
   PetscFunctionBegin;
   PetscCall(PetscSortedInt(n, mesh->tag, &sorted));
+  /* gmsh writes them in order as a rule. */
   if (sorted) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(n, &order));
   for (PetscInt k = 0; k < n; k++) order[k] = k;
@@ -515,6 +520,7 @@ static PetscErrorCode ReadElements4(Msh *m)
   PetscCall(ReadCount(m, 4, "elements", &all));
   least = ReadInt(m, 8);
   most = ReadInt(m, 8);
+  /* Counted over blocks, to be compared with the declared number. */
   for (size_t b = 0; b < blocks; b++, done += n) {
     const long long dim = ReadInt(m, 4), entity = ReadInt(m, 4), type = ReadInt(m, 4);
 
@@ -645,6 +651,7 @@ static PetscErrorCode ReadNames(Msh *m)
               m->path, (int)PetscMin(strcspn(line, "\r\n"), 40), line);
     name.dim = (int)dim;
     name.tag = (int)tag;
+    /* Room grows by doubling, without a counter of its own. */
     if (!(m->n_names & (m->n_names + 1))) /* one below a power of 2: double the size */
       PetscCall(PetscRealloc((2 * m->n_names + 2) * sizeof(name), &m->name));
     m->name[m->n_names++] = name;
@@ -678,6 +685,7 @@ static PetscErrorCode RefuseOther(const Msh *m)
   const char *other = OtherFormat(m);
 
   PetscFunctionBegin;
+  /* gmsh's own older format has another remedy than a foreign one. */
   HycoCheck(!other || strncmp(other, "gmsh", 4),
             "the mesh %s has gmsh's format 1; hyco reads 2.2 and 4.1: convert it by gmsh -save -format msh41 %s -o "
             "NEW.msh",
@@ -781,6 +789,7 @@ PetscErrorCode HycoMshRead(const char path[], HycoMsh *mesh)
   memset(mesh, 0, sizeof(*mesh));
   ierr = ReadAll(&m);
   if (!ierr) ierr = ReadSections(&m);
+  /* The text of the whole file: as large as the tables. */
   PetscCall(PetscFree(m.text));
   PetscCall(PetscFree(m.name));
   PetscCall(PetscFree(m.member));

@@ -117,6 +117,7 @@ static PetscErrorCode ByScotch(PetscInt n, const Graph *g, PetscInt n_parts, Pet
   PetscCall(MatPartitioningSetAdjacency(partitioning, graph));
   PetscCall(MatPartitioningSetType(partitioning, MATPARTITIONINGPTSCOTCH));
   PetscCall(MatPartitioningSetNParts(partitioning, n_parts));
+  /* Heavy edges hold both sides of a contact on one rank. */
   PetscCall(MatPartitioningSetUseEdgeWeights(partitioning, PETSC_TRUE));
   PetscCall(MatPartitioningApply(partitioning, &is));
   PetscCall(ISGetIndices(is, &p));
@@ -171,6 +172,7 @@ static PetscErrorCode Cut(const Data *d, PetscInt n_parts, PetscInt part[])
   PetscCall(CellGraph(d->mesh, d->n_pairs, d->pairs, &graph));
   if (d->by == HYCO_PARTITION_METIS) PetscCall(ByMetis(d->mesh->n_cells, &graph, n_parts, part, &done));
   if (!done) PetscCall(ByScotch(d->mesh->n_cells, &graph, n_parts, part));
+  /* A part without a cell would leave a rank without a mesh. */
   PetscCall(FillParts(d->mesh->n_cells, n_parts, part));
   PetscCall(PetscFree(graph.xadj));
   PetscCall(PetscFree(graph.adjncy));
@@ -195,6 +197,7 @@ static PetscErrorCode Partition(PetscPartitioner partitioner, PetscInt n_parts, 
   PetscCall(PetscMalloc1(n, &cells));
   for (PetscInt p = 0; p < n_parts; p++) {
     for (PetscInt c = 0; c < n; c++) {
+      /* Cells ascending within a part: the order of the mesh file survives distribution. */
       if (part[c] == p) cells[at++] = c;
     }
   }

@@ -112,6 +112,7 @@ static PetscErrorCode FindShapes(DM dm, PetscInt *shapes)
 
     PetscCall(DMPlexGetConeSize(dm, c, &size));
     PetscCall(DMPlexGetCellType(dm, c, &of));
+    /* By number of cone points and type: second-order cells have the type of their corners. */
     while (t < HYCO_N_CELL_TYPES && !IsOf((HycoCellType)t, of, size, ties)) t++;
     HycoCheck(t < HYCO_N_CELL_TYPES,
               "the mesh has cells of DMPlex's type %s; hyco supports segments, triangles, quadrilaterals, tetrahedra, "
@@ -156,6 +157,7 @@ PetscErrorCode HycoPlexType(DM dm, PetscInt *type, PetscBool *mixed)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   HycoOnEach(comm, FindShapes(dm, &shapes));
+  /* A rank may have one type of cells alone, or none. */
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &shapes, 1, MPIU_INT, MPI_BOR, comm));
   *type = shapes ? (PetscInt)HycoShapesType(shapes) : -1;
   *mixed = (PetscBool)(shapes && shapes != (PetscInt)1 << *type);
@@ -400,6 +402,7 @@ static void Reverse(HycoCellType type, PetscInt facet[])
     facet[k] = facet[last];
     facet[last] = keep;
   }
+  /* The middles of the sides, in the same turn. */
   for (PetscInt k = corners, last = 2 * corners - 1; HycoCellKinds[type].quadratic && corners > 2 && k < last;
        k++, last--) {
     const PetscInt keep = facet[k];
@@ -455,9 +458,11 @@ static PetscErrorCode AddFacet(Builder *b, PetscInt cell, PetscInt point, PetscI
     const PetscInt tied = HycoMeshTied(m, node[v]);
 
     mine = (PetscBool)(mine || b->owned[m->node_point[node[v]] - b->v0]);
+    /* Masters of a tied node take its share of the facet's load. */
     for (PetscInt j = tied < 0 ? 0 : m->tied_start[tied]; tied >= 0 && j < m->tied_start[tied + 1]; j++)
       mine = (PetscBool)(mine || b->owned[m->node_point[m->tied_master[j]] - b->v0]);
   }
+  /* Only facets around owned nodes: others are another rank's to integrate. */
   if (!mine) PetscFunctionReturn(PETSC_SUCCESS);
   if (b->n_facets == b->room) {
     b->room = 2 * b->room + 64;
@@ -479,6 +484,7 @@ static PetscErrorCode AddNode(Builder *b, PetscInt group, PetscInt node)
 
   PetscFunctionBegin;
   if (*n == b->node_room) {
+    /* Doubling: the number of points of a label is not known by kind. */
     b->node_room = 2 * b->node_room + 64;
     PetscCall(PetscRealloc((size_t)b->node_room * sizeof(*m->group_node), &m->group_node));
   }
@@ -630,6 +636,7 @@ static PetscErrorCode TakeGroup(Builder *b, PetscInt group, DMLabel label)
   PetscCall(ISGetLocalSize(values, &n_values));
   PetscCall(ISGetIndices(values, &value));
   for (PetscInt k = 0; k < n_values; k++) {
+    /* In a submesh the value keeps the dimension, even where a group has lost all of its points. */
     if (b->sub && value[k] < HYCO_FACET) m->group_dim[group] = value[k] - 1; /* also without points */
     PetscCall(DMLabelGetStratumIS(label, value[k], &points));
     if (!points) continue;
@@ -642,6 +649,7 @@ static PetscErrorCode TakeGroup(Builder *b, PetscInt group, DMLabel label)
   PetscCall(ISRestoreIndices(values, &value));
   PetscCall(ISDestroy(&values));
   n = m->group_start[group + 1] - m->group_start[group];
+  /* Sorted, as searches by bisection expect. */
   PetscCall(HycoSortUnique(&n, m->group_node ? m->group_node + m->group_start[group] : NULL));
   m->group_start[group + 1] = m->group_start[group] + n;
   n = m->group_cell_start[group + 1] - m->group_cell_start[group];
@@ -698,6 +706,7 @@ static PetscErrorCode TakeBodies(Builder *b)
       *body = k;
     }
   }
+  /* A cell of a DMPlex without a label would have no law. */
   for (PetscInt e = 0; e < m->n_cells; e++)
     HycoCheck(m->cell_body[e] >= 0, "cell %d belongs to no body; give each cell of the mesh the label of a body",
               (int)m->cell_id[e]);
@@ -766,6 +775,7 @@ static PetscErrorCode MakeTables(Builder *b)
   PetscCall(FindOwned(b));
   PetscCall(TakeCells(b));
   PetscCall(TakeNodes(b));
+  /* After nodes are known: ties name them by tag. */
   PetscCall(HycoMeshSetTies(b->m, b->ties));
   PetscCall(TakeGroups(b));
   PetscCall(TakeBodies(b));
@@ -830,6 +840,7 @@ static void DropInnerFacets(HycoMesh m)
 
   for (PetscInt f = 0; f < m->n_facets; f++) {
     if (m->group_dim[m->facet_group[f]] == m->dim) continue;
+    /* In place and downwards: n never overtakes f. */
     memmove(m->facets + n * m->nf, m->facets + f * m->nf, (size_t)m->nf * sizeof(PetscInt));
     m->facet_group[n] = m->facet_group[f];
     if (m->facet_point) m->facet_point[n] = m->facet_point[f];
@@ -879,6 +890,7 @@ PetscErrorCode HycoPlexToTables(DM dm, MPI_Comm comm, HycoScene scene, HycoMesh 
 
   PetscFunctionBegin;
   PetscCall(HycoMeshQuery(dm, mesh));
+  /* Made once for each DM: the tables are composed with it. */
   if (*mesh) {
     PetscCall(PetscObjectReference((PetscObject)dm));
     PetscFunctionReturn(PETSC_SUCCESS);

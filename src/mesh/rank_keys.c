@@ -29,6 +29,7 @@ static PetscErrorCode RankOwn(PetscInt n, const PetscInt64 key[], PetscInt place
   HycoDuplicate(n, key, &sorted);
   if (n) qsort(sorted, (size_t)n, sizeof(*sorted), Compare);
   for (PetscInt k = 0; k < n; k++) {
+    /* Equal keys get one place. */
     if (!k || sorted[k] != sorted[m - 1]) sorted[m++] = sorted[k];
   }
   for (PetscInt k = 0; k < n; k++)

@@ -194,6 +194,7 @@ static PetscBool GroupHas(const Group *g, PetscInt n, const PetscInt node[])
       while (v < g->nv && g->node[e * g->nv + v] != node[k]) v++;
       found += v < g->nv;
     }
+    /* All nodes of the facet: it is a side of this cell, or inside it. */
     if (found == n) return PETSC_TRUE;
   }
   return PETSC_FALSE;
@@ -316,6 +317,7 @@ static PetscErrorCode CollectGroups(HycoScene scene, Reader *r, HycoMesh m)
   PetscCall(PetscMalloc1(n_facets, &m->facet_cell));
   PetscCall(PetscMalloc1(n_facets, &r->before));
   PetscCall(PetscMalloc1(m->n_cells, &r->last));
+  /* -1: no facet of the cell so far. */
   for (PetscInt e = 0; e < m->n_cells; e++) r->last[e] = -1;
   for (PetscInt k = 0; k < r->n_groups; k++) {
     PetscCall(PetscStrallocpy(r->group[k].name, &m->group_name[k]));
@@ -375,10 +377,12 @@ static PetscErrorCode CheckTwins(HycoScene scene, HycoMesh m, const PetscInt sta
   for (PetscInt e = 0; e < m->n_cells; e++) {
     const PetscInt *cell = m->cells + e * m->nv;
 
+    /* Twins share every node: those around the first one suffice. */
     for (PetscInt k = start[cell[0]]; k < start[cell[0] + 1]; k++) {
       const PetscInt other = around[k];
       const PetscBool alike = (PetscBool)(HycoMeshShape(m, e) == HycoMeshShape(m, other));
 
+      /* Each pair once. */
       if (other == e || (alike && other > e) || !CellHas(m, other, m->nv, cell)) continue;
       HycoCheck(!alike,
                 "%s: cells %d and %d have the same nodes; a cell must belong to one body (format 2.2 repeats a cell "
@@ -404,6 +408,7 @@ static PetscErrorCode MakeTables(HycoScene scene, Reader *r, HycoMesh m)
   PetscCall(CollectNodes(r, m));
   PetscCall(HycoMeshNodeCells(m, &r->start, &r->around));
   PetscCall(CheckTwins(scene, m, r->start, r->around));
+  /* Needs the cells around each node, as hanging nodes show there. */
   PetscCall(CheckConforming(scene, m, r->start, r->around));
   PetscCall(CollectGroups(scene, r, m));
   PetscCall(CheckLoads(scene, r));
