@@ -209,7 +209,7 @@ static PetscErrorCode IsLower(HycoPath p, const HycoStepAttempt *a, const Progre
   *lower = PETSC_FALSE;
   if (a->law.failed) PetscFunctionReturn(PETSC_SUCCESS);
   *lower = PETSC_TRUE;
-  /* No potential (contact changes, friction, damage): the residual alone judges. */
+  /* Without a potential there is nothing to search on: the full step is taken. */
   if (!now->search) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecDot(p->F, p->U, &work));
   potential = a->law.potential - work;

@@ -551,6 +551,7 @@ PetscErrorCode HycoMeshCreateDM(HycoScene scene, HycoMesh m)
   cut.scene = scene;
   PetscCall(MakeDM(PETSC_COMM_SELF, &cut, &dm));
   PetscCall(HycoMeshSetDM(m, dm));
+  /* Points are numbered cells, facets without cells, nodes: as MakeDM() makes them. */
   PetscCall(Identity(m->n_cells, &m->cell_point));
   PetscCall(PetscMalloc1(m->n_nodes, &m->node_point));
   PetscCall(PetscMalloc1(m->n_facets, &m->facet_point));
@@ -569,6 +570,7 @@ PetscErrorCode HycoSubmeshNodes(HycoMesh sub, HycoMesh of, PetscInt node[])
 
   PetscFunctionBegin;
   for (PetscInt i = 0; i < of->n_nodes; i++) {
+    /* Points of nodes are a range of the other DM: a table over it, not over all points. */
     first = PetscMin(first, NodePoint(of, i));
     last = PetscMax(last, NodePoint(of, i) + 1);
   }

@@ -77,7 +77,7 @@ static PetscErrorCode JudgeSample(HycoReducer t, HycoROM m, PetscInt k, const Pe
     PetscCall(PathErrors(t, m, k, &j->u, &j->lambda));
   else
     SnapshotErrors(t, m, k, &j->u, &j->lambda);
-  /* A path that ends early has a positive reason only at its last time. */
+  /* A path that ends early has a negative reason, as a solve that diverges. */
   j->solved = (PetscBool)(m->prediction.reason >= 0);
   /* The work of the search is counted: an unsolved point costs its attempts. */
   t->n_judged += j->solved ? 1 : HYCO_UNSOLVED_WORK;

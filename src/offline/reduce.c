@@ -219,7 +219,7 @@ static PetscErrorCode PODRank(HycoReducer t, PetscInt n_sigma, const PetscReal s
   PetscInt first;
 
   PetscFunctionBegin;
-  /* Of a 1D scene nothing is dominant; elsewhere modes far above the rest are taken before the energy is counted. */
+  /* With springs rigid motions are taken first; the tolerance then applies to the energy of the deformation. */
   first = CountDominant(t->scene, n_sigma, sigma);
   *l = first + HycoPODRank(n_sigma - first, sigma + first, tol, t->noise, 0);
   /* The user's limit is no lack of accuracy. */

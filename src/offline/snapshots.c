@@ -224,7 +224,7 @@ static PetscErrorCode WriteSprings(HycoFOM fom, HycoH5 h, const char name[])
   if (!fom->scene->n_springs) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoFOMGetRows(fom, &rows));
   PetscCall(PetscCalloc1(fom->fe->n_dof, &force));
-  /* At 1: springs do not follow the load ramp. */
+  /* -K u, the force on the body. */
   HycoSpringsAddForces(fom->fe, 1, fom->u, force);
   for (PetscInt k = 0; k < fom->fe->n_dof; k++) force[k] = fom->fe->fixed[k] ? 0 : force[k];
   ierr = HycoFieldWrite(h, rows, fom->n_nodes, name, HYCO_ON_NODES, MPIU_REAL, fom->fe->dim, 1, force);

@@ -166,7 +166,7 @@ static PetscErrorCode ConcludePaths(HycoReducer t, HycoROM m, PetscInt n, PetscI
     s->n++;
     positive += sign[k] > 0;
     if (ratio[k] < ratio[worst] || sign[worst] == 0) worst = k;
-    /* The elastic tangent has a positive determinant, from which each path begins. */
+    /* The first tangent of negative sign is the one that the message shows. */
     if (sign[k] < 0 && change < 0) change = k;
   }
   s->n_singular = PetscMin(positive, s->n - positive);

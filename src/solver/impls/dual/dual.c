@@ -36,6 +36,7 @@ static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked
                s->now.word);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+  /* A fallback must not ask for a dense matrix that the choice of forms has avoided. */
   if (s->falling_back && y->m > HYCO_FALLBACK_MAX && (s->form != form || s->now.traits & HYCO_TAO_DENSE))
     PetscFunctionReturn(PETSC_SUCCESS);
   *cost = 2;
@@ -70,6 +71,7 @@ static PetscErrorCode Resize(Dual *d, PetscInt m, PetscInt p)
   PetscCall(PetscCalloc1(m + 1, &d->active));
   d->m = m;
   d->p = p;
+  /* A set of other contacts is no start. */
   d->started = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -114,6 +116,7 @@ static PetscErrorCode GatherVec(MPI_Comm comm, Vec v, PetscReal all[])
   PetscCall(VecGetOwnershipRanges(v, &ranges));
   PetscCall(PetscMalloc2(size, &counts, size, &offsets));
   for (PetscMPIInt r = 0; r < size; r++) {
+    /* Counts of MPI are ints: more contacts than that have no dense matrix either. */
     PetscCall(PetscMPIIntCast(ranges[r + 1] - ranges[r], &counts[r]));
     PetscCall(PetscMPIIntCast(ranges[r], &offsets[r]));
   }
@@ -236,6 +239,7 @@ static PetscErrorCode Recover(HycoSolver s, const Dual *d, Vec x, Vec L)
 
   PetscFunctionBegin;
   PetscCall(HycoSystemWork(y));
+  /* The solution without contact is known: only that of the forces is added. */
   if (s->free)
     PetscCall(AddForces(s, x, L));
   else if (!s->stiffness.lu)
@@ -245,6 +249,7 @@ static PetscErrorCode Recover(HycoSolver s, const Dual *d, Vec x, Vec L)
     PetscCall(VecAYPX(y->work_x[0], -1, y->F));
     PetscCall(HycoStiffnessSolve(s, y->work_x[0], x));
   }
+  /* In twice the precision where the plain solve was not accurate enough. */
   if (s->stiffness.refined)
     PetscCall(HycoStiffnessRefine(s, d->L, x));
   else if (!d->p)
@@ -367,6 +372,7 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   HycoLogged(HYCO_EVENT_FORCES, SolveForces(s, d, L, solved));
   PetscCall(SetForces(d, L));
   PetscCall(Recover(s, d, x, L));
+  /* Reduced models: gaps that should be 0 have round-off of the dense factor, which one correction removes. */
   if (s->stiffness.lu && !d->p && *solved && s->now.traits & HYCO_TAO_OWN && !s->system->blocks)
     PetscCall(CloseGaps(s, d, x, L));
   PetscFunctionReturn(PETSC_SUCCESS);

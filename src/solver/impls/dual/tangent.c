@@ -91,6 +91,7 @@ static PetscErrorCode SetUp(HycoSolverTangent t, Vec x, Vec L)
   PetscCall(HycoSolverFactor(s, &singular));
   PetscCheck(!singular, HycoComm(s), PETSC_ERR_USER,
              "the stiffness is singular, so that there is no gradient; check that supports hold every body");
+  /* Without contacts K alone gives the derivative. */
   if (!s->system->m) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecScatterCreateToAll(L, &t->scatter, &t->all));
   t->m = s->system->m;

@@ -70,6 +70,7 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
 
   PetscFunctionBegin;
   PetscCall(PetscStrncpy(s->method, "linear", sizeof(s->method)));
+  /* No contacts and no factor: conjugate gradients alone. */
   if (s->iterative) {
     PetscCall(SolveIterative(s, (Linear *)form->data, x, solved));
     PetscFunctionReturn(PETSC_SUCCESS);

@@ -109,6 +109,7 @@ static PetscErrorCode OneEach(Mat B, PetscBool *diagonal)
     PetscInt n;
 
     PetscCall(MatGetRow(B, r, &n, NULL, NULL));
+    /* An empty row is no obstacle: the contact is idle. */
     more = n > 1;
     PetscCall(MatRestoreRow(B, r, &n, NULL, NULL));
   }
@@ -131,6 +132,7 @@ static PetscErrorCode ScaleOnly(HycoSystem y, Gap *s)
   for (PetscInt r = lo; r < hi; r++) {
     const PetscScalar *vals;
 
+    /* An idle contact has no unknown: T stays 1 there. */
     if (s->pivot[r - lo] == HYCO_IDLE) continue;
     PetscCall(MatGetRow(y->B, r, &n, NULL, &vals));
     PetscCall(VecSetValue(t, s->pivot[r - lo], 1 / vals[0], INSERT_VALUES));
@@ -210,6 +212,7 @@ static PetscErrorCode DropIdle(Gap *s, PetscInt n)
   for (PetscInt k = 0; k < n; k++) {
     if (s->pivot[k] == HYCO_IDLE) continue;
     s->contact[s->n] = k;
+    /* In place: s->n never overtakes k. */
     s->pivot[s->n++] = s->pivot[k];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -222,6 +225,7 @@ static PetscErrorCode ToGaps(HycoSystem s, const Gap *q, Vec x, Vec y)
   const PetscScalar *g;
 
   PetscFunctionBegin;
+  /* Other unknowns stay what they are. */
   PetscCall(VecCopy(x, y));
   PetscCall(MatCreateVecs(s->B, NULL, &gap));
   PetscCall(MatMult(s->B, x, gap));
@@ -279,6 +283,7 @@ static PetscErrorCode RenewSolver(HycoSolver s, Gap *g)
   if (g->ksp) {
     PetscCall(KSPGetOperators(g->ksp, &old, NULL));
     PetscCall(MatGetSize(old, &n_old, NULL));
+    /* A KSP of another size cannot be reused. */
     if (n_old != s->system->n)
       PetscCall(KSPDestroy(&g->ksp));
     else
@@ -383,6 +388,7 @@ PetscErrorCode HycoSolveOnSet(Mat Kg, Mat Kw, KSP ksp, Vec f, PetscInt n, const 
   PetscInt size;
 
   PetscFunctionBegin;
+  /* Kg is needed again for the next set. */
   PetscCall(MatCopy(Kg, Kw, SAME_NONZERO_PATTERN));
   PetscCall(MatGetSize(Kg, &size, NULL));
   PetscCall(MatGetDiagonal(Kg, rhs));

@@ -156,12 +156,14 @@ static PetscErrorCode Evaluate(Run *p, const PetscBool active[])
   }
   PetscCall(VecRestoreArrayRead(p->gap, &v));
   PetscCall(VecGetSize(p->l, &m));
+  /* No active contact: all forces are 0. */
   if (!m) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatMult(y->K, p->x, p->r));
   PetscCall(VecAYPX(p->r, -1, y->F));
   PetscCall(HycoConstrainedForces(f->constrained, p->r, p->l));
   PetscCall(VecGetArrayRead(p->l, &v));
   for (PetscInt k = 0; k < f->n; k++) {
+    /* Rows of the constraints are the active contacts in their order. */
     if (active[k]) p->force[k] = v[n++];
   }
   PetscCall(VecRestoreArrayRead(p->l, &v));
@@ -177,6 +179,7 @@ static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singu
   PetscFunctionBegin;
   PetscCall(SetConstraints(p, active, singular));
   if (*singular) PetscFunctionReturn(PETSC_SUCCESS);
+  /* The size of the loads in the preconditioner's norm, to which residuals are relative. */
   if (p->size < 0) PetscCall(HycoConstrainedSize(p->form->constrained, p->s->system->F, &p->size));
   PetscCall(HycoConstrainedSolve(p->form->constrained, p->s->system->F, p->d, p->accuracy, &p->size, p->x, &its));
   HycoCountLinear(p->s, its);
@@ -189,6 +192,7 @@ static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool 
 {
   const Run *p = (const Run *)ctx;
   const Projected *f = p->form;
+  /* Coarse solves: a force of the size of their error has no sign. */
   const PetscReal noise = PetscMax(HYCO_BELIEVED * p->accuracy, p->s->target > 0 ? 0 : HYCO_NOISE);
   PetscReal size[2] = {0, 0}, sizes[2];
 
@@ -213,6 +217,7 @@ static PetscErrorCode FillForces(const Run *p, PetscBool clean, const PetscBool 
   PetscCall(VecSet(L, 0));
   PetscCall(VecGetArray(L, &l));
   for (PetscInt k = 0; k < p->form->n; k++) {
+    /* Negative forces of round-off would count as adhesion. */
     if (active[k]) l[p->form->contact[k]] = clean ? PetscMax(p->force[k], 0) : p->force[k];
   }
   PetscCall(VecRestoreArray(L, &l));
@@ -251,6 +256,7 @@ static PetscErrorCode Settled(void *ctx, PetscBool *more)
   }
   PetscCall(FillForces(p, PETSC_TRUE, p->solved, p->L));
   PetscCall(HycoSystemComputeKKT(s->system, p->x, p->L, &kkt));
+  /* By how much the recomputed residual exceeds a third of the tolerance. */
   missing = kkt.stationarity / (0.3 * s->rtol);
   if (s->target > 0) missing = PetscMax(missing, s->system->residual / s->target);
   *more = (PetscBool)(missing > 1 && p->accuracy > HYCO_LEAST);
@@ -301,6 +307,7 @@ static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked
   if (iterative && own && aij && y->symmetric && !p) {
     PetscCall(HycoOperatorStateUpdate(&f->seen, y->B, NULL, &same));
     if (!same) PetscCall(FindNodes(y, f));
+    /* Below the primal form with few contacts, above it with many. */
     if (f->possible) *cost = y->m > HYCO_MANY_SHARE * (PetscReal)y->n ? 2 : 0.5;
   }
   if (asked && *cost < 0)
@@ -319,6 +326,7 @@ static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singul
   PetscFunctionBegin;
   *singular = PETSC_FALSE;
   PetscCall(HycoOperatorStateUpdate(&f->made, s->system->K, NULL, &same));
+  /* K is the same: a ramp and a path keep their multigrid. */
   if (same) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoConstrainedDestroy(&f->constrained));
   PetscCall(HycoConstrainedCreate(HycoComm(s), "hyco_primal_", s->system->K, &f->constrained));
@@ -366,6 +374,7 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   p.L = L;
   set.ctx = &p;
   PetscCall(VecGetOwnershipRange(s->system->D, &set.first, NULL));
+  /* A cold start has no contact. */
   if (!s->warm || !f->started) PetscCall(PetscArrayzero(f->active, f->n));
   PetscCall(HycoTaoSetType(f->tao, s->now.type, set.max_its));
   PetscCall(HycoTaoSolveSet(f->tao, &set, f->active, s->system->D, p.gap, &s->its, &status));
