@@ -94,6 +94,7 @@ static PetscErrorCode AddCells(HycoFE fe, HycoAssemblyMap p, PetscBool constant,
 
   PetscFunctionBegin;
   for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
+    /* The constant cells are summed once and copied into K at each parameter value. */
     if (fe->constant[e] != constant) continue;
     PetscCall(HycoFEElementRoom(fe, e, &Ke));
     PetscCall(HycoFEElementStiffness(fe, e, Ke));

@@ -92,6 +92,7 @@ static void Line3(HycoElement *e, PetscBool at_nodes)
    include the middle's, in proportion to their values there. */
 static void QuadAt(PetscInt nv, PetscReal x, PetscReal y, PetscReal N[], PetscReal dN[][3])
 {
+  /* The middle's function and its slopes. */
   const PetscReal f[3] = {(1 - x * x) * (1 - y * y), -2 * x * (1 - y * y), -2 * y * (1 - x * x)};
 
   for (PetscInt a = 0; a < nv; a++) {
@@ -149,6 +150,7 @@ static void Tri6(HycoElement *e, PetscBool at_nodes)
     PetscReal L[4] = {0};
 
     for (PetscInt a = 0; a < 3; a++) {
+      /* Values at the nodes themselves, for gaps and normals there. */
       if (at_nodes)
         L[a] = q < 3 ? a == q : a == side[q - 3][0] || a == side[q - 3][1] ? 0.5 : 0;
       else
@@ -227,6 +229,7 @@ static void Hex(HycoElement *e, PetscInt nv)
   e->nv = nv;
   e->nq = 27;
   for (PetscInt q = 0; q < 27; q++) {
+    /* The first coordinate runs fastest. */
     const PetscInt at[3] = {q % 3, q / 3 % 3, q / 9};
     const PetscReal x[3] = {gauss[at[0]], gauss[at[1]], gauss[at[2]]};
 

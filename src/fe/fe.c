@@ -192,6 +192,7 @@ PetscErrorCode HycoFECreateSurface(HycoScene scene, DM dm, HycoFE *fe)
   PetscCall(HycoMeshOf(dm, scene, &mesh));
   PetscCall(PetscNew(&surface));
   *surface = *mesh;
+  /* Surfaces are moved and loaded without integrating a cell. */
   surface->n_cells = 0;
   ierr = Create(scene, dm, surface, fe);
   if (ierr) PetscCall(PetscFree(surface));
@@ -338,6 +339,7 @@ static PetscErrorCode SetSupports(HycoFE fe)
     for (PetscInt c = 0; c < m->dim; c++) {
       for (PetscInt j = m->group_start[g]; fixed->value[c] && j < m->group_start[g + 1]; j++) {
         const PetscInt i = m->group_node[j], dof = i * m->dim + c;
+        /* 0 where nothing was set: compared only where the component is fixed already. */
         const PetscReal former = fe->u0[dof];
         PetscReal value;
 
@@ -348,6 +350,7 @@ static PetscErrorCode SetSupports(HycoFE fe)
                   (int)m->node_id[i], "xyz"[c], (double)former, (double)value, HycoExprKey(fixed->value[c]));
         fe->fixed[dof] = PETSC_TRUE;
         fe->u0[dof] = value;
+        /* Homogeneous supports need no lifting. */
         fe->lifted = (PetscBool)(fe->lifted || value != 0);
       }
     }

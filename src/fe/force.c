@@ -59,6 +59,7 @@ static PetscErrorCode AddPointForce(HycoFE fe, PetscInt cell, PetscInt q, const 
   for (PetscInt c = 0; c < m->dim; c++) {
     PetscReal f = 0;
 
+    /* Expressions cost more than the point's gradients. */
     if (!body->force[c] && inertia[c] == 0) continue;
     if (body->force[c]) PetscCall(HycoExprEval(body->force[c], fe->mu, 1, x, &f));
     f += inertia[c];
@@ -145,6 +146,7 @@ static PetscErrorCode SetShares(HycoFE fe, PetscInt group, HycoLoadShares *s)
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(4 * m->n_nodes, &sum));
   for (PetscInt f = 0; f < m->n_facets; f++) {
+    /* Facets that a rank shares are integrated by each for its own nodes. */
     if (m->facet_group[f] != group || !Acts(fe, f)) continue;
     for (PetscInt q = 0; q < el->nq; q++) {
       PetscReal v[4];
@@ -157,6 +159,7 @@ static PetscErrorCode SetShares(HycoFE fe, PetscInt group, HycoLoadShares *s)
     }
   }
   for (PetscInt i = 0; i < m->n_nodes; i++) n += sum[4 * i + 3] != 0; /* the corners of quad8 have negative shares */
+  /* The same nodes as at the last position: no allocation along a study. */
   if (n != s->n) {
     PetscCall(PetscFree(s->node));
     PetscCall(PetscFree(s->share));
@@ -268,6 +271,7 @@ static PetscErrorCode AddVolume(HycoFE fe, PetscInt cell, Into F)
     PetscCall(HycoFEBodyForce(fe, cell, f));
     PetscCall(AddCell(fe, cell, f, F));
   }
+  /* Thermal stress C eps_thermal as nodal forces, of linear scenes. */
   if (hot) {
     PetscCall(HycoCellHeat(fe, cell, push));
     PetscCall(AddCell(fe, cell, push, F));
@@ -279,6 +283,7 @@ static PetscErrorCode AddVolume(HycoFE fe, PetscInt cell, Into F)
    the moved segment (force per length, N/m). */
 static PetscErrorCode AddSegment(HycoFE fe, const HycoPointLoad *load, const PetscInt node[], Into F)
 {
+  /* First-order segments: two points integrate a linear load times a linear function. */
   const HycoElement *el = HycoMeshIsQuadratic(fe->mesh) ? HycoElementGetFacet(HYCO_TRI6) : HycoElementGet(HYCO_LINE2);
 
   PetscFunctionBegin;

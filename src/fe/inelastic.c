@@ -71,6 +71,7 @@ static PetscErrorCode ListNames(HycoScene scene, HycoFEState s)
       PetscBool seen = PETSC_FALSE;
 
       for (PetscInt j = 0; j < s->n_names && !seen; j++) PetscCall(PetscStrcmp(s->name[j], law->state_name[k], &seen));
+      /* Laws of one kind in several bodies have the same variables. */
       if (!seen) PetscCall(PetscStrallocpy(law->state_name[k], &s->name[s->n_names++]));
     }
   }
@@ -89,6 +90,7 @@ PetscErrorCode HycoFEStateCreate(HycoFE fe, HycoFEState *state)
   s->n_cells = n;
   PetscCall(PetscMalloc1(n + 1, &s->start));
   s->start[0] = 0;
+  /* Packed: bodies with small states do not pay for the largest. */
   for (PetscInt e = 0; e < n; e++) s->start[e + 1] = s->start[e] + nq * PointSize(fe, e);
   PetscCall(PetscCalloc1(s->start[n], &s->value));
   for (PetscInt e = 0; e < n; e++) {
@@ -171,6 +173,7 @@ static PetscErrorCode BatchCreate(HycoFE fe, Batch *b)
                 {&b->constant, HYCO_MAX_DECLARED}};
     const PetscInt parts = (PetscInt)(sizeof(part) / sizeof(part[0]));
 
+    /* One allocation: arrays of a batch lie side by side in the cache. */
     room = 0;
     for (PetscInt k = 0; k < parts; k++) room += part[k].size * n;
     PetscCall(PetscMalloc1(room, &b->memory));
@@ -240,6 +243,7 @@ static void Linear(HycoFE fe, const HycoElement *el, Batch *b)
   const PetscInt ns = fe->n_sigma, size = fe->tangent_size[fe->mesh->cell_body[b->cell[0]]];
 
   for (PetscInt i = 0; i < b->n * el->nq; i++) {
+    /* Lame's constants (2) or a full tangent. */
     const PetscReal *C = fe->tangent + fe->tangent_start[b->cell[i / el->nq]] + i % el->nq * size;
     const PetscReal *strain = b->strain + i * ns;
     PetscReal *stress = b->stress + i * ns;
@@ -390,6 +394,7 @@ static PetscErrorCode Step(HycoFE fe, const HycoElement *el, Batch *b)
   else
     PetscCall(Update(fe, fe->mesh->cell_body[b->cell[0]], b->n * el->nq, b, &failed));
   if (!linear && !failed) Complete(fe, el, b);
+  /* The state before stays untouched by a failed batch: the step is tried again. */
   if (!failed) Scatter(fe, el, b, linear);
   b->n = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -405,6 +410,7 @@ static PetscErrorCode StepAll(HycoFE fe, HycoBodies bodies, Batch *b)
   for (PetscInt e = 0; e < m->n_cells; e++) {
     const PetscBool linear = fe->scene->body[m->cell_body[e]].law->linear;
 
+    /* Linear cells of a model's path are a constant matrix. */
     if (bodies == HYCO_BODIES_FLOWING && linear) continue;
     if (b->n == BATCH || (b->n && m->cell_body[e] != m->cell_body[b->cell[0]])) PetscCall(Step(fe, el, b));
     b->cell[b->n++] = e;
@@ -470,6 +476,7 @@ PetscErrorCode HycoFELinearStress(HycoFE fe, const PetscReal u[], HycoFEState st
       PetscReal *g = HycoKeptGradients(fe, el, e, q), strain[6];
 
       HycoPointStrain(fe, el, e, u, (PetscReal(*)[3])g, fe->bbar[body] ? mean : NULL, strain);
+      /* Stresses are those of the elastic part. */
       for (PetscInt c = 0; c < 3; c++) strain[c] -= hot;
       HycoTangentApply((PetscBool)(size == 2), fe->dim, C, strain, to.stress);
       *to.stored = 0;
@@ -511,6 +518,7 @@ PetscErrorCode HycoFEStateForce(HycoFE fe, HycoFEState state, PetscInt cell, Pet
     PetscReal s[6] = {0, 0, 0, 0, 0, 0};
 
     PetscCall(HycoGradients(fe, el, cell, q, g, &w));
+    /* In 2D the out-of-plane components beyond n_sigma do no work. */
     PetscCall(PetscArraycpy(s, PointAt(fe, state, cell, q).stress, fe->n_sigma));
     HycoPointForce(fe, el, g, bbar ? mean : NULL, w, s, f);
   }
@@ -535,6 +543,7 @@ PetscErrorCode HycoFEPointRows(HycoFE fe, PetscInt cell, PetscInt q, PetscReal B
   for (PetscInt c = 0; c < fe->n_sigma; c++) {
     PetscReal unit[6] = {0};
 
+    /* A row of B is what a unit stress does at the nodes, per weight. */
     unit[c] = 1;
     HycoPointForce(fe, el, g, bbar ? mean : NULL, 1, unit, B + c * n);
   }
@@ -589,6 +598,7 @@ static void GatherPoints(HycoFE fe, const HycoElement *el, PetscInt n, const Pet
       b->stress0[i * ns + c] = from.stress[c];
     }
     for (PetscInt j = 0; j < n_state; j++) b->state0[i * n_state + j] = from.variable[j];
+    /* At a first step the temperature has not changed. */
     b->temperature0[i] = *from.temperature == VIRGIN ? T : *from.temperature;
     b->temperature[i] = T;
   }
@@ -606,6 +616,7 @@ static void ScatterPoints(HycoFE fe, const HycoElement *el, PetscInt n, const Pe
 
     size[i] = Lost(fe, cell, q, b->strain + i * ns, b->stress + i * ns, s + i * ns);
     for (PetscInt r = 0; r < ns && b->tangents; r++) {
+      /* The symmetric part, as the global tangent takes. */
       for (PetscInt c = 0; c < ns; c++)
         tangent[(i * ns + r) * ns + c] = C[r * ns + c] - (Ct[r * ns + c] + Ct[c * ns + r]) / 2;
     }
@@ -693,6 +704,7 @@ PetscErrorCode HycoFEStateVariable(HycoFE fe, HycoFEState state, const char name
       PetscBool same;
 
       PetscCall(PetscStrcmp(law->state_name[k], name, &same));
+      /* -1: the law of this body has no such variable. */
       if (same) which = k;
     }
     for (PetscInt q = 0; q < el->nq && which >= 0; q++) {

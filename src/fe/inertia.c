@@ -32,6 +32,7 @@ static PetscErrorCode SetAxis(HycoFE fe, const HycoMotion *m, HycoAcceleration *
   }
   PetscCall(Vector(fe, m->axis, a->axis));
   PetscCall(Vector(fe, m->through, a->through));
+  /* Perpendicular to the plane, or the axis of revolution. */
   if (fe->dim < 3) a->axis[fe->formulation == HYCO_AXISYMMETRIC ? 1 : 2] = 1;
   length = HycoLength(a->axis);
   HycoCheck(length > 0, "rotation has no axis; write rotation: {axis: {z: 1}} or another direction");

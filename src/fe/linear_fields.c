@@ -37,6 +37,7 @@ static inline void Strain2(PetscInt nv, const PetscReal g[], const PetscReal v[]
   }
   strain[0] = xx;
   strain[1] = yy;
+  /* Plane strain; other formulations are not served here. */
   strain[2] = 0;
   strain[3] = xy + yx;
 }
@@ -70,6 +71,7 @@ static inline void AddPoint(PetscInt ns, PetscReal w, const PetscReal C[], Petsc
   for (PetscInt c = 0; c < 3; c++) square += (stress[c] - mean) * (stress[c] - mean);
   for (PetscInt c = 3; c < ns; c++) square += 2 * stress[c] * stress[c];
   for (PetscInt c = 0; c < ns; c++) s->stress[c] += w * stress[c];
+  /* The mean of the equivalent stresses, not that of the mean stress. */
   s->mises += w * PetscSqrtReal(1.5 * square);
   s->stored += w * stored / 2;
   s->volume += w;
@@ -112,6 +114,7 @@ PetscErrorCode HycoFELinearFields(HycoFE fe, const PetscReal u[], PetscReal sigm
     for (PetscInt a = 0; a < el->nv; a++) {
       for (PetscInt c = 0; c < dim; c++) v[a * dim + c] = u[node[a] * dim + c];
     }
+    /* A constant dimension, so that the compiler unrolls the loops. */
     if (dim == 2)
       AddCell(2, fe, el, e, v, &s);
     else

@@ -71,6 +71,7 @@ static PetscErrorCode ListRows(HycoLinearForce f, const PetscBool nodes[])
 
     f->row[i] = -1;
     if (!n) continue;
+    /* Grows by doubling: neighbours are not counted before. */
     if (at + n > room) {
       room = 2 * room + n + 1000;
       PetscCall(PetscRealloc((size_t)room * sizeof(PetscInt), &f->column));
@@ -101,6 +102,7 @@ PetscErrorCode HycoLinearForceCreate(HycoFE fe, const PetscBool nodes[], HycoLin
     PetscBool wanted = (PetscBool)!nodes;
 
     for (PetscInt a = 0; a < m->nv && !wanted; a++) wanted = nodes[m->cells[e * m->nv + a]];
+    /* A cell enters if any of its nodes has a wanted row. */
     if (wanted && IsLinear(fe, e)) f->cell[f->n_cells++] = e;
   }
   PetscCall(ListRows(f, nodes));
@@ -153,6 +155,7 @@ static PetscErrorCode SetHeat(HycoLinearForce f)
     if (!fe->scene->body[fe->mesh->cell_body[f->cell[k]]].expansion) continue;
     PetscCall(HycoCellHeat(fe, f->cell[k], push));
     for (PetscInt r = 0; r < nv * dim; r++) {
+      /* Rows that nobody tests are not kept. */
       if (f->row[node[r / dim]] >= 0) f->heat[f->row[node[r / dim]] * dim + r % dim] += push[r];
     }
   }
@@ -180,6 +183,7 @@ void HycoLinearForceAdd(HycoLinearForce f, const PetscReal u[], PetscReal f_int[
       const PetscReal *block = f->K + j * dim * dim, *own = u + f->column[j] * dim;
 
       for (PetscInt c = 0; c < dim; c++) {
+        /* Blocks by node: one index for dim^2 numbers. */
         for (PetscInt d = 0; d < dim; d++) sum[c] += block[c * dim + d] * own[d];
       }
     }

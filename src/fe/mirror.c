@@ -143,6 +143,7 @@ PetscErrorCode HycoFEAgreeOnMirrors(MPI_Comm comm, HycoFE fe)
     HycoCheck(!seen[2 * b] || !seen[2 * b + 1],
               "body %s: its map inverts some cells and not others; a map may mirror a whole body, but not fold it",
               fe->scene->body[b].name);
+    /* Also on ranks without a cell of the body, which may have its facets. */
     fe->mirrored[b] = seen[2 * b + 1];
   }
   PetscCall(PetscFree(seen));

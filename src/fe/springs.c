@@ -180,6 +180,7 @@ static PetscErrorCode FacetMatrix(HycoFE fe, const HycoSpring *spring, PetscInt 
     for (PetscInt r = 0; r < n; r++) {
       for (PetscInt t = 0; t < n; t++) {
         const PetscInt c = r % m->dim, d = t % m->dim;
+        /* The part along the normal needs both directions at the point: it is integrated, not averaged. */
         const PetscReal along = k[3] != 0 ? k[3] * normal[c] * normal[d] / area : 0;
 
         K[r * n + t] += el->N[q][r / m->dim] * el->N[q][t / m->dim] * (along + (c == d ? area * k[c] : 0));
@@ -270,6 +271,7 @@ static PetscReal Pull(HycoFE fe, PetscInt k, const PetscReal u[], PetscReal forc
   for (PetscInt r = 0; r < n; r++) {
     force[r] = 0;
     for (PetscInt t = 0; t < n; t++) force[r] -= K[r * n + t] * u[node[t / fe->dim] * fe->dim + t % fe->dim];
+    /* force is -K u. */
     energy -= force[r] * u[node[r / fe->dim] * fe->dim + r % fe->dim] / 2;
   }
   return energy;

@@ -27,6 +27,7 @@ static PetscErrorCode Envelope(Mat K, IS order, PetscReal *sum)
     PetscInt first = i;
 
     for (PetscInt k = ia[old[i]]; k < ia[old[i] + 1]; k++) first = PetscMin(first, new_of[ja[k]]);
+    /* A Cholesky factor fills a row from its first entry on, and nothing before it. */
     *sum += i - first;
   }
   PetscCall(MatRestoreRowIJ(K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
@@ -61,6 +62,7 @@ PetscErrorCode HycoBandedSolver(PC pc)
   PetscCallMPI(MPI_Comm_size(comm, &size));
   if (size > 1) { /* every rank factors all of it, which takes less time than communication */
     PetscCall(PCSetType(pc, PCREDUNDANT));
+    /* As many copies as ranks. */
     PetscCall(PCRedundantSetNumber(pc, size));
     PetscCall(PCRedundantGetKSP(pc, &each));
     PetscCall(KSPSetType(each, KSPPREONLY));
@@ -91,6 +93,7 @@ PetscErrorCode HycoBanded(Mat K, PetscBool *thin)
   }
   PetscCall(MatGetSize(K, &n, NULL));
   PetscCall(MatGetInfo(K, MAT_LOCAL, &info));
+  /* Long rows: no order makes the envelope small. */
   if (info.nz_used > HYCO_THIN_ROW * (PetscReal)n) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatGetOrdering(K, MATORDERINGRCM, &row, &col));
   PetscCall(Envelope(K, row, &sum));
