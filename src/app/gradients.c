@@ -38,6 +38,7 @@ PetscErrorCode DriverReportGradient(cJSON *json, HycoScene scene, const HycoGrad
       cJSON_AddNumberToObject(of, names[p], g->value[at]);
       PetscCall(
           DriverPrint("%s %s %.6g%s", p ? "," : "", names[p], (double)g->value[at], g->kink[at] ? " (one-sided)" : ""));
+      /* At a contact that is just about to close or open the derivative differs by side. */
       if (!g->kink[at]) continue;
       kink = cJSON_CreateObject();
       cJSON_AddStringToObject(kink, "output", outputs[q]);
@@ -59,6 +60,7 @@ PetscErrorCode DriverGradientColumns(HycoScene scene, DriverGradients *columns)
   PetscFunctionBegin;
   columns->n = 0;
   columns->name = NULL;
+  /* `on` is set by the caller, the rest here. */
   if (!columns->on) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoSceneGetQuantities(scene, &n, outputs));
   PetscCall(HycoSceneGetParameters(scene, &n_par, &names, NULL, NULL));

@@ -113,6 +113,7 @@ static PetscErrorCode CheckNames(PetscBool trains)
   int argc;
 
   PetscFunctionBegin;
+  /* The list is static: this may be called again. */
   n_outputs = 0;
   PetscCall(Peek("model", model));
   if (trains) PetscCall(Take("-model", model, PETSC_TRUE));
@@ -122,6 +123,7 @@ static PetscErrorCode CheckNames(PetscBool trains)
   }
   PetscCall(Peek("hyco_checkpoint", path));
   PetscCall(Take("-hyco_checkpoint", path, PETSC_TRUE));
+  /* The snapshots lie beside the model, and are written as well. */
   if (trains && model[0]) PetscCall(AddSnapshots(model));
   if (!trains) PetscCall(Take("-model", model, PETSC_FALSE));
   PetscCall(CheckSceneFile());
@@ -146,8 +148,10 @@ static PetscErrorCode CheckPlace(const char name[], const char path[], HycoFileK
 
   PetscFunctionBegin;
   PetscCall(HycoFileCheckPlace(name, path, kind, &direct));
+  /* Through links: what counts is the folder in which the file really is. */
   HycoFileFollow(path, folder);
   slash = strrchr(folder, '/');
+  /* "/file" is in "/", whose slash stays. */
   if (slash)
     slash[slash == folder] = '\0';
   else

@@ -14,6 +14,7 @@ PetscErrorCode DriverGetReducedPath(HycoROM model, DriverReducedPath *path)
   path->ended = h.ended;
   path->t = h.t;
   path->n = h.n;
+  /* Before the broadcast of the struct, which carries it to all. */
   if (rank == 0) PetscCall(PetscStrncpy(path->why, h.why, sizeof(path->why)));
   PetscCallMPI(MPI_Bcast(path, sizeof(*path), MPI_BYTE, 0, PETSC_COMM_WORLD));
   PetscCall(PetscMalloc1(path->n, &path->step));
