@@ -23,7 +23,7 @@ static int Compare(const void *a, const void *b)
 }
 
 /* Points in an order in which the parameters that the stiffness depends on change least often, so that consecutive
-   points share its factor. */
+   points share its factor. The points themselves stay where they are: point[] refers to the caller's array. */
 static PetscErrorCode Sort(HycoROM m, PetscInt n, const PetscReal mu[], PetscInt order[], Point point[])
 {
   const PetscInt n_par = m->model->scene->n_parameters;
@@ -80,7 +80,8 @@ static PetscErrorCode SolveEach(HycoROM m, PetscInt n, const Point point[], Hyco
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All points are checked before the first is solved: a wrong one must not cost the time of those before it. */
+/* All points are checked before the first is solved: a wrong one must not cost the time of those before it. Results are
+   written to the caller's places, whatever the order of the solves. */
 PetscErrorCode HycoROMSolveMany(HycoROM m, PetscInt n, PetscInt n_parameters, const PetscReal mu[],
                                 HycoPrediction prediction[], PetscReal Lambda[], PetscReal U[])
 {

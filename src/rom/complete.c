@@ -107,6 +107,8 @@ static PetscErrorCode FindModal(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Only the displacements that B beyond the RID multiplies, not all of them: gaps there need no more. The list is made
+   once, since it follows from the pairs. */
 PetscErrorCode HycoROMExpandModal(HycoROM m)
 {
   const PetscInt l = m->model->l;

@@ -81,6 +81,8 @@ static PetscErrorCode Prepare(HycoROM m, const PetscReal Lambda[], HycoFE *fe, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Nothing where the model does not know all forces: a sum over a part would look like a resultant. Forces are given,
+   not taken from m, because derivatives ask for those of moved states. */
 PetscErrorCode HycoROMSumContacts(HycoROM m, const PetscReal Lambda[], const HycoContactResult *result[])
 {
   PetscReal least, *pressure;
@@ -103,6 +105,8 @@ PetscErrorCode HycoROMSumContacts(HycoROM m, const PetscReal Lambda[], const Hyc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The sum of contact and friction forces on a set of bodies along an axis, by which reactions follow from balance.
+   Internal pairs of two bodies of the set cancel, as both sides are added. */
 PetscErrorCode HycoROMPushBodies(HycoROM m, const PetscReal Lambda[], const PetscBool of[], PetscInt axis,
                                  PetscReal *force)
 {

@@ -24,6 +24,7 @@ struct _n_HycoBalance {
   HycoEquilibrium last;
 };
 
+/* Also half made: every part is created on the first measurement, in this order. */
 PetscErrorCode HycoBalanceDestroy(HycoBalance *balance)
 {
   HycoBalance b = *balance;
@@ -61,7 +62,8 @@ static PetscErrorCode Create(HycoROM m, HycoBalance b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Floating bodies: adds springs to the ground, the H1 norm matrix scaled to the bodies' stiffness. */
+/* Floating bodies: adds springs to the ground, the H1 norm matrix scaled to the bodies' stiffness. Without them K is
+   singular, and its inverse, by which residuals are measured, does not exist. */
 static PetscErrorCode HoldFloating(HycoFE fe, Mat K)
 {
   HycoMotions motions;

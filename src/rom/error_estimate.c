@@ -145,7 +145,8 @@ static void Shares(HycoROM m, PetscReal *fresh, PetscReal *outside)
   *outside /= sum;
 }
 
-/* A parameter without a range counts by its own unit. */
+/* A parameter without a range counts by its own unit. Euclidean, with the widths of the ranges as units: parameters of
+   different dimensions become comparable. */
 PetscReal HycoEstimatesDistance(HycoScene s, const PetscReal a[], const PetscReal b[])
 {
   PetscReal sum = 0;
@@ -166,6 +167,7 @@ static PetscReal Tail(HycoROM m)
 
   for (PetscInt j = 0; j < l; j++) {
     all += m->gamma[j] * m->gamma[j];
+    /* The last quarter: if it carries much, more modes would too. */
     if (j >= 3 * l / 4) last += m->gamma[j] * m->gamma[j];
   }
   return Quotient(last, all);
@@ -343,6 +345,7 @@ static void EvaluateFormulas(HycoROM m, const PetscReal feature[], PetscReal fac
     *own[e] = m->model->traits.uniform ? PetscMax(estimate[e], *own[e]) : estimate[e];
 }
 
+/* First everything is set to "not known", so that every early end leaves a valid prediction. */
 PetscErrorCode HycoEstimatesEvaluate(HycoROM m, HycoPrediction *p)
 {
   const HycoEstimates *t = &m->model->estimates;
@@ -366,9 +369,11 @@ PetscErrorCode HycoEstimatesEvaluate(HycoROM m, HycoPrediction *p)
   p->inconsistent = IsInconsistent(m, p->inconsistency);
   if (t->n) {
     p->unseen = Unseen(m, feature, &p->unseen_feature);
+    /* Beyond the training the estimates grow with the square of the distance in units of a usual distance between points. */
     outside = 1 + (p->beyond > 0 ? HycoEstimatesDistance(m->model->scene, m->fe->mu, nearest) / t->floor[DISTANCE] : 0);
     EvaluateFormulas(m, feature, outside * outside * PetscMin(p->unseen, MOST_FACTOR), p);
   }
+  /* Displacements that miss the gaps are wrong by at least that. */
   if (p->inconsistent && p->estimated_error_u >= 0)
     p->estimated_error_u = PetscMax(p->estimated_error_u, p->inconsistency);
   if (p->inconsistent && p->estimated_error_sigma >= 0)
@@ -383,6 +388,7 @@ static void DescribeErrors(const PetscReal error[], char text[HYCO_LINE])
            (double)error[HYCO_ESTIMATE_SIGMA], (double)error[HYCO_ESTIMATE_LAMBDA]);
 }
 
+/* Errors that were measured, of the held-out points, come before what is estimated from them. */
 PetscErrorCode HycoEstimatesView(HycoROM m, PetscViewer viewer)
 {
   const HycoEstimates *t = &m->model->estimates;

@@ -83,6 +83,7 @@ static PetscErrorCode Evaluate(Fit *f, const PetscReal x[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* TAO's vectors live here as arrays in [0, 1]^n; the array is given back after an error as well. */
 static PetscErrorCode EvaluateVec(Fit *f, Vec X)
 {
   const PetscScalar *x;
@@ -96,6 +97,8 @@ static PetscErrorCode EvaluateVec(Fit *f, Vec X)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* TAO's callback for Gauss-Newton. TAO may ask for residual and Jacobian at the same point: Evaluate() keeps the last
+   one. */
 static PetscErrorCode Residual(Tao tao, Vec X, Vec R, void *ctx)
 {
   Fit *f = (Fit *)ctx;
@@ -110,6 +113,7 @@ static PetscErrorCode Residual(Tao tao, Vec X, Vec R, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* By rows: outputs; columns: parameters in units of their ranges, so that steps in all of them are comparable. */
 static PetscErrorCode Jacobian(Tao tao, Vec X, Mat J, Mat P, void *ctx)
 {
   Fit *f = (Fit *)ctx;
@@ -136,6 +140,8 @@ static void Slope(const Fit *f, PetscReal g[])
   }
 }
 
+/* TAO's callback for limited-memory methods, with the same evaluation as Residual(), so that both types minimise one
+   function. */
 static PetscErrorCode Objective(Tao tao, Vec X, PetscReal *value, Vec G, void *ctx)
 {
   Fit *f = (Fit *)ctx;
@@ -257,10 +263,12 @@ static PetscBool IsMinimum(const Fit *f)
 
   Slope(f, g);
   for (PetscInt p = 0; p < f->n_par; p++) {
+    /* At an end of a range the slope may point outwards. */
     const PetscBool held = (PetscBool)((f->x[p] <= 0 && g[p] > 0) || (f->x[p] >= 1 && g[p] < 0));
 
     if (!held) most = PetscMax(most, PetscAbsReal(g[p]));
   }
+  /* Relative to the sizes of J and r: the same answer whatever the units of the outputs. */
   return (PetscBool)(Size(f->n, f->r) <= EXACT || most <= MINIMUM * Size(f->n * f->n_par, f->J) * Size(f->n, f->r));
 }
 
@@ -325,6 +333,7 @@ static PetscErrorCode RunAll(Fit *f, const PetscReal starts[], const char type[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The fit works on x in [0, 1]^n; mu is made from it at the end. Which starts are tried depends on the fixed sequence of samples, hence the same answer in every run. */
 PetscErrorCode HycoROMFit(HycoROM m, PetscInt n, const PetscInt output[], const PetscReal target[],
                           const PetscReal start[], PetscInt n_samples, PetscInt n_starts, const char type[],
                           PetscReal mu[], HycoFit *fit)

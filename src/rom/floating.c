@@ -29,7 +29,8 @@ PetscErrorCode HycoFloatingDestroy(HycoFloating *floating)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* f->mesh is set first, so that HycoFloatingDestroy() frees it after an error. */
+/* f->mesh is set first, so that HycoFloatingDestroy() frees it after an error. Takes over `loaded`; rigid[] and of[]
+   are copied. */
 PetscErrorCode HycoFloatingCreate(PetscInt n, const HycoRigid rigid[], PetscInt n_bodies, const PetscInt of[],
                                   HycoMesh loaded, HycoFloating *floating)
 {
@@ -48,8 +49,8 @@ PetscErrorCode HycoFloatingCreate(PetscInt n, const HycoRigid rigid[], PetscInt 
 
 enum { NUMBERS = 3 + 1 + 6 }; /* of a motion in the file: centre, size, coefficients */
 
-/* The number of motions follows from the dataset's rows (-1: not known yet). The mesh may be absent: a floating
-   body without loads. */
+/* The number of motions follows from the dataset's rows (-1: not known yet). The mesh may be absent: a floating body
+   without loads. One function reads and writes, so that the order of the datasets cannot differ. */
 PetscErrorCode HycoFloatingMove(HycoH5 h, HycoROM m)
 {
   const PetscBool reads = HycoH5Reads(h);
@@ -93,7 +94,8 @@ static PetscReal At(HycoFloating f, HycoFE fe, PetscInt j, PetscInt i, PetscInt 
   return HycoRigidAt(&f->rigid[j], fe->dim, fe->X + 3 * i, c);
 }
 
-/* work[n]: of the loads at mu. */
+/* work[n]: of the loads at mu. The balance holds at every mu, and so does the work of the loads along a rigid motion,
+   without any elastic solve. */
 static PetscErrorCode LoadWork(HycoROM m, HycoFloating f, const PetscReal mu[], PetscReal work[])
 {
   PetscReal *load;
@@ -180,7 +182,9 @@ static PetscReal Evaluate(const Dual *d, const PetscReal c[], PetscReal gradient
 #define BALANCED   1e-12 /* relative to the largest work */
 #define ACTS       1e-10 /* directions of c with less curvature, relative, are those in which no contact acts */
 
-/* Minimises the dual function from c = 0. *met: the works agree. */
+/* Minimises the dual function from c = 0. *met: the works agree. Newton's method with Armijo's line search (Nocedal
+   and Wright, Numerical Optimization, algorithm 3.1): the dual of an entropy is convex and smooth, and has no
+   constraint. */
 static PetscErrorCode Minimise(const Dual *d, PetscReal c[], PetscBool *met)
 {
   const PetscInt p = d->p;
@@ -219,6 +223,7 @@ static PetscErrorCode Minimise(const Dual *d, PetscReal c[], PetscBool *met)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Forces are multiplied by positive factors, so that open contacts stay open and none pulls. */
 PetscErrorCode HycoFloatingBalance(HycoROM m)
 {
   HycoFloating f = m->model->floating;

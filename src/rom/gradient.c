@@ -35,7 +35,8 @@ typedef struct {
   PetscBool whole_current;
 } Work;
 
-/* The state of z at mu (NULL: the data are there), as a prediction would leave it; w: NULL, or its w. */
+/* The state of z at mu (NULL: the data are there), as a prediction would leave it; w: NULL, or its w. In the order of a
+   prediction: the floating bodies' balance changes forces that the reconstruction has set. */
 static PetscErrorCode Move(Work *o, const PetscReal mu[], const PetscReal z[], PetscReal w[])
 {
   HycoROM m = o->m;
@@ -113,6 +114,7 @@ static PetscErrorCode Create(Work *o)
 
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(o->mu, m->fe->mu, m->model->scene->n_variables));
+  /* By value: a copy of the struct is all that differences overwrite. */
   o->prediction = m->prediction;
   o->remainder = m->remainder;
   o->whole_current = m->whole_current;
@@ -134,16 +136,20 @@ static PetscErrorCode Create(Work *o)
     /* Closed or undecided contacts; open ones do not change at first order. */
     if (HycoTangentMayTouch(o->z[o->p + i], o->w[0][o->p + i], o->size)) o->contact[o->k++] = i;
   }
+  /* The tangent is factored once, for all parameters. */
   PetscCall(Close(o));
   if (m->measured)
     PetscCall(PetscArraycpy(o->output, m->prediction.quantity, m->model->scene->n_quantities));
   else
     PetscCall(MoveAndMeasure(o, NULL, o->z, NULL, o->output));
+  /* Extremes are measured where they are now: a maximum's place does not move in a derivative, by the envelope
+     theorem. */
   PetscCall(HycoROMFocusOutputs(m, o->output, &o->focused));
   if (o->focused) PetscCall(MoveAndMeasure(o, NULL, o->z, NULL, o->output));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Also after an error in Create(): arrays that do not exist yet are NULL. */
 static PetscErrorCode Destroy(Work *o)
 {
   PetscFunctionBegin;
@@ -206,7 +212,8 @@ static PetscErrorCode FindTurns(Work *o, const HycoDifference *d, PetscBool *tur
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* dz along a parameter, and the outputs with fixed z. */
+/* dz along a parameter, and the outputs with fixed z. By the implicit function theorem: z moves so that the residual
+   stays 0. The residual's change along mu is a difference of three evaluations, exact up to second order. */
 static PetscErrorCode Differentiate(Work *o, Along *a)
 {
   HycoROM m = o->m;
@@ -235,7 +242,8 @@ static PetscErrorCode Differentiate(Work *o, Along *a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds to the outputs what they change along z, with the data at mu. */
+/* Adds to the outputs what they change along z, with the data at mu. The outputs change along mu with z fixed, and
+   along z with mu fixed; both together are the total derivative. */
 static PetscErrorCode Follow(Work *o, const Along *a)
 {
   const PetscInt n = o->m->model->scene->n_quantities;
@@ -301,6 +309,7 @@ static PetscErrorCode Restore(Work *o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Refusals before any work: friction and histories have derivatives of the path, not of a point. */
 static PetscErrorCode Check(HycoROM m)
 {
   PetscFunctionBegin;

@@ -18,7 +18,8 @@ static HycoBodiesSurface SurfaceOf(HycoROM m)
   return HycoBodiesSurfaceNormal(m->fe, &m->pairs, &m->rows);
 }
 
-/* HycoROMSetUpDefault() makes fe and rows, which the surface borrows. */
+/* HycoROMSetUpDefault() makes fe and rows, which the surface borrows. The solver is shared with the handle, so that its
+   options and monitors apply. */
 static PetscErrorCode SetUp(HycoROM m)
 {
   HycoBodiesSurface s;
@@ -90,6 +91,7 @@ static PetscReal Left(HycoROM m, PetscInt k, PetscReal gaps)
   return left > 0 ? PetscMax(left - rounding, 0) : PetscMin(left + rounding, 0);
 }
 
+/* Residuals relative to the largest gap and force, as full order's are, so that one tolerance serves for both. */
 void HycoBodiesMeasure(HycoROM m, HycoKKT *kkt)
 {
   const HycoBodiesWork o = (HycoBodiesWork)m->work;
@@ -100,6 +102,7 @@ void HycoBodiesMeasure(HycoROM m, HycoKKT *kkt)
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
     PetscReal sum = 0;
 
+    /* Without entries: no master is faced, or all is prescribed. */
     if (m->rows.start[k] == m->rows.start[k + 1]) continue;
     for (PetscInt j = m->rows.start[k]; j < m->rows.start[k + 1]; j++)
       sum += PetscAbsReal(m->rows.value[j] * m->U[m->rows.dof[j]]);
@@ -220,6 +223,7 @@ PetscInt HycoBodiesGrid(HycoSubstructures b, PetscInt k, PetscReal theta[])
   return n;
 }
 
+/* What a user must know to trust the model: sizes, whether anything is interpolated, and the bound if so. */
 PetscErrorCode HycoBodiesView(HycoROM m, PetscViewer viewer)
 {
   HycoSubstructures b = (HycoSubstructures)m->model->data;
@@ -244,7 +248,8 @@ PetscErrorCode HycoBodiesView(HycoROM m, PetscViewer viewer)
 }
 
 /* The traits and ops without a history; HycoBodiesTakePath() replaces both when a file or a scene has one. `data`
-   exists from the beginning, since load and training fill it. */
+   exists from the beginning, since load and training fill it. Settings: none, as there is nothing to search, so that
+   training makes one model only. */
 PetscErrorCode HycoROMCreate_Bodies(HycoROM m)
 {
   static const HycoROMTraits traits = {.title = "condensed bodies",

@@ -1,7 +1,7 @@
 /* The part of the model of bodies in the model file. */
 #include <hycobodies.h>
 
-/* Sizes, by body. */
+/* Sizes, by body. Lengths of all other datasets follow from these, which is why they are read and checked first. */
 static PetscErrorCode MoveSizes(HycoH5 h, HycoROM m, HycoSubstructures b)
 {
   PetscInt head[5] = {b->n, b->p, b->r, b->n_turns, b->n_theta};
@@ -175,7 +175,8 @@ static PetscErrorCode MoveBody(HycoH5 h, HycoSubstructures b, PetscInt k)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What is inelastic. */
+/* What is inelastic. Written and read by one function; in->fields has the responses of all bodies, samples and turns,
+   one below the other. */
 static PetscErrorCode MoveInelastic(HycoROM m, HycoH5 h)
 {
   HycoSubstructures b = (HycoSubstructures)m->model->data;
@@ -216,8 +217,8 @@ static PetscErrorCode MoveInelastic(HycoROM m, HycoH5 h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A file whose scene has a history makes this a model of paths. Sizes before theta before the probe before blocks:
-   each part's lengths come from the one before. */
+/* A file whose scene has a history makes this a model of paths. Sizes before theta before the probe before blocks: each
+   part's lengths come from the one before. Reading fills structures that are empty, writing leaves them unchanged. */
 PetscErrorCode HycoBodiesFile(HycoROM m, HycoH5 h)
 {
   HycoSubstructures b = (HycoSubstructures)m->model->data;

@@ -68,6 +68,7 @@ PetscErrorCode HycoBodiesFrictionCreate(HycoScene scene, const HycoBodiesSurface
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* In the opposite order of creation: the solver refers to the system, and the system to W and g. */
 PetscErrorCode HycoBodiesFrictionDestroy(HycoBodiesFriction *friction)
 {
   HycoBodiesFriction f = *friction;
@@ -91,7 +92,8 @@ const HycoBodiesSurface *HycoBodiesFrictionSurface(HycoBodiesFriction f)
   return &f->all;
 }
 
-/* U_old = 0 is the unloaded state, from which the first step measures slip. */
+/* U_old = 0 is the unloaded state, from which the first step measures slip. W depends on the parameters through the
+   bodies' weights and poses, but not on time. */
 PetscErrorCode HycoBodiesFrictionBegin(HycoBodiesFriction f)
 {
   PetscFunctionBegin;
@@ -147,6 +149,7 @@ static PetscErrorCode GrowRows(HycoBodiesFriction f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Called for each step, as gaps and coefficients of friction change in time. */
 PetscErrorCode HycoBodiesFrictionPrepare(HycoBodiesFriction f, HycoBodiesWork o, const PetscReal mu[])
 {
   const HycoBodiesSurface *s = &f->normal;
@@ -200,6 +203,7 @@ static PetscErrorCode Measure(HycoBodiesFriction f, const PetscReal L[], HycoKKT
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The problem on the contacts alone, with the flexibility W between them: displacements follow from L by the bodies' flexibilities. */
 PetscErrorCode HycoBodiesFrictionSolve(HycoBodiesFriction f, HycoBodiesWork o, HycoKKT *kkt, PetscInt *its,
                                        PetscBool *solved)
 {

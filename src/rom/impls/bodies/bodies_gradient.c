@@ -7,7 +7,8 @@ static HycoBodiesSurface SurfaceOf(HycoROM m)
   return HycoBodiesSurfaceNormal(m->fe, &m->pairs, &m->rows);
 }
 
-/* z NULL: the caller wants the sizes alone. */
+/* z NULL: the caller wants the sizes alone. The unknowns are the rigid motions that contact holds, then the forces of
+   all contacts, open ones included. */
 PetscErrorCode HycoBodiesUnknowns(HycoROM m, PetscInt *p, PetscInt *n, PetscReal z[])
 {
   HycoBodiesWork o = (HycoBodiesWork)m->work;

@@ -46,7 +46,8 @@ PetscErrorCode HycoBodiesForgetKept(HycoBodiesWork o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The first prediction only takes the rows; columns are worth their memory once the same rows have come twice. */
+/* The first prediction only takes the rows; columns are worth their memory once the same rows have come twice. The
+   products depend on the rows B and on nothing else that a parameter of loads or gaps changes. */
 PetscErrorCode HycoBodiesKeepRows(HycoBodiesWork o, PetscInt m)
 {
   HycoBodiesKept *kept = &o->kept;
@@ -113,6 +114,7 @@ static PetscErrorCode KeepInBody(HycoBodiesWork o, PetscInt k, PetscInt b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Contacts are made one by one as they close: those that never do cost neither time nor memory. */
 PetscErrorCode HycoBodiesKeep(HycoBodiesWork o, PetscInt n, const PetscInt contact[])
 {
   HycoBodiesKept *kept = &o->kept;
@@ -152,6 +154,7 @@ void HycoBodiesKeptRow(HycoBodiesWork o, PetscInt k, PetscInt n, const PetscInt 
   }
 }
 
+/* u -= C B^T Lambda, blended between the samples; kappa is the body's stiffness relative to that of its samples. */
 PetscErrorCode HycoBodiesKeptDisplace(HycoBodiesWork o, PetscInt m, const PetscReal Lambda[], PetscReal u[])
 {
   const HycoSubstructures b = o->bodies;

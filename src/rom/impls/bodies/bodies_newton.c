@@ -23,7 +23,8 @@
 #define VIOLATED  1e-11 /* share of the largest force or gap: less is round-off */
 #define DEPENDENT 1e-12 /* share of the diagonal of W: contacts that repeat others */
 
-/* y = beta y + factor A x of a table by rows, n x l; transposed: A^T x. */
+/* y = beta y + factor A x of a table by rows, n x l; transposed: A^T x. BLAS sees a table by rows as its transpose by
+   columns, hence the exchanged letters. */
 static PetscErrorCode Multiply(PetscBool transposed, PetscInt n, PetscInt l, const PetscReal A[], const PetscReal x[],
                                PetscReal factor, PetscReal beta, PetscReal y[])
 {
@@ -117,7 +118,8 @@ static void TakeStrains(HycoROM m, PetscInt k, const PetscReal cells[], PetscRea
   }
 }
 
-/* The column of contact k, if it is not there. */
+/* The column of contact k, if it is not there. On demand: only contacts that enter the set at some time need one, and
+   each costs a response of the bodies. */
 static PetscErrorCode Column(HycoROM m, PetscInt k)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
@@ -235,7 +237,8 @@ static PetscErrorCode FactorAll(HycoROM m, PetscBool *independent)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same contact by contact; those that depend on the ones before them leave the set. */
+/* The same contact by contact; those that depend on the ones before them leave the set. Cholesky by rows without
+   pivoting: a contact that is dependent would have a pivot of round-off, and its force would be arbitrary. */
 static PetscErrorCode FactorEach(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
@@ -361,7 +364,8 @@ PetscErrorCode HycoBodiesMoveCells(HycoROM m, const PetscReal alpha[], const Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* e += the strains of prescribed displacements. */
+/* e += the strains of prescribed displacements. The responses of training are those of unprescribed displacements: what
+   supports move is added here. */
 static void AddSupports(HycoROM m, PetscReal e[])
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
@@ -544,7 +548,7 @@ static PetscErrorCode Advance(HycoROM m, PetscReal alpha[], HycoStepAttempt *a)
 }
 
 /* Evaluates at alpha, with the tangent if there is none, or if the present one has not reduced r enough from *before,
-   which becomes the norm of r. */
+   which becomes the norm of r. A tangent costs more than several residuals: it stays as long as it contracts. */
 static PetscErrorCode EvaluateOrRenew(HycoROM m, PetscReal t0, PetscReal t1, const PetscReal alpha[], PetscReal *before,
                                       HycoStepAttempt *a)
 {
@@ -588,7 +592,8 @@ static PetscErrorCode EvaluateStep(HycoROM m, PetscReal t0, PetscReal t1, PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves r = 0 on the set; else a->why. */
+/* Solves r = 0 on the set; else a->why. Convergence is judged relative to the size of the strains, w->norm, and to a
+   floor below which all is round-off. */
 static PetscErrorCode Newton(HycoROM m, PetscReal t0, PetscReal t1, PetscReal alpha[], HycoStepAttempt *a)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;

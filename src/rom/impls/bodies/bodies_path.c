@@ -48,7 +48,8 @@ static PetscErrorCode Settle(HycoROM m, PetscReal t0, PetscReal t1, const PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* alpha and the forces of the last accepted time. */
+/* alpha and the forces of the last accepted time. U_old and L_old are those of the last accepted step, which nothing
+   has overwritten since. */
 static PetscErrorCode Retry(HycoPath p, PetscReal alpha[], PetscReal Lambda[])
 {
   const PetscScalar *old;
@@ -202,7 +203,8 @@ static PetscReal Misfit(HycoROM m, const PetscReal alpha[])
   return size > 0 ? PetscSqrtReal(rest / size) : 0;
 }
 
-/* The state of the contacts at a listed time. */
+/* The state of the contacts at a listed time. Work and number of slipping contacts are sums since the begin of the
+   path. */
 static PetscErrorCode RecordFriction(HycoROM m, HycoStep *s)
 {
   const HycoSlip *slip = HycoBodiesFrictionSlip(((HycoBodiesPath)m->work)->friction);
@@ -249,7 +251,8 @@ static PetscErrorCode Record(HycoPath p)
 
 /* -- set-up -- */
 
-/* The unknowns of the cells in fe's mesh, and back. */
+/* The unknowns of the cells in fe's mesh, and back. The laws are evaluated in few cells: their displacements are found
+   by number in the file's list, which ascends. */
 static PetscErrorCode FindUnknowns(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
@@ -372,6 +375,8 @@ static PetscErrorCode CreatePath(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The order: the surfaces before the bodies' work, which borrows them, and the points before the arrays of their
+   number. */
 static PetscErrorCode SetUp(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
@@ -413,6 +418,7 @@ static PetscErrorCode Reset(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The path itself is HycoTraceFollow(): this only resets what would carry over from another prediction. */
 static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
@@ -439,6 +445,8 @@ static PetscErrorCode Features(HycoROM m, PetscReal misfit[2])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The amplification is the factor between an error of the strains at the points and one of the fields, as found in
+   training. */
 static PetscErrorCode View(HycoROM m, PetscViewer viewer)
 {
   HycoBodiesInelastic in = ((HycoSubstructures)m->model->data)->inelastic;
@@ -454,6 +462,8 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Without unknowns, residual and expand: a path has no gradient. No estimate of its own either: those of held-out paths
+   apply. */
 PetscErrorCode HycoBodiesTakePath(HycoROM m)
 {
   static const HycoROMTraits traits = {.title = "condensed bodies",

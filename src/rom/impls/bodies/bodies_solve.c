@@ -128,7 +128,8 @@ static void Blend(PetscInt n_samples, const PetscReal weight[], PetscInt n, cons
 
 /* -- set-up -- */
 
-/* The places of the mesh's unknowns. */
+/* The places of the mesh's unknowns. loc[]: an unknown of the mesh to its place among the surfaces' unknowns, then
+   among those inside; -1: only the modes know it. */
 static PetscErrorCode FindPlaces(HycoBodiesWork o, HycoMesh m)
 {
   const HycoSubstructures b = o->bodies;
@@ -189,6 +190,8 @@ static PetscErrorCode GrowRows(HycoBodiesWork o, PetscInt room)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The probe is the small mesh of cells at which loads, stiffness and pose of each body are sampled at new
+   parameters. */
 PetscErrorCode HycoBodiesSetUp(HycoBodiesWork o, HycoSubstructures b, HycoScene scene, const HycoBodiesSurface *s,
                                HycoSolver solver)
 {
@@ -259,7 +262,9 @@ static PetscErrorCode Place(HycoBodiesWork o, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The coefficients of the loads, and the displacements that they cause without contact. */
+/* The coefficients of the loads, and the displacements that they cause without contact. Loads are combinations of those
+   of training; their coefficients follow from as many entries of the force vector (DEIM; Chaturantabut and Sorensen
+   2010), in the body's own axes. */
 static PetscErrorCode Load(HycoBodiesWork o)
 {
   const HycoSubstructures b = o->bodies;
@@ -340,7 +345,8 @@ static PetscInt BodyOf(HycoSubstructures b, PetscInt place)
   return k;
 }
 
-/* Adds an entry to the row that begins at `start`. */
+/* Adds an entry to the row that begins at `start`. A row has a few dozen entries: a linear search costs less than a
+   map. */
 static void AddEntry(HycoBodiesWork o, PetscInt start, PetscInt *end, PetscInt place, PetscReal value)
 {
   for (PetscInt j = start; j < *end; j++) {
@@ -352,7 +358,9 @@ static void AddEntry(HycoBodiesWork o, PetscInt start, PetscInt *end, PetscInt p
   o->row[(*end)++] = value;
 }
 
-/* The rows of B on the bodies' unknowns, in their axes, and the gaps that the displacements without contact leave. */
+/* The rows of B on the bodies' unknowns, in their axes, and the gaps that the displacements without contact leave.
+   Contact rows are in the axes of space, flexibilities in those of the body: B is turned by the pose, not C, which is
+   dense. */
 static PetscErrorCode TurnRows(HycoBodiesWork o, const HycoBodiesSurface *s)
 {
   const HycoSubstructures b = o->bodies;
@@ -413,6 +421,8 @@ static PetscErrorCode TakeWeights(HycoBodiesWork o, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* to = sum over the samples of weight times from: the interpolation between trained samples of a body. `stride` lies
+   between the samples. */
 void HycoBodiesBlend(HycoBodiesWork o, PetscInt k, PetscInt n, size_t stride, const PetscReal from[], PetscReal to[])
 {
   const PetscReal *w = o->weight[k];
@@ -483,7 +493,8 @@ static PetscErrorCode FindTouched(HycoBodiesWork o, Problem *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The flexibilities between the places that are touched. */
+/* The flexibilities between the places that are touched. p->C[k] is n_k x n_k for the touched places of body k, which
+   are first[k] .. first[k + 1] of p->place. */
 static PetscErrorCode Gather(HycoBodiesWork o, Problem *p)
 {
   const HycoSubstructures b = o->bodies;
@@ -579,7 +590,8 @@ static PetscErrorCode Fill(HycoBodiesWork o, Problem *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* By the solver of contact systems: another method than the active set, or if that fails, the next ones. */
+/* By the solver of contact systems: another method than the active set, or if that fails, the next ones. o->active is
+   the start; p->z receives the forces. */
 static PetscErrorCode SolveSystem(HycoBodiesWork o, Problem *p, PetscBool *solved)
 {
   HycoSystem system;
@@ -662,6 +674,7 @@ static PetscErrorCode SolveProblem(HycoBodiesWork o, Problem *p, PetscReal Lambd
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For derivatives, which need the same matrix as the solve, on the contacts that may touch. */
 PetscErrorCode HycoBodiesMatrix(HycoBodiesWork o, PetscInt n, const PetscInt contact[], PetscReal M[])
 {
   const size_t size = (size_t)(o->bodies->p + n);
@@ -677,7 +690,8 @@ PetscErrorCode HycoBodiesMatrix(HycoBodiesWork o, PetscInt n, const PetscInt con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* u = free - C f / kappa + Z x */
+/* u = free - C f / kappa + Z x. Exact for any forces: the approximation of the model is in C and in the samples' blend
+   only. */
 static PetscErrorCode Displace(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal Lambda[])
 {
   const HycoSubstructures b = o->bodies;
@@ -962,6 +976,7 @@ static PetscErrorCode AddResponses(HycoBodiesWork o, PetscInt k, PetscInt n, Pet
         x[(end - d) * own->n_samples + q] = factor * f[end] * o->weight[k][q];
     }
     PetscCall(PetscBLASIntCast((end - d) * own->n_samples, &columns));
+    /* An unknown without a force ends a run at once. */
     if (columns)
       BLASgemv_("N", &rows, &columns, &one, own->H + HycoBodiesColumn(own, 0, d, n), &rows, x, &each, &one, row, &each);
   }
@@ -991,7 +1006,8 @@ static PetscErrorCode RowsOf(HycoBodiesWork o, PetscInt k, PetscInt n, PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The modes of body k in its turns, and its unknowns inside. */
+/* The modes of body k in its turns, and its unknowns inside. The modes were trained in several turns of the body, whose
+   shares add up to its present one. */
 static PetscErrorCode ExpandBody(HycoBodiesWork o, PetscInt k, PetscReal gamma[])
 {
   const HycoSubstructures b = o->bodies;

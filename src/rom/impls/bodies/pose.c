@@ -91,8 +91,10 @@ void HycoPoseFit(PetscInt dim, PetscInt n, const PetscReal X[], const PetscReal 
   if (m.size > 0) pose->residual = PetscMax(pose->residual, m.off / m.size);
 }
 
-/* Three passes because second moments need the centres, and distances the map. Each pass reduces over ranks, so
-   that every rank makes the same pose from the same sums; a node counts once, on its owner. */
+/* Three passes because second moments need the centres, and distances the map. Each pass reduces over ranks, so that
+   every rank makes the same pose from the same sums; a node counts once, on its owner. The pose is the rotation, scale
+   and shift that fit the mapped nodes best in the least squares' sense (Umeyama 1991); its residual tells how far the
+   map is from such a motion. */
 PetscErrorCode HycoBodyPoses(HycoFOM f, PetscInt n, const PetscInt of[], const PetscReal X0[], HycoPose pose[])
 {
   const PetscInt dim = f->fe->dim, width = (PetscInt)(sizeof(Moments) / sizeof(PetscReal));

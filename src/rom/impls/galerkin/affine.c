@@ -30,6 +30,7 @@ PetscErrorCode HycoTableCreate(const PetscInt n[], PetscReal *x[], PetscInt dim,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* x[p] are allocated one by one, as counts differ by parameter. */
 PetscErrorCode HycoTableDestroy(HycoTable *table)
 {
   HycoTable t = *table;
@@ -64,6 +65,7 @@ PetscErrorCode HycoTableKeepPattern(HycoROM m, HycoTable t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The pattern is that of training: the same for all parameters, so that one evaluation fills all entries. */
 PetscErrorCode HycoTableCreateSparse(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -80,6 +82,8 @@ PetscErrorCode HycoTableCreateSparse(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Each entry of the reduced stiffness is interpolated by itself: no cell is assembled, and the cost does not depend on
+   the mesh. */
 PetscErrorCode HycoTableFill(HycoROM m, const PetscReal mu[])
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -99,6 +103,7 @@ PetscErrorCode HycoTableFill(HycoROM m, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The number of nodes says the polynomial's degree in each parameter. */
 PetscErrorCode HycoTableView(HycoROM m, PetscViewer viewer)
 {
   HycoGalerkinModel g = (HycoGalerkinModel)m->model->data;
@@ -116,6 +121,7 @@ PetscErrorCode HycoTableView(HycoROM m, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Parameters one after the other in one dataset: HDF5 has no ragged rows. */
 PetscErrorCode HycoTableSave(HycoROM m, HycoH5 h)
 {
   HycoGalerkinModel g = (HycoGalerkinModel)m->model->data;
@@ -199,6 +205,7 @@ static PetscErrorCode LoadValues(HycoROM m, HycoH5 h, PetscInt **count, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A dense table has no `start`. */
 PetscErrorCode HycoTableLoad(HycoROM m, HycoH5 h)
 {
   PetscInt *count = NULL;

@@ -17,6 +17,8 @@
 /* For a path with all of A full order, because its iterations multiply by the matrix many times. */
 #define BORDERED_MIN 300
 
+/* G minimises the weighted misfit of the modes on A's unknowns plus ridge times the square of the coefficients (Hoerl
+   and Kennard 1970), by the normal equations, which are small. */
 PetscErrorCode HycoGalerkinSetRidge(HycoROM m, PetscReal ridge)
 {
   HycoGalerkinModel g = (HycoGalerkinModel)m->model->data;
@@ -50,6 +52,7 @@ PetscErrorCode HycoGalerkinSetRidge(HycoROM m, PetscReal ridge)
     for (PetscInt j = 0; j < l; j++) g->G[j * n + k] = info ? 0 : X[k * l + j] * weight[j];
   }
   PetscCall(PetscFree3(X, N, weight));
+  /* Last: the work arrays are freed before, also if the normal equations are singular. */
   HycoCheckModel(!info || ridge > 0,
                  "-hyco_hybrid_ridge 0: the %d modes are not linearly independent on the %d unknowns of A; use -1",
                  (int)l, (int)n);
@@ -75,6 +78,7 @@ static PetscErrorCode CountUnknowns(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Dense up to the size where LAPACK's factor is faster than a sparse one. */
 static PetscErrorCode CreateReduced(PetscInt rows, PetscInt cols, PetscBool dense, PetscInt per_row, Mat *A)
 {
   PetscFunctionBegin;
@@ -91,6 +95,7 @@ static PetscErrorCode CreateReduced(PetscInt rows, PetscInt cols, PetscBool dens
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Everything whose size does not depend on parameters; the first Assemble() makes the matrices' patterns. */
 PetscErrorCode HycoGalerkinSetUp(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -109,6 +114,7 @@ PetscErrorCode HycoGalerkinSetUp(HycoROM m)
   PetscCall(g->model->table && !dense ? HycoTableCreateSparse(m) : CreateReduced(m->n, m->n, dense, 0, &g->Kr));
   PetscCall(MatCreateVecs(g->Kr, &g->x, &g->Fr));
   if (!dense && !m->model->scene->n_times) PetscCall(HycoLoadsCreate(m));
+  /* Without contact forces in the RID the problem is one linear solve. */
   if (m->n_L) {
     PetscCall(CreateReduced(m->n_L, m->n, dense, g->n_free + 15, &g->Br));
     PetscCall(CreateReduced(m->n, m->n_L, dense, g->n_free + 15, &g->Btr));
@@ -126,6 +132,7 @@ PetscErrorCode HycoGalerkinSetUp(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The current rows of B belong to the matrix that goes: current_B must not survive it. */
 PetscErrorCode HycoGalerkinReset(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -159,6 +166,7 @@ PetscErrorCode HycoGalerkinDestroy(HycoGalerkinModel g)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Only what the new parameters change; `ready` is false meanwhile, so that an error leaves nothing that looks valid. */
 static PetscErrorCode Assemble(HycoROM m, const PetscReal mu[])
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -204,7 +212,8 @@ PetscErrorCode HycoGalerkinAssemble(HycoROM m, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets gamma, and U on the nodes of fe's mesh. */
+/* Sets gamma, and U on the nodes of fe's mesh. U = u0 + V gamma, and the full-order unknowns as solved: the modes there
+   are only their continuation. */
 PetscErrorCode HycoGalerkinExpand(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -254,6 +263,7 @@ PetscErrorCode HycoGalerkinUnpack(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Seconds are measured by part: training compares settings by them. */
 PetscErrorCode HycoGalerkinSolve(HycoROM m, const PetscReal mu[])
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -282,6 +292,7 @@ PetscErrorCode HycoGalerkinSolve(HycoROM m, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Infinite, as the largest number, for a singular matrix. */
 PetscErrorCode HycoGalerkinCondition(HycoROM m, PetscReal *condition)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;

@@ -59,6 +59,7 @@ static PetscErrorCode ViewScan(HycoROM m, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A symmetric model is positive definite by construction, and needs no scan. */
 PetscErrorCode HycoGalerkinView(HycoROM m, PetscViewer viewer)
 {
   HycoGalerkinModel g = (HycoGalerkinModel)m->model->data;

@@ -23,6 +23,7 @@ PetscErrorCode HycoGalerkinUnknowns(HycoROM m, PetscInt *p, PetscInt *n, PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Vectors of the system from arrays of unknowns, by copy: the solver keeps its own. */
 static PetscErrorCode Put(PetscInt n, const PetscReal from[], Vec to)
 {
   PetscScalar *v;
@@ -34,6 +35,7 @@ static PetscErrorCode Put(PetscInt n, const PetscReal from[], Vec to)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The opposite of Put(). */
 static PetscErrorCode Take(PetscInt n, Vec from, PetscReal to[])
 {
   const PetscScalar *v;

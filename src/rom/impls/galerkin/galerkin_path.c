@@ -21,7 +21,7 @@ struct _n_HycoGalerkinPath {
   PetscBool moved;        /* the attempt's prescribed displacements are in U */
 };
 
-/* K and Kr. The first one is assembled again as in later assemblies, so that the sums have the same bits. */
+/* K and Kr. The first one is assembled again as in later assemblies, so that the sums have the same bits. Called when the path needs a new linear part. */
 static PetscErrorCode Stiffness(HycoPath p)
 {
   HycoROM m = (HycoROM)p->ctx;
@@ -236,6 +236,7 @@ static PetscErrorCode CreateLinear(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The path borrows matrices and vectors of the Galerkin work, and only adds the history's own state. */
 PetscErrorCode HycoGalerkinPathCreate(HycoROM m)
 {
   static const HycoPathOps ops = {
@@ -283,7 +284,7 @@ PetscErrorCode HycoGalerkinPathDestroy(HycoGalerkinPath *path)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* held = 0: at the path's begin no support has moved. */
+/* held = 0: at the path's begin no support has moved. The trace then holds all listed times; m shows the last one. */
 PetscErrorCode HycoGalerkinPathSolve(HycoROM m, const PetscReal mu[])
 {
   HycoGalerkinPath q = ((HycoGalerkin)m->work)->path;

@@ -21,6 +21,7 @@ struct _n_HycoLoads {
   Vec F[1 + MAX_LOADS], X[1 + MAX_LOADS], sum;
 };
 
+/* n + 1 of each: the constant part is number 0. */
 PetscErrorCode HycoLoadsDestroy(HycoLoads *loads)
 {
   HycoLoads p = *loads;
@@ -80,7 +81,8 @@ static PetscErrorCode Sum(HycoLoads p, const Vec v[], const PetscReal t[], Vec y
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The loads are affine in the parameters: 1 and each parameter's place between the ends of its range. */
+/* The loads are affine in the parameters: 1 and each parameter's place between the ends of its range. Between 0 and 1,
+   so that coefficients of different parameters are of one size. */
 static void Coordinates(HycoROM m, const PetscReal mu[], PetscReal t[])
 {
   HycoGalerkin g = (HycoGalerkin)m->work;

@@ -68,8 +68,8 @@ static PetscErrorCode SelectPairs(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The submesh has the first n nodes, so that unknowns have the same numbers in both: V, fe_dof and sets serve for
-   both. */
+/* The submesh has the first n nodes, so that unknowns have the same numbers in both: V, fe_dof and sets serve for both.
+   Cells beyond are needed by the full reconstruction only, which has the model's whole mesh. */
 PetscErrorCode HycoGalerkinCreateOwn(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -122,7 +122,8 @@ PetscErrorCode HycoGalerkinCreateSets(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A'_c, the unknowns on which B's rows act, and A_c, those of them in A. */
+/* A'_c, the unknowns on which B's rows act, and A_c, those of them in A. B's pattern follows the search of masters, so
+   this is called whenever the rows are new. */
 static PetscErrorCode CreateContactSets(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;

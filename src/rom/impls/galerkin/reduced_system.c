@@ -61,6 +61,7 @@ static PetscErrorCode DestroyContact(ContactProduct *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* V_A may be V itself: both are counted references. */
 PetscErrorCode HycoReducedDestroy(HycoReduced *reduced)
 {
   HycoReduced r = *reduced;
@@ -86,7 +87,7 @@ PetscErrorCode HycoReducedDestroy(HycoReduced *reduced)
 
 /* -- the bases -- */
 
-/* A matrix that is stored row major. */
+/* A matrix that is stored row major. PETSc's dense matrices lie by columns: the same array is the transpose. */
 static PetscErrorCode CreateRowMajor(PetscInt rows, PetscInt columns, PetscReal a[], Mat *A)
 {
   Mat At;
@@ -186,7 +187,8 @@ PetscErrorCode HycoReducedPrepare(HycoROM m)
 
 /* -- the stiffness -- */
 
-/* The unknowns of cells that a parameter changes. */
+/* The unknowns of cells that a parameter changes. Rows of K outside this set are multiplied once; for each new
+   stiffness only these are. */
 static PetscErrorCode CreateVarying(HycoROM m, IS *unknowns)
 {
   PetscInt n = 0, *dof;
@@ -275,7 +277,8 @@ static PetscErrorCode Multiply(HycoROM m, MatReuse reuse, Rows *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A row of Kr. A sparse one has its pattern from the first time on. */
+/* A row of Kr. A sparse one has its pattern from the first time on. MatSetValuesRow() skips the search for each column,
+   which is most of the time of a small insertion. */
 static PetscErrorCode PutRow(HycoROM m, PetscInt row, PetscInt n, const PetscInt column[], const PetscScalar value[])
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -288,7 +291,8 @@ static PetscErrorCode PutRow(HycoROM m, PetscInt row, PetscInt n, const PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rows of full-order unknowns, and their columns in the rows of the modes. */
+/* Rows of full-order unknowns, and their columns in the rows of the modes. F's columns are already in the order of
+   x. */
 static PetscErrorCode PutFull(HycoROM m, const Rows *s)
 {
   const PetscScalar *u;
@@ -455,6 +459,7 @@ PetscErrorCode HycoReducedFillStiffness(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Gives the array of values itself, by which a table of the stiffness is written and read. */
 PetscErrorCode HycoReducedEntries(HycoROM m, PetscInt *n, PetscScalar *a[])
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -482,6 +487,7 @@ PetscErrorCode HycoReducedEntries(HycoROM m, PetscInt *n, PetscScalar *a[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The row of each entry in the array of HycoReducedEntries(). */
 PetscErrorCode HycoReducedRows(HycoROM m, PetscInt row[])
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -506,7 +512,8 @@ PetscErrorCode HycoReducedRows(HycoROM m, PetscInt row[])
 
 /* -- the contacts -- */
 
-/* A product, or its transpose, as a matrix of the system. */
+/* A product, or its transpose, as a matrix of the system. B^T is kept as a matrix of its own: the solver multiplies by
+   both, and rows are contiguous in each. */
 static PetscErrorCode PutProduct(Mat product, PetscBool transposed, Mat to)
 {
   PetscInt rows;
@@ -610,7 +617,8 @@ PetscErrorCode HycoReducedTest(HycoROM m, const PetscScalar F[], Vec Fr)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Vbar[A,:]^T F[A] and D[A_lambda] */
+/* Vbar[A,:]^T F[A] and D[A_lambda]. The right-hand sides of the reduced system; D is taken at the contacts of A_lambda
+   only. */
 PetscErrorCode HycoReducedFillVectors(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;

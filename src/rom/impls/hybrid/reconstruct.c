@@ -77,6 +77,7 @@ static PetscErrorCode SetUp(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The weighted problem keeps a factor of S between predictions, which goes with it. */
 PetscErrorCode HycoReconstructionDestroy(HycoReconstruction *reconstruction)
 {
   HycoReconstruction r = *reconstruction;
