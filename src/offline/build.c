@@ -7,7 +7,8 @@
 #include <hycoreducerimpl.h>
 #include <string.h>
 
-/* Reads the distributed mesh, its contacts on rank 0, its sizes on all ranks. */
+/* Reads the distributed mesh, its contacts on rank 0, its sizes on all ranks. Without matrices: training makes
+   full-order models of its own for the solutions. */
 static PetscErrorCode ReadMesh(HycoReducer t)
 {
   PetscReal mu[HYCO_MAX_PARAMETERS];
@@ -71,7 +72,8 @@ static PetscErrorCode SurfacesOf(HycoReducer t, PetscBool contact[], PetscInt *n
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* 3 groups a contact: slave and master of a moved one, and every slave. */
+/* 3 groups a contact: slave and master of a moved one, and every slave. Marks the nodes of the surfaces' mesh that the
+   model's contacts have, by the same rule as CutMesh(). */
 PetscErrorCode HycoReducerMarkContacts(HycoReducer t, PetscBool contact[])
 {
   PetscInt *all, n_all;
@@ -168,6 +170,7 @@ static PetscErrorCode CutMesh(HycoReducer t, HycoMesh from, const PetscBool in[]
   PetscCall(PetscMalloc1(3 * t->scene->n_contacts + t->scene->n_loads, &all));
   PetscCall(PetscMalloc2(from->n_cells, &keep, surface->n_nodes, &extra));
   PetscCall(SurfacesOf(t, contact, &n_all, all));
+  /* Pressures act on whole groups of facets, some of which have no kept cell. */
   for (PetscInt k = 0; LoadedSurfaces(t) && k < t->scene->n_loads; k++)
     PetscCall(HycoMeshFindGroup(from, "load", t->scene->load[k].group, &all[n_all++]));
   for (PetscInt e = 0; e < from->n_cells; e++) {
@@ -195,8 +198,9 @@ static PetscErrorCode CutMesh(HycoReducer t, HycoMesh from, const PetscBool in[]
 /* Known only on a node's own rank: whether it has a cell outside Omega_A, and which of its components are fixed. */
 #define BESIDE 8
 
-/* What rank 0 must know about the RID's nodes, which other ranks own: which components are fixed, and whether a cell outside
-   the RID has the node, which is then on the interface. */
+/* What rank 0 must know about the RID's nodes, which other ranks own: which components are fixed, and whether a cell
+   outside the RID has the node, which is then on the interface. Bits: a fixed component each, and BESIDE for a cell
+   outside. */
 static PetscErrorCode FetchNotes(HycoReducer t, const PetscBool in[], PetscInt n, const PetscInt global[],
                                  PetscInt note[])
 {
@@ -265,6 +269,7 @@ static PetscErrorCode CutDomain(HycoReducer t, HycoROM m)
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(t->fom->part->n_cells, &in));
   PetscCall(FindCells(t, in));
+  /* On one rank the part is the whole mesh, which is cut without a copy in between. */
   if (t->fom->size == 1)
     PetscCall(CutMesh(t, t->fom->part, in, m, &global));
   else {
@@ -283,6 +288,8 @@ static PetscErrorCode CutDomain(HycoReducer t, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Contact forces of the training solutions; the caller frees them. Room for all columns, since the number is known at
+   the end. */
 PetscErrorCode HycoReducerDualSnapshots(HycoReducer t, PetscInt *n, PetscReal **S)
 {
   /* Columns without any force would only slow down NNMF and NNLS. */
@@ -301,6 +308,7 @@ PetscErrorCode HycoReducerDualSnapshots(HycoReducer t, PetscInt *n, PetscReal **
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Borrowed arrays, a column for each training point. */
 PetscErrorCode HycoReducerGetSolutions(HycoReducer t, PetscInt *n, const PetscReal *mu[], const PetscReal *Lambda[],
                                        const PetscReal *gamma[])
 {
@@ -312,6 +320,7 @@ PetscErrorCode HycoReducerGetSolutions(HycoReducer t, PetscInt *n, const PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Facts are numbers of one type of model, which the report lists under their names without knowing the type. */
 PetscErrorCode HycoTrainingAddFact(HycoTraining *r, const char name[], PetscReal value)
 {
   HycoFact *fact = &r->fact[r->n_facts++];
@@ -485,7 +494,8 @@ static PetscErrorCode BuildModel(HycoReducer t, PetscBool useful, HycoROM m, Hyc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rank 0: creates a model with the masters that its contacts meet. */
+/* Rank 0: creates a model with the masters that its contacts meet. The masters first: the mesh's cut keeps the surfaces
+   that they lie on. */
 static PetscErrorCode BeginOnRoot(HycoReducer t, HycoROM *model)
 {
   PetscErrorCode ierr;
@@ -610,6 +620,7 @@ PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, HycoROM *model,
   /* A refused model (a singular stiffness) is not kept; the search goes on to the next. */
   if (ierr) (void)!HycoROMDestroy(model);
   PetscCall(ierr);
+  /* Work arrays of the scan are made anew from the file's data on every rank. */
   PetscCall(HycoROMReset(*model));
   PetscCall(HycoROMBroadcast(HycoComm(t), model)); /* with the results */
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -655,6 +666,7 @@ PetscErrorCode HycoReducerOpen(HycoReducer t, HycoSamples samples, const char pa
   char folder[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBegin;
+  /* Nothing of a former training with the same handle may remain. */
   PetscCall(HycoReducerReset(t));
   t->samples = samples;
   /* The columns of bases are the training points, until types with modes of their own replace them. */
@@ -695,7 +707,8 @@ PetscErrorCode HycoReducerClose(HycoReducer t, HycoSnapshots *store)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solved points are in the store already and cost a look at their files. */
+/* Solved points are in the store already and cost a look at their files. Their time is counted apart: it is that of
+   full order, not of the reduction. */
 PetscErrorCode HycoReducerSolve(HycoReducer t, HycoSnapshots store, HycoSamples points)
 {
   const PetscReal begin = HycoNow();
@@ -723,6 +736,7 @@ static PetscInt HeldByDefault(PetscInt n)
   return PetscMin(MOST_HELD, PetscMax(LEAST_HELD, n));
 }
 
+/* Held-out points that share a stiffness come together, `together` at a time, and cost one factor. */
 static PetscErrorCode DrawHeld(HycoReducer t, PetscInt count, PetscInt together, HycoSamples *held)
 {
   PetscInt n, n_par, slow[HYCO_MAX_PARAMETERS];
@@ -730,6 +744,7 @@ static PetscErrorCode DrawHeld(HycoReducer t, PetscInt count, PetscInt together,
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->samples, &n, &n_par, NULL));
+  /* Negative: the user has not said how many. */
   if (count < 0) count = HeldByDefault(n);
   /* Rank 0 decides: points drawn must be the same everywhere. */
   if (t->rank == 0) HycoSceneReaches(t->scene, reaches);
@@ -768,6 +783,7 @@ PetscErrorCode HycoReducerHoldOut(HycoReducer t, HycoSnapshots store)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A search that can decide by few points saves their solutions; when it cannot, this draws the rest. */
 PetscErrorCode HycoReducerHoldOutMore(HycoReducer t, HycoSnapshots store)
 {
   HycoSamples more;

@@ -93,7 +93,8 @@ static PetscErrorCode Borrow(PetscInt n, const PetscInt group[], const PetscReal
 }
 
 /* Fits the formula for these errors. Those up to `least`, for example of forces without contact, contain no information
-   on their size: they come last, and only raise the bound. */
+   on their size: they come last, and only raise the bound. On logarithms: errors and features span orders of magnitude,
+   and their relation is nearly a power law there. */
 static PetscErrorCode Fit(PetscInt n, const HycoHeldOut rows[], const PetscReal error[], PetscReal least,
                           const HycoEstimates *estimates, PetscBool borrow, PetscReal law[])
 {
@@ -275,8 +276,9 @@ static PetscErrorCode NameSettings(const HycoTraining *report, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fits the formulas, and stores the errors in the model. Rank 0. Rank 0 alone has the model's online data; the
-   caller broadcasts what other ranks report. */
+/* Fits the formulas, and stores the errors in the model. Rank 0. Rank 0 alone has the model's online data; the caller
+   broadcasts what other ranks report. What it learns from are predictions, not interpolations: held-out points are in
+   no basis. */
 static PetscErrorCode Conclude(HycoReducer t, HycoSamples points, PetscInt n, HycoHeldOut rows[],
                                HycoOutputErrors outputs[], HycoROM m, HycoTraining *report)
 {
@@ -373,6 +375,7 @@ static PetscErrorCode Learn(HycoReducer t, HycoSamples points, PetscInt n, HycoH
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Errors are those of the final model, at points that did not choose it where there are such. */
 PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, HycoROM model, HycoTraining *report)
 {
   HycoHeldOut *rows = t->judged_held;

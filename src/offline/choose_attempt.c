@@ -57,6 +57,8 @@ HycoAttempt *HycoAttemptsChoose(PetscInt n, HycoAttempt attempt[])
   return chosen;
 }
 
+/* The ratio above which an attempt of this cost cannot be chosen any more: its held-out paths are then not predicted to
+   the end. */
 PetscReal HycoAttemptsLimit(PetscInt n, const HycoAttempt attempt[], PetscReal cost, PetscInt *beaten)
 {
   const HycoAttempt *by;

@@ -62,7 +62,8 @@ static PetscErrorCode FillNotes(HycoFE fe, const PetscBool near[], PetscReal val
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* These data, a column each, rows in the file's order. Collective. */
+/* These data, a column each, rows in the file's order. Collective. Volume, body and whether a cell is kept in any case,
+   as columns of a matrix, so that one gathering serves for them too. */
 static PetscErrorCode Notes(HycoReducer t, const PetscBool near[], PetscInt n_rows, Mat *X)
 {
   HycoFE fe = t->fom->fe;
@@ -173,6 +174,8 @@ static PetscErrorCode FindWeights(HycoReducer t, PetscReal fixed, PetscReal tol,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Weights by nonnegative least squares (Lawson and Hanson 1974): few positive ones, and a tangent that stays definite
+   (Hernandez, Caicedo and Ferrer 2017). */
 PetscErrorCode HycoCubatureFind(HycoReducer t, const PetscBool near[], PetscReal fixed, PetscReal tol, Mat W,
                                 PetscInt n, const PetscReal sigma[], PetscReal w[], PetscReal error[2])
 {

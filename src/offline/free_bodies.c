@@ -5,6 +5,7 @@
 #include <hycoquantities.h>
 #include <hycoreducerimpl.h>
 
+/* A mesh of the marked cells of all ranks, on rank 0. Without contact surfaces, which the balance has no use for. */
 PetscErrorCode HycoReducerGatherMesh(HycoReducer t, const PetscBool needed[], HycoMesh *mesh)
 {
   HycoMesh part = t->fom->part;
@@ -50,7 +51,8 @@ static PetscErrorCode PartsOfBodies(HycoReducer t, const HycoMotions *motions, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Orthonormal coefficients Q (n x 6) of the span of these motions. */
+/* Orthonormal coefficients Q (n x 6) of the span of these motions. Modified Gram-Schmidt; twice, as once loses
+   orthogonality for nearly parallel motions. */
 static void Span(PetscInt n, const HycoRigid rigid[], PetscReal Q[][6])
 {
   for (PetscInt k = 0; k < n; k++) {
@@ -136,7 +138,7 @@ static void KeepMotions(HycoReducer t, HycoMotions *motions, const PetscInt firs
   motions->n = kept;
 }
 
-/* With the motions found. */
+/* With the motions found. needed[] is filled on each rank for its own cells; the mesh of them is on rank 0 only. */
 static PetscErrorCode Take(HycoReducer t, HycoMotions *motions, HycoROM m)
 {
   HycoMesh part = t->fom->part, loaded = NULL;

@@ -58,7 +58,8 @@ static PetscErrorCode Start(HycoReducer t, HycoSamples start, HycoSamples *sampl
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Checks the indicator: the replayed residual for paths, the others for solutions without a history. */
+/* Checks the indicator: the replayed residual for paths, the others for solutions without a history. Here and not where
+   the option is read: the scene is known only now. */
 static PetscErrorCode CheckIndicator(HycoReducer t)
 {
   const PetscBool residual = (PetscBool)(t->greedy.indicator == HYCO_INDICATOR_RESIDUAL);
@@ -373,7 +374,7 @@ static PetscErrorCode RunLoop(HycoReducer t, Loop *loop, HycoTraining *report)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* After the loop's store is open. */
+/* After the loop's store is open. `grown` has the cells of the RID so far, which only grows. */
 static PetscErrorCode RunOn(HycoReducer t, Loop *loop, const char path[], HycoTraining *report)
 {
   PetscFunctionBegin;
@@ -386,6 +387,7 @@ static PetscErrorCode RunOn(HycoReducer t, Loop *loop, const char path[], HycoTr
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The store is closed and the set destroyed after an error too. */
 PetscErrorCode HycoReducerRunGreedy(HycoReducer t, HycoSamples start, HycoSamples training, const char path[],
                                     HycoTraining *training_report)
 {

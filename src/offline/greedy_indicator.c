@@ -72,6 +72,7 @@ PetscErrorCode HycoIndicatorCreate(HycoROM model, HycoIndicatorKind kind, PetscI
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Also half made: what does not exist is NULL. */
 PetscErrorCode HycoIndicatorDestroy(HycoIndicator *indicator)
 {
   HycoIndicator d;
@@ -126,6 +127,7 @@ static PetscErrorCode SetUp(HycoIndicator d)
   PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &d->system));
   PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &d->solver));
   PetscCall(PetscObjectSetOptions((PetscObject)d->solver, m->model->scene->options));
+  /* The scene's options: the local problem is solved as full order would be. */
   PetscCall(HycoSolverSetFromOptions(d->solver));
   PetscCall(HycoSolverSetWarmStart(d->solver, PETSC_FALSE)); /* no warm start, because the ranks share the points */
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -306,7 +308,8 @@ static PetscErrorCode EvaluateLocal(HycoIndicator d, const PetscReal mu[], HycoR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* For the last predicted path; infinite if a law has no solution. */
+/* For the last predicted path; infinite if a law has no solution. The residual on the whole mesh needs no local solve:
+   the path is replayed for it. */
 static PetscErrorCode EvaluateResidual(HycoIndicator d, HycoIndication *v)
 {
   HycoEquilibrium e;

@@ -311,6 +311,7 @@ static PetscErrorCode PredictAllPaths(Rows *r, PetscInt n, HycoHeldOut rows[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* rows[] has a place for every point; collective, as fields are compared by the ranks that have them. */
 PetscErrorCode HycoReducerPredictHeldOut(HycoReducer t, HycoSamples points, HycoROM m, HycoSnapshots store,
                                          HycoHeldOutRace *race, HycoHeldOut rows[])
 {
@@ -338,7 +339,8 @@ PetscReal HycoHeldOutForce(PetscInt n, const HycoHeldOut rows[])
   return force;
 }
 
-/* One of row->error or row->end, after division. */
+/* One of row->error or row->end, after division. Forces are divided by the larger of their own size and a share of the
+   largest of all points: where a contact just closes any error would be infinite. */
 static PetscReal Divided(const HycoHeldOut *row, HycoErrorKind kind, PetscReal force, PetscReal error)
 {
   const PetscBool forces = (PetscBool)(kind == HYCO_ERROR_LAMBDA || kind == HYCO_ERROR_LAMBDA_RID);

@@ -12,6 +12,8 @@
 #define MOST_NUMBERS 6e6  /* of their rows in the file */
 #define LEAST_SCORE  0.1
 
+/* A cell's score is the largest share of its body's stress over all samples: the cells of large stress are those whose
+   outputs matter, and get exact displacements first. */
 PetscErrorCode HycoBodiesAddScores(HycoReducer t, HycoBodiesFactor *factor, const PetscReal u[])
 {
   HycoFE fe = factor->fom->fe;
@@ -83,7 +85,8 @@ static PetscErrorCode MarkInner(HycoReducer t, HycoBodiesFactor *factor, const P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Joins more[] to in[], if there is room. Collective. */
+/* Joins more[] to in[], if there is room. Collective. in[] stays as it is if the unknowns inside would exceed their
+   number. */
 static PetscErrorCode Join(HycoReducer t, HycoBodiesFactor *factor, PetscBool in[], PetscBool more[], PetscBool inner[],
                            PetscBool *fits)
 {
@@ -139,7 +142,8 @@ static PetscErrorCode GatherAll(MPI_Comm comm, PetscInt n, const PetscInt own[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* t->seeds_cell: the cells of all ranks, ascending, at least one; in[]: those of this rank's part. Collective. */
+/* t->seeds_cell: the cells of all ranks, ascending, at least one; in[]: those of this rank's part. Collective. The same
+   list on every rank: seeds are cells of the model's mesh for all. */
 static PetscErrorCode ShareCells(HycoReducer t, HycoMesh m, PetscBool in[])
 {
   PetscInt *own, n = 0;
@@ -264,7 +268,8 @@ static PetscErrorCode AnyLeft(HycoReducer t, HycoFE fe, const PetscBool bare[], 
 }
 
 /* Leaves a node to the modes, of which a model has one at least: that which moves most. It is exact too, because its
-   modes are all of its displacements. *released: there is one. Collective. */
+   modes are all of its displacements. *released: there is one. Collective. Otherwise a small mesh could have all nodes
+   exact, and a model without any mode is none. */
 static PetscErrorCode Release(HycoReducer t, HycoBodiesFactor *factor, PetscBool inner[], PetscBool *released)
 {
   HycoMesh m = factor->fom->part;

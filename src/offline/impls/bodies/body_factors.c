@@ -18,7 +18,8 @@ static PetscBool Same(PetscInt n, const PetscReal a[], const PetscReal b[])
 
 /* -- blocks -- */
 
-/* The unknowns of each body on this rank. */
+/* The unknowns of each body on this rank. Bodies share no node, so each has a block of K of its own, which is factored
+   by itself. */
 static PetscErrorCode TakeRows(HycoReducer t, HycoBodiesFactor *factor)
 {
   HycoMesh m = factor->fom->part;
@@ -423,6 +424,7 @@ static PetscErrorCode ReduceBody(HycoSubstructures b, HycoBodiesFactor *factor, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* u: the displacements of the surfaces' unknowns under F; work: of F on the rigid motions. */
 PetscErrorCode HycoBodiesReduce(HycoSubstructures b, HycoBodiesFactor *factor, PetscInt n, const Vec F[], PetscReal u[],
                                 PetscReal work[])
 {
@@ -469,6 +471,7 @@ static PetscErrorCode ExtendBody(HycoSubstructures b, HycoBodiesFactor *factor, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* x: displacements everywhere from loads F and surface forces z, with the factors that are there. */
 PetscErrorCode HycoBodiesExtend(HycoSubstructures b, HycoBodiesFactor *factor, PetscInt n, const Vec F[],
                                 const PetscReal z[], Vec x[])
 {
@@ -550,6 +553,7 @@ PetscErrorCode HycoBodiesCondense(HycoReducer t, HycoBodiesFactor *factor, const
 
 /* -- end -- */
 
+/* Records and kept factors are lists of their own: flexibilities outlive the factors they came from. */
 static PetscErrorCode ReleaseBody(HycoBodyFactor *body)
 {
   PetscFunctionBegin;

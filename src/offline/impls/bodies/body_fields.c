@@ -77,6 +77,7 @@ static PetscErrorCode SolvePath(HycoBodiesFriction f, HycoBodiesWork o, HycoScen
     if (!*solved) break;
     PetscCall(HycoBodiesFrictionAccept(f));
     /* Another time within each quarter for each point: all times are seen, not four of them. */
+    /* Samples of forces are spread over the path. */
     if (t >= first + (last - first) * (seen + SomeShare(k)) / SEEN && seen < SEEN) {
       PetscCall(PetscArraycpy(sampled->c + sampled->n * b->r, o->c, b->r));
       PetscCall(PetscArraycpy(sampled->f + sampled->n * b->ns, o->f, b->ns));
@@ -153,7 +154,8 @@ static PetscInt PathStride(HycoReducer t)
   return 1 + (t->n_s - 1) / MOST_COLUMNS;
 }
 
-/* Adds the elastic part of the training paths: their loads and contact forces at the listed times. */
+/* Adds the elastic part of the training paths: their loads and contact forces at the listed times. Their forces are the
+   very ones that predictions will have. */
 static PetscErrorCode TakePaths(HycoReducer t, HycoBodiesWork o, const HycoBodiesSurface *s, PetscInt every,
                                 Sampled *sampled)
 {
@@ -177,7 +179,7 @@ static PetscErrorCode TakePaths(HycoReducer t, HycoBodiesWork o, const HycoBodie
 }
 
 /* Rank 0. Online code on the surfaces' mesh, which rank 0 alone has: the samples are those that a prediction would
-   find. The work is freed before an error returns. */
+   find. The work is freed before an error returns. The contact problem on the surfaces alone is far cheaper than one of full order: there can be many samples. */
 static PetscErrorCode SampleForces(HycoReducer t, HycoFOM f, HycoSamples points, Sampled *sampled)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
@@ -420,7 +422,8 @@ static void TurnField(HycoReducer t, const HycoBodiesFactor *factor, PetscInt bo
   }
 }
 
-/* An empty dense matrix with n columns in the file's order. */
+/* An empty dense matrix with n columns in the file's order. As the snapshots' matrices, so that POD and rows of V are
+   the same functions for both. */
 static PetscErrorCode CreateColumns(HycoReducer t, HycoFOM f, PetscInt n, Mat *S)
 {
   const PetscInt dim = t->sizes[3];
@@ -575,7 +578,8 @@ static PetscErrorCode Squares(HycoFOM f, PetscInt n, const PetscReal U[], PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* b->left at the checks. A turned field is the sum of q_j G_j u with |q|^2 = dim. Collective. */
+/* b->left at the checks. A turned field is the sum of q_j G_j u with |q|^2 = dim. Collective. What the modes miss at
+   samples that they were not made of; it is the model's own estimate of its displacements. */
 static PetscErrorCode MeasureLeft(HycoReducer t, HycoBodiesFactor *factor, const Sampled *sampled, Mat V)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
@@ -650,7 +654,7 @@ static PetscErrorCode TurnMode(HycoReducer t, const HycoBodiesFactor *factor, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* v = 1 at an unknown, else 0. */
+/* v = 1 at an unknown, else 0. The right-hand side by which a row of K^-1 is obtained. */
 static PetscErrorCode SetUnit(PetscInt row, Vec v)
 {
   PetscInt lo, hi;
@@ -866,7 +870,8 @@ static PetscErrorCode ModesOf(HycoReducer t, HycoBodiesFactor *factor, PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Samples are doubled until the modes are few beside them and miss little. Only the last V and sigma survive. */
+/* Samples are doubled until the modes are few beside them and miss little. Only the last V and sigma survive. sampled
+   keeps what earlier rounds have found: doubling adds to it. */
 PetscErrorCode HycoBodiesFields(HycoReducer t, HycoSnapshots store, HycoBodiesFactor *factor)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;

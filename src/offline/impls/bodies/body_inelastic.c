@@ -259,7 +259,8 @@ static PetscErrorCode TakeValues(const Unknowns *at, Vec x, PetscInt k, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* x = K^-1 F; the surfaces' displacements u. Collective. */
+/* x = K^-1 F; the surfaces' displacements u. Collective. F: inelastic forces of one mode. The rigid motions' work is
+   not needed: such forces are self-equilibrated. */
 static PetscErrorCode Displace(HycoSubstructures b, HycoBodiesFactor *factor, Vec F, PetscReal u[], Vec *x)
 {
   PetscReal *work;
@@ -299,7 +300,8 @@ static PetscErrorCode ForceOfMode(HycoReducer t, HycoFOM f, PetscInt k, Vec F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The responses to the modes: P and the fields; work[m x m]: of the modes on these, Q^T K^-1 Q. Collective. */
+/* The responses to the modes: P and the fields; work[m x m]: of the modes on these, Q^T K^-1 Q. Collective. One solve
+   for each mode; every later path combines these. */
 static PetscErrorCode Respond(HycoReducer t, HycoBodiesFactor *factor, PetscReal u[], PetscReal work[])
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
@@ -658,7 +660,8 @@ static PetscErrorCode FillPoints(HycoReducer t, const Unknowns *at, const PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The points and their cells' rows for forces, loads and modes. weight: of the cubature, NULL: interpolation. Collective. */
+/* The points and their cells' rows for forces, loads and modes. weight: of the cubature, NULL: interpolation.
+   Collective. nd unknowns of the cells with laws, the same list on all ranks, each row filled by the owner. */
 static PetscErrorCode FillCells(HycoReducer t, HycoBodiesFactor *factor, const PetscReal weight[], PetscReal u[])
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;

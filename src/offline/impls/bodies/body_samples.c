@@ -12,7 +12,8 @@
 #define HOPELESS    0.3 /* e above which the model is refused */
 #define ITERATIONS  30  /* of the power method */
 
-/* Node k of n along parameter p, in its own variable. */
+/* Node k of n along parameter p, in its own variable. Chebyshev points of the second kind (extrema), nested when their
+   number n goes to 2 n - 1: former samples stay. Ends exactly, without round-off. */
 static PetscReal Node(HycoReducer t, HycoSubstructures b, PetscInt p, PetscInt n, PetscInt k)
 {
   const PetscReal share = (1 - PetscCosReal(PETSC_PI * ((PetscReal)k / (PetscReal)(n - 1)))) / 2;
@@ -131,7 +132,8 @@ static PetscErrorCode Factor(PetscInt n, PetscReal C[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The largest |eigenvalue| of (D, C), D symmetric, from the factor L of C (both n x n). */
+/* The largest |eigenvalue| of (D, C), D symmetric, from the factor L of C (both n x n). Power iteration on L^-1 D L^-T,
+   symmetric, whose |eigenvalues| are those of the pencil; a few digits are enough for a bound. */
 static PetscErrorCode Largest(PetscInt n, const PetscReal L[], const PetscReal D[], PetscReal *largest)
 {
   PetscBLASInt m, one = 1;
@@ -221,7 +223,8 @@ static PetscErrorCode Bound(HycoSubstructures b, const PetscReal mu[], const Hyc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* e along axis p: at two nodes of the next finer grid, with the other parameters at a middle node. Collective. */
+/* e along axis p: at two nodes of the next finer grid, with the other parameters at a middle node. Collective. The
+   finer grid's next nodes are those where interpolation is worst, and are samples themselves if the axis is refined. */
 static PetscErrorCode BoundAlong(HycoReducer t, HycoBodiesFactor *factor, PetscInt axis, PetscReal *e)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;

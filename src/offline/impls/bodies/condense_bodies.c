@@ -357,7 +357,8 @@ static PetscErrorCode ChooseVariable(HycoReducer t, const PetscReal mu[], PetscI
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The parameters theta, and which bodies each changes, with values enough to begin with. Collective. */
+/* The parameters theta, and which bodies each changes, with values enough to begin with. Collective. theta: parameters
+   that change a body's shape or its ratio of moduli; all others are exact without any sample. */
 static PetscErrorCode TakeTheta(HycoReducer t, HycoSubstructures b)
 {
   const HycoBodyParts *parts = &HycoTrainingOfBodies(t)->parts;

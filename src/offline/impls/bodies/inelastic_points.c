@@ -121,6 +121,7 @@ static PetscErrorCode CreateSampler(HycoReducer t, HycoSnapshots store, Sampler 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Each path is replayed once with the laws, since snapshots keep displacements and no strains. */
 static PetscErrorCode FollowAll(Sampler *s, HycoSnapshots store, PetscReal tol, HycoPathModes *modes)
 {
   PetscInt n;
@@ -138,6 +139,7 @@ static PetscErrorCode FollowAll(Sampler *s, HycoSnapshots store, PetscReal tol, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Modes of sqrt(w) s at all points: their Euclidean product is then the integral. */
 PetscErrorCode HycoPointsSample(HycoReducer t, HycoSnapshots store, PetscReal tol, HycoBasis *basis)
 {
   HycoPathModes modes = {0};
@@ -160,6 +162,7 @@ PetscErrorCode HycoPointsSample(HycoReducer t, HycoSnapshots store, PetscReal to
 
 /* -- modes on the part -- */
 
+/* From the file's rows to the part's cells. */
 PetscErrorCode HycoPointsMode(HycoReducer t, const HycoBasis *modes, PetscInt k, PetscReal value[])
 {
   const PetscScalar *rows;
@@ -173,6 +176,7 @@ PetscErrorCode HycoPointsMode(HycoReducer t, const HycoBasis *modes, PetscInt k,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Adds to force[], the nodal forces of a cell under stresses that are given at its points. */
 PetscErrorCode HycoPointsCellForce(HycoFE fe, PetscInt e, const PetscReal value[], PetscReal force[])
 {
   const PetscInt n = fe->mesh->nv * fe->dim, nq = HycoElementGet(fe->mesh->type)->nq, ns = fe->n_sigma;
@@ -228,8 +232,9 @@ static PetscErrorCode ZeroPoints(Mat V, PetscInt n, PetscInt count, const PetscI
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Q-DEIM on what is left, round after round: each round gives up to l further points, so that the system at the
-   points is overdetermined and noise is averaged. */
+/* Q-DEIM on what is left, round after round: each round gives up to l further points, so that the system at the points
+   is overdetermined and noise is averaged. Q-DEIM (Drmac and Gugercin 2016): pivots of a QR factorisation with column
+   exchange of V^T. */
 PetscErrorCode HycoPointsChoose(const HycoBasis *modes, PetscInt n, PetscInt rounds, PetscInt *count, PetscInt point[])
 {
   PetscInt found = 1;
@@ -253,6 +258,8 @@ PetscErrorCode HycoPointsChoose(const HycoBasis *modes, PetscInt n, PetscInt rou
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* P = pseudoinverse of the modes at the chosen points, by which coefficients follow from the laws there; 1 / smallest
+   singular value is the amplification of their errors. */
 PetscErrorCode HycoPointsInverse(const HycoBasis *modes, PetscInt n, PetscInt count, const PetscInt point[],
                                  PetscReal P[], PetscReal there[], PetscReal *smallest)
 {

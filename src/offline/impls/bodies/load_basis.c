@@ -14,7 +14,8 @@
 #define POINTS(p, q) (12 + 8 * (p) + 24 * (q))
 #define MORE         8 /* further points */
 
-/* F at mu in the bodies' axes, 0 where fixed. Collective. */
+/* F at mu in the bodies' axes, 0 where fixed. Collective. In the body's axes a load that moves with the body does not
+   change, and needs one vector only. */
 static PetscErrorCode TurnedLoad(HycoReducer t, HycoFOM f, const PetscReal X0[], const PetscReal mu[], HycoPose pose[],
                                  Vec F)
 {
@@ -201,7 +202,7 @@ static PetscErrorCode SurveyPoints(HycoReducer t, HycoBodiesFactor *factor, Surv
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Puts the turns of all bodies one after the other. */
+/* Puts the turns of all bodies one after the other. G: 9 numbers a turn, up to 9 turns a body, as a rotation has. */
 static PetscErrorCode TakeTurns(HycoSubstructures b, const Survey *s)
 {
   PetscFunctionBegin;
