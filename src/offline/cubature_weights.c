@@ -174,8 +174,7 @@ static PetscErrorCode FindWeights(HycoReducer t, PetscReal fixed, PetscReal tol,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Weights by nonnegative least squares (Lawson and Hanson 1974): few positive ones, and a tangent that stays definite
-   (Hernandez, Caicedo and Ferrer 2017). */
+/* Weights by nonnegative least squares (Lawson and Hanson 1974): few positive ones, and a tangent that stays definite (ECSW; Farhat et al. 2014). */
 PetscErrorCode HycoCubatureFind(HycoReducer t, const PetscBool near[], PetscReal fixed, PetscReal tol, Mat W,
                                 PetscInt n, const PetscReal sigma[], PetscReal w[], PetscReal error[2])
 {

@@ -146,6 +146,7 @@ static PetscErrorCode Race(HycoReducer t, HycoROM m, PetscInt n, const PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* m->reconstruct is off: forces outside the RID are not judged, and cost more than the solve. */
 PetscErrorCode HycoReducerJudgeRace(HycoReducer t, HycoROM m, const HycoJudged best[], PetscReal most,
                                     HycoJudged judged[], PetscReal *u, PetscBool *lost)
 {
@@ -230,6 +231,7 @@ static PetscInt NameUnsolved(HycoReducer t, PetscInt n, const PetscReal mu[], ch
   for (PetscInt k = 0; k < n && named < NAMED; k++) {
     char at[HYCO_LINE], when[64] = "";
 
+    /* Only the first NAMED are named; the message has one line. */
     if (t->judged[k].solved) continue;
     /* Parameters by name: the point can be repeated by the command line. */
     HycoSceneNamePoint(t->scene, mu + k * t->scene->n_parameters, at);
@@ -242,6 +244,7 @@ static PetscInt NameUnsolved(HycoReducer t, PetscInt n, const PetscReal mu[], ch
   return missing;
 }
 
+/* Ends a message: which training points made the model be refused. */
 void HycoReducerNameWorst(HycoReducer t, char text[HYCO_LINE])
 {
   PetscInt n, n_par, worst = -1, missing;

@@ -254,6 +254,7 @@ static PetscErrorCode JudgeOnRoot(Outputs *o, const HycoHeldOut rows[], HycoOutp
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Outputs of the stored fields are measured by the code that measures predictions: both have the same definition. */
 PetscErrorCode HycoReducerJudgeOutputs(HycoReducer t, HycoSamples points, HycoROM m, HycoSnapshots store,
                                        const HycoHeldOut rows[], HycoOutputErrors errors[])
 {

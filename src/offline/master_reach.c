@@ -118,6 +118,8 @@ static PetscReal LongestEdge(HycoMesh m, PetscInt group)
   return longest;
 }
 
+/* The farthest way over which a contact with a force has come, with a margin: masters beyond it cannot be met by one
+   that closes. */
 PetscErrorCode HycoMetReach(HycoScene scene, HycoMesh whole, const HycoPairs *pairs, PetscInt n, const PetscReal mu[],
                             const PetscReal Lambda[], PetscReal reach[])
 {
@@ -161,7 +163,8 @@ typedef struct {
   PetscInt n_nodes, room_nodes, *node;
 } Lists;
 
-/* Adds the contacts' current masters; *grown counts the new ones. */
+/* Adds the contacts' current masters; *grown counts the new ones. l->head[k] begins the list of contact k, newest
+   first; nodes of all lists are in one array. */
 static PetscErrorCode Note(const HycoPairs *p, Lists *l, PetscInt *grown)
 {
   PetscFunctionBegin;
@@ -223,7 +226,8 @@ static PetscBool Moves(HycoScene scene, PetscInt p)
 }
 
 /* Adds points of the ranges, in the parameters that move something; the others as in mu. A Halton sequence in the
-   parameters that move bodies; it ends when FRUITLESS points give no new master. */
+   parameters that move bodies; it ends when FRUITLESS points give no new master. HycoHalton() (Halton 1960) fills the
+   ranges evenly for any number of points. */
 static PetscErrorCode NoteBetween(Surfaces *s, HycoScene scene, const PetscReal mu[], Lists *l)
 {
   const PetscInt n_par = scene->n_parameters;

@@ -100,7 +100,7 @@ PetscErrorCode HycoReducerGetDisplacements(HycoReducer t, HycoSnapshots store, M
 }
 
 /* Without the lifting modes vanish where displacements are fixed, so that U = r(u0) + V gamma meets any prescribed
-   values (30). */
+   values (30). By the file's rows, in which modes and DEIM points are numbered. */
 PetscErrorCode HycoReducerReadField(HycoReducer t, HycoSnapshots store, PetscInt kind, PetscInt first, PetscInt n,
                                     Mat *S)
 {
@@ -119,6 +119,7 @@ static PetscErrorCode Points(HycoReducer t, Mat V, PetscInt index[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One place for all PODs, so that the options hold for each of them. */
 PetscErrorCode HycoReducerCreateSVD(HycoReducer t, MPI_Comm comm, SVD *svd)
 {
   const char *prefix;
@@ -133,6 +134,7 @@ PetscErrorCode HycoReducerCreateSVD(HycoReducer t, MPI_Comm comm, SVD *svd)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* V's columns are orthonormal; singular values below the noise are left out, whatever tol is. */
 PetscErrorCode HycoReducerPOD(HycoReducer t, Mat S, PetscReal tol, PetscInt max_modes, Mat *V, PetscInt *l,
                               PetscReal sigma[])
 {
@@ -239,6 +241,7 @@ PetscReal HycoPathScale(PetscReal first, PetscReal largest)
   return largest / PetscMax(first, slight * largest);
 }
 
+/* A path is compressed to modes times singular values: their Gram matrix is that of the path, up to tol. */
 PetscErrorCode HycoPathModesAdd(HycoReducer t, Mat path, PetscReal tol, HycoPathModes *modes)
 {
   PetscReal *sigma;
@@ -310,6 +313,7 @@ static PetscErrorCode JoinPaths(HycoReducer t, const HycoPathModes *modes, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Room for the larger of both numbers. */
 PetscErrorCode HycoReducerTakeBasis(HycoReducer t, Mat S, PetscReal tol, PetscInt most, HycoBasis *basis)
 {
   PetscInt N, n;
@@ -336,6 +340,7 @@ PetscErrorCode HycoPathModesJoin(HycoReducer t, HycoPathModes *modes, PetscInt N
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Displacements between the listed times enrich the modes at no further solve. */
 PetscErrorCode HycoReducerReadPath(HycoReducer t, HycoSnapshots store, PetscInt kind, PetscInt j, Mat *path)
 {
   PetscInt n_par, N, n_rows;
@@ -419,6 +424,7 @@ static PetscErrorCode CutBasis(HycoReducer t, PetscInt kind, Mat *V, PetscInt *l
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rows of S at the nodes, by column; on the other ranks rows is empty. */
 PetscErrorCode HycoReducerFetchRows(HycoReducer t, Mat S, PetscInt n_columns, PetscInt n, const PetscInt node[],
                                     PetscReal rows[])
 {
@@ -469,6 +475,7 @@ static PetscErrorCode FetchBatch(HycoReducer t, PetscInt first, Mat S, void *ctx
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* In batches, so that no more than one batch of whole fields is in memory. */
 PetscErrorCode HycoReducerFetchSnapshots(HycoReducer t, PetscInt n, const PetscInt node[], PetscReal **rows)
 {
   const PetscInt n_rows = t->rank ? 0 : n * t->sizes[3];
@@ -609,6 +616,7 @@ static PetscErrorCode SetForces(HycoReducer t, PetscInt k, Mat R)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Columns of length 1, zero where fixed; a column of zeros stays zero. */
 PetscErrorCode HycoReducerUnitRows(HycoReducer t, Mat X, Mat *scaled)
 {
   HycoMesh part = t->fom->part;
@@ -646,6 +654,7 @@ PetscErrorCode HycoReducerUnitRows(HycoReducer t, Mat X, Mat *scaled)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The supremizer of a force is the displacement on which it does most work in the H1 norm: M^-1 B^T Lambda. */
 PetscErrorCode HycoReducerSupremizers(HycoReducer t, Mat *forces, Mat *supremizers)
 {
   HycoFOM f = t->fom;

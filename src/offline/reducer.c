@@ -6,6 +6,7 @@
 
 const char *const HycoHybrids[] = {"auto", "rank", "contact", "all", NULL};
 
+/* Defaults of a program without options; HycoReducerSetFromOptions() changes them. */
 static PetscErrorCode Create(MPI_Comm comm, HycoReducer *reducer)
 {
   HycoReducer t;
@@ -41,6 +42,7 @@ static PetscErrorCode EndTraining(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The prototype is an empty model: its traits answer what the type can do. */
 PetscErrorCode HycoReducerSetType(HycoReducer t, HycoROMType name)
 {
   PetscBool same = PETSC_FALSE;
@@ -125,6 +127,7 @@ PetscErrorCode HycoReducerResetBases(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Also half made: each part is NULL until it is. */
 PetscErrorCode HycoReducerDestroy(HycoReducer *reducer)
 {
   HycoReducer t;
@@ -185,6 +188,7 @@ PetscErrorCode HycoReducerGetTargets(HycoReducer t, PetscReal target[], PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A budget below 0: as many solutions may be added as there are at first. */
 PetscErrorCode HycoReducerSetTargets(HycoReducer t, const PetscReal target[], PetscInt budget)
 {
   PetscFunctionBegin;
@@ -204,6 +208,7 @@ HycoDefineMethod(HycoReducerSetGreedyMonitor, (HycoReducer t, HycoGreedyMonitor 
 HycoDefineMethod(HycoReducerSetGreedyIndicator, (HycoReducer t, HycoIndicatorKind kind), t, HYCO_REDUCER_CLASSID,
                  t->greedy.indicator = kind)
 
+/* 0: no limit. Both limits are checked after an iteration, so that a model is always complete. */
 PetscErrorCode HycoReducerSetGreedyStop(HycoReducer t, PetscReal target, PetscInt max_snapshots, PetscReal max_seconds)
 {
   PetscFunctionBegin;
@@ -515,6 +520,7 @@ PetscErrorCode HycoReducerTries(HycoReducer t, const char types[], PetscBool *tr
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* As the search's lines describe settings, so that both can be compared. */
 PetscErrorCode HycoReducerView(HycoReducer t, PetscViewer viewer)
 {
   HycoReducerSettings settings;
@@ -532,6 +538,7 @@ PetscErrorCode HycoReducerView(HycoReducer t, PetscViewer viewer)
 
 HycoDefineViewFromOptions(HycoReducer, HYCO_REDUCER_CLASSID)
 
+/* Cut at `length`: such texts are parts of one line. */
 void HycoReducerSettingsDescribe(const HycoReducerSettings *r, size_t length, char text[])
 {
   const char *kind = HycoHybrids[r->hybrid];
@@ -551,6 +558,7 @@ void HycoReducerSettingsDescribe(const HycoReducerSettings *r, size_t length, ch
              r->plane ? r->plane : "");
 }
 
+/* r borrows the type's name. */
 void HycoReducerGetSettings(HycoReducer t, HycoReducerSettings *r)
 {
   *r = (HycoReducerSettings){.type = t->prototype->model->type,

@@ -17,6 +17,7 @@ typedef struct {
   PetscSF to_part, to_surface;
 } Rid;
 
+/* The label is the result, and not destroyed. */
 static PetscErrorCode RidDestroy(Rid *r)
 {
   PetscFunctionBegin;
@@ -458,6 +459,7 @@ PetscErrorCode HycoRIDBuild(HycoFOM f, const HycoPairs *pairs, const HycoRIDSett
   PetscCallMPI(MPI_Bcast(&n_rows, 1, MPIU_INT, 0, HycoComm(f)));
   PetscCall(RidCreate(f, &r));
   HycoOnEach(HycoComm(f), AddRegions(&r, settings));
+  /* exact: the cells are chosen by a cubature or by bodies, and nothing is added. */
   if (!settings->whole && !settings->exact) {
     PetscCall(AddSupports(&r, settings));
     if (settings->extension > 0) PetscCall(ExtendContact(&r, pairs, settings->extension));

@@ -43,6 +43,7 @@ static PetscBool Alike(HycoScene s, const PetscBool reaches[], const PetscReal a
   return PETSC_TRUE;
 }
 
+/* Factors, not solves, are what full order costs. */
 PetscErrorCode HycoReducerCountStiffnesses(HycoReducer t, HycoSamples samples, PetscBool in_order, PetscInt *count)
 {
   PetscBool reaches[HYCO_MAX_PARAMETERS];
@@ -64,6 +65,7 @@ PetscErrorCode HycoReducerCountStiffnesses(HycoReducer t, HycoSamples samples, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The measure of the search's budget: what the solutions cost by the same estimate as the attempts. */
 PetscErrorCode HycoReducerSolutionsWork(HycoReducer t, PetscReal *work)
 {
   const PetscReal dim = t->sizes[3],

@@ -302,7 +302,8 @@ static PetscErrorCode Reduce(Search *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The sizes and the cost of an attempt's model. */
+/* The sizes and the cost of an attempt's model. Sizes of the built model, on which its cost depends; seconds are
+   measured later, if it is judged. */
 static void TakeSizes(HycoReducer t, const HycoTraining *report, HycoAttempt *a)
 {
   a->n_modes = report->n_modes;
@@ -635,6 +636,7 @@ static PetscErrorCode FindPlane(HycoReducer t, PetscInt *plane)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Only for paths in 3D. */
 PetscErrorCode HycoReducerFindPlane(HycoReducer t, const char **group)
 {
   PetscInt plane = -1;
@@ -673,7 +675,8 @@ static PetscErrorCode TryPlanes(Search *s, const HycoROM type, PetscBool *met)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Tries all of A full order, if "auto" keeps the contacts' displacements and is not accurate enough. */
+/* Tries all of A full order, if "auto" keeps the contacts' displacements and is not accurate enough. In the order of
+   cost, so that the dearer ones are not tried if a cheaper one is enough. */
 static PetscErrorCode TryHybrids(Search *s, const HycoROM type)
 {
   PetscBool met = PETSC_FALSE;
@@ -806,6 +809,7 @@ static PetscErrorCode Wants(Search *s, const HycoROM type, PetscBool *wanted)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* `own`: the types with modes of their own, or the others. */
 static PetscErrorCode TryType(Search *s, const char name[], PetscBool own)
 {
   const PetscReal budget = s->budget, spent = s->spent;
@@ -1066,7 +1070,8 @@ static PetscErrorCode BeginGrown(Search *s, HycoSamples *grown)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Trains on these points from now on; solves those that are not solved. */
+/* Trains on these points from now on; solves those that are not solved. Bases are of the former set, hence not
+   reduced. */
 static PetscErrorCode TrainOn(Search *s, HycoSamples grown)
 {
   HycoReducer t = s->t;
@@ -1269,6 +1274,8 @@ static PetscErrorCode Conclude(Search *s, HycoROM *model, HycoSamples *grown, Hy
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rounds() tries settings and adds solutions until the targets are met; Conclude() builds the best and judges it at
+   fresh points. */
 static PetscErrorCode Learn(Search *s, HycoROM *model, HycoSamples *grown, HycoTraining *report)
 {
   HycoReducer t = s->t;
@@ -1292,6 +1299,7 @@ static PetscErrorCode Learn(Search *s, HycoROM *model, HycoSamples *grown, HycoT
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Destroys what the search has allocated also after an error; model and grown set are the caller's. */
 PetscErrorCode HycoReducerLearn(HycoReducer t, HycoSnapshots store, HycoROM *model, HycoSamples *grown,
                                 HycoTraining *report)
 {

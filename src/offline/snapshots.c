@@ -69,6 +69,7 @@ static PetscErrorCode CloseSample(HycoSnapshots s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A file of a sample may be open: it is kept open between reads of its fields. */
 PetscErrorCode HycoSnapshotsDestroy(HycoSnapshots *snapshots)
 {
   PetscFunctionBegin;
@@ -656,6 +657,7 @@ PetscErrorCode HycoSnapshotsGetRows(HycoSnapshots s, HycoSamples samples, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A column for each sample and listed time; each rank reads its own rows of every file. */
 PetscErrorCode HycoSnapshotsGetField(HycoSnapshots s, HycoSamples samples, PetscInt first, PetscInt n,
                                      const char field[], PetscInt block, Mat *S)
 {
@@ -712,7 +714,8 @@ static PetscErrorCode ReadBetween(HycoSnapshots s, const PetscReal mu[], PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rank 0 counts, so that all ranks create the same matrix; each reads its rows. */
+/* Rank 0 counts, so that all ranks create the same matrix; each reads its rows. Steps between listed times, without
+   those at them, which HycoSnapshotsGetField() reads. */
 PetscErrorCode HycoSnapshotsGetBetween(HycoSnapshots s, const PetscReal mu[], PetscInt rows, PetscInt total, Mat *U)
 {
   PetscInt n = 0, lo, hi, lda;
@@ -732,6 +735,7 @@ PetscErrorCode HycoSnapshotsGetBetween(HycoSnapshots s, const PetscReal mu[], Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* k: the listed time, 0 without a history. */
 PetscErrorCode HycoSnapshotsReadRows(HycoSnapshots s, const PetscReal mu[], PetscInt k, const char field[],
                                      PetscInt first, PetscInt n, PetscReal value[])
 {
@@ -745,6 +749,7 @@ PetscErrorCode HycoSnapshotsReadRows(HycoSnapshots s, const PetscReal mu[], Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Files of earlier versions lack fields that were added since. */
 PetscErrorCode HycoSnapshotsHas(HycoSnapshots s, const PetscReal mu[], PetscInt k, const char field[], PetscBool *has)
 {
   char name[HYCO_LINE];
@@ -757,6 +762,7 @@ PetscErrorCode HycoSnapshotsHas(HycoSnapshots s, const PetscReal mu[], PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The times of full order's steps; the caller frees them. -1: their number is the file's. */
 PetscErrorCode HycoSnapshotsReadTaken(HycoSnapshots s, const PetscReal mu[], PetscInt *n, PetscReal **taken)
 {
   HycoH5 h;

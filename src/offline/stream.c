@@ -102,7 +102,8 @@ static PetscErrorCode MergePoints(Stream *s, HycoSnapshots store)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads the modes of path j. */
+/* Reads the modes of path j. CheckRoom() fails where a single path does not fit into the memory that the user
+   allows. */
 static PetscErrorCode ReadModes(const Stream *s, HycoSnapshots store, PetscReal tol, PetscInt j, HycoPathModes *modes)
 {
   PetscInt n;
@@ -160,6 +161,7 @@ static PetscErrorCode EndStream(Stream *s, PetscReal tol, PetscInt most)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Incremental SVD: the modes so far and a new batch are merged by the SVD of both side by side (Brand 2006). */
 PetscErrorCode HycoReducerStreamBasis(HycoReducer t, HycoSnapshots store, PetscInt kind, PetscReal tol, PetscInt most)
 {
   Stream s = {.t = t, .kind = kind};

@@ -1,6 +1,8 @@
 /* Replay of the laws along the training paths: gives stress and state at each listed time. */
 #include <hycoreducerimpl.h>
 
+/* column -1: no displacement has been read. The callbacks say where displacements come from and what is taken at each
+   step. */
 PetscErrorCode HycoTrainingReplayCreate(HycoReducer t, PetscErrorCode (*displacement)(void *, PetscInt, PetscReal[]),
                                         PetscErrorCode (*record)(void *, PetscInt), void *ctx, HycoTrainingReplay *r)
 {
@@ -86,6 +88,7 @@ static PetscErrorCode Follow(HycoTrainingReplay *r, PetscInt k, const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* In full order's own steps, so that states are those of the solutions. */
 PetscErrorCode HycoTrainingReplayFollow(HycoTrainingReplay *r, HycoSnapshots store, PetscInt k)
 {
   HycoReducer t = r->t;

@@ -365,8 +365,9 @@ static PetscErrorCode TakeProbe(HycoSubstructures b, const PetscInt point[], con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Gathers the cells around the points and the bodies' largest. Collective. The cells around each DEIM point (F of
-   an unknown sums over them), with facets for pressures, and one cell of each body for its pose and modulus. */
+/* Gathers the cells around the points and the bodies' largest. Collective. The cells around each DEIM point (F of an
+   unknown sums over them), with facets for pressures, and one cell of each body for its pose and modulus. The model
+   carries this small mesh: loads and poses at new parameters follow from its nodes alone. */
 static PetscErrorCode GatherProbe(HycoReducer t, HycoBodiesFactor *factor, const PetscInt point[])
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;

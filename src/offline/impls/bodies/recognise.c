@@ -171,8 +171,9 @@ static PetscErrorCode Sums(Compared *c, PetscReal sum[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The largest entry of K(mu) Q v - kappa Q K v relative to the root of the mean square, by body: |b - kappa a| from
-   the sums alone would be exact to the root of the round-off only. */
+/* The largest entry of K(mu) Q v - kappa Q K v relative to the root of the mean square, by body: |b - kappa a| from the
+   sums alone would be exact to the root of the round-off only. off: how far K(mu) is from a turned and scaled K; load:
+   how far F is, without and with the factor. */
 static PetscErrorCode Distances(Compared *c, const PetscReal sum[])
 {
   HycoMesh m = c->f->part;
@@ -263,8 +264,9 @@ static PetscInt Ways(const Compared *c, PetscInt k)
   return ways;
 }
 
-/* Whether the nodes of each body have moved, beyond turning and scaling. Collective. A pose has no translation,
-   which changes neither K nor its axes but the place of the contacts. */
+/* Whether the nodes of each body have moved, beyond turning and scaling. Collective. A pose has no translation, which
+   changes neither K nor its axes but the place of the contacts. Relative to the whole mesh's extent: a small body far
+   from the origin has no more digits. */
 static PetscErrorCode Shifted(Compared *c, PetscBool moved[])
 {
   const PetscReal length = HycoMeshLength(c->f->part);
@@ -278,7 +280,7 @@ static PetscErrorCode Shifted(Compared *c, PetscBool moved[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Stores nodes, K v and F at this point, with which the others are compared. Collective. */
+/* Stores nodes, K v and F at this point, with which the others are compared. Collective. K v for one v (SetProbe()) in place of K: matrices that differ agree on it by chance only. */
 static PetscErrorCode SetReference(Compared *c, const PetscReal mu[])
 {
   PetscFunctionBegin;
@@ -291,7 +293,8 @@ static PetscErrorCode SetReference(Compared *c, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All parameters at once, compared with points that have the same values of those that change shapes. Collective. */
+/* All parameters at once, compared with points that have the same values of those that change shapes. Collective.
+   Parameters that turn or scale a body each alone may shear it together, as two maps of one body do. */
 static PetscErrorCode VisitTogether(Compared *c, const PetscReal first[])
 {
   HycoScene s = c->f->scene;
@@ -358,6 +361,8 @@ static PetscErrorCode CompareAll(Compared *c, const PetscReal first[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Measured and not derived from the expressions: whether a map turns, scales or bends is seen in the matrices that it
+   makes. */
 PetscErrorCode HycoBodyPartsFind(HycoFOM f, const PetscReal first[], HycoBodyParts *parts)
 {
   Compared c = {.f = f, .parts = parts};
@@ -446,6 +451,7 @@ PetscInt HycoBodyPartsFail(const HycoBodyParts *parts)
   return -1;
 }
 
+/* For hyco check and for training: why a model of bodies suits the scene, or why not. */
 PetscErrorCode HycoBodyPartsDescribe(HycoScene s, const HycoBodyParts *parts, char text[HYCO_LINE])
 {
   PetscInt shape[HYCO_MAX_PARAMETERS], body;

@@ -25,7 +25,8 @@ static PetscErrorCode Sample(HycoROM m, const PetscReal mu[], PetscInt entries, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the table reproduces the matrix at mu. */
+/* Whether the table reproduces the matrix at mu. At a point that made no entry of the table: agreement there is
+   evidence of a polynomial. */
 static PetscErrorCode Agrees(HycoROM m, HycoTable t, const PetscReal mu[], PetscBool *agrees)
 {
   const PetscInt entries = t->values.rows;
@@ -118,7 +119,8 @@ static PetscErrorCode CountValues(HycoROM m, PetscInt p, PetscInt entries, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rank 0. Not finding a table is no failure: predictions then assemble. */
+/* Rank 0. Not finding a table is no failure: predictions then assemble. A stiffness that is a polynomial in the
+   parameters is exact in the table; others are refused by Agrees(), which is why no error is added. */
 PetscErrorCode HycoGalerkinTabulate(HycoROM m, const PetscBool reaches[])
 {
   HycoGalerkinModel g = (HycoGalerkinModel)m->model->data;

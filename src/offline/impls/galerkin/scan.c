@@ -11,7 +11,8 @@
 
 #define LARGEST 2500 /* number of unknowns above which a dense factor at every point takes minutes */
 
-/* The parameters over whose ranges the reduced stiffness is scanned. */
+/* The parameters over whose ranges the reduced stiffness is scanned. The others do not change the matrix, and a grid
+   over them would repeat it. */
 static PetscErrorCode FindParameters(HycoROM m, PetscBool reaches[])
 {
   const HycoScene s = m->model->scene;
@@ -125,7 +126,8 @@ static PetscErrorCode Conclude(HycoReducer t, HycoROM m, const PetscBool reaches
       here, there);
 }
 
-/* Monitors the training paths first .. last-1. */
+/* Monitors the training paths first .. last-1. The tangents of a path depend on its strains: they are watched where the
+   path goes. */
 static PetscErrorCode ScanMyPaths(HycoReducer t, HycoROM m, PetscInt first, PetscInt last, PetscInt each,
                                   PetscInt stride, PetscReal sign[], PetscReal ratio[])
 {
@@ -252,7 +254,8 @@ PetscErrorCode HycoGalerkinFinish(HycoReducer t, HycoROM m, HycoTraining *report
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A sparse factor (bordered paths) is linear in n; then the cells' laws, and the modes' products. */
+/* A sparse factor (bordered paths) is linear in n; then the cells' laws, and the modes' products. In operations of a
+   prediction: LU of the reduced matrix, assembly of the RID's cells, products with the modes. Only comparisons of attempts use it. */
 PetscReal HycoGalerkinCost(HycoReducer t, const HycoAttempt *a)
 {
   const PetscReal dim = t->sizes[3],

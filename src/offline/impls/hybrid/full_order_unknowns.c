@@ -20,6 +20,7 @@ typedef struct {
   PetscReal ridge; /* all; < 0: automatic */
 } * Training;
 
+/* Declared with the type, so that the help lists them under it. */
 static PetscErrorCode SetFromOptions(HycoReducer t)
 {
   Training s;
@@ -263,6 +264,7 @@ static PetscErrorCode Exchange(HycoReducer t, HycoROM m, PetscInt n, const Petsc
         for (PetscInt c = 0; c < N; c++) {
           if (chosen[c]) dof[k++] = candidate[c];
         }
+        /* Each trial costs a solve for every snapshot; sets are recognised by their hash. */
         if (!past) {
           seen[n_seen++] = hash;
           PetscCall(HycoReducerTell(t, "choices of full-order displacements", trials, limit));
@@ -368,7 +370,8 @@ static PetscErrorCode MarkContact(HycoReducer t, HycoROM m, PetscBool contact[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The free unknowns of the nodes of A: all, or those of contact nodes. */
+/* The free unknowns of the nodes of A: all, or those of contact nodes. Fixed ones have no equation, and their values
+   are in the lifting. */
 static PetscErrorCode FreeUnknowns(HycoReducer t, HycoROM m, PetscBool contact_only, PetscInt *n, PetscInt dof[])
 {
   const PetscInt dim = m->model->mesh->dim, *node;
@@ -527,6 +530,7 @@ static PetscBool Offers(HycoReducer t, PetscBool targets, size_t length, char wh
   return PETSC_TRUE;
 }
 
+/* The text that training prints; a report has the same numbers one by one. */
 static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
 {
   PetscFunctionBegin;
@@ -540,6 +544,7 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The modes are those of the snapshots: there is no function of its own for them. */
 PetscErrorCode HycoTrainerCreate_Hybrid(HycoTrainerOps *ops)
 {
   PetscFunctionBegin;

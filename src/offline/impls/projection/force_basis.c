@@ -10,7 +10,8 @@
 #include <hycotrainers.h>
 #include <petscblaslapack.h>
 
-/* Shared by projection and cubature, whose defaults of `dual` the caller has set. */
+/* Shared by projection and cubature, whose defaults of `dual` the caller has set. Declared here once: the help shows
+   one entry for both types. */
 PetscErrorCode HycoForceBasisSetFromOptions(HycoReducer t)
 {
   HycoForceBasis s = (HycoForceBasis)t->training;
@@ -166,8 +167,9 @@ static PetscErrorCode ProjectBatch(HycoReducer t, PetscInt first, Mat S, void *c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Appends to the modes the components of the supremizers of the dual snapshots that are orthogonal to them: l, V,
-   sigma (0 for these) and VtU then have more columns. */
+/* Appends to the modes the components of the supremizers of the dual snapshots that are orthogonal to them: l, V, sigma
+   (0 for these) and VtU then have more columns. Supremizers keep the reduced saddle-point problem solvable (Ballarin et
+   al. 2015): each force vector has a displacement that it works on. */
 static PetscErrorCode Enrich(HycoReducer t)
 {
   PetscReal *QtU, *size;
@@ -255,6 +257,7 @@ PetscErrorCode HycoProjectionMakeBasis(HycoROM m, HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A model that misses its own training solutions by half is no model, whatever its held-out errors would be. */
 PetscErrorCode HycoProjectionJudge(HycoROM m, HycoReducer t)
 {
   const HycoProjectionModel p = (HycoProjectionModel)m->model->data;
@@ -283,6 +286,7 @@ static PetscErrorCode Build(HycoROM m, HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* dual_misfit is the part of the forces that no combination of the vectors represents. */
 PetscErrorCode HycoProjectionReport(HycoReducer t, HycoROM m, HycoTraining *r)
 {
   const HycoProjectionModel p = (HycoProjectionModel)m->model->data;
@@ -299,6 +303,7 @@ PetscErrorCode HycoProjectionReport(HycoReducer t, HycoROM m, HycoTraining *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* HycoGalerkinFinish() scans the ranges for a singular reduced stiffness, as for hybrid models. */
 PetscErrorCode HycoTrainerCreate_Projection(HycoTrainerOps *ops)
 {
   PetscFunctionBegin;
