@@ -75,7 +75,8 @@ static void Halve(HycoPoint point[], PetscInt lo, PetscInt hi, PetscInt b, Box t
   Halve(point, mid, hi, 2 * b + 2, tree);
 }
 
-/* The trees of all ranks. */
+/* The trees of all ranks. The boxes of this rank's own slaves, halved along their longest side, as leaves of a tree of
+   fixed depth. */
 static PetscErrorCode FindBoxes(Candidates *s)
 {
   HycoMesh m = s->fe->mesh;
@@ -274,7 +275,8 @@ static PetscErrorCode AddNear(Candidates *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sends all nodes of the master to the ranks with slaves. A rigid body's master is one node, wherever it lies. */
+/* Sends all nodes of the master to the ranks with slaves. A rigid body's master is one node, wherever it lies. Whether
+   a rank has slaves is seen in the root of its tree, which is empty otherwise. */
 static PetscErrorCode AddAll(Candidates *s)
 {
   HycoMesh m = s->fe->mesh;

@@ -119,8 +119,9 @@ static PetscErrorCode SlidingOf(HycoFE fe, const HycoPairs *p, PetscInt k, const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* For an active contact, the tangential motion over the facet's size: the measure of whether displacements are
-   small. overlap: of the unloaded gaps. index: from contacts to entries of L (NULL: the same). */
+/* For an active contact, the tangential motion over the facet's size: the measure of whether displacements are small.
+   overlap: of the unloaded gaps. index: from contacts to entries of L (NULL: the same). For remarks to the user: a
+   large sliding or overlap makes small displacements or pairs doubtful, but is no error. */
 PetscErrorCode HycoContactMeasure(HycoFE fe, HycoPairs *pairs, const PetscReal u[], const PetscReal L[],
                                   const PetscInt index[], HycoContactState *state)
 {

@@ -117,7 +117,8 @@ PetscErrorCode HycoSurfaceVectors(HycoFE fe, PetscInt group, PetscReal vector[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The part of each node (share, n_nodes) in the area of the surface `group`. */
+/* The part of each node (share, n_nodes) in the area of the surface `group`. Shares add up to the area of the surface,
+   those of tied nodes included, as PassTied() hands them on. */
 static PetscErrorCode Shares(HycoFE fe, PetscInt group, PetscReal share[])
 {
   HycoMesh m = fe->mesh;
@@ -142,7 +143,8 @@ static PetscErrorCode Shares(HycoFE fe, PetscInt group, PetscReal share[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Areas of the contacts' slaves (m^2), by which forces become pressures. Not collective. */
+/* Areas of the contacts' slaves (m^2), by which forces become pressures. Not collective. Negative shares, of corners of
+   second-order facets, belong to nodes that carry no contact. */
 PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, PetscReal area[])
 {
   PetscReal *share;

@@ -31,7 +31,7 @@ static PetscErrorCode IsSurfaceMoved(HycoScene scene, HycoMesh m, HycoContact c,
 }
 
 /* Tolerance and motion of each contact over all ranks: a rank alone sees only a part of the surface, and all must
-   search alike. Collective. */
+   search alike. Collective. Ranks without a facet of the surface have nothing to say about its tolerance. */
 PetscErrorCode HycoContactsFacts(MPI_Comm comm, HycoScene scene, HycoMesh part, HycoSurfaceFacts facts[])
 {
   PetscFunctionBegin;
@@ -194,7 +194,8 @@ static PetscErrorCode CheckSlaves(HycoScene scene, HycoMesh m, const PetscInt he
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the nodes of a contact without masters, except completely fixed ones, which cannot touch anything. */
+/* Adds the nodes of a contact without masters, except completely fixed ones, which cannot touch anything. For
+   obstacles: there is no master to find, and the row of B has the slave's unknowns only. */
 static PetscErrorCode AppendNodes(HycoFE fe, PetscInt index, const PetscInt held[], HycoPairs *p)
 {
   HycoMesh m = fe->mesh;
@@ -241,7 +242,8 @@ static PetscErrorCode KeepOwned(HycoMesh m, HycoPairs *p)
 }
 
 /* Setup by type, then what concerns several contacts: ties and slaves with several contacts. Masters of moved
-   surfaces are found last. */
+   surfaces are found last. Ties are dropped before slaves are counted: a tied node has no unknown that a contact
+   could act on. */
 static PetscErrorCode FindAll(HycoFE fe, HycoPairs *pairs)
 {
   HycoScene scene = fe->scene;

@@ -146,7 +146,8 @@ static PetscErrorCode Geometry(HycoFE fe, const HycoPairs *pairs, PetscReal work
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Keeps what was computed for the state of fe; not normals that are turned, which is no part of it. */
+/* Keeps what was computed for the state of fe; not normals that are turned, which is no part of it. Several functions
+   ask for normals and gaps at the same positions; fe->drawn numbers these. */
 static PetscErrorCode KeepGeometry(HycoFE fe, HycoPairs *pairs, const PetscReal normal[], const PetscReal gap[])
 {
   PetscFunctionBegin;

@@ -179,7 +179,8 @@ static PetscInt Keep(const PetscReal a[2], const PetscReal b[2], PetscInt n, Pet
 }
 
 /* Sutherland and Hodgman clip by one side of the slave after the other. Each cut adds at most one corner to a convex
-   polygon: 4 + 4 are the 8 of HycoPiece. */
+   polygon: 4 + 4 are the 8 of HycoPiece. Both facets are given by their corners in the plane; curved sides are cut as
+   straight ones. */
 void HycoPieceCut(PetscInt dim, const HycoSide *slave, const HycoSide *master, HycoPiece *piece)
 {
   PetscInt n = master->corners;

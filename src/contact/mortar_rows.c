@@ -57,7 +57,8 @@ typedef struct {
   Term *term;
 } Mortar;
 
-/* Second-order quadrilaterals have products of degree 8, triangles of degree 4; on a circle the radius is one more. */
+/* Second-order quadrilaterals have products of degree 8, triangles of degree 4; on a circle the radius is one more. The
+   degree of the quadrature rule follows. */
 static PetscErrorCode MortarCreate(HycoFE fe, PetscInt slaves, PetscInt masters, PetscReal reach, PetscInt n,
                                    const PetscInt slave[], Mortar *s)
 {
@@ -95,7 +96,8 @@ static PetscErrorCode MortarDestroy(Mortar *s)
 
 /* -- one facet -- */
 
-/* Adds the integrals over an interval or a triangle of a piece; vertex: its corners. */
+/* Adds the integrals over an interval or a triangle of a piece; vertex: its corners. M and `own` are over the facing
+   part only, so that dual functions are those of that part. */
 static void AddSimplex(Mortar *s, const HycoPlane *plane, const HycoSide *slave, const HycoSide *master,
                        const PetscReal *const vertex[3], PetscReal size, Block *b)
 {
@@ -459,7 +461,8 @@ static PetscErrorCode Append(const Mortar *s, PetscInt index, PetscInt n, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* By node of the slave without a row: the row of the nearest node that shares a facet with it, or with such a node. */
+/* By node of the slave without a row: the row of the nearest node that shares a facet with it, or with such a node. A
+   node without a row, such as a fixed one, would otherwise leave its part of the pressure to nobody. */
 static PetscErrorCode FindTakers(Mortar *s)
 {
   HycoMesh m = s->fe->mesh;
@@ -504,7 +507,7 @@ static PetscErrorCode Integrate(Mortar *s, PetscInt index, PetscInt n, const Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The slave's and the master's groups are those of t. */
+/* The slave's and the master's groups are those of t. `s` is destroyed after an error as well. */
 static PetscErrorCode Run(Mortar *s, PetscInt index, PetscInt n, const PetscInt slave[], HycoPairs *pairs)
 {
   PetscErrorCode ierr;

@@ -84,7 +84,7 @@ static void Enclose(HycoPatches s, PetscInt patch, HycoBox *b)
   }
 }
 
-/* The box of the vectors v of the points item[0 .. n). */
+/* The box of the vectors v of the points item[0 .. n). Empty for n = 0: the largest numbers as the lower end. */
 static HycoBox VectorBox(PetscInt n, const HycoPoint item[], const PetscReal v[])
 {
   HycoBox b;
@@ -328,7 +328,8 @@ static void SetBest(Query *q, PetscReal best, PetscInt patch, const PetscReal w[
   for (PetscInt a = 0; a < HYCO_FACET_NODES; a++) q->w[a] = w[a];
 }
 
-/* Updates the query with the nearest of the items lo .. hi - 1 under box t; the nearer child is searched first. */
+/* Updates the query with the nearest of the items lo .. hi - 1 under box t; the nearer child is searched first. Branch
+   and bound: a box farther than the best so far is not entered. */
 static void Search(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi, Query *q)
 {
   const PetscInt mid = (lo + hi) / 2;

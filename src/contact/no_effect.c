@@ -38,8 +38,9 @@ PetscErrorCode HycoContactCheckStill(HycoFE fe, const HycoPairs *pairs, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The completely fixed nodes of groups without masters, which HycoPairsFind() leaves out, as contacts without
-   masters. The caller destroys it. */
+/* The completely fixed nodes of groups without masters, which HycoPairsFind() leaves out, as contacts without masters.
+   The caller destroys it. So that prescribed displacements that penetrate an obstacle are an error, not a solution
+   without a force. */
 static PetscErrorCode FixedAtObstacles(HycoFE fe, const HycoPairs *pairs, HycoPairs *still)
 {
   HycoMesh m = fe->mesh;

@@ -102,7 +102,8 @@ static PetscErrorCode CheckApart(const HycoMasterSearch *t, HycoContact c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fails if no slave node has a master: with the distance of the nearest one that faces it, if any does. */
+/* Fails if no slave node has a master: with the distance of the nearest one that faces it, if any does. For the type
+   surface with a tolerance, where nodes that face nothing are allowed, but not all of them. */
 static PetscErrorCode RefuseAll(HycoMasterSearch *t, HycoContact c, const HycoMatch *m)
 {
   PetscReal nearest = PETSC_MAX_REAL;
@@ -128,7 +129,8 @@ static PetscErrorCode RefuseAll(HycoMasterSearch *t, HycoContact c, const HycoMa
            (double)nearest);
 }
 
-/* Adds each slave node with its master, or fails for those without one. */
+/* Adds each slave node with its master, or fails for those without one. n = 0 in a match: a node that faces no master,
+   and may do so. */
 static PetscErrorCode AppendMatched(HycoMasterSearch *t, HycoContact c, PetscInt index, HycoRemedy remedy,
                                     const HycoMatch *m, Missed missed[], HycoPairs *p)
 {

@@ -75,7 +75,7 @@ PetscErrorCode HycoPairsSelect(const HycoPairs *all, PetscInt n, const PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A copy with all contacts, on a mesh with other numbers of nodes. */
+/* A copy with all contacts, on a mesh with other numbers of nodes. index: from the old nodes to the new ones. */
 PetscErrorCode HycoPairsRenumber(const HycoPairs *pairs, const PetscInt index[], HycoPairs *out)
 {
   PetscInt *which;

@@ -102,7 +102,8 @@ static void Add(HycoFE fe, const PetscReal x[3], const PetscReal normal[3], Pets
   }
 }
 
-/* The nodes of a group are sorted. */
+/* The nodes of a group are sorted. of[k]: whether contact k counts in an output of a part of a surface, or of one
+   contact. */
 PetscErrorCode HycoPairsOfQuantity(HycoScene scene, HycoMesh m, const HycoPairs *pairs, const HycoQuantity *q,
                                    PetscBool of[])
 {
@@ -144,6 +145,7 @@ PetscErrorCode HycoPairsCheckQuantities(MPI_Comm comm, HycoScene scene, HycoMesh
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Sums of this rank's contacts only; scene->n_contacts results, then those of outputs of parts. */
 PetscErrorCode HycoContactResults(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], const PetscReal area[],
                                   const PetscReal lambda[], const PetscReal pressure[], PetscReal least,
                                   HycoContactResult result[])

@@ -120,7 +120,8 @@ static PetscErrorCode CheckSmooth(HycoFE fe, const HycoPairs *pairs, const Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Contacts with the same slave are chained from the last to the first. */
+/* Contacts with the same slave are chained from the last to the first. The chain allows any number of contacts at a
+   node, and no search for them. */
 static PetscErrorCode CheckCorners(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[])
 {
   PetscInt *last, *before;

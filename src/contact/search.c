@@ -30,7 +30,8 @@ PetscErrorCode HycoMasterSearchJudge(HycoMasterSearch *t, PetscInt slave, PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On moved surfaces; n = 0: it has no master. */
+/* On moved surfaces; n = 0: it has no master. reach: masters beyond it are none, as in training; a large number
+   otherwise. */
 static PetscErrorCode Follow(HycoMasterSearch *t, PetscInt slave, PetscReal reach, HycoProjection *at)
 {
   PetscBool past;

@@ -31,7 +31,8 @@ static PetscErrorCode MakePatches(HycoMesh m, PetscInt group, PetscInt node[], P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Finds the points that the slave nodes follow; nodes on both surfaces need none. */
+/* Finds the points that the slave nodes follow; nodes on both surfaces need none. On the mesh as drawn: a tie glues
+   what lies together there, whatever a map does afterwards. */
 static PetscErrorCode Project(HycoScene s, HycoMesh m, PetscInt k, PetscInt group, HycoPatches patches,
                               const PetscBool on[], Found *found)
 {
@@ -259,7 +260,8 @@ static PetscErrorCode FindMeans(HycoFE fe, PetscInt k, const Shared *shared, Fou
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The means of all ties that have them, after the nearest points of all ties. */
+/* The means of all ties that have them, after the nearest points of all ties. As for mortar contacts, of which a tie is
+   one that neither opens nor slides. */
 static PetscErrorCode FindAllMeans(HycoScene s, HycoMesh m, Found *found)
 {
   PetscBool any = PETSC_FALSE;
@@ -396,7 +398,8 @@ PetscErrorCode HycoTiesFind(HycoScene s, HycoMesh m, HycoTies *ties)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* For contacts with a master surface: checks that none of its nodes is tied. */
+/* For contacts with a master surface: checks that none of its nodes is tied. Slaves may be tied: DropTied() moves their
+   contact to their masters. */
 static PetscErrorCode CheckMasters(HycoScene s, HycoMesh m)
 {
   PetscFunctionBegin;
@@ -468,6 +471,7 @@ PetscErrorCode HycoPairsDropTied(HycoScene s, HycoMesh m, HycoPairs *p)
   PetscCall(PetscMalloc2(m->n_nodes, &has, p->n, &which));
   ierr = Choose(s, m, p, has, &n, which);
   if (!ierr && n < p->n) {
+    /* A selection keeps the order, in which contacts are numbered. */
     ierr = HycoPairsSelect(p, n, which, NULL, &kept);
     if (!ierr) ierr = HycoPairsDestroy(p);
     if (!ierr) *p = kept;

@@ -73,7 +73,8 @@ static PetscErrorCode SurfaceSenses(Shapes *s, PetscInt contact, PetscReal work[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The slave surface's error is also taken for given normals, which cannot be more exact than the mesh. */
+/* The slave surface's error is also taken for given normals, which cannot be more exact than the mesh. A sense is one
+   of three possible normals of a contact: given, of the slave's surface, of the master's. */
 static PetscErrorCode FindSenses(Shapes *s)
 {
   HycoScene scene = s->fe->scene;
@@ -267,8 +268,8 @@ static PetscErrorCode HasSense(const Shapes *s, PetscInt contact, PetscInt sense
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The normals of choice number `code`; *possible: each contact has them. Collective. With up to three contacts a
-   code has one digit (base 3) for each. */
+/* The normals of choice number `code`; *possible: each contact has them. Collective. With up to three contacts a code
+   has one digit (base 3) for each. 3^n combinations are tried, since each contact's better normal is not known. */
 static PetscErrorCode Senses(const Shapes *s, PetscInt code, PetscInt sense[], PetscBool *possible)
 {
   const PetscBool common = (PetscBool)(s->fe->scene->n_contacts > MOST_CONTACTS); /* as far as available */

@@ -222,7 +222,7 @@ static PetscErrorCode WriteContent(HycoFOM f, HycoH5 h, const Content *c, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Writes nodes and cells, each rank its rows. */
+/* Writes nodes and cells, each rank its rows. In the file's order, so that another number of ranks can resume. */
 static PetscErrorCode WriteItems(HycoFOM f, HycoH5 h)
 {
   HycoMesh m = f->part;
@@ -268,7 +268,8 @@ static PetscErrorCode FreeContent(Content *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Refuses to overwrite a file that is not a checkpoint. Models and snapshots are expensive to make. */
+/* Refuses to overwrite a file that is not a checkpoint. Models and snapshots are expensive to make. A checkpoint of an
+   earlier run may be overwritten: it is what the option is for. */
 static PetscErrorCode CheckPlace(const char path[])
 {
   PetscBool precious;
@@ -338,7 +339,8 @@ static PetscErrorCode LoadSteps(HycoFOM f, HycoH5 h, PetscInt *rows, PetscReal *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Checks format, key and sizes before the path is changed. Rank 0. */
+/* Checks format, key and sizes before the path is changed. Rank 0. All of it into memory first: a damaged file leaves
+   the path at its begin. */
 static PetscErrorCode ReadOpened(HycoFOM f, HycoH5 h, const char key[], Content *c)
 {
   char *text = NULL;
@@ -379,7 +381,7 @@ static PetscErrorCode ReadOpened(HycoFOM f, HycoH5 h, const char key[], Content 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The file is closed on an error too. */
+/* The file is closed on an error too. On rank 0; nodes and cells are read by each rank later, by ReadRows(). */
 static PetscErrorCode ReadContent(HycoFOM f, const char key[], Content *c)
 {
   HycoH5 h;
@@ -493,7 +495,8 @@ static PetscErrorCode TakeContent(HycoFOM f, const Content *c)
 }
 
 /* Continues from the checkpoint, or leaves the path at its begin if there is no file. K, B, D are assembled at the
-   resumed time; fields of earlier times come from the separate files. Collective. */
+   resumed time; fields of earlier times come from the separate files. Collective. Then the path is where the run before
+   was after its last accepted step, to the last bit. */
 PetscErrorCode HycoPathLoad(HycoFOM f)
 {
   HycoPath p = f->path;

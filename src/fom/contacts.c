@@ -60,7 +60,8 @@ static PetscErrorCode AddSlaves(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fetches the facets around the needed nodes. */
+/* Fetches the facets around the needed nodes. Only around slaves of this rank, which has all masters that they may
+   meet: the search is then local. */
 static PetscErrorCode FetchSurface(HycoFOM f, HycoMesh *surface)
 {
   PetscBool *in;
@@ -121,7 +122,7 @@ typedef struct {
   PetscInt n, *global, *node;
 } Places;
 
-/* Local nodes sorted by their global numbers, for binary search. */
+/* Local nodes sorted by their global numbers, for binary search. A table by global number would have the length of the whole mesh on each rank. */
 static PetscErrorCode PlacesCreate(HycoMesh m, Places *p)
 {
   PetscFunctionBegin;
@@ -199,8 +200,9 @@ static PetscErrorCode PlaceGathered(HycoFOM f, HycoMesh mesh, PetscInt n, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All contacts on rank 0, in the order of one rank, with their surfaces: for errors and for results that need an
-   order. The caller destroys both. Collective. */
+/* All contacts on rank 0, in the order of one rank, with their surfaces: for errors and for results that need an order.
+   The caller destroys both. Collective. Contacts are packed with their nodes' global numbers, which mean the same on
+   every rank. */
 PetscErrorCode HycoFOMGatherContacts(HycoFOM f, HycoMesh *mesh, HycoPairs *pairs)
 {
   const HycoPairs *p = &f->pairs;
@@ -251,7 +253,8 @@ static PetscErrorCode FindWhole(HycoFOM f, HycoMesh mesh, HycoPairs *whole, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The fallback: contacts found on rank 0 are sent back, and their masters' facets are fetched. */
+/* The fallback: contacts found on rank 0 are sent back, and their masters' facets are fetched. Correct for any scene,
+   but its memory and time are those of one rank. */
 static PetscErrorCode FindOnRoot(HycoFOM f, const HycoSurfaceFacts facts[])
 {
   HycoPairs whole;
@@ -484,8 +487,9 @@ PetscErrorCode HycoFOMFetchMasters(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A mesh with all facets around the nodes of this rank's surfaces, its fe at the current parameters, and the places
-   of the surfaces' nodes there; the caller destroys them. Collective. */
+/* A mesh with all facets around the nodes of this rank's surfaces, its fe at the current parameters, and the places of
+   the surfaces' nodes there; the caller destroys them. Collective. Normals at the surfaces' border need facets of cells
+   that other ranks have. */
 PetscErrorCode HycoFOMWiden(HycoFOM f, HycoMesh *mesh, HycoFE *fe, PetscInt **index)
 {
   HycoMesh m = f->surface;

@@ -158,7 +158,7 @@ static void Set(HycoGradient *g, HycoGradientStore *store, const HycoDifference 
   }
 }
 
-/* The outputs at the two points beside mu. */
+/* The outputs at the two points beside mu. value[0 .. n): at mu itself, set by the caller. */
 static PetscErrorCode MeasureBeside(HycoScene scene, const PetscReal mu[], const HycoDifference *d,
                                     HycoGradientMeasure measure, void *context, PetscReal value[])
 {
@@ -180,6 +180,7 @@ PetscBool HycoGradientSetSmooth(HycoGradient *g, HycoGradientStore *store, const
   return PETSC_TRUE;
 }
 
+/* A second, closer difference only where the first shows a jump: it tells a kink from curvature. */
 PetscErrorCode HycoGradientColumn(HycoGradient *g, HycoGradientStore *store, HycoScene scene, const PetscReal mu[],
                                   const HycoDifference *d, PetscBool kink, HycoGradientMeasure measure, void *context,
                                   PetscReal value[])

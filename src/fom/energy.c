@@ -113,7 +113,8 @@ static PetscErrorCode ContactSums(HycoFOM f, PetscReal *gap_work, PetscReal *fix
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sum of K_ii U_i^2, to detect an energy that is a small difference. */
+/* Sum of K_ii U_i^2, to detect an energy that is a small difference. The strain energy of a nearly rigid motion is far
+   below it, and has that much fewer digits. */
 static PetscErrorCode NodalEnergy(HycoFOM f, PetscReal *sum)
 {
   Vec work;

@@ -208,7 +208,8 @@ static PetscErrorCode SetFromOptions(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On defaults alone, without a scene; also for the declaration of options. */
+/* On defaults alone, without a scene; also for the declaration of options. Defaults of options; everything else is
+   zero. */
 static PetscErrorCode Create(MPI_Comm comm, HycoFOM *fom)
 {
   PetscFunctionBegin;
@@ -263,8 +264,8 @@ static PetscErrorCode SetUp(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads and distributes the mesh and finds the contacts; holds a reference to the scene. Collective on comm; after
-   an error *fom is NULL. */
+/* Reads and distributes the mesh and finds the contacts; holds a reference to the scene. Collective on comm; after an
+   error *fom is NULL. A set of points uses one model: mesh, pairing and patterns stay. */
 PetscErrorCode HycoFOMCreate(MPI_Comm comm, HycoScene scene, HycoFOM *fom)
 {
   PetscErrorCode ierr;
@@ -646,7 +647,8 @@ static PetscErrorCode LargestPart(HycoFOM f, PetscInt largest[3])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The ranks' shares of the searches for masters so far, and the time of all that contacts need before a solve. */
+/* The ranks' shares of the searches for masters so far, and the time of all that contacts need before a solve. CPU and
+   not wall time: ranks wait for each other in collective calls. */
 static PetscErrorCode ViewContacts(HycoFOM f, PetscViewer viewer)
 {
   PetscInt64 most = f->pairs.queries, all = f->pairs.queries;

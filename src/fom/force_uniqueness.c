@@ -11,8 +11,9 @@ typedef struct {
   PetscReal *value, *gap;
 } Rows;
 
-/* Marks contacts whose gap is closed, and that have an unknown. The scale is of all contacts, so that round-off
-   counts equally everywhere; two passes, since it is known after the first. */
+/* Marks contacts whose gap is closed, and that have an unknown. The scale is of all contacts, so that round-off counts
+   equally everywhere; two passes, since it is known after the first. 1e-9 of it: a gap that the solver has left by
+   round-off is closed. */
 static PetscErrorCode MarkClosed(MPI_Comm comm, const Rows *r, const PetscReal u[], const PetscReal lambda[],
                                  PetscBool in[])
 {
@@ -136,8 +137,9 @@ static PetscErrorCode GatherRest(HycoFOM f, const Rows *r, const PetscBool in[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The number of rows minus their rank; the unknowns are numbered anew, those that occur. Rank 0. By the Gram matrix
-   (n x n, dense): n is small after peeling. */
+/* The number of rows minus their rank; the unknowns are numbered anew, those that occur. Rank 0. By the Gram matrix (n
+   x n, dense): n is small after peeling. Each dependent row is a direction in which contact forces are arbitrary while
+   displacements are not. */
 static PetscErrorCode Dependent(const Rows *r, PetscInt *dependent)
 {
   const PetscInt n = r->m, n_values = r->start[n];

@@ -174,7 +174,7 @@ static PetscErrorCode ComputeRows(HycoFOM f, HycoFriction r, Rows *rows)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* B and its transpose anew. */
+/* B and its transpose anew. As many entries in a tangential row as in a normal one, hence the same room. */
 static PetscErrorCode FillB(HycoFOM f, HycoFriction r, const Rows *rows)
 {
   const PetscInt dim = f->fe->dim, entries = f->width * dim, *global = f->surface->node_global;
@@ -237,6 +237,7 @@ static PetscErrorCode Assemble(HycoFOM f, HycoFriction r, Rows *rows)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* At each step: tangents turn with the surfaces of its begin. */
 PetscErrorCode HycoFrictionAssemble(HycoFOM f)
 {
   HycoFriction r = f->friction;
@@ -313,7 +314,7 @@ PetscErrorCode HycoFrictionAccept(HycoFOM f)
 }
 
 /* Sums over the contacts of all ranks: the work since the path began and the number of contacts that slip now.
-   Collective. */
+   Collective. Both sums in one reduction. */
 PetscErrorCode HycoFrictionMeasure(HycoFOM f, HycoStep *s)
 {
   HycoFriction r = f->friction;
@@ -335,7 +336,8 @@ static PetscReal *Column(const HycoShear *s, PetscInt c, PetscInt *stride)
   return c < 3 ? s->force + c : c < 6 ? s->slip + (c - 3) : c < 7 ? s->work : s->state;
 }
 
-/* Each column in the order of one rank, so that a checkpoint resumes on any number of ranks. Collective. */
+/* Each column in the order of one rank, so that a checkpoint resumes on any number of ranks. Collective. Slip and force
+   at the begin of a step are the path's memory of friction. */
 PetscErrorCode HycoFrictionSave(HycoFOM f, HycoH5 h)
 {
   PetscReal *value;

@@ -46,7 +46,8 @@ static PetscErrorCode AddContacts(HycoFOM f, const PetscReal U[], const PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* R += B^T L, W = D - B U at the present parameters. Collective. */
+/* R += B^T L, W = D - B U at the present parameters. Collective. By the rows at the moved positions, not by the matrix
+   B, which belongs to the solution. */
 static PetscErrorCode ContactData(Work *o, Vec R, Vec W)
 {
   HycoFOM f = o->f;
@@ -222,7 +223,8 @@ static PetscErrorCode Column(Work *o, PetscInt p, HycoGradient *gradient)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Vectors, the data at the solution, and the system of its closed contacts. Collective. */
+/* Vectors, the data at the solution, and the system of its closed contacts. Collective. Copies of U and L: the model
+   moves while differences are taken. */
 static PetscErrorCode Create(Work *o)
 {
   HycoFOM f = o->f;
@@ -308,6 +310,7 @@ static PetscErrorCode Check(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A linear solve for each parameter with the factor that is there; no contact problem is solved again. */
 PetscErrorCode HycoFOMGetGradient(HycoFOM f, HycoGradient *gradient)
 {
   Work o = {.f = f};

@@ -109,7 +109,8 @@ PetscErrorCode HycoPathSetFromOptions(HycoPath p, HycoOptionItems PetscOptionsOb
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* To the first time with a virgin state. K must be assembled anew if a former path left a tangent in it. Collective. */
+/* To the first time with a virgin state. K must be assembled anew if a former path left a tangent in it. Collective.
+   The laws' state at the first temperature has no strain, and displacements are zero: loads begin from nothing. */
 PetscErrorCode HycoPathBegin(HycoPath p, const PetscReal mu[])
 {
   PetscReal all[HYCO_MAX_PARAMETERS];
@@ -150,7 +151,7 @@ static PetscErrorCode NoteOrder(HycoPath p, PetscReal order)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Accepted times, which a reduced path may repeat. */
+/* Accepted times, which a reduced path may repeat. Doubled room, as for the orders. */
 static PetscErrorCode NoteTime(HycoPath p)
 {
   PetscFunctionBegin;
@@ -318,7 +319,8 @@ static PetscErrorCode Advance(HycoPath p, PetscBool *reached)
 }
 
 /* All listed times from the current one; stops at the first that cannot be reached, which is no error: p->ended is
-   false and p->why says why. Collective. */
+   false and p->why says why. Collective. The last accepted time is recorded too, so that its fields can be looked
+   at. */
 PetscErrorCode HycoPathRun(HycoPath p)
 {
   PetscBool reached = PETSC_TRUE;

@@ -71,7 +71,8 @@ PetscErrorCode HycoMeshLoad(MPI_Comm comm, HycoScene scene, DM *dm)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Local tables of the mesh without its distribution: for programs on one rank. Collective. */
+/* Local tables of the mesh without its distribution: for programs on one rank. Collective. Refined as the scene says,
+   like every mesh of a model. */
 PetscErrorCode HycoMeshCreate(MPI_Comm comm, HycoScene scene, HycoMesh *mesh)
 {
   DM dm;

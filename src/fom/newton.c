@@ -91,9 +91,10 @@ PetscErrorCode HycoPathMoves(HycoPath p, const PetscScalar u[], Vec work, PetscB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* rhs = K U + F - f_int: the right-hand side of the contact system. r is F - f_int - B^T L on entry, so that B^T L
-   is added back. Where all loads vanish, their sum is round-off, which no contact forces of a floating body balance:
-   with friction it is 0 then. */
+/* rhs = K U + F - f_int: the right-hand side of the contact system. r is F - f_int - B^T L on entry, so that B^T L is
+   added back. Where all loads vanish, their sum is round-off, which no contact forces of a floating body balance: with
+   friction it is 0 then. The system's unknowns are U and L themselves and not their changes, since contact conditions
+   are on the whole of both. */
 static PetscErrorCode RightSide(HycoPath p)
 {
   PetscReal before = 0, after = 1;
@@ -279,7 +280,7 @@ static PetscErrorCode Push(PetscInt n, Vec store[], Vec vector, Vec last)
 }
 
 /* gamma of min |g - sum of gamma_j dG_j|, by normal equations, n <= HYCO_ANDERSON, and dense elimination; a small ridge
-   keeps dependent differences harmless. */
+   keeps dependent differences harmless. Anderson's acceleration (Walker and Ni 2011), type II. */
 static PetscErrorCode LeastSquares(PetscInt n, Vec dG[], Vec g, PetscReal gamma[])
 {
   PetscReal A[HYCO_ANDERSON][HYCO_ANDERSON], trace = 0;
@@ -382,7 +383,8 @@ static PetscBool Stalls(HycoPath p, const Progress *now)
   return (PetscBool)(p->kept > 0 && !(rate < 1 && PetscLogReal(target / r[2]) > WORTH * PetscLogReal(rate)));
 }
 
-/* Updates K at U. The evaluation at U gave no tangents; residuals are kept, as U is the same. */
+/* Updates K at U. The evaluation at U gave no tangents; residuals are kept, as U is the same. For the modified method:
+   a new tangent where the kept one contracts too slowly. */
 static PetscErrorCode Renew(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAttempt *a, Progress *now)
 {
   const Progress here = *now;
@@ -397,7 +399,8 @@ static PetscErrorCode Renew(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAtte
 /* Iterations of a step before it is halved, by HycoNewton; a step with at most half of them was easy. */
 static const PetscInt usual_its[] = {0, 15, 60, 30};
 
-/* One attempt: evaluate, test, assemble where needed, solve, advance. Ends with a->converged or a reason in a->why. */
+/* One attempt: evaluate, test, assemble where needed, solve, advance. Ends with a->converged or a reason in a->why.
+   least: the smallest residual so far, for the message; worst: of the contacts' conditions. */
 static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoNewton method, HycoStepAttempt *a)
 {
   const PetscBool tangent = (PetscBool)(method == HYCO_NEWTON_TANGENT);
@@ -455,7 +458,8 @@ PetscErrorCode HycoPathRestore(HycoPath p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* K is assembled here if it is elastic, else in the iterations. */
+/* K is assembled here if it is elastic, else in the iterations. At the end of the step, t1: loads, gaps and
+   temperatures of an implicit step (backward Euler). */
 PetscErrorCode HycoPathAssemble(HycoPath p, PetscReal t1)
 {
   PetscReal mu[HYCO_MAX_PARAMETERS];

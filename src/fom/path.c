@@ -52,7 +52,8 @@ static PetscErrorCode ReduceReport(HycoFOM f, HycoFEStepReport *r)
 }
 
 /* Sets this rank's rows of f_int from f_local; and r = F - f_int there, 0 where fixed. f_local is complete at owned
-   nodes, so that no communication is needed. */
+   nodes, so that no communication is needed. f_int are the stresses' nodal forces; r without contact forces, which
+   RightSide() and the residual add. */
 static PetscErrorCode TakeForces(HycoFOM f)
 {
   HycoPath p = f->path;
@@ -236,7 +237,8 @@ static PetscErrorCode AddWork(HycoFOM f, const HycoFEStepReport *law, PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The criteria of a single solution, without the energy identity, which a path has by steps. */
+/* The criteria of a single solution, without the energy identity, which a path has by steps. A step with an absurd
+   displacement is refused and halved, like one that did not converge. */
 static PetscErrorCode JudgeStep(HycoPath p, HycoReason reason, char why[HYCO_LINE])
 {
   HycoFOM f = (HycoFOM)p->ctx;
@@ -290,7 +292,7 @@ static PetscErrorCode Largest(HycoFOM f, HycoStep *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Collective, like the other measures. */
+/* Collective, like the other measures. At listed times only: a step costs no more communication than it must. */
 static PetscErrorCode MeasureContacts(HycoFOM f, HycoStep *s)
 {
   const PetscScalar *l;
@@ -367,7 +369,8 @@ static PetscErrorCode Save(HycoPath p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The full-order operations of a path; f's vectors are borrowed. Collective. */
+/* The full-order operations of a path; f's vectors are borrowed. Collective. Steps, iterations and halving are those of
+   HycoPath, which reduced models share; this adds only what full order does differently. */
 PetscErrorCode HycoFOMPathCreate(HycoFOM f)
 {
   static const HycoPathOps ops = {.assemble = Assemble,

@@ -67,7 +67,8 @@ static PetscErrorCode Reactions(HycoFOM f, PetscReal contact[], PetscReal r[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* r[n_dof] of this rank's part (N), complete at owned nodes. Collective. */
+/* r[n_dof] of this rank's part (N), complete at owned nodes. Collective. Outputs and reports need them by unknown;
+   HycoFOMGetReactions() sums them by support. */
 PetscErrorCode HycoFOMReactions(HycoFOM f, PetscReal r[])
 {
   PetscReal *contact;
@@ -255,8 +256,8 @@ static PetscErrorCode Balance(HycoFOM f, PetscInt n, Sums *s, PetscReal *balance
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Resultants (N) and moments about the origin of each support and spring, of the loads and of the obstacles, and
-   their balance, in f->reaction (borrowed). Collective. */
+/* Resultants (N) and moments about the origin of each support and spring, of the loads and of the obstacles, and their
+   balance, in f->reaction (borrowed). Collective. Group names are borrowed from the scene. */
 PetscErrorCode HycoFOMGetReactions(HycoFOM f, PetscInt *n, const HycoReaction *result[], PetscReal *balance)
 {
   HycoScene scene;

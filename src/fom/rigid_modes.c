@@ -59,8 +59,8 @@ static void Names(HycoFOM f, const HycoMotions *free, PetscInt n, const PetscRea
   }
 }
 
-/* Adds a combination to the released motions, orthonormalised against the existing ones; a dependent one is left
-   out. Dependent: less than a tenth remains. */
+/* Adds a combination to the released motions, orthonormalised against the existing ones; a dependent one is left out.
+   Dependent: less than a tenth remains. u is taken over, or destroyed. */
 static PetscErrorCode AddReleased(HycoFOM f, PetscInt n, const Vec motion[], const PetscReal z[])
 {
   PetscReal norm, before;
@@ -329,8 +329,9 @@ static PetscErrorCode Work(Vec force, Vec motion, PetscReal *on, PetscReal *all)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The share of the forces' work on a released motion that is not balanced must be small: otherwise it would
-   accelerate the body. A disc under its own symmetric load has round-off here, a missing support has 1. */
+/* The share of the forces' work on a released motion that is not balanced must be small: otherwise it would accelerate
+   the body. A disc under its own symmetric load has round-off here, a missing support has 1. The message needs the
+   motion's name, which rank 0 has. */
 static PetscErrorCode CheckBalance(HycoFOM f, const char forces[], PetscReal share)
 {
   PetscFunctionBegin;
@@ -390,7 +391,7 @@ PetscErrorCode HycoFOMCheckContactBalance(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The solution is determined up to these motions; the shown one is orthogonal to them. */
+/* The solution is determined up to these motions; the shown one is orthogonal to them. n_turned of them: the motions on which contact normals are turned. */
 PetscErrorCode HycoFOMTakeOutReleased(HycoFOM f, Vec u)
 {
   PetscScalar dot;
@@ -456,7 +457,9 @@ static PetscErrorCode Orthonormalize(PetscInt *n, Vec v[])
 }
 
 /* Sets translations and rotations of the moved nodes, zero where fixed. For an algebraic multigrid, in block layout.
-   MatNullSpaceCreateRigidBody() gives them without supports; zeros at fixed rows match K. */
+   MatNullSpaceCreateRigidBody() gives them without supports; zeros at fixed rows match K. With its block size and these
+   vectors GAMG's coarse spaces represent rigid motions exactly, on which its convergence depends (Vanek, Mandel and
+   Brezina 1996). */
 static PetscErrorCode SetNearKernel(HycoFOM f)
 {
   const PetscInt dim = f->fe->dim;

@@ -29,7 +29,7 @@ static PetscErrorCode AddField(HycoSeries s, const char name[], HycoPlace place,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* VTK's vectors have three components in every dimension. */
+/* VTK's vectors have three components in every dimension. u is complete at all nodes of the part, ghosts included. */
 static PetscErrorCode AddDisplacement(HycoSeries s)
 {
   const HycoSeriesSource *f = &s->from;
@@ -101,7 +101,8 @@ static PetscErrorCode AddContacts(HycoSeries s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The file at `path` is written completely or not at all, at HycoSeriesClose(); most: number of times. Collective. */
+/* The file at `path` is written completely or not at all, at HycoSeriesClose(); most: number of times. Collective. A
+   series that ends early is closed all the same, with the times that it has. */
 PetscErrorCode HycoSeriesCreate(MPI_Comm comm, const char path[], PetscInt most, HycoSeries *series)
 {
   HycoFieldFile file;
@@ -162,7 +163,8 @@ PetscErrorCode HycoSeriesOpen(HycoSeries s, const HycoSeriesSource *from)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* At the path's first time: the mesh is that of the moved nodes there. Collective. */
+/* At the path's first time: the mesh is that of the moved nodes there. Collective. Without a series nothing is written,
+   and all its functions return at once. */
 PetscErrorCode HycoSeriesBegin(HycoFOM f)
 {
   HycoSeriesSource from;
@@ -208,7 +210,8 @@ static PetscErrorCode ReadField(HycoFOM f, HycoH5 h, const HycoFileOrder *order,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fields of nodes and of cells have separate names in the file; the place is found by trial. */
+/* Fields of nodes and of cells have separate names in the file; the place is found by trial. The components are the
+   number of the dataset's columns. */
 static PetscErrorCode CopyField(HycoFOM f, HycoSeries s, HycoH5 h, const char name[], PetscInt k)
 {
   HycoField field = {name, HYCO_ON_NODES, 0, NULL};

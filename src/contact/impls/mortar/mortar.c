@@ -88,7 +88,8 @@ static PetscErrorCode Find(HycoContact c, HycoFE fe, PetscInt index, PetscReal r
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* integrated: gaps are sums over many nodes, so that touching surfaces need a threshold for zero. */
+/* integrated: gaps are sums over many nodes, so that touching surfaces need a threshold for zero. Find() serves both
+   the first search and those on moved surfaces. */
 PetscErrorCode HycoContactCreate_Mortar(HycoContact contact)
 {
   static const struct _HycoContactOps ops = {.setup = SetUp, .find = Find};
