@@ -45,7 +45,8 @@ PetscErrorCode HycoBlocksCreate(PetscInt n_cones, const HycoCone cones[], PetscI
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The blocks of the ordinary problem: one row each, force >= 0. */
+/* The blocks of the ordinary problem: one row each, force >= 0. So that one Newton method serves problems with and
+   without friction. */
 PetscErrorCode HycoBlocksCreateNonnegative(PetscInt n, HycoBlocks **blocks)
 {
   HycoCone cone;
@@ -131,7 +132,8 @@ PetscErrorCode HycoBlockDerivative(const HycoBlocks *b, PetscInt k, const PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Replaces r by the nearest admissible forces, block by block. */
+/* Replaces r by the nearest admissible forces, block by block. Whatever a method has left by round-off: reported forces
+   obey the law exactly. */
 PetscErrorCode HycoBlocksAdmit(const HycoBlocks *b, PetscReal r[])
 {
   PetscReal z[HYCO_MAX_BLOCK];
@@ -150,8 +152,9 @@ static PetscReal Most(PetscReal most, PetscReal value)
   return value <= PETSC_MAX_REAL ? PetscMax(most, value) : PETSC_MAX_REAL;
 }
 
-/* Largest entries of the residual P(r - rho w) - r of the law: of all components, of the missing normal force, and
-   of what makes r itself inadmissible. Not collective. */
+/* Largest entries of the residual P(r - rho w) - r of the law: of all components, of the missing normal force, and of
+   what makes r itself inadmissible. Not collective. r solves the problem exactly if r = P(r - rho w) (Eaves 1971), for
+   any rho > 0. */
 PetscErrorCode HycoBlocksNaturalMap(const HycoBlocks *b, PetscReal rho, const PetscReal r[], const PetscReal w[],
                                     HycoNaturalMap *map)
 {

@@ -11,7 +11,8 @@ struct _n_HycoSetFactor {
   PetscBool *wanted, *kept; /* n */
 };
 
-/* Room for all n contacts, so that a set of any size can be factored. */
+/* Room for all n contacts, so that a set of any size can be factored. L is n x n by columns; a set of k contacts uses
+   its leading k x k part. */
 PetscErrorCode HycoSetFactorCreate(PetscInt n, HycoSetFactor *factor)
 {
   HycoSetFactor f;

@@ -61,7 +61,7 @@ static void SetSprings(Proximal *h)
   }
 }
 
-/* S + A^T A / kappa */
+/* S + A^T A / kappa. The condensed matrix of the forces when the unknowns are held by springs kappa. */
 static PetscErrorCode AddSprings(Proximal *h)
 {
   const size_t p = (size_t)h->p, m = (size_t)h->m;
@@ -85,7 +85,8 @@ static PetscErrorCode AddSprings(Proximal *h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* r and x for the forces L; NULL: for none. */
+/* r and x for the forces L; NULL: for none. r: what is left of the load on the unknowns; x moves by it against the
+   springs. */
 static void Place(Proximal *h, const PetscReal L[])
 {
   for (PetscInt i = 0; i < h->p; i++) h->r[i] = -h->lcp->q[i];

@@ -100,7 +100,8 @@ static PetscErrorCode Reveal(PetscInt k, PetscReal A[], const PetscReal gap[], P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The rank of a Gram matrix A (k x k, overwritten), by pivots of the scaled matrix. */
+/* The rank of a Gram matrix A (k x k, overwritten), by pivots of the scaled matrix. By the same pivots as sets of
+   contacts are reduced, with the same tolerance. */
 PetscErrorCode HycoGramRank(PetscInt k, PetscReal A[], PetscInt *rank)
 {
   PetscReal *d;

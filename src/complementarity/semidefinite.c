@@ -132,7 +132,8 @@ static PetscErrorCode Continue(const HycoActiveSet *e, const HycoLCP *lcp, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* For lcp->p > 0; z = (x_pinned, L). On one process, or alike on every rank. */
+/* For lcp->p > 0; z = (x_pinned, L). On one process, or alike on every rank. One by one: sets that change at once may
+   leave a body without any contact, and the matrix singular. */
 PetscErrorCode HycoLCPSemidefinite(const HycoLCP *lcp, PetscBool active[], PetscReal z[], PetscInt *its,
                                    HycoLCPStatus *status)
 {

@@ -88,7 +88,8 @@ static PetscErrorCode Slack(Newton *h, const PetscReal z[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* y and F at z with the slacks w; *norm = |F|_2, *size: the size of the forces, to which it is compared. */
+/* y and F at z with the slacks w; *norm = |F|_2, *size: the size of the forces, to which it is compared. F = z - P(z -
+   rho w), zero at a solution; without bounds, as of free unknowns, F = rho w. */
 static PetscErrorCode Evaluate(Newton *h, const PetscReal z[], PetscReal *norm, PetscReal *size)
 {
   PetscReal sum = 0, most = 0, least = 0;
@@ -123,7 +124,8 @@ static PetscErrorCode Residual(Newton *h, const PetscReal z[], PetscReal *norm, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The sign of the determinant of J at z, a solution; 0: J is singular. */
+/* The sign of the determinant of J at z, a solution; 0: J is singular. A negative one proves that the problem has other
+   solutions as well, by the degree of F. */
 static PetscErrorCode Sign(Newton *h, const PetscReal z[], PetscInt *sign)
 {
   PetscReal norm, size;
@@ -375,7 +377,8 @@ static PetscErrorCode Unloaded(Newton *h, PetscReal z[], HycoLCPStatus *status)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* From the given forces. Floating bodies have no start without any, as every contact would look open. */
+/* From the given forces. Floating bodies have no start without any, as every contact would look open. Near the last
+   step's solution Newton's method converges in few iterations: the first start to be tried. */
 static PetscErrorCode FromForces(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
   PetscFunctionBegin;
@@ -388,7 +391,8 @@ static PetscErrorCode FromForces(Newton *h, PetscReal z[], HycoLCPStatus *status
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* From the solution with normal forces alone. */
+/* From the solution with normal forces alone. Which contacts are closed is then right as a rule, and only stick and
+   slip are left. */
 static PetscErrorCode FromNormal(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
   const HycoBlocks *b = h->blocks;
@@ -424,8 +428,8 @@ static PetscErrorCode FromNormal(Newton *h, PetscReal z[], HycoLCPStatus *status
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* From the solution in which every contact is closed and sticks, as far as there is one; then from its admissible forces.
-   Contacts without a row have no force. */
+/* From the solution in which every contact is closed and sticks, as far as there is one; then from its admissible
+   forces. Contacts without a row have no force. A solution if nothing slips, as at the begin of many paths. */
 static PetscErrorCode FromStick(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
   PetscBool regular;
@@ -449,7 +453,8 @@ static PetscErrorCode FromStick(Newton *h, PetscReal z[], HycoLCPStatus *status)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Steps in which the admissible forces are those of the last one, then the problem itself. */
+/* Steps in which the admissible forces are those of the last one, then the problem itself. Each step is a problem with
+   a fixed bound of friction, which is convex: the fixed-point method of Tresca's friction. */
 static PetscErrorCode FromFrozen(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
   const HycoBlocks *b = h->blocks;
@@ -497,7 +502,8 @@ static PetscErrorCode Starts(Newton *h, PetscReal z[], HycoLCPStatus *status)
 }
 
 /* The proximal point method from z: it ends if z solves the problem of lcp, and further steps gain nothing. Proximal
-   point problems are solved from the last z; if one fails, so does the method. */
+   point problems are solved from the last z; if one fails, so does the method. For problems of which Newton's method
+   cycles; each step is strongly monotone, and has one solution. */
 static PetscErrorCode Proximal(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
   const size_t n = (size_t)h->n;
@@ -653,7 +659,8 @@ static PetscErrorCode Adapt(HycoConeFactor f, PetscInt p, const HycoBlocks *bloc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* z: start and solution (p + n); lcp->blocks NULL: forces >= 0. On one process, or alike on every rank. */
+/* z: start and solution (p + n); lcp->blocks NULL: forces >= 0. On one process, or alike on every rank. Chain() tries
+   the starts one after the other until one converges. */
 PetscErrorCode HycoLCPSemismooth(const HycoLCP *lcp, PetscReal z[], PetscInt *its, HycoLCPStatus *status)
 {
   const PetscInt n = lcp->p + lcp->n;

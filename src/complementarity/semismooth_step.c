@@ -91,7 +91,7 @@ static void AddUnknown(HycoConeStep *t, PetscInt first, PetscInt size, const Pet
 }
 
 /* Column k of L: the direction of the longest of the rows R without their parts along the columns before; returns its
-   length. */
+   length. Rank-revealing: a derivative of rank r has r such columns, and the others are noise. */
 static PetscReal Longest(PetscInt size, const PetscReal R[], PetscInt k, PetscReal L[HYCO_MAX_BLOCK][HYCO_MAX_BLOCK])
 {
   PetscReal most = 0;
@@ -157,7 +157,8 @@ static PetscErrorCode TakeBase(HycoConeStep *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Lists the rows of DP that differ from the base; returns how many columns of Z are missing for them. */
+/* Lists the rows of DP that differ from the base; returns how many columns of Z are missing for them. t->column: the
+   column of Z of each row, -1: none yet. */
 static PetscInt Compare(HycoConeStep *t)
 {
   PetscInt missing = 0;
@@ -287,6 +288,7 @@ static void Assemble(HycoConeStep *t)
   }
 }
 
+/* info > 0 is kept: a singular matrix is no error here. */
 static void Factor(HycoConeStep *t)
 {
   const PetscBLASInt m = (PetscBLASInt)t->m;
@@ -351,7 +353,8 @@ static void AddForces(const HycoConeStep *t, const PetscReal a[], PetscReal s[])
 
 /* -- the update of the base -- */
 
-/* The columns of Z that are missing: b is a unit vector. */
+/* The columns of Z that are missing: b is a unit vector. Z = inverse of the base times unit vectors, for the low-rank
+   update (Woodbury). */
 static PetscErrorCode AddColumns(HycoConeStep *t)
 {
   const PetscInt n = t->n, before = t->n_columns;
@@ -403,7 +406,7 @@ static PetscReal RowTimes(const HycoConeStep *t, PetscInt row, const PetscReal v
   return BLASdot_(&n, t->M + (size_t)row * (t->symmetric ? (size_t)t->n : 1), &step, v, &one);
 }
 
-/* ((I - rho M) Z)_row for all columns. */
+/* ((I - rho M) Z)_row for all columns. Only columns that are new since the last call. */
 static const PetscReal *RowOfQ(HycoConeStep *t, PetscInt row)
 {
   PetscReal *Q = t->Q + (size_t)row * HYCO_CONE_CHANGES;
@@ -500,7 +503,8 @@ static PetscErrorCode Correct(HycoConeStep *t, const PetscReal q[], const PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The base is factored, and its update; if that is nearly singular the present DP becomes the base. */
+/* The base is factored, and its update; if that is nearly singular the present DP becomes the base. After it t->A has a
+   factor, and t->S that of the update. */
 static PetscErrorCode Prepare(HycoConeStep *t)
 {
   PetscBool regular;
@@ -521,6 +525,7 @@ PetscErrorCode HycoConeStepRenew(HycoConeStep *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* `least`: the least-squares step, for singular matrices. */
 PetscErrorCode HycoConeStepSolve(HycoConeStep *t, const PetscReal b[], PetscBool least, PetscReal s[],
                                  PetscBool *regular)
 {
@@ -568,6 +573,7 @@ static PetscErrorCode IsHomogeneous(const HycoConeStep *t, const PetscReal y[], 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The solution itself on the present pieces of P, where these are homogeneous: there is no cancellation in a step. */
 PetscErrorCode HycoConeStepPoint(HycoConeStep *t, const PetscReal q[], const PetscReal y[], PetscReal z[],
                                  PetscBool *regular, PetscBool *served)
 {

@@ -112,7 +112,8 @@ static void Solve(HycoTangent t, PetscReal x[])
   for (PetscBLASInt i = 0; i < m; i++) x[i] *= t->scale[i];
 }
 
-/* Without the contacts whose rows depend on closed ones, which these decide. */
+/* Without the contacts whose rows depend on closed ones, which these decide. S is the Schur complement of the undecided
+   contacts; into and out couple them with the set. */
 static PetscErrorCode Condense(HycoTangent t, const PetscReal M[])
 {
   const size_t n = (size_t)(t->p + t->n), m = (size_t)t->n_set;

@@ -91,7 +91,7 @@ static PetscErrorCode Reset(HycoTao t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Destroys the copies of a dense problem. */
+/* Destroys the copies of a dense problem. They are kept over solves of one size. */
 static PetscErrorCode ResetDense(HycoTao t)
 {
   PetscFunctionBegin;
@@ -214,7 +214,7 @@ static PetscErrorCode Hessian(Tao tao, Vec y, Mat H, Mat P, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* w = M z - f */
+/* w = M z - f. w and z are complementary: TAO's form of the problem. */
 static PetscErrorCode Slack(Tao tao, Vec z, Vec w, void *ctx)
 {
   HycoTao t = (HycoTao)ctx;

@@ -10,7 +10,8 @@
 
 #define TOPOLOGY "mesh" /* the name under which hyco writes */
 
-/* The tags in the order of the points' global numbers, which run by depth. */
+/* The tags in the order of the points' global numbers, which run by depth. So that tags written beside the topology
+   belong to its points in the file. */
 static PetscErrorCode OrderTags(DM dm, IS *ordered)
 {
   const MPI_Comm comm = PetscObjectComm((PetscObject)dm);

@@ -13,8 +13,8 @@ const HycoCellKind HycoCellKinds[HYCO_N_CELL_TYPES] = {
 /* The container, composed with a DM, of its tables. */
 #define TABLES "HycoTables"
 
-/* The destructor of the container on the DM, and for tables without a DM; also of half-made tables, whose other
-   arrays are NULL. */
+/* The destructor of the container on the DM, and for tables without a DM; also of half-made tables, whose other arrays
+   are NULL. Called when the last reference to the DM goes. */
 static PetscErrorCode FreeTables(void *tables)
 {
   HycoMesh m = (HycoMesh)tables;
@@ -78,7 +78,8 @@ PetscErrorCode HycoMeshSetDM(HycoMesh m, DM dm)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The tables that a DM already has (borrowed), NULL: none. Not collective. */
+/* The tables that a DM already has (borrowed), NULL: none. Not collective. Several models of one DM share the
+   tables. */
 PetscErrorCode HycoMeshQuery(DM dm, HycoMesh *mesh)
 {
   PetscContainer container;
@@ -90,7 +91,8 @@ PetscErrorCode HycoMeshQuery(DM dm, HycoMesh *mesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The container must not free the tables when it goes, hence the destructor is removed first. */
+/* The container must not free the tables when it goes, hence the destructor is removed first. The tables are then the
+   caller's alone. */
 PetscErrorCode HycoMeshDetach(HycoMesh m)
 {
   PetscContainer container;
@@ -153,7 +155,8 @@ static PetscErrorCode CheckPointLoad(HycoMesh mesh, const HycoPointLoad *load)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Stiffness per area of a surface, or of single points; a normal component needs a surface. */
+/* Stiffness per area of a surface, or of single points; a normal component needs a surface. Lines in 3D have no area
+   and no normal. */
 static PetscErrorCode CheckSpring(HycoMesh mesh, const HycoSpring *spring)
 {
   PetscInt group, dim;
@@ -372,8 +375,8 @@ PetscErrorCode HycoMeshOwners(MPI_Comm comm, HycoMesh part, PetscInt n, const Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The cells around each node in CSR, masters of tied nodes included; cells ascend at each node. The caller frees
-   both arrays. */
+/* The cells around each node in CSR, masters of tied nodes included; cells ascend at each node. The caller frees both
+   arrays. Two passes: count, then fill. */
 PetscErrorCode HycoMeshNodeCells(HycoMesh m, PetscInt **start, PetscInt **cell)
 {
   PetscInt *next, node[HYCO_MAX_CELL_NODES];

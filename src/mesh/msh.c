@@ -70,7 +70,8 @@ static long long ReadInt(Msh *m, size_t bytes)
   return value;
 }
 
-/* A read past the end marks the file as failed and returns 0; the caller checks once per node. */
+/* A read past the end marks the file as failed and returns 0; the caller checks once per node. memcpy(): numbers in a
+   binary file are not aligned. */
 static double ReadDouble(Msh *m)
 {
   double value = 0;
@@ -193,7 +194,8 @@ static PetscErrorCode CheckEntity(Msh *m, long long dim, long long tag)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Blocks by entity: first all tags, then all coordinates, with parametric ones that are dropped. */
+/* Blocks by entity: first all tags, then all coordinates, with parametric ones that are dropped. least and most are
+   declared; they are compared with each node as a check of damaged files. */
 static PetscErrorCode ReadNodes4(Msh *m)
 {
   size_t blocks, n, all, done = 0;
@@ -230,7 +232,7 @@ static PetscErrorCode ReadNodes4(Msh *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sorts the nodes by tag. */
+/* Sorts the nodes by tag. By a permutation, since coordinates move with their tags. */
 static PetscErrorCode SortNodes(HycoMsh *mesh)
 {
   const PetscInt n = mesh->n_nodes;
@@ -341,7 +343,8 @@ static const char *TypeName(long long type)
   }
 }
 
-/* Widens a group, or an element of nv nodes that is to be added, so that both have the same number. */
+/* Widens a group, or an element of nv nodes that is to be added, so that both have the same number. Shapes with fewer
+   nodes repeat nodes; a group has one number of nodes for all of its elements. */
 static PetscErrorCode Match(Msh *m, HycoMshGroup *g, PetscInt nv, PetscInt node[])
 {
   const HycoCellType has = HycoMshType(g->dim, g->nv), own = HycoMshType(g->dim, nv);
@@ -388,7 +391,8 @@ static PetscErrorCode AddElement(Msh *m, HycoMshGroup *g, long long tag, long lo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads the tag and the nodes of one element of a known type; changes the type of one with repeated nodes. */
+/* Reads the tag and the nodes of one element of a known type; changes the type of one with repeated nodes. *of becomes
+   the type of the smaller shape: meshers collapse hexahedra at the axis of a sweep. */
 static PetscErrorCode ReadElement(Msh *m, size_t bytes, long long tag, long long *of, PetscInt node[])
 {
   const long long type = *of;
@@ -440,8 +444,8 @@ static PetscErrorCode ReadTags2(Msh *m, long long n, long long *group)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Binary files have blocks of elements with one header, text has a header per line; both are read as blocks, of
-   one element in text. */
+/* Binary files have blocks of elements with one header, text has a header per line; both are read as blocks, of one
+   element in text. `follow` is the number of elements in a block. */
 static PetscErrorCode ReadElements2(Msh *m)
 {
   size_t n;
@@ -479,7 +483,8 @@ static PetscErrorCode ReadElements2(Msh *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the elements of a block to the groups of its entity. */
+/* Adds the elements of a block to the groups of its entity. An entity may be in several groups: its elements are added
+   to each. */
 static PetscErrorCode ReadBlock4(Msh *m, long long dim, long long entity, long long type, size_t n, long long least,
                                  long long most)
 {
@@ -552,7 +557,8 @@ static PetscErrorCode ReadElements(Msh *m)
 
 /* -- entities and names -- */
 
-/* Reads a list of an entity: its groups, whose sign is an orientation, or its boundary. */
+/* Reads a list of an entity: its groups, whose sign is an orientation, or its boundary. The boundary is read to be
+   skipped. */
 static PetscErrorCode ReadList(Msh *m, PetscBool groups, int dim, long long entity)
 {
   size_t n;
@@ -602,7 +608,7 @@ static PetscErrorCode ReadEntities(Msh *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The next line; NULL at the end of the file. */
+/* The next line; NULL at the end of the file. m->at is afterwards behind it. */
 static const char *NextLine(Msh *m)
 {
   const char *line = m->at;
@@ -628,7 +634,8 @@ static PetscBool ReadQuoted(const char *text, char name[128])
   return (PetscBool)(*end == '\n' || !*end);
 }
 
-/* One line each: dimension, tag, "name"; text in binary files too. */
+/* One line each: dimension, tag, "name"; text in binary files too. Names are optional: groups without one are known by
+   their number. */
 static PetscErrorCode ReadNames(Msh *m)
 {
   const char *line = NextLine(m);
@@ -722,7 +729,8 @@ static PetscErrorCode ReadFormat(Msh *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Skips sections that are not needed ($Periodic, post-processing data) line by line. */
+/* Skips sections that are not needed ($Periodic, post-processing data) line by line. Entities must come before
+   elements, as gmsh writes them: elements name their entity. */
 static PetscErrorCode ReadSections(Msh *m)
 {
   const char *line;
@@ -754,7 +762,8 @@ static PetscErrorCode ReadSections(Msh *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The whole file in memory: the parsers then never meet the end of a buffer within a number. */
+/* The whole file in memory: the parsers then never meet the end of a buffer within a number. A zero after the last byte
+   ends every number. */
 static PetscErrorCode ReadAll(Msh *m)
 {
   FILE *file = fopen(m->path, "rb");
@@ -797,7 +806,8 @@ PetscErrorCode HycoMshRead(const char path[], HycoMsh *mesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Also of tables that a failed HycoMshRead() left incomplete: it has set them to 0 first. */
+/* Also of tables that a failed HycoMshRead() left incomplete: it has set them to 0 first. The parser's own data are
+   freed by the reader. */
 PetscErrorCode HycoMshDestroy(HycoMsh *mesh)
 {
   PetscFunctionBegin;

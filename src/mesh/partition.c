@@ -94,7 +94,8 @@ static PetscErrorCode ByMetis(PetscInt n, const Graph *g, PetscInt n_parts, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* PT-Scotch by PETSc's MatPartitioning on this process, for the same graph. */
+/* PT-Scotch by PETSc's MatPartitioning on this process, for the same graph. Copies, since METIS's integers may be of
+   another size than PETSc's. */
 static PetscErrorCode ByScotch(PetscInt n, const Graph *g, PetscInt n_parts, PetscInt part[])
 {
   PetscInt *i, *j, *weight;
@@ -129,8 +130,9 @@ static PetscErrorCode ByScotch(PetscInt n, const Graph *g, PetscInt n_parts, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Gives each part that has no cell one of the largest part, while that has two: METIS leaves parts of a few cells empty,
-   and a rank without cells works for nothing. */
+/* Gives each part that has no cell one of the largest part, while that has two: METIS leaves parts of a few cells
+   empty, and a rank without cells works for nothing. From the last cells on, which leaves the largest part connected as
+   a rule. */
 static PetscErrorCode FillParts(PetscInt n, PetscInt n_parts, PetscInt part[])
 {
   PetscInt *size;
@@ -214,7 +216,8 @@ static PetscErrorCode Destroy(PetscPartitioner partitioner)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Called by PetscPartitionerSetType(), before HycoPartitionerSetMesh() fills the data. */
+/* Called by PetscPartitionerSetType(), before HycoPartitionerSetMesh() fills the data. Registered as a type of
+   PetscPartitioner, so that DMPlexDistribute() uses it. */
 static PetscErrorCode Create(PetscPartitioner partitioner)
 {
   Data *d;

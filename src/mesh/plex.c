@@ -96,7 +96,8 @@ static PetscBool IsOf(HycoCellType type, DMPolytopeType of, PetscInt size, HycoT
                                                          : !HycoCellKinds[type].quadratic);
 }
 
-/* The shapes of this process's cells, bits 1 << HycoCellType. */
+/* The shapes of this process's cells, bits 1 << HycoCellType. An unknown type is an error on the rank that has it;
+   FindType() is collective. */
 static PetscErrorCode FindShapes(DM dm, PetscInt *shapes)
 {
   HycoTies ties;
@@ -279,7 +280,8 @@ static PetscErrorCode FindOwned(Builder *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The masters of a cell's tied nodes: with ties, the end of its cone. */
+/* The masters of a cell's tied nodes: with ties, the end of its cone. Masters are in the cone, so that they come with
+   the cell when it moves to another rank. */
 static PetscErrorCode FollowedVertices(const Builder *b, PetscInt cell, PetscInt *n, const PetscInt *vertex[])
 {
   HycoCellType shape;
@@ -337,7 +339,8 @@ static PetscErrorCode TakeCells(Builder *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Collects their nodes, by tag, with coordinates. */
+/* Collects their nodes, by tag, with coordinates. By tag: the order of nodes, and with it that of all sums over them,
+   is that of the file. */
 static PetscErrorCode TakeNodes(Builder *b)
 {
   HycoMesh m = b->m;
@@ -594,7 +597,8 @@ static int CompareFacets(const void *a, const void *b)
   return (x->point > y->point) - (x->point < y->point);
 }
 
-/* The facets of a group, in the order of their cells; those without their cell have their orientation. */
+/* The facets of a group, in the order of their cells; those without their cell have their orientation. Outward: a
+   pressure acts against the normal, and contact's gap is along it. */
 static PetscErrorCode PlaceFacets(Builder *b, PetscInt group)
 {
   HycoMesh m = b->m;
@@ -686,7 +690,8 @@ static PetscErrorCode TakeGroups(Builder *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Assigns each cell to the group of its one body. */
+/* Assigns each cell to the group of its one body. A body is the group of its name; in a mesh file others are rejected
+   while it is read. */
 static PetscErrorCode TakeBodies(Builder *b)
 {
   HycoMesh m = b->m;
@@ -713,7 +718,8 @@ static PetscErrorCode TakeBodies(Builder *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The cells and nodes of a submesh: facets without their cells are between them. */
+/* The cells and nodes of a submesh: facets without their cells are between them. In a submesh DMPlex has no order of
+   depths that would tell them apart. */
 static PetscErrorCode FindStrata(Builder *b)
 {
   const PetscInt dim = b->m->dim;
@@ -761,7 +767,8 @@ static PetscErrorCode TakeNodeBodies(Builder *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Makes the tables of this process's part, without the data that needs communication. */
+/* Makes the tables of this process's part, without the data that needs communication. Without communication: its errors
+   are raised by all ranks together afterwards. */
 static PetscErrorCode MakeTables(Builder *b)
 {
   IS tags;
@@ -881,8 +888,8 @@ static PetscErrorCode FillTables(Builder *b, MPI_Comm comm)
 }
 
 /* The local tables of a DM's part: nodes and cells by tag, groups, facets outward, bodies; with several ranks also
-   global numbers. The caller gets a reference to the DM. Collective on comm, which is PETSC_COMM_SELF for a DM that one rank
-   alone uses. */
+   global numbers. The caller gets a reference to the DM. Collective on comm, which is PETSC_COMM_SELF for a DM that one
+   rank alone uses. After an error the tables are freed, and the DM is as before. */
 PetscErrorCode HycoPlexToTables(DM dm, MPI_Comm comm, HycoScene scene, HycoMesh *mesh)
 {
   Builder b = {.dm = dm, .scene = scene};

@@ -44,7 +44,8 @@ static PetscErrorCode ChooseType(HycoScene scene, Reader *r, HycoMesh m, PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Every body is a group of cells, of types that can be in one mesh; other groups may have any lower dimension. */
+/* Every body is a group of cells, of types that can be in one mesh; other groups may have any lower dimension.
+   r->group[k].body is the body of each group, -1: none. */
 static PetscErrorCode CheckBodies(HycoScene scene, Reader *r, HycoMesh m)
 {
   PetscInt cells = 0, shapes = 0, nv = 0;
@@ -134,7 +135,8 @@ static PetscErrorCode CollectCells(HycoScene scene, Reader *r, HycoMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nodes of the cells, ascending by tag, and the cells' node indices. */
+/* Nodes of the cells, ascending by tag, and the cells' node indices. r->index: from a node of the file to one of the
+   mesh. */
 static PetscErrorCode CollectNodes(Reader *r, HycoMesh m)
 {
   const HycoMsh *file = &r->file;
@@ -259,8 +261,8 @@ static PetscErrorCode AddFacets(HycoScene scene, Reader *r, HycoMesh m, Group *g
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nodes and cells of each group as CSR lists. Nodes may lie outside the bodies (index -1) and are then left out,
-   with the cells that have them. */
+/* Nodes and cells of each group as CSR lists. Nodes may lie outside the bodies (index -1) and are then left out, with
+   the cells that have them. Points and lines too, for supports, forces and outputs. */
 static PetscErrorCode AddMembers(Reader *r, HycoMesh m, Group *g, PetscInt group, const PetscInt start[],
                                  const PetscInt around[], PetscInt *n_node, PetscInt *n_cell)
 {

@@ -150,7 +150,7 @@ void HycoCountLinear(HycoSolver s, PetscInt its)
   s->linear_most = PetscMax(s->linear_most, its);
 }
 
-/* ksp NULL: the own interface to MUMPS. */
+/* ksp NULL: the own interface to MUMPS. Written into s->linear_method, which reports show. */
 PetscErrorCode HycoNameLinear(HycoSolver s, KSP ksp)
 {
   KSPType method;

@@ -69,7 +69,8 @@ PetscErrorCode HycoSolverDestroy(HycoSolver *solver)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Takes a reference. Factors stay valid if K and B are the same objects in the same state. */
+/* Takes a reference. Factors stay valid if K and B are the same objects in the same state. The same system may be set
+   again after its matrices have changed. */
 PetscErrorCode HycoSolverSetSystem(HycoSolver s, HycoSystem system)
 {
   PetscFunctionBegin;
@@ -150,7 +151,8 @@ HycoDefineMethod(HycoSolverSetMonitor, (HycoSolver s, HycoMonitor monitor, void 
                  s->monitor = monitor;
                  s->monitor_ctx = ctx)
 
-/* -hyco_solver_form: auto, or a registered form's name. */
+/* -hyco_solver_form: auto, or a registered form's name. Registered forms, of extensions too, are words of the
+   option. */
 static PetscErrorCode ReadForm(HycoSolver s, HycoOptionItems PetscOptionsObject)
 {
   const char **words;

@@ -129,7 +129,7 @@ static PetscErrorCode GatherVec(MPI_Comm comm, Vec v, PetscReal all[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* g = D - B K^-1 F, on every rank. */
+/* g = D - B K^-1 F, on every rank. d->g has the motions of floating bodies first, then the gaps. */
 static PetscErrorCode FreeGap(HycoSolver s, const Dual *d, Vec x)
 {
   HycoSystem y = s->system;
@@ -200,7 +200,7 @@ static PetscErrorCode SolveForces(HycoSolver s, Dual *d, Vec start, PetscBool *s
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets this rank's part of the forces, which every rank has. */
+/* Sets this rank's part of the forces, which every rank has. All ranks have solved the same problem. */
 static PetscErrorCode SetForces(const Dual *d, Vec L)
 {
   PetscInt lo, hi;
@@ -257,7 +257,7 @@ static PetscErrorCode Recover(HycoSolver s, const Dual *d, Vec x, Vec L)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Changes the forces by dL (m), and x accordingly. */
+/* Changes the forces by dL (m), and x accordingly. Linear: no contact problem is solved again. */
 static PetscErrorCode Shift(HycoSolver s, const PetscReal dL[], Vec x, Vec L)
 {
   Vec change, force, move;
@@ -319,7 +319,8 @@ static PetscErrorCode CloseGaps(HycoSolver s, const Dual *d, Vec x, Vec L)
 #define SAME_FLEXIBILITY 1e-12
 
 /* For a small dense K: computes S again, by solves refined in twice the working precision. Called after a failed
-   attempt; *better: S has changed, so that another attempt may succeed. */
+   attempt; *better: S has changed, so that another attempt may succeed. A condensed S of a stiff K has digits lost by
+   cancellation, which can make the set cycle. */
 static PetscErrorCode Refine(HycoSolver s, HycoSolverForm form, PetscBool *better)
 {
   Dual *d = (Dual *)form->data;

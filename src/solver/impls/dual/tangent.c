@@ -31,7 +31,7 @@ PetscInt HycoSolverTangentUndecided(HycoSolverTangent t)
   return t->tangent ? HycoTangentUndecided(t->tangent) : 0;
 }
 
-/* value[m] of all ranks. */
+/* value[m] of all ranks. In the order of the rows of B. */
 static PetscErrorCode GatherAll(HycoSolverTangent t, Vec v, PetscReal value[])
 {
   const PetscScalar *all;
@@ -102,7 +102,8 @@ static PetscErrorCode SetUp(HycoSolverTangent t, Vec x, Vec L)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* x and L must be the solution of the present system: the states of the contacts are read from its gaps and forces. */
+/* x and L must be the solution of the present system: the states of the contacts are read from its gaps and forces.
+   After an error *tangent is NULL. */
 PetscErrorCode HycoSolverTangentCreate(HycoSolver s, Vec x, Vec L, HycoSolverTangent *tangent)
 {
   PetscErrorCode ierr;

@@ -84,7 +84,8 @@ PetscErrorCode HycoGapPivots(HycoSystem y, PetscInt pivot[], PetscBool *all)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the gap coordinates exist for this B. Collective. */
+/* Whether the gap coordinates exist for this B. Collective. They exist if each contact has an unknown that no other
+   has. */
 PetscErrorCode HycoGapPossible(HycoSystem y, PetscBool *possible)
 {
   PetscInt lo, hi, *pivot;
@@ -273,7 +274,7 @@ static PetscErrorCode NearKernel(HycoSystem s, const Gap *g)
 }
 
 /* Sets the new Kw in the solver, which keeps its data if the sizes are unchanged. KSPReset() drops the factor, but
-   keeps options and type. */
+   keeps options and type. Options were read when it was created. */
 static PetscErrorCode RenewSolver(HycoSolver s, Gap *g)
 {
   PetscInt n_old = -1;

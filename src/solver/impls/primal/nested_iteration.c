@@ -39,7 +39,7 @@ typedef struct {
   const PetscScalar *value;
 } Rows;
 
-/* Restored by RowsRestore(). */
+/* Restored by RowsRestore(). Direct access: MatGetRow() for each row of each pass would dominate. */
 static PetscErrorCode RowsGet(Mat K, Rows *r)
 {
   PetscBool done;
@@ -218,7 +218,7 @@ static PetscErrorCode Interpolate(const Rows *r, const PetscInt coarse_of[], Pet
 }
 
 /* The next coarser level; *made is false if the matrix is small, or cannot be coarsened. Bounds and loads of coarse
-   unknowns are those of the finer level. */
+   unknowns are those of the finer level. Galerkin's coarse matrix P^T K P keeps symmetry and definiteness. */
 static PetscErrorCode Coarsen(Level *fine, Level *coarse, PetscBool *made)
 {
   Rows r;
@@ -307,8 +307,9 @@ static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The active set method from l->active; y is the last solution. Only the set is used, whether or not it has
-   converged. At most 40 iterations: the set need not be final. */
+/* The active set method from l->active; y is the last solution. Only the set is used, whether or not it has converged.
+   At most 40 iterations: the set need not be final. Started from the set of the coarser level, which is nearly right:
+   few iterations a level (nested iteration). */
 static PetscErrorCode SolveLevel(Level *l, Vec y)
 {
   Solve p = {.level = l, .y = y};
@@ -369,7 +370,7 @@ static PetscErrorCode Prolong(Level *fine, const Level *coarse, Vec y)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Also of a level that Coarsen() has begun and given up. */
+/* Also of a level that Coarsen() has begun and given up. NULL-safe in each part. */
 static PetscErrorCode LevelDestroy(Level *l)
 {
   PetscFunctionBegin;
@@ -477,8 +478,9 @@ static PetscErrorCode GatherMatrix(MPI_Comm comm, Mat K, Mat *whole)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* set: 1 where the bound is active in the coarse solutions, else 0 (distributed like f). *made is false if the
-   matrix is not suitable. Collective. */
+/* set: 1 where the bound is active in the coarse solutions, else 0 (distributed like f). *made is false if the matrix
+   is not suitable. Collective. Worth it for obstacles along whole bodies, where a cold active set needs as many
+   iterations as there are cells across the contact. */
 PetscErrorCode HycoMultilevelStart(Mat K, Vec f, Vec bound, Vec set, PetscBool *made)
 {
   MPI_Comm comm = PetscObjectComm((PetscObject)K);

@@ -16,7 +16,8 @@
 #define HYCO_NOISE       1e-9
 #define HYCO_NOISE_LEAST 1e-13
 
-/* The value of a distributed vector at this rank's pivots. Pivots may be owned by other ranks. */
+/* The value of a distributed vector at this rank's pivots. Pivots may be owned by other ranks. In the order of this
+   rank's contacts without idle ones. */
 static PetscErrorCode AtPivots(Vec v, VecScatter scatter, Vec work, PetscInt n, PetscReal out[])
 {
   const PetscScalar *w;
@@ -268,7 +269,8 @@ static PetscErrorCode BoundQP(Primal *p, Gap *g, PetscBool *solved)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Bounds in the order of the contacts without idle ones. */
+/* Bounds in the order of the contacts without idle ones. y = 0 is the start; bounds are on y's entries at the
+   pivots. */
 static PetscErrorCode PrimalCreate(HycoSolver s, const Gap *g, Vec x, Primal *p)
 {
   HycoSystem y = s->system;

@@ -93,8 +93,8 @@ static PetscErrorCode Bounds(void *ctx, Vec lo, Vec hi)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets the active rows of B and their nodes as constraints. Only if the set differs from that of the last solve on
-   any rank. */
+/* Sets the active rows of B and their nodes as constraints. Only if the set differs from that of the last solve on any
+   rank. Constraints are projected out of the residuals, so that the multigrid of K serves every set. */
 static PetscErrorCode SetConstraints(Run *p, const PetscBool active[], PetscBool *singular)
 {
   const Projected *f = p->form;
@@ -264,7 +264,8 @@ static PetscErrorCode Settled(void *ctx, PetscBool *more)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Without a target the start is 0, so that equal problems have equal iterations. */
+/* Without a target the start is 0, so that equal problems have equal iterations. With a target the caller's x is a good
+   start, since a path calls again with little changed. */
 static PetscErrorCode RunCreate(HycoSolver s, Projected *f, Vec x, Run *p)
 {
   PetscFunctionBegin;
@@ -334,7 +335,7 @@ static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singul
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Writes the number of conjugate-gradient iterations into the report. */
+/* Writes the number of conjugate-gradient iterations into the report. Iterations of all sets of this solve. */
 static PetscErrorCode NameSolves(HycoSolver s, const Projected *f)
 {
   KSP ksp;

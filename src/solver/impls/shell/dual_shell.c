@@ -39,7 +39,8 @@ static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One product: a multiplication by B^T, a solve, a multiplication by B. */
+/* One product: a multiplication by B^T, a solve, a multiplication by B. S = B K^-1 B^T is never formed: its m columns
+   would be m solves. */
 static PetscErrorCode MultS(Mat S, Vec v, Vec Sv)
 {
   Shell *f;
