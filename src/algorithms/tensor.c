@@ -37,7 +37,8 @@ static void NextPolynomial(PetscInt n, const PetscReal s[], PetscInt d, PetscRea
   for (PetscInt k = 0; k <= n; k++) p[k] /= PetscSqrtReal(length);
 }
 
-/* weight[n] of the polynomial's value at `at` by the nodes' data. The degree is limited by the number of nodes. */
+/* weight[n] of the polynomial's value at `at` by the nodes' data. The degree is limited by the number of nodes. Least
+   squares of the degree given; with as many coefficients as nodes it interpolates. */
 PetscErrorCode HycoPolynomialWeights(PetscInt n, const PetscReal x[], PetscInt degree, PetscReal at, PetscReal weight[])
 {
   const PetscInt top = PetscMin(degree, n - 1);
@@ -71,7 +72,7 @@ PetscInt HycoTensorSize(const HycoTensor *t)
   return size;
 }
 
-/* Weights of all nodes (their product over the axes), the last axis fastest. */
+/* Weights of all nodes (their product over the axes), the last axis fastest. Axes of one node have the weight 1. */
 PetscErrorCode HycoTensorWeights(const HycoTensor *t, const PetscReal at[], PetscReal weight[])
 {
   PetscReal *w;

@@ -103,7 +103,8 @@ static PetscErrorCode AddCells(HycoFE fe, HycoAssemblyMap p, PetscBool constant,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Leaves *places NULL if the pattern does not fit; the caller then assembles by MatSetValues(). */
+/* Leaves *places NULL if the pattern does not fit; the caller then assembles by MatSetValues(). Places in the matrix's
+   array are looked up once: later assemblies add without any search for columns. */
 static PetscErrorCode Create(HycoFE fe, const PetscInt ia[], const PetscInt ja[], PetscInt n, HycoAssemblyMap *places)
 {
   HycoAssemblyMap p;

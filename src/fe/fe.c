@@ -214,7 +214,8 @@ PetscErrorCode HycoFESetDrawn(HycoFE fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* X = map(x, mu), body by body. */
+/* X = map(x, mu), body by body. Maps act on the drawing, not on the last position: the result does not depend on what
+   was solved before. */
 static PetscErrorCode MoveNodes(HycoFE fe)
 {
   HycoMesh m = fe->mesh;
@@ -413,6 +414,7 @@ static PetscBool AnyChanges(HycoExpr const e[3], const PetscBool changed[])
                      HycoExprChanges(e[2], changed));
 }
 
+/* Asked by hyco check, and by resultants, which are computed again only then. */
 PetscBool HycoSceneLoadsChange(HycoScene s, const PetscBool changed[])
 {
   PetscBool any = PETSC_FALSE;
@@ -425,7 +427,8 @@ PetscBool HycoSceneLoadsChange(HycoScene s, const PetscBool changed[])
   return any;
 }
 
-/* By parameter: whether K or B depends on it; others act on F and D only, so that a factor of K stays valid. */
+/* By parameter: whether K or B depends on it; others act on F and D only, so that a factor of K stays valid. By which
+   points are ordered, grouped and interpolated. */
 void HycoSceneReaches(HycoScene scene, PetscBool reaches[])
 {
   for (PetscInt p = 0; p < scene->n_parameters; p++) {
@@ -478,6 +481,7 @@ PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Cells' data are brought up to date when they are used again: parameters may have changed meanwhile. */
 PetscErrorCode HycoFEUseCells(HycoFE fe, PetscBool use)
 {
   const PetscBool late = (PetscBool)(use && fe->without_cells);

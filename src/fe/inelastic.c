@@ -196,8 +196,9 @@ static PetscErrorCode BatchDestroy(Batch *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Computes strains at the end of the step and reads the state at its begin; the law's strains exclude thermal
-   strain. Total and thermal strains go to the state separately. */
+/* Computes strains at the end of the step and reads the state at its begin; the law's strains exclude thermal strain.
+   Total and thermal strains go to the state separately. Gradients are kept in the batch for Scatter(), which needs them
+   for the forces. */
 static PetscErrorCode Gather(HycoFE fe, const HycoElement *el, Batch *b)
 {
   const PetscInt ns = fe->n_sigma, body = fe->mesh->cell_body[b->cell[0]];
@@ -345,7 +346,8 @@ static void Count(HycoFE fe, Batch *b, PetscInt i, const Point *from, const Poin
     r->potential += b->w[i] * b->potential[i];
 }
 
-/* Writes the batch's results to the state, f_int, the tangents and the report. */
+/* Writes the batch's results to the state, f_int, the tangents and the report. f_int is complete at owned nodes, as
+   every part has all cells around these. */
 static void Scatter(HycoFE fe, const HycoElement *el, Batch *b, PetscBool linear)
 {
   HycoMesh m = fe->mesh;
@@ -454,7 +456,8 @@ PetscErrorCode HycoFEStepBodies(HycoFE fe, HycoBodies bodies, const PetscReal u[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Stress and energy of linear laws at displacements u: they do not depend on the past. */
+/* Stress and energy of linear laws at displacements u: they do not depend on the past. Once for each listed time: no
+   step of a linear law needs the one before. */
 PetscErrorCode HycoFELinearStress(HycoFE fe, const PetscReal u[], HycoFEState state, PetscReal *stored)
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
@@ -579,7 +582,8 @@ void HycoFEInelasticStress(HycoFE fe, HycoFEState state, PetscInt cell, PetscInt
   (void)Lost(fe, cell, q, elastic, p.stress, s);
 }
 
-/* The law's input at n points of one body, without thermal strains. */
+/* The law's input at n points of one body, without thermal strains. For models with laws at few points, which bring
+   their own strains. */
 static void GatherPoints(HycoFE fe, const HycoElement *el, PetscInt n, const PetscInt point[], const PetscReal strain[],
                          Batch *b)
 {
@@ -623,6 +627,7 @@ static void ScatterPoints(HycoFE fe, const HycoElement *el, PetscInt n, const Pe
   }
 }
 
+/* s, size and tangent by point; the state at the end is not kept, since the caller may repeat the step. */
 PetscErrorCode HycoFEStepPoints(HycoFE fe, PetscInt n, const PetscInt point[], const PetscReal strain[], PetscReal t0,
                                 PetscReal t1, HycoFEState begin, PetscReal s[], PetscReal size[], PetscReal tangent[],
                                 HycoFEStepReport *report)
@@ -654,7 +659,7 @@ PetscErrorCode HycoFEStepPoints(HycoFE fe, PetscInt n, const PetscInt point[], c
 }
 
 /* Volume means by cell: stress (n_sigma each), von Mises stress, accumulated inelastic strain, temperature; NULL
-   outputs are skipped. */
+   outputs are skipped. Fields in files are by cell, while states are by point. */
 PetscErrorCode HycoFEStateFields(HycoFE fe, HycoFEState state, PetscReal sigma[], PetscReal mises[],
                                  PetscReal inelastic[], PetscReal temperature[])
 {

@@ -2,7 +2,8 @@
 #include "inertia.h"
 #include <hycovector.h>
 
-/* Entries that do not depend on the position, evaluated at the origin. */
+/* Entries that do not depend on the position, evaluated at the origin. For gravity and axes: each is one vector for all
+   bodies. */
 static PetscErrorCode Vector(HycoFE fe, HycoExpr const e[3], PetscReal v[3])
 {
   const PetscReal nowhere[3] = {0, 0, 0};

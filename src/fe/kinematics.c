@@ -87,6 +87,7 @@ PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Without gradients, which many uses do not need, and kept by cell until nodes move. */
 PetscErrorCode HycoPointWeights(HycoFE fe, const HycoElement *el, PetscInt cell, const PetscReal *weight[])
 {
   const PetscInt *node = fe->mesh->cells + cell * fe->mesh->nv;
@@ -109,7 +110,8 @@ PetscErrorCode HycoPointWeights(HycoFE fe, const HycoElement *el, PetscInt cell,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Mean gradients of the cells of bodies with bbar, from the stored gradients. */
+/* Mean gradients of the cells of bodies with bbar, from the stored gradients. kept_mean is NULL while it is filled, so
+   that HycoMeanGradients() computes. */
 static PetscErrorCode KeepMeans(HycoFE fe, const HycoElement *el)
 {
   PetscReal *mean = fe->kept_mean;
@@ -174,7 +176,8 @@ PetscErrorCode HycoMeshCheckCells(HycoMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Mean dilatation of the cell: mean[a][c] = 1/V integral of d(tr eps)/du_ac, the bbar element's volumetric row. */
+/* Mean dilatation of the cell: mean[a][c] = 1/V integral of d(tr eps)/du_ac, the bbar element's volumetric row. Hughes
+   1980: the volumetric strain is the same at all points, so that it cannot lock. */
 PetscErrorCode HycoMeanGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal mean[HYCO_CELL_NODES][3])
 {
   const PetscInt dim = el->dim;
@@ -236,7 +239,7 @@ PetscErrorCode HycoFacetDirection(HycoFE fe, const HycoElement *el, PetscInt fac
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same with the circumference 2 pi r. */
+/* The same with the circumference 2 pi r. n dS times the weight of the quadrature point. */
 PetscErrorCode HycoFacetNormal(HycoFE fe, const HycoElement *el, PetscInt facet, PetscInt q, PetscReal n[3])
 {
   const PetscInt *node = fe->mesh->facets + facet * fe->mesh->nf;

@@ -42,6 +42,7 @@ static inline void Strain2(PetscInt nv, const PetscReal g[], const PetscReal v[]
   strain[3] = xy + yx;
 }
 
+/* Engineering shear strains, in the order xx yy zz xy yz xz. */
 static inline void Strain3(PetscInt nv, const PetscReal g[], const PetscReal v[], PetscReal strain[6])
 {
   PetscReal h[3][3] = {{0}};
@@ -77,6 +78,7 @@ static inline void AddPoint(PetscInt ns, PetscReal w, const PetscReal C[], Petsc
   s->volume += w;
 }
 
+/* All sums of a cell in one loop over its points. */
 static inline void AddCell(PetscInt dim, HycoFE fe, const HycoElement *el, PetscInt e, const PetscReal v[], Sums *sums)
 {
   Sums s = {.volume = 0};
@@ -95,6 +97,7 @@ static inline void AddCell(PetscInt dim, HycoFE fe, const HycoElement *el, Petsc
   *sums = s;
 }
 
+/* *served false: another law, bbar or an axisymmetric scene; the caller takes the general way. */
 PetscErrorCode HycoFELinearFields(HycoFE fe, const PetscReal u[], PetscReal sigma[], PetscReal mises[],
                                   PetscReal *stored, PetscBool *served)
 {

@@ -32,7 +32,7 @@ static PetscBool IsLinear(HycoFE fe, PetscInt cell)
 }
 
 /* The nodes of the linear cells around node i, ascending, in list; returns their number. Insertion keeps the list
-   sorted; a node has at most some tens of neighbours. */
+   sorted; a node has at most some tens of neighbours. The columns of a row of blocks. */
 static PetscInt Neighbours(HycoFE fe, PetscInt n, const PetscInt around[], PetscInt list[])
 {
   const PetscInt nv = fe->mesh->nv;
@@ -87,7 +87,8 @@ static PetscErrorCode ListRows(HycoLinearForce f, const PetscBool nodes[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* For the rows of nodes[] (NULL: all nodes). Only linear bodies enter; others are integrated at each step. */
+/* For the rows of nodes[] (NULL: all nodes). Only linear bodies enter; others are integrated at each step. Internal
+   forces of linear bodies as a product with a matrix: along a path it is the same at each step. */
 PetscErrorCode HycoLinearForceCreate(HycoFE fe, const PetscBool nodes[], HycoLinearForce *force)
 {
   HycoMesh m = fe->mesh;

@@ -26,7 +26,8 @@ static PetscBool AtPoints(HycoMesh m, PetscInt group)
 }
 
 /* Visits each facet and each point with a spring, in the order of the scene's springs; cell: the cell to which it
-   belongs. A point is visited on the process that owns it. */
+   belongs. A point is visited on the process that owns it. around: a cell of each node, which gets the stiffness of a
+   spring at the point. */
 static PetscErrorCode ForEach(HycoFE fe, const PetscInt around[],
                               PetscErrorCode (*visit)(HycoFE, PetscInt spring, PetscInt cell, PetscInt facet,
                                                       PetscInt node, void *),
@@ -159,7 +160,8 @@ static PetscErrorCode PointMatrix(HycoFE fe, const HycoSpring *spring, PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Normal and area at each Gauss point: n n^T dS = (n dS)(n dS)^T / dS. */
+/* Normal and area at each Gauss point: n n^T dS = (n dS)(n dS)^T / dS. By the consistent matrix, which couples the
+   nodes of a facet, and not by lumped springs. */
 static PetscErrorCode FacetMatrix(HycoFE fe, const HycoSpring *spring, PetscInt facet, PetscReal K[])
 {
   HycoMesh m = fe->mesh;
@@ -190,7 +192,8 @@ static PetscErrorCode FacetMatrix(HycoFE fe, const HycoSpring *spring, PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Evaluated when the nodes move or a stiffness changes. */
+/* Evaluated when the nodes move or a stiffness changes. Springs are part of K, assembled with the matrices of their
+   cells. */
 PetscErrorCode HycoSpringsSet(HycoFE fe)
 {
   HycoSprings s = fe->springs;
