@@ -41,7 +41,8 @@ static const char *const foreign[] = {OWN_SOLVERS,
                                       "device_",
                                       NULL};
 
-/* PETSc compares names of options without regard to case. */
+/* PETSc compares names of options without regard to case. PETSc's own objects have options by prefix, which no table
+   lists. */
 static PetscBool BeginsAs(const char *const beginnings[], const char name[])
 {
   for (PetscInt k = 0; beginnings[k]; k++) {
@@ -98,7 +99,8 @@ PetscBool DriverReads(const Command *command, const HycoOption *option)
   return (PetscBool)(strcmp(option->owner, "HycoROM") || !option->only[0] || strstr(option->only, command->name));
 }
 
-/* Fails for an option of the library that no object of the command reads. */
+/* Fails for an option of the library that no object of the command reads. Options of the hyco: section are not checked
+   by command: one scene serves all of them. */
 static PetscErrorCode CheckReaders(const Command *command, const HycoOption *option)
 {
   char readers[DRIVER_LINE] = "";
@@ -139,6 +141,7 @@ static PetscErrorCode CheckName(const Command *command, const HycoOptionList *ow
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Before anything is read or solved, so that a typing error costs no time. */
 PetscErrorCode DriverCheckArguments(const Command *command, int argc, char **argv)
 {
   HycoOptionList own = {0};

@@ -58,6 +58,7 @@ static void Warn(Check *check, const HycoContactInspection *c)
         c->name, c->slave, (double)c->coarse, c->master);
 }
 
+/* One line for each contact, composed of what is known. */
 static PetscErrorCode Print(const HycoContactInspection *c)
 {
   PetscFunctionBegin;

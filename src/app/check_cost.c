@@ -46,6 +46,7 @@ static void Seconds(PetscReal t, char text[32])
     snprintf(text, 32, "%.2g hours", (double)t / 3600);
 }
 
+/* 8 bytes for each number of a solution, stored as it is. */
 static PetscErrorCode PrintTraining(Check *check, HycoSamples samples, cJSON *object)
 {
   const HycoInspection *in = &check->in;

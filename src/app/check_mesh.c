@@ -26,6 +26,7 @@ static PetscErrorCode NameCells(Check *check, char name[HYCO_LINE])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* n_dof counts what is solved for; the printed line adds what supports and ties take. */
 PetscErrorCode CheckReportMesh(Check *check)
 {
   const HycoInspection *in = &check->in;
@@ -100,7 +101,7 @@ PetscErrorCode CheckReportBodies(Check *check)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A user may have confused them. */
+/* A user may have confused them. A warning only: two names for one surface may be meant. */
 static void WarnOfAlike(Check *check, const HycoAlikeGroups *a)
 {
   if (a->letters)

@@ -6,7 +6,8 @@
 
 #define WIDE 10 /* ratio of a range's ends from which polynomials in its logarithm interpolate better */
 
-/* Collected, and printed at the end: among the other lines they would be overlooked. */
+/* Collected, and printed at the end: among the other lines they would be overlooked. Rank 0 prints and reports them;
+   the other ranks have the same list or none. */
 void CheckReportWarning(Check *check, const char format[], ...)
 {
   char line[HYCO_LINE];
@@ -109,6 +110,7 @@ static PetscErrorCode ReadSolve(PetscBool *solve)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The functions that read the options declare them: called without a scene, they only note names and texts. */
 PetscErrorCode DeclareCheck(PetscOptions options)
 {
   char path[PETSC_MAX_PATH_LEN];

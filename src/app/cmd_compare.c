@@ -214,7 +214,7 @@ static PetscErrorCode CompareAll(Points *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -mu, or -mu_NAME for each parameter: a set of one. */
+/* -mu, or -mu_NAME for each parameter: a set of one. Compared as a set, so that report and table have one form. */
 static PetscErrorCode AddOnePoint(HycoScene scene, HycoSamples samples, PetscBool *given)
 {
   PetscReal mu[64];

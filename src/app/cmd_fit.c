@@ -85,7 +85,7 @@ static PetscErrorCode CheckTargets(const char list[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -target_OUTPUT for the outputs of the model. */
+/* -target_OUTPUT for the outputs of the model. Names with errors are found last, when all right ones have been read. */
 static PetscErrorCode ReadTargets(Fit *f)
 {
   const char *names[HYCO_MAX_QUANTITIES];
@@ -106,6 +106,7 @@ static PetscErrorCode ReadTargets(Fit *f)
 
 /* -- the fit, the same on each rank -- */
 
+/* The prediction at the answer is the model's last. */
 static PetscErrorCode Run(Fit *f, const Settings *s)
 {
   HycoPrediction at;
@@ -187,7 +188,7 @@ static PetscErrorCode PrintAnswer(const Fit *f, const PetscReal full[], cJSON *j
     if (full) PetscCall(DriverPrint(", full order %.6g", (double)full[k]));
     PetscCall(DriverPrint("\n"));
   }
-  /* Relative to each target, so that outputs of different units weigh the same. */
+  /* By the scales of the fit, so that outputs of different units weigh the same. */
   cJSON_AddNumberToObject(json, "misfit_model", Mean(f, value));
   PetscCall(DriverPrint("misfit (relative, root mean square): model %.2g", (double)Mean(f, value)));
   if (full) cJSON_AddNumberToObject(json, "misfit_full_order", Mean(f, full));

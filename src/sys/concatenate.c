@@ -23,8 +23,8 @@ PetscErrorCode HycoConcatenate(MPI_Comm comm, PetscInt n, const void *mine, MPI_
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Row k goes to rank to[k]; rows of one sender keep their order. A row is one element of an MPI type, so that
-   counts fit into an int. */
+/* Row k goes to rank to[k]; rows of one sender keep their order. A row is one element of an MPI type, so that counts
+   fit into an int. *got is allocated; rows arrive by sending rank. */
 PetscErrorCode HycoSendRows(MPI_Comm comm, PetscInt n, const PetscMPIInt to[], size_t size, const void *row,
                             PetscInt *n_got, void *got)
 {
