@@ -96,7 +96,7 @@ typedef struct {
   PetscReal *fields;       /* modes of displacement, by body, sample and turn, x m */
   PetscInt nd, *dof, *body; /* the free unknowns of the points' cells (node of the whole mesh times dim plus component,
                                ascending); their bodies */
-  PetscReal *C, *R, *A;     /* their displacements: nd x ns, nd x r, nd x m */
+  PetscReal *C, *R, *A, *Z; /* their displacements: nd x ns, nd x r, nd x m; by rigid motions, nd x p */
 } * HycoBodiesInelastic;
 
 /* What of a parameter is interpolated: itself, its logarithm, or -1 over it. */

@@ -541,6 +541,10 @@ PetscErrorCode HycoFOMAssemble(HycoFOM f, const PetscReal mu[])
   PetscCall(HycoFOMSetParameters(f, mu));
   /* An error in what follows makes the next call assemble everything. */
   f->fe->ready = PETSC_FALSE; /* until everything that depends on it is assembled */
+  /* Motions that contact prevents depend on the masters of now: those of the last point may be on the other side. */
+  f->contact_cpu -= HycoCPU();
+  if (f->searches) HycoOnEach(HycoComm(f), f->fe_surface ? HycoPairsMove(f->fe_surface, &f->pairs) : PETSC_SUCCESS);
+  f->contact_cpu += HycoCPU();
   if (f->fe->stiffness_changed || f->fe->contact_changed) PetscCall(HycoFOMRelease(f));
   if (!f->n_free) PetscCall(CountFree(f));
   if (f->fe->stiffness_changed) {

@@ -1,4 +1,5 @@
 """Floating bodies, and unconstrained bodies: K is singular, the contact problem of the former is not."""
+import csv
 import os
 import subprocess
 import sys
@@ -95,6 +96,25 @@ class Overhang(Case):
                 self.solved(found)
                 self.assertLess(found['n_facing'], found['n_contacts'])
                 self.near(found['contacts']['c']['force'][1], -6, 1e-9)
+
+    def test_travels(self):
+        """A block that contact alone holds at places far apart: as a set each is the single solution, and `check` accepts the range."""
+        grid, axis = Grid(), np.linspace(0, 1, 5)
+        grid.box('quad4', [np.linspace(-6, 7, 53), axis - 1], lambda x: x, 'rail', {'y1': 'seat', 'y0': 'ground'})
+        grid.box('quad4', [axis, axis], lambda x: x, 'block', {'y0': 'under', 'y1': 'top'})
+        self.written('scene: {mesh: mesh.msh, parameters: [place, load]}\nparameter: {place: {range: [-5, 5]}, load: {range: [1, 9]}}\n'
+                     'body: {rail: {young: 1000}, block: {young: 1000, map: {x: x + place}}}\nfixed: {ground: {x: 0, y: 0}, top: {x: 0}}\n'
+                     'pressure: {top: load}\ncontact: {c: {type: surface, slave: seat, master: under, tolerance: 1}}\noutput: {sink: {mean: u_y, group: top}}\n', grid)
+        self.hyco('check', '-scene', 'scene.yaml')
+        single = [self.hyco('solve', '-scene', 'scene.yaml', '-mu', f'{place},6')['outputs']['sink'] for place in (-5, 4.7)]
+        for ranks in (0, 2):
+            for form in ('dual', 'primal'):
+                self.hyco('solve', '-scene', 'scene.yaml', '-values_place', '-5,4.7', '-values_load', 6, '-table', 't.csv', '-hyco_solver_form', form, ranks=ranks)
+                with open(self.path('t.csv'), encoding='ascii') as file:
+                    rows = list(csv.DictReader(file))
+                for row, sink in zip(rows, single):
+                    self.near(float(row['total_contact_force']), 6, 1e-8)
+                    self.near(float(row['sink']), sink, 1e-6)
 
     def test_free_in_a_gap(self):
         """A block pressed on a table between two walls that it does not touch: it stays where it is drawn, and the table has the load."""

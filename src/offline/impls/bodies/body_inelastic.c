@@ -83,9 +83,8 @@ PetscErrorCode HycoBodiesCheckPath(HycoReducer t)
   if (free) PetscCall(PetscStrncpy(name, motions.name[0], sizeof(name)));
   PetscCall(HycoMotionsDestroy(&motions));
   HycoCheckModel(
-      !free,
-      "no support keeps %s, only contact does, which a model of bodies with a history does not support; train "
-      "a hybrid model",
+      !free || !HycoSceneHasFriction(s),
+      "no support keeps %s, only contact does, which a model of bodies with friction does not support: use hyco solve",
       name);
   /* Last, because it evaluates expressions over the ranges. */
   PetscCall(CheckChanges(t));
@@ -356,6 +355,8 @@ static PetscErrorCode FillForces(HycoReducer t, HycoBodiesFactor *factor, const 
     }
     /* Straight into the rows of C: they lie one after the other, by unknown. */
     PetscCall(HycoBodiesReduce(b, factor, many, e, b->inelastic->C + (size_t)first * (size_t)b->ns, work));
+    /* The work of a unit force on the rigid motions is the displacement of its unknown in them. */
+    PetscCall(PetscArraycpy(b->inelastic->Z + first * b->p, work, many * b->p));
     PetscCall(HycoReducerTell(t, "displacements of the cells with laws", first + many, at->n));
   }
   for (PetscInt j = 0; j < MANY; j++) PetscCall(VecDestroy(&e[j]));
@@ -676,6 +677,7 @@ static PetscErrorCode FillCells(HycoReducer t, HycoBodiesFactor *factor, const P
   PetscCall(PetscCalloc1((size_t)at.n * (size_t)in->m + 1, &in->A));
   PetscCall(PetscCalloc1((size_t)at.n * (size_t)b->ns + 1, &in->C));
   PetscCall(PetscCalloc1((size_t)at.n * (size_t)b->r + 1, &in->R));
+  PetscCall(PetscCalloc1(at.n * b->p + 1, &in->Z));
   for (PetscInt k = 0; k < in->m; k++) PetscCall(TakeValues(&at, factor->strain[k], k, in->m, in->A));
   PetscCall(FillForces(t, factor, &at));
   PetscCall(FillLoads(t, factor, &at, u));

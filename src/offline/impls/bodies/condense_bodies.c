@@ -400,6 +400,7 @@ static PetscErrorCode TakeNoStrains(HycoReducer t)
   PetscCall(PetscCalloc1(1, &in->C));
   PetscCall(PetscCalloc1(1, &in->R));
   PetscCall(PetscCalloc1(1, &in->A));
+  PetscCall(PetscCalloc1(1, &in->Z));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

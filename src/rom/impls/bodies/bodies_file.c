@@ -214,6 +214,7 @@ static PetscErrorCode MoveInelastic(HycoROM m, HycoH5 h)
   PetscCall(HycoH5Real(h, "bodies/inelastic/C", &in->nd, b->ns, &in->C));
   PetscCall(HycoH5Real(h, "bodies/inelastic/R", &in->nd, b->r, &in->R));
   PetscCall(HycoH5Real(h, "bodies/inelastic/A", &in->nd, in->m, &in->A));
+  if (b->p) PetscCall(HycoH5Real(h, "bodies/inelastic/Z", &in->nd, b->p, &in->Z));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -12,6 +12,10 @@
   with what their stresses lack of the elastic ones, s = C (e - e_th) - sigma. It is solved by Newton's method; its tangent
   is kept while it contracts, also from step to step. Then the set is checked: forces, and gaps of all contacts; if one is
   violated, the contact problem at alpha gives the next set. The set of a step is the first one of the next.
+
+  Rigid motions x that contact alone prevents do not strain the points. On a set, with G = B Z of the motions and f the
+  work of the loads on them, W_aa L - G x = B P alpha - w and G^T L = f. W_aa is factored with rho G G^T added, which
+  keeps L and moves x by rho f: alone it may be singular where the pins of a body's flexibility are.
 */
 #include "bodies_path.h"
 #include <petscblaslapack.h>
@@ -201,6 +205,11 @@ PetscErrorCode HycoBodiesScale(HycoROM m)
       for (PetscInt j = 0; j < l; j++) w->BP[k * l + j] += value * in->P[o->row_at[e] * l + j];
     }
   }
+  PetscCall(PetscArrayzero(w->G, m->model->pairs.n * b->p));
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) {
+    for (PetscInt e = o->row_start[k]; e < o->row_start[k + 1]; e++)
+      Add(b->p, o->row[e], o->Z + o->row_at[e] * b->p, w->G + k * b->p);
+  }
   PetscCall(PetscMalloc1(in->nd * PetscMax(l, b->r) + 1, &cells));
   for (PetscInt i = 0; i < in->nd * l; i++) cells[i] = in->A[i] / o->kappa[in->body[i / l]];
   TakeStrains(m, l, cells, w->response);
@@ -213,16 +222,37 @@ PetscErrorCode HycoBodiesScale(HycoROM m)
 
 /* -- a set of closed contacts -- */
 
+/* An entry of W_aa, with rho G G^T. */
+static PetscReal SetEntry(const HycoBodiesPath w, PetscInt p, PetscInt k, PetscInt i)
+{
+  PetscReal value = w->column[k][i];
+
+  for (PetscInt d = 0; d < p; d++) value += w->rho * w->G[k * p + d] * w->G[i * p + d];
+  return value;
+}
+
+/* rho: both terms of the diagonal are of one size. */
+static void WeighMotions(HycoBodiesPath w, PetscInt p)
+{
+  PetscReal flexibility = 0, motions = 0;
+
+  for (PetscInt i = 0; i < w->n_set; i++) {
+    flexibility += w->column[w->set[i]][w->set[i]];
+    for (PetscInt d = 0; d < p; d++) motions += PetscSqr(w->G[w->set[i] * p + d]);
+  }
+  w->rho = motions > 0 ? flexibility / motions : 0;
+}
+
 /* Factors W_aa as a whole. *independent: no contact depends on those before it. */
 static PetscErrorCode FactorAll(HycoROM m, PetscBool *independent)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
-  const PetscInt n = w->n_set;
+  const PetscInt n = w->n_set, p = w->bodies.bodies->p;
   PetscBLASInt nb, info = 0;
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < n; k++) {
-    for (PetscInt i = 0; i < n; i++) w->U[k * n + i] = i <= k ? w->column[w->set[k]][w->set[i]] : 0;
+    for (PetscInt i = 0; i < n; i++) w->U[k * n + i] = i <= k ? SetEntry(w, p, w->set[k], w->set[i]) : 0;
   }
   PetscCall(PetscBLASIntCast(n, &nb));
   /* Only the upper triangle is filled; zeros below let FactorEach() share the layout. */
@@ -232,7 +262,7 @@ static PetscErrorCode FactorAll(HycoROM m, PetscBool *independent)
     const PetscReal u = w->U[k * n + k];
 
     /* potrf accepts pivots of round-off size; their forces would be noise of any size. */
-    *independent = (PetscBool)(u * u > DEPENDENT * w->column[w->set[k]][w->set[k]]);
+    *independent = (PetscBool)(u * u > DEPENDENT * SetEntry(w, p, w->set[k], w->set[k]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -242,23 +272,24 @@ static PetscErrorCode FactorAll(HycoROM m, PetscBool *independent)
 static PetscErrorCode FactorEach(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
-  const PetscInt n = w->n_set;
+  const PetscInt n = w->n_set, p = w->bodies.bodies->p;
 
   PetscFunctionBegin;
   w->n_set = 0;
   for (PetscInt k = 0; k < n; k++) {
     const PetscInt contact = w->set[k], rank = w->n_set;
-    PetscReal *u = w->U + (size_t)rank * (size_t)n, pivot = w->column[contact][contact];
+    const PetscReal diagonal = SetEntry(w, p, contact, contact);
+    PetscReal *u = w->U + (size_t)rank * (size_t)n, pivot = diagonal;
 
     for (PetscInt i = 0; i < rank; i++) {
       const PetscReal *other = w->U + (size_t)i * (size_t)n;
 
-      u[i] = w->column[contact][w->set[i]];
+      u[i] = SetEntry(w, p, contact, w->set[i]);
       for (PetscInt d = 0; d < i; d++) u[i] -= other[d] * u[d];
       u[i] /= other[i];
       pivot -= u[i] * u[i];
     }
-    if (!(pivot > DEPENDENT * w->column[contact][contact])) continue;
+    if (!(pivot > DEPENDENT * diagonal)) continue;
     u[rank] = PetscSqrtReal(pivot);
     w->set[w->n_set++] = contact;
   }
@@ -279,6 +310,7 @@ static PetscErrorCode Factor(HycoROM m)
   PetscCall(PetscMalloc1((size_t)w->n_set * (size_t)w->n_set + 1, &w->U));
   /* Columns are kept for the path: a contact that closes again costs nothing. */
   for (PetscInt k = 0; k < w->n_set; k++) PetscCall(Column(m, w->set[k]));
+  WeighMotions(w, w->bodies.bodies->p);
   PetscCall(FactorAll(m, &independent));
   if (!independent) PetscCall(FactorEach(m));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -296,6 +328,56 @@ static void SolveOnSet(const HycoBodiesPath w, PetscInt k, PetscReal X[])
   /* X^T is stored: X^T <- X^T U^-1 U^-T */
   BLAStrsm_("R", "U", "N", "N", &columns, &n, &one, w->U, &n, X, &columns);
   BLAStrsm_("R", "U", "T", "N", &columns, &n, &one, w->U, &n, X, &columns);
+}
+
+/* Y = W_aa^-1 G, and G^T Y, whose size is p: W_aa^-1 is positive definite, so that it is singular only where the set does
+   not determine a motion. */
+static PetscErrorCode TakeMotions(HycoBodiesPath w, PetscInt p)
+{
+  PetscBLASInt n, info = 0;
+
+  PetscFunctionBegin;
+  w->loose = PETSC_FALSE;
+  if (!p) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoFreeAll(&w->Y, &w->H);
+  PetscCall(PetscMalloc1(w->n_set * p + 1, &w->Y));
+  PetscCall(PetscCalloc1(p * p, &w->H));
+  for (PetscInt i = 0; i < w->n_set; i++) PetscCall(PetscArraycpy(w->Y + i * p, w->G + w->set[i] * p, p));
+  SolveOnSet(w, p, w->Y);
+  for (PetscInt i = 0; i < w->n_set; i++) {
+    for (PetscInt d = 0; d < p * p; d++) w->H[d] += w->G[w->set[i] * p + d / p] * w->Y[i * p + d % p];
+  }
+  PetscCall(PetscBLASIntCast(p, &n));
+  LAPACKpotrf_("U", &n, w->H, &n, &info);
+  for (PetscInt d = 0; d < p && !info; d++) info = !(PetscSqr(w->H[d * (p + 1)]) > DEPENDENT * w->H[0] * w->H[0]);
+  w->loose = (PetscBool)(info != 0);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The forces X = W_aa^-1 (given), n_set x k, and the motions x, p x k, with G^T X = work (k = 1), or 0 (NULL). */
+static PetscErrorCode Balance(HycoBodiesPath w, PetscInt p, PetscInt k, const PetscReal work[], PetscReal X[],
+                              PetscReal x[])
+{
+  PetscBLASInt n, columns, info;
+  PetscReal *right;
+
+  PetscFunctionBegin;
+  SolveOnSet(w, k, X);
+  if (!p || w->loose) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscCalloc1(p * k + 1, &right)); /* by columns of p */
+  for (PetscInt j = 0; j < p * k; j++) {
+    right[j] = work ? work[j % p] : 0;
+    for (PetscInt i = 0; i < w->n_set; i++) right[j] -= w->G[w->set[i] * p + j % p] * X[i * k + j / p];
+  }
+  PetscCall(PetscBLASIntCast(p, &n));
+  PetscCall(PetscBLASIntCast(k, &columns));
+  LAPACKpotrs_("U", &n, &columns, w->H, &n, right, &n, &info);
+  for (PetscInt i = 0; i < w->n_set; i++) {
+    for (PetscInt j = 0; j < p * k; j++) X[i * k + j / p] += w->Y[i * p + j % p] * right[j];
+  }
+  for (PetscInt j = 0; j < p * k; j++) x[j % p * k + j / p] = right[j] - (work ? w->rho * work[j % p] : 0);
+  PetscCall(PetscFree(right));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* S = response + the strains of the forces Z. first: where strains begin in a column. */
@@ -334,7 +416,8 @@ static PetscErrorCode TakeSet(HycoROM m)
   PetscCall(PetscMalloc1(w->n_set * l + 1, &w->Z));
   /* L = W_aa^-1 (B P alpha - w): Z is its derivative by alpha. */
   for (PetscInt i = 0; i < w->n_set; i++) PetscCall(PetscArraycpy(w->Z + i * l, w->BP + w->set[i] * l, l));
-  SolveOnSet(w, l, w->Z);
+  PetscCall(TakeMotions(w, w->bodies.bodies->p));
+  PetscCall(Balance(w, w->bodies.bodies->p, l, NULL, w->Z, w->x));
   PetscCall(AddForces(w, l, n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -353,6 +436,7 @@ PetscErrorCode HycoBodiesMoveCells(HycoROM m, const PetscReal alpha[], const Pet
   PetscCall(Multiply(PETSC_FALSE, in->nd, b->r, in->R, w->bodies.c, 1, 1, cells));
   PetscCall(Multiply(PETSC_FALSE, in->nd, in->m, in->A, alpha, 1, 1, cells));
   for (PetscInt i = 0; i < in->nd; i++) cells[i] /= w->bodies.kappa[in->body[i]];
+  PetscCall(Multiply(PETSC_FALSE, in->nd, b->p, in->Z, w->bodies.x, 1, 1, cells));
   for (PetscInt i = 0; i < w->n_set; i++) {
     Add(in->nd, Lambda[w->set[i]], w->column[w->set[i]] + m->model->pairs.n + w->n_rows, cells);
   }
@@ -385,6 +469,8 @@ static PetscErrorCode TakeLoads(HycoROM m)
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   const HycoBodiesWork o = &w->bodies;
   const HycoBodiesSurface s = HycoBodiesSurfaceOf(m);
+  const PetscInt p = o->bodies->p, r = o->bodies->r;
+  PetscReal *work;
 
   PetscFunctionBegin;
   PetscCall(PetscFree(w->z));
@@ -393,7 +479,10 @@ static PetscErrorCode TakeLoads(HycoROM m)
   PetscCall(PetscArraycpy(w->gap, o->gap, m->model->pairs.n));
   /* At alpha = 0 the set's forces close the gaps that the loads leave: W_aa z = -w. */
   for (PetscInt i = 0; i < w->n_set; i++) w->z[i] = -o->gap[w->set[i]];
-  SolveOnSet(w, 1, w->z);
+  PetscCall(PetscCalloc1(p + 1, &work));
+  PetscCall(Multiply(PETSC_FALSE, p, r, o->work, o->c, 1, 0, work));
+  PetscCall(Balance(w, p, 1, work, w->z, w->x0));
+  PetscCall(PetscFree(work));
   PetscCall(PetscArrayzero(w->e0, w->n_rows));
   PetscCall(Multiply(PETSC_FALSE, w->n_rows, o->bodies->r, w->loads, o->c, 1, 0, w->e0));
   AddSupports(m, w->e0);
@@ -423,12 +512,12 @@ static PetscErrorCode ChooseSet(HycoROM m, const PetscReal Lambda[], PetscBool *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The forces on the set, and whether a condition is violated. */
+/* The forces on the set and the rigid motions, and whether a condition is violated. */
 static PetscErrorCode Check(HycoROM m, const PetscReal alpha[], PetscReal Lambda[], PetscBool *violated)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   const HycoBodiesWork o = &w->bodies;
-  const PetscInt l = o->bodies->inelastic->m;
+  const PetscInt l = o->bodies->inelastic->m, p = o->bodies->p;
   PetscReal most = 0, size = 0;
 
   PetscFunctionBegin;
@@ -448,6 +537,11 @@ static PetscErrorCode Check(HycoROM m, const PetscReal alpha[], PetscReal Lambda
     /* The scale of a violation is the largest gap without forces: near closure all gaps are round-off. */
     if (o->row_start[k] < o->row_start[k + 1]) size = PetscMax(size, PetscAbsReal(o->gap[k]));
   }
+  for (PetscInt d = 0; d < p && !w->loose; d++) {
+    o->x[d] = w->x0[d];
+    for (PetscInt k = 0; k < l; k++) o->x[d] += w->x[d * l + k] * alpha[k];
+  }
+  PetscCall(Multiply(PETSC_FALSE, m->model->pairs.n, p, w->G, o->x, -1, 1, o->gap));
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
     PetscReal gap = o->gap[k];
 

@@ -40,8 +40,8 @@ static PetscErrorCode Settle(HycoROM m, PetscReal t0, PetscReal t1, const PetscR
   HycoBodiesGiven(&w->bodies, &s, Lambda);
   MoveAll(m);
   HycoBodiesMeasure(m, &p->kkt);
-  /* Equilibrium holds by condensation; what is left of it is Newton's residual of alpha. */
-  p->kkt.stationarity = a->residual;
+  /* Equilibrium holds by condensation, but for rigid motions; what is left of it is Newton's residual of alpha. */
+  p->kkt.stationarity = PetscMax(p->kkt.stationarity, a->residual);
   /* Recomputed from U and Lambda: the search's own word is not enough. */
   a->converged = (PetscBool)(HycoKKTMax(&p->kkt) <= 1e-8);
   if (!a->converged) HycoFormat(a->why, "the residual of the contacts is %.1e", (double)HycoKKTMax(&p->kkt));
@@ -321,6 +321,8 @@ static PetscErrorCode Allocate(HycoROM m)
   PetscCall(PetscCalloc1(rows * l + 1, &w->there));
   PetscCall(PetscCalloc1(in->n_points + 1, &w->weight));
   PetscCall(PetscMalloc1(pairs * l + 1, &w->BP));
+  PetscCall(PetscMalloc1(pairs * w->bodies.bodies->p + 1, &w->G));
+  PetscCall(PetscCalloc2(w->bodies.bodies->p * l + 1, &w->x, w->bodies.bodies->p + 1, &w->x0));
   PetscCall(PetscMalloc1(rows * l + 1, &w->response));
   PetscCall(PetscMalloc1(rows * w->bodies.bodies->r + 1, &w->loads));
   PetscCall(PetscMalloc1(rows * l + 1, &w->S));
@@ -410,6 +412,8 @@ static PetscErrorCode Reset(HycoROM m)
   HycoFreeAll(&w->at, &w->cell_at, &w->point, &w->B, &w->T, &w->there, &w->weight, &w->BP, &w->response, &w->loads,
               &w->column, &w->set, &w->U, &w->Z, &w->S, &w->z, &w->e0, &w->gap, &w->last, &w->u, &w->e, &w->s, &w->size,
               &w->lost, &w->X, &w->r, &w->J, &w->pivot);
+  HycoFreeAll(&w->G, &w->Y, &w->H);
+  PetscCall(PetscFree2(w->x, w->x0));
   PetscCall(VecDestroy(&w->alpha));
   PetscCall(VecDestroy(&w->L));
   PetscCall(HycoPathFree(&w->path));

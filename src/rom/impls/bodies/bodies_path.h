@@ -15,6 +15,7 @@ typedef struct _n_HycoBodiesPath {
   PetscReal *B, *T, *there; /* n_rows x (nv dim): strains; n_rows x m: as in HycoBodiesInelastic, at fe's nodes */
   PetscReal *weight;        /* by point: norm of its rows of T */
   PetscReal *BP, *response; /* contacts x m: B P / kappa; n_rows x m: strains by alpha, */
+  PetscReal *G;             /* contacts x p: B Z, of the rigid motions that contact alone prevents */
   PetscReal *loads;         /* and n_rows x r: by loads */
   PetscReal **column;       /* by contact: gaps of all contacts, strains, displacements of the cells for a unit force;
                                NULL: not needed yet */
@@ -23,6 +24,9 @@ typedef struct _n_HycoBodiesPath {
   PetscReal *U;             /* n_set x n_set: upper factor of W_aa */
   PetscReal *Z, *S;         /* n_set x m: forces per alpha; n_rows x m: strains per alpha */
   PetscReal *z, *e0, *gap;  /* n_set, n_rows: the same at alpha = 0; by contact: gaps there, without forces */
+  PetscReal *Y, *H, rho;    /* n_set x p: W_aa^-1 G; p x p: the factor of G^T Y; of G G^T that is added to W_aa */
+  PetscReal *x, *x0;        /* p x m: the rigid motions per alpha; at alpha = 0 */
+  PetscBool loose;          /* the closed contacts do not determine the rigid motions */
   PetscReal *u;             /* n_dof: displacements, in the points' cells */
   PetscReal *e, *s, *size;  /* n_rows: strains; what their stresses lack of the elastic ones; by point: of its terms */
   PetscReal *lost, *X;      /* n_rows x n_sigma: derivative of s; n_rows x m: times S */

@@ -60,7 +60,7 @@ PetscErrorCode HycoBodiesDestroy(HycoSubstructures *bodies)
     HycoBodiesInelastic s = b->inelastic;
 
     HycoFreeAll(&s->point, &s->weight, &s->T, &s->there, &s->P, &s->fields, &s->dof, &s->body, &s->C, &s->R, &s->A,
-                &b->inelastic);
+                &s->Z, &b->inelastic);
   }
   PetscCall(PetscFree(*bodies));
   PetscFunctionReturn(PETSC_SUCCESS);

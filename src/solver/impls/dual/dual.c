@@ -8,6 +8,7 @@
 /* Lemke's dictionary has m^2 entries, all of which change in each of about m pivots: above this number of contacts
    it is not used as a fallback, and neither is the dual form where another form was chosen. */
 #define HYCO_FALLBACK_MAX 3000
+#define HELD              1e-12 /* of a motion's squared length at all contacts: less at closed ones is round-off */
 
 typedef struct {
   PetscInt m, p; /* numbers of contacts, and of unknowns pinned because K is singular: these come before the contacts
@@ -153,6 +154,30 @@ static PetscErrorCode FreeGap(HycoSolver s, const Dual *d, Vec x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether the contacts of the last solution's set prevent all motions that the supports leave. They may have no master any
+   more, where contacts travel. By the pivots of G^T G against those of all contacts. */
+static PetscErrorCode Holds(const Dual *d, PetscBool *holds)
+{
+  const size_t n = (size_t)(d->p + d->m), p = (size_t)d->p;
+  PetscReal *gram, *all;
+  PetscBLASInt size, info = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc2(p * p, &gram, p, &all));
+  for (size_t i = p; i < n; i++) {
+    const PetscReal *row = d->S + i * n;
+
+    for (size_t k = 0; k < p; k++) all[k] += row[k] * row[k];
+    for (size_t k = 0; k < p * p && d->active[i - p]; k++) gram[k] += row[k / p] * row[k % p];
+  }
+  PetscCall(PetscBLASIntCast(d->p, &size));
+  LAPACKpotrf_("U", &size, gram, &size, &info);
+  *holds = (PetscBool)!info;
+  for (size_t k = 0; k < p && *holds; k++) *holds = (PetscBool)(gram[k * p + k] * gram[k * p + k] > HELD * all[k]);
+  PetscCall(PetscFree2(gram, all));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Solves the dense problem by the current method. Floating bodies start with every contact closed. */
 static PetscErrorCode SolveForces(HycoSolver s, Dual *d, Vec start, PetscBool *solved)
 {
@@ -172,6 +197,7 @@ static PetscErrorCode SolveForces(HycoSolver s, Dual *d, Vec start, PetscBool *s
   PetscFunctionBegin;
   if (d->p) HycoFormat(name, "dual, %d rigid motions held by contact", (int)d->p);
   PetscCall(HycoSolverNameMethod(s, name));
+  if (s->warm && d->started && d->p) PetscCall(Holds(d, &d->started));
   /* A cold start: no contact closed, or all for floating bodies, which are otherwise singular. */
   for (PetscInt i = 0; i < d->m && (!s->warm || !d->started); i++) d->active[i] = (PetscBool)(d->p > 0);
   /* At each attempt: a fallback uses another method with the same object. */
