@@ -74,7 +74,7 @@ def numbers(found):
 
 
 def refused(entry):
-    return ["", "", "refused: " + entry["train"]["refused"].split(":")[0].split(" (")[0], "", "", "", ""]
+    return ["", "", "refused: " + entry["train"]["refused"].split(":")[0].split(" (")[0].replace("the model misses its own", "misses its"), "", "", "", ""]
 
 
 def measured(entry, contact):

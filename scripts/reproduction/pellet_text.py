@@ -11,11 +11,11 @@ over its {contacts} steps with contact (from step {first} on). *paper* in the co
 forces, the top of the pellet, contact nodes within 0.1 mm (without: *no extension*), and one layer (*no layer*).
 
 {numbers}
-The RID's share of the force is that of S3's full-order contact force, at the loads 0.6 / 0.8 / 1. The
-speed-up is the median over the steps, relative to a full order that keeps its factor ({full_ms} ms per step here, {ms} ms
-reduced), and {ramp} over the whole ramp with its one factorisation; the paper's 10 (8.5 on the rope) is relative to an active set with a new matrix in each iteration.
+The RID's share is that of S3's full-order contact force, at the loads 0.6 / 0.8 / 1. The
+speed-up is the median over the steps, relative to a full order that keeps its factor ({full_ms} ms per step, {ms} ms
+reduced), and {ramp} over the whole ramp; the paper's 10 is relative to an active set with a new matrix in each iteration.
 
-The accuracy is not monotone in modes, radii or layers, because DEIM's few elements change with each of them. According to the paper, the model is half as accurate without
+The accuracy is not monotone in modes, radii or layers, because DEIM's few elements change with each. In the paper the model is half as accurate without
 the extension; here the error over a larger RID need not fall.
 
 ## Why the paper's 1 % and 5 % cannot come from S1 and S2
@@ -27,8 +27,8 @@ smallest maximum error in the RID that any coefficients can reach, for displacem
 elements that depend on these alone) separately:
 
 {bounds}
-No model with these modes has a displacement error over the RID below {least} %, whereas the paper states 1, or a stress error
-below {least_sigma} %, whereas the paper states 5: the bounds exclude its number for {excluded}. With 9 radii at 1e-10, the same settings give {fine_u} and {fine_sigma} %. Crosses at the bottom mark steps that did not converge:
+No model with these modes has a displacement error over the RID below {least} % (paper: 1), or a stress error
+below {least_sigma} % (paper: 5): the bounds exclude its number for {excluded}. With 9 radii at 1e-10, the same settings give {fine_u} and {fine_sigma} %. Crosses at the bottom mark steps that did not converge:
 
 ![errors by step]({folder}/pellet-errors.png)
 

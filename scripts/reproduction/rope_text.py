@@ -4,7 +4,7 @@ TEXT = """\
 # Reproduction of the paper's figures and tables: the rope (section 6)
 
 `scripts/reproduce` writes this page from its runs. Errors are relative, in percent, mean / max over {test_grid} points in the cell centres of the parameter box, unless
-stated otherwise. The paper's curves and maps are pictures without data, of which only the shapes can be compared; its numbers are shown beside ours.
+stated otherwise. Of the paper's curves and maps, pictures without data, only the shapes can be compared.
 
 ## What the paper does not specify
 
@@ -16,8 +16,6 @@ stated otherwise. The paper's curves and maps are pictures without data, of whic
 | norm of the dual POD for the RID | the dual norm of H1: {dual} vector at 1e-1 (paper: 1) |
 
 ## The numbers
-
-The last two columns count test points without a converged solution, and those that needed the fallback solver.
 
 {numbers}
 - **Regular grid.** The RID has the paper's size, {nodes} nodes, {a} of them in A, and contains {covered} % of the contact force on average ({least} % at least).
@@ -31,7 +29,7 @@ The last two columns count test points without a converged solution, and those t
 
 ![figure 4]({folder}/figure-04.png)
 
-As in the paper, displacements need few vectors and forces many; {slow} iterations help NNMF only for large k. Both POD curves end at round-off.
+As in the paper, displacements need few vectors and forces many; {slow} iterations help NNMF only for large k.
 
 ![figure 5]({folder}/figure-05.png)
 
@@ -51,7 +49,7 @@ With the paper's settings and all of A full order, then with the accurate settin
 
 ![figure 9]({folder}/figure-09.png)
 
-Ours, and the paper's in brackets; unknowns are the displacements and forces of A; our speed-up is the median over the test grid, with reconstruction, over a tridiagonal
+Ours, and the paper's in brackets; unknowns are the displacements and forces of A; our speed-up, the median over the test grid, is over a tridiagonal
 solve on 100 nodes, which leaves nothing to gain (the paper's: over a plain active set):
 
 {table_1}
@@ -61,7 +59,7 @@ against {at_pb14}; over the test points {rid_force} and {all_force} against {pb_
 
 ## Figure 10: greedy training by the indicator (43)
 
-Mean errors over {history_grid} points, every few iterations up to {iterations}, and the indicator's mean over its training points. The projection-based models have the same solutions.
+Mean errors over {history_grid} points, every few iterations up to {iterations}, and the indicator's mean over its training points, of models with the same solutions.
 
 ![figure 10]({folder}/figure-10.png)
 
@@ -73,7 +71,7 @@ Mean errors at the end, in percent:
 | hybrid, 1e-14 and a layer | {u_h1_greedy_fine} | {u_greedy_fine} | {lambda_rid_dual_greedy_fine} | {lambda_rid_greedy_fine} |
 | projection-based | {u_h1_pb_on_paper} | {u_pb_on_paper} | {lambda_rid_dual_pb_on_paper} | {lambda_rid_pb_on_paper} |
 
-In the paper the hybrid model is also better in displacement, and equal in the dual norm; ours with the paper's thresholds only in the 2-norm of the forces, with the
+In the paper the hybrid model is also better in displacement, and equal in the dual norm; ours with the paper's thresholds only in the 2-norm of the forces, with
 accurate settings in all four. The indicator's mean at 1e-10 is above the mean error at {above_u} of the {judged} evaluated iterations for the displacement, at
 {above_lambda} for the forces; in the paper it overestimates both.
 
@@ -84,7 +82,7 @@ The hybrid models have the same solutions, each with its own RID (in the paper i
 ![figure 11]({folder}/figure-11.png)
 
 At the end the error of the displacement is {u_greedy_pb} (projection-based) and {u_hr_on_pb} (hybrid), of the forces {lambda_rid_greedy_pb} and {lambda_rid_hr_on_pb};
-in the paper the hybrid model is much better in both. The indicator (45), a length, falls with the error, as in the paper. In all histories together, {failed} predictions
+in the paper the hybrid model is much better in both. The indicator (45) falls with the error, as in the paper. In all histories together, {failed} predictions
 did not converge; the means exclude them.
 
 ## Figure 12: errors after the greedy training

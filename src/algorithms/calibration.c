@@ -11,7 +11,8 @@
 #define FAR        1.4  /* no value lies above the limit by more: logarithms, a factor of 4 */
 
 /* c >= 0 that minimises |X c - y|^2 about the means, regularised. The ridge is added as p rows; the means are
-   removed, since the constant is fitted separately. */
+   removed, since the constant is fitted separately. Exponents must not be negative: an estimate never falls as a
+   feature grows. */
 static PetscErrorCode Fit(PetscInt n, PetscInt p, const PetscReal X[], const PetscReal y[], PetscReal c[])
 {
   const PetscInt rows = n + p;
@@ -81,7 +82,7 @@ static PetscReal Above(PetscInt p, const PetscReal X[], PetscReal y, const Petsc
   return y;
 }
 
-/* Values of one group (of one solution) are not independent. */
+/* Values of one group (of one solution) are not independent. Quadratic, for some hundred rows. */
 static PetscInt CountGroups(PetscInt n, const PetscInt group[])
 {
   PetscInt count = 0;
@@ -96,7 +97,7 @@ static PetscInt CountGroups(PetscInt n, const PetscInt group[])
 }
 
 /* c[p]: the constant such that `share` of the y lie below the formula with exponents c[0 .. p). X: n x p by rows, in
-   logarithms. */
+   logarithms. The exponents stay: for errors of too few rows to fit their own. */
 PetscErrorCode HycoRaiseBound(PetscInt n, const PetscInt group[], PetscInt p, const PetscReal X[], const PetscReal y[],
                               PetscReal share, PetscReal c[])
 {
@@ -137,8 +138,9 @@ static PetscErrorCode LeaveOut(PetscInt n, PetscInt telling, const PetscInt grou
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Exponents c[0 .. p) from the first `telling` rows, and the constant c[p] from all n rows, judged by fits without
-   each row's group. Share of values below: `share`. */
+/* Exponents c[0 .. p) from the first `telling` rows, and the constant c[p] from all n rows, judged by fits without each
+   row's group. Share of values below: `share`. Rows beyond `telling` have errors of round-off, which say nothing of the
+   exponents. */
 PetscErrorCode HycoUpperBound(PetscInt n, PetscInt telling, const PetscInt group[], PetscInt p, const PetscReal X[],
                               const PetscReal y[], PetscReal share, PetscReal c[])
 {

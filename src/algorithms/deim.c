@@ -2,7 +2,7 @@
 #include <hycoalgorithms.h>
 #include <petscblaslapack.h>
 
-/* values[k][j] = V[rows[k], j] on every rank, by a sum in which one rank has the row. Collective. */
+/* values[k][j] = V[rows[k], j] on every rank, by a sum in which one rank has the row. Collective. Rows may repeat. */
 PetscErrorCode HycoGatherRows(Mat V, PetscInt n, const PetscInt rows[], PetscReal values[])
 {
   PetscInt lo, hi, cols, lda;
@@ -24,7 +24,8 @@ PetscErrorCode HycoGatherRows(Mat V, PetscInt n, const PetscInt rows[], PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* c: V[index[0..k), 0..k) c = V[index[0..k), k]. Row-wise storage of `rows`, column-wise for LAPACK. */
+/* c: V[index[0..k), 0..k) c = V[index[0..k), k]. Row-wise storage of `rows`, column-wise for LAPACK. Regular in exact
+   arithmetic, as each row was chosen where the residual is not zero. */
 static PetscErrorCode Interpolate(PetscInt k, PetscInt l, const PetscReal rows[], PetscReal c[])
 {
   PetscReal *A;
@@ -44,7 +45,8 @@ static PetscErrorCode Interpolate(PetscInt k, PetscInt l, const PetscReal rows[]
 }
 
 /* index[k] (global row): where mode k differs most from its interpolation by the former ones; among entries equal to
-   1e-10 the lowest row, so that the choice is the same on any number of ranks. Collective. */
+   1e-10 the lowest row, so that the choice is the same on any number of ranks. Collective. The greedy algorithm of
+   Chaturantabut and Sorensen (2010). */
 PetscErrorCode HycoDEIM(Mat V, PetscInt index[])
 {
   PetscInt l, lo, hi, lda;

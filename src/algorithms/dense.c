@@ -35,7 +35,7 @@ PetscErrorCode HycoPivotColumns(PetscInt m, PetscInt n, PetscReal A[], PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* P (n x m) = A^+ by the SVD; singular values below tol of the largest are dropped. */
+/* P (n x m) = A^+ by the SVD; singular values below tol of the largest are dropped. By columns; zero if A is empty. */
 PetscErrorCode HycoPseudoInverse(PetscInt m, PetscInt n, const PetscReal A[], PetscReal tol, PetscReal P[])
 {
   const PetscInt k = PetscMin(m, n);
@@ -118,8 +118,8 @@ static PetscReal LargestOfSquare(PetscBLASInt n, const PetscReal A[], const Pets
   return value;
 }
 
-/* Sign of det A and the reciprocal of its condition number, both from one LU factorisation; *ratio 0: singular. For
-   the search of turning points. */
+/* Sign of det A and the reciprocal of its condition number, both from one LU factorisation; *ratio 0: singular. For the
+   search of turning points. Estimates, not an SVD: it is called for every point of a scan. */
 PetscErrorCode HycoSingularity(PetscInt n, const PetscReal A[], PetscInt *sign, PetscReal *ratio)
 {
   PetscReal *LU, *x, *y, large, inverse;

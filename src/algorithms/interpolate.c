@@ -40,7 +40,8 @@ static PetscErrorCode KeepDifferent(HycoInterpolant it, const PetscReal points[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* To [0, 1]; a parameter with one value keeps the width 1. */
+/* To [0, 1]; a parameter with one value keeps the width 1. Simplices of parameters of different units would be
+   arbitrarily flat otherwise. */
 static PetscErrorCode Scale(HycoInterpolant it, const PetscReal points[])
 {
   PetscFunctionBegin;
@@ -70,7 +71,8 @@ static PetscInt Place(PetscInt n, const PetscReal value[], PetscReal x, PetscRea
   return i;
 }
 
-/* Finds axes and nodes if every combination of the points' values is a point. */
+/* Finds axes and nodes if every combination of the points' values is a point. it->at stays NULL where the points are no
+   grid. */
 static PetscErrorCode FindGrid(HycoInterpolant it)
 {
   PetscReal nodes = 1;
@@ -226,8 +228,8 @@ PetscErrorCode HycoInterpolantDestroy(HycoInterpolant *interpolant)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Weights of the corners of the box around x. Parameters at a node of their axis do not double the number of
-   corners. */
+/* Weights of the corners of the box around x. Parameters at a node of their axis do not double the number of corners.
+   Multilinear: exact at the nodes, continuous between. */
 static void GridWeights(HycoInterpolant it, const PetscReal x[], PetscReal weight[])
 {
   PetscInt place[HYCO_INTERPOLANT_MAX_DIM];
@@ -260,7 +262,8 @@ static void GridWeights(HycoInterpolant it, const PetscReal x[], PetscReal weigh
 }
 
 /* Barycentric coordinates in the first simplex that contains x; outside all, in the one with the least negative
-   coordinates, clipped to its faces. A linear search: models have some hundred simplices. */
+   coordinates, clipped to its faces. A linear search: models have some hundred simplices. Piecewise linear on the
+   Delaunay triangulation. */
 static void SimplexWeights(HycoInterpolant it, const PetscReal x[], PetscReal weight[])
 {
   const PetscInt dim = it->dim;

@@ -8,8 +8,8 @@ typedef struct {
   PetscReal *Q, *R, *y;
 } Passive;
 
-/* Appends column j of A by modified Gram-Schmidt, twice; false if it depends on the present ones. Dependent: less
-   than 1e-12 of its length remains. */
+/* Appends column j of A by modified Gram-Schmidt, twice; false if it depends on the present ones. Dependent: less than
+   1e-12 of its length remains. f->y is Q^T b, so that the solution on the set is one back substitution. */
 static PetscBool Append(Passive *f, const PetscReal A[], const PetscReal b[], PetscInt j)
 {
   const PetscInt m = f->m, k = f->k;
@@ -72,7 +72,7 @@ PetscInt HycoNNLSStep(PetscInt k, const PetscInt p[], const PetscReal z[], Petsc
 }
 
 /* Moves from x towards z until an entry becomes 0, which then leaves the set; true if z itself is reached. The
-   factorisation is made anew from the entries that stay: removals are rare. */
+   factorisation is made anew from the entries that stay: removals are rare. The inner loop of Lawson and Hanson. */
 static PetscBool MoveTowards(Passive *f, const PetscReal A[], const PetscReal b[], const PetscReal z[], PetscReal x[],
                              PetscBool passive[])
 {

@@ -54,7 +54,8 @@ static PetscErrorCode Gradient(const Half *h, const PetscReal X[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* next = [X - alpha gradient]_+; whether the decrease is at least a hundredth of the linear prediction. */
+/* next = [X - alpha gradient]_+; whether the decrease is at least a hundredth of the linear prediction. The condition
+   is that of Lin (2007), which needs no value of the function. */
 static PetscErrorCode Try(const Half *h, const PetscReal X[], PetscReal alpha, PetscBool *enough)
 {
   PetscReal slope = 0, curve = 0;
@@ -72,7 +73,7 @@ static PetscErrorCode Try(const Half *h, const PetscReal X[], PetscReal alpha, P
 }
 
 /* Projected gradients on one half until their norm is below tol; returns their number. The step length of the last
-   iteration is tried first. */
+   iteration is tried first. Projected gradients with a line search by factors of ten (Lin 2007). */
 static PetscErrorCode SolveHalf(const Half *h, PetscReal tol, PetscReal X[], PetscInt *its)
 {
   const PetscInt n = h->k * h->n;
@@ -100,8 +101,8 @@ static PetscErrorCode SolveHalf(const Half *h, PetscReal tol, PetscReal X[], Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The larger one of the parts of u v^T with u and v split by sign: its sign and size. The smaller part is zeroed by
-   the start; signs of singular vectors are arbitrary. */
+/* The larger one of the parts of u v^T with u and v split by sign: its sign and size. The smaller part is zeroed by the
+   start; signs of singular vectors are arbitrary. size: the product of both parts' lengths. */
 static PetscReal LargerPart(PetscInt m, const PetscReal u[], PetscInt n, const PetscReal v[], PetscInt stride,
                             PetscReal *sign, PetscReal *length_u, PetscReal *length_v)
 {
@@ -116,7 +117,8 @@ static PetscReal LargerPart(PetscInt m, const PetscReal u[], PetscInt n, const P
   return size[*sign < 0];
 }
 
-/* NNDSVD of S: Wt (k x m) and H (k x n). Columns beyond the numerical rank of S are zero and stay zero. */
+/* NNDSVD of S: Wt (k x m) and H (k x n). Columns beyond the numerical rank of S are zero and stay zero. Boutsidis and
+   Gallopoulos (2008): deterministic, so that training is repeatable. */
 static PetscErrorCode Start(PetscInt m, PetscInt n, const PetscReal S[], PetscInt k, PetscReal Wt[], PetscReal H[])
 {
   const PetscInt r = PetscMin(m, n);
@@ -150,7 +152,7 @@ static PetscErrorCode Start(PetscInt m, PetscInt n, const PetscReal S[], PetscIn
 }
 
 /* min over Y >= 0 of |S - Y^T X| (X given) or |S - X^T Y|: sets the Gram matrix and right-hand side of the other
-   factor. S: m x n; `of_W`: Y is Wt, else H. */
+   factor. S: m x n; `of_W`: Y is Wt, else H. Each half is a convex problem with k x k matrices. */
 static PetscErrorCode SetHalf(PetscInt m, PetscInt n, PetscInt k, const PetscReal S[], PetscBool of_W,
                               const PetscReal other[], PetscReal G[], PetscReal C[], Half *h)
 {

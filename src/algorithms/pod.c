@@ -23,7 +23,7 @@ PetscErrorCode HycoPODCreateSVD(MPI_Comm comm, SVD *svd)
 }
 
 /* The smallest l whose left-out energy is at most tol of the whole (18); values below noise times the first are
-   round-off. Summed from the smallest. */
+   round-off. Summed from the smallest. 0 modes if all values are zero. */
 PetscInt HycoPODRank(PetscInt k, const PetscReal s[], PetscReal tol, PetscReal noise, PetscInt max_modes)
 {
   PetscReal total = 0, tail = 0;
@@ -97,7 +97,7 @@ static PetscErrorCode Solve(SVD svd, Mat S, PetscInt most, PetscBool *fixed)
 }
 
 /* The first k left singular vectors, distributed like the rows of S. SLEPc stores them by its own vectors; a dense
-   matrix is what the models need. */
+   matrix is what the models need. Those of the last solve of svd. */
 static PetscErrorCode GetVectors(SVD svd, Mat S, PetscInt k, Mat *V)
 {
   PetscInt N, rows;
@@ -241,7 +241,7 @@ PetscErrorCode HycoPOD(SVD svd, Mat S, PetscReal tol, PetscReal noise, PetscInt 
 }
 
 /* POD from a Gram matrix G (n x n): W (n x l) such that S W has orthonormal columns. Eigenvalues are squares, hence
-   values below 1e-7 of the first are round-off. The caller frees W. */
+   values below 1e-7 of the first are round-off. The caller frees W. sigma: n values, those beyond l included. */
 PetscErrorCode HycoPODGram(PetscInt n, const PetscReal G[], PetscReal tol, PetscReal noise, PetscReal **W, PetscInt *l,
                            PetscReal sigma[])
 {

@@ -6,7 +6,7 @@
 */
 #include <hycoalgorithms.h>
 
-/* Overwrites V by V diag(sigma). */
+/* Overwrites V by V diag(sigma). The scaled modes stand for the columns that they came from. */
 static PetscErrorCode ScaleModes(Mat V, PetscInt l, const PetscReal sigma[])
 {
   PetscInt rows, lda;

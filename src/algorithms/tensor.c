@@ -77,7 +77,7 @@ PetscInt HycoTensorSize(const HycoTensor *t)
   return size;
 }
 
-/* Weights of all nodes (their product over the axes), the last axis fastest. */
+/* Weights of all nodes (their product over the axes), the last axis fastest. Axes of one node have the weight 1. */
 PetscErrorCode HycoTensorWeights(const HycoTensor *t, const PetscReal at[], PetscReal weight[])
 {
   PetscReal *w;

@@ -9,7 +9,8 @@
 #include <petscblaslapack.h>
 #include <slepc/private/svdimpl.h>
 
-/* SLEPc asks for the space of the solution before the solve. */
+/* SLEPc asks for the space of the solution before the solve. One iteration, all triplets: there is nothing to
+   converge. */
 static PetscErrorCode SetUp(SVD svd)
 {
   PetscBool dense;
@@ -55,7 +56,8 @@ static PetscErrorCode CopyRows(Mat A, Mat B)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* R = U s V^T: R (n x n, its upper triangle) is overwritten by U; Vt: n x n. Workspace by a query of LAPACK. */
+/* R = U s V^T: R (n x n, its upper triangle) is overwritten by U; Vt: n x n. Workspace by a query of LAPACK. The small
+   triangle is the same on every rank, and decomposed by each. */
 static PetscErrorCode DecomposeTriangle(PetscInt n, PetscScalar R[], PetscReal s[], PetscScalar Vt[])
 {
   PetscBLASInt nb, one = 1, lwork = -1, info;
@@ -124,7 +126,8 @@ static PetscErrorCode StoreRight(BV V, PetscInt n, const PetscScalar Vt[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A = Q R, R = U s V^T: left vectors are Q U. */
+/* A = Q R, R = U s V^T: left vectors are Q U. Singular values from R are accurate to round-off of the largest, while a
+   Gram matrix would lose half of the digits. */
 static PetscErrorCode Solve(SVD svd)
 {
   const PetscInt n = svd->ncv;

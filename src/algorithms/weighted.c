@@ -19,7 +19,7 @@ struct _n_HycoWeighted {
   PetscReal *g, *w, *z, *t; /* S^T h, gradient, work, n each; a weighted column of S, m */
 };
 
-/* S is borrowed and must not change. */
+/* S is borrowed and must not change. For problems that differ in weights d and data h only: S, and all room, stays. */
 PetscErrorCode HycoWeightedCreate(PetscInt m, PetscInt n, const PetscReal S[], PetscReal shift, HycoWeighted *weighted)
 {
   HycoWeighted f;
@@ -63,7 +63,8 @@ static void Transposed(HycoWeighted f, const PetscReal t[], PetscReal y[])
   BLASgemv_("T", &m, &n, &one, f->S, &m, t, &inc, &zero, y, &inc);
 }
 
-/* Column j of S^T diag(d) S + shift. Computed at the first use: few columns become passive. */
+/* Column j of S^T diag(d) S + shift. Computed at the first use: few columns become passive. Valid for the d of the
+   present call. */
 static const PetscReal *Gram(HycoWeighted f, PetscInt j)
 {
   const PetscReal *s = f->S + (size_t)j * (size_t)f->m;
@@ -78,7 +79,7 @@ static const PetscReal *Gram(HycoWeighted f, PetscInt j)
 }
 
 /* Makes column j passive; false if it depends on the passive ones. A row of the Cholesky factor, from the known
-   columns. */
+   columns. rest: what is left of the diagonal. */
 static PetscBool Append(HycoWeighted f, PetscInt j)
 {
   const PetscReal *column = Gram(f, j);
@@ -187,7 +188,7 @@ static PetscInt Steepest(HycoWeighted f, PetscReal tol)
   return best;
 }
 
-/* No column is passive at first: the gradient is then S^T h. */
+/* No column is passive at first: the gradient is then S^T h. d and h are borrowed until the next call. */
 static PetscErrorCode Begin(HycoWeighted f, const PetscReal d[], const PetscReal h[], PetscReal x[], PetscReal *size)
 {
   PetscFunctionBegin;

@@ -41,7 +41,8 @@ static const char *const foreign[] = {OWN_SOLVERS,
                                       "device_",
                                       NULL};
 
-/* PETSc compares names of options without regard to case. */
+/* PETSc compares names of options without regard to case. PETSc's own objects have options by prefix, which no table
+   lists. */
 static PetscBool BeginsAs(const char *const beginnings[], const char name[])
 {
   for (PetscInt k = 0; beginnings[k]; k++) {
@@ -65,6 +66,7 @@ static PetscErrorCode ListTakers(const char name[], char list[DRIVER_LINE])
   for (PetscInt c = 0; commands[c].name; c++) {
     HycoOptionList own = {0};
 
+    /* Recorded in a list of its own: the table of the running command stays as it is. */
     PetscCall(HycoOptionsRecord(&own, commands[c].declare));
     if (HycoOptionListFind(&own, name)) PetscCall(HycoListAdd(list, ", ", commands[c].name));
     PetscCall(HycoOptionListDestroy(&own));
@@ -79,6 +81,7 @@ static PetscErrorCode Unknown(const Command *command, const HycoOptionList *own,
   char takers[DRIVER_LINE];
 
   PetscFunctionBegin;
+  /* A renamed option first: its new name is the answer, whoever has it. */
   PetscCall(HycoOptionsCheckName(name));
   PetscCall(ListTakers(name, takers));
   HycoCheck(!takers[0], "hyco %s has no option -%s; these commands have it: hyco %s", command->name, name, takers);
@@ -96,7 +99,8 @@ PetscBool DriverReads(const Command *command, const HycoOption *option)
   return (PetscBool)(strcmp(option->owner, "HycoROM") || !option->only[0] || strstr(option->only, command->name));
 }
 
-/* Fails for an option of the library that no object of the command reads. */
+/* Fails for an option of the library that no object of the command reads. Options of the hyco: section are not checked
+   by command: one scene serves all of them. */
 static PetscErrorCode CheckReaders(const Command *command, const HycoOption *option)
 {
   char readers[DRIVER_LINE] = "";
@@ -137,6 +141,7 @@ static PetscErrorCode CheckName(const Command *command, const HycoOptionList *ow
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Before anything is read or solved, so that a typing error costs no time. */
 PetscErrorCode DriverCheckArguments(const Command *command, int argc, char **argv)
 {
   HycoOptionList own = {0};
@@ -164,6 +169,7 @@ PetscErrorCode DriverRefuseOnly(const char only[], const char reason[])
 
   PetscFunctionBegin;
   PetscCall(PetscGetArgs(&argc, &argv));
+  /* From 2: the program and the command come first. */
   for (int k = 2; k < argc; k++) {
     const HycoOption *option = IsKey(argv[k]) ? HycoOptionFind(argv[k] + (argv[k][1] == '-' ? 2 : 1)) : NULL;
 
@@ -189,6 +195,7 @@ static PetscErrorCode CheckLeft(PetscBool early)
   PetscFunctionBegin;
   PetscCall(PetscOptionsLeftGet(NULL, &n, &names, &values));
   for (PetscInt k = 0; k < n && !first[0]; k++) {
+    /* Early: options of the solvers are read with the first solve, and count as read here. */
     if (early && IsReadLate(names[k])) continue;
     if (strncmp(names[k], "options_left", 12) && strncmp(names[k], "skip_petscrc", 12) && strcmp(names[k], "nox"))
       PetscCall(PetscStrncpy(first, names[k], sizeof(first)));
@@ -247,6 +254,7 @@ PetscErrorCode DriverReadFiles(char scene[], char model[], char output[], char r
   if (table)
     PetscCall(
         DriverGet("table", "<file.csv> a table with a row per point; or <file.h5>, with a dataset per column", table));
+  /* Every command that reports also prints, which -quiet is for. */
   if (report) PetscCall(DriverReadQuiet());
   PetscFunctionReturn(PETSC_SUCCESS);
 }

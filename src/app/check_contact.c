@@ -20,6 +20,7 @@ PetscErrorCode CheckReportTies(Check *check)
     cJSON_AddNumberToObject(one, "n_nodes", t->n_nodes);
     cJSON_AddItemToArray(list, one);
     if (t->coarse > 0) cJSON_AddNumberToObject(one, "slave_over_master", t->coarse);
+    /* A mortar tie integrates over both sides, and does not depend on which is finer. */
     if (t->coarse > COARSER && !t->mortar)
       CheckReportWarning(
           check,
@@ -36,6 +37,7 @@ static void Warn(Check *check, const HycoContactInspection *c)
 {
   const PetscReal length = check->in.length;
 
+  /* One of the three: each explains the next, so that a user mends the first cause. */
   if (!c->n)
     CheckReportWarning(check, "contact %s has no effect: all displacements of every node of %s are fixed", c->name,
                        c->slave);
@@ -47,6 +49,7 @@ static void Warn(Check *check, const HycoContactInspection *c)
     CheckReportWarning(
         check, "contact %s: the smallest gap is %.3g, %.2g of the mesh's extent; small displacements cannot close it",
         c->name, (double)c->gap_min, (double)(c->gap_min / length));
+  /* Contacts that are integrated do not lose force between a coarse slave's nodes. */
   if (c->coarse > COARSER && !c->integrated)
     CheckReportWarning(
         check,
@@ -55,6 +58,7 @@ static void Warn(Check *check, const HycoContactInspection *c)
         c->name, c->slave, (double)c->coarse, c->master);
 }
 
+/* One line for each contact, composed of what is known. */
 static PetscErrorCode Print(const HycoContactInspection *c)
 {
   PetscFunctionBegin;
@@ -89,6 +93,7 @@ PetscErrorCode CheckReportContacts(Check *check)
     cJSON_AddStringToObject(contact, "name", c->name);
     cJSON_AddStringToObject(contact, "type", c->type);
     ReportNumbers(contact, {"n", c->n}, {"n_facing_min", c->facing_min}, {"n_facing_max", c->facing_max});
+    /* Without a node that faces a master there is no gap; a key of an arbitrary value would be read as one. */
     if (c->facing_max) cJSON_AddNumberToObject(contact, "gap_min", c->gap_min);
     if (c->facing_max) cJSON_AddNumberToObject(contact, "gap_max", c->gap_max);
     if (c->between) cJSON_AddNumberToObject(contact, "n_between_nodes", c->between);

@@ -17,7 +17,9 @@ PetscErrorCode CheckReportSolve(Check *check, HycoFOM fom)
   PetscCall(HycoFOMSolve(fom, n, mu));
   PetscCall(PetscFree(mu));
   PetscCall(HycoFOMGetSummary(fom, &s));
+  /* An error, not a warning: a scene that fails at its centre cannot be trained. */
   HycoCheck(s.reason > 0, "the solve at the centre of the ranges: %s", s.why);
+  /* Measured times replace the estimates by operation counts in what follows. */
   check->in.first = s.seconds.total;
   check->in.next = s.seconds.solve;
   PetscCall(DriverPrint("solved at the centre: %d of %d contacts closed, total contact force %.10g\n", (int)s.n_active,
@@ -44,6 +46,7 @@ static void Seconds(PetscReal t, char text[32])
     snprintf(text, 32, "%.2g hours", (double)t / 3600);
 }
 
+/* 8 bytes for each number of a solution, stored as it is. */
 static PetscErrorCode PrintTraining(Check *check, HycoSamples samples, cJSON *object)
 {
   const HycoInspection *in = &check->in;
@@ -89,6 +92,7 @@ PetscErrorCode CheckReportCost(Check *check, HycoSamples samples, PetscBool solv
   PetscCall(HycoSceneGetHistory(check->scene, &n_times, NULL));
   Seconds(in->first, first);
   Seconds(in->next, next);
+  /* A measured history is a whole path; unmeasured, one linear solve is all that can be estimated. */
   if (n_times && solved)
     PetscCall(DriverPrint("a full-order solve of the history, as measured: %s", first));
   else
@@ -100,6 +104,7 @@ PetscErrorCode CheckReportCost(Check *check, HycoSamples samples, PetscBool solv
   cJSON_AddBoolToObject(object, "measured", solved);
   ReportNumbers(object, {"factor_mb", 1e-6 * in->bytes}, {"solve_mb", 1e-6 * (in->resident + in->bytes)},
                 {"seconds_first", in->first}, {"seconds_next", in->next});
+  /* Without a measured path the number of its steps is not known, hence no time of a training. */
   if (!n_times || solved)
     PetscCall(PrintTraining(check, samples, object));
   else

@@ -19,12 +19,14 @@ static PetscErrorCode NameCells(Check *check, char name[HYCO_LINE])
     char one[HYCO_LINE];
 
     cJSON_AddNumberToObject(types, in->type[t], in->cells[t]);
+    /* A single type's number is that of all cells, which has been printed. */
     HycoFormat(one, in->n_types > 1 ? "%s (%d)" : "%s", in->type[t], (int)in->cells[t]);
     PetscCall(HycoListAdd(name, ", ", one));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* n_dof counts what is solved for; the printed line adds what supports and ties take. */
 PetscErrorCode CheckReportMesh(Check *check)
 {
   const HycoInspection *in = &check->in;
@@ -68,6 +70,7 @@ static PetscErrorCode PrintBody(Check *check, const HycoBodyInspection *b)
         "body %s consists of %d parts that share no node; if it should be one piece, the mesh has duplicate "
         "nodes (gmsh: Coherence, or BooleanFragments)",
         b->name, (int)b->n_parts);
+  /* Meshes that were glued without merging nodes: the body would tear there without any message. */
   if (b->n_doubled)
     CheckReportWarning(
         check,
@@ -98,7 +101,7 @@ PetscErrorCode CheckReportBodies(Check *check)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A user may have confused them. */
+/* A user may have confused them. A warning only: two names for one surface may be meant. */
 static void WarnOfAlike(Check *check, const HycoAlikeGroups *a)
 {
   if (a->letters)
@@ -122,6 +125,7 @@ PetscErrorCode CheckReportGroups(Check *check)
   PetscFunctionBegin;
   for (PetscInt k = 0; k < in->n_alike; k++) WarnOfAlike(check, &in->alike[k]);
   for (PetscInt g = 0; g < in->n_groups; g++) {
+    /* Used but empty: a support or load there has no effect. */
     if (in->used[g] && in->empty[g]) CheckReportWarning(check, "the group %s has no nodes of a body", in->group[g]);
     if (in->used[g]) continue;
     cJSON_AddItemToArray(unused, cJSON_CreateString(in->group[g]));

@@ -6,7 +6,8 @@
 
 #define WIDE 10 /* ratio of a range's ends from which polynomials in its logarithm interpolate better */
 
-/* Collected, and printed at the end: among the other lines they would be overlooked. */
+/* Collected, and printed at the end: among the other lines they would be overlooked. Rank 0 prints and reports them;
+   the other ranks have the same list or none. */
 void CheckReportWarning(Check *check, const char format[], ...)
 {
   char line[HYCO_LINE];
@@ -24,6 +25,7 @@ static PetscErrorCode ReportRange(Check *check, const HycoVariableInspection *v,
   const PetscBool *does = v->affects;
 
   PetscFunctionBegin;
+  /* Without a logarithm below 0; and a parameter of maps moves nodes rather than scales the stiffness. */
   if (does[HYCO_AFFECTS_STIFFNESS] && !does[HYCO_AFFECTS_MAPS] && lo > 0 && hi >= WIDE * lo) {
     cJSON_AddItemToArray(cJSON_GetObjectItem(check->json, "wide_ranges"), cJSON_CreateString(v->name));
     PetscCall(DriverPrint("  for a hybrid model, let its logarithm be the parameter: q from %.4g to %.4g, and 10^q in "
@@ -47,6 +49,7 @@ static PetscErrorCode ReportVariable(Check *check, PetscInt p, cJSON *reaches)
 
   PetscFunctionBegin;
   PetscCall(HycoSceneGetParameters(check->scene, &n, NULL, &lo, &hi));
+  /* Variables are ordered: parameters, the time, tables. */
   what = p < n ? "parameter" : p == n ? "time" : "table";
   for (PetscInt k = 0; k < HYCO_N_AFFECTED; k++) {
     if (!v->affects[k]) continue;
@@ -73,6 +76,7 @@ static PetscErrorCode Describe(Check *check)
   PetscFunctionBegin;
   PetscCall(HycoSceneGetParameters(check->scene, &n_par, NULL, NULL, NULL));
   PetscCall(HycoSceneGetHistory(check->scene, &n_times, &times));
+  /* The order of the text: from the mesh to what acts on it. */
   PetscCall(CheckReportMesh(check));
   PetscCall(CheckReportBodies(check));
   PetscCall(CheckReportContacts(check));
@@ -106,6 +110,7 @@ static PetscErrorCode ReadSolve(PetscBool *solve)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The functions that read the options declare them: called without a scene, they only note names and texts. */
 PetscErrorCode DeclareCheck(PetscOptions options)
 {
   char path[PETSC_MAX_PATH_LEN];
@@ -126,9 +131,11 @@ static PetscErrorCode Finish(Check *check)
   const int n = cJSON_GetArraySize(check->warnings);
 
   PetscFunctionBegin;
+  /* Last, all together: warnings between the results would be overlooked. */
   for (int k = 0; k < n; k++)
     PetscCall(DriverPrint("warning: %s\n", cJSON_GetStringValue(cJSON_GetArrayItem(check->warnings, k))));
   PetscCall(DriverPrint("%d warning%s, no error\n", n, n == 1 ? "" : "s"));
+  /* The report takes over the array, and frees it. */
   cJSON_AddItemToObject(check->json, "warnings", check->warnings);
   cJSON_AddNumberToObject(check->json, "n_warnings", n);
   PetscCall(ReportWrite(&check->json));
@@ -152,6 +159,7 @@ PetscErrorCode CommandCheck(void)
   PetscCall(DriverCheckMesh(check.scene));
   PetscCall(DriverGetSamples(check.scene, PETSC_FALSE, &samples, &given));
   PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, check.scene, &fom));
+  /* After HycoFOMCreate(), which reads the options of full order. */
   PetscCall(DriverCheckLeftEarly());
   PetscCall(ReportCreate("check", check.scene, NULL, &check.json));
   check.warnings = cJSON_CreateArray();

@@ -22,6 +22,7 @@ static PetscErrorCode CommonOutputs(HycoScene scene, HycoROM model, Outputs *out
   HycoSceneMatchQuantities(scene, other, at);
   outputs->n = 0;
   for (PetscInt q = 0; q < n; q++) {
+    /* Outputs that one of the two lacks are left out of the comparison, not refused. */
     if (at[q] < 0) continue;
     outputs->full[outputs->n] = q;
     outputs->reduced[outputs->n] = at[q];
@@ -42,6 +43,7 @@ static void FillCommon(const DriverColumns *c, const HycoSummary *s, const HycoP
   v[DRIVER_KKT] = HycoKKTMax(&p->kkt);
   v[DRIVER_SECONDS_FOM] = s->seconds.total;
   v[DRIVER_SECONDS_ROM] = p->seconds.total;
+  /* A negative estimate means none, which a table shows as not a number. */
   for (PetscInt k = 0; k < DRIVER_ESTIMATES; k++) judged[k] = estimate[k] >= 0 ? estimate[k] : NAN;
   judged[DRIVER_ESTIMATES] = p->unseen;
 }
@@ -76,10 +78,12 @@ static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, 
   v[DRIVER_LAMBDA] = e.lambda;
   v[DRIVER_LAMBDA_DUAL] = e.lambda_dual;
   FillCommon(c, &s, &p, v, sliding);
+  /* The fallback solver of the contact problem, not full order. */
   v[c->n_errors + DRIVER_FALLBACK] = p.reason == HYCO_CONVERGED_FALLBACK;
   v[c->n_errors + DRIVER_COVERED] = p.covered_force;
   v[c->n_errors + DRIVER_LAMBDA_NORM] = s.lambda_norm2;
   v[c->n_errors + DRIVER_SIGMA_NORM] = e.sigma_norm2;
+  /* Absolute, in the output's unit: outputs may be zero or change sign. */
   for (PetscInt q = 0; q < outputs->n; q++)
     v[c->outputs + q] = PetscAbsReal(p.quantity[outputs->reduced[q]] - s.quantity[outputs->full[q]]);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -177,6 +181,7 @@ static PetscErrorCode CompareMine(const Points *p)
   PetscReal *unused;
 
   PetscFunctionBegin;
+  /* Ranks other than the group's first compute the same values and drop them. */
   PetscCall(PetscMalloc1(p->columns.n, &unused));
   PetscCall(HycoQueueGetGroup(p->queue, &group));
   PetscCall(HycoFOMCreate(group, p->scene, &fom));
@@ -204,7 +209,7 @@ static PetscErrorCode CompareAll(Points *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -mu, or -mu_NAME for each parameter: a set of one. */
+/* -mu, or -mu_NAME for each parameter: a set of one. Compared as a set, so that report and table have one form. */
 static PetscErrorCode AddOnePoint(HycoScene scene, HycoSamples samples, PetscBool *given)
 {
   PetscReal mu[64];
@@ -249,6 +254,7 @@ PetscErrorCode CommandCompare(void)
   PetscCall(DriverRequire("model", file));
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &scene));
   PetscCall(DriverCheckMesh(scene));
+  /* A model on every rank, since each group of ranks predicts its own points. */
   HycoOnEach(PETSC_COMM_WORLD, HycoROMLoad(file, &model));
   PetscCall(HycoROMCheckScene(model, scene));
   PetscCall(DriverGetSamples(scene, PETSC_FALSE, &samples, &given));
@@ -264,9 +270,11 @@ PetscErrorCode CommandCompare(void)
   PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
   PetscCall(DriverCompareColumns((PetscBool)(n_times > 0), p.outputs.n, p.outputs.names, &p.columns));
   p.sliding = &sliding;
+  /* Afterwards rank 0 has all rows. */
   PetscCall(CompareAll(&p));
   HycoAllreduce(&sliding, 1, MPIU_REAL, MPI_MAX, PETSC_COMM_WORLD);
   rows = DriverRowsOfRoot(p.n, p.columns.n, p.value, &all);
+  /* Before the report, which fails if a prediction did not converge. */
   if (table[0]) PetscCall(DriverWriteTable(table, scene, p.mu, p.columns.names, &rows));
   PetscCall(DriverWarnSliding(sliding));
   PetscCall(DriverReportComparison(scene, contact, &p.columns, p.n, p.value));

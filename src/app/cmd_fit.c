@@ -59,7 +59,9 @@ static PetscErrorCode ReadTarget(Fit *f, PetscInt output, const char name[])
   PetscFunctionBegin;
   PetscCall(PetscSNPrintf(key, sizeof(key), "target_%s", name));
   PetscCall(DriverGet(key, "", text));
+  /* Outputs without a target are free. */
   if (!text[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Infinite targets would pass strtod(); no misfit could reach them. */
   f->target[f->n] = strtod(text, &end);
   HycoCheck(end != text && !*end && !PetscIsInfOrNanReal(f->target[f->n]), "-%s is \"%s\"; a number is expected", key,
             text);
@@ -76,6 +78,7 @@ static PetscErrorCode CheckTargets(const char list[])
   PetscFunctionBegin;
   PetscCall(PetscOptionsLeftGet(NULL, &left, &keys, &values));
   for (PetscInt k = 0; k < left; k++) {
+    /* Those left over: ReadTarget() has read the ones of the model's outputs. */
     if (strncasecmp(keys[k], "target_", 7) == 0) PetscCall(PetscStrncpy(bad, keys[k], sizeof(bad)));
   }
   PetscCall(PetscOptionsLeftRestore(NULL, &left, &keys, &values));
@@ -83,7 +86,7 @@ static PetscErrorCode CheckTargets(const char list[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -target_OUTPUT for the outputs of the model. */
+/* -target_OUTPUT for the outputs of the model. Names with errors are found last, when all right ones have been read. */
 static PetscErrorCode ReadTargets(Fit *f)
 {
   const char *names[HYCO_MAX_QUANTITIES];
@@ -110,6 +113,7 @@ static PetscErrorCode ReadTargets(Fit *f)
 
 /* -- the fit, the same on each rank -- */
 
+/* The prediction at the answer is the model's last. */
 static PetscErrorCode Run(Fit *f, const Settings *s)
 {
   HycoPrediction at;
@@ -135,6 +139,7 @@ static PetscErrorCode LoadScene(const Fit *f, const char path[], HycoScene *scen
   PetscFunctionBegin;
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, scene));
   PetscCall(DriverCheckMesh(*scene));
+  /* The full-order solution would otherwise answer for another scene. */
   PetscCall(HycoROMCheckScene(f->model, *scene));
   PetscCall(HycoSceneGetQuantities(f->scene, &n, names));
   HycoSceneMatchQuantities(f->scene, *scene, at);
@@ -199,6 +204,7 @@ static PetscErrorCode PrintAnswer(const Fit *f, const PetscReal full[], cJSON *j
     if (full) PetscCall(DriverPrint(", full order %.6g", (double)full[k]));
     PetscCall(DriverPrint("\n"));
   }
+  /* By the scales of the fit, so that outputs of different units weigh the same. */
   cJSON_AddNumberToObject(json, "misfit_model", Mean(f, value));
   PetscCall(DriverPrint("misfit (relative, root mean square): model %.2g", (double)Mean(f, value)));
   if (full) cJSON_AddNumberToObject(json, "misfit_full_order", Mean(f, full));
@@ -228,6 +234,7 @@ static PetscErrorCode Report(const Fit *f, const PetscReal full[])
   ends = cJSON_AddArrayToObject(json, "at_ends");
   PetscCall(HycoSceneGetParameters(f->scene, NULL, &names, NULL, NULL));
   for (PetscInt p = 0; p < f->n_par; p++) {
+    /* An answer at an end may lie beyond the range: the user must know. */
     if (mu[p] > f->lo[p] && mu[p] < f->hi[p]) continue;
     cJSON_AddItemToArray(ends, cJSON_CreateString(names[p]));
     PetscCall(DriverPrint("%s is at the end of its range\n", names[p]));
@@ -235,9 +242,11 @@ static PetscErrorCode Report(const Fit *f, const PetscReal full[])
   PetscCall(DriverPrint("%d predictions (%s)\n", (int)fit->evaluations, fit->method));
   if (fit->n_starts > 1)
     PetscCall(DriverPrint("%d of %d starts ended at the least misfit\n", (int)fit->n_least, (int)fit->n_starts));
+  /* Converged to a minimum that does not meet the targets: they may be out of reach, or another valley is. */
   if (fit->converged && fit->misfit > UNMET)
     PetscCall(DriverPrint("the targets are not met; the misfit may have lower minima elsewhere: other starts (-mu, "
                           "-starts, -fit_starts) may find them\n"));
+  /* At a kink, where a contact opens or closes, the slope jumps, and Newton's steps cannot end there. */
   if (!fit->converged)
     PetscCall(DriverMissed("the fit ended%s, where the misfit %.2g is no minimum by its slope; start elsewhere (-mu, "
                            "-starts, -fit_starts)",
@@ -254,6 +263,7 @@ static PetscErrorCode ReadStart(const Fit *f, Settings *s)
 
   PetscFunctionBegin;
   PetscCall(HycoSceneGetParameters(f->scene, NULL, &names, NULL, NULL));
+  /* Only whether: DriverGetPoint() then reads and checks them. */
   PetscCall(PetscOptionsHasName(NULL, NULL, "-mu", &s->given));
   for (PetscInt p = 0; p < f->n_par && !s->given; p++) {
     PetscCall(PetscSNPrintf(key, sizeof(key), "-mu_%s", names[p]));
@@ -313,14 +323,15 @@ PetscErrorCode CommandFit(void)
   f.paths = (PetscBool)(n_times > 0);
   PetscCall(ReadTargets(&f));
   PetscCall(ReadStart(&f, &s));
-  if (own[0])
-    PetscCall(LoadScene(&f, own, &scene, at));
+  if (own[0]) PetscCall(LoadScene(&f, own, &scene, at));
+  /* The model alone would ignore settings of full order in silence. */
   else
     PetscCall(DriverRefuseOnly("full order", "it is for full order, which fit solves only with -scene"));
   PetscCall(DriverCheckLeftEarly());
   HycoStaged(HYCO_STAGE_ONLINE, RunOnEach(&f, &s));
   if (scene) HycoStaged(HYCO_STAGE_FULL_ORDER, Check(&f, scene, at, f.mu, full));
   PetscCall(DriverCheckLeft());
+  /* Last, since it may end in a miss: the answer is complete by then. */
   PetscCall(Report(&f, scene ? full : NULL));
   PetscCall(HycoSceneDestroy(&scene));
   PetscCall(HycoROMDestroy(&f.model));

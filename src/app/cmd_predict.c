@@ -33,6 +33,7 @@ static PetscErrorCode ReportEstimates(cJSON *json, HycoScene scene, const HycoPr
   for (PetscInt q = 0; q < n; q++) Estimate(outputs, names[q], p->estimated_error_quantity[q]);
   Estimate(json, "inconsistency", p->inconsistency);
   cJSON_AddNumberToObject(json, "unseen", p->unseen);
+  /* The feature matters only where it is out of the range of the training. */
   if (p->unseen > HYCO_UNSEEN) cJSON_AddStringToObject(json, "unseen_feature", HycoFeatureNames[p->unseen_feature]);
   cJSON_AddBoolToObject(json, "extrapolated", p->beyond > 0);
   cJSON_AddNumberToObject(json, "beyond", p->beyond);
@@ -49,6 +50,7 @@ static PetscErrorCode PrintOutputEstimates(HycoScene scene, const HycoPrediction
   PetscCall(HycoSceneGetQuantities(scene, &n, names));
   for (PetscInt q = 0; q < n; q++) {
     PetscCall(DriverPrint("%s%s ", q ? ", " : "estimated errors of the outputs: ", names[q]));
+    /* Below 0: the model does not estimate this one. */
     if (p->estimated_error_quantity[q] >= 0)
       PetscCall(DriverPrint("%.3g", (double)p->estimated_error_quantity[q]));
     else
@@ -82,6 +84,7 @@ static PetscErrorCode PrintEstimates(HycoScene scene, const HycoPrediction *p, c
         "UNSEEN REGIME: the %s is %.3g times the largest at the held-out points; the estimates are multiplied "
         "by it (up to 100), and are not tested\n",
         HycoFeatureNames[p->unseen_feature], (double)p->unseen));
+  /* A miss rather than an error: forces may be right although the displacements are not. */
   if (p->inconsistent)
     PetscCall(
         DriverMissed("the displacements do not follow the contact forces: at closed contacts they miss the gaps by "
@@ -115,12 +118,14 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], const HycoPr
   cJSON_AddBoolToObject(json, "converged", p->reason > 0);
   if (p->n_dependent >= 0) cJSON_AddBoolToObject(json, "forces_unique", p->n_dependent == 0);
   ReportNumbers(json, {"n_modes", p->n_modes}, {"n_fe_dofs", p->n_fe_dofs});
+  /* Full order has no RID: a report of one would be that of the prediction it replaces. */
   if (!fallback[0]) ReportRID(json, p);
   ReportNumbers(json, {"covered_force", p->covered_force}, {"total_contact_force", p->total_contact_force},
                 {"lambda_max", p->lambda_max}, {"lambda_norm2", p->lambda_norm2},
                 {whole ? "u_norm2" : "rid_u_norm2", p->u_norm2});
   ReportVector(json, whole ? "u_min" : "rid_u_min", p->dim, p->u_min);
   ReportVector(json, whole ? "u_max" : "rid_u_max", p->dim, p->u_max);
+  /* Different keys: a part's energy must not be taken for that of the whole. */
   cJSON_AddNumberToObject(json, whole ? "strain_energy" : "rid_strain_energy", energy);
   PetscCall(ReportContacts(json, p->n_contacts, p->n_facing, p->overlap, p->sliding));
   if (n_carried) PetscCall(DriverReportCarried(json, p->dim, n_carried, carried));
@@ -238,9 +243,12 @@ static PetscErrorCode Path(HycoROM model, HycoScene scene, const char output[], 
   PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
   PetscCall(DriverGetPoint(scene, mu));
   PetscCall(DriverReadFiles(NULL, NULL, NULL, NULL, table));
+  /* A path's steps depend on each other: one rank computes it. */
   HycoOnRoot(PETSC_COMM_WORLD, HycoROMPredict(model, n, mu));
+  /* Here, since the prediction has read the last options. */
   PetscCall(DriverCheckLeft());
   PetscCall(DriverGetReducedPath(model, &path));
+  /* Not even one step: there is nothing to write. */
   HycoCheck(path.n, "no prediction: %s; nothing was written", path.why);
   HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetPrediction(model, &p));
   PetscCallMPI(MPI_Bcast(&p, sizeof(p), MPI_BYTE, 0, PETSC_COMM_WORLD));
@@ -344,12 +352,14 @@ static PetscErrorCode ShapeOf(HycoROM model, HycoScene scene, Shape *s)
   PetscCall(DriverGradientColumns(scene, &s->gradients));
   PetscCall(PetscMalloc1(N_COLUMNS + 3 * HYCO_MAX_QUANTITIES + s->carried.n_contacts * s->carried.each + s->gradients.n,
                          &s->names));
+  /* Columns of paths are last among the own ones, so that a point's table ends before them. */
   s->own = n_times ? (residual ? N_COLUMNS : RESIDUAL) : PATH_FORCE;
   PetscCall(ReportColumns(scene, s->own, columns, &s->with_quantities, s->names));
   s->with_extremes = s->with_quantities;
   for (PetscInt c = s->own; n_times && c < s->with_quantities; c++) {
     char *name = s->path_name[c - s->own];
 
+    /* An output's extreme along the path beside its value at the end. */
     PetscCall(PetscSNPrintf(name, DRIVER_LINE, "path_%s", s->names[c]));
     s->names[s->with_extremes++] = name;
   }
@@ -386,6 +396,7 @@ static void FillRow(const HycoPrediction *p, PetscInt n_carried, const HycoConta
   v[CONVERGED] = p->reason > 0;
   v[ITERATIONS] = p->iterations;
   v[SECONDS] = p->seconds.total;
+  /* Known() makes not a number of what the model does not know. */
   v[ESTIMATE_U] = Known(p->estimated_error_u);
   v[ESTIMATE_SIGMA] = Known(p->estimated_error_sigma);
   v[ESTIMATE_LAMBDA] = Known(p->estimated_error_lambda);
@@ -473,10 +484,12 @@ static PetscErrorCode PredictQueued(HycoROM model, PetscInt each, PetscInt n_par
     PetscCall(HycoQueueTake(t->queue, &piece));
     if (piece < 0) break;
     first = piece * each;
+    /* The last piece may be shorter. */
     n = PetscMin(each, rows->n - first);
     PetscCall(DriverRowsAdd(rows, first, n, &t->value));
     PetscCall(HycoROMSolveMany(model, n, n_par, mu + first * n_par, NULL, NULL, NULL));
   }
+  /* The monitor's context is on the caller's stack. */
   PetscCall(HycoROMSetPointMonitor(model, NULL, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -532,6 +545,7 @@ static PetscErrorCode ListRest(const DriverRows *rows, PetscInt *n, PetscInt **l
     const DriverPiece *piece = &rows->piece[p];
 
     for (PetscInt k = 0; k < piece->n; k++) {
+      /* 1 where DriverWantsFullOrder() gave a reason. */
       if (piece->value[(size_t)k * (size_t)rows->width + FULL_ORDER] > 0) mine[count++] = piece->first + k;
     }
   }
@@ -541,6 +555,7 @@ static PetscErrorCode ListRest(const DriverRows *rows, PetscInt *n, PetscInt **l
   if (HycoRank(comm)) PetscCall(PetscMalloc1(*n, list));
   PetscCall(PetscMPIIntCast(*n, &length));
   PetscCallMPI(MPI_Bcast(*list, length, MPIU_INT, 0, comm));
+  /* Pieces arrive in the order of ranks; ascending, neighbours in a grid share a factor. */
   PetscCall(PetscSortInt(*n, *list));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -607,6 +622,7 @@ static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, H
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
   PetscCall(DriverReadFiles(NULL, NULL, NULL, NULL, table));
   PetscCall(DriverCheckLeftEarly()); /* solver options are read by the first prediction */
+  /* Columns are known before the first prediction: rows have their full width from the start. */
   PetscCall(ShapeOf(model, scene, &s));
   rows.n = n;
   rows.width = s.width;
@@ -672,10 +688,12 @@ PetscErrorCode CommandPredict(void)
   PetscCall(DriverRequire("model", path));
   PetscCall(DriverReadMonitor(&monitor));
   PetscCall(ReadExtrapolate(&extrapolate));
+  /* On each rank; a damaged file fails on all, with one message. */
   HycoOnEach(PETSC_COMM_WORLD, HycoROMLoad(path, &model));
   PetscCall(HycoROMSetExtrapolate(model, extrapolate));
   PetscCall(HycoROMGetScene(model, &scene));
   PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
+  /* It loads the scene only if -hyco_fallback or the whole displacement asks for it. */
   PetscCall(DriverReadFallback(model, extrapolate, &fallback));
   PetscCall(DriverReadGradient(&derives));
   HycoCheck(!derives || !fallback.on,
@@ -685,6 +703,7 @@ PetscErrorCode CommandPredict(void)
   PetscCall(HycoROMWantsEquilibrium(model, &residual));
   HycoCheck(!residual || n_times,
             "-hyco_residual needs a model of paths, and the scene of %s has no history; remove it", path);
+  /* Set on all ranks; DriverMonitor() prints on rank 0. */
   if (monitor) PetscCall(HycoROMSetMonitor(model, DriverMonitor, NULL));
   PetscCall(DriverHasSamples(scene, &set));
   if (set) {

@@ -38,9 +38,11 @@ static PetscErrorCode PrintReactions(cJSON *json, HycoFOM fom, PetscInt dim)
   for (PetscInt k = 0; k < n; k++) {
     cJSON *one = cJSON_GetObjectItem(json, section[r[k].kind]);
 
+    /* A section appears with its first member: a scene without springs has none. */
     if (!one) one = cJSON_AddObjectToObject(json, section[r[k].kind]);
     if (r[k].group[0]) one = cJSON_AddObjectToObject(one, r[k].group);
     ReportVector(one, "force", dim, r[k].force);
+    /* In a plane there is only the moment about z. */
     if (dim == 2) ReportVector(one, "moment", 1, r[k].moment + 2);
     if (dim == 3) ReportVector(one, "moment", 3, r[k].moment);
     if (r[k].group[0])
@@ -108,6 +110,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
       "KKT residuals: stationarity %.1e (round-off %.1e), penetration %.1e, adhesion %.1e, complementarity %.1e\n",
       (double)s->kkt.stationarity, (double)s->kkt.rounding, (double)s->kkt.penetration, (double)s->kkt.adhesion,
       (double)s->kkt.complementarity));
+  /* 0: the contacts have no masters to face. */
   if (s->n_facing && s->n_facing < s->n_contacts)
     PetscCall(DriverPrint("%d of the %d slave nodes face a master\n", (int)s->n_facing, (int)s->n_contacts));
   PetscCall(ReportContacts(json, s->n_contacts, s->n_facing, s->overlap, s->sliding));
@@ -131,8 +134,10 @@ static PetscErrorCode Path(HycoFOM fom, HycoScene scene, const PetscReal mu[], c
   PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
   PetscCall(HycoSceneGetHistory(scene, &path.n, NULL));
   if (output[0]) PetscCall(HycoFOMSetSeries(fom, output));
+  /* Each step is printed as it is reached, since a path may take hours. */
   PetscCall(HycoFOMSetStepMonitor(fom, DriverMonitorStep, &path));
   PetscCall(HycoFOMSolve(fom, n, mu));
+  /* Writes the table and fails if the path ended early; fields so far are written by the series itself. */
   PetscCall(DriverEndHistory(fom, scene, mu, table));
   if (derives) PetscCall(HycoFOMGetGradient(fom, &gradient));
   PetscCall(HycoFOMGetSummary(fom, &summary));
@@ -155,6 +160,7 @@ static PetscErrorCode One(HycoFOM fom, HycoScene scene, const PetscReal mu[], co
   HycoCheck(summary.reason > 0, "%s (KKT residuals: %.1e, %.1e, %.1e, %.1e); nothing was written", summary.why,
             (double)summary.kkt.stationarity, (double)summary.kkt.penetration, (double)summary.kkt.adhesion,
             (double)summary.kkt.complementarity);
+  /* Needs the factor of the solution, which is still there. */
   if (derives) PetscCall(HycoFOMGetGradient(fom, &gradient));
   if (output[0]) PetscCall(HycoFOMWrite(fom, output));
   PetscCall(Report(scene, mu, fom, &summary, derives ? &gradient : NULL));
@@ -185,6 +191,7 @@ static PetscErrorCode CreateTable(HycoScene scene, PetscInt dim, PetscInt n, Tab
   t->width = N_COLUMNS + HYCO_MAX_QUANTITIES + t->carried.n_contacts * t->carried.each + t->gradients.n;
   PetscCall(PetscMalloc1(t->width, &t->names));
   PetscCall(ReportColumns(scene, N_COLUMNS, columns, &t->with_quantities, t->names));
+  /* Outputs are fewer than the room. */
   t->width = t->with_quantities;
   for (PetscInt c = 0; c < t->carried.n_contacts * t->carried.each; c++) t->names[t->width++] = t->carried.name[c];
   t->with_carried = t->width;
@@ -222,6 +229,7 @@ static PetscErrorCode FillRow(HycoFOM fom, const HycoSummary *s, const Table *t,
   PetscCall(PetscArraycpy(v + N_COLUMNS, s->quantity, t->with_quantities - N_COLUMNS));
   PetscCall(HycoFOMGetContacts(fom, &n, &carried));
   DriverCarriedFill(&t->carried, n, carried, v + t->with_quantities);
+  /* A point that failed has no derivative, and its row stays. */
   for (PetscInt c = 0; c < t->gradients.n; c++) v[t->with_carried + c] = NAN;
   if (!t->gradients.on || s->reason <= 0) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoFOMGetGradient(fom, &gradient));
@@ -303,6 +311,7 @@ PetscErrorCode CommandSolve(void)
   PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
   PetscCall(DriverReadGradient(&derives));
   PetscCall(DriverHasSamples(scene, &set));
+  /* One path gives a table already; several would need one each. */
   if (set) PetscCall(HycoSceneRefuseHistory(scene, "a set of points"));
   if (set) {
     PetscCall(DriverGetSamples(scene, PETSC_FALSE, &samples, &set));
@@ -311,6 +320,7 @@ PetscErrorCode CommandSolve(void)
   if (set || n_times) PetscCall(DriverReadFiles(NULL, NULL, NULL, NULL, table));
   PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom));
   PetscCall(HycoFOMGetSolver(fom, &solver));
+  /* The handle is the FOM's: options have been read by its creation. */
   if (monitor) PetscCall(HycoSolverSetMonitor(solver, DriverMonitor, NULL));
   HycoStaged(HYCO_STAGE_FULL_ORDER, set       ? Many(fom, scene, samples, output, table, derives)
                                     : n_times ? Path(fom, scene, mu, output, table, derives)

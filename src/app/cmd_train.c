@@ -7,6 +7,7 @@ static void ReportScan(cJSON *json, const HycoScan *s, PetscInt n_par)
 {
   cJSON *object;
 
+  /* The key is there in any case, so that a script can tell a scan of no points from an older report. */
   if (!s->n) {
     cJSON_AddNullToObject(json, "scan");
     return;
@@ -51,6 +52,7 @@ static PetscErrorCode PrintGain(HycoReducer reducer, const HycoTraining *t)
   PetscCall(HycoReducerGetSolved(reducer, &n, &of));
   for (PetscInt k = 0; k < n; k++) solved += of[k];
   if (!solved || !t->held_out.n || !(t->held_out.seconds > 0)) PetscFunctionReturn(PETSC_SUCCESS);
+  /* n groups solve at once: the time of one solution is n times the share of each. */
   each = n * t->seconds_snapshots / solved;
   PetscCall(DriverPrint(
       "a prediction takes %.3g ms, a full-order solution took %.3g ms%s\n", 1e3 * (double)t->held_out.seconds,
@@ -75,9 +77,11 @@ static PetscErrorCode Report(HycoScene scene, HycoReducer reducer, const HycoTra
                 {"n_force_modes", t->n_force_modes}, {"n_fe_dofs", t->n_fe_dofs}, {"rid_nodes", t->rid_nodes},
                 {"rid_a_nodes", t->rid_a_nodes}, {"rid_elements", t->rid_elements}, {"rid_contacts", t->rid_contacts},
                 {"rid_fraction", t->rid_fraction});
+  /* Known only if the reduced stiffness was formed. */
   if (t->stiffness) cJSON_AddNumberToObject(json, "condition", t->condition);
   PetscCall(HycoSceneGetParameters(scene, &n_par, NULL, NULL, NULL));
   ReportScan(json, &t->scan, n_par);
+  /* Negative: not computed. */
   if (t->error_u >= 0)
     ReportNumbers(json, {"training_error_u", t->error_u}, {"training_error_lambda_rid", t->error_lambda});
   ReportNumbers(json, {"held_out_predictions", t->n_held});
@@ -113,6 +117,7 @@ static PetscErrorCode CheckRead(HycoReducer reducer, PetscBool greedy)
     char dashed[DRIVER_LINE];
     PetscBool set, read;
 
+    /* Options without `only` are read by every training. */
     if (!only[0] || strcmp(table[k].owner, "HycoReducer")) continue;
     PetscCall(PetscSNPrintf(dashed, sizeof(dashed), "-%s", table[k].name));
     PetscCall(PetscOptionsHasName(NULL, NULL, dashed, &set));
@@ -136,6 +141,7 @@ static PetscErrorCode TakeOnce(HycoSamples samples, const char what[])
   if (!samples) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoSamplesDropTwins(samples, &dropped));
   PetscCall(HycoSamplesGet(samples, &n, NULL, NULL));
+  /* Said, since the number of points that is reported differs from what was given. */
   if (dropped)
     PetscCall(DriverPrint("%d of the %d %s points are duplicates; each of the %d different points is used once\n",
                           (int)dropped, (int)(n + dropped), what, (int)n));

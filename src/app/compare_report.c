@@ -136,11 +136,13 @@ static PetscErrorCode Sum(const DriverColumns *c, PetscInt n, const PetscReal va
   PetscReal *ratio;
 
   PetscFunctionBegin;
+  /* The least covered force begins at all of it. */
   *t = (Totals){.covered = {0, 1}};
   PetscCall(PetscMalloc1(n, &ratio));
   for (PetscInt k = 0; k < n; k++) {
     const PetscReal *v = value + k * c->n + c->n_errors;
 
+    /* A prediction may take less than the clock's resolution. */
     ratio[k] = v[DRIVER_SECONDS_FOM] / PetscMax(v[DRIVER_SECONDS_ROM], 1e-9);
     t->speedup += ratio[k] / n;
     t->seconds[0] += v[DRIVER_SECONDS_FOM] / n;
@@ -207,6 +209,7 @@ PetscErrorCode DriverReportComparison(HycoScene scene, PetscBool contact, const 
   PetscCall(DriverPrint("%d %s%s%s\n", (int)n, c->paths ? "path" : "point", n == 1 ? "" : "s",
                         c->paths ? ", each at its worst listed time and at its end" : ""));
   for (PetscInt k = 0; k < c->n_errors; k++) {
+    /* Errors of forces mean nothing without contact. */
     if (contact || !strstr(c->names[k], "lambda"))
       ReportError(json, c->names[k], n, c->n, value, k, converged, &t.undefined);
   }
@@ -215,6 +218,7 @@ PetscErrorCode DriverReportComparison(HycoScene scene, PetscBool contact, const 
   PetscCall(c->paths ? ReportPaths(json, &t) : ReportPoints(json, contact, &t));
   PetscCall(ReportWrite(&json));
   PetscCall(PetscFree(value));
+  /* After the report is written, so that its numbers can be looked at. */
   HycoCheck(!t.failed, "%d of the %d %s; the errors do not include them", (int)t.failed, (int)n,
             c->paths ? "reduced paths did not reach their end" : "predictions did not converge");
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -15,6 +15,7 @@ PetscErrorCode DriverReportCarried(cJSON *json, PetscInt dim, PetscInt n, const 
     if (dim == 2) ReportVector(one, "moment", 1, r[k].moment + 2);
     if (dim == 3) ReportVector(one, "moment", 3, r[k].moment);
     ReportNumbers(one, {"area", r[k].area}, {"pressure_max", r[k].pressure}, {"pressure_min", r[k].pressure_min});
+    /* One contact's resultant is in the lines that follow in any case. */
     if (n > 1)
       PetscCall(
           DriverPrint("contact %s: %d of %d active, force on the slave (%.6g, %.6g, %.6g), largest pressure %.6g\n",
@@ -39,6 +40,7 @@ PetscErrorCode DriverGetCarried(HycoROM model, HycoScene scene, PetscInt *n, Hyc
   PetscCall(HycoSceneGetContacts(scene, &all, names));
   *n = 0;
   HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetContacts(model, n, &r));
+  /* The model's own array, which the next prediction overwrites. */
   if (r) PetscCall(PetscArraycpy(*result, r, *n));
   PetscCallMPI(MPI_Bcast(n, 1, MPIU_INT, 0, PETSC_COMM_WORLD));
   HycoBcast(*result, *n * (PetscInt)sizeof(**result), MPI_BYTE, PETSC_COMM_WORLD);
@@ -58,6 +60,7 @@ static PetscInt List(PetscInt dim, const HycoContactResult *r, const char *name[
 
   name[n] = "n_active", value[n++] = r->n_active;
   for (PetscInt c = 0; c < dim; c++) name[n] = force[c], value[n++] = r->force[c];
+  /* In 2D only the moment about z, in 1D none. */
   for (PetscInt c = dim == 2 ? 2 : 0; dim > 1 && c < 3; c++) name[n] = moment[c], value[n++] = r->moment[c];
   name[n] = "area", value[n++] = r->area;
   name[n] = "pressure_max", value[n++] = r->pressure;
@@ -76,6 +79,7 @@ PetscErrorCode DriverCarriedColumns(HycoScene scene, PetscInt dim, DriverCarried
   PetscCall(HycoSceneGetContacts(scene, &columns->n_contacts, NULL));
   PetscCall(PetscMalloc1(columns->n_contacts, &contact));
   PetscCall(HycoSceneGetContacts(scene, &columns->n_contacts, contact));
+  /* The values of `none` are not used: only the names and their number. */
   columns->each = List(dim, &none, name, value);
   PetscCall(PetscMalloc1(columns->n_contacts * columns->each, &columns->name));
   for (PetscInt k = 0; k < columns->n_contacts * columns->each; k++)

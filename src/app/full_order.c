@@ -24,6 +24,7 @@ PetscErrorCode DriverReadTarget(HycoErrorKind kind, PetscReal *target)
   snprintf(name, sizeof(name), "target_%s", HycoErrorKinds[kind]);
   PetscCall(DriverGet(name, texts[kind], text));
   if (!text[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  /* 1 is a hundred per cent: a larger relative error is surely meant as a percentage. */
   *target = strtod(text, &end);
   HycoCheck(end != text && !*end && *target > 0 && *target <= 1,
             "-%s is \"%s\"; it must be a relative error above 0 and at most 1 (1e-2 is one per cent)", name, text);
@@ -49,6 +50,7 @@ PetscErrorCode DriverReadFallback(HycoROM model, PetscBool extrapolate, Fallback
             type);
   PetscCall(DriverReadTarget(HYCO_ERROR_U, &f->target_u));
   PetscCall(DriverReadTarget(HYCO_ERROR_LAMBDA, &f->target_lambda));
+  /* -scene of predict is only for full order, as the checks below say. */
   PetscCall(DriverReadFiles(path, NULL, NULL, NULL, NULL));
   HycoCheck(f->on || (!(f->target_u > 0) && !(f->target_lambda > 0)),
             "-target_u and -target_lambda set when hyco predict solves full order instead; give -hyco_fallback too");
@@ -65,12 +67,14 @@ PetscErrorCode DriverReadFallback(HycoROM model, PetscBool extrapolate, Fallback
             f->on ? "-hyco_fallback solves full order where the reduced model is not accurate enough"
                   : "-hyco_full_displacement solves full order with the predicted forces");
   PetscCall(HycoSceneLoad(PETSC_COMM_WORLD, path, &f->scene));
+  /* A path's failure cannot be mended by one solve at its end. */
   PetscCall(HycoSceneRefuseHistory(f->scene, "-hyco_fallback"));
   PetscCall(DriverCheckMesh(f->scene));
   PetscCall(HycoROMCheckScene(model, f->scene));
   PetscCall(HycoROMGetScene(model, &own));
   PetscCall(HycoSceneGetQuantities(own, &f->n_outputs, NULL));
   HycoSceneMatchQuantities(own, f->scene, f->output);
+  /* As the model's: both accept the same parameters. */
   PetscCall(HycoSceneSetExtrapolate(f->scene, extrapolate));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -119,6 +123,7 @@ static void TakeDisplacement(Fallback *f, const HycoSummary *s, HycoPrediction *
   p->overlap = s->overlap;
   p->sliding = s->sliding;
   f->strain_energy = s->strain_energy;
+  /* Outputs that the full-order scene lacks are not known any more. */
   for (PetscInt k = 0; k < f->n_outputs; k++) p->quantity[k] = f->output[k] < 0 ? NAN : s->quantity[f->output[k]];
   for (PetscInt c = 0; c < 3; c++) {
     p->u_min[c] = s->u_min[c];
@@ -135,6 +140,7 @@ PetscErrorCode DriverSolveDisplacement(Fallback *f, HycoROM model, PetscInt n, c
 
   PetscFunctionBegin;
   HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetLambda(model, NULL, &Lambda, NULL, NULL));
+  /* Created at the first need: most predictions never need it. */
   if (!f->fom) PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, f->scene, &f->fom));
   PetscCall(HycoFOMSolveForces(f->fom, n, mu, Lambda));
   PetscCall(HycoFOMGetSummary(f->fom, &s));
@@ -169,10 +175,12 @@ PetscErrorCode DriverSolveFullOrder(Fallback *f, PetscInt n, const PetscReal mu[
   p->n_active = p->n_rid_active = s.n_active;
   p->n_dof = p->n_fe_dofs = s.n_dof;
   p->n_multipliers = p->n_contacts = p->n_all_contacts = s.n_contacts;
+  /* All of the reduced model's numbers are replaced: none of them describes this solution. */
   p->n_modes = 0;
   p->total_contact_force = s.total_contact_force;
   p->lambda_max = s.lambda_max;
   p->lambda_norm2 = s.lambda_norm2;
+  /* Every contact is part of the system. */
   p->covered_force = 1;
   p->seconds = s.seconds;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -99,6 +99,7 @@ PetscErrorCode DriverGradientColumns(HycoScene scene, DriverGradients *columns)
   PetscFunctionBegin;
   columns->n = 0;
   columns->name = NULL;
+  /* `on` is set by the caller, the rest here. */
   if (!columns->on) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoSceneGetQuantities(scene, &n, outputs));
   PetscCall(HycoSceneGetParameters(scene, &n_par, &names, NULL, NULL));

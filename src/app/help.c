@@ -87,6 +87,7 @@ static int SubjectOf(const char name[])
   for (int k = 0; k < N_SUBJECTS; k++) {
     const size_t n = Begins(subjects[k].beginnings, name);
 
+    /* The longest beginning wins: hyco_pod_ is another subject than hyco_. */
     if (n > longest) {
       longest = n;
       best = k;
@@ -114,6 +115,7 @@ static PetscErrorCode Collect(const Command *command, const HycoOptionList *own,
   PetscCall(HycoGetOptionTable(&m, &table));
   PetscCall(PetscMalloc1((size_t)(own->n + m), list));
   *n = 0;
+  /* The command's own options first, then those of the classes that it uses. */
   for (PetscInt k = 0; k < own->n; k++) (*list)[(*n)++] = &own->option[k];
   for (PetscInt k = 0; k < m; k++) {
     if (!command || DriverReads(command, &table[k])) (*list)[(*n)++] = &table[k];
@@ -173,6 +175,7 @@ PetscErrorCode DriverHelp(const Command *command)
   for (PetscInt k = 0; commands[k].name; k++) {
     if (command && command != &commands[k]) continue;
     printf("  %s\n      %s\n", commands[k].usage, commands[k].meaning);
+    /* Of all commands into one list, in which an option of several appears once. */
     PetscCall(HycoOptionsRecord(&own, commands[k].declare));
   }
   PetscCall(Collect(command, &own, &n, &list));

@@ -37,6 +37,7 @@ PetscBool DriverRefuseEarly(const char text[])
   for (int k = 0; ranks[k]; k++) {
     const char *rank = getenv(ranks[k]);
 
+    /* No variable: a run without a launcher, which speaks for itself. */
     if (!rank || atol(rank) <= 0) continue;
     nanosleep(&nap, NULL); /* a launcher ends all ranks when one has failed */
     return PETSC_FALSE;
@@ -65,6 +66,7 @@ static void ChooseTemporary(void)
   const char *folder = NULL;
 
   for (int k = 0; asked[k] && !folder; k++) folder = getenv(asked[k]);
+  /* The folder that Open MPI would take, if it works, is left to the user's choice. */
   if (HoldsFolders(folder ? folder : others[0])) return;
   for (int k = 0; others[k]; k++) {
     if (!HoldsFolders(others[k])) continue;
@@ -157,6 +159,7 @@ void DriverChooseKernels(char **argv)
   const char *kernels = KernelsOfProcessor();
 
   call.address = dlsym(RTLD_DEFAULT, "openblas_get_corename");
+  /* Only if OpenBLAS has fallen back to its oldest kernels, and the user has chosen none. */
   if (!kernels || !call.address || getenv(choice) || strcmp(call.name(), "Prescott") || setenv(choice, kernels, 1))
     return;
   execv("/proc/self/exe", argv); /* returns only after a failure: hyco then continues unchanged */
@@ -175,6 +178,7 @@ void DriverOneThread(void)
   } call;
 
   for (int k = 0; asked[k]; k++) {
+    /* Any of these is the user's choice, whichever library is linked. */
     if (getenv(asked[k])) return;
   }
   for (int k = 0; setters[k]; k++) {

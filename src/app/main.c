@@ -47,11 +47,13 @@ static PetscErrorCode KeepMessage(MPI_Comm comm, int line, const char *function,
 {
   if (HycoWantsTrace()) (void)!PetscTraceBackErrorHandler(comm, line, function, file, code, type, text, ctx);
   if (type == PETSC_ERROR_INITIAL) {
+    /* Errors that a user can mend have a text written for them; all others are defects, shown with their place. */
     if (code == PETSC_ERR_USER || code == PETSC_ERR_ORDER || code == HYCO_ERR_NO_MODEL)
       snprintf(message, sizeof(message), "%s", text ? text : "");
     else
       snprintf(message, sizeof(message), "internal error %d in %s (%s:%d): %s", (int)code, function ? function : "?",
                file ? file : "?", line, text ? text : "");
+    /* Names from files may contain control characters, and end up on a terminal. */
     HycoMakePrintable(message);
   }
   return code;
@@ -83,6 +85,7 @@ static void Stop(void)
     fflush(stderr);
   }
   MPI_Ibarrier(MPI_COMM_WORLD, &request);
+  /* Three seconds for the others to arrive, in steps of 10 ms. */
   for (int k = 0; k < 300 && !together; k++) {
     const struct timespec nap = {0, 10000000};
 
@@ -90,6 +93,7 @@ static void Stop(void)
     if (!together) nanosleep(&nap, NULL);
   }
   if (!together) {
+    /* Rank 0 has not spoken for this error, since it waits in a call of its own. */
     if (rank) fprintf(stderr, "hyco: error on rank %d: %s\n", rank, message);
     fflush(stderr);
     MPI_Abort(MPI_COMM_WORLD, 1);
@@ -127,6 +131,7 @@ static int AnswerAtOnce(int argc, char **argv)
       return 0;
     }
   }
+  /* After -version, which is answered with any command. */
   if (command) return -1;
   if (argc > 1) {
     const char *names[8], *near;
@@ -176,6 +181,7 @@ static PetscErrorCode Start(int *argc, char ***argv)
   HycoErrorText said = NULL;
 
   if (!DriverHasStack(*argv) || !DriverCheckOptionFiles(*argc, *argv)) return PETSC_ERR_USER;
+  /* PETSc prints its trace while it starts, before an error handler can be set. */
   PetscErrorPrintf = PrintNothing;
   ierr = HycoInitialize(argc, argv);
   signal(SIGPIPE, SIG_IGN);
@@ -194,6 +200,7 @@ static int Help(char **argv)
   PetscErrorCode ierr = 0;
   int argc = 1;
 
+  /* Help needs PETSc, but no other rank and no network. */
   DriverStartAlone();
   if (Start(&argc, &argv)) return DRIVER_FAILED;
   if (HycoRank(MPI_COMM_WORLD) == 0) {

@@ -21,6 +21,7 @@ static PetscBool FollowLine(char line[], int depth, char problem[HYCO_LINE])
     const PetscBool yaml = (PetscBool)(strcasecmp(before, "-options_file_yaml") == 0);
 
     if ((yaml || strcasecmp(before, "-options_file") == 0) && !Follow(word, yaml, depth, problem)) return PETSC_FALSE;
+    /* The option of which the next word is the value. */
     before = word;
   }
   return PETSC_TRUE;
@@ -42,6 +43,7 @@ static PetscBool Follow(const char path[], PetscBool yaml, int depth, char probl
         "the option file %.200s names itself, or files name each other more than %d times; remove an -options_file",
         path, DEEPEST);
   if (!file) return (PetscBool)(depth < DEEPEST);
+  /* The whole file at once: YAML has no lines of its own. */
   if (yaml) {
     if (getdelim(&line, &room, '\0', file) > 0 && HycoYAMLHasProblem(line, wrong)) {
       snprintf(problem, HYCO_LINE, "the option file %.200s is not valid YAML: %.700s", path, wrong);
@@ -49,6 +51,7 @@ static PetscBool Follow(const char path[], PetscBool yaml, int depth, char probl
     }
   } else
     while (good && getline(&line, &room, file) > 0) {
+      /* The characters with which PETSc begins a comment. strchr() also finds the end of an empty line. */
       if (!strchr("#%!", line[strspn(line, " \t")])) good = FollowLine(line, depth + 1, problem);
     }
   free(line);
@@ -70,6 +73,7 @@ PetscBool DriverCheckOptionFiles(int argc, char **argv)
   if (!skip && home) good = Follow(path, PETSC_FALSE, 0, problem);
   for (int k = 0; good && !skip && k < 2; k++) good = Follow(files[k], PETSC_FALSE, 0, problem);
   if (good && environment) {
+    /* FollowLine() cuts the text, and the environment's must stay. */
     char *line = strdup(environment);
 
     good = (PetscBool)(!line || FollowLine(line, 0, problem));
@@ -119,6 +123,7 @@ PetscErrorCode DriverReportOptionFiles(cJSON *json)
   PetscFunctionBegin;
   PetscCall(PetscGetArgs(&argc, &argv));
   AddEnvironment(object, "PETSC_OPTIONS");
+  /* A result depends on options that are not on the command line: the report names their sources. */
   AddEnvironment(object, "PETSC_OPTIONS_YAML");
   for (int k = 1; k < argc; k++) skip = (PetscBool)(skip || strcmp(argv[k], "-skip_petscrc") == 0);
   if (!skip && home) {

@@ -113,6 +113,7 @@ static PetscErrorCode CheckNames(PetscBool trains)
   int argc;
 
   PetscFunctionBegin;
+  /* The list is static: this may be called again. */
   n_outputs = 0;
   PetscCall(Peek("model", model));
   if (trains) PetscCall(Take("-model", model, PETSC_TRUE));
@@ -124,6 +125,7 @@ static PetscErrorCode CheckNames(PetscBool trains)
   PetscCall(Take("-hyco_checkpoint", path, PETSC_TRUE));
   PetscCall(Peek("hyco_write_fclib", path));
   PetscCall(Take("-hyco_write_fclib", path, PETSC_TRUE));
+  /* The snapshots lie beside the model, and are written as well. */
   if (trains && model[0]) PetscCall(AddSnapshots(model));
   if (!trains) PetscCall(Take("-model", model, PETSC_FALSE));
   PetscCall(CheckSceneFile());
@@ -148,8 +150,10 @@ static PetscErrorCode CheckPlace(const char name[], const char path[], HycoFileK
 
   PetscFunctionBegin;
   PetscCall(HycoFileCheckPlace(name, path, kind, &direct));
+  /* Through links: what counts is the folder in which the file really is. */
   HycoFileFollow(path, folder);
   slash = strrchr(folder, '/');
+  /* "/file" is in "/", whose slash stays. */
   if (slash)
     slash[slash == folder] = '\0';
   else

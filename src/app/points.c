@@ -52,6 +52,7 @@ static PetscErrorCode CheckNamed(HycoScene scene, const char prefix[])
   for (PetscInt k = 0; k < left; k++) {
     PetscBool known = PETSC_FALSE;
 
+    /* PETSc's options have no letter case. */
     if (strncasecmp(keys[k], prefix, strlen(prefix))) continue;
     for (PetscInt p = 0; p < n; p++) known = (PetscBool)(known || strcasecmp(keys[k] + strlen(prefix), names[p]) == 0);
     if (!known) PetscCall(PetscStrncpy(bad, keys[k], sizeof(bad)));
@@ -97,6 +98,7 @@ static PetscErrorCode ReadGridType(PetscInt *type)
                             "training; or roots of Chebyshev polynomials",
                             types, &word, &given));
   PetscOptionsEnd();
+  /* Otherwise TRAINING stays, which is no word of the list. */
   if (given) *type = word;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -119,6 +121,7 @@ static PetscErrorCode GetNamed(HycoScene scene, const char prefix[], const char 
   PetscCall(CheckNamed(scene, prefix));
   PetscCall(HycoSceneGetParameters(scene, &n, &names, NULL, NULL));
   for (PetscInt p = 0; p < n; p++) {
+    /* Set for all first: the caller frees what is there, also after a missing one. */
     values[p] = NULL;
     PetscCall(PetscSNPrintf(key, sizeof(key), "%s%s", prefix, names[p]));
     PetscCall(DriverGet(key, "", text));
@@ -163,8 +166,10 @@ PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[])
     PetscCall(PetscFree(values[p]));
   }
   PetscCall(ListRanges(scene, list));
+  /* A scene without parameters needs neither. */
   HycoCheck(text[0] || given == n, "the scene has %d parameters (%s); give -mu with all of them, or -mu_NAME for each",
             (int)n, list);
+  /* The ranges, unless extrapolation is allowed. */
   PetscCall(HycoSceneCheckParameters(scene, n, mu));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -220,6 +225,7 @@ static PetscErrorCode AddGrid(HycoScene scene, HycoSamples samples, const char n
   HycoCheck(m == n && n > 0, "-%s has %d numbers; the scene has %d parameters: %s", name, (int)m, (int)n,
             n ? list : "(none)");
   for (PetscInt p = 0; p < n; p++) {
+    /* Whole numbers are read as reals, so that 2.5 is refused rather than cut. */
     HycoCheck(values[p] >= 1 && values[p] <= 1e8 && values[p] == PetscFloorReal(values[p]),
               "-%s is \"%s\"; whole numbers, at least 1, are expected", name, text);
     counts[p] = (PetscInt)values[p];
@@ -316,6 +322,7 @@ PetscErrorCode DriverGetSamples(HycoScene scene, PetscBool closed, HycoSamples *
 
   PetscFunctionBegin;
   PetscCall(DriverGet("grid", "<n,n,...> a set of points: a grid with n values per parameter", grid));
+  /* Only declares; a grid reads it when it is added. */
   if (!scene) PetscCall(ReadGridType(&type));
   if (scene) PetscCall(HycoSamplesCreate(scene, samples));
   PetscCall(AddValues(scene, scene ? *samples : NULL, &n_sets));
@@ -330,6 +337,7 @@ PetscErrorCode DriverGetSamples(HycoScene scene, PetscBool closed, HycoSamples *
   HycoCheck(n_sets <= 1,
             "there are several sets of points; give only one of -grid, -values_NAME, -points and -scatter");
   PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
+  /* Test points lie in the middle of cells, where training on a closed grid has none. */
   if (grid[0])
     PetscCall(AddGrid(scene, *samples, "grid", closed ? TRAINING : CENTRED, grid));
   else if (points[0])

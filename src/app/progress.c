@@ -75,6 +75,7 @@ PetscErrorCode DriverPrint(const char format[], ...)
     va_start(args, format);
     vfprintf(stdout, format, args);
     va_end(args);
+    /* Output to a file is buffered in blocks: a run of hours would show nothing. */
     fflush(stdout);
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -49,6 +49,7 @@ static void *Run(void *unused)
 {
   pthread_mutex_lock(&progress.lock);
   while (!progress.over) {
+    /* Half a period at most, so that a line is late by no more than that. */
     const double next = Now() + PetscMin(1, progress.period / 2);
     const struct timespec until = {(time_t)next, (long)(1e9 * (next - (double)(time_t)next))};
 

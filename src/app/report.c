@@ -31,6 +31,7 @@ PetscErrorCode ReportCreate(const char command[], HycoScene scene, const PetscRe
   cJSON_AddStringToObject(*json, "command", command);
   cJSON_AddStringToObject(*json, "scene", title);
   point = cJSON_AddObjectToObject(*json, "mu");
+  /* A set of points has an empty object. */
   for (PetscInt p = 0; mu && p < n; p++) cJSON_AddNumberToObject(point, names[p], mu[p]);
   cJSON_AddNumberToObject(*json, "ranks", HycoSize(PETSC_COMM_WORLD));
   PetscCall(DriverReportOptionFiles(*json));
@@ -221,6 +222,7 @@ PetscErrorCode ReportSet(const char command[], const char table[], HycoScene sce
     for (PetscInt k = 0; k < rows->piece[p].n; k++)
       failed += rows->piece[p].value[(size_t)k * (size_t)rows->width + (size_t)converged] < 0.5;
   }
+  /* Each rank has only the rows that it took. */
   HycoAllreduce(&failed, 1, MPIU_INT, MPI_SUM, PETSC_COMM_WORLD);
   if (table[0]) PetscCall(DriverWriteTable(table, scene, mu, columns, rows));
   PetscCall(DriverPrint("%d points in %.3f s (%.3g a second), %d not converged%s\n", (int)n, (double)seconds,
@@ -252,6 +254,7 @@ PetscErrorCode ReportWrite(cJSON **json)
   PetscCall(DriverReadFiles(NULL, NULL, NULL, path, NULL));
   if (path[0]) {
     text = cJSON_Print(*json);
+    /* An error of writing is raised on all ranks, which end together. */
     HycoOnRoot(PETSC_COMM_WORLD, DriverWriteText(path, text));
     cJSON_free(text);
   }

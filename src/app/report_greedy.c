@@ -11,6 +11,7 @@ static PetscErrorCode Append(GreedyLog *log, const char text[])
 
   PetscFunctionBegin;
   if (log->length + length + 1 > log->room) {
+    /* Doubled, so that a long training appends in linear time. */
     log->room = 2 * (log->room + length) + 4096;
     PetscCall(PetscRealloc(log->room, &log->text));
   }
@@ -33,6 +34,7 @@ PetscErrorCode DriverFormatPoint(HycoScene scene, const PetscReal mu[], char wor
   if (columns) columns[0] = '\0';
   for (PetscInt p = 0; p < n && w < DRIVER_LINE && c < DRIVER_LINE; p++) {
     if (mu) {
+      /* May count beyond the room, which ends the loop: the text is then cut. */
       w += (size_t)snprintf(words + w, DRIVER_LINE - w, "%s%s = %.6g", p ? ", " : "", names[p], (double)mu[p]);
       if (columns) c += (size_t)snprintf(columns + c, DRIVER_LINE - c, "%.12g", (double)mu[p]);
     }
@@ -75,6 +77,7 @@ static PetscErrorCode Monitor(const HycoGreedyStep *s, void *ctx)
            (int)s->n_samples, (int)s->n_modes, (int)s->rid_nodes, (int)s->rid_elements, columns, (double)s->eta,
            (double)s->eta_u, (double)s->eta_lambda, (double)s->max_eta, (double)s->mean_eta_u,
            (double)s->mean_eta_lambda, (int)s->n_infinite, (double)s->seconds);
+  /* The head with the first row, when the scene's parameters are certainly known. */
   if (!log->length) PetscCall(BeginTable(log));
   PetscCall(Append(log, row));
   if (log->table[0]) PetscCall(DriverWriteText(log->table, log->text));
@@ -127,6 +130,7 @@ PetscErrorCode DriverJudgeGreedy(const GreedyLog *log)
   end.max_eta = log->max_eta;
   end.infinite = log->infinite;
   PetscCall(PetscStrncpy(end.stop, log->stop, sizeof(end.stop)));
+  /* The monitor runs on rank 0 only, and a miss must be raised on all. */
   PetscCallMPI(MPI_Bcast(&end, sizeof(end), MPI_BYTE, 0, PETSC_COMM_WORLD));
   PetscCall(PetscOptionsHasName(NULL, NULL, "-target", &asked));
   if (strcmp(end.stop, "target") == 0 || (!asked && strcmp(end.stop, "points"))) PetscFunctionReturn(PETSC_SUCCESS);

@@ -192,6 +192,7 @@ static PetscErrorCode Added(PetscInt n, PetscInt parameter, PetscBool former, vo
   PetscFunctionBegin;
   PetscCall(HycoSceneGetParameters(s->scene, NULL, &names, NULL, NULL));
   s->n_points += n;
+  /* Held-out points that decided where to add solutions are no fair judges any more. */
   if (former) {
     PetscCall(DriverPrint(
         "the targets are missed, at the held-out points or at fresh ones away from the added solutions: the "
@@ -228,6 +229,7 @@ static PetscErrorCode Misses(const Search *s, const HycoTraining *t)
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
     char reached[32], asked[32];
 
+    /* No limit for this kind. */
     if (!(limit[j] > 0) || t->held_out.largest[j] <= limit[j]) continue;
     DriverPercent(t->held_out.largest[j], reached);
     DriverPercent(limit[j], asked);
@@ -298,6 +300,7 @@ PetscErrorCode DriverJudgeModel(const Search *s, const HycoTraining *t)
     PetscCall(DriverPrint("chosen: settings %d of %d: %s\n", (int)t->chosen.number, (int)t->chosen.of, what));
     PetscCall(PrintLeftOut(t));
   }
+  /* Without any there is nothing to judge, and no miss. */
   if (!t->held_out.n) {
     PetscCall(DriverPrint("no held-out points: the errors of this model are not known, and it cannot estimate them\n"));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -373,6 +376,7 @@ void DriverReportModel(cJSON *json, const Search *s, const HycoTraining *t)
   if (a->number) {
     cJSON *search = cJSON_AddObjectToObject(json, "search"), *left_out;
 
+    /* Attempts count from the first search; `chosen` is numbered within the last one, hence the shift. */
     ReportNumbers(search, {"attempts", s->n}, {"chosen", s->n - a->of + a->number}, {"added", t->n_added},
                   {"former_held_out", t->n_former});
     cJSON_AddStringToObject(search, "model_type", a->settings.type);

@@ -26,9 +26,9 @@ PetscErrorCode DriverReportHistory(cJSON *json, HycoScene scene, const HycoHisto
   cJSON_AddNumberToObject(history, "t_end", h->t);
   cJSON_AddStringToObject(history, "newton", h->newton);
   ReportNumbers(history, {"factor_in_solves", h->factor_cost}, {"newton_order", h->order},
-                {"newton_orders", h->n_orders}, {"steps_limited", h->n_bound},
-                {"rate_change", h->rate_change});
+                {"newton_orders", h->n_orders}, {"steps_limited", h->n_bound}, {"rate_change", h->rate_change});
   PetscCall(DriverReportSteps(history, scene, PETSC_FALSE, h->n, h->step));
+  /* Sums over the steps, of which the table has each. */
   for (PetscInt k = 0; k < h->n; k++) {
     seconds[0] += h->step[k].seconds_factor;
     seconds[1] += h->step[k].seconds_solve;

@@ -18,6 +18,7 @@ PetscErrorCode DriverMissed(const char format[], ...)
     fprintf(stderr, "hyco: missed: %s\n", text);
     fflush(stderr);
   }
+  /* All ranks keep the list: each builds the report, and the exit status must agree. */
   if (!missed) missed = cJSON_CreateArray();
   cJSON_AddItemToArray(missed, cJSON_CreateString(text));
   PetscFunctionReturn(PETSC_SUCCESS);

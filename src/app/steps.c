@@ -122,6 +122,7 @@ PetscErrorCode DriverWriteSteps(const char table[], HycoScene scene, const Petsc
   PetscFunctionBegin;
   if (!n || !table[0]) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt c = 0; c < CountColumns(scene); c++) {
+    /* Some columns exist only for full order or only for reduced paths. */
     if (NameOf(&columns[c], reduced)) own[n_own++] = NameOf(&columns[c], reduced);
   }
   PetscCall(ReportColumns(scene, n_own, own, &width, names));
@@ -136,6 +137,7 @@ PetscErrorCode DriverWriteSteps(const char table[], HycoScene scene, const Petsc
     PetscCall(PetscArraycpy(v, step[k].quantity, width - n_own));
     PetscCall(PetscArraycpy(point + k * n_par, mu, n_par));
   }
+  /* All ranks have the steps; rank 0's are written. */
   rows = DriverRowsOfRoot(n, width, value, &all);
   PetscCall(DriverWriteTable(table, scene, point, names, &rows));
   PetscCall(PetscFree2(value, point));

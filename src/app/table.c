@@ -68,6 +68,7 @@ static PetscErrorCode WritePiece(const Table *t, PetscMPIInt owner, const Driver
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  /* The others have nothing to do with this piece. */
   if (rank && rank != owner) PetscFunctionReturn(PETSC_SUCCESS);
   if (rank) PetscCallMPI(MPI_Send(&n, 1, MPIU_INT, 0, 0, comm));
   if (!rank && owner) PetscCallMPI(MPI_Recv(&n, 1, MPIU_INT, owner, 0, comm, MPI_STATUS_IGNORE));
@@ -121,6 +122,7 @@ static PetscErrorCode WriteText(const char path[], const Table *t)
     if (next.first == LONG_MAX) break;
     PetscCall(
         WritePiece(t, next.rank, next.rank == mine.rank ? &rows->piece[at] : NULL, out ? HycoFileStream(out) : NULL));
+    /* Only the rank whose piece was written moves on. */
     at += next.rank == mine.rank;
   }
   HycoOnRoot(PETSC_COMM_WORLD, HycoFileClose(&out, PETSC_TRUE));
@@ -156,6 +158,7 @@ static PetscErrorCode WriteColumns(const char path[], const Table *t)
   PetscErrorCode ierr = 0;
 
   PetscFunctionBegin;
+  /* HDF5 writes collectively: a rank that left earlier would block the others. */
   HycoAllreduce(&rounds, 1, MPIU_INT, MPI_MAX, PETSC_COMM_WORLD);
   PetscCall(HycoH5CreateTable(PETSC_COMM_WORLD, path, &file));
   for (PetscInt p = 0; p < t->n_par && !ierr; p++) ierr = WriteColumn(file, t, rounds, p, 0);

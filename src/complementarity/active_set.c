@@ -93,8 +93,10 @@ static PetscErrorCode Step(const HycoActiveSet *e, PetscInt its, History *h, Pet
 
   PetscFunctionBegin;
   PetscCall(e->solve(e->ctx, active, singular));
+  /* The caller decides: a dependent contact leaves the set, or another method is tried. */
   if (*singular) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(e->violations(e->ctx, active, h->violates));
+  /* Counted for a monitor alone. */
   for (PetscInt i = 0; e->monitor && i < e->n; i++) n_active += active[i];
   if (e->monitor) PetscCall(Reduce(e, MPI_SUM, &n_active));
   PetscCall(Change(e, h, active, changes));

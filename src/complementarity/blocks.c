@@ -36,6 +36,7 @@ PetscErrorCode HycoBlocksCreate(PetscInt n_cones, const HycoCone cones[], PetscI
   for (PetscInt k = 0; k < n; k++) {
     b->of[k] = of ? of[k] : 0;
     b->row[k + 1] = b->row[k] + cones[b->of[k]]->size;
+    /* Data of a block, as a coefficient of friction, begin at at[k]. */
     b->at[k + 1] = b->at[k] + cones[b->of[k]]->n_data;
   }
   PetscCall(PetscMalloc1(b->at[n] + 1, &b->data));
@@ -44,7 +45,8 @@ PetscErrorCode HycoBlocksCreate(PetscInt n_cones, const HycoCone cones[], PetscI
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The blocks of the ordinary problem: one row each, force >= 0. */
+/* The blocks of the ordinary problem: one row each, force >= 0. So that one Newton method serves problems with and
+   without friction. */
 PetscErrorCode HycoBlocksCreateNonnegative(PetscInt n, HycoBlocks **blocks)
 {
   HycoCone cone;
@@ -103,7 +105,8 @@ PetscErrorCode HycoBlockDerivative(const HycoBlocks *b, PetscInt k, const PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Replaces r by the nearest admissible forces, block by block. */
+/* Replaces r by the nearest admissible forces, block by block. Whatever a method has left by round-off: reported forces
+   obey the law exactly. */
 PetscErrorCode HycoBlocksAdmit(const HycoBlocks *b, PetscReal r[])
 {
   PetscReal z[HYCO_MAX_BLOCK];
@@ -122,8 +125,9 @@ static PetscReal Most(PetscReal most, PetscReal value)
   return value <= PETSC_MAX_REAL ? PetscMax(most, value) : PETSC_MAX_REAL;
 }
 
-/* Largest entries of the residual P(r - rho w) - r of the law: of all components, of the missing normal force, and
-   of what makes r itself inadmissible. Not collective. */
+/* Largest entries of the residual P(r - rho w) - r of the law: of all components, of the missing normal force, and of
+   what makes r itself inadmissible. Not collective. r solves the problem exactly if r = P(r - rho w) (Eaves 1971), for
+   any rho > 0. */
 PetscErrorCode HycoBlocksNaturalMap(const HycoBlocks *b, PetscReal rho, const PetscReal r[], const PetscReal w[],
                                     HycoNaturalMap *map)
 {

@@ -11,7 +11,8 @@ struct _n_HycoSetFactor {
   PetscBool *wanted, *kept; /* n */
 };
 
-/* Room for all n contacts, so that a set of any size can be factored. */
+/* Room for all n contacts, so that a set of any size can be factored. L is n x n by columns; a set of k contacts uses
+   its leading k x k part. */
 PetscErrorCode HycoSetFactorCreate(PetscInt n, HycoSetFactor *factor)
 {
   HycoSetFactor f;
@@ -52,6 +53,7 @@ static PetscInt Rearrange(HycoSetFactor f, PetscInt k, const PetscInt a[])
 
   for (PetscInt i = 0; i < f->n; i++) f->wanted[i] = f->kept[i] = PETSC_FALSE;
   for (PetscInt j = 0; j < k; j++) f->wanted[a[j]] = PETSC_TRUE;
+  /* The leading factored contacts that stay: their part of the factor is still valid. */
   while (stay < f->k && f->wanted[f->a[stay]]) f->kept[f->a[stay++]] = PETSC_TRUE;
   count = stay;
   for (PetscInt j = stay; j < f->k; j++) { /* in their former order */
@@ -62,6 +64,7 @@ static PetscInt Rearrange(HycoSetFactor f, PetscInt k, const PetscInt a[])
     f->a[count++] = i;
   }
   for (PetscInt j = 0; j < k; j++) {
+    /* New contacts at the end, where appending costs one row each. */
     if (!f->kept[a[j]]) f->a[count++] = a[j];
   }
   f->k = stay;

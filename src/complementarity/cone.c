@@ -27,7 +27,7 @@ PetscErrorCode HycoConeDestroy(HycoCone *cone)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Before the type, whose constructor may depend on it. */
+/* Before the type, whose constructor may depend on it. The first component of a block is along the normal. */
 PetscErrorCode HycoConeSetSize(HycoCone cone, PetscInt size)
 {
   PetscFunctionBegin;
@@ -66,7 +66,7 @@ PetscErrorCode HycoConeSetType(HycoCone cone, HycoConeType type)
 HycoDefineMethod(HycoConeGetType, (HycoCone cone, HycoConeType *type), cone, HYCO_CONE_CLASSID,
                  *type = ((PetscObject)cone)->type_name)
 
-/* n_data: reals of each block, such as a coefficient of friction. */
+/* n_data: reals of each block, such as a coefficient of friction. For constructors of types. */
 PetscErrorCode HycoConeSetOps(HycoCone cone, const struct _HycoConeOps *ops, PetscInt n_data)
 {
   PetscFunctionBegin;

@@ -58,7 +58,8 @@ static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Contacts that depend on others of the set are removed from it, and carry no force. */
+/* Contacts that depend on others of the set are removed from it, and carry no force. The callback of the active set's
+   loop. */
 static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singular)
 {
   Dense *d = (Dense *)ctx;
@@ -82,7 +83,7 @@ static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singu
 }
 
 /* Dense primal-dual active set from `active`, which is also the result; z: n (with p pinned unknowns p + n). On one
-   process, or alike on every rank. */
+   process, or alike on every rank. Primal-dual active set (Hintermueller, Ito and Kunisch 2003): a Newton method whose iterates are sets, so that it ends with the exact solution or cycles. */
 PetscErrorCode HycoLCPActiveSet(const HycoLCP *lcp, PetscBool active[], PetscReal z[], PetscInt *its,
                                 HycoLCPStatus *status)
 {
@@ -97,6 +98,7 @@ PetscErrorCode HycoLCPActiveSet(const HycoLCP *lcp, PetscBool active[], PetscRea
                      .monitor_ctx = lcp->monitor_ctx};
 
   PetscFunctionBegin;
+  /* Pinned unknowns without bounds: the matrix is semidefinite, and another loop is used. */
   if (lcp->p) {
     PetscCall(HycoLCPSemidefinite(lcp, active, z, its, status));
     PetscFunctionReturn(PETSC_SUCCESS);

@@ -34,7 +34,8 @@ static PetscReal Cover(PetscInt i)
   return 1 + x - PetscFloorReal(x);
 }
 
-/* Scaled to entries of order one, so that the tolerances of pivots have no unit. */
+/* Scaled to entries of order one, so that the tolerances of pivots have no unit. T is [M, cover] at first; n rows, n +
+   1 columns, the last for the artificial variable. */
 static PetscErrorCode DictionaryCreate(PetscInt n, const PetscReal M[], const PetscReal q[], PetscReal size_M,
                                        PetscReal size_q, Dictionary *d)
 {
@@ -46,6 +47,7 @@ static PetscErrorCode DictionaryCreate(PetscInt n, const PetscReal M[], const Pe
   PetscCall(PetscMalloc4(n, &d->basic, n + 1, &d->nonbasic, 2 * n + 1, &d->where, n, &d->tied));
   for (size_t k = 0; k < (size_t)n * (size_t)n; k++) d->T[k] = M[k] / size_M;
   for (PetscInt i = 0; i < n; i++) {
+    /* The covering vector: slightly different entries break ties of the first pivots. */
     d->T[(size_t)n * (size_t)n + (size_t)i] = Cover(i);
     d->value[i] = q[i] / size_q;
     d->basic[i] = d->where[i] = i;
@@ -78,7 +80,7 @@ static PetscErrorCode Sizes(const Dictionary *d, PetscBLASInt *n, PetscBLASInt *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* column = T[:,j] */
+/* column = T[:,j]. T without its waiting pivots, and these on top: T - U V^T. */
 static PetscErrorCode FetchColumn(Dictionary *d, PetscInt j)
 {
   PetscBLASInt n, cols, k, one = 1;
@@ -91,7 +93,7 @@ static PetscErrorCode FetchColumn(Dictionary *d, PetscInt j)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* row = T[i,:] */
+/* row = T[i,:]. As FetchColumn(). */
 static PetscErrorCode FetchRow(Dictionary *d, PetscInt i)
 {
   PetscBLASInt n, cols, k, one = 1;
@@ -196,7 +198,8 @@ static PetscInt Leaving(Dictionary *d)
   return n_tied ? BreakTie(d, n_tied) : -1;
 }
 
-/* All pivots, from the first, in row `row`, to the end. */
+/* All pivots, from the first, in row `row`, to the end. Complementary pivoting (Lemke 1965): exactly one of each pair
+   w_i, z_i is basic until the artificial variable leaves. */
 static PetscErrorCode Run(Dictionary *d, PetscInt row, PetscInt max_its, PetscInt *its, HycoLCPStatus *status)
 {
   const PetscInt n = d->n;
@@ -235,6 +238,7 @@ static PetscReal Violation(PetscInt n, const PetscReal M[], const PetscReal q[],
     PetscReal w = q[i];
 
     for (PetscInt j = 0; j < n; j++) {
+      /* Most components are 0 on a sparse contact. */
       if (z[j] != 0) w += M[(size_t)j * (size_t)n + (size_t)i] * z[j];
     }
     worst = PetscMax(worst, z[i] > 0 ? PetscAbsReal(w) : -w);
@@ -245,7 +249,8 @@ static PetscReal Violation(PetscInt n, const PetscReal M[], const PetscReal q[],
   return PetscMax(worst / size_q, size_z > 0 ? -least_z / size_z : 0);
 }
 
-/* z of the last basis: from the pivots or solved anew, whichever has the smaller violation. */
+/* z of the last basis: from the pivots or solved anew, whichever has the smaller violation. Solving anew on the support
+   removes the round-off of all pivots. */
 static PetscErrorCode Unpack(const Dictionary *d, const PetscReal M[], const PetscReal q[], PetscReal scale,
                              PetscReal z[])
 {

@@ -61,7 +61,7 @@ static void SetSprings(Proximal *h)
   }
 }
 
-/* S + A^T A / kappa */
+/* S + A^T A / kappa. The condensed matrix of the forces when the unknowns are held by springs kappa. */
 static PetscErrorCode AddSprings(Proximal *h)
 {
   const size_t p = (size_t)h->p, m = (size_t)h->m;
@@ -76,6 +76,7 @@ static PetscErrorCode AddSprings(Proximal *h)
   for (size_t j = 0; j < m; j++) {
     const PetscReal *column = Column(h, (PetscInt)j);
 
+    /* Rows of the pinned unknowns over the square root of their spring. */
     for (size_t i = 0; i < p; i++) A[j * p + i] = column[i] / PetscSqrtReal(h->kappa[i]);
     PetscCall(PetscArraycpy(h->S + j * m, column + p, m));
   }
@@ -84,7 +85,8 @@ static PetscErrorCode AddSprings(Proximal *h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* r and x for the forces L; NULL: for none. */
+/* r and x for the forces L; NULL: for none. r: what is left of the load on the unknowns; x moves by it against the
+   springs. */
 static void Place(Proximal *h, const PetscReal L[])
 {
   for (PetscInt i = 0; i < h->p; i++) h->r[i] = -h->lcp->q[i];
@@ -212,6 +214,7 @@ PetscErrorCode HycoLCPProximal(const HycoLCP *lcp, PetscBool active[], PetscReal
   PetscCall(PetscMalloc2((size_t)m * (size_t)m, &h.S, m, &h.gap));
   PetscCall(PetscCalloc5(p, &h.kappa, p, &h.centre, p, &h.x, p, &h.r, p, &h.step));
   PetscCall(Iterate(&h, active, z + p, its, status));
+  /* The pinned unknowns of the last centre; forces are in place. */
   PetscCall(PetscArraycpy(z, h.x, p));
   PetscCall(PetscFree2(h.S, h.gap));
   PetscCall(PetscFree5(h.kappa, h.centre, h.x, h.r, h.step));

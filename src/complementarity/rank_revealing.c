@@ -70,6 +70,7 @@ static PetscInt NextPivot(PetscInt k, const PetscReal A[], const PetscReal gap[]
   }
   for (PetscInt i = 0; i < k && largest > DEPENDENT; i++) {
     if (kept[i] || PetscAbsReal(A[(size_t)i * (size_t)k + (size_t)i]) < largest * (1 - 1e-8)) continue;
+    /* Equal pivots are contacts that repeat each other: the one that closes first carries the force. */
     if (best < 0 || gap[i] < gap[best]) best = i;
   }
   return best;
@@ -99,7 +100,8 @@ static PetscErrorCode Reveal(PetscInt k, PetscReal A[], const PetscReal gap[], P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The rank of a Gram matrix A (k x k, overwritten), by pivots of the scaled matrix. */
+/* The rank of a Gram matrix A (k x k, overwritten), by pivots of the scaled matrix. By the same pivots as sets of
+   contacts are reduced, with the same tolerance. */
 PetscErrorCode HycoGramRank(PetscInt k, PetscReal A[], PetscInt *rank)
 {
   PetscReal *d;
@@ -133,6 +135,7 @@ static PetscErrorCode TrySet(PetscInt n, const PetscReal M[], const PetscReal q[
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(k, &x, k, &d));
   CopyScaled(n, M, k, a, A, d);
+  /* The scaled problem: D M D (D^-1 z) = -D q. */
   for (PetscInt j = 0; j < k; j++) x[j] = -q[a[j]] * d[j];
   PetscCall(Solve(k, A, symmetric, tol, x, regular));
   for (PetscInt j = 0; *regular && j < k; j++) z[a[j]] = x[j] * d[j];

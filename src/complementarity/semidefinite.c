@@ -214,7 +214,8 @@ static PetscErrorCode Continue(const HycoActiveSet *e, const HycoLCP *lcp, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* For lcp->p > 0; z = (x_pinned, L). On one process, or alike on every rank. */
+/* For lcp->p > 0; z = (x_pinned, L). On one process, or alike on every rank. One by one: sets that change at once may
+   leave a body without any contact, and the matrix singular. */
 PetscErrorCode HycoLCPSemidefinite(const HycoLCP *lcp, PetscBool active[], PetscReal z[], PetscInt *its,
                                    HycoLCPStatus *status)
 {
@@ -234,6 +235,7 @@ PetscErrorCode HycoLCPSemidefinite(const HycoLCP *lcp, PetscBool active[], Petsc
   PetscCall(PetscMalloc3(n, &h.a, n, &h.w, lcp->n, &h.idle));
   for (PetscInt i = lcp->p; i < n; i++)
     h.flexibility = PetscMax(h.flexibility, PetscAbsReal(lcp->M[(size_t)i * (size_t)n + (size_t)i]));
+  /* No contact moves anything: any scale serves. */
   if (h.flexibility == 0) h.flexibility = 1;
   FindIdle(&h);
   PetscCall(HycoActiveSetRun(&e, active, its, status));

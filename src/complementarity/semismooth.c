@@ -88,7 +88,8 @@ static PetscErrorCode Slack(Newton *h, const PetscReal z[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* y and F at z with the slacks w; *norm = |F|_2, *size: the size of the forces, to which it is compared. */
+/* y and F at z with the slacks w; *norm = |F|_2, *size: the size of the forces, to which it is compared. F = z - P(z -
+   rho w), zero at a solution; without bounds, as of free unknowns, F = rho w. */
 static PetscErrorCode Evaluate(Newton *h, const PetscReal z[], PetscReal *norm, PetscReal *size)
 {
   PetscReal sum = 0, most = 0, least = 0;
@@ -123,7 +124,8 @@ static PetscErrorCode Residual(Newton *h, const PetscReal z[], PetscReal *norm, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The sign of the determinant of J at z, a solution; 0: J is singular. */
+/* The sign of the determinant of J at z, a solution; 0: J is singular. A negative one proves that the problem has other
+   solutions as well, by the degree of F. */
 static PetscErrorCode Sign(Newton *h, const PetscReal z[], PetscInt *sign)
 {
   PetscReal norm, size;
@@ -141,6 +143,7 @@ static PetscErrorCode Sign(Newton *h, const PetscReal z[], PetscInt *sign)
    not searched for a lucky decrease. */
 static PetscErrorCode Search(Newton *h, PetscReal z[], PetscReal *norm, PetscReal *size, PetscBool *less)
 {
+  /* Near round-off only the full step is tried, and half is enough. */
   const PetscReal before = *norm, least = before <= ROUNDING * *size ? 1 : LEAST_STEP;
   const PetscReal share = before <= ROUNDING * *size ? 0.5 : 1e-4;
   const PetscBool near = (PetscBool)(before <= NEAR * *size);
@@ -158,10 +161,12 @@ static PetscErrorCode Search(Newton *h, PetscReal z[], PetscReal *norm, PetscRea
     }
     if (near) PetscCall(Slack(h, trial));
     PetscCall(Evaluate(h, trial, norm, size));
+    /* Armijo's condition on |F|. */
     *less = (PetscBool)(*norm < (1 - share * t) * before);
   }
   if (*less) {
     PetscCall(PetscArraycpy(z, trial, h->n));
+    /* Passing into the neighbourhood of the solution: w anew, without the drift of updates. */
     if (!near && *norm <= NEAR * *size) PetscCall(Residual(h, z, norm, size));
   } else {
     PetscCall(PetscArraycpy(h->w, w, h->n));
@@ -195,10 +200,12 @@ static PetscErrorCode Step(Newton *h, const PetscReal z[], PetscBool near, Petsc
 
   PetscFunctionBegin;
   if (!near && !least) PetscCall(HycoConeStepPoint(h->linear, h->q, h->y, h->step, regular, &served));
+  /* The point itself was solved for: the step is its difference from z. */
   if (served) {
     for (PetscInt i = 0; i < h->n; i++) h->step[i] -= z[i];
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+  /* The right-hand side of the step is -F; F comes back below. */
   for (PetscInt i = 0; i < h->n; i++) h->F[i] = -h->F[i];
   PetscCall(HycoConeStepSolve(h->linear, h->F, least, h->step, regular));
   for (PetscInt i = 0; i < h->n; i++) h->F[i] = -h->F[i];
@@ -397,7 +404,8 @@ static PetscErrorCode FromForces(Newton *h, PetscReal z[], HycoLCPStatus *status
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* From the solution with normal forces alone. */
+/* From the solution with normal forces alone. Which contacts are closed is then right as a rule, and only stick and
+   slip are left. */
 static PetscErrorCode FromNormal(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
   const HycoBlocks *b = h->blocks;
@@ -433,8 +441,8 @@ static PetscErrorCode FromNormal(Newton *h, PetscReal z[], HycoLCPStatus *status
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* From the solution in which every contact is closed and sticks, as far as there is one; then from its admissible forces.
-   Contacts without a row have no force. */
+/* From the solution in which every contact is closed and sticks, as far as there is one; then from its admissible
+   forces. Contacts without a row have no force. A solution if nothing slips, as at the begin of many paths. */
 static PetscErrorCode FromStick(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
   PetscBool regular;
@@ -458,7 +466,8 @@ static PetscErrorCode FromStick(Newton *h, PetscReal z[], HycoLCPStatus *status)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Steps in which the admissible forces are those of the last one, then the problem itself. */
+/* Steps in which the admissible forces are those of the last one, then the problem itself. Each step is a problem with
+   a fixed bound of friction, which is convex: the fixed-point method of Tresca's friction. */
 static PetscErrorCode FromFrozen(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
   const HycoBlocks *b = h->blocks;
@@ -493,10 +502,12 @@ static PetscErrorCode Starts(Newton *h, PetscReal z[], HycoLCPStatus *status)
   PetscFunctionBegin;
   PetscCall(Iterate(h, z, status));
   if (*status == HYCO_LCP_SOLVED) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Sweeps over blocks cannot move a floating body. */
   if (h->p) {
     PetscCall(FromStick(h, z, status));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+  /* Forces of a failed start may lie outside their cones. */
   PetscCall(HycoBlocksAdmit(h->blocks, z));
   PetscCall(Sweep(h, MOST_SWEEPS, z));
   PetscCall(Iterate(h, z, status));
@@ -504,7 +515,8 @@ static PetscErrorCode Starts(Newton *h, PetscReal z[], HycoLCPStatus *status)
 }
 
 /* The proximal point method from z: it ends if z solves the problem of lcp, and further steps gain nothing. Proximal
-   point problems are solved from the last z; if one fails, so does the method. */
+   point problems are solved from the last z; if one fails, so does the method. For problems of which Newton's method
+   cycles; each step is strongly monotone, and has one solution. */
 static PetscErrorCode Proximal(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
   const size_t n = (size_t)h->n;
@@ -542,6 +554,7 @@ static PetscErrorCode Chain(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
   PetscFunctionBegin;
   PetscCall(SetScales(h));
+  /* Friction: the forces of the last step first, then the solution without friction. */
   if (h->lcp->blocks) {
     PetscCall(FromForces(h, z, status));
     if (*status != HYCO_LCP_SOLVED) PetscCall(FromNormal(h, z, status));
@@ -554,6 +567,7 @@ static PetscErrorCode Chain(Newton *h, PetscReal z[], HycoLCPStatus *status)
   }
   if (*status == HYCO_LCP_SOLVED) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(Restart(h, z));
+  /* Last: it solves a sequence of problems, each with a full flexibility. */
   PetscCall(Proximal(h, z, status));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -645,6 +659,7 @@ static PetscErrorCode Adapt(HycoConeFactor f, PetscInt p, const HycoBlocks *bloc
   PetscBool same = (PetscBool)(f->row && f->step.p == p && f->n_blocks == blocks->n);
 
   PetscFunctionBegin;
+  /* Equal numbers of blocks may still have other sizes. */
   if (same) PetscCall(PetscArraycmp(f->row, blocks->row, blocks->n + 1, &same));
   if (!same) {
     PetscCall(Release(f));
@@ -657,7 +672,8 @@ static PetscErrorCode Adapt(HycoConeFactor f, PetscInt p, const HycoBlocks *bloc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* z: start and solution (p + n); lcp->blocks NULL: forces >= 0. On one process, or alike on every rank. */
+/* z: start and solution (p + n); lcp->blocks NULL: forces >= 0. On one process, or alike on every rank. Chain() tries
+   the starts one after the other until one converges. */
 PetscErrorCode HycoLCPSemismooth(const HycoLCP *lcp, PetscReal z[], PetscInt *its, HycoLCPStatus *status)
 {
   const PetscInt n = lcp->p + lcp->n;

@@ -77,6 +77,7 @@ static void AddUnknown(HycoConeStep *t, PetscInt first, PetscInt size, const Pet
 
   left->n = right->n = 0;
   for (PetscInt i = 0; i < size; i++) {
+    /* Sparse: an unknown of a sticking component has one term. */
     if (l[i] != 0) {
       left->row[left->n] = first + i;
       left->value[left->n++] = l[i] * t->rho[first + i];
@@ -90,7 +91,7 @@ static void AddUnknown(HycoConeStep *t, PetscInt first, PetscInt size, const Pet
 }
 
 /* Column k of L: the direction of the longest of the rows R without their parts along the columns before; returns its
-   length. */
+   length. Rank-revealing: a derivative of rank r has r such columns, and the others are noise. */
 static PetscReal Longest(PetscInt size, const PetscReal R[], PetscInt k, PetscReal L[HYCO_MAX_BLOCK][HYCO_MAX_BLOCK])
 {
   PetscReal most = 0;
@@ -99,6 +100,7 @@ static PetscReal Longest(PetscInt size, const PetscReal R[], PetscInt k, PetscRe
     PetscReal v[HYCO_MAX_BLOCK] = {0}, square = 0;
 
     for (PetscInt j = 0; j < size; j++) v[j] = R[i * size + j];
+    /* Gram and Schmidt against the former columns of L. */
     for (PetscInt a = 0; a < k; a++) {
       PetscReal along = 0;
 
@@ -125,6 +127,7 @@ static PetscInt Factorise(HycoConeStep *t, PetscInt k, PetscBool add)
     const PetscReal length = Longest(size, D, a, L);
 
     if (!a) most = length;
+    /* The rest of the rows is dependent: the rank is a. */
     if (!(length > ROUNDING * most)) return a;
     for (PetscInt i = 0; i < size && add; i++) {
       for (PetscInt j = 0; j < size; j++) E[i] += D[i * size + j] * L[a][j];
@@ -143,16 +146,19 @@ static PetscErrorCode TakeBase(HycoConeStep *t)
   t->factored = t->updated = PETSC_FALSE;
   t->m = t->c = t->n_columns = 0;
   PetscCall(PetscArraycpy(t->base, t->DP, (size_t)t->blocks->n * HYCO_BLOCK));
+  /* Motions without a cone are unknowns of their own. */
   for (PetscInt i = 0; i < t->p; i++) AddUnknown(t, i, 1, &one, &one);
   for (PetscInt k = 0; k < t->blocks->n; k++) t->rank[k] = t->base_rank[k] = Factorise(t, k, PETSC_TRUE);
   for (PetscInt i = 0; i < t->n; i++) {
+    /* No columns of Z and no rows of Q yet for this base. */
     t->column[i] = -1;
     t->known[i] = 0;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Lists the rows of DP that differ from the base; returns how many columns of Z are missing for them. */
+/* Lists the rows of DP that differ from the base; returns how many columns of Z are missing for them. t->column: the
+   column of Z of each row, -1: none yet. */
 static PetscInt Compare(HycoConeStep *t)
 {
   PetscInt missing = 0;
@@ -167,6 +173,7 @@ static PetscInt Compare(HycoConeStep *t)
 
       for (PetscInt j = 0; j < size; j++) same = (PetscBool)(same && now[i * size + j] == base[i * size + j]);
       if (same) continue;
+      /* A row that has changed before has its column already. */
       missing += t->column[first + i] < 0;
       t->block[t->c] = k;
       t->changed[t->c++] = first + i;
@@ -201,6 +208,7 @@ PetscErrorCode HycoConeStepDerive(HycoConeStep *t, const HycoBlocks *blocks, con
 
     PetscCall(HycoBlockDerivative(blocks, k, y + t->p + blocks->row[k], D));
     for (PetscInt i = 1; i < size; i++) {
+      /* A direction in which nothing moves has no force: its derivative would make the matrix singular. */
       if (!Inflexible(t, k, i)) continue;
       for (PetscInt j = 0; j < size; j++) D[i * size + j] = D[j * size + i] = 0;
     }
@@ -218,6 +226,7 @@ PetscErrorCode HycoConeStepDerive(HycoConeStep *t, const HycoBlocks *blocks, con
   if (t->factored && t->info == 0) {
     const PetscInt missing = Compare(t), most = PetscMin(HYCO_CONE_CHANGES, t->m / LEAST_SHARE);
 
+    /* Few changes: a low-rank update of the factor instead of a new one. */
     if (t->c <= most && t->n_columns + missing <= most) PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(TakeBase(t));
@@ -279,6 +288,7 @@ static void Assemble(HycoConeStep *t)
   }
 }
 
+/* info > 0 is kept: a singular matrix is no error here. */
 static void Factor(HycoConeStep *t)
 {
   const PetscBLASInt m = (PetscBLASInt)t->m;
@@ -326,6 +336,7 @@ static PetscErrorCode RightHandSide(HycoConeStep *t, const PetscReal b[])
     for (PetscInt i = 0; i < t->left[a].n; i++) {
       const PetscInt row = t->left[a].row[i];
 
+      /* left has been multiplied by rho: the first term is L^T b. */
       t->rhs[a] += t->left[a].value[i] * (b[row] / t->rho[row] - t->product[row]);
     }
   }
@@ -342,7 +353,8 @@ static void AddForces(const HycoConeStep *t, const PetscReal a[], PetscReal s[])
 
 /* -- the update of the base -- */
 
-/* The columns of Z that are missing: b is a unit vector. */
+/* The columns of Z that are missing: b is a unit vector. Z = inverse of the base times unit vectors, for the low-rank
+   update (Woodbury). */
 static PetscErrorCode AddColumns(HycoConeStep *t)
 {
   const PetscInt n = t->n, before = t->n_columns;
@@ -352,6 +364,7 @@ static PetscErrorCode AddColumns(HycoConeStep *t)
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < t->c; k++) {
+    /* Numbers first, so that all missing columns are solved in one call. */
     if (t->column[t->changed[k]] < 0) t->column[t->changed[k]] = t->n_columns++;
   }
   count = (PetscBLASInt)(t->n_columns - before);
@@ -363,6 +376,7 @@ static PetscErrorCode AddColumns(HycoConeStep *t)
     const PetscReal *M = t->M + (size_t)row * (size_t)n;
 
     if (column < before) continue;
+    /* The unit vector itself; AddForces() adds what the unknowns respond. */
     t->Z[(size_t)column * (size_t)n + (size_t)row] = 1;
     for (PetscInt a = 0; a < t->m; a++) {
       PetscReal sum = 0;
@@ -392,7 +406,7 @@ static PetscReal RowTimes(const HycoConeStep *t, PetscInt row, const PetscReal v
   return BLASdot_(&n, t->M + (size_t)row * (t->symmetric ? (size_t)t->n : 1), &step, v, &one);
 }
 
-/* ((I - rho M) Z)_row for all columns. */
+/* ((I - rho M) Z)_row for all columns. Only columns that are new since the last call. */
 static const PetscReal *RowOfQ(HycoConeStep *t, PetscInt row)
 {
   PetscReal *Q = t->Q + (size_t)row * HYCO_CONE_CHANGES;
@@ -426,6 +440,7 @@ static PetscErrorCode Update(HycoConeStep *t, PetscBool *regular)
 
   PetscFunctionBegin;
   *regular = PETSC_TRUE;
+  /* S belongs to the present changes. */
   if (t->updated || !t->c) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(AddColumns(t));
   for (PetscInt r = 0; r < c; r++) {
@@ -445,6 +460,7 @@ static PetscErrorCode Update(HycoConeStep *t, PetscBool *regular)
     least = PetscMin(least, PetscAbsReal(t->S[k * (c + 1)]));
     most = PetscMax(most, PetscAbsReal(t->S[k * (c + 1)]));
   }
+  /* A small pivot: the update loses digits, and a new base is taken. */
   *regular = t->updated = (PetscBool)(info == 0 && least >= SINGULAR * PetscMax(most, 1));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -464,6 +480,7 @@ static PetscErrorCode Correct(HycoConeStep *t, const PetscReal q[], const PetscR
 
     t->small[r] = 0;
     for (PetscInt j = 0; j < size; j++) {
+      /* The right-hand side with the new rows of DP, applied to the step of the base. */
       if (change[j] != 0)
         t->small[r] -=
             change[j] * (s[first + j] - t->rho[first + j] * (RowTimes(t, first + j, s) + (q ? q[first + j] : 0)));
@@ -486,7 +503,8 @@ static PetscErrorCode Correct(HycoConeStep *t, const PetscReal q[], const PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The base is factored, and its update; if that is nearly singular the present DP becomes the base. */
+/* The base is factored, and its update; if that is nearly singular the present DP becomes the base. After it t->A has a
+   factor, and t->S that of the update. */
 static PetscErrorCode Prepare(HycoConeStep *t)
 {
   PetscBool regular;
@@ -507,6 +525,7 @@ PetscErrorCode HycoConeStepRenew(HycoConeStep *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* `least`: the least-squares step, for singular matrices. */
 PetscErrorCode HycoConeStepSolve(HycoConeStep *t, const PetscReal b[], PetscBool least, PetscReal s[],
                                  PetscBool *regular)
 {
@@ -515,6 +534,7 @@ PetscErrorCode HycoConeStepSolve(HycoConeStep *t, const PetscReal b[], PetscBool
   PetscReal size = 0;
 
   PetscFunctionBegin;
+  /* Least squares need the present matrix, not an update of another. */
   if (least && t->c) PetscCall(TakeBase(t));
   if (!least) PetscCall(Prepare(t));
   m = (PetscBLASInt)t->m;
@@ -526,6 +546,7 @@ PetscErrorCode HycoConeStepSolve(HycoConeStep *t, const PetscReal b[], PetscBool
   if (!info) AddForces(t, t->rhs, s);
   if (!least && !info) PetscCall(Correct(t, NULL, b, s));
   for (PetscInt i = 0; i < t->n; i++) size += PetscAbsReal(s[i]);
+  /* A nearly singular factor shows as infinite numbers. */
   *regular = (PetscBool)(info == 0 && !PetscIsInfOrNanReal(size));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -546,11 +567,13 @@ static PetscErrorCode IsHomogeneous(const HycoConeStep *t, const PetscReal y[], 
       rest = PetscMax(rest, PetscAbsReal(z[i]));
       most = PetscMax(most, PetscAbsReal(y[first + i]));
     }
+    /* Not with frozen radii, whose disks do not scale with y. */
     *is = (PetscBool)(rest <= HOMOGENEOUS * most);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The solution itself on the present pieces of P, where these are homogeneous: there is no cancellation in a step. */
 PetscErrorCode HycoConeStepPoint(HycoConeStep *t, const PetscReal q[], const PetscReal y[], PetscReal z[],
                                  PetscBool *regular, PetscBool *served)
 {
@@ -567,6 +590,7 @@ PetscErrorCode HycoConeStepPoint(HycoConeStep *t, const PetscReal q[], const Pet
   info = t->info;
   for (PetscInt a = 0; a < t->m; a++) {
     t->rhs[a] = 0;
+    /* -L^T rho q: the fixed part of y on the present states. */
     for (PetscInt i = 0; i < t->left[a].n; i++) t->rhs[a] -= t->left[a].value[i] * q[t->left[a].row[i]];
   }
   if (m && !info) LAPACKgetrs_("N", &m, &one, t->A, &m, t->pivot, t->rhs, &m, &info);

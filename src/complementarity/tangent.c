@@ -43,6 +43,7 @@ PetscErrorCode HycoTangentStates(PetscInt n, const PetscReal L[], const PetscRea
   PetscFunctionBegin;
   for (PetscInt i = 0; i < n; i++) most = PetscMax(most, L[i]);
   for (PetscInt i = 0; i < n; i++) {
+    /* A contact whose own row is flexible must press noticeably: otherwise it may open for a small change. */
     const PetscBool closed =
         (PetscBool)(L[i] > NEAR * most && (flexibility[i] <= 0 || L[i] * flexibility[i] > NEAR * size));
 
@@ -110,7 +111,8 @@ static void Solve(HycoTangent t, PetscReal x[])
   for (PetscBLASInt i = 0; i < m; i++) x[i] *= t->scale[i];
 }
 
-/* Without the contacts whose rows depend on closed ones, which these decide. */
+/* Without the contacts whose rows depend on closed ones, which these decide. S is the Schur complement of the undecided
+   contacts; into and out couple them with the set. */
 static PetscErrorCode Condense(HycoTangent t, const PetscReal M[])
 {
   const size_t n = (size_t)(t->p + t->n), m = (size_t)t->n_set;
@@ -162,6 +164,7 @@ PetscErrorCode HycoTangentCreate(PetscInt p, PetscInt n, const PetscReal M[], co
   PetscCall(PetscMalloc1(n + 1, &t->open));
   for (PetscInt i = 0; i < p; i++) t->set[t->n_set++] = i;
   for (PetscInt i = 0; i < n; i++) {
+    /* Motions first, then closed contacts: the equations that hold to both sides. */
     if (state[i] == HYCO_TANGENT_CLOSED) t->set[t->n_set++] = p + i;
     if (state[i] == HYCO_TANGENT_UNDECIDED) t->open[t->n_open++] = p + i;
   }
@@ -194,6 +197,7 @@ static void Gaps(HycoTangent t, const PetscReal q[], int sign, PetscReal change[
       change[k] += sign * out[i] * t->v[i];
       size += PetscAbsReal(out[i] * t->v[i]);
     }
+    /* A sum of terms that cancel: 0, and no kink. */
     if (PetscAbsReal(change[k]) <= NOTHING * size) change[k] = 0;
     *kink = (PetscBool)(*kink || change[k] != 0);
   }

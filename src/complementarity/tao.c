@@ -52,12 +52,14 @@ PetscErrorCode HycoTaoFindType(const char type[], char name[HYCO_TAO_NAME], char
   PetscFunctionBegin;
   list[0] = name[0] = '\0';
   for (size_t k = 0; k < sizeof(known) / sizeof(known[0]); k++) {
+    /* hyco's own types have options of their own. */
     if (known[k].traits & HYCO_TAO_OWN) continue;
     if (strcasecmp(known[k].name, type) == 0) PetscCall(PetscStrncpy(name, known[k].name, HYCO_TAO_NAME));
     PetscCall(PetscStrlcat(list, list[0] ? ", " : "", HYCO_LINE));
     PetscCall(PetscStrlcat(list, known[k].name, HYCO_LINE));
   }
   PetscCall(PetscFunctionListFind(TaoList, type, &create));
+  /* A type that the program has registered. */
   if (!name[0] && create) PetscCall(PetscStrncpy(name, type, HYCO_TAO_NAME));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -85,7 +87,7 @@ static PetscErrorCode Reset(HycoTao t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Destroys the copies of a dense problem. */
+/* Destroys the copies of a dense problem. They are kept over solves of one size. */
 static PetscErrorCode ResetDense(HycoTao t)
 {
   PetscFunctionBegin;
@@ -136,6 +138,7 @@ static PetscErrorCode Prepare(HycoTao t, Vec y, PetscInt max_its, PetscBool *mad
   PetscCall(TaoCreate(t->comm, &t->tao));
   PetscCall(TaoSetType(t->tao, t->type));
   if (t->owner) PetscCall(PetscObjectGetOptionsPrefix(t->owner, &prefix));
+  /* The owner's prefix first: several solvers in one program have options of their own. */
   PetscCall(PetscSNPrintf(t->prefix, sizeof(t->prefix), "%shyco_", prefix ? prefix : ""));
   PetscCall(TaoSetOptionsPrefix(t->tao, t->prefix));
   if (t->traits & HYCO_TAO_OWN) { /* the form has its own solver on a set */
@@ -189,6 +192,7 @@ static PetscErrorCode Objective(Tao tao, Vec y, PetscReal *value, Vec gradient, 
   PetscCall(VecDot(y, gradient, &yHy));
   PetscCall(VecDot(y, t->F, &fy));
   PetscCall(VecAXPY(gradient, -1, t->F));
+  /* The product with H is needed for the gradient anyway. */
   *value = yHy / 2 - fy;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -201,7 +205,7 @@ static PetscErrorCode Hessian(Tao tao, Vec y, Mat H, Mat P, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* w = M z - f */
+/* w = M z - f. w and z are complementary: TAO's form of the problem. */
 static PetscErrorCode Slack(Tao tao, Vec z, Vec w, void *ctx)
 {
   HycoTao t = (HycoTao)ctx;
@@ -255,6 +259,7 @@ static PetscErrorCode SetBoundProblem(HycoTao t, PetscBool krylov)
   PetscFunctionBegin;
   PetscCall(TaoSetObjectiveAndGradient(t->tao, NULL, Objective, t));
   PetscCall(TaoSetHessian(t->tao, t->H, t->H, Hessian, NULL));
+  /* 0 for the last: the initial residual may be as small as the solution's. */
   PetscCall(TaoSetTolerances(t->tao, 1e-13, 1e-14, 0));
   PetscCall(PetscObjectTypeCompare((PetscObject)t->H, MATSHELL, &shell));
   PetscCall(TaoGetKSP(t->tao, &ksp));
@@ -275,6 +280,7 @@ static PetscErrorCode SetComplementarity(HycoTao t, PetscBool krylov)
 
   PetscFunctionBegin;
   if (!t->w) PetscCall(VecDuplicate(t->F, &t->w));
+  /* TAO's semismooth types scale the Jacobian in place: H must stay. */
   if (!t->J) PetscCall(MatDuplicate(t->H, MAT_COPY_VALUES, &t->J));
   PetscCall(TaoSetConstraintsRoutine(t->tao, t->w, Slack, t));
   PetscCall(TaoSetJacobianRoutine(t->tao, t->J, t->J, Jacobian, t));
@@ -301,6 +307,7 @@ static PetscErrorCode Run(HycoTao t, Vec lo, Vec hi, Vec y, PetscBool krylov, Pe
   PetscCall(Prepare(t, y, t->max_its ? t->max_its : 2000, &made));
   PetscCall(TaoSetSolution(t->tao, y));
   PetscCall(TaoSetVariableBounds(t->tao, lo, hi));
+  /* The same test for all types, on the scaled residual. */
   if (made) PetscCall(TaoSetConvergenceTest(t->tao, Converged, t));
   if (t->traits & HYCO_TAO_SEMISMOOTH) {
     if (made) PetscCall(SetComplementarity(t, krylov));
@@ -309,6 +316,7 @@ static PetscErrorCode Run(HycoTao t, Vec lo, Vec hi, Vec y, PetscBool krylov, Pe
   else
     PetscCall(TaoSetHessian(t->tao, t->H, t->H, Hessian, NULL));
   if (made) PetscCall(ReadOptions(t));
+  /* Stagnation is counted from here. */
   t->best = PETSC_MAX_REAL;
   t->best_at = 0;
   PetscCall(TaoSolve(t->tao));
@@ -395,6 +403,7 @@ static PetscErrorCode Projected(const HycoTao t, Vec lo, Vec hi, Vec y, PetscRea
   PetscCall(MatMult(t->H, y, step));
   PetscCall(VecAXPY(step, -1, t->F));
   PetscCall(VecAYPX(step, -1, y));
+  /* The projection onto the bounds. */
   PetscCall(VecMedian(lo, step, hi, step));
   PetscCall(VecAXPY(step, -1, y));
   PetscCall(VecNorm(step, NORM_INFINITY, size));
@@ -441,8 +450,10 @@ PetscErrorCode HycoTaoSolve(HycoTao t, Mat H, Vec f, Vec lo, Vec hi, Vec y, Pets
   PetscCall(VecDuplicate(y, &d));
   PetscCall(Scale(H, f, lo, hi, y, d, &size));
   PetscCall(CatchRun(t, lo, hi, y, PETSC_FALSE, its, solved, &failed));
+  /* An error inside TAO, as a factor of a singular Hessian: once more without factors. */
   if (failed) PetscCall(CatchRun(t, lo, hi, y, PETSC_TRUE, its, solved, &failed));
   if (!*solved && t->traits & HYCO_TAO_RESTARTS) PetscCall(SecondStart(t, lo, hi, y, failed, its, solved));
+  /* Back from the scaled unknowns. */
   PetscCall(VecPointwiseMult(y, y, d));
   PetscCall(VecScale(y, size));
   PetscCall(VecDestroy(&d));
@@ -458,10 +469,12 @@ static PetscErrorCode SetForceBounds(HycoTao t, Vec z)
   PetscScalar *l;
 
   PetscFunctionBegin;
+  /* Unchanged: an online solve of microseconds must not make vectors. */
   if (t->tao->XL && !blocks && t->n_free == t->lcp->p) PetscFunctionReturn(PETSC_SUCCESS);
   HycoVecDuplicate(z, &lo, &hi);
   PetscCall(VecSet(hi, PETSC_INFINITY));
   PetscCall(VecGetArrayWrite(lo, &l));
+  /* Motions are free, forces not negative. */
   for (PetscInt i = 0; i < t->lcp->p + t->lcp->n; i++) l[i] = i < t->lcp->p ? PETSC_NINFINITY : 0;
   for (PetscInt k = 0; blocks && k < blocks->n; k++) {
     for (PetscInt i = blocks->row[k]; i < blocks->row[k + 1] && !blocks->cone[blocks->of[k]]->nonnegative; i++)
@@ -499,6 +512,7 @@ PetscErrorCode HycoTaoSolveSet(HycoTao t, const HycoActiveSet *set, PetscBool ac
                                HycoLCPStatus *status)
 {
   PetscFunctionBegin;
+  /* The form solves on a set itself: there is no dense problem. */
   t->lcp = NULL;
   t->set = set;
   t->active = active;
@@ -571,6 +585,7 @@ static PetscErrorCode PlaceSolution(HycoTao t, PetscInt n, PetscReal z[])
   PetscFunctionBegin;
   if (t->placed) PetscCall(VecGetSize(t->placed, &old));
   if (old != n) {
+    /* A Tao of PETSc 3.18 keeps the size of its first solution. */
     PetscCall(Reset(t));
     PetscCall(VecDestroy(&t->placed));
     PetscCall(VecCreateSeqWithArray(PETSC_COMM_SELF, 1, n, NULL, &t->placed));

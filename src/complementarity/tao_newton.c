@@ -29,6 +29,7 @@ static PetscErrorCode Free(const Model *m, const PetscBool active[], IS *is, Pet
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(m->n, &rows));
   for (PetscInt i = 0; i < m->n; i++) {
+    /* Two entries for each unknown: its lower and its upper bound. */
     if (!active[2 * i] && !active[2 * i + 1]) rows[k++] = m->first + i;
   }
   PetscCall(ISCreateGeneral(PetscObjectComm((PetscObject)m->x), k, rows, PETSC_OWN_POINTER, is));
@@ -216,6 +217,7 @@ static PetscErrorCode StartSet(const Model *m, PetscBool active[])
   PetscCall(VecGetArrayRead(m->lo, &lo));
   PetscCall(VecGetArrayRead(m->hi, &hi));
   for (PetscInt i = 0; i < m->n; i++) {
+    /* An unknown whose bounds coincide is always on one. */
     active[2 * i] = (PetscBool)(x[i] <= lo[i] && (g[i] > 0 || lo[i] >= hi[i]));
     active[2 * i + 1] = (PetscBool)(!active[2 * i] && x[i] >= hi[i] && g[i] < 0);
   }
@@ -258,6 +260,7 @@ static PetscErrorCode GatherHessian(Mat H, PetscInt N, PetscReal M[])
   IS all;
 
   PetscFunctionBegin;
+  /* Any matrix type of the program, also a shell with entries by products. */
   PetscCall(MatConvert(H, MATDENSE, MAT_INITIAL_MATRIX, &dense));
   PetscCall(ISCreateStride(PETSC_COMM_SELF, N, 0, 1, &all));
   PetscCall(MatCreateSubMatrices(dense, 1, &all, &all, MAT_INITIAL_MATRIX, &whole));
@@ -413,6 +416,7 @@ PetscErrorCode HycoTaoNewton(Tao tao, PetscBool lemke)
   PetscFunctionBegin;
   PetscCall(Read(tao, lemke, &m));
   HycoVecDuplicate(m.x, &m.d, &m.w, &m.p);
+  /* The start is projected onto the bounds. */
   PetscCall(VecMedian(m.lo, m.x, m.hi, m.x));
   PetscCall(PetscObjectStateIncrease((PetscObject)m.x)); /* VecMedian() does not on ranks without rows, whose cached
                                                             norm would then remain, and only there */

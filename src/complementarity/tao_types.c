@@ -43,6 +43,7 @@ static PetscErrorCode ReadBounds(Tao tao, const HycoLCP *lcp, PetscReal **q)
   PetscCall(VecGetArrayRead(tao->XL, &lo));
   PetscCall(VecGetArrayRead(tao->XU, &hi));
   for (PetscInt i = 0; i < n; i++) {
+    /* The methods know lower bounds of forces alone. */
     if (hi[i] < PETSC_INFINITY || (lo[i] > PETSC_NINFINITY) != (i >= lcp->p)) bad = i;
     if (i >= lcp->p && lo[i] != 0 && !*q) HycoDuplicate((size_t)n, lcp->q, q);
   }
@@ -51,6 +52,7 @@ static PetscErrorCode ReadBounds(Tao tao, const HycoLCP *lcp, PetscReal **q)
              "finite lower one and no upper one of the others",
              ((PetscObject)tao)->type_name, (int)bad, (int)n, (double)lo[bad], (double)hi[bad], (int)lcp->p);
   for (PetscInt j = lcp->p; j < n && *q; j++) {
+    /* q + M lo: the problem in z - lo, whose bounds are 0. */
     for (PetscInt i = 0; i < n; i++) (*q)[i] += lcp->M[(size_t)j * (size_t)n + (size_t)i] * lo[j];
   }
   PetscCall(VecRestoreArrayRead(tao->XL, &lo));
@@ -75,6 +77,7 @@ static PetscErrorCode SolveDense(Tao tao, PetscErrorCode (*method)(HycoTao, cons
   SetReason(t);
   if (!q) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecGetArrayRead(tao->XL, &lo));
+  /* Back from z - lo. */
   for (PetscInt i = lcp.p; i < lcp.p + lcp.n; i++) t->z[i] += lo[i];
   PetscCall(VecRestoreArrayRead(tao->XL, &lo));
   PetscCall(PetscFree(q));
@@ -107,6 +110,7 @@ static PetscErrorCode SolveActiveSet(Tao tao)
     set.max_its = tao->max_it;
     set.monitor = t->monitor || tao->numbermonitors || tao->hist_max ? Monitor : NULL;
     set.monitor_ctx = t;
+    /* The form reads the bounds where a Tao has them: a program may have set others. */
     if (set.bounds) PetscCall(set.bounds(set.ctx, tao->XL, tao->XU));
     PetscCall(HycoActiveSetRun(&set, t->active, &t->its, &t->status));
     SetReason(t);
@@ -188,6 +192,7 @@ static PetscErrorCode CreateKSP(Tao tao)
   PetscCall(KSPSetType(tao->ksp, KSPPREONLY));
   PetscCall(KSPGetPC(tao->ksp, &pc));
   PetscCall(PCSetType(pc, PCLU));
+  /* PETSc's own LU is for one process. */
   if (size > 1) PetscCall(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -25,9 +25,10 @@ static PetscErrorCode IsShared(MPI_Comm comm, HycoMesh part, HycoMesh m, const H
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the contacts that the ranks have found for their own slaves are those of a search on one rank: every
-   contact of the scene has slaves, one with drawn masters has at least one master, and pairs are one to one. If not,
-   the caller searches on one rank, which reports the error. Collective. */
+/* Whether the contacts that the ranks have found for their own slaves are those of a search on one rank: every contact
+   of the scene has slaves, one with drawn masters has at least one master, and pairs are one to one. If not, the caller
+   searches on one rank, which reports the error. Collective. Counts alone, since a rank cannot know what another one
+   would have found. */
 PetscErrorCode HycoContactsAgree(MPI_Comm comm, HycoScene scene, HycoMesh part, HycoMesh surface, const HycoPairs *p,
                                  PetscBool *agreed)
 {

@@ -88,8 +88,9 @@ static void SearchAlong(HycoPatches s, PetscInt t, PetscReal least, PetscInt lo,
     SearchAlong(s, 2 * t + 1 + right, of[right], right ? mid : lo, right ? hi : mid, l);
 }
 
-/* The node nearest to the line from x along the mean of its normal `out` and the node's reversed normal, within
-   `small` of it (length); p->n = 0: none. Matches mirrored surfaces at any distance. */
+/* The node nearest to the line from x along the mean of its normal `out` and the node's reversed normal, within `small`
+   of it (length); p->n = 0: none. Matches mirrored surfaces at any distance. `off` is squared: distances from the line
+   are compared without roots. */
 void HycoPatchesAlongLine(HycoPatches s, const PetscReal x[3], const PetscReal out[3], PetscReal small,
                           HycoProjection *p)
 {

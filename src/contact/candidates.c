@@ -75,7 +75,8 @@ static void Halve(HycoPoint point[], PetscInt lo, PetscInt hi, PetscInt b, Box t
   Halve(point, mid, hi, 2 * b + 2, tree);
 }
 
-/* The trees of all ranks. */
+/* The trees of all ranks. The boxes of this rank's own slaves, halved along their longest side, as leaves of a tree of
+   fixed depth. */
 static PetscErrorCode FindBoxes(Candidates *s)
 {
   HycoMesh m = s->fe->mesh;
@@ -158,9 +159,11 @@ static PetscErrorCode FindReach(Candidates *s)
 static PetscErrorCode Add(Candidates *s, PetscMPIInt rank, PetscInt node)
 {
   PetscFunctionBegin;
+  /* Each node is offered by its owner alone. */
   if (HycoMeshOwned(s->fe->mesh, node) < 0 || s->sent[node] == rank + 1) PetscFunctionReturn(PETSC_SUCCESS);
   s->sent[node] = rank + 1;
   if (s->n == s->room) {
+    /* Doubling: the number of nodes near other ranks is not known before. */
     s->room = 2 * s->room + 256;
     PetscCall(PetscRealloc((size_t)s->room * sizeof(PetscInt), &s->node));
     PetscCall(PetscRealloc((size_t)s->room * sizeof(PetscMPIInt), &s->to));
@@ -232,7 +235,9 @@ static PetscErrorCode FindMargin(Candidates *s, PetscBool integrated, PetscReal 
     most[0] = PetscMax(most[0], radius);
     most[1] = PetscMax(most[1], HycoLength(centre) + radius);
   }
+  /* The widest facet may be on another rank: every rank must search as far. */
   HycoAllreduce(most, 2, MPIU_REAL, MPI_MAX, s->comm);
+  /* Round-off grows with the distance from the origin, not with the size of a facet. */
   s->margin = (2 * HYCO_SAME_POINT + slack) * most[0] + ROUND_OFF * most[1];
   s->stretch = 1;
   if (integrated) PetscCall(WidenMargin(s));
@@ -252,8 +257,10 @@ static PetscErrorCode AddNear(Candidates *s)
 
     if (m->facet_group[f] != s->master) continue;
     radius = Ball(s->fe, f, centre);
+    /* A node of the group without a facet on this rank may still be a master of node pairs. */
     for (PetscInt a = 0; a < m->nf; a++) s->on[node[a]] = PETSC_TRUE;
     for (PetscMPIInt r = 0; r < s->size; r++) {
+      /* The tree of boxes around the slaves of rank r: a facet's ball that meets none of them is not sent. */
       for (PetscInt a = 0; IsNear(s->tree + (size_t)r * BOXES, 0, centre, radius) && a < m->nf; a++)
         PetscCall(Add(s, r, node[a]));
     }
@@ -268,7 +275,8 @@ static PetscErrorCode AddNear(Candidates *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sends all nodes of the master to the ranks with slaves. A rigid body's master is one node, wherever it lies. */
+/* Sends all nodes of the master to the ranks with slaves. A rigid body's master is one node, wherever it lies. Whether
+   a rank has slaves is seen in the root of its tree, which is empty otherwise. */
 static PetscErrorCode AddAll(Candidates *s)
 {
   HycoMesh m = s->fe->mesh;
@@ -300,12 +308,15 @@ PetscErrorCode HycoContactsCandidates(MPI_Comm comm, HycoFE fe, PetscReal slack,
     if (!c->master) continue;
     PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->slave, &s.slave));
     PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->master, &s.master));
+    /* Per contact: the ranks that a surface is near to differ. */
     PetscCall(PetscArrayzero(s.sent, fe->mesh->n_nodes));
     PetscCall(FindBoxes(&s));
     PetscCall(FindMargin(&s, c->integrated, slack));
     PetscCall(FindReach(&s));
+    /* The one node of a rigid body is the master everywhere. */
     PetscCall(c->rigid ? AddAll(&s) : AddNear(&s));
   }
+  /* One exchange for all contacts. */
   PetscCall(HycoSendRows(comm, s.n, s.to, sizeof(PetscInt), s.node, n, node));
   PetscCall(PetscFree2(s.tree, s.on));
   HycoFreeAll(&s.sent, &s.node, &s.to);

@@ -17,6 +17,7 @@ static PetscErrorCode SizeAt(HycoFE fe, const char group[], PetscInt node, Sizes
   PetscInt g = 0;
 
   PetscFunctionBegin;
+  /* Groups follow each other in the order of the contacts: pointers suffice. */
   if (s->group != group) {
     PetscCall(HycoMeshFindGroup(fe->mesh, "contact", group, &g));
     if (!s->size) PetscCall(PetscMalloc1(fe->mesh->n_nodes, &s->size));
@@ -58,6 +59,7 @@ static PetscErrorCode RefuseOverlap(HycoFE fe, const HycoPairs *p, PetscInt k, P
   PetscFunctionBegin;
   PetscCall(HycoContactGetLength(c, "overlap", &stated));
   HycoPairsJump(p, k, 3, fe->X, r);
+  /* The advice has 1 % more than the deepest node, so that it works when copied. */
   HycoFail("contact %s: before any load node %d of %s lies %.4g deep in %s (its master point is %.4g away), and %.4g "
            "is allowed%s; check the positions of the bodies, or allow an intended overlap by contact_%s_overlap %.4g",
            c->name, (int)fe->mesh->node_id[p->slave[k]], c->slave, -(double)gap, c->master, (double)HycoLength(r),
@@ -117,8 +119,9 @@ static PetscErrorCode SlidingOf(HycoFE fe, const HycoPairs *p, PetscInt k, const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* For an active contact, the tangential motion over the facet's size: the measure of whether displacements are
-   small. overlap: of the unloaded gaps. index: from contacts to entries of L (NULL: the same). */
+/* For an active contact, the tangential motion over the facet's size: the measure of whether displacements are small.
+   overlap: of the unloaded gaps. index: from contacts to entries of L (NULL: the same). For remarks to the user: a
+   large sliding or overlap makes small displacements or pairs doubtful, but is no error. */
 PetscErrorCode HycoContactMeasure(HycoFE fe, HycoPairs *pairs, const PetscReal u[], const PetscReal L[],
                                   const PetscInt index[], HycoContactState *state)
 {

@@ -79,7 +79,8 @@ PetscErrorCode HycoContactView(HycoContact contact, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* For constructors of types only: the scene reads the entries right after the type is set, and rejects others. */
+/* For constructors of types only: the scene reads the entries right after the type is set, and rejects others.
+   `required`: HycoContactComplete() refuses a scene without it. */
 PetscErrorCode HycoContactDeclare(HycoContact contact, const char name[], const char title[], HycoEntryKind kind,
                                   PetscBool required)
 {
@@ -124,7 +125,8 @@ PetscErrorCode HycoContactEvaluate(HycoContact contact, const char name[], const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A length of the scene's entry, or -1 if it is not given. */
+/* A length of the scene's entry, or -1 if it is not given. A length is a number, which no parameter changes: it decides
+   the pairing. */
 PetscErrorCode HycoContactGetLength(HycoContact contact, const char name[], PetscReal *length)
 {
   const HycoEntry *entry;

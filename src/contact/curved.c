@@ -26,6 +26,7 @@ static PetscReal Evaluate(const HycoCurved *f, const PetscReal x[3], const Petsc
     tangent[0][c] = tangent[1][c] = 0;
     for (PetscInt a = 0; a < f->nf; a++) {
       r[c] += w[a] * f->X[a][c];
+      /* A line has one tangent. */
       for (PetscInt d = 0; d < (f->corners > 2 ? 2 : 1); d++) tangent[d][c] += slope[a][d] * f->X[a][c];
     }
   }
@@ -85,6 +86,7 @@ static PetscBool IsInside(const HycoCurved *f, const PetscReal at[2])
 /* The nearest point of a line, from the nearest of its nodes. */
 static PetscReal OnLine(const HycoCurved *line, const PetscReal x[3], PetscReal w[3])
 {
+  /* Reference coordinates of the ends and of the middle: the start of the descent is the nearest node. */
   static const PetscReal place[3] = {-1, 1, 0};
   PetscReal at[2] = {0, 0}, best = PETSC_MAX_REAL;
 
@@ -106,8 +108,10 @@ PetscReal HycoCurvedProject(const HycoCurved *f, const PetscReal x[3], PetscReal
 
   if (f->corners == 2) return OnLine(f, x, w);
   best = Descend(f, x, at, w);
+  /* The minimum of the extended facet is no point of it. */
   if (!IsInside(f, at)) best = PETSC_MAX_REAL;
   for (PetscInt k = 0; k < f->corners; k++) {
+    /* An edge: its two corners and the node in its middle. */
     const PetscInt of[3] = {k, (k + 1) % f->corners, f->corners + k};
     const HycoCurved line = {3, 2, {f->X[of[0]], f->X[of[1]], f->X[of[2]]}};
     PetscReal along[HYCO_FACET_NODES], d = OnLine(&line, x, along);

@@ -54,8 +54,10 @@ void HycoSurfaceSizes(HycoFE fe, PetscInt group, PetscReal size[])
     const PetscInt *node = m->facets + k / corners * nf, v = k % corners, ends[2] = {node[v], node[(v + 1) % corners]};
     const PetscReal length = HycoDistance(fe->X + 3 * ends[0], fe->X + 3 * ends[1]);
 
+    /* Facets of all groups lie in one list. */
     if (m->facet_group[k / corners] != group) continue;
     for (PetscInt e = 0; e < 2; e++) size[ends[e]] = PetscMax(size[ends[e]], length);
+    /* Middles of edges and of the facet have the size of the edges around them. */
     for (PetscInt w = corners; w < nf; w++) { /* second order: the middle of the edge, of the facet */
       if (w == corners + v || w == 2 * corners) size[node[w]] = PetscMax(size[node[w]], length);
     }
@@ -110,11 +112,13 @@ PetscErrorCode HycoSurfaceVectors(HycoFE fe, PetscInt group, PetscReal vector[])
       }
     }
   }
+  /* A tied slave node has no contact of its own. */
   PassTied(m, 3, vector);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The part of each node (share, n_nodes) in the area of the surface `group`. */
+/* The part of each node (share, n_nodes) in the area of the surface `group`. Shares add up to the area of the surface,
+   those of tied nodes included, as PassTied() hands them on. */
 static PetscErrorCode Shares(HycoFE fe, PetscInt group, PetscReal share[])
 {
   HycoMesh m = fe->mesh;
@@ -130,6 +134,7 @@ static PetscErrorCode Shares(HycoFE fe, PetscInt group, PetscReal share[])
       for (PetscInt a = 0; a < m->nf; a++) {
         const PetscInt node = m->facets[f * m->nf + a];
 
+        /* Nodes on the axis of second-order cells, to which a uniform pressure gives no force. */
         if (!HycoNodeHasNoArea(fe, node)) share[node] += el->N[q][a] * PetscSqrtReal(HycoDot(n, n));
       }
     }
@@ -138,7 +143,8 @@ static PetscErrorCode Shares(HycoFE fe, PetscInt group, PetscReal share[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Areas of the contacts' slaves (m^2), by which forces become pressures. Not collective. */
+/* Areas of the contacts' slaves (m^2), by which forces become pressures. Not collective. Negative shares, of corners of
+   second-order facets, belong to nodes that carry no contact. */
 PetscErrorCode HycoContactAreas(HycoFE fe, const HycoPairs *pairs, PetscReal area[])
 {
   PetscReal *share;
@@ -168,6 +174,7 @@ PetscReal HycoSurfaceTolerance(HycoMesh m, PetscInt group)
   PetscReal shortest = PETSC_MAX_REAL;
 
   for (PetscInt f = 0; f < m->n_facets; f++) {
+    /* A collapsed quadrilateral has an edge of length 0, which must not count. */
     const PetscInt *node = m->facets + f * m->nf, n = HycoFacetCorners(corners, node);
 
     if (m->facet_group[f] != group) continue;

@@ -31,7 +31,7 @@ static PetscErrorCode IsSurfaceMoved(HycoScene scene, HycoMesh m, HycoContact c,
 }
 
 /* Tolerance and motion of each contact over all ranks: a rank alone sees only a part of the surface, and all must
-   search alike. Collective. */
+   search alike. Collective. Ranks without a facet of the surface have nothing to say about its tolerance. */
 PetscErrorCode HycoContactsFacts(MPI_Comm comm, HycoScene scene, HycoMesh part, HycoSurfaceFacts facts[])
 {
   PetscFunctionBegin;
@@ -182,6 +182,7 @@ static PetscErrorCode CheckSlaves(HycoScene scene, HycoMesh m, const PetscInt he
   for (PetscInt k = 0; k < p->n; k++) {
     const PetscInt i = p->slave[k], free = m->dim - held[i];
 
+    /* The first contact, to be named beside the one too many. */
     if (!count[i]++) first[i] = p->contact[k];
     HycoCheck(!free || count[i] <= free,
               "node %d is a slave of %d contacts, among them %s and %s, and has %d free displacement%s, so that the "
@@ -193,7 +194,8 @@ static PetscErrorCode CheckSlaves(HycoScene scene, HycoMesh m, const PetscInt he
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the nodes of a contact without masters, except completely fixed ones, which cannot touch anything. */
+/* Adds the nodes of a contact without masters, except completely fixed ones, which cannot touch anything. For
+   obstacles: there is no master to find, and the row of B has the slave's unknowns only. */
 static PetscErrorCode AppendNodes(HycoFE fe, PetscInt index, const PetscInt held[], HycoPairs *p)
 {
   HycoMesh m = fe->mesh;
@@ -229,6 +231,7 @@ static PetscErrorCode KeepOwned(HycoMesh m, HycoPairs *p)
   for (PetscInt k = 0; k < p->n; k++) {
     if (HycoMeshOwned(m, p->slave[k]) >= 0) which[n++] = k;
   }
+  /* On one rank, and where no slave is in the overlap, nothing is copied. */
   if (n < p->n) {
     PetscCall(HycoPairsSelect(p, n, which, NULL, &kept));
     PetscCall(HycoPairsDestroy(p));
@@ -239,7 +242,8 @@ static PetscErrorCode KeepOwned(HycoMesh m, HycoPairs *p)
 }
 
 /* Setup by type, then what concerns several contacts: ties and slaves with several contacts. Masters of moved
-   surfaces are found last. */
+   surfaces are found last. Ties are dropped before slaves are counted: a tied node has no unknown that a contact
+   could act on. */
 static PetscErrorCode FindAll(HycoFE fe, HycoPairs *pairs)
 {
   HycoScene scene = fe->scene;

@@ -131,6 +131,7 @@ static PetscErrorCode Geometry(HycoFE fe, const HycoPairs *pairs, PetscReal work
     PetscCall(PetscArraycpy(slave + 3 * k, fe->X + 3 * pairs->slave[k], 3));
     MasterPoint(fe, pairs, k, master + 3 * k);
   }
+  /* Contacts of one scene entry in one batch: expressions are evaluated for all of its points at once. */
   for (PetscInt k = 0, next; k < pairs->n; k = next) {
     HycoContact c = fe->scene->contact[pairs->contact[k]];
     HycoContactPoints points = {.mu = fe->mu, .slave = slave + 3 * k, .master = master + 3 * k};
@@ -138,13 +139,15 @@ static PetscErrorCode Geometry(HycoFE fe, const HycoPairs *pairs, PetscReal work
     next = HycoPairsRun(pairs, k);
     points.n = next - k;
     PetscCall(Normals(fe, c, pairs, k, next, &points, work, normal + 3 * k));
+    /* In the axes of oblique supports, where the rows of B live. */
     for (PetscInt i = k; i < next && fe->n_turned; i++) HycoTurnNormal(fe, pairs, i, normal + 3 * i);
     PetscCall(Gaps(fe, c, pairs, k, &points, normal + 3 * k, gap + k));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Keeps what was computed for the state of fe; not normals that are turned, which is no part of it. */
+/* Keeps what was computed for the state of fe; not normals that are turned, which is no part of it. Several functions
+   ask for normals and gaps at the same positions; fe->drawn numbers these. */
 static PetscErrorCode KeepGeometry(HycoFE fe, HycoPairs *pairs, const PetscReal normal[], const PetscReal gap[])
 {
   PetscFunctionBegin;
@@ -165,6 +168,7 @@ PetscErrorCode HycoContactGeometry(HycoFE fe, HycoPairs *pairs, PetscReal normal
   PetscReal *work;
 
   PetscFunctionBegin;
+  /* The same positions and variables: normals and gaps are those of the last call. */
   if (fe->drawn && pairs->drawn == fe->drawn && !fe->n_turned) {
     PetscCall(PetscArraycpy(normal, pairs->geometry, 3 * pairs->n));
     PetscCall(PetscArraycpy(gap, pairs->geometry + 3 * pairs->n, pairs->n));
@@ -173,6 +177,7 @@ PetscErrorCode HycoContactGeometry(HycoFE fe, HycoPairs *pairs, PetscReal normal
   PetscCall(HycoPairsMove(fe, pairs));
   PetscCall(PetscMalloc1(3 * fe->mesh->n_nodes + 6 * pairs->n, &work));
   HycoFinally(Geometry(fe, pairs, work, normal, gap), PetscCall(PetscFree(work)));
+  /* After both are known: an overlap or a normal to the wrong side is an error of the scene. */
   PetscCall(HycoContactCheck(fe, pairs, normal, gap));
   PetscCall(KeepGeometry(fe, pairs, normal, gap));
   PetscFunctionReturn(PETSC_SUCCESS);

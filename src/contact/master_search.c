@@ -9,7 +9,7 @@
 #define HYCO_PAST_BORDER 0.1
 
 /* Patches and their normals: the master's nodes (pair) or facets (surface). Borrowed data of fe: nodes must not move
-   while the search exists. */
+   while the search exists. Normals are of length 1, outward from the master's body. */
 static PetscErrorCode FindPatches(HycoMasterSearch *t)
 {
   HycoMesh m = t->fe->mesh;
@@ -44,7 +44,8 @@ static PetscErrorCode FindPatches(HycoMasterSearch *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The groups of a contact by name: on a rank's part they may be empty, and the search then has no patches. */
+/* The groups of a contact by name: on a rank's part they may be empty, and the search then has no patches. `nodes`:
+   masters are nodes (pair), not points of facets. */
 PetscErrorCode HycoMasterSearchCreate(HycoFE fe, HycoContact c, PetscBool nodes, HycoMasterSearch *t)
 {
   PetscInt slave, master;
@@ -71,6 +72,7 @@ PetscErrorCode HycoMasterSearchCreateOn(HycoFE fe, PetscInt slave, PetscInt mast
   t->master = master;
   PetscCall(FindPatches(t));
   PetscCall(PetscCalloc1(3 * t->n_nodes, &t->outward));
+  /* In 1D a surface is a point, and any master point faces it. */
   if (fe->dim > 1) PetscCall(HycoSurfaceNormals(fe, t->slave, t->outward));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -189,7 +191,9 @@ PetscErrorCode HycoMasterSearchAtBorder(HycoMasterSearch *t, const HycoProjectio
 
   PetscFunctionBegin;
   *border = PETSC_FALSE;
+  /* Facets of one node, or a point inside a facet: no border. */
   if (t->nf == 1 || at->n > 2 || at->n < 1 || (t->nf == 2 && at->n == 2)) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Made for messages alone, and therefore late. */
   if (!t->at_border) PetscCall(FindBorder(t));
   if (at->n == 1)
     *border = t->at_border[at->node[0]];
@@ -199,7 +203,7 @@ PetscErrorCode HycoMasterSearchAtBorder(HycoMasterSearch *t, const HycoProjectio
 }
 
 /* Compares the tangential part of the vector from the node to its master point, in the facet's plane, with the
-   tolerance. */
+   tolerance. A projection onto the border's edge is past it if the node lies beyond, along the surface. */
 PetscErrorCode HycoMasterSearchIsPast(HycoMasterSearch *t, PetscInt slave, const HycoProjection *at, PetscBool *past)
 {
   const PetscReal *n = t->normal + 3 * at->patch;

@@ -45,11 +45,13 @@ void HycoPlaneSet(PetscInt dim, PetscInt corners, const PetscReal *const X[], co
     plane->centre[c] = 0;
     for (PetscInt a = 0; a < corners; a++) plane->centre[c] += X[a][c] / corners;
   }
+  /* The ball around the facet: which master facets may lie over it. */
   for (PetscInt a = 0; a < corners; a++) plane->radius = PetscMax(plane->radius, HycoDistance(X[a], plane->centre));
   along = HycoDot(plane->axis[0], normal);
   for (PetscInt c = 0; c < 3; c++) plane->axis[0][c] -= along * normal[c];
   HycoNormalise(plane->axis[0]);
   for (PetscInt c = 0; c < 3; c++) {
+    /* The vector product of normal and first axis. */
     const PetscInt i = (c + 1) % 3, j = (c + 2) % 3;
 
     plane->axis[1][c] = normal[i] * plane->axis[0][j] - normal[j] * plane->axis[0][i];
@@ -70,6 +72,7 @@ void HycoSideSet(const HycoPlane *plane, PetscInt nf, PetscInt corners, const Pe
     for (PetscInt c = 0; c < 3; c++) r[c] = X[3 * node[a] + c] - plane->centre[c];
     side->at[a][0] = HycoDot(r, plane->axis[0]);
     side->at[a][1] = plane->dim == 2 ? 0 : HycoDot(r, plane->axis[1]);
+    /* Above the plane of the slave's facet: the gap between both sides is their difference. */
     side->height[a] = HycoDot(r, plane->normal);
   }
 }
@@ -107,9 +110,12 @@ static void InQuadrilateral(const HycoSide *s, const PetscReal p[2], PetscReal x
       t[1][c] = ((1 - xi[0]) * (x[3] - x[0]) + (1 + xi[0]) * (x[2] - x[1])) / 4;
     }
     det = t[0][0] * t[1][1] - t[0][1] * t[1][0];
+    /* Degenerate: the point so far is as good as any. */
     if (det == 0) return;
     step[0] = (r[0] * t[1][1] - r[1] * t[1][0]) / det;
     step[1] = (r[1] * t[0][0] - r[0] * t[0][1]) / det;
+    /* Steps of at most half of the reference cell: from far outside a full step could leave the domain where the map is
+       regular. */
     for (PetscInt c = 0; c < 2; c++) xi[c] += PetscMin(PetscMax(step[c], -1), 1);
     if (PetscMax(PetscAbsReal(step[0]), PetscAbsReal(step[1])) < 1e-14) return;
   }
@@ -135,6 +141,7 @@ void HycoSideFunctions(const HycoSide *s, const PetscReal p[2], PetscReal N[HYCO
     InQuadrilateral(s, p, xi);
     Bilinear(xi, N);
   }
+  /* Second order: the functions of all nodes at this reference point. */
   if (s->nf > s->corners) HycoFacetFunctions(s->nf, xi, N, slope);
 }
 
@@ -158,10 +165,12 @@ static PetscInt Keep(const PetscReal a[2], const PetscReal b[2], PetscInt n, Pet
   for (PetscInt k = 0; k < n; k++) {
     const PetscReal *p = old[k], *q = old[(k + 1) % n], dp = Cross(a, b, p), dq = Cross(a, b, q);
 
+    /* On the left of a counterclockwise edge is inside. */
     if (dp >= 0 && kept < 8) {
       at[kept][0] = p[0];
       at[kept++][1] = p[1];
     }
+    /* The edge p q crosses the line only if its ends are on different sides; a corner on the line is already kept. */
     if ((dp < 0) == (dq < 0) || dp == 0 || dq == 0 || kept == 8) continue;
     for (PetscInt c = 0; c < 2; c++) at[kept][c] = p[c] + dp / (dp - dq) * (q[c] - p[c]);
     kept++;
@@ -170,7 +179,8 @@ static PetscInt Keep(const PetscReal a[2], const PetscReal b[2], PetscInt n, Pet
 }
 
 /* Sutherland and Hodgman clip by one side of the slave after the other. Each cut adds at most one corner to a convex
-   polygon: 4 + 4 are the 8 of HycoPiece. */
+   polygon: 4 + 4 are the 8 of HycoPiece. Both facets are given by their corners in the plane; curved sides are cut as
+   straight ones. */
 void HycoPieceCut(PetscInt dim, const HycoSide *slave, const HycoSide *master, HycoPiece *piece)
 {
   PetscInt n = master->corners;
@@ -179,6 +189,7 @@ void HycoPieceCut(PetscInt dim, const HycoSide *slave, const HycoSide *master, H
   piece->size = 0;
   if (dim == 2) {
     const PetscReal *s[2] = {slave->at[0], slave->at[1]}, *m[2] = {master->at[0], master->at[1]};
+    /* In 2D pieces are intervals on a line. */
     const PetscReal lo = PetscMax(PetscMin(s[0][0], s[1][0]), PetscMin(m[0][0], m[1][0])),
                     hi = PetscMin(PetscMax(s[0][0], s[1][0]), PetscMax(m[0][0], m[1][0]));
 
@@ -199,6 +210,7 @@ void HycoPieceCut(PetscInt dim, const HycoSide *slave, const HycoSide *master, H
   for (PetscInt a = 0; a < slave->corners && n > 2; a++) {
     const PetscInt b = (a + 1) % slave->corners;
 
+    /* A slave facet may be numbered clockwise in the plane's axes. */
     n = sign > 0 ? Keep(at[a], at[b], n, piece->at) : Keep(at[b], at[a], n, piece->at);
   }
   piece->n = n;

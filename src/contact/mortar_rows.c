@@ -57,7 +57,8 @@ typedef struct {
   Term *term;
 } Mortar;
 
-/* Second-order quadrilaterals have products of degree 8, triangles of degree 4; on a circle the radius is one more. */
+/* Second-order quadrilaterals have products of degree 8, triangles of degree 4; on a circle the radius is one more. The
+   degree of the quadrature rule follows. */
 static PetscErrorCode MortarCreate(HycoFE fe, PetscInt slaves, PetscInt masters, PetscReal reach, PetscInt n,
                                    const PetscInt slave[], Mortar *s)
 {
@@ -74,6 +75,7 @@ static PetscErrorCode MortarCreate(HycoFE fe, PetscInt slaves, PetscInt masters,
   PetscCall(HycoMasterSearchCreateOn(fe, slaves, masters, PETSC_FALSE, &s->t));
   PetscCall(PetscMalloc3(m->n_nodes, &s->row, n, &s->D, s->t.n, &s->near));
   PetscCall(PetscArrayzero(s->D, n));
+  /* -1: a node of the surface that is no slave here (fixed, or another rank's). */
   for (PetscInt i = 0; i < m->n_nodes; i++) s->row[i] = -1;
   for (PetscInt k = 0; k < n; k++) s->row[slave[k]] = k;
   if (s->t.n && n) PetscCall(HycoPatchesCreate(fe->X, s->t.n, m->nf, s->corners, s->t.node, s->t.normal, &s->patches));
@@ -94,7 +96,8 @@ static PetscErrorCode MortarDestroy(Mortar *s)
 
 /* -- one facet -- */
 
-/* Adds the integrals over an interval or a triangle of a piece; vertex: its corners. */
+/* Adds the integrals over an interval or a triangle of a piece; vertex: its corners. M and `own` are over the facing
+   part only, so that dual functions are those of that part. */
 static void AddSimplex(Mortar *s, const HycoPlane *plane, const HycoSide *slave, const HycoSide *master,
                        const PetscReal *const vertex[3], PetscReal size, Block *b)
 {
@@ -131,6 +134,7 @@ static PetscReal Height(const HycoSide *slave, const HycoSide *master, const Hyc
     for (PetscInt c = 0; c < 2; c++) at[c] += piece->at[k][c] / piece->n;
   }
   for (PetscInt side = 0; side < 2; side++) {
+    /* Linear functions of the corners: a height differs from the exact one by the facet's curvature. */
     flat = side ? *slave : *master;
     flat.nf = flat.corners; /* heights are known at corners */
     HycoSideFunctions(&flat, at, N);
@@ -180,6 +184,7 @@ static PetscErrorCode AddPieces(Mortar *s, const HycoPlane *plane, const HycoSid
   for (PetscInt k = 0; k < s->n_near; k++) {
     const PetscReal *n = s->t.normal + 3 * s->near[k];
 
+    /* Facets within 72 degrees of facing each other; a facet on the axis has no normal. */
     if (HycoDot(n, plane->normal) <= HYCO_OPPOSED && HycoDot(n, n) > 0)
       PetscCall(AddPiece(s, plane, slave, s->near[k], limit));
   }
@@ -216,6 +221,7 @@ static PetscErrorCode FindPieces(Mortar *s, PetscInt f, HycoSide *slave)
   HycoPlaneSet(m->dim, corners, X, normal, plane);
   HycoSideSet(plane, m->nf, s->corners, node, s->fe->X, slave);
   s->size = SizeOf(m->dim, slave);
+  /* Its distance bounds how far the facing part can be. */
   HycoPatchesProject(s->patches, plane->centre, NULL, &at);
   limit = PetscMin(s->reach, (at.distance + plane->radius) / -HYCO_OPPOSED);
   prism.radius = plane->radius;
@@ -225,6 +231,7 @@ static PetscErrorCode FindPieces(Mortar *s, PetscInt f, HycoSide *slave)
   PetscCall(HycoPatchesWithin(s->patches, &prism, &s->n_near, s->near));
   do {
     PetscCall(AddPieces(s, plane, slave, limit));
+    /* Counted twice, the slave's area faces more than itself: a second layer lies behind the first. */
     limit /= 2;
   } while (s->facing > TWICE * s->size && limit > ROUND_OFF * plane->radius);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -296,11 +303,13 @@ static PetscErrorCode AddPinned(Mortar *s, const HycoSide *slave, PetscInt i, co
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k <= slave->nf; k++) {
+    /* One more taker than nodes: where none of the facet's nodes has a row. */
     const PetscInt row = k < slave->nf ? s->row[slave->node[k]] : s->taker[slave->node[i]];
     const PetscReal value = c[k] * s->own[i];
 
     if (c[k] == 0 || row < 0) continue;
     PetscCall(AddMean(s, i, row, value));
+    /* Minus the part that the pinned point carries, so that the sum of the forces stays. */
     for (PetscInt a = 0; a < at->n; a++) PetscCall(AddTerm(s, row, at->node[a], -value * at->weight[a]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -318,6 +327,7 @@ static PetscBool Extrapolate(const Mortar *s, const HycoSide *slave, PetscInt i,
   for (PetscInt k = 0; k < slave->nf; k++) {
     PetscReal r[3];
 
+    /* In widths of the facet: the matrix does not depend on the unit of length. */
     for (PetscInt e = 0; e < 3; e++)
       r[e] = (s->fe->X[3 * slave->node[k] + e] - s->fe->X[3 * slave->node[i] + e]) / s->plane.radius;
     d[k][0] = 1;
@@ -325,6 +335,7 @@ static PetscBool Extrapolate(const Mortar *s, const HycoSide *slave, PetscInt i,
     for (PetscInt e = 0; takes[k] && e < size * size; e++) A[e] += d[k][e / size] * d[k][e % size];
   }
   LAPACKpotrf_("L", &n, A, &n, &info);
+  /* Nodes on one line do not determine a plane. */
   for (PetscInt e = 0; e < size && !info; e++) info = PetscRealPart(A[e * size + e]) < UNDETERMINED;
   if (info) return PETSC_FALSE;
   LAPACKpotrs_("L", &n, &one, A, &n, b, &n, &info);
@@ -376,6 +387,7 @@ static PetscErrorCode AddFacet(Mortar *s, PetscInt f)
     s->D[row] += share;
     PetscCall(AddMean(s, i, row, share));
   }
+  /* Only ties pin nodes. */
   if (usable && s->pin) PetscCall(AddPins(s, &slave));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -424,6 +436,7 @@ static PetscErrorCode Append(const Mortar *s, PetscInt index, PetscInt n, const 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(n + 2, &start));
   PetscCall(PetscMalloc3(s->n_terms, &place, s->n_terms, &node, s->n_terms, &weight));
+  /* Counting sort by row, two places ahead, so that the second loop leaves the starts in place. */
   for (PetscInt e = 0; e < s->n_terms; e++) start[s->term[e].row + 2]++;
   for (PetscInt k = 0; k < n; k++) start[k + 2] += start[k + 1];
   for (PetscInt e = 0; e < s->n_terms; e++) place[start[s->term[e].row + 1]++] = e;
@@ -433,6 +446,7 @@ static PetscErrorCode Append(const Mortar *s, PetscInt index, PetscInt n, const 
   for (PetscInt k = 0; k < n; k++) {
     PetscInt masters;
 
+    /* Terms of one master from several facets become one, divided by D of the row. */
     PetscCall(Merge(s, start[k + 1] - start[k], place + start[k], s->D[k], node, weight, &masters));
     HycoPairsAppend(pairs, index, slave[k], masters, node, weight);
   }
@@ -441,7 +455,8 @@ static PetscErrorCode Append(const Mortar *s, PetscInt index, PetscInt n, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* By node of the slave without a row: the row of the nearest node that shares a facet with it, or with such a node. */
+/* By node of the slave without a row: the row of the nearest node that shares a facet with it, or with such a node. A
+   node without a row, such as a fixed one, would otherwise leave its part of the pressure to nobody. */
 static PetscErrorCode FindTakers(Mortar *s)
 {
   HycoMesh m = s->fe->mesh;
@@ -453,6 +468,7 @@ static PetscErrorCode FindTakers(Mortar *s)
     const PetscInt f = k % m->n_facets, *node = m->facets + f * m->nf;
     PetscInt row = -1;
 
+    /* Two passes over the facets: nodes far from any row take that of a neighbour which took one. */
     if (m->facet_group[f] != s->t.slave) continue;
     for (PetscInt a = 0; a < m->nf; a++) {
       const PetscInt own = Carries(s, a, node[a]) ? s->row[node[a]] : -1;
@@ -476,6 +492,7 @@ static PetscErrorCode Integrate(Mortar *s, PetscInt index, PetscInt n, const Pet
   for (PetscInt f = 0; f < m->n_facets && s->patches; f++) {
     PetscBool any = (PetscBool)(s->pin != NULL);
 
+    /* In a fixed order: sums do not depend on the ranks. */
     if (m->facet_group[f] != s->t.slave) continue;
     for (PetscInt a = 0; a < m->nf; a++) any = (PetscBool)(any || s->row[m->facets[f * m->nf + a]] >= 0);
     if (any) PetscCall(AddFacet(s, f));
@@ -484,7 +501,7 @@ static PetscErrorCode Integrate(Mortar *s, PetscInt index, PetscInt n, const Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The slave's and the master's groups are those of t. */
+/* The slave's and the master's groups are those of t. `s` is destroyed after an error as well. */
 static PetscErrorCode Run(Mortar *s, PetscInt index, PetscInt n, const PetscInt slave[], HycoPairs *pairs)
 {
   PetscFunctionBegin;
@@ -505,6 +522,7 @@ PetscErrorCode HycoMortarRows(HycoContact c, HycoFE fe, PetscInt index, PetscRea
   PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->slave, &slaves));
   PetscCall(HycoMeshFindGroup(fe->mesh, "contact", c->master, &masters));
   PetscCall(HycoLogEvent(HYCO_EVENT_SEARCH, PETSC_TRUE));
+  /* Also after an error Run() has freed what was made. */
   ierr = MortarCreate(fe, slaves, masters, reach, n, slave, &s);
   if (!ierr) ierr = Run(&s, index, n, slave, pairs);
   PetscCall(HycoLogEvent(HYCO_EVENT_SEARCH, PETSC_FALSE));

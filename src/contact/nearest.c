@@ -31,6 +31,7 @@ static HycoPoint Pivot(const HycoPoint *first, const HycoPoint *middle, const Hy
 void HycoPointsSplit(HycoPoint point[], PetscInt lo, PetscInt mid, PetscInt hi, PetscInt axis)
 {
   while (hi - lo > 1 && lo < mid && mid < hi) { /* Hoare's selection */
+    /* The median of three: sorted input, as nodes of a structured mesh, must not be the worst case. */
     const HycoPoint pivot = Pivot(&point[lo], &point[lo + (hi - lo) / 2], &point[hi - 1], axis);
     PetscInt i = lo, j = hi - 1;
 
@@ -67,6 +68,7 @@ static void Enclose(HycoPatches s, PetscInt patch, HycoBox *b)
 {
   const PetscInt *node = s->node + patch * s->nf;
 
+  /* A curved facet bulges beyond its nodes. */
   if (s->corners < s->nf) {
     const HycoCurved facet = Curved(s, patch);
 
@@ -82,7 +84,7 @@ static void Enclose(HycoPatches s, PetscInt patch, HycoBox *b)
   }
 }
 
-/* The box of the vectors v of the points item[0 .. n). */
+/* The box of the vectors v of the points item[0 .. n). Empty for n = 0: the largest numbers as the lower end. */
 static HycoBox VectorBox(PetscInt n, const HycoPoint item[], const PetscReal v[])
 {
   HycoBox b;
@@ -117,7 +119,9 @@ static void Build(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi)
       b->hi[c] = PetscMax(b->hi[c], one.hi[c]);
     }
   }
+  /* The longest side, so that boxes become cubes and few of them meet a query. */
   for (PetscInt c = 1; c < 3; c++) axis = b->hi[c] - b->lo[c] > b->hi[axis] - b->lo[axis] ? c : axis;
+  /* A box of normals: whole branches that face away are skipped. */
   if (s->turn) s->turn[t] = VectorBox(hi - lo, s->item + lo, s->normal);
   if (hi - lo <= HYCO_LEAF) return;
   HycoPointsSplit(s->item, lo, (lo + hi) / 2, hi, axis);
@@ -321,7 +325,8 @@ static void SetBest(Query *q, PetscReal best, PetscInt patch, const PetscReal w[
   for (PetscInt a = 0; a < HYCO_FACET_NODES; a++) q->w[a] = w[a];
 }
 
-/* Updates the query with the nearest of the items lo .. hi - 1 under box t; the nearer child is searched first. */
+/* Updates the query with the nearest of the items lo .. hi - 1 under box t; the nearer child is searched first. Branch
+   and bound: a box farther than the best so far is not entered. */
 static void Search(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi, Query *q)
 {
   const PetscInt mid = (lo + hi) / 2;

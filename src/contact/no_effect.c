@@ -19,6 +19,7 @@ static PetscReal Largest(const PetscReal v[], PetscInt n)
 PetscErrorCode HycoContactCheckStill(HycoFE fe, const HycoPairs *pairs, PetscInt k, PetscReal gap, PetscReal *left)
 {
   const PetscInt slave = pairs->slave[k], dim = fe->dim;
+  /* The gap is a difference of positions: its round-off is theirs. */
   PetscReal size = PetscMax(PetscAbsReal(gap) + Largest(fe->X + 3 * slave, 3) + Largest(fe->u0 + slave * dim, dim),
                             HycoMeshLength(fe->mesh));
 
@@ -37,8 +38,9 @@ PetscErrorCode HycoContactCheckStill(HycoFE fe, const HycoPairs *pairs, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The completely fixed nodes of groups without masters, which HycoPairsFind() leaves out, as contacts without
-   masters. The caller destroys it. */
+/* The completely fixed nodes of groups without masters, which HycoPairsFind() leaves out, as contacts without masters.
+   The caller destroys it. So that prescribed displacements that penetrate an obstacle are an error, not a solution
+   without a force. */
 static PetscErrorCode FixedAtObstacles(HycoFE fe, const HycoPairs *pairs, HycoPairs *still)
 {
   HycoMesh m = fe->mesh;
@@ -56,12 +58,14 @@ static PetscErrorCode FixedAtObstacles(HycoFE fe, const HycoPairs *pairs, HycoPa
   for (PetscInt k = 0; k < s->n_contacts; k++) {
     PetscInt g = 0;
 
+    /* With a master the contact acts on its nodes, whatever the slave is. */
     if (s->contact[k]->master) continue;
     PetscCall(PetscArrayzero(is_slave, m->n_nodes)); /* of this contact: another one does not check its obstacle */
     for (PetscInt j = 0; j < pairs->n; j++) {
       if (pairs->contact[j] == k) is_slave[pairs->slave[j]] = PETSC_TRUE;
     }
     PetscCall(HycoMeshFindGroup(m, "contact", s->contact[k]->slave, &g));
+    /* Corners of second-order triangles carry no contact: nothing to check there. */
     HycoSurfaceCarriers(m, g, carries);
     for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) {
       const PetscInt i = m->group_node[j];
@@ -108,6 +112,7 @@ PetscErrorCode HycoContactCountStill(HycoFE fe, const HycoPairs *pairs, const Pe
   PetscFunctionBegin;
   PetscCall(FixedAtObstacles(fe, pairs, &still));
   *n = still.n;
+  /* A slave without a master at these positions is not one without an effect. */
   for (PetscInt k = 0; k < pairs->n; k++) *n += start[k + 1] == start[k] && !HycoPairsAlone(fe->scene, pairs, k);
   PetscCall(PetscMalloc2(3 * still.n, &normal, still.n, &gap));
   HycoFinally(CheckObstacles(fe, &still, normal, gap), PetscCall(PetscFree2(normal, gap));

@@ -43,6 +43,7 @@ static PetscErrorCode Describe(HycoMasterSearch *t, const Missed *missed, size_t
 
   PetscFunctionBegin;
   HycoMasterSearchProject(t, missed->node, PETSC_FALSE, &at);
+  /* First among facets that face it, then among all: the message needs a distance in any case. */
   if (!at.n) HycoMasterSearchProject(t, missed->node, PETSC_TRUE, &at);
   PetscCall(HycoMasterSearchAtBorder(t, &at, &border));
   snprintf(text, room, "%d (%.4g away%s", (int)t->fe->mesh->node_id[missed->node], (double)at.distance,
@@ -64,6 +65,7 @@ static PetscErrorCode Complain(HycoMasterSearch *t, HycoContact c, HycoRemedy re
 
   PetscFunctionBegin;
   PetscCall(HycoMasterSearchReady(t));
+  /* The farthest first: they show what is wrong with the surfaces. */
   qsort(missed, (size_t)n, sizeof(Missed), FarthestFirst);
   for (PetscInt k = 0; k < PetscMin(n, 5); k++) {
     char one[HYCO_LINE / 2];
@@ -74,6 +76,7 @@ static PetscErrorCode Complain(HycoMasterSearch *t, HycoContact c, HycoRemedy re
   }
   PetscCall(PetscMalloc1(n, &node));
   for (PetscInt k = 0; k < n; k++) node[k] = missed[k].node;
+  /* The type knows what helps: another tolerance, another type, other surfaces. */
   PetscCall((*remedy)(t, c, n, node, what));
   PetscCall(PetscFree(node));
   HycoFail("contact %s: %d of the %d nodes of %s have no %s of %s within %g: %snode%s %s; %s", c->name, (int)n,
@@ -89,6 +92,7 @@ static PetscErrorCode CheckApart(const HycoMasterSearch *t, HycoContact c)
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(m->n_nodes, &master));
+  /* A node on both sides would be in contact with itself. */
   for (PetscInt k = 0; k < t->n * t->nf; k++) master[t->node[k]] = PETSC_TRUE;
   for (PetscInt k = m->group_start[t->slave]; k < m->group_start[t->slave + 1]; k++)
     HycoCheck(!master[m->group_node[k]],
@@ -98,7 +102,8 @@ static PetscErrorCode CheckApart(const HycoMasterSearch *t, HycoContact c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fails if no slave node has a master: with the distance of the nearest one that faces it, if any does. */
+/* Fails if no slave node has a master: with the distance of the nearest one that faces it, if any does. For the type
+   surface with a tolerance, where nodes that face nothing are allowed, but not all of them. */
 static PetscErrorCode RefuseAll(HycoMasterSearch *t, HycoContact c, const HycoMatch *m)
 {
   PetscReal nearest = PETSC_MAX_REAL;
@@ -111,6 +116,7 @@ static PetscErrorCode RefuseAll(HycoMasterSearch *t, HycoContact c, const HycoMa
     HycoVerdict why;
 
     PetscCall(HycoMasterSearchJudge(t, m->slave[k], PETSC_MAX_REAL, 0, &at, &why));
+    /* Of those that face the master: the others need another remedy. */
     if (why != HYCO_FOUND || at.distance >= nearest) continue;
     nearest = at.distance;
     node = m->slave[k];
@@ -123,7 +129,8 @@ static PetscErrorCode RefuseAll(HycoMasterSearch *t, HycoContact c, const HycoMa
            (double)nearest);
 }
 
-/* Adds each slave node with its master, or fails for those without one. */
+/* Adds each slave node with its master, or fails for those without one. n = 0 in a match: a node that faces no master,
+   and may do so. */
 static PetscErrorCode AppendMatched(HycoMasterSearch *t, HycoContact c, PetscInt index, HycoRemedy remedy,
                                     const HycoMatch *m, Missed missed[], HycoPairs *p)
 {
@@ -201,6 +208,7 @@ static PetscErrorCode FindSlaves(const HycoMasterSearch *t, PetscInt *n, PetscIn
   *n = 0;
   PetscCall(PetscMalloc1(m->n_nodes, &carries));
   PetscCall(PetscMalloc1(m->group_start[t->slave + 1] - m->group_start[t->slave], slave));
+  /* Which nodes a uniform pressure pushes, by the cell type. */
   HycoSurfaceCarriers(m, t->slave, carries);
   for (PetscInt k = m->group_start[t->slave]; k < m->group_start[t->slave + 1]; k++) {
     const PetscInt i = m->group_node[k];

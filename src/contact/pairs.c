@@ -11,6 +11,7 @@ PetscErrorCode HycoPairsReserve(HycoPairs *p, PetscInt contacts, PetscInt width)
   PetscCall(PetscRealloc((size_t)(n + 1) * sizeof(PetscInt), &p->contact));
   PetscCall(PetscRealloc((size_t)(n + 1) * sizeof(PetscInt), &p->master_start));
   if (!p->n) p->master_start[0] = 0;
+  /* One more than needed: arrays of no contacts are not NULL. */
   PetscCall(PetscRealloc((size_t)(p->master_start[p->n] + contacts * width + 1) * sizeof(PetscInt), &p->master));
   PetscCall(PetscRealloc((size_t)(p->master_start[p->n] + contacts * width + 1) * sizeof(PetscReal), &p->weight));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -64,15 +65,17 @@ PetscErrorCode HycoPairsSelect(const HycoPairs *all, PetscInt n, const PetscInt 
   for (PetscInt j = 0; index && j < masters; j++) out->master[j] = index[out->master[j]];
   if (all->number) PetscCall(PetscMalloc1(n + 1, &out->number));
   for (PetscInt i = 0; all->number && i < n; i++) out->number[i] = all->number[which[i]];
+  /* What was found out about the surfaces holds for a part of them. */
   out->facts = all->facts;
   out->queries = all->queries;
   out->room = all->room;
   out->n_searches = all->n_searches;
+  /* Searches of moved surfaces go on with the copy's own contacts. */
   if (all->search) HycoDuplicate(all->n_searches, all->search, &out->search);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A copy with all contacts, on a mesh with other numbers of nodes. */
+/* A copy with all contacts, on a mesh with other numbers of nodes. index: from the old nodes to the new ones. */
 PetscErrorCode HycoPairsRenumber(const HycoPairs *pairs, const PetscInt index[], HycoPairs *out)
 {
   PetscInt *which;
@@ -123,6 +126,7 @@ PetscErrorCode HycoPairsMarkSurfaces(HycoScene scene, HycoMesh m, const HycoPair
   for (PetscInt k = 0; k < scene->n_contacts; k++) {
     PetscInt g = 0;
 
+    /* Types without a search at moved positions keep their masters. */
     if (!scene->contact[k]->ops->find) continue;
     PetscCall(HycoMeshFindGroup(m, "contact", scene->contact[k]->master, &g));
     for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) node[m->group_node[j]] = PETSC_TRUE;

@@ -13,6 +13,7 @@ static PetscBool MayMeet(const HycoBox *b, const HycoPrism *p)
   }
   radius = HycoLength(half);
   along = HycoDot(r, p->normal);
+  /* Along the normal and across it, each with the ball's radius: cheap and never too small. */
   if (PetscAbsReal(along) > p->along + radius) return PETSC_FALSE;
   return (PetscBool)(HycoTangentialLength(r, p->normal) <= p->radius + radius);
 }

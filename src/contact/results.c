@@ -55,6 +55,7 @@ PetscErrorCode HycoContactPressures(MPI_Comm comm, HycoFE fe, const HycoPairs *p
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < pairs->n; k++) pressure[k] = area[k] > 0 ? lambda[k] / area[k] : 0;
+  /* Elsewhere every node that carries a force has an area. */
   if (fe->formulation != HYCO_AXISYMMETRIC || !HycoMeshIsQuadratic(m)) PetscFunctionReturn(PETSC_SUCCESS);
   if (HycoSize(comm) > 1) PetscCall(HycoMeshNodeSF(comm, m, m->n_nodes, m->node_global, &sf));
   PetscCall(PetscMalloc2(m->n_nodes, &size, m->n_nodes, &force));
@@ -62,10 +63,12 @@ PetscErrorCode HycoContactPressures(MPI_Comm comm, HycoFE fe, const HycoPairs *p
     PetscCall(PetscArrayzero(size, m->n_nodes));
     PetscCall(PetscArrayzero(force, m->n_nodes));
     for (PetscInt k = 0; k < pairs->n; k++) {
+      /* One contact after the other: a node may be the slave of several. */
       if (pairs->contact[k] != c) continue;
       size[pairs->slave[k]] = area[k];
       force[pairs->slave[k]] = lambda[k];
     }
+    /* A facet's nodes may be owned by other ranks, which have their contacts. */
     if (sf) PetscCall(SumByNode(sf, m, size));
     if (sf) PetscCall(SumByNode(sf, m, force));
     AddMiddles(fe, pairs, c, size, force, pressure);
@@ -97,7 +100,8 @@ static void Add(HycoFE fe, const PetscReal x[3], const PetscReal normal[3], Pets
   }
 }
 
-/* The nodes of a group are sorted. */
+/* The nodes of a group are sorted. of[k]: whether contact k counts in an output of a part of a surface, or of one
+   contact. */
 PetscErrorCode HycoPairsOfQuantity(HycoScene scene, HycoMesh m, const HycoPairs *pairs, const HycoQuantity *q,
                                    PetscBool of[])
 {
@@ -130,6 +134,7 @@ PetscErrorCode HycoPairsCheckQuantities(MPI_Comm comm, HycoScene scene, HycoMesh
     PetscCall(HycoPairsOfQuantity(scene, m, pairs, quantity, of));
     for (PetscInt k = 0; k < pairs->n; k++) n += of[k];
     PetscCall(PetscFree(of));
+    /* The part may lie on another rank. */
     HycoAllreduce(&n, 1, MPIU_INT, MPI_SUM, comm);
     HycoCheck(n, "the output %s: no node of the group %s is a slave of %s%s; give a part of a slave surface",
               quantity->name, quantity->group, quantity->contact ? "the contact " : "a contact",
@@ -138,6 +143,7 @@ PetscErrorCode HycoPairsCheckQuantities(MPI_Comm comm, HycoScene scene, HycoMesh
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Sums of this rank's contacts only; scene->n_contacts results, then those of outputs of parts. */
 PetscErrorCode HycoContactResults(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[], const PetscReal area[],
                                   const PetscReal lambda[], const PetscReal pressure[], PetscReal least,
                                   HycoContactResult result[])
@@ -151,6 +157,7 @@ PetscErrorCode HycoContactResults(HycoFE fe, const HycoPairs *pairs, const Petsc
     const HycoQuantity *q = c < scene->n_contacts ? NULL : &scene->quantity[c - scene->n_contacts];
     HycoContactResult *r = &result[c];
 
+    /* The largest number as the minimum of none. */
     *r = (HycoContactResult){.name = q ? q->name : scene->contact[c]->name, .pressure_min = PETSC_MAX_REAL};
     if (q && !HycoQuantityOfPart(q)) continue;
     if (q) PetscCall(HycoPairsOfQuantity(scene, fe->mesh, pairs, q, of));
@@ -160,7 +167,9 @@ PetscErrorCode HycoContactResults(HycoFE fe, const HycoPairs *pairs, const Petsc
       if (q ? !of[k] : pairs->contact[k] != c) continue;
       r->n++;
       if (pairs->shear) r->friction_work += pairs->shear->work[k];
+      /* An open contact counts as 0, so that a seal that opens anywhere shows it. */
       r->pressure_min = PetscMin(r->pressure_min, lambda[k] > least ? pressure[k] : 0);
+      /* Forces of round-off are no contact: areas would jump by nodes that barely touch. */
       if (lambda[k] > least)
         Add(fe, fe->X + 3 * pairs->slave[k], normal + 3 * k, area[k], lambda[k], shear, pressure[k], r);
     }

@@ -104,6 +104,7 @@ static PetscErrorCode CheckSmooth(HycoFE fe, const HycoPairs *pairs, const Petsc
   for (PetscInt k = 0; k < pairs->n; k++) {
     for (PetscInt j = before[k]; j >= 0; j = before[j]) {
       if (!AreSmooth(fe, pairs, k, j, normal)) continue;
+      /* The first pair of contacts is named, and only its nodes are counted. */
       a = n ? a : pairs->contact[j];
       b = n ? b : pairs->contact[k];
       n += pairs->contact[j] == a && pairs->contact[k] == b;
@@ -119,7 +120,8 @@ static PetscErrorCode CheckSmooth(HycoFE fe, const HycoPairs *pairs, const Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Contacts with the same slave are chained from the last to the first. */
+/* Contacts with the same slave are chained from the last to the first. The chain allows any number of contacts at a
+   node, and no search for them. */
 static PetscErrorCode CheckCorners(HycoFE fe, const HycoPairs *pairs, const PetscReal normal[])
 {
   PetscInt *last, *before;
@@ -130,6 +132,7 @@ static PetscErrorCode CheckCorners(HycoFE fe, const HycoPairs *pairs, const Pets
   for (PetscInt i = 0; i < fe->mesh->n_nodes; i++) last[i] = -1;
   for (PetscInt k = 0; k < pairs->n; k++) {
     before[k] = -1;
+    /* A slave without a master at these positions has no normal to compare. */
     if (HycoPairsAlone(fe->scene, pairs, k)) continue;
     before[k] = last[pairs->slave[k]];
     last[pairs->slave[k]] = k;
@@ -174,6 +177,7 @@ PetscErrorCode HycoContactRows(HycoFE fe, HycoPairs *pairs, PetscInt start[], Pe
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(3 * pairs->n, &normal));
   ierr = HycoContactGeometry(fe, pairs, normal, gap);
+  /* With the normals of these parameters: they turn with the bodies. */
   if (!ierr) ierr = CheckCorners(fe, pairs, normal);
   if (!ierr) ierr = Rows(fe, pairs, normal, start, dof, value, gap);
   PetscCall(PetscFree(normal));
@@ -220,6 +224,7 @@ PetscErrorCode HycoContactTangentRows(HycoFE fe, HycoPairs *pairs, const PetscIn
   for (PetscInt k = 0; k < pairs->n && !ierr; k++) {
     PetscReal jump[3];
 
+    /* Any orthonormal pair: the law is isotropic in the plane. */
     Tangents(fe->dim, normal + 3 * k, tangent + 6 * k);
     HycoPairsJump(pairs, k, fe->dim, u, jump);
     for (PetscInt r = row[k]; r < row[k + 1]; r++) {
@@ -228,6 +233,7 @@ PetscErrorCode HycoContactTangentRows(HycoFE fe, HycoPairs *pairs, const PetscIn
       gap[r] = r == row[k] ? drawn[k] : HycoPairsAlone(fe->scene, pairs, k) ? 0 : HycoDot(jump, along);
       AddRow(fe, pairs, k, along, &n, dof, value, &gap[r]);
       start[r + 1] = n;
+      /* No free unknown on either side: the gap must hold by itself. */
       if (r == row[k] && start[r + 1] == start[r] && !HycoPairsAlone(fe->scene, pairs, k))
         ierr = HycoContactCheckStill(fe, pairs, k, drawn[k], &gap[r]);
     }

@@ -30,7 +30,8 @@ PetscErrorCode HycoMasterSearchJudge(HycoMasterSearch *t, PetscInt slave, PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On moved surfaces; n = 0: it has no master. */
+/* On moved surfaces; n = 0: it has no master. reach: masters beyond it are none, as in training; a large number
+   otherwise. */
 static PetscErrorCode Follow(HycoMasterSearch *t, PetscInt slave, PetscReal reach, HycoProjection *at)
 {
   PetscBool past;
@@ -49,9 +50,11 @@ static PetscErrorCode AnswerAll(HycoMasterSearch *t, const HycoQuery *q, PetscIn
                                 HycoProjection at[], HycoVerdict why[])
 {
   PetscFunctionBegin;
+  /* The tree is not made for a rank without slaves. */
   if (n) PetscCall(HycoMasterSearchReady(t));
   for (PetscInt k = 0; k < n; k++) {
     why[k] = HYCO_FOUND;
+    /* On moved surfaces every slave stays a contact, with or without a master: no verdict. */
     if (q->moved)
       PetscCall(Follow(t, slave[k], q->tolerance, &at[k]));
     else
@@ -76,6 +79,7 @@ static PetscErrorCode AddNeighbours(HycoMesh m, PetscInt slave, PetscInt master,
   HycoPatches patches;
 
   PetscFunctionBegin;
+  /* An empty master is an error that the search of contacts words better. */
   if (!n_masters) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoPatchesCreate(m->xyz, n_masters, 1, 1, m->group_node + lo, NULL, &patches));
   for (PetscInt k = m->group_start[slave]; k < m->group_start[slave + 1]; k++, (*n)++) {

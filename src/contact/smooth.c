@@ -32,7 +32,8 @@ typedef struct {
   PetscInt *fan;           /* n_nodes: 0 if the facets form a closed ring around the node */
 } Surface;
 
-/* Max's weights are sin(angle) / (a b), in 2D 1 / a. */
+/* Max's weights are sin(angle) / (a b), in 2D 1 / a. Max (1999) chose them so that the normals at the nodes of a sphere
+   are exact. */
 static PetscErrorCode AddFacets(HycoFE fe, PetscInt group, Surface *s)
 {
   HycoMesh m = fe->mesh;
@@ -75,7 +76,8 @@ static PetscErrorCode NormalAt(HycoFE fe, PetscInt facet, PetscInt v, PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* For second order: the sums of the facets' normals at the nodes, exact[] and mean[]. */
+/* For second order: the sums of the facets' normals at the nodes, exact[] and mean[]. A second-order facet has a normal
+   of its own at each node, of an accuracy that needs no weights. */
 static PetscErrorCode AddNodeNormals(HycoFE fe, PetscInt group, Surface *s)
 {
   HycoMesh m = fe->mesh;
@@ -126,8 +128,9 @@ static PetscErrorCode FindBends(HycoFE fe, PetscInt group, Surface *s, PetscReal
 }
 
 /* Normals of the smooth surface at the group's nodes (n_nodes x 3), their possible errors (doubt, radians) and the
-   angles between facets (bend). At a closed ring the error is of second order in the bend, at a border of first
-   order. Not collective: all facets around the nodes must be in the mesh. */
+   angles between facets (bend). At a closed ring the error is of second order in the bend, at a border of first order.
+   Not collective: all facets around the nodes must be in the mesh. These doubts decide which rigid motions of smooth
+   surfaces contact does not resist. */
 PetscErrorCode HycoSmoothNormals(HycoFE fe, PetscInt group, PetscReal normal[], PetscReal doubt[], PetscReal bend[])
 {
   HycoMesh m = fe->mesh;

@@ -23,6 +23,7 @@ static PetscErrorCode MakePatches(HycoMesh m, PetscInt group, PetscInt node[], P
   PetscFunctionBegin;
   for (PetscInt f = 0; f < m->n_facets; f++) {
     if (m->facet_group[f] != group) continue;
+    /* A slave node that is on the master already is bonded by the mesh. */
     for (PetscInt v = 0; v < m->nf; v++) on[m->facets[f * m->nf + v]] = PETSC_TRUE;
     PetscCall(PetscArraycpy(node + m->nf * n++, m->facets + f * m->nf, m->nf));
   }
@@ -30,7 +31,8 @@ static PetscErrorCode MakePatches(HycoMesh m, PetscInt group, PetscInt node[], P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Finds the points that the slave nodes follow; nodes on both surfaces need none. */
+/* Finds the points that the slave nodes follow; nodes on both surfaces need none. On the mesh as drawn: a tie glues
+   what lies together there, whatever a map does afterwards. */
 static PetscErrorCode Project(HycoScene s, HycoMesh m, PetscInt k, PetscInt group, HycoPatches patches,
                               const PetscBool on[], Found *found)
 {
@@ -78,6 +80,7 @@ static PetscErrorCode FindOne(HycoScene s, HycoMesh m, PetscInt k, Found *found)
   PetscFunctionBegin;
   PetscCall(HycoMeshFindGroup(m, "tie", tie->slave, &slave));
   PetscCall(HycoMeshFindGroup(m, "tie", tie->master, &master));
+  /* An empty side would silently leave the bodies apart. */
   HycoCheck(m->group_start[slave] < m->group_start[slave + 1] && m->group_start[master] < m->group_start[master + 1],
             "tie %s: the group %s is empty", tie->name,
             m->group_start[slave] < m->group_start[slave + 1] ? tie->master : tie->slave);
@@ -112,6 +115,7 @@ static PetscErrorCode CheckChains(HycoScene s, HycoMesh m, const Found *found)
     for (PetscInt a = 0; a < n; a++) {
       const PetscInt other = found->tie[node[a]];
 
+      /* A chain of ties would have to be eliminated in the right order. */
       HycoCheck(other < 0,
                 "tie %s: node %d, to which nodes of %s are tied, is itself a slave of the tie %s; exchange slave and "
                 "master of one of them",
@@ -141,6 +145,7 @@ static PetscErrorCode SharedCreate(HycoScene s, HycoMesh m, Shared *shared)
     PetscInt g = 0;
 
     PetscCall(HycoMeshFindGroup(m, "fixed", s->fixed[k].group, &g));
+    /* A support along a normal holds a direction that differs from node to node: the masters must be in its group. */
     if (s->fixed[k].normal) shared->group[shared->n_groups++] = g;
     for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) {
       for (PetscInt c = 0; c < 3; c++) shared->held[m->group_node[j]] |= (s->fixed[k].value[c] != NULL) << c;
@@ -148,6 +153,7 @@ static PetscErrorCode SharedCreate(HycoScene s, HycoMesh m, Shared *shared)
   }
   for (PetscInt k = 0; k < s->n_contacts; k++)
     PetscCall(HycoMeshFindGroup(m, "contact", s->contact[k]->slave, &shared->group[shared->n_groups++]));
+  /* The axis holds the radius as a support does. */
   for (PetscInt i = 0; i < m->n_nodes && s->formulation == HYCO_AXISYMMETRIC; i++)
     shared->held[i] |= m->xyz[3 * i] <= 1e-9 * HycoMeshLength(m);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -173,6 +179,8 @@ static PetscBool CanFollow(HycoMesh m, const Shared *shared, const Found *found,
   const PetscInt n = Masters(found, i, &node, &weight);
 
   for (PetscInt a = 0; a < n; a++) {
+    /* Masters must have every support that the slave has: otherwise the support would act on a node that does not move
+       with it. */
     if (found->tie[node[a]] >= 0 || (shared->held[i] & ~shared->held[node[a]])) return PETSC_FALSE;
   }
   for (PetscInt g = 0; g < shared->n_groups; g++) {
@@ -240,7 +248,8 @@ static PetscErrorCode FindMeans(HycoFE fe, PetscInt k, const Shared *shared, Fou
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The means of all ties that have them, after the nearest points of all ties. */
+/* The means of all ties that have them, after the nearest points of all ties. As for mortar contacts, of which a tie is
+   one that neither opens nor slides. */
 static PetscErrorCode FindAllMeans(HycoScene s, HycoMesh m, Found *found)
 {
   PetscBool any = PETSC_FALSE;
@@ -310,6 +319,7 @@ static PetscReal Reach(HycoMesh m, const Found *found, PetscInt i)
   for (PetscInt a = 0; a < n; a++) {
     for (PetscInt c = 0; c < 3; c++) at[c] += weight[a] * m->xyz[3 * node[a] + c];
   }
+  /* Twice the distance as drawn: maps may stretch it. */
   return PetscMax(found->tolerance[found->tie[i]],
                   PetscMax(found->row[i] < 0 ? 0 : 2 * HycoDistance(at, m->xyz + 3 * i), 1e-9 * HycoMeshLength(m)));
 }
@@ -323,6 +333,7 @@ static PetscErrorCode Find(HycoScene s, HycoMesh m, Found *found, HycoTies *ties
   PetscFunctionBegin;
   for (PetscInt i = 0; i < m->n_nodes; i++) found->tie[i] = found->row[i] = -1;
   for (PetscInt k = 0; k < s->n_ties; k++) PetscCall(FindOne(s, m, k, found));
+  /* After all nearest points: which nodes are tied decides who may follow a mean. */
   PetscCall(FindAllMeans(s, m, found));
   PetscCall(CheckChains(s, m, found));
   PetscCall(CheckRoom(s, m, found));
@@ -330,6 +341,7 @@ static PetscErrorCode Find(HycoScene s, HycoMesh m, Found *found, HycoTies *ties
     const PetscInt *node;
     const PetscReal *weight;
 
+    /* Counted first: the arrays have exactly these entries. */
     n += Masters(found, i, &node, &weight);
   }
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
@@ -362,6 +374,7 @@ PetscErrorCode HycoTiesFind(HycoScene s, HycoMesh m, HycoTies *ties)
   *ties = NULL;
   if (!s->n_ties) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMemzero(&found.mean, sizeof(found.mean)));
+  /* Zero contacts: starts exist even without means. */
   PetscCall(HycoPairsReserve(&found.mean, 0, 0));
   PetscCall(
       PetscMalloc4(m->n_nodes, &found.tie, m->n_nodes, &found.row, m->n_nodes, &found.at, s->n_ties, &found.tolerance));
@@ -370,7 +383,8 @@ PetscErrorCode HycoTiesFind(HycoScene s, HycoMesh m, HycoTies *ties)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* For contacts with a master surface: checks that none of its nodes is tied. */
+/* For contacts with a master surface: checks that none of its nodes is tied. Slaves may be tied: DropTied() moves their
+   contact to their masters. */
 static PetscErrorCode CheckMasters(HycoScene s, HycoMesh m)
 {
   PetscFunctionBegin;
@@ -383,6 +397,7 @@ static PetscErrorCode CheckMasters(HycoScene s, HycoMesh m)
     for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) {
       const PetscInt tied = HycoMeshTied(m, m->group_node[j]);
 
+      /* A contact force on a tied node would have to pass to its masters inside the search. */
       HycoCheck(tied < 0,
                 "contact %s: node %d of its master %s is a slave of the tie %s; exchange slave and master of the tie",
                 c->name, (int)m->node_id[m->group_node[j]], c->master,
@@ -435,11 +450,13 @@ PetscErrorCode HycoPairsDropTied(HycoScene s, HycoMesh m, HycoPairs *p)
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
+  /* Nothing is tied: the pairs stay as they are. */
   if (!m->n_tied) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(CheckMasters(s, m));
   PetscCall(PetscMalloc2(m->n_nodes, &has, p->n, &which));
   ierr = Choose(s, m, p, has, &n, which);
   if (!ierr && n < p->n) {
+    /* A selection keeps the order, in which contacts are numbered. */
     ierr = HycoPairsSelect(p, n, which, NULL, &kept);
     if (!ierr) ierr = HycoPairsDestroy(p);
     if (!ierr) *p = kept;

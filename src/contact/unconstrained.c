@@ -50,6 +50,7 @@ static PetscErrorCode SurfaceSenses(Shapes *s, PetscInt contact, PetscReal work[
     const char *group = side == SLAVE ? c->slave : c->master;
     PetscInt g = 0;
 
+    /* An obstacle has no surface on its other side. */
     if (!group) continue;
     PetscCall(HycoMeshFindGroup(s->wide->mesh, "contact", group, &g));
     PetscCall(HycoSmoothNormals(s->wide, g, normal, doubt, bend));
@@ -58,10 +59,12 @@ static PetscErrorCode SurfaceSenses(Shapes *s, PetscInt contact, PetscReal work[
 
       if (p->contact[i] != contact) continue;
       for (PetscInt j = lo; j < hi; j++) {
+        /* Several masters: the normal at their mean point is interpolated by the weights of the gap. */
         const PetscInt here = side == SLAVE ? p->slave[i] : p->master[j], node = s->index ? s->index[here] : here;
 
         for (PetscInt d = 0; d < 3; d++)
           s->normal[side][3 * i + d] += side == SLAVE ? normal[3 * node + d] : -p->weight[j] * normal[3 * node + d];
+        /* The most doubtful of the nodes that enter. */
         s->doubt[side][i] = PetscMax(s->doubt[side][i], doubt[node]);
         s->bend[side][i] = PetscMax(s->bend[side][i], bend[node]);
       }
@@ -70,7 +73,8 @@ static PetscErrorCode SurfaceSenses(Shapes *s, PetscInt contact, PetscReal work[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The slave surface's error is also taken for given normals, which cannot be more exact than the mesh. */
+/* The slave surface's error is also taken for given normals, which cannot be more exact than the mesh. A sense is one
+   of three possible normals of a contact: given, of the slave's surface, of the master's. */
 static PetscErrorCode FindSenses(Shapes *s)
 {
   HycoScene scene = s->fe->scene;
@@ -139,6 +143,7 @@ static PetscErrorCode Spectrum(const Shapes *s, const PetscInt sense[], const Pe
     const PetscInt t = sense[s->pairs->contact[i]];
     const PetscReal *d = s->d + (size_t)i * (size_t)k * 3;
 
+    /* No master at these positions: the contact resists nothing. */
     if (HycoPairsAlone(s->fe->scene, s->pairs, i)) continue;
     for (PetscInt a = 0; a < k; a++) {
       for (PetscInt b = 0; b < k; b++) {
@@ -165,6 +170,7 @@ static PetscErrorCode Spectrum(const Shapes *s, const PetscInt sense[], const Pe
 static PetscErrorCode Tangential(const Shapes *s, const PetscInt sense[], const PetscReal z[], PetscReal weight[],
                                  PetscBool *tangential)
 {
+  /* Motions have the length of all unknowns together. */
   const PetscReal noise = 1e-9 / PetscSqrtReal((PetscReal)HycoFEUnknowns(s->fe));
   PetscReal norm = 0;
 
@@ -176,6 +182,7 @@ static PetscErrorCode Tangential(const Shapes *s, const PetscInt sense[], const 
     PetscReal d[3];
 
     Combine(s, i, z, d);
+    /* Within twice the normal's error, or within what the surface bends between its nodes. */
     if ((Rubs(s, i) ? HycoLength(d) : PetscAbsReal(HycoDot(s->normal[t] + 3 * i, d))) <=
         (Rubs(s, i) ? 0 : PetscMax(2 * s->doubt[t][i], s->bend[t][i]) * PetscSqrtReal(HycoDot(d, d))) +
             noise * PetscSqrtReal(norm))
@@ -202,12 +209,14 @@ static PetscErrorCode Null(const Shapes *s, const PetscInt sense[], PetscReal z[
     PetscCall(Spectrum(s, sense, weight, A, M, values));
     all = PETSC_TRUE;
     *n = 0;
+    /* Ratios of at most 1: on the mean within the normals' errors. */
     for (PetscInt a = 0; a < k && values[a] <= 1; a++) {
       PetscBool good;
       PetscReal norm = 0;
 
       PetscCall(Tangential(s, sense, A + a * k, weight, &good));
       all = (PetscBool)(all && good);
+      /* Left out in this round; the raised weights turn the eigenvectors of the next. */
       if (!good) continue;
       for (PetscInt b = 0; b < k; b++) norm += A[a * k + b] * A[a * k + b];
       for (PetscInt b = 0; b < k; b++) z[*n * k + b] = A[a * k + b] / PetscSqrtReal(norm);
@@ -223,6 +232,7 @@ static void Join(PetscInt k, const PetscReal z[], PetscReal basis[], PetscInt *n
 {
   PetscReal *v = basis + *n * k, norm = 0;
 
+  /* The whole space is there. */
   if (*n == k) return;
   for (PetscInt a = 0; a < k; a++) v[a] = z[a];
   for (PetscInt b = 0; b < 2 * *n; b++) { /* twice, against round-off */
@@ -248,14 +258,15 @@ static PetscErrorCode HasSense(const Shapes *s, PetscInt contact, PetscInt sense
     const PetscReal *n = s->normal[sense] + 3 * i;
 
     if (s->pairs->contact[i] != contact || HycoPairsAlone(s->fe->scene, s->pairs, i)) continue;
+    /* Vectors are zero where no facet gave a normal. */
     if (!(HycoDot(n, n) > 0)) *has = PETSC_FALSE;
   }
   HycoAllreduce(has, 1, HYCO_MPI_BOOL, MPI_LAND, s->comm);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The normals of choice number `code`; *possible: each contact has them. Collective. With up to three contacts a
-   code has one digit (base 3) for each. */
+/* The normals of choice number `code`; *possible: each contact has them. Collective. With up to three contacts a code
+   has one digit (base 3) for each. 3^n combinations are tried, since each contact's better normal is not known. */
 static PetscErrorCode Senses(const Shapes *s, PetscInt code, PetscInt sense[], PetscBool *possible)
 {
   const PetscBool common = (PetscBool)(s->fe->scene->n_contacts > MOST_CONTACTS); /* as far as available */
@@ -265,6 +276,7 @@ static PetscErrorCode Senses(const Shapes *s, PetscInt code, PetscInt sense[], P
   for (PetscInt c = 0, rest = code; c < s->fe->scene->n_contacts; c++) {
     PetscBool has, given;
 
+    /* With more contacts all combinations would be too many: one sense for all, where it exists. */
     sense[c] = common ? code : rest % N_SENSES;
     rest /= N_SENSES;
     PetscCall(HasSense(s, c, sense[c], &has));
@@ -297,12 +309,14 @@ static PetscErrorCode Search(const Shapes *s, PetscInt *n_unconstrained, PetscRe
     PetscCall(Senses(s, code, sense, &possible));
     if (!possible) continue;
     PetscCall(Null(s, sense, z, &n));
+    /* Kept apart from the union: motions of different choices need not be free together. */
     if (n > *n_alike) {
       *n_alike = 0;
       for (PetscInt a = 0; a < n; a++) Join(k, z + a * k, alike, n_alike);
     }
     before = *n_unconstrained;
     for (PetscInt a = 0; a < n; a++) Join(k, z + a * k, unconstrained, n_unconstrained);
+    /* No further motion can be found. */
     if (before == k) break;
   }
   PetscCall(PetscFree2(sense, z));
@@ -320,6 +334,7 @@ static PetscReal Entry(const HycoMotions *motions, const PetscReal z[], PetscInt
   PetscReal sum = 0;
 
   for (PetscInt a = 0; a < first; a++) {
+    /* The columns of a part are taken through its first motion. */
     if (motions->rigid[a].part == motions->rigid[first].part) return 0; /* the column of that motion contains it */
   }
   for (PetscInt a = first; a < k; a++) {
@@ -379,6 +394,7 @@ PetscErrorCode HycoFEFindUnconstrained(MPI_Comm comm, HycoFE fe, HycoFE wide, co
   PetscCall(PetscCalloc1((size_t)s.m * (size_t)s.k * 3, &s.d));
   for (PetscInt t = 0; t < N_SENSES; t++)
     PetscCall(PetscCalloc3(3 * s.m, &s.normal[t], s.m, &s.doubt[t], s.m, &s.bend[t]));
+  /* The relative displacement of slave and master by each motion, at each contact. */
   Relative(&s, motions);
   ierr = FindAllSenses(&s);
   if (!ierr) ierr = Search(&s, n_unconstrained, *unconstrained, n_alike, *alike);

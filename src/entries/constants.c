@@ -12,7 +12,8 @@ static const char *Name(HycoScene s, PetscInt c)
   return s->key[s->constant[c]] + strlen(SECTION);
 }
 
-/* A constant must not hide a variable that some expression uses under the same name. */
+/* A constant must not hide a variable that some expression uses under the same name. Letter case is ignored, since
+   options have none. */
 static PetscErrorCode CheckName(HycoScene s, const char key[], const char name[])
 {
   PetscFunctionBegin;
@@ -25,8 +26,8 @@ static PetscErrorCode CheckName(HycoScene s, const char key[], const char name[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Appends `text` with its constants substituted, in brackets. depth: nesting of constants, to detect cycles. A
-   chain of constants that refers to no one twice is at most n_constants deep. */
+/* Appends `text` with its constants substituted, in brackets. depth: nesting of constants, to detect cycles. A chain of
+   constants that refers to no one twice is at most n_constants deep. out[] is one buffer for the whole recursion. */
 static PetscErrorCode Expand(HycoScene s, const char key[], const char text[], PetscInt depth, char out[LONGEST])
 {
   size_t at = strlen(out);
@@ -85,7 +86,8 @@ PetscErrorCode HycoSceneExpression(HycoScene s, const char key[], const char tex
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All are listed before one is expanded: they may refer to each other in any order. */
+/* All are listed before one is expanded: they may refer to each other in any order. Before any other expression of the
+   scene is read. */
 PetscErrorCode HycoSceneReadConstants(HycoScene s)
 {
   HycoExpr tried = NULL;

@@ -75,6 +75,7 @@ PetscErrorCode HycoDeclaredView(const HycoDeclared *d, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Also of declarations that no entry has filled. */
 PetscErrorCode HycoDeclaredDestroy(HycoDeclared *d)
 {
   PetscFunctionBegin;

@@ -67,7 +67,8 @@ static PetscErrorCode GetLong(PetscOptions options, const char key[], char **val
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Copies the global database's entries over the scene's own; only those of the method if the scene is a model's. */
+/* Copies the global database's entries over the scene's own; only those of the method if the scene is a model's. The
+   command line wins over the scene, so that a study needs one file. */
 PetscErrorCode HycoEntriesOverride(PetscOptions options, PetscBool method_only)
 {
   PetscInt n;
@@ -113,8 +114,9 @@ static PetscErrorCode RefuseOthers(PetscOptions options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* scene->key takes over the array; the number of entries grows as values are read, so that a scene that fails is
-   freed to that point. */
+/* scene->key takes over the array; the number of entries grows as values are read, so that a scene that fails is freed
+   to that point. Sorted: members of a section follow each other, bodies come before forces, and a fingerprint does not
+   depend on the file's order. */
 PetscErrorCode HycoEntriesList(HycoScene scene)
 {
   PetscInt n;
@@ -147,7 +149,8 @@ PetscErrorCode HycoEntriesList(HycoScene scene)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The scene's file and folder: `path` is a folder with scene.yaml, or the file. */
+/* The scene's file and folder: `path` is a folder with scene.yaml, or the file. 16 characters of room for what is
+   appended. */
 static PetscErrorCode FindFile(const char path[], char file[PETSC_MAX_PATH_LEN], char folder[PETSC_MAX_PATH_LEN])
 {
   struct stat info;
@@ -173,7 +176,8 @@ static PetscErrorCode FindFile(const char path[], char file[PETSC_MAX_PATH_LEN],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* libyaml and PETSc treat a byte 0 differently. */
+/* libyaml and PETSc treat a byte 0 differently. A zero byte would end the text for one of them and not for the other,
+   which would then check something else. */
 static PetscBool IsText(const char file[])
 {
   FILE *f = fopen(file, "rb");
@@ -217,8 +221,8 @@ static PetscErrorCode Insert(PetscOptions options, const char file[], char text[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Duplicate keys and nesting are checked before PETSc reads the text, which accepts both silently. PETSc's own errors name
-   no file, and are replaced by a line that does. */
+/* Duplicate keys and nesting are checked before PETSc reads the text, which accepts both silently. PETSc's own errors
+   name no file, and are replaced by a line that does. PETSc reads the same text that was checked. */
 static PetscErrorCode ReadYAML(PetscOptions options, const char file[])
 {
   char message[HYCO_LINE], *text;
@@ -238,8 +242,8 @@ static PetscErrorCode ReadYAML(PetscOptions options, const char file[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Every rank reads the file: it is small, and PETSc's options are local to a rank. Collective by the check of
-   errors. */
+/* Every rank reads the file: it is small, and PETSc's options are local to a rank. Collective by the check of errors.
+   The command line's entries are then put over those of the file. */
 PetscErrorCode HycoEntriesRead(MPI_Comm comm, const char path[], PetscOptions *options, char folder[PETSC_MAX_PATH_LEN])
 {
   char file[PETSC_MAX_PATH_LEN] = "";

@@ -15,6 +15,7 @@ struct _n_HycoExpr {
   PetscBool in_space, in_heat, in_mu[HYCO_MAX_PARAMETERS];
 };
 
+/* A plain number has no parser. */
 PetscErrorCode HycoExprDestroy(HycoExpr *expr)
 {
   PetscFunctionBegin;
@@ -92,7 +93,8 @@ static PetscErrorCode FindVariables(HycoExpr e, PetscInt n, const char *const na
 
 /* muParser takes minutes for many brackets inside each other. */
 #define DEEPEST 100
-/* Before the parser sees it, which would run for minutes. */
+/* Before the parser sees it, which would run for minutes. A text of a mistyped script may have thousands of
+   brackets. */
 static PetscErrorCode CheckNesting(HycoExpr e)
 {
   PetscInt depth = 0, most = 0;
@@ -141,6 +143,7 @@ static PetscErrorCode Parse(HycoExpr e, PetscInt n, const char *const names[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* key is the entry, by which messages name the expression; both texts are copied. */
 PetscErrorCode HycoExprCreate(const char key[], const char text[], PetscInt n, const char *const names[],
                               HycoExpr *expr)
 {
@@ -152,7 +155,8 @@ PetscErrorCode HycoExprCreate(const char key[], const char text[], PetscInt n, c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* For messages: the place, and those parameters that the expression uses. */
+/* For messages: the place, and those parameters that the expression uses. Only what can explain a value: other
+   parameters would distract. */
 PetscErrorCode HycoExprPlace(HycoExpr e, const PetscReal mu[], const PetscReal xyz[3], char place[HYCO_LINE])
 {
   size_t length;
@@ -221,6 +225,7 @@ PetscBool HycoExprInHeat(HycoExpr e)
   return (PetscBool)(e && e->in_heat);
 }
 
+/* Elsewhere there is no temperature at which to evaluate it. */
 PetscErrorCode HycoExprRefuseHeat(HycoExpr e)
 {
   char text[SHORT];

@@ -21,7 +21,8 @@ static HycoExpr *Find(HycoScene s, const char key[])
   return NULL;
 }
 
-/* Accelerations are integrated over cells with one value: a field of them would not be a rigid motion. */
+/* Accelerations are integrated over cells with one value: a field of them would not be a rigid motion. Also of a later
+   override: the former expression is replaced. */
 PetscErrorCode HycoSceneReadMotion(HycoScene s, PetscInt entry)
 {
   const char *key = s->key[entry];
@@ -48,8 +49,8 @@ static HycoExpr *At(HycoScene s, PetscInt k)
   return k < 3 ? &m->gravity[k] : k == 3 ? &m->speed : k < 7 ? &m->axis[k - 4] : &m->through[k - 7];
 }
 
-/* changed NULL: whether there is any; else whether the changed variables affect it. A body without density has
-   none. */
+/* changed NULL: whether there is any; else whether the changed variables affect it. A body without density has none. By
+   the entries, not by values: a speed of 0 at these parameters is still a load. */
 PetscBool HycoSceneHasInertia(HycoScene s, const HycoBody *body, const PetscBool changed[])
 {
   const HycoMotion *m = &s->motion;

@@ -29,7 +29,8 @@ static PetscBool IsItem(const char line[])
   return (PetscBool)(line[0] == '-' && strchr(" \t", line[1]) && line[1 + strspn(line + 1, " \t")] == '[');
 }
 
-/* Changes the text in place; true if it changed anything. Comments and quoted texts stay as they are. */
+/* Changes the text in place; true if it changed anything. Comments and quoted texts stay as they are. PETSc's YAML
+   reader knows lists of scalars only; [[0, 1], [2, 3]] becomes [0 1, 2 3], which HycoSceneReadHistory() understands. */
 PetscBool HycoEntriesFlatten(char text[])
 {
   PetscInt depth = 0; /* of open brackets */

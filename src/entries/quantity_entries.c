@@ -28,8 +28,9 @@ static PetscErrorCode FindAxis(const char key[], const char axis[], PetscInt *fi
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* field: index in the scene's output_fields, whose order is that of HycoQuantityKind up to AREA; after it come
-   group and contact. */
+/* field: index in the scene's output_fields, whose order is that of HycoQuantityKind up to AREA; after it come group
+   and contact. Entries of one output come in any order; what they must have together is checked by
+   HycoSceneCheckQuantities(). */
 PetscErrorCode HycoSceneReadQuantity(HycoScene s, PetscInt entry, const char name[], PetscInt field)
 {
   HycoQuantity *q = NULL;

@@ -3,7 +3,8 @@
 #include <hycosceneimpl.h>
 #include <string.h>
 
-/* field: index in the scene's tie_fields. tolerance -1: the default, from the size of the mesh. */
+/* field: index in the scene's tie_fields. tolerance -1: the default, from the size of the mesh. Groups are only names
+   here: the mesh is read later. */
 PetscErrorCode HycoSceneReadTie(HycoScene s, PetscInt entry, const char name[], PetscInt field)
 {
   HycoTie *tie = NULL;
@@ -39,6 +40,7 @@ PetscErrorCode HycoSceneReadTie(HycoScene s, PetscInt entry, const char name[], 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A surface that is tied to itself would have chains of ties. */
 PetscErrorCode HycoSceneCheckTies(HycoScene s)
 {
   PetscFunctionBegin;

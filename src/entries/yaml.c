@@ -70,8 +70,8 @@ static void CheckEvents(yaml_parser_t *parser, const char text[], char problem[H
   }
 }
 
-/* Twice, because events know no aliases: the second pass builds the document, after the first has bounded its
-   depth. */
+/* Twice, because events know no aliases: the second pass builds the document, after the first has bounded its depth.
+   problem[] is one line, with the number of the line in the file. */
 PetscBool HycoYAMLHasProblem(const char text[], char problem[HYCO_LINE])
 {
   yaml_parser_t parser;
@@ -109,8 +109,8 @@ typedef struct {
   PetscInt *line_of;
 } Scan;
 
-/* A key: its path becomes s->path. The path is compared, not the key: "young" of two bodies is no repetition.
-   Without letter case, as in PETSc's database. */
+/* A key: its path becomes s->path. The path is compared, not the key: "young" of two bodies is no repetition. Without
+   letter case, as in PETSc's database. In PETSc's form, a_b_c, in which two ways of nesting may give the same entry. */
 static PetscErrorCode TakeKey(Scan *s, const char word[])
 {
   const size_t length = strlen(s->path);
@@ -171,7 +171,8 @@ static PetscErrorCode TakeEnd(Scan *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A scalar in a mapping is a key or a value in turn; libyaml's events do not tell which. */
+/* A scalar in a mapping is a key or a value in turn; libyaml's events do not tell which. of->key tells whether the next
+   scalar is a key. */
 static PetscErrorCode TakeEvent(Scan *s, const yaml_event_t *event)
 {
   Level *of = s->depth ? &s->level[s->depth - 1] : NULL;
@@ -196,7 +197,7 @@ static PetscErrorCode TakeEvent(Scan *s, const yaml_event_t *event)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The text has no problem of syntax. */
+/* The text has no problem of syntax. An error of the scan ends it; the event is freed before. */
 static PetscErrorCode ScanAll(Scan *s, yaml_parser_t *parser)
 {
   PetscBool more = PETSC_TRUE;
@@ -210,6 +211,7 @@ static PetscErrorCode ScanAll(Scan *s, yaml_parser_t *parser)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Before PETSc reads the text: what it would accept silently is refused with a line number. */
 PetscErrorCode HycoEntriesCheck(const char text[], const char file[])
 {
   Scan s = {.file = file};

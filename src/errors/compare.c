@@ -17,7 +17,8 @@ static void Add(Norms *n, PetscReal value, PetscReal reference)
 }
 
 /* U, u: displacements of the RID's nodes; sigma: (cells of the RID) x (components); Lambda, lambda: forces of all
-   contacts, also of those outside the RID, which are reconstructed. NULL sigma or inelastic: not compared. */
+   contacts, also of those outside the RID, which are reconstructed. NULL sigma or inelastic: not compared. Differences
+   and sizes, not quotients: a path divides them by its own largest sizes. */
 PetscErrorCode HycoROMMeasureRID(HycoROM m, const PetscReal u[], const PetscReal sigma[], const PetscReal inelastic[],
                                  const PetscReal lambda[], HycoLost lost[])
 {
@@ -97,7 +98,8 @@ static PetscErrorCode DestroyCompared(HycoContained contained)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* This rank's rows of the modes on the whole mesh, from the model's file. */
+/* This rank's rows of the modes on the whole mesh, from the model's file. A model in memory has its modes on the RID
+   only. */
 static PetscErrorCode ReadModes(HycoCompared k, const char path[])
 {
   const PetscInt dim = k->rows.width[0], n = k->rows.n[0] * dim, l = k->rows.l;
@@ -120,7 +122,8 @@ static PetscErrorCode ReadModes(HycoCompared k, const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Only rank 0 has the model; every rank reads its own rows of the modes from the file, so that none has them all. */
+/* Only rank 0 has the model; every rank reads its own rows of the modes from the file, so that none has them all. For
+   all comparisons with this model. */
 static PetscErrorCode Fill(HycoROM m, HycoFOM f, HycoCompared k)
 {
   char path[PETSC_MAX_PATH_LEN] = "";
@@ -178,8 +181,8 @@ static PetscErrorCode Check(HycoROM m, HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The errors in H1 and its dual. Collective. m and lambda are NULL on the other ranks, and AddForces() uses them
-   on rank 0 only. */
+/* The errors in H1 and its dual. Collective. m and lambda are NULL on the other ranks, and AddForces() uses them on
+   rank 0 only. The norms of the paper: displacements in H1, forces in its dual. */
 static PetscErrorCode CompareH1(HycoROM m, const PetscReal lambda[], HycoCompared k, HycoErrors *e)
 {
   PetscReal lost, size;
@@ -196,8 +199,8 @@ static PetscErrorCode CompareH1(HycoROM m, const PetscReal lambda[], HycoCompare
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Each rank compares its rows of the whole mesh; the RID and the contacts are compared on rank 0, which has the
-   model. */
+/* Each rank compares its rows of the whole mesh; the RID and the contacts are compared on rank 0, which has the model.
+   *e is set on rank 0 alone. */
 PetscErrorCode HycoROMCompare(HycoROM m, HycoFOM f, HycoErrors *e)
 {
   HycoErrors found = {0};

@@ -37,8 +37,9 @@ static PetscReal *At(const Kept *kept, PetscInt k)
   return kept->value + (size_t)k * (size_t)(kept->n_dof + kept->n_sigma + kept->n_cells + kept->n_contacts);
 }
 
-/* A HycoStepMonitor. HycoFOMGetSolution() gathers on rank 0 and is collective; the inelastic strains are of this
-   rank's cells and are sent by the file's order. */
+/* A HycoStepMonitor. HycoFOMGetSolution() gathers on rank 0 and is collective; the inelastic strains are of this rank's
+   cells and are sent by the file's order. Full order's fields at all listed times, since the reduced path is predicted
+   only when it has ended. */
 static PetscErrorCode Keep(HycoFOM f, const HycoStep *step, void *ctx)
 {
   Kept *kept = (Kept *)ctx;
@@ -126,7 +127,7 @@ static PetscErrorCode Compare(HycoROM m, PetscInt n, const PetscReal mu[], const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The path is solved, and kept on rank 0. Collective. */
+/* The path is solved, and kept on rank 0. Collective. A path that full order cannot follow is no reference. */
 static PetscErrorCode CompareKept(HycoROM m, HycoFOM f, PetscInt n, const PetscReal mu[], Kept *kept, HycoPathErrors *e)
 {
   HycoHistory h;
@@ -138,6 +139,7 @@ static PetscErrorCode CompareKept(HycoROM m, HycoFOM f, PetscInt n, const PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Memory: a whole solution for each listed time, on rank 0. */
 PetscErrorCode HycoROMComparePath(HycoROM m, HycoFOM f, PetscInt n, const PetscReal mu[], HycoPathErrors *e)
 {
   Kept kept = {0};

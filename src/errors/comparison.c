@@ -42,6 +42,7 @@ PetscErrorCode HycoComparisonCreate(HycoFOM f, HycoROM m, HycoComparison *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The model and the full-order model are borrowed. */
 PetscErrorCode HycoComparisonDestroy(HycoComparison *c)
 {
   PetscFunctionBegin;
@@ -82,8 +83,9 @@ static PetscErrorCode Complete(HycoComparison *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* U = r(u0) + V gamma (30), with the full-order values. of: the rank that has the model. lda: rows of V on this
-   rank, which may be more than those of the comparison. */
+/* U = r(u0) + V gamma (30), with the full-order values. of: the rank that has the model. lda: rows of V on this rank,
+   which may be more than those of the comparison. Displacements of the whole mesh are formed by rows, without ever
+   being on one rank. */
 PetscErrorCode HycoComparisonPredict(HycoComparison *c, HycoROM m, PetscMPIInt of, const PetscReal V[], PetscInt lda)
 {
   const PetscInt n = c->n[0] * c->width[0], first = c->first[0] * c->width[0];

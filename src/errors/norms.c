@@ -51,6 +51,7 @@ PetscErrorCode HycoNormsCreate(HycoFOM f, HycoNorms *norms)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* In the opposite order of creation. */
 PetscErrorCode HycoNormsDestroy(HycoNorms *norms)
 {
   HycoNorms h = *norms;
@@ -97,7 +98,8 @@ static PetscErrorCode SetFromRows(HycoNorms h, const PetscReal rows[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* |u - minus|, or |u| if minus is NULL; both by rows in the file's order. */
+/* |u - minus|, or |u| if minus is NULL; both by rows in the file's order. sqrt(v . H v); a norm of the difference needs
+   no second product. */
 PetscErrorCode HycoNormH1(HycoNorms h, const PetscReal u[], const PetscReal minus[], PetscReal *norm)
 {
   HycoMesh part = h->f->part;
@@ -141,7 +143,8 @@ static PetscErrorCode AddForces(HycoNorms h, HycoROM m, PetscBool rid_only, cons
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Only rank 0 has forces to add; the assembly sends them to the owners of the rows. */
+/* Only rank 0 has forces to add; the assembly sends them to the owners of the rows. sqrt(r . M^-1 r) for r = B^T L: one
+   solve with the factor of M. */
 PetscErrorCode HycoNormDual(HycoNorms h, HycoROM m, PetscBool rid_only, const PetscReal L[], const PetscReal minus[],
                             PetscReal *norm)
 {

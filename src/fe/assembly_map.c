@@ -91,6 +91,7 @@ static PetscErrorCode AddCells(HycoFE fe, HycoAssemblyMap p, PetscBool constant,
 
   PetscFunctionBegin;
   for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
+    /* The constant cells are summed once and copied into K at each parameter value. */
     if (fe->constant[e] != constant) continue;
     PetscCall(HycoFEElementRoom(fe, e, &Ke));
     PetscCall(HycoFEElementStiffness(fe, e, Ke));
@@ -99,7 +100,8 @@ static PetscErrorCode AddCells(HycoFE fe, HycoAssemblyMap p, PetscBool constant,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Leaves *places NULL if the pattern does not fit; the caller then assembles by MatSetValues(). */
+/* Leaves *places NULL if the pattern does not fit; the caller then assembles by MatSetValues(). Places in the matrix's
+   array are looked up once: later assemblies add without any search for columns. */
 static PetscErrorCode Create(HycoFE fe, const PetscInt ia[], const PetscInt ja[], PetscInt n, HycoAssemblyMap *places)
 {
   HycoAssemblyMap p;

@@ -8,7 +8,8 @@ static PetscBool ready = PETSC_FALSE;
 static const PetscReal corner[8][3] = {{-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {-1, 1, -1},
                                        {-1, -1, 1},  {1, -1, 1},  {1, 1, 1},  {-1, 1, 1}};
 
-/* Products of linear functions on [-1, 1]^dim with two Gauss points in each direction. */
+/* Products of linear functions on [-1, 1]^dim with two Gauss points in each direction. Two points integrate the
+   stiffness of a parallelogram or parallelepiped exactly. */
 static void Tensor(HycoElement *e, PetscInt dim)
 {
   const PetscReal g = 1 / PetscSqrtReal(3.0);
@@ -92,6 +93,7 @@ static void Line3(HycoElement *e, PetscBool at_nodes)
    include the middle's, in proportion to their values there. */
 static void QuadAt(PetscInt nv, PetscReal x, PetscReal y, PetscReal N[], PetscReal dN[][3])
 {
+  /* The middle's function and its slopes. */
   const PetscReal f[3] = {(1 - x * x) * (1 - y * y), -2 * x * (1 - y * y), -2 * y * (1 - x * x)};
 
   for (PetscInt a = 0; a < nv; a++) {
@@ -104,7 +106,8 @@ static void QuadAt(PetscInt nv, PetscReal x, PetscReal y, PetscReal N[], PetscRe
   }
 }
 
-/* Quad8 and quad9 share their first eight nodes in gmsh's order. */
+/* Quad8 and quad9 share their first eight nodes in gmsh's order. Three by three points, with which the mass of quad9 is
+   exact as well; at_nodes: the functions at the nodes themselves. */
 static void Quad(HycoElement *e, PetscInt nv, PetscBool at_nodes)
 {
   e->dim = 2;
@@ -120,7 +123,7 @@ static void Quad(HycoElement *e, PetscInt nv, PetscBool at_nodes)
 static const PetscInt side[6][2] = {{0, 1}, {1, 2}, {2, 0}, {3, 0}, {2, 3}, {1, 3}};
 
 /* Functions of a quadratic simplex of nv nodes at the point with barycentric coordinates L: L_a (2 L_a - 1) for
-   corners, 4 L_a L_b for sides. */
+   corners, 4 L_a L_b for sides. side[]: the two corners of each side, in gmsh's order. */
 static void SimplexAt(PetscInt dim, PetscInt nv, const PetscReal L[4], PetscReal N[], PetscReal dN[][3])
 {
   static const PetscReal slope[4][3] = {{-1, -1, -1}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
@@ -149,6 +152,7 @@ static void Tri6(HycoElement *e, PetscBool at_nodes)
     PetscReal L[4] = {0};
 
     for (PetscInt a = 0; a < 3; a++) {
+      /* Values at the nodes themselves, for gaps and normals there. */
       if (at_nodes)
         L[a] = q < 3 ? a == q : a == side[q - 3][0] || a == side[q - 3][1] ? 0.5 : 0;
       else
@@ -227,6 +231,7 @@ static void Hex(HycoElement *e, PetscInt nv)
   e->nv = nv;
   e->nq = 27;
   for (PetscInt q = 0; q < 27; q++) {
+    /* The first coordinate runs fastest. */
     const PetscInt at[3] = {q % 3, q / 3 % 3, q / 9};
     const PetscReal x[3] = {gauss[at[0]], gauss[at[1]], gauss[at[2]]};
 
@@ -266,7 +271,8 @@ const HycoElement *HycoElementGet(HycoCellType type)
   return &table[type];
 }
 
-/* The element of a cell's facets; in 1D a point of weight 1. */
+/* The element of a cell's facets; in 1D a point of weight 1. Facets of pyramids and prisms are quadrilaterals, of which
+   triangles repeat a node. */
 const HycoElement *HycoElementGetFacet(HycoCellType type)
 {
   if (!ready) Tabulate();
@@ -294,7 +300,7 @@ const HycoElement *HycoElementGetFacet(HycoCellType type)
 }
 
 /* The facet's functions and slopes at its own nodes, for normals at carriers; NULL where contacts use the integral
-   instead. */
+   instead. First-order facets have one normal, or are averaged by area. */
 const HycoElement *HycoElementGetFacetNodes(HycoCellType type)
 {
   if (!ready) Tabulate();

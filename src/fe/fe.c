@@ -171,6 +171,7 @@ PetscErrorCode HycoFECreateSurface(HycoScene scene, DM dm, HycoFE *fe)
   PetscCall(HycoMeshOf(dm, scene, &mesh));
   PetscCall(PetscNew(&surface));
   *surface = *mesh;
+  /* Surfaces are moved and loaded without integrating a cell. */
   surface->n_cells = 0;
   HycoOnError(Create(scene, dm, surface, fe), PetscCall(PetscFree(surface)));
   (*fe)->surface = surface;
@@ -190,7 +191,8 @@ PetscErrorCode HycoFESetDrawn(HycoFE fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* X = map(x, mu), body by body. */
+/* X = map(x, mu), body by body. Maps act on the drawing, not on the last position: the result does not depend on what
+   was solved before. */
 static PetscErrorCode MoveNodes(HycoFE fe)
 {
   HycoMesh m = fe->mesh;
@@ -315,6 +317,7 @@ static PetscErrorCode SetSupports(HycoFE fe)
     for (PetscInt c = 0; c < m->dim; c++) {
       for (PetscInt j = m->group_start[g]; fixed->value[c] && j < m->group_start[g + 1]; j++) {
         const PetscInt i = m->group_node[j], dof = i * m->dim + c;
+        /* 0 where nothing was set: compared only where the component is fixed already. */
         const PetscReal former = fe->u0[dof];
         PetscReal value;
 
@@ -325,6 +328,7 @@ static PetscErrorCode SetSupports(HycoFE fe)
                   (int)m->node_id[i], "xyz"[c], (double)former, (double)value, HycoExprKey(fixed->value[c]));
         fe->fixed[dof] = PETSC_TRUE;
         fe->u0[dof] = value;
+        /* Homogeneous supports need no lifting. */
         fe->lifted = (PetscBool)(fe->lifted || value != 0);
       }
     }
@@ -387,6 +391,7 @@ static PetscBool AnyChanges(HycoExpr const e[3], const PetscBool changed[])
                      HycoExprChanges(e[2], changed));
 }
 
+/* Asked by hyco check, and by resultants, which are computed again only then. */
 PetscBool HycoSceneLoadsChange(HycoScene s, const PetscBool changed[])
 {
   PetscBool any = PETSC_FALSE;
@@ -399,7 +404,8 @@ PetscBool HycoSceneLoadsChange(HycoScene s, const PetscBool changed[])
   return any;
 }
 
-/* By parameter: whether K or B depends on it; others act on F and D only, so that a factor of K stays valid. */
+/* By parameter: whether K or B depends on it; others act on F and D only, so that a factor of K stays valid. By which
+   points are ordered, grouped and interpolated. */
 void HycoSceneReaches(HycoScene scene, PetscBool reaches[])
 {
   for (PetscInt p = 0; p < scene->n_parameters; p++) {
@@ -452,6 +458,7 @@ PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Cells' data are brought up to date when they are used again: parameters may have changed meanwhile. */
 PetscErrorCode HycoFEUseCells(HycoFE fe, PetscBool use)
 {
   const PetscBool late = (PetscBool)(use && fe->without_cells);

@@ -42,8 +42,8 @@ static PetscErrorCode AddNode(HycoFE fe, PetscInt node, PetscInt c, PetscReal va
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the body forces at point q of a cell to its unknowns. w N_a f, f: the body's force per volume plus gravity
-   and centrifugal force, at X(mu). */
+/* Adds the body forces at point q of a cell to its unknowns. w N_a f, f: the body's force per volume plus gravity and
+   centrifugal force, at X(mu). Forces per volume act on the moved body, not per drawn volume. */
 static PetscErrorCode AddPointForce(HycoFE fe, PetscInt cell, PetscInt q, const HycoAcceleration *motion,
                                     PetscReal value[])
 {
@@ -59,6 +59,7 @@ static PetscErrorCode AddPointForce(HycoFE fe, PetscInt cell, PetscInt q, const 
   for (PetscInt c = 0; c < m->dim; c++) {
     PetscReal f = 0;
 
+    /* Expressions cost more than the point's gradients. */
     if (!body->force[c] && inertia[c] == 0) continue;
     if (body->force[c]) PetscCall(HycoExprEval(body->force[c], fe->mu, 1, x, &f));
     f += inertia[c];
@@ -106,7 +107,8 @@ static PetscBool Acts(HycoFE fe, PetscInt facet)
   return (PetscBool)(fe->all_facets || fe->mesh->facet_cell[facet] >= 0);
 }
 
-/* Quadrature of t dS - p n dS, for loads that vary over the facet; n has the length of the area element. */
+/* Quadrature of t dS - p n dS, for loads that vary over the facet; n has the length of the area element. A pressure
+   acts against the outward normal. */
 static PetscErrorCode AddFacetLoad(HycoFE fe, const HycoLoad *load, PetscInt facet, Into F)
 {
   HycoMesh m = fe->mesh;
@@ -134,7 +136,8 @@ static PetscErrorCode AddFacetLoad(HycoFE fe, const HycoLoad *load, PetscInt fac
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sums of n dS and dS around each node that the load acts on. */
+/* Sums of n dS and dS around each node that the load acts on. A uniform load is then a product for each node, not an
+   integral: moved nodes alone make it again. */
 static PetscErrorCode SetShares(HycoFE fe, PetscInt group, HycoLoadShares *s)
 {
   HycoMesh m = fe->mesh;
@@ -145,6 +148,7 @@ static PetscErrorCode SetShares(HycoFE fe, PetscInt group, HycoLoadShares *s)
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(4 * m->n_nodes, &sum));
   for (PetscInt f = 0; f < m->n_facets; f++) {
+    /* Facets that a rank shares are integrated by each for its own nodes. */
     if (m->facet_group[f] != group || !Acts(fe, f)) continue;
     for (PetscInt q = 0; q < el->nq; q++) {
       PetscReal v[4];
@@ -157,6 +161,7 @@ static PetscErrorCode SetShares(HycoFE fe, PetscInt group, HycoLoadShares *s)
     }
   }
   for (PetscInt i = 0; i < m->n_nodes; i++) n += sum[4 * i + 3] != 0; /* the corners of quad8 have negative shares */
+  /* The same nodes as at the last position: no allocation along a study. */
   if (n != s->n) {
     HycoFreeAll(&s->node, &s->share);
     PetscCall(PetscMalloc1(n, &s->node));
@@ -231,7 +236,8 @@ static PetscErrorCode AddLifting(HycoFE fe, PetscInt cell, Into F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Forces of the thermal strains, w B^T C (alpha dT), added to push (nv x dim, N). */
+/* Forces of the thermal strains, w B^T C (alpha dT), added to push (nv x dim, N). With bbar as for every stress, so
+   that a free expansion has none. */
 PetscErrorCode HycoCellHeat(HycoFE fe, PetscInt cell, PetscReal push[])
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
@@ -267,6 +273,7 @@ static PetscErrorCode AddVolume(HycoFE fe, PetscInt cell, Into F)
     PetscCall(HycoFEBodyForce(fe, cell, f));
     PetscCall(AddCell(fe, cell, f, F));
   }
+  /* Thermal stress C eps_thermal as nodal forces, of linear scenes. */
   if (hot) {
     PetscCall(HycoCellHeat(fe, cell, push));
     PetscCall(AddCell(fe, cell, push, F));
@@ -274,10 +281,11 @@ static PetscErrorCode AddVolume(HycoFE fe, PetscInt cell, Into F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The force per unit length along a segment: its ends, and its middle if of second order. Integral of N_a f ds over
-   the moved segment (force per length, N/m). */
+/* The force per unit length along a segment: its ends, and its middle if of second order. Integral of N_a f ds over the
+   moved segment (force per length, N/m). By the length of the moved segment. */
 static PetscErrorCode AddSegment(HycoFE fe, const HycoPointLoad *load, const PetscInt node[], Into F)
 {
+  /* First-order segments: two points integrate a linear load times a linear function. */
   const HycoElement *el = HycoMeshIsQuadratic(fe->mesh) ? HycoElementGetFacet(HYCO_TRI6) : HycoElementGet(HYCO_LINE2);
 
   PetscFunctionBegin;
@@ -413,9 +421,9 @@ static PetscErrorCode AddElastic(HycoFE fe, const PetscReal u[], PetscBool held,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* r = internal minus applied forces at supported unknowns, 0 elsewhere: f_int if it is given (histories), else K u
-   of the cells with a fixed unknown, since the assembled K has only the diagonal in these rows. Complete at owned
-   nodes. Not collective. */
+/* r = internal minus applied forces at supported unknowns, 0 elsewhere: f_int if it is given (histories), else K u of
+   the cells with a fixed unknown, since the assembled K has only the diagonal in these rows. Complete at owned nodes.
+   Not collective. Contact forces are not in it: the caller subtracts what they press on supports. */
 PetscErrorCode HycoFEReactions(HycoFE fe, const PetscReal u[], const PetscReal f_int[], PetscReal r[])
 {
   PetscFunctionBegin;

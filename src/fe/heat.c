@@ -46,7 +46,8 @@ static PetscErrorCode SetCell(HycoFE fe, const HycoElement *el, PetscInt cell)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Only bodies whose expressions changed; all after the nodes moved. Not collective. */
+/* Only bodies whose expressions changed; all after the nodes moved. Not collective. Temperatures are at integration
+   points: laws and thermal strains read them there. */
 PetscErrorCode HycoFESetHeat(HycoFE fe, PetscBool all, const PetscBool changed[])
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);

@@ -70,6 +70,7 @@ static PetscErrorCode ListNames(HycoScene scene, HycoFEState s)
       PetscBool seen = PETSC_FALSE;
 
       for (PetscInt j = 0; j < s->n_names && !seen; j++) PetscCall(PetscStrcmp(s->name[j], law->state_name[k], &seen));
+      /* Laws of one kind in several bodies have the same variables. */
       if (!seen) PetscCall(PetscStrallocpy(law->state_name[k], &s->name[s->n_names++]));
     }
   }
@@ -88,6 +89,7 @@ PetscErrorCode HycoFEStateCreate(HycoFE fe, HycoFEState *state)
   s->n_cells = n;
   PetscCall(PetscMalloc1(n + 1, &s->start));
   s->start[0] = 0;
+  /* Packed: bodies with small states do not pay for the largest. */
   for (PetscInt e = 0; e < n; e++) s->start[e + 1] = s->start[e] + nq * PointSize(fe, e);
   PetscCall(PetscCalloc1(s->start[n], &s->value));
   for (PetscInt e = 0; e < n; e++) {
@@ -170,6 +172,7 @@ static PetscErrorCode BatchCreate(HycoFE fe, Batch *b)
                 {&b->constant, HYCO_MAX_DECLARED}};
     const PetscInt parts = (PetscInt)(sizeof(part) / sizeof(part[0]));
 
+    /* One allocation: arrays of a batch lie side by side in the cache. */
     room = 0;
     for (PetscInt k = 0; k < parts; k++) room += part[k].size * n;
     PetscCall(PetscMalloc1(room, &b->memory));
@@ -192,8 +195,9 @@ static PetscErrorCode BatchDestroy(Batch *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Computes strains at the end of the step and reads the state at its begin; the law's strains exclude thermal
-   strain. Total and thermal strains go to the state separately. */
+/* Computes strains at the end of the step and reads the state at its begin; the law's strains exclude thermal strain.
+   Total and thermal strains go to the state separately. Gradients are kept in the batch for Scatter(), which needs them
+   for the forces. */
 static PetscErrorCode Gather(HycoFE fe, const HycoElement *el, Batch *b)
 {
   const PetscInt ns = fe->n_sigma, body = fe->mesh->cell_body[b->cell[0]];
@@ -239,6 +243,7 @@ static void Linear(HycoFE fe, const HycoElement *el, Batch *b)
   const PetscInt ns = fe->n_sigma, size = fe->tangent_size[fe->mesh->cell_body[b->cell[0]]];
 
   for (PetscInt i = 0; i < b->n * el->nq; i++) {
+    /* Lame's constants (2) or a full tangent. */
     const PetscReal *C = fe->tangent + fe->tangent_start[b->cell[i / el->nq]] + i % el->nq * size;
     const PetscReal *strain = b->strain + i * ns;
     PetscReal *stress = b->stress + i * ns;
@@ -340,7 +345,8 @@ static void Count(HycoFE fe, Batch *b, PetscInt i, const Point *from, const Poin
     r->potential += b->w[i] * b->potential[i];
 }
 
-/* Writes the batch's results to the state, f_int, the tangents and the report. */
+/* Writes the batch's results to the state, f_int, the tangents and the report. f_int is complete at owned nodes, as
+   every part has all cells around these. */
 static void Scatter(HycoFE fe, const HycoElement *el, Batch *b, PetscBool linear)
 {
   HycoMesh m = fe->mesh;
@@ -389,6 +395,7 @@ static PetscErrorCode Step(HycoFE fe, const HycoElement *el, Batch *b)
   else
     PetscCall(Update(fe, fe->mesh->cell_body[b->cell[0]], b->n * el->nq, b, &failed));
   if (!linear && !failed) Complete(fe, el, b);
+  /* The state before stays untouched by a failed batch: the step is tried again. */
   if (!failed) Scatter(fe, el, b, linear);
   b->n = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -404,6 +411,7 @@ static PetscErrorCode StepAll(HycoFE fe, HycoBodies bodies, Batch *b)
   for (PetscInt e = 0; e < m->n_cells; e++) {
     const PetscBool linear = fe->scene->body[m->cell_body[e]].law->linear;
 
+    /* Linear cells of a model's path are a constant matrix. */
     if (bodies == HYCO_BODIES_FLOWING && linear) continue;
     if (b->n == BATCH || (b->n && m->cell_body[e] != m->cell_body[b->cell[0]])) PetscCall(Step(fe, el, b));
     b->cell[b->n++] = e;
@@ -444,7 +452,8 @@ PetscErrorCode HycoFEStepBodies(HycoFE fe, HycoBodies bodies, const PetscReal u[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Stress and energy of linear laws at displacements u: they do not depend on the past. */
+/* Stress and energy of linear laws at displacements u: they do not depend on the past. Once for each listed time: no
+   step of a linear law needs the one before. */
 PetscErrorCode HycoFELinearStress(HycoFE fe, const PetscReal u[], HycoFEState state, PetscReal *stored)
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
@@ -466,6 +475,7 @@ PetscErrorCode HycoFELinearStress(HycoFE fe, const PetscReal u[], HycoFEState st
       PetscReal *g = HycoKeptGradients(fe, el, e, q), strain[6];
 
       HycoPointStrain(fe, el, e, u, (PetscReal(*)[3])g, fe->bbar[body] ? mean : NULL, strain);
+      /* Stresses are those of the elastic part. */
       for (PetscInt c = 0; c < 3; c++) strain[c] -= hot;
       HycoTangentApply((PetscBool)(size == 2), fe->dim, C, strain, to.stress);
       *to.stored = 0;
@@ -507,6 +517,7 @@ PetscErrorCode HycoFEStateForce(HycoFE fe, HycoFEState state, PetscInt cell, Pet
     PetscReal s[6] = {0, 0, 0, 0, 0, 0};
 
     PetscCall(HycoGradients(fe, el, cell, q, g, &w));
+    /* In 2D the out-of-plane components beyond n_sigma do no work. */
     PetscCall(PetscArraycpy(s, PointAt(fe, state, cell, q).stress, fe->n_sigma));
     HycoPointForce(fe, el, g, bbar ? mean : NULL, w, s, f);
   }
@@ -531,6 +542,7 @@ PetscErrorCode HycoFEPointRows(HycoFE fe, PetscInt cell, PetscInt q, PetscReal B
   for (PetscInt c = 0; c < fe->n_sigma; c++) {
     PetscReal unit[6] = {0};
 
+    /* A row of B is what a unit stress does at the nodes, per weight. */
     unit[c] = 1;
     HycoPointForce(fe, el, g, bbar ? mean : NULL, 1, unit, B + c * n);
   }
@@ -566,7 +578,8 @@ void HycoFEInelasticStress(HycoFE fe, HycoFEState state, PetscInt cell, PetscInt
   (void)Lost(fe, cell, q, elastic, p.stress, s);
 }
 
-/* The law's input at n points of one body, without thermal strains. */
+/* The law's input at n points of one body, without thermal strains. For models with laws at few points, which bring
+   their own strains. */
 static void GatherPoints(HycoFE fe, const HycoElement *el, PetscInt n, const PetscInt point[], const PetscReal strain[],
                          Batch *b)
 {
@@ -585,6 +598,7 @@ static void GatherPoints(HycoFE fe, const HycoElement *el, PetscInt n, const Pet
       b->stress0[i * ns + c] = from.stress[c];
     }
     for (PetscInt j = 0; j < n_state; j++) b->state0[i * n_state + j] = from.variable[j];
+    /* At a first step the temperature has not changed. */
     b->temperature0[i] = *from.temperature == VIRGIN ? T : *from.temperature;
     b->temperature[i] = T;
   }
@@ -602,12 +616,14 @@ static void ScatterPoints(HycoFE fe, const HycoElement *el, PetscInt n, const Pe
 
     size[i] = Lost(fe, cell, q, b->strain + i * ns, b->stress + i * ns, s + i * ns);
     for (PetscInt r = 0; r < ns && b->tangents; r++) {
+      /* The symmetric part, as the global tangent takes. */
       for (PetscInt c = 0; c < ns; c++)
         tangent[(i * ns + r) * ns + c] = C[r * ns + c] - (Ct[r * ns + c] + Ct[c * ns + r]) / 2;
     }
   }
 }
 
+/* s, size and tangent by point; the state at the end is not kept, since the caller may repeat the step. */
 PetscErrorCode HycoFEStepPoints(HycoFE fe, PetscInt n, const PetscInt point[], const PetscReal strain[], PetscReal t0,
                                 PetscReal t1, HycoFEState begin, PetscReal s[], PetscReal size[], PetscReal tangent[],
                                 HycoFEStepReport *report)
@@ -639,7 +655,7 @@ PetscErrorCode HycoFEStepPoints(HycoFE fe, PetscInt n, const PetscInt point[], c
 }
 
 /* Volume means by cell: stress (n_sigma each), von Mises stress, accumulated inelastic strain, temperature; NULL
-   outputs are skipped. */
+   outputs are skipped. Fields in files are by cell, while states are by point. */
 PetscErrorCode HycoFEStateFields(HycoFE fe, HycoFEState state, PetscReal sigma[], PetscReal mises[],
                                  PetscReal inelastic[], PetscReal temperature[])
 {
@@ -689,6 +705,7 @@ PetscErrorCode HycoFEStateVariable(HycoFE fe, HycoFEState state, const char name
       PetscBool same;
 
       PetscCall(PetscStrcmp(law->state_name[k], name, &same));
+      /* -1: the law of this body has no such variable. */
       if (same) which = k;
     }
     for (PetscInt q = 0; q < el->nq && which >= 0; q++) {

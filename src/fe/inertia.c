@@ -2,7 +2,8 @@
 #include "inertia.h"
 #include <hycovector.h>
 
-/* Entries that do not depend on the position, evaluated at the origin. */
+/* Entries that do not depend on the position, evaluated at the origin. For gravity and axes: each is one vector for all
+   bodies. */
 static PetscErrorCode Vector(HycoFE fe, HycoExpr const e[3], PetscReal v[3])
 {
   const PetscReal nowhere[3] = {0, 0, 0};
@@ -32,6 +33,7 @@ static PetscErrorCode SetAxis(HycoFE fe, const HycoMotion *m, HycoAcceleration *
   }
   PetscCall(Vector(fe, m->axis, a->axis));
   PetscCall(Vector(fe, m->through, a->through));
+  /* Perpendicular to the plane, or the axis of revolution. */
   if (fe->dim < 3) a->axis[fe->formulation == HYCO_AXISYMMETRIC ? 1 : 2] = 1;
   length = HycoLength(a->axis);
   HycoCheck(length > 0, "rotation has no axis; write rotation: {axis: {z: 1}} or another direction");

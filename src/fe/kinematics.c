@@ -87,6 +87,7 @@ PetscErrorCode HycoGradients(HycoFE fe, const HycoElement *el, PetscInt cell, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Without gradients, which many uses do not need, and kept by cell until nodes move. */
 PetscErrorCode HycoPointWeights(HycoFE fe, const HycoElement *el, PetscInt cell, const PetscReal *weight[])
 {
   const PetscInt *node = fe->mesh->cells + cell * fe->mesh->nv;
@@ -98,6 +99,7 @@ PetscErrorCode HycoPointWeights(HycoFE fe, const HycoElement *el, PetscInt cell,
     PetscCall(PetscCalloc1(fe->mesh->n_cells, &fe->weighed_at));
   }
   *weight = w = fe->weight + cell * el->nq;
+  /* place counts positions: it rises when nodes move. */
   if (fe->weighed_at[cell] == fe->place) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt q = 0; q < el->nq; q++) {
     w[q] = PetscAbsReal(HycoDeterminant(el, node, fe->X, q)) * el->w[q];
@@ -108,7 +110,8 @@ PetscErrorCode HycoPointWeights(HycoFE fe, const HycoElement *el, PetscInt cell,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Mean gradients of the cells of bodies with bbar, from the stored gradients. */
+/* Mean gradients of the cells of bodies with bbar, from the stored gradients. kept_mean is NULL while it is filled, so
+   that HycoMeanGradients() computes. */
 static PetscErrorCode KeepMeans(HycoFE fe, const HycoElement *el)
 {
   PetscReal *mean = fe->kept_mean;
@@ -116,6 +119,7 @@ static PetscErrorCode KeepMeans(HycoFE fe, const HycoElement *el)
 
   PetscFunctionBegin;
   for (PetscInt b = 0; b < fe->scene->n_bodies; b++) any = (PetscBool)(any || fe->bbar[b]);
+  /* Scenes without bbar store nothing. */
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
   if (!mean) PetscCall(PetscCalloc1((size_t)fe->mesh->n_cells * (size_t)(3 * el->nv), &mean));
   fe->kept_mean = NULL; /* computed below */
@@ -172,7 +176,8 @@ PetscErrorCode HycoMeshCheckCells(HycoMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Mean dilatation of the cell: mean[a][c] = 1/V integral of d(tr eps)/du_ac, the bbar element's volumetric row. */
+/* Mean dilatation of the cell: mean[a][c] = 1/V integral of d(tr eps)/du_ac, the bbar element's volumetric row. Hughes
+   1980: the volumetric strain is the same at all points, so that it cannot lock. */
 PetscErrorCode HycoMeanGradients(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal mean[HYCO_CELL_NODES][3])
 {
   const PetscInt dim = el->dim;
@@ -213,6 +218,7 @@ PetscErrorCode HycoFacetDirection(HycoFE fe, const HycoElement *el, PetscInt fac
     PetscReal middle;
 
     PetscCheck(cell >= 0, PETSC_COMM_SELF, PETSC_ERR_PLIB, "a point facet without its cell");
+    /* The outward side is away from the other end of the cell. */
     middle = (fe->X[3 * m->cells[2 * cell]] + fe->X[3 * m->cells[2 * cell + 1]]) / 2;
     n[0] = fe->X[3 * node[0]] > middle ? 1 : -1;
     n[1] = n[2] = 0;
@@ -227,12 +233,13 @@ PetscErrorCode HycoFacetDirection(HycoFE fe, const HycoElement *el, PetscInt fac
   for (PetscInt c = 0; c < 3; c++) {
     const PetscInt d = (c + 1) % 3, e = (c + 2) % 3;
 
+    /* In 2D the second tangent is the unit vector out of the plane. */
     n[c] = side * el->w[q] * (t[0][d] * t[1][e] - t[0][e] * t[1][d]);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same with the circumference 2 pi r. */
+/* The same with the circumference 2 pi r. n dS times the weight of the quadrature point. */
 PetscErrorCode HycoFacetNormal(HycoFE fe, const HycoElement *el, PetscInt facet, PetscInt q, PetscReal n[3])
 {
   const PetscInt *node = fe->mesh->facets + facet * fe->mesh->nf;
@@ -293,6 +300,7 @@ void HycoPointForce(HycoFE fe, const HycoElement *el, PetscReal g[HYCO_CELL_NODE
 
   for (PetscInt a = 0; a < el->nv; a++) {
     for (PetscInt c = 0; c < fe->dim; c++) {
+      /* The mean's dilatation in place of the point's. */
       PetscReal sum = mean ? pressure * (mean[a][c] - HycoDilatation(fe, g, a, c)) : 0;
 
       for (PetscInt d = 0; d < fe->dim; d++) sum += g[a][d] * s[at[c][d]];

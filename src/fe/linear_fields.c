@@ -37,10 +37,12 @@ static inline void Strain2(PetscInt nv, const PetscReal g[], const PetscReal v[]
   }
   strain[0] = xx;
   strain[1] = yy;
+  /* Plane strain; other formulations are not served here. */
   strain[2] = 0;
   strain[3] = xy + yx;
 }
 
+/* Engineering shear strains, in the order xx yy zz xy yz xz. */
 static inline void Strain3(PetscInt nv, const PetscReal g[], const PetscReal v[], PetscReal strain[6])
 {
   PetscReal h[3][3] = {{0}};
@@ -70,11 +72,13 @@ static inline void AddPoint(PetscInt ns, PetscReal w, const PetscReal C[], Petsc
   for (PetscInt c = 0; c < 3; c++) square += (stress[c] - mean) * (stress[c] - mean);
   for (PetscInt c = 3; c < ns; c++) square += 2 * stress[c] * stress[c];
   for (PetscInt c = 0; c < ns; c++) s->stress[c] += w * stress[c];
+  /* The mean of the equivalent stresses, not that of the mean stress. */
   s->mises += w * PetscSqrtReal(1.5 * square);
   s->stored += w * stored / 2;
   s->volume += w;
 }
 
+/* All sums of a cell in one loop over its points. */
 static inline void AddCell(PetscInt dim, HycoFE fe, const HycoElement *el, PetscInt e, const PetscReal v[], Sums *sums)
 {
   Sums s = {.volume = 0};
@@ -93,6 +97,7 @@ static inline void AddCell(PetscInt dim, HycoFE fe, const HycoElement *el, Petsc
   *sums = s;
 }
 
+/* *served false: another law, bbar or an axisymmetric scene; the caller takes the general way. */
 PetscErrorCode HycoFELinearFields(HycoFE fe, const PetscReal u[], PetscReal sigma[], PetscReal mises[],
                                   PetscReal *stored, PetscBool *served)
 {
@@ -112,6 +117,7 @@ PetscErrorCode HycoFELinearFields(HycoFE fe, const PetscReal u[], PetscReal sigm
     for (PetscInt a = 0; a < el->nv; a++) {
       for (PetscInt c = 0; c < dim; c++) v[a * dim + c] = u[node[a] * dim + c];
     }
+    /* A constant dimension, so that the compiler unrolls the loops. */
     if (dim == 2)
       AddCell(2, fe, el, e, v, &s);
     else

@@ -31,7 +31,7 @@ static PetscBool IsLinear(HycoFE fe, PetscInt cell)
 }
 
 /* The nodes of the linear cells around node i, ascending, in list; returns their number. Insertion keeps the list
-   sorted; a node has at most some tens of neighbours. */
+   sorted; a node has at most some tens of neighbours. The columns of a row of blocks. */
 static PetscInt Neighbours(HycoFE fe, PetscInt n, const PetscInt around[], PetscInt list[])
 {
   const PetscInt nv = fe->mesh->nv;
@@ -70,6 +70,7 @@ static PetscErrorCode ListRows(HycoLinearForce f, const PetscBool nodes[])
 
     f->row[i] = -1;
     if (!n) continue;
+    /* Grows by doubling: neighbours are not counted before. */
     if (at + n > room) {
       room = 2 * room + n + 1000;
       PetscCall(PetscRealloc((size_t)room * sizeof(PetscInt), &f->column));
@@ -83,7 +84,8 @@ static PetscErrorCode ListRows(HycoLinearForce f, const PetscBool nodes[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* For the rows of nodes[] (NULL: all nodes). Only linear bodies enter; others are integrated at each step. */
+/* For the rows of nodes[] (NULL: all nodes). Only linear bodies enter; others are integrated at each step. Internal
+   forces of linear bodies as a product with a matrix: along a path it is the same at each step. */
 PetscErrorCode HycoLinearForceCreate(HycoFE fe, const PetscBool nodes[], HycoLinearForce *force)
 {
   HycoMesh m = fe->mesh;
@@ -98,6 +100,7 @@ PetscErrorCode HycoLinearForceCreate(HycoFE fe, const PetscBool nodes[], HycoLin
     PetscBool wanted = (PetscBool)!nodes;
 
     for (PetscInt a = 0; a < m->nv && !wanted; a++) wanted = nodes[m->cells[e * m->nv + a]];
+    /* A cell enters if any of its nodes has a wanted row. */
     if (wanted && IsLinear(fe, e)) f->cell[f->n_cells++] = e;
   }
   PetscCall(ListRows(f, nodes));
@@ -150,6 +153,7 @@ static PetscErrorCode SetHeat(HycoLinearForce f)
     if (!fe->scene->body[fe->mesh->cell_body[f->cell[k]]].expansion) continue;
     PetscCall(HycoCellHeat(fe, f->cell[k], push));
     for (PetscInt r = 0; r < nv * dim; r++) {
+      /* Rows that nobody tests are not kept. */
       if (f->row[node[r / dim]] >= 0) f->heat[f->row[node[r / dim]] * dim + r % dim] += push[r];
     }
   }
@@ -177,6 +181,7 @@ void HycoLinearForceAdd(HycoLinearForce f, const PetscReal u[], PetscReal f_int[
       const PetscReal *block = f->K + j * dim * dim, *own = u + f->column[j] * dim;
 
       for (PetscInt c = 0; c < dim; c++) {
+        /* Blocks by node: one index for dim^2 numbers. */
         for (PetscInt d = 0; d < dim; d++) sum[c] += block[c * dim + d] * own[d];
       }
     }

@@ -16,7 +16,8 @@ static PetscInt Sign(HycoMesh m, const HycoElement *el, PetscInt cell, const Pet
   return (volume > 0) - (volume < 0);
 }
 
-/* Signs of the cells as drawn, with which those of the moved cells are compared. */
+/* Signs of the cells as drawn, with which those of the moved cells are compared. A map may mirror a body: normals of
+   its facets must then be turned. */
 PetscErrorCode HycoMirrorCreate(HycoFE fe)
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
@@ -88,7 +89,8 @@ static PetscErrorCode CellsTurn(HycoFE fe, PetscInt turn[], PetscInt first[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Bodies that share nodes must have the same sign, because a facet may have nodes of both. */
+/* Bodies that share nodes must have the same sign, because a facet may have nodes of both. Otherwise the outward side
+   of such a facet would be undefined. */
 static PetscErrorCode CheckPieces(HycoFE fe)
 {
   HycoMesh m = fe->mesh;
@@ -143,6 +145,7 @@ PetscErrorCode HycoFEAgreeOnMirrors(MPI_Comm comm, HycoFE fe)
     HycoCheck(!seen[2 * b] || !seen[2 * b + 1],
               "body %s: its map inverts some cells and not others; a map may mirror a whole body, but not fold it",
               fe->scene->body[b].name);
+    /* Also on ranks without a cell of the body, which may have its facets. */
     fe->mirrored[b] = seen[2 * b + 1];
   }
   PetscCall(PetscFree(seen));

@@ -157,7 +157,8 @@ void HycoFEGeneralise(HycoFE fe, PetscReal f[])
   }
 }
 
-/* The displacements of eliminated components: offset + a.u, then ties, whose masters must be complete. */
+/* The displacements of eliminated components: offset + a.u, then ties, whose masters must be complete. Ties last:
+   masters of tied nodes may have oblique supports. */
 void HycoFEComplete(HycoFE fe, PetscReal u[])
 {
   for (PetscInt k = 0; k < fe->n_oblique; k++) {

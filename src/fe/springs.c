@@ -26,7 +26,8 @@ static PetscBool AtPoints(HycoMesh m, PetscInt group)
 }
 
 /* Visits each facet and each point with a spring, in the order of the scene's springs; cell: the cell to which it
-   belongs. A point is visited on the process that owns it. */
+   belongs. A point is visited on the process that owns it. around: a cell of each node, which gets the stiffness of a
+   spring at the point. */
 static PetscErrorCode ForEach(HycoFE fe, const PetscInt around[],
                               PetscErrorCode (*visit)(HycoFE, PetscInt spring, PetscInt cell, PetscInt facet,
                                                       PetscInt node, void *),
@@ -158,7 +159,8 @@ static PetscErrorCode PointMatrix(HycoFE fe, const HycoSpring *spring, PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Normal and area at each Gauss point: n n^T dS = (n dS)(n dS)^T / dS. */
+/* Normal and area at each Gauss point: n n^T dS = (n dS)(n dS)^T / dS. By the consistent matrix, which couples the
+   nodes of a facet, and not by lumped springs. */
 static PetscErrorCode FacetMatrix(HycoFE fe, const HycoSpring *spring, PetscInt facet, PetscReal K[])
 {
   HycoMesh m = fe->mesh;
@@ -179,6 +181,7 @@ static PetscErrorCode FacetMatrix(HycoFE fe, const HycoSpring *spring, PetscInt 
     for (PetscInt r = 0; r < n; r++) {
       for (PetscInt t = 0; t < n; t++) {
         const PetscInt c = r % m->dim, d = t % m->dim;
+        /* The part along the normal needs both directions at the point: it is integrated, not averaged. */
         const PetscReal along = k[3] != 0 ? k[3] * normal[c] * normal[d] / area : 0;
 
         K[r * n + t] += el->N[q][r / m->dim] * el->N[q][t / m->dim] * (along + (c == d ? area * k[c] : 0));
@@ -188,7 +191,8 @@ static PetscErrorCode FacetMatrix(HycoFE fe, const HycoSpring *spring, PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Evaluated when the nodes move or a stiffness changes. */
+/* Evaluated when the nodes move or a stiffness changes. Springs are part of K, assembled with the matrices of their
+   cells. */
 PetscErrorCode HycoSpringsSet(HycoFE fe)
 {
   HycoSprings s = fe->springs;
@@ -269,6 +273,7 @@ static PetscReal Pull(HycoFE fe, PetscInt k, const PetscReal u[], PetscReal forc
   for (PetscInt r = 0; r < n; r++) {
     force[r] = 0;
     for (PetscInt t = 0; t < n; t++) force[r] -= K[r * n + t] * u[node[t / fe->dim] * fe->dim + t % fe->dim];
+    /* force is -K u. */
     energy -= force[r] * u[node[r / fe->dim] * fe->dim + r % fe->dim] / 2;
   }
   return energy;

@@ -27,6 +27,7 @@ static void AddMaterial(PetscInt nv, PetscInt dim, const PetscReal lame[2], cons
   const PetscInt n = nv * dim;
 
   for (PetscInt a = 0; a < nv; a++) {
+    /* Upper blocks: the element matrix is symmetric. */
     for (PetscInt b = a; b < nv; b++) {
       const PetscReal *p = P + a * dim * n + b * dim;
       PetscReal *block = Ke + a * dim * n + b * dim, trace = 0;
@@ -114,6 +115,7 @@ static void StrainRows(HycoFE fe, const HycoElement *el, PetscReal g[HYCO_CELL_N
 static PetscErrorCode AddGeneral(HycoFE fe, const HycoElement *el, PetscInt cell, PetscReal Ke[])
 {
   const PetscInt ns = fe->n_sigma, n = el->nv * fe->dim;
+  /* The same replacement of the dilatation as in forces and stresses. */
   const PetscBool bbar = fe->bbar[fe->mesh->cell_body[cell]];
   PetscReal mean[HYCO_CELL_NODES][3];
 
@@ -248,6 +250,7 @@ static PetscErrorCode CountNeighbours(HycoMesh m, PetscInt n_owned, PetscInt fir
   for (PetscInt i = 0; i < m->n_nodes; i++) {
     const PetscInt row = Global(m, i) - first;
 
+    /* Rows of other ranks are counted there. */
     if (row < 0 || row >= n_owned) continue;
     on[row] = 1; /* the diagonal, also for a node without cells */
     seen[i] = i;
@@ -328,6 +331,7 @@ static PetscErrorCode AddStiffness(HycoFE fe, Mat K)
   PetscFunctionBegin;
   PetscCall(HycoAssemblyMapAssemble(fe, K, &done));
   if (done) PetscFunctionReturn(PETSC_SUCCESS);
+  /* The pattern of the first assembly stays. */
   PetscCall(MatZeroEntries(K));
   for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
     PetscCall(HycoFEElementRoom(fe, e, &Ke));

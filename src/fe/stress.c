@@ -27,6 +27,7 @@ static PetscErrorCode AtPoint(HycoFE fe, const HycoElement *el, PetscInt cell, P
   PetscFunctionBegin;
   PetscCall(HycoGradients(fe, el, cell, q, g, w));
   HycoPointStrain(fe, el, cell, u, g, mean->used ? mean->g : NULL, e);
+  /* Only normal components: thermal strain has no shear. */
   for (PetscInt k = 0; k < 3 && fe->thermal; k++) e[k] -= fe->thermal[cell * el->nq + q];
   for (PetscInt k = 0; k < 6; k++) s[k] = 0;
   HycoTangentApply(HycoFEIsIsotropic(fe, cell), fe->dim, fe->tangent + fe->tangent_start[cell] + q * size, e, s);
@@ -87,6 +88,7 @@ static PetscErrorCode KeepMean(HycoFE fe, const HycoElement *el, PetscInt cell, 
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < 3 * el->nv; k++) same = (PetscBool)(same && X[k] == fe->X[3 * node[k / 3] + k % 3]);
+  /* Bit for bit: a body that does not move keeps its gradients. */
   if (same) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscArrayzero(g, 3 * el->nv));
   X[0] = NAN; /* not kept after an error */
@@ -117,7 +119,9 @@ PetscErrorCode HycoFEStressKept(HycoFE fe, const PetscBool in[], const PetscReal
   for (PetscInt cell = 0; cell < n; cell++) {
     PetscReal *own = *kept + (size_t)cell * (size_t)(2 * size), *of = sigma + cell * fe->n_sigma, e[6], s[6] = {0};
 
+    /* Cells that no output reads stay 0. */
     if (in && !in[cell]) continue;
+    /* Moduli or temperature vary within the cell: the mean stress is not that of the mean strain. */
     if (!IsUniform(fe, el, cell)) {
       PetscCall(AddMean(fe, el, cell, u, of));
       continue;
@@ -181,6 +185,7 @@ PetscErrorCode HycoFEHeatWork(HycoFE fe, const PetscReal u[], PetscReal work[])
     const PetscInt size = fe->tangent_size[fe->mesh->cell_body[cell]];
     Mean mean;
 
+    /* Bodies without expansion contribute nothing. */
     if (!fe->scene->body[fe->mesh->cell_body[cell]].expansion) continue;
     PetscCall(GetMean(fe, el, cell, &mean));
     for (PetscInt q = 0; q < el->nq; q++) {

@@ -395,6 +395,7 @@ static PetscErrorCode AddSpring(HycoFE fe, PetscInt spring, PetscInt n, const Pe
 
     for (PetscInt c = 0; c < 3; c++) x[c] = (fe->X[3 * node[r / fe->dim] + c] - p->centre[c]) / p->size;
     n_rigid = RigidRow(fe->dim, x, r % fe->dim, row[r]);
+    /* The largest diagonal entry: K over it is free of units. */
     most = PetscMax(most, K[r * size + r]);
   }
   for (PetscInt k = 0; k < size * size && most > 0; k++) {
@@ -457,6 +458,7 @@ PetscErrorCode HycoFEFreeMotions(MPI_Comm comm, HycoFE fe, HycoMotions *motions)
   PetscCall(PetscMemzero(motions, sizeof(*motions)));
   PetscCall(PetscMalloc1(m->n_nodes, &part));
   motions->part = part;
+  /* Connected parts of the mesh: each may move by itself. */
   PetscCall(FindParts(comm, m, part, &n_parts));
   PetscCall(PetscCalloc1(n_parts, &parts));
   PetscCall(PlaceParts(comm, fe, part, n_parts, parts));

@@ -17,6 +17,7 @@ PetscErrorCode HycoTangentsCreate(HycoFE fe)
   for (PetscInt b = 0; b < fe->scene->n_bodies; b++)
     fe->tangent_size[b] = HycoMaterialTangentSize(fe->scene->body[b].law, fe->dim);
   for (PetscInt e = 0; e < m->n_cells; e++) {
+    /* Cells of different laws have tangents of different size. */
     fe->tangent_start[e] = n;
     n += el->nq * fe->tangent_size[m->cell_body[e]];
   }
@@ -42,6 +43,7 @@ static PetscErrorCode Update(HycoFE fe, Batch *b)
   if (!b->n) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt k = 0; k < b->n * el->nq; k++) {
     HycoPointPlace(fe, el, b->cell[k / el->nq], k % el->nq, b->x + 3 * k);
+    /* Bodies without a temperature pass none: their laws do not read it. */
     if (hot) b->temperature[k] = fe->temperature[b->cell[k / el->nq] * el->nq + k % el->nq];
   }
   PetscCall(HycoMaterialTangents(fe->scene->body[body].law, fe->dim, fe->mu, b->n * el->nq, b->x,
@@ -82,6 +84,7 @@ PetscErrorCode HycoFESetTangents(HycoFE fe, PetscBool all, PetscBool moved, cons
   for (PetscInt k = 0; k < fe->scene->n_bodies; k++) {
     const HycoMaterial law = fe->scene->body[k].law;
 
+    /* A flowing law's tangent at rest may have been overwritten by a step. */
     same[k] = (PetscBool)(changed && law->linear && !HycoMaterialChanges(law, changed) &&
                           !(moved && HycoMaterialInSpace(law)));
   }

@@ -68,6 +68,7 @@ PetscErrorCode HycoTiedFix(HycoFE fe)
                 "exchange slave and master, or remove the node from the support",
                 (int)m->node_id[m->tied[k]], tie->name, tie->slave, "xyz"[c]);
       fe->fixed[dof] = PETSC_TRUE;
+      /* The unknown is the difference from the masters, not the displacement. */
       fe->u0[dof] = 0;
     }
   }

@@ -65,7 +65,8 @@ static PetscErrorCode NameLifted(HycoFOM f, Vec L, char name[HYCO_LINE])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* gram (p x p): of the rows of B with a force, times the motions v; *size: the largest square of a B v with all rows. */
+/* gram (p x p): of the rows of B with a force, times the motions v; *size: the largest square of a B v with all rows.
+   Motions that these rows resist are held by contact; the others could go on for ever. */
 static PetscErrorCode HeldBy(HycoFOM f, PetscInt p, const Vec v[], PetscReal gram[], PetscReal *size)
 {
   const PetscScalar *force;
@@ -130,8 +131,9 @@ PetscErrorCode HycoFOMNameLoose(HycoFOM f, char name[HYCO_LINE])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Turns a converged reason into a divergence if displacements or the energy defect are too large, and writes why
-   (one line; "" for an accepted solution). *relative: the largest displacement over the mesh's extent. Collective. */
+/* Turns a converged reason into a divergence if displacements or the energy defect are too large, and writes why (one
+   line; "" for an accepted solution). *relative: the largest displacement over the mesh's extent. Collective. A solver
+   may converge to something that no linear theory allows, of a nearly singular K. */
 PetscErrorCode HycoFOMJudge(HycoFOM f, const PetscReal u[], Vec L, PetscReal energy_defect, HycoReason *reason,
                             PetscReal *relative, char why[HYCO_LINE])
 {

@@ -115,6 +115,7 @@ static PetscErrorCode Identify(HycoFOM f, char text[HYCO_LINE])
 
   PetscFunctionBegin;
   PetscCall(HycoSceneFingerprint(scene, &hash));
+  /* Bit for bit: a resumed path must be the same path. */
   hash = HycoHash(hash, f->path->mu, (size_t)scene->n_parameters * sizeof(PetscReal));
   for (PetscInt k = 0; k < scene->n_entries; k++) { /* the stored steps contain the outputs */
     if (strncasecmp(scene->key[k], "output_", 7)) continue;
@@ -139,6 +140,7 @@ static PetscErrorCode MoveNodes(HycoFOM f, PetscBool out, PetscReal value[])
     for (PetscInt i = 0; i < f->part->n_nodes; i++) {
       const PetscInt row = HycoMeshOwned(f->part, i);
 
+      /* Owned nodes: ghosts follow from them after a resume. */
       for (PetscInt c = 0; row >= 0 && c < dim; c++) {
         PetscReal *at = value + i * cols + j * dim + c;
 
@@ -160,6 +162,7 @@ static PetscErrorCode MoveState(HycoFOM f, PetscBool out, PetscInt cols, PetscRe
   PetscReal *state;
 
   PetscFunctionBegin;
+  /* Borrowed: the state is filled in place. */
   PetscCall(HycoFEStateGet(f->path->begin, &start, &state));
   for (PetscInt e = 0; e < f->part->n_cells; e++) {
     const PetscInt n = start[e + 1] - start[e];
@@ -183,6 +186,7 @@ static void MoveHead(HycoPath p, PetscBool out, PetscReal head[])
   if (out) {
     head[0] = p->t;
     head[1] = p->dt;
+    /* Exact: numbers of steps are below 2^53. */
     head[2] = (PetscReal)p->step;
     head[3] = (PetscReal)p->n_steps;
     memcpy(head + 4, work, n_work * sizeof(PetscReal));
@@ -212,13 +216,14 @@ static PetscErrorCode WriteContent(HycoFOM f, HycoH5 h, const Content *c, const 
   PetscCall(HycoH5WriteInt(h, "checkpoint/format", 1, 1, &format));
   PetscCall(HycoH5WriteText(h, "checkpoint/key", key));
   PetscCall(HycoH5WriteReal(h, "head", N_HEAD, 1, c->head));
+  /* One row more than listed times: the sums since the last one. */
   PetscCall(HycoH5WriteReal(h, "steps", c->n_steps + 1, STEP_COLS(f), c->steps));
   if (c->n_orders) PetscCall(HycoH5WriteReal(h, "orders", c->n_orders, 1, c->orders));
   PetscCall(HycoH5WriteReal(h, "taken", c->n_taken, 1, c->taken));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Writes nodes and cells, each rank its rows. */
+/* Writes nodes and cells, each rank its rows. In the file's order, so that another number of ranks can resume. */
 static PetscErrorCode WriteItems(HycoFOM f, HycoH5 h)
 {
   HycoMesh m = f->part;
@@ -228,6 +233,7 @@ static PetscErrorCode WriteItems(HycoFOM f, HycoH5 h)
 
   PetscFunctionBegin;
   PetscCall(HycoFOMGetRows(f, &rows));
+  /* The widest state of all ranks, so that rows have one length. */
   PetscCall(StateCols(f, &cols));
   PetscCall(PetscCalloc2(m->n_nodes * NODE_COLS(f), &node, m->n_cells * cols, &cell));
   PetscCall(MoveNodes(f, PETSC_TRUE, node));
@@ -313,6 +319,7 @@ PetscErrorCode HycoPathSave(HycoFOM f)
 
   PetscFunctionBegin;
   if (!p->checkpoint[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Collective: the fingerprint reads the mesh's numbers of all ranks. */
   PetscCall(Identify(f, key));
   PetscCall(PetscMalloc1(N_HEAD, &c.head));
   MoveHead(p, PETSC_TRUE, c.head);
@@ -323,6 +330,7 @@ PetscErrorCode HycoPathSave(HycoFOM f)
   HycoDuplicate(p->n_taken, p->taken, &c.taken);
   PetscCall(HycoH5CreateShared(HycoComm(f), p->checkpoint, &h));
   ierr = WriteAll(f, h, &c, key);
+  /* Also after an error, without which the other ranks would wait. */
   failed = HycoH5Close(&h, (PetscBool)!ierr);
   PetscCall(FreeContent(&c));
   PetscCall(ierr ? ierr : failed);
@@ -347,7 +355,8 @@ static PetscErrorCode LoadSteps(HycoFOM f, HycoH5 h, PetscInt *rows, PetscReal *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Checks format, key and sizes before the path is changed. Rank 0. */
+/* Checks format, key and sizes before the path is changed. Rank 0. All of it into memory first: a damaged file leaves
+   the path at its begin. */
 static PetscErrorCode ReadOpened(HycoFOM f, HycoH5 h, const char key[], Content *c)
 {
   char *text = NULL;
@@ -388,7 +397,7 @@ static PetscErrorCode ReadOpened(HycoFOM f, HycoH5 h, const char key[], Content 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The file is closed on an error too. */
+/* The file is closed on an error too. On rank 0; nodes and cells are read by each rank later, by ReadRows(). */
 static PetscErrorCode ReadContent(HycoFOM f, const char key[], Content *c)
 {
   HycoH5 h;
@@ -424,6 +433,7 @@ static PetscErrorCode SpreadContent(HycoFOM f, Content *c)
   c->n_taken = size[3];
   PetscCall(Spread(f, N_HEAD, &c->head));
   PetscCall(Spread(f, (c->n_steps + 1) * STEP_COLS(f), &c->steps));
+  /* Empty arrays are not in the file. */
   if (c->n_orders) PetscCall(Spread(f, c->n_orders, &c->orders));
   if (c->n_taken) PetscCall(Spread(f, c->n_taken, &c->taken));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -449,6 +459,7 @@ static PetscErrorCode ReadItems(HycoFOM f, const char name[], HycoPlace place, P
 
   PetscFunctionBegin;
   PetscCall(HycoFOMGetRows(f, &order));
+  /* One rank: rows are the mesh's own order. */
   if (!order) {
     PetscCall(ReadRows(f, name, 0, place == HYCO_ON_CELLS ? f->n_cells : f->n_nodes, cols, value));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -494,7 +505,8 @@ static PetscErrorCode TakeContent(HycoFOM f, const Content *c)
 }
 
 /* Continues from the checkpoint, or leaves the path at its begin if there is no file. K, B, D are assembled at the
-   resumed time; fields of earlier times come from the separate files. Collective. */
+   resumed time; fields of earlier times come from the separate files. Collective. Then the path is where the run before
+   was after its last accepted step, to the last bit. */
 PetscErrorCode HycoPathLoad(HycoFOM f)
 {
   HycoPath p = f->path;

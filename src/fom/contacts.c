@@ -60,7 +60,8 @@ static PetscErrorCode AddSlaves(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fetches the facets around the needed nodes. */
+/* Fetches the facets around the needed nodes. Only around slaves of this rank, which has all masters that they may
+   meet: the search is then local. */
 static PetscErrorCode FetchSurface(HycoFOM f, HycoMesh *surface)
 {
   PetscBool *in;
@@ -102,7 +103,9 @@ static PetscErrorCode PackContacts(HycoMesh m, const HycoPairs *p, PetscInt *n, 
 
       s->contact = p->contact[k];
       s->slave = m->node_global[p->slave[k]];
+      /* The number of the contact in the order of one rank. */
       s->number = p->number ? p->number[k] : k;
+      /* A mortar row has more masters than a facet: it travels in several pieces of one size. */
       s->more = i > 0;
       s->n = PetscMin(p->master_start[k + 1] - lo, HYCO_FACET_NODES);
       for (PetscInt j = 0; j < s->n; j++) {
@@ -119,7 +122,7 @@ typedef struct {
   PetscInt n, *global, *node;
 } Places;
 
-/* Local nodes sorted by their global numbers, for binary search. */
+/* Local nodes sorted by their global numbers, for binary search. A table by global number would have the length of the whole mesh on each rank. */
 static PetscErrorCode PlacesCreate(HycoMesh m, Places *p)
 {
   PetscFunctionBegin;
@@ -154,6 +157,7 @@ static PetscErrorCode UnpackContacts(HycoMesh m, PetscInt n, const Sent sent[], 
     PetscInt master[HYCO_FACET_NODES];
 
     for (PetscInt j = 0; j < sent[k].n; j++) master[j] = PlaceOf(&places, sent[k].master[j]);
+    /* Append opens a new contact; this one goes on with the last. */
     if (sent[k].more) p->n--; /* to the masters of the contact before */
     HycoPairsAppend(p, sent[k].contact, PlaceOf(&places, sent[k].slave), sent[k].n, master, sent[k].weight);
   }
@@ -195,8 +199,9 @@ static PetscErrorCode PlaceGathered(HycoFOM f, HycoMesh mesh, PetscInt n, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All contacts on rank 0, in the order of one rank, with their surfaces: for errors and for results that need an
-   order. The caller destroys both. Collective. */
+/* All contacts on rank 0, in the order of one rank, with their surfaces: for errors and for results that need an order.
+   The caller destroys both. Collective. Contacts are packed with their nodes' global numbers, which mean the same on
+   every rank. */
 PetscErrorCode HycoFOMGatherContacts(HycoFOM f, HycoMesh *mesh, HycoPairs *pairs)
 {
   const HycoPairs *p = &f->pairs;
@@ -208,6 +213,7 @@ PetscErrorCode HycoFOMGatherContacts(HycoFOM f, HycoMesh *mesh, HycoPairs *pairs
   PetscCall(PetscMemzero(pairs, sizeof(*pairs)));
   PetscCall(HycoFOMGatherSurface(f, mesh));
   PetscCall(PackContacts(f->surface, p, &n_mine, &mine));
+  /* One count per contact: counts of bytes would overflow an int. */
   PetscCallMPI(MPI_Type_contiguous((PetscMPIInt)sizeof(Sent), MPI_BYTE, &type));
   PetscCallMPI(MPI_Type_commit(&type));
   PetscCall(HycoConcatenate(HycoComm(f), n_mine, mine, type, sizeof(Sent), &n, &all));
@@ -229,6 +235,7 @@ static PetscErrorCode SendContacts(HycoFOM f, HycoMesh mesh, const HycoPairs *wh
   PetscCall(PackContacts(mesh, whole, &n, &sent));
   PetscCall(PetscMalloc2(n, &slave, n, &to));
   for (PetscInt k = 0; k < n; k++) slave[k] = sent[k].slave;
+  /* To the owner of the slave: there its row of B is assembled. */
   PetscCall(HycoMeshOwners(HycoComm(f), f->part, n, slave, to));
   PetscCall(HycoSendRows(HycoComm(f), n, to, sizeof(Sent), sent, n_got, got));
   PetscCall(PetscFree2(slave, to));
@@ -245,7 +252,8 @@ static PetscErrorCode FindWhole(HycoFOM f, HycoMesh mesh, HycoPairs *whole, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The fallback: contacts found on rank 0 are sent back, and their masters' facets are fetched. */
+/* The fallback: contacts found on rank 0 are sent back, and their masters' facets are fetched. Correct for any scene,
+   but its memory and time are those of one rank. */
 static PetscErrorCode FindOnRoot(HycoFOM f, const HycoSurfaceFacts facts[])
 {
   HycoPairs whole;
@@ -290,6 +298,7 @@ static PetscErrorCode NumberContacts(HycoFOM f)
   PetscCall(PetscMalloc1(p->n, &key));
   PetscCall(PetscFree(p->number));
   PetscCall(PetscMalloc1(p->n + 1, &p->number));
+  /* 64 bits: contacts times nodes exceed an int. */
   for (PetscInt k = 0; k < p->n; k++)
     key[k] = (PetscInt64)p->contact[k] * f->part->n_whole_nodes + f->surface->node_whole[p->slave[k]];
   PetscCall(HycoRankKeys(HycoComm(f), p->n, key, p->number, &f->n_contacts));
@@ -420,12 +429,14 @@ static PetscErrorCode Renew(HycoFOM f)
   PetscCall(FetchSurface(f, &f->surface));
   PetscCall(PlacesCreate(f->surface, &places));
   PetscCall(PetscMalloc1(before->n_nodes, &index));
+  /* Old nodes in the new surface: nodes are only added. */
   for (PetscInt i = 0; i < before->n_nodes; i++) index[i] = PlaceOf(&places, before->node_global[i]);
   PetscCall(PetscFree2(places.global, places.node));
   PetscCall(HycoPairsRenumber(&f->pairs, index, &renumbered));
   PetscCall(PetscFree(index));
   PetscCall(HycoPairsDestroy(&f->pairs));
   f->pairs = renumbered;
+  /* It refers to the nodes of the former surface. */
   PetscCall(HycoFEDestroy(&f->fe_surface));
   PetscCall(HycoMeshDestroy(&before));
   PetscCall(CountPatches(f));
@@ -466,8 +477,9 @@ PetscErrorCode HycoFOMFetchMasters(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A mesh with all facets around the nodes of this rank's surfaces, its fe at the current parameters, and the places
-   of the surfaces' nodes there; the caller destroys them. Collective. */
+/* A mesh with all facets around the nodes of this rank's surfaces, its fe at the current parameters, and the places of
+   the surfaces' nodes there; the caller destroys them. Collective. Normals at the surfaces' border need facets of cells
+   that other ranks have. */
 PetscErrorCode HycoFOMWiden(HycoFOM f, HycoMesh *mesh, HycoFE *fe, PetscInt **index)
 {
   HycoMesh m = f->surface;

@@ -26,9 +26,11 @@ void HycoDifferenceSet(HycoScene scene, const PetscReal mu[], PetscInt p, PetscR
   PetscReal h = share * (width > 0 ? width : PetscMax(PetscAbsReal(mu[p]), 1));
   const PetscBool inside = (PetscBool)(mu[p] >= scene->lo[p] && mu[p] <= scene->hi[p] && width > 0);
 
+  /* So that the step taken is the step divided by. */
   h = (mu[p] + h) - mu[p]; /* representable */
   *d = (HycoDifference){.parameter = p, .step = {0, h, -h}, .weight = {0, 0.5 / h, -0.5 / h}, .sign = 1};
   if (!inside || (mu[p] - h >= scene->lo[p] && mu[p] + h <= scene->hi[p])) return;
+  /* At the upper end downwards, elsewhere upwards: one-sided values are those towards larger parameters. */
   if (mu[p] + h > scene->hi[p]) d->sign = -1;
   h *= d->sign;
   *d = (HycoDifference){.parameter = p, .step = {0, h, 2 * h}, .weight = {-1.5 / h, 2 / h, -0.5 / h}, .sign = d->sign};
@@ -153,9 +155,11 @@ static void Set(HycoGradient *g, HycoGradientStore *store, const HycoDifference 
     if (closer)
       turns = HycoDifferenceKinks(d, Jump(g, d, value, q),
                                   (const PetscReal[]){closer[q], closer[n + q], closer[2 * n + q]});
+    /* At a kink the mean of both slopes would be no derivative at all. */
     if (turns) HycoDifferenceTakeSide(&side);
     store->value[at] = 0;
     for (PetscInt k = 0; k < 3; k++) store->value[at] += side.weight[k] * value[k * n + q];
+    /* Below the noise of the difference: a derivative that is exactly 0 has round-off of any sign. */
     if (PetscAbsReal(store->value[at] * d->step[1]) <= NOISE * PetscAbsReal(value[q])) store->value[at] = 0;
     store->kink[at] = (PetscBool)(kink || turns);
   }
@@ -183,6 +187,7 @@ PetscBool HycoGradientSetSmooth(HycoGradient *g, HycoGradientStore *store, const
   return PETSC_TRUE;
 }
 
+/* A second, closer difference only where the first shows a jump: it tells a kink from curvature. */
 PetscErrorCode HycoGradientColumn(HycoGradient *g, HycoGradientStore *store, HycoScene scene, const PetscReal mu[],
                                   const HycoDifference *d, PetscBool kink, HycoGradientMeasure measure, void *context,
                                   PetscReal value[])

@@ -113,7 +113,8 @@ static PetscErrorCode ContactSums(HycoFOM f, PetscReal *gap_work, PetscReal *fix
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sum of K_ii U_i^2, to detect an energy that is a small difference. */
+/* Sum of K_ii U_i^2, to detect an energy that is a small difference. The strain energy of a nearly rigid motion is far
+   below it, and has that much fewer digits. */
 static PetscErrorCode NodalEnergy(HycoFOM f, PetscReal *sum)
 {
   Vec work;
@@ -136,10 +137,12 @@ PetscErrorCode HycoFOMEnergy(HycoFOM f, HycoSummary *s)
   PetscFunctionBegin;
   PetscCall(FreeWork(f, &free_work));
   PetscCall(CellSums(f, &mine[0], &lifting));
+  /* Gaps at the current parameters: they may fail where the search fails. */
   HycoOnEach(HycoComm(f), ContactSums(f, &mine[2], &mine[3]));
   mine[1] = free_work + lifting;
   PetscCallMPI(MPI_Allreduce(mine, all, 4, MPIU_REAL, MPI_SUM, HycoComm(f)));
   s->strain_energy = all[0];
+  /* Loads on free unknowns, supports by the lifting, and moving obstacles. */
   s->external_work = all[1] + all[3];
   s->gap_work = all[2];
   largest = PetscMax(PetscMax(2 * s->strain_energy, PetscAbsReal(s->external_work)), PetscAbsReal(s->gap_work));

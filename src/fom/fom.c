@@ -73,8 +73,10 @@ static PetscErrorCode ReadMesh(HycoFOM f)
   PetscCall(HycoMeshLoad(HycoComm(f), f->scene, &f->dm));
   PetscCall(Distribute(f));
   PetscCall(HycoPlexToMesh(f->dm, f->scene, &f->part));
+  /* A part knows its own nodes; the mesh has its number as a fact. */
   f->n_nodes = f->size == 1 ? f->part->n_nodes : f->part->n_whole_nodes;
   f->n_cells = f->size == 1 ? f->part->n_cells : f->part->n_whole_cells;
+  /* On one rank the reader has checked them, before ties. */
   if (f->size > 1) HycoOnEach(HycoComm(f), HycoMeshCheckCells(f->part));
   if (f->size > 1) HycoOnEach(HycoComm(f), HycoFECreate(f->scene, f->part->dm, &f->fe));
   f->contact_cpu -= HycoCPU();
@@ -95,6 +97,7 @@ static PetscErrorCode CreateScatter(HycoFOM f)
 
   PetscFunctionBegin;
   PetscCall(VecCreateSeq(PETSC_COMM_SELF, f->part->n_nodes * dim, &f->U_local));
+  /* By node: blocks of dim, so that indices are a third as many. */
   if (f->part->node_global)
     PetscCall(ISCreateBlock(PETSC_COMM_SELF, dim, f->part->n_nodes, f->part->node_global, PETSC_COPY_VALUES, &is));
   else
@@ -173,6 +176,7 @@ static PetscErrorCode SetFromOptions(HycoFOM f)
       "-hyco_mesh_write", "<file.h5> write the mesh, with the scene's refinement, in PETSc's HDF5 format of a DMPlex",
       f->mesh_write, sizeof(f->mesh_write), NULL));
   PetscCall(HycoOptionsName("-hyco_fom_view", "print sizes, system and solver after each full-order solve"));
+  /* What follows is listed under this title by `hyco help`. */
   PetscCall(HycoOptionsFor("history"));
   if (!f->scene || f->scene->n_times > 0)
     PetscCall(ReadPath(f, PetscOptionsObject));
@@ -183,7 +187,8 @@ static PetscErrorCode SetFromOptions(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On defaults alone, without a scene; also for the declaration of options. */
+/* On defaults alone, without a scene; also for the declaration of options. Defaults of options; everything else is
+   zero. */
 static PetscErrorCode Create(MPI_Comm comm, HycoFOM *fom)
 {
   PetscFunctionBegin;
@@ -238,8 +243,8 @@ static PetscErrorCode SetUp(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads and distributes the mesh and finds the contacts; holds a reference to the scene. Collective on comm; after
-   an error *fom is NULL. */
+/* Reads and distributes the mesh and finds the contacts; holds a reference to the scene. Collective on comm; after an
+   error *fom is NULL. A set of points uses one model: mesh, pairing and patterns stay. */
 PetscErrorCode HycoFOMCreate(MPI_Comm comm, HycoScene scene, HycoFOM *fom)
 {
   PetscFunctionBegin;
@@ -262,6 +267,7 @@ PetscErrorCode HycoFOMCreateMesh(MPI_Comm comm, HycoScene scene, HycoFOM *fom)
   (*fom)->scene = scene;
   PetscCall(PetscObjectSetOptions((PetscObject)*fom, scene->options));
   ierr = SetFromOptions(*fom);
+  /* A training would write the mesh once more at each of its parts. */
   (*fom)->mesh_write[0] = '\0'; /* only for solves */
   if (!ierr) ierr = ReadMesh(*fom);
   if (!ierr && (*fom)->size > 1) ierr = HycoFOMKeepOnRoot(*fom);
@@ -313,6 +319,7 @@ static PetscErrorCode ComputeWhole(HycoFOM f, HycoMesh mesh, HycoPairs *pairs)
   PetscCall(HycoFECreate(f->scene, mesh->dm, &fe));
   PetscCall(PetscMalloc1(pairs->n, &gap));
   ierr = HycoFESetParameters(fe, f->fe->mu);
+  /* A whole-mesh decision: the surface alone cannot tell whether a map mirrors a body. */
   if (!ierr) ierr = PetscArraycpy(fe->mirrored, f->fe->mirrored, f->scene->n_bodies);
   if (!ierr) ierr = ComputeRows(fe, pairs, f->width, &r, gap, &n_still);
   PetscCall(PetscFree3(r.start, r.dof, r.value));
@@ -355,6 +362,7 @@ static PetscErrorCode AllRows(HycoFOM f, Rows *r)
   HycoCatch(ComputeRows(f->fe_surface, &f->pairs, f->width, r, f->gap, &f->summary.n_still), ierr, message);
   failed = (PetscBool)(message[0] != '\0');
   HycoAllreduce(&failed, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(f));
+  /* On rank 0 with all contacts: the first error in the order of one rank, the same line on any number. */
   if (failed) PetscCall(RaiseWhole(f));
   PetscCall(HycoErrorSync(HycoComm(f), ierr, message));
   HycoAllreduce(&f->summary.n_still, 1, MPIU_INT, MPI_SUM, HycoComm(f));
@@ -410,6 +418,8 @@ static PetscErrorCode AssembleContact(HycoFOM f, PetscBool rows_changed)
 
   PetscFunctionBegin;
   PetscCall(FindMasters(f, &wider));
+  /* A search may have found other masters: entries of the former ones would stay in the pattern and widen every
+     product. */
   if (f->n_contacts && rows_changed && (f->Bt || wider) && f->searches) { /* removes entries of former masters */
     PetscCall(MatDestroy(&f->B));
     PetscCall(CreateB(f));
@@ -433,6 +443,7 @@ static PetscErrorCode CountFree(HycoFOM f)
 
   PetscFunctionBegin;
   for (PetscInt i = 0; i < f->part->n_nodes; i++) {
+    /* Each node once. */
     for (PetscInt c = 0; HycoMeshOwned(f->part, i) >= 0 && c < f->fe->dim; c++)
       mine += !f->fe->fixed[i * f->fe->dim + c];
   }
@@ -608,7 +619,8 @@ static PetscErrorCode LargestPart(HycoFOM f, PetscInt largest[3])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The ranks' shares of the searches for masters so far, and the time of all that contacts need before a solve. */
+/* The ranks' shares of the searches for masters so far, and the time of all that contacts need before a solve. CPU and
+   not wall time: ranks wait for each other in collective calls. */
 static PetscErrorCode ViewContacts(HycoFOM f, PetscViewer viewer)
 {
   PetscInt64 most = f->pairs.queries, all = f->pairs.queries;
@@ -620,6 +632,7 @@ static PetscErrorCode ViewContacts(HycoFOM f, PetscViewer viewer)
   HycoAllreduce(&sum, 1, MPIU_REAL, MPI_SUM, HycoComm(f));
   PetscCall(PetscViewerASCIIPrintf(viewer, "contacts: %.4g s of CPU on a rank at most, %.4g s on all\n", (double)cpu,
                                    (double)sum));
+  /* Shares say something on several ranks alone. */
   if (f->size == 1) PetscFunctionReturn(PETSC_SUCCESS);
   HycoAllreduce(&most, 1, MPIU_INT64, MPI_MAX, HycoComm(f));
   HycoAllreduce(&all, 1, MPIU_INT64, MPI_SUM, HycoComm(f));
@@ -641,6 +654,7 @@ PetscErrorCode HycoFOMView(HycoFOM f, PetscViewer viewer)
   PetscCall(PetscViewerASCIIPrintf(viewer, "%d nodes, %d cells, %d contacts, on %d ranks\n", (int)f->n_nodes,
                                    (int)f->n_cells, (int)f->n_contacts, (int)f->size));
   if (f->size > 1) {
+    /* The balance of the partition: its largest part sets the time. */
     PetscCall(LargestPart(f, largest));
     PetscCall(PetscViewerASCIIPrintf(viewer, "a rank: at most %d unknowns of its own, %d of %d others\n",
                                      (int)largest[0], (int)largest[1], (int)largest[2]));

@@ -11,8 +11,9 @@ typedef struct {
   PetscReal *value, *gap;
 } Rows;
 
-/* Marks contacts whose gap is closed, and that have an unknown. The scale is of all contacts, so that round-off
-   counts equally everywhere; two passes, since it is known after the first. */
+/* Marks contacts whose gap is closed, and that have an unknown. The scale is of all contacts, so that round-off counts
+   equally everywhere; two passes, since it is known after the first. 1e-9 of it: a gap that the solver has left by
+   round-off is closed. */
 static PetscErrorCode MarkClosed(MPI_Comm comm, const Rows *r, const PetscReal u[], const PetscReal lambda[],
                                  PetscBool in[])
 {
@@ -96,6 +97,7 @@ static PetscErrorCode Peel(HycoFOM f, const Rows *r, PetscBool in[])
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(f->fe_surface->n_dof, &count));
   while (change) {
+    /* Over all ranks: a master node may occur in rows of several. */
     PetscCall(CountRows(f, r, in, count));
     change = PeelOwn(r, count, in);
     HycoAllreduce(&change, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(f));
@@ -114,6 +116,7 @@ static PetscErrorCode GatherRest(HycoFOM f, const Rows *r, const PetscBool in[],
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc3(r->m, &end, r->start[r->m], &dof, r->start[r->m], &value));
+  /* Lengths instead of starts: those of several ranks can be concatenated. */
   for (PetscInt k = 0; k < r->m; k++) {
     if (in[k]) end[m++] = r->start[k + 1] - r->start[k];
     for (PetscInt j = r->start[k]; in[k] && j < r->start[k + 1]; j++, n++) {
@@ -134,8 +137,9 @@ static PetscErrorCode GatherRest(HycoFOM f, const Rows *r, const PetscBool in[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The number of rows minus their rank; the unknowns are numbered anew, those that occur. Rank 0. By the Gram matrix
-   (n x n, dense): n is small after peeling. */
+/* The number of rows minus their rank; the unknowns are numbered anew, those that occur. Rank 0. By the Gram matrix (n
+   x n, dense): n is small after peeling. Each dependent row is a direction in which contact forces are arbitrary while
+   displacements are not. */
 static PetscErrorCode Dependent(const Rows *r, PetscInt *dependent)
 {
   const PetscInt n = r->m, n_values = r->start[n];
@@ -226,6 +230,7 @@ static PetscErrorCode TakeRest(const Rows *r, const PetscBool in[], Rows *rest)
       rest->dof[n] = r->dof[j];
       rest->value[n++] = r->value[j];
     }
+    /* After its entries: starts are those of the next row. */
     if (in[k]) rest->start[++rest->m] = n;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -248,8 +253,10 @@ PetscErrorCode HycoRowsCountDependent(PetscInt m, PetscInt start[], PetscInt dof
   for (PetscInt k = 0; k < m; k++) {
     for (PetscInt j = start[k]; in[k] && j < start[k + 1]; j++) count[dof[j]]++;
   }
+  /* Once: on one process rows leave in one sweep, and those that stay are few. */
   (void)PeelOwn(&r, count, in);
   for (PetscInt k = 0; k < m; k++) pressed = (PetscBool)(pressed || (in[k] && lambda[k] > 0));
+  /* Without a force nothing can be redistributed. */
   if (pressed) {
     PetscCall(TakeRest(&r, in, &rest));
     PetscCall(Dependent(&rest, dependent));

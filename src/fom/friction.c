@@ -99,6 +99,7 @@ PetscErrorCode HycoFrictionCreate(HycoFOM f)
   PetscCall(PetscNew(&r));
   f->friction = r;
   PetscCall(HycoSlipCreate(HycoComm(f), f->scene, &f->pairs, f->fe->dim, &r->slip));
+  /* A row for the normal and dim - 1 for the tangents of contacts with friction. */
   r->rows = r->slip.row[f->pairs.n];
   PetscCall(VecCreate(HycoComm(f), &r->L));
   PetscCall(VecSetSizes(r->L, r->rows, PETSC_DETERMINE));
@@ -107,6 +108,7 @@ PetscErrorCode HycoFrictionCreate(HycoFOM f)
   for (PetscInt j = 0; j < N_PER_ROW; j++) PetscCall(VecDuplicate(r->L, &r->other[j]));
   PetscCall(HycoSystemCreate(HycoComm(f), &r->system));
   PetscCall(HycoSolverCreate(HycoComm(f), &r->solver));
+  /* The cone of Coulomb is no set of bounds: neither active set nor TAO takes it. */
   PetscCall(HycoSolverSetType(r->solver, HYCO_SOLVER_SEMISMOOTH));
   PetscCall(PetscObjectSetOptions((PetscObject)r->solver, f->scene->options));
   PetscCall(HycoSolverSetFromOptions(r->solver));
@@ -136,6 +138,7 @@ PetscErrorCode HycoFrictionBegin(HycoFOM f)
   HycoFriction r = f->friction;
 
   PetscFunctionBegin;
+  /* The former path may have ended in a system with friction. */
   if (r->B) PetscCall(Use(f, PETSC_FALSE));
   PetscCall(VecSet(r->L, 0));
   PetscCall(VecSet(r->L_old, 0));
@@ -163,7 +166,7 @@ static PetscErrorCode ComputeRows(HycoFOM f, HycoFriction r, Rows *rows)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* B and its transpose anew. */
+/* B and its transpose anew. As many entries in a tangential row as in a normal one, hence the same room. */
 static PetscErrorCode FillB(HycoFOM f, HycoFriction r, const Rows *rows)
 {
   const PetscInt dim = f->fe->dim, entries = f->width * dim, *global = f->surface->node_global;
@@ -234,6 +237,7 @@ static PetscErrorCode Extrapolate(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* At each step: tangents turn with the surfaces of its begin. */
 PetscErrorCode HycoFrictionAssemble(HycoFOM f)
 {
   HycoFriction r = f->friction;
@@ -357,7 +361,7 @@ PetscErrorCode HycoFrictionAccept(HycoFOM f)
 }
 
 /* Sums over the contacts of all ranks: the work since the path began and the number of contacts that slip now.
-   Collective. */
+   Collective. Both sums in one reduction. */
 PetscErrorCode HycoFrictionMeasure(HycoFOM f, HycoStep *s)
 {
   HycoFriction r = f->friction;
@@ -379,7 +383,8 @@ static PetscReal *Column(const HycoShear *s, PetscInt c, PetscInt *stride)
   return c < 3 ? s->force + c : c < 6 ? s->slip + (c - 3) : c < 7 ? s->work : s->state;
 }
 
-/* Each column in the order of one rank, so that a checkpoint resumes on any number of ranks. Collective. */
+/* Each column in the order of one rank, so that a checkpoint resumes on any number of ranks. Collective. Slip and force
+   at the begin of a step are the path's memory of friction. */
 PetscErrorCode HycoFrictionSave(HycoFOM f, HycoH5 h)
 {
   PetscReal *value;
@@ -390,6 +395,7 @@ PetscErrorCode HycoFrictionSave(HycoFOM f, HycoH5 h)
   for (PetscInt c = 0; c < N_STATE && !ierr; c++) {
     char name[32];
     PetscInt stride;
+    /* Forces, slips, works and states of contacts in one list of columns. */
     const PetscReal *from = Column(&f->friction->slip.shear, c, &stride);
 
     for (PetscInt k = 0; k < f->pairs.n; k++) value[k] = from[k * stride];

@@ -47,7 +47,8 @@ static PetscErrorCode AddContacts(HycoFOM f, const PetscReal U[], const PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* R += B^T L, W = D - B U at the present parameters. Collective. */
+/* R += B^T L, W = D - B U at the present parameters. Collective. By the rows at the moved positions, not by the matrix
+   B, which belongs to the solution. */
 static PetscErrorCode ContactData(Work *o, Vec R, Vec W)
 {
   HycoFOM f = o->f;
@@ -216,13 +217,15 @@ static PetscErrorCode Column(Work *o, PetscInt p, HycoGradient *gradient)
   PetscFunctionBegin;
   HycoDifferenceSet(o->f->scene, o->mu, p, HYCO_GRADIENT_STEP, &d);
   PetscCall(Differentiate(o, &d, &turns));
+  /* kink: an undecided contact takes another state towards the two sides. */
   PetscCall(HycoSolverTangentSolve(o->tangent, o->r, o->g, d.sign, o->dU, o->dL, &kink));
   PetscCall(HycoGradientColumn(gradient, o->store, o->f->scene, o->mu, &d, (PetscBool)(turns || kink), Measure, o,
                                o->output));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Vectors, the data at the solution, and the system of its closed contacts. Collective. */
+/* Vectors, the data at the solution, and the system of its closed contacts. Collective. Copies of U and L: the model
+   moves while differences are taken. */
 static PetscErrorCode Create(Work *o)
 {
   HycoFOM f = o->f;
@@ -291,15 +294,18 @@ static PetscErrorCode Check(HycoFOM f)
 
   PetscFunctionBegin;
   PetscCall(HycoGradientCheckScene(f->scene));
+  /* Displacements recovered from given forces are no solution of the contact problem. */
   PetscCheck(f->solved && !f->given, PETSC_COMM_SELF, PETSC_ERR_ORDER,
              "call HycoFOMSolve() before HycoFOMGetGradient()");
   HycoCheck(!f->n_pins, "-hyco_regularise: a body that nothing holds has no gradient; add a support");
   if (f->path) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Derivatives of an unconverged state would be numbers without meaning. */
   PetscCall(HycoSolverGetReason(f->solver, &reason));
   HycoCheck(reason > 0, "there is no gradient: %s", HycoReasonName(reason));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A linear solve for each parameter with the factor that is there; no contact problem is solved again. */
 PetscErrorCode HycoFOMGetGradient(HycoFOM f, HycoGradient *gradient)
 {
   Work o = {.f = f};

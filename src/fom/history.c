@@ -24,6 +24,7 @@ PetscErrorCode HycoPathNew(MPI_Comm comm, HycoScene scene, HycoPath *path)
   p->bound = 1e-3;
   p->smallest = 1e-10;
   p->substeps = 1;
+  /* Without inelastic laws the stiffness is constant and one iteration solves a step. */
   for (PetscInt b = 0; scene && b < scene->n_bodies; b++)
     p->flows = (PetscBool)(p->flows || !scene->body[b].law->linear);
   *path = p;
@@ -33,6 +34,7 @@ PetscErrorCode HycoPathNew(MPI_Comm comm, HycoScene scene, HycoPath *path)
 /* Work vectors like U and Lambda, which the owner has set. Collective. */
 PetscErrorCode HycoPathSetUp(HycoPath p)
 {
+  /* In the layout of the model's unknowns: of the whole mesh, or of a reduced system. */
   Vec *likeU[] = {&p->F, &p->f_int, &p->r, &p->U_old, &p->work, &p->diagonal, &p->U_last, &p->G_last, &p->G};
   Vec *likeL[] = {&p->L_old, &p->gap_work, &p->L_last, &p->L_new};
 
@@ -109,7 +111,8 @@ PetscErrorCode HycoPathSetFromOptions(HycoPath p, HycoOptionItems PetscOptionsOb
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* To the first time with a virgin state. K must be assembled anew if a former path left a tangent in it. Collective. */
+/* To the first time with a virgin state. K must be assembled anew if a former path left a tangent in it. Collective.
+   The laws' state at the first temperature has no strain, and displacements are zero: loads begin from nothing. */
 PetscErrorCode HycoPathBegin(HycoPath p, const PetscReal mu[])
 {
   PetscReal all[HYCO_MAX_PARAMETERS];
@@ -172,6 +175,7 @@ static PetscErrorCode Accept(HycoPath p, PetscReal t1, const HycoStepAttempt *a)
   p->end = state;
   p->t = t1;
   p->now.substeps++;
+  /* Over the steps since the last listed time, whose row of the table has them. */
   p->now.residual = PetscMax(p->now.residual, a->residual);
   p->now.kkt = PetscMax(p->now.kkt, HycoKKTMax(&p->kkt));
   p->now.most_iterations = PetscMax(p->now.most_iterations, a->iterations);
@@ -179,6 +183,7 @@ static PetscErrorCode Accept(HycoPath p, PetscReal t1, const HycoStepAttempt *a)
   /* Accepted times, which a reduced path may repeat. */
   HycoGrow(p->n_taken, p->room_taken, p->taken);
   p->taken[p->n_taken++] = p->t;
+  /* Last: the op may read the accepted time and state. */
   PetscCall((*p->ops->accept)(p, a));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -194,6 +199,7 @@ static void Count(HycoPath p, const HycoStepAttempt *a)
   p->now.seconds_factor += a->seconds_factor;
   p->now.seconds_solve += a->seconds_solve;
   p->now.seconds_law += a->seconds_law;
+  /* A cut is counted once, where it happens. */
   if (a->converged) return;
   p->now.cuts++;
   p->n_cuts++;
@@ -273,6 +279,7 @@ static PetscErrorCode Start(HycoPath p, PetscBool *reached)
   HycoStepAttempt a;
 
   PetscFunctionBegin;
+  /* A step of no length: laws respond elastically, rates have no time. */
   PetscCall(HycoPathAttempt(p, p->t, p->t, &a));
   Count(p, &a);
   *reached = a.converged;
@@ -305,16 +312,19 @@ static PetscErrorCode Advance(HycoPath p, PetscBool *reached)
     PetscCall(Reach(p, s->times[p->step], reached));
   else
     PetscCall(Start(p, reached));
+  /* Before the record is made, which stores it. */
   p->now.seconds += HycoNow() - begin;
   if (!*reached) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(Record(p));
   p->step++;
+  /* After each listed time at the latest; the full order also saves between. */
   if (p->ops->save) PetscCall((*p->ops->save)(p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* All listed times from the current one; stops at the first that cannot be reached, which is no error: p->ended is
-   false and p->why says why. Collective. */
+   false and p->why says why. Collective. The last accepted time is recorded too, so that its fields can be looked
+   at. */
 PetscErrorCode HycoPathRun(HycoPath p)
 {
   PetscBool reached = PETSC_TRUE;
@@ -363,6 +373,7 @@ void HycoPathGetHistory(HycoPath p, HycoHistory *h)
   h->n_taken = p->n_taken;
   h->taken = p->taken;
   if (p->n_steps) HycoPathExtremes(p->scene, p->n_steps, p->steps, h->path_quantity);
+  /* In place: the order in time is not needed again. */
   if (p->n_orders) qsort(p->orders, (size_t)p->n_orders, sizeof(*p->orders), Ascending);
   if (p->n_orders) h->order = p->orders[p->n_orders / 2];
 }

@@ -13,6 +13,7 @@ static PetscErrorCode CheckTies(HycoScene scene)
   PetscFunctionBegin;
   if (!scene->n_ties) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscStrlen(scene->mesh_path, &length));
+  /* A DMPlex in memory, or PETSc's file of one. */
   HycoCheck(!scene->dm && (length < 3 || strcmp(scene->mesh_path + length - 3, ".h5")),
             "tie %s: ties need the mesh as a gmsh file, not as a DMPlex", scene->tie[0].name);
   HycoCheck(!scene->refine, "tie %s: scene_refine cannot refine a mesh with ties; refine the file (gmsh -refine)",
@@ -33,6 +34,7 @@ static PetscErrorCode ReadMesh(HycoScene scene, HycoMesh *mesh)
   if (!ierr) ierr = HycoTiesFind(scene, *mesh, &ties);
   if (!ierr) ierr = HycoMeshSetTies(*mesh, ties);
   PetscCall(HycoTiesDestroy(&ties));
+  /* The caller has no handle to free after an error. */
   if (ierr) PetscCall(HycoMeshDestroy(mesh));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -69,7 +71,8 @@ PetscErrorCode HycoMeshLoad(MPI_Comm comm, HycoScene scene, DM *dm)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Local tables of the mesh without its distribution: for programs on one rank. Collective. */
+/* Local tables of the mesh without its distribution: for programs on one rank. Collective. Refined as the scene says,
+   like every mesh of a model. */
 PetscErrorCode HycoMeshCreate(MPI_Comm comm, HycoScene scene, HycoMesh *mesh)
 {
   DM dm;

@@ -70,12 +70,14 @@ PetscErrorCode HycoPathMoves(HycoPath p, const PetscScalar u[], Vec work, PetscB
   PetscInt count = 0;
 
   PetscFunctionBegin;
+  /* The prescribed values come back below: only the assembly sees the differences. */
   PetscCall(PetscArraycpy(p->u0, fe->u0, fe->n_dof));
   for (PetscInt k = 0; k < fe->n_dof; k++) {
     fe->u0[k] = HycoFESupports(fe, k) ? fe->u0[k] - u[k] : 0; /* the difference of a tied node from its masters stays
                                                                  0 */
     count += fe->u0[k] != 0;
   }
+  /* Assembly is collective: all ranks must agree whether it runs. */
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &count, 1, MPIU_INT, MPI_SUM, p->comm));
   *moved = (PetscBool)(count > 0);
   if (*moved) {
@@ -89,9 +91,10 @@ PetscErrorCode HycoPathMoves(HycoPath p, const PetscScalar u[], Vec work, PetscB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* rhs = K U + F - f_int: the right-hand side of the contact system. r is F - f_int - B^T L on entry, so that B^T L
-   is added back. Where all loads vanish, their sum is round-off, which no contact forces of a floating body balance:
-   with friction it is 0 then. */
+/* rhs = K U + F - f_int: the right-hand side of the contact system. r is F - f_int - B^T L on entry, so that B^T L is
+   added back. Where all loads vanish, their sum is round-off, which no contact forces of a floating body balance: with
+   friction it is 0 then. The system's unknowns are U and L themselves and not their changes, since contact conditions
+   are on the whole of both. */
 static PetscErrorCode RightSide(HycoPath p)
 {
   PetscReal before = 0, after = 1;
@@ -207,6 +210,7 @@ static PetscErrorCode IsLower(HycoPath p, const HycoStepAttempt *a, const Progre
   *lower = PETSC_FALSE;
   if (a->law.failed) PetscFunctionReturn(PETSC_SUCCESS);
   *lower = PETSC_TRUE;
+  /* Without a potential there is nothing to search on: the full step is taken. */
   if (!now->search) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecDot(p->F, p->U, &work));
   potential = a->law.potential - work;
@@ -253,6 +257,7 @@ static PetscErrorCode SetChanged(HycoPath p, Vec a, Vec b, PetscBool *changed)
   for (PetscInt k = 0; k < n; k++) count += (x[k] > 0) != (y[k] > 0);
   PetscCall(VecRestoreArrayRead(a, &x));
   PetscCall(VecRestoreArrayRead(b, &y));
+  /* One contact on one rank restarts the mixing on all. */
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &count, 1, MPIU_INT, MPI_SUM, p->comm));
   *changed = (PetscBool)(count > 0);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -275,7 +280,7 @@ static PetscErrorCode Push(PetscInt n, Vec store[], Vec vector, Vec last)
 }
 
 /* gamma of min |g - sum of gamma_j dG_j|, by normal equations, n <= HYCO_ANDERSON, and dense elimination; a small ridge
-   keeps dependent differences harmless. */
+   keeps dependent differences harmless. Anderson's acceleration (Walker and Ni 2011), type II. */
 static PetscErrorCode LeastSquares(PetscInt n, Vec dG[], Vec g, PetscReal gamma[])
 {
   PetscReal A[HYCO_ANDERSON][HYCO_ANDERSON], trace = 0;
@@ -286,6 +291,7 @@ static PetscErrorCode LeastSquares(PetscInt n, Vec dG[], Vec g, PetscReal gamma[
     trace += A[i][i];
   }
   PetscCall(VecMDot(g, n, dG, gamma));
+  /* Also positive where all differences vanish. */
   for (PetscInt i = 0; i < n; i++) A[i][i] += 1e-13 * trace + PETSC_SQRT_MACHINE_EPSILON * PETSC_SMALL * PETSC_SMALL;
   for (PetscInt i = 0; i < n; i++) { /* positive definite: no pivoting */
     for (PetscInt r = i + 1; r < n; r++) {
@@ -313,9 +319,11 @@ static PetscErrorCode Mix(HycoPath p, PetscInt k)
   PetscFunctionBegin;
   PetscCall(VecWAXPY(p->work, -1, p->U, p->G)); /* g */
   if (k > 1) PetscCall(SetChanged(p, p->L_new, p->L_last, &changed));
+  /* The differences so far are forgotten. */
   if (k <= 1 || changed)
     p->n_mixed = 0;
   else {
+    /* The newest first; the oldest is overwritten. */
     PetscCall(Push(p->n_mixed, p->dU, p->G, p->U_last));
     PetscCall(Push(p->n_mixed, p->dG, p->work, p->G_last));
     if (p->n_contacts) PetscCall(Push(p->n_mixed, p->dL, p->L_new, p->L_last));
@@ -331,6 +339,7 @@ static PetscErrorCode Mix(HycoPath p, PetscInt k)
   if (p->n_mixed) PetscCall(LeastSquares(p->n_mixed, p->dG, p->work, gamma));
   for (PetscInt j = 0; j < p->n_mixed; j++) {
     PetscCall(VecAXPY(p->U, -gamma[j], p->dU[j]));
+    /* Forces are mixed like displacements: on a fixed set both are affine in the iterate. */
     if (p->n_contacts) PetscCall(VecAXPY(p->Lambda, -gamma[j], p->dL[j]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -374,7 +383,8 @@ static PetscBool Stalls(HycoPath p, const Progress *now)
   return (PetscBool)(p->kept > 0 && !(rate < 1 && PetscLogReal(target / r[2]) > WORTH * PetscLogReal(rate)));
 }
 
-/* Updates K at U. The evaluation at U gave no tangents; residuals are kept, as U is the same. */
+/* Updates K at U. The evaluation at U gave no tangents; residuals are kept, as U is the same. For the modified method:
+   a new tangent where the kept one contracts too slowly. */
 static PetscErrorCode Renew(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAttempt *a, Progress *now)
 {
   const Progress here = *now;
@@ -389,7 +399,8 @@ static PetscErrorCode Renew(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAtte
 /* Iterations of a step before it is halved, by HycoNewton; a step with at most half of them was easy. */
 static const PetscInt usual_its[] = {0, 15, 60, 30};
 
-/* One attempt: evaluate, test, assemble where needed, solve, advance. Ends with a->converged or a reason in a->why. */
+/* One attempt: evaluate, test, assemble where needed, solve, advance. Ends with a->converged or a reason in a->why.
+   least: the smallest residual so far, for the message; worst: of the contacts' conditions. */
 static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoNewton method, HycoStepAttempt *a)
 {
   const PetscBool tangent = (PetscBool)(method == HYCO_NEWTON_TANGENT);
@@ -447,7 +458,8 @@ PetscErrorCode HycoPathRestore(HycoPath p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* K is assembled here if it is elastic, else in the iterations. */
+/* K is assembled here if it is elastic, else in the iterations. At the end of the step, t1: loads, gaps and
+   temperatures of an implicit step (backward Euler). */
 PetscErrorCode HycoPathAssemble(HycoPath p, PetscReal t1)
 {
   PetscReal mu[HYCO_MAX_PARAMETERS];

@@ -52,7 +52,8 @@ static PetscErrorCode ReduceReport(HycoFOM f, HycoFEStepReport *r)
 }
 
 /* Sets this rank's rows of f_int from f_local; and r = F - f_int there, 0 where fixed. f_local is complete at owned
-   nodes, so that no communication is needed. */
+   nodes, so that no communication is needed. f_int are the stresses' nodal forces; r without contact forces, which
+   RightSide() and the residual add. */
 static PetscErrorCode TakeForces(HycoFOM f)
 {
   HycoPath p = f->path;
@@ -71,6 +72,7 @@ static PetscErrorCode TakeForces(HycoFOM f)
       const PetscInt k = row * dim + c;
 
       f_int[k] = p->f_local[i * dim + c];
+      /* At supports the difference is a reaction. */
       r[k] = f->fe->fixed[i * dim + c] ? 0 : F[k] - f_int[k];
     }
   }
@@ -170,6 +172,7 @@ static PetscErrorCode MeanWork(HycoFOM f, Vec before, Vec after, PetscBool on_fi
     for (PetscInt c = 0; row >= 0 && c < dim; c++) {
       const PetscInt k = row * dim + c;
 
+      /* Free unknowns: work of the loads. Fixed ones: internal forces times the motion of the supports. */
       if (f->fe->fixed[i * dim + c] == on_fixed) sum += (a[k] + b[k]) / 2 * (u[k] - u_old[k]);
     }
   }
@@ -189,6 +192,7 @@ static PetscErrorCode ContactWork(HycoFOM f, PetscReal *sum)
   PetscFunctionBegin;
   *sum = 0;
   if (!f->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Tangential forces do work as well, with rows of their own. */
   if (f->friction) {
     PetscCall(HycoFrictionWork(f, sum));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -209,6 +213,7 @@ static PetscErrorCode AddWork(HycoFOM f, const HycoFEStepReport *law, PetscReal 
 {
   HycoPath p = f->path;
   HycoWork *w = &p->work_done;
+  /* Stored energy is a state, the others are increments. */
   PetscReal loads, supports, contact, stored = law->stored - w->stored, defect;
 
   PetscFunctionBegin;
@@ -218,6 +223,7 @@ static PetscErrorCode AddWork(HycoFOM f, const HycoFEStepReport *law, PetscReal 
   defect = PetscAbsReal(loads + supports - contact - stored - law->dissipated - law->thermal - law->moduli);
   w->size += PetscAbsReal(loads) + PetscAbsReal(supports) + PetscAbsReal(contact) + PetscAbsReal(stored) +
              PetscAbsReal(law->dissipated) + PetscAbsReal(law->thermal) + PetscAbsReal(law->moduli);
+  /* Of this step; the largest of the path is kept. */
   *step_defect = HycoRelative(defect, w->size);
   w->defect = PetscMax(w->defect, *step_defect);
   w->loads += loads;
@@ -230,7 +236,8 @@ static PetscErrorCode AddWork(HycoFOM f, const HycoFEStepReport *law, PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The criteria of a single solution, without the energy identity, which a path has by steps. */
+/* The criteria of a single solution, without the energy identity, which a path has by steps. A step with an absurd
+   displacement is refused and halved, like one that did not converge. */
 static PetscErrorCode JudgeStep(HycoPath p, HycoReason reason, char why[HYCO_LINE])
 {
   HycoFOM f = (HycoFOM)p->ctx;
@@ -271,6 +278,7 @@ static PetscErrorCode Largest(HycoFOM f, HycoStep *s)
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(f->part->n_cells, &mises, f->part->n_cells, &inelastic));
+  /* Ghost cells included: their values are the owners'. */
   PetscCall(HycoFEStateFields(f->fe, f->path->begin, NULL, mises, inelastic, NULL));
   for (PetscInt e = 0; e < f->part->n_cells; e++) {
     most[0] = PetscMax(most[0], mises[e]);
@@ -283,7 +291,7 @@ static PetscErrorCode Largest(HycoFOM f, HycoStep *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Collective, like the other measures. */
+/* Collective, like the other measures. At listed times only: a step costs no more communication than it must. */
 static PetscErrorCode MeasureContacts(HycoFOM f, HycoStep *s)
 {
   const PetscScalar *l;
@@ -298,6 +306,7 @@ static PetscErrorCode MeasureContacts(HycoFOM f, HycoStep *s)
   PetscCall(VecGetArrayRead(f->Lambda, &l));
   for (PetscInt k = 0; k < n; k++) {
     sum[0] += l[k];
+    /* Counted in a real beside the sum: one reduction for both. */
     sum[1] += l[k] > 0;
     s->lambda_max = PetscMax(s->lambda_max, l[k]);
   }
@@ -360,7 +369,8 @@ static PetscErrorCode Save(HycoPath p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The full-order operations of a path; f's vectors are borrowed. Collective. */
+/* The full-order operations of a path; f's vectors are borrowed. Collective. Steps, iterations and halving are those of
+   HycoPath, which reduced models share; this adds only what full order does differently. */
 PetscErrorCode HycoFOMPathCreate(HycoFOM f)
 {
   static const HycoPathOps ops = {.assemble = Assemble,
@@ -382,6 +392,7 @@ PetscErrorCode HycoFOMPathCreate(HycoFOM f)
   p->K = f->K;
   p->U = f->U;
   p->Lambda = f->Lambda;
+  /* The solver's right-hand side: the path writes K U + F - f_int there, and keeps its loads in a vector of its own. */
   p->rhs = f->F;
   p->D = f->D;
   p->n_contacts = f->n_contacts;
@@ -403,10 +414,13 @@ PetscErrorCode HycoPathSolve(HycoFOM f, const PetscReal mu[])
   PetscCall(PetscMemzero(&p->work_done, sizeof(p->work_done)));
   PetscCall(VecSet(p->F_old, 0));
   PetscCall(VecSet(p->f_old, 0));
+  /* The file's place is checked before the first step, not after hours. */
   PetscCall(HycoSeriesBegin(f));
   PetscCall(HycoPathCheckPlace(f));
+  /* After all resets, which it overwrites. */
   if (p->resume) PetscCall(HycoPathLoad(f));
   PetscCall(HycoPathRun(p));
+  /* A path that ends early still has its last listed time to show. */
   f->solved = (PetscBool)(p->n_steps > 0);
   PetscCall(HycoSeriesEnd(f));
   f->summary.seconds.total = HycoNow() - begin;

@@ -64,7 +64,8 @@ static PetscErrorCode Reactions(HycoFOM f, PetscReal contact[], PetscReal r[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* r[n_dof] of this rank's part (N), complete at owned nodes. Collective. */
+/* r[n_dof] of this rank's part (N), complete at owned nodes. Collective. Outputs and reports need them by unknown;
+   HycoFOMGetReactions() sums them by support. */
 PetscErrorCode HycoFOMReactions(HycoFOM f, PetscReal r[])
 {
   PetscReal *contact;
@@ -83,6 +84,7 @@ static void AddTo(HycoFE fe, PetscInt dof, PetscReal value, HycoReaction *to)
   const PetscReal *x = fe->X + 3 * (dof / fe->dim);
 
   if (fe->formulation == HYCO_AXISYMMETRIC) {
+    /* Radial forces on a ring balance themselves. */
     if (c) to->force[c] += value;
     return;
   }
@@ -99,6 +101,7 @@ static PetscErrorCode FindSupports(HycoFOM f, PetscInt support[])
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < f->fe->n_dof; k++) support[k] = -1;
+  /* From the last to the first, so that the first one stays. */
   for (PetscInt s = f->scene->n_fixed - 1; s >= 0; s--) {
     PetscInt g = 0;
 
@@ -147,6 +150,7 @@ static void Resolve(PetscInt n, const HycoOblique *const o[], const PetscBool pl
   for (PetscInt a = 0; a < n; a++) {
     for (PetscInt b = 0; b <= n; b++) {
       A[a][b] = 0;
+      /* A component with a support of its own takes any force along it: only the others determine rho. */
       for (PetscInt d = 0; d < 3; d++) A[a][b] += plain[d] ? 0 : o[a]->n[d] * (b < n ? o[b]->n[d] : force[d]);
     }
   }
@@ -203,6 +207,7 @@ static PetscErrorCode AddUp(HycoFOM f, PetscReal *work, PetscInt support[], Sums
   HycoReaction *loads = s->result + f->scene->n_fixed + f->scene->n_springs;
 
   PetscFunctionBegin;
+  /* Nodal contact forces and what the supports must add for equilibrium. */
   PetscCall(Reactions(f, contact, r));
   HycoOnEach(HycoComm(f), HycoFELoads(f->fe, load));
   PetscCall(FindSupports(f, support));
@@ -212,6 +217,7 @@ static PetscErrorCode AddUp(HycoFOM f, PetscReal *work, PetscInt support[], Sums
     for (PetscInt k = i * dim; k < (i + 1) * dim; k++) {
       AddTo(f->fe, k, load[k], &loads[0]);
       AddTo(f->fe, k, contact[k], &loads[1]);
+      /* The scale of the balance: magnitudes of all that is summed. */
       s->size += PetscAbsReal(r[k]) + PetscAbsReal(load[k]) + PetscAbsReal(contact[k]);
     }
   }
@@ -229,6 +235,7 @@ static PetscErrorCode Balance(HycoFOM f, PetscInt n, Sums *s, PetscReal *balance
   PetscCall(PetscMalloc1(6 * n + 1, &sum));
   for (PetscInt k = 0; k < 6 * n; k++)
     sum[k] = k % 6 < 3 ? s->result[k / 6].force[k % 6] : s->result[k / 6].moment[k % 6 - 3];
+  /* In the same reduction. */
   sum[6 * n] = s->size;
   HycoAllreduce(sum, 6 * n + 1, MPIU_REAL, MPI_SUM, HycoComm(f));
   for (PetscInt k = 0; k < n; k++) {
@@ -246,8 +253,8 @@ static PetscErrorCode Balance(HycoFOM f, PetscInt n, Sums *s, PetscReal *balance
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Resultants (N) and moments about the origin of each support and spring, of the loads and of the obstacles, and
-   their balance, in f->reaction (borrowed). Collective. */
+/* Resultants (N) and moments about the origin of each support and spring, of the loads and of the obstacles, and their
+   balance, in f->reaction (borrowed). Collective. Group names are borrowed from the scene. */
 PetscErrorCode HycoFOMGetReactions(HycoFOM f, PetscInt *n, const HycoReaction *result[], PetscReal *balance)
 {
   HycoScene scene;
@@ -261,6 +268,7 @@ PetscErrorCode HycoFOMGetReactions(HycoFOM f, PetscInt *n, const HycoReaction *r
   scene = f->scene;
   n_dof = f->fe->n_dof;
   all = scene->n_fixed + scene->n_springs + 2;
+  /* Kept: the result borrows it until the next call. */
   if (!f->reaction) PetscCall(PetscMalloc1(all, &f->reaction));
   PetscCall(PetscArrayzero(f->reaction, all));
   PetscCall(PetscMalloc2(3 * n_dof, &work, n_dof, &support));

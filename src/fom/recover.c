@@ -5,8 +5,8 @@
 */
 #include <hycofomimpl.h>
 
-/* Creates a solver without contacts; in the other one they are unknowns. The factor of the contact solver may be
-   that of another form. */
+/* Creates a solver without contacts; in the other one they are unknowns. The factor of the contact solver may be that
+   of another form. Once for a model: predictions at several points share the factor if the stiffness does. */
 static PetscErrorCode SetUp(HycoFOM f)
 {
   PetscFunctionBegin;
@@ -22,7 +22,8 @@ static PetscErrorCode SetUp(HycoFOM f)
 }
 
 /* U under given forces (Lambda on rank 0, in the order of one rank). The KKT residuals are those of (16), thus they
-   show what the forces violate. Collective. */
+   show what the forces violate. Collective. One linear solve in place of a contact problem: what
+   -hyco_full_displacement costs. */
 PetscErrorCode HycoFOMSolveForces(HycoFOM f, PetscInt n, const PetscReal mu[], const PetscReal Lambda[])
 {
   HycoSeconds *t;

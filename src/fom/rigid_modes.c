@@ -26,6 +26,7 @@ PetscErrorCode HycoFOMMotionVectors(HycoFOM f, const HycoMotions *motions, Vec *
     for (PetscInt i = 0; i < f->part->n_nodes; i++) {
       const PetscInt at = HycoMeshOwned(f->part, i);
 
+      /* Each node's motion from its owner. */
       if (at >= 0) PetscCall(PetscArraycpy(own + at * dim, motion + i * dim, dim));
     }
     PetscCall(VecRestoreArray((*v)[k], &own));
@@ -58,8 +59,8 @@ static void Names(HycoFOM f, const HycoMotions *free, PetscInt n, const PetscRea
   }
 }
 
-/* Adds a combination to the released motions, orthonormalised against the existing ones; a dependent one is left
-   out. Dependent: less than a tenth remains. */
+/* Adds a combination to the released motions, orthonormalised against the existing ones; a dependent one is left out.
+   Dependent: less than a tenth remains. u is taken over, or destroyed. */
 static PetscErrorCode AddReleased(HycoFOM f, PetscInt n, const Vec motion[], const PetscReal z[])
 {
   PetscReal norm, before;
@@ -77,6 +78,7 @@ static PetscErrorCode AddReleased(HycoFOM f, PetscInt n, const Vec motion[], con
     PetscCall(VecAXPY(u, -dot, f->released[k % f->n_released]));
   }
   PetscCall(VecNorm(u, NORM_2, &norm));
+  /* Motions are known within the error of the facets: what is left of a tenth would be that error. */
   if (norm < 0.1 * before) {
     PetscCall(VecDestroy(&u));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -126,6 +128,7 @@ static PetscErrorCode FindUnconstrained(HycoFOM f, const HycoMotions *free, Unco
   PetscCall(HycoMeshDestroy(&mesh));
   PetscCall(PetscFree(index));
   PetscCall(ierr);
+  /* The names go into messages, which are the same on every rank. */
   HycoOnRoot(HycoComm(f), NameUnconstrained(f, free, z));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -174,6 +177,7 @@ static PetscErrorCode ReleasedRows(HycoFOM f, PetscReal row[])
   for (PetscInt i = 0; i < f->surface->n_nodes; i++) {
     const PetscInt at = f->surface->node_global ? f->surface->node_global[i] : i;
 
+    /* Surfaces know contact nodes of other ranks: the vector brings the mark to the owner. */
     if (node[i]) PetscCall(VecSetValue(contact, at * f->fe->dim, 1, INSERT_VALUES));
   }
   PetscCall(PetscFree(node));
@@ -243,9 +247,11 @@ static PetscErrorCode ChoosePins(HycoFOM f)
     if (HycoMeshOwned(f->part, i) >= 0) tag[HycoMeshOwned(f->part, i)] = f->part->node_id[i];
   }
   for (PetscInt p = 0; p < n; p++) {
+    /* Over all ranks; equal rows by the smallest tag, so that the choice does not depend on the partition. */
     PetscCall(LongestRow(f, tag, row, &f->pin_tag[p], &f->pin_component[p], unit));
     length = PetscSqrtReal(RowSize(n, unit));
     for (PetscInt k = 0; k < n && length > 0; k++) unit[k] /= length;
+    /* What the pin already holds is taken from the other rows. */
     for (PetscInt i = 0; i < n_own && length > 0; i++) {
       PetscReal dot = 0;
 
@@ -265,6 +271,7 @@ static PetscErrorCode SetPins(HycoFOM f, PetscInt n)
   PetscReal *released;
 
   PetscFunctionBegin;
+  /* Nothing to remove where there were none. */
   if (n || f->fe->n_pins) PetscCall(HycoFESetPins(f->fe, n, f->pin_tag, f->pin_component));
   if (fe != f->fe) PetscCall(HycoFESetPins(fe, n, f->pin_tag, f->pin_component));
   PetscCall(ToSurface(f, n ? f->n_turned : 0, f->released, &released));
@@ -319,8 +326,9 @@ static PetscErrorCode Work(Vec force, Vec motion, PetscReal *on, PetscReal *all)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The share of the forces' work on a released motion that is not balanced must be small: otherwise it would
-   accelerate the body. A disc under its own symmetric load has round-off here, a missing support has 1. */
+/* The share of the forces' work on a released motion that is not balanced must be small: otherwise it would accelerate
+   the body. A disc under its own symmetric load has round-off here, a missing support has 1. The message needs the
+   motion's name, which rank 0 has. */
 static PetscErrorCode CheckBalance(HycoFOM f, const char forces[], PetscReal share)
 {
   PetscFunctionBegin;
@@ -379,7 +387,7 @@ PetscErrorCode HycoFOMCheckContactBalance(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The solution is determined up to these motions; the shown one is orthogonal to them. */
+/* The solution is determined up to these motions; the shown one is orthogonal to them. n_turned of them: the motions on which contact normals are turned. */
 PetscErrorCode HycoFOMTakeOutReleased(HycoFOM f, Vec u)
 {
   PetscScalar dot;
@@ -432,6 +440,7 @@ static PetscErrorCode Orthonormalize(PetscInt *n, Vec v[])
       PetscCall(VecAXPY(w, -dot, v[j % kept]));
     }
     PetscCall(VecNorm(w, NORM_2, &size));
+    /* Exact vectors up to round-off: what is left of a dependent one is noise. */
     if (size > 1e-8 * before) {
       PetscCall(VecScale(w, 1 / size));
       v[k] = v[kept];
@@ -444,7 +453,9 @@ static PetscErrorCode Orthonormalize(PetscInt *n, Vec v[])
 }
 
 /* Sets translations and rotations of the moved nodes, zero where fixed. For an algebraic multigrid, in block layout.
-   MatNullSpaceCreateRigidBody() gives them without supports; zeros at fixed rows match K. */
+   MatNullSpaceCreateRigidBody() gives them without supports; zeros at fixed rows match K. With its block size and these
+   vectors GAMG's coarse spaces represent rigid motions exactly, on which its convergence depends (Vanek, Mandel and
+   Brezina 1996). */
 static PetscErrorCode SetNearKernel(HycoFOM f)
 {
   const PetscInt dim = f->fe->dim;

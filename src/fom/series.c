@@ -29,7 +29,7 @@ static PetscErrorCode AddField(HycoSeries s, const char name[], HycoPlace place,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* VTK's vectors have three components in every dimension. */
+/* VTK's vectors have three components in every dimension. u is complete at all nodes of the part, ghosts included. */
 static PetscErrorCode AddDisplacement(HycoSeries s)
 {
   const HycoSeriesSource *f = &s->from;
@@ -68,6 +68,7 @@ static PetscErrorCode AddState(HycoSeries s)
   PetscCall(AddField(s, "nodal_mises", HYCO_ON_NODES, 1, nodal_mises));
   PetscCall(PetscFree2(nodal, nodal_mises));
   PetscCall(HycoFEStateGetNames(state, &n_names, &names));
+  /* Laws' own variables by name; cells of other laws have NaN. */
   for (PetscInt k = 0; k < n_names; k++) {
     PetscCall(HycoFEStateVariable(f->fe, state, names[k], mises));
     PetscCall(AddField(s, names[k], HYCO_ON_CELLS, 1, mises));
@@ -86,6 +87,7 @@ static PetscErrorCode AddContacts(HycoSeries s)
   PetscFunctionBegin;
   if (!f->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
   ierr = HycoContactFieldsCreate(f->comm, f->fe_surface, f->pairs, f->u_surface, f->lambda, &c);
+  /* Contacts live on surfaces, fields on the parts' nodes. */
   if (!ierr) ierr = HycoContactFieldsToPart(f->comm, f->fe, f->fe_surface->mesh, &c);
   if (!ierr) ierr = AddField(s, "contact_force", HYCO_ON_NODES, 3, c.force);
   if (!ierr) ierr = AddField(s, "contact_pressure", HYCO_ON_NODES, 1, c.pressure);
@@ -99,7 +101,8 @@ static PetscErrorCode AddContacts(HycoSeries s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The file at `path` is written completely or not at all, at HycoSeriesClose(); most: number of times. Collective. */
+/* The file at `path` is written completely or not at all, at HycoSeriesClose(); most: number of times. Collective. A
+   series that ends early is closed all the same, with the times that it has. */
 PetscErrorCode HycoSeriesCreate(MPI_Comm comm, const char path[], PetscInt most, HycoSeries *series)
 {
   HycoFieldFile file;
@@ -160,7 +163,8 @@ PetscErrorCode HycoSeriesOpen(HycoSeries s, const HycoSeriesSource *from)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* At the path's first time: the mesh is that of the moved nodes there. Collective. */
+/* At the path's first time: the mesh is that of the moved nodes there. Collective. Without a series nothing is written,
+   and all its functions return at once. */
 PetscErrorCode HycoSeriesBegin(HycoFOM f)
 {
   HycoSeriesSource from;
@@ -199,13 +203,15 @@ static PetscErrorCode ReadField(HycoFOM f, HycoH5 h, const HycoFileOrder *order,
 
   PetscFunctionBegin;
   PetscCall(HycoH5GetSize(h, set, &n_rows, &cols));
+  /* A file of another mesh, beside a checkpoint of this one. */
   HycoCheck(n_rows == all, "its field %s has %d rows", field->name, (int)n_rows);
   PetscCall(PetscMalloc1(n * cols, rows));
   PetscCall(HycoH5ReadRows(h, set, order ? order->first[field->place] : 0, n, cols, *rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fields of nodes and of cells have separate names in the file; the place is found by trial. */
+/* Fields of nodes and of cells have separate names in the file; the place is found by trial. The components are the
+   number of the dataset's columns. */
 static PetscErrorCode CopyField(HycoFOM f, HycoSeries s, HycoH5 h, const char name[], PetscInt k)
 {
   HycoField field = {name, HYCO_ON_NODES, 0, NULL};
@@ -234,6 +240,7 @@ static PetscErrorCode CopyFields(HycoFOM f, HycoSeries s, HycoH5 h, PetscInt k)
 
   PetscFunctionBegin;
   HycoOnEach(HycoComm(f), HycoH5LoadText(h, "fields", &list));
+  /* The list was written with the fields: laws may have changed since, the file has not. */
   for (word = strtok_r(list, " ", &rest); word && !ierr; word = strtok_r(NULL, " ", &rest))
     ierr = CopyField(f, s, h, word, k);
   PetscCall(PetscFree(list));

@@ -19,6 +19,7 @@ static PetscErrorCode CountRows(HycoSlip *s, HycoScene scene, const HycoPairs *p
   s->row[0] = 0;
   for (PetscInt k = 0; k < n; k++) {
     s->of[k] = scene->contact[pairs->contact[k]]->friction != NULL;
+    /* A contact without friction keeps its one row: both kinds are in one system. */
     s->row[k + 1] = s->row[k] + (s->of[k] ? s->dim : 1);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -38,6 +39,7 @@ PetscErrorCode HycoSlipCreate(MPI_Comm comm, HycoScene scene, const HycoPairs *p
     PetscCall(HycoConeSetSize(s->cone[c], c ? dim : 1));
     PetscCall(HycoConeSetType(s->cone[c], c ? HYCO_CONE_COULOMB : HYCO_CONE_NONNEGATIVE));
   }
+  /* Zero: no force, no slip, open. */
   PetscCall(PetscCalloc4(3 * n, &s->shear.force, 3 * n, &s->shear.slip, n, &s->shear.work, n, &s->shear.state));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -11,11 +11,13 @@ static PetscErrorCode MeasureContacts(HycoFOM f, HycoSummary *s)
   HycoContactState state;
 
   PetscFunctionBegin;
+  /* Reads normals and gaps at the present parameters. */
   HycoOnEach(HycoComm(f), HycoContactMeasure(f->fe_surface, &f->pairs, f->u_surface, f->lambda, NULL, &state));
   n[0] = state.n_facing;
   most[0] = state.overlap;
   most[1] = state.sliding;
   for (PetscInt k = 0; k < f->pairs.n; k++) {
+    /* Exact zeros: the solver sets open contacts to 0. */
     n[1] += f->lambda[k] > 0;
     sum[0] += f->lambda[k];
     most[2] = PetscMax(most[2], f->lambda[k]);
@@ -102,6 +104,7 @@ static PetscErrorCode SumContacts(HycoFOM f)
         HycoContactResults(f->fe_surface, &f->pairs, c.normal, c.area, f->lambda, c.pressure_of, 0, f->contact_result);
   PetscCall(HycoContactFieldsDestroy(&c));
   PetscCall(ierr);
+  /* Forces add up over ranks, pressures take the largest and the smallest. */
   for (PetscInt k = 0; k < n; k++) PetscCall(SumResult(f, &f->contact_result[k]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -116,6 +119,7 @@ PetscErrorCode HycoFOMMeasureQuantities(HycoFOM f, PetscReal value[])
   if (!f->scene->n_quantities) PetscFunctionReturn(PETSC_SUCCESS);
   if (HycoSceneHasFieldOutputs(f->scene)) PetscCall(HycoFOMStress(f));
   if (HycoSceneHasContactOutputs(f->scene)) PetscCall(SumContacts(f));
+  /* A product with K on all unknowns: only where an output asks for it. */
   if (HycoSceneHasReactions(f->scene)) {
     PetscCall(PetscMalloc1(f->fe->n_dof, &reaction));
     PetscCall(HycoFOMReactions(f, reaction));
@@ -211,6 +215,7 @@ PetscErrorCode HycoFOMStress(HycoFOM f)
   if (f->sigma_ready) PetscFunctionReturn(PETSC_SUCCESS);
   if (!f->sigma) PetscCall(PetscMalloc1(f->part->n_cells * f->fe->n_sigma, &f->sigma));
   PetscCall(VecGetArrayRead(f->U_local, &u));
+  /* Stresses of a path are those of the laws' state. */
   if (f->path)
     PetscCall(HycoFEStateFields(f->fe, f->path->begin, f->sigma, NULL, NULL, NULL));
   else
@@ -231,6 +236,7 @@ static PetscErrorCode BringTogether(HycoFOM f)
   if (f->size == 1 || f->all_ready) PetscFunctionReturn(PETSC_SUCCESS);
   if (f->rank == 0 && !f->u_all) PetscCall(PetscMalloc1(f->n_nodes * f->fe->dim, &f->u_all));
   if (f->rank == 0 && !f->sigma_all) PetscCall(PetscMalloc1(f->n_cells * f->fe->n_sigma, &f->sigma_all));
+  /* All rows on rank 0 (PETSC_TRUE), not a block per rank. */
   PetscCall(HycoFileOrderCreate(HycoComm(f), f->part, PETSC_TRUE, &all));
   PetscCall(HycoFileOrderSend(all, HYCO_ON_NODES, MPIU_REAL, f->fe->dim, f->u, f->u_all));
   PetscCall(HycoFileOrderSend(all, HYCO_ON_CELLS, MPIU_REAL, f->fe->n_sigma, f->sigma, f->sigma_all));
@@ -250,6 +256,7 @@ PetscErrorCode HycoFOMGetSolution(HycoFOM f, PetscInt *n_nodes, const PetscReal 
   PetscCheck(f->solved, PETSC_COMM_SELF, PETSC_ERR_ORDER, "call HycoFOMSolve() before HycoFOMGetSolution()");
   PetscCall(BringTogether(f));
   if (n_nodes) *n_nodes = f->rank ? 0 : f->n_nodes;
+  /* On one rank the solution itself, without a copy. */
   if (U) *U = f->size > 1 ? f->u_all : f->u;
   if (n_contacts) *n_contacts = f->rank ? 0 : f->n_contacts;
   PetscCall(HycoFOMGetLambda(f, &lambda));

@@ -18,6 +18,7 @@ PetscErrorCode HycoFOMToLocal(HycoFOM f, Vec v, PetscReal value[])
 /* value[] of fe_surface's unknowns; on one rank these are all. Collective. */
 PetscErrorCode HycoFOMToSurface(HycoFOM f, Vec v, PetscReal value[])
 {
+  /* On one rank the surface has the mesh's unknowns. */
   Vec at = f->to_surface ? f->U_surface : v;
 
   PetscFunctionBegin;
@@ -97,6 +98,7 @@ PetscErrorCode HycoFOMSetLambda(HycoFOM f, const PetscReal lambda[])
   PetscFunctionBegin;
   if (!f->n_contacts) PetscFunctionReturn(PETSC_SUCCESS);
   if (f->size > 1) PetscCall(HycoFOMGetNumbers(f, &number));
+  /* Rank 0 has all values; assembly sends each to its row. */
   for (PetscInt k = 0; f->rank == 0 && k < f->n_contacts; k++)
     PetscCall(VecSetValue(f->Lambda, k, lambda[number ? number[k] : k], INSERT_VALUES));
   PetscCall(HycoVecAssemble(f->Lambda));
@@ -158,6 +160,7 @@ PetscErrorCode HycoFOMToRows(HycoFOM f, HycoPlace place, MPI_Datatype type, Pets
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCallMPI(MPI_Type_size(type, &size));
+  /* One rank: the file's order is the mesh's. */
   PetscCall(PetscMemcpy(rows, value, (size_t)(n * components) * (size_t)size));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

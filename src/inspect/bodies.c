@@ -74,8 +74,8 @@ static PetscReal Stretch(HycoCellType shape, const PetscInt node[], const PetscR
   return k + PetscSqrtReal(k * k - 1);
 }
 
-/* The ratio varies inside a cell that is no simplex: the worst quadrature point counts. A one-dimensional cell has
-   no shape. */
+/* The ratio varies inside a cell that is no simplex: the worst quadrature point counts. A one-dimensional cell has no
+   shape. Long cells are less accurate, and slow down iterative solvers. */
 void HycoInspectCells(HycoInspection *in, HycoFE fe)
 {
   HycoMesh m = fe->mesh;
@@ -216,7 +216,7 @@ static PetscErrorCode CountTypes(HycoInspection *in, HycoMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rank 0, on the whole mesh: parts of ranks would cut bodies. */
+/* Rank 0, on the whole mesh: parts of ranks would cut bodies. Names are borrowed from the scene. */
 PetscErrorCode HycoInspectBodies(HycoInspection *in)
 {
   HycoMesh m = in->whole->part;

@@ -15,7 +15,7 @@ static PetscReal Coarseness(const HycoPairs *p, PetscInt k, PetscInt n_nodes, co
   return master > 0 ? size[p->slave[k]] / master : 0;
 }
 
-/* The facet sizes of two groups: room for 2 reals a node. */
+/* The facet sizes of two groups: room for 2 reals a node. size[0 .. n) of the slave, [n .. 2 n) of the master. */
 static PetscErrorCode FacetSizes(HycoFE fe, const char key[], const char slave[], const char master[], PetscReal size[])
 {
   PetscInt g = 0;
@@ -97,7 +97,7 @@ PetscErrorCode HycoInspectTies(HycoInspection *in)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The extremes start reversed, and are narrowed at each inspected point. */
+/* The extremes start reversed, and are narrowed at each inspected point. tolerance -1: not given in the scene. */
 PetscErrorCode HycoInspectContactsBegin(HycoInspection *in)
 {
   HycoScene s = in->whole->scene;

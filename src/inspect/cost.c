@@ -21,7 +21,8 @@ static PetscErrorCode Resident(MPI_Comm comm, PetscReal *bytes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Floating-point operations per second of a small matrix product on this process. */
+/* Floating-point operations per second of a small matrix product on this process. A peak of which a sparse
+   factorisation reaches the share SPARSE_SHARE. */
 static PetscErrorCode Speed(PetscReal *flops)
 {
   const PetscBLASInt n = 256;
@@ -63,8 +64,8 @@ PetscErrorCode HycoInspectCost(HycoFOM f, PetscReal assembly, HycoInspection *in
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A solution whose stiffness was factorised before costs no factor: those that differ in loads or gaps alone share
-   one. */
+/* A solution whose stiffness was factorised before costs no factor: those that differ in loads or gaps alone share one.
+   Without samples a typical number of points, for an order of magnitude. */
 PetscErrorCode HycoInspectionCountTraining(HycoScene s, HycoSamples samples, PetscInt *n_training,
                                            PetscInt *n_stiffness)
 {

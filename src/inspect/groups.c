@@ -6,7 +6,7 @@
 /* Groups with this share of common nodes are alike. */
 #define ALIKE 0.95
 
-/* The number of common nodes of the groups g and h; both are ascending. */
+/* The number of common nodes of the groups g and h; both are ascending. One pass through both lists. */
 static PetscInt Common(HycoMesh m, PetscInt g, PetscInt h)
 {
   PetscInt n = 0, j = m->group_start[h];
@@ -54,7 +54,8 @@ static PetscErrorCode Use(const char key[], const char name[], void *context)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Marks the groups of the scene's entries and of the region of interest. */
+/* Marks the groups of the scene's entries and of the region of interest. Options of the hyco: section may name groups
+   too. */
 static PetscErrorCode MarkUsed(HycoInspection *in)
 {
   char *region[64];
@@ -70,6 +71,7 @@ static PetscErrorCode MarkUsed(HycoInspection *in)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Names are those of the mesh, which in->whole keeps. */
 PetscErrorCode HycoInspectGroups(HycoInspection *in)
 {
   HycoMesh m = in->whole->part;

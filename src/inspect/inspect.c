@@ -7,7 +7,8 @@
 /* Up to this number of parameters all corners of the ranges are assembled, above it only the ends of each. */
 #define MOST_CORNERS 4
 
-/* The centre of the ranges, then their corners, or with many parameters the ends of each. The caller frees mu. */
+/* The centre of the ranges, then their corners, or with many parameters the ends of each. The caller frees mu. Extremes
+   of a map or a gap are at corners as a rule; 2^p of them are too many for many parameters. */
 static PetscErrorCode ListPoints(HycoScene s, PetscInt *n, PetscReal **mu)
 {
   const PetscInt p = s->n_parameters;
@@ -84,6 +85,7 @@ static PetscErrorCode InspectPoint(HycoFOM f, HycoInspection *in, const PetscRea
 
   PetscFunctionBegin;
   if (!s->n_times) {
+    /* Without a history the parameters are all variables. */
     PetscCall(Assemble(f, in, mu, first));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -94,7 +96,8 @@ static PetscErrorCode InspectPoint(HycoFOM f, HycoInspection *in, const PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a motion is that of a rigid body, whose node moves (contact type rigid). */
+/* Whether a motion is that of a rigid body, whose node moves (contact type rigid). Such a motion is free by design, and
+   no reason for a warning. */
 static PetscBool IsRigidBodys(HycoFOM f, const PetscReal motion[])
 {
   HycoMesh m = f->part;
@@ -115,7 +118,8 @@ static PetscBool IsRigidBodys(HycoFOM f, const PetscReal motion[])
 }
 
 /* Evaluates the outputs of a body at rest: refuses groups and components that solve would refuse. contact is NULL:
-   contact quantities are checked but have no value. */
+   contact quantities are checked but have no value. All outputs are evaluated, though their values at rest say
+   nothing. */
 static PetscErrorCode CheckOutputs(HycoFOM whole)
 {
   HycoFE fe = whole->fe;
@@ -130,7 +134,7 @@ static PetscErrorCode CheckOutputs(HycoFOM whole)
 }
 
 /* Motions that the supports leave free: contact prevents them, or -hyco_regularise removes them; others are an error of
-   the assembly. */
+   the assembly. in->loose counts those of deformable bodies. */
 static PetscErrorCode FindMotions(HycoInspection *in)
 {
   HycoFOM f = in->whole;
@@ -198,6 +202,7 @@ static PetscErrorCode Visit(HycoFOM f, HycoInspection *in)
   begin = HycoNow();
   PetscCall(InspectPoint(f, in, mu, (PetscBool)(in->n_points == 1)));
   begin = HycoNow() - begin;
+  /* The centre's assembly is timed, which is the last: the others have warmed up caches. */
   PetscCall(HycoInspectCost(f, begin, in));
   HycoOnRoot(HycoComm(f), Describe(in));
   PetscCall(DescribeBodies(f, mu, in->bodies));
@@ -228,6 +233,8 @@ static PetscErrorCode Begin(HycoFOM f, HycoInspection *in)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Several ranks assemble as they would in a solve; shapes and gaps are measured on rank 0, which has a model of its
+   own. */
 PetscErrorCode HycoInspect(HycoFOM f, HycoInspection *in)
 {
   PetscErrorCode ierr;
@@ -251,6 +258,7 @@ PetscErrorCode HycoInspect(HycoFOM f, HycoInspection *in)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Also of one that failed half-way. */
 PetscErrorCode HycoInspectionDestroy(HycoInspection *in)
 {
   PetscFunctionBegin;

@@ -27,6 +27,7 @@ static PetscErrorCode Envelope(Mat K, IS order, PetscReal *sum)
     PetscInt first = i;
 
     for (PetscInt k = ia[old[i]]; k < ia[old[i] + 1]; k++) first = PetscMin(first, new_of[ja[k]]);
+    /* A Cholesky factor fills a row from its first entry on, and nothing before it. */
     *sum += i - first;
   }
   PetscCall(MatRestoreRowIJ(K, 0, PETSC_FALSE, PETSC_FALSE, &n, &ia, &ja, &done));
@@ -89,6 +90,7 @@ PetscErrorCode HycoBanded(Mat K, PetscBool *thin)
   }
   PetscCall(MatGetSize(K, &n, NULL));
   PetscCall(MatGetInfo(K, MAT_LOCAL, &info));
+  /* Long rows: no order makes the envelope small. */
   if (info.nz_used > HYCO_THIN_ROW * (PetscReal)n) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatGetOrdering(K, MATORDERINGRCM, &row, &col));
   PetscCall(Envelope(K, row, &sum));

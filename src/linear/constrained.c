@@ -37,6 +37,7 @@ static PetscErrorCode LargestEigenvalue(Mat K, PetscReal *largest)
   PetscCall(KSPCreate(PetscObjectComm((PetscObject)K), &ksp));
   PetscCall(KSPSetOperators(ksp, K, K));
   PetscCall(KSPSetType(ksp, KSPCG));
+  /* From the coefficients of conjugate gradients, at no further product. */
   PetscCall(KSPSetComputeSingularValues(ksp, PETSC_TRUE));
   PetscCall(KSPSetTolerances(ksp, 1e-12, PETSC_DEFAULT, PETSC_DEFAULT, HYCO_EIGEN_ITS));
   PetscCall(KSPGetPC(ksp, &pc));
@@ -167,6 +168,7 @@ static PetscErrorCode SolveCoarsest(HycoConstrained c, HycoLevel *v, Vec r, Vec 
   PetscCall(HycoVecGather(v->mu, mu));
   PetscCall(PetscBLASIntCast(v->m, &m));
   LAPACKpotrs_("L", &m, &one, c->S, &m, mu, &m, &info);
+  /* z - Y mu with Y = K^-1 B^T. */
   for (PetscInt k = 0; k < v->m; k++) mu[k] = -mu[k];
   PetscCall(VecMAXPY(z, v->m, mu, c->Y));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -209,6 +211,7 @@ static PetscErrorCode Apply(PC shell, Vec r, Vec z)
   PetscCall(PCShellGetContext(shell, &c));
   v = c->level;
   PetscCall(VecCopy(r, v->r));
+  /* The multigrid cycle projects at each smoother. */
   if (c->coarse)
     PetscCall(Cycle(c, 0, v->r, z));
   else {

@@ -95,6 +95,7 @@ static PetscErrorCode FindAggregates(HycoLevel *fine, Mat coarse)
   PetscCall(VecDuplicate(fine->z, &fine->aggregate));
   PetscCall(VecGetOwnershipRange(fine->aggregate, &lo, &hi));
   PetscCall(VecGetArray(fine->aggregate, &a));
+  /* By node: all components of a node are in one aggregate. */
   for (PetscInt r = lo; r < hi; r += rows) {
     PetscCall(NodeAggregate(fine->P, r, rows, cols, &aggregate));
     for (PetscInt k = 0; k < rows; k++) a[r - lo + k] = aggregate;
@@ -122,6 +123,7 @@ static PetscErrorCode KnownOfB(Mat K, Mat B, const PetscInt at[], Known *known)
     const PetscInt *col;
     const PetscScalar *value;
 
+    /* The first unknown of the slave's node. */
     *mine = at[r - lo] / bs * bs;
     PetscCall(MatGetRow(B, r, &n, &col, &value));
     for (PetscInt k = 0; k < n; k++) {
@@ -146,6 +148,7 @@ static PetscErrorCode AggregatesAt(const HycoLevel *fine, const Known *known, Pe
   PetscFunctionBegin;
   PetscCall(ISCreateGeneral(PETSC_COMM_SELF, known->m, known->at, PETSC_USE_POINTER, &is));
   PetscCall(VecCreateSeq(PETSC_COMM_SELF, known->m, &here));
+  /* Repeated indices are allowed: a node may have several constraints. */
   PetscCall(VecScatterCreate(fine->aggregate, is, here, NULL, &scatter));
   PetscCall(HycoScatter(scatter, fine->aggregate, here));
   PetscCall(VecGetArrayRead(here, &a));
@@ -256,6 +259,7 @@ static PetscErrorCode CoarseB(HycoLevel *fine, const Known *known, Mat coarse_K,
   }
   PetscCall(HycoMatAssemble(A));
   PetscCall(MatMatMult(fine->B, fine->P, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &BP));
+  /* A^T B P: combinations of the constraints on the coarse unknowns. */
   PetscCall(MatTransposeMatMult(A, BP, MAT_INITIAL_MATRIX, PETSC_DEFAULT, B));
   HycoDestroyAll(&BP, &A);
   PetscCall(PetscFree3(first, count, weight));
@@ -361,6 +365,7 @@ static PetscErrorCode PrepareCoarsest(HycoConstrained c, HycoLevel *v, PetscBool
     PetscCall(KSPSolve(c->coarse, v->r, c->Y[j]));
     PetscCall(MatMult(v->B, c->Y[j], v->mu));
     PetscCall(HycoVecGather(v->mu, c->S + (size_t)j * (size_t)m));
+    /* A small shift: constraints that have become dependent on this level must not break the factor. */
     c->S[(size_t)j * (size_t)m + (size_t)j] *= 1 + HYCO_COARSE_SHIFT;
   }
   PetscCall(VecDestroy(&unit));
@@ -388,11 +393,13 @@ PetscErrorCode HycoConstrainedSet(HycoConstrained c, Mat B, const PetscInt at[],
     HycoLevel *v = &c->level[l];
     Known coarse;
 
+    /* Nothing is constrained on this level, nor on coarser ones. */
     if (!v->m) break;
     if (l == 0 || l + 1 < c->n) PetscCall(PrepareG(v, l ? HYCO_COARSE_SHIFT : 0, singular));
     if (*singular || l + 1 == c->n) break;
     PetscCall(FindAggregates(v, v[1].K));
     PetscCall(CoarseB(v, &known, v[1].K, &coarse, &v[1].B));
+    /* The finer level's are not needed any more. */
     PetscCall(KnownFree(&known));
     known = coarse;
     v[1].m = known.m;

@@ -141,6 +141,7 @@ static PetscErrorCode AllEntries(HycoDirect d, Mat K, Mat Bt, Mat B, PetscBool p
   PetscFunctionBegin;
   PetscCall(Entries(d, K, 0, 0, pattern, &at));
   if (B) PetscCall(Entries(d, B, d->n, 0, pattern, &at));
+  /* Symmetric: the lower triangle suffices. */
   if (B && !d->symmetric) PetscCall(Entries(d, Bt, 0, d->n, pattern, &at));
   d->id.nnz_loc = at;
   if (d->alone) { /* centralised entries: no communication */
@@ -158,6 +159,7 @@ static PetscErrorCode CountEntries(Mat K, Mat Bt, Mat B, size_t *n)
   const Mat all[3] = {K, Bt, B};
 
   PetscFunctionBegin;
+  /* MUMPS dislikes empty arrays. */
   *n = 1;
   for (int k = 0; k < 3; k++) {
     MatInfo info;
@@ -218,6 +220,7 @@ static PetscErrorCode ReadControls(HycoDirect d)
     PetscCall(PetscSNPrintf(name, sizeof(name), "-icntl_%d", k));
     PetscCall(PetscOptionsGetInt(NULL, "hyco_mumps_", name, &i, NULL));
     ICNTL(d, k) = (MUMPS_INT)i;
+    /* There are 60 integer controls, and fewer real ones. */
     if (k > 15) continue;
     r = d->id.cntl[k - 1];
     PetscCall(PetscSNPrintf(name, sizeof(name), "-cntl_%d", k));
@@ -296,6 +299,7 @@ static PetscErrorCode Analyse(HycoDirect d, Mat K, Mat Bt, Mat B)
              "MUMPS could not analyse K (INFOG(1) = %d, INFOG(2) = %d); use -hyco_linear iterative, or other "
              "-hyco_mumps_icntl_...",
              (int)INFOG(d, 1), (int)INFOG(d, 2));
+  /* Used by the analysis alone. */
   PetscCall(PetscFree(d->id.perm_in));
   PetscCall(MatCreateVecs(K, &x, NULL));
   PetscCall(VecScatterCreateToZero(x, &d->to_root, &d->root));
@@ -323,6 +327,7 @@ static PetscErrorCode SamePattern(HycoDirect d, Mat K, Mat B, PetscBool *same)
   }
   *same = (PetscBool)(d->begun && d->K_id == K_id && d->B_id == B_id && d->K_pattern == K_pattern &&
                       d->B_pattern == B_pattern);
+  /* Values may differ: the analysis depends on the pattern. */
   if (!*same) PetscCall(Release(d));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -344,6 +349,7 @@ PetscErrorCode HycoDirectAnalyse(HycoDirect d, Mat K, Mat Bt, Mat B, PetscBool s
     d->n_schur = d->n_pinned + d->m;
     PetscCall(Analyse(d, K, Bt, B));
   }
+  /* INFOG(17): megabytes over all ranks. */
   *bytes = 1e6 * (PetscReal)INFOG(d, 17) + 8. * (PetscReal)d->n_schur * (PetscReal)d->n_schur;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -372,6 +378,7 @@ static PetscErrorCode SpreadSchur(HycoDirect d, PetscReal M[])
   for (size_t j = 0; j < n && d->rank == 0; j++) {
     for (size_t i = (size_t)d->n_pinned; i < n; i++) M[j * n + i] = -M[j * n + i];
   }
+  /* Column by column: counts of MPI are ints. */
   for (size_t j = 0; j < n; j++) HycoBcast(M + j * n, n, MPIU_REAL, d->comm);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -418,6 +425,7 @@ static PetscErrorCode Fetch(HycoDirect d, Vec v)
   d->id.rhs = d->rhs;
   d->id.nrhs = 1;
   d->id.lrhs = d->id.n;
+  /* The reduced right-hand side of the Schur unknowns. */
   d->id.redrhs = d->reduced;
   d->id.lredrhs = d->id.size_schur;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -500,6 +508,7 @@ PetscErrorCode HycoDirectReduceMany(HycoDirect d, PetscInt k, const Vec F[], Pet
   PetscFunctionBegin;
   if (!k) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(CondenseMany(d, k, F, &all, &reduced));
+  /* Work on pinned motions has the opposite sign, as in SpreadSchur(). */
   for (PetscInt i = 0; i < k * d->n_schur && d->rank == 0; i++)
     q[i] = i % d->n_schur < d->n_pinned ? -reduced[i] : reduced[i];
   HycoFreeAll(&all, &reduced);
@@ -517,6 +526,7 @@ PetscErrorCode HycoDirectExpandMany(HycoDirect d, PetscInt k, const Vec F[], con
   if (!k) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(CondenseMany(d, k, F, &all, &reduced));
   if (d->rank == 0) PetscCall(PetscArraycpy(reduced, z, (size_t)d->n_schur * (size_t)k));
+  /* Phase 2: the expansion from the Schur unknowns. */
   PetscCall(Run(d, 2));
   for (PetscInt j = 0; j < k; j++) {
     if (d->rank == 0) PetscCall(PetscArraycpy(d->rhs, all + rows * (size_t)j, d->n));

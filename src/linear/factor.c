@@ -13,6 +13,7 @@ PetscErrorCode HycoOperatorStateUpdate(HycoOperatorState *seen, Mat K, Mat B, Pe
   if (B) PetscCall(PetscObjectStateGet((PetscObject)B, &b));
   PetscCall(PetscObjectGetId((PetscObject)K, &K_id));
   if (B) PetscCall(PetscObjectGetId((PetscObject)B, &B_id));
+  /* Object and state: another matrix may have the same state count. */
   *same = (PetscBool)(seen->K == K_id && seen->B == B_id && seen->K_state == k && seen->B_state == b);
   seen->K = K_id;
   seen->B = B_id;
@@ -113,6 +114,7 @@ PetscErrorCode HycoFactor(KSP ksp, PetscBool *singular)
     Mat factor;
 
     PetscCall(PCFactorGetMatrix(pc, &factor));
+    /* Per cent of workspace beyond the estimate. */
     PetscCall(MatMumpsSetIcntl(factor, 14, room));
     {
       Mat K;

@@ -21,6 +21,7 @@ PetscErrorCode HycoIterativeSolver(MPI_Comm comm, const char prefix[], Mat K, KS
   PetscCall(KSPGetPC(*ksp, &pc));
   PetscCall(PCSetType(pc, PCGAMG));
   PetscCall(PCGAMGSetType(pc, PCGAMGAGG));
+  /* Aggregates depend on the pattern; the next set changes few entries. */
   PetscCall(PCGAMGSetReuseInterpolation(pc, PETSC_TRUE));
   PetscCall(KSPSetFromOptions(*ksp));
   PetscCall(KSPSetErrorIfNotConverged(*ksp, PETSC_FALSE));

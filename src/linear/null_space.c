@@ -14,6 +14,7 @@ PetscErrorCode HycoKernelSize(Mat K, PetscInt *n)
   *n = 0;
   PetscCall(MatGetNullSpace(K, &kernel));
   if (kernel) PetscCall(MatNullSpaceGetVecs(kernel, &constant, n, NULL));
+  /* The constant vector is no rigid motion of a vector field. */
   PetscCheck(!constant, PetscObjectComm((PetscObject)K), PETSC_ERR_SUP,
              "give the null space of K by vectors only (MatNullSpaceCreate() without the constant)");
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -80,7 +81,9 @@ PetscErrorCode HycoKernelPins(MPI_Comm comm, Mat K, PetscInt n, PetscInt pinned[
   PetscCall(Rows(K, n, &rows, &row));
   PetscCall(PetscMalloc1(n, &unit));
   for (PetscInt p = 0; p < n; p++) { /* pivoted Gram-Schmidt on the rows */
+    /* The row that is largest over all ranks; ties go to the smallest number. */
     PetscCall(Longest(comm, first, rows, n, row, &pinned[p], unit));
+    /* What the pin holds is removed from the other rows. */
     for (PetscInt i = 0; i < rows; i++) {
       PetscReal dot = 0;
 
@@ -110,6 +113,7 @@ static PetscErrorCode WorkOn(Vec z, Vec F, Vec b, Vec Kx, PetscReal least, Vec w
   PetscCall(VecNorm(work, NORM_1, &rounding));
   PetscCall(VecNorm(z, NORM_2, &norm));
   size = PetscMax(all[0] + all[1], least * norm);
+  /* Of at most 1 per cent: beyond it an unbalanced load would be hidden. */
   rounding = PetscMin(16 * PETSC_MACHINE_EPSILON * rounding, 1e-2 * size);
   *share = size > 0 ? PetscMax(PetscAbsReal(on[0] - on[1]) - rounding, 0) / size : 0;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -131,6 +135,7 @@ PetscErrorCode HycoKernelWork(Mat K, Vec x, Vec F, Vec b, PetscReal *share)
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
   HycoVecDuplicate(F, &work, &Kx);
   PetscCall(MatGetDiagonal(K, Kx));
+  /* diag(K) x: the size of the terms of K x. */
   PetscCall(VecPointwiseMult(Kx, Kx, x));
   PetscCall(VecNorm(F, NORM_2, &norm[0]));
   if (b) PetscCall(VecNorm(b, NORM_2, &norm[1]));

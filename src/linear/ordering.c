@@ -52,6 +52,7 @@ static PetscErrorCode Dissect(PetscInt n, const PetscInt degree[], const PetscIn
   PetscFunctionBegin;
   PetscCall(PetscMalloc3(n + 1, &xadj, n, &perm, n, &iperm));
   xadj[0] = 0;
+  /* From degrees to starts: ranks could send their degrees as they were. */
   for (PetscInt i = 0; i < n; i++) xadj[i + 1] = xadj[i] + (idx_t)degree[i];
   PetscCall(PetscMalloc1(xadj[n] + 1, &adjncy));
   for (idx_t k = 0; k < xadj[n]; k++) adjncy[k] = (idx_t)next[k];
@@ -78,6 +79,7 @@ PetscErrorCode HycoDissection(MPI_Comm comm, Mat K, PetscInt place[])
   if (HycoRank(comm) == 0) PetscCall(PetscMalloc1(n_all, &node));
   HycoOnRoot(comm, Dissect(n_all, degree, edges, node));
   for (PetscInt i = 0; i < n_all; i++) {
+    /* Nodes are ordered, unknowns of a node follow each other: a third of the graph. */
     for (PetscInt c = 0; c < bs; c++) place[i * bs + c] = node[i] * bs + c;
   }
   HycoFreeAll(&node, &degree, &edges);

@@ -44,6 +44,7 @@ PetscErrorCode HycoRefine(PetscBLASInt n, const PetscReal K[], PetscBLASInt lda,
   for (PetscInt step = 0; step < MAX_STEPS; step++) {
     PetscReal change = 0, size = 0;
 
+    /* In twice the working precision: otherwise refinement would stop at the error of the residual. */
     Residual(n, K, lda, b, low, x, r);
     LAPACKgetrs_("N", &n, &one, lu, &n, ipiv, r, &n, &info);
     for (PetscBLASInt i = 0; i < n; i++) {

@@ -15,6 +15,7 @@ static PetscErrorCode RowBlocks(Mat K, PetscInt block, PetscInt bs, PetscInt *n_
 
     PetscCall(MatGetRow(K, r, &n, &col, NULL));
     for (PetscInt k = 0; k < n; k++) {
+      /* Columns of a row are ascending: equal blocks follow each other. */
       if (col[k] / bs > block && col[k] / bs != column[*n_blocks - 1]) column[(*n_blocks)++] = col[k] / bs;
     }
     PetscCall(MatRestoreRow(K, r, &n, &col, NULL));
@@ -31,6 +32,7 @@ static PetscErrorCode CopyRow(Mat K, PetscInt block, PetscInt bs, PetscInt colum
   PetscFunctionBegin;
   PetscCall(RowBlocks(K, block, bs, &blocks, column));
   width = blocks * bs;
+  /* A block may lack entries that the row's other unknowns have. */
   PetscCall(PetscArrayzero(value, bs * width));
   for (PetscInt r = 0; r < bs; r++) {
     PetscInt n, at = 0;

@@ -53,15 +53,19 @@ static void StartCreep(const HycoFlowRule *rule, Work *w)
 
   w->q = trial;
   w->creep = w->slope = 0;
+  /* Without creep q_tr is final here; yielding, if the law yields, is applied by the end of the step. */
   w->done = PETSC_TRUE;
   if (!rule->creep || !(w->p.dt > 0) || !(trial > 0)) return;
   w->creep = (*rule->creep)(&w->p, trial, &w->slope);
   if (!(w->creep > 0)) return;
   w->done = PETSC_FALSE;
+  /* The root lies between 0 and q_tr, since creep only relaxes: Newton's iterates are kept in this interval. */
   w->b.lo = 0;
   w->b.hi = trial;
   w->b.iterations = 0;
   if (w->H * w->creep > trial) {
+    /* The law's exponent at q_tr, and the root of H creep = q_tr of a power law of that exponent; the last line is one
+       more step, for q + H creep(q) = q_tr. */
     const PetscReal power = trial * w->slope / w->creep;
     const PetscReal guess = trial * PetscPowReal(trial / (w->H * w->creep), 1 / power);
 
@@ -80,6 +84,7 @@ static void IterateCreep(const HycoFlowRule *rule, Work *w)
 
   if (w->H * w->slope > 1 && rest > 0)
     newton = old - PetscLogReal(w->H * w->creep / rest) / (w->slope / w->creep + 1 / rest); /* NaN if creep overflows */
+  /* The function rises in q: its sign says on which side of the root q is, whatever Newton's step does. */
   if (excess < 0)
     w->b.lo = old;
   else if (excess == 0) {
@@ -88,6 +93,7 @@ static void IterateCreep(const HycoFlowRule *rule, Work *w)
   } else
     w->b.hi = old;
   w->done = Advance(&w->b, newton, &w->q);
+  /* Only after a step of Newton's: after a bisection the tangent at the old q says nothing about the new one. */
   if (w->done && w->q == newton) {
     const PetscReal power = old * w->slope / w->creep, change = (w->q - old) / old;
 
@@ -159,6 +165,7 @@ static PetscReal Trial(PetscInt ns, PetscReal G, PetscReal bulk, const PetscReal
   PetscReal sum = 0;
 
   *pressure = bulk * trace;
+  /* In 2D there is an out-of-plane component as well: the first three are always the normal ones. */
   for (PetscInt c = 0; c < 3; c++) {
     s[c] = 2 * G * (elastic[c] - trace / 3);
     sum += s[c] * s[c];
@@ -196,6 +203,7 @@ static void Energies(const HycoFlowRule *rule, const HycoFlowPoint *p, HycoMater
   PetscReal sum = 0;
 
   m->stored[i] = elastic;
+  /* The equivalent inelastic strain of the step, by which the size of steps is chosen. */
   if (m->increment) m->increment[i] = f->creep + f->plastic;
   for (PetscInt c = 0; m->dissipated && c < ns; c++)
     sum +=
@@ -234,20 +242,23 @@ static void Finish(const HycoFlowRule *rule, HycoMaterialPoints *m, PetscInt i, 
   const PetscReal young = m->constant[0][i], poisson = m->constant[1][i], *strain = m->strain + i * ns;
   const PetscReal *state0 = m->state0 + i * (ns + 2);
   const Flow f = Solve(rule, w);
+  /* 3/2 s/q_tr is the flow direction of von Mises; in 1D the sign of the stress. Without a trial stress there is no
+     direction, and nothing flows. */
   const PetscReal dp = f.creep + f.plastic, unit = w->trial > 0 ? (ns == 1 ? 1.0 : 1.5) / w->trial : 0;
   const PetscReal left = w->trial > 0 ? f.q / w->trial : 0;
   PetscReal *state = m->state + i * (ns + 2), *stress = m->stress + i * ns, N[6], energy = 0;
 
   for (PetscInt c = 0; c < ns; c++) {
     N[c] = unit * w->s[c];
+    /* Shear strains of the state are engineering ones, like the strains: twice the tensor's. */
     state[c] = state0[c] + (c < 3 ? dp : 2 * dp) * N[c];
     stress[c] = left * w->s[c] + (c < 3 ? w->pressure : 0);
     energy += stress[c] * (strain[c] - state[c]) / 2;
   }
   state[ns] = state0[ns] + f.creep;
   state[ns + 1] = state0[ns + 1] + f.plastic;
-  if (m->tangent && ns == 1)
-    m->tangent[i] = young - young * young * f.slope;
+  if (m->tangent && ns == 1) m->tangent[i] = young - young * young * f.slope;
+  /* At rest dp / q_tr has the limit of the slope, so that the tangent is continuous there. */
   else if (m->tangent)
     Tangent(ns, young / (2 * (1 + poisson)), young / (3 * (1 - 2 * poisson)), f.slope,
             w->trial > 0 ? dp / w->trial : f.slope, N, m->tangent + i * ns * ns);
@@ -281,6 +292,7 @@ static void UpdateBlock(const HycoFlowRule *rule, HycoMaterialPoints *m, PetscIn
     Begin(m, i, w);
   }
   for (PetscInt k = 0; k < n; k++) {
+    /* The points that iterate are kept in a dense list: those that are done cost nothing. */
     StartCreep(rule, &work[k]);
     if (!work[k].done) active[left++] = k;
   }
@@ -295,6 +307,8 @@ static void UpdateBlock(const HycoFlowRule *rule, HycoMaterialPoints *m, PetscIn
   }
   for (PetscInt k = 0; k < n; k++) {
     Finish(rule, m, first + k, &work[k]);
+    /* Any component of a stress that is not finite has made all of them so: the first is enough. The comparison also
+       fails for NaN. */
     if (m->failed >= 0 || PetscAbsReal(m->stress[(first + k) * ns]) < PETSC_INFINITY) continue;
     m->failed = first + k;
     m->why = "the stress is not finite";

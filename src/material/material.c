@@ -139,6 +139,7 @@ PetscErrorCode HycoMaterialSetStateNames(HycoMaterial material, PetscInt n_state
   for (PetscInt k = 0; material->state_name && k < material->n_state; k++)
     PetscCall(PetscFree(material->state_name[k]));
   PetscCall(PetscFree(material->state_name));
+  /* Also without names: the number is what the history's storage depends on. */
   material->n_state = n_state;
   if (!n_state || !names) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscCalloc1(n_state, &material->state_name));
@@ -186,10 +187,13 @@ PetscErrorCode HycoMaterialSetUp(HycoMaterial material, PetscInt dim, HycoFormul
 {
   PetscFunctionBegin;
   material->formulation = formulation;
+  /* First, since it is the law's setup that decides the number of state variables checked below. */
   if (material->ops->setup) PetscCall((*material->ops->setup)(material, dim));
   HycoCheck(has_history || (material->linear && !material->n_state),
             "body %s: its law %s is history-dependent; give the scene a history: {times: [...]}",
             ((PetscObject)material)->name, ((PetscObject)material)->type_name);
+  /* Plane stress is reached by eliminating the thickness strain from a constant tangent, which an inelastic law has
+     not. */
   HycoCheck(material->linear || formulation != HYCO_PLANE_STRESS,
             "body %s: its law %s is inelastic, and plane_stress is for linear laws; use scene_formulation plane_strain "
             "or a 3D mesh",
@@ -206,6 +210,7 @@ PetscBool HycoMaterialChanges(HycoMaterial material, const PetscBool changed[])
   for (PetscInt j = 0; j < material->constants.n; j++) {
     const HycoExpr expr = material->constants.entry[j].expr;
 
+    /* Only a constant that is given as a function of the temperature sees that the temperature changes. */
     constant[j] = (PetscBool)(HycoExprChanges(expr, changed) ||
                               (HycoExprInHeat(expr) && HycoExprChanges(material->temperature, changed)));
     any = (PetscBool)(any || constant[j]);
@@ -254,6 +259,7 @@ void HycoTangentApply(PetscBool isotropic, PetscInt dim, const PetscReal tangent
 {
   const PetscInt n = HycoStrainSize(dim);
 
+  /* tangent: Lame's lambda and mu. A bar has the modulus alone, which is kept in the place of mu. */
   if (isotropic && dim == 1) {
     stress[0] = tangent[1] * strain[0];
   } else if (isotropic) {
@@ -279,6 +285,7 @@ static void ExpandLame(PetscInt dim, const PetscReal lame[2], PetscReal tangent[
   for (PetscInt c = 0; c < ns; c++) {
     PetscReal unit[6] = {0, 0, 0, 0, 0, 0}, column[6];
 
+    /* Column c by the same formula as the stresses, so that both forms agree to the last bit. */
     unit[c] = 1;
     HycoTangentApply(PETSC_TRUE, dim, own, unit, column);
     for (PetscInt r = 0; r < ns; r++) tangent[r * ns + c] = column[r];
@@ -324,6 +331,7 @@ static PetscErrorCode CheckConstant(const HycoEntry *e, const PetscReal mu[], Pe
 
     if (value[i] > e->lo && value[i] < e->hi) continue;
     PetscCall(HycoExprPlace(e->expr, mu, x + 3 * i, place));
+    /* A one-sided interval is said in words: "between 0 and infinity" helps nobody. */
     if (e->hi >= PETSC_INFINITY && (e->lo == 0 || e->lo == HYCO_NOT_NEGATIVE))
       HycoFail("%s is %g at %s; %s must %s", HycoExprKey(e->expr), (double)value[i], place, e->title,
                e->lo == 0 ? "be positive" : "not be negative");
@@ -369,6 +377,7 @@ PetscErrorCode HycoMaterialConstants(HycoMaterial material, const PetscReal mu[]
     PetscReal *value = work + j * n;
 
     constant[j] = value;
+    /* The default first: an entry that the scene does not give has no expression. */
     for (PetscInt i = 0; i < n; i++) value[i] = d->entry[j].value;
     if (!d->entry[j].expr) continue;
     PetscCall(HycoExprEvalHot(d->entry[j].expr, mu, n, x, temperature, value));
@@ -386,6 +395,7 @@ static PetscErrorCode RestTangents(HycoMaterial material, HycoMaterialPoints *p)
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(n, &zero));
+  /* Inputs are all zero and may share one array; outputs must not overlap them. */
   p->strain0 = p->strain = p->stress0 = zero;
   p->stress = zero + 2 * p->n * p->n_strain;
   p->state0 = zero + 3 * p->n * p->n_strain;
@@ -434,6 +444,7 @@ PetscErrorCode HycoMaterialTangents(HycoMaterial material, PetscInt dim, const P
   PetscCall(HycoMaterialConstants(material, mu, n, x, temperature, work, constant));
   p.tangent = tangent;
   p.temperature0 = p.temperature = temperature;
+  /* Isotropic laws give two constants a point, from which the integration is much cheaper than from a matrix. */
   if (material->ops->isotropic)
     PetscCall((*material->ops->isotropic)(material, &p, tangent));
   else if (material->linear)
@@ -442,6 +453,7 @@ PetscErrorCode HycoMaterialTangents(HycoMaterial material, PetscInt dim, const P
     PetscCall(RestTangents(material, &p));
   if (material->ops->isotropic && HycoMaterialTangentSize(material, dim) != 2) ExpandAll(dim, n, tangent);
   for (PetscInt i = 0; i < n && p.failed < 0 && !material->ops->isotropic; i++) {
+    /* Isotropic ones are definite by the intervals of their constants, checked above. */
     if (IsDefinite(dim, tangent + i * p.n_strain * p.n_strain)) continue;
     p.failed = i;
     p.why = "the tangent is not symmetric and positive definite";
@@ -449,6 +461,7 @@ PetscErrorCode HycoMaterialTangents(HycoMaterial material, PetscInt dim, const P
   HycoCheck(p.failed < 0, "body %s, law %s: %s at x = %g, y = %g, z = %g", ((PetscObject)material)->name,
             ((PetscObject)material)->type_name, p.why ? p.why : "no answer", (double)x[3 * p.failed],
             (double)x[3 * p.failed + 1], (double)x[3 * p.failed + 2]);
+  /* Last: the check is of the law in 3D, before the thickness strain is eliminated. */
   if (material->formulation == HYCO_PLANE_STRESS) ReleaseThickness(n, tangent);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

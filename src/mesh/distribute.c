@@ -130,8 +130,9 @@ static PetscErrorCode NumberPoints(DM dm)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* For a DM that another program made: adds tags, requires faces and edges as points (a facet of a group must be
-   one), and completes the labels, so that a group of facets contains its nodes. Collective. */
+/* For a DM that another program made: adds tags, requires faces and edges as points (a facet of a group must be one),
+   and completes the labels, so that a group of facets contains its nodes. Collective. Tags order nodes and cells on any
+   number of ranks, which DMPlex's own numbers do not. */
 PetscErrorCode HycoPlexComplete(DM dm)
 {
   PetscInt n, dim, depth;

@@ -75,9 +75,11 @@ static PetscErrorCode Collect(const HycoMsh *mesh, PetscInt *n, Wanted **list)
 
       w->group = k;
       w->element = j / each;
+      /* A quadrilateral of the boundary is its own face; a hexahedron has six. */
       w->face = each == 1 ? ITSELF : j % each;
       n_corners = Around(mesh, w, node, &n_sides);
       for (PetscInt c = 0; c < CORNERS; c++) w->corner[c] = c < n_corners ? node[c] : -1;
+      /* Sorted corners name the position, whichever element looks at it. */
       PetscCall(PetscSortInt(n_corners, w->corner));
     }
   }

@@ -60,6 +60,7 @@ PetscInt HycoMeshFace(HycoMesh m, PetscInt cell, PetscInt number, PetscInt node[
     PetscBool again = PETSC_FALSE;
 
     node[v] = m->cells[cell * m->nv + face[m->type][number][v]];
+    /* Few nodes: comparing all pairs is cheaper than sorting. */
     for (PetscInt w = 0; w < v; w++) again = (PetscBool)(again || node[w] == node[v]);
     n += !again;
   }

@@ -24,8 +24,9 @@ static PetscErrorCode CreateSF(HycoFileOrder *o, HycoPlace place, PetscInt n, co
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rows of nodes and of cells by ascending tag. Each row has one leaf: a node at its owner, a cell at the owner of
-   its first node, so that overlapping parts send nothing twice. Collective. */
+/* Rows of nodes and of cells by ascending tag. Each row has one leaf: a node at its owner, a cell at the owner of its
+   first node, so that overlapping parts send nothing twice. Collective. Files are then the same byte by byte, whatever
+   the number of ranks. */
 PetscErrorCode HycoFileOrderCreate(MPI_Comm comm, HycoMesh m, PetscBool root, HycoFileOrder **order)
 {
   PetscInt *leaf, *row;
@@ -89,7 +90,8 @@ PetscErrorCode HycoSFBcast(PetscSF sf, MPI_Datatype type, PetscInt width, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The reverse: leaf to root, for star forests with one leaf per root, hence MPI_REPLACE. Collective. */
+/* The reverse: leaf to root, for star forests with one leaf per root, hence MPI_REPLACE. Collective. With several
+   leaves at one root the last would win, which MPI does not define. */
 PetscErrorCode HycoSFSend(PetscSF sf, MPI_Datatype type, PetscInt width, const void *leaf, void *root)
 {
   MPI_Datatype unit;

@@ -234,7 +234,8 @@ static PetscErrorCode SendColumns(Gather *g, PetscSF sf, PetscInt n, const Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sends the points of the shares, with tags and ties. */
+/* Sends the points of the shares, with tags and ties. DMPlex moves points, cones and labels; tags and ties are not
+   known to it. */
 static PetscErrorCode Migrate(Gather *g)
 {
   PetscBool *own;
@@ -313,6 +314,7 @@ static PetscErrorCode MakeSubmesh(const Gather *g, HycoMesh *sub)
   }
   for (PetscInt k = 0; k < m->n_groups; k++) {
     m->group_dim[k] = g->part->group_dim[k]; /* also of groups without points here */
+    /* Groups that are gathered as a whole keep the facets without a cell here. */
     if (g->in && g->in[k]) all[n_all++] = k;
   }
   /* The gathered points include cells that were only needed for their facets; the submesh drops them and makes their
@@ -336,6 +338,7 @@ PetscErrorCode HycoMeshGather(HycoScene scene, HycoMesh part, const PetscBool in
   *mesh = NULL;
   PetscCallMPI(MPI_Comm_rank(g.comm, &g.rank));
   PetscCall(Choose(&g));
+  /* Each rank cuts its own points before they travel. */
   PetscCall(CutShare(&g));
   PetscCall(Migrate(&g));
   HycoOnRoot(g.comm, MakeSubmesh(&g, mesh));

@@ -10,7 +10,8 @@
 
 #define TOPOLOGY "mesh" /* the name under which hyco writes */
 
-/* The tags in the order of the points' global numbers, which run by depth. */
+/* The tags in the order of the points' global numbers, which run by depth. So that tags written beside the topology
+   belong to its points in the file. */
 static PetscErrorCode OrderTags(DM dm, IS *ordered)
 {
   const MPI_Comm comm = PetscObjectComm((PetscObject)dm);
@@ -153,6 +154,7 @@ PetscErrorCode HycoPlexRead(MPI_Comm comm, const char path[], DM *dm)
   PetscCall(DMPlexTopologyLoad(*dm, viewer, &from_file));
   PetscCall(DMPlexLabelsLoad(*dm, viewer, from_file));
   PetscCall(DMPlexCoordinatesLoad(*dm, viewer, from_file));
+  /* Tags in outputs are those of the file, whatever order PETSc gives the points. */
   PetscCall(LoadTags(*dm, viewer, from_file));
   PetscCall(PetscSFDestroy(&from_file));
   PetscCall(PetscViewerPopFormat(viewer));

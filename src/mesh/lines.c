@@ -32,7 +32,8 @@ static Edge EdgeOf(HycoMesh m, PetscInt cell, PetscInt number, PetscInt k)
   return edge;
 }
 
-/* The edges with all nodes in the group, by ascending key, without repetition. */
+/* The edges with all nodes in the group, by ascending key, without repetition. A line load has no elements of its own
+   in a 3D mesh: the edges are those of cells between nodes of the group. */
 static PetscErrorCode FindEdges(HycoMesh m, const PetscBool in[], PetscInt *n, Edge **edge)
 {
   /* Each edge of a cell occurs in two of its faces and in all cells around it; duplicates go after the sort. */
@@ -57,7 +58,8 @@ static PetscErrorCode FindEdges(HycoMesh m, const PetscBool in[], PetscInt *n, E
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Checks that no node owned by this process has more than two segments, or two that a third closes to a triangle. */
+/* Checks that no node owned by this process has more than two segments, or two that a third closes to a triangle. The
+   load per length would act on the wrong edges, without any other sign of it. */
 static PetscErrorCode CheckPath(HycoMesh m, PetscInt group, PetscInt n, const Edge edge[], PetscInt next[])
 {
   PetscFunctionBegin;
@@ -102,10 +104,12 @@ PetscErrorCode HycoMeshLine(HycoMesh m, PetscInt group, PetscInt *n, PetscInt **
   PetscCall(FindEdges(m, in, n, &edge));
   PetscCall(PetscFree(in));
   PetscCall(PetscMalloc1(2 * m->n_nodes, &next));
+  /* A branch has no direction in which a load per length could go on. */
   ierr = CheckPath(m, group, *n, edge, next);
   PetscCall(PetscFree(next));
   if (!ierr) ierr = PetscMalloc1(width * *n, segment);
   for (PetscInt k = 0; k < *n && !ierr; k++) {
+    /* Both nodes of an edge were packed into one key to be sorted. */
     (*segment)[width * k] = (PetscInt)(edge[k].key / m->n_nodes);
     (*segment)[width * k + 1] = (PetscInt)(edge[k].key % m->n_nodes);
     if (width > 2) (*segment)[width * k + 2] = edge[k].middle;

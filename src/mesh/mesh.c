@@ -13,8 +13,8 @@ const HycoCellKind HycoCellKinds[HYCO_N_CELL_TYPES] = {
 /* The container, composed with a DM, of its tables. */
 #define TABLES "HycoTables"
 
-/* The destructor of the container on the DM, and for tables without a DM; also of half-made tables, whose other
-   arrays are NULL. */
+/* The destructor of the container on the DM, and for tables without a DM; also of half-made tables, whose other arrays
+   are NULL. Called when the last reference to the DM goes. */
 static PetscErrorCode FreeTables(void *tables)
 {
   HycoMesh m = (HycoMesh)tables;
@@ -38,6 +38,7 @@ PetscErrorCode HycoMeshDestroy(HycoMesh *mesh)
 
   PetscFunctionBegin;
   *mesh = NULL;
+  /* The tables go with the DM's last reference. */
   if (dm)
     PetscCall(DMDestroy(&dm));
   else if (m)
@@ -60,7 +61,8 @@ PetscErrorCode HycoMeshSetDM(HycoMesh m, DM dm)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The tables that a DM already has (borrowed), NULL: none. Not collective. */
+/* The tables that a DM already has (borrowed), NULL: none. Not collective. Several models of one DM share the
+   tables. */
 PetscErrorCode HycoMeshQuery(DM dm, HycoMesh *mesh)
 {
   PetscContainer container;
@@ -72,7 +74,8 @@ PetscErrorCode HycoMeshQuery(DM dm, HycoMesh *mesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The container must not free the tables when it goes, hence the destructor is removed first. */
+/* The container must not free the tables when it goes, hence the destructor is removed first. The tables are then the
+   caller's alone. */
 PetscErrorCode HycoMeshDetach(HycoMesh m)
 {
   PetscContainer container;
@@ -101,6 +104,7 @@ PetscErrorCode HycoMeshFindGroup(HycoMesh mesh, const char key[], const char nam
     }
     PetscCall(HycoListAdd(list, ", ", mesh->group_name[g]));
   }
+  /* A typing error is the usual reason. */
   near = HycoNearest(name, mesh->n_groups, (const char *const *)mesh->group_name);
   if (near) HycoFail("%s: the mesh has no group \"%s\"; its groups are: %s; did you mean %s?", key, name, list, near);
   HycoFail("%s: the mesh has no group \"%s\"; its groups are: %s", key, name, list);
@@ -127,13 +131,15 @@ static PetscErrorCode CheckPointLoad(HycoMesh mesh, const HycoPointLoad *load)
   dim = mesh->group_dim[group];
   HycoCheck(dim < mesh->dim, "the force on %s: that group has cells, and is not a body of the scene; add it under body",
             load->group);
+  /* In 2D a line is the boundary, in 3D it is an edge or a wire. */
   HycoCheck(!dim || dim < mesh->dim - 1,
             "the force on %s: that group is a boundary; write traction: %s: {...} (force per unit %s)", load->group,
             load->group, mesh->dim == 3 ? "area" : "length");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Stiffness per area of a surface, or of single points; a normal component needs a surface. */
+/* Stiffness per area of a surface, or of single points; a normal component needs a surface. Lines in 3D have no area
+   and no normal. */
 static PetscErrorCode CheckSpring(HycoMesh mesh, const HycoSpring *spring)
 {
   PetscInt group, dim;
@@ -161,6 +167,7 @@ static PetscErrorCode CheckTie(HycoMesh mesh, const HycoTie *tie)
     PetscInt group = 0;
 
     PetscCall(HycoMeshFindGroup(mesh, "tie", name, &group));
+    /* Both sides are surfaces: points have no facets to project to. */
     HycoCheck(mesh->group_dim[group] == mesh->dim - 1,
               "tie %s: its %s must be a group of dimension %d; %s has dimension %d", tie->name,
               side ? "master" : "slave", (int)mesh->dim - 1, name, (int)mesh->group_dim[group]);
@@ -180,6 +187,7 @@ static PetscErrorCode CheckContact(HycoMesh mesh, HycoContact contact)
             contact->slave);
   if (!contact->master) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoMeshFindGroup(mesh, "contact", contact->master, &group));
+  /* Types that search need facets to project to. */
   HycoCheck(!contact->ops->find || mesh->group_dim[group] == mesh->dim - 1,
             "contact %s: the master group %s has dimension %d; a group of dimension %d is needed", contact->name,
             contact->master, (int)mesh->group_dim[group], (int)mesh->dim - 1);
@@ -222,6 +230,7 @@ PetscErrorCode HycoMeshCheckGroups(HycoMesh mesh, HycoScene scene)
               "contact %s: type surface needs first-order cells, and the mesh has %s; use type: mortar, matching "
               "meshes with type: pair, or mesh with gmsh -order 1",
               scene->contact[k]->name, HycoCellKinds[mesh->type].name);
+  /* Outputs last: their group alone is checked, its meaning by the outputs. */
   for (PetscInt k = 0; k < scene->n_quantities; k++) {
     if (scene->quantity[k].group) PetscCall(HycoMeshFindGroup(mesh, "output", scene->quantity[k].group, &group));
   }
@@ -340,6 +349,7 @@ PetscErrorCode HycoMeshOwners(MPI_Comm comm, HycoMesh part, PetscInt n, const Pe
   PetscFunctionBegin;
   PetscCall(PetscLayoutCreateFromSizes(comm, part->n_owned, PETSC_DETERMINE, 1, &layout));
   for (PetscInt k = 0; k < n; k++) {
+    /* Bisection only when the owner changes. */
     if (global[k] < layout->range[last] || global[k] >= layout->range[last + 1])
       PetscCall(PetscLayoutFindOwner(layout, global[k], &last));
     owner[k] = last;
@@ -348,8 +358,8 @@ PetscErrorCode HycoMeshOwners(MPI_Comm comm, HycoMesh part, PetscInt n, const Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The cells around each node in CSR, masters of tied nodes included; cells ascend at each node. The caller frees
-   both arrays. */
+/* The cells around each node in CSR, masters of tied nodes included; cells ascend at each node. The caller frees both
+   arrays. Two passes: count, then fill. */
 PetscErrorCode HycoMeshNodeCells(HycoMesh m, PetscInt **start, PetscInt **cell)
 {
   PetscInt *next, node[HYCO_MAX_CELL_NODES];

@@ -47,11 +47,13 @@ static long long ReadInt(Msh *m, size_t bytes)
 
   if (m->failed) return 0;
   if (m->binary) {
+    /* No read past the end, whatever the file declares. */
     if ((size_t)(m->end - m->at) < bytes) {
       m->failed = PETSC_TRUE;
     } else if (bytes == 4) {
       int word;
 
+      /* Not a cast: numbers of a binary file lie at any address. */
       memcpy(&word, m->at, 4);
       value = word;
     } else {
@@ -68,7 +70,8 @@ static long long ReadInt(Msh *m, size_t bytes)
   return value;
 }
 
-/* A read past the end marks the file as failed and returns 0; the caller checks once per node. */
+/* A read past the end marks the file as failed and returns 0; the caller checks once per node. memcpy(): numbers in a
+   binary file are not aligned. */
 static double ReadDouble(Msh *m)
 {
   double value = 0;
@@ -83,6 +86,7 @@ static double ReadDouble(Msh *m)
   } else {
     char *end;
 
+    /* Independent of the locale, unlike strtod(). */
     value = HycoNumber(m->at, &end);
     m->failed = (PetscBool)(end == m->at);
     m->at = end;
@@ -156,6 +160,7 @@ static PetscErrorCode AddCoordinates(Msh *m, size_t k)
               (long long)m->mesh->tag[k]);
     m->mesh->xyz[3 * k + c] = x;
   }
+  /* After the three: one check for a node. */
   HycoCheck(!m->failed, "the mesh %s is damaged: the coordinates of node %lld are not numbers", m->path,
             (long long)m->mesh->tag[k]);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -186,7 +191,8 @@ static PetscErrorCode CheckEntity(Msh *m, long long dim, long long tag)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Blocks by entity: first all tags, then all coordinates, with parametric ones that are dropped. */
+/* Blocks by entity: first all tags, then all coordinates, with parametric ones that are dropped. least and most are
+   declared; they are compared with each node as a check of damaged files. */
 static PetscErrorCode ReadNodes4(Msh *m)
 {
   size_t blocks, n, all, done = 0;
@@ -223,7 +229,7 @@ static PetscErrorCode ReadNodes4(Msh *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sorts the nodes by tag. */
+/* Sorts the nodes by tag. By a permutation, since coordinates move with their tags. */
 static PetscErrorCode SortNodes(HycoMsh *mesh)
 {
   const PetscInt n = mesh->n_nodes;
@@ -233,6 +239,7 @@ static PetscErrorCode SortNodes(HycoMsh *mesh)
 
   PetscFunctionBegin;
   PetscCall(PetscSortedInt(n, mesh->tag, &sorted));
+  /* gmsh writes them in order as a rule. */
   if (sorted) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(n, &order));
   for (PetscInt k = 0; k < n; k++) order[k] = k;
@@ -331,7 +338,8 @@ static const char *TypeName(long long type)
   }
 }
 
-/* Widens a group, or an element of nv nodes that is to be added, so that both have the same number. */
+/* Widens a group, or an element of nv nodes that is to be added, so that both have the same number. Shapes with fewer
+   nodes repeat nodes; a group has one number of nodes for all of its elements. */
 static PetscErrorCode Match(Msh *m, HycoMshGroup *g, PetscInt nv, PetscInt node[])
 {
   const HycoCellType has = HycoMshType(g->dim, g->nv), own = HycoMshType(g->dim, nv);
@@ -378,7 +386,8 @@ static PetscErrorCode AddElement(Msh *m, HycoMshGroup *g, long long tag, long lo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads the tag and the nodes of one element of a known type; changes the type of one with repeated nodes. */
+/* Reads the tag and the nodes of one element of a known type; changes the type of one with repeated nodes. *of becomes
+   the type of the smaller shape: meshers collapse hexahedra at the axis of a sweep. */
 static PetscErrorCode ReadElement(Msh *m, size_t bytes, long long tag, long long *of, PetscInt node[])
 {
   const long long type = *of;
@@ -430,8 +439,8 @@ static PetscErrorCode ReadTags2(Msh *m, long long n, long long *group)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Binary files have blocks of elements with one header, text has a header per line; both are read as blocks, of
-   one element in text. */
+/* Binary files have blocks of elements with one header, text has a header per line; both are read as blocks, of one
+   element in text. `follow` is the number of elements in a block. */
 static PetscErrorCode ReadElements2(Msh *m)
 {
   size_t n;
@@ -469,7 +478,8 @@ static PetscErrorCode ReadElements2(Msh *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the elements of a block to the groups of its entity. */
+/* Adds the elements of a block to the groups of its entity. An entity may be in several groups: its elements are added
+   to each. */
 static PetscErrorCode ReadBlock4(Msh *m, long long dim, long long entity, long long type, size_t n, long long least,
                                  long long most)
 {
@@ -510,6 +520,7 @@ static PetscErrorCode ReadElements4(Msh *m)
   PetscCall(ReadCount(m, 4, "elements", &all));
   least = ReadInt(m, 8);
   most = ReadInt(m, 8);
+  /* Counted over blocks, to be compared with the declared number. */
   for (size_t b = 0; b < blocks; b++, done += n) {
     const long long dim = ReadInt(m, 4), entity = ReadInt(m, 4), type = ReadInt(m, 4);
 
@@ -541,7 +552,8 @@ static PetscErrorCode ReadElements(Msh *m)
 
 /* -- entities and names -- */
 
-/* Reads a list of an entity: its groups, whose sign is an orientation, or its boundary. */
+/* Reads a list of an entity: its groups, whose sign is an orientation, or its boundary. The boundary is read to be
+   skipped. */
 static PetscErrorCode ReadList(Msh *m, PetscBool groups, int dim, long long entity)
 {
   size_t n;
@@ -588,7 +600,7 @@ static PetscErrorCode ReadEntities(Msh *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The next line; NULL at the end of the file. */
+/* The next line; NULL at the end of the file. m->at is afterwards behind it. */
 static const char *NextLine(Msh *m)
 {
   const char *line = m->at;
@@ -614,7 +626,8 @@ static PetscBool ReadQuoted(const char *text, char name[128])
   return (PetscBool)(*end == '\n' || !*end);
 }
 
-/* One line each: dimension, tag, "name"; text in binary files too. */
+/* One line each: dimension, tag, "name"; text in binary files too. Names are optional: groups without one are known by
+   their number. */
 static PetscErrorCode ReadNames(Msh *m)
 {
   const char *line = NextLine(m);
@@ -637,6 +650,7 @@ static PetscErrorCode ReadNames(Msh *m)
               m->path, (int)PetscMin(strcspn(line, "\r\n"), 40), line);
     name.dim = (int)dim;
     name.tag = (int)tag;
+    /* Room grows by doubling, without a counter of its own. */
     if (!(m->n_names & (m->n_names + 1))) /* one below a power of 2: double the size */
       PetscCall(PetscRealloc((2 * m->n_names + 2) * sizeof(name), &m->name));
     m->name[m->n_names++] = name;
@@ -670,6 +684,7 @@ static PetscErrorCode RefuseOther(const Msh *m)
   const char *other = OtherFormat(m);
 
   PetscFunctionBegin;
+  /* gmsh's own older format has another remedy than a foreign one. */
   HycoCheck(!other || strncmp(other, "gmsh", 4),
             "the mesh %s has gmsh's format 1; hyco reads 2.2 and 4.1: convert it by gmsh -save -format msh41 %s -o "
             "NEW.msh",
@@ -706,7 +721,8 @@ static PetscErrorCode ReadFormat(Msh *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Skips sections that are not needed ($Periodic, post-processing data) line by line. */
+/* Skips sections that are not needed ($Periodic, post-processing data) line by line. Entities must come before
+   elements, as gmsh writes them: elements name their entity. */
 static PetscErrorCode ReadSections(Msh *m)
 {
   const char *line;
@@ -738,7 +754,8 @@ static PetscErrorCode ReadSections(Msh *m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The whole file in memory: the parsers then never meet the end of a buffer within a number. */
+/* The whole file in memory: the parsers then never meet the end of a buffer within a number. A zero after the last byte
+   ends every number. */
 static PetscErrorCode ReadAll(Msh *m)
 {
   FILE *file = fopen(m->path, "rb");
@@ -778,7 +795,8 @@ PetscErrorCode HycoMshRead(const char path[], HycoMsh *mesh)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Also of tables that a failed HycoMshRead() left incomplete: it has set them to 0 first. */
+/* Also of tables that a failed HycoMshRead() left incomplete: it has set them to 0 first. The parser's own data are
+   freed by the reader. */
 PetscErrorCode HycoMshDestroy(HycoMsh *mesh)
 {
   PetscFunctionBegin;

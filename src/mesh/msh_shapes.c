@@ -21,6 +21,7 @@ PetscErrorCode HycoMshWiden(HycoMshGroup *g, PetscInt nv)
   PetscCall(PetscMalloc1(g->room * nv, &node));
   for (PetscInt e = 0; e < g->n; e++) {
     PetscCall(PetscArraycpy(node + e * nv, g->node + e * g->nv, g->nv));
+    /* Repeats nodes, as a triangle (0, 1, 2, 2). */
     HycoShapeWiden(shape, nv, node + e * nv);
   }
   PetscCall(PetscFree(g->node));

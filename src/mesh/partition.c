@@ -93,7 +93,8 @@ static PetscErrorCode ByMetis(PetscInt n, const Graph *g, PetscInt n_parts, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* PT-Scotch by PETSc's MatPartitioning on this process, for the same graph. */
+/* PT-Scotch by PETSc's MatPartitioning on this process, for the same graph. Copies, since METIS's integers may be of
+   another size than PETSc's. */
 static PetscErrorCode ByScotch(PetscInt n, const Graph *g, PetscInt n_parts, PetscInt part[])
 {
   PetscInt *i, *j, *weight;
@@ -116,6 +117,7 @@ static PetscErrorCode ByScotch(PetscInt n, const Graph *g, PetscInt n_parts, Pet
   PetscCall(MatPartitioningSetAdjacency(partitioning, graph));
   PetscCall(MatPartitioningSetType(partitioning, MATPARTITIONINGPTSCOTCH));
   PetscCall(MatPartitioningSetNParts(partitioning, n_parts));
+  /* Heavy edges hold both sides of a contact on one rank. */
   PetscCall(MatPartitioningSetUseEdgeWeights(partitioning, PETSC_TRUE));
   PetscCall(MatPartitioningApply(partitioning, &is));
   PetscCall(ISGetIndices(is, &p));
@@ -127,8 +129,9 @@ static PetscErrorCode ByScotch(PetscInt n, const Graph *g, PetscInt n_parts, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Gives each part that has no cell one of the largest part, while that has two: METIS leaves parts of a few cells empty,
-   and a rank without cells works for nothing. */
+/* Gives each part that has no cell one of the largest part, while that has two: METIS leaves parts of a few cells
+   empty, and a rank without cells works for nothing. From the last cells on, which leaves the largest part connected as
+   a rule. */
 static PetscErrorCode FillParts(PetscInt n, PetscInt n_parts, PetscInt part[])
 {
   PetscInt *size;
@@ -170,6 +173,7 @@ static PetscErrorCode Cut(const Data *d, PetscInt n_parts, PetscInt part[])
   PetscCall(CellGraph(d->mesh, d->n_pairs, d->pairs, &graph));
   if (d->by == HYCO_PARTITION_METIS) PetscCall(ByMetis(d->mesh->n_cells, &graph, n_parts, part, &done));
   if (!done) PetscCall(ByScotch(d->mesh->n_cells, &graph, n_parts, part));
+  /* A part without a cell would leave a rank without a mesh. */
   PetscCall(FillParts(d->mesh->n_cells, n_parts, part));
   HycoFreeAll(&graph.xadj, &graph.adjncy, &graph.weight);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -192,6 +196,7 @@ static PetscErrorCode Partition(PetscPartitioner partitioner, PetscInt n_parts, 
   PetscCall(PetscMalloc1(n, &cells));
   for (PetscInt p = 0; p < n_parts; p++) {
     for (PetscInt c = 0; c < n; c++) {
+      /* Cells ascending within a part: the order of the mesh file survives distribution. */
       if (part[c] == p) cells[at++] = c;
     }
   }
@@ -208,7 +213,8 @@ static PetscErrorCode Destroy(PetscPartitioner partitioner)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Called by PetscPartitionerSetType(), before HycoPartitionerSetMesh() fills the data. */
+/* Called by PetscPartitionerSetType(), before HycoPartitionerSetMesh() fills the data. Registered as a type of
+   PetscPartitioner, so that DMPlexDistribute() uses it. */
 static PetscErrorCode Create(PetscPartitioner partitioner)
 {
   Data *d;

@@ -96,7 +96,8 @@ static PetscBool IsOf(HycoCellType type, DMPolytopeType of, PetscInt size, HycoT
                                                          : !HycoCellKinds[type].quadratic);
 }
 
-/* The shapes of this process's cells, bits 1 << HycoCellType. */
+/* The shapes of this process's cells, bits 1 << HycoCellType. An unknown type is an error on the rank that has it;
+   FindType() is collective. */
 static PetscErrorCode FindShapes(DM dm, PetscInt *shapes)
 {
   HycoTies ties;
@@ -112,6 +113,7 @@ static PetscErrorCode FindShapes(DM dm, PetscInt *shapes)
 
     PetscCall(DMPlexGetConeSize(dm, c, &size));
     PetscCall(DMPlexGetCellType(dm, c, &of));
+    /* By number of cone points and type: second-order cells have the type of their corners. */
     while (t < HYCO_N_CELL_TYPES && !IsOf((HycoCellType)t, of, size, ties)) t++;
     HycoCheck(t < HYCO_N_CELL_TYPES,
               "the mesh has cells of DMPlex's type %s; hyco supports segments, triangles, quadrilaterals, tetrahedra, "
@@ -156,6 +158,7 @@ PetscErrorCode HycoPlexType(DM dm, PetscInt *type, PetscBool *mixed)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   HycoOnEach(comm, FindShapes(dm, &shapes));
+  /* A rank may have one type of cells alone, or none. */
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &shapes, 1, MPIU_INT, MPI_BOR, comm));
   *type = shapes ? (PetscInt)HycoShapesType(shapes) : -1;
   *mixed = (PetscBool)(shapes && shapes != (PetscInt)1 << *type);
@@ -277,7 +280,8 @@ static PetscErrorCode FindOwned(Builder *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The masters of a cell's tied nodes: with ties, the end of its cone. */
+/* The masters of a cell's tied nodes: with ties, the end of its cone. Masters are in the cone, so that they come with
+   the cell when it moves to another rank. */
 static PetscErrorCode FollowedVertices(const Builder *b, PetscInt cell, PetscInt *n, const PetscInt *vertex[])
 {
   HycoCellType shape;
@@ -335,7 +339,8 @@ static PetscErrorCode TakeCells(Builder *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Collects their nodes, by tag, with coordinates. */
+/* Collects their nodes, by tag, with coordinates. By tag: the order of nodes, and with it that of all sums over them,
+   is that of the file. */
 static PetscErrorCode TakeNodes(Builder *b)
 {
   HycoMesh m = b->m;
@@ -400,6 +405,7 @@ static void Reverse(HycoCellType type, PetscInt facet[])
     facet[k] = facet[last];
     facet[last] = keep;
   }
+  /* The middles of the sides, in the same turn. */
   for (PetscInt k = corners, last = 2 * corners - 1; HycoCellKinds[type].quadratic && corners > 2 && k < last;
        k++, last--) {
     const PetscInt keep = facet[k];
@@ -455,9 +461,11 @@ static PetscErrorCode AddFacet(Builder *b, PetscInt cell, PetscInt point, PetscI
     const PetscInt tied = HycoMeshTied(m, node[v]);
 
     mine = (PetscBool)(mine || b->owned[m->node_point[node[v]] - b->v0]);
+    /* Masters of a tied node take its share of the facet's load. */
     for (PetscInt j = tied < 0 ? 0 : m->tied_start[tied]; tied >= 0 && j < m->tied_start[tied + 1]; j++)
       mine = (PetscBool)(mine || b->owned[m->node_point[m->tied_master[j]] - b->v0]);
   }
+  /* Only facets around owned nodes: others are another rank's to integrate. */
   if (!mine) PetscFunctionReturn(PETSC_SUCCESS);
   HycoGrow(b->n_facets, b->room, b->facet);
   PetscCall(PetscArraycpy(b->facet[b->n_facets].node, node, m->nf));
@@ -579,7 +587,8 @@ static int CompareFacets(const void *a, const void *b)
   return (x->point > y->point) - (x->point < y->point);
 }
 
-/* The facets of a group, in the order of their cells; those without their cell have their orientation. */
+/* The facets of a group, in the order of their cells; those without their cell have their orientation. Outward: a
+   pressure acts against the normal, and contact's gap is along it. */
 static PetscErrorCode PlaceFacets(Builder *b, PetscInt group)
 {
   HycoMesh m = b->m;
@@ -621,6 +630,7 @@ static PetscErrorCode TakeGroup(Builder *b, PetscInt group, DMLabel label)
   PetscCall(ISGetLocalSize(values, &n_values));
   PetscCall(ISGetIndices(values, &value));
   for (PetscInt k = 0; k < n_values; k++) {
+    /* In a submesh the value keeps the dimension, even where a group has lost all of its points. */
     if (b->sub && value[k] < HYCO_FACET) m->group_dim[group] = value[k] - 1; /* also without points */
     PetscCall(DMLabelGetStratumIS(label, value[k], &points));
     if (!points) continue;
@@ -633,6 +643,7 @@ static PetscErrorCode TakeGroup(Builder *b, PetscInt group, DMLabel label)
   PetscCall(ISRestoreIndices(values, &value));
   PetscCall(ISDestroy(&values));
   n = m->group_start[group + 1] - m->group_start[group];
+  /* Sorted, as searches by bisection expect. */
   PetscCall(HycoSortUnique(&n, m->group_node ? m->group_node + m->group_start[group] : NULL));
   m->group_start[group + 1] = m->group_start[group] + n;
   n = m->group_cell_start[group + 1] - m->group_cell_start[group];
@@ -669,7 +680,8 @@ static PetscErrorCode TakeGroups(Builder *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Assigns each cell to the group of its one body. */
+/* Assigns each cell to the group of its one body. A body is the group of its name; in a mesh file others are rejected
+   while it is read. */
 static PetscErrorCode TakeBodies(Builder *b)
 {
   HycoMesh m = b->m;
@@ -689,13 +701,15 @@ static PetscErrorCode TakeBodies(Builder *b)
       *body = k;
     }
   }
+  /* A cell of a DMPlex without a label would have no law. */
   for (PetscInt e = 0; e < m->n_cells; e++)
     HycoCheck(m->cell_body[e] >= 0, "cell %d belongs to no body; give each cell of the mesh the label of a body",
               (int)m->cell_id[e]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The cells and nodes of a submesh: facets without their cells are between them. */
+/* The cells and nodes of a submesh: facets without their cells are between them. In a submesh DMPlex has no order of
+   depths that would tell them apart. */
 static PetscErrorCode FindStrata(Builder *b)
 {
   const PetscInt dim = b->m->dim;
@@ -743,7 +757,8 @@ static PetscErrorCode TakeNodeBodies(Builder *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Makes the tables of this process's part, without the data that needs communication. */
+/* Makes the tables of this process's part, without the data that needs communication. Without communication: its errors
+   are raised by all ranks together afterwards. */
 static PetscErrorCode MakeTables(Builder *b)
 {
   IS tags;
@@ -757,6 +772,7 @@ static PetscErrorCode MakeTables(Builder *b)
   PetscCall(FindOwned(b));
   PetscCall(TakeCells(b));
   PetscCall(TakeNodes(b));
+  /* After nodes are known: ties name them by tag. */
   PetscCall(HycoMeshSetTies(b->m, b->ties));
   PetscCall(TakeGroups(b));
   PetscCall(TakeBodies(b));
@@ -821,6 +837,7 @@ static void DropInnerFacets(HycoMesh m)
 
   for (PetscInt f = 0; f < m->n_facets; f++) {
     if (m->group_dim[m->facet_group[f]] == m->dim) continue;
+    /* In place and downwards: n never overtakes f. */
     memmove(m->facets + n * m->nf, m->facets + f * m->nf, (size_t)m->nf * sizeof(PetscInt));
     m->facet_group[n] = m->facet_group[f];
     if (m->facet_point) m->facet_point[n] = m->facet_point[f];
@@ -861,8 +878,8 @@ static PetscErrorCode FillTables(Builder *b, MPI_Comm comm)
 }
 
 /* The local tables of a DM's part: nodes and cells by tag, groups, facets outward, bodies; with several ranks also
-   global numbers. The caller gets a reference to the DM. Collective on comm, which is PETSC_COMM_SELF for a DM that one rank
-   alone uses. */
+   global numbers. The caller gets a reference to the DM. Collective on comm, which is PETSC_COMM_SELF for a DM that one
+   rank alone uses. After an error the tables are freed, and the DM is as before. */
 PetscErrorCode HycoPlexToTables(DM dm, MPI_Comm comm, HycoScene scene, HycoMesh *mesh)
 {
   Builder b = {.dm = dm, .scene = scene};
@@ -870,6 +887,7 @@ PetscErrorCode HycoPlexToTables(DM dm, MPI_Comm comm, HycoScene scene, HycoMesh 
 
   PetscFunctionBegin;
   PetscCall(HycoMeshQuery(dm, mesh));
+  /* Made once for each DM: the tables are composed with it. */
   if (*mesh) {
     PetscCall(PetscObjectReference((PetscObject)dm));
     PetscFunctionReturn(PETSC_SUCCESS);

@@ -29,6 +29,7 @@ static PetscErrorCode RankOwn(PetscInt n, const PetscInt64 key[], PetscInt place
   HycoDuplicate(n, key, &sorted);
   if (n) qsort(sorted, (size_t)n, sizeof(*sorted), Compare);
   for (PetscInt k = 0; k < n; k++) {
+    /* Equal keys get one place. */
     if (!k || sorted[k] != sorted[m - 1]) sorted[m++] = sorted[k];
   }
   for (PetscInt k = 0; k < n; k++)
@@ -38,9 +39,9 @@ static PetscErrorCode RankOwn(PetscInt n, const PetscInt64 key[], PetscInt place
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* place[k] in 0..total-1: the position of key[k] among all distinct keys of all ranks, by ascending value. Equal
-   keys get equal places. The range of keys is divided evenly; dense tags thus balance. Memory is that of the keys
-   of a rank. Collective. */
+/* place[k] in 0..total-1: the position of key[k] among all distinct keys of all ranks, by ascending value. Equal keys
+   get equal places. The range of keys is divided evenly; dense tags thus balance. Memory is that of the keys of a rank.
+   Collective. A distributed sort by buckets: two exchanges, and no rank has all keys. */
 PetscErrorCode HycoRankKeys(MPI_Comm comm, PetscInt n, const PetscInt64 key[], PetscInt place[], PetscInt *total)
 {
   PetscMPIInt size, *n_send, *n_receive, *send, *receive;

@@ -44,7 +44,8 @@ static PetscErrorCode ChooseType(HycoScene scene, Reader *r, HycoMesh m, PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Every body is a group of cells, of types that can be in one mesh; other groups may have any lower dimension. */
+/* Every body is a group of cells, of types that can be in one mesh; other groups may have any lower dimension.
+   r->group[k].body is the body of each group, -1: none. */
 static PetscErrorCode CheckBodies(HycoScene scene, Reader *r, HycoMesh m)
 {
   PetscInt cells = 0, shapes = 0, nv = 0;
@@ -134,7 +135,8 @@ static PetscErrorCode CollectCells(HycoScene scene, Reader *r, HycoMesh m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nodes of the cells, ascending by tag, and the cells' node indices. */
+/* Nodes of the cells, ascending by tag, and the cells' node indices. r->index: from a node of the file to one of the
+   mesh. */
 static PetscErrorCode CollectNodes(Reader *r, HycoMesh m)
 {
   const HycoMsh *file = &r->file;
@@ -194,6 +196,7 @@ static PetscBool GroupHas(const Group *g, PetscInt n, const PetscInt node[])
       while (v < g->nv && g->node[e * g->nv + v] != node[k]) v++;
       found += v < g->nv;
     }
+    /* All nodes of the facet: it is a side of this cell, or inside it. */
     if (found == n) return PETSC_TRUE;
   }
   return PETSC_FALSE;
@@ -258,8 +261,8 @@ static PetscErrorCode AddFacets(HycoScene scene, Reader *r, HycoMesh m, Group *g
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Nodes and cells of each group as CSR lists. Nodes may lie outside the bodies (index -1) and are then left out,
-   with the cells that have them. */
+/* Nodes and cells of each group as CSR lists. Nodes may lie outside the bodies (index -1) and are then left out, with
+   the cells that have them. Points and lines too, for supports, forces and outputs. */
 static PetscErrorCode AddMembers(Reader *r, HycoMesh m, Group *g, PetscInt group, const PetscInt start[],
                                  const PetscInt around[], PetscInt *n_node, PetscInt *n_cell)
 {
@@ -316,6 +319,7 @@ static PetscErrorCode CollectGroups(HycoScene scene, Reader *r, HycoMesh m)
   PetscCall(PetscMalloc1(n_facets, &m->facet_cell));
   PetscCall(PetscMalloc1(n_facets, &r->before));
   PetscCall(PetscMalloc1(m->n_cells, &r->last));
+  /* -1: no facet of the cell so far. */
   for (PetscInt e = 0; e < m->n_cells; e++) r->last[e] = -1;
   for (PetscInt k = 0; k < r->n_groups; k++) {
     PetscCall(PetscStrallocpy(r->group[k].name, &m->group_name[k]));
@@ -375,10 +379,12 @@ static PetscErrorCode CheckTwins(HycoScene scene, HycoMesh m, const PetscInt sta
   for (PetscInt e = 0; e < m->n_cells; e++) {
     const PetscInt *cell = m->cells + e * m->nv;
 
+    /* Twins share every node: those around the first one suffice. */
     for (PetscInt k = start[cell[0]]; k < start[cell[0] + 1]; k++) {
       const PetscInt other = around[k];
       const PetscBool alike = (PetscBool)(HycoMeshShape(m, e) == HycoMeshShape(m, other));
 
+      /* Each pair once. */
       if (other == e || (alike && other > e) || !CellHas(m, other, m->nv, cell)) continue;
       HycoCheck(!alike,
                 "%s: cells %d and %d have the same nodes; a cell must belong to one body (format 2.2 repeats a cell "
@@ -404,6 +410,7 @@ static PetscErrorCode MakeTables(HycoScene scene, Reader *r, HycoMesh m)
   PetscCall(CollectNodes(r, m));
   PetscCall(HycoMeshNodeCells(m, &r->start, &r->around));
   PetscCall(CheckTwins(scene, m, r->start, r->around));
+  /* Needs the cells around each node, as hanging nodes show there. */
   PetscCall(CheckConforming(scene, m, r->start, r->around));
   PetscCall(CollectGroups(scene, r, m));
   PetscCall(CheckLoads(scene, r));

@@ -284,6 +284,7 @@ static PetscErrorCode TagCells(DM dm, DMPlexTransform transform, const PetscInt 
   PetscFunctionBegin;
   PetscCall(DMPlexGetHeightStratum(dm, 0, &c0, &c1));
   PetscCall(PetscMalloc1(c1 - c0, &place));
+  /* Places of the tags over all ranks: children of a cell follow each other as their parents do. */
   PetscCall(HycoRankInts(comm, c1 - c0, tag + c0, place, &total));
   HycoOnEach(comm, TagChildren(dm, transform, c0, c1, place, new_tag));
   PetscCall(PetscFree(place));

@@ -89,6 +89,7 @@ static void NoteFacets(Packing *p)
   for (PetscInt k = 0; k < m->n_facets * m->nf; k++) {
     const PetscInt i = m->facets[k], tied = HycoMeshTied(m, i);
 
+    /* Groups that no contact reads stay at home. */
     if (!p->in[m->facet_group[k / m->nf]]) continue;
     Note(&p->facets, i, k / m->nf);
     for (PetscInt j = tied < 0 ? 0 : m->tied_start[tied]; tied >= 0 && j < m->tied_start[tied + 1]; j++)
@@ -230,6 +231,7 @@ static PetscErrorCode PlaceNodes(HycoMesh m, const Rows *r)
   for (PetscInt i = 0; i < r->n; i++) {
     const PetscInt *row = r->row + i * r->width;
 
+    /* Columns as they were packed: tag, keys, body, global and whole number, coordinates. */
     m->node_id[i] = row[0];
     m->node_body[i] = row[3];
     m->node_global[i] = row[4];

@@ -49,6 +49,7 @@ static PetscErrorCode CutAll(HycoMesh m, Cut *c)
   PetscCall(Identity(m->n_nodes, &c->node_at));
   PetscCall(PetscMalloc1(m->n_facets, &c->facet));
   for (PetscInt f = 0; f < m->n_facets; f++) {
+    /* Facets with a cell follow from it. */
     if (m->facet_cell[f] < 0) c->facet[c->n_facets++] = f;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -296,6 +297,7 @@ static PetscErrorCode AddTags(DM dm, const Cut *c)
   for (PetscInt f = 0; c && f < c->of->n_facets; f++) {
     const PetscInt cell = c->of->facet_cell[f];
 
+    /* A new group: the last cell says nothing about its facets. */
     if (!f || c->of->facet_group[f] != c->of->facet_group[f - 1]) last = 0;
     if (cell >= 0) last = c->of->cell_id[cell];
     if (next == c->n_facets || c->facet[next] != f) continue;
@@ -410,6 +412,7 @@ static PetscErrorCode Select(Cut *c, PetscInt n_keep, const PetscInt keep[], Pet
   HycoDuplicate(n_keep, keep, &c->cell);
   PetscCall(PetscMalloc1(m->n_cells, &c->cell_at));
   for (PetscInt e = 0; e < m->n_cells; e++) c->cell_at[e] = -1;
+  /* Where a kept cell is in the new mesh. */
   for (PetscInt k = 0; k < n_keep; k++) c->cell_at[keep[k]] = k;
   PetscCall(PetscMalloc1(m->n_facets, &c->facet));
   for (PetscInt f = 0; f < m->n_facets; f++) {
@@ -542,6 +545,7 @@ PetscErrorCode HycoMeshCreateDM(HycoScene scene, HycoMesh m)
   cut.scene = scene;
   PetscCall(MakeDM(PETSC_COMM_SELF, &cut, &dm));
   PetscCall(HycoMeshSetDM(m, dm));
+  /* Points are numbered cells, facets without cells, nodes: as MakeDM() makes them. */
   PetscCall(Identity(m->n_cells, &m->cell_point));
   PetscCall(PetscMalloc1(m->n_nodes, &m->node_point));
   PetscCall(PetscMalloc1(m->n_facets, &m->facet_point));
@@ -560,6 +564,7 @@ PetscErrorCode HycoSubmeshNodes(HycoMesh sub, HycoMesh of, PetscInt node[])
 
   PetscFunctionBegin;
   for (PetscInt i = 0; i < of->n_nodes; i++) {
+    /* Points of nodes are a range of the other DM: a table over it, not over all points. */
     first = PetscMin(first, NodePoint(of, i));
     last = PetscMax(last, NodePoint(of, i) + 1);
   }

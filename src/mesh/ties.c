@@ -51,6 +51,7 @@ PetscErrorCode HycoTiesBcast(MPI_Comm comm, HycoTies *ties)
   PetscFunctionBegin;
   HycoBcast(head, 2, MPIU_INT, comm);
   n = head[0];
+  /* Also the other ranks then keep NULL: a scene without ties costs nothing. */
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
   if (!*ties) PetscCall(HycoTiesCreate(n, (HycoCellType)head[1], ties));
   t = *ties;
@@ -215,6 +216,7 @@ PetscErrorCode HycoMeshSetTies(HycoMesh m, HycoTies ties)
   PetscCall(PetscSortIntWithArray(m->n_nodes, tag, node));
   PetscCall(FindTied(m, tag, node));
   PetscCall(PetscFree2(tag, node));
+  /* The reverse lists too: which tied nodes follow a node. */
   PetscCall(FindFollow(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

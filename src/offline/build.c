@@ -7,7 +7,8 @@
 #include <hycoreducerimpl.h>
 #include <string.h>
 
-/* Reads the distributed mesh, its contacts on rank 0, its sizes on all ranks. */
+/* Reads the distributed mesh, its contacts on rank 0, its sizes on all ranks. Without matrices: training makes
+   full-order models of its own for the solutions. */
 static PetscErrorCode ReadMesh(HycoReducer t)
 {
   PetscReal mu[HYCO_MAX_PARAMETERS];
@@ -60,16 +61,19 @@ static PetscErrorCode SurfacesOf(HycoReducer t, PetscBool contact[], PetscInt *n
   PetscFunctionBegin;
   HycoPairsMark(&t->fom->pairs, contact);
   PetscCall(HycoMovedGroups(t->scene, surface, &t->fom->pairs, n_all, all));
+  /* Moved surfaces whole: a slave may meet any of their facets at some parameter. */
   for (PetscInt g = 0; g < *n_all; g++) {
     for (PetscInt k = surface->group_start[all[g]]; k < surface->group_start[all[g] + 1]; k++)
       contact[surface->group_node[k]] = PETSC_TRUE;
   }
+  /* Slave groups whole as well: areas and averaged normals read all facets around a node. */
   for (PetscInt k = 0; k < t->scene->n_contacts; k++)
     PetscCall(HycoMeshFindGroup(surface, "contact", t->scene->contact[k]->slave, &all[(*n_all)++]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* 3 groups a contact: slave and master of a moved one, and every slave. */
+/* 3 groups a contact: slave and master of a moved one, and every slave. Marks the nodes of the surfaces' mesh that the
+   model's contacts have, by the same rule as CutMesh(). */
 PetscErrorCode HycoReducerMarkContacts(HycoReducer t, PetscBool contact[])
 {
   PetscInt *all, n_all;
@@ -118,6 +122,7 @@ static PetscErrorCode GatherCells(HycoReducer t, const PetscBool in[], HycoMesh 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(part->n_groups, &group));
   PetscCall(HycoMarkContactGroups(t->scene, part, group));
+  /* Facets with loads: a model of cells alone must integrate tractions on them. */
   for (PetscInt k = 0; LoadedSurfaces(t) && k < t->scene->n_loads; k++) {
     PetscInt g = 0;
 
@@ -144,6 +149,7 @@ static PetscErrorCode FindSurface(HycoMesh surface, HycoMesh m, PetscInt node[])
   PetscCall(PetscSortIntWithArray(m->n_nodes, whole, at));
   for (PetscInt i = 0; i < surface->n_nodes; i++) {
     PetscCall(PetscFindInt(surface->node_whole ? surface->node_whole[i] : i, m->n_nodes, whole, &node[i]));
+    /* -1: a surface node that the RID does not contain. */
     node[i] = node[i] < 0 ? -1 : at[node[i]];
   }
   PetscCall(PetscFree2(whole, at));
@@ -164,6 +170,7 @@ static PetscErrorCode CutMesh(HycoReducer t, HycoMesh from, const PetscBool in[]
   PetscCall(PetscMalloc1(3 * t->scene->n_contacts + t->scene->n_loads, &all));
   PetscCall(PetscMalloc2(from->n_cells, &keep, surface->n_nodes, &extra));
   PetscCall(SurfacesOf(t, contact, &n_all, all));
+  /* Pressures act on whole groups of facets, some of which have no kept cell. */
   for (PetscInt k = 0; LoadedSurfaces(t) && k < t->scene->n_loads; k++)
     PetscCall(HycoMeshFindGroup(from, "load", t->scene->load[k].group, &all[n_all++]));
   for (PetscInt e = 0; e < from->n_cells; e++) {
@@ -190,8 +197,9 @@ static PetscErrorCode CutMesh(HycoReducer t, HycoMesh from, const PetscBool in[]
 /* Known only on a node's own rank: whether it has a cell outside Omega_A, and which of its components are fixed. */
 #define BESIDE 8
 
-/* What rank 0 must know about the RID's nodes, which other ranks own: which components are fixed, and whether a cell outside
-   the RID has the node, which is then on the interface. */
+/* What rank 0 must know about the RID's nodes, which other ranks own: which components are fixed, and whether a cell
+   outside the RID has the node, which is then on the interface. Bits: a fixed component each, and BESIDE for a cell
+   outside. */
 static PetscErrorCode FetchNotes(HycoReducer t, const PetscBool in[], PetscInt n, const PetscInt global[],
                                  PetscInt note[])
 {
@@ -230,15 +238,18 @@ static PetscErrorCode TakeSets(HycoReducer t, HycoROM m, const PetscInt note[])
   PetscFunctionBegin;
   PetscCall(PetscFree(t->fixed));
   PetscCall(PetscMalloc1(n * dim, &t->fixed));
+  /* The first bits of a node's note say which components are fixed, as found by the rank that owns it. */
   for (PetscInt k = 0; k < n * dim; k++) t->fixed[k] = (PetscBool)((note[k / dim] >> k % dim & 1) != 0);
   PetscCall(PetscCalloc1(n, &sets));
   for (PetscInt e = 0; e < m->model->mesh->n_cells; e++) { /* whether connected to Omega_B */
     PetscInt node[HYCO_MAX_CELL_NODES];
     const PetscInt n_nodes = HycoMeshCellNodes(m->model->mesh, e, node);
 
+    /* A node beside cells of Omega_B is on the interface. */
     for (PetscInt v = 0; v < n_nodes; v++) sets[node[v]] = note[node[v]] & BESIDE ? 1 : 2;
   }
   PetscCall(PetscMalloc1(f->n_contacts, &m->model->in_rid));
+  /* Contacts next: masters outside the RID take their slaves to the interface, (32)-(36). */
   PetscCall(HycoRIDSets(f->fe_surface, &f->pairs, f->searches ? &t->met.rows : &f->pairs,
                         f->searches ? t->met.of : NULL, t->surface_node, n, sets, m->model->in_rid));
   PetscCall(HycoROMSetDomain(m, sets));
@@ -257,6 +268,7 @@ static PetscErrorCode CutDomain(HycoReducer t, HycoROM m)
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(t->fom->part->n_cells, &in));
   PetscCall(FindCells(t, in));
+  /* On one rank the part is the whole mesh, which is cut without a copy in between. */
   if (t->fom->size == 1)
     PetscCall(CutMesh(t, t->fom->part, in, m, &global));
   else {
@@ -273,6 +285,8 @@ static PetscErrorCode CutDomain(HycoReducer t, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Contact forces of the training solutions; the caller frees them. Room for all columns, since the number is known at
+   the end. */
 PetscErrorCode HycoReducerDualSnapshots(HycoReducer t, PetscInt *n, PetscReal **S)
 {
   /* Columns without any force would only slow down NNMF and NNLS. */
@@ -291,6 +305,7 @@ PetscErrorCode HycoReducerDualSnapshots(HycoReducer t, PetscInt *n, PetscReal **
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Borrowed arrays, a column for each training point. */
 PetscErrorCode HycoReducerGetSolutions(HycoReducer t, PetscInt *n, const PetscReal *mu[], const PetscReal *Lambda[],
                                        const PetscReal *gamma[])
 {
@@ -302,6 +317,7 @@ PetscErrorCode HycoReducerGetSolutions(HycoReducer t, PetscInt *n, const PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Facts are numbers of one type of model, which the report lists under their names without knowing the type. */
 PetscErrorCode HycoTrainingAddFact(HycoTraining *r, const char name[], PetscReal value)
 {
   HycoFact *fact = &r->fact[r->n_facts++];
@@ -331,6 +347,7 @@ static PetscErrorCode LimitModes(HycoReducer t, HycoROM m)
     for (PetscInt k = 0; k < n * dim; k++) n_A += !t->fixed[node[k / dim] * dim + k % dim];
     PetscCall(ISRestoreIndices(m->model->inside, &node));
   }
+  /* Only rank 0 has the sets, but all ranks have the bases that become shorter. */
   PetscCallMPI(MPI_Bcast(&n_A, 1, MPIU_INT, 0, HycoComm(t)));
   if (n_A >= l || !n_A) PetscFunctionReturn(PETSC_SUCCESS);
   t->l = n_A;
@@ -410,6 +427,7 @@ static PetscErrorCode CheckForces(HycoReducer t, HycoROM m)
   PetscFunctionBegin;
   PetscCall(PetscObjectSetOptions((PetscObject)t->prototype, t->scene->options));
   PetscCall(HycoROMSetFromOptions(t->prototype)); /* as for the model's predictions */
+  /* One contact suffices here: how well the RID covers the force is judged on held-out points. */
   for (PetscInt k = 0; k < m->model->pairs.n; k++) kept = (PetscBool)(kept || m->model->in_rid[k]);
   for (PetscInt k = 0; k < t->n_s * m->model->pairs.n; k++) presses = (PetscBool)(presses || t->Lambda[k] > 0);
   HycoCheckModel(!m->ops->reconstruct || !t->prototype->reconstruct || kept || !presses,
@@ -447,6 +465,7 @@ static PetscErrorCode TakeClosed(HycoReducer t, HycoROM m)
   PetscCall(PetscCalloc1(N, &m->model->closed));
   for (PetscInt k = 0; k < t->n_s; k++) {
     const PetscReal *L = t->Lambda + (size_t)k * (size_t)N;
+    /* Relative to each solution's own largest: small loads close contacts too. */
     PetscReal most = 0;
 
     for (PetscInt i = 0; i < N; i++) most = PetscMax(most, L[i]);
@@ -463,6 +482,7 @@ static PetscErrorCode BuildModel(HycoReducer t, PetscBool useful, HycoROM m, Hyc
   PetscCall(FillModel(t, m));
   PetscCall((*t->trainer.build)(m, t));
   PetscCall(TakeClosed(t, m));
+  /* Only for a model that will be used: a greedy iteration may pass through poor ones. */
   if (useful) PetscCall(CheckUseful(t, m));
   PetscCall(Report(t, m, report));
   PetscCall(HycoROMReset(m));
@@ -471,7 +491,8 @@ static PetscErrorCode BuildModel(HycoReducer t, PetscBool useful, HycoROM m, Hyc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rank 0: creates a model with the masters that its contacts meet. */
+/* Rank 0: creates a model with the masters that its contacts meet. The masters first: the mesh's cut keeps the surfaces
+   that they lie on. */
 static PetscErrorCode BeginOnRoot(HycoReducer t, HycoROM *model)
 {
   PetscErrorCode ierr;
@@ -508,6 +529,7 @@ static PetscErrorCode MarkJudged(HycoReducer t, HycoROM m, PetscBool judged[])
 
   PetscFunctionBegin;
   for (PetscInt i = 0; i < m->model->mesh->n_nodes; i++) judged[i] = (PetscBool)(traits->cells || all);
+  /* Contact nodes, whose displacements `rank` and `contact` choose from. */
   for (PetscInt i = 0; surface && i < surface->n_nodes; i++) {
     if (t->surface_node[i] >= 0) judged[t->surface_node[i]] = PETSC_TRUE;
   }
@@ -538,6 +560,7 @@ static PetscErrorCode FetchJudged(HycoReducer t, HycoROM m)
     t->rid_row[i] = judged[i] ? t->n_rid_nodes : -1;
     if (judged[i]) node[t->n_rid_nodes++] = m->model->mesh->node_whole[i];
   }
+  /* Rows in the order of the list; rid_row says where each node's are. */
   PetscCall(HycoReducerFetchSnapshots(t, t->n_rid_nodes, node, &t->U_rid));
   PetscCall(PetscFree2(judged, node));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -583,6 +606,7 @@ PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, HycoROM *model,
   PetscFunctionBegin;
   *model = NULL;
   HycoLogged(HYCO_EVENT_MODEL, MakeModel(t, useful, model, report)); /* ends on an error too: a search goes on */
+  /* A report holds numbers and fixed arrays only; pointers in it are set anew below. */
   PetscCallMPI(MPI_Bcast(report, sizeof(*report), MPI_BYTE, 0, HycoComm(t)));
   report->type = report->chosen.settings.type = t->prototype->model->type; /* set on each rank */
   PetscCall(HycoROMBroadcast(HycoComm(t), model));
@@ -590,8 +614,10 @@ PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, HycoROM *model,
   PetscCall(HycoLogEvent(HYCO_EVENT_SCAN, PETSC_TRUE));
   ierr = (*t->trainer.finish)(t, *model, report);
   PetscCall(HycoLogEvent(HYCO_EVENT_SCAN, PETSC_FALSE));
+  /* A refused model (a singular stiffness) is not kept; the search goes on to the next. */
   if (ierr) (void)!HycoROMDestroy(model);
   PetscCall(ierr);
+  /* Work arrays of the scan are made anew from the file's data on every rank. */
   PetscCall(HycoROMReset(*model));
   PetscCall(HycoROMBroadcast(HycoComm(t), model)); /* with the results */
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -610,6 +636,7 @@ PetscErrorCode HycoReducerFinish(HycoReducer t, HycoSnapshots store, const char 
     ierr = HycoReducerLearn(t, store, &model, &grown, report);
   else
     ierr = HycoReducerBuild(t, PETSC_TRUE, &model, report);
+  /* Estimates are part of the model: they come before the file. */
   if (!ierr) ierr = HycoReducerCalibrate(t, store, model, report);
   PetscCall(HycoSamplesDestroy(&grown));
   if (!ierr) ierr = HycoROMSave(model, t->fom, t->l, t->V, path);
@@ -636,8 +663,10 @@ PetscErrorCode HycoReducerOpen(HycoReducer t, HycoSamples samples, const char pa
   char folder[PETSC_MAX_PATH_LEN];
 
   PetscFunctionBegin;
+  /* Nothing of a former training with the same handle may remain. */
   PetscCall(HycoReducerReset(t));
   t->samples = samples;
+  /* The columns of bases are the training points, until types with modes of their own replace them. */
   PetscCall(HycoReducerSetColumns(t, samples));
   t->solving = 0;
   t->late = PETSC_FALSE;
@@ -674,7 +703,8 @@ PetscErrorCode HycoReducerClose(HycoReducer t, HycoSnapshots *store)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solved points are in the store already and cost a look at their files. */
+/* Solved points are in the store already and cost a look at their files. Their time is counted apart: it is that of
+   full order, not of the reduction. */
 PetscErrorCode HycoReducerSolve(HycoReducer t, HycoSnapshots store, HycoSamples points)
 {
   const PetscReal begin = HycoNow();
@@ -702,6 +732,7 @@ static PetscInt HeldByDefault(PetscInt n)
   return PetscMin(MOST_HELD, PetscMax(LEAST_HELD, n));
 }
 
+/* Held-out points that share a stiffness come together, `together` at a time, and cost one factor. */
 static PetscErrorCode DrawHeld(HycoReducer t, PetscInt count, PetscInt together, HycoSamples *held)
 {
   PetscInt n, n_par, slow[HYCO_MAX_PARAMETERS];
@@ -709,6 +740,7 @@ static PetscErrorCode DrawHeld(HycoReducer t, PetscInt count, PetscInt together,
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->samples, &n, &n_par, NULL));
+  /* Negative: the user has not said how many. */
   if (count < 0) count = HeldByDefault(n);
   /* Rank 0 decides: points drawn must be the same everywhere. */
   if (t->rank == 0) HycoSceneReaches(t->scene, reaches);
@@ -730,9 +762,11 @@ PetscErrorCode HycoReducerHoldOut(HycoReducer t, HycoSnapshots store)
 
   PetscFunctionBegin;
   t->drawn = 0;
+  /* The user's own points are never reduced. */
   t->few = (PetscBool)(t->late && !t->validation && t->n_validation < 0);
   PetscCall(HycoSamplesDestroy(&t->held));
   if (t->validation) {
+    /* A held-out point must not be trained on: it would judge nothing. */
     PetscCall(HycoSamplesExcept(t->validation, t->samples, &t->held));
     PetscCall(HycoSamplesGet(t->validation, &n, NULL, NULL));
     PetscCall(HycoSamplesGet(t->held, &m, NULL, NULL));
@@ -745,6 +779,7 @@ PetscErrorCode HycoReducerHoldOut(HycoReducer t, HycoSnapshots store)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A search that can decide by few points saves their solutions; when it cannot, this draws the rest. */
 PetscErrorCode HycoReducerHoldOutMore(HycoReducer t, HycoSnapshots store)
 {
   HycoSamples more;
@@ -756,6 +791,7 @@ PetscErrorCode HycoReducerHoldOutMore(HycoReducer t, HycoSnapshots store)
   PetscCall(HycoSamplesGet(t->samples, &n, NULL, NULL));
   PetscCall(DrawHeld(t, HeldByDefault(n) - FEW_HELD, TOGETHER, &more));
   PetscCall(HycoSamplesAddSet(t->held, more));
+  /* Drawn points may meet earlier ones, for instance corners. */
   PetscCall(HycoSamplesDropTwins(t->held, NULL));
   PetscCall(HycoSamplesDestroy(&more));
   PetscCall(HycoReducerSolve(t, store, t->held));
@@ -770,6 +806,7 @@ PetscErrorCode HycoReducerHoldOutFresh(HycoReducer t, HycoSnapshots store, HycoS
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(last, &n, NULL, NULL));
+  /* The user's points stay in the set, and only the drawn ones are replaced. */
   if (t->validation) {
     PetscCall(HycoSamplesExcept(t->validation, t->samples, &held));
     PetscCall(HycoSamplesGet(held, &m, NULL, NULL));
@@ -780,6 +817,7 @@ PetscErrorCode HycoReducerHoldOutFresh(HycoReducer t, HycoSnapshots store, HycoS
   PetscCall(HycoSamplesDropTwins(held, NULL));
   PetscCall(HycoSamplesExcept(held, last, &others));
   PetscCall(HycoSamplesGet(others, n_fresh, NULL, NULL));
+  /* Those that judge no more: they may become training points. */
   PetscCall(HycoSamplesExcept(last, held, former));
   t->held = held;
   HycoDestroyAll(&others, &fresh, &last);
@@ -803,6 +841,7 @@ static PetscErrorCode DecideLate(HycoReducer t)
     PetscCall(HycoReducerTries(t, types[k], &tries));
     PetscCall(HycoROMCreate(&type));
     PetscCall(HycoROMSetType(type, types[k]));
+    /* One such type is enough: if it suffices, no training point is ever solved. */
     if (tries && HycoReducerOwnModes(t, type)) t->late = PETSC_TRUE;
     PetscCall(HycoROMDestroy(&type));
   }
@@ -834,6 +873,7 @@ static PetscErrorCode RunOn(HycoReducer t, HycoSnapshots store, HycoSamples samp
   PetscFunctionBegin;
   if (t->trainer.begin) PetscCall((*t->trainer.begin)(t));
   PetscCall(DecideLate(t));
+  /* Otherwise when the search comes to a type that learns from solutions. */
   if (!t->late) PetscCall(HycoReducerSolve(t, store, samples));
   PetscCall(HycoReducerHoldOut(t, store));
   *solved = HycoNow() - t->solving;
@@ -853,6 +893,7 @@ PetscErrorCode HycoReducerRun(HycoReducer t, HycoSamples samples, const char pat
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
   HycoCheck(samples, "give the training points");
+  /* Before hours of solutions: targets without points to judge by cannot be met. */
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++)
     HycoCheck(!(t->target[j] > 0) || t->validation || t->n_validation,
               "-target_%s needs held-out points, and -hyco_validation is 0; remove one of the two", HycoErrorKinds[j]);
@@ -861,6 +902,7 @@ PetscErrorCode HycoReducerRun(HycoReducer t, HycoSamples samples, const char pat
   HycoFinally(RunOn(t, store, samples, path, &report, &solved), PetscCall(HycoReducerClose(t, &store)));
   report.sliding = t->sliding;
   report.rate_change = t->rate_change;
+  /* Late solves happen inside the reduction: their time is counted with the snapshots. */
   report.seconds_snapshots = solved - begin + t->solving;
   report.seconds_reduction = HycoNow() - solved - t->solving;
   if (training) *training = report;

@@ -54,6 +54,7 @@ static PetscErrorCode Spacing(HycoReducer t, PetscReal *spacing)
     for (PetscInt j = 0; j < n; j++) {
       const PetscReal d = HycoEstimatesDistance(t->scene, mu + k * n_par, mu + j * n_par);
 
+      /* O(n^2) distances: thousands of points take well below a second. */
       if (d > 0 && (nearest[k] == 0 || d < nearest[k])) nearest[k] = d;
     }
   }
@@ -84,6 +85,7 @@ static PetscErrorCode Borrow(PetscInt n, const PetscInt group[], const PetscReal
   for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++) {
     if (!estimates->has[e]) continue;
     PetscCall(PetscArraycpy(other, estimates->law[e], HYCO_ESTIMATE_FEATURES + 1));
+    /* Raised anew: the constant of another error says nothing about this one. */
     PetscCall(HycoRaiseBound(n, group, HYCO_ESTIMATE_FEATURES, X, y, SHARE, other));
     if (MeanOf(n, X, other) < MeanOf(n, X, law)) PetscCall(PetscArraycpy(law, other, HYCO_ESTIMATE_FEATURES + 1));
   }
@@ -91,7 +93,8 @@ static PetscErrorCode Borrow(PetscInt n, const PetscInt group[], const PetscReal
 }
 
 /* Fits the formula for these errors. Those up to `least`, for example of forces without contact, contain no information
-   on their size: they come last, and only raise the bound. */
+   on their size: they come last, and only raise the bound. On logarithms: errors and features span orders of magnitude,
+   and their relation is nearly a power law there. */
 static PetscErrorCode Fit(PetscInt n, const HycoHeldOut rows[], const PetscReal error[], PetscReal least,
                           const HycoEstimates *estimates, PetscBool borrow, PetscReal law[])
 {
@@ -128,6 +131,7 @@ static PetscErrorCode FitError(PetscInt n, const HycoHeldOut rows[], HycoEstimat
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(n, &error));
   for (PetscInt i = 0; i < n; i++) {
+    /* Forces and stresses are guarded: below a tenth of the largest they are relative to that tenth. */
     error[i] = HycoHeldOutError(&rows[i], errors[kind], estimates->force);
     finite = (PetscBool)(finite && !PetscIsInfOrNanReal(error[i]));
   }
@@ -164,8 +168,10 @@ static PetscErrorCode FitOutput(PetscInt n, const HycoHeldOut rows[], const Hyco
   PetscCall(PetscSortReal(n, sorted));
   o->median = sorted[n / 2];
   o->largest = sorted[n - 1];
+  /* Without calibrated features (estimates->n = 0) there is nothing to fit with. */
   o->has = (PetscBool)(o->magnitude > 0 && estimates->n);
   PetscCall(Median(n, error, 1, 0, &median));
+  /* Smaller errors count as this one: their logarithms would only be noise. */
   least = PetscMax(NEGLIGIBLE * median, HYCO_OUTPUT_ROUND_OFF * o->magnitude);
   if (o->has) PetscCall(Fit(n, rows, error, least, estimates, PETSC_TRUE, o->law));
   PetscCall(PetscFree2(error, sorted));
@@ -185,6 +191,7 @@ static PetscErrorCode FitAll(HycoReducer t, PetscInt n, PetscInt least, const Hy
                              HycoEstimates *estimates)
 {
   PetscFunctionBegin;
+  /* Too few points: an upper tolerance limit of so few would say nothing. */
   if (n < least) PetscFunctionReturn(PETSC_SUCCESS);
   estimates->n = n;
   for (PetscInt j = 0; j < HYCO_ESTIMATE_FEATURES; j++) {
@@ -192,6 +199,7 @@ static PetscErrorCode FitAll(HycoReducer t, PetscInt n, PetscInt least, const Hy
         Median(n, rows[0].feature + j, (PetscInt)(sizeof(*rows) / sizeof(PetscReal)), 1 / SMALL, &estimates->floor[j]));
     estimates->floor[j] *= SMALL;
   }
+  /* The distance has a floor of its own: between training points it is never 0, and its median says little. */
   PetscCall(Spacing(t, &estimates->floor[HYCO_ESTIMATE_DISTANCE]));
   for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++) PetscCall(FitError(n, rows, (HycoEstimateKind)e, estimates));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -257,6 +265,7 @@ static PetscErrorCode NameSettings(const HycoTraining *report, HycoROM m)
   PetscFunctionBegin;
   if (!chosen->number) PetscFunctionReturn(PETSC_SUCCESS);
   HycoReducerSettingsDescribe(&chosen->settings, sizeof(settings), settings);
+  /* Errors near added solutions are smaller than elsewhere: `view` says how many points are free of this. */
   if (report->n_fresh)
     HycoFormat(fresh, "  training added %d solutions; near %d of the held-out points, fresh ones, it added none\n",
                (int)report->n_added, (int)report->n_fresh);
@@ -267,8 +276,9 @@ static PetscErrorCode NameSettings(const HycoTraining *report, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Fits the formulas, and stores the errors in the model. Rank 0. Rank 0 alone has the model's online data; the
-   caller broadcasts what other ranks report. */
+/* Fits the formulas, and stores the errors in the model. Rank 0. Rank 0 alone has the model's online data; the caller
+   broadcasts what other ranks report. What it learns from are predictions, not interpolations: held-out points are in
+   no basis. */
 static PetscErrorCode Conclude(HycoReducer t, HycoSamples points, PetscInt n, HycoHeldOut rows[],
                                HycoOutputErrors outputs[], HycoROM m, HycoTraining *report)
 {
@@ -338,6 +348,7 @@ static PetscErrorCode JudgeCorners(HycoReducer t, HycoSamples corners, PetscInt 
   PetscFunctionBegin;
   if (!n_corners) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoReducerPredictHeldOut(t, corners, model, store, NULL, rows + n));
+  /* The scale of forces is that of all points, so that corners with small forces are judged alike. */
   PetscCall(HycoHeldOutSummarise(n_corners, rows + n, HycoHeldOutForce(n + n_corners, rows), &there));
   for (PetscInt e = 0; e < HYCO_N_ERRORS; e++) {
     held_out->largest[e] = PetscMax(held_out->largest[e], there.largest[e]);
@@ -356,6 +367,7 @@ static PetscErrorCode Learn(HycoReducer t, HycoSamples points, PetscInt n, HycoH
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(n, &outputs));
   PetscCall(HycoReducerJudgeOutputs(t, points, model, store, rows, outputs));
+  /* Rank 0 has the rows of all points, and the fit is small. */
   HycoOnRoot(HycoComm(t), Conclude(t, points, n, rows, outputs, model, report));
   PetscCallMPI(MPI_Bcast(&report->n_held, 1, MPIU_INT, 0, HycoComm(t)));
   PetscCallMPI(MPI_Bcast(report->output, sizeof(report->output), MPI_BYTE, 0, HycoComm(t)));
@@ -363,6 +375,7 @@ static PetscErrorCode Learn(HycoReducer t, HycoSamples points, PetscInt n, HycoH
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Errors are those of the final model, at points that did not choose it where there are such. */
 PetscErrorCode HycoReducerCalibrate(HycoReducer t, HycoSnapshots store, HycoROM model, HycoTraining *report)
 {
   HycoHeldOut *rows = t->judged_held;

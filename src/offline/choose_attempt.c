@@ -57,6 +57,8 @@ HycoAttempt *HycoAttemptsChoose(PetscInt n, HycoAttempt attempt[])
   return chosen;
 }
 
+/* The ratio above which an attempt of this cost cannot be chosen any more: its held-out paths are then not predicted to
+   the end. */
 PetscReal HycoAttemptsLimit(PetscInt n, const HycoAttempt attempt[], PetscReal cost, PetscInt *beaten)
 {
   const HycoAttempt *by;
@@ -92,6 +94,7 @@ HycoAttempt *HycoAttemptsReopen(PetscInt n, HycoAttempt attempt[])
   for (PetscInt k = 0; k < n; k++) {
     HycoAttempt *a = &attempt[k];
 
+    /* In the order of the attempts, which is the order of their cost. */
     if (a->beaten_by && !a->reopened && !IsMet(n, attempt, a->cost) &&
         !(a->ratio > HycoAttemptsLimit(n, attempt, a->cost, &beaten)))
       return a;

@@ -48,6 +48,7 @@ static PetscErrorCode FillNotes(HycoFE fe, const PetscBool near[], PetscReal val
   for (PetscInt e = 0; e < n; e++) {
     value[N_NOTES * e] = near && near[e] ? 0 : volume[e];
     value[N_NOTES * e + 1] = fe->mesh->cell_body[e];
+    /* Cells with a full-order displacement have weight 1, and are not chosen. */
     value[N_NOTES * e + 2] = near && near[e];
   }
   PetscCall(PetscFree(volume));
@@ -55,7 +56,8 @@ static PetscErrorCode FillNotes(HycoFE fe, const PetscBool near[], PetscReal val
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* These data, a column each, rows in the file's order. Collective. */
+/* These data, a column each, rows in the file's order. Collective. Volume, body and whether a cell is kept in any case,
+   as columns of a matrix, so that one gathering serves for them too. */
 static PetscErrorCode Notes(HycoReducer t, const PetscBool near[], PetscInt n_rows, Mat *X)
 {
   HycoFE fe = t->fom->fe;
@@ -65,6 +67,7 @@ static PetscErrorCode Notes(HycoReducer t, const PetscBool near[], PetscInt n_ro
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(N_NOTES * fe->mesh->n_cells, &value, N_NOTES * n_rows, &rows));
+  /* An inverted cell on one rank is an error on all. */
   HycoOnEach(HycoComm(t), FillNotes(fe, near, value));
   PetscCall(HycoFOMToRows(t->fom, HYCO_ON_CELLS, MPIU_REAL, N_NOTES, value, rows));
   PetscCall(MatCreateDense(HycoComm(t), n_rows, PETSC_DECIDE, t->sizes[1], N_NOTES, NULL, X));
@@ -117,6 +120,7 @@ static void Measure(PetscInt n_cells, PetscInt n, const PetscReal vectors[], con
       missed += vectors[(size_t)i * (size_t)n_cells + (size_t)e] * (w[e] - 1);
       all += vectors[(size_t)i * (size_t)n_cells + (size_t)e];
     }
+    /* Vectors are orthonormal: their singular values give each the weight that it has in the contributions. */
     lost += sigma[i] * missed * sigma[i] * missed;
     size += sigma[i] * all * sigma[i] * all;
   }
@@ -130,6 +134,7 @@ static void Measure(PetscInt n_cells, PetscInt n, const PetscReal vectors[], con
       missed += volume[e] * (w[e] - 1);
       all += volume[e];
     }
+    /* A body without any chosen cell would lose its whole volume: the largest, not the mean. */
     error[1] = PetscMax(error[1], HycoRelative(PetscAbsReal(missed), all));
   }
 }
@@ -162,6 +167,7 @@ static PetscErrorCode FindWeights(HycoReducer t, PetscReal fixed, PetscReal tol,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Weights by nonnegative least squares (Lawson and Hanson 1974): few positive ones, and a tangent that stays definite (ECSW; Farhat et al. 2014). */
 PetscErrorCode HycoCubatureFind(HycoReducer t, const PetscBool near[], PetscReal fixed, PetscReal tol, Mat W,
                                 PetscInt n, const PetscReal sigma[], PetscReal w[], PetscReal error[2])
 {
@@ -174,6 +180,7 @@ PetscErrorCode HycoCubatureFind(HycoReducer t, const PetscBool near[], PetscReal
   PetscCall(MatGetLocalSize(W, &rows, NULL));
   PetscCall(Notes(t, near, rows, &X));
   PetscCall(PetscMalloc2((size_t)n * n_cells + 1, &vectors, N_NOTES * n_cells + 1, &notes));
+  /* All cells of n vectors on rank 0: nonnegative least squares is a serial algorithm. */
   for (PetscInt j = 0; j < n; j++) PetscCall(GatherColumn(W, j, vectors + (size_t)j * n_cells));
   for (PetscInt j = 0; j < N_NOTES; j++) PetscCall(GatherColumn(X, j, notes + (size_t)j * n_cells));
   PetscCall(MatDestroy(&X));

@@ -5,6 +5,7 @@
 #include <hycoquantities.h>
 #include <hycoreducerimpl.h>
 
+/* A mesh of the marked cells of all ranks, on rank 0. Without contact surfaces, which the balance has no use for. */
 PetscErrorCode HycoReducerGatherMesh(HycoReducer t, const PetscBool needed[], HycoMesh *mesh)
 {
   HycoMesh part = t->fom->part;
@@ -22,6 +23,7 @@ PetscErrorCode HycoReducerGatherMesh(HycoReducer t, const PetscBool needed[], Hy
     for (PetscInt e = 0; e < part->n_cells; e++) {
       if (needed[e]) keep[n++] = e;
     }
+    /* On one rank nothing moves, and the part is the whole mesh. */
     ierr = HycoSubmesh(t->scene, part, n, keep, 0, NULL, 0, NULL, mesh);
     PetscCall(PetscFree(keep));
   }
@@ -36,6 +38,7 @@ static PetscErrorCode PartsOfBodies(HycoReducer t, const HycoMotions *motions, P
   const PetscInt n = t->scene->n_bodies;
 
   PetscFunctionBegin;
+  /* Neutral values of minimum and maximum, for bodies with no node on this rank. */
   for (PetscInt b = 0; b < n; b++) first[b] = PETSC_MAX_INT, last[b] = -1;
   for (PetscInt i = 0; i < part->n_nodes; i++) {
     const PetscInt b = part->node_body[i];
@@ -48,7 +51,8 @@ static PetscErrorCode PartsOfBodies(HycoReducer t, const HycoMotions *motions, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Orthonormal coefficients Q (n x 6) of the span of these motions. */
+/* Orthonormal coefficients Q (n x 6) of the span of these motions. Modified Gram-Schmidt; twice, as once loses
+   orthogonality for nearly parallel motions. */
 static void Span(PetscInt n, const HycoRigid rigid[], PetscReal Q[][6])
 {
   for (PetscInt k = 0; k < n; k++) {
@@ -78,6 +82,7 @@ static PetscBool Contains(PetscInt n, PetscReal Q[][6], const PetscReal v[6])
     for (PetscInt i = 0; i < 6; i++) dot += Q[k][i] * v[i];
     in += dot * dot;
   }
+  /* The part of v outside the span, by Pythagoras: Q is orthonormal. */
   return (PetscBool)(all - in <= 1e-8 * all);
 }
 
@@ -89,6 +94,7 @@ static PetscBool StayFree(HycoScene scene, PetscInt dim, PetscInt n, const HycoR
   PetscReal Q[6][6];
 
   for (PetscInt p = 0; p < HYCO_MAX_PARAMETERS; p++) changed[p] = PETSC_TRUE;
+  /* In 1D there is no turn. */
   if (dim == 1 || !HycoSceneChanges(scene, changed).nodes) return PETSC_TRUE;
   Span(n, rigid, Q);
   for (PetscInt k = 0; k < n; k++) {
@@ -99,6 +105,7 @@ static PetscBool StayFree(HycoScene scene, PetscInt dim, PetscInt n, const HycoR
     for (PetscInt d = 0; d < dim && turn > 1e-16; d++) {
       PetscReal v[6] = {0};
 
+      /* The projection of direction d to the plane perpendicular to the axis. */
       for (PetscInt c = 0; c < dim; c++) v[c] = (c == d) - axis[c] * axis[d] / turn;
       stay = (PetscBool)(stay && Contains(n, Q, v));
     }
@@ -118,9 +125,11 @@ static void KeepMotions(HycoReducer t, HycoMotions *motions, const PetscInt firs
     PetscBool whole = PETSC_TRUE;
 
     for (n = 1; k + n < motions->n && motions->rigid[k + n].part == part;) n++;
+    /* A body in two parts would have the motion in one of them alone, which no row of bodies can say. */
     for (PetscInt b = 0; b < n_bodies; b++)
       whole = (PetscBool)(whole && (first[b] == last[b] || first[b] > part || last[b] < part));
     if (!whole || !StayFree(t->scene, t->sizes[3], n, motions->rigid + k)) continue;
+    /* In place: kept never overtakes k. */
     for (PetscInt j = 0; j < n; j++, kept++) {
       motions->rigid[kept] = motions->rigid[k + j];
       for (PetscInt b = 0; b < n_bodies; b++) of[kept * n_bodies + b] = first[b] == part;
@@ -129,7 +138,7 @@ static void KeepMotions(HycoReducer t, HycoMotions *motions, const PetscInt firs
   motions->n = kept;
 }
 
-/* With the motions found. */
+/* With the motions found. needed[] is filled on each rank for its own cells; the mesh of them is on rank 0 only. */
 static PetscErrorCode Take(HycoReducer t, HycoMotions *motions, HycoROM m)
 {
   HycoMesh part = t->fom->part, loaded = NULL;
@@ -145,6 +154,7 @@ static PetscErrorCode Take(HycoReducer t, HycoMotions *motions, HycoROM m)
   if (!ierr) KeepMotions(t, motions, first, last, of);
   for (PetscInt k = 0; k < motions->n * n; k++) moved[k % n] = (PetscBool)(moved[k % n] || of[k]);
   if (!ierr && motions->n) {
+    /* Only cells with loads on bodies that move: the balance needs no others. */
     HycoOnEach(HycoComm(t), HycoMarkLoads(t->scene, part, moved, needed));
     PetscCall(HycoReducerGatherMesh(t, needed, &loaded));
   }

@@ -47,6 +47,7 @@ static PetscErrorCode Start(HycoReducer t, HycoSamples start, HycoSamples *sampl
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesCreate(t->scene, samples));
+  /* The corners of the ranges, so that (42) interpolates everywhere inside. */
   if (!start) {
     PetscCall(AddCorners(t, *samples));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -57,7 +58,8 @@ static PetscErrorCode Start(HycoReducer t, HycoSamples start, HycoSamples *sampl
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Checks the indicator: the replayed residual for paths, the others for solutions without a history. */
+/* Checks the indicator: the replayed residual for paths, the others for solutions without a history. Here and not where
+   the option is read: the scene is known only now. */
 static PetscErrorCode CheckIndicator(HycoReducer t)
 {
   const PetscBool residual = (PetscBool)(t->greedy.indicator == HYCO_INDICATOR_RESIDUAL);
@@ -119,6 +121,7 @@ static PetscErrorCode SpreadSnapshots(HycoReducer t, HycoROM m, PetscReal **U_at
   PetscCall(HycoReducerFetchSnapshots(t, t->rank ? 0 : m->model->mesh->n_nodes, m->model->mesh->node_whole, &rows));
   PetscCall(PetscMalloc1((size_t)n_dof * (size_t)t->n_s, U_at));
   for (PetscInt i = 0; t->rank == 0 && i < n_dof; i++) {
+    /* An unknown's values at all solutions together: (42) is a sum over solutions for each unknown. */
     for (PetscInt k = 0; k < t->n_s; k++)
       (*U_at)[(size_t)i * (size_t)t->n_s + (size_t)k] = rows[(size_t)k * (size_t)n_dof + (size_t)i];
   }
@@ -150,6 +153,7 @@ static PetscErrorCode EvaluateShare(HycoReducer t, Loop *loop, HycoROM m, const 
     HycoIndication v;
 
     PetscCall(HycoIndicatorEvaluate(indicator, loop->points + k * loop->n_par, &v));
+    /* Reduced by a maximum over ranks later: a NaN would be lost there. */
     loop->value[4 * k] = Infinite(v.eta);
     loop->value[4 * k + 1] = Infinite(v.eta_u);
     loop->value[4 * k + 2] = Infinite(v.eta_lambda);
@@ -242,6 +246,7 @@ static PetscErrorCode Choose(HycoReducer t, Loop *loop, PetscInt *worst, HycoGre
     PetscBool known = PETSC_FALSE;
 
     step->max_eta = PetscMax(step->max_eta, value[0]);
+    /* Means of the finite ones; how many are infinite is reported beside them. */
     if (!PetscIsInfReal(value[0])) {
       step->mean_eta_u += value[1];
       step->mean_eta_lambda += value[2];
@@ -249,6 +254,7 @@ static PetscErrorCode Choose(HycoReducer t, Loop *loop, PetscInt *worst, HycoGre
     }
     for (PetscInt j = 0; j < n_solved && !known; j++)
       PetscCall(PetscArraycmp(solved + j * loop->n_par, loop->points + k * loop->n_par, loop->n_par, &known));
+    /* A solved point may still have the largest indicator, as of a poor model: solving it again would never end. */
     if (!known && (*worst < 0 || Before(t, loop, k, *worst))) *worst = k;
   }
   step->n_points = loop->n_points;
@@ -280,6 +286,7 @@ static PetscErrorCode Iterate(HycoReducer t, Loop *loop, PetscInt iteration, Hyc
   PetscInt worst;
 
   PetscFunctionBegin;
+  /* The former model before the next one is built: only one is in memory. */
   PetscCall(HycoROMDestroy(&loop->model));
   PetscCall(BuildModel(t, loop, iteration, report));
   PetscCall(EvaluateModel(t, loop, iteration));
@@ -307,12 +314,14 @@ static PetscErrorCode SetSettings(HycoReducer t)
 
   PetscFunctionBegin;
   t->plane = NULL;
+  /* Settings that the user has fixed are the user's. */
   if (!t->search || t->prototype->model->traits.settings != HYCO_SETTINGS_RID) PetscFunctionReturn(PETSC_SUCCESS);
   if (!pinned[HYCO_CHOICE_TOLERANCE])
     t->tol[HYCO_SEED_DISPLACEMENT] = t->tol[HYCO_SEED_STRESS] = t->tol[HYCO_SEED_FORCE] = t->tol[HYCO_SEED_INELASTIC] =
         ACCURATE;
   if (!pinned[HYCO_CHOICE_HYBRID] && !pinned[HYCO_CHOICE_LAYERS] && !t->whole_rid)
     PetscCall(HycoReducerFindPlane(t, &t->plane));
+  /* On a plane of symmetry all displacements of A are full order, see HycoReducerFindPlane(). */
   if (t->plane)
     t->hybrid = HYCO_HYBRID_ALL;
   else if (!pinned[HYCO_CHOICE_LAYERS])
@@ -328,6 +337,7 @@ static PetscErrorCode Conclude(HycoReducer t, Loop *loop, const char path[], Hyc
 
   PetscFunctionBegin;
   PetscCall(HycoReducerHoldOut(t, loop->store));
+  /* The growing RID of the loop must not bind the search. */
   if (learn) { /* each attempt has its own RID and bases */
     PetscCall(PetscFree(t->grown));
     PetscCall(HycoReducerResetBases(t));
@@ -349,7 +359,7 @@ static PetscErrorCode RunLoop(HycoReducer t, Loop *loop, HycoTraining *report)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* After the loop's store is open. */
+/* After the loop's store is open. `grown` has the cells of the RID so far, which only grows. */
 static PetscErrorCode RunOn(HycoReducer t, Loop *loop, const char path[], HycoTraining *report)
 {
   PetscFunctionBegin;
@@ -362,6 +372,7 @@ static PetscErrorCode RunOn(HycoReducer t, Loop *loop, const char path[], HycoTr
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The store is closed and the set destroyed after an error too. */
 PetscErrorCode HycoReducerRunGreedy(HycoReducer t, HycoSamples start, HycoSamples training, const char path[],
                                     HycoTraining *training_report)
 {

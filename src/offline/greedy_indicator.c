@@ -67,10 +67,12 @@ PetscErrorCode HycoIndicatorCreate(HycoROM model, HycoIndicatorKind kind, PetscI
   PetscCall(HycoROMSetReconstruct(model, (PetscBool)(kind == HYCO_INDICATOR_RESIDUAL)));
   if (!HycoIndicatorInterpolates(kind)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(n, &d->weight));
+  /* Once per iteration: the triangulation depends on the solved points alone. */
   PetscCall(HycoInterpolantCreate(model->model->scene->n_parameters, n, points, &d->interpolant));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Also half made: what does not exist is NULL. */
 PetscErrorCode HycoIndicatorDestroy(HycoIndicator *indicator)
 {
   HycoIndicator d;
@@ -102,10 +104,12 @@ static PetscErrorCode SetUp(HycoIndicator d)
     PetscCall(VecDuplicate(d->L, &d->D));
     PetscCall(VecDuplicate(d->local.D, &d->gap));
   }
+  /* The norm's matrix on the model's mesh, of which A is taken. */
   PetscCall(HycoFECreateMatrix(m->fe, PETSC_COMM_SELF, m->fe->mesh->n_nodes, 0, &d->M));
   PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &d->system));
   PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &d->solver));
   PetscCall(PetscObjectSetOptions((PetscObject)d->solver, m->model->scene->options));
+  /* The scene's options: the local problem is solved as full order would be. */
   PetscCall(HycoSolverSetFromOptions(d->solver));
   PetscCall(HycoSolverSetWarmStart(d->solver, PETSC_FALSE)); /* no warm start, because the ranks share the points */
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -123,6 +127,7 @@ static PetscErrorCode AssembleNorm(HycoIndicator d)
   if (d->M_A && now == d->geometry) PetscFunctionReturn(PETSC_SUCCESS);
   d->geometry = now;
   HycoDestroyAll(&d->norm, &d->M_A);
+  /* Gradients times the mesh's length, so that both parts of the norm have one unit. */
   PetscCall(HycoFEAssembleH1(m->fe, d->length, d->M));
   PetscCall(MatCreateSubMatrix(d->M, d->local.is_A, d->local.is_A, MAT_INITIAL_MATRIX, &d->M_A));
   PetscCall(HycoDefiniteSolver(d->M_A, "the H1 norm's matrix", &d->norm));
@@ -271,16 +276,19 @@ static PetscErrorCode EvaluateLocal(HycoIndicator d, const PetscReal mu[], HycoR
   HycoCheck(m->ops->local,
             "-hyco_greedy_indicator local needs the system on the RID, which a %s model does not have; use penetration",
             m->model->type);
+  /* Matrices at the last prediction's parameters: no further assembly. */
   PetscUseTypeMethod(m, local, &d->local);
   if (!d->system) PetscCall(SetUp(d));
   PetscCall(AssembleNorm(d));
   PetscCall(Interpolate(d, mu));
   PetscCall(SolveLocal(d, reason));
+  /* Also if the local problem was not solved; the caller then replaces the values. */
   PetscCall(Distances(d, v));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* For the last predicted path; infinite if a law has no solution. */
+/* For the last predicted path; infinite if a law has no solution. The residual on the whole mesh needs no local solve:
+   the path is replayed for it. */
 static PetscErrorCode EvaluateResidual(HycoIndicator d, HycoIndication *v)
 {
   HycoEquilibrium e;
@@ -302,6 +310,7 @@ PetscErrorCode HycoIndicatorEvaluate(HycoIndicator d, const PetscReal mu[], Hyco
   PetscFunctionBegin;
   PetscCall(HycoROMPredict(m, m->model->scene->n_parameters, mu));
   if (d->kind == HYCO_INDICATOR_PENETRATION) {
+    /* Penetration counts at all contacts, also outside the RID. */
     PetscCall(HycoROMComplete(m));
     v->eta = v->eta_u = v->size = Penetration(m);
     v->eta_lambda = 0;

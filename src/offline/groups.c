@@ -33,6 +33,7 @@ PetscErrorCode HycoSnapshotsDeclare(PetscOptions options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* As many groups as points or ranks, unless memory forbids: one rank a point has no communication at all. */
 PetscErrorCode HycoSnapshotsChooseGroups(MPI_Comm comm, HycoScene scene, PetscInt n, PetscInt *groups)
 {
   PetscMPIInt size;
@@ -78,6 +79,7 @@ static PetscErrorCode FindKinds(HycoScene scene, PetscInt n_par, const PetscReal
       const PetscReal *a = mu + list[first[k]] * n_par, *b = mu + list[i] * n_par;
       PetscInt p = 0;
 
+      /* Equal values of all parameters that the stiffness depends on, bit for bit: the factor is reused only then. */
       while (p < n_par && (!reaches[p] || a[p] == b[p])) p++;
       if (p == n_par) break;
     }
@@ -88,6 +90,8 @@ static PetscErrorCode FindKinds(HycoScene scene, PetscInt n_par, const PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* `list` are the points that are not in the store yet. The kinds are found on rank 0 alone, since their search is
+   quadratic at worst. */
 PetscErrorCode HycoSnapshotsCreateQueue(MPI_Comm comm, HycoScene scene, PetscInt n_par, const PetscReal mu[],
                                         PetscInt n, const PetscInt list[], PetscInt n_all, HycoQueue *queue)
 {
@@ -115,6 +119,7 @@ PetscErrorCode HycoSnapshotsReadMonitor(HycoSnapshots s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For -hyco_groups_monitor: what each group does and when, in one order of events. */
 PetscErrorCode HycoSnapshotsNote(HycoSnapshots s, HycoQueue queue, const char format[], ...)
 {
   PetscInt number, color;

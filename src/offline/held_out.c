@@ -53,6 +53,7 @@ static PetscErrorCode CompareRID(Rows *r, const PetscReal mu[], HycoHeldOut *row
   row->size = f.size;
   row->rid_size = f.rid_size;
   PetscCall(PetscFree(lambda));
+  /* Features of a diverged solution would be fitted to. */
   if (row->converged > 0) PetscCall(HycoEstimatesFeatures(m, row->feature));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -67,12 +68,14 @@ static PetscErrorCode MeasureU(Rows *r, const PetscReal mu[], PetscInt step, Pet
   PetscInt lda;
 
   PetscFunctionBegin;
+  /* Each rank reads its rows of the stored solution. */
   HycoOnEach(HycoComm(t), Read(r, mu, step));
   PetscCall(HycoComparisonBring(&r->c));
   HycoSceneSetTime(t->scene, mu, t->scene->n_times ? t->scene->times[step] : 0, all);
   PetscCall(HycoFOMSetParameters(t->fom, all));
   PetscCall(MatDenseGetLDA(t->V, &lda));
   PetscCall(MatDenseGetArrayRead(t->V, &V));
+  /* The model's displacement on all rows, from its coefficients and V, without the whole mesh on one rank. */
   PetscCall(HycoComparisonPredict(&r->c, r->m, of, V, lda));
   PetscCall(MatDenseRestoreArrayRead(t->V, &V));
   PetscCall(HycoComparisonSquares(&r->c, square));
@@ -89,6 +92,7 @@ static PetscErrorCode MeasureStep(Rows *r, const PetscReal mu[], PetscInt step, 
   PetscCall(PetscMalloc1(r->m->model->pairs.n, &lambda));
   PetscCall(HycoSnapshotsReadRows(r->store, mu, step, "lambda", 0, r->m->model->pairs.n, lambda));
   PetscCall(HycoROMMeasureRID(r->m, r->c.rid[0], r->c.rid[1], r->c.rid[2], lambda, lost));
+  /* Squares of the whole mesh, which all ranks have summed. */
   lost[HYCO_ERROR_U] = (HycoLost){PetscSqrtReal(square[0]), PetscSqrtReal(square[1])};
   PetscCall(PetscFree(lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -164,6 +168,7 @@ PetscErrorCode HycoHeldOutPredict(HycoROM m, HycoSnapshots store, const PetscRea
   PetscFunctionBegin;
   if (m->model->scene->n_times) {
     PetscCall(HycoSnapshotsReadTaken(store, mu, &n, &taken));
+    /* Full order's own steps: otherwise the error would include that of different steps in time. */
     PetscCall(HycoROMSetJudgedSteps(m, n, taken));
   }
   ierr = HycoROMPredict(m, m->model->scene->n_parameters, mu);
@@ -301,6 +306,7 @@ static PetscErrorCode PredictAllPaths(Rows *r, PetscInt n, HycoHeldOut rows[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* rows[] has a place for every point; collective, as fields are compared by the ranks that have them. */
 PetscErrorCode HycoReducerPredictHeldOut(HycoReducer t, HycoSamples points, HycoROM m, HycoSnapshots store,
                                          HycoHeldOutRace *race, HycoHeldOut rows[])
 {
@@ -309,6 +315,7 @@ PetscErrorCode HycoReducerPredictHeldOut(HycoReducer t, HycoSamples points, Hyco
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(points, &n, NULL, NULL));
+  /* Rows of points that a race leaves out stay 0: not predicted. */
   PetscCall(PetscArrayzero(rows, n));
   PetscCall(HycoComparisonCreate(t->fom, m, &r.c));
   if (!t->scene->n_times)
@@ -327,7 +334,8 @@ PetscReal HycoHeldOutForce(PetscInt n, const HycoHeldOut rows[])
   return force;
 }
 
-/* One of row->error or row->end, after division. */
+/* One of row->error or row->end, after division. Forces are divided by the larger of their own size and a share of the
+   largest of all points: where a contact just closes any error would be infinite. */
 static PetscReal Divided(const HycoHeldOut *row, HycoErrorKind kind, PetscReal force, PetscReal error)
 {
   const PetscBool forces = (PetscBool)(kind == HYCO_ERROR_LAMBDA || kind == HYCO_ERROR_LAMBDA_RID);
@@ -359,6 +367,7 @@ PetscErrorCode HycoHeldOutSummarise(PetscInt n, const HycoHeldOut rows[], PetscR
     v->not_converged += rows[k].converged < 0.5;
     PetscCall(PetscArraycpy(seconds, rows[k].seconds, HYCO_HELD_REPEATS));
     PetscCall(PetscSortReal(HYCO_HELD_REPEATS, seconds));
+    /* The median of the repeats: the first one touches cold memory. */
     v->seconds += seconds[HYCO_HELD_REPEATS / 2] / n;
   }
   for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
@@ -372,6 +381,7 @@ PetscErrorCode HycoHeldOutSummarise(PetscInt n, const HycoHeldOut rows[], PetscR
       v->mean[j] += error[k] / n;
     }
     PetscCall(PetscSortReal(n, error));
+    /* Infinite errors sort last. */
     v->median[j] = error[n / 2];
   }
   PetscCall(PetscFree(error));

@@ -86,6 +86,7 @@ static PetscErrorCode FindContacts(HycoFE fe, HycoPairs *pairs, const Sets *s, P
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc4(n + 1, &start, entries, &dof, entries, &value, n, &gap));
+  /* Rows at the training parameters: empty ones, without a master, are not in A_lambda. */
   PetscCall(HycoContactRows(fe, pairs, start, dof, value, gap));
   for (PetscInt k = 0; k < n; k++) {
     for (PetscInt j = start[k]; j < start[k + 1]; j++) in_rid[k] = in_rid[k] || s->sets[s->index[dof[j] / dim]] == 2;
@@ -118,6 +119,7 @@ PetscErrorCode HycoRIDSets(HycoFE fe, HycoPairs *pairs, const HycoPairs *rows, c
 
   PetscFunctionBegin;
   CloseIncomplete(&s);
+  /* A master that joins I may leave another contact incomplete. */
   while (lost) PetscCall(CloseDependent(&s, &lost));
   PetscCall(PetscArrayzero(in_rid, pairs->n));
   if (of)

@@ -77,7 +77,9 @@ static PetscErrorCode JudgeSample(HycoReducer t, HycoROM m, PetscInt k, const Pe
     PetscCall(PathErrors(t, m, k, &j->u, &j->lambda));
   else
     SnapshotErrors(t, m, k, &j->u, &j->lambda);
+  /* A path that ends early has a negative reason, as a solve that diverges. */
   j->solved = (PetscBool)(m->prediction.reason >= 0);
+  /* The work of the search is counted: an unsolved point costs its attempts. */
   t->n_judged += j->solved ? 1 : HYCO_UNSOLVED_WORK;
   j->t = m->trace.history.t;
   if (!j->solved || !(j->u < HYCO_JUDGED_WORST)) j->u = HYCO_JUDGED_WORST;
@@ -95,6 +97,7 @@ static PetscErrorCode JudgeAll(HycoReducer t, HycoROM m, PetscReal most, HycoJud
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->columns, &n, &n_par, &mu));
+  /* (41) does not change what is judged here, and would cost more than the solve. */
   m->reconstruct = PETSC_FALSE;
   *u = *lambda = 0;
   for (PetscInt k = 0; k < n && *u <= most; k++) {
@@ -107,6 +110,7 @@ static PetscErrorCode JudgeAll(HycoReducer t, HycoROM m, PetscReal most, HycoJud
     if (judged) judged[k] = j;
   }
   if (*u > most) *u = *lambda = HYCO_JUDGED_WORST;
+  /* Predictions of the user choose their own steps again. */
   if (m->model->scene->n_times) PetscCall(HycoROMSetSteps(m, 0, NULL));
   m->reconstruct = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -127,6 +131,7 @@ static PetscErrorCode Race(HycoReducer t, HycoROM m, PetscInt n, const PetscInt 
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->columns, NULL, &n_par, &mu));
+  /* Without a former best the limit is `most` times the number of paths. */
   for (PetscInt k = 0; k < n && best; k++) all = (k ? all : 0) + best[k].u;
   *lost = PETSC_FALSE;
   for (PetscInt k = 0; k < n && !*lost; k++) {
@@ -141,6 +146,7 @@ static PetscErrorCode Race(HycoReducer t, HycoROM m, PetscInt n, const PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* m->reconstruct is off: forces outside the RID are not judged, and cost more than the solve. */
 PetscErrorCode HycoReducerJudgeRace(HycoReducer t, HycoROM m, const HycoJudged best[], PetscReal most,
                                     HycoJudged judged[], PetscReal *u, PetscBool *lost)
 {
@@ -152,6 +158,7 @@ PetscErrorCode HycoReducerJudgeRace(HycoReducer t, HycoROM m, const HycoJudged b
   PetscCall(PetscMalloc2(n, &order, n, &key));
   for (PetscInt k = 0; k < n; k++) {
     order[k] = k;
+    /* The worst paths of the best settings first: a loser is found after few paths. */
     key[k] = best ? -best[k].u : 0;
   }
   if (best) PetscCall(PetscSortRealWithArrayInt(n, key, order));
@@ -179,6 +186,7 @@ PetscErrorCode HycoReducerJudge(HycoReducer t, HycoROM m)
   PetscInt n;
 
   PetscFunctionBegin;
+  /* Models of bodies learn from samples of their own: no training solution exists. */
   if (t->columns != t->samples) { /* there is no training solution */
     m->model->numbers[0] = 0;
     m->model->numbers[1] = m->model->numbers[2] = -1;
@@ -190,6 +198,7 @@ PetscErrorCode HycoReducerJudge(HycoReducer t, HycoROM m)
   PetscCall(PetscMalloc1(n, &t->judged));
   PetscCall(JudgeAll(t, m, PETSC_INFINITY, t->judged, &m->model->numbers[1], &m->model->numbers[2]));
   m->model->numbers[0] = 0;
+  /* After the predictions: the matrix of the last one is there. */
   PetscTryTypeMethod(m, condition, &m->model->numbers[0]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -222,7 +231,9 @@ static PetscInt NameUnsolved(HycoReducer t, PetscInt n, const PetscReal mu[], ch
   for (PetscInt k = 0; k < n && named < NAMED; k++) {
     char at[HYCO_LINE], when[64] = "";
 
+    /* Only the first NAMED are named; the message has one line. */
     if (t->judged[k].solved) continue;
+    /* Parameters by name: the point can be repeated by the command line. */
     HycoSceneNamePoint(t->scene, mu + k * t->scene->n_parameters, at);
     if (path) snprintf(when, sizeof(when), " (t = %.6g)", (double)t->judged[k].t);
     length = strlen(text);
@@ -233,6 +244,7 @@ static PetscInt NameUnsolved(HycoReducer t, PetscInt n, const PetscReal mu[], ch
   return missing;
 }
 
+/* Ends a message: which training points made the model be refused. */
 void HycoReducerNameWorst(HycoReducer t, char text[HYCO_LINE])
 {
   PetscInt n, n_par, worst = -1, missing;
@@ -241,6 +253,7 @@ void HycoReducerNameWorst(HycoReducer t, char text[HYCO_LINE])
   size_t length;
 
   text[0] = '\0';
+  /* Nothing is known before training points are judged. */
   if (!t->judged || HycoSamplesGet(t->columns, &n, &n_par, &mu)) return;
   missing = NameUnsolved(t, n, mu, text);
   for (PetscInt k = 0; k < n; k++) {

@@ -35,10 +35,12 @@ static PetscErrorCode GatherCells(HycoReducer t, HycoMesh *mesh, PetscBool **bal
   *balanced = NULL;
   *loaded = NULL;
   PetscCall(PetscMalloc1(part->n_cells, &needed));
+  /* A group without cells on a rank is no error there. */
   HycoOnEach(HycoComm(t), HycoQuantitiesMarkCells(t->scene, part, needed));
   PetscCall(HycoReducerGatherMesh(t, needed, mesh));
   if (HycoSceneHasReactions(t->scene)) {
     PetscCall(PetscCalloc1(t->scene->n_quantities * t->scene->n_bodies, balanced));
+    /* Collective: a group's supports may lie on several ranks. */
     PetscCall(HycoQuantitiesBalance(HycoComm(t), t->scene, part, *balanced));
     HycoOnEach(HycoComm(t), HycoQuantitiesMarkLoads(t->scene, part, *balanced, needed));
     PetscCall(HycoReducerGatherMesh(t, needed, loaded));
@@ -62,9 +64,11 @@ static PetscErrorCode MakeProbe(HycoReducer t, HycoROM m)
   PetscCall(GatherCells(t, &mesh, &balanced, &loaded));
   n = mesh ? mesh->n_nodes * t->sizes[3] : 0;
   PetscCall(PetscMalloc1((size_t)n * (size_t)t->l + 1, &columns));
+  /* Rows of distributed modes, only those of the gathered nodes. */
   PetscCall(HycoReducerFetchRows(t, t->V, t->l, mesh ? mesh->n_nodes : 0, mesh ? mesh->node_whole : NULL, columns));
   if (mesh) PetscCall(PetscMalloc1((size_t)n * (size_t)t->l + 1, &V));
   for (PetscInt i = 0; i < n; i++) {
+    /* Fetched by columns, used by rows. */
     for (PetscInt j = 0; j < t->l; j++)
       V[(size_t)i * (size_t)t->l + (size_t)j] = columns[(size_t)j * (size_t)n + (size_t)i];
   }
@@ -99,6 +103,7 @@ static PetscErrorCode Begin(Outputs *o)
     const PetscInt *at, n = Places(o, k, &at);
     PetscInt last = -1;
 
+    /* An empty range if no cell is needed. */
     o->first[k] = PETSC_MAX_INT;
     for (PetscInt i = 0; i < n; i++) {
       o->first[k] = PetscMin(o->first[k], at[i]);
@@ -163,8 +168,10 @@ static PetscErrorCode MeasureStored(Outputs *o, const PetscReal mu[], PetscInt s
   PetscFunctionBegin;
   for (int k = 0; o->fe && k < (HycoSceneHasReactions(scene) ? N_FIELDS : REACTION); k++)
     PetscCall(ReadField(o, mu, step, k, &has[k]));
+  /* Tangential forces and work, where the scene has friction. */
   PetscCall(ReadFriction(o, mu, step));
   PetscCall(HycoSnapshotsReadRows(o->store, mu, step, "lambda", 0, o->m->model->pairs.n, o->lambda));
+  /* Outputs are evaluated on the mesh and with the variables of this time. */
   HycoSceneSetTime(scene, mu, scene->n_times ? scene->times[step] : 0, all);
   PetscCall(HycoROMMeasureSolution(o->m, all, o->value[DISPLACEMENT], o->value[STRESS],
                                    has[REACTION] ? o->value[REACTION] : NULL, o->lambda, value));
@@ -222,6 +229,7 @@ static PetscErrorCode JudgeAll(Outputs *o, const HycoHeldOut rows[], HycoOutputE
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(o->points, &n, &n_par, &mu));
   for (PetscInt k = 0; k < n; k++) {
+    /* A diverged prediction has no outputs to judge. */
     if (rows[k].converged < 0.5) continue;
     PetscCall(HycoReducerTell(o->t, "outputs", k, n));
     PetscCall(JudgeOne(o, mu + k * n_par, &e[k]));
@@ -243,6 +251,7 @@ static PetscErrorCode JudgeOnRoot(Outputs *o, const HycoHeldOut rows[], HycoOutp
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Outputs of the stored fields are measured by the code that measures predictions: both have the same definition. */
 PetscErrorCode HycoReducerJudgeOutputs(HycoReducer t, HycoSamples points, HycoROM m, HycoSnapshots store,
                                        const HycoHeldOut rows[], HycoOutputErrors errors[])
 {

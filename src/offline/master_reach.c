@@ -77,14 +77,17 @@ static PetscErrorCode SurfacesCreate(HycoScene scene, HycoMesh whole, const Hyco
 
   PetscFunctionBegin;
   PetscCall(PetscMemzero(s, sizeof(*s)));
+  /* Slave and master surfaces of moved contacts alone. */
   PetscCall(CutSurfaces(scene, whole, all, &s->mesh));
   PetscCall(HycoFECreate(scene, s->mesh->dm, &s->fe));
   PetscCall(PetscMalloc1(s->mesh->n_nodes, &s->node));
   PetscCall(HycoSubmeshNodes(s->mesh, whole, s->node));
   PetscCall(PetscMalloc1(whole->n_nodes, &index));
+  /* Both directions: rows of the small mesh, nodes of the whole. */
   for (PetscInt i = 0; i < s->mesh->n_nodes; i++) index[s->node[i]] = i;
   PetscCall(PetscMalloc1(all->n, &s->of));
   for (PetscInt k = 0; k < all->n; k++) {
+    /* The others keep the masters that they have as drawn. */
     if (HycoPairsMoved(all, k)) s->of[n++] = k;
   }
   PetscCall(HycoPairsSelect(all, n, s->of, index, &s->pairs));
@@ -115,6 +118,8 @@ static PetscReal LongestEdge(HycoMesh m, PetscInt group)
   return longest;
 }
 
+/* The farthest way over which a contact with a force has come, with a margin: masters beyond it cannot be met by one
+   that closes. */
 PetscErrorCode HycoMetReach(HycoScene scene, HycoMesh whole, const HycoPairs *pairs, PetscInt n, const PetscReal mu[],
                             const PetscReal Lambda[], PetscReal reach[])
 {
@@ -158,7 +163,8 @@ typedef struct {
   PetscInt n_nodes, room_nodes, *node;
 } Lists;
 
-/* Adds the contacts' current masters; *grown counts the new ones. */
+/* Adds the contacts' current masters; *grown counts the new ones. l->head[k] begins the list of contact k, newest
+   first; nodes of all lists are in one array. */
 static PetscErrorCode Note(const HycoPairs *p, Lists *l, PetscInt *grown)
 {
   PetscFunctionBegin;
@@ -217,7 +223,8 @@ static PetscBool Moves(HycoScene scene, PetscInt p)
 }
 
 /* Adds points of the ranges, in the parameters that move something; the others as in mu. A Halton sequence in the
-   parameters that move bodies; it ends when FRUITLESS points give no new master. */
+   parameters that move bodies; it ends when FRUITLESS points give no new master. HycoHalton() (Halton 1960) fills the
+   ranges evenly for any number of points. */
 static PetscErrorCode NoteBetween(Surfaces *s, HycoScene scene, const PetscReal mu[], Lists *l)
 {
   const PetscInt n_par = scene->n_parameters;
@@ -232,6 +239,7 @@ static PetscErrorCode NoteBetween(Surfaces *s, HycoScene scene, const PetscReal 
       at[p] = mu[p];
       if (Moves(scene, p)) at[p] = scene->lo[p] + (scene->hi[p] - scene->lo[p]) * HycoHalton(k, moving++);
     }
+    /* No parameter moves anything: training points are all there is. */
     if (!moving) break;
     PetscCall(NoteAt(s, at, l, &grown));
     fruitless = grown ? 0 : fruitless + 1;
@@ -291,6 +299,7 @@ PetscErrorCode HycoMetFind(HycoScene scene, HycoMesh whole, const HycoPairs *pai
   PetscFunctionBegin;
   PetscCall(PetscMemzero(met, sizeof(*met)));
   PetscCall(SurfacesCreate(scene, whole, pairs, &s));
+  /* A slave's search is limited to distances that may close: far masters would enlarge the RID for nothing. */
   HycoPairsSetReach(&s.pairs, reach);
   PetscCall(PetscMalloc1(s.pairs.n, &l.head));
   for (PetscInt k = 0; k < s.pairs.n; k++) l.head[k] = -1;

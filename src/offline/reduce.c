@@ -40,6 +40,7 @@ static PetscErrorCode RemoveLifting(HycoReducer t, Mat S)
   PetscFunctionBegin;
   PetscCall(MatGetLocalSize(S, &n_rows, NULL));
   PetscCall(PetscMalloc1(n_rows, &fixed));
+  /* Which unknowns are fixed is known by parts, snapshots lie by rows of the file. */
   PetscCall(HycoFOMToRows(t->fom, HYCO_ON_NODES, HYCO_MPI_BOOL, t->sizes[3], t->fom->fe->fixed, fixed));
   PetscCall(MatGetSize(S, NULL, &n));
   PetscCall(MatDenseGetLDA(S, &lda));
@@ -95,7 +96,7 @@ PetscErrorCode HycoReducerGetDisplacements(HycoReducer t, HycoSnapshots store, M
 }
 
 /* Without the lifting modes vanish where displacements are fixed, so that U = r(u0) + V gamma meets any prescribed
-   values (30). */
+   values (30). By the file's rows, in which modes and DEIM points are numbered. */
 PetscErrorCode HycoReducerReadField(HycoReducer t, HycoSnapshots store, PetscInt kind, PetscInt first, PetscInt n,
                                     Mat *S)
 {
@@ -114,6 +115,7 @@ static PetscErrorCode Points(HycoReducer t, Mat V, PetscInt index[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One place for all PODs, so that the options hold for each of them. */
 PetscErrorCode HycoReducerCreateSVD(HycoReducer t, MPI_Comm comm, SVD *svd)
 {
   const char *prefix;
@@ -128,6 +130,7 @@ PetscErrorCode HycoReducerCreateSVD(HycoReducer t, MPI_Comm comm, SVD *svd)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* V's columns are orthonormal; singular values below the noise are left out, whatever tol is. */
 PetscErrorCode HycoReducerPOD(HycoReducer t, Mat S, PetscReal tol, PetscInt max_modes, Mat *V, PetscInt *l,
                               PetscReal sigma[])
 {
@@ -213,8 +216,10 @@ static PetscErrorCode PODRank(HycoReducer t, PetscInt n_sigma, const PetscReal s
   PetscInt first;
 
   PetscFunctionBegin;
+  /* With springs rigid motions are taken first; the tolerance then applies to the energy of the deformation. */
   first = CountDominant(t->scene, n_sigma, sigma);
   *l = first + HycoPODRank(n_sigma - first, sigma + first, tol, t->noise, 0);
+  /* The user's limit is no lack of accuracy. */
   if (max_modes > 0) *l = PetscMin(*l, max_modes);
   HycoCheckModel(*l <= found || tol == 0,
                  "-hyco_pod_svd_type %s finds only %d accurate modes, which leave out more than %g of the snapshots' "
@@ -231,6 +236,7 @@ PetscReal HycoPathScale(PetscReal first, PetscReal largest)
   return largest / PetscMax(first, slight * largest);
 }
 
+/* A path is compressed to modes times singular values: their Gram matrix is that of the path, up to tol. */
 PetscErrorCode HycoPathModesAdd(HycoReducer t, Mat path, PetscReal tol, HycoPathModes *modes)
 {
   PetscReal *sigma;
@@ -288,8 +294,10 @@ static PetscErrorCode JoinPaths(HycoReducer t, const HycoPathModes *modes, Petsc
   for (PetscInt j = 0; j < modes->n; j++) {
     PetscInt l;
 
+    /* A path without displacement (no load reaches it) has no modes. */
     if (!modes->V[j]) continue;
     PetscCall(MatGetSize(modes->V[j], NULL, &l));
+    /* Modes carry their singular values, so that the second POD sees each path's energy. */
     PetscCall(MatScale(modes->V[j], HycoPathScale(modes->first[j], largest)));
     PetscCall(HycoCopyColumns(modes->V[j], l, *joined, at));
     at += l;
@@ -298,6 +306,7 @@ static PetscErrorCode JoinPaths(HycoReducer t, const HycoPathModes *modes, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Room for the larger of both numbers. */
 PetscErrorCode HycoReducerTakeBasis(HycoReducer t, Mat S, PetscReal tol, PetscInt most, HycoBasis *basis)
 {
   PetscInt N, n;
@@ -324,6 +333,7 @@ PetscErrorCode HycoPathModesJoin(HycoReducer t, HycoPathModes *modes, PetscInt N
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Displacements between the listed times enrich the modes at no further solve. */
 PetscErrorCode HycoReducerReadPath(HycoReducer t, HycoSnapshots store, PetscInt kind, PetscInt j, Mat *path)
 {
   PetscInt n_par, N, n_rows;
@@ -358,6 +368,7 @@ static PetscErrorCode FindPathBasis(HycoReducer t, HycoSnapshots store, PetscInt
     PetscCall(MatGetSize(path, &N, NULL));
     PetscCall(MatGetLocalSize(path, &n_rows, NULL));
     PetscCall(HycoPathModesAdd(t, path, tol, &modes));
+    /* One path at a time: all columns of all paths may not fit into memory. */
     PetscCall(MatDestroy(&path));
   }
   PetscCall(HycoPathModesJoin(t, &modes, N, n_rows, tol, most, &t->basis[kind]));
@@ -397,13 +408,16 @@ static PetscErrorCode CutBasis(HycoReducer t, PetscInt kind, Mat *V, PetscInt *l
   *V = NULL;
   PetscCall(PODRank(t, basis->n_sigma, basis->sigma, t->tol[kind], most, basis->l, l));
   t->counts[kind] = *l;
+  /* A field that is zero in all solutions, as stresses of a rigid body. */
   if (!*l) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatDenseGetSubMatrix(basis->V, PETSC_DECIDE, PETSC_DECIDE, 0, *l, &part));
+  /* A copy, because the submatrix borrows the basis' array. */
   PetscCall(MatDuplicate(part, MAT_COPY_VALUES, V));
   PetscCall(MatDenseRestoreSubMatrix(basis->V, &part));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rows of S at the nodes, by column; on the other ranks rows is empty. */
 PetscErrorCode HycoReducerFetchRows(HycoReducer t, Mat S, PetscInt n_columns, PetscInt n, const PetscInt node[],
                                     PetscReal rows[])
 {
@@ -454,6 +468,7 @@ static PetscErrorCode FetchBatch(HycoReducer t, PetscInt first, Mat S, void *ctx
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* In batches, so that no more than one batch of whole fields is in memory. */
 PetscErrorCode HycoReducerFetchSnapshots(HycoReducer t, PetscInt n, const PetscInt node[], PetscReal **rows)
 {
   const PetscInt n_rows = t->rank ? 0 : n * t->sizes[3];
@@ -525,6 +540,7 @@ static PetscErrorCode SeedFrom(HycoReducer t, Mat V, PetscInt l, PetscInt kind, 
   PetscInt *index;
 
   PetscFunctionBegin;
+  /* A basis may serve the modes without placing the RID. */
   if (!l || !Seeds(t, kind)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(l, &index));
   HycoLogged(HYCO_EVENT_DEIM, Points(t, V, index));
@@ -546,6 +562,7 @@ static PetscErrorCode TakeDisplacements(HycoReducer t)
   PetscCall(PetscArraycpy(t->sigma, basis->sigma, PetscMax(t->n_s, basis->n_sigma) + 1));
   PetscCall(SeedFrom(t, V, t->l, HYCO_SEED_DISPLACEMENT, t->sizes[3], &t->n_seeds_node, &t->seeds_node));
   PetscCall(PetscMalloc1(t->l * t->n_s, &t->VtU));
+  /* Coefficients of a truncated basis are the first ones: modes are orthonormal. */
   for (PetscInt k = 0; k < t->n_s; k++)
     PetscCall(PetscArraycpy(t->VtU + k * t->l, basis->coefficients + k * basis->l, t->l));
   t->V = V;
@@ -581,6 +598,7 @@ static PetscErrorCode SetForces(HycoReducer t, PetscInt k, Mat R)
   PetscCall(HycoContactRows(f->fe_surface, &f->pairs, start, dof, value, gap));
   for (PetscInt i = 0; i < m; i++) {
     for (PetscInt j = start[i]; j < start[i + 1]; j++) {
+      /* Rows of B act on the surfaces' mesh; the distributed vectors have global numbers. */
       const PetscInt node = f->surface->node_global ? f->surface->node_global[dof[j] / dim] : dof[j] / dim;
 
       PetscCall(MatSetValue(R, node * dim + dof[j] % dim, k, value[j] * t->Lambda[(size_t)k * (size_t)m + (size_t)i],
@@ -591,6 +609,7 @@ static PetscErrorCode SetForces(HycoReducer t, PetscInt k, Mat R)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Columns of length 1, zero where fixed; a column of zeros stays zero. */
 PetscErrorCode HycoReducerUnitRows(HycoReducer t, Mat X, Mat *scaled)
 {
   HycoMesh part = t->fom->part;
@@ -628,6 +647,7 @@ PetscErrorCode HycoReducerUnitRows(HycoReducer t, Mat X, Mat *scaled)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The supremizer of a force is the displacement on which it does most work in the H1 norm: M^-1 B^T Lambda. */
 PetscErrorCode HycoReducerSupremizers(HycoReducer t, Mat *forces, Mat *supremizers)
 {
   HycoFOM f = t->fom;
@@ -679,6 +699,7 @@ static PetscErrorCode MoveWherePresses(HycoReducer t, PetscInt k)
 
   PetscFunctionBegin;
   if (!t->fom->searches) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Ties go to the first solution, the same on any number of ranks. */
   for (PetscInt q = 1; q < t->n_s && t->rank == 0; q++) {
     if (t->Lambda[(size_t)q * m + (size_t)k] > t->Lambda[(size_t)most * m + (size_t)k]) most = q;
   }
@@ -729,6 +750,7 @@ static PetscErrorCode AddContactNodes(HycoReducer t, PetscInt k, PetscInt *n, Pe
   PetscFunctionBegin;
   HycoPairsMasters(&f->pairs, k, &masters, &master, &weight);
   PetscCall(PetscRealloc((size_t)(*n + masters + 1) * sizeof(**nodes), nodes));
+  /* The slave first, then its masters: all of them must lie in the RID. */
   for (PetscInt j = -1; j < masters; j++) {
     const PetscInt node = j < 0 ? HycoPairsSlave(&f->pairs, k) : master[j];
 
@@ -747,6 +769,7 @@ static PetscErrorCode DualSeeds(HycoReducer t, PetscInt *n_nodes, PetscInt **nod
   PetscFunctionBegin;
   *n_nodes = 0;
   PetscCall(PetscMalloc2(t->n_s * t->n_s, &G, t->n_s, &index));
+  /* The dual norm of H1 between forces: one solve with the norm's matrix per snapshot. */
   PetscCall(DualGram(t, G));
   HycoOnRoot(HycoComm(t), DualPoints(t, G, &l, index));
   PetscCallMPI(MPI_Bcast(&l, 1, MPIU_INT, 0, HycoComm(t)));
@@ -756,6 +779,7 @@ static PetscErrorCode DualSeeds(HycoReducer t, PetscInt *n_nodes, PetscInt **nod
     if (t->rank == 0) PetscCall(AddContactNodes(t, index[k], n_nodes, nodes));
   }
   PetscCallMPI(MPI_Bcast(n_nodes, 1, MPIU_INT, 0, HycoComm(t)));
+  /* Rank 0's list has grown in place; the others get exactly its length. */
   if (t->rank) PetscCall(PetscMalloc1(*n_nodes, nodes));
   HycoBcast(*nodes, *n_nodes, MPIU_INT, HycoComm(t));
   PetscCall(PetscFree2(G, index));
@@ -772,6 +796,7 @@ static PetscErrorCode ReadForces(HycoReducer t, HycoSnapshots store)
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->columns, NULL, &n_par, &mu));
   PetscCall(PetscMalloc1((size_t)m * (size_t)t->n_s + 1, &t->Lambda));
+  /* Contacts are stored in the order of the mesh file: the same for every partition. */
   for (PetscInt k = 0; k < t->n_s; k++)
     PetscCall(HycoSnapshotsReadRows(store, mu + k / steps * n_par, k % steps, HycoSeedFields[HYCO_SEED_DUAL], 0, m,
                                     t->Lambda + (size_t)k * (size_t)m));
@@ -794,11 +819,13 @@ PetscErrorCode HycoReducerTakeBases(HycoReducer t)
   const PetscInt dim = t->sizes[3], n_sigma = dim == 1 ? 1 : dim == 2 ? 4 : 6;
 
   PetscFunctionBegin;
+  /* Of the former attempt; the whole bases stay. */
   PetscCall(HycoReducerDropBases(t));
   PetscCall(TakeDisplacements(t));
   PetscCall(TakeField(t, HYCO_SEED_STRESS, n_sigma, &t->n_seeds_cell, &t->seeds_cell));
   PetscCall(TakeField(t, HYCO_SEED_FORCE, dim, &t->n_seeds_node, &t->seeds_node));
   PetscCall(TakeField(t, HYCO_SEED_SPRING, dim, &t->n_seeds_node, &t->seeds_node));
+  /* One component: the accumulated strain shows where laws act. */
   PetscCall(TakeField(t, HYCO_SEED_INELASTIC, 1, &t->n_seeds_cell, &t->seeds_cell));
   if (Seeds(t, HYCO_SEED_DUAL))
     PetscCall(AddSeeds(t->n_dual_seeds, t->dual_seeds, 1, &t->n_seeds_node, &t->seeds_node));
@@ -822,6 +849,7 @@ static PetscErrorCode ReadTaken(HycoReducer t, HycoSnapshots store)
     PetscCall(HycoSnapshotsReadTaken(store, mu + k * n_par, &count, &taken));
     PetscCall(PetscRealloc((size_t)(t->taken_start[k] + count + 1) * sizeof(PetscReal), &t->taken));
     PetscCall(PetscArraycpy(t->taken + t->taken_start[k], taken, count));
+    /* All paths in one array, since each has its own number of steps. */
     t->taken_start[k + 1] = t->taken_start[k] + count;
     PetscCall(PetscFree(taken));
   }
@@ -839,6 +867,7 @@ PetscErrorCode HycoReducerReduce(HycoReducer t, HycoSnapshots store, PetscBool a
   PetscCall(ReduceField(t, store, HYCO_SEED_SPRING, all));
   PetscCall(ReduceField(t, store, HYCO_SEED_INELASTIC, all));
   if (t->scene->n_times) HycoOnRoot(HycoComm(t), ReadTaken(t, store));
+  /* Also where the RID is not seeded by forces: (41) needs them. */
   PetscCall(ReduceForces(t, store));
   PetscCall(HycoReducerTakeBases(t));
   PetscFunctionReturn(PETSC_SUCCESS);

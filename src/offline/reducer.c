@@ -6,6 +6,7 @@
 
 const char *const HycoHybrids[] = {"auto", "rank", "contact", "all", NULL};
 
+/* Defaults of a program without options; HycoReducerSetFromOptions() changes them. */
 static PetscErrorCode Create(MPI_Comm comm, HycoReducer *reducer)
 {
   HycoReducer t;
@@ -17,11 +18,13 @@ static PetscErrorCode Create(MPI_Comm comm, HycoReducer *reducer)
   t->noise = 1e-11;
   PetscCall(PetscStrncpy(t->svd_type, HYCO_SVD_TSQR, sizeof(t->svd_type)));
   t->greedy.target = 1e-3;
+  /* -1: by the number of training points. */
   t->n_validation = -1;
   t->search = PETSC_TRUE;
   t->search_budget = 1;
   t->budget = -1;
   t->ridge = -1;
+  /* The paper's thresholds for the rope (section 6). */
   for (PetscInt k = 0; k < HYCO_N_SEEDS; k++) t->tol[k] = k == HYCO_SEED_DUAL ? 1e-1 : 1e-7;
   t->seed[HYCO_SEED_DISPLACEMENT] = t->seed[HYCO_SEED_STRESS] = t->seed[HYCO_SEED_FORCE] = PETSC_TRUE;
   *reducer = t;
@@ -39,6 +42,7 @@ static PetscErrorCode EndTraining(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The prototype is an empty model: its traits answer what the type can do. */
 PetscErrorCode HycoReducerSetType(HycoReducer t, HycoROMType name)
 {
   PetscBool same = PETSC_FALSE;
@@ -70,7 +74,9 @@ PetscErrorCode HycoReducerCreate(MPI_Comm comm, HycoScene scene, HycoReducer *re
   PetscCall(Create(comm, reducer));
   PetscCall(PetscObjectReference((PetscObject)scene));
   (*reducer)->scene = scene;
+  /* The local problem of (43) would be a path of its own. */
   if (scene->n_times) (*reducer)->greedy.indicator = HYCO_INDICATOR_RESIDUAL;
+  /* Springs act on surfaces whose cells would otherwise be missing from the RID. */
   (*reducer)->seed[HYCO_SEED_SPRING] = (PetscBool)(scene->n_springs > 0);
   for (PetscInt b = 0; b < scene->n_bodies && scene->n_times; b++) {
     if (!scene->body[b].law->linear) (*reducer)->seed[HYCO_SEED_INELASTIC] = PETSC_TRUE;
@@ -113,12 +119,14 @@ PetscErrorCode HycoReducerResetBases(HycoReducer t)
     t->basis[k].l = t->basis[k].n_sigma = 0;
   }
   PetscCall(MatDestroy(&t->S));
+  /* Everything that was cut from these solutions or judged on them. */
   HycoFreeAll(&t->U_rid, &t->rid_row, &t->V_rid, &t->Lambda, &t->U_norm, &t->dual_seeds, &t->taken_start, &t->taken,
               &t->judged, &t->judged_held);
   t->n_dual_seeds = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Also half made: each part is NULL until it is. */
 PetscErrorCode HycoReducerDestroy(HycoReducer *reducer)
 {
   HycoReducer t;
@@ -127,6 +135,7 @@ PetscErrorCode HycoReducerDestroy(HycoReducer *reducer)
   HycoDestroyBegin(reducer, HYCO_REDUCER_CLASSID);
   t = *reducer;
   PetscCall(HycoReducerReset(t));
+  /* The type's own data before the prototype that names the type. */
   PetscCall(EndTraining(t));
   PetscCall(PetscStrArrayDestroy(&t->groups));
   HycoFreeAll(&t->region, &t->solved, &t->written);
@@ -177,6 +186,7 @@ PetscErrorCode HycoReducerGetTargets(HycoReducer t, PetscReal target[], PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A budget below 0: as many solutions may be added as there are at first. */
 PetscErrorCode HycoReducerSetTargets(HycoReducer t, const PetscReal target[], PetscInt budget)
 {
   PetscFunctionBegin;
@@ -196,6 +206,7 @@ HycoDefineMethod(HycoReducerSetGreedyMonitor, (HycoReducer t, HycoGreedyMonitor 
 HycoDefineMethod(HycoReducerSetGreedyIndicator, (HycoReducer t, HycoIndicatorKind kind), t, HYCO_REDUCER_CLASSID,
                  t->greedy.indicator = kind)
 
+/* 0: no limit. Both limits are checked after an iteration, so that a model is always complete. */
 PetscErrorCode HycoReducerSetGreedyStop(HycoReducer t, PetscReal target, PetscInt max_snapshots, PetscReal max_seconds)
 {
   PetscFunctionBegin;
@@ -341,6 +352,7 @@ static PetscErrorCode TakeSeedKinds(HycoReducer t, PetscInt n, char ***list)
       PetscCall(PetscStrncpy(wrong, (*list)[i], sizeof(wrong)));
   }
   PetscCall(PetscStrArrayDestroy(list));
+  /* Force modes that leave out springs would not balance at their nodes. */
   t->seed[HYCO_SEED_SPRING] = (PetscBool)(t->seed[HYCO_SEED_FORCE] && t->scene && t->scene->n_springs);
   HycoCheck(!wrong[0],
             "-hyco_rid_modes has \"%s\"; the possible values are displacement, stress, force, dual and inelastic",
@@ -492,6 +504,7 @@ PetscErrorCode HycoReducerTries(HycoReducer t, const char types[], PetscBool *tr
 
   PetscFunctionBegin;
   HycoCheckHandle(t, HYCO_REDUCER_CLASSID);
+  /* types: a list of names in one text, as in the table of options. */
   *tries = (PetscBool)(strstr(types, t->prototype->model->type) != NULL);
   PetscCall(HycoTrainerNames(&names));
   for (PetscInt k = 0; names[k] && searches && !*tries; k++) {
@@ -499,11 +512,13 @@ PetscErrorCode HycoReducerTries(HycoReducer t, const char types[], PetscBool *tr
 
     if (!strstr(types, names[k])) continue;
     PetscCall(HycoTrainerFind(names[k], &trainer));
+    /* A search takes types that offer settings; others must be named. */
     *tries = (PetscBool)(trainer.offers != NULL);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* As the search's lines describe settings, so that both can be compared. */
 PetscErrorCode HycoReducerView(HycoReducer t, PetscViewer viewer)
 {
   HycoReducerSettings settings;
@@ -521,10 +536,12 @@ PetscErrorCode HycoReducerView(HycoReducer t, PetscViewer viewer)
 
 HycoDefineViewFromOptions(HycoReducer, HYCO_REDUCER_CLASSID)
 
+/* Cut at `length`: such texts are parts of one line. */
 void HycoReducerSettingsDescribe(const HycoReducerSettings *r, size_t length, char text[])
 {
   const char *kind = HycoHybrids[r->hybrid];
 
+  /* As options, so that a line of a search can be repeated by them. */
   if (r->variant)
     snprintf(text, length, "%s, %s", r->type, r->variant);
   else if (!r->pod)
@@ -539,6 +556,7 @@ void HycoReducerSettingsDescribe(const HycoReducerSettings *r, size_t length, ch
              r->plane ? r->plane : "");
 }
 
+/* r borrows the type's name. */
 void HycoReducerGetSettings(HycoReducer t, HycoReducerSettings *r)
 {
   *r = (HycoReducerSettings){.type = t->prototype->model->type,

@@ -30,6 +30,7 @@ static PetscErrorCode RidCreate(HycoFOM f, Rid *r)
   PetscCall(DMLabelCreate(PETSC_COMM_SELF, "rid", &r->label));
   PetscCall(HycoMeshNodeCells(part, &r->start, &r->around));
   PetscCall(PetscMalloc1(part->n_owned, &r->own));
+  /* On one rank a node's cells are all here. */
   if (f->size == 1) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoMeshNodeSF(HycoComm(f), part, part->n_nodes, part->node_global, &r->to_part));
   PetscCall(HycoMeshNodeSF(HycoComm(f), part, surface ? surface->n_nodes : 0, surface ? surface->node_global : NULL,
@@ -151,6 +152,7 @@ static PetscErrorCode AddGroup(Rid *r, const char name[])
     for (PetscInt k = m->group_cell_start[g]; k < m->group_cell_start[g + 1]; k++) PetscCall(Add(r, m->group_cell[k]));
   } else if (m->group_dim[g] == m->dim - 1) {
     for (PetscInt f = 0; f < m->n_facets; f++) {
+      /* The cell behind a facet has the unknowns that its load acts on. */
       if (m->facet_group[f] == g) PetscCall(Add(r, m->facet_cell[f]));
     }
   } else {
@@ -191,6 +193,7 @@ static PetscErrorCode FindNear(HycoFOM f, const HycoPairs *pairs, PetscReal d, c
   PetscCall(PetscCalloc2(m->n_nodes, &contact, m->n_nodes, &list));
   PetscCall(HycoPairsMarkSurfaces(f->scene, m, pairs, contact));
   for (PetscInt i = 0; i < m->n_nodes; i++) {
+    /* Distances as drawn: the extension is a length of the scene's mesh. */
     if (contact[i] && in[i]) list[n++] = i;
   }
   for (PetscInt i = 0; i < m->n_nodes; i++) {
@@ -203,6 +206,7 @@ static PetscErrorCode FindNear(HycoFOM f, const HycoPairs *pairs, PetscReal d, c
         sum += (m->xyz[3 * i + c] - m->xyz[3 * list[j] + c]) * (m->xyz[3 * i + c] - m->xyz[3 * list[j] + c]);
       close = (PetscBool)(sum < d * d);
     }
+    /* 2 distinguishes contact nodes outside, whose cells are not added. */
     near[i] = !contact[i] ? 0 : close ? 1 : 2;
   }
   PetscCall(PetscFree2(contact, list));
@@ -256,6 +260,7 @@ static PetscErrorCode ListMasters(HycoFOM f, const HycoPairs *pairs, const Petsc
     PetscInt masters;
 
     HycoPairsMasters(pairs, k, &masters, &master, &weight);
+    /* A pair's one master is found by its own cells. */
     if (masters < 2 || !in[HycoPairsSlave(pairs, k)]) continue;
     for (PetscInt j = 0; j < width; j++)
       list[*n * width + j] = j >= masters ? -1 : f->surface->node_whole ? f->surface->node_whole[master[j]] : master[j];
@@ -276,6 +281,7 @@ static PetscErrorCode AddBehind(Rid *r, PetscInt i, PetscInt n, const PetscBool 
     const PetscInt own = HycoMeshOwnNodes(m, r->around[j], of);
 
     for (PetscInt v = 0; v < own; v++) has += marked[of[v]];
+    /* A cell with a whole facet of masters: cells that only touch at an edge are not behind the contact. */
     if (has >= PetscMin(n, SmallestFacet(m, r->around[j]))) PetscCall(Add(r, r->around[j]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -290,12 +296,14 @@ static PetscErrorCode AddMasters(Rid *r, PetscInt width, const PetscInt master[]
   PetscFunctionBegin;
   for (; n < width && master[n] >= 0; n++) {
     PetscCall(FindInPart(r->part->n_nodes, r->part->node_whole, master[n], &node[n]));
+    /* Masters that this part does not have are another rank's. */
     if (node[n] >= 0) marked[node[n]] = PETSC_TRUE;
   }
   for (PetscInt k = 0; k < n; k++) {
     if (node[k] >= 0) PetscCall(AddBehind(r, node[k], n, marked));
   }
   for (PetscInt k = 0; k < n; k++) {
+    /* Undone one by one: clearing the whole array for each contact would cost nodes times contacts. */
     if (node[k] >= 0) marked[node[k]] = PETSC_FALSE;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -315,10 +323,12 @@ static PetscErrorCode CompleteSlaves(Rid *r, const HycoPairs *pairs, PetscInt n_
   PetscCall(PetscMalloc4(r->part->n_nodes, &node, n_surface, &in, (size_t)width * (size_t)n_rows, &list, width, &at));
   PetscCall(PetscCalloc1(r->part->n_nodes, &marked));
   PetscCall(MarkNodes(r, r->label, node));
+  /* Rank 0 has the contacts, the parts know which nodes are in the RID. */
   PetscCall(ToSurface(r, node, in));
   HycoOnRoot(HycoComm(r->f), ListMasters(r->f, pairs, in, width, &n, list));
   PetscCallMPI(MPI_Bcast(&n, 1, MPIU_INT, 0, HycoComm(r->f)));
   HycoBcast(list, (size_t)width * (size_t)n, MPIU_INT, HycoComm(r->f));
+  /* Every rank goes through all lists, and adds the cells of its part. */
   for (PetscInt k = 0; k < n; k++) PetscCall(AddMasters(r, width, list + (size_t)k * (size_t)width, at, marked));
   PetscCall(PetscFree(marked));
   PetscCall(PetscFree4(node, in, list, at));
@@ -396,6 +406,7 @@ static PetscErrorCode AddRigid(Rid *r, HycoScene scene)
   PetscFunctionBegin;
   for (PetscInt c = 0; c < 2 * scene->n_contacts; c++) {
     HycoContact contact = scene->contact[c / 2];
+    /* Slave and master group in turn. */
     PetscInt g = 0;
 
     if (!contact->rigid) continue;
@@ -411,6 +422,7 @@ static PetscErrorCode AddRegions(Rid *r, const HycoRIDSettings *settings)
   PetscInt at;
 
   PetscFunctionBegin;
+  /* A model that has chosen its cells: nothing is added, not even for rigid bodies. */
   for (PetscInt k = 0; settings->exact && k < settings->n_cells; k++) {
     PetscCall(FindInPart(r->part->n_cells, r->part->cell_whole, settings->cells[k], &at));
     if (at >= 0) PetscCall(Add(r, at));
@@ -418,6 +430,7 @@ static PetscErrorCode AddRegions(Rid *r, const HycoRIDSettings *settings)
   if (settings->exact) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt e = 0; settings->whole && e < r->part->n_cells; e++) PetscCall(Add(r, e));
   for (PetscInt k = 0; k < settings->n_groups; k++) PetscCall(AddGroup(r, settings->groups[k]));
+  /* All cells at the plane: the RID then cuts the bodies from side to side. */
   if (settings->plane) PetscCall(AddGroup(r, settings->plane));
   PetscCall(AddRigid(r, r->f->scene));
   if (settings->region) PetscCall(AddRegion(r, settings->region));
@@ -434,6 +447,7 @@ PetscErrorCode HycoRIDBuild(HycoFOM f, const HycoPairs *pairs, const HycoRIDSett
   PetscCallMPI(MPI_Bcast(&n_rows, 1, MPIU_INT, 0, HycoComm(f)));
   PetscCall(RidCreate(f, &r));
   HycoOnEach(HycoComm(f), AddRegions(&r, settings));
+  /* exact: the cells are chosen by a cubature or by bodies, and nothing is added. */
   if (!settings->whole && !settings->exact) {
     PetscCall(AddSupports(&r, settings));
     if (settings->extension > 0) PetscCall(ExtendContact(&r, pairs, settings->extension));

@@ -43,6 +43,7 @@ static PetscBool Alike(HycoScene s, const PetscBool reaches[], const PetscReal a
   return PETSC_TRUE;
 }
 
+/* Factors, not solves, are what full order costs. */
 PetscErrorCode HycoReducerCountStiffnesses(HycoReducer t, HycoSamples samples, PetscBool in_order, PetscInt *count)
 {
   PetscBool reaches[HYCO_MAX_PARAMETERS];
@@ -56,6 +57,7 @@ PetscErrorCode HycoReducerCountStiffnesses(HycoReducer t, HycoSamples samples, P
   for (PetscInt k = 0; k < n; k++) {
     PetscBool seen = PETSC_FALSE;
 
+    /* In order a factor is kept only from the point before; otherwise points are grouped by stiffness. */
     for (PetscInt j = in_order ? PetscMax(k - 1, 0) : 0; j < k && !seen; j++)
       seen = Alike(t->scene, reaches, mu + j * n_par, mu + k * n_par);
     *count += !seen;
@@ -63,6 +65,7 @@ PetscErrorCode HycoReducerCountStiffnesses(HycoReducer t, HycoSamples samples, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The measure of the search's budget: what the solutions cost by the same estimate as the attempts. */
 PetscErrorCode HycoReducerSolutionsWork(HycoReducer t, PetscReal *work)
 {
   const PetscReal dim = t->sizes[3],

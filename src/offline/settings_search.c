@@ -95,6 +95,7 @@ static void LeaveOut(Search *s, const char what[], PetscBool possible, const cha
   for (PetscInt k = 0; k < s->n_left_out; k++) {
     if (strcmp(s->left_out[k].what, what) == 0) return;
   }
+  /* A report has room for so many: the first ones are the likeliest. */
   if (s->n_left_out == HYCO_MAX_LEFT_OUT) return;
   (void)!PetscStrncpy(next->what, what, sizeof(next->what));
   (void)!PetscStrncpy(next->why, why, sizeof(next->why));
@@ -141,6 +142,7 @@ static PetscErrorCode SurfaceEdge(HycoReducer t, PetscReal *mean)
       const PetscInt *node = m->facets + f * m->nf,
                      corners = HycoMeshIsQuadratic(m) ? HycoCellKinds[m->type].corners : HycoFacetCorners(m->nf, node);
 
+      /* A facet of one node (1D) has no edge. */
       if (m->facet_group[f] != g || m->nf < 2) continue;
       for (PetscInt j = 0; j < corners; j++)
         sum += HycoDistance(m->xyz + 3 * node[j], m->xyz + 3 * node[(j + 1) % corners]);
@@ -292,7 +294,8 @@ static PetscErrorCode Reduce(Search *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The sizes and the cost of an attempt's model. */
+/* The sizes and the cost of an attempt's model. Sizes of the built model, on which its cost depends; seconds are
+   measured later, if it is judged. */
 static void TakeSizes(HycoReducer t, const HycoTraining *report, HycoAttempt *a)
 {
   a->n_modes = report->n_modes;
@@ -339,6 +342,7 @@ static PetscBool Affords(Search *s, const HycoReducerSettings *settings)
 {
   char why[HYCO_LINE];
 
+  /* The first attempts are always made: without any there is no model. */
   if (s->n_models < LEAST || s->spent + s->last <= s->budget) return PETSC_TRUE;
   snprintf(why, sizeof(why),
            "%d settings took %.1e of the %.1e operations that the search may take; -hyco_search_budget %g allows twice "
@@ -370,6 +374,7 @@ static PetscErrorCode Predictions(HycoReducer t, HycoSamples points, PetscReal n
 static PetscErrorCode Count(Search *s, HycoAttempt *a)
 {
   HycoReducer t = s->t;
+  /* Modes times coefficients for each comparison on the whole mesh, and the stresses of its cells. */
   const PetscReal whole = 2 * (PetscReal)t->sizes[0] * t->sizes[3] * a->n_modes + 100 * (PetscReal)t->sizes[1];
   const PetscReal held = a->held_out.n + (HYCO_UNSOLVED_WORK - 1) * (PetscReal)a->held_out.not_converged,
                   repeats = t->scene->n_times ? 1 : HYCO_HELD_REPEATS;
@@ -377,6 +382,7 @@ static PetscErrorCode Count(Search *s, HycoAttempt *a)
   PetscReal judging, testing;
 
   PetscFunctionBegin;
+  /* Counted on rank 0, where models are built and judged. */
   PetscCallMPI(MPI_Bcast(numbers, 2, MPIU_INT, 0, HycoComm(t)));
   a->n_unknowns = numbers[1];
   PetscCall(Predictions(t, t->samples, numbers[0], a, &judging));
@@ -384,6 +390,7 @@ static PetscErrorCode Count(Search *s, HycoAttempt *a)
   s->last = judging + testing + whole * ((PetscReal)t->n_s + held * (PetscReal)HycoSnapshotsSteps(t->scene));
   if (t->trainer.work && !a->failure[0]) s->last += (*t->trainer.work)(t);
   s->spent += s->last;
+  /* Only models that are good for something count as attempts made. */
   s->n_models += !a->failure[0] && (a->beaten_by || a->held_out.largest[HYCO_ERROR_U] < USELESS);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -400,6 +407,7 @@ static PetscErrorCode Make(Search *s, const HycoReducerSettings *settings, Petsc
   PetscFunctionBegin;
   HycoReducerSettingsDescribe(settings, sizeof(what), what);
   HycoFormat(t->doing, "settings %d, %s", (int)a->number, what);
+  /* With `hybrid all` in a search a large RID is refused before its dense matrix is filled. */
   t->most_full_order =
       t->pinned[HYCO_CHOICE_HYBRID] || settings->hybrid != HYCO_HYBRID_ALL || settings->plane ? 0 : MANY_UNKNOWNS;
   PetscCall(SetSettings(t, settings));
@@ -409,9 +417,11 @@ static PetscErrorCode Make(Search *s, const HycoReducerSettings *settings, Petsc
   t->trying = PETSC_TRUE;
   ierr = BuildAndJudge(s, all, a);
   t->trying = PETSC_FALSE;
+  /* Messages of later steps must not name these settings. */
   t->doing[0] = '\0';
   PetscCall(HycoCatchEnd(ierr, message));
   t->most_full_order = 0;
+  /* An error of another kind (memory, a damaged file) is not a property of the settings. */
   PetscCall(HycoCatchNoModel(ierr, message));
   if (message[0]) a->ratio = PETSC_INFINITY;
   if (message[0] && t->remedy[0]) PetscCall(PetscStrncpy(s->remedy, t->remedy, sizeof(s->remedy)));
@@ -484,6 +494,7 @@ static PetscBool IsTooLarge(Search *s, const HycoReducerSettings *r)
     const HycoAttempt *a = &s->attempt[k];
     const HycoReducerSettings *b = &a->settings;
 
+    /* Larger in every setting that adds cells or modes: then the RID contains the other one. */
     if (strcmp(b->type, r->type) || a->n_unknowns <= MANY_UNKNOWNS || b->plane || r->pod_tol > b->pod_tol ||
         r->layers < b->layers || r->contact_extension < b->contact_extension || (b->whole && !r->whole))
       continue;
@@ -523,6 +534,7 @@ static HycoReducerSettings KindFor(const Search *s, const HycoROM type, HycoHybr
   r.type = type->model->type;
   r.rid = (PetscBool)(type->model->traits.settings == HYCO_SETTINGS_RID);
   r.pod = (PetscBool)!HycoReducerOwnModes(s->t, type);
+  /* What the user has fixed is never searched. */
   r.hybrid = s->t->pinned[HYCO_CHOICE_HYBRID] ? s->given.hybrid : hybrid;
   if (r.rid) return r;
   r.layers = s->given.layers;
@@ -575,6 +587,7 @@ static PetscErrorCode CountContacts(HycoReducer t, const char group[], PetscInt 
   PetscCall(HycoMeshFindGroup(m, "fixed", group, &g));
   PetscCall(PetscCalloc1(m->n_nodes, &in));
   for (PetscInt k = m->group_start[g]; k < m->group_start[g + 1]; k++) in[m->group_node[k]] = PETSC_TRUE;
+  /* Contacts on the plane: the plane with most of them cuts the contact zone. */
   for (PetscInt k = 0; k < pairs->n; k++) *n += in[HycoPairsSlave(pairs, k)];
   PetscCall(PetscFree(in));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -615,6 +628,7 @@ static PetscErrorCode FindPlane(HycoReducer t, PetscInt *plane)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Only for paths in 3D. */
 PetscErrorCode HycoReducerFindPlane(HycoReducer t, const char **group)
 {
   PetscInt plane = -1;
@@ -644,6 +658,7 @@ static PetscErrorCode TryPlanes(Search *s, const HycoROM type, PetscBool *met)
     r.rid = r.pod = PETSC_TRUE;
     r.hybrid = HYCO_HYBRID_ALL;
     r.plane = s->plane;
+    /* The further attempts only differ in the tolerance. */
     if (k && pinned[HYCO_CHOICE_TOLERANCE]) break;
     PetscCall(Try(s, &r, PETSC_FALSE));
     if (s->ended) break;
@@ -652,7 +667,8 @@ static PetscErrorCode TryPlanes(Search *s, const HycoROM type, PetscBool *met)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Tries all of A full order, if "auto" keeps the contacts' displacements and is not accurate enough. */
+/* Tries all of A full order, if "auto" keeps the contacts' displacements and is not accurate enough. In the order of
+   cost, so that the dearer ones are not tried if a cheaper one is enough. */
 static PetscErrorCode TryHybrids(Search *s, const HycoROM type)
 {
   PetscBool met = PETSC_FALSE;
@@ -680,6 +696,7 @@ static PetscErrorCode TryOne(Search *s, const HycoROM type)
   r.rid = PETSC_FALSE;
   r.pod = (PetscBool)!HycoReducerOwnModes(s->t, type);
   if (s->t->scene->n_times) r.layers = s->given.layers; /* its mesh consists of the cells of its modes */
+  /* Variants are the type's own: it must be set before they are asked for. */
   PetscCall(HycoReducerSetType(s->t, r.type));
   variant = HycoReducerVariants(s->t);
   if (!variant) variant = one;
@@ -687,6 +704,7 @@ static PetscErrorCode TryOne(Search *s, const HycoROM type)
     r.variant = *variant++;
     PetscCall(Try(s, &r, PETSC_FALSE));
     met = (PetscBool)(s->attempt[s->n - 1].ratio <= 1 && !s->t->exhaustive);
+    /* Ordered by cost: the first that meets the targets is the cheapest. */
   } while (*variant && !met && !s->ended);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -709,6 +727,7 @@ static PetscErrorCode Refuse(HycoReducer t, const HycoROM type, char why[HYCO_LI
   PetscCall(HycoTrainerFind(type->model->type, &trainer));
   HycoCatch(HycoReducerCheckContacts(t, type), ierr, why);
   PetscCall(HycoCatchNoModel(ierr, why));
+  /* A refusal by the contacts needs no further check. */
   if (why[0] || !type->model->traits.own_modes || !trainer.begin) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoReducerSetType(t, type->model->type));
   HycoCatch((*trainer.begin)(t), ierr, why);
@@ -729,8 +748,10 @@ static PetscErrorCode Offers(Search *s, const HycoROM type, PetscBool *offered, 
   PetscCall(HycoTrainerFind(type->model->type, &trainer));
   PetscCall(Refuse(t, type, why));
   *possible = (PetscBool)!why[0];
+  /* Refused: the reason goes into the report. */
   if (why[0]) PetscFunctionReturn(PETSC_SUCCESS);
   *offered = (*trainer.offers)(t, s->targets, HYCO_LINE, why);
+  /* In operations, as the budget: seconds would make the choice depend on the machine. */
   if (*offered && trainer.work) work = (*trainer.work)(t);
   if (t->late) most *= 2; /* for it may save the training solutions */
   if (work > most && most <= 0)
@@ -755,6 +776,7 @@ static PetscErrorCode Wants(Search *s, const HycoROM type, PetscBool *wanted)
 
   PetscFunctionBegin;
   *wanted = (PetscBool)(strcmp(type->model->type, s->given.type) == 0);
+  /* The user's type is the only one. */
   if (t->pinned[HYCO_CHOICE_TYPE]) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoTrainerFind(type->model->type, &trainer));
   *wanted = (PetscBool)(trainer.offers != NULL);
@@ -762,6 +784,7 @@ static PetscErrorCode Wants(Search *s, const HycoROM type, PetscBool *wanted)
     *wanted = possible = PETSC_FALSE;
     if (type->model->traits.own_modes) HycoFormat(why, "it does not support scenes with a history");
   }
+  /* A search that has ended does not set up a type that learns by itself. */
   if (*wanted && !(HycoReducerOwnModes(t, type) && Ends(s, best))) PetscCall(Offers(s, type, wanted, &possible, why));
   if (*wanted && Ends(s, best))
     snprintf(why, sizeof(why),
@@ -774,6 +797,7 @@ static PetscErrorCode Wants(Search *s, const HycoROM type, PetscBool *wanted)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* `own`: the types with modes of their own, or the others. */
 static PetscErrorCode TryType(Search *s, const char name[], PetscBool own)
 {
   const PetscReal budget = s->budget, spent = s->spent;
@@ -822,6 +846,7 @@ static PetscErrorCode TakeColumns(HycoReducer t, HycoSnapshots store, PetscBool 
     PetscCall(HycoReducerSetColumns(t, t->held));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+  /* The first type that learns from solutions pays for them. */
   if (t->late) PetscCall(HycoReducerSolve(t, store, t->samples));
   t->late = PETSC_FALSE;
   PetscCall(HycoReducerSetColumns(t, t->samples));
@@ -897,6 +922,7 @@ static PetscErrorCode FindTelling(Search *s, HycoSamples samples, PetscInt *by)
   for (PetscInt p = 0; p < s->t->scene->n_parameters; p++) {
     const PetscReal c = Correlation(s, n, held, n_train, train, p);
 
+    /* Errors that grow with the distance from the training values of one parameter name that parameter. */
     if (c > largest) {
       largest = c;
       *by = p;
@@ -986,6 +1012,7 @@ static PetscErrorCode BeginHeld(Search *s)
     s->ratio[k] = 1; /* until an attempt gives another value */
     s->order[k] = k;
   }
+  /* The scale of forces: known after the first attempt at these points. */
   s->force = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -1031,7 +1058,8 @@ static PetscErrorCode BeginGrown(Search *s, HycoSamples *grown)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Trains on these points from now on; solves those that are not solved. */
+/* Trains on these points from now on; solves those that are not solved. Bases are of the former set, hence not
+   reduced. */
 static PetscErrorCode TrainOn(Search *s, HycoSamples grown)
 {
   HycoReducer t = s->t;
@@ -1059,11 +1087,14 @@ static PetscErrorCode Rounds(Search *s, HycoSamples *grown, HycoTraining *report
                    n_add = PetscMin(PetscMax(2, s->first / ROUND), left);
 
     PetscCall(Attempts(s));
+    /* Points are added only for targets: the default limits end with what the user's points give. */
     if (!s->targets || s->least <= 1 || n_add < 1 || !t->scene->n_parameters || IsOwn(t)) break;
     PetscCall(BeginGrown(s, grown));
     PetscCall(AddPoints(s, *grown, n_add, &n, &by));
+    /* Every candidate is a training point already. */
     if (!n) break;
     report->n_added += n;
+    /* Held-out points have neighbours now: they judge more kindly than a user's points. */
     s->near = PETSC_TRUE;
     if (t->added) HycoOnRoot(HycoComm(t), t->added(n, by, PETSC_FALSE, t->attempt_ctx));
     PetscCall(TrainOn(s, *grown));
@@ -1080,11 +1111,13 @@ static PetscErrorCode Advise(Search *s, HycoTraining *report)
 
   PetscFunctionBegin;
   PetscCall(FindTelling(s, t->samples, &by));
+  /* More values of one parameter cost fewer solutions than more of all. */
   if (by >= 0)
     snprintf(values, sizeof(values), "give more values of %s, whose training values are too far apart",
              t->scene->parameter[by]);
   next[0] = '\0';
   for (PetscInt k = 0; k < s->n_left_out && !next[0]; k++) {
+    /* Only a type that was left out can be tried; other notes are of settings. */
     for (PetscInt j = 0; s->types[j]; j++) {
       if (s->left_out[k].possible && strcmp(s->left_out[k].what, s->types[j]) == 0)
         snprintf(next, sizeof(report->next), "try -hyco_model_type %s, which the search left out (%s)", s->types[j],
@@ -1189,7 +1222,9 @@ static PetscErrorCode JudgeFresh(Search *s, HycoROM model, HycoSamples *former, 
   PetscCall(HycoSamplesGet(t->held, &n, NULL, NULL));
   PetscCall(PetscMalloc1(n, &t->judged_held));
   PetscCall(HycoReducerPredictHeldOut(t, t->held, model, s->store, NULL, t->judged_held));
+  /* Of the new set. */
   s->force = HycoHeldOutForce(n, t->judged_held);
+  /* Points near added solutions count too: they are a part of the region. */
   *met = (PetscBool)(s->least <= 1);
   for (PetscInt k = 0; k < n; k++) *met = (PetscBool)(*met && Quotient(s, &t->judged_held[k]) <= 1);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -1211,6 +1246,7 @@ static PetscErrorCode Conclude(Search *s, HycoROM *model, HycoSamples *grown, Hy
   PetscCall(JudgeFresh(s, *model, &former, report, &met));
   if (!met) {
     *again = PETSC_TRUE;
+    /* Estimates must not be fitted to points that become training points. */
     PetscCall(PetscFree(t->judged_held));
     PetscCall(HycoROMDestroy(model));
     PetscCall(HycoSamplesGet(former, &n, NULL, NULL));
@@ -1224,6 +1260,8 @@ static PetscErrorCode Conclude(Search *s, HycoROM *model, HycoSamples *grown, Hy
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rounds() tries settings and adds solutions until the targets are met; Conclude() builds the best and judges it at
+   fresh points. */
 static PetscErrorCode Learn(Search *s, HycoROM *model, HycoSamples *grown, HycoTraining *report)
 {
   HycoReducer t = s->t;
@@ -1247,6 +1285,7 @@ static PetscErrorCode Learn(Search *s, HycoROM *model, HycoSamples *grown, HycoT
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Destroys what the search has allocated also after an error; model and grown set are the caller's. */
 PetscErrorCode HycoReducerLearn(HycoReducer t, HycoSnapshots store, HycoROM *model, HycoSamples *grown,
                                 HycoTraining *report)
 {
@@ -1256,6 +1295,7 @@ PetscErrorCode HycoReducerLearn(HycoReducer t, HycoSnapshots store, HycoROM *mod
   PetscFunctionBegin;
   *grown = NULL;
   t->plane = NULL;
+  /* Nothing to search: one build with the settings as they are. */
   if (Settled(t)) {
     PetscCall(TakeColumns(t, store, HycoReducerOwnModes(t, t->prototype)));
     PetscCall(HycoReducerReduce(t, store, PETSC_FALSE));
@@ -1270,6 +1310,7 @@ PetscErrorCode HycoReducerLearn(HycoReducer t, HycoSnapshots store, HycoROM *mod
   PetscCall(HycoTrainerNames(&s->types));
   ierr = Learn(s, model, grown, report);
   Forget(s);
+  /* After an error a model of an earlier attempt may be left. */
   (void)!HycoROMDestroy(&s->kept);
   PetscCall(PetscFree(s));
   t->ridge = -1;

@@ -23,8 +23,10 @@ static PetscErrorCode MakeFolder(const char folder[])
     HycoCheck(errno == EEXIST && stat(folder, &info) == 0 && S_ISDIR(info.st_mode),
               "the snapshot folder %s cannot be created; check that its parent folder exists and is writable", folder);
   }
+  /* Tried now: the first solution may take an hour. */
   HycoCheck(access(folder, W_OK) == 0, "the snapshot folder %s is not writable", folder);
   snprintf(all, sizeof(all), "%s/", folder);
+  /* Files under temporary names of processes that are gone. */
   PetscCall(HycoFileSweep(all));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -62,6 +64,7 @@ static PetscErrorCode CloseSample(HycoSnapshots s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A file of a sample may be open: it is kept open between reads of its fields. */
 PetscErrorCode HycoSnapshotsDestroy(HycoSnapshots *snapshots)
 {
   PetscFunctionBegin;
@@ -107,6 +110,7 @@ static PetscErrorCode CheckFingerprint(HycoSnapshots s, HycoH5 h, const char pat
   snprintf(mine, sizeof(mine), "%016llx", s->fingerprint);
   same = strcmp(text, mine) == 0;
   PetscCall(PetscFree(text));
+  /* Names the entry, where it is one of the history; otherwise returns. */
   if (!same) PetscCall(CheckHistory(s, h, path));
   HycoCheck(same,
             "%s is a snapshot of another scene%s or mesh; remove the folder %s, or name another by -hyco_snapshots",
@@ -147,12 +151,14 @@ static PetscErrorCode FindMissing(HycoSnapshots s, PetscInt n, PetscInt n_par, c
     if (access(path, F_OK) != 0) {
       PetscBool twin = PETSC_FALSE;
 
+      /* O(n^2) comparisons of a few numbers: nothing beside one solve. */
       for (PetscInt j = 0; j < *n_missing && !twin; j++)
         PetscCall(PetscArraycmp(mu + missing[j] * n_par, mu + k * n_par, n_par, &twin));
       if (!twin) missing[(*n_missing)++] = k;
       continue;
     }
     PetscCall(OpenSample(s, mu + k * n_par, &h));
+    /* The largest sliding of stored solutions counts for this training's warning. */
     if (HycoH5Has(h, "sliding")) {
       PetscReal sliding;
 
@@ -184,6 +190,7 @@ static PetscErrorCode WriteHead(HycoSnapshots s, HycoFOM fom, HycoH5 h, const Pe
   PetscFunctionBegin;
   snprintf(fingerprint, sizeof(fingerprint), "%016llx", s->fingerprint);
   PetscCall(HycoH5WriteText(h, "fingerprint", fingerprint));
+  /* Empty without a history. */
   PetscCall(HycoSceneWriteHistory(s->scene, &history));
   if (history[0]) ierr = HycoH5WriteText(h, "history", history);
   PetscCall(PetscFree(history));
@@ -210,6 +217,7 @@ static PetscErrorCode WriteSprings(HycoFOM fom, HycoH5 h, const char name[])
   if (!fom->scene->n_springs) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoFOMGetRows(fom, &rows));
   PetscCall(PetscCalloc1(fom->fe->n_dof, &force));
+  /* -K u, the force on the body. */
   HycoSpringsAddForces(fom->fe, 1, fom->u, force);
   for (PetscInt k = 0; k < fom->fe->n_dof; k++) force[k] = fom->fe->fixed[k] ? 0 : force[k];
   HycoFinally(HycoFieldWrite(h, rows, fom->n_nodes, name, HYCO_ON_NODES, MPIU_REAL, fom->fe->dim, 1, force),
@@ -225,6 +233,7 @@ static PetscErrorCode WriteFields(HycoSnapshots s, HycoFOM fom, HycoH5 h, const 
 
   PetscFunctionBegin;
   HycoOnRoot(HycoComm(fom), WriteHead(s, fom, h, mu));
+  /* Contacts in the order of the mesh file, gathered by numbers and not by ranks. */
   PetscCall(HycoFOMWriteForces(fom, h, "lambda"));
   PetscCall(HycoFOMGetRows(fom, &rows));
   PetscCall(HycoFieldWrite(h, rows, fom->n_nodes, "U", HYCO_ON_NODES, MPIU_REAL, dim, 1, fom->u));
@@ -246,7 +255,9 @@ static PetscErrorCode WriteSample(HycoSnapshots s, HycoFOM fom, const PetscReal 
   PetscCall(SamplePath(s, mu, path));
   PetscCall(HycoH5CreateShared(HycoComm(fom), path, &h));
   ierr = WriteFields(s, fom, h, mu, force);
+  /* Per rank, for the report's balance. */
   s->bytes += HycoH5Written(h);
+  /* Collective, also after an error: the other ranks of the group are in it. */
   failed = HycoH5Close(&h, (PetscBool)!ierr);
   PetscCall(ierr ? ierr : failed);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -324,6 +335,7 @@ static PetscErrorCode WriteFriction(HycoFOM fom, PathWriter *w, PetscInt step)
 
   PetscFunctionBegin;
   if (!shear) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Components one by one: a field has one number per contact. */
   PetscCall(PetscMalloc1(fom->pairs.n + 1, &value));
   for (PetscInt c = 0; c < HYCO_SNAPSHOT_FRICTION && !ierr; c++) {
     char name[HYCO_LINE];
@@ -348,9 +360,11 @@ static PetscErrorCode WriteStep(HycoFOM fom, const HycoStep *step, void *ctx)
   PetscFunctionBegin;
   PetscCall(HycoFOMGetRows(fom, &rows));
   PetscCall(HycoFOMStress(fom));
+  /* The accumulated inelastic strain; stresses come from HycoFOMStress(). */
   PetscCall(HycoFEStateFields(fom->fe, fom->path->begin, NULL, NULL, w->inelastic, NULL));
   PetscCall(HycoFOMToLocal(fom, fom->path->f_old, w->force));
   HycoSpringsAddForces(fom->fe, 1, fom->u, w->force); /* the forces of springs are a field of their own */
+  /* Internal forces at fixed unknowns are reactions, stored as a field of their own. */
   for (PetscInt k = 0; k < fom->fe->n_dof; k++) w->force[k] = fom->fe->fixed[k] ? 0 : w->force[k];
   NameField(w->s, step->index, "lambda", name);
   PetscCall(HycoFOMWriteForces(fom, w->h, name));
@@ -384,6 +398,7 @@ static PetscErrorCode WritePath(PathWriter *w, HycoFOM fom, const PetscReal mu[]
   PetscCall(HycoFOMSolve(fom, w->s->scene->n_parameters, mu));
   PetscCall(HycoFOMGetHistory(fom, &history));
   HycoSceneNamePoint(w->s->scene, mu, at);
+  /* Half of a path would train a model that is wrong at the end and does not know it. */
   HycoCheck(history.ended, "the path at %s ends at t = %.10g, because its steps became too small: %s", at,
             (double)history.t, history.why);
   HycoOnRoot(HycoComm(fom), WriteHead(w->s, fom, w->h, mu));
@@ -400,6 +415,7 @@ static PetscErrorCode SolvePath(HycoSnapshots s, HycoFOM fom, const PetscReal mu
   PetscErrorCode ierr, failed;
 
   PetscFunctionBegin;
+  /* All points would write the same checkpoint. */
   PetscCheck(!fom->path->checkpoint[0], HycoComm(fom), PETSC_ERR_USER,
              "-hyco_checkpoint is for hyco solve; training stores each solved path in its snapshot folder");
   PetscCheck(!fom->path->fclib[0], HycoComm(fom), PETSC_ERR_USER, "-hyco_write_fclib is for hyco solve; remove it");
@@ -491,6 +507,7 @@ static PetscErrorCode SolveGroup(HycoSnapshots s, HycoQueue queue, const Missing
 
   PetscFunctionBegin;
   PetscCall(HycoQueueGetGroup(queue, &group));
+  /* On the group's communicator: each group has the whole mesh distributed over its ranks. */
   PetscCall(HycoFOMCreate(group, s->scene, &fom));
   if (fom->path) {
     fom->path->interrupt = Hear;
@@ -552,6 +569,7 @@ PetscErrorCode HycoSnapshotsFill(HycoSnapshots s, HycoSamples samples, HycoProgr
   PetscCall(HycoSamplesGet(samples, &m.n_all, &m.n_par, &m.mu));
   HycoCheck(m.n_all > 0, "the set of samples is empty");
   PetscCall(PetscMalloc1(m.n_all, &m.missing));
+  /* One rank looks into the folder: others might see it in another state. */
   HycoOnRoot(HycoComm(s), FindMissing(s, m.n_all, m.n_par, m.mu, &m.n, m.missing));
   PetscCallMPI(MPI_Bcast(&m.n, 1, MPIU_INT, 0, HycoComm(s)));
   HycoBcast(m.missing, m.n, MPIU_INT, HycoComm(s));
@@ -589,8 +607,10 @@ static PetscErrorCode ReadColumns(HycoSnapshots s, PetscInt n, const PetscReal m
     for (PetscInt j = 0; j < n_steps; j++) {
       NameField(s, j, field, name);
       PetscCall(HycoH5GetSize(h, name, &size, &one));
+      /* A mesh that was refined after the first solutions. */
       HycoCheck(size == total, "%s: %s has %d rows, and other snapshots have %d; remove the folder", s->last_path, name,
                 (int)size, (int)total);
+      /* Straight into the column of the dense matrix, whose rows are this rank's. */
       PetscCall(HycoH5ReadRows(h, name, lo, rows, 1, data + (size_t)(k * n_steps + j) * (size_t)lda));
     }
   }
@@ -622,6 +642,7 @@ PetscErrorCode HycoSnapshotsGetRows(HycoSnapshots s, HycoSamples samples, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A column for each sample and listed time; each rank reads its own rows of every file. */
 PetscErrorCode HycoSnapshotsGetField(HycoSnapshots s, HycoSamples samples, PetscInt first, PetscInt n,
                                      const char field[], PetscInt block, Mat *S)
 {
@@ -677,7 +698,8 @@ static PetscErrorCode ReadBetween(HycoSnapshots s, const PetscReal mu[], PetscIn
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rank 0 counts, so that all ranks create the same matrix; each reads its rows. */
+/* Rank 0 counts, so that all ranks create the same matrix; each reads its rows. Steps between listed times, without
+   those at them, which HycoSnapshotsGetField() reads. */
 PetscErrorCode HycoSnapshotsGetBetween(HycoSnapshots s, const PetscReal mu[], PetscInt rows, PetscInt total, Mat *U)
 {
   PetscInt n = 0, lo, hi, lda;
@@ -696,6 +718,7 @@ PetscErrorCode HycoSnapshotsGetBetween(HycoSnapshots s, const PetscReal mu[], Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* k: the listed time, 0 without a history. */
 PetscErrorCode HycoSnapshotsReadRows(HycoSnapshots s, const PetscReal mu[], PetscInt k, const char field[],
                                      PetscInt first, PetscInt n, PetscReal value[])
 {
@@ -709,6 +732,7 @@ PetscErrorCode HycoSnapshotsReadRows(HycoSnapshots s, const PetscReal mu[], Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Files of earlier versions lack fields that were added since. */
 PetscErrorCode HycoSnapshotsHas(HycoSnapshots s, const PetscReal mu[], PetscInt k, const char field[], PetscBool *has)
 {
   char name[HYCO_LINE];
@@ -721,6 +745,7 @@ PetscErrorCode HycoSnapshotsHas(HycoSnapshots s, const PetscReal mu[], PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The times of full order's steps; the caller frees them. -1: their number is the file's. */
 PetscErrorCode HycoSnapshotsReadTaken(HycoSnapshots s, const PetscReal mu[], PetscInt *n, PetscReal **taken)
 {
   HycoH5 h;

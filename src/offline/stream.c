@@ -24,6 +24,7 @@ PetscErrorCode HycoReducerEachBatch(HycoReducer t, HycoBatchUse use, void *ctx)
   const PetscInt most = PetscMax(1, Room(t, t->sizes[0] * t->sizes[3]) / n_steps);
 
   PetscFunctionBegin;
+  /* They are in memory: no reading, one batch. */
   if (t->S) {
     PetscCall((*use)(t, 0, t->S, ctx));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -31,6 +32,7 @@ PetscErrorCode HycoReducerEachBatch(HycoReducer t, HycoBatchUse use, void *ctx)
   for (PetscInt first = 0; first < n; first += most) {
     Mat S;
 
+    /* Read again in each pass: the price of not holding them. */
     PetscCall(HycoSnapshotsGetField(t->store, t->columns, first, PetscMin(most, n - first),
                                     HycoSeedFields[HYCO_SEED_DISPLACEMENT], t->sizes[3], &S));
     PetscCall((*use)(t, first * n_steps, S, ctx));
@@ -63,6 +65,7 @@ static PetscErrorCode CheckRoom(const Stream *s, PetscInt n)
 
   PetscFunctionBegin;
   PetscCall(CountModes(s, &l));
+  /* Before the columns are merged: afterwards the modes would be lost with the memory. */
   HycoCheck(l + n <= s->room,
             "-hyco_pod_memory %g has room for %d columns of the field %s, and its %d modes with %d more columns "
             "need at least %.3g; give more, or a larger -hyco_pod_noise, which keeps fewer modes",
@@ -99,7 +102,8 @@ static PetscErrorCode MergePoints(Stream *s, HycoSnapshots store)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads the modes of path j. */
+/* Reads the modes of path j. CheckRoom() fails where a single path does not fit into the memory that the user
+   allows. */
 static PetscErrorCode ReadModes(const Stream *s, HycoSnapshots store, PetscReal tol, PetscInt j, HycoPathModes *modes)
 {
   PetscInt n;
@@ -129,6 +133,7 @@ static PetscErrorCode MergePaths(Stream *s, HycoSnapshots store, PetscReal tol)
       HycoPathModes modes = {0};
 
       PetscCall(ReadModes(s, store, tol, j, &modes));
+      /* The first pass only finds the largest displacement of all paths. */
       if (pass && modes.V[0]) {
         PetscCall(MatScale(modes.V[0], HycoPathScale(modes.first[0], largest)));
         PetscCall(Merge(s, 1 / (PetscReal)n, &modes.V[0]));
@@ -155,11 +160,13 @@ static PetscErrorCode EndStream(Stream *s, PetscReal tol, PetscInt most)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Incremental SVD: the modes so far and a new batch are merged by the SVD of both side by side (Brand 2006). */
 PetscErrorCode HycoReducerStreamBasis(HycoReducer t, HycoSnapshots store, PetscInt kind, PetscReal tol, PetscInt most)
 {
   Stream s = {.t = t, .kind = kind};
 
   PetscFunctionBegin;
+  /* Merging needs accurate small singular values, which Gram matrices lose. */
   HycoCheck(strcmp(t->svd_type, HYCO_SVD_TSQR) == 0,
             "-hyco_pod_memory computes PODs by the SVD type %s, and -hyco_pod_svd_type is %s; leave one of the two out",
             HYCO_SVD_TSQR, t->svd_type);

@@ -1,6 +1,8 @@
 /* Replay of the laws along the training paths: gives stress and state at each listed time. */
 #include <hycoreducerimpl.h>
 
+/* column -1: no displacement has been read. The callbacks say where displacements come from and what is taken at each
+   step. */
 PetscErrorCode HycoTrainingReplayCreate(HycoReducer t, PetscErrorCode (*displacement)(void *, PetscInt, PetscReal[]),
                                         PetscErrorCode (*record)(void *, PetscInt), void *ctx, HycoTrainingReplay *r)
 {
@@ -72,11 +74,13 @@ static PetscErrorCode Follow(HycoTrainingReplay *r, PetscInt k, const PetscReal 
   PetscInt step = 0;
 
   PetscFunctionBegin;
+  /* States of the former path. */
   PetscCall(HycoMarchEnd(&r->march));
   for (PetscInt i = 0; i < n; i++) {
     HycoSceneSetTime(scene, mu, taken[i], all);
     PetscCall(HycoFOMSetParameters(r->t->fom, all));
     PetscCall(Displace(r, k, taken[i]));
+    /* A law without a solution on one rank ends the replay on all. */
     HycoOnEach(HycoComm(r->t), Step(r, taken[PetscMax(i - 1, 0)], taken[i]));
     if (!scene->n_times || (step < scene->n_times && taken[i] == scene->times[step]))
       PetscCall((*r->record)(r->ctx, k * steps + step++));
@@ -84,6 +88,7 @@ static PetscErrorCode Follow(HycoTrainingReplay *r, PetscInt k, const PetscReal 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* In full order's own steps, so that states are those of the solutions. */
 PetscErrorCode HycoTrainingReplayFollow(HycoTrainingReplay *r, HycoSnapshots store, PetscInt k)
 {
   HycoReducer t = r->t;
@@ -93,8 +98,8 @@ PetscErrorCode HycoTrainingReplayFollow(HycoTrainingReplay *r, HycoSnapshots sto
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
-  if (t->scene->n_times)
-    HycoOnEach(HycoComm(t), HycoSnapshotsReadTaken(store, mu + k * n_par, &n, &taken));
+  if (t->scene->n_times) HycoOnEach(HycoComm(t), HycoSnapshotsReadTaken(store, mu + k * n_par, &n, &taken));
+  /* Without a history one time, 0, at which the laws are linear. */
   else
     PetscCall(PetscCalloc1(1, &taken));
   HycoFinally(Follow(r, k, mu + k * n_par, n, taken), PetscCall(PetscFree(taken)));

@@ -79,6 +79,7 @@ static PetscErrorCode MarkHeld(HycoScene scene, HycoMesh m, const HycoQuantity *
   for (PetscInt s = 0; s < scene->n_fixed; s++) {
     PetscBool acts = PETSC_FALSE;
 
+    /* A support along an oblique direction acts along each axis on which it has a component. */
     PetscCall(SupportActs(&scene->fixed[s], q->field, &acts));
     if (acts) PetscCall(MarkGroup(m, "fixed", scene->fixed[s].group, part, in, inside, outside));
   }
@@ -134,13 +135,16 @@ PetscErrorCode HycoQuantitiesBalance(MPI_Comm comm, HycoScene scene, HycoMesh m,
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(n, &part));
   PetscCall(PetscCalloc1(2 * scene->n_quantities * n, &held));
+  /* Bodies that are tied to each other have one balance: forces between them are not known one by one. */
   PetscCall(JoinBodies(comm, scene, m, part));
   HycoOnEach(comm, MarkAll(scene, m, part, held));
+  /* Each rank sees the nodes of its part alone, and a group may be on several. */
   HycoAllreduce(held, 2 * scene->n_quantities * n, HYCO_MPI_BOOL, MPI_LOR, comm);
   for (PetscInt k = 0; k < scene->n_quantities; k++) {
     const PetscBool *inside = held + 2 * k * n, *outside = inside + n;
     PetscBool follows = PETSC_TRUE;
 
+    /* Of all bodies: the reaction is one number, the sum over the group, so one undetermined body spoils it. */
     for (PetscInt b = 0; b < n; b++) follows = (PetscBool)(follows && !(inside[b] && outside[b]));
     for (PetscInt b = 0; b < n; b++) balanced[k * n + b] = (PetscBool)(follows && inside[part[b]]);
   }
@@ -158,6 +162,7 @@ static PetscErrorCode MarkPoints(HycoMesh m, const HycoPointLoad *load, PetscBoo
   PetscCall(PetscArrayzero(node, m->n_nodes));
   for (PetscInt k = m->group_start[g]; k < m->group_start[g + 1]; k++) node[m->group_node[k]] = PETSC_TRUE;
   for (PetscInt k = 0; k < m->n_cells * m->nv; k++) {
+    /* A concentrated force goes to a node; the cells around it are what makes the node part of the RID. */
     if (node[m->cells[k]]) needed[k / m->nv] = PETSC_TRUE;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -177,6 +182,7 @@ PetscErrorCode HycoMarkLoads(HycoScene scene, HycoMesh m, const PetscBool of[], 
 
     PetscCall(HycoMeshFindGroup(m, "load", scene->load[s].group, &g));
     for (PetscInt f = 0; f < m->n_facets; f++) {
+      /* A facet without a cell belongs to another rank. */
       if (m->facet_group[f] == g && m->facet_cell[f] >= 0) needed[m->facet_cell[f]] = PETSC_TRUE;
     }
   }
@@ -186,6 +192,7 @@ PetscErrorCode HycoMarkLoads(HycoScene scene, HycoMesh m, const PetscBool of[], 
     const HycoBody *body = &scene->body[m->cell_body[e]];
 
     if (!of[m->cell_body[e]]) continue;
+    /* By what the scene says, not by values: a force that is zero at these parameters may not be at others. */
     if (body->force[0] || body->force[1] || body->force[2] || HycoSceneHasInertia(scene, body, NULL))
       needed[e] = PETSC_TRUE;
   }
@@ -199,6 +206,7 @@ PetscErrorCode HycoQuantitiesMarkLoads(HycoScene scene, HycoMesh m, const PetscB
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(scene->n_bodies, &of));
+  /* The balance of a body needs all loads on it, wherever on the body they act. */
   for (PetscInt k = 0; k < scene->n_quantities * scene->n_bodies; k++)
     of[k % scene->n_bodies] = (PetscBool)(of[k % scene->n_bodies] || balanced[k]);
   HycoFinally(HycoMarkLoads(scene, m, of, needed), PetscCall(PetscFree(of)));

@@ -48,6 +48,7 @@ static PetscErrorCode ListRows(HycoMesh m, const unsigned char code[], PetscInt 
   l->n = n;
   PetscCall(PetscMalloc1(n, &l->shape));
   PetscCall(PetscMalloc1(n + 1, &l->start));
+  /* Room for the largest shape with its code; smaller shapes leave the end unused. */
   PetscCall(PetscMalloc1(n * (m->nv + 1), &l->item));
   l->start[0] = 0;
   for (PetscInt e = 0, at = 0; e < n; e++, row += m->nv) {

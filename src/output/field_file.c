@@ -62,6 +62,7 @@ PetscErrorCode HycoFieldsCheckPath(const char path[])
 
   PetscFunctionBegin;
   PetscCall(HycoFieldsNumbers(path, h5));
+  /* Writability is checked when the command reads its options; this is about what may not be replaced. */
   if (stat(h5, &info) != 0) PetscFunctionReturn(PETSC_SUCCESS);
   HycoCheck(S_ISREG(info.st_mode),
             "%s is not a file (a folder, a device, a pipe), and the numbers of %s would be written there; give the "
@@ -89,6 +90,7 @@ PetscErrorCode HycoFieldFileCreate(MPI_Comm comm, const char path[], PetscInt mo
   f->vtk = (PetscBool)(Ending(path) == 7);
   PetscCall(PetscStrncpy(f->path, path, sizeof(f->path)));
   PetscCall(HycoFieldsNumbers(path, f->h5_path));
+  /* Times arrive one by one; none is allocated while fields are written. */
   PetscCall(PetscMalloc1(most, &f->t));
   *file = f;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -136,6 +138,7 @@ PetscErrorCode HycoFieldFileOpen(HycoFieldFile f, const HycoFileOrder *order, Hy
   PetscCall(PetscFree(f->mu));
   PetscCall(PetscMalloc1(PetscMax(f->most, 1) * scene->n_parameters + 1, &f->mu));
   PetscCall(PetscArraycpy(f->mu, mu, scene->n_parameters));
+  /* A former file that was not committed is dropped: false removes it. */
   PetscCall(HycoH5Close(&f->h, PETSC_FALSE));
   PetscCall(HycoH5CreateShared(f->comm, f->h5_path, &f->h));
   if (f->vtk) {
@@ -144,6 +147,7 @@ PetscErrorCode HycoFieldFileOpen(HycoFieldFile f, const HycoFileOrder *order, Hy
   }
   HycoOnRoot(f->comm, WriteHead(f));
   PetscCall(HycoFieldsWriteMesh(f->h, "mesh", order, mesh, X, PETSC_TRUE));
+  /* One shape needs no codes: XDMF reads the cells' table as it is. */
   if (mesh->mixed) PetscCall(WriteTopology(f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -198,11 +202,13 @@ static PetscErrorCode Describe(HycoFieldFile f, const char set[], const HycoFiel
         PetscCall(HycoH5WriteAttribute(f->h, set, "unit", f->scene->unit[kind]));
     }
   }
+  /* By name: fields carry no kind, and these names are those of the documented outputs. */
   if (!strcmp(field->name, "contact")) PetscCall(NameContacts(f, set));
   if (!strcmp(field->name, "principal_stress"))
     PetscCall(HycoH5WriteAttribute(f->h, set, "components", "1 2 3"));
   else if (field->components == 3)
     PetscCall(HycoH5WriteAttribute(f->h, set, "components", "x y z"));
+  /* The two formats order symmetric tensors differently; what is written says so itself. */
   else if (field->components == 6)
     PetscCall(HycoH5WriteAttribute(f->h, set, "components", f->vtk ? "xx yy zz xy yz xz" : "xx xy xz yy yz zz"));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -217,11 +223,13 @@ PetscErrorCode HycoFieldFileAddRows(HycoFieldFile f, const HycoField *field, con
   char set[HYCO_LINE];
 
   PetscFunctionBegin;
+  /* A fixed table: the fields of a file are known when it is designed, hence an internal error. */
   PetscCheck(f->n_fields < HYCO_MOST_FIELDS, f->comm, PETSC_ERR_PLIB,
              "%s: no room for the field %s; there are %d already", f->path, field->name, HYCO_MOST_FIELDS);
   PetscCall(PetscStrncpy(f->name[f->n_fields], field->name, sizeof(f->name[0])));
   *noted = *field;
   noted->name = f->name[f->n_fields++];
+  /* The data belong to the caller and are gone when the .xdmf is written; only name, place and size are kept. */
   noted->data = NULL;
   if (f->vtk)
     PetscCall(HycoVTKWriteField(f, field, rows, set));
@@ -244,6 +252,7 @@ PetscErrorCode HycoFieldFileAdd(HycoFieldFile f, const HycoField *field)
   PetscFunctionBegin;
   PetscCall(HycoFieldRows(f->order, n, field->place, MPIU_REAL, field->components, field->data, &rows));
   ierr = HycoFieldFileAddRows(f, field, (const PetscReal *)rows);
+  /* Without an order the rows are the caller's own array. */
   if (rows != field->data) PetscCall(PetscFree(rows));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -269,6 +278,7 @@ PetscErrorCode HycoFieldFileBeginPoint(HycoFieldFile f, const PetscReal X[], con
   PetscFunctionBegin;
   PetscCall(HycoFieldFileBeginTime(f, f->n));
   PetscCall(PetscArraycpy(f->mu + f->n * n_par, mu, n_par));
+  /* A .vtkhdf has the points of all times in one dataset, an .xdmf a dataset for each. */
   if (f->vtk) {
     PetscCall(HycoVTKWritePoints(f, X));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -296,6 +306,7 @@ static void Escape(const char name[], char out[6 * PETSC_MAX_PATH_LEN])
   for (; *name; name++) {
     const char *at = strchr(special, *name);
 
+    /* Each character becomes at most 6, which is the room that out[] has. */
     if (at)
       out += sprintf(out, "%s", entity[at - special]);
     else
@@ -321,6 +332,7 @@ static void WriteGrid(HycoFieldFile f, FILE *out, const char h5[], PetscInt k)
   char name[HYCO_LINE], kind[64];
 
   fprintf(out, "  <Grid Name=\"mesh\" GridType=\"Uniform\">\n");
+  /* A single solution has no time: viewers would show a series of one. */
   if (f->most) fprintf(out, "   <Time Value=\"%.17g\"/>\n", (double)f->t[k]);
   fprintf(out, "   <Topology TopologyType=\"%s\" NumberOfElements=\"%ld\"%s>\n",
           f->mesh->mixed ? "Mixed" : topology[type], (long)n_cells, type == HYCO_LINE2 ? " NodesPerElement=\"2\"" : "");
@@ -330,6 +342,7 @@ static void WriteGrid(HycoFieldFile f, FILE *out, const char h5[], PetscInt k)
   else
     WriteItem(out, kind, n_cells, f->mesh->nv, h5, "mesh/cells");
   fprintf(out, "   </Topology>\n   <Geometry GeometryType=\"XYZ\">\n");
+  /* In a file of points each mesh has coordinates of its own, since maps move the nodes with the parameters. */
   HycoFormat(name, f->points ? "step-%04d/xyz" : "mesh/xyz", (int)k);
   WriteItem(out, "Precision=\"8\"", HycoFieldFileCount(f, HYCO_ON_NODES), 3, h5, name);
   fprintf(out, "   </Geometry>\n");
@@ -392,6 +405,7 @@ static PetscErrorCode WriteParameters(HycoFieldFile f)
   for (PetscInt p = 0; p < n_par && !ierr; p++) {
     for (PetscInt k = 0; k < rows; k++) column[k] = f->mu[k * n_par + p];
     HycoFormat(name, "%s/%s", f->vtk ? "VTKHDF/FieldData" : "mu", f->scene->parameter[p]);
+    /* VTK's field data are one-dimensional, while .h5 files of .xdmf have columns. */
     ierr = HycoH5WriteReal(f->h, name, rows, f->vtk ? HYCO_H5_LINE : 1, column);
   }
   PetscCall(PetscFree(column));

@@ -15,6 +15,7 @@ PetscErrorCode HycoFieldRows(const HycoFileOrder *order, PetscInt n, HycoPlace p
   PetscFunctionBegin;
   *rows = (void *)value;
   if (!order) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Zero where no rank has a value: a node that no body uses still has a row. */
   PetscCall(PetscCalloc1((size_t)count * size, (char **)rows));
   PetscCall(HycoFileOrderSend(order, place, type, components, value, *rows));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -80,6 +81,7 @@ PetscErrorCode HycoStressInvariants(PetscInt n_cells, PetscInt dim, const PetscR
   PetscFunctionBegin;
   for (PetscInt e = 0; e < n_cells; e++) {
     PetscReal s[6], value[3];
+    /* LAPACK overwrites the matrix and only reads its upper triangle; both are filled anew for each cell. */
     PetscScalar work[32];
 
     HycoTensor6(1, HycoStrainSize(dim), sigma + e * HycoStrainSize(dim), s);
@@ -108,11 +110,13 @@ static PetscErrorCode FillCorners(HycoFE fe, PetscReal sum[], PetscReal pressure
     for (PetscInt j = 0; j < m->n_facets * corners; j++) {
       const PetscInt *node = m->facets + j / corners * m->nf, v = j % corners;
 
+      /* Neighbouring middle nodes of corner v in this facet are number v and, cyclically, the one before. */
       if (m->facet_group[j / corners] != g) continue;
       sum[2 * node[v]] += pressure[node[corners + v]] + pressure[node[corners + (v + corners - 1) % corners]];
       sum[2 * node[v] + 1] += 2;
     }
     for (PetscInt i = 0; i < m->n_nodes; i++) {
+      /* Of several contacts the largest, as for the other nodes. */
       if (sum[2 * i + 1] > 0) pressure[i] = PetscMax(pressure[i], sum[2 * i] / sum[2 * i + 1]);
     }
   }
@@ -169,6 +173,7 @@ static PetscErrorCode FillFriction(HycoFE fe, const HycoPairs *pairs, HycoContac
     f->state[s] = PetscMax(f->state[s], shear->state[k]);
     for (PetscInt c = 0; c < 3; c++) {
       f->slip[3 * s + c] += shear->slip[3 * k + c];
+      /* A slave of no area, such as a corner of a six-node face, has a force but no traction. */
       if (f->area[k] > 0) f->traction[3 * s + c] += shear->force[3 * k + c] / f->area[k];
     }
   }
@@ -185,10 +190,12 @@ PetscErrorCode HycoContactFieldsCreate(MPI_Comm comm, HycoFE surface, HycoPairs 
   PetscFunctionBegin;
   f->rubs = (PetscBool)(pairs->shear != NULL);
   f->traction = f->slip = f->state = NULL;
+  /* Zero at nodes without contact; gap and contact's number are then set to not a number. */
   PetscCall(PetscCalloc4(3 * n, &f->force, n, &f->pressure, n, &f->gap_node, n, &f->which));
   PetscCall(PetscCalloc4(pairs->n, &f->gap, 3 * pairs->n, &f->normal, pairs->n, &f->area, pairs->n, &f->slave_id));
   PetscCall(PetscMalloc1(pairs->n, &f->pressure_of));
   HycoOnEach(comm, FillContacts(surface, pairs, u, lambda, f));
+  /* Areas and pressures of shared slaves need the facets of other ranks as well. */
   PetscCall(HycoContactPressures(comm, surface, pairs, f->area, lambda, f->pressure_of));
   for (PetscInt k = 0; k < pairs->n; k++) { /* for a node in several contacts the largest */
     const PetscInt s = HycoPairsSlave(pairs, k);
@@ -211,6 +218,7 @@ static PetscErrorCode Combine(PetscSF to_owner, PetscSF to_part, HycoMesh part, 
   PetscCall(PetscMalloc3(part->n_owned, &owned, n, &one, part->n_nodes, &mine));
   for (PetscInt c = 0; c < width; c++) {
     for (PetscInt i = 0; i < n; i++) one[i] = value[i * width + c];
+    /* The neutral element of op, for nodes that no surface has. */
     for (PetscInt i = 0; i < part->n_owned; i++) owned[i] = start;
     PetscCall(PetscSFReduceBegin(to_owner, MPIU_REAL, one, owned, op));
     PetscCall(PetscSFReduceEnd(to_owner, MPIU_REAL, one, owned, op));
@@ -228,6 +236,7 @@ static PetscErrorCode CombineLeast(PetscSF to_owner, PetscSF to_part, HycoMesh p
 {
   PetscFunctionBegin;
   for (PetscInt i = 0; i < n; i++) {
+    /* In place: the caller's array is replaced by the part's right afterwards. */
     if (!(PetscAbsReal(value[i]) < PETSC_MAX_REAL)) value[i] = PETSC_MAX_REAL;
   }
   PetscCall(Combine(to_owner, to_part, part, n, 1, MPI_MIN, PETSC_MAX_REAL, value, at_part));
@@ -266,6 +275,7 @@ static PetscErrorCode ToPart(MPI_Comm comm, HycoMesh part, HycoMesh surface, Hyc
       PetscMalloc4(3 * part->n_nodes, &force, part->n_nodes, &pressure, part->n_nodes, &gap, part->n_nodes, &which));
   PetscCall(HycoMeshNodeSF(comm, part, surface->n_nodes, surface->node_global, &to_owner));
   PetscCall(HycoMeshNodeSF(comm, part, part->n_nodes, part->node_global, &to_part));
+  /* Forces add up: each contact's is counted on one rank only. Pressures and gaps do not: largest and smallest. */
   PetscCall(Combine(to_owner, to_part, part, surface->n_nodes, 3, MPI_SUM, 0, f->force, force));
   PetscCall(Combine(to_owner, to_part, part, surface->n_nodes, 1, MPI_MAX, 0, f->pressure, pressure));
   PetscCall(CombineLeast(to_owner, to_part, part, surface->n_nodes, f->gap_node, gap));
@@ -433,6 +443,7 @@ static PetscErrorCode AddContacts(HycoFieldFile file, const HycoSolution *s)
 
   PetscFunctionBegin;
   ierr = HycoContactFieldsCreate(file->comm, s->surface, s->pairs, s->u_surface, s->lambda, &f);
+  /* The fields are destroyed after an error as well: each step frees nothing by itself. */
   if (!ierr) ierr = HycoContactFieldsToPart(file->comm, s->fe, s->surface->mesh, &f);
   if (!ierr) ierr = AddContactFields(file, s, &f);
   PetscCall(HycoContactFieldsDestroy(&f));

@@ -28,6 +28,7 @@ static PetscErrorCode FindPlace(HycoScene scene, HycoMesh m, const HycoQuantity 
 {
   PetscFunctionBegin;
   p->group = p->body = -1;
+  /* Without a group the whole mesh, which is cells. */
   p->dim = m->dim;
   if (!q->group) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoMeshFindGroup(m, "output", q->group, &p->group));
@@ -61,6 +62,7 @@ static PetscErrorCode MarkAround(HycoMesh m, const Place *p, PetscBool in[])
   for (PetscInt e = 0; e < m->n_cells; e++) {
     const PetscInt n = HycoMeshCellNodes(m, e, of);
 
+    /* in[] comes from the caller with whatever it had. */
     in[e] = PETSC_FALSE;
     for (PetscInt v = 0; v < n; v++) in[e] = (PetscBool)(in[e] || node[of[v]]);
   }
@@ -81,12 +83,14 @@ PetscErrorCode HycoQuantityMarkCells(HycoScene scene, HycoMesh m, PetscInt k, Pe
   PetscCall(FindPlace(scene, m, q, &p));
   if (q->kind == HYCO_QUANTITY_REACTION && p.group >= 0) {
     PetscCall(MarkAround(m, &p, in));
+    /* So that neither cells nor facets of the group are marked below: its nodes decide. */
     p.dim = -1;
   } else if (p.dim == m->dim)
     MarkCells(m, &p, in);
   else if (p.dim < m->dim - 1)
     PetscCall(MarkAround(m, &p, in));
   for (PetscInt f = 0; f < m->n_facets && p.dim == m->dim - 1; f++) {
+    /* The stress on a facet is that of its cell. */
     if (m->facet_group[f] == p.group && m->facet_cell[f] >= 0) in[m->facet_cell[f]] = PETSC_TRUE;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -148,6 +152,7 @@ static void AwayFromZ(HycoFE fe, PetscInt cell, PetscReal out[2])
 
   out[0] = out[1] = 0;
   for (PetscInt q = 0; q < el->nq; q++) {
+    /* Volume of the quadrature point in the mapped cell, whichever its orientation. */
     const PetscReal w = el->w[q] * PetscAbsReal(HycoDeterminant(el, fe->mesh->cells + cell * el->nv, fe->X, q));
     PetscReal x[3];
 
@@ -157,6 +162,7 @@ static void AwayFromZ(HycoFE fe, PetscInt cell, PetscReal out[2])
     volume += w;
   }
   r = PetscSqrtReal(out[0] * out[0] + out[1] * out[1]);
+  /* r is the centroid's distance times the volume; below round-off of the cell's own extent it has no direction. */
   for (PetscInt c = 0; c < 2; c++) out[c] = r > 1e-9 * volume * farthest ? out[c] / r : 0;
 }
 
@@ -169,10 +175,12 @@ static PetscErrorCode OfCell(HycoFE fe, PetscInt field, const PetscReal sigma[],
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(s, sigma + cell * fe->n_sigma, fe->n_sigma)); /* xx, yy, zz, xy, yz, xz */
   if (field >= XX && field <= XZ) *value = s[field - XX];
+  /* The axisymmetric components are radial, axial, hoop: nothing has to be turned. */
   if ((field == RR || field == TT) && fe->formulation == HYCO_AXISYMMETRIC) {
     *value = field == RR ? s[0] : s[2];
   } else if (field == RR || field == TT) {
     AwayFromZ(fe, cell, n);
+    /* The mean of both over all directions, since the shear's part cancels. */
     if (n[0] == 0 && n[1] == 0)
       *value = (s[0] + s[1]) / 2;
     else if (field == RR)
@@ -182,6 +190,7 @@ static PetscErrorCode OfCell(HycoFE fe, PetscInt field, const PetscReal sigma[],
   }
   if (field == MISES) *value = HycoMises(fe->dim, s);
   if (field > MISES) {
+    /* Principal stresses are asked for by few outputs, so they are computed for the cell alone. */
     PetscCall(HycoStressInvariants(1, fe->dim, s, &mises, principal));
     *value = principal[field - FIRST];
   }
@@ -202,12 +211,14 @@ static PetscErrorCode KeepClose(HycoFE fe, const HycoQuantity *q, const PetscRea
     const PetscInt n = in[e] ? HycoMeshCellNodes(m, e, node) : 0;
     PetscReal least = PETSC_MAX_REAL, here;
 
+    /* Displacements are at nodes: a cell is decisive if any of its nodes is. */
     for (PetscInt v = 0; v < n && q->field < XX; v++)
       least = PetscMin(least, PetscAbsReal(OfNode(fe, q->field, u, node[v]) - value));
     if (n && q->field >= XX) {
       PetscCall(OfCell(fe, q->field, sigma, e, &here));
       least = PetscAbsReal(here - value);
     }
+    /* CLOSE leaves room for the extreme to move to a neighbour within the model's error. */
     in[e] = (PetscBool)(in[e] && least <= CLOSE * PetscAbsReal(value));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -228,6 +239,8 @@ static PetscErrorCode KeepSupported(HycoFE fe, const HycoQuantity *q, PetscBool 
 
     if (HycoFESupports(fe, i * m->dim + q->field)) held = i;
   }
+  /* One cell is enough: a balanced reaction is computed from loads and contact forces, and the cell only keeps a
+     supported node in the RID. */
   for (PetscInt e = 0; e < m->n_cells && kept < 0; e++) {
     const PetscInt n_of = in[e] ? HycoMeshCellNodes(m, e, of) : 0;
 
@@ -253,7 +266,9 @@ PetscErrorCode HycoQuantitiesMarkDecisive(HycoFE fe, const PetscReal u[], const 
     const HycoQuantity *q = &scene->quantity[k];
 
     PetscCall(HycoQuantityMarkCells(scene, m, k, in));
+    /* Only extremes: a mean has no decisive cell, and needs all of its group. */
     if (q->kind < HYCO_QUANTITY_MEAN) PetscCall(KeepClose(fe, q, u, sigma, value[k], in));
+    /* Rotated unknowns of oblique supports hold several axes at once, which one cell might not show. */
     if (q->kind == HYCO_QUANTITY_REACTION && balanced && !fe->n_oblique) PetscCall(KeepSupported(fe, q, in));
     for (PetscInt e = 0; e < m->n_cells; e++) needed[e] = (PetscBool)(needed[e] || in[e]);
     for (PetscInt e = 0; e < m->n_cells && OfStress(q); e++) stressed[e] = (PetscBool)(stressed[e] || in[e]);
@@ -315,6 +330,7 @@ static PetscErrorCode AddNodes(HycoFE fe, const HycoQuantity *q, const PetscReal
     const PetscReal value = OfNode(fe, field, u, m->group_node[k]);
 
     Extend(s, value);
+    /* Extremes may see a node twice, sums may not. */
     if (HycoMeshOwned(m, m->group_node[k]) < 0) continue;
     s->sum += value;
     s->weight += 1;
@@ -327,6 +343,7 @@ static PetscErrorCode AddNodes(HycoFE fe, const HycoQuantity *q, const PetscReal
 
     if (!in[e]) continue;
     PetscCall(OfCell(fe, field, sigma, e, &value));
+    /* Stresses are constant in cells: those around the points stand for the value there. */
     PetscCall(AddEntity(fe, q, u, e, -1, &value, s));
   }
   PetscCall(PetscFree(in));
@@ -360,11 +377,13 @@ static PetscErrorCode AddReactions(HycoFE fe, const HycoQuantity *q, const Petsc
     const PetscInt i = p.group < 0 ? k : m->group_node[m->group_start[p.group] + k], dof = i * fe->dim + q->field;
 
     if (HycoMeshOwned(m, i) < 0) continue;
+    /* Only supports: at other nodes the residual of equilibrium is contact, springs or round-off. */
     if (fe->fixed[dof]) s->sum += reaction[dof];
     s->weight += HycoFESupports(fe, dof);
     for (PetscInt c = 0; c < fe->dim; c++) {
       const HycoOblique *oblique = HycoFEOblique(fe, i * fe->dim + c);
 
+      /* Its reaction is one number along the direction a; the axis has its component of it. */
       if (!oblique || oblique->a[q->field] == 0) continue;
       s->sum -= oblique->a[q->field] * reaction[i * fe->dim + c];
       s->weight += 1;
@@ -390,10 +409,12 @@ static PetscErrorCode AddContacts(HycoFE fe, PetscInt i, const HycoContactResult
             axisymmetric   ? " in an axisymmetric scene"
             : fe->dim == 2 ? " in 2D; use z"
                            : " in 1D");
+  /* The smallest pressure starts at the largest number, which any contact replaces. */
   *value = !contact ? NAN : q->kind == HYCO_QUANTITY_PRESSURE_MIN ? PETSC_MAX_REAL : 0;
   for (PetscInt c = part < 0 ? 0 : part; contact && c < (part < 0 ? n : part + 1); c++) {
     const HycoContactResult *r = &contact[c];
 
+    /* Results of parts are stored after those of the contacts, at n + i. */
     if (part < 0 && q->contact && strcmp(q->contact, r->name)) continue;
     if (q->kind == HYCO_QUANTITY_PRESSURE)
       *value = PetscMax(*value, r->pressure);
@@ -478,6 +499,7 @@ PetscErrorCode HycoQuantitiesMeasure(MPI_Comm comm, HycoFE fe, const PetscReal u
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < scene->n_quantities; k++) {
+    /* Contacts' results are already summed over the ranks; those of bodies are summed here. */
     if (scene->quantity[k].kind >= HYCO_QUANTITY_FORCE)
       HycoOnEach(comm, AddContacts(fe, k, contact, &value[k]));
     else

@@ -24,6 +24,7 @@ static PetscErrorCode WriteSequence(HycoH5 h, const char name[], PetscInt n, Pet
 /* On one process. One piece: the numbers of points, cells and ids are lists of length 1. */
 static PetscErrorCode WriteHead(HycoFieldFile f, const HycoCellList *cells)
 {
+  /* Version 2.0 of the format is the first with steps. */
   static const PetscInt version[2] = {2, 0};
   const PetscInt n_cells = HycoFieldFileCount(f, HYCO_ON_CELLS);
 
@@ -46,6 +47,7 @@ static PetscErrorCode WriteRows(HycoFieldFile f, const char set[], HycoPlace pla
                  first = f->order ? f->order->first[place] : 0, times = PetscMax(f->most, 1);
 
   PetscFunctionBegin;
+  /* The product is formed in 64 bits, since the indices may have 32. */
   HycoCheck((PetscInt64)all * times < PETSC_MAX_INT,
             "%s: %d times of %d nodes or cells are too many for one dataset; give an output that ends in .xdmf",
             f->path, (int)times, (int)all);
@@ -93,6 +95,7 @@ PetscErrorCode HycoVTKWriteMesh(HycoFieldFile f, const PetscReal X[])
   PetscFunctionBegin;
   PetscCall(HycoCellListCreate(f->order, m, NULL, &cells));
   HycoFinally(WriteCells(f, &cells), PetscCall(HycoCellListDestroy(&cells)));
+  /* Ids and cells are common to all times, and their offsets stay 0 in Steps. */
   if (!f->points)
     PetscCall(HycoFieldWrite(f->h, f->order, m->n_nodes, ROOT "Points", HYCO_ON_NODES, MPIU_REAL, 3, 3, X));
   PetscCall(HycoFieldWrite(f->h, f->order, m->n_nodes, ROOT "PointData/node_id", HYCO_ON_NODES, MPIU_INT, 1,
@@ -133,6 +136,7 @@ PetscErrorCode HycoVTKWriteField(HycoFieldFile f, const HycoField *field, const 
 
   PetscFunctionBegin;
   HycoFormat(set, ROOT "%s/%s", field->place == HYCO_ON_CELLS ? "CellData" : "PointData", field->name);
+  /* VTK orders a symmetric tensor xx yy zz xy yz xz, XDMF row by row. */
   if (field->components == 6) {
     PetscCall(PetscMalloc1(6 * n, &tensor));
     Permute(n, rows, tensor);
@@ -154,6 +158,7 @@ static PetscErrorCode WriteSteps(HycoFieldFile f)
   PetscFunctionBegin;
   PetscCall(HycoH5WriteReal(f->h, ROOT "Steps/Values", f->n, HYCO_H5_LINE, f->t));
   PetscCall(HycoH5WriteAttributeInt(f->h, ROOT "Steps", "NSteps", 1, &f->n));
+  /* One part at each time, of the same cells. */
   PetscCall(WriteSequence(f->h, ROOT "Steps/NumberOfParts", f->n, 1, 0));
   for (size_t k = 0; k < sizeof(zeros) / sizeof(zeros[0]); k++) {
     HycoFormat(name, ROOT "Steps/%s", zeros[k]);
@@ -163,6 +168,7 @@ static PetscErrorCode WriteSteps(HycoFieldFile f)
       WriteSequence(f->h, ROOT "Steps/PointOffsets", f->n, 0, f->points ? HycoFieldFileCount(f, HYCO_ON_NODES) : 0));
   for (PetscInt p = 0; p < f->scene->n_parameters; p++) {
     HycoFormat(name, ROOT "Steps/FieldDataOffsets/%s", f->scene->parameter[p]);
+    /* Each row of a point's parameters; a path has one row for all its times. */
     PetscCall(WriteSequence(f->h, name, f->n, 0, f->points));
   }
   for (PetscInt k = 0; k < f->n_fields; k++) {

@@ -21,6 +21,7 @@ PetscErrorCode HycoSceneWriteHistory(HycoScene s, char **text)
   for (PetscInt k = 0; k < s->n_entries; k++) {
     if (OfHistory(s->key[k])) room += strlen(s->key[k]) + strlen(s->value[k]) + 2;
   }
+  /* A blank and an end of line for each entry are the 2 of the sum, the final zero its first 1. */
   PetscCall(PetscCalloc1(room, text));
   end = *text;
   for (PetscInt k = 0; k < s->n_entries; k++) {
@@ -67,6 +68,7 @@ static void CompareLine(const char line[], const char made[], const char here[],
 
   what[0] = '\0';
   if (was && is && n_was == n_is && strncmp(was, is, (size_t)n_was) == 0) return;
+  /* Long values are shown from where they begin to differ: their beginnings, which agree, would hide the difference. */
   if (was && is) from = FirstDifference(was, n_was, is, n_is);
   snprintf(what, HYCO_LINE, "%.*s is %s%.*s in the scene and %s%.*s in the file", n_key, line, from ? "...," : "",
            PetscMin(n_is - from, LONG), is ? is + from : "missing", from ? "...," : "", PetscMin(n_was - from, LONG),

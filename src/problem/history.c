@@ -20,6 +20,7 @@ static PetscBool TakeNumber(const char **text, PetscReal *value)
    [2, 3]] arrives in this form from HycoEntriesFlatten(). The caller frees *value, also if *n is -1. */
 static PetscErrorCode ReadRows(const char text[], PetscInt width, PetscInt *n, PetscReal **value)
 {
+  /* As many rows as commas and one more: the loop below ends there, whatever else the text has. */
   PetscInt room = 1;
   PetscBool right = PETSC_TRUE;
 
@@ -29,6 +30,7 @@ static PetscErrorCode ReadRows(const char text[], PetscInt width, PetscInt *n, P
   for (*n = 0; right && *n < room; ++*n) {
     text += strspn(text, " ");
     for (PetscInt k = 0; right && k < width; k++) right = TakeNumber(&text, *value + *n * width + k);
+    /* Each row ends in a comma and the last in the text's end: too many or too few numbers in a row are found here. */
     right = (PetscBool)(right && *text == (*n + 1 < room ? ',' : '\0'));
     text++;
   }
@@ -68,12 +70,14 @@ static PetscErrorCode AddVariable(HycoScene s, const char key[], const char name
   const PetscBool time = (PetscBool)(s->n_variables == s->n_parameters);
 
   PetscFunctionBegin;
+  /* strcmp for t only; all else is an option's name, in which PETSc ignores the case. */
   for (PetscInt p = 0; p < s->n_variables; p++)
     HycoCheck((time || p == s->n_parameters ? strcmp : strcasecmp)(s->parameter[p], name),
               "%s: %s is already the name of %s; give each variable its own name", key, name,
               p < s->n_parameters    ? "a parameter"
               : p == s->n_parameters ? "the time"
                                      : "a table");
+  /* Expressions have one array of values for parameters, time and tables, of this size. */
   HycoCheck(s->n_variables < HYCO_MAX_PARAMETERS,
             "%s: the scene has more than %d variables (parameters, t and the tables of the history)", key,
             HYCO_MAX_PARAMETERS);
@@ -102,11 +106,13 @@ static PetscErrorCode ReadTable(HycoScene s, const char key[], const char text[]
     PetscCall(PetscMalloc1(n, &table->value));
   }
   for (PetscInt k = 0; k < n; k++) {
+    /* Two arrays, since the interpolation searches the times alone. */
     table->t[k] = row[2 * k];
     table->value[k] = row[2 * k + 1];
   }
   table->n = n;
   PetscCall(PetscFree(row));
+  /* After the rows are freed: a failed check returns at once. */
   HycoCheck(n > 0, "%s is \"%.200s\"; a table needs rows of two numbers, time and value: [[0, 1], [10, 2.5]]", key,
             text);
   PetscCall(CheckTimes(key, n, table->t));
@@ -120,6 +126,7 @@ PetscErrorCode HycoSceneReadHistory(HycoScene s)
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < s->n_entries; k++) {
+    /* A table's times mean nothing without a path, so this is refused rather than ignored. */
     if (strcasecmp(s->key[k], "history_times") == 0) PetscCall(ReadTimes(s, s->key[k], s->value[k]));
     if (strncasecmp(s->key[k], TABLES, strlen(TABLES)) == 0) table = s->key[k];
   }
@@ -148,6 +155,7 @@ PetscErrorCode HycoSceneCheckHistory(HycoScene s)
 
   PetscFunctionBegin;
   for (PetscInt p = s->n_parameters; p < s->n_variables; p++) in_time[p] = PETSC_TRUE;
+  /* Maps, stiffnesses of springs and normals enter what is precomputed: K, and the pairs of contacts. */
   for (PetscInt b = 0; b < s->n_bodies; b++) {
     for (PetscInt c = 0; c < 3; c++)
       HycoCheck(!HycoExprChanges(s->body[b].map[c], in_time),
@@ -165,6 +173,7 @@ PetscErrorCode HycoSceneCheckHistory(HycoScene s)
     HycoCheck(!HycoDeclaredChanges(&s->contact[k]->entries, "gap", in_time),
               "contact %s: its normal changes in time; only the gap and the friction may change in time",
               ((PetscObject)s->contact[k])->name);
+    /* Friction's force depends on where the slave came from, which a single solve does not know. */
     HycoCheck(!s->contact[k]->friction || s->n_times,
               "%s: friction depends on the path of the loads, and the scene has no history; write history: {times: [0, "
               "...]}",
@@ -211,6 +220,7 @@ PetscReal HycoSceneNextStop(HycoScene s, PetscReal t)
 {
   PetscReal next = PETSC_MAX_REAL;
 
+  /* From the end, so that the last one kept is the earliest after t. */
   for (PetscInt k = s->n_times - 1; k >= 0 && s->times[k] > t; k--) next = s->times[k];
   for (PetscInt j = 0; j < s->n_tables; j++) {
     const HycoTimeTable *table = &s->table[j];

@@ -123,7 +123,10 @@ PetscErrorCode HycoSamplesReach(HycoScene s, PetscInt n, const PetscReal mu[], P
     for (PetscInt k = 0; k < n; k++) value[k] = mu[k * n_par + p];
     PetscCall(PetscSortReal(n, value));
     for (PetscInt k = 1; k < n; k++) step = PetscMax(step, value[k] - value[k - 1]);
+    /* Beyond half a step from the outermost value a point is no longer among the trained ones, and errors there say
+       nothing about the training. */
     step = 0.5 * step * (1 + 1e-9);
+    /* Never outside the ranges: the model refuses such parameters. */
     lo[p] = n ? PetscMax(s->lo[p], value[0] - step) : s->lo[p];
     hi[p] = n ? PetscMin(s->hi[p], value[n - 1] + step) : s->hi[p];
   }
@@ -189,6 +192,7 @@ static PetscErrorCode SeekCorner(const Drawing *d, PetscReal point[], PetscBool 
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < Corners(axes->n - axes->n_lead) && taken; k++) {
+    /* The leading axes, which the group shares, keep the values that point[] has. */
     PutAtCorner(axes, axes->n_lead, axes->n, k, d->lo, d->hi, point);
     PetscCall(IsTaken(d, point, &taken));
   }
@@ -208,6 +212,8 @@ static PetscErrorCode SeekGroupCorner(Drawing *d, PetscInt first)
   PetscCall(PetscArraycpy(point, d->lo, d->n_par));
   d->corner = -1;
   for (PetscInt k = 0; k < n && !found; k++) {
+    /* Cyclic from `first`, so that successive groups begin at different corners and all are used before one is
+       repeated. */
     PutAtCorner(&d->axes, 0, d->axes.n_lead, (first + k) % n, d->lo, d->hi, point);
     PetscCall(SeekCorner(d, point, &found));
     if (found) d->corner = (first + k) % n;
@@ -243,6 +249,7 @@ static PetscErrorCode Draw(const Drawing *d, PetscInt k, PetscReal point[])
   PetscBool taken = PETSC_TRUE;
 
   PetscFunctionBegin;
+  /* A corner whose free corners are all taken falls through to the sequence below, at the corner's shared axes only. */
   if (corner) {
     PetscBool found;
 
@@ -251,6 +258,7 @@ static PetscErrorCode Draw(const Drawing *d, PetscInt k, PetscReal point[])
     PetscCall(SeekCorner(d, point, &found));
     if (found) PetscFunctionReturn(PETSC_SUCCESS);
   }
+  /* turn moves along the sequence until a point is new; the low-discrepancy sequence never ends, so the loop does. */
   for (PetscInt turn = 0; taken; turn++) {
     Recur(d, k, turn, point);
     if (corner) PutAtCorner(&d->axes, 0, d->axes.n_lead, d->corner, d->lo, d->hi, point);
@@ -276,14 +284,17 @@ PetscErrorCode HycoSamplesUnseen(HycoSamples samples, PetscInt first, PetscInt c
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(samples, &n, &d.n_par, &mu));
   PetscCall(HycoSamplesGetScene(samples, &scene));
+  /* Within the training's reach: the drawn points are to judge interpolation, which is all that a model promises. */
   PetscCall(HycoSamplesReach(scene, n, mu, d.lo, d.hi));
   PetscCall(HycoSamplesCreate(scene, unseen));
   d.drawn = *unseen;
   FindAxes(d.n_par, d.lo, d.hi, slow, &d.axes);
+  /* If every axis is slow a group would consist of one point drawn repeatedly. */
   if (d.axes.n_lead == d.axes.n) d.together = 1;
   for (PetscInt k = first; d.axes.n && k < first + count; k++) {
     const PetscInt group = k / d.together;
 
+    /* Also at the first point when continued in the middle of a group, whose corner is then found again. */
     if (group % N_PLACES == CORNER && (k % d.together == 0 || k == first))
       PetscCall(SeekGroupCorner(&d, group / N_PLACES));
     PetscCall(Draw(&d, k, point));
@@ -318,6 +329,7 @@ PetscErrorCode HycoSamplesExcept(HycoSamples samples, HycoSamples seen, HycoSamp
   PetscCall(HycoSamplesCreate(scene, rest));
   for (PetscInt k = 0; k < n; k++) {
     PetscCall(Has(m, n_par, other, mu + k * n_par, &twin));
+    /* Points are compared exactly: files keep all digits of what was trained. */
     if (!twin) PetscCall(HycoSamplesAddPoint(*rest, mu + k * n_par));
   }
   PetscFunctionReturn(PETSC_SUCCESS);

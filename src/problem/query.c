@@ -110,6 +110,8 @@ static PetscErrorCode HashDM(HycoScene scene, unsigned long long *hash)
 
   PetscFunctionBegin;
   PetscCall(DMGetCoordinateDim(scene->dm, &dim));
+  /* The coordinates alone: meshes of the same points with other cells or labels have the same fingerprint, unlike
+     meshes of files, whose whole text counts. */
   PetscCall(DMGetCoordinates(scene->dm, &place));
   PetscCall(VecGetLocalSize(place, &n));
   PetscCall(VecGetArrayRead(place, &x));
@@ -183,6 +185,7 @@ PetscErrorCode HycoSceneView(HycoScene scene, PetscViewer viewer)
   for (PetscInt k = 0; k < scene->n_entries; k++) {
     const char *key = scene->key[k];
 
+    /* The header and the ranges have been shown above in their own form. */
     if (strncasecmp(key, "scene_", 6) == 0 || strncasecmp(key, "parameter_", 10) == 0) continue;
     PetscCall(PetscViewerASCIIPrintf(viewer, "  %s: %s\n", key, scene->value[k]));
   }

@@ -46,8 +46,10 @@ PetscErrorCode HycoSamplesAddPoint(HycoSamples s, const PetscReal mu[])
   HycoCheckHandle(s->scene, HYCO_SCENE_CLASSID);
   P = s->scene->n_parameters;
   PetscCall(HycoSceneCheckParameters(s->scene, P, mu));
+  /* Doubled, so that adding n points costs O(n); +16 begins from none. */
   if (s->n == s->room) {
     s->room = 2 * s->room + 16;
+    /* A scene without parameters has points of no values, of which there may still be one. */
     PetscCall(PetscRealloc((size_t)s->room * (size_t)PetscMax(P, 1) * sizeof(PetscReal), &s->mu));
   }
   PetscCall(PetscArraycpy(s->mu + s->n * P, mu, P));
@@ -146,6 +148,7 @@ PetscErrorCode HycoSamplesAddChebyshev(HycoSamples s, const PetscInt counts[])
   HycoCheckHandle(s, HYCO_SAMPLES_CLASSID);
   HycoCheckHandle(s->scene, HYCO_SCENE_CLASSID);
   for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
+    /* All counts before the first allocation: a failed check would leak the nodes of the former parameters. */
     HycoCheck(counts[p] >= 1 && counts[p] <= 100000000, "the grid has %d points for %s; at least 1 is needed",
               (int)counts[p], s->scene->parameter[p]);
   }
@@ -169,9 +172,11 @@ static PetscErrorCode ReadHeader(HycoSamples s, const char path[], char *line, P
   for (word = strtok_r(line, ", \t\r\n", &rest); word; word = strtok_r(NULL, ", \t\r\n", &rest), c++) {
     PetscInt p = 0;
 
+    /* Names must match exactly, since expressions distinguish the case of parameters. */
     while (p < P && strcmp(word, s->scene->parameter[p])) p++;
     HycoCheck(p < P && c < P, "%s: the column \"%s\" is not a parameter of the scene, or there are too many columns",
               path, word);
+    /* With each column a parameter and none twice, P columns are all of them. */
     for (PetscInt b = 0; b < c; b++) HycoCheck(column[b] != p, "%s: the column %s occurs twice", path, word);
     column[c] = p;
   }
@@ -197,10 +202,12 @@ static PetscErrorCode ReadLines(HycoSamples s, const char path[], FILE *file)
       PetscCall(ReadHeader(s, path, line, column));
       continue;
     }
+    /* Blank lines, such as one at the end of a file, are no points. */
     if (line[strspn(line, " \t\r\n")] == '\0') continue;
     for (PetscInt c = 0; c < P; c++) {
       char *end;
 
+      /* HycoNumber() and not strtod(), which obeys the locale's decimal comma. */
       mu[column[c]] = HycoNumber(next, &end);
       end += strspn(end, " \t\r\n");
       HycoCheck(end != next && (*end == (c == P - 1 ? '\0' : ',')),
@@ -261,6 +268,8 @@ static PetscErrorCode FindTwins(HycoSamples s, PetscBool twin[])
   for (PetscInt k = 0; k < s->n; k++) {
     PetscBool same = PETSC_FALSE;
 
+    /* Within a run of equal hashes all earlier ones are compared; CompareKeyed() keeps them in the order of points, so
+       that the first occurrence is the one that stays. */
     for (PetscInt j = k - 1; j >= 0 && !same && key[j].hash == key[k].hash; j--)
       PetscCall(PetscArraycmp(s->mu + key[j].at * P, s->mu + key[k].at * P, P, &same));
     twin[key[k].at] = same;
@@ -283,6 +292,7 @@ PetscErrorCode HycoSamplesDropTwins(HycoSamples s, PetscInt *n_dropped)
   for (PetscInt k = 0; k < s->n; k++) {
     const PetscInt P = s->scene->n_parameters;
 
+    /* Moved in place: `kept` never exceeds k. PetscArraymove() since source and target may be the same. */
     if (!twin[k]) PetscCall(PetscArraymove(s->mu + kept++ * P, s->mu + k * P, P));
   }
   if (n_dropped) *n_dropped = s->n - kept;

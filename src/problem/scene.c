@@ -60,6 +60,7 @@ static PetscErrorCode UnknownKey(const char key[], const char what[], const Hyco
 
     PetscCall(PetscSNPrintf(list + used, sizeof(list) - used, "%s%s", j ? ", " : "", fields[j]));
   }
+  /* Compared with the key's last word: names of members may contain anything. */
   if (last) near = HycoNearest(last + 1, n, fields);
   if (near) HycoFail("the scene's entry %s is unknown; %s has: %s; did you mean %s?", key, what, list, near);
   HycoFail("the scene's entry %s is unknown; %s has: %s", key, what, list);
@@ -75,6 +76,7 @@ static PetscErrorCode Member(const char name[], size_t size, PetscInt *n, void *
   for (PetscInt k = 0; k < *n; k++) {
     char *known;
 
+    /* By memcpy: the struct's type is not known here, and its first field is the pointer. */
     memcpy(&known, items + (size_t)k * size, sizeof(known));
     if (strcmp(known, name) == 0) {
       *index = k;
@@ -83,6 +85,7 @@ static PetscErrorCode Member(const char name[], size_t size, PetscInt *n, void *
   }
   PetscCall(PetscRealloc(((size_t)*n + 1) * size, array));
   items = (char *)*array;
+  /* Zero is "not given" for every field, and what HycoSceneDestroy() skips. */
   memset(items + (size_t)*n * size, 0, size);
   {
     char *copy;
@@ -162,6 +165,7 @@ static PetscErrorCode ReadParameters(HycoScene s)
   HycoCheck(commas < HYCO_MAX_PARAMETERS, "scene_parameters lists %d parameters; a scene has at most %d",
             (int)commas + 1, HYCO_MAX_PARAMETERS);
   PetscCall(PetscOptionsGetStringArray(s->options, NULL, "-scene_parameters", s->parameter, &n, &set));
+  /* Set before the checks below: destroying the scene frees the names counted here. */
   s->n_parameters = s->n_variables = set ? n : 0;
   for (PetscInt p = 0; p < s->n_parameters; p++) {
     const char *name = s->parameter[p];
@@ -169,6 +173,7 @@ static PetscErrorCode ReadParameters(HycoScene s)
     HycoCheck(HycoIsVariableName(name),
               "scene_parameters: \"%s\" cannot name a parameter; use letters, digits and _, and none of x, y, z, pi",
               name);
+    /* Without case, since parameter_NAME_range is an option, and PETSc's options have none. */
     for (PetscInt q = 0; q < p; q++)
       HycoCheck(strcasecmp(s->parameter[q], name), "scene_parameters: %s occurs twice; remove one of them", name);
     PetscCall(ReadRange(s, p));
@@ -242,10 +247,13 @@ static PetscErrorCode CreateLaw(HycoScene s, const char name[], PetscObject *obj
 
   PetscFunctionBegin;
   PetscCall(GetType(s, "body", name, "law_type", &type, given));
+  /* body_NAME_law is the short form of body_NAME_law_type. */
   if (!*given) PetscCall(GetType(s, "body", name, "law", &type, given));
   PetscCall(HycoMaterialCreate(PETSC_COMM_SELF, &law));
+  /* The name of the body, which the law's messages show. */
   PetscCall(PetscObjectSetName((PetscObject)law, name));
   ierr = HycoMaterialSetType(law, *given ? type : HYCO_MATERIAL_ELASTIC);
+  /* Texts, such as a law's file, decide which constants it declares: before the first constant is looked up. */
   if (!ierr) ierr = ReadTexts(s, name, law);
   if (ierr) PetscCall(HycoMaterialDestroy(&law));
   PetscCall(ierr);
@@ -287,14 +295,17 @@ static PetscErrorCode SplitDeclared(HycoScene s, const Section *section, const c
     HycoDeclared *of_object;
     PetscBool given;
 
+    /* A name is not empty, and fits name[]. */
     if (bar == rest || bar - rest >= HYCO_LINE) continue;
     memcpy(name, rest, (size_t)(bar - rest));
     name[bar - rest] = '\0';
     PetscCall((*section->create)(s, name, &object, &of_object, &given));
     if (HycoDeclaredFind(of_object, bar + 1)) *field = bar + 1;
+    /* young may also be written as law_young: {law: {type: ..., young: ...}} in YAML is flattened so. */
     if (section->nested && strncasecmp(bar + 1, section->nested, strlen(section->nested)) == 0 &&
         HycoDeclaredFind(of_object, bar + 1 + strlen(section->nested)))
       *field = bar + 1 + strlen(section->nested);
+    /* A member whose type the scene gives is surely meant; else the first one tried is the best guess. */
     if (given || !*likely) {
       PetscCall(PetscObjectDestroy(likely));
       *likely = object;
@@ -317,6 +328,7 @@ static PetscErrorCode FindDeclared(HycoScene s, const Section *section, const ch
   PetscFunctionBegin;
   ierr = SplitDeclared(s, section, rest, name, field, &likely, &declared);
   HycoFormat(what, "%s %s", section->what, likely ? likely->type_name : "...");
+  /* UnknownKey() needs the declared fields of `likely`, which is destroyed only afterwards. */
   if (!ierr && !*field) ierr = UnknownKey(key, what, declared, section->others);
   PetscCall(PetscObjectDestroy(&likely));
   PetscCall(ierr);
@@ -351,6 +363,7 @@ static PetscErrorCode ReadBody(HycoScene s, PetscInt entry, const char rest[])
 
   PetscFunctionBegin;
   if (!SplitKey(rest, body_fields, name, &field)) {
+    /* May create and drop laws of names that are tried; FindBody() then adds the one that was found. */
     PetscCall(FindDeclared(s, &bodies, key, rest, name, &constant));
     PetscCall(FindBody(s, name, &body));
     PetscCall(HycoDeclaredRead(s, key, s->value[entry], HycoDeclaredFind(&body->law->constants, constant)));
@@ -378,6 +391,7 @@ static PetscErrorCode FindContact(HycoScene s, const char name[], HycoContact *c
     if (strcmp(((PetscObject)*contact)->name, name) == 0) PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(PetscRealloc((size_t)(s->n_contacts + 1) * sizeof(*s->contact), &s->contact));
+  /* Counted only afterwards: a failed creation has destroyed its object. */
   PetscCall(CreateContact(s, name, (PetscObject *)contact, &declared, &given));
   s->contact[s->n_contacts++] = *contact;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -393,6 +407,7 @@ static PetscErrorCode ReadContact(HycoScene s, PetscInt entry, const char rest[]
   HycoContact contact;
 
   PetscFunctionBegin;
+  /* `type` alone is no field of a type: it is known without one. */
   if (SplitKey(rest, contact_fields, name, &type)) {
     PetscCall(FindContact(s, name, &contact)); /* reads it */
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -436,6 +451,7 @@ static PetscErrorCode ReadForce(HycoScene s, PetscInt entry, const char name[], 
     PetscCall(NewColdExpr(s, entry, &body->force[field]));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+  /* Points and lines exist only in the mesh: whether the group does is checked when the mesh is read. */
   PetscCall(Member(name, sizeof(HycoPointLoad), &s->n_point_loads, (void **)&s->point_load, &k));
   PetscCall(NewColdExpr(s, entry, &s->point_load[k].force[field]));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -452,6 +468,7 @@ static PetscErrorCode ReadGroups(HycoScene s, PetscInt entry, char names[], Pets
   for (char *name = NextGroup(names, &rest); name; name = NextGroup(NULL, &rest)) {
     PetscInt k = 0;
 
+    /* The section is told by the key; field is the component within it, as the caller's list has it. */
     if (strncasecmp(key, "force_", 6) == 0) {
       PetscCall(ReadForce(s, entry, name, field));
     } else if (strncasecmp(key, "spring_", 7) == 0) {
@@ -484,6 +501,7 @@ static PetscErrorCode ReadMember(HycoScene s, PetscInt entry)
   if (strncasecmp(key, "body_", 5) == 0) {
     PetscCall(ReadBody(s, entry, rest));
   } else if (strncasecmp(key, "fixed_", 6) == 0) {
+    /* An unknown field is refused here with the section's list, before a member is added. */
     if (!SplitKey(rest, fixed_fields, name, &field)) PetscCall(UnknownKey(key, "a fixed group", NULL, fixed_fields));
     PetscCall(ReadGroups(s, entry, name, field));
   } else if (what) {
@@ -531,6 +549,7 @@ static PetscErrorCode CheckPlainEntry(HycoScene s, PetscInt entry)
   } else if (!HycoOptionFind(key)) {
     const char *near = HycoOptionNearest(key, NULL);
 
+    /* First for the reasons it knows, such as an option of an older version; then for a likely typing error. */
     PetscCall(HycoOptionsCheckName(key));
     HycoCheck(!near, "the option %s is unknown; did you mean %s?", key, near);
     HycoFail("the option %s is unknown; hyco -help lists them", key);
@@ -555,6 +574,7 @@ static PetscErrorCode CheckHeat(HycoBody *body)
   PetscBool reads = body->law->heat;
 
   PetscFunctionBegin;
+  /* A constant that is a function of T reads the temperature as much as a law that says so. */
   for (PetscInt j = 0; j < body->law->constants.n; j++)
     reads = (PetscBool)(reads || HycoExprInHeat(body->law->constants.entry[j].expr));
   HycoCheck(!body->expansion || (body->temperature && body->reference),
@@ -579,8 +599,10 @@ static PetscErrorCode CheckSupports(HycoScene s)
     const HycoFixed *fixed = &s->fixed[k];
     HycoExpr given = NULL;
 
+    /* `given` is any component of the direction; the others are zero if not given. */
     for (PetscInt c = 0; c < 3; c++) {
       if (fixed->direction[c]) given = fixed->direction[c];
+      /* The rotated unknowns are eliminated once for all parameters: a turning direction would change K's structure. */
       HycoCheck(!HycoExprChanges(fixed->direction[c], every),
                 "%s changes with a parameter; the direction of a support must be constant",
                 HycoExprKey(fixed->direction[c]));
@@ -611,6 +633,7 @@ static PetscErrorCode CheckScene(HycoScene s)
     for (PetscInt j = 0; j < d->n; j++)
       HycoCheck(!d->entry[j].required || d->entry[j].expr || d->entry[j].text, "body %s has no %s (%s)",
                 s->body[k].name, d->entry[j].name, d->entry[j].title);
+    /* In the order in which a user would mend them: bodies, contacts, supports, then what refers to them. */
     PetscCall(CheckHeat(&s->body[k]));
   }
   for (PetscInt k = 0; k < s->n_contacts; k++) PetscCall(HycoContactComplete(s->contact[k]));
@@ -643,6 +666,7 @@ static PetscErrorCode ReadRefine(HycoScene s)
   PetscFunctionBegin;
   PetscCall(GetString(s, "scene_refine", &text));
   times = strtol(text, &end, 10);
+  /* The text is freed before the check, which returns on failure; -1 keeps its verdict. */
   s->refine = *end || times < 0 || times > 12 ? -1 : (PetscInt)times;
   PetscCall(PetscFree(text));
   HycoCheck(
@@ -660,6 +684,7 @@ static PetscErrorCode ReadFormulation(HycoScene s)
 
   PetscFunctionBegin;
   PetscCall(GetString(s, "scene_formulation", &text));
+  /* s->formulation is 0 then, which is plane strain, the first of names[]. */
   known = (PetscBool)!text[0];
   for (PetscInt k = 0; k < 3; k++) {
     if (strcasecmp(text, names[k])) continue;
@@ -701,9 +726,11 @@ static PetscErrorCode Build(HycoScene s, const char folder[])
   PetscCall(GetString(s, "scene_unit_length", &s->unit[HYCO_UNIT_LENGTH]));
   PetscCall(GetString(s, "scene_unit_force", &s->unit[HYCO_UNIT_FORCE]));
   PetscCall(GetString(s, "scene_unit_stress", &s->unit[HYCO_UNIT_STRESS]));
+  /* The mesh's path is relative to the scene's folder; it is found before anything refers to groups. */
   PetscCall(FindMesh(s, folder));
   PetscCall(ReadRefine(s));
   PetscCall(ReadFormulation(s));
+  /* Parameters, then t and the tables, then constants: the order of variables in expressions, which files keep. */
   PetscCall(ReadParameters(s));
   PetscCall(HycoSceneReadHistory(s));
   PetscCall(HycoSceneReadConstants(s));
@@ -828,7 +855,9 @@ PetscErrorCode HycoSceneFromText(MPI_Comm comm, const char text[], HycoScene *sc
 
   PetscFunctionBegin;
   *scene = NULL;
+  /* SplitText() cuts its text into pieces; the caller's stays whole. */
   PetscCall(PetscStrallocpy(text, &copy));
+  /* At most one line for each end of line, and one without. */
   for (const char *c = text; *c; c++) lines += *c == '\n';
   PetscCall(PetscMalloc2(lines, &key, lines, &value));
   ierr = SplitText(copy, &lines, key, value);
@@ -847,6 +876,7 @@ PetscErrorCode HycoSceneDestroy(HycoScene *scene)
   PetscFunctionBegin;
   HycoDestroyBegin(scene, HYCO_SCENE_CLASSID);
   s = *scene;
+  /* First, so that a failure below leaves no handle to something half freed. */
   *scene = NULL;
   for (PetscInt k = 0; k < s->n_bodies; k++) {
     PetscCall(HycoMaterialDestroy(&s->body[k].law));
@@ -855,6 +885,7 @@ PetscErrorCode HycoSceneDestroy(HycoScene *scene)
       PetscCall(HycoExprDestroy(&s->body[k].force[c]));
     }
     PetscCall(HycoExprDestroy(&s->body[k].density));
+    /* The law only borrows the temperature, and is gone by now. */
     PetscCall(HycoExprDestroy(&s->body[k].temperature));
     PetscCall(HycoExprDestroy(&s->body[k].reference));
     PetscCall(HycoExprDestroy(&s->body[k].expansion));

@@ -23,7 +23,7 @@ static int Compare(const void *a, const void *b)
 }
 
 /* Points in an order in which the parameters that the stiffness depends on change least often, so that consecutive
-   points share its factor. */
+   points share its factor. The points themselves stay where they are: point[] refers to the caller's array. */
 static PetscErrorCode Sort(HycoROM m, PetscInt n, const PetscReal mu[], PetscInt order[], Point point[])
 {
   const PetscInt n_par = m->model->scene->n_parameters;
@@ -32,6 +32,8 @@ static PetscErrorCode Sort(HycoROM m, PetscInt n, const PetscReal mu[], PetscInt
 
   PetscFunctionBegin;
   HycoSceneReaches(m->fe->scene, reaches);
+  /* Parameters that reach the stiffness first: they are the leading keys of the comparison, so that each new factor
+     serves a whole run of points. */
   for (PetscInt pass = 0; pass < 2; pass++) {
     for (PetscInt p = 0; p < n_par; p++) {
       if (reaches[p] == (pass ? PETSC_FALSE : PETSC_TRUE)) order[count++] = p;
@@ -57,7 +59,8 @@ PetscErrorCode HycoROMGetSizes(HycoROM m, PetscInt *n_contacts, PetscInt *n_node
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves the points in their sorted order; the results are in the order of the input. */
+/* Solves the points in their sorted order; the results are in the order of the input. Each point is a cold solve, so
+   that its result does not depend on its place in the batch. */
 static PetscErrorCode SolveEach(HycoROM m, PetscInt n, const Point point[], HycoPrediction prediction[],
                                 PetscReal Lambda[], PetscReal U[])
 {
@@ -77,7 +80,8 @@ static PetscErrorCode SolveEach(HycoROM m, PetscInt n, const Point point[], Hyco
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All points are checked before the first is solved: a wrong one must not cost the time of those before it. */
+/* All points are checked before the first is solved: a wrong one must not cost the time of those before it. Results are
+   written to the caller's places, whatever the order of the solves. */
 PetscErrorCode HycoROMSolveMany(HycoROM m, PetscInt n, PetscInt n_parameters, const PetscReal mu[],
                                 HycoPrediction prediction[], PetscReal Lambda[], PetscReal U[])
 {
@@ -93,6 +97,8 @@ PetscErrorCode HycoROMSolveMany(HycoROM m, PetscInt n, PetscInt n_parameters, co
   PetscCall(PetscMalloc1(n, &point));
   ierr = Sort(m, n, mu, order, point);
   if (!ierr) ierr = SolveEach(m, n, point, prediction, Lambda, U);
+  /* Also after an error: the handle's vectors then belong to some point of the batch, which the getters must not
+     show. */
   m->solved = PETSC_FALSE; /* a batch leaves no current solution */
   PetscCall(PetscFree(point));
   PetscCall(ierr);

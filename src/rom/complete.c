@@ -21,6 +21,8 @@ PetscErrorCode HycoRowsFill(HycoFE fe, HycoPairs *pairs, HycoRows *rows)
 
   PetscFunctionBegin;
   PetscCall(HycoPairsMove(fe, pairs));
+  /* An upper bound of the width: exact counts would need the rows themselves. The room only grows, since positions
+     repeat along a study. */
   entries = HycoPairsWidth(pairs) * fe->dim * pairs->n;
   if (entries > rows->room) {
     PetscCall(PetscRealloc((size_t)entries * sizeof(*rows->dof), &rows->dof));
@@ -97,6 +99,7 @@ static PetscErrorCode FindModal(HycoROM m)
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(m->fe->n_dof + 1, &m->modal));
   for (PetscInt i = 0; i < m->fe->n_dof; i++) {
+    /* fe_dof is ascending, as I is: one pass over both. */
     while (f < m->model->n_fe && m->model->fe_dof[f] < i) f++;
     if (f == m->model->n_fe || m->model->fe_dof[f] != i) m->modal[n++] = i;
   }
@@ -104,6 +107,8 @@ static PetscErrorCode FindModal(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Only the displacements that B beyond the RID multiplies, not all of them: gaps there need no more. The list is made
+   once, since it follows from the pairs. */
 PetscErrorCode HycoROMExpandModal(HycoROM m)
 {
   const PetscInt l = m->model->l;
@@ -114,6 +119,7 @@ PetscErrorCode HycoROMExpandModal(HycoROM m)
     const PetscInt i = m->modal[k];
     const PetscReal *v = m->model->V + (size_t)i * (size_t)l;
 
+    /* The modes vanish where displacements are prescribed (15), so that u0 alone is right there. */
     m->U[i] = m->fe->u0[i];
     for (PetscInt j = 0; j < l; j++) m->U[i] += v[j] * m->gamma[j];
   }

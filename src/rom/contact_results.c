@@ -31,6 +31,8 @@ static PetscErrorCode Make(HycoROM m)
   m->carried = c;
   PetscCall(PetscMalloc1(3 * m->model->pairs.n, &c->normal));
   PetscCall(PetscMalloc1(m->model->pairs.n, &c->gap));
+  /* Areas are those of the slave's nodes on the moved mesh, which a parameter may scale: they are filled per
+     prediction, not here. */
   PetscCall(PetscMalloc1(m->model->pairs.n, &c->area));
   PetscCall(PetscMalloc1(HycoSceneResults(m->model->scene), &c->result));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -78,6 +80,8 @@ static PetscErrorCode Prepare(HycoROM m, const PetscReal Lambda[], HycoFE *fe, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Nothing where the model does not know all forces: a sum over a part would look like a resultant. Forces are given,
+   not taken from m, because derivatives ask for those of moved states. */
 PetscErrorCode HycoROMSumContacts(HycoROM m, const PetscReal Lambda[], const HycoContactResult *result[])
 {
   PetscReal least, *pressure;
@@ -100,6 +104,8 @@ PetscErrorCode HycoROMSumContacts(HycoROM m, const PetscReal Lambda[], const Hyc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The sum of contact and friction forces on a set of bodies along an axis, by which reactions follow from balance.
+   Internal pairs of two bodies of the set cancel, as both sides are added. */
 PetscErrorCode HycoROMPushBodies(HycoROM m, const PetscReal Lambda[], const PetscBool of[], PetscInt axis,
                                  PetscReal *force)
 {

@@ -24,6 +24,7 @@ struct _n_HycoBalance {
   HycoEquilibrium last;
 };
 
+/* Also half made: every part is created on the first measurement, in this order. */
 PetscErrorCode HycoBalanceDestroy(HycoBalance *balance)
 {
   HycoBalance b = *balance;
@@ -40,6 +41,7 @@ PetscErrorCode HycoBalanceDestroy(HycoBalance *balance)
 static PetscErrorCode Create(HycoROM m, HycoBalance b)
 {
   const HycoFE fe = m->fe_whole;
+  /* One more than the listed times: a path that ends early has its end as the last row. */
   const PetscInt n_times = m->model->scene->n_times + 1; /* one more: the end of a path that ends early */
 
   PetscFunctionBegin;
@@ -56,7 +58,8 @@ static PetscErrorCode Create(HycoROM m, HycoBalance b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Floating bodies: adds springs to the ground, the H1 norm matrix scaled to the bodies' stiffness. */
+/* Floating bodies: adds springs to the ground, the H1 norm matrix scaled to the bodies' stiffness. Without them K is
+   singular, and its inverse, by which residuals are measured, does not exist. */
 static PetscErrorCode HoldFloating(HycoFE fe, Mat K)
 {
   HycoMotions motions;
@@ -87,12 +90,15 @@ static PetscErrorCode Factor(HycoROM m, HycoBalance b)
   HycoChanges reached;
 
   PetscFunctionBegin;
+  /* Time and tables are variables too: a stiffness that follows the temperature needs a factor at each listed time. */
   for (PetscInt p = 0; p < m->model->scene->n_variables; p++) changed[p] = (PetscBool)(b->mu[p] != fe->mu[p]);
   reached = HycoSceneChanges(m->model->scene, changed);
   if (b->factored && !reached.nodes && !reached.stiffness) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Until the new factor is complete: an error in between must not leave the old one with the new mu. */
   b->factored = PETSC_FALSE;
   PetscCall(KSPDestroy(&b->ksp));
   PetscCall(HycoFEAssembleStiffness(fe, b->K));
+  /* A body that only contact supports would make K singular. */
   PetscCall(HoldFloating(fe, b->K));
   HycoLogged(HYCO_EVENT_FACTOR, HycoDefiniteSolver(b->K, "the elastic stiffness of the whole mesh", &b->ksp));
   PetscCall(PetscArraycpy(b->mu, fe->mu, m->model->scene->n_variables));
@@ -109,6 +115,8 @@ static void AddFriction(HycoROM m, PetscReal f[])
   PetscInt n;
 
   for (PetscInt k = 0; k < pairs->n; k++) {
+    /* The master's share has the weights of the normal force: forces and moments of the two sides are opposite as those
+       of full order. */
     HycoPairsMasters(pairs, k, &n, &master, &weight);
     for (PetscInt c = 0; c < dim; c++) {
       const PetscReal force = pairs->shear->force[3 * k + c];
@@ -131,6 +139,7 @@ static void AddContact(HycoROM m, HycoBalance b, PetscInt j, PetscReal f[])
     PetscReal bu = 0;
 
     for (PetscInt i = B->start[k]; i < B->start[k + 1]; i++) {
+      /* U_whole is the displacement of time j: March() has set it before this call. */
       bu += B->value[i] * m->U_whole[B->dof[i]];
       f[B->dof[i]] += B->value[i] * L[k];
     }
@@ -180,12 +189,14 @@ static PetscErrorCode March(HycoROM m, HycoBalance b, HycoReplay *replay)
     HycoFEStepReport report;
 
     PetscCall(HycoReplayMove(replay, k));
+    /* All accepted steps are replayed, not only listed times: the state of the laws depends on each step's size. */
     HycoTraceWholeU(m, k, m->U_whole);
     PetscCall(HycoReplayTry(replay, k, m->U_whole, &report));
     if (report.failed)
       HycoFormat(b->why, "the laws cannot be integrated on the whole mesh at t = %.10g: %s", (double)trace->t[k],
                  report.why);
     if (report.failed) PetscFunctionReturn(PETSC_SUCCESS);
+    /* at[] has the steps that end at a listed time, in order. */
     if (trace->at[j] == k) PetscCall(MeasureTime(m, b, replay, j++));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -207,6 +218,8 @@ static PetscReal ContactResidual(HycoROM m, const HycoBalance b, PetscInt j, Pet
 
   for (PetscInt k = 0; k < n; k++) {
     const size_t at = (size_t)j * (size_t)n + (size_t)k;
+    /* The natural map: 0 exactly where one is 0 and the other not negative. c turns forces into lengths, so that the
+       minimum compares like with like. */
     const PetscReal both = PetscMin(b->gap[at], c * m->trace.Lambda[at]);
 
     sum += both * both;
@@ -245,6 +258,7 @@ static PetscErrorCode Measure(HycoROM m, HycoBalance b, HycoEquilibrium *e)
   m->whole_current = PETSC_FALSE; /* the replay overwrites U_whole */
   ierr = HycoReplayBegin(m, m->fe_whole, &replay);
   if (!ierr) ierr = March(m, b, &replay);
+  /* Before the error is raised: the replay holds states in the FE, which the next prediction uses. */
   PetscCall(HycoReplayEnd(&replay));
   PetscCall(ierr);
   if (b->why[0])

@@ -75,6 +75,7 @@ static PetscReal Misfit(HycoROM m)
     const PetscInt dof = m->model->fe_dof[f];
     PetscReal by_modes = m->fe->u0[dof];
 
+    /* V has rows of full-order unknowns too, in whose place the displacement has the unknowns. */
     for (PetscInt j = 0; j < m->model->l; j++)
       by_modes += m->model->V[(size_t)dof * (size_t)m->model->l + (size_t)j] * m->gamma[j];
     lost += (m->U[dof] - by_modes) * (m->U[dof] - by_modes);
@@ -113,9 +114,12 @@ static PetscReal Inconsistency(HycoROM m)
   PetscReal lost = 0, force = 0, size = 0;
 
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
+    /* All components of the nodes that the rows name, also those along the surface, which the rows themselves do not
+       read. */
     for (PetscInt j = m->rows.start[k] * dim; j < m->rows.start[k + 1] * dim; j++)
       size = PetscMax(size, PetscAbsReal(m->U[m->rows.dof[j / dim] / dim * dim + j % dim]));
     if (!(m->Lambda[k] > 0)) continue;
+    /* B u - D, weighted by the force: an open contact's gap is no inconsistency. */
     lost += m->Lambda[k] * PetscSqr(HycoROMAddRow(m, k, -m->rows.gap[k]));
     force += m->Lambda[k];
   }
@@ -132,6 +136,7 @@ static void Shares(HycoROM m, PetscReal *fresh, PetscReal *outside)
     const PetscReal force = PetscMax(m->Lambda[k], 0);
 
     sum += force;
+    /* Not every model knows which contacts had a force in training. */
     if (m->model->closed && !m->model->closed[k]) *fresh += force;
     if (!m->model->in_rid[k]) *outside += force;
   }
@@ -140,7 +145,8 @@ static void Shares(HycoROM m, PetscReal *fresh, PetscReal *outside)
   *outside /= sum;
 }
 
-/* A parameter without a range counts by its own unit. */
+/* A parameter without a range counts by its own unit. Euclidean, with the widths of the ranges as units: parameters of
+   different dimensions become comparable. */
 PetscReal HycoEstimatesDistance(HycoScene s, const PetscReal a[], const PetscReal b[])
 {
   PetscReal sum = 0;
@@ -161,6 +167,7 @@ static PetscReal Tail(HycoROM m)
 
   for (PetscInt j = 0; j < l; j++) {
     all += m->gamma[j] * m->gamma[j];
+    /* The last quarter: if it carries much, more modes would too. */
     if (j >= 3 * l / 4) last += m->gamma[j] * m->gamma[j];
   }
   return Quotient(last, all);
@@ -172,6 +179,7 @@ static PetscErrorCode MeasureOne(HycoROM m, PetscReal feature[])
   const PetscInt n_par = m->model->scene->n_parameters;
 
   PetscFunctionBegin;
+  /* Reconstructed forces and whole displacements first: most features need them. */
   PetscCall(HycoROMComplete(m));
   feature[MISFIT] = feature[PENETRATION] = feature[ADHESION] = 0;
   if (m->ops->features)
@@ -187,6 +195,7 @@ static PetscErrorCode MeasureOne(HycoROM m, PetscReal feature[])
     feature[REMAINDER] = m->remainder;
   }
   feature[TAIL] = Tail(m);
+  /* 0 without stored points or parameters: a feature that is constant drops out of the calibration. */
   feature[DISTANCE] = m->model->n_points && n_par ? PETSC_MAX_REAL : 0;
   for (PetscInt k = 0; n_par && k < m->model->n_points; k++)
     feature[DISTANCE] =
@@ -202,6 +211,7 @@ PetscErrorCode HycoEstimatesFeatures(HycoROM m, PetscReal feature[])
   PetscReal one[HYCO_FEATURES];
 
   PetscFunctionBegin;
+  /* Without a history there is one solution. */
   if (!m->trace.n_listed) {
     PetscCall(MeasureOne(m, feature));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -237,11 +247,13 @@ static PetscReal Beyond(HycoROM m, const PetscReal mu[], PetscReal nearest[])
   PetscReal most = 0;
 
   for (PetscInt p = 0; p < s->n_parameters; p++) {
+    /* A parameter of one value has no width; its distance is then absolute. */
     const PetscReal width = s->hi[p] > s->lo[p] ? s->hi[p] - s->lo[p] : 1;
 
     nearest[p] = PetscMin(PetscMax(mu[p], m->model->reach[p]), m->model->reach[s->n_parameters + p]);
     most = PetscMax(most, PetscAbsReal(mu[p] - nearest[p]) / width);
   }
+  /* Round-off of a range's end that was written in decimal is not outside. */
   return most > 1e-12 ? most : 0;
 }
 
@@ -263,6 +275,8 @@ static PetscReal Unseen(HycoROM m, const PetscReal feature[], PetscInt *which)
   for (PetscInt j = 0; j < HYCO_FEATURES; j++) {
     const PetscReal reached = m->model->estimates.reached[j];
 
+    /* slight: changes below it are round-off of the feature, whatever the held-out values were. A negative `reached` is
+       a feature that no held-out point had. */
     if (!(slight[j] > 0) || reached < 0 || (j <= PENETRATION && m->ops->features)) continue;
     if (!(feature[j] > most * PetscMax(reached, slight[j]))) continue;
     most = feature[j] / PetscMax(reached, slight[j]);
@@ -314,12 +328,15 @@ static void EvaluateFormulas(HycoROM m, const PetscReal feature[], PetscReal fac
                                             &p->estimated_error_lambda};
   PetscReal term[HYCO_ESTIMATE_FEATURES], estimate[HYCO_N_ESTIMATES];
 
+  /* As in the fit of the laws: log(1 + f / floor) is flat for features that are small against their floor and linear in
+     log f above. */
   for (PetscInt j = 0; j < HYCO_ESTIMATE_FEATURES; j++) term[j] = PetscLogReal(1 + feature[j] / t->floor[j]);
   for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++)
     estimate[e] = t->has[e] ? EstimateError(m, t->law[e], term, t->largest[e]) * factor : -1;
   for (PetscInt q = 0; q < t->n_outputs; q++) {
     const HycoOutputEstimate *o = &t->output[q];
 
+    /* An output that nearly vanishes has round-off of its usual size, which no feature shows. */
     if (o->has && !PetscIsInfOrNanReal(p->quantity[q]))
       p->estimated_error_quantity[q] =
           PetscMax(EstimateError(m, o->law, term, o->largest), HYCO_OUTPUT_ROUND_OFF * o->magnitude) * factor;
@@ -328,6 +345,7 @@ static void EvaluateFormulas(HycoROM m, const PetscReal feature[], PetscReal fac
     *own[e] = m->model->traits.uniform ? PetscMax(estimate[e], *own[e]) : estimate[e];
 }
 
+/* First everything is set to "not known", so that every early end leaves a valid prediction. */
 PetscErrorCode HycoEstimatesEvaluate(HycoROM m, HycoPrediction *p)
 {
   const HycoEstimates *t = &m->model->estimates;
@@ -351,9 +369,11 @@ PetscErrorCode HycoEstimatesEvaluate(HycoROM m, HycoPrediction *p)
   p->inconsistent = IsInconsistent(m, p->inconsistency);
   if (t->n) {
     p->unseen = Unseen(m, feature, &p->unseen_feature);
+    /* Beyond the training the estimates grow with the square of the distance in units of a usual distance between points. */
     outside = 1 + (p->beyond > 0 ? HycoEstimatesDistance(m->model->scene, m->fe->mu, nearest) / t->floor[DISTANCE] : 0);
     EvaluateFormulas(m, feature, outside * outside * PetscMin(p->unseen, MOST_FACTOR), p);
   }
+  /* Displacements that miss the gaps are wrong by at least that. */
   if (p->inconsistent && p->estimated_error_u >= 0)
     p->estimated_error_u = PetscMax(p->estimated_error_u, p->inconsistency);
   if (p->inconsistent && p->estimated_error_sigma >= 0)
@@ -370,6 +390,7 @@ static void DescribeErrors(const PetscReal error[], char text[HYCO_LINE])
            (double)error[HYCO_ESTIMATE_SIGMA], (double)error[HYCO_ESTIMATE_LAMBDA]);
 }
 
+/* Errors that were measured, of the held-out points, come before what is estimated from them. */
 PetscErrorCode HycoEstimatesView(HycoROM m, PetscViewer viewer)
 {
   const HycoEstimates *t = &m->model->estimates;

@@ -63,8 +63,10 @@ static PetscErrorCode Evaluate(Fit *f, const PetscReal x[])
   PetscBool same = f->known;
 
   PetscFunctionBegin;
+  /* TAO asks for residual and Jacobian at the same x in separate calls: one prediction serves both. */
   for (PetscInt p = 0; p < f->n_par; p++) same = (PetscBool)(same && x[p] == f->x[p]);
   if (same) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Before the prediction: after an error r and J would belong to different points. */
   f->known = PETSC_FALSE;
   ToParameters(f, x, mu);
   PetscCall(HycoROMPredict(f->model, f->n_par, mu));
@@ -88,6 +90,7 @@ static PetscErrorCode Evaluate(Fit *f, const PetscReal x[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* TAO's vectors live here as arrays in [0, 1]^n; the array is given back after an error as well. */
 static PetscErrorCode EvaluateVec(Fit *f, Vec X)
 {
   const PetscScalar *x;
@@ -98,6 +101,8 @@ static PetscErrorCode EvaluateVec(Fit *f, Vec X)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* TAO's callback for Gauss-Newton. TAO may ask for residual and Jacobian at the same point: Evaluate() keeps the last
+   one. */
 static PetscErrorCode Residual(Tao tao, Vec X, Vec R, void *ctx)
 {
   Fit *f = (Fit *)ctx;
@@ -112,6 +117,7 @@ static PetscErrorCode Residual(Tao tao, Vec X, Vec R, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* By rows: outputs; columns: parameters in units of their ranges, so that steps in all of them are comparable. */
 static PetscErrorCode Jacobian(Tao tao, Vec X, Mat J, Mat P, void *ctx)
 {
   Fit *f = (Fit *)ctx;
@@ -121,6 +127,7 @@ static PetscErrorCode Jacobian(Tao tao, Vec X, Mat J, Mat P, void *ctx)
   (void)P;
   PetscCall(EvaluateVec(f, X));
   for (PetscInt k = 0; k < f->n; k++) {
+    /* J is tiny and dense: its assembly costs less than a copy of its layout would be worth. */
     for (PetscInt p = 0; p < f->n_par; p++) PetscCall(MatSetValue(J, k, p, f->J[k * f->n_par + p], INSERT_VALUES));
   }
   PetscCall(HycoMatAssemble(J));
@@ -136,6 +143,8 @@ static void Slope(const Fit *f, PetscReal g[])
   }
 }
 
+/* TAO's callback for limited-memory methods, with the same evaluation as Residual(), so that both types minimise one
+   function. */
 static PetscErrorCode Objective(Tao tao, Vec X, PetscReal *value, Vec G, void *ctx)
 {
   Fit *f = (Fit *)ctx;
@@ -144,6 +153,7 @@ static PetscErrorCode Objective(Tao tao, Vec X, PetscReal *value, Vec G, void *c
   PetscFunctionBegin;
   (void)tao;
   PetscCall(EvaluateVec(f, X));
+  /* Half of the squares, so that the gradient is J^T r without a factor. */
   *value = PetscSqr(Size(f->n, f->r)) / 2;
   PetscCall(VecGetArrayWrite(G, &g));
   Slope(f, g);
@@ -162,6 +172,7 @@ static PetscErrorCode Sample(Fit *f, PetscInt n, const PetscReal mu[], PetscReal
   PetscCall(HycoROMSolveMany(f->model, n, f->n_par, mu, p, NULL, NULL));
   f->evaluations = n;
   for (PetscInt k = 0; k < f->n; k++) {
+    /* Targets differ in size: relative differences give each the same weight. */
     f->scale[k] = PetscAbsReal(f->target[k]);
     for (PetscInt i = 0; i < n && f->target[k] == 0; i++)
       f->scale[k] = PetscMax(f->scale[k], PetscAbsReal(Value(f, &p[i], k)));
@@ -169,6 +180,7 @@ static PetscErrorCode Sample(Fit *f, PetscInt n, const PetscReal mu[], PetscReal
   }
   for (PetscInt i = 0; i < n; i++) {
     Misfit(f, &p[i], r);
+    /* Points without a solution are last in the order and never become a start. */
     misfit[i] = p[i].reason > 0 ? Size(f->n, r) : PETSC_MAX_REAL;
   }
   PetscCall(PetscFree(p));
@@ -185,6 +197,7 @@ static PetscErrorCode Start(Fit *f, const PetscReal start[], PetscInt n_samples,
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesCreate(f->model->model->scene, &samples));
+  /* A given start is the only one; otherwise scattered points, because the misfit may have several minima. */
   if (start)
     PetscCall(HycoSamplesAddPoint(samples, start));
   else
@@ -195,6 +208,7 @@ static PetscErrorCode Start(Fit *f, const PetscReal start[], PetscInt n_samples,
   for (PetscInt i = 0; i < n; i++) order[i] = i;
   PetscCall(PetscSortRealWithArrayInt(n, misfit, order));
   for (PetscInt i = 0; i < n && kept < *n_starts && misfit[i] < PETSC_MAX_REAL; i++, kept++) {
+    /* A parameter whose range is one value stays at it. */
     for (PetscInt q = 0; q < f->n_par; q++)
       starts[kept * f->n_par + q] =
           f->hi[q] > f->lo[q] ? (mu[order[i] * f->n_par + q] - f->lo[q]) / (f->hi[q] - f->lo[q]) : 0;
@@ -216,6 +230,7 @@ static PetscErrorCode Minimise(Fit *f, const char type[], Vec X)
 
   PetscFunctionBegin;
   HycoVecDuplicate(X, &lo, &hi);
+  /* Variables are shares of the ranges: bounds 0 and 1. VecDuplicate() has zeros in lo. */
   PetscCall(VecSet(hi, 1));
   PetscCall(VecCreateSeq(PETSC_COMM_SELF, f->n, &r));
   PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, f->n, f->n_par, NULL, &J));
@@ -224,11 +239,14 @@ static PetscErrorCode Minimise(Fit *f, const char type[], Vec X)
   if (squares) {
     PetscCall(TaoSetResidualRoutine(tao, r, Residual, f));
     PetscCall(TaoSetJacobianResidualRoutine(tao, J, J, Jacobian, f));
+    /* Nearly no regularisation: it would pull the answer from the targets. It must not be 0, since J^T J is singular if
+       targets do not determine all parameters. */
     PetscCall(TaoBRGNSetRegularizerWeight(tao, WEIGHT));
   } else
     PetscCall(TaoSetObjectiveAndGradient(tao, NULL, Objective, f));
   PetscCall(TaoSetSolution(tao, X));
   PetscCall(TaoSetVariableBounds(tao, lo, hi));
+  /* The misfit is piecewise smooth: the absolute tolerance stands for round-off, and IsMinimum() judges the end. */
   PetscCall(TaoSetTolerances(tao, 1e-14, 0, 0));
   PetscCall(TaoSetMaximumIterations(tao, 200));
   PetscCall(TaoSolve(tao));
@@ -243,10 +261,12 @@ static PetscBool IsMinimum(const Fit *f)
 
   Slope(f, g);
   for (PetscInt p = 0; p < f->n_par; p++) {
+    /* At an end of a range the slope may point outwards. */
     const PetscBool held = (PetscBool)((f->x[p] <= 0 && g[p] > 0) || (f->x[p] >= 1 && g[p] < 0));
 
     if (!held) most = PetscMax(most, PetscAbsReal(g[p]));
   }
+  /* Relative to the sizes of J and r: the same answer whatever the units of the outputs. */
   return (PetscBool)(Size(f->n, f->r) <= EXACT || most <= MINIMUM * Size(f->n * f->n_par, f->J) * Size(f->n, f->r));
 }
 
@@ -254,6 +274,7 @@ static PetscBool IsMinimum(const Fit *f)
    one. */
 static PetscErrorCode RunFrom(Fit *f, const PetscReal start[], const char type[], PetscBool *minimum, char method[64])
 {
+  /* Gauss-Newton can stall at a kink, where the limited-memory method still descends, and the other way round. */
   const char *const types[2] = {type, strcmp(type, HYCO_FIT_BRGN) ? HYCO_FIT_BRGN : HYCO_FIT_BLMVM};
   PetscScalar *x;
   Vec X;
@@ -296,6 +317,7 @@ static PetscErrorCode RunAll(Fit *f, const PetscReal starts[], const char type[]
     PetscBool minimum = PETSC_FALSE;
 
     PetscCall(RunFrom(f, starts + s * f->n_par, type, &minimum, method));
+    /* Root mean square, so that it does not depend on the number of targets. */
     ends[s] = Size(f->n, f->r) / PetscSqrtReal((PetscReal)f->n);
     if (s && !IsBetter(fit, ends[s], minimum)) continue;
     fit->misfit = ends[s];
@@ -303,11 +325,13 @@ static PetscErrorCode RunAll(Fit *f, const PetscReal starts[], const char type[]
     PetscCall(PetscStrncpy(fit->method, method, sizeof(fit->method)));
     PetscCall(PetscArraycpy(x, f->x, f->n_par));
   }
+  /* Counted afterwards: the least is known only when all starts have ended. */
   for (PetscInt s = 0; s < fit->n_starts; s++) fit->n_least += ends[s] <= (1 + SAME) * fit->misfit + EXACT;
   PetscCall(PetscFree(ends));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The fit works on x in [0, 1]^n; mu is made from it at the end. Which starts are tried depends on the fixed sequence of samples, hence the same answer in every run. */
 PetscErrorCode HycoROMFit(HycoROM m, PetscInt n, const PetscInt output[], const PetscReal target[],
                           const PetscReal start[], PetscInt n_samples, PetscInt n_starts, const char type[],
                           PetscReal mu[], HycoFit *fit)
@@ -334,6 +358,7 @@ PetscErrorCode HycoROMFit(HycoROM m, PetscInt n, const PetscInt output[], const 
   PetscCall(RunAll(&f, starts, type, fit, x));
   PetscCall(PetscFree(starts));
   f.known = PETSC_FALSE;
+  /* Once more at the answer: the caller's getters of the model show this point, not the last start's. */
   PetscCall(Evaluate(&f, x));
   ToParameters(&f, x, mu);
   fit->kink = f.kink;

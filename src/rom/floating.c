@@ -28,7 +28,8 @@ PetscErrorCode HycoFloatingDestroy(HycoFloating *floating)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* f->mesh is set first, so that HycoFloatingDestroy() frees it after an error. */
+/* f->mesh is set first, so that HycoFloatingDestroy() frees it after an error. Takes over `loaded`; rigid[] and of[]
+   are copied. */
 PetscErrorCode HycoFloatingCreate(PetscInt n, const HycoRigid rigid[], PetscInt n_bodies, const PetscInt of[],
                                   HycoMesh loaded, HycoFloating *floating)
 {
@@ -47,8 +48,8 @@ PetscErrorCode HycoFloatingCreate(PetscInt n, const HycoRigid rigid[], PetscInt 
 
 enum { NUMBERS = 3 + 1 + 6 }; /* of a motion in the file: centre, size, coefficients */
 
-/* The number of motions follows from the dataset's rows (-1: not known yet). The mesh may be absent: a floating
-   body without loads. */
+/* The number of motions follows from the dataset's rows (-1: not known yet). The mesh may be absent: a floating body
+   without loads. One function reads and writes, so that the order of the datasets cannot differ. */
 PetscErrorCode HycoFloatingMove(HycoH5 h, HycoROM m)
 {
   const PetscBool reads = HycoH5Reads(h);
@@ -74,10 +75,12 @@ PetscErrorCode HycoFloatingMove(HycoH5 h, HycoROM m)
     PetscCall(PetscArraycpy(f->rigid[k].rigid, number + NUMBERS * k + 4, 6));
   }
   PetscCall(PetscFree(number));
+  /* of[] is a table, motions x bodies. */
   f->n_bodies = m->model->scene->n_bodies;
   PetscCall(HycoH5Int(h, "floating/bodies", 0, 1, &f->n, f->n_bodies, &f->of));
   if (reads ? !HycoH5Has(h, "floating/mesh/head") : !f->mesh) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoMeshMove(h, "floating/mesh", f->n_bodies, &f->mesh));
+  /* Ties belong to the scene's mesh and are not stored twice. */
   if (reads) PetscCall(HycoMeshSetTies(f->mesh, m->model->mesh->ties));
   if (reads) PetscCall(HycoMeshCreateDM(m->model->scene, f->mesh));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -90,7 +93,8 @@ static PetscReal At(HycoFloating f, HycoFE fe, PetscInt j, PetscInt i, PetscInt 
   return HycoRigidAt(&f->rigid[j], fe->dim, fe->X + 3 * i, c);
 }
 
-/* work[n]: of the loads at mu. */
+/* work[n]: of the loads at mu. The balance holds at every mu, and so does the work of the loads along a rigid motion,
+   without any elastic solve. */
 static PetscErrorCode LoadWork(HycoROM m, HycoFloating f, const PetscReal mu[], PetscReal work[])
 {
   PetscReal *load;
@@ -147,6 +151,7 @@ static PetscReal Evaluate(const Dual *d, const PetscReal c[], PetscReal gradient
   const PetscInt p = d->p;
   PetscReal value = 0;
 
+  /* The gradient is a difference of loads and forces' work: its round-off is that of these terms. */
   *size = 0;
   for (PetscInt i = 0; i < p; i++) {
     gradient[i] = -d->load[i];
@@ -156,6 +161,8 @@ static PetscReal Evaluate(const Dual *d, const PetscReal c[], PetscReal gradient
   }
   for (PetscInt k = 0; k < d->n; k++) {
     const PetscReal *w = d->work + k * p;
+    /* The forces are those of the prediction times exp(c.w): positive whatever c is, so that no contact gets a tensile
+       force by the balance. */
     PetscReal power = 0, force;
 
     for (PetscInt i = 0; i < p; i++) power += c[i] * w[i];
@@ -174,7 +181,9 @@ static PetscReal Evaluate(const Dual *d, const PetscReal c[], PetscReal gradient
 #define BALANCED   1e-12 /* relative to the largest work */
 #define ACTS       1e-10 /* directions of c with less curvature, relative, are those in which no contact acts */
 
-/* Minimises the dual function from c = 0. *met: the works agree. */
+/* Minimises the dual function from c = 0. *met: the works agree. Newton's method with Armijo's line search (Nocedal
+   and Wright, Numerical Optimization, algorithm 3.1): the dual of an entropy is convex and smooth, and has no
+   constraint. */
 static PetscErrorCode Minimise(const Dual *d, PetscReal c[], PetscBool *met)
 {
   const PetscInt p = d->p;
@@ -213,6 +222,7 @@ static PetscErrorCode Minimise(const Dual *d, PetscReal c[], PetscBool *met)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Forces are multiplied by positive factors, so that open contacts stay open and none pulls. */
 PetscErrorCode HycoFloatingBalance(HycoROM m)
 {
   HycoFloating f = m->model->floating;

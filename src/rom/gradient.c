@@ -35,7 +35,8 @@ typedef struct {
   PetscBool whole_current;
 } Work;
 
-/* The state of z at mu (NULL: the data are there), as a prediction would leave it; w: NULL, or its w. */
+/* The state of z at mu (NULL: the data are there), as a prediction would leave it; w: NULL, or its w. In the order of a
+   prediction: the floating bodies' balance changes forces that the reconstruction has set. */
 static PetscErrorCode Move(Work *o, const PetscReal mu[], const PetscReal z[], PetscReal w[])
 {
   HycoROM m = o->m;
@@ -88,6 +89,8 @@ static PetscErrorCode Close(Work *o)
   for (PetscInt j = 0; j < o->k; j++) {
     const size_t at = (size_t)(o->p + j);
 
+    /* Of a contact: its force and its gap at mu. Both nearly 0 is undecided, and gets the state that the derivative
+       itself chooses. */
     L[j] = o->z[o->p + o->contact[j]];
     w[j] = o->w[0][o->p + o->contact[j]];
     flexibility[j] = M[at * n + at];
@@ -96,6 +99,8 @@ static PetscErrorCode Close(Work *o)
   PetscCall(HycoTangentCreate(o->p, o->k, M, state, &o->tangent, &regular));
   PetscCall(PetscFree4(L, w, flexibility, state));
   PetscCall(PetscFree(M));
+  /* A singular matrix means forces that can be redistributed: a derivative of one of many distributions would be
+     arbitrary. */
   HycoCheck(regular, "the forces of the model's closed contacts are not unique here, so that they have no derivative");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -109,6 +114,7 @@ static PetscErrorCode Create(Work *o)
 
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(o->mu, m->fe->mu, m->model->scene->n_variables));
+  /* By value: a copy of the struct is all that differences overwrite. */
   o->prediction = m->prediction;
   o->remainder = m->remainder;
   o->whole_current = m->whole_current;
@@ -130,16 +136,20 @@ static PetscErrorCode Create(Work *o)
     /* Closed or undecided contacts; open ones do not change at first order. */
     if (HycoTangentMayTouch(o->z[o->p + i], o->w[0][o->p + i], o->size)) o->contact[o->k++] = i;
   }
+  /* The tangent is factored once, for all parameters. */
   PetscCall(Close(o));
   if (m->measured)
     PetscCall(PetscArraycpy(o->output, m->prediction.quantity, m->model->scene->n_quantities));
   else
     PetscCall(MoveAndMeasure(o, NULL, o->z, NULL, o->output));
+  /* Extremes are measured where they are now: a maximum's place does not move in a derivative, by the envelope
+     theorem. */
   PetscCall(HycoROMFocusOutputs(m, o->output, &o->focused));
   if (o->focused) PetscCall(MoveAndMeasure(o, NULL, o->z, NULL, o->output));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Also after an error in Create(): arrays that do not exist yet are NULL. */
 static PetscErrorCode Destroy(Work *o)
 {
   PetscFunctionBegin;
@@ -161,6 +171,8 @@ static PetscBool Turns(const Work *o, const HycoDifference *d, PetscBool closer)
   PetscReal most = 0, slope = 0;
 
   for (PetscInt i = 0; i < o->n; i++) most = PetscMax(most, o->z[o->p + i]);
+  /* The slope of the gaps along the parameter is the scale for a jump: a contact that barely moves has slopes of
+     round-off. */
   for (PetscInt j = 0; j < o->k; j++) {
     const PetscInt at = o->p + o->contact[j];
 
@@ -172,6 +184,7 @@ static PetscBool Turns(const Work *o, const HycoDifference *d, PetscBool closer)
     const PetscReal v[3] = {o->w[0][at], o->w[1][at], o->w[2][at]}, near[3] = {o->w[0][at], o->w[3][at], o->w[4][at]};
     PetscReal jump;
 
+    /* A contact without force has no part in the solution, whatever its gap does. */
     if (o->z[at] <= HYCO_GRADIENT_FORCE * most) continue;
     jump = HycoDifferenceJump(d, o->size, slope, v);
     if (closer ? HycoDifferenceKinks(d, jump, near) : jump > 0) return PETSC_TRUE;
@@ -189,6 +202,7 @@ static PetscErrorCode FindTurns(Work *o, const HycoDifference *d, PetscBool *tur
   PetscFunctionBegin;
   *turns = Turns(o, d, PETSC_FALSE);
   if (!*turns) PetscFunctionReturn(PETSC_SUCCESS);
+  /* A jump of the slope stays when the step shrinks, curvature does not. */
   HycoDifferenceShrink(&near);
   for (PetscInt j = 1; j < 3; j++) {
     HycoDifferencePoint(&near, m->model->scene, o->mu, j, at);
@@ -198,7 +212,8 @@ static PetscErrorCode FindTurns(Work *o, const HycoDifference *d, PetscBool *tur
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* dz along a parameter, and the outputs with fixed z. */
+/* dz along a parameter, and the outputs with fixed z. By the implicit function theorem: z moves so that the residual
+   stays 0. The residual's change along mu is a difference of three evaluations, exact up to second order. */
 static PetscErrorCode Differentiate(Work *o, Along *a)
 {
   HycoROM m = o->m;
@@ -227,7 +242,8 @@ static PetscErrorCode Differentiate(Work *o, Along *a)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds to the outputs what they change along z, with the data at mu. */
+/* Adds to the outputs what they change along z, with the data at mu. The outputs change along mu with z fixed, and
+   along z with mu fixed; both together are the total derivative. */
 static PetscErrorCode Follow(Work *o, const Along *a)
 {
   const PetscInt n = o->m->model->scene->n_quantities;
@@ -249,16 +265,19 @@ static PetscErrorCode Columns(Work *o, HycoGradient *gradient)
   PetscReal size;
 
   PetscFunctionBegin;
+  /* Stresses are not differenced here: without the cells a model that does not read them moves faster. */
   PetscCall(HycoFEUseCells(m->fe, (PetscBool)!m->model->traits.surfaces));
   for (PetscInt p = 0; p < gradient->n_parameters; p++) {
     HycoDifferenceSet(m->model->scene, o->mu, p, HYCO_GRADIENT_STEP, &o->along[p].d);
     PetscCall(Differentiate(o, &o->along[p]));
   }
+  /* Back at mu before the outputs are followed: their differences start from the data there. */
   PetscCall((*m->ops->residual)(m, o->mu, o->z, NULL, &size));
   for (PetscInt p = 0; p < gradient->n_parameters; p++) PetscCall(Follow(o, &o->along[p]));
   for (PetscInt p = 0; p < gradient->n_parameters; p++) {
     const Along *a = &o->along[p];
 
+    /* A smooth column is done by the central difference; the others need one-sided ones, which move the data again. */
     if (HycoGradientSetSmooth(gradient, &m->gradient, &a->d, a->kink, a->output)) continue;
     o->dz = a->dz;
     o->moved_on = PETSC_TRUE;
@@ -279,6 +298,7 @@ static PetscErrorCode Restore(Work *o)
   PetscCall(Move(o, o->moved_on ? o->mu : NULL, o->z, NULL));
   PetscCall(HycoFEUseCells(m->fe, PETSC_TRUE));
   m->prediction = o->prediction;
+  /* Also what getters of the prediction read: the gradient must not be visible in them. */
   m->remainder = o->remainder;
   m->whole_current = o->whole_current;
   PetscCall(PetscArraycpy(m->gamma, o->gamma, m->model->l));
@@ -289,6 +309,7 @@ static PetscErrorCode Restore(Work *o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Refusals before any work: friction and histories have derivatives of the path, not of a point. */
 static PetscErrorCode Check(HycoROM m)
 {
   PetscFunctionBegin;
@@ -321,6 +342,7 @@ PetscErrorCode HycoROMGetGradient(HycoROM m, HycoGradient *gradient)
   if (!ierr) ierr = Columns(&o, gradient);
   if (!ierr) ierr = Restore(&o);
   if (ierr) m->solved = m->ready = PETSC_FALSE;
+  /* Before the error is raised, so that a program that catches it leaks nothing. */
   PetscCall(Destroy(&o));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -15,6 +15,7 @@ PetscErrorCode HycoMeshMoveGroupNames(HycoH5 h, const char name[], HycoMesh m)
     PetscCall(PetscCalloc1(length, &names));
     for (g = 0; g < m->n_groups; g++) {
       PetscCall(PetscStrlcat(names, m->group_name[g], length));
+      /* A newline separates: names of groups cannot contain it, since they come from lines of a file. */
       PetscCall(PetscStrlcat(names, "\n", length));
     }
     PetscCall(HycoH5WriteText(h, name, names));
@@ -50,11 +51,14 @@ PetscErrorCode HycoMeshMove(HycoH5 h, const char prefix[], PetscInt n_bodies, Hy
   head[0] = (PetscInt)m->type;
   head[1] = m->dim;
   PetscCall(HycoH5Ints(h, At(prefix, "head", path), 0, HYCO_N_MESH_TYPES - 1, 2, head));
+  /* Everything below has sizes that follow from type and dimension. */
   m->type = (HycoCellType)head[0];
   m->dim = HycoElementGet(m->type)->dim;
   m->nv = HycoElementGet(m->type)->nv;
   m->nf = HycoElementGetFacet(m->type)->nv;
   PetscCall(HycoH5Real(h, At(prefix, "xyz", path), &m->n_nodes, 3, &m->xyz));
+  /* Each array of indices is checked against the size that was read before it: a damaged file is refused, not
+     followed. */
   last = m->n_nodes - 1;
   PetscCall(HycoH5Int(h, At(prefix, "node_id", path), 0, PETSC_MAX_INT, &m->n_nodes, 1, &m->node_id));
   PetscCall(HycoH5Int(h, At(prefix, "node_body", path), 0, n_bodies - 1, &m->n_nodes, 1, &m->node_body));
@@ -69,7 +73,9 @@ PetscErrorCode HycoMeshMove(HycoH5 h, const char prefix[], PetscInt n_bodies, Hy
   PetscCall(HycoH5Int(h, At(prefix, "facet_group", path), 0, m->n_groups - 1, &m->n_facets, 1, &m->facet_group));
   PetscCall(HycoH5Int(h, At(prefix, "facet_cell", path), -1, m->n_cells - 1, &m->n_facets, 1, &m->facet_cell));
   if (!HycoH5Reads(h)) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Derived: a collapsed cell has repeated nodes. */
   for (PetscInt e = 0; e < m->n_cells; e++) m->mixed = (PetscBool)(m->mixed || HycoMeshShape(m, e) != m->type);
+  /* Groups of cells serve the whole mesh alone, so that a part has none. */
   PetscCall(PetscCalloc1(m->n_groups + 1, &m->group_cell_start));
   PetscCall(PetscMalloc1(1, &m->group_cell));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -55,6 +55,7 @@ static PetscErrorCode Extract(HycoROM m, HycoOutputCells p)
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(m->model->whole->n_cells, &needed, m->model->whole->n_cells, &keep));
+  /* Only cells that some output reads, and those around their nodes: the other modes are not copied. */
   PetscCall(HycoQuantitiesMarkCells(m->model->scene, m->model->whole, needed));
   PetscCall(List(m->model->whole->n_cells, needed, &n, keep));
   PetscCall(HycoSubmesh(m->model->scene, m->model->whole, n, keep, 0, NULL, 0, NULL, &p->mesh));
@@ -109,6 +110,7 @@ static PetscErrorCode TakeContact(HycoROM m, HycoOutputCells p, const PetscReal 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < p->fe->n_dof; k++)
     any = (PetscBool)(any || (HycoFESupports(p->fe, k) && p->surface_node[k / dim] >= 0));
+  /* No support on a slave or master surface: nothing to subtract. */
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MakeSurface(m, p));
   PetscCall(HycoFESetParameters(p->fe_surface, p->fe->mu));
@@ -117,7 +119,9 @@ static PetscErrorCode TakeContact(HycoROM m, HycoOutputCells p, const PetscReal 
   for (PetscInt k = 0; !ierr && k < p->fe->n_dof; k++) {
     if (p->surface_node[k / dim] >= 0) force[k] = c.force[3 * p->surface_node[k / dim] + k % dim];
   }
+  /* Forces of tied and oblique nodes in the unknowns that the supports hold. */
   HycoFEGeneralise(p->fe, force);
+  /* The support's force is what holds the body beside the contact force on the same node. */
   for (PetscInt k = 0; k < p->fe->n_dof; k++) p->reaction[k] -= HycoFESupports(p->fe, k) ? force[k] : 0;
   PetscCall(PetscFree2(u, force));
   PetscCall(HycoContactFieldsDestroy(&c));
@@ -163,6 +167,7 @@ static PetscErrorCode Fill(HycoROM m, HycoOutputCells p)
   PetscCall(HycoQuantitiesMarkStressed(m->model->scene, p->mesh, p->stressed));
   PetscCall(PetscMalloc1(m->model->n_fe, &p->fe_at));
   PetscCall(PetscMalloc1(m->model->whole_nodes, &place));
+  /* From whole-mesh nodes to those of these cells: both meshes number their own. */
   for (PetscInt i = 0; i < m->model->whole_nodes; i++) place[i] = -1;
   for (PetscInt i = 0; i < p->mesh->n_nodes; i++) place[p->mesh->node_whole[i]] = i;
   for (PetscInt k = 0; k < m->model->n_fe; k++) {
@@ -257,6 +262,7 @@ static PetscErrorCode Follow(HycoROM m, HycoOutputCells p)
   PetscCall(HycoFESetParameters(p->fe, m->fe->mu));
   Displace(m, p, m->gamma, U_fe);
   PetscCall(PetscFree(U_fe));
+  /* Gradients are kept while no parameter moves the nodes. */
   PetscCall(HycoFEStressKept(p->fe, p->stressed, p->u, &p->means, p->sigma));
   PetscCall(ReactPredicted(m, p, NULL, m->Lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -273,6 +279,7 @@ static PetscErrorCode Make(HycoROM m)
   PetscCall(PetscNew(&m->output_cells));
   ierr = Extract(m, m->output_cells);
   if (!ierr) ierr = Fill(m, m->output_cells);
+  /* After the cells: resultants need the modes' forces there. */
   if (!ierr && HycoSceneHasReactions(m->model->scene)) ierr = HycoResultantsFind(m, &m->output_cells->resultants);
   if (ierr) PetscCall(HycoOutputCellsDestroy(&m->output_cells));
   PetscCall(ierr);
@@ -306,6 +313,7 @@ static PetscErrorCode MeasureTimes(HycoROM m)
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
+  /* Without fields no replay is needed: the forces of each listed time are in the trace. */
   if (!m->output_cells) { /* only results of contacts */
     for (PetscInt j = 0; j < m->trace.n_listed; j++)
       PetscCall(MeasurePredicted(m, NULL, ForcesAt(m, j), m->trace.step[j].quantity));
@@ -369,6 +377,7 @@ static PetscErrorCode MakeFew(HycoROM m, HycoOutputCells all, PetscInt n, const 
   HycoOutputCells p;
 
   PetscFunctionBegin;
+  /* Nearby points decide by the same cells: the small mesh is made once for a whole gradient. */
   for (PetscInt k = 0, at = 0; k < n && has; k++) {
     has = Find(m->few->mesh, all->mesh->cell_whole[keep[k]], &at);
     if (has && stressed[keep[k]]) m->few->stressed[at] = PETSC_TRUE;
@@ -380,6 +389,7 @@ static PetscErrorCode MakeFew(HycoROM m, HycoOutputCells all, PetscInt n, const 
   PetscCall(HycoSubmesh(m->model->scene, all->mesh, n, keep, 0, NULL, 0, NULL, &p->mesh));
   PetscCall(PetscMalloc1(p->mesh->n_nodes * width, &p->V));
   PetscCall(PetscMalloc1(p->mesh->n_nodes, &node));
+  /* Rows of V in the order of the new mesh's nodes. */
   PetscCall(HycoSubmeshNodes(p->mesh, all->mesh, node));
   for (PetscInt i = 0; i < p->mesh->n_nodes; i++)
     PetscCall(PetscArraycpy(p->V + i * width, all->V + node[i] * width, width));
@@ -419,6 +429,7 @@ PetscErrorCode HycoROMFocusOutputs(HycoROM m, const PetscReal value[], PetscBool
   if (!ierr) ierr = MakeFew(m, p, n, keep, stressed);
   *focused = (PetscBool)!ierr;
   if (ierr) PetscCall(HycoOutputCellsDestroy(&m->few));
+  /* Before the error: MakeFew() may have failed after the marks. */
   PetscCall(PetscFree3(needed, stressed, keep));
   PetscCall(ierr);
   if (*focused) PetscCall(HycoROMUnfocusOutputs(m)); /* an exchange, its own inverse */

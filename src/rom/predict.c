@@ -9,6 +9,7 @@ PetscErrorCode HycoROMSetUpFields(HycoROM m)
   PetscCall(PetscMalloc1(m->model->pairs.n, &m->slave_id));
   for (PetscInt k = 0; k < m->model->pairs.n; k++) m->slave_id[k] = m->model->mesh->node_id[m->model->pairs.slave[k]];
   PetscCall(PetscCalloc1(m->model->l, &m->gamma));
+  /* Zeros: nodes outside the RID are never written by some types. */
   PetscCall(PetscCalloc1(m->model->mesh->n_nodes * m->model->mesh->dim, &m->U));
   PetscCall(PetscCalloc1(m->model->pairs.n, &m->Lambda));
   PetscCall(PetscMalloc1(m->model->mesh->n_cells * m->fe->n_sigma, &m->stress));
@@ -62,6 +63,7 @@ PetscErrorCode HycoROMSetUp(HycoROM m)
   if (m->ready) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoROMReset(m)); /* removes incomplete data after a refusal */
   PetscCall(HycoROMTakePairs(&m->model->pairs, &m->pairs));
+  /* Zeroed, so that reset can free what setup had not made yet. */
   if (m->model->traits.work) PetscCall(PetscCalloc1(m->model->traits.work, (char **)&m->work));
   if (m->ops->setup)
     PetscUseTypeMethod(m, setup);
@@ -133,6 +135,7 @@ PetscErrorCode HycoROMSetSolution(HycoROM m, const PetscReal mu[], const PetscRe
   PetscCall(HycoROMExpand(m));
   for (PetscInt j = 0; j < m->model->l; j++) sum += m->gamma[j];
   for (PetscInt k = 0; k < m->model->pairs.n; k++) sum += m->Lambda[k];
+  /* Such a type satisfies no condition by construction: residuals are what it really misses. */
   MeasureContacts(m, &p->kkt);
   p->iterations = 0;
   p->reason = PetscIsInfOrNanReal(sum) ? HYCO_DIVERGED_RESIDUAL : HYCO_CONVERGED;
@@ -156,6 +159,7 @@ PetscErrorCode HycoROMReset(HycoROM m)
   PetscCall(HycoFEDestroy(&m->fe_beyond));
   PetscCall(HycoRowsDestroy(&m->rows));
   PetscCall(HycoFEDestroy(&m->fe));
+  /* It points into data that the type has freed. */
   m->of_fe = NULL;
   PetscCall(HycoROMDropPairs(&m->pairs));
   PetscCall(HycoTraceFree(m));

@@ -20,6 +20,7 @@ PetscErrorCode HycoROMGetStrainEnergy(HycoROM m, PetscReal *energy)
 
   PetscFunctionBegin;
   PetscCall(CheckSolved(m));
+  /* The energy of a path is that of the laws' elastic strains, summed when the state was there. */
   if (m->trace.n_listed) {
     *energy = m->trace.history.step[m->trace.shown].stored;
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -30,6 +31,7 @@ PetscErrorCode HycoROMGetStrainEnergy(HycoROM m, PetscReal *energy)
   PetscCall(PetscMalloc1(m->model->mesh->n_cells, &each));
   PetscCall(HycoFEEnergy(m->fe, m->U, each));
   for (PetscInt e = 0; e < m->model->mesh->n_cells; e++) *energy += each[e];
+  /* Springs to the ground store energy too, as in full order's identity. */
   *energy += HycoSpringsEnergy(m->fe, m->U);
   PetscCall(PetscFree(each));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -76,6 +78,7 @@ static PetscErrorCode MeasureDisplacements(HycoROM m, HycoPrediction *p)
     for (PetscInt c = 0; c < p->dim; c++) {
       const PetscReal u = m->U[node[k] * p->dim + c];
 
+      /* The first node sets the range: 0 need not be in it. */
       p->u_min[c] = k ? PetscMin(p->u_min[c], u) : u;
       p->u_max[c] = k ? PetscMax(p->u_max[c], u) : u;
       p->u_norm2 += u * u;
@@ -130,6 +133,7 @@ PetscErrorCode HycoROMGetPrediction(HycoROM m, HycoPrediction *out)
   PetscCall(CheckSolved(m));
   p = &m->prediction;
   p->dim = m->fe->dim;
+  /* Sizes of the reduced problem: a report shows them beside full order's. */
   p->n_dof = m->n;
   PetscCall(PetscStrncpy(p->type, m->model->type, sizeof(p->type)));
   PetscCall(PetscStrncpy(p->title, m->model->traits.title, sizeof(p->title)));
@@ -148,7 +152,9 @@ PetscErrorCode HycoROMGetPrediction(HycoROM m, HycoPrediction *out)
   PetscCall(MeasureDisplacements(m, p));
   PetscCall(MeasureContacts(m, p));
   PetscCall(HycoROMMeasureQuantities(m, p));
+  /* Outputs are there: estimates of theirs may be evaluated. */
   m->measured = PETSC_TRUE;
+  /* After the outputs, whose magnitudes bound their estimates from below. */
   PetscCall(HycoEstimatesEvaluate(m, p));
   PetscCall(MeasureEquilibrium(m, p));
   *out = *p;
@@ -167,6 +173,7 @@ PetscErrorCode HycoROMGetRID(HycoROM m, PetscInt *n_nodes, const PetscInt *node_
   if (U) *U = m->U;
   if (n_cells) *n_cells = m->model->mesh->n_cells;
   if (cell_ids) *cell_ids = m->model->mesh->cell_id;
+  /* Recomputing from U would need the inelastic strains of that time. */
   if (sigma && m->trace.n_listed)
     *sigma = m->trace.sigma + (size_t)m->trace.shown * (size_t)(m->model->mesh->n_cells * m->fe->n_sigma);
   else if (sigma) {
@@ -243,6 +250,7 @@ PetscErrorCode HycoROMWrite(HycoROM m, const char path[])
 
   PetscFunctionBegin;
   PetscCall(CheckSolved(m));
+  /* A series: the laws are replayed on the whole mesh. */
   if (m->model->scene->n_times) {
     PetscCall(HycoTraceWrite(m, path));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -292,6 +300,7 @@ PetscErrorCode HycoROMView(HycoROM m, PetscViewer viewer)
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
   pod = HycoROMCountPOD(m);
   PetscCall(PetscViewerASCIIPrintf(viewer, "%s model\n", m->model->traits.title));
+  /* Models of bodies take no solutions: there is no training error. */
   if (m->model->numbers[1] < 0)
     PetscCall(PetscViewerASCIIPrintf(viewer, "  trained without solutions, for the region of %d points\n",
                                      (int)m->model->n_points));

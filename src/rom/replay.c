@@ -87,7 +87,9 @@ static PetscErrorCode WriteTimes(HycoReplay *r, HycoSeries series)
     PetscCall(HycoReplayMove(r, k));
     HycoTraceWholeU(m, k, m->U_whole);
     PetscCall(HycoReplayStep(r, k, m->U_whole));
+    /* Steps between listed times are only marched through. */
     if (j == m->trace.n_listed || m->trace.at[j] != k) continue;
+    /* The getters that the fields use read the selected time. */
     HycoTraceShow(m, j);
     from = Look(r, j++);
     PetscCall(HycoSeriesAddTime(series, &from));

@@ -99,11 +99,14 @@ PetscErrorCode HycoResultantsFind(HycoROM m, HycoResultants *resultants)
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(m->model->scene->n_quantities * m->model->scene->n_bodies, &balanced));
   PetscCall(PetscMalloc2(m->model->whole->n_cells, &needed, m->model->whole->n_cells, &keep));
+  /* Which outputs' groups hold all supports of their bodies along the axis: only their reactions follow from
+     balance. */
   PetscCall(HycoQuantitiesBalance(PETSC_COMM_SELF, m->model->scene, m->model->whole, balanced));
   PetscCall(HycoQuantitiesMarkLoads(m->model->scene, m->model->whole, balanced, needed));
   for (PetscInt e = 0; e < m->model->whole->n_cells; e++) {
     if (needed[e]) keep[n++] = e;
   }
+  /* The cells with loads alone: the balance needs no others online. */
   PetscCall(HycoSubmesh(m->model->scene, m->model->whole, n, keep, 0, NULL, 0, NULL, &loaded));
   PetscCall(PetscFree2(needed, keep));
   PetscCall(HycoResultantsCreate(m, balanced, loaded, resultants));
@@ -157,6 +160,7 @@ static PetscErrorCode BringLoads(HycoResultants r, const PetscReal mu[])
                                                       HycoExprChanges(s->body[b].reference, changed) ||
                                                       HycoExprChanges(s->body[b].expansion, changed))));
   if (r->ready && !c.nodes && !heat && !HycoSceneLoadsChange(s, changed)) PetscFunctionReturn(PETSC_SUCCESS);
+  /* After an error in between, the loads must not pass for those at r->mu. */
   r->ready = PETSC_FALSE;
   PetscCall(HycoFESetParameters(r->fe, mu));
   PetscCall(HycoFELoads(r->fe, r->load));

@@ -36,6 +36,7 @@ PetscErrorCode HycoROMClone(HycoROM m, HycoROM *clone)
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
   PetscCall(CreateHandle(&c));
   c->model = m->model;
+  /* Counted without a lock: clones are for one thread or rank each, as PETSc's objects are. */
   c->model->references++;
   *c->ops = *m->ops;
   PetscCall(PetscObjectSetOptions((PetscObject)c, ((PetscObject)m)->options));
@@ -117,6 +118,7 @@ static PetscErrorCode DestroyModel(HycoROM rom)
 
   PetscFunctionBegin;
   if (--m->references) PetscFunctionReturn(PETSC_SUCCESS);
+  /* The type first: its data may refer to mesh and scene. */
   PetscTryTypeMethod(rom, destroy);
   PetscCall(HycoFloatingDestroy(&m->floating));
   PetscCall(HycoPairsDestroy(&m->whole_pairs));
@@ -165,6 +167,7 @@ static PetscErrorCode CreateNodes(PetscInt n, const PetscInt sets[], PetscInt le
   PetscCall(ISDestroy(nodes));
   PetscCall(PetscMalloc1(n, &list));
   for (PetscInt i = 0; i < n; i++) {
+    /* sets: 0 outside, 1 on the interface, 2 in A. */
     if (!sets || sets[i] >= least) list[count++] = i;
   }
   PetscCall(ISCreateGeneral(PETSC_COMM_SELF, count, list, PETSC_COPY_VALUES, nodes));
@@ -192,6 +195,7 @@ PetscErrorCode HycoROMGetDomain(HycoROM m, PetscInt sets[])
 
     PetscCall(ISGetLocalSize(each[s], &n));
     PetscCall(ISGetIndices(each[s], &node));
+    /* A is a part of the RID: its nodes are counted twice. */
     for (PetscInt k = 0; k < n; k++) sets[node[k]]++;
     PetscCall(ISRestoreIndices(each[s], &node));
   }

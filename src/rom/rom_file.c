@@ -51,6 +51,7 @@ static PetscErrorCode MovePairs(HycoH5 h, PetscInt n_nodes, PetscInt n_contacts,
   PetscCall(HycoH5Int(h, "problem/pairs/slave", 0, n_nodes - 1, &p->n, 1, &p->slave));
   PetscCall(HycoH5Int(h, "problem/pairs/contact", 0, n_contacts - 1, &p->n, 1, &p->contact));
   PetscCall(HycoH5Starts(h, "problem/pairs/master_start", p->n, &p->master_start));
+  /* Masters of all contacts in one array (CSR), whose length is known after the starts. */
   entries = &p->master_start[p->n];
   PetscCall(HycoH5Int(h, "problem/pairs/master", 0, n_nodes - 1, entries, 1, &p->master));
   PetscCall(HycoH5Real(h, "problem/pairs/weight", entries, 1, &p->weight));
@@ -111,6 +112,7 @@ static PetscErrorCode SaveOutputEstimates(HycoH5 h, HycoROM m)
     *at++ = o->magnitude;
     *at++ = o->median;
     *at++ = o->largest;
+    /* The constant and a coefficient for each feature. */
     for (PetscInt j = 0; j <= HYCO_ESTIMATE_FEATURES; j++) *at++ = o->law[j];
   }
   PetscCall(HycoH5WriteReal(h, "training/outputs", t->n_outputs, OUTPUT_NUMBERS, numbers));
@@ -134,6 +136,7 @@ static PetscErrorCode SaveEstimates(HycoH5 h, HycoROM m)
     }
     PetscCall(HycoH5WriteReal(h, "training/held_out", HELD_NUMBERS, 1, numbers));
   }
+  /* Errors of outputs are stored without estimates too: `view` shows them. */
   PetscCall(SaveOutputEstimates(h, m));
   if (!t->n) PetscFunctionReturn(PETSC_SUCCESS);
   *at++ = (PetscReal)t->n;
@@ -165,6 +168,7 @@ static PetscErrorCode LoadHeldOut(HycoH5 h, HycoROM m)
   PetscFunctionBegin;
   if (!HycoH5Has(h, "training/held_out")) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoH5LoadReal(h, "training/held_out", &n, &one, &numbers));
+  /* Stored as a real beside the errors, one dataset instead of two. */
   good = IsCount(numbers[0]);
   t->n_held = good ? (PetscInt)numbers[0] : 0;
   for (PetscInt e = 0; e < HYCO_N_ESTIMATES; e++) {
@@ -185,6 +189,7 @@ static PetscErrorCode LoadReached(HycoH5 h, HycoROM m)
   PetscBool good = PETSC_TRUE;
 
   PetscFunctionBegin;
+  /* -1: not known, and then not judged. */
   for (PetscInt j = 0; j < HYCO_FEATURES; j++) m->model->estimates.reached[j] = -1;
   if (!HycoH5Has(h, "training/reached")) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoH5LoadReal(h, "training/reached", &n, &one, &numbers));
@@ -273,6 +278,7 @@ static PetscErrorCode LoadEstimates(HycoH5 h, HycoROM m)
   if (HycoH5Has(h, "training/search")) PetscCall(HycoH5LoadText(h, "training/search", &m->model->search));
   PetscCall(LoadHeldOut(h, m));
   PetscCall(LoadReached(h, m));
+  /* Its numbers are of formulas with fewer features. */
   if (HycoH5Has(h, "training/trust")) PetscCall(LoadOldEstimates(h, m));
   if (!HycoH5Has(h, "training/estimates")) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoH5LoadReal(h, "training/estimates", &n, &one, &numbers));
@@ -319,6 +325,7 @@ static PetscErrorCode MoveSizes(HycoH5 h, HycoROM m)
   m->model->whole_cells = sizes[1];
   m->model->hybrid = (HycoHybrid)sizes[2];
   for (PetscInt k = 0; k < 3; k++) m->model->counts[k] = sizes[3 + k];
+  /* An enumeration from a file: out of range it would index tables of names. */
   HycoCheck(sizes[2] <= HYCO_HYBRID_ALL && m->model->whole_nodes > 0 && m->model->whole_cells > 0,
             "%s: problem/sizes is damaged", m->model->path);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -378,6 +385,7 @@ static PetscErrorCode MoveProvenance(HycoH5 h, HycoROM m)
   }
   PetscCall(HycoH5LoadText(h, "training/provenance", &m->model->provenance));
   PetscCall(HycoH5LoadText(h, "training/fingerprint", &text));
+  /* A hash of fixed length: a longer text is cut and then differs. */
   PetscCall(PetscStrncpy(m->model->fingerprint, text, sizeof(m->model->fingerprint)));
   PetscCall(PetscFree(text));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -390,6 +398,7 @@ static PetscErrorCode MoveDomain(HycoH5 h, HycoROM m)
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
+  /* Two sets of nodes become one number per node, the form of older files. */
   if (!HycoH5Reads(h)) {
     PetscCall(PetscMalloc1(m->model->mesh->n_nodes, &sets));
     PetscCall(HycoROMGetDomain(m, sets));
@@ -443,6 +452,7 @@ static PetscErrorCode MoveProblem(HycoH5 h, HycoROM m)
 /* Writes everything except the whole mesh. */
 static PetscErrorCode SaveProblem(HycoH5 h, HycoROM m)
 {
+  /* The oldest format that can hold the model, so that earlier versions still read what they know. */
   PetscInt format = m->model->pairs.room ? HYCO_ROM_MOVED : HYCO_ROM_STILL;
 
   PetscFunctionBegin;
@@ -496,6 +506,7 @@ static PetscErrorCode CheckKind(HycoH5 h, const char path[])
   PetscCall(HycoH5LoadInt(h, "format", 0, PETSC_MAX_INT, &one, &one, &format));
   version = *format;
   PetscCall(PetscFree(format));
+  /* Both directions: a newer file may have datasets that change the meaning of those known here. */
   HycoCheck(version >= HYCO_ROM_OLDEST && version <= HYCO_ROM_FORMAT,
             "%s has model format %d, and this hyco (%s) reads formats %d to %d; train it again, or use the version "
             "that wrote it",
@@ -518,8 +529,10 @@ static PetscErrorCode Load(HycoH5 *h, const char path[], HycoROM *model)
   if (!ierr) ierr = MoveProblem(*h, m);
   PetscCall(HycoLogEvent(HYCO_EVENT_LOAD, PETSC_FALSE));
   PetscCall(HycoH5Close(h, PETSC_FALSE));
+  /* The scene in the file has a hyco: section: its options hold unless the command line differs. */
   if (!ierr) ierr = PetscObjectSetOptions((PetscObject)m, m->model->scene->options);
   if (!ierr) ierr = HycoROMSetFromOptions(m);
+  /* The first error is the one to report. */
   if (ierr) (void)!HycoROMDestroy(&m);
   PetscCall(ierr);
   *model = m;
@@ -549,6 +562,7 @@ static PetscErrorCode MakeImage(HycoROM m, void **image, size_t *size)
 
   PetscFunctionBegin;
   PetscCall(HycoH5CreateImage("the model", &h));
+  /* The file in memory: ranks get bytes and load them as a file, so that one code serves both. */
   ierr = SaveProblem(h, m);
   if (!ierr) ierr = HycoH5GetImage(h, image, size);
   PetscCall(HycoH5Close(&h, PETSC_FALSE));

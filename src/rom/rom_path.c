@@ -23,6 +23,7 @@ PetscErrorCode HycoTraceBegin(HycoROM m)
   HycoTrace *r = &m->trace;
 
   PetscFunctionBegin;
+  /* Only counters: the arrays keep their room from path to path. */
   r->n = r->n_listed = r->shown = 0;
   PetscCall(PetscMemzero(&r->history, sizeof(r->history)));
   PetscCall(PetscFree(r->step));
@@ -62,6 +63,7 @@ PetscErrorCode HycoTraceList(HycoROM m, PetscReal **sigma, PetscReal **inelastic
   const size_t k = (size_t)r->n_listed, n_cells = (size_t)m->model->mesh->n_cells;
 
   PetscFunctionBegin;
+  /* The last accepted step is the one that has just reached the listed time. */
   r->at[r->n_listed] = r->n - 1;
   r->shown = r->n_listed++;
   PetscCall(PetscArraycpy(r->Lambda + k * (size_t)m->model->pairs.n, m->Lambda, m->model->pairs.n));
@@ -81,6 +83,7 @@ PetscErrorCode HycoTraceMeasure(HycoROM m, HycoStep *s)
     s->total_contact_force += m->Lambda[k];
     s->lambda_max = PetscMax(s->lambda_max, m->Lambda[k]);
   }
+  /* After the largest is known: a force of round-off is not active. */
   for (PetscInt k = 0; k < m->model->pairs.n; k++) s->n_active += m->Lambda[k] > HYCO_PRESSES * s->lambda_max;
   PetscCall(ISGetLocalSize(m->model->rid, &n));
   PetscCall(ISGetIndices(m->model->rid, &node));
@@ -98,6 +101,7 @@ static PetscErrorCode ComputeFields(HycoROM m, PetscBool linear, HycoFEState sta
   PetscBool served = PETSC_FALSE;
 
   PetscFunctionBegin;
+  /* One pass over the cells without building a state; it declines where a law has one. */
   if (linear) PetscCall(HycoFELinearFields(m->fe, m->U, sigma, mises, &stored, &served));
   if (served) PetscCall(PetscArrayzero(inelastic, m->model->mesh->n_cells));
   if (linear && !served) PetscCall(HycoFELinearStress(m->fe, m->U, state, &stored));
@@ -120,6 +124,7 @@ PetscErrorCode HycoTraceRecord(HycoROM m, PetscBool linear, HycoFEState state, H
     s->inelastic = PetscMax(s->inelastic, inelastic[e]);
   }
   PetscCall(PetscFree(mises));
+  /* After the fields: the step's maxima belong to the same time. */
   PetscCall(HycoTraceMeasure(m, s));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -188,6 +193,7 @@ void HycoTraceWholeU(HycoROM m, PetscInt k, PetscReal U[])
     U[i] = m->fe_whole->u0[i];
     for (PetscInt j = 0; j < m->model->l; j++) U[i] += v[j] * gamma[j];
   }
+  /* Full-order unknowns over the modes' values, as in U; their numbers are those of the model's mesh. */
   for (PetscInt f = 0; f < m->model->n_fe; f++)
     U[m->model->mesh->node_whole[m->model->fe_dof[f] / dim] * dim + m->model->fe_dof[f] % dim] = U_fe[f];
   HycoFEComplete(m->fe_whole, U);
@@ -235,6 +241,7 @@ PetscErrorCode HycoROMSetStep(HycoROM m, PetscInt k)
              "HycoROMSetStep: %d is not a listed time that the path reached; there are %d", (int)k, (int)r->n_listed);
   at = r->at[k];
   HycoSceneSetTime(m->model->scene, m->fe->mu, r->t[at], mu);
+  /* Types with a reduced mesh have rows for its contacts alone; the rows of all follow on demand. */
   if (m->fe->mesh == m->model->mesh)
     PetscCall(HycoROMBringRows(m, mu));
   else
@@ -244,8 +251,10 @@ PetscErrorCode HycoROMSetStep(HycoROM m, PetscInt k)
   PetscCall(HycoROMExpandModal(m));
   for (PetscInt f = 0; f < m->model->n_fe; f++)
     m->U[m->model->fe_dof[f]] = r->U_fe[(size_t)at * (size_t)m->model->n_fe + (size_t)f];
+  /* After all free unknowns are set: tied and oblique nodes follow them. */
   HycoFEComplete(m->fe, m->U);
   HycoTraceShow(m, k);
+  /* Lambda has entries at all contacts: the next solution must clear those outside its own. */
   m->spread = PETSC_TRUE;
   m->whole_current = m->beyond_current = PETSC_FALSE;
   r->shown = k;

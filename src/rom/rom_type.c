@@ -30,9 +30,11 @@ PetscErrorCode HycoROMSetType(HycoROM m, HycoROMType type)
       "%s%sa model of the former type %s, which models of bodies replace: train the scene again (-hyco_model_type "
       "bodies, or without this option)",
       m->model->path, m->model->path[0] ? ": " : "", former);
+  /* A file can name a type that only another program registers. */
   HycoCheck(create, "%s%sthe type of reduced model \"%s\" is unknown; a program can add a type by HycoROMRegister()",
             m->model->path, m->model->path[0] ? ": problem/type is damaged, or another program's: " : "", type);
   PetscCheck(!m->model->data, PETSC_COMM_SELF, PETSC_ERR_ORDER, "HycoROMSetType: the model has a type");
+  /* Before the name is set: an error leaves a handle without a type. */
   PetscCall(create(m));
   PetscCall(PetscObjectChangeTypeName((PetscObject)m, type));
   PetscCall(HycoROMTypeNames(&names));

@@ -74,10 +74,12 @@ static PetscErrorCode WriteFacets(MPI_Comm comm, HycoH5 h, HycoMesh m, PetscInt 
     PetscInt least = node[0]; /* a facet belongs to the rank of its node with the smallest tag */
 
     for (PetscInt v = 1; v < m->nf; v++) least = PetscMin(least, node[v]);
+    /* Each facet on exactly one rank: overlap cells bring it to several. */
     if (HycoMeshOwned(m, least) < 0) continue;
     for (PetscInt v = 0; v < m->nf; v++) nodes[n * m->nf + v] = m->node_whole ? m->node_whole[node[v]] : node[v];
     group[n] = m->facet_group[f];
     cell[n] = m->cell_whole ? m->cell_whole[e] : e;
+    /* Group, then cell, then facet of the cell: an order that no partition changes. */
     key[n] = ((PetscInt64)group[n] * n_cells + cell[n]) * 8 + HycoMeshFacetNumber(m, f);
     n++;
   }
@@ -115,6 +117,8 @@ static PetscErrorCode WriteModes(HycoH5 h, PetscInt l, Mat V)
   PetscCall(PetscMalloc1((size_t)(last - first) * (size_t)l, &rows));
   PetscCall(MatDenseGetArrayRead(V, &v));
   for (PetscInt i = 0; i < last - first; i++) {
+    /* The file has the modes of one unknown together, as predictions read them; PETSc's dense matrix lies by
+       columns. */
     for (PetscInt j = 0; j < l; j++) rows[(size_t)i * (size_t)l + (size_t)j] = v[(size_t)j * (size_t)lda + (size_t)i];
   }
   PetscCall(MatDenseRestoreArrayRead(V, &v));
@@ -130,6 +134,7 @@ PetscErrorCode HycoROMWriteWhole(HycoH5 h, HycoFOM f, PetscInt l, Mat V)
 
   PetscFunctionBegin;
   PetscCall(HycoFOMGetRows(f, &order));
+  /* Small data once, from rank 0; the rest by rows of all ranks. */
   HycoOnRoot(HycoComm(f), WriteHead(h, m));
   PetscCall(HycoFieldsWriteMesh(h, "whole", order, m, m->xyz, PETSC_FALSE));
   PetscCall(HycoFieldWrite(h, order, m->n_nodes, IN("node_body"), HYCO_ON_NODES, MPIU_INT, 1, 1, m->node_body));
@@ -151,6 +156,7 @@ static PetscErrorCode LoadWholeMesh(HycoH5 h, HycoModel m, HycoMesh *whole)
   PetscCall(HycoMeshCreateDM(m->scene, *whole));
   n_dof = (*whole)->n_nodes * (*whole)->dim;
   PetscCall(HycoH5Real(h, "whole/V", &n_dof, m->l, &m->V_whole));
+  /* The two parts of a file may come from different writes after damage. */
   HycoCheck((*whole)->n_nodes == m->whole_nodes && (*whole)->n_cells == m->whole_cells, "%s: the whole mesh is damaged",
             m->path);
   PetscCall(HycoPairsRenumber(&m->pairs, m->mesh->node_whole, &m->whole_pairs));
@@ -167,6 +173,7 @@ static PetscErrorCode OpenWhole(HycoModel m)
 
   PetscFunctionBegin;
   if (m->whole) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Before training has written the file there is none to read from. */
   PetscCheck(m->path[0], PETSC_COMM_SELF, PETSC_ERR_PLIB, "a model in training has no whole mesh");
   PetscCall(HycoH5OpenOr(m->path, "train the model again", &h));
   ierr = LoadWholeMesh(h, m, &whole);

@@ -55,6 +55,7 @@ static PetscErrorCode Estimate(HycoSolver s, HycoSolverForm form, PetscReal *byt
     PetscCall(form->ops->estimate(s, form, bytes));
   else {
     PetscCall(HycoDirectCreate(HycoComm(s), &probe));
+    /* A floating body's K is singular: it is factored with its motions pinned. */
     PetscCall(HycoDirectPinKernel(probe, s->system->K));
     PetscCall(HycoDirectAnalyse(probe, s->system->K, NULL, NULL, s->system->symmetric, bytes));
     PetscCall(HycoDirectDestroy(&probe));
@@ -147,7 +148,7 @@ void HycoCountLinear(HycoSolver s, PetscInt its)
   s->linear_most = PetscMax(s->linear_most, its);
 }
 
-/* ksp NULL: the own interface to MUMPS. */
+/* ksp NULL: the own interface to MUMPS. Written into s->linear_method, which reports show. */
 PetscErrorCode HycoNameLinear(HycoSolver s, KSP ksp)
 {
   KSPType method;
@@ -165,6 +166,7 @@ PetscErrorCode HycoNameLinear(HycoSolver s, KSP ksp)
   PetscCall(KSPGetPC(ksp, &handle));
   PetscCall(PCGetType(handle, &pc));
   if (strcmp(pc, PCSHELL) == 0) PetscCall(PCShellGetName(handle, &pc)); /* the preconditioner inside the shell */
+  /* The package is a fact of a factor alone. */
   if (!s->iterative) PetscCall(PCFactorGetMatSolverType(handle, &package));
   if (package)
     PetscCall(PetscSNPrintf(s->linear_method, sizeof(s->linear_method), "direct: %s by %s", pc, package));

@@ -11,7 +11,8 @@
 #define HYCO_MOST_CONTACTS 3000
 
 /* M = [0 A; -A^T I] and q = (-f', 0), with the motions z in place of pinned unknowns. Rows of contacts are gathered:
-   the problem is small and identical on every rank. */
+   the problem is small and identical on every rank. Only whether contact can balance the loads on the motions is asked,
+   not the solution. */
 static PetscErrorCode Fill(HycoSystem y, PetscInt p, const Vec z[], PetscReal M[], PetscReal q[])
 {
   const size_t n = (size_t)(p + y->m);

@@ -42,6 +42,7 @@ PetscErrorCode HycoSolverCreate(MPI_Comm comm, HycoSolver *solver)
   (*solver)->rtol = 1e-8;
   (*solver)->warm = PETSC_TRUE;
   (*solver)->fallback = PETSC_TRUE;
+  /* -hyco_solver_multilevel false: the active set starts without contact. */
   (*solver)->multilevel = PETSC_TRUE;
   (*solver)->refine = PETSC_TRUE;
   PetscCall(HycoSolverCreateForms(*solver));
@@ -58,6 +59,7 @@ PetscErrorCode HycoSolverDestroy(HycoSolver *solver)
   s = *solver;
   PetscCall(HycoSystemDestroy(&s->system));
   for (PetscInt k = 0; k < s->n_forms; k++) {
+    /* A form without data has no destructor. */
     if (s->forms[k]->ops->destroy) PetscCall(s->forms[k]->ops->destroy(s->forms[k]));
     PetscCall(PetscFree(s->forms[k]));
   }
@@ -67,7 +69,8 @@ PetscErrorCode HycoSolverDestroy(HycoSolver *solver)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Takes a reference. Factors stay valid if K and B are the same objects in the same state. */
+/* Takes a reference. Factors stay valid if K and B are the same objects in the same state. The same system may be set
+   again after its matrices have changed. */
 PetscErrorCode HycoSolverSetSystem(HycoSolver s, HycoSystem system)
 {
   PetscFunctionBegin;
@@ -103,6 +106,7 @@ PetscErrorCode HycoSolverSetTaoType(HycoSolver s, const char type[])
 
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
+  /* Also after an unknown type: the former one must not stay by accident. */
   s->tao_type[0] = '\0';
   if (!type) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoTaoFindType(type, s->tao_type, list));
@@ -147,7 +151,8 @@ HycoDefineMethod(HycoSolverSetMonitor, (HycoSolver s, HycoMonitor monitor, void 
                  s->monitor = monitor;
                  s->monitor_ctx = ctx)
 
-/* -hyco_solver_form: auto, or a registered form's name. */
+/* -hyco_solver_form: auto, or a registered form's name. Registered forms, of extensions too, are words of the
+   option. */
 static PetscErrorCode ReadForm(HycoSolver s, HycoOptionItems PetscOptionsObject)
 {
   const char **words;
@@ -165,6 +170,7 @@ static PetscErrorCode ReadForm(HycoSolver s, HycoOptionItems PetscOptionsObject)
                          "full order: unknowns of the problem: forces (dual, for few contacts; dual_free without a "
                          "matrix) or gaps (primal, for as many contacts as unknowns)",
                          words, &form, NULL);
+  /* The name is the form's own, in its spelling. */
   if (!ierr) ierr = PetscStrncpy(s->form_name, form ? words[form] : "", sizeof(s->form_name));
   PetscCall(PetscFree(words));
   PetscCall(ierr);
@@ -183,6 +189,7 @@ static PetscErrorCode ReadTaoType(HycoSolver s, HycoOptionItems PetscOptionsObje
                               "sets its own options) [gpcg; ssils if nonsymmetric]",
                               type, sizeof(type), &given));
   if (!given) PetscFunctionReturn(PETSC_SUCCESS);
+  /* An option without effect is an error. */
   HycoCheck(s->type == TAO,
             "-hyco_tao_type has no effect here, because the solver type is %s; give -hyco_solver_type tao",
             HycoSolverTypes[s->type]);
@@ -203,6 +210,7 @@ PetscErrorCode HycoSolverSetFromOptions(HycoSolver s)
 
   PetscFunctionBegin;
   HycoCheckHandle(s, HYCO_SOLVER_CLASSID);
+  /* Present values are the defaults of the options. */
   linear = (PetscInt)s->linear;
   gigabytes = 1e-9 * s->memory;
   PetscObjectOptionsBegin((PetscObject)s);
@@ -301,6 +309,7 @@ static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscReal *cost
   PetscFunctionBegin;
   if (s->system->blocks && s->system->m && !form->cones) {
     *cost = -1;
+    /* The first form's reason is the most telling one. */
     if (!why[0])
       HycoFormat(why, "the form %s takes contact forces >= 0 only, and this system has other cones; use dual",
                  form->name);
@@ -412,6 +421,7 @@ static PetscErrorCode DecideByForces(HycoSolver s, Vec x, Vec L)
 
   PetscFunctionBegin;
   if (s->system->K) PetscCall(HycoKernelSize(s->system->K, &n_free));
+  /* Supports determine everything, or nothing is left to decide by. */
   if (!n_free || !s->system->m || s->system->blocks || !s->fallback || s->form == dual)
     PetscFunctionReturn(PETSC_SUCCESS);
   s->falling_back = PETSC_TRUE;
@@ -464,6 +474,7 @@ static PetscErrorCode Try(HycoSolver s, const Candidate *c, Vec x, Vec L, PetscB
   if (!form) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscStrncpy(before, s->method, sizeof(before)));
   PetscCall(Attempt(s, form, x, L));
+  /* A residual just above the tolerance may be round-off of the factor, which twice the precision removes. */
   if (s->reason < 0 && s->refine && form->ops->refine) PetscCall(form->ops->refine(s, form, &better));
   if (s->reason < 0 && better) PetscCall(Attempt(s, form, x, L));
   if (s->falling_back) PetscCall(NameFallback(s, before));
@@ -563,6 +574,7 @@ PetscErrorCode HycoSolverSolveLinear(HycoSolver s, Vec r, Vec x)
   PetscCall(HycoSystemWork(y));
   PetscCall(HycoStiffnessSolve(s, r, x));
   PetscCall(MatMult(y->K, x, y->work_x[0]));
+  /* One step of refinement: solutions of loads are combined later, and their errors with them. */
   PetscCall(VecAYPX(y->work_x[0], -1, r));
   PetscCall(HycoStiffnessSolve(s, y->work_x[0], y->work_x[1]));
   PetscCall(VecAXPY(x, 1, y->work_x[1]));

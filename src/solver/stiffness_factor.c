@@ -73,6 +73,7 @@ static PetscErrorCode RefineDense(HycoSolver s, PetscInt n, const PetscReal b[],
   PetscBLASInt ld;
 
   PetscFunctionBegin;
+  /* K may be a part of a larger dense matrix. */
   PetscCall(MatDenseGetLDA(s->system->K, &lda));
   PetscCall(PetscBLASIntCast(lda, &ld));
   PetscCall(MatDenseGetArrayRead(s->system->K, &K));
@@ -91,6 +92,7 @@ static void RefineProduct(HycoSolver s, const PetscReal B[], const PetscReal X[]
     for (size_t i = 0; i < m; i++) {
       PetscReal sum[2] = {0, 0};
 
+      /* Each product with its rounding error, summed in a pair of doubles. */
       for (size_t k = 0; k < n; k++) HycoAddProduct(B[k * m + i], X[j * n + k], sum);
       S[j * m + i] = sum[0] + sum[1];
     }
@@ -140,6 +142,7 @@ PetscErrorCode HycoStiffnessSolve(HycoSolver s, Vec r, Vec x)
   PetscBLASInt one = 1, info;
 
   PetscFunctionBegin;
+  /* Sparse: MUMPS refines by itself. */
   if (!f->lu) {
     PetscCall(HycoDirectSolve(f->direct, r, x));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -170,6 +173,7 @@ PetscErrorCode HycoStiffnessRefine(HycoSolver s, const PetscReal L[], Vec x)
   PetscCall(MatDenseGetArrayRead(y->Bt, &bt));
   PetscCall(VecGetArrayRead(y->F, &F));
   for (size_t i = 0; i < n; i++) {
+    /* F - Bt L as an unevaluated sum of two doubles. */
     PetscReal sum[2] = {F[i], 0};
 
     for (size_t k = 0; k < (size_t)y->m; k++) HycoAddProduct(-bt[k * n + i], L[k], sum);
@@ -234,8 +238,10 @@ PetscErrorCode HycoStiffnessFactor(HycoSolver s, Mat Bt, Mat B, PetscReal S[], P
     if (B) PetscCall(PetscObjectTypeCompare((PetscObject)B, MATSEQDENSE, &dense_B));
     PetscCheck(dense_B, PETSC_COMM_SELF, PETSC_ERR_SUP, "a dense K needs a dense B");
     HycoLogged(HYCO_EVENT_FACTOR, FactorDense(f, K, singular));
+    /* For a sparse K the Schur complement comes with the factor. */
     if (B && !*singular) HycoLogged(HYCO_EVENT_FACTOR, HycoStiffnessCondense(s, Bt, B, S));
   }
+  /* Only a complete factor is marked as that of K. */
   if (!*singular) PetscCall(HycoOperatorStateUpdate(&f->of, K, B, &same));
   s->seconds_factor += HycoNow() - begin;
   PetscFunctionReturn(PETSC_SUCCESS);

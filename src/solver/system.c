@@ -104,6 +104,7 @@ PetscErrorCode HycoSystemSetVectors(HycoSystem s, Vec F, Vec D)
              "F has length %d and D %d where %d and %d are expected", (int)n, (int)m, (int)s->n, (int)s->m);
   PetscCall(PetscObjectReference((PetscObject)F));
   if (D) PetscCall(PetscObjectReference((PetscObject)D));
+  /* Work vectors have the layout of F and D. */
   if (F != s->F || D != s->D) PetscCall(FreeWork(s));
   HycoDestroyAll(&s->F, &s->D);
   s->F = F;
@@ -190,6 +191,7 @@ PetscErrorCode HycoSystemSetBlocks(HycoSystem s, PetscInt n_cones, const HycoCon
   if (n_cones) HycoOnEach(HycoComm(s), CheckCover(n_cones, cones, n_blocks, cone_of, data, rows));
   for (PetscInt c = 0; c < n_cones; c++) other = (PetscBool)(other || !cones[c]->nonnegative);
   PetscCall(HycoBlocksDestroy(&s->blocks));
+  /* Nonnegative cones alone are the plain problem, for which all methods exist. */
   if (other) PetscCall(HycoBlocksCreate(n_cones, cones, n_blocks, cone_of, data, &s->blocks));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -240,6 +242,7 @@ static PetscErrorCode DropRounding(HycoSystem s, Vec x, Vec r, Vec diagonal, Pet
   PetscCall(VecGetArrayRead(x, &X));
   PetscCall(VecGetArrayRead(s->F, &F));
   for (PetscInt i = 0; i < n; i++) {
+    /* Negated, so that a NaN stays in the residual. */
     if (!(PetscAbsReal(residual[i]) <= 16 * PETSC_MACHINE_EPSILON * (PetscAbsReal(K[i] * X[i]) + PetscAbsReal(F[i]))))
       continue;
     squares += residual[i] * residual[i];
@@ -276,6 +279,7 @@ static PetscErrorCode Stationarity(HycoSystem s, Vec x, Vec L, PetscReal *value,
   PetscCall(DropRounding(s, x, Kx, BtL, &dropped));
   PetscCall(VecNorm(Kx, NORM_2, &nr));
   size = PetscMax(PetscMin(nK, nB + nF), PetscMax(nB, nF));
+  /* Absolute: paths compare it with Newton's residual. */
   s->residual = nr;
   *value = PetscMax(Quotient(nr, size), free_work);
   *rounding = Quotient(dropped, size);
@@ -292,8 +296,10 @@ static PetscErrorCode BlockKKT(HycoSystem s, const PetscReal w[], const PetscRea
   PetscReal local[3], worst[3];
 
   PetscFunctionBegin;
+  /* The map's parts: what is missing of a force, what lies outside its cone, and their difference. */
   PetscCall(HycoBlocksNaturalMap(s->blocks, size_w > 0 ? force / size_w : 1, l, w, &map));
   local[0] = map.missing, local[1] = map.outside, local[2] = map.map;
+  /* Blocks are on the ranks of their rows. */
   PetscCallMPI(MPI_Allreduce(local, worst, 3, MPIU_REAL, MPI_MAX, HycoComm(s)));
   kkt->penetration = Quotient(worst[0], force);
   kkt->adhesion = Quotient(worst[1], force);
@@ -324,6 +330,7 @@ static PetscErrorCode FlexibilityKKT(HycoSystem s, Vec L, HycoKKT *kkt)
     for (PetscInt i = 0; l[j] != 0 && i < m; i++) w[i] += column[i] * l[j];
   }
   for (PetscInt i = 0; i < m; i++) {
+    /* The terms of which a gap is the difference. */
     size = PetscMax(size, PetscMax(PetscAbsReal(g[i]), PetscAbsReal(w[i])));
     w[i] += g[i];
     if (!(PetscAbsReal(w[i]) <= PETSC_MAX_REAL) || !(PetscAbsReal(l[i]) <= PETSC_MAX_REAL)) /* or NaN */
@@ -339,6 +346,7 @@ static PetscErrorCode FlexibilityKKT(HycoSystem s, Vec L, HycoKKT *kkt)
   kkt->adhesion = worst[1] > 0 ? worst[1] / most : 0;
   kkt->complementarity = worst[2];
   for (PetscInt i = 0; s->blocks && i < m; i++) stiffest = PetscMax(stiffest, G[(size_t)i * (size_t)m + (size_t)i]);
+  /* Without any force the gap over the stiffest flexibility is the scale of forces. */
   if (s->blocks) PetscCall(BlockKKT(s, w, l, size, most, Quotient(size, stiffest), kkt));
   PetscCall(VecRestoreArray(s->work_L, &w));
   PetscCall(VecRestoreArrayRead(L, &l));
@@ -354,6 +362,7 @@ static PetscErrorCode GapKKT(HycoSystem s, Vec gap, Vec L, PetscReal size_gap, P
   const PetscScalar *w, *l;
 
   PetscFunctionBegin;
+  /* The loads stand for the forces that are missing. */
   PetscCall(VecNorm(s->F, NORM_INFINITY, &load));
   PetscCall(VecGetArrayRead(gap, &w));
   PetscCall(VecGetArrayRead(L, &l));
@@ -428,6 +437,7 @@ PetscErrorCode HycoSystemView(HycoSystem s, PetscViewer viewer)
   for (PetscInt c = 0; s->blocks && c < s->blocks->n_cones; c++)
     PetscCall(PetscViewerASCIIPrintf(viewer, "cone: %s, %d components\n", ((PetscObject)s->blocks->cone[c])->type_name,
                                      (int)s->blocks->cone[c]->size));
+  /* Sizes and nonzeros. */
   PetscCall(PetscViewerPushFormat(viewer, PETSC_VIEWER_ASCII_INFO));
   if (s->K) PetscCall(MatView(s->K, viewer));
   if (s->B && s->m) PetscCall(MatView(s->B, viewer));

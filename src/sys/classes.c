@@ -48,7 +48,8 @@ PetscErrorCode HycoPackageCheck(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A freed handle may still be readable: PetscHeaderDestroy() clears the class id, so that this finds most of them. */
+/* A freed handle may still be readable: PetscHeaderDestroy() clears the class id, so that this finds most of them. For
+   programs that call the library: hyco itself passes no wrong handle. */
 PetscErrorCode HycoHandleCheck(const void *handle, const PetscClassId *classid, const char function[])
 {
   size_t k = 0;

@@ -14,7 +14,8 @@ PetscBool HycoWantsTrace(void)
 
 static char caught_line[HYCO_LINE];
 
-/* Keeps the first message of an error, where it is raised; the calls that it passes through add none. */
+/* Keeps the first message of an error, where it is raised; the calls that it passes through add none. PETSc's own
+   checks have a text as well, which may be all there is. */
 static PetscErrorCode CatchHandler(MPI_Comm comm, int line, const char *function, const char *file, PetscErrorCode code,
                                    PetscErrorType type, const char *message, void *ctx)
 {
@@ -31,7 +32,7 @@ static PetscErrorCode CatchHandler(MPI_Comm comm, int line, const char *function
 }
 
 /* The number of bytes of the character at `c` if it can be printed, in UTF-8 without control characters; 0: it cannot.
- */
+   No full check of UTF-8: enough that nothing moves the cursor. */
 static size_t Printable(const unsigned char *c)
 {
   const size_t n = c[0] < 0x80 ? 1 : c[0] >= 0xc2 && c[0] < 0xe0 ? 2 : (c[0] & 0xf0) == 0xe0 ? 3 : c[0] < 0xf5 ? 4 : 0;
@@ -100,7 +101,8 @@ PetscErrorCode HycoCatchNoModel(PetscErrorCode caught, const char message[])
   SETERRQ(PETSC_COMM_SELF, caught, "%s", message);
 }
 
-/* Collective, also without an error. The first rank that failed is heard: others often fail as a consequence. */
+/* Collective, also without an error. The first rank that failed is heard: others often fail as a consequence. message:
+   this rank's, empty if it has not failed. */
 PetscErrorCode HycoErrorSync(MPI_Comm comm, PetscErrorCode caught, const char message[])
 {
   PetscMPIInt size, mine, first;

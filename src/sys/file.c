@@ -20,7 +20,8 @@ struct _n_HycoFile {
   char place[PETSC_MAX_PATH_LEN], temporary[HYCO_FILE_NAME];
 };
 
-/* Identifies the machine since its last start, and the space of its process ids: each container has its own. */
+/* Identifies the machine since its last start, and the space of its process ids: each container has its own. A process
+   id alone would match another machine's process on a shared disk. */
 static unsigned Node(void)
 {
   static unsigned node;
@@ -44,7 +45,7 @@ static unsigned Node(void)
 }
 
 /* The position of ".hyco-NODE-PID-NUMBER." in a file's name, with its numbers; NULL: not found. Names may contain
-   ".hyco-" themselves: the next occurrence is tried. */
+   ".hyco-" themselves: the next occurrence is tried. Node, process and number make temporary names unique. */
 static const char *FindTag(const char name[], unsigned *node, long *pid)
 {
   unsigned number;
@@ -84,8 +85,9 @@ static PetscBool IsLeft(const char path[], unsigned node, long pid)
   return (PetscBool)(stat(path, &info) == 0 && S_ISREG(info.st_mode) && time(NULL) - info.st_mtime > OLD);
 }
 
-/* Called before writing: a killed run leaves its temporary file, which has the size of a model. An empty name
-   sweeps the folder. Failures are ignored, since another process may sweep too. */
+/* Called before writing: a killed run leaves its temporary file, which has the size of a model. An empty name sweeps
+   the folder. Failures are ignored, since another process may sweep too. Only files of processes of this machine that
+   do not run any more are removed. */
 PetscErrorCode HycoFileSweep(const char path[])
 {
   char place[PETSC_MAX_PATH_LEN], file[2 * PETSC_MAX_PATH_LEN];
@@ -114,7 +116,7 @@ PetscErrorCode HycoFileSweep(const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One name for all ranks, made on rank 0. */
+/* One name for all ranks, made on rank 0. In the folder of the output: a rename works within one file system only. */
 PetscErrorCode HycoFileScratch(MPI_Comm comm, const char path[], const char kind[], char scratch[HYCO_FILE_NAME])
 {
   char place[PETSC_MAX_PATH_LEN];
@@ -128,6 +130,7 @@ PetscErrorCode HycoFileScratch(MPI_Comm comm, const char path[], const char kind
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* rename() is atomic: a reader sees the old file or the new one. */
 PetscErrorCode HycoFileKeep(const char scratch[], const char path[])
 {
   char place[PETSC_MAX_PATH_LEN];
@@ -144,7 +147,8 @@ PetscErrorCode HycoFileKeep(const char scratch[], const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Before long work. A file that does not exist is checked when it is opened. */
+/* Before long work. A file that does not exist is checked when it is opened. *direct: it is written to as it is,
+   without a temporary file. */
 PetscErrorCode HycoFileCheckPlace(const char option[], const char path[], HycoFileKind kind, PetscBool *direct)
 {
   const char *dash = option[0] ? "-" : "", *blank = option[0] ? " " : "";
@@ -182,7 +186,8 @@ PetscErrorCode HycoFileOpenScratch(const char scratch[], const char path[], int 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* O_EXCL: a temporary name that exists belongs to another process, and must not be written to. */
+/* O_EXCL: a temporary name that exists belongs to another process, and must not be written to. Permissions are those of
+   the user's umask. */
 static PetscErrorCode OpenPlace(HycoFile f)
 {
   int fd;
@@ -229,7 +234,8 @@ static int Flush(HycoFile f)
   return 0;
 }
 
-/* pwrite() may write less than asked, for example at a limit of 2 GB. */
+/* pwrite() may write less than asked, for example at a limit of 2 GB. At a place of its own: ranks write to one file at
+   the same time. */
 PetscErrorCode HycoFilePut(int fd, const char path[], const void *data, size_t bytes, size_t place)
 {
   PetscFunctionBegin;

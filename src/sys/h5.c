@@ -69,6 +69,7 @@ static PetscErrorCode Free(HycoH5 *file)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Also of files that are only created: readers take what they find. */
 static hid_t Access(void)
 {
   hid_t access = H5Pcreate(H5P_FILE_ACCESS);
@@ -100,8 +101,8 @@ static PetscErrorCode MarkSealed(HycoH5 f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A file in memory: HDF5 cannot close a file on a full disk, but memory can be discarded. Nothing reaches the
-   disk: backing store is off in InMemory(). */
+/* A file in memory: HDF5 cannot close a file on a full disk, but memory can be discarded. Nothing reaches the disk:
+   backing store is off in InMemory(). `table`: a file for other programs, whose mark is an attribute and no dataset. */
 static PetscErrorCode CreateImage(const char name[], PetscBool table, HycoH5 *file)
 {
   hid_t access;
@@ -126,7 +127,8 @@ PetscErrorCode HycoH5CreateImage(const char name[], HycoH5 *file)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The output is opened first: a place that cannot be written to is an error before the numbers are computed. */
+/* The output is opened first: a place that cannot be written to is an error before the numbers are computed. The file
+   on the disk is written when it is closed. */
 static PetscErrorCode Create(const char path[], PetscBool table, HycoH5 *file)
 {
   HycoFile out;
@@ -145,8 +147,8 @@ PetscErrorCode HycoH5Create(const char path[], HycoH5 *file)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Checks that there is space for the description of one more dataset, and for a file with `bytes` of numbers. Rank
-   0. */
+/* Checks that there is space for the description of one more dataset, and for a file with `bytes` of numbers. Rank 0.
+   HDF5 cannot close a file on a full disk: better to find out before. */
 static PetscErrorCode MakeRoom(HycoH5 f, size_t bytes)
 {
   static const char zeros[ROOM];
@@ -160,7 +162,8 @@ static PetscErrorCode MakeRoom(HycoH5 f, size_t bytes)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On rank 0. O_EXCL in HycoFileOpenScratch() claims the name, then HDF5 truncates the same file. */
+/* On rank 0. O_EXCL in HycoFileOpenScratch() claims the name, then HDF5 truncates the same file. HDF5 and this program
+   have the file open at the same time, for metadata and numbers. */
 static PetscErrorCode BeginShared(HycoH5 f)
 {
   PetscBool direct;
@@ -197,7 +200,8 @@ static PetscErrorCode OpenShared(HycoH5 f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One rank needs no shared file. With several, rank 0 allocates the datasets under a temporary name, and all write to it. */
+/* One rank needs no shared file. With several, rank 0 allocates the datasets under a temporary name, and all write to
+   it. HDF5 need not be built for MPI. */
 static PetscErrorCode CreateShared(MPI_Comm comm, const char path[], PetscBool table, HycoH5 *file)
 {
   HycoH5 f;
@@ -234,7 +238,7 @@ PetscErrorCode HycoH5CreateTable(MPI_Comm comm, const char path[], HycoH5 *file)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* HDF5 copies the image: the caller may free it. */
+/* HDF5 copies the image: the caller may free it. For models that are broadcast: other ranks read no file. */
 PetscErrorCode HycoH5OpenImage(const char name[], void *image, size_t size, HycoH5 *file)
 {
   hid_t access = InMemory();
@@ -252,7 +256,8 @@ PetscErrorCode HycoH5OpenImage(const char name[], void *image, size_t size, Hyco
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The checksum is verified before HDF5 parses anything: a damaged structure can crash it. */
+/* The checksum is verified before HDF5 parses anything: a damaged structure can crash it. Files of other programs, such
+   as meshes, have no seal, and are opened as well. */
 PetscErrorCode HycoH5Open(const char path[], HycoH5 *file)
 {
   HycoH5 f;
@@ -281,7 +286,8 @@ PetscErrorCode HycoH5Open(const char path[], HycoH5 *file)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What cannot be opened is not hyco's; a model has `kind`, a snapshot a fingerprint. */
+/* What cannot be opened is not hyco's; a model has `kind`, a snapshot a fingerprint. Asked before a file is
+   overwritten. */
 PetscErrorCode HycoH5IsPrecious(const char path[], PetscBool *precious)
 {
   HycoH5 h = NULL;
@@ -310,7 +316,7 @@ PetscErrorCode HycoH5OpenOr(const char path[], const char remedy[], HycoH5 *file
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The caller frees *image. */
+/* The caller frees *image. The first call gives the size. */
 PetscErrorCode HycoH5GetImage(HycoH5 f, void **image, size_t *size)
 {
   ssize_t bytes = H5Fflush(f->id, H5F_SCOPE_GLOBAL) < 0 ? -1 : H5Fget_file_image(f->id, NULL, 0);
@@ -326,8 +332,8 @@ PetscErrorCode HycoH5GetImage(HycoH5 f, void **image, size_t *size)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Writes the image of the file in memory, followed by its seal. Fails if there is no memory for a copy; a full disk
-   is reported when the file is closed. */
+/* Writes the image of the file in memory, followed by its seal. Fails if there is no memory for a copy; a full disk is
+   reported when the file is closed. The checksum is of exactly what is written. */
 static PetscErrorCode WriteImage(HycoH5 f)
 {
   unsigned char seal[HYCO_SEAL];
@@ -356,7 +362,7 @@ static PetscErrorCode Sync(HycoH5 f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Seals the file and renames it. On rank 0. */
+/* Seals the file and renames it. On rank 0. Sealed last: a file with a seal is complete. */
 static PetscErrorCode Place(HycoH5 f)
 {
   unsigned char seal[HYCO_SEAL];
@@ -375,8 +381,8 @@ static PetscErrorCode Place(HycoH5 f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rank 0's HDF5 has created all datasets. Before the other ranks' data are synced, because HDF5 writes its
-   metadata at the close. */
+/* Rank 0's HDF5 has created all datasets. Before the other ranks' data are synced, because HDF5 writes its metadata at
+   the close. From here on the file's structure does not change any more. */
 static PetscErrorCode EndLayout(HycoH5 f)
 {
   /* Cleared first: after a failed close CloseShared() must not close it again. */
@@ -486,8 +492,8 @@ static PetscErrorCode FindSet(HycoH5 f, const char name[], hid_t type, PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Writes the rows first .. first + n - 1 of a dataset into the file in memory. Writes to parts of a dataset one
-   after another: rows of several times, or of several points. */
+/* Writes the rows first .. first + n - 1 of a dataset into the file in memory. Writes to parts of a dataset one after
+   another: rows of several times, or of several points. Negative: HDF5 has failed. */
 static herr_t PutRows(hid_t set, hid_t type, PetscInt cols, PetscInt first, PetscInt n, const void *data)
 {
   const hsize_t start[2] = {(hsize_t)first, 0}, count[2] = {(hsize_t)n, (hsize_t)cols};
@@ -501,7 +507,8 @@ static herr_t PutRows(hid_t set, hid_t type, PetscInt cols, PetscInt first, Pets
   return failed;
 }
 
-/* Writes the rows first .. first + n - 1 of a dataset with `rows` rows; creates the dataset if it does not exist. */
+/* Writes the rows first .. first + n - 1 of a dataset with `rows` rows; creates the dataset if it does not exist. A
+   shared file's dataset has a place, at which numbers are written without HDF5. */
 static PetscErrorCode Write(HycoH5 f, const char name[], hid_t type, PetscInt rows, PetscInt cols, PetscInt first,
                             PetscInt n, const void *data)
 {
@@ -616,6 +623,7 @@ PetscErrorCode HycoH5WriteAttribute(HycoH5 f, const char at[], const char name[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One number is a scalar, as VTK expects. */
 PetscErrorCode HycoH5WriteAttributeInt(HycoH5 f, const char at[], const char name[], PetscInt n, const PetscInt value[])
 {
   const hsize_t size = (hsize_t)n;
@@ -639,7 +647,8 @@ static PetscBool IsPlain(hid_t set)
   return plain;
 }
 
-/* Opens a two-dimensional dataset of the wanted class and returns its size. The caller closes the set. */
+/* Opens a two-dimensional dataset of the wanted class and returns its size. The caller closes the set. Files may come
+   from anywhere: nothing in them is trusted before it is checked. */
 static PetscErrorCode OpenSet(HycoH5 f, const char name[], H5T_class_t wanted, hid_t *set, hsize_t dims[2])
 {
   const hsize_t most = PetscMin((hsize_t)PETSC_MAX_INT, (hsize_t)f->size);
@@ -723,6 +732,7 @@ static PetscErrorCode CheckFinite(HycoH5 f, const char name[], size_t n, const P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Into an array of the caller, of the size asked for. */
 PetscErrorCode HycoH5ReadReal(HycoH5 file, const char name[], PetscInt rows, PetscInt cols, PetscReal *data)
 {
   hid_t set;
@@ -736,7 +746,8 @@ PetscErrorCode HycoH5ReadReal(HycoH5 file, const char name[], PetscInt rows, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads a dataset into new memory (*data), `size` bytes per number, with room for one more. */
+/* Reads a dataset into new memory (*data), `size` bytes per number, with room for one more. *rows and *cols are -1 if
+   any size is right, and become that of the file. */
 static PetscErrorCode LoadSet(HycoH5 f, const char name[], H5T_class_t class, hid_t type, size_t size, PetscInt *rows,
                               PetscInt *cols, void *data)
 {
@@ -753,6 +764,7 @@ static PetscErrorCode LoadSet(HycoH5 f, const char name[], H5T_class_t class, hi
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Infinite numbers and not a number in a file are damage. */
 PetscErrorCode HycoH5LoadReal(HycoH5 file, const char name[], PetscInt *rows, PetscInt *cols, PetscReal **data)
 {
   PetscFunctionBegin;
@@ -778,7 +790,7 @@ PetscErrorCode HycoH5LoadInt(HycoH5 file, const char name[], PetscInt lo, PetscI
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* No row: the ranks that have none need not open the dataset. */
+/* No row: the ranks that have none need not open the dataset. A contiguous part, as each rank reads its own. */
 PetscErrorCode HycoH5ReadRows(HycoH5 file, const char name[], PetscInt start, PetscInt n, PetscInt cols,
                               PetscReal *data)
 {
@@ -840,7 +852,8 @@ PetscErrorCode HycoH5Reals(HycoH5 file, const char name[], PetscInt n, PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reads into the caller's array, after the range check in memory of its own. */
+/* Reads into the caller's array, after the range check in memory of its own. Writes or reads, by the direction of the
+   file. */
 PetscErrorCode HycoH5Ints(HycoH5 file, const char name[], PetscInt lo, PetscInt hi, PetscInt n, PetscInt data[])
 {
   PetscInt *read = data;

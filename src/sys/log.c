@@ -48,7 +48,7 @@ static void Note(HycoEvent event, PetscBool begin)
   depth += begin ? 1 : -1;
 }
 
-/* If a name cannot be registered, its time counts for the enclosing event. */
+/* If a name cannot be registered, its time counts for the enclosing event. At the first event, when PETSc has been initialised. */
 static PetscErrorCode Register(void)
 {
   PetscClassId id;

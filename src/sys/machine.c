@@ -31,7 +31,8 @@ double HycoNumber(const char text[], char **end)
   return number;
 }
 
-/* The factorisation makes BLAS allocate its buffers now, where a lack of memory can be reported. */
+/* The factorisation makes BLAS allocate its buffers now, where a lack of memory can be reported. OpenBLAS ends the
+   program without a message if it cannot have its buffers. */
 PetscErrorCode HycoReserveBLAS(void)
 {
   static PetscBool done;

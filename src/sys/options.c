@@ -33,6 +33,7 @@ static PetscErrorCode ForgetTable(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Zeroed, so that it can be filled again. */
 PetscErrorCode HycoOptionListDestroy(HycoOptionList *list)
 {
   PetscFunctionBegin;
@@ -44,7 +45,8 @@ PetscErrorCode HycoOptionListDestroy(HycoOptionList *list)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Declarations may record others inside: the former list is restored, on errors too. */
+/* Declarations may record others inside: the former list is restored, on errors too. With an empty database: no option
+   is found, each is only noted. */
 PetscErrorCode HycoOptionsRecord(HycoOptionList *list, PetscErrorCode (*declare)(PetscOptions))
 {
   PetscOptions none;
@@ -70,7 +72,8 @@ void HycoOptionsSetDeclare(PetscErrorCode (*declare)(PetscOptions))
   declare_all = declare;
 }
 
-/* Made at the first use: programs that only solve never need it. */
+/* Made at the first use: programs that only solve never need it. Of all classes of the library; the program's own
+   options are its commands'. */
 PetscErrorCode HycoGetOptionTable(PetscInt *n, const HycoOption *options[])
 {
   PetscFunctionBegin;
@@ -84,7 +87,7 @@ PetscErrorCode HycoGetOptionTable(PetscInt *n, const HycoOption *options[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* An entry that ends with _ is a prefix: the rest of the name is the user's. */
+/* An entry that ends with _ is a prefix: the rest of the name is the user's. Letter case is ignored, as PETSc does. */
 const HycoOption *HycoOptionListFind(const HycoOptionList *list, const char name[])
 {
   for (PetscInt k = 0; k < list->n; k++) {
@@ -162,6 +165,7 @@ const char *HycoNearest(const char *word, PetscInt n, const char *const names[])
   return nearest;
 }
 
+/* NULL if nothing is near. */
 const char *HycoOptionNearest(const char word[], const HycoOptionList *more)
 {
   const HycoOptionList *lists[] = {&table, more};
@@ -270,6 +274,7 @@ static PetscErrorCode Find(HycoOptionItems items, const char name[], const char 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Present values are the defaults, which the help shows. */
 PetscErrorCode HycoOptionsReal_Private(HycoOptionItems items, const char name[], const char text[], PetscReal lo,
                                        PetscReal hi, PetscReal *value, PetscBool *set)
 {
@@ -320,7 +325,7 @@ PetscErrorCode HycoOptionsInt_Private(HycoOptionItems items, const char name[], 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The index of `word` in `words`, which ends with NULL. */
+/* The index of `word` in `words`, which ends with NULL. Letter case is ignored. */
 static PetscErrorCode FindWord(HycoOptionItems items, const char name[], const char word[], const char *const words[],
                                PetscInt *index)
 {
@@ -352,6 +357,7 @@ PetscErrorCode HycoOptionsBool_Private(HycoOptionItems items, const char name[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The words are the form in the help. */
 PetscErrorCode HycoOptionsWord_Private(HycoOptionItems items, const char name[], const char text[],
                                        const char *const words[], PetscInt *index, PetscBool *set)
 {

@@ -34,8 +34,8 @@ void HycoFileFollow(const char path[], char end[PETSC_MAX_PATH_LEN])
   }
 }
 
-/* A file that does not exist is identified by its folder and name, so that two options that would create the same
-   file are found. */
+/* A file that does not exist is identified by its folder and name, so that two options that would create the same file
+   are found. Device and inode: two names of one file are equal, whatever links there are. */
 void HycoFileIdentify(const char path[], HycoFileIdentity *identity)
 {
   char end[PETSC_MAX_PATH_LEN];

@@ -67,7 +67,8 @@ static PetscErrorCode OpenWindow(HycoQueue q)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Contiguous ranks form a group, which usually share a node. kind NULL: all tasks are of one kind. Collective. */
+/* Contiguous ranks form a group, which usually share a node. kind NULL: all tasks are of one kind. Collective. Tasks
+   are taken, not assigned: groups that are faster take more. */
 PetscErrorCode HycoQueueCreate(MPI_Comm comm, PetscInt n_groups, PetscInt n, const PetscInt kind[], HycoQueue *queue)
 {
   PetscMPIInt rank;
@@ -113,7 +114,8 @@ PetscErrorCode HycoQueueGetGroup(HycoQueue q, MPI_Comm *group)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds to a counter atomically; returns its former value. more = 0 reads. */
+/* Adds to a counter atomically; returns its former value. more = 0 reads. MPI_Fetch_and_op() needs no lock between
+   ranks. */
 static PetscErrorCode Add(HycoQueue q, PetscInt counter, PetscInt more, PetscInt *before)
 {
   PetscFunctionBegin;
@@ -148,7 +150,8 @@ static PetscErrorCode NextKind(HycoQueue q)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The next task; -1: none. On the group's rank that accesses the counters. */
+/* The next task; -1: none. On the group's rank that accesses the counters. `busy` is of the whole group, whose first
+   rank calls this. */
 static PetscErrorCode TakeTask(HycoQueue q, PetscInt *task)
 {
   PetscInt failed, done, at;
@@ -212,7 +215,8 @@ PetscErrorCode HycoQueueServe(HycoQueue q)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Collective on the group: all its ranks fail together, so that none waits for another. */
+/* Collective on the group: all its ranks fail together, so that none waits for another. A group that works for hours
+   asks between its steps. */
 PetscErrorCode HycoQueueHear(HycoQueue q)
 {
   PetscInt failed = 0;

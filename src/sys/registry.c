@@ -36,7 +36,8 @@ static PetscErrorCode Add(HycoRegistry *r, const char name[], HycoVoidFn *create
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Every registry is forgotten in PetscFinalize(), so that a program can initialise PETSc again. */
+/* Every registry is forgotten in PetscFinalize(), so that a program can initialise PETSc again. Registries are static
+   objects; each is chained in once. */
 static PetscErrorCode Begin(HycoRegistry *r)
 {
   PetscFunctionBegin;
@@ -77,7 +78,8 @@ PetscErrorCode HycoRegistryNames(HycoRegistry *r, PetscInt *n, const char *const
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* "a, b or c", with a suggestion, for messages about an unknown name. */
+/* "a, b or c", with a suggestion, for messages about an unknown name. In the order of registration, or sorted if the
+   registry is. */
 PetscErrorCode HycoRegistryList(HycoRegistry *r, const char name[], char list[HYCO_LINE])
 {
   const char *near;

@@ -24,8 +24,9 @@ static void StoreWord(unsigned long long word, unsigned char byte[8])
   for (int k = 0; k < 8; k++, word >>= 8) byte[k] = (unsigned char)(word & 255);
 }
 
-/* FNV-1a by words instead of bytes (eight times as fast), the rest by bytes. Each step is a bijection of the hash
-   and of the word: damage within one word is always detected. `bytes` is a multiple of 8, except in the last call. */
+/* FNV-1a by words instead of bytes (eight times as fast), the rest by bytes. Each step is a bijection of the hash and
+   of the word: damage within one word is always detected. `bytes` is a multiple of 8, except in the last call. No
+   protection against intent, only against damage: truncated copies, bad disks. */
 static unsigned long long Sum(unsigned long long sum, const unsigned char *data, size_t bytes)
 {
   size_t k = 0;
@@ -85,6 +86,7 @@ static PetscErrorCode Open(const char path[], FILE **file, size_t *size)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Magic word, size, checksum: the size alone finds most truncated files at once. */
 PetscErrorCode HycoSealFile(const char path[], size_t *size, unsigned char seal[HYCO_SEAL])
 {
   FILE *file;

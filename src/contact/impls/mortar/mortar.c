@@ -12,6 +12,7 @@ static PetscErrorCode CheckSupported(HycoContact c, HycoFE fe)
   PetscInt g = 0;
 
   PetscFunctionBegin;
+  /* In 1D a contact is between two points. */
   HycoCheck(m->dim > 1, "contact %s: type mortar integrates over facets, which a 1D mesh does not have; use type: pair",
             c->name);
   PetscCall(HycoMeshFindGroup(m, "contact", c->slave, &g));
@@ -35,8 +36,10 @@ static PetscErrorCode CheckFacing(HycoContact c, HycoFE fe, const HycoPairs *p, 
   PetscCall(HycoContactGetLength(c, "tolerance", &stated));
   for (PetscInt k = first; k < p->n; k++) {
     if (p->master_start[k + 1] > p->master_start[k]) continue;
+    /* The first such node, to be named. */
     if (!alone++) one = p->slave[k];
   }
+  /* A stated tolerance means that nodes beyond it have no contact; but not that all of them have none. */
   if (!alone || (stated >= 0 && (p->facts || alone < p->n - first))) PetscFunctionReturn(PETSC_SUCCESS);
   HycoFail("contact %s: %d of the %d nodes of %s face no part of %s within %g, among them node %d; draw the surfaces "
            "closer, remove these nodes from %s, extend %s, or give a %scontact_%s_tolerance, with which nodes that do "

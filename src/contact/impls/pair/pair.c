@@ -51,8 +51,10 @@ static PetscErrorCode MatchAlong(HycoMasterSearch *t, HycoContact c, HycoMatch *
     HycoProjection nearest;
 
     along[k].n = 0; /* this matches mirrored surfaces at any distance */
+    /* A node without an outward normal (of no facet) has no line to search along. */
     if (out) HycoPatchesAlongLine(t->patches, t->X + 3 * m->slave[k], out, m->small, &along[k]);
     HycoMasterSearchProject(t, m->slave[k], PETSC_TRUE, &nearest);
+    /* Nodes whose nearest facet faces away need no partner: they are on a side that the contact does not meet. */
     needs[k] = (PetscBool)(!out || HycoDot(out, t->normal + 3 * nearest.patch) <= HYCO_OPPOSED);
   }
   PetscCall(AreMatched(t->fe->mesh, m->n, along, needs, Farthest(stated, m), &matched));
@@ -60,6 +62,7 @@ static PetscErrorCode MatchAlong(HycoMasterSearch *t, HycoContact c, HycoMatch *
     const PetscReal *out = HycoMasterSearchOutward(t, m->slave[k]);
 
     m->at[k] = along[k];
+    /* A partner behind the surface, seen through the body. */
     if (m->at[k].n && HycoDot(out, t->normal + 3 * m->at[k].patch) > HYCO_OPPOSED) m->at[k].n = 0;
     m->why[k] = HYCO_FOUND;
   }
@@ -88,6 +91,7 @@ static PetscErrorCode CheckMasters(HycoMesh m, HycoContact c, const HycoMatch *m
     if (partner_of[j] >= 0) {
       const PetscInt other = partner_of[j];
 
+      /* Before the error, which does not return here. */
       PetscCall(PetscFree(partner_of));
       HycoFail("contact %s: nodes %d and %d of %s are both nearest to node %d of %s; use matching meshes, or type: %s",
                c->name, (int)m->node_id[other], (int)m->node_id[match->slave[k]], c->slave, (int)m->node_id[j],

@@ -36,7 +36,8 @@ static PetscErrorCode SetUp(HycoContact c, HycoFE fe, PetscInt index, HycoPairs 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* rigid: the gap is measured from the slave's position, since the master node is not on the surface. */
+/* rigid: the gap is measured from the slave's position, since the master node is not on the surface. A normal is
+   required for the same reason: there is no facet to take it from. */
 PetscErrorCode HycoContactCreate_Rigid(HycoContact contact)
 {
   static const struct _HycoContactOps ops = {.setup = SetUp};

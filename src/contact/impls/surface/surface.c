@@ -33,6 +33,7 @@ static PetscErrorCode Remedy(HycoMasterSearch *t, HycoContact c, PetscInt n, con
     HycoProjection at;
     HycoVerdict why;
 
+    /* Without any limit of distance: does the node face the master at all? */
     PetscCall(HycoMasterSearchJudge(t, missed[k], PETSC_MAX_REAL, 0, &at, &why));
     facing = (PetscBool)(facing || why == HYCO_FOUND);
     farthest = PetscMax(farthest, at.distance);
@@ -71,7 +72,9 @@ static PetscErrorCode Find(HycoContact c, HycoFE fe, PetscInt index, PetscReal r
   PetscCall(HycoMasterSearchCreate(fe, c, PETSC_FALSE, &t));
   PetscCall(PetscMalloc2(n, &at, n, &why));
   ierr = HycoMasterSearchFind(&t, &query, n, slave, at, why);
+  /* A facet has at most nf nodes: the width of a projection. */
   PetscCall(HycoPairsReserve(found, n, fe->mesh->nf));
+  /* In the order of the slaves, also without a master (n = 0): sizes stay the same at every parameter. */
   for (PetscInt k = 0; k < n && !ierr; k++) HycoPairsAppend(found, index, slave[k], at[k].n, at[k].node, at[k].weight);
   PetscCall(PetscFree2(at, why));
   PetscCall(HycoMasterSearchDestroy(&t));

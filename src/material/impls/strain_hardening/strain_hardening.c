@@ -24,6 +24,7 @@ static PetscReal Creep(const HycoFlowPoint *p, PetscReal q, PetscReal *slope)
   PetscReal after;
 
   if (!(more > 0)) {
+    /* The power law's derivative: d more / d q = exponent / m * more / q, and after' = m after / (before + more). */
     *slope = 0;
     return 0;
   }

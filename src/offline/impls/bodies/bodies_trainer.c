@@ -7,6 +7,7 @@
 #define ENTRIES 15
 #define USELESS 0.5 /* mean error of the training displacements along paths */
 
+/* Defaults are those that docs/options.md lists; of_history[] are refused where they could do nothing. */
 static PetscErrorCode SetFromOptions(HycoReducer t)
 {
   static const char *const laws[] = {"auto", "interpolation", "cubature", NULL};
@@ -147,6 +148,7 @@ static PetscErrorCode CheckPath(HycoROM m, HycoReducer t)
   const HycoBodiesInelastic in = ((HycoSubstructures)m->model->data)->inelastic;
 
   PetscFunctionBegin;
+  /* Negated, so that a NaN is refused too. */
   if (!(m->model->numbers[1] < USELESS)) HycoReducerNameWorst(t, worst);
   HycoCheckModel(
       m->model->numbers[1] < USELESS,
@@ -167,6 +169,7 @@ static PetscErrorCode Build(HycoROM m, HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A path's model has no bound of forces: its errors are those at held-out paths. */
 static PetscErrorCode ReportPath(HycoROM m, HycoTraining *r)
 {
   HycoSubstructures b = (HycoSubstructures)m->model->data;
@@ -194,6 +197,7 @@ static PetscReal PathCost(HycoReducer t)
   return points * (2 * ns * ns * m + 2 * ns * m * m) + m * m * m;
 }
 
+/* The summary is a line for the user; the facts are the same numbers for scripts. */
 static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
 {
   HycoSubstructures b = (HycoSubstructures)m->model->data;
@@ -237,6 +241,7 @@ static PetscReal Cost(HycoReducer t, const HycoAttempt *a)
   return row * row + active * active * active / 3 + 2 * (PetscReal)a->n_modes * (PetscReal)a->rid_nodes * t->sizes[3];
 }
 
+/* Modes and build are functions of their own, because the modes are those of bodies and not of snapshots. */
 PetscErrorCode HycoTrainerCreate_Bodies(HycoTrainerOps *ops)
 {
   PetscFunctionBegin;

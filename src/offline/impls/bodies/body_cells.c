@@ -12,6 +12,8 @@
 #define MOST_NUMBERS 6e6  /* of their rows in the file */
 #define LEAST_SCORE  0.1
 
+/* A cell's score is the largest share of its body's stress over all samples: the cells of large stress are those whose
+   outputs matter, and get exact displacements first. */
 PetscErrorCode HycoBodiesAddScores(HycoReducer t, HycoBodiesFactor *factor, const PetscReal u[])
 {
   HycoFE fe = factor->fom->fe;
@@ -83,7 +85,8 @@ static PetscErrorCode MarkInner(HycoReducer t, HycoBodiesFactor *factor, const P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Joins more[] to in[], if there is room. Collective. */
+/* Joins more[] to in[], if there is room. Collective. in[] stays as it is if the unknowns inside would exceed their
+   number. */
 static PetscErrorCode Join(HycoReducer t, HycoBodiesFactor *factor, PetscBool in[], PetscBool more[], PetscBool inner[],
                            PetscBool *fits)
 {
@@ -201,9 +204,11 @@ static PetscErrorCode MarkSurfaces(HycoReducer t, HycoBodiesFactor *factor)
   PetscFunctionBegin;
   HycoDuplicate(b->ns + 1, b->dof, &sorted);
   PetscCall(PetscMalloc1(b->ns + 1, &place));
+  /* Sorted by number, so that each unknown of the part is found by bisection. */
   for (PetscInt k = 0; k < b->ns; k++) place[k] = k;
   PetscCall(PetscSortIntWithArray(b->ns, sorted, place));
   for (PetscInt i = 0; i < m->n_nodes * b->dim; i++) {
+    /* Unknowns are known by their number in the whole mesh, which does not depend on the partition. */
     const PetscInt node = m->node_whole ? m->node_whole[i / b->dim] : i / b->dim;
     PetscInt at;
 
@@ -230,7 +235,8 @@ static void MarkBare(HycoBodiesFactor *factor, const PetscBool in[])
 }
 
 /* Leaves a node to the modes, of which a model has one at least: that which moves most. It is exact too, because its
-   modes are all of its displacements. *released: there is one. Collective. */
+   modes are all of its displacements. *released: there is one. Collective. Otherwise a small mesh could have all nodes
+   exact, and a model without any mode is none. */
 static PetscErrorCode Release(HycoReducer t, HycoBodiesFactor *factor, PetscBool inner[], PetscBool *released)
 {
   HycoMesh m = factor->fom->part;
@@ -263,6 +269,7 @@ PetscErrorCode HycoBodiesChooseCells(HycoReducer t, HycoBodiesFactor *factor)
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(factor->fom->part->n_cells + 1, &in));
   PetscCall(PetscMalloc1(fe->n_dof + 1, &inner));
+  /* Known unknowns first: the cells are chosen among those that still need something. */
   PetscCall(MarkSurfaces(t, factor));
   PetscCall(Choose(t, factor, in, inner));
   PetscCall(ShareCells(t, factor->fom->part, in));
@@ -273,9 +280,11 @@ PetscErrorCode HycoBodiesChooseCells(HycoReducer t, HycoBodiesFactor *factor)
   for (PetscInt i = 0; i < fe->n_dof; i++) left = (PetscBool)(left || !(fe->fixed[i] || factor->bare[i] || inner[i]));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &left, 1, HYCO_MPI_BOOL, MPI_LOR, HycoComm(t)));
   if (!fits) PetscCall(PetscArrayzero(inner, fe->n_dof)); /* of the cell that stands for none */
+  /* If something is left outside the cells, modes are needed anyway, and surfaces keep theirs. */
   if (fits && !left) PetscCall(Release(t, factor, inner, &released));
   if (!released) PetscCall(PetscArrayzero(factor->known, fe->n_dof));
   if (!released) PetscCall(PetscArrayzero(factor->bare, fe->n_dof));
+  /* In ascending numbers on every rank: the rows of H are in this order. */
   PetscCall(List(t, factor, inner));
   for (PetscInt i = 0; i < fe->n_dof; i++) factor->bare[i] = (PetscBool)(factor->bare[i] || inner[i]);
   HycoFreeAll(&inner, &in);

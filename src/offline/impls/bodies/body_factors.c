@@ -18,7 +18,8 @@ static PetscBool Same(PetscInt n, const PetscReal a[], const PetscReal b[])
 
 /* -- blocks -- */
 
-/* The unknowns of each body on this rank. */
+/* The unknowns of each body on this rank. Bodies share no node, so each has a block of K of its own, which is factored
+   by itself. */
 static PetscErrorCode TakeRows(HycoReducer t, HycoBodiesFactor *factor)
 {
   HycoMesh m = factor->fom->part;
@@ -61,7 +62,9 @@ PetscErrorCode HycoBodiesSplit(HycoReducer t, Mat N, HycoBodiesFactor *factor)
     const PetscInt begin = PetscMax(lo, b->start[k]), end = PetscMin(hi, b->start[k + 1]);
     IS surface;
 
+    /* A body that nothing may touch has no rows in the dense problem. */
     if (b->start[k] == b->start[k + 1]) continue;
+    /* The part of the body's rows that this rank has; possibly none, but the call is collective. */
     PetscCall(ISCreateStride(HycoComm(t), PetscMax(end - begin, 0), begin, 1, &surface));
     PetscCall(MatCreateSubMatrix(N, surface, body->global, MAT_INITIAL_MATRIX, &body->N));
     PetscCall(ISDestroy(&surface));
@@ -148,13 +151,16 @@ static PetscErrorCode MoveTo(HycoReducer t, HycoBodiesFactor *factor, const Pets
   PetscReal mu[HYCO_MAX_PARAMETERS];
 
   PetscFunctionBegin;
+  /* Positions are kept from sample to sample: the grid changes one axis at a time. */
   if (factor->theta && Same(b->n_theta, theta, factor->theta)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscFree(factor->theta));
   factor->assembled = PETSC_FALSE;
+  /* All other parameters are those of the first point: they enter by poses and factors, exactly. */
   PetscCall(PetscArraycpy(mu, b->first, b->n_variables));
   for (PetscInt p = 0; p < b->n_theta; p++) mu[b->theta[p]] = theta[p];
   f->fe->ready = PETSC_FALSE;
   HycoOnEach(HycoComm(f), HycoFESetParameters(f->fe, mu));
+  /* Whether a map mirrors a body must be the same decision on all ranks. */
   if (f->size > 1) PetscCall(HycoFEAgreeOnMirrors(HycoComm(f), f->fe));
   HycoDuplicate(b->n_theta + 1, theta, &factor->theta);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -170,6 +176,7 @@ static PetscErrorCode AssembleAt(HycoReducer t, HycoBodiesFactor *factor, const 
   PetscCall(MoveTo(t, factor, theta));
   if (factor->assembled) PetscFunctionReturn(PETSC_SUCCESS);
   HycoOnEach(HycoComm(f), HycoFEAssembleStiffness(f->fe, f->K));
+  /* Rigid motions at these positions: a turn depends on the nodes. */
   PetscCall(HycoFOMSetMotions(f));
   for (PetscInt k = 0; k < factor->n; k++) {
     HycoBodyFactor *body = &factor->body[k];
@@ -195,8 +202,10 @@ static PetscErrorCode CheckMemory(HycoReducer t, HycoBodiesFactor *factor)
   for (PetscInt k = 0; k < b->n; k++) {
     PetscInt axes = 0;
 
+    /* Three values along each axis to begin with, and held-out ones beside them. */
     for (PetscInt p = 0; p < b->n_theta; p++) axes += HycoBodiesAxis(b, k, p);
     bytes += factor->body[k].bytes;
+    /* The Schur complement of one body at a time is on every rank while it is formed. */
     most = PetscMax(most, PetscSqr((PetscReal)(factor->body[k].p + b->body[k].n)));
     flexibilities += (PetscPowReal(3, (PetscReal)axes) + 2 * axes) * PetscSqr((PetscReal)b->body[k].n);
   }
@@ -320,9 +329,11 @@ PetscErrorCode HycoBodiesRefactor(HycoReducer t, HycoBodiesFactor *factor, const
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < factor->n; k++) {
+    /* Only the axes that change this body: at others its factor is the same. */
     OwnTheta(b, k, theta, own);
     if (!Recall(&factor->body[k], b->n_theta, own)) PetscCall(Factor(t, factor, k, own, NULL));
   }
+  /* Factor() may have moved the nodes to positions of another body's sample. */
   PetscCall(MoveTo(t, factor, theta));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -369,6 +380,7 @@ static PetscErrorCode TakeLoaded(const HycoBodyFactor *body, PetscInt n, const V
   *many = 0;
   PetscCall(PetscMalloc1(n + 1, number));
   for (PetscInt j = 0; j < n; j++) {
+    /* Most loads act on few bodies: a solve for each of the others would return zeros. */
     if (in[j]) (*number)[(*many)++] = j;
   }
   *v = NULL;
@@ -376,6 +388,7 @@ static PetscErrorCode TakeLoaded(const HycoBodyFactor *body, PetscInt n, const V
   PetscCall(MatCreateVecs(body->K, &first, NULL));
   PetscCall(VecDuplicateVecs(first, *many, v));
   PetscCall(VecDestroy(&first));
+  /* Reverse: from the vector of all bodies to the body's own. */
   for (PetscInt j = 0; j < *many; j++) PetscCall(VecISCopy(F[(*number)[j]], body->global, SCATTER_REVERSE, (*v)[j]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -386,6 +399,7 @@ static PetscErrorCode ReduceBody(HycoSubstructures b, HycoBodiesFactor *factor, 
                                  const PetscBool in[], PetscReal u[], PetscReal work[])
 {
   const HycoBodyFactor *body = &factor->body[k];
+  /* Motions of this body first, then its surfaces, as MUMPS returns the reduced vector. */
   const PetscInt n_q = body->p + b->body[k].n;
   PetscInt many, *number;
   PetscReal *q;
@@ -399,6 +413,7 @@ static PetscErrorCode ReduceBody(HycoSubstructures b, HycoBodiesFactor *factor, 
   for (PetscInt j = 0; j < many; j++) {
     const PetscReal *own = q + (size_t)j * (size_t)n_q;
 
+    /* Rows of the dense problem are numbered over all bodies. */
     for (PetscInt i = 0; i < body->p; i++) work[number[j] * b->p + body->motion[i]] = -own[i];
     for (PetscInt i = 0; i < b->body[k].n; i++)
       u[(size_t)number[j] * (size_t)b->ns + (size_t)(b->start[k] + i)] = -own[body->p + i];
@@ -409,15 +424,18 @@ static PetscErrorCode ReduceBody(HycoSubstructures b, HycoBodiesFactor *factor, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* u: the displacements of the surfaces' unknowns under F; work: of F on the rigid motions. */
 PetscErrorCode HycoBodiesReduce(HycoSubstructures b, HycoBodiesFactor *factor, PetscInt n, const Vec F[], PetscReal u[],
                                 PetscReal work[])
 {
   PetscBool *in;
 
   PetscFunctionBegin;
+  /* Bodies without the load keep zeros. */
   PetscCall(PetscArrayzero(u, (size_t)b->ns * (size_t)n));
   PetscCall(PetscArrayzero(work, b->p * n));
   PetscCall(PetscMalloc1(n * factor->n + 1, &in));
+  /* On all ranks alike: whether a body is loaded is a collective decision, since its solve is. */
   PetscCall(FindLoaded(b, factor, n, F, NULL, in));
   for (PetscInt k = 0; k < factor->n; k++) PetscCall(ReduceBody(b, factor, k, n, F, in + k * n, u, work));
   PetscCall(PetscFree(in));
@@ -453,12 +471,14 @@ static PetscErrorCode ExtendBody(HycoSubstructures b, HycoBodiesFactor *factor, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* x: displacements everywhere from loads F and surface forces z, with the factors that are there. */
 PetscErrorCode HycoBodiesExtend(HycoSubstructures b, HycoBodiesFactor *factor, PetscInt n, const Vec F[],
                                 const PetscReal z[], Vec x[])
 {
   PetscBool *in;
 
   PetscFunctionBegin;
+  /* Bodies add disjoint parts of the displacement. */
   for (PetscInt j = 0; j < n; j++) PetscCall(VecZeroEntries(x[j]));
   PetscCall(PetscMalloc1(n * factor->n + 1, &in));
   PetscCall(FindLoaded(b, factor, n, F, z, in));
@@ -479,10 +499,12 @@ static PetscErrorCode Respond(HycoSubstructures b, HycoBodiesFactor *factor, Pet
   PetscFunctionBegin;
   PetscCall(PetscCalloc2(b->ns * b->r + 1, &u, b->p * b->r + 1, &work));
   PetscCall(PetscMalloc1(b->r * factor->n + 1, &in));
+  /* The basis of loads as vectors; a vector may load several bodies. */
   PetscCall(FindLoaded(b, factor, b->r, factor->basis, NULL, in));
   PetscCall(ReduceBody(b, factor, k, b->r, factor->basis, in + k * b->r, u, work));
   PetscCall(PetscMalloc1((size_t)n * (size_t)b->r + 1, &record->R));
   PetscCall(PetscMalloc1(b->p * b->r + 1, &record->work));
+  /* By unknown, as predictions read them: R c is then one product by rows. */
   for (PetscInt d = 0; d < b->r; d++) {
     for (PetscInt i = 0; i < n; i++) record->R[i * b->r + d] = u[d * b->ns + b->start[k] + i];
     for (PetscInt i = 0; i < b->p; i++) record->work[i * b->r + d] = work[d * b->p + i];
@@ -531,6 +553,7 @@ PetscErrorCode HycoBodiesCondense(HycoReducer t, HycoBodiesFactor *factor, const
 
 /* -- end -- */
 
+/* Records and kept factors are lists of their own: flexibilities outlive the factors they came from. */
 static PetscErrorCode ReleaseBody(HycoBodyFactor *body)
 {
   PetscFunctionBegin;

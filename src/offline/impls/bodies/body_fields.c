@@ -77,6 +77,7 @@ static PetscErrorCode SolvePath(HycoBodiesFriction f, HycoBodiesWork o, HycoScen
     if (!*solved) break;
     PetscCall(HycoBodiesFrictionAccept(f, t));
     /* Another time within each quarter for each point: all times are seen, not four of them. */
+    /* Samples of forces are spread over the path. */
     if (t >= first + (last - first) * (seen + SomeShare(k)) / SEEN && seen < SEEN) {
       PetscCall(PetscArraycpy(sampled->c + sampled->n * b->r, o->c, b->r));
       PetscCall(PetscArraycpy(sampled->f + sampled->n * b->ns, o->f, b->ns));
@@ -153,7 +154,8 @@ static PetscInt PathStride(HycoReducer t)
   return 1 + (t->n_s - 1) / MOST_COLUMNS;
 }
 
-/* Adds the elastic part of the training paths: their loads and contact forces at the listed times. */
+/* Adds the elastic part of the training paths: their loads and contact forces at the listed times. Their forces are the
+   very ones that predictions will have. */
 static PetscErrorCode TakePaths(HycoReducer t, HycoBodiesWork o, const HycoBodiesSurface *s, PetscInt every,
                                 Sampled *sampled)
 {
@@ -177,7 +179,7 @@ static PetscErrorCode TakePaths(HycoReducer t, HycoBodiesWork o, const HycoBodie
 }
 
 /* Rank 0. Online code on the surfaces' mesh, which rank 0 alone has: the samples are those that a prediction would
-   find. The work is freed before an error returns. */
+   find. The work is freed before an error returns. The contact problem on the surfaces alone is far cheaper than one of full order: there can be many samples. */
 static PetscErrorCode SampleForces(HycoReducer t, HycoFOM f, HycoSamples points, Sampled *sampled)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
@@ -277,11 +279,13 @@ static PetscErrorCode Expand(HycoSubstructures b, HycoBodiesFactor *factor, Pets
   PetscCall(CreateVectors(factor, n, x));
   for (PetscInt j = 0; j < n; j++) {
     PetscCall(VecZeroEntries(F[j]));
+    /* The load of a sample from its coefficients: the vectors of loads themselves are not stored. */
     for (PetscInt k = 0; c && k < b->r; k++) PetscCall(VecAXPY(F[j], c[j * b->r + k], factor->basis[k]));
   }
   PetscCall(HycoBodiesExtend(b, factor, n, F, z, x));
   for (PetscInt j = 0; j < n; j++, u += f->fe->n_dof) {
     PetscCall(HycoFOMToLocal(f, x[j], u));
+    /* Modes vanish where displacements are prescribed, as those of a POD do. */
     for (PetscInt i = 0; i < f->fe->n_dof; i++) u[i] = f->fe->fixed[i] ? 0 : u[i];
   }
   PetscCall(DestroyVectors(n, F));
@@ -305,6 +309,7 @@ static PetscErrorCode ExpandSamples(HycoSubstructures b, HycoBodiesFactor *facto
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc2(MANY * b->r + 1, &c, (size_t)MANY * (size_t)n_z + 1, &z)); /* z of motions: 0 */
+  /* Several right-hand sides at once: MUMPS reads its factor once for all of them. */
   for (PetscInt first = 0; first < n; first += MANY) {
     const PetscInt many = PetscMin(MANY, n - first);
 
@@ -328,6 +333,7 @@ static PetscErrorCode ExpandMotions(HycoSubstructures b, HycoBodiesFactor *facto
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(b->p + b->ns + 1, &z));
   for (PetscInt k = 0; k < b->p; k++, u += factor->fom->fe->n_dof) {
+    /* A motion of unit size; its place in z is before those of the surfaces. */
     z[k] = 1;
     PetscCall(Expand(b, factor, 1, NULL, z, u));
     z[k] = 0;
@@ -388,11 +394,13 @@ static PetscErrorCode ExpandAll(HycoReducer t, HycoBodiesFactor *factor, Sampled
   const PetscInt nodes = HycoBodiesGrid(HycoTrainingOfBodies(t)->bodies, 0, NULL);
 
   PetscFunctionBegin;
+  /* Node by node of the grid, because each one has a factor of its own. */
   for (PetscInt j = 0; j < nodes; j++) {
     PetscCall(ExpandNode(t, factor, j, sampled));
     PetscCall(HycoReducerTell(t, "displacements of the bodies", j + 1, nodes));
   }
   if (!sampled->expanded) PetscCall(ExpandStrains(factor, sampled));
+  /* The checks are at points that no mode has seen. */
   sampled->expanded = sampled->n - sampled->n_checks;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -414,7 +422,8 @@ static void TurnField(HycoReducer t, const HycoBodiesFactor *factor, PetscInt bo
   }
 }
 
-/* An empty dense matrix with n columns in the file's order. */
+/* An empty dense matrix with n columns in the file's order. As the snapshots' matrices, so that POD and rows of V are
+   the same functions for both. */
 static PetscErrorCode CreateColumns(HycoReducer t, HycoFOM f, PetscInt n, Mat *S)
 {
   const PetscInt dim = t->sizes[3];
@@ -433,6 +442,7 @@ static PetscErrorCode BodyColumns(HycoReducer t, const HycoBodiesFactor *factor,
 {
   HycoFOM f = factor->fom;
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  /* The body's own axes turn with the parameters: a basis of turns spans every direction of the field. */
   const PetscInt first = b->turn_start[body], turns = b->turn_start[body + 1] - first;
   PetscReal *value;
   PetscScalar *s;
@@ -446,6 +456,7 @@ static PetscErrorCode BodyColumns(HycoReducer t, const HycoBodiesFactor *factor,
   for (PetscInt k = 0; k < n * turns; k++) {
     TurnField(t, factor, body, b->G + 9 * (first + k % turns), PETSC_FALSE,
               U + (size_t)(k / turns) * (size_t)f->fe->n_dof, value);
+    /* Rows in the file's order: the POD does not depend on the partition. */
     PetscCall(HycoFOMToRows(f, HYCO_ON_NODES, MPIU_REAL, b->dim, value, s + (size_t)k * (size_t)lda));
   }
   PetscCall(MatDenseRestoreArray(*S, &s));
@@ -470,6 +481,7 @@ static PetscErrorCode ScaleColumns(Mat S)
   for (PetscInt k = 0; k < n; k++) most = PetscMax(most, norm[k]);
   PetscCall(MatDenseGetArray(S, &s));
   for (PetscInt k = 0; k < n; k++) {
+    /* Not those of round-off: scaled to 1 they would be modes of noise. */
     const PetscReal scale = most > 0 ? 1 / PetscMax(norm[k], SMALL * most) : 0;
 
     for (PetscInt i = 0; i < rows; i++) s[(size_t)k * (size_t)lda + (size_t)i] *= scale;
@@ -566,7 +578,8 @@ static PetscErrorCode Squares(HycoFOM f, PetscInt n, const PetscReal U[], PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* b->left at the checks. A turned field is the sum of q_j G_j u with |q|^2 = dim. Collective. */
+/* b->left at the checks. A turned field is the sum of q_j G_j u with |q|^2 = dim. Collective. What the modes miss at
+   samples that they were not made of; it is the model's own estimate of its displacements. */
 static PetscErrorCode MeasureLeft(HycoReducer t, HycoBodiesFactor *factor, const Sampled *sampled, Mat V)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
@@ -617,10 +630,12 @@ static PetscErrorCode TurnMode(HycoReducer t, const HycoBodiesFactor *factor, Pe
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(f->fe->n_dof + 1, &local, f->fe->n_dof + 1, &turned));
+  /* The mode lies by rows of the file, the turn needs the nodes of the part. */
   PetscCall(HycoFOMFromRows(f, HYCO_ON_NODES, b->dim, column, local));
   TurnField(t, factor, body, b->G + 9 * turn, PETSC_TRUE, local, turned);
   PetscCall(VecGetArray(v, &a));
   for (PetscInt i = 0; i < f->fe->n_dof; i++) {
+    /* A load vector has each unknown once, on its owner. */
     const PetscInt own = HycoMeshOwned(f->part, i / b->dim);
 
     if (own >= 0) a[own * b->dim + i % b->dim] = turned[i];
@@ -630,7 +645,7 @@ static PetscErrorCode TurnMode(HycoReducer t, const HycoBodiesFactor *factor, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* v = 1 at an unknown, else 0. */
+/* v = 1 at an unknown, else 0. The right-hand side by which a row of K^-1 is obtained. */
 static PetscErrorCode SetUnit(PetscInt row, Vec v)
 {
   PetscInt lo, hi;
@@ -654,6 +669,7 @@ static PetscErrorCode AllocateCoefficients(HycoSubstructures b)
     size_t rows;
 
     s->l = b->mode_start[k + 1] - b->mode_start[k];
+    /* A row for each mode in each turn, and one for each unknown inside the chosen cells, at each sample. */
     rows = (size_t)s->n_samples * (size_t)((b->turn_start[k + 1] - b->turn_start[k]) * s->l + s->m);
     PetscCall(PetscCalloc1(rows * (size_t)s->n + 1, &s->H));
     PetscCall(PetscCalloc1(rows * (size_t)b->r + 1, &s->a));
@@ -681,6 +697,7 @@ static PetscErrorCode SetRow(HycoReducer t, HycoBodiesFactor *factor, PetscInt k
   PetscInt lda;
 
   PetscFunctionBegin;
+  /* The unknowns inside come after all modes. */
   if (i >= turned) {
     PetscCall(SetUnit(factor->row[b->inner_start[k] + i - turned], v));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -778,6 +795,7 @@ static PetscErrorCode TakeModes(HycoReducer t, HycoSnapshots store, Mat V, Petsc
   PetscCall(PetscFree(t->VtU));
   PetscCall(PetscMalloc1(t->l * t->n_s, &t->VtU));
   PetscCall(HycoReducerGetDisplacements(t, store, &S));
+  /* V^T U of the training solutions, by which regressions and the report measure what the modes miss. */
   PetscCall(HycoReducerMultiply(t, V, S, t->VtU));
   HycoDestroyAll(&S, &t->V);
   t->V = V;
@@ -796,6 +814,7 @@ static PetscErrorCode FindInMesh(HycoReducer t, HycoBodiesFactor *factor)
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(surface->n_nodes, &contact));
   PetscCall(PetscMalloc1(surface->n_nodes, &node));
+  /* The contacts that the model keeps, with their masters over the ranges. */
   PetscCall(HycoReducerMarkContacts(t, contact));
   for (PetscInt i = 0; i < surface->n_nodes; i++) {
     if (contact[i]) node[n++] = surface->node_whole ? surface->node_whole[i] : i;
@@ -824,22 +843,26 @@ static PetscErrorCode ModesOf(HycoReducer t, HycoBodiesFactor *factor, PetscInt 
   PetscBool all;
 
   PetscFunctionBegin;
+  /* Samples are solutions of the condensed bodies: each costs a dense contact problem and no factor. */
   PetscCall(Sample(t, factor->fom, wanted, &all, sampled));
   PetscCall(ExpandAll(t, factor, sampled));
   if (!HycoBodiesFlow(t)) PetscCall(HycoBodiesChooseCells(t, factor)); /* else those with laws are chosen */
   PetscCall(PetscFree(b->mode_start));
   PetscCall(FindModes(t, factor, sampled->n_U, sampled->U, V, sigma));
   if (!t->scene->n_times) PetscCall(MeasureLeft(t, factor, sampled, *V));
+  /* If the modes are nearly as many as the samples, further samples would give further modes. */
   *enough = PETSC_TRUE;
   for (PetscInt k = 0; k < b->n; k++)
     *enough = (PetscBool)(*enough && b->mode_start[k + 1] - b->mode_start[k] <= FULL * sampled->expanded);
   HycoTrainingOfBodies(t)->filled = (PetscBool) !*enough;
+  /* What modes miss at the checks is doubled for at most a few times: geometry parameters may never be spanned. */
   if (sampled->n_checks && doubled < UNTIL_SEEN) *enough = (PetscBool)(*enough && b->left <= Missed(t));
   *enough = (PetscBool)(*enough || !all);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Samples are doubled until the modes are few beside them and miss little. Only the last V and sigma survive. */
+/* Samples are doubled until the modes are few beside them and miss little. Only the last V and sigma survive. sampled
+   keeps what earlier rounds have found: doubling adds to it. */
 PetscErrorCode HycoBodiesFields(HycoReducer t, HycoSnapshots store, HycoBodiesFactor *factor)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
@@ -858,6 +881,7 @@ PetscErrorCode HycoBodiesFields(HycoReducer t, HycoSnapshots store, HycoBodiesFa
   PetscCall(PetscCalloc1(factor->fom->fe->n_dof + 1, &factor->known));
   PetscCall(PetscCalloc1(factor->fom->fe->n_dof + 1, &factor->bare));
   PetscCall(PetscCalloc1(b->ns + 1, &factor->in_mesh));
+  /* The surfaces' mesh is on rank 0. */
   HycoOnRoot(HycoComm(t), FindInMesh(t, factor));
   HycoBcast(factor->in_mesh, b->ns, HYCO_MPI_BOOL, HycoComm(t));
   PetscCall(PetscCalloc1(factor->fom->fe->n_dof + 1, &factor->moved));
@@ -867,6 +891,7 @@ PetscErrorCode HycoBodiesFields(HycoReducer t, HycoSnapshots store, HycoBodiesFa
     ierr = ModesOf(t, factor, n, k, &sampled, &V, &sigma, &enough);
   }
   HycoFreeAll(&sampled.c, &sampled.f, &sampled.U);
+  /* Rows of H, a and g for the modes that were kept: only once, after the last doubling. */
   if (!ierr) ierr = Coefficients(t, factor, V);
   if (ierr) {
     PetscCall(MatDestroy(&V));

@@ -75,14 +75,17 @@ PetscErrorCode HycoBodiesCheckPath(HycoReducer t)
                  s->n_ties ? "ties"
                  : rigid   ? "a contact of type rigid"
                            : "a support along a direction");
+  /* With a path a floating body would need its motions among the unknowns of Newton's method. */
   PetscCall(HycoFEFreeMotions(HycoComm(t), t->fom->fe, &motions));
   free = motions.n;
+  /* Copied before the motions are destroyed. */
   if (free) PetscCall(PetscStrncpy(name, motions.name[0], sizeof(name)));
   PetscCall(HycoMotionsDestroy(&motions));
   HycoCheckModel(
       !free || !HycoSceneHasFriction(s),
       "no support keeps %s, only contact does, which a model of bodies with friction does not support: use hyco solve",
       name);
+  /* Last, because it evaluates expressions over the ranges. */
   PetscCall(CheckChanges(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -116,10 +119,12 @@ static PetscErrorCode TakePoints(HycoReducer t, PetscInt count, PetscInt point[]
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(count + 1, &cell)); /* a mesh needs a cell */
   for (PetscInt i = 0; i < count; i++) cell[i] = point[i] / nq;
+  /* Without a point (laws that never flow in training) the mesh still needs a cell. */
   t->n_seeds_cell = PetscMax(count, 1);
   PetscCall(PetscSortRemoveDupsInt(&t->n_seeds_cell, cell));
   PetscCall(PetscFree(t->seeds_cell));
   t->seeds_cell = cell;
+  /* The index of a point is cell in the whole mesh times points per cell, plus its number there. */
   in->point = point;
   in->n_points = count;
   PetscCall(PetscCalloc1(size, &in->T));
@@ -215,6 +220,7 @@ static PetscErrorCode ListAll(HycoReducer t, Unknowns *all)
   PetscCall(PetscMalloc1(all->n + 1, &all->global));
   for (PetscInt i = 0; i < all->n; i++) order[i] = i;
   all->dof = packed[0];
+  /* By number in the whole mesh: the order does not depend on the partition. */
   PetscCall(PetscSortIntWithArray(all->n, all->dof, order));
   for (PetscInt i = 0; i < all->n; i++) {
     all->body[i] = packed[1][order[i]];
@@ -241,7 +247,8 @@ static PetscErrorCode TakeValues(const Unknowns *at, Vec x, PetscInt k, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* x = K^-1 F; the surfaces' displacements u. Collective. */
+/* x = K^-1 F; the surfaces' displacements u. Collective. F: inelastic forces of one mode. The rigid motions' work is
+   not needed: such forces are self-equilibrated. */
 static PetscErrorCode Displace(HycoSubstructures b, HycoBodiesFactor *factor, Vec F, PetscReal u[], Vec *x)
 {
   PetscReal *work;
@@ -266,11 +273,13 @@ static PetscErrorCode ForceOfMode(HycoReducer t, HycoFOM f, PetscInt k, Vec F)
   PetscCall(PetscMalloc1(f->part->n_cells * HycoPointRows(t) + 1, &value));
   PetscCall(PetscCalloc1(f->fe->n_dof + 1, &force));
   PetscCall(HycoPointsMode(t, &HycoTrainingOfBodies(t)->strains, k, value));
+  /* Includes ghost cells, so that the sums at owned nodes are complete. */
   HycoOnEach(HycoComm(t), HycoPointsForces(f->fe, value, force));
   PetscCall(VecGetArray(F, &v));
   for (PetscInt i = 0; i < f->fe->n_dof; i++) {
     const PetscInt own = HycoMeshOwned(f->part, i / dim);
 
+    /* Fixed unknowns carry a reaction, no load. */
     if (own >= 0) v[own * dim + i % dim] = f->fe->fixed[i] ? 0 : force[i];
   }
   PetscCall(VecRestoreArray(F, &v));
@@ -278,7 +287,8 @@ static PetscErrorCode ForceOfMode(HycoReducer t, HycoFOM f, PetscInt k, Vec F)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The responses to the modes: P and the fields; work[m x m]: of the modes on these, Q^T K^-1 Q. Collective. */
+/* The responses to the modes: P and the fields; work[m x m]: of the modes on these, Q^T K^-1 Q. Collective. One solve
+   for each mode; every later path combines these. */
 static PetscErrorCode Respond(HycoReducer t, HycoBodiesFactor *factor, PetscReal u[], PetscReal work[])
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
@@ -320,6 +330,7 @@ static PetscErrorCode FillForces(HycoReducer t, HycoBodiesFactor *factor, const 
   for (PetscInt j = 0; j < MANY; j++) PetscCall(VecDuplicate(factor->fom->F, &e[j]));
   PetscCall(VecGetOwnershipRange(e[0], &lo, &hi));
   for (PetscInt first = 0; first < at->n; first += MANY) {
+    /* A block of unit loads per solve; the last block may be smaller. */
     const PetscInt many = PetscMin(MANY, at->n - first);
 
     for (PetscInt j = 0; j < many; j++) {
@@ -330,6 +341,7 @@ static PetscErrorCode FillForces(HycoReducer t, HycoBodiesFactor *factor, const 
       if (row >= lo && row < hi) v[row - lo] = 1;
       PetscCall(VecRestoreArray(e[j], &v));
     }
+    /* Straight into the rows of C: they lie one after the other, by unknown. */
     PetscCall(HycoBodiesReduce(b, factor, many, e, b->inelastic->C + (size_t)first * (size_t)b->ns, work));
     /* The work of a unit force on the rigid motions is the displacement of its unknown in them. */
     PetscCall(PetscArraycpy(b->inelastic->Z + first * b->p, work, many * b->p));
@@ -349,6 +361,7 @@ static PetscErrorCode FillLoads(HycoReducer t, HycoBodiesFactor *factor, const U
   for (PetscInt k = 0; k < b->r; k++) {
     Vec x;
 
+    /* Full displacements, of which the cells' unknowns are taken: loads are few. */
     PetscCall(Displace(b, factor, factor->basis[k], u, &x));
     PetscCall(TakeValues(at, x, k, b->r, b->inelastic->R));
     PetscCall(VecDestroy(&x));
@@ -378,6 +391,7 @@ static PetscErrorCode Combine(PetscInt m, PetscInt l, const PetscReal M[], Vec X
   for (PetscInt j = 0; j < l; j++) PetscCall(VecMAXPY(Y[j], m, M + j * m, X));
   for (PetscInt k = 0; k < m; k++) {
     PetscCall(VecDestroy(&X[k]));
+    /* The first l places have the new vectors, the others are gone. */
     if (k < l) X[k] = Y[k];
   }
   PetscCall(PetscFree(Y));
@@ -454,6 +468,7 @@ static PetscErrorCode Contributions(HycoReducer t, HycoBodiesFactor *factor, Pet
 
   PetscFunctionBegin;
   PetscCall(HycoFOMGetRows(t->fom, &order));
+  /* On one rank the file's order is the mesh's. */
   n_rows = order ? order->n[HYCO_ON_CELLS] : n_cells;
   PetscCall(MatCreateDense(HycoComm(t), n_rows, PETSC_DECIDE, t->sizes[1], m * n_k, NULL, S));
   PetscCall(PetscMalloc4((size_t)m * (size_t)fe->n_dof + 1, &u, n_cells * HycoPointRows(t) + 1, &value, n_cells * m + 1,
@@ -464,8 +479,10 @@ static PetscErrorCode Contributions(HycoReducer t, HycoBodiesFactor *factor, Pet
   PetscCall(MatDenseGetArray(*S, &s));
   for (PetscInt k = 0; k < n_k; k++) {
     PetscCall(HycoPointsMode(t, modes, k, value));
+    /* The work of one stress mode on all displacement modes in a cell at once. */
     HycoOnEach(HycoComm(t), WorkOnModes(fe, value, m, u, work));
     PetscCall(HycoFOMToRows(t->fom, HYCO_ON_CELLS, MPIU_REAL, m, work, rows));
+    /* Column of the pair (stress k, displacement i): all of a stress mode's pairs beside each other. */
     for (PetscInt i = 0; i < n_rows * m; i++)
       s[(size_t)(k * m + i % m) * (size_t)lds + (size_t)(i / m)] = modes->sigma[k] * rows[i];
   }
@@ -542,11 +559,13 @@ static PetscErrorCode FillPoint(HycoReducer t, const Unknowns *at, const PetscRe
   PetscReal B[6 * HYCO_MAX_CELL_DOFS];
 
   PetscFunctionBegin;
+  /* B, the strains at the point by the cell's displacements, and its weight w. */
   PetscCall(HycoFEPointRows(fe, e, q, B, &in->weight[p]));
   for (PetscInt i = 0; i < n && weight; i++) {
     const PetscInt k = HycoCellUnknown(part, e, i), node = k / part->dim;
     PetscInt row;
 
+    /* Unknowns of the cells are sorted by number; -1: fixed, with no displacement by any load. */
     PetscCall(PetscFindInt((part->node_whole ? part->node_whole[node] : node) * part->dim + k % part->dim, at->n,
                            at->dof, &row));
     for (PetscInt c = 0; c < ns && row >= 0; c++) {
@@ -570,6 +589,7 @@ static PetscErrorCode FillOwnPoints(HycoReducer t, const Unknowns *at, const Pet
       PetscInt p;
 
       PetscCall(PetscFindInt((part->cell_whole ? part->cell_whole[e] : e) * nq + q, in->n_points, in->point, &p));
+      /* Points that were not chosen have no laws. */
       if (p >= 0) PetscCall(FillPoint(t, at, weight, e, q, p));
     }
   }
@@ -594,7 +614,8 @@ static PetscErrorCode FillPoints(HycoReducer t, const Unknowns *at, const PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The points and their cells' rows for forces, loads and modes. weight: of the cubature, NULL: interpolation. Collective. */
+/* The points and their cells' rows for forces, loads and modes. weight: of the cubature, NULL: interpolation.
+   Collective. nd unknowns of the cells with laws, the same list on all ranks, each row filled by the owner. */
 static PetscErrorCode FillCells(HycoReducer t, HycoBodiesFactor *factor, const PetscReal weight[], PetscReal u[])
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
@@ -652,6 +673,7 @@ PetscErrorCode HycoBodiesStrains(HycoReducer t, HycoBodiesFactor *factor)
   PetscReal theta[HYCO_MAX_PARAMETERS], *u, *work, *weight = NULL;
 
   PetscFunctionBegin;
+  /* Points and weights are those of the positions at which the factors are. */
   PetscCall(HycoFOMSetParameters(t->fom, b->first));
   HycoBodiesPoint(t, 0, theta);
   PetscCall(HycoBodiesRefactor(t, factor, theta));
@@ -659,6 +681,7 @@ PetscErrorCode HycoBodiesStrains(HycoReducer t, HycoBodiesFactor *factor)
   PetscCall(PetscMalloc2(b->ns + 1, &u, in->m * in->m + 1, &work));
   PetscCall(Respond(t, factor, u, work));
   PetscCall(ChoosePoints(t, factor, work, &weight));
+  /* After the points are chosen: only their cells need displacements. */
   PetscCall(FillCells(t, factor, weight, u));
   PetscCall(PetscFree(weight));
   PetscCall(PetscFree2(u, work));

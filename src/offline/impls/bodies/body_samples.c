@@ -14,7 +14,8 @@
 #define SHORT       0.01 /* share of the tolerance: terms of a flexibility without larger entries are left out */
 #define SHORTENED   0.1  /* share of the tolerance that this and single precision may add to e */
 
-/* Node k of n along parameter p, in its own variable. */
+/* Node k of n along parameter p, in its own variable. Chebyshev points of the second kind (extrema), nested when their
+   number n goes to 2 n - 1: former samples stay. Ends exactly, without round-off. */
 static PetscReal Node(HycoReducer t, HycoSubstructures b, PetscInt p, PetscInt n, PetscInt k)
 {
   const PetscReal share = (1 - PetscCosReal(PETSC_PI * ((PetscReal)k / (PetscReal)(n - 1)))) / 2;
@@ -35,10 +36,12 @@ PetscInt HycoBodiesSampleOf(HycoSubstructures b, PetscInt body, PetscInt k)
   PetscInt index[HYCO_TENSOR_MAX_DIM], sample = 0;
 
   for (PetscInt p = b->n_theta - 1; p >= 0; p--) {
+    /* The last axis is the fastest, as in HycoBodiesGrid(). */
     index[p] = k % b->n_nodes[p];
     k /= b->n_nodes[p];
   }
   for (PetscInt p = 0; p < b->n_theta; p++) {
+    /* The body is the same at all nodes along this axis: the first of them is its sample. */
     if (t->n[p] == 1 && index[p]) return -1;
     sample = sample * t->n[p] + (t->n[p] > 1 ? index[p] : 0);
   }
@@ -61,6 +64,7 @@ static PetscErrorCode SetGrid(HycoReducer t, HycoSubstructures b)
     for (PetscInt k = 0; k < b->n_nodes[p]; k++)
       b->node[n++] = HycoBodiesVariable(b->variable[p], Node(t, b, p, b->n_nodes[p], k));
   }
+  /* Each body has the nodes of the axes that change it and one of the others. */
   for (PetscInt k = 0; k < b->n; k++) {
     for (PetscInt p = 0; p < b->n_theta; p++) b->body[k].tensor.n[p] = HycoBodiesAxis(b, k, p) ? b->n_nodes[p] : 1;
   }
@@ -148,7 +152,8 @@ static PetscErrorCode Factor(PetscInt n, PetscReal C[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The largest |eigenvalue| of (D, C), D symmetric, from the factor L of C (both n x n). */
+/* The largest |eigenvalue| of (D, C), D symmetric, from the factor L of C (both n x n). Power iteration on L^-1 D L^-T,
+   symmetric, whose |eigenvalues| are those of the pencil; a few digits are enough for a bound. */
 static PetscErrorCode Largest(PetscInt n, const PetscReal L[], const PetscReal D[], PetscReal *largest)
 {
   PetscBLASInt m, one = 1;
@@ -355,6 +360,7 @@ PetscErrorCode HycoBodiesSample(HycoReducer t, HycoBodiesFactor *factor)
     PetscCall(CondenseGrid(t, factor));
     for (PetscInt p = 0; p < b->n_theta; p++) PetscCall(BoundAlong(t, factor, p, e[p]));
     worst = Worst(t, b, e);
+    /* Nested Chebyshev grids: all former samples stay nodes of the finer grid. */
     if (worst >= 0) b->n_nodes[worst] = 2 * b->n_nodes[worst] - 1;
   } while (worst >= 0);
   HycoOnRoot(HycoComm(t), Store(t, factor, e));

@@ -17,6 +17,7 @@
 static PetscErrorCode CheckParts(HycoReducer t)
 {
   const HycoBodyParts *parts = &HycoTrainingOfBodies(t)->parts;
+  /* Parameters are visited one by one and together: only together can they fail so. */
   const PetscInt fail = HycoBodyPartsFail(parts);
   PetscInt shape[HYCO_MAX_PARAMETERS];
   char list[HYCO_LINE] = "", bodies[HYCO_LINE] = "";
@@ -32,6 +33,7 @@ static PetscErrorCode CheckParts(HycoReducer t)
   for (PetscInt k = 0; k < parts->n; k++) {
     PetscInt own[HYCO_MAX_PARAMETERS];
 
+    /* The message names bodies and parameters: either may be changed. */
     if (HycoBodyPartsShapes(parts, k, own)) PetscCall(HycoListAdd(bodies, ", ", parts->name[k]));
   }
   HycoCheckModel(n <= MOST_THETA,
@@ -50,6 +52,7 @@ static PetscErrorCode CheckScene(HycoReducer t)
   PetscFunctionBegin;
   HycoCheckModel(!t->scan && !t->keep_singular, "-hyco_scan and -hyco_keep_singular have no effect on "
                                                 "-hyco_model_type bodies; remove them");
+  /* Without contact there is nothing to condense to; hyper-reduction alone serves. */
   HycoCheckModel(t->sizes[2] > 0, "the scene has no contact, and a model of bodies represents the surfaces that touch; "
                                   "train a hybrid model");
   PetscCall(PetscOptionsGetBool(t->scene->options, NULL, "-hyco_regularise", &regularise, NULL));
@@ -65,6 +68,7 @@ PetscErrorCode HycoBodiesBegin(HycoReducer t)
   PetscFunctionBegin;
   PetscCall(CheckScene(t));
   if (HycoTrainingOfBodies(t)->parts.n) PetscFunctionReturn(PETSC_SUCCESS); /* they do not depend on the solutions */
+  /* The first training point is the reference of all poses and factors. */
   PetscCall(HycoReducerColumn(t, 0, mu));
   PetscCall(HycoBodyPartsFind(t->fom, mu, &HycoTrainingOfBodies(t)->parts));
   PetscCall(CheckParts(t));
@@ -113,6 +117,7 @@ static PetscErrorCode BodiesOfSurface(HycoFOM f, const HycoBodyParts *parts, Pet
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(n + 1, of));
   PetscCall(PetscMalloc2(f->part->n_owned + f->part->n_nodes, &own, n + 1, &global));
+  /* On one rank the surface's numbers are the mesh's. */
   for (PetscInt i = 0; i < n; i++) global[i] = f->surface->node_global ? f->surface->node_global[i] : i;
   for (PetscInt i = 0; i < f->part->n_nodes; i++) {
     if (HycoMeshOwned(f->part, i) >= 0) own[HycoMeshOwned(f->part, i)] = parts->of[i];
@@ -192,10 +197,12 @@ static PetscErrorCode List(HycoFOM f, const PetscInt of[], const PetscBool in[],
     for (PetscInt i = 0; i < m->n_nodes * b->dim; i++) {
       const PetscInt node = i / b->dim;
 
+      /* Fixed unknowns do not move and carry a reaction that is no contact's. */
       if (!in[node] || of[node] != k || f->fe_surface->fixed[i]) continue;
       b->dof[b->ns] = (m->node_whole ? m->node_whole[node] : node) * b->dim + i % b->dim;
       global[b->ns++] = (m->node_global ? m->node_global[node] : node) * b->dim + i % b->dim;
     }
+    /* Body after body: the blocks of C are contiguous. */
     b->start[k + 1] = b->ns;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -214,6 +221,7 @@ static PetscErrorCode ListReached(HycoReducer t, const PetscInt of[], HycoSubstr
   PetscCall(HycoPairsMarkSurfaces(f->scene, f->surface, &f->pairs, in));
   PetscCall(List(f, of, in, b, global));
   for (PetscInt k = 0; k < b->n; k++) most = PetscMax(most, b->start[k + 1] - b->start[k]);
+  /* A body's flexibility is dense: nodes that no slave ever meets are left out where that pays. */
   if (most > MANY_UNKNOWNS && f->searches && t->scene->n_parameters) {
     PetscCall(LeaveOut(t, in));
     PetscCall(List(f, of, in, b, global));
@@ -270,6 +278,7 @@ static PetscErrorCode NodesAt(HycoReducer t, const PetscReal first[], PetscInt p
   mu[p] = value;
   HycoOnEach(HycoComm(f), HycoFESetParameters(f->fe, mu));
   PetscCall(PetscArraycpy(X, f->fe->X, 3 * f->part->n_nodes));
+  /* The caller moves on: K and F of this position are never assembled. */
   f->fe->ready = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -285,6 +294,7 @@ static PetscErrorCode Bends(HycoReducer t, const PetscReal mu[], PetscInt p, Pet
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc3(3 * n + 1, &X, 3 * n + 1, &from, 3 * n + 1, &to));
+  /* A straight line between the two ends; in between the share is that of the variable. */
   PetscCall(NodesAt(t, mu, p, lo, from));
   PetscCall(NodesAt(t, mu, p, hi, to));
   PetscCall(PetscArrayzero(distance, HYCO_BODIES_VARIABLES));
@@ -300,6 +310,7 @@ static PetscErrorCode Bends(HycoReducer t, const PetscReal mu[], PetscInt p, Pet
         const PetscInt body = parts->of[i / 3];
 
         if (HycoMeshOwned(t->fom->part, i / 3) < 0) continue;
+        /* Bodies that only move or turn are exact whatever is interpolated. */
         if (!(parts->enters[body * parts->n_parameters + p] & HYCO_ENTERS_SHAPE)) continue;
         distance[g] += PetscSqr(X[i] - from[i] - share * (to[i] - from[i]));
       }
@@ -321,20 +332,24 @@ static PetscErrorCode ChooseVariable(HycoReducer t, const PetscReal mu[], PetscI
 
   PetscFunctionBegin;
   *variable = HYCO_BODIES_PLAIN;
+  /* Logarithm and reciprocal need positive values. */
   if (s->lo[p] <= 0 || s->hi[p] <= s->lo[p]) PetscFunctionReturn(PETSC_SUCCESS);
   changed[p] = PETSC_TRUE;
   if (!HycoSceneChanges(s, changed).nodes) {
+    /* Below a factor of two a logarithm is nearly linear. */
     if (s->hi[p] > 2 * s->lo[p]) *variable = HYCO_BODIES_LOGARITHM;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(Bends(t, mu, p, distance));
   for (PetscInt g = 0; g < HYCO_BODIES_VARIABLES; g++) {
+    /* Clearly straighter only: a tie stays with the parameter itself. */
     if (distance[g] < STRAIGHTER * distance[*variable]) *variable = g;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The parameters theta, and which bodies each changes, with values enough to begin with. Collective. */
+/* The parameters theta, and which bodies each changes, with values enough to begin with. Collective. theta: parameters
+   that change a body's shape or its ratio of moduli; all others are exact without any sample. */
 static PetscErrorCode TakeTheta(HycoReducer t, HycoSubstructures b)
 {
   const HycoBodyParts *parts = &HycoTrainingOfBodies(t)->parts;
@@ -350,6 +365,7 @@ static PetscErrorCode TakeTheta(HycoReducer t, HycoSubstructures b)
   for (PetscInt k = 0; k < b->n; k++) {
     for (PetscInt p = 0; p < b->n_theta; p++) {
       b->n_nodes[p] = LEAST;
+      /* LEAST values along an axis that changes the shape, to begin with. */
       b->body[k].tensor.n[p] = parts->enters[k * parts->n_parameters + shape[p]] & HYCO_ENTERS_SHAPE ? LEAST : 1;
     }
   }
@@ -365,6 +381,7 @@ static PetscErrorCode TakeNoStrains(HycoReducer t)
   PetscFunctionBegin;
   PetscCall(PetscNew(&b->inelastic));
   in = b->inelastic;
+  /* Nothing is amplified: no modes of strains. */
   in->amplification = 1;
   PetscCall(PetscCalloc1(1, &in->T));
   PetscCall(PetscCalloc1(1, &in->there));
@@ -422,7 +439,9 @@ static PetscErrorCode MakeModes(HycoReducer t, HycoSnapshots store)
   PetscCall(HycoReducerColumn(t, 0, mu));
   PetscCall(PetscMalloc1(b->n_variables + 1, &b->first));
   PetscCall(PetscArraycpy(b->first, mu, b->n_variables));
+  /* Before anything is condensed: the grid follows from the parameters that change shapes. */
   PetscCall(TakeTheta(t, b));
+  /* Laws that flow: their modes come from the replayed training paths. */
   if (HycoBodiesFlow(t))
     PetscCall(HycoBodiesStrainModes(t, store));
   else if (t->scene->n_times)

@@ -52,6 +52,8 @@ static PetscErrorCode Weigh(HycoFE fe, PetscReal scale[])
   for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
     for (PetscInt q = 0; q < el->nq && HycoInelasticFlows(fe, e); q++) {
       PetscCall(HycoGradients(fe, el, e, q, g, &w));
+      /* Squares of scaled stresses sum to an integral, so that the POD's norm is L2 and not one that follows the
+         mesh. */
       scale[e * el->nq + q] = PetscSqrtReal(w);
     }
   }
@@ -95,16 +97,19 @@ static PetscErrorCode CreateSampler(HycoReducer t, HycoSnapshots store, Sampler 
   *s = (Sampler){.t = t, .fe = t->fom->fe};
   PetscCall(HycoReducerColumn(t, 0, mu));
   PetscCall(HycoFOMSetParameters(t->fom, mu));
+  /* All columns at once: steps of a path are replayed in order. */
   PetscCall(HycoReducerGetDisplacements(t, store, &s->U));
   PetscCall(HycoFOMGetRows(t->fom, &order));
   PetscCall(PetscCalloc1(part->n_cells * size + 1, &s->value));
   PetscCall(PetscCalloc1(part->n_cells * nq + 1, &s->scale));
+  /* A column for each listed time of one path: paths are merged one by one. */
   PetscCall(MatCreateDense(HycoComm(t), (order ? order->n[HYCO_ON_CELLS] : part->n_cells) * size, PETSC_DECIDE,
                            t->sizes[1] * size, HycoSnapshotsSteps(t->scene), NULL, &s->S));
   PetscCall(HycoTrainingReplayCreate(t, Displacement, Record, s, &s->replay));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Each path is replayed once with the laws, since snapshots keep displacements and no strains. */
 static PetscErrorCode FollowAll(Sampler *s, HycoSnapshots store, PetscReal tol, HycoPathModes *modes)
 {
   PetscInt n;
@@ -115,11 +120,13 @@ static PetscErrorCode FollowAll(Sampler *s, HycoSnapshots store, PetscReal tol, 
     PetscCall(HycoReducerTell(s->t, "inelastic strains of the paths", k, n));
     PetscCall(HycoTrainingReplayFollow(&s->replay, store, k));
     PetscCall(HycoMatAssemble(s->S));
+    /* Each path is compressed before the next is replayed: memory does not grow with their number. */
     PetscCall(HycoPathModesAdd(s->t, s->S, tol, modes));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Modes of sqrt(w) s at all points: their Euclidean product is then the integral. */
 PetscErrorCode HycoPointsSample(HycoReducer t, HycoSnapshots store, PetscReal tol, HycoBasis *basis)
 {
   HycoPathModes modes = {0};
@@ -144,6 +151,7 @@ PetscErrorCode HycoPointsSample(HycoReducer t, HycoSnapshots store, PetscReal to
 
 /* -- modes on the part -- */
 
+/* From the file's rows to the part's cells. */
 PetscErrorCode HycoPointsMode(HycoReducer t, const HycoBasis *modes, PetscInt k, PetscReal value[])
 {
   const PetscScalar *rows;
@@ -157,6 +165,7 @@ PetscErrorCode HycoPointsMode(HycoReducer t, const HycoBasis *modes, PetscInt k,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Adds to force[], the nodal forces of a cell under stresses that are given at its points. */
 PetscErrorCode HycoPointsCellForce(HycoFE fe, PetscInt e, const PetscReal value[], PetscReal force[])
 {
   const PetscInt n = fe->mesh->nv * fe->dim, nq = HycoElementGet(fe->mesh->type)->nq, ns = fe->n_sigma;
@@ -180,6 +189,7 @@ PetscErrorCode HycoPointsForces(HycoFE fe, const PetscReal value[], PetscReal fo
   for (PetscInt e = 0; e < fe->mesh->n_cells; e++) {
     PetscReal own[HYCO_MAX_CELL_DOFS] = {0};
 
+    /* Elastic cells have no inelastic stress, whatever the modes' rows hold. */
     if (!HycoInelasticFlows(fe, e)) continue;
     PetscCall(HycoPointsCellForce(fe, e, value + e * size, own));
     for (PetscInt k = 0; k < n; k++) force[HycoCellUnknown(fe->mesh, e, k)] += own[k];
@@ -202,6 +212,7 @@ static PetscErrorCode ZeroPoints(Mat V, PetscInt n, PetscInt count, const PetscI
   PetscCall(MatDenseGetLDA(V, &lda));
   PetscCall(MatDenseGetArray(V, &v));
   for (PetscInt k = 0; k < count * n; k++) {
+    /* Points are numbered over the whole mesh, rows over all components. */
     const PetscInt row = point[k / n] * n + k % n;
 
     for (PetscInt j = 0; j < l && row >= lo && row < hi; j++) v[(size_t)j * (size_t)lda + (size_t)(row - lo)] = 0;
@@ -210,8 +221,9 @@ static PetscErrorCode ZeroPoints(Mat V, PetscInt n, PetscInt count, const PetscI
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Q-DEIM on what is left, round after round: each round gives up to l further points, so that the system at the
-   points is overdetermined and noise is averaged. */
+/* Q-DEIM on what is left, round after round: each round gives up to l further points, so that the system at the points
+   is overdetermined and noise is averaged. Q-DEIM (Drmac and Gugercin 2016): pivots of a QR factorisation with column
+   exchange of V^T. */
 PetscErrorCode HycoPointsChoose(const HycoBasis *modes, PetscInt n, PetscInt rounds, PetscInt *count, PetscInt point[])
 {
   PetscInt found = 1;
@@ -235,6 +247,8 @@ PetscErrorCode HycoPointsChoose(const HycoBasis *modes, PetscInt n, PetscInt rou
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* P = pseudoinverse of the modes at the chosen points, by which coefficients follow from the laws there; 1 / smallest
+   singular value is the amplification of their errors. */
 PetscErrorCode HycoPointsInverse(const HycoBasis *modes, PetscInt n, PetscInt count, const PetscInt point[],
                                  PetscReal P[], PetscReal there[], PetscReal *smallest)
 {

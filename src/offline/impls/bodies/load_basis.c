@@ -14,7 +14,8 @@
 #define POINTS(p, q) (12 + 8 * (p) + 24 * (q))
 #define MORE         8 /* further points */
 
-/* F at mu in the bodies' axes, 0 where fixed. Collective. */
+/* F at mu in the bodies' axes, 0 where fixed. Collective. In the body's axes a load that moves with the body does not
+   change, and needs one vector only. */
 static PetscErrorCode TurnedLoad(HycoReducer t, HycoFOM f, const PetscReal X0[], const PetscReal mu[], HycoPose pose[],
                                  Vec F)
 {
@@ -100,10 +101,12 @@ static PetscErrorCode CheckTurns(HycoReducer t, const HycoPose pose[])
   for (PetscInt e = 0; e < m->n_cells; e++) {
     if (HycoInelasticFlows(t->fom->fe, e)) flows[HycoTrainingOfBodies(t)->parts.of[m->cells[e * m->nv]]] = PETSC_TRUE;
   }
+  /* A body may lie on several ranks, with its flowing cells on one of them. */
   HycoAllreduce(flows, HycoTrainingOfBodies(t)->parts.n, HYCO_MPI_BOOL, MPI_LOR, HycoComm(t));
   for (PetscInt k = 0; k < HycoTrainingOfBodies(t)->parts.n; k++) {
     PetscReal turned = 0;
 
+    /* Distance of Q from the identity. */
     for (PetscInt d = 0; d < 9; d++) turned = PetscMax(turned, PetscAbsReal(pose[k].Q[d] - (d % 4 == 0)));
     HycoCheckModel(!flows[k] || turned < 1e-9,
                    "body %s deforms inelastically, and its map turns it, which a model of bodies does not support; "
@@ -169,6 +172,7 @@ static PetscErrorCode AddPath(HycoReducer t, HycoBodiesFactor *factor, Survey *s
   for (PetscInt j = 0; j < n; j++) {
     const PetscReal now = scene->n_times ? scene->times[j / 2] : 0, next = j % 2 ? scene->times[j / 2 + 1] : now;
 
+    /* Loads follow tables and time as well as parameters. */
     HycoSceneSetTime(scene, mu, now + 0.618 * (next - now), all);
     PetscCall(AddPoint(t, factor, s, all, check));
   }
@@ -198,7 +202,7 @@ static PetscErrorCode SurveyPoints(HycoReducer t, HycoBodiesFactor *factor, Surv
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Puts the turns of all bodies one after the other. */
+/* Puts the turns of all bodies one after the other. G: 9 numbers a turn, up to 9 turns a body, as a rotation has. */
 static PetscErrorCode TakeTurns(HycoSubstructures b, const Survey *s)
 {
   PetscFunctionBegin;
@@ -222,6 +226,7 @@ static PetscErrorCode ValueAt(Vec v, PetscInt i, PetscReal *value)
   PetscFunctionBegin;
   PetscCall(VecGetOwnershipRange(v, &lo, &hi));
   PetscCall(VecGetArrayRead(v, &a));
+  /* 0 on the others, so that the sum is the value. */
   *value = i >= lo && i < hi ? a[i - lo] : 0;
   PetscCall(VecRestoreArrayRead(v, &a));
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, value, 1, MPIU_REAL, MPI_SUM, PetscObjectComm((PetscObject)v)));
@@ -256,12 +261,14 @@ static PetscErrorCode FindPoints(HycoSubstructures b, const HycoBodiesFactor *fa
   PetscCall(PetscCalloc4(r * r + 1, &D, r * r + 1, &P, r + 1, &c, r + 1, &at));
   HycoVecDuplicate(factor->fom->F, &rest, &size);
   for (PetscInt k = 0; k < r; k++) {
+    /* The interpolation through the points so far; the matrix grows by a row and a column. */
     if (k) PetscCall(Invert(k, r, D, P));
     for (PetscInt i = 0; i < k; i++) PetscCall(ValueAt(factor->basis[k], point[i], &at[i]));
     PetscCall(VecCopy(factor->basis[k], rest));
     for (PetscInt i = 0; i < k; i++) {
       c[i] = 0;
       for (PetscInt j = 0; j < k; j++) c[i] += P[i * k + j] * at[j];
+      /* What the former vectors do not interpolate: the next point is where it is largest. */
       PetscCall(VecAXPY(rest, -c[i], factor->basis[i]));
     }
     PetscCall(VecCopy(rest, size));
@@ -273,6 +280,7 @@ static PetscErrorCode FindPoints(HycoSubstructures b, const HycoBodiesFactor *fa
     }
   }
   PetscCall(PetscMalloc1(r * r + 1, &b->A));
+  /* Once more with all points: A turns values of F into coefficients. */
   if (r) PetscCall(Invert(r, r, D, b->A));
   HycoDestroyAll(&rest, &size);
   PetscCall(PetscFree4(D, P, c, at));
@@ -309,6 +317,7 @@ static PetscErrorCode LargestCells(HycoReducer t, const PetscReal first[], Petsc
   PetscReal *volume, *most;
 
   PetscFunctionBegin;
+  /* At the reference: a cell that is largest elsewhere serves as well, but every run must choose the same. */
   PetscCall(HycoFOMSetParameters(t->fom, first));
   PetscCall(PetscMalloc1(m->n_cells + 1, &volume));
   PetscCall(PetscCalloc1(parts->n, &most));
@@ -341,6 +350,7 @@ static PetscErrorCode TakeProbe(HycoSubstructures b, const PetscInt point[], con
   PetscCall(PetscCalloc1(b->n, &b->cell));
   for (PetscInt k = 0; k < b->r; k++) {
     for (PetscInt i = 0; i < m->n_nodes; i++) {
+      /* The probe is small: no search structure is worth its lines. */
       if (m->node_whole[i] == node[k]) b->at[k] = i * b->dim + point[k] % b->dim;
     }
   }
@@ -352,8 +362,9 @@ static PetscErrorCode TakeProbe(HycoSubstructures b, const PetscInt point[], con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Gathers the cells around the points and the bodies' largest. Collective. The cells around each DEIM point (F of
-   an unknown sums over them), with facets for pressures, and one cell of each body for its pose and modulus. */
+/* Gathers the cells around the points and the bodies' largest. Collective. The cells around each DEIM point (F of an
+   unknown sums over them), with facets for pressures, and one cell of each body for its pose and modulus. The model
+   carries this small mesh: loads and poses at new parameters follow from its nodes alone. */
 static PetscErrorCode GatherProbe(HycoReducer t, HycoBodiesFactor *factor, const PetscInt point[])
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
@@ -370,6 +381,7 @@ static PetscErrorCode GatherProbe(HycoReducer t, HycoBodiesFactor *factor, const
     const PetscInt n = HycoMeshCellNodes(m, e, of);
 
     needed[e] = (PetscBool)(cell[HycoTrainingOfBodies(t)->parts.of[of[0]]] == (m->cell_whole ? m->cell_whole[e] : e));
+    /* Every cell around a point contributes to the nodal force there. */
     for (PetscInt v = 0; v < n * b->r && !needed[e]; v++)
       needed[e] = (PetscBool)((m->node_whole ? m->node_whole[of[v / b->r]] : of[v / b->r]) == node[v % b->r]);
   }
@@ -398,10 +410,12 @@ PetscErrorCode HycoBodiesLoads(HycoReducer t, HycoBodiesFactor *factor)
   if (!ierr) ierr = TakeTurns(b, &s);
   PetscCall(PetscFree2(s.G, s.turns));
   HycoFreeAll(&s.pose, &s.X0);
+  /* The survey has moved the nodes. */
   f->fe->ready = PETSC_FALSE;
   PetscCall(ierr);
   b->r = factor->n_basis;
   PetscCall(FindPoints(b, factor, point));
+  /* On rank 0: a prediction evaluates loads at these points alone. */
   PetscCall(GatherProbe(t, factor, point));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

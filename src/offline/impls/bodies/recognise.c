@@ -94,6 +94,7 @@ static PetscErrorCode Turn(const Compared *c, PetscBool back, Vec from, Vec to)
   for (PetscInt i = 0; i < m->n_nodes; i++) {
     const PetscInt own = HycoMeshOwned(m, i);
 
+    /* Both vectors have owned unknowns only, by node. */
     if (own >= 0) HycoPoseTurn(c->pose[c->parts->of[i]].Q, dim, back, a + own * dim, b + own * dim);
   }
   PetscCall(VecRestoreArray(to, &b));
@@ -115,6 +116,7 @@ static PetscErrorCode SetProbe(Compared *c)
     const PetscInt own = HycoMeshOwned(m, k / dim), whole = m->node_whole ? m->node_whole[k / dim] : k / dim;
     const PetscReal number = (PetscReal)(whole * dim + k % dim + 1);
 
+    /* A chirp: no two nodes have the same value, and no rigid motion or symmetry hides a change. */
     if (own >= 0) v[own * dim + k % dim] = c->f->fe->fixed[k] ? 0 : PetscSinReal(1.7 * number * number + number);
   }
   PetscCall(VecRestoreArray(c->v, &v));
@@ -141,12 +143,14 @@ static PetscErrorCode Sums(Compared *c, PetscReal sum[])
     const PetscInt own = HycoMeshOwned(m, i);
     PetscReal *s = sum + SUMS * c->parts->of[i], Qa[3], QF[3];
 
+    /* Ghosts are counted on their owner. */
     if (own < 0) continue;
     HycoPoseTurn(c->pose[c->parts->of[i]].Q, dim, PETSC_FALSE, a + own * dim, Qa);
     HycoPoseTurn(c->pose[c->parts->of[i]].Q, dim, PETSC_FALSE, F0 + own * dim, QF);
     for (PetscInt d = 0; d < dim; d++) {
       const PetscInt k = own * dim + d;
 
+      /* A turned probe that does not vanish at a support: the support does not turn with the body. */
       s[AT_FIXED] += c->f->fe->fixed[i * dim + d] ? PetscAbsReal(v[k]) : 0;
       if (c->f->fe->fixed[i * dim + d]) continue;
       s[AA] += Qa[d] * Qa[d];
@@ -162,12 +166,14 @@ static PetscErrorCode Sums(Compared *c, PetscReal sum[])
   PetscCall(VecRestoreArrayRead(c->now, &v));
   PetscCall(VecRestoreArrayRead(c->F0, &F0));
   PetscCall(VecRestoreArrayRead(c->F, &F));
+  /* One reduction for all bodies and sums. */
   HycoAllreduce(sum, SUMS * c->parts->n, MPIU_REAL, MPI_SUM, HycoComm(c->f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The largest entry of K(mu) Q v - kappa Q K v relative to the root of the mean square, by body: |b - kappa a| from
-   the sums alone would be exact to the root of the round-off only. */
+/* The largest entry of K(mu) Q v - kappa Q K v relative to the root of the mean square, by body: |b - kappa a| from the
+   sums alone would be exact to the root of the round-off only. off: how far K(mu) is from a turned and scaled K; load:
+   how far F is, without and with the factor. */
 static PetscErrorCode Distances(Compared *c, const PetscReal sum[])
 {
   HycoMesh m = c->f->part;
@@ -192,6 +198,7 @@ static PetscErrorCode Distances(Compared *c, const PetscReal sum[])
       const PetscInt k = own * dim + d;
 
       if (c->f->fe->fixed[i * dim + d]) continue;
+      /* Entry by entry at the factor that Sums() has found. */
       r[0] += PetscSqr(b[k] - c->kappa[body] * Qa[d]);
       r[1] += PetscSqr(F[k] - QF[d]);
       r[2] += PetscSqr(F[k] - c->kappa[body] * QF[d]);
@@ -207,6 +214,7 @@ static PetscErrorCode Distances(Compared *c, const PetscReal sum[])
 
     c->off[k] = sum[SUMS * k + BB] > 0 ? PetscSqrtReal(rest[3 * k] / sum[SUMS * k + BB]) : 0;
     if (sum[SUMS * k + AT_FIXED] > SIMILAR * c->f->n_nodes) c->off[k] = 1; /* supports that do not turn */
+    /* Loads that turn with the body, with and without its factor. */
     c->load[2 * k] = size > 0 ? PetscSqrtReal(rest[3 * k + 1] / size) : 0;
     c->load[2 * k + 1] = size > 0 ? PetscSqrtReal(rest[3 * k + 2] / size) : 0;
   }
@@ -228,6 +236,7 @@ static PetscErrorCode Compare(Compared *c, const PetscReal mu[])
   PetscCall(MatMult(c->K, c->now, c->product));
   PetscCall(PetscMalloc1(SUMS * c->parts->n, &sum));
   PetscCall(Sums(c, sum));
+  /* The factor in the sense of least squares. */
   for (PetscInt k = 0; k < c->parts->n; k++)
     c->kappa[k] = sum[SUMS * k + AA] > 0 ? sum[SUMS * k + AB] / sum[SUMS * k + AA] : 1;
   PetscCall(Distances(c, sum));
@@ -255,8 +264,9 @@ static PetscInt Ways(const Compared *c, PetscInt k)
   return ways;
 }
 
-/* Whether the nodes of each body have moved, beyond turning and scaling. Collective. A pose has no translation,
-   which changes neither K nor its axes but the place of the contacts. */
+/* Whether the nodes of each body have moved, beyond turning and scaling. Collective. A pose has no translation, which
+   changes neither K nor its axes but the place of the contacts. Relative to the whole mesh's extent: a small body far
+   from the origin has no more digits. */
 static PetscErrorCode Shifted(Compared *c, PetscBool moved[])
 {
   const PetscReal length = HycoMeshLength(c->f->part);
@@ -270,7 +280,7 @@ static PetscErrorCode Shifted(Compared *c, PetscBool moved[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Stores nodes, K v and F at this point, with which the others are compared. Collective. */
+/* Stores nodes, K v and F at this point, with which the others are compared. Collective. K v for one v (SetProbe()) in place of K: matrices that differ agree on it by chance only. */
 static PetscErrorCode SetReference(Compared *c, const PetscReal mu[])
 {
   PetscFunctionBegin;
@@ -283,7 +293,8 @@ static PetscErrorCode SetReference(Compared *c, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* All parameters at once, compared with points that have the same values of those that change shapes. Collective. */
+/* All parameters at once, compared with points that have the same values of those that change shapes. Collective.
+   Parameters that turn or scale a body each alone may shear it together, as two maps of one body do. */
 static PetscErrorCode VisitTogether(Compared *c, const PetscReal first[])
 {
   HycoScene s = c->f->scene;
@@ -350,6 +361,8 @@ static PetscErrorCode CompareAll(Compared *c, const PetscReal first[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Measured and not derived from the expressions: whether a map turns, scales or bends is seen in the matrices that it
+   makes. */
 PetscErrorCode HycoBodyPartsFind(HycoFOM f, const PetscReal first[], HycoBodyParts *parts)
 {
   Compared c = {.f = f, .parts = parts};
@@ -397,10 +410,12 @@ static PetscErrorCode DescribeOne(const HycoBodyParts *parts, PetscInt p, PetscB
   for (size_t w = 0; w < sizeof(words) / sizeof(words[0]); w++) {
     char names[HYCO_LINE] = "", one[HYCO_LINE];
 
+    /* Of a path every load changes in time: the words would tell nothing. */
     if (path && words[w].way == HYCO_ENTERS_LOADS) continue;
     for (PetscInt k = 0; k < parts->n; k++) {
       const PetscInt enters = parts->enters[k * parts->n_parameters + p];
 
+      /* A body that needs samples has nothing exact to tell of this parameter. */
       if (!(enters & words[w].way) || (words[w].way != HYCO_ENTERS_SHAPE && enters & HYCO_ENTERS_SHAPE)) continue;
       PetscCall(HycoListAdd(names, ", ", parts->name[k]));
     }
@@ -420,6 +435,7 @@ PetscInt HycoBodyPartsShapes(const HycoBodyParts *parts, PetscInt b, PetscInt pa
     PetscBool any = PETSC_FALSE;
 
     for (PetscInt k = 0; k < parts->n; k++) {
+      /* b < 0: any body. */
       if ((b < 0 || k == b) && parts->enters[k * parts->n_parameters + p] & HYCO_ENTERS_SHAPE) any = PETSC_TRUE;
     }
     if (any) parameter[n++] = p;
@@ -435,6 +451,7 @@ PetscInt HycoBodyPartsFail(const HycoBodyParts *parts)
   return -1;
 }
 
+/* For hyco check and for training: why a model of bodies suits the scene, or why not. */
 PetscErrorCode HycoBodyPartsDescribe(HycoScene s, const HycoBodyParts *parts, char text[HYCO_LINE])
 {
   PetscInt shape[HYCO_MAX_PARAMETERS], body;
@@ -450,6 +467,7 @@ PetscErrorCode HycoBodyPartsDescribe(HycoScene s, const HycoBodyParts *parts, ch
                             : "enters no body");
     PetscCall(HycoListAdd(text, "; ", line));
   }
+  /* What no parameter does alone cannot be told by parameter. */
   body = HycoBodyPartsFail(parts);
   if (body >= 0) {
     HycoFormat(line, "body %s changes its shape where parameters change together", parts->name[body]);

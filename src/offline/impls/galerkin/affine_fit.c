@@ -25,7 +25,8 @@ static PetscErrorCode Sample(HycoROM m, const PetscReal mu[], PetscInt entries, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the table reproduces the matrix at mu. */
+/* Whether the table reproduces the matrix at mu. At a point that made no entry of the table: agreement there is
+   evidence of a polynomial. */
 static PetscErrorCode Agrees(HycoROM m, HycoTable t, const PetscReal mu[], PetscBool *agrees)
 {
   const PetscInt entries = t->values.rows;
@@ -57,6 +58,7 @@ static PetscErrorCode FillTable(HycoROM m, HycoTable t)
 
   PetscFunctionBegin;
   for (PetscInt node = 0; node < HycoTensorSize(tensor); node++) {
+    /* From the number of the node to its indices; the last is the fastest, as in HycoTensor. */
     for (PetscInt p = tensor->dim - 1, rest = node; p >= 0; p--) {
       mu[p] = t->x[p][rest % tensor->n[p]];
       rest /= tensor->n[p];
@@ -76,6 +78,7 @@ static PetscErrorCode Try(HycoROM m, const PetscInt n[], PetscInt entries, Petsc
   PetscFunctionBegin;
   for (PetscInt p = 0; p < s->n_parameters; p++) {
     PetscCall(PetscMalloc1(n[p], &x[p]));
+    /* Chebyshev points: interpolation of polynomials of degree n - 1 is exact and well conditioned. */
     PetscCall(HycoChebyshevNodes(n[p], s->lo[p], s->hi[p], x[p]));
   }
   PetscCall(HycoTableCreate(n, x, s->n_parameters, entries, table));
@@ -84,8 +87,10 @@ static PetscErrorCode Try(HycoROM m, const PetscInt n[], PetscInt entries, Petsc
   *holds = PETSC_TRUE;
   for (PetscInt k = 0; k < N_CHECKS && *holds; k++) {
     for (PetscInt p = 0; p < s->n_parameters; p++) {
+      /* Multiples of the golden ratio modulo 1: spread over the range and on no node. */
       const PetscReal golden = 0.6180339887498949 * (1 + k + 3 * p) + 0.1, part = golden - PetscFloorReal(golden);
 
+      /* One parameter varies for its own degree; all together for the table itself. */
       mu[p] = varied < 0 || p == varied ? s->lo[p] + part * (s->hi[p] - s->lo[p]) : (s->lo[p] + s->hi[p]) / 2;
     }
     PetscCall(Agrees(m, *table, mu, holds));
@@ -100,7 +105,9 @@ static PetscErrorCode CountValues(HycoROM m, PetscInt p, PetscInt entries, Petsc
   PetscBool holds = PETSC_FALSE;
 
   PetscFunctionBegin;
+  /* The others at one value, so that a trial has few nodes. */
   for (PetscInt q = 0; q < m->model->scene->n_parameters; q++) n[q] = 1;
+  /* The first n that reproduces the entries gives their degree, n - 1. */
   for (n[p] = 2; n[p] <= MOST && !holds; n[p]++) {
     HycoTable table;
 
@@ -112,7 +119,8 @@ static PetscErrorCode CountValues(HycoROM m, PetscInt p, PetscInt entries, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rank 0. Not finding a table is no failure: predictions then assemble. */
+/* Rank 0. Not finding a table is no failure: predictions then assemble. A stiffness that is a polynomial in the
+   parameters is exact in the table; others are refused by Agrees(), which is why no error is added. */
 PetscErrorCode HycoGalerkinTabulate(HycoROM m, const PetscBool reaches[])
 {
   HycoGalerkinModel g = (HycoGalerkinModel)m->model->data;

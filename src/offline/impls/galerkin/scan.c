@@ -11,7 +11,8 @@
 
 #define LARGEST 2500 /* number of unknowns above which a dense factor at every point takes minutes */
 
-/* The parameters over whose ranges the reduced stiffness is scanned. */
+/* The parameters over whose ranges the reduced stiffness is scanned. The others do not change the matrix, and a grid
+   over them would repeat it. */
 static PetscErrorCode FindParameters(HycoROM m, PetscBool reaches[])
 {
   const HycoScene s = m->model->scene;
@@ -34,9 +35,11 @@ static PetscErrorCode ChooseGrid(PetscInt asked, PetscInt unknowns, PetscInt n_p
 
   PetscFunctionBegin;
   for (PetscInt p = 0; p < n_par; p++) q += reaches[p];
+  /* A number that was given is per parameter. */
   *each = asked;
   if (!asked) *each = q > 12 || !q ? 1 : PetscMax(2, PetscMin(101, (PetscInt)PetscPowReal(most, 1 / (PetscReal)q)));
   all = PetscPowReal((PetscReal)*each, (PetscReal)q);
+  /* In reals: the product of many parameters overflows integers. */
   HycoCheck(all <= 1e6, "-hyco_scan %d gives %.0e points for %d parameters; give a smaller number", (int)asked,
             (double)all, (int)q);
   *n = (PetscInt)(all + 0.5);
@@ -103,11 +106,14 @@ static PetscErrorCode Conclude(HycoReducer t, HycoROM m, const PetscBool reaches
   for (PetscInt k = 0; k < s->n; k++) {
     positive += sign[k] > 0;
     if (ratio[k] < ratio[worst]) worst = k;
+    /* The sign of the determinant says which side a point is on, not which side is right: changes count. */
     if (k && !change && sign[k] != sign[0]) change = k;
   }
+  /* The smaller of the two groups of signs. */
   s->n_singular = PetscMin(positive, s->n - positive);
   s->smallest = ratio[worst];
   GridPoint(m->model->scene, reaches, each, worst, s->at);
+  /* Without a change of sign a small singular value alone is no proof; it is stored and shown. */
   if (t->keep_singular || (!change && ratio[worst] > 0)) PetscFunctionReturn(PETSC_SUCCESS);
   GridPoint(m->model->scene, reaches, each, PetscMax(change - 1, 0), mu);
   Say(m->model->scene, mu, here);
@@ -120,7 +126,8 @@ static PetscErrorCode Conclude(HycoReducer t, HycoROM m, const PetscBool reaches
       here, there);
 }
 
-/* Monitors the training paths first .. last-1. */
+/* Monitors the training paths first .. last-1. The tangents of a path depend on its strains: they are watched where the
+   path goes. */
 static PetscErrorCode ScanMyPaths(HycoReducer t, HycoROM m, PetscInt first, PetscInt last, PetscInt each,
                                   PetscInt stride, PetscReal sign[], PetscReal ratio[])
 {
@@ -156,14 +163,17 @@ static PetscErrorCode ConcludePaths(HycoReducer t, HycoROM m, PetscInt n, PetscI
   PetscCall(HycoSamplesGet(t->samples, NULL, &n_par, &mu));
   s->n = 0;
   for (PetscInt k = 0; k < n; k++) {
+    /* Strides leave out times, and a path that ends early has none there. */
     if (sign[k] == 0) continue; /* not computed */
     s->n++;
     positive += sign[k] > 0;
     if (ratio[k] < ratio[worst] || sign[worst] == 0) worst = k;
+    /* The first tangent of negative sign is the one that the message shows. */
     if (sign[k] < 0 && change < 0) change = k;
   }
   s->n_singular = PetscMin(positive, s->n - positive);
   s->smallest = ratio[worst];
+  /* The path is named by its parameters; its time would not help to choose settings. */
   PetscCall(PetscArraycpy(s->at, mu + worst / each * n_par, n_par));
   if (t->keep_singular || !s->n_singular) PetscFunctionReturn(PETSC_SUCCESS);
   Say(m->model->scene, mu + change / each * n_par, here);
@@ -185,10 +195,12 @@ static PetscErrorCode ScanPaths(HycoReducer t, HycoROM m)
   PetscCall(HycoSamplesGet(t->samples, &n, NULL, NULL));
   HycoOnEach(HycoComm(t), HycoROMSetUp(m));
   if (m->n > LARGEST) PetscFunctionReturn(PETSC_SUCCESS);
+  /* So that all singular value decompositions together take some 5e10 operations. */
   stride = 1 + (PetscInt)((PetscReal)(n * each) * PetscPowReal((PetscReal)m->n, 3) / 5e10);
   PetscCall(PetscCalloc2(n * each, &sign, n * each, &ratio));
   HycoOnEach(HycoComm(t), ScanMyPaths(t, m, t->rank * n / HycoSize(HycoComm(t)),
                                       (t->rank + 1) * n / HycoSize(HycoComm(t)), each, stride, sign, ratio));
+  /* Each path is on one rank, and zero elsewhere: sums collect. */
   HycoAllreduce(sign, n * each, MPIU_REAL, MPI_SUM, HycoComm(t));
   HycoAllreduce(ratio, n * each, MPIU_REAL, MPI_SUM, HycoComm(t));
   HycoOnRoot(HycoComm(t), ConcludePaths(t, m, n * each, each, sign, ratio));
@@ -205,9 +217,11 @@ static PetscErrorCode Scan(HycoReducer t, HycoROM m, PetscBool reaches[])
   PetscReal *sign, *ratio;
 
   PetscFunctionBegin;
+  /* Each rank has the model, and needs its online data for its share. */
   HycoOnEach(HycoComm(t), FindParameters(m, reaches));
   if (m->n > LARGEST) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(ChooseGrid(t->scan, m->n, m->model->scene->n_parameters, reaches, &each, &g->scan.n));
+  /* Zeros outside the rank's share: the sums below collect. */
   PetscCall(PetscCalloc2(g->scan.n, &sign, g->scan.n, &ratio));
   HycoOnEach(HycoComm(t), ScanMine(m, reaches, each, t->rank * g->scan.n / HycoSize(HycoComm(t)),
                                    (t->rank + 1) * g->scan.n / HycoSize(HycoComm(t)), sign, ratio));
@@ -229,6 +243,7 @@ PetscErrorCode HycoGalerkinFinish(HycoReducer t, HycoROM m, HycoTraining *report
     PetscCall(ScanPaths(t, m));
   else {
     PetscCall(Scan(t, m, reaches));
+    /* One rank suffices: a table has few nodes. */
     HycoOnRoot(HycoComm(t), HycoGalerkinTabulate(m, reaches));
   }
   report->scan = ((HycoGalerkinModel)m->model->data)->scan;
@@ -236,7 +251,8 @@ PetscErrorCode HycoGalerkinFinish(HycoReducer t, HycoROM m, HycoTraining *report
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A sparse factor (bordered paths) is linear in n; then the cells' laws, and the modes' products. */
+/* A sparse factor (bordered paths) is linear in n; then the cells' laws, and the modes' products. In operations of a
+   prediction: LU of the reduced matrix, assembly of the RID's cells, products with the modes. Only comparisons of attempts use it. */
 PetscReal HycoGalerkinCost(HycoReducer t, const HycoAttempt *a)
 {
   const PetscReal dim = t->sizes[3],

@@ -20,6 +20,7 @@ typedef struct {
   PetscReal ridge; /* all; < 0: automatic */
 } * Training;
 
+/* Declared with the type, so that the help lists them under it. */
 static PetscErrorCode SetFromOptions(HycoReducer t)
 {
   Training s;
@@ -128,6 +129,7 @@ static PetscErrorCode TimesModes(HycoROM m, Mat A, IS rows, IS columns, PetscRea
   PetscInt n;
 
   PetscFunctionBegin;
+  /* V is stored by rows: as a dense matrix of PETSc it is its transpose. */
   PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, m->model->l, m->fe->n_dof, m->model->V, &Vt));
   PetscCall(MatTranspose(Vt, MAT_INITIAL_MATRIX, &V));
   PetscCall(ISCreateStride(PETSC_COMM_SELF, m->model->l, 0, 1, &all));
@@ -137,6 +139,7 @@ static PetscErrorCode TimesModes(HycoROM m, Mat A, IS rows, IS columns, PetscRea
   PetscCall(ISGetLocalSize(rows, &n));
   PetscCall(MatDenseGetArrayRead(product, &p));
   for (PetscInt k = 0; k < n; k++) {
+    /* Back to rows, as the rank revealing factorisation wants them. */
     for (PetscInt j = 0; j < m->model->l; j++) P[k * m->model->l + j] = p[j * n + k];
   }
   PetscCall(MatDenseRestoreArrayRead(product, &p));
@@ -151,6 +154,7 @@ static PetscErrorCode ContactRows(HycoROM m, const PetscInt candidate[], PetscRe
   IS candidates, unknowns;
 
   PetscFunctionBegin;
+  /* B at the training parameters that Assembled() has set. */
   PetscCall(HycoGalerkinContactMatrix(m));
   PetscCall(ISCreateStride(PETSC_COMM_SELF, m->fe->n_dof, 0, 1, &unknowns));
   PetscCall(ISCreateGeneral(PETSC_COMM_SELF, m->m, candidate, PETSC_COPY_VALUES, &candidates));
@@ -254,6 +258,7 @@ static PetscErrorCode Exchange(HycoReducer t, HycoROM m, PetscInt n, const Petsc
         for (PetscInt c = 0; c < N; c++) {
           if (chosen[c]) dof[k++] = candidate[c];
         }
+        /* Each trial costs a solve for every snapshot; sets are recognised by their hash. */
         if (!past) {
           seen[n_seen++] = hash;
           PetscCall(HycoReducerTell(t, "choices of full-order displacements", trials, limit));
@@ -289,6 +294,7 @@ static PetscErrorCode SearchFrom(HycoReducer t, HycoROM m, PetscInt start, Petsc
   PetscBool *chosen;
 
   PetscFunctionBegin;
+  /* No full-order unknowns: the rank of (38) is that of the modes alone. */
   PetscCall(HycoROMSetFE(m, HYCO_HYBRID_RANK, 0, NULL));
   PetscCall(Assembled(t, m));
   N = m->m;
@@ -296,8 +302,10 @@ static PetscErrorCode SearchFrom(HycoReducer t, HycoROM m, PetscInt start, Petsc
   PetscCall(Candidates(m, candidate));
   PetscCall(ResolvedContacts(m, candidate, (PetscBool)(start == 0), &rank, pivot));
   for (PetscInt k = 0; k < N; k++) chosen[k] = (PetscBool)(start < 2);
+  /* A pivot is a contact that the modes resolve: it needs no displacement of its own. */
   for (PetscInt k = 0; k < rank && start < 2; k++) chosen[pivot[k]] = PETSC_FALSE;
   for (PetscInt k = 0; k < N - rank && start >= 2; k++) chosen[(k * N / (N - rank) + start - 2) % N] = PETSC_TRUE;
+  /* First the start is judged, then what the exchanges have left is listed. */
   for (PetscInt pass = 0; pass < 2; pass++) {
     *n = 0;
     for (PetscInt k = 0; k < N; k++) {
@@ -323,6 +331,7 @@ static PetscErrorCode ChooseRank(HycoReducer t, HycoROM m, Verdict *best)
   PetscCall(PetscMalloc2(room, &dof, room, &trial));
   for (PetscInt start = 0; start < starts; start++) {
     PetscCall(SearchFrom(t, m, start, &other, trial, &verdict));
+    /* The first start holds unless another is better: an order without ties by chance. */
     if (start && !Better(&verdict, best)) continue;
     *best = verdict;
     n = other;
@@ -340,6 +349,7 @@ static PetscErrorCode MarkContact(HycoReducer t, HycoROM m, PetscBool contact[])
   PetscBool *met;
 
   PetscFunctionBegin;
+  /* Nothing moves: the pairs are the contact nodes. */
   if (!t->fom->searches) {
     HycoPairsMark(&m->model->pairs, contact);
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -347,13 +357,15 @@ static PetscErrorCode MarkContact(HycoReducer t, HycoROM m, PetscBool contact[])
   PetscCall(PetscCalloc1(n, &met));
   HycoPairsMark(&t->met.rows, met);
   for (PetscInt i = 0; i < n; i++) {
+    /* Masters over the whole ranges, not only at one point. */
     if (met[i]) contact[t->surface_node[i]] = PETSC_TRUE;
   }
   PetscCall(PetscFree(met));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The free unknowns of the nodes of A: all, or those of contact nodes. */
+/* The free unknowns of the nodes of A: all, or those of contact nodes. Fixed ones have no equation, and their values
+   are in the lifting. */
 static PetscErrorCode FreeUnknowns(HycoReducer t, HycoROM m, PetscBool contact_only, PetscInt *n, PetscInt dof[])
 {
   const PetscInt dim = m->model->mesh->dim, *node;
@@ -367,6 +379,7 @@ static PetscErrorCode FreeUnknowns(HycoReducer t, HycoROM m, PetscBool contact_o
   PetscCall(ISGetLocalSize(m->model->inside, &n_A));
   PetscCall(ISGetIndices(m->model->inside, &node));
   for (PetscInt k = 0; k < n_A * dim; k++) {
+    /* Nodes of A in ascending order, so that fe_dof is too. */
     const PetscInt i = node[k / dim] * dim + k % dim;
 
     if (!t->fixed[i] && (contact[i / dim] || !contact_only)) dof[(*n)++] = i;
@@ -397,10 +410,13 @@ static PetscErrorCode RaceRidges(HycoReducer t, HycoROM m, PetscReal *strength)
     PetscReal u;
     PetscBool lost;
 
+    /* A new regression of the modes on A's unknowns; the reduced matrix follows. */
     PetscCall(HycoGalerkinSetRidge(m, ridge));
     PetscCall(HycoReducerJudgeRace(t, m, any ? its : NULL, t->trying ? USELESS : PETSC_INFINITY, judged, &u, &lost));
+    /* Errors have one minimum over the ridge as a rule: after LOST worse ones in a row the search ends. */
     in_a_row += any;
     if (lost || !(u < least)) continue;
+    /* The errors of the best so far, by path: the next ridge races against them. */
     PetscCall(PetscArraycpy(its, judged, n));
     least = u;
     *strength = ridge;
@@ -425,6 +441,7 @@ static PetscErrorCode TryRidges(HycoReducer t, HycoROM m, PetscReal *strength)
   for (PetscReal ridge = 1e-14; ridge < 1e-5; ridge *= 10) {
     PetscCall(HycoReducerTell(t, "ridges", tried++, RIDGES));
     PetscCall(HycoGalerkinSetRidge(m, ridge));
+    /* Ends early when the mean exceeds the least so far. */
     PetscCall(HycoReducerJudgeMeans(t, m, least, &u, &lambda));
     if (!(u < least)) continue;
     least = u;
@@ -465,6 +482,7 @@ static PetscErrorCode ChooseUnknowns(HycoReducer t, HycoROM m)
                          m->model->mesh->n_nodes * m->model->mesh->dim, &contact));
   PetscCall(FreeUnknowns(t, m, PETSC_FALSE, &n_all, all));
   PetscCall(FreeUnknowns(t, m, PETSC_TRUE, &n_contact, contact));
+  /* A search limits the size of dense matrices by it. */
   t->n_unknowns = n_all;
   HycoCheckModel(n_all, "the RID has no interior node; enlarge it: -hyco_rid_layers 1, or smaller tolerances");
   if (!n_contact && kind != HYCO_HYBRID_ALL)
@@ -474,6 +492,7 @@ static PetscErrorCode ChooseUnknowns(HycoReducer t, HycoROM m)
     HycoFailNoModel("-hyco_hybrid contact leaves no equation for the modes, because every unknown of A belongs to a "
                     "contact; use rank, all or auto");
   }
+  /* n_all^2 reals and n_all^3 operations for each factor. */
   HycoCheckModel(kind != HYCO_HYBRID_ALL || !t->most_full_order || n_all <= t->most_full_order,
                  "the RID has %d unknowns, too many to keep all of them full order in a dense matrix; use -hyco_hybrid "
                  "contact or rank",
@@ -481,6 +500,7 @@ static PetscErrorCode ChooseUnknowns(HycoReducer t, HycoROM m)
   if (kind == HYCO_HYBRID_RANK) PetscCall(ChooseRank(t, m, &v));
   if (kind == HYCO_HYBRID_ALL) PetscCall(ChooseAll(t, m, n_all, all));
   if (kind == HYCO_HYBRID_CONTACT) PetscCall(HycoROMSetFE(m, HYCO_HYBRID_CONTACT, n_contact, contact));
+  /* After the choice: training errors in the file are those of the final model. */
   PetscCall(HycoReducerJudge(t, m));
   PetscCall(PetscFree2(all, contact));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -504,6 +524,7 @@ static PetscBool Offers(HycoReducer t, PetscBool targets, size_t length, char wh
   return PETSC_TRUE;
 }
 
+/* The text that training prints; a report has the same numbers one by one. */
 static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
 {
   PetscFunctionBegin;
@@ -517,6 +538,7 @@ static PetscErrorCode Report(HycoReducer t, HycoROM m, HycoTraining *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The modes are those of the snapshots: there is no function of its own for them. */
 PetscErrorCode HycoTrainerCreate_Hybrid(HycoTrainerOps *ops)
 {
   PetscFunctionBegin;

@@ -10,7 +10,8 @@
 #include <hycotrainers.h>
 #include <petscblaslapack.h>
 
-/* Shared by projection and cubature, whose defaults of `dual` the caller has set. */
+/* Shared by projection and cubature, whose defaults of `dual` the caller has set. Declared here once: the help shows
+   one entry for both types. */
 PetscErrorCode HycoForceBasisSetFromOptions(HycoReducer t)
 {
   HycoForceBasis s = (HycoForceBasis)t->training;
@@ -25,6 +26,7 @@ PetscErrorCode HycoForceBasisSetFromOptions(HycoReducer t)
                       "contact forces: finite-element multipliers (hybrid, cubature), or combinations of factorised "
                       "dual snapshots or of the dual snapshots (projection, cubature) [fe; nnmf if projection]",
                       HycoDuals, &dual, NULL));
+  /* The help lists them under these types; others refuse them. */
   PetscCall(HycoOptionsFor("projection or cubature"));
   PetscCall(HycoOptionsInt("-hyco_nnmf_vectors",
                            "number of vectors of the nonnegative factorisation (0: that of the displacement modes)", 0,
@@ -45,6 +47,7 @@ static PetscErrorCode SetFromOptions(HycoReducer t)
   t->training = s;
   s->dual = HYCO_DUAL_NNMF;
   PetscCall(HycoForceBasisSetFromOptions(t));
+  /* With a multiplier per contact V^T B^T has fewer rows than columns: forces would not be unique. */
   HycoCheckModel(s->dual != HYCO_DUAL_FE,
                  "-hyco_dual fe leaves a projection-based model with more forces than modes; use nnmf or snapshots");
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -143,8 +146,9 @@ static PetscErrorCode ProjectBatch(HycoReducer t, PetscInt first, Mat S, void *c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Appends to the modes the components of the supremizers of the dual snapshots that are orthogonal to them: l, V,
-   sigma (0 for these) and VtU then have more columns. */
+/* Appends to the modes the components of the supremizers of the dual snapshots that are orthogonal to them: l, V, sigma
+   (0 for these) and VtU then have more columns. Supremizers keep the reduced saddle-point problem solvable (Ballarin et
+   al. 2015): each force vector has a displacement that it works on. */
 static PetscErrorCode Enrich(HycoReducer t)
 {
   PetscReal *QtU, *size;
@@ -199,6 +203,7 @@ static PetscErrorCode FromSnapshots(HycoROM m, PetscInt n, const PetscReal S[])
     PetscReal length = 0;
 
     for (PetscInt i = 0; i < N; i++) length += S[j * N + i] * S[j * N + i];
+    /* Scaling keeps a vector nonnegative, and its coefficient is then a force. */
     for (PetscInt i = 0; i < N; i++) p->V_lambda[j * N + i] = S[j * N + i] / PetscSqrtReal(length);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -215,7 +220,9 @@ PetscErrorCode HycoProjectionMakeBasis(HycoROM m, HycoReducer t)
 
   PetscFunctionBegin;
   p->dual = s->dual;
+  /* Without snapshots that are zero. */
   PetscCall(HycoReducerDualSnapshots(t, &n, &S));
+  /* No more than the rank of the snapshots. */
   k = s->vectors ? PetscMin(s->vectors, PetscMin(N, n)) : m->model->l;
   for (PetscInt i = 0; i < N * n; i++) S[i] = PetscMax(S[i], 0); /* negative by round-off of iterative solves */
   PetscCall(PetscMalloc1(N * PetscMax(n, k) + 1, &p->V_lambda));
@@ -229,6 +236,7 @@ PetscErrorCode HycoProjectionMakeBasis(HycoROM m, HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A model that misses its own training solutions by half is no model, whatever its held-out errors would be. */
 PetscErrorCode HycoProjectionJudge(HycoROM m, HycoReducer t)
 {
   const HycoProjectionModel p = (HycoProjectionModel)m->model->data;
@@ -236,6 +244,7 @@ PetscErrorCode HycoProjectionJudge(HycoROM m, HycoReducer t)
 
   PetscFunctionBegin;
   PetscCall(HycoReducerJudge(t, m));
+  /* Negated: an error that is not a number is refused too. */
   if (!(m->model->numbers[1] < 0.5)) HycoReducerNameWorst(t, worst);
   HycoCheckModel(m->model->numbers[1] < 0.5,
                  "the %s model misses its own training displacements by %.0f %% on average (%d modes, %d force "
@@ -256,6 +265,7 @@ static PetscErrorCode Build(HycoROM m, HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* dual_misfit is the part of the forces that no combination of the vectors represents. */
 PetscErrorCode HycoProjectionReport(HycoReducer t, HycoROM m, HycoTraining *r)
 {
   const HycoProjectionModel p = (HycoProjectionModel)m->model->data;
@@ -272,6 +282,7 @@ PetscErrorCode HycoProjectionReport(HycoReducer t, HycoROM m, HycoTraining *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* HycoGalerkinFinish() scans the ranges for a singular reduced stiffness, as for hybrid models. */
 PetscErrorCode HycoTrainerCreate_Projection(HycoTrainerOps *ops)
 {
   PetscFunctionBegin;

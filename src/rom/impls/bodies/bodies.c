@@ -55,6 +55,7 @@ static PetscReal Unbalanced(HycoBodiesWork o)
     for (PetscInt j = 0; j < b->r; j++) sum += o->work[i * b->r + j] * o->c[j];
     size = PetscAbsReal(sum);
     for (PetscInt k = 0; k < b->ns; k++) {
+      /* Work of the loads against that of the contact forces on motion i, Z^T (F - B^T L) = 0. */
       sum -= o->Z[k * b->p + i] * o->f[k];
       size += PetscAbsReal(o->Z[k * b->p + i] * o->f[k]);
     }
@@ -76,12 +77,15 @@ static PetscReal Left(HycoROM m, PetscInt k, PetscReal gaps)
   for (PetscInt j = o->row_start[k]; j < o->row_start[k + 1]; j++) {
     const PetscInt at = o->row_at[j];
 
+    /* free and the response to the forces may be huge and opposite, as their sum u is small. */
     terms += PetscAbsReal(o->row[j]) * (PetscAbsReal(o->free[at]) + PetscAbsReal(o->u[at] - o->free[at]));
   }
+  /* Shrinks the residual towards 0 and never past it: a true penetration keeps its sign. */
   rounding = PetscMin(16 * PETSC_MACHINE_EPSILON * terms, ROUNDED * gaps);
   return left > 0 ? PetscMax(left - rounding, 0) : PetscMin(left + rounding, 0);
 }
 
+/* Residuals relative to the largest gap and force, as full order's are, so that one tolerance serves for both. */
 void HycoBodiesMeasure(HycoROM m, HycoKKT *kkt)
 {
   const HycoBodiesWork o = (HycoBodiesWork)m->work;
@@ -92,6 +96,7 @@ void HycoBodiesMeasure(HycoROM m, HycoKKT *kkt)
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
     PetscReal sum = 0;
 
+    /* Without entries: no master is faced, or all is prescribed. */
     if (m->rows.start[k] == m->rows.start[k + 1]) continue;
     for (PetscInt j = m->rows.start[k]; j < m->rows.start[k + 1]; j++)
       sum += PetscAbsReal(m->rows.value[j] * m->U[m->rows.dof[j]]);
@@ -160,6 +165,7 @@ static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
   PetscCall(HycoBodiesSolve(o, &s, mu, m->Lambda, &solved));
   PetscCall(ExpandAll(m));
   HycoBodiesMeasure(m, &p->kkt);
+  /* The bound of theory.md: from the samples' error e and the present forces; 0 where nothing is interpolated. */
   p->interpolation_error = HycoBodiesBound(o, &norm);
   p->iterations = o->its;
   p->reason = solved && HycoKKTMax(&p->kkt) > m->solver->rtol ? HYCO_DIVERGED_RESIDUAL : o->reason;
@@ -204,12 +210,14 @@ PetscInt HycoBodiesGrid(HycoSubstructures b, PetscInt k, PetscReal theta[])
   }
   for (PetscInt p = b->n_theta - 1; theta && p >= 0; p--) {
     node -= b->n_nodes[p];
+    /* Nodes are of the interpolated variable, for instance 1/radius; theta is the parameter itself. */
     theta[p] = HycoBodiesValue(b->variable[p], node[k % b->n_nodes[p]]);
     k /= b->n_nodes[p];
   }
   return n;
 }
 
+/* What a user must know to trust the model: sizes, whether anything is interpolated, and the bound if so. */
 PetscErrorCode HycoBodiesView(HycoROM m, PetscViewer viewer)
 {
   HycoSubstructures b = (HycoSubstructures)m->model->data;
@@ -234,7 +242,8 @@ PetscErrorCode HycoBodiesView(HycoROM m, PetscViewer viewer)
 }
 
 /* The traits and ops without a history; HycoBodiesTakePath() replaces both when a file or a scene has one. `data`
-   exists from the beginning, since load and training fill it. */
+   exists from the beginning, since load and training fill it. Settings: none, as there is nothing to search, so that
+   training makes one model only. */
 PetscErrorCode HycoROMCreate_Bodies(HycoROM m)
 {
   static const HycoROMTraits traits = {.title = "condensed bodies",

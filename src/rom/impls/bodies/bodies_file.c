@@ -1,7 +1,7 @@
 /* The part of the model of bodies in the model file. */
 #include <hycobodies.h>
 
-/* Sizes, by body. */
+/* Sizes, by body. Lengths of all other datasets follow from these, which is why they are read and checked first. */
 static PetscErrorCode MoveSizes(HycoH5 h, HycoROM m, HycoSubstructures b)
 {
   PetscInt head[5] = {b->n, b->p, b->r, b->n_turns, b->n_theta};
@@ -104,12 +104,15 @@ static PetscErrorCode MoveColumns(HycoH5 h, const char path[], const HycoSubstru
   PetscReal *file = NULL;
 
   PetscFunctionBegin;
+  /* Both orders are the same then, and nothing is copied. */
   if (s->n_samples == 1) {
     PetscCall(HycoH5Real(h, path, &rows, length, data));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (!HycoH5Reads(h)) {
     PetscCall(PetscMalloc1((size_t)rows * (size_t)length + 1, &file));
+    /* In memory the samples of one unknown lie side by side, because a prediction blends them; the file keeps the older
+       order. */
     Swap(s->n, s->n_samples, length, *data, file);
   }
   PetscCall(HycoH5Real(h, path, &rows, length, &file));
@@ -267,16 +270,19 @@ static PetscErrorCode MoveBody(HycoH5 h, const char model[], HycoSubstructures b
   PetscCall(HycoH5Real(h, At(k, "R", path), &rows, b->r, &s->R));
   PetscCall(HycoH5Real(h, At(k, "Z", path), &rows, b->p, &s->Z));
   PetscCall(HycoH5Real(h, At(k, "work", path), &columns, b->r, &s->work));
+  /* r is the model's number of loads, which MoveSizes() has read. */
   PetscCall(HycoH5Real(h, At(k, "gram", path), &b->r, b->r, &s->gram));
   columns = (b->turn_start[k + 1] - b->turn_start[k]) * s->l + s->m;
   PetscCall(MoveResponses(h, s, k, columns));
+  /* The same name for another length: a and g have a row for each column of H. */
   rows = s->n_samples * columns;
   PetscCall(HycoH5Real(h, At(k, "a", path), &rows, b->r, &s->a));
   PetscCall(HycoH5Real(h, At(k, "g", path), &rows, b->p, &s->g));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What is inelastic. */
+/* What is inelastic. Written and read by one function; in->fields has the responses of all bodies, samples and turns,
+   one below the other. */
 static PetscErrorCode MoveInelastic(HycoROM m, HycoH5 h)
 {
   HycoSubstructures b = (HycoSubstructures)m->model->data;
@@ -318,8 +324,8 @@ static PetscErrorCode MoveInelastic(HycoROM m, HycoH5 h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A file whose scene has a history makes this a model of paths. Sizes before theta before the probe before blocks:
-   each part's lengths come from the one before. */
+/* A file whose scene has a history makes this a model of paths. Sizes before theta before the probe before blocks: each
+   part's lengths come from the one before. Reading fills structures that are empty, writing leaves them unchanged. */
 PetscErrorCode HycoBodiesFile(HycoROM m, HycoH5 h)
 {
   HycoSubstructures b = (HycoSubstructures)m->model->data;

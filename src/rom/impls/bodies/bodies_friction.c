@@ -30,6 +30,7 @@ static PetscErrorCode CreateRows(HycoBodiesFriction f)
   const PetscInt dim = f->slip.dim, n = f->slip.row[f->slip.n];
 
   PetscFunctionBegin;
+  /* Rows of a contact have the same masters, so that the width of its normal row bounds each. */
   f->rows.room = HycoPairsWidth(pairs) * dim * n + 1;
   PetscCall(PetscCalloc1(n + 1, &f->rows.start));
   PetscCall(PetscMalloc1(f->rows.room, &f->rows.dof));
@@ -37,6 +38,7 @@ static PetscErrorCode CreateRows(HycoBodiesFriction f)
   PetscCall(PetscCalloc1(n + 1, &f->rows.gap));
   PetscCall(PetscMalloc1(n + 1, &f->contact));
   for (PetscInt k = 0; k < pairs->n; k++) {
+    /* Every row of a contact has its scene entry: the gap and the normal are found by it. */
     for (PetscInt r = f->slip.row[k]; r < f->slip.row[k + 1]; r++) f->contact[r] = pairs->contact[k];
   }
   f->all = (HycoBodiesSurface){f->normal.fe, f->normal.pairs, &f->rows, n, f->contact};
@@ -69,6 +71,7 @@ PetscErrorCode HycoBodiesFrictionCreate(HycoScene scene, const HycoBodiesSurface
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* In the opposite order of creation: the solver refers to the system, and the system to W and g. */
 PetscErrorCode HycoBodiesFrictionDestroy(HycoBodiesFriction *friction)
 {
   HycoBodiesFriction f = *friction;
@@ -87,7 +90,8 @@ const HycoBodiesSurface *HycoBodiesFrictionSurface(HycoBodiesFriction f)
   return &f->all;
 }
 
-/* U_old = 0 is the unloaded state, from which the first step measures slip. */
+/* U_old = 0 is the unloaded state, from which the first step measures slip. W depends on the parameters through the
+   bodies' weights and poses, but not on time. */
 PetscErrorCode HycoBodiesFrictionBegin(HycoBodiesFriction f)
 {
   PetscFunctionBegin;
@@ -108,9 +112,12 @@ static PetscErrorCode Flexibility(HycoBodiesFriction f, HycoBodiesWork o)
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(n + 1, &row));
+  /* All rows, also of open contacts: the path keeps W for all of its steps. */
   for (PetscInt k = 0; k < n; k++) row[k] = k;
+  /* Without this the first step of a path would find that its rows are new and keep nothing. */
   if (!o->kept.same) PetscCall(HycoBodiesKeepRows(o, n)); /* those of now */
   PetscCall(HycoBodiesKeep(o, n, row));
+  /* HycoBodiesKeep() gives up where the columns exceed the memory that is allowed. */
   HycoCheck(o->kept.same,
             "the flexibility of %d contacts with friction needs more memory than a model of bodies takes; "
             "use a coarser mesh there, or hyco solve",
@@ -140,6 +147,7 @@ static PetscErrorCode GrowRows(HycoBodiesFriction f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Called for each step, as gaps and coefficients of friction change in time. */
 PetscErrorCode HycoBodiesFrictionPrepare(HycoBodiesFriction f, HycoBodiesWork o, const PetscReal mu[])
 {
   const HycoBodiesSurface *s = &f->normal;

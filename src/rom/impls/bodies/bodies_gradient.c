@@ -27,6 +27,7 @@ static void Gaps(HycoROM m, PetscReal w[], PetscReal *size)
 
     for (PetscInt j = o->row_start[k]; j < o->row_start[k + 1]; j++) bu += o->row[j] * o->u[o->row_at[j]];
     w[k] = m->rows.gap[k] - bu;
+    /* An empty row has no gap: its slave has no master here. */
     if (o->row_start[k] < o->row_start[k + 1])
       *size = PetscMax(*size, PetscMax(PetscAbsReal(bu), PetscAbsReal(m->rows.gap[k])));
   }
@@ -45,8 +46,10 @@ PetscErrorCode HycoBodiesResidual(HycoROM m, const PetscReal mu[], const PetscRe
   if (mu) PetscCall(HycoBodiesPrepare(o, &s, mu));
   PetscCall(PetscArraycpy(o->x, z, b->p));
   PetscCall(PetscArraycpy(m->Lambda, z + b->p, m->model->pairs.n));
+  /* Displacements follow from forces and motions without a solve, because the flexibility is explicit. */
   HycoBodiesGiven(o, &s, m->Lambda);
   if (!w) PetscFunctionReturn(PETSC_SUCCESS);
+  /* First the motions, then the contacts: the order of the unknowns z. */
   for (PetscInt i = 0; i < b->p; i++) {
     w[i] = 0;
     for (PetscInt j = 0; j < b->r; j++) w[i] -= o->work[i * b->r + j] * o->c[j];

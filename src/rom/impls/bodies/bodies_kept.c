@@ -14,10 +14,12 @@ static PetscBool Same(HycoBodiesWork o, PetscInt m)
   const HycoBodiesKept *kept = &o->kept;
 
   if (!kept->start) return PETSC_FALSE;
+  /* Cheapest first: a contact that has another number of masters differs here. */
   for (PetscInt k = 0; k <= m; k++) {
     if (kept->start[k] != o->row_start[k]) return PETSC_FALSE;
   }
   for (PetscInt e = 0; e < o->row_start[m]; e++) {
+    /* Values within round-off are the same: a point that is computed anew in the body's axes has other last digits. */
     if (kept->at[e] != o->row_at[e] || PetscAbsReal(kept->value[e] - o->row[e]) > SAME) return PETSC_FALSE;
   }
   return PETSC_TRUE;
@@ -43,7 +45,8 @@ PetscErrorCode HycoBodiesForgetKept(HycoBodiesWork o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The first prediction only takes the rows; columns are worth their memory once the same rows have come twice. */
+/* The first prediction only takes the rows; columns are worth their memory once the same rows have come twice. The
+   products depend on the rows B and on nothing else that a parameter of loads or gaps changes. */
 PetscErrorCode HycoBodiesKeepRows(HycoBodiesWork o, PetscInt m)
 {
   HycoBodiesKept *kept = &o->kept;
@@ -58,6 +61,7 @@ PetscErrorCode HycoBodiesKeepRows(HycoBodiesWork o, PetscInt m)
     PetscCall(PetscCalloc1(n + 1, &kept->at_weights));
   }
   if (kept->same) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Columns are products with the old rows. */
   PetscCall(ForgetColumns(kept, n));
   HycoFreeAll(&kept->start, &kept->at, &kept->value);
   kept->m = m;
@@ -108,6 +112,7 @@ static PetscErrorCode KeepInBody(HycoBodiesWork o, PetscInt k, PetscInt b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Contacts are made one by one as they close: those that never do cost neither time nor memory. */
 PetscErrorCode HycoBodiesKeep(HycoBodiesWork o, PetscInt n, const PetscInt contact[])
 {
   HycoBodiesKept *kept = &o->kept;
@@ -135,6 +140,7 @@ void HycoBodiesKeptRow(HycoBodiesWork o, PetscInt k, PetscInt n, const PetscInt 
 
   for (PetscInt i = 0; i < n; i++) row[i] = 0;
   for (PetscInt j = 0; j < b->n; j++) {
+    /* W[k][j] is null where contact k does not touch body j. */
     const PetscReal *W = o->kept.W[k * b->n + j], scale = 1 / o->kappa[j];
 
     for (PetscInt i = 0; W && i < n; i++) {
@@ -168,6 +174,7 @@ static PetscErrorCode BlendColumn(HycoBodiesWork o, PetscInt k, PetscInt j, cons
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* u -= C B^T Lambda, blended between the samples; kappa is the body's stiffness relative to that of its samples. */
 PetscErrorCode HycoBodiesKeptDisplace(HycoBodiesWork o, PetscInt m, const PetscReal Lambda[], PetscReal u[])
 {
   const HycoSubstructures b = o->bodies;
@@ -178,6 +185,7 @@ PetscErrorCode HycoBodiesKeptDisplace(HycoBodiesWork o, PetscInt m, const PetscR
     for (PetscInt k = 0; k < m; k++) {
       const PetscReal *P = o->kept.P[k * b->n + j], force = -Lambda[k] / o->kappa[j];
 
+      /* Most contacts are open: their columns are neither made nor read. */
       if (!P || Lambda[k] == 0) continue;
       PetscCall(BlendColumn(o, k, j, &P));
       HycoBodiesAdd(own->n, force, P, u + b->start[j]);

@@ -26,7 +26,8 @@
 #define VIOLATED  1e-11 /* share of the largest force or gap: less is round-off */
 #define DEPENDENT 1e-12 /* share of the diagonal of W: contacts that repeat others */
 
-/* y = beta y + factor A x of a table by rows, n x l; transposed: A^T x. */
+/* y = beta y + factor A x of a table by rows, n x l; transposed: A^T x. BLAS sees a table by rows as its transpose by
+   columns, hence the exchanged letters. */
 static PetscErrorCode Multiply(PetscBool transposed, PetscInt n, PetscInt l, const PetscReal A[], const PetscReal x[],
                                PetscReal factor, PetscReal beta, PetscReal y[])
 {
@@ -100,7 +101,8 @@ static void TakeStrains(HycoROM m, PetscInt k, const PetscReal cells[], PetscRea
   }
 }
 
-/* The column of contact k, if it is not there. */
+/* The column of contact k, if it is not there. On demand: only contacts that enter the set at some time need one, and
+   each costs a response of the bodies. */
 static PetscErrorCode Column(HycoROM m, PetscInt k)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
@@ -189,6 +191,7 @@ PetscErrorCode HycoBodiesScale(HycoROM m)
   PetscCall(PetscMalloc1(in->nd * PetscMax(l, b->r) + 1, &cells));
   for (PetscInt i = 0; i < in->nd * l; i++) cells[i] = in->A[i] / o->kappa[in->body[i / l]];
   TakeStrains(m, l, cells, w->response);
+  /* The strains by loads are those at c, the coefficients of the loads, and serve all times of a path. */
   for (PetscInt i = 0; i < in->nd * b->r; i++) cells[i] = in->R[i] / o->kappa[in->body[i / b->r]];
   TakeStrains(m, b->r, cells, w->loads);
   PetscCall(PetscFree(cells));
@@ -242,7 +245,8 @@ static PetscErrorCode FactorAll(HycoROM m, PetscBool *independent)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same contact by contact; those that depend on the ones before them leave the set. */
+/* The same contact by contact; those that depend on the ones before them leave the set. Cholesky by rows without
+   pivoting: a contact that is dependent would have a pivot of round-off, and its force would be arbitrary. */
 static PetscErrorCode FactorEach(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
@@ -282,6 +286,7 @@ static PetscErrorCode Factor(HycoROM m)
   PetscFunctionBegin;
   PetscCall(PetscFree(w->U));
   PetscCall(PetscMalloc1((size_t)w->n_set * (size_t)w->n_set + 1, &w->U));
+  /* Columns are kept for the path: a contact that closes again costs nothing. */
   for (PetscInt k = 0; k < w->n_set; k++) PetscCall(Column(m, w->set[k]));
   WeighMotions(w, w->bodies.bodies->p);
   PetscCall(FactorAll(m, &independent));
@@ -361,6 +366,7 @@ static PetscErrorCode AddForces(const HycoBodiesPath w, PetscInt l, PetscInt fir
   PetscBLASInt rows, modes, n;
 
   PetscFunctionBegin;
+  /* Without contacts the strains follow alpha alone. */
   PetscCall(PetscArraycpy(w->S, w->response, w->n_rows * l));
   if (!w->n_set || !l || !w->n_rows) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1((size_t)w->n_set * (size_t)w->n_rows, &strain));
@@ -369,6 +375,7 @@ static PetscErrorCode AddForces(const HycoBodiesPath w, PetscInt l, PetscInt fir
   PetscCall(PetscBLASIntCast(w->n_rows, &rows));
   PetscCall(PetscBLASIntCast(l, &modes));
   PetscCall(PetscBLASIntCast(w->n_set, &n));
+  /* One product of n_set rows instead of a loop over contacts: S is the largest table of a step. */
   BLASgemm_("N", "T", &modes, &rows, &n, &one, w->Z, &modes, strain, &rows, &one, w->S, &modes); /* S, Z by rows */
   PetscCall(PetscFree(strain));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -411,6 +418,7 @@ PetscErrorCode HycoBodiesMoveCells(HycoROM m, const PetscReal alpha[], const Pet
   for (PetscInt i = 0; i < w->n_set; i++) {
     HycoBodiesAdd(in->nd, Lambda[w->set[i]], w->column[w->set[i]] + m->model->pairs.n + w->n_rows, cells);
   }
+  /* Only the points' cells have displacements afterwards; elsewhere u keeps the prescribed values alone. */
   PetscCall(PetscArraycpy(w->u, m->fe->u0, m->fe->n_dof));
   for (PetscInt i = 0; i < in->nd; i++) w->u[w->at[i]] += cells[i];
   HycoFEComplete(m->fe, w->u);
@@ -418,7 +426,8 @@ PetscErrorCode HycoBodiesMoveCells(HycoROM m, const PetscReal alpha[], const Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* e += the strains of prescribed displacements. */
+/* e += the strains of prescribed displacements. The responses of training are those of unprescribed displacements: what
+   supports move is added here. */
 static void AddSupports(HycoROM m, PetscReal e[])
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
@@ -495,6 +504,7 @@ static PetscErrorCode Check(HycoROM m, const PetscReal alpha[], PetscReal Lambda
   PetscCall(PetscArrayzero(Lambda, m->model->pairs.n));
   PetscCall(PetscArraycpy(o->gap, w->gap, m->model->pairs.n)); /* gap -= B P alpha */
   PetscCall(Multiply(PETSC_FALSE, m->model->pairs.n, l, w->BP, alpha, -1, 1, o->gap));
+  /* The forces are affine in alpha, as the strains are: no solve. */
   for (PetscInt i = 0; i < w->n_set; i++) {
     PetscReal *force = &Lambda[w->set[i]];
 
@@ -503,6 +513,7 @@ static PetscErrorCode Check(HycoROM m, const PetscReal alpha[], PetscReal Lambda
     most = PetscMax(most, PetscAbsReal(*force));
   }
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
+    /* The scale of a violation is the largest gap without forces: near closure all gaps are round-off. */
     if (o->row_start[k] < o->row_start[k + 1]) size = PetscMax(size, PetscAbsReal(o->gap[k]));
   }
   for (PetscInt d = 0; d < p && !w->loose; d++) {
@@ -514,10 +525,12 @@ static PetscErrorCode Check(HycoROM m, const PetscReal alpha[], PetscReal Lambda
     PetscReal gap = o->gap[k];
 
     if (Lambda[k] < -VIOLATED * most) *violated = PETSC_TRUE;
+    /* Closed contacts have no gap by construction; contacts without a master have none at all. */
     if (Lambda[k] != 0 || o->row_start[k] == o->row_start[k + 1]) continue;
     for (PetscInt i = 0; i < w->n_set; i++) gap += w->column[w->set[i]][k] * Lambda[w->set[i]];
     if (gap < -VIOLATED * size) *violated = PETSC_TRUE;
   }
+  /* Tensile forces of round-off become 0, so that ChooseSet() does not take them for closed. */
   for (PetscInt i = 0; i < w->n_set; i++) Lambda[w->set[i]] = PetscMax(Lambda[w->set[i]], 0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -608,7 +621,7 @@ static PetscErrorCode Advance(HycoROM m, PetscReal alpha[], HycoStepAttempt *a)
 }
 
 /* Evaluates at alpha, with the tangent if there is none, or if the present one has not reduced r enough from *before,
-   which becomes the norm of r. */
+   which becomes the norm of r. A tangent costs more than several residuals: it stays as long as it contracts. */
 static PetscErrorCode EvaluateOrRenew(HycoROM m, PetscReal t0, PetscReal t1, const PetscReal alpha[], PetscReal *before,
                                       HycoStepAttempt *a)
 {
@@ -645,13 +658,15 @@ static PetscErrorCode EvaluateStep(HycoROM m, PetscReal t0, PetscReal t1, PetscR
   PetscFunctionBegin;
   PetscCall(EvaluateOrRenew(m, t0, t1, alpha, norm, a));
   for (PetscInt k = 0; k < HALVINGS && w->always && (a->law.failed || !(*norm <= before)) && a->iterations; k++) {
+    /* Towards the last point, whose residual is known to be finite. */
     for (PetscInt i = 0; i < w->bodies.bodies->inelastic->m; i++) alpha[i] = (alpha[i] + last[i]) / 2;
     PetscCall(EvaluateOrRenew(m, t0, t1, alpha, norm, a));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Solves r = 0 on the set; else a->why. */
+/* Solves r = 0 on the set; else a->why. Convergence is judged relative to the size of the strains, w->norm, and to a
+   floor below which all is round-off. */
 static PetscErrorCode Newton(HycoROM m, PetscReal t0, PetscReal t1, PetscReal alpha[], HycoStepAttempt *a)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
@@ -702,6 +717,7 @@ static PetscErrorCode Contacts(HycoROM m, const PetscReal alpha[], PetscReal Lam
   PetscFunctionBegin;
   PetscCall(HycoBodiesStrain(&w->bodies, &s, alpha));
   PetscCall(HycoBodiesContact(&w->bodies, &s, Lambda, &solved));
+  /* Reported as iterations of contact problems, apart from those of Newton's method. */
   a->active_its += w->bodies.its;
   if (!solved) HycoFormat(a->why, "the contact problem has no solution");
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -714,9 +730,12 @@ PetscErrorCode HycoBodiesSearch(HycoROM m, PetscReal t0, PetscReal t1, PetscReal
   PetscBool same, violated = PETSC_TRUE;
 
   PetscFunctionBegin;
+  /* The forces of the contact problem name the next set. Opening and closing single contacts by the sign of their
+     violation would cycle. */
   if (!Presses(m, Lambda)) PetscCall(Contacts(m, alpha, Lambda, a));
   PetscCall(ChooseSet(m, Lambda, &same));
   for (PetscInt round = 0; violated && round < ROUNDS && !a->why[0]; round++) {
+    /* Again in each round: e0 and z belong to the set. */
     PetscCall(TakeLoads(m));
     PetscCall(Newton(m, t0, t1, alpha, a));
     if (a->why[0]) break;

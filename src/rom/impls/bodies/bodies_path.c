@@ -63,6 +63,7 @@ static PetscErrorCode Rub(HycoROM m, HycoPath p, PetscReal t1, HycoStepAttempt *
   if (!solved) HycoFormat(a->why, "not converged: no contact forces with this friction balance the load");
   PetscCall(VecGetArray(p->Lambda, &L));
   HycoBodiesFrictionNormal(w->friction, L);
+  /* The getters of contact results read the normal forces as a model without friction has them. */
   PetscCall(PetscArraycpy(m->Lambda, L, m->model->pairs.n));
   PetscCall(VecRestoreArray(p->Lambda, &L));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -83,6 +84,7 @@ static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAt
   }
   PetscCall(VecGetArray(p->U, &alpha));
   PetscCall(VecGetArray(p->Lambda, &L));
+  /* The option tangent renews in each iteration from the first one on. */
   w->always = (PetscBool)(p->method == HYCO_NEWTON_TANGENT);
   PetscCall(HycoBodiesSearch(m, t0, t1, alpha, L, a));
   if (a->why[0] && !w->always) { /* again from the begin of the step */
@@ -105,12 +107,14 @@ static PetscBool Unchanged(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   const HycoBodiesWork o = &w->bodies;
+  /* Also when something else differs: the next call compares with this state. */
   PetscBool same = (PetscBool)(o->kept.same && w->place == m->fe->place);
   PetscReal *last = w->last;
 
   w->place = m->fe->place;
   for (PetscInt k = 0; k < o->bodies->n; k++) {
     for (PetscInt q = 0; q <= o->bodies->body[k].n_samples; q++, last++) {
+      /* The weights of the samples and kappa together determine a body's stiffness at the present parameters. */
       const PetscReal now = q ? o->weight[k][q - 1] : o->kappa[k];
 
       same = (PetscBool)(same && now == *last);
@@ -131,6 +135,7 @@ static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elast
   PetscFunctionBegin;
   (void)elastic;
   PetscCall(HycoROMBringRows(m, mu));
+  /* Friction condenses all rows, normal and tangential, in its own tables, which replace those below. */
   if (w->friction) {
     PetscCall(HycoBodiesFrictionPrepare(w->friction, &w->bodies, mu));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -174,6 +179,8 @@ static PetscReal Misfit(HycoROM m, const PetscReal alpha[])
   for (PetscInt i = 0; i < w->n_rows; i++) {
     PetscReal left = w->s[i];
 
+    /* there[] has the modes' stresses at the points: what is left is not represented by any alpha, and laws at other
+       points miss it too. */
     for (PetscInt k = 0; k < l; k++) left -= w->there[i * l + k] * alpha[k];
     rest += left * left;
     size += w->s[i] * w->s[i];
@@ -181,7 +188,8 @@ static PetscReal Misfit(HycoROM m, const PetscReal alpha[])
   return size > 0 ? PetscSqrtReal(rest / size) : 0;
 }
 
-/* The state of the contacts at a listed time. */
+/* The state of the contacts at a listed time. Work and number of slipping contacts are sums since the begin of the
+   path. */
 static PetscErrorCode RecordFriction(HycoROM m, HycoStep *s)
 {
   const HycoSlip *slip = HycoBodiesFrictionSlip(((HycoBodiesPath)m->work)->friction);
@@ -210,9 +218,11 @@ static PetscErrorCode Record(HycoPath p)
     PetscCall(HycoBodiesExpand(&w->bodies, m->gamma));
   }
   PetscCall(HycoROMExpandModal(m));
+  /* Exact displacements of surfaces and cells over those of the modes, in this order. */
   MoveAll(m);
   HycoFEComplete(m->fe, m->U);
   PetscCall(VecGetArrayRead(p->U, &alpha));
+  /* The largest of the listed times is a feature of the estimate. */
   w->misfit = PetscMax(w->misfit, Misfit(m, alpha));
   PetscCall(VecRestoreArrayRead(p->U, &alpha));
   PetscCall(HycoTraceRecord(m, PETSC_TRUE, p->begin, &p->now));
@@ -226,7 +236,8 @@ static PetscErrorCode Record(HycoPath p)
 
 /* -- set-up -- */
 
-/* The unknowns of the cells in fe's mesh, and back. */
+/* The unknowns of the cells in fe's mesh, and back. The laws are evaluated in few cells: their displacements are found
+   by number in the file's list, which ascends. */
 static PetscErrorCode FindUnknowns(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
@@ -265,11 +276,13 @@ static PetscErrorCode FindPoints(HycoROM m)
   PetscCall(PetscMalloc2(mesh->n_cells, &whole, mesh->n_cells, &cell));
   for (PetscInt e = 0; e < mesh->n_cells; e++) cell[e] = e;
   PetscCall(PetscArraycpy(whole, mesh->cell_whole, mesh->n_cells));
+  /* The points are stored by cells of the whole mesh; the model's mesh has some of them in another order. */
   PetscCall(PetscSortIntWithArray(mesh->n_cells, whole, cell));
   for (PetscInt i = 0; i < in->n_points; i++) {
     PetscInt at;
 
     PetscCall(PetscFindInt(in->point[i] / nq, mesh->n_cells, whole, &at));
+    /* The seal finds flipped bits, not a file that was changed on purpose. */
     HycoCheck(at >= 0 && HycoInelasticFlows(m->fe, cell[at]), "%s: bodies/inelastic/point is damaged", m->model->path);
     w->point[i] = cell[at] * nq + in->point[i] % nq;
   }
@@ -332,12 +345,15 @@ static PetscErrorCode CreatePath(HycoROM m)
   HycoCheck(
       p->method != HYCO_NEWTON_ELASTIC,
       "-hyco_newton elastic is not for models of bodies, whose tangents are small; use auto, modified or tangent");
+  /* The tangent costs one product of the size of the points' table: kept while it contracts. */
   if (p->method == HYCO_NEWTON_AUTO) p->method = HYCO_NEWTON_MODIFIED;
   PetscCall(VecCreateSeq(PETSC_COMM_SELF, w->bodies.bodies->inelastic->m, &w->alpha));
   PetscCall(VecCreateSeq(PETSC_COMM_SELF, m->model->pairs.n, &w->L));
   p->ops = &ops;
   p->ctx = m;
   p->fe = m->fe;
+  /* The driver copies and restores U and Lambda when a step is refused: they must be all of the state but that of the
+     laws. */
   p->U = w->alpha;
   p->Lambda = w->L;
   p->n_contacts = m->model->pairs.n;
@@ -346,6 +362,8 @@ static PetscErrorCode CreatePath(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The order: the surfaces before the bodies' work, which borrows them, and the points before the arrays of their
+   number. */
 static PetscErrorCode SetUp(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
@@ -388,11 +406,13 @@ static PetscErrorCode Reset(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The path itself is HycoTraceFollow(): this only resets what would carry over from another prediction. */
 static PetscErrorCode Solve(HycoROM m, const PetscReal mu[])
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
 
   PetscFunctionBegin;
+  /* A feature of this path alone. */
   w->misfit = 0;
   HycoBodiesRestart(m); /* the same factors whatever was predicted before */
   if (w->friction) PetscCall(HycoBodiesFrictionBegin(w->friction));
@@ -413,6 +433,8 @@ static PetscErrorCode Features(HycoROM m, PetscReal misfit[2])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The amplification is the factor between an error of the strains at the points and one of the fields, as found in
+   training. */
 static PetscErrorCode View(HycoROM m, PetscViewer viewer)
 {
   HycoBodiesInelastic in = ((HycoSubstructures)m->model->data)->inelastic;
@@ -428,6 +450,8 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Without unknowns, residual and expand: a path has no gradient. No estimate of its own either: those of held-out paths
+   apply. */
 PetscErrorCode HycoBodiesTakePath(HycoROM m)
 {
   static const HycoROMTraits traits = {.title = "condensed bodies",

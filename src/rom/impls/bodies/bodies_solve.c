@@ -73,6 +73,7 @@ void HycoBodiesSetTensors(HycoSubstructures b)
     t->dim = b->n_theta;
     for (PetscInt p = 0; p < b->n_theta; p++) {
       t->x[p] = node;
+      /* Interpolation through all nodes; where one node serves, the degree is 0. */
       t->degree[p] = t->n[p] - 1;
       node += b->n_nodes[p];
     }
@@ -113,7 +114,8 @@ static void Blend(PetscInt n_samples, const PetscReal weight[], PetscInt n, cons
 
 /* -- set-up -- */
 
-/* The places of the mesh's unknowns. */
+/* The places of the mesh's unknowns. loc[]: an unknown of the mesh to its place among the surfaces' unknowns, then
+   among those inside; -1: only the modes know it. */
 static PetscErrorCode FindPlaces(HycoBodiesWork o, HycoMesh m)
 {
   const HycoSubstructures b = o->bodies;
@@ -174,6 +176,8 @@ static PetscErrorCode GrowRows(HycoBodiesWork o, PetscInt room)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The probe is the small mesh of cells at which loads, stiffness and pose of each body are sampled at new
+   parameters. */
 PetscErrorCode HycoBodiesSetUp(HycoBodiesWork o, HycoSubstructures b, HycoScene scene, const HycoBodiesSurface *s,
                                HycoSolver solver)
 {
@@ -249,7 +253,9 @@ static PetscErrorCode Place(HycoBodiesWork o, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The coefficients of the loads, and the displacements that they cause without contact. */
+/* The coefficients of the loads, and the displacements that they cause without contact. Loads are combinations of those
+   of training; their coefficients follow from as many entries of the force vector (DEIM; Chaturantabut and Sorensen
+   2010), in the body's own axes. */
 static PetscErrorCode Load(HycoBodiesWork o)
 {
   const HycoSubstructures b = o->bodies;
@@ -312,6 +318,7 @@ static PetscErrorCode BlendMotions(HycoBodiesWork o)
 
     Blend(own->n_samples, o->weight[k], own->n * b->p, own->Z, o->Z + b->start[k] * b->p);
     Blend(own->n_samples, o->weight[k], b->p * b->r, own->work, work);
+    /* A motion may move several bodies, as tied ones do: the works add up. */
     for (PetscInt i = 0; i < b->p * b->r; i++) o->work[i] += work[i];
   }
   PetscCall(PetscFree(work));
@@ -328,7 +335,8 @@ PetscInt HycoBodiesAt(HycoSubstructures b, PetscInt place)
   return k;
 }
 
-/* Adds an entry to the row that begins at `start`. */
+/* Adds an entry to the row that begins at `start`. A row has a few dozen entries: a linear search costs less than a
+   map. */
 static void AddEntry(HycoBodiesWork o, PetscInt start, PetscInt *end, PetscInt place, PetscReal value)
 {
   for (PetscInt j = start; j < *end; j++) {
@@ -340,7 +348,9 @@ static void AddEntry(HycoBodiesWork o, PetscInt start, PetscInt *end, PetscInt p
   o->row[(*end)++] = value;
 }
 
-/* The rows of B on the bodies' unknowns, in their axes, and the gaps that the displacements without contact leave. */
+/* The rows of B on the bodies' unknowns, in their axes, and the gaps that the displacements without contact leave.
+   Contact rows are in the axes of space, flexibilities in those of the body: B is turned by the pose, not C, which is
+   dense. */
 static PetscErrorCode TurnRows(HycoBodiesWork o, const HycoBodiesSurface *s)
 {
   const HycoSubstructures b = o->bodies;
@@ -393,6 +403,7 @@ static PetscErrorCode TakeWeights(HycoBodiesWork o, const PetscReal mu[])
     PetscCall(PetscMalloc1(n, &weight));
     PetscCall(HycoBodiesWeights(b, k, mu, weight));
     PetscCall(PetscArraycmp(weight, o->weight[k], n, &same));
+    /* Columns blended at other weights are stale; a study along a load keeps all of them. */
     if (!same) PetscCall(PetscArrayzero(o->blended + b->start[k], b->body[k].n));
     o->kept.weights[k] += !same;
     PetscCall(PetscFree(o->weight[k]));
@@ -402,6 +413,8 @@ static PetscErrorCode TakeWeights(HycoBodiesWork o, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* to = sum over the samples of weight times from: the interpolation between trained samples of a body. `stride` lies
+   between the samples. */
 void HycoBodiesBlend(HycoBodiesWork o, PetscInt k, PetscInt n, size_t stride, const PetscReal from[], PetscReal to[])
 {
   const PetscReal *w = o->share[k];
@@ -462,6 +475,7 @@ static PetscErrorCode FindTouched(HycoBodiesWork o, Problem *p)
   for (PetscInt k = 0; k < p->n; k++) {
     for (PetscInt j = o->row_start[p->contact[k]]; j < o->row_start[p->contact[k] + 1]; j++) p->at[o->row_at[j]] = 0;
   }
+  /* A problem has far fewer unknowns than the surfaces: its columns are gathered at these alone. */
   for (PetscInt i = 0; i < b->ns; i++) {
     if (p->at[i] < 0) continue;
     p->at[i] = p->n_place;
@@ -470,7 +484,8 @@ static PetscErrorCode FindTouched(HycoBodiesWork o, Problem *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The flexibilities between the places that are touched. */
+/* The flexibilities between the places that are touched. p->C[k] is n_k x n_k for the touched places of body k, which
+   are first[k] .. first[k + 1] of p->place. */
 static PetscErrorCode Gather(HycoBodiesWork o, Problem *p)
 {
   const HycoSubstructures b = o->bodies;
@@ -520,6 +535,7 @@ static void FillRow(HycoBodiesWork o, Problem *p, PetscInt first, PetscReal row[
     return;
   }
   Respond(o, p, p->contact[first]);
+  /* Only the upper triangle: W is symmetric, and the caller mirrors it. */
   for (PetscInt j = 0; j < p->n - first; j++) {
     const PetscInt contact = p->contact[first + j];
 
@@ -565,7 +581,8 @@ static PetscErrorCode Fill(HycoBodiesWork o, Problem *p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* By the solver of contact systems: another method than the active set, or if that fails, the next ones. */
+/* By the solver of contact systems: another method than the active set, or if that fails, the next ones. o->active is
+   the start; p->z receives the forces. */
 static PetscErrorCode SolveSystem(HycoBodiesWork o, Problem *p, PetscBool *solved)
 {
   HycoSystem system;
@@ -645,6 +662,7 @@ static PetscErrorCode SolveProblem(HycoBodiesWork o, Problem *p, PetscReal Lambd
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For derivatives, which need the same matrix as the solve, on the contacts that may touch. */
 PetscErrorCode HycoBodiesMatrix(HycoBodiesWork o, PetscInt n, const PetscInt contact[], PetscReal M[])
 {
   const size_t size = (size_t)(o->bodies->p + n);
@@ -653,13 +671,15 @@ PetscErrorCode HycoBodiesMatrix(HycoBodiesWork o, PetscInt n, const PetscInt con
   PetscFunctionBegin;
   HycoDuplicate(n, contact, &p.contact);
   PetscCall(Fill(o, &p));
+  /* As [0 Z^T B^T; -B Z W]: the motions come before the contacts, as in z. */
   PetscCall(PetscArraycpy(M, p.M, size * size));
   PetscCall(Release(o, &p));
   PetscCall(PetscFree(p.contact));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* u = free - C f / kappa + Z x */
+/* u = free - C f / kappa + Z x. Exact for any forces: the approximation of the model is in C and in the samples' blend
+   only. */
 static PetscErrorCode Displace(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal Lambda[])
 {
   const HycoSubstructures b = o->bodies;
@@ -727,6 +747,7 @@ static PetscErrorCode FirstDepth(HycoBodiesWork o, const HycoBodiesSurface *s, P
   for (PetscInt k = 0; k < s->n; k++) {
     const PetscInt c = s->contact[k];
 
+    /* No master, no depth. */
     if (o->row_start[k] == o->row_start[k + 1]) continue;
     deepest[c] = PetscMax(deepest[c], -o->gap[k]);
     shallowest[c] = PetscMin(shallowest[c], -o->gap[k]);
@@ -736,6 +757,7 @@ static PetscErrorCode FirstDepth(HycoBodiesWork o, const HycoBodiesSurface *s, P
 
     least[c] = DEEP * deepest[c];
     if (spread > FLAT * deepest[c] && shallowest[c] > least[c]) least[c] = deepest[c] - NEAREST * spread;
+    /* Penetration of round-off size must not choose the first contacts. */
     least[c] = PetscMax(least[c], CLOSED * size);
   }
   HycoFreeAll(&shallowest, &deepest);
@@ -857,8 +879,10 @@ PetscErrorCode HycoBodiesStrain(HycoBodiesWork o, const HycoBodiesSurface *s, co
     const PetscBLASInt rows = (PetscBLASInt)b->body[k].n, modes = (PetscBLASInt)m, each = 1;
     const PetscReal factor = 1 / o->kappa[k], one = 1, *P = b->inelastic->P + (size_t)b->start[k] * (size_t)m;
 
+    /* A body without surfaces has no part in the gaps. */
     if (rows) BLASgemv_("T", &modes, &rows, &factor, P, &modes, alpha, &each, &one, o->free + b->start[k], &each);
   }
+  /* The gaps without contact forces: negative ones are where contact must close. */
   for (PetscInt k = 0; k < s->n; k++) {
     o->gap[k] = s->rows->gap[k];
     for (PetscInt j = o->row_start[k]; j < o->row_start[k + 1]; j++) o->gap[k] -= o->row[j] * o->free[o->row_at[j]];
@@ -891,6 +915,7 @@ PetscErrorCode HycoBodiesContact(HycoBodiesWork o, const HycoBodiesSurface *s, P
   o->its = 0;
   o->reason = HYCO_CONVERGED;
   PetscCall(PetscStrncpy(o->method, HYCO_SOLVER_ACTIVE_SET, sizeof(o->method)));
+  /* Contacts outside the last problem keep 0, and so do all if there is no solution. */
   PetscCall(PetscArrayzero(Lambda, s->n));
   PetscCall(PetscMalloc2(s->n + 1, &in, s->n + 1, &p.contact));
   PetscCall(SolveRounds(o, s, &p, in, Lambda, solved));
@@ -920,12 +945,14 @@ PetscReal HycoBodiesBound(HycoBodiesWork o, PetscReal *norm)
     for (PetscInt i = b->start[k]; i < b->start[k + 1]; i++) {
       PetscReal elastic = o->free[i] - o->u[i]; /* C f / kappa */
 
+      /* Rigid motions store no energy: without them the product with f would be the work of the loads too. */
       for (PetscInt j = 0; j < b->p; j++) elastic += o->Z[i * b->p + j] * o->x[j];
       square += o->f[i] * elastic;
     }
     for (PetscInt i = 0; i < b->r * b->r; i++) loads += o->c[i / b->r] * gram[i] * o->c[i % b->r] / o->kappa[k];
   }
   *norm = PetscSqrtReal(PetscMax(square, 0));
+  /* Relative to the forces; without contact there is nothing to bound. */
   return *norm > 0 ? b->bound + PetscSqrtReal(PetscMax(loads, 0)) / *norm : 0;
 }
 
@@ -947,9 +974,11 @@ void HycoBodiesMove(HycoBodiesWork o, const HycoBodiesSurface *s, PetscReal U[])
       place = o->loc[i * dim + c];
       own[c] = o->u[place];
     }
+    /* A node inside: its displacement is that of the modes. */
     if (place < 0) continue;
     HycoPoseTurn(o->pose[HycoBodiesAt(b, place)].Q, dim, PETSC_FALSE, own, turned);
     for (PetscInt c = 0; c < dim; c++) {
+      /* u0 has the prescribed values; the place's value comes on top in the scene's axes. */
       if (o->loc[i * dim + c] >= 0) U[i * dim + c] = s->fe->u0[i * dim + c] + turned[c];
     }
   }
@@ -968,11 +997,14 @@ static PetscErrorCode AddResponses(HycoBodiesWork o, PetscInt k, PetscInt n, Pet
   PetscCall(PetscBLASIntCast(n, &rows));
   PetscCall(PetscMalloc1(own->n * own->n_samples + 1, &x));
   for (PetscInt d = 0, end; d < own->n && n; d = end + 1) {
+    /* Runs of unknowns with forces are a few, since contact zones are connected: each run is one product of a
+       contiguous part of H. */
     for (end = d; end < own->n && f[end] != 0; end++) {
       for (PetscInt q = 0; q < own->n_samples; q++)
         x[(end - d) * own->n_samples + q] = factor * f[end] * o->weight[k][q];
     }
     PetscCall(PetscBLASIntCast((end - d) * own->n_samples, &columns));
+    /* An unknown without a force ends a run at once. */
     if (columns)
       BLASgemv_("N", &rows, &columns, &one, own->H + HycoBodiesColumn(own, 0, d, n), &rows, x, &each, &one, row, &each);
   }
@@ -995,13 +1027,15 @@ static PetscErrorCode RowsOf(HycoBodiesWork o, PetscInt k, PetscInt n, PetscReal
 
     for (PetscInt d = 0; d < b->r; d++) loads += a[d] * o->c[d];
     for (PetscInt d = 0; d < b->p; d++) motions += g[d] * o->x[d];
+    /* Rows of all samples, blended into one: weights are those of this body alone. */
     row[i % n] += weight * (loads / o->kappa[k] + motions);
   }
   PetscCall(AddResponses(o, k, n, -1 / o->kappa[k], row));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The modes of body k in its turns, and its unknowns inside. */
+/* The modes of body k in its turns, and its unknowns inside. The modes were trained in several turns of the body, whose
+   shares add up to its present one. */
 static PetscErrorCode ExpandBody(HycoBodiesWork o, PetscInt k, PetscReal gamma[])
 {
   const HycoSubstructures b = o->bodies;
@@ -1061,6 +1095,7 @@ void HycoBodiesAddStrains(HycoBodiesWork o, const PetscReal alpha[], PetscReal g
     for (PetscInt j = 0; j < own->n_samples * turns; j++, F += (size_t)own->l * (size_t)m) {
       PetscReal share = 0;
 
+      /* Fields are stored for a basis of turns G, since a vector field turns linearly with Q. */
       for (PetscInt d = 0; d < 9; d++) share += b->G[9 * (b->turn_start[k] + j % turns) + d] * o->pose[k].Q[d];
       AddProduct(own->l, m, F, alpha, share * o->weight[k][j / turns] / o->kappa[k], gamma + b->mode_start[k]);
     }

@@ -81,14 +81,17 @@ void HycoPoseFit(PetscInt dim, PetscInt n, const PetscReal X[], const PetscReal 
     m.X[i % 3] += X[i] / n;
     m.x[i % 3] += x[i] / n;
   }
+  /* Second moments about the centres: the best turn does not depend on the translation. */
   for (PetscInt i = 0; i < n; i++) AddSecond(dim, X + 3 * i, x + 3 * i, &m);
   FromMoments(dim, &m, pose);
   for (PetscInt i = 0; i < n; i++) AddDistance(dim, pose, X + 3 * i, x + 3 * i, &m);
+  /* The largest distance of a node from the fitted map, relative to the body: above round-off the map changes the
+     shape. */
   if (m.size > 0) pose->residual = PetscMax(pose->residual, m.off / m.size);
 }
 
-/* Three passes because second moments need the centres, and distances the map. Each pass reduces over ranks, so
-   that every rank makes the same pose from the same sums; a node counts once, on its owner. */
+/* Three passes because second moments need the centres, and distances the map. Each pass reduces over ranks, so that
+   every rank makes the same pose from the same sums; a node counts once, on its owner. The pose is the orthogonal factor and the mean scale of the affine map that fits the mapped nodes best by least squares; its residual tells how far the map is from turning and scaling. */
 PetscErrorCode HycoBodyPoses(HycoFOM f, PetscInt n, const PetscInt of[], const PetscReal X0[], HycoPose pose[])
 {
   const PetscInt dim = f->fe->dim, width = (PetscInt)(sizeof(Moments) / sizeof(PetscReal));
@@ -101,6 +104,7 @@ PetscErrorCode HycoBodyPoses(HycoFOM f, PetscInt n, const PetscInt of[], const P
     for (PetscInt i = 0; i < f->part->n_nodes; i++) {
       Moments *own = &m[of[i]];
 
+      /* Nodes of the overlap are on several ranks. */
       if (HycoMeshOwned(f->part, i) < 0) continue;
       own->n += pass == 0;
       for (PetscInt c = 0; pass == 0 && c < 3; c++) {
@@ -112,6 +116,7 @@ PetscErrorCode HycoBodyPoses(HycoFOM f, PetscInt n, const PetscInt of[], const P
     }
     if (pass == 1) { /* the centres are the same on all ranks */
       for (PetscInt b = 0; b < n; b++) HycoAllreduce(m[b].XX, 18, MPIU_REAL, MPI_SUM, HycoComm(f));
+      /* One reduction for all bodies; distances are maxima, sums otherwise. */
     } else
       HycoAllreduce(&m[0].n, n * width, MPIU_REAL, pass ? MPI_MAX : MPI_SUM, HycoComm(f));
     for (PetscInt b = 0; b < n; b++) {

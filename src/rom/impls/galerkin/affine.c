@@ -16,6 +16,7 @@ PetscErrorCode HycoTableCreate(const PetscInt n[], PetscReal *x[], PetscInt dim,
   PetscFunctionBegin;
   PetscCall(PetscNew(&t));
   *table = t;
+  /* No pattern: a dense matrix, until HycoTableKeepPattern() says otherwise. */
   t->n = -1;
   t->values.rows = entries;
   t->values.tensor.dim = dim;
@@ -29,6 +30,7 @@ PetscErrorCode HycoTableCreate(const PetscInt n[], PetscReal *x[], PetscInt dim,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* x[p] are allocated one by one, as counts differ by parameter. */
 PetscErrorCode HycoTableDestroy(HycoTable *table)
 {
   HycoTable t = *table;
@@ -51,6 +53,7 @@ PetscErrorCode HycoTableKeepPattern(HycoROM m, HycoTable t)
   PetscFunctionBegin;
   PetscCall(PetscObjectTypeCompare((PetscObject)g->Kr, MATSEQDENSE, &dense));
   if (dense) PetscFunctionReturn(PETSC_SUCCESS);
+  /* The pattern of Kr in the order in which the entries of the table lie. */
   PetscCall(MatGetRowIJ(g->Kr, 0, PETSC_FALSE, PETSC_FALSE, &n, &start, &column, &done));
   t->n = n;
   HycoDuplicate(n + 1, start, &t->start);
@@ -59,12 +62,14 @@ PetscErrorCode HycoTableKeepPattern(HycoROM m, HycoTable t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The pattern is that of training: the same for all parameters, so that one evaluation fills all entries. */
 PetscErrorCode HycoTableCreateSparse(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
   const HycoTable t = g->model->table;
 
   PetscFunctionBegin;
+  /* A file of another number of modes would be read out of bounds. */
   HycoCheck(t->n == m->n, "%s: the table of the reduced stiffness has %d rows, the matrix %d: train the model again",
             m->model->path, (int)t->n, (int)m->n);
   PetscCall(MatCreate(PETSC_COMM_SELF, &g->Kr));
@@ -74,6 +79,8 @@ PetscErrorCode HycoTableCreateSparse(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Each entry of the reduced stiffness is interpolated by itself: no cell is assembled, and the cost does not depend on
+   the mesh. */
 PetscErrorCode HycoTableFill(HycoROM m, const PetscReal mu[])
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -92,6 +99,7 @@ PetscErrorCode HycoTableFill(HycoROM m, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The number of nodes says the polynomial's degree in each parameter. */
 PetscErrorCode HycoTableView(HycoROM m, PetscViewer viewer)
 {
   HycoGalerkinModel g = (HycoGalerkinModel)m->model->data;
@@ -100,6 +108,7 @@ PetscErrorCode HycoTableView(HycoROM m, PetscViewer viewer)
   PetscFunctionBegin;
   PetscCall(PetscViewerASCIIPrintf(viewer, "  the reduced stiffness is a polynomial, tabulated at"));
   for (PetscInt p = 0, n = 0; p < t->dim; p++) {
+    /* Parameters of one node do not change the stiffness. */
     if (t->n[p] > 1)
       PetscCall(PetscViewerASCIIPrintf(viewer, "%s %d values of %s", n++ ? " x" : "", (int)t->n[p],
                                        m->model->scene->parameter[p]));
@@ -108,6 +117,7 @@ PetscErrorCode HycoTableView(HycoROM m, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Parameters one after the other in one dataset: HDF5 has no ragged rows. */
 PetscErrorCode HycoTableSave(HycoROM m, HycoH5 h)
 {
   HycoGalerkinModel g = (HycoGalerkinModel)m->model->data;
@@ -127,6 +137,7 @@ PetscErrorCode HycoTableSave(HycoROM m, HycoH5 h)
   if (t->n >= 0) PetscCall(HycoH5WriteInt(h, "table/start", t->n + 1, 1, t->start));
   if (t->n >= 0) PetscCall(HycoH5WriteInt(h, "table/column", t->values.rows, 1, t->column));
   PetscCall(HycoH5WriteReal(h, "table/parameters", all, 1, x));
+  /* A row per node of the grid, so that a reader sees one stiffness as one row. */
   PetscCall(HycoH5WriteReal(h, "table/stiffness", HycoTensorSize(tensor), t->values.rows, t->values.data));
   PetscCall(PetscFree(x));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -156,6 +167,7 @@ static PetscErrorCode LoadPattern(HycoROM m, HycoH5 h)
   t->n = n - 1;
   PetscCall(HycoH5LoadInt(h, "table/column", 0, PetscMax(t->n - 1, 0), entries, &one, &t->column));
   good = (PetscBool)(n > 1 && t->start[0] == 0 && t->start[n - 1] == *entries);
+  /* MatSeqAIJSetPreallocationCSR() takes rows as they are: a wrong one would be memory out of bounds. */
   for (PetscInt i = 0; i < t->n && good; i++) {
     good = (PetscBool)(t->start[i + 1] >= t->start[i]);
     for (PetscInt k = t->start[i] + 1; k < t->start[i + 1] && good; k++)
@@ -177,6 +189,7 @@ static PetscErrorCode LoadValues(HycoROM m, HycoH5 h, PetscInt **count, PetscRea
   for (PetscInt p = 0; p < dim; p++) {
     all += (*count)[p];
     nodes *= (*count)[p];
+    /* Before the product of the counts can overflow or ask for all memory. */
     HycoCheck(nodes <= HYCO_TABLE_NODES, "%s: table/counts is damaged", m->model->path);
   }
   PetscCall(HycoH5LoadReal(h, "table/parameters", &all, &one, x));
@@ -188,6 +201,7 @@ static PetscErrorCode LoadValues(HycoROM m, HycoH5 h, PetscInt **count, PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A dense table has no `start`. */
 PetscErrorCode HycoTableLoad(HycoROM m, HycoH5 h)
 {
   PetscInt *count = NULL;

@@ -17,6 +17,8 @@
 /* For a path with all of A full order, because its iterations multiply by the matrix many times. */
 #define BORDERED_MIN 300
 
+/* G minimises the weighted misfit of the modes on A's unknowns plus ridge times the square of the coefficients (Hoerl
+   and Kennard 1970), by the normal equations, which are small. */
 PetscErrorCode HycoGalerkinSetRidge(HycoROM m, PetscReal ridge)
 {
   HycoGalerkinModel g = (HycoGalerkinModel)m->model->data;
@@ -50,6 +52,7 @@ PetscErrorCode HycoGalerkinSetRidge(HycoROM m, PetscReal ridge)
     for (PetscInt j = 0; j < l; j++) g->G[j * n + k] = info ? 0 : X[k * l + j] * weight[j];
   }
   PetscCall(PetscFree3(X, N, weight));
+  /* Last: the work arrays are freed before, also if the normal equations are singular. */
   HycoCheckModel(!info || ridge > 0,
                  "-hyco_hybrid_ridge 0: the %d modes are not linearly independent on the %d unknowns of A; use -1",
                  (int)l, (int)n);
@@ -64,14 +67,18 @@ static PetscErrorCode CountUnknowns(HycoROM m)
   const PetscInt l = m->model->l;
 
   PetscFunctionBegin;
+  /* Below BORDERED_MIN a dense matrix is faster than the sparse border; without a history the product (K V) G is done
+     once per stiffness and pays off. */
   g->bordered = (PetscBool)(g->model->G && m->model->scene->n_times && l + m->model->n_fe > BORDERED_MIN);
   g->n_free = m->model->hybrid == HYCO_HYBRID_ALL && !g->bordered ? 0 : l;
+  /* The modes' coefficients first, then the full-order displacements, in the order of fe_dof. */
   m->n = g->n_free + m->model->n_fe;
   if (!g->model->contact) m->n_L = m->m; /* otherwise set by the type */
   HycoCheckModel(m->n > 0, "the model has no unknowns, because every training solution is zero; check the loads");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Dense up to the size where LAPACK's factor is faster than a sparse one. */
 static PetscErrorCode CreateReduced(PetscInt rows, PetscInt cols, PetscBool dense, PetscInt per_row, Mat *A)
 {
   PetscFunctionBegin;
@@ -82,11 +89,13 @@ static PetscErrorCode CreateReduced(PetscInt rows, PetscInt cols, PetscBool dens
     PetscCall(MatSetSizes(*A, rows, cols, rows, cols));
     PetscCall(MatSetType(*A, MATSEQAIJ));
     PetscCall(MatSeqAIJSetPreallocation(*A, per_row, NULL));
+    /* Rows of modes and of displacements differ in length: Preallocate() gives the exact room later. */
     PetscCall(MatSetOption(*A, MAT_NEW_NONZERO_ALLOCATION_ERR, PETSC_FALSE));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Everything whose size does not depend on parameters; the first Assemble() makes the matrices' patterns. */
 PetscErrorCode HycoGalerkinSetUp(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -105,6 +114,7 @@ PetscErrorCode HycoGalerkinSetUp(HycoROM m)
   PetscCall(g->model->table && !dense ? HycoTableCreateSparse(m) : CreateReduced(m->n, m->n, dense, 0, &g->Kr));
   PetscCall(MatCreateVecs(g->Kr, &g->x, &g->Fr));
   if (!dense && !m->model->scene->n_times) PetscCall(HycoLoadsCreate(m));
+  /* Without contact forces in the RID the problem is one linear solve. */
   if (m->n_L) {
     PetscCall(CreateReduced(m->n_L, m->n, dense, g->n_free + 15, &g->Br));
     PetscCall(CreateReduced(m->n, m->n_L, dense, g->n_free + 15, &g->Btr));
@@ -122,6 +132,7 @@ PetscErrorCode HycoGalerkinSetUp(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The current rows of B belong to the matrix that goes: current_B must not survive it. */
 PetscErrorCode HycoGalerkinReset(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -145,6 +156,7 @@ PetscErrorCode HycoGalerkinDestroy(HycoGalerkinModel g)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Only what the new parameters change; `ready` is false meanwhile, so that an error leaves nothing that looks valid. */
 static PetscErrorCode Assemble(HycoROM m, const PetscReal mu[])
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -190,7 +202,8 @@ PetscErrorCode HycoGalerkinAssemble(HycoROM m, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets gamma, and U on the nodes of fe's mesh. */
+/* Sets gamma, and U on the nodes of fe's mesh. U = u0 + V gamma, and the full-order unknowns as solved: the modes there
+   are only their continuation. */
 PetscErrorCode HycoGalerkinExpand(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -224,9 +237,11 @@ PetscErrorCode HycoGalerkinUnpack(HycoROM m)
 
   PetscFunctionBegin;
   PetscCall(HycoGalerkinExpand(m));
+  /* Force vectors reach contacts outside A_lambda: the next solution must not keep their forces there. */
   if (m->spread) PetscCall(PetscArrayzero(m->Lambda, m->model->pairs.n));
   m->spread = PETSC_FALSE;
   if (!m->n_L) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Force vectors: Lambda is their combination. */
   if (g->model->expand) {
     PetscCall(g->model->expand(m));
     m->spread = PETSC_TRUE;
@@ -238,6 +253,7 @@ PetscErrorCode HycoGalerkinUnpack(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Seconds are measured by part: training compares settings by them. */
 PetscErrorCode HycoGalerkinSolve(HycoROM m, const PetscReal mu[])
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -252,6 +268,7 @@ PetscErrorCode HycoGalerkinSolve(HycoROM m, const PetscReal mu[])
   }
   PetscCall(Assemble(m, mu));
   p->seconds.assemble = HycoNow() - begin;
+  /* Before the solve: the solution without contact comes from the table of loads, if it is affine in them. */
   HycoLogged(HYCO_EVENT_SOLVE, HycoLoadsSetFree(m, mu));
   HycoLogged(HYCO_EVENT_SOLVE, HycoSolverSolve(m->solver, g->x, g->L));
   PetscCall(HycoSolverGetSeconds(m->solver, &p->seconds.factor, &p->seconds.solve));
@@ -265,6 +282,7 @@ PetscErrorCode HycoGalerkinSolve(HycoROM m, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Infinite, as the largest number, for a singular matrix. */
 PetscErrorCode HycoGalerkinCondition(HycoROM m, PetscReal *condition)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -275,6 +293,7 @@ PetscErrorCode HycoGalerkinCondition(HycoROM m, PetscReal *condition)
   PetscFunctionBegin;
   *condition = 0;
   if (m->n > 2500) PetscFunctionReturn(PETSC_SUCCESS); /* an SVD would take minutes */
+  /* Densely: the reduced matrix is small, and nonsymmetric, so that no iterative estimate would be safe. */
   PetscCall(MatConvert(g->Kr, MATSEQDENSE, MAT_INITIAL_MATRIX, &dense));
   PetscCall(MatDenseGetArray(dense, &a));
   PetscCall(HycoExtremeSingularValues(m->n, m->n, a, &smallest, &largest));
@@ -300,9 +319,11 @@ static PetscErrorCode QuadraticForm(HycoROM m, PetscReal *energy, PetscReal *siz
   for (PetscInt i = 0; i < n; i++) {
     PetscReal sum = 0;
 
+    /* Most unknowns outside the RID are exactly 0, and their rows of K are empty. */
     if (m->U[i] == 0) continue;
     for (PetscInt k = ia[i]; k < ia[i + 1]; k++) {
       sum += a[k] * m->U[ja[k]];
+      /* The diagonal alone: what the displacements would store node by node, the size of the terms that cancel. */
       if (ja[k] == i) *size += a[k] * m->U[i] * m->U[i] / 2;
     }
     *energy += m->U[i] * sum / 2;
@@ -339,6 +360,7 @@ PetscErrorCode HycoGalerkinLocal(HycoROM m, HycoLocal *local)
   if (m->m) PetscCall(HycoGalerkinContactMatrix(m));
   if (m->m && !g->D) PetscCall(MatCreateVecs(g->B, NULL, &g->D));
   if (m->m) {
+    /* Rows of the RID's contacts; own_rows is in their order. */
     PetscCall(VecGetArrayWrite(g->D, &gap));
     for (PetscInt k = 0; k < m->m; k++) gap[m->contact[k]] = g->own_rows.gap[k];
     PetscCall(VecRestoreArrayWrite(g->D, &gap));

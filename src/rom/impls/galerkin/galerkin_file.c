@@ -11,6 +11,7 @@ static PetscErrorCode MoveScan(HycoROM m, HycoH5 h)
   PetscFunctionBegin;
   if (HycoH5Reads(h) ? !HycoH5Has(h, "training/scan_counts") : !scan->n) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoH5Ints(h, "training/scan_counts", 0, PETSC_MAX_INT, 2, counts));
+  /* The same statements read and write: when writing, the values come back unchanged. */
   scan->n = counts[0];
   scan->n_singular = counts[1];
   PetscCall(HycoH5Reals(h, "training/scan_smallest", 1, &scan->smallest));
@@ -26,6 +27,7 @@ PetscErrorCode HycoGalerkinMove(HycoROM m, HycoH5 h)
   PetscFunctionBegin;
   if (HycoH5Reads(h) ? HycoH5Has(h, "problem/G") : g->G != NULL) {
     PetscCall(HycoH5Real(h, "problem/G", &m->model->l, m->model->n_fe, &g->G));
+    /* The ridge of the regression of gamma on U[A], which `view` shows. */
     PetscCall(HycoH5Reals(h, "problem/ridge", 1, &g->ridge));
   }
   PetscCall(MoveScan(m, h));
@@ -49,6 +51,7 @@ static PetscErrorCode ViewScan(HycoROM m, PetscViewer viewer)
   for (PetscInt p = 0; p < m->model->scene->n_parameters; p++)
     PetscCall(PetscViewerASCIIPrintf(viewer, "%s %s = %.6g", p ? "," : " at", m->model->scene->parameter[p],
                                      (double)g->scan.at[p]));
+  /* The scan only finds changes of sign between its points: a number, not the place. */
   if (g->scan.n_singular)
     PetscCall(PetscViewerASCIIPrintf(viewer, "; SINGULAR inside the ranges: the determinant has the other sign at %d",
                                      (int)g->scan.n_singular));
@@ -56,6 +59,7 @@ static PetscErrorCode ViewScan(HycoROM m, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A symmetric model is positive definite by construction, and needs no scan. */
 PetscErrorCode HycoGalerkinView(HycoROM m, PetscViewer viewer)
 {
   HycoGalerkinModel g = (HycoGalerkinModel)m->model->data;

@@ -26,6 +26,7 @@ PetscErrorCode HycoGalerkinResidual(HycoROM m, const PetscReal mu[], const Petsc
   Vec r, s;
 
   PetscFunctionBegin;
+  /* Without mu only z moves, and the assembled system stays. */
   if (mu) PetscCall(HycoGalerkinAssemble(m, mu));
   PetscCall(HycoVecWrite(g->x, m->n, z));
   if (m->n_L) PetscCall(HycoVecWrite(g->L, m->n_L, z + m->n));
@@ -40,6 +41,7 @@ PetscErrorCode HycoGalerkinResidual(HycoROM m, const PetscReal mu[], const Petsc
   if (!m->n_L) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(VecDuplicate(g->L, &s));
   PetscCall(MatMult(g->Br, g->x, s));
+  /* The larger of B x and D is what a gap near 0 is a difference of. */
   PetscCall(VecNorm(s, NORM_INFINITY, size));
   PetscCall(VecNorm(g->Dr, NORM_INFINITY, &gap));
   *size = PetscMax(*size, gap);
@@ -68,6 +70,7 @@ static PetscErrorCode AddTo(Mat A, PetscReal scale, size_t n, const PetscInt to_
     for (PetscInt j = 0; j < entries; j++) {
       const PetscInt at = to_column ? to_column[column[j]] : column[j];
 
+      /* Entries of contacts that are open have no column. */
       if (at >= 0) M[(size_t)at * n + (size_t)row] += scale * value[j];
     }
     PetscCall(MatRestoreRow(A, i, &entries, &column, &value));
@@ -90,6 +93,7 @@ PetscErrorCode HycoGalerkinJacobian(HycoROM m, PetscInt k, const PetscInt contac
   for (PetscInt i = 0; i < m->n_L; i++) at[i] = -1;
   for (PetscInt j = 0; j < k; j++) at[contact[j]] = m->n + j;
   PetscCall(AddTo(g->Btr, 1, n, NULL, at, M));
+  /* The second row has w = D - B x, hence the sign. */
   PetscCall(AddTo(g->Br, -1, n, at, NULL, M));
   PetscCall(PetscFree(at));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -21,7 +21,7 @@ struct _n_HycoGalerkinPath {
   PetscBool moved;        /* the attempt's prescribed displacements are in U */
 };
 
-/* K and Kr. The first one is assembled again as in later assemblies, so that the sums have the same bits. */
+/* K and Kr. The first one is assembled again as in later assemblies, so that the sums have the same bits. Called when the path needs a new linear part. */
 static PetscErrorCode Stiffness(HycoPath p)
 {
   HycoROM m = (HycoROM)p->ctx;
@@ -65,8 +65,10 @@ static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elast
   fe->ready = PETSC_FALSE; /* until everything that depends on it is assembled */
   g->path->moved = PETSC_FALSE;
   m->beyond_current = PETSC_FALSE;
+  /* Later stiffnesses are tangents, which Newton's method assembles with the laws' states. */
   if (fe->stiffness_changed && (elastic || !p->n_taken)) PetscCall(Stiffness(p)); /* the first is the elastic one */
   PetscCall(HycoLinearForceSet(g->path->linear, fe->stiffness_changed));
+  /* B is filled on demand: a step that only changes gaps keeps it. */
   if (fe->contact_changed) g->current_B = PETSC_FALSE;
   if (fe->contact_changed || fe->gap_changed) HycoLogged(HYCO_EVENT_CONTACT, HycoGalerkinOwnRows(m));
   if (m->n_L && fe->contact_changed) HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillContact(m));
@@ -85,9 +87,12 @@ static PetscErrorCode Displace(HycoROM m)
   PetscFunctionBegin;
   PetscCall(HycoGalerkinExpand(m));
   PetscCall(PetscArraycpy(q->u, m->U, m->fe->n_dof));
+  /* At the first iteration of a step the internal forces must be those of the accepted state; the supports' motion
+     enters as a load. */
   for (PetscInt k = 0; k < m->fe->n_dof && !q->moved; k++) {
     if (HycoFESupports(m->fe, k)) q->u[k] = q->held[k];
   }
+  /* Tied and oblique nodes follow the values that have just been put back. */
   if (!q->moved) HycoFEComplete(m->fe, q->u);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -103,9 +108,11 @@ static PetscErrorCode Step(HycoPath p, PetscReal t0, PetscReal t1, PetscBool tan
   PetscCall(Displace(m));
   PetscCall(PetscArrayzero(p->f_local, m->fe->n_dof));
   PetscCall(HycoFEStepBodies(m->fe, HYCO_BODIES_FLOWING, q->u, t0, t1, p->begin, p->end, p->f_local, tangent, report));
+  /* A sum over some cells with test functions of the modes is no gradient of an energy: no line search on it. */
   report->has_potential = PETSC_FALSE;
   if (report->failed) PetscFunctionReturn(PETSC_SUCCESS);
   HycoLinearForceAdd(q->linear, q->u, p->f_local);
+  /* Before the test: forces at tied nodes belong to their masters, which may be in A. */
   HycoFEPassTied(m->fe, p->f_local);
   PetscCall(HycoReducedTest(m, p->f_local, p->f_int));
   PetscCall(VecWAXPY(p->r, -1, p->f_int, p->F));
@@ -129,6 +136,7 @@ static PetscErrorCode Moves(HycoPath p, Vec rhs)
   PetscCall(HycoReducedTest(m, F, p->work));
   PetscCall(VecRestoreArrayRead(g->F, &F));
   PetscCall(VecAXPY(rhs, 1, p->work));
+  /* What remains is the part of the supports alone. */
   PetscCall(VecAXPY(rhs, -1, p->F));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -177,6 +185,7 @@ static PetscErrorCode Watch(HycoROM m, PetscInt k)
 
   PetscFunctionBegin;
   Expect(m, k + 1);
+  /* Not at each time: an SVD per listed time would double the cost of a training path. */
   if (!g->watch.stride || k % g->watch.stride) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatConvert(g->Kr, MATSEQDENSE, MAT_INITIAL_MATRIX, &dense));
   PetscCall(MatDenseGetArray(dense, &a));
@@ -197,6 +206,7 @@ static PetscErrorCode Record(HycoPath p)
   PetscCall(HycoGalerkinUnpack(m));
   PetscCall(HycoGalerkinCheckContactBasis(m));
   PetscCall(CompleteState(m, p));
+  /* After the state is complete: (41) reads the whole displacement at the contacts. */
   if (m->ops->reconstruct && m->reconstruct) HycoLogged(HYCO_EVENT_RECONSTRUCT, (*m->ops->reconstruct)(m));
   PetscCall(HycoFloatingBalance(m));
   PetscCall(HycoTraceRecord(m, PETSC_FALSE, p->begin, &p->now));
@@ -216,6 +226,7 @@ static PetscErrorCode CreateLinear(HycoROM m)
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(m->model->mesh->n_nodes, &inside, m->model->mesh->n_nodes, &sets));
   PetscCall(HycoROMGetDomain(m, sets));
+  /* 2 is A: rows of the interface are never tested. */
   for (PetscInt i = 0; i < mesh->n_nodes; i++) inside[i] = (PetscBool)(sets[i] == 2);
   for (PetscInt k = 0; k < mesh->n_tied; k++)
     inside[mesh->tied[k]] = PETSC_TRUE; /* whose forces are added to the
@@ -225,6 +236,7 @@ static PetscErrorCode CreateLinear(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The path borrows matrices and vectors of the Galerkin work, and only adds the history's own state. */
 PetscErrorCode HycoGalerkinPathCreate(HycoROM m)
 {
   static const HycoPathOps ops = {
@@ -272,7 +284,7 @@ PetscErrorCode HycoGalerkinPathDestroy(HycoGalerkinPath *path)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* held = 0: at the path's begin no support has moved. */
+/* held = 0: at the path's begin no support has moved. The trace then holds all listed times; m shows the last one. */
 PetscErrorCode HycoGalerkinPathSolve(HycoROM m, const PetscReal mu[])
 {
   HycoGalerkinPath q = ((HycoGalerkin)m->work)->path;

@@ -21,6 +21,7 @@ struct _n_HycoLoads {
   Vec F[1 + MAX_LOADS], X[1 + MAX_LOADS], sum;
 };
 
+/* n + 1 of each: the constant part is number 0. */
 PetscErrorCode HycoLoadsDestroy(HycoLoads *loads)
 {
   HycoLoads p = *loads;
@@ -47,6 +48,7 @@ PetscErrorCode HycoLoadsCreate(HycoROM m)
   PetscFunctionBegin;
   HycoSceneReaches(m->fe->scene, reaches);
   for (PetscInt j = 0; j < s->n_parameters; j++) {
+    /* Only parameters that leave the stiffness alone: K^-1 of them is one factor. */
     if (!reaches[j] && s->hi[j] > s->lo[j]) parameter[n++] = j;
   }
   if (!n || n > MAX_LOADS) PetscFunctionReturn(PETSC_SUCCESS);
@@ -78,7 +80,8 @@ static PetscErrorCode Sum(HycoLoads p, const Vec v[], const PetscReal t[], Vec y
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The loads are affine in the parameters: 1 and each parameter's place between the ends of its range. */
+/* The loads are affine in the parameters: 1 and each parameter's place between the ends of its range. Between 0 and 1,
+   so that coefficients of different parameters are of one size. */
 static void Coordinates(HycoROM m, const PetscReal mu[], PetscReal t[])
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -104,6 +107,8 @@ static PetscErrorCode IsSum(HycoROM m, const PetscReal t[], PetscBool *is)
   PetscCall(Sum(p, p->F, t, p->sum));
   PetscCall(VecAXPY(p->sum, -1, g->Fr));
   PetscCall(VecNorm(p->sum, NORM_INFINITY, &apart));
+  /* Tested on the assembled vector at each mu: an expression may be affine at the middle by chance and not
+     elsewhere. */
   *is = (PetscBool)(apart <= AFFINE * size);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -129,6 +134,8 @@ static PetscErrorCode SampleForces(HycoROM m, const PetscReal mu[])
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(at, mu, m->model->scene->n_parameters));
   for (PetscInt j = 0; j < p->n; j++) at[p->parameter[j]] = m->model->scene->lo[p->parameter[j]];
+  /* F[0] at the lower ends; F[j] is the change by parameter j alone. Products of two loads are not found here but by
+     the check at the middle. */
   for (PetscInt j = 0; j <= p->n; j++) {
     PetscReal size;
 
@@ -145,6 +152,7 @@ static PetscErrorCode SampleForces(HycoROM m, const PetscReal mu[])
   PetscCall(ForceAt(m, at));
   Coordinates(m, at, t);
   PetscCall(IsSum(m, t, &p->affine));
+  /* Back at the caller's point, whose right-hand side is solved next. */
   PetscCall(ForceAt(m, mu));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -163,8 +171,10 @@ static PetscErrorCode Renew(HycoROM m, const PetscReal mu[])
   ierr = SampleForces(m, mu);
   if (ierr) m->fe->ready = PETSC_FALSE; /* it is at other parameters */
   PetscCall(ierr);
+  /* A singular stiffness has no such solutions; the solver reports it. */
   p->affine = (PetscBool)(p->affine && !singular);
   for (PetscInt j = 0; j <= p->n && p->affine; j++) {
+    /* A load that is 0 over its range needs no solve. */
     if (p->given[j])
       PetscCall(HycoSolverSolveLinear(m->solver, p->F[j], p->X[j]));
     else
@@ -185,6 +195,7 @@ PetscErrorCode HycoLoadsSetFree(HycoROM m, const PetscReal mu[])
   PetscFunctionBegin;
   if (!p) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoSolverSetFree(m->solver, NULL));
+  /* The first prediction with this stiffness pays a solve for each load; the later ones of a ramp none. */
   if (!p->current) PetscCall(Renew(m, mu));
   if (!p->affine) PetscFunctionReturn(PETSC_SUCCESS);
   Coordinates(m, mu, t);

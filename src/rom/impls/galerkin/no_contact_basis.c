@@ -13,6 +13,7 @@ PetscErrorCode HycoGalerkinCheckContactBasis(HycoROM m)
   PetscFunctionBegin;
   if (m->n_L || p->reason <= 0 || (m->ops->reconstruct && !m->reconstruct)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoROMComplete(m));
+  /* A model that has no contact in its RID converges with any penetration: only the whole displacement shows it. */
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
     const PetscReal bu = HycoROMAddRow(m, k, 0);
 

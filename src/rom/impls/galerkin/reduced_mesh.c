@@ -6,7 +6,7 @@
 #include <hycogalerkin.h>
 
 /* One past the last node that is needed: of a cell or a load in Omega_A, of a contact of A_lambda, of a facet whose
-   normal is needed there. */
+   normal is needed there. Nodes are ordered by first use, so that the first n are a mesh of their own. */
 static PetscErrorCode CountNodes(HycoROM m, PetscInt *n)
 {
   HycoMesh mesh = m->model->mesh;
@@ -28,6 +28,7 @@ static PetscErrorCode CountNodes(HycoROM m, PetscInt *n)
     *n = PetscMax(*n, m->model->pairs.slave[k] + 1);
     for (PetscInt j = m->model->pairs.master_start[k]; j < m->model->pairs.master_start[k + 1]; j++)
       *n = PetscMax(*n, m->model->pairs.master[j] + 1);
+    /* An averaged normal and a mortar read the facets around the slave, whose nodes may lie outside Omega_A. */
     if (HycoContactAverages(m->model->scene->contact[m->model->pairs.contact[k]]) ||
         m->model->scene->contact[m->model->pairs.contact[k]]->integrated)
       slave[m->model->pairs.slave[k]] = PETSC_TRUE;
@@ -38,6 +39,7 @@ static PetscErrorCode CountNodes(HycoROM m, PetscInt *n)
     for (PetscInt a = 0; a < mesh->nf; a++) any = (PetscBool)(any || slave[mesh->facets[f * mesh->nf + a]]);
     for (PetscInt a = 0; any && a < mesh->nf; a++) *n = PetscMax(*n, mesh->facets[f * mesh->nf + a] + 1);
   }
+  /* In ascending order: masters that are added here may be tied in turn. */
   for (PetscInt k = 0; k < mesh->n_tied && mesh->tied[k] < *n; k++) { /* their masters may add nodes */
     for (PetscInt j = mesh->tied_start[k]; j < mesh->tied_start[k + 1]; j++)
       *n = PetscMax(*n, mesh->tied_master[j] + 1);
@@ -60,12 +62,14 @@ static PetscErrorCode SelectPairs(HycoROM m)
   }
   PetscCall(ISCreateGeneral(PETSC_COMM_SELF, m->m, m->contact, PETSC_COPY_VALUES, &g->sets.is_A_lambda));
   PetscCall(HycoPairsSelect(all, m->m, m->contact, NULL, &g->own_pairs));
+  /* The masters that a slave may meet over the ranges: fixed here, so that B's pattern is known before the first
+     prediction. */
   HycoPairsSetReach(&g->own_pairs, m->model->master_reach);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The submesh has the first n nodes, so that unknowns have the same numbers in both: V, fe_dof and sets serve for
-   both. */
+/* The submesh has the first n nodes, so that unknowns have the same numbers in both: V, fe_dof and sets serve for both.
+   Cells beyond are needed by the full reconstruction only, which has the model's whole mesh. */
 PetscErrorCode HycoGalerkinCreateOwn(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -94,6 +98,7 @@ static PetscErrorCode CreateUnknowns(HycoFE fe, IS nodes, IS *unknowns)
   for (PetscInt k = 0; k < n_nodes * fe->dim; k++) {
     const PetscInt i = node[k / fe->dim] * fe->dim + k % fe->dim;
 
+    /* Fixed unknowns are decoupled rows, which (38) must not test. */
     if (!fe->fixed[i]) dof[n++] = i;
   }
   PetscCall(ISRestoreIndices(nodes, &node));
@@ -117,7 +122,8 @@ PetscErrorCode HycoGalerkinCreateSets(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A'_c, the unknowns on which B's rows act, and A_c, those of them in A. */
+/* A'_c, the unknowns on which B's rows act, and A_c, those of them in A. B's pattern follows the search of masters, so
+   this is called whenever the rows are new. */
 static PetscErrorCode CreateContactSets(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -132,6 +138,7 @@ static PetscErrorCode CreateContactSets(HycoROM m)
   HycoDuplicate(n, column, &dof);
   PetscCall(MatRestoreRowIJ(g->B, 0, PETSC_FALSE, PETSC_FALSE, &n_rows, &start, &column, &done));
   PetscCall(PetscSortRemoveDupsInt(&n, dof));
+  /* The set contains the earlier one: equal sizes mean equal sets. */
   if (n == n_old) { /* B's pattern grows, and the set with it */
     PetscCall(PetscFree(dof));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -168,6 +175,7 @@ PetscErrorCode HycoGalerkinContactMatrix(HycoROM m)
 
   PetscFunctionBegin;
   if (g->current_B) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Not a new matrix: entries that were ever used stay in the pattern, and products with B keep their symbolic part. */
   if (g->B)
     PetscCall(MatZeroEntries(g->B));
   else
@@ -177,6 +185,7 @@ PetscErrorCode HycoGalerkinContactMatrix(HycoROM m)
     PetscCall(MatSetValues(g->B, 1, &m->contact[k], rows->start[k + 1] - rows->start[k], rows->dof + rows->start[k],
                            rows->value + rows->start[k], ADD_VALUES));
   PetscCall(HycoMatAssemble(g->B));
+  /* PETSc counts changes of the pattern, so that the sets are rebuilt only then. */
   PetscCall(MatGetNonzeroState(g->B, &after));
   if (!g->sets.is_Ac || after != before) PetscCall(CreateContactSets(m));
   g->current_B = PETSC_TRUE;
@@ -206,6 +215,7 @@ PetscErrorCode HycoGalerkinOwnRows(HycoROM m)
   if (!g->own_pairs.room) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt k = 0; k < m->m; k++) {
     const PetscInt hi = rows->start[k + 1];
+    /* A contact that no map moves has kept its masters since training, which chose A_lambda by them. */
     PetscBool tested = (PetscBool)!HycoPairsMoved(&g->own_pairs, k);
 
     for (PetscInt t = lo; t < hi && !tested; t++) {
@@ -216,6 +226,8 @@ PetscErrorCode HycoGalerkinOwnRows(HycoROM m)
       rows->dof[n] = rows->dof[t];
       rows->value[n] = rows->value[t];
     }
+    /* A row that no unknown of A reads cannot be in (38), A_lambda of the present masters: it is made empty with a gap
+       that never closes. */
     if (!tested) rows->gap[k] = none;
     rows->start[k + 1] = n;
     lo = hi;

@@ -58,6 +58,7 @@ static PetscErrorCode DestroyContact(ContactProduct *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* V_A may be V itself: both are counted references. */
 PetscErrorCode HycoReducedDestroy(HycoReduced *reduced)
 {
   HycoReduced r = *reduced;
@@ -76,7 +77,7 @@ PetscErrorCode HycoReducedDestroy(HycoReduced *reduced)
 
 /* -- the bases -- */
 
-/* A matrix that is stored row major. */
+/* A matrix that is stored row major. PETSc's dense matrices lie by columns: the same array is the transpose. */
 static PetscErrorCode CreateRowMajor(PetscInt rows, PetscInt columns, PetscReal a[], Mat *A)
 {
   Mat At;
@@ -137,10 +138,12 @@ static PetscErrorCode CreateP(HycoROM m, IS unknowns, PetscBool with_G, Mat *P)
       PetscCall(MatSetValues(*P, 1, &i, 1, &at, &one, INSERT_VALUES));
       continue;
     }
+    /* By rows of V: one row of P is a combination of the modes, or through G of the unknowns of A. */
     for (PetscInt j = 0; j < n_modes; j++) {
       v[j] = with_G ? 0 : modes[j];
       for (PetscInt k = 0; with_G && k < m->model->l; k++) v[j] += modes[k] * g->model->G[k * m->n + j];
     }
+    /* A fixed unknown's row is empty: its value is in u0 and moves to the right-hand side. */
     if (!m->fe->fixed[dof[i]]) PetscCall(MatSetValues(*P, 1, &i, n_modes, g->reduced->index, v, INSERT_VALUES));
   }
   PetscCall(HycoMatAssemble(*P));
@@ -159,6 +162,7 @@ PetscErrorCode HycoReducedPrepare(HycoROM m)
   if (g->reduced) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscNew(&g->reduced));
   r = g->reduced;
+  /* No coefficients among the unknowns: gamma = G U[A] throughout. */
   r->all_full = (PetscBool)(g->model->G && !g->bordered);
   PetscCall(PetscObjectTypeCompare((PetscObject)g->Kr, MATSEQDENSE, &r->dense));
   PetscCall(ISCreateStride(PETSC_COMM_SELF, m->fe->n_dof, 0, 1, &r->all));
@@ -172,7 +176,8 @@ PetscErrorCode HycoReducedPrepare(HycoROM m)
 
 /* -- the stiffness -- */
 
-/* The unknowns of cells that a parameter changes. */
+/* The unknowns of cells that a parameter changes. Rows of K outside this set are multiplied once; for each new
+   stiffness only these are. */
 static PetscErrorCode CreateVarying(HycoROM m, IS *unknowns)
 {
   PetscInt n = 0, *dof;
@@ -183,6 +188,7 @@ static PetscErrorCode CreateVarying(HycoROM m, IS *unknowns)
   PetscCall(PetscMalloc1(m->fe->n_dof, &dof));
   for (PetscInt e = 0; e < m->model->mesh->n_cells; e++) {
     PetscInt node[HYCO_MAX_CELL_NODES];
+    /* A cell is constant if neither its law, its map nor its temperature depends on a parameter. */
     const PetscInt n_nodes = m->fe->constant[e] ? 0 : HycoMeshCellNodes(m->model->mesh, e, node);
 
     for (PetscInt v = 0; v < n_nodes; v++) varies[node[v]] = PETSC_TRUE;
@@ -209,6 +215,7 @@ static PetscErrorCode CreateRows(HycoROM m, IS in, PetscErrorCode (*of)(IS, IS, 
   PetscFunctionBegin;
   PetscCall(ISCreateGeneral(PETSC_COMM_SELF, m->model->n_fe, m->model->fe_dof, PETSC_COPY_VALUES, &fe));
   PetscCall(ISDifference(g->sets.is_A, fe, &tested));
+  /* Two kinds of rows: full-order unknowns test with their shape function, the rest of A with the modes. */
   PetscCall((*of)(fe, in, &s->full));
   PetscCall((*of)(tested, in, &s->tested));
   HycoDestroyAll(&tested, &fe);
@@ -217,6 +224,7 @@ static PetscErrorCode CreateRows(HycoROM m, IS in, PetscErrorCode (*of)(IS, IS, 
   PetscCall(ISGetIndices(s->full, &dof));
   for (PetscInt k = 0; k < s->n_full; k++) {
     PetscCall(PetscFindInt(dof[k], m->model->n_fe, m->model->fe_dof, &s->row[k]));
+    /* Unknowns of x come after the coefficients. */
     s->row[k] += g->n_free;
   }
   PetscCall(ISRestoreIndices(s->full, &dof));
@@ -256,7 +264,8 @@ static PetscErrorCode Multiply(HycoROM m, MatReuse reuse, Rows *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A row of Kr. A sparse one has its pattern from the first time on. */
+/* A row of Kr. A sparse one has its pattern from the first time on. MatSetValuesRow() skips the search for each column,
+   which is most of the time of a small insertion. */
 static PetscErrorCode PutRow(HycoROM m, PetscInt row, PetscInt n, const PetscInt column[], const PetscScalar value[])
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -269,7 +278,8 @@ static PetscErrorCode PutRow(HycoROM m, PetscInt row, PetscInt n, const PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rows of full-order unknowns, and their columns in the rows of the modes. */
+/* Rows of full-order unknowns, and their columns in the rows of the modes. F's columns are already in the order of
+   x. */
 static PetscErrorCode PutFull(HycoROM m, const Rows *s)
 {
   const PetscScalar *u;
@@ -284,6 +294,7 @@ static PetscErrorCode PutFull(HycoROM m, const Rows *s)
     PetscCall(PutRow(m, s->row[k], n, column, value));
     PetscCall(MatRestoreRow(s->F, k, &n, &column, &value));
   }
+  /* U: columns of full-order unknowns in the rows that the modes test. */
   if (!s->U) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatDenseGetArrayRead(s->U, &u));
   for (PetscInt j = 0; j < m->model->l; j++) {
@@ -301,6 +312,7 @@ static PetscErrorCode AddModes(HycoROM m, Mat M)
 
   PetscFunctionBegin;
   if (!M) PetscFunctionReturn(PETSC_SUCCESS);
+  /* PETSc's dense matrices lie by columns, `modes` by rows. */
   PetscCall(MatDenseGetArrayRead(M, &a));
   for (PetscInt i = 0; i < m->model->l; i++) {
     for (PetscInt j = 0; j < m->model->l; j++)
@@ -317,6 +329,7 @@ static PetscErrorCode PutModes(HycoROM m)
   HycoReduced r = g->reduced;
 
   PetscFunctionBegin;
+  /* These rows are the definition of gamma and do not depend on the parameters. */
   if (g->bordered && r->filled) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt i = 0; i < g->n_free; i++) {
     PetscScalar *row = r->modes + i * m->n;
@@ -342,6 +355,7 @@ static PetscErrorCode Preallocate(HycoROM m)
   PetscCall(PetscMalloc1(m->n, &n));
   for (PetscInt j = 0; j < g->n_free; j++) n[j] = m->n;
   for (PetscInt k = 0; k < m->model->n_fe; k++) {
+    /* A full-order unknown couples with its neighbours in K and, through the others, with all modes. */
     PetscCall(MatGetRow(g->K, m->model->fe_dof[k], &n[g->n_free + k], NULL, NULL));
     PetscCall(MatRestoreRow(g->K, m->model->fe_dof[k], NULL, NULL, NULL));
     n[g->n_free + k] = PetscMin(m->n, g->n_free + n[g->n_free + k]);
@@ -364,6 +378,7 @@ static PetscErrorCode Start(HycoROM m)
   if (m->model->n_fe) PetscCall(CreateP(m, r->all, PETSC_FALSE, &r->P));
   PetscCall(CreateVarying(m, &varying));
   PetscCall(ISGetLocalSize(varying, &n));
+  /* If a third varies, splitting the rows costs more than multiplying all of them. */
   if (r->all_full ||
       (!m->model->n_fe && r->V_A == r->V && 3 * n >= m->fe->n_dof)) { /* K itself is faster than a copy */
     PetscCall(ISDestroy(&varying));
@@ -374,6 +389,7 @@ static PetscErrorCode Start(HycoROM m)
   PetscCall(CreateRows(m, varying, ISIntersect, &r->varying));
   PetscCall(CreateRows(m, varying, ISDifference, &constant));
   PetscCall(ISDestroy(&varying));
+  /* Once: what no parameter changes is a constant l x l block and constant rows. */
   PetscCall(Multiply(m, MAT_INITIAL_MATRIX, &constant));
   PetscCall(PutFull(m, &constant));
   r->constant = constant.M;
@@ -394,12 +410,14 @@ static PetscErrorCode PutAll(HycoROM m)
   else {
     PetscCall(MatMatMult(r->varying.K_f, r->V, MAT_INITIAL_MATRIX, PETSC_DETERMINE, &r->KV));
     PetscCall(CreateRowMajor(m->model->l, m->model->n_fe, g->model->G, &r->G));
+    /* Into Kr itself, without a temporary of its size. */
     PetscCall(MatProductCreateWithMat(r->KV, r->G, NULL, g->Kr));
     PetscCall(MatProductSetType(g->Kr, MATPRODUCT_AB));
     PetscCall(MatProductSetFromOptions(g->Kr));
     PetscCall(MatProductSymbolic(g->Kr));
   }
   PetscCall(MatProductNumeric(g->Kr));
+  /* K[A,A] is the part of the unknowns themselves. */
   PetscCall(MatAXPY(g->Kr, 1, r->varying.F, SUBSET_NONZERO_PATTERN));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -415,6 +433,7 @@ PetscErrorCode HycoReducedFillStiffness(HycoROM m)
   r = g->reduced;
   if (!r->filled) PetscCall(Start(m));
   PetscCall(Multiply(m, r->filled ? MAT_REUSE_MATRIX : MAT_INITIAL_MATRIX, &r->varying));
+  /* Otherwise row by row, since Kr may be sparse. */
   if (r->all_full)
     PetscCall(PutAll(m));
   else {
@@ -426,6 +445,7 @@ PetscErrorCode HycoReducedFillStiffness(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Gives the array of values itself, by which a table of the stiffness is written and read. */
 PetscErrorCode HycoReducedEntries(HycoROM m, PetscInt *n, PetscScalar *a[])
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -448,10 +468,12 @@ PetscErrorCode HycoReducedEntries(HycoROM m, PetscInt *n, PetscScalar *a[])
   PetscCall(MatRestoreRowIJ(g->Kr, 0, PETSC_FALSE, PETSC_FALSE, &rows, &start, &columns, &done));
   PetscCall(MatSeqAIJGetArray(g->Kr, &all));
   *a = all;
+  /* The array stays where it is; the caller reads or writes it before the next assembly. */
   PetscCall(MatSeqAIJRestoreArray(g->Kr, &all));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The row of each entry in the array of HycoReducedEntries(). */
 PetscErrorCode HycoReducedRows(HycoROM m, PetscInt row[])
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -462,6 +484,7 @@ PetscErrorCode HycoReducedRows(HycoROM m, PetscInt row[])
   PetscFunctionBegin;
   PetscCall(PetscObjectTypeCompare((PetscObject)g->Kr, MATSEQDENSE, &dense));
   if (dense) {
+    /* PETSc's dense matrix lies by columns. */
     for (PetscInt k = 0; k < m->n * m->n; k++) row[k] = k % m->n;
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -475,13 +498,15 @@ PetscErrorCode HycoReducedRows(HycoROM m, PetscInt row[])
 
 /* -- the contacts -- */
 
-/* A product, or its transpose, as a matrix of the system. */
+/* A product, or its transpose, as a matrix of the system. B^T is kept as a matrix of its own: the solver multiplies by
+   both, and rows are contiguous in each. */
 static PetscErrorCode PutProduct(Mat product, PetscBool transposed, Mat to)
 {
   PetscInt rows;
 
   PetscFunctionBegin;
   PetscCall(MatGetSize(product, &rows, NULL));
+  /* Entries that have left the product keep their place in the pattern, with 0. */
   PetscCall(MatZeroEntries(to));
   for (PetscInt k = 0; k < rows; k++) {
     const PetscInt *column;
@@ -508,9 +533,11 @@ static PetscErrorCode MultiplyContact(HycoROM m, IS set, PetscBool grown, Contac
   PetscFunctionBegin;
   PetscCall(ISGetLocalSize(set, &n));
   if (c->P) PetscCall(MatGetSize(c->P, &n_P, NULL));
+  /* MAT_REUSE_MATRIX requires the patterns of the first call. */
   if (grown) {
     HycoDestroyAll(&c->BP, &c->B);
   }
+  /* P has a row for each unknown of the set, which grows with B. */
   if (n != n_P) {
     PetscCall(MatDestroy(&c->P));
     PetscCall(CreateP(m, set, g->reduced->all_full, &c->P));
@@ -530,6 +557,7 @@ PetscErrorCode HycoReducedFillContact(HycoROM m)
   PetscBool grown;
 
   PetscFunctionBegin;
+  /* Force vectors instead of multipliers: the type has its own products (44). */
   if (g->model->contact) {
     PetscCall(g->model->contact(m));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -544,6 +572,7 @@ PetscErrorCode HycoReducedFillContact(HycoROM m)
   PetscCall(PutProduct(r->all_c.BP, PETSC_FALSE, g->Br));
   PetscCall(ISGetLocalSize(g->sets.is_Ac, &n_Ac));
   PetscCall(ISGetLocalSize(g->sets.is_Ac_all, &n_all));
+  /* With obstacles and pairs A_c is A'_c: one product serves both (Property 1 of the paper). */
   if (n_Ac < n_all) PetscCall(MultiplyContact(m, g->sets.is_Ac, (PetscBool)(grown || !r->Ac.BP), &r->Ac));
   PetscCall(PutProduct(n_Ac < n_all ? r->Ac.BP : r->all_c.BP, PETSC_TRUE, g->Btr));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -559,6 +588,7 @@ PetscErrorCode HycoReducedTest(HycoROM m, const PetscScalar F[], Vec Fr)
   PetscFunctionBegin;
   PetscCall(VecGetArrayWrite(Fr, &f));
   if (g->n_free && !g->bordered) {
+    /* The caller's arrays in place of copies; they are reset in the opposite order. */
     PetscCall(VecPlaceArray(r->u, F));
     PetscCall(VecPlaceArray(r->gamma, f));
     PetscCall(MatMultTranspose(r->V_A, r->u, r->gamma));
@@ -571,7 +601,8 @@ PetscErrorCode HycoReducedTest(HycoROM m, const PetscScalar F[], Vec Fr)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Vbar[A,:]^T F[A] and D[A_lambda] */
+/* Vbar[A,:]^T F[A] and D[A_lambda]. The right-hand sides of the reduced system; D is taken at the contacts of A_lambda
+   only. */
 PetscErrorCode HycoReducedFillVectors(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
@@ -583,6 +614,7 @@ PetscErrorCode HycoReducedFillVectors(HycoROM m)
   PetscCall(HycoReducedTest(m, F, g->Fr));
   PetscCall(VecRestoreArrayRead(g->F, &F));
   if (!m->n_L) PetscFunctionReturn(PETSC_SUCCESS);
+  /* V_lambda^T D in place of D. */
   if (g->model->gap) {
     PetscCall(g->model->gap(m));
     PetscFunctionReturn(PETSC_SUCCESS);

@@ -28,7 +28,8 @@ static PetscErrorCode Reset(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Prints the RID, its full-order displacements, and the data of the reconstruction. */
+/* Prints the RID, its full-order displacements, and the data of the reconstruction. Numbers of other modes are those of
+   training; they seed the RID and are not part of the model. */
 static PetscErrorCode View(HycoROM m, PetscViewer viewer)
 {
   static const char *const words[] = {"auto", "rank: the fewest that give full row rank",
@@ -51,6 +52,7 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
   if (m->model->pairs.n)
     PetscCall(PetscViewerASCIIPrintf(viewer, "  full-order displacements: %d (%s)\n", (int)m->model->n_fe,
                                      words[m->model->hybrid]));
+  /* G: the regression of gamma on the unknowns of A. */
   if (m->model->hybrid == HYCO_HYBRID_ALL && h->galerkin.G)
     PetscCall(PetscViewerASCIIPrintf(viewer, "  ridge: %.0e of the first squared singular value\n",
                                      (double)h->galerkin.ridge));
@@ -59,7 +61,8 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Writes to the model file, or reads from it. */
+/* Writes to the model file, or reads from it. Writes or reads, by the file's direction. -1: the number of snapshots is
+   taken from the file. */
 static PetscErrorCode Move(HycoROM m, HycoH5 file)
 {
   HycoHybridModel h = (HycoHybridModel)m->model->data;
@@ -82,7 +85,8 @@ static PetscErrorCode Destroy(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* .reconstruct makes it a type whose forces outside A_lambda follow from (41). */
+/* .reconstruct makes it a type whose forces outside A_lambda follow from (41). Galerkin's functions do the rest: the
+   type adds the RID's reconstruction to them. */
 PetscErrorCode HycoROMCreate_Hybrid(HycoROM m)
 {
   static const HycoROMTraits traits = {.title = "hybrid hyper-reduced",

@@ -20,9 +20,11 @@ static PetscErrorCode Solve(PetscInt solver, PetscInt m, PetscInt n, const Petsc
 
   PetscFunctionBegin;
   if (solver == SOLVER_TAO) PetscCall(HycoTaoNNLS(m, n, A, b, HYCO_TAO_BNLS, RTOL, c, NULL, &solved));
+  /* TAO's own word is its recomputed optimality, to RTOL. */
   if (solved) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoNNLS(m, n, A, b, c, NULL));
   if (solver != SOLVER_AUTO) PetscFunctionReturn(PETSC_SUCCESS);
+  /* By the optimality conditions of (41), not by the method's count of iterations. */
   PetscCall(HycoNNLSCheck(m, n, A, b, c, RTOL, NULL, &solved));
   if (!solved) PetscCall(HycoTaoNNLS(m, n, A, b, HYCO_TAO_BNLS, RTOL, c, NULL, &solved));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -59,10 +61,12 @@ static PetscErrorCode SetUp(HycoROM m)
       const PetscReal force = h->S_lambda[(size_t)j * (size_t)N + (size_t)k];
 
       any = (PetscBool)(any || force != 0);
+      /* The scale of forces in the RID, where (41) fits them: the weight on c is relative to it. */
       if (m->model->in_rid[k]) r->scale = PetscMax(r->scale, force);
     }
     if (any) r->contact[r->n++] = k;
   }
+  /* Few rows: many contacts of a surface never close in training. */
   PetscCall(PetscMalloc1((size_t)r->n * (size_t)h->n_dual, &r->S));
   for (PetscInt j = 0; j < h->n_dual; j++) {
     for (PetscInt k = 0; k < r->n; k++)
@@ -73,6 +77,7 @@ static PetscErrorCode SetUp(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The weighted problem keeps a factor of S between predictions, which goes with it. */
 PetscErrorCode HycoReconstructionDestroy(HycoReconstruction *reconstruction)
 {
   HycoReconstruction r = *reconstruction;
@@ -128,6 +133,7 @@ static PetscReal Remainder(HycoROM m, const HycoReconstruction r, PetscInt n_dua
     const PetscReal force = m->Lambda[r->contact[i]];
     PetscReal rest = force;
 
+    /* Outside the RID the combination is the only value there is. */
     if (!m->model->in_rid[r->contact[i]]) continue;
     for (PetscInt j = 0; j < n_dual; j++) rest -= r->c[j] * r->S[(size_t)j * (size_t)r->n + (size_t)i];
     lost += rest * rest;

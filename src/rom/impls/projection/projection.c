@@ -25,6 +25,7 @@ static void DropRoundoff(HycoROM m, const PetscReal largest[], PetscScalar b[])
   const HycoProjectionModel p = (HycoProjectionModel)m->model->data;
 
   for (PetscInt i = 0; i < p->l_lambda; i++) {
+    /* The size of the terms: a force vector's sum times the largest displacement of a mode. */
     PetscReal sum = 0;
 
     for (PetscInt c = 0; c < m->m; c++)
@@ -90,6 +91,7 @@ static PetscErrorCode OpenUnmoved(HycoROM m, PetscScalar d[])
   PetscReal largest = 0;
 
   PetscFunctionBegin;
+  /* Any positive gap would do; one of the size of the others keeps the residuals' scale. */
   for (PetscInt i = 0; i < n; i++) largest = PetscMax(largest, PetscAbsScalar(d[i]));
   PetscCall(MatDenseGetArrayRead(g->Br, &b));
   for (PetscInt i = 0; i < n; i++) {
@@ -117,6 +119,7 @@ static PetscErrorCode FillGap(HycoROM m)
     d[i] = 0;
     for (PetscInt c = 0; c < m->m; c++) d[i] += v[m->contact[c]] * g->own_rows.gap[c];
   }
+  /* After the product: it may overwrite d. */
   PetscCall(OpenUnmoved(m, d));
   PetscCall(VecRestoreArray(g->Dr, &d));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -185,7 +188,9 @@ PetscErrorCode HycoProjectionMove(HycoROM m, HycoH5 h)
   if (HycoH5Reads(h)) {
     PetscCall(HycoROMLoadWord(m, h, "problem/dual", HycoDuals, &word));
     p->dual = (HycoDual)word;
+    /* Not known before the dataset is read. */
     p->l_lambda = -1;
+    /* Full-order unknowns exist only beside multipliers. */
     HycoCheck((p->dual == HYCO_DUAL_FE || m->model->n_fe == 0) && m->model->counts[1] <= m->model->l,
               "%s: problem/dual is damaged", m->model->path);
   } else

@@ -37,6 +37,7 @@ static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked
                s->now.word);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+  /* A fallback must not ask for a dense matrix that the choice of forms has avoided. */
   if (s->falling_back && y->m > HYCO_FALLBACK_MAX && (s->form != form || s->now.traits & HYCO_TAO_DENSE))
     PetscFunctionReturn(PETSC_SUCCESS);
   *cost = 2;
@@ -71,6 +72,7 @@ static PetscErrorCode Resize(Dual *d, PetscInt m, PetscInt p)
   PetscCall(PetscCalloc1(m + 1, &d->active));
   d->m = m;
   d->p = p;
+  /* A set of other contacts is no start. */
   d->started = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -198,7 +200,7 @@ static PetscErrorCode SolveForces(HycoSolver s, Dual *d, Vec start, PetscBool *s
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets this rank's part of the forces, which every rank has. */
+/* Sets this rank's part of the forces, which every rank has. All ranks have solved the same problem. */
 static PetscErrorCode SetForces(const Dual *d, Vec L)
 {
   PetscInt lo, hi;
@@ -234,6 +236,7 @@ static PetscErrorCode Recover(HycoSolver s, const Dual *d, Vec x, Vec L)
 
   PetscFunctionBegin;
   PetscCall(HycoSystemWork(y));
+  /* The solution without contact is known: only that of the forces is added. */
   if (s->free)
     PetscCall(AddForces(s, x, L));
   else if (!s->stiffness.lu)
@@ -243,6 +246,7 @@ static PetscErrorCode Recover(HycoSolver s, const Dual *d, Vec x, Vec L)
     PetscCall(VecAYPX(y->work_x[0], -1, y->F));
     PetscCall(HycoStiffnessSolve(s, y->work_x[0], x));
   }
+  /* In twice the precision where the plain solve was not accurate enough. */
   if (s->stiffness.refined)
     PetscCall(HycoStiffnessRefine(s, d->L, x));
   else if (!d->p)
@@ -250,7 +254,7 @@ static PetscErrorCode Recover(HycoSolver s, const Dual *d, Vec x, Vec L)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Changes the forces by dL (m), and x accordingly. */
+/* Changes the forces by dL (m), and x accordingly. Linear: no contact problem is solved again. */
 static PetscErrorCode Shift(HycoSolver s, const PetscReal dL[], Vec x, Vec L)
 {
   Vec change, force, move;
@@ -306,7 +310,8 @@ static PetscErrorCode CloseGaps(HycoSolver s, const Dual *d, Vec x, Vec L)
 #define SAME_FLEXIBILITY 1e-12
 
 /* For a small dense K: computes S again, by solves refined in twice the working precision. Called after a failed
-   attempt; *better: S has changed, so that another attempt may succeed. */
+   attempt; *better: S has changed, so that another attempt may succeed. A condensed S of a stiff K has digits lost by
+   cancellation, which can make the set cycle. */
 static PetscErrorCode Refine(HycoSolver s, HycoSolverForm form, PetscBool *better)
 {
   Dual *d = (Dual *)form->data;
@@ -359,6 +364,7 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   HycoLogged(HYCO_EVENT_FORCES, SolveForces(s, d, L, solved));
   PetscCall(SetForces(d, L));
   PetscCall(Recover(s, d, x, L));
+  /* Reduced models: gaps that should be 0 have round-off of the dense factor, which one correction removes. */
   if (s->stiffness.lu && !d->p && *solved && s->now.traits & HYCO_TAO_OWN && !s->system->blocks)
     PetscCall(CloseGaps(s, d, x, L));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -72,6 +72,7 @@ static PetscErrorCode SetUp(HycoSolverTangent t, Vec x, Vec L)
   PetscCall(HycoSolverFactor(s, &singular));
   PetscCheck(!singular, HycoComm(s), PETSC_ERR_USER,
              "the stiffness is singular, so that there is no gradient; check that supports hold every body");
+  /* Without contacts K alone gives the derivative. */
   if (!s->system->m) PetscFunctionReturn(PETSC_SUCCESS);
   t->m = s->system->m;
   PetscCall(HycoKernelSize(s->system->K, &t->p));
@@ -81,7 +82,8 @@ static PetscErrorCode SetUp(HycoSolverTangent t, Vec x, Vec L)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* x and L must be the solution of the present system: the states of the contacts are read from its gaps and forces. */
+/* x and L must be the solution of the present system: the states of the contacts are read from its gaps and forces.
+   After an error *tangent is NULL. */
 PetscErrorCode HycoSolverTangentCreate(HycoSolver s, Vec x, Vec L, HycoSolverTangent *tangent)
 {
   PetscFunctionBegin;

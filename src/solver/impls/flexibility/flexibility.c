@@ -104,7 +104,8 @@ static PetscErrorCode Destroy(HycoSolverForm form)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Its Tao object is of one process, as G is. */
+/* Its Tao object is of one process, as G is. For systems given by their flexibility, as models of bodies have: there is
+   no K. */
 PetscErrorCode HycoSolverFormCreate_Flexibility(HycoSolver s, HycoSolverForm form)
 {
   Flexibility *f;

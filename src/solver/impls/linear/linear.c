@@ -63,13 +63,14 @@ static PetscErrorCode SolveIterative(HycoSolver s, Linear *l, Vec x, PetscBool *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* x in place; L is not used. */
+/* x in place; L is not used. Without contacts: no active set, no loop. */
 static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, PetscBool *solved)
 {
   PetscBool singular;
 
   PetscFunctionBegin;
   PetscCall(PetscStrncpy(s->method, "linear", sizeof(s->method)));
+  /* No contacts and no factor: conjugate gradients alone. */
   if (s->iterative) {
     PetscCall(SolveIterative(s, (Linear *)form->data, x, solved));
     PetscFunctionReturn(PETSC_SUCCESS);

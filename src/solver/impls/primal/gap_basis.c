@@ -80,7 +80,8 @@ PetscErrorCode HycoGapPivots(HycoSystem y, PetscInt pivot[], PetscBool *all)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the gap coordinates exist for this B. Collective. */
+/* Whether the gap coordinates exist for this B. Collective. They exist if each contact has an unknown that no other
+   has. */
 PetscErrorCode HycoGapPossible(HycoSystem y, PetscBool *possible)
 {
   PetscInt lo, hi, *pivot;
@@ -105,6 +106,7 @@ static PetscErrorCode OneEach(Mat B, PetscBool *diagonal)
     PetscInt n;
 
     PetscCall(MatGetRow(B, r, &n, NULL, NULL));
+    /* An empty row is no obstacle: the contact is idle. */
     more = n > 1;
     PetscCall(MatRestoreRow(B, r, &n, NULL, NULL));
   }
@@ -127,6 +129,7 @@ static PetscErrorCode ScaleOnly(HycoSystem y, Gap *s)
   for (PetscInt r = lo; r < hi; r++) {
     const PetscScalar *vals;
 
+    /* An idle contact has no unknown: T stays 1 there. */
     if (s->pivot[r - lo] == HYCO_IDLE) continue;
     PetscCall(MatGetRow(y->B, r, &n, NULL, &vals));
     PetscCall(VecSetValue(t, s->pivot[r - lo], 1 / vals[0], INSERT_VALUES));
@@ -204,6 +207,7 @@ static PetscErrorCode DropIdle(Gap *s, PetscInt n)
   for (PetscInt k = 0; k < n; k++) {
     if (s->pivot[k] == HYCO_IDLE) continue;
     s->contact[s->n] = k;
+    /* In place: s->n never overtakes k. */
     s->pivot[s->n++] = s->pivot[k];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -216,6 +220,7 @@ static PetscErrorCode ToGaps(HycoSystem s, const Gap *q, Vec x, Vec y)
   const PetscScalar *g;
 
   PetscFunctionBegin;
+  /* Other unknowns stay what they are. */
   PetscCall(VecCopy(x, y));
   PetscCall(MatCreateVecs(s->B, NULL, &gap));
   PetscCall(MatMult(s->B, x, gap));
@@ -262,7 +267,7 @@ static PetscErrorCode NearKernel(HycoSystem s, const Gap *g)
 }
 
 /* Sets the new Kw in the solver, which keeps its data if the sizes are unchanged. KSPReset() drops the factor, but
-   keeps options and type. */
+   keeps options and type. Options were read when it was created. */
 static PetscErrorCode RenewSolver(HycoSolver s, Gap *g)
 {
   PetscInt n_old = -1;
@@ -272,6 +277,7 @@ static PetscErrorCode RenewSolver(HycoSolver s, Gap *g)
   if (g->ksp) {
     PetscCall(KSPGetOperators(g->ksp, &old, NULL));
     PetscCall(MatGetSize(old, &n_old, NULL));
+    /* A KSP of another size cannot be reused. */
     if (n_old != s->system->n)
       PetscCall(KSPDestroy(&g->ksp));
     else
@@ -372,6 +378,7 @@ PetscErrorCode HycoSolveOnSet(Mat Kg, Mat Kw, KSP ksp, Vec f, PetscInt n, const 
   PetscInt size;
 
   PetscFunctionBegin;
+  /* Kg is needed again for the next set. */
   PetscCall(MatCopy(Kg, Kw, SAME_NONZERO_PATTERN));
   PetscCall(MatGetSize(Kg, &size, NULL));
   PetscCall(MatGetDiagonal(Kg, rhs));

@@ -39,7 +39,7 @@ typedef struct {
   const PetscScalar *value;
 } Rows;
 
-/* Restored by RowsRestore(). */
+/* Restored by RowsRestore(). Direct access: MatGetRow() for each row of each pass would dominate. */
 static PetscErrorCode RowsGet(Mat K, Rows *r)
 {
   PetscBool done;
@@ -146,6 +146,7 @@ static PetscErrorCode Split(const Rows *r, PetscInt coarse_of[], PetscInt *n_coa
         const PetscInt j = r->col[k];
 
         if (j == i || r->value[k] > strong) continue;
+        /* A strong neighbour is coarse: this one is interpolated. */
         if (coarse_of[j] >= 0) stays = PETSC_FALSE;
         if (seen[j]) continue;
         seen[j] = PETSC_TRUE;
@@ -156,6 +157,7 @@ static PetscErrorCode Split(const Rows *r, PetscInt coarse_of[], PetscInt *n_coa
   }
   *n_coarse = 0;
   for (PetscInt i = 0; i < r->n; i++) {
+    /* Numbered in the order of the unknowns, so that the result does not depend on the search. */
     if (coarse_of[i] == 0) coarse_of[i] = (*n_coarse)++;
   }
   HycoFreeAll(&queue, &seen);
@@ -214,7 +216,7 @@ static PetscErrorCode Interpolate(const Rows *r, const PetscInt coarse_of[], Pet
 }
 
 /* The next coarser level; *made is false if the matrix is small, or cannot be coarsened. Bounds and loads of coarse
-   unknowns are those of the finer level. */
+   unknowns are those of the finer level. Galerkin's coarse matrix P^T K P keeps symmetry and definiteness. */
 static PetscErrorCode Coarsen(Level *fine, Level *coarse, PetscBool *made)
 {
   Rows r;
@@ -267,6 +269,7 @@ static PetscErrorCode SolveOnLevel(void *ctx, PetscBool active[], PetscBool *sin
   }
   PetscCall(HycoSolveOnSet(l->K, p->work, p->ksp, l->f, n, p->at, p->at_bound, p->rhs, p->y, singular));
   if (*singular) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Forces are residuals at the closed unknowns. */
   PetscCall(MatMult(l->K, p->y, p->residual));
   PetscCall(VecAYPX(p->residual, -1, l->f));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -286,6 +289,7 @@ static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool 
   PetscCall(VecGetArrayRead(p->residual, &force));
   PetscCall(VecGetArrayRead(p->diagonal, &d));
   for (PetscInt i = 0; i < l->n; i++) {
+    /* The scale of values over the level: a violation of round-off does not change the set. */
     size = PetscMax(size, PetscAbsReal(value[i]));
     if (active[i]) largest = PetscMax(largest, PetscAbsReal(force[i]));
   }
@@ -301,11 +305,13 @@ static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The active set method from l->active; y is the last solution. Only the set is used, whether or not it has
-   converged. At most 40 iterations: the set need not be final. */
+/* The active set method from l->active; y is the last solution. Only the set is used, whether or not it has converged.
+   At most 40 iterations: the set need not be final. Started from the set of the coarser level, which is nearly right:
+   few iterations a level (nested iteration). */
 static PetscErrorCode SolveLevel(Level *l, Vec y)
 {
   Solve p = {.level = l, .y = y};
+  /* On rank 0 alone: no reductions. */
   const HycoActiveSet set = {.comm = MPI_COMM_NULL,
                              .n = l->n,
                              .max_its = HYCO_LEVEL_ITS,
@@ -345,6 +351,7 @@ static PetscErrorCode Prolong(Level *fine, const Level *coarse, Vec y)
   for (PetscInt i = 0; i < fine->n; i++) {
     const PetscInt c = fine->coarse_of[i];
 
+    /* What a Jacobi step from the interpolated value would exceed is closed. */
     fine->active[i] = c >= 0 ? coarse->active[c] : (PetscBool)(value[i] + f[i] / d[i] > fine->bound[i]);
   }
   PetscCall(VecRestoreArrayRead(fine_y, &value));
@@ -354,7 +361,7 @@ static PetscErrorCode Prolong(Level *fine, const Level *coarse, Vec y)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Also of a level that Coarsen() has begun and given up. */
+/* Also of a level that Coarsen() has begun and given up. NULL-safe in each part. */
 static PetscErrorCode LevelDestroy(Level *l)
 {
   PetscFunctionBegin;
@@ -371,6 +378,7 @@ static PetscErrorCode Cascade(Level level[], PetscBool *made)
   PetscBool more = PETSC_TRUE;
 
   PetscFunctionBegin;
+  /* Until a level is small or does not shrink. */
   while (more && n < HYCO_MAX_LEVELS) {
     PetscCall(Coarsen(&level[n - 1], &level[n], &more));
     n += more;
@@ -411,6 +419,8 @@ static PetscErrorCode StartOnRoot(Mat K, Vec f, Vec bound, Vec set, PetscBool *m
   PetscCall(RowsRestore(&r));
   if (*made) {
     PetscCall(MatDuplicate(K, MAT_COPY_VALUES, &level->K));
+    /* With these signs all couplings are negative: K is an M-matrix, on which sets of coarse problems are good
+       starts. */
     PetscCall(MatDiagonalScale(level->K, signs, signs));
     PetscCall(VecDuplicate(f, &level->f));
     PetscCall(VecPointwiseMult(level->f, f, signs));
@@ -449,8 +459,9 @@ static PetscErrorCode GatherMatrix(MPI_Comm comm, Mat K, Mat *whole)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* set: 1 where the bound is active in the coarse solutions, else 0 (distributed like f). *made is false if the
-   matrix is not suitable. Collective. */
+/* set: 1 where the bound is active in the coarse solutions, else 0 (distributed like f). *made is false if the matrix
+   is not suitable. Collective. Worth it for obstacles along whole bodies, where a cold active set needs as many
+   iterations as there are cells across the contact. */
 PetscErrorCode HycoMultilevelStart(Mat K, Vec f, Vec bound, Vec set, PetscBool *made)
 {
   MPI_Comm comm = PetscObjectComm((PetscObject)K);
@@ -461,6 +472,7 @@ PetscErrorCode HycoMultilevelStart(Mat K, Vec f, Vec bound, Vec set, PetscBool *
 
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_rank(comm, &rank));
+  /* Serial: coarse problems are cheap beside the factor of the fine one. */
   PetscCall(GatherMatrix(comm, K, &whole));
   PetscCall(VecScatterCreateToZero(f, &scatter, &f_root));
   HycoVecDuplicate(f_root, &bound_root, &set_root);

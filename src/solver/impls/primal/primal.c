@@ -16,7 +16,8 @@
 #define HYCO_NOISE       1e-9
 #define HYCO_NOISE_LEAST 1e-13
 
-/* The value of a distributed vector at this rank's pivots. Pivots may be owned by other ranks. */
+/* The value of a distributed vector at this rank's pivots. Pivots may be owned by other ranks. In the order of this
+   rank's contacts without idle ones. */
 static PetscErrorCode AtPivots(Vec v, VecScatter scatter, Vec work, PetscInt n, PetscReal out[])
 {
   PetscFunctionBegin;
@@ -76,6 +77,7 @@ static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singu
   }
   PetscCall(HycoSolveOnSet(g->Kg, g->Kw, g->ksp, p->f, n, p->at, p->at_d, p->rhs, p->y, singular));
   PetscCall(KSPGetIterationNumber(g->ksp, &its));
+  /* Counts of the report. */
   if (p->s->iterative) HycoCountLinear(p->s, its);
   if (!*singular) PetscCall(Evaluate(p));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -116,6 +118,7 @@ static PetscErrorCode StartFromCoarse(const Primal *p, PetscBool active[], Petsc
   PetscCall(HycoMultilevelStart(g->Kg, p->f, p->hi, set, made));
   if (*made) {
     PetscCall(AtPivots(set, p->scatter, p->work, p->n, p->value));
+    /* The set came as a vector of 0 and 1. */
     for (PetscInt k = 0; k < p->n; k++) active[k] = (PetscBool)(p->value[k] > 0.5);
   }
   PetscCall(VecDestroy(&set));
@@ -143,6 +146,7 @@ static PetscErrorCode Fill(const Primal *p, PetscBool clean)
   PetscCall(VecSet(p->L, 0));
   PetscCall(VecGetArray(p->L, &l));
   for (PetscInt k = 0; k < p->n; k++) {
+    /* In between the signs of the forces tell which contacts pull. */
     if (!clean)
       l[g->contact[k]] = p->force[k];
     else if (g->active[k])
@@ -161,6 +165,7 @@ static PetscErrorCode Settled(void *ctx, PetscBool *more)
   HycoKKT kkt;
 
   PetscFunctionBegin;
+  /* The set was found with coarse solves: it must hold with accurate ones. */
   *more = (PetscBool)(p->noise > HYCO_NOISE);
   if (*more) PetscCall(SetAccuracy(p, HYCO_NOISE));
   if (*more || !s->iterative || !(s->target > 0)) PetscFunctionReturn(PETSC_SUCCESS);
@@ -217,12 +222,14 @@ static PetscErrorCode ActiveSet(Primal *p, Gap *g, PetscBool *solved)
 
   PetscFunctionBegin;
   PetscCall(VecGetOwnershipRange(s->system->D, &set.first, NULL));
+  /* From coarse to fine: the first sets are far from the last. */
   if (s->iterative) PetscCall(SetAccuracy(p, HYCO_NOISE_FIRST));
   p->cold = (PetscBool)(!s->warm || !g->started);
   if (p->cold) PetscCall(StartCold(p, g->active));
   PetscCall(HycoTaoSetType(g->tao, s->now.type, set.max_its));
   PetscCall(HycoTaoSolveSet(g->tao, &set, g->active, p->hi, p->y, &s->its, &status));
   if (status == HYCO_LCP_SINGULAR) s->reason = HYCO_DIVERGED_SINGULAR;
+  /* Only a set that has converged is a start for the next solve. */
   g->started = *solved = (PetscBool)(status == HYCO_LCP_SOLVED);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -257,7 +264,8 @@ static PetscErrorCode BoundQP(Primal *p, Gap *g, PetscBool *solved)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Bounds in the order of the contacts without idle ones. */
+/* Bounds in the order of the contacts without idle ones. y = 0 is the start; bounds are on y's entries at the
+   pivots. */
 static PetscErrorCode PrimalCreate(HycoSolver s, const Gap *g, Vec x, Primal *p)
 {
   HycoSystem y = s->system;
@@ -282,6 +290,7 @@ static PetscErrorCode PrimalCreate(HycoSolver s, const Gap *g, Vec x, Primal *p)
   PetscCall(VecDuplicate(x, &p->y));
   PetscCall(VecSet(p->y, 0));
   HycoVecDuplicate(x, &p->f, &p->rhs, &p->residual);
+  /* The loads in gap coordinates. */
   PetscCall(MatMultTranspose(g->T, y->F, p->f));
   PetscCall(ISCreateGeneral(PETSC_COMM_SELF, p->n, g->pivot, PETSC_COPY_VALUES, &is));
   PetscCall(VecCreateSeq(PETSC_COMM_SELF, p->n, &p->work));
@@ -305,6 +314,7 @@ static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked
   *cost = -1;
   if (!y->K || !y->m) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscObjectTypeCompareAny((PetscObject)y->K, &aij, MATSEQAIJ, MATMPIAIJ, ""));
+  /* Not by itself where it could not solve; asked for, the reason is told. */
   if (!asked && (s->now.traits & HYCO_TAO_DENSE || !aij || !y->symmetric)) PetscFunctionReturn(PETSC_SUCCESS);
   if (s->now.traits & HYCO_TAO_DENSE)
     HycoFormat(why,
@@ -319,6 +329,7 @@ static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked
     *cost = 1;
   else if (many || s->iterative) {
     PetscCall(HycoOperatorStateUpdate(&g->seen, y->B, NULL, &same));
+    /* Whether each contact has an unknown of its own: a property of B, found once. */
     if (!same) PetscCall(HycoGapPossible(y, &g->possible));
     if (g->possible) *cost = 1;
   }

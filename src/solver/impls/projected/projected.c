@@ -92,8 +92,8 @@ static PetscErrorCode Bounds(void *ctx, Vec lo, Vec hi)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets the active rows of B and their nodes as constraints. Only if the set differs from that of the last solve on
-   any rank. */
+/* Sets the active rows of B and their nodes as constraints. Only if the set differs from that of the last solve on any
+   rank. Constraints are projected out of the residuals, so that the multigrid of K serves every set. */
 static PetscErrorCode SetConstraints(Run *p, const PetscBool active[], PetscBool *singular)
 {
   const Projected *f = p->form;
@@ -153,12 +153,14 @@ static PetscErrorCode Evaluate(Run *p, const PetscBool active[])
   }
   PetscCall(VecRestoreArrayRead(p->gap, &v));
   PetscCall(VecGetSize(p->l, &m));
+  /* No active contact: all forces are 0. */
   if (!m) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(MatMult(y->K, p->x, p->r));
   PetscCall(VecAYPX(p->r, -1, y->F));
   PetscCall(HycoConstrainedForces(f->constrained, p->r, p->l));
   PetscCall(VecGetArrayRead(p->l, &v));
   for (PetscInt k = 0; k < f->n; k++) {
+    /* Rows of the constraints are the active contacts in their order. */
     if (active[k]) p->force[k] = v[n++];
   }
   PetscCall(VecRestoreArrayRead(p->l, &v));
@@ -174,6 +176,7 @@ static PetscErrorCode SolveOnSet(void *ctx, PetscBool active[], PetscBool *singu
   PetscFunctionBegin;
   PetscCall(SetConstraints(p, active, singular));
   if (*singular) PetscFunctionReturn(PETSC_SUCCESS);
+  /* The size of the loads in the preconditioner's norm, to which residuals are relative. */
   if (p->size < 0) PetscCall(HycoConstrainedSize(p->form->constrained, p->s->system->F, &p->size));
   PetscCall(HycoConstrainedSolve(p->form->constrained, p->s->system->F, p->d, p->accuracy, &p->size, p->x, &its));
   HycoCountLinear(p->s, its);
@@ -186,6 +189,7 @@ static PetscErrorCode Violations(void *ctx, const PetscBool active[], PetscBool 
 {
   const Run *p = (const Run *)ctx;
   const Projected *f = p->form;
+  /* Coarse solves: a force of the size of their error has no sign. */
   const PetscReal noise = PetscMax(HYCO_BELIEVED * p->accuracy, p->s->target > 0 ? 0 : HYCO_NOISE);
   PetscReal size[2] = {0, 0}, sizes[2];
 
@@ -210,6 +214,7 @@ static PetscErrorCode FillForces(const Run *p, PetscBool clean, const PetscBool 
   PetscCall(VecSet(L, 0));
   PetscCall(VecGetArray(L, &l));
   for (PetscInt k = 0; k < p->form->n; k++) {
+    /* Negative forces of round-off would count as adhesion. */
     if (active[k]) l[p->form->contact[k]] = clean ? PetscMax(p->force[k], 0) : p->force[k];
   }
   PetscCall(VecRestoreArray(L, &l));
@@ -248,6 +253,7 @@ static PetscErrorCode Settled(void *ctx, PetscBool *more)
   }
   PetscCall(FillForces(p, PETSC_TRUE, p->solved, p->L));
   PetscCall(HycoSystemComputeKKT(s->system, p->x, p->L, &kkt));
+  /* By how much the recomputed residual exceeds a third of the tolerance. */
   missing = kkt.stationarity / (0.3 * s->rtol);
   if (s->target > 0) missing = PetscMax(missing, s->system->residual / s->target);
   *more = (PetscBool)(missing > 1 && p->accuracy > HYCO_LEAST);
@@ -255,7 +261,8 @@ static PetscErrorCode Settled(void *ctx, PetscBool *more)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Without a target the start is 0, so that equal problems have equal iterations. */
+/* Without a target the start is 0, so that equal problems have equal iterations. With a target the caller's x is a good
+   start, since a path calls again with little changed. */
 static PetscErrorCode RunCreate(HycoSolver s, Projected *f, Vec x, Run *p)
 {
   PetscFunctionBegin;
@@ -286,6 +293,7 @@ static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked
   if (iterative && own && aij && y->symmetric && !p) {
     PetscCall(HycoOperatorStateUpdate(&f->seen, y->B, NULL, &same));
     if (!same) PetscCall(FindNodes(y, f));
+    /* Below the primal form with few contacts, above it with many. */
     if (f->possible) *cost = y->m > HYCO_MANY_SHARE * (PetscReal)y->n ? 2 : 0.5;
   }
   if (asked && *cost < 0)
@@ -304,6 +312,7 @@ static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singul
   PetscFunctionBegin;
   *singular = PETSC_FALSE;
   PetscCall(HycoOperatorStateUpdate(&f->made, s->system->K, NULL, &same));
+  /* K is the same: a ramp and a path keep their multigrid. */
   if (same) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoConstrainedDestroy(&f->constrained));
   PetscCall(HycoConstrainedCreate(HycoComm(s), "hyco_primal_", s->system->K, &f->constrained));
@@ -311,7 +320,7 @@ static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singul
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Writes the number of conjugate-gradient iterations into the report. */
+/* Writes the number of conjugate-gradient iterations into the report. Iterations of all sets of this solve. */
 static PetscErrorCode NameSolves(HycoSolver s, const Projected *f)
 {
   KSP ksp;
@@ -351,6 +360,7 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   p.L = L;
   set.ctx = &p;
   PetscCall(VecGetOwnershipRange(s->system->D, &set.first, NULL));
+  /* A cold start has no contact. */
   if (!s->warm || !f->started) PetscCall(PetscArrayzero(f->active, f->n));
   PetscCall(HycoTaoSetType(f->tao, s->now.type, set.max_its));
   PetscCall(HycoTaoSolveSet(f->tao, &set, f->active, s->system->D, p.gap, &s->its, &status));

@@ -39,7 +39,8 @@ static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One product: a multiplication by B^T, a solve, a multiplication by B. */
+/* One product: a multiplication by B^T, a solve, a multiplication by B. S = B K^-1 B^T is never formed: its m columns
+   would be m solves. */
 static PetscErrorCode MultS(Mat S, Vec v, Vec Sv)
 {
   Shell *f;
@@ -77,6 +78,7 @@ static PetscErrorCode LocalDiagonal(HycoSystem y, Vec d)
   PetscCall(MatGetDiagonal(y->K, inverse));
   PetscCall(VecReciprocal(inverse));
   PetscCall(MatDuplicate(y->B, MAT_COPY_VALUES, &scaled));
+  /* Columns of B over the diagonal of K. */
   PetscCall(MatDiagonalScale(scaled, NULL, inverse));
   PetscCall(VecGetOwnershipRange(d, &lo, &hi));
   PetscCall(VecGetArray(d, &out));
@@ -117,6 +119,7 @@ static PetscErrorCode EstimateDiagonal(Mat S, Shell *f)
   PetscCall(MatMult(S, v, Sv));
   PetscCall(VecDot(v, Sv, &ratio));
   PetscCall(VecNorm(f->diagonal, NORM_1, &sum));
+  /* Otherwise the local diagonal alone serves: scaling needs orders of magnitude. */
   if (ratio > 0 && sum > 0) PetscCall(VecScale(f->diagonal, ratio / sum));
   HycoDestroyAll(&v, &Sv);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -143,6 +146,7 @@ static PetscErrorCode Forces(const Shell *p, Mat S, Vec x, Vec L, PetscBool *sol
   HycoVecDuplicate(L, &f, &lo, &hi);
   PetscCall(HycoStiffnessSolve(s, y->F, x));
   PetscCall(MatMult(y->B, x, f));
+  /* f = B K^-1 F - D: the penetration without contact, which the forces must close. */
   PetscCall(VecAXPY(f, -1, y->D));
   PetscCall(VecSet(lo, 0));
   PetscCall(VecSet(hi, PETSC_INFINITY));
@@ -165,6 +169,7 @@ static PetscErrorCode Displacements(HycoSolver s, Shell *f, Vec x, Vec L)
     Vec r = f->force, dx = f->motion;
 
     PetscCall(MatMult(y->Bt, L, r));
+    /* In the first pass x = 0: the residual is the load itself. */
     PetscCall(MatMultAdd(y->K, x, r, r));
     PetscCall(VecAYPX(r, -1, y->F));
     PetscCall(HycoStiffnessSolve(s, r, dx));
@@ -194,6 +199,7 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   PetscCall(MatShellSetOperation(S, MATOP_MULT, (void (*)(void))MultS));
   PetscCall(MatShellSetOperation(S, MATOP_MULT_TRANSPOSE, (void (*)(void))MultS)); /* S is symmetric */
   PetscCall(MatShellSetOperation(S, MATOP_GET_DIAGONAL, (void (*)(void))DiagonalS));
+  /* TAO's Newton types take conjugate gradients then. */
   PetscCall(MatSetOption(S, MAT_SYMMETRIC, PETSC_TRUE));
   HycoVecDuplicate(y->F, &f->force, &f->motion);
   PetscCall(VecDuplicate(y->D, &f->diagonal));
