@@ -298,19 +298,29 @@ static PetscErrorCode AddValues(HycoScene scene, HycoSamples samples, PetscInt *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One number, read as a list so that "3,4" is refused with a message. */
-static PetscErrorCode AddScattered(HycoSamples samples, const char text[])
+/* n points of the sequence, or n,m: those after the first m, which are those of a training with m. */
+static PetscErrorCode AddScattered(HycoScene scene, HycoSamples samples, const char text[])
 {
-  PetscInt m;
-  PetscReal *value, count;
+  PetscInt m, n_par;
+  PetscReal *value, count, after;
+  const PetscReal *mu;
+  HycoSamples all;
 
   PetscFunctionBegin;
   PetscCall(ParseNumbers("scatter", text, &m, &value));
-  count = m == 1 ? value[0] : 0;
+  count = m == 1 || m == 2 ? value[0] : 0;
+  after = m == 2 ? value[1] : 0;
   PetscCall(PetscFree(value));
-  HycoCheck(count >= 1 && count <= 1e8 && count == PetscFloorReal(count),
-            "-scatter is \"%s\"; one whole number, at least 1, is expected", text);
-  PetscCall(HycoSamplesAddScattered(samples, (PetscInt)count));
+  HycoCheck(count >= 1 && after >= 0 && count + after <= 1e8 && count == PetscFloorReal(count) &&
+                after == PetscFloorReal(after),
+            "-scatter is \"%s\"; one whole number, at least 1, is expected, or n,m for the n points after the first m",
+            text);
+  PetscCall(HycoSamplesCreate(scene, &all));
+  PetscCall(HycoSamplesAddScattered(all, (PetscInt)(count + after)));
+  PetscCall(HycoSamplesGet(all, NULL, &n_par, &mu));
+  for (PetscInt k = 0; k < (PetscInt)count; k++)
+    PetscCall(HycoSamplesAddPoint(samples, mu + ((PetscInt)after + k) * n_par));
+  PetscCall(HycoSamplesDestroy(&all));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -329,8 +339,9 @@ PetscErrorCode DriverGetSamples(HycoScene scene, PetscBool closed, HycoSamples *
   PetscCall(DriverGet(
       "points", "<file.csv> a set of points: a header with the parameters' names, then a point per line", points));
   PetscCall(DriverGet("scatter",
-                      "<n> a set of points: n points spread over the ranges, corners and faces included, with many "
-                      "values of each parameter; for training with 3 parameters or more",
+                      "<n[,m]> a set of points: n points spread over the ranges, corners and faces included, with many "
+                      "values of each parameter; for training with 3 parameters or more. With m those after the first "
+                      "m: unseen by a training with -scatter m",
                       scatter));
   if (!scene) PetscFunctionReturn(PETSC_SUCCESS);
   n_sets += (grid[0] != '\0') + (points[0] != '\0') + (scatter[0] != '\0');
@@ -343,7 +354,7 @@ PetscErrorCode DriverGetSamples(HycoScene scene, PetscBool closed, HycoSamples *
   else if (points[0])
     PetscCall(HycoSamplesAddFile(*samples, points));
   else if (scatter[0])
-    PetscCall(AddScattered(*samples, scatter));
+    PetscCall(AddScattered(scene, *samples, scatter));
   else if (!n) /* a scene without parameters has one point */
     PetscCall(HycoSamplesAddPoint(*samples, NULL));
   *given = (PetscBool)(n_sets || !n);

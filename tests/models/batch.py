@@ -35,7 +35,7 @@ class Batch(Case):
                         np.testing.assert_allclose(float(here[name]), float(value), rtol=1e-6, atol=1e-8, err_msg=f'{name} of row {k}')
 
     def test_table(self):
-        """The table of a grid is the same on any number of ranks, and in HDF5."""
+        """The table of a grid is the same on any number of ranks, and in HDF5; scattered points may begin after the first ones."""
         self.hyco('train', '-scene', ROPE, '-grid', '3,4', '-model', 'r.h5')
         predict = ('predict', '-model', 'r.h5', '-grid', '40,25')
         self.hyco(*predict, '-table', 't.csv')
@@ -51,6 +51,9 @@ class Batch(Case):
                     for name in rows[0]:
                         if name != 'seconds':
                             np.testing.assert_allclose(file[name][:], [float(row[name]) for row in rows], rtol=1e-6, atol=1e-12, err_msg=name)
+        self.hyco('predict', '-model', 'r.h5', '-scatter', '9', '-table', 'all.csv')
+        self.hyco('predict', '-model', 'r.h5', '-scatter', '5,4', '-table', 'later.csv')
+        self.assertEqual(self.rows('later.csv'), self.rows('all.csv')[4:])
         run = self.run_raw(*predict, '-table', 'r.h5')
         self.assertEqual(run.returncode, 1)
         self.assertTrue(os.path.exists(self.path('r.h5')))
