@@ -16,6 +16,7 @@
 #define MISSED       2e-4 /* or, at most UNTIL_SEEN times, while the modes miss this share of the displacements at a */
 #define UNTIL_SEEN   2    /* check: the estimate of u is then above what the search takes as accurate enough */
 #define SPREAD       3    /* nodes of theta at which the displacements of each are computed */
+#define WITHIN       1e-2 /* of the tolerance of the modes, for the displacements of which those of turning bodies are made */
 #define SMALL        1e-7 /* of the largest sample: smaller ones count as much as this */
 #define SCORED       24   /* displacements at all nodes of theta whose stresses show which cells matter */
 #define MANY         64   /* right-hand sides at once */
@@ -491,6 +492,72 @@ static PetscErrorCode ScaleColumns(Mat S)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The displacements of a body that turns, each of length 1, by fewer: *count singular values times modes of them, in `few`
+   (n_dof each), to a share of the tolerance of the modes. Each of them is turned in several ways, and the cost of the modes
+   grows with the square of their number. Collective. */
+static PetscErrorCode Compress(HycoReducer t, const HycoBodiesFactor *factor, PetscInt body, PetscInt n,
+                               const PetscReal U[], PetscInt *count, PetscReal **few)
+{
+  HycoFOM f = factor->fom;
+  const PetscInt dim = t->sizes[3];
+  const size_t n_dof = (size_t)f->fe->n_dof;
+  PetscReal *value, *sigma, norm;
+  PetscScalar *s;
+  PetscInt lda;
+  Mat S, W;
+
+  PetscFunctionBegin;
+  PetscCall(CreateColumns(t, f, n, &S));
+  PetscCall(MatDenseGetLDA(S, &lda));
+  PetscCall(PetscMalloc2(n_dof + 1, &value, n + 1, &sigma));
+  PetscCall(MatDenseGetArray(S, &s));
+  for (PetscInt k = 0; k < n; k++) {
+    /* All unknowns of the body: those that need no modes turn into others that do. */
+    for (size_t i = 0; i < n_dof; i++)
+      value[i] = HycoTrainingOfBodies(t)->parts.of[i / (size_t)dim] == body ? U[(size_t)k * n_dof + i] : 0;
+    PetscCall(HycoFOMToRows(f, HYCO_ON_NODES, MPIU_REAL, dim, value, s + (size_t)k * (size_t)lda));
+  }
+  PetscCall(MatDenseRestoreArray(S, &s));
+  PetscCall(ScaleColumns(S));
+  PetscCall(MatNorm(S, NORM_FROBENIUS, &norm));
+  *count = 0;
+  if (norm > 0) PetscCall(HycoReducerPOD(t, S, WITHIN * HycoTrainingOfBodies(t)->pod_tol, 0, &W, count, sigma));
+  PetscCall(MatDestroy(&S));
+  PetscCall(PetscMalloc1(n_dof * (size_t)*count + 1, few));
+  for (PetscInt k = 0; k < *count; k++) {
+    PetscReal *own = *few + (size_t)k * n_dof;
+    const PetscScalar *w;
+
+    PetscCall(MatDenseGetColumn(W, k, (PetscScalar **)&w));
+    PetscCall(HycoFOMFromRows(f, HYCO_ON_NODES, dim, w, own));
+    PetscCall(MatDenseRestoreColumn(W, (PetscScalar **)&w));
+    for (size_t i = 0; i < n_dof; i++) own[i] *= sigma[k];
+  }
+  if (norm > 0) PetscCall(MatDestroy(&W));
+  PetscCall(PetscFree2(value, sigma));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The matrix whose POD gives the modes of a body: its displacements in all of its turns. Collective. */
+static PetscErrorCode ModeColumns(HycoReducer t, const HycoBodiesFactor *factor, PetscInt body, PetscInt n,
+                                  const PetscReal U[], Mat *S)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  PetscReal *few = NULL;
+  PetscInt count;
+
+  PetscFunctionBegin;
+  if (b->turn_start[body + 1] - b->turn_start[body] > 1) {
+    PetscCall(Compress(t, factor, body, n, U, &count, &few));
+    PetscCall(BodyColumns(t, factor, body, count, few, S));
+    PetscCall(PetscFree(few));
+  } else {
+    PetscCall(BodyColumns(t, factor, body, n, U, S));
+    PetscCall(ScaleColumns(*S));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The modes of all bodies in V, and their singular values in sigma. Collective. */
 static PetscErrorCode FindModes(HycoReducer t, const HycoBodiesFactor *factor, PetscInt n, const PetscReal U[], Mat *V,
                                 PetscReal **sigma)
@@ -502,13 +569,12 @@ static PetscErrorCode FindModes(HycoReducer t, const HycoBodiesFactor *factor, P
   *sigma = NULL;
   PetscCall(PetscCalloc1(b->n + 1, &b->mode_start));
   for (PetscInt k = 0; k < b->n; k++) {
-    const PetscInt columns = n * (b->turn_start[k + 1] - b->turn_start[k]);
     PetscReal *own, norm;
-    PetscInt l = 0;
+    PetscInt l = 0, columns;
     Mat S, W = NULL, joined;
 
-    PetscCall(BodyColumns(t, factor, k, n, U, &S));
-    PetscCall(ScaleColumns(S));
+    PetscCall(ModeColumns(t, factor, k, n, U, &S));
+    PetscCall(MatGetSize(S, NULL, &columns));
     PetscCall(MatNorm(S, NORM_FROBENIUS, &norm));
     PetscCall(PetscCalloc1(columns + 1, &own));
     /* A body that does not move, or has no unknown of its own left, has no modes. */
