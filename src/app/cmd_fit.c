@@ -32,6 +32,7 @@ typedef struct {
 } Settings;
 static const char *const types[] = {"brgn", "blmvm", NULL};
 
+/* Also called by DeclareFit(), so that help shows these texts and defaults. */
 static PetscErrorCode ReadSettings(Settings *s)
 {
   *s = (Settings){.samples = 64, .starts = 1};
@@ -180,6 +181,8 @@ static PetscReal Mean(const Fit *f, const PetscReal value[])
   return PetscSqrtReal(sum / (PetscReal)f->n);
 }
 
+/* full: the outputs of the full-order solve at the answer, or NULL without -scene. f->output counts the outputs at
+   the last time first, then those over the path, hence the remainder. */
 static PetscErrorCode PrintAnswer(const Fit *f, const PetscReal full[], cJSON *json)
 {
   const char *names[HYCO_MAX_QUANTITIES];

@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* One option for each kind of error; 0: no target. train and predict share the names, so that a model is judged
+   and used by the same number. */
 PetscErrorCode DriverReadTarget(HycoErrorKind kind, PetscReal *target)
 {
   static const char *const texts[HYCO_N_ERRORS] = {

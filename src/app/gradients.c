@@ -59,6 +59,8 @@ static PetscErrorCode ReportPath(cJSON *json, cJSON *kinks, HycoScene scene, con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rows are outputs, columns parameters. A derivative at a kink is marked where it stands, and listed apart,
+   because a number alone does not show that it is one-sided. */
 PetscErrorCode DriverReportGradient(cJSON *json, HycoScene scene, const HycoGradient *g)
 {
   const char *outputs[HYCO_MAX_QUANTITIES];
@@ -111,6 +113,7 @@ PetscErrorCode DriverGradientColumns(HycoScene scene, DriverGradients *columns)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* All derivatives of a point, and last how many of them are one-sided. */
 void DriverGradientFill(const DriverGradients *columns, const HycoGradient *g, PetscReal v[])
 {
   if (!columns->n) return;

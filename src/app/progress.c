@@ -139,6 +139,7 @@ PetscErrorCode DriverProgress(PetscInt done, PetscInt n, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The monitor that a training calls, with how many of n pieces of a phase are done. */
 PetscErrorCode DriverPhase(const char phase[], PetscInt done, PetscInt n, void *ctx)
 {
   char word[DRIVER_LINE];

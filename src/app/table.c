@@ -44,6 +44,7 @@ DriverRows DriverRowsOfRoot(PetscInt n, PetscInt width, PetscReal value[], Drive
   return (DriverRows){n, width, 1, piece};
 }
 
+/* Parameters with ten digits, because -points may read them back; results with eight. */
 static size_t FormatRow(const Table *t, PetscInt k, const PetscReal value[], char *text, size_t room)
 {
   const PetscInt width = t->rows->width;
@@ -151,6 +152,8 @@ static PetscErrorCode WriteColumn(HycoH5 file, const Table *t, PetscInt rounds, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A dataset for each column, in rounds of as many rows as a rank keeps in a piece. No rank holds the whole table.
+   */
 static PetscErrorCode WriteColumns(const char path[], const Table *t)
 {
   HycoH5 file;

@@ -151,6 +151,8 @@ static PetscErrorCode WritePoint(const File *f, const char group[], const PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The solution is that of this program, for others to compare with. The guess is where the path came from: without
+   it a solver may find another of several solutions. */
 static PetscErrorCode WriteAll(const File *f, const PetscReal z[], const PetscReal start[])
 {
   const PetscInt one = 1;
@@ -163,6 +165,8 @@ static PetscErrorCode WriteAll(const File *f, const PetscReal z[], const PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* fclib_local knows no contact without tangents: those without friction get tangents with W = 0, hence m = dim
+   rows for each. The first error is returned, and the file is complete or absent. */
 PetscErrorCode HycoLCPWriteFclib(const HycoLCP *lcp, PetscInt dim, const PetscReal z[], const PetscReal start[],
                                  const char path[])
 {

@@ -622,6 +622,7 @@ struct _n_HycoConeFactor {
   PetscReal *rho;
 };
 
+/* Empty: the first solve makes what it needs. A factor outlives the solves of a path. */
 PetscErrorCode HycoConeFactorCreate(HycoConeFactor *factor)
 {
   PetscFunctionBegin;
@@ -648,6 +649,8 @@ PetscErrorCode HycoConeFactorDestroy(HycoConeFactor *factor)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Without the matrix the next solve factors anew; the arrays stay. To be called when S changes in place, which a
+   pointer cannot show. NULL-safe. */
 void HycoConeFactorForget(HycoConeFactor f)
 {
   if (f && f->row) HycoConeStepSetMatrix(&f->step, NULL);

@@ -45,6 +45,7 @@ void HycoConeStepSetMatrix(HycoConeStep *t, const PetscReal M[])
   t->factored = PETSC_FALSE;
 }
 
+/* Blocks are gathered anew for each solve, with other data; sizes and order stay, so that the factor does too. */
 void HycoConeStepSetBlocks(HycoConeStep *t, const HycoBlocks *blocks)
 {
   t->blocks = blocks;
@@ -233,6 +234,8 @@ PetscErrorCode HycoConeStepDerive(HycoConeStep *t, const HycoBlocks *blocks, con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* DP = 1 in every block: all contacts closed and sticking, the linear problem w = 0 on all rows. Rows without
+   flexibility have DP = 0, since no force can change their w. */
 PetscErrorCode HycoConeStepStick(HycoConeStep *t)
 {
   PetscFunctionBegin;
@@ -518,6 +521,8 @@ static PetscErrorCode Prepare(HycoConeStep *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The states of the last step become the base of the factor, in place of low-rank changes whose round-off adds up.
+   */
 PetscErrorCode HycoConeStepRenew(HycoConeStep *t)
 {
   PetscFunctionBegin;

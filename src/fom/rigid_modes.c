@@ -60,7 +60,7 @@ static void Names(HycoFOM f, const HycoMotions *free, PetscInt n, const PetscRea
 }
 
 /* Adds a combination to the released motions, orthonormalised against the existing ones; a dependent one is left out.
-   Dependent: less than a tenth remains. u is taken over, or destroyed. */
+   Dependent: less than a tenth remains. z: coefficients of the n motions. */
 static PetscErrorCode AddReleased(HycoFOM f, PetscInt n, const Vec motion[], const PetscReal z[])
 {
   PetscReal norm, before;
@@ -387,7 +387,8 @@ PetscErrorCode HycoFOMCheckContactBalance(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The solution is determined up to these motions; the shown one is orthogonal to them. n_turned of them: the motions on which contact normals are turned. */
+/* The solution is determined up to the motions for which the normals are turned (n_turned, the first ones); the shown
+   one is orthogonal to them. The others are no motions of the mesh, whose facets resist them: they stay in u. */
 PetscErrorCode HycoFOMTakeOutReleased(HycoFOM f, Vec u)
 {
   PetscScalar dot;

@@ -8,6 +8,7 @@
 
 const char *const HycoSeedFields[HYCO_N_SEEDS] = {"U", "sigma", "force", "lambda", "inelastic", "spring"};
 
+/* The samples whose solutions are the columns of snapshot matrices; a path has several columns. */
 PetscErrorCode HycoReducerSetColumns(HycoReducer t, HycoSamples columns)
 {
   PetscFunctionBegin;
@@ -108,6 +109,8 @@ PetscErrorCode HycoReducerReadField(HycoReducer t, HycoSnapshots store, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Q-DEIM chooses its points by a pivoted QR of V^T: independent of the order of the modes, and with a better bound
+   of the interpolation error (Drmac, Gugercin 2016) than the greedy choice of DEIM. */
 static PetscErrorCode Points(HycoReducer t, Mat V, PetscInt index[])
 {
   PetscFunctionBegin;
@@ -229,6 +232,8 @@ static PetscErrorCode PODRank(HycoReducer t, PetscInt n_sigma, const PetscReal s
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A mode of a small path matters as much as one of a large path, since errors are relative to each path; hence the
+   factor. */
 PetscReal HycoPathScale(PetscReal first, PetscReal largest)
 {
   const PetscReal slight = 1e-3; /* paths with smaller relative displacements may be noise */

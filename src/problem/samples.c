@@ -12,6 +12,7 @@ struct _p_HycoSamples {
   PetscReal *mu; /* n x n_parameters */
 };
 
+/* Keeps a reference to the scene, whose ranges the sets of points need at each call. */
 PetscErrorCode HycoSamplesCreate(HycoScene scene, HycoSamples *samples)
 {
   PetscFunctionBegin;
@@ -125,6 +126,8 @@ static PetscErrorCode AddGrid(HycoSamples s, const PetscInt counts[], PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A closed grid has the ends of the ranges, and thus at least 2 points for each parameter; a centred one begins
+   half a step inside, and may have a single one. */
 PetscErrorCode HycoSamplesAddGrid(HycoSamples s, const PetscInt counts[], PetscBool closed)
 {
   PetscFunctionBegin;
@@ -140,6 +143,8 @@ PetscErrorCode HycoSamplesAddTrainingGrid(HycoSamples s, const PetscInt counts[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For interpolation by polynomials: equidistant nodes have Lebesgue constants that grow exponentially with their
+   number, Chebyshev's only logarithmically. */
 PetscErrorCode HycoSamplesAddChebyshev(HycoSamples s, const PetscInt counts[])
 {
   PetscReal *values[HYCO_MAX_PARAMETERS];

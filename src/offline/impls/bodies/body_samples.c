@@ -72,6 +72,7 @@ static PetscErrorCode SetGrid(HycoReducer t, HycoSubstructures b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* k counts the nodes of the tensor grid, the last parameter fastest. */
 void HycoBodiesPoint(HycoReducer t, PetscInt k, PetscReal theta[])
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;

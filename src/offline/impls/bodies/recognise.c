@@ -443,6 +443,7 @@ PetscInt HycoBodyPartsShapes(const HycoBodyParts *parts, PetscInt b, PetscInt pa
   return n;
 }
 
+/* The first body that no model of bodies can represent, for the message; -1: none. */
 PetscInt HycoBodyPartsFail(const HycoBodyParts *parts)
 {
   for (PetscInt k = 0; k < parts->n; k++) {

@@ -153,6 +153,7 @@ static PetscErrorCode ReadTerms(HycoH5 h, const char model[], const char path[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Terms in double precision, of symmetric matrices the entries of one triangle. */
 static PetscErrorCode WriteTerms(HycoH5 h, const char path[], const HycoFlexibility *C)
 {
   const size_t length = (size_t)C->n * (size_t)(C->n + 1) / 2;
@@ -167,6 +168,8 @@ static PetscErrorCode WriteTerms(HycoH5 h, const char path[], const HycoFlexibil
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Terms in single precision apart, as float in the file too: they are most of it, and a load reads them as they
+   are used. */
 static PetscErrorCode WriteShortTerms(HycoH5 h, const char path[], const HycoFlexibility *C)
 {
   const size_t length = (size_t)C->n * (size_t)(C->n + 1) / 2;

@@ -198,6 +198,9 @@ static PetscErrorCode Measure(HycoBodiesFriction f, const PetscReal L[], HycoKKT
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The start is the accepted forces of the last step, not those of an attempt: a halved step must give what it
+   would have given at once. Displacements follow from the forces by the bodies' flexibilities, and the residuals
+   from both, not from the solver's word. */
 PetscErrorCode HycoBodiesFrictionSolve(HycoBodiesFriction f, HycoBodiesWork o, PetscReal t, HycoKKT *kkt, PetscInt *its,
                                        PetscBool *solved)
 {
@@ -246,6 +249,7 @@ PetscErrorCode HycoBodiesFrictionAccept(HycoBodiesFriction f, PetscReal t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Back to the accepted forces after a refused step; displacements of the bodies are made from them. */
 void HycoBodiesFrictionRestore(HycoBodiesFriction f, HycoBodiesWork o)
 {
   PetscScalar *L;

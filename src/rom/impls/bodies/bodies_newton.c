@@ -233,7 +233,7 @@ static PetscErrorCode FactorAll(HycoROM m, PetscBool *independent)
     for (PetscInt i = 0; i < n; i++) w->U[k * n + i] = i <= k ? SetEntry(w, p, w->set[k], w->set[i]) : 0;
   }
   PetscCall(PetscBLASIntCast(n, &nb));
-  /* Only the upper triangle is filled; zeros below let FactorEach() share the layout. */
+  /* By columns, the upper triangle: potrf and trsm read nothing below it. */
   if (n) LAPACKpotrf_("U", &nb, w->U, &nb, &info);
   *independent = (PetscBool)!info;
   for (PetscInt k = 0; k < n && *independent; k++) {

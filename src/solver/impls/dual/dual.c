@@ -44,7 +44,8 @@ static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The analysis stays for the factorisation. */
+/* By the symbolic analysis of [K B^T; B 0], which the factorisation reuses. The pins come
+   before it, because they change the matrix that is analysed. */
 static PetscErrorCode EstimateFactor(HycoSolver s, HycoSolverForm form, PetscReal *bytes)
 {
   HycoStiffness *f = &s->stiffness;
@@ -54,8 +55,7 @@ static PetscErrorCode EstimateFactor(HycoSolver s, HycoSolverForm form, PetscRea
   (void)form;
   if (!f->direct) PetscCall(HycoDirectCreate(HycoComm(s), &f->direct));
   PetscCall(HycoDirectPinKernel(f->direct, y->K));
-  PetscCall(
-      HycoDirectAnalyse(f->direct, y->K, y->Bt, y->B, y->symmetric, bytes)); /* the factorisation reuses the analysis */
+  PetscCall(HycoDirectAnalyse(f->direct, y->K, y->Bt, y->B, y->symmetric, bytes));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -121,8 +121,10 @@ static PetscErrorCode FreeGap(HycoSolver s, const Dual *d, Vec x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the contacts of the last solution's set prevent all motions that the supports leave. They may have no master any
-   more, where contacts travel. By the pivots of G^T G against those of all contacts. */
+/* Whether the contacts of the last solution's set prevent all motions that the supports leave: where contacts travel,
+   some may have no master any more, and a start from such a set would be singular. G, the rows of the motions, stands
+   in the first p columns of S. By Cholesky's pivots of G^T G over the set, relative to the motions' squared lengths over
+   all contacts, which have the same unit. */
 static PetscErrorCode Holds(const Dual *d, PetscBool *holds)
 {
   const size_t n = (size_t)(d->p + d->m), p = (size_t)d->p;
@@ -171,14 +173,16 @@ static PetscErrorCode SolveForces(HycoSolver s, Dual *d, Vec start, PetscBool *s
   /* At each attempt: a fallback uses another method with the same object. */
   PetscCall(HycoTaoSetType(d->tao, s->now.type, s->max_its));
   if (s->system->blocks) PetscCall(HycoBlocksGather(HycoComm(s), s->system->blocks, &blocks));
-  if (blocks)
-    PetscCall(PetscArrayzero(d->L, d->p)); /* the path decides between several solutions: by its last forces */
+  /* With friction a step may have several solutions: the path decides between them by its last forces. The unknowns
+     of rigid motions begin at 0. */
+  if (blocks) PetscCall(PetscArrayzero(d->L, d->p));
   if (blocks) PetscCall(HycoVecGather(start, d->L + d->p));
   if (blocks && !d->cone) PetscCall(HycoConeFactorCreate(&d->cone));
   if (blocks && s->other && !d->p && !s->falling_back) {
     PetscCall(PetscMalloc1(d->m + 1, &other));
     PetscCall(HycoVecGather(s->other, other));
   }
+  /* Borrowed until the problem is solved; NULL: the only starts are the last forces and those of the method. */
   lcp.other = other;
   lcp.blocks = blocks;
   lcp.cone = d->cone;
@@ -412,6 +416,8 @@ void HycoSolverGetCondensed(HycoSolver s, PetscInt *m, PetscInt *p, const PetscR
   *S = d->S;
 }
 
+/* The last dense problem and its solution z, with the p unknowns of motions first. Borrowed until the next solve;
+   the blocks are set by the caller. */
 void HycoSolverGetDense(HycoSolver s, HycoLCP *lcp, const PetscReal *z[])
 {
   const Dual *d = (const Dual *)HycoSolverFindForm(s, "dual")->data;
