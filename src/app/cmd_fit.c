@@ -105,6 +105,7 @@ static PetscErrorCode ReadTargets(Fit *f)
     PetscCall(PetscSNPrintf(path, sizeof(path), "path_%s", names[q]));
     PetscCall(ReadTarget(f, n + q, path));
   }
+  /* All outputs may be targets twice for a path: at its last time, and over its times. */
   f->n_all = n;
   HycoCheck(n, "the model has no outputs to fit; train it on a scene with an entry output");
   PetscCall(CheckTargets(list));

@@ -102,8 +102,10 @@ void DriverWantsFullOrder(const Fallback *f, const HycoPrediction *p, char why[D
   else if (p->unseen > HYCO_UNSEEN)
     snprintf(why, DRIVER_LINE, "the %s is %.2g times that at any held-out point", HycoFeatureNames[p->unseen_feature],
              (double)p->unseen);
+  /* What precedes needs no target: such predictions are wrong by any measure. */
   else if (!(f->target_u > 0) && !(f->target_lambda > 0))
     return;
+  /* Negative: no estimate. A target cannot be promised without one. */
   else if ((f->target_u > 0 && p->estimated_error_u < 0) || (f->target_lambda > 0 && p->estimated_error_lambda < 0))
     snprintf(why, DRIVER_LINE, "the model does not estimate its error of %s",
              f->target_u > 0 && p->estimated_error_u < 0 ? "u" : "the contact forces");

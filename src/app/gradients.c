@@ -52,6 +52,7 @@ static PetscErrorCode ReportPath(cJSON *json, cJSON *kinks, HycoScene scene, con
       if (g->path_kink[at]) AddKink(kinks, name, names[p], NULL);
       for (PetscInt k = 0; k < g->n_times; k++) {
         cJSON_AddItemToArray(each, cJSON_CreateNumber(g->times[k * n + at]));
+        /* A kink at the last time is that of `gradient`, and listed with it. */
         if (g->times_kink[k * n + at] && k < g->n_times - 1) AddKink(kinks, outputs[q], names[p], &t[k]);
       }
     }

@@ -185,6 +185,7 @@ static PetscErrorCode Show(const Newton *h, const PetscReal z[], PetscInt change
   for (PetscInt k = 0; k < h->blocks->n; k++) {
     PetscBool any = PETSC_FALSE;
 
+    /* Exactly 0: P gives an open contact no force at all. */
     for (PetscInt i = h->blocks->row[k]; i < h->blocks->row[k + 1]; i++) any = (PetscBool)(any || z[i] != 0);
     n_active += any;
   }
@@ -640,6 +641,7 @@ static PetscErrorCode Release(HycoConeFactor f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* NULL-safe, as paths without friction have none. */
 PetscErrorCode HycoConeFactorDestroy(HycoConeFactor *factor)
 {
   PetscFunctionBegin;

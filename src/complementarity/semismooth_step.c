@@ -14,12 +14,15 @@
 PetscErrorCode HycoConeStepCreate(PetscInt p, const HycoBlocks *blocks, const PetscReal rho[], HycoConeStep *t)
 {
   const PetscInt n = p + blocks->row[blocks->n];
+  /* Updates of low rank have at most so many columns; a step with more factors anew. */
   const size_t most = HYCO_CONE_CHANGES;
 
   PetscFunctionBegin;
   *t = (HycoConeStep){.n = n, .p = p, .blocks = blocks, .rho = rho};
   PetscCall(PetscCalloc4((size_t)blocks->n * HYCO_BLOCK + 1, &t->DP, (size_t)blocks->n * HYCO_BLOCK + 1, &t->base,
                          blocks->n + 1, &t->rank, blocks->n + 1, &t->base_rank));
+  /* A's unknowns are the ranks of the blocks' derivatives: open contacts have rank 0, slipping ones 1 (in 3D 2),
+     sticking ones all of their rows. The room is that of all contacts sticking. */
   PetscCall(
       PetscMalloc6(n, &t->left, n, &t->right, (size_t)n * (size_t)n, &t->A, n, &t->rhs, n, &t->product, n, &t->pivot));
   PetscCall(PetscMalloc4(n + 1, &t->changed, n + 1, &t->block, n + 1, &t->column, n + 1, &t->known));
@@ -28,6 +31,7 @@ PetscErrorCode HycoConeStepCreate(PetscInt p, const HycoBlocks *blocks, const Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* M, rho and the blocks are borrowed. Grouped as allocated. */
 PetscErrorCode HycoConeStepDestroy(HycoConeStep *t)
 {
   PetscFunctionBegin;

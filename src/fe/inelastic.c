@@ -733,6 +733,8 @@ PetscErrorCode HycoFEYields(HycoFE fe, PetscReal t, PetscBool *yields)
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(fe->n_dof, &u));
   PetscCall(PetscCalloc1(fe->n_dof, &f));
+  /* Strains far beyond any yield limit, without symmetry: no cell is left unstrained, and no random numbers are
+     used. */
   for (PetscInt i = 0; i < fe->n_dof; i++) u[i] = size * PetscSinReal(1.7 * i * i + i);
   PetscCall(HycoFEStateCreate(fe, &begin));
   PetscCall(HycoFEStateCreate(fe, &end));

@@ -265,7 +265,9 @@ PetscErrorCode HycoGradientOfPath(HycoScene scene, const PetscReal mu[], const H
   PetscFunctionBegin;
   PetscCall(HycoGradientCreate(scene, store, g));
   all = *g;
+  /* Each output at each listed time, and its extreme over them, as if they were outputs of their own. */
   all.n_outputs *= scene->n_times + 1;
+  /* At mu, and at the points of a difference with one closer step. */
   PetscCall(PetscCalloc1(6 * all.n_outputs + 1, &value));
   Gather(scene, step, value);
   for (PetscInt p = 0; p < g->n_parameters && !ierr; p++) {

@@ -177,6 +177,7 @@ PetscErrorCode HycoMaterialSetData(HycoMaterial material, void *data)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Of the law's own operations: the type of what is behind the pointer is known to them alone. */
 PetscErrorCode HycoMaterialGetData(HycoMaterial material, void *data)
 {
   PetscFunctionBegin;

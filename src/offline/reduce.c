@@ -74,6 +74,7 @@ PetscErrorCode HycoReducerMultiply(HycoReducer t, Mat X, Mat Y, PetscReal produc
   PetscFunctionBegin;
   PetscCall(MatTransposeMatMult(X, Y, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &P));
   if (HycoSize(HycoComm(t)) > 1)
+    /* Every rank has the same numbers afterwards, and takes the same decisions from them. */
     PetscCall(MatCreateRedundantMatrix(P, HycoSize(HycoComm(t)), PETSC_COMM_SELF, MAT_INITIAL_MATRIX, &whole));
   else {
     PetscCall(PetscObjectReference((PetscObject)P));

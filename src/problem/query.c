@@ -17,6 +17,8 @@ PetscErrorCode HycoSceneGetParameters(HycoScene scene, PetscInt *n, const char *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Outputs in the order of the entries, which is that of all arrays of their values. names: room for
+   HYCO_MAX_QUANTITIES, or NULL; borrowed. */
 PetscErrorCode HycoSceneGetQuantities(HycoScene scene, PetscInt *n, const char *names[HYCO_MAX_QUANTITIES])
 {
   PetscFunctionBegin;
@@ -177,6 +179,7 @@ PetscErrorCode HycoSceneFingerprint(HycoScene scene, unsigned long long *hash)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The entries as they were given, after options have replaced some: what a run used can be read off a model. */
 PetscErrorCode HycoSceneView(HycoScene scene, PetscViewer viewer)
 {
   PetscFunctionBegin;

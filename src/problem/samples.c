@@ -25,6 +25,7 @@ PetscErrorCode HycoSamplesCreate(HycoScene scene, HycoSamples *samples)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The scene lives on, if others refer to it. */
 PetscErrorCode HycoSamplesDestroy(HycoSamples *samples)
 {
   PetscFunctionBegin;
@@ -70,10 +71,12 @@ PetscErrorCode HycoSamplesAddProduct(HycoSamples s, const PetscInt counts[], con
   for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
     HycoCheck(counts[p] >= 1, "parameter %s has %d values; at least 1 is needed", s->scene->parameter[p],
               (int)counts[p]);
+    /* By a quotient: the product itself could exceed 32 bits. */
     HycoCheck(total <= 100000000 / counts[p], "the set has more than 100 million points; use fewer per parameter");
     total *= counts[p];
   }
   for (PetscInt k = 0; k < total; k++) {
+    /* k in a number system whose digits have the bases counts[p]. */
     PetscInt rest = k;
 
     for (PetscInt p = s->scene->n_parameters - 1; p >= 0; p--) {

@@ -343,7 +343,8 @@ PetscErrorCode HycoROMMeasurePath(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On request, as most predictions of a search need none. A path has measured its listed times before. */
+/* On request, as most predictions of a search need none. Of a path first each listed time, then the one that is
+   shown. */
 PetscErrorCode HycoROMMeasureQuantities(HycoROM m, HycoPrediction *out)
 {
   PetscFunctionBegin;

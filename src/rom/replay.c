@@ -61,6 +61,7 @@ PetscErrorCode HycoReplayEnd(HycoReplay *r)
 static HycoSeriesSource Look(const HycoReplay *r, PetscInt j)
 {
   HycoROM m = r->m;
+  /* On one process the whole mesh has the surfaces: one FE serves both. */
   const HycoSeriesSource from = {.comm = PETSC_COMM_SELF,
                                  .fe = m->fe_whole,
                                  .state = r->march.state,

@@ -259,6 +259,7 @@ static PetscErrorCode LoadOutputEstimates(HycoH5 h, HycoROM m)
     o->median = *at++;
     o->largest = *at++;
     for (PetscInt j = 0; j <= HYCO_ESTIMATE_FEATURES; j++) o->law[j] = *at++;
+    /* An estimate without held-out points or size cannot have been written. */
     good = (PetscBool)(good && (!o->has || (o->magnitude > 0 && t->n)));
   }
   PetscCall(PetscFree(numbers));

@@ -56,6 +56,7 @@ PetscErrorCode HycoBodiesFrictionCreate(HycoScene scene, const HycoBodiesSurface
   f = *friction;
   f->normal = *surface;
   PetscCall(HycoSlipCreate(PETSC_COMM_SELF, scene, surface->pairs, surface->fe->dim, &f->slip));
+  /* Rows of normals and tangents, whose number fixes the sizes below. */
   PetscCall(CreateRows(f));
   PetscCall(PetscCalloc1(surface->fe->n_dof, &f->U));
   PetscCall(PetscCalloc1(surface->fe->n_dof, &f->U_old));
@@ -85,6 +86,7 @@ PetscErrorCode HycoBodiesFrictionDestroy(HycoBodiesFriction *friction)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The surface with a row for each normal and tangent. Borrowed; the normal rows alone are those of the model. */
 const HycoBodiesSurface *HycoBodiesFrictionSurface(HycoBodiesFriction f)
 {
   return &f->all;
@@ -241,6 +243,7 @@ PetscErrorCode HycoBodiesFrictionAccept(HycoBodiesFriction f, PetscReal t)
   PetscFunctionBegin;
   PetscCall(VecGetArrayRead(f->L, &L));
   HycoSlipAdd(&f->slip, L, f->w, f->most);
+  /* The last two accepted forces, in this order: the next step extrapolates from them. */
   PetscCall(PetscArraycpy(f->before, f->forces, f->all.n));
   PetscCall(PetscArraycpy(f->forces, L, f->all.n));
   HycoSlipTake(&f->slip, t);
@@ -270,6 +273,7 @@ void HycoBodiesFrictionNormal(HycoBodiesFriction f, PetscReal Lambda[])
   PetscCallVoid(VecRestoreArrayRead(f->L, &L));
 }
 
+/* Borrowed, for outputs and fields: slip, states and work since the path began. */
 const HycoSlip *HycoBodiesFrictionSlip(HycoBodiesFriction f)
 {
   return &f->slip;

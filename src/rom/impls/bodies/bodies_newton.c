@@ -317,6 +317,7 @@ static PetscErrorCode TakeMotions(HycoBodiesPath w, PetscInt p)
   PetscFunctionBegin;
   w->loose = PETSC_FALSE;
   if (!p) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Their sizes follow the set. */
   HycoFreeAll(&w->Y, &w->H);
   PetscCall(PetscMalloc1(w->n_set * p + 1, &w->Y));
   PetscCall(PetscCalloc1(p * p, &w->H));
@@ -326,8 +327,10 @@ static PetscErrorCode TakeMotions(HycoBodiesPath w, PetscInt p)
     for (PetscInt d = 0; d < p * p; d++) w->H[d] += w->G[w->set[i] * p + d / p] * w->Y[i * p + d % p];
   }
   PetscCall(PetscBLASIntCast(p, &n));
+  /* Symmetric, so that by rows or by columns is the same. */
   LAPACKpotrf_("U", &n, w->H, &n, &info);
   for (PetscInt d = 0; d < p && !info; d++) info = !(PetscSqr(w->H[d * (p + 1)]) > DEPENDENT * w->H[0] * w->H[0]);
+  /* No error: the next set, or the contact problem, may hold the motion. */
   w->loose = (PetscBool)(info != 0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

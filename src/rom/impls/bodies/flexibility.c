@@ -47,6 +47,7 @@ static PetscErrorCode ChooseTerms(HycoFlexibility *f, PetscInt n_samples, const 
   PetscCall(PetscArrayzero(most, n_samples));
   Scales(f, n_samples, sample, scale);
   for (PetscInt u = 0; u < f->n && least > 0; u++) {
+    /* It moves in no sample, as where a support holds it. */
     if (!(scale[u] > 0)) continue;
     PetscCall(Transform(f->n, n_samples, Q, sample, u, X, columns));
     for (PetscInt t = 0; t < n_samples; t++) {
@@ -58,6 +59,8 @@ static PetscErrorCode ChooseTerms(HycoFlexibility *f, PetscInt n_samples, const 
   for (PetscInt t = 0; t < n_samples; t++) {
     PetscReal peak = 0;
 
+    /* The largest value of the polynomial at the nodes bounds what the term adds inside the ranges, up to the
+       small growth between them. */
     for (PetscInt s = 0; s < n_samples; s++) peak = PetscMax(peak, PetscAbsReal(Q[s * n_samples + t]));
     if (!t || peak * most[t] >= least) f->term[f->n_terms++] = t;
   }

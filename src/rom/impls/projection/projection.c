@@ -211,6 +211,7 @@ static PetscErrorCode Load(HycoROM m, HycoH5 h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Types with force vectors of their own, such as the cubature, destroy them through this too. */
 PetscErrorCode HycoProjectionDestroy(HycoROM m)
 {
   HycoProjectionModel p = (HycoProjectionModel)m->model->data;

@@ -136,6 +136,7 @@ static PetscErrorCode Holds(const Dual *d, PetscBool *holds)
   for (size_t i = p; i < n; i++) {
     const PetscReal *row = d->S + i * n;
 
+    /* The diagonal over all contacts: the scale of each motion, whose unit may be a length or an angle. */
     for (size_t k = 0; k < p; k++) all[k] += row[k] * row[k];
     for (size_t k = 0; k < p * p && d->active[i - p]; k++) gram[k] += row[k / p] * row[k % p];
   }
@@ -269,6 +270,7 @@ static PetscErrorCode Shift(HycoSolver s, const PetscReal dL[], Vec x, Vec L)
   HycoVecDuplicate(x, &force, &move);
   PetscCall(VecGetOwnershipRange(L, &lo, &hi));
   PetscCall(HycoVecWrite(change, hi - lo, dL + lo));
+  /* With the factor that is there: one back and forward substitution. */
   PetscCall(MatMult(s->system->Bt, change, force));
   /* x follows the forces: dx = -K^-1 Bt dL. */
   PetscCall(HycoStiffnessSolve(s, force, move));
@@ -291,6 +293,7 @@ static PetscErrorCode CloseGaps(HycoSolver s, const Dual *d, Vec x, Vec L)
   PetscFunctionBegin;
   PetscCall(VecDuplicate(y->D, &gap));
   PetscCall(MatMult(y->B, x, gap));
+  /* Of B x itself: gaps are judged relative to the displacements that cancel in them. */
   PetscCall(VecNorm(gap, NORM_INFINITY, &size));
   PetscCall(VecAYPX(gap, -1, y->D));
   PetscCall(HycoVecGather(gap, d->g));
