@@ -169,6 +169,8 @@ PetscErrorCode DriverReadMonitor(PetscBool *monitor)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One line per iteration of each contact problem; of a path there are as many problems as iterations of Newton's
+   method. */
 PetscErrorCode DriverMonitor(PetscInt iteration, PetscInt n_active, PetscInt changes, void *ctx)
 {
   PetscFunctionBegin;

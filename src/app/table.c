@@ -28,6 +28,7 @@ PetscErrorCode DriverRowsAdd(DriverRows *rows, PetscInt first, PetscInt n, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Pieces are allocated as rows come, since a queue gives a rank an unknown number of points. */
 PetscErrorCode DriverRowsFree(DriverRows *rows)
 {
   PetscFunctionBegin;

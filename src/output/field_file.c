@@ -291,6 +291,7 @@ PetscErrorCode HycoFieldFileBeginPoint(HycoFieldFile f, const PetscReal X[], con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* n counts times that are complete, and names the next step. */
 PetscErrorCode HycoFieldFileEndTime(HycoFieldFile f)
 {
   PetscFunctionBegin;
