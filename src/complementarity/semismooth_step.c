@@ -525,8 +525,8 @@ static PetscErrorCode Prepare(HycoConeStep *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The states of the last step become the base of the factor, in place of low-rank changes whose round-off adds up.
-   */
+/* A factor of the present J itself, in place of a former one with changes of low rank: for a step that did not
+   lower the residual, which round-off of the update may be the cause of. */
 PetscErrorCode HycoConeStepRenew(HycoConeStep *t)
 {
   PetscFunctionBegin;

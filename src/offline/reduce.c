@@ -110,8 +110,8 @@ PetscErrorCode HycoReducerReadField(HycoReducer t, HycoSnapshots store, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Q-DEIM chooses its points by a pivoted QR of V^T: independent of the order of the modes, and with a better bound
-   of the interpolation error (Drmac, Gugercin 2016) than the greedy choice of DEIM. */
+/* Q-DEIM chooses its points by a pivoted QR of V^T, which depends on the space of the modes and not on their
+   order, with a better bound of the interpolation error than the greedy choice of DEIM (Drmac, Gugercin 2016). */
 static PetscErrorCode Points(HycoReducer t, Mat V, PetscInt index[])
 {
   PetscFunctionBegin;

@@ -169,8 +169,8 @@ static PetscErrorCode WriteTerms(HycoH5 h, const char path[], const HycoFlexibil
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Terms in single precision apart, as float in the file too: they are most of it, and a load reads them as they
-   are used. */
+/* Terms in single precision apart, as float in the file too: most of a model's size is theirs, and a double would
+   not make them more accurate. */
 static PetscErrorCode WriteShortTerms(HycoH5 h, const char path[], const HycoFlexibility *C)
 {
   const size_t length = (size_t)C->n * (size_t)(C->n + 1) / 2;

@@ -140,7 +140,7 @@ static size_t At(const HycoFlexibility *f, PetscInt terms, PetscInt t, PetscInt 
   return ((size_t)unknown * (size_t)terms + (size_t)t) * (size_t)f->n;
 }
 
-/* Of term t, in the file's and the trainings' loops over single entries. Predictions use whole columns instead. */
+/* Of term t, for loops over single entries, as those of a file. Predictions use whole columns instead. */
 PetscReal HycoFlexibilityEntry(const HycoFlexibility *f, PetscInt t, PetscInt unknown, PetscInt i)
 {
   if (t < f->n_wide) return f->wide[At(f, f->n_wide, t, unknown) + (size_t)i];
