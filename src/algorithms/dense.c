@@ -54,6 +54,7 @@ PetscErrorCode HycoPseudoInverse(PetscInt m, PetscInt n, const PetscReal A[], Pe
   LAPACKgesvd_("S", "S", &mb, &nb, copy, &mb, s, U, &mb, Vt, &kb, work, &lwork, &info);
   PetscCheck(info == 0, PETSC_COMM_SELF, PETSC_ERR_LIB, "singular values did not converge (LAPACK gesvd: %d)",
              (int)info);
+  /* Dropped: directions in which A maps to round-off; their inverse would be noise. */
   for (PetscInt r = 0; r < k && s[r] > tol * s[0]; r++) {
     for (PetscInt j = 0; j < m; j++) {
       for (PetscInt i = 0; i < n; i++) P[j * n + i] += Vt[i * k + r] * U[r * m + j] / s[r];
@@ -94,6 +95,8 @@ static PetscReal LargestOfSquare(PetscBLASInt n, const PetscReal A[], const Pets
   const PetscReal unit = 1, zero = 0;
   PetscReal value = 0;
 
+  /* No symmetry, so that it is not orthogonal to the vector that is looked for, and no random numbers: the same on
+     any machine. */
   for (PetscInt i = 0; i < n; i++) x[i] = 1 + 0.5 * PetscSinReal((PetscReal)(i + 1));
   for (PetscInt it = 0; it < 200; it++) {
     PetscReal before = value, size = 0;
@@ -104,6 +107,7 @@ static PetscReal LargestOfSquare(PetscBLASInt n, const PetscReal A[], const Pets
     if (!(size > 0) || PetscIsInfOrNanReal(size)) return size;
     for (PetscInt i = 0; i < n; i++) x[i] /= size;
     if (LU) {
+      /* (A^T A)^-1 = A^-1 A^-T. */
       LAPACKgetrs_("T", &n, &one, LU, &n, ipiv, x, &n, &info);
       LAPACKgetrs_("N", &n, &one, LU, &n, ipiv, x, &n, &info);
     } else {
@@ -135,6 +139,8 @@ PetscErrorCode HycoSingularity(PetscInt n, const PetscReal A[], PetscInt *sign, 
   for (PetscInt i = 0; i < n; i++) {
     const PetscReal u = LU[(size_t)i * (size_t)n + (size_t)i];
 
+    /* det A is the product of the pivots, with a change of sign for each exchange of rows. The product itself
+       would overflow. */
     *sign *= (u > 0) - (u < 0);
     if (ipiv[i] != i + 1) *sign = -*sign;
   }
@@ -142,6 +148,7 @@ PetscErrorCode HycoSingularity(PetscInt n, const PetscReal A[], PetscInt *sign, 
     large = LargestOfSquare(nb, A, NULL, NULL, x, y);
     inverse = LargestOfSquare(nb, A, LU, ipiv, x, y);
     if (large > 0 && inverse > 0 && !PetscIsInfOrNanReal(inverse))
+      /* Two roots: the product of the squares may overflow. */
       *ratio = 1 / PetscSqrtReal(large) / PetscSqrtReal(inverse);
   }
   PetscCall(PetscFree4(LU, x, y, ipiv));

@@ -146,6 +146,7 @@ static PetscErrorCode TakeSimplices(HycoInterpolant it, qhT *qh)
   PetscCall(PetscMalloc2(n * (it->dim + 1), &it->simplex, n * it->dim * it->dim, &it->inverse));
   FORALLfacets
   {
+    /* At most 8 parameters, hence 9 corners of a simplex. */
     PetscInt vertex[9], m = 0;
 
     if (facet->upperdelaunay) continue;
@@ -155,6 +156,7 @@ static PetscErrorCode TakeSimplices(HycoInterpolant it, qhT *qh)
 
       if (m <= it->dim && id >= 0 && id < it->n) vertex[m++] = id;
     }
+    /* Sorted, so that barycentric weights are summed in the same order on every machine. */
     PetscCall(PetscSortInt(m, vertex));
     if (m == it->dim + 1) PetscCall(AddSimplex(it, vertex));
   }
@@ -238,6 +240,7 @@ static void GridWeights(HycoInterpolant it, const PetscReal x[], PetscReal weigh
 
   for (PetscInt p = 0; p < it->dim; p++) {
     place[p] = Place(it->count[p], it->axis[p], x[p], &t[p]);
+    /* The upper node of an interval is the lower one of the next, also at the end of the axis. */
     if (t[p] == 1) {
       place[p]++;
       t[p] = 0;

@@ -20,6 +20,7 @@ static PetscBool Append(Passive *f, const PetscReal A[], const PetscReal b[], Pe
     before += q[i] * q[i];
   }
   for (PetscInt c = 0; c < k; c++) r[c] = 0;
+  /* Twice is enough (Kahan, Parlett): the second pass removes what cancellation left in the first. */
   for (PetscInt pass = 0; pass < 2; pass++) {
     for (PetscInt c = 0; c < k; c++) {
       const PetscReal *other = f->Q + (size_t)c * (size_t)m;
@@ -31,6 +32,7 @@ static PetscBool Append(Passive *f, const PetscReal A[], const PetscReal b[], Pe
     }
   }
   for (PetscInt i = 0; i < m; i++) after += q[i] * q[i];
+  /* Also false for NaN, which must not enter the set. */
   if (!(after > 1e-24 * before)) return PETSC_FALSE;
   r[k] = PetscSqrtReal(after);
   f->y[k] = 0;
@@ -113,6 +115,8 @@ static void Gradient(const Passive *f, const PetscReal A[], const PetscReal b[],
   }
 }
 
+/* Lawson and Hanson's active set (1974), which ends after finitely many steps at a point that satisfies the KKT
+   conditions. By columns; A and b are not changed. */
 PetscErrorCode HycoNNLS(PetscInt m, PetscInt n, const PetscReal A[], const PetscReal b[], PetscReal x[],
                         PetscReal *residual)
 {

@@ -46,6 +46,8 @@ static PetscReal ProjectedNorm(PetscInt n, const PetscReal gradient[], const Pet
   return PetscSqrtReal(sum);
 }
 
+/* Of |S - W H|^2 / 2 in one factor: (W^T W) H - W^T S. Both products are made once for a half step, so that an
+   inner iteration costs k^2 n. */
 static PetscErrorCode Gradient(const Half *h, const PetscReal X[])
 {
   PetscFunctionBegin;
@@ -137,6 +139,8 @@ static PetscErrorCode Start(PetscInt m, PetscInt n, const PetscReal S[], PetscIn
              "the singular value decomposition did not converge (LAPACK gesvd: %d)", (int)info);
   PetscCall(PetscArrayzero(Wt, k * m));
   PetscCall(PetscArrayzero(H, k * n));
+  /* Each singular pair is split into its positive and negative parts; the larger of the two products is the best
+     nonnegative approximation of rank 1 of the pair. */
   for (PetscInt c = 0; c < PetscMin(k, r) && s[c] > 1e-12 * s[0]; c++) {
     const PetscReal *u = U + c * m, *v = Vt + c;
     PetscReal sign, size, length_u, length_v;
@@ -231,6 +235,7 @@ PetscErrorCode HycoNNMF(PetscInt m, PetscInt n, const PetscReal S[], PetscInt k,
   if (norm == 0) PetscFunctionReturn(PETSC_SUCCESS);
   norm = PetscSqrtReal(norm);
   PetscCall(PetscMalloc4(m * n, &scaled, k * m, &Wt, k * n, &H, k * k + 5 * k * PetscMax(m, n), &room));
+  /* ROUND_OFF is absolute, while forces may have any unit. */
   for (PetscInt i = 0; i < m * n; i++) scaled[i] = S[i] / norm;
   PetscCall(Start(m, n, scaled, k, Wt, H));
   PetscCall(Alternate(m, n, k, scaled, max_its, Wt, H, room));
@@ -240,6 +245,7 @@ PetscErrorCode HycoNNMF(PetscInt m, PetscInt n, const PetscReal S[], PetscInt k,
 
     for (PetscInt i = 0; i < m; i++) length += Wt[i * k + c] * Wt[i * k + c];
     for (PetscInt j = 0; j < n; j++) use += H[j * k + c] * H[j * k + c];
+    /* A vector that no snapshot uses would be an unknown without effect. */
     if (!(length * use > 0)) continue;
     for (PetscInt i = 0; i < m; i++) W[*n_vectors * m + i] = Wt[i * k + c] / PetscSqrtReal(length);
     (*n_vectors)++;

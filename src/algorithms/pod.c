@@ -56,6 +56,8 @@ static PetscErrorCode FixSigns(Mat V, PetscInt l)
     PetscInt at = PETSC_MAX_INT, first;
     PetscScalar *column = v + (size_t)j * (size_t)lda;
 
+    /* The largest magnitude of all ranks first, then the first row that reaches it, so that round-off between
+       equal entries of a symmetric mode does not decide. */
     for (PetscInt i = 0; i < hi - lo; i++) largest = PetscMax(largest, PetscAbsScalar(column[i]));
     PetscCallMPI(MPI_Allreduce(&largest, &all, 1, MPIU_REAL, MPI_MAX, comm));
     for (PetscInt i = hi - lo - 1; i >= 0; i--) {
@@ -63,6 +65,7 @@ static PetscErrorCode FixSigns(Mat V, PetscInt l)
     }
     PetscCallMPI(MPI_Allreduce(&at, &first, 1, MPIU_INT, MPI_MIN, comm));
     if (at == first && at != PETSC_MAX_INT) sign = column[at - lo] < 0 ? -1 : 1;
+    /* Only the owner of this row has a sign; the sum broadcasts it. */
     PetscCallMPI(MPI_Allreduce(&sign, &sum, 1, MPIU_REAL, MPI_SUM, comm));
     for (PetscInt i = 0; sum < 0 && i < hi - lo; i++) column[i] = -column[i];
   }
@@ -128,6 +131,7 @@ static PetscErrorCode CountAccurate(Mat S, Mat V, PetscInt k, const PetscReal si
   PetscCall(PetscMalloc1(k, &stretch));
   PetscCall(PetscCalloc1(k, &skew));
   PetscCall(MatTransposeMatMult(S, V, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &product));
+  /* |S^T v_j| = sigma_j for an exact left singular vector. */
   PetscCall(MatGetColumnNorms(product, NORM_2, stretch));
   PetscCall(MatDestroy(&product));
   PetscCall(MatTransposeMatMult(V, V, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &product));
@@ -136,6 +140,7 @@ static PetscErrorCode CountAccurate(Mat S, Mat V, PetscInt k, const PetscReal si
   PetscCall(MatDenseGetArrayRead(product, &g));
   for (PetscInt j = 0; j < k; j++) {
     for (PetscInt i = lo; i < hi; i++) {
+      /* A pair counts against the later of the two: the first ones, of large singular values, stay usable. */
       PetscReal *worst = &skew[PetscMax(i, j)];
 
       *worst = PetscMax(*worst, PetscAbsScalar(g[j * lda + i - lo] - (i == j)));
@@ -147,6 +152,7 @@ static PetscErrorCode CountAccurate(Mat S, Mat V, PetscInt k, const PetscReal si
   for (*accurate = 0; *accurate < k; ++*accurate) {
     const PetscReal s = sigma[*accurate];
 
+    /* The first inaccurate mode ends the basis, since all after it have smaller singular values. */
     if (!(PetscAbsReal(stretch[*accurate] - s) <= ACCURATE * s && skew[*accurate] <= ORTHONORMAL)) break;
   }
   HycoFreeAll(&stretch, &skew);

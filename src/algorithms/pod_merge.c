@@ -23,6 +23,7 @@ static PetscErrorCode ScaleModes(Mat V, PetscInt l, const PetscReal sigma[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Without communication: both matrices have the same rows on each rank. */
 PetscErrorCode HycoCopyColumns(Mat X, PetscInt n, Mat Y, PetscInt at)
 {
   Mat from, to;
@@ -71,6 +72,8 @@ PetscErrorCode HycoPODMerge(SVD svd, PetscReal loss, Mat *merged, Mat *S)
   }
   PetscCall(MatGetSize(all, &N, &n));
   PetscCall(PetscMalloc1(n + 1, &sigma));
+  /* V Sigma instead of the snapshots: V Sigma has their singular values and left singular vectors, and as many
+     columns as are kept. */
   PetscCall(HycoPOD(svd, all, loss, 0, 0, &V, &l, sigma));
   PetscCall(MatDestroy(&all));
   if (l) PetscCall(ScaleModes(V, l, sigma));

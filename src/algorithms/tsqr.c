@@ -90,6 +90,7 @@ static PetscErrorCode MakeBasis(SVD svd, BV *Q)
   PetscCall(MatGetLocalSize(svd->A, &rows, NULL));
   PetscCallMPI(MPI_Allreduce(&rows, &least, 1, MPIU_INT, MPI_MIN, comm));
   if (least >= n) {
+    /* SLEPc's own basis, without a copy. The caller destroys *Q in both cases. */
     PetscCall(PetscObjectReference((PetscObject)svd->U));
     *Q = svd->U;
   } else {
@@ -163,6 +164,7 @@ static PetscErrorCode Solve(SVD svd)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A type of SLEPc's SVD, so that options, monitors and views are those of the others. */
 static PetscErrorCode Create(SVD svd)
 {
   PetscFunctionBegin;

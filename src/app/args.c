@@ -259,6 +259,7 @@ PetscErrorCode DriverReadFiles(char scene[], char model[], char output[], char r
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Options whose absence has no sensible default. Text is empty where an option is absent or has no value. */
 PetscErrorCode DriverRequire(const char name[], const char value[])
 {
   PetscFunctionBegin;

@@ -79,6 +79,8 @@ static PetscErrorCode Print(const HycoContactInspection *c)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Extremes over the points that were assembled: a contact may face its master at the centre and leave it at a
+   corner of the ranges. */
 PetscErrorCode CheckReportContacts(Check *check)
 {
   const PetscInt n_without = check->in.n_without;

@@ -81,6 +81,7 @@ static PetscErrorCode PrintPaths(Check *check, HycoSamples samples)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Estimates in order of magnitude, from the size of the factor; with -check_solve one solve was timed. */
 PetscErrorCode CheckReportCost(Check *check, HycoSamples samples, PetscBool solved)
 {
   const HycoInspection *in = &check->in;

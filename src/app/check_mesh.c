@@ -83,6 +83,8 @@ static PetscErrorCode PrintBody(Check *check, const HycoBodyInspection *b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Parts and doubled nodes are reported together: nodes at the same place that are not shared are the usual reason
+   why a body falls apart. */
 PetscErrorCode CheckReportBodies(Check *check)
 {
   cJSON *bodies = cJSON_AddArrayToObject(check->json, "bodies");

@@ -160,11 +160,13 @@ static PetscErrorCode CompareQueued(const Points *p, HycoFOM fom, PetscBool root
     PetscReal *v;
 
     PetscCall(HycoQueueTake(p->queue, &k));
+    /* The point before has been finished by taking the next one. */
     if (!first && HycoRank(PETSC_COMM_WORLD) == 0) {
       PetscCall(HycoQueueDone(p->queue, &n_done));
       PetscCall(DriverProgress(n_done, p->n, word));
     }
     if (k < 0) PetscFunctionReturn(PETSC_SUCCESS);
+    /* Rows of other groups stay 0 on this rank, so that a sum over the ranks collects the table. */
     v = root ? p->value + k * p->columns.n : unused;
     PetscCall(p->columns.paths ? ComparePath(fom, p->model, root, p->n_par, p->mu + k * p->n_par, &p->outputs,
                                              &p->columns, v, p->sliding)

@@ -32,6 +32,7 @@ typedef struct {
 } Settings;
 static const char *const types[] = {"brgn", "blmvm", NULL};
 
+/* Also called by DeclareFit(), so that help shows these texts and defaults. */
 static PetscErrorCode ReadSettings(Settings *s)
 {
   *s = (Settings){.samples = 64, .starts = 1};
@@ -104,6 +105,7 @@ static PetscErrorCode ReadTargets(Fit *f)
     PetscCall(PetscSNPrintf(path, sizeof(path), "path_%s", names[q]));
     PetscCall(ReadTarget(f, n + q, path));
   }
+  /* All outputs may be targets twice for a path: at its last time, and over its times. */
   f->n_all = n;
   HycoCheck(n, "the model has no outputs to fit; train it on a scene with an entry output");
   PetscCall(CheckTargets(list));
@@ -180,6 +182,8 @@ static PetscReal Mean(const Fit *f, const PetscReal value[])
   return PetscSqrtReal(sum / (PetscReal)f->n);
 }
 
+/* full: the outputs of the full-order solve at the answer, or NULL without -scene. f->output counts the outputs at
+   the last time first, then those over the path, hence the remainder. */
 static PetscErrorCode PrintAnswer(const Fit *f, const PetscReal full[], cJSON *json)
 {
   const char *names[HYCO_MAX_QUANTITIES];

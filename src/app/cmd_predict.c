@@ -652,6 +652,8 @@ static PetscErrorCode ReadExtrapolate(PetscBool *extrapolate)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Declare...() read every option once into variables that are not used: each option has one place in the code,
+   where it is read, and help shows what is read there. */
 PetscErrorCode DeclarePredict(PetscOptions options)
 {
   char path[PETSC_MAX_PATH_LEN];

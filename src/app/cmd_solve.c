@@ -210,6 +210,8 @@ static PetscErrorCode DestroyTable(Table *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The layout of a row: fixed columns, outputs of the scene, resultants of the contacts, derivatives. The same
+   order as the names in the table. */
 static PetscErrorCode FillRow(HycoFOM fom, const HycoSummary *s, const Table *t, PetscReal v[])
 {
   const HycoContactResult *carried;

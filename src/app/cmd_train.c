@@ -162,6 +162,8 @@ static PetscErrorCode ReadGreedy(PetscBool *greedy)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The same calls as in the run, with NULL in place of scene and objects: they declare and return. Options of the
+   classes are declared by HycoDeclareClasses(). */
 PetscErrorCode DeclareTrain(PetscOptions options)
 {
   GreedyLog log = {0};

@@ -12,6 +12,8 @@ PetscErrorCode DeclareView(PetscOptions options)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A model is loaded on rank 0 alone, where it is printed; a scene on all, because its check of the mesh is
+   collective. */
 PetscErrorCode CommandView(void)
 {
   char path[PETSC_MAX_PATH_LEN], file[PETSC_MAX_PATH_LEN];

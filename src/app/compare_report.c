@@ -160,6 +160,8 @@ static PetscErrorCode Sum(const DriverColumns *c, PetscInt n, const PetscReal va
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Mean and median of the speed-up: a single point with a new stiffness costs full order a factor, and dominates
+   the mean. */
 static PetscErrorCode ReportPoints(cJSON *json, PetscBool contact, const Totals *t)
 {
   PetscFunctionBegin;
@@ -179,6 +181,8 @@ static PetscErrorCode ReportPoints(cJSON *json, PetscBool contact, const Totals 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Seconds instead of a ratio for each path: the time steps of both are the same, so that the ratio of the means is
+   the speed-up. */
 static PetscErrorCode ReportPaths(cJSON *json, const Totals *t)
 {
   PetscFunctionBegin;

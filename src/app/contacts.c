@@ -2,6 +2,8 @@
 #include "driver.h"
 #include <math.h>
 
+/* Resultants on the slave's side; the master has the opposite ones. Moments are about the origin: in 2D the z
+   component alone, in 1D none. */
 PetscErrorCode DriverReportCarried(cJSON *json, PetscInt dim, PetscInt n, const HycoContactResult r[])
 {
   cJSON *all = cJSON_AddObjectToObject(json, "contacts");
@@ -68,6 +70,7 @@ static PetscInt List(PetscInt dim, const HycoContactResult *r, const char *name[
   return n;
 }
 
+/* Names only: a table needs them before there is a result. */
 PetscErrorCode DriverCarriedColumns(HycoScene scene, PetscInt dim, DriverCarried *columns)
 {
   const HycoContactResult none = {.name = NULL};

@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* One option for each kind of error; 0: no target. train and predict share the names, so that a model is judged
+   and used by the same number. */
 PetscErrorCode DriverReadTarget(HycoErrorKind kind, PetscReal *target)
 {
   static const char *const texts[HYCO_N_ERRORS] = {
@@ -100,8 +102,10 @@ void DriverWantsFullOrder(const Fallback *f, const HycoPrediction *p, char why[D
   else if (p->unseen > HYCO_UNSEEN)
     snprintf(why, DRIVER_LINE, "the %s is %.2g times that at any held-out point", HycoFeatureNames[p->unseen_feature],
              (double)p->unseen);
+  /* What precedes needs no target: such predictions are wrong by any measure. */
   else if (!(f->target_u > 0) && !(f->target_lambda > 0))
     return;
+  /* Negative: no estimate. A target cannot be promised without one. */
   else if ((f->target_u > 0 && p->estimated_error_u < 0) || (f->target_lambda > 0 && p->estimated_error_lambda < 0))
     snprintf(why, DRIVER_LINE, "the model does not estimate its error of %s",
              f->target_u > 0 && p->estimated_error_u < 0 ? "u" : "the contact forces");

@@ -52,6 +52,7 @@ static PetscErrorCode ReportPath(cJSON *json, cJSON *kinks, HycoScene scene, con
       if (g->path_kink[at]) AddKink(kinks, name, names[p], NULL);
       for (PetscInt k = 0; k < g->n_times; k++) {
         cJSON_AddItemToArray(each, cJSON_CreateNumber(g->times[k * n + at]));
+        /* A kink at the last time is that of `gradient`, and listed with it. */
         if (g->times_kink[k * n + at] && k < g->n_times - 1) AddKink(kinks, outputs[q], names[p], &t[k]);
       }
     }
@@ -59,6 +60,8 @@ static PetscErrorCode ReportPath(cJSON *json, cJSON *kinks, HycoScene scene, con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rows are outputs, columns parameters. A derivative at a kink is marked where it stands, and listed apart,
+   because a number alone does not show that it is one-sided. */
 PetscErrorCode DriverReportGradient(cJSON *json, HycoScene scene, const HycoGradient *g)
 {
   const char *outputs[HYCO_MAX_QUANTITIES];
@@ -111,6 +114,7 @@ PetscErrorCode DriverGradientColumns(HycoScene scene, DriverGradients *columns)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* All derivatives of a point, and last how many of them are one-sided. */
 void DriverGradientFill(const DriverGradients *columns, const HycoGradient *g, PetscReal v[])
 {
   if (!columns->n) return;

@@ -79,6 +79,7 @@ static size_t Begins(const char list[], const char name[])
   return longest;
 }
 
+/* Options without a subject of their own go to the last one. */
 static int SubjectOf(const char name[])
 {
   size_t longest = 0;

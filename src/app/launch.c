@@ -79,6 +79,8 @@ static void ChooseTemporary(void)
 #define STACK ((rlim_t)512 * 1024)
 #define USUAL ((rlim_t)8 * 1024 * 1024)
 
+/* Some batch systems set a small limit, and libraries then end in a segmentation fault without a line. Asked
+   before MPI starts, since a process that has called MPI_Init() cannot start itself again. */
 PetscBool DriverHasStack(char **argv)
 {
   struct rlimit limit;

@@ -217,6 +217,8 @@ static int Factors(const Command *command)
   return command->run == CommandSolve || command->run == CommandTrain || command->run == CommandCompare;
 }
 
+/* The order matters: help needs no MPI; kernels of BLAS and its threads are chosen before these libraries read the
+   environment; messages are kept only once PETSc is there to raise errors. */
 int main(int argc, char **argv)
 {
   PetscErrorCode ierr;

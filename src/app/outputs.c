@@ -70,6 +70,7 @@ static PetscErrorCode AddFields(const char path[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Beside the model by default: two models in one folder do not share solutions unless they are told to. */
 PetscErrorCode DriverSnapshotFolder(const char model[], char folder[PETSC_MAX_PATH_LEN])
 {
   PetscFunctionBegin;
@@ -166,6 +167,8 @@ static PetscErrorCode CheckPlace(const char name[], const char path[], HycoFileK
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Before anything is computed: folders that do not exist, files that cannot be written, names that are also
+   inputs. What is found here costs seconds, at the end hours. */
 static PetscErrorCode CheckFiles(PetscBool trains)
 {
   char path[PETSC_MAX_PATH_LEN];
@@ -184,6 +187,7 @@ static PetscErrorCode CheckFiles(PetscBool trains)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* On rank 0, whose line ends all ranks: other machines may not see the same folders. */
 PetscErrorCode DriverCheckOutputs(const Command *command)
 {
   PetscFunctionBegin;

@@ -192,6 +192,7 @@ static PetscErrorCode HasNamed(HycoScene scene, const char word[], const char pr
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* -mu or any -mu_NAME: whether a single point was asked for. The values are read and checked later. */
 PetscErrorCode DriverHasPoint(HycoScene scene, PetscBool *given)
 {
   PetscFunctionBegin;
@@ -240,6 +241,7 @@ static PetscErrorCode AddGrid(HycoScene scene, HycoSamples samples, const char n
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* scene = NULL only declares the option, for help. Candidates cost an indicator each, not a solve. */
 PetscErrorCode DriverGetTrainingGrid(HycoScene scene, HycoSamples *samples)
 {
   char text[PETSC_MAX_PATH_LEN];
@@ -254,6 +256,8 @@ PetscErrorCode DriverGetTrainingGrid(HycoScene scene, HycoSamples *samples)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The user's own held-out points; *samples = NULL: none are given, and the training scatters its own. With both
+   sets it would be unclear which one judges the model. */
 PetscErrorCode DriverGetValidation(HycoScene scene, HycoSamples *samples)
 {
   char grid[PETSC_MAX_PATH_LEN], points[PETSC_MAX_PATH_LEN];

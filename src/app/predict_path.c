@@ -35,6 +35,7 @@ PetscErrorCode DriverPrintReducedPath(HycoScene scene, const PetscReal mu[], con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Relative to the path's size, not to each time's: at vanishing loads the ratio would be one of round-off. */
 PetscErrorCode DriverPrintEquilibrium(const DriverReducedPath *path)
 {
   const HycoEquilibrium *e = &path->equilibrium;

@@ -139,6 +139,7 @@ PetscErrorCode DriverProgress(PetscInt done, PetscInt n, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The monitor that a training calls, with how many of n pieces of a phase are done. */
 PetscErrorCode DriverPhase(const char phase[], PetscInt done, PetscInt n, void *ctx)
 {
   char word[DRIVER_LINE];
@@ -168,6 +169,8 @@ PetscErrorCode DriverReadMonitor(PetscBool *monitor)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One line per iteration of each contact problem; of a path there are as many problems as iterations of Newton's
+   method. */
 PetscErrorCode DriverMonitor(PetscInt iteration, PetscInt n_active, PetscInt changes, void *ctx)
 {
   PetscFunctionBegin;

@@ -60,6 +60,8 @@ static void *Run(void *unused)
   return unused;
 }
 
+/* A thread, because factorisations and solves in libraries do not return for minutes: a file would get no line,
+   and a batch system might take the run for dead. Rank 0 alone prints. */
 void DriverProgressBegin(void)
 {
   if (HycoRank(PETSC_COMM_WORLD)) return;
@@ -68,6 +70,7 @@ void DriverProgressBegin(void)
                                                                                    progress */
 }
 
+/* Under the lock: the thread may be reading it. */
 void DriverProgressSetPeriod(PetscReal seconds)
 {
   pthread_mutex_lock(&progress.lock);

@@ -43,6 +43,8 @@ void ReportNumbers_Private(cJSON *json, PetscInt n, const ReportNumber number[])
   for (PetscInt k = 0; k < n; k++) cJSON_AddNumberToObject(json, number[k].name, number[k].value);
 }
 
+/* Above one facet the slave has passed its master: the pairing before any displacement, on which small sliding
+   rests, no longer holds. */
 PetscErrorCode DriverWarnSliding(PetscReal sliding)
 {
   PetscFunctionBegin;
@@ -78,6 +80,7 @@ PetscErrorCode ReportContacts(cJSON *json, PetscInt n_contacts, PetscInt n_facin
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* NaN is written as null by cJSON: an output without a value, as a model without reconstruction has it. */
 PetscErrorCode ReportQuantities(cJSON *json, HycoScene scene, const PetscReal value[])
 {
   const char *names[HYCO_MAX_QUANTITIES];
@@ -115,6 +118,7 @@ PetscErrorCode ReportColumns(HycoScene scene, PetscInt n, const char *const colu
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Relative residuals that were recomputed from K, B, F and D, not what the solver believes. */
 void ReportKKT(cJSON *json, const HycoKKT *kkt)
 {
   cJSON *object = cJSON_AddObjectToObject(json, "kkt");
@@ -131,6 +135,7 @@ void ReportSeconds(cJSON *json, const HycoSeconds *seconds)
                 {"solve", seconds->solve}, {"total", seconds->total});
 }
 
+/* Arrays have the scene's dimension or one moment in 2D: no component that is 0 by definition. */
 void ReportVector(cJSON *json, const char name[], PetscInt n, const PetscReal v[])
 {
   cJSON *array = cJSON_AddArrayToObject(json, name);
@@ -138,6 +143,7 @@ void ReportVector(cJSON *json, const char name[], PetscInt n, const PetscReal v[
   for (PetscInt k = 0; k < n; k++) cJSON_AddItemToArray(array, cJSON_CreateNumber(v[k]));
 }
 
+/* Under a temporary name until the close succeeds: a full disk leaves the old file. */
 PetscErrorCode DriverWriteText(const char path[], const char text[])
 {
   HycoFile out;
@@ -178,6 +184,8 @@ static void AddColumn(cJSON *json, const char name[], PetscInt n, PetscInt n_col
   }
 }
 
+/* Relative errors, in per cent on the screen and as shares in the report. Points where the error is x/0 are
+   counted and left out of the mean, which would otherwise be infinite. */
 void ReportError(cJSON *json, const char name[], PetscInt n, PetscInt n_columns, const PetscReal value[],
                  PetscInt column, PetscInt converged, PetscInt *all_undefined)
 {
@@ -189,6 +197,7 @@ void ReportError(cJSON *json, const char name[], PetscInt n, PetscInt n_columns,
     (void)!DriverPrint("  %-21s mean %9.4f %%   max %9.4f %%\n", name, 100 * (double)c.mean, 100 * (double)c.worst);
 }
 
+/* Absolute and in the unit of the output: an output may pass through 0, where a relative error means nothing. */
 void ReportOutputError(cJSON *json, const char name[], PetscInt n, PetscInt n_columns, const PetscReal value[],
                        PetscInt column, PetscInt converged)
 {

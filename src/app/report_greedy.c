@@ -43,6 +43,8 @@ PetscErrorCode DriverFormatPoint(HycoScene scene, const PetscReal mu[], char wor
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The order of the columns is part of the format; parameters stand in the middle, since their number depends on
+   the scene. */
 static PetscErrorCode BeginTable(GreedyLog *log)
 {
   PetscInt n;
@@ -144,6 +146,8 @@ PetscErrorCode DriverJudgeGreedy(const GreedyLog *log)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* max_eta is infinite where only the model has a contact force, or where a solve failed; `infinite` counts such
+   points. */
 void DriverReportGreedy(cJSON *json, const GreedyLog *log)
 {
   cJSON *greedy = cJSON_AddObjectToObject(json, "greedy");

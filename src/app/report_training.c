@@ -21,6 +21,7 @@ PetscErrorCode DriverReadBudget(PetscInt *budget)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A budget of added solutions has a meaning with targets only: without them nothing is added. */
 PetscErrorCode DriverReadTargets(Search *s)
 {
   PetscFunctionBegin;
@@ -89,6 +90,8 @@ static PetscErrorCode Append(Search *s, const char text[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The whole table is written after each attempt: a search may take hours, and what was tried so far is on disk if
+   it is killed. Quotes in a failure would end the field of a CSV reader. */
 static PetscErrorCode AppendRow(Search *s, const HycoAttempt *a)
 {
   char row[4 * DRIVER_LINE], number[32];
@@ -352,6 +355,7 @@ static void ReportOutputs(cJSON *held, const Search *s, const HycoTraining *t)
   }
 }
 
+/* Sections that do not apply are null or absent: 0 would read as an error of 0. */
 void DriverReportModel(cJSON *json, const Search *s, const HycoTraining *t)
 {
   const HycoAttempt *a = &t->chosen;

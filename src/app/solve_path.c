@@ -16,6 +16,8 @@ PetscErrorCode DriverMonitorStep(HycoFOM fom, const HycoStep *s, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The observed order of Newton's method is in the report because a wrong tangent still converges, only more
+   slowly: 2 is the evidence for a consistent one. */
 PetscErrorCode DriverReportHistory(cJSON *json, HycoScene scene, const HycoHistory *h)
 {
   cJSON *history = cJSON_AddObjectToObject(json, "history");
@@ -38,6 +40,7 @@ PetscErrorCode DriverReportHistory(cJSON *json, HycoScene scene, const HycoHisto
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Sums of counts and seconds, maxima of residuals and defects: one bad step must not vanish in a mean. */
 static PetscErrorCode PrintEnd(const HycoHistory *h)
 {
   PetscInt substeps = 0, iterations = 0, factors = 0, cuts = 0;

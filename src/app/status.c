@@ -5,6 +5,8 @@
 
 static cJSON *missed; /* messages of DriverMissed(), an array; NULL: none */
 
+/* No error: the model or prediction is written, and the exit status is 3. Collective, with the same text on all
+   ranks. */
 PetscErrorCode DriverMissed(const char format[], ...)
 {
   char text[DRIVER_LINE];
@@ -30,6 +32,7 @@ void DriverReportMissed(cJSON *json)
   if (missed) cJSON_AddItemToObject(json, "missed", cJSON_Duplicate(missed, cJSON_True));
 }
 
+/* An error outweighs a miss. */
 int DriverEndStatus(PetscErrorCode ierr)
 {
   const int status = ierr ? DRIVER_FAILED : missed ? DRIVER_MISSED : DRIVER_DONE;

@@ -80,6 +80,8 @@ static PetscReal ValueOf(const Column *c, const HycoStep *s)
   return c->kind == COUNT ? (PetscReal)n : n < 0 ? NAN : n == 0;
 }
 
+/* A line as soon as a listed time is reached: paths may take hours. The widths are those of usual values, so that
+   lines are aligned. */
 PetscErrorCode DriverPrintStep(const HycoStep *s, PetscInt n)
 {
   PetscFunctionBegin;
@@ -91,6 +93,8 @@ PetscErrorCode DriverPrintStep(const HycoStep *s, PetscInt n)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A warning, no error: closed contacts with dependent rows leave the nodal forces undetermined, while all that
+   follows from B^T L is unique. */
 PetscErrorCode DriverPrintDependent(PetscInt n_dependent, PetscInt n, const HycoStep step[])
 {
   const char *before = " at t =";
@@ -144,6 +148,8 @@ PetscErrorCode DriverWriteSteps(const char table[], HycoScene scene, const Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* An array for each column of a path's table. A column that this kind of path does not know is NaN at its first
+   time already, and is left out rather than filled with null. */
 PetscErrorCode DriverReportSteps(cJSON *history, HycoScene scene, PetscBool reduced, PetscInt n, const HycoStep step[])
 {
   const char *names[HYCO_MAX_QUANTITIES];

@@ -28,6 +28,7 @@ PetscErrorCode DriverRowsAdd(DriverRows *rows, PetscInt first, PetscInt n, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Pieces are allocated as rows come, since a queue gives a rank an unknown number of points. */
 PetscErrorCode DriverRowsFree(DriverRows *rows)
 {
   PetscFunctionBegin;
@@ -44,6 +45,7 @@ DriverRows DriverRowsOfRoot(PetscInt n, PetscInt width, PetscReal value[], Drive
   return (DriverRows){n, width, 1, piece};
 }
 
+/* Parameters with ten digits, because -points may read them back; results with eight. */
 static size_t FormatRow(const Table *t, PetscInt k, const PetscReal value[], char *text, size_t room)
 {
   const PetscInt width = t->rows->width;
@@ -151,6 +153,8 @@ static PetscErrorCode WriteColumn(HycoH5 file, const Table *t, PetscInt rounds, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A dataset for each column, in rounds of as many rows as a rank keeps in a piece. No rank holds the whole table.
+   */
 static PetscErrorCode WriteColumns(const char path[], const Table *t)
 {
   HycoH5 file;

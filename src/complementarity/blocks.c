@@ -86,6 +86,7 @@ PetscErrorCode HycoBlocksGather(MPI_Comm comm, const HycoBlocks *b, HycoBlocks *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* z = P(y) of block k, whose data (a coefficient of friction, for instance) belong to it and not to its cone. */
 PetscErrorCode HycoBlockProject(const HycoBlocks *b, PetscInt k, const PetscReal y[], PetscReal z[])
 {
   const HycoCone cone = b->cone[b->of[k]];

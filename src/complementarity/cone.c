@@ -117,6 +117,7 @@ static PetscErrorCode Derivative(HycoCone cone, const PetscReal data[], const Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The flag lets blocks that are all of this kind be treated as none, by the active set and TAO. */
 PetscErrorCode HycoConeCreate_Nonnegative(HycoCone cone)
 {
   const struct _HycoConeOps ops = {.project = Project, .derivative = Derivative};

@@ -63,6 +63,7 @@ static PetscErrorCode Freeze(HycoCone cone, const PetscReal data[], const PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Not nonnegative even where the coefficient is 0: the tangential rows then have the one admissible force 0. */
 PetscErrorCode HycoConeCreate_Coulomb(HycoCone cone)
 {
   const struct _HycoConeOps ops = {.project = Project, .derivative = Derivative, .freeze = Freeze};

@@ -66,6 +66,7 @@ static PetscErrorCode WriteMatrix(const File *f, const char group[], PetscInt m,
                                   const PetscInt column[], PetscReal sign)
 {
   const size_t size = (size_t)(f->lcp->p + f->lcp->n), room = (size_t)m * (size_t)n + 1;
+  /* nz = -1 marks compressed columns in CSparse's format, which FCLIB has taken over. */
   const PetscInt columns = -1;
   PetscInt *start, *i, count = 0;
   PetscReal *x;
@@ -123,6 +124,7 @@ static PetscErrorCode WriteProblem(const File *f)
   PetscCall(PetscMalloc2(lcp->p, &free, lcp->p, &s));
   for (PetscInt i = 0; i < lcp->p; i++) {
     free[i] = i;
+    /* As the equations: FCLIB's 0 = R l + V^T r + s. */
     s[i] = -lcp->q[i];
   }
   PetscCall(WriteMatrix(f, "fclib_local/V", f->m, f->row, lcp->p, free, 1));
@@ -142,6 +144,7 @@ static PetscErrorCode WritePoint(const File *f, const char group[], const PetscR
   PetscFunctionBegin;
   HycoDuplicate(n, lcp->q, &u);
   for (PetscInt j = 0; j < n; j++) {
+    /* u = q + W r + V l by columns, of which most are those of open contacts. */
     for (PetscInt i = 0; z[j] != 0 && i < n; i++) u[i] += lcp->M[(size_t)j * (size_t)n + (size_t)i] * z[j];
   }
   if (lcp->p) PetscCall(WriteReal(f, group, "l", lcp->p, z));
@@ -151,6 +154,8 @@ static PetscErrorCode WritePoint(const File *f, const char group[], const PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The solution is that of this program, for others to compare with. The guess is where the path came from: without
+   it a solver may find another of several solutions. */
 static PetscErrorCode WriteAll(const File *f, const PetscReal z[], const PetscReal start[])
 {
   const PetscInt one = 1;
@@ -163,6 +168,8 @@ static PetscErrorCode WriteAll(const File *f, const PetscReal z[], const PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* fclib_local knows no contact without tangents: those without friction get tangents with W = 0, hence m = dim
+   rows for each. The first error is returned, and the file is complete or absent. */
 PetscErrorCode HycoLCPWriteFclib(const HycoLCP *lcp, PetscInt dim, const PetscReal z[], const PetscReal start[],
                                  const char path[])
 {

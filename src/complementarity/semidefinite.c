@@ -101,6 +101,8 @@ static PetscErrorCode SolveByCholesky(Floating *h, PetscBool *solved)
   PetscCall(PetscBLASIntCast(p, &motions));
   PetscCall(PetscMalloc3((size_t)n * (size_t)n + 1, &S, n * (p + 1) + 1, &Y, p * (p + 1), &H));
   for (PetscInt j = 0; j < n; j++) {
+    /* S of the set, the rows of A^T beside it, and g as the last right-hand side: one triangular solve for all of
+       them. */
     const PetscReal *column = h->M + (size_t)h->a[p + j] * (size_t)h->n;
 
     for (PetscInt i = j; i < n; i++) S[(size_t)j * (size_t)n + (size_t)i] = column[h->a[p + i]];
@@ -112,6 +114,7 @@ static PetscErrorCode SolveByCholesky(Floating *h, PetscBool *solved)
     if (n) BLAStrsm_("L", "L", "N", "N", &size, &columns, &unit, S, &size, Y, &size);
     for (PetscInt i = 0; i < p; i++) {
       for (PetscInt j = 0; j <= p; j++) {
+        /* K' + A S^-1 A^T = K' + Y^T Y, and its right-hand side as the column p. As few as there are motions. */
         H[j * p + i] = j < p ? h->M[(size_t)j * (size_t)h->n + (size_t)i] : -h->q[i];
         for (PetscInt k = 0; k < n; k++) H[j * p + i] += Y[i * n + k] * Y[j * n + k];
       }
@@ -119,6 +122,7 @@ static PetscErrorCode SolveByCholesky(Floating *h, PetscBool *solved)
     PetscCall(Cholesky(p, H, solved));
   }
   if (*solved) {
+    /* In place: the last columns become the solutions. */
     PetscReal *x = H + p * p, *L = Y + p * n;
 
     BLAStrsm_("L", "L", "N", "N", &motions, &one, &unit, H, &motions, x, &motions);

@@ -185,6 +185,7 @@ static PetscErrorCode Show(const Newton *h, const PetscReal z[], PetscInt change
   for (PetscInt k = 0; k < h->blocks->n; k++) {
     PetscBool any = PETSC_FALSE;
 
+    /* Exactly 0: P gives an open contact no force at all. */
     for (PetscInt i = h->blocks->row[k]; i < h->blocks->row[k + 1]; i++) any = (PetscBool)(any || z[i] != 0);
     n_active += any;
   }
@@ -622,6 +623,7 @@ struct _n_HycoConeFactor {
   PetscReal *rho;
 };
 
+/* Empty: the first solve makes what it needs. A factor outlives the solves of a path. */
 PetscErrorCode HycoConeFactorCreate(HycoConeFactor *factor)
 {
   PetscFunctionBegin;
@@ -639,6 +641,7 @@ static PetscErrorCode Release(HycoConeFactor f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* NULL-safe, as paths without friction have none. */
 PetscErrorCode HycoConeFactorDestroy(HycoConeFactor *factor)
 {
   PetscFunctionBegin;
@@ -648,6 +651,8 @@ PetscErrorCode HycoConeFactorDestroy(HycoConeFactor *factor)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Without the matrix the next solve factors anew; the arrays stay. To be called when S changes in place, which a
+   pointer cannot show. NULL-safe. */
 void HycoConeFactorForget(HycoConeFactor f)
 {
   if (f && f->row) HycoConeStepSetMatrix(&f->step, NULL);

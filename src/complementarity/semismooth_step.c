@@ -14,12 +14,15 @@
 PetscErrorCode HycoConeStepCreate(PetscInt p, const HycoBlocks *blocks, const PetscReal rho[], HycoConeStep *t)
 {
   const PetscInt n = p + blocks->row[blocks->n];
+  /* Updates of low rank have at most so many columns; a step with more factors anew. */
   const size_t most = HYCO_CONE_CHANGES;
 
   PetscFunctionBegin;
   *t = (HycoConeStep){.n = n, .p = p, .blocks = blocks, .rho = rho};
   PetscCall(PetscCalloc4((size_t)blocks->n * HYCO_BLOCK + 1, &t->DP, (size_t)blocks->n * HYCO_BLOCK + 1, &t->base,
                          blocks->n + 1, &t->rank, blocks->n + 1, &t->base_rank));
+  /* A's unknowns are the ranks of the blocks' derivatives: open contacts have rank 0, slipping ones 1 (in 3D 2),
+     sticking ones all of their rows. The room is that of all contacts sticking. */
   PetscCall(
       PetscMalloc6(n, &t->left, n, &t->right, (size_t)n * (size_t)n, &t->A, n, &t->rhs, n, &t->product, n, &t->pivot));
   PetscCall(PetscMalloc4(n + 1, &t->changed, n + 1, &t->block, n + 1, &t->column, n + 1, &t->known));
@@ -28,6 +31,7 @@ PetscErrorCode HycoConeStepCreate(PetscInt p, const HycoBlocks *blocks, const Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* M, rho and the blocks are borrowed. Grouped as allocated. */
 PetscErrorCode HycoConeStepDestroy(HycoConeStep *t)
 {
   PetscFunctionBegin;
@@ -45,6 +49,7 @@ void HycoConeStepSetMatrix(HycoConeStep *t, const PetscReal M[])
   t->factored = PETSC_FALSE;
 }
 
+/* Blocks are gathered anew for each solve, with other data; sizes and order stay, so that the factor does too. */
 void HycoConeStepSetBlocks(HycoConeStep *t, const HycoBlocks *blocks)
 {
   t->blocks = blocks;
@@ -233,6 +238,8 @@ PetscErrorCode HycoConeStepDerive(HycoConeStep *t, const HycoBlocks *blocks, con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* DP = 1 in every block: all contacts closed and sticking, the linear problem w = 0 on all rows. Rows without
+   flexibility have DP = 0, since no force can change their w. */
 PetscErrorCode HycoConeStepStick(HycoConeStep *t)
 {
   PetscFunctionBegin;
@@ -518,6 +525,8 @@ static PetscErrorCode Prepare(HycoConeStep *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A factor of the present J itself, in place of a former one with changes of low rank: for a step that did not
+   lower the residual, which round-off of the update may be the cause of. */
 PetscErrorCode HycoConeStepRenew(HycoConeStep *t)
 {
   PetscFunctionBegin;

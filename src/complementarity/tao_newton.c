@@ -246,6 +246,7 @@ static PetscErrorCode StepByActiveSet(Model *m, HycoLCPStatus *status)
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(set.n, &active));
+  /* Newton's iterates settle on one set of bounds, so that late steps begin with theirs. */
   PetscCall(StartSet(m, active));
   PetscCall(HycoActiveSetRun(&set, active, &its, status));
   PetscCall(PetscFree(active));

@@ -126,6 +126,7 @@ static PetscErrorCode DenseLemke(HycoTao t, const HycoLCP *lcp)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Without a dense problem behind it the Tao is one of a program: its Hessian is made dense, in Newton's loop. */
 static PetscErrorCode SolveLemke(Tao tao)
 {
   const HycoTao t = (HycoTao)tao->data;

@@ -32,6 +32,7 @@ typedef struct {
   PetscBool *on;             /* by node of the part: it has a facet of the master */
 } Candidates;
 
+/* A box begins with lo > hi, and grows with its points: a rank without slaves keeps it. */
 static PetscBool IsEmpty(const Box *b)
 {
   return (PetscBool)(b->lo[0] > b->hi[0]);

@@ -79,6 +79,7 @@ void HycoSideSet(const HycoPlane *plane, PetscInt nf, PetscInt corners, const Pe
 
 /* -- functions -- */
 
+/* Twice the signed area of the triangle a b p: > 0 where p is to the left of ab. */
 static PetscReal Cross(const PetscReal a[2], const PetscReal b[2], const PetscReal p[2])
 {
   return (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
@@ -147,6 +148,7 @@ void HycoSideFunctions(const HycoSide *s, const PetscReal p[2], PetscReal N[HYCO
 
 /* -- cuts -- */
 
+/* Of a convex polygon, as a fan of triangles; negative if its corners turn clockwise. */
 static PetscReal Area(PetscInt n, PetscReal at[][2])
 {
   PetscReal area = 0;

@@ -51,6 +51,7 @@ static void Shorten(const char text[], char out[SHORT])
     snprintf(out, SHORT, "%.120s ... %s", text, text + n - 120);
 }
 
+/* muParser's own message says where it stopped; the entry says which of the many expressions it was. */
 static PetscErrorCode Raise(HycoExpr e)
 {
   char text[SHORT];
@@ -175,6 +176,7 @@ PetscErrorCode HycoExprPlace(HycoExpr e, const PetscReal mu[], const PetscReal x
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Without a temperature, for entries in which it is no variable. */
 PetscErrorCode HycoExprEval(HycoExpr e, const PetscReal mu[], PetscInt n, const PetscReal xyz[], PetscReal value[])
 {
   PetscFunctionBegin;
@@ -193,6 +195,7 @@ PetscErrorCode HycoExprEvalHot(HycoExpr e, const PetscReal mu[], PetscInt n, con
   } else {
     for (PetscInt p = 0; p < e->n_parameters; p++) e->mu[p] = mu[p];
     for (PetscInt k = 0; k < n; k++) {
+      /* Most entries are the same everywhere, and are evaluated at thousands of points. */
       if (e->in_space || e->in_heat || k == 0) {
         if (temperature) e->temperature = temperature[k];
         for (int c = 0; c < 3; c++) e->x[c] = xyz[3 * k + c];
@@ -207,6 +210,7 @@ PetscErrorCode HycoExprEvalHot(HycoExpr e, const PetscReal mu[], PetscInt n, con
     if (PetscIsInfOrNanReal(value[k])) {
       char place[HYCO_LINE], text[SHORT];
 
+      /* With the place and the parameters, since a division by zero may occur at one point of one sample alone. */
       PetscCall(HycoExprPlace(e, mu, xyz + 3 * k, place));
       Shorten(e->text, text);
       HycoFail("%s: \"%s\" is not finite at %s", e->key, text, place);

@@ -14,6 +14,7 @@ PetscErrorCode HycoSceneVisitGroups(HycoScene s, HycoGroupVisitor visit, void *c
   for (PetscInt k = 0; k < s->n_ties; k++) PetscCall(visit("tie", s->tie[k].slave, context));
   for (PetscInt k = 0; k < s->n_ties; k++) PetscCall(visit("tie", s->tie[k].master, context));
   for (PetscInt k = 0; k < s->n_contacts; k++) {
+    /* A type of contact declares its entries, so that those of programs are found too. */
     for (PetscInt j = 0; j < s->contact[k]->entries.n; j++) {
       const HycoEntry *entry = &s->contact[k]->entries.entry[j];
 

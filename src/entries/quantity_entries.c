@@ -20,6 +20,7 @@ static PetscErrorCode FindField(const char key[], const char text[], PetscInt *f
   HycoFail("%s is \"%.100s\"; it must be one of %s", key, text, list);
 }
 
+/* One letter: xy, for instance, would be taken for a shear stress. */
 static PetscErrorCode FindAxis(const char key[], const char axis[], PetscInt *field)
 {
   PetscFunctionBegin;
@@ -41,6 +42,7 @@ PetscErrorCode HycoSceneReadQuantity(HycoScene s, PetscInt entry, const char nam
   for (PetscInt k = 0; k < s->n_quantities; k++) {
     if (strcasecmp(s->quantity[k].name, name) == 0) q = &s->quantity[k];
   }
+  /* The first entry of this output. All have room at once, so that pointers to them stay valid. */
   if (!q) {
     HycoCheck(s->n_quantities < HYCO_MAX_QUANTITIES, "the scene has more than %d outputs", HYCO_MAX_QUANTITIES);
     if (!s->quantity) PetscCall(PetscCalloc1(HYCO_MAX_QUANTITIES, &s->quantity));
@@ -48,6 +50,7 @@ PetscErrorCode HycoSceneReadQuantity(HycoScene s, PetscInt entry, const char nam
     PetscCall(PetscStrallocpy(name, &q->name));
   }
   if (field > HYCO_QUANTITY_AREA) {
+    /* An option may replace the text of the file. */
     char **place = field == HYCO_QUANTITY_AREA + 1 ? &q->group : &q->contact;
 
     PetscCall(PetscFree(*place));
@@ -70,6 +73,7 @@ PetscErrorCode HycoSceneReadQuantity(HycoScene s, PetscInt entry, const char nam
     PetscCall(FindAxis(s->key[entry], s->value[entry], &q->field));
   else
     PetscCall(FindField(s->key[entry], s->value[entry], &q->field));
+  /* A field of contacts, not of nodes or cells: the extremes have kinds of their own, with other data. */
   if (field < HYCO_QUANTITY_REACTION && strcmp(HycoQuantityFields[q->field], "contact_pressure") == 0) {
     HycoCheck(
         q->kind != HYCO_QUANTITY_MEAN,
@@ -118,6 +122,7 @@ PetscBool HycoSceneHasReactions(HycoScene s)
   return HycoSceneHasOutputs(s, HYCO_QUANTITY_REACTION, HYCO_QUANTITY_REACTION);
 }
 
+/* Kinds are ordered: those of fields from MAX to REACTION, those of contacts from FORCE on. */
 PetscBool HycoSceneHasFieldOutputs(HycoScene s)
 {
   return HycoSceneHasOutputs(s, HYCO_QUANTITY_MAX, HYCO_QUANTITY_REACTION);

@@ -34,6 +34,7 @@ PetscErrorCode HycoSceneReadTie(HycoScene s, PetscInt entry, const char name[], 
               "%s is \"%.100s\"; it must be mortar or collocation", s->key[entry], s->value[entry]);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+  /* An option of the command line comes after the file, and replaces its text. */
   group = field ? &tie->master : &tie->slave;
   PetscCall(PetscFree(*group));
   PetscCall(PetscStrallocpy(s->value[entry], group));

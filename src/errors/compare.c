@@ -215,12 +215,14 @@ PetscErrorCode HycoROMCompare(HycoROM m, HycoFOM f, HycoErrors *e)
   PetscCall(Keep(m, f, &k));
   PetscCall(HycoFOMStress(f));
   PetscCall(HycoFOMGetLambda(f, &lambda));
+  /* In the order of the file, of which each rank has a block. */
   PetscCall(HycoFOMToRows(f, HYCO_ON_NODES, MPIU_REAL, k->rows.width[0], f->u, k->rows.value[0]));
   PetscCall(HycoFOMToRows(f, HYCO_ON_CELLS, MPIU_REAL, k->rows.width[1], f->sigma, k->rows.value[1]));
   PetscCall(HycoComparisonBring(&k->rows));
   PetscCall(HycoComparisonPredict(&k->rows, m, 0, k->V, k->rows.n[0] * k->rows.width[0]));
   HycoOnRoot(HycoComm(f), HycoROMCompareRID(m, k->rows.rid[0], k->rows.rid[1], lambda, &found, NULL));
   PetscCall(HycoComparisonSquares(&k->rows, square));
+  /* Squares are summed over the ranks before the root and the quotient. */
   found.u = HycoRelative(PetscSqrtReal(square[0]), PetscSqrtReal(square[1]));
   PetscCall(CompareH1(m, lambda, k, &found));
   if (f->rank == 0) *e = found;

@@ -17,6 +17,7 @@ void HycoPathErrorsJudge(PetscInt n, const HycoLost lost[], HycoPathErrors *e)
       const HycoLost *here = &lost[k * HYCO_N_ERRORS + j];
 
       e->end[j] = HycoRelative(here->lost, PetscMax(here->size, HYCO_SMALL_FORCE * size));
+      /* Equal errors: the first time. After the loop e->end is that of the last one. */
       if (e->end[j] <= e->worst[j]) continue;
       e->worst[j] = e->end[j];
       e->at[j] = k;
@@ -80,6 +81,7 @@ static PetscErrorCode Measure(HycoROM m, const Kept *kept, PetscInt k, HycoLost 
 
   PetscFunctionBegin;
   PetscCall(HycoROMSetStep(m, k));
+  /* Both in the order of the mesh file on rank 0, hence plain differences. */
   PetscCall(HycoROMGetWholeU(m, NULL, &found));
   for (PetscInt i = 0; i < kept->n_dof; i++) {
     square[0] += (found[i] - u[i]) * (found[i] - u[i]);

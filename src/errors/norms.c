@@ -27,6 +27,8 @@ static PetscErrorCode AssembleNorm(HycoNorms h, Mat *A)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* At the centre of the ranges: errors of a set of points are comparable only in one norm, not in that of each
+   moved mesh. */
 PetscErrorCode HycoNormsCreate(HycoFOM f, HycoNorms *norms)
 {
   HycoScene scene = f->scene;

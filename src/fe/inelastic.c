@@ -486,6 +486,7 @@ PetscErrorCode HycoFELinearStress(HycoFE fe, const PetscReal u[], HycoFEState st
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Of all bodies. Elastic ones have no state, but their internal forces are part of f_int. */
 PetscErrorCode HycoFEStep(HycoFE fe, const PetscReal u[], PetscReal t0, PetscReal t1, HycoFEState begin,
                           HycoFEState end, PetscReal f_int[], PetscBool tangent, HycoFEStepReport *report)
 {
@@ -568,6 +569,8 @@ static PetscReal Lost(HycoFE fe, PetscInt cell, PetscInt q, const PetscReal elas
   return terms;
 }
 
+/* C : (e - e_th) - sigma, the stress that the elastic one loses by flow: its divergence is the nodal force of the
+   inelastic strains. */
 void HycoFEInelasticStress(HycoFE fe, HycoFEState state, PetscInt cell, PetscInt q, PetscReal s[])
 {
   const Point p = PointAt(fe, state, cell, q);
@@ -730,6 +733,8 @@ PetscErrorCode HycoFEYields(HycoFE fe, PetscReal t, PetscBool *yields)
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(fe->n_dof, &u));
   PetscCall(PetscCalloc1(fe->n_dof, &f));
+  /* Strains far beyond any yield limit, without symmetry: no cell is left unstrained, and no random numbers are
+     used. */
   for (PetscInt i = 0; i < fe->n_dof; i++) u[i] = size * PetscSinReal(1.7 * i * i + i);
   PetscCall(HycoFEStateCreate(fe, &begin));
   PetscCall(HycoFEStateCreate(fe, &end));

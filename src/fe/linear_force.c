@@ -25,6 +25,7 @@ PetscErrorCode HycoLinearForceDestroy(HycoLinearForce *force)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Cells whose internal force is K u: they are summed by a product, not by their points. */
 static PetscBool IsLinear(HycoFE fe, PetscInt cell)
 {
   return fe->scene->body[fe->mesh->cell_body[cell]].law->linear;

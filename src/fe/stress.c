@@ -9,6 +9,8 @@ typedef struct {
   PetscReal g[HYCO_CELL_NODES][3];
 } Mean;
 
+/* The mean dilatation of the cell (bbar): gradients averaged over the volume, for the trace of the strain alone.
+   */
 static PetscErrorCode GetMean(HycoFE fe, const HycoElement *el, PetscInt cell, Mean *mean)
 {
   PetscFunctionBegin;
@@ -104,6 +106,8 @@ static PetscErrorCode KeepMean(HycoFE fe, const HycoElement *el, PetscInt cell, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For many displacements on one mesh: the mean gradients of each cell are kept from the first call on, NaN marking
+   those that are not there yet. *kept is freed by the caller, when nodes move. */
 PetscErrorCode HycoFEStressKept(HycoFE fe, const PetscBool in[], const PetscReal u[], PetscReal **kept,
                                 PetscReal sigma[])
 {

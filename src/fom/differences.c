@@ -217,6 +217,8 @@ typedef struct {
   void *context;
 } Beside;
 
+/* A path beside this one that chooses other steps has another error in time: the difference would be that of the
+   steps, divided by a small number. */
 PetscErrorCode HycoPathCheckBeside(PetscBool ended, PetscInt cuts, const char why[])
 {
   PetscFunctionBegin;
@@ -237,6 +239,7 @@ static void Gather(HycoScene scene, const HycoStep step[], PetscReal output[])
   HycoPathExtremes(scene, scene->n_times, step, output + scene->n_times * n);
 }
 
+/* step: not used; the outputs of a path are those of its own listed times, not of a displaced mesh. */
 static PetscErrorCode MeasurePath(void *context, const PetscReal mu[], PetscReal step, PetscReal output[])
 {
   const Beside *b = (const Beside *)context;
@@ -262,7 +265,9 @@ PetscErrorCode HycoGradientOfPath(HycoScene scene, const PetscReal mu[], const H
   PetscFunctionBegin;
   PetscCall(HycoGradientCreate(scene, store, g));
   all = *g;
+  /* Each output at each listed time, and its extreme over them, as if they were outputs of their own. */
   all.n_outputs *= scene->n_times + 1;
+  /* At mu, and at the points of a difference with one closer step. */
   PetscCall(PetscCalloc1(6 * all.n_outputs + 1, &value));
   Gather(scene, step, value);
   for (PetscInt p = 0; p < g->n_parameters && !ierr; p++) {

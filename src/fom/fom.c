@@ -452,6 +452,7 @@ static PetscErrorCode CountFree(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Moduli may be invalid in the cells of one rank alone: all ranks end with its line. */
 static PetscErrorCode AssembleStiffness(HycoFOM f)
 {
   PetscFunctionBegin;

@@ -229,6 +229,7 @@ static PetscErrorCode Extrapolate(HycoFOM f)
   PetscCall(VecGetArrayRead(r->L_old, &L));
   PetscCall(VecGetArrayRead(r->L_before, &before));
   PetscCall(VecGetArray(r->ahead, &ahead));
+  /* The time stands after the parameters, among the variables of expressions. */
   has = HycoSlipExtrapolate(&r->slip, f->fe->mu[f->scene->n_parameters], r->rows, L, before, ahead);
   PetscCall(VecRestoreArray(r->ahead, &ahead));
   PetscCall(VecRestoreArrayRead(r->L_before, &before));
@@ -298,6 +299,7 @@ static PetscErrorCode WriteProblem(HycoFOM f, const HycoBlocks *blocks, Vec befo
   PetscFunctionBegin;
   HycoSolverGetDense(f->friction->solver, &lcp, &z);
   lcp.blocks = blocks;
+  /* The unknowns of rigid motions, which come first, begin at 0, as in SolveForces() of the dual form. */
   PetscCall(PetscCalloc1(lcp.p + lcp.n + 1, &start));
   PetscCall(VecGetArrayRead(before, &L));
   PetscCall(PetscArraycpy(start + lcp.p, L, lcp.n));
@@ -322,6 +324,7 @@ static PetscErrorCode WriteFclib(HycoFOM f)
              "-hyco_write_fclib_time",
              (double)f->path->t);
   PetscCall(HycoBlocksGather(HycoComm(f), r->system->blocks, &blocks));
+  /* The forces before the step: L_old still has them, since it is taken over after the file. */
   PetscCall(VecScatterCreateToZero(r->L_old, &to_root, &before));
   PetscCall(VecScatterBegin(to_root, r->L_old, before, INSERT_VALUES, SCATTER_FORWARD));
   PetscCall(VecScatterEnd(to_root, r->L_old, before, INSERT_VALUES, SCATTER_FORWARD));
@@ -420,6 +423,7 @@ static PetscErrorCode ReadColumns(HycoFOM f, PetscReal *value[N_STATE])
     char name[32];
 
     PetscCall(PetscSNPrintf(name, sizeof(name), "friction/%d", (int)c));
+    /* Sizes are given, so that a checkpoint with other contacts is refused. */
     ierr = HycoH5LoadReal(h, name, &rows, &one, &value[c]);
   }
   PetscCall(HycoH5Close(&h, PETSC_FALSE));

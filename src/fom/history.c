@@ -337,6 +337,8 @@ PetscErrorCode HycoPathRun(HycoPath p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Over the listed times, at which outputs are measured. An output that is a minimum has its smallest value, all
+   others the largest. */
 void HycoPathExtremes(HycoScene scene, PetscInt n, const HycoStep step[], PetscReal value[])
 {
   for (PetscInt q = 0; q < scene->n_quantities; q++) {

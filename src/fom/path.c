@@ -438,6 +438,8 @@ PetscErrorCode HycoFOMGetHistory(HycoFOM f, HycoHistory *h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Called after each listed time, with the model at that time: fields may be written or read there. One monitor
+   only, and it replaces the one between listed times. */
 PetscErrorCode HycoFOMSetStepMonitor(HycoFOM f, HycoStepMonitor monitor, void *ctx)
 {
   PetscFunctionBegin;

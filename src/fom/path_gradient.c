@@ -21,12 +21,15 @@ static PetscErrorCode Solve(HycoFOM f, const PetscReal mu[])
 
   PetscFunctionBegin;
   PetscCall(PetscStrncpy(checkpoint, p->checkpoint, sizeof(checkpoint)));
+  /* Paths beside the solution must not print, write a series, resume, or overwrite the checkpoint of the solution.
+     */
   p->monitor = NULL;
   p->between = NULL;
   p->series = NULL;
   p->resume = PETSC_FALSE;
   p->checkpoint[0] = '\0';
   ierr = HycoFOMSolve(f, f->scene->n_parameters, mu);
+  /* Also after an error: the caller may go on with this model. */
   p->monitor = monitor;
   p->between = between;
   p->series = series;

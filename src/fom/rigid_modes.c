@@ -17,6 +17,7 @@ PetscErrorCode HycoFOMMotionVectors(HycoFOM f, const HycoMotions *motions, Vec *
   const PetscInt dim = f->fe->dim;
 
   PetscFunctionBegin;
+  /* In the layout of displacements, as PETSc's null space and products with F need them. */
   PetscCall(VecDuplicateVecs(f->U, motions->n, v));
   for (PetscInt k = 0; k < motions->n; k++) {
     const PetscReal *motion = motions->motion + (size_t)k * (size_t)f->fe->n_dof;
@@ -60,7 +61,7 @@ static void Names(HycoFOM f, const HycoMotions *free, PetscInt n, const PetscRea
 }
 
 /* Adds a combination to the released motions, orthonormalised against the existing ones; a dependent one is left out.
-   Dependent: less than a tenth remains. u is taken over, or destroyed. */
+   Dependent: less than a tenth remains. z: coefficients of the n motions. */
 static PetscErrorCode AddReleased(HycoFOM f, PetscInt n, const Vec motion[], const PetscReal z[])
 {
   PetscReal norm, before;
@@ -151,6 +152,7 @@ static PetscErrorCode FindReleased(HycoFOM f, const HycoMotions *free)
   /* Only if something is to be released at all. */
   for (PetscInt k = 0; !ierr && k < z.n_alike && z.n; k++)
     PetscCall(AddReleased(f, free->n, motion, z.alike + k * free->n));
+  /* The first ones: their normals are turned, and only they are removed from the solution. */
   f->n_turned = f->n_released;
   for (PetscInt k = 0; !ierr && k < z.n; k++) PetscCall(AddReleased(f, free->n, motion, z.all + k * free->n));
   PetscCall(VecDestroyVecs(free->n, &motion));
@@ -349,6 +351,7 @@ PetscErrorCode HycoFOMBalance(HycoFOM f)
   PetscFunctionBegin;
   for (PetscInt k = 0; k < f->n_pins; k++) {
     PetscCall(Work(f->F, f->released[k], &on, &all));
+    /* The motions are orthonormal, so that one pass suffices in any order. */
     PetscCall(VecAXPY(f->F, -on, f->released[k]));
     worst = PetscMax(worst, all > 0 ? PetscAbsReal(on) / all : 0);
   }
@@ -387,7 +390,8 @@ PetscErrorCode HycoFOMCheckContactBalance(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The solution is determined up to these motions; the shown one is orthogonal to them. n_turned of them: the motions on which contact normals are turned. */
+/* The solution is determined up to the motions for which the normals are turned (n_turned, the first ones); the shown
+   one is orthogonal to them. The others are no motions of the mesh, whose facets resist them: they stay in u. */
 PetscErrorCode HycoFOMTakeOutReleased(HycoFOM f, Vec u)
 {
   PetscScalar dot;

@@ -137,6 +137,7 @@ static PetscErrorCode Look(HycoFOM f, HycoSeriesSource *from)
   HycoPath p = f->path;
 
   PetscFunctionBegin;
+  /* begin: the state at p->t, since an accepted step has become the begin of the next. */
   *from = (HycoSeriesSource){.comm = HycoComm(f),
                              .fe = f->fe,
                              .state = p->begin,

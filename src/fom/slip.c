@@ -44,6 +44,7 @@ PetscErrorCode HycoSlipCreate(MPI_Comm comm, HycoScene scene, const HycoPairs *p
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Grouped as allocated: each PetscFreeN() gets the pointers of one PetscMallocN(). */
 PetscErrorCode HycoSlipDestroy(HycoSlip *s)
 {
   PetscFunctionBegin;
@@ -130,6 +131,7 @@ void HycoSlipAdd(HycoSlip *s, const PetscReal L[], const PetscReal w[], PetscRea
   for (PetscInt k = 0; k < s->n; k++) Add(s, k, L + s->row[k], w + s->row[k], most);
 }
 
+/* The times of the last two accepted steps, which HycoSlipExtrapolate() needs; n_taken: whether there are two. */
 void HycoSlipTake(HycoSlip *s, PetscReal t)
 {
   s->t_before = s->t;

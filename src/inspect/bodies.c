@@ -117,11 +117,13 @@ static PetscErrorCode CountParts(HycoMesh m, PetscInt n_bodies, PetscInt n[])
     for (PetscInt i = 0; i < m->n_nodes; i++) part[i] = i;
     PetscCall(PetscArrayzero(seen, m->n_nodes));
     for (PetscInt k = 0; k < m->n_cells * m->nv; k++) {
+      /* Joins each node of a cell with its first one. */
       if (m->cell_body[k / m->nv] == b) part[Root(part, m->cells[k])] = Root(part, m->cells[k - k % m->nv]);
     }
     for (PetscInt e = 0; e < m->n_cells; e++) {
       const PetscInt root = Root(part, m->cells[e * m->nv]);
 
+      /* A part is counted by the first cell of its root, so that nodes without a cell of this body are none. */
       if (m->cell_body[e] != b || seen[root]) continue;
       seen[root] = PETSC_TRUE;
       n[b]++;
@@ -156,6 +158,8 @@ typedef struct {
   PetscInt body, node;
 } Place;
 
+/* By place, then body, then node: nodes at one place are neighbours afterwards, and the order is the same on every
+   machine, which qsort() alone does not promise for equal ones. */
 static int ComparePlaces(const void *a, const void *b)
 {
   const Place *p = (const Place *)a, *q = (const Place *)b;
@@ -182,6 +186,7 @@ static PetscErrorCode CountDoubled(HycoScene s, HycoMesh m, HycoBodyInspection b
   PetscCall(MarkSurfaces(s, m, of_surface));
   for (PetscInt i = 0; i < m->n_nodes; i++) {
     place[i] = (Place){.body = m->node_body[i], .node = i};
+    /* Rounded to a grid that is much finer than any cell: coordinates of a mesh file have some digits only. */
     for (PetscInt c = 0; c < 3; c++) place[i].at[c] = PetscFloorReal(m->xyz[3 * i + c] / step + 0.5);
   }
   qsort(place, (size_t)m->n_nodes, sizeof(*place), ComparePlaces);
@@ -190,6 +195,7 @@ static PetscErrorCode CountDoubled(HycoScene s, HycoMesh m, HycoBodyInspection b
 
     if (p->body != q->body || p->body < 0 || of_surface[p->node] || of_surface[q->node]) continue;
     if (memcmp(p->at, q->at, sizeof(p->at)) != 0) continue;
+    /* The first pair is named, by the tags of the file, for the user to look at. */
     if (!body[p->body].n_doubled++) {
       body[p->body].doubled[0] = m->node_id[p->node];
       body[p->body].doubled[1] = m->node_id[q->node];

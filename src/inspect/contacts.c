@@ -68,10 +68,12 @@ static PetscErrorCode CompareTie(HycoFE fe, PetscInt tie, PetscReal *coarse)
     PetscReal master = 0;
 
     for (PetscInt j = m->tied_start[k]; j < m->tied_start[k + 1]; j++)
+      /* size has the slave's facets first, then the master's. */
       master = PetscMax(master, size[m->n_nodes + m->tied_master[j]]);
     if (m->ties->tie[m->tied_entry[k]] == tie) ratio[n++] = size[m->tied[k]] / master;
   }
   PetscCall(PetscSortReal(n, ratio));
+  /* The median: at an edge of the surfaces single ratios are wide of it. */
   *coarse = n ? ratio[n / 2] : 0;
   PetscCall(PetscFree2(size, ratio));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -119,6 +121,8 @@ PetscErrorCode HycoInspectContactsBegin(HycoInspection *in)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* At one point of the ranges; the extremes over all points grow with each call. Facets are compared at the first
+   point only (`first`). */
 PetscErrorCode HycoInspectGaps(HycoInspection *in, HycoFE fe, PetscBool first)
 {
   HycoPairs *p = &in->whole->pairs;

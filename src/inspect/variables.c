@@ -48,6 +48,7 @@ static void FindReach(HycoScene s, PetscInt p, PetscBool does[HYCO_N_AFFECTED])
                                               HycoExprChanges(s->fixed[k].normal, changed));
 }
 
+/* Parameters, then time and tables, as in the expressions: the report names what each affects. */
 PetscErrorCode HycoInspectVariables(HycoInspection *in)
 {
   HycoScene s = in->whole->scene;

@@ -286,6 +286,8 @@ PetscErrorCode HycoConstrainedDestroy(HycoConstrained *constrained)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Borrowed: whoever solves sets tolerances and reads counts on it, but the operators belong to the constrained
+   solve. */
 PetscErrorCode HycoConstrainedGetKSP(HycoConstrained c, KSP *ksp)
 {
   PetscFunctionBegin;

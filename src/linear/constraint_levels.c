@@ -276,6 +276,7 @@ static PetscErrorCode Redundant(Mat G, KSP *ksp)
   PetscFunctionBegin;
   PetscCall(KSPCreate(PetscObjectComm((PetscObject)G), ksp));
   PetscCall(KSPSetOperators(*ksp, G, G));
+  /* No iteration: the projection onto the constraints must be exact. */
   PetscCall(KSPSetType(*ksp, KSPPREONLY));
   PetscCall(KSPGetPC(*ksp, &pc));
   PetscCall(PCSetType(pc, PCREDUNDANT));
@@ -283,6 +284,7 @@ static PetscErrorCode Redundant(Mat G, KSP *ksp)
   PetscCall(KSPSetType(inner, KSPPREONLY));
   PetscCall(KSPGetPC(inner, &pc));
   PetscCall(PCSetType(pc, PCCHOLESKY));
+  /* Nested dissection: G couples neighbours on a surface. */
   PetscCall(PCFactorSetMatOrderingType(pc, MATORDERINGND));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

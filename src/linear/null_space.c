@@ -30,6 +30,7 @@ static PetscErrorCode Rows(Mat K, PetscInt n, PetscInt *rows, PetscReal **row)
   PetscCall(MatGetNullSpace(K, &kernel));
   PetscCall(MatNullSpaceGetVecs(kernel, NULL, NULL, &v));
   PetscCall(MatGetLocalSize(K, rows, NULL));
+  /* An unknown's entries in all motions lie together: pivots are chosen by the length of such rows. */
   PetscCall(PetscMalloc1(*rows * n, row));
   for (PetscInt k = 0; k < n; k++) {
     const PetscScalar *a;

@@ -62,6 +62,7 @@ static PetscErrorCode LongestRow(Mat K, PetscInt *longest)
   for (PetscInt r = lo; r < hi; r++) {
     PetscInt n;
 
+    /* By rows, which any type of matrix gives, one at a time. */
     PetscCall(MatGetRow(K, r, &n, NULL, NULL));
     *longest = PetscMax(*longest, n);
     PetscCall(MatRestoreRow(K, r, &n, NULL, NULL));

@@ -224,7 +224,10 @@ static void Begin(const HycoMaterialPoints *m, PetscInt i, Work *w)
   const PetscReal *strain = m->strain + i * ns, *state0 = m->state0 + i * (ns + 2);
   PetscReal elastic[6];
 
+  /* As if nothing flowed in this step; what flows then lowers the stress along the trial deviator. */
   for (PetscInt c = 0; c < ns; c++) elastic[c] = strain[c] - state0[c];
+  /* How much the equivalent stress falls per equivalent inelastic strain: the flow direction is that of the trial
+     stress (radial return, Wilkins 1964). */
   w->H = ns == 1 ? young : 3 * G;
   if (ns == 1) {
     w->s[0] = young * elastic[0];
@@ -337,6 +340,7 @@ static PetscErrorCode SetUp(HycoMaterial material, PetscInt dim)
     PetscCall(PetscSNPrintf(text[c], sizeof(text[c]), "inelastic_%s", component[c]));
     name[c] = text[c];
   }
+  /* After the tensor, as Begin() and the update read them. */
   name[ns] = "creep_strain";
   name[ns + 1] = "plastic_strain";
   PetscCall(HycoMaterialSetStateNames(material, ns + 2, name));

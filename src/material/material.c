@@ -51,6 +51,7 @@ PetscErrorCode HycoMaterialSetType(HycoMaterial material, HycoMaterialType type)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The registered name. For reports and models only: no code decides by it, properties of a law are traits. */
 PetscErrorCode HycoMaterialGetType(HycoMaterial material, HycoMaterialType *type)
 {
   PetscFunctionBegin;
@@ -123,6 +124,8 @@ PetscErrorCode HycoMaterialSetOps(HycoMaterial material, const struct _HycoMater
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* States without names: a law that nobody reads variable by variable needs their number alone. The states of a
+   point are consecutive reals, 0 at the first time. */
 PetscErrorCode HycoMaterialSetStateSize(HycoMaterial material, PetscInt n_state)
 {
   PetscFunctionBegin;
@@ -165,6 +168,7 @@ PetscErrorCode HycoMaterialSetLinear(HycoMaterial material, PetscBool linear)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The law keeps what is behind the pointer, and frees it in its destroy operation: the class never looks at it. */
 PetscErrorCode HycoMaterialSetData(HycoMaterial material, void *data)
 {
   PetscFunctionBegin;
@@ -173,6 +177,7 @@ PetscErrorCode HycoMaterialSetData(HycoMaterial material, void *data)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Of the law's own operations: the type of what is behind the pointer is known to them alone. */
 PetscErrorCode HycoMaterialGetData(HycoMaterial material, void *data)
 {
   PetscFunctionBegin;
@@ -218,6 +223,8 @@ PetscBool HycoMaterialChanges(HycoMaterial material, const PetscBool changed[])
   return any && material->ops->depends ? (*material->ops->depends)(material, constant) : any;
 }
 
+/* Whether constants differ from point to point of a body. A temperature is a field too, hence the second test.
+   Without either, one evaluation of the constants serves all points of a body. */
 PetscBool HycoMaterialInSpace(HycoMaterial material)
 {
   for (PetscInt j = 0; j < material->constants.n; j++) {

@@ -599,6 +599,8 @@ static PetscErrorCode MakeModel(HycoReducer t, PetscBool useful, HycoROM *model,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rank 0 builds from what has the RID's size, and all ranks get the bytes of its file: twice, because finish()
+   scans on all ranks and adds its results. */
 PetscErrorCode HycoReducerBuild(HycoReducer t, PetscBool useful, HycoROM *model, HycoTraining *report)
 {
   PetscErrorCode ierr;

@@ -166,6 +166,8 @@ static PetscErrorCode Take(HycoReducer t, HycoMotions *motions, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rigid motions at the present parameters that supports leave free, and the bodies that they move: their balance
+   corrects reconstructed forces online. */
 PetscErrorCode HycoReducerFindFloating(HycoReducer t, HycoROM m)
 {
   HycoMotions motions;

@@ -39,11 +39,13 @@ struct _n_HycoIndicator {
   HycoSolver solver;
 };
 
+/* (42) limits the number of parameters, which the caller checks. */
 PetscBool HycoIndicatorInterpolates(HycoIndicatorKind kind)
 {
   return (PetscBool)(kind == HYCO_INDICATOR_LOCAL);
 }
 
+/* Each rank then holds the whole mesh and a factor of the elastic stiffness. */
 PetscBool HycoIndicatorOnWhole(HycoIndicatorKind kind)
 {
   return (PetscBool)(kind == HYCO_INDICATOR_RESIDUAL);

@@ -8,6 +8,7 @@
 
 const char *const HycoSeedFields[HYCO_N_SEEDS] = {"U", "sigma", "force", "lambda", "inelastic", "spring"};
 
+/* The samples whose solutions are the columns of snapshot matrices; a path has several columns. */
 PetscErrorCode HycoReducerSetColumns(HycoReducer t, HycoSamples columns)
 {
   PetscFunctionBegin;
@@ -73,6 +74,7 @@ PetscErrorCode HycoReducerMultiply(HycoReducer t, Mat X, Mat Y, PetscReal produc
   PetscFunctionBegin;
   PetscCall(MatTransposeMatMult(X, Y, MAT_INITIAL_MATRIX, PETSC_DEFAULT, &P));
   if (HycoSize(HycoComm(t)) > 1)
+    /* Every rank has the same numbers afterwards, and takes the same decisions from them. */
     PetscCall(MatCreateRedundantMatrix(P, HycoSize(HycoComm(t)), PETSC_COMM_SELF, MAT_INITIAL_MATRIX, &whole));
   else {
     PetscCall(PetscObjectReference((PetscObject)P));
@@ -108,6 +110,8 @@ PetscErrorCode HycoReducerReadField(HycoReducer t, HycoSnapshots store, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Q-DEIM chooses its points by a pivoted QR of V^T, which depends on the space of the modes and not on their
+   order, with a better bound of the interpolation error than the greedy choice of DEIM (Drmac, Gugercin 2016). */
 static PetscErrorCode Points(HycoReducer t, Mat V, PetscInt index[])
 {
   PetscFunctionBegin;
@@ -229,6 +233,8 @@ static PetscErrorCode PODRank(HycoReducer t, PetscInt n_sigma, const PetscReal s
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A mode of a small path matters as much as one of a large path, since errors are relative to each path; hence the
+   factor. */
 PetscReal HycoPathScale(PetscReal first, PetscReal largest)
 {
   const PetscReal slight = 1e-3; /* paths with smaller relative displacements may be noise */

@@ -99,6 +99,7 @@ PetscErrorCode HycoReducerReset(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Between the attempts of a search: bases depend on the settings, solutions do not. */
 PetscErrorCode HycoReducerDropBases(HycoReducer t)
 {
   PetscFunctionBegin;

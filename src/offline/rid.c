@@ -437,6 +437,8 @@ static PetscErrorCode AddRegions(Rid *r, const HycoRIDSettings *settings)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* (20): the cells around the seeds, supports that single out a mode, the extension and whole contacts, then
+   layers. Order: each step completes what the former one has cut. */
 PetscErrorCode HycoRIDBuild(HycoFOM f, const HycoPairs *pairs, const HycoRIDSettings *settings, DMLabel *label)
 {
   PetscInt n_rows = f->rank ? 0 : pairs->n;

@@ -29,6 +29,8 @@ PetscReal HycoReducerSolveWork(HycoReducer t)
   return t->sizes[3] == 2 ? 120 * n * PetscLog2Real(n + 1) : 180 * n * PetscPowReal(n, 1. / 3);
 }
 
+/* Operations are counted, not timed, so that a search takes the same way on every machine; a path counts as so
+   many solves. */
 PetscReal HycoReducerSolvesOf(HycoReducer t)
 {
   return t->scene->n_times ? (PetscReal)t->scene->n_times * SUBSTEPS * ITERATIONS : 1;
@@ -90,6 +92,8 @@ PetscErrorCode HycoReducerSolutionsWork(HycoReducer t, PetscReal *work)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A search may cost as much as the solutions it works on: without a limit the last, largest RIDs would take most
+   of a training. */
 PetscErrorCode HycoReducerSearchBudget(HycoReducer t, PetscReal *operations)
 {
   PetscFunctionBegin;

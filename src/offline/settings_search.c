@@ -468,6 +468,7 @@ static HycoReducerSettings SettingsFor(const Search *s, const Size *size)
   return r;
 }
 
+/* Bitwise equality of the numbers suffices: settings are taken from lists, not computed. */
 static PetscBool Same(const HycoReducerSettings *a, const HycoReducerSettings *b)
 {
   return (PetscBool)(strcmp(a->type, b->type) == 0 && a->pod_tol == b->pod_tol && a->layers == b->layers &&

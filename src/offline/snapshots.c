@@ -31,6 +31,8 @@ static PetscErrorCode MakeFolder(const char folder[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rank 0 makes the folder before any rank opens a file in it. The fingerprint is of scene and mesh: solutions of
+   another one are refused by it. */
 static PetscErrorCode Begin(HycoSnapshots s)
 {
   PetscFunctionBegin;
@@ -633,6 +635,7 @@ static PetscErrorCode FirstSize(HycoSnapshots s, HycoSamples samples, const char
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* 0: no solution is stored yet. Rank 0 reads, the others learn it. */
 PetscErrorCode HycoSnapshotsGetRows(HycoSnapshots s, HycoSamples samples, const char field[], PetscInt *n)
 {
   PetscFunctionBegin;

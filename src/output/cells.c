@@ -28,6 +28,8 @@ static PetscErrorCode Nodes(const HycoFileOrder *order, HycoMesh m, PetscBool vt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A row of node numbers for each cell, in the order of the mesh file; vtk: in VTK's order of the nodes within a
+   cell. */
 PetscErrorCode HycoFieldsWriteCells(HycoH5 h, const char name[], const HycoFileOrder *order, HycoMesh m, PetscBool vtk)
 {
   PetscInt *cells;
@@ -62,6 +64,9 @@ static PetscErrorCode ListRows(HycoMesh m, const unsigned char code[], PetscInt 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Cells of several types have different numbers of nodes: a flat list with the start of each cell. In parallel
+   each rank has a block of the file's rows, and needs only where its block begins (a prefix sum), not the others'
+   lists. */
 PetscErrorCode HycoCellListCreate(const HycoFileOrder *order, HycoMesh m, const unsigned char code[], HycoCellList *l)
 {
   const MPI_Comm comm = order ? order->comm : PETSC_COMM_SELF;
@@ -82,6 +87,7 @@ PetscErrorCode HycoCellListCreate(const HycoFileOrder *order, HycoMesh m, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Each rank writes its own part of one array, beginning at `first`. Collective on the communicator of h. */
 PetscErrorCode HycoCellListWrite(HycoH5 h, const char name[], const HycoCellList *l)
 {
   PetscFunctionBegin;

@@ -96,6 +96,7 @@ PetscErrorCode HycoFieldFileCreate(MPI_Comm comm, const char path[], PetscInt mo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Of the whole mesh, not of this rank: datasets have one size on all ranks. */
 PetscInt HycoFieldFileCount(HycoFieldFile f, HycoPlace place)
 {
   return f->order ? f->order->all[place] : place == HYCO_ON_CELLS ? f->mesh->n_cells : f->mesh->n_nodes;
@@ -163,6 +164,8 @@ static void NameSet(HycoFieldFile f, PetscInt k, const HycoField *field, char na
     HycoFormat(name, "%s/%s", folder, field->name);
 }
 
+/* Steps have a folder each, so that all times have fields of the same names. Four digits keep the order of names
+   that of times for readers that sort. */
 void HycoFieldName(const HycoField *field, PetscInt k, char name[HYCO_LINE])
 {
   HycoFormat(name, "step-%04d/%s/%s", (int)k, field->place == HYCO_ON_CELLS ? "cells" : "nodes", field->name);
@@ -288,6 +291,7 @@ PetscErrorCode HycoFieldFileBeginPoint(HycoFieldFile f, const PetscReal X[], con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* n counts times that are complete, and names the next step. */
 PetscErrorCode HycoFieldFileEndTime(HycoFieldFile f)
 {
   PetscFunctionBegin;
@@ -444,6 +448,7 @@ PetscErrorCode HycoFieldFileCommit(HycoFieldFile f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A file that was not committed is removed: only Commit closes it as complete. NULL-safe. */
 PetscErrorCode HycoFieldFileDestroy(HycoFieldFile *file)
 {
   HycoFieldFile f = *file;

@@ -21,6 +21,9 @@ PetscErrorCode HycoFieldRows(const HycoFileOrder *order, PetscInt n, HycoPlace p
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Each rank sends its values to the ranks that own these rows of the file, so that files are in the order of the
+   mesh file on any number of ranks, and then writes one contiguous block. order = NULL: one process, whose order
+   is that of the file already. */
 PetscErrorCode HycoFieldWrite(HycoH5 h, const HycoFileOrder *order, PetscInt n, const char name[], HycoPlace place,
                               MPI_Datatype type, PetscInt components, PetscInt cols, const void *value)
 {
@@ -47,6 +50,7 @@ PetscErrorCode HycoFieldWriteData(HycoH5 h, const HycoFileOrder *order, PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Tags are written beside the rows: they are how users and other programs find a node of the mesh file again. */
 PetscErrorCode HycoFieldsWriteMesh(HycoH5 h, const char folder[], const HycoFileOrder *order, HycoMesh m,
                                    const PetscReal X[], PetscBool vtk)
 {
@@ -304,6 +308,7 @@ PetscErrorCode HycoContactFieldsToPart(MPI_Comm comm, HycoFE fe, HycoMesh surfac
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The grouping is that of the allocations: PetscFreeN() must get the pointers of one PetscMallocN(). */
 PetscErrorCode HycoContactFieldsDestroy(HycoContactFields *f)
 {
   PetscFunctionBegin;
@@ -451,6 +456,8 @@ static PetscErrorCode AddContacts(HycoFieldFile file, const HycoSolution *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The field rid exists for models alone; all others are the same for full order and models, so that files of both
+   can be subtracted. */
 static PetscErrorCode AddFields(HycoFieldFile file, const HycoSolution *s)
 {
   const HycoField rid = {"rid", HYCO_ON_CELLS, 1, s->rid};
@@ -471,6 +478,7 @@ static PetscErrorCode Write(HycoFieldFile file, const HycoSolution *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The file is destroyed also after an error, which removes what was written so far: complete or absent. */
 PetscErrorCode HycoSolutionWrite(const char path[], const HycoSolution *s)
 {
   HycoFieldFile file;

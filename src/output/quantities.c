@@ -96,6 +96,7 @@ PetscErrorCode HycoQuantityMarkCells(HycoScene scene, HycoMesh m, PetscInt k, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The union over all outputs. A model must contain all of these cells, or the output has no value. */
 PetscErrorCode HycoQuantitiesMarkCells(HycoScene scene, HycoMesh m, PetscBool needed[])
 {
   PetscBool *in;
@@ -117,6 +118,8 @@ static PetscBool OfStress(const HycoQuantity *q)
   return (PetscBool)(q->kind <= HYCO_QUANTITY_MEAN && q->field >= XX);
 }
 
+/* A subset of HycoQuantitiesMarkCells(): stresses cost more to store than displacements, and outputs of
+   displacements do not need them. */
 PetscErrorCode HycoQuantitiesMarkStressed(HycoScene scene, HycoMesh m, PetscBool stressed[])
 {
   PetscBool *in;
@@ -250,6 +253,8 @@ static PetscErrorCode KeepSupported(HycoFE fe, const HycoQuantity *q, PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For derivatives: outputs are measured many times beside mu, and a maximum is decided by cells that are close to
+   it. The others cannot become the largest within a small step, so that leaving them out changes nothing. */
 PetscErrorCode HycoQuantitiesMarkDecisive(HycoFE fe, const PetscReal u[], const PetscReal sigma[],
                                           const PetscReal value[], PetscBool balanced, PetscBool needed[],
                                           PetscBool stressed[])

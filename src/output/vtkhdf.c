@@ -77,6 +77,8 @@ static PetscErrorCode WriteTypes(HycoFieldFile f, const HycoCellList *cells)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rank 0 creates the groups before the collective writes that need them. HycoOnRoot() ends all ranks with the same
+   error. */
 static PetscErrorCode WriteCells(HycoFieldFile f, const HycoCellList *cells)
 {
   PetscFunctionBegin;
@@ -105,6 +107,8 @@ PetscErrorCode HycoVTKWriteMesh(HycoFieldFile f, const PetscReal X[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* VTK has three coordinates also in 1D and 2D. A path has one set of points; a set of parameter values moves them
+   at each step. */
 PetscErrorCode HycoVTKWritePoints(HycoFieldFile f, const PetscReal X[])
 {
   void *rows;

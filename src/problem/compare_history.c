@@ -75,6 +75,8 @@ static void CompareLine(const char line[], const char made[], const char here[],
            was ? was + from : "missing");
 }
 
+/* Reduced paths and stored solutions have one row for each listed time: with another history they would be read at
+   wrong times without any error. The first entry that differs is named, from either side. */
 PetscErrorCode HycoSceneCompareHistory(HycoScene scene, const char made[], const char path[])
 {
   char *here, what[HYCO_LINE] = "";

@@ -139,6 +139,8 @@ PetscErrorCode HycoSceneReadHistory(HycoScene s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* By the entry, not by its value: a coefficient that is 0 at some parameters still makes the problem one of a path
+   with tangents, since types of models and sizes may not depend on mu. */
 PetscBool HycoSceneHasFriction(HycoScene s)
 {
   for (PetscInt k = 0; k < s->n_contacts; k++) {
@@ -182,6 +184,7 @@ PetscErrorCode HycoSceneCheckHistory(HycoScene s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Tables and times alone: their names are among those of the variables, which the scene frees. */
 PetscErrorCode HycoSceneDestroyHistory(HycoScene s)
 {
   PetscFunctionBegin;

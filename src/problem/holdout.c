@@ -74,6 +74,10 @@ static void PutOnFace(const Axes *axes, PetscInt k, PetscInt member, const Petsc
   point[p] = end % 2 ? hi[p] : lo[p];
 }
 
+/* Halton's sequence, dense in the ranges after any number of points, so that more points extend a set instead of
+   replacing it. Inner points alone would leave the boundary of the box, on which errors are largest, to
+   extrapolation: hence the turns of corners and faces. When all corners are there their turns go to inner points.
+   */
 PetscErrorCode HycoSamplesAddScattered(HycoSamples samples, PetscInt count)
 {
   PetscReal mu[HYCO_MAX_PARAMETERS];
@@ -303,6 +307,8 @@ PetscErrorCode HycoSamplesUnseen(HycoSamples samples, PetscInt first, PetscInt c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Both sets are of one scene: their points have the same components in the same order. A point in both occurs
+   twice. */
 PetscErrorCode HycoSamplesAddSet(HycoSamples samples, HycoSamples other)
 {
   PetscInt n, n_par;

@@ -4,6 +4,7 @@
 #include <string.h>
 #include <petscviewer.h>
 
+/* Borrowed arrays in the order of the components of mu. Any address may be NULL. */
 PetscErrorCode HycoSceneGetParameters(HycoScene scene, PetscInt *n, const char *const *names[], const PetscReal *lo[],
                                       const PetscReal *hi[])
 {
@@ -16,6 +17,8 @@ PetscErrorCode HycoSceneGetParameters(HycoScene scene, PetscInt *n, const char *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Outputs in the order of the entries, which is that of all arrays of their values. names: room for
+   HYCO_MAX_QUANTITIES, or NULL; borrowed. */
 PetscErrorCode HycoSceneGetQuantities(HycoScene scene, PetscInt *n, const char *names[HYCO_MAX_QUANTITIES])
 {
   PetscFunctionBegin;
@@ -25,6 +28,8 @@ PetscErrorCode HycoSceneGetQuantities(HycoScene scene, PetscInt *n, const char *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The order is that of the numbers in pairs, results and fields: by the entries of the scene. Called with NULL
+   first for the number, because scenes have no limit of contacts, unlike outputs. */
 PetscErrorCode HycoSceneGetContacts(HycoScene scene, PetscInt *n, const char *names[])
 {
   PetscFunctionBegin;
@@ -54,6 +59,8 @@ void HycoSceneNamePoint(HycoScene s, const PetscReal mu[], char at[HYCO_LINE])
   }
 }
 
+/* Before anything is assembled or predicted: a wrong number of values, or a point at which nothing was trained,
+   would still give plausible numbers. */
 PetscErrorCode HycoSceneCheckParameters(HycoScene scene, PetscInt n, const PetscReal mu[])
 {
   PetscFunctionBegin;
@@ -172,6 +179,7 @@ PetscErrorCode HycoSceneFingerprint(HycoScene scene, unsigned long long *hash)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The entries as they were given, after options have replaced some: what a run used can be read off a model. */
 PetscErrorCode HycoSceneView(HycoScene scene, PetscViewer viewer)
 {
   PetscFunctionBegin;

@@ -12,6 +12,7 @@ struct _p_HycoSamples {
   PetscReal *mu; /* n x n_parameters */
 };
 
+/* Keeps a reference to the scene, whose ranges the sets of points need at each call. */
 PetscErrorCode HycoSamplesCreate(HycoScene scene, HycoSamples *samples)
 {
   PetscFunctionBegin;
@@ -24,6 +25,7 @@ PetscErrorCode HycoSamplesCreate(HycoScene scene, HycoSamples *samples)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The scene lives on, if others refer to it. */
 PetscErrorCode HycoSamplesDestroy(HycoSamples *samples)
 {
   PetscFunctionBegin;
@@ -69,10 +71,12 @@ PetscErrorCode HycoSamplesAddProduct(HycoSamples s, const PetscInt counts[], con
   for (PetscInt p = 0; p < s->scene->n_parameters; p++) {
     HycoCheck(counts[p] >= 1, "parameter %s has %d values; at least 1 is needed", s->scene->parameter[p],
               (int)counts[p]);
+    /* By a quotient: the product itself could exceed 32 bits. */
     HycoCheck(total <= 100000000 / counts[p], "the set has more than 100 million points; use fewer per parameter");
     total *= counts[p];
   }
   for (PetscInt k = 0; k < total; k++) {
+    /* k in a number system whose digits have the bases counts[p]. */
     PetscInt rest = k;
 
     for (PetscInt p = s->scene->n_parameters - 1; p >= 0; p--) {
@@ -125,6 +129,8 @@ static PetscErrorCode AddGrid(HycoSamples s, const PetscInt counts[], PetscBool 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A closed grid has the ends of the ranges, and thus at least 2 points for each parameter; a centred one begins
+   half a step inside, and may have a single one. */
 PetscErrorCode HycoSamplesAddGrid(HycoSamples s, const PetscInt counts[], PetscBool closed)
 {
   PetscFunctionBegin;
@@ -140,6 +146,8 @@ PetscErrorCode HycoSamplesAddTrainingGrid(HycoSamples s, const PetscInt counts[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* For interpolation by polynomials: equidistant nodes have Lebesgue constants that grow exponentially with their
+   number, Chebyshev's only logarithmically. */
 PetscErrorCode HycoSamplesAddChebyshev(HycoSamples s, const PetscInt counts[])
 {
   PetscReal *values[HYCO_MAX_PARAMETERS];

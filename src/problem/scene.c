@@ -557,6 +557,7 @@ static PetscErrorCode CheckPlainEntry(HycoScene s, PetscInt entry)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Names of tables are free, so that only the beginning of a key can be checked. */
 static PetscErrorCode CheckHistoryEntry(const char key[])
 {
   static const char *const fields[] = {"times", "tables_NAME", NULL};
@@ -847,6 +848,8 @@ static PetscErrorCode SplitText(char text[], PetscInt *lines, char *key[], char 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* From the text that a model file stores, a line for each entry. No file is read: the mesh of a model is in its
+   file, and relative names are relative to the working folder. */
 PetscErrorCode HycoSceneFromText(MPI_Comm comm, const char text[], HycoScene *scene)
 {
   char *copy, **key, **value;

@@ -138,6 +138,7 @@ PetscErrorCode HycoROMSolveShared(MPI_Comm comm, HycoROM m, PetscInt n, PetscInt
     first[r] = (PetscMPIInt)((PetscInt64)n * r / size);
     count[r] = (PetscMPIInt)((PetscInt64)n * (r + 1) / size) - first[r];
   }
+  /* Results go directly to their places in the arrays of all points, which are then exchanged in place. */
   n_dof = (size_t)(n_nodes * dim);
   at = (size_t)first[HycoRank(comm)];
   HycoOnEach(comm, HycoROMSolveMany(m, count[HycoRank(comm)], n_parameters, mu + at * (size_t)n_parameters,

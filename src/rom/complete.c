@@ -63,6 +63,7 @@ static PetscErrorCode BringRows(HycoROM m, HycoFE fe, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rows of B and gaps at mu, for the contacts of the model's mesh. */
 PetscErrorCode HycoROMBringRows(HycoROM m, const PetscReal mu[])
 {
   PetscFunctionBegin;

@@ -12,6 +12,7 @@ struct _n_HycoCarried {
   HycoContactResult *result;      /* HycoSceneResults() */
 };
 
+/* NULL-safe: results are made at the first request. */
 PetscErrorCode HycoCarriedDestroy(HycoCarried *carried)
 {
   PetscFunctionBegin;

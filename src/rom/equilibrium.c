@@ -202,6 +202,7 @@ static PetscErrorCode March(HycoROM m, HycoBalance b, HycoReplay *replay)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Of values >= 0; 0 for none. */
 static PetscReal Largest(PetscInt n, const PetscReal value[])
 {
   PetscReal most = 0;

@@ -304,6 +304,8 @@ static PetscBool IsInconsistent(HycoROM m, PetscReal inconsistency)
 #define MOST_UNDER      30
 #define MOST_UNDER_PATH 2.5
 
+/* The fit extrapolates in its features; estimates far outside the errors that it was fitted to are not supported
+   by any of them. largest: of the held-out errors; 0: not known. */
 static PetscReal Clamped(HycoROM m, PetscReal estimate, PetscReal largest)
 {
   const PetscReal under = m->trace.n_listed ? MOST_UNDER_PATH : MOST_UNDER;

@@ -28,6 +28,8 @@ typedef struct {
   HycoPrediction prediction;
 } Fit;
 
+/* The optimiser's unknowns are shares of the ranges: parameters may differ by many orders of magnitude, and its
+   tolerances are absolute. Cut at the ends, because x may leave [0, 1] by round-off, and predict refuses it. */
 static void ToParameters(const Fit *f, const PetscReal x[], PetscReal mu[])
 {
   for (PetscInt p = 0; p < f->n_par; p++)
@@ -50,6 +52,7 @@ static PetscReal Value(const Fit *f, const HycoPrediction *p, PetscInt k)
   return q < n ? p->quantity[q] : p->path_quantity[q - n];
 }
 
+/* Divided by the scales, so that outputs of different units weigh the same. */
 static void Misfit(const Fit *f, const HycoPrediction *p, PetscReal r[])
 {
   for (PetscInt k = 0; k < f->n; k++) r[k] = (Value(f, p, k) - f->target[k]) / f->scale[k];

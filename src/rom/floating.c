@@ -17,6 +17,7 @@ struct _n_HycoFloating {
   HycoMesh mesh;          /* the cells with the loads of these bodies; NULL: there are none */
 };
 
+/* NULL-safe: models without floating bodies have none. */
 PetscErrorCode HycoFloatingDestroy(HycoFloating *floating)
 {
   HycoFloating f = *floating;

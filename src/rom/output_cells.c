@@ -343,6 +343,8 @@ PetscErrorCode HycoROMMeasurePath(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* On request, as most predictions of a search need none. Of a path first each listed time, then the one that is
+   shown. */
 PetscErrorCode HycoROMMeasureQuantities(HycoROM m, HycoPrediction *out)
 {
   PetscFunctionBegin;
@@ -399,6 +401,7 @@ static PetscErrorCode MakeFew(HycoROM m, HycoOutputCells all, PetscInt n, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Exchanges the two sets of cells; what balances the bodies belongs to neither, and moves along. */
 PetscErrorCode HycoROMUnfocusOutputs(HycoROM m)
 {
   const HycoOutputCells all = m->output_cells;
@@ -412,6 +415,8 @@ PetscErrorCode HycoROMUnfocusOutputs(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Makes the cells that decide the outputs at this prediction the ones that are measured, until
+   HycoROMUnfocusOutputs(): gradients measure twice for each parameter. */
 PetscErrorCode HycoROMFocusOutputs(HycoROM m, const PetscReal value[], PetscBool *focused)
 {
   HycoOutputCells p = m->output_cells;
@@ -436,6 +441,7 @@ PetscErrorCode HycoROMFocusOutputs(HycoROM m, const PetscReal value[], PetscBool
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* NULL: no output reads a cell, as where all are of contacts. */
 HycoFE HycoROMGetOutputCells(HycoROM m)
 {
   return m->output_cells ? m->output_cells->fe : NULL;
@@ -447,6 +453,8 @@ void HycoROMGetOutputFields(HycoROM m, const PetscReal *u[], const PetscReal *si
   *sigma = m->output_cells ? m->output_cells->sigma : NULL;
 }
 
+/* Outputs of given fields by the same code as those of predictions: errors and calibration compare like with like.
+   */
 PetscErrorCode HycoROMMeasureSolution(HycoROM m, const PetscReal mu[], const PetscReal u[], const PetscReal sigma[],
                                       const PetscReal reaction[], const PetscReal Lambda[], PetscReal value[])
 {

@@ -18,6 +18,8 @@ static PetscErrorCode Follow(void *context, const PetscReal mu[], const HycoStep
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
+  /* The difference of two paths is a small share of either: what Newton's method leaves must be small beside it.
+     */
   trace->rtol = HYCO_GRADIENT_RTOL;
   trace->n_given = o->n;
   trace->given = o->taken;
@@ -45,12 +47,14 @@ PetscErrorCode HycoROMPathGradient(HycoROM m, HycoGradient *gradient)
   PetscFunctionBegin;
   PetscCall(HycoROMGetHistory(m, &history));
   HycoCheck(history.ended, "there is no gradient: the path ends at t = %g, before its last time", (double)history.t);
+  /* Copies: predictions beside mu overwrite both. */
   PetscCall(PetscArraycpy(mu, m->fe->mu, m->model->scene->n_variables));
   o.n = history.n_taken;
   HycoDuplicate(o.n, history.taken, &o.taken);
   ierr = HycoGradientOfPath(m->model->scene, mu, history.step, &m->gradient, gradient, Follow, &o);
   if (!ierr) ierr = HycoROMPredict(m, m->model->scene->n_parameters, mu);
   if (!ierr) ierr = HycoROMSetStep(m, shown);
+  /* The handle then has the results of a path beside the one that was asked for. */
   if (ierr) m->solved = PETSC_FALSE;
   PetscCall(PetscFree(o.taken));
   PetscCall(ierr);

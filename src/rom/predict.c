@@ -35,6 +35,8 @@ PetscErrorCode HycoROMSetUpDefault(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A handle's own pairs. Masters of moved surfaces change with each prediction, so that they are copied; otherwise
+   the arrays of the model are used, which handles share. */
 PetscErrorCode HycoROMTakePairs(const HycoPairs *of, HycoPairs *own)
 {
   PetscFunctionBegin;
@@ -47,6 +49,7 @@ PetscErrorCode HycoROMTakePairs(const HycoPairs *of, HycoPairs *own)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Arrays of the model are not freed: room is 0 for those that are shared. */
 PetscErrorCode HycoROMDropPairs(HycoPairs *own)
 {
   PetscFunctionBegin;
@@ -73,6 +76,8 @@ PetscErrorCode HycoROMSetUp(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The order: a solve on the RID, forces elsewhere (41), then the balance of floating bodies, which all forces
+   enter. */
 PetscErrorCode HycoROMPredict(HycoROM m, PetscInt n, const PetscReal mu[])
 {
   HycoPrediction *p;

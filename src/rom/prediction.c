@@ -4,6 +4,7 @@
 #include <petscviewer.h>
 #include <string.h>
 
+/* After a failed prediction too: m->solved is set at its end only. */
 static PetscErrorCode CheckSolved(HycoROM m)
 {
   PetscFunctionBegin;
@@ -183,6 +184,8 @@ PetscErrorCode HycoROMGetRID(HycoROM m, PetscInt *n_nodes, const PetscInt *node_
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* All contacts of the scene in its order, also those outside the RID; in_rid: 1 where the force is a multiplier, 0
+   where it is reconstructed. */
 PetscErrorCode HycoROMGetLambda(HycoROM m, PetscInt *n_contacts, const PetscReal *Lambda[], const PetscInt *node_ids[],
                                 const PetscInt *in_rid[])
 {
@@ -273,6 +276,8 @@ static PetscErrorCode WritePoint(HycoROM m, const PetscReal mu[], HycoFieldFile 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Every point is checked before the first is predicted: the file would be removed at the first wrong one, after
+   all work before it. */
 PetscErrorCode HycoROMWriteMany(HycoROM m, PetscInt n, PetscInt n_parameters, const PetscReal mu[], const char path[])
 {
   HycoFieldFile file;
@@ -292,6 +297,8 @@ PetscErrorCode HycoROMWriteMany(HycoROM m, PetscInt n, PetscInt n_parameters, co
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What a user needs to judge a model without its scene: type, training, errors, provenance, and the scene as it
+   was. */
 PetscErrorCode HycoROMView(HycoROM m, PetscViewer viewer)
 {
   PetscInt pod;

@@ -16,6 +16,8 @@ PetscErrorCode HycoReplayMove(HycoReplay *r, PetscInt k)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Nothing is solved here: the displacements of a path are known, and the laws follow them from the first time on,
+   on any part of the mesh. */
 PetscErrorCode HycoReplayBegin(HycoROM m, HycoFE fe, HycoReplay *r)
 {
   PetscFunctionBegin;
@@ -25,6 +27,8 @@ PetscErrorCode HycoReplayBegin(HycoROM m, HycoFE fe, HycoReplay *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The accepted times of the path are the steps: with others the implicit laws would give other states than the
+   path itself. */
 PetscErrorCode HycoReplayTry(HycoReplay *r, PetscInt k, const PetscReal u[], HycoFEStepReport *report)
 {
   const PetscReal *t = r->m->trace.t;
@@ -57,6 +61,7 @@ PetscErrorCode HycoReplayEnd(HycoReplay *r)
 static HycoSeriesSource Look(const HycoReplay *r, PetscInt j)
 {
   HycoROM m = r->m;
+  /* On one process the whole mesh has the surfaces: one FE serves both. */
   const HycoSeriesSource from = {.comm = PETSC_COMM_SELF,
                                  .fe = m->fe_whole,
                                  .state = r->march.state,

@@ -90,6 +90,8 @@ PetscErrorCode HycoResultantsCreate(HycoROM m, PetscBool balanced[], HycoMesh lo
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* In training, on the whole mesh. A reaction from the balance of forces has the accuracy of the contact forces,
+   one from the internal forces that of the modes. */
 PetscErrorCode HycoResultantsFind(HycoROM m, HycoResultants *resultants)
 {
   PetscBool *balanced, *needed;
@@ -169,6 +171,8 @@ static PetscErrorCode BringLoads(HycoResultants r, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Overwrites the outputs whose bodies are in balance: support = - contact - loads. The others keep what was
+   measured from the internal forces. */
 PetscErrorCode HycoResultantsSet(HycoROM m, HycoResultants r, const PetscReal mu[], const PetscReal Lambda[],
                                  PetscReal value[])
 {

@@ -18,6 +18,7 @@ static PetscErrorCode CreateHandle(HycoROM *rom)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* An empty model to be filled by a training or a file. The one reference is the handle's. */
 PetscErrorCode HycoROMCreate(HycoROM *rom)
 {
   PetscFunctionBegin;
@@ -48,6 +49,8 @@ PetscErrorCode HycoROMClone(HycoROM m, HycoROM *clone)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Those of predict are declared for its help alone; -hyco_reconstruct concerns trainings too, whose judgement
+   predicts. */
 PetscErrorCode HycoROMSetFromOptions(HycoROM m)
 {
   PetscFunctionBegin;
@@ -175,6 +178,8 @@ static PetscErrorCode CreateNodes(PetscInt n, const PetscInt sets[], PetscInt le
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* sets[node]: 1 on the interface, 2 inside A, 0 elsewhere. As two IS, which is what reduced systems are made of.
+   */
 PetscErrorCode HycoROMSetDomain(HycoROM m, const PetscInt sets[])
 {
   PetscFunctionBegin;
@@ -183,6 +188,7 @@ PetscErrorCode HycoROMSetDomain(HycoROM m, const PetscInt sets[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The inverse of HycoROMSetDomain(), for files. */
 PetscErrorCode HycoROMGetDomain(HycoROM m, PetscInt sets[])
 {
   const IS each[2] = {m->model->rid, m->model->inside};
@@ -254,6 +260,7 @@ PetscErrorCode HycoROMSetMonitor(HycoROM m, HycoMonitor monitor, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Modes that were added to the POD's (supremizers, for instance) come last and have no singular value. */
 PetscInt HycoROMCountPOD(HycoROM m)
 {
   PetscInt l = m->model->l;

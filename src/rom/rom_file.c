@@ -58,6 +58,7 @@ static PetscErrorCode MovePairs(HycoH5 h, PetscInt n_nodes, PetscInt n_contacts,
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Words, not numbers, are stored: the order of an enumeration may change between versions. */
 PetscErrorCode HycoROMLoadWord(HycoROM m, HycoH5 h, const char name[], const char *const words[], PetscInt *index)
 {
   char *text;
@@ -258,6 +259,7 @@ static PetscErrorCode LoadOutputEstimates(HycoH5 h, HycoROM m)
     o->median = *at++;
     o->largest = *at++;
     for (PetscInt j = 0; j <= HYCO_ESTIMATE_FEATURES; j++) o->law[j] = *at++;
+    /* An estimate without held-out points or size cannot have been written. */
     good = (PetscBool)(good && (!o->has || (o->magnitude > 0 && t->n)));
   }
   PetscCall(PetscFree(numbers));
@@ -584,6 +586,8 @@ static PetscErrorCode FromImage(void *image, size_t size, HycoROM *model)
 /* Largest message: an MPI count is an int. */
 #define MOST_BYTES ((size_t)1 << 30)
 
+/* As the bytes of a model file, so that what ranks get is what a file would give. In pieces, since the count of an
+   MPI message is an int. */
 PetscErrorCode HycoROMBroadcast(MPI_Comm comm, HycoROM *model)
 {
   PetscMPIInt rank;

@@ -37,6 +37,8 @@ PetscErrorCode HycoTraceBegin(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Coefficients and full-order unknowns of an accepted time, from which all displacements follow: the states of the
+   laws are not stored, a replay computes them. */
 PetscErrorCode HycoTraceAdd(HycoROM m, PetscReal t)
 {
   const size_t l = (size_t)m->model->l, n_fe = (size_t)m->model->n_fe;
@@ -57,6 +59,7 @@ PetscErrorCode HycoTraceAdd(HycoROM m, PetscReal t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Room of the listed time for what the type computes there; the caller fills stresses and inelastic strains. */
 PetscErrorCode HycoTraceList(HycoROM m, PetscReal **sigma, PetscReal **inelastic)
 {
   HycoTrace *r = &m->trace;
@@ -72,6 +75,7 @@ PetscErrorCode HycoTraceList(HycoROM m, PetscReal **sigma, PetscReal **inelastic
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The norm is over the RID, the sums over all contacts. A step begins with zeros. */
 PetscErrorCode HycoTraceMeasure(HycoROM m, HycoStep *s)
 {
   const PetscInt dim = m->fe->dim, *node;
@@ -129,6 +133,7 @@ PetscErrorCode HycoTraceRecord(HycoROM m, PetscBool linear, HycoFEState state, H
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The options of time steps are those of full order, and mean the same. */
 PetscErrorCode HycoTraceOptions(HycoROM m, HycoPath p)
 {
   PetscFunctionBegin;
@@ -152,6 +157,8 @@ static void Summarise(HycoPath p, HycoPrediction *out)
   }
 }
 
+/* Given steps: those of the full order path, so that the error in time is that of both and cancels in comparisons.
+   rtol of gradients is smaller, for differences of paths, and is restored. */
 PetscErrorCode HycoTraceFollow(HycoROM m, HycoPath p, const PetscReal mu[])
 {
   HycoPrediction *out = &m->prediction;
@@ -199,6 +206,7 @@ void HycoTraceWholeU(HycoROM m, PetscInt k, PetscReal U[])
   HycoFEComplete(m->fe_whole, U);
 }
 
+/* Largest values over the listed times, for the table of a set of paths. */
 void HycoTraceSummary(HycoROM m, HycoPrediction *p)
 {
   const HycoHistory *h = &m->trace.history;
@@ -278,6 +286,8 @@ PetscErrorCode HycoROMSetSteps(HycoROM m, PetscInt n, const PetscReal t[])
   16 /* limit of halved steps when training judges a model, which otherwise could take minutes to                      \
         fail */
 
+/* A path that needs many more steps than full order is a failure of the model, which judging it need not follow to
+   its end. */
 PetscErrorCode HycoROMSetJudgedSteps(HycoROM m, PetscInt n, const PetscReal t[])
 {
   PetscFunctionBegin;

@@ -599,6 +599,7 @@ PetscErrorCode HycoSolverSetStartSet(HycoSolver s, const PetscBool active[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Not referenced: the caller keeps it until the solve. NULL: none. */
 PetscErrorCode HycoSolverSetOtherStart(HycoSolver s, Vec L)
 {
   PetscFunctionBegin;

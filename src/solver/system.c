@@ -134,6 +134,7 @@ PetscErrorCode HycoSystemSetFlexibility(HycoSystem s, Mat G, Vec g)
   PetscCall(MatGetSize(G, &rows, &cols));
   PetscCall(VecGetSize(g, &m));
   if (dense) PetscCall(MatDenseGetLDA(G, &lda));
+  /* BLAS and the factor of the set take the array as it lies. */
   PetscCheck(dense && lda == rows && rows == cols && m == rows, PETSC_COMM_SELF, PETSC_ERR_ARG_SIZ,
              "G is %d x %d and g has length %d; G must be dense on one process, square, and g as long", (int)rows,
              (int)cols, (int)m);

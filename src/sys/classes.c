@@ -40,6 +40,7 @@ PetscErrorCode HycoClassesForget(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A class without its number would be an error deep inside PETSc, in a line that no user understands. */
 PetscErrorCode HycoPackageCheck(void)
 {
   PetscFunctionBegin;

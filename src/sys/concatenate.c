@@ -34,12 +34,15 @@ PetscErrorCode HycoConcatenate(MPI_Comm comm, PetscInt n, const void *mine, MPI_
   return Concatenate(comm, PETSC_FALSE, n, mine, type, size, n_all, all);
 }
 
+/* The same on every rank. */
 PetscErrorCode HycoConcatenateAll(MPI_Comm comm, PetscInt n, const void *mine, MPI_Datatype type, size_t size,
                                   PetscInt *n_all, void *all)
 {
   return Concatenate(comm, PETSC_TRUE, n, mine, type, size, n_all, all);
 }
 
+/* Every rank gets all entries, for vectors of the contacts' size alone. Counts and offsets are ints of MPI, which
+   PetscMPIIntCast() checks. */
 PetscErrorCode HycoVecGather(Vec v, PetscReal all[])
 {
   PetscMPIInt ranks, count, *counts, *offsets;

@@ -5,6 +5,7 @@
 #include <string.h>
 #include <time.h>
 
+/* An environment variable, because errors may come before options are read. */
 PetscBool HycoWantsTrace(void)
 {
   const char *trace = getenv("HYCO_TRACE");
@@ -44,6 +45,7 @@ static size_t Printable(const unsigned char *c)
   return c[0] == 0xc2 && c[1] < 0xa0 ? 0 : n;
 }
 
+/* A message may quote a file's bytes: control characters would move a terminal's cursor or break the one line. */
 void HycoMakePrintable(char text[])
 {
   for (char *c = text; *c;) {
@@ -66,6 +68,7 @@ void HycoFormat(char line[HYCO_LINE], const char format[], ...)
   HycoPointEnd(before);
 }
 
+/* Cut at the length of a line: the first names are enough for a message. */
 PetscErrorCode HycoListAdd(char list[HYCO_LINE], const char between[], const char name[])
 {
   PetscFunctionBegin;
@@ -84,6 +87,8 @@ PetscErrorCode HycoCatchBegin(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The line of the error that was caught, or an empty one. The caller decides, usually after all ranks have agreed.
+   */
 PetscErrorCode HycoCatchEnd(PetscErrorCode caught, char message[HYCO_LINE])
 {
   PetscFunctionBegin;
@@ -144,6 +149,7 @@ PetscReal HycoCPU(void)
   return (PetscReal)now.tv_sec + 1e-9 * (PetscReal)now.tv_nsec;
 }
 
+/* Seconds of a clock that nobody sets, hence for differences alone. */
 PetscReal HycoNow(void)
 {
   struct timespec now;

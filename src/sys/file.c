@@ -40,6 +40,7 @@ static unsigned Node(void)
   }
   m = readlink("/proc/self/ns/pid", text + n, sizeof(text) - n);
   if (m > 0) n += (size_t)m;
+  /* Never 0, which says that it has not been computed. */
   node = (unsigned)HycoHash(HYCO_HASH_START, text, n) | 1u;
   return node;
 }
@@ -108,8 +109,10 @@ PetscErrorCode HycoFileSweep(const char path[])
     long pid;
     const char *tag = FindTag(entry->d_name, &node, &pid);
 
+    /* Only temporary files of this very output: the tag stands after its whole name. */
     if (!tag || (n && ((size_t)(tag - entry->d_name) != n || strncmp(entry->d_name, base, n)))) continue;
     snprintf(file, sizeof(file), "%.*s%s", (int)(base - place), place, entry->d_name);
+    /* A process that runs may be a training on the same folder: its file stays. */
     if (IsLeft(file, node, pid)) (void)unlink(file);
   }
   if (folder) closedir(folder);
@@ -178,6 +181,8 @@ static PetscErrorCode CheckOpen(const char path[], PetscBool good)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* O_EXCL: a temporary name belongs to one process. Another one of this name would be a run that shares the process
+   number, and must not be overwritten. */
 PetscErrorCode HycoFileOpenScratch(const char scratch[], const char path[], int *fd)
 {
   PetscFunctionBegin;
@@ -258,6 +263,7 @@ PetscErrorCode HycoFileComplain(const char shown[], int failed)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Bytes that were given to the stream may still be in its buffer: a full disk shows here. */
 PetscErrorCode HycoFileFlush(HycoFile file)
 {
   PetscFunctionBegin;

@@ -192,6 +192,7 @@ static PetscErrorCode JoinShared(HycoH5 f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rank 0 creates the file before the others open it. An error of either is that of all. */
 static PetscErrorCode OpenShared(HycoH5 f)
 {
   PetscFunctionBegin;
@@ -231,6 +232,8 @@ PetscErrorCode HycoH5CreateShared(MPI_Comm comm, const char path[], HycoH5 *file
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A file whose datasets are the columns of a table and nothing else: that it is complete is said by an attribute.
+   Collective. */
 PetscErrorCode HycoH5CreateTable(MPI_Comm comm, const char path[], HycoH5 *file)
 {
   PetscFunctionBegin;
@@ -572,6 +575,7 @@ PetscErrorCode HycoH5WriteReal(HycoH5 file, const char name[], PetscInt rows, Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Half the bytes, for data whose error is far above 1e-7. */
 PetscErrorCode HycoH5WriteSingle(HycoH5 file, const char name[], PetscInt rows, PetscInt cols, const float *data)
 {
   PetscFunctionBegin;
@@ -586,6 +590,7 @@ PetscErrorCode HycoH5WriteInt(HycoH5 file, const char name[], PetscInt rows, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Arrays of bytes: HDF5's strings have variants that not every reader knows. */
 PetscErrorCode HycoH5WriteText(HycoH5 file, const char name[], const char text[])
 {
   PetscFunctionBegin;
@@ -709,6 +714,7 @@ PetscBool HycoH5Has(HycoH5 file, const char name[])
   return (PetscBool)(H5Lexists(file->id, name, file->access) > 0);
 }
 
+/* From the header of a dataset of reals: nothing is read. */
 PetscErrorCode HycoH5GetSize(HycoH5 file, const char name[], PetscInt *rows, PetscInt *cols)
 {
   hid_t set;
@@ -836,6 +842,8 @@ PetscErrorCode HycoH5Real(HycoH5 file, const char name[], PetscInt *rows, PetscI
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* One call for both directions: code that moves an object writes and reads it by the same lines. Read values lie
+   in lo to hi, or the file is refused. */
 PetscErrorCode HycoH5Int(HycoH5 file, const char name[], PetscInt lo, PetscInt hi, PetscInt *rows, PetscInt cols,
                          PetscInt **data)
 {

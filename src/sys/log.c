@@ -34,6 +34,8 @@ static PetscBool registered = PETSC_FALSE;
 static volatile int depth, running[DEEPEST];
 static const char *volatile stage_runs;
 
+/* Read by the thread of the progress, without a lock: it may show a word that is just over, never a wrong pointer.
+   */
 const char *HycoLogDoing(void)
 {
   const int n = depth;

@@ -108,6 +108,7 @@ const HycoOption *HycoOptionFind(const char name[])
   return HycoOptionListFind(&table, name);
 }
 
+/* Options of earlier versions are named with their successors, instead of having no effect. */
 PetscErrorCode HycoOptionsCheckName(const char name[])
 {
   PetscFunctionBegin;
@@ -156,6 +157,7 @@ static void Compare(const char *word, const char *name, PetscInt *best, const ch
   *nearest = name;
 }
 
+/* For "did you mean": NULL if every name differs by more than a typing error. */
 const char *HycoNearest(const char *word, PetscInt n, const char *const names[])
 {
   const char *nearest = NULL;

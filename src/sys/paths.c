@@ -44,11 +44,13 @@ void HycoFileIdentify(const char path[], HycoFileIdentity *identity)
 
   memset(identity, 0, sizeof(*identity));
   identity->exists = (PetscBool)(stat(path, &info) == 0);
+  /* /dev/null, a terminal: no file that could be overwritten. */
   identity->open_device = (PetscBool)(identity->exists && S_ISCHR(info.st_mode));
   if (!identity->exists) {
     HycoFileFollow(path, end);
     slash = strrchr(end, '/');
     snprintf(identity->name, sizeof(identity->name), "%s", slash ? slash + 1 : end);
+    /* The root folder keeps its slash. */
     if (slash) slash[slash == end] = '\0';
     if (stat(slash ? end : ".", &info) != 0) {
       snprintf(identity->name, sizeof(identity->name), "%s", path);

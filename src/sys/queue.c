@@ -32,6 +32,7 @@ static PetscErrorCode SortKinds(HycoQueue q, PetscInt n, const PetscInt kind[])
   for (PetscInt i = 0; i < n; i++) {
     if (sorted[i]) continue;
     q->first[q->n_kinds++] = at;
+    /* Those of kind[i] in their own order; kind NULL: all are of one kind. */
     for (PetscInt j = i; j < n; j++) {
       if (sorted[j] || (kind && kind[j] != kind[i])) continue;
       q->order[at++] = j;

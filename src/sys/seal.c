@@ -19,6 +19,7 @@ static unsigned long long LoadWord(const unsigned char byte[8])
   return word;
 }
 
+/* Little endian on any machine: seals are compared between machines. */
 static void StoreWord(unsigned long long word, unsigned char byte[8])
 {
   for (int k = 0; k < 8; k++, word >>= 8) byte[k] = (unsigned char)(word & 255);
@@ -38,6 +39,7 @@ static unsigned long long Sum(unsigned long long sum, const unsigned char *data,
   return HycoHash(sum, data + k, bytes - k);
 }
 
+/* Magic number, length, checksum: a file that was cut, extended or changed in any bit does not match. */
 void HycoSealMake(const void *data, size_t bytes, unsigned char seal[HYCO_SEAL])
 {
   memcpy(seal, magic, 8);

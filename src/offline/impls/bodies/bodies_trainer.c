@@ -88,6 +88,7 @@ static const char *const *Variants(HycoReducer t)
   return HycoBodiesFlow(t) && !HycoTrainingOfBodies(t)->named ? variants : NULL;
 }
 
+/* Interpolation unless cubature is named: the search tries variants in the order of their cost. */
 static PetscErrorCode SetVariant(HycoReducer t, const char name[])
 {
   PetscFunctionBegin;

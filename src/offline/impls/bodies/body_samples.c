@@ -72,6 +72,7 @@ static PetscErrorCode SetGrid(HycoReducer t, HycoSubstructures b)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* k counts the nodes of the tensor grid, the last parameter fastest. */
 void HycoBodiesPoint(HycoReducer t, PetscInt k, PetscReal theta[])
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
@@ -110,6 +111,7 @@ static PetscErrorCode TakeRecords(HycoReducer t, HycoBodiesFactor *factor, const
   for (PetscInt k = 0; k < b->n; k++) {
     HycoSubstructure *s = &b->body[k];
     HycoBodyFactor *body = &factor->body[k];
+    /* Sizes of a sample's responses to the loads, of its rigid motions, and of the loads' work on these. */
     const size_t R = (size_t)(s->n * b->r), Z = (size_t)(s->n * b->p), work = (size_t)(b->p * b->r),
                  samples = (size_t)s->n_samples;
 
@@ -123,6 +125,7 @@ static PetscErrorCode TakeRecords(HycoReducer t, HycoBodiesFactor *factor, const
       const HycoBodyRecord *r = &body->record[record[j * b->n + k]];
       const PetscInt at = HycoBodiesSampleOf(b, k, j);
 
+      /* A body has a sample for each node of its own parameters only, which many nodes of the grid share. */
       if (at < 0) continue;
       body->sample[at] = record[j * b->n + k];
       PetscCall(PetscArraycpy(s->R + (size_t)at * R, r->R, R));

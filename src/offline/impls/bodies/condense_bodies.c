@@ -95,6 +95,8 @@ PetscReal HycoBodiesOperations(HycoReducer t)
          (SOLVES * (PetscReal)s->samples + strains) * HycoReducerSolveWork(t);
 }
 
+/* Whether the search may try the type without being told to. Whether bodies are recognised is found later, at the
+   samples. */
 PetscBool HycoBodiesOffers(HycoReducer t, PetscBool targets, size_t length, char why[])
 {
   (void)targets;

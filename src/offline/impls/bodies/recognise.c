@@ -325,6 +325,7 @@ static PetscErrorCode VisitTogether(Compared *c, const PetscReal first[])
    of an expression, at which nothing seems to change. */
 static PetscErrorCode Visit(Compared *c, const PetscReal first[])
 {
+  /* Not at simple fractions, where symmetric expressions have equal values. */
   static const PetscReal share[2] = {0.137, 0.829};
   HycoScene s = c->f->scene;
   PetscReal mu[HYCO_MAX_PARAMETERS];
@@ -343,6 +344,7 @@ static PetscErrorCode Visit(Compared *c, const PetscReal first[])
     for (PetscInt k = 0; k < c->parts->n; k++) {
       PetscInt ways = Ways(c, k);
 
+      /* A body that is only moved needs no sample: in its own axes it stays the same. */
       if (moved[k] && !(ways & (HYCO_ENTERS_SHAPE | HYCO_ENTERS_SIZE))) ways |= HYCO_ENTERS_PLACE;
       c->parts->enters[k * s->n_parameters + p] |= ways;
     }
@@ -443,6 +445,7 @@ PetscInt HycoBodyPartsShapes(const HycoBodyParts *parts, PetscInt b, PetscInt pa
   return n;
 }
 
+/* The first body that no model of bodies can represent, for the message; -1: none. */
 PetscInt HycoBodyPartsFail(const HycoBodyParts *parts)
 {
   for (PetscInt k = 0; k < parts->n; k++) {

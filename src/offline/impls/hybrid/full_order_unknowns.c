@@ -28,6 +28,7 @@ static PetscErrorCode SetFromOptions(HycoReducer t)
   PetscFunctionBegin;
   PetscCall(PetscNew(&s));
   t->training = s;
+  /* Not 0, which is a value of its own: plain least squares. */
   s->ridge = -1;
   PetscObjectOptionsBegin((PetscObject)t);
   PetscCall(HycoOptionsFor("hybrid"));

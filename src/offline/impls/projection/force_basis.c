@@ -38,6 +38,7 @@ PetscErrorCode HycoForceBasisSetFromOptions(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Nonnegative vectors are the default: few unknowns. The store of settings is freed with the training. */
 static PetscErrorCode SetFromOptions(HycoReducer t)
 {
   HycoForceBasis s;

@@ -145,6 +145,7 @@ static PetscErrorCode ReadTerms(HycoH5 h, const char model[], const char path[],
                 path);
     EACH_ENTRY(C->n, k, i, u)
     {
+      /* Both triangles in memory: predictions read whole columns. */
       HycoFlexibilitySetEntry(C, t, u, i, row[k]);
       HycoFlexibilitySetEntry(C, t, i, u, row[k]);
     }
@@ -153,6 +154,7 @@ static PetscErrorCode ReadTerms(HycoH5 h, const char model[], const char path[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Terms in double precision, of symmetric matrices the entries of one triangle. */
 static PetscErrorCode WriteTerms(HycoH5 h, const char path[], const HycoFlexibility *C)
 {
   const size_t length = (size_t)C->n * (size_t)(C->n + 1) / 2;
@@ -167,6 +169,8 @@ static PetscErrorCode WriteTerms(HycoH5 h, const char path[], const HycoFlexibil
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Terms in single precision apart, as float in the file too: most of a model's size is theirs, and a double would
+   not make them more accurate. */
 static PetscErrorCode WriteShortTerms(HycoH5 h, const char path[], const HycoFlexibility *C)
 {
   const size_t length = (size_t)C->n * (size_t)(C->n + 1) / 2;
@@ -208,6 +212,7 @@ static PetscErrorCode MoveFlexibility(HycoH5 h, const char model[], HycoSubstruc
   char path[64];
 
   PetscFunctionBegin;
+  /* An older format: the samples themselves, from which the polynomial is made on load. */
   if (HycoH5Reads(h) && HycoH5Has(h, At(k, "C", path))) {
     PetscCall(LoadSamples(h, path, s));
     PetscFunctionReturn(PETSC_SUCCESS);
@@ -215,6 +220,7 @@ static PetscErrorCode MoveFlexibility(HycoH5 h, const char model[], HycoSubstruc
   PetscCall(HycoH5Ints(h, At(k, "flexibility_head", path), 1, s->n_samples, 2, head));
   C->n = s->n;
   C->n_terms = head[0];
+  /* A damaged number would be a length of an array below. */
   C->n_wide = PetscMin(head[1], head[0]);
   PetscCall(HycoH5Int(h, At(k, "flexibility_terms", path), 0, s->n_samples - 1, &C->n_terms, 1, &C->term));
   if (!HycoH5Reads(h)) {
@@ -224,6 +230,7 @@ static PetscErrorCode MoveFlexibility(HycoH5 h, const char model[], HycoSubstruc
   }
   PetscCall(HycoFlexibilityTakePolynomials(C, &s->tensor));
   PetscCall(HycoFlexibilityAllocate(C));
+  /* A body without a surface that may touch: the datasets have no rows. */
   if (!C->n) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(ReadTerms(h, model, At(k, "flexibility", path), C, 0, C->n_wide));
   PetscCall(ReadTerms(h, model, At(k, "flexibility_single", path), C, C->n_wide, C->n_terms));

@@ -56,6 +56,7 @@ PetscErrorCode HycoBodiesFrictionCreate(HycoScene scene, const HycoBodiesSurface
   f = *friction;
   f->normal = *surface;
   PetscCall(HycoSlipCreate(PETSC_COMM_SELF, scene, surface->pairs, surface->fe->dim, &f->slip));
+  /* Rows of normals and tangents, whose number fixes the sizes below. */
   PetscCall(CreateRows(f));
   PetscCall(PetscCalloc1(surface->fe->n_dof, &f->U));
   PetscCall(PetscCalloc1(surface->fe->n_dof, &f->U_old));
@@ -85,6 +86,7 @@ PetscErrorCode HycoBodiesFrictionDestroy(HycoBodiesFriction *friction)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The surface with a row for each normal and tangent. Borrowed; the normal rows alone are those of the model. */
 const HycoBodiesSurface *HycoBodiesFrictionSurface(HycoBodiesFriction f)
 {
   return &f->all;
@@ -198,6 +200,9 @@ static PetscErrorCode Measure(HycoBodiesFriction f, const PetscReal L[], HycoKKT
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The start is the accepted forces of the last step, not those of an attempt: a halved step must give what it
+   would have given at once. Displacements follow from the forces by the bodies' flexibilities, and the residuals
+   from both, not from the solver's word. */
 PetscErrorCode HycoBodiesFrictionSolve(HycoBodiesFriction f, HycoBodiesWork o, PetscReal t, HycoKKT *kkt, PetscInt *its,
                                        PetscBool *solved)
 {
@@ -238,6 +243,7 @@ PetscErrorCode HycoBodiesFrictionAccept(HycoBodiesFriction f, PetscReal t)
   PetscFunctionBegin;
   PetscCall(VecGetArrayRead(f->L, &L));
   HycoSlipAdd(&f->slip, L, f->w, f->most);
+  /* The last two accepted forces, in this order: the next step extrapolates from them. */
   PetscCall(PetscArraycpy(f->before, f->forces, f->all.n));
   PetscCall(PetscArraycpy(f->forces, L, f->all.n));
   HycoSlipTake(&f->slip, t);
@@ -246,6 +252,7 @@ PetscErrorCode HycoBodiesFrictionAccept(HycoBodiesFriction f, PetscReal t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Back to the accepted forces after a refused step; displacements of the bodies are made from them. */
 void HycoBodiesFrictionRestore(HycoBodiesFriction f, HycoBodiesWork o)
 {
   PetscScalar *L;
@@ -266,6 +273,7 @@ void HycoBodiesFrictionNormal(HycoBodiesFriction f, PetscReal Lambda[])
   PetscCallVoid(VecRestoreArrayRead(f->L, &L));
 }
 
+/* Borrowed, for outputs and fields: slip, states and work since the path began. */
 const HycoSlip *HycoBodiesFrictionSlip(HycoBodiesFriction f)
 {
   return &f->slip;

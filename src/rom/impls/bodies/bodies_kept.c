@@ -165,11 +165,13 @@ static PetscErrorCode BlendColumn(HycoBodiesWork o, PetscInt k, PetscInt j, cons
   if (!kept->blend[at]) {
     PetscCall(PetscMalloc1(own->n + 1, &kept->blend[at]));
     kept->bytes += 8 * (PetscReal)own->n;
+    /* No weights have this number: the room is not yet a column. */
     kept->at_weights[at] = -1;
   }
   *column = kept->blend[at];
   if (kept->at_weights[at] == kept->weights[j]) PetscFunctionReturn(PETSC_SUCCESS);
   HycoBodiesBlend(o, j, own->n, (size_t)own->n, kept->P[at], kept->blend[at]);
+  /* Weights are compared by their number, which grows with each change, and not entry by entry. */
   kept->at_weights[at] = kept->weights[j];
   PetscFunctionReturn(PETSC_SUCCESS);
 }

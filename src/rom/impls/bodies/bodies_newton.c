@@ -233,7 +233,7 @@ static PetscErrorCode FactorAll(HycoROM m, PetscBool *independent)
     for (PetscInt i = 0; i < n; i++) w->U[k * n + i] = i <= k ? SetEntry(w, p, w->set[k], w->set[i]) : 0;
   }
   PetscCall(PetscBLASIntCast(n, &nb));
-  /* Only the upper triangle is filled; zeros below let FactorEach() share the layout. */
+  /* By columns, the upper triangle: potrf and trsm read nothing below it. */
   if (n) LAPACKpotrf_("U", &nb, w->U, &nb, &info);
   *independent = (PetscBool)!info;
   for (PetscInt k = 0; k < n && *independent; k++) {
@@ -317,6 +317,7 @@ static PetscErrorCode TakeMotions(HycoBodiesPath w, PetscInt p)
   PetscFunctionBegin;
   w->loose = PETSC_FALSE;
   if (!p) PetscFunctionReturn(PETSC_SUCCESS);
+  /* Their sizes follow the set. */
   HycoFreeAll(&w->Y, &w->H);
   PetscCall(PetscMalloc1(w->n_set * p + 1, &w->Y));
   PetscCall(PetscCalloc1(p * p, &w->H));
@@ -326,8 +327,10 @@ static PetscErrorCode TakeMotions(HycoBodiesPath w, PetscInt p)
     for (PetscInt d = 0; d < p * p; d++) w->H[d] += w->G[w->set[i] * p + d / p] * w->Y[i * p + d % p];
   }
   PetscCall(PetscBLASIntCast(p, &n));
+  /* Symmetric, so that by rows or by columns is the same. */
   LAPACKpotrf_("U", &n, w->H, &n, &info);
   for (PetscInt d = 0; d < p && !info; d++) info = !(PetscSqr(w->H[d * (p + 1)]) > DEPENDENT * w->H[0] * w->H[0]);
+  /* No error: the next set, or the contact problem, may hold the motion. */
   w->loose = (PetscBool)(info != 0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -323,9 +323,11 @@ static PetscErrorCode Allocate(HycoROM m)
   PetscCall(PetscMalloc1(l + 1, &w->pivot));
   PetscCall(PetscCalloc1(pairs + 1, &w->column));
   PetscCall(PetscCalloc1(pairs + 1, &w->gap));
+  /* kappa and the weights of the samples of each body: what Unchanged() compares. */
   for (PetscInt k = 0; k < w->bodies.bodies->n; k++) samples += 1 + w->bodies.bodies->body[k].n_samples;
   PetscCall(PetscCalloc1(samples + 1, &w->last));
   PetscCall(PetscMalloc1(pairs + 1, &w->set));
+  /* No set yet: -1 equals no number of contacts, not even 0. */
   w->n_set = -1;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -450,8 +452,8 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Without unknowns, residual and expand: a path has no gradient. No estimate of its own either: those of held-out paths
-   apply. */
+/* Without unknowns, residual and expand: derivatives of a path are differences of whole paths (path_gradient.c). No
+   estimate of its own either: those of held-out paths apply. */
 PetscErrorCode HycoBodiesTakePath(HycoROM m)
 {
   static const HycoROMTraits traits = {.title = "condensed bodies",

@@ -325,6 +325,7 @@ static PetscErrorCode BlendMotions(HycoBodiesWork o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Places are those of surfaces first, body after body, then those of the points inside. */
 PetscInt HycoBodiesAt(HycoSubstructures b, PetscInt place)
 {
   const PetscInt *start = place < b->ns ? b->start : b->inner_start;
@@ -923,6 +924,7 @@ PetscErrorCode HycoBodiesContact(HycoBodiesWork o, const HycoBodiesSurface *s, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The problem without a path: poses, rows and loads at mu, then contact. */
 PetscErrorCode HycoBodiesSolve(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal mu[], PetscReal Lambda[],
                                PetscBool *solved)
 {

@@ -47,6 +47,7 @@ static PetscErrorCode ChooseTerms(HycoFlexibility *f, PetscInt n_samples, const 
   PetscCall(PetscArrayzero(most, n_samples));
   Scales(f, n_samples, sample, scale);
   for (PetscInt u = 0; u < f->n && least > 0; u++) {
+    /* It moves in no sample, as where a support holds it. */
     if (!(scale[u] > 0)) continue;
     PetscCall(Transform(f->n, n_samples, Q, sample, u, X, columns));
     for (PetscInt t = 0; t < n_samples; t++) {
@@ -58,6 +59,8 @@ static PetscErrorCode ChooseTerms(HycoFlexibility *f, PetscInt n_samples, const 
   for (PetscInt t = 0; t < n_samples; t++) {
     PetscReal peak = 0;
 
+    /* The largest value of the polynomial at the nodes bounds what the term adds inside the ranges, up to the
+       small growth between them. */
     for (PetscInt s = 0; s < n_samples; s++) peak = PetscMax(peak, PetscAbsReal(Q[s * n_samples + t]));
     if (!t || peak * most[t] >= least) f->term[f->n_terms++] = t;
   }
@@ -65,6 +68,7 @@ static PetscErrorCode ChooseTerms(HycoFlexibility *f, PetscInt n_samples, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* size_t before the product: n^2 times the terms exceeds 32 bits at a few thousand unknowns. */
 PetscErrorCode HycoFlexibilityAllocate(HycoFlexibility *f)
 {
   const size_t square = (size_t)f->n * (size_t)f->n;
@@ -92,6 +96,9 @@ PetscErrorCode HycoFlexibilityTakePolynomials(HycoFlexibility *f, const HycoTens
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* sample[s]: n x n, symmetric, at the node s of the tensor grid. least: entries of a term below this share of the
+   diagonal are not needed; 0 keeps all terms in double precision. The constant term is always wide: the others are
+   small beside it, so that their single precision is relative to less. */
 PetscErrorCode HycoFlexibilityCreate(const HycoTensor *tensor, PetscInt n, const PetscReal *const sample[],
                                      PetscReal least, HycoFlexibility *f)
 {
@@ -133,12 +140,14 @@ static size_t At(const HycoFlexibility *f, PetscInt terms, PetscInt t, PetscInt 
   return ((size_t)unknown * (size_t)terms + (size_t)t) * (size_t)f->n;
 }
 
+/* Of term t, for loops over single entries, as those of a file. Predictions use whole columns instead. */
 PetscReal HycoFlexibilityEntry(const HycoFlexibility *f, PetscInt t, PetscInt unknown, PetscInt i)
 {
   if (t < f->n_wide) return f->wide[At(f, f->n_wide, t, unknown) + (size_t)i];
   return f->narrow[At(f, f->n_terms - f->n_wide, t - f->n_wide, unknown) + (size_t)i];
 }
 
+/* A later sum of terms has the rounding of narrow ones to float: the trainings measure errors after it. */
 void HycoFlexibilitySetEntry(HycoFlexibility *f, PetscInt t, PetscInt unknown, PetscInt i, PetscReal value)
 {
   if (t < f->n_wide)
@@ -147,6 +156,8 @@ void HycoFlexibilitySetEntry(HycoFlexibility *f, PetscInt t, PetscInt unknown, P
     f->narrow[At(f, f->n_terms - f->n_wide, t - f->n_wide, unknown) + (size_t)i] = (float)value;
 }
 
+/* weight: of the samples in the interpolation at a point (Lagrange). Of the polynomials' values at the samples it
+   makes theirs at the point. */
 void HycoFlexibilityShares(const HycoFlexibility *f, PetscInt n_samples, const PetscReal weight[], PetscReal share[])
 {
   for (PetscInt t = 0; t < f->n_terms; t++) {
@@ -155,6 +166,7 @@ void HycoFlexibilityShares(const HycoFlexibility *f, PetscInt n_samples, const P
   }
 }
 
+/* Narrow entries are widened in the loop, which the compiler vectorises; sums are in double precision. */
 void HycoFlexibilityAdd(const HycoFlexibility *f, PetscInt t, PetscInt unknown, PetscReal factor, PetscReal to[])
 {
   if (t < f->n_wide) {

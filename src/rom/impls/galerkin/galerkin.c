@@ -193,6 +193,8 @@ static PetscErrorCode Assemble(HycoROM m, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The reduced system at mu without its solution, for the scan of the determinant. Results of the last prediction
+   are void afterwards. */
 PetscErrorCode HycoGalerkinAssemble(HycoROM m, const PetscReal mu[])
 {
   PetscFunctionBegin;

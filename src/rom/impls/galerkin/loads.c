@@ -64,6 +64,7 @@ PetscErrorCode HycoLoadsCreate(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The combination of load solutions belongs to one stiffness. NULL-safe. */
 void HycoLoadsForget(HycoLoads loads)
 {
   if (loads) loads->current = PETSC_FALSE;

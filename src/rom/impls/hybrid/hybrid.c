@@ -20,6 +20,7 @@ static PetscErrorCode SetFromOptions(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The reconstruction is that of the mesh and the pairs of this set-up, and is made anew with the next one. */
 static PetscErrorCode Reset(HycoROM m)
 {
   PetscFunctionBegin;

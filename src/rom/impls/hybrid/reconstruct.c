@@ -142,6 +142,9 @@ static PetscReal Remainder(HycoROM m, const HycoReconstruction r, PetscInt n_dua
   return size > 0 ? PetscSqrtReal(lost / size) : 0;
 }
 
+/* (41): nonnegative least squares for the coefficients of the dual snapshots. The RID's forces shall be met, and
+   contacts that the predicted displacements leave open shall have none, weighted by the gap. Forces of the RID
+   itself are kept. */
 PetscErrorCode HycoHybridReconstruct(HycoROM m)
 {
   const HycoHybridModel h = (HycoHybridModel)m->model->data;

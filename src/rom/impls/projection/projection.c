@@ -143,6 +143,8 @@ static PetscErrorCode Expand(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The energy that the vectors leave out is that of the training; online forces outside their cone cannot be
+   represented at all. */
 PetscErrorCode HycoProjectionViewForces(HycoROM m, PetscViewer viewer)
 {
   HycoProjectionModel p = (HycoProjectionModel)m->model->data;
@@ -209,6 +211,7 @@ static PetscErrorCode Load(HycoROM m, HycoH5 h)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Types with force vectors of their own, such as the cubature, destroy them through this too. */
 PetscErrorCode HycoProjectionDestroy(HycoROM m)
 {
   HycoProjectionModel p = (HycoProjectionModel)m->model->data;
@@ -228,6 +231,8 @@ void HycoProjectionInit(HycoProjectionModel p)
   p->galerkin.symmetric = PETSC_TRUE;
 }
 
+/* (44). whole: every cell is in the RID; force_basis: unknowns are coefficients of force vectors, not forces of
+   contacts. */
 PetscErrorCode HycoROMCreate_Projection(HycoROM m)
 {
   static const HycoROMTraits traits = {.title = "projection-based",

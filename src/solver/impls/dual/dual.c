@@ -44,7 +44,8 @@ static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The analysis stays for the factorisation. */
+/* By the symbolic analysis of [K B^T; B 0], which the factorisation reuses. The pins come
+   before it, because they change the matrix that is analysed. */
 static PetscErrorCode EstimateFactor(HycoSolver s, HycoSolverForm form, PetscReal *bytes)
 {
   HycoStiffness *f = &s->stiffness;
@@ -54,8 +55,7 @@ static PetscErrorCode EstimateFactor(HycoSolver s, HycoSolverForm form, PetscRea
   (void)form;
   if (!f->direct) PetscCall(HycoDirectCreate(HycoComm(s), &f->direct));
   PetscCall(HycoDirectPinKernel(f->direct, y->K));
-  PetscCall(
-      HycoDirectAnalyse(f->direct, y->K, y->Bt, y->B, y->symmetric, bytes)); /* the factorisation reuses the analysis */
+  PetscCall(HycoDirectAnalyse(f->direct, y->K, y->Bt, y->B, y->symmetric, bytes));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -121,8 +121,10 @@ static PetscErrorCode FreeGap(HycoSolver s, const Dual *d, Vec x)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether the contacts of the last solution's set prevent all motions that the supports leave. They may have no master any
-   more, where contacts travel. By the pivots of G^T G against those of all contacts. */
+/* Whether the contacts of the last solution's set prevent all motions that the supports leave: where contacts travel,
+   some may have no master any more, and a start from such a set would be singular. G, the rows of the motions, stands
+   in the first p columns of S. By Cholesky's pivots of G^T G over the set, relative to the motions' squared lengths over
+   all contacts, which have the same unit. */
 static PetscErrorCode Holds(const Dual *d, PetscBool *holds)
 {
   const size_t n = (size_t)(d->p + d->m), p = (size_t)d->p;
@@ -134,6 +136,7 @@ static PetscErrorCode Holds(const Dual *d, PetscBool *holds)
   for (size_t i = p; i < n; i++) {
     const PetscReal *row = d->S + i * n;
 
+    /* The diagonal over all contacts: the scale of each motion, whose unit may be a length or an angle. */
     for (size_t k = 0; k < p; k++) all[k] += row[k] * row[k];
     for (size_t k = 0; k < p * p && d->active[i - p]; k++) gram[k] += row[k / p] * row[k % p];
   }
@@ -171,14 +174,16 @@ static PetscErrorCode SolveForces(HycoSolver s, Dual *d, Vec start, PetscBool *s
   /* At each attempt: a fallback uses another method with the same object. */
   PetscCall(HycoTaoSetType(d->tao, s->now.type, s->max_its));
   if (s->system->blocks) PetscCall(HycoBlocksGather(HycoComm(s), s->system->blocks, &blocks));
-  if (blocks)
-    PetscCall(PetscArrayzero(d->L, d->p)); /* the path decides between several solutions: by its last forces */
+  /* With friction a step may have several solutions: the path decides between them by its last forces. The unknowns
+     of rigid motions begin at 0. */
+  if (blocks) PetscCall(PetscArrayzero(d->L, d->p));
   if (blocks) PetscCall(HycoVecGather(start, d->L + d->p));
   if (blocks && !d->cone) PetscCall(HycoConeFactorCreate(&d->cone));
   if (blocks && s->other && !d->p && !s->falling_back) {
     PetscCall(PetscMalloc1(d->m + 1, &other));
     PetscCall(HycoVecGather(s->other, other));
   }
+  /* Borrowed until the problem is solved; NULL: the only starts are the last forces and those of the method. */
   lcp.other = other;
   lcp.blocks = blocks;
   lcp.cone = d->cone;
@@ -265,6 +270,7 @@ static PetscErrorCode Shift(HycoSolver s, const PetscReal dL[], Vec x, Vec L)
   HycoVecDuplicate(x, &force, &move);
   PetscCall(VecGetOwnershipRange(L, &lo, &hi));
   PetscCall(HycoVecWrite(change, hi - lo, dL + lo));
+  /* With the factor that is there: one back and forward substitution. */
   PetscCall(MatMult(s->system->Bt, change, force));
   /* x follows the forces: dx = -K^-1 Bt dL. */
   PetscCall(HycoStiffnessSolve(s, force, move));
@@ -287,6 +293,7 @@ static PetscErrorCode CloseGaps(HycoSolver s, const Dual *d, Vec x, Vec L)
   PetscFunctionBegin;
   PetscCall(VecDuplicate(y->D, &gap));
   PetscCall(MatMult(y->B, x, gap));
+  /* Of B x itself: gaps are judged relative to the displacements that cancel in them. */
   PetscCall(VecNorm(gap, NORM_INFINITY, &size));
   PetscCall(VecAYPX(gap, -1, y->D));
   PetscCall(HycoVecGather(gap, d->g));
@@ -412,6 +419,8 @@ void HycoSolverGetCondensed(HycoSolver s, PetscInt *m, PetscInt *p, const PetscR
   *S = d->S;
 }
 
+/* The last dense problem and its solution z, with the p unknowns of motions first. Borrowed until the next solve;
+   the blocks are set by the caller. */
 void HycoSolverGetDense(HycoSolver s, HycoLCP *lcp, const PetscReal *z[])
 {
   const Dual *d = (const Dual *)HycoSolverFindForm(s, "dual")->data;

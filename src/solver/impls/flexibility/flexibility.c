@@ -92,6 +92,7 @@ static PetscErrorCode Solve(HycoSolver s, HycoSolverForm form, Vec x, Vec L, Pet
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* G is the caller's. */
 static PetscErrorCode Destroy(HycoSolverForm form)
 {
   Flexibility *f = (Flexibility *)form->data;

@@ -336,6 +336,7 @@ static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Never singular: with contacts as bounds K itself is not factored before the first set. */
 static PetscErrorCode SetUp(HycoSolver s, HycoSolverForm form, PetscBool *singular)
 {
   PetscFunctionBegin;

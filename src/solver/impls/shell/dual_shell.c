@@ -21,6 +21,7 @@ static PetscErrorCode Accepts(HycoSolver s, HycoSolverForm form, PetscBool asked
   (void)form;
   *cost = -1;
   if (!asked || !s->system->K || !s->system->m || s->iterative) PetscFunctionReturn(PETSC_SUCCESS);
+  /* From here on the form was asked for by name, so that what it cannot do is said, with an alternative. */
   PetscCall(HycoKernelSize(s->system->K, &p));
   if (traits & (HYCO_TAO_OWN | HYCO_TAO_DENSE))
     HycoFormat(why,
