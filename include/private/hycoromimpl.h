@@ -261,10 +261,10 @@ PetscErrorCode HycoROMMeasurePath(HycoROM model);
    ownership of all. */
 PetscErrorCode HycoROMSetOutputCells(HycoROM model, HycoMesh mesh, PetscReal V[], PetscBool balanced[],
                                      HycoMesh loaded);
-/* Until HycoROMUnfocusOutputs() the quantities are measured on the cells that decide them near the last prediction, whose
-   quantities are value[], just measured. *focused: they are on cells, not only of contacts. */
 /* The gradient of a predicted path. */
 PetscErrorCode HycoROMPathGradient(HycoROM model, HycoGradient *gradient);
+/* Until HycoROMUnfocusOutputs() the quantities are measured on the cells that decide them near the last prediction, whose
+   quantities are value[], just measured. *focused: they are on cells, not only of contacts. */
 PetscErrorCode HycoROMFocusOutputs(HycoROM model, const PetscReal value[], PetscBool *focused);
 PetscErrorCode HycoROMUnfocusOutputs(HycoROM model);
 /* On that mesh; NULL: the quantities need only results of contacts. Borrowed. */

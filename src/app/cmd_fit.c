@@ -62,6 +62,7 @@ static PetscErrorCode ReadTarget(Fit *f, PetscInt output, const char name[])
   PetscCall(DriverGet(key, "", text));
   /* Outputs without a target are free. */
   if (!text[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoCheck(f->n < HYCO_MAX_QUANTITIES, "-%s is one target too many; give at most %d", key, HYCO_MAX_QUANTITIES);
   /* Infinite targets would pass strtod(); no misfit could reach them. */
   f->target[f->n] = strtod(text, &end);
   HycoCheck(end != text && !*end && !PetscIsInfOrNanReal(f->target[f->n]), "-%s is \"%s\"; a number is expected", key,

@@ -506,7 +506,8 @@ static PetscErrorCode TakeContent(HycoFOM f, const Content *c)
 
 /* Continues from the checkpoint, or leaves the path at its begin if there is no file. K, B, D are assembled at the
    resumed time; fields of earlier times come from the separate files. Collective. Then the path is where the run before
-   was after its last accepted step, to the last bit. */
+   was after its last accepted step, to the last bit; with friction but for
+   the forces before the last ones, from which starts are extrapolated. */
 PetscErrorCode HycoPathLoad(HycoFOM f)
 {
   HycoPath p = f->path;

@@ -160,6 +160,7 @@ static void NoteRate(HycoPath p, PetscReal h, PetscReal increment)
   const PetscReal rate = increment / h;
 
   p->crept += increment;
+  /* The first step counts as a whole: fewer than five cannot show that the rate is resolved. */
   p->changed += PetscAbsReal(rate - p->rate) * h;
   p->rate = rate;
 }

@@ -16,10 +16,12 @@ static PetscErrorCode Solve(HycoFOM f, const PetscReal mu[])
   PetscErrorCode (*const between)(HycoFOM, void *) = p->between;
   HycoSeries series = p->series;
   const PetscBool resume = p->resume;
-  char checkpoint[PETSC_MAX_PATH_LEN];
+  char checkpoint[PETSC_MAX_PATH_LEN], fclib[PETSC_MAX_PATH_LEN];
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
+  PetscCall(PetscStrncpy(fclib, p->fclib, sizeof(fclib)));
+  p->fclib[0] = '\0';
   PetscCall(PetscStrncpy(checkpoint, p->checkpoint, sizeof(checkpoint)));
   /* Paths beside the solution must not print, write a series, resume, or overwrite the checkpoint of the solution.
      */
@@ -35,6 +37,7 @@ static PetscErrorCode Solve(HycoFOM f, const PetscReal mu[])
   p->series = series;
   p->resume = resume;
   PetscCall(PetscStrncpy(p->checkpoint, checkpoint, sizeof(p->checkpoint)));
+  PetscCall(PetscStrncpy(p->fclib, fclib, sizeof(p->fclib)));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -143,9 +143,11 @@ void HycoSlipTake(HycoSlip *s, PetscReal t)
 PetscBool HycoSlipExtrapolate(const HycoSlip *s, PetscReal t, PetscInt n, const PetscReal L[], const PetscReal before[],
                               PetscReal r[])
 {
-  const PetscReal ratio = (t - s->t) / (s->t - s->t_before);
+  PetscReal ratio;
 
-  if (s->n_taken < 2 || !(ratio > 0) || PetscIsInfReal(ratio)) return PETSC_FALSE;
+  if (s->n_taken < 2 || !(s->t > s->t_before)) return PETSC_FALSE;
+  ratio = (t - s->t) / (s->t - s->t_before);
+  if (!(ratio > 0) || PetscIsInfReal(ratio)) return PETSC_FALSE;
   for (PetscInt i = 0; i < n; i++) r[i] = L[i] + ratio * (L[i] - before[i]);
   return PETSC_TRUE;
 }

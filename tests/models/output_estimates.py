@@ -174,7 +174,9 @@ class Outputs(Case):
         mu = ('-scene', scene, '-mu', '0.05,0.05', '-output_drop_group', 'foundation_top', '-output_another_max', 'u')
         solved = self.hyco('solve', *mu)['outputs']
         full = self.hyco('predict', '-model', 'fall.h5', *mu, '-hyco_fallback', '-target_u', 1e-9)['outputs']
-        self.assertEqual({name: value for name, value in full.items() if name != 'drop'}, {name: solved[name] for name in full if name != 'drop'})
+        for name, value in full.items():  # from another start: the last digits may differ
+            if name != 'drop':
+                self.near(value, solved[name], 1e-10, name)
         self.assertIsNone(full['drop'])
         found = self.hyco('compare', '-model', 'fall.h5', *mu)
         self.assertEqual({name for name in found if name.startswith('error_output_')}, {f'error_output_{name}' for name in full if name != 'drop'})

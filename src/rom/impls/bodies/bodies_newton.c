@@ -313,6 +313,7 @@ static void SolveOnSet(const HycoBodiesPath w, PetscInt k, PetscReal X[])
 static PetscErrorCode TakeMotions(HycoBodiesPath w, PetscInt p)
 {
   PetscBLASInt n, info = 0;
+  PetscReal *size;
 
   PetscFunctionBegin;
   w->loose = PETSC_FALSE;
@@ -327,9 +328,12 @@ static PetscErrorCode TakeMotions(HycoBodiesPath w, PetscInt p)
     for (PetscInt d = 0; d < p * p; d++) w->H[d] += w->G[w->set[i] * p + d / p] * w->Y[i * p + d % p];
   }
   PetscCall(PetscBLASIntCast(p, &n));
+  PetscCall(PetscMalloc1(p, &size));
+  for (PetscInt d = 0; d < p; d++) size[d] = w->H[d * (p + 1)];
   /* Symmetric, so that by rows or by columns is the same. */
   LAPACKpotrf_("U", &n, w->H, &n, &info);
-  for (PetscInt d = 0; d < p && !info; d++) info = !(PetscSqr(w->H[d * (p + 1)]) > DEPENDENT * w->H[0] * w->H[0]);
+  for (PetscInt d = 0; d < p && !info; d++) info = !(PetscSqr(w->H[d * (p + 1)]) > DEPENDENT * size[d]);
+  PetscCall(PetscFree(size));
   /* No error: the next set, or the contact problem, may hold the motion. */
   w->loose = (PetscBool)(info != 0);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -663,6 +667,7 @@ static PetscErrorCode EvaluateStep(HycoROM m, PetscReal t0, PetscReal t1, PetscR
   for (PetscInt k = 0; k < HALVINGS && w->always && (a->law.failed || !(*norm <= before)) && a->iterations; k++) {
     /* Towards the last point, whose residual is known to be finite. */
     for (PetscInt i = 0; i < w->bodies.bodies->inelastic->m; i++) alpha[i] = (alpha[i] + last[i]) / 2;
+    a->why[0] = '\0'; /* of a singular tangent at the point before */
     PetscCall(EvaluateOrRenew(m, t0, t1, alpha, norm, a));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -679,6 +684,7 @@ static PetscErrorCode Newton(HycoROM m, PetscReal t0, PetscReal t1, PetscReal al
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(w->bodies.bodies->inelastic->m + 1, &last));
+  PetscCall(PetscArraycpy(last, alpha, w->bodies.bodies->inelastic->m));
   while (!a->why[0]) {
     PetscCall(EvaluateStep(m, t0, t1, alpha, last, &norm, a));
     if (a->law.failed) {
@@ -726,6 +732,23 @@ static PetscErrorCode Contacts(HycoROM m, const PetscReal alpha[], PetscReal Lam
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The set of these forces; or of the contact problem's, if it does not determine the rigid motions. Without any closed
+   contact these are those of the contact problem, and no load acts on them. */
+static PetscErrorCode Choose(HycoROM m, const PetscReal alpha[], PetscReal Lambda[], PetscBool *same,
+                             HycoStepAttempt *a)
+{
+  HycoBodiesPath w = (HycoBodiesPath)m->work;
+
+  PetscFunctionBegin;
+  PetscCall(ChooseSet(m, Lambda, same));
+  if (!w->loose || !w->n_set || a->why[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(Contacts(m, alpha, Lambda, a));
+  PetscCall(ChooseSet(m, Lambda, same));
+  if (w->loose && w->n_set && !a->why[0])
+    HycoFormat(a->why, "the closed contacts do not determine the motion of a body that contact alone holds");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The set of the last step first: in most steps it holds, and no contact problem is solved at all. */
 PetscErrorCode HycoBodiesSearch(HycoROM m, PetscReal t0, PetscReal t1, PetscReal alpha[], PetscReal Lambda[],
                                 HycoStepAttempt *a)
@@ -736,7 +759,7 @@ PetscErrorCode HycoBodiesSearch(HycoROM m, PetscReal t0, PetscReal t1, PetscReal
   /* The forces of the contact problem name the next set. Opening and closing single contacts by the sign of their
      violation would cycle. */
   if (!Presses(m, Lambda)) PetscCall(Contacts(m, alpha, Lambda, a));
-  PetscCall(ChooseSet(m, Lambda, &same));
+  PetscCall(Choose(m, alpha, Lambda, &same, a));
   for (PetscInt round = 0; violated && round < ROUNDS && !a->why[0]; round++) {
     /* Again in each round: e0 and z belong to the set. */
     PetscCall(TakeLoads(m));
@@ -745,7 +768,7 @@ PetscErrorCode HycoBodiesSearch(HycoROM m, PetscReal t0, PetscReal t1, PetscReal
     PetscCall(Check(m, alpha, Lambda, &violated));
     if (!violated) break;
     PetscCall(Contacts(m, alpha, Lambda, a));
-    PetscCall(ChooseSet(m, Lambda, &same));
+    PetscCall(Choose(m, alpha, Lambda, &same, a));
     if (same) break; /* the violation was round-off */
     violated = PETSC_TRUE;
   }

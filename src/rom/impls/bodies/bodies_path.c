@@ -160,7 +160,11 @@ static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
   PetscCall(VecGetArrayRead(p->U, &alpha));
   PetscCall(HycoBodiesExpand(&w->bodies, m->gamma));
   if (w->friction) HycoBodiesMove(&w->bodies, &s, m->U);
-  if (!w->friction) HycoBodiesAddStrains(&w->bodies, alpha, m->gamma);
+  if (!w->friction) {
+    HycoBodiesAddStrains(&w->bodies, alpha, m->gamma);
+    MoveAll(m);
+    PetscCall(PetscArraycpy(w->accepted, m->U, m->fe->n_dof));
+  }
   PetscCall(VecRestoreArrayRead(p->U, &alpha));
   PetscCall(HycoTraceAdd(m, p->t));
   p->now.stored = a->law.stored;
@@ -203,6 +207,17 @@ static PetscErrorCode RecordFriction(HycoROM m, HycoStep *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The same at the last accepted time: the work may have a step that was refused. */
+static void MoveBack(HycoROM m)
+{
+  HycoBodiesPath w = (HycoBodiesPath)m->work;
+
+  for (PetscInt i = 0; i < m->fe->n_dof; i++) {
+    if (w->bodies.loc[i] >= 0) m->U[i] = w->accepted[i];
+  }
+  for (PetscInt i = 0; i < w->bodies.bodies->inelastic->nd; i++) m->U[w->at[i]] = w->accepted[w->at[i]];
+}
+
 /* p->why is set if the path ended early: the work then has the refused step, and the listed time is that of the
    last accepted one. */
 static PetscErrorCode Record(HycoPath p)
@@ -219,7 +234,10 @@ static PetscErrorCode Record(HycoPath p)
   }
   PetscCall(HycoROMExpandModal(m));
   /* Exact displacements of surfaces and cells over those of the modes, in this order. */
-  MoveAll(m);
+  if (w->friction)
+    MoveAll(m);
+  else
+    MoveBack(m);
   HycoFEComplete(m->fe, m->U);
   PetscCall(VecGetArrayRead(p->U, &alpha));
   /* The largest of the listed times is a feature of the estimate. */
@@ -318,6 +336,7 @@ static PetscErrorCode Allocate(HycoROM m)
   PetscCall(PetscCalloc1(in->n_points + 1, &w->size));
   PetscCall(PetscCalloc1(rows * ns + 1, &w->lost));
   PetscCall(PetscCalloc1(m->fe->n_dof, &w->u));
+  PetscCall(PetscCalloc1(m->fe->n_dof, &w->accepted));
   PetscCall(PetscCalloc1(l + 1, &w->r));
   PetscCall(PetscMalloc1(l * l + 1, &w->J));
   PetscCall(PetscMalloc1(l + 1, &w->pivot));
@@ -399,7 +418,7 @@ static PetscErrorCode Reset(HycoROM m)
   HycoFreeAll(&w->at, &w->cell_at, &w->point, &w->B, &w->T, &w->there, &w->weight, &w->BP, &w->response, &w->loads,
               &w->column, &w->set, &w->U, &w->Z, &w->S, &w->z, &w->e0, &w->gap, &w->last, &w->u, &w->e, &w->s, &w->size,
               &w->lost, &w->X, &w->r, &w->J, &w->pivot);
-  HycoFreeAll(&w->G, &w->Y, &w->H);
+  HycoFreeAll(&w->G, &w->Y, &w->H, &w->accepted);
   PetscCall(PetscFree2(w->x, w->x0));
   HycoDestroyAll(&w->alpha, &w->L);
   PetscCall(HycoPathFree(&w->path));

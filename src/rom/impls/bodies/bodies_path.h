@@ -27,7 +27,7 @@ typedef struct _n_HycoBodiesPath {
   PetscReal *Y, *H, rho;    /* n_set x p: W_aa^-1 G; p x p: the factor of G^T Y; of G G^T that is added to W_aa */
   PetscReal *x, *x0;        /* p x m: the rigid motions per alpha; at alpha = 0 */
   PetscBool loose;          /* the closed contacts do not determine the rigid motions */
-  PetscReal *u;             /* n_dof: displacements, in the points' cells */
+  PetscReal *u, *accepted;  /* n_dof: displacements, in the points' cells; of the last accepted time, on surfaces too */
   PetscReal *e, *s, *size;  /* n_rows: strains; what their stresses lack of the elastic ones; by point: of its terms */
   PetscReal *lost, *X;      /* n_rows x n_sigma: derivative of s; n_rows x m: times S */
   PetscReal *r, *J;         /* m, m x m */

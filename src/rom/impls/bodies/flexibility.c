@@ -169,11 +169,10 @@ void HycoFlexibilityShares(const HycoFlexibility *f, PetscInt n_samples, const P
 /* Narrow entries are widened in the loop, which the compiler vectorises; sums are in double precision. */
 void HycoFlexibilityAdd(const HycoFlexibility *f, PetscInt t, PetscInt unknown, PetscReal factor, PetscReal to[])
 {
-  if (t < f->n_wide) {
-    const PetscReal *wide = f->wide + At(f, f->n_wide, t, unknown);
-
-    for (PetscInt i = 0; i < f->n; i++) to[i] += factor * wide[i];
-  } else {
+  if (t < f->n_wide)
+    /* By the same routine as sums of blended columns: with one sample kept products have the same bits. */
+    HycoBodiesAdd(f->n, factor, f->wide + At(f, f->n_wide, t, unknown), to);
+  else {
     const float *narrow = f->narrow + At(f, f->n_terms - f->n_wide, t - f->n_wide, unknown);
 
     for (PetscInt i = 0; i < f->n; i++) to[i] += factor * narrow[i];
