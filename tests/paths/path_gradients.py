@@ -115,8 +115,9 @@ class PathGradients(Case):
             self.assertEqual(report[key], plain[key], key)
         self.assertEqual(report['history']['outputs'], plain['history']['outputs'])
         held, mean = (plain['history']['outputs'][name] for name in ('held', 'mean'))
+        near = ','.join(repr(value + 0.05 * (RANGES[p][1] - RANGES[p][0])) for p, value in point.items())
         r = self.hyco('fit', '-model', 'm.h5', *STEPS, '-target_end', repr(plain['outputs']['end']), '-target_held', repr(held[-1]),
-                      '-target_mean', repr(mean[-1]), '-fit_starts', '8', '-target_path_held', repr(max(held)), '-target_path_mean', repr(max(mean)))
+                      '-target_mean', repr(mean[-1]), '-mu', near, '-target_path_held', repr(max(held)), '-target_path_mean', repr(max(mean)))
         self.assertTrue(r['converged'])
         self.assertLess(r['misfit_model'], 1e-6)
         for name, value in point.items():
