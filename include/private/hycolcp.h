@@ -45,6 +45,13 @@ unsigned long long HycoSetHash(PetscInt n, const PetscBool active[]);
 
 /* -- dense complementarity, w = q + M z >= 0, z >= 0, w.z = 0; all replicated -- */
 
+#define HYCO_DEPENDENT 1e-12 /* share of a diagonal entry: a pivot that is no larger is round-off */
+/*
+  Factors the triangle ("L" or "U", by columns) of the symmetric n x n matrix A; *regular: no pivot is round-off beside its
+  diagonal entry, or beside scale[n].
+*/
+PetscErrorCode HycoCholesky(const char triangle[], PetscInt n, PetscReal A[], const PetscReal scale[],
+                            PetscBool *regular);
 /*
   The Cholesky factor of M_aa, M symmetric n x n, updated from one set and one right-hand side to the next, until
   HycoSetFactorForget() after a change of M (NULL-safe). HycoSetFactorSolve(): z_a = -M_aa^-1 q_a, 0 elsewhere;

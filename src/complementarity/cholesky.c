@@ -132,3 +132,22 @@ PetscErrorCode HycoSetFactorSolve(HycoSetFactor f, const PetscReal M[], const Pe
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+/* potrf accepts pivots of round-off size, whose solutions would be noise of any size. The comparison is false for NaN. */
+PetscErrorCode HycoCholesky(const char triangle[], PetscInt n, PetscReal A[], const PetscReal scale[],
+                            PetscBool *regular)
+{
+  PetscReal *diagonal;
+  PetscBLASInt size, info = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscBLASIntCast(n, &size));
+  PetscCall(PetscMalloc1(n + 1, &diagonal));
+  for (PetscInt k = 0; k < n; k++) diagonal[k] = scale ? scale[k] : A[(size_t)k * (size_t)(n + 1)];
+  if (n) LAPACKpotrf_(triangle, &size, A, &size, &info);
+  *regular = (PetscBool)!info;
+  for (PetscInt k = 0; k < n && *regular; k++)
+    *regular = (PetscBool)(PetscSqr(A[(size_t)k * (size_t)(n + 1)]) > HYCO_DEPENDENT * diagonal[k]);
+  PetscCall(PetscFree(diagonal));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

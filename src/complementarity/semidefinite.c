@@ -32,8 +32,6 @@ static void FindIdle(Floating *h)
   }
 }
 
-#define DEPENDENT 1e-12 /* pivots of a scaled matrix that are no larger are round-off */
-
 /* By LU: the matrix is not symmetric in sign. Rows of unknowns are scaled by the typical flexibility. */
 static PetscErrorCode SolveByPivots(Floating *h, PetscBool *singular)
 {
@@ -68,24 +66,6 @@ static PetscErrorCode SolveByPivots(Floating *h, PetscBool *singular)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Factors the n x n matrix S by Cholesky; *regular: no pivot is small beside its diagonal entry. */
-static PetscErrorCode Cholesky(PetscInt n, PetscReal S[], PetscBool *regular)
-{
-  PetscReal *diagonal;
-  PetscBLASInt size, info;
-
-  PetscFunctionBegin;
-  PetscCall(PetscBLASIntCast(n, &size));
-  PetscCall(PetscMalloc1(n + 1, &diagonal));
-  for (PetscInt j = 0; j < n; j++) diagonal[j] = S[(size_t)j * (size_t)(n + 1)];
-  if (n) LAPACKpotrf_("L", &size, S, &size, &info);
-  *regular = (PetscBool)(!n || !info);
-  for (PetscInt j = 0; j < n && *regular; j++) /* false for NaN */
-    *regular = (PetscBool)(PetscSqr(S[(size_t)j * (size_t)(n + 1)]) > DEPENDENT * diagonal[j]);
-  PetscCall(PetscFree(diagonal));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* With the symmetric S of the set regular: its factor, then (K' + A S^-1 A^T) x = f' + A S^-1 g, L = S^-1 (A^T x - g).
    Half of the operations of LU, and no pivots. *solved: both are regular. */
 static PetscErrorCode SolveByCholesky(Floating *h, PetscBool *solved)
@@ -109,7 +89,7 @@ static PetscErrorCode SolveByCholesky(Floating *h, PetscBool *solved)
     for (PetscInt i = 0; i < p; i++) Y[i * n + j] = column[i];
     Y[p * n + j] = h->q[h->a[p + j]];
   }
-  PetscCall(Cholesky(n, S, solved));
+  PetscCall(HycoCholesky("L", n, S, NULL, solved));
   if (*solved) {
     if (n) BLAStrsm_("L", "L", "N", "N", &size, &columns, &unit, S, &size, Y, &size);
     for (PetscInt i = 0; i < p; i++) {
@@ -121,8 +101,8 @@ static PetscErrorCode SolveByCholesky(Floating *h, PetscBool *solved)
     }
     /* Where no closed contact meets a motion, only round-off of K' is left of its entry, and the loads' motion is without
        bounds. */
-    for (PetscInt i = 0; i < p; i++) *solved = (PetscBool)(*solved && H[i * (p + 1)] * h->flexibility > DEPENDENT);
-    if (*solved) PetscCall(Cholesky(p, H, solved));
+    for (PetscInt i = 0; i < p; i++) *solved = (PetscBool)(*solved && H[i * (p + 1)] * h->flexibility > HYCO_DEPENDENT);
+    if (*solved) PetscCall(HycoCholesky("L", p, H, NULL, solved));
   }
   if (*solved) {
     /* In place: the last columns become the solutions. */

@@ -24,7 +24,6 @@
 #define HALVINGS  6     /* of a step of Newton's method */
 #define CONTRACTS 0.2   /* of the residual in an iteration: more, and the tangent is made again */
 #define VIOLATED  1e-11 /* share of the largest force or gap: less is round-off */
-#define DEPENDENT 1e-12 /* share of the diagonal of W: contacts that repeat others */
 
 /* y = beta y + factor A x of a table by rows, n x l; transposed: A^T x. BLAS sees a table by rows as its transpose by
    columns, hence the exchanged letters. */
@@ -226,22 +225,13 @@ static PetscErrorCode FactorAll(HycoROM m, PetscBool *independent)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   const PetscInt n = w->n_set, p = w->bodies.bodies->p;
-  PetscBLASInt nb, info = 0;
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < n; k++) {
     for (PetscInt i = 0; i < n; i++) w->U[k * n + i] = i <= k ? SetEntry(w, p, w->set[k], w->set[i]) : 0;
   }
-  PetscCall(PetscBLASIntCast(n, &nb));
-  /* By columns, the upper triangle: potrf and trsm read nothing below it. */
-  if (n) LAPACKpotrf_("U", &nb, w->U, &nb, &info);
-  *independent = (PetscBool)!info;
-  for (PetscInt k = 0; k < n && *independent; k++) {
-    const PetscReal u = w->U[k * n + k];
-
-    /* potrf accepts pivots of round-off size; their forces would be noise of any size. */
-    *independent = (PetscBool)(u * u > DEPENDENT * SetEntry(w, p, w->set[k], w->set[k]));
-  }
+  /* By columns, the upper triangle: the factor and trsm read nothing below it. */
+  PetscCall(HycoCholesky("U", n, w->U, NULL, independent));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -267,7 +257,7 @@ static PetscErrorCode FactorEach(HycoROM m)
       u[i] /= other[i];
       pivot -= u[i] * u[i];
     }
-    if (!(pivot > DEPENDENT * diagonal)) continue;
+    if (!(pivot > HYCO_DEPENDENT * diagonal)) continue;
     u[rank] = PetscSqrtReal(pivot);
     w->set[w->n_set++] = contact;
   }
@@ -312,8 +302,7 @@ static void SolveOnSet(const HycoBodiesPath w, PetscInt k, PetscReal X[])
    not determine a motion. */
 static PetscErrorCode TakeMotions(HycoBodiesPath w, PetscInt p)
 {
-  PetscBLASInt n, info = 0;
-  PetscReal *size;
+  PetscBool regular;
 
   PetscFunctionBegin;
   w->loose = PETSC_FALSE;
@@ -327,15 +316,10 @@ static PetscErrorCode TakeMotions(HycoBodiesPath w, PetscInt p)
   for (PetscInt i = 0; i < w->n_set; i++) {
     for (PetscInt d = 0; d < p * p; d++) w->H[d] += w->G[w->set[i] * p + d / p] * w->Y[i * p + d % p];
   }
-  PetscCall(PetscBLASIntCast(p, &n));
-  PetscCall(PetscMalloc1(p, &size));
-  for (PetscInt d = 0; d < p; d++) size[d] = w->H[d * (p + 1)];
   /* Symmetric, so that by rows or by columns is the same. */
-  LAPACKpotrf_("U", &n, w->H, &n, &info);
-  for (PetscInt d = 0; d < p && !info; d++) info = !(PetscSqr(w->H[d * (p + 1)]) > DEPENDENT * size[d]);
-  PetscCall(PetscFree(size));
+  PetscCall(HycoCholesky("U", p, w->H, NULL, &regular));
   /* No error: the next set, or the contact problem, may hold the motion. */
-  w->loose = (PetscBool)(info != 0);
+  w->loose = (PetscBool)!regular;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -8,7 +8,6 @@
 /* Lemke's dictionary has m^2 entries, all of which change in each of about m pivots: above this number of contacts
    it is not used as a fallback, and neither is the dual form where another form was chosen. */
 #define HYCO_FALLBACK_MAX 3000
-#define HELD              1e-12 /* of a motion's squared length at all contacts: less at closed ones is round-off */
 
 typedef struct {
   PetscInt m, p; /* numbers of contacts, and of unknowns pinned because K is singular: these come before the contacts
@@ -129,7 +128,6 @@ static PetscErrorCode Holds(const Dual *d, PetscBool *holds)
 {
   const size_t n = (size_t)(d->p + d->m), p = (size_t)d->p;
   PetscReal *gram, *all;
-  PetscBLASInt size, info = 0;
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc2(p * p, &gram, p, &all));
@@ -140,10 +138,7 @@ static PetscErrorCode Holds(const Dual *d, PetscBool *holds)
     for (size_t k = 0; k < p; k++) all[k] += row[k] * row[k];
     for (size_t k = 0; k < p * p && d->active[i - p]; k++) gram[k] += row[k / p] * row[k % p];
   }
-  PetscCall(PetscBLASIntCast(d->p, &size));
-  LAPACKpotrf_("U", &size, gram, &size, &info);
-  *holds = (PetscBool)!info;
-  for (size_t k = 0; k < p && *holds; k++) *holds = (PetscBool)(gram[k * p + k] * gram[k * p + k] > HELD * all[k]);
+  PetscCall(HycoCholesky("U", d->p, gram, all, holds));
   PetscCall(PetscFree2(gram, all));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
