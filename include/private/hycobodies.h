@@ -95,6 +95,10 @@ void HycoFlexibilityShares(const HycoFlexibility *f, PetscInt n_samples, const P
 /* The column of an unknown; to += factor times that of one term. */
 void HycoFlexibilityColumn(const HycoFlexibility *f, const PetscReal share[], PetscInt unknown, PetscReal column[]);
 void HycoFlexibilityAdd(const HycoFlexibility *f, PetscInt t, PetscInt unknown, PetscReal factor, PetscReal to[]);
+/* to[n] = the sum over the terms of share times from, `stride` apart: in the order of HycoFlexibilityColumn(), so that
+   products that are kept give the same bits as those that are not. */
+void HycoFlexibilityBlend(const HycoFlexibility *f, const PetscReal share[], PetscInt n, size_t stride,
+                          const PetscReal from[], PetscReal to[]);
 
 /* One body: its blocks at each of its samples (tensor), one sample after the other. All row major, except H: an unknown
    of the surfaces has its columns at all samples side by side. */
@@ -255,10 +259,6 @@ PetscErrorCode HycoBodiesKeepRows(HycoBodiesWork work, PetscInt m);
 PetscErrorCode HycoBodiesForgetKept(HycoBodiesWork work);
 /* If the rows are the last ones: P and W of n contacts, unless they need too much memory (kept.same is false then). */
 PetscErrorCode HycoBodiesKeep(HycoBodiesWork work, PetscInt n, const PetscInt contact[]);
-/* to[n] = the sum over the terms of body k, `stride` apart, with its shares and without kappa: always in the same
-   order, so that products that are kept give the same bits as those that are not. */
-void HycoBodiesBlend(HycoBodiesWork work, PetscInt k, PetscInt n, size_t stride, const PetscReal from[],
-                     PetscReal to[]);
 /* row[n]: of the matrix W at the present parameters, contact k with n contacts; u -= C B^T Lambda. */
 void HycoBodiesKeptRow(HycoBodiesWork work, PetscInt k, PetscInt n, const PetscInt contact[], PetscReal row[]);
 PetscErrorCode HycoBodiesKeptDisplace(HycoBodiesWork work, PetscInt m, const PetscReal Lambda[], PetscReal u[]);

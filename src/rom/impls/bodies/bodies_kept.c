@@ -146,7 +146,7 @@ void HycoBodiesKeptRow(HycoBodiesWork o, PetscInt k, PetscInt n, const PetscInt 
     for (PetscInt i = 0; W && i < n; i++) {
       PetscReal blended;
 
-      HycoBodiesBlend(o, j, 1, (size_t)o->kept.m, W + contact[i], &blended);
+      HycoFlexibilityBlend(&b->body[j].C, o->share[j], 1, (size_t)o->kept.m, W + contact[i], &blended);
       row[i] += scale * blended;
     }
   }
@@ -170,7 +170,7 @@ static PetscErrorCode BlendColumn(HycoBodiesWork o, PetscInt k, PetscInt j, cons
   }
   *column = kept->blend[at];
   if (kept->at_weights[at] == kept->weights[j]) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoBodiesBlend(o, j, own->n, (size_t)own->n, kept->P[at], kept->blend[at]);
+  HycoFlexibilityBlend(&own->C, o->share[j], own->n, (size_t)own->n, kept->P[at], kept->blend[at]);
   /* Weights are compared by their number, which grows with each change, and not entry by entry. */
   kept->at_weights[at] = kept->weights[j];
   PetscFunctionReturn(PETSC_SUCCESS);

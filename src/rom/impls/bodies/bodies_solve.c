@@ -414,34 +414,6 @@ static PetscErrorCode TakeWeights(HycoBodiesWork o, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* to = sum over the samples of weight times from: the interpolation between trained samples of a body. `stride` lies
-   between the samples. */
-/* In the order of HycoFlexibilityColumn(). */
-void HycoBodiesBlend(HycoBodiesWork o, PetscInt k, PetscInt n, size_t stride, const PetscReal from[], PetscReal to[])
-{
-  const HycoFlexibility *C = &o->bodies->body[k].C;
-  const PetscReal *w = o->share[k];
-  PetscInt t;
-
-  for (PetscInt i = 0; i < n; i++) to[i] = w[0] * from[i];
-  for (t = 1, from += stride; t < C->n_wide; t++, from += stride) {
-    for (PetscInt i = 0; i < n; i++) to[i] += w[t] * from[i];
-  }
-  for (; t + 4 <= C->n_terms; t += 4, from += 4 * stride) { /* four at a time: `to` is read and written less often */
-    const PetscReal *a = from, *b = a + stride, *c = b + stride, *d = c + stride;
-
-    for (PetscInt i = 0; i < n; i++) to[i] += w[t] * a[i] + w[t + 1] * b[i] + w[t + 2] * c[i] + w[t + 3] * d[i];
-  }
-  for (; t + 2 <= C->n_terms; t += 2, from += 2 * stride) {
-    const PetscReal *a = from, *b = a + stride;
-
-    for (PetscInt i = 0; i < n; i++) to[i] += w[t] * a[i] + w[t + 1] * b[i];
-  }
-  for (; t < C->n_terms; t++, from += stride) {
-    for (PetscInt i = 0; i < n; i++) to[i] += w[t] * from[i];
-  }
-}
-
 /* The column of an unknown of body k in its flexibility, without kappa; made when it is needed for the first time. */
 static PetscErrorCode GetColumn(HycoBodiesWork o, PetscInt k, PetscInt unknown, const PetscReal **column)
 {

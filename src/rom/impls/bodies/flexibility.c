@@ -179,31 +179,55 @@ void HycoFlexibilityAdd(const HycoFlexibility *f, PetscInt t, PetscInt unknown, 
   }
 }
 
-/* Four terms at a time: `column` is read and written less often. */
+/* to[n] += the sum over `terms` terms of share times from, `stride` apart. Four at a time: `to` is read and written less
+   often. For both precisions in one order, so that sums of kept products and of columns have the same bits. */
+#define ADD_TERMS(name, type)                                                                                          \
+  static void name(PetscInt terms, const PetscReal share[], size_t n, size_t stride, const type from[],                \
+                   PetscReal to[])                                                                                     \
+  {                                                                                                                    \
+    PetscInt t = 0;                                                                                                    \
+                                                                                                                       \
+    for (; t + 4 <= terms; t += 4, from += 4 * stride) {                                                               \
+      const type *a = from, *b = a + stride, *c = b + stride, *d = c + stride;                                         \
+                                                                                                                       \
+      for (size_t i = 0; i < n; i++)                                                                                   \
+        to[i] += share[t] * a[i] + share[t + 1] * b[i] + share[t + 2] * c[i] + share[t + 3] * d[i];                    \
+    }                                                                                                                  \
+    for (; t + 2 <= terms; t += 2, from += 2 * stride) {                                                               \
+      const type *a = from, *b = a + stride;                                                                           \
+                                                                                                                       \
+      for (size_t i = 0; i < n; i++) to[i] += share[t] * a[i] + share[t + 1] * b[i];                                   \
+    }                                                                                                                  \
+    for (; t < terms; t++, from += stride) {                                                                           \
+      for (size_t i = 0; i < n; i++) to[i] += share[t] * from[i];                                                      \
+    }                                                                                                                  \
+  }
+ADD_TERMS(AddTerms, PetscReal)
+ADD_TERMS(AddShortTerms, float)
+
+/* to[n] = the same of the wide terms. */
+static void SumWide(const HycoFlexibility *f, const PetscReal share[], size_t n, size_t stride, const PetscReal from[],
+                    PetscReal to[])
+{
+  for (size_t i = 0; i < n; i++) to[i] = share[0] * from[i];
+  for (PetscInt t = 1; t < f->n_wide; t++) {
+    from += stride;
+    for (size_t i = 0; i < n; i++) to[i] += share[t] * from[i];
+  }
+}
+
 void HycoFlexibilityColumn(const HycoFlexibility *f, const PetscReal share[], PetscInt unknown, PetscReal column[])
 {
   const size_t n = (size_t)f->n;
   const PetscInt narrow = f->n_terms - f->n_wide;
-  const PetscReal *wide = f->wide + At(f, f->n_wide, 0, unknown), *w = share + f->n_wide;
-  const float *a = f->narrow + At(f, narrow, 0, unknown);
-  PetscInt t;
 
-  for (size_t i = 0; i < n; i++) column[i] = share[0] * wide[i];
-  for (t = 1; t < f->n_wide; t++) {
-    wide += n;
-    for (size_t i = 0; i < n; i++) column[i] += share[t] * wide[i];
-  }
-  for (t = 0; t + 4 <= narrow; t += 4, a += 4 * n) {
-    const float *b = a + n, *c = b + n, *d = c + n;
+  SumWide(f, share, n, n, f->wide + At(f, f->n_wide, 0, unknown), column);
+  AddShortTerms(narrow, share + f->n_wide, n, n, f->narrow + At(f, narrow, 0, unknown), column);
+}
 
-    for (size_t i = 0; i < n; i++) column[i] += w[t] * a[i] + w[t + 1] * b[i] + w[t + 2] * c[i] + w[t + 3] * d[i];
-  }
-  for (; t + 2 <= narrow; t += 2, a += 2 * n) {
-    const float *b = a + n;
-
-    for (size_t i = 0; i < n; i++) column[i] += w[t] * a[i] + w[t + 1] * b[i];
-  }
-  for (; t < narrow; t++, a += n) {
-    for (size_t i = 0; i < n; i++) column[i] += w[t] * a[i];
-  }
+void HycoFlexibilityBlend(const HycoFlexibility *f, const PetscReal share[], PetscInt n, size_t stride,
+                          const PetscReal from[], PetscReal to[])
+{
+  SumWide(f, share, (size_t)n, stride, from, to);
+  AddTerms(f->n_terms - f->n_wide, share + f->n_wide, (size_t)n, stride, from + (size_t)f->n_wide * stride, to);
 }
