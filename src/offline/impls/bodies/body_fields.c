@@ -407,9 +407,9 @@ static PetscErrorCode ExpandAll(HycoReducer t, HycoBodiesFactor *factor, Sampled
 }
 
 /* value = G u at the unknowns of a body that have modes, else 0. Zero outside the body and at unknowns that need
-   no modes, so that POD spends none on them. Modes of different bodies have disjoint rows. */
+   no modes (skip: `bare` ones too), so that POD spends none on them. Modes of different bodies have disjoint rows. */
 static void TurnField(HycoReducer t, const HycoBodiesFactor *factor, PetscInt body, const PetscReal G[], PetscBool back,
-                      const PetscReal u[], PetscReal value[])
+                      PetscBool skip, const PetscReal u[], PetscReal value[])
 {
   HycoFOM f = factor->fom;
   const PetscInt dim = f->fe->dim;
@@ -419,7 +419,7 @@ static void TurnField(HycoReducer t, const HycoBodiesFactor *factor, PetscInt bo
 
     if (HycoTrainingOfBodies(t)->parts.of[i] == body) HycoPoseTurn(G, dim, back, u + i * dim, turned);
     for (PetscInt c = 0; c < dim; c++)
-      value[i * dim + c] = f->fe->fixed[i * dim + c] || factor->bare[i * dim + c] ? 0 : turned[c];
+      value[i * dim + c] = f->fe->fixed[i * dim + c] || (skip && factor->bare[i * dim + c]) ? 0 : turned[c];
   }
 }
 
@@ -437,14 +437,11 @@ static PetscErrorCode CreateColumns(HycoReducer t, HycoFOM f, PetscInt n, Mat *S
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The columns of one body in all of its turns. Collective. */
-static PetscErrorCode BodyColumns(HycoReducer t, const HycoBodiesFactor *factor, PetscInt body, PetscInt n,
-                                  const PetscReal U[], Mat *S)
+/* The columns of one body in the turns G (9 numbers each). Collective. */
+static PetscErrorCode TurnedColumns(HycoReducer t, const HycoBodiesFactor *factor, PetscInt body, PetscInt n,
+                                    const PetscReal U[], PetscInt turns, const PetscReal G[], PetscBool skip, Mat *S)
 {
   HycoFOM f = factor->fom;
-  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
-  /* The body's own axes turn with the parameters: a basis of turns spans every direction of the field. */
-  const PetscInt first = b->turn_start[body], turns = b->turn_start[body + 1] - first;
   PetscReal *value;
   PetscScalar *s;
   PetscInt lda;
@@ -455,13 +452,26 @@ static PetscErrorCode BodyColumns(HycoReducer t, const HycoBodiesFactor *factor,
   PetscCall(PetscMalloc1(f->fe->n_dof + 1, &value));
   PetscCall(MatDenseGetArray(*S, &s));
   for (PetscInt k = 0; k < n * turns; k++) {
-    TurnField(t, factor, body, b->G + 9 * (first + k % turns), PETSC_FALSE,
-              U + (size_t)(k / turns) * (size_t)f->fe->n_dof, value);
+    TurnField(t, factor, body, G + 9 * (k % turns), PETSC_FALSE, skip, U + (size_t)(k / turns) * (size_t)f->fe->n_dof,
+              value);
     /* Rows in the file's order: the POD does not depend on the partition. */
-    PetscCall(HycoFOMToRows(f, HYCO_ON_NODES, MPIU_REAL, b->dim, value, s + (size_t)k * (size_t)lda));
+    PetscCall(HycoFOMToRows(f, HYCO_ON_NODES, MPIU_REAL, t->sizes[3], value, s + (size_t)k * (size_t)lda));
   }
   PetscCall(MatDenseRestoreArray(*S, &s));
   PetscCall(PetscFree(value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* In all of its turns: its own axes turn with the parameters, and a basis of turns spans every direction of the field.
+   Collective. */
+static PetscErrorCode BodyColumns(HycoReducer t, const HycoBodiesFactor *factor, PetscInt body, PetscInt n,
+                                  const PetscReal U[], Mat *S)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  const PetscInt first = b->turn_start[body];
+
+  PetscFunctionBegin;
+  PetscCall(TurnedColumns(t, factor, body, n, U, b->turn_start[body + 1] - first, b->G + 9 * first, PETSC_TRUE, S));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -498,26 +508,15 @@ static PetscErrorCode ScaleColumns(Mat S)
 static PetscErrorCode Compress(HycoReducer t, const HycoBodiesFactor *factor, PetscInt body, PetscInt n,
                                const PetscReal U[], PetscInt *count, PetscReal **few)
 {
-  HycoFOM f = factor->fom;
-  const PetscInt dim = t->sizes[3];
-  const size_t n_dof = (size_t)f->fe->n_dof;
-  PetscReal *value, *sigma, norm;
-  PetscScalar *s;
-  PetscInt lda;
+  static const PetscReal as_it_is[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  const size_t n_dof = (size_t)factor->fom->fe->n_dof;
+  PetscReal *sigma, norm;
   Mat S, W;
 
   PetscFunctionBegin;
-  PetscCall(CreateColumns(t, f, n, &S));
-  PetscCall(MatDenseGetLDA(S, &lda));
-  PetscCall(PetscMalloc2(n_dof + 1, &value, n + 1, &sigma));
-  PetscCall(MatDenseGetArray(S, &s));
-  for (PetscInt k = 0; k < n; k++) {
-    /* All unknowns of the body: those that need no modes turn into others that do. */
-    for (size_t i = 0; i < n_dof; i++)
-      value[i] = HycoTrainingOfBodies(t)->parts.of[i / (size_t)dim] == body ? U[(size_t)k * n_dof + i] : 0;
-    PetscCall(HycoFOMToRows(f, HYCO_ON_NODES, MPIU_REAL, dim, value, s + (size_t)k * (size_t)lda));
-  }
-  PetscCall(MatDenseRestoreArray(S, &s));
+  /* All unknowns of the body: those that need no modes turn into others that do. */
+  PetscCall(TurnedColumns(t, factor, body, n, U, 1, as_it_is, PETSC_FALSE, &S));
+  PetscCall(PetscMalloc1(n + 1, &sigma));
   PetscCall(ScaleColumns(S));
   PetscCall(MatNorm(S, NORM_FROBENIUS, &norm));
   *count = 0;
@@ -526,15 +525,15 @@ static PetscErrorCode Compress(HycoReducer t, const HycoBodiesFactor *factor, Pe
   PetscCall(PetscMalloc1(n_dof * (size_t)*count + 1, few));
   for (PetscInt k = 0; k < *count; k++) {
     PetscReal *own = *few + (size_t)k * n_dof;
-    const PetscScalar *w;
+    PetscScalar *w;
 
-    PetscCall(MatDenseGetColumn(W, k, (PetscScalar **)&w));
-    PetscCall(HycoFOMFromRows(f, HYCO_ON_NODES, dim, w, own));
-    PetscCall(MatDenseRestoreColumn(W, (PetscScalar **)&w));
+    PetscCall(MatDenseGetColumn(W, k, &w));
+    PetscCall(HycoFOMFromRows(factor->fom, HYCO_ON_NODES, t->sizes[3], w, own));
+    PetscCall(MatDenseRestoreColumn(W, &w));
     for (size_t i = 0; i < n_dof; i++) own[i] *= sigma[k];
   }
   if (norm > 0) PetscCall(MatDestroy(&W));
-  PetscCall(PetscFree2(value, sigma));
+  PetscCall(PetscFree(sigma));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -698,7 +697,7 @@ static PetscErrorCode TurnMode(HycoReducer t, const HycoBodiesFactor *factor, Pe
   PetscCall(PetscMalloc2(f->fe->n_dof + 1, &local, f->fe->n_dof + 1, &turned));
   /* The mode lies by rows of the file, the turn needs the nodes of the part. */
   PetscCall(HycoFOMFromRows(f, HYCO_ON_NODES, b->dim, column, local));
-  TurnField(t, factor, body, b->G + 9 * turn, PETSC_TRUE, local, turned);
+  TurnField(t, factor, body, b->G + 9 * turn, PETSC_TRUE, PETSC_TRUE, local, turned);
   PetscCall(VecGetArray(v, &a));
   for (PetscInt i = 0; i < f->fe->n_dof; i++) {
     /* A load vector has each unknown once, on its owner. */
