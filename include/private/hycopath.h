@@ -106,7 +106,7 @@ struct _n_HycoPath {
   /* current position on the path */
   PetscReal mu[HYCO_MAX_PARAMETERS], t, dt;
   PetscReal rate, crept, changed; /* of the largest inelastic strain; its sum; of changes of the rate times the steps */
-  PetscBool yields;               /* a law deforms inelastically at once: rates mean nothing */
+  PetscBool creeps;               /* full order: no law deforms inelastically at once, which has no rate */
   PetscInt step;                  /* number of listed times reached: the index of the next one */
   HycoKKT kkt;                    /* of the last accepted time */
   HycoStep now;                   /* since the last listed time */

@@ -400,7 +400,6 @@ static PetscErrorCode FindMasters(HycoFOM f, PetscBool *wider)
   PetscFunctionBegin;
   *wider = PETSC_FALSE;
   if (!f->searches) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoOnEach(HycoComm(f), f->fe_surface ? HycoPairsMove(f->fe_surface, &f->pairs) : PETSC_SUCCESS);
   width = HycoPairsWidth(&f->pairs);
   HycoAllreduce(&width, 1, MPIU_INT, MPI_MAX, HycoComm(f));
   *wider = (PetscBool)(width > f->width);

@@ -137,9 +137,6 @@ PetscErrorCode HycoPathBegin(HycoPath p, const PetscReal mu[])
   HycoOnEach(p->comm, HycoFESetParameters(p->fe, all)); /* the initial state depends on the first temperature */
   HycoOnEach(p->comm, HycoFEStateCreate(p->fe, &p->begin));
   HycoOnEach(p->comm, HycoFEStateCreate(p->fe, &p->end));
-  p->yields = PETSC_FALSE;
-  if (p->flows) HycoOnEach(p->comm, HycoFEYields(p->fe, p->t, &p->yields));
-  if (p->flows) HycoAllreduce(&p->yields, 1, HYCO_MPI_BOOL, MPI_LOR, p->comm);
   p->fe->ready = PETSC_FALSE; /* nothing is assembled for it yet */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -371,7 +368,7 @@ void HycoPathGetHistory(HycoPath p, HycoHistory *h)
   h->newton = HycoNewtons[HycoPathMethod(p)];
   h->factor_cost = HycoPathFactorCost(p);
   h->n_bound = p->n_bound;
-  h->rate_change = p->crept > 0 && !p->yields ? p->changed / p->crept : 0;
+  h->rate_change = p->crept > 0 && p->creeps ? p->changed / p->crept : 0;
   h->n_orders = p->n_orders;
   h->n_taken = p->n_taken;
   h->taken = p->taken;

@@ -402,6 +402,18 @@ PetscErrorCode HycoFOMPathCreate(HycoFOM f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether rates of inelastic strains mean anything, at the first time. Collective. */
+static PetscErrorCode FindCreep(HycoPath p)
+{
+  PetscBool yields = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  if (p->flows) HycoOnEach(p->comm, HycoFEYields(p->fe, p->t, &yields));
+  HycoAllreduce(&yields, 1, HYCO_MPI_BOOL, MPI_LOR, p->comm);
+  p->creeps = (PetscBool)(p->flows && !yields);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The path at mu, from its first time or from a checkpoint. Not reaching the end is no error. Collective. */
 PetscErrorCode HycoPathSolve(HycoFOM f, const PetscReal mu[])
 {
@@ -410,6 +422,7 @@ PetscErrorCode HycoPathSolve(HycoFOM f, const PetscReal mu[])
 
   PetscFunctionBegin;
   PetscCall(HycoPathBegin(p, mu));
+  PetscCall(FindCreep(p));
   if (f->friction) PetscCall(HycoFrictionBegin(f));
   PetscCall(PetscMemzero(&p->work_done, sizeof(p->work_done)));
   PetscCall(VecSet(p->F_old, 0));
