@@ -27,10 +27,10 @@ FORMS = ('dual', 'primal', 'dual_free')
 METHODS = OURS + tao(NEWTON + FIRST_ORDER, FORMS) + tao(SEMISMOOTH, ('dual',))
 ON_TWO_RANKS = OURS + tao(['gpcg', 'tron', 'bnls'], FORMS) + tao(['ssils'], ('dual',))
 QUICK = OURS + tao(['gpcg', 'tron'], ('dual', 'primal'))
-# on the large scenes, unless HYCO_ALL_SOLVERS (scripts/solver-tables: minutes more); the others are tested on the small ones
-FEW = {('rope 2000', 1): QUICK, ('rope 2000', 2): QUICK,
-       ('pellet A', 1): ON_TWO_RANKS + tao(['bntr', 'bntl', *FIRST_ORDER, 'asils', 'ssfls', 'asfls'], ('dual',)), ('pellet A', 2): QUICK}
-if 'HYCO_ALL_SOLVERS' in os.environ:
+# the others on the two small scenes, on one rank; all of them everywhere with HYCO_LONG (scripts/solver-tables, ctest -C Long)
+FEW = {('rope 2000', 1): QUICK, ('rope 2000', 2): QUICK, ('rope 100', 2): QUICK, ('blocks', 2): QUICK,
+       ('pellet A', 1): QUICK + tao(['bnls', 'ssils'], ('dual',)), ('pellet A', 2): QUICK}
+if 'HYCO_LONG' in os.environ:
     FEW = {}
 
 # (scene, form, TAO types): why they do not solve alone. Whether they do on some machine is not promised.

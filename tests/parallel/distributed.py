@@ -166,7 +166,7 @@ class Distributed(Case):
         most = {}
         for ranks in (1, 4):
             run = self.run_raw('solve', '-scene', os.path.join(PELLET, 'scene.yaml'), '-scene_refine', 1, '-mu', '4.06,1', '-output',
-                               'memory.xdmf', '-malloc_debug', '-memory_view', ranks=ranks, timeout=200)
+                               'memory.xdmf', '-malloc_dump', '-memory_view', ranks=ranks, timeout=200)
             self.assertEqual(run.returncode, 0, run.stderr)
             found = re.search(r'Maximum .* space PetscMalloc\(\)ed: *total *(\S+) *max *(\S+) *min', run.stdout)
             most[ranks] = [float(v) for v in found.groups()]

@@ -18,7 +18,7 @@ CHOSEN = ('mesh/node_id', 'mesh/cell_id', 'problem/role', 'problem/in_rid', 'pro
 class PodMemory(Case):
     def train(self, name, megabytes, *words, ranks=0, store='store'):
         """The model, and the most bytes that PETSc held, of all ranks together."""
-        run = self.run_raw('train', *words, '-hyco_pod_memory', megabytes, '-hyco_snapshots', store, '-model', name, '-malloc_debug', '-memory_view',
+        run = self.run_raw('train', *words, '-hyco_pod_memory', megabytes, '-hyco_snapshots', store, '-model', name, '-malloc_dump', '-memory_view',
                            ranks=ranks, timeout=200)
         self.assertEqual(run.returncode, 0, run.stderr)
         total, = re.findall(r'Maximum .* space PetscMalloc\(\)ed: *total *(\S+)', run.stdout)

@@ -58,7 +58,7 @@ class Training(Case):
         """320 solutions of the pellet, of which a fifth of the unknowns are at contacts, in batches: the largest of four ranks has 1.02 times
         the mean (1.26 times, when it had the displacements at all contacts and of the whole model's mesh)."""
         words = ('-scene', PELLET, '-values_radius', '4.02,4.03,4.04,4.05,4.06,4.07,4.08,4.1', '-values_load', ','.join(f'{k / 40:g}' for k in range(1, 41)),
-                 '-hyco_pod_memory', 12, '-hyco_pod_noise', 1e-6, '-hyco_snapshots', 'many.snapshots', '-model', 'many.h5', '-malloc_debug', '-memory_view')
+                 '-hyco_pod_memory', 12, '-hyco_pod_noise', 1e-6, '-hyco_snapshots', 'many.snapshots', '-model', 'many.h5', '-malloc_dump', '-memory_view')
         for groups in (4, 1):  # the first run solves, the second only reduces
             run = self.run_raw('train', *words, '-hyco_groups', groups, ranks=4, timeout=200)
             self.assertEqual(run.returncode, 0, run.stderr)
@@ -72,7 +72,7 @@ class Training(Case):
         for ranks in (1, 4):
             run = self.run_raw('train', '-scene', BLOCKS, '-scene_refine', 2, '-grid', '8,8', '-hyco_groups', 1, '-hyco_search', 'false',
                                '-hyco_pod_tol', 0, '-hyco_rid_modes', 'displacement,force', '-hyco_validation', 6, '-hyco_snapshots',
-                               'memory.snapshots', '-model', 'memory.h5', '-malloc_debug', '-memory_view', ranks=ranks, timeout=200)
+                               'memory.snapshots', '-model', 'memory.h5', '-malloc_dump', '-memory_view', ranks=ranks, timeout=200)
             most[ranks] = self.peak(run)
         self.assertLess(most[4][1], 1.25 * most[4][0] / 4)
         self.assertLess(most[4][0], 2.2 * most[1][0])

@@ -561,10 +561,10 @@ static PetscErrorCode Try(Problem *p, HycoSolver solver, const Method *m, const 
 }
 
 /* On problems above 500, which take most of the time, only the methods that hyco chooses or uses as a fallback;
-   HYCO_ALL_SOLVERS (scripts/solver-tables): all. */
+   HYCO_LONG (scripts/solver-tables): all. */
 static PetscBool Large(const Method *m)
 {
-  if (!m->tao || getenv("HYCO_ALL_SOLVERS")) return PETSC_TRUE;
+  if (!m->tao || getenv("HYCO_LONG")) return PETSC_TRUE;
   return (PetscBool)(m->form != HYCO_FORM_DUAL_FREE && (!strcmp(m->tao, "gpcg") || !strcmp(m->tao, "tron")));
 }
 
