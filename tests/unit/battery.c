@@ -560,14 +560,6 @@ static PetscErrorCode Try(Problem *p, HycoSolver solver, const Method *m, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* On problems above 500, which take most of the time, only the methods that hyco chooses or uses as a fallback;
-   HYCO_LONG (scripts/solver-tables): all. */
-static PetscBool Large(const Method *m)
-{
-  if (!m->tao || getenv("HYCO_LONG")) return PETSC_TRUE;
-  return (PetscBool)(m->form != HYCO_FORM_DUAL_FREE && (!strcmp(m->tao, "gpcg") || !strcmp(m->tao, "tron")));
-}
-
 static PetscErrorCode RunClass(const Class *c, PetscInt largest, PetscBool few, int n_methods, const Method methods[],
                                Cell cells[])
 {
@@ -586,7 +578,7 @@ static PetscErrorCode RunClass(const Class *c, PetscInt largest, PetscBool few, 
       const char *reason;
       const PetscInt fit = Fit(methods[m].name, c, &reason);
 
-      if ((few && methods[m].many) || (sizes[k] > 500 && !Large(&methods[m]))) continue;
+      if (few && methods[m].many) continue;
       /* an unsuitable one, on small problems or the next larger one, must not report convergence with a wrong result */
       if (sizes[k] <= (fit ? fit : 50) || (fit < 500 && k && sizes[k - 1] == fit))
         PetscCall(Try(&p, solver, &methods[m], c, sizes[k], (PetscBool)(sizes[k] <= fit), reason, &cells[m]));
@@ -716,7 +708,8 @@ static PetscErrorCode Test(void)
   PetscFunctionBegin;
   PetscCallMPI(MPI_Comm_size(PETSC_COMM_WORLD, &size));
   PetscCallMPI(MPI_Comm_rank(PETSC_COMM_WORLD, &rank));
-  if (size > 1) largest = 200; /* MUMPS and communication take the time */
+  if (size > 1 || !getenv("HYCO_LONG"))
+    largest = 200; /* HYCO_LONG (scripts/solver-tables, ctest -C Long): 2000, minutes */
   PetscCall(PetscOptionsGetInt(NULL, NULL, "-largest", &largest, NULL));
   PetscCall(PetscOptionsGetStringArray(NULL, NULL, "-measure", measured, &n_measured, &measure));
   if (measure) {
