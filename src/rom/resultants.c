@@ -9,7 +9,7 @@
 #include <hycoromimpl.h>
 
 struct _n_HycoResultants {
-  PetscBool *balanced;                   /* n_quantities x n_bodies */
+  PetscBool *balanced, *loaded;          /* n_quantities x n_bodies; by body: of a quantity */
   PetscBool pushed[HYCO_MAX_QUANTITIES]; /* contact acts on these bodies from outside */
   HycoMesh mesh;                         /* the cells with the loads of these bodies */
   HycoFE fe;
@@ -24,7 +24,7 @@ PetscErrorCode HycoResultantsDestroy(HycoResultants *resultants)
   if (!*resultants) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoFEDestroy(&(*resultants)->fe));
   PetscCall(HycoMeshDestroy(&(*resultants)->mesh));
-  HycoFreeAll(&(*resultants)->balanced, &(*resultants)->load, resultants);
+  HycoFreeAll(&(*resultants)->balanced, &(*resultants)->loaded, &(*resultants)->load, resultants);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -82,8 +82,14 @@ PetscErrorCode HycoResultantsCreate(HycoROM m, PetscBool balanced[], HycoMesh lo
   r = *resultants;
   r->balanced = balanced;
   r->mesh = loaded;
+  PetscCall(PetscCalloc1(m->model->scene->n_bodies + 1, &r->loaded));
+  for (PetscInt k = 0; k < m->model->scene->n_quantities * m->model->scene->n_bodies; k++) {
+    if (balanced[k]) r->loaded[k % m->model->scene->n_bodies] = PETSC_TRUE;
+  }
   ierr = HycoFECreate(m->model->scene, loaded->dm, &r->fe);
   if (!ierr) PetscCall(PetscMalloc1(r->fe->n_dof, &r->load));
+  /* Forces of thermal strains do no work on a translation: their sum over a body is 0, but for radii. */
+  if (!ierr) r->fe->without_cells = (PetscBool)(m->model->scene->formulation != HYCO_AXISYMMETRIC);
   if (!ierr) ierr = FindPushed(m, r);
   if (ierr) PetscCall(HycoResultantsDestroy(resultants));
   PetscCall(ierr);
@@ -149,19 +155,22 @@ static PetscReal Load(HycoResultants r, const PetscBool of[], PetscInt axis)
 static PetscErrorCode BringLoads(HycoResultants r, const PetscReal mu[])
 {
   const HycoScene s = r->fe->scene;
-  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, heat = PETSC_FALSE;
+  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, heat = PETSC_FALSE, moved = PETSC_FALSE;
   HycoChanges c;
 
   PetscFunctionBegin;
   for (PetscInt p = 0; p < s->n_variables; p++) changed[p] = (PetscBool)(!r->ready || mu[p] != r->mu[p]);
   c = HycoSceneChanges(s, changed);
-  /* Moduli act on the forces of heat alone. */
   for (PetscInt b = 0; b < s->n_bodies; b++)
+    moved = (PetscBool)(moved || (r->loaded[b] && HycoBodyMoves(&s->body[b], changed)));
+  if (r->fe->joint || r->mesh->ties) moved = c.nodes;
+  /* Moduli act on the forces of heat alone. */
+  for (PetscInt b = 0; b < s->n_bodies && !r->fe->without_cells; b++)
     heat =
         (PetscBool)(heat || (s->body[b].expansion && (c.stiffness || HycoExprChanges(s->body[b].temperature, changed) ||
                                                       HycoExprChanges(s->body[b].reference, changed) ||
                                                       HycoExprChanges(s->body[b].expansion, changed))));
-  if (r->ready && !c.nodes && !heat && !HycoSceneLoadsChange(s, changed)) PetscFunctionReturn(PETSC_SUCCESS);
+  if (r->ready && !moved && !heat && !HycoSceneLoadsChange(s, changed)) PetscFunctionReturn(PETSC_SUCCESS);
   /* After an error in between, the loads must not pass for those at r->mu. */
   r->ready = PETSC_FALSE;
   PetscCall(HycoFESetParameters(r->fe, mu));
