@@ -16,7 +16,8 @@ typedef struct {
   PetscReal *w[5];            /* p + n: at the three points, and at closer ones */
   PetscReal *q, *v;           /* p + k */
   PetscReal size;
-  PetscBool focused; /* the outputs' cells are few */
+  PetscBool focused;  /* the outputs' cells are few */
+  PetscBool contacts; /* outputs read contacts alone, and the forces are those of z */
   HycoTangent tangent;
   PetscReal *output; /* 6 x n_outputs: at the three points, at closer ones */
   /* the prediction */
@@ -40,13 +41,17 @@ static PetscErrorCode Move(Work *o, const PetscReal mu[], const PetscReal z[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The outputs there. */
+/* The outputs there. Those of contacts need their rows and forces, and no displacement. */
 static PetscErrorCode MoveAndMeasure(Work *o, const PetscReal mu[], const PetscReal z[], PetscReal output[])
 {
   HycoPrediction p = {0};
 
   PetscFunctionBegin;
-  PetscCall(Move(o, mu, z));
+  if (o->contacts) {
+    if (mu) PetscCall(HycoROMBringRows(o->m, mu));
+    PetscCall(PetscArraycpy(o->m->Lambda, z + o->p, o->n));
+  } else
+    PetscCall(Move(o, mu, z));
   PetscCall(HycoROMMeasureQuantities(o->m, &p));
   PetscCall(PetscArraycpy(output, p.quantity, o->m->model->scene->n_quantities));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -111,6 +116,8 @@ static PetscErrorCode Create(Work *o)
   HycoDuplicate(n_dof, m->U, &o->U);
   HycoDuplicate(m->model->pairs.n, m->Lambda, &o->Lambda);
   PetscUseTypeMethod(m, unknowns, &o->p, &o->n, NULL);
+  o->contacts =
+      (PetscBool)(m->model->traits.surfaces && !m->model->floating && !HycoSceneHasFieldOutputs(m->model->scene));
   PetscCall(PetscMalloc3(o->p + o->n + 1, &o->z, o->p + o->n + 1, &o->moved, o->p + o->n + 1, &o->dz));
   /* Open contacts do not change. */
   PetscCall(PetscArrayzero(o->dz, o->p + o->n));
