@@ -40,6 +40,8 @@ typedef struct {
   char loose[512];       /* a motion of a body that contact alone may hold, where no contact has a force: its position
                             is arbitrary; "": none */
   char regularised[512]; /* unconstrained motions that -hyco_regularise removed, separated by "; " */
+  char buried[512];      /* contacts whose given gap overlaps at every node by more than 1 % of the extent of a body, as
+                            with the wrong sign: "fit (by 2 %), ..."; "": none */
   char why[512];         /* not converged: the reason in words, with the body or the number that shows it; else "" */
 } HycoSummary;
 

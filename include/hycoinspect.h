@@ -44,6 +44,7 @@ typedef struct {
   const char *name, *type, *slave, *master; /* groups; master NULL: none */
   PetscInt n, facing_min, facing_max; /* number of contacts; of those that may close, the smallest and largest number */
   PetscReal gap_min, gap_max;         /* gaps of those that may close; max < min: no contact may close */
+  PetscReal buried;     /* HycoSummary.buried: the largest share of an extent, at any of the points; 0: none */
   PetscInt between;     /* masters between nodes, as where meshes do not match, unless the type is for this */
   PetscBool integrated; /* the type integrates over facets: either side may be the finer */
   PetscReal coarse; /* slave's facet size over the master's, median, where most contacts may close; 0: not compared */

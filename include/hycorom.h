@@ -210,13 +210,14 @@ typedef struct {
   Finds the parameters within the ranges at which n outputs of the model are closest to targets, output[n] their indices
   (of a path at its last listed time; n_outputs more: their largest over the listed times, path_quantity): the least squares of (output - target) / |target| (a target of 0: over the largest output at the samples), on the model's
   gradients by the TAO type `type`, then by the other one if that ends at no minimum. It minimises from the n_starts best
-  of n_samples predictions over the ranges, or (start: not NULL) from there alone. mu[n_parameters] is the best answer, and
+  of n_samples predictions over the ranges, or (start: not NULL) from there alone. held[n_parameters]: values within the
+  ranges that parameters keep, NaN: it is free; NULL: all are. mu[n_parameters] is the best answer, and
   the last prediction the one there. Not collective; on several ranks answers may differ in the last bits. Fails where
   HycoROMGetGradient() does, and if no prediction at a start converges.
 */
 PetscErrorCode HycoROMFit(HycoROM model, PetscInt n, const PetscInt output[], const PetscReal target[],
-                          const PetscReal start[], PetscInt n_samples, PetscInt n_starts, const char type[],
-                          PetscReal mu[], HycoFit *fit);
+                          const PetscReal start[], const PetscReal held[], PetscInt n_samples, PetscInt n_starts,
+                          const char type[], PetscReal mu[], HycoFit *fit);
 /* Gets the strain energy of the last prediction on the RID's cells; this may cost as much as the prediction. */
 PetscErrorCode HycoROMGetStrainEnergy(HycoROM model, PetscReal *energy);
 

@@ -205,8 +205,10 @@ typedef struct _n_HycoBodiesWork {
   PetscReal **blend;  /* by body with several samples: the columns of its flexibility with these weights, n x n; */
   PetscBool *blended; /* by place: whether they are there */
   HycoFE fe;          /* on probe */
-  PetscReal *X0, *E0; /* by body: nodes of its cell and the largest entry of its tangents in its own axes */
-  PetscInt *E_at;     /* which entry */
+  PetscBool prepared; /* what HycoBodiesPrepare() makes is that at `mu` */
+  PetscReal *mu, *reference; /* variables; by body: where its reference was taken */
+  PetscReal *X0, *E0;        /* by body: nodes of its cell and the largest entry of its tangents in its own axes */
+  PetscInt *E_at;            /* which entry */
   HycoPose *pose;
   PetscReal *kappa, *c, *elastic, *free, *u, *f, *x; /* elastic: free, without inelastic strains */
   PetscReal *Z, *work;                               /* ns x p, p x r row major: of all bodies, interpolated */

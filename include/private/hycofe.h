@@ -70,7 +70,8 @@ struct _n_HycoFE {
      forces of thermal strains are loads, with elastic tangents */
   const PetscReal *cell_weight;
   PetscBool all_facets, heat_is_load;
-  PetscBool without_cells; /* tangents, heat and springs stay those of a former mu: HycoFEUseCells() */
+  PetscBool without_cells; /* tangents, heat and springs stay those of a former mu, heat is no load: HycoFEUseCells() */
+  PetscBool keeps_sides;   /* and maps mirror what they did: parameters stay close to those of the call */
   /* kept from one parameter value to the next */
   HycoAssemblyMap places; /* positions of the element entries in K; created by the second assembly */
   PetscInt n_loads;
@@ -88,6 +89,8 @@ struct _n_HycoFE {
   PetscReal *X;         /* n_nodes x 3, moved nodes */
   PetscBool *mirrored;  /* by body: its map reverses orientation */
   PetscInt place;       /* of the nodes: a number that is unique on this process for each position of the nodes */
+  PetscInt *moved_at;   /* by body: the place at which its nodes moved last */
+  PetscBool joint;      /* cells have nodes of other bodies: a body's map moves them too */
   PetscInt drawn;       /* the same, of the nodes, normals and gaps of contacts; 0: not at a parameter value */
   PetscReal *kept;      /* gradients (nv x 3) and weight of each point, computed at kept_place:
                            HycoFEKeepGradients(); or NULL */
@@ -154,6 +157,10 @@ typedef struct {
 HycoChanges HycoSceneChanges(HycoScene scene, const PetscBool changed[]);
 /* Whether they change the entries of the loads, inertia included. */
 PetscBool HycoSceneLoadsChange(HycoScene scene, const PetscBool changed[]);
+/* Whether they change the map of a body. */
+PetscBool HycoBodyMoves(const HycoBody *body, const PetscBool changed[]);
+/* Whether they change F: loads, supports, heat, and what moves or stiffens. */
+PetscBool HycoSceneForcesChange(HycoScene scene, const PetscBool changed[]);
 /* Which parameters (room for n_parameters) affect the stiffness or the contacts' rows. */
 void HycoSceneReaches(HycoScene scene, PetscBool reaches[]);
 

@@ -46,10 +46,6 @@ PetscErrorCode HycoGradientCreate(HycoScene scene, HycoGradientStore *store, Hyc
 PetscErrorCode HycoGradientDestroy(HycoGradientStore *store);
 /* Sets output[n_outputs] at the point `at` (n_variables) of a parameter's difference, which lies `step` from mu. */
 typedef PetscErrorCode (*HycoGradientMeasure)(void *context, const PetscReal at[], PetscReal step, PetscReal output[]);
-/* Sets the column of the difference's parameter from the outputs at mu and at its points beside it (value: 3 n_outputs), if
-   their slopes are the same to both sides; false: they are not, and HycoGradientColumn() tells kinks from curvature. */
-PetscBool HycoGradientSetSmooth(HycoGradient *gradient, HycoGradientStore *store, const HycoDifference *difference,
-                                PetscBool kink, const PetscReal value[]);
 /* Sets the column of the difference's parameter from the outputs at its points beside mu, and where their slopes differ
    also at those of a quarter of the step, which tell a kink from curvature. value: room for 6 gradient->n_outputs, the
    first n_outputs those at mu; kink: the solution has one. As collective as `measure`. */

@@ -526,11 +526,11 @@ class Model(_Handle):
         times, path = (None if any(v is None for v in each) or not each else np.array(each).reshape(shape + each[0].shape) for each in (times, path))
         return Gradient(mu, named, value.reshape(shape + size[1:]), kink.reshape(shape + size[1:]), undecided.reshape(shape)[()], times, path)
 
-    def fit(self, targets, start=None, starts=1, samples=64, kind='brgn'):
+    def fit(self, targets, start=None, starts=1, samples=64, kind='brgn', hold=None):
         """The Fit of {output: target}: the parameters within the ranges at which the outputs are closest to the targets, as hyco fit; of
         a path at its last time, and path_OUTPUT the largest over its listed times.
         It minimises from the `starts` best of `samples` predictions over the ranges, or from `start` alone, by the TAO type `kind`
-        (brgn, blmvm). Under mpiexec each process does the same."""
+        (brgn, blmvm); hold: {parameter: value} that are kept. Under mpiexec each process does the same."""
         handle, known = self._open, self.outputs + ([f'path_{name}' for name in self.outputs] if self._times else [])
         lacking = [name for name in targets if name not in known]
         if lacking or not targets:
@@ -539,7 +539,11 @@ class Model(_Handle):
         target = np.array(list(targets.values()), float)
         mu, found = np.zeros(len(self.parameters)), np.zeros(1, c.struct('HycoFit'))
         start = None if start is None else _one(start, self.parameters)
-        c.call('HycoROMFit', handle, c.count(len(output)), c.address(output), c.address(target), c.address(start), c.count(samples),
+        lacking = [name for name in hold or {} if name not in self.parameters]
+        if lacking:
+            raise Error(f'hold names {", ".join(lacking)}; the parameters are {", ".join(self.parameters)}')
+        held = np.array([(hold or {}).get(name, np.nan) for name in self.parameters], float)
+        c.call('HycoROMFit', handle, c.count(len(output)), c.address(output), c.address(target), c.address(start), c.address(held), c.count(samples),
                c.count(starts), kind.encode(), c.address(mu), c.address(found))
         return Fit(mu, self.predict(mu, check=False).outputs, self.parameters, found[0])
 

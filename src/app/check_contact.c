@@ -49,6 +49,11 @@ static void Warn(Check *check, const HycoContactInspection *c)
     CheckReportWarning(
         check, "contact %s: the smallest gap is %.3g, %.2g of the mesh's extent; small displacements cannot close it",
         c->name, (double)c->gap_min, (double)(c->gap_min / length));
+  if (c->buried > 0)
+    CheckReportWarning(check,
+                       "contact %s: its gap overlaps at every node, by %.2g %% of its body's extent; is the sign right "
+                       "(above 0 the surfaces are apart)?",
+                       c->name, 100 * (double)c->buried);
   /* Contacts that are integrated do not lose force between a coarse slave's nodes. */
   if (c->coarse > COARSER && !c->integrated)
     CheckReportWarning(

@@ -24,11 +24,11 @@ typedef struct {
 
 /* -- options -- */
 
-/* -fit_type, -fit_starts, -starts, and whether -mu gives the start. */
+/* -fit_type, -fit_starts, -starts, whether -mu gives the start, and -hold_NAME (NaN: the parameter is free). */
 typedef struct {
   PetscInt type, samples, starts;
   PetscBool given;
-  PetscReal mu[MOST];
+  PetscReal mu[MOST], held[MOST];
 } Settings;
 static const char *const types[] = {"brgn", "blmvm", NULL};
 
@@ -122,7 +122,7 @@ static PetscErrorCode Run(Fit *f, const Settings *s)
   HycoPrediction at;
 
   PetscFunctionBegin;
-  PetscCall(HycoROMFit(f->model, f->n, f->output, f->target, s->given ? s->mu : NULL, s->samples, s->starts,
+  PetscCall(HycoROMFit(f->model, f->n, f->output, f->target, s->given ? s->mu : NULL, s->held, s->samples, s->starts,
                        types[s->type], f->mu, &f->fit));
   PetscCall(HycoROMGetPrediction(f->model, &at));
   for (PetscInt k = 0; k < f->n; k++)
@@ -221,12 +221,12 @@ static PetscErrorCode PrintAnswer(const Fit *f, const PetscReal full[], cJSON *j
 }
 
 /* A fit that ended at no minimum is a miss (exit status 3), with its report written. */
-static PetscErrorCode Report(const Fit *f, const PetscReal full[])
+static PetscErrorCode Report(const Fit *f, const PetscReal held[], const PetscReal full[])
 {
   const HycoFit *fit = &f->fit;
   const PetscReal *mu = f->mu;
   const char *const *names;
-  cJSON *json, *ends;
+  cJSON *json, *ends, *kept;
 
   PetscFunctionBegin;
   PetscCall(ReportCreate("fit", f->scene, mu, &json));
@@ -237,8 +237,13 @@ static PetscErrorCode Report(const Fit *f, const PetscReal full[])
   cJSON_AddBoolToObject(json, "kink", fit->kink);
   ReportNumbers(json, {"starts", (PetscReal)fit->n_starts}, {"starts_at_least", (PetscReal)fit->n_least});
   ends = cJSON_AddArrayToObject(json, "at_ends");
+  kept = cJSON_AddArrayToObject(json, "held");
   PetscCall(HycoSceneGetParameters(f->scene, NULL, &names, NULL, NULL));
   for (PetscInt p = 0; p < f->n_par; p++) {
+    if (!PetscIsNanReal(held[p])) {
+      cJSON_AddItemToArray(kept, cJSON_CreateString(names[p]));
+      continue;
+    }
     /* An answer at an end may lie beyond the range: the user must know. */
     if (mu[p] > f->lo[p] && mu[p] < f->hi[p]) continue;
     cJSON_AddItemToArray(ends, cJSON_CreateString(names[p]));
@@ -260,7 +265,7 @@ static PetscErrorCode Report(const Fit *f, const PetscReal full[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* -mu or -mu_NAME as the start. Without -mu the start is searched; DriverGetPoint() would require all parameters. */
+/* -mu or -mu_NAME as the start, and what is held. Without -mu the start is searched; DriverGetPoint() would require all parameters. */
 static PetscErrorCode ReadStart(const Fit *f, Settings *s)
 {
   const char *const *names;
@@ -275,6 +280,11 @@ static PetscErrorCode ReadStart(const Fit *f, Settings *s)
     PetscCall(PetscOptionsHasName(NULL, NULL, key, &s->given));
   }
   if (s->given) PetscCall(DriverGetPoint(f->scene, s->mu));
+  PetscCall(DriverGetHeld(f->scene, s->held));
+  for (PetscInt p = 0; p < f->n_par && s->given; p++)
+    HycoCheck(PetscIsNanReal(s->held[p]) || s->held[p] == s->mu[p],
+              "-mu starts %s at %.10g, and -hold_%s keeps it at %.10g; give both the same value", names[p],
+              (double)s->mu[p], names[p], (double)s->held[p]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -297,6 +307,7 @@ PetscErrorCode DeclareFit(PetscOptions options)
   (void)options;
   PetscCall(DriverReadFiles(path, path, NULL, path, NULL));
   PetscCall(DriverGetPoint(NULL, NULL));
+  PetscCall(DriverGetHeld(NULL, NULL));
   PetscCall(DriverGet("target_",
                       "<v> value that an output of the model should have: -target_OUTPUT v; of a path at its last "
                       "time, -target_path_OUTPUT v "
@@ -337,7 +348,7 @@ PetscErrorCode CommandFit(void)
   if (scene) HycoStaged(HYCO_STAGE_FULL_ORDER, Check(&f, scene, at, f.mu, full));
   PetscCall(DriverCheckLeft());
   /* Last, since it may end in a miss: the answer is complete by then. */
-  PetscCall(Report(&f, scene ? full : NULL));
+  PetscCall(Report(&f, s.held, scene ? full : NULL));
   PetscCall(HycoSceneDestroy(&scene));
   PetscCall(HycoROMDestroy(&f.model));
   PetscFunctionReturn(PETSC_SUCCESS);

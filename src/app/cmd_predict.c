@@ -427,6 +427,7 @@ typedef struct {
   HycoQueue queue;
   PetscReal *value; /* of the piece */
   PetscInt n_unseen, n_inconsistent;
+  DriverLacking *lacking;
 } Taken;
 
 /* A HycoPointMonitor: called after each point of a batch, whatever the order of the batch. It serves the queue, so
@@ -449,8 +450,11 @@ static PetscErrorCode TakePoint(HycoROM model, PetscInt k, void *ctx)
   /* Gradients of points that did not converge. */
   for (PetscInt c = t->shape->with_carried; c < t->shape->width; c++) v[c] = NAN;
   if (t->shape->gradients.on && p.reason > 0) {
-    PetscCall(HycoROMGetGradient(model, &gradient));
-    DriverGradientFill(&t->shape->gradients, &gradient, v + t->shape->with_carried);
+    PetscErrorCode caught;
+
+    PetscCall(HycoCatchBegin());
+    caught = HycoROMGetGradient(model, &gradient);
+    PetscCall(DriverGradientCatch(&t->shape->gradients, &gradient, caught, t->lacking, v + t->shape->with_carried));
   }
   DriverWantsFullOrder(t->fallback, &p, why);
   v[FULL_ORDER] = why[0] != '\0'; /* required; SolveRest() solves it */
@@ -517,7 +521,7 @@ static PetscErrorCode PrintDoubts(PetscInt n, const Taken *t)
 static PetscErrorCode PredictAll(HycoROM model, const Fallback *fallback, PetscInt n_par, const PetscReal mu[],
                                  const Shape *s, DriverRows *rows)
 {
-  Taken taken = {.fallback = fallback, .shape = s};
+  Taken taken = {.fallback = fallback, .shape = s, .lacking = &rows->lacking};
   PetscInt each;
 
   PetscFunctionBegin;
@@ -527,6 +531,7 @@ static PetscErrorCode PredictAll(HycoROM model, const Fallback *fallback, PetscI
   HycoOnEach(PETSC_COMM_WORLD, HycoQueueEnd(taken.queue, PredictQueued(model, each, n_par, mu, &taken, rows)));
   PetscCall(HycoQueueDestroy(&taken.queue));
   PetscCall(PrintDoubts(rows->n, &taken));
+  PetscCall(DriverGradientsEnd(&rows->lacking));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

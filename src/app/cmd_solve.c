@@ -8,6 +8,11 @@ static PetscErrorCode Remarks(const HycoSummary *s, PetscInt n, const HycoStep s
   PetscFunctionBegin;
   if (s->regularised[0]) PetscCall(DriverPrint("regularised: neither supports nor contact keep %s\n", s->regularised));
   if (s->loose[0]) PetscCall(DriverPrint("warning: no contact force keeps %s: its position is arbitrary\n", s->loose));
+  if (s->buried[0])
+    PetscCall(
+        DriverPrint("warning: every node of %s overlaps before any load, in share of the body's extent: is the sign of "
+                    "the gap right (above 0 the surfaces are apart)?\n",
+                    s->buried));
   if (s->n_still)
     PetscCall(DriverPrint("%d contact%s between fixed displacements: without effect\n", (int)s->n_still,
                           s->n_still > 1 ? "s lie" : " lies"));
@@ -79,6 +84,7 @@ static PetscErrorCode Report(HycoScene scene, const PetscReal mu[], HycoFOM fom,
   cJSON_AddNumberToObject(json, "n_dependent", s->n_dependent);
   cJSON_AddStringToObject(json, "regularised", s->regularised);
   cJSON_AddStringToObject(json, "loose", s->loose);
+  cJSON_AddStringToObject(json, "buried", s->buried);
   cJSON_AddNumberToObject(json, "active_set_iterations", s->iterations);
   cJSON_AddStringToObject(json, "solver", method);
   cJSON_AddStringToObject(json, "linear", linear);
@@ -212,10 +218,11 @@ static PetscErrorCode DestroyTable(Table *t)
 
 /* The layout of a row: fixed columns, outputs of the scene, resultants of the contacts, derivatives. The same
    order as the names in the table. */
-static PetscErrorCode FillRow(HycoFOM fom, const HycoSummary *s, const Table *t, PetscReal v[])
+static PetscErrorCode FillRow(HycoFOM fom, const HycoSummary *s, const Table *t, DriverLacking *lacking, PetscReal v[])
 {
   const HycoContactResult *carried;
   HycoGradient gradient;
+  PetscErrorCode caught;
   PetscInt n;
 
   PetscFunctionBegin;
@@ -234,8 +241,10 @@ static PetscErrorCode FillRow(HycoFOM fom, const HycoSummary *s, const Table *t,
   /* A point that failed has no derivative, and its row stays. */
   for (PetscInt c = 0; c < t->gradients.n; c++) v[t->with_carried + c] = NAN;
   if (!t->gradients.on || s->reason <= 0) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoFOMGetGradient(fom, &gradient));
-  DriverGradientFill(&t->gradients, &gradient, v + t->with_carried);
+  /* Its errors are raised on every rank. */
+  PetscCall(HycoCatchBegin());
+  caught = HycoFOMGetGradient(fom, &gradient);
+  PetscCall(DriverGradientCatch(&t->gradients, &gradient, caught, lacking, v + t->with_carried));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -248,6 +257,7 @@ static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, co
   Table t = {.gradients = {.on = derives}};
   DriverPiece all;
   DriverRows rows;
+  DriverLacking lacking = {0};
   PetscReal begin, u_relative = 0;
 
   PetscFunctionBegin;
@@ -264,14 +274,18 @@ static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, co
     if (k == 0) PetscCall(Remarks(&s, 0, NULL));
     /* The dimension is known from the first solution. */
     if (k == 0) PetscCall(CreateTable(scene, s.dim, n, &t));
-    PetscCall(FillRow(fom, &s, &t, t.value + k * t.width));
     if (s.reason > 0) u_relative = PetscMax(u_relative, s.u_relative);
+    /* Before the gradient: after an error of it there is no solution to write. */
     if (output[0]) PetscCall(HycoFOMWriteAdd(fom));
+    PetscCall(FillRow(fom, &s, &t, &lacking, t.value + k * t.width));
     PetscCall(DriverSetPhase(k + 1, n));
   }
   if (output[0]) PetscCall(HycoFOMWriteEnd(fom));
   PetscCall(WarnOfUnits(u_relative));
   rows = DriverRowsOfRoot(n, t.width, t.value, &all);
+  /* Every rank has counted every point. */
+  rows.lacking = lacking;
+  HycoCheck(!lacking.n || lacking.n_found, "%s", lacking.why);
   PetscCall(ReportSet("solve", table, scene, samples, t.names, &rows, HycoNow() - begin));
   PetscCall(DestroyTable(&t));
   PetscFunctionReturn(PETSC_SUCCESS);

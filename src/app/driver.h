@@ -57,6 +57,8 @@ PetscErrorCode DriverCheckMesh(HycoScene scene);
 
 /* One point: -mu v,v,... or -mu_NAME v. */
 PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[]);
+/* -hold_NAME v, held[n_parameters]; NaN: not given. */
+PetscErrorCode DriverGetHeld(HycoScene scene, PetscReal held[]);
 /* Whether -mu or a -mu_NAME was given. */
 PetscErrorCode DriverHasPoint(HycoScene scene, PetscBool *given);
 /* A set of points: -grid (closed: by default with the ends of the ranges), -values_NAME, -points or -scatter. *given:
@@ -160,6 +162,12 @@ PetscErrorCode DriverWriteText(const char path[], const char text[]);
 
 /* -- table.c: rows of results, one for each point -- */
 
+/* Points of a set that have a gradient, those of them that converged and have none, and why the first has not. */
+typedef struct {
+  PetscInt n_found, n;
+  char why[HYCO_LINE];
+} DriverLacking;
+
 /* Rows first .. first + n - 1, n x width row major. */
 typedef struct {
   PetscInt first, n;
@@ -170,6 +178,7 @@ typedef struct {
   PetscInt n, width; /* rows on all ranks; columns */
   PetscInt n_pieces;
   DriverPiece *piece;
+  DriverLacking lacking; /* of -gradient */
 } DriverRows;
 
 /* Adds a piece after the others; value: its n x width zeros, which the rows own. */
@@ -183,7 +192,7 @@ DriverRows DriverRowsOfRoot(PetscInt n, PetscInt width, PetscReal value[], Drive
 PetscErrorCode DriverWriteTable(const char path[], HycoScene scene, const PetscReal mu[], const char *const names[],
                                 const DriverRows *rows);
 /* The report of a set of points from the rows of their values (one column is named "converged"), and their table at
-   `table` ("": none); fails if a point did not converge. Collective. */
+   `table` ("": none); fails if a point did not converge or has no gradient. Collective. */
 PetscErrorCode ReportSet(const char command[], const char table[], HycoScene scene, HycoSamples samples,
                          const char *const columns[], const DriverRows *rows, PetscReal seconds);
 
@@ -222,6 +231,11 @@ typedef struct {
 PetscErrorCode DriverGradientColumns(HycoScene scene, DriverGradients *columns);
 /* Their values in a row (v: n). */
 void DriverGradientFill(const DriverGradients *columns, const HycoGradient *gradient, PetscReal v[]);
+/* Ends catching the error of the gradient of a converged point: fills its columns (v: n, NaN before), or counts it. */
+PetscErrorCode DriverGradientCatch(const DriverGradients *columns, const HycoGradient *gradient, PetscErrorCode caught,
+                                   DriverLacking *lacking, PetscReal v[]);
+/* Sums the points of all ranks; fails if there are some and none has a gradient. Collective. */
+PetscErrorCode DriverGradientsEnd(DriverLacking *lacking);
 
 /* -- progress.c -- */
 

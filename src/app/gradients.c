@@ -124,3 +124,37 @@ void DriverGradientFill(const DriverGradients *columns, const HycoGradient *g, P
     v[columns->n - 1] += g->kink[k];
   }
 }
+
+PetscErrorCode DriverGradientCatch(const DriverGradients *columns, const HycoGradient *g, PetscErrorCode caught,
+                                   DriverLacking *lacking, PetscReal v[])
+{
+  char why[HYCO_LINE];
+
+  PetscFunctionBegin;
+  PetscCall(HycoCatchEnd(caught, why));
+  if (!caught) {
+    DriverGradientFill(columns, g, v);
+    lacking->n_found++;
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  /* The prediction stands: a point without a derivative must not cost the others of a set. */
+  if (!lacking->n++) PetscCall(PetscStrncpy(lacking->why, why, sizeof(lacking->why)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A gradient that no point has is refused as that of a single point is: nothing is written. */
+PetscErrorCode DriverGradientsEnd(DriverLacking *l)
+{
+  const MPI_Comm comm = PETSC_COMM_WORLD;
+  PetscInt sum[2] = {l->n_found, l->n};
+  PetscMPIInt size = HycoSize(comm), first = l->n ? HycoRank(comm) : size;
+
+  PetscFunctionBegin;
+  HycoAllreduce(sum, 2, MPIU_INT, MPI_SUM, comm);
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &first, 1, MPI_INT, MPI_MIN, comm));
+  if (first < size) PetscCallMPI(MPI_Bcast(l->why, HYCO_LINE, MPI_CHAR, first, comm));
+  l->n_found = sum[0];
+  l->n = sum[1];
+  HycoCheck(!l->n || l->n_found, "%s", l->why);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

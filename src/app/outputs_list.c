@@ -82,6 +82,8 @@ static const Written written[] = {
      "closed contacts that depend linearly on others (of a path the most)"},
     {"report", "solve", "loose", "text", "-",
      "a rigid motion that no contact force prevents: its position is arbitrary"},
+    {"report", "solve", "buried", "text", "-",
+     "contacts whose given gap overlaps at every node by over 1 % of a body's extent"},
     {"report", "solve predict", "active_set_iterations", "count", "-", "iterations of the contact solver"},
     {"report", "solve predict", "solver", "text", "-", "its method"},
     {"report", "solve", "linear", "text", "-", "the solver of K"},
@@ -155,6 +157,7 @@ static const Written written[] = {
     {"report", "fit", "starts", "count", "-", "minimisations"},
     {"report", "fit", "starts_at_least", "count", "-", "of these, those that ended at the least misfit"},
     {"report", "fit", "at_ends", "texts", "-", "parameters at the end of their range"},
+    {"report", "fit", "held", "texts", "-", "parameters that -hold_NAME keeps"},
     {"report", "solve predict", "n_facing", "count", "-", "contacts that may close; predict: of the RID"},
     {"report", "solve predict", "overlap", "number", "length", "largest initial overlap, >= 0"},
     {"report", "solve predict", "sliding", "number", "-",
@@ -217,6 +220,7 @@ static const Written written[] = {
 
     {"report", "solve predict", "n_points", "count", "-", "points of a set, which has these keys only"},
     {"report", "solve predict", "not_converged", "count", "-", "of them not converged"},
+    {"report", "solve predict", "without_gradient", "count", "-", "of them converged, without a gradient (-gradient)"},
     {"report", "solve predict", "seconds_total", "number", "s", "of the set"},
     {"report", "solve predict", "points_per_second", "number", "1/s", "their number over seconds_total"},
 

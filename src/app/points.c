@@ -1,5 +1,6 @@
 /* Points in the parameter space, from the command line. */
 #include "driver.h"
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -39,7 +40,7 @@ static PetscErrorCode ListNames(HycoScene scene, char list[HYCO_LINE])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Refuses -mu_foo if foo is not a parameter. `prefix` is "mu_" or "values_". */
+/* Refuses -mu_foo if foo is not a parameter. `prefix` is "mu_", "values_" or "hold_". */
 static PetscErrorCode CheckNamed(HycoScene scene, const char prefix[])
 {
   PetscInt n, left;
@@ -171,6 +172,28 @@ PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[])
             (int)n, list);
   /* The ranges, unless extrapolation is allowed. */
   PetscCall(HycoSceneCheckParameters(scene, n, mu));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -hold_NAME v: held[p] is the value that a parameter keeps, NaN where none is given. Ranges are the fit's to check. */
+PetscErrorCode DriverGetHeld(HycoScene scene, PetscReal held[])
+{
+  PetscInt n, count[64], given;
+  const char *const *names, *missing;
+  PetscReal *values[64];
+
+  PetscFunctionBegin;
+  PetscCall(GetNamed(scene, "hold_", "<v> value that the parameter NAME of a fit keeps: -hold_radius 4.06", count,
+                     values, &given, &missing));
+  if (!scene) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoSceneGetParameters(scene, &n, &names, NULL, NULL));
+  for (PetscInt p = 0; p < n; p++) {
+    held[p] = NAN;
+    if (!values[p]) continue;
+    HycoCheck(count[p] == 1, "-hold_%s has %d values; one is expected", names[p], (int)count[p]);
+    held[p] = values[p][0];
+    PetscCall(PetscFree(values[p]));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -216,7 +216,7 @@ static PetscInt FindConverged(PetscInt n_columns, const char *const columns[])
   return 0;
 }
 
-/* The table is written even if points failed; the command fails after it, with the number. */
+/* The table is written even if points or gradients failed; the command fails after it, with the number. */
 PetscErrorCode ReportSet(const char command[], const char table[], HycoScene scene, HycoSamples samples,
                          const char *const columns[], const DriverRows *rows, PetscReal seconds)
 {
@@ -239,10 +239,13 @@ PetscErrorCode ReportSet(const char command[], const char table[], HycoScene sce
                         table[0] ? "" : "; -table FILE.csv writes their results"));
   PetscCall(ReportCreate(command, scene, NULL, &json));
   ReportNumbers(json, {"n_points", n}, {"not_converged", failed}, {"seconds_total", seconds});
+  if (rows->lacking.n) ReportNumbers(json, {"without_gradient", rows->lacking.n});
   if (seconds > 0) cJSON_AddNumberToObject(json, "points_per_second", n / seconds);
   PetscCall(ReportWrite(&json));
   HycoCheck(!failed, "%d of the %d points did not converge; the column converged of %s says which", (int)failed, (int)n,
             table[0] ? table : "a table (-table FILE.csv)");
+  HycoCheck(!rows->lacking.n, "%d of the %d points have no gradient: their columns d_ of %s are nan; the first: %s",
+            (int)rows->lacking.n, (int)n, table[0] ? table : "a table (-table FILE.csv)", rows->lacking.why);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

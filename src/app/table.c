@@ -42,7 +42,7 @@ PetscErrorCode DriverRowsFree(DriverRows *rows)
 DriverRows DriverRowsOfRoot(PetscInt n, PetscInt width, PetscReal value[], DriverPiece *piece)
 {
   *piece = (DriverPiece){0, HycoRank(PETSC_COMM_WORLD) ? 0 : n, value};
-  return (DriverRows){n, width, 1, piece};
+  return (DriverRows){.n = n, .width = width, .n_pieces = 1, .piece = piece};
 }
 
 /* Parameters with ten digits, because -points may read them back; results with eight. */

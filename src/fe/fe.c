@@ -18,8 +18,22 @@ PetscErrorCode HycoFEDestroy(HycoFE *fe)
   HycoFreeAll(&(*fe)->shares, &(*fe)->constant, &(*fe)->bbar, &(*fe)->temperature, &(*fe)->thermal, &(*fe)->pin,
               &(*fe)->released, &(*fe)->X, &(*fe)->room, &(*fe)->mirrored, &(*fe)->drawn_sign, &(*fe)->fixed,
               &(*fe)->oblique, &(*fe)->oblique_at, &(*fe)->u0, &(*fe)->kept, &(*fe)->kept_mean, &(*fe)->weight,
-              &(*fe)->weighed_at, &(*fe)->tangent, &(*fe)->tangent_start, &(*fe)->tangent_size, fe);
+              &(*fe)->weighed_at, &(*fe)->moved_at, &(*fe)->tangent, &(*fe)->tangent_start, &(*fe)->tangent_size, fe);
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether a change of some parameters changes the supports: a value, or, with moved nodes, one that depends on the
+   position. */
+static PetscBool SupportsChange(HycoScene s, const PetscBool changed[], PetscBool moved)
+{
+  for (PetscInt k = 0; k < s->n_fixed; k++) {
+    for (PetscInt c = 0; c < 7; c++) {
+      HycoExpr value = c < 3 ? s->fixed[k].value[c] : c < 6 ? s->fixed[k].direction[c - 3] : s->fixed[k].normal;
+
+      if (HycoExprChanges(value, changed) || (moved && value && HycoExprInSpace(value))) return PETSC_TRUE;
+    }
+  }
+  return PETSC_FALSE;
 }
 
 /* Finds the cells and supports that no parameter changes. A cell is constant if its law, its springs and the
@@ -54,14 +68,7 @@ static PetscErrorCode FindConstant(HycoFE fe)
   /* Before constant cells are counted. */
   HycoSpringsMarkVarying(fe, every);
   for (PetscInt e = 0; e < m->n_cells; e++) fe->n_constant += fe->constant[e];
-  fe->fixed_constant = PETSC_TRUE;
-  for (PetscInt k = 0; k < s->n_fixed; k++) {
-    for (PetscInt c = 0; c < 7; c++) {
-      HycoExpr value = c < 3 ? s->fixed[k].value[c] : c < 6 ? s->fixed[k].direction[c - 3] : s->fixed[k].normal;
-
-      if (HycoExprChanges(value, every) || (any && value && HycoExprInSpace(value))) fe->fixed_constant = PETSC_FALSE;
-    }
-  }
+  fe->fixed_constant = (PetscBool)!SupportsChange(s, every, any);
   PetscCall(PetscFree(moves));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -126,6 +133,9 @@ static PetscErrorCode Create(HycoScene scene, DM dm, HycoMesh mesh, HycoFE *fe)
   f->n_dof = mesh->n_nodes * mesh->dim;
   f->n_sigma = HycoStrainSize(mesh->dim);
   PetscCall(PetscMalloc1(3 * mesh->n_nodes, &f->X));
+  PetscCall(PetscCalloc1(scene->n_bodies + 1, &f->moved_at));
+  for (PetscInt k = 0; k < mesh->n_cells * mesh->nv; k++)
+    f->joint = (PetscBool)(f->joint || mesh->node_body[mesh->cells[k]] != mesh->cell_body[k / mesh->nv]);
   PetscCall(PetscCalloc1(f->n_dof, &f->fixed));
   PetscCall(PetscCalloc1(f->n_dof, &f->u0));
   /* The order: FindConstant() needs the springs, which need the tables alone. */
@@ -178,32 +188,55 @@ PetscErrorCode HycoFECreateSurface(HycoScene scene, DM dm, HycoFE *fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The counter gives each placement of nodes its own number, by which kept gradients are recognised as old. */
-PetscErrorCode HycoFESetDrawn(HycoFE fe)
+/* A number for each placement of nodes, by which kept gradients are recognised as old: unique in the process, not only
+   in fe. */
+static PetscInt NewPlace(void)
 {
   static PetscInt places = 0;
 
+  return ++places;
+}
+
+PetscErrorCode HycoFESetDrawn(HycoFE fe)
+{
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(fe->X, fe->mesh->xyz, 3 * fe->mesh->n_nodes));
-  /* Unique in the process, not only in fe. */
-  fe->place = ++places;
+  fe->place = NewPlace();
+  for (PetscInt b = 0; b < fe->scene->n_bodies; b++) fe->moved_at[b] = fe->place;
   fe->drawn = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* X = map(x, mu), body by body. Maps act on the drawing, not on the last position: the result does not depend on what
-   was solved before. */
-static PetscErrorCode MoveNodes(HycoFE fe)
+PetscBool HycoBodyMoves(const HycoBody *body, const PetscBool changed[])
+{
+  return (PetscBool)(HycoExprChanges(body->map[0], changed) || HycoExprChanges(body->map[1], changed) ||
+                     HycoExprChanges(body->map[2], changed));
+}
+
+/* X = map(x, mu) of the bodies whose maps change. Maps act on the drawing, not on the last position: the result does not
+   depend on what was solved before. first: all bodies; so it is with ties, which place nodes of one by those of another. */
+static PetscErrorCode MoveNodes(HycoFE fe, PetscBool first, const PetscBool changed[])
 {
   HycoMesh m = fe->mesh;
 
   PetscFunctionBegin;
-  PetscCall(HycoFESetDrawn(fe));
+  if (first || fe->joint || m->ties)
+    PetscCall(HycoFESetDrawn(fe));
+  else {
+    fe->place = NewPlace();
+    fe->drawn = 0;
+    for (PetscInt b = 0; b < fe->scene->n_bodies; b++) {
+      if (HycoBodyMoves(&fe->scene->body[b], changed)) fe->moved_at[b] = fe->place;
+    }
+    for (PetscInt i = 0; i < m->n_nodes; i++) {
+      if (fe->moved_at[m->node_body[i]] == fe->place) PetscCall(PetscArraycpy(fe->X + 3 * i, m->xyz + 3 * i, 3));
+    }
+  }
   for (PetscInt b = 0; b < fe->scene->n_bodies; b++) {
     for (PetscInt c = 0; c < 3; c++) {
       HycoExpr map = fe->scene->body[b].map[c];
 
-      if (!map) continue;
+      if (!map || fe->moved_at[b] != fe->place) continue;
       HycoCheck(m->dim > c, "%s: the mesh has %d space dimension%s and no component %c; remove the entry",
                 HycoExprKey(map), (int)m->dim, m->dim == 1 ? "" : "s", "xyz"[c]);
       for (PetscInt i = 0; i < m->n_nodes; i++) {
@@ -233,7 +266,7 @@ PetscBool HycoNodeHasNoArea(HycoFE fe, PetscInt node)
 static PetscErrorCode CheckAxis(HycoFE fe)
 {
   /* Length (m) below which a radius counts as zero. */
-  const PetscReal zero = 1e-9 * HycoMeshLength(fe->mesh);
+  const PetscReal zero = fe->formulation == HYCO_AXISYMMETRIC ? 1e-9 * HycoMeshLength(fe->mesh) : 0;
 
   PetscFunctionBegin;
   for (PetscInt i = 0; fe->formulation == HYCO_AXISYMMETRIC && i < fe->mesh->n_nodes; i++) {
@@ -369,9 +402,7 @@ HycoChanges HycoSceneChanges(HycoScene s, const PetscBool changed[])
 {
   HycoChanges c = {PETSC_FALSE, PETSC_FALSE, PETSC_FALSE, PETSC_FALSE};
 
-  for (PetscInt b = 0; b < s->n_bodies; b++) {
-    for (PetscInt d = 0; d < 3; d++) c.nodes = (PetscBool)(c.nodes || HycoExprChanges(s->body[b].map[d], changed));
-  }
+  for (PetscInt b = 0; b < s->n_bodies; b++) c.nodes = (PetscBool)(c.nodes || HycoBodyMoves(&s->body[b], changed));
   /* Everything is integrated over, or evaluated at, the moved nodes. */
   c.stiffness = c.rows = c.gaps = c.nodes;
   for (PetscInt b = 0; b < s->n_bodies; b++)
@@ -404,6 +435,18 @@ PetscBool HycoSceneLoadsChange(HycoScene s, const PetscBool changed[])
   return any;
 }
 
+/* K enters F where displacements are prescribed and where bodies are hot. */
+PetscBool HycoSceneForcesChange(HycoScene s, const PetscBool changed[])
+{
+  const HycoChanges c = HycoSceneChanges(s, changed);
+  PetscBool any = (PetscBool)(c.nodes || c.stiffness || SupportsChange(s, changed, c.nodes));
+
+  for (PetscInt b = 0; b < s->n_bodies; b++)
+    any = (PetscBool)(any || HycoExprChanges(s->body[b].temperature, changed) ||
+                      HycoExprChanges(s->body[b].reference, changed) || HycoExprChanges(s->body[b].expansion, changed));
+  return (PetscBool)(any || HycoSceneLoadsChange(s, changed));
+}
+
 /* By parameter: whether K or B depends on it; others act on F and D only, so that a factor of K stays valid. By which
    points are ordered, grouped and interpolated. */
 void HycoSceneReaches(HycoScene scene, PetscBool reaches[])
@@ -426,6 +469,7 @@ PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
   static PetscInt drawn = 0;
   PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, first = (PetscBool)!fe->ready;
   HycoChanges c;
+  PetscBool supports;
 
   PetscFunctionBegin;
   for (PetscInt p = 0; p < fe->scene->n_variables; p++) {
@@ -434,21 +478,22 @@ PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
     fe->mu[p] = mu[p];
   }
   c = HycoSceneChanges(fe->scene, changed);
+  supports = (PetscBool)(first || (!fe->fixed_constant && SupportsChange(fe->scene, changed, c.nodes)));
   fe->stiffness_changed = (PetscBool)(first || c.stiffness);
   fe->contact_changed = (PetscBool)(first || c.rows);
   /* Supports that change move D by B u0. */
-  fe->gap_changed = (PetscBool)(first || c.gaps || !fe->fixed_constant);
+  fe->gap_changed = (PetscBool)(first || c.gaps || supports);
   fe->ready = PETSC_FALSE; /* until everything is updated */
   if (first || c.nodes) {
-    PetscCall(MoveNodes(fe));
+    PetscCall(MoveNodes(fe, first, changed));
     PetscCall(HycoTiedPlace(fe));
     PetscCall(CheckAxis(fe));
-    PetscCall(HycoMirrorFind(fe));
+    if (first || !fe->keeps_sides) PetscCall(HycoMirrorFind(fe));
     for (PetscInt k = 0; k < fe->n_loads; k++) fe->shares[k].ready = PETSC_FALSE;
   }
   if (first || c.rows || c.gaps) fe->drawn = ++drawn;
   /* After the nodes: values and directions may depend on the position. */
-  if (first || !fe->fixed_constant) PetscCall(SetSupports(fe));
+  if (supports) PetscCall(SetSupports(fe));
   if (!fe->without_cells) {
     if (fe->temperature) PetscCall(HycoFESetHeat(fe, (PetscBool)(first || c.nodes), changed));
     if (fe->stiffness_changed) PetscCall(HycoFESetTangents(fe, first, c.nodes, changed));
@@ -464,7 +509,7 @@ PetscErrorCode HycoFEUseCells(HycoFE fe, PetscBool use)
   const PetscBool late = (PetscBool)(use && fe->without_cells);
 
   PetscFunctionBegin;
-  fe->without_cells = (PetscBool)!use;
+  fe->without_cells = fe->keeps_sides = (PetscBool)!use;
   if (!late) PetscFunctionReturn(PETSC_SUCCESS);
   if (fe->temperature) PetscCall(HycoFESetHeat(fe, PETSC_TRUE, NULL));
   PetscCall(HycoFESetTangents(fe, PETSC_TRUE, PETSC_TRUE, NULL));

@@ -42,18 +42,17 @@ static PetscErrorCode AddNode(HycoFE fe, PetscInt node, PetscInt c, PetscReal va
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the body forces at point q of a cell to its unknowns. w N_a f, f: the body's force per volume plus gravity and
+/* Adds the body forces at point q of a cell, of weight w, to its unknowns. w N_a f, f: the body's force per volume plus gravity and
    centrifugal force, at X(mu). Forces per volume act on the moved body, not per drawn volume. */
-static PetscErrorCode AddPointForce(HycoFE fe, PetscInt cell, PetscInt q, const HycoAcceleration *motion,
+static PetscErrorCode AddPointForce(HycoFE fe, PetscInt cell, PetscInt q, PetscReal w, const HycoAcceleration *motion,
                                     PetscReal value[])
 {
   HycoMesh m = fe->mesh;
   const HycoElement *el = HycoElementGet(m->type);
   const HycoBody *body = &fe->scene->body[m->cell_body[cell]];
-  PetscReal x[3], g[HYCO_CELL_NODES][3], w, inertia[3];
+  PetscReal x[3], inertia[3];
 
   PetscFunctionBegin;
-  PetscCall(HycoGradients(fe, el, cell, q, g, &w));
   HycoPointPlace(fe, el, cell, q, x);
   PetscCall(HycoInertiaForce(fe, body, motion, x, inertia));
   for (PetscInt c = 0; c < m->dim; c++) {
@@ -80,13 +79,15 @@ static PetscBool HasBodyForce(HycoFE fe, PetscInt cell)
    parameters. */
 PetscErrorCode HycoFEBodyForce(HycoFE fe, PetscInt cell, PetscReal value[])
 {
+  const PetscReal *weight;
   HycoAcceleration motion;
 
   PetscFunctionBegin;
   if (!HasBodyForce(fe, cell)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoAccelerationSet(fe, &fe->scene->body[fe->mesh->cell_body[cell]], &motion));
+  PetscCall(HycoPointWeights(fe, HycoElementGet(fe->mesh->type), cell, &weight));
   for (PetscInt q = 0; q < HycoElementGet(fe->mesh->type)->nq; q++)
-    PetscCall(AddPointForce(fe, cell, q, &motion, value));
+    PetscCall(AddPointForce(fe, cell, q, weight[q], &motion, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -265,7 +266,8 @@ PetscErrorCode HycoCellHeat(HycoFE fe, PetscInt cell, PetscReal push[])
 static PetscErrorCode AddVolume(HycoFE fe, PetscInt cell, Into F)
 {
   const HycoBody *body = &fe->scene->body[fe->mesh->cell_body[cell]];
-  const PetscBool hot = (PetscBool)(fe->thermal && (!fe->scene->n_times || fe->heat_is_load) && body->expansion);
+  const PetscBool hot =
+      (PetscBool)(fe->thermal && !fe->without_cells && (!fe->scene->n_times || fe->heat_is_load) && body->expansion);
   PetscReal f[HYCO_MAX_CELL_DOFS] = {0}, push[HYCO_MAX_CELL_DOFS] = {0};
 
   PetscFunctionBegin;

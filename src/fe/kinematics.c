@@ -99,14 +99,14 @@ PetscErrorCode HycoPointWeights(HycoFE fe, const HycoElement *el, PetscInt cell,
     PetscCall(PetscCalloc1(fe->mesh->n_cells, &fe->weighed_at));
   }
   *weight = w = fe->weight + cell * el->nq;
-  /* place counts positions: it rises when nodes move. */
-  if (fe->weighed_at[cell] == fe->place) PetscFunctionReturn(PETSC_SUCCESS);
+  /* It rises when the body's nodes move. */
+  if (fe->weighed_at[cell] == fe->moved_at[fe->mesh->cell_body[cell]]) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt q = 0; q < el->nq; q++) {
     w[q] = PetscAbsReal(HycoDeterminant(el, node, fe->X, q)) * el->w[q];
     if (fe->formulation == HYCO_AXISYMMETRIC) w[q] *= 2 * PETSC_PI * Radius(fe, el->nv, node, el->N[q]);
     if (fe->cell_weight) w[q] *= fe->cell_weight[cell];
   }
-  fe->weighed_at[cell] = fe->place;
+  fe->weighed_at[cell] = fe->moved_at[fe->mesh->cell_body[cell]];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -75,8 +75,11 @@ static PetscErrorCode CellsTurn(HycoFE fe, PetscInt turn[], PetscInt first[])
   for (PetscInt e = 0; e < m->n_cells; e++) {
     const PetscInt b = m->cell_body[e];
     HycoExpr *map = fe->scene->body[b].map;
+    PetscInt sign;
+
+    if (fe->moved_at[b] != fe->place) continue;
     /* The sign relative to the drawing: files may number cells in either orientation. */
-    const PetscInt sign = map[0] || map[1] || map[2] ? fe->drawn_sign[e] * Sign(m, el, e, fe->X) : 1;
+    sign = map[0] || map[1] || map[2] ? fe->drawn_sign[e] * Sign(m, el, e, fe->X) : 1;
 
     HycoCheck(sign, "cell %d is degenerate: its volume vanishes", (int)m->cell_id[e]);
     if (!turn[b]) first[b] = e;
@@ -120,13 +123,15 @@ PetscErrorCode HycoMirrorFind(HycoFE fe)
   for (PetscInt b = 0; b < fe->scene->n_bodies && !ierr; b++) {
     HycoExpr *map = fe->scene->body[b].map;
 
+    /* A body that has not moved keeps its sign. */
+    if (fe->moved_at[b] != fe->place) continue;
     /* turn = 0: no cell here. */
     fe->mirrored[b] = (PetscBool)(turn[b] < 0);
     if (!turn[b] && (map[0] || map[1] || map[2])) ierr = MapTurns(fe, b, &fe->mirrored[b]);
   }
   PetscCall(PetscFree(turn));
   PetscCall(ierr);
-  PetscCall(CheckPieces(fe));
+  if (fe->joint) PetscCall(CheckPieces(fe));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

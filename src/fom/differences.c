@@ -172,19 +172,12 @@ static PetscErrorCode MeasureBeside(PetscInt n, HycoScene scene, const PetscReal
   PetscReal at[HYCO_MAX_PARAMETERS];
 
   PetscFunctionBegin;
-  for (PetscInt j = 1; j < 3; j++) {
+  /* The second first, where the data are that were moved to both before. */
+  for (PetscInt j = 2; j > 0; j--) {
     HycoDifferencePoint(d, scene, mu, j, at);
     PetscCall((*measure)(context, at, d->step[j], value + j * n));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-PetscBool HycoGradientSetSmooth(HycoGradient *g, HycoGradientStore *store, const HycoDifference *d, PetscBool kink,
-                                const PetscReal value[])
-{
-  if (NeedsCloser(g, d, value)) return PETSC_FALSE;
-  Set(g, store, d, value, NULL, kink);
-  return PETSC_TRUE;
 }
 
 /* A second, closer difference only where the first shows a jump: it tells a kink from curvature. */

@@ -36,6 +36,28 @@ static PetscErrorCode MeasureContacts(HycoFOM f, HycoSummary *s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Collective. */
+static PetscErrorCode NameBuried(HycoFOM f, HycoSummary *s)
+{
+  PetscReal *share;
+
+  PetscFunctionBegin;
+  s->buried[0] = '\0';
+  /* Without an overlap no contact is buried; the same on every rank. */
+  if (!(s->overlap > 0)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(f->scene->n_contacts, &share));
+  PetscCall(HycoContactBuried(HycoComm(f), f->fe, f->fe_surface, &f->pairs, share));
+  for (PetscInt c = 0; c < f->scene->n_contacts; c++) {
+    char one[HYCO_LINE];
+
+    if (!(share[c] > 0)) continue;
+    HycoFormat(one, "%s%s (by %.2g %%)", s->buried[0] ? ", " : "", f->scene->contact[c]->name, 100 * (double)share[c]);
+    PetscCall(PetscStrlcat(s->buried, one, sizeof(s->buried)));
+  }
+  PetscCall(PetscFree(share));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Sum of squares over owned nodes, extremes over all. */
 static PetscErrorCode MeasureDisplacements(HycoFOM f, HycoSummary *s)
 {
@@ -182,6 +204,7 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
   if (s->reason > 0 && !f->path && !f->given) PetscCall(HycoFOMNameLoose(f, why));
   PetscCall(PetscStrncpy(s->loose, why, sizeof(s->loose)));
   PetscCall(MeasureContacts(f, s));
+  PetscCall(NameBuried(f, s));
   for (PetscInt k = 0; f->path && k < f->path->n_steps; k++)
     s->sliding = PetscMax(s->sliding, f->path->steps[k].sliding); /* contacts may be open at the end */
   s->n_dependent = 0;

@@ -128,16 +128,18 @@ PetscErrorCode HycoInspectGaps(HycoInspection *in, HycoFE fe, PetscBool first)
   HycoPairs *p = &in->whole->pairs;
   HycoScene s = fe->scene;
   const PetscReal length = HycoMeshLength(fe->mesh);
-  PetscReal *normal, *gap;
+  PetscReal *normal, *gap, *share;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc2(3 * p->n, &normal, p->n, &gap));
+  PetscCall(PetscMalloc3(3 * p->n, &normal, p->n, &gap, s->n_contacts, &share));
   PetscCall(HycoContactGeometry(fe, p, normal, gap));
+  PetscCall(HycoContactBuried(PETSC_COMM_SELF, fe, fe, p, share));
   for (PetscInt c = 0; c < s->n_contacts; c++) {
     HycoContactInspection *r = &in->contact[c];
     PetscInt facing = 0;
 
     r->n = 0;
+    r->buried = PetscMax(r->buried, share[c]);
     for (PetscInt k = 0; k < p->n; k++) {
       if (p->contact[k] != c) continue;
       r->n++;
@@ -154,6 +156,6 @@ PetscErrorCode HycoInspectGaps(HycoInspection *in, HycoFE fe, PetscBool first)
     if (HycoPairsFollows(p, c)) r->tolerance = -1; /* surfaces that move are searched at any distance */
     if (first) PetscCall(CompareFacets(in, fe, c));
   }
-  PetscCall(PetscFree2(normal, gap));
+  PetscCall(PetscFree3(normal, gap, share));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

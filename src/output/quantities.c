@@ -148,15 +148,17 @@ static PetscReal OfNode(HycoFE fe, PetscInt field, const PetscReal u[], PetscInt
 
 /* The direction from the z axis to the centroid of a cell, which is not the mean of its nodes if it is a pyramid; 0 if
    the centroid is on the axis. */
-static void AwayFromZ(HycoFE fe, PetscInt cell, PetscReal out[2])
+static PetscErrorCode AwayFromZ(HycoFE fe, PetscInt cell, PetscReal out[2])
 {
   const HycoElement *el = HycoElementGet(fe->mesh->type);
+  const PetscReal *weight;
   PetscReal r, farthest = 0, volume = 0;
 
+  PetscFunctionBegin;
   out[0] = out[1] = 0;
+  PetscCall(HycoPointWeights(fe, el, cell, &weight));
   for (PetscInt q = 0; q < el->nq; q++) {
-    /* Volume of the quadrature point in the mapped cell, whichever its orientation. */
-    const PetscReal w = el->w[q] * PetscAbsReal(HycoDeterminant(el, fe->mesh->cells + cell * el->nv, fe->X, q));
+    const PetscReal w = weight[q];
     PetscReal x[3];
 
     HycoPointPlace(fe, el, cell, q, x);
@@ -167,6 +169,7 @@ static void AwayFromZ(HycoFE fe, PetscInt cell, PetscReal out[2])
   r = PetscSqrtReal(out[0] * out[0] + out[1] * out[1]);
   /* r is the centroid's distance times the volume; below round-off of the cell's own extent it has no direction. */
   for (PetscInt c = 0; c < 2; c++) out[c] = r > 1e-9 * volume * farthest ? out[c] / r : 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Value in a cell; r and t: about z in 2D and 3D, in an axisymmetric scene about its axis. A cell around the z axis has
@@ -182,7 +185,7 @@ static PetscErrorCode OfCell(HycoFE fe, PetscInt field, const PetscReal sigma[],
   if ((field == RR || field == TT) && fe->formulation == HYCO_AXISYMMETRIC) {
     *value = field == RR ? s[0] : s[2];
   } else if (field == RR || field == TT) {
-    AwayFromZ(fe, cell, n);
+    PetscCall(AwayFromZ(fe, cell, n));
     /* The mean of both over all directions, since the shear's part cancels. */
     if (n[0] == 0 && n[1] == 0)
       *value = (s[0] + s[1]) / 2;
@@ -299,10 +302,14 @@ static PetscErrorCode AddEntity(HycoFE fe, const HycoQuantity *quantity, const P
   const HycoElement *el = facet < 0 ? HycoElementGet(m->type) : HycoElementGetFacet(m->type);
   const PetscInt *node = facet < 0 ? m->cells + cell * m->nv : m->facets + facet * m->nf, field = quantity->field;
   const PetscReal *weight = NULL;
+  PetscReal at[HYCO_CELL_NODES];
 
   PetscFunctionBegin;
   if (value) Extend(s, *value);
-  for (PetscInt a = 0; a < el->nv && !value; a++) Extend(s, OfNode(fe, field, u, node[a]));
+  for (PetscInt a = 0; a < el->nv && !value; a++) {
+    at[a] = OfNode(fe, field, u, node[a]);
+    Extend(s, at[a]);
+  }
   if (HycoMeshOwned(m, node[0]) < 0) PetscFunctionReturn(PETSC_SUCCESS); /* added by another process */
   s->weight += quantity->kind != HYCO_QUANTITY_MEAN;
   if (facet < 0 && quantity->kind == HYCO_QUANTITY_MEAN) PetscCall(HycoPointWeights(fe, el, cell, &weight));
@@ -315,7 +322,7 @@ static PetscErrorCode AddEntity(HycoFE fe, const HycoQuantity *quantity, const P
       /* The length of the normal is the weighted area. */
       w = PetscSqrtReal(w);
     }
-    for (PetscInt a = 0; a < el->nv && !value; a++) here += el->N[q][a] * OfNode(fe, field, u, node[a]);
+    for (PetscInt a = 0; a < el->nv && !value; a++) here += el->N[q][a] * at[a];
     s->sum += w * here;
     s->weight += w;
   }

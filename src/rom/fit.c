@@ -19,7 +19,7 @@ typedef struct {
   const PetscInt *output; /* by target: its output */
   const PetscReal *target;
   PetscReal scale[HYCO_MAX_QUANTITIES];
-  const PetscReal *lo, *hi;
+  PetscReal lo[HYCO_MAX_PARAMETERS], hi[HYCO_MAX_PARAMETERS]; /* of a held parameter both are its value */
   PetscInt evaluations;
   /* at the last point: */
   PetscReal x[HYCO_MAX_PARAMETERS], r[HYCO_MAX_QUANTITIES],
@@ -194,8 +194,8 @@ static PetscErrorCode Sample(Fit *f, PetscInt n, const PetscReal mu[], PetscReal
 static PetscErrorCode Start(Fit *f, const PetscReal start[], PetscInt n_samples, PetscInt *n_starts, PetscReal starts[])
 {
   HycoSamples samples = NULL;
-  const PetscReal *mu;
-  PetscReal *misfit;
+  const PetscReal *all;
+  PetscReal *misfit, *mu;
   PetscInt n, *order, kept = 0;
 
   PetscFunctionBegin;
@@ -205,7 +205,11 @@ static PetscErrorCode Start(Fit *f, const PetscReal start[], PetscInt n_samples,
     PetscCall(HycoSamplesAddPoint(samples, start));
   else
     PetscCall(HycoSamplesAddScattered(samples, n_samples));
-  PetscCall(HycoSamplesGet(samples, &n, NULL, &mu));
+  PetscCall(HycoSamplesGet(samples, &n, NULL, &all));
+  HycoDuplicate(n * f->n_par, all, &mu);
+  /* Held parameters have their values at every start. */
+  for (PetscInt i = 0; i < n * f->n_par; i++)
+    mu[i] = PetscMin(PetscMax(mu[i], f->lo[i % f->n_par]), f->hi[i % f->n_par]);
   PetscCall(PetscMalloc2(n, &misfit, n, &order));
   PetscCall(Sample(f, n, mu, misfit));
   for (PetscInt i = 0; i < n; i++) order[i] = i;
@@ -218,6 +222,7 @@ static PetscErrorCode Start(Fit *f, const PetscReal start[], PetscInt n_samples,
   }
   *n_starts = kept;
   PetscCall(PetscFree2(misfit, order));
+  PetscCall(PetscFree(mu));
   PetscCall(HycoSamplesDestroy(&samples));
   HycoCheck(kept, "no prediction at the start of the fit converged; give another -mu");
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -334,10 +339,34 @@ static PetscErrorCode RunAll(Fit *f, const PetscReal starts[], const char type[]
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The ranges of the fit: a held parameter has that of one value, which is no direction of a step, since derivatives are
+   multiplied by the width. */
+static PetscErrorCode SetRanges(Fit *f, const PetscReal held[])
+{
+  const HycoScene scene = f->model->model->scene;
+  PetscInt n_free = f->n_par;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArraycpy(f->lo, scene->lo, f->n_par));
+  PetscCall(PetscArraycpy(f->hi, scene->hi, f->n_par));
+  if (!held) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt p = 0; p < f->n_par; p++) {
+    if (PetscIsNanReal(held[p])) continue;
+    HycoCheck(held[p] >= scene->lo[p] && held[p] <= scene->hi[p],
+              "a fit holds the parameter %s at %.10g; its range is from %.10g to %.10g", scene->parameter[p],
+              (double)held[p], (double)scene->lo[p], (double)scene->hi[p]);
+    f->lo[p] = f->hi[p] = held[p];
+    n_free--;
+  }
+  HycoCheck(n_free, "a fit holds all %d parameters, so that nothing is left to find; predict gives the outputs there",
+            (int)f->n_par);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The fit works on x in [0, 1]^n; mu is made from it at the end. Which starts are tried depends on the fixed sequence of samples, hence the same answer in every run. */
 PetscErrorCode HycoROMFit(HycoROM m, PetscInt n, const PetscInt output[], const PetscReal target[],
-                          const PetscReal start[], PetscInt n_samples, PetscInt n_starts, const char type[],
-                          PetscReal mu[], HycoFit *fit)
+                          const PetscReal start[], const PetscReal held[], PetscInt n_samples, PetscInt n_starts,
+                          const char type[], PetscReal mu[], HycoFit *fit)
 {
   const HycoScene scene = m->model->scene;
   Fit f = {.model = m, .n = n, .output = output, .target = target, .n_par = scene->n_parameters};
@@ -353,8 +382,7 @@ PetscErrorCode HycoROMFit(HycoROM m, PetscInt n, const PetscInt output[], const 
   for (PetscInt k = 0; k < n; k++)
     HycoCheck(output[k] >= 0 && output[k] < (scene->n_times ? 2 : 1) * scene->n_quantities,
               "there is no output %d; the model has %d", (int)output[k], (int)scene->n_quantities);
-  f.lo = scene->lo;
-  f.hi = scene->hi;
+  PetscCall(SetRanges(&f, held));
   *fit = (HycoFit){.n_starts = n_starts};
   PetscCall(PetscMalloc1(n_starts * f.n_par + 1, &starts));
   PetscCall(Start(&f, start, n_samples, &fit->n_starts, starts));

@@ -1,32 +1,23 @@
 /*
   The gradient of a prediction. A type's problem is w = q + M z, z = (x, L); with the set of closed contacts M z' + q' = 0
-  there, with q' the change of w at fixed z: differences of the type's data. An output's derivative is the sum of its
-  differences with the data at mu + h and fixed z, and along z + h z' with the data at mu; where these have a kink, its
-  difference along both. Outputs are measured on the cells that decide them.
+  there, with q' the change of w at fixed z: differences of the type's data. An output's derivative is its difference along
+  mu + h and z + h z' together. Outputs are measured on the cells that decide them.
 */
 #include <hycogradient.h>
 #include <hycolcp.h>
 #include <hycoromimpl.h>
-
-/* Of a parameter. */
-typedef struct {
-  HycoDifference d;
-  PetscBool kink;
-  PetscReal *dz;     /* p + n */
-  PetscReal *output; /* 3 n_outputs: at the three points with fixed z */
-} Along;
 
 typedef struct {
   HycoROM m;
   PetscReal mu[HYCO_MAX_PARAMETERS];
   PetscInt p, n, k, *contact; /* unknowns x, contacts; those that are closed or undecided */
   PetscReal *z, *moved;       /* p + n */
-  Along *along;               /* by parameter */
-  PetscReal *dz;              /* of the parameter in hand; borrowed */
+  PetscReal *dz;              /* p + n: along the parameter in hand */
   PetscReal *w[5];            /* p + n: at the three points, and at closer ones */
   PetscReal *q, *v;           /* p + k */
   PetscReal size;
-  PetscBool focused, moved_on; /* the outputs' cells are few; the data are not at mu */
+  PetscBool focused;  /* the outputs' cells are few */
+  PetscBool contacts; /* outputs read contacts alone, and the forces are those of z */
   HycoTangent tangent;
   PetscReal *output; /* 6 x n_outputs: at the three points, at closer ones */
   /* the prediction */
@@ -35,29 +26,32 @@ typedef struct {
   PetscBool whole_current;
 } Work;
 
-/* The state of z at mu (NULL: the data are there), as a prediction would leave it; w: NULL, or its w. In the order of a
+/* The state of z at mu (NULL: the data are there), as a prediction would leave it. In the order of a
    prediction: the floating bodies' balance changes forces that the reconstruction has set. */
-static PetscErrorCode Move(Work *o, const PetscReal mu[], const PetscReal z[], PetscReal w[])
+static PetscErrorCode Move(Work *o, const PetscReal mu[], const PetscReal z[])
 {
   HycoROM m = o->m;
   PetscReal size;
 
   PetscFunctionBegin;
-  PetscUseTypeMethod(m, residual, mu, z, w, &size);
+  PetscUseTypeMethod(m, residual, mu, z, NULL, &size);
   PetscUseTypeMethod(m, expand);
   if (m->ops->reconstruct && m->reconstruct) PetscCall((*m->ops->reconstruct)(m));
   PetscCall(HycoFloatingBalance(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The outputs there. */
-static PetscErrorCode MoveAndMeasure(Work *o, const PetscReal mu[], const PetscReal z[], PetscReal w[],
-                                     PetscReal output[])
+/* The outputs there. Those of contacts need their rows and forces, and no displacement. */
+static PetscErrorCode MoveAndMeasure(Work *o, const PetscReal mu[], const PetscReal z[], PetscReal output[])
 {
   HycoPrediction p = {0};
 
   PetscFunctionBegin;
-  PetscCall(Move(o, mu, z, w));
+  if (o->contacts) {
+    if (mu) PetscCall(HycoROMBringRows(o->m, mu));
+    PetscCall(PetscArraycpy(o->m->Lambda, z + o->p, o->n));
+  } else
+    PetscCall(Move(o, mu, z));
   PetscCall(HycoROMMeasureQuantities(o->m, &p));
   PetscCall(PetscArraycpy(output, p.quantity, o->m->model->scene->n_quantities));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -70,7 +64,7 @@ static PetscErrorCode Measure(void *context, const PetscReal mu[], PetscReal ste
 
   PetscFunctionBegin;
   for (PetscInt i = 0; i < o->p + o->n; i++) o->moved[i] = o->z[i] + step * o->dz[i];
-  PetscCall(MoveAndMeasure(o, mu, o->moved, NULL, output));
+  PetscCall(MoveAndMeasure(o, mu, o->moved, output));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -122,10 +116,11 @@ static PetscErrorCode Create(Work *o)
   HycoDuplicate(n_dof, m->U, &o->U);
   HycoDuplicate(m->model->pairs.n, m->Lambda, &o->Lambda);
   PetscUseTypeMethod(m, unknowns, &o->p, &o->n, NULL);
-  PetscCall(PetscMalloc2(o->p + o->n + 1, &o->z, o->p + o->n + 1, &o->moved));
-  PetscCall(PetscCalloc1(m->model->scene->n_parameters, &o->along));
-  for (PetscInt k = 0; k < m->model->scene->n_parameters; k++)
-    PetscCall(PetscCalloc2(o->p + o->n + 1, &o->along[k].dz, 3 * m->model->scene->n_quantities, &o->along[k].output));
+  o->contacts =
+      (PetscBool)(m->model->traits.surfaces && !m->model->floating && !HycoSceneHasFieldOutputs(m->model->scene));
+  PetscCall(PetscMalloc3(o->p + o->n + 1, &o->z, o->p + o->n + 1, &o->moved, o->p + o->n + 1, &o->dz));
+  /* Open contacts do not change. */
+  PetscCall(PetscArrayzero(o->dz, o->p + o->n));
   for (PetscInt j = 0; j < 5; j++) PetscCall(PetscMalloc1(o->p + o->n + 1, &o->w[j]));
   PetscCall(PetscMalloc3(o->n + 1, &o->contact, o->p + o->n + 1, &o->q, o->p + o->n + 1, &o->v));
   PetscCall(PetscCalloc1(6 * m->model->scene->n_quantities + 1, &o->output));
@@ -141,11 +136,11 @@ static PetscErrorCode Create(Work *o)
   if (m->measured)
     PetscCall(PetscArraycpy(o->output, m->prediction.quantity, m->model->scene->n_quantities));
   else
-    PetscCall(MoveAndMeasure(o, NULL, o->z, NULL, o->output));
+    PetscCall(MoveAndMeasure(o, NULL, o->z, o->output));
   /* Extremes are measured where they are now: a maximum's place does not move in a derivative, by the envelope
      theorem. */
   PetscCall(HycoROMFocusOutputs(m, o->output, &o->focused));
-  if (o->focused) PetscCall(MoveAndMeasure(o, NULL, o->z, NULL, o->output));
+  if (o->focused) PetscCall(MoveAndMeasure(o, NULL, o->z, o->output));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -154,10 +149,7 @@ static PetscErrorCode Destroy(Work *o)
 {
   PetscFunctionBegin;
   PetscCall(HycoTangentDestroy(&o->tangent));
-  for (PetscInt k = 0; o->along && k < o->m->model->scene->n_parameters; k++)
-    PetscCall(PetscFree2(o->along[k].dz, o->along[k].output));
-  PetscCall(PetscFree(o->along));
-  PetscCall(PetscFree2(o->z, o->moved));
+  PetscCall(PetscFree3(o->z, o->moved, o->dz));
   for (PetscInt j = 0; j < 5; j++) PetscCall(PetscFree(o->w[j]));
   PetscCall(PetscFree3(o->contact, o->q, o->v));
   HycoFreeAll(&o->output, &o->gamma, &o->U, &o->Lambda);
@@ -212,77 +204,61 @@ static PetscErrorCode FindTurns(Work *o, const HycoDifference *d, PetscBool *tur
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* dz along a parameter, and the outputs with fixed z. By the implicit function theorem: z moves so that the residual
-   stays 0. The residual's change along mu is a difference of three evaluations, exact up to second order. */
-static PetscErrorCode Differentiate(Work *o, Along *a)
+/* dz along a parameter. By the implicit function theorem: z moves so that the residual stays 0. The residual's change along
+   mu is a difference of three evaluations, exact up to second order. */
+static PetscErrorCode Differentiate(Work *o, HycoDifference *d, PetscBool *kink)
 {
   HycoROM m = o->m;
-  const PetscInt n_outputs = m->model->scene->n_quantities;
-  PetscReal at[HYCO_MAX_PARAMETERS];
+  PetscReal at[HYCO_MAX_PARAMETERS], size;
   PetscBool turns;
 
   PetscFunctionBegin;
-  PetscCall(PetscArraycpy(a->output, o->output, n_outputs));
   for (PetscInt j = 1; j < 3; j++) {
-    HycoDifferencePoint(&a->d, m->model->scene, o->mu, j, at);
-    PetscCall(MoveAndMeasure(o, at, o->z, o->w[j], a->output + j * n_outputs));
+    HycoDifferencePoint(d, m->model->scene, o->mu, j, at);
+    PetscCall((*m->ops->residual)(m, at, o->z, o->w[j], &size));
   }
-  PetscCall(FindTurns(o, &a->d, &turns));
+  PetscCall(FindTurns(o, d, &turns));
   /* A one-sided difference: across the change of masters the central one is of neither side. */
-  if (turns) HycoDifferenceTakeSide(&a->d);
+  if (turns) HycoDifferenceTakeSide(d);
   for (PetscInt i = 0; i < o->p + o->k; i++) {
     const PetscInt row = i < o->p ? i : o->p + o->contact[i - o->p];
 
     o->q[i] = 0;
-    for (PetscInt j = 0; j < 3; j++) o->q[i] += a->d.weight[j] * o->w[j][row];
+    for (PetscInt j = 0; j < 3; j++) o->q[i] += d->weight[j] * o->w[j][row];
   }
-  PetscCall(HycoTangentSolve(o->tangent, o->q, a->d.sign, o->v, &a->kink));
-  a->kink = (PetscBool)(a->kink || turns);
-  for (PetscInt i = 0; i < o->p + o->k; i++) a->dz[i < o->p ? i : o->p + o->contact[i - o->p]] = o->v[i];
+  PetscCall(HycoTangentSolve(o->tangent, o->q, d->sign, o->v, kink));
+  *kink = (PetscBool)(*kink || turns);
+  for (PetscInt i = 0; i < o->p + o->k; i++) o->dz[i < o->p ? i : o->p + o->contact[i - o->p]] = o->v[i];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds to the outputs what they change along z, with the data at mu. The outputs change along mu with z fixed, and
-   along z with mu fixed; both together are the total derivative. */
-static PetscErrorCode Follow(Work *o, const Along *a)
+/* Whether a parameter moves nodes. */
+static PetscBool Moves(HycoScene s, PetscInt p)
 {
-  const PetscInt n = o->m->model->scene->n_quantities;
-  PetscReal *change = o->output + 3 * n;
+  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE};
 
-  PetscFunctionBegin;
-  o->dz = a->dz;
-  for (PetscInt j = 1; j < 3; j++) {
-    PetscCall(Measure(o, NULL, a->d.step[j], change));
-    for (PetscInt q = 0; q < n; q++) a->output[j * n + q] += change[q] - o->output[q];
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
+  changed[p] = PETSC_TRUE;
+  return HycoSceneChanges(s, changed).nodes;
 }
 
-/* All columns: the data move along each parameter, and come back to mu once. */
+/* All columns. Those of parameters that move nodes last: the way back from one's points is a part of the way to the next
+   one's. */
 static PetscErrorCode Columns(Work *o, HycoGradient *gradient)
 {
   HycoROM m = o->m;
-  PetscReal size;
 
   PetscFunctionBegin;
   /* Stresses are not differenced here: without the cells a model that does not read them moves faster. */
   PetscCall(HycoFEUseCells(m->fe, (PetscBool)!m->model->traits.surfaces));
-  for (PetscInt p = 0; p < gradient->n_parameters; p++) {
-    HycoDifferenceSet(m->model->scene, o->mu, p, HYCO_GRADIENT_STEP, &o->along[p].d);
-    PetscCall(Differentiate(o, &o->along[p]));
-  }
-  /* Back at mu before the outputs are followed: their differences start from the data there. */
-  PetscCall((*m->ops->residual)(m, o->mu, o->z, NULL, &size));
-  for (PetscInt p = 0; p < gradient->n_parameters; p++) PetscCall(Follow(o, &o->along[p]));
-  for (PetscInt p = 0; p < gradient->n_parameters; p++) {
-    const Along *a = &o->along[p];
+  for (PetscInt k = 0; k < 2 * gradient->n_parameters; k++) {
+    const PetscInt p = k % gradient->n_parameters;
+    HycoDifference d;
+    PetscBool kink;
 
-    /* A smooth column is done by the central difference; the others need one-sided ones, which move the data again. */
-    if (HycoGradientSetSmooth(gradient, &m->gradient, &a->d, a->kink, a->output)) continue;
-    o->dz = a->dz;
-    o->moved_on = PETSC_TRUE;
-    PetscCall(
-        HycoGradientColumn(gradient, &m->gradient, m->model->scene, o->mu, &a->d, a->kink, Measure, o, o->output));
+    if (Moves(m->model->scene, p) != (k >= gradient->n_parameters)) continue;
+    HycoDifferenceSet(m->model->scene, o->mu, p, HYCO_GRADIENT_STEP, &d);
+    PetscCall(Differentiate(o, &d, &kink));
+    PetscCall(HycoGradientColumn(gradient, &m->gradient, m->model->scene, o->mu, &d, kink, Measure, o, o->output));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -295,7 +271,7 @@ static PetscErrorCode Restore(Work *o)
 
   PetscFunctionBegin;
   if (o->focused) PetscCall(HycoROMUnfocusOutputs(m));
-  PetscCall(Move(o, o->moved_on ? o->mu : NULL, o->z, NULL));
+  PetscCall(Move(o, o->mu, o->z));
   PetscCall(HycoFEUseCells(m->fe, PETSC_TRUE));
   m->prediction = o->prediction;
   /* Also what getters of the prediction read: the gradient must not be visible in them. */

@@ -9,6 +9,8 @@
 #include <hycoromimpl.h>
 #include <math.h>
 
+#define KEPT 4096 /* cells */
+
 struct _n_HycoOutputCells {
   HycoMesh mesh; /* with these cells */
   HycoFE fe;
@@ -262,7 +264,8 @@ static PetscErrorCode Follow(HycoROM m, HycoOutputCells p)
   PetscCall(HycoFESetParameters(p->fe, m->fe->mu));
   Displace(m, p, m->gamma, U_fe);
   PetscCall(PetscFree(U_fe));
-  /* Gradients are kept while no parameter moves the nodes. */
+  /* Gradients are kept while no parameter moves the nodes; where stresses vary within cells, of each point of few cells. */
+  if (p->fe->thermal && p->mesh->n_cells <= KEPT) PetscCall(HycoFEKeepGradients(p->fe));
   PetscCall(HycoFEStressKept(p->fe, p->stressed, p->u, &p->means, p->sigma));
   PetscCall(ReactPredicted(m, p, NULL, m->Lambda));
   PetscFunctionReturn(PETSC_SUCCESS);

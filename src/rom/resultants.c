@@ -8,14 +8,22 @@
 #include <hycoquantities.h>
 #include <hycoromimpl.h>
 
+#define KEPT 3 /* points whose loads are kept */
+
+/* At a point. */
+typedef struct {
+  PetscInt used;                            /* counts requests; 0: nothing is there */
+  PetscReal *load, mu[HYCO_MAX_PARAMETERS]; /* n_dof: on the nodes */
+} Loads;
+
 struct _n_HycoResultants {
-  PetscBool *balanced;                   /* n_quantities x n_bodies */
+  PetscBool *balanced, *loaded;          /* n_quantities x n_bodies; by body: of a quantity */
   PetscBool pushed[HYCO_MAX_QUANTITIES]; /* contact acts on these bodies from outside */
   HycoMesh mesh;                         /* the cells with the loads of these bodies */
   HycoFE fe;
-  PetscReal *load; /* n_dof: on the nodes; */
-  PetscBool ready; /* those at these parameters */
-  PetscReal mu[HYCO_MAX_PARAMETERS];
+  Loads at[KEPT];
+  PetscInt uses;
+  const PetscReal *load; /* of `at`, at the parameters in hand */
 };
 
 PetscErrorCode HycoResultantsDestroy(HycoResultants *resultants)
@@ -24,7 +32,8 @@ PetscErrorCode HycoResultantsDestroy(HycoResultants *resultants)
   if (!*resultants) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoFEDestroy(&(*resultants)->fe));
   PetscCall(HycoMeshDestroy(&(*resultants)->mesh));
-  HycoFreeAll(&(*resultants)->balanced, &(*resultants)->load, resultants);
+  for (PetscInt k = 0; k < KEPT; k++) PetscCall(PetscFree((*resultants)->at[k].load));
+  HycoFreeAll(&(*resultants)->balanced, &(*resultants)->loaded, resultants);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -82,8 +91,13 @@ PetscErrorCode HycoResultantsCreate(HycoROM m, PetscBool balanced[], HycoMesh lo
   r = *resultants;
   r->balanced = balanced;
   r->mesh = loaded;
+  PetscCall(PetscCalloc1(m->model->scene->n_bodies + 1, &r->loaded));
+  for (PetscInt k = 0; k < m->model->scene->n_quantities * m->model->scene->n_bodies; k++) {
+    if (balanced[k]) r->loaded[k % m->model->scene->n_bodies] = PETSC_TRUE;
+  }
   ierr = HycoFECreate(m->model->scene, loaded->dm, &r->fe);
-  if (!ierr) PetscCall(PetscMalloc1(r->fe->n_dof, &r->load));
+  /* Forces of thermal strains do no work on a translation: their sum over a body is 0, but for radii. */
+  if (!ierr) r->fe->without_cells = (PetscBool)(m->model->scene->formulation != HYCO_AXISYMMETRIC);
   if (!ierr) ierr = FindPushed(m, r);
   if (ierr) PetscCall(HycoResultantsDestroy(resultants));
   PetscCall(ierr);
@@ -145,29 +159,52 @@ static PetscReal Load(HycoResultants r, const PetscBool of[], PetscInt axis)
   return sum;
 }
 
-/* The loads at mu, unless they are there or no change affects them. */
-static PetscErrorCode BringLoads(HycoResultants r, const PetscReal mu[])
+/* Whether the loads at mu differ from those at another point. */
+static PetscBool Differ(HycoResultants r, const PetscReal other[], const PetscReal mu[])
 {
   const HycoScene s = r->fe->scene;
-  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, heat = PETSC_FALSE;
+  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE}, heat = PETSC_FALSE, moved = PETSC_FALSE;
   HycoChanges c;
 
-  PetscFunctionBegin;
-  for (PetscInt p = 0; p < s->n_variables; p++) changed[p] = (PetscBool)(!r->ready || mu[p] != r->mu[p]);
+  for (PetscInt p = 0; p < s->n_variables; p++) changed[p] = (PetscBool)(mu[p] != other[p]);
   c = HycoSceneChanges(s, changed);
-  /* Moduli act on the forces of heat alone. */
   for (PetscInt b = 0; b < s->n_bodies; b++)
+    moved = (PetscBool)(moved || (r->loaded[b] && HycoBodyMoves(&s->body[b], changed)));
+  if (r->fe->joint || r->mesh->ties) moved = c.nodes;
+  /* Moduli act on the forces of heat alone. */
+  for (PetscInt b = 0; b < s->n_bodies && !r->fe->without_cells; b++)
     heat =
         (PetscBool)(heat || (s->body[b].expansion && (c.stiffness || HycoExprChanges(s->body[b].temperature, changed) ||
                                                       HycoExprChanges(s->body[b].reference, changed) ||
                                                       HycoExprChanges(s->body[b].expansion, changed))));
-  if (r->ready && !c.nodes && !heat && !HycoSceneLoadsChange(s, changed)) PetscFunctionReturn(PETSC_SUCCESS);
-  /* After an error in between, the loads must not pass for those at r->mu. */
-  r->ready = PETSC_FALSE;
+  return (PetscBool)(moved || heat || HycoSceneLoadsChange(s, changed));
+}
+
+/* The loads at mu, unless they are there or no change affects them. In place of those that were asked for longest ago: a
+   gradient asks for its point's and for those to both sides. */
+static PetscErrorCode BringLoads(HycoResultants r, const PetscReal mu[])
+{
+  Loads *oldest = r->at;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < KEPT; k++) {
+    Loads *one = &r->at[k];
+
+    if (one->used && !Differ(r, one->mu, mu)) {
+      one->used = ++r->uses;
+      r->load = one->load;
+      PetscFunctionReturn(PETSC_SUCCESS);
+    }
+    if (one->used < oldest->used) oldest = one;
+  }
+  /* After an error in between, the loads must not pass for those there. */
+  oldest->used = 0;
   PetscCall(HycoFESetParameters(r->fe, mu));
-  PetscCall(HycoFELoads(r->fe, r->load));
-  PetscCall(PetscArraycpy(r->mu, mu, s->n_variables));
-  r->ready = PETSC_TRUE;
+  if (!oldest->load) PetscCall(PetscMalloc1(r->fe->n_dof + 1, &oldest->load));
+  PetscCall(HycoFELoads(r->fe, oldest->load));
+  PetscCall(PetscArraycpy(oldest->mu, mu, r->fe->scene->n_variables));
+  oldest->used = ++r->uses;
+  r->load = oldest->load;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

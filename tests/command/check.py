@@ -116,7 +116,7 @@ class Check(Case):
             self.assertLess(abs(solved['estimate']['solve_mb'] - memory), 0.5 * memory)
 
     def test_suspicious(self):
-        """A coarse slave, an unused parameter and group, equal groups, a body in two parts, long cells, a gap that is too wide."""
+        """A coarse slave, an unused parameter and group, equal groups, a body in two parts, long cells, a gap that is too wide, one of the wrong sign."""
         found = self.hyco('check', '-scene', self.scene())
         self.near(found['contacts'][0]['slave_over_master'], 2, 1e-12)
         self.warned(found, 'under', 'slave')
@@ -130,6 +130,14 @@ class Check(Case):
         self.warned(flat, 'upper', '500')
         wide = self.hyco('check', '-scene', self.scene(upper=4), '-contact_under_gap', '0.5')
         self.warned(wide, 'under', '0.5')
+        # 0.02 of the wrong sign is 1.4 % of a body; 0.01 may be an interference, and 0.02 at one end alone an obstacle's shape
+        for gap, buried in (('-0.02', 'under (by 1.4 %)'), ('-0.01', ''), ('-0.02*x', '')):
+            at = ('-scene', self.path('scene'), '-contact_under_gap', gap)
+            self.assertEqual(any('sign' in line and 'under' in line for line in self.hyco('check', *at)['warnings']), bool(buried), gap)
+            self.assertEqual(self.hyco('solve', *at, '-mu', '0.02,0')['buried'], buried)
+            if buried:
+                for ranks in (0, 2):
+                    self.assertIn('is the sign of the gap right', self.run_raw('solve', *at, '-mu', '0.02,0', ranks=ranks).stdout)
         self.scene(upper=4)
         with open(self.path('scene', 'two.msh'), encoding='ascii') as f:
             lines = f.read().split('\n')

@@ -42,7 +42,7 @@ ELSEWHERE = {'missed', 'options_from.SOURCE', 'unseen_feature', 'fallback', 'gre
              'inelastic_amplification', 'equilibrium', 'search.variant', 'held_out.ERROR.end', 'ties[].slave_over_master', 'contacts[].slave_over_master', 'contacts[].n_between_nodes',
              'seconds_full_order', 'seconds_reduced', 'equilibrium.worst', 'equilibrium.t', 'equilibrium.worst_contact', 'equilibrium.residual', 'equilibrium.contact',
              'training_error_u', 'training_error_lambda_rid', 'condition', 'ties[].name', 'ties[].n_nodes', 'gradient_kinks[].output', 'gradient_kinks[].parameter',
-             'gradient_kinks[].t'}
+             'gradient_kinks[].t', 'without_gradient'}
 
 
 def listed():

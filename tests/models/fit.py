@@ -47,6 +47,19 @@ class Fit(Case):
         self.assertNotIn('misfit_full_order', r)
         self.assertIn('the targets are not met', self.run_raw('fit', '-model', 'm.h5', '-target_lift', '100').stdout)
 
+    def test_held(self):
+        """A held parameter keeps its value, and the others meet the targets that are left, from searched starts and from a given one, by both types."""
+        two = self.targets[:2]
+        for args in ((), ('-mu', '2.5,0.5,9'), ('-fit_type', 'blmvm', '-mu', '2.5,0.5,9')):
+            r = self.hyco('fit', '-model', 'm.h5', *two, '-hold_place', '2.5', *args)
+            self.assertTrue(r['converged'])
+            self.assertEqual((r['mu']['place'], r['held']), (2.5, ['place']))
+            self.near(r['targets']['lift']['model'], self.outputs['lift'], 1e-6)
+        r = self.hyco('fit', '-model', 'm.h5', *self.targets, '-hold_place', '5', '-hold_press', '0.63', status=None)
+        self.assertEqual((r['mu']['place'], r['mu']['press'], r['held']), (5, 0.63, ['place', 'press']))
+        self.assertNotIn('place', r['at_ends'])  # it is held there
+        self.assertGreater(r['misfit_model'], 1e-3)  # the moment is that of another place
+
     def test_starts(self):
         """A moment that two places have: with several starts the least misfit is the answer, at most that of one start, and counts say how many reached it."""
         one = self.hyco('fit', '-model', 'm.h5', *self.targets, '-fit_starts', '8')
@@ -61,7 +74,10 @@ class Fit(Case):
     def test_refused(self):
         """One line that names what is wrong, and no report."""
         for words, args in ((('target_foo', 'lift'), ('-target_foo', '1')), (('-target_', 'lift', 'peak'), ()), (('target_lift', 'number'), ('-target_lift', 'x')),
-                            (('place', 'range'), ('-target_lift', '5', '-mu', '9,0.5,9')), (('output', 'turn'), (*self.targets, *ROLLER[:-4]))):
+                            (('place', 'range'), ('-target_lift', '5', '-mu', '9,0.5,9')), (('output', 'turn'), (*self.targets, *ROLLER[:-4])),
+                            (('hold_foo', 'place'), ('-target_lift', '5', '-hold_foo', '1')), (('place', '9', 'range'), ('-target_lift', '5', '-hold_place', '9')),
+                            (('hold_place', 'same'), ('-target_lift', '5', '-hold_place', '1', '-mu', '2,0.5,9')),
+                            (('all 3', 'predict'), ('-target_lift', '5', '-hold_place', '1', '-hold_press', '0.5', '-hold_modulus', '9'))):
             run = self.run_raw('fit', '-model', 'm.h5', *args, '-report', 'none.json')
             self.assertEqual((run.returncode, len(run.stderr.strip().splitlines())), (1, 1), run.stderr)
             for word in words:

@@ -1,5 +1,8 @@
 """Gradients of paths (creep, yielding, friction), at full order and of models of bodies and hybrid ones: outputs at each listed time and the extremes over
 them against central differences of paths in the same steps; one-sided and flagged at kinks; the path stays; a fit to outputs of a path."""
+import csv
+import json
+import math
 import os
 import sys
 import unittest
@@ -87,6 +90,36 @@ class PathGradients(Case):
         for output, expected in (('push', [0, 1, 0]), ('end', [0.5, 0, 0.9])):
             for value, exact in zip(r['gradient_times'][output]['p'], expected):
                 self.assertAlmostEqual(abs(value), exact, 7, output)
+
+    def test_failing(self):
+        """A point beside which a path has no value: its derivatives are nan, those of the others of the set stand, and one line says so after the table and
+        the report are written; such a point alone is an error, and nothing is written."""
+        grid = Grid()
+        grid.box('line2', [[0, 0.5, 1]], lambda x: x, 'bar', {'x0': 'left', 'x1': 'right'})
+        scene = self.written(BAR.replace('x: p*q', 'x: p*q + 0*sqrt(abs(p - 0.500075) - 1e-7)'), grid)
+        self.hyco('train', '-scene', scene, '-hyco_model_type', 'hybrid', '-scatter', '4', '-model', 'bar.h5', status=None)
+        still = self.written(BAR.split('history')[0].replace('x: p*q', 'x: p + 0*sqrt(abs(p - 0.5000225) - 1e-7)'), grid)
+        for command, ranks, last in ((('solve', '-scene', still), 2, 1), (('predict', '-model', 'bar.h5'), 0, 0.9), (('predict', '-model', 'bar.h5'), 2, 0.9)):
+            run = self.run_raw(*command, '-values_p', '0.4,0.5,0.7', '-gradient', '-table', 'rows.csv', '-report', 'rows.json', ranks=ranks)
+            self.assertEqual((run.returncode, run.stderr.count('hyco: error')), (1, 1), run.stderr)
+            self.assertIn('1 of the 3 points have no gradient', run.stderr)
+            self.assertIn('is not finite', run.stderr)
+            with open(self.path('rows.csv'), encoding='ascii') as f:
+                rows = list(csv.DictReader(f))
+            self.assertEqual([row['converged'] for row in rows], ['1', '1', '1'])
+            for row, p, slope in zip(rows, (0.4, 0.5, 0.7), (0, None, last)):
+                self.near(float(row['p']), p, 1e-12)
+                if slope is None:
+                    self.assertTrue(math.isnan(float(row['d_push_d_p'])) and math.isnan(float(row['gradient_kinks'])))
+                else:
+                    self.assertAlmostEqual(abs(float(row['d_push_d_p'])), slope, 7)
+            with open(self.path('rows.json'), encoding='utf-8') as f:
+                report = json.load(f)
+            self.assertEqual((report['n_points'], report['not_converged'], report['without_gradient']), (3, 0, 1))
+            for at in (('-mu', '0.5'), ('-values_p', '0.5')):
+                run = self.run_raw(*command, *at, '-gradient', '-report', 'none.json', ranks=ranks)
+                self.assertEqual((run.returncode, run.stderr.count('hyco: error')), (1, 1), run.stderr)
+                self.assertFalse(os.path.exists(self.path('none.json')))
 
     def test_models(self):
         """Models of bodies (creep, friction) and hybrid ones, at the end and of the extremes; a prediction stays; outputs of a path determine its parameters."""

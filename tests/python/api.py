@@ -188,10 +188,15 @@ class Python(Case):
             for name, value in report['mu'].items():
                 self.near(found.parameters[name], value, 1e-6)
             np.testing.assert_allclose(model.predict(found.mu).outputs[list(targets)[0]], list(targets.values())[0], rtol=1e-6)
+            names = list(model.parameters)
+            held = model.fit({'lift': targets['lift']}, samples=16, hold={names[0]: 0.031})
+            self.assertEqual(held.mu[0], 0.031)
+            self.near(model.predict(held.mu).outputs['lift'], targets['lift'], 1e-6)
             again = model.fit(targets, start=[0.03, 1000], kind='blmvm')
             self.assertEqual(again.starts, 1)
             self.assertLess(again.misfit, 1e-5)
-            for bad in (lambda: model.fit({'nothing': 1}), lambda: model.fit({}), lambda: model.fit(targets, kind='newton')):
+            for bad in (lambda: model.fit({'nothing': 1}), lambda: model.fit({}), lambda: model.fit(targets, kind='newton'),
+                        lambda: model.fit(targets, hold={'none': 1}), lambda: model.fit(targets, hold={names[0]: 1e9})):
                 with self.assertRaises(self.hyco_py.Error) as error:
                     bad()
                 self.assertEqual(len(str(error.exception).splitlines()), 1)

@@ -26,9 +26,9 @@ PetscErrorCode HycoBodiesReset(HycoBodiesWork o)
   PetscCall(HycoTaoDestroy(&o->tao));
   PetscCall(HycoSolverDestroy(&o->own));
   for (PetscInt k = 0; o->weight && k < o->bodies->n; k++) HycoFreeAll(&o->weight[k], &o->share[k], &o->blend[k]);
-  HycoFreeAll(&o->kept.weights, &o->weight, &o->share, &o->blend, &o->blended, &o->X0, &o->E0, &o->E_at, &o->pose,
-              &o->kappa, &o->c, &o->elastic, &o->free, &o->u, &o->f, &o->x, &o->loc, &o->row_start, &o->row_at, &o->row,
-              &o->gap, &o->active, &o->Z, &o->work);
+  HycoFreeAll(&o->kept.weights, &o->weight, &o->share, &o->blend, &o->blended, &o->mu, &o->reference, &o->X0, &o->E0,
+              &o->E_at, &o->pose, &o->kappa, &o->c, &o->elastic, &o->free, &o->u, &o->f, &o->x, &o->loc, &o->row_start,
+              &o->row_at, &o->row, &o->gap, &o->active, &o->Z, &o->work);
   PetscCall(PetscMemzero(o, sizeof(*o)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -151,6 +151,7 @@ static PetscErrorCode TakeReference(HycoBodiesWork o, PetscInt k, const PetscRea
   const PetscReal *tangent;
 
   PetscFunctionBegin;
+  PetscCall(PetscArraycpy(o->reference + k * o->bodies->n_variables, mu, o->bodies->n_variables));
   PetscCall(HycoFESetParameters(o->fe, mu));
   tangent = o->fe->tangent + o->fe->tangent_start[e];
   for (PetscInt v = 0; v < m->nv; v++)
@@ -199,6 +200,8 @@ PetscErrorCode HycoBodiesSetUp(HycoBodiesWork o, HycoSubstructures b, HycoScene 
   PetscCall(HycoFECreate(scene, b->probe->dm, &o->fe));
   /* Of a history too, thermal strains are loads here: the laws' s = C (e - e_th) - sigma leaves them out. */
   o->fe->heat_is_load = PETSC_TRUE;
+  PetscCall(PetscCalloc1(b->n_variables + 1, &o->mu));
+  PetscCall(PetscCalloc1(b->n * b->n_variables + 1, &o->reference));
   PetscCall(PetscMalloc1(3 * b->probe->nv * b->n, &o->X0));
   PetscCall(PetscMalloc1(b->n, &o->E0));
   PetscCall(PetscMalloc1(b->n, &o->E_at));
@@ -236,9 +239,12 @@ static PetscErrorCode Place(HycoBodiesWork o, const PetscReal mu[])
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < b->n; k++) {
+    PetscBool same;
+
     HycoBodiesReference(b, k, mu, reference);
-    /* Only a body with samples has another shape at this mu; the reference of the others, taken in set-up, stays. */
-    if (b->body[k].n_samples > 1) PetscCall(TakeReference(o, k, reference));
+    /* Only a body with samples has another shape at this mu, and only if a parameter of its shape changes. */
+    PetscCall(PetscArraycmp(reference, o->reference + k * b->n_variables, b->n_variables, &same));
+    if (!same) PetscCall(TakeReference(o, k, reference));
   }
   PetscCall(HycoFESetParameters(o->fe, mu));
   for (PetscInt k = 0; k < b->n; k++) {
@@ -268,6 +274,8 @@ static PetscErrorCode Load(HycoBodiesWork o)
   if (!b->r) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(b->r, &value));
   PetscCall(VecCreateSeq(PETSC_COMM_SELF, o->fe->n_dof, &all));
+  /* A few cells, most often where they were. */
+  if (o->fe->thermal) PetscCall(HycoFEKeepGradients(o->fe));
   PetscCall(HycoFEAssembleForce(o->fe, all));
   PetscCall(VecGetArrayRead(all, &F));
   for (PetscInt k = 0; k < b->r; k++) {
@@ -834,15 +842,29 @@ static PetscErrorCode SolveRounds(HycoBodiesWork o, const HycoBodiesSurface *s, 
 }
 
 /* The order matters: weights before Load() and BlendMotions(), the pose and kappa before both, all displacements
-   without contact before TurnRows(), which subtracts them from the gaps. */
+   without contact before TurnRows(), which subtracts them from the gaps. Only what the changed parameters enter. */
 PetscErrorCode HycoBodiesPrepare(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal mu[])
 {
+  const HycoScene scene = o->fe->scene;
+  const PetscBool first = (PetscBool)!o->prepared;
+  PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE};
+  HycoChanges c;
+
   PetscFunctionBegin;
-  PetscCall(TakeWeights(o, mu));
-  PetscCall(Place(o, mu));
-  PetscCall(Load(o));
-  PetscCall(BlendMotions(o));
+  for (PetscInt p = 0; p < scene->n_variables; p++) changed[p] = (PetscBool)(first || mu[p] != o->mu[p]);
+  c = HycoSceneChanges(scene, changed);
+  /* Until all of it is there: an error leaves nothing that the next point could take over. */
+  o->prepared = PETSC_FALSE;
+  if (first || c.nodes || c.stiffness) {
+    PetscCall(TakeWeights(o, mu));
+    PetscCall(Place(o, mu));
+    PetscCall(BlendMotions(o));
+  } else
+    PetscCall(HycoFESetParameters(o->fe, mu));
+  if (first || HycoSceneForcesChange(scene, changed)) PetscCall(Load(o));
   PetscCall(TurnRows(o, s));
+  PetscCall(PetscArraycpy(o->mu, mu, scene->n_variables));
+  o->prepared = PETSC_TRUE;
   PetscCall(HycoBodiesKeepRows(o, s->n));
   PetscCall(HycoBodiesStrain(o, s, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
