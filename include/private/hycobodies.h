@@ -211,6 +211,7 @@ typedef struct _n_HycoBodiesWork {
   PetscReal *kappa, *c, *elastic, *free, *u, *f, *x; /* elastic: free, without inelastic strains */
   PetscReal *Z, *work;                               /* ns x p, p x r row major: of all bodies, interpolated */
   PetscInt n_loc, *loc;                   /* by unknown of the surface's mesh: its place, with ns added inside; or -1 */
+  PetscInt n_placed, *placed, *placed_in; /* its nodes with a place, and their bodies */
   PetscInt *row_start, *row_at, row_room; /* the rows of B in the bodies' axes */
   PetscReal *row;
   HycoBodiesKept kept;
@@ -296,7 +297,7 @@ PetscErrorCode HycoBodiesFrictionDerive(HycoBodiesFriction friction, PetscInt m,
    has further solutions. */
 void HycoBodiesFrictionNormal(HycoBodiesFriction friction, PetscReal Lambda[]);
 const HycoSlip *HycoBodiesFrictionSlip(HycoBodiesFriction friction);
-PetscBool HycoBodiesFrictionDisproven(HycoBodiesFriction friction);
+PetscErrorCode HycoBodiesFrictionDisproven(HycoBodiesFriction friction, PetscBool *disproven);
 /* M of n contacts at the prepared parameters: p + n square by columns. */
 PetscErrorCode HycoBodiesMatrix(HycoBodiesWork work, PetscInt n, const PetscInt contact[], PetscReal M[]);
 /* Ops of gradients. */

@@ -124,9 +124,8 @@ static PetscErrorCode Residual(Newton *h, const PetscReal z[], PetscReal *norm, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The sign of the determinant of J at z, a solution; 0: J is singular. A negative one proves that the problem has other
-   solutions as well, by the degree of F. */
-static PetscErrorCode Sign(Newton *h, const PetscReal z[], PetscInt *sign)
+/* DP at z, a solution, for what follows from it: the sign, derivatives. */
+static PetscErrorCode DeriveAt(Newton *h, const PetscReal z[])
 {
   PetscReal norm, size;
   PetscInt changes;
@@ -134,7 +133,6 @@ static PetscErrorCode Sign(Newton *h, const PetscReal z[], PetscInt *sign)
   PetscFunctionBegin;
   PetscCall(Residual(h, z, &norm, &size));
   PetscCall(HycoConeStepDerive(h->linear, h->blocks, h->y, &changes));
-  PetscCall(HycoConeStepSign(h->linear, sign));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -682,7 +680,15 @@ void HycoConeFactorForget(HycoConeFactor f)
   PetscCallVoid(PetscFree(f->scaled));
 }
 
-/* With the DP of the solution, at which the sign was taken. */
+/* A negative sign of the determinant of J proves that the problem has other solutions as well, by the degree of F. */
+PetscErrorCode HycoConeFactorSign(HycoConeFactor f, PetscInt *sign)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoConeStepSign(&f->step, sign));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* With the DP of the last solution. */
 PetscErrorCode HycoConeFactorTangent(HycoConeFactor f, const PetscReal dq[], PetscReal dz[], PetscBool *regular)
 {
   const PetscInt p = f->step.p, n = f->step.n;
@@ -749,7 +755,8 @@ PetscErrorCode HycoLCPSemismooth(const HycoLCP *lcp, PetscReal z[], PetscInt *it
   PetscCall(Chain(&h, z, status));
   if (lcp->sign) *lcp->sign = 0;
   /* Before DropRounding() and the scaling back: z is that of h's problem. */
-  if (lcp->sign && *status == HYCO_LCP_SOLVED) PetscCall(Sign(&h, z, lcp->sign));
+  if (*status == HYCO_LCP_SOLVED) PetscCall(DeriveAt(&h, z));
+  if (lcp->sign && *status == HYCO_LCP_SOLVED) PetscCall(HycoConeStepSign(h.linear, lcp->sign));
   DropRounding(&h, z);
   for (PetscInt i = 0; i < h.p; i++) z[i] *= h.flexibility;
   *its = h.its;

@@ -25,7 +25,6 @@ struct _n_HycoBodiesFriction {
   PetscInt p;               /* rigid motions */
   PetscReal *M;             /* p + rows square: [0 G^T; -G W]; NULL: not computed at these parameters yet */
   PetscReal *q, *z, *ahead; /* p + rows: of the step; its motions and forces; a start of it */
-  PetscInt sign;            /* of the determinant at the solution */
   PetscReal *pieces;        /* of the laws, when the derivative of the forces was taken */
   PetscReal *before;        /* by row: forces of the accepted step before the last one */
   PetscReal *U, *U_old;     /* n_dof: of the surface, at the step and at the last accepted time */
@@ -217,7 +216,6 @@ PetscErrorCode HycoBodiesFrictionTouch(HycoBodiesFriction f, HycoBodiesWork o, P
                  .symmetric = PETSC_TRUE,
                  .blocks = f->blocks,
                  .cone = f->factor,
-                 .sign = &f->sign,
                  .warm = PETSC_TRUE,
                  .given = PETSC_TRUE};
 
@@ -340,8 +338,13 @@ const HycoSlip *HycoBodiesFrictionSlip(HycoBodiesFriction f)
   return &f->slip;
 }
 
-/* sign < 0: the determinant of the last Newton matrix is negative, so that the solution is one of several. */
-PetscBool HycoBodiesFrictionDisproven(HycoBodiesFriction f)
+/* Of the solution that is accepted; needs a factor, which the next step begins with. */
+PetscErrorCode HycoBodiesFrictionDisproven(HycoBodiesFriction f, PetscBool *disproven)
 {
-  return (PetscBool)(f->sign < 0);
+  PetscInt sign;
+
+  PetscFunctionBegin;
+  PetscCall(HycoConeFactorSign(f->factor, &sign));
+  *disproven = (PetscBool)(sign < 0);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }

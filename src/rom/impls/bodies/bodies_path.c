@@ -46,10 +46,9 @@ static PetscErrorCode Settle(HycoROM m, PetscReal t0, PetscReal t1, const PetscR
   if (a->why[0]) PetscFunctionReturn(PETSC_SUCCESS);
   /* The getters of contact results read the normal forces, with friction too. */
   PetscCall(PetscArraycpy(m->Lambda, Lambda, m->model->pairs.n));
-  if (w->friction) {
+  if (w->friction)
     PetscCall(HycoBodiesFrictionMove(w->friction, &w->bodies, &p->kkt));
-    MoveAll(m);
-  } else {
+  else {
     PetscCall(HycoBodiesStrain(&w->bodies, &w->surface, alpha));
     HycoBodiesGiven(&w->bodies, &w->surface, Lambda);
     MoveAll(m);
@@ -151,8 +150,13 @@ static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
   PetscCall(VecRestoreArrayRead(p->U, &alpha));
   PetscCall(HycoTraceAdd(m, p->t));
   p->now.stored = a->law.stored;
-  if (w->friction) PetscCall(HycoBodiesFrictionAccept(w->friction, p->t));
-  if (w->friction) p->now.disproven += HycoBodiesFrictionDisproven(w->friction);
+  if (w->friction) {
+    PetscBool disproven;
+
+    PetscCall(HycoBodiesFrictionAccept(w->friction, p->t));
+    PetscCall(HycoBodiesFrictionDisproven(w->friction, &disproven));
+    p->now.disproven += disproven;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
