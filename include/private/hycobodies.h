@@ -213,6 +213,7 @@ typedef struct _n_HycoBodiesWork {
   PetscReal *kappa, *c, *elastic, *free, *u, *f, *x; /* elastic: free, without inelastic strains */
   PetscReal *Z, *work;                               /* ns x p, p x r row major: of all bodies, interpolated */
   PetscInt n_loc, *loc;                   /* by unknown of the surface's mesh: its place, with ns added inside; or -1 */
+  PetscInt n_placed, *placed, *placed_in; /* its nodes with a place, and their bodies */
   PetscInt *row_start, *row_at, row_room; /* the rows of B in the bodies' axes */
   PetscReal *row;
   HycoBodiesKept kept;
@@ -267,7 +268,7 @@ PetscErrorCode HycoBodiesKeptDisplace(HycoBodiesWork work, PetscInt m, const Pet
 /* Friction between the bodies (bodies_friction.c): steps of a path on the rows with tangents. surface: with the normal
    rows alone (borrowed). */
 typedef struct _n_HycoBodiesFriction *HycoBodiesFriction;
-PetscErrorCode HycoBodiesFrictionCreate(HycoScene scene, const HycoBodiesSurface *surface,
+PetscErrorCode HycoBodiesFrictionCreate(HycoScene scene, const HycoBodiesSurface *surface, PetscInt p,
                                         HycoBodiesFriction *friction);
 PetscErrorCode HycoBodiesFrictionDestroy(HycoBodiesFriction *friction);
 /* The surface with tangents, for HycoBodiesSetUp(). Borrowed. */
@@ -282,13 +283,23 @@ PetscErrorCode HycoBodiesFrictionSolve(HycoBodiesFriction friction, HycoBodiesWo
                                        PetscInt *its, PetscBool *solved);
 /* The solved step becomes the state of the contacts at t. */
 PetscErrorCode HycoBodiesFrictionAccept(HycoBodiesFriction friction, PetscReal t);
-/* After a step that was refused, prepared at the last accepted time: its forces, and u, f of work. */
-void HycoBodiesFrictionRestore(HycoBodiesFriction friction, HycoBodiesWork work);
+/* The parts of a step of bodies that deform inelastically: the forces at alpha (`again`: not the first alpha of the step),
+   with x of work, o->free and the gaps; u, f and the residuals for these forces. */
+PetscErrorCode HycoBodiesFrictionTouch(HycoBodiesFriction friction, HycoBodiesWork work, PetscReal t,
+                                       const PetscReal alpha[], PetscBool again, PetscInt *its, PetscBool *solved);
+PetscErrorCode HycoBodiesFrictionMove(HycoBodiesFriction friction, HycoBodiesWork work, HycoKKT *kkt);
+/* By row. Borrowed. */
+const PetscReal *HycoBodiesFrictionForces(HycoBodiesFriction friction);
+/* The derivative of the forces last found by alpha: Z (n_set x m row major), of the rows set[] of closed contacts, from BP =
+   B P / kappa (rows x m). *changed, true: Z is wanted in any case; afterwards whether set and Z have been made anew. */
+PetscErrorCode HycoBodiesFrictionDerive(HycoBodiesFriction friction, PetscInt m, const PetscReal BP[],
+                                        PetscBool *changed, PetscInt *n_set, PetscInt set[], PetscReal **Z,
+                                        PetscBool *regular);
 /* The normal forces of the solved step; the state of the contacts, whose arrays the friction owns; whether the last step
    has further solutions. */
 void HycoBodiesFrictionNormal(HycoBodiesFriction friction, PetscReal Lambda[]);
 const HycoSlip *HycoBodiesFrictionSlip(HycoBodiesFriction friction);
-PetscBool HycoBodiesFrictionDisproven(HycoBodiesFriction friction);
+PetscErrorCode HycoBodiesFrictionDisproven(HycoBodiesFriction friction, PetscBool *disproven);
 /* M of n contacts at the prepared parameters: p + n square by columns. */
 PetscErrorCode HycoBodiesMatrix(HycoBodiesWork work, PetscInt n, const PetscInt contact[], PetscReal M[]);
 /* Ops of gradients. */
@@ -319,5 +330,6 @@ PetscErrorCode HycoBodiesDestroyModel(HycoROM model);
 PetscInt HycoBodiesGrid(HycoSubstructures bodies, PetscInt k, PetscReal theta[]);
 /* The residuals at the contacts, recomputed from U and the forces; `stationarity` is that of floating bodies. */
 void HycoBodiesMeasure(HycoROM model, HycoKKT *kkt);
+PetscReal HycoBodiesUnbalanced(HycoBodiesWork work);
 
 #endif

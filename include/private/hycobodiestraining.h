@@ -101,10 +101,13 @@ typedef struct {
   PetscInt *row;      /* of the unknowns inside in the distributed vectors */
 } HycoBodiesFactor;
 
-/* Whether the model has modes of inelastic forces; bodies without a history, or with friction, are elastic. */
+/* Whether the model has modes of inelastic forces: with a history, and with friction where a law is not linear. */
 static inline PetscBool HycoBodiesFlow(HycoReducer t)
 {
-  return (PetscBool)(t->scene->n_times && !HycoSceneHasFriction(t->scene));
+  PetscBool flows = (PetscBool)!HycoSceneHasFriction(t->scene);
+
+  for (PetscInt k = 0; k < t->scene->n_bodies; k++) flows = (PetscBool)(flows || !t->scene->body[k].law->linear);
+  return (PetscBool)(t->scene->n_times && flows);
 }
 PetscErrorCode HycoBodiesBegin(HycoReducer reducer);
 PetscErrorCode HycoBodiesModes(HycoReducer reducer, HycoSnapshots store);

@@ -72,6 +72,12 @@ typedef struct _n_HycoConeFactor *HycoConeFactor;
 PetscErrorCode HycoConeFactorCreate(HycoConeFactor *factor);
 PetscErrorCode HycoConeFactorDestroy(HycoConeFactor *factor);
 void HycoConeFactorForget(HycoConeFactor factor);
+/* After a solve with this factor: the sign of the determinant of J at the solution, as HycoLCP's; dz (p + n), the derivative of the solution where q changes by dq, on the
+   pieces of the laws at the solution. *regular: it has one. */
+PetscErrorCode HycoConeFactorSign(HycoConeFactor factor, PetscInt *sign);
+PetscErrorCode HycoConeFactorTangent(HycoConeFactor factor, const PetscReal dq[], PetscReal dz[], PetscBool *regular);
+/* These pieces: n numbers, borrowed until the next solve. */
+void HycoConeFactorGetPieces(HycoConeFactor factor, PetscInt *n, const PetscReal *pieces[]);
 /*
   A dense problem: M column major, n x n. `symmetric`: M is positive semidefinite; then `factor` may be that of M's last
   set, or one after HycoSetFactorForget(); NULL: each set is factored anew. With p free unknowns before the n contacts

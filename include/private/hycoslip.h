@@ -35,6 +35,8 @@ void HycoSlipTake(HycoSlip *slip, PetscReal t);
 /* r: forces L of the last accepted time, extrapolated with those before to the time t; false: there are not enough times. */
 PetscBool HycoSlipExtrapolate(const HycoSlip *slip, PetscReal t, PetscInt n, const PetscReal L[],
                               const PetscReal before[], PetscReal r[]);
+/* L by row, from the normal forces and the vectors (3 n) of friction on the slaves, with the present tangents. */
+void HycoSlipForces(const HycoSlip *slip, const PetscReal normal[], const PetscReal force[], PetscReal L[]);
 /* sum: the work since the start and the number of slipping contacts of this process. */
 void HycoSlipSum(const HycoSlip *slip, PetscReal sum[2]);
 

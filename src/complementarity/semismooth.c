@@ -38,7 +38,7 @@ typedef struct {
   PetscInt n, p;                  /* length of z; free unknowns before the forces */
   const PetscReal *M, *q;         /* of the problem that is solved now: `M0`, or a proximal step's */
   const PetscReal *M0, *q0;       /* lcp's, scaled if p > 0 */
-  PetscReal *scaled, flexibility; /* of a typical contact; p > 0 */
+  PetscReal *scaled, flexibility; /* q0; of a typical contact; p > 0 */
   PetscReal *rho, *w, *y, *F;     /* n each; y = z - rho w */
   PetscReal *step, *trial;        /* n; 3 n: z, w and the change of w */
   PetscReal start;                /* the largest force at the start */
@@ -124,9 +124,8 @@ static PetscErrorCode Residual(Newton *h, const PetscReal z[], PetscReal *norm, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The sign of the determinant of J at z, a solution; 0: J is singular. A negative one proves that the problem has other
-   solutions as well, by the degree of F. */
-static PetscErrorCode Sign(Newton *h, const PetscReal z[], PetscInt *sign)
+/* DP at z, a solution, for what follows from it: the sign, derivatives. */
+static PetscErrorCode DeriveAt(Newton *h, const PetscReal z[])
 {
   PetscReal norm, size;
   PetscInt changes;
@@ -134,7 +133,6 @@ static PetscErrorCode Sign(Newton *h, const PetscReal z[], PetscInt *sign)
   PetscFunctionBegin;
   PetscCall(Residual(h, z, &norm, &size));
   PetscCall(HycoConeStepDerive(h->linear, h->blocks, h->y, &changes));
-  PetscCall(HycoConeStepSign(h->linear, sign));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -450,10 +448,18 @@ static PetscErrorCode FromStick(Newton *h, PetscReal z[], HycoLCPStatus *status)
   PetscReal *stuck;
 
   PetscFunctionBegin;
-  for (PetscInt i = 0; i < h->n; i++)
-    h->F[i] = i < h->p || h->M[(size_t)i * (size_t)(h->n + 1)] > 0 ? -h->rho[i] * h->q[i] : 0;
   /* DP = 1: the step from z = 0 is then the solution of w = 0 on all rows. */
   PetscCall(HycoConeStepStick(h->linear));
+  for (PetscInt i = 0; i < h->p; i++) h->F[i] = -h->rho[i] * h->q[i];
+  for (PetscInt k = 0; k < h->blocks->n; k++) {
+    const PetscInt first = h->blocks->row[k], size = h->blocks->row[k + 1] - first;
+
+    for (PetscInt i = 0; i < size; i++) {
+      const PetscInt row = h->p + first + i;
+
+      h->F[row] = h->linear->DP[k * HYCO_BLOCK + i * (size + 1)] > 0 ? -h->rho[row] * h->q[row] : 0;
+    }
+  }
   PetscCall(HycoConeStepSolve(h->linear, h->F, (PetscBool)(h->linear->m <= MOST_LEAST), h->step, &regular));
   for (PetscInt i = 0; i < h->n; i++) z[i] = regular ? h->step[i] : 0;
   HycoDuplicate(h->n, z, &stuck);
@@ -573,32 +579,52 @@ static PetscErrorCode Chain(Newton *h, PetscReal z[], HycoLCPStatus *status)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Floating bodies: z_i = x_i / flexibility for the free unknowns, so that all entries are forces and all w lengths. */
-static PetscErrorCode ScaleFree(Newton *h, PetscReal z[])
-{
-  const size_t n = (size_t)h->n, p = (size_t)h->p;
-  PetscReal *M, *q, f = 0;
+struct _n_HycoConeFactor {
+  HycoConeStep step;
+  PetscInt n_blocks, *row; /* of the blocks that it is for; NULL: none yet */
+  PetscReal *rho;
+  PetscReal *scaled, flexibility; /* with free unknowns: M in units of forces and lengths, NULL: not yet; of a typical
+                                     contact */
+};
 
+/* Rows and columns of the free unknowns times a typical flexibility: M stays [0 A; -A^T W] in structure. Once for an M. */
+static PetscErrorCode ScaleMatrix(HycoConeFactor f, PetscInt p, PetscInt n, const PetscReal M[])
+{
+  const size_t N = (size_t)n;
+  PetscReal most = 0;
+
+  PetscFunctionBegin;
+  if (f->scaled) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoDuplicate(N * N, M, &f->scaled);
+  for (size_t i = (size_t)p; i < N; i++) most = PetscMax(most, PetscAbsReal(M[i * N + i]));
+  f->flexibility = most > 0 ? most : 1;
+  for (size_t i = 0; i < (size_t)p; i++) {
+    /* Of rigid motions: round-off, by which a body that slides away would find a load. */
+    for (size_t j = 0; j < (size_t)p; j++) f->scaled[i * N + j] = 0;
+    for (size_t j = 0; j < N; j++) f->scaled[i * N + j] *= f->flexibility;
+    for (size_t j = 0; j < N; j++) f->scaled[j * N + i] *= f->flexibility;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Floating bodies: z_i = x_i / flexibility for the free unknowns, so that all entries are forces and all w lengths; the
+   factor has M so. */
+static PetscErrorCode ScaleFree(Newton *h, HycoConeFactor f, PetscReal z[])
+{
   PetscFunctionBegin;
   h->M0 = h->lcp->M;
   h->q0 = h->lcp->q;
-  for (size_t i = p; i < n; i++) f = PetscMax(f, PetscAbsReal(h->M0[i * n + i]));
-  h->flexibility = f > 0 ? f : 1;
-  if (p) {
-    PetscCall(PetscMalloc1(n * n + n, &M));
-    q = M + n * n;
-    PetscCall(PetscArraycpy(M, h->M0, n * n));
-    PetscCall(PetscArraycpy(q, h->q0, n));
-    for (size_t i = 0; i < p; i++) {
-      /* Rows and columns of the free unknowns: M stays [0 A; -A^T W] in structure. */
-      q[i] *= h->flexibility;
-      z[i] /= h->flexibility;
-      for (size_t j = 0; j < n; j++) M[i * n + j] *= h->flexibility;
-      for (size_t j = 0; j < n; j++) M[j * n + i] *= h->flexibility;
+  if (h->p) {
+    PetscCall(ScaleMatrix(f, h->p, h->n, h->lcp->M));
+    PetscCall(PetscMalloc1(h->n, &h->scaled));
+    PetscCall(PetscArraycpy(h->scaled, h->q0, h->n));
+    for (PetscInt i = 0; i < h->p; i++) {
+      h->scaled[i] *= f->flexibility;
+      z[i] /= f->flexibility;
     }
-    h->scaled = M;
-    h->M0 = M;
-    h->q0 = q;
+    h->M0 = f->scaled;
+    h->q0 = h->scaled;
+    h->flexibility = f->flexibility;
   }
   Pose(h, h->M0, h->q0);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -617,12 +643,6 @@ static void DropRounding(const Newton *h, PetscReal z[])
   for (PetscInt i = h->p; i < h->n && most <= TIGHT * least; i++) z[i] = 0;
 }
 
-struct _n_HycoConeFactor {
-  HycoConeStep step;
-  PetscInt n_blocks, *row; /* of the blocks that it is for; NULL: none yet */
-  PetscReal *rho;
-};
-
 /* Empty: the first solve makes what it needs. A factor outlives the solves of a path. */
 PetscErrorCode HycoConeFactorCreate(HycoConeFactor *factor)
 {
@@ -637,7 +657,7 @@ static PetscErrorCode Release(HycoConeFactor f)
   PetscFunctionBegin;
   if (!f->row) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoConeStepDestroy(&f->step));
-  HycoFreeAll(&f->row, &f->rho);
+  HycoFreeAll(&f->row, &f->rho, &f->scaled);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -655,7 +675,41 @@ PetscErrorCode HycoConeFactorDestroy(HycoConeFactor *factor)
    pointer cannot show. NULL-safe. */
 void HycoConeFactorForget(HycoConeFactor f)
 {
-  if (f && f->row) HycoConeStepSetMatrix(&f->step, NULL);
+  if (!f || !f->row) return;
+  HycoConeStepSetMatrix(&f->step, NULL);
+  PetscCallVoid(PetscFree(f->scaled));
+}
+
+/* A negative sign of the determinant of J proves that the problem has other solutions as well, by the degree of F. */
+PetscErrorCode HycoConeFactorSign(HycoConeFactor f, PetscInt *sign)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoConeStepSign(&f->step, sign));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* With the DP of the last solution. */
+PetscErrorCode HycoConeFactorTangent(HycoConeFactor f, const PetscReal dq[], PetscReal dz[], PetscBool *regular)
+{
+  const PetscInt p = f->step.p, n = f->step.n;
+  PetscReal *scaled = NULL;
+
+  PetscFunctionBegin;
+  if (p) {
+    PetscCall(PetscMalloc1(n, &scaled));
+    for (PetscInt i = 0; i < n; i++) scaled[i] = dq[i] * (i < p ? f->flexibility : 1);
+  }
+  PetscCall(HycoConeStepTangent(&f->step, scaled ? scaled : dq, dz, regular));
+  for (PetscInt i = 0; i < p; i++) dz[i] *= f->flexibility;
+  PetscCall(PetscFree(scaled));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Two solutions with the same pieces have the same derivative. */
+void HycoConeFactorGetPieces(HycoConeFactor f, PetscInt *n, const PetscReal *DP[])
+{
+  *n = f->n_blocks * HYCO_BLOCK;
+  *DP = f->step.DP;
 }
 
 /* Makes the factor one for problems with these blocks. */
@@ -689,19 +743,20 @@ PetscErrorCode HycoLCPSemismooth(const HycoLCP *lcp, PetscReal z[], PetscInt *it
   PetscFunctionBegin;
   if (!lcp->blocks) PetscCall(HycoBlocksCreateNonnegative(lcp->n, &nonnegative));
   if (!lcp->blocks) h.blocks = nonnegative;
-  if (!f || lcp->p) PetscCall(HycoConeFactorCreate(&own)); /* M with free unknowns is scaled anew */
+  if (!f) PetscCall(HycoConeFactorCreate(&own));
   if (own) f = own;
   PetscCall(Adapt(f, lcp->p, h.blocks));
   h.linear = &f->step;
   h.linear->symmetric = (PetscBool)(lcp->symmetric && !lcp->p);
   h.rho = f->rho;
   PetscCall(PetscMalloc5(n, &h.w, n, &h.y, n, &h.F, n, &h.step, 3 * n, &h.trial));
-  PetscCall(ScaleFree(&h, z));
+  PetscCall(ScaleFree(&h, f, z));
   for (PetscInt i = h.p; i < n; i++) h.start = PetscMax(h.start, PetscAbsReal(z[i]));
   PetscCall(Chain(&h, z, status));
   if (lcp->sign) *lcp->sign = 0;
   /* Before DropRounding() and the scaling back: z is that of h's problem. */
-  if (lcp->sign && *status == HYCO_LCP_SOLVED) PetscCall(Sign(&h, z, lcp->sign));
+  if (*status == HYCO_LCP_SOLVED) PetscCall(DeriveAt(&h, z));
+  if (lcp->sign && *status == HYCO_LCP_SOLVED) PetscCall(HycoConeStepSign(h.linear, lcp->sign));
   DropRounding(&h, z);
   for (PetscInt i = 0; i < h.p; i++) z[i] *= h.flexibility;
   *its = h.its;

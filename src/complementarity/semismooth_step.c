@@ -187,15 +187,24 @@ static PetscInt Compare(HycoConeStep *t)
   return missing;
 }
 
-/* Whether row i of block k has no flexibility, as the tangential one along the normal of a plane of symmetry. It stays
-   out of DP: its equation w = 0 could not be met by its own force, and A would be singular. */
+/* Whether row i of block k has no flexibility, as the tangential one along the normal of a plane of symmetry, and no
+   motion of a floating body moves it. It stays out of DP: its equation w = 0 could not be met by its own force, and A would
+   be singular. */
 static PetscBool Inflexible(const HycoConeStep *t, PetscInt k, PetscInt i)
 {
   const PetscInt first = t->p + t->blocks->row[k], end = t->p + t->blocks->row[k + 1];
-  PetscReal most = 0;
+  PetscReal most = 0, own = t->M[(size_t)(first + i) * (size_t)(t->n + 1)];
 
-  for (PetscInt j = first; j < end; j++) most = PetscMax(most, t->M[(size_t)j * (size_t)(t->n + 1)]);
-  return (PetscBool) !(t->M[(size_t)(first + i) * (size_t)(t->n + 1)] > INFLEXIBLE * most);
+  for (PetscInt j = first; j < end; j++) {
+    most = PetscMax(most, t->M[(size_t)j * (size_t)(t->n + 1)]);
+    for (PetscInt c = 0; c < t->p; c++) {
+      const PetscReal moves = PetscAbsReal(t->M[(size_t)c * (size_t)t->n + (size_t)j]);
+
+      most = PetscMax(most, moves);
+      if (j == first + i) own = PetscMax(own, moves);
+    }
+  }
+  return (PetscBool) !(own > INFLEXIBLE * most);
 }
 
 /* Entries of DP are compared exactly: a step between the same states of contacts without slip in 3D has the same DP,
@@ -582,18 +591,14 @@ static PetscErrorCode IsHomogeneous(const HycoConeStep *t, const PetscReal y[], 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The solution itself on the present pieces of P, where these are homogeneous: there is no cancellation in a step. */
-PetscErrorCode HycoConeStepPoint(HycoConeStep *t, const PetscReal q[], const PetscReal y[], PetscReal z[],
-                                 PetscBool *regular, PetscBool *served)
+/* z = DP (z - rho (q + M z)) */
+static PetscErrorCode SolvePoint(HycoConeStep *t, const PetscReal q[], PetscReal z[], PetscBool *regular)
 {
   const PetscBLASInt one = 1;
   PetscBLASInt m, info;
   PetscReal size = 0;
 
   PetscFunctionBegin;
-  *regular = PETSC_TRUE;
-  PetscCall(IsHomogeneous(t, y, served));
-  if (!*served) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(Prepare(t));
   m = (PetscBLASInt)t->m;
   info = t->info;
@@ -608,6 +613,25 @@ PetscErrorCode HycoConeStepPoint(HycoConeStep *t, const PetscReal q[], const Pet
   if (!info) PetscCall(Correct(t, q, NULL, z));
   for (PetscInt i = 0; i < t->n; i++) size += PetscAbsReal(z[i]);
   *regular = (PetscBool)(info == 0 && !PetscIsInfOrNanReal(size));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The solution itself on the present pieces of P, where these are homogeneous: there is no cancellation in a step. */
+PetscErrorCode HycoConeStepPoint(HycoConeStep *t, const PetscReal q[], const PetscReal y[], PetscReal z[],
+                                 PetscBool *regular, PetscBool *served)
+{
+  PetscFunctionBegin;
+  *regular = PETSC_TRUE;
+  PetscCall(IsHomogeneous(t, y, served));
+  if (*served) PetscCall(SolvePoint(t, q, z, regular));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The derivative of the point: the same linear map, whatever P is between its pieces. */
+PetscErrorCode HycoConeStepTangent(HycoConeStep *t, const PetscReal dq[], PetscReal dz[], PetscBool *regular)
+{
+  PetscFunctionBegin;
+  PetscCall(SolvePoint(t, dq, dz, regular));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

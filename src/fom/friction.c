@@ -460,23 +460,18 @@ PetscErrorCode HycoFrictionLoad(HycoFOM f)
 {
   HycoFriction r = f->friction;
   PetscReal *value[N_STATE] = {NULL};
+  const PetscScalar *normal;
   PetscScalar *L;
 
   PetscFunctionBegin;
   HycoOnRoot(HycoComm(f), ReadColumns(f, value));
   PetscCall(TakeColumns(f, value));
   for (PetscInt c = 0; c < N_STATE; c++) PetscCall(PetscFree(value[c]));
-  PetscCall(CopyNormal(f, f->Lambda, PETSC_FALSE, r->L));
+  PetscCall(VecGetArrayRead(f->Lambda, &normal));
   PetscCall(VecGetArray(r->L, &L));
-  for (PetscInt k = 0; k < f->pairs.n; k++) {
-    for (PetscInt j = r->slip.row[k] + 1; j < r->slip.row[k + 1]; j++) {
-      const PetscReal *t = r->slip.tangent + 6 * k + 3 * (j - r->slip.row[k] - 1), *force = r->slip.shear.force + 3 * k;
-
-      /* The saved force is the one on the slave, the opposite of the multiplier (Add() in slip.c). */
-      L[j] = -(force[0] * t[0] + force[1] * t[1] + force[2] * t[2]);
-    }
-  }
+  HycoSlipForces(&r->slip, normal, r->slip.shear.force, L);
   PetscCall(VecRestoreArray(r->L, &L));
+  PetscCall(VecRestoreArrayRead(f->Lambda, &normal));
   PetscCall(VecCopy(r->L, r->L_old));
   if (r->used) PetscCall(VecCopy(r->L, f->path->Lambda));
   PetscCall(HycoFOMToSurface(f, f->U, r->u_old));

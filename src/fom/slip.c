@@ -152,6 +152,19 @@ PetscBool HycoSlipExtrapolate(const HycoSlip *s, PetscReal t, PetscInt n, const 
   return PETSC_TRUE;
 }
 
+/* The force is the one on the slave, the opposite of the multiplier (Add()). */
+void HycoSlipForces(const HycoSlip *s, const PetscReal normal[], const PetscReal force[], PetscReal L[])
+{
+  for (PetscInt k = 0; k < s->n; k++) {
+    L[s->row[k]] = normal[k];
+    for (PetscInt j = s->row[k] + 1; j < s->row[k + 1]; j++) {
+      const PetscReal *t = s->tangent + 6 * k + 3 * (j - s->row[k] - 1), *f = force + 3 * k;
+
+      L[j] = -(f[0] * t[0] + f[1] * t[1] + f[2] * t[2]);
+    }
+  }
+}
+
 /* sum: the work, and the number of slipping contacts as a real, so that one reduction serves both. Local. */
 void HycoSlipSum(const HycoSlip *s, PetscReal sum[2])
 {

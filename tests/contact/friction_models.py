@@ -24,7 +24,8 @@ history: {times: [0, 1, 1.5, 2, 2.4, 3], tables: {s: [[0, 0], [1, 0], [2, 1], [3
 output: {T: {friction: x, contact: floor}, N: {force: y}, W: {friction: work}, R: {reaction: x, group: top}}
 """
 ELASTIC = 'young: 1000*soft, poisson: 0.3'
-NORTON = 'law: norton, young: 1000, poisson: 0.3, rate: 1e-3, exponent: 2'
+NORTON = 'law: norton, young: 1000, poisson: 0.3, rate: 1e-3*soft, exponent: 2'
+J2 = 'law: j2, young: 1000, poisson: 0.3, yield: 3*soft, hardening: 100'
 # Two blocks; the ratio of one's moduli changes, so that its flexibility is interpolated; in 2D and 3D
 TWO = """
 scene: {mesh: mesh.msh, parameters: [m, hard]}
@@ -35,17 +36,28 @@ contact: {joint: {type: TYPE, slave: face, master: back, friction: m}}
 history: {times: [0, 1, 1.5, 2, 3], tables: {s: [[0, 0], [1, 0], [2, 1], [3, 0]]}}
 output: {T: {friction: x, contact: joint}, W: {friction: work}}
 """
+# A block that friction alone holds on a plane, pressed and pushed to and fro until most of it slips, and unloaded
+HELD = """
+scene: {mesh: mesh.msh, parameters: [m, press, push]}
+parameter: {m: {range: [0.3, 0.6]}, press: {range: [1, 2]}, push: {range: [0.1, 0.25]}}
+body: {block: {LAW}}
+traction: {top: {x: "push*press*h", y: "-press*v"}}
+contact: {plane: {group: base, normal: {y: -1}, gap: "0.0001*(x - 1)^2", friction: m}}
+history: {times: [0, 1, 2, 3, 4, 5], tables: {v: [[0, 0], [1, 1], [3, 1], [4, 0.5], [5, 1]], h: [[1, 0], [2, 1], [3, -1], [4, 0]]}}
+output: {T: {friction: x, contact: plane}, W: {friction: work}}
+"""
+BODIES = ['-hyco_model_type', 'bodies']
 COLUMNS = ('total_contact_force', 'friction_work', 'n_slipping', 'n_active')
 
 
 class FrictionModels(Case):
-    def pad(self, name='scene.yaml', law=ELASTIC, *changes):
+    def pad(self, name='scene.yaml', law=ELASTIC, *changes, cells=6):
         grid = Grid()
-        grid.box('quad4', [np.linspace(0, 2, 13), np.linspace(0, 1, 7)], lambda x: x, 'pad', {'y0': 'base', 'y1': 'top'})
+        grid.box('quad4', [np.linspace(0, 2, 2 * cells + 1), np.linspace(0, 1, cells + 1)], lambda x: x, 'pad', {'y0': 'base', 'y1': 'top'})
         grid.write(self.path('mesh.msh'))
         return self.changed(name, PAD.replace('LAW', law), changes)
 
-    def two(self, dim, kind):
+    def two(self, dim, kind, *changes):
         last = 'yz'[dim - 2]
         grid = Grid()
         flat = lambda n: [np.linspace(0, 1, n)] * (dim - 1)
@@ -55,7 +67,7 @@ class FrictionModels(Case):
         grid.write(self.path('mesh.msh'))
         held = 'x: 0, y: 0' + ', z: 0' * (dim - 2)
         text = TWO.replace('LAST', last).replace('HELD', held).replace('MORE', 'y: 0,' * (dim - 2)).replace('TYPE', kind)
-        return self.changed('scene.yaml', text, ())
+        return self.changed('scene.yaml', text, changes)
 
     def train(self, scene, *args, grid='2,1,1,1', **options):
         return self.hyco('train', '-scene', scene, '-model', self.path('m.h5'), '-grid', grid, '-hyco_validation', '2', *args, **options)
@@ -149,13 +161,42 @@ class FrictionModels(Case):
         self.assertEqual(batch['forces_unique'].tolist(), [0, 0])
         self.assertTrue(np.isnan(batch['estimated_error_lambda']).all())
 
+    def compared(self, scene, point, limit):
+        """The errors of a path in the time steps of full order."""
+        report = self.hyco('compare', '-scene', scene, '-model', self.path('m.h5'), '-mu', point)
+        self.assertEqual(report['not_converged'], 0)
+        self.assertLess(report['kkt_max'], 1e-8)
+        errors = {kind: report['worst_' + kind]['max'] for kind in ('u', 'sigma', 'lambda')}
+        self.assertLess(max(errors.values()), limit, errors)
+
+    def test_inelastic(self):
+        """Bodies that creep and that yield, in 2D and 3D: contact forces, slip and work are those of full order to the error of the inelastic modes."""
+        for law, laws in ((NORTON, 'interpolation'), (J2, 'cubature')):
+            scene = self.pad('flows.yaml', law, ('[0.1, 0.5]', '[0.3, 0.4]'), ('[0.5, 2]', '[0.9, 1.1]'), ('[0, 1]}', '[0.4, 0.6]}'), cells=3)
+            trained = self.train(scene, '-hyco_snapshots', self.path(laws), '-hyco_bodies_laws', laws, '-target_u', '0.02', '-target_lambda', '0.03', *BODIES, grid='2,3,1,1')
+            self.assertGreater(trained['n_inelastic_modes'], 3)
+            self.alike(scene, '0.37,1.2,1,0.5', 0.05)
+            self.compared(scene, '0.37,1.2,1,0.5', 0.02)
+        scene = self.two(3, 'surface', ('young: 1000*(1 + hard*x)', 'law: norton, young: 1000, rate: 1e-4*(1 + hard), exponent: 2'),
+                         ('times: [0, 1, 1.5, 2, 3]', 'times: [0, 1, 2]'))
+        self.train(scene, '-hyco_snapshots', self.path('flows3'), *BODIES, grid='2,1')
+        self.alike(scene, '0.22,1.5', 0.02)
+
+    def test_held(self):
+        """A body that friction alone holds: elastic, its path is that of full order; creeping, to the error of the modes."""
+        grid = Grid()
+        grid.box('quad4', [np.linspace(0, 2, 9), np.linspace(0, 1, 5)], lambda x: x, 'block', {'y0': 'base', 'y1': 'top'})
+        grid.write(self.path('mesh.msh'))
+        for law, limit in (('young: 1000, poisson: 0.3', 1e-8), ('law: norton, young: 1000, poisson: 0.3, rate: 1e-4, exponent: 2', 2e-3)):
+            scene = self.changed('held.yaml', HELD.replace('LAW', law), ())
+            self.train(scene, '-hyco_snapshots', self.path('held-' + law[:3]), *BODIES, grid='2,2,1')
+            self.alike(scene, '0.4,1.3,0.22', limit)
+
     def test_refused(self):
-        """Other types, and bodies that creep, in one line that names contact or body; no type drops the friction."""
+        """Other types in one line that names the contact; no type drops the friction."""
         for words, scene, args in ((('floor', 'friction', 'hybrid', 'bodies'), self.pad(), ['-hyco_model_type', 'hybrid']),
                                    (('floor', 'friction', 'projection', 'bodies'), self.pad(), ['-hyco_model_type', 'projection']),
-                                   (('floor', 'friction', 'cubature', 'bodies'), self.pad(), ['-hyco_model_type', 'cubature']),
-                                   (('friction', 'body pad', 'hyco solve'), self.pad('creeps.yaml', NORTON), ['-hyco_model_type', 'bodies']),
-                                   (('friction', 'body pad', 'hyco solve'), self.pad('creeps.yaml', NORTON), [])):
+                                   (('floor', 'friction', 'cubature', 'bodies'), self.pad(), ['-hyco_model_type', 'cubature'])):
             run = self.run_raw('train', '-scene', scene, '-model', self.path('none.h5'), '-grid', '2,1,1,1', *args)
             self.assertEqual(run.returncode, 1, run.stderr)
             self.assertEqual(len(run.stderr.strip().splitlines()), 1, run.stderr)

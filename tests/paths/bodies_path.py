@@ -173,7 +173,6 @@ class BodiesPath(Ring):
         ratio = self.altered('ratio.yaml', NORTON, HISTORY, ('LAW'.replace('LAW', NORTON) + ', young: 1e5', NORTON + ', young: 1e5*(1 + 0.1*push*x)'))
         turned = self.altered('turned.yaml', NORTON, HISTORY, (NORTON, 'map: {x: x*cos(gap) - y*sin(gap), y: x*sin(gap) + y*cos(gap)}, ' + NORTON))
         aging = self.altered('aging.yaml', NORTON, HISTORY, ('core: {young: 1e5', 'core: {young: 1e5*(1 + 0.01*t)'))
-        free = self.altered('free.yaml', 'law: elastic', HISTORY, ('sym_x0: {x: 0}, ', ''), ('tolerance: 1e-3', 'tolerance: 1e-3, friction: 0.2'))
         flat = self.altered('flat.yaml', 'law: elastic', '', ('*q*', '*'))
         self.train('damaged.h5', *BODIES, grid='2,2')
         with h5py.File(self.path('damaged.h5'), 'r+') as f:
@@ -184,7 +183,6 @@ class BodiesPath(Ring):
         for args, words in (([*line, self.path('ratio'), '-scene', ratio], ['push', 'ring', 'hybrid']),
                             ([*line, self.path('turned'), '-scene', turned], ['ring', 'hybrid']),
                             ([*line, self.path('aging'), '-scene', aging], ['t affects', 'stiffness', 'hybrid']),
-                            ([*line, self.path('free'), '-scene', free], ['no support keeps', 'friction', 'hyco solve']),
                             ([*line, self.path('flat'), '-scene', flat, '-hyco_bodies_laws', 'cubature'], ['-hyco_bodies_laws', 'history']),
                             (['predict', '-model', self.path('damaged.h5'), '-mu', POINT], ['damaged.h5', 'bodies/inelastic/T'])):
             self.refused_in_one_line(words, *args)

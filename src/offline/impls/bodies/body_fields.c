@@ -155,14 +155,42 @@ static PetscInt PathStride(HycoReducer t)
   return 1 + (t->n_s - 1) / MOST_COLUMNS;
 }
 
-/* Adds the elastic part of the training paths: their loads and contact forces at the listed times. Their forces are the
-   very ones that predictions will have. */
-static PetscErrorCode TakePaths(HycoReducer t, HycoBodiesWork o, const HycoBodiesSurface *s, PetscInt every,
-                                Sampled *sampled)
+/* The forces of column k of the training solutions, by row of the contact problem. */
+static PetscErrorCode TakeForces(HycoReducer t, HycoSnapshots store, HycoBodiesFriction friction, PetscInt n,
+                                 PetscInt k, PetscReal L[])
 {
-  const HycoSubstructures b = o->bodies;
+  const PetscInt n_steps = HycoSnapshotsSteps(t->scene);
+  const PetscReal *normal = t->Lambda + (size_t)k * (size_t)n, *all;
+  PetscReal *component, *force;
+  PetscInt n_par;
 
   PetscFunctionBegin;
+  if (!friction) PetscCall(PetscArraycpy(L, normal, n));
+  if (!friction) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoSamplesGet(t->columns, NULL, &n_par, &all));
+  PetscCall(PetscMalloc2(n + 1, &component, 3 * n + 1, &force));
+  for (PetscInt c = 0; c < 3; c++) {
+    PetscCall(
+        HycoSnapshotsReadRows(store, all + k / n_steps * n_par, k % n_steps, HycoSnapshotFriction[c], 0, n, component));
+    for (PetscInt i = 0; i < n; i++) force[3 * i + c] = component[i];
+  }
+  HycoSlipForces(HycoBodiesFrictionSlip(friction), normal, force, L);
+  PetscCall(PetscFree2(component, force));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Adds the elastic part of the training paths: their loads and contact forces at the listed times. Their forces are the
+   very ones that predictions will have. */
+static PetscErrorCode TakePaths(HycoReducer t, HycoSnapshots store, HycoBodiesWork o, const HycoBodiesSurface *s,
+                                HycoBodiesFriction friction, PetscInt every, Sampled *sampled)
+{
+  const HycoSubstructures b = o->bodies;
+  const HycoBodiesSurface *rows = friction ? HycoBodiesFrictionSurface(friction) : s;
+  PetscReal *L;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(rows->n + 1, &L));
+  if (friction) PetscCall(HycoBodiesFrictionBegin(friction));
   for (PetscInt k = 0; k < t->n_s; k += every) {
     PetscReal mu[HYCO_MAX_PARAMETERS];
 
@@ -170,18 +198,23 @@ static PetscErrorCode TakePaths(HycoReducer t, HycoBodiesWork o, const HycoBodie
     PetscCall(HycoFESetParameters(s->fe, mu));
     PetscCall(HycoRowsFill(s->fe, s->pairs, s->rows));
     /* Forces of the training paths are given: no contact problem, only f = B^T L in the bodies' axes. */
-    PetscCall(HycoBodiesPrepare(o, s, mu));
-    HycoBodiesGiven(o, s, t->Lambda + (size_t)k * (size_t)s->pairs->n);
+    if (friction)
+      PetscCall(HycoBodiesFrictionPrepare(friction, o, mu));
+    else
+      PetscCall(HycoBodiesPrepare(o, s, mu));
+    PetscCall(TakeForces(t, store, friction, s->pairs->n, k, L));
+    HycoBodiesGiven(o, rows, L);
     PetscCall(PetscArraycpy(sampled->c + sampled->n * b->r, o->c, b->r));
     PetscCall(PetscArraycpy(sampled->f + sampled->n * b->ns, o->f, b->ns));
     sampled->n++;
   }
+  PetscCall(PetscFree(L));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Rank 0. Online code on the surfaces' mesh, which rank 0 alone has: the samples are those that a prediction would
    find. The work is freed before an error returns. The contact problem on the surfaces alone is far cheaper than one of full order: there can be many samples. */
-static PetscErrorCode SampleForces(HycoReducer t, HycoFOM f, HycoSamples points, Sampled *sampled)
+static PetscErrorCode SampleForces(HycoReducer t, HycoSnapshots store, HycoFOM f, HycoSamples points, Sampled *sampled)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   struct _n_HycoBodiesWork work = {0};
@@ -192,11 +225,12 @@ static PetscErrorCode SampleForces(HycoReducer t, HycoFOM f, HycoSamples points,
 
   PetscFunctionBegin;
   PetscCall(HycoRowsCreate(&f->pairs, b->dim, &rows));
-  if (HycoSceneHasFriction(t->scene)) PetscCall(HycoBodiesFrictionCreate(t->scene, &s, &friction));
+  if (HycoSceneHasFriction(t->scene)) PetscCall(HycoBodiesFrictionCreate(t->scene, &s, b->p, &friction));
   ierr = HycoBodiesSetUp(&work, b, t->scene, friction ? HycoBodiesFrictionSurface(friction) : &s, NULL);
   if (!ierr) ierr = SolvePoints(t, &work, &s, friction, points, sampled);
-  if (!ierr && t->scene->n_times && !friction && !sampled->expanded)
-    ierr = TakePaths(t, &work, &s, PathStride(t), sampled);
+  /* Elastic bodies with friction have enough paths of their own. */
+  if (!ierr && t->scene->n_times && (!friction || HycoBodiesFlow(t)) && !sampled->expanded)
+    ierr = TakePaths(t, store, &work, &s, friction, PathStride(t), sampled);
   PetscCall(HycoBodiesReset(&work));
   PetscCall(HycoBodiesFrictionDestroy(&friction));
   PetscCall(HycoRowsDestroy(&rows));
@@ -209,7 +243,8 @@ static PetscErrorCode SampleForces(HycoReducer t, HycoFOM f, HycoSamples points,
 }
 
 /* The samples on every rank, at `wanted` points or as many as there is room for: *all. Collective. */
-static PetscErrorCode Sample(HycoReducer t, HycoFOM f, PetscInt wanted, PetscBool *all, Sampled *sampled)
+static PetscErrorCode Sample(HycoReducer t, HycoSnapshots store, HycoFOM f, PetscInt wanted, PetscBool *all,
+                             Sampled *sampled)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   const PetscInt nodes = PetscMin(SPREAD, HycoBodiesGrid(b, 0, NULL));
@@ -225,10 +260,8 @@ static PetscErrorCode Sample(HycoReducer t, HycoFOM f, PetscInt wanted, PetscBoo
   PetscCall(HycoSamplesAddPoint(points, b->first));
   if (t->scene->n_parameters) PetscCall(HycoSamplesAddScattered(points, n + CHECKS));
   PetscCall(HycoSamplesGet(points, &n, NULL, NULL));
-  if (HycoSceneHasFriction(t->scene))
-    n *= SEEN;
-  else if (t->scene->n_times)
-    n += 1 + t->n_s / PathStride(t);
+  if (HycoSceneHasFriction(t->scene)) n *= SEEN;
+  if (t->scene->n_times) n += 1 + t->n_s / PathStride(t);
   PetscCall(PetscRealloc(((size_t)n * (size_t)b->r + 1) * sizeof(PetscReal), &sampled->c));
   PetscCall(PetscRealloc(((size_t)n * (size_t)b->ns + 1) * sizeof(PetscReal), &sampled->f));
   {
@@ -237,7 +270,7 @@ static PetscErrorCode Sample(HycoReducer t, HycoFOM f, PetscInt wanted, PetscBoo
 
     PetscCall(HycoCatchBegin());
     /* Not HycoOnRoot(): the points are destroyed on every rank before the error returns. */
-    if (f->rank == 0) caught = SampleForces(t, t->fom, points, sampled);
+    if (f->rank == 0) caught = SampleForces(t, store, t->fom, points, sampled);
     PetscCall(HycoCatchEnd(caught, message));
     ierr = HycoErrorSync(HycoComm(t), caught, message);
   }
@@ -901,15 +934,15 @@ static PetscReal Missed(HycoReducer t)
 
 /* The modes of `wanted` samples, the number `doubled` of doublings; *enough: the samples are many more than the modes of
    any body, which miss little at the checks, or there is no room for more. Collective. */
-static PetscErrorCode ModesOf(HycoReducer t, HycoBodiesFactor *factor, PetscInt wanted, PetscInt doubled,
-                              Sampled *sampled, Mat *V, PetscReal **sigma, PetscBool *enough)
+static PetscErrorCode ModesOf(HycoReducer t, HycoSnapshots store, HycoBodiesFactor *factor, PetscInt wanted,
+                              PetscInt doubled, Sampled *sampled, Mat *V, PetscReal **sigma, PetscBool *enough)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   PetscBool all;
 
   PetscFunctionBegin;
   /* Samples are solutions of the condensed bodies: each costs a dense contact problem and no factor. */
-  PetscCall(Sample(t, factor->fom, wanted, &all, sampled));
+  PetscCall(Sample(t, store, factor->fom, wanted, &all, sampled));
   PetscCall(ExpandAll(t, factor, sampled));
   if (!HycoBodiesFlow(t)) PetscCall(HycoBodiesChooseCells(t, factor)); /* else those with laws are chosen */
   PetscCall(PetscFree(b->mode_start));
@@ -953,7 +986,7 @@ PetscErrorCode HycoBodiesFields(HycoReducer t, HycoSnapshots store, HycoBodiesFa
   for (PetscInt n = HycoTrainingOfBodies(t)->samples, k = 0; !ierr && !enough && k <= DOUBLINGS; n *= 2, k++) {
     PetscCall(MatDestroy(&V));
     PetscCall(PetscFree(sigma));
-    ierr = ModesOf(t, factor, n, k, &sampled, &V, &sigma, &enough);
+    ierr = ModesOf(t, store, factor, n, k, &sampled, &V, &sigma, &enough);
   }
   HycoFreeAll(&sampled.c, &sampled.f, &sampled.U);
   /* Rows of H, a and g for the modes that were kept: only once, after the last doubling. */

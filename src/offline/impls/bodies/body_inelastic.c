@@ -7,7 +7,6 @@
 #include <hycoalgorithms.h>
 #include <hycobodiestraining.h>
 #include <hycoinelasticpoints.h>
-#include <hycokinematics.h>
 
 #define MANY 64 /* right-hand sides at once */
 
@@ -48,11 +47,6 @@ static PetscErrorCode CheckChanges(HycoReducer t)
                    "bodies does not support that: train a hybrid model",
                    s->parameter[shape[0]], parts->name[k]);
   }
-  for (PetscInt k = 0; k < parts->n; k++)
-    HycoCheckModel(!flows[k] || !HycoSceneHasFriction(s),
-                   "the scene has friction, and body %s deforms inelastically; models of bodies with friction are for "
-                   "elastic bodies: use hyco solve",
-                   parts->name[k]);
   PetscCall(PetscFree(flows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -62,9 +56,6 @@ PetscErrorCode HycoBodiesCheckPath(HycoReducer t)
 {
   const HycoScene s = t->scene;
   PetscBool oblique = PETSC_FALSE, rigid = PETSC_FALSE;
-  HycoMotions motions;
-  char name[HYCO_LINE] = "";
-  PetscInt free;
 
   PetscFunctionBegin;
   HycoCheckModel(t->sizes[3] > 1, "-hyco_model_type bodies with a history is for 2D and 3D; in 1D use hybrid");
@@ -75,16 +66,6 @@ PetscErrorCode HycoBodiesCheckPath(HycoReducer t)
                  s->n_ties ? "ties"
                  : rigid   ? "a contact of type rigid"
                            : "a support along a direction");
-  /* With a path a floating body would need its motions among the unknowns of Newton's method. */
-  PetscCall(HycoFEFreeMotions(HycoComm(t), t->fom->fe, &motions));
-  free = motions.n;
-  /* Copied before the motions are destroyed. */
-  if (free) PetscCall(PetscStrncpy(name, motions.name[0], sizeof(name)));
-  PetscCall(HycoMotionsDestroy(&motions));
-  HycoCheckModel(
-      !free || !HycoSceneHasFriction(s),
-      "no support keeps %s, only contact does, which a model of bodies with friction does not support: use hyco solve",
-      name);
   /* Last, because it evaluates expressions over the ranges. */
   PetscCall(CheckChanges(t));
   PetscFunctionReturn(PETSC_SUCCESS);

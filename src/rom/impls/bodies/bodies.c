@@ -44,7 +44,7 @@ PetscErrorCode HycoBodiesDestroyModel(HycoROM m)
 }
 
 /* The residual of equilibrium along the rigid motions that contact alone prevents, relative to the terms of each. */
-static PetscReal Unbalanced(HycoBodiesWork o)
+PetscReal HycoBodiesUnbalanced(HycoBodiesWork o)
 {
   const HycoSubstructures b = o->bodies;
   PetscReal most = 0;
@@ -115,7 +115,7 @@ void HycoBodiesMeasure(HycoROM m, HycoKKT *kkt)
     if (most > 0) both = PetscMax(both, PetscAbsReal(left / gaps * (m->Lambda[k] / most)));
   }
   kkt->rounding = 0;
-  kkt->stationarity = Unbalanced(o);
+  kkt->stationarity = HycoBodiesUnbalanced(o);
   kkt->penetration = gaps > 0 ? in / gaps : 0;
   kkt->adhesion = most > 0 ? pulls / most : 0;
   kkt->complementarity = both;

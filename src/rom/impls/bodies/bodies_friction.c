@@ -1,26 +1,35 @@
 /*
   Coulomb friction between condensed bodies. A contact with friction has a normal row and dim - 1 tangents, as at full
-  order (fom/friction.c); W = sum_b B_b C_b B_b^T has as many. The steps are those of full order, by the same cone and
-  solver: nothing but theta is interpolated. W does not change along a path, so that a step is a small dense problem.
+  order (fom/friction.c); W = sum_b B_b C_b B_b^T has as many. With the rigid motions x that contact alone prevents the
+  forces r of a step solve
+
+      w = q - B P alpha / kappa + W r - G x,     G^T r = f,     r = P(r - rho w),     G = B Z,
+
+  by the same cone and the same method as full order: nothing but theta is interpolated. W does not change along a path,
+  so that a step is a small dense problem. Elastic bodies have no alpha; for the others this is the contact problem at
+  alpha, whose derivative dr / dalpha Newton's method on alpha needs (bodies_newton.c).
 */
 #include "bodies_path.h"
-#include <hycosolverimpl.h>
 
-#define SOLVED 1e-8 /* residual of the contacts */
+#define SOLVED  1e-8 /* residual of the contacts */
+#define ROUNDED 1e-6 /* of a gap without forces, the least size of those that are left */
 
 struct _n_HycoBodiesFriction {
   HycoSlip slip;
   HycoBodiesSurface normal, all; /* without and with tangents */
   HycoRows rows;
   PetscInt *contact; /* by row: of the scene */
-  HycoSystem system;
-  HycoSolver solver;
-  Mat W;                 /* NULL: not computed at these parameters yet */
-  Vec g, L, other;       /* other: a start of the next step */
-  PetscReal *before;     /* by row: forces of the accepted step before the last one */
-  PetscReal *U, *U_old;  /* n_dof: of the surface, at the step and at the last accepted time */
-  PetscReal *w, *forces; /* by row: of the last accepted step */
-  PetscReal most;        /* largest displacement */
+  HycoBlocks *blocks;
+  HycoTao tao;
+  HycoConeFactor factor;
+  PetscInt p;               /* rigid motions */
+  PetscReal *M;             /* p + rows square: [0 G^T; -G W]; NULL: not computed at these parameters yet */
+  PetscReal *q, *z, *ahead; /* p + rows: of the step; its motions and forces; a start of it */
+  PetscReal *pieces;        /* of the laws, when the derivative of the forces was taken */
+  PetscReal *before;        /* by row: forces of the accepted step before the last one */
+  PetscReal *U, *U_old;     /* n_dof: of the surface, at the step and at the last accepted time */
+  PetscReal *w, *forces;    /* by row: of the last accepted step */
+  PetscReal most;           /* largest displacement */
 };
 
 /* Room for the rows with tangents. */
@@ -45,44 +54,50 @@ static PetscErrorCode CreateRows(HycoBodiesFriction f)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The solver is always semismooth: the active set of other scenes has no cone. An error leaves a handle that
+/* The method is always semismooth: the active set of other scenes has no cone. An error leaves a handle that
    HycoBodiesFrictionDestroy() frees. */
-PetscErrorCode HycoBodiesFrictionCreate(HycoScene scene, const HycoBodiesSurface *surface, HycoBodiesFriction *friction)
+PetscErrorCode HycoBodiesFrictionCreate(HycoScene scene, const HycoBodiesSurface *surface, PetscInt p,
+                                        HycoBodiesFriction *friction)
 {
   HycoBodiesFriction f;
+  PetscInt n;
 
   PetscFunctionBegin;
   PetscCall(PetscNew(friction));
   f = *friction;
   f->normal = *surface;
+  f->p = p;
   PetscCall(HycoSlipCreate(PETSC_COMM_SELF, scene, surface->pairs, surface->fe->dim, &f->slip));
   /* Rows of normals and tangents, whose number fixes the sizes below. */
   PetscCall(CreateRows(f));
+  n = p + f->all.n;
   PetscCall(PetscCalloc1(surface->fe->n_dof, &f->U));
   PetscCall(PetscCalloc1(surface->fe->n_dof, &f->U_old));
-  PetscCall(PetscCalloc1(f->all.n + 1, &f->w));
-  PetscCall(PetscCalloc1(f->all.n + 1, &f->forces));
-  PetscCall(PetscCalloc1(f->all.n + 1, &f->before));
-  PetscCall(VecCreateSeq(PETSC_COMM_SELF, f->all.n, &f->L));
-  PetscCall(VecDuplicate(f->L, &f->g));
-  PetscCall(VecDuplicate(f->L, &f->other));
-  PetscCall(HycoSystemCreate(PETSC_COMM_SELF, &f->system));
-  PetscCall(HycoSolverCreate(PETSC_COMM_SELF, &f->solver));
-  PetscCall(HycoSolverSetType(f->solver, HYCO_SOLVER_SEMISMOOTH));
+  PetscCall(PetscCalloc1(n + 1, &f->w));
+  PetscCall(PetscCalloc1(n + 1, &f->forces));
+  PetscCall(PetscCalloc1(n + 1, &f->before));
+  PetscCall(PetscCalloc1(n + 1, &f->q));
+  PetscCall(PetscCalloc1(n + 1, &f->z));
+  PetscCall(PetscCalloc1(n + 1, &f->ahead));
+  PetscCall(HycoConeFactorCreate(&f->factor));
+  PetscCall(HycoTaoCreate(PETSC_COMM_SELF, NULL, &f->tao));
+  PetscCall(HycoTaoSetType(f->tao, HYCO_TAO_SEMISMOOTH_NEWTON, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* In the opposite order of creation: the solver refers to the system, and the system to W and g. */
 PetscErrorCode HycoBodiesFrictionDestroy(HycoBodiesFriction *friction)
 {
   HycoBodiesFriction f = *friction;
 
   PetscFunctionBegin;
   if (!f) PetscFunctionReturn(PETSC_SUCCESS);
-  HycoDestroyAll(&f->solver, &f->system, &f->W, &f->g, &f->L, &f->other);
+  PetscCall(HycoTaoDestroy(&f->tao));
+  PetscCall(HycoConeFactorDestroy(&f->factor));
+  PetscCall(HycoBlocksDestroy(&f->blocks)); /* before the cones, which they refer to */
   PetscCall(HycoSlipDestroy(&f->slip));
   PetscCall(HycoRowsDestroy(&f->rows));
-  HycoFreeAll(&f->contact, &f->U, &f->U_old, &f->w, &f->forces, &f->before, friction);
+  HycoFreeAll(&f->contact, &f->M, &f->pieces, &f->q, &f->z, &f->ahead, &f->U, &f->U_old, &f->w, &f->forces, &f->before,
+              friction);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -100,39 +115,26 @@ PetscErrorCode HycoBodiesFrictionBegin(HycoBodiesFriction f)
   PetscCall(HycoSlipBegin(&f->slip));
   PetscCall(PetscArrayzero(f->U_old, f->normal.fe->n_dof));
   PetscCall(PetscArrayzero(f->forces, f->all.n));
-  PetscCall(VecSet(f->L, 0));
-  PetscCall(MatDestroy(&f->W)); /* of other parameters */
+  PetscCall(PetscFree(f->M)); /* of other parameters */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* W of all rows, from the columns that are kept while the rows are the same. */
-static PetscErrorCode Flexibility(HycoBodiesFriction f, HycoBodiesWork o)
+/* W of all rows, also of open contacts, since the path keeps it for all of its steps; from the columns that are kept while
+   the rows are the same. */
+static PetscErrorCode Condense(HycoBodiesFriction f, HycoBodiesWork o)
 {
   const PetscInt n = f->all.n;
   PetscInt *row;
-  PetscScalar *W;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(n + 1, &row));
-  /* All rows, also of open contacts: the path keeps W for all of its steps. */
   for (PetscInt k = 0; k < n; k++) row[k] = k;
   /* Without this the first step of a path would find that its rows are new and keep nothing. */
   if (!o->kept.same) PetscCall(HycoBodiesKeepRows(o, n)); /* those of now */
-  PetscCall(HycoBodiesKeep(o, n, row));
-  /* HycoBodiesKeep() gives up where the columns exceed the memory that is allowed. */
-  HycoCheck(o->kept.same,
-            "the flexibility of %d contacts with friction needs more memory than a model of bodies takes; "
-            "use a coarser mesh there, or hyco solve",
-            (int)f->slip.n);
-  PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, n, n, NULL, &f->W));
-  PetscCall(MatDenseGetArray(f->W, &W));
-  for (PetscInt k = 0; k < n; k++) HycoBodiesKeptRow(o, k, n, row, W + (size_t)k * (size_t)n);
-  for (PetscInt k = 0; k < n; k++) { /* symmetric to the last digit */
-    for (PetscInt j = 0; j < k; j++) W[(size_t)k * (size_t)n + (size_t)j] = W[(size_t)j * (size_t)n + (size_t)k];
-  }
-  PetscCall(MatDenseRestoreArray(f->W, &W));
+  PetscCall(PetscMalloc1(PetscSqr((size_t)(f->p + n)) + 1, &f->M));
+  PetscCall(HycoBodiesMatrix(o, n, row, f->M));
+  HycoConeFactorForget(f->factor);
   PetscCall(PetscFree(row));
-  PetscCall(HycoSystemSetFlexibility(f->system, f->W, f->g));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -162,16 +164,13 @@ PetscErrorCode HycoBodiesFrictionPrepare(HycoBodiesFriction f, HycoBodiesWork o,
   PetscCall(HycoContactTangentRows(s->fe, s->pairs, f->slip.row, f->U_old, f->slip.tangent, f->rows.start, f->rows.dof,
                                    f->rows.value, f->rows.gap));
   PetscCall(HycoBodiesPrepare(o, &f->all, mu));
-  /* W is constant along a path; gaps and coefficients change with every step. */
-  if (!f->W) PetscCall(Flexibility(f, o));
-  PetscCall(HycoVecWrite(f->g, f->all.n, o->gap));
-  /* After the coefficients: the cones' data are copied with the blocks. */
-  PetscCall(HycoSystemSetBlocks(f->system, 2, f->slip.cone, f->slip.n, f->slip.of, f->slip.data));
+  PetscCall(HycoBlocksDestroy(&f->blocks)); /* of other coefficients */
+  PetscCall(HycoBlocksCreate(2, f->slip.cone, f->slip.n, f->slip.of, f->slip.data, &f->blocks));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* w = D - B U of the displacements found, and the residuals of the natural map at it. */
-static PetscErrorCode Measure(HycoBodiesFriction f, const PetscReal L[], HycoKKT *kkt)
+static PetscErrorCode Measure(HycoBodiesFriction f, HycoBodiesWork o, const PetscReal L[], HycoKKT *kkt)
 {
   PetscReal size = 0, force = 0;
   HycoNaturalMap map;
@@ -185,92 +184,152 @@ static PetscErrorCode Measure(HycoBodiesFriction f, const PetscReal L[], HycoKKT
       terms += PetscAbsReal(f->rows.value[e] * f->U[f->rows.dof[e]]);
     }
     f->w[k] = f->rows.gap[k] - bu;
-    if (f->rows.start[k] < f->rows.start[k + 1]) size = PetscMax(size, PetscMax(PetscAbsReal(f->rows.gap[k]), terms));
     force = PetscMax(force, PetscAbsReal(L[k]));
+    if (f->rows.start[k] == f->rows.start[k + 1]) continue;
+    size = PetscMax(size, PetscMax(PetscAbsReal(f->rows.gap[k]), terms));
+    /* Where all contacts stick without a gap, nothing moves, and what is left is the round-off of gaps without forces. */
+    size = PetscMax(size, ROUNDED * PetscAbsReal(o->gap[k]));
   }
   f->most = 0;
   for (PetscInt i = 0; i < f->normal.fe->n_dof; i++) f->most = PetscMax(f->most, PetscAbsReal(f->U[i]));
   *kkt = (HycoKKT){0};
   if (!(force > 0)) force = 1;
   /* rho = force / gap makes both arguments of the projection equally large in the units of forces. */
-  PetscCall(HycoBlocksNaturalMap(f->system->blocks, size > 0 ? force / size : 1, L, f->w, &map));
+  PetscCall(HycoBlocksNaturalMap(f->blocks, size > 0 ? force / size : 1, L, f->w, &map));
   kkt->penetration = map.missing / force;
   kkt->adhesion = map.outside / force;
   kkt->complementarity = map.map / force;
+  kkt->stationarity = HycoBodiesUnbalanced(o);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The start is the accepted forces of the last step, not those of an attempt: a halved step must give what it
-   would have given at once. Displacements follow from the forces by the bodies' flexibilities, and the residuals
-   from both, not from the solver's word. */
-PetscErrorCode HycoBodiesFrictionSolve(HycoBodiesFriction f, HycoBodiesWork o, PetscReal t, HycoKKT *kkt, PetscInt *its,
-                                       PetscBool *solved)
+/* The problem at alpha (NULL: elastic bodies). The first start of a step is the accepted forces of the last one, not
+   those of an attempt: a halved step must give what it would have given at once. `again`: at another alpha of the same
+   step, from the forces found there. */
+PetscErrorCode HycoBodiesFrictionTouch(HycoBodiesFriction f, HycoBodiesWork o, PetscReal t, const PetscReal alpha[],
+                                       PetscBool again, PetscInt *its, PetscBool *solved)
 {
-  const HycoFE fe = f->normal.fe;
-  PetscScalar *L;
-  HycoReason reason;
-  PetscBool extrapolated;
+  const PetscInt n = f->all.n, p = f->p;
+  HycoLCP lcp = {.n = n,
+                 .p = p,
+                 .q = f->q,
+                 .symmetric = PETSC_TRUE,
+                 .blocks = f->blocks,
+                 .cone = f->factor,
+                 .warm = PETSC_TRUE,
+                 .given = PETSC_TRUE};
 
   PetscFunctionBegin;
-  PetscCall(VecGetArray(f->other, &L));
-  extrapolated = HycoSlipExtrapolate(&f->slip, t, f->all.n, f->forces, f->before, L);
-  PetscCall(VecRestoreArray(f->other, &L));
-  PetscCall(VecGetArray(f->L, &L));
-  PetscCall(PetscArraycpy(L, f->forces, f->all.n)); /* a step that was refused leaves no trace */
-  PetscCall(VecRestoreArray(f->L, &L));
-  PetscCall(HycoSolverSetSystem(f->solver, f->system));
-  PetscCall(HycoSolverSetOtherStart(f->solver, extrapolated ? f->other : NULL));
-  PetscCall(HycoSolverSolve(f->solver, NULL, f->L));
-  PetscCall(HycoSolverGetReason(f->solver, &reason));
-  /* What follows is done for forces that did not converge too: their residuals are reported. */
-  PetscCall(HycoSolverGetIterations(f->solver, its));
-  PetscCall(VecGetArray(f->L, &L));
-  HycoBodiesGiven(o, &f->all, L);
+  if (!f->M) PetscCall(Condense(f, o));
+  lcp.M = f->M;
+  if (alpha) PetscCall(HycoBodiesStrain(o, &f->all, alpha));
+  for (PetscInt i = 0; i < p; i++) {
+    f->q[i] = 0;
+    for (PetscInt j = 0; j < o->bodies->r; j++) f->q[i] -= o->work[i * o->bodies->r + j] * o->c[j];
+  }
+  PetscCall(PetscArraycpy(f->q + p, o->gap, n));
+  if (!again) {
+    PetscCall(PetscArrayzero(f->z, p));
+    PetscCall(PetscArraycpy(f->z + p, f->forces, n)); /* a step that was refused leaves no trace */
+    if (HycoSlipExtrapolate(&f->slip, t, n, f->forces, f->before, f->ahead + p)) lcp.other = f->ahead;
+  }
+  PetscCall(HycoTaoSolveLCP(f->tao, &lcp, NULL, f->z, its, solved));
+  PetscCall(HycoBlocksAdmit(f->blocks, f->z + p)); /* inadmissible by round-off; residuals are recomputed */
+  PetscCall(PetscArraycpy(o->x, f->z, p));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Displacements follow from the forces by the bodies' flexibilities, and the residuals from both, not from the solver's
+   word. */
+PetscErrorCode HycoBodiesFrictionMove(HycoBodiesFriction f, HycoBodiesWork o, HycoKKT *kkt)
+{
+  const HycoFE fe = f->normal.fe;
+
+  PetscFunctionBegin;
+  HycoBodiesGiven(o, &f->all, f->z + f->p);
   PetscCall(PetscArraycpy(f->U, fe->u0, fe->n_dof));
   HycoBodiesMove(o, &f->all, f->U);
   HycoFEComplete(fe, f->U);
-  PetscCall(Measure(f, L, kkt));
-  PetscCall(VecRestoreArray(f->L, &L));
-  *solved = (PetscBool)(reason > 0 && HycoKKTMax(kkt) <= SOLVED);
+  PetscCall(Measure(f, o, f->z + f->p, kkt));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A step of elastic bodies. What follows a solve is done for forces that did not converge too: their residuals are
+   reported. */
+PetscErrorCode HycoBodiesFrictionSolve(HycoBodiesFriction f, HycoBodiesWork o, PetscReal t, HycoKKT *kkt, PetscInt *its,
+                                       PetscBool *solved)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoBodiesFrictionTouch(f, o, t, NULL, PETSC_FALSE, its, solved));
+  PetscCall(HycoBodiesFrictionMove(f, o, kkt));
+  *solved = (PetscBool)(*solved && HycoKKTMax(kkt) <= SOLVED);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The forces by row. Borrowed. */
+const PetscReal *HycoBodiesFrictionForces(HycoBodiesFriction f)
+{
+  return f->z + f->p;
+}
+
+/* The rows of the contacts with a force, and Z. Exact while no contact opens, closes, or changes between stick and slip,
+   and in 2D; in 3D the direction of a slip turns. Nothing is done while the pieces are the same. */
+PetscErrorCode HycoBodiesFrictionDerive(HycoBodiesFriction f, PetscInt m, const PetscReal BP[], PetscBool *changed,
+                                        PetscInt *n_set, PetscInt set[], PetscReal **Z, PetscBool *regular)
+{
+  const PetscInt n = f->all.n, p = f->p;
+  const PetscReal *pieces;
+  PetscReal *dq, *dz;
+  PetscInt n_pieces;
+
+  PetscFunctionBegin;
+  *regular = PETSC_TRUE;
+  HycoConeFactorGetPieces(f->factor, &n_pieces, &pieces);
+  if (!*changed) {
+    PetscBool same;
+
+    PetscCall(PetscArraycmp(pieces, f->pieces, n_pieces, &same));
+    if (same) PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  *changed = PETSC_TRUE;
+  PetscCall(PetscFree(f->pieces));
+  HycoDuplicate(n_pieces + 1, pieces, &f->pieces);
+  *n_set = 0;
+  for (PetscInt k = 0; k < f->slip.n; k++) {
+    for (PetscInt i = f->slip.row[k]; i < f->slip.row[k + 1] && f->z[p + f->slip.row[k]] > 0; i++) set[(*n_set)++] = i;
+  }
+  PetscCall(PetscFree(*Z));
+  PetscCall(PetscMalloc1(*n_set * m + 1, Z));
+  PetscCall(PetscCalloc2(p + n + 1, &dq, p + n + 1, &dz));
+  /* Without a force there is nothing to derive, and floating bodies have no place. */
+  for (PetscInt j = 0; j < m && *n_set && *regular; j++) {
+    for (PetscInt k = 0; k < n; k++) dq[p + k] = -BP[k * m + j];
+    PetscCall(HycoConeFactorTangent(f->factor, dq, dz, regular));
+    for (PetscInt k = 0; k < *n_set; k++) (*Z)[k * m + j] = dz[p + set[k]];
+  }
+  PetscCall(PetscFree2(dq, dz));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Slip, forces and displacements change here only, so that a halved step repeats from the same state. */
 PetscErrorCode HycoBodiesFrictionAccept(HycoBodiesFriction f, PetscReal t)
 {
-  const PetscScalar *L;
+  const PetscReal *L = f->z + f->p;
 
   PetscFunctionBegin;
-  PetscCall(VecGetArrayRead(f->L, &L));
   HycoSlipAdd(&f->slip, L, f->w, f->most);
   /* The last two accepted forces, in this order: the next step extrapolates from them. */
   PetscCall(PetscArraycpy(f->before, f->forces, f->all.n));
   PetscCall(PetscArraycpy(f->forces, L, f->all.n));
   HycoSlipTake(&f->slip, t);
-  PetscCall(VecRestoreArrayRead(f->L, &L));
   PetscCall(PetscArraycpy(f->U_old, f->U, f->normal.fe->n_dof));
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Back to the accepted forces after a refused step; displacements of the bodies are made from them. */
-void HycoBodiesFrictionRestore(HycoBodiesFriction f, HycoBodiesWork o)
-{
-  PetscScalar *L;
-
-  PetscCallVoid(VecGetArray(f->L, &L));
-  PetscCallVoid(PetscArraycpy(L, f->forces, f->all.n));
-  HycoBodiesGiven(o, &f->all, L);
-  PetscCallVoid(VecRestoreArray(f->L, &L));
 }
 
 /* The first row of each contact is its normal one. */
 void HycoBodiesFrictionNormal(HycoBodiesFriction f, PetscReal Lambda[])
 {
-  const PetscScalar *L;
-
-  PetscCallVoid(VecGetArrayRead(f->L, &L));
-  for (PetscInt k = 0; k < f->slip.n; k++) Lambda[k] = L[f->slip.row[k]];
-  PetscCallVoid(VecRestoreArrayRead(f->L, &L));
+  for (PetscInt k = 0; k < f->slip.n; k++) Lambda[k] = f->z[f->p + f->slip.row[k]];
 }
 
 /* Borrowed, for outputs and fields: slip, states and work since the path began. */
@@ -279,8 +338,13 @@ const HycoSlip *HycoBodiesFrictionSlip(HycoBodiesFriction f)
   return &f->slip;
 }
 
-/* sign < 0: the determinant of the last Newton matrix is negative, so that the solution is one of several. */
-PetscBool HycoBodiesFrictionDisproven(HycoBodiesFriction f)
+/* Of the solution that is accepted; needs a factor, which the next step begins with. */
+PetscErrorCode HycoBodiesFrictionDisproven(HycoBodiesFriction f, PetscBool *disproven)
 {
-  return (PetscBool)(f->solver->sign < 0);
+  PetscInt sign;
+
+  PetscFunctionBegin;
+  PetscCall(HycoConeFactorSign(f->factor, &sign));
+  *disproven = (PetscBool)(sign < 0);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -16,6 +16,12 @@
   Rigid motions x that contact alone prevents do not strain the points. On a set, with G = B Z of the motions and f the
   work of the loads on them, W_aa L - G x = B P alpha - w and G^T L = f. W_aa is factored with rho G G^T added, which
   keeps L and moves x by rho f: alone it may be singular where the pins of a body's flexibility are.
+
+  With friction the forces are those of the contact problem at alpha (bodies_friction.c), L(alpha), and the set is their
+  linear map L_k + Z (alpha - alpha_k) on the states found there: which contacts are open, stick or slip. A round is the same
+  small problem on that map, then the contact problem at the new alpha; it was the last one if the forces are those of the
+  map. Where no state changes, and in 2D, the map is exact, and most steps take one round; in 3D the directions of slip turn,
+  and rounds are a Newton's method. States that change in every round end the step, which is halved.
 */
 #include "bodies_path.h"
 
@@ -24,6 +30,7 @@
 #define HALVINGS  6     /* of a step of Newton's method */
 #define CONTRACTS 0.2   /* of the residual in an iteration: more, and the tangent is made again */
 #define VIOLATED  1e-11 /* share of the largest force or gap: less is round-off */
+#define AGREES    1e-9  /* share of the largest force: forces with friction are those of the linear map */
 
 /* y = beta y + factor A x of a table by rows, n x l; transposed: A^T x. BLAS sees a table by rows as its transpose by
    columns, hence the exchanged letters. */
@@ -57,7 +64,7 @@ PetscErrorCode HycoBodiesForget(HycoROM m)
   HycoBodiesPath w = (HycoBodiesPath)m->work;
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; w->column && k < m->model->pairs.n; k++) PetscCall(PetscFree(w->column[k]));
+  for (PetscInt k = 0; w->column && k < w->surface.n; k++) PetscCall(PetscFree(w->column[k]));
   HycoBodiesRestart(m);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -108,7 +115,7 @@ static PetscErrorCode Column(HycoROM m, PetscInt k)
   const HycoBodiesWork o = &w->bodies;
   const HycoSubstructures b = o->bodies;
   HycoBodiesInelastic in = b->inelastic;
-  const PetscInt n = m->model->pairs.n;
+  const PetscInt n = w->gaps;
   PetscReal *y, *cells;
 
   PetscFunctionBegin;
@@ -117,7 +124,7 @@ static PetscErrorCode Column(HycoROM m, PetscInt k)
      displacements of their cells. */
   PetscCall(PetscCalloc1(n + w->n_rows + in->nd + 1, &w->column[k]));
   PetscCall(PetscMalloc1(b->ns + 1, &y));
-  Push(o, k, y);
+  if (n) Push(o, k, y);
   for (PetscInt j = 0; j < n; j++) {
     for (PetscInt e = o->row_start[j]; e < o->row_start[j + 1]; e++) w->column[k][j] -= o->row[e] * y[o->row_at[e]];
   }
@@ -174,16 +181,16 @@ PetscErrorCode HycoBodiesScale(HycoROM m)
 
   PetscFunctionBegin;
   PetscCall(TakePoints(m));
-  PetscCall(PetscArrayzero(w->BP, m->model->pairs.n * l));
-  for (PetscInt k = 0; k < m->model->pairs.n; k++) {
+  PetscCall(PetscArrayzero(w->BP, w->surface.n * l));
+  for (PetscInt k = 0; k < w->surface.n; k++) {
     for (PetscInt e = o->row_start[k]; e < o->row_start[k + 1]; e++) {
       const PetscReal value = o->row[e] / o->kappa[HycoBodiesAt(b, o->row_at[e])];
 
       for (PetscInt j = 0; j < l; j++) w->BP[k * l + j] += value * in->P[o->row_at[e] * l + j];
     }
   }
-  PetscCall(PetscArrayzero(w->G, m->model->pairs.n * b->p));
-  for (PetscInt k = 0; k < m->model->pairs.n; k++) {
+  PetscCall(PetscArrayzero(w->G, w->surface.n * b->p));
+  for (PetscInt k = 0; k < w->surface.n; k++) {
     for (PetscInt e = o->row_start[k]; e < o->row_start[k + 1]; e++)
       HycoBodiesAdd(b->p, o->row[e], o->Z + o->row_at[e] * b->p, w->G + k * b->p);
   }
@@ -349,8 +356,8 @@ static PetscErrorCode Balance(HycoBodiesPath w, PetscInt p, PetscInt k, const Pe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* S = response + the strains of the forces Z. first: where strains begin in a column. */
-static PetscErrorCode AddForces(const HycoBodiesPath w, PetscInt l, PetscInt first)
+/* S = response + the strains of the forces Z. */
+static PetscErrorCode AddForces(const HycoBodiesPath w, PetscInt l)
 {
   const PetscReal one = 1;
   PetscReal *strain;
@@ -362,7 +369,7 @@ static PetscErrorCode AddForces(const HycoBodiesPath w, PetscInt l, PetscInt fir
   if (!w->n_set || !l || !w->n_rows) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1((size_t)w->n_set * (size_t)w->n_rows, &strain));
   for (PetscInt i = 0; i < w->n_set; i++)
-    PetscCall(PetscArraycpy(strain + i * w->n_rows, w->column[w->set[i]] + first, w->n_rows));
+    PetscCall(PetscArraycpy(strain + i * w->n_rows, w->column[w->set[i]] + w->gaps, w->n_rows));
   PetscCall(PetscBLASIntCast(w->n_rows, &rows));
   PetscCall(PetscBLASIntCast(l, &modes));
   PetscCall(PetscBLASIntCast(w->n_set, &n));
@@ -376,7 +383,7 @@ static PetscErrorCode AddForces(const HycoBodiesPath w, PetscInt l, PetscInt fir
 static PetscErrorCode TakeSet(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
-  const PetscInt l = w->bodies.bodies->inelastic->m, n = m->model->pairs.n;
+  const PetscInt l = w->bodies.bodies->inelastic->m;
 
   PetscFunctionBegin;
   w->factored = PETSC_FALSE;
@@ -387,7 +394,7 @@ static PetscErrorCode TakeSet(HycoROM m)
   for (PetscInt i = 0; i < w->n_set; i++) PetscCall(PetscArraycpy(w->Z + i * l, w->BP + w->set[i] * l, l));
   PetscCall(TakeMotions(w, w->bodies.bodies->p));
   PetscCall(Balance(w, w->bodies.bodies->p, l, NULL, w->Z, w->x));
-  PetscCall(AddForces(w, l, n));
+  PetscCall(AddForces(w, l));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -407,7 +414,7 @@ PetscErrorCode HycoBodiesMoveCells(HycoROM m, const PetscReal alpha[], const Pet
   for (PetscInt i = 0; i < in->nd; i++) cells[i] /= w->bodies.kappa[in->body[i]];
   PetscCall(Multiply(PETSC_FALSE, in->nd, b->p, in->Z, w->bodies.x, 1, 1, cells));
   for (PetscInt i = 0; i < w->n_set; i++) {
-    HycoBodiesAdd(in->nd, Lambda[w->set[i]], w->column[w->set[i]] + m->model->pairs.n + w->n_rows, cells);
+    HycoBodiesAdd(in->nd, Lambda[w->set[i]], w->column[w->set[i]] + w->gaps + w->n_rows, cells);
   }
   /* Only the points' cells have displacements afterwards; elsewhere u keeps the prescribed values alone. */
   PetscCall(PetscArraycpy(w->u, m->fe->u0, m->fe->n_dof));
@@ -432,31 +439,40 @@ static void AddSupports(HycoROM m, PetscReal e[])
   }
 }
 
+/* e0, the strains of the points at alpha = 0, with the forces z. */
+static PetscErrorCode TakeStrainsOfLoads(HycoROM m)
+{
+  HycoBodiesPath w = (HycoBodiesPath)m->work;
+  const HycoBodiesWork o = &w->bodies;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(w->e0, w->n_rows));
+  PetscCall(Multiply(PETSC_FALSE, w->n_rows, o->bodies->r, w->loads, o->c, 1, 0, w->e0));
+  AddSupports(m, w->e0);
+  for (PetscInt k = 0; k < w->n_set; k++) HycoBodiesAdd(w->n_rows, w->z[k], w->column[w->set[k]] + w->gaps, w->e0);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The part of the loads: forces and strains of the points at alpha = 0. */
 static PetscErrorCode TakeLoads(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   const HycoBodiesWork o = &w->bodies;
-  const HycoBodiesSurface s = HycoBodiesSurfaceOf(m);
   const PetscInt p = o->bodies->p, r = o->bodies->r;
   PetscReal *work;
 
   PetscFunctionBegin;
   PetscCall(PetscFree(w->z));
   PetscCall(PetscMalloc1(w->n_set + 1, &w->z));
-  PetscCall(HycoBodiesStrain(o, &s, NULL));
-  PetscCall(PetscArraycpy(w->gap, o->gap, m->model->pairs.n));
+  PetscCall(HycoBodiesStrain(o, &w->surface, NULL));
+  PetscCall(PetscArraycpy(w->gap, o->gap, w->surface.n));
   /* At alpha = 0 the set's forces close the gaps that the loads leave: W_aa z = -w. */
   for (PetscInt i = 0; i < w->n_set; i++) w->z[i] = -o->gap[w->set[i]];
   PetscCall(PetscCalloc1(p + 1, &work));
   PetscCall(Multiply(PETSC_FALSE, p, r, o->work, o->c, 1, 0, work));
   PetscCall(Balance(w, p, 1, work, w->z, w->x0));
   PetscCall(PetscFree(work));
-  PetscCall(PetscArrayzero(w->e0, w->n_rows));
-  PetscCall(Multiply(PETSC_FALSE, w->n_rows, o->bodies->r, w->loads, o->c, 1, 0, w->e0));
-  AddSupports(m, w->e0);
-  for (PetscInt k = 0; k < w->n_set; k++)
-    HycoBodiesAdd(w->n_rows, w->z[k], w->column[w->set[k]] + m->model->pairs.n, w->e0);
+  PetscCall(TakeStrainsOfLoads(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -464,7 +480,7 @@ static PetscErrorCode TakeLoads(HycoROM m)
 static PetscErrorCode ChooseSet(HycoROM m, const PetscReal Lambda[], PetscBool *same)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
-  const PetscInt n = m->model->pairs.n;
+  const PetscInt n = w->surface.n;
   PetscInt count = 0, kept = 0;
 
   PetscFunctionBegin;
@@ -492,9 +508,9 @@ static PetscErrorCode Check(HycoROM m, const PetscReal alpha[], PetscReal Lambda
 
   PetscFunctionBegin;
   *violated = PETSC_FALSE;
-  PetscCall(PetscArrayzero(Lambda, m->model->pairs.n));
-  PetscCall(PetscArraycpy(o->gap, w->gap, m->model->pairs.n)); /* gap -= B P alpha */
-  PetscCall(Multiply(PETSC_FALSE, m->model->pairs.n, l, w->BP, alpha, -1, 1, o->gap));
+  PetscCall(PetscArrayzero(Lambda, w->surface.n));
+  PetscCall(PetscArraycpy(o->gap, w->gap, w->surface.n)); /* gap -= B P alpha */
+  PetscCall(Multiply(PETSC_FALSE, w->surface.n, l, w->BP, alpha, -1, 1, o->gap));
   /* The forces are affine in alpha, as the strains are: no solve. */
   for (PetscInt i = 0; i < w->n_set; i++) {
     PetscReal *force = &Lambda[w->set[i]];
@@ -503,7 +519,7 @@ static PetscErrorCode Check(HycoROM m, const PetscReal alpha[], PetscReal Lambda
     for (PetscInt k = 0; k < l; k++) *force += w->Z[i * l + k] * alpha[k];
     most = PetscMax(most, PetscAbsReal(*force));
   }
-  for (PetscInt k = 0; k < m->model->pairs.n; k++) {
+  for (PetscInt k = 0; k < w->surface.n; k++) {
     /* The scale of a violation is the largest gap without forces: near closure all gaps are round-off. */
     if (o->row_start[k] < o->row_start[k + 1]) size = PetscMax(size, PetscAbsReal(o->gap[k]));
   }
@@ -511,8 +527,8 @@ static PetscErrorCode Check(HycoROM m, const PetscReal alpha[], PetscReal Lambda
     o->x[d] = w->x0[d];
     for (PetscInt k = 0; k < l; k++) o->x[d] += w->x[d * l + k] * alpha[k];
   }
-  PetscCall(Multiply(PETSC_FALSE, m->model->pairs.n, p, w->G, o->x, -1, 1, o->gap));
-  for (PetscInt k = 0; k < m->model->pairs.n; k++) {
+  PetscCall(Multiply(PETSC_FALSE, w->surface.n, p, w->G, o->x, -1, 1, o->gap));
+  for (PetscInt k = 0; k < w->surface.n; k++) {
     PetscReal gap = o->gap[k];
 
     if (Lambda[k] < -VIOLATED * most) *violated = PETSC_TRUE;
@@ -694,7 +710,9 @@ static PetscErrorCode Newton(HycoROM m, PetscReal t0, PetscReal t1, PetscReal al
 /* Without a force there is no set to begin with, as in the first step of a path or after a contact has opened. */
 static PetscBool Presses(HycoROM m, const PetscReal Lambda[])
 {
-  for (PetscInt k = 0; k < m->model->pairs.n; k++) {
+  const HycoBodiesPath w = (HycoBodiesPath)m->work;
+
+  for (PetscInt k = 0; k < w->surface.n; k++) {
     if (Lambda[k] > 0) return PETSC_TRUE;
   }
   return PETSC_FALSE;
@@ -704,12 +722,11 @@ static PetscBool Presses(HycoROM m, const PetscReal Lambda[])
 static PetscErrorCode Contacts(HycoROM m, const PetscReal alpha[], PetscReal Lambda[], HycoStepAttempt *a)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
-  const HycoBodiesSurface s = HycoBodiesSurfaceOf(m);
   PetscBool solved;
 
   PetscFunctionBegin;
-  PetscCall(HycoBodiesStrain(&w->bodies, &s, alpha));
-  PetscCall(HycoBodiesContact(&w->bodies, &s, Lambda, &solved));
+  PetscCall(HycoBodiesStrain(&w->bodies, &w->surface, alpha));
+  PetscCall(HycoBodiesContact(&w->bodies, &w->surface, Lambda, &solved));
   /* Reported as iterations of contact problems, apart from those of Newton's method. */
   a->active_its += w->bodies.its;
   if (!solved) HycoFormat(a->why, "the contact problem has no solution");
@@ -733,13 +750,115 @@ static PetscErrorCode Choose(HycoROM m, const PetscReal alpha[], PetscReal Lambd
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* -- friction -- */
+
+/* Force i of the set by the linear map. */
+static PetscReal Mapped(const HycoBodiesPath w, PetscInt l, PetscInt i, const PetscReal alpha[])
+{
+  PetscReal force = w->z[i];
+
+  for (PetscInt k = 0; k < l; k++) force += w->Z[i * l + k] * alpha[k];
+  return force;
+}
+
+/* The linear map at the contact problem's solution for alpha, and the strains with it. */
+static PetscErrorCode TakeStates(HycoROM m, const PetscReal alpha[], HycoStepAttempt *a)
+{
+  HycoBodiesPath w = (HycoBodiesPath)m->work;
+  const PetscInt l = w->bodies.bodies->inelastic->m;
+  const PetscReal *L = HycoBodiesFrictionForces(w->friction);
+  PetscBool changed = w->fresh, regular;
+
+  PetscFunctionBegin;
+  PetscCall(HycoBodiesFrictionDerive(w->friction, l, w->BP, &changed, &w->n_set, w->set, &w->Z, &regular));
+  if (!regular) HycoFormat(a->why, "the contact forces with friction have no derivative");
+  w->fresh = (PetscBool)!regular;
+  if (changed) {
+    w->factored = PETSC_FALSE;
+    for (PetscInt k = 0; k < w->n_set; k++) PetscCall(Column(m, w->set[k]));
+    PetscCall(AddForces(w, l));
+    PetscCall(PetscFree(w->z));
+    PetscCall(PetscMalloc1(w->n_set + 1, &w->z));
+  }
+  for (PetscInt i = 0; i < w->n_set; i++) {
+    w->z[i] = 0;
+    w->z[i] = L[w->set[i]] - Mapped(w, l, i, alpha);
+  }
+  PetscCall(TakeStrainsOfLoads(m));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether the forces at alpha are those of the linear map. */
+static PetscBool Agrees(HycoROM m, const PetscReal alpha[])
+{
+  HycoBodiesPath w = (HycoBodiesPath)m->work;
+  const PetscReal *L = HycoBodiesFrictionForces(w->friction);
+  PetscReal most = 0, apart = 0;
+  PetscInt i = 0;
+
+  for (PetscInt k = 0; k < w->surface.n; k++) {
+    PetscReal force = 0;
+
+    if (i < w->n_set && w->set[i] == k) force = Mapped(w, w->bodies.bodies->inelastic->m, i++, alpha);
+    most = PetscMax(most, PetscAbsReal(L[k]));
+    apart = PetscMax(apart, PetscAbsReal(L[k] - force));
+  }
+  return (PetscBool)(apart <= AGREES * most);
+}
+
+/* The contact problem at alpha. */
+static PetscErrorCode Touch(HycoROM m, PetscReal t1, const PetscReal alpha[], PetscBool again, HycoStepAttempt *a)
+{
+  HycoBodiesPath w = (HycoBodiesPath)m->work;
+  PetscBool solved;
+  PetscInt its;
+
+  PetscFunctionBegin;
+  PetscCall(HycoBodiesFrictionTouch(w->friction, &w->bodies, t1, w->n_rows ? alpha : NULL, again, &its, &solved));
+  a->active_its += its;
+  if (!solved) HycoFormat(a->why, "not converged: no contact forces with this friction balance the load");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Elastic bodies have the first contact problem alone. */
+static PetscErrorCode SearchStates(HycoROM m, PetscReal t0, PetscReal t1, PetscReal alpha[], HycoStepAttempt *a)
+{
+  HycoBodiesPath w = (HycoBodiesPath)m->work;
+  PetscBool done = (PetscBool)!w->n_rows;
+
+  PetscFunctionBegin;
+  PetscCall(Touch(m, t1, alpha, PETSC_FALSE, a));
+  if (done) a->iterations = 1;
+  for (PetscInt round = 0; !done && round < ROUNDS && !a->why[0]; round++) {
+    const PetscInt before = a->iterations;
+
+    PetscCall(TakeStates(m, alpha, a));
+    if (!a->why[0]) PetscCall(Newton(m, t0, t1, alpha, a));
+    /* alpha is that of the contact problem. */
+    done = (PetscBool)(a->iterations == before);
+    if (done || a->why[0]) break;
+    PetscCall(Touch(m, t1, alpha, PETSC_TRUE, a));
+    done = Agrees(m, alpha);
+  }
+  if (!done && !a->why[0]) HycoFormat(a->why, "contacts stick and slip in turn");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- a step -- */
+
 /* The set of the last step first: in most steps it holds, and no contact problem is solved at all. */
 PetscErrorCode HycoBodiesSearch(HycoROM m, PetscReal t0, PetscReal t1, PetscReal alpha[], PetscReal Lambda[],
                                 HycoStepAttempt *a)
 {
+  HycoBodiesPath w = (HycoBodiesPath)m->work;
   PetscBool same, violated = PETSC_TRUE;
 
   PetscFunctionBegin;
+  if (w->friction) {
+    PetscCall(SearchStates(m, t0, t1, alpha, a));
+    HycoBodiesFrictionNormal(w->friction, Lambda);
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   /* The forces of the contact problem name the next set. Opening and closing single contacts by the sign of their
      violation would cycle. */
   if (!Presses(m, Lambda)) PetscCall(Contacts(m, alpha, Lambda, a));

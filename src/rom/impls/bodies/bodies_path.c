@@ -8,10 +8,28 @@
 static void MoveAll(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
-  const HycoBodiesSurface s = HycoBodiesSurfaceOf(m);
 
-  HycoBodiesMove(&w->bodies, &s, m->U);
+  HycoBodiesMove(&w->bodies, &w->surface, m->U);
   for (PetscInt i = 0; i < w->bodies.bodies->inelastic->nd; i++) m->U[w->at[i]] = w->u[w->at[i]];
+}
+
+/* The laws of all points in the cells at the forces L (by row), which gives the state at t1: the search has evaluated them
+   at the chosen points only and stored nothing. */
+static PetscErrorCode SettleCells(HycoROM m, PetscReal t0, PetscReal t1, const PetscReal alpha[], const PetscReal L[],
+                                  HycoStepAttempt *a)
+{
+  HycoBodiesPath w = (HycoBodiesPath)m->work;
+  HycoPath p = w->path;
+  const PetscReal begin = HycoNow();
+
+  PetscFunctionBegin;
+  PetscCall(HycoBodiesMoveCells(m, alpha, L));
+  PetscCall(PetscArrayzero(p->f_local, m->fe->n_dof));
+  PetscCall(
+      HycoFEStepBodies(m->fe, HYCO_BODIES_FLOWING, w->u, t0, t1, p->begin, p->end, p->f_local, PETSC_FALSE, &a->law));
+  a->seconds_law += HycoNow() - begin;
+  if (a->law.failed) HycoFormat(a->why, "%s", a->law.why);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Displacements of the surfaces and the cells, the state of these, and the residuals, recomputed from them. */
@@ -20,52 +38,27 @@ static PetscErrorCode Settle(HycoROM m, PetscReal t0, PetscReal t1, const PetscR
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   HycoPath p = w->path;
-  const HycoBodiesSurface s = HycoBodiesSurfaceOf(m);
-  const PetscReal begin = HycoNow();
 
   PetscFunctionBegin;
-  PetscCall(HycoBodiesMoveCells(m, alpha, Lambda));
-  /* Now the laws of all points in the cells, which gives the state at t1; the search has evaluated them at the
-     chosen points only and stored nothing. */
-  PetscCall(PetscArrayzero(p->f_local, m->fe->n_dof));
-  PetscCall(
-      HycoFEStepBodies(m->fe, HYCO_BODIES_FLOWING, w->u, t0, t1, p->begin, p->end, p->f_local, PETSC_FALSE, &a->law));
-  a->seconds_law += HycoNow() - begin;
-  if (a->law.failed) {
-    HycoFormat(a->why, "%s", a->law.why);
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
+  a->law.dt_factor = 1; /* elastic bodies: no law asks for shorter steps */
+  if (w->n_rows || !w->friction)
+    PetscCall(SettleCells(m, t0, t1, alpha, w->friction ? HycoBodiesFrictionForces(w->friction) : Lambda, a));
+  if (a->why[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  /* The getters of contact results read the normal forces, with friction too. */
   PetscCall(PetscArraycpy(m->Lambda, Lambda, m->model->pairs.n));
-  PetscCall(HycoBodiesStrain(&w->bodies, &s, alpha));
-  HycoBodiesGiven(&w->bodies, &s, Lambda);
-  MoveAll(m);
-  HycoBodiesMeasure(m, &p->kkt);
+  if (w->friction)
+    PetscCall(HycoBodiesFrictionMove(w->friction, &w->bodies, &p->kkt));
+  else {
+    PetscCall(HycoBodiesStrain(&w->bodies, &w->surface, alpha));
+    HycoBodiesGiven(&w->bodies, &w->surface, Lambda);
+    MoveAll(m);
+    HycoBodiesMeasure(m, &p->kkt);
+  }
   /* Equilibrium holds by condensation, but for rigid motions; what is left of it is Newton's residual of alpha. */
   p->kkt.stationarity = PetscMax(p->kkt.stationarity, a->residual);
   /* Recomputed from U and Lambda: the search's own word is not enough. */
   a->converged = (PetscBool)(HycoKKTMax(&p->kkt) <= 1e-8);
   if (!a->converged) HycoFormat(a->why, "the residual of the contacts is %.1e", (double)HycoKKTMax(&p->kkt));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* A step with friction: elastic bodies. */
-static PetscErrorCode Rub(HycoROM m, HycoPath p, PetscReal t1, HycoStepAttempt *a)
-{
-  HycoBodiesPath w = (HycoBodiesPath)m->work;
-  PetscScalar *L;
-  PetscBool solved;
-
-  PetscFunctionBegin;
-  PetscCall(HycoBodiesFrictionSolve(w->friction, &w->bodies, t1, &p->kkt, &a->active_its, &solved));
-  a->iterations = 1;
-  a->law.dt_factor = 1; /* no law asks for shorter steps */
-  a->converged = solved;
-  if (!solved) HycoFormat(a->why, "not converged: no contact forces with this friction balance the load");
-  PetscCall(VecGetArray(p->Lambda, &L));
-  HycoBodiesFrictionNormal(w->friction, L);
-  /* The getters of contact results read the normal forces as a model without friction has them. */
-  PetscCall(PetscArraycpy(m->Lambda, L, m->model->pairs.n));
-  PetscCall(VecRestoreArray(p->Lambda, &L));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -78,16 +71,12 @@ static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAt
   PetscScalar *alpha, *L;
 
   PetscFunctionBegin;
-  if (w->friction) {
-    PetscCall(Rub(m, p, t1, a));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
   PetscCall(VecGetArray(p->U, &alpha));
   PetscCall(VecGetArray(p->Lambda, &L));
   /* The option tangent renews in each iteration from the first one on. */
   w->always = (PetscBool)(p->method == HYCO_NEWTON_TANGENT);
   PetscCall(HycoBodiesSearch(m, t0, t1, alpha, L, a));
-  if (a->why[0] && !w->always) { /* again from the begin of the step */
+  if (a->why[0] && !w->always && (w->n_rows || !w->friction)) { /* again from the begin of the step */
     /* alpha and the forces of the last accepted time. */
     PetscCall(HycoVecRead(p->U_old, p->n_free, alpha));
     PetscCall(HycoVecRead(p->L_old, p->n_contacts, L));
@@ -130,46 +119,44 @@ static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elast
 {
   HycoROM m = (HycoROM)p->ctx;
   HycoBodiesPath w = (HycoBodiesPath)m->work;
-  const HycoBodiesSurface s = HycoBodiesSurfaceOf(m);
 
   PetscFunctionBegin;
   (void)elastic;
   PetscCall(HycoROMBringRows(m, mu));
-  /* Friction condenses all rows, normal and tangential, in its own tables, which replace those below. */
-  if (w->friction) {
+  if (w->friction)
     PetscCall(HycoBodiesFrictionPrepare(w->friction, &w->bodies, mu));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCall(HycoBodiesPrepare(&w->bodies, &s, mu));
-  if (Unchanged(m)) PetscFunctionReturn(PETSC_SUCCESS);
+  else
+    PetscCall(HycoBodiesPrepare(&w->bodies, &w->surface, mu));
+  /* Elastic bodies with friction need no tables of strains. */
+  if ((w->friction && !w->n_rows) || Unchanged(m)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoBodiesForget(m));
   PetscCall(HycoBodiesScale(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The trace and the listed times need gamma, which is expanded for accepted steps only. With friction Rub() has
-   done so, and there are no strains. */
+/* The trace and the listed times need gamma, which is expanded for accepted steps only. */
 static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
 {
   HycoROM m = (HycoROM)p->ctx;
   HycoBodiesPath w = (HycoBodiesPath)m->work;
-  const HycoBodiesSurface s = HycoBodiesSurfaceOf(m);
   const PetscScalar *alpha;
 
   PetscFunctionBegin;
   PetscCall(VecGetArrayRead(p->U, &alpha));
   PetscCall(HycoBodiesExpand(&w->bodies, m->gamma));
-  if (w->friction) HycoBodiesMove(&w->bodies, &s, m->U);
-  if (!w->friction) {
-    HycoBodiesAddStrains(&w->bodies, alpha, m->gamma);
-    MoveAll(m);
-    PetscCall(PetscArraycpy(w->accepted, m->U, m->fe->n_dof));
-  }
+  HycoBodiesAddStrains(&w->bodies, alpha, m->gamma);
+  MoveAll(m);
+  PetscCall(PetscArraycpy(w->accepted, m->U, m->fe->n_dof));
   PetscCall(VecRestoreArrayRead(p->U, &alpha));
   PetscCall(HycoTraceAdd(m, p->t));
   p->now.stored = a->law.stored;
-  if (w->friction) PetscCall(HycoBodiesFrictionAccept(w->friction, p->t));
-  if (w->friction) p->now.disproven += HycoBodiesFrictionDisproven(w->friction);
+  if (w->friction) {
+    PetscBool disproven;
+
+    PetscCall(HycoBodiesFrictionAccept(w->friction, p->t));
+    PetscCall(HycoBodiesFrictionDisproven(w->friction, &disproven));
+    p->now.disproven += disproven;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -228,16 +215,9 @@ static PetscErrorCode Record(HycoPath p)
 
   PetscFunctionBegin;
   PetscCall(HycoVecRead(p->Lambda, m->model->pairs.n, m->Lambda));
-  if (w->friction && p->why[0]) { /* the last step may have been refused */
-    HycoBodiesFrictionRestore(w->friction, &w->bodies);
-    PetscCall(HycoBodiesExpand(&w->bodies, m->gamma));
-  }
   PetscCall(HycoROMExpandModal(m));
   /* Exact displacements of surfaces and cells over those of the modes, in this order. */
-  if (w->friction)
-    MoveAll(m);
-  else
-    MoveBack(m);
+  MoveBack(m);
   HycoFEComplete(m->fe, m->U);
   PetscCall(VecGetArrayRead(p->U, &alpha));
   /* The largest of the listed times is a feature of the estimate. */
@@ -313,8 +293,7 @@ static PetscErrorCode Allocate(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   HycoBodiesInelastic in = w->bodies.bodies->inelastic;
-  const PetscInt n = m->model->mesh->nv * m->model->mesh->dim, l = in->m, ns = m->fe->n_sigma,
-                 pairs = m->model->pairs.n;
+  const PetscInt n = m->model->mesh->nv * m->model->mesh->dim, l = in->m, ns = m->fe->n_sigma, pairs = w->surface.n;
   const PetscInt rows = w->n_rows = in->n_points * ns;
   PetscInt samples = 0;
 
@@ -388,7 +367,6 @@ static PetscErrorCode CreatePath(HycoROM m)
 static PetscErrorCode SetUp(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
-  HycoBodiesSurface s;
 
   PetscFunctionBegin;
   PetscCall(HycoROMSetUpDefault(m));
@@ -396,10 +374,13 @@ static PetscErrorCode SetUp(HycoROM m)
   m->n = w->bodies.bodies->inelastic->m;
   /* The mesh has few cells: pressures act on facets of the surfaces whose cells it lacks. */
   m->fe->all_facets = PETSC_TRUE;
-  s = HycoBodiesSurfaceOf(m);
-  if (HycoSceneHasFriction(m->model->scene)) PetscCall(HycoBodiesFrictionCreate(m->model->scene, &s, &w->friction));
-  PetscCall(HycoBodiesSetUp(&w->bodies, w->bodies.bodies, m->model->scene,
-                            w->friction ? HycoBodiesFrictionSurface(w->friction) : &s, m->solver));
+  w->surface = HycoBodiesSurfaceOf(m);
+  if (HycoSceneHasFriction(m->model->scene)) {
+    PetscCall(HycoBodiesFrictionCreate(m->model->scene, &w->surface, w->bodies.bodies->p, &w->friction));
+    w->surface = *HycoBodiesFrictionSurface(w->friction);
+  }
+  w->gaps = w->friction ? 0 : w->surface.n;
+  PetscCall(HycoBodiesSetUp(&w->bodies, w->bodies.bodies, m->model->scene, &w->surface, m->solver));
   PetscCall(FindUnknowns(m));
   PetscCall(FindPoints(m));
   PetscCall(Allocate(m));

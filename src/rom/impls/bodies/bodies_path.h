@@ -9,18 +9,20 @@ typedef struct _n_HycoBodiesPath {
   struct _n_HycoBodiesWork bodies; /* the first, as in the model without a history */
   HycoPath path;
   HycoBodiesFriction friction; /* NULL: no contact has any */
+  HycoBodiesSurface surface;   /* with the rows of the contact problem: with friction, also tangents */
   Vec alpha, L;
   PetscInt *at, *cell_at;   /* by unknown of the cells: of fe's mesh; by cell and its unknown: its row, or -1 */
   PetscInt *point, n_rows;  /* the points in the model's mesh; n_sigma rows each: */
   PetscReal *B, *T, *there; /* n_rows x (nv dim): strains; n_rows x m: as in HycoBodiesInelastic, at fe's nodes */
   PetscReal *weight;        /* by point: norm of its rows of T */
-  PetscReal *BP, *response; /* contacts x m: B P / kappa; n_rows x m: strains by alpha, */
-  PetscReal *G;             /* contacts x p: B Z, of the rigid motions that contact alone prevents */
+  PetscReal *BP, *response; /* rows x m: B P / kappa; n_rows x m: strains by alpha, */
+  PetscReal *G;             /* rows x p: B Z, of the rigid motions that contact alone prevents */
   PetscReal *loads;         /* and n_rows x r: by loads */
-  PetscReal **column;       /* by contact: gaps of all contacts, strains, displacements of the cells for a unit force;
-                               NULL: not needed yet */
+  PetscReal **column;       /* by row: gaps of all contacts (`gaps` of them), strains, displacements of the cells for a
+                               unit force; NULL: not needed yet */
+  PetscInt gaps;            /* none with friction, which has a matrix of them */
   PetscBool fresh;          /* rows or stiffness have changed since the set was factored */
-  PetscInt n_set, *set;     /* closed contacts */
+  PetscInt n_set, *set;     /* closed contacts; with friction, their rows */
   PetscReal *U;             /* n_set x n_set: upper factor of W_aa */
   PetscReal *Z, *S;         /* n_set x m: forces per alpha; n_rows x m: strains per alpha */
   PetscReal *z, *e0, *gap;  /* n_set, n_rows: the same at alpha = 0; by contact: gaps there, without forces */

@@ -27,8 +27,8 @@ PetscErrorCode HycoBodiesReset(HycoBodiesWork o)
   PetscCall(HycoSolverDestroy(&o->own));
   for (PetscInt k = 0; o->weight && k < o->bodies->n; k++) HycoFreeAll(&o->weight[k], &o->share[k], &o->blend[k]);
   HycoFreeAll(&o->kept.weights, &o->weight, &o->share, &o->blend, &o->blended, &o->mu, &o->reference, &o->X0, &o->E0,
-              &o->E_at, &o->pose, &o->kappa, &o->c, &o->elastic, &o->free, &o->u, &o->f, &o->x, &o->loc, &o->row_start,
-              &o->row_at, &o->row, &o->gap, &o->active, &o->Z, &o->work);
+              &o->E_at, &o->pose, &o->kappa, &o->c, &o->elastic, &o->free, &o->u, &o->f, &o->x, &o->loc, &o->placed,
+              &o->placed_in, &o->row_start, &o->row_at, &o->row, &o->gap, &o->active, &o->Z, &o->work);
   PetscCall(PetscMemzero(o, sizeof(*o)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -140,6 +140,17 @@ static PetscErrorCode FindPlaces(HycoBodiesWork o, HycoMesh m)
     o->loc[i] = at < 0 ? -1 : place[at];
   }
   PetscCall(PetscFree2(sorted, place));
+  PetscCall(PetscMalloc1(m->n_nodes + 1, &o->placed));
+  PetscCall(PetscMalloc1(m->n_nodes + 1, &o->placed_in));
+  for (PetscInt i = 0; i < m->n_nodes; i++) {
+    PetscInt last = -1;
+
+    for (PetscInt c = 0; c < b->dim; c++) last = PetscMax(last, o->loc[i * b->dim + c]);
+    /* A node inside: its displacement is that of the modes. */
+    if (last < 0) continue;
+    o->placed[o->n_placed] = i;
+    o->placed_in[o->n_placed++] = HycoBodiesAt(b, last);
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -967,24 +978,17 @@ PetscReal HycoBodiesBound(HycoBodiesWork o, PetscReal *norm)
    counts as 0 and which are not written. */
 void HycoBodiesMove(HycoBodiesWork o, const HycoBodiesSurface *s, PetscReal U[])
 {
-  const HycoSubstructures b = o->bodies;
-  const PetscInt dim = b->dim;
+  const PetscInt dim = o->bodies->dim;
 
-  for (PetscInt i = 0; i < s->fe->mesh->n_nodes; i++) {
+  for (PetscInt k = 0; k < o->n_placed; k++) {
+    const PetscInt i = o->placed[k] * dim, *loc = o->loc + i;
     PetscReal own[3] = {0, 0, 0}, turned[3];
-    PetscInt place = -1;
 
-    for (PetscInt c = 0; c < dim; c++) {
-      if (o->loc[i * dim + c] < 0) continue;
-      place = o->loc[i * dim + c];
-      own[c] = o->u[place];
-    }
-    /* A node inside: its displacement is that of the modes. */
-    if (place < 0) continue;
-    HycoPoseTurn(o->pose[HycoBodiesAt(b, place)].Q, dim, PETSC_FALSE, own, turned);
+    for (PetscInt c = 0; c < dim; c++) own[c] = loc[c] < 0 ? 0 : o->u[loc[c]];
+    HycoPoseTurn(o->pose[o->placed_in[k]].Q, dim, PETSC_FALSE, own, turned);
     for (PetscInt c = 0; c < dim; c++) {
       /* u0 has the prescribed values; the place's value comes on top in the scene's axes. */
-      if (o->loc[i * dim + c] >= 0) U[i * dim + c] = s->fe->u0[i * dim + c] + turned[c];
+      if (loc[c] >= 0) U[i + c] = s->fe->u0[i + c] + turned[c];
     }
   }
 }
