@@ -13,10 +13,24 @@
 
 /* -- atoms -- */
 
+PetscErrorCode HycoAtomTranslate(HycoScene s, const HycoAtom *a, const PetscReal mu[], PetscReal *value, HycoText *c)
+{
+  PetscReal first = 0;
+  PetscBool valid;
+
+  PetscFunctionBegin;
+  PetscCall(HycoTranslate(s, a->text, a->change ? a->to : a->x, mu, value, c, &valid, NULL, NULL));
+  if (!a->change) PetscFunctionReturn(PETSC_SUCCESS);
+  if (c) PetscCall(HycoTextAdd(c, " - "));
+  PetscCall(HycoTranslate(s, a->text, a->x, mu, &first, c, &valid, NULL, NULL));
+  *value -= first;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Whether muParser has the same values at the ends and the middle of the ranges. */
 static PetscErrorCode Agrees(HycoScene s, const HycoAtom *atom, PetscBool *agrees)
 {
-  PetscReal mu[HYCO_MAX_PARAMETERS], mine, theirs;
+  PetscReal mu[HYCO_MAX_PARAMETERS], mine, theirs, first = 0;
   HycoExpr e;
   PetscErrorCode ierr = 0;
 
@@ -24,28 +38,30 @@ static PetscErrorCode Agrees(HycoScene s, const HycoAtom *atom, PetscBool *agree
   PetscCall(HycoSceneExpression(s, atom->key, atom->text, &e));
   *agrees = PETSC_TRUE;
   for (PetscInt k = 0; k < 3 && !ierr && *agrees; k++) {
-    PetscBool valid;
-
     for (PetscInt p = 0; p < s->n_parameters; p++) mu[p] = s->lo[p] + (s->hi[p] - s->lo[p]) * (PetscReal)k / 2;
-    PetscCall(HycoTranslate(s, atom->text, atom->x, mu, &mine, NULL, &valid, NULL, NULL));
+    PetscCall(HycoAtomTranslate(s, atom, mu, &mine, NULL));
     /* An atom that is not finite somewhere in the ranges is no candidate. */
     if (PetscIsInfOrNanReal(mine)) *agrees = PETSC_FALSE;
-    if (*agrees) ierr = HycoExprEval(e, mu, 1, atom->x, &theirs);
-    if (*agrees && !ierr) *agrees = (PetscBool)(PetscAbsReal(mine - theirs) <= SAME * PetscAbsReal(theirs));
+    if (*agrees) ierr = HycoExprEval(e, mu, 1, atom->change ? atom->to : atom->x, &theirs);
+    if (*agrees && !ierr && atom->change) ierr = HycoExprEval(e, mu, 1, atom->x, &first);
+    if (*agrees && !ierr)
+      *agrees = (PetscBool)(PetscAbsReal(mine - (theirs - first)) <=
+                            SAME * PetscMax(PetscAbsReal(theirs), PetscAbsReal(first)));
   }
   PetscCall(HycoExprDestroy(&e));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Atoms on which muParser and this parser differ are left out silently: the fit then decides without them. */
-static PetscErrorCode Add(HycoScene s, const char key[], const char text[], const PetscReal x[3], PetscInt *n,
-                          HycoAtom **atom)
+/* axis: of a change of the place by 1; -1: none. Atoms on which muParser and this parser differ are left out silently: the fit then decides without them. */
+static PetscErrorCode Add(HycoScene s, const char key[], const char text[], const PetscReal x[3], PetscInt axis,
+                          PetscInt *n, HycoAtom **atom)
 {
-  HycoAtom one = {.key = key, .text = text, .x = {x[0], x[1], x[2]}};
+  HycoAtom one = {.key = key, .text = text, .change = (PetscBool)(axis >= 0), .x = {x[0], x[1], x[2]}};
   PetscBool agrees = PETSC_FALSE;
 
   PetscFunctionBegin;
+  for (PetscInt c = 0; c < 3 && axis >= 0; c++) one.to[c] = x[c] + (c == axis);
   PetscCall(Agrees(s, &one, &agrees));
   if (!agrees) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscRealloc((size_t)(*n + 1) * sizeof(**atom), atom));
@@ -70,37 +86,38 @@ PetscErrorCode HycoAtomsFind(HycoScene s, PetscInt n, const PetscReal x[], Petsc
   PetscFunctionBegin;
   *n_atoms = 0;
   *atom = NULL;
-  for (PetscInt p = 0; p < s->n_parameters; p++) PetscCall(Add(s, s->parameter[p], s->parameter[p], x, n_atoms, atom));
+  for (PetscInt p = 0; p < s->n_parameters; p++)
+    PetscCall(Add(s, s->parameter[p], s->parameter[p], x, -1, n_atoms, atom));
   for (PetscInt k = 0; k < s->n_entries; k++) {
     /* Entries that cannot change K, F, B or D, and constants, which occur within other entries. */
     if (!strncmp(s->key[k], "output_", 7) || !strncmp(s->key[k], "scene_", 6) || !strncmp(s->key[k], "constant_", 9) ||
         Known(s->value[k], *n_atoms, *atom))
       continue;
     PetscCall(HycoTranslate(s, s->value[k], x, s->lo, &value, NULL, &valid, &uses, &space));
+    for (PetscInt c = 0; valid && uses && space && strstr(s->key[k], "_map_") && c < 3; c++)
+      PetscCall(Add(s, s->key[k], s->value[k], x, c, n_atoms, atom));
     for (PetscInt i = 0; valid && uses && i < (space ? n : 1); i++)
-      PetscCall(Add(s, s->key[k], s->value[k], x + 3 * i, n_atoms, atom));
+      PetscCall(Add(s, s->key[k], s->value[k], x + 3 * i, -1, n_atoms, atom));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* -- candidates -- */
 
-/* value[k] = a b / c; not finite where c is 0. */
+/* value[k] = a b d / c; not finite where c is 0. */
 PetscErrorCode HycoFunctionsEvaluate(HycoScene s, const HycoAtom atom[], PetscInt n, const HycoFunction f[],
                                      const PetscReal mu[], PetscReal value[])
 {
-  PetscBool valid;
-
   PetscFunctionBegin;
   for (PetscInt k = 0; k < n; k++) {
-    const PetscInt of[3] = {f[k].a, f[k].b, f[k].c};
+    const PetscInt of[4] = {f[k].a, f[k].b, f[k].d, f[k].c};
 
     value[k] = 1;
-    for (PetscInt j = 0; j < 3; j++) {
+    for (PetscInt j = 0; j < 4; j++) {
       PetscReal one = 1;
 
-      if (of[j] >= 0) PetscCall(HycoTranslate(s, atom[of[j]].text, atom[of[j]].x, mu, &one, NULL, &valid, NULL, NULL));
-      value[k] = j < 2 ? value[k] * one : value[k] / one;
+      if (of[j] >= 0) PetscCall(HycoAtomTranslate(s, &atom[of[j]], mu, &one, NULL));
+      value[k] = j < 3 ? value[k] * one : value[k] / one;
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -117,18 +134,23 @@ static PetscInt Candidates(PetscInt m, PetscInt level, HycoFunction f[])
     n++;                                                                                                               \
   } while (0)
   /* The constant first: the choice prefers earlier candidates. */
-  CANDIDATE(-1, -1, -1);
-  for (PetscInt a = 0; a < m; a++) CANDIDATE(a, -1, -1);
+  CANDIDATE(-1, -1, -1, -1);
+  for (PetscInt a = 0; a < m; a++) CANDIDATE(a, -1, -1, -1);
   for (PetscInt a = -1; level > 0 && a < m; a++) {
     for (PetscInt c = 0; c < m; c++) {
-      if (a != c) CANDIDATE(a, -1, c);
+      if (a != c) CANDIDATE(a, -1, c, -1);
     }
   }
   for (PetscInt c = -1; level > 1 && c < (level > 2 ? m : 0); c++) {
     for (PetscInt a = 0; a < m; a++) {
       for (PetscInt b = a; b < m; b++) {
-        if (a != c && b != c) CANDIDATE(a, b, c);
+        if (a != c && b != c) CANDIDATE(a, b, c, -1);
       }
+    }
+  }
+  for (PetscInt a = 0; level > 3 && a < m; a++) {
+    for (PetscInt b = a; b < m; b++) {
+      for (PetscInt d = b; d < m; d++) CANDIDATE(a, b, -1, d);
     }
   }
 #undef CANDIDATE
@@ -148,17 +170,16 @@ static PetscErrorCode Tabulate(HycoScene s, PetscInt n_atoms, const HycoAtom ato
                                const HycoFunction f[], PetscReal value[])
 {
   PetscReal *at;
-  PetscBool valid;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(n_atoms + 1, &at));
   for (PetscInt i = 0; i < d->n_points; i++) {
     for (PetscInt a = 0; a < n_atoms; a++)
-      PetscCall(
-          HycoTranslate(s, atom[a].text, atom[a].x, d->mu + i * s->n_parameters, &at[a], NULL, &valid, NULL, NULL));
+      PetscCall(HycoAtomTranslate(s, &atom[a], d->mu + i * s->n_parameters, &at[a], NULL));
     for (PetscInt k = 0; k < n; k++)
       value[(size_t)k * (size_t)d->n_points + (size_t)i] =
-          (f[k].a < 0 ? 1 : at[f[k].a]) * (f[k].b < 0 ? 1 : at[f[k].b]) / (f[k].c < 0 ? 1 : at[f[k].c]);
+          (f[k].a < 0 ? 1 : at[f[k].a]) * (f[k].b < 0 ? 1 : at[f[k].b]) * (f[k].d < 0 ? 1 : at[f[k].d]) /
+          (f[k].c < 0 ? 1 : at[f[k].c]);
   }
   PetscCall(PetscFree(at));
   PetscFunctionReturn(PETSC_SUCCESS);
