@@ -15,13 +15,15 @@
 
 #include "runtime/runtime.c"
 
-#define EXACT      1e-11 /* error of a function at points that were not fitted */
+#define EXACT      2e-11 /* error of a function at points that were not fitted */
 #define CHECKED    64    /* points at which the runtime is compared with the model */
 #define AGREES     1e-9  /* difference there, of an output's largest value */
 #define PLACES     6     /* at which expressions in space are functions of the parameters */
 #define MOST       6000000
 #define MOST_ITEMS 3000
-#define SAMPLES    120 /* points for the functions, of which a third checks them */
+#define SAMPLES    120 /* points for the functions, of which a third checks them; more with weights of samples: */
+#define SEVERAL    20  /* samples: with more, products are tried of known functions alone */
+#define EACH       8   /* for each */
 
 /* A value: of an output, of a contact's force along an axis, of a stress in a cell, of a displacement, of a travel. */
 typedef struct {
@@ -43,6 +45,8 @@ typedef struct {
   Row *row;
   PetscReal *area, *pressure; /* by contact of the model */
   PetscInt travel_row;        /* the first row of the travel's values */
+  PetscInt n_weights;         /* of the samples of bodies: expressions */
+  char **weight;
   HycoExportFit base, response;
   HycoExportModel out;
 } Export;
@@ -571,11 +575,38 @@ static PetscErrorCode Join(const HycoExportFit *part, PetscInt n, const PetscInt
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The functions of `from` that some rows have, of the group's response, or of the flexibility of the body to whose places
+   they belong: the rows without forces have products of them. */
+static PetscErrorCode FindSeeds(Export *e, PetscInt first, const HycoExportFit *from, PetscInt *n, HycoFunction seed[])
+{
+  const PetscInt g = e->group[first], places = e->n_groups - (e->travel ? HycoTravelBodies(e->travel) : 0);
+
+  PetscFunctionBegin;
+  *n = 0;
+  for (PetscInt k = 0; k < from->n; k++) {
+    PetscBool has = PETSC_FALSE;
+
+    for (PetscInt r = 0; r < e->ny && !has; r++) {
+      const PetscInt at = r - e->p - e->k - e->travel_row;
+      const PetscBool of =
+          (PetscBool)(g < places ? e->group[r] == g : at >= 0 && HycoTravelIsFlexible(e->travel, at, g - places));
+
+      has = (PetscBool)(of && from->coefficient[(size_t)r * (size_t)from->n + (size_t)k] != 0);
+    }
+    if (has) seed[(*n)++] = from->function[k];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Functions of the first level that suffices for rows, up to the last one; else of that. */
 static PetscErrorCode FitRows(Export *e, PetscInt last, const HycoFitData *all, PetscInt n, const PetscInt row[],
                               HycoExportFit *fit)
 {
-  HycoFitData data = {all->n_points, n, all->mu, NULL, NULL, all->scale};
+  const HycoExportFit *from =
+      e->group[row[0]] < e->n_groups - (e->travel ? HycoTravelBodies(e->travel) : 0) ? &e->response : fit;
+  HycoFunction *seed;
+  PetscInt n_seeds = 0;
+  HycoFitData data = {all->n_points, n, all->atom, NULL, NULL, all->scale};
   HycoExportFit part = {.worst = PETSC_MAX_REAL};
   PetscReal *y;
   PetscInt *group;
@@ -584,10 +615,15 @@ static PetscErrorCode FitRows(Export *e, PetscInt last, const HycoFitData *all, 
   PetscCall(Select(all, n, row, &y, &group));
   data.y = y;
   data.group = group;
-  for (PetscInt level = 0; level <= last && part.worst > EXACT; level++) {
+  PetscCall(PetscMalloc1(PetscMax(from->n, 1), &seed));
+  if (e->n_weights > SEVERAL) last = PetscMin(last, 1);
+  if (e->travel && fit == &e->base) PetscCall(FindSeeds(e, row[0], from, &n_seeds, seed));
+  for (PetscInt level = n_seeds ? -1 - e->n_atoms : 0; level <= last && part.worst > EXACT; level++) {
     PetscCall(FreeFit(&part));
-    PetscCall(HycoFitFunctions(e->s, e->n_atoms, e->atom, level, EXACT, &data, &part));
+    PetscCall(HycoFitFunctions(e->n_atoms, e->atom, level, n_seeds, seed, EXACT, &data, &part));
   }
+  PetscCall(PetscFree(seed));
+  if (!part.function) part.n = 0; /* too many were left */
   PetscCall(Join(&part, n, row, all->n_rows, fit));
   if (part.worst > fit->worst || !fit->worst) {
     fit->worst = part.worst;
@@ -623,19 +659,21 @@ static PetscErrorCode Fit(Export *e, PetscInt last, const HycoFitData *data, Hyc
 static PetscErrorCode FitBoth(Export *e, PetscInt fixed)
 {
   Samples o;
-  PetscReal *scale;
+  PetscReal *scale, *value;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(e->n_groups, &scale));
-  PetscCall(Sample(e, SAMPLES, fixed, &o));
+  PetscCall(Sample(e, PetscMax(SAMPLES, EACH * e->n_weights), fixed, &o));
+  PetscCall(PetscMalloc1((size_t)o.n * (size_t)e->n_atoms + 1, &value));
+  PetscCall(HycoAtomsTabulate(e->s, e->n_atoms, e->atom, o.n, o.mu, value));
   Scale(e, &o, scale);
-  PetscCall(Fit(e, e->travel ? HYCO_FIT_LEVELS - 2 : 1, &(HycoFitData){o.n, 2 * e->ny, o.mu, o.added, e->group, scale},
+  PetscCall(Fit(e, e->travel ? HYCO_FIT_LEVELS - 2 : 1, &(HycoFitData){o.n, 2 * e->ny, value, o.added, e->group, scale},
                 &e->response));
   /* If the response has no functions the export is refused anyway: the costly levels are left out. */
   PetscCall(Fit(e, e->response.worst > EXACT ? 0 : HYCO_FIT_LEVELS - 1,
-                &(HycoFitData){o.n, e->ny, o.mu, o.y, e->group, scale}, &e->base));
+                &(HycoFitData){o.n, e->ny, value, o.y, e->group, scale}, &e->base));
   PetscCall(FreeSamples(&o));
-  PetscCall(PetscFree(scale));
+  HycoFreeAll(&scale, &value);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -653,17 +691,19 @@ static PetscErrorCode Refuse(Export *e)
     HycoFormat(of, "the stiffness or the turn of a body");
   else
     HycoFormat(of, "the output %s", e->out.name[e->row[at].group]);
-  for (PetscInt p = 0; p < e->s->n_parameters; p++) {
+  for (PetscInt p = 0; p < e->s->n_parameters && !e->travel; p++) { /* there it takes long */
     /* With parameter p fixed: if the fits are exact then, p is what has no such functions. */
     PetscCall(FitBoth(e, p));
     if (e->base.worst <= EXACT && e->response.worst <= EXACT) PetscCall(HycoListAdd(list, " and ", e->s->parameter[p]));
   }
-  if (response)
-    HycoFail("export: the directions of contacts or the stiffness change with %s otherwise than by factors of moduli; "
-             "shapes and ratios of moduli within a body cannot be exported",
-             list[0] ? list : "several parameters");
-  HycoFail("export: %s change%s with %s otherwise than by sums of products of the scene's expressions", of,
-           row == e->p + e->k || at >= 0 ? "s" : "", list[0] ? list : "several parameters");
+  if (response && at < 0)
+    HycoFail(
+        "export: the directions of contacts or the stiffness change with %s otherwise than by factors of moduli and "
+        "samples of bodies; contacts that turn with a stated normal or a shape cannot be exported",
+        list[0] ? list : "several parameters");
+  HycoFail("export: %s change%s with %s otherwise than by sums of products of the scene's expressions and weights of "
+           "samples, as stresses in a body do whose shape changes",
+           of, row == e->p + e->k || at >= 0 ? "s" : "", list[0] ? list : "several parameters");
 }
 
 /* -- the arrays -- */
@@ -685,6 +725,29 @@ static PetscErrorCode Merge(Export *e, const HycoExportFit *fit, PetscInt place[
     }
     place[k] = at;
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Two steps X = X (2 - M X) of a pseudo-inverse X, which has lost the digits of M's condition: functions of different outputs
+   may depend nearly on each other. */
+static PetscErrorCode RefineInverse(size_t n, const PetscReal M[], PetscReal X[])
+{
+  PetscReal *MX, *old;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(n * n, &MX, n * n, &old));
+  for (PetscInt step = 0; step < 2; step++) {
+    PetscCall(PetscArraycpy(old, X, n * n));
+    for (size_t k = 0; k < n * n; k++) {
+      MX[k] = k / n == k % n ? 2 : 0;
+      for (size_t j = 0; j < n; j++) MX[k] -= M[k / n * n + j] * old[j * n + k % n];
+    }
+    for (size_t k = 0; k < n * n; k++) {
+      X[k] = 0;
+      for (size_t j = 0; j < n; j++) X[k] += old[k / n * n + j] * MX[j * n + k % n];
+    }
+  }
+  PetscCall(PetscFree2(MX, old));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -715,7 +778,8 @@ static PetscErrorCode ChoosePoints(Export *e, PetscReal point[], PetscReal inver
     PetscCall(HycoFunctionsEvaluate(e->s, e->atom, n, e->response.function, point + i * n_par, chosen + i * n));
     for (PetscInt k = 0; k < n; k++) chosen[i * n + k] /= scale[k];
   }
-  PetscCall(HycoPseudoInverse(n, n, chosen, 1e-15, inverse)); /* inverse[k * n + i]: of function k at point i */
+  PetscCall(HycoPseudoInverse(n, n, chosen, 1e-12, inverse)); /* inverse[k * n + i]: of function k at point i */
+  PetscCall(RefineInverse((size_t)n, chosen, inverse));
   for (PetscInt k = 0; k < n * n; k++) inverse[k] /= scale[k / n];
   PetscCall(PetscFree4(value, chosen, scale, pivot));
   PetscCall(HycoSamplesDestroy(&samples));
@@ -797,9 +861,10 @@ static PetscErrorCode KeepTerms(Export *e, const PetscInt place[], const PetscRe
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc3(n_f, &scale, n_f, &value, n_f, &size));
-  /* Sizes of the functions at the ends and the middle of the ranges. */
-  for (PetscInt end = 0; end < 3; end++) {
-    for (PetscInt p = 0; p < e->s->n_parameters; p++) mu[p] = e->s->lo[p] + (e->s->hi[p] - e->s->lo[p]) * end / 2;
+  /* Sizes of the functions: at the ends, the middle and between, where a weight of a sample is not 0 everywhere. */
+  for (PetscInt k = 0; k < 7; k++) {
+    for (PetscInt p = 0; p < e->s->n_parameters; p++)
+      mu[p] = e->s->lo[p] + (e->s->hi[p] - e->s->lo[p]) * (k < 3 ? (PetscReal)k / 2 : 0.07 + 0.23 * (PetscReal)(k - 3));
     PetscCall(HycoFunctionsEvaluate(e->s, e->atom, n_f, e->response.function, mu, value));
     for (PetscInt f = 0; f < n_f; f++) scale[f] = PetscMax(scale[f], PetscAbsReal(value[f]));
   }
@@ -1012,6 +1077,7 @@ static PetscErrorCode Prepare(Export *e)
 {
   const HycoROM m = e->m;
   PetscReal mu[HYCO_MAX_PARAMETERS], x[3 * PLACES];
+  PetscInt places; /* the group of the first body's places */
 
   PetscFunctionBegin;
   PetscCall(HycoSceneRefuseHistory(e->s, "hyco export"));
@@ -1030,16 +1096,24 @@ static PetscErrorCode Prepare(Export *e)
     PetscCall(AddRow(e, (Row){.from = TRAVEL, .index = i, .group = e->out.n_outputs + HycoTravelGroup(e->travel, i)}));
   for (PetscInt i = 0; i < PLACES; i++) /* nodes without regularity */
     PetscCall(PetscArraycpy(x + 3 * i, m->fe->X + 3 * ((i * 7919 + 13) % m->fe->mesh->n_nodes), 3));
-  PetscCall(HycoAtomsFind(e->s, PLACES, x, &e->n_atoms, &e->atom));
+  PetscCall(HycoAtomsFind(e->s, (PetscBool)(e->travel != NULL), PLACES, x, &e->n_atoms, &e->atom));
+  PetscCall(HycoExportWeights(m, &e->n_weights, &e->weight));
+  for (PetscInt i = 0; i < e->n_weights; i++) PetscCall(HycoAtomsAddWeight(e->s, e->weight[i], &e->n_atoms, &e->atom));
   e->out.n_atoms = e->n_atoms;
   e->out.atom = e->atom;
   e->ny = e->p + e->k + e->n_rows;
-  e->n_groups = 2 + e->out.n_outputs + (e->travel ? HycoTravelValues(e->travel) : 0);
+  places = 2 + e->out.n_outputs + (e->travel ? HycoTravelValues(e->travel) : 0);
+  e->n_groups = places + (e->travel ? HycoTravelBodies(e->travel) : 0);
   PetscCall(PetscMalloc1(2 * e->ny + 1, &e->group));
   for (PetscInt r = 0; r < 2 * e->ny; r++) {
     const PetscInt at = r % e->ny;
 
-    e->group[r] = at < e->p ? 0 : at < e->p + e->k ? 1 : 2 + e->row[at - e->p - e->k].group;
+    if (at >= e->p + e->k)
+      e->group[r] = 2 + e->row[at - e->p - e->k].group;
+    else if (at >= e->p && e->travel)
+      e->group[r] = places + HycoTravelAt(e->travel, at - e->p);
+    else
+      e->group[r] = at >= e->p;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -1076,7 +1150,8 @@ static PetscErrorCode ExportC(HycoROM m, const char path[], char **description)
   PetscCall(FreeFit(&e.response));
   PetscCall(HycoTravelDestroy(&e.travel));
   if (e.z) PetscCall(PetscFree4(e.z, e.w, e.unit, e.contact));
-  HycoFreeAll(&e.group, &e.atom, &e.row, &e.area, &e.pressure);
+  for (PetscInt i = 0; i < e.n_weights; i++) PetscCall(PetscFree(e.weight[i]));
+  HycoFreeAll(&e.weight, &e.group, &e.atom, &e.row, &e.area, &e.pressure);
   PetscCall(HycoExportModelFree(&e.out));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

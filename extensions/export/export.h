@@ -7,10 +7,10 @@
 #include "runtime/model.h"
 
 /* An expression of the scene in the parameters alone: its text at a place x, which is fixed, or what it changes from there
-   to the place `to`, as the entries of a turn by a map. */
+   to the place `to`, as the entries of a turn by a map. Two weights of samples are never multiplied. */
 typedef struct {
   const char *key, *text; /* borrowed from the scene */
-  PetscBool change;
+  PetscBool change, weight;
   PetscReal x[3], to[3];
 } HycoAtom;
 
@@ -18,6 +18,10 @@ typedef struct {
 typedef struct {
   PetscInt a, b, c, d;
 } HycoFunction;
+
+/* The weights of the samples of a model of bodies, between which those that change their shape or the ratio of their moduli
+   are interpolated, as expressions in the scene's parameters; each once. The caller frees the texts and the array. */
+PetscErrorCode HycoExportWeights(HycoROM m, PetscInt *n, char ***text);
 
 /* Texts that grow. */
 typedef struct {
@@ -39,15 +43,23 @@ PetscErrorCode HycoAtomTranslate(HycoScene scene, const HycoAtom *atom, const Pe
                                  HycoText *c);
 
 /* The atoms of a scene: its parameters, and each entry's expression that has one, at some places x (n x 3) if it varies in
-   space. */
-PetscErrorCode HycoAtomsFind(HycoScene scene, PetscInt n, const PetscReal x[], PetscInt *n_atoms, HycoAtom **atom);
+   space; of maps what they change from place to place, and unless `travels` also the places. */
+PetscErrorCode HycoAtomsFind(HycoScene scene, PetscBool travels, PetscInt n, const PetscReal x[], PetscInt *n_atoms,
+                             HycoAtom **atom);
+
+/* Adds the weight of a sample, which is borrowed. */
+PetscErrorCode HycoAtomsAddWeight(HycoScene scene, const char text[], PetscInt *n_atoms, HycoAtom **atom);
+
+/* value[n x n_atoms]: of the atoms at n points mu. */
+PetscErrorCode HycoAtomsTabulate(HycoScene scene, PetscInt n_atoms, const HycoAtom atom[], PetscInt n,
+                                 const PetscReal mu[], PetscReal value[]);
 
 /* Linear combinations of functions of the parameters that give data at points exactly: a subset of candidates. */
 typedef struct {
   PetscInt n_points, n_rows; /* y: n_points x n_rows */
-  const PetscReal *mu, *y;
-  const PetscInt *group;  /* by row: its group, */
-  const PetscReal *scale; /* which has a scale of errors; 0: all is 0 */
+  const PetscReal *atom, *y; /* atom: n_points x atoms: their values */
+  const PetscInt *group;     /* by row: its group, */
+  const PetscReal *scale;    /* which has a scale of errors; 0: all is 0 */
 } HycoFitData;
 typedef struct {
   PetscInt n;
@@ -56,10 +68,10 @@ typedef struct {
   PetscReal worst;        /* error at the points that were not fitted (each third), relative to the group */
   PetscInt worst_row;
 } HycoExportFit;
-/* The functions are those of a level: 1, a; from 1 on 1/c, a/c; from 2 on a b; from 3 on a b / c; from 4 on a b d. worst > tol: they do not
-   suffice. The caller frees both arrays. */
-PetscErrorCode HycoFitFunctions(HycoScene scene, PetscInt n_atoms, const HycoAtom atom[], PetscInt level, PetscReal tol,
-                                const HycoFitData *data, HycoExportFit *fit);
+/* The functions are those of a level: 1, a; from 1 on 1/c, a/c; from 2 on a b; from 3 on a b / c; from 4 on a b d. At level -1 they are those of
+   seed[], and their products with one atom; at level -2 - k with atom k. worst > tol: they do not suffice, or are too many to be tried. The caller frees both arrays. */
+PetscErrorCode HycoFitFunctions(PetscInt n_atoms, const HycoAtom atom[], PetscInt level, PetscInt n_seeds,
+                                const HycoFunction seed[], PetscReal tol, const HycoFitData *data, HycoExportFit *fit);
 #define HYCO_FIT_LEVELS 5
 /* value[n]: of the functions at mu. */
 PetscErrorCode HycoFunctionsEvaluate(HycoScene scene, const HycoAtom atom[], PetscInt n, const HycoFunction f[],

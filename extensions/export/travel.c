@@ -61,7 +61,6 @@ static PetscErrorCode Check(HycoROM m)
 {
   const HycoFE fe = m->fe;
   const HycoScene s = m->model->scene;
-  const HycoSubstructures b = (HycoSubstructures)m->model->data;
 
   PetscFunctionBegin;
   HycoCheck(
@@ -74,9 +73,6 @@ static PetscErrorCode Check(HycoROM m)
   HycoCheck(
       !fe->n_turned && !fe->n_oblique,
       "export: contacts that travel beside supports along directions, or with -hyco_regularise, cannot be exported");
-  for (PetscInt k = 0; k < b->n; k++)
-    HycoCheck(b->body[k].n_samples == 1,
-              "export: contacts that travel on bodies whose shape or ratio of moduli changes cannot be exported");
   for (PetscInt c = 0; c < s->n_contacts; c++) {
     const HycoContact of = s->contact[c];
 
@@ -86,6 +82,57 @@ static PetscErrorCode Check(HycoROM m)
     HycoCheck(HycoContactAverages(of) && !of->gap,
               "export: contact %s: a normal or a gap that the scene gives cannot be exported where contacts travel",
               of->name);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- samples -- */
+
+/* The product of Lagrange's polynomials of sample j of a body. */
+static PetscErrorCode WriteWeight(HycoSubstructures b, PetscInt k, PetscInt j, HycoScene s, HycoText *t)
+{
+  const HycoTensor *of = &b->body[k].tensor;
+  PetscReal factor = 1;
+
+  PetscFunctionBegin;
+  for (PetscInt p = b->n_theta - 1; p >= 0; j /= of->n[p], p--) {
+    const PetscInt at = j % of->n[p];
+    char x[HYCO_LINE];
+
+    HycoFormat(x, "%s%s%s",
+               b->variable[p] == HYCO_BODIES_LOGARITHM    ? "ln("
+               : b->variable[p] == HYCO_BODIES_RECIPROCAL ? "(-1/"
+                                                          : "(",
+               s->parameter[b->theta[p]], ")");
+    for (PetscInt i = 0; i < of->n[p]; i++) {
+      if (i == at) continue;
+      factor /= of->x[p][at] - of->x[p][i];
+      PetscCall(HycoTextAdd(t, "(%s-(%.17g))*", x, (double)of->x[p][i]));
+    }
+  }
+  PetscCall(HycoTextAdd(t, "(%.17g)", (double)factor));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoExportWeights(HycoROM m, PetscInt *n, char ***text)
+{
+  const HycoSubstructures b = strcmp(m->model->type, "bodies") ? NULL : (HycoSubstructures)m->model->data;
+
+  PetscFunctionBegin;
+  *n = 0;
+  *text = NULL;
+  for (PetscInt k = 0; b && k < b->n; k++) {
+    for (PetscInt j = 0; j < b->body[k].n_samples && b->body[k].n_samples > 1; j++) {
+      HycoText t = {0};
+      PetscBool known = PETSC_FALSE;
+
+      PetscCall(WriteWeight(b, k, j, m->model->scene, &t));
+      for (PetscInt i = 0; i < *n && !known; i++) known = (PetscBool)!strcmp((*text)[i], t.text);
+      if (known) PetscCall(PetscFree(t.text));
+      if (known) continue;
+      PetscCall(PetscRealloc((size_t)(*n + 1) * sizeof(**text), text));
+      (*text)[(*n)++] = t.text;
+    }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -336,6 +383,16 @@ PetscInt HycoTravelPlaces(HycoTravel t)
   return ((HycoSubstructures)t->m->model->data)->ns;
 }
 
+PetscInt HycoTravelBodies(HycoTravel t)
+{
+  return t->bodies->bodies->n;
+}
+
+PetscInt HycoTravelAt(HycoTravel t, PetscInt place)
+{
+  return HycoBodiesAt(t->bodies->bodies, place);
+}
+
 void HycoTravelUnknowns(HycoTravel t, PetscReal z[])
 {
   const PetscInt p = t->bodies->bodies->p;
@@ -380,6 +437,8 @@ PetscReal HycoTravelValue(HycoTravel t, PetscInt i)
 {
   const Value *v = &t->value[i];
 
+  if (v->from == FLEXIBLE && t->bodies->bodies->body[v->index].n_samples > 1)
+    return t->bodies->share[v->index][v->part] / t->bodies->kappa[v->index];
   if (v->from == FLEXIBLE) return 1 / t->bodies->kappa[v->index];
   return v->from == HELD ? t->m->fe->u0[v->index] : t->bodies->pose[v->index].Q[v->part];
 }
@@ -399,6 +458,11 @@ PetscInt HycoTravelBody(HycoTravel t, PetscInt body)
 const PetscReal *HycoTravelTurn(HycoTravel t, PetscInt k)
 {
   return t->bodies->pose[k].Q;
+}
+
+PetscBool HycoTravelIsFlexible(HycoTravel t, PetscInt i, PetscInt k)
+{
+  return (PetscBool)(t->value[i].from == FLEXIBLE && t->value[i].index == k);
 }
 
 /* All entries of a turn are of one size. */

@@ -14,6 +14,9 @@ typedef struct _n_HycoTravel *HycoTravel;
 PetscErrorCode HycoTravelCreate(HycoROM m, HycoExportModel *out, HycoTravel *travel);
 PetscErrorCode HycoTravelDestroy(HycoTravel *travel);
 PetscInt HycoTravelPlaces(HycoTravel travel);
+/* The bodies; that of a place. */
+PetscInt HycoTravelBodies(HycoTravel travel);
+PetscInt HycoTravelAt(HycoTravel travel, PetscInt place);
 /* z at the last prediction. */
 void HycoTravelUnknowns(HycoTravel travel, PetscReal z[]);
 /* w of z at mu, where HycoROMOps.expand then has the fields of z. */
@@ -24,6 +27,8 @@ PetscErrorCode HycoTravelMotions(HycoTravel travel, const PetscReal mu[], PetscR
 PetscInt HycoTravelValues(HycoTravel travel);
 PetscReal HycoTravelValue(HycoTravel travel, PetscInt i);
 PetscInt HycoTravelGroup(HycoTravel travel, PetscInt i);
+/* Whether a value is of the flexibility of body k. */
+PetscBool HycoTravelIsFlexible(HycoTravel travel, PetscInt i, PetscInt k);
 /* The body that has a body of the scene, if it turns; -1: none. Its turn Q at the last mu. */
 PetscInt HycoTravelBody(HycoTravel travel, PetscInt body);
 const PetscReal *HycoTravelTurn(HycoTravel travel, PetscInt k);
