@@ -185,6 +185,33 @@ static int assemble(const Model *m, Work *o)
   return 1;
 }
 
+/* Entry n of four rows minus their products with the first n entries of another one; two sums of each. */
+static void subtract(size_t n, size_t row_length, const double b[], double rows[])
+{
+  double *r0 = rows, *r1 = r0 + row_length, *r2 = r1 + row_length, *r3 = r2 + row_length;
+  double s[8] = {0, 0, 0, 0, 0, 0, 0, 0};
+  size_t i = 0;
+
+  for (; i + 2 <= n; i += 2) {
+    for (size_t k = 0; k < 2; k++) {
+      s[k] += r0[i + k] * b[i + k];
+      s[2 + k] += r1[i + k] * b[i + k];
+      s[4 + k] += r2[i + k] * b[i + k];
+      s[6 + k] += r3[i + k] * b[i + k];
+    }
+  }
+  for (; i < n; i++) {
+    s[0] += r0[i] * b[i];
+    s[2] += r1[i] * b[i];
+    s[4] += r2[i] * b[i];
+    s[6] += r3[i] * b[i];
+  }
+  r0[n] -= s[0] + s[1];
+  r1[n] -= s[2] + s[3];
+  r2[n] -= s[4] + s[5];
+  r3[n] -= s[6] + s[7];
+}
+
 /* Lower factor, row by row, of the matrix in the lower triangle of a: n rows of the length `row_length`, of which the first
    `done` are factored. A row that depends on the former ones has an infinite pivot, so that its unknown is 0. Returns the
    number of such rows. */
@@ -192,16 +219,30 @@ static int factorise(size_t n, size_t row_length, size_t done, double a[])
 {
   int dependent = 0;
 
-  for (size_t i = done; i < n; i++) {
-    double *row = a + i * row_length, pivot = row[i];
+  for (size_t first = done; first < n; first += 4) {
+    const size_t end = first + 4 < n ? first + 4 : n;
 
-    for (size_t j = 0; j < i; j++) row[j] = (row[j] - dot(j, row, a + j * row_length)) / a[j * row_length + j];
-    row[i] = pivot - dot(i, row, row);
-    if (row[i] > 1e-13 * pivot) {
-      row[i] = sqrt(row[i]);
-    } else {
-      row[i] = HUGE_VAL;
-      dependent++;
+    /* Four rows at a time, which read the former ones once. */
+    for (size_t j = 0; j < first; j++) {
+      const double *former = a + j * row_length;
+
+      if (end == first + 4)
+        subtract(j, row_length, former, a + first * row_length);
+      else
+        for (size_t i = first; i < end; i++) a[i * row_length + j] -= dot(j, a + i * row_length, former);
+      for (size_t i = first; i < end; i++) a[i * row_length + j] /= former[j];
+    }
+    for (size_t i = first; i < end; i++) {
+      double *row = a + i * row_length, pivot = row[i];
+
+      for (size_t j = first; j < i; j++) row[j] = (row[j] - dot(j, row, a + j * row_length)) / a[j * row_length + j];
+      row[i] = pivot - dot(i, row, row);
+      if (row[i] > 1e-13 * pivot) {
+        row[i] = sqrt(row[i]);
+      } else {
+        row[i] = HUGE_VAL;
+        dependent++;
+      }
     }
   }
   return dependent;
