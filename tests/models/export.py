@@ -241,11 +241,11 @@ class Export(Case):
     def test_refused(self):
         """One line names what cannot be exported, and no file is written."""
         roller = ('-scene', os.path.join(SOURCE, 'examples', 'roller'))
-        self.hyco('train', *roller, '-contact_under_gap', '0.01', '-hyco_model_type', 'bodies', '-scatter', '2', '-model', 'roller.h5')
+        self.hyco('train', *roller, '-contact_under_gap', '0.01', '-hyco_model_type', 'bodies', '-scatter', '2', '-model', 'given.h5')
         self.hyco('train', '-scene', ROPE, '-grid', '4,5', '-model', 'hybrid.h5')
-        for words, args in ((('under', 'gap', 'travel'), ('-model', 'roller.h5', '-c', 'no.c')),
+        for words, args in ((('under', 'gap', 'travel'), ('-model', 'given.h5', '-c', 'no.c')),
                             (('hybrid', 'bodies'), ('-model', 'hybrid.h5', '-c', 'no.c')), (('-c', '.c'), ('-model', 'roller.h5', '-c', 'no.txt')),
-                            (('-c',), ('-model', 'roller.h5'))):
+                            (('-c',), ('-model', 'given.h5'))):
             run = self.run_raw('export', *args)
             self.assertEqual((run.returncode, len(run.stderr.strip().splitlines())), (1, 1), run.stderr)
             for word in words:
