@@ -244,7 +244,7 @@ class Export(Case):
         self.hyco('train', *roller, '-contact_under_gap', '0.01', '-hyco_model_type', 'bodies', '-scatter', '2', '-model', 'given.h5')
         self.hyco('train', '-scene', ROPE, '-grid', '4,5', '-model', 'hybrid.h5')
         for words, args in ((('under', 'gap', 'travel'), ('-model', 'given.h5', '-c', 'no.c')),
-                            (('hybrid', 'bodies'), ('-model', 'hybrid.h5', '-c', 'no.c')), (('-c', '.c'), ('-model', 'roller.h5', '-c', 'no.txt')),
+                            (('hybrid', 'bodies'), ('-model', 'hybrid.h5', '-c', 'no.c')), (('-c', '.c'), ('-model', 'given.h5', '-c', 'no.txt')),
                             (('-c',), ('-model', 'given.h5'))):
             run = self.run_raw('export', *args)
             self.assertEqual((run.returncode, len(run.stderr.strip().splitlines())), (1, 1), run.stderr)
