@@ -20,8 +20,9 @@ typedef struct {
   double *W, *A, *L, *V, *S, *last, *y;
   double *at_places, *push, *sum; /* n_motions + n_places: w for z = 0, z; n_terms */
   int *closed, *at, *made,
-      n_closed; /* by contact: 0, open; 2, one of the next; the closed ones, rows of L; of W's columns */
-  Met *met;     /* by contact; of moved surfaces, like */
+      n_closed;          /* by contact: 0, open; 2, one of the next; the closed ones, rows of L; of W's columns */
+  Met *met;              /* by contact; of moved surfaces, like */
+  int *touched, *before; /* places of moved surfaces that rows have; by place: how many of these precede it */
   Room room;
 } Work;
 
@@ -44,7 +45,8 @@ static size_t work_size(const Model *m)
                                (size_t)HycoPatchesBoxes(s->n_facets) * sizeof(HycoBox)
                          : 0;
 
-  return work_doubles(m) * sizeof(double) + moved + 3 * (size_t)m->n_contacts * sizeof(int);
+  return work_doubles(m) * sizeof(double) + moved +
+         (3 * (size_t)m->n_contacts + (s ? 2 * (size_t)m->n_places + 1 : 0)) * sizeof(int);
 }
 
 static double *take(double **from, size_t n)
@@ -92,6 +94,8 @@ static void place(const Model *m, void *memory, Work *o)
   o->closed = (int *)(void *)next;
   o->at = o->closed + n;
   o->made = o->at + n;
+  o->touched = s ? o->made + n : NULL;
+  o->before = s ? o->touched + places : NULL;
 }
 
 /* Four sums, which a compiler may add side by side. */
@@ -120,9 +124,16 @@ static void fill_moved(const Model *m, const Work *o, const Met *a, double y[], 
   for (int e = 0; e < a->n; e++) {
     for (const Block *b = m->block; b < m->block + m->n_blocks; b++) {
       const int row = a->place[e] - b->first;
+      const double factor = a->value[e] * o->value[b->value], *C = b->C;
 
-      if (row >= 0 && row < b->n)
-        add((size_t)b->n, a->value[e] * o->value[b->value], b->C + (size_t)row * (size_t)b->n, y + b->first);
+      if (row < 0 || row >= b->n) continue;
+      C += (size_t)row * (size_t)b->n;
+      if (2 * (o->before[b->first + b->n] - o->before[b->first]) > b->n) { /* all, side by side, cost less */
+        add((size_t)b->n, factor, C, y + b->first);
+        continue;
+      }
+      for (int t = o->before[b->first]; t < o->before[b->first + b->n]; t++)
+        y[o->touched[t]] += factor * C[o->touched[t] - b->first];
     }
   }
   for (int i = 0; i < m->n_contacts; i++) {
@@ -150,6 +161,23 @@ static const double *column(const Model *m, Work *o, size_t a)
   return w;
 }
 
+/* The places that contacts touch. */
+static void find_touched(const Model *m, Work *o)
+{
+  int n = 0;
+
+  memset(o->before, 0, (size_t)(m->n_places + 1) * sizeof(int));
+  for (int k = 0; k < m->n_contacts; k++) {
+    for (int e = 0; e < o->met[k].n; e++) o->before[o->met[k].place[e]] = 1;
+  }
+  for (int i = 0; i <= m->n_places; i++) {
+    const int is = o->before[i];
+
+    o->before[i] = n;
+    if (is) o->touched[n++] = i;
+  }
+}
+
 /* The values for z = 0, and q and A of the contacts at the functions' values; 0: the model does not know a node. */
 static int assemble(const Model *m, Work *o)
 {
@@ -165,6 +193,7 @@ static int assemble(const Model *m, Work *o)
   for (PetscInt k = 0; s && k < s->n_searches; k++) {
     if (!meet(s, &s->search[k], &o->room, o->value, o->met)) return 0;
   }
+  if (s) find_touched(m, o);
   for (size_t i = 0; i < p && s; i++) o->q[i] = q[i];
   for (size_t i = 0; i < n && s; i++) {
     const Met *a = &o->met[i];
