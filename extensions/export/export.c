@@ -2,10 +2,10 @@
   hyco export: the predictions of a model as one file of C99. The model's problem is probed through the operations that
   gradients use: w = q + M z, and the values from which the outputs follow, are affine in z, and functions of the parameters are
   found for their coefficients (functions.c). The runtime that the file has is also compiled here: before anything is
-  written, its predictions are compared with the model's.
+  written, its predictions are compared with the model's. Of surfaces that move past each other z has the forces at the
+  places of the surfaces instead (travel.c): the search, which is no function of the parameters, is the program's own.
 */
-#include "export.h"
-#include "runtime/runtime.c"
+#include "travel.h"
 #include <hycoextensions.h>
 #include <hycomaterialimpl.h>
 #include <hycoquantities.h>
@@ -13,36 +13,78 @@
 #include <string.h>
 #include <time.h>
 
-#define EXACT      1e-11 /* error of a function at points that were not fitted */
+#include "runtime/runtime.c"
+
+#define EXACT      2e-11 /* error of a function at points that were not fitted */
 #define CHECKED    64    /* points at which the runtime is compared with the model */
 #define AGREES     1e-9  /* difference there, of an output's largest value */
 #define PLACES     6     /* at which expressions in space are functions of the parameters */
 #define MOST       6000000
 #define MOST_ITEMS 3000
-#define SAMPLES    120 /* points for the functions, of which a third checks them */
+#define SAMPLES    120 /* points for the functions, of which a third checks them; more with weights of samples: */
+#define SEVERAL    20  /* samples: with more, products are tried of known functions alone */
+#define EACH       8   /* for each */
 
-/* A value: of an output, of a contact's force along an axis, of a stress in a cell, of a displacement. */
+/* A value: of an output, of a contact's force along an axis, of a stress in a cell, of a displacement, of a travel. */
 typedef struct {
-  enum { QUANTITY, FORCE, CELL, NODE } from;
-  PetscInt index, axis, group; /* group: the output to which it belongs */
+  enum { QUANTITY, FORCE, CELL, NODE, TRAVEL } from;
+  PetscInt index, axis, group; /* group: the output to which it belongs; from n_outputs on those of a travel */
   PetscReal coefficient[6];    /* of a cell's stresses */
+  PetscInt turned;             /* 1 + the body whose axes the values of a cell or node are in; 0: those of space */
 } Row;
 
 typedef struct {
   HycoROM m;
   HycoScene s;
-  PetscInt p, n, k, *contact; /* motions and contacts of the model's problem; the contacts with a row */
+  HycoTravel travel;          /* NULL: no surface moves */
+  PetscInt p, n, k, *contact; /* motions and contacts of the model's problem; the contacts with a row, or all places */
   PetscReal *z, *unit;        /* p + n; their sizes */
   PetscReal *w;
   PetscInt n_atoms, n_rows, room, ny, n_groups, *group;
   HycoAtom *atom;
   Row *row;
   PetscReal *area, *pressure; /* by contact of the model */
+  PetscInt travel_row;        /* the first row of the travel's values */
+  PetscInt n_weights;         /* of the samples of bodies: expressions */
+  char **weight;
   HycoExportFit base, response;
   HycoExportModel out;
 } Export;
 
 /* -- probing -- */
+
+/* The displacement that the row names, in the axes of its body. */
+static PetscReal Component(const Export *e, const Row *r, const PetscReal u[])
+{
+  const PetscInt dim = e->m->model->mesh->dim, node = r->index / dim;
+  const PetscReal *Q = r->turned ? HycoTravelTurn(e->travel, r->turned - 1) : NULL;
+  PetscReal sum = 0;
+
+  if (!Q) return u[r->index];
+  for (PetscInt c = 0; c < dim; c++) sum += Q[3 * c + r->index % dim] * u[node * dim + c];
+  return sum;
+}
+
+/* The same of stresses (xx, yy, zz, xy, yz, xz). */
+static PetscReal Stress(const Export *e, const Row *r, PetscInt n, const PetscReal sigma[])
+{
+  static const PetscInt at[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {0, 2}};
+  const PetscReal *Q = r->turned ? HycoTravelTurn(e->travel, r->turned - 1) : NULL;
+  PetscReal sum = 0;
+
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscInt i = at[k][0], j = at[k][1];
+    PetscReal own = Q ? 0 : sigma[k];
+
+    for (PetscInt c = 0; c < n && Q; c++) { /* Q^T sigma Q */
+      const PetscInt a = at[c][0], b = at[c][1];
+
+      own += sigma[c] * (Q[3 * a + i] * Q[3 * b + j] + (a == b ? 0 : Q[3 * b + i] * Q[3 * a + j]));
+    }
+    sum += r->coefficient[k] * own;
+  }
+  return sum;
+}
 
 /* y = (w, values) at mu for z: motions, then the contacts of e->contact in units of e->unit; NULL: 0. */
 static PetscErrorCode Probe(Export *e, const PetscReal mu[], const PetscReal z[], PetscReal y[])
@@ -63,7 +105,10 @@ static PetscErrorCode Probe(Export *e, const PetscReal mu[], const PetscReal z[]
     e->z[at] = z[i] * e->unit[i < e->p ? 0 : 1];
   }
   /* Order: the residual sets the parameters, expand the fields of z, from which the outputs follow. */
-  PetscUseTypeMethod(m, residual, mu, e->z, e->w, &size);
+  if (e->travel)
+    PetscCall(HycoTravelResidual(e->travel, mu, e->z, e->w));
+  else
+    PetscUseTypeMethod(m, residual, mu, e->z, e->w, &size);
   PetscUseTypeMethod(m, expand);
   PetscCall(HycoROMMeasureQuantities(m, &prediction));
   PetscCall(HycoROMSumContacts(m, m->Lambda, &result));
@@ -77,10 +122,10 @@ static PetscErrorCode Probe(Export *e, const PetscReal mu[], const PetscReal z[]
 
     *value = r->from == QUANTITY ? prediction.quantity[r->index]
              : r->from == FORCE  ? result[r->index].force[r->axis]
-             : r->from == NODE   ? u[r->index]
+             : r->from == NODE   ? Component(e, r, u)
+             : r->from == TRAVEL ? HycoTravelValue(e->travel, r->index)
                                  : 0;
-    for (PetscInt c = 0; r->from == CELL && c < n_sigma; c++)
-      *value += r->coefficient[c] * sigma[r->index * n_sigma + c];
+    if (r->from == CELL) *value = Stress(e, r, n_sigma, sigma + r->index * n_sigma);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -144,6 +189,9 @@ static PetscErrorCode AddItems(Export *e, PetscInt quantity, Output *o)
     PetscReal *const at = (cells ? sigma : u) + i * each;
     Row row = {.from = cells ? CELL : NODE, .index = cells ? i : i * each};
 
+    /* Invariants do not depend on the axes: in those of a turning body fewer functions of the parameters suffice. */
+    if (e->travel && o->of != COMPONENT)
+      row.turned = 1 + HycoTravelBody(e->travel, cells ? fe->mesh->cell_body[i] : fe->mesh->node_body[i]);
     at[0] = 1;
     /* 0 outside of the output's group, 1 in it; the mean of the same field is the item's weight. */
     PetscCall(MeasureOne(fe, *q, HYCO_QUANTITY_MAX, one, u, sigma, &in));
@@ -190,6 +238,12 @@ static PetscErrorCode AddContacts(Export *e, const HycoQuantity *q, const PetscR
     PetscInt at = 0;
 
     if (!of[k]) continue;
+    if (e->travel) { /* areas are the program's */
+      PetscCall(HycoExportAddContact(&e->out, k));
+      o->weight = -1;
+      o->n++;
+      continue;
+    }
     while (at < e->k && e->contact[at] != k) at++;
     if (at == e->k && (o->kind != PRESSURE_SMALLEST || !e->k)) continue; /* it is always open */
     PetscCall(HycoExportAddContact(&e->out, at < e->k ? at : 0));
@@ -197,6 +251,44 @@ static PetscErrorCode AddContacts(Export *e, const HycoQuantity *q, const PetscR
     o->n++;
   }
   PetscCall(PetscFree(of));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of moved surfaces: the sum of the contacts' forces on their slaves, q is of, or their moment. */
+static PetscErrorCode AddForces(Export *e, const HycoQuantity *q, Output *o)
+{
+  const HycoPairs *pairs = &e->m->model->pairs;
+  const PetscBool none = (PetscBool)(e->m->fe->formulation == HYCO_AXISYMMETRIC && !q->field); /* the sum of a ring */
+  PetscReal *weight;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(pairs->n, &weight));
+  for (PetscInt k = 0; k < pairs->n; k++) weight[k] = 0;
+  *o = (Output){.kind = RESULTANT, .of = (int)q->field + (q->kind == HYCO_QUANTITY_MOMENT ? 3 : 0), .width = -1};
+  PetscCall(AddContacts(e, q, weight, o));
+  o->weight = e->out.n_weights;
+  for (PetscInt k = 0; k < o->n + e->out.surfaces.n_nodes; k++)
+    PetscCall(HycoExportAddWeight(&e->out, k < o->n && !none ? -1 : 0));
+  PetscCall(PetscFree(weight));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of moved surfaces: a reaction that follows from the balance of bodies is the value of the loads, against which the contacts
+   push those of[]. */
+static PetscErrorCode AddPush(Export *e, const PetscBool of[], PetscInt axis, Output *o)
+{
+  const HycoPairs *pairs = &e->m->model->pairs;
+  const PetscInt *body = e->m->model->mesh->node_body;
+
+  PetscFunctionBegin;
+  *o = (Output){
+      .kind = RESULTANT, .of = (int)axis, .width = o->first, .first = e->out.n_contact, .weight = e->out.n_weights};
+  o->n = pairs->n;
+  for (PetscInt k = 0; k < pairs->n; k++) {
+    PetscCall(HycoExportAddContact(&e->out, k));
+    PetscCall(HycoExportAddWeight(&e->out, of[body[pairs->slave[k]]]));
+  }
+  for (PetscInt i = 0; i < e->out.surfaces.n_nodes; i++) PetscCall(HycoExportAddWeight(&e->out, of[e->out.body[i]]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -253,9 +345,14 @@ static PetscErrorCode AddQuantity(Export *e, PetscInt k)
   } else if (kind >= HYCO_QUANTITY_AREA) {
     o.kind = kind == HYCO_QUANTITY_AREA ? CLOSED : kind == HYCO_QUANTITY_PRESSURE ? PRESSURE : PRESSURE_SMALLEST;
     PetscCall(AddContacts(e, q, kind == HYCO_QUANTITY_AREA ? e->area : e->pressure, &o));
+  } else if (e->travel && (kind == HYCO_QUANTITY_FORCE || kind == HYCO_QUANTITY_MOMENT)) {
+    PetscCall(AddForces(e, q, &o));
   } else {
+    const PetscBool *pushed = e->travel ? HycoROMGetPushed(e->m, k) : NULL;
+
     o.n = 1;
     PetscCall(AddRow(e, (Row){.from = QUANTITY, .index = k, .group = e->out.n_outputs}));
+    if (pushed) PetscCall(AddPush(e, pushed, q->field, &o));
   }
   PetscCall(AddOutput(e, &o, q->name, HycoExportUnit(e->s, q)));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -273,18 +370,21 @@ static PetscErrorCode FindOutputs(Export *e)
   for (PetscInt k = 0; k < s->n_quantities; k++) PetscCall(AddQuantity(e, k));
   for (PetscInt c = 0; c < s->n_contacts; c++) {
     for (PetscInt a = 0; a < e->m->model->mesh->dim; a++) {
-      const Output o = {.kind = SUM, .of = COMPONENT, .n = 1, .width = 1, .first = e->n_rows, .weight = -1};
+      Output o = {.kind = SUM, .of = COMPONENT, .n = 1, .width = 1, .first = e->n_rows, .weight = -1};
 
-      PetscCall(AddRow(e, (Row){.from = FORCE, .index = c, .axis = a, .group = e->out.n_outputs}));
+      q = (HycoQuantity){
+          .kind = HYCO_QUANTITY_FORCE, .field = a, .contact = (char *)s->contact[c]->name}; /* borrowed */
+      if (e->travel)
+        PetscCall(AddForces(e, &q, &o));
+      else
+        PetscCall(AddRow(e, (Row){.from = FORCE, .index = c, .axis = a, .group = e->out.n_outputs}));
       HycoFormat(name, "%s.force_%c", s->contact[c]->name, "xyz"[a]);
-      q.kind = HYCO_QUANTITY_FORCE;
       PetscCall(AddOutput(e, &o, name, HycoExportUnit(s, &q)));
     }
     for (PetscInt a = 0; a < 2; a++) {
       Output o = {.kind = a ? PRESSURE : CLOSED};
 
       q.kind = a ? HYCO_QUANTITY_PRESSURE : HYCO_QUANTITY_AREA;
-      q.contact = (char *)s->contact[c]->name; /* borrowed */
       PetscCall(AddContacts(e, &q, a ? e->pressure : e->area, &o));
       HycoFormat(name, "%s.%s", s->contact[c]->name, a ? "pressure_max" : "area");
       PetscCall(AddOutput(e, &o, name, HycoExportUnit(s, &q)));
@@ -305,13 +405,19 @@ static PetscErrorCode FindProblem(Export *e, const PetscReal mu[])
 
   PetscFunctionBegin;
   PetscUseTypeMethod(m, unknowns, &e->p, &e->n, NULL);
+  if (e->travel) e->n = HycoTravelPlaces(e->travel);
   n = (size_t)(e->p + e->n);
   PetscCall(PetscMalloc4(n + 1, &e->z, n + 1, &e->w, 2, &e->unit, e->n + 1, &e->contact));
-  PetscUseTypeMethod(m, unknowns, &e->p, &e->n, e->z);
+  if (e->travel)
+    HycoTravelUnknowns(e->travel, e->z);
+  else
+    PetscUseTypeMethod(m, unknowns, &e->p, &e->n, e->z);
   /* Sizes of motions and forces at the solution, by which probing stays above round-off. */
   e->unit[0] = e->unit[1] = 0;
   for (PetscInt i = 0; i < e->p + e->n; i++) e->unit[i >= e->p] = PetscMax(e->unit[i >= e->p], PetscAbsReal(e->z[i]));
   for (PetscInt i = 0; i < 2; i++) e->unit[i] = e->unit[i] > 0 ? e->unit[i] : 1;
+  for (PetscInt i = 0; e->travel && i < e->n; i++) e->contact[e->k++] = i;
+  if (e->travel) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc2(n * n + 1, &M, e->n + 1, &all));
   PetscUseTypeMethod(m, residual, mu, e->z, e->w, &size);
   for (PetscInt i = 0; i < e->n; i++) all[i] = i;
@@ -384,6 +490,8 @@ static PetscErrorCode Sample(Export *e, PetscInt n, PetscInt fixed, Samples *o)
       ierr = Probe(e, o->mu + i * n_par, z, added + j * e->ny);
       /* y is affine in z: the difference is M z, and T z of the values. */
       for (PetscInt r = 0; r < e->ny; r++) added[j * e->ny + r] -= y[r];
+      /* The flexibility of places is in blocks, times values. */
+      if (e->travel) ierr = PetscArrayzero(added + j * e->ny + e->p, e->k);
     }
   }
   PetscCall(PetscFree(z));
@@ -419,34 +527,153 @@ static void Scale(const Export *e, const Samples *o, PetscReal scale[])
   }
 }
 
-/* Functions of the first level that suffices, up to the last one; else of that. */
-static PetscErrorCode Fit(Export *e, PetscInt last, const HycoFitData *data, HycoExportFit *fit)
+/* The rows of a part, of all points. */
+static PetscErrorCode Select(const HycoFitData *all, PetscInt n, const PetscInt row[], PetscReal **y, PetscInt **group)
 {
   PetscFunctionBegin;
-  fit->worst = PETSC_MAX_REAL;
-  for (PetscInt level = 0; level <= last && fit->worst > EXACT; level++) {
-    PetscCall(FreeFit(fit));
-    PetscCall(HycoFitFunctions(e->s, e->n_atoms, e->atom, level, EXACT, data, fit));
+  PetscCall(PetscMalloc1((size_t)all->n_points * (size_t)n + 1, y));
+  PetscCall(PetscMalloc1(n + 1, group));
+  for (PetscInt k = 0; k < n; k++) {
+    (*group)[k] = all->group[row[k]];
+    for (PetscInt i = 0; i < all->n_points; i++)
+      (*y)[(size_t)i * (size_t)n + (size_t)k] = all->y[(size_t)i * (size_t)all->n_rows + (size_t)row[k]];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Both fits; that of the response needs no products. */
+/* Adds the functions and coefficients of some rows to fit, whose coefficients then are rows x functions; the functions of
+   other rows have the coefficient 0. */
+static PetscErrorCode Join(const HycoExportFit *part, PetscInt n, const PetscInt row[], PetscInt n_rows,
+                           HycoExportFit *fit)
+{
+  PetscReal *coefficient;
+  PetscInt *place, more = fit->n;
+
+  PetscFunctionBegin;
+  PetscCall(PetscRealloc((size_t)(fit->n + part->n) * sizeof(*fit->function), &fit->function));
+  PetscCall(PetscMalloc1(part->n, &place));
+  for (PetscInt k = 0; k < part->n; k++) {
+    place[k] = 0;
+    while (place[k] < more && memcmp(&fit->function[place[k]], &part->function[k], sizeof(*part->function)) != 0)
+      place[k]++;
+    if (place[k] == more) fit->function[more++] = part->function[k];
+  }
+  PetscCall(PetscCalloc1((size_t)more * (size_t)n_rows + 1, &coefficient));
+  for (PetscInt r = 0; r < n_rows; r++) {
+    for (PetscInt k = 0; k < fit->n; k++)
+      coefficient[(size_t)r * (size_t)more + (size_t)k] = fit->coefficient[(size_t)r * (size_t)fit->n + (size_t)k];
+  }
+  for (PetscInt r = 0; r < n; r++) {
+    for (PetscInt k = 0; k < part->n; k++)
+      coefficient[(size_t)row[r] * (size_t)more + (size_t)place[k]] =
+          part->coefficient[(size_t)r * (size_t)part->n + (size_t)k];
+  }
+  PetscCall(PetscFree(place));
+  PetscCall(PetscFree(fit->coefficient));
+  fit->coefficient = coefficient;
+  fit->n = more;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The functions of `from` that some rows have, of the group's response, or of the flexibility of the body to whose places
+   they belong: the rows without forces have products of them. */
+static PetscErrorCode FindSeeds(Export *e, PetscInt first, const HycoExportFit *from, PetscInt *n, HycoFunction seed[])
+{
+  const PetscInt g = e->group[first], places = e->n_groups - (e->travel ? HycoTravelBodies(e->travel) : 0);
+
+  PetscFunctionBegin;
+  *n = 0;
+  for (PetscInt k = 0; k < from->n; k++) {
+    PetscBool has = PETSC_FALSE;
+
+    for (PetscInt r = 0; r < e->ny && !has; r++) {
+      const PetscInt at = r - e->p - e->k - e->travel_row;
+      const PetscBool of =
+          (PetscBool)(g < places ? e->group[r] == g : at >= 0 && HycoTravelIsFlexible(e->travel, at, g - places));
+
+      has = (PetscBool)(of && from->coefficient[(size_t)r * (size_t)from->n + (size_t)k] != 0);
+    }
+    if (has) seed[(*n)++] = from->function[k];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Functions of the first level that suffices for rows, up to the last one; else of that. */
+static PetscErrorCode FitRows(Export *e, PetscInt last, const HycoFitData *all, PetscInt n, const PetscInt row[],
+                              HycoExportFit *fit)
+{
+  const HycoExportFit *from =
+      e->group[row[0]] < e->n_groups - (e->travel ? HycoTravelBodies(e->travel) : 0) ? &e->response : fit;
+  HycoFunction *seed;
+  PetscInt n_seeds = 0;
+  HycoFitData data = {all->n_points, n, all->atom, NULL, NULL, all->scale};
+  HycoExportFit part = {.worst = PETSC_MAX_REAL};
+  PetscReal *y;
+  PetscInt *group;
+
+  PetscFunctionBegin;
+  PetscCall(Select(all, n, row, &y, &group));
+  data.y = y;
+  data.group = group;
+  PetscCall(PetscMalloc1(PetscMax(from->n, 1), &seed));
+  if (e->n_weights > SEVERAL) last = PetscMin(last, 1);
+  if (e->travel && fit == &e->base) PetscCall(FindSeeds(e, row[0], from, &n_seeds, seed));
+  for (PetscInt level = n_seeds ? -1 - e->n_atoms : 0; level <= last && part.worst > EXACT; level++) {
+    PetscCall(FreeFit(&part));
+    PetscCall(HycoFitFunctions(e->n_atoms, e->atom, level, n_seeds, seed, EXACT, &data, &part));
+  }
+  PetscCall(PetscFree(seed));
+  if (!part.function) part.n = 0; /* too many were left */
+  PetscCall(Join(&part, n, row, all->n_rows, fit));
+  if (part.worst > fit->worst || !fit->worst) {
+    fit->worst = part.worst;
+    fit->worst_row = row[part.worst_row];
+  }
+  PetscCall(FreeFit(&part));
+  HycoFreeAll(&y, &group);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of all rows at once, or where surfaces move of each group, whose values have few functions of the many. */
+static PetscErrorCode Fit(Export *e, PetscInt last, const HycoFitData *data, HycoExportFit *fit)
+{
+  PetscInt *row;
+
+  PetscFunctionBegin;
+  PetscCall(FreeFit(fit));
+  *fit = (HycoExportFit){0};
+  PetscCall(PetscMalloc1(data->n_rows + 1, &row));
+  for (PetscInt g = 0; g < (e->travel ? e->n_groups : 1) && fit->worst <= EXACT; g++) {
+    PetscInt n = 0;
+
+    for (PetscInt r = 0; r < data->n_rows; r++) {
+      if (!e->travel || data->group[r] == g) row[n++] = r;
+    }
+    if (n && (!e->travel || data->scale[g] > 0)) PetscCall(FitRows(e, last, data, n, row, fit));
+  }
+  PetscCall(PetscFree(row));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Both fits; that of the response needs products only where bodies turn. */
 static PetscErrorCode FitBoth(Export *e, PetscInt fixed)
 {
   Samples o;
-  PetscReal *scale;
+  PetscReal *scale, *value;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(e->n_groups, &scale));
-  PetscCall(Sample(e, SAMPLES, fixed, &o));
+  PetscCall(Sample(e, PetscMax(SAMPLES, EACH * e->n_weights), fixed, &o));
+  PetscCall(PetscMalloc1((size_t)o.n * (size_t)e->n_atoms + 1, &value));
+  PetscCall(HycoAtomsTabulate(e->s, e->n_atoms, e->atom, o.n, o.mu, value));
   Scale(e, &o, scale);
-  PetscCall(Fit(e, 1, &(HycoFitData){o.n, 2 * e->ny, o.mu, o.added, e->group, scale}, &e->response));
+  PetscCall(Fit(e, e->travel ? HYCO_FIT_LEVELS - 2 : 1, &(HycoFitData){o.n, 2 * e->ny, value, o.added, e->group, scale},
+                &e->response));
   /* If the response has no functions the export is refused anyway: the costly levels are left out. */
   PetscCall(Fit(e, e->response.worst > EXACT ? 0 : HYCO_FIT_LEVELS - 1,
-                &(HycoFitData){o.n, e->ny, o.mu, o.y, e->group, scale}, &e->base));
+                &(HycoFitData){o.n, e->ny, value, o.y, e->group, scale}, &e->base));
   PetscCall(FreeSamples(&o));
-  PetscCall(PetscFree(scale));
+  HycoFreeAll(&scale, &value);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -460,19 +687,23 @@ static PetscErrorCode Refuse(Export *e)
   PetscFunctionBegin;
   if (at < 0)
     HycoFormat(of, "%s", row < e->p ? "the loads on bodies that contact alone holds" : "the gaps");
+  else if (e->row[at].from == TRAVEL)
+    HycoFormat(of, "the stiffness or the turn of a body");
   else
     HycoFormat(of, "the output %s", e->out.name[e->row[at].group]);
-  for (PetscInt p = 0; p < e->s->n_parameters; p++) {
+  for (PetscInt p = 0; p < e->s->n_parameters && !e->travel; p++) { /* there it takes long */
     /* With parameter p fixed: if the fits are exact then, p is what has no such functions. */
     PetscCall(FitBoth(e, p));
     if (e->base.worst <= EXACT && e->response.worst <= EXACT) PetscCall(HycoListAdd(list, " and ", e->s->parameter[p]));
   }
-  if (response)
-    HycoFail("export: the directions of contacts or the stiffness change with %s otherwise than by factors of moduli; "
-             "contacts that travel or turn, shapes and ratios of moduli within a body cannot be exported",
-             list[0] ? list : "several parameters");
-  HycoFail("export: %s change%s with %s otherwise than by sums of products of the scene's expressions", of,
-           row == e->p + e->k || at >= 0 ? "s" : "", list[0] ? list : "several parameters");
+  if (response && at < 0)
+    HycoFail(
+        "export: the directions of contacts or the stiffness change with %s otherwise than by factors of moduli and "
+        "samples of bodies; contacts that turn with a stated normal or a shape cannot be exported",
+        list[0] ? list : "several parameters");
+  HycoFail("export: %s change%s with %s otherwise than by sums of products of the scene's expressions and weights of "
+           "samples, as stresses in a body do whose shape changes",
+           of, row == e->p + e->k || at >= 0 ? "s" : "", list[0] ? list : "several parameters");
 }
 
 /* -- the arrays -- */
@@ -487,14 +718,36 @@ static PetscErrorCode Merge(Export *e, const HycoExportFit *fit, PetscInt place[
     const HycoFunction *f = &fit->function[k];
     PetscInt at = 0;
 
-    while (at < o->n_functions && (o->function[at].a != f->a || o->function[at].b != f->b || o->function[at].c != f->c))
-      at++;
+    while (at < o->n_functions && memcmp(&o->function[at], f, sizeof(*f)) != 0) at++;
     if (at == o->n_functions) {
       PetscCall(PetscRealloc((size_t)(at + 1) * sizeof(*o->function), &o->function));
       o->function[o->n_functions++] = *f;
     }
     place[k] = at;
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Two steps X = X (2 - M X) of a pseudo-inverse X, which has lost the digits of M's condition: functions of different outputs
+   may depend nearly on each other. */
+static PetscErrorCode RefineInverse(size_t n, const PetscReal M[], PetscReal X[])
+{
+  PetscReal *MX, *old;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2(n * n, &MX, n * n, &old));
+  for (PetscInt step = 0; step < 2; step++) {
+    PetscCall(PetscArraycpy(old, X, n * n));
+    for (size_t k = 0; k < n * n; k++) {
+      MX[k] = k / n == k % n ? 2 : 0;
+      for (size_t j = 0; j < n; j++) MX[k] -= M[k / n * n + j] * old[j * n + k % n];
+    }
+    for (size_t k = 0; k < n * n; k++) {
+      X[k] = 0;
+      for (size_t j = 0; j < n; j++) X[k] += old[k / n * n + j] * MX[j * n + k % n];
+    }
+  }
+  PetscCall(PetscFree2(MX, old));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -525,7 +778,8 @@ static PetscErrorCode ChoosePoints(Export *e, PetscReal point[], PetscReal inver
     PetscCall(HycoFunctionsEvaluate(e->s, e->atom, n, e->response.function, point + i * n_par, chosen + i * n));
     for (PetscInt k = 0; k < n; k++) chosen[i * n + k] /= scale[k];
   }
-  PetscCall(HycoPseudoInverse(n, n, chosen, 1e-15, inverse)); /* inverse[k * n + i]: of function k at point i */
+  PetscCall(HycoPseudoInverse(n, n, chosen, 1e-12, inverse)); /* inverse[k * n + i]: of function k at point i */
+  PetscCall(RefineInverse((size_t)n, chosen, inverse));
   for (PetscInt k = 0; k < n * n; k++) inverse[k] /= scale[k / n];
   PetscCall(PetscFree4(value, chosen, scale, pivot));
   PetscCall(HycoSamplesDestroy(&samples));
@@ -541,11 +795,17 @@ static PetscErrorCode AddMatrix(Export *e, const PetscReal mu[], const PetscReal
 
   PetscFunctionBegin;
   PetscCall(PetscArrayzero(e->z, e->p + e->n));
-  /* z = 0; sets the parameters for the jacobian. */
-  PetscUseTypeMethod(e->m, residual, mu, e->z, e->w, &largest);
-  PetscUseTypeMethod(e->m, jacobian, e->k, e->contact, M);
+  if (e->travel) {
+    PetscCall(HycoTravelMotions(e->travel, mu, M)); /* k x p */
+  } else {
+    /* z = 0; sets the parameters for the jacobian. */
+    PetscUseTypeMethod(e->m, residual, mu, e->z, e->w, &largest);
+    PetscUseTypeMethod(e->m, jacobian, e->k, e->contact, M);
+  }
   for (PetscInt f = 0; f < e->response.n; f++) {
     for (size_t i = 0; i < k; i++) {
+      for (size_t j = 0; j < p && e->travel; j++) o->A[((size_t)f * p + j) * k + i] += share[f] * M[i * p + j];
+      if (e->travel) continue;
       for (size_t j = 0; j <= i; j++) o->W[(size_t)f * size + i * (i + 1) / 2 + j] += share[f] * M[(p + i) * n + p + j];
       for (size_t j = 0; j < p; j++) o->A[((size_t)f * p + j) * k + i] += share[f] * M[(p + i) * n + j];
     }
@@ -578,6 +838,20 @@ static PetscErrorCode AddValues(Export *e, const PetscReal mu[], const PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The terms by unknown: most have no force, and are passed over. */
+static PetscErrorCode Transpose(size_t n, HycoExportModel *o)
+{
+  const size_t terms = (size_t)o->n_terms;
+  PetscReal *by;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n * terms + 1, &by));
+  for (size_t i = 0; i < n * terms; i++) by[i % n * terms + i / n] = o->term[i];
+  PetscCall(PetscFree(o->term));
+  o->term = by;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The rows of T that are more than round-off beside the others of their value, as terms. */
 static PetscErrorCode KeepTerms(Export *e, const PetscInt place[], const PetscReal T[])
 {
@@ -587,9 +861,10 @@ static PetscErrorCode KeepTerms(Export *e, const PetscInt place[], const PetscRe
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc3(n_f, &scale, n_f, &value, n_f, &size));
-  /* Sizes of the functions at the ends and the middle of the ranges. */
-  for (PetscInt end = 0; end < 3; end++) {
-    for (PetscInt p = 0; p < e->s->n_parameters; p++) mu[p] = e->s->lo[p] + (e->s->hi[p] - e->s->lo[p]) * end / 2;
+  /* Sizes of the functions: at the ends, the middle and between, where a weight of a sample is not 0 everywhere. */
+  for (PetscInt k = 0; k < 7; k++) {
+    for (PetscInt p = 0; p < e->s->n_parameters; p++)
+      mu[p] = e->s->lo[p] + (e->s->hi[p] - e->s->lo[p]) * (k < 3 ? (PetscReal)k / 2 : 0.07 + 0.23 * (PetscReal)(k - 3));
     PetscCall(HycoFunctionsEvaluate(e->s, e->atom, n_f, e->response.function, mu, value));
     for (PetscInt f = 0; f < n_f; f++) scale[f] = PetscMax(scale[f], PetscAbsReal(value[f]));
   }
@@ -609,6 +884,7 @@ static PetscErrorCode KeepTerms(Export *e, const PetscInt place[], const PetscRe
             HycoExportAddTerm(&e->out, r, place[f], (PetscInt)n, T + ((size_t)f * (size_t)e->n_rows + (size_t)r) * n));
     }
   }
+  PetscCall(Transpose(n, &e->out));
   PetscCall(PetscFree3(scale, value, size));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -619,7 +895,10 @@ static PetscErrorCode Fill(Export *e)
   HycoExportModel *o = &e->out;
   const size_t k = (size_t)e->k, n = (size_t)(e->p + e->k), f = (size_t)e->response.n;
   /* As a real: the product may exceed PetscInt. It bounds the file's size and the memory below. */
-  const PetscReal numbers = (PetscReal)f * ((PetscReal)k * (PetscReal)k / 2 + (PetscReal)e->n_rows * (PetscReal)n) + 1;
+  const PetscReal square = e->travel ? 0 : (PetscReal)k * (PetscReal)k / 2;
+  const PetscReal numbers = (PetscReal)f * (square + (PetscReal)e->n_rows * (PetscReal)n) + 1 +
+                            (e->travel ? HycoTravelNumbers(e->travel) : 0);
+  const size_t triangle = e->travel ? 0 : k * (k + 1) / 2, matrix = e->travel ? k * (size_t)e->p : n * n;
   PetscInt *place;
   PetscReal *point, *inverse, *T, *M, *share;
 
@@ -639,15 +918,17 @@ static PetscErrorCode Fill(Export *e)
           e->base.coefficient[(size_t)r * (size_t)e->base.n + (size_t)j];
   }
   o->n_motions = e->p;
-  o->n_contacts = e->k;
+  o->n_places = e->k;
+  o->n_contacts = e->travel ? e->m->model->pairs.n : e->k;
+  if (e->travel) PetscCall(HycoTravelBlocks(e->travel, e->travel_row, o));
   o->n_values = e->n_rows;
   o->n_stiffness = e->response.n;
   PetscCall(PetscMalloc1(e->response.n + 1, &o->stiffness));
   for (PetscInt i = 0; i < e->response.n; i++) o->stiffness[i] = (int)place[e->base.n + i];
-  PetscCall(PetscCalloc1(f * k * (k + 1) / 2 + 1, &o->W));
+  PetscCall(PetscCalloc1(f * triangle + 1, &o->W));
   PetscCall(PetscCalloc1(f * (size_t)e->p * k + 1, &o->A));
   PetscCall(PetscCalloc5(f * (size_t)e->s->n_parameters + 1, &point, f * f + 1, &inverse, f * (size_t)e->n_rows * n + 1,
-                         &T, n * n + 1, &M, f + 1, &share));
+                         &T, matrix + 1, &M, f + 1, &share));
   PetscCall(ChoosePoints(e, point, inverse));
   for (PetscInt i = 0; i < e->response.n; i++) {
     for (PetscInt j = 0; j < e->response.n; j++) share[j] = inverse[(size_t)j * f + (size_t)i];
@@ -671,6 +952,7 @@ static PetscErrorCode RunHere(Export *e, const Model *model, Work *o, const Pets
 
   PetscFunctionBegin;
   PetscCall(HycoFunctionsEvaluate(e->s, e->atom, e->out.n_functions, e->out.function, mu, o->f));
+  if (e->travel) PetscCall(HycoTravelPositions(&e->out, e->s, mu, o->room.X));
   *solved = (PetscBool)(predict(model, o, out, &kkt, &its) == OK);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -758,7 +1040,11 @@ static PetscErrorCode CompareHere(Export *e)
   const Model model = {.n_parameters = (int)e->s->n_parameters,
                        .n_functions = (int)o->n_functions,
                        .n_motions = (int)o->n_motions,
+                       .n_places = (int)o->n_places,
                        .n_contacts = (int)o->n_contacts,
+                       .n_blocks = (int)o->n_blocks,
+                       .block = o->block,
+                       .surfaces = e->travel ? &o->surfaces : NULL,
                        .n_stiffness = (int)o->n_stiffness,
                        .n_values = (int)o->n_values,
                        .n_terms = (int)o->n_terms,
@@ -791,6 +1077,7 @@ static PetscErrorCode Prepare(Export *e)
 {
   const HycoROM m = e->m;
   PetscReal mu[HYCO_MAX_PARAMETERS], x[3 * PLACES];
+  PetscInt places; /* the group of the first body's places */
 
   PetscFunctionBegin;
   PetscCall(HycoSceneRefuseHistory(e->s, "hyco export"));
@@ -798,22 +1085,35 @@ static PetscErrorCode Prepare(Export *e)
             "a model of type %s cannot be exported; train one with -hyco_model_type bodies", m->model->type);
   for (PetscInt p = 0; p < e->s->n_parameters; p++) mu[p] = (e->s->lo[p] + e->s->hi[p]) / 2;
   PetscCall(HycoROMPredict(m, e->s->n_parameters, mu));
+  PetscCall(HycoTravelCreate(m, &e->out, &e->travel));
   PetscCall(FindProblem(e, mu));
   e->out.tolerance = m->solver->rtol;
   PetscCall(HycoROMMeasureQuantities(m, &(HycoPrediction){0}));
   PetscCall(FindOutputs(e));
+  e->travel_row = e->n_rows;
+  if (e->travel) HycoTravelStart(e->travel, e->n_rows, &e->out);
+  for (PetscInt i = 0; e->travel && i < HycoTravelValues(e->travel); i++)
+    PetscCall(AddRow(e, (Row){.from = TRAVEL, .index = i, .group = e->out.n_outputs + HycoTravelGroup(e->travel, i)}));
   for (PetscInt i = 0; i < PLACES; i++) /* nodes without regularity */
     PetscCall(PetscArraycpy(x + 3 * i, m->fe->X + 3 * ((i * 7919 + 13) % m->fe->mesh->n_nodes), 3));
-  PetscCall(HycoAtomsFind(e->s, PLACES, x, &e->n_atoms, &e->atom));
+  PetscCall(HycoAtomsFind(e->s, (PetscBool)(e->travel != NULL), PLACES, x, &e->n_atoms, &e->atom));
+  PetscCall(HycoExportWeights(m, &e->n_weights, &e->weight));
+  for (PetscInt i = 0; i < e->n_weights; i++) PetscCall(HycoAtomsAddWeight(e->s, e->weight[i], &e->n_atoms, &e->atom));
   e->out.n_atoms = e->n_atoms;
   e->out.atom = e->atom;
   e->ny = e->p + e->k + e->n_rows;
-  e->n_groups = 2 + e->out.n_outputs;
+  places = 2 + e->out.n_outputs + (e->travel ? HycoTravelValues(e->travel) : 0);
+  e->n_groups = places + (e->travel ? HycoTravelBodies(e->travel) : 0);
   PetscCall(PetscMalloc1(2 * e->ny + 1, &e->group));
   for (PetscInt r = 0; r < 2 * e->ny; r++) {
     const PetscInt at = r % e->ny;
 
-    e->group[r] = at < e->p ? 0 : at < e->p + e->k ? 1 : 2 + e->row[at - e->p - e->k].group;
+    if (at >= e->p + e->k)
+      e->group[r] = 2 + e->row[at - e->p - e->k].group;
+    else if (at >= e->p && e->travel)
+      e->group[r] = places + HycoTravelAt(e->travel, at - e->p);
+    else
+      e->group[r] = at >= e->p;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -848,8 +1148,10 @@ static PetscErrorCode ExportC(HycoROM m, const char path[], char **description)
   HycoPointEnd(point);
   PetscCall(FreeFit(&e.base));
   PetscCall(FreeFit(&e.response));
+  PetscCall(HycoTravelDestroy(&e.travel));
   if (e.z) PetscCall(PetscFree4(e.z, e.w, e.unit, e.contact));
-  HycoFreeAll(&e.group, &e.atom, &e.row, &e.area, &e.pressure);
+  for (PetscInt i = 0; i < e.n_weights; i++) PetscCall(PetscFree(e.weight[i]));
+  HycoFreeAll(&e.weight, &e.group, &e.atom, &e.row, &e.area, &e.pressure);
   PetscCall(HycoExportModelFree(&e.out));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -190,6 +190,11 @@ static PetscReal Name(Parser *p)
   }
   if (n != 1 || name[0] < 'x' || name[0] > 'z') return Invalid(p);
   p->space = PETSC_TRUE;
+  if (!p->x) {
+    snprintf(text, sizeof(text), "x[%d]", name[0] - 'x');
+    Write(p, text);
+    return 0;
+  }
   WriteNumber(p, p->x[name[0] - 'x']);
   return p->x[name[0] - 'x'];
 }

@@ -1,7 +1,33 @@
-# The runtime's text as an array, from which each exported file begins.
-set(text ${PROJECT_SOURCE_DIR}/extensions/export/runtime/runtime.c)
-set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${text})
-file(READ ${text} bytes HEX)
+# The text from which each exported file begins, as an array: what the library's search and a program share, then the runtime. Of the library's files it is
+# what stands between two comments; their functions become static.
+set(text "")
+foreach(file extensions/export/runtime/library.c include/private/hycomesh.h include/private/hycovector.h src/contact/nearest.h src/contact/master_search.h
+             src/contact/nearest.c src/contact/master_search.c extensions/export/runtime/model.h extensions/export/runtime/surfaces.c
+             extensions/export/runtime/runtime.c)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${file})
+  file(READ ${PROJECT_SOURCE_DIR}/${file} rest)
+  set(begin "/* -- begin: in exported models too -- */")
+  set(end "/* -- end: in exported models too -- */")
+  if(file MATCHES "^extensions")
+    string(REGEX REPLACE "#include \"[^\n]*\n" "" rest "${rest}")
+    string(APPEND text "${rest}\n")
+    continue()
+  endif()
+  string(FIND "${rest}" "${begin}" at)
+  while(NOT at EQUAL -1)
+    string(LENGTH "${begin}" length)
+    math(EXPR at "${at} + ${length}")
+    string(SUBSTRING "${rest}" ${at} -1 rest)
+    string(FIND "${rest}" "${end}" at)
+    string(SUBSTRING "${rest}" 0 ${at} part)
+    string(REGEX REPLACE "\n(void|PetscBool|PetscInt|const PetscReal \\*)( ?Hyco)" "\nstatic \\1\\2" part "${part}")
+    string(REPLACE "\nstatic inline" "\nstatic" part "${part}")
+    string(APPEND text "${part}")
+    string(SUBSTRING "${rest}" ${at} -1 rest)
+    string(FIND "${rest}" "${begin}" at)
+  endwhile()
+endforeach()
+string(HEX "${text}" bytes)
 string(REGEX REPLACE "(..)" "0x\\1," bytes "${bytes}")
 file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/export_runtime.c
      CONTENT "extern const char HycoExportRuntime[];\nconst char HycoExportRuntime[] = {@bytes@0};\n" @ONLY)

@@ -6,17 +6,33 @@
 #include <math.h>
 #include <string.h>
 
-#define INDEPENDENT 1e-4 /* of a function beside the former ones, relative to its own size */
+#define INDEPENDENT 1e-5 /* of a function beside the former ones, relative to its own size */
 #define MIXED       12   /* combinations of the rows by which functions are chosen */
 #define MOST        40   /* functions */
+#define MANY        3000 /* candidates: more take too long */
 #define SAME        1e-13
+#define PASSES      3 /* of a solution by a pseudo-inverse */
 
 /* -- atoms -- */
+
+PetscErrorCode HycoAtomTranslate(HycoScene s, const HycoAtom *a, const PetscReal mu[], PetscReal *value, HycoText *c)
+{
+  PetscReal first = 0;
+  PetscBool valid;
+
+  PetscFunctionBegin;
+  PetscCall(HycoTranslate(s, a->text, a->change ? a->to : a->x, mu, value, c, &valid, NULL, NULL));
+  if (!a->change) PetscFunctionReturn(PETSC_SUCCESS);
+  if (c) PetscCall(HycoTextAdd(c, " - "));
+  PetscCall(HycoTranslate(s, a->text, a->x, mu, &first, c, &valid, NULL, NULL));
+  *value -= first;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 /* Whether muParser has the same values at the ends and the middle of the ranges. */
 static PetscErrorCode Agrees(HycoScene s, const HycoAtom *atom, PetscBool *agrees)
 {
-  PetscReal mu[HYCO_MAX_PARAMETERS], mine, theirs;
+  PetscReal mu[HYCO_MAX_PARAMETERS], mine, theirs, first = 0;
   HycoExpr e;
   PetscErrorCode ierr = 0;
 
@@ -24,32 +40,71 @@ static PetscErrorCode Agrees(HycoScene s, const HycoAtom *atom, PetscBool *agree
   PetscCall(HycoSceneExpression(s, atom->key, atom->text, &e));
   *agrees = PETSC_TRUE;
   for (PetscInt k = 0; k < 3 && !ierr && *agrees; k++) {
-    PetscBool valid;
-
     for (PetscInt p = 0; p < s->n_parameters; p++) mu[p] = s->lo[p] + (s->hi[p] - s->lo[p]) * (PetscReal)k / 2;
-    PetscCall(HycoTranslate(s, atom->text, atom->x, mu, &mine, NULL, &valid, NULL, NULL));
+    PetscCall(HycoAtomTranslate(s, atom, mu, &mine, NULL));
     /* An atom that is not finite somewhere in the ranges is no candidate. */
     if (PetscIsInfOrNanReal(mine)) *agrees = PETSC_FALSE;
-    if (*agrees) ierr = HycoExprEval(e, mu, 1, atom->x, &theirs);
-    if (*agrees && !ierr) *agrees = (PetscBool)(PetscAbsReal(mine - theirs) <= SAME * PetscAbsReal(theirs));
+    if (*agrees) ierr = HycoExprEval(e, mu, 1, atom->change ? atom->to : atom->x, &theirs);
+    if (*agrees && !ierr && atom->change) ierr = HycoExprEval(e, mu, 1, atom->x, &first);
+    if (*agrees && !ierr)
+      *agrees = (PetscBool)(PetscAbsReal(mine - (theirs - first)) <=
+                            SAME * PetscMax(PetscAbsReal(theirs), PetscAbsReal(first)));
   }
   PetscCall(HycoExprDestroy(&e));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Atoms on which muParser and this parser differ are left out silently: the fit then decides without them. */
-static PetscErrorCode Add(HycoScene s, const char key[], const char text[], const PetscReal x[3], PetscInt *n,
-                          HycoAtom **atom)
+/* Whether an atom is a constant, or one of those that are there: by its values at some points of the ranges. */
+static PetscErrorCode IsNew(HycoScene s, const HycoAtom *one, PetscInt n, const HycoAtom atom[], PetscBool *is)
 {
-  HycoAtom one = {.key = key, .text = text, .x = {x[0], x[1], x[2]}};
+  static const PetscReal at[] = {0.07, 0.38, 0.61, 0.93};
+  PetscReal mu[HYCO_MAX_PARAMETERS], value[4], other;
+
+  PetscFunctionBegin;
+  *is = PETSC_TRUE;
+  for (PetscInt k = -1; k < n && *is; k++) { /* -1: its own first value */
+    PetscBool same = PETSC_TRUE;
+
+    for (PetscInt i = 0; i < 4; i++) {
+      /* Each parameter at its own place, so that no two of them look alike. */
+      for (PetscInt p = 0; p < s->n_parameters; p++)
+        mu[p] = s->lo[p] + (s->hi[p] - s->lo[p]) * at[(i + p) % 4] / (1 + 0.1 * (PetscReal)p);
+      if (k < 0) PetscCall(HycoAtomTranslate(s, one, mu, &value[i], NULL));
+      other = value[0];
+      if (k >= 0) PetscCall(HycoAtomTranslate(s, &atom[k], mu, &other, NULL));
+      same = (PetscBool)(same && PetscAbsReal(value[i] - other) <= SAME * PetscAbsReal(other));
+    }
+    *is = (PetscBool)!same;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* axis: of a change of the place by 1; -1: none. Atoms on which muParser and this parser differ are left out silently: the fit then decides without them. */
+static PetscErrorCode Add(HycoScene s, const char key[], const char text[], const PetscReal x[3], PetscInt axis,
+                          PetscInt *n, HycoAtom **atom)
+{
+  HycoAtom one = {.key = key, .text = text, .change = (PetscBool)(axis >= 0), .x = {x[0], x[1], x[2]}};
   PetscBool agrees = PETSC_FALSE;
 
   PetscFunctionBegin;
+  for (PetscInt c = 0; c < 3 && axis >= 0; c++) one.to[c] = x[c] + (c == axis);
   PetscCall(Agrees(s, &one, &agrees));
+  if (agrees) PetscCall(IsNew(s, &one, *n, *atom, &agrees));
   if (!agrees) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscRealloc((size_t)(*n + 1) * sizeof(**atom), atom));
   (*atom)[(*n)++] = one;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoAtomsAddWeight(HycoScene s, const char text[], PetscInt *n, HycoAtom **atom)
+{
+  const PetscReal nowhere[3] = {0, 0, 0};
+  const PetscInt before = *n;
+
+  PetscFunctionBegin;
+  PetscCall(Add(s, "weight of a sample", text, nowhere, -1, n, atom));
+  if (*n > before) (*atom)[before].weight = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -62,76 +117,114 @@ static PetscBool Known(const char text[], PetscInt n, const HycoAtom atom[])
   return PETSC_FALSE;
 }
 
-PetscErrorCode HycoAtomsFind(HycoScene s, PetscInt n, const PetscReal x[], PetscInt *n_atoms, HycoAtom **atom)
+PetscErrorCode HycoAtomsFind(HycoScene s, PetscBool travels, PetscInt n, const PetscReal x[], PetscInt *n_atoms,
+                             HycoAtom **atom)
 {
   PetscReal value;
-  PetscBool valid, uses, space;
+  PetscBool valid, uses, space, map;
 
   PetscFunctionBegin;
   *n_atoms = 0;
   *atom = NULL;
-  for (PetscInt p = 0; p < s->n_parameters; p++) PetscCall(Add(s, s->parameter[p], s->parameter[p], x, n_atoms, atom));
+  for (PetscInt p = 0; p < s->n_parameters; p++)
+    PetscCall(Add(s, s->parameter[p], s->parameter[p], x, -1, n_atoms, atom));
   for (PetscInt k = 0; k < s->n_entries; k++) {
     /* Entries that cannot change K, F, B or D, and constants, which occur within other entries. */
     if (!strncmp(s->key[k], "output_", 7) || !strncmp(s->key[k], "scene_", 6) || !strncmp(s->key[k], "constant_", 9) ||
         Known(s->value[k], *n_atoms, *atom))
       continue;
     PetscCall(HycoTranslate(s, s->value[k], x, s->lo, &value, NULL, &valid, &uses, &space));
-    for (PetscInt i = 0; valid && uses && i < (space ? n : 1); i++)
-      PetscCall(Add(s, s->key[k], s->value[k], x + 3 * i, n_atoms, atom));
+    map = (PetscBool)(strstr(s->key[k], "_map_") != NULL);
+    for (PetscInt c = 0; valid && uses && space && map && c < 3; c++)
+      PetscCall(Add(s, s->key[k], s->value[k], x, c, n_atoms, atom));
+    for (PetscInt i = 0; valid && uses && !(map && travels) && i < (space ? n : 1); i++)
+      PetscCall(Add(s, s->key[k], s->value[k], x + 3 * i, -1, n_atoms, atom));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* -- candidates -- */
 
-/* value[k] = a b / c; not finite where c is 0. */
+/* value[k] = a b d / c; not finite where c is 0. */
 PetscErrorCode HycoFunctionsEvaluate(HycoScene s, const HycoAtom atom[], PetscInt n, const HycoFunction f[],
                                      const PetscReal mu[], PetscReal value[])
 {
-  PetscBool valid;
-
   PetscFunctionBegin;
   for (PetscInt k = 0; k < n; k++) {
-    const PetscInt of[3] = {f[k].a, f[k].b, f[k].c};
+    const PetscInt of[4] = {f[k].a, f[k].b, f[k].d, f[k].c};
 
     value[k] = 1;
-    for (PetscInt j = 0; j < 3; j++) {
+    for (PetscInt j = 0; j < 4; j++) {
       PetscReal one = 1;
 
-      if (of[j] >= 0) PetscCall(HycoTranslate(s, atom[of[j]].text, atom[of[j]].x, mu, &one, NULL, &valid, NULL, NULL));
-      value[k] = j < 2 ? value[k] * one : value[k] / one;
+      if (of[j] >= 0) PetscCall(HycoAtomTranslate(s, &atom[of[j]], mu, &one, NULL));
+      value[k] = j < 3 ? value[k] * one : value[k] / one;
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A weight of a sample is one of the factors at most, and no divisor. */
+static PetscBool Sensible(const HycoAtom atom[], PetscInt a, PetscInt b, PetscInt c, PetscInt d)
+{
+  const PetscInt of[3] = {a, b, d};
+  PetscInt weights = 0;
+
+  for (PetscInt k = 0; k < 3; k++) weights += of[k] >= 0 && atom[of[k]].weight;
+  return (PetscBool)(weights < 2 && (c < 0 || (!atom[c].weight && a != c && b != c)));
+}
+
 /* All candidates of a level, the simpler ones first; f NULL: counts them. */
-static PetscInt Candidates(PetscInt m, PetscInt level, HycoFunction f[])
+static PetscInt Candidates(PetscInt m, const HycoAtom atom[], PetscInt level, HycoFunction f[])
 {
   PetscInt n = 0;
 
 #define CANDIDATE(...)                                                                                                 \
   do {                                                                                                                 \
-    if (f) f[n] = (HycoFunction){__VA_ARGS__};                                                                         \
+    const HycoFunction one = {__VA_ARGS__};                                                                            \
+                                                                                                                       \
+    if (!Sensible(atom, one.a, one.b, one.c, one.d)) break;                                                            \
+    if (f) f[n] = one;                                                                                                 \
     n++;                                                                                                               \
   } while (0)
   /* The constant first: the choice prefers earlier candidates. */
-  CANDIDATE(-1, -1, -1);
-  for (PetscInt a = 0; a < m; a++) CANDIDATE(a, -1, -1);
+  CANDIDATE(-1, -1, -1, -1);
+  for (PetscInt a = 0; a < m; a++) CANDIDATE(a, -1, -1, -1);
   for (PetscInt a = -1; level > 0 && a < m; a++) {
-    for (PetscInt c = 0; c < m; c++) {
-      if (a != c) CANDIDATE(a, -1, c);
-    }
+    for (PetscInt c = 0; c < m; c++) CANDIDATE(a, -1, c, -1);
   }
   for (PetscInt c = -1; level > 1 && c < (level > 2 ? m : 0); c++) {
     for (PetscInt a = 0; a < m; a++) {
-      for (PetscInt b = a; b < m; b++) {
-        if (a != c && b != c) CANDIDATE(a, b, c);
-      }
+      for (PetscInt b = a; b < m; b++) CANDIDATE(a, b, c, -1);
+    }
+  }
+  for (PetscInt a = 0; level > 3 && a < m; a++) {
+    for (PetscInt b = a; b < m; b++) {
+      for (PetscInt d = b; d < m; d++) CANDIDATE(a, b, -1, d);
     }
   }
 #undef CANDIDATE
+  return n;
+}
+
+/* The same from functions that are known to matter: these, and their products with one atom that is neither a weight nor a
+   turn, `only` this (-1: any). */
+static PetscInt FromSeeds(PetscInt m, const HycoAtom atom[], PetscInt only, PetscInt n_seeds, const HycoFunction seed[],
+                          HycoFunction f[])
+{
+  PetscInt n = 0;
+
+  if (only >= 0 && (atom[only].weight || atom[only].change)) return 0;
+  for (PetscInt k = 0; k < n_seeds * (m + 1); k++) {
+    const PetscInt a = k % (m + 1) - 1;
+    HycoFunction one = seed[k / (m + 1)];
+    PetscInt *const slot = one.a < 0 ? &one.a : one.b < 0 ? &one.b : one.d < 0 ? &one.d : NULL;
+
+    if (a >= 0 && ((only >= 0 && a != only) || !slot || atom[a].weight || atom[a].change || a == one.c)) continue;
+    if (a >= 0) *slot = a;
+    if (f) f[n] = one;
+    n++;
+  }
   return n;
 }
 
@@ -144,23 +237,49 @@ static PetscBool Held(PetscInt k)
 }
 
 /* values[k * N + i] of the functions at all N points. */
-static PetscErrorCode Tabulate(HycoScene s, PetscInt n_atoms, const HycoAtom atom[], const HycoFitData *d, PetscInt n,
-                               const HycoFunction f[], PetscReal value[])
+static void Tabulate(PetscInt n_atoms, const HycoFitData *d, PetscInt n, const HycoFunction f[], PetscReal value[])
 {
-  PetscReal *at;
-  PetscBool valid;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1(n_atoms + 1, &at));
   for (PetscInt i = 0; i < d->n_points; i++) {
-    for (PetscInt a = 0; a < n_atoms; a++)
-      PetscCall(
-          HycoTranslate(s, atom[a].text, atom[a].x, d->mu + i * s->n_parameters, &at[a], NULL, &valid, NULL, NULL));
+    const PetscReal *at = d->atom + (size_t)i * (size_t)n_atoms;
+
     for (PetscInt k = 0; k < n; k++)
       value[(size_t)k * (size_t)d->n_points + (size_t)i] =
-          (f[k].a < 0 ? 1 : at[f[k].a]) * (f[k].b < 0 ? 1 : at[f[k].b]) / (f[k].c < 0 ? 1 : at[f[k].c]);
+          (f[k].a < 0 ? 1 : at[f[k].a]) * (f[k].b < 0 ? 1 : at[f[k].b]) * (f[k].d < 0 ? 1 : at[f[k].d]) /
+          (f[k].c < 0 ? 1 : at[f[k].c]);
   }
-  PetscCall(PetscFree(at));
+}
+
+PetscErrorCode HycoAtomsTabulate(HycoScene s, PetscInt n_atoms, const HycoAtom atom[], PetscInt n, const PetscReal mu[],
+                                 PetscReal value[])
+{
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < n; i++) {
+    for (PetscInt a = 0; a < n_atoms; a++)
+      PetscCall(HycoAtomTranslate(s, &atom[a], mu + i * s->n_parameters,
+                                  &value[(size_t)i * (size_t)n_atoms + (size_t)a], NULL));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Drops functions that are 0 or not finite somewhere. */
+static PetscErrorCode Clean(PetscInt N, PetscInt *n, HycoFunction f[], PetscReal value[])
+{
+  PetscInt kept = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < *n; k++) {
+    const PetscReal *v = value + (size_t)k * (size_t)N;
+    PetscReal most = 0, sum = 0;
+
+    for (PetscInt i = 0; i < N; i++) {
+      most = PetscMax(most, PetscAbsReal(v[i]));
+      sum += v[i];
+    }
+    if (most == 0 || PetscIsInfOrNanReal(sum)) continue;
+    PetscCall(PetscArraymove(value + (size_t)kept * (size_t)N, v, N));
+    f[kept++] = f[k];
+  }
+  *n = kept;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -266,7 +385,7 @@ static PetscErrorCode Choose(const HycoFitData *d, PetscInt *n, HycoFunction f[]
 static PetscErrorCode Solve(const HycoFitData *d, PetscInt n, const PetscReal value[], HycoExportFit *fit)
 {
   const PetscInt N = d->n_points;
-  PetscReal *A, *P, *scale;
+  PetscReal *A, *P, *scale, *left;
   PetscInt *at, m = 0;
 
   PetscFunctionBegin;
@@ -280,15 +399,22 @@ static PetscErrorCode Solve(const HycoFitData *d, PetscInt n, const PetscReal va
       scale[k] = PetscMax(scale[k], PetscAbsReal(value[(size_t)k * (size_t)N + (size_t)i]));
     for (PetscInt i = 0; i < m; i++) A[k * m + i] = value[(size_t)k * (size_t)N + (size_t)at[i]] / scale[k];
   }
-  PetscCall(HycoPseudoInverse(m, n, A, 1e-15, P)); /* n x m by columns */
+  PetscCall(HycoPseudoInverse(m, n, A, 1e-14, P)); /* n x m by columns */
   PetscCall(PetscArrayzero(fit->coefficient, (size_t)n * (size_t)d->n_rows));
-  for (PetscInt i = 0; i < m; i++) {
-    const PetscReal *y = d->y + (size_t)at[i] * (size_t)d->n_rows;
+  PetscCall(PetscMalloc1(m + 1, &left));
+  for (PetscInt r = 0; r < d->n_rows * PASSES; r++) {
+    PetscReal *c = fit->coefficient + (size_t)(r / PASSES) * (size_t)n;
 
-    for (PetscInt r = 0; r < d->n_rows; r++) {
-      for (PetscInt k = 0; k < n; k++) fit->coefficient[(size_t)r * (size_t)n + (size_t)k] += P[i * n + k] * y[r];
+    /* Refined: a product with a pseudo-inverse loses the digits of its condition. */
+    for (PetscInt i = 0; i < m; i++) {
+      left[i] = d->y[(size_t)at[i] * (size_t)d->n_rows + (size_t)(r / PASSES)];
+      for (PetscInt k = 0; k < n; k++) left[i] -= c[k] * A[k * m + i];
+    }
+    for (PetscInt i = 0; i < m; i++) {
+      for (PetscInt k = 0; k < n; k++) c[k] += P[i * n + k] * left[i];
     }
   }
+  PetscCall(PetscFree(left));
   for (PetscInt r = 0; r < d->n_rows; r++) {
     for (PetscInt k = 0; k < n; k++) fit->coefficient[(size_t)r * (size_t)n + (size_t)k] /= scale[k];
   }
@@ -367,21 +493,37 @@ static PetscErrorCode Reduce(const HycoFitData *d, PetscReal tol, PetscReal valu
 }
 
 /* Both arrays are the caller's, also when worst > tol. */
-PetscErrorCode HycoFitFunctions(HycoScene s, PetscInt n_atoms, const HycoAtom atom[], PetscInt level, PetscReal tol,
-                                const HycoFitData *d, HycoExportFit *fit)
+PetscErrorCode HycoFitFunctions(PetscInt n_atoms, const HycoAtom atom[], PetscInt level, PetscInt n_seeds,
+                                const HycoFunction seed[], PetscReal tol, const HycoFitData *d, HycoExportFit *fit)
 {
-  const PetscInt most = Candidates(n_atoms, level, NULL);
+  const PetscInt most =
+      level < 0 ? FromSeeds(n_atoms, atom, -2 - level, n_seeds, seed, NULL) : Candidates(n_atoms, atom, level, NULL);
   PetscReal *value;
 
   PetscFunctionBegin;
-  fit->n = most;
+  fit->n = 0;
+  fit->worst = PETSC_MAX_REAL;
+  if (most < 1 || most > MANY) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(most, &fit->function));
   PetscCall(PetscMalloc1((size_t)most * (size_t)d->n_points, &value));
-  (void)Candidates(n_atoms, level, fit->function);
-  PetscCall(Tabulate(s, n_atoms, atom, d, fit->n, fit->function, value));
-  PetscCall(Choose(d, &fit->n, fit->function, value));
-  PetscCall(PetscMalloc1((size_t)fit->n * (size_t)d->n_rows + 1, &fit->coefficient));
-  PetscCall(Solve(d, fit->n, value, fit));
+  /* Chosen one by one; these may miss some that depend nearly on others: then all together, if they are few. */
+  for (PetscInt pass = 0; pass < 2 && fit->worst > tol; pass++) {
+    fit->n = most;
+    if (level < 0)
+      (void)FromSeeds(n_atoms, atom, -2 - level, n_seeds, seed, fit->function);
+    else
+      (void)Candidates(n_atoms, atom, level, fit->function);
+    Tabulate(n_atoms, d, fit->n, fit->function, value);
+    PetscCall(Clean(d->n_points, &fit->n, fit->function, value));
+    if (pass && fit->n > d->n_points / 2) {
+      fit->n = 0;
+      break;
+    }
+    if (!pass) PetscCall(Choose(d, &fit->n, fit->function, value));
+    PetscCall(PetscFree(fit->coefficient));
+    PetscCall(PetscMalloc1((size_t)fit->n * (size_t)d->n_rows + 1, &fit->coefficient));
+    PetscCall(Solve(d, fit->n, value, fit));
+  }
   if (fit->worst <= tol) PetscCall(Reduce(d, tol, value, fit));
   PetscCall(PetscFree(value));
   PetscFunctionReturn(PETSC_SUCCESS);

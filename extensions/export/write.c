@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
-extern const char HycoExportRuntime[]; /* runtime/runtime.c, by extension.cmake */
+extern const char HycoExportRuntime[]; /* what the library and a program share, by extension.cmake */
 
 #define ADD(...) PetscCall(HycoTextAdd(__VA_ARGS__))
 
@@ -67,10 +67,14 @@ PetscErrorCode HycoExportAddTerm(HycoExportModel *m, PetscInt value, PetscInt fu
 /* Not the atoms, which are borrowed. */
 PetscErrorCode HycoExportModelFree(HycoExportModel *m)
 {
+  Surfaces *s = &m->surfaces;
+
   PetscFunctionBegin;
   for (PetscInt k = 0; k < m->n_outputs; k++) HycoFreeAll(&m->name[k], &m->unit[k]);
+  for (PetscInt k = 0; k < m->n_blocks; k++) HycoFreeAll(&m->block[k].C);
   HycoFreeAll(&m->function, &m->offset, &m->W, &m->A, &m->term, &m->weight, &m->stiffness, &m->value, &m->factor,
-              &m->contact, &m->output, &m->name, &m->unit);
+              &m->contact, &m->output, &m->name, &m->unit, &m->block, &m->body, &m->drawn, &s->w, &s->N, &s->dN,
+              &s->surface, &s->search, &s->facet, &s->border, &s->node, &s->at_border, &s->place, &s->given, &s->pose);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -91,16 +95,22 @@ const char *HycoExportUnit(HycoScene s, const HycoQuantity *q)
   return text;
 }
 
+/* The text of an entry, or "". Borrowed. */
+const char *HycoExportEntry(HycoScene s, const char key[])
+{
+  for (PetscInt k = 0; k < s->n_entries; k++) {
+    if (!strcmp(s->key[k], key)) return s->value[k];
+  }
+  return "";
+}
+
 /* "parameter_NAME_unit", or "". */
 static const char *UnitOf(HycoScene s, const char parameter[])
 {
   char key[HYCO_LINE];
 
   HycoFormat(key, "parameter_%s_unit", parameter);
-  for (PetscInt k = 0; k < s->n_entries; k++) {
-    if (!strcmp(s->key[k], key)) return s->value[k];
-  }
-  return "";
+  return HycoExportEntry(s, key);
 }
 
 /* The beginning of all names: that of the model's file, as an identifier. */
@@ -159,6 +169,7 @@ static const char functions[] =
     "  for (int p = 0; p < @_N_PARAMETERS; p++) outside = outside || !(mu[p] >= @_lo[p] && mu[p] <= @_hi[p]);\n"
     "  place(&model, memory, &o);\n"
     "  functions(mu, o.f);\n"
+    "  positions(mu, o.room.X);\n"
     "  status = predict(&model, &o, result->output, &result->kkt, &result->iterations);\n"
     "  if (!work) free(memory);\n"
     "  return status == OK && outside ? OUTSIDE : status;\n}\n";
@@ -237,13 +248,13 @@ static PetscErrorCode WriteNames(HycoText *t, HycoScene parameter, const char pr
 
 static PetscErrorCode WriteArrays(const HycoExportModel *m, HycoText *t)
 {
-  const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts, f = (size_t)m->n_stiffness;
+  const size_t p = (size_t)m->n_motions, n = (size_t)m->n_places, f = (size_t)m->n_stiffness;
 
   PetscFunctionBegin;
   PetscCall(
       WriteReals(t, "static const double offset[]", (p + n + (size_t)m->n_values) * (size_t)m->n_functions, m->offset));
   PetscCall(WriteInts(t, "static const int stiffness[]", m->n_stiffness, m->stiffness));
-  PetscCall(WriteReals(t, "static const double flexibility[]", f * n * (n + 1) / 2, m->W));
+  PetscCall(WriteReals(t, "static const double flexibility[]", m->n_blocks ? 0 : f * n * (n + 1) / 2, m->W));
   PetscCall(WriteReals(t, "static const double work_on_motions[]", f * p * n, m->A));
   PetscCall(WriteInts(t, "static const int term_value[]", m->n_terms, m->value));
   PetscCall(WriteInts(t, "static const int term_factor[]", m->n_terms, m->factor));
@@ -260,6 +271,89 @@ static PetscErrorCode WriteArrays(const HycoExportModel *m, HycoText *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The blocks of the flexibility, and the surfaces on which masters are searched for. */
+static PetscErrorCode WriteSurfaces(const HycoExportModel *m, HycoText *t)
+{
+  const Surfaces *s = &m->surfaces;
+  const PetscInt points = s->nq * s->nf, unknowns = s->n_nodes * s->dim;
+  PetscInt facets = 0;
+  char name[HYCO_LINE];
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < m->n_blocks; k++) {
+    HycoFormat(name, "static const double block_%d[]", (int)k);
+    PetscCall(WriteReals(t, name, (size_t)m->block[k].n * (size_t)m->block[k].n, m->block[k].C));
+  }
+  ADD(t, "static const Block blocks[] = {");
+  for (PetscInt k = 0; k < m->n_blocks; k++)
+    ADD(t, "%s{%d, %d, %d, block_%d}", k ? ", " : "", m->block[k].first, m->block[k].n, m->block[k].value, (int)k);
+  ADD(t, "};\nstatic const Surface surface[] = {");
+  for (PetscInt k = 0; k < m->n_surfaces; k++) {
+    const Surface *u = &s->surface[k];
+
+    facets += u->n;
+    ADD(t, "%s{%d, %d, %d, %d, %d, %d}", k ? ", " : "", (int)u->first, (int)u->n, (int)u->side, (int)u->n_border,
+        (int)u->border, (int)u->at_border);
+  }
+  ADD(t, "};\nstatic const Facing searches[] = {");
+  for (PetscInt k = 0; k < s->n_searches; k++) {
+    const Facing *h = &s->search[k];
+
+    ADD(t, "%s{%d, %d, %d, %d, %.17g}", k ? ", " : "", (int)h->slave, (int)h->master, (int)h->first, (int)h->n,
+        h->reach);
+  }
+  ADD(t, "};\n");
+  PetscCall(WriteReals(t, "static const double point_weight[]", (size_t)s->nq, s->w));
+  PetscCall(WriteReals(t, "static const double point_function[]", (size_t)points, s->N));
+  PetscCall(WriteReals(t, "static const double point_slope[]", 2 * (size_t)points, s->dN));
+  PetscCall(WriteReals(t, "static const double drawn[]", 3 * (size_t)s->n_nodes, m->drawn));
+  PetscCall(WriteInts(t, "static const PetscInt facet[]", facets * s->nf, s->facet));
+  PetscCall(WriteInts(t, "static const PetscInt border[]", 2 * m->n_border, s->border));
+  PetscCall(WriteInts(t, "static const PetscInt slave[]", m->n_contacts, s->node));
+  PetscCall(WriteInts(t, "static const int place_of[]", unknowns, s->place));
+  PetscCall(WriteInts(t, "static const int given[]", unknowns, s->given));
+  PetscCall(WriteInts(t, "static const int pose[]", s->n_nodes, s->pose));
+  PetscCall(WriteInts(t, "static const int body[]", s->n_nodes, m->body));
+  ADD(t, "static const PetscBool at_border[] = {");
+  for (PetscInt k = 0; k < m->n_surfaces * s->n_nodes; k++)
+    ADD(t, "%s%s", k ? ", " : "", s->at_border[k] ? "PETSC_TRUE" : "PETSC_FALSE");
+  ADD(t,
+      "};\nstatic const Surfaces surfaces = {%d, %d, %d, %d, %d, %d, %.17g, point_weight, point_function, "
+      "point_slope,\n"
+      "                                  surface, searches, facet, border, slave, at_border, place_of, given, pose};\n",
+      (int)s->dim, (int)s->n_nodes, (int)s->nf, (int)s->nq, (int)s->n_searches, (int)s->n_facets, s->around);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The nodes of the surfaces at mu, by the maps of their bodies. */
+static PetscErrorCode WritePositions(const HycoExportModel *m, HycoScene s, HycoText *t)
+{
+  PetscBool valid;
+  PetscReal value;
+
+  PetscFunctionBegin;
+  ADD(t, "static void positions(const double mu[], double X[])\n{\n  (void)mu;\n");
+  if (!m->surfaces.n_nodes) ADD(t, "  (void)X;\n");
+  if (m->surfaces.n_nodes) {
+    ADD(t,
+        "  memcpy(X, drawn, sizeof(drawn));\n  for (int i = 0; i < %d; i++) {\n    const double *x = drawn + 3 * "
+        "i;\n\n",
+        (int)m->surfaces.n_nodes);
+    ADD(t, "    (void)x;\n");
+  }
+  for (PetscInt b = 0; b < s->n_bodies && m->surfaces.n_nodes; b++) {
+    for (PetscInt c = 0; c < 3; c++) {
+      if (!s->body[b].map[c]) continue;
+      ADD(t, "    if (body[i] == %d) X[3 * i + %d] = ", (int)b, (int)c);
+      PetscCall(HycoTranslate(s, HycoExportEntry(s, HycoExprKey(s->body[b].map[c])), NULL, s->lo, &value, t, &valid,
+                              NULL, NULL));
+      ADD(t, ";\n");
+    }
+  }
+  ADD(t, "%s}\n\n", m->surfaces.n_nodes ? "  }\n" : "");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode WriteModel(const HycoExportModel *m, HycoScene s, const char prefix[], HycoText *t)
 {
   char name[HYCO_LINE];
@@ -272,26 +366,31 @@ static PetscErrorCode WriteModel(const HycoExportModel *m, HycoScene s, const ch
   PetscCall(WriteNames(t, s, prefix, "parameter", s->n_parameters, s->parameter, NULL));
   PetscCall(WriteNames(t, NULL, prefix, "output", m->n_outputs, m->name, m->unit));
   PetscCall(WriteArrays(m, t));
-  ADD(t, "\nstatic const Model model = {%d, %d, %d, %d, %d, %d, %d, %d, %.17g, %s_lo, %s_hi, offset, stiffness,\n",
-      (int)s->n_parameters, (int)m->n_functions, (int)m->n_motions, (int)m->n_contacts, (int)m->n_stiffness,
-      (int)m->n_values, (int)m->n_terms, (int)m->n_outputs, (double)m->tolerance, prefix, prefix);
-  ADD(t, "                            flexibility, work_on_motions, term_value, term_factor, term, outputs, contact,\n"
-         "                            weight};\n\n");
+  if (m->surfaces.n_nodes) PetscCall(WriteSurfaces(m, t));
+  ADD(t,
+      "\nstatic const Model model = {%d, %d, %d, %d, %d, %d, %d, %d, %d, %d, %.17g, %s_lo, %s_hi, offset, stiffness,\n",
+      (int)s->n_parameters, (int)m->n_functions, (int)m->n_motions, (int)m->n_places, (int)m->n_stiffness,
+      (int)m->n_values, (int)m->n_terms, (int)m->n_outputs, (int)m->n_contacts, (int)m->n_blocks, (double)m->tolerance,
+      prefix, prefix);
+  ADD(t,
+      "                            flexibility, work_on_motions, term_value, term_factor, term, outputs, contact,\n"
+      "                            weight, %s, %s};\n\n",
+      m->surfaces.n_nodes ? "blocks" : "NULL", m->surfaces.n_nodes ? "&surfaces" : "NULL");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The functions of the parameters: each expression once. */
 static PetscErrorCode WriteFunctions(const HycoExportModel *m, HycoScene s, HycoText *t)
 {
-  PetscBool valid, *used;
+  PetscBool *used;
   PetscReal value;
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(m->n_atoms + 1, &used));
   for (PetscInt k = 0; k < m->n_functions; k++) {
-    const PetscInt of[3] = {m->function[k].a, m->function[k].b, m->function[k].c};
+    const PetscInt of[4] = {m->function[k].a, m->function[k].b, m->function[k].c, m->function[k].d};
 
-    for (PetscInt j = 0; j < 3; j++) {
+    for (PetscInt j = 0; j < 4; j++) {
       if (of[j] >= 0) used[of[j]] = PETSC_TRUE;
     }
   }
@@ -300,7 +399,7 @@ static PetscErrorCode WriteFunctions(const HycoExportModel *m, HycoScene s, Hyco
     if (!used[k]) continue;
     ADD(t, "  const double e%d = ", (int)k);
     /* Values do not matter here; the text was valid when the atom was found. */
-    PetscCall(HycoTranslate(s, m->atom[k].text, m->atom[k].x, s->lo, &value, t, &valid, NULL, NULL));
+    PetscCall(HycoAtomTranslate(s, &m->atom[k], s->lo, &value, t));
     ADD(t, "; /* ");
     PetscCall(AddWords(t, m->atom[k].key, PETSC_TRUE));
     ADD(t, " */\n");
@@ -314,6 +413,7 @@ static PetscErrorCode WriteFunctions(const HycoExportModel *m, HycoScene s, Hyco
     if (f->a < 0) ADD(t, "1.0");
     if (f->a >= 0) ADD(t, "e%d", (int)f->a);
     if (f->b >= 0) ADD(t, " * e%d", (int)f->b);
+    if (f->d >= 0) ADD(t, " * e%d", (int)f->d);
     if (f->c >= 0) ADD(t, " / e%d", (int)f->c);
     ADD(t, ";\n");
   }
@@ -332,6 +432,7 @@ static PetscErrorCode WriteProgram(const HycoExportModel *m, HycoScene s, const 
   ADD(t, "%s\n/* -- the model -- */\n\n", HycoExportRuntime);
   PetscCall(WriteModel(m, s, prefix, t));
   PetscCall(WriteFunctions(m, s, t));
+  PetscCall(WritePositions(m, s, t));
   PetscCall(AddNamed(t, functions, prefix));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -257,6 +257,8 @@ PetscErrorCode HycoBodiesStrain(HycoBodiesWork work, const HycoBodiesSurface *su
 PetscErrorCode HycoBodiesContact(HycoBodiesWork work, const HycoBodiesSurface *surface, PetscReal Lambda[],
                                  PetscBool *solved);
 void HycoBodiesGiven(HycoBodiesWork work, const HycoBodiesSurface *surface, const PetscReal Lambda[]);
+/* After HycoBodiesPrepare(), with x set: u for forces f on the surfaces' unknowns (ns). */
+PetscErrorCode HycoBodiesRespond(HycoBodiesWork work, const PetscReal f[]);
 /* Compares the rows of m contacts with the last ones: kept.same, and takes them. */
 PetscErrorCode HycoBodiesKeepRows(HycoBodiesWork work, PetscInt m);
 PetscErrorCode HycoBodiesForgetKept(HycoBodiesWork work);

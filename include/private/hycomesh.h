@@ -55,11 +55,13 @@ HycoCellType HycoShapesType(PetscInt shapes);
 void HycoShapeWiden(HycoCellType shape, PetscInt nv, PetscInt node[]);
 /* The shape of a cell in a mesh of a type. */
 HycoCellType HycoShapeOf(HycoCellType type, const PetscInt node[]);
+/* -- begin: in exported models too -- */
 /* The number of corners of a facet with nf nodes of first order. */
 static inline PetscInt HycoFacetCorners(PetscInt nf, const PetscInt node[])
 {
   return nf == 4 && node[2] == node[3] ? 3 : nf;
 }
+/* -- end: in exported models too -- */
 
 /* The scene's ties on the whole mesh, the same on all ranks: slave nodes with their masters, u_slave = sum of weight
    times u_master. Entries of a slave are contiguous; slaves and masters are in ascending order. Reference-counted. */

@@ -308,6 +308,9 @@ PetscErrorCode HycoResultantsCreate(HycoROM model, PetscBool balanced[], HycoMes
 PetscErrorCode HycoResultantsFind(HycoROM model, HycoResultants *resultants);
 /* Whether all reactions of a prediction follow. */
 PetscBool HycoResultantsSuffice(HycoROM model, HycoResultants resultants);
+/* The bodies from whose balance quantity q follows, if contact acts on them from outside; NULL otherwise. Borrowed. */
+const PetscBool *HycoResultantsPushed(HycoROM model, HycoResultants resultants, PetscInt q);
+const PetscBool *HycoROMGetPushed(HycoROM model, PetscInt q);
 /* Sets the quantities that follow from forces Lambda of a prediction and the loads at mu[]. NULL-safe. */
 PetscErrorCode HycoResultantsSet(HycoROM model, HycoResultants resultants, const PetscReal mu[],
                                  const PetscReal Lambda[], PetscReal value[]);

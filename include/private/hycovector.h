@@ -3,6 +3,7 @@
 #define HYCOVECTOR_H
 #include <petscmath.h>
 
+/* -- begin: in exported models too -- */
 static inline PetscReal HycoDot(const PetscReal a[3], const PetscReal b[3])
 {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -32,5 +33,15 @@ static inline PetscReal HycoTangentialLength(const PetscReal r[3], const PetscRe
 
   return HycoLength(t);
 }
+/* w times the normal of a facet with the tangents t. */
+static inline void HycoFacetCross(const PetscReal t[2][3], PetscReal w, PetscReal n[3])
+{
+  for (PetscInt c = 0; c < 3; c++) {
+    const PetscInt d = (c + 1) % 3, e = (c + 2) % 3;
+
+    n[c] = w * (t[0][d] * t[1][e] - t[0][e] * t[1][d]);
+  }
+}
+/* -- end: in exported models too -- */
 
 #endif

@@ -4,9 +4,11 @@
 #include "master_search.h"
 #include <stdlib.h>
 
+/* -- begin: in exported models too -- */
 /* How far past the border a slave node may be, as a share of the facet's shortest edge: its master is then a point
    of the border. */
 #define HYCO_PAST_BORDER 0.1
+/* -- end: in exported models too -- */
 
 /* Patches and their normals: the master's nodes (pair) or facets (surface). Borrowed data of fe: nodes must not move
    while the search exists. Normals are of length 1, outward from the master's body. */
@@ -103,6 +105,7 @@ PetscErrorCode HycoMasterSearchDestroy(HycoMasterSearch *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* -- begin: in exported models too -- */
 /* NULL: the slave has no normal (1D, or a group without facets). */
 const PetscReal *HycoMasterSearchOutward(const HycoMasterSearch *t, PetscInt slave)
 {
@@ -156,12 +159,36 @@ static int CompareEdges(const void *a, const void *b)
   return (p[1] > q[1]) - (p[1] < q[1]);
 }
 
-/* Finds the edges (2D: ends) that belong to one facet only, and their nodes. */
-static PetscErrorCode FindBorder(HycoMasterSearch *t)
+/* In the interior of a facet: no. */
+PetscBool HycoMasterSearchOnBorder(const HycoMasterSearch *t, const HycoProjection *at)
+{
+  const PetscInt edge[2] = {at->node[0], at->n > 1 ? at->node[1] : at->node[0]};
+
+  /* Facets of one node, or a point inside a facet: no border. */
+  if (t->nf == 1 || at->n > 2 || at->n < 1 || (t->nf == 2 && at->n == 2)) return PETSC_FALSE;
+  if (at->n == 1) return t->at_border[at->node[0]];
+  return (PetscBool)(bsearch(edge, t->border, (size_t)t->n_border, 2 * sizeof(PetscInt), CompareEdges) != NULL);
+}
+
+/* Compares the tangential part of the vector from the node to its master point, in the facet's plane, with the
+   tolerance. A projection onto the border's edge is past it if the node lies beyond, along the surface. */
+PetscBool HycoMasterSearchIsBeside(const HycoMasterSearch *t, PetscInt slave, const HycoProjection *at)
+{
+  PetscReal r[3];
+
+  HycoMasterSearchAcross(t, slave, at, r);
+  return (PetscBool)(HycoTangentialLength(r, t->normal + 3 * at->patch) >
+                     HYCO_PAST_BORDER * ShortestEdge(t, at->patch));
+}
+/* -- end: in exported models too -- */
+
+/* Finds the edges (2D: ends) that belong to one facet only, and their nodes, unless they are there. */
+PetscErrorCode HycoMasterSearchBorder(HycoMasterSearch *t)
 {
   const PetscInt nf = t->nf, edges = t->n * nf;
 
   PetscFunctionBegin;
+  if (t->at_border) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(2 * edges, &t->border));
   PetscCall(PetscCalloc1(t->n_nodes, &t->at_border));
   for (PetscInt k = 0; k < edges; k++) {
@@ -184,35 +211,20 @@ static PetscErrorCode FindBorder(HycoMasterSearch *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a projection is on a node or an edge of the master's border. In the interior of a facet: no. */
+/* Made for messages alone, and therefore late. */
 PetscErrorCode HycoMasterSearchAtBorder(HycoMasterSearch *t, const HycoProjection *at, PetscBool *border)
 {
-  const PetscInt edge[2] = {at->node[0], at->n > 1 ? at->node[1] : at->node[0]};
-
   PetscFunctionBegin;
-  *border = PETSC_FALSE;
-  /* Facets of one node, or a point inside a facet: no border. */
-  if (t->nf == 1 || at->n > 2 || at->n < 1 || (t->nf == 2 && at->n == 2)) PetscFunctionReturn(PETSC_SUCCESS);
-  /* Made for messages alone, and therefore late. */
-  if (!t->at_border) PetscCall(FindBorder(t));
-  if (at->n == 1)
-    *border = t->at_border[at->node[0]];
-  else
-    *border = (PetscBool)(bsearch(edge, t->border, (size_t)t->n_border, 2 * sizeof(PetscInt), CompareEdges) != NULL);
+  PetscCall(HycoMasterSearchBorder(t));
+  *border = HycoMasterSearchOnBorder(t, at);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Compares the tangential part of the vector from the node to its master point, in the facet's plane, with the
-   tolerance. A projection onto the border's edge is past it if the node lies beyond, along the surface. */
+/* The border is searched for only where a node may be past it. */
 PetscErrorCode HycoMasterSearchIsPast(HycoMasterSearch *t, PetscInt slave, const HycoProjection *at, PetscBool *past)
 {
-  const PetscReal *n = t->normal + 3 * at->patch;
-  PetscReal r[3];
-
   PetscFunctionBegin;
-  *past = PETSC_FALSE;
-  HycoMasterSearchAcross(t, slave, at, r);
-  if (HycoTangentialLength(r, n) > HYCO_PAST_BORDER * ShortestEdge(t, at->patch))
-    PetscCall(HycoMasterSearchAtBorder(t, at, past));
+  *past = HycoMasterSearchIsBeside(t, slave, at);
+  if (*past) PetscCall(HycoMasterSearchAtBorder(t, at, past));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

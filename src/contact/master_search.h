@@ -5,6 +5,7 @@
 #include <hycocontactimpl.h>
 #include <hycovector.h>
 
+/* -- begin: in exported models too -- */
 /* Share of a facet's shortest edge: points at a smaller distance coincide. */
 #define HYCO_SAME_POINT 1e-6
 
@@ -21,6 +22,7 @@ typedef struct {
   PetscInt n_border, *border; /* edges (2D: ends) of one facet only, as sorted pairs of nodes; created when needed */
   PetscBool *at_border;       /* by node; NULL: not created */
 } HycoMasterSearch;
+/* -- end: in exported models too -- */
 
 /* Creates the search on fe's nodes. The caller destroys it. */
 PetscErrorCode HycoMasterSearchCreate(HycoFE fe, HycoContact contact, PetscBool nodes, HycoMasterSearch *search);
@@ -40,6 +42,12 @@ void HycoMasterSearchProject(const HycoMasterSearch *search, PetscInt slave, Pet
 void HycoMasterSearchAcross(const HycoMasterSearch *search, PetscInt slave, const HycoProjection *at, PetscReal r[3]);
 /* Whether a point is on the master's border: on an edge with one facet, or at a node of such an edge. */
 PetscErrorCode HycoMasterSearchAtBorder(HycoMasterSearch *search, const HycoProjection *at, PetscBool *border);
+/* The same, once the border is there (HycoMasterSearchBorder()). */
+PetscBool HycoMasterSearchOnBorder(const HycoMasterSearch *search, const HycoProjection *at);
+PetscErrorCode HycoMasterSearchBorder(HycoMasterSearch *search);
+/* Whether a slave node is beside its facet by more than a tenth of the facet's shortest edge in its plane: past the border,
+   if the point is on it. */
+PetscBool HycoMasterSearchIsBeside(const HycoMasterSearch *search, PetscInt slave, const HycoProjection *at);
 /* Whether a slave node is past the master's border, by more than a tenth of the facet's shortest edge in its plane. */
 PetscErrorCode HycoMasterSearchIsPast(HycoMasterSearch *search, PetscInt slave, const HycoProjection *at,
                                       PetscBool *past);

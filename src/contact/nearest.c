@@ -6,6 +6,7 @@
 #include "curved.h"
 #include <hycovector.h>
 
+/* -- begin: in exported models too -- */
 /* A smaller weight is round-off of a projection onto an edge or a node. */
 #define SNAP 1e-12
 /* Share of the coordinates' size: more than the round-off of a distance. */
@@ -54,6 +55,7 @@ void HycoPointsSplit(HycoPoint point[], PetscInt lo, PetscInt mid, PetscInt hi, 
   }
 }
 
+#ifndef HYCO_EXPORTED
 /* Borrows the coordinates; the corners come first among the nodes, then the middles of sides. */
 static HycoCurved Curved(HycoPatches s, PetscInt patch)
 {
@@ -63,11 +65,13 @@ static HycoCurved Curved(HycoPatches s, PetscInt patch)
   return facet;
 }
 
+#endif
 /* A box that contains a patch. Of first order the nodes bound the patch, also a bilinear one. */
 static void Enclose(HycoPatches s, PetscInt patch, HycoBox *b)
 {
   const PetscInt *node = s->node + patch * s->nf;
 
+#ifndef HYCO_EXPORTED
   /* A curved facet bulges beyond its nodes. */
   if (s->corners < s->nf) {
     const HycoCurved facet = Curved(s, patch);
@@ -75,6 +79,7 @@ static void Enclose(HycoPatches s, PetscInt patch, HycoBox *b)
     HycoCurvedBox(&facet, b->lo, b->hi);
     return;
   }
+#endif
   for (PetscInt c = 0; c < 3; c++) {
     b->lo[c] = b->hi[c] = s->X[3 * node[0] + c];
     for (PetscInt a = 1; a < s->nf; a++) {
@@ -129,13 +134,37 @@ static void Build(HycoPatches s, PetscInt t, PetscInt lo, PetscInt hi)
   Build(s, 2 * t + 2, (lo + hi) / 2, hi);
 }
 
+/* A complete binary tree in an array, of the depth of the larger half at each split: no pointers, and children by
+   2 t + 1. */
+PetscInt HycoPatchesBoxes(PetscInt n)
+{
+  PetscInt boxes = 1;
+
+  for (PetscInt most = n; most > HYCO_LEAF; most = (most + 1) / 2) boxes = 2 * boxes + 1;
+  return boxes;
+}
+
+/* From the centres of the patches on. */
+void HycoPatchesBuild(HycoPatches s)
+{
+  for (PetscInt k = 0; k < s->n; k++) {
+    s->item[k].index = k;
+    for (PetscInt c = 0; c < 3; c++) {
+      s->item[k].x[c] = 0;
+      for (PetscInt a = 0; a < s->nf; a++) s->item[k].x[c] += s->X[3 * s->node[k * s->nf + a] + c] / s->nf;
+    }
+  }
+  Build(s, 0, 0, s->n);
+}
+/* -- end: in exported models too -- */
+
 /* nf nodes and `corners` corners per patch (corners < nf: second order); normal: n x 3 or NULL. Borrows X, node and
    normal, which must stay in place. */
 PetscErrorCode HycoPatchesCreate(const PetscReal X[], PetscInt n, PetscInt nf, PetscInt corners, const PetscInt node[],
                                  const PetscReal normal[], HycoPatches *patches)
 {
+  const PetscInt boxes = HycoPatchesBoxes(n);
   HycoPatches s;
-  PetscInt boxes = 1;
 
   PetscFunctionBegin;
   PetscCall(PetscNew(&s));
@@ -145,21 +174,11 @@ PetscErrorCode HycoPatchesCreate(const PetscReal X[], PetscInt n, PetscInt nf, P
   s->nf = nf;
   s->corners = corners;
   s->node = node;
-  /* A complete binary tree in an array, of the depth of the larger half at each split: no pointers, and children by
-     2 t + 1. */
-  for (PetscInt most = n; most > HYCO_LEAF; most = (most + 1) / 2) boxes = 2 * boxes + 1;
   PetscCall(PetscMalloc1(n, &s->item));
   PetscCall(PetscMalloc1(boxes, &s->box));
   /* Boxes of normals serve the search along lines between nodes. */
   if (nf == 1 && normal) PetscCall(PetscMalloc1(boxes, &s->turn));
-  for (PetscInt k = 0; k < n; k++) {
-    s->item[k].index = k;
-    for (PetscInt c = 0; c < 3; c++) {
-      s->item[k].x[c] = 0;
-      for (PetscInt a = 0; a < nf; a++) s->item[k].x[c] += X[3 * node[k * nf + a] + c] / nf;
-    }
-  }
-  Build(s, 0, 0, n);
+  HycoPatchesBuild(s);
   *patches = s;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -173,6 +192,7 @@ PetscErrorCode HycoPatchesDestroy(HycoPatches *patches)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* -- begin: in exported models too -- */
 /* Squared distance from x to the combination w of n points. */
 static PetscReal Distance2(PetscInt n, const PetscReal *const X[], const PetscReal w[], const PetscReal x[3])
 {
@@ -256,11 +276,13 @@ static PetscReal OnPatch(HycoPatches s, PetscInt patch, const PetscReal x[3], Pe
   const PetscReal *X[4];
   PetscReal best = PETSC_MAX_REAL;
 
+#ifndef HYCO_EXPORTED
   if (s->corners < s->nf) {
     const HycoCurved facet = Curved(s, patch);
 
     return HycoCurvedProject(&facet, x, w);
   }
+#endif
   /* Edges are always tried: for a warped quadrilateral the inner stationary point need not be the nearest. */
   for (PetscInt a = 0; a < nf; a++) X[a] = s->X + 3 * s->node[patch * s->nf + a];
   if ((nf == 3 && InTriangle(X, x, w)) || (nf == 4 && InQuadrilateral(X, x, w))) best = Distance2(nf, X, w, x);
@@ -392,3 +414,4 @@ void HycoPatchesProject(HycoPatches s, const PetscReal x[3], const PetscReal aga
   }
   for (PetscInt a = 0; a < p->n; a++) p->weight[a] /= sum;
 }
+/* -- end: in exported models too -- */

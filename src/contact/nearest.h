@@ -3,6 +3,7 @@
 #define HYCO_NEAREST_H
 #include <hycomesh.h>
 
+/* -- begin: in exported models too -- */
 /* A point of a patch: sum of weight[a] times node[a]. Weights have sum 1, and are positive on patches of first order;
    nodes are in ascending order. n = 0: no point. */
 typedef struct {
@@ -18,9 +19,11 @@ typedef struct {
   PetscReal x[3];
   PetscInt index;
 } HycoPoint;
+/* -- end: in exported models too -- */
 /* Rearranges the points lo .. hi - 1 so that those before `mid` come first along the axis. */
 void HycoPointsSplit(HycoPoint point[], PetscInt lo, PetscInt mid, PetscInt hi, PetscInt axis);
 
+/* -- begin: in exported models too -- */
 /* The tree of the patches: its nodes are boxes; those of at most HYCO_LEAF patches have no children. */
 #define HYCO_LEAF 4
 typedef struct {
@@ -35,6 +38,7 @@ struct _n_HycoPatches {
   HycoBox *box;    /* of tree node t; its children are 2 t + 1 and 2 t + 2 */
   HycoBox *turn;   /* the normals of its points; NULL: no points with normals */
 };
+/* -- end: in exported models too -- */
 
 /* n patches of nf nodes each, the first `corners` of them corners: with nf = corners 1 points, 2 segments, 3 triangles,
    4 bilinear quadrilaterals; else facets of second order (2, 3 or 4 corners). X: coordinates of nodes; normal (n x 3,
@@ -43,6 +47,10 @@ struct _n_HycoPatches {
 PetscErrorCode HycoPatchesCreate(const PetscReal X[], PetscInt n, PetscInt nf, PetscInt corners, const PetscInt node[],
                                  const PetscReal normal[], HycoPatches *patches);
 PetscErrorCode HycoPatchesDestroy(HycoPatches *patches);
+/* The same in two steps, in the caller's memory: the number of boxes of n patches; the tree of patches whose members but
+   `box` and `item`, of which the room is there, are set. */
+PetscInt HycoPatchesBoxes(PetscInt n);
+void HycoPatchesBuild(HycoPatches patches);
 /* The patches' point nearest to x; among equally near ones that of the first patch, so that the result is the same
    with any more patches that are farther away. against: a unit normal that the patch must oppose, or NULL. */
 void HycoPatchesProject(HycoPatches patches, const PetscReal x[3], const PetscReal against[3], HycoProjection *p);

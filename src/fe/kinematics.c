@@ -1,5 +1,6 @@
 /* Jacobians of cells and facets. */
 #include <hycokinematics.h>
+#include <hycovector.h>
 
 /* det dX/dxi at point q, with its sign. */
 PetscReal HycoDeterminant(const HycoElement *el, const PetscInt node[], const PetscReal X[], PetscInt q)
@@ -230,12 +231,8 @@ PetscErrorCode HycoFacetDirection(HycoFE fe, const HycoElement *el, PetscInt fac
       for (PetscInt a = 0; a < el->nv; a++) t[d][c] += fe->X[3 * node[a] + c] * el->dN[q][a][d];
     }
   }
-  for (PetscInt c = 0; c < 3; c++) {
-    const PetscInt d = (c + 1) % 3, e = (c + 2) % 3;
-
-    /* In 2D the second tangent is the unit vector out of the plane. */
-    n[c] = side * el->w[q] * (t[0][d] * t[1][e] - t[0][e] * t[1][d]);
-  }
+  /* In 2D the second tangent is the unit vector out of the plane. */
+  HycoFacetCross((const PetscReal(*)[3])t, side * el->w[q], n);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

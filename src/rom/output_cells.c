@@ -450,6 +450,11 @@ HycoFE HycoROMGetOutputCells(HycoROM m)
   return m->output_cells ? m->output_cells->fe : NULL;
 }
 
+const PetscBool *HycoROMGetPushed(HycoROM m, PetscInt q)
+{
+  return m->output_cells ? HycoResultantsPushed(m, m->output_cells->resultants, q) : NULL;
+}
+
 void HycoROMGetOutputFields(HycoROM m, const PetscReal *u[], const PetscReal *sigma[])
 {
   *u = m->output_cells ? m->output_cells->u : NULL;

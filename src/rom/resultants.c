@@ -141,6 +141,12 @@ static const PetscBool *Bodies(HycoROM m, HycoResultants r, PetscInt q)
   return NULL;
 }
 
+/* Those on which contact acts from outside. */
+const PetscBool *HycoResultantsPushed(HycoROM m, HycoResultants r, PetscInt q)
+{
+  return r && m->model->scene->quantity[q].kind == HYCO_QUANTITY_REACTION && r->pushed[q] ? Bodies(m, r, q) : NULL;
+}
+
 /* One quantity that does not follow makes the sums over supports necessary. */
 PetscBool HycoResultantsSuffice(HycoROM m, HycoResultants r)
 {

@@ -1,6 +1,9 @@
 /* The runtime of exported models: problems with known solutions, with bodies that contact alone holds, dependent contacts,
    sets from which the bodies get loose; principal stresses. */
 #include "check.h"
+#include "../../src/contact/master_search.h"
+#include <math.h>
+
 #include "../../extensions/export/runtime/runtime.c"
 
 enum { N = 24, P = 3 };
@@ -34,10 +37,11 @@ static void Make(int n, int p, int rank, unsigned long long *state, Problem *o)
   for (int i = 0; i < n; i++) {
     o->offset[p + i] = o->L[i] > 0 ? 0 : 0.1 + fabs(Draw(state));
     for (int j = 0; j < p; j++) o->offset[p + i] += o->A[j * n + i] * x[j];
-    for (int j = 0; j < n; j++) o->offset[p + i] -= entry(o->W, (size_t)i, (size_t)j) * o->L[j];
+    for (int j = 0; j < n; j++) o->offset[p + i] -= o->W[i > j ? i * (i + 1) / 2 + j : j * (j + 1) / 2 + i] * o->L[j];
   }
   o->model = (Model){.n_functions = 1,
                      .n_motions = p,
+                     .n_places = n,
                      .n_contacts = n,
                      .n_stiffness = 1,
                      .tolerance = 1e-8,

@@ -5,56 +5,48 @@
       w_x = q_x + A L = 0,   0 <= L  complementary to  w_L = q_L - A^T x + W L >= 0,
 
   and values of the displacements and stresses, affine in z, from which the outputs follow. q, A, W and the values are
-  combinations of functions of the parameters.
+  combinations of functions of the parameters. Where surfaces move past each other they are those of forces at places of
+  the surfaces, of which the contacts' rows B make those of the contacts: L acts by B^T L, W is the sum over the bodies of
+  B_b C_b B_b^T.
 */
-#include <math.h>
-#include <stddef.h>
-#include <stdlib.h>
-#include <string.h>
-
-enum { OK, OUTSIDE, DIVERGED, NO_MEMORY };                            /* status */
-enum { SUM, LARGEST, SMALLEST, CLOSED, PRESSURE, PRESSURE_SMALLEST }; /* kinds of output */
-enum { COMPONENT, NORM, MISES, PRINCIPAL };                           /* what counts of an item; PRINCIPAL + k */
-
-/* An output: a number for each of n items, combined as its kind says. The items are places with `width` values each, from
-   value `first` on, or contacts, from `first` on in Model.contact. */
-typedef struct Output {
-  int kind, of, n, width, first, weight; /* weight: place of the first in Model.weight; -1: all are 1 */
-} Output;
-
-typedef struct {
-  int n_parameters, n_functions, n_motions, n_contacts, n_stiffness, n_values, n_terms, n_outputs;
-  double tolerance;          /* of the KKT residual */
-  const double *lo, *hi;     /* ranges of the parameters */
-  const double *offset;      /* n_motions + n_contacts + n_values rows of n_functions: w and the values for z = 0 */
-  const int *stiffness;      /* functions by which the next two are multiplied, n_stiffness of each */
-  const double *W, *A;       /* lower triangle of n_contacts rows; n_motions x n_contacts */
-  const int *value, *factor; /* of n_terms: the value to which it adds, and its function */
-  const double *term;        /* n_terms x (n_motions + n_contacts) */
-  const Output *output;
-  const int *contact;
-  const double *weight;
-} Model;
+#include "model.h"
+#include "surfaces.c"
 
 /* Arrays in the caller's memory. */
 typedef struct {
   double *f, *q, *w, *z, *value; /* functions; n_motions + n_contacts; values */
-  /* L: factor of W on the closed contacts, in rows of n_contacts; V = L^-1 A^T; S: factor of V^T V */
+  /* W: columns, as far as they are made. L: factor of W on the closed contacts, in rows of n_contacts; V = L^-1 A^T; S: of
+     V^T V */
   double *W, *A, *L, *V, *S, *last, *y;
-  int *closed, *at, n_closed; /* by contact: 0, open; 2, one of the next; the closed ones, rows of L */
+  double *at_places, *push, *sum; /* n_motions + n_places: w for z = 0, z; n_terms */
+  int *closed, *at, *made,
+      n_closed;          /* by contact: 0, open; 2, one of the next; the closed ones, rows of L; of W's columns */
+  Met *met;              /* by contact; of moved surfaces, like */
+  int *touched, *before; /* places of moved surfaces that rows have; by place: how many of these precede it */
+  Room room;
 } Work;
 
+/* The numbers of doubles and of ints in a Work. */
 static size_t work_doubles(const Model *m)
 {
-  const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts;
+  const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts, places = (size_t)m->n_places;
+  const size_t nodes = m->surfaces ? (size_t)m->surfaces->n_nodes : 0,
+               facets = m->surfaces ? (size_t)m->surfaces->n_facets : 0;
 
-  return (size_t)m->n_functions + (size_t)m->n_values + 4 * (p + n) + n * (n + 1) / 2 + n * n + 2 * p * n + p * p + n;
+  return (size_t)m->n_functions + (size_t)m->n_values + (size_t)m->n_terms + 4 * (p + n) + 2 * (p + places) +
+         2 * n * n + 2 * p * n + p * p + n + 7 * nodes + 3 * facets;
 }
 
-/* The ints follow the doubles, so that both are aligned. */
+/* The largest members come first, so that all are aligned. */
 static size_t work_size(const Model *m)
 {
-  return work_doubles(m) * sizeof(double) + 2 * (size_t)m->n_contacts * sizeof(int);
+  const Surfaces *s = m->surfaces;
+  const size_t moved = s ? (size_t)m->n_contacts * sizeof(Met) + (size_t)s->n_facets * sizeof(HycoPoint) +
+                               (size_t)HycoPatchesBoxes(s->n_facets) * sizeof(HycoBox)
+                         : 0;
+
+  return work_doubles(m) * sizeof(double) + moved +
+         (3 * (size_t)m->n_contacts + (s ? 2 * (size_t)m->n_places + 1 : 0)) * sizeof(int);
 }
 
 static double *take(double **from, size_t n)
@@ -65,26 +57,45 @@ static double *take(double **from, size_t n)
   return taken;
 }
 
-/* The order of the arrays does not matter, but that doubles come first. */
+/* The order of the arrays matters by their alignment alone. */
 static void place(const Model *m, void *memory, Work *o)
 {
-  const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts;
+  const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts, places = (size_t)m->n_places;
+  const Surfaces *s = m->surfaces;
   double *next = memory;
 
+  o->met = NULL;
+  o->room.X = NULL;
   o->f = take(&next, (size_t)m->n_functions);
   o->value = take(&next, (size_t)m->n_values);
   o->q = take(&next, p + n);
   o->w = take(&next, p + n);
   o->z = take(&next, p + n);
-  o->W = take(&next, n * (n + 1) / 2);
+  o->W = take(&next, n * n);
   o->A = take(&next, p * n);
   o->L = take(&next, n * n);
   o->V = take(&next, p * n);
   o->S = take(&next, p * p);
   o->last = take(&next, p + n);
   o->y = take(&next, n);
+  o->at_places = take(&next, p + places);
+  o->push = take(&next, p + places);
+  o->sum = take(&next, (size_t)m->n_terms);
+  if (s) {
+    o->room.X = take(&next, 3 * (size_t)s->n_nodes);
+    o->room.outward = take(&next, 3 * (size_t)s->n_nodes);
+    o->room.area = take(&next, (size_t)s->n_nodes);
+    o->room.normal = take(&next, 3 * (size_t)s->n_facets);
+    o->met = (Met *)(void *)next;
+    o->room.item = (HycoPoint *)(void *)(o->met + n);
+    o->room.box = (HycoBox *)(void *)(o->room.item + s->n_facets);
+    next = (double *)(void *)(o->room.box + HycoPatchesBoxes(s->n_facets));
+  }
   o->closed = (int *)(void *)next;
   o->at = o->closed + n;
+  o->made = o->at + n;
+  o->touched = s ? o->made + n : NULL;
+  o->before = s ? o->touched + places : NULL;
 }
 
 /* Four sums, which a compiler may add side by side. */
@@ -100,27 +111,134 @@ static double dot(size_t n, const double a[], const double b[])
   return s[0] + s[1] + (s[2] + s[3]);
 }
 
-/* W between two contacts. */
-static double entry(const double W[], size_t i, size_t j)
+/* to += factor from. */
+static void add(size_t n, double factor, const double from[], double to[])
 {
-  return i > j ? W[i * (i + 1) / 2 + j] : W[j * (j + 1) / 2 + i];
+  for (size_t i = 0; i < n; i++) to[i] += factor * from[i];
 }
 
-/* q, W and A at the functions' values. */
-static void assemble(const Model *m, Work *o)
+/* W of contact a by those at places: y = the sum of C_b B_b^T over the bodies, then B y. */
+static void fill_moved(const Model *m, const Work *o, const Met *a, double y[], double w[])
 {
-  const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts, d = (size_t)m->n_functions;
-  const size_t size = n * (n + 1) / 2;
+  memset(y, 0, (size_t)m->n_places * sizeof(double));
+  for (int e = 0; e < a->n; e++) {
+    for (const Block *b = m->block; b < m->block + m->n_blocks; b++) {
+      const int row = a->place[e] - b->first;
+      const double factor = a->value[e] * o->value[b->value], *C = b->C;
 
-  for (size_t i = 0; i < p + n; i++) o->q[i] = dot(d, m->offset + i * d, o->f);
-  memset(o->W, 0, size * sizeof(double));
-  memset(o->A, 0, p * n * sizeof(double));
-  for (size_t s = 0; s < (size_t)m->n_stiffness; s++) {
-    const double factor = o->f[m->stiffness[s]];
-
-    for (size_t i = 0; i < size; i++) o->W[i] += factor * m->W[s * size + i];
-    for (size_t i = 0; i < p * n; i++) o->A[i] += factor * m->A[s * p * n + i];
+      if (row < 0 || row >= b->n) continue;
+      C += (size_t)row * (size_t)b->n;
+      if (2 * (o->before[b->first + b->n] - o->before[b->first]) > b->n) { /* all, side by side, cost less */
+        add((size_t)b->n, factor, C, y + b->first);
+        continue;
+      }
+      for (int t = o->before[b->first]; t < o->before[b->first + b->n]; t++)
+        y[o->touched[t]] += factor * C[o->touched[t] - b->first];
+    }
   }
+  for (int i = 0; i < m->n_contacts; i++) {
+    w[i] = 0;
+    for (int e = 0; e < o->met[i].n; e++) w[i] += o->met[i].value[e] * y[o->met[i].place[e]];
+  }
+}
+
+/* W of contact a with all; made when it is needed first. */
+static const double *column(const Model *m, Work *o, size_t a)
+{
+  const size_t n = (size_t)m->n_contacts, size = n * (n + 1) / 2;
+  double *w = o->W + a * n;
+
+  if (o->made[a]) return w;
+  o->made[a] = 1;
+  memset(w, 0, n * sizeof(double));
+  if (m->surfaces) fill_moved(m, o, &o->met[a], o->push + m->n_motions, w);
+  for (size_t s = 0; s < (size_t)m->n_stiffness && !m->surfaces; s++) {
+    const double factor = o->f[m->stiffness[s]], *W = m->W + s * size;
+
+    add(a + 1, factor, W + a * (a + 1) / 2, w);
+    for (size_t i = a + 1; i < n; i++) w[i] += factor * W[i * (i + 1) / 2 + a];
+  }
+  return w;
+}
+
+/* The places that contacts touch. */
+static void find_touched(const Model *m, Work *o)
+{
+  int n = 0;
+
+  memset(o->before, 0, (size_t)(m->n_places + 1) * sizeof(int));
+  for (int k = 0; k < m->n_contacts; k++) {
+    for (int e = 0; e < o->met[k].n; e++) o->before[o->met[k].place[e]] = 1;
+  }
+  for (int i = 0; i <= m->n_places; i++) {
+    const int is = o->before[i];
+
+    o->before[i] = n;
+    if (is) o->touched[n++] = i;
+  }
+}
+
+/* The values for z = 0, and q and A of the contacts at the functions' values; 0: the model does not know a node. */
+static int assemble(const Model *m, Work *o)
+{
+  const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts, places = (size_t)m->n_places,
+               d = (size_t)m->n_functions;
+  const Surfaces *s = m->surfaces;
+  double *q = s ? o->at_places : o->q;
+
+  for (size_t i = 0; i < p + places; i++) q[i] = dot(d, m->offset + i * d, o->f);
+  for (size_t i = 0; i < (size_t)m->n_values; i++) o->value[i] = dot(d, m->offset + (p + places + i) * d, o->f);
+  memset(o->made, 0, n * sizeof(int));
+  memset(o->A, 0, p * n * sizeof(double));
+  for (PetscInt k = 0; s && k < s->n_searches; k++) {
+    if (!meet(s, &s->search[k], &o->room, o->value, o->met)) return 0;
+  }
+  if (s) find_touched(m, o);
+  for (size_t i = 0; i < p && s; i++) o->q[i] = q[i];
+  for (size_t i = 0; i < n && s; i++) {
+    const Met *a = &o->met[i];
+
+    o->q[p + i] = a->n ? a->gap : 0;
+    for (int e = 0; e < a->n; e++) o->q[p + i] += a->value[e] * q[p + (size_t)a->place[e]];
+  }
+  for (size_t k = 0; k < (size_t)m->n_stiffness; k++) {
+    for (size_t j = 0; j < p; j++) {
+      const double factor = o->f[m->stiffness[k]], *A = m->A + (k * p + j) * places;
+
+      if (!s) add(n, factor, A, o->A + j * n);
+      for (size_t i = 0; i < n && s; i++) {
+        for (int e = 0; e < o->met[i].n; e++) o->A[j * n + i] += factor * o->met[i].value[e] * A[o->met[i].place[e]];
+      }
+    }
+  }
+  return 1;
+}
+
+/* Entry n of four rows minus their products with the first n entries of another one; two sums of each. */
+static void subtract(size_t n, size_t row_length, const double b[], double rows[])
+{
+  double *r0 = rows, *r1 = r0 + row_length, *r2 = r1 + row_length, *r3 = r2 + row_length;
+  double s[8] = {0, 0, 0, 0, 0, 0, 0, 0};
+  size_t i = 0;
+
+  for (; i + 2 <= n; i += 2) {
+    for (size_t k = 0; k < 2; k++) {
+      s[k] += r0[i + k] * b[i + k];
+      s[2 + k] += r1[i + k] * b[i + k];
+      s[4 + k] += r2[i + k] * b[i + k];
+      s[6 + k] += r3[i + k] * b[i + k];
+    }
+  }
+  for (; i < n; i++) {
+    s[0] += r0[i] * b[i];
+    s[2] += r1[i] * b[i];
+    s[4] += r2[i] * b[i];
+    s[6] += r3[i] * b[i];
+  }
+  r0[n] -= s[0] + s[1];
+  r1[n] -= s[2] + s[3];
+  r2[n] -= s[4] + s[5];
+  r3[n] -= s[6] + s[7];
 }
 
 /* Lower factor, row by row, of the matrix in the lower triangle of a: n rows of the length `row_length`, of which the first
@@ -130,16 +248,30 @@ static int factorise(size_t n, size_t row_length, size_t done, double a[])
 {
   int dependent = 0;
 
-  for (size_t i = done; i < n; i++) {
-    double *row = a + i * row_length, pivot = row[i];
+  for (size_t first = done; first < n; first += 4) {
+    const size_t end = first + 4 < n ? first + 4 : n;
 
-    for (size_t j = 0; j < i; j++) row[j] = (row[j] - dot(j, row, a + j * row_length)) / a[j * row_length + j];
-    row[i] = pivot - dot(i, row, row);
-    if (row[i] > 1e-13 * pivot) {
-      row[i] = sqrt(row[i]);
-    } else {
-      row[i] = HUGE_VAL;
-      dependent++;
+    /* Four rows at a time, which read the former ones once. */
+    for (size_t j = 0; j < first; j++) {
+      const double *former = a + j * row_length;
+
+      if (end == first + 4)
+        subtract(j, row_length, former, a + first * row_length);
+      else
+        for (size_t i = first; i < end; i++) a[i * row_length + j] -= dot(j, a + i * row_length, former);
+      for (size_t i = first; i < end; i++) a[i * row_length + j] /= former[j];
+    }
+    for (size_t i = first; i < end; i++) {
+      double *row = a + i * row_length, pivot = row[i];
+
+      for (size_t j = first; j < i; j++) row[j] = (row[j] - dot(j, row, a + j * row_length)) / a[j * row_length + j];
+      row[i] = pivot - dot(i, row, row);
+      if (row[i] > 1e-13 * pivot) {
+        row[i] = sqrt(row[i]);
+      } else {
+        row[i] = HUGE_VAL;
+        dependent++;
+      }
     }
   }
   return dependent;
@@ -193,8 +325,9 @@ static int solve_set(const Model *m, Work *o, double epsilon, double delta)
   for (size_t i = 0; i < n; i++) L[i] = 0;
   for (size_t i = 0; i < k; i++) {
     const size_t a = (size_t)o->at[i];
+    const double *W = column(m, o, a);
 
-    for (size_t j = 0; j <= i && i >= same; j++) o->L[i * n + j] = entry(o->W, a, (size_t)o->at[j]);
+    for (size_t j = 0; j <= i && i >= same; j++) o->L[i * n + j] = W[o->at[j]];
     if (i >= same) o->L[i * n + i] += delta;
     for (size_t j = 0; j < p; j++) o->V[j * k + i] = o->A[j * n + a];
     o->y[i] = delta * o->last[p + a] - o->q[p + a];
@@ -227,18 +360,13 @@ static void residual(const Model *m, Work *o, double *gap, double *force)
 
   *gap = *force = 0;
   for (size_t i = 0; i < p; i++) o->w[i] = o->q[i] + dot(n, o->A + i * n, L);
+  memset(o->w + p, 0, n * sizeof(double));
+  for (size_t j = 0; j < p; j++) add(n, -x[j], o->A + j * n, o->w + p);
+  for (size_t j = 0; j < (size_t)o->n_closed; j++) add(n, L[o->at[j]], column(m, o, (size_t)o->at[j]), o->w + p);
   for (size_t i = 0; i < n; i++) {
-    double change = 0;
-
-    for (size_t j = 0; j < p; j++) change -= o->A[j * n + i] * x[j];
-    for (size_t j = 0; j < (size_t)o->n_closed; j++) {
-      const size_t a = (size_t)o->at[j];
-
-      change += entry(o->W, i, a) * L[a];
-    }
-    o->w[p + i] = o->q[p + i] + change;
-    *gap = fmax(*gap, fmax(fabs(change), fabs(o->q[p + i])));
+    *gap = fmax(*gap, fmax(fabs(o->w[p + i]), fabs(o->q[p + i])));
     *force = fmax(*force, fabs(L[i]));
+    o->w[p + i] += o->q[p + i];
   }
 }
 
@@ -280,7 +408,7 @@ static void start(const Model *m, Work *o)
 
   for (int i = 0; i < m->n_contacts; i++) least = fmin(least, o->q[m->n_motions + i]);
   for (int i = 0; i < m->n_contacts; i++)
-    o->closed[i] = m->n_motions > 0 || (o->q[m->n_motions + i] < 0 && o->q[m->n_motions + i] <= least / 2);
+    o->closed[i] = m->n_motions > 0 ? !o->met || o->met[i].n : o->q[i] < 0 && o->q[i] <= least / 2;
   o->n_closed = 0;
   for (int i = 0; i < m->n_motions + m->n_contacts; i++) o->last[i] = 0;
 }
@@ -294,7 +422,7 @@ static double kkt_residual(const Model *m, Work *o)
 
   residual(m, o, &gap, &force);
   for (size_t i = 0; i < n; i++) { /* forces that move no gap by more than round-off are 0, as without loads */
-    if (o->z[p + i] == 0 || (o->closed[i] && o->z[p + i] * entry(o->W, i, i) > 1e-15 * gap)) continue;
+    if (o->z[p + i] == 0 || (o->closed[i] && o->z[p + i] * column(m, o, i)[i] > 1e-15 * gap)) continue;
     o->z[p + i] = 0;
     dropped = 1;
   }
@@ -319,7 +447,7 @@ static double search_held(const Model *m, Work *o, int *iterations)
   const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts;
   double epsilon = 0, delta = 0, kkt = HUGE_VAL;
 
-  for (size_t i = 0; i < n; i++) delta = fmax(delta, 1e-8 * entry(o->W, i, i));
+  for (size_t i = 0; i < n; i++) delta = fmax(delta, 1e-8 * column(m, o, i)[i]);
   for (size_t i = 0; i < p * n; i++) epsilon = fmax(epsilon, 1e-2 * o->A[i] * o->A[i] * (1e-8 / delta));
   start(m, o);
   for (int i = 0; i < 40 && kkt > 1e-13; i++) {
@@ -333,14 +461,26 @@ static double search_held(const Model *m, Work *o, int *iterations)
 
 /* -- outputs -- */
 
-/* A value is its offset's functions plus the terms, each linear in z. */
+/* Adds the terms to the values, each linear in z. */
 static void evaluate(const Model *m, Work *o)
 {
-  const size_t first = (size_t)m->n_motions + (size_t)m->n_contacts, d = (size_t)m->n_functions;
+  const size_t p = (size_t)m->n_motions, n = (size_t)m->n_terms;
+  double *push = o->push + p;
 
-  for (size_t i = 0; i < (size_t)m->n_values; i++) o->value[i] = dot(d, m->offset + (first + i) * d, o->f);
-  for (size_t i = 0; i < (size_t)m->n_terms; i++)
-    o->value[m->value[i]] += o->f[m->factor[i]] * dot(first, m->term + i * first, o->z);
+  memcpy(o->push, o->z, p * sizeof(double));
+  if (m->surfaces)
+    memset(push, 0, (size_t)m->n_places * sizeof(double));
+  else
+    memcpy(push, o->z + p, (size_t)m->n_places * sizeof(double));
+  for (int k = 0; k < m->n_contacts && m->surfaces; k++) {
+    for (int e = 0; e < o->met[k].n; e++) push[o->met[k].place[e]] += o->z[p + (size_t)k] * o->met[k].value[e];
+  }
+  memset(o->sum, 0, n * sizeof(double));
+  /* Most places have no force. */
+  for (size_t j = 0; j < p + (size_t)m->n_places; j++) {
+    if (o->push[j] != 0) add(n, o->push[j], m->term + j * n, o->sum);
+  }
+  for (size_t i = 0; i < n; i++) o->value[m->value[i]] += o->f[m->factor[i]] * o->sum[i];
 }
 
 /* The principal stresses, the largest first, by Jacobi's rotations: xx, yy, zz, xy, yz, xz. */
@@ -386,17 +526,37 @@ static double item(int of, int width, const double value[])
   return out[of - PRINCIPAL];
 }
 
+/* The part of a contact in a resultant, or in a moment: of its force at the slave. */
+static double resultant(const Model *m, const Work *o, const Output *q, int i)
+{
+  const int k = m->contact[q->first + i], a = q->of % 3, b = (q->of + 1) % 3, c = (q->of + 2) % 3;
+  const Met *met = &o->met[k];
+  const double *weight = m->weight + q->weight, *x = o->room.X + 3 * m->surfaces->node[k];
+  double share = weight[i];
+
+  for (int j = 0; j < met->n_masters; j++) share -= met->weight[j] * weight[q->n + met->master[j]];
+  share *= o->z[m->n_motions + k];
+  return q->of < 3 ? share * met->normal[a] : share * (x[b] * met->normal[c] - x[c] * met->normal[b]);
+}
+
 /* least: forces below it are none, as in the library. An output over no item is 0. */
 static double output(const Model *m, const Work *o, const Output *q, double least)
 {
   double sum = q->kind == LARGEST ? -HUGE_VAL : q->kind == SMALLEST || q->kind == PRESSURE_SMALLEST ? HUGE_VAL : 0;
 
+  if (q->kind == RESULTANT && q->width >= 0) sum = o->value[q->width];
   for (int i = 0; i < q->n; i++) {
-    const double weight = q->weight < 0 ? 1 : m->weight[q->weight + i];
+    double weight = q->weight < 0 ? 1 : m->weight[q->weight + i];
 
-    if (q->kind >= CLOSED) {
-      const double force = o->z[m->n_motions + m->contact[q->first + i]], pressure = force > least ? weight * force : 0;
+    if (q->kind == RESULTANT) {
+      if (o->z[m->n_motions + m->contact[q->first + i]] > least) sum += resultant(m, o, q, i);
+    } else if (q->kind >= CLOSED) {
+      const int k = m->contact[q->first + i];
+      const double force = o->z[m->n_motions + k];
+      double pressure;
 
+      if (o->met) weight = q->kind == CLOSED ? o->met[k].area : o->met[k].area > 0 ? 1 / o->met[k].area : 0;
+      pressure = force > least ? weight * force : 0;
       if (q->kind == CLOSED) sum += force > least ? weight : 0;
       if (q->kind == PRESSURE) sum = fmax(sum, pressure);
       if (q->kind == PRESSURE_SMALLEST) sum = fmin(sum, pressure);
@@ -409,13 +569,15 @@ static double output(const Model *m, const Work *o, const Output *q, double leas
   return sum == HUGE_VAL ? 0 : sum;
 }
 
-/* The prediction for the functions' values in o->f. Residuals say whether it is solved. */
+/* The prediction for the functions' values in o->f, and the nodes of moved surfaces in o->room.X. Residuals say whether it is
+   solved. */
 static int predict(const Model *m, Work *o, double out[], double *kkt, int *iterations)
 {
   double least = 0;
 
   *iterations = 0;
-  assemble(m, o);
+  *kkt = HUGE_VAL;
+  if (!assemble(m, o)) return DIVERGED;
   start(m, o);
   *kkt = search(m, o, 0, 0, iterations) ? kkt_residual(m, o) : HUGE_VAL;
   if (*kkt > m->tolerance) *kkt = search_held(m, o, iterations);

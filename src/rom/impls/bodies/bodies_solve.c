@@ -679,6 +679,50 @@ PetscErrorCode HycoBodiesMatrix(HycoBodiesWork o, PetscInt n, const PetscInt con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* u -= C f / kappa. */
+static PetscErrorCode Yield(HycoBodiesWork o)
+{
+  const HycoSubstructures b = o->bodies;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < b->n; k++) {
+    const HycoSubstructure *own = &b->body[k];
+    PetscReal *u = o->u + b->start[k];
+
+    for (PetscInt j = 0; j < own->n; j++) {
+      const PetscReal force = o->f[b->start[k] + j] / o->kappa[k];
+
+      const PetscReal *column;
+
+      if (force == 0) continue;
+      PetscCall(GetColumn(o, k, j, &column));
+      HycoBodiesAdd(own->n, -force, column, u);
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* u += Z x. */
+static void MoveRigidly(HycoBodiesWork o)
+{
+  const HycoSubstructures b = o->bodies;
+
+  for (PetscInt i = 0; i < b->ns; i++) {
+    for (PetscInt j = 0; j < b->p; j++) o->u[i] += o->Z[i * b->p + j] * o->x[j];
+  }
+}
+
+/* The forces are those on the surfaces' unknowns, which need not be those of contacts. */
+PetscErrorCode HycoBodiesRespond(HycoBodiesWork o, const PetscReal f[])
+{
+  PetscFunctionBegin;
+  PetscCall(PetscArraycpy(o->f, f, o->bodies->ns));
+  PetscCall(PetscArraycpy(o->u, o->free, o->bodies->ns));
+  PetscCall(Yield(o));
+  MoveRigidly(o);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* u = free - C f / kappa + Z x. Exact for any forces: the approximation of the model is in C and in the samples' blend
    only. */
 static PetscErrorCode Displace(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal Lambda[])
@@ -695,23 +739,8 @@ static PetscErrorCode Displace(HycoBodiesWork o, const HycoBodiesSurface *s, con
   /* Kept products P = C B^T give u contact by contact, otherwise u comes column by column of C from the summed
      forces f. */
   if (o->kept.same) PetscCall(HycoBodiesKeptDisplace(o, s->n, Lambda, o->u));
-  for (PetscInt k = 0; k < b->n && !o->kept.same; k++) {
-    const HycoSubstructure *own = &b->body[k];
-    PetscReal *u = o->u + b->start[k];
-
-    for (PetscInt j = 0; j < own->n; j++) {
-      const PetscReal force = o->f[b->start[k] + j] / o->kappa[k];
-
-      const PetscReal *column;
-
-      if (force == 0) continue;
-      PetscCall(GetColumn(o, k, j, &column));
-      HycoBodiesAdd(own->n, -force, column, u);
-    }
-  }
-  for (PetscInt i = 0; i < b->ns; i++) {
-    for (PetscInt j = 0; j < b->p; j++) o->u[i] += o->Z[i * b->p + j] * o->x[j];
-  }
+  if (!o->kept.same) PetscCall(Yield(o));
+  MoveRigidly(o);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -1,0 +1,66 @@
+/* The data of an exported model. */
+#ifndef HYCO_EXPORTED_MODEL
+#define HYCO_EXPORTED_MODEL
+
+enum { OK, OUTSIDE, DIVERGED, NO_MEMORY };                                       /* status */
+enum { SUM, LARGEST, SMALLEST, CLOSED, PRESSURE, PRESSURE_SMALLEST, RESULTANT }; /* kinds of output */
+enum { COMPONENT, NORM, MISES, PRINCIPAL }; /* what counts of an item; PRINCIPAL + k */
+
+/* An output: a number for each of n items, combined as its kind says. The items are places with `width` values each, from
+   value `first` on, or contacts, from `first` on in Model.contact. A RESULTANT: the value `width` (-1: 0) and the contacts'
+   forces along axis `of`, from 3 on the moments around it, times the weights of the contacts minus those of the masters,
+   which follow them by node. */
+typedef struct Output {
+  int kind, of, n, width, first, weight; /* weight: place of the first in Model.weight; -1: all are 1, or as found */
+} Output;
+
+/* Places first .. first + n - 1, which have the flexibility C (n x n), times a value. */
+typedef struct {
+  int first, n, value;
+  const double *C;
+} Block;
+
+enum { PRESCRIBED = -1, UNKNOWN = -2 };     /* instead of a place: moved by a support; not among the model's unknowns */
+enum { WIDE = 3 * (1 + HYCO_FACET_NODES) }; /* entries of a row, at most */
+
+/* The facets of a group, and of a master its border as HycoMasterSearch has it. */
+typedef struct {
+  PetscInt first, n, side, n_border, border, at_border; /* side: -1, of a mirrored body */
+} Surface;
+
+/* The contacts first .. first + n - 1: the nodes of a surface with their masters on another. */
+typedef struct {
+  PetscInt slave, master, first, n;
+  double reach; /* of a master */
+} Facing;
+
+typedef struct {
+  PetscInt dim, n_nodes, nf, nq, n_searches, n_facets; /* nodes and points of a facet; of the largest master */
+  double around;                                       /* 2 pi in an axisymmetric scene; 0 */
+  const double *w, *N, *dN;                            /* nq; nq x nf; nq x nf x 2 */
+  const Surface *surface;
+  const Facing *search;
+  const PetscInt *facet, *border, *node; /* node: of each slave */
+  const PetscBool *at_border;
+  const int *place, *given; /* n_nodes x dim; given: the value that is a prescribed displacement; -1: it is 0 */
+  const int *pose;          /* by node: the first of nine values that turn its body; -1: none */
+} Surfaces;
+
+typedef struct {
+  int n_parameters, n_functions, n_motions, n_places, n_stiffness, n_values, n_terms, n_outputs;
+  int n_contacts, n_blocks;  /* n_places contacts, and no blocks, unless surfaces move */
+  double tolerance;          /* of the KKT residual */
+  const double *lo, *hi;     /* ranges of the parameters */
+  const double *offset;      /* n_motions + n_places + n_values rows of n_functions: w and the values for z = 0 */
+  const int *stiffness;      /* functions by which the next two are multiplied, n_stiffness of each */
+  const double *W, *A;       /* lower triangle of n_places rows, where there are no blocks; n_motions x n_places */
+  const int *value, *factor; /* of n_terms: the value to which it adds, and its function */
+  const double *term;        /* (n_motions + n_places) x n_terms */
+  const Output *output;
+  const int *contact;
+  const double *weight;
+  const Block *block;
+  const Surfaces *surfaces; /* NULL: none moves */
+} Model;
+
+#endif

@@ -1,0 +1,528 @@
+/* Models whose surfaces move past each other: what their programs search on, and the problem before its contacts. */
+#include "travel.h"
+#include <hycobodies.h>
+#include <hycosamples.h>
+#include <string.h>
+
+#define POINTS 9     /* at which it is found out which bodies turn and which displacements are prescribed */
+#define TURNED 1e-12 /* of an entry of Q: more is no round-off */
+
+typedef struct {
+  enum { FLEXIBLE, HELD, TURN } from;
+  PetscInt index, part; /* body or unknown; term of the flexibility, entry of Q */
+} Value;
+
+struct _n_HycoTravel {
+  HycoROM m;
+  HycoBodiesWork bodies; /* the model's */
+  Value *value;
+  PetscInt n_values, room, *node; /* node: by node of the program, of the model's mesh */
+  PetscReal mu[HYCO_MAX_PARAMETERS];
+  PetscBool placed; /* the model is at mu */
+};
+
+PetscErrorCode HycoTravelDestroy(HycoTravel *travel)
+{
+  PetscFunctionBegin;
+  if (!*travel) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoFreeAll(&(*travel)->value, &(*travel)->node, travel);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode AddValue(HycoTravel t, Value value)
+{
+  PetscFunctionBegin;
+  HycoGrow(t->n_values, t->room, t->value);
+  t->value[t->n_values++] = value;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Moves the model. */
+static PetscErrorCode Bring(HycoTravel t, const PetscReal mu[])
+{
+  const HycoBodiesSurface s = HycoBodiesSurfaceOf(t->m);
+  const PetscInt n = t->m->model->scene->n_parameters;
+  PetscBool same;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArraycmp(mu, t->mu, n, &same));
+  if (same && t->placed) PetscFunctionReturn(PETSC_SUCCESS);
+  t->placed = PETSC_FALSE;
+  PetscCall(HycoROMBringRows(t->m, mu));
+  PetscCall(HycoBodiesPrepare(t->bodies, &s, mu));
+  PetscCall(PetscArraycpy(t->mu, mu, n));
+  t->placed = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- what cannot be exported -- */
+
+static PetscErrorCode Check(HycoROM m)
+{
+  const HycoFE fe = m->fe;
+  const HycoScene s = m->model->scene;
+
+  PetscFunctionBegin;
+  HycoCheck(
+      !strcmp(m->model->type, "bodies"),
+      "export: surfaces that a map moves past each other need a model of type bodies; train one with -hyco_model_type "
+      "bodies");
+  HycoCheck(
+      !HycoMeshIsQuadratic(fe->mesh) && fe->dim > 1,
+      "export: contacts that travel on cells of second order, or in 1D, cannot be exported; use cells of first order");
+  HycoCheck(
+      !fe->n_turned && !fe->n_oblique,
+      "export: contacts that travel beside supports along directions, or with -hyco_regularise, cannot be exported");
+  for (PetscInt c = 0; c < s->n_contacts; c++) {
+    const HycoContact of = s->contact[c];
+
+    HycoCheck(HycoPairsFollows(&m->pairs, c) && !of->integrated && of->master,
+              "export: contact %s: where contacts travel, only those of type surface that do can be exported",
+              of->name);
+    HycoCheck(HycoContactAverages(of) && !of->gap,
+              "export: contact %s: a normal or a gap that the scene gives cannot be exported where contacts travel",
+              of->name);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- samples -- */
+
+/* The product of Lagrange's polynomials of sample j of a body. */
+static PetscErrorCode WriteWeight(HycoSubstructures b, PetscInt k, PetscInt j, HycoScene s, HycoText *t)
+{
+  const HycoTensor *of = &b->body[k].tensor;
+  PetscReal factor = 1;
+
+  PetscFunctionBegin;
+  for (PetscInt p = b->n_theta - 1; p >= 0; j /= of->n[p], p--) {
+    const PetscInt at = j % of->n[p];
+    char x[HYCO_LINE];
+
+    HycoFormat(x, "%s%s%s",
+               b->variable[p] == HYCO_BODIES_LOGARITHM    ? "ln("
+               : b->variable[p] == HYCO_BODIES_RECIPROCAL ? "(-1/"
+                                                          : "(",
+               s->parameter[b->theta[p]], ")");
+    for (PetscInt i = 0; i < of->n[p]; i++) {
+      if (i == at) continue;
+      factor /= of->x[p][at] - of->x[p][i];
+      PetscCall(HycoTextAdd(t, "(%s-(%.17g))*", x, (double)of->x[p][i]));
+    }
+  }
+  PetscCall(HycoTextAdd(t, "(%.17g)", (double)factor));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoExportWeights(HycoROM m, PetscInt *n, char ***text)
+{
+  const HycoSubstructures b = strcmp(m->model->type, "bodies") ? NULL : (HycoSubstructures)m->model->data;
+
+  PetscFunctionBegin;
+  *n = 0;
+  *text = NULL;
+  for (PetscInt k = 0; b && k < b->n; k++) {
+    for (PetscInt j = 0; j < b->body[k].n_samples && b->body[k].n_samples > 1; j++) {
+      HycoText t = {0};
+      PetscBool known = PETSC_FALSE;
+
+      PetscCall(WriteWeight(b, k, j, m->model->scene, &t));
+      for (PetscInt i = 0; i < *n && !known; i++) known = (PetscBool)!strcmp((*text)[i], t.text);
+      if (known) PetscCall(PetscFree(t.text));
+      if (known) continue;
+      PetscCall(PetscRealloc((size_t)(*n + 1) * sizeof(**text), text));
+      (*text)[(*n)++] = t.text;
+    }
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- surfaces -- */
+
+/* Marks the nodes of the contacts' facets, and numbers them. */
+static PetscErrorCode FindNodes(HycoTravel t, HycoExportModel *out, PetscInt number[])
+{
+  HycoMesh m = t->m->fe->mesh;
+  const HycoScene s = t->m->model->scene;
+  Surfaces *u = &out->surfaces;
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < m->n_nodes; i++) number[i] = -1;
+  for (PetscInt c = 0; c < 2 * s->n_contacts; c++) {
+    const char *group = c % 2 ? s->contact[c / 2]->master : s->contact[c / 2]->slave;
+    PetscInt g = 0;
+
+    PetscCall(HycoMeshFindGroup(m, "contact", group, &g));
+    for (PetscInt f = 0; f < m->n_facets; f++) {
+      for (PetscInt a = 0; a < m->nf && m->facet_group[f] == g; a++) number[m->facets[f * m->nf + a]] = 0;
+    }
+  }
+  PetscCall(PetscMalloc1(m->n_nodes, &t->node));
+  for (PetscInt i = 0; i < m->n_nodes; i++) {
+    if (number[i] < 0) continue;
+    HycoCheck(HycoMeshTied(m, i) < 0, "export: contacts that travel on tied nodes, as node %d, cannot be exported",
+              (int)m->node_id[i]);
+    t->node[u->n_nodes] = i;
+    number[i] = u->n_nodes++; /* ascending, as in the mesh */
+  }
+  PetscCall(PetscMalloc1(u->n_nodes, &out->body));
+  PetscCall(PetscMalloc1(3 * u->n_nodes, &out->drawn));
+  for (PetscInt i = 0; i < u->n_nodes; i++) {
+    out->body[i] = m->node_body[t->node[i]];
+    PetscCall(PetscArraycpy(out->drawn + 3 * i, m->xyz + 3 * t->node[i], 3));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A group's facets and border, as the search has them. */
+static PetscErrorCode AddSurface(HycoTravel t, PetscInt group, const PetscInt number[], HycoExportModel *out)
+{
+  const HycoFE fe = t->m->fe;
+  Surfaces *u = &out->surfaces;
+  Surface *all = (Surface *)u->surface, *of;
+  PetscInt *facet = (PetscInt *)u->facet, *border = (PetscInt *)u->border;
+  PetscBool *at = (PetscBool *)u->at_border;
+  HycoMasterSearch search;
+
+  PetscFunctionBegin;
+  PetscCall(HycoMasterSearchCreateOn(fe, group, group, PETSC_FALSE, &search));
+  PetscCall(HycoMasterSearchBorder(&search));
+  of = &all[out->n_surfaces];
+  of->first = out->n_surfaces ? of[-1].first + of[-1].n : 0;
+  of->n = search.n;
+  of->n_border = search.n_border;
+  of->border = 2 * out->n_border;
+  of->at_border = out->n_surfaces * u->n_nodes;
+  of->side = search.n && fe->mirrored[fe->mesh->node_body[search.node[0]]] ? -1 : 1;
+  PetscCall(PetscRealloc((size_t)((of->first + of->n) * u->nf + 1) * sizeof(*facet), &facet));
+  PetscCall(PetscRealloc((size_t)(of->border + 2 * of->n_border + 1) * sizeof(*border), &border));
+  PetscCall(PetscRealloc((size_t)(of->at_border + u->n_nodes + 1) * sizeof(*at), &at));
+  for (PetscInt k = 0; k < of->n * u->nf; k++) facet[of->first * u->nf + k] = number[search.node[k]];
+  for (PetscInt k = 0; k < 2 * of->n_border; k++) border[of->border + k] = number[search.border[k]];
+  for (PetscInt i = 0; i < u->n_nodes; i++) at[of->at_border + i] = search.at_border[t->node[i]];
+  u->facet = facet;
+  u->border = border;
+  u->at_border = at;
+  u->n_facets = PetscMax(u->n_facets, of->n);
+  out->n_border += of->n_border;
+  out->n_surfaces++;
+  PetscCall(HycoMasterSearchDestroy(&search));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The shape functions at the points of a facet. */
+static PetscErrorCode TakeElement(const HycoFE fe, Surfaces *u)
+{
+  const HycoElement *el = HycoElementGetFacet(fe->mesh->type);
+  PetscReal *w, *N, *dN;
+
+  PetscFunctionBegin;
+  u->dim = fe->dim;
+  u->nf = el->nv;
+  u->nq = el->nq;
+  u->around = fe->formulation == HYCO_AXISYMMETRIC ? 2 * PETSC_PI : 0;
+  PetscCall(PetscMalloc1(el->nq, &w));
+  PetscCall(PetscMalloc1(el->nq * el->nv, &N));
+  PetscCall(PetscMalloc1(2 * el->nq * el->nv, &dN));
+  for (PetscInt k = 0; k < el->nq * el->nv; k++) {
+    const PetscInt q = k / el->nv, a = k % el->nv;
+
+    w[q] = el->w[q];
+    N[k] = el->N[q][a];
+    for (PetscInt d = 0; d < 2; d++) dN[2 * k + d] = el->dN[q][a][d];
+  }
+  u->w = w;
+  u->N = N;
+  u->dN = dN;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Slave and master of each contact of the scene, and its slave nodes. */
+static PetscErrorCode FindSurfaces(HycoTravel t, const PetscInt number[], HycoExportModel *out)
+{
+  const HycoScene s = t->m->model->scene;
+  const HycoPairs *pairs = &t->m->pairs;
+  Surfaces *u = &out->surfaces;
+  Facing *search;
+  Surface *surface;
+  PetscInt *node;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(s->n_contacts, &search));
+  u->search = search;
+  PetscCall(PetscCalloc1(2 * s->n_contacts, &surface));
+  u->surface = surface;
+  PetscCall(PetscMalloc1(pairs->n, &node));
+  u->node = node;
+  u->n_searches = s->n_contacts;
+  for (PetscInt c = 0; c < s->n_contacts; c++) {
+    PetscInt g[2] = {0, 0};
+
+    PetscCall(HycoMeshFindGroup(t->m->fe->mesh, "contact", s->contact[c]->slave, &g[0]));
+    PetscCall(HycoMeshFindGroup(t->m->fe->mesh, "contact", s->contact[c]->master, &g[1]));
+    for (PetscInt k = 0; k < 2; k++) PetscCall(AddSurface(t, g[k], number, out));
+    search[c].slave = 2 * c;
+    search[c].master = 2 * c + 1;
+    search[c].reach = pairs->search[c].reach;
+  }
+  for (PetscInt k = pairs->n - 1; k >= 0; k--) {
+    search[pairs->contact[k]].first = k;
+    search[pairs->contact[k]].n++;
+    node[k] = number[pairs->slave[k]];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The places of the nodes' unknowns; those that supports prescribe somewhere in the ranges, and the bodies that turn, have
+   values. turns: by body. */
+static PetscErrorCode FindPlaces(HycoTravel t, const PetscBool moves[], const PetscBool turns[], HycoExportModel *out)
+{
+  const HycoSubstructures b = t->bodies->bodies;
+  const HycoFE fe = t->m->fe;
+  Surfaces *u = &out->surfaces;
+  int *place, *given, *pose;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(u->n_nodes * u->dim, &place));
+  u->place = place;
+  PetscCall(PetscMalloc1(u->n_nodes * u->dim, &given));
+  u->given = given;
+  PetscCall(PetscMalloc1(u->n_nodes, &pose));
+  u->pose = pose;
+  for (PetscInt k = 0; k < b->n; k++) {
+    for (PetscInt term = 0; term < b->body[k].C.n_terms; term++) PetscCall(AddValue(t, (Value){FLEXIBLE, k, term}));
+  }
+  for (PetscInt i = 0; i < u->n_nodes; i++) {
+    PetscInt body = -1;
+
+    for (PetscInt c = 0; c < u->dim; c++) {
+      const PetscInt dof = t->node[i] * u->dim + c, at = t->bodies->loc[dof];
+
+      place[i * u->dim + c] = fe->fixed[dof] ? PRESCRIBED : at >= 0 && at < b->ns ? (int)at : UNKNOWN;
+      given[i * u->dim + c] = -1;
+      if (place[i * u->dim + c] >= 0) body = HycoBodiesAt(b, at);
+      if (!fe->fixed[dof] || !moves[dof]) continue;
+      given[i * u->dim + c] = (int)t->n_values;
+      PetscCall(AddValue(t, (Value){HELD, dof, 0}));
+    }
+    pose[i] = body >= 0 && turns[body] ? -2 - (int)body : -1;
+  }
+  for (PetscInt k = 0; k < b->n; k++) {
+    for (PetscInt i = 0; i < u->n_nodes && turns[k]; i++) {
+      if (pose[i] == -2 - (int)k) pose[i] = (int)t->n_values;
+    }
+    for (PetscInt e = 0; e < 9 && turns[k]; e++) PetscCall(AddValue(t, (Value){TURN, k, e}));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* moves: by unknown, whether a displacement is prescribed that is not 0; turns: by body. */
+static PetscErrorCode FindMotions(HycoTravel t, PetscBool moves[], PetscBool turns[])
+{
+  const HycoFE fe = t->m->fe;
+  HycoSamples samples;
+  const PetscReal *mu;
+  PetscInt n;
+  PetscErrorCode ierr = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesCreate(t->m->model->scene, &samples));
+  PetscCall(HycoSamplesAddScattered(samples, POINTS));
+  PetscCall(HycoSamplesGet(samples, &n, NULL, &mu));
+  for (PetscInt i = 0; i < n && !ierr; i++) {
+    ierr = Bring(t, mu + i * t->m->model->scene->n_parameters);
+    for (PetscInt k = 0; k < fe->n_dof && !ierr; k++)
+      moves[k] = (PetscBool)(moves[k] || (fe->fixed[k] && fe->u0[k] != 0));
+    for (PetscInt k = 0; k < 9 * t->bodies->bodies->n && !ierr; k++)
+      turns[k / 9] =
+          (PetscBool)(turns[k / 9] || PetscAbsReal(t->bodies->pose[k / 9].Q[k % 9] - (k % 9 % 4 == 0)) > TURNED);
+  }
+  PetscCall(HycoSamplesDestroy(&samples));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Make(HycoTravel t, HycoExportModel *out)
+{
+  PetscInt *number;
+  PetscBool *moves, *turns;
+
+  PetscFunctionBegin;
+  PetscCall(Check(t->m));
+  t->bodies = (HycoBodiesWork)t->m->work;
+  PetscCall(TakeElement(t->m->fe, &out->surfaces));
+  PetscCall(PetscMalloc1(t->m->fe->mesh->n_nodes, &number));
+  PetscCall(PetscCalloc2(t->m->fe->n_dof, &moves, t->bodies->bodies->n, &turns));
+  PetscCall(FindNodes(t, out, number));
+  PetscCall(FindSurfaces(t, number, out));
+  PetscCall(FindMotions(t, moves, turns));
+  PetscCall(FindPlaces(t, moves, turns, out));
+  PetscCall(PetscFree2(moves, turns));
+  PetscCall(PetscFree(number));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTravelCreate(HycoROM m, HycoExportModel *out, HycoTravel *travel)
+{
+  HycoTravel t;
+
+  PetscFunctionBegin;
+  *travel = NULL;
+  if (!m->pairs.room) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscNew(&t));
+  t->m = m;
+  *travel = t;
+  PetscCall(Make(t, out));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* -- the problem -- */
+
+PetscInt HycoTravelPlaces(HycoTravel t)
+{
+  return ((HycoSubstructures)t->m->model->data)->ns;
+}
+
+PetscInt HycoTravelBodies(HycoTravel t)
+{
+  return t->bodies->bodies->n;
+}
+
+PetscInt HycoTravelAt(HycoTravel t, PetscInt place)
+{
+  return HycoBodiesAt(t->bodies->bodies, place);
+}
+
+void HycoTravelUnknowns(HycoTravel t, PetscReal z[])
+{
+  const PetscInt p = t->bodies->bodies->p;
+
+  for (PetscInt i = 0; i < p; i++) z[i] = t->bodies->x[i];
+  for (PetscInt i = 0; i < t->bodies->bodies->ns; i++) z[p + i] = t->bodies->f[i];
+}
+
+PetscErrorCode HycoTravelResidual(HycoTravel t, const PetscReal mu[], const PetscReal z[], PetscReal w[])
+{
+  const HycoBodiesWork o = t->bodies;
+  const HycoSubstructures b = o->bodies;
+
+  PetscFunctionBegin;
+  PetscCall(Bring(t, mu));
+  PetscCall(PetscArrayzero(t->m->Lambda, t->m->model->pairs.n));
+  PetscCall(PetscArraycpy(o->x, z, b->p));
+  PetscCall(HycoBodiesRespond(o, z + b->p));
+  for (PetscInt i = 0; i < b->p; i++) {
+    w[i] = 0;
+    for (PetscInt j = 0; j < b->r; j++) w[i] -= o->work[i * b->r + j] * o->c[j];
+    for (PetscInt k = 0; k < b->ns; k++) w[i] += o->Z[k * b->p + i] * o->f[k];
+  }
+  for (PetscInt k = 0; k < b->ns; k++) w[b->p + k] = -o->u[k];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTravelMotions(HycoTravel t, const PetscReal mu[], PetscReal Z[])
+{
+  PetscFunctionBegin;
+  PetscCall(Bring(t, mu));
+  PetscCall(PetscArraycpy(Z, t->bodies->Z, t->bodies->bodies->ns * t->bodies->bodies->p));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscInt HycoTravelValues(HycoTravel t)
+{
+  return t->n_values;
+}
+
+PetscReal HycoTravelValue(HycoTravel t, PetscInt i)
+{
+  const Value *v = &t->value[i];
+
+  if (v->from == FLEXIBLE && t->bodies->bodies->body[v->index].n_samples > 1)
+    return t->bodies->share[v->index][v->part] / t->bodies->kappa[v->index];
+  if (v->from == FLEXIBLE) return 1 / t->bodies->kappa[v->index];
+  return v->from == HELD ? t->m->fe->u0[v->index] : t->bodies->pose[v->index].Q[v->part];
+}
+
+PetscInt HycoTravelBody(HycoTravel t, PetscInt body)
+{
+  const HycoSubstructures b = t->bodies->bodies;
+
+  for (PetscInt i = 0; i < t->n_values; i++) {
+    const PetscInt k = t->value[i].index;
+
+    if (t->value[i].from == TURN && b->probe->cell_body[b->cell[k]] == body) return k;
+  }
+  return -1;
+}
+
+const PetscReal *HycoTravelTurn(HycoTravel t, PetscInt k)
+{
+  return t->bodies->pose[k].Q;
+}
+
+PetscBool HycoTravelIsFlexible(HycoTravel t, PetscInt i, PetscInt k)
+{
+  return (PetscBool)(t->value[i].from == FLEXIBLE && t->value[i].index == k);
+}
+
+/* All entries of a turn are of one size. */
+PetscInt HycoTravelGroup(HycoTravel t, PetscInt i)
+{
+  return t->value[i].from == TURN ? i - t->value[i].part : i;
+}
+
+void HycoTravelStart(HycoTravel t, PetscInt first, HycoExportModel *out)
+{
+  Surfaces *u = &out->surfaces;
+  int *given = (int *)u->given, *pose = (int *)u->pose;
+
+  (void)t;
+  for (PetscInt i = 0; i < u->n_nodes * u->dim; i++) given[i] += given[i] < 0 ? 0 : (int)first;
+  for (PetscInt i = 0; i < u->n_nodes; i++) pose[i] += pose[i] < 0 ? 0 : (int)first;
+}
+
+PetscReal HycoTravelNumbers(HycoTravel t)
+{
+  PetscReal sum = 0;
+
+  for (PetscInt k = 0; k < t->bodies->bodies->n; k++)
+    sum += t->bodies->bodies->body[k].C.n_terms * PetscSqr((PetscReal)t->bodies->bodies->body[k].n);
+  return sum;
+}
+
+PetscErrorCode HycoTravelBlocks(HycoTravel t, PetscInt first, HycoExportModel *out)
+{
+  const HycoSubstructures b = t->bodies->bodies;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(t->n_values, &out->block));
+  for (PetscInt i = 0; i < t->n_values && t->value[i].from == FLEXIBLE; i++) {
+    const HycoFlexibility *f = &b->body[t->value[i].index].C;
+    const size_t n = (size_t)f->n;
+    PetscReal *C;
+
+    if (!n) continue;
+    PetscCall(PetscMalloc1(n * n, &C));
+    for (size_t k = 0; k < n * n; k++)
+      C[k] = HycoFlexibilityEntry(f, t->value[i].part, (PetscInt)(k / n), (PetscInt)(k % n));
+    out->block[out->n_blocks++] = (Block){(int)b->start[t->value[i].index], (int)n, (int)(first + i), C};
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoTravelPositions(const HycoExportModel *out, HycoScene s, const PetscReal mu[], PetscReal X[])
+{
+  PetscBool valid;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArraycpy(X, out->drawn, 3 * out->surfaces.n_nodes));
+  for (PetscInt i = 0; i < 3 * out->surfaces.n_nodes; i++) {
+    const HycoExpr map = s->body[out->body[i / 3]].map[i % 3];
+
+    if (!map) continue;
+    PetscCall(HycoTranslate(s, HycoExportEntry(s, HycoExprKey(map)), out->drawn + i - i % 3, mu, &X[i], NULL, &valid,
+                            NULL, NULL));
+    HycoCheck(valid, "export: the map %s cannot be exported: it is no expression that is known", HycoExprKey(map));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
