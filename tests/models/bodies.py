@@ -3,6 +3,8 @@ float; where a body's shape changes, they follow the number of its samples and s
 import os
 import shutil
 import re
+import resource
+import subprocess
 import unittest
 
 import h5py
@@ -10,7 +12,7 @@ import numpy as np
 
 import rigid_motions
 import rigid
-from common import SOURCE, Case
+from common import HYCO, SANITIZED, SOURCE, Case
 
 MESH = os.path.join(SOURCE, 'examples', '{0}', '{0}.msh')
 TYPE = ('-hyco_model_type', 'bodies')
@@ -389,6 +391,27 @@ class Bodies(Case):
                       'a spring along one component does not turn with the body')
         said = self.hyco('check', '-scene', HERTZ)['bodies_by_parameter']
         self.assertIn('radius: changes the shape or the material of body upper, which needs samples', said)
+
+    @unittest.skipIf(SANITIZED, 'a sanitizer changes times')
+    def test_check_cost(self):
+        """What check announces before anything is solved is within a factor of 3 of the CPU time of the whole default training and of a prediction, of a
+        scene that needs samples and of a larger one that needs none."""
+        def cpu(*args):
+            def total():
+                used = resource.getrusage(resource.RUSAGE_CHILDREN)
+                return used.ru_utime + used.ru_stime
+            before = total()
+            self.assertIn(subprocess.run([HYCO, *map(str, args)], cwd=self.folder, capture_output=True, check=False).returncode, (0, 3))
+            return total() - before
+
+        for scene, n in ((HERTZ, 1000), (ROLLER, 600)):
+            said, other = (self.hyco('check', '-scene', scene)['estimate'] for _ in range(2))
+            said = {name: min(said[name], other[name]) for name in ('seconds_bodies', 'seconds_prediction')}  # beside other programs
+            training = cpu('train', '-scene', scene, '-grid', '2,2,2', '-model', 'cost.h5')
+            first, all_ = (cpu('predict', '-model', 'cost.h5', '-scatter', k) for k in (1, n))
+            with self.subTest(scene=scene, said=said, training=training, prediction=(all_ - first) / (n - 1)):
+                self.assertLess(abs(np.log(said['seconds_bodies'] / training)), np.log(3))
+                self.assertLess(abs(np.log(said['seconds_prediction'] * (n - 1) / (all_ - first))), np.log(3))
 
     def test_solvers(self):
         """Every method that is asked for solves the contact problem of a prediction, and is named; it is refused with floating bodies; tolerance and
