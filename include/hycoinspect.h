@@ -95,7 +95,11 @@ typedef struct {
   char bodies[1024];         /* how the parameters enter the bodies; "": not of this scene */
   PetscReal bytes, resident; /* memory of a factor; of the processes now, all ranks */
   PetscReal first, next;     /* estimated seconds of a solve with a new stiffness, with the last one; on each rank */
-  HycoFOM whole;             /* what the names belong to */
+  PetscInt
+      body_values; /* assumed values of the parameters that change bodies, of a model of bodies; 0: no such model */
+  PetscReal body_training, body_prediction; /* estimated seconds of its training, held-out solutions included; of a
+                                               prediction */
+  HycoFOM whole;                            /* what the names belong to */
 } HycoInspection;
 
 /*

@@ -70,22 +70,24 @@ static inline void HycoBodiesAdd(PetscInt n, PetscReal factor, const PetscReal f
   BLASaxpy_(&size, &factor, from, &one, to, &one);
 }
 
-/* The flexibility C of a body, n x n and symmetric: the sum over its terms of share[] C_t, the share of a term its
-   polynomial of theta, one of those that are orthonormal on the samples; the first is constant. An unknown has its
-   columns of all terms side by side, because a prediction reads them together. */
+/* A matrix of a body, rows x n, its flexibility or the responses of other unknowns: the sum over its terms of share[] C_t,
+   the share of a term its polynomial of theta, one of those that are orthonormal on the samples; the first is constant. An
+   unknown has its columns of all terms side by side, because a prediction reads them together. */
 typedef struct {
-  PetscInt n, n_terms, n_wide; /* unknowns; terms; those in double precision, the first ones */
-  PetscInt *term;              /* their polynomials, ascending */
-  PetscReal *polynomial;       /* samples x terms row major: at the samples */
+  PetscInt rows, n, n_terms, n_wide; /* n: unknowns; terms; those in double precision, the first ones */
+  PetscInt *term;                    /* their polynomials, the constant one first */
+  PetscReal *polynomial;             /* samples x terms row major: at the samples */
   PetscReal *wide;
   float *narrow;
 } HycoFlexibility;
-/* From the samples at the tensor's nodes. least 0: all terms in double precision; > 0: the first one, the others in
-   single precision, without those whose entries are nowhere as large, relative to the diagonal. */
-PetscErrorCode HycoFlexibilityCreate(const HycoTensor *tensor, PetscInt n, const PetscReal *const sample[],
-                                     PetscReal least, HycoFlexibility *f);
+/* From the samples at the tensor's nodes, by columns. least 0: all terms in double precision; > 0: the first one and those
+   with entries above `single`, the others in single precision, without those whose entries are all below `least`, relative
+   to the scales of their row and column: scale[rows + n], or NULL for the roots of the diagonal. */
+PetscErrorCode HycoFlexibilityCreate(const HycoTensor *tensor, PetscInt rows, PetscInt n,
+                                     const PetscReal *const sample[], const PetscReal scale[], PetscReal least,
+                                     PetscReal single, HycoFlexibility *f);
 PetscErrorCode HycoFlexibilityDestroy(HycoFlexibility *f);
-/* Room for n, n_terms, n_wide; the polynomials of `term`; entry i of an unknown's column in a term. */
+/* Room for rows, n, n_terms, n_wide; the polynomials of `term`; entry i of an unknown's column in a term. */
 PetscErrorCode HycoFlexibilityAllocate(HycoFlexibility *f);
 PetscErrorCode HycoFlexibilityTakePolynomials(HycoFlexibility *f, const HycoTensor *tensor);
 PetscReal HycoFlexibilityEntry(const HycoFlexibility *f, PetscInt t, PetscInt unknown, PetscInt i);
@@ -95,27 +97,24 @@ void HycoFlexibilityShares(const HycoFlexibility *f, PetscInt n_samples, const P
 /* The column of an unknown; to += factor times that of one term. */
 void HycoFlexibilityColumn(const HycoFlexibility *f, const PetscReal share[], PetscInt unknown, PetscReal column[]);
 void HycoFlexibilityAdd(const HycoFlexibility *f, PetscInt t, PetscInt unknown, PetscReal factor, PetscReal to[]);
+/* y += the sum of x[n] times the columns. */
+PetscErrorCode HycoFlexibilityMultiply(const HycoFlexibility *f, const PetscReal share[], const PetscReal x[],
+                                       PetscReal y[]);
 /* to[n] = the sum over the terms of share times from, `stride` apart: in the order of HycoFlexibilityColumn(), so that
    products that are kept give the same bits as those that are not. */
 void HycoFlexibilityBlend(const HycoFlexibility *f, const PetscReal share[], PetscInt n, size_t stride,
                           const PetscReal from[], PetscReal to[]);
 
-/* One body: its blocks at each of its samples (tensor), one sample after the other. All row major, except H: an unknown
-   of the surfaces has its columns at all samples side by side. */
+/* One body. R, Z and work are row major, one sample after the other. */
 typedef struct {
   HycoTensor tensor;        /* over the parameters theta; one node along those that do not change its shape */
   PetscInt n_samples, n, l; /* n: unknowns of its surfaces; l: modes */
   PetscInt m;               /* unknowns inside whose displacements are exact */
   HycoFlexibility C;
   PetscReal *R, *Z, *work; /* n x r; n x p; p x r, the work of the loads on the rigid motions */
-  PetscReal *H, *a, *g;    /* l rows for each turn, then m rows: of n, of r, of p */
+  HycoFlexibility H, a;    /* l rows for each turn, then m rows: of the n forces; of the r loads, then the p motions */
   PetscReal *gram;         /* r x r: of the errors of R at held-out samples in the norm of C^-1, summed; 0 */
 } HycoSubstructure;
-/* The first entry of the column of an unknown at a sample, `rows` long, in H. */
-static inline size_t HycoBodiesColumn(const HycoSubstructure *s, PetscInt sample, PetscInt unknown, PetscInt rows)
-{
-  return ((size_t)unknown * (size_t)s->n_samples + (size_t)sample) * (size_t)rows;
-}
 
 /* Whether a cell's body may deform inelastically. */
 static inline PetscBool HycoInelasticFlows(HycoFE fe, PetscInt cell)
@@ -199,13 +198,17 @@ typedef struct {
 /* What solves change. In the bodies' axes: c of the loads (r); displacements of the surfaces without contact (free, ns)
    and with it, then of the unknowns inside (u, ns + ni); forces on the surfaces (f, ns); x (p). */
 typedef struct _n_HycoBodiesWork {
-  HycoSubstructures bodies; /* borrowed */
-  PetscReal **weight;       /* by body: of its samples */
-  PetscReal **share;        /* by body: of the terms of its flexibility */
+  HycoSubstructures bodies;                /* borrowed */
+  PetscReal **weight;                      /* by body: of its samples */
+  PetscReal **share, **share_H, **share_a; /* by body: of the terms of C, H, a */
+  PetscReal **R;                           /* by body: at these weights */
   PetscReal **blend;  /* by body with several samples: the columns of its flexibility with these weights, n x n; */
   PetscBool *blended; /* by place: whether they are there */
-  HycoFE fe;          /* on probe */
-  PetscBool prepared; /* what HycoBodiesPrepare() makes is that at `mu` */
+  PetscInt n_contacts;
+  PetscReal **response;      /* by contact and body: C row^T at the present parameters, NULL: 0; */
+  PetscBool *responded;      /* by contact: whether they are there */
+  HycoFE fe;                 /* on probe */
+  PetscBool prepared;        /* what HycoBodiesPrepare() makes is that at `mu` */
   PetscReal *mu, *reference; /* variables; by body: where its reference was taken */
   PetscReal *X0, *E0;        /* by body: nodes of its cell and the largest entry of its tangents in its own axes */
   PetscInt *E_at;            /* which entry */

@@ -39,6 +39,7 @@ PetscInt HycoBodyPartsFail(const HycoBodyParts *parts);
 typedef struct {
   PetscReal *theta;            /* n_theta */
   PetscReal *C, *R, *Z, *work; /* n x n; n x r; n x p; p x r, where the body has none of the p motions 0 */
+  PetscReal *L;                /* the Cholesky factor of C, once it is held out; rank 0 */
 } HycoBodyRecord;
 
 /* How laws in few cells give the coefficients of the inelastic forces. */

@@ -8,6 +8,7 @@
 #include <hycoalgorithms.h>
 #include <petscblaslapack.h>
 #include <slepc/private/svdimpl.h>
+#include <slepcblaslapack.h>
 
 /* SLEPc asks for the space of the solution before the solve. One iteration, all triplets: there is nothing to
    converge. */
@@ -29,27 +30,61 @@ static PetscErrorCode SetUp(SVD svd)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Copies this rank's rows of the dense matrix A to B, which has the same number of columns: as many rows as both
-   have, then zeros. Zero rows change neither R nor the singular values. */
-static PetscErrorCode CopyRows(Mat A, Mat B)
+/* The rows of A on this rank that take part: those with an entry, as of one body among several, or, if few rows have none,
+   all. *whole: all of them on every rank, which has at least as many as there are columns. Collective. */
+static PetscErrorCode FindRows(Mat A, PetscInt *count, PetscInt **row, PetscBool *whole)
 {
-  PetscInt n, rows, have, lda, ldb;
+  PetscInt n, rows, lda, most[2];
+  const PetscScalar *a;
+  PetscBool *any;
+
+  PetscFunctionBegin;
+  PetscCall(MatGetSize(A, NULL, &n));
+  PetscCall(MatGetLocalSize(A, &rows, NULL));
+  PetscCall(MatDenseGetLDA(A, &lda));
+  PetscCall(PetscCalloc1(rows + 1, &any));
+  PetscCall(PetscMalloc1(rows + 1, row));
+  PetscCall(MatDenseGetArrayRead(A, &a));
+  for (PetscInt j = 0; j < n; j++) {
+    for (PetscInt i = 0; i < rows; i++) any[i] = (PetscBool)(any[i] || a[(size_t)j * (size_t)lda + (size_t)i] != 0);
+  }
+  PetscCall(MatDenseRestoreArrayRead(A, &a));
+  *count = 0;
+  for (PetscInt i = 0; i < rows; i++) {
+    if (any[i]) (*row)[(*count)++] = i;
+  }
+  PetscCall(PetscFree(any));
+  most[0] = 4 * *count > 3 * rows;
+  most[1] = rows < n;
+  PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, most, 2, MPIU_INT, MPI_MAX, PetscObjectComm((PetscObject)A)));
+  *whole = (PetscBool)(most[0] && !most[1]);
+  if (!most[0]) PetscFunctionReturn(PETSC_SUCCESS);
+  *count = rows;
+  for (PetscInt i = 0; i < rows; i++) (*row)[i] = i;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Copies these rows of the dense matrix A to the first ones of B, or (back) the first ones of A to these of B; the others
+   of B are 0. */
+static PetscErrorCode CopyRows(Mat A, Mat B, PetscBool back, PetscInt count, const PetscInt row[])
+{
+  PetscInt n, rows, lda, ldb;
   const PetscScalar *a;
   PetscScalar *b;
 
   PetscFunctionBegin;
   PetscCall(MatGetSize(A, NULL, &n));
-  PetscCall(MatGetLocalSize(A, &have, NULL));
   PetscCall(MatGetLocalSize(B, &rows, NULL));
   PetscCall(MatDenseGetLDA(A, &lda));
   PetscCall(MatDenseGetLDA(B, &ldb));
   PetscCall(MatDenseGetArrayRead(A, &a));
   PetscCall(MatDenseGetArrayWrite(B, &b));
   for (PetscInt j = 0; j < n; j++) {
-    PetscScalar *column = b + (size_t)j * (size_t)ldb;
+    const PetscScalar *from = a + (size_t)j * (size_t)lda;
+    PetscScalar *to = b + (size_t)j * (size_t)ldb;
 
-    PetscCall(PetscArraycpy(column, a + (size_t)j * (size_t)lda, PetscMin(have, rows)));
-    if (have < rows) PetscCall(PetscArrayzero(column + have, rows - have));
+    PetscCall(PetscArrayzero(to, rows));
+    for (PetscInt i = 0; i < count; i++) to[back ? row[i] : i] = from[back ? i : row[i]];
   }
   PetscCall(MatDenseRestoreArrayWrite(B, &b));
   PetscCall(MatDenseRestoreArrayRead(A, &a));
@@ -60,48 +95,46 @@ static PetscErrorCode CopyRows(Mat A, Mat B)
    triangle is the same on every rank, and decomposed by each. */
 static PetscErrorCode DecomposeTriangle(PetscInt n, PetscScalar R[], PetscReal s[], PetscScalar Vt[])
 {
-  PetscBLASInt nb, one = 1, lwork = -1, info;
+  PetscBLASInt nb, one = 1, lwork = -1, info, *integers;
   PetscScalar size, none, *work;
 
   PetscFunctionBegin;
   PetscCall(PetscBLASIntCast(n, &nb));
   /* Of the factor only the upper triangle counts. */
   for (PetscInt j = 0; j < n; j++) PetscCall(PetscArrayzero(R + j * n + j + 1, n - j - 1));
-  LAPACKgesvd_("O", "S", &nb, &nb, R, &nb, s, &none, &one, Vt, &nb, &size, &lwork, &info);
+  PetscCall(PetscMalloc1(8 * n + 1, &integers));
+  /* Divide and conquer: several times faster than QR iterations where there are hundreds of columns. */
+  LAPACKgesdd_("O", &nb, &nb, R, &nb, s, &none, &one, Vt, &nb, &size, &lwork, integers, &info);
   lwork = (PetscBLASInt)size;
   PetscCall(PetscMalloc1(lwork, &work));
-  LAPACKgesvd_("O", "S", &nb, &nb, R, &nb, s, &none, &one, Vt, &nb, work, &lwork, &info);
-  PetscCall(PetscFree(work));
+  LAPACKgesdd_("O", &nb, &nb, R, &nb, s, &none, &one, Vt, &nb, work, &lwork, integers, &info);
+  HycoFreeAll(&work, &integers);
   PetscCheck(info == 0, PETSC_COMM_SELF, PETSC_ERR_LIB,
-             "the singular value decomposition did not converge (LAPACK gesvd: %d)", (int)info);
+             "the singular value decomposition did not converge (LAPACK gesdd: %d)", (int)info);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Q, whose n columns SLEPc's tall-skinny QR makes orthonormal: svd->U if each rank has at least n rows, as SLEPc
-   requires, otherwise a copy padded with rows of zeros. SLEPc's tall-skinny QR assumes n rows on each rank. */
-static PetscErrorCode MakeBasis(SVD svd, BV *Q)
+/* Q, whose n columns SLEPc's tall-skinny QR makes orthonormal: svd->U if all rows take part, otherwise of those that do,
+   and of rows of zeros if they are fewer than n, as SLEPc requires. Zero rows change neither R nor the singular values. */
+static PetscErrorCode MakeBasis(SVD svd, PetscBool whole, PetscInt count, const PetscInt row[], BV *Q)
 {
-  MPI_Comm comm = PetscObjectComm((PetscObject)svd);
   const PetscInt n = svd->ncv;
-  PetscInt rows, least;
   Mat q;
 
   PetscFunctionBegin;
-  PetscCall(MatGetLocalSize(svd->A, &rows, NULL));
-  PetscCallMPI(MPI_Allreduce(&rows, &least, 1, MPIU_INT, MPI_MIN, comm));
-  if (least >= n) {
+  if (whole) {
     /* SLEPc's own basis, without a copy. The caller destroys *Q in both cases. */
     PetscCall(PetscObjectReference((PetscObject)svd->U));
     *Q = svd->U;
   } else {
-    PetscCall(BVCreate(comm, Q));
-    PetscCall(BVSetSizes(*Q, PetscMax(rows, n), PETSC_DETERMINE, n));
+    PetscCall(BVCreate(PetscObjectComm((PetscObject)svd), Q));
+    PetscCall(BVSetSizes(*Q, PetscMax(count, n), PETSC_DETERMINE, n));
     PetscCall(BVSetType(*Q, BVMAT));
   }
   PetscCall(BVSetOrthogonalization(*Q, BV_ORTHOG_CGS, BV_ORTHOG_REFINE_IFNEEDED, PETSC_DEFAULT, BV_ORTHOG_BLOCK_TSQR));
   PetscCall(BVSetActiveColumns(*Q, 0, n));
   PetscCall(BVGetMat(*Q, &q));
-  PetscCall(CopyRows(svd->A, q));
+  PetscCall(CopyRows(svd->A, q, PETSC_FALSE, count, row));
   PetscCall(BVRestoreMat(*Q, &q));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -135,9 +168,12 @@ static PetscErrorCode Solve(SVD svd)
   BV Q;
   Mat R, q, u;
   PetscScalar *r, *Vt;
+  PetscInt count = 0, *row = NULL;
+  PetscBool whole = PETSC_FALSE;
 
   PetscFunctionBegin;
-  PetscCall(MakeBasis(svd, &Q));
+  PetscCall(FindRows(svd->A, &count, &row, &whole));
+  PetscCall(MakeBasis(svd, whole, count, row, &Q));
   PetscCall(MatCreateSeqDense(PETSC_COMM_SELF, n, n, NULL, &R));
   PetscCall(BVOrthogonalize(Q, R));
   PetscCall(PetscMalloc1(n * n, &Vt));
@@ -150,10 +186,11 @@ static PetscErrorCode Solve(SVD svd)
     PetscCall(BVSetActiveColumns(svd->U, 0, n));
     PetscCall(BVGetMat(svd->U, &u));
     PetscCall(BVGetMat(Q, &q));
-    PetscCall(CopyRows(q, u));
+    PetscCall(CopyRows(q, u, PETSC_TRUE, count, row));
     PetscCall(BVRestoreMat(Q, &q));
     PetscCall(BVRestoreMat(svd->U, &u));
   }
+  PetscCall(PetscFree(row));
   PetscCall(StoreRight(svd->V, n, Vt));
   PetscCall(PetscFree(Vt));
   HycoDestroyAll(&R, &Q);

@@ -69,6 +69,22 @@ static PetscErrorCode PrintTraining(Check *check, HycoSamples samples, cJSON *ob
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* What train tries first: without the training solutions. */
+static PetscErrorCode PrintBodies(Check *check, cJSON *object)
+{
+  const HycoInspection *in = &check->in;
+  char training[32];
+
+  PetscFunctionBegin;
+  Seconds(in->body_training, training);
+  PetscCall(
+      DriverPrint("a model of bodies, which train tries first, without the training solutions: about %s with held-out "
+                  "solutions and reduction, and %.2g ms a prediction\n",
+                  training, 1e3 * (double)in->body_prediction));
+  ReportNumbers(object, {"seconds_bodies", in->body_training}, {"seconds_prediction", in->body_prediction});
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* An estimate of a path would need the number of its steps and of their iterations. */
 static PetscErrorCode PrintPaths(Check *check, HycoSamples samples)
 {
@@ -110,5 +126,6 @@ PetscErrorCode CheckReportCost(Check *check, HycoSamples samples, PetscBool solv
     PetscCall(PrintTraining(check, samples, object));
   else
     PetscCall(PrintPaths(check, samples));
+  if (in->body_values) PetscCall(PrintBodies(check, object));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

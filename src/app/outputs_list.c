@@ -70,6 +70,8 @@ static const Written written[] = {
     {"report", "check", "estimate.n_stiffness", "count", "-", "of them with a new stiffness"},
     {"report", "check", "estimate.seconds_training", "number", "s", "these solves, without the reduction"},
     {"report", "check", "estimate.snapshots_mb", "number", "MB", "these solutions"},
+    {"report", "check", "estimate.seconds_bodies", "number", "s", "training of a model of bodies, reduction included"},
+    {"report", "check", "estimate.seconds_prediction", "number", "s", "its predictions"},
     {"report", "check", "warnings", "texts", "-", "the warnings"},
     {"report", "check", "n_warnings", "count", "-", "their number"},
 

@@ -98,7 +98,7 @@ class Files(Case):
                  ('mesh/node_id', (1 << 40, 1), 'i4'), ('problem/scene', (1 << 33, 1), 'i1'),
                  ('training/points', (1 << 30, 2), 'f8'), ('bodies/A', (1 << 20, 1 << 20), 'f8'),
                  ('bodies/start', (1 << 40, 1), 'i4'), ('bodies/body_0/flexibility', (1 << 20, 1 << 20), 'f8'),
-                 ('bodies/body_0/responses', (1 << 28, 98), 'f8'), ('bodies/dof', (1 << 40, 1), 'i4'))
+                 ('bodies/body_0/displacements', (1 << 28, 98), 'f8'), ('bodies/dof', (1 << 40, 1), 'i4'))
         for name, shape, kind in sizes:
             with self.subTest(name=name, shape=shape):
                 self.refused(self.edited(put(name, shape, kind), 'b.h5' if 'bodies' in name else 'good.h5'), f'{name} is damaged')
@@ -112,7 +112,7 @@ class Files(Case):
                 f['bodies/' + name][at] = value
             return change
 
-        values = (('A', (0, 0), np.nan), ('body_0/flexibility', (0, 7), np.inf), ('body_0/R', (0, 0), np.nan), ('body_0/responses', (0, 0), -np.inf), ('dof', (0, 0), 10**6),
+        values = (('A', (0, 0), np.nan), ('body_0/flexibility', (0, 7), np.inf), ('body_0/R', (0, 0), np.nan), ('body_0/displacements', (0, 0), -np.inf), ('dof', (0, 0), 10**6),
                   ('at', (0, 0), -1), ('cell', (0, 0), 10**6), ('head', (0, 0), 0), ('start', (1, 0), 10**6))
         for name, at, value in values:
             with self.subTest(name=name, at=at, value=value):

@@ -3,6 +3,8 @@ float; where a body's shape changes, they follow the number of its samples and s
 import os
 import shutil
 import re
+import resource
+import subprocess
 import unittest
 
 import h5py
@@ -10,7 +12,7 @@ import numpy as np
 
 import rigid_motions
 import rigid
-from common import SOURCE, Case
+from common import HYCO, SANITIZED, SOURCE, Case
 
 MESH = os.path.join(SOURCE, 'examples', '{0}', '{0}.msh')
 TYPE = ('-hyco_model_type', 'bodies')
@@ -175,33 +177,40 @@ class Bodies(Case):
         self.assertLess(np.abs(force[0].sum(axis=0)).max(), 1e-12 * np.abs(force[0]).sum())  # both sides of the pair
 
     def test_older_file(self):
-        """A file in which the fields' responses lie by mode, not by surface unknown, and flexibilities are samples, predicts the same."""
+        """Files in which flexibilities and the fields' responses are samples, or these lie by mode and not by surface unknown, predict the same."""
         self.hyco('train', '-scene', HERTZ, *TYPE, '-scatter', '2', '-model', 'new.h5', '-hyco_bodies_tol', '1e-3')
-        shutil.copy(self.path('new.h5'), self.path('old.h5'))
+        new = self.hyco('predict', '-model', 'new.h5', '-mu', '0.06,1.1,10.3')
         samples = []
-        with h5py.File(self.path('old.h5'), 'r+') as f:
-            del f['sealed']
-            nodes = f['bodies/node'][:, 0]
-            for body in (g for name, g in f['bodies'].items() if name.startswith('body_')):
-                terms = np.vstack([body[name][:] for name in ('flexibility', 'flexibility_single') if name in body])
-                n = round((2 * terms.shape[1]) ** 0.5 - 0.5)
-                H = body['responses'][:].reshape(-1, n, body['responses'].shape[1])
-                samples.append(H.shape[0])
-                self.assertEqual('flexibility_single' in body, H.shape[0] > 1)
-                Q, R = np.linalg.qr(np.vander(nodes[:H.shape[0]] - nodes.mean(), increasing=True))
-                Q = (Q * np.sign(np.diag(R)))[:, body['flexibility_terms'][:, 0]]
-                C = np.zeros((H.shape[0], n, n))
-                at = np.triu_indices(n)
-                C[:, at[0], at[1]] = C[:, at[1], at[0]] = Q @ terms
-                for name in [name for name in body if name.startswith('flexibility')]:
-                    del body[name]
-                body['C'] = C.reshape(-1, n)
-                del body['responses']
-                body['H'] = H.transpose(0, 2, 1).reshape(-1, n)
+
+        def take(body, name, nodes):
+            """The samples of a matrix from its terms."""
+            terms = np.vstack([body[name + part][:] for part in ('', '_single') if name + part in body])
+            Q, R = np.linalg.qr(np.vander(nodes - nodes.mean(), increasing=True))
+            matrix = (Q * np.sign(np.diag(R)))[:, body[name + '_terms'][:, 0]] @ terms
+            for part in [part for part in body if part in (name, name + '_single', name + '_terms', name + '_head')]:
+                del body[part]
+            return matrix
+
+        for oldest in (False, True):
+            shutil.copy(self.path('new.h5'), self.path('old.h5'))
+            with h5py.File(self.path('old.h5'), 'r+') as f:
+                del f['sealed']
+                for body in (g for name, g in f['bodies'].items() if name.startswith('body_')):
+                    loads, n = body['gram'].shape[0], round((2 * body['flexibility'].shape[1]) ** 0.5 - 0.5)
+                    count = body['R'].shape[0] // n
+                    samples.append(count)
+                    self.assertEqual(['flexibility_single' in body, 'displacements_single' in body], 2 * [count > 1])
+                    C, H, a = (take(body, name, f['bodies/node'][:count, 0]) for name in ('flexibility', 'displacements', 'displacements_of_loads'))
+                    H, a, at, whole = H.reshape(count, n, -1), a.reshape(count, loads, -1), np.triu_indices(n), np.zeros((count, n, n))
+                    whole[:, at[0], at[1]] = whole[:, at[1], at[0]] = C
+                    body['C'] = whole.reshape(-1, n)
+                    body['H' if oldest else 'responses'] = H.transpose(0, 2, 1).reshape(-1, n) if oldest else H.reshape(count * n, -1)
+                    body['a'] = a.transpose(0, 2, 1).reshape(-1, loads)
+                    body['g'] = np.zeros((len(body['a']), 0))
+            old = self.hyco('predict', '-model', 'old.h5', '-mu', '0.06,1.1,10.3')
+            for name in ('rid_u_norm2', 'total_contact_force', 'rid_u_min', 'rid_u_max'):
+                np.testing.assert_allclose(old[name], new[name], rtol=1e-11, atol=1e-15, err_msg=name)
         self.assertGreater(max(samples), 1)
-        new, old = (self.hyco('predict', '-model', name, '-mu', '0.06,1.1,10.3') for name in ('new.h5', 'old.h5'))
-        for name in ('rid_u_norm2', 'total_contact_force', 'rid_u_min', 'rid_u_max'):
-            np.testing.assert_allclose(old[name], new[name], rtol=1e-11, atol=1e-15, err_msg=name)
 
     def test_unmet_masters(self):
         """A surface of which no slave meets the greater part: displacements there are right too, on the surface as inside."""
@@ -382,6 +391,27 @@ class Bodies(Case):
                       'a spring along one component does not turn with the body')
         said = self.hyco('check', '-scene', HERTZ)['bodies_by_parameter']
         self.assertIn('radius: changes the shape or the material of body upper, which needs samples', said)
+
+    @unittest.skipIf(SANITIZED, 'a sanitizer changes times')
+    def test_check_cost(self):
+        """What check announces before anything is solved is within a factor of 3 of the CPU time of the whole default training and of a prediction, of a
+        scene that needs samples and of a larger one that needs none."""
+        def cpu(*args):
+            def total():
+                used = resource.getrusage(resource.RUSAGE_CHILDREN)
+                return used.ru_utime + used.ru_stime
+            before = total()
+            self.assertIn(subprocess.run([HYCO, *map(str, args)], cwd=self.folder, capture_output=True, check=False).returncode, (0, 3))
+            return total() - before
+
+        for scene, n in ((HERTZ, 1000), (ROLLER, 600)):
+            said, other = (self.hyco('check', '-scene', scene)['estimate'] for _ in range(2))
+            said = {name: min(said[name], other[name]) for name in ('seconds_bodies', 'seconds_prediction')}  # beside other programs
+            training = cpu('train', '-scene', scene, '-grid', '2,2,2', '-model', 'cost.h5')
+            first, all_ = (cpu('predict', '-model', 'cost.h5', '-scatter', k) for k in (1, n))
+            with self.subTest(scene=scene, said=said, training=training, prediction=(all_ - first) / (n - 1)):
+                self.assertLess(abs(np.log(said['seconds_bodies'] / training)), np.log(3))
+                self.assertLess(abs(np.log(said['seconds_prediction'] * (n - 1) / (all_ - first))), np.log(3))
 
     def test_solvers(self):
         """Every method that is asked for solves the contact problem of a prediction, and is named; it is refused with floating bodies; tolerance and

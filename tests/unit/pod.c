@@ -285,11 +285,57 @@ static PetscErrorCode TestMergedZeros(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Two of three rows are zero, as those of other bodies: the singular values and modes are those of the rest, and the modes
+   are exactly zero there. */
+static PetscErrorCode TestZeroRows(void)
+{
+  const PetscInt sizes[][2] = {{900, 13}, {60, 13}};
+
+  PetscFunctionBegin;
+  for (int t = 0; t < 2; t++) {
+    const PetscInt N = sizes[t][0], n = sizes[t][1], some = N / 3;
+    PetscReal sigma[13], *value;
+    PetscInt lo, hi, l, *row;
+    Mat S, V;
+
+    PetscCall(MatCreateDense(PETSC_COMM_WORLD, PETSC_DECIDE, PETSC_DECIDE, N, n, NULL, &S));
+    PetscCall(MatGetOwnershipRange(S, &lo, &hi));
+    for (PetscInt i = lo; i < hi; i++) {
+      for (PetscInt j = 0; j < n && i % 3 == 1; j++) {
+        PetscReal sum = 0;
+
+        for (PetscInt k = n - 1; k >= 0; k--) sum += pow(10, -k) * Cosine(some, i / 3, k) * Cosine(n, j, k);
+        PetscCall(MatSetValue(S, i, j, sum, INSERT_VALUES));
+      }
+    }
+    PetscCall(HycoMatAssemble(S));
+    PetscCall(HycoPOD(svd, S, 5e-16, 0, 0, &V, &l, sigma));
+    CHECK(l == 8, "%d modes", (int)l);
+    for (PetscInt k = 0; k < l; k++) CHECK_NEAR(sigma[k], pow(10, -k), 1e-7 * pow(10, -k));
+    PetscCall(PetscMalloc2(N * l, &value, N, &row));
+    for (PetscInt i = 0; i < N; i++) row[i] = i;
+    PetscCall(HycoGatherRows(V, N, row, value));
+    for (PetscInt k = 0; k < l; k++) {
+      PetscReal dot = 0;
+
+      for (PetscInt i = 0; i < N; i++) {
+        CHECK(i % 3 == 1 || value[i * l + k] == 0, "row %d of mode %d", (int)i, (int)k);
+        if (i % 3 == 1) dot += value[i * l + k] * Cosine(some, i / 3, k);
+      }
+      CHECK_NEAR(fabs(dot), 1, 1e-9);
+    }
+    PetscCall(PetscFree2(value, row));
+    HycoDestroyAll(&V, &S);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Test(void)
 {
   PetscFunctionBegin;
   PetscCall(HycoPODCreateSVD(PETSC_COMM_WORLD, &svd));
   PetscCall(TestKnown());
+  PetscCall(TestZeroRows());
   PetscCall(TestCriterion());
   PetscCall(TestZeroAndOne());
   PetscCall(TestTypes());

@@ -564,7 +564,7 @@ static PetscErrorCode ReleaseBody(HycoBodyFactor *body)
   for (PetscInt i = 0; i < body->n_records; i++) {
     HycoBodyRecord *r = &body->record[i];
 
-    HycoFreeAll(&r->theta, &r->C, &r->R, &r->Z, &r->work);
+    HycoFreeAll(&r->theta, &r->C, &r->R, &r->Z, &r->work, &r->L);
   }
   HycoFreeAll(&body->kept, &body->record, &body->sample);
   PetscCall(PetscFree2(body->motion, body->pin));

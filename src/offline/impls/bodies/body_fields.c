@@ -21,6 +21,8 @@
 #define SCORED       24   /* displacements at all nodes of theta whose stresses show which cells matter */
 #define MANY         64   /* right-hand sides at once */
 #define SEEN         4    /* times of a path with friction whose forces are samples */
+#define SHORT        1e-7 /* of the largest response in a column: terms without larger entries are left out; */
+#define SHORTENED    0.1  /* share of MISSED that this and single precision may add */
 #define CHECKS       32   /* points at which the displacements that the modes miss are measured, no samples */
 
 /* Samples: the loads' coefficients and the surfaces' forces, a column each; the last n_checks are
@@ -758,8 +760,13 @@ static PetscErrorCode SetUnit(PetscInt row, Vec v)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Allocates H, a and g. */
-static PetscErrorCode AllocateCoefficients(HycoSubstructures b)
+/* H and a of a body (hycobodies.h) at its samples, one after the other and each by columns. */
+typedef struct {
+  PetscInt rows;
+  PetscReal *H, *a;
+} Coefficient;
+
+static PetscErrorCode AllocateCoefficients(HycoSubstructures b, Coefficient own[])
 {
   PetscFunctionBegin;
   for (PetscInt k = 0; k < b->n; k++) {
@@ -768,10 +775,10 @@ static PetscErrorCode AllocateCoefficients(HycoSubstructures b)
 
     s->l = b->mode_start[k + 1] - b->mode_start[k];
     /* A row for each mode in each turn, and one for each unknown inside the chosen cells, at each sample. */
-    rows = (size_t)s->n_samples * (size_t)((b->turn_start[k + 1] - b->turn_start[k]) * s->l + s->m);
-    PetscCall(PetscCalloc1(rows * (size_t)s->n + 1, &s->H));
-    PetscCall(PetscCalloc1(rows * (size_t)b->r + 1, &s->a));
-    PetscCall(PetscCalloc1(rows * (size_t)b->p + 1, &s->g));
+    own[k].rows = (b->turn_start[k + 1] - b->turn_start[k]) * s->l + s->m;
+    rows = (size_t)s->n_samples * (size_t)own[k].rows;
+    PetscCall(PetscCalloc1(rows * (size_t)s->n + 1, &own[k].H));
+    PetscCall(PetscCalloc1(rows * (size_t)(b->r + b->p) + 1, &own[k].a));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -808,15 +815,17 @@ static PetscErrorCode SetRow(HycoReducer t, HycoBodiesFactor *factor, PetscInt k
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* H, a and g of a body at one of its samples, where the factor is. x: the loads' displacements. Collective. */
+/* H and a of a body at one of its samples, where the factor is. x: the loads' displacements. Collective. */
 static PetscErrorCode BodyCoefficients(HycoReducer t, HycoBodiesFactor *factor, PetscInt k, PetscInt sample, Mat V,
-                                       const Vec x[])
+                                       const Vec x[], Coefficient *own)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   HycoSubstructure *s = &b->body[k];
   /* Modes in each turn, then the unknowns inside; MANY right-hand sides at once, since MUMPS is several times
      faster on blocks. */
-  const PetscInt rows = s->l * (b->turn_start[k + 1] - b->turn_start[k]) + s->m;
+  const PetscInt rows = own->rows;
+  PetscReal *H = own->H + (size_t)sample * (size_t)rows * (size_t)s->n;
+  PetscReal *a = own->a + (size_t)sample * (size_t)rows * (size_t)(b->r + b->p);
   PetscReal *u, *g;
   Vec v[MANY];
 
@@ -829,17 +838,18 @@ static PetscErrorCode BodyCoefficients(HycoReducer t, HycoBodiesFactor *factor, 
     for (PetscInt j = 0; j < many; j++) PetscCall(SetRow(t, factor, k, first + j, V, v[j]));
     PetscCall(HycoBodiesReduce(b, factor, many, v, u, g));
     for (PetscInt j = 0; j < many; j++) {
-      /* H = -N K^-1 v has a column for each row of a and g: stored by surface unknown, so that a prediction adds
-         whole columns of the few loaded ones. */
-      const size_t row = (size_t)(sample * rows + first + j);
+      const PetscInt row = first + j;
 
-      for (PetscInt d = 0; d < s->n; d++)
-        s->H[HycoBodiesColumn(s, sample, d, rows) + (size_t)(first + j)] = u[j * b->ns + b->start[k] + d];
-      PetscCall(PetscArraycpy(s->g + row * (size_t)b->p, g + j * b->p, b->p));
-      for (PetscInt d = 0; d < b->r; d++) PetscCall(VecDot(v[j], x[d], &s->a[row * (size_t)b->r + (size_t)d]));
+      /* H = -N K^-1 v has a column for each unknown of the surfaces, so that a prediction adds those of the few loaded
+         ones. */
+      for (PetscInt d = 0; d < s->n; d++) H[(size_t)d * (size_t)rows + (size_t)row] = u[j * b->ns + b->start[k] + d];
+      for (PetscInt d = 0; d < b->r; d++) PetscCall(VecDot(v[j], x[d], &a[d * rows + row]));
+      for (PetscInt d = 0; d < b->p; d++) a[(b->r + d) * rows + row] = g[j * b->p + d];
       for (PetscInt d = 0; d < factor->n_strains; d++)
-        PetscCall(VecDot(v[j], factor->strain[d],
-                         &b->inelastic->fields[(StrainRows(b, k) + row) * (size_t)factor->n_strains + (size_t)d]));
+        PetscCall(VecDot(
+            v[j], factor->strain[d],
+            &b->inelastic
+                 ->fields[(StrainRows(b, k) + (size_t)(sample * rows + row)) * (size_t)factor->n_strains + (size_t)d]));
     }
   }
   PetscCall(DestroyVectors(MANY, v));
@@ -847,16 +857,158 @@ static PetscErrorCode BodyCoefficients(HycoReducer t, HycoBodiesFactor *factor, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* scale[rows + n] of H: of its rows, alike for the modes and for the unknowns inside; of its columns relative to these. */
+static void ResponseScales(const HycoSubstructure *s, const Coefficient *own, PetscReal scale[])
+{
+  const PetscInt rows = own->rows, columns = s->n_samples * s->n;
+  PetscReal most[2] = {0, 0}, *column = scale + rows;
+
+  for (PetscInt q = 0; q < columns; q++) {
+    for (PetscInt i = 0; i < rows; i++) {
+      PetscReal *group = &most[i >= rows - s->m];
+
+      *group = PetscMax(*group, PetscAbsReal(own->H[(size_t)q * (size_t)rows + (size_t)i]));
+    }
+  }
+  for (PetscInt i = 0; i < rows; i++) scale[i] = most[i >= rows - s->m];
+  for (PetscInt d = 0; d < s->n; d++) column[d] = 0;
+  for (PetscInt q = 0; q < columns; q++) {
+    PetscReal *to = &column[q % s->n];
+
+    for (PetscInt i = 0; i < rows; i++) {
+      if (scale[i] > 0) *to = PetscMax(*to, PetscAbsReal(own->H[(size_t)q * (size_t)rows + (size_t)i]) / scale[i]);
+    }
+  }
+}
+
+/* H of a body from its samples; least: see HycoFlexibilityCreate(). */
+static PetscErrorCode TakeResponses(HycoSubstructure *s, const Coefficient *own, PetscReal least)
+{
+  const PetscReal **sample;
+  PetscReal *scale;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(s->n_samples, &sample));
+  PetscCall(PetscMalloc1(own->rows + s->n + 1, &scale));
+  for (PetscInt q = 0; q < s->n_samples; q++) sample[q] = own->H + (size_t)q * (size_t)own->rows * (size_t)s->n;
+  if (least > 0) ResponseScales(s, own, scale);
+  PetscCall(HycoFlexibilityDestroy(&s->H));
+  PetscCall(HycoFlexibilityCreate(&s->tensor, own->rows, s->n, sample, scale, least, PETSC_MAX_REAL, &s->H));
+  PetscCall(PetscFree(scale));
+  PetscCall(PetscFree(sample));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* a of a body from its samples, all of it: a few columns. */
+static PetscErrorCode TakeLoads(HycoSubstructures b, HycoSubstructure *s, const Coefficient *own)
+{
+  const PetscInt n = b->r + b->p;
+  const PetscReal **sample;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(s->n_samples, &sample));
+  for (PetscInt q = 0; q < s->n_samples; q++) sample[q] = own->a + (size_t)q * (size_t)own->rows * (size_t)n;
+  PetscCall(HycoFlexibilityCreate(&s->tensor, own->rows, n, sample, NULL, 0, 0, &s->a));
+  PetscCall(PetscFree(sample));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* row[own->rows] of body k for sample j at these weights, from the samples of H if `full`. */
+static PetscErrorCode RowsAt(HycoSubstructures b, PetscInt k, const Coefficient *own, const Sampled *sampled,
+                             PetscInt j, const PetscReal weight[], PetscBool full, PetscReal row[])
+{
+  const HycoSubstructure *s = &b->body[k];
+  PetscReal *share, *f, *c;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(s->n_samples, &share));
+  PetscCall(PetscCalloc2(s->n + 1, &f, b->r + b->p + 1, &c)); /* no motion of the body as a whole */
+  PetscCall(PetscArrayzero(row, own->rows));
+  for (PetscInt i = 0; i < s->n; i++) f[i] = -sampled->f[(size_t)j * (size_t)b->ns + (size_t)(b->start[k] + i)];
+  PetscCall(PetscArraycpy(c, sampled->c + j * b->r, b->r));
+  HycoFlexibilityShares(&s->a, s->n_samples, weight, share);
+  PetscCall(HycoFlexibilityMultiply(&s->a, share, c, row));
+  HycoFlexibilityShares(&s->H, s->n_samples, weight, share);
+  if (!full) PetscCall(HycoFlexibilityMultiply(&s->H, share, f, row));
+  for (PetscInt q = 0; q < s->n_samples * s->n && full; q++) {
+    if (f[q % s->n] != 0)
+      HycoBodiesAdd(own->rows, weight[q / s->n] * f[q % s->n], own->H + (size_t)q * (size_t)own->rows, row);
+  }
+  PetscCall(PetscFree2(f, c));
+  PetscCall(PetscFree(share));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Raises *error to that of the rows of body k for the last samples' loads and forces, relative to the rows of each: by H as
+   it is stored, at theta. Rank 0. */
+static PetscErrorCode StoredError(HycoSubstructures b, PetscInt k, const Coefficient *own, const Sampled *sampled,
+                                  const PetscReal theta[], PetscReal *error)
+{
+  const HycoSubstructure *s = &b->body[k];
+  PetscReal mu[HYCO_MAX_PARAMETERS] = {0}, *weight, *row, *stored;
+
+  PetscFunctionBegin;
+  for (PetscInt p = 0; p < b->n_theta; p++) mu[b->theta[p]] = theta[p];
+  PetscCall(PetscMalloc3(s->n_samples, &weight, own->rows + 1, &row, own->rows + 1, &stored));
+  PetscCall(HycoBodiesWeights(b, k, mu, weight));
+  for (PetscInt j = PetscMax(0, sampled->n - CHECKS); j < sampled->n; j++) {
+    PetscReal size = 0, missed = 0;
+
+    PetscCall(RowsAt(b, k, own, sampled, j, weight, PETSC_TRUE, row));
+    PetscCall(RowsAt(b, k, own, sampled, j, weight, PETSC_FALSE, stored));
+    for (PetscInt i = 0; i < own->rows; i++) {
+      size += PetscSqr(row[i]);
+      missed += PetscSqr(row[i] - stored[i]);
+    }
+    if (size > 0) *error = PetscMax(*error, PetscSqrtReal(missed / size));
+  }
+  PetscCall(PetscFree3(weight, row, stored));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* H of all bodies with small terms in single precision and without those that have no effect, or all of them if that adds
+   too much to what the modes miss; what it adds joins b->left. Rank 0. */
+static PetscErrorCode StoreCoefficients(HycoReducer t, const HycoBodiesFactor *factor, const Sampled *sampled,
+                                        const Coefficient own[])
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  PetscReal theta[HYCO_MAX_PARAMETERS], error = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < b->n; k++) {
+    HycoSubstructure *s = &b->body[k];
+    PetscReal added = 0;
+
+    PetscCall(TakeLoads(b, s, &own[k]));
+    PetscCall(TakeResponses(s, &own[k], s->n_samples > 1 ? SHORT : 0));
+    if (s->n_samples == 1) continue;
+    /* Between the samples, and at the ends of the ranges, where polynomials are largest. */
+    PetscCall(StoredError(b, k, &own[k], sampled, factor->between, &added));
+    for (PetscInt end = 0; end < 2; end++) {
+      HycoBodiesPoint(t, end ? HycoBodiesGrid(b, 0, NULL) - 1 : 0, theta);
+      PetscCall(StoredError(b, k, &own[k], sampled, theta, &added));
+    }
+    if (added > SHORTENED * MISSED) {
+      PetscCall(TakeResponses(s, &own[k], 0));
+      added = 0;
+    }
+    error = PetscMax(error, added);
+  }
+  b->left += error;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* From the last node to the first: its factor is still there after ExpandAll(), and the kept ones are those used
    last. */
-static PetscErrorCode Coefficients(HycoReducer t, HycoBodiesFactor *factor, Mat V)
+static PetscErrorCode AllCoefficients(HycoReducer t, HycoBodiesFactor *factor, const Sampled *sampled, Mat V,
+                                      Coefficient own[])
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   const PetscInt nodes = HycoBodiesGrid(b, 0, NULL);
   Vec *x;
 
   PetscFunctionBegin;
-  PetscCall(AllocateCoefficients(b));
+  PetscCall(AllocateCoefficients(b, own));
   if (b->inelastic) PetscCall(PetscCalloc1(StrainRows(b, b->n) * (size_t)factor->n_strains + 1, &b->inelastic->fields));
   PetscCall(PetscMalloc1(b->r + 1, &x));
   for (PetscInt j = nodes - 1; j >= 0; j--) { /* the last factor is there */
@@ -871,12 +1023,28 @@ static PetscErrorCode Coefficients(HycoReducer t, HycoBodiesFactor *factor, Mat 
       const PetscInt sample = HycoBodiesSampleOf(b, k, j);
 
       /* Nodes that differ only in parameters that do not change the body are no samples of it. */
-      if (sample >= 0) PetscCall(BodyCoefficients(t, factor, k, sample, V, x));
+      if (sample >= 0) PetscCall(BodyCoefficients(t, factor, k, sample, V, x, &own[k]));
     }
     for (PetscInt d = 0; d < b->r; d++) PetscCall(VecDestroy(&x[d]));
     PetscCall(HycoReducerTell(t, "coefficients of the modes", nodes - j, nodes));
   }
   PetscCall(PetscFree(x));
+  HycoOnRoot(HycoComm(t), StoreCoefficients(t, factor, sampled, own));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Coefficients(HycoReducer t, HycoBodiesFactor *factor, const Sampled *sampled, Mat V)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  Coefficient *own;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc1(b->n, &own));
+  ierr = AllCoefficients(t, factor, sampled, V, own);
+  for (PetscInt k = 0; k < b->n; k++) HycoFreeAll(&own[k].H, &own[k].a);
+  PetscCall(PetscFree(own));
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -988,9 +1156,10 @@ PetscErrorCode HycoBodiesFields(HycoReducer t, HycoSnapshots store, HycoBodiesFa
     PetscCall(PetscFree(sigma));
     ierr = ModesOf(t, store, factor, n, k, &sampled, &V, &sigma, &enough);
   }
-  HycoFreeAll(&sampled.c, &sampled.f, &sampled.U);
-  /* Rows of H, a and g for the modes that were kept: only once, after the last doubling. */
-  if (!ierr) ierr = Coefficients(t, factor, V);
+  PetscCall(PetscFree(sampled.U));
+  /* Rows of H and a for the modes that were kept: only once, after the last doubling. */
+  if (!ierr) ierr = Coefficients(t, factor, &sampled, V);
+  HycoFreeAll(&sampled.c, &sampled.f);
   if (ierr) {
     PetscCall(MatDestroy(&V));
     PetscCall(PetscFree(sigma));

@@ -9,10 +9,9 @@
 #include <petscblaslapack.h>
 
 #define MOST_VALUES 17
-#define HOPELESS    0.3  /* e above which the model is refused */
-#define ITERATIONS  30   /* of the power method */
-#define SHORT       0.01 /* share of the tolerance: terms of a flexibility without larger entries are left out */
-#define SHORTENED   0.1  /* share of the tolerance that this and single precision may add to e */
+#define HOPELESS    0.3 /* e above which the model is refused */
+#define ITERATIONS  30  /* of the power method */
+#define SHORTENED   0.1 /* share of the tolerance that left out terms and single precision may add to e */
 
 /* Node k of n along parameter p, in its own variable. Chebyshev points of the second kind (extrema), nested when their
    number n goes to 2 n - 1: former samples stay. Ends exactly, without round-off. */
@@ -83,9 +82,9 @@ void HycoBodiesPoint(HycoReducer t, PetscInt k, PetscReal theta[])
   }
 }
 
-/* C of body k from its samples, with small terms in single precision and without those that have no effect beside the
-   tolerance, or all in double precision. Rank 0. */
-static PetscErrorCode TakeFlexibility(HycoReducer t, const HycoBodiesFactor *factor, PetscInt k, PetscBool shortened)
+/* C of body k from its samples: how small terms are stored, see HycoFlexibilityCreate(). Rank 0. */
+static PetscErrorCode TakeFlexibility(HycoReducer t, const HycoBodiesFactor *factor, PetscInt k, PetscReal least,
+                                      PetscReal single)
 {
   HycoSubstructure *s = &HycoTrainingOfBodies(t)->bodies->body[k];
   const HycoBodyFactor *body = &factor->body[k];
@@ -95,8 +94,7 @@ static PetscErrorCode TakeFlexibility(HycoReducer t, const HycoBodiesFactor *fac
   PetscCall(PetscMalloc1(s->n_samples, &C));
   for (PetscInt j = 0; j < s->n_samples; j++) C[j] = body->record[body->sample[j]].C;
   PetscCall(HycoFlexibilityDestroy(&s->C));
-  PetscCall(HycoFlexibilityCreate(&s->tensor, s->n, C,
-                                  shortened && s->n_samples > 1 ? SHORT * HycoTrainingOfBodies(t)->tol : 0, &s->C));
+  PetscCall(HycoFlexibilityCreate(&s->tensor, s->n, s->n, C, NULL, s->n_samples > 1 ? least : 0, single, &s->C));
   PetscCall(PetscFree(C));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -132,25 +130,28 @@ static PetscErrorCode TakeRecords(HycoReducer t, HycoBodiesFactor *factor, const
       PetscCall(PetscArraycpy(s->Z + (size_t)at * Z, r->Z, Z));
       PetscCall(PetscArraycpy(s->work + (size_t)at * work, r->work, work));
     }
-    PetscCall(TakeFlexibility(t, factor, k, PETSC_TRUE));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* -- the bound -- */
 
-/* The Cholesky factor of C (n x n, overwritten) in its lower triangle. */
-static PetscErrorCode Factor(PetscInt n, PetscReal C[])
+/* record->L, the Cholesky factor of C in its lower triangle; made once, as the point is held out again. */
+static PetscErrorCode Factor(PetscInt n, HycoBodyRecord *record)
 {
   PetscBLASInt m, info;
-  PetscReal most = 0;
+  PetscReal most = 0, *L;
 
   PetscFunctionBegin;
+  if (record->L) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscBLASIntCast(n, &m));
-  for (PetscInt i = 0; i < n; i++) most = PetscMax(most, C[(size_t)i * (size_t)(n + 1)]);
-  for (PetscInt i = 0; i < n; i++) C[(size_t)i * (size_t)(n + 1)] += 1e-13 * most; /* pinned unknowns do not move */
+  PetscCall(PetscMalloc1((size_t)n * (size_t)n, &L));
+  PetscCall(PetscArraycpy(L, record->C, (size_t)n * (size_t)n));
+  record->L = L;
+  for (PetscInt i = 0; i < n; i++) most = PetscMax(most, L[(size_t)i * (size_t)(n + 1)]);
+  for (PetscInt i = 0; i < n; i++) L[(size_t)i * (size_t)(n + 1)] += 1e-13 * most; /* pinned unknowns do not move */
   /* The shift is far below any bound that matters, and pinned unknowns have zero rows. */
-  LAPACKpotrf_("L", &m, C, &m, &info);
+  LAPACKpotrf_("L", &m, L, &m, &info);
   PetscCheck(!info, PETSC_COMM_SELF, PETSC_ERR_LIB, "the flexibility of a body is not positive definite");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -235,63 +236,63 @@ static PetscErrorCode Difference(const HycoSubstructure *s, const HycoBodyFactor
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* e of all bodies at a point that is no sample: [0] of the samples, [1] of the flexibility as it is stored. Rank 0. */
-static PetscErrorCode Bound(HycoSubstructures b, const PetscReal mu[], const HycoBodiesFactor *factor,
-                            const PetscInt at[], PetscReal e[2])
+/* A point that is no sample, and the bodies' records there. */
+typedef struct {
+  PetscReal mu[HYCO_MAX_PARAMETERS];
+  PetscInt *record;
+} Held;
+
+/* e of all bodies at a point: of the samples, whose errors of R join gram, or of the flexibilities as they are stored. Rank
+   0. */
+static PetscErrorCode Bound(HycoSubstructures b, const HycoBodiesFactor *factor, const Held *held, PetscBool stored,
+                            PetscReal *e)
 {
   PetscFunctionBegin;
-  e[0] = e[1] = 0;
+  *e = 0;
   for (PetscInt k = 0; k < b->n; k++) {
     const HycoSubstructure *s = &b->body[k];
-    const HycoBodyRecord *record = &factor->body[k].record[at[k]];
+    HycoBodyRecord *record = &factor->body[k].record[held->record[k]];
     const size_t n = (size_t)PetscSqr(s->n);
-    PetscReal *L, *D, *weight, own;
+    PetscReal *D, *weight, own;
 
     /* Nothing of this body is interpolated. */
     if (s->n_samples == 1 || !s->n) continue;
-    PetscCall(PetscMalloc3(n + 1, &L, n + 1, &D, s->n_samples, &weight));
-    PetscCall(HycoBodiesWeights(b, k, mu, weight));
-    PetscCall(PetscArraycpy(L, record->C, n));
-    PetscCall(Factor(s->n, L));
-    for (int stored = 0; stored < 2; stored++) {
-      PetscCall(Difference(s, &factor->body[k], weight, (PetscBool)stored, record->C, D));
-      PetscCall(Largest(s->n, L, D, &own));
-      e[stored] = PetscMax(e[stored], own);
-    }
-    PetscCall(AddGram(s, weight, b->r, L, record->R));
-    PetscCall(PetscFree3(L, D, weight));
+    PetscCall(PetscMalloc2(n + 1, &D, s->n_samples, &weight));
+    PetscCall(HycoBodiesWeights(b, k, held->mu, weight));
+    PetscCall(Factor(s->n, record));
+    PetscCall(Difference(s, &factor->body[k], weight, stored, record->C, D));
+    PetscCall(Largest(s->n, record->L, D, &own));
+    *e = PetscMax(*e, own);
+    if (!stored) PetscCall(AddGram(s, weight, b->r, record->L, record->R));
+    PetscCall(PetscFree2(D, weight));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* e along axis p: at two nodes of the next finer grid, with the other parameters at a middle node. Collective. */
-static PetscErrorCode BoundAlong(HycoReducer t, HycoBodiesFactor *factor, PetscInt axis, PetscReal e[2])
+static PetscErrorCode BoundAlong(HycoReducer t, HycoBodiesFactor *factor, PetscInt axis, Held held[2], PetscReal *e)
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
 
-  PetscInt *record;
-
   PetscFunctionBegin;
-  e[0] = e[1] = 0;
-  PetscCall(PetscMalloc1(b->n, &record));
+  *e = 0;
   for (PetscInt side = 0; side < 2; side++) {
     const PetscInt finer = 2 * b->n_nodes[axis] - 1;
-    PetscReal theta[HYCO_MAX_PARAMETERS], mu[HYCO_MAX_PARAMETERS] = {0}, own[2] = {0, 0};
+    PetscReal theta[HYCO_MAX_PARAMETERS], own = 0;
 
     for (PetscInt p = 0; p < b->n_theta; p++) {
       theta[p] =
           p == axis ? Node(t, b, p, finer, side ? finer - 2 : 1) : Node(t, b, p, b->n_nodes[p], b->n_nodes[p] / 2);
-      mu[b->theta[p]] = theta[p];
+      held[side].mu[b->theta[p]] = theta[p];
     }
-    PetscCall(HycoBodiesCondense(t, factor, theta, record));
-    HycoOnRoot(HycoComm(t), Bound(b, mu, factor, record, own));
-    PetscCallMPI(MPI_Bcast(own, 2, MPIU_REAL, 0, HycoComm(t)));
-    for (int k = 0; k < 2; k++) e[k] = PetscMax(e[k], own[k]);
+    PetscCall(HycoBodiesCondense(t, factor, theta, held[side].record));
+    HycoOnRoot(HycoComm(t), Bound(b, factor, &held[side], PETSC_FALSE, &own));
+    PetscCallMPI(MPI_Bcast(&own, 1, MPIU_REAL, 0, HycoComm(t)));
+    *e = PetscMax(*e, own);
     PetscCall(PetscFree(factor->between));
     /* Kept for MeasureLeft(): a point that is no sample, with a factor that may still be there. */
     HycoDuplicate(b->n_theta, theta, &factor->between);
   }
-  PetscCall(PetscFree(record));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -318,7 +319,7 @@ static PetscErrorCode CondenseGrid(HycoReducer t, HycoBodiesFactor *factor)
 }
 
 /* The axis with the largest e that a finer grid may reduce, -1: none. */
-static PetscInt Worst(HycoReducer t, HycoSubstructures b, PetscReal e[][2])
+static PetscInt Worst(HycoReducer t, HycoSubstructures b, const PetscReal e[])
 {
   const HycoBodiesTraining s = HycoTrainingOfBodies(t);
   PetscInt worst = -1;
@@ -328,53 +329,84 @@ static PetscInt Worst(HycoReducer t, HycoSubstructures b, PetscReal e[][2])
     const PetscInt n = HycoBodiesGrid(b, 0, NULL) / b->n_nodes[p] * finer;
 
     /* The axes' errors add up: each may use its share of the tolerance. */
-    if (e[p][0] <= s->tol / b->n_theta || finer > MOST_VALUES || n > s->most_samples) continue;
-    if (worst < 0 || e[p][0] > e[worst][0]) worst = p;
+    if (e[p] <= s->tol / b->n_theta || finer > MOST_VALUES || n > s->most_samples) continue;
+    if (worst < 0 || e[p] > e[worst]) worst = p;
   }
   return worst;
 }
 
-/* The flexibilities as they are stored, unless that adds more to the error of some axis than it may: then all of their
-   terms stay, in double precision. e, [2] of each axis: [1] becomes that of what is kept. Rank 0. */
-static PetscErrorCode Store(HycoReducer t, const HycoBodiesFactor *factor, PetscReal e[][2])
+/* Ways to store a flexibility, the shortest first: shares of the tolerance below which terms are left out, and the size up
+   to which they are in single precision; the last one is all of it. The noise of single precision acts on the stiffest
+   parts of C, a term that is left out hardly does. */
+static const struct {
+  PetscReal least, single;
+} ways[] = {{1e-2, PETSC_MAX_REAL}, {1e-2, 1e-2}, {1e-3, 1e-4}, {0, 0}};
+
+/* The flexibilities in the first of these ways that adds to e of no axis more than it may; e becomes that of what is
+   stored. Rank 0. */
+static PetscErrorCode Store(HycoReducer t, const HycoBodiesFactor *factor, const Held held[], PetscReal e[])
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
-  PetscBool fine = PETSC_TRUE;
+  const PetscReal tol = HycoTrainingOfBodies(t)->tol;
+  PetscReal own, stored[HYCO_MAX_PARAMETERS];
+  PetscBool fine = PETSC_FALSE;
 
   PetscFunctionBegin;
-  for (PetscInt p = 0; p < b->n_theta; p++)
-    fine = (PetscBool)(fine && e[p][1] <= e[p][0] + SHORTENED * HycoTrainingOfBodies(t)->tol / b->n_theta);
-  if (fine) PetscFunctionReturn(PETSC_SUCCESS);
-  for (PetscInt p = 0; p < b->n_theta; p++) e[p][1] = e[p][0];
-  for (PetscInt k = 0; k < b->n; k++) PetscCall(TakeFlexibility(t, factor, k, PETSC_FALSE));
+  for (size_t way = 0; !fine && way < sizeof(ways) / sizeof(*ways); way++) {
+    for (PetscInt k = 0; k < b->n; k++)
+      PetscCall(TakeFlexibility(t, factor, k, ways[way].least * tol, ways[way].single));
+    fine = PETSC_TRUE;
+    for (PetscInt p = 0; p < b->n_theta && ways[way].least > 0; p++) {
+      stored[p] = 0;
+      for (PetscInt side = 0; side < 2 && fine; side++) {
+        PetscCall(Bound(b, factor, &held[2 * p + side], PETSC_TRUE, &own));
+        stored[p] = PetscMax(stored[p], own);
+        fine = (PetscBool)(own <= e[p] + SHORTENED * tol / b->n_theta);
+      }
+    }
+    if (fine && ways[way].least > 0) PetscCall(PetscArraycpy(e, stored, b->n_theta));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* One axis is refined at a time, the worst: a tensor grid that is fine in all of them would cost the product. What
    remains above the tolerance is no failure, it is in the bound. */
-PetscErrorCode HycoBodiesSample(HycoReducer t, HycoBodiesFactor *factor)
+static PetscErrorCode Refine(HycoReducer t, HycoBodiesFactor *factor, Held held[])
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
-  PetscReal e[HYCO_MAX_PARAMETERS][2] = {{0}};
+  PetscReal e[HYCO_MAX_PARAMETERS] = {0};
   PetscInt worst;
 
   PetscFunctionBegin;
   do {
     PetscCall(CondenseGrid(t, factor));
-    for (PetscInt p = 0; p < b->n_theta; p++) PetscCall(BoundAlong(t, factor, p, e[p]));
+    for (PetscInt p = 0; p < b->n_theta; p++) PetscCall(BoundAlong(t, factor, p, held + 2 * p, &e[p]));
     worst = Worst(t, b, e);
     /* Nested Chebyshev grids: all former samples stay nodes of the finer grid. */
     if (worst >= 0) b->n_nodes[worst] = 2 * b->n_nodes[worst] - 1;
   } while (worst >= 0);
-  HycoOnRoot(HycoComm(t), Store(t, factor, e));
-  HycoBcast(&e[0][0], 2 * b->n_theta, MPIU_REAL, HycoComm(t));
+  HycoOnRoot(HycoComm(t), Store(t, factor, held, e));
+  HycoBcast(e, b->n_theta, MPIU_REAL, HycoComm(t));
   b->bound = 0;
   for (PetscInt p = 0; p < b->n_theta; p++) {
-    b->bound += e[p][1];
-    HycoCheckModel(e[p][1] <= HOPELESS,
+    b->bound += e[p];
+    HycoCheckModel(e[p] <= HOPELESS,
                    "the flexibility of a body cannot be interpolated over %s: with %d values its relative error is "
                    "%.2g; train a hybrid model",
-                   t->scene->parameter[b->theta[p]], (int)b->n_nodes[p], (double)e[p][1]);
+                   t->scene->parameter[b->theta[p]], (int)b->n_nodes[p], (double)e[p]);
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBodiesSample(HycoReducer t, HycoBodiesFactor *factor)
+{
+  const PetscInt n = 2 * HycoTrainingOfBodies(t)->bodies->n_theta;
+  Held *held;
+  PetscInt *record;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc2(n + 1, &held, n * factor->n + 1, &record));
+  for (PetscInt k = 0; k < n; k++) held[k].record = record + k * factor->n;
+  HycoFinally(Refine(t, factor, held), PetscCall(PetscFree2(held, record)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -87,53 +87,27 @@ static const char *At(PetscInt k, const char name[], char path[64])
   return path;
 }
 
-/* to[b][a] = from[a][b], blocks of `length` numbers. */
-static void Swap(PetscInt n_a, PetscInt n_b, PetscInt length, const PetscReal from[], PetscReal to[])
+/* A part of a dataset's name after the first. */
+static const char *AtPart(PetscInt k, const char name[], const char part[], char path[64])
 {
-  for (PetscInt a = 0; a < n_a; a++) {
-    for (PetscInt b = 0; b < n_b; b++, from += length)
-      PetscCallVoid(PetscArraycpy(to + ((size_t)b * (size_t)n_a + (size_t)a) * (size_t)length, from, length));
-  }
+  (void)snprintf(path, 64, "bodies/body_%d/%s_%s", (int)k, name, part);
+  return path;
 }
 
-/* H of a body, columns of `length` numbers by unknown; in the file sample after sample. */
-static PetscErrorCode MoveColumns(HycoH5 h, const char path[], const HycoSubstructure *s, PetscInt length,
-                                  PetscReal **data)
+/* The entries of a term that a file has, by columns: of a symmetric matrix the lower triangle. */
+static PetscInt Entries(const HycoFlexibility *C, PetscBool symmetric)
 {
-  PetscInt rows = s->n_samples * s->n;
-  PetscReal *file = NULL;
-
-  PetscFunctionBegin;
-  /* Both orders are the same then, and nothing is copied. */
-  if (s->n_samples == 1) {
-    PetscCall(HycoH5Real(h, path, &rows, length, data));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  if (!HycoH5Reads(h)) {
-    PetscCall(PetscMalloc1((size_t)rows * (size_t)length + 1, &file));
-    /* In memory the samples of one unknown lie side by side, because a prediction blends them; the file keeps the older
-       order. */
-    Swap(s->n, s->n_samples, length, *data, file);
-  }
-  PetscCall(HycoH5Real(h, path, &rows, length, &file));
-  if (HycoH5Reads(h)) {
-    PetscCall(PetscMalloc1((size_t)rows * (size_t)length + 1, data));
-    Swap(s->n_samples, s->n, length, file, *data);
-  }
-  PetscCall(PetscFree(file));
-  PetscFunctionReturn(PETSC_SUCCESS);
+  return symmetric ? C->n * (C->n + 1) / 2 : C->rows * C->n;
 }
+#define EACH_ENTRY(C, symmetric, k, i, u)                                                                              \
+  for (PetscInt u = 0, k = 0; u < (C)->n; u++)                                                                         \
+    for (PetscInt i = (symmetric) ? u : 0; i < (C)->rows; i++, k++)
 
-/* Entry k of a triangle by columns: its row and column. */
-#define EACH_ENTRY(n, k, i, u)                                                                                         \
-  for (PetscInt u = 0, k = 0; u < (n); u++)                                                                            \
-    for (PetscInt i = u; i < (n); i++, k++)
-
-/* Terms [first, last) of C are a row each of its lower triangle by columns. */
-static PetscErrorCode ReadTerms(HycoH5 h, const char model[], const char path[], HycoFlexibility *C, PetscInt first,
-                                PetscInt last)
+/* Terms [first, last), a row each. */
+static PetscErrorCode ReadTerms(HycoH5 h, const char model[], const char path[], PetscBool symmetric,
+                                HycoFlexibility *C, PetscInt first, PetscInt last)
 {
-  const PetscInt length = C->n * (C->n + 1) / 2;
+  const PetscInt length = Entries(C, symmetric);
   PetscReal *row;
 
   PetscFunctionBegin;
@@ -143,26 +117,26 @@ static PetscErrorCode ReadTerms(HycoH5 h, const char model[], const char path[],
     for (PetscInt k = 0; k < length; k++)
       HycoCheck(!PetscIsInfOrNanReal(row[k]), "%s: %s contains a value that is not finite: the file is damaged", model,
                 path);
-    EACH_ENTRY(C->n, k, i, u)
+    EACH_ENTRY(C, symmetric, k, i, u)
     {
-      /* Both triangles in memory: predictions read whole columns. */
       HycoFlexibilitySetEntry(C, t, u, i, row[k]);
-      HycoFlexibilitySetEntry(C, t, i, u, row[k]);
+      /* Both triangles in memory: predictions read whole columns. */
+      if (symmetric) HycoFlexibilitySetEntry(C, t, i, u, row[k]);
     }
   }
   PetscCall(PetscFree(row));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Terms in double precision, of symmetric matrices the entries of one triangle. */
-static PetscErrorCode WriteTerms(HycoH5 h, const char path[], const HycoFlexibility *C)
+/* Terms in double precision. */
+static PetscErrorCode WriteTerms(HycoH5 h, const char path[], PetscBool symmetric, const HycoFlexibility *C)
 {
-  const size_t length = (size_t)C->n * (size_t)(C->n + 1) / 2;
+  const size_t length = (size_t)Entries(C, symmetric);
   PetscReal *wide;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(length * (size_t)C->n_wide + 1, &wide));
-  for (PetscInt t = 0; t < C->n_wide; t++) EACH_ENTRY(C->n, k, i, u)
+  for (PetscInt t = 0; t < C->n_wide; t++) EACH_ENTRY(C, symmetric, k, i, u)
   wide[(size_t)t * length + (size_t)k] = HycoFlexibilityEntry(C, t, u, i);
   PetscCall(HycoH5WriteReal(h, path, C->n_wide, (PetscInt)length, wide));
   PetscCall(PetscFree(wide));
@@ -171,92 +145,147 @@ static PetscErrorCode WriteTerms(HycoH5 h, const char path[], const HycoFlexibil
 
 /* Terms in single precision apart, as float in the file too: most of a model's size is theirs, and a double would
    not make them more accurate. */
-static PetscErrorCode WriteShortTerms(HycoH5 h, const char path[], const HycoFlexibility *C)
+static PetscErrorCode WriteShortTerms(HycoH5 h, const char path[], PetscBool symmetric, const HycoFlexibility *C)
 {
-  const size_t length = (size_t)C->n * (size_t)(C->n + 1) / 2;
+  const size_t length = (size_t)Entries(C, symmetric);
   const PetscInt terms = C->n_terms - C->n_wide;
   float *narrow;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(length * (size_t)terms + 1, &narrow));
-  for (PetscInt t = 0; t < terms; t++) EACH_ENTRY(C->n, k, i, u)
+  for (PetscInt t = 0; t < terms; t++) EACH_ENTRY(C, symmetric, k, i, u)
   narrow[(size_t)t * length + (size_t)k] = (float)HycoFlexibilityEntry(C, C->n_wide + t, u, i);
   if (terms) PetscCall(HycoH5WriteSingle(h, path, terms, (PetscInt)length, narrow));
   PetscCall(PetscFree(narrow));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* C from its samples, one after the other, as in files of earlier versions. */
-static PetscErrorCode LoadSamples(HycoH5 h, const char path[], HycoSubstructure *s)
+/* A matrix of body k from its samples, one after the other and each by columns. */
+static PetscErrorCode TakeSamples(const HycoSubstructure *s, PetscInt rows, PetscInt n, const PetscReal data[],
+                                  HycoFlexibility *C)
 {
-  const size_t square = (size_t)s->n * (size_t)s->n;
-  PetscInt rows = s->n_samples * s->n;
   const PetscReal **sample;
-  PetscReal *file = NULL;
 
   PetscFunctionBegin;
-  PetscCall(HycoH5Real(h, path, &rows, s->n, &file));
   PetscCall(PetscMalloc1(s->n_samples, &sample));
-  for (PetscInt k = 0; k < s->n_samples; k++) sample[k] = file + square * (size_t)k;
-  PetscCall(HycoFlexibilityCreate(&s->tensor, s->n, sample, 0, &s->C));
+  for (PetscInt k = 0; k < s->n_samples; k++) sample[k] = data + (size_t)k * (size_t)rows * (size_t)n;
+  PetscCall(HycoFlexibilityCreate(&s->tensor, rows, n, sample, NULL, 0, 0, C));
   PetscCall(PetscFree(sample));
-  PetscCall(PetscFree(file));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The flexibility of body k. */
-static PetscErrorCode MoveFlexibility(HycoH5 h, const char model[], HycoSubstructure *s, PetscInt k)
+/* C, H or a of body k, whose sizes are there. */
+static PetscErrorCode MoveFlexibility(HycoH5 h, const char model[], const HycoSubstructure *s, PetscInt k,
+                                      const char name[], PetscBool symmetric, HycoFlexibility *C)
 {
-  HycoFlexibility *C = &s->C;
   PetscInt head[2] = {C->n_terms, C->n_wide};
   char path[64];
 
   PetscFunctionBegin;
-  /* An older format: the samples themselves, from which the polynomial is made on load. */
-  if (HycoH5Reads(h) && HycoH5Has(h, At(k, "C", path))) {
-    PetscCall(LoadSamples(h, path, s));
-    PetscFunctionReturn(PETSC_SUCCESS);
-  }
-  PetscCall(HycoH5Ints(h, At(k, "flexibility_head", path), 1, s->n_samples, 2, head));
-  C->n = s->n;
+  PetscCall(HycoH5Ints(h, AtPart(k, name, "head", path), 1, s->n_samples, 2, head));
   C->n_terms = head[0];
   /* A damaged number would be a length of an array below. */
   C->n_wide = PetscMin(head[1], head[0]);
-  PetscCall(HycoH5Int(h, At(k, "flexibility_terms", path), 0, s->n_samples - 1, &C->n_terms, 1, &C->term));
+  PetscCall(HycoH5Int(h, AtPart(k, name, "terms", path), 0, s->n_samples - 1, &C->n_terms, 1, &C->term));
   if (!HycoH5Reads(h)) {
-    PetscCall(WriteTerms(h, At(k, "flexibility", path), C));
-    PetscCall(WriteShortTerms(h, At(k, "flexibility_single", path), C));
+    PetscCall(WriteTerms(h, At(k, name, path), symmetric, C));
+    PetscCall(WriteShortTerms(h, AtPart(k, name, "single", path), symmetric, C));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(HycoFlexibilityTakePolynomials(C, &s->tensor));
   PetscCall(HycoFlexibilityAllocate(C));
-  /* A body without a surface that may touch: the datasets have no rows. */
-  if (!C->n) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(ReadTerms(h, model, At(k, "flexibility", path), C, 0, C->n_wide));
-  PetscCall(ReadTerms(h, model, At(k, "flexibility_single", path), C, C->n_wide, C->n_terms));
+  /* A body without a surface that may touch, or without modes: the datasets have no rows. */
+  if (!C->n || !C->rows) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(ReadTerms(h, model, At(k, name, path), symmetric, C, 0, C->n_wide));
+  PetscCall(ReadTerms(h, model, AtPart(k, name, "single", path), symmetric, C, C->n_wide, C->n_terms));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* H of body k. Older files have its transpose in each sample, as the dataset H. */
-static PetscErrorCode MoveResponses(HycoH5 h, HycoSubstructure *s, PetscInt k, PetscInt columns)
+/* C as its samples, as in files of earlier versions. */
+static PetscErrorCode LoadSamples(HycoH5 h, const char path[], HycoSubstructure *s)
 {
-  PetscInt old = s->n_samples * columns;
-  PetscReal *H = NULL;
+  PetscInt rows = s->n_samples * s->n;
+  PetscReal *file = NULL;
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5Real(h, path, &rows, s->n, &file));
+  PetscCall(TakeSamples(s, s->n, s->n, file, &s->C));
+  PetscCall(PetscFree(file));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* H as its samples, a column each of their rows, or, in the oldest files, its transpose. */
+static PetscErrorCode LoadResponses(HycoH5 h, HycoSubstructure *s, PetscInt k, PetscInt rows)
+{
+  const size_t size = (size_t)s->n_samples * (size_t)s->n * (size_t)rows;
+  PetscInt old = s->n_samples * rows, columns = s->n_samples * s->n;
+  PetscReal *file = NULL, *swapped;
   char path[64];
 
   PetscFunctionBegin;
-  if (!HycoH5Reads(h) || !HycoH5Has(h, At(k, "H", path))) {
-    PetscCall(MoveColumns(h, At(k, "responses", path), s, columns, &s->H));
+  if (!HycoH5Has(h, At(k, "H", path))) {
+    PetscCall(HycoH5Real(h, At(k, "responses", path), &columns, rows, &file));
+    PetscCall(TakeSamples(s, rows, s->n, file, &s->H));
+    PetscCall(PetscFree(file));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(HycoH5Real(h, path, &old, s->n, &H));
-  PetscCall(PetscMalloc1((size_t)old * (size_t)s->n + 1, &s->H));
+  PetscCall(HycoH5Real(h, path, &old, s->n, &file));
+  PetscCall(PetscMalloc1(size + 1, &swapped));
   for (PetscInt i = 0; i < old; i++) {
     for (PetscInt j = 0; j < s->n; j++)
-      s->H[HycoBodiesColumn(s, i / columns, j, columns) + (size_t)(i % columns)] =
-          H[(size_t)i * (size_t)s->n + (size_t)j];
+      swapped[((size_t)(i / rows) * (size_t)s->n + (size_t)j) * (size_t)rows + (size_t)(i % rows)] =
+          file[(size_t)i * (size_t)s->n + (size_t)j];
   }
-  PetscCall(PetscFree(H));
+  PetscCall(TakeSamples(s, rows, s->n, swapped, &s->H));
+  HycoFreeAll(&swapped, &file);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* a of files of earlier versions: the loads and the motions apart, samples by rows. */
+static PetscErrorCode LoadResponsesToLoads(HycoH5 h, HycoSubstructures b, PetscInt k, PetscInt rows)
+{
+  HycoSubstructure *s = &b->body[k];
+  const PetscInt n = b->r + b->p;
+  PetscInt all = s->n_samples * rows;
+  PetscReal *a = NULL, *g = NULL, *data;
+  char path[64];
+
+  PetscFunctionBegin;
+  PetscCall(HycoH5Real(h, At(k, "a", path), &all, b->r, &a));
+  PetscCall(HycoH5Real(h, At(k, "g", path), &all, b->p, &g));
+  PetscCall(PetscMalloc1((size_t)all * (size_t)n + 1, &data));
+  for (PetscInt i = 0; i < all; i++) {
+    PetscReal *row = data + (size_t)(i / rows) * (size_t)(n * rows) + i % rows;
+
+    for (PetscInt d = 0; d < n; d++) row[d * rows] = d < b->r ? a[i * b->r + d] : g[i * b->p + d - b->r];
+  }
+  PetscCall(TakeSamples(s, rows, n, data, &s->a));
+  HycoFreeAll(&a, &g, &data);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* C, H and a of body k. */
+static PetscErrorCode MoveMatrices(HycoH5 h, const char model[], HycoSubstructures b, PetscInt k)
+{
+  HycoSubstructure *s = &b->body[k];
+  const PetscInt rows = (b->turn_start[k + 1] - b->turn_start[k]) * s->l + s->m;
+  char path[64];
+
+  PetscFunctionBegin;
+  s->C.rows = s->C.n = s->H.n = s->n;
+  s->H.rows = s->a.rows = rows;
+  s->a.n = b->r + b->p;
+  if (HycoH5Reads(h) && HycoH5Has(h, At(k, "C", path)))
+    PetscCall(LoadSamples(h, path, s));
+  else
+    PetscCall(MoveFlexibility(h, model, s, k, "flexibility", PETSC_TRUE, &s->C));
+  if (HycoH5Reads(h) && HycoH5Has(h, At(k, "a", path))) {
+    PetscCall(LoadResponses(h, s, k, rows));
+    PetscCall(LoadResponsesToLoads(h, b, k, rows));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(MoveFlexibility(h, model, s, k, "displacements", PETSC_FALSE, &s->H));
+  PetscCall(MoveFlexibility(h, model, s, k, "displacements_of_loads", PETSC_FALSE, &s->a));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -273,18 +302,12 @@ static PetscErrorCode MoveBody(HycoH5 h, const char model[], HycoSubstructures b
   s->m = b->inner_start[k + 1] - b->inner_start[k];
   rows = s->n_samples * s->n;
   columns = s->n_samples * b->p;
-  PetscCall(MoveFlexibility(h, model, s, k));
   PetscCall(HycoH5Real(h, At(k, "R", path), &rows, b->r, &s->R));
   PetscCall(HycoH5Real(h, At(k, "Z", path), &rows, b->p, &s->Z));
   PetscCall(HycoH5Real(h, At(k, "work", path), &columns, b->r, &s->work));
   /* r is the model's number of loads, which MoveSizes() has read. */
   PetscCall(HycoH5Real(h, At(k, "gram", path), &b->r, b->r, &s->gram));
-  columns = (b->turn_start[k + 1] - b->turn_start[k]) * s->l + s->m;
-  PetscCall(MoveResponses(h, s, k, columns));
-  /* The same name for another length: a and g have a row for each column of H. */
-  rows = s->n_samples * columns;
-  PetscCall(HycoH5Real(h, At(k, "a", path), &rows, b->r, &s->a));
-  PetscCall(HycoH5Real(h, At(k, "g", path), &rows, b->p, &s->g));
+  PetscCall(MoveMatrices(h, model, b, k));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -25,10 +25,13 @@ PetscErrorCode HycoBodiesReset(HycoBodiesWork o)
   PetscCall(HycoFEDestroy(&o->fe));
   PetscCall(HycoTaoDestroy(&o->tao));
   PetscCall(HycoSolverDestroy(&o->own));
-  for (PetscInt k = 0; o->weight && k < o->bodies->n; k++) HycoFreeAll(&o->weight[k], &o->share[k], &o->blend[k]);
-  HycoFreeAll(&o->kept.weights, &o->weight, &o->share, &o->blend, &o->blended, &o->mu, &o->reference, &o->X0, &o->E0,
-              &o->E_at, &o->pose, &o->kappa, &o->c, &o->elastic, &o->free, &o->u, &o->f, &o->x, &o->loc, &o->placed,
-              &o->placed_in, &o->row_start, &o->row_at, &o->row, &o->gap, &o->active, &o->Z, &o->work);
+  for (PetscInt k = 0; o->R && k < o->bodies->n; k++)
+    HycoFreeAll(&o->weight[k], &o->share[k], &o->share_H[k], &o->share_a[k], &o->blend[k], &o->R[k]);
+  for (PetscInt k = 0; o->response && k < o->n_contacts * o->bodies->n; k++) PetscCall(PetscFree(o->response[k]));
+  HycoFreeAll(&o->kept.weights, &o->weight, &o->share, &o->share_H, &o->share_a, &o->R, &o->blend, &o->blended,
+              &o->response, &o->responded, &o->mu, &o->reference, &o->X0, &o->E0, &o->E_at, &o->pose, &o->kappa, &o->c,
+              &o->elastic, &o->free, &o->u, &o->f, &o->x, &o->loc, &o->placed, &o->placed_in, &o->row_start, &o->row_at,
+              &o->row, &o->gap, &o->active, &o->Z, &o->work);
   PetscCall(PetscMemzero(o, sizeof(*o)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -46,7 +49,9 @@ PetscErrorCode HycoBodiesDestroy(HycoSubstructures *bodies)
     HycoSubstructure *s = &b->body[k];
 
     PetscCall(HycoFlexibilityDestroy(&s->C));
-    HycoFreeAll(&s->R, &s->Z, &s->work, &s->H, &s->a, &s->g, &s->gram);
+    PetscCall(HycoFlexibilityDestroy(&s->H));
+    PetscCall(HycoFlexibilityDestroy(&s->a));
+    HycoFreeAll(&s->R, &s->Z, &s->work, &s->gram);
   }
   HycoFreeAll(&b->first, &b->theta, &b->variable, &b->n_nodes, &b->node, &b->body, &b->start, &b->dof, &b->inner_start,
               &b->inner, &b->cell, &b->at, &b->at_body, &b->A, &b->mode_start, &b->turn_start, &b->G);
@@ -103,13 +108,18 @@ PetscErrorCode HycoBodiesWeights(HycoSubstructures b, PetscInt k, const PetscRea
 }
 
 /* sum = the sum of the n_samples of n numbers each, times their weights. */
-static void Blend(PetscInt n_samples, const PetscReal weight[], PetscInt n, const PetscReal data[], PetscReal sum[])
+static PetscErrorCode Blend(PetscInt n_samples, const PetscReal weight[], PetscInt n, const PetscReal data[],
+                            PetscReal sum[])
 {
-  for (PetscInt i = 0; i < n; i++) sum[i] = weight[0] * data[i];
-  for (PetscInt j = 1; j < n_samples; j++) {
-    data += n;
-    for (PetscInt i = 0; i < n; i++) sum[i] += weight[j] * data[i];
-  }
+  const PetscReal one = 1, zero = 0;
+  const PetscBLASInt each = 1;
+  PetscBLASInt rows, columns;
+
+  PetscFunctionBegin;
+  PetscCall(PetscBLASIntCast(n, &rows));
+  PetscCall(PetscBLASIntCast(n_samples, &columns));
+  if (rows) BLASgemv_("N", &rows, &columns, &one, data, &rows, weight, &each, &zero, sum, &each);
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* -- set-up -- */
@@ -201,12 +211,21 @@ PetscErrorCode HycoBodiesSetUp(HycoBodiesWork o, HycoSubstructures b, HycoScene 
   o->solver = solver ? solver : o->own;
   PetscCall(PetscCalloc1(b->n, &o->weight));
   PetscCall(PetscCalloc1(b->n, &o->share));
+  PetscCall(PetscCalloc1(b->n, &o->share_H));
+  PetscCall(PetscCalloc1(b->n, &o->share_a));
   PetscCall(PetscCalloc1(b->n, &o->blend));
+  PetscCall(PetscCalloc1(b->n, &o->R));
+  o->n_contacts = m;
+  PetscCall(PetscCalloc1(m * b->n + 1, &o->response));
+  PetscCall(PetscCalloc1(m + 1, &o->responded));
   PetscCall(PetscCalloc1(b->ns + 1, &o->blended));
   PetscCall(PetscCalloc1(b->n, &o->kept.weights));
   for (PetscInt k = 0; k < b->n; k++) {
     PetscCall(PetscCalloc1(b->body[k].n_samples, &o->weight[k]));
     PetscCall(PetscCalloc1(b->body[k].C.n_terms + 1, &o->share[k]));
+    PetscCall(PetscCalloc1(b->body[k].H.n_terms + 1, &o->share_H[k]));
+    PetscCall(PetscCalloc1(b->body[k].a.n_terms + 1, &o->share_a[k]));
+    PetscCall(PetscMalloc1(b->body[k].n * b->r + 1, &o->R[k]));
   }
   PetscCall(HycoFECreate(scene, b->probe->dm, &o->fe));
   /* Of a history too, thermal strains are loads here: the laws' s = C (e - e_th) - sigma leaves them out. */
@@ -307,16 +326,12 @@ static PetscErrorCode Load(HycoBodiesWork o)
   }
   PetscCall(PetscFree(value));
   for (PetscInt k = 0; k < b->n; k++) {
-    const HycoSubstructure *own = &b->body[k];
     PetscReal *u = o->elastic + b->start[k];
+    const PetscReal *R = o->R[k];
 
-    /* R's rows of all samples one after the other: i / n is the sample, i % n the unknown. u = sum of weights R c
-       / kappa. */
-    for (PetscInt i = 0; i < own->n_samples * own->n; i++) {
-      const PetscReal weight = o->weight[k][i / own->n] / o->kappa[k];
-
-      for (PetscInt j = 0; j < b->r; j++)
-        u[i % own->n] += weight * own->R[(size_t)i * (size_t)b->r + (size_t)j] * o->c[j];
+    for (PetscInt i = 0; i < b->body[k].n; i++, R += b->r) {
+      for (PetscInt j = 0; j < b->r; j++) u[i] += R[j] * o->c[j];
+      u[i] /= o->kappa[k];
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -335,8 +350,8 @@ static PetscErrorCode BlendMotions(HycoBodiesWork o)
   for (PetscInt k = 0; k < b->n; k++) {
     const HycoSubstructure *own = &b->body[k];
 
-    Blend(own->n_samples, o->weight[k], own->n * b->p, own->Z, o->Z + b->start[k] * b->p);
-    Blend(own->n_samples, o->weight[k], b->p * b->r, own->work, work);
+    PetscCall(Blend(own->n_samples, o->weight[k], own->n * b->p, own->Z, o->Z + b->start[k] * b->p));
+    PetscCall(Blend(own->n_samples, o->weight[k], b->p * b->r, own->work, work));
     /* A motion may move several bodies, as tied ones do: the works add up. */
     for (PetscInt i = 0; i < b->p * b->r; i++) o->work[i] += work[i];
   }
@@ -409,7 +424,7 @@ static PetscErrorCode TurnRows(HycoBodiesWork o, const HycoBodiesSurface *s)
 
 /* -- flexibilities -- */
 
-/* The weights of the samples at mu; columns with other ones are forgotten. */
+/* The weights of the samples at mu, and what depends on them alone; columns with other ones are forgotten. */
 static PetscErrorCode TakeWeights(HycoBodiesWork o, const PetscReal mu[])
 {
   const HycoSubstructures b = o->bodies;
@@ -428,7 +443,12 @@ static PetscErrorCode TakeWeights(HycoBodiesWork o, const PetscReal mu[])
     o->kept.weights[k] += !same;
     PetscCall(PetscFree(o->weight[k]));
     o->weight[k] = weight;
+    /* The first prediction has no weights of 0 all over. */
+    if (same) continue;
     HycoFlexibilityShares(&b->body[k].C, n, weight, o->share[k]);
+    HycoFlexibilityShares(&b->body[k].H, n, weight, o->share_H[k]);
+    HycoFlexibilityShares(&b->body[k].a, n, weight, o->share_a[k]);
+    PetscCall(Blend(n, weight, b->body[k].n * b->r, b->body[k].R, o->R[k]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -456,94 +476,69 @@ static PetscErrorCode GetColumn(HycoBodiesWork o, PetscInt k, PetscInt unknown, 
 
 /* -- the complementarity problem of some contacts -- */
 
-/* The contacts in the problem, and the places that their rows touch, ascending. */
+/* The contacts in the problem. */
 typedef struct {
-  PetscInt n, *contact, n_place, *place, *at; /* at: by place of all: its number among these */
-  PetscReal *M, *q, *z, *y;
-  PetscInt *first; /* by body: the first of its places; n + 1 */
-  PetscReal **C;   /* by body: its flexibility between these places */
+  PetscInt n, *contact;
+  PetscReal *M, *q, *z;
 } Problem;
 
-/* First marks, then numbers in ascending order, so that the places of one body are contiguous, as Gather() and
-   Respond() expect. */
-static PetscErrorCode FindTouched(HycoBodiesWork o, Problem *p)
+/* o->response of a contact: C row^T of each body that its row touches, without kappa. Made once at the present parameters:
+   further problems, and the displacements, take it from there. */
+static PetscErrorCode Respond(HycoBodiesWork o, PetscInt contact)
 {
   const HycoSubstructures b = o->bodies;
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1(b->ns + 1, &p->at));
-  PetscCall(PetscMalloc1(b->ns + 1, &p->place));
-  for (PetscInt i = 0; i < b->ns; i++) p->at[i] = -1;
-  for (PetscInt k = 0; k < p->n; k++) {
-    for (PetscInt j = o->row_start[p->contact[k]]; j < o->row_start[p->contact[k] + 1]; j++) p->at[o->row_at[j]] = 0;
-  }
-  /* A problem has far fewer unknowns than the surfaces: its columns are gathered at these alone. */
-  for (PetscInt i = 0; i < b->ns; i++) {
-    if (p->at[i] < 0) continue;
-    p->at[i] = p->n_place;
-    p->place[p->n_place++] = i;
-  }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
+  PetscReal **response = o->response + contact * b->n;
 
-/* The flexibilities between the places that are touched. p->C[k] is n_k x n_k for the touched places of body k, which
-   are first[k] .. first[k + 1] of p->place. */
-static PetscErrorCode Gather(HycoBodiesWork o, Problem *p)
-{
-  const HycoSubstructures b = o->bodies;
   PetscFunctionBegin;
-  PetscCall(PetscMalloc2(b->n + 1, &p->first, b->n, &p->C));
-  p->first[0] = 0;
-  for (PetscInt k = 0, i = 0; k < b->n; k++) {
-    const PetscInt lo = b->start[k];
-    const PetscReal scale = 1 / o->kappa[k];
-    PetscReal *to;
+  if (o->responded[contact]) PetscFunctionReturn(PETSC_SUCCESS);
+  o->responded[contact] = PETSC_TRUE;
+  for (PetscInt k = 0; k < b->n; k++) {
+    const PetscInt lo = b->start[k], hi = b->start[k + 1];
+    PetscBool touched = PETSC_FALSE;
 
-    while (i < p->n_place && p->place[i] < b->start[k + 1]) i++;
-    p->first[k + 1] = i;
-    /* A copy, contiguous in the touched places: Respond() then adds whole columns by BLAS instead of indexed
-       entries of the n x n block. */
-    PetscCall(PetscMalloc1(PetscSqr((size_t)(i - p->first[k])) + 1, &p->C[k]));
-    to = p->C[k];
-    for (PetscInt j = p->first[k]; j < i; j++) {
+    for (PetscInt e = o->row_start[contact]; e < o->row_start[contact + 1]; e++) {
       const PetscReal *column;
 
-      PetscCall(GetColumn(o, k, p->place[j] - lo, &column));
-      for (PetscInt d = p->first[k]; d < i; d++) *to++ = scale * column[p->place[d] - lo];
+      if (o->row_at[e] < lo || o->row_at[e] >= hi) continue;
+      if (!response[k]) PetscCall(PetscMalloc1(hi - lo, &response[k]));
+      PetscCall(GetColumn(o, k, o->row_at[e] - lo, &column));
+      for (PetscInt i = 0; i < hi - lo && !touched; i++) response[k][i] = o->row[e] * column[i];
+      if (touched) HycoBodiesAdd(hi - lo, o->row[e], column, response[k]);
+      touched = PETSC_TRUE;
     }
+    /* At other parameters it touched this body. */
+    if (!touched) PetscCall(PetscFree(response[k]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* y = C row^T / kappa on the places that are touched. */
-static void Respond(HycoBodiesWork o, const Problem *p, PetscInt contact)
-{
-  const HycoSubstructures b = o->bodies;
-
-  PetscCallVoid(PetscArrayzero(p->y, p->n_place));
-  for (PetscInt j = o->row_start[contact]; j < o->row_start[contact + 1]; j++) {
-    const PetscInt at = p->at[o->row_at[j]], body = HycoBodiesAt(b, o->row_at[j]), lo = p->first[body];
-    const PetscInt n = p->first[body + 1] - lo;
-
-    HycoBodiesAdd(n, o->row[j], p->C[body] + (size_t)(at - lo) * (size_t)n, p->y + lo);
-  }
 }
 
 /* row[j] = W of the contact with those in the problem from number `first` on. */
-static void FillRow(HycoBodiesWork o, Problem *p, PetscInt first, PetscReal row[])
+static PetscErrorCode FillRow(HycoBodiesWork o, Problem *p, PetscInt first, PetscReal row[])
 {
+  const HycoSubstructures b = o->bodies;
+
+  PetscFunctionBegin;
   if (o->kept.same) {
     HycoBodiesKeptRow(o, p->contact[first], p->n - first, p->contact + first, row);
-    return;
+    PetscFunctionReturn(PETSC_SUCCESS);
   }
-  Respond(o, p, p->contact[first]);
-  /* Only the upper triangle: W is symmetric, and the caller mirrors it. */
-  for (PetscInt j = 0; j < p->n - first; j++) {
-    const PetscInt contact = p->contact[first + j];
+  PetscCall(Respond(o, p->contact[first]));
+  for (PetscInt k = 0; k < b->n; k++) {
+    const PetscReal *y = o->response[p->contact[first] * b->n + k], scale = 1 / o->kappa[k];
+    const PetscInt lo = b->start[k], hi = b->start[k + 1];
 
-    row[j] = 0;
-    for (PetscInt e = o->row_start[contact]; e < o->row_start[contact + 1]; e++)
-      row[j] += o->row[e] * p->y[p->at[o->row_at[e]]];
+    /* Only the upper triangle: W is symmetric, and the caller mirrors it. */
+    for (PetscInt j = 0; y && j < p->n - first; j++) {
+      const PetscInt contact = p->contact[first + j];
+      PetscReal sum = 0;
+
+      for (PetscInt e = o->row_start[contact]; e < o->row_start[contact + 1]; e++) {
+        if (o->row_at[e] >= lo && o->row_at[e] < hi) sum += o->row[e] * y[o->row_at[e] - lo];
+      }
+      row[j] += scale * sum;
+    }
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* M = [0 A; -A^T W] and q = (-work, w) of the contacts in the problem. */
@@ -553,12 +548,10 @@ static PetscErrorCode Fill(HycoBodiesWork o, Problem *p)
   const size_t n = (size_t)(b->p + p->n);
 
   PetscFunctionBegin;
-  /* May turn kept.same off (memory); only then the touched places are needed. */
+  /* May turn kept.same off (memory). */
   PetscCall(HycoBodiesKeep(o, p->n, p->contact));
-  if (!o->kept.same) PetscCall(FindTouched(o, p));
-  if (!o->kept.same) PetscCall(Gather(o, p));
   PetscCall(PetscCalloc1(n * n + 1, &p->M));
-  PetscCall(PetscCalloc3(n + 1, &p->q, n + 1, &p->z, p->n_place + 1, &p->y));
+  PetscCall(PetscCalloc2(n + 1, &p->q, n + 1, &p->z));
   for (PetscInt i = 0; i < b->p; i++) {
     for (PetscInt j = 0; j < b->r; j++) p->q[i] -= o->work[i * b->r + j] * o->c[j];
   }
@@ -567,7 +560,7 @@ static PetscErrorCode Fill(HycoBodiesWork o, Problem *p)
     const size_t column = (size_t)(b->p + k);
 
     p->q[column] = o->gap[contact];
-    FillRow(o, p, k, p->M + column * n + column);
+    PetscCall(FillRow(o, p, k, p->M + column * n + column));
     /* FillRow() computes row k from the diagonal on; W is symmetric, and copying keeps it so to the last digit. */
     for (size_t j = column; j < n; j++) p->M[j * n + column] = p->M[column * n + j];
     for (PetscInt i = 0; i < b->p; i++) {
@@ -627,14 +620,11 @@ static PetscErrorCode SolveSet(HycoBodiesWork o, Problem *p, PetscBool *solved)
 }
 
 /* Frees what Fill() made. */
-static PetscErrorCode Release(HycoBodiesWork o, Problem *p)
+static PetscErrorCode Release(Problem *p)
 {
   PetscFunctionBegin;
-  for (PetscInt k = 0; p->C && k < o->bodies->n; k++) PetscCall(PetscFree(p->C[k]));
-  if (p->C) PetscCall(PetscFree2(p->first, p->C));
-  HycoFreeAll(&p->M, &p->at, &p->place);
-  PetscCall(PetscFree3(p->q, p->z, p->y));
-  p->n_place = 0;
+  PetscCall(PetscFree(p->M));
+  PetscCall(PetscFree2(p->q, p->z));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -659,7 +649,7 @@ static PetscErrorCode SolveProblem(HycoBodiesWork o, Problem *p, PetscReal Lambd
   for (PetscInt i = 0; i < b->p; i++) o->x[i] = p->z[i];
   for (PetscInt k = 0; k < p->n; k++) /* negative by round-off; the residuals are recomputed */
     Lambda[p->contact[k]] = b->p && !o->active[k] ? 0 : PetscMax(p->z[b->p + k], 0);
-  PetscCall(Release(o, p));
+  PetscCall(Release(p));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -674,7 +664,7 @@ PetscErrorCode HycoBodiesMatrix(HycoBodiesWork o, PetscInt n, const PetscInt con
   PetscCall(Fill(o, &p));
   /* As [0 Z^T B^T; -B Z W]: the motions come before the contacts, as in z. */
   PetscCall(PetscArraycpy(M, p.M, size * size));
-  PetscCall(Release(o, &p));
+  PetscCall(Release(&p));
   PetscCall(PetscFree(p.contact));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -736,10 +726,17 @@ static PetscErrorCode Displace(HycoBodiesWork o, const HycoBodiesSurface *s, con
       o->f[o->row_at[j]] += o->row[j] * Lambda[k];
   }
   PetscCall(PetscArraycpy(o->u, o->free, b->ns));
-  /* Kept products P = C B^T give u contact by contact, otherwise u comes column by column of C from the summed
-     forces f. */
+  /* Kept products P = C B^T give u, or those at the present parameters. */
   if (o->kept.same) PetscCall(HycoBodiesKeptDisplace(o, s->n, Lambda, o->u));
-  if (!o->kept.same) PetscCall(Yield(o));
+  for (PetscInt k = 0; k < s->n && !o->kept.same; k++) {
+    if (Lambda[k] == 0) continue;
+    PetscCall(Respond(o, k));
+    for (PetscInt j = 0; j < b->n; j++) {
+      const PetscReal *y = o->response[k * b->n + j];
+
+      if (y) HycoBodiesAdd(b->body[j].n, -Lambda[k] / o->kappa[j], y, o->u + b->start[j]);
+    }
+  }
   MoveRigidly(o);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -903,6 +900,7 @@ PetscErrorCode HycoBodiesPrepare(HycoBodiesWork o, const HycoBodiesSurface *s, c
     PetscCall(HycoFESetParameters(o->fe, mu));
   if (first || HycoSceneForcesChange(scene, changed)) PetscCall(Load(o));
   PetscCall(TurnRows(o, s));
+  PetscCall(PetscArrayzero(o->responded, s->n));
   PetscCall(PetscArraycpy(o->mu, mu, scene->n_variables));
   o->prepared = PETSC_TRUE;
   PetscCall(HycoBodiesKeepRows(o, s->n));
@@ -1022,53 +1020,22 @@ void HycoBodiesMove(HycoBodiesWork o, const HycoBodiesSurface *s, PetscReal U[])
   }
 }
 
-/* row += factor H f at the weights of the samples: H of a run of unknowns with forces is one matrix. */
-static PetscErrorCode AddResponses(HycoBodiesWork o, PetscInt k, PetscInt n, PetscReal factor, PetscReal row[])
-{
-  const HycoSubstructure *own = &o->bodies->body[k];
-  const PetscReal *f = o->f + o->bodies->start[k], one = 1;
-  const PetscBLASInt each = 1;
-  PetscBLASInt rows, columns;
-  PetscReal *x;
-
-  PetscFunctionBegin;
-  PetscCall(PetscBLASIntCast(n, &rows));
-  PetscCall(PetscMalloc1(own->n * own->n_samples + 1, &x));
-  for (PetscInt d = 0, end; d < own->n && n; d = end + 1) {
-    /* Runs of unknowns with forces are a few, since contact zones are connected: each run is one product of a
-       contiguous part of H. */
-    for (end = d; end < own->n && f[end] != 0; end++) {
-      for (PetscInt q = 0; q < own->n_samples; q++)
-        x[(end - d) * own->n_samples + q] = factor * f[end] * o->weight[k][q];
-    }
-    PetscCall(PetscBLASIntCast((end - d) * own->n_samples, &columns));
-    /* An unknown without a force ends a run at once. */
-    if (columns)
-      BLASgemv_("N", &rows, &columns, &one, own->H + HycoBodiesColumn(own, 0, d, n), &rows, x, &each, &one, row, &each);
-  }
-  PetscCall(PetscFree(x));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* row = (a c - H f) / kappa + g x for all rows of body k, at the weights of its samples. */
+/* row = (a c - H f) / kappa + g x for all rows of body k, at the weights of its samples; a has the columns of g, too. */
 static PetscErrorCode RowsOf(HycoBodiesWork o, PetscInt k, PetscInt n, PetscReal row[])
 {
   const HycoSubstructures b = o->bodies;
   const HycoSubstructure *own = &b->body[k];
-  const PetscReal *a = own->a, *g = own->g;
+  PetscReal *x;
 
   PetscFunctionBegin;
   PetscCall(PetscArrayzero(row, n));
-  for (PetscInt i = 0; i < own->n_samples * n; i++, a += b->r, g += b->p) {
-    const PetscReal weight = o->weight[k][i / n];
-    PetscReal loads = 0, motions = 0;
-
-    for (PetscInt d = 0; d < b->r; d++) loads += a[d] * o->c[d];
-    for (PetscInt d = 0; d < b->p; d++) motions += g[d] * o->x[d];
-    /* Rows of all samples, blended into one: weights are those of this body alone. */
-    row[i % n] += weight * (loads / o->kappa[k] + motions);
-  }
-  PetscCall(AddResponses(o, k, n, -1 / o->kappa[k], row));
+  PetscCall(PetscMalloc1(own->n + b->r + b->p + 1, &x));
+  for (PetscInt d = 0; d < b->r; d++) x[d] = o->c[d] / o->kappa[k];
+  PetscCall(PetscArraycpy(x + b->r, o->x, b->p));
+  PetscCall(HycoFlexibilityMultiply(&own->a, o->share_a[k], x, row));
+  for (PetscInt i = 0; i < own->n; i++) x[i] = -o->f[b->start[k] + i] / o->kappa[k];
+  PetscCall(HycoFlexibilityMultiply(&own->H, o->share_H[k], x, row));
+  PetscCall(PetscFree(x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
