@@ -243,14 +243,51 @@ class Patch(Held):
 CROWN = {2: ", map: {y: 'y + gap*x^2*(2.5 - y)/1.5'}", 3: ", map: {z: 'z + gap*(x^2 + y^2)*(2.5 - z)/1.5'}"}
 
 
-class Crowned(Held):
-    name = 'hybrid'
+class Models(Held):
+    """Crowned blocks, and models of them."""
+
+    TRAIN = ('-values_press', '0.02,0.04,0.06,0.08,0.1', '-values_gap', '0.03,0.05,0.07,0.09')
+    TEST = ('-values_press', '0.03,0.07', '-values_gap', '0.04,0.08')
 
     def crowned(self, kind, n_a, n_b, slave='b', contact='surface'):
         flat = KINDS[kind] == 2
         stack(self, kind, [n_a, n_a] if flat else [n_a, n_a, n_a - 2], [n_b, n_b] if flat else [n_b, n_b, n_b - 1],
               contact, slave, '', CROWN[KINDS[kind]])
         return self.path('two.yaml')
+
+    def compare(self, scene, model, *points):
+        c = self.hyco('compare', '-scene', scene, '-model', model, *points)
+        self.assertEqual((c['not_converged'], c['undefined']), (0, 0))
+        return {k: c[f'error_{k}']['max'] for k in ('u', 'u_rid', 'sigma', 'sigma_11', 'lambda_rid', 'lambda')}
+
+    def model(self, kind, n_a, n_b, contact='surface', hybrid='contact'):
+        """Trains m.h5 on an RID of one layer that cuts the surfaces: report of the training, errors at unseen points."""
+        scene = self.crowned(kind, n_a, n_b, 'b', contact)
+        t = self.hyco('train', '-scene', scene, *self.TRAIN, '-model', 'm.h5', '-hyco_hybrid', hybrid, '-hyco_snapshots',
+                      f'{kind}_{n_a}_{n_b}.train', '-hyco_pod_tol', '1e-9', '-hyco_rid_layers', 1)
+        return t, self.compare(scene, 'm.h5', *self.TEST)
+
+    def check_sets(self):
+        """The kept contacts are complete in the RID; where it cuts the surfaces some of their nodes (A'_c) are on the interface, not in A_c.
+        (Of surfaces that a map moves it has all that may meet.)"""
+        with h5py.File(self.path('m.h5')) as f:
+            role, kept = f['problem/role'][:, 0], f['problem/in_rid'][:, 0]
+            start, master, weight, slave = (f['problem/pairs/' + k][:, 0] for k in
+                                            ('master_start', 'master', 'weight', 'slave'))
+        rows = [k for k in range(len(kept)) if kept[k]]
+        nodes = set(slave[rows]).union(*(master[start[k]:start[k + 1]] for k in rows))
+        self.assertTrue(0 < len(rows) <= len(kept))
+        self.assertTrue(all(role[i] > 0 for i in nodes))
+        if len(rows) < len(kept):
+            self.assertGreater(sum(role[i] == 1 for i in nodes), 0)
+        self.assertTrue(all(role[slave[k]] == 2 or start[k + 1] == start[k] + 1 for k in rows))
+        self.assertTrue((weight > 0).all())
+        self.assertLess(abs(np.add.reduceat(weight, start[:-1]) - 1).max(), 1e-14)
+        return f'{len(rows)} of {len(kept)} contacts'
+
+
+class Crowned(Models):
+    name = 'hybrid'
 
     def test_ranks(self):
         """Facets whose nodes and slaves belong to several ranks."""
@@ -291,14 +328,6 @@ class Crowned(Held):
             for force in forces[1:]:
                 self.near(force, forces[0], 1e-9)
 
-    TRAIN = ('-values_press', '0.02,0.04,0.06,0.08,0.1', '-values_gap', '0.03,0.05,0.07,0.09')
-    TEST = ('-values_press', '0.03,0.07', '-values_gap', '0.04,0.08')
-
-    def compare(self, scene, model, *points):
-        c = self.hyco('compare', '-scene', scene, '-model', model, *points)
-        self.assertEqual((c['not_converged'], c['undefined']), (0, 0))
-        return {k: c[f'error_{k}']['max'] for k in ('u', 'u_rid', 'sigma', 'sigma_11', 'lambda_rid', 'lambda')}
-
     def test_whole(self):
         """The whole mesh as RID: full order at unseen parameters if all displacements are full order, at a training
         point if only the contacts' are and the modes hold the solution."""
@@ -313,31 +342,6 @@ class Crowned(Held):
                     worst = max(self.compare(scene, f'{kind}_{hybrid}.h5', *points).values())
                     self.held(f'{hybrid} full order on the whole mesh, {kind}', worst, 0, worst, 1e-9)
 
-    def model(self, kind, n_a, n_b, contact='surface', hybrid='contact'):
-        """Trains m.h5 on an RID of one layer that cuts the surfaces: report of the training, errors at unseen points."""
-        scene = self.crowned(kind, n_a, n_b, 'b', contact)
-        t = self.hyco('train', '-scene', scene, *self.TRAIN, '-model', 'm.h5', '-hyco_hybrid', hybrid, '-hyco_snapshots',
-                      f'{kind}_{n_a}_{n_b}.train', '-hyco_pod_tol', '1e-9', '-hyco_rid_layers', 1)
-        return t, self.compare(scene, 'm.h5', *self.TEST)
-
-    def check_sets(self):
-        """The kept contacts are complete in the RID; where it cuts the surfaces some of their nodes (A'_c) are on the interface, not in A_c.
-        (Of surfaces that a map moves it has all that may meet.)"""
-        with h5py.File(self.path('m.h5')) as f:
-            role, kept = f['problem/role'][:, 0], f['problem/in_rid'][:, 0]
-            start, master, weight, slave = (f['problem/pairs/' + k][:, 0] for k in
-                                            ('master_start', 'master', 'weight', 'slave'))
-        rows = [k for k in range(len(kept)) if kept[k]]
-        nodes = set(slave[rows]).union(*(master[start[k]:start[k + 1]] for k in rows))
-        self.assertTrue(0 < len(rows) <= len(kept))
-        self.assertTrue(all(role[i] > 0 for i in nodes))
-        if len(rows) < len(kept):
-            self.assertGreater(sum(role[i] == 1 for i in nodes), 0)
-        self.assertTrue(all(role[slave[k]] == 2 or start[k + 1] == start[k] + 1 for k in rows))
-        self.assertTrue((weight > 0).all())
-        self.assertLess(abs(np.add.reduceat(weight, start[:-1]) - 1).max(), 1e-14)
-        return f'{len(rows)} of {len(kept)} contacts'
-
     def test_hybrid(self):
         """Trained in the same way, the model on meshes that do not match has at most twice the errors of that with node pairs on matching
         meshes; and at most twice the values measured when the bounds were set."""
@@ -350,13 +354,6 @@ class Crowned(Held):
                     name = f"{kind} {n_b} on {n_a}, RID {100 * t['rid_fraction']:.0f} %, {self.check_sets()}"
                     for quantity, bound in (('u', u), ('lambda_rid', force)):
                         self.held(f'{name}, {quantity}', e[quantity], 0, e[quantity], min(bound, 2 * pair[quantity]))
-
-    def test_rank(self):
-        """The fewest full-order displacements, each contact's own also where masters are shared: u is held. (Forces on
-        surfaces want -hyco_hybrid contact, with node pairs as here.)"""
-        t, e = self.model('quad4', 24, 31, hybrid='rank')
-        self.assertLess(t['n_fe_dofs'], t['rid_contacts'])
-        self.held(f"rank quad4 31 on 24, {self.check_sets()}, u", e['u'], 0, e['u'], 2e-3)
 
 
 class Projection(Case):
