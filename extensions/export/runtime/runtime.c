@@ -577,13 +577,21 @@ static int predict(const Model *m, Work *o, double out[], double *kkt, int *iter
 
   *iterations = 0;
   *kkt = HUGE_VAL;
+  for (int i = 0; i < m->n_outputs; i++) out[i] = NAN;
   if (!assemble(m, o)) return DIVERGED;
+  /* fmax() passes over what is not a number: a residual of such gaps would be 0. */
+  for (int i = 0; i < m->n_motions + m->n_contacts; i++) {
+    if (!isfinite(o->q[i])) return DIVERGED;
+  }
   start(m, o);
   *kkt = search(m, o, 0, 0, iterations) ? kkt_residual(m, o) : HUGE_VAL;
   if (*kkt > m->tolerance) *kkt = search_held(m, o, iterations);
   /* 1e-10 of the largest force. */
   for (int i = 0; i < m->n_contacts; i++) least = fmax(least, 1e-10 * o->z[m->n_motions + i]);
   evaluate(m, o);
-  for (int i = 0; i < m->n_outputs; i++) out[i] = output(m, o, &m->output[i], least);
+  for (int i = 0; i < m->n_outputs; i++) {
+    out[i] = output(m, o, &m->output[i], least);
+    if (!isfinite(out[i])) *kkt = HUGE_VAL;
+  }
   return *kkt <= m->tolerance ? OK : DIVERGED;
 }
