@@ -1080,7 +1080,9 @@ static PetscErrorCode Prepare(Export *e)
   PetscInt places; /* the group of the first body's places */
 
   PetscFunctionBegin;
-  PetscCall(HycoSceneRefuseHistory(e->s, "hyco export"));
+  HycoCheck(!e->s->n_times,
+            "hyco export: this model is one of paths in time (history_times); programs are written of models of "
+            "scenes without a history; hyco predict, C and Python predict its paths");
   HycoCheck(m->ops->unknowns && m->ops->residual && m->ops->jacobian && m->ops->expand,
             "a model of type %s cannot be exported; train one with -hyco_model_type bodies", m->model->type);
   for (PetscInt p = 0; p < e->s->n_parameters; p++) mu[p] = (e->s->lo[p] + e->s->hi[p]) / 2;

@@ -234,6 +234,9 @@ PetscErrorCode HycoBodiesView(HycoROM m, PetscViewer viewer)
                                      "  contact forces within %.1e (bound at held-out samples of the bodies, %d "
                                      "samples)\n",
                                      (double)b->forces, (int)HycoBodiesGrid(b, 0, NULL)));
+  else if (b->inelastic)
+    PetscCall(PetscViewerASCIIPrintf(viewer, "  elastic responses are exact, %d modes of what is inelastic are not\n",
+                                     (int)b->inelastic->m));
   else
     PetscCall(PetscViewerASCIIPrintf(viewer, "  nothing is interpolated: forces are those of full order\n"));
   PetscCall(PetscViewerASCIIPrintf(viewer, "  fields and stresses on %d of %d elements, or the whole mesh\n",
