@@ -22,6 +22,7 @@ typedef struct {
 /* Steps as shares of the range: of data, where the error of the central difference is about 1e-9 and that of round-off less;
    of paths, whose round-off is that of Newton's method. */
 #define HYCO_GRADIENT_STEP      3e-5
+#define HYCO_GRADIENT_CLOSER    2 /* differences of a quarter of the step, where slopes jump */
 #define HYCO_GRADIENT_PATH_STEP 1e-4
 /* Central where the range has room for it, else of the same order to the inside. share: the step's, of the range. */
 void HycoDifferenceSet(HycoScene scene, const PetscReal mu[], PetscInt parameter, PetscReal share,

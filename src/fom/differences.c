@@ -132,37 +132,20 @@ static PetscReal Jump(const HycoGradient *g, const HycoDifference *d, const Pets
   return HycoDifferenceJump(d, PetscMax(PetscAbsReal(v[0]), PetscAbsReal(v[1])), 0, v);
 }
 
-/* Whether an output has different slopes to the two sides. */
-static PetscBool NeedsCloser(const HycoGradient *g, const HycoDifference *d, const PetscReal value[])
+/* The derivative of output q from the values at the points of d. */
+static void Set(HycoGradient *g, HycoGradientStore *store, const HycoDifference *d, const PetscReal value[], PetscInt q,
+                PetscBool kink, PetscBool turns)
 {
-  for (PetscInt q = 0; q < g->n_outputs; q++) {
-    if (Jump(g, d, value, q) > 0) return PETSC_TRUE;
-  }
-  return PETSC_FALSE;
-}
+  const PetscInt at = q * g->n_parameters + d->parameter;
+  HycoDifference side = *d;
 
-/* closer: NULL, or the outputs at the points of the shrunk difference. */
-static void Set(HycoGradient *g, HycoGradientStore *store, const HycoDifference *d, const PetscReal value[],
-                const PetscReal closer[], PetscBool kink)
-{
-  const PetscInt n = g->n_outputs;
-
-  for (PetscInt q = 0; q < n; q++) {
-    const PetscInt at = q * g->n_parameters + d->parameter;
-    HycoDifference side = *d;
-    PetscBool turns = PETSC_FALSE;
-
-    if (closer)
-      turns = HycoDifferenceKinks(d, Jump(g, d, value, q),
-                                  (const PetscReal[]){closer[q], closer[n + q], closer[2 * n + q]});
-    /* At a kink the mean of both slopes would be no derivative at all. */
-    if (turns) HycoDifferenceTakeSide(&side);
-    store->value[at] = 0;
-    for (PetscInt k = 0; k < 3; k++) store->value[at] += side.weight[k] * value[k * n + q];
-    /* Below the noise of the difference: a derivative that is exactly 0 has round-off of any sign. */
-    if (PetscAbsReal(store->value[at] * d->step[1]) <= NOISE * PetscAbsReal(value[q])) store->value[at] = 0;
-    store->kink[at] = (PetscBool)(kink || turns);
-  }
+  /* At a kink the mean of both slopes would be no derivative at all. */
+  if (turns) HycoDifferenceTakeSide(&side);
+  store->value[at] = 0;
+  for (PetscInt k = 0; k < 3; k++) store->value[at] += side.weight[k] * value[k * g->n_outputs + q];
+  /* Below the noise of the difference: a derivative that is exactly 0 has round-off of any sign. */
+  if (PetscAbsReal(store->value[at] * d->step[1]) <= NOISE * PetscAbsReal(value[q])) store->value[at] = 0;
+  store->kink[at] = (PetscBool)(kink || turns);
 }
 
 /* The n outputs at the two points beside mu. */
@@ -180,25 +163,49 @@ static PetscErrorCode MeasureBeside(PetscInt n, HycoScene scene, const PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A second, closer difference only where the first shows a jump: it tells a kink from curvature. */
+/* Closer differences only of outputs whose slopes jump: they tell a kink from curvature, and are of one side of a kink that
+   lies between their points and the farther ones. */
 PetscErrorCode HycoGradientColumn(HycoGradient *g, HycoGradientStore *store, HycoScene scene, const PetscReal mu[],
                                   const HycoDifference *d, PetscBool kink, HycoGradientMeasure measure, void *context,
                                   PetscReal value[])
 {
-  PetscReal *closer = NULL;
+  const PetscInt n = g->n_outputs;
+  PetscReal *closer = value + 3 * n; /* the room's second half: value is 6 x n_outputs */
+  HycoDifference at = *d;
+  PetscReal *jump;
+  PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(MeasureBeside(g->n_outputs, scene, mu, d, measure, context, value));
-  if (NeedsCloser(g, d, value)) {
-    HycoDifference near = *d;
-
-    HycoDifferenceShrink(&near);
-    /* The room's second half: value is 6 x n_outputs. */
-    closer = value + 3 * g->n_outputs;
-    PetscCall(PetscArraycpy(closer, value, g->n_outputs));
-    PetscCall(MeasureBeside(g->n_outputs, scene, mu, &near, measure, context, closer));
+  PetscCall(MeasureBeside(n, scene, mu, d, measure, context, value));
+  PetscCall(PetscMalloc1(n + 1, &jump));
+  for (PetscInt q = 0; q < n; q++) {
+    Set(g, store, d, value, q, kink, PETSC_FALSE);
+    jump[q] = 1;
   }
-  Set(g, store, d, value, closer, kink);
+  /* Of a path each closer difference is two paths more. */
+  for (PetscInt k = scene->n_times ? HYCO_GRADIENT_CLOSER - 1 : 0; k < HYCO_GRADIENT_CLOSER; k++) {
+    HycoDifference near = at;
+    PetscBool any = PETSC_FALSE;
+
+    for (PetscInt q = 0; q < n; q++) {
+      if (jump[q] > 0) jump[q] = Jump(g, &at, value, q);
+      any = (PetscBool)(any || jump[q] > 0);
+    }
+    if (!any) break;
+    HycoDifferenceShrink(&near);
+    for (PetscInt q = 0; q < n; q++) closer[q] = value[q];
+    ierr = MeasureBeside(n, scene, mu, &near, measure, context, closer);
+    if (ierr) PetscCall(PetscFree(jump));
+    PetscCall(ierr);
+    for (PetscInt q = 0; q < n; q++) {
+      const PetscReal v[3] = {closer[q], closer[n + q], closer[2 * n + q]};
+
+      if (jump[q] > 0) Set(g, store, &near, closer, q, kink, HycoDifferenceKinks(&at, jump[q], v));
+    }
+    for (PetscInt q = n; q < 3 * n; q++) value[q] = closer[q];
+    at = near;
+  }
+  PetscCall(PetscFree(jump));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

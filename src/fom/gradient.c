@@ -164,23 +164,33 @@ static PetscErrorCode Turns(Work *o, const HycoDifference *d, PetscBool closer, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same, with the gaps nearer to mu only where they are needed. Collective. */
-static PetscErrorCode FindTurns(Work *o, const HycoDifference *d, PetscBool *turns)
+/* The same, with the data nearer to mu only where they are needed: d becomes closer, so that its points are on this side of
+   a change of masters farther away. Collective. */
+static PetscErrorCode FindTurns(Work *o, HycoDifference *d, PetscBool *turns)
 {
-  HycoDifference near = *d;
   PetscReal at[HYCO_MAX_PARAMETERS];
 
   PetscFunctionBegin;
-  PetscCall(Turns(o, d, PETSC_FALSE, turns));
-  if (!*turns) PetscFunctionReturn(PETSC_SUCCESS);
-  /* The size of a jump between slopes stays when the points come closer; that of curvature shrinks with them. */
-  HycoDifferenceShrink(&near);
-  for (PetscInt j = 1; j < 3; j++) {
-    HycoDifferencePoint(&near, o->f->scene, o->mu, j, at);
-    /* o->dU receives an imbalance that is not needed; it is set anew by the solve. */
-    PetscCall(Data(o, at, o->dU, o->W[2 + j]));
+  for (PetscInt k = 0; k < HYCO_GRADIENT_CLOSER; k++) {
+    HycoDifference near = *d;
+
+    PetscCall(Turns(o, d, PETSC_FALSE, turns));
+    if (!*turns) break;
+    /* The size of a jump between slopes stays when the points come closer; that of curvature shrinks with them. */
+    HycoDifferenceShrink(&near);
+    for (PetscInt j = 1; j < 3; j++) {
+      HycoDifferencePoint(&near, o->f->scene, o->mu, j, at);
+      PetscCall(Data(o, at, o->R[j], o->W[2 + j]));
+    }
+    PetscCall(Turns(o, d, PETSC_TRUE, turns));
+    for (PetscInt j = 1; j < 3; j++) {
+      Vec W = o->W[j];
+
+      o->W[j] = o->W[2 + j];
+      o->W[2 + j] = W;
+    }
+    *d = near;
   }
-  PetscCall(Turns(o, d, PETSC_TRUE, turns));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -184,23 +184,37 @@ static PetscBool Turns(const Work *o, const HycoDifference *d, PetscBool closer)
   return PETSC_FALSE;
 }
 
-/* The same, with the gaps nearer to mu only where they are needed. */
-static PetscErrorCode FindTurns(Work *o, const HycoDifference *d, PetscBool *turns)
+/* The same, with the gaps nearer to mu only where they are needed: d becomes closer, so that its points are on this side of
+   a change of masters farther away. */
+static PetscErrorCode FindTurns(Work *o, HycoDifference *d, PetscBool *turns)
 {
   HycoROM m = o->m;
-  HycoDifference near = *d;
   PetscReal at[HYCO_MAX_PARAMETERS], size;
 
   PetscFunctionBegin;
-  *turns = Turns(o, d, PETSC_FALSE);
-  if (!*turns) PetscFunctionReturn(PETSC_SUCCESS);
-  /* A jump of the slope stays when the step shrinks, curvature does not. */
-  HycoDifferenceShrink(&near);
-  for (PetscInt j = 1; j < 3; j++) {
-    HycoDifferencePoint(&near, m->model->scene, o->mu, j, at);
-    PetscCall((*m->ops->residual)(m, at, o->z, o->w[2 + j], &size));
+  *turns = PETSC_FALSE;
+  for (PetscInt k = 0; k < HYCO_GRADIENT_CLOSER; k++) {
+    HycoDifference near = *d;
+
+    if (!Turns(o, d, PETSC_FALSE)) {
+      *turns = PETSC_FALSE;
+      break;
+    }
+    /* A jump of the slope stays when the step shrinks, curvature does not. */
+    HycoDifferenceShrink(&near);
+    for (PetscInt j = 1; j < 3; j++) {
+      HycoDifferencePoint(&near, m->model->scene, o->mu, j, at);
+      PetscCall((*m->ops->residual)(m, at, o->z, o->w[2 + j], &size));
+    }
+    *turns = Turns(o, d, PETSC_TRUE);
+    for (PetscInt j = 1; j < 3; j++) {
+      PetscReal *w = o->w[j];
+
+      o->w[j] = o->w[2 + j];
+      o->w[2 + j] = w;
+    }
+    *d = near;
   }
-  *turns = Turns(o, d, PETSC_TRUE);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -35,6 +35,34 @@ class ModelGradients(gradients.Gradients):
         for key in ('outputs', 'contacts', 'estimated_error_outputs', 'kkt', 'rid_strain_energy'):
             self.assertEqual(report[key], plain[key])
 
+    def slope(self, command, place):
+        """The derivative of the force, and whether it is said to be one of a kink."""
+        report = self.hyco(*command, '-mu', f'{place!r},0.6,11,0.4,0.03', '-gradient')
+        return report['gradient']['lift']['place'], bool(report['gradient_kinks'])
+
+    def test_beside_a_kink(self):
+        """At a distance from a change of masters that is a part of the difference's step the derivative is that of its own side; of models and at full order."""
+        scene = self.scene(gradients.ROLLER)
+        predict = self.model('bodies', ('-scene', scene), '-scatter', '3')
+        low = high = 1.07
+        at = {low: self.slope(predict, low)[0]}
+        while abs(at[high] - at[low]) < 0.05:  # between changes of masters the derivative changes smoothly, by 0.01 in each of these steps
+            low, high = high, high + 0.005
+            at[high] = self.slope(predict, high)[0]
+            self.assertLess(high, 2)
+        while high - low > 1e-8:
+            middle = (low + high) / 2
+            at[middle] = self.slope(predict, middle)[0]
+            low, high = (middle, high) if abs(at[middle] - at[low]) < abs(at[middle] - at[high]) else (low, middle)
+        step = 3e-5 * (RANGES['place'][1] - RANGES['place'][0])
+        before, after = (self.slope(predict, low + side * 3 * step)[0] for side in (-1, 1))
+        self.assertGreater(abs(before - after), 0.05)
+        for share in (-0.6, -0.22, 0.22, 0.6):
+            for command in (predict, ('solve', '-scene', scene)):
+                value, kink = self.slope(command, low + share * step)
+                self.assertFalse(kink, share)
+                self.assertLess(abs(value - (before if share < 0 else after)), 0.1 * abs(before - after), (share, command))
+
     def test_vanishing(self):
         """Derivatives that vanish are 0, not round-off: a force in balance with a load, a displacement that the obstacle gives."""
         for scene, mu, output, parameter in ((gradients.FLOATING, '2.1,230,0.2', 'lift', 'soft'), (gradients.BUMP, '1.3,0.21,12', 'low', 'modulus')):
