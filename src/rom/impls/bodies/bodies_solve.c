@@ -310,7 +310,7 @@ static PetscErrorCode Load(HycoBodiesWork o)
   PetscCall(VecGetArrayRead(all, &F));
   for (PetscInt k = 0; k < b->r; k++) {
     const PetscInt node = b->at[k] / b->dim;
-    PetscReal force[3], turned[3];
+    PetscReal force[3], turned[3] = {0, 0, 0};
 
     /* K has no rows for fixed unknowns, and training set them to zero before the turn, so that the DEIM points see
        the same vectors. */
