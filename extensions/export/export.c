@@ -991,19 +991,17 @@ static PetscErrorCode Time(Export *e, const Model *model, Work *o, const PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* A component of a contact's force is compared with the largest of its components: one that vanishes by symmetry is
-   round-off. */
-static void ShareScales(PetscInt n, char *const name[], const PetscReal most[], PetscReal scale[])
+/* The size that errors of output k are relative to: its own, but a component of a contact's force has the largest of its
+   components, as one that vanishes by symmetry is round-off. */
+static PetscReal ScaleOf(PetscInt n, char *const name[], const PetscReal most[], PetscInt k)
 {
-  for (PetscInt k = 0; k < n; k++) {
-    const char *force = strstr(name[k], ".force_");
+  const char *force = strstr(name[k], ".force_");
+  PetscReal scale = most[k];
 
-    scale[k] = most[k];
-    for (PetscInt j = 0; force && j < n; j++) {
-      if (!strncmp(name[j], name[k], (size_t)(force - name[k]) + strlen(".force_")))
-        scale[k] = PetscMax(scale[k], most[j]);
-    }
+  for (PetscInt j = 0; force && j < n; j++) {
+    if (!strncmp(name[j], name[k], (size_t)(force - name[k]) + strlen(".force_"))) scale = PetscMax(scale, most[j]);
   }
+  return scale;
 }
 
 /* Sets e->out.difference: of an output relative to its largest value, at points over the ranges; fails if it is no
@@ -1037,14 +1035,14 @@ static PetscErrorCode Compare(Export *e, const Model *model, void *memory)
     }
   }
   PetscCall(Time(e, model, &o, mu, mine));
-  ShareScales(n, e->out.name, most, mine);
   for (PetscInt k = 0; k < n; k++) {
-    most[k] = mine[k];
-    HycoCheck(worst[k] <= AGREES * most[k],
+    const PetscReal scale = ScaleOf(n, e->out.name, most, k);
+
+    HycoCheck(worst[k] <= AGREES * scale,
               "export: the output %s of the program differs from the model's by %.1e of its largest value; the forces "
               "may not be unique",
-              e->out.name[k], (double)(worst[k] / most[k]));
-    if (most[k] > 0) e->out.difference = PetscMax(e->out.difference, worst[k] / most[k]);
+              e->out.name[k], (double)(worst[k] / scale));
+    if (scale > 0) e->out.difference = PetscMax(e->out.difference, worst[k] / scale);
   }
   PetscCall(PetscFree4(mine, theirs, most, worst));
   PetscCall(HycoSamplesDestroy(&samples));

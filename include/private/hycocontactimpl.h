@@ -198,8 +198,10 @@ PetscErrorCode HycoContactCountStill(HycoFE fe, const HycoPairs *pairs, const Pe
 /* The gap that is stored for an empty row: positive, of the mesh's scale, and without meaning. */
 PetscReal HycoContactNoGap(HycoFE fe);
 /* share[]: by contact of the scene whose given gap overlaps at every node by more than 1 % of an extent: the least overlap over
-   the extent of its smaller body; else 0. fe: on all nodes of this rank, surface: on those of the contacts. Collective. */
-PetscErrorCode HycoContactBuried(MPI_Comm comm, HycoFE fe, HycoFE surface, HycoPairs *pairs, PetscReal share[]);
+   the extent of its smaller body; else 0. fe: on all nodes of this rank, surface: on those of the contacts; gap: of the pairs,
+   by HycoContactGeometry(). Collective. */
+PetscErrorCode HycoContactBuried(MPI_Comm comm, HycoFE fe, HycoFE surface, const HycoPairs *pairs,
+                                 const PetscReal gap[], PetscReal share[]);
 /* Facts about the contacts of a solution u (n_dof), L (pairs->n entries, or by index). */
 typedef struct {
   PetscInt n_facing; /* contacts that may close: slave nodes that face a master, and those at obstacles */

@@ -755,7 +755,7 @@ PetscErrorCode HycoLCPSemismooth(const HycoLCP *lcp, PetscReal z[], PetscInt *it
   PetscCall(Chain(&h, z, status));
   if (lcp->sign) *lcp->sign = 0;
   /* Before DropRounding() and the scaling back: z is that of h's problem. */
-  if (*status == HYCO_LCP_SOLVED) PetscCall(DeriveAt(&h, z));
+  if ((lcp->cone || lcp->sign) && *status == HYCO_LCP_SOLVED) PetscCall(DeriveAt(&h, z));
   if (lcp->sign && *status == HYCO_LCP_SOLVED) PetscCall(HycoConeStepSign(h.linear, lcp->sign));
   DropRounding(&h, z);
   for (PetscInt i = 0; i < h.p; i++) z[i] *= h.flexibility;

@@ -33,16 +33,11 @@ static PetscErrorCode Extents(MPI_Comm comm, HycoFE fe, PetscReal extent[])
 }
 
 /* For each contact of the scene: its largest gap, and minus the smallest extent of its bodies. */
-static PetscErrorCode Gather(HycoFE fe, HycoPairs *p, const PetscReal extent[], PetscReal most[])
+static void Gather(HycoFE fe, const HycoPairs *p, const PetscReal gap[], const PetscReal extent[], PetscReal most[])
 {
   HycoMesh m = fe->mesh;
-  PetscReal *normal, *gap;
-  PetscErrorCode ierr;
 
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc2(3 * p->n, &normal, p->n, &gap));
-  ierr = HycoContactGeometry(fe, p, normal, gap);
-  for (PetscInt k = 0; !ierr && k < p->n; k++) {
+  for (PetscInt k = 0; k < p->n; k++) {
     PetscReal *of = most + 2 * p->contact[k];
 
     if (HycoPairsAlone(fe->scene, p, k)) continue;
@@ -51,13 +46,11 @@ static PetscErrorCode Gather(HycoFE fe, HycoPairs *p, const PetscReal extent[], 
     for (PetscInt j = p->master_start[k]; j < p->master_start[k + 1]; j++)
       of[1] = PetscMax(of[1], -extent[m->node_body[p->master[j]]]);
   }
-  PetscCall(PetscFree2(normal, gap));
-  PetscCall(ierr);
-  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* By the smallest overlap of a contact, not the largest: a rounded obstacle may reach deep at one node. */
-PetscErrorCode HycoContactBuried(MPI_Comm comm, HycoFE fe, HycoFE surface, HycoPairs *pairs, PetscReal share[])
+PetscErrorCode HycoContactBuried(MPI_Comm comm, HycoFE fe, HycoFE surface, const HycoPairs *pairs,
+                                 const PetscReal gap[], PetscReal share[])
 {
   HycoScene s = fe->scene;
   PetscReal *extent, *most;
@@ -73,7 +66,7 @@ PetscErrorCode HycoContactBuried(MPI_Comm comm, HycoFE fe, HycoFE surface, HycoP
   PetscCall(PetscMalloc2(s->n_bodies, &extent, 2 * s->n_contacts, &most));
   for (PetscInt k = 0; k < 2 * s->n_contacts; k++) most[k] = -PETSC_MAX_REAL;
   PetscCall(Extents(comm, fe, extent));
-  HycoOnEach(comm, Gather(surface, pairs, extent, most));
+  Gather(surface, pairs, gap, extent, most);
   HycoAllreduce(most, 2 * s->n_contacts, MPIU_REAL, MPI_MAX, comm);
   for (PetscInt c = 0; c < s->n_contacts; c++) {
     const PetscReal *of = most + 2 * c;

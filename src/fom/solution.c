@@ -39,14 +39,15 @@ static PetscErrorCode MeasureContacts(HycoFOM f, HycoSummary *s)
 /* Collective. */
 static PetscErrorCode NameBuried(HycoFOM f, HycoSummary *s)
 {
-  PetscReal *share;
+  PetscReal *normal, *gap, *share;
 
   PetscFunctionBegin;
   s->buried[0] = '\0';
   /* Without an overlap no contact is buried; the same on every rank. */
   if (!(s->overlap > 0)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc1(f->scene->n_contacts, &share));
-  PetscCall(HycoContactBuried(HycoComm(f), f->fe, f->fe_surface, &f->pairs, share));
+  PetscCall(PetscMalloc3(3 * f->pairs.n, &normal, f->pairs.n, &gap, f->scene->n_contacts, &share));
+  HycoOnEach(HycoComm(f), HycoContactGeometry(f->fe_surface, &f->pairs, normal, gap));
+  PetscCall(HycoContactBuried(HycoComm(f), f->fe, f->fe_surface, &f->pairs, gap, share));
   for (PetscInt c = 0; c < f->scene->n_contacts; c++) {
     char one[HYCO_LINE];
 
@@ -54,7 +55,7 @@ static PetscErrorCode NameBuried(HycoFOM f, HycoSummary *s)
     HycoFormat(one, "%s%s (by %.2g %%)", s->buried[0] ? ", " : "", f->scene->contact[c]->name, 100 * (double)share[c]);
     PetscCall(PetscStrlcat(s->buried, one, sizeof(s->buried)));
   }
-  PetscCall(PetscFree(share));
+  PetscCall(PetscFree3(normal, gap, share));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

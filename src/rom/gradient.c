@@ -192,14 +192,11 @@ static PetscErrorCode FindTurns(Work *o, HycoDifference *d, PetscBool *turns)
   PetscReal at[HYCO_MAX_PARAMETERS], size;
 
   PetscFunctionBegin;
-  *turns = PETSC_FALSE;
   for (PetscInt k = 0; k < HYCO_GRADIENT_CLOSER; k++) {
     HycoDifference near = *d;
 
-    if (!Turns(o, d, PETSC_FALSE)) {
-      *turns = PETSC_FALSE;
-      break;
-    }
+    *turns = Turns(o, d, PETSC_FALSE);
+    if (!*turns) break;
     /* A jump of the slope stays when the step shrinks, curvature does not. */
     HycoDifferenceShrink(&near);
     for (PetscInt j = 1; j < 3; j++) {
