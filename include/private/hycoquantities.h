@@ -19,6 +19,8 @@ PetscErrorCode HycoQuantitiesMarkCells(HycoScene scene, HycoMesh mesh, PetscBool
 PetscErrorCode HycoQuantitiesMarkDecisive(HycoFE fe, const PetscReal u[], const PetscReal sigma[],
                                           const PetscReal value[], PetscBool balanced, PetscBool needed[],
                                           PetscBool stressed[]);
+/* Whether it is the extreme or the mean of a stress in cells. */
+PetscBool HycoQuantityOfStress(const HycoQuantity *q);
 /* Marks the cells whose stresses the quantities need. */
 PetscErrorCode HycoQuantitiesMarkStressed(HycoScene scene, HycoMesh mesh, PetscBool stressed[]);
 /* Which reactions follow from balance (balance.c): balanced[k * n_bodies + b], for each quantity k the bodies b of

@@ -361,10 +361,10 @@ PetscErrorCode HycoHeldOutPredict(HycoROM model, HycoSnapshots store, const Pets
 typedef struct {
   PetscReal error[HYCO_MAX_QUANTITIES], size[HYCO_MAX_QUANTITIES];
 } HycoOutputErrors;
-/* Predicts again with the final model at those of n points where rows[] converged, and sets errors[n], zero before, on rank 0. Nothing if
+/* Predicts again with the final model at those of n points where rows[] converged, and sets errors[n], zero before, and the rows' features, on rank 0. Nothing if
    the scene has no outputs. Collective; model, rows and errors are those of rank 0. */
 PetscErrorCode HycoReducerJudgeOutputs(HycoReducer t, HycoSamples points, HycoROM model, HycoSnapshots store,
-                                       const HycoHeldOut rows[], HycoOutputErrors errors[]);
+                                       HycoHeldOut rows[], HycoOutputErrors errors[]);
 /* The largest 2-norm of contact forces; a relative error, where forces below a tenth of that norm are divided by the
    tenth (PETSC_INFINITY: not converged, or x/0); a summary of all. */
 PetscReal HycoHeldOutForce(PetscInt n, const HycoHeldOut rows[]);

@@ -269,6 +269,10 @@ PetscErrorCode HycoROMFocusOutputs(HycoROM model, const PetscReal value[], Petsc
 PetscErrorCode HycoROMUnfocusOutputs(HycoROM model);
 /* On that mesh; NULL: the quantities need only results of contacts. Borrowed. */
 HycoFE HycoROMGetOutputCells(HycoROM model);
+/* Of a type with exact displacements beside modes: the share of the contact forces at nodes of cells, of those whose
+   stresses the outputs need, that have modes at other nodes; 0: none, another type, or the
+   outputs have not been measured. */
+PetscErrorCode HycoROMShareTorn(HycoROM model, PetscReal *share);
 /* The displacements and cell stresses there, of the last HycoROMMeasureQuantities() without a history; NULL as above. */
 void HycoROMGetOutputFields(HycoROM model, const PetscReal *u[], const PetscReal *sigma[]);
 /* The quantities of another solution at the last prediction's parameters, mu[] with the time of a history: u and sigma

@@ -82,7 +82,7 @@ static PetscErrorCode PrintEstimates(HycoScene scene, const HycoPrediction *p, c
   if (p->unseen > HYCO_UNSEEN)
     PetscCall(DriverPrint(
         "UNSEEN REGIME: the %s is %.3g times the largest at the held-out points; the estimates are multiplied "
-        "by it (up to 100), and are not tested\n",
+        "by it (up to 100) or missing, and are not tested\n",
         HycoFeatureNames[p->unseen_feature], (double)p->unseen));
   /* A miss rather than an error: forces may be right although the displacements are not. */
   if (p->inconsistent)

@@ -221,7 +221,7 @@ static PetscErrorCode JudgeOne(Outputs *o, const PetscReal mu[], HycoOutputError
 }
 
 /* All points with converged predictions. */
-static PetscErrorCode JudgeAll(Outputs *o, const HycoHeldOut rows[], HycoOutputErrors e[])
+static PetscErrorCode JudgeAll(Outputs *o, HycoHeldOut rows[], HycoOutputErrors e[])
 {
   PetscInt n, n_par;
   const PetscReal *mu;
@@ -233,12 +233,14 @@ static PetscErrorCode JudgeAll(Outputs *o, const HycoHeldOut rows[], HycoOutputE
     if (rows[k].converged < 0.5) continue;
     PetscCall(HycoReducerTell(o->t, "outputs", k, n));
     PetscCall(JudgeOne(o, mu + k * n_par, &e[k]));
+    /* Again, now that the cells of the outputs are there: one feature is theirs. */
+    PetscCall(HycoEstimatesFeatures(o->m, rows[k].feature));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The model's output cells were made for this judgement; predictions make their own. */
-static PetscErrorCode JudgeOnRoot(Outputs *o, const HycoHeldOut rows[], HycoOutputErrors e[])
+static PetscErrorCode JudgeOnRoot(Outputs *o, HycoHeldOut rows[], HycoOutputErrors e[])
 {
   PetscErrorCode ierr;
 
@@ -253,7 +255,7 @@ static PetscErrorCode JudgeOnRoot(Outputs *o, const HycoHeldOut rows[], HycoOutp
 
 /* Outputs of the stored fields are measured by the code that measures predictions: both have the same definition. */
 PetscErrorCode HycoReducerJudgeOutputs(HycoReducer t, HycoSamples points, HycoROM m, HycoSnapshots store,
-                                       const HycoHeldOut rows[], HycoOutputErrors errors[])
+                                       HycoHeldOut rows[], HycoOutputErrors errors[])
 {
   Outputs o = {.t = t, .points = points, .m = m, .store = store};
 

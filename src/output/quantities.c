@@ -112,8 +112,7 @@ PetscErrorCode HycoQuantitiesMarkCells(HycoScene scene, HycoMesh m, PetscBool ne
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a quantity is one of a stress. */
-static PetscBool OfStress(const HycoQuantity *q)
+PetscBool HycoQuantityOfStress(const HycoQuantity *q)
 {
   return (PetscBool)(q->kind <= HYCO_QUANTITY_MEAN && q->field >= XX);
 }
@@ -128,7 +127,7 @@ PetscErrorCode HycoQuantitiesMarkStressed(HycoScene scene, HycoMesh m, PetscBool
   PetscCall(PetscMalloc1(m->n_cells, &in));
   PetscCall(PetscArrayzero(stressed, m->n_cells));
   for (PetscInt k = 0; k < scene->n_quantities; k++) {
-    if (!OfStress(&scene->quantity[k])) continue;
+    if (!HycoQuantityOfStress(&scene->quantity[k])) continue;
     PetscCall(HycoQuantityMarkCells(scene, m, k, in));
     for (PetscInt e = 0; e < m->n_cells; e++) stressed[e] = (PetscBool)(stressed[e] || in[e]);
   }
@@ -279,7 +278,8 @@ PetscErrorCode HycoQuantitiesMarkDecisive(HycoFE fe, const PetscReal u[], const 
     /* Rotated unknowns of oblique supports hold several axes at once, which one cell might not show. */
     if (q->kind == HYCO_QUANTITY_REACTION && balanced && !fe->n_oblique) PetscCall(KeepSupported(fe, q, in));
     for (PetscInt e = 0; e < m->n_cells; e++) needed[e] = (PetscBool)(needed[e] || in[e]);
-    for (PetscInt e = 0; e < m->n_cells && OfStress(q); e++) stressed[e] = (PetscBool)(stressed[e] || in[e]);
+    for (PetscInt e = 0; e < m->n_cells && HycoQuantityOfStress(q); e++)
+      stressed[e] = (PetscBool)(stressed[e] || in[e]);
   }
   PetscCall(PetscFree(in));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -18,16 +18,17 @@
 
     5  inconsistency  |B u - D| of the closed contacts, weighted by their forces, relative to their largest displacement
     6  new contacts   share of the force at contacts that no training solution closes
-    7  outside        share of the force outside the RID
+    7  outside        share of the force outside the RID; of bodies, beside cells with modes at some of their nodes alone
     8  remainder      of the reconstruction (41), relative to the forces in the RID
 
-  6 to 8 do not concern models that give accurate forces of all contacts. A displacement that does not follow its forces
+  6 and 8 do not concern models that give accurate forces of all contacts, and 7 concerns their stresses alone. A displacement that does not follow its forces
   is a failure of the prediction.
 
   The scene's outputs have formulas of their own, for absolute errors: an output may pass through zero. An estimate is
   at least HYCO_OUTPUT_ROUND_OFF of the largest absolute value of the output at the held-out points.
 */
 #include <hycoalgorithms.h>
+#include <hycoquantities.h>
 #include <hycoromimpl.h>
 #include <petscviewer.h>
 #include <stdio.h>
@@ -50,7 +51,7 @@ const char *const HycoFeatureNames[] = {"misfit of the full-order displacements"
                                         "tail",
                                         "difference between displacements and gaps at closed contacts",
                                         "share of the force at contacts that no training solution closes",
-                                        "share of the force outside the RID",
+                                        "share of the force outside the RID, or beside cells that it has in part",
                                         "remainder of the reconstructed forces"};
 
 /* Values of the features up to which no regime is new; 0: not used for this purpose. */
@@ -193,7 +194,8 @@ static PetscErrorCode MeasureOne(HycoROM m, PetscReal feature[])
   if (!m->model->traits.forces) {
     Shares(m, &feature[NEW_CONTACTS], &feature[OUTSIDE]);
     feature[REMAINDER] = m->remainder;
-  }
+  } else
+    PetscCall(HycoROMShareTorn(m, &feature[OUTSIDE]));
   feature[TAIL] = Tail(m);
   /* 0 without stored points or parameters: a feature that is constant drops out of the calibration. */
   feature[DISTANCE] = m->model->n_points && n_par ? PETSC_MAX_REAL : 0;
@@ -347,11 +349,21 @@ static void EvaluateFormulas(HycoROM m, const PetscReal feature[], PetscReal fac
     *own[e] = m->model->traits.uniform ? PetscMax(estimate[e], *own[e]) : estimate[e];
 }
 
+/* What a new regime adds to the estimates. Of forces beside cells that have modes at some of their nodes alone, which are
+   accurate, the stresses of such cells alone have none: *torn. */
+static PetscReal UnseenFactor(HycoROM m, HycoPrediction *p, const PetscReal feature[], PetscBool *torn)
+{
+  p->unseen = Unseen(m, feature, &p->unseen_feature);
+  *torn = (PetscBool)(m->model->traits.uniform && p->unseen_feature == OUTSIDE && p->unseen > HYCO_UNSEEN);
+  return *torn ? 1 : PetscMin(p->unseen, MOST_FACTOR);
+}
+
 /* First everything is set to "not known", so that every early end leaves a valid prediction. */
 PetscErrorCode HycoEstimatesEvaluate(HycoROM m, HycoPrediction *p)
 {
   const HycoEstimates *t = &m->model->estimates;
   PetscReal nearest[HYCO_MAX_PARAMETERS], feature[HYCO_FEATURES], outside;
+  PetscBool torn;
 
   PetscFunctionBegin;
   for (PetscInt q = 0; q < HYCO_MAX_QUANTITIES; q++) p->estimated_error_quantity[q] = -1;
@@ -370,10 +382,14 @@ PetscErrorCode HycoEstimatesEvaluate(HycoROM m, HycoPrediction *p)
   p->inconsistency = feature[INCONSISTENCY];
   p->inconsistent = IsInconsistent(m, p->inconsistency);
   if (t->n) {
-    p->unseen = Unseen(m, feature, &p->unseen_feature);
+    const PetscReal factor = UnseenFactor(m, p, feature, &torn);
+
     /* Beyond the training the estimates grow with the square of the distance in units of a usual distance between points. */
     outside = 1 + (p->beyond > 0 ? HycoEstimatesDistance(m->model->scene, m->fe->mu, nearest) / t->floor[DISTANCE] : 0);
-    EvaluateFormulas(m, feature, outside * outside * PetscMin(p->unseen, MOST_FACTOR), p);
+    EvaluateFormulas(m, feature, outside * outside * factor, p);
+    for (PetscInt q = 0; torn && q < t->n_outputs; q++) {
+      if (HycoQuantityOfStress(&m->model->scene->quantity[q])) p->estimated_error_quantity[q] = -1;
+    }
   }
   /* Displacements that miss the gaps are wrong by at least that. */
   if (p->inconsistent && p->estimated_error_u >= 0)

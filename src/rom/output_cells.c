@@ -14,13 +14,15 @@
 struct _n_HycoOutputCells {
   HycoMesh mesh; /* with these cells */
   HycoFE fe;
-  PetscReal *V, *u, *sigma;  /* n_dof x l; n_dof; n_cells x n_sigma */
-  PetscReal *means;          /* of HycoFEStressKept() */
-  PetscBool *stressed;       /* by cell: sigma is needed there, elsewhere it is 0 */
-  PetscInt *fe_at;           /* by full-order displacement: its index in u; -1: none */
-  PetscReal *reaction;       /* n_dof, of supports; NULL: no quantity needs them */
-  PetscInt *surface_node;    /* by node: its number on fe_surface; -1: in no contact. Allocated with reaction */
-  HycoFE fe_surface;         /* on the model's mesh without its cells; NULL until needed */
+  PetscReal *V, *u, *sigma; /* n_dof x l; n_dof; n_cells x n_sigma */
+  PetscReal *means;         /* of HycoFEStressKept() */
+  PetscBool *stressed;      /* by cell: sigma is needed there, elsewhere it is 0 */
+  PetscInt *fe_at;          /* by full-order displacement: its index in u; -1: none */
+  PetscBool *torn;          /* by node of the model's mesh: its displacement is exact, and a cell whose stress is needed
+                                has modes at others; NULL: not a type with exact displacements beside modes */
+  PetscReal *reaction;      /* n_dof, of supports; NULL: no quantity needs them */
+  PetscInt *surface_node;   /* by node: its number on fe_surface; -1: in no contact. Allocated with reaction */
+  HycoFE fe_surface;        /* on the model's mesh without its cells; NULL until needed */
   HycoResultants resultants; /* of the reactions that follow from balance; NULL: there are no reactions */
 };
 
@@ -33,7 +35,7 @@ PetscErrorCode HycoOutputCellsDestroy(HycoOutputCells *cells)
   PetscCall(HycoResultantsDestroy(&(*cells)->resultants));
   PetscCall(HycoMeshDestroy(&(*cells)->mesh));
   HycoFreeAll(&(*cells)->V, &(*cells)->u, &(*cells)->sigma, &(*cells)->means, &(*cells)->stressed, &(*cells)->fe_at,
-              &(*cells)->reaction, &(*cells)->surface_node, cells);
+              &(*cells)->torn, &(*cells)->reaction, &(*cells)->surface_node, cells);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -154,6 +156,38 @@ static PetscErrorCode ReactPredicted(HycoROM m, HycoOutputCells p, const PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* p->torn. place[]: by node of the whole mesh, its number in these cells; -1: none. Contact forces beside such cells, of a
+   contact that training has not seen, move one side of the cell alone. */
+static PetscErrorCode FindTorn(HycoROM m, HycoOutputCells p, const PetscInt place[])
+{
+  const PetscInt dim = p->fe->dim;
+  PetscBool *modes, *torn;
+
+  PetscFunctionBegin;
+  if (!m->model->traits.uniform) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(p->fe->n_dof, &modes));
+  PetscCall(PetscCalloc1(p->mesh->n_nodes, &torn));
+  PetscCall(PetscCalloc1(m->model->mesh->n_nodes, &p->torn));
+  for (PetscInt i = 0; i < p->fe->n_dof; i++) modes[i] = (PetscBool)!p->fe->fixed[i];
+  for (PetscInt k = 0; k < m->model->n_fe; k++) {
+    if (p->fe_at[k] >= 0) modes[p->fe_at[k]] = PETSC_FALSE;
+  }
+  for (PetscInt e = 0; e < p->mesh->n_cells; e++) {
+    const PetscInt *node = p->mesh->cells + e * p->mesh->nv;
+    PetscBool any = PETSC_FALSE;
+
+    for (PetscInt j = 0; j < p->mesh->nv * dim; j++) any = (PetscBool)(any || modes[node[j / dim] * dim + j % dim]);
+    for (PetscInt v = 0; any && p->stressed[e] && v < p->mesh->nv; v++) torn[node[v]] = PETSC_TRUE;
+  }
+  for (PetscInt i = 0; i < m->model->mesh->n_nodes; i++) {
+    const PetscInt at = place[m->model->mesh->node_whole[i]];
+
+    p->torn[i] = (PetscBool)(at >= 0 && torn[at]);
+  }
+  HycoFreeAll(&torn, &modes);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Once mesh and V are set. Full-order displacements replace the modes' at the unknowns that these cells share with
    the model's mesh. */
 static PetscErrorCode Fill(HycoROM m, HycoOutputCells p)
@@ -177,6 +211,7 @@ static PetscErrorCode Fill(HycoROM m, HycoOutputCells p)
 
     p->fe_at[k] = i < 0 ? -1 : i * dim + m->model->fe_dof[k] % dim;
   }
+  PetscCall(FindTorn(m, p, place));
   PetscCall(PetscFree(place));
   PetscCall(PrepareReactions(m, p));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -360,6 +395,27 @@ PetscErrorCode HycoROMMeasureQuantities(HycoROM m, HycoPrediction *out)
   PetscCall(Make(m));
   if (m->output_cells) PetscCall(Follow(m, m->output_cells));
   PetscCall(MeasurePredicted(m, m->output_cells, m->Lambda, out->quantity));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoROMShareTorn(HycoROM m, PetscReal *share)
+{
+  PetscReal sum = 0, torn = 0;
+
+  PetscFunctionBegin;
+  *share = 0;
+  if (!m->output_cells || !m->output_cells->torn) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) {
+    const PetscReal force = PetscMax(m->Lambda[k], 0);
+    PetscBool any = PETSC_FALSE;
+
+    if (force == 0) continue;
+    for (PetscInt j = m->rows.start[k]; j < m->rows.start[k + 1]; j++)
+      any = (PetscBool)(any || m->output_cells->torn[m->rows.dof[j] / m->fe->dim]);
+    sum += force;
+    torn += any ? force : 0;
+  }
+  if (sum > 0) *share = torn / sum;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -65,6 +65,23 @@ class Regime(Case):
         self.assertNotIn('UNSEEN', here.stdout)
         self.assertIn('UNSEEN REGIME', there.stdout)
 
+    def test_beside_modes(self):
+        """A model of bodies of the roller on a mesh too fine for all cells to be exact, asked far outside: the forces are right, but the largest
+        stress is that of cells between exact nodes and those of modes. It has no estimate there, and `predict` says so; inside it has one."""
+        with open(os.path.join(ROLLER, 'scene.yaml'), encoding='utf-8') as f:
+            text = f.read().replace('range: [-5, 5]', 'range: [-5, -2]').replace('roller.msh', os.path.join(ROLLER, 'roller.msh'))
+        scene = self.path('far.yaml')
+        with open(scene, 'w', encoding='utf-8') as f:
+            f.write(text + 'output: {peak: {max: mises, group: block}, push: {force: y, contact: under}}\n')
+        self.hyco('train', '-scene', scene, '-scene_refine', 1, '-grid', '3,2,2', '-hyco_model_type', 'bodies', '-model', self.path('far.h5'))
+        here, there = (self.hyco('predict', '-model', self.path('far.h5'), '-extrapolate', '-mu', mu) for mu in ('-3.4,0.5,10', '4,0.5,10'))
+        full = self.hyco('solve', '-scene', scene, '-scene_refine', 1, '-parameter_place_range', '-5,5', '-mu', '4,0.5,10')
+        self.assertIsNotNone(here['estimated_error_outputs']['peak'])
+        self.assertNotIn('unseen_feature', here)
+        self.assertIsNone(there['estimated_error_outputs']['peak'])
+        self.assertIn('beside cells', there['unseen_feature'])
+        self.assertLess(abs(there['outputs']['push'] - full['outputs']['push']), there['estimated_error_outputs']['push'])
+
 
     def test_rigid_motion(self):
         """A block that its support moves against a wall, or short of it, where its stress is round-off: errors of stress stay errors, at the

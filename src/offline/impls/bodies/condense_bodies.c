@@ -2,7 +2,7 @@
    steps. */
 #include <hycobodiestraining.h>
 
-#define MOST_UNKNOWNS 4000 /* of the surfaces of a body: C_b is dense */
+#define MOST_NODES    3000 /* of the surfaces of a body, by their unknowns: C_b is dense */
 #define MANY_UNKNOWNS 1500 /* of a body: masters that no slave meets are left out */
 #define RINGS         2    /* of facets around those that slaves met at some points of the ranges */
 #define SEARCHED      200  /* such points */
@@ -254,10 +254,10 @@ static PetscErrorCode Select(HycoReducer t, HycoSubstructures b, Mat *N)
   HycoBcast(b->dof, b->ns, MPIU_INT, HycoComm(f));
   /* The same on every rank, after the broadcast. */
   for (PetscInt k = 0; k < b->n; k++)
-    HycoCheckModel(b->start[k + 1] - b->start[k] <= MOST_UNKNOWNS,
+    HycoCheckModel(b->start[k + 1] - b->start[k] <= MOST_NODES * b->dim,
                    "body %s has %d unknowns on the surfaces that may touch; a model of bodies stores the square of "
                    "their number, and is limited to %d: train a hybrid model",
-                   parts->name[k], (int)(b->start[k + 1] - b->start[k]), MOST_UNKNOWNS);
+                   parts->name[k], (int)(b->start[k + 1] - b->start[k]), (int)(MOST_NODES * b->dim));
   /* Columns as K's rows; one entry in each row, set by rank 0, which has the list. */
   PetscCall(MatCreateAIJ(HycoComm(f), PETSC_DECIDE, f->part->n_owned * b->dim, b->ns, f->n_nodes * b->dim, 1, NULL, 1,
                          NULL, N));
