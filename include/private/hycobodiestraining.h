@@ -51,6 +51,7 @@ typedef struct {
   PetscInt samples, most_samples, cells, laws; /* laws: how they are evaluated in few cells */
   PetscBool named;                             /* by an option */
   HycoBasis strains;                           /* modes of the inelastic forces; V is NULL without a history */
+  PetscInt n_laws; /* points of the last model at which the laws are evaluated; 0: none yet */
   HycoBodyParts parts;
   HycoSubstructures bodies; /* complete on rank 0 */
   PetscInt n_factors;       /* of single bodies */

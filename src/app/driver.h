@@ -333,6 +333,7 @@ typedef struct {
   char table[PETSC_MAX_PATH_LEN];                     /* "": none */
   char *text;                                         /* the table; PetscFree() it */
   size_t length, room;
+  HycoAttempt fastest; /* of those within the limits; number 0: none */
 } Search;
 
 /* -target_max_added. */

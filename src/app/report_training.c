@@ -163,6 +163,39 @@ static PetscErrorCode PrintAim(const Search *s, PetscInt n_held)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Keeps the attempt with the fewest operations within the limits, which need not be accurate enough to be chosen. */
+static void KeepFastest(Search *s, const HycoAttempt *a)
+{
+  if (a->failure[0] || a->beaten_by || !a->held_out.n || a->held_out.n < a->n_held) return;
+  for (PetscInt j = 0; j < HYCO_N_ERRORS; j++) {
+    if (s->limit[j] > 0 && a->held_out.largest[j] > s->limit[j]) return;
+  }
+  if (!s->fastest.number || a->cost < s->fastest.cost) s->fastest = *a;
+}
+
+#define FASTER 2   /* times: a smaller gain is none to mention */
+#define WIDER  1.1 /* a target, over the error that shall meet it */
+
+/* The trade that the search has met and not taken, with the targets that take it. */
+static PetscErrorCode PrintFaster(const Search *s, const HycoTraining *t)
+{
+  static const HycoErrorKind kinds[] = {HYCO_ERROR_U, HYCO_ERROR_SIGMA, HYCO_ERROR_LAMBDA, HYCO_ERROR_INELASTIC};
+  const HycoAttempt *a = &s->fastest;
+  char errors[DRIVER_LINE], targets[DRIVER_LINE] = "";
+  size_t at = 0;
+
+  PetscFunctionBegin;
+  if (s->on || !a->number || a->number == t->chosen.number || FASTER * a->cost > t->chosen.cost)
+    PetscFunctionReturn(PETSC_SUCCESS);
+  DescribeErrors(IsPath(s), a->held_out.largest, errors);
+  for (size_t j = 0; j < (IsPath(s) ? 4 : 3); j++)
+    at += (size_t)snprintf(targets + at, sizeof(targets) - at, " -target_%s %.2g", HycoErrorKinds[kinds[j]],
+                           WIDER * (double)a->held_out.largest[kinds[j]]);
+  PetscCall(DriverPrint("faster: settings %d take %.3g ms with %s; to have them:%s\n", (int)a->number,
+                        1e3 * (double)a->held_out.seconds, errors, targets));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* A HycoAttemptMonitor. Rank 0: HycoAttemptMonitor is called there only. */
 static PetscErrorCode Attempted(const HycoAttempt *a, void *ctx)
 {
@@ -182,6 +215,7 @@ static PetscErrorCode Attempted(const HycoAttempt *a, void *ctx)
   else
     PetscCall(DriverPrint("  %2d %s: %d modes, RID %.1f %%; %s; %.3g ms%s\n", (int)a->number, what, (int)a->n_modes,
                           100 * (double)a->rid_fraction, errors, 1e3 * (double)a->held_out.seconds, end));
+  KeepFastest(s, a);
   PetscCall(AppendRow(s, a));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -321,6 +355,7 @@ PetscErrorCode DriverJudgeModel(const Search *s, const HycoTraining *t)
   PetscCall(PrintOutputs(s, t));
   if (!t->n_held)
     PetscCall(DriverPrint("the model does not estimate its errors: fewer than 10 predictions of held-out solutions\n"));
+  PetscCall(PrintFaster(s, t));
   PetscCall(Misses(s, t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

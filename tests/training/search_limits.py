@@ -2,6 +2,7 @@
 too large, settings beyond its budget of operations; full-order solutions that it does not need."""
 import csv
 import os
+import re
 import unittest
 
 from baselines import Ring
@@ -98,9 +99,18 @@ class SearchLimits(Ring):
         self.assertLess(report['held_out']['lambda']['largest'], 1e-6)
 
     def test_paths(self):
-        """Paths: models of bodies are tried first, their laws by interpolation before a cubature."""
-        _, rows = self.search(self.norton, 'paths', '-grid', '2,2', '-hyco_snapshots', self.path('store'), status=None)
+        """Paths: models of bodies are tried first, their laws by interpolation before a cubature, which costs more. A dearer model is chosen; a line
+        names the faster one, with targets that it meets."""
+        train = ('train', '-scene', self.norton, '-grid', '2,2', '-hyco_snapshots', self.path('store'), '-table', self.path('paths.csv'), '-model', self.path('p.h5'))
+        run = self.run_raw(*train)
+        with open(self.path('paths.csv'), newline='', encoding='utf-8') as f:
+            rows = list(csv.DictReader(f))
         self.assertEqual((rows[0]['model_type'], rows[0]['variant'], rows[0]['failure']), ('bodies', 'interpolation', ''))
+        self.assertLess(float(rows[0]['operations']), 0.9 * float(rows[1]['operations']))
+        targets = re.search(r'^faster: settings 1 take .*; to have them: (.*)$', run.stdout, re.M)[1].split()
+        self.hyco(*train, *targets)
+        with open(self.path('paths.csv'), newline='', encoding='utf-8') as f:
+            self.assertEqual([(r['variant'], r['meets']) for r in csv.DictReader(f)], [('interpolation', '1')])
 
 
 if __name__ == '__main__':

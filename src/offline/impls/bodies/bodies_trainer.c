@@ -188,12 +188,12 @@ static PetscErrorCode ReportPath(HycoROM m, HycoTraining *r)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Operations of an iteration: the laws in the cells, the tangent, and its factor. */
+/* Operations of an iteration: the laws at the model's points, the tangent, and its factor. */
 static PetscReal PathCost(HycoReducer t)
 {
   const HycoBodiesTraining s = HycoTrainingOfBodies(t);
   const PetscReal m = (PetscReal)s->strains.l, ns = (PetscReal)t->fom->fe->n_sigma,
-                  points = (PetscReal)(s->cells * s->strains.l);
+                  points = s->n_laws ? (PetscReal)s->n_laws : (PetscReal)s->cells * m;
 
   return points * (2 * ns * ns * m + 2 * ns * m * m) + m * m * m;
 }

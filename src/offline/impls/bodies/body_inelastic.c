@@ -107,7 +107,7 @@ static PetscErrorCode TakePoints(HycoReducer t, PetscInt count, PetscInt point[]
   t->seeds_cell = cell;
   /* The index of a point is cell in the whole mesh times points per cell, plus its number there. */
   in->point = point;
-  in->n_points = count;
+  in->n_points = HycoTrainingOfBodies(t)->n_laws = count;
   PetscCall(PetscCalloc1(size, &in->T));
   PetscCall(PetscCalloc1(size, &in->there));
   PetscCall(PetscCalloc1(count + 1, &in->weight));
