@@ -1195,6 +1195,8 @@ static PetscErrorCode ModesOf(HycoReducer t, HycoSnapshots store, HycoBodiesFact
   PetscCall(PetscFree(b->mode_start));
   PetscCall(FindModes(t, factor, sampled->n_U, sampled->U, V, sigma));
   if (!t->scene->n_times) PetscCall(MeasureLeft(t, factor, sampled, *V));
+  PetscCall(PetscInfo(NULL, "%d samples of bodies, of which %d are checks: %d modes miss %.1e\n", (int)sampled->n,
+                      (int)sampled->n_checks, (int)b->l, (double)b->left));
   /* If the modes are nearly as many as the samples, further samples would give further modes. */
   *enough = PETSC_TRUE;
   for (PetscInt k = 0; k < b->n; k++)
