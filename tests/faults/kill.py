@@ -16,7 +16,7 @@ from rows import Rows
 TRAIN = ['train', '-scene', ROPE, '-grid', '12,12', '-model', 'm.h5']
 PATHS = ['train', '-scene', os.path.join(SOURCE, 'examples', 'rod'), '-grid', '2,2,1', '-hyco_pod_tol', '1e-9', '-hyco_rid_layers', '1',
          '-hyco_rid_contact_extension', '1', '-model', 'm.h5']
-BODIES = ['train', '-scene', os.path.join(SOURCE, 'examples', 'hertz'), '-hyco_model_type', 'bodies', '-scatter', '2', '-model', 'm.h5',
+BODIES = ['train', '-scene', os.path.join(SOURCE, 'examples', 'blocks'), '-hyco_model_type', 'bodies', '-scatter', '2', '-model', 'm.h5',
           '-hyco_bodies_samples', '10']
 KILLS = {'hybrid': 5, 'hybrid with a history': 3}
 ROWS = Rows('kill')
@@ -158,7 +158,7 @@ class Kill(Case):
         """Samples, displacements and coefficients of bodies that a killed training has finished are not computed again; those of another scene are
         refused; none remain beside the model."""
         n = self.watch()
-        right, forces = self.content(), self.hyco('predict', '-model', 'm.h5', '-mu', '0.05,1.3,9')['total_contact_force']
+        right, forces = self.content(), self.hyco('predict', '-model', 'm.h5', '-mu', '0.05,0.06')['total_contact_force']
         os.remove(self.path('m.h5'))
         for kill in (n // 3, n - 1):
             self.watch(1, kill)
@@ -166,14 +166,14 @@ class Kill(Case):
         shutil.copy(self.path('m.h5.snapshots', self.pieces()[0]), self.path('other'))
         scene = BODIES[2]
         with open(os.path.join(scene, 'scene.yaml'), encoding='ascii') as f:
-            other = self.changed('other.yaml', f.read(), [('mesh: hertz.msh', f'mesh: {scene}/hertz.msh'), ('poisson: 0.3', 'poisson: 0.31')])
+            other = self.changed('other.yaml', f.read(), [('mesh: blocks.msh', f'mesh: {scene}/blocks.msh'), ('poisson: 0.3', 'poisson: 0.31')])
         refused = self.run_raw(*BODIES[:2], other, *BODIES[3:], '-hyco_snapshots', 'other')
         self.assertEqual((refused.returncode, refused.stderr.count('hyco: error')), (1, 1), refused.stderr)
         self.assertIn('another scene or mesh; remove the folder', refused.stderr)
         self.assertEqual(self.resumed(1, 2), right)
         self.watch(2, n - 1)  # the factors of two ranks differ by round-off from run to run
         self.resumed(2, 2)
-        self.near(self.hyco('predict', '-model', 'm.h5', '-mu', '0.05,1.3,9')['total_contact_force'], forces, 1e-9)
+        self.near(self.hyco('predict', '-model', 'm.h5', '-mu', '0.05,0.06')['total_contact_force'], forces, 1e-9)
         ROWS.add('`kill -9` of a rank during `train`, model of bodies: twice on 1 rank, once on 2',
                  'the same command continues after the finished samples, displacements and coefficients; on one rank the same model, byte for byte')
 
