@@ -97,9 +97,9 @@ typedef struct {
   PetscReal first, next;     /* estimated seconds of a solve with a new stiffness, with the last one; on each rank */
   PetscInt
       body_values; /* assumed values of the parameters that change bodies, of a model of bodies; 0: no such model */
-  PetscReal body_training, body_prediction; /* estimated seconds of its training, held-out solutions included; of a
-                                               prediction */
-  HycoFOM whole;                            /* what the names belong to */
+  PetscReal body_training[2], body_prediction; /* estimated seconds of its training, held-out solutions included, at
+                                                  least and at most; of a prediction */
+  HycoFOM whole;                               /* what the names belong to */
 } HycoInspection;
 
 /*

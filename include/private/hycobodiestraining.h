@@ -4,6 +4,7 @@
 
 #include <hycobodies.h>
 #include <hycoreducerimpl.h>
+#include <hycosnapshotsimpl.h>
 
 /* How a parameter enters a body: the sum of these. */
 enum {
@@ -94,13 +95,14 @@ typedef struct {
   PetscInt n_basis;
   Vec *basis; /* of the turned loads, orthonormal */
   PetscInt n_strains;
-  Vec *strain;        /* K^-1 times the modes of the inelastic forces */
-  PetscReal *score;   /* by cell of the part */
-  PetscReal *moved;   /* by unknown of the part: largest sampled displacement */
-  PetscBool *known;   /* by unknown of the part: on the surfaces; */
-  PetscBool *bare;    /* the same: no mode has it, because the model's mesh does */
-  PetscBool *in_mesh; /* ns: the model's mesh has its node, whatever its cells */
-  PetscInt *row;      /* of the unknowns inside in the distributed vectors */
+  Vec *strain;            /* K^-1 times the modes of the inelastic forces */
+  PetscReal *score;       /* by cell of the part */
+  PetscReal *moved;       /* by unknown of the part: largest sampled displacement */
+  PetscBool *known;       /* by unknown of the part: on the surfaces; */
+  PetscBool *bare;        /* the same: no mode has it, because the model's mesh does */
+  PetscBool *in_mesh;     /* ns: the model's mesh has its node, whatever its cells */
+  PetscInt *row;          /* of the unknowns inside in the distributed vectors */
+  unsigned long long key; /* the common part of the keys of finished pieces */
 } HycoBodiesFactor;
 
 /* Whether the model has modes of inelastic forces: with a history, and with friction where a law is not linear. */
@@ -122,6 +124,13 @@ PetscErrorCode HycoBodiesSplit(HycoReducer reducer, Mat N, HycoBodiesFactor *fac
 PetscErrorCode HycoBodiesReleaseFactor(HycoBodiesFactor *factor);
 /* Nodes and factors at theta; only bodies that theta changes are factored. Collective. */
 PetscErrorCode HycoBodiesRefactor(HycoReducer reducer, HycoBodiesFactor *factor, const PetscReal theta[]);
+/* Nodes at theta, without factors. Collective. */
+PetscErrorCode HycoBodiesMoveTo(HycoReducer reducer, HycoBodiesFactor *factor, const PetscReal theta[]);
+/* Keys of pieces that an interrupted training finds again (HycoSnapshotsFindPiece()): their common part, after
+   HycoBodiesLoads() (collective); of `what` of body k (-1: all) at theta. */
+PetscErrorCode HycoBodiesBeginKeys(HycoReducer reducer, HycoBodiesFactor *factor);
+unsigned long long HycoBodiesKey(HycoSubstructures bodies, const HycoBodiesFactor *factor, const char what[],
+                                 PetscInt k, const PetscReal theta[]);
 /* record[n]: of each body its record at theta, condensed if there is none. Collective. */
 PetscErrorCode HycoBodiesCondense(HycoReducer reducer, HycoBodiesFactor *factor, const PetscReal theta[],
                                   PetscInt record[]);

@@ -94,6 +94,7 @@ struct _n_HycoMesh {
   /* of the whole mesh of a part or a surface; 0: of this one */
   PetscInt n_whole_nodes, n_whole_cells;
   PetscReal whole_length;
+  PetscReal length; /* of its own bounding box, once HycoMeshLength() was asked for it; else 0 */
   /* cells, ascending by tag */
   PetscInt n_cells;
   PetscInt *cells;      /* n_cells x nv, node indices */

@@ -21,7 +21,32 @@ struct _p_HycoSnapshots {
   PetscReal rate_change;      /* the same of the paths that were solved: HycoHistory */
   HycoH5 last;                /* the file that was read last, checked and open; or NULL */
   char last_path[PETSC_MAX_PATH_LEN]; /* its name */
+  PetscInt n_pieces;                  /* finished pieces of this training that have files, by their keys; rank 0 */
+  unsigned long long *piece;
 };
+
+/* Fails if an open file is not of this scene and mesh. Not collective. */
+PetscErrorCode HycoSnapshotsCheckFile(HycoSnapshots store, HycoH5 file, const char path[]);
+
+/* A finished piece of a training, up to HYCO_PIECE_ARRAYS arrays; n: of this rank's numbers, 0 on ranks that have none. */
+#define HYCO_PIECE_ARRAYS 4
+typedef struct {
+  PetscInt n;
+  PetscReal *value;
+} HycoPieceArray;
+
+/* The key of a piece, continued (start with HYCO_HASH_START); the same key on every rank, from those of all (collective).
+   It must contain all that the piece follows from. */
+unsigned long long HycoPieceAdd(unsigned long long key, size_t bytes, const void *data);
+PetscErrorCode HycoPieceJoin(MPI_Comm comm, unsigned long long *key);
+/* Reads a piece that this or an interrupted training has kept into the arrays, if there is one; keeps one; removes those
+   of this training, once its model is written. The key is that of rank 0. Fails if the folder's pieces are of another
+   scene. Collective; removing is not. */
+PetscErrorCode HycoSnapshotsFindPiece(HycoSnapshots store, unsigned long long key, PetscInt n,
+                                      const HycoPieceArray array[], PetscBool *found);
+PetscErrorCode HycoSnapshotsKeepPiece(HycoSnapshots store, unsigned long long key, PetscInt n,
+                                      const HycoPieceArray array[]);
+PetscErrorCode HycoSnapshotsDropPieces(HycoSnapshots store);
 
 /* Reads -hyco_groups_monitor; prints a line about this rank's group, with the event's number, on the group's first
    rank, if it was given. Collective; not collective. */

@@ -2,15 +2,13 @@
 #include "inspect.h"
 #include <hycobodiestraining.h>
 
-/* What a training finds itself, as assumed here: values of a parameter that changes a shape, and of all together; nodes of
-   these at which displacements are sampled; samples of displacements where nothing changes a shape, else, and where a body turns; seconds of reading and recognition; modes of a body;
-   closed contacts and entries of a row of B; held-out solutions; unknowns inside. */
-#define VALUES      5
-#define MOST_VALUES 15
+/* What a training finds itself, as assumed here, at least and at most: values of a parameter that changes a shape; samples
+   of displacements (as many rounds double them), and where a body turns. Of all values together; nodes of these at which
+   displacements are sampled; seconds of reading and recognition; modes of a body; closed contacts and entries of a row of
+   B; held-out solutions; unknowns inside. */
+static const PetscReal VALUES[2] = {3, 5}, SAMPLES[2] = {93, 273}, OF_TURNS[2] = {93, 993};
+#define MOST_VALUES 60
 #define SPREAD      3
-#define FEW         120
-#define MANY        240
-#define OF_TURNS    600
 #define START       0.3
 #define MODES       80
 #define ACTIVE      0.3
@@ -20,9 +18,12 @@
 #define INNER_TABLE 6e6
 #define TURNS       3
 
-/* Sparse factors, solves with them, and dense products on narrow matrices, relative to a product of large ones. */
+/* Solves with sparse factors, dense products on narrow matrices, and decompositions, relative to a product of large ones. */
 #define SOLVE_SHARE  0.12
 #define NARROW_SHARE 0.25
+#define POD_SHARE    0.12
+#define MARGIN       1.5  /* of the ends of the range */
+#define EACH         5e-5 /* seconds beside the operations of a solve */
 
 /* The unknowns of the surfaces that may touch. Rank 0. */
 static PetscErrorCode CountSurface(HycoFOM f, PetscReal *n)
@@ -66,33 +67,33 @@ static PetscErrorCode FindTurned(HycoFOM f, const HycoBodyParts *parts, const Pe
 }
 
 /* Adds the work of one body: of its samples and modes, and of a prediction. ns: unknowns of its surfaces; share: of the
-   mesh. */
-static void AddBody(const HycoInspection *in, PetscReal factor, PetscReal ns, PetscReal share, PetscInt axes,
-                    PetscBool turned, PetscReal columns, PetscReal *training, PetscReal *prediction)
+   mesh; values: of all parameters of its shape. */
+static void AddBody(const HycoInspection *in, PetscReal ns, PetscReal share, PetscInt axes, PetscReal values,
+                    PetscBool turned, PetscReal columns, PetscReal speed, PetscReal *training, PetscReal *prediction)
 {
-  const PetscReal values = PetscMin(PetscPowReal(VALUES, (PetscReal)axes), MOST_VALUES),
-                  entries = share * in->bytes / 8, rows = share * (PetscReal)in->n_free, most = PetscMin(columns, rows),
+  const PetscReal entries = share * in->bytes / 8, rows = share * (PetscReal)in->n_free, most = PetscMin(columns, rows),
                   inner = PetscMin(PetscMin(INNER, INNER_TABLE / (ns * values)), rows),
-                  modes = MODES * (turned ? TURNS : 1);
+                  modes = MODES * (turned ? TURNS : 1), turns = PetscMin(TURNS * most / 2, rows);
 
-  /* Condensations, those held out too. */
-  *training += (values + 2 * axes) * (share * factor + ns * ns * ns) / NARROW_SHARE;
+  /* Condensations, those held out too; their factors are counted with the full-order solutions. */
+  *training += (values + 2 * axes) * ns * ns * ns / NARROW_SHARE;
   /* Displacements, and the rows of the model. */
-  *training += (columns + (modes + inner) * values) * 4 * entries / SOLVE_SHARE;
+  *training += (columns + (modes + inner) * values) * (4 * entries / SOLVE_SHARE + EACH * speed);
   /* POD of the last samples, and before of half and a quarter of them; a turned body has several fields for each mode. */
-  *training += 1.3 * (6 * rows * most * most + 20 * most * most * most) / NARROW_SHARE;
-  if (turned) *training += 6 * rows * PetscSqr(TURNS * most / 2) / NARROW_SHARE;
+  *training += 1.3 * (6 * rows * most * most + 20 * most * most * most) / POD_SHARE;
+  if (turned) *training += (6 * rows + 20 * turns) * turns * turns / POD_SHARE;
   *prediction += ACTIVE * ns * ns * (values > 1 ? values : 1) + 2 * ACTIVE * ns * (modes + inner) * values;
 }
 
-/* The costs of a model of bodies: in->body_values values of the parameters that change a body, 0: no such model. factor:
-   operations of K's. speed: of products a second, on each rank. Collective. */
-PetscErrorCode HycoInspectBodyCost(HycoFOM f, const HycoBodyParts *parts, const PetscReal mu[], PetscReal factor,
-                                   PetscReal speed, HycoInspection *in)
+/* The costs of a model of bodies: in->body_values values of the parameters that change a body, 0: no such model. speed:
+   of products a second, on each rank. Collective. */
+PetscErrorCode HycoInspectBodyCost(HycoFOM f, const HycoBodyParts *parts, const PetscReal mu[], PetscReal speed,
+                                   HycoInspection *in)
 {
   PetscInt shape[HYCO_MAX_PARAMETERS];
   const PetscInt n_theta = HycoBodyPartsShapes(parts, -1, shape);
-  PetscReal ns = 0, training = 0, prediction = 0, active = ACTIVE * (PetscReal)f->n_contacts, samples;
+  const PetscReal active = ACTIVE * (PetscReal)f->n_contacts;
+  PetscReal ns = 0;
   PetscBool *turned, any = PETSC_FALSE;
 
   PetscFunctionBegin;
@@ -101,17 +102,27 @@ PetscErrorCode HycoInspectBodyCost(HycoFOM f, const HycoBodyParts *parts, const 
   PetscCall(FindTurned(f, parts, mu, turned));
   HycoOnRoot(HycoComm(f), CountSurface(f, &ns));
   PetscCallMPI(MPI_Bcast(&ns, 1, MPIU_REAL, 0, HycoComm(f)));
-  in->body_values = (PetscInt)PetscMin(PetscPowReal(VALUES, (PetscReal)n_theta), MOST_VALUES);
   for (PetscInt b = 0; b < parts->n; b++) any = (PetscBool)(any || turned[b]);
-  samples = any ? OF_TURNS : n_theta ? MANY : FEW;
-  for (PetscInt b = 0; b < parts->n; b++)
-    AddBody(in, factor, PetscMax(ns / parts->n, 1), 1. / (PetscReal)parts->n, HycoBodyPartsShapes(parts, b, shape),
-            turned[b], samples * (n_theta ? SPREAD : 1), &training, &prediction);
-  /* W and its factor, twice for contacts that join; the search; parameters, loads and outputs. */
-  prediction += 2 * (ENTRIES * active * ns + active * active * active / 3) + 2e4 * (PetscReal)f->n_contacts + 4e5;
-  training += samples * prediction / NARROW_SHARE;
-  in->body_training = training / (speed * f->size) + HELD * in->first + START;
-  in->body_prediction = prediction / (NARROW_SHARE * speed);
+  for (int end = 0; end < 2; end++) {
+    const PetscReal samples = any ? OF_TURNS[end] : SAMPLES[end];
+    PetscReal training = 0, prediction = 0;
+
+    for (PetscInt b = 0; b < parts->n; b++) {
+      const PetscInt axes = HycoBodyPartsShapes(parts, b, shape);
+      const PetscReal values = PetscMin(PetscPowReal(VALUES[end], (PetscReal)axes), MOST_VALUES);
+
+      AddBody(in, PetscMax(ns / parts->n, 1), 1. / (PetscReal)parts->n, axes, values, turned[b],
+              samples * (n_theta ? SPREAD : 1), speed, &training, &prediction);
+    }
+    /* W and its factor, twice for contacts that join; the search; parameters, loads and outputs. */
+    prediction += 2 * (ENTRIES * active * ns + active * active * active / 3) + 2e4 * (PetscReal)f->n_contacts + 4e5;
+    training += samples * prediction / NARROW_SHARE;
+    in->body_values = (PetscInt)PetscMin(PetscPowReal(VALUES[end], (PetscReal)n_theta), MOST_VALUES);
+    in->body_training[end] =
+        (training / (speed * f->size) + START + (HELD + (n_theta ? in->body_values + 2 * n_theta : 0)) * in->first) *
+        (end ? MARGIN : 1 / MARGIN);
+    in->body_prediction = prediction / (NARROW_SHARE * speed);
+  }
   PetscCall(PetscFree(turned));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

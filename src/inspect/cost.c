@@ -47,7 +47,7 @@ static PetscErrorCode Speed(PetscReal *flops)
 
 /* Only the symbolic analysis is done: MUMPS then knows the size of the factor and the operations, and nothing of
    that size is allocated. */
-PetscErrorCode HycoInspectCost(HycoFOM f, PetscReal assembly, HycoInspection *in, PetscReal *factor, PetscReal *speed)
+PetscErrorCode HycoInspectCost(HycoFOM f, PetscReal assembly, HycoInspection *in, PetscReal *speed)
 {
   HycoDirect probe;
   PetscReal begin = HycoNow();
@@ -60,8 +60,7 @@ PetscErrorCode HycoInspectCost(HycoFOM f, PetscReal assembly, HycoInspection *in
                               &in->bytes));
   begin = HycoNow() - begin;
   PetscCall(Speed(speed));
-  *factor = HycoDirectOperations(probe);
-  in->first = assembly + begin + *factor / (SPARSE_SHARE * *speed * f->size);
+  in->first = assembly + begin + HycoDirectOperations(probe) / (SPARSE_SHARE * *speed * f->size);
   in->next = 20 * in->bytes / 8 / (SPARSE_SHARE * *speed * f->size); /* a few products with the factor */
   PetscCall(HycoDirectDestroy(&probe));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -178,8 +178,7 @@ static PetscErrorCode Describe(HycoInspection *in)
 
 /* How the parameters enter the bodies, with changes from the point mu; of scenes with contact. With a history only what does
    not depend on time. Collective. */
-static PetscErrorCode DescribeBodies(HycoFOM f, const PetscReal mu[], PetscReal factor, PetscReal speed,
-                                     HycoInspection *in)
+static PetscErrorCode DescribeBodies(HycoFOM f, const PetscReal mu[], PetscReal speed, HycoInspection *in)
 {
   HycoBodyParts parts;
 
@@ -187,7 +186,7 @@ static PetscErrorCode DescribeBodies(HycoFOM f, const PetscReal mu[], PetscReal 
   if (!f->n_contacts || !f->scene->n_parameters) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoBodyPartsFind(f, mu, &parts));
   PetscCall(HycoBodyPartsDescribe(f->scene, &parts, in->bodies));
-  PetscCall(HycoInspectBodyCost(f, &parts, mu, factor, speed, in));
+  PetscCall(HycoInspectBodyCost(f, &parts, mu, speed, in));
   PetscCall(HycoBodyPartsDestroy(&parts));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -196,7 +195,7 @@ static PetscErrorCode DescribeBodies(HycoFOM f, const PetscReal mu[], PetscReal 
 static PetscErrorCode Visit(HycoFOM f, HycoInspection *in)
 {
   const PetscInt p = f->scene->n_parameters;
-  PetscReal *mu, begin, factor, speed;
+  PetscReal *mu, begin, speed;
 
   PetscFunctionBegin;
   PetscCall(ListPoints(f->scene, &in->n_points, &mu));
@@ -205,9 +204,9 @@ static PetscErrorCode Visit(HycoFOM f, HycoInspection *in)
   PetscCall(InspectPoint(f, in, mu, (PetscBool)(in->n_points == 1)));
   begin = HycoNow() - begin;
   /* The centre's assembly is timed, which is the last: the others have warmed up caches. */
-  PetscCall(HycoInspectCost(f, begin, in, &factor, &speed));
+  PetscCall(HycoInspectCost(f, begin, in, &speed));
   HycoOnRoot(HycoComm(f), Describe(in));
-  PetscCall(DescribeBodies(f, mu, factor, speed, in));
+  PetscCall(DescribeBodies(f, mu, speed, in));
   PetscCall(PetscFree(mu));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -28,14 +28,12 @@ PetscErrorCode HycoInspectVariables(HycoInspection *in);
 
 /* For the assembled system, which took `assembly` seconds: the factor's memory by MUMPS's analysis of the stiffness
    with the contacts, seconds from its count of operations. Collective. */
-PetscErrorCode HycoInspectCost(HycoFOM fom, PetscReal assembly, HycoInspection *in, PetscReal *factor,
-                               PetscReal *speed);
+PetscErrorCode HycoInspectCost(HycoFOM fom, PetscReal assembly, HycoInspection *in, PetscReal *speed);
 
 /* -- body_cost.c -- */
 
-/* factor, speed: the operations of K's factor, those of a product in a second on this rank, of HycoInspectCost().
-   Collective. */
-PetscErrorCode HycoInspectBodyCost(HycoFOM fom, const HycoBodyParts *parts, const PetscReal mu[], PetscReal factor,
-                                   PetscReal speed, HycoInspection *in);
+/* speed: the operations of a product in a second on this rank, of HycoInspectCost(). Collective. */
+PetscErrorCode HycoInspectBodyCost(HycoFOM fom, const HycoBodyParts *parts, const PetscReal mu[], PetscReal speed,
+                                   HycoInspection *in);
 
 #endif

@@ -314,15 +314,16 @@ void HycoMeshEnds(HycoMesh m, PetscReal ends[6])
 }
 
 /* The longest side of the bounding box of the whole mesh (length): the scale of tolerances. A part uses the whole
-   mesh's value, so that tolerances do not depend on the partition. */
+   mesh's value, so that tolerances do not depend on the partition. Asked for each node: visited once. */
 PetscReal HycoMeshLength(HycoMesh m)
 {
-  PetscReal length = m->whole_length, ends[6];
+  PetscReal ends[6];
 
-  if (length > 0) return length;
+  if (m->whole_length > 0) return m->whole_length;
+  if (m->length > 0) return m->length;
   HycoMeshEnds(m, ends);
-  for (PetscInt c = 0; c < 3; c++) length = PetscMax(length, ends[c] + ends[3 + c]);
-  return length;
+  for (PetscInt c = 0; c < 3; c++) m->length = PetscMax(m->length, ends[c] + ends[3 + c]);
+  return m->length;
 }
 
 /* The star forest from the owners' nodes (contiguous numbers of the distributed vectors) to n given ones.

@@ -644,6 +644,7 @@ PetscErrorCode HycoReducerFinish(HycoReducer t, HycoSnapshots store, const char 
   if (!ierr) ierr = HycoROMSave(model, t->fom, t->l, t->V, path);
   PetscCall(HycoROMDestroy(&model));
   PetscCall(ierr);
+  PetscCall(HycoSnapshotsDropPieces(store));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -73,6 +73,7 @@ PetscErrorCode HycoSnapshotsDestroy(HycoSnapshots *snapshots)
   HycoDestroyBegin(snapshots, HYCO_SNAPSHOTS_CLASSID);
   PetscCall(CloseSample(*snapshots));
   PetscCall(PetscFree2((*snapshots)->solved, (*snapshots)->written));
+  PetscCall(PetscFree((*snapshots)->piece));
   PetscCall(HycoSceneDestroy(&(*snapshots)->scene));
   PetscCall(PetscHeaderDestroy(snapshots));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -102,7 +103,7 @@ static PetscErrorCode CheckHistory(HycoSnapshots s, HycoH5 h, const char path[])
 }
 
 /* Another scene's solutions would silently give a wrong model. Of a changed history, the message says what changed. */
-static PetscErrorCode CheckFingerprint(HycoSnapshots s, HycoH5 h, const char path[])
+PetscErrorCode HycoSnapshotsCheckFile(HycoSnapshots s, HycoH5 h, const char path[])
 {
   char *text, mine[32];
   int same;
@@ -132,7 +133,7 @@ static PetscErrorCode OpenSample(HycoSnapshots s, const PetscReal mu[], HycoH5 *
     PetscCall(CloseSample(s));
     PetscCall(HycoH5OpenOr(path, "remove it and run again", &s->last));
     PetscCall(PetscStrncpy(s->last_path, path, sizeof(s->last_path)));
-    HycoOnError(CheckFingerprint(s, s->last, path), PetscCall(CloseSample(s)));
+    HycoOnError(HycoSnapshotsCheckFile(s, s->last, path), PetscCall(CloseSample(s)));
   }
   *h = s->last;
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -16,6 +16,8 @@ from rows import Rows
 TRAIN = ['train', '-scene', ROPE, '-grid', '12,12', '-model', 'm.h5']
 PATHS = ['train', '-scene', os.path.join(SOURCE, 'examples', 'rod'), '-grid', '2,2,1', '-hyco_pod_tol', '1e-9', '-hyco_rid_layers', '1',
          '-hyco_rid_contact_extension', '1', '-model', 'm.h5']
+BODIES = ['train', '-scene', os.path.join(SOURCE, 'examples', 'blocks'), '-hyco_model_type', 'bodies', '-scatter', '2', '-model', 'm.h5',
+          '-hyco_bodies_samples', '10']
 KILLS = {'hybrid': 5, 'hybrid with a history': 3}
 ROWS = Rows('kill')
 
@@ -126,6 +128,54 @@ class Kill(Case):
     def test_paths(self):
         """A path in progress is solved again, those before it are not."""
         self.check_kills(1, 'hybrid with a history', PATHS)
+
+    def pieces(self):
+        folder = self.path('m.h5.snapshots')
+        return [f for f in (os.listdir(folder) if os.path.isdir(folder) else ()) if f.startswith('bodies-') and f.endswith('.h5')]
+
+    def watch(self, ranks=1, most=10**9):
+        """Runs a training of bodies; kills one rank when so many pieces are finished. Returns their largest number."""
+        seen = 0
+        with open(self.path('log'), 'wb') as out:
+            run = subprocess.Popen(self.command(ranks, BODIES), cwd=self.folder, stdout=out, stderr=out)
+            while run.poll() is None and seen < most:
+                seen = max(seen, len(self.pieces()))
+                time.sleep(0.002)
+            if run.poll() is None:
+                os.kill(children(run.pid)[-1] if ranks > 1 else run.pid, signal.SIGKILL)
+            status = wait(run)
+        self.assertEqual(status != 0, seen >= most, f'{seen} pieces, and {most} asked for')
+        return seen
+
+    def resumed(self, ranks, most):
+        """The model after the same command once more, which finds what was finished: it makes so few factors."""
+        report = self.hyco(*BODIES, ranks=ranks)
+        self.assertLessEqual(report['n_body_factors'], most)
+        self.assertEqual(self.pieces(), [])
+        return self.content()
+
+    def test_bodies(self):
+        """Samples, displacements and coefficients of bodies that a killed training has finished are not computed again; those of another scene are
+        refused; none remain beside the model."""
+        n = self.watch()
+        right, forces = self.content(), self.hyco('predict', '-model', 'm.h5', '-mu', '0.05,0.06')['total_contact_force']
+        os.remove(self.path('m.h5'))
+        for kill in (n // 3, n - 1):
+            self.watch(1, kill)
+        os.mkdir(self.path('other'))
+        shutil.copy(self.path('m.h5.snapshots', self.pieces()[0]), self.path('other'))
+        scene = BODIES[2]
+        with open(os.path.join(scene, 'scene.yaml'), encoding='ascii') as f:
+            other = self.changed('other.yaml', f.read(), [('mesh: blocks.msh', f'mesh: {scene}/blocks.msh'), ('poisson: 0.3', 'poisson: 0.31')])
+        refused = self.run_raw(*BODIES[:2], other, *BODIES[3:], '-hyco_snapshots', 'other')
+        self.assertEqual((refused.returncode, refused.stderr.count('hyco: error')), (1, 1), refused.stderr)
+        self.assertIn('another scene or mesh; remove the folder', refused.stderr)
+        self.assertEqual(self.resumed(1, 2), right)
+        self.watch(2, n - 1)  # the factors of two ranks differ by round-off from run to run
+        self.resumed(2, 2)
+        self.near(self.hyco('predict', '-model', 'm.h5', '-mu', '0.05,0.06')['total_contact_force'], forces, 1e-9)
+        ROWS.add('`kill -9` of a rank during `train`, model of bodies: twice on 1 rank, once on 2',
+                 'the same command continues after the finished samples, displacements and coefficients; on one rank the same model, byte for byte')
 
     def limited(self, kilobytes, train=TRAIN, ranks=1, alone=0):
         """A run in which, once it solves, no file can grow beyond a size, which emulates a full disk. `alone`: that rank only, or all."""

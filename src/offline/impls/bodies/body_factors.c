@@ -4,6 +4,7 @@
   the unknowns that MUMPS pins for a body that contact alone holds are its isostatic supports, and give the rigid motions.
 */
 #include <hycobodiestraining.h>
+#include <string.h>
 
 #define KEPT 0.3 /* share of the memory for the factors of samples that are kept */
 
@@ -144,7 +145,7 @@ static void OwnTheta(HycoSubstructures b, PetscInt k, const PetscReal theta[], P
 /* -- factors -- */
 
 /* The nodes at theta. Collective. */
-static PetscErrorCode MoveTo(HycoReducer t, HycoBodiesFactor *factor, const PetscReal theta[])
+PetscErrorCode HycoBodiesMoveTo(HycoReducer t, HycoBodiesFactor *factor, const PetscReal theta[])
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   HycoFOM f = factor->fom;
@@ -173,7 +174,7 @@ static PetscErrorCode AssembleAt(HycoReducer t, HycoBodiesFactor *factor, const 
   HycoFOM f = factor->fom;
 
   PetscFunctionBegin;
-  PetscCall(MoveTo(t, factor, theta));
+  PetscCall(HycoBodiesMoveTo(t, factor, theta));
   if (factor->assembled) PetscFunctionReturn(PETSC_SUCCESS);
   HycoOnEach(HycoComm(f), HycoFEAssembleStiffness(f->fe, f->K));
   /* Rigid motions at these positions: a turn depends on the nodes. */
@@ -266,8 +267,6 @@ static PetscErrorCode TakeBlock(HycoSubstructures b, const HycoBodyFactor *body,
   const size_t p = (size_t)body->p, n = (size_t)n_own;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(n * n + 1, &record->C));
-  PetscCall(PetscCalloc1(n * (size_t)b->p + 1, &record->Z));
   for (size_t j = 0; j < n; j++) {
     /* M is by columns with the p pins first: rows of a surface column are its work on the motions, then C. */
     const PetscReal *column = M + (p + j) * (p + n);
@@ -334,7 +333,7 @@ PetscErrorCode HycoBodiesRefactor(HycoReducer t, HycoBodiesFactor *factor, const
     if (!Recall(&factor->body[k], b->n_theta, own)) PetscCall(Factor(t, factor, k, own, NULL));
   }
   /* Factor() may have moved the nodes to positions of another body's sample. */
-  PetscCall(MoveTo(t, factor, theta));
+  PetscCall(HycoBodiesMoveTo(t, factor, theta));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -502,15 +501,71 @@ static PetscErrorCode Respond(HycoSubstructures b, HycoBodiesFactor *factor, Pet
   /* The basis of loads as vectors; a vector may load several bodies. */
   PetscCall(FindLoaded(b, factor, b->r, factor->basis, NULL, in));
   PetscCall(ReduceBody(b, factor, k, b->r, factor->basis, in + k * b->r, u, work));
-  PetscCall(PetscMalloc1((size_t)n * (size_t)b->r + 1, &record->R));
-  PetscCall(PetscMalloc1(b->p * b->r + 1, &record->work));
   /* By unknown, as predictions read them: R c is then one product by rows. */
-  for (PetscInt d = 0; d < b->r; d++) {
+  for (PetscInt d = 0; d < b->r && !factor->fom->rank; d++) {
     for (PetscInt i = 0; i < n; i++) record->R[i * b->r + d] = u[d * b->ns + b->start[k] + i];
     for (PetscInt i = 0; i < b->p; i++) record->work[i * b->r + d] = work[d * b->p + i];
   }
   PetscCall(PetscFree(in));
   PetscCall(PetscFree2(u, work));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The key of what is computed at these values of theta (NULL: at all) for body k, which follows from the surfaces'
+   unknowns and the loads' basis. */
+unsigned long long HycoBodiesKey(HycoSubstructures b, const HycoBodiesFactor *factor, const char what[], PetscInt k,
+                                 const PetscReal theta[])
+{
+  unsigned long long key = HycoHash(factor->key, what, strlen(what) + 1);
+
+  key = HycoHash(key, &k, sizeof(k));
+  return HycoHash(key, theta, (size_t)b->n_theta * sizeof(*theta));
+}
+
+/* The common part of all keys. Collective. */
+PetscErrorCode HycoBodiesBeginKeys(HycoReducer t, HycoBodiesFactor *factor)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  const size_t rows = (size_t)(factor->fom->part->n_owned * b->dim);
+  unsigned long long key = HycoHash(HYCO_HASH_START, HycoVersion(), strlen(HycoVersion()));
+
+  PetscFunctionBegin;
+  key = HycoPieceAdd(key, (size_t)b->n_variables * sizeof(PetscReal), b->first);
+  key = HycoPieceAdd(key, (size_t)(b->n + 1) * sizeof(PetscInt), b->start);
+  key = HycoPieceAdd(key, (size_t)b->ns * sizeof(PetscInt), b->dof);
+  for (PetscInt k = 0; k < factor->n_basis; k++) {
+    const PetscScalar *v;
+
+    PetscCall(VecGetArrayRead(factor->basis[k], &v));
+    key = HycoPieceAdd(key, rows * sizeof(PetscScalar), v);
+    PetscCall(VecRestoreArrayRead(factor->basis[k], &v));
+  }
+  PetscCall(HycoPieceJoin(HycoComm(t), &key));
+  factor->key = key;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A body condensed at its own theta, or what an interrupted training has kept of that. Collective. */
+static PetscErrorCode MakeRecord(HycoReducer t, HycoBodiesFactor *factor, PetscInt k, HycoBodyRecord *r)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  const unsigned long long key = HycoBodiesKey(b, factor, "record", k, r->theta);
+  const PetscInt root = t->rank ? 0 : 1, n = b->body[k].n;
+  HycoPieceArray array[] = {
+      {root * n * n, NULL}, {root * n * b->r, NULL}, {root * n * b->p, NULL}, {root * b->p * b->r, NULL}};
+  PetscBool found;
+
+  PetscFunctionBegin;
+  for (int j = 0; j < HYCO_PIECE_ARRAYS; j++) PetscCall(PetscCalloc1(array[j].n + 1, &array[j].value));
+  r->C = array[0].value;
+  r->R = array[1].value;
+  r->Z = array[2].value;
+  r->work = array[3].value;
+  PetscCall(HycoSnapshotsFindPiece(t->store, key, HYCO_PIECE_ARRAYS, array, &found));
+  if (found) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(Factor(t, factor, k, r->theta, r));
+  PetscCall(Respond(b, factor, k, r));
+  PetscCall(HycoSnapshotsKeepPiece(t->store, key, HYCO_PIECE_ARRAYS, array));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -530,17 +585,18 @@ static PetscErrorCode CondenseBody(HycoReducer t, HycoBodiesFactor *factor, Pets
     if (Same(b->n_theta, own, body->record[*at].theta)) PetscFunctionReturn(PETSC_SUCCESS);
   }
   *fresh = PETSC_TRUE;
+  /* The number of motions is known by the first assembly. */
+  if (!factor->pins) PetscCall(AssembleAt(t, factor, own));
   /* record[] holds numbers, not addresses, since the array moves. */
   PetscCall(PetscRealloc((size_t)(body->n_records + 1) * sizeof(*record), &body->record));
   record = &body->record[body->n_records++];
   PetscCall(PetscMemzero(record, sizeof(*record)));
   HycoDuplicate(b->n_theta + 1, own, &record->theta);
-  PetscCall(Factor(t, factor, k, own, record));
-  PetscCall(Respond(b, factor, k, record));
+  PetscCall(MakeRecord(t, factor, k, record));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Every rank has the records with theta, R and work; C and Z are on rank 0. */
+/* Every rank has the records with theta; the rest is on rank 0. */
 PetscErrorCode HycoBodiesCondense(HycoReducer t, HycoBodiesFactor *factor, const PetscReal theta[], PetscInt record[])
 {
   PetscBool fresh = PETSC_FALSE;

@@ -336,10 +336,31 @@ static PetscBool Visits(PetscInt k, PetscInt j, PetscInt n)
   return (PetscBool)(n <= SPREAD || (j + k) % (n / SPREAD) == 0);
 }
 
-/* The displacements of these samples, where the factor is, n columns. Collective. */
-static PetscErrorCode ExpandSamples(HycoSubstructures b, HycoBodiesFactor *factor, const Sampled *sampled, PetscInt n,
-                                    const PetscInt sample[], PetscReal u[])
+/* Expand() with the factor at theta, or what an interrupted training has kept of that. Collective. */
+static PetscErrorCode ExpandAt(HycoReducer t, HycoBodiesFactor *factor, const PetscReal theta[], PetscInt n,
+                               const PetscReal c[], const PetscReal z[], PetscReal u[])
 {
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  unsigned long long key = HycoBodiesKey(b, factor, "displacements", -1, theta);
+  const HycoPieceArray array = {n * factor->fom->fe->n_dof, u};
+  PetscBool found;
+
+  PetscFunctionBegin;
+  key = HycoPieceAdd(key, (size_t)(n * b->r) * sizeof(*c), c);
+  key = HycoPieceAdd(key, (size_t)n * (size_t)(b->p + b->ns) * sizeof(*z), z);
+  PetscCall(HycoSnapshotsFindPiece(t->store, key, 1, &array, &found));
+  if (found) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoBodiesRefactor(t, factor, theta));
+  PetscCall(Expand(b, factor, n, c, z, u));
+  PetscCall(HycoSnapshotsKeepPiece(t->store, key, 1, &array));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The displacements of these samples at theta, n columns. Collective. */
+static PetscErrorCode ExpandSamples(HycoReducer t, HycoBodiesFactor *factor, const PetscReal theta[],
+                                    const Sampled *sampled, PetscInt n, const PetscInt sample[], PetscReal u[])
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   const PetscInt n_z = b->p + b->ns;
   PetscReal *c, *z;
 
@@ -355,26 +376,27 @@ static PetscErrorCode ExpandSamples(HycoSubstructures b, HycoBodiesFactor *facto
       PetscCall(PetscArraycpy(c + j * b->r, sampled->c + k * (size_t)b->r, b->r));
       PetscCall(PetscArraycpy(z + (size_t)j * (size_t)n_z + b->p, sampled->f + k * (size_t)b->ns, b->ns));
     }
-    PetscCall(Expand(b, factor, many, c, z, u + (size_t)first * (size_t)factor->fom->fe->n_dof));
+    PetscCall(ExpandAt(t, factor, theta, many, c, z, u + (size_t)first * (size_t)factor->fom->fe->n_dof));
   }
   PetscCall(PetscFree2(c, z));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The rigid motions at the present factor. Collective. */
-static PetscErrorCode ExpandMotions(HycoSubstructures b, HycoBodiesFactor *factor, PetscReal u[])
+/* The rigid motions at theta. Collective. */
+static PetscErrorCode ExpandMotions(HycoReducer t, HycoBodiesFactor *factor, const PetscReal theta[], PetscReal u[])
 {
-  PetscReal *z;
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  PetscReal *c, *z;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc1(b->p + b->ns + 1, &z));
+  PetscCall(PetscCalloc2(b->r + 1, &c, b->p + b->ns + 1, &z));
   for (PetscInt k = 0; k < b->p; k++, u += factor->fom->fe->n_dof) {
     /* A motion of unit size; its place in z is before those of the surfaces. */
     z[k] = 1;
-    PetscCall(Expand(b, factor, 1, NULL, z, u));
+    PetscCall(ExpandAt(t, factor, theta, 1, c, z, u));
     z[k] = 0;
   }
-  PetscCall(PetscFree(z));
+  PetscCall(PetscFree2(c, z));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -390,7 +412,6 @@ static PetscErrorCode ExpandNode(HycoReducer t, HycoBodiesFactor *factor, PetscI
 
   PetscFunctionBegin;
   HycoBodiesPoint(t, j, theta);
-  PetscCall(HycoBodiesRefactor(t, factor, theta));
   PetscCall(PetscMalloc1(sampled->n + 1, &sample));
   for (PetscInt k = sampled->expanded; k < last; k++) {
     if (Visits(k, j, nodes)) sample[n++] = k;
@@ -398,14 +419,15 @@ static PetscErrorCode ExpandNode(HycoReducer t, HycoBodiesFactor *factor, PetscI
   /* Columns of earlier rounds stay: doubling the samples computes the new ones only. */
   PetscCall(PetscRealloc((n_dof * (size_t)(sampled->n_U + n + b->p) + 1) * sizeof(PetscReal), &sampled->U));
   U = sampled->U + n_dof * (size_t)sampled->n_U;
-  PetscCall(ExpandSamples(b, factor, sampled, n, sample, U));
+  PetscCall(ExpandSamples(t, factor, theta, sampled, n, sample, U));
+  PetscCall(HycoBodiesMoveTo(t, factor, theta));
   /* Stresses of about SCORED samples show where cells matter; with inelastic bodies the cells follow from the
      laws. */
   for (PetscInt k = 0; k < n && !HycoBodiesFlow(t); k += 1 + n * nodes / SCORED)
     PetscCall(HycoBodiesAddScores(t, factor, U + n_dof * (size_t)k));
   sampled->n_U += n;
   if (!sampled->expanded) {
-    PetscCall(ExpandMotions(b, factor, U + n_dof * (size_t)n));
+    PetscCall(ExpandMotions(t, factor, theta, U + n_dof * (size_t)n));
     sampled->n_U += b->p;
   }
   PetscCall(PetscFree(sample));
@@ -685,7 +707,7 @@ static PetscErrorCode MeasureLeft(HycoReducer t, HycoBodiesFactor *factor, const
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   const PetscInt n = sampled->n_checks;
   const size_t n_dof = (size_t)factor->fom->fe->n_dof;
-  PetscReal *U, *all, *lost, *norm;
+  PetscReal theta[HYCO_MAX_PARAMETERS], *U, *all, *lost, *norm;
   PetscInt *sample;
 
   PetscFunctionBegin;
@@ -694,8 +716,9 @@ static PetscErrorCode MeasureLeft(HycoReducer t, HycoBodiesFactor *factor, const
   PetscCall(PetscCalloc1(n, &lost));
   PetscCall(PetscMalloc1(n + 1, &sample));
   for (PetscInt k = 0; k < n; k++) sample[k] = sampled->n - n + k;
-  if (b->n_theta) PetscCall(HycoBodiesRefactor(t, factor, factor->between)); /* no sample */
-  PetscCall(ExpandSamples(b, factor, sampled, n, sample, U));
+  HycoBodiesPoint(t, 0, theta);
+  /* A point that is no sample. */
+  PetscCall(ExpandSamples(t, factor, b->n_theta ? factor->between : theta, sampled, n, sample, U));
   PetscCall(PetscFree(sample));
   PetscCall(Squares(factor->fom, n, U, all));
   for (PetscInt k = 0; k < b->n && n; k++) {
@@ -998,6 +1021,76 @@ static PetscErrorCode StoreCoefficients(HycoReducer t, const HycoBodiesFactor *f
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The key of the coefficients, but for body and theta: they follow from the modes, turns, unknowns inside and inelastic
+   responses. Collective. */
+static PetscErrorCode KeyCoefficients(HycoReducer t, const HycoBodiesFactor *factor, Mat V, unsigned long long *key)
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  const PetscScalar *v;
+  PetscInt rows, lda;
+
+  PetscFunctionBegin;
+  *key = HYCO_HASH_START;
+  PetscCall(MatGetLocalSize(V, &rows, NULL));
+  PetscCall(MatDenseGetLDA(V, &lda));
+  PetscCall(MatDenseGetArrayRead(V, &v));
+  for (PetscInt j = 0; j < b->l; j++) *key = HycoPieceAdd(*key, (size_t)rows * sizeof(*v), v + (size_t)j * (size_t)lda);
+  PetscCall(MatDenseRestoreArrayRead(V, &v));
+  for (PetscInt d = 0; d < factor->n_strains; d++) {
+    PetscCall(VecGetLocalSize(factor->strain[d], &rows));
+    PetscCall(VecGetArrayRead(factor->strain[d], &v));
+    *key = HycoPieceAdd(*key, (size_t)rows * sizeof(*v), v);
+    PetscCall(VecRestoreArrayRead(factor->strain[d], &v));
+  }
+  *key = HycoPieceAdd(*key, (size_t)(9 * b->n_turns) * sizeof(*b->G), b->G);
+  *key = HycoPieceAdd(*key, (size_t)b->inner_start[b->n] * sizeof(*factor->row), factor->row);
+  PetscCall(HycoPieceJoin(HycoComm(t), key));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* H and a of all bodies at node j of theta, or what an interrupted training has kept of them; modes: the key of
+   KeyCoefficients(). Collective. */
+static PetscErrorCode NodeCoefficients(HycoReducer t, HycoBodiesFactor *factor, PetscInt j, Mat V,
+                                       unsigned long long modes, Coefficient own[])
+{
+  HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
+  const PetscInt root = t->rank ? 0 : 1;
+  PetscReal theta[HYCO_MAX_PARAMETERS];
+  PetscBool there = PETSC_FALSE;
+  Vec *x;
+
+  PetscFunctionBegin;
+  HycoBodiesPoint(t, j, theta);
+  PetscCall(PetscMalloc1(b->r + 1, &x));
+  for (PetscInt k = 0; k < b->n; k++) {
+    const PetscInt sample = HycoBodiesSampleOf(b, k, j), H = own[k].rows * b->body[k].n,
+                   a = own[k].rows * (b->r + b->p), fields = own[k].rows * factor->n_strains;
+    const unsigned long long key = HycoHash(HycoBodiesKey(b, factor, "coefficients", k, theta), &modes, sizeof(modes));
+    HycoPieceArray array[3] = {{0}};
+    PetscBool found;
+
+    /* Nodes that differ only in parameters that do not change the body are no samples of it. */
+    if (sample < 0) continue;
+    array[0] = (HycoPieceArray){root * H, own[k].H + (size_t)sample * (size_t)H};
+    array[1] = (HycoPieceArray){root * a, own[k].a + (size_t)sample * (size_t)a};
+    if (fields)
+      array[2] = (HycoPieceArray){root * fields, b->inelastic->fields + StrainRows(b, k) * (size_t)factor->n_strains +
+                                                     (size_t)sample * (size_t)fields};
+    PetscCall(HycoSnapshotsFindPiece(t->store, key, 3, array, &found));
+    if (found) continue;
+    PetscCall(HycoBodiesRefactor(t, factor, theta));
+    /* The displacements K^-1 F of the basis of the loads. */
+    if (!there) PetscCall(CreateVectors(factor, b->r, x));
+    if (!there) PetscCall(HycoBodiesExtend(b, factor, b->r, factor->basis, NULL, x));
+    there = PETSC_TRUE;
+    PetscCall(BodyCoefficients(t, factor, k, sample, V, x, &own[k]));
+    PetscCall(HycoSnapshotsKeepPiece(t->store, key, 3, array));
+  }
+  if (there) PetscCall(DestroyVectors(b->r, x));
+  PetscCall(PetscFree(x));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* From the last node to the first: its factor is still there after ExpandAll(), and the kept ones are those used
    last. */
 static PetscErrorCode AllCoefficients(HycoReducer t, HycoBodiesFactor *factor, const Sampled *sampled, Mat V,
@@ -1005,30 +1098,16 @@ static PetscErrorCode AllCoefficients(HycoReducer t, HycoBodiesFactor *factor, c
 {
   HycoSubstructures b = HycoTrainingOfBodies(t)->bodies;
   const PetscInt nodes = HycoBodiesGrid(b, 0, NULL);
-  Vec *x;
+  unsigned long long modes;
 
   PetscFunctionBegin;
   PetscCall(AllocateCoefficients(b, own));
   if (b->inelastic) PetscCall(PetscCalloc1(StrainRows(b, b->n) * (size_t)factor->n_strains + 1, &b->inelastic->fields));
-  PetscCall(PetscMalloc1(b->r + 1, &x));
+  PetscCall(KeyCoefficients(t, factor, V, &modes));
   for (PetscInt j = nodes - 1; j >= 0; j--) { /* the last factor is there */
-    PetscReal theta[HYCO_MAX_PARAMETERS];
-
-    HycoBodiesPoint(t, j, theta);
-    PetscCall(HycoBodiesRefactor(t, factor, theta));
-    /* The displacements K^-1 F of the basis of the loads. Collective. */
-    PetscCall(CreateVectors(factor, b->r, x));
-    PetscCall(HycoBodiesExtend(b, factor, b->r, factor->basis, NULL, x));
-    for (PetscInt k = 0; k < b->n; k++) {
-      const PetscInt sample = HycoBodiesSampleOf(b, k, j);
-
-      /* Nodes that differ only in parameters that do not change the body are no samples of it. */
-      if (sample >= 0) PetscCall(BodyCoefficients(t, factor, k, sample, V, x, &own[k]));
-    }
-    for (PetscInt d = 0; d < b->r; d++) PetscCall(VecDestroy(&x[d]));
+    PetscCall(NodeCoefficients(t, factor, j, V, modes, own));
     PetscCall(HycoReducerTell(t, "coefficients of the modes", nodes - j, nodes));
   }
-  PetscCall(PetscFree(x));
   HycoOnRoot(HycoComm(t), StoreCoefficients(t, factor, sampled, own));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -1116,6 +1195,8 @@ static PetscErrorCode ModesOf(HycoReducer t, HycoSnapshots store, HycoBodiesFact
   PetscCall(PetscFree(b->mode_start));
   PetscCall(FindModes(t, factor, sampled->n_U, sampled->U, V, sigma));
   if (!t->scene->n_times) PetscCall(MeasureLeft(t, factor, sampled, *V));
+  PetscCall(PetscInfo(NULL, "%d samples of bodies, of which %d are checks: %d modes miss %.1e\n", (int)sampled->n,
+                      (int)sampled->n_checks, (int)b->l, (double)b->left));
   /* If the modes are nearly as many as the samples, further samples would give further modes. */
   *enough = PETSC_TRUE;
   for (PetscInt k = 0; k < b->n; k++)

@@ -416,6 +416,7 @@ static PetscErrorCode Condense(HycoReducer t, HycoSnapshots store, HycoBodiesFac
   PetscCall(HycoBodiesSplit(t, N, factor));
   PetscCall(MatDestroy(&N));
   PetscCall(HycoBodiesLoads(t, factor));
+  PetscCall(HycoBodiesBeginKeys(t, factor));
   PetscCall(HycoBodiesSample(t, factor));
   if (HycoBodiesFlow(t)) PetscCall(HycoBodiesStrains(t, factor));
   PetscCall(HycoBodiesFields(t, store, factor));
