@@ -381,7 +381,7 @@ static const Written written[] = {
     {"table", "path", "kkt_max", "number", "-", "largest KKT residual of the steps"},
     {"table", "path", "forces_unique", "flag", "-",
      "1, or 0: nodal contact forces are not unique then; NaN: not known"},
-    {"table", "path of solve", "sliding", "number", "-", "as in reports"},
+    {"table", "path", "sliding", "number", "-", "as in reports"},
     {"table", "path of solve", "work", "number", "energy", "of loads and supports since the start"},
     {"table", "path of solve", "contact_work", "number", "energy", "against contact"},
     {"table", "path of solve", "stored", "number", "energy", "elastic"},

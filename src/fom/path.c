@@ -325,7 +325,7 @@ static PetscErrorCode MeasureSliding(HycoFOM f, PetscReal *sliding)
 
   PetscFunctionBegin;
   if (f->n_contacts)
-    HycoOnEach(HycoComm(f), HycoContactMeasure(f->fe_surface, &f->pairs, f->u_surface, f->lambda, NULL, &state));
+    HycoOnEach(HycoComm(f), HycoContactMeasure(f->fe_surface, &f->pairs, f->u_surface, f->lambda, NULL, NULL, &state));
   *sliding = state.sliding;
   HycoAllreduce(sliding, 1, MPIU_REAL, MPI_MAX, HycoComm(f));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -12,7 +12,7 @@ static PetscErrorCode MeasureContacts(HycoFOM f, HycoSummary *s)
 
   PetscFunctionBegin;
   /* Reads normals and gaps at the present parameters. */
-  HycoOnEach(HycoComm(f), HycoContactMeasure(f->fe_surface, &f->pairs, f->u_surface, f->lambda, NULL, &state));
+  HycoOnEach(HycoComm(f), HycoContactMeasure(f->fe_surface, &f->pairs, f->u_surface, f->lambda, NULL, NULL, &state));
   n[0] = state.n_facing;
   most[0] = state.overlap;
   most[1] = state.sliding;

@@ -47,7 +47,7 @@ history: {times: [0, 1, 2, 3, 4, 5], tables: {v: [[0, 0], [1, 1], [3, 1], [4, 0.
 output: {T: {friction: x, contact: plane}, W: {friction: work}}
 """
 BODIES = ['-hyco_model_type', 'bodies']
-COLUMNS = ('total_contact_force', 'friction_work', 'n_slipping', 'n_active')
+COLUMNS = ('total_contact_force', 'friction_work', 'n_slipping', 'n_active', 'sliding')
 
 
 class FrictionModels(Case):
