@@ -262,6 +262,8 @@ static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, co
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
+  PetscInt n_loose = 0;
+  char loose[DRIVER_LINE] = "";
   if (output[0]) PetscCall(HycoFOMWriteBegin(fom, output, n));
   begin = HycoNow();
   for (PetscInt k = 0; k < n; k++) {
@@ -274,6 +276,8 @@ static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, co
     if (k == 0) PetscCall(Remarks(&s, 0, NULL));
     /* The dimension is known from the first solution. */
     if (k == 0) PetscCall(CreateTable(scene, s.dim, n, &t));
+    if (s.loose[0] && !n_loose++) PetscCall(PetscStrncpy(loose, s.loose, sizeof(loose)));
+    s.loose[0] = '\0'; /* of the set, below */
     if (s.reason > 0) u_relative = PetscMax(u_relative, s.u_relative);
     /* Before the gradient: after an error of it there is no solution to write. */
     if (output[0]) PetscCall(HycoFOMWriteAdd(fom));
@@ -285,6 +289,10 @@ static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, co
   rows = DriverRowsOfRoot(n, t.width, t.value, &all);
   /* Every rank has counted every point. */
   rows.lacking = lacking;
+  if (n_loose)
+    PetscCall(DriverPrint("warning: at %d of %d points no contact force keeps a body, the first: %s; its position is "
+                          "arbitrary\n",
+                          (int)n_loose, (int)n, loose));
   HycoCheck(!lacking.n || lacking.n_found, "%s", lacking.why);
   PetscCall(ReportSet("solve", table, scene, samples, t.names, &rows, HycoNow() - begin));
   PetscCall(DestroyTable(&t));
