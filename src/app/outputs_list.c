@@ -322,7 +322,7 @@ static const Written written[] = {
     {"table", "predict", "rid_u_norm2", "number", "length", "as in reports; NaN after full order"},
     {"table", "solve", "strain_energy", "number", "energy", "as in reports"},
     {"table", "solve predict compare", "kkt_max", "number", "-", "largest of the four KKT residuals"},
-    {"table", "solve predict compare", "converged", "flag", "-", "1 or 0"},
+    {"table", "solve predict compare", "converged", "flag", "-", "1 or 0; 0: results are NaN"},
     {"table", "solve compare", "iterations", "count", "-", "of the contact solver; of paths contact problems"},
     {"table", "predict", "active_set_iterations", "count", "-", "as in reports"},
     {"table", "solve predict", "seconds", "number", "s", "of the point, or since the last listed time"},
