@@ -517,7 +517,6 @@ PetscErrorCode HycoPathAttempt(HycoPath p, PetscReal t0, PetscReal t1, HycoStepA
   /* Models with an iteration of their own (bodies) need neither K nor its tangents here. */
   if (p->ops->iterate) {
     PetscCall((*p->ops->iterate)(p, t0, t1, a));
-    a->easy = (PetscBool)(a->iterations <= usual_its[HycoPathMethod(p)] / 2);
     if (!a->converged) PetscCall(HycoPathRestore(p));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
