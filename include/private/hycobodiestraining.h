@@ -21,6 +21,7 @@ typedef struct {
   char (*name)[64];    /* of the scene's bodies in it: "block", "block + plate" */
   PetscInt *of;        /* by node of the process's part: its body */
   PetscInt *enters;    /* n x n_parameters */
+  PetscInt *support;   /* the same: the support (of scene->fixed) that does not turn with the body; -1: none */
   PetscBool *together; /* by body: similar to itself where all other parameters change at once */
 } HycoBodyParts;
 

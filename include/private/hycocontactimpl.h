@@ -208,8 +208,12 @@ typedef struct {
   PetscReal overlap; /* largest initial overlap, the gap negative before any displacement */
   PetscReal sliding; /* largest relative tangential motion of a closed contact, over the size of a facet */
 } HycoContactState;
+/* facet: as HycoContactFacets() gives them, of the contacts that no map moves; NULL: fe's mesh has the whole surfaces. */
 PetscErrorCode HycoContactMeasure(HycoFE fe, HycoPairs *pairs, const PetscReal u[], const PetscReal L[],
-                                  const PetscInt *index, HycoContactState *state);
+                                  const PetscInt *index, const PetscReal facet[], HycoContactState *state);
+/* The size of the facets over which the sliding of each contact is measured (pairs->n): the longest edge at the master, or
+   else at the slave; 0: neither has any. */
+PetscErrorCode HycoContactFacets(HycoFE fe, const HycoPairs *pairs, PetscReal facet[]);
 /*
   Finds the combinations of `motions` that frictionless contact does not prevent because of the surfaces' shape: the
   motion is tangential at every contact, to within the faceting error, to a normal, the slave's surface, the master's,

@@ -101,6 +101,12 @@ typedef struct {
   void *monitor_ctx;
 } HycoLCP;
 /*
+  Moves the p free unknowns x of an N x N problem without forces by as little as possible, such that the slack of no row
+  row[0..n) is negative. *exists false: no motion does that, and x is unchanged. Not collective.
+*/
+PetscErrorCode HycoLCPUnload(PetscInt N, PetscInt p, PetscInt n, const PetscInt row[], const PetscReal M[],
+                             const PetscReal q[], PetscReal x[], PetscBool *exists);
+/*
   The active set method from `active`, which returns the last set. Contacts that repeat others carry no force and leave
   the set. The status is SINGULAR if their gaps contradict each other and choosing the smaller ones does not resolve it,
   or if contact does not hold floating bodies under this load.

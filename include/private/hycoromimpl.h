@@ -89,6 +89,7 @@ struct _n_HycoModel {
   PetscInt *closed;        /* by contact: has a force in some training solution; NULL: not known (older files) */
   PetscReal *master_reach; /* moved surfaces: largest distance of a master point, by contact of the scene; NULL: none
                               is moved, or the file is older than this search */
+  PetscReal *facet;        /* by contact: HycoContactFacets(); NULL: an older file */
   PetscInt l;              /* POD modes */
   PetscReal *V;            /* (mesh n_nodes * dim) x l, row major: the modes on the nodes of mesh */
   PetscReal *sigma;        /* l singular values */

@@ -84,7 +84,8 @@ static PetscErrorCode ComparePoint(HycoScene scene, HycoFOM fom, HycoROM model, 
   v[c->n_errors + DRIVER_LAMBDA_NORM] = s.lambda_norm2;
   v[c->n_errors + DRIVER_SIGMA_NORM] = e.sigma_norm2;
   /* Absolute, in the output's unit: outputs may be zero or change sign. */
-  for (PetscInt q = 0; q < outputs->n; q++)
+  for (PetscInt q = 0; q < outputs->n && p.reason <= 0; q++) v[c->outputs + q] = NAN;
+  for (PetscInt q = 0; q < outputs->n && p.reason > 0; q++)
     v[c->outputs + q] = PetscAbsReal(p.quantity[outputs->reduced[q]] - s.quantity[outputs->full[q]]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

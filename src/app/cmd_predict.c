@@ -418,6 +418,12 @@ static void FillRow(const HycoPrediction *p, PetscInt n_carried, const HycoConta
   for (PetscInt k = s->with_extremes; k < s->with_estimates; k++)
     v[k] = Known(p->estimated_error_quantity[k - s->with_extremes]);
   DriverCarriedFill(&s->carried, n_carried, carried, v + s->with_estimates);
+  /* A point that failed has no results, and its row stays. */
+  for (PetscInt c = 0; c < s->with_carried && p->reason <= 0; c++) {
+    const PetscBool known = (PetscBool)((c >= KKT && c <= SECONDS) || c == BEYOND || c == UNSEEN || c == FULL_ORDER);
+
+    if (!known) v[c] = NAN;
+  }
 }
 
 /* Data for the rows of a piece. */

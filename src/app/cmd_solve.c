@@ -238,7 +238,10 @@ static PetscErrorCode FillRow(HycoFOM fom, const HycoSummary *s, const Table *t,
   PetscCall(PetscArraycpy(v + N_COLUMNS, s->quantity, t->with_quantities - N_COLUMNS));
   PetscCall(HycoFOMGetContacts(fom, &n, &carried));
   DriverCarriedFill(&t->carried, n, carried, v + t->with_quantities);
-  /* A point that failed has no derivative, and its row stays. */
+  /* A point that failed has no results, and its row stays. */
+  for (PetscInt c = 0; c < t->with_carried && s->reason <= 0; c++) {
+    if (c < KKT || c >= N_COLUMNS) v[c] = NAN;
+  }
   for (PetscInt c = 0; c < t->gradients.n; c++) v[t->with_carried + c] = NAN;
   if (!t->gradients.on || s->reason <= 0) PetscFunctionReturn(PETSC_SUCCESS);
   /* Its errors are raised on every rank. */
@@ -259,6 +262,8 @@ static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, co
   DriverRows rows;
   DriverLacking lacking = {0};
   PetscReal begin, u_relative = 0;
+  PetscInt n_loose = 0;
+  char loose[DRIVER_LINE] = "";
 
   PetscFunctionBegin;
   PetscCall(HycoSamplesGet(samples, &n, &n_par, &mu));
@@ -271,6 +276,8 @@ static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, co
     PetscCall(HycoFOMGetSummary(fom, &s));
     /* Solvers read their options at the first solve. */
     if (k == 0) PetscCall(DriverCheckLeft());
+    if (s.loose[0] && !n_loose++) PetscCall(PetscStrncpy(loose, s.loose, sizeof(loose)));
+    s.loose[0] = '\0'; /* of the set, below */
     if (k == 0) PetscCall(Remarks(&s, 0, NULL));
     /* The dimension is known from the first solution. */
     if (k == 0) PetscCall(CreateTable(scene, s.dim, n, &t));
@@ -282,6 +289,10 @@ static PetscErrorCode Many(HycoFOM fom, HycoScene scene, HycoSamples samples, co
   }
   if (output[0]) PetscCall(HycoFOMWriteEnd(fom));
   PetscCall(WarnOfUnits(u_relative));
+  if (n_loose)
+    PetscCall(DriverPrint("warning: at %d of %d points no contact force keeps a body, the first: %s; its position is "
+                          "arbitrary\n",
+                          (int)n_loose, (int)n, loose));
   rows = DriverRowsOfRoot(n, t.width, t.value, &all);
   /* Every rank has counted every point. */
   rows.lacking = lacking;

@@ -42,7 +42,7 @@ static const Column columns[] = {
     BOTH("residual", residual, REAL),
     BOTH("kkt_max", kkt, REAL),
     BOTH("forces_unique", n_dependent, NONE),
-    FULL_ONLY("sliding", sliding, REAL),
+    BOTH("sliding", sliding, REAL),
     FULL_ONLY("work", work, REAL),
     FULL_ONLY("contact_work", contact_work, REAL),
     FULL_ONLY("stored", stored, REAL),

@@ -201,6 +201,25 @@ static PetscErrorCode Continue(const HycoActiveSet *e, const HycoLCP *lcp, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Bodies without loads, which carry no force, from x = 0: they stay where they are, or move as little as contact asks for.
+   Forces of round-off would be a solution relative to nothing. */
+static PetscErrorCode Unload(Floating *h, PetscBool active[], PetscBool *done)
+{
+  PetscInt *row;
+
+  PetscFunctionBegin;
+  *done = PETSC_TRUE;
+  for (PetscInt i = 0; i < h->p; i++) *done = (PetscBool)(*done && h->q[i] == 0);
+  if (!*done) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscArrayzero(h->z, h->n));
+  PetscCall(PetscMalloc1(h->m, &row));
+  for (PetscInt i = 0; i < h->m; i++) row[i] = h->p + i;
+  PetscCall(HycoLCPUnload(h->n, h->p, h->m, row, h->M, h->q, h->z, done));
+  PetscCall(PetscFree(row));
+  for (PetscInt i = 0; i < h->m && *done; i++) active[i] = PETSC_FALSE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* For lcp->p > 0; z = (x_pinned, L). On one process, or alike on every rank. One by one: sets that change at once may
    leave a body without any contact, and the matrix singular. */
 PetscErrorCode HycoLCPSemidefinite(const HycoLCP *lcp, PetscBool active[], PetscReal z[], PetscInt *its,
@@ -218,7 +237,13 @@ PetscErrorCode HycoLCPSemidefinite(const HycoLCP *lcp, PetscBool active[], Petsc
                            .monitor = lcp->monitor,
                            .monitor_ctx = lcp->monitor_ctx};
 
+  PetscBool done;
+
   PetscFunctionBegin;
+  *its = 0;
+  *status = HYCO_LCP_SOLVED;
+  PetscCall(Unload(&h, active, &done));
+  if (done) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc3(n, &h.a, n, &h.w, lcp->n, &h.idle));
   for (PetscInt i = lcp->p; i < n; i++)
     h.flexibility = PetscMax(h.flexibility, PetscAbsReal(lcp->M[(size_t)i * (size_t)n + (size_t)i]));

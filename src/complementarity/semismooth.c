@@ -25,6 +25,7 @@
 #define MOST_LEAST  1000  /* rows up to which a singular J is solved by least squares */
 #define RANK_TOL    1e-10 /* of motions: singular values relative to the largest that count as 0 */
 #define GAPS        1e-4  /* share of the forces that would close the gaps or were there before: round-off of these */
+#define LOCKED      1e-6  /* share of the forces before: below it friction has locked nothing in */
 #define SHIFT       1e-3  /* alpha relative to M's diagonal: the proximal point method's rate of convergence */
 #define TIGHT       1e-14 /* |F| relative to the forces: nothing is left to gain */
 #define SOLVED      1e-10 /* the same: solved, if the steps gain nothing more */
@@ -363,16 +364,58 @@ static PetscErrorCode Restart(Newton *h, PetscReal z[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether no force is a solution, which z is then: floating bodies without loads stay where they are. */
-static PetscErrorCode Unloaded(Newton *h, PetscReal z[], HycoLCPStatus *status)
+/* The motions x that leave the bodies where they were, without forces: no contact slips, and those with a force before
+   just touch, in the sense of least squares. *none: no load acts on a motion. */
+static PetscErrorCode Stay(Newton *h, const PetscReal forces[], PetscReal x[], PetscBool *none)
+{
+  const HycoBlocks *b = h->blocks;
+  PetscReal norm, size;
+  PetscBool *in;
+
+  PetscFunctionBegin;
+  *none = PETSC_TRUE;
+  PetscCall(PetscArrayzero(x, h->n));
+  PetscCall(Residual(h, x, &norm, &size));
+  for (PetscInt i = 0; i < h->p; i++) *none = (PetscBool)(*none && PetscAbsReal(h->F[i]) <= SOLVED * size);
+  if (!*none || !(h->start > 0)) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscCalloc1(h->n, &in));
+  for (PetscInt k = 0; k < b->n; k++) {
+    const PetscInt first = h->p + b->row[k];
+
+    in[first] = (PetscBool)(forces[first] > 0);
+    for (PetscInt i = first + 1; i < h->p + b->row[k + 1]; i++) in[i] = PETSC_TRUE;
+  }
+  for (PetscInt i = 0; i < h->n; i++) h->w[i] = -h->w[i];
+  PetscCall(FitMotions(h, in, h->w, x));
+  PetscCall(PetscFree(in));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether no forces are a solution with the motions x, which are z then. */
+static PetscErrorCode Take(Newton *h, const PetscReal x[], PetscReal z[], HycoLCPStatus *status)
 {
   PetscReal norm, size;
 
   PetscFunctionBegin;
-  PetscCall(PetscArrayzero(h->step, h->n));
-  PetscCall(Residual(h, h->step, &norm, &size));
+  PetscCall(Residual(h, x, &norm, &size));
   *status = norm <= SOLVED * size ? HYCO_LCP_SOLVED : HYCO_LCP_LIMIT;
-  if (*status == HYCO_LCP_SOLVED) PetscCall(PetscArrayzero(z, h->n));
+  if (*status == HYCO_LCP_SOLVED) PetscCall(PetscArraycpy(z, x, h->n));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The same once the motions have opened what would overlap. */
+static PetscErrorCode Unload(Newton *h, PetscReal x[], PetscReal z[], HycoLCPStatus *status)
+{
+  const HycoBlocks *b = h->blocks;
+  PetscInt *row;
+  PetscBool exists;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(b->n + 1, &row));
+  for (PetscInt k = 0; k < b->n; k++) row[k] = h->p + b->row[k];
+  PetscCall(HycoLCPUnload(h->n, h->p, b->n, row, h->M, h->q, x, &exists));
+  PetscCall(PetscFree(row));
+  if (exists) PetscCall(Take(h, x, z, status));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -389,17 +432,30 @@ static PetscErrorCode ChooseStart(Newton *h, PetscReal z[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* From the given forces. Floating bodies have no start without any, as every contact would look open. */
+/* From the given forces. Floating bodies have no start without any, as every contact would look open. Without loads they
+   stay where they are; but forces that friction has locked in come before none with other motions. */
 static PetscErrorCode FromForces(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
+  PetscBool none = PETSC_FALSE;
+  PetscReal *x = NULL, most = 0;
+  HycoLCPStatus unloaded = HYCO_LCP_LIMIT;
+
   PetscFunctionBegin;
+  *status = HYCO_LCP_LIMIT;
   if (h->p) {
-    PetscCall(Unloaded(h, z, status));
-    if (*status == HYCO_LCP_SOLVED || !(h->start > 0)) PetscFunctionReturn(PETSC_SUCCESS);
-    PetscCall(Consistent(h, z));
+    PetscCall(PetscMalloc1(h->n, &x));
+    PetscCall(Stay(h, z, x, &none));
+    if (none) PetscCall(Take(h, x, z, status));
   }
-  PetscCall(ChooseStart(h, z));
-  PetscCall(Iterate(h, z, status));
+  if (*status != HYCO_LCP_SOLVED && (!h->p || h->start > 0)) {
+    if (h->p) PetscCall(Consistent(h, z));
+    PetscCall(ChooseStart(h, z));
+    PetscCall(Iterate(h, z, status));
+  }
+  for (PetscInt i = h->p; i < h->n; i++) most = PetscMax(most, PetscAbsReal(z[i]));
+  if (none && (*status != HYCO_LCP_SOLVED || most <= LOCKED * h->start)) PetscCall(Unload(h, x, z, &unloaded));
+  if (unloaded == HYCO_LCP_SOLVED) *status = unloaded;
+  PetscCall(PetscFree(x));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -58,6 +58,21 @@ PetscBool HycoTangentMayTouch(PetscReal L, PetscReal w, PetscReal size)
   return (PetscBool)(L > 0 || w <= NEAR * size);
 }
 
+/* Whether the stiffness M_jj of free unknown j is round-off beside that which the contacts give it: without a closed one
+   the unknown is not determined. */
+static PetscBool Loose(HycoTangent t, const PetscReal M[], size_t j)
+{
+  const size_t n = (size_t)(t->p + t->n);
+  PetscReal most = 0;
+
+  for (size_t i = (size_t)t->p; i < n; i++) {
+    const PetscReal arm = M[j * n + i], flexibility = M[i * n + i];
+
+    if (flexibility > 0) most = PetscMax(most, arm * arm / flexibility);
+  }
+  return (PetscBool)(PetscAbsReal(M[j * n + j]) <= DEPENDENT * most);
+}
+
 /* The columns of M of the set, scaled to entries of order 1: the rows of x and of contacts have different units. */
 static PetscErrorCode Factor(HycoTangent t, const PetscReal M[], PetscBool *regular)
 {
@@ -70,7 +85,8 @@ static PetscErrorCode Factor(HycoTangent t, const PetscReal M[], PetscBool *regu
   if (!m) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscBLASIntCast(t->n_set, &mb));
   for (size_t j = 0; j < m; j++) {
-    const PetscReal diagonal = PetscAbsReal(M[(size_t)t->set[j] * n + (size_t)t->set[j]]);
+    const PetscBool loose = (PetscBool)(j < (size_t)t->p && Loose(t, M, j));
+    const PetscReal diagonal = loose ? 0 : PetscAbsReal(M[(size_t)t->set[j] * n + (size_t)t->set[j]]);
 
     t->scale[j] = diagonal > 0 ? 1 / PetscSqrtReal(diagonal) : 0;
   }
@@ -84,6 +100,9 @@ static PetscErrorCode Factor(HycoTangent t, const PetscReal M[], PetscBool *regu
     /* Negative marks a row scaled here, so that it does not count as scaled for the others of the loop. */
     t->scale[j] = largest > 0 ? -1 / largest : -1;
   }
+  /* An unknown that no contact holds has nothing but round-off in its row, and there is no derivative. */
+  for (size_t j = 0; j < (size_t)t->p && m == (size_t)t->p; j++) *regular = (PetscBool)(*regular && !Loose(t, M, j));
+  if (!*regular) PetscFunctionReturn(PETSC_SUCCESS);
   for (size_t j = 0; j < m; j++) t->scale[j] = PetscAbsReal(t->scale[j]);
   for (size_t j = 0; j < m; j++) {
     for (size_t i = 0; i < m; i++)

@@ -103,27 +103,38 @@ PetscErrorCode HycoContactCheck(HycoFE fe, const HycoPairs *pairs, const PetscRe
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The tangential motion of contact k, over the size of the master's facet, or else of the slave's. */
-static PetscErrorCode SlidingOf(HycoFE fe, const HycoPairs *p, PetscInt k, const PetscReal normal[3],
-                                const PetscReal u[], Sizes sizes[2], PetscReal *sliding)
+/* The size of the master's facet at contact k, or else of the slave's. */
+static PetscErrorCode FacetAt(HycoFE fe, const HycoPairs *p, PetscInt k, Sizes sizes[2], PetscReal *size)
 {
   HycoContact c = fe->scene->contact[p->contact[k]];
-  PetscReal r[3], size;
 
   PetscFunctionBegin;
-  HycoPairsJump(p, k, fe->dim, u, r);
-  PetscCall(SizeAt(fe, c->master, p->master[p->master_start[k]], &sizes[0], &size));
+  *size = 0;
+  if (p->master_start[k] == p->master_start[k + 1]) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(SizeAt(fe, c->master, p->master[p->master_start[k]], &sizes[0], size));
   /* A master of single nodes has no facets. */
-  if (!(size > 0)) PetscCall(SizeAt(fe, c->slave, p->slave[k], &sizes[1], &size));
-  *sliding = size > 0 ? HycoTangentialLength(r, normal) / size : 0;
+  if (!(*size > 0)) PetscCall(SizeAt(fe, c->slave, p->slave[k], &sizes[1], size));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* On a mesh with the whole surfaces; a model keeps them, whose mesh may lack facets of masters. */
+PetscErrorCode HycoContactFacets(HycoFE fe, const HycoPairs *pairs, PetscReal facet[])
+{
+  Sizes sizes[2] = {{NULL, NULL}, {NULL, NULL}};
+  PetscErrorCode ierr = 0;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < pairs->n && !ierr; k++) ierr = FacetAt(fe, pairs, k, sizes, &facet[k]);
+  HycoFreeAll(&sizes[0].size, &sizes[1].size);
+  PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* For an active contact, the tangential motion over the facet's size: the measure of whether displacements are small.
-   overlap: of the unloaded gaps. index: from contacts to entries of L (NULL: the same). For remarks to the user: a
-   large sliding or overlap makes small displacements or pairs doubtful, but is no error. */
+   overlap: of the unloaded gaps. index: from contacts to entries of L and facet (NULL: the same). For remarks to the user:
+   a large sliding or overlap makes small displacements or pairs doubtful, but is no error. */
 PetscErrorCode HycoContactMeasure(HycoFE fe, HycoPairs *pairs, const PetscReal u[], const PetscReal L[],
-                                  const PetscInt index[], HycoContactState *state)
+                                  const PetscInt index[], const PetscReal facet[], HycoContactState *state)
 {
   Sizes sizes[2] = {{NULL, NULL}, {NULL, NULL}};
   PetscReal *normal, *gap;
@@ -134,15 +145,21 @@ PetscErrorCode HycoContactMeasure(HycoFE fe, HycoPairs *pairs, const PetscReal u
   PetscCall(PetscMalloc2(3 * pairs->n, &normal, pairs->n, &gap));
   ierr = HycoContactGeometry(fe, pairs, normal, gap);
   for (PetscInt k = 0; !ierr && k < pairs->n; k++) {
-    PetscReal sliding = 0;
+    const PetscInt at = index ? index[k] : k;
+    PetscReal r[3], size;
 
     /* It faces no master: there is nothing to measure. */
     if (HycoPairsAlone(fe->scene, pairs, k)) continue;
     state->n_facing++;
     state->overlap = PetscMax(state->overlap, -gap[k]);
-    if (pairs->master_start[k] == pairs->master_start[k + 1] || !(L[index ? index[k] : k] > 0)) continue;
-    ierr = SlidingOf(fe, pairs, k, normal + 3 * k, u, sizes, &sliding);
-    state->sliding = PetscMax(state->sliding, sliding);
+    if (pairs->master_start[k] == pairs->master_start[k + 1] || !(L[at] > 0)) continue;
+    HycoPairsJump(pairs, k, fe->dim, u, r);
+    /* Surfaces that a map moves are whole in every mesh, and may meet other masters. */
+    if (facet && !HycoPairsMoved(pairs, k))
+      size = facet[at];
+    else
+      ierr = FacetAt(fe, pairs, k, sizes, &size);
+    if (!ierr && size > 0) state->sliding = PetscMax(state->sliding, HycoTangentialLength(r, normal + 3 * k) / size);
   }
   if (state->overlap <= HYCO_ROUNDING * HycoMeshLength(fe->mesh)) state->overlap = 0;
   PetscCall(PetscFree2(normal, gap));

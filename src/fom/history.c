@@ -8,6 +8,7 @@
 #include <stdlib.h>
 
 #define GROWTH 1.5
+#define CREEPS 1e-12 /* a smaller inelastic strain of a whole path is round-off of elastic strains */
 
 const char *const HycoNewtons[] = {"auto", "tangent", "elastic", "modified", NULL};
 
@@ -368,7 +369,7 @@ void HycoPathGetHistory(HycoPath p, HycoHistory *h)
   h->newton = HycoNewtons[HycoPathMethod(p)];
   h->factor_cost = HycoPathFactorCost(p);
   h->n_bound = p->n_bound;
-  h->rate_change = p->crept > 0 && p->creeps ? p->changed / p->crept : 0;
+  h->rate_change = p->crept > CREEPS && p->creeps ? p->changed / p->crept : 0;
   h->n_orders = p->n_orders;
   h->n_taken = p->n_taken;
   h->taken = p->taken;

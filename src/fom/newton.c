@@ -91,21 +91,40 @@ PetscErrorCode HycoPathMoves(HycoPath p, const PetscScalar u[], Vec work, PetscB
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* rhs = K U + F - f_int: the right-hand side of the contact system. r is F - f_int - B^T L on entry, so that B^T L is
-   added back. Where all loads vanish, their sum is round-off, which no contact forces of a floating body balance: with
-   friction it is 0 then. The system's unknowns are U and L themselves and not their changes, since contact conditions
-   are on the whole of both. */
-static PetscErrorCode RightSide(HycoPath p)
+/* Whether K U + F - f_int may be round-off alone, which no contact forces of a floating body balance; *least: its size.
+   With friction, or where contact alone holds a body. */
+static PetscErrorCode Rounding(HycoPath p, PetscReal *least)
 {
-  PetscReal before = 0, after = 1;
+  MatNullSpace kernel = NULL;
+  PetscReal size[2];
+
+  PetscFunctionBegin;
+  *least = -1;
+  PetscCall(MatGetNullSpace(p->K, &kernel));
+  if (!p->rubs && !kernel) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecNorm(p->rhs, NORM_INFINITY, &size[0]));
+  PetscCall(VecPointwiseMult(p->work, p->diagonal, p->U));
+  PetscCall(VecNorm(p->work, NORM_INFINITY, &size[1]));
+  *least = PetscMax(NOTHING * size[0], 16 * PETSC_MACHINE_EPSILON * size[1]);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* rhs = K U + F - f_int: the right-hand side of the contact system. r is F - f_int - B^T L on entry, so that B^T L is
+   added back. Where all loads vanish, their sum is round-off, and it is 0 then. The system's unknowns are U and L
+   themselves and not their changes, since contact conditions are on the whole of both. first: of a step, which moves the
+   supports; later iterates have their new values. */
+static PetscErrorCode RightSide(HycoPath p, PetscBool first)
+{
+  PetscReal least, size = 0;
 
   PetscFunctionBegin;
   PetscCall(MatMult(p->K, p->U, p->rhs));
-  if (p->rubs) PetscCall(VecNorm(p->rhs, NORM_INFINITY, &before));
+  PetscCall(Rounding(p, &least));
   PetscCall(VecAXPY(p->rhs, 1, p->r));
   if (p->n_contacts) PetscCall(MatMultAdd(p->Bt, p->Lambda, p->rhs, p->rhs));
-  if (p->rubs) PetscCall(VecNorm(p->rhs, NORM_INFINITY, &after));
-  if (after <= NOTHING * before) PetscCall(VecSet(p->rhs, 0));
+  if (first) PetscCall((*p->ops->moves)(p, p->rhs));
+  if (least >= 0) PetscCall(VecNorm(p->rhs, NORM_INFINITY, &size));
+  if (size <= least) PetscCall(VecSet(p->rhs, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -139,9 +158,7 @@ static PetscErrorCode SolveSystem(HycoPath p, PetscBool first, const Progress *n
   PetscInt its, linear, most;
 
   PetscFunctionBegin;
-  PetscCall(RightSide(p));
-  /* Only the first system of a step moves the supports; later iterates have their new values. */
-  if (first) PetscCall((*p->ops->moves)(p, p->rhs));
+  PetscCall(RightSide(p, first));
   PetscCall(HycoSystemSetVectors(p->system, p->rhs, p->D));
   PetscCall(HycoSolverSetSystem(p->solver, p->system));
   PetscCall(VecCopy(p->U, p->G));
@@ -353,7 +370,7 @@ static PetscErrorCode Judge(HycoPath p, const Progress *now, HycoStepAttempt *a,
   const PetscReal size = now->size > 0 ? now->size : 1;
 
   PetscFunctionBegin;
-  PetscCall(RightSide(p));
+  PetscCall(RightSide(p, PETSC_FALSE));
   PetscCall(HycoSystemSetVectors(p->system, p->rhs, p->D));
   HycoLogged(HYCO_EVENT_KKT, HycoSystemComputeKKT(p->system, p->U, p->Lambda, kkt));
   *worst = PetscMax(kkt->penetration, PetscMax(kkt->adhesion, kkt->complementarity));
@@ -500,7 +517,6 @@ PetscErrorCode HycoPathAttempt(HycoPath p, PetscReal t0, PetscReal t1, HycoStepA
   /* Models with an iteration of their own (bodies) need neither K nor its tangents here. */
   if (p->ops->iterate) {
     PetscCall((*p->ops->iterate)(p, t0, t1, a));
-    a->easy = (PetscBool)(a->iterations <= usual_its[HycoPathMethod(p)] / 2);
     if (!a->converged) PetscCall(HycoPathRestore(p));
     PetscFunctionReturn(PETSC_SUCCESS);
   }

@@ -205,6 +205,25 @@ static PetscErrorCode ContactWork(HycoFOM f, PetscReal *sum)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Energies below it are round-off: eps |K_ii U_i| are forces without a meaning, as in Newton's method. */
+static PetscErrorCode RoundingWork(HycoFOM f, PetscReal *work)
+{
+  const PetscScalar *u, *K;
+  PetscReal sum = 0;
+  PetscInt n;
+
+  PetscFunctionBegin;
+  PetscCall(VecGetLocalSize(f->U, &n));
+  PetscCall(VecGetArrayRead(f->U, &u));
+  PetscCall(VecGetArrayRead(f->path->diagonal, &K));
+  for (PetscInt i = 0; i < n; i++) sum += PetscAbsReal(K[i]) * u[i] * u[i];
+  PetscCall(VecRestoreArrayRead(f->path->diagonal, &K));
+  PetscCall(VecRestoreArrayRead(f->U, &u));
+  PetscCallMPI(MPI_Allreduce(&sum, work, 1, MPIU_REAL, MPI_SUM, HycoComm(f)));
+  *work *= 16 * PETSC_MACHINE_EPSILON;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The energies of the accepted step. With all forces at their mean over the step the balance  work of loads and
    supports = stored + dissipated + of heat and of moduli that change + work against contact  is an identity: its
    defect measures the equilibrium, since the laws give the energies and the loads give the work. The defect is
@@ -214,7 +233,7 @@ static PetscErrorCode AddWork(HycoFOM f, const HycoFEStepReport *law, PetscReal 
   HycoPath p = f->path;
   HycoWork *w = &p->work_done;
   /* Stored energy is a state, the others are increments. */
-  PetscReal loads, supports, contact, stored = law->stored - w->stored, defect;
+  PetscReal loads, supports, contact, stored = law->stored - w->stored, defect, rounding;
 
   PetscFunctionBegin;
   PetscCall(MeanWork(f, p->F_old, p->F, PETSC_FALSE, &loads));
@@ -223,8 +242,9 @@ static PetscErrorCode AddWork(HycoFOM f, const HycoFEStepReport *law, PetscReal 
   defect = PetscAbsReal(loads + supports - contact - stored - law->dissipated - law->thermal - law->moduli);
   w->size += PetscAbsReal(loads) + PetscAbsReal(supports) + PetscAbsReal(contact) + PetscAbsReal(stored) +
              PetscAbsReal(law->dissipated) + PetscAbsReal(law->thermal) + PetscAbsReal(law->moduli);
-  /* Of this step; the largest of the path is kept. */
-  *step_defect = HycoRelative(defect, w->size);
+  PetscCall(RoundingWork(f, &rounding));
+  /* Of this step; the largest of the path is kept. Rigid motions exchange nothing but round-off. */
+  *step_defect = w->size > rounding ? HycoRelative(defect, w->size) : 0;
   w->defect = PetscMax(w->defect, *step_defect);
   w->loads += loads;
   w->supports += supports;
@@ -325,7 +345,7 @@ static PetscErrorCode MeasureSliding(HycoFOM f, PetscReal *sliding)
 
   PetscFunctionBegin;
   if (f->n_contacts)
-    HycoOnEach(HycoComm(f), HycoContactMeasure(f->fe_surface, &f->pairs, f->u_surface, f->lambda, NULL, &state));
+    HycoOnEach(HycoComm(f), HycoContactMeasure(f->fe_surface, &f->pairs, f->u_surface, f->lambda, NULL, NULL, &state));
   *sliding = state.sliding;
   HycoAllreduce(sliding, 1, MPIU_REAL, MPI_MAX, HycoComm(f));
   PetscFunctionReturn(PETSC_SUCCESS);

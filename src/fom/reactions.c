@@ -229,7 +229,8 @@ static PetscErrorCode AddUp(HycoFOM f, PetscReal *work, PetscInt support[], Sums
    over the sum of all magnitudes. Forces alone: moments about the origin depend on its distance. */
 static PetscErrorCode Balance(HycoFOM f, PetscInt n, Sums *s, PetscReal *balance)
 {
-  PetscReal *sum, most = 0;
+  PetscReal *sum, most = 0, size;
+  Vec terms;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(6 * n + 1, &sum));
@@ -248,7 +249,13 @@ static PetscErrorCode Balance(HycoFOM f, PetscInt n, Sums *s, PetscReal *balance
     for (PetscInt k = 0; k < n; k++) rest += s->result[k].force[c];
     most = PetscMax(most, PetscAbsReal(rest));
   }
-  *balance = sum[6 * n] > 0 ? most / sum[6 * n] : 0;
+  PetscCall(VecDuplicate(f->U, &terms));
+  PetscCall(MatGetDiagonal(f->K, terms));
+  PetscCall(VecPointwiseMult(terms, terms, f->U));
+  PetscCall(VecNorm(terms, NORM_1, &size));
+  PetscCall(VecDestroy(&terms));
+  /* Without any force all of them are round-off of the displacements. */
+  *balance = sum[6 * n] > 16 * PETSC_MACHINE_EPSILON * size ? most / sum[6 * n] : 0;
   PetscCall(PetscFree(sum));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -12,7 +12,7 @@ static PetscErrorCode MeasureContacts(HycoFOM f, HycoSummary *s)
 
   PetscFunctionBegin;
   /* Reads normals and gaps at the present parameters. */
-  HycoOnEach(HycoComm(f), HycoContactMeasure(f->fe_surface, &f->pairs, f->u_surface, f->lambda, NULL, &state));
+  HycoOnEach(HycoComm(f), HycoContactMeasure(f->fe_surface, &f->pairs, f->u_surface, f->lambda, NULL, NULL, &state));
   n[0] = state.n_facing;
   most[0] = state.overlap;
   most[1] = state.sliding;
@@ -201,10 +201,11 @@ PetscErrorCode HycoFOMGetSummary(HycoFOM f, HycoSummary *out)
   defect = f->path || f->given || s->energy_defect <= s->kkt.rounding ? 0 : s->energy_defect;
   PetscCall(HycoFOMJudge(f, f->u, f->n_contacts ? f->Lambda : NULL, defect, &s->reason, &s->u_relative, why));
   PetscCall(PetscStrncpy(s->why, why, sizeof(s->why)));
-  why[0] = '\0';
-  if (s->reason > 0 && !f->path && !f->given) PetscCall(HycoFOMNameLoose(f, why));
-  PetscCall(PetscStrncpy(s->loose, why, sizeof(s->loose)));
   PetscCall(MeasureContacts(f, s));
+  why[0] = '\0';
+  /* Of a path at its end, if nothing presses: friction may hold what normal forces do not. */
+  if (s->reason > 0 && !f->given && (!f->path || !s->n_active)) PetscCall(HycoFOMNameLoose(f, why));
+  PetscCall(PetscStrncpy(s->loose, why, sizeof(s->loose)));
   PetscCall(NameBuried(f, s));
   for (PetscInt k = 0; f->path && k < f->path->n_steps; k++)
     s->sliding = PetscMax(s->sliding, f->path->steps[k].sliding); /* contacts may be open at the end */

@@ -255,6 +255,8 @@ static PetscErrorCode TakeSets(HycoReducer t, HycoROM m, const PetscInt note[])
   PetscCall(HycoROMSetDomain(m, sets));
   PetscCall(PetscFree(sets));
   PetscCall(HycoPairsRenumber(&f->pairs, t->surface_node, &m->model->pairs));
+  PetscCall(PetscMalloc1(f->pairs.n + 1, &m->model->facet));
+  PetscCall(HycoContactFacets(f->fe_surface, &f->pairs, m->model->facet));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

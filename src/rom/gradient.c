@@ -71,7 +71,7 @@ static PetscErrorCode Measure(void *context, const PetscReal mu[], PetscReal ste
 /* The derivative's matrix, of the closed and the undecided contacts. */
 static PetscErrorCode Close(Work *o)
 {
-  PetscReal *M, *L, *w, *flexibility;
+  PetscReal *M, *L, *w, *flexibility, most = 0;
   PetscInt *state;
   PetscBool regular;
   const size_t n = (size_t)(o->p + o->k);
@@ -88,6 +88,7 @@ static PetscErrorCode Close(Work *o)
     L[j] = o->z[o->p + o->contact[j]];
     w[j] = o->w[0][o->p + o->contact[j]];
     flexibility[j] = M[at * n + at];
+    most = PetscMax(most, L[j]);
   }
   PetscCall(HycoTangentStates(o->k, L, w, o->size, flexibility, state));
   PetscCall(HycoTangentCreate(o->p, o->k, M, state, &o->tangent, &regular));
@@ -95,6 +96,10 @@ static PetscErrorCode Close(Work *o)
   PetscCall(PetscFree(M));
   /* A singular matrix means forces that can be redistributed: a derivative of one of many distributions would be
      arbitrary. */
+  HycoCheck(
+      regular || most > 0,
+      "no load presses a body here that contact alone holds, so that its position has no derivative; take a point "
+      "at which it carries a load");
   HycoCheck(regular, "the forces of the model's closed contacts are not unique here, so that they have no derivative");
   PetscFunctionReturn(PETSC_SUCCESS);
 }

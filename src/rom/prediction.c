@@ -97,13 +97,15 @@ static PetscErrorCode MeasureContacts(HycoROM m, HycoPrediction *p)
   HycoContactState state;
 
   PetscFunctionBegin;
-  PetscCall(HycoContactMeasure(m->fe, m->of_fe, m->U, m->Lambda, m->contact, &state));
+  PetscCall(HycoContactMeasure(m->fe, m->of_fe, m->U, m->Lambda, m->contact, m->model->facet, &state));
   p->n_facing = state.n_facing;
   p->overlap = state.overlap;
   p->sliding = state.sliding;
   p->n_dependent = -1;
-  for (PetscInt k = 0; k < m->trace.n_listed; k++)
+  for (PetscInt k = 0; k < m->trace.n_listed; k++) {
     p->n_dependent = PetscMax(p->n_dependent, m->trace.history.step[k].n_dependent);
+    p->sliding = PetscMax(p->sliding, m->trace.history.step[k].sliding); /* contacts may be open at the end */
+  }
   if (m->model->traits.surfaces && p->reason > 0 && !m->trace.n_listed)
     PetscCall(HycoRowsCountDependent(m->model->pairs.n, m->rows.start, m->rows.dof, m->rows.value, m->rows.gap,
                                      m->fe->n_dof, m->U, m->Lambda, &p->n_dependent));

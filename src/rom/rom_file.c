@@ -434,6 +434,8 @@ static PetscErrorCode MoveProblem(HycoH5 h, HycoROM m)
   PetscCall(MovePairs(h, *nodes, m->model->scene->n_contacts, &m->model->pairs));
   PetscCall(HycoH5Int(h, "problem/in_rid", 0, 1, &m->model->pairs.n, 1, &m->model->in_rid));
   PetscCall(MoveReach(h, m));
+  if (HycoH5Reads(h) ? HycoH5Has(h, "problem/facet") : m->model->facet != NULL)
+    PetscCall(HycoH5Real(h, "problem/facet", &m->model->pairs.n, 1, &m->model->facet));
   PetscCall(HycoFloatingMove(h, m));
   if (HycoH5Reads(h)) m->model->l = m->model->n_fe = m->model->n_points = -1;
   PetscCall(HycoH5Real(h, "problem/singular_values", &m->model->l, 1, &m->model->sigma));

@@ -79,10 +79,13 @@ PetscErrorCode HycoTraceList(HycoROM m, PetscReal **sigma, PetscReal **inelastic
 PetscErrorCode HycoTraceMeasure(HycoROM m, HycoStep *s)
 {
   const PetscInt dim = m->fe->dim, *node;
+  HycoContactState state;
   PetscInt n;
 
   PetscFunctionBegin;
   s->n_dependent = -1; /* unless the type knows its surfaces */
+  PetscCall(HycoContactMeasure(m->fe, m->of_fe, m->U, m->Lambda, m->contact, m->model->facet, &state));
+  s->sliding = state.sliding;
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
     s->total_contact_force += m->Lambda[k];
     s->lambda_max = PetscMax(s->lambda_max, m->Lambda[k]);

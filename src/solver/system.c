@@ -227,11 +227,11 @@ static PetscReal Quotient(PetscReal a, PetscReal b)
 }
 
 /* Removes from r the part due to the rounding of x, entries of at most 16 eps (|K_ii x_i| + |F_i|); returns their
-   norm. Rounding x to doubles leaves a residual of this size whatever the solver does. */
-static PetscErrorCode DropRounding(HycoSystem s, Vec x, Vec r, Vec diagonal, PetscReal *dropped)
+   norm. Rounding x to doubles leaves a residual of this size whatever the solver does. *terms: the norm of K_ii x_i. */
+static PetscErrorCode DropRounding(HycoSystem s, Vec x, Vec r, Vec diagonal, PetscReal *dropped, PetscReal *terms)
 {
   PetscInt n;
-  PetscReal squares = 0, sum;
+  PetscReal squares[2] = {0, 0}, sum[2];
   PetscScalar *residual;
   const PetscScalar *K, *X, *F;
 
@@ -243,18 +243,20 @@ static PetscErrorCode DropRounding(HycoSystem s, Vec x, Vec r, Vec diagonal, Pet
   PetscCall(VecGetArrayRead(x, &X));
   PetscCall(VecGetArrayRead(s->F, &F));
   for (PetscInt i = 0; i < n; i++) {
+    squares[1] += PetscSqr(K[i] * X[i]);
     /* Negated, so that a NaN stays in the residual. */
     if (!(PetscAbsReal(residual[i]) <= 16 * PETSC_MACHINE_EPSILON * (PetscAbsReal(K[i] * X[i]) + PetscAbsReal(F[i]))))
       continue;
-    squares += residual[i] * residual[i];
+    squares[0] += residual[i] * residual[i];
     residual[i] = 0;
   }
   PetscCall(VecRestoreArrayRead(x, &X));
   PetscCall(VecRestoreArrayRead(s->F, &F));
   PetscCall(VecRestoreArrayRead(diagonal, &K));
   PetscCall(VecRestoreArray(r, &residual));
-  PetscCallMPI(MPI_Allreduce(&squares, &sum, 1, MPIU_REAL, MPI_SUM, HycoComm(s)));
-  *dropped = PetscSqrtReal(sum);
+  PetscCallMPI(MPI_Allreduce(squares, sum, 2, MPIU_REAL, MPI_SUM, HycoComm(s)));
+  *dropped = PetscSqrtReal(sum[0]);
+  *terms = PetscSqrtReal(sum[1]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -264,7 +266,7 @@ static PetscErrorCode DropRounding(HycoSystem s, Vec x, Vec r, Vec diagonal, Pet
 static PetscErrorCode Stationarity(HycoSystem s, Vec x, Vec L, PetscReal *value, PetscReal *rounding)
 {
   Vec Kx = s->work_x[0], BtL = s->work_x[1];
-  PetscReal nK, nB = 0, nF, nr, size, dropped = 0, free_work;
+  PetscReal nK, nB = 0, nF, nr, size, dropped = 0, terms = 0, free_work;
 
   PetscFunctionBegin;
   PetscCall(VecNorm(s->F, NORM_2, &nF));
@@ -277,9 +279,11 @@ static PetscErrorCode Stationarity(HycoSystem s, Vec x, Vec L, PetscReal *value,
   PetscCall(VecNorm(Kx, NORM_2, &nK));
   if (s->m) PetscCall(VecAXPY(Kx, 1, BtL));
   PetscCall(VecAXPY(Kx, -1, s->F));
-  PetscCall(DropRounding(s, x, Kx, BtL, &dropped));
+  PetscCall(DropRounding(s, x, Kx, BtL, &dropped, &terms));
   PetscCall(VecNorm(Kx, NORM_2, &nr));
   size = PetscMax(PetscMin(nK, nB + nF), PetscMax(nB, nF));
+  /* Without any force x is a rigid motion, whose K x is round-off of its terms. */
+  if (size == 0) size = terms;
   /* Absolute: paths compare it with Newton's residual. */
   s->residual = nr;
   *value = PetscMax(Quotient(nr, size), free_work);

@@ -1,5 +1,6 @@
 """Floating bodies, and unconstrained bodies: K is singular, the contact problem of the former is not."""
 import csv
+import json
 import os
 import subprocess
 import sys
@@ -96,6 +97,44 @@ class Overhang(Case):
                 self.solved(found)
                 self.assertLess(found['n_facing'], found['n_contacts'])
                 self.near(found['contacts']['c']['force'][1], -6, 1e-9)
+
+    def test_unloaded(self):
+        """A block without a load carries no force: it stays as drawn, or moves by what it overlaps; said in one line; no gradient, which would be that of nothing.
+        So in a set and in a model. A row of a point without a solution has no numbers."""
+        grid, axis = Grid(), np.linspace(0, 1, 7)
+        grid.box('quad4', [2 * np.linspace(0, 1, 13), axis - 1], lambda x: x, 'base', {'y1': 'seat', 'y0': 'ground'})
+        grid.box('quad4', [axis + 0.5, axis], lambda x: x, 'block', {'y0': 'under', 'y1': 'top'})
+        self.written('scene: {mesh: mesh.msh, parameters: [load, soft]}\nparameter: {load: {range: [0, 9]}, soft: {range: [0.5, 2]}}\n'
+                     'body: {base: {young: 1000*soft}, block: {young: 1000}}\nfixed: {ground: {x: 0, y: 0}, top: {x: 0}}\npressure: {top: load}\n'
+                     'contact: {c: {type: surface, slave: under, master: seat, gap: "0.003*(x - 1) + GAP"}}\noutput: {rise: {max: u_y, group: block}}\n', grid)
+        with open(self.path('scene.yaml'), encoding='ascii') as file:
+            text = file.read()
+        for gap, rise in ((0.01, 0), (-0.02, 0.0215)):
+            self.written(text.replace('GAP', str(gap)))
+            run = self.run_raw('solve', '-scene', 'scene.yaml', '-mu', '0,1', '-report', self.path('r.json'))
+            self.assertEqual((run.returncode, run.stdout.count('no contact force keeps body block from moving along (0, 1, 0)')), (0, 1), run.stdout + run.stderr)
+            with open(self.path('r.json'), encoding='utf-8') as file:
+                report = json.load(file)
+            self.assertEqual((report['total_contact_force'], report['n_active']), (0, 0))
+            self.assertAlmostEqual(report['outputs']['rise'], rise, 12)
+            run = self.run_raw('solve', '-scene', 'scene.yaml', '-mu', '0,1', '-gradient')
+            self.assertEqual((run.returncode, run.stderr.count('\n')), (1, 1))
+            self.assertIn('no load presses a body here', run.stderr)
+        self.hyco('train', '-scene', 'scene.yaml', '-grid', '2,2', '-model', self.path('m.h5'), '-hyco_model_type', 'bodies')
+        for command in (('solve', '-scene', 'scene.yaml'), ('predict', '-model', 'm.h5')):
+            run = self.run_raw(*command, '-values_load', '0,6', '-values_soft', 1.5, '-table', self.path('t.csv'))
+            self.assertEqual(run.returncode, 0, run.stderr)
+            self.assertEqual(run.stdout.count('warning: at 1 of 2 points no contact force keeps a body'), command[0] == 'solve', run.stdout)
+            rows = np.genfromtxt(self.path('t.csv'), delimiter=',', names=True)
+            self.assertEqual(rows['total_contact_force'][0], 0)
+            self.near(rows['total_contact_force'][1], 6, 1e-6)
+            self.near(rows['rise'][0], 0.0215, 1e-9)
+        run = self.run_raw('solve', '-scene', 'scene.yaml', '-values_load', '6,-6', '-parameter_load_range', '-9,9', '-values_soft', 1.5, '-table', self.path('t.csv'))
+        self.assertEqual(run.returncode, 1)
+        rows = np.genfromtxt(self.path('t.csv'), delimiter=',', names=True)
+        self.assertEqual(rows['converged'].tolist(), [1, 0])
+        for name in rows.dtype.names:
+            self.assertEqual(bool(np.isnan(rows[name][1])), name not in ('load', 'soft', 'kkt_max', 'converged', 'iterations', 'seconds'), name)
 
     def test_travels(self):
         """A block that contact alone holds at places far apart: as a set each is the single solution, and `check` accepts the range."""

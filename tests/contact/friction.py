@@ -49,6 +49,14 @@ contact: {plane: {group: base, normal: {y: -1}, gap: "GAP", friction: 0.5}}
 history: {times: [0, 1, 2, 3, 4, 5], tables: {v: [[0, 0], [1, 2], [2, 2], [3, 1], [4, 0], [5, 2]], h: [[1, 0], [2, 0.2], [3, -0.1], [4, 0]]}}
 output: {N: {force: y, contact: plane}, T: {friction: x, contact: plane}}
 """
+RELEASED = """
+scene: {mesh: mesh.msh}
+body: {block: {young: 1000, poisson: 0.3}, lid: {young: 2000, poisson: 0.3}}
+fixed: {top: {x: "0.2*max(min(t - 1, 1), 0)", y: "-0.01*p"}}
+contact: {floor: {group: base, normal: {y: -1}, gap: 0, friction: 0.2}, cover: {type: surface, slave: back, master: under, friction: 0.4}}
+history: {times: [0, 1, 2, 3], tables: {p: [[0, 0], [1, 1], [2, 1], [3, 0]]}}
+output: {along: {mean: u_x, group: block}, up: {mean: u_y, group: block}}
+"""
 RING = """
 scene: {mesh: mesh.msh, formulation: axisymmetric}
 body: {ring: {young: 1000, poisson: 0.3}}
@@ -127,7 +135,8 @@ class Friction(Case):
         self.assertIn('body block', run.stderr)
 
     def test_unloaded(self):
-        """The block that friction holds, with its load taken away and applied again: no forces at the time without a load."""
+        """The block that friction holds, with its load taken away and applied again: no forces at the time without a load. So a block that a lid
+        has drawn along and leaves: it stays there, and a line says that nothing holds it."""
         grid = Grid()
         grid.box('quad4', [np.linspace(0, 2, 9), np.linspace(0, 1, 5)], lambda x: x, 'block', {'y0': 'base', 'y1': 'top'})
         grid.write(self.path('mesh.msh'))
@@ -136,6 +145,18 @@ class Friction(Case):
             for row, normal, tangential in zip(rows, (0, 4, 4, 2, 0, 4), (0, 0, -0.4, 0.2, 0, 0)):
                 self.assertLess(abs(row['N'] - normal), 1e-8)
                 self.assertLess(abs(row['T'] - tangential), 1e-8)
+
+        grid = Grid()
+        grid.box('quad4', [np.linspace(0, 2, 9), np.linspace(0, 1, 5)], lambda x: x, 'block', {'y0': 'base', 'y1': 'back'})
+        grid.box('quad4', [np.linspace(0, 2, 7), np.linspace(1, 1.5, 4)], lambda x: x, 'lid', {'y0': 'under', 'y1': 'top'})
+        grid.write(self.path('mesh.msh'))
+        scene = self.changed('scene.yaml', RELEASED, ())
+        rows = self.rows(scene)
+        self.assertEqual(rows[3]['total_contact_force'], 0)
+        self.assertGreater(rows[2]['along'], 0.15)  # the lid has drawn it along
+        self.assertLess(abs(rows[3]['along'] - rows[2]['along']), 0.01)  # where it stays
+        self.assertLess(abs(rows[3]['up']), 1e-12)
+        self.assertIn('no contact force keeps body block', self.run_raw('solve', '-scene', scene).stdout)
 
     def test_ring(self):
         """A ring in a bore that is too small, pushed along it: the resultant is mu times the radial force, and balances the support's."""

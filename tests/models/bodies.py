@@ -386,9 +386,11 @@ class Bodies(Case):
         said = self.hyco('check', '-scene', self.write('turned.yaml', TURNED))['bodies_by_parameter']
         self.assertIn('size: enlarges body cylinder uniformly', said)
         self.assertIn('turn: moves body cylinder rigidly', said)
-        half = self.write('half.yaml', TURNED.replace('cylinder_top: {x: 0,', 'cylinder_top: {') + 'spring: {cylinder_top: {x: 9}}\n')
-        self.assertIn('turn: changes the shape or the material of body cylinder', self.hyco('check', '-scene', half)['bodies_by_parameter'],
-                      'a spring along one component does not turn with the body')
+        for held in ('y: -press', 'normal: -press, direction: {x: 1, y: 2}'):
+            half = self.write('half.yaml', TURNED.replace('x: 0, y: -press', held) + 'spring: {cylinder_top: {x: 9}}\n')
+            said = self.hyco('check', '-scene', half)['bodies_by_parameter']
+            self.assertIn('turn: turns body cylinder without its support cylinder_top, which needs samples', said)
+            self.assertNotIn('turn: changes the shape', said)
         said = self.hyco('check', '-scene', HERTZ)['bodies_by_parameter']
         self.assertIn('radius: changes the shape or the material of body upper, which needs samples', said)
 

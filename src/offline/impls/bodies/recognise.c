@@ -17,7 +17,7 @@
 PetscErrorCode HycoBodyPartsDestroy(HycoBodyParts *parts)
 {
   PetscFunctionBegin;
-  HycoFreeAll(&parts->name, &parts->of, &parts->enters, &parts->together);
+  HycoFreeAll(&parts->name, &parts->of, &parts->enters, &parts->support, &parts->together);
   parts->n = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -41,6 +41,8 @@ static PetscErrorCode FindParts(HycoFOM f, HycoBodyParts *parts)
   PetscCallMPI(MPI_Allreduce(MPI_IN_PLACE, &parts->n, 1, MPIU_INT, MPI_MAX, HycoComm(f)));
   PetscCall(PetscCalloc1(parts->n, &parts->name));
   PetscCall(PetscCalloc1(parts->n * parts->n_parameters + 1, &parts->enters));
+  PetscCall(PetscMalloc1(parts->n * parts->n_parameters + 1, &parts->support));
+  for (PetscInt k = 0; k < parts->n * parts->n_parameters; k++) parts->support[k] = -1;
   PetscCall(PetscMalloc1(parts->n, &parts->together));
   PetscCall(PetscCalloc1(parts->n * n_bodies, &in));
   for (PetscInt e = 0; e < f->part->n_cells; e++)
@@ -62,7 +64,8 @@ static PetscErrorCode FindParts(HycoFOM f, HycoBodyParts *parts)
 typedef struct {
   HycoFOM f;
   HycoBodyParts *parts;
-  PetscReal *X0;                 /* the nodes at the first point */
+  const PetscReal *first;        /* the first point */
+  PetscReal *X0;                 /* the nodes there */
   Mat K;                         /* at the current point */
   Vec v, y, now, product, F0, F; /* at the first point: v, K v, F */
   HycoPose *pose;
@@ -280,6 +283,62 @@ static PetscErrorCode Shifted(Compared *c, PetscBool moved[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether the direction of an oblique support at node i is not the one that turns with its body. */
+static PetscErrorCode StaysBehind(const Compared *c, const HycoFixed *fixed, PetscInt i, PetscBool *stays)
+{
+  const HycoPose *pose = &c->pose[c->parts->of[i]];
+  const PetscInt dim = c->f->part->dim;
+  PetscReal before[3] = {0, 0, 0}, turned[3] = {0, 0, 0}, now[3] = {0, 0, 0}, along = 0, size[2] = {0, 0};
+
+  PetscFunctionBegin;
+  for (PetscInt d = 0; d < dim; d++) {
+    if (!fixed->direction[d]) continue;
+    PetscCall(HycoExprEval(fixed->direction[d], c->first, 1, c->X0 + 3 * i, &before[d]));
+    PetscCall(HycoExprEval(fixed->direction[d], c->f->fe->mu, 1, c->f->fe->X + 3 * i, &now[d]));
+  }
+  HycoPoseTurn(pose->Q, dim, PETSC_FALSE, before, turned);
+  for (PetscInt d = 0; d < dim; d++) {
+    along += now[d] * turned[d];
+    size[0] += now[d] * now[d];
+    size[1] += turned[d] * turned[d];
+  }
+  *stays = (PetscBool)(PetscAbsReal(along) < (1 - SAME) * PetscSqrtReal(size[0] * size[1]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* support[]: by body, as in HycoBodyParts. After Compare(). Collective. */
+static PetscErrorCode FindSupports(const Compared *c, PetscInt support[])
+{
+  HycoMesh m = c->f->part;
+  HycoScene s = c->f->scene;
+  const PetscScalar *v;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < c->parts->n; k++) support[k] = -1;
+  PetscCall(VecGetArrayRead(c->now, &v));
+  for (PetscInt k = 0; k < s->n_fixed; k++) {
+    const HycoFixed *fixed = &s->fixed[k];
+    PetscInt g = 0;
+
+    PetscCall(HycoMeshFindGroup(m, "fixed", fixed->group, &g));
+    for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) {
+      const PetscInt i = m->group_node[j], own = HycoMeshOwned(m, i);
+      PetscBool stays = PETSC_FALSE;
+
+      /* A body that changes its shape has no turn. */
+      if (own < 0 || c->pose[c->parts->of[i]].residual > SIMILAR) continue;
+      /* As in Sums(): the turned probe does not vanish there. */
+      for (PetscInt d = 0; d < m->dim; d++)
+        stays = (PetscBool)(stays || (fixed->value[d] && PetscAbsReal(v[own * m->dim + d]) > SIMILAR));
+      if (fixed->normal && !stays) PetscCall(StaysBehind(c, fixed, i, &stays));
+      if (stays) support[c->parts->of[i]] = k;
+    }
+  }
+  PetscCall(VecRestoreArrayRead(c->now, &v));
+  HycoAllreduce(support, c->parts->n, MPIU_INT, MPI_MAX, HycoComm(c->f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Stores nodes, K v and F at this point, with which the others are compared. Collective. K v for one v (SetProbe()) in place of K: matrices that differ agree on it by chance only. */
 static PetscErrorCode SetReference(Compared *c, const PetscReal mu[])
 {
@@ -330,9 +389,10 @@ static PetscErrorCode Visit(Compared *c, const PetscReal first[])
   HycoScene s = c->f->scene;
   PetscReal mu[HYCO_MAX_PARAMETERS];
   PetscBool *moved;
+  PetscInt *support;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(c->parts->n, &moved));
+  PetscCall(PetscMalloc2(c->parts->n, &moved, c->parts->n, &support));
   for (PetscInt q = 0; q < 2 * s->n_parameters; q++) {
     const PetscInt p = q / 2;
 
@@ -341,15 +401,17 @@ static PetscErrorCode Visit(Compared *c, const PetscReal first[])
     mu[p] = s->lo[p] + share[q % 2] * (s->hi[p] - s->lo[p]);
     PetscCall(Compare(c, mu));
     PetscCall(Shifted(c, moved));
+    PetscCall(FindSupports(c, support));
     for (PetscInt k = 0; k < c->parts->n; k++) {
       PetscInt ways = Ways(c, k);
 
       /* A body that is only moved needs no sample: in its own axes it stays the same. */
       if (moved[k] && !(ways & (HYCO_ENTERS_SHAPE | HYCO_ENTERS_SIZE))) ways |= HYCO_ENTERS_PLACE;
       c->parts->enters[k * s->n_parameters + p] |= ways;
+      if (ways & HYCO_ENTERS_SHAPE) c->parts->support[k * s->n_parameters + p] = support[k];
     }
   }
-  PetscCall(PetscFree(moved));
+  PetscCall(PetscFree2(moved, support));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -367,7 +429,7 @@ static PetscErrorCode CompareAll(Compared *c, const PetscReal first[])
    makes. */
 PetscErrorCode HycoBodyPartsFind(HycoFOM f, const PetscReal first[], HycoBodyParts *parts)
 {
-  Compared c = {.f = f, .parts = parts};
+  Compared c = {.f = f, .parts = parts, .first = first};
   Vec *const all[6] = {&c.y, &c.now, &c.product, &c.F0, &c.F, &c.v};
   PetscErrorCode ierr;
 
@@ -396,7 +458,7 @@ PetscErrorCode HycoBodyPartsFind(HycoFOM f, const PetscReal first[], HycoBodyPar
 
 /* "moves body cylinder rigidly, changes the loads of body block"; "" if the parameter enters no body. Loads of a path depend
    on time, and are not told. */
-static PetscErrorCode DescribeOne(const HycoBodyParts *parts, PetscInt p, PetscBool path, char text[HYCO_LINE])
+static PetscErrorCode DescribeOne(HycoScene s, const HycoBodyParts *parts, PetscInt p, char text[HYCO_LINE])
 {
   static const struct {
     PetscInt way;
@@ -413,9 +475,11 @@ static PetscErrorCode DescribeOne(const HycoBodyParts *parts, PetscInt p, PetscB
     char names[HYCO_LINE] = "", one[HYCO_LINE];
 
     /* Of a path every load changes in time: the words would tell nothing. */
-    if (path && words[w].way == HYCO_ENTERS_LOADS) continue;
+    if (s->n_times && words[w].way == HYCO_ENTERS_LOADS) continue;
     for (PetscInt k = 0; k < parts->n; k++) {
       const PetscInt enters = parts->enters[k * parts->n_parameters + p];
+
+      if (parts->support[k * parts->n_parameters + p] >= 0) continue; /* below */
 
       /* A body that needs samples has nothing exact to tell of this parameter. */
       if (!(enters & words[w].way) || (words[w].way != HYCO_ENTERS_SHAPE && enters & HYCO_ENTERS_SHAPE)) continue;
@@ -423,6 +487,15 @@ static PetscErrorCode DescribeOne(const HycoBodyParts *parts, PetscInt p, PetscB
     }
     if (!names[0]) continue;
     HycoFormat(one, "%s body %s%s", words[w].before, names, words[w].after);
+    PetscCall(HycoListAdd(text, ", ", one));
+  }
+  for (PetscInt k = 0; k < parts->n; k++) {
+    const PetscInt support = parts->support[k * parts->n_parameters + p];
+    char one[HYCO_LINE];
+
+    if (support < 0) continue;
+    HycoFormat(one, "turns body %s without its support %s, which needs samples", parts->name[k],
+               s->fixed[support].group);
     PetscCall(HycoListAdd(text, ", ", one));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -463,7 +536,7 @@ PetscErrorCode HycoBodyPartsDescribe(HycoScene s, const HycoBodyParts *parts, ch
   PetscFunctionBegin;
   text[0] = '\0';
   for (PetscInt p = 0; p < s->n_parameters; p++) {
-    PetscCall(DescribeOne(parts, p, (PetscBool)(s->n_times > 0), one));
+    PetscCall(DescribeOne(s, parts, p, one));
     HycoFormat(line, "%s: %s", s->parameter[p],
                one[0]       ? one
                : s->n_times ? "leaves places and elastic stiffness as they are"

@@ -364,6 +364,8 @@ static PetscErrorCode AddForces(const HycoBodiesPath w, PetscInt l)
   PetscBLASInt rows, modes, n;
 
   PetscFunctionBegin;
+  if (w->summed) PetscFunctionReturn(PETSC_SUCCESS);
+  w->summed = PETSC_TRUE;
   /* Without contacts the strains follow alpha alone. */
   PetscCall(PetscArraycpy(w->S, w->response, w->n_rows * l));
   if (!w->n_set || !l || !w->n_rows) PetscFunctionReturn(PETSC_SUCCESS);
@@ -376,6 +378,20 @@ static PetscErrorCode AddForces(const HycoBodiesPath w, PetscInt l)
   /* One product of n_set rows instead of a loop over contacts: S is the largest table of a step. */
   BLASgemm_("N", "T", &modes, &rows, &n, &one, w->Z, &modes, strain, &rows, &one, w->S, &modes); /* S, Z by rows */
   PetscCall(PetscFree(strain));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* e += S alpha: by S, or by the terms of its sum, which a set with no tangent of its own does without. */
+static PetscErrorCode AddStrains(HycoBodiesPath w, PetscInt l, const PetscReal alpha[])
+{
+  PetscFunctionBegin;
+  PetscCall(Multiply(PETSC_FALSE, w->n_rows, l, w->summed ? w->S : w->response, alpha, 1, 1, w->e));
+  for (PetscInt i = 0; i < w->n_set && !w->summed; i++) {
+    PetscReal force = 0;
+
+    for (PetscInt k = 0; k < l; k++) force += w->Z[i * l + k] * alpha[k];
+    HycoBodiesAdd(w->n_rows, force, w->column[w->set[i]] + w->gaps, w->e);
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -394,7 +410,7 @@ static PetscErrorCode TakeSet(HycoROM m)
   for (PetscInt i = 0; i < w->n_set; i++) PetscCall(PetscArraycpy(w->Z + i * l, w->BP + w->set[i] * l, l));
   PetscCall(TakeMotions(w, w->bodies.bodies->p));
   PetscCall(Balance(w, w->bodies.bodies->p, l, NULL, w->Z, w->x));
-  PetscCall(AddForces(w, l));
+  w->summed = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -555,7 +571,7 @@ static PetscErrorCode Evaluate(HycoROM m, PetscReal t0, PetscReal t1, const Pets
 
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(w->e, w->e0, w->n_rows));
-  PetscCall(Multiply(PETSC_FALSE, w->n_rows, in->m, w->S, alpha, 1, 1, w->e));
+  PetscCall(AddStrains(w, in->m, alpha));
   /* The state at t0 is only read: a refused or repeated step starts from it again. */
   PetscCall(HycoFEStepPoints(m->fe, in->n_points, w->point, w->e, t0, t1, w->path->begin, w->s, w->size,
                              tangent ? w->lost : NULL, &a->law));
@@ -586,6 +602,7 @@ static PetscErrorCode Tangent(HycoROM m, HycoStepAttempt *a)
   PetscBLASInt lb, rows, info;
 
   PetscFunctionBegin;
+  PetscCall(AddForces(w, l));
   PetscCall(PetscBLASIntCast(l, &lb));
   PetscCall(PetscBLASIntCast(w->n_rows, &rows));
   PetscCall(PetscArrayzero(w->J, l * l));
@@ -770,13 +787,14 @@ static PetscErrorCode TakeStates(HycoROM m, const PetscReal alpha[], HycoStepAtt
   PetscBool changed = w->fresh, regular;
 
   PetscFunctionBegin;
+  if (w->fresh) w->factored = PETSC_FALSE;
   PetscCall(HycoBodiesFrictionDerive(w->friction, l, w->BP, &changed, &w->n_set, w->set, &w->Z, &regular));
   if (!regular) HycoFormat(a->why, "the contact forces with friction have no derivative");
   w->fresh = (PetscBool)!regular;
   if (changed) {
-    w->factored = PETSC_FALSE;
+    /* The tangent of other states stays while it contracts, like that of other strains. */
+    w->summed = PETSC_FALSE;
     for (PetscInt k = 0; k < w->n_set; k++) PetscCall(Column(m, w->set[k]));
-    PetscCall(AddForces(w, l));
     PetscCall(PetscFree(w->z));
     PetscCall(PetscMalloc1(w->n_set + 1, &w->z));
   }

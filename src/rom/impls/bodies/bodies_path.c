@@ -76,6 +76,8 @@ static PetscErrorCode Iterate(HycoPath p, PetscReal t0, PetscReal t1, HycoStepAt
   /* The option tangent renews in each iteration from the first one on. */
   w->always = (PetscBool)(p->method == HYCO_NEWTON_TANGENT);
   PetscCall(HycoBodiesSearch(m, t0, t1, alpha, L, a));
+  /* Iterations with a kept tangent are many and cheap: they must not keep steps shorter than those of full order. */
+  a->easy = (PetscBool)!a->why[0];
   if (a->why[0] && !w->always && (w->n_rows || !w->friction)) { /* again from the begin of the step */
     /* alpha and the forces of the last accepted time. */
     PetscCall(HycoVecRead(p->U_old, p->n_free, alpha));

@@ -34,7 +34,8 @@ typedef struct _n_HycoBodiesPath {
   PetscReal *lost, *X;      /* n_rows x n_sigma: derivative of s; n_rows x m: times S */
   PetscReal *r, *J;         /* m, m x m */
   PetscBLASInt *pivot;      /* of J's factor, */
-  PetscBool factored;       /* which belongs to the set */
+  PetscBool factored;       /* which belongs to this set, or one before of the same path */
+  PetscBool summed;         /* S is that of the set */
   PetscReal *last;          /* by body: kappa and weights of its samples to which the columns belong, */
   PetscInt place;           /* and the place of fe's nodes */
   PetscBool always;         /* a new tangent in each iteration */

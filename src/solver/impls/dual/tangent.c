@@ -30,7 +30,7 @@ PetscInt HycoSolverTangentUndecided(HycoSolverTangent t)
 static PetscErrorCode Close(HycoSolverTangent t, Vec x, Vec L)
 {
   HycoSystem y = t->s->system;
-  PetscReal *force, *gap, *flexibility, sizes[2];
+  PetscReal *force, *gap, *flexibility, sizes[2], most;
   const PetscReal *S;
   PetscInt *state;
   PetscBool regular;
@@ -51,6 +51,10 @@ static PetscErrorCode Close(HycoSolverTangent t, Vec x, Vec L)
   PetscCall(HycoTangentStates(t->m, force, gap, PetscMax(sizes[0], sizes[1]), flexibility, state));
   PetscCall(HycoTangentCreate(t->p, t->m, S, state, &t->tangent, &regular));
   PetscCall(PetscFree4(force, gap, flexibility, state));
+  PetscCall(VecNorm(L, NORM_INFINITY, &most));
+  PetscCheck(regular || most > 0, HycoComm(t->s), PETSC_ERR_USER,
+             "no load presses a body here that contact alone holds, so that its position has no derivative; take a point "
+             "at which it carries a load");
   PetscCheck(regular, HycoComm(t->s), PETSC_ERR_USER,
              "the forces of the closed contacts are not unique here, so that they have no derivative; remove contacts "
              "whose gaps follow from those of others");

@@ -1,0 +1,60 @@
+/*
+  Floating bodies on which no load acts: contact forces 0 solve w = q + M z, z = (x, forces), where a motion x leaves no
+  gap negative, q + G x >= 0 with G the columns of x in M. The nearest one to a given x is a problem of least distance, a
+  nonnegative least-squares problem in multipliers (C. L. Lawson, R. J. Hanson, Solving Least Squares Problems (1974),
+  chapter 23).
+*/
+#include <hycoalgorithms.h>
+#include <hycolcp.h>
+
+#define APART 1e-8 /* residual of that problem, whose right-hand side is 1: below, no motion opens all contacts */
+
+/* G d >= -w, |d| least: with E = (G, -w)^T and u >= 0 of least |E u - e|, e = (0, 1), d = -r / r_last for r = E u - e. */
+static PetscErrorCode LeastDistance(PetscInt p, PetscInt n, const PetscReal E[], PetscReal d[], PetscBool *exists)
+{
+  PetscReal *u, *e, *r, residual;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n, &u));
+  PetscCall(PetscCalloc2(p + 1, &e, p + 1, &r));
+  e[p] = 1;
+  PetscCall(HycoNNLS(p + 1, n, E, e, u, &residual));
+  for (PetscInt i = 0; i <= p; i++) r[i] = -e[i];
+  for (PetscInt k = 0; k < n; k++) {
+    for (PetscInt i = 0; i <= p; i++) r[i] += u[k] * E[k * (p + 1) + i];
+  }
+  *exists = (PetscBool)(residual > APART && r[p] < 0);
+  for (PetscInt i = 0; i < p && *exists; i++) d[i] = -r[i] / r[p];
+  PetscCall(PetscFree(u));
+  PetscCall(PetscFree2(e, r));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* M: N x N by columns, of which the first p are G; row[n]: the contacts' normal rows. x stays where it leaves no gap
+   negative. */
+PetscErrorCode HycoLCPUnload(PetscInt N, PetscInt p, PetscInt n, const PetscInt row[], const PetscReal M[],
+                             const PetscReal q[], PetscReal x[], PetscBool *exists)
+{
+  PetscReal *E, *d, most = 0, least = 0;
+
+  PetscFunctionBegin;
+  *exists = PETSC_TRUE;
+  PetscCall(PetscMalloc2(n * (p + 1) + 1, &E, p + 1, &d));
+  for (PetscInt k = 0; k < n; k++) {
+    PetscReal *column = E + k * (p + 1), w = q[row[k]];
+
+    for (PetscInt i = 0; i < p; i++) {
+      column[i] = M[(size_t)i * (size_t)N + (size_t)row[k]];
+      w += column[i] * x[i];
+    }
+    column[p] = -w;
+    most = PetscMax(most, PetscAbsReal(w));
+    least = PetscMin(least, w);
+  }
+  /* In units of the largest gap, so that the rows of E are alike. */
+  for (PetscInt k = 0; k < n && least < 0; k++) E[k * (p + 1) + p] /= most;
+  if (least < 0) PetscCall(LeastDistance(p, n, E, d, exists));
+  for (PetscInt i = 0; i < p && least < 0 && *exists; i++) x[i] += most * d[i];
+  PetscCall(PetscFree2(E, d));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
