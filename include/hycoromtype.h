@@ -73,10 +73,10 @@ typedef struct _HycoROMOps {
   PetscErrorCode (*jacobian)(HycoROM, PetscInt k, const PetscInt contact[],
                              PetscReal M[]); /* of x and these k forces, p + k square by columns, at the last mu */
   PetscErrorCode (*beside)(
-      HycoROM, const PetscReal mu[], const PetscInt contact[], const PetscReal z[], PetscInt point,
-      PetscReal w[]); /* NULL, or in place of `residual` beside the last prediction: w of z to the first
-                                              order, of the contacts that the model has at the time, contact[] of all; keeps the change of the
-                                              data as that of `point`, 1 to 4 */
+      HycoROM, const PetscReal mu[], PetscInt n, const PetscInt contact[], PetscBool rows, const PetscReal z[],
+      PetscInt point, PetscReal w[]); /* NULL, or in place of `residual` beside the last prediction: w of z to the first
+                                         order, of n contacts; rows: theirs change, and are those that the model has at
+                                         the time. Keeps the change of the data as that of `point`, 1 to 4 */
   PetscErrorCode (*slope)(HycoROM, PetscInt n, const PetscInt contact[], const PetscReal weight[2],
                           const PetscInt point[2], const PetscReal dz[], PetscReal dgamma[],
                           PetscReal dU[]); /* with `beside`: the derivatives of the modes' coefficients and of the

@@ -308,7 +308,7 @@ void HycoBodiesFrictionNormal(HycoBodiesFriction friction, PetscReal Lambda[]);
 const HycoSlip *HycoBodiesFrictionSlip(HycoBodiesFriction friction);
 PetscErrorCode HycoBodiesFrictionDisproven(HycoBodiesFriction friction, PetscBool *disproven);
 /* Parts of a solve for gradients. HycoBodiesBring(): the data of the bodies, c and the rows at mu, as HycoBodiesPrepare();
-   o->gap: those of the rows. HycoBodiesBlend(): sum[n] of the samples' numbers by their weights. HycoBodiesYield(): u -= C f /
+   o->gap: those of the rows (surface NULL: these stay). HycoBodiesBlend(): sum[n] of the samples' numbers by their weights. HycoBodiesYield(): u -= C f /
    kappa. HycoBodiesRows(): those of the fields of body k, of which n are turns times modes, then the unknowns inside;
    HycoBodiesAddRows(): row += a x - H f. */
 PetscErrorCode HycoBodiesBring(HycoBodiesWork work, const HycoBodiesSurface *surface, const PetscReal mu[]);
@@ -326,8 +326,8 @@ PetscErrorCode HycoBodiesUnknowns(HycoROM model, PetscInt *p, PetscInt *n, Petsc
 PetscErrorCode HycoBodiesResidual(HycoROM model, const PetscReal mu[], const PetscReal z[], PetscReal w[],
                                   PetscReal *size);
 PetscErrorCode HycoBodiesJacobian(HycoROM model, PetscInt k, const PetscInt contact[], PetscReal M[]);
-PetscErrorCode HycoBodiesNear(HycoROM model, const PetscReal mu[], const PetscInt contact[], const PetscReal z[],
-                              PetscInt point, PetscReal w[]);
+PetscErrorCode HycoBodiesNear(HycoROM model, const PetscReal mu[], PetscInt n, const PetscInt contact[], PetscBool rows,
+                              const PetscReal z[], PetscInt point, PetscReal w[]);
 PetscErrorCode HycoBodiesSlope(HycoROM model, PetscInt n, const PetscInt contact[], const PetscReal weight[2],
                                const PetscInt point[2], const PetscReal dz[], PetscReal dgamma[], PetscReal dU[]);
 /* Sets the displacements of the surfaces and, after HycoBodiesExpand(), of the unknowns inside in U (by unknown of the

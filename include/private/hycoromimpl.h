@@ -247,6 +247,8 @@ PetscErrorCode HycoROMDropPairs(HycoPairs *own);
 /* Allocates the rows of contacts. */
 PetscErrorCode HycoRowsCreate(const HycoPairs *pairs, PetscInt dim, HycoRows *rows);
 PetscErrorCode HycoRowsDestroy(HycoRows *rows);
+/* Whether supports of fe hold a displacement of a row of these contacts. */
+PetscBool HycoRowsAreHeld(HycoFE fe, const HycoPairs *pairs);
 /* HycoContactRows(), with more room where mortars meet more masters. */
 PetscErrorCode HycoRowsFill(HycoFE fe, HycoPairs *pairs, HycoRows *rows);
 /* Updates the rows and gaps of all contacts, and U on all nodes of mesh, to the last prediction. */

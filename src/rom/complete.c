@@ -53,7 +53,7 @@ static PetscErrorCode CreateBeyond(HycoROM m)
 }
 
 /* Whether supports hold a displacement in a row: then it is a part of the gap. */
-static PetscBool AreHeld(HycoFE fe, const HycoPairs *pairs)
+PetscBool HycoRowsAreHeld(HycoFE fe, const HycoPairs *pairs)
 {
   const PetscInt dim = fe->dim;
 
@@ -73,7 +73,7 @@ static PetscErrorCode BringRows(HycoROM m, HycoFE fe, const PetscReal mu[])
   PetscCall(HycoFESetParameters(fe, mu));
   /* fe knows whether its parameters since the last rows affect these. */
   if (m->rows.filled && !fe->contact_changed &&
-      (!fe->gap_changed || (fe->supports_only && !fe->n_oblique && !AreHeld(fe, &m->pairs))))
+      (!fe->gap_changed || (fe->supports_only && !fe->n_oblique && !HycoRowsAreHeld(fe, &m->pairs))))
     PetscFunctionReturn(PETSC_SUCCESS);
   fe->ready = PETSC_FALSE; /* until its rows are computed */
   PetscCall(HycoRowsFill(fe, &m->pairs, &m->rows));

@@ -14,12 +14,13 @@ typedef struct {
   PetscReal mu[HYCO_MAX_PARAMETERS];
   PetscInt p, n, k, *contact; /* unknowns x, contacts; those that are closed or undecided */
   PetscInt *list;             /* n: the contacts of the problem, once the problem is that of some */
-  PetscBool near;
-  PetscReal *z, *moved; /* p + n */
-  PetscReal *dz;        /* p + n: along the parameter in hand */
-  PetscReal *w[5];      /* p + n: at the three points, and at closer ones */
-  PetscInt at[5];       /* the number of each among what the type keeps of points beside mu */
-  PetscReal *q, *v;     /* p + k */
+  PetscBool near, held;       /* held: supports hold nodes of the contacts */
+  PetscBool rows;             /* the parameter in hand moves or changes them, or outputs read more than them */
+  PetscReal *z, *moved;       /* p + n */
+  PetscReal *dz;              /* p + n: along the parameter in hand */
+  PetscReal *w[5];            /* p + n: at the three points, and at closer ones */
+  PetscInt at[5];             /* the number of each among what the type keeps of points beside mu */
+  PetscReal *q, *v;           /* p + k */
   PetscReal size;
   PetscBool focused;  /* the outputs' cells are few */
   PetscBool contacts; /* outputs read contacts alone, and the forces are those of z */
@@ -70,8 +71,8 @@ static PetscErrorCode MeasureMoved(Work *o, const PetscReal mu[], PetscReal step
   HycoPrediction p = {0};
 
   PetscFunctionBegin;
-  PetscCall(HycoROMBringRows(m, mu));
-  for (PetscInt k = 0; k < o->n; k++) m->Lambda[k] = o->z[o->p + k] + step * o->dz[o->p + k];
+  if (o->rows) PetscCall(HycoROMBringRows(m, mu));
+  for (PetscInt k = 0; k < o->n; k++) m->Lambda[o->rows ? k : o->list[k]] = o->z[o->p + k] + step * o->dz[o->p + k];
   for (PetscInt j = 0; j < m->model->l && !o->contacts; j++) m->gamma[j] = o->gamma[j] + step * o->dgamma[j];
   for (PetscInt j = 0; j < m->model->n_fe && !o->contacts; j++) {
     const PetscInt i = m->model->fe_dof[j];
@@ -90,6 +91,10 @@ static PetscErrorCode MeasureNear(Work *o, const PetscReal mu[], PetscReal step,
   PetscInt side = 0;
 
   PetscFunctionBegin;
+  if (!o->rows) {
+    PetscCall(MeasureMoved(o, mu, step, output));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(PetscArraycmp(o->m->near[1].fe->mu, mu, o->m->model->scene->n_variables, &there));
   if (there) side = 1;
   HycoROMExchange(o->m, side);
@@ -171,6 +176,7 @@ static PetscErrorCode Focus(Work *o)
   if (!all) o->n = o->k;
   PetscCall(HycoROMMakeNear(m, o->n, o->list));
   o->near = PETSC_TRUE;
+  o->held = HycoRowsAreHeld(m->fe, &m->near[0].pairs);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -269,9 +275,12 @@ static PetscErrorCode Beside(Work *o, const HycoDifference *d, PetscInt point, P
 
   PetscFunctionBegin;
   HycoDifferencePoint(d, m->model->scene, o->mu, point, at);
-  if (o->near) {
+  if (o->near && !o->rows)
+    PetscCall((*m->ops->beside)(m, at, o->n, o->list, PETSC_FALSE, o->z, o->at[j], o->w[j]));
+  else if (o->near) {
     HycoROMExchange(m, point - 1);
-    HycoFinally((*m->ops->beside)(m, at, o->list, o->z, o->at[j], o->w[j]), HycoROMExchange(m, point - 1));
+    HycoFinally((*m->ops->beside)(m, at, o->n, o->list, PETSC_TRUE, o->z, o->at[j], o->w[j]),
+                HycoROMExchange(m, point - 1));
   } else
     PetscCall((*m->ops->residual)(m, at, o->z, o->w[j], &size));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -331,13 +340,13 @@ static PetscErrorCode Differentiate(Work *o, HycoDifference *d, PetscBool *kink)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a parameter moves nodes. */
-static PetscBool Moves(HycoScene s, PetscInt p)
+/* What a parameter changes. */
+static HycoChanges Changes(HycoScene s, PetscInt p)
 {
   PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE};
 
   changed[p] = PETSC_TRUE;
-  return HycoSceneChanges(s, changed).nodes;
+  return HycoSceneChanges(s, changed);
 }
 
 /* All columns. Those of parameters that move nodes last: the way back from one's points is a part of the way to the next
@@ -349,10 +358,12 @@ static PetscErrorCode Columns(Work *o, HycoGradient *gradient)
   PetscFunctionBegin;
   for (PetscInt k = 0; k < 2 * gradient->n_parameters; k++) {
     const PetscInt p = k % gradient->n_parameters;
+    const HycoChanges c = Changes(m->model->scene, p);
     HycoDifference d;
     PetscBool kink;
 
-    if (Moves(m->model->scene, p) != (k >= gradient->n_parameters)) continue;
+    if (c.nodes != (k >= gradient->n_parameters)) continue;
+    o->rows = (PetscBool)(!o->contacts || o->held || c.rows || c.gaps);
     HycoDifferenceSet(m->model->scene, o->mu, p, HYCO_GRADIENT_STEP, &d);
     PetscCall(Differentiate(o, &d, &kink));
     PetscCall(HycoGradientColumn(gradient, &m->gradient, m->model->scene, o->mu, &d, kink, Measure, o, o->output));

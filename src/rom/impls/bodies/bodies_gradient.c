@@ -192,7 +192,8 @@ static PetscErrorCode AddDisplacements(HycoBodiesWork o, const Parts *change, Pe
 }
 
 /* The change of the data to those of `at`, where the rows are of n contacts. */
-static void TakeChange(HycoBodiesWork o, PetscInt n, const PetscInt contact[], const PetscReal L[], PetscReal change[])
+static void TakeChange(HycoBodiesWork o, PetscInt n, const PetscInt contact[], PetscBool rows, const PetscReal L[],
+                       PetscReal change[])
 {
   const HycoSubstructures b = o->bodies;
   const HycoBodiesWork at = o->beside->at;
@@ -205,7 +206,7 @@ static void TakeChange(HycoBodiesWork o, PetscInt n, const PetscInt contact[], c
     for (PetscInt j = 0; j < b->body[k].n_samples; j++) *to++ = at->weight[k][j] - o->weight[k][j];
   }
   for (PetscInt i = 0; i < b->ns; i++) to[i] = 0;
-  for (PetscInt k = 0; k < n; k++) {
+  for (PetscInt k = 0; k < n && rows; k++) {
     if (L[k] == 0) continue;
     for (PetscInt e = at->row_start[k]; e < at->row_start[k + 1]; e++) to[at->row_at[e]] += at->row[e] * L[k];
     for (PetscInt e = o->row_start[contact[k]]; e < o->row_start[contact[k] + 1]; e++)
@@ -218,8 +219,8 @@ static void TakeChange(HycoBodiesWork o, PetscInt n, const PetscInt contact[], c
 }
 
 /* In place of HycoBodiesResidual() at mu: w of the change of the data, to the first order. */
-PetscErrorCode HycoBodiesNear(HycoROM m, const PetscReal mu[], const PetscInt contact[], const PetscReal z[],
-                              PetscInt point, PetscReal w[])
+PetscErrorCode HycoBodiesNear(HycoROM m, const PetscReal mu[], PetscInt n, const PetscInt contact[], PetscBool rows,
+                              const PetscReal z[], PetscInt point, PetscReal w[])
 {
   HycoBodiesWork o = (HycoBodiesWork)m->work, at;
   const HycoSubstructures b = o->bodies;
@@ -231,9 +232,9 @@ PetscErrorCode HycoBodiesNear(HycoROM m, const PetscReal mu[], const PetscInt co
   PetscCall(MakeBeside(m));
   at = o->beside->at;
   du = o->beside->du;
-  PetscCall(HycoROMBringRows(m, mu));
-  PetscCall(HycoBodiesBring(at, &s, mu));
-  TakeChange(o, s.n, contact, z + b->p, o->beside->change[point]);
+  if (rows) PetscCall(HycoROMBringRows(m, mu));
+  PetscCall(HycoBodiesBring(at, rows ? &s : NULL, mu));
+  TakeChange(o, n, contact, rows, z + b->p, o->beside->change[point]);
   change = PartsOf(o, o->beside->change[point]);
   PetscCall(PetscArrayzero(du, b->ns));
   PetscCall(AddDisplacements(o, &change, du));
@@ -242,12 +243,12 @@ PetscErrorCode HycoBodiesNear(HycoROM m, const PetscReal mu[], const PetscInt co
     for (PetscInt j = 0; j < b->r; j++) w[i] -= at->work[i * b->r + j] * o->c[j] + o->work[i * b->r + j] * change.c[j];
     for (PetscInt k = 0; k < b->ns; k++) w[i] += at->Z[k * b->p + i] * o->f[k] + o->Z[k * b->p + i] * change.f[k];
   }
-  for (PetscInt k = 0; k < s.n; k++) {
-    PetscReal gap = at->gap[k];
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscInt lo = o->row_start[contact[k]], hi = o->row_start[contact[k] + 1];
+    PetscReal gap = rows ? at->gap[k] : m->rows.gap[contact[k]];
 
-    for (PetscInt e = at->row_start[k]; e < at->row_start[k + 1]; e++) gap -= at->row[e] * o->u[at->row_at[e]];
-    for (PetscInt e = o->row_start[contact[k]]; e < o->row_start[contact[k] + 1]; e++)
-      gap -= o->row[e] * du[o->row_at[e]];
+    for (PetscInt e = at->row_start[k]; rows && e < at->row_start[k + 1]; e++) gap -= at->row[e] * o->u[at->row_at[e]];
+    for (PetscInt e = lo; e < hi; e++) gap -= o->row[e] * (du[o->row_at[e]] + (rows ? 0 : o->u[o->row_at[e]]));
     w[b->p + k] = gap;
   }
   PetscFunctionReturn(PETSC_SUCCESS);

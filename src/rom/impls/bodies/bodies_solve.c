@@ -919,7 +919,7 @@ static PetscErrorCode Bring(HycoBodiesWork o, const HycoBodiesSurface *s, const 
   } else
     PetscCall(HycoFESetParameters(o->fe, mu));
   if (forces) PetscCall(alone ? FindLoads(o) : Load(o));
-  PetscCall(TurnRows(o, s));
+  if (s) PetscCall(TurnRows(o, s));
   PetscCall(PetscArraycpy(o->mu, mu, o->fe->scene->n_variables));
   o->prepared = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
