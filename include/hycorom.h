@@ -199,10 +199,12 @@ PetscErrorCode HycoROMGetGradient(HycoROM model, HycoGradient *gradient);
 typedef struct {
   PetscReal misfit;                     /* root mean square of the relative differences from the targets */
   PetscReal scale[HYCO_MAX_QUANTITIES]; /* by target: what its difference is divided by */
-  PetscBool converged, kink;  /* the slope of the misfit vanishes within the ranges; derivatives are one-sided */
-  PetscInt evaluations;       /* predictions */
-  PetscInt n_starts, n_least; /* minimisations; those that ended at the least misfit */
-  char method[64];            /* TAO types of the best one */
+  PetscBool converged, kink;     /* the slope of the misfit vanishes within the ranges; derivatives are one-sided */
+  PetscInt evaluations;          /* predictions */
+  PetscInt n_starts, n_least;    /* minimisations; those that ended at the least misfit */
+  PetscInt n_free, n_determined; /* parameters that are not held; those that the targets determine near the answer, or
+                                    combinations of them: with fewer it is one of many */
+  char method[64];               /* TAO types of the best one */
 } HycoFit;
 #define HYCO_FIT_BRGN  "brgn"
 #define HYCO_FIT_BLMVM "blmvm"
@@ -210,7 +212,7 @@ typedef struct {
   Finds the parameters within the ranges at which n outputs of the model are closest to targets, output[n] their indices
   (of a path at its last listed time; n_outputs more: their largest over the listed times, path_quantity): the least squares of (output - target) / |target| (a target of 0: over the largest output at the samples), on the model's
   gradients by the TAO type `type`, then by the other one if that ends at no minimum. It minimises from the n_starts best
-  of n_samples predictions over the ranges, or (start: not NULL) from there alone. held[n_parameters]: values within the
+  of n_samples predictions (n_starts, if these are more) over the ranges, or (start: not NULL) from there alone. held[n_parameters]: values within the
   ranges that parameters keep, NaN: it is free; NULL: all are. mu[n_parameters] is the best answer, and
   the last prediction the one there. Not collective; on several ranks answers may differ in the last bits. Fails where
   HycoROMGetGradient() does, and if no prediction at a start converges.

@@ -72,7 +72,17 @@ typedef struct _HycoROMOps {
                                                   NULL: not needed); size: of gaps and displacements of the contacts */
   PetscErrorCode (*jacobian)(HycoROM, PetscInt k, const PetscInt contact[],
                              PetscReal M[]); /* of x and these k forces, p + k square by columns, at the last mu */
-  PetscErrorCode (*expand)(HycoROM);         /* sets what a solve sets (modes, displacements, forces) from that z */
+  PetscErrorCode (*beside)(
+      HycoROM, const PetscReal mu[], PetscInt n, const PetscInt contact[], PetscBool rows, const PetscReal z[],
+      PetscInt point, PetscReal w[]); /* NULL, or in place of `residual` beside the last prediction: w of z to the first
+                                         order, of n contacts; rows: theirs change, and are those that the model has at
+                                         the time. Keeps the change of the data as that of `point`, 1 to 4 */
+  PetscErrorCode (*slope)(HycoROM, PetscInt n, const PetscInt contact[], const PetscReal weight[2],
+                          const PetscInt point[2], const PetscReal dz[], PetscReal dgamma[],
+                          PetscReal dU[]); /* with `beside`: the derivatives of the modes' coefficients and of the
+                                              full-order displacements, for those of the data (the weighted sum of the
+                                              changes at two points) and of z */
+  PetscErrorCode (*expand)(HycoROM);       /* sets what a solve sets (modes, displacements, forces) from that z */
   PetscErrorCode (*view)(HycoROM, PetscViewer);
   PetscErrorCode (*save)(HycoROM, HycoH5);
   PetscErrorCode (*load)(HycoROM, HycoH5);

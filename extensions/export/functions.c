@@ -11,7 +11,24 @@
 #define MOST        40   /* functions */
 #define MANY        3000 /* candidates: more take too long */
 #define SAME        1e-13
-#define PASSES      3 /* of a solution by a pseudo-inverse */
+#define PASSES      3     /* of a solution by a pseudo-inverse */
+#define DEPENDENT   1e-10 /* share of an expression that is left beside a sum of others: round-off */
+
+static PetscReal Product(PetscInt n, const PetscReal a[], const PetscReal b[])
+{
+  PetscReal sum = 0;
+
+  for (PetscInt i = 0; i < n; i++) sum += a[i] * b[i];
+  return sum;
+}
+
+/* v -= its part along q, of length 1. */
+static void Deflate(PetscInt n, const PetscReal q[], PetscReal v[])
+{
+  const PetscReal sum = Product(n, v, q);
+
+  for (PetscInt i = 0; i < n; i++) v[i] -= sum * q[i];
+}
 
 /* -- atoms -- */
 
@@ -80,18 +97,57 @@ static PetscErrorCode IsNew(HycoScene s, const HycoAtom *one, PetscInt n, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether an atom is a sum of others and a constant, by its values at irregular points of the ranges: then its products are
+   sums of theirs. */
+static PetscErrorCode IsSum(HycoScene s, const HycoAtom *one, PetscInt n, const HycoAtom atom[], PetscBool *is)
+{
+  const PetscInt N = 2 * (n + 2) + 16;
+  PetscReal mu[HYCO_MAX_PARAMETERS], *q;
+  PetscInt kept = 0;
+
+  PetscFunctionBegin;
+  *is = PETSC_FALSE;
+  PetscCall(PetscMalloc1((n + 2) * N, &q));
+  for (PetscInt k = 0; k < n + 2; k++) { /* the constant, the others, then `one` */
+    PetscReal *v = q + kept * N, size, left;
+
+    for (PetscInt i = 0; i < N; i++) {
+      for (PetscInt p = 0; p < s->n_parameters; p++) {
+        const PetscReal at = (PetscReal)(i + 1) * 0.61803398874989485 * (1 + 0.75487766624669276 * (PetscReal)p);
+
+        mu[p] = s->lo[p] + (s->hi[p] - s->lo[p]) * (at - PetscFloorReal(at));
+      }
+      v[i] = 1;
+      if (k) PetscCall(HycoAtomTranslate(s, k <= n ? &atom[k - 1] : one, mu, &v[i], NULL));
+    }
+    size = PetscSqrtReal(Product(N, v, v));
+    for (PetscInt j = 0; j < 2 * kept; j++) Deflate(N, q + j % kept * N, v); /* twice, against round-off */
+    left = PetscSqrtReal(Product(N, v, v));
+    *is = (PetscBool)(left <= DEPENDENT * size);
+    for (PetscInt i = 0; i < N && !*is; i++) v[i] /= left;
+    kept += !*is;
+  }
+  PetscCall(PetscFree(q));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* axis: of a change of the place by 1; -1: none. Atoms on which muParser and this parser differ are left out silently: the fit then decides without them. */
 static PetscErrorCode Add(HycoScene s, const char key[], const char text[], const PetscReal x[3], PetscInt axis,
-                          PetscInt *n, HycoAtom **atom)
+                          PetscBool space, PetscInt *n, HycoAtom **atom)
 {
   HycoAtom one = {.key = key, .text = text, .change = (PetscBool)(axis >= 0), .x = {x[0], x[1], x[2]}};
-  PetscBool agrees = PETSC_FALSE;
+  PetscBool agrees = PETSC_FALSE, sum = PETSC_FALSE;
 
   PetscFunctionBegin;
   for (PetscInt c = 0; c < 3 && axis >= 0; c++) one.to[c] = x[c] + (c == axis);
   PetscCall(Agrees(s, &one, &agrees));
   if (agrees) PetscCall(IsNew(s, &one, *n, *atom, &agrees));
   if (!agrees) PetscFunctionReturn(PETSC_SUCCESS);
+  /* At each place another sum, of a few functions: all of them would be too many candidates. */
+  if (space) {
+    PetscCall(IsSum(s, &one, *n, *atom, &sum));
+    if (sum) PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(PetscRealloc((size_t)(*n + 1) * sizeof(**atom), atom));
   (*atom)[(*n)++] = one;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -103,7 +159,7 @@ PetscErrorCode HycoAtomsAddWeight(HycoScene s, const char text[], PetscInt *n, H
   const PetscInt before = *n;
 
   PetscFunctionBegin;
-  PetscCall(Add(s, "weight of a sample", text, nowhere, -1, n, atom));
+  PetscCall(Add(s, "weight of a sample", text, nowhere, -1, PETSC_FALSE, n, atom));
   if (*n > before) (*atom)[before].weight = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -127,7 +183,7 @@ PetscErrorCode HycoAtomsFind(HycoScene s, PetscBool travels, PetscInt n, const P
   *n_atoms = 0;
   *atom = NULL;
   for (PetscInt p = 0; p < s->n_parameters; p++)
-    PetscCall(Add(s, s->parameter[p], s->parameter[p], x, -1, n_atoms, atom));
+    PetscCall(Add(s, s->parameter[p], s->parameter[p], x, -1, PETSC_FALSE, n_atoms, atom));
   for (PetscInt k = 0; k < s->n_entries; k++) {
     /* Entries that cannot change K, F, B or D, and constants, which occur within other entries. */
     if (!strncmp(s->key[k], "output_", 7) || !strncmp(s->key[k], "scene_", 6) || !strncmp(s->key[k], "constant_", 9) ||
@@ -136,9 +192,9 @@ PetscErrorCode HycoAtomsFind(HycoScene s, PetscBool travels, PetscInt n, const P
     PetscCall(HycoTranslate(s, s->value[k], x, s->lo, &value, NULL, &valid, &uses, &space));
     map = (PetscBool)(strstr(s->key[k], "_map_") != NULL);
     for (PetscInt c = 0; valid && uses && space && map && c < 3; c++)
-      PetscCall(Add(s, s->key[k], s->value[k], x, c, n_atoms, atom));
+      PetscCall(Add(s, s->key[k], s->value[k], x, c, PETSC_FALSE, n_atoms, atom));
     for (PetscInt i = 0; valid && uses && !(map && travels) && i < (space ? n : 1); i++)
-      PetscCall(Add(s, s->key[k], s->value[k], x + 3 * i, -1, n_atoms, atom));
+      PetscCall(Add(s, s->key[k], s->value[k], x + 3 * i, -1, space, n_atoms, atom));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -301,22 +357,6 @@ static void Mix(const HycoFitData *d, PetscReal target[])
       }
     }
   }
-}
-
-static PetscReal Product(PetscInt n, const PetscReal a[], const PetscReal b[])
-{
-  PetscReal sum = 0;
-
-  for (PetscInt i = 0; i < n; i++) sum += a[i] * b[i];
-  return sum;
-}
-
-/* v -= its part along q, of length 1. */
-static void Deflate(PetscInt n, const PetscReal q[], PetscReal v[])
-{
-  const PetscReal sum = Product(n, v, q);
-
-  for (PetscInt i = 0; i < n; i++) v[i] -= sum * q[i];
 }
 
 /* What the targets lose by a function that is orthogonal to the chosen ones, relative to its square; 0: it depends on

@@ -197,6 +197,7 @@ typedef struct {
 
 /* What solves change. In the bodies' axes: c of the loads (r); displacements of the surfaces without contact (free, ns)
    and with it, then of the unknowns inside (u, ns + ni); forces on the surfaces (f, ns); x (p). */
+typedef struct _n_HycoBodiesBeside *HycoBodiesBeside;
 typedef struct _n_HycoBodiesWork {
   HycoSubstructures bodies;                /* borrowed */
   PetscReal **weight;                      /* by body: of its samples */
@@ -228,6 +229,7 @@ typedef struct _n_HycoBodiesWork {
   HycoReason reason; /* of the last solve; its iterations */
   PetscInt its;
   char method[64];
+  HycoBodiesBeside beside; /* of gradients (bodies_gradient.c); NULL: not needed yet */
 } * HycoBodiesWork;
 
 /* NULL-safe. */
@@ -305,6 +307,18 @@ PetscErrorCode HycoBodiesFrictionDerive(HycoBodiesFriction friction, PetscInt m,
 void HycoBodiesFrictionNormal(HycoBodiesFriction friction, PetscReal Lambda[]);
 const HycoSlip *HycoBodiesFrictionSlip(HycoBodiesFriction friction);
 PetscErrorCode HycoBodiesFrictionDisproven(HycoBodiesFriction friction, PetscBool *disproven);
+/* Parts of a solve for gradients. HycoBodiesBring(): the data of the bodies, c and the rows at mu, as HycoBodiesPrepare();
+   o->gap: those of the rows (surface NULL: these stay). HycoBodiesBlend(): sum[n] of the samples' numbers by their weights. HycoBodiesYield(): u -= C f /
+   kappa. HycoBodiesRows(): those of the fields of body k, of which n are turns times modes, then the unknowns inside;
+   HycoBodiesAddRows(): row += a x - H f. */
+PetscErrorCode HycoBodiesBring(HycoBodiesWork work, const HycoBodiesSurface *surface, const PetscReal mu[]);
+PetscErrorCode HycoBodiesBlend(PetscInt n_samples, const PetscReal weight[], PetscInt n, const PetscReal data[],
+                               PetscReal sum[]);
+PetscErrorCode HycoBodiesYield(HycoBodiesWork work, const PetscReal f[], PetscReal u[]);
+PetscErrorCode HycoBodiesRows(HycoBodiesWork work, PetscInt k, PetscInt n, PetscReal row[]);
+PetscErrorCode HycoBodiesAddRows(HycoBodiesWork work, PetscInt k, const PetscReal share_a[], const PetscReal share_H[],
+                                 const PetscReal x[], const PetscReal f[], PetscReal row[]);
+PetscErrorCode HycoBodiesForgetBeside(HycoBodiesWork work);
 /* M of n contacts at the prepared parameters: p + n square by columns. */
 PetscErrorCode HycoBodiesMatrix(HycoBodiesWork work, PetscInt n, const PetscInt contact[], PetscReal M[]);
 /* Ops of gradients. */
@@ -312,6 +326,10 @@ PetscErrorCode HycoBodiesUnknowns(HycoROM model, PetscInt *p, PetscInt *n, Petsc
 PetscErrorCode HycoBodiesResidual(HycoROM model, const PetscReal mu[], const PetscReal z[], PetscReal w[],
                                   PetscReal *size);
 PetscErrorCode HycoBodiesJacobian(HycoROM model, PetscInt k, const PetscInt contact[], PetscReal M[]);
+PetscErrorCode HycoBodiesNear(HycoROM model, const PetscReal mu[], PetscInt n, const PetscInt contact[], PetscBool rows,
+                              const PetscReal z[], PetscInt point, PetscReal w[]);
+PetscErrorCode HycoBodiesSlope(HycoROM model, PetscInt n, const PetscInt contact[], const PetscReal weight[2],
+                               const PetscInt point[2], const PetscReal dz[], PetscReal dgamma[], PetscReal dU[]);
 /* Sets the displacements of the surfaces and, after HycoBodiesExpand(), of the unknowns inside in U (by unknown of the
    surface's mesh) without prescribed ones. */
 void HycoBodiesMove(HycoBodiesWork work, const HycoBodiesSurface *surface, PetscReal U[]);

@@ -70,8 +70,9 @@ struct _n_HycoFE {
      forces of thermal strains are loads, with elastic tangents */
   const PetscReal *cell_weight;
   PetscBool all_facets, heat_is_load;
-  PetscBool without_cells; /* tangents, heat and springs stay those of a former mu, heat is no load: HycoFEUseCells() */
-  PetscBool keeps_sides;   /* and maps mirror what they did: parameters stay close to those of the call */
+  PetscBool without_cells; /* tangents, heat and springs stay those of a former mu, heat is no load */
+  PetscBool keeps_sides;   /* maps mirror what they did: parameters stay close to those of the first call */
+  PetscBool *on_surface;   /* by node: it moves, as HycoFEUseSurfaces() wants; NULL: all do */
   /* kept from one parameter value to the next */
   HycoAssemblyMap places; /* positions of the element entries in K; created by the second assembly */
   PetscInt n_loads;
@@ -84,7 +85,8 @@ struct _n_HycoFE {
   PetscBool ready;
   PetscReal mu[HYCO_MAX_PARAMETERS];
   PetscBool stiffness_changed, contact_changed;
-  PetscBool gap_changed; /* the gaps of the contacts, or the supports' contribution to them, have changed */
+  PetscBool gap_changed;   /* the gaps of the contacts, or the supports' contribution to them, have changed */
+  PetscBool supports_only; /* the latter alone */
   /* geometry at mu */
   PetscReal *X;         /* n_nodes x 3, moved nodes */
   PetscBool *mirrored;  /* by body: its map reverses orientation */
@@ -96,6 +98,9 @@ struct _n_HycoFE {
                            HycoFEKeepGradients(); or NULL */
   PetscReal *kept_mean; /* mean gradients of each cell, nv x 3; NULL: no body uses bbar */
   PetscInt kept_place;
+  PetscReal **kept_stiffness; /* by cell: of the forces of prescribed displacements, made at kept_at, which `stiffened`
+                                 counts: HycoFEKeepStiffness(); or NULL */
+  PetscInt *kept_at, stiffened;
   PetscReal *weight; /* of each point, and by cell the place at which HycoPointWeights() found them; or NULL */
   PetscInt *weighed_at;
   /* supports at mu */
@@ -135,12 +140,14 @@ PetscErrorCode HycoFECreateSurface(HycoScene scene, DM dm, HycoFE *fe);
 /* On the tables of a file just read (borrowed), before they become a DM: a tie's weights are part of the topology. */
 PetscErrorCode HycoFECreateRead(HycoScene scene, HycoMesh mesh, HycoFE *fe);
 PetscErrorCode HycoFEDestroy(HycoFE *fe);
-/* While cells are not used, HycoFESetParameters() leaves what belongs to them as it is. Brings them to the present mu when
-   they are used again. */
-PetscErrorCode HycoFEUseCells(HycoFE fe, PetscBool use);
+/* Before the first HycoFESetParameters(): only the surfaces are needed, at parameters close to each other. Later nodes of no
+   facet, tie or support are where the mesh file has them. */
+PetscErrorCode HycoFEUseSurfaces(HycoFE fe);
 /* Keeps the gradients of the shape functions until the nodes move: for paths, which evaluate the same nodes many
    times. */
 PetscErrorCode HycoFEKeepGradients(HycoFE fe);
+/* Keeps the stiffness of cells with prescribed displacements until nodes or moduli change: for an fe of few cells. */
+PetscErrorCode HycoFEKeepStiffness(HycoFE fe);
 /* Puts the nodes at their coordinates in the mesh file; for geometry only. */
 PetscErrorCode HycoFESetDrawn(HycoFE fe);
 /* Fails for a cell whose volume in the mesh file is zero. */

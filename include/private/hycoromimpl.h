@@ -19,6 +19,7 @@ typedef struct _n_HycoBalance *HycoBalance;
 typedef struct {
   PetscInt *start, *dof, room; /* room: of dof and value */
   PetscReal *value, *gap;
+  PetscBool filled; /* HycoRowsFill() was called */
 } HycoRows;
 
 /* Terms of an error estimate (error_estimate.c): log(1 + feature / floor) with a coefficient for each feature, and a
@@ -116,6 +117,15 @@ struct _n_HycoModel {
   void *data;
 };
 
+/* Some contacts in place of all, at parameters of their own, and the forces there (near.c). */
+typedef struct {
+  HycoFE fe; /* on mesh, without the data of cells */
+  HycoPairs pairs;
+  HycoRows rows;
+  HycoCarried carried;
+  PetscReal *Lambda;
+} HycoNear;
+
 /* A model, with its last prediction and what is allocated to make one. */
 struct _p_HycoROM {
   PETSCHEADER(HycoROMOps);
@@ -148,6 +158,7 @@ struct _p_HycoROM {
   HycoCarried carried;          /* results of the contacts (contact_results.c) */
   HycoBalance balance;          /* data kept by HycoROMGetEquilibrium() */
   HycoGradientStore gradient;   /* of HycoROMGetGradient() */
+  HycoNear near[2];             /* for it: to the two sides of the prediction */
   HycoRows rows;                /* of B over dofs of mesh, all contacts; current after HycoROMComplete() */
   /* the last prediction */
   PetscBool solved;
@@ -237,6 +248,8 @@ PetscErrorCode HycoROMDropPairs(HycoPairs *own);
 /* Allocates the rows of contacts. */
 PetscErrorCode HycoRowsCreate(const HycoPairs *pairs, PetscInt dim, HycoRows *rows);
 PetscErrorCode HycoRowsDestroy(HycoRows *rows);
+/* Whether supports of fe hold a displacement of a row of these contacts. */
+PetscBool HycoRowsAreHeld(HycoFE fe, const HycoPairs *pairs);
 /* HycoContactRows(), with more room where mortars meet more masters. */
 PetscErrorCode HycoRowsFill(HycoFE fe, HycoPairs *pairs, HycoRows *rows);
 /* Updates the rows and gaps of all contacts, and U on all nodes of mesh, to the last prediction. */
@@ -268,6 +281,11 @@ PetscErrorCode HycoROMPathGradient(HycoROM model, HycoGradient *gradient);
    quantities are value[], just measured. *focused: they are on cells, not only of contacts. */
 PetscErrorCode HycoROMFocusOutputs(HycoROM model, const PetscReal value[], PetscBool *focused);
 PetscErrorCode HycoROMUnfocusOutputs(HycoROM model);
+/* Makes near[] of these n contacts, with the forces of the last prediction. HycoROMExchange(): near[side] takes the place of
+   the model's contacts, which it has until the next call: motions of fe do not move what the prediction left. */
+PetscErrorCode HycoROMMakeNear(HycoROM model, PetscInt n, const PetscInt contact[]);
+void HycoROMExchange(HycoROM model, PetscInt side);
+PetscErrorCode HycoNearDestroy(HycoNear *near);
 /* On that mesh; NULL: the quantities need only results of contacts. Borrowed. */
 HycoFE HycoROMGetOutputCells(HycoROM model);
 /* Of a type with exact displacements beside modes: the share of the contact forces at nodes of cells, of those whose

@@ -133,12 +133,15 @@ typedef enum {
   HYCO_QUANTITY_PRESSURE,
   HYCO_QUANTITY_PRESSURE_MIN
 } HycoQuantityKind;
+/* Over the listed times of a path: the least of an output that is a minimum, else the largest; or what `path` states. */
+typedef enum { HYCO_EXTREME_OWN, HYCO_EXTREME_MAX, HYCO_EXTREME_MIN, HYCO_EXTREME_ABSOLUTE } HycoExtreme;
 typedef struct {
   char *name, *group; /* group NULL: all of the mesh */
   char *contact;      /* NULL: all contacts */
   PetscBool given;    /* the kind and the field are given */
   HycoQuantityKind kind;
   PetscInt field; /* index in HycoQuantityFields; along or about an axis 0 to 2; HYCO_FRICTION_WORK */
+  HycoExtreme path;
 } HycoQuantity;
 extern const char *const HycoQuantityFields[]; /* NULL ends */
 #define HYCO_FRICTION_WORK 3

@@ -13,6 +13,7 @@ Arrays in, arrays out; only NumPy is needed. Under mpiexec every process runs th
 together, and many points are divided over them. Errors are hyco.Error with hyco's one line.
 """
 import ctypes
+import warnings
 from functools import cached_property
 
 import numpy as np
@@ -61,6 +62,9 @@ def _points(mu, parameters):
         lacking = [name for name in parameters if name not in mu.keys()]
         if lacking:
             raise Error(f'the values have no {", ".join(lacking)}; the parameters are {", ".join(parameters)}')
+        unknown = [] if hasattr(mu, 'columns') else [str(name) for name in mu.keys() if name not in parameters]  # a table may have other columns
+        if unknown:
+            raise Error(f'the values name {", ".join(unknown)}; the parameters are {", ".join(parameters)}')
         values = np.broadcast_arrays(*(np.asarray(mu[name], float) for name in parameters))
         return np.ascontiguousarray(np.stack(values, -1)) if parameters else np.zeros(0)
     mu = np.ascontiguousarray(mu, float)
@@ -110,13 +114,15 @@ class Gradient:
     kink       the same shape: the derivatives to the two sides differ, and value is that towards larger parameter values
     undecided  (...) number of contacts with neither force nor gap
     outputs    {name: value} of the outputs there
+    lacking    of a set {index of a point: why it has no gradient}: there value is nan
     times, path  of a path (else None), whose value is that of the last listed time: (..., times, outputs, parameters), at each listed
                time; (..., outputs, parameters), of the largest over the listed times (for min the smallest)
     gradient['lift'] is that of one output, (..., parameters)
     """
 
-    def __init__(self, mu, outputs, value, kink, undecided, times, path):
+    def __init__(self, mu, outputs, value, kink, undecided, times, path, lacking=None):
         self.mu, self.outputs, self.value, self.kink, self.undecided, self.times, self.path = mu, outputs, value, kink, undecided, times, path
+        self.lacking = lacking or {}
 
     def __getitem__(self, name):
         return self.value[..., list(self.outputs).index(name), :]
@@ -130,6 +136,7 @@ class Fit:
     misfit       root mean square of the relative differences from the targets
     converged    it is a minimum within the ranges, by its slope
     kink         derivatives there are one-sided
+    free, determined  parameters that are not held; those (or combinations) that the targets determine: with fewer mu is one of many answers
     starts, at_least  minimisations, and those that ended at the least misfit
     evaluations  predictions
     """
@@ -138,6 +145,7 @@ class Fit:
         self.mu, self.outputs, self.parameters = mu, outputs, dict(zip(names, mu.tolist()))
         self.misfit, self.converged, self.kink = float(found['misfit']), bool(found['converged']), bool(found['kink'])
         self.starts, self.at_least, self.evaluations = (int(found[name]) for name in ('n_starts', 'n_least', 'evaluations'))
+        self.free, self.determined = int(found['n_free']), int(found['n_determined'])
 
 
 def _gradient(function, handle):
@@ -510,25 +518,37 @@ class Model(_Handle):
         return result
 
     def gradient(self, mu, extrapolate=False):
-        """The Gradient of the outputs at mu: one point (parameters,) or many (..., parameters), which this process solves one by one."""
+        """The Gradient of the outputs at mu: one point (parameters,) or many (..., parameters), which this process solves one by one. A
+        point of a set without a gradient has nan, and a warning says which; without any the first one's Error is raised."""
         mu = _points(mu, self.parameters)
-        points = mu.reshape(-1, mu.shape[-1])
-        size = (len(points), len(self.outputs), len(self.parameters))
-        value, kink, undecided, times, path = np.zeros(size), np.zeros(size, bool), np.zeros(len(points), int), [], []
-        outputs = np.zeros(size[:2])
+        shape, points = mu.shape[:-1], mu.reshape(-1, mu.shape[-1])
+        size = (len(self.outputs), len(self.parameters))
+        outputs, found, lacking, first = np.zeros((len(points), size[0])), {}, {}, None
         for k, point in enumerate(points):
-            outputs[k] = list(self.predict(point, extrapolate=extrapolate).outputs.values())
-            value[k], kink[k], undecided[k], of_times, of_path = _gradient('HycoROMGetGradient', self._open)
-            times.append(of_times)
-            path.append(of_path)
-        shape = mu.shape[:-1]
+            outputs[k] = list(self.predict(point, extrapolate=extrapolate, check=bool(not shape)).outputs.values())
+            try:
+                found[k] = _gradient('HycoROMGetGradient', self._open)
+            except Error as error:
+                lacking[np.unravel_index(k, shape) if len(shape) > 1 else k] = str(error)
+                first = first or (k, error)
+        if first and not found:
+            raise first[1]
+        if first:
+            warnings.warn(f'{len(lacking)} of {len(points)} points have no gradient, the first at {_where(points[first[0]], self.parameters)}: {first[1]}',
+                          stacklevel=2)
+
+        def spread(column, empty, of):
+            """A result of all points, `empty` at those without; its shape at a point is `of`."""
+            rows = [found[k][column] if k in found else np.full(of, empty) for k in range(len(points))]
+            return np.reshape(rows, shape + of) if rows else np.full(shape + of, empty)
+
+        times, path = (spread(k, np.nan, of) if self._times and found else None for k, of in ((3, (self._times, *size)), (4, size)))
         named = {name: outputs[:, k].reshape(shape)[()] for k, name in enumerate(self.outputs)}
-        times, path = (None if any(v is None for v in each) or not each else np.array(each).reshape(shape + each[0].shape) for each in (times, path))
-        return Gradient(mu, named, value.reshape(shape + size[1:]), kink.reshape(shape + size[1:]), undecided.reshape(shape)[()], times, path)
+        return Gradient(mu, named, spread(0, np.nan, size), spread(1, False, size), spread(2, 0, ())[()], times, path, lacking)
 
     def fit(self, targets, start=None, starts=1, samples=64, kind='brgn', hold=None):
         """The Fit of {output: target}: the parameters within the ranges at which the outputs are closest to the targets, as hyco fit; of
-        a path at its last time, and path_OUTPUT the largest over its listed times.
+        a path at its last time, and path_OUTPUT over its listed times (the largest, or as the output's entry `path` says).
         It minimises from the `starts` best of `samples` predictions over the ranges, or from `start` alone, by the TAO type `kind`
         (brgn, blmvm); hold: {parameter: value} that are kept. Under mpiexec each process does the same."""
         handle, known = self._open, self.outputs + ([f'path_{name}' for name in self.outputs] if self._times else [])
@@ -545,7 +565,11 @@ class Model(_Handle):
         held = np.array([(hold or {}).get(name, np.nan) for name in self.parameters], float)
         c.call('HycoROMFit', handle, c.count(len(output)), c.address(output), c.address(target), c.address(start), c.address(held), c.count(samples),
                c.count(starts), kind.encode(), c.address(mu), c.address(found))
-        return Fit(mu, self.predict(mu, check=False).outputs, self.parameters, found[0])
+        fit = Fit(mu, self.predict(mu, check=False).outputs, self.parameters, found[0])
+        if fit.determined < fit.free:
+            warnings.warn(f'{fit.free} parameters are free, and the targets determine {fit.determined} of them or of their combinations: the answer is one of '
+                          'many; hold parameters (hold=) or give more targets', stacklevel=2)
+        return fit
 
     # ---- of the last prediction at one point
 

@@ -220,7 +220,7 @@ static PetscErrorCode AddOnePoint(HycoScene scene, HycoSamples samples, PetscBoo
   PetscFunctionBegin;
   PetscCall(DriverHasPoint(scene, given));
   if (!*given) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(DriverGetPoint(scene, mu));
+  PetscCall(DriverGetPoint(scene, NULL, mu));
   PetscCall(HycoSamplesAddPoint(samples, mu));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -228,12 +228,14 @@ static PetscErrorCode AddOnePoint(HycoScene scene, HycoSamples samples, PetscBoo
 PetscErrorCode DeclareCompare(PetscOptions options)
 {
   char path[PETSC_MAX_PATH_LEN];
+  PetscBool extrapolate;
 
   PetscFunctionBegin;
   (void)options;
   PetscCall(DriverReadFiles(path, path, NULL, path, path));
-  PetscCall(DriverGetPoint(NULL, NULL));
+  PetscCall(DriverGetPoint(NULL, NULL, NULL));
   PetscCall(DriverGetSamples(NULL, PETSC_FALSE, NULL, NULL));
+  PetscCall(DriverReadExtrapolate(&extrapolate));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -246,7 +248,7 @@ PetscErrorCode CommandCompare(void)
   Points p = {0};
   DriverPiece all;
   DriverRows rows;
-  PetscBool given, contact;
+  PetscBool given, contact, extrapolate;
   PetscReal sliding = 0;
   PetscInt n_times;
   char path[PETSC_MAX_PATH_LEN], file[PETSC_MAX_PATH_LEN], table[PETSC_MAX_PATH_LEN], report[PETSC_MAX_PATH_LEN];
@@ -260,6 +262,9 @@ PetscErrorCode CommandCompare(void)
   /* A model on every rank, since each group of ranks predicts its own points. */
   HycoOnEach(PETSC_COMM_WORLD, HycoROMLoad(file, &model));
   PetscCall(HycoROMCheckScene(model, scene));
+  PetscCall(DriverReadExtrapolate(&extrapolate));
+  PetscCall(HycoSceneSetExtrapolate(scene, extrapolate));
+  PetscCall(HycoROMSetExtrapolate(model, extrapolate));
   PetscCall(DriverGetSamples(scene, PETSC_FALSE, &samples, &given));
   if (!given) PetscCall(AddOnePoint(scene, samples, &given));
   HycoCheck(given, "give the test points: -mu V,V,... for one, or -grid N,N,..., or -values_NAME V,V,... for each "

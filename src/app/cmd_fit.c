@@ -235,7 +235,8 @@ static PetscErrorCode Report(const Fit *f, const PetscReal held[], const PetscRe
   cJSON_AddStringToObject(json, "solver", fit->method);
   cJSON_AddBoolToObject(json, "converged", fit->converged);
   cJSON_AddBoolToObject(json, "kink", fit->kink);
-  ReportNumbers(json, {"starts", (PetscReal)fit->n_starts}, {"starts_at_least", (PetscReal)fit->n_least});
+  ReportNumbers(json, {"starts", (PetscReal)fit->n_starts}, {"starts_at_least", (PetscReal)fit->n_least},
+                {"free", (PetscReal)fit->n_free}, {"determined", (PetscReal)fit->n_determined});
   ends = cJSON_AddArrayToObject(json, "at_ends");
   kept = cJSON_AddArrayToObject(json, "held");
   PetscCall(HycoSceneGetParameters(f->scene, NULL, &names, NULL, NULL));
@@ -252,6 +253,11 @@ static PetscErrorCode Report(const Fit *f, const PetscReal held[], const PetscRe
   PetscCall(DriverPrint("%d predictions (%s)\n", (int)fit->evaluations, fit->method));
   if (fit->n_starts > 1)
     PetscCall(DriverPrint("%d of %d starts ended at the least misfit\n", (int)fit->n_least, (int)fit->n_starts));
+  if (fit->n_determined < fit->n_free)
+    PetscCall(
+        DriverPrint("NOT UNIQUE: %d parameters are free, and the targets determine %d of them or of their "
+                    "combinations: the answer is one of many; hold parameters (-hold_NAME) or give more targets\n",
+                    (int)fit->n_free, (int)fit->n_determined));
   /* Converged to a minimum that does not meet the targets: they may be out of reach, or another valley is. */
   if (fit->converged && fit->misfit > UNMET)
     PetscCall(DriverPrint("the targets are not met; the misfit may have lower minima elsewhere: other starts (-mu, "
@@ -279,8 +285,8 @@ static PetscErrorCode ReadStart(const Fit *f, Settings *s)
     PetscCall(PetscSNPrintf(key, sizeof(key), "-mu_%s", names[p]));
     PetscCall(PetscOptionsHasName(NULL, NULL, key, &s->given));
   }
-  if (s->given) PetscCall(DriverGetPoint(f->scene, s->mu));
   PetscCall(DriverGetHeld(f->scene, s->held));
+  if (s->given) PetscCall(DriverGetPoint(f->scene, s->held, s->mu));
   for (PetscInt p = 0; p < f->n_par && s->given; p++)
     HycoCheck(PetscIsNanReal(s->held[p]) || s->held[p] == s->mu[p],
               "-mu starts %s at %.10g, and -hold_%s keeps it at %.10g; give both the same value", names[p],
@@ -306,7 +312,7 @@ PetscErrorCode DeclareFit(PetscOptions options)
   PetscFunctionBegin;
   (void)options;
   PetscCall(DriverReadFiles(path, path, NULL, path, NULL));
-  PetscCall(DriverGetPoint(NULL, NULL));
+  PetscCall(DriverGetPoint(NULL, NULL, NULL));
   PetscCall(DriverGetHeld(NULL, NULL));
   PetscCall(DriverGet("target_",
                       "<v> value that an output of the model should have: -target_OUTPUT v; of a path at its last "

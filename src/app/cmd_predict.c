@@ -179,7 +179,7 @@ static PetscErrorCode One(HycoROM model, HycoScene scene, Fallback *fallback, co
 
   PetscFunctionBegin;
   PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
-  PetscCall(DriverGetPoint(scene, mu));
+  PetscCall(DriverGetPoint(scene, NULL, mu));
   HycoOnRoot(PETSC_COMM_WORLD, HycoROMPredict(model, n, mu));
   HycoOnRoot(PETSC_COMM_WORLD, HycoROMGetPrediction(model, &p));
   PetscCallMPI(MPI_Bcast(&p, sizeof(p), MPI_BYTE, 0, PETSC_COMM_WORLD));
@@ -241,7 +241,7 @@ static PetscErrorCode Path(HycoROM model, HycoScene scene, const char output[], 
 
   PetscFunctionBegin;
   PetscCall(HycoSceneGetParameters(scene, &n, NULL, NULL, NULL));
-  PetscCall(DriverGetPoint(scene, mu));
+  PetscCall(DriverGetPoint(scene, NULL, mu));
   PetscCall(DriverReadFiles(NULL, NULL, NULL, NULL, table));
   /* A path's steps depend on each other: one rank computes it. */
   HycoOnRoot(PETSC_COMM_WORLD, HycoROMPredict(model, n, mu));
@@ -650,19 +650,6 @@ static PetscErrorCode Many(HycoROM model, HycoScene scene, Fallback *fallback, H
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Outside the region of training no estimate is tested: the user must say that this is meant. */
-static PetscErrorCode ReadExtrapolate(PetscBool *extrapolate)
-{
-  PetscFunctionBegin;
-  *extrapolate = PETSC_FALSE;
-  PetscOptionsBegin(PETSC_COMM_WORLD, NULL, "hyco", NULL);
-  PetscCall(HycoOptionsFlag("-extrapolate",
-                            "permit predictions outside the ranges of the training, where the model is not tested",
-                            extrapolate));
-  PetscOptionsEnd();
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* Declare...() read every option once into variables that are not used: each option has one place in the code,
    where it is read, and help shows what is read there. */
 PetscErrorCode DeclarePredict(PetscOptions options)
@@ -674,9 +661,9 @@ PetscErrorCode DeclarePredict(PetscOptions options)
   PetscFunctionBegin;
   (void)options;
   PetscCall(DriverReadFiles(path, path, path, path, path));
-  PetscCall(DriverGetPoint(NULL, NULL));
+  PetscCall(DriverGetPoint(NULL, NULL, NULL));
   PetscCall(DriverGetSamples(NULL, PETSC_FALSE, NULL, NULL));
-  PetscCall(ReadExtrapolate(&flag));
+  PetscCall(DriverReadExtrapolate(&flag));
   PetscCall(DriverReadTarget(HYCO_ERROR_U, &target));
   PetscCall(DriverReadTarget(HYCO_ERROR_LAMBDA, &target));
   PetscCall(DriverReadMonitor(&flag));
@@ -700,7 +687,7 @@ PetscErrorCode CommandPredict(void)
   PetscCall(DriverReadFiles(NULL, path, output, report, NULL));
   PetscCall(DriverRequire("model", path));
   PetscCall(DriverReadMonitor(&monitor));
-  PetscCall(ReadExtrapolate(&extrapolate));
+  PetscCall(DriverReadExtrapolate(&extrapolate));
   /* On each rank; a damaged file fails on all, with one message. */
   HycoOnEach(PETSC_COMM_WORLD, HycoROMLoad(path, &model));
   PetscCall(HycoROMSetExtrapolate(model, extrapolate));

@@ -310,7 +310,7 @@ PetscErrorCode DeclareSolve(PetscOptions options)
   PetscFunctionBegin;
   (void)options;
   PetscCall(DriverReadFiles(path, NULL, path, path, path));
-  PetscCall(DriverGetPoint(NULL, NULL));
+  PetscCall(DriverGetPoint(NULL, NULL, NULL));
   PetscCall(DriverGetSamples(NULL, PETSC_FALSE, NULL, NULL));
   PetscCall(DriverReadMonitor(&monitor));
   PetscCall(DriverReadGradient(&monitor));
@@ -343,7 +343,7 @@ PetscErrorCode CommandSolve(void)
   if (set) {
     PetscCall(DriverGetSamples(scene, PETSC_FALSE, &samples, &set));
   } else
-    PetscCall(DriverGetPoint(scene, mu));
+    PetscCall(DriverGetPoint(scene, NULL, mu));
   if (set || n_times) PetscCall(DriverReadFiles(NULL, NULL, NULL, NULL, table));
   PetscCall(HycoFOMCreate(PETSC_COMM_WORLD, scene, &fom));
   PetscCall(HycoFOMGetSolver(fom, &solver));

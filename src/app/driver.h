@@ -55,8 +55,10 @@ PetscErrorCode DriverCheckMesh(HycoScene scene);
 
 /* -- points.c: points in the parameter space; without a scene, these functions only declare their options -- */
 
-/* One point: -mu v,v,... or -mu_NAME v. */
-PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[]);
+/* One point: -mu v,v,... or -mu_NAME v. held: values of parameters that need no -mu_NAME, NaN: it needs one; NULL: all do. */
+PetscErrorCode DriverGetPoint(HycoScene scene, const PetscReal held[], PetscReal mu[]);
+/* -extrapolate, of predict and compare. */
+PetscErrorCode DriverReadExtrapolate(PetscBool *extrapolate);
 /* -hold_NAME v, held[n_parameters]; NaN: not given. */
 PetscErrorCode DriverGetHeld(HycoScene scene, PetscReal held[]);
 /* Whether -mu or a -mu_NAME was given. */

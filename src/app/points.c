@@ -136,8 +136,9 @@ static PetscErrorCode GetNamed(HycoScene scene, const char prefix[], const char 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Either -mu with all or a -mu_NAME for each: a mixture is refused, since it would not be clear which counts. */
-PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[])
+/* Either -mu with all or a -mu_NAME for each: a mixture is refused, since it would not be clear which counts. held: values
+   of those that need no -mu_NAME (NaN: it needs one; NULL: all do). */
+PetscErrorCode DriverGetPoint(HycoScene scene, const PetscReal held[], PetscReal mu[])
 {
   PetscInt n, m, count[64], given;
   const char *const *names, *missing;
@@ -159,6 +160,10 @@ PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[])
     PetscCall(PetscFree(all));
   }
   for (PetscInt p = 0; p < n; p++) {
+    if (!values[p] && held && !text[0] && !PetscIsNanReal(held[p])) {
+      mu[p] = held[p];
+      given++;
+    }
     if (!values[p]) continue;
     HycoCheck(count[p] == 1, "-mu_%s has %d values; one is expected", names[p], (int)count[p]);
     HycoCheck(!text[0], "-mu gives every parameter, and -mu_%s gives one of them again; remove one of the two",
@@ -172,6 +177,19 @@ PetscErrorCode DriverGetPoint(HycoScene scene, PetscReal mu[])
             (int)n, list);
   /* The ranges, unless extrapolation is allowed. */
   PetscCall(HycoSceneCheckParameters(scene, n, mu));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Outside the region of training no estimate is tested: the user must say that this is meant. */
+PetscErrorCode DriverReadExtrapolate(PetscBool *extrapolate)
+{
+  PetscFunctionBegin;
+  *extrapolate = PETSC_FALSE;
+  PetscOptionsBegin(PETSC_COMM_WORLD, NULL, "hyco", NULL);
+  PetscCall(HycoOptionsFlag("-extrapolate",
+                            "permit predictions outside the ranges of the training, where the model is not tested",
+                            extrapolate));
+  PetscOptionsEnd();
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

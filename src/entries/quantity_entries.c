@@ -29,8 +29,8 @@ static PetscErrorCode FindAxis(const char key[], const char axis[], PetscInt *fi
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* field: index in the scene's output_fields, whose order is that of HycoQuantityKind up to AREA; after it come group
-   and contact. Entries of one output come in any order; what they must have together is checked by
+/* field: index in the scene's output_fields, whose order is that of HycoQuantityKind up to AREA; after it come group,
+   contact and path. Entries of one output come in any order; what they must have together is checked by
    HycoSceneCheckQuantities(). */
 PetscErrorCode HycoSceneReadQuantity(HycoScene s, PetscInt entry, const char name[], PetscInt field)
 {
@@ -48,6 +48,16 @@ PetscErrorCode HycoSceneReadQuantity(HycoScene s, PetscInt entry, const char nam
     if (!s->quantity) PetscCall(PetscCalloc1(HYCO_MAX_QUANTITIES, &s->quantity));
     q = &s->quantity[s->n_quantities++];
     PetscCall(PetscStrallocpy(name, &q->name));
+  }
+  if (field == HYCO_QUANTITY_AREA + 3) {
+    static const char *const words[] = {"", "max", "min", "absolute"};
+    PetscInt k = HYCO_EXTREME_MAX;
+
+    while (k <= HYCO_EXTREME_ABSOLUTE && strcmp(words[k], s->value[entry])) k++;
+    HycoCheck(k <= HYCO_EXTREME_ABSOLUTE, "%s is \"%.100s\"; it must be one of max, min and absolute", s->key[entry],
+              s->value[entry]);
+    q->path = (HycoExtreme)k;
+    PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (field > HYCO_QUANTITY_AREA) {
     /* An option may replace the text of the file. */
@@ -101,8 +111,8 @@ void HycoSceneMatchQuantities(HycoScene s, HycoScene other, PetscInt at[])
     for (PetscInt j = 0; j < other->n_quantities; j++) {
       const HycoQuantity *r = &other->quantity[j];
 
-      if (!strcasecmp(q->name, r->name) && q->kind == r->kind && q->field == r->field && SameText(q->group, r->group) &&
-          SameText(q->contact, r->contact))
+      if (!strcasecmp(q->name, r->name) && q->kind == r->kind && q->field == r->field && q->path == r->path &&
+          SameText(q->group, r->group) && SameText(q->contact, r->contact))
         at[k] = j;
     }
   }

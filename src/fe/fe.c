@@ -3,11 +3,16 @@
 #include <hycomaterialimpl.h>
 #include "assembly_map.h"
 
+#define RUN 64 /* nodes at which a map is evaluated together */
+
 /* NULL-safe. The tables belong to the DM, of which fe has a reference; those of HycoFECreateRead() to the caller. */
 PetscErrorCode HycoFEDestroy(HycoFE *fe)
 {
   PetscFunctionBegin;
   if (!*fe) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt e = 0; (*fe)->kept_stiffness && e < (*fe)->mesh->n_cells; e++)
+    PetscCall(PetscFree((*fe)->kept_stiffness[e]));
+  HycoFreeAll(&(*fe)->kept_stiffness, &(*fe)->kept_at, &(*fe)->on_surface);
   PetscCall(PetscFree((*fe)->surface));
   PetscCall(DMDestroy(&(*fe)->dm));
   PetscCall(HycoAssemblyMapDestroy(&(*fe)->places));
@@ -213,6 +218,12 @@ PetscBool HycoBodyMoves(const HycoBody *body, const PetscBool changed[])
                      HycoExprChanges(body->map[2], changed));
 }
 
+/* Whether the map of body b moves a node; at first all, by which HycoMirrorFind() sees how cells turn. */
+static PetscBool Takes(HycoFE fe, PetscBool first, PetscInt b, PetscInt node)
+{
+  return (PetscBool)(fe->mesh->node_body[node] == b && (first || !fe->on_surface || fe->on_surface[node]));
+}
+
 /* X = map(x, mu) of the bodies whose maps change. Maps act on the drawing, not on the last position: the result does not
    depend on what was solved before. first: all bodies; so it is with ties, which place nodes of one by those of another. */
 static PetscErrorCode MoveNodes(HycoFE fe, PetscBool first, const PetscBool changed[])
@@ -239,9 +250,13 @@ static PetscErrorCode MoveNodes(HycoFE fe, PetscBool first, const PetscBool chan
       if (!map || fe->moved_at[b] != fe->place) continue;
       HycoCheck(m->dim > c, "%s: the mesh has %d space dimension%s and no component %c; remove the entry",
                 HycoExprKey(map), (int)m->dim, m->dim == 1 ? "" : "s", "xyz"[c]);
-      for (PetscInt i = 0; i < m->n_nodes; i++) {
-        /* A component without a map keeps its drawn coordinate (HycoFESetDrawn()). */
-        if (m->node_body[i] == b) PetscCall(HycoExprEval(map, fe->mu, 1, m->xyz + 3 * i, fe->X + 3 * i + c));
+      for (PetscInt i = 0, n; i < m->n_nodes; i += PetscMax(n, 1)) {
+        PetscReal value[RUN];
+
+        /* Nodes of a body follow each other. A component without a map keeps its drawn coordinate (HycoFESetDrawn()). */
+        for (n = 0; n < RUN && i + n < m->n_nodes && Takes(fe, first, b, i + n);) n++;
+        if (n) PetscCall(HycoExprEval(map, fe->mu, n, m->xyz + 3 * i, value));
+        for (PetscInt k = 0; k < n; k++) fe->X[3 * (i + k) + c] = value[k];
       }
     }
   }
@@ -344,6 +359,7 @@ static PetscErrorCode SetSupports(HycoFE fe)
   for (PetscInt i = 0; i < m->n_nodes; i++) fe->fixed[i * m->dim] = OnAxis(fe, i);
   for (PetscInt k = 0; k < fe->scene->n_fixed; k++) {
     HycoFixed *fixed = &fe->scene->fixed[k];
+    PetscReal value = 0;
     PetscInt g = 0;
 
     PetscCall(HycoMeshFindGroup(m, "fixed", fixed->group, &g));
@@ -352,9 +368,9 @@ static PetscErrorCode SetSupports(HycoFE fe)
         const PetscInt i = m->group_node[j], dof = i * m->dim + c;
         /* 0 where nothing was set: compared only where the component is fixed already. */
         const PetscReal former = fe->u0[dof];
-        PetscReal value;
 
-        PetscCall(HycoExprEval(fixed->value[c], fe->mu, 1, fe->X + 3 * i, &value));
+        if (j == m->group_start[g] || HycoExprInSpace(fixed->value[c]))
+          PetscCall(HycoExprEval(fixed->value[c], fe->mu, 1, fe->X + 3 * i, &value));
         HycoCheck(!fe->fixed[dof] ||
                       PetscAbsReal(value - former) <= 1e-12 * (PetscAbsReal(value) + PetscAbsReal(former)),
                   "node %d is fixed twice in %c, to %g and to %g (by %s); remove it from one support",
@@ -483,6 +499,8 @@ PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
   fe->contact_changed = (PetscBool)(first || c.rows);
   /* Supports that change move D by B u0. */
   fe->gap_changed = (PetscBool)(first || c.gaps || supports);
+  fe->supports_only = (PetscBool)(!first && !c.gaps && supports);
+  fe->stiffened += fe->stiffness_changed;
   fe->ready = PETSC_FALSE; /* until everything is updated */
   if (first || c.nodes) {
     PetscCall(MoveNodes(fe, first, changed));
@@ -503,16 +521,22 @@ PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Cells' data are brought up to date when they are used again: parameters may have changed meanwhile. */
-PetscErrorCode HycoFEUseCells(HycoFE fe, PetscBool use)
+/* Also nodes at which expressions of supports are evaluated. */
+PetscErrorCode HycoFEUseSurfaces(HycoFE fe)
 {
-  const PetscBool late = (PetscBool)(use && fe->without_cells);
+  const HycoMesh m = fe->mesh;
 
   PetscFunctionBegin;
-  fe->without_cells = fe->keeps_sides = (PetscBool)!use;
-  if (!late) PetscFunctionReturn(PETSC_SUCCESS);
-  if (fe->temperature) PetscCall(HycoFESetHeat(fe, PETSC_TRUE, NULL));
-  PetscCall(HycoFESetTangents(fe, PETSC_TRUE, PETSC_TRUE, NULL));
-  PetscCall(HycoSpringsSet(fe));
+  fe->without_cells = fe->keeps_sides = PETSC_TRUE;
+  /* Ties and cells of several bodies place nodes by others. */
+  if (fe->joint || m->ties) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscCalloc1(m->n_nodes + 1, &fe->on_surface));
+  for (PetscInt k = 0; k < m->n_facets * m->nf; k++) fe->on_surface[m->facets[k]] = PETSC_TRUE;
+  for (PetscInt k = 0; k < fe->scene->n_fixed; k++) {
+    PetscInt g = 0;
+
+    PetscCall(HycoMeshFindGroup(m, "fixed", fe->scene->fixed[k].group, &g));
+    for (PetscInt j = m->group_start[g]; j < m->group_start[g + 1]; j++) fe->on_surface[m->group_node[j]] = PETSC_TRUE;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

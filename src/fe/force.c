@@ -200,6 +200,36 @@ static PetscErrorCode AddUniformLoad(HycoFE fe, const HycoLoad *load, PetscInt g
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The stiffness of a cell, kept from one parameter value to the next where HycoFEKeepStiffness() was called. */
+static PetscErrorCode Stiffness(HycoFE fe, PetscInt cell, PetscReal **Ke)
+{
+  const size_t n = (size_t)(HycoMeshCellSize(fe->mesh, cell) * fe->dim);
+
+  PetscFunctionBegin;
+  /* Oblique supports, whose directions may change, are eliminated in it. */
+  if (!fe->kept_stiffness || fe->n_oblique) {
+    PetscCall(HycoFEElementRoom(fe, cell, Ke));
+    PetscCall(HycoFEElementStiffness(fe, cell, *Ke));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  if (!fe->kept_stiffness[cell]) PetscCall(PetscMalloc1(n * n, &fe->kept_stiffness[cell]));
+  *Ke = fe->kept_stiffness[cell];
+  if (fe->kept_at[cell] == fe->stiffened) PetscFunctionReturn(PETSC_SUCCESS);
+  fe->kept_at[cell] = 0; /* until it is there */
+  PetscCall(HycoFEElementStiffness(fe, cell, *Ke));
+  fe->kept_at[cell] = fe->stiffened;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoFEKeepStiffness(HycoFE fe)
+{
+  PetscFunctionBegin;
+  if (fe->kept_stiffness) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscCalloc1(fe->mesh->n_cells + 1, &fe->kept_stiffness));
+  PetscCall(PetscCalloc1(fe->mesh->n_cells + 1, &fe->kept_at));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Moves K u0 of one cell to the right-hand side. */
 static PetscErrorCode AddLifting(HycoFE fe, PetscInt cell, Into F)
 {
@@ -216,8 +246,7 @@ static PetscErrorCode AddLifting(HycoFE fe, PetscInt cell, Into F)
     any = (PetscBool)(any || u0[k] != 0);
   }
   if (!any) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoFEElementRoom(fe, cell, &Ke));
-  PetscCall(HycoFEElementStiffness(fe, cell, Ke));
+  PetscCall(Stiffness(fe, cell, &Ke));
   for (PetscInt k = 0; k < n; k++) {
     /* u0 has the offsets of oblique supports, too: Ke is that of the eliminated unknowns. */
     const PetscInt i = node[k / m->dim], c = k % m->dim, global = m->node_global ? m->node_global[i] : i;

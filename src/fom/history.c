@@ -336,17 +336,23 @@ PetscErrorCode HycoPathRun(HycoPath p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Over the listed times, at which outputs are measured. An output that is a minimum has its smallest value, all
-   others the largest. */
+/* Whether a is beyond b. */
+static PetscBool IsBeyond(const HycoQuantity *q, PetscReal a, PetscReal b)
+{
+  const PetscBool least = (PetscBool)(q->kind == HYCO_QUANTITY_MIN || q->kind == HYCO_QUANTITY_PRESSURE_MIN);
+
+  if (q->path == HYCO_EXTREME_ABSOLUTE) return (PetscBool)(PetscAbsReal(a) > PetscAbsReal(b));
+  return (PetscBool)(q->path == HYCO_EXTREME_MIN || (least && q->path == HYCO_EXTREME_OWN) ? a < b : a > b);
+}
+
+/* Over the listed times, at which outputs are measured; with its sign. */
 void HycoPathExtremes(HycoScene scene, PetscInt n, const HycoStep step[], PetscReal value[])
 {
   for (PetscInt q = 0; q < scene->n_quantities; q++) {
-    const HycoQuantityKind kind = scene->quantity[q].kind;
-    const PetscBool least = (PetscBool)(kind == HYCO_QUANTITY_MIN || kind == HYCO_QUANTITY_PRESSURE_MIN);
-
     value[q] = step[0].quantity[q];
-    for (PetscInt k = 1; k < n; k++)
-      value[q] = least ? PetscMin(value[q], step[k].quantity[q]) : PetscMax(value[q], step[k].quantity[q]);
+    for (PetscInt k = 1; k < n; k++) {
+      if (IsBeyond(&scene->quantity[q], step[k].quantity[q], value[q])) value[q] = step[k].quantity[q];
+    }
   }
 }
 

@@ -78,7 +78,7 @@ static const HycoMember gradient[] = {
 
 #define F(member) FIELD(HycoFit, member)
 static const HycoMember fit[] = {
-  F(misfit), F(scale), F(converged), F(kink), F(evaluations), F(n_starts), F(n_least), F(method)};
+  F(misfit), F(scale), F(converged), F(kink), F(evaluations), F(n_starts), F(n_least), F(n_free), F(n_determined), F(method)};
 #undef F
 
 #define F(member) FIELD(HycoTraining, member)

@@ -17,7 +17,7 @@ static const char *const spring_fields[] = {"x", "y", "z", "normal", NULL};
 static const char *const contact_fields[] = {"type", NULL};
 static const char *const tie_fields[] = {"slave", "master", "tolerance", "method", NULL};
 static const char *const output_fields[] = {"max",      "min",  "mean",  "reaction", "force", "moment",
-                                            "friction", "area", "group", "contact",  NULL};
+                                            "friction", "area", "group", "contact",  "path",  NULL};
 static const char *const scene_fields[] = {"title",       "mesh",       "parameters",  "refine", "formulation",
                                            "unit_length", "unit_force", "unit_stress", NULL};
 static const char *const parameter_fields[] = {"range", "unit", "title", NULL};

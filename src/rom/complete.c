@@ -30,6 +30,7 @@ PetscErrorCode HycoRowsFill(HycoFE fe, HycoPairs *pairs, HycoRows *rows)
     rows->room = entries;
   }
   PetscCall(HycoContactRows(fe, pairs, rows->start, rows->dof, rows->value, rows->gap));
+  rows->filled = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -37,6 +38,7 @@ PetscErrorCode HycoRowsDestroy(HycoRows *rows)
 {
   PetscFunctionBegin;
   HycoFreeAll(&rows->start, &rows->dof, &rows->value, &rows->gap);
+  rows->filled = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -50,13 +52,29 @@ static PetscErrorCode CreateBeyond(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether supports hold a displacement in a row: then it is a part of the gap. */
+PetscBool HycoRowsAreHeld(HycoFE fe, const HycoPairs *pairs)
+{
+  const PetscInt dim = fe->dim;
+
+  for (PetscInt k = 0; k < pairs->n * dim; k++) {
+    if (fe->fixed[pairs->slave[k / dim] * dim + k % dim]) return PETSC_TRUE;
+  }
+  for (PetscInt j = 0; j < pairs->master_start[pairs->n] * dim; j++) {
+    if (fe->fixed[pairs->master[j / dim] * dim + j % dim]) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
 /* The rows of all contacts at mu on fe, which is on mesh or on mesh without cells. */
 static PetscErrorCode BringRows(HycoROM m, HycoFE fe, const PetscReal mu[])
 {
   PetscFunctionBegin;
   PetscCall(HycoFESetParameters(fe, mu));
   /* fe knows whether its parameters since the last rows affect these. */
-  if (!fe->contact_changed && !fe->gap_changed) PetscFunctionReturn(PETSC_SUCCESS);
+  if (m->rows.filled && !fe->contact_changed &&
+      (!fe->gap_changed || (fe->supports_only && !fe->n_oblique && !HycoRowsAreHeld(fe, &m->pairs))))
+    PetscFunctionReturn(PETSC_SUCCESS);
   fe->ready = PETSC_FALSE; /* until its rows are computed */
   PetscCall(HycoRowsFill(fe, &m->pairs, &m->rows));
   fe->ready = PETSC_TRUE;

@@ -30,11 +30,11 @@ static PetscErrorCode Make(HycoROM m)
   if (m->carried) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscNew(&c));
   m->carried = c;
-  PetscCall(PetscMalloc1(3 * m->model->pairs.n, &c->normal));
-  PetscCall(PetscMalloc1(m->model->pairs.n, &c->gap));
+  PetscCall(PetscMalloc1(3 * m->pairs.n, &c->normal));
+  PetscCall(PetscMalloc1(m->pairs.n, &c->gap));
   /* Areas are those of the slave's nodes on the moved mesh, which a parameter may scale: they are filled per
      prediction, not here. */
-  PetscCall(PetscMalloc1(m->model->pairs.n, &c->area));
+  PetscCall(PetscMalloc1(m->pairs.n, &c->area));
   PetscCall(PetscMalloc1(HycoSceneResults(m->model->scene), &c->result));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -76,7 +76,7 @@ static PetscErrorCode Prepare(HycoROM m, const PetscReal Lambda[], HycoFE *fe, P
   PetscCall(HycoROMBringContacts(m, fe));
   PetscCall(Make(m));
   PetscCall(Bring(m, *fe));
-  for (PetscInt k = 0; k < m->model->pairs.n; k++) most = PetscMax(most, Lambda[k]);
+  for (PetscInt k = 0; k < m->pairs.n; k++) most = PetscMax(most, Lambda[k]);
   *least = HYCO_PRESSES * most;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -92,7 +92,7 @@ PetscErrorCode HycoROMSumContacts(HycoROM m, const PetscReal Lambda[], const Hyc
   *result = NULL;
   if (!HycoROMHasAllForces(m)) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(Prepare(m, Lambda, &fe, &least));
-  PetscCall(PetscMalloc1(m->model->pairs.n, &pressure));
+  PetscCall(PetscMalloc1(m->pairs.n, &pressure));
   PetscCall(HycoContactPressures(PETSC_COMM_SELF, fe, &m->pairs, m->carried->area, Lambda, pressure));
   PetscCall(HycoContactResults(fe, &m->pairs, m->carried->normal, m->carried->area, Lambda, pressure, least,
                                m->carried->result));
@@ -119,13 +119,13 @@ PetscErrorCode HycoROMPushBodies(HycoROM m, const PetscReal Lambda[], const Pets
   PetscFunctionBegin;
   PetscCall(Prepare(m, Lambda, &fe, &least));
   *force = 0;
-  for (PetscInt k = 0; k < m->model->pairs.n; k++) {
+  for (PetscInt k = 0; k < m->pairs.n; k++) {
     const HycoShear *shear = m->pairs.shear;
     /* The normal points out of the slave: the force on the slave is against it, that of friction as it is. */
     const PetscReal along = Lambda[k] * m->carried->normal[3 * k + axis] - (shear ? shear->force[3 * k + axis] : 0);
 
     if (Lambda[k] <= least || HycoPairsAlone(m->model->scene, &m->pairs, k)) continue;
-    if (of[body[m->model->pairs.slave[k]]]) *force -= along;
+    if (of[body[m->pairs.slave[k]]]) *force -= along;
     HycoPairsMasters(&m->pairs, k, &n, &master, &weight);
     for (PetscInt j = 0; j < n; j++) *force += of[body[master[j]]] ? weight[j] * along : 0;
   }

@@ -12,6 +12,7 @@
 #define MINIMUM 1e-5 /* of the slope of the misfit, relative to what the derivatives allow */
 #define WEIGHT  1e-6 /* of the regularisation of Gauss-Newton steps: for targets that do not determine all parameters */
 #define SAME    1e-4 /* relative difference of misfits that are one minimum's */
+#define LEFT    1e-6 /* share of a parameter's derivatives that is left beside the others' and is not round-off */
 
 typedef struct {
   HycoROM model;
@@ -341,12 +342,12 @@ static PetscErrorCode RunAll(Fit *f, const PetscReal starts[], const char type[]
 
 /* The ranges of the fit: a held parameter has that of one value, which is no direction of a step, since derivatives are
    multiplied by the width. */
-static PetscErrorCode SetRanges(Fit *f, const PetscReal held[])
+static PetscErrorCode SetRanges(Fit *f, const PetscReal held[], PetscInt *n_free)
 {
   const HycoScene scene = f->model->model->scene;
-  PetscInt n_free = f->n_par;
 
   PetscFunctionBegin;
+  *n_free = f->n_par;
   PetscCall(PetscArraycpy(f->lo, scene->lo, f->n_par));
   PetscCall(PetscArraycpy(f->hi, scene->hi, f->n_par));
   if (!held) PetscFunctionReturn(PETSC_SUCCESS);
@@ -356,11 +357,44 @@ static PetscErrorCode SetRanges(Fit *f, const PetscReal held[])
               "a fit holds the parameter %s at %.10g; its range is from %.10g to %.10g", scene->parameter[p],
               (double)held[p], (double)scene->lo[p], (double)scene->hi[p]);
     f->lo[p] = f->hi[p] = held[p];
-    n_free--;
+    --*n_free;
   }
-  HycoCheck(n_free, "a fit holds all %d parameters, so that nothing is left to find; predict gives the outputs there",
+  HycoCheck(*n_free, "a fit holds all %d parameters, so that nothing is left to find; predict gives the outputs there",
             (int)f->n_par);
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* How many parameters the targets determine near the answer: the rank of J, whose columns of held parameters are 0. By
+   Gram-Schmidt with the largest rest first. */
+static PetscInt Determined(const Fit *f)
+{
+  PetscReal A[HYCO_MAX_QUANTITIES * HYCO_MAX_PARAMETERS], first = 0;
+  PetscInt rank = 0;
+
+  for (PetscInt i = 0; i < f->n * f->n_par; i++) A[i] = f->J[i];
+  for (; rank < PetscMin(f->n, f->n_par); rank++) {
+    PetscReal most = 0, q[HYCO_MAX_QUANTITIES];
+    PetscInt pivot = 0;
+
+    for (PetscInt p = 0; p < f->n_par; p++) {
+      PetscReal sum = 0;
+
+      for (PetscInt k = 0; k < f->n; k++) sum += PetscSqr(A[k * f->n_par + p]);
+      if (sum <= most) continue;
+      most = sum;
+      pivot = p;
+    }
+    if (!rank) first = most;
+    if (most <= LEFT * LEFT * first) break;
+    for (PetscInt k = 0; k < f->n; k++) q[k] = A[k * f->n_par + pivot] / PetscSqrtReal(most);
+    for (PetscInt p = 0; p < f->n_par; p++) {
+      PetscReal dot = 0;
+
+      for (PetscInt k = 0; k < f->n; k++) dot += q[k] * A[k * f->n_par + p];
+      for (PetscInt k = 0; k < f->n; k++) A[k * f->n_par + p] -= dot * q[k];
+    }
+  }
+  return rank;
 }
 
 /* The fit works on x in [0, 1]^n; mu is made from it at the end. Which starts are tried depends on the fixed sequence of samples, hence the same answer in every run. */
@@ -371,6 +405,7 @@ PetscErrorCode HycoROMFit(HycoROM m, PetscInt n, const PetscInt output[], const 
   const HycoScene scene = m->model->scene;
   Fit f = {.model = m, .n = n, .output = output, .target = target, .n_par = scene->n_parameters};
   PetscReal x[HYCO_MAX_PARAMETERS], *starts;
+  PetscInt n_free;
 
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
@@ -382,10 +417,11 @@ PetscErrorCode HycoROMFit(HycoROM m, PetscInt n, const PetscInt output[], const 
   for (PetscInt k = 0; k < n; k++)
     HycoCheck(output[k] >= 0 && output[k] < (scene->n_times ? 2 : 1) * scene->n_quantities,
               "there is no output %d; the model has %d", (int)output[k], (int)scene->n_quantities);
-  PetscCall(SetRanges(&f, held));
-  *fit = (HycoFit){.n_starts = n_starts};
+  PetscCall(SetRanges(&f, held, &n_free));
+  *fit = (HycoFit){.n_starts = n_starts, .n_free = n_free};
   PetscCall(PetscMalloc1(n_starts * f.n_par + 1, &starts));
-  PetscCall(Start(&f, start, n_samples, &fit->n_starts, starts));
+  /* As many samples as starts are asked for. */
+  PetscCall(Start(&f, start, PetscMax(n_samples, n_starts), &fit->n_starts, starts));
   PetscCall(RunAll(&f, starts, type, fit, x));
   PetscCall(PetscFree(starts));
   f.known = PETSC_FALSE;
@@ -393,6 +429,7 @@ PetscErrorCode HycoROMFit(HycoROM m, PetscInt n, const PetscInt output[], const 
   PetscCall(Evaluate(&f, x));
   ToParameters(&f, x, mu);
   fit->kink = f.kink;
+  fit->n_determined = Determined(&f);
   fit->evaluations = f.evaluations;
   PetscCall(PetscArraycpy(fit->scale, f.scale, n));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -1,7 +1,9 @@
 /*
   The gradient of a prediction. A type's problem is w = q + M z, z = (x, L); with the set of closed contacts M z' + q' = 0
-  there, with q' the change of w at fixed z: differences of the type's data. An output's derivative is its difference along
-  mu + h and z + h z' together. Outputs are measured on the cells that decide them.
+  there, with q' the change of w at fixed z. A type with the op `beside` has q' and the derivatives of its fields from those
+  of its data, at the closed contacts alone; of others q' is a difference of w, and the fields are those of a moved state.
+  An output's derivative is its difference along mu + h and z + h z' together. Outputs are measured on the cells that decide
+  them.
 */
 #include <hycogradient.h>
 #include <hycolcp.h>
@@ -11,9 +13,13 @@ typedef struct {
   HycoROM m;
   PetscReal mu[HYCO_MAX_PARAMETERS];
   PetscInt p, n, k, *contact; /* unknowns x, contacts; those that are closed or undecided */
+  PetscInt *list;             /* n: the contacts of the problem, once the problem is that of some */
+  PetscBool near, held;       /* held: supports hold nodes of the contacts */
+  PetscBool rows;             /* the parameter in hand moves or changes them, or outputs read more than them */
   PetscReal *z, *moved;       /* p + n */
   PetscReal *dz;              /* p + n: along the parameter in hand */
   PetscReal *w[5];            /* p + n: at the three points, and at closer ones */
+  PetscInt at[5];             /* the number of each among what the type keeps of points beside mu */
   PetscReal *q, *v;           /* p + k */
   PetscReal size;
   PetscBool focused;  /* the outputs' cells are few */
@@ -23,6 +29,7 @@ typedef struct {
   /* the prediction */
   HycoPrediction prediction;
   PetscReal remainder, *gamma, *U, *Lambda;
+  PetscReal *dgamma, *dU, *u0; /* along the parameter in hand; prescribed displacements at mu */
   PetscBool whole_current;
 } Work;
 
@@ -57,12 +64,54 @@ static PetscErrorCode MoveAndMeasure(Work *o, const PetscReal mu[], const PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Sets what outputs read, moved along the derivatives, and measures them. */
+static PetscErrorCode MeasureMoved(Work *o, const PetscReal mu[], PetscReal step, PetscReal output[])
+{
+  HycoROM m = o->m;
+  HycoPrediction p = {0};
+
+  PetscFunctionBegin;
+  if (o->rows) PetscCall(HycoROMBringRows(m, mu));
+  for (PetscInt k = 0; k < o->n; k++) m->Lambda[o->rows ? k : o->list[k]] = o->z[o->p + k] + step * o->dz[o->p + k];
+  for (PetscInt j = 0; j < m->model->l && !o->contacts; j++) m->gamma[j] = o->gamma[j] + step * o->dgamma[j];
+  for (PetscInt j = 0; j < m->model->n_fe && !o->contacts; j++) {
+    const PetscInt i = m->model->fe_dof[j];
+
+    m->U[i] = o->U[i] + m->fe->u0[i] - o->u0[i] + step * o->dU[i];
+  }
+  PetscCall(HycoROMMeasureQuantities(m, &p));
+  PetscCall(PetscArraycpy(output, p.quantity, m->model->scene->n_quantities));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The same with the contacts to one side, which most often are at mu. */
+static PetscErrorCode MeasureNear(Work *o, const PetscReal mu[], PetscReal step, PetscReal output[])
+{
+  PetscBool there;
+  PetscInt side = 0;
+
+  PetscFunctionBegin;
+  if (!o->rows) {
+    PetscCall(MeasureMoved(o, mu, step, output));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(PetscArraycmp(o->m->near[1].fe->mu, mu, o->m->model->scene->n_variables, &there));
+  if (there) side = 1;
+  HycoROMExchange(o->m, side);
+  HycoFinally(MeasureMoved(o, mu, step, output), HycoROMExchange(o->m, side));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The outputs at mu of the state moved by step times its change. */
 static PetscErrorCode Measure(void *context, const PetscReal mu[], PetscReal step, PetscReal output[])
 {
   Work *o = (Work *)context;
 
   PetscFunctionBegin;
+  if (o->near) {
+    PetscCall(MeasureNear(o, mu, step, output));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   for (PetscInt i = 0; i < o->p + o->n; i++) o->moved[i] = o->z[i] + step * o->dz[i];
   PetscCall(MoveAndMeasure(o, mu, o->moved, output));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -104,6 +153,38 @@ static PetscErrorCode Close(Work *o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The problem, of the contacts that are closed or undecided alone; of all where outputs see open ones: the least pressure,
+   and that of nodes without area. */
+static PetscErrorCode Focus(Work *o)
+{
+  HycoROM m = o->m;
+  const HycoScene scene = m->model->scene;
+  const PetscBool all =
+      (PetscBool)(HycoSceneHasOutputs(scene, HYCO_QUANTITY_PRESSURE_MIN, HYCO_QUANTITY_PRESSURE_MIN) ||
+                  (scene->formulation == HYCO_AXISYMMETRIC && HycoMeshIsQuadratic(m->model->mesh)));
+
+  PetscFunctionBegin;
+  HycoDuplicate(m->fe->n_dof, m->fe->u0, &o->u0);
+  PetscCall(PetscCalloc1(m->model->l + 1, &o->dgamma));
+  PetscCall(PetscCalloc1(m->fe->n_dof + 1, &o->dU));
+  PetscCall(PetscMalloc1(o->n + 1, &o->list));
+  for (PetscInt i = 0; i < o->n; i++) o->list[i] = i;
+  for (PetscInt i = 0; i < o->k && !all; i++) {
+    const PetscInt from = o->contact[i];
+
+    /* Ascending: what is overwritten has been read. */
+    o->list[i] = from;
+    o->z[o->p + i] = o->z[o->p + from];
+    o->w[0][o->p + i] = o->w[0][o->p + from];
+    o->contact[i] = i;
+  }
+  if (!all) o->n = o->k;
+  PetscCall(HycoROMMakeNear(m, o->n, o->list));
+  o->near = PETSC_TRUE;
+  o->held = HycoRowsAreHeld(m->fe, &m->near[0].pairs);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Keeps the prediction: differences move the model's state, and Restore() puts it back. */
 static PetscErrorCode Create(Work *o)
 {
@@ -127,6 +208,7 @@ static PetscErrorCode Create(Work *o)
   /* Open contacts do not change. */
   PetscCall(PetscArrayzero(o->dz, o->p + o->n));
   for (PetscInt j = 0; j < 5; j++) PetscCall(PetscMalloc1(o->p + o->n + 1, &o->w[j]));
+  for (PetscInt j = 0; j < 5; j++) o->at[j] = j;
   PetscCall(PetscMalloc3(o->n + 1, &o->contact, o->p + o->n + 1, &o->q, o->p + o->n + 1, &o->v));
   PetscCall(PetscCalloc1(6 * m->model->scene->n_quantities + 1, &o->output));
   PetscUseTypeMethod(m, unknowns, &o->p, &o->n, o->z);
@@ -146,6 +228,7 @@ static PetscErrorCode Create(Work *o)
      theorem. */
   PetscCall(HycoROMFocusOutputs(m, o->output, &o->focused));
   if (o->focused) PetscCall(MoveAndMeasure(o, NULL, o->z, o->output));
+  if (m->ops->beside) PetscCall(Focus(o));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -157,7 +240,7 @@ static PetscErrorCode Destroy(Work *o)
   PetscCall(PetscFree3(o->z, o->moved, o->dz));
   for (PetscInt j = 0; j < 5; j++) PetscCall(PetscFree(o->w[j]));
   PetscCall(PetscFree3(o->contact, o->q, o->v));
-  HycoFreeAll(&o->output, &o->gamma, &o->U, &o->Lambda);
+  HycoFreeAll(&o->output, &o->gamma, &o->U, &o->Lambda, &o->list, &o->dgamma, &o->dU, &o->u0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -189,13 +272,29 @@ static PetscBool Turns(const Work *o, const HycoDifference *d, PetscBool closer)
   return PETSC_FALSE;
 }
 
-/* The same, with the gaps nearer to mu only where they are needed: d becomes closer, so that its points are on this side of
-   a change of masters farther away. */
-static PetscErrorCode FindTurns(Work *o, HycoDifference *d, PetscBool *turns)
+/* w at point j of the difference, and at its closer ones. */
+static PetscErrorCode Beside(Work *o, const HycoDifference *d, PetscInt point, PetscInt j)
 {
   HycoROM m = o->m;
   PetscReal at[HYCO_MAX_PARAMETERS], size;
 
+  PetscFunctionBegin;
+  HycoDifferencePoint(d, m->model->scene, o->mu, point, at);
+  if (o->near && !o->rows)
+    PetscCall((*m->ops->beside)(m, at, o->n, o->list, PETSC_FALSE, o->z, o->at[j], o->w[j]));
+  else if (o->near) {
+    HycoROMExchange(m, point - 1);
+    HycoFinally((*m->ops->beside)(m, at, o->n, o->list, PETSC_TRUE, o->z, o->at[j], o->w[j]),
+                HycoROMExchange(m, point - 1));
+  } else
+    PetscCall((*m->ops->residual)(m, at, o->z, o->w[j], &size));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The same, with the gaps nearer to mu only where they are needed: d becomes closer, so that its points are on this side of
+   a change of masters farther away. */
+static PetscErrorCode FindTurns(Work *o, HycoDifference *d, PetscBool *turns)
+{
   PetscFunctionBegin;
   for (PetscInt k = 0; k < HYCO_GRADIENT_CLOSER; k++) {
     HycoDifference near = *d;
@@ -204,16 +303,16 @@ static PetscErrorCode FindTurns(Work *o, HycoDifference *d, PetscBool *turns)
     if (!*turns) break;
     /* A jump of the slope stays when the step shrinks, curvature does not. */
     HycoDifferenceShrink(&near);
-    for (PetscInt j = 1; j < 3; j++) {
-      HycoDifferencePoint(&near, m->model->scene, o->mu, j, at);
-      PetscCall((*m->ops->residual)(m, at, o->z, o->w[2 + j], &size));
-    }
+    for (PetscInt j = 1; j < 3; j++) PetscCall(Beside(o, &near, j, 2 + j));
     *turns = Turns(o, d, PETSC_TRUE);
     for (PetscInt j = 1; j < 3; j++) {
       PetscReal *w = o->w[j];
+      const PetscInt number = o->at[j];
 
       o->w[j] = o->w[2 + j];
       o->w[2 + j] = w;
+      o->at[j] = o->at[2 + j];
+      o->at[2 + j] = number;
     }
     *d = near;
   }
@@ -224,15 +323,10 @@ static PetscErrorCode FindTurns(Work *o, HycoDifference *d, PetscBool *turns)
    mu is a difference of three evaluations, exact up to second order. */
 static PetscErrorCode Differentiate(Work *o, HycoDifference *d, PetscBool *kink)
 {
-  HycoROM m = o->m;
-  PetscReal at[HYCO_MAX_PARAMETERS], size;
   PetscBool turns;
 
   PetscFunctionBegin;
-  for (PetscInt j = 1; j < 3; j++) {
-    HycoDifferencePoint(d, m->model->scene, o->mu, j, at);
-    PetscCall((*m->ops->residual)(m, at, o->z, o->w[j], &size));
-  }
+  for (PetscInt j = 1; j < 3; j++) PetscCall(Beside(o, d, j, j));
   PetscCall(FindTurns(o, d, &turns));
   /* A one-sided difference: across the change of masters the central one is of neither side. */
   if (turns) HycoDifferenceTakeSide(d);
@@ -245,16 +339,19 @@ static PetscErrorCode Differentiate(Work *o, HycoDifference *d, PetscBool *kink)
   PetscCall(HycoTangentSolve(o->tangent, o->q, d->sign, o->v, kink));
   *kink = (PetscBool)(*kink || turns);
   for (PetscInt i = 0; i < o->p + o->k; i++) o->dz[i < o->p ? i : o->p + o->contact[i - o->p]] = o->v[i];
+  /* Displacements, unless outputs need forces alone. */
+  if (o->near && !o->contacts)
+    PetscCall((*o->m->ops->slope)(o->m, o->n, o->list, d->weight + 1, o->at + 1, o->dz, o->dgamma, o->dU));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a parameter moves nodes. */
-static PetscBool Moves(HycoScene s, PetscInt p)
+/* What a parameter changes. */
+static HycoChanges Changes(HycoScene s, PetscInt p)
 {
   PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE};
 
   changed[p] = PETSC_TRUE;
-  return HycoSceneChanges(s, changed).nodes;
+  return HycoSceneChanges(s, changed);
 }
 
 /* All columns. Those of parameters that move nodes last: the way back from one's points is a part of the way to the next
@@ -264,14 +361,14 @@ static PetscErrorCode Columns(Work *o, HycoGradient *gradient)
   HycoROM m = o->m;
 
   PetscFunctionBegin;
-  /* Stresses are not differenced here: without the cells a model that does not read them moves faster. */
-  PetscCall(HycoFEUseCells(m->fe, (PetscBool)!m->model->traits.surfaces));
   for (PetscInt k = 0; k < 2 * gradient->n_parameters; k++) {
     const PetscInt p = k % gradient->n_parameters;
+    const HycoChanges c = Changes(m->model->scene, p);
     HycoDifference d;
     PetscBool kink;
 
-    if (Moves(m->model->scene, p) != (k >= gradient->n_parameters)) continue;
+    if (c.nodes != (k >= gradient->n_parameters)) continue;
+    o->rows = (PetscBool)(!o->contacts || o->held || c.rows || c.gaps);
     HycoDifferenceSet(m->model->scene, o->mu, p, HYCO_GRADIENT_STEP, &d);
     PetscCall(Differentiate(o, &d, &kink));
     PetscCall(HycoGradientColumn(gradient, &m->gradient, m->model->scene, o->mu, &d, kink, Measure, o, o->output));
@@ -287,8 +384,7 @@ static PetscErrorCode Restore(Work *o)
 
   PetscFunctionBegin;
   if (o->focused) PetscCall(HycoROMUnfocusOutputs(m));
-  PetscCall(Move(o, o->mu, o->z));
-  PetscCall(HycoFEUseCells(m->fe, PETSC_TRUE));
+  if (!o->near) PetscCall(Move(o, o->mu, o->z));
   m->prediction = o->prediction;
   /* Also what getters of the prediction read: the gradient must not be visible in them. */
   m->remainder = o->remainder;

@@ -159,6 +159,7 @@ PetscErrorCode HycoROMReset(HycoROM m)
   PetscCall(HycoOutputCellsDestroy(&m->output_cells));
   PetscCall(HycoOutputCellsDestroy(&m->few));
   PetscCall(HycoCarriedDestroy(&m->carried));
+  for (PetscInt side = 0; side < 2; side++) PetscCall(HycoNearDestroy(&m->near[side]));
   PetscCall(HycoFEDestroy(&m->fe_floating));
   PetscCall(HycoSolverDestroy(&m->solver));
   PetscCall(HycoFEDestroy(&m->fe_beyond));

@@ -5,6 +5,7 @@ import shutil
 import re
 import resource
 import subprocess
+import sys
 import unittest
 
 import h5py
@@ -12,12 +13,25 @@ import numpy as np
 
 import rigid_motions
 import rigid
-from common import HYCO, SANITIZED, SOURCE, Case
+from common import HYCO, PATIENCE, SANITIZED, SOURCE, Case
 
 MESH = os.path.join(SOURCE, 'examples', '{0}', '{0}.msh')
 TYPE = ('-hyco_model_type', 'bodies')
 ROLLER = os.path.join(SOURCE, 'examples', 'roller')
 HERTZ = os.path.join(SOURCE, 'examples', 'hertz')
+SET = """
+import warnings
+import hyco
+with hyco.Model('v.h5') as model:
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter('always')
+        g = model.gradient([[1.3, -0.5, 9], [1.3, 0.5, 9]], extrapolate=True)  # the first without contact
+    print(g['push'].tolist(), list(g.lacking), len(told), 'press 0.5' in str(told[0].message))
+    try:
+        model.gradient([1.3, 0.5, 9])
+    except hyco.NotConverged:
+        print(True)
+"""
 TURNED = f"""
 scene: {{title: a turned and enlarged cylinder on a block, mesh: {MESH.format('roller')}, parameters: [place, press, modulus, turn, size]}}
 parameter: {{place: {{range: [-4, 4]}}, press: {{range: [0.2, 1]}}, modulus: {{range: [5, 20]}}, turn: {{range: [-15, 15]}}, size: {{range: [0.9, 1.1]}}}}
@@ -420,7 +434,7 @@ class Bodies(Case):
     def test_solvers(self):
         """Every method that is asked for solves the contact problem of a prediction, and is named; it is refused with floating bodies; tolerance and
         fallback act."""
-        self.hyco('train', '-scene', ROLLER, *TYPE, '-scatter', '2', '-model', 'v.h5')
+        self.hyco('train', '-scene', ROLLER, *TYPE, '-scatter', '2', '-model', 'v.h5', '-output_push_force', 'y', '-output_push_contact', 'under')
         at = ('-model', 'v.h5', '-mu', '1.3,0.5,9')
         force = self.hyco('predict', *at)['total_contact_force']
         for name in ('lemke', 'semismooth', 'tao'):
@@ -430,6 +444,13 @@ class Bodies(Case):
         self.hyco('predict', *at, '-hyco_solver_max_its', '1')
         run = self.run_raw('predict', *at, '-hyco_solver_max_its', '1', '-hyco_solver_fallback', 'false')
         self.assertEqual(run.returncode, 1, run.stdout)
+        self.assertIn('-extrapolate', self.run_raw('compare', '-scene', ROLLER, '-model', 'v.h5', '-mu', '5.2,0.5,9').stderr)
+        self.assertLess(self.hyco('compare', '-scene', ROLLER, '-model', 'v.h5', '-mu', '5.2,0.5,9', '-extrapolate')['error_lambda']['max'], 1e-9)
+        if not SANITIZED:  # the interpreter would need the sanitizers
+            # of a set of gradients from Python, that point has nan and is named; alone it is the error
+            run = subprocess.run([sys.executable, '-c', SET], cwd=self.folder, capture_output=True, text=True, timeout=60 * PATIENCE, check=False, env={
+                **os.environ, 'PYTHONPATH': os.path.join(os.path.dirname(HYCO), 'python'), 'PETSC_OPTIONS': '-hyco_solver_max_its 1 -hyco_solver_fallback false'})
+            self.assertEqual(run.stdout, '[[0.0, 0.0, 0.0], [nan, nan, nan]] [1] 1 True\nTrue\n', run.stderr)
         self.hyco('train', '-scene', self.write('floating.yaml', FLOATING), *TYPE, '-scatter', '2', '-model', 'w.h5')
         run = self.run_raw('predict', '-model', 'w.h5', '-mu', '2.2,123,0.3', '-hyco_solver_type', 'lemke')
         self.assertIn('-hyco_solver_type', run.stderr)

@@ -45,15 +45,19 @@ class Fit(Case):
         self.assertEqual((r['mu']['press'], r['mu']['modulus']), (1, 20))
         self.near(r['misfit_model'], 1 - r['targets']['lift']['model'] / 100, 1e-6)
         self.assertNotIn('misfit_full_order', r)
-        self.assertIn('the targets are not met', self.run_raw('fit', '-model', 'm.h5', '-target_lift', '100').stdout)
+        text = self.run_raw('fit', '-model', 'm.h5', '-target_lift', '100').stdout
+        self.assertIn('the targets are not met', text)
+        self.assertIn('NOT UNIQUE: 3 parameters are free', text)
+        self.assertEqual(r['free'], 3)
+        self.assertLess(r['determined'], 3)
 
     def test_held(self):
         """A held parameter keeps its value, and the others meet the targets that are left, from searched starts and from a given one, by both types."""
         two = self.targets[:2]
-        for args in ((), ('-mu', '2.5,0.5,9'), ('-fit_type', 'blmvm', '-mu', '2.5,0.5,9')):
+        for args in ((), ('-mu_press', '0.5', '-mu_modulus', '9'), ('-fit_type', 'blmvm', '-mu', '2.5,0.5,9')):  # a held one needs no -mu_NAME
             r = self.hyco('fit', '-model', 'm.h5', *two, '-hold_place', '2.5', *args)
             self.assertTrue(r['converged'])
-            self.assertEqual((r['mu']['place'], r['held']), (2.5, ['place']))
+            self.assertEqual((r['mu']['place'], r['held'], r['free'], r['determined']), (2.5, ['place'], 2, 1))
             self.near(r['targets']['lift']['model'], self.outputs['lift'], 1e-6)
         r = self.hyco('fit', '-model', 'm.h5', *self.targets, '-hold_place', '5', '-hold_press', '0.63', status=None)
         self.assertEqual((r['mu']['place'], r['mu']['press'], r['held']), (5, 0.63, ['place', 'press']))
@@ -64,12 +68,12 @@ class Fit(Case):
         """A moment that two places have: with several starts the least misfit is the answer, at most that of one start, and counts say how many reached it."""
         one = self.hyco('fit', '-model', 'm.h5', *self.targets, '-fit_starts', '8')
         self.assertEqual((one['starts'], one['starts_at_least']), (1, 1))
-        r = self.hyco('fit', '-model', 'm.h5', *self.targets, '-fit_starts', '8', '-starts', '5')
-        self.assertEqual(r['starts'], 5)
+        r = self.hyco('fit', '-model', 'm.h5', *self.targets, '-fit_starts', '4', '-starts', '5')  # at least as many predictions as starts
+        self.assertEqual((r['starts'], r['free'], r['determined']), (5, 3, 3))
         self.assertTrue(1 <= r['starts_at_least'] <= 5)
         self.assertLessEqual(r['misfit_model'], max(one['misfit_model'], 1e-9))
         self.assertGreater(r['evaluations'], one['evaluations'])
-        self.assertIn(f"{r['starts_at_least']} of 5 starts", self.run_raw('fit', '-model', 'm.h5', *self.targets, '-fit_starts', '8', '-starts', '5').stdout)
+        self.assertIn(f"{r['starts_at_least']} of 5 starts", self.run_raw('fit', '-model', 'm.h5', *self.targets, '-fit_starts', '4', '-starts', '5').stdout)
 
     def test_refused(self):
         """One line that names what is wrong, and no report."""

@@ -3,6 +3,7 @@ import csv
 import os
 import shutil
 import subprocess
+import sys
 import unittest
 
 import h5py
@@ -145,6 +146,10 @@ class Paths(FlowingRing):
             self.assertLessEqual(report['end_' + kind]['max'], report['worst_' + kind]['max'])
         with open(self.path('unseen.csv'), encoding='utf-8') as f:
             self.assertEqual([int(r['times_reached']) for r in csv.DictReader(f)], [7] * 4)
+        for columns in ((), ('--columns', 'end_u,worst_inelastic')):
+            subprocess.run([sys.executable, os.path.join(SOURCE, 'scripts', 'plot'), 'errors', self.path('unseen.csv'), *columns, '-o', self.path('unseen.png')],
+                           check=True, capture_output=True, timeout=60 * PATIENCE)
+            self.assertGreater(os.path.getsize(self.path('unseen.png')), 10000)
         view = self.run_raw('view', '-model', self.path('unseen.h5')).stdout
         self.assertIn('7 listed times', view)
 

@@ -27,7 +27,7 @@ body: {block: {law: j2, young: 1000, poisson: 0.3, yield: 1, hardening: 10}}
 fixed: {left: {x: 0}, foot: {y: 0}}
 traction: {right: {x: 1.3*pull*t}}
 history: {times: [0, 0.5, 1]}
-output: {long: {mean: u_x, group: right}}
+output: {long: {mean: u_x, group: right}, thin: {mean: u_y, group: top, path: absolute}}
 """
 RANKS = r"""
 import sys
@@ -167,6 +167,8 @@ class Python(Case):
             np.testing.assert_allclose(many.value[0, 0], one.value, rtol=1e-9)
             for output, by in report['gradient'].items():
                 np.testing.assert_allclose(one[output], list(by.values()), rtol=1e-9)
+            with self.assertRaisesRegex(self.hyco_py.Error, 'knob.*press, modulus'):
+                model.predict({'modulus': 1100, 'press': 0.031, 'knob': 1})
             h = [0.03e-4, 1500e-4]
             for j in range(2):
                 shift = np.eye(2)[j] * h
@@ -223,7 +225,9 @@ class Python(Case):
             self.near(p.outputs['long'], h['long'][-1], 1e-12)
             self.near(model.predict([[0.7], [0.9]]).outputs['long'][1], p.outputs['long'], 1e-9)
             g = model.gradient([[0.7], [0.9]])
-            self.assertEqual((g.value.shape, g.times.shape, g.path.shape), ((2, 1, 1), (2, 3, 1, 1), (2, 1, 1)))
+            self.assertEqual((g.value.shape, g.times.shape, g.path.shape), ((2, 2, 1), (2, 3, 2, 1), (2, 2, 1)))
+            self.assertLess(h['thin'][-1], -1e-3)  # the largest size over the path, not the largest value
+            np.testing.assert_allclose(p.data['path_quantity'][:2], [h['long'][-1], h['thin'][-1]], rtol=1e-9)
             np.testing.assert_array_equal(g.times[:, -1], g.value)
             np.testing.assert_allclose(g.path, g.value, rtol=1e-9)  # it is longest at the end
             report = self.hyco('predict', '-model', 'bar.h5', '-mu', '0.9', '-gradient')

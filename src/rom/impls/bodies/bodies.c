@@ -268,6 +268,8 @@ PetscErrorCode HycoROMCreate_Bodies(HycoROM m)
                                  .unknowns = HycoBodiesUnknowns,
                                  .residual = HycoBodiesResidual,
                                  .jacobian = HycoBodiesJacobian,
+                                 .beside = HycoBodiesNear,
+                                 .slope = HycoBodiesSlope,
                                  .expand = ExpandAll,
                                  .features = Features,
                                  .estimate = Estimate,

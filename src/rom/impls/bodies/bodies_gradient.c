@@ -66,3 +66,285 @@ PetscErrorCode HycoBodiesJacobian(HycoROM m, PetscInt k, const PetscInt contact[
   PetscCall(HycoBodiesMatrix((HycoBodiesWork)m->work, k, contact, M));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
+
+/* -- derivatives beside a prediction -- */
+
+/* The change of the bodies' data to points beside the prediction's. All that follows from them is differentiated by the
+   rules of sums and products: u = (R c - C f) / kappa + Z x is linear in each. */
+struct _n_HycoBodiesBeside {
+  HycoBodiesWork at; /* the data at the last such point */
+  PetscInt n_weights, size;
+  PetscReal *change[5]; /* by point; 0: sums of them. c, 1 for each body's kappa, 9 for its turn, its weights, f */
+  PetscReal *du;        /* surfaces, then inside */
+};
+
+/* The parts of a change. */
+typedef struct {
+  const PetscReal *c, *kappa, *turn, *weight, *f;
+} Parts;
+
+static Parts PartsOf(const HycoBodiesWork o, const PetscReal change[])
+{
+  const HycoSubstructures b = o->bodies;
+  const PetscReal *kappa = change + b->r, *turn = kappa + b->n, *weight = turn + 9 * b->n;
+
+  return (Parts){change, kappa, turn, weight, weight + o->beside->n_weights};
+}
+
+/* NULL-safe. */
+PetscErrorCode HycoBodiesForgetBeside(HycoBodiesWork o)
+{
+  HycoBodiesBeside s = o->beside;
+
+  PetscFunctionBegin;
+  if (!s) PetscFunctionReturn(PETSC_SUCCESS);
+  if (s->at) PetscCall(HycoBodiesReset(s->at));
+  for (PetscInt k = 0; k < 5; k++) PetscCall(PetscFree(s->change[k]));
+  HycoFreeAll(&s->at, &s->du, &o->beside);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* At the first gradient of a model. */
+static PetscErrorCode MakeBeside(HycoROM m)
+{
+  HycoBodiesWork o = (HycoBodiesWork)m->work;
+  const HycoSubstructures b = o->bodies;
+  HycoBodiesSurface s = HycoBodiesSurfaceOf(m);
+  HycoBodiesBeside made;
+
+  PetscFunctionBegin;
+  if (o->beside) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscNew(&o->beside));
+  made = o->beside;
+  PetscCall(PetscNew(&made->at));
+  for (PetscInt k = 0; k < b->n; k++) made->n_weights += b->body[k].n_samples;
+  made->size = b->r + 10 * b->n + made->n_weights + b->ns;
+  for (PetscInt k = 0; k < 5; k++) PetscCall(PetscCalloc1(made->size, &made->change[k]));
+  PetscCall(PetscMalloc1(b->ns + b->ni + 1, &made->du));
+  /* Room for any number of contacts: gradients differ in theirs. */
+  s.n = m->model->pairs.n;
+  PetscCall(HycoBodiesSetUp(made->at, b, m->model->scene, &s, m->solver));
+  made->at->fe->keeps_sides = PETSC_TRUE; /* beside a prediction no body turns inside out */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscBool AnyOf(PetscInt n, const PetscReal v[])
+{
+  for (PetscInt i = 0; i < n; i++) {
+    if (v[i] != 0) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
+/* y += factor times A x, n rows of m. */
+static void AddRowProducts(PetscInt n, PetscInt m, const PetscReal A[], const PetscReal x[], PetscReal factor,
+                           PetscReal y[])
+{
+  for (PetscInt i = 0; i < n; i++, A += m) {
+    for (PetscInt j = 0; j < m; j++) y[i] += factor * A[j] * x[j];
+  }
+}
+
+/* The part of a change that the weights of body k have: du += (R' c - C' f) / kappa + Z' x. */
+static PetscErrorCode AddWeighted(HycoBodiesWork o, PetscInt k, const PetscReal weight[], PetscReal du[])
+{
+  const HycoSubstructures b = o->bodies;
+  const HycoSubstructure *own = &b->body[k];
+  const PetscInt n = own->n;
+  PetscReal *blend, *share, *f;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc3(n * PetscMax(b->r, b->p) + 1, &blend, own->C.n_terms + 1, &share, n + 1, &f));
+  PetscCall(HycoBodiesBlend(own->n_samples, weight, n * b->r, own->R, blend));
+  AddRowProducts(n, b->r, blend, o->c, 1 / o->kappa[k], du);
+  HycoFlexibilityShares(&own->C, own->n_samples, weight, share);
+  for (PetscInt i = 0; i < n; i++) f[i] = -o->f[b->start[k] + i] / o->kappa[k];
+  PetscCall(HycoFlexibilityMultiply(&own->C, share, f, du));
+  PetscCall(HycoBodiesBlend(own->n_samples, weight, n * b->p, own->Z, blend));
+  AddRowProducts(n, b->p, blend, o->x, 1, du);
+  PetscCall(PetscFree3(blend, share, f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* du[ns]: of the surfaces, at the same x. */
+static PetscErrorCode AddDisplacements(HycoBodiesWork o, const Parts *change, PetscReal du[])
+{
+  const HycoSubstructures b = o->bodies;
+  const PetscBool loads = AnyOf(b->r, change->c);
+  const PetscReal *weight = change->weight;
+
+  PetscFunctionBegin;
+  for (PetscInt k = 0; k < b->n; weight += b->body[k++].n_samples) {
+    const PetscInt n = b->body[k].n;
+    PetscReal *u = du + b->start[k];
+
+    if (loads) AddRowProducts(n, b->r, o->R[k], change->c, 1 / o->kappa[k], u);
+    for (PetscInt i = 0; i < n && change->kappa[k] != 0; i++) {
+      PetscReal elastic = o->u[b->start[k] + i];
+
+      for (PetscInt j = 0; j < b->p; j++) elastic -= o->Z[(b->start[k] + i) * b->p + j] * o->x[j];
+      u[i] -= elastic * change->kappa[k] / o->kappa[k];
+    }
+    if (AnyOf(b->body[k].n_samples, weight)) PetscCall(AddWeighted(o, k, weight, u));
+  }
+  PetscCall(HycoBodiesYield(o, change->f, du));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The change of the data to those of `at`, where the rows are of n contacts. */
+static void TakeChange(HycoBodiesWork o, PetscInt n, const PetscInt contact[], PetscBool rows, const PetscReal L[],
+                       PetscReal change[])
+{
+  const HycoSubstructures b = o->bodies;
+  const HycoBodiesWork at = o->beside->at;
+  PetscReal *to = change;
+
+  for (PetscInt j = 0; j < b->r; j++) *to++ = at->c[j] - o->c[j];
+  for (PetscInt k = 0; k < b->n; k++) *to++ = at->kappa[k] - o->kappa[k];
+  for (PetscInt k = 0; k < 9 * b->n; k++) *to++ = at->pose[k / 9].Q[k % 9] - o->pose[k / 9].Q[k % 9];
+  for (PetscInt k = 0; k < b->n; k++) {
+    for (PetscInt j = 0; j < b->body[k].n_samples; j++) *to++ = at->weight[k][j] - o->weight[k][j];
+  }
+  for (PetscInt i = 0; i < b->ns; i++) to[i] = 0;
+  for (PetscInt k = 0; k < n && rows; k++) {
+    if (L[k] == 0) continue;
+    for (PetscInt e = at->row_start[k]; e < at->row_start[k + 1]; e++) to[at->row_at[e]] += at->row[e] * L[k];
+    for (PetscInt e = o->row_start[contact[k]]; e < o->row_start[contact[k] + 1]; e++)
+      to[o->row_at[e]] -= o->row[e] * L[k];
+  }
+  /* Entries that cancel but for round-off: columns of C are long. */
+  for (PetscInt i = 0; i < b->ns; i++) {
+    if (PetscAbsReal(to[i]) <= 8 * PETSC_MACHINE_EPSILON * PetscAbsReal(o->f[i])) to[i] = 0;
+  }
+}
+
+/* In place of HycoBodiesResidual() at mu: w of the change of the data, to the first order. */
+PetscErrorCode HycoBodiesNear(HycoROM m, const PetscReal mu[], PetscInt n, const PetscInt contact[], PetscBool rows,
+                              const PetscReal z[], PetscInt point, PetscReal w[])
+{
+  HycoBodiesWork o = (HycoBodiesWork)m->work, at;
+  const HycoSubstructures b = o->bodies;
+  const HycoBodiesSurface s = HycoBodiesSurfaceOf(m);
+  PetscReal *du;
+  Parts change;
+
+  PetscFunctionBegin;
+  PetscCall(MakeBeside(m));
+  at = o->beside->at;
+  du = o->beside->du;
+  if (rows) PetscCall(HycoROMBringRows(m, mu));
+  PetscCall(HycoBodiesBring(at, rows ? &s : NULL, mu));
+  TakeChange(o, n, contact, rows, z + b->p, o->beside->change[point]);
+  change = PartsOf(o, o->beside->change[point]);
+  PetscCall(PetscArrayzero(du, b->ns));
+  PetscCall(AddDisplacements(o, &change, du));
+  for (PetscInt i = 0; i < b->p; i++) {
+    w[i] = 0;
+    for (PetscInt j = 0; j < b->r; j++) w[i] -= at->work[i * b->r + j] * o->c[j] + o->work[i * b->r + j] * change.c[j];
+    for (PetscInt k = 0; k < b->ns; k++) w[i] += at->Z[k * b->p + i] * o->f[k] + o->Z[k * b->p + i] * change.f[k];
+  }
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscInt lo = o->row_start[contact[k]], hi = o->row_start[contact[k] + 1];
+    PetscReal gap = rows ? at->gap[k] : m->rows.gap[contact[k]];
+
+    for (PetscInt e = at->row_start[k]; rows && e < at->row_start[k + 1]; e++) gap -= at->row[e] * o->u[at->row_at[e]];
+    for (PetscInt e = lo; e < hi; e++) gap -= o->row[e] * (du[o->row_at[e]] + (rows ? 0 : o->u[o->row_at[e]]));
+    w[b->p + k] = gap;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The derivatives of the fields of body k: of the modes in its turns, and of its unknowns inside. */
+static PetscErrorCode ExpandSlope(HycoBodiesWork o, PetscInt k, const Parts *change, const PetscReal weight[],
+                                  const PetscReal dx[], PetscReal dgamma[], PetscReal inside[])
+{
+  const HycoSubstructures b = o->bodies;
+  const HycoSubstructure *own = &b->body[k];
+  const PetscInt turns = b->turn_start[k + 1] - b->turn_start[k], n = turns * own->l + own->m;
+  const PetscBool weighted = AnyOf(own->n_samples, weight), turned = AnyOf(9, change->turn + 9 * k);
+  const PetscReal kappa = o->kappa[k], rate = change->kappa[k] / kappa;
+  PetscReal *row, *base, *x, *f, *share;
+
+  PetscFunctionBegin;
+  PetscCall(PetscCalloc5(n + 1, &row, n + 1, &base, b->r + b->p + 1, &x, own->n + 1, &f,
+                         own->a.n_terms + own->H.n_terms + 1, &share));
+  for (PetscInt j = 0; j < b->r; j++) x[j] = (change->c[j] - rate * o->c[j]) / kappa;
+  PetscCall(PetscArraycpy(x + b->r, dx, b->p));
+  for (PetscInt i = 0; i < own->n; i++) {
+    const PetscInt at = b->start[k] + i;
+
+    f[i] = (change->f[at] - rate * o->f[at]) / kappa;
+  }
+  PetscCall(HycoBodiesAddRows(o, k, o->share_a[k], o->share_H[k], x, f, row));
+  if (weighted) {
+    for (PetscInt j = 0; j < b->r; j++) x[j] = o->c[j] / kappa;
+    PetscCall(PetscArraycpy(x + b->r, o->x, b->p));
+    for (PetscInt i = 0; i < own->n; i++) f[i] = o->f[b->start[k] + i] / kappa;
+    HycoFlexibilityShares(&own->a, own->n_samples, weight, share);
+    HycoFlexibilityShares(&own->H, own->n_samples, weight, share + own->a.n_terms);
+    PetscCall(HycoBodiesAddRows(o, k, share, share + own->a.n_terms, x, f, row));
+  }
+  if (turned) PetscCall(HycoBodiesRows(o, k, n, base));
+  for (PetscInt j = 0; j < turns; j++) {
+    PetscReal of = 0, slope = 0;
+
+    for (PetscInt d = 0; d < 9; d++) {
+      of += b->G[9 * (b->turn_start[k] + j) + d] * o->pose[k].Q[d];
+      slope += b->G[9 * (b->turn_start[k] + j) + d] * change->turn[9 * k + d];
+    }
+    HycoBodiesAdd(own->l, of, row + j * own->l, dgamma + b->mode_start[k]);
+    if (turned) HycoBodiesAdd(own->l, slope, base + j * own->l, dgamma + b->mode_start[k]);
+  }
+  PetscCall(PetscArraycpy(inside + b->inner_start[k], row + turns * own->l, own->m));
+  PetscCall(PetscFree5(row, base, x, f, share));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* As HycoBodiesMove(): U' = Q u' + Q' u at the nodes with a place; prescribed displacements are the caller's. */
+static void MoveSlope(HycoBodiesWork o, const Parts *change, const PetscReal du[], PetscReal dU[])
+{
+  const PetscInt dim = o->bodies->dim;
+
+  for (PetscInt k = 0; k < o->n_placed; k++) {
+    const PetscInt i = o->placed[k] * dim, *loc = o->loc + i, body = o->placed_in[k];
+    PetscReal own[3] = {0, 0, 0}, slope[3] = {0, 0, 0}, turned[3], more[3];
+
+    for (PetscInt c = 0; c < dim; c++) {
+      own[c] = loc[c] < 0 ? 0 : o->u[loc[c]];
+      slope[c] = loc[c] < 0 ? 0 : du[loc[c]];
+    }
+    HycoPoseTurn(o->pose[body].Q, dim, PETSC_FALSE, slope, turned);
+    HycoPoseTurn(change->turn + 9 * body, dim, PETSC_FALSE, own, more);
+    for (PetscInt c = 0; c < dim; c++) {
+      if (loc[c] >= 0) dU[i + c] = turned[c] + more[c];
+    }
+  }
+}
+
+/* The change of the data is that of the weighted points, that of the forces has their change too. */
+PetscErrorCode HycoBodiesSlope(HycoROM m, PetscInt n, const PetscInt contact[], const PetscReal weight[2],
+                               const PetscInt point[2], const PetscReal dz[], PetscReal dgamma[], PetscReal dU[])
+{
+  HycoBodiesWork o = (HycoBodiesWork)m->work;
+  const HycoSubstructures b = o->bodies;
+  const HycoBodiesBeside s = o->beside;
+  PetscReal *sum = s->change[0], *du = s->du, *f = sum + s->size - b->ns;
+  const Parts change = PartsOf(o, sum);
+  const PetscReal *of = change.weight;
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < s->size; i++)
+    sum[i] = weight[0] * s->change[point[0]][i] + weight[1] * s->change[point[1]][i];
+  for (PetscInt k = 0; k < n; k++) {
+    for (PetscInt e = o->row_start[contact[k]]; e < o->row_start[contact[k] + 1]; e++)
+      f[o->row_at[e]] += o->row[e] * dz[b->p + k];
+  }
+  PetscCall(PetscArrayzero(du, b->ns + b->ni));
+  PetscCall(AddDisplacements(o, &change, du));
+  AddRowProducts(b->ns, b->p, o->Z, dz, 1, du);
+  PetscCall(PetscArrayzero(dgamma, b->l));
+  for (PetscInt k = 0; k < b->n; of += b->body[k++].n_samples)
+    PetscCall(ExpandSlope(o, k, &change, of, dz, dgamma, du + b->ns));
+  MoveSlope(o, &change, du, dU);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}

@@ -25,6 +25,7 @@ PetscErrorCode HycoBodiesReset(HycoBodiesWork o)
   PetscCall(HycoFEDestroy(&o->fe));
   PetscCall(HycoTaoDestroy(&o->tao));
   PetscCall(HycoSolverDestroy(&o->own));
+  PetscCall(HycoBodiesForgetBeside(o));
   for (PetscInt k = 0; o->R && k < o->bodies->n; k++)
     HycoFreeAll(&o->weight[k], &o->share[k], &o->share_H[k], &o->share_a[k], &o->blend[k], &o->R[k]);
   for (PetscInt k = 0; o->response && k < o->n_contacts * o->bodies->n; k++) PetscCall(PetscFree(o->response[k]));
@@ -108,8 +109,8 @@ PetscErrorCode HycoBodiesWeights(HycoSubstructures b, PetscInt k, const PetscRea
 }
 
 /* sum = the sum of the n_samples of n numbers each, times their weights. */
-static PetscErrorCode Blend(PetscInt n_samples, const PetscReal weight[], PetscInt n, const PetscReal data[],
-                            PetscReal sum[])
+PetscErrorCode HycoBodiesBlend(PetscInt n_samples, const PetscReal weight[], PetscInt n, const PetscReal data[],
+                               PetscReal sum[])
 {
   const PetscReal one = 1, zero = 0;
   const PetscBLASInt each = 1;
@@ -228,6 +229,7 @@ PetscErrorCode HycoBodiesSetUp(HycoBodiesWork o, HycoSubstructures b, HycoScene 
     PetscCall(PetscMalloc1(b->body[k].n * b->r + 1, &o->R[k]));
   }
   PetscCall(HycoFECreate(scene, b->probe->dm, &o->fe));
+  PetscCall(HycoFEKeepStiffness(o->fe)); /* of a few cells */
   /* Of a history too, thermal strains are loads here: the laws' s = C (e - e_th) - sigma leaves them out. */
   o->fe->heat_is_load = PETSC_TRUE;
   PetscCall(PetscCalloc1(b->n_variables + 1, &o->mu));
@@ -289,10 +291,9 @@ static PetscErrorCode Place(HycoBodiesWork o, const PetscReal mu[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The coefficients of the loads, and the displacements that they cause without contact. Loads are combinations of those
-   of training; their coefficients follow from as many entries of the force vector (DEIM; Chaturantabut and Sorensen
-   2010), in the body's own axes. */
-static PetscErrorCode Load(HycoBodiesWork o)
+/* The coefficients of the loads. Loads are combinations of those of training; their coefficients follow from as many
+   entries of the force vector (DEIM; Chaturantabut and Sorensen 2010), in the body's own axes. */
+static PetscErrorCode FindLoads(HycoBodiesWork o)
 {
   const HycoSubstructures b = o->bodies;
   const PetscScalar *F;
@@ -300,7 +301,6 @@ static PetscErrorCode Load(HycoBodiesWork o)
   Vec all;
 
   PetscFunctionBegin;
-  PetscCall(PetscArrayzero(o->elastic, b->ns));
   if (!b->r) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(b->r, &value));
   PetscCall(VecCreateSeq(PETSC_COMM_SELF, o->fe->n_dof, &all));
@@ -325,7 +325,18 @@ static PetscErrorCode Load(HycoBodiesWork o)
     for (PetscInt j = 0; j < b->r; j++) o->c[k] += b->A[k * b->r + j] * value[j];
   }
   PetscCall(PetscFree(value));
-  for (PetscInt k = 0; k < b->n; k++) {
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The displacements that they cause without contact. */
+static PetscErrorCode Load(HycoBodiesWork o)
+{
+  const HycoSubstructures b = o->bodies;
+
+  PetscFunctionBegin;
+  PetscCall(FindLoads(o));
+  PetscCall(PetscArrayzero(o->elastic, b->ns));
+  for (PetscInt k = 0; k < b->n && b->r; k++) {
     PetscReal *u = o->elastic + b->start[k];
     const PetscReal *R = o->R[k];
 
@@ -350,8 +361,8 @@ static PetscErrorCode BlendMotions(HycoBodiesWork o)
   for (PetscInt k = 0; k < b->n; k++) {
     const HycoSubstructure *own = &b->body[k];
 
-    PetscCall(Blend(own->n_samples, o->weight[k], own->n * b->p, own->Z, o->Z + b->start[k] * b->p));
-    PetscCall(Blend(own->n_samples, o->weight[k], b->p * b->r, own->work, work));
+    PetscCall(HycoBodiesBlend(own->n_samples, o->weight[k], own->n * b->p, own->Z, o->Z + b->start[k] * b->p));
+    PetscCall(HycoBodiesBlend(own->n_samples, o->weight[k], b->p * b->r, own->work, work));
     /* A motion may move several bodies, as tied ones do: the works add up. */
     for (PetscInt i = 0; i < b->p * b->r; i++) o->work[i] += work[i];
   }
@@ -424,8 +435,9 @@ static PetscErrorCode TurnRows(HycoBodiesWork o, const HycoBodiesSurface *s)
 
 /* -- flexibilities -- */
 
-/* The weights of the samples at mu, and what depends on them alone; columns with other ones are forgotten. */
-static PetscErrorCode TakeWeights(HycoBodiesWork o, const PetscReal mu[])
+/* The weights of the samples at mu, and what depends on them alone; columns with other ones are forgotten. alone: only the
+   weights. */
+static PetscErrorCode TakeWeights(HycoBodiesWork o, const PetscReal mu[], PetscBool alone)
 {
   const HycoSubstructures b = o->bodies;
 
@@ -444,11 +456,11 @@ static PetscErrorCode TakeWeights(HycoBodiesWork o, const PetscReal mu[])
     PetscCall(PetscFree(o->weight[k]));
     o->weight[k] = weight;
     /* The first prediction has no weights of 0 all over. */
-    if (same) continue;
+    if (same || alone) continue;
     HycoFlexibilityShares(&b->body[k].C, n, weight, o->share[k]);
     HycoFlexibilityShares(&b->body[k].H, n, weight, o->share_H[k]);
     HycoFlexibilityShares(&b->body[k].a, n, weight, o->share_a[k]);
-    PetscCall(Blend(n, weight, b->body[k].n * b->r, b->body[k].R, o->R[k]));
+    PetscCall(HycoBodiesBlend(n, weight, b->body[k].n * b->r, b->body[k].R, o->R[k]));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -669,18 +681,17 @@ PetscErrorCode HycoBodiesMatrix(HycoBodiesWork o, PetscInt n, const PetscInt con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* u -= C f / kappa. */
-static PetscErrorCode Yield(HycoBodiesWork o)
+PetscErrorCode HycoBodiesYield(HycoBodiesWork o, const PetscReal f[], PetscReal to[])
 {
   const HycoSubstructures b = o->bodies;
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < b->n; k++) {
     const HycoSubstructure *own = &b->body[k];
-    PetscReal *u = o->u + b->start[k];
+    PetscReal *u = to + b->start[k];
 
     for (PetscInt j = 0; j < own->n; j++) {
-      const PetscReal force = o->f[b->start[k] + j] / o->kappa[k];
+      const PetscReal force = f[b->start[k] + j] / o->kappa[k];
 
       const PetscReal *column;
 
@@ -708,7 +719,7 @@ PetscErrorCode HycoBodiesRespond(HycoBodiesWork o, const PetscReal f[])
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(o->f, f, o->bodies->ns));
   PetscCall(PetscArraycpy(o->u, o->free, o->bodies->ns));
-  PetscCall(Yield(o));
+  PetscCall(HycoBodiesYield(o, o->f, o->u));
   MoveRigidly(o);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -878,31 +889,54 @@ static PetscErrorCode SolveRounds(HycoBodiesWork o, const HycoBodiesSurface *s, 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The order matters: weights before Load() and BlendMotions(), the pose and kappa before both, all displacements
-   without contact before TurnRows(), which subtracts them from the gaps. Only what the changed parameters enter. */
-PetscErrorCode HycoBodiesPrepare(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal mu[])
+/* What changes from the parameters of the last call to mu. */
+static HycoChanges Changes(HycoBodiesWork o, const PetscReal mu[], PetscBool *forces)
 {
   const HycoScene scene = o->fe->scene;
-  const PetscBool first = (PetscBool)!o->prepared;
   PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE};
-  HycoChanges c;
+
+  for (PetscInt p = 0; p < scene->n_variables; p++) changed[p] = (PetscBool)(!o->prepared || mu[p] != o->mu[p]);
+  *forces = (PetscBool)(!o->prepared || HycoSceneForcesChange(scene, changed));
+  return HycoSceneChanges(scene, changed);
+}
+
+/* The order matters: weights before Load() and BlendMotions(), the pose and kappa before both, all displacements
+   without contact before TurnRows(), which subtracts them from the gaps. Only what the changed parameters enter. alone: the
+   data of the bodies and the rows, without displacements. */
+static PetscErrorCode Bring(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal mu[], PetscBool alone)
+{
+  PetscBool forces;
+  const HycoChanges c = Changes(o, mu, &forces);
+  const PetscBool first = (PetscBool)!o->prepared;
 
   PetscFunctionBegin;
-  for (PetscInt p = 0; p < scene->n_variables; p++) changed[p] = (PetscBool)(first || mu[p] != o->mu[p]);
-  c = HycoSceneChanges(scene, changed);
   /* Until all of it is there: an error leaves nothing that the next point could take over. */
   o->prepared = PETSC_FALSE;
   if (first || c.nodes || c.stiffness) {
-    PetscCall(TakeWeights(o, mu));
+    PetscCall(TakeWeights(o, mu, alone));
     PetscCall(Place(o, mu));
     PetscCall(BlendMotions(o));
   } else
     PetscCall(HycoFESetParameters(o->fe, mu));
-  if (first || HycoSceneForcesChange(scene, changed)) PetscCall(Load(o));
-  PetscCall(TurnRows(o, s));
-  PetscCall(PetscArrayzero(o->responded, s->n));
-  PetscCall(PetscArraycpy(o->mu, mu, scene->n_variables));
+  if (forces) PetscCall(alone ? FindLoads(o) : Load(o));
+  if (s) PetscCall(TurnRows(o, s));
+  PetscCall(PetscArraycpy(o->mu, mu, o->fe->scene->n_variables));
   o->prepared = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBodiesBring(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal mu[])
+{
+  PetscFunctionBegin;
+  PetscCall(Bring(o, s, mu, PETSC_TRUE));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBodiesPrepare(HycoBodiesWork o, const HycoBodiesSurface *s, const PetscReal mu[])
+{
+  PetscFunctionBegin;
+  PetscCall(Bring(o, s, mu, PETSC_FALSE));
+  PetscCall(PetscArrayzero(o->responded, s->n));
   PetscCall(HycoBodiesKeepRows(o, s->n));
   PetscCall(HycoBodiesStrain(o, s, NULL));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -1020,22 +1054,37 @@ void HycoBodiesMove(HycoBodiesWork o, const HycoBodiesSurface *s, PetscReal U[])
   }
 }
 
-/* row = (a c - H f) / kappa + g x for all rows of body k, at the weights of its samples; a has the columns of g, too. */
-static PetscErrorCode RowsOf(HycoBodiesWork o, PetscInt k, PetscInt n, PetscReal row[])
+/* row += a x - H f with these shares of the terms; a has the columns of g, too. */
+PetscErrorCode HycoBodiesAddRows(HycoBodiesWork o, PetscInt k, const PetscReal share_a[], const PetscReal share_H[],
+                                 const PetscReal x[], const PetscReal f[], PetscReal row[])
+{
+  const HycoSubstructure *own = &o->bodies->body[k];
+  PetscReal *minus;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFlexibilityMultiply(&own->a, share_a, x, row));
+  PetscCall(PetscMalloc1(own->n + 1, &minus));
+  for (PetscInt i = 0; i < own->n; i++) minus[i] = -f[i];
+  PetscCall(HycoFlexibilityMultiply(&own->H, share_H, minus, row));
+  PetscCall(PetscFree(minus));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* row = (a c - H f) / kappa + g x for all rows of body k, at the weights of its samples. */
+PetscErrorCode HycoBodiesRows(HycoBodiesWork o, PetscInt k, PetscInt n, PetscReal row[])
 {
   const HycoSubstructures b = o->bodies;
-  const HycoSubstructure *own = &b->body[k];
-  PetscReal *x;
+  const PetscInt n_own = b->body[k].n;
+  PetscReal *x, *f;
 
   PetscFunctionBegin;
   PetscCall(PetscArrayzero(row, n));
-  PetscCall(PetscMalloc1(own->n + b->r + b->p + 1, &x));
+  PetscCall(PetscMalloc2(b->r + b->p + 1, &x, n_own + 1, &f));
   for (PetscInt d = 0; d < b->r; d++) x[d] = o->c[d] / o->kappa[k];
   PetscCall(PetscArraycpy(x + b->r, o->x, b->p));
-  PetscCall(HycoFlexibilityMultiply(&own->a, o->share_a[k], x, row));
-  for (PetscInt i = 0; i < own->n; i++) x[i] = -o->f[b->start[k] + i] / o->kappa[k];
-  PetscCall(HycoFlexibilityMultiply(&own->H, o->share_H[k], x, row));
-  PetscCall(PetscFree(x));
+  for (PetscInt i = 0; i < n_own; i++) f[i] = o->f[b->start[k] + i] / o->kappa[k];
+  PetscCall(HycoBodiesAddRows(o, k, o->share_a[k], o->share_H[k], x, f, row));
+  PetscCall(PetscFree2(x, f));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -1050,7 +1099,7 @@ static PetscErrorCode ExpandBody(HycoBodiesWork o, PetscInt k, PetscReal gamma[]
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(n + 1, &row));
-  PetscCall(RowsOf(o, k, n, row));
+  PetscCall(HycoBodiesRows(o, k, n, row));
   for (PetscInt j = 0; j < turns; j++) {
     PetscReal share = 0;
 
