@@ -104,9 +104,9 @@ PetscBool DriverHasStack(char **argv);
 /* Fails if a launcher of another MPI has started several processes, each of which would do all the work and write
    the same files. Collective. */
 PetscErrorCode DriverCheckLaunch(void);
-/* If OpenBLAS does not know this processor because it is newer, and selects its oldest kernels: restarts this
-   program with the kernels that the processor supports (a factor takes half the time), unless OPENBLAS_CORETYPE is
-   set. The library reads that variable when it is loaded, before main(). */
+/* If OpenBLAS does not know this processor because it is newer, and selects its oldest kernels: selects those that the
+   processor supports (a factor takes half the time), unless OPENBLAS_CORETYPE is set. The library reads that variable
+   when it is loaded, before main(); if it cannot read it again, the program is started again. */
 void DriverChooseKernels(char **argv);
 /* One BLAS thread per rank, unless its variables, or OpenMP's, are set. (A BLAS reads them when it is loaded, before
    main().) */

@@ -211,7 +211,7 @@ static int Help(char **argv)
   return HycoFinalize() || ierr ? DRIVER_FAILED : DRIVER_DONE;
 }
 
-/* Whether it solves full order. Otherwise a restart would take longer than a prediction. */
+/* Whether it solves full order. Otherwise a restart, where it is needed, would take longer than a prediction. */
 static int Factors(const Command *command)
 {
   return command->run == CommandSolve || command->run == CommandTrain || command->run == CommandCompare;

@@ -53,11 +53,11 @@ class Launch(Case):
         return {re.sub(r'\d+', '0', line) for line in run.stderr.splitlines()}
 
     def kernels(self, command, **environment):
-        """The kernels that OpenBLAS reports, one line for each start."""
+        """The kernels that OpenBLAS reports, one line for each choice."""
         return re.findall(r'(?m)^Core: (\S+)', self.start(*command, OPENBLAS_VERBOSE='2', **environment).stderr)
 
     def test_young_processor(self):
-        """An OpenBLAS older than the processor uses its oldest kernels; solve and train then restart with those that the processor supports."""
+        """An OpenBLAS older than the processor uses its oldest kernels; solve and train then select those that the processor supports."""
         predict, solve = self.kernels(self.COMMANDS[1]), self.kernels(self.COMMANDS[2])
         if predict != ['Prescott']:
             self.assertEqual(solve, predict)
