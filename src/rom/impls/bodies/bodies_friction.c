@@ -290,7 +290,8 @@ PetscErrorCode HycoBodiesFrictionDerive(HycoBodiesFriction f, PetscInt m, const 
     PetscBool near = PETSC_TRUE;
 
     /* Slips that turn change the map a little, and the rounds of the search correct it; other states by much more. */
-    for (PetscInt i = 0; i < n_pieces && near; i++) near = (PetscBool)(PetscAbsReal(pieces[i] - f->pieces[i]) <= TURNED);
+    for (PetscInt i = 0; i < n_pieces && near; i++)
+      near = (PetscBool)(PetscAbsReal(pieces[i] - f->pieces[i]) <= TURNED);
     if (near) PetscFunctionReturn(PETSC_SUCCESS);
   }
   *changed = PETSC_TRUE;

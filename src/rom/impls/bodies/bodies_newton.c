@@ -26,7 +26,7 @@
 #include "bodies_path.h"
 
 #define ROUNDS    30    /* of sets in a step */
-#define KEPT     8     /* of these, with the map of other directions of slip */
+#define KEPT      8     /* of these, with the map of other directions of slip */
 #define MOST_ITS  30    /* of Newton's method in a step */
 #define HALVINGS  6     /* of a step of Newton's method */
 #define CONTRACTS 0.2   /* of the residual in an iteration: more, and the tangent is made again */
