@@ -31,6 +31,7 @@
 #define SOLVED      1e-10 /* the same: solved, if the steps gain nothing more */
 #define NEAR        1e-6  /* the same: near a solution, */
 #define ROUNDING    1e-12 /* and round-off, if a step does not halve it */
+#define CONTRACTS   0.2   /* of |F| in a step: more, and a factor of another J is made again */
 #define LEAST_STEP  (1. / 64)
 
 typedef struct {
@@ -216,10 +217,15 @@ static PetscErrorCode Step(Newton *h, const PetscReal z[], PetscBool near, Petsc
 static PetscErrorCode Improve(Newton *h, PetscReal z[], PetscReal *norm, PetscReal *size, PetscBool *regular,
                               PetscBool *less)
 {
+  const PetscReal before = *norm;
+  const PetscBool lagged = h->linear->lagged;
+
   PetscFunctionBegin;
   *less = PETSC_FALSE;
   PetscCall(Step(h, z, (PetscBool)(*norm <= NEAR * *size), PETSC_FALSE, regular));
   if (*regular) PetscCall(Search(h, z, norm, size, less));
+  /* A new factor where the present one does not contract; the next step begins with it. */
+  if (*less && lagged && *norm > CONTRACTS * before) PetscCall(HycoConeStepRenew(h->linear));
   if (!*less && *norm > ROUNDING * *size) { /* by the residual, with a factor of J itself */
     PetscCall(HycoConeStepRenew(h->linear));
     PetscCall(Step(h, z, PETSC_TRUE, PETSC_FALSE, regular));

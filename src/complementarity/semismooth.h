@@ -39,6 +39,7 @@ typedef struct {
   PetscBLASInt *pivot, info;
   PetscBool factored; /* A is the factor for the base, or singular: info */
   PetscBool nearly_singular;
+  PetscBool lagged;             /* the factor of the base stands for that of J, which is near */
   PetscInt c, *changed, *block; /* rows whose DP has changed since the base, and their blocks */
   PetscInt n_columns, *column;  /* of Z; by row: its column, or -1 */
   PetscReal *Z, *Q;             /* n x HYCO_CONE_CHANGES; rows of (I - rho M) Z, row by row, as far as known: */

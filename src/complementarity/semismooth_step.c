@@ -6,6 +6,7 @@
 #define SINGULAR 1e-8  /* least pivot of A relative to the largest: below, least squares may give another step */
 #define LEAST_SHARE                                                                                                    \
   3 /* the base changes once a third of its unknowns would be updated: a solve with each costs a factor then */
+#define NEAR        0.1   /* largest change of an entry of DP at which the base may stand for it */
 #define HOMOGENEOUS 1e-14 /* P(y) - DP y relative to y: round-off */
 #define ROUNDING    1e-13 /* rows of DP relative to the longest that count as 0 */
 #define INFLEXIBLE  1e-12 /* diagonal entry of M relative to its block's largest that counts as 0 */
@@ -148,7 +149,7 @@ static PetscErrorCode TakeBase(HycoConeStep *t)
   const PetscReal one = 1;
 
   PetscFunctionBegin;
-  t->factored = t->updated = PETSC_FALSE;
+  t->factored = t->updated = t->lagged = PETSC_FALSE;
   t->m = t->c = t->n_columns = 0;
   PetscCall(PetscArraycpy(t->base, t->DP, (size_t)t->blocks->n * HYCO_BLOCK));
   /* Motions without a cone are unknowns of their own. */
@@ -207,6 +208,18 @@ static PetscBool Inflexible(const HycoConeStep *t, PetscInt k, PetscInt i)
   return (PetscBool) !(own > INFLEXIBLE * most);
 }
 
+/* Whether DP differs from the base by little, as where slips turn in many contacts, and no contact has another state. */
+static PetscBool IsNear(const HycoConeStep *t)
+{
+  for (PetscInt k = 0; k < t->blocks->n; k++) {
+    if (t->rank[k] != t->base_rank[k]) return PETSC_FALSE;
+    for (PetscInt i = k * HYCO_BLOCK; i < (k + 1) * HYCO_BLOCK; i++) {
+      if (PetscAbsReal(t->DP[i] - t->base[i]) > NEAR) return PETSC_FALSE;
+    }
+  }
+  return PETSC_TRUE;
+}
+
 /* Entries of DP are compared exactly: a step between the same states of contacts without slip in 3D has the same DP,
    and keeps the factor. */
 PetscErrorCode HycoConeStepDerive(HycoConeStep *t, const HycoBlocks *blocks, const PetscReal y[], PetscInt *changes)
@@ -236,12 +249,17 @@ PetscErrorCode HycoConeStepDerive(HycoConeStep *t, const HycoBlocks *blocks, con
     *changes += PetscAbsInt(t->rank[k] - before);
   }
   if (t->factored && same) PetscFunctionReturn(PETSC_SUCCESS);
-  t->updated = PETSC_FALSE;
+  t->updated = t->lagged = PETSC_FALSE;
   if (t->factored && t->info == 0) {
     const PetscInt missing = Compare(t), most = PetscMin(HYCO_CONE_CHANGES, t->m / LEAST_SHARE);
 
     /* Few changes: a low-rank update of the factor instead of a new one. */
     if (t->c <= most && t->n_columns + missing <= most) PetscFunctionReturn(PETSC_SUCCESS);
+    t->lagged = (PetscBool)(!t->nearly_singular && IsNear(t));
+    if (t->lagged) {
+      t->c = 0;
+      PetscFunctionReturn(PETSC_SUCCESS);
+    }
   }
   PetscCall(TakeBase(t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -539,7 +557,7 @@ static PetscErrorCode Prepare(HycoConeStep *t)
 PetscErrorCode HycoConeStepRenew(HycoConeStep *t)
 {
   PetscFunctionBegin;
-  if (t->c) PetscCall(TakeBase(t));
+  if (t->c || t->lagged) PetscCall(TakeBase(t));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -553,7 +571,7 @@ PetscErrorCode HycoConeStepSolve(HycoConeStep *t, const PetscReal b[], PetscBool
 
   PetscFunctionBegin;
   /* Least squares need the present matrix, not an update of another. */
-  if (least && t->c) PetscCall(TakeBase(t));
+  if (least) PetscCall(HycoConeStepRenew(t));
   if (!least) PetscCall(Prepare(t));
   m = (PetscBLASInt)t->m;
   PetscCall(RightHandSide(t, b));
@@ -599,6 +617,7 @@ static PetscErrorCode SolvePoint(HycoConeStep *t, const PetscReal q[], PetscReal
   PetscReal size = 0;
 
   PetscFunctionBegin;
+  if (t->lagged) PetscCall(TakeBase(t));
   PetscCall(Prepare(t));
   m = (PetscBLASInt)t->m;
   info = t->info;
@@ -622,7 +641,9 @@ PetscErrorCode HycoConeStepPoint(HycoConeStep *t, const PetscReal q[], const Pet
 {
   PetscFunctionBegin;
   *regular = PETSC_TRUE;
-  PetscCall(IsHomogeneous(t, y, served));
+  *served = PETSC_FALSE;
+  /* Steps alone have the right limit with a factor of another J. */
+  if (!t->lagged) PetscCall(IsHomogeneous(t, y, served));
   if (*served) PetscCall(SolvePoint(t, q, z, regular));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -639,6 +660,7 @@ PetscErrorCode HycoConeStepTangent(HycoConeStep *t, const PetscReal dq[], PetscR
 PetscErrorCode HycoConeStepSign(HycoConeStep *t, PetscInt *sign)
 {
   PetscFunctionBegin;
+  if (t->lagged) PetscCall(TakeBase(t));
   PetscCall(Prepare(t));
   /* det A is the product of U's diagonal, with a change of sign for each exchange of rows; det A = det J. */
   *sign = t->info == 0;

@@ -26,6 +26,7 @@
 #include "bodies_path.h"
 
 #define ROUNDS    30    /* of sets in a step */
+#define KEPT      8     /* of these, with the map of other directions of slip */
 #define MOST_ITS  30    /* of Newton's method in a step */
 #define HALVINGS  6     /* of a step of Newton's method */
 #define CONTRACTS 0.2   /* of the residual in an iteration: more, and the tangent is made again */
@@ -850,6 +851,8 @@ static PetscErrorCode SearchStates(HycoROM m, PetscReal t0, PetscReal t1, PetscR
   for (PetscInt round = 0; !done && round < ROUNDS && !a->why[0]; round++) {
     const PetscInt before = a->iterations;
 
+    /* A map that is kept converges in few rounds, or is made again. */
+    if (round >= KEPT) w->fresh = PETSC_TRUE;
     PetscCall(TakeStates(m, alpha, a));
     if (!a->why[0]) PetscCall(Newton(m, t0, t1, alpha, a));
     /* alpha is that of the contact problem. */
