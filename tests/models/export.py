@@ -113,6 +113,16 @@ Transfinite Curve{1, 3} = 29; Transfinite Curve{2, 4, 6, 8} = 5; Transfinite Cur
 Physical Surface("plate") = {1}; Physical Surface("tool") = {2}; Physical Curve("base") = {1}; Physical Curve("end") = {2};
 Physical Curve("top") = {3}; Physical Curve("corner") = {4}; Physical Curve("sole") = {5}; Physical Curve("grip") = {7};
 """)
+DISPLACED = f"""
+scene: {{title: a cylinder that rolls on a block, mesh: {os.path.join(SOURCE, 'examples', 'roller', 'roller.msh')}, parameters: [roll, press, side, lift, tilt, soft]}}
+parameter: {{roll: {{range: [-0.1, 0.1]}}, press: {{range: [0.2, 1]}}, side: {{range: [-0.1, 0.1]}}, lift: {{range: [-0.1, 0.1]}}, tilt: {{range: [-0.01, 0.01]}}, soft: {{range: [5, 20]}}}}
+body:
+  block: {{young: soft, poisson: 0.4}}
+  cylinder: {{young: 100, poisson: 0.3, map: {{x: "x*cos(roll) - (y - 10)*sin(roll)", y: "10 + x*sin(roll) + (y - 10)*cos(roll)"}}}}
+fixed: {{block_base: {{x: 0, y: lift}}, cylinder_top: {{x: "side + tilt*x", y: "-press + tilt*y"}}}}
+contact: {{under: {{type: surface, slave: cylinder_round, master: block_top}}}}
+output: {{base: {{reaction: y, group: block_base}}}}
+"""
 # Two threads predict all points, one with its own memory; a line for each point, from the first thread.
 MAIN = """#include "NAME.h"
 #include <pthread.h>
@@ -241,6 +251,15 @@ class Export(Case):
         """2D: the radius of a tool that travels over a plate, to beyond its edge, whose end is drawn aside: flexibilities between samples, moved normals and areas."""
         self.drawn('drawn_shape', 2, SHAPE[1], SHAPE[0])
         self.judge('shape', self.path('drawn_shape'), ['force', 'hold', 'most', 'stress', 'sink', 'touch'])
+
+    def test_displaced(self):
+        """Four parameters of given displacements that vary in space on a body that turns by a small angle: found whatever the number of expressions."""
+        with open(self.path('displaced.yaml'), 'w', encoding='ascii') as f:
+            f.write(DISPLACED)
+        self.hyco('train', '-scene', 'displaced.yaml', '-hyco_model_type', 'bodies', '-scatter', '12', '-hyco_validation', '0', '-model', 'displaced.h5')
+        run = self.run_raw('export', '-model', 'displaced.h5', '-c', 'displaced.c')
+        self.assertEqual(run.returncode, 0, run.stderr)
+        self.assertLess(float(run.stdout.split('largest difference from the model ')[1].split()[0]), 1e-11)
 
     def test_refused(self):
         """One line names what cannot be exported, and no file is written."""
