@@ -28,11 +28,11 @@ static PetscErrorCode Product(const char transpose[2], PetscInt m, PetscInt n, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* One half: min 1/2 tr(X^T G X) - tr(C^T X), X >= 0, X and C k x n, G k x k. `room`: 4 k n numbers. */
+/* One half: min 1/2 tr(X^T G X) - tr(C^T X), X >= 0, X and C k x n, G k x k. */
 typedef struct {
   PetscInt k, n;
   const PetscReal *G, *C;
-  PetscReal *gradient, *next, *step, *Gstep;
+  PetscReal *gradient, *step, *Gstep;
 } Half;
 
 /* Norm of the gradient, without the entries that keep X at 0. */
@@ -56,20 +56,20 @@ static PetscErrorCode Gradient(const Half *h, const PetscReal X[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* next = [X - alpha gradient]_+; whether the decrease is at least a hundredth of the linear prediction. The condition
+/* step = [X - alpha gradient]_+ - X; whether the decrease is at least a hundredth of the linear prediction. The condition
    is that of Lin (2007), which needs no value of the function. */
 static PetscErrorCode Try(const Half *h, const PetscReal X[], PetscReal alpha, PetscBool *enough)
 {
-  PetscReal slope = 0, curve = 0;
+  const PetscBLASInt one = 1;
+  PetscBLASInt size;
+  PetscReal slope, curve;
 
   PetscFunctionBegin;
-  for (PetscInt i = 0; i < h->k * h->n; i++) {
-    h->next[i] = PetscMax(X[i] - alpha * h->gradient[i], 0);
-    h->step[i] = h->next[i] - X[i];
-    slope += h->gradient[i] * h->step[i];
-  }
+  PetscCall(PetscBLASIntCast(h->k * h->n, &size));
+  for (PetscInt i = 0; i < size; i++) h->step[i] = PetscMax(X[i] - alpha * h->gradient[i], 0) - X[i];
+  slope = BLASdot_(&size, h->gradient, &one, h->step, &one);
   PetscCall(Product("NN", h->k, h->n, h->k, h->G, h->step, h->Gstep));
-  for (PetscInt i = 0; i < h->k * h->n; i++) curve += h->Gstep[i] * h->step[i];
+  curve = BLASdot_(&size, h->Gstep, &one, h->step, &one);
   *enough = (PetscBool)(0.99 * slope + 0.5 * curve <= 0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -176,7 +176,7 @@ static PetscErrorCode Alternate(PetscInt m, PetscInt n, PetscInt k, const PetscR
 {
   const PetscInt size = k * PetscMax(m, n);
   PetscReal *factor[2] = {Wt, H}, *G = room, *C = G + k * k, tol[2], first = 0;
-  Half h = {0, 0, NULL, NULL, C + size, C + 2 * size, C + 3 * size, C + 4 * size};
+  Half h = {0, 0, NULL, NULL, C + size, C + 2 * size, C + 3 * size};
 
   PetscFunctionBegin;
   for (PetscInt it = 0; it < max_its; it++) {
@@ -234,7 +234,7 @@ PetscErrorCode HycoNNMF(PetscInt m, PetscInt n, const PetscReal S[], PetscInt k,
   }
   if (norm == 0) PetscFunctionReturn(PETSC_SUCCESS);
   norm = PetscSqrtReal(norm);
-  PetscCall(PetscMalloc4(m * n, &scaled, k * m, &Wt, k * n, &H, k * k + 5 * k * PetscMax(m, n), &room));
+  PetscCall(PetscMalloc4(m * n, &scaled, k * m, &Wt, k * n, &H, k * k + 4 * k * PetscMax(m, n), &room));
   /* ROUND_OFF is absolute, while forces may have any unit. */
   for (PetscInt i = 0; i < m * n; i++) scaled[i] = S[i] / norm;
   PetscCall(Start(m, n, scaled, k, Wt, H));

@@ -1,5 +1,5 @@
 """Scenes drawn from the documents alone: at the centre and at the corners of the ranges full order's results balance, by identities of statics that
-were written beside each scene (forces on floating bodies, reactions and contact forces). With HYCO_LONG also the two whose paths take minutes."""
+were written beside each scene (forces on floating bodies, reactions and contact forces). With HYCO_LONG also the three whose paths take minutes."""
 import os
 import subprocess
 import sys

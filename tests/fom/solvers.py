@@ -27,8 +27,10 @@ FORMS = ('dual', 'primal', 'dual_free')
 METHODS = OURS + tao(NEWTON + FIRST_ORDER, FORMS) + tao(SEMISMOOTH, ('dual',))
 ON_TWO_RANKS = OURS + tao(['gpcg', 'tron', 'bnls'], FORMS) + tao(['ssils'], ('dual',))
 QUICK = OURS + tao(['gpcg', 'tron'], ('dual', 'primal'))
+LARGE = 2000 if 'HYCO_LONG' in os.environ else 1000
+ROPES = f'rope {LARGE}'
 # the others on the two small scenes, on one rank; all of them everywhere with HYCO_LONG (scripts/solver-tables, ctest -C Long)
-FEW = {('rope 2000', 1): QUICK, ('rope 2000', 2): QUICK, ('rope 100', 2): QUICK, ('blocks', 2): QUICK,
+FEW = {(ROPES, 1): QUICK, (ROPES, 2): QUICK, ('rope 100', 2): QUICK, ('blocks', 2): QUICK,
        ('pellet A', 1): QUICK + tao(['bnls', 'ssils'], ('dual',)), ('pellet A', 2): QUICK}
 if 'HYCO_LONG' in os.environ:
     FEW = {}
@@ -40,8 +42,8 @@ UNFIT = [
     ('*', 'primal', ['blmvm'], 'no progress'),
     ('pellet A', 'primal', ['bncg'], 'no progress'),
     ('rope 100', 'dual', ['blmvm'], 'slow: round-off decides whether it ends in time'),
-    ('rope 2000', '*', FIRST_ORDER, 'no progress'),
-    ('rope 2000', 'primal', ['bntr', 'bnls', 'bntl'], 'no progress at 1e-7'),
+    (ROPES, '*', FIRST_ORDER, 'no progress'),
+    (ROPES, 'primal', ['bntr', 'bnls', 'bntl'], 'no progress at 1e-7'),
 ]
 
 
@@ -105,7 +107,7 @@ class Solvers(Case):
         for ranks in (1, 2):
             for method in FEW.get((scene, ranks), ON_TWO_RANKS if ranks == 2 else [*METHODS, *further]):
                 # thousands of solves, which on two ranks are mostly communication
-                slow = ranks == 2 and (method[1:] == ('dual_free', 'gpcg') or scene == 'rope 2000' and
+                slow = ranks == 2 and (method[1:] == ('dual_free', 'gpcg') or scene == ROPES and
                                        (method[1] == 'dual_free' or method[1:] == ('primal', 'bnls')))
                 if method[2] in without or slow:
                     continue
@@ -118,15 +120,15 @@ class Solvers(Case):
         self.near(self.every('rope 100', ['-scene', ROPE, '-mu', '0.07,0.17'], tao(QUASI, ('dual', 'primal'))),
                   0.3502256293, 1e-9)
 
-    def test_rope_2000(self):
-        """The rope of 2000 nodes."""
-        n = 2000
-        mesh = self.path('rope2000.msh')
+    def test_rope_fine(self):
+        """The rope of 1000 nodes; with HYCO_LONG, of 2000."""
+        n = LARGE
+        mesh = self.path('fine.msh')
         msh(mesh, [(i / (n - 1), 0, 0) for i in range(n)],
             [(1, 1, [i + 1, i + 2]) for i in range(n - 1)] + [(15, 2, [1]), (15, 2, [n])],
             {1: (1, 'rope'), 2: (0, 'ends')})
-        # without the semismooth types: a factor of a full 2000 x 2000 matrix for each of 200 iterations
-        self.every('rope 2000', ['-scene', ROPE, '-scene_mesh', mesh, '-mu', '0.07,0.17'], without=SEMISMOOTH)
+        # without the semismooth types: a factor of a full n x n matrix for each of 200 iterations
+        self.every(ROPES, ['-scene', ROPE, '-scene_mesh', mesh, '-mu', '0.07,0.17'], without=SEMISMOOTH)
 
     def test_blocks(self):
         """Two blocks."""

@@ -468,16 +468,15 @@ class Bodies(Case):
             self.near(p['total_contact_force'], s['total_contact_force'], 1e-10)
 
     def test_ranks(self):
-        """The same forces and the same output in the hottest cell from a training on one, two and three ranks, with samples and with a floating body."""
-        for name, text, point in (('floating.yaml', FLOATING, '2.2,123,0.3'), ('stiff.yaml', STIFF, '1.9,0.041')):
+        """The same forces and the same output in the hottest cell from a training on one and more ranks: on two with samples, on three with a floating body."""
+        for name, text, point, many in (('floating.yaml', FLOATING, '2.2,123,0.3', 3), ('stiff.yaml', STIFF, '1.9,0.041', 2)):
             scene = self.write(name, text + 'output: {hot: {max: mises}}\n')
             forces = []
-            for ranks in (1, 2, 3):
+            for ranks in (1, many):
                 self.hyco('train', '-scene', scene, *TYPE, '-scatter', '2', '-model', 'r.h5', '-hyco_snapshots', 'snapshots', ranks=ranks)
                 r = self.hyco('predict', '-model', 'r.h5', '-mu', point)
                 forces.append((r['total_contact_force'], r['lambda_max'], r['outputs']['hot']))
-            for other in forces[1:]:
-                np.testing.assert_allclose(other, forces[0], rtol=1e-9)
+            np.testing.assert_allclose(forces[1], forces[0], rtol=1e-9)
 
     def refused(self, scene, *words, options=()):
         run = self.run_raw('train', '-scene', scene, *TYPE, '-scatter', '2', '-model', 'no.h5', *options)

@@ -106,15 +106,15 @@ contact: {wall: {group: over, normal: {z: 1}, gap: -0.01*press*(1 + x)}}
             'penetrates': (SURFACE.replace('base: {z: 0}', 'base: {z: 0}, over: {x: 0, y: 0, z: 0}, under: {x: 0, y: 0, z: -0.01}'), {}),
             'shared': (SURFACE.replace('slave: under', 'slave: over'), {}),
         }
-        for name, (text, more) in cases.items():
+        for k, (name, (text, more)) in enumerate(cases.items()):
             scene, said = self.blocks(text, **more), []
-            for ranks in (0, *RANKS):
+            for ranks in (0, RANKS[k % len(RANKS)]):
                 run = self.run_raw('solve', '-scene', scene, '-mu', 1, ranks=ranks)
                 self.assertEqual(run.returncode, 1, name + run.stdout)
                 said.append([line for line in run.stderr.splitlines() if 'error: ' in line])
             with self.subTest(name=name):
                 self.assertEqual([len(lines) for lines in said], [1] * len(said), said)
-                self.assertEqual(said[1:], said[:1] * len(RANKS))
+                self.assertEqual(said[1], said[0])
                 self.assertIn('contact', said[0][0])
 
 
