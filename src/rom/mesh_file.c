@@ -75,7 +75,7 @@ PetscErrorCode HycoMeshMove(HycoH5 h, const char prefix[], PetscInt n_bodies, Hy
   if (!HycoH5Reads(h)) PetscFunctionReturn(PETSC_SUCCESS);
   /* Derived: a collapsed cell has repeated nodes. */
   for (PetscInt e = 0; e < m->n_cells; e++) m->mixed = (PetscBool)(m->mixed || HycoMeshShape(m, e) != m->type);
-  /* Groups of cells serve the whole mesh alone, so that a part has none. */
+  /* Groups of cells serve the whole mesh alone, and are read with it (whole_mesh.c). */
   PetscCall(PetscCalloc1(m->n_groups + 1, &m->group_cell_start));
   PetscCall(PetscMalloc1(1, &m->group_cell));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -60,6 +60,51 @@ static PetscErrorCode WriteGroupNodes(MPI_Comm comm, HycoH5 h, HycoMesh m, Petsc
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether a group is that of a body, whose cells cell_body gives. */
+static PetscBool IsBody(HycoScene scene, const char name[])
+{
+  for (PetscInt k = 0; k < scene->n_bodies; k++) {
+    if (strcmp(scene->body[k].name, name) == 0) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
+/* Writes the cells of groups that are no bodies, group by group. Collective. */
+static PetscErrorCode WriteGroupCells(HycoFOM f, HycoH5 h)
+{
+  HycoMesh m = f->part;
+  const PetscInt most = m->group_cell_start[m->n_groups];
+  PetscInt64 *key;
+  PetscInt *cell, *place, *start, n = 0, all;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc3(most, &key, most, &cell, most, &place));
+  PetscCall(PetscCalloc1(m->n_groups + 1, &start));
+  for (PetscInt g = 0; g < m->n_groups; g++) {
+    for (PetscInt k = m->group_cell_start[g]; k < m->group_cell_start[g + 1] && !IsBody(f->scene, m->group_name[g]);
+         k++) {
+      const PetscInt e = m->group_cell[k], *node = m->cells + e * m->nv;
+      PetscInt least = node[0];
+
+      /* On one rank alone, as facets. */
+      for (PetscInt v = 1; v < m->nv; v++) least = PetscMin(least, node[v]);
+      if (HycoMeshOwned(m, least) < 0) continue;
+      cell[n] = m->cell_whole ? m->cell_whole[e] : e;
+      key[n] = (PetscInt64)g * f->n_cells + cell[n];
+      n++;
+      start[g + 1]++;
+    }
+  }
+  HycoAllreduce(start, m->n_groups + 1, MPIU_INT, MPI_SUM, HycoComm(f));
+  for (PetscInt g = 0; g < m->n_groups; g++) start[g + 1] += start[g];
+  PetscCall(HycoRankKeys(HycoComm(f), n, key, place, &all));
+  HycoOnRoot(HycoComm(f), HycoH5WriteInt(h, IN("group_cell_start"), m->n_groups + 1, 1, start));
+  PetscCall(WritePlaced(HycoComm(f), h, IN("group_cell"), all, 1, n, place, cell));
+  PetscCall(PetscFree(start));
+  PetscCall(PetscFree3(key, cell, place));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Writes the facets, group by group in the order of their cells. Collective. */
 static PetscErrorCode WriteFacets(MPI_Comm comm, HycoH5 h, HycoMesh m, PetscInt n_cells)
 {
@@ -140,8 +185,20 @@ PetscErrorCode HycoROMWriteWhole(HycoH5 h, HycoFOM f, PetscInt l, Mat V)
   PetscCall(HycoFieldWrite(h, order, m->n_nodes, IN("node_body"), HYCO_ON_NODES, MPIU_INT, 1, 1, m->node_body));
   PetscCall(HycoFieldWrite(h, order, m->n_cells, IN("cell_body"), HYCO_ON_CELLS, MPIU_INT, 1, 1, m->cell_body));
   PetscCall(WriteGroupNodes(HycoComm(f), h, m, f->n_nodes));
+  PetscCall(WriteGroupCells(f, h));
   PetscCall(WriteFacets(HycoComm(f), h, m, f->n_cells));
   PetscCall(WriteModes(h, l, V));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The cells of groups that are no bodies; older files have none. */
+static PetscErrorCode LoadGroupCells(HycoH5 h, HycoMesh m)
+{
+  PetscFunctionBegin;
+  if (!HycoH5Has(h, IN("group_cell"))) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoFreeAll(&m->group_cell_start, &m->group_cell);
+  PetscCall(HycoH5Starts(h, IN("group_cell_start"), m->n_groups, &m->group_cell_start));
+  PetscCall(HycoH5Int(h, IN("group_cell"), 0, m->n_cells - 1, &m->group_cell_start[m->n_groups], 1, &m->group_cell));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -152,6 +209,7 @@ static PetscErrorCode LoadWholeMesh(HycoH5 h, HycoModel m, HycoMesh *whole)
 
   PetscFunctionBegin;
   PetscCall(HycoMeshMove(h, "whole", m->scene->n_bodies, whole));
+  PetscCall(LoadGroupCells(h, *whole));
   PetscCall(HycoMeshSetTies(*whole, m->mesh->ties));
   PetscCall(HycoMeshCreateDM(m->scene, *whole));
   n_dof = (*whole)->n_nodes * (*whole)->dim;

@@ -26,6 +26,41 @@ output: {push: {force: y, contact: ride}, tip: {mean: u_y, group: tip}}
 """
 
 
+# A rail in two parts, of which one is a group of its own too, under a shoe that travels
+PARTS = """
+Point(1) = {0, 0, 0}; Point(2) = {4, 0, 0}; Point(3) = {12, 0, 0}; Point(4) = {12, 4, 0}; Point(5) = {4, 4, 0}; Point(6) = {0, 4, 0};
+Line(1) = {1, 2}; Line(2) = {2, 5}; Line(3) = {5, 6}; Line(4) = {6, 1}; Line(5) = {2, 3}; Line(6) = {3, 4}; Line(7) = {4, 5};
+Curve Loop(1) = {1, 2, 3, 4}; Plane Surface(1) = {1}; Curve Loop(2) = {5, 6, 7, -2}; Plane Surface(2) = {2};
+Transfinite Curve {1, 3} = 9; Transfinite Curve {5, 7} = 17; Transfinite Curve {2, 4, 6} = 9;
+Point(11) = {-1, 10, 0}; Point(12) = {1, 10, 0}; Point(13) = {1, 12, 0}; Point(14) = {-1, 12, 0};
+Line(11) = {11, 12}; Line(12) = {12, 13}; Line(13) = {13, 14}; Line(14) = {14, 11}; Curve Loop(3) = {11, 12, 13, 14}; Plane Surface(3) = {3};
+Transfinite Curve {11, 12, 13, 14} = 6; Transfinite Surface {1:3}; Recombine Surface {1:3};
+Physical Surface("root") = {1}; Physical Surface("rail") = {1, 2}; Physical Surface("shoe") = {3};
+Physical Curve("base") = {4}; Physical Curve("rail_top") = {3, 7}; Physical Curve("shoe_under") = {11}; Physical Curve("shoe_top") = {13};
+"""
+RAIL = """
+scene: {title: rail, mesh: rail.msh, parameters: [place, load]}
+parameter: {place: {range: [5, 10]}, load: {range: [0.1, 0.3]}}
+body: {rail: {young: 1000, poisson: 0.3}, shoe: {young: 1000, poisson: 0.3, map: {x: x + place, y: "y - 6 + x^2/20"}}}
+fixed: {base: {x: 0, y: 0}, shoe_top: {x: 0, y: -load}}
+contact: {run: {type: surface, slave: shoe_under, master: rail_top}}
+output: {root: {mean: mises, group: root}, rail: {mean: mises, group: rail}}
+"""
+
+
+class Parts(Case):
+    def test_group_of_a_part(self):
+        """A group of some cells of a body, of which an output is the mean stress: models have it, from training on one rank and on two."""
+        self.drawn('rail', 2, PARTS, RAIL)
+        full = self.hyco('solve', '-scene', self.path('rail'), '-mu', '7,0.2')['outputs']
+        self.assertGreater(abs(full['root'] - full['rail']), 0.01 * full['rail'])
+        for ranks in (0, 2):
+            self.hyco('train', '-scene', self.path('rail'), '-grid', '3,3', '-hyco_model_type', 'bodies', '-hyco_snapshots', self.path('parts'),
+                      '-model', self.path('rail.h5'), ranks=ranks)
+            found = self.hyco('predict', '-model', self.path('rail.h5'), '-mu', '7,0.2')['outputs']
+            self.near(found['root'], full['root'], 1e-9)
+
+
 class Follows(Case):
     @classmethod
     def setUpClass(cls):
