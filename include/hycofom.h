@@ -142,9 +142,9 @@ PetscErrorCode HycoFOMSolve(HycoFOM fom, PetscInt n, const PetscReal mu[]);
 /*
   Solves K U = F - B^T Lambda at mu (length n) with given contact forces Lambda (n_contacts, read on rank 0, in the
   order of HycoFOMGetSolution()), for example those predicted by a model of bodies. It needs one factor of K, which is
-  kept while K does not change. The results are available as after HycoFOMSolve(), with Lambda as given. The summary's
-  residuals are those of (16): penetration and complementarity show the errors of Lambda. Its reason is that of the
-  linear solve. Collective.
+  kept while K does not change. Rigid motions that contact alone prevents are those that close the contacts with a
+  force. The results are available as after HycoFOMSolve(), with Lambda as given. The summary's residuals are those of
+  (16): penetration and complementarity show the errors of Lambda. Its reason is that of the linear solve. Collective.
 */
 PetscErrorCode HycoFOMSolveForces(HycoFOM fom, PetscInt n, const PetscReal mu[], const PetscReal Lambda[]);
 /* Gets the path of the last solve; n is 0 for a scene without a history. Not collective. */

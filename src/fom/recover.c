@@ -3,6 +3,7 @@
   only forces. The factor is that of K, without contacts, and is kept while K is
   unchanged.
 */
+#include <hycoalgorithms.h>
 #include <hycofomimpl.h>
 
 /* Creates a solver without contacts; in the other one they are unknowns. The factor of the contact solver may be that
@@ -18,6 +19,57 @@ static PetscErrorCode SetUp(HycoFOM f)
   PetscCall(HycoSolverSetType(f->given_solver, HYCO_SOLVER_ACTIVE_SET)); /* without its contacts */
   PetscCall(HycoSolverSetForm(f->given_solver, HYCO_FORM_AUTO));
   PetscCall(VecDuplicate(f->F, &f->given_F));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+#define ACTS                                                                                                           \
+  1e-12 /* of a Gram matrix relative to its largest value: less, and closed contacts do not determine a motion */
+#define REPEATS 2 /* the second removes the rounding of the first */
+
+/* Adds the rigid motions that contact alone prevents, which K leaves open: so that the contacts with a force close, in the
+   sense of least squares. */
+static PetscErrorCode CloseContacts(HycoFOM f)
+{
+  MatNullSpace kernel = NULL;
+  const Vec *z;
+  const PetscScalar *L;
+  PetscScalar *values;
+  PetscReal *gram, *inverse, *right, *x;
+  PetscInt p = 0, n;
+  Vec *at, gap;
+
+  PetscFunctionBegin;
+  if (f->n_contacts) PetscCall(MatGetNullSpace(f->K, &kernel));
+  if (kernel) PetscCall(MatNullSpaceGetVecs(kernel, NULL, &p, &z));
+  if (!p) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecDuplicateVecs(f->D, p, &at));
+  PetscCall(VecDuplicate(f->D, &gap));
+  PetscCall(PetscMalloc4(p * p, &gram, p * p, &inverse, p, &right, p, &x));
+  PetscCall(VecGetLocalSize(f->D, &n));
+  for (PetscInt i = 0; i < p; i++) {
+    PetscCall(MatMult(f->B, z[i], at[i]));
+    /* Open contacts have gaps that nothing closes. */
+    PetscCall(VecGetArrayRead(f->Lambda, &L));
+    PetscCall(VecGetArray(at[i], &values));
+    for (PetscInt k = 0; k < n; k++) values[k] = L[k] > 0 ? values[k] : 0;
+    PetscCall(VecRestoreArray(at[i], &values));
+    PetscCall(VecRestoreArrayRead(f->Lambda, &L));
+  }
+  for (PetscInt i = 0; i < p; i++) PetscCall(VecMDot(at[i], p, at, gram + i * p));
+  PetscCall(HycoPseudoInverse(p, p, gram, ACTS, inverse));
+  for (int r = 0; r < REPEATS; r++) {
+    PetscCall(MatMult(f->B, f->U, gap));
+    PetscCall(VecAYPX(gap, -1, f->D));
+    PetscCall(VecMDot(gap, p, at, right));
+    for (PetscInt i = 0; i < p; i++) {
+      x[i] = 0;
+      for (PetscInt j = 0; j < p; j++) x[i] += inverse[i * p + j] * right[j];
+    }
+    for (PetscInt i = 0; i < p; i++) PetscCall(VecAXPY(f->U, x[i], z[i]));
+  }
+  PetscCall(PetscFree4(gram, inverse, right, x));
+  PetscCall(VecDestroyVecs(p, &at));
+  PetscCall(VecDestroy(&gap));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -49,6 +101,7 @@ PetscErrorCode HycoFOMSolveForces(HycoFOM f, PetscInt n, const PetscReal mu[], c
   PetscCall(HycoSystemSetVectors(f->given_system, f->given_F, NULL));
   PetscCall(HycoSolverSetSystem(f->given_solver, f->given_system));
   HycoLogged(HYCO_EVENT_SOLVE, HycoSolverSolve(f->given_solver, f->U, NULL));
+  PetscCall(CloseContacts(f));
   PetscCall(HycoSolverGetSeconds(f->given_solver, &t->factor, &t->solve));
   HycoLogged(HYCO_EVENT_KKT, HycoSystemComputeKKT(f->system, f->U, f->Lambda, &f->given_kkt));
   PetscCall(HycoFOMGather(f));

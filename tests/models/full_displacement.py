@@ -7,6 +7,25 @@ import numpy as np
 from common import PELLET, ROPE, Case
 
 TYPE = ('-hyco_model_type', 'bodies')
+DOWN = """
+Point(1) = {0, 0, 0}; Point(2) = {6, 0, 0}; Point(3) = {6, 2, 0}; Point(4) = {0, 2, 0};
+Point(5) = {1, 2.3, 0}; Point(6) = {4, 2.3, 0}; Point(7) = {4, 4, 0}; Point(8) = {1, 4, 0};
+Line(1) = {1, 2}; Line(2) = {2, 3}; Line(3) = {3, 4}; Line(4) = {4, 1}; Line(5) = {5, 6}; Line(6) = {6, 7}; Line(7) = {7, 8}; Line(8) = {8, 5};
+Curve Loop(1) = {1:4}; Curve Loop(2) = {5:8}; Plane Surface(1) = {1}; Plane Surface(2) = {2};
+Transfinite Curve {1, 3} = 13; Transfinite Curve {2, 4, 6, 8} = 5; Transfinite Curve {5, 7} = 10;
+Transfinite Surface {1, 2}; Recombine Surface {1, 2};
+Physical Surface("lower") = {1}; Physical Surface("upper") = {2}; Physical Curve("base") = {1}; Physical Curve("floor") = {3};
+Physical Curve("under") = {5}; Physical Curve("top") = {7}; Physical Curve("side") = {8};
+"""
+FLOATING = """
+scene: {title: a block comes down, mesh: down.msh, parameters: [load]}
+parameter: {load: {range: [0.5, 2]}}
+body: {lower: {young: 1000, poisson: 0.3}, upper: {young: 2000, poisson: 0.3}}
+fixed: {base: {x: 0, y: 0}, side: {x: 0}}
+pressure: {top: load*(1 + x/20)}
+contact: {c: {type: surface, slave: under, master: floor, tolerance: 1}}
+output: {top: {mean: u_y, group: top}}
+"""
 
 
 class Displacements(Case):
@@ -48,6 +67,18 @@ class Displacements(Case):
         self.near(self.hyco(*args, ranks=2)['u_norm2'], one['u_norm2'], 1e-11)
         iterative = self.hyco(*args, '-hyco_linear', 'iterative')
         self.near(iterative['u_norm2'], one['u_norm2'], 1e-7)
+
+    def test_floating(self):
+        """A block that contact alone holds, on one rank and on two: it comes down onto the other, which the forces alone do not say."""
+        self.drawn('down', 2, DOWN, FLOATING)
+        scene = self.path('down')
+        self.hyco('train', '-scene', scene, *TYPE, '-grid', 3, '-model', self.path('d.h5'))
+        full = self.hyco('solve', '-scene', scene, '-mu', 0.7)
+        for ranks in (0, 2):
+            r = self.hyco('predict', '-model', self.path('d.h5'), '-mu', 0.7, '-scene', scene, '-hyco_full_displacement', ranks=ranks)
+            self.near(r['outputs']['top'], full['outputs']['top'], 1e-9)
+            self.near(r['u_norm2'], full['u_norm2'], 1e-9)
+            self.assertLess(r['kkt']['complementarity'], 1e-9)
 
     def test_with_fallback(self):
         """With the fallback, full order where a target is missed, the full solve with the forces elsewhere."""
