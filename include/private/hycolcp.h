@@ -149,9 +149,10 @@ PetscErrorCode HycoTangentStates(PetscInt n, const PetscReal L[], const PetscRea
                                  const PetscReal flexibility[], PetscInt state[]);
 /* Whether a contact is closed or undecided, when its flexibility is not known. */
 PetscBool HycoTangentMayTouch(PetscReal L, PetscReal w, PetscReal size);
-/* The derivative with p free unknowns x before the n contacts, M as in HycoLCP (read now). *regular: the closed
+/* The derivative with p free unknowns x before the n contacts, M as in HycoLCP (read now). rigid: they are rigid motions,
+   without stiffness. *regular: the closed
    contacts determine their forces; otherwise only HycoTangentDestroy() (NULL-safe) may be called. */
-PetscErrorCode HycoTangentCreate(PetscInt p, PetscInt n, const PetscReal M[], const PetscInt state[],
+PetscErrorCode HycoTangentCreate(PetscInt p, PetscBool rigid, PetscInt n, const PetscReal M[], const PetscInt state[],
                                  HycoTangent *tangent, PetscBool *regular);
 PetscErrorCode HycoTangentDestroy(HycoTangent *tangent);
 /* Undecided contacts whose rows do not depend on closed ones. */

@@ -8,6 +8,7 @@
 #include <petscblaslapack.h>
 
 #define NEAR      1e-7  /* forces and gaps below this share of the largest are near zero */
+#define PRESSES   1e-10 /* share of the gaps that a force moves by its own flexibility: less is round-off */
 #define DEPENDENT 1e-10 /* share of its flexibility that a contact has left, if its row depends on closed ones */
 #define NOTHING   1e-9  /* share of its terms below which the change of a gap is round-off */
 #define REGULAR   1e-14 /* smallest pivot over the largest of the scaled matrix */
@@ -45,7 +46,7 @@ PetscErrorCode HycoTangentStates(PetscInt n, const PetscReal L[], const PetscRea
   for (PetscInt i = 0; i < n; i++) {
     /* A contact whose own row is flexible must press noticeably: otherwise it may open for a small change. */
     const PetscBool closed =
-        (PetscBool)(L[i] > NEAR * most && (flexibility[i] <= 0 || L[i] * flexibility[i] > NEAR * size));
+        (PetscBool)(L[i] > NEAR * most && (flexibility[i] <= 0 || L[i] * flexibility[i] > PRESSES * size));
 
     state[i] = closed ? HYCO_TANGENT_CLOSED : w[i] <= NEAR * size ? HYCO_TANGENT_UNDECIDED : HYCO_TANGENT_OPEN;
   }
@@ -58,23 +59,8 @@ PetscBool HycoTangentMayTouch(PetscReal L, PetscReal w, PetscReal size)
   return (PetscBool)(L > 0 || w <= NEAR * size);
 }
 
-/* Whether the stiffness M_jj of free unknown j is round-off beside that which the contacts give it: without a closed one
-   the unknown is not determined. */
-static PetscBool Loose(HycoTangent t, const PetscReal M[], size_t j)
-{
-  const size_t n = (size_t)(t->p + t->n);
-  PetscReal most = 0;
-
-  for (size_t i = (size_t)t->p; i < n; i++) {
-    const PetscReal arm = M[j * n + i], flexibility = M[i * n + i];
-
-    if (flexibility > 0) most = PetscMax(most, arm * arm / flexibility);
-  }
-  return (PetscBool)(PetscAbsReal(M[j * n + j]) <= DEPENDENT * most);
-}
-
 /* The columns of M of the set, scaled to entries of order 1: the rows of x and of contacts have different units. */
-static PetscErrorCode Factor(HycoTangent t, const PetscReal M[], PetscBool *regular)
+static PetscErrorCode Factor(HycoTangent t, PetscBool rigid, const PetscReal M[], PetscBool *regular)
 {
   const size_t n = (size_t)(t->p + t->n), m = (size_t)t->n_set;
   PetscBLASInt mb, info;
@@ -85,8 +71,8 @@ static PetscErrorCode Factor(HycoTangent t, const PetscReal M[], PetscBool *regu
   if (!m) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscBLASIntCast(t->n_set, &mb));
   for (size_t j = 0; j < m; j++) {
-    const PetscBool loose = (PetscBool)(j < (size_t)t->p && Loose(t, M, j));
-    const PetscReal diagonal = loose ? 0 : PetscAbsReal(M[(size_t)t->set[j] * n + (size_t)t->set[j]]);
+    const PetscReal diagonal =
+        rigid && j < (size_t)t->p ? 0 : PetscAbsReal(M[(size_t)t->set[j] * n + (size_t)t->set[j]]);
 
     t->scale[j] = diagonal > 0 ? 1 / PetscSqrtReal(diagonal) : 0;
   }
@@ -100,13 +86,14 @@ static PetscErrorCode Factor(HycoTangent t, const PetscReal M[], PetscBool *regu
     /* Negative marks a row scaled here, so that it does not count as scaled for the others of the loop. */
     t->scale[j] = largest > 0 ? -1 / largest : -1;
   }
-  /* An unknown that no contact holds has nothing but round-off in its row, and there is no derivative. */
-  for (size_t j = 0; j < (size_t)t->p && m == (size_t)t->p; j++) *regular = (PetscBool)(*regular && !Loose(t, M, j));
-  if (!*regular) PetscFunctionReturn(PETSC_SUCCESS);
   for (size_t j = 0; j < m; j++) t->scale[j] = PetscAbsReal(t->scale[j]);
   for (size_t j = 0; j < m; j++) {
-    for (size_t i = 0; i < m; i++)
-      t->lu[j * m + i] = M[(size_t)t->set[j] * n + (size_t)t->set[i]] * t->scale[i] * t->scale[j];
+    for (size_t i = 0; i < m; i++) {
+      /* What M has between rigid motions is round-off. */
+      const PetscReal entry = rigid && PetscMax(i, j) < (size_t)t->p ? 0 : M[(size_t)t->set[j] * n + (size_t)t->set[i]];
+
+      t->lu[j * m + i] = entry * t->scale[i] * t->scale[j];
+    }
   }
   LAPACKgetrf_(&mb, &mb, t->lu, &mb, t->ipiv, &info);
   for (size_t j = 0; j < m; j++) {
@@ -169,7 +156,7 @@ static PetscErrorCode Condense(HycoTangent t, const PetscReal M[])
 }
 
 /* *regular false: the closed contacts do not determine the solution; only Destroy may follow. M is read here alone. */
-PetscErrorCode HycoTangentCreate(PetscInt p, PetscInt n, const PetscReal M[], const PetscInt state[],
+PetscErrorCode HycoTangentCreate(PetscInt p, PetscBool rigid, PetscInt n, const PetscReal M[], const PetscInt state[],
                                  HycoTangent *tangent, PetscBool *regular)
 {
   HycoTangent t;
@@ -191,7 +178,7 @@ PetscErrorCode HycoTangentCreate(PetscInt p, PetscInt n, const PetscReal M[], co
   PetscCall(PetscMalloc1(t->n_set + 1, &t->scale));
   PetscCall(PetscMalloc1(t->n_set + 1, &t->v));
   PetscCall(PetscMalloc1(t->n_set + 1, &t->ipiv));
-  PetscCall(Factor(t, M, regular));
+  PetscCall(Factor(t, rigid, M, regular));
   if (*regular) PetscCall(Condense(t, M));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -140,7 +140,8 @@ static PetscErrorCode Close(Work *o)
     most = PetscMax(most, L[j]);
   }
   PetscCall(HycoTangentStates(o->k, L, w, o->size, flexibility, state));
-  PetscCall(HycoTangentCreate(o->p, o->k, M, state, &o->tangent, &regular));
+  /* Of bodies, whose unknowns are rigid motions, M is 0 there. */
+  PetscCall(HycoTangentCreate(o->p, PETSC_FALSE, o->k, M, state, &o->tangent, &regular));
   PetscCall(PetscFree4(L, w, flexibility, state));
   PetscCall(PetscFree(M));
   /* A singular matrix means forces that can be redistributed: a derivative of one of many distributions would be
@@ -149,7 +150,8 @@ static PetscErrorCode Close(Work *o)
       regular || most > 0,
       "no load presses a body here that contact alone holds, so that its position has no derivative; take a point "
       "at which it carries a load");
-  HycoCheck(regular, "the forces of the model's closed contacts are not unique here, so that they have no derivative");
+  HycoCheck(regular,
+            "the forces of the model's closed contacts are not unique here, or round-off, and have no derivative");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

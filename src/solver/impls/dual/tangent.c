@@ -49,16 +49,17 @@ static PetscErrorCode Close(HycoSolverTangent t, Vec x, Vec L)
   PetscCall(HycoVecGather(L, force));
   for (PetscInt i = 0; i < t->m; i++) flexibility[i] = S[(size_t)(t->p + i) * (size_t)n + (size_t)(t->p + i)];
   PetscCall(HycoTangentStates(t->m, force, gap, PetscMax(sizes[0], sizes[1]), flexibility, state));
-  PetscCall(HycoTangentCreate(t->p, t->m, S, state, &t->tangent, &regular));
+  PetscCall(HycoTangentCreate(t->p, PETSC_TRUE, t->m, S, state, &t->tangent, &regular));
   PetscCall(PetscFree4(force, gap, flexibility, state));
   PetscCall(VecNorm(L, NORM_INFINITY, &most));
   PetscCheck(
       regular || most > 0, HycoComm(t->s), PETSC_ERR_USER,
       "no load presses a body here that contact alone holds, so that its position has no derivative; take a point "
       "at which it carries a load");
-  PetscCheck(regular, HycoComm(t->s), PETSC_ERR_USER,
-             "the forces of the closed contacts are not unique here, so that they have no derivative; remove contacts "
-             "whose gaps follow from those of others");
+  PetscCheck(
+      regular, HycoComm(t->s), PETSC_ERR_USER,
+      "the forces of the closed contacts are not unique here, or round-off, and have no derivative; remove contacts "
+      "whose gaps follow from those of others");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
