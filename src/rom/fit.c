@@ -12,6 +12,7 @@
 #define MINIMUM 1e-5 /* of the slope of the misfit, relative to what the derivatives allow */
 #define WEIGHT  1e-6 /* of the regularisation of Gauss-Newton steps: for targets that do not determine all parameters */
 #define SAME    1e-4 /* relative difference of misfits that are one minimum's */
+#define INSIDE  1e-4 /* share of half the ranges */
 #define LEFT    1e-6 /* share of a parameter's derivatives that is left beside the others' and is not round-off */
 
 typedef struct {
@@ -59,6 +60,23 @@ static void Misfit(const Fit *f, const HycoPrediction *p, PetscReal r[])
   for (PetscInt k = 0; k < f->n; k++) r[k] = (Value(f, p, k) - f->target[k]) / f->scale[k];
 }
 
+/* The derivatives at mu, of which the prediction is the model's last; where there are none, as at the end of a range at
+   which no load presses a body, those a little inside the ranges. */
+static PetscErrorCode Differentiate(Fit *f, const PetscReal mu[], HycoGradient *g)
+{
+  PetscReal inside[HYCO_MAX_PARAMETERS];
+  char message[HYCO_LINE];
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  HycoCatch(HycoROMGetGradient(f->model, g), ierr, message);
+  if (!ierr) PetscFunctionReturn(PETSC_SUCCESS);
+  for (PetscInt p = 0; p < f->n_par; p++) inside[p] = mu[p] + INSIDE * ((f->lo[p] + f->hi[p]) / 2 - mu[p]);
+  PetscCall(HycoROMPredict(f->model, f->n_par, inside));
+  PetscCall(HycoROMGetGradient(f->model, g));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* r and J at x. */
 static PetscErrorCode Evaluate(Fit *f, const PetscReal x[])
 {
@@ -76,7 +94,7 @@ static PetscErrorCode Evaluate(Fit *f, const PetscReal x[])
   PetscCall(HycoROMPredict(f->model, f->n_par, mu));
   PetscCall(HycoROMGetPrediction(f->model, &f->prediction));
   HycoCheck(f->prediction.reason > 0, "a prediction of the fit failed: %s", HycoReasonName(f->prediction.reason));
-  PetscCall(HycoROMGetGradient(f->model, &g));
+  PetscCall(Differentiate(f, mu, &g));
   Misfit(f, &f->prediction, f->r);
   f->kink = PETSC_FALSE;
   for (PetscInt k = 0; k < f->n; k++) {

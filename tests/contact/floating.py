@@ -138,6 +138,10 @@ class Overhang(Case):
         self.assertEqual(rows['converged'].tolist(), [1, 0])
         for name in rows.dtype.names:
             self.assertEqual(bool(np.isnan(rows[name][1])), name not in ('load', 'soft', 'kkt_max', 'converged', 'iterations', 'seconds'), name)
+        # a fit that begins at the load 0 goes on from there
+        full = self.hyco('solve', '-scene', 'scene.yaml', '-mu', '0.01,1')
+        fit = self.hyco('fit', '-model', 'm.h5', '-target_rise', repr(full['outputs']['rise']), '-hold_soft', 1, '-mu_load', 0)
+        self.near(fit['mu']['load'], 0.01, 1e-4)
 
     def test_travels(self):
         """A block that contact alone holds at places far apart: as a set each is the single solution, and `check` accepts the range."""
