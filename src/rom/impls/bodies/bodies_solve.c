@@ -415,7 +415,8 @@ static PetscErrorCode TurnRows(HycoBodiesWork o, const HycoBodiesSurface *s)
       /* Training leaves out masters that no slave met; a prediction that meets one has no flexibility there and
          must not go on. */
       HycoCheck(place >= 0 && place < b->ns,
-                "contact %s: node %d is not among the surfaces on which the model of bodies was trained",
+                "contact %s: node %d, which a slave meets here, is not among the surfaces on which the model of bodies "
+                "was trained; train it on points as far away as this one, or solve full order (hyco solve)",
                 s->fe->scene->contact[s->contact[k]]->name, (int)s->fe->mesh->node_id[node]);
       body = HycoBodiesAt(b, place);
       for (PetscInt d = 0; d < dim; d++) {
