@@ -41,9 +41,9 @@ def cubature(tolerance, *contact):
 
 RANK, VECTORS = ("hybrid", "rank"), ("dual", "nnmf")
 TRAINING = {name: ["-scatter", "12"] for name in ("", "searched")}
-SEARCHED = Setting("hybrid", "searched")  # no option: the settings that train finds
+SEARCHED = Setting("hybrid", "searched")  # the settings that train finds for the type
 BASELINES = [Setting("projection", "", TIGHT), *(cubature(tol, *contact) for contact in ([], [RANK], [VECTORS]) for tol in ("1e-4", "1e-6"))]
-BODIES = [Setting("bodies", "")]
+BODIES = [Setting("bodies", "searched")]
 
 
 @dataclass
@@ -105,7 +105,7 @@ class Bench:
         """CPU seconds and the report, of a model that stands there already those of its training."""
         report = os.path.splitext(model)[0] + ".json"
         if not (os.path.exists(model) and os.path.exists(report)):
-            known = [] if setting == SEARCHED else ["-hyco_search", "false", "-validation_points", self.points]
+            known = [] if setting.training == "searched" else ["-hyco_search", "false", "-validation_points", self.points]
             cpu, trained = self.hyco("train", *self.case.scene, "-model", model, *self.case.training[setting.training], "-hyco_snapshots", self.snapshots,
                                      *setting.arguments(), *known, ends=(0, 3))
             with open(report, "w", encoding="utf-8") as file:
@@ -129,7 +129,7 @@ class Bench:
         online = ["-model", model, *(word for name, value in setting.options if name.startswith("newton") for word in ("-hyco_" + name, value))]
         try:
             cpu, trained = self.train(setting, model)
-            held = self.compare(model) if setting == SEARCHED else trained["held_out"]
+            held = self.compare(model) if setting.training == "searched" else trained["held_out"]
             path_s, megabytes = self.path_seconds(online)
         except RuntimeError as error:
             return row | {"status": str(error)}
