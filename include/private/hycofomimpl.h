@@ -142,6 +142,8 @@ PetscErrorCode HycoRowsCountDependent(PetscInt m, PetscInt start[], PetscInt dof
                                       PetscInt *dependent);
 /* Creates distributed vectors of the motions; VecDestroyVecs() destroys them. Collective. */
 PetscErrorCode HycoFOMMotionVectors(HycoFOM fom, const HycoMotions *motions, Vec **v);
+/* w[p] = B v of the contacts with a force, 0 of the others; *size: the largest square of a B v with all. Collective. */
+PetscErrorCode HycoFOMMoveClosed(HycoFOM fom, PetscInt p, const Vec v[], Vec w[], PetscReal *size);
 /* name: a rigid motion, left free by supports and springs, on which no contact force of the solution acts; "": none.
    Collective. */
 PetscErrorCode HycoFOMNameLoose(HycoFOM fom, char name[HYCO_LINE]);

@@ -65,18 +65,15 @@ static PetscErrorCode NameLifted(HycoFOM f, Vec L, char name[HYCO_LINE])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* gram (p x p): of the rows of B with a force, times the motions v; *size: the largest square of a B v with all rows.
-   Motions that these rows resist are held by contact; the others could go on for ever. */
-static PetscErrorCode HeldBy(HycoFOM f, PetscInt p, const Vec v[], PetscReal gram[], PetscReal *size)
+/* Rows with a force within round-off of the largest do not hold anything. */
+PetscErrorCode HycoFOMMoveClosed(HycoFOM f, PetscInt p, const Vec v[], Vec w[], PetscReal *size)
 {
   const PetscScalar *force;
   PetscReal most, square;
   PetscInt n;
-  Vec *w;
 
   PetscFunctionBegin;
   *size = 0;
-  PetscCall(VecDuplicateVecs(f->Lambda, p, &w));
   PetscCall(VecNorm(f->Lambda, NORM_INFINITY, &most));
   PetscCall(VecGetLocalSize(f->Lambda, &n));
   PetscCall(VecGetArrayRead(f->Lambda, &force));
@@ -87,11 +84,22 @@ static PetscErrorCode HeldBy(HycoFOM f, PetscInt p, const Vec v[], PetscReal gra
     PetscCall(VecDot(w[k], w[k], &square));
     *size = PetscMax(*size, square);
     PetscCall(VecGetArray(w[k], &own));
-    /* Rows with a force within round-off of the largest do not hold anything. */
     for (PetscInt i = 0; i < n; i++) own[i] = most > 0 && force[i] > 1e-12 * most ? own[i] : 0;
     PetscCall(VecRestoreArray(w[k], &own));
   }
   PetscCall(VecRestoreArrayRead(f->Lambda, &force));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* gram (p x p): of the rows of B with a force, times the motions v; *size as above. Motions that these rows resist are held
+   by contact; the others could go on for ever. */
+static PetscErrorCode HeldBy(HycoFOM f, PetscInt p, const Vec v[], PetscReal gram[], PetscReal *size)
+{
+  Vec *w;
+
+  PetscFunctionBegin;
+  PetscCall(VecDuplicateVecs(f->Lambda, p, &w));
+  PetscCall(HycoFOMMoveClosed(f, p, v, w, size));
   for (PetscInt k = 0; k < p; k++) PetscCall(VecMDot(w[k], p, w, gram + k * p));
   PetscCall(VecDestroyVecs(p, &w));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -32,10 +32,8 @@ static PetscErrorCode CloseContacts(HycoFOM f)
 {
   MatNullSpace kernel = NULL;
   const Vec *z;
-  const PetscScalar *L;
-  PetscScalar *values;
-  PetscReal *gram, *inverse, *right, *x;
-  PetscInt p = 0, n;
+  PetscReal *gram, *inverse, *right, *x, size;
+  PetscInt p = 0;
   Vec *at, gap;
 
   PetscFunctionBegin;
@@ -45,16 +43,7 @@ static PetscErrorCode CloseContacts(HycoFOM f)
   PetscCall(VecDuplicateVecs(f->D, p, &at));
   PetscCall(VecDuplicate(f->D, &gap));
   PetscCall(PetscMalloc4(p * p, &gram, p * p, &inverse, p, &right, p, &x));
-  PetscCall(VecGetLocalSize(f->D, &n));
-  for (PetscInt i = 0; i < p; i++) {
-    PetscCall(MatMult(f->B, z[i], at[i]));
-    /* Open contacts have gaps that nothing closes. */
-    PetscCall(VecGetArrayRead(f->Lambda, &L));
-    PetscCall(VecGetArray(at[i], &values));
-    for (PetscInt k = 0; k < n; k++) values[k] = L[k] > 0 ? values[k] : 0;
-    PetscCall(VecRestoreArray(at[i], &values));
-    PetscCall(VecRestoreArrayRead(f->Lambda, &L));
-  }
+  PetscCall(HycoFOMMoveClosed(f, p, z, at, &size));
   for (PetscInt i = 0; i < p; i++) PetscCall(VecMDot(at[i], p, at, gram + i * p));
   PetscCall(HycoPseudoInverse(p, p, gram, ACTS, inverse));
   for (int r = 0; r < REPEATS; r++) {
