@@ -52,7 +52,8 @@ typedef enum {
   HYCO_DIVERGED_STEP = -6,             /* a history: its time steps became too small */
   HYCO_DIVERGED_DISPLACEMENT = -7,     /* full order: displacements of more than 1e6 times the mesh's extent */
   HYCO_DIVERGED_ENERGY = -8,           /* full order: strain energy and work differ */
-  HYCO_DIVERGED_HELD = -9              /* contact alone holds a body, can balance the load, and the method failed */
+  HYCO_DIVERGED_HELD = -9,             /* contact alone holds a body, can balance the load, and the method failed */
+  HYCO_DIVERGED_SURFACE = -10          /* a model of bodies: a slave meets nodes that training left out */
 } HycoReason;
 
 /* Collective. The caller owns it. */

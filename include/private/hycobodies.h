@@ -210,6 +210,7 @@ typedef struct _n_HycoBodiesWork {
   PetscBool *responded;      /* by contact: whether they are there */
   HycoFE fe;                 /* on probe */
   PetscBool prepared;        /* what HycoBodiesPrepare() makes is that at `mu` */
+  PetscBool lacks;           /* a slave meets nodes that have no flexibility: there is no solution */
   PetscReal *mu, *reference; /* variables; by body: where its reference was taken */
   PetscReal *X0, *E0;        /* by body: nodes of its cell and the largest entry of its tangents in its own axes */
   PetscInt *E_at;            /* which entry */

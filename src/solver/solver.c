@@ -665,6 +665,9 @@ const char *HycoReasonName(HycoReason reason)
            "and the supports";
   case HYCO_DIVERGED_ENERGY:
     return "not converged: strain energy and work differ; stiffnesses differ by too much for double precision";
+  case HYCO_DIVERGED_SURFACE:
+    return "not converged: a slave meets nodes on which the model of bodies was not trained; train it on points as far "
+           "away as this one, or solve full order (-hyco_fallback, hyco solve)";
   case HYCO_DIVERGED_ITERATIONS:
     return "not converged: limit of iterations reached, or a cycle";
   default:

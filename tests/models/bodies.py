@@ -1,5 +1,6 @@
 """Models of bodies as substructures: forces, surfaces and resultants are those of full order where contacts travel, bodies turn, grow, soften or
 float; where a body's shape changes, they follow the number of its samples and stay within the bound; check says how parameters enter the bodies."""
+import csv
 import os
 import shutil
 import re
@@ -239,7 +240,7 @@ class Bodies(Case):
 
     def test_reached(self):
         """A pad that reaches a small part of a wide surface: the unknowns of the others are left out, forces stay those of full order, also at the ends
-        of the range; beyond it, where it meets others, a prediction is refused by the contact's name."""
+        of the range; beyond it, where it meets others, a prediction does not converge, and full order takes its place."""
         self.drawn('pad', 3, PAD[1], PAD[0])
         report = self.hyco('train', '-scene', 'pad', *TYPE, '-grid', '3,2', '-model', 'pad.h5')
         self.assertLess(report['n_surface_unknowns'], 900)  # of 1875 + 48
@@ -247,9 +248,20 @@ class Bodies(Case):
         self.assertEqual(c['not_converged'], 0)
         self.assertLess(c['error_lambda']['max'], 1e-9)
         self.assertLess(c['error_u']['max'], 1e-3)
-        run = self.run_raw('predict', '-model', 'pad.h5', '-mu', '9,0.03', '-extrapolate')
+        at = ('-extrapolate', '-mu', '9,0.03')
+        run = self.run_raw('predict', '-model', 'pad.h5', *at)
         self.assertNotEqual(run.returncode, 0)
-        self.assertIn('contact under', run.stderr)
+        self.assertIn('was not trained', run.stderr)
+        there = self.hyco('solve', '-scene', 'pad', '-mu', '9,0.03', '-parameter_place_range', '-2,9')['total_contact_force']
+        p = self.hyco('predict', '-model', 'pad.h5', *at, '-hyco_fallback', '-scene', 'pad')
+        self.assertTrue(p['full_order'])
+        self.near(p['total_contact_force'], there, 1e-12)
+        with open(self.path('far.csv'), 'w', encoding='utf-8') as f:
+            f.write('place,press\n1,0.03\n9,0.03\n')
+        run = self.run_raw('predict', '-model', 'pad.h5', '-points', 'far.csv', '-extrapolate', '-table', 'far_out.csv')
+        self.assertEqual(run.returncode, 1, run.stderr)
+        with open(self.path('far_out.csv'), encoding='utf-8') as f:
+            self.assertEqual([row['converged'] for row in csv.DictReader(f)], ['1', '0'])
 
     def test_kept_rows(self):
         """Rows that stay from one prediction to the next, while loads and moduli change, and rows that do not: a batch is what single predictions are."""

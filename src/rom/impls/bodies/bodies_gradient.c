@@ -44,6 +44,7 @@ PetscErrorCode HycoBodiesResidual(HycoROM m, const PetscReal mu[], const PetscRe
   PetscFunctionBegin;
   if (mu) PetscCall(HycoROMBringRows(m, mu));
   if (mu) PetscCall(HycoBodiesPrepare(o, &s, mu));
+  HycoCheck(!o->lacks, "beside this point, %s", HycoReasonName(HYCO_DIVERGED_SURFACE));
   PetscCall(PetscArraycpy(o->x, z, b->p));
   PetscCall(PetscArraycpy(m->Lambda, z + b->p, m->model->pairs.n));
   /* Displacements follow from forces and motions without a solve, because the flexibility is explicit. */

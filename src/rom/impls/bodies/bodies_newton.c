@@ -875,6 +875,8 @@ PetscErrorCode HycoBodiesSearch(HycoROM m, PetscReal t0, PetscReal t1, PetscReal
   PetscBool same, violated = PETSC_TRUE;
 
   PetscFunctionBegin;
+  if (w->bodies.lacks) HycoFormat(a->why, "%s", HycoReasonName(HYCO_DIVERGED_SURFACE));
+  if (a->why[0]) PetscFunctionReturn(PETSC_SUCCESS);
   if (w->friction) {
     PetscCall(SearchStates(m, t0, t1, alpha, a));
     HycoBodiesFrictionNormal(w->friction, Lambda);

@@ -407,6 +407,7 @@ static PetscErrorCode TurnRows(HycoBodiesWork o, const HycoBodiesSurface *s)
   PetscFunctionBegin;
   PetscCall(GrowRows(o, rows->start[s->n] * dim + 1)); /* mortars may meet more masters than before */
   o->row_start[0] = 0;
+  o->lacks = PETSC_FALSE;
   for (PetscInt k = 0; k < s->n; k++) {
     for (PetscInt e = rows->start[k]; e < rows->start[k + 1]; e++) {
       const PetscInt place = o->loc[rows->dof[e]], node = rows->dof[e] / dim, c = rows->dof[e] % dim;
@@ -414,10 +415,10 @@ static PetscErrorCode TurnRows(HycoBodiesWork o, const HycoBodiesSurface *s)
 
       /* Training leaves out masters that no slave met; a prediction that meets one has no flexibility there and
          must not go on. */
-      HycoCheck(place >= 0 && place < b->ns,
-                "contact %s: node %d, which a slave meets here, is not among the surfaces on which the model of bodies "
-                "was trained; train it on points as far away as this one, or solve full order (hyco solve)",
-                s->fe->scene->contact[s->contact[k]]->name, (int)s->fe->mesh->node_id[node]);
+      if (place < 0 || place >= b->ns) {
+        o->lacks = PETSC_TRUE;
+        continue;
+      }
       body = HycoBodiesAt(b, place);
       for (PetscInt d = 0; d < dim; d++) {
         const PetscReal value = o->pose[body].Q[3 * c + d] * rows->value[e];
@@ -930,6 +931,7 @@ PetscErrorCode HycoBodiesBring(HycoBodiesWork o, const HycoBodiesSurface *s, con
 {
   PetscFunctionBegin;
   PetscCall(Bring(o, s, mu, PETSC_TRUE));
+  HycoCheck(!o->lacks, "beside this point, %s", HycoReasonName(HYCO_DIVERGED_SURFACE));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -1007,6 +1009,10 @@ PetscErrorCode HycoBodiesSolve(HycoBodiesWork o, const HycoBodiesSurface *s, con
   PetscFunctionBegin;
   PetscCall(HycoBodiesPrepare(o, s, mu));
   PetscCall(HycoBodiesContact(o, s, Lambda, solved));
+  if (o->lacks) {
+    o->reason = HYCO_DIVERGED_SURFACE;
+    *solved = PETSC_FALSE;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
