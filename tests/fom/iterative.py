@@ -61,6 +61,11 @@ class Iterative(Case):
                 self.assertEqual(direct['n_active'], iterative['n_active'])
                 self.near(float(iterative['total_contact_force']), float(direct['total_contact_force']), 1e-7)
 
+    def test_travels(self):
+        """Contacts that change from point to point: other gap coordinates, and multigrid with levels of other sizes."""
+        self.hyco('solve', '-scene', os.path.join(EXAMPLES, 'roller3d'), '-values_place', '-4,4', '-values_press', '0.3', '-values_modulus', '10',
+                  '-hyco_linear', 'iterative', '-hyco_solver_form', 'primal')
+
     def test_form(self):
         """By name; refused without iterations."""
         args = ('solve', '-scene', PELLET, '-mu', '4.06,1', '-hyco_solver_form', 'projected')

@@ -266,28 +266,14 @@ static PetscErrorCode NearKernel(HycoSystem s, const Gap *g)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets the new Kw in the solver, which keeps its data if the sizes are unchanged. KSPReset() drops the factor, but
-   keeps options and type. Options were read when it was created. */
+/* A new solver for the new Kw: KSPReset() leaves the levels of GAMG (PETSc 3.18), whose sizes change. */
 static PetscErrorCode RenewSolver(HycoSolver s, Gap *g)
 {
-  PetscInt n_old = -1;
-  Mat old;
-
   PetscFunctionBegin;
-  if (g->ksp) {
-    PetscCall(KSPGetOperators(g->ksp, &old, NULL));
-    PetscCall(MatGetSize(old, &n_old, NULL));
-    /* A KSP of another size cannot be reused. */
-    if (n_old != s->system->n)
-      PetscCall(KSPDestroy(&g->ksp));
-    else
-      PetscCall(KSPReset(g->ksp));
-  }
+  PetscCall(KSPDestroy(&g->ksp));
   if (s->iterative) PetscCall(NearKernel(s->system, g));
-  if (!g->ksp)
-    PetscCall(s->iterative ? HycoIterativeSolver(HycoComm(s), "hyco_primal_", g->Kw, &g->ksp)
-                           : HycoDirectSolver(HycoComm(s), "hyco_primal_", g->Kw, PETSC_TRUE, &g->ksp));
-  PetscCall(KSPSetOperators(g->ksp, g->Kw, g->Kw));
+  PetscCall(s->iterative ? HycoIterativeSolver(HycoComm(s), "hyco_primal_", g->Kw, &g->ksp)
+                         : HycoDirectSolver(HycoComm(s), "hyco_primal_", g->Kw, PETSC_TRUE, &g->ksp));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
