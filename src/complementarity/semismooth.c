@@ -3,8 +3,10 @@
 
       F(z) = z - P(z - rho w) = 0,     J = I - DP (I - rho M)
 
-  rho is 1/M_nn of the block's normal force and 1/mean M_tt of its other components. Rows in which DP is 0 (open contacts,
-  slip in 2D) are eliminated. The steps are halved until |F| decreases. It has no global convergence, so that there is
+  rho is 1/M_nn of the block's normal force and 1/mean M_tt of its other components, without what motions on soft supports
+  add to them. Rows in which DP is 0 (open contacts, slip in 2D) are eliminated. The steps are halved until |F| is smaller
+  than the largest of the last few; down to small ones, because a component that hardly yields runs far past the border of
+  its cone in a full step. It has no global convergence, so that there is
   a chain of starts: the given forces; the solution with the normal forces alone; forces after block Gauss-Seidel sweeps;
   forces after steps in which the admissible forces are those of the last step (freeze); the proximal point method, whose
   problems M + alpha, q - alpha z_k are regular where M has no full rank (P. Alart, A. Curnier, Comput. Methods Appl.
@@ -32,7 +34,13 @@
 #define NEAR        1e-6  /* the same: near a solution, */
 #define ROUNDING    1e-12 /* and round-off, if a step does not halve it */
 #define CONTRACTS   0.2   /* of |F| in a step: more, and a factor of another J is made again */
-#define LEAST_STEP  (1. / 64)
+#define LEAST_STEP  (1. / 65536)
+#define MARGIN      1e-6 /* of tangential forces: nearer to the border of the cone a contact may slip */
+#define MEMORY      6    /* |F| may grow up to the largest of so many iterations */
+#define MOST_SOFT   12   /* motions on soft supports: of two bodies */
+#define SOFT        1e-2 /* of the largest flexibility: what is left without them */
+#define CLOSE       0.1  /* |F| relative to the forces: Newton's method is tried from a proximal step */
+#define MOST_ALL    200  /* iterations of all starts after which no proximal step begins */
 
 typedef struct {
   const HycoLCP *lcp;
@@ -45,6 +53,7 @@ typedef struct {
   PetscReal *step, *trial;        /* n; 3 n: z, w and the change of w */
   PetscReal start;                /* the largest force at the start */
   HycoConeStep *linear;
+  PetscReal allowed; /* |F| that a step may reach */
   PetscInt its;
 } Newton;
 
@@ -55,6 +64,45 @@ static void Pose(Newton *h, const PetscReal M[], const PetscReal q[])
   if (M != h->linear->M) HycoConeStepSetMatrix(h->linear, M);
   h->M = M;
   h->q = q;
+}
+
+/* Takes from d, the diagonal of M, what motions on soft supports add to it: every contact would look as if it yielded. A
+   Cholesky factor with pivots: the columns of these motions come first, and leave little of M. Else d stays. */
+static PetscErrorCode TakeSoft(const Newton *h, PetscReal d[])
+{
+  const PetscInt n = h->n, room = PetscMin(MOST_SOFT, n / 4);
+  PetscReal *L, *rest, most = 0, mean = 0;
+  PetscInt k;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc2((size_t)n * (size_t)room + 1, &L, n, &rest));
+  PetscCall(PetscArraycpy(rest, d, n));
+  for (PetscInt i = 0; i < n; i++) most = PetscMax(most, d[i]);
+  for (k = 0; k < room; k++) {
+    PetscReal *v = L + (size_t)k * (size_t)n;
+    PetscInt at = 0;
+
+    for (PetscInt i = 0; i < n; i++) {
+      if (rest[i] > rest[at]) at = i;
+    }
+    if (!(rest[at] > SOFT * most)) break;
+    PetscCall(PetscArraycpy(v, h->M + (size_t)at * (size_t)n, n));
+    for (PetscInt j = 0; j < k; j++) {
+      for (PetscInt i = 0; i < n; i++) v[i] -= L[j * n + i] * L[j * n + at];
+    }
+    for (PetscInt i = 0, root = at; i < n; i++) {
+      v[i] /= PetscSqrtReal(rest[root]);
+      if (i != root) rest[i] = PetscMax(rest[i] - v[i] * v[i], 0);
+    }
+    rest[at] = 0;
+  }
+  for (PetscInt i = 0; i < n; i++) mean += rest[i] / (PetscReal)n;
+  /* A tenth of the mean: a pivot has nothing left. */
+  for (PetscInt i = 0; i < n && k < room; i++) {
+    if (d[i] > 0) d[i] = PetscMax(rest[i], 0.1 * mean);
+  }
+  PetscCall(PetscFree2(L, rest));
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The scales, by block; a row without flexibility has that of the stiffest one. */
@@ -68,6 +116,8 @@ static PetscErrorCode SetScales(Newton *h)
     h->rho[i] = i < h->p ? h->flexibility : h->M[(size_t)i * (size_t)h->n + (size_t)i];
     most = PetscMax(most, h->rho[i]);
   }
+  /* Floating bodies have no such motions: they are unknowns. */
+  if (!h->p) PetscCall(TakeSoft(h, h->rho));
   for (PetscInt k = 0; k < b->n; k++) {
     const PetscInt first = h->p + b->row[k], size = b->row[k + 1] - b->row[k];
     PetscReal mean = 0;
@@ -138,7 +188,7 @@ static PetscErrorCode DeriveAt(Newton *h, const PetscReal z[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* z + t s with the first t = 1, 1/2, ..., 1/64 that decreases |F|; *less: there is one. Else z is unchanged. w changes by
+/* z + t s with the first t = 1, 1/2, ..., LEAST_STEP that decreases |F| below `allowed`; *less: there is one. Else z is unchanged. w changes by
    t M s; near the solution it is computed anew, without the round-off of former changes. Where |F| is round-off it is
    not searched for a lucky decrease. */
 static PetscErrorCode Search(Newton *h, PetscReal z[], PetscReal *norm, PetscReal *size, PetscBool *less)
@@ -161,8 +211,8 @@ static PetscErrorCode Search(Newton *h, PetscReal z[], PetscReal *norm, PetscRea
     }
     if (near) PetscCall(Slack(h, trial));
     PetscCall(Evaluate(h, trial, norm, size));
-    /* Armijo's condition on |F|. */
-    *less = (PetscBool)(*norm < (1 - share * t) * before);
+    /* Armijo's condition on |F|; near the solution on that of the last iteration. */
+    *less = (PetscBool)(*norm < (1 - share * t) * (near ? before : h->allowed));
   }
   if (*less) {
     PetscCall(PetscArraycpy(z, trial, h->n));
@@ -243,7 +293,7 @@ static PetscErrorCode Improve(Newton *h, PetscReal z[], PetscReal *norm, PetscRe
 static PetscErrorCode Iterate(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
   const PetscInt most = h->lcp->max_its ? h->lcp->max_its : MOST_ITS;
-  PetscReal norm, size;
+  PetscReal norm, size, last[MEMORY] = {0};
   PetscBool regular = PETSC_TRUE, less = PETSC_TRUE;
 
   PetscFunctionBegin;
@@ -251,6 +301,8 @@ static PetscErrorCode Iterate(Newton *h, PetscReal z[], HycoLCPStatus *status)
   for (PetscInt k = 0; k < most && norm > TIGHT * size && regular && less; k++) {
     PetscInt changes;
 
+    last[k % MEMORY] = h->allowed = norm;
+    for (PetscInt i = 0; i < MEMORY; i++) h->allowed = PetscMax(h->allowed, last[i]);
     PetscCall(HycoConeStepDerive(h->linear, h->blocks, h->y, &changes));
     PetscCall(Improve(h, z, &norm, &size, &regular, &less));
     h->its++;
@@ -321,7 +373,21 @@ static PetscErrorCode FitMotions(Newton *h, const PetscBool in[], const PetscRea
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Displacements x of floating bodies for given forces: those that close the gaps of the blocks with a force. */
+/* Whether the forces of block k are inside its cone: slightly larger tangential ones are admissible too. */
+static PetscErrorCode Sticks(const Newton *h, PetscInt k, const PetscReal z[], PetscBool *sticks)
+{
+  const PetscInt size = h->blocks->row[k + 1] - h->blocks->row[k];
+  PetscReal more[HYCO_MAX_BLOCK], admitted[HYCO_MAX_BLOCK];
+
+  PetscFunctionBegin;
+  for (PetscInt i = 0; i < size; i++) more[i] = i ? z[i] * (1 + MARGIN) : z[i];
+  PetscCall(HycoBlockProject(h->blocks, k, more, admitted));
+  PetscCall(PetscArraycmp(more, admitted, size, sticks));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Displacements x of floating bodies for given forces: those that close the gaps of the blocks with a force, and where
+   these are inside their cones let nothing slip. */
 static PetscErrorCode Consistent(Newton *h, PetscReal z[])
 {
   const HycoBlocks *b = h->blocks;
@@ -332,8 +398,12 @@ static PetscErrorCode Consistent(Newton *h, PetscReal z[])
   PetscCall(PetscArrayzero(z, h->p));
   PetscCall(Slack(h, z));
   for (PetscInt k = 0; k < b->n; k++) {
-    for (PetscInt i = h->p + b->row[k]; i < h->p + b->row[k + 1]; i++) {
-      in[i] = (PetscBool)(z[h->p + b->row[k]] > 0);
+    const PetscInt first = h->p + b->row[k];
+    PetscBool sticks;
+
+    PetscCall(Sticks(h, k, z + first, &sticks));
+    for (PetscInt i = first; i < h->p + b->row[k + 1]; i++) {
+      in[i] = (PetscBool)(z[first] > 0 && (i == first || sticks));
       /* A x = -w closes the gaps that the given forces leave. */
       h->w[i] = -h->w[i];
     }
@@ -428,13 +498,16 @@ static PetscErrorCode Unload(Newton *h, PetscReal x[], PetscReal z[], HycoLCPSta
 /* Replaces z by the other start if its residual is smaller. */
 static PetscErrorCode ChooseStart(Newton *h, PetscReal z[])
 {
-  PetscReal given, other, size;
+  PetscReal given, least, size, *other;
 
   PetscFunctionBegin;
-  if (!h->lcp->other || h->p) PetscFunctionReturn(PETSC_SUCCESS);
+  if (!h->lcp->other) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoDuplicate(h->n, h->lcp->other, &other);
   PetscCall(Residual(h, z, &given, &size));
-  PetscCall(Residual(h, h->lcp->other, &other, &size));
-  if (other < given) PetscCall(PetscArraycpy(z, h->lcp->other, h->n));
+  if (h->p) PetscCall(Consistent(h, other));
+  PetscCall(Residual(h, other, &least, &size));
+  if (least < given) PetscCall(PetscArraycpy(z, other, h->n));
+  PetscCall(PetscFree(other));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -583,18 +656,28 @@ static PetscErrorCode Starts(Newton *h, PetscReal z[], HycoLCPStatus *status)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The proximal point method from z: it ends if z solves the problem of lcp, and further steps gain nothing. Proximal
-   point problems are solved from the last z; if one fails, so does the method. For problems of which Newton's method
-   cycles; each step is strongly monotone, and has one solution. */
+/* Newton's method on the problem itself from a copy of z, which its solution replaces. */
+static PetscErrorCode TryFrom(Newton *h, PetscReal z[], PetscReal copy[], HycoLCPStatus *status)
+{
+  PetscFunctionBegin;
+  PetscCall(PetscArraycpy(copy, z, h->n));
+  PetscCall(Iterate(h, copy, status));
+  if (*status == HYCO_LCP_SOLVED) PetscCall(PetscArraycpy(z, copy, h->n));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The proximal point method from z: it ends if z solves the problem of lcp, and further steps gain nothing, or after
+   many iterations. Proximal point problems are solved from the last z; if one fails, so does the method. For problems of
+   which Newton's method cycles; each step is strongly monotone, and has one solution. */
 static PetscErrorCode Proximal(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
   const size_t n = (size_t)h->n;
-  PetscReal *M, *q, *alpha, before = PETSC_MAX_REAL;
+  PetscReal *M, *q, *alpha, *copy, before = PETSC_MAX_REAL;
   PetscBool done = PETSC_FALSE;
 
   PetscFunctionBegin;
   HycoDuplicate(n * n, h->M0, &M);
-  PetscCall(PetscMalloc2(n, &q, n, &alpha));
+  PetscCall(PetscMalloc3(n, &q, n, &alpha, n, &copy));
   for (size_t i = 0; i < n; i++) {
     alpha[i] = SHIFT / h->rho[i];
     M[i * n + i] += alpha[i];
@@ -605,16 +688,19 @@ static PetscErrorCode Proximal(Newton *h, PetscReal z[], HycoLCPStatus *status)
     for (size_t i = 0; i < n; i++) q[i] = h->q0[i] - alpha[i] * z[i];
     Pose(h, M, q);
     PetscCall(Starts(h, z, status));
-    done = (PetscBool)(*status != HYCO_LCP_SOLVED);
+    done = (PetscBool)(*status != HYCO_LCP_SOLVED || h->its > MOST_ALL);
     Pose(h, h->M0, h->q0);
     PetscCall(Residual(h, z, &norm, &size));
     /* The status of the original problem, not of the proximal one. */
     *status = norm <= SOLVED * size ? HYCO_LCP_SOLVED : HYCO_LCP_LIMIT;
     done = (PetscBool)(done || norm <= TIGHT * size || (*status == HYCO_LCP_SOLVED && norm > before / 2));
     before = norm;
+    if (*status == HYCO_LCP_SOLVED || norm > CLOSE * size) continue;
+    PetscCall(TryFrom(h, z, copy, status));
+    done = (PetscBool)(done || *status == HYCO_LCP_SOLVED);
   }
   PetscCall(PetscFree(M));
-  PetscCall(PetscFree2(q, alpha));
+  PetscCall(PetscFree3(q, alpha, copy));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

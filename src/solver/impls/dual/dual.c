@@ -174,9 +174,9 @@ static PetscErrorCode SolveForces(HycoSolver s, Dual *d, Vec start, PetscBool *s
   if (blocks) PetscCall(PetscArrayzero(d->L, d->p));
   if (blocks) PetscCall(HycoVecGather(start, d->L + d->p));
   if (blocks && !d->cone) PetscCall(HycoConeFactorCreate(&d->cone));
-  if (blocks && s->other && !d->p && !s->falling_back) {
-    PetscCall(PetscMalloc1(d->m + 1, &other));
-    PetscCall(HycoVecGather(s->other, other));
+  if (blocks && s->other && !s->falling_back) {
+    PetscCall(PetscCalloc1(d->p + d->m + 1, &other));
+    PetscCall(HycoVecGather(s->other, other + d->p));
   }
   /* Borrowed until the problem is solved; NULL: the only starts are the last forces and those of the method. */
   lcp.other = other;
