@@ -14,6 +14,16 @@ import numpy as np
 from common import Case, msh
 
 CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
+SOFT = """
+scene: {mesh: mesh.msh}
+body: {box0: {young: 1000, poisson: 0.3}, box1: {young: 1000, poisson: 0.3}}
+fixed: {low0: {x: 0, y: 0, z: 0}}
+%s
+traction: {high1: {x: "0.3*s", y: "0.2*s", z: "-2*min(t,1)"}}
+contact: {c: {type: mortar, slave: low1, master: high0, friction: 0.3}}
+history: {times: [0, 0.5, 1, 2, 3, 4], tables: {s: [[1, 0], [2, 1], [3, -1], [4, 1]]}}
+output: {N: {force: z, contact: c}, T: {friction: x, contact: c}, W: {friction: work}}
+"""
 
 
 def boxes(path, dim, shapes, sizes, heights):
@@ -129,6 +139,20 @@ class Random(Case):
                 self.one(seed)
                 with open(self.path('t.csv'), encoding='ascii', newline='') as file:
                     self.assertGreater(max(float(row['t']) for row in csv.DictReader(file)), limit)
+
+    def test_soft(self):
+        """A box that soft springs hold is pressed and pushed around: steps are not cut, and forces are those without the springs."""
+        boxes(self.path('mesh.msh'), 3, [[4, 4, 2], [3, 3, 2]], [[1, 1, .5], [.8, .8, .5]], [0, .5])
+        rows = []
+        for spring in ('', 'spring: {high1: {x: 1e-4, y: 1e-4, z: 1e-4}}'):
+            with open(self.path('scene.yaml'), 'w', encoding='ascii') as file:
+                file.write(SOFT % spring)
+            history = self.hyco('solve', '-scene', self.path('scene.yaml'))['history']
+            self.assertLessEqual(max(history['substeps']), 1)
+            rows.append(np.array([history['outputs'][name] for name in ('N', 'T', 'W')]))
+        np.testing.assert_allclose(rows[0][:2], rows[1][:2], rtol=1e-3, atol=1e-4)
+        np.testing.assert_allclose(rows[0][2], rows[1][2], rtol=1e-2)
+        self.assertGreater(rows[0][2, -1], 1e-7)
 
     def test_scenes(self):
         """Solved or refused by name; the law, computed again; more than half of them are solved, and some slip."""
