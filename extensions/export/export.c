@@ -6,6 +6,7 @@
   places of the surfaces instead (travel.c): the search, which is no function of the parameters, is the program's own.
 */
 #include "travel.h"
+#include <hycobodies.h>
 #include <hycoextensions.h>
 #include <hycomaterialimpl.h>
 #include <hycoquantities.h>
@@ -13,23 +14,29 @@
 #include <string.h>
 #include <time.h>
 
+#define PATHS
 #include "runtime/runtime.c"
+#include <hycocoulomb.h>
+#include "runtime/paths.c"
 
-#define EXACT      2e-11 /* error of a function at points that were not fitted */
-#define CHECKED    64    /* points at which the runtime is compared with the model */
-#define AGREES     1e-9  /* difference there, of an output's largest value */
-#define PLACES     6     /* at which expressions in space are functions of the parameters */
-#define MOST       6000000
-#define MOST_ITEMS 3000
-#define SAMPLES    120 /* points for the functions, of which a third checks them; more with weights of samples: */
-#define SEVERAL    20  /* samples: with more, products are tried of known functions alone */
-#define EACH       8   /* for each */
-#define NEARLY     1e-3 /* an error that more functions may remove; they are chosen from all at once at as many points: */
-#define MORE       3    /* times */
+#define EXACT          2e-11 /* error of a function at points that were not fitted */
+#define CHECKED        64    /* points at which the runtime is compared with the model */
+#define AGREES         1e-9  /* difference there, of an output's largest value */
+#define PLACES         6     /* at which expressions in space are functions of the parameters */
+#define MOST           6000000
+#define MOST_ITEMS     3000
+#define PATHS_CHECKED  8 /* or so many paths */
+#define PATH_TOLERANCE 1e-8
+#define ROUNDING       1e-14 /* of a coefficient beside others */
+#define SAMPLES        120   /* points for the functions, of which a third checks them; more with weights of samples: */
+#define SEVERAL        20    /* samples: with more, products are tried of known functions alone */
+#define EACH           8     /* for each */
+#define NEARLY         1e-3 /* an error that more functions may remove; they are chosen from all at once at as many points: */
+#define MORE           3 /* times */
 
 /* A value: of an output, of a contact's force along an axis, of a stress in a cell, of a displacement, of a travel. */
 typedef struct {
-  enum { QUANTITY, FORCE, CELL, NODE, TRAVEL } from;
+  enum { QUANTITY, FORCE, CELL, NODE, TRAVEL, COEFFICIENT } from;
   PetscInt index, axis, group; /* group: the output to which it belongs; from n_outputs on those of a travel */
   PetscReal coefficient[6];    /* of a cell's stresses */
   PetscInt turned;             /* 1 + the body whose axes the values of a cell or node are in; 0: those of space */
@@ -39,7 +46,8 @@ typedef struct {
   HycoROM m;
   HycoScene s;
   HycoTravel travel;          /* NULL: no surface moves */
-  PetscInt p, n, k, *contact; /* motions and contacts of the model's problem; the contacts with a row, or all places */
+  PetscInt p, n, k, *contact; /* motions and contacts of the model's problem; the contacts with a row, or all places; */
+  PetscInt *first;            /* with friction rows instead; by contact of the model: its first one; NULL: its number */
   PetscReal *z, *unit;        /* p + n; their sizes */
   PetscReal *w;
   PetscInt n_atoms, n_rows, room, ny, n_groups, *group;
@@ -51,6 +59,8 @@ typedef struct {
   char **weight;
   HycoExportFit base, response;
   HycoExportModel out;
+  double *state; /* of a path of the program */
+  PetscErrorCode failed;
 } Export;
 
 /* -- probing -- */
@@ -127,6 +137,9 @@ static PetscErrorCode Probe(Export *e, const PetscReal mu[], const PetscReal z[]
              : r->from == NODE   ? Component(e, r, u)
              : r->from == TRAVEL ? HycoTravelValue(e->travel, r->index)
                                  : 0;
+    if (r->from == COEFFICIENT)
+      PetscCall(HycoExprEval(e->s->contact[m->pairs.contact[r->index]]->friction, mu, 1,
+                             m->fe->X + 3 * m->pairs.slave[r->index], value));
     if (r->from == CELL) *value = Stress(e, r, n_sigma, sigma + r->index * n_sigma);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -246,7 +259,7 @@ static PetscErrorCode AddContacts(Export *e, const HycoQuantity *q, const PetscR
       o->n++;
       continue;
     }
-    while (at < e->k && e->contact[at] != k) at++;
+    while (at < e->k && e->contact[at] != (e->first ? e->first[k] : k)) at++;
     if (at == e->k && (o->kind != PRESSURE_SMALLEST || !e->k)) continue; /* it is always open */
     PetscCall(HycoExportAddContact(&e->out, at < e->k ? at : 0));
     PetscCall(HycoExportAddWeight(&e->out, at < e->k ? weight[k] : 0));
@@ -326,6 +339,26 @@ static PetscErrorCode AddOutput(Export *e, const Output *o, const char name[], c
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The work of friction: of the blocks of its contacts. */
+static PetscErrorCode AddWork(Export *e, const HycoQuantity *q, Output *o)
+{
+  const HycoPairs *pairs = &e->m->model->pairs;
+  PetscBool *of;
+
+  PetscFunctionBegin;
+  *o = (Output){.kind = WORK, .width = 1, .first = e->out.n_contact, .weight = -1};
+  PetscCall(PetscMalloc1(pairs->n, &of));
+  PetscCall(HycoPairsOfQuantity(e->s, e->m->model->mesh, pairs, q, of));
+  for (PetscInt b = 0, k = 0; b < e->out.n_slip; b++) {
+    while (e->first[k] != e->contact[e->out.row[b]]) k++;
+    if (!of[k]) continue;
+    PetscCall(HycoExportAddContact(&e->out, b));
+    o->n++;
+  }
+  PetscCall(PetscFree(of));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode AddQuantity(Export *e, PetscInt k)
 {
   const HycoQuantity *q = &e->s->quantity[k];
@@ -344,6 +377,8 @@ static PetscErrorCode AddQuantity(Export *e, PetscInt k)
     if (o.kind == SUM) o.weight = e->out.n_weights;
     PetscCall(AddItems(e, k, &o));
     for (PetscInt i = o.first; i < e->n_rows; i++) e->row[i].group = e->out.n_outputs;
+  } else if (kind == HYCO_QUANTITY_FRICTION && q->field == HYCO_FRICTION_WORK) {
+    PetscCall(AddWork(e, q, &o));
   } else if (kind >= HYCO_QUANTITY_AREA) {
     o.kind = kind == HYCO_QUANTITY_AREA ? CLOSED : kind == HYCO_QUANTITY_PRESSURE ? PRESSURE : PRESSURE_SMALLEST;
     PetscCall(AddContacts(e, q, kind == HYCO_QUANTITY_AREA ? e->area : e->pressure, &o));
@@ -397,11 +432,51 @@ static PetscErrorCode FindOutputs(Export *e)
 
 /* -- the problem -- */
 
+/* The rows of contacts with friction, and their blocks: those that a force along the normal moves, moves[] by row. */
+static PetscErrorCode FindBlocks(Export *e, const PetscReal moves[])
+{
+  const HycoPairs *pairs = &e->m->model->pairs;
+  HycoExportModel *o = &e->out;
+  PetscInt at = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(pairs->n + 1, &e->first));
+  PetscCall(PetscCalloc1(pairs->n + 1, &o->row));
+  PetscCall(PetscMalloc1(pairs->n + 1, &o->coefficient));
+  PetscCall(PetscMalloc1(e->n + 1, &o->normal));
+  for (PetscInt k = 0; k < pairs->n; k++) {
+    const PetscBool rubs = (PetscBool)(e->s->contact[pairs->contact[k]]->friction != NULL);
+    const PetscInt rows = rubs ? e->m->model->mesh->dim : 1;
+
+    e->first[k] = at;
+    for (PetscInt r = at; r < at + rows && moves[at] > 0; r++) {
+      o->normal[e->k] = r == at;
+      e->contact[e->k++] = r;
+    }
+    if (moves[at] > 0) o->coefficient[o->n_slip++] = rubs ? (int)k : -1; /* a row's number once there are rows */
+    if (moves[at] > 0) o->row[o->n_slip] = (int)e->k;
+    at += rows;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of a path: the largest forces of the listed times, as the last one may be without loads; displacements of their size. */
+static void ScalePath(Export *e, const PetscReal flexibility[])
+{
+  PetscReal most = 0, flexible = 0;
+
+  for (PetscInt i = 0; i < e->m->trace.n_listed * e->m->model->pairs.n; i++)
+    most = PetscMax(most, e->m->trace.Lambda[i]);
+  for (PetscInt i = 0; i < e->n; i++) flexible = PetscMax(flexible, flexibility[i]);
+  e->unit[1] = most > 0 ? most : 1;
+  e->unit[0] = flexible > 0 ? e->unit[1] * flexible : 1;
+}
+
 /* The contacts with a row of B, and the sizes of z; M must be [0 A; -A^T W]. */
 static PetscErrorCode FindProblem(Export *e, const PetscReal mu[])
 {
   HycoROM m = e->m;
-  PetscReal *M, size, held = 0, most = 0;
+  PetscReal *M, *flexibility, *moves, size, held = 0, most = 0;
   PetscInt *all;
   size_t n;
 
@@ -420,7 +495,7 @@ static PetscErrorCode FindProblem(Export *e, const PetscReal mu[])
   for (PetscInt i = 0; i < 2; i++) e->unit[i] = e->unit[i] > 0 ? e->unit[i] : 1;
   for (PetscInt i = 0; e->travel && i < e->n; i++) e->contact[e->k++] = i;
   if (e->travel) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc2(n * n + 1, &M, e->n + 1, &all));
+  PetscCall(PetscMalloc4(n * n + 1, &M, e->n + 1, &all, e->n + 1, &flexibility, e->n + 1, &moves));
   PetscUseTypeMethod(m, residual, mu, e->z, e->w, &size);
   for (PetscInt i = 0; i < e->n; i++) all[i] = i;
   PetscUseTypeMethod(m, jacobian, e->n, all, M);
@@ -435,10 +510,18 @@ static PetscErrorCode FindProblem(Export *e, const PetscReal mu[])
     }
   }
   for (PetscInt i = 0; i < e->n; i++) {
-    /* A contact without flexibility never touches: its slave faces nothing. */
-    if (M[(size_t)(e->p + i) * (n + 1)] > 0) e->contact[e->k++] = i;
+    flexibility[i] = moves[i] = M[(size_t)(e->p + i) * (n + 1)];
+    /* Where a body is pinned it has no flexibility of its own, but moves. */
+    for (size_t j = 0; j < (size_t)e->p; j++)
+      moves[i] = PetscMax(moves[i], PetscAbsReal(M[j * n + (size_t)(e->p + i)]));
   }
-  PetscCall(PetscFree2(M, all));
+  /* A contact that nothing moves never touches: its slave faces nothing. */
+  for (PetscInt i = 0; i < e->n && !HycoSceneHasFriction(e->s); i++) {
+    if (moves[i] > 0) e->contact[e->k++] = i;
+  }
+  if (HycoSceneHasFriction(e->s)) PetscCall(FindBlocks(e, moves));
+  if (e->s->n_times) ScalePath(e, flexibility);
+  PetscCall(PetscFree4(M, all, flexibility, moves));
   HycoCheck(held <= 1e-10 * most,
             "a model of type %s cannot be exported, as its unknowns are not contact forces alone; train one with "
             "-hyco_model_type bodies",
@@ -456,6 +539,29 @@ static void Irregular(PetscInt n, PetscInt which, PetscReal z[])
   for (PetscInt i = 0; i < n; i++) z[i] = 0.1 + (i + 1) * step - floor((i + 1) * step);
 }
 
+/* n points over the ranges, the last variables of a path (time, tables) each for itself. The caller frees mu. */
+static PetscErrorCode Scatter(const Export *e, PetscInt n, PetscReal **mu)
+{
+  const PetscInt n_par = e->s->n_parameters, n_var = e->s->n_variables;
+  HycoSamples samples;
+  const PetscReal *at;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesCreate(e->s, &samples));
+  PetscCall(HycoSamplesAddScattered(samples, n));
+  PetscCall(HycoSamplesGet(samples, NULL, NULL, &at));
+  PetscCall(PetscMalloc1(n * n_var, mu));
+  for (PetscInt k = 0; k < n * n_var; k++) {
+    const PetscInt i = k / n_var, p = k % n_var;
+    const PetscReal share = (PetscReal)(i + 1) * PetscSqrtReal((PetscReal)(2 + 3 * p));
+
+    (*mu)[k] =
+        p < n_par ? at[i * n_par + p] : e->s->lo[p] + (e->s->hi[p] - e->s->lo[p]) * (share - PetscFloorReal(share));
+  }
+  PetscCall(HycoSamplesDestroy(&samples));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Samples for a fit: y at z = 0, and what two z add; fixed: a parameter that stays in the middle of its range; -1: none. */
 typedef struct {
   PetscInt n;
@@ -465,19 +571,13 @@ typedef struct {
 
 static PetscErrorCode Sample(Export *e, PetscInt n, PetscInt fixed, Samples *o)
 {
-  HycoSamples samples;
-  const PetscReal *mu;
+  const PetscInt n_par = e->s->n_variables;
   PetscReal *z;
-  const PetscInt n_par = e->s->n_parameters;
   PetscErrorCode ierr = 0;
 
   PetscFunctionBegin;
   o->n = n;
-  PetscCall(HycoSamplesCreate(e->s, &samples));
-  PetscCall(HycoSamplesAddScattered(samples, n));
-  PetscCall(HycoSamplesGet(samples, NULL, NULL, &mu));
-  HycoDuplicate(n * n_par, mu, &o->own);
-  PetscCall(HycoSamplesDestroy(&samples));
+  PetscCall(Scatter(e, n, &o->own));
   for (PetscInt i = 0; fixed >= 0 && i < n; i++) o->own[i * n_par + fixed] = (e->s->lo[fixed] + e->s->hi[fixed]) / 2;
   o->mu = o->own;
   PetscCall(PetscMalloc1((size_t)n * (size_t)e->ny + 1, &o->y));
@@ -756,16 +856,12 @@ static PetscErrorCode RefineInverse(size_t n, const PetscReal M[], PetscReal X[]
 /* Points at which the functions of the response are independent (n x n_par), and the inverse of their values there. */
 static PetscErrorCode ChoosePoints(Export *e, PetscReal point[], PetscReal inverse[])
 {
-  const PetscInt n = e->response.n, N = 4 * n + 16, n_par = e->s->n_parameters;
-  HycoSamples samples;
-  const PetscReal *mu;
-  PetscReal *value, *chosen, *scale;
+  const PetscInt n = e->response.n, N = 4 * n + 16, n_par = e->s->n_variables;
+  PetscReal *mu, *value, *chosen, *scale;
   PetscInt *pivot;
 
   PetscFunctionBegin;
-  PetscCall(HycoSamplesCreate(e->s, &samples));
-  PetscCall(HycoSamplesAddScattered(samples, N));
-  PetscCall(HycoSamplesGet(samples, NULL, NULL, &mu));
+  PetscCall(Scatter(e, N, &mu));
   PetscCall(PetscMalloc4(n * N, &value, n * n, &chosen, n, &scale, N, &pivot));
   PetscCall(PetscArrayzero(scale, n));
   for (PetscInt i = 0; i < N; i++) {
@@ -784,7 +880,7 @@ static PetscErrorCode ChoosePoints(Export *e, PetscReal point[], PetscReal inver
   PetscCall(RefineInverse((size_t)n, chosen, inverse));
   for (PetscInt k = 0; k < n * n; k++) inverse[k] /= scale[k / n];
   PetscCall(PetscFree4(value, chosen, scale, pivot));
-  PetscCall(HycoSamplesDestroy(&samples));
+  PetscCall(PetscFree(mu));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -823,12 +919,14 @@ static PetscErrorCode AddValues(Export *e, const PetscReal mu[], const PetscReal
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc3(n + 1, &z, e->ny, &y, e->ny, &y0));
-  PetscCall(Probe(e, mu, NULL, y0));
+  /* Results count friction where there is a normal force alone. */
+  for (PetscInt c = 0; e->first && c < e->k; c++) z[e->p + c] = e->out.normal[c];
+  PetscCall(Probe(e, mu, z, y0));
   /* n probes at each point of the response: the values need no Jacobian of their own. */
   for (PetscInt c = 0; c < n && e->n_rows; c++) {
-    z[c] = 1;
+    z[c] += 1;
     PetscCall(Probe(e, mu, z, y));
-    z[c] = 0;
+    z[c] -= 1;
     for (PetscInt r = 0; r < e->n_rows; r++) {
       const PetscReal change = (y[n + r] - y0[n + r]) / e->unit[c >= e->p];
 
@@ -854,22 +952,58 @@ static PetscErrorCode Transpose(size_t n, HycoExportModel *o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* size[n]: of functions at the ends, the middle and between, where a weight of a sample is not 0 everywhere. */
+static PetscErrorCode SizeFunctions(Export *e, PetscInt n, const HycoFunction f[], PetscReal size[])
+{
+  PetscReal *value, mu[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n + 1, &value));
+  PetscCall(PetscArrayzero(size, n));
+  for (PetscInt k = 0; k < 7; k++) {
+    for (PetscInt p = 0; p < e->s->n_variables; p++)
+      mu[p] = e->s->lo[p] + (e->s->hi[p] - e->s->lo[p]) * (k < 3 ? (PetscReal)k / 2 : 0.07 + 0.23 * (PetscReal)(k - 3));
+    PetscCall(HycoFunctionsEvaluate(e->s, e->atom, n, f, mu, value));
+    for (PetscInt i = 0; i < n; i++) size[i] = PetscMax(size[i], PetscAbsReal(value[i]));
+  }
+  PetscCall(PetscFree(value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of paths: coefficients of gaps and of values without forces that are round-off beside the others of their group are 0, so
+   that nothing presses where there are no loads. */
+static PetscErrorCode DropRounding(Export *e)
+{
+  const PetscInt n = e->base.n;
+  PetscReal *size, *most;
+
+  PetscFunctionBegin;
+  if (!e->s->n_times) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(n + 1, &size));
+  PetscCall(PetscCalloc1(e->n_groups, &most));
+  PetscCall(SizeFunctions(e, n, e->base.function, size));
+  for (PetscInt pass = 0; pass < 2; pass++) {
+    for (PetscInt i = 0; i < e->ny * n; i++) {
+      PetscReal *of = &most[e->group[i / n]], *c = &e->base.coefficient[i];
+
+      if (!pass) *of = PetscMax(*of, PetscAbsReal(*c) * size[i % n]);
+      if (pass && PetscAbsReal(*c) * size[i % n] <= ROUNDING * *of) *c = 0;
+    }
+  }
+  HycoFreeAll(&size, &most);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The rows of T that are more than round-off beside the others of their value, as terms. */
 static PetscErrorCode KeepTerms(Export *e, const PetscInt place[], const PetscReal T[])
 {
   const size_t n = (size_t)(e->p + e->k);
   const PetscInt n_f = e->response.n;
-  PetscReal *scale, *value, *size, mu[HYCO_MAX_PARAMETERS];
+  PetscReal *scale, *size;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc3(n_f, &scale, n_f, &value, n_f, &size));
-  /* Sizes of the functions: at the ends, the middle and between, where a weight of a sample is not 0 everywhere. */
-  for (PetscInt k = 0; k < 7; k++) {
-    for (PetscInt p = 0; p < e->s->n_parameters; p++)
-      mu[p] = e->s->lo[p] + (e->s->hi[p] - e->s->lo[p]) * (k < 3 ? (PetscReal)k / 2 : 0.07 + 0.23 * (PetscReal)(k - 3));
-    PetscCall(HycoFunctionsEvaluate(e->s, e->atom, n_f, e->response.function, mu, value));
-    for (PetscInt f = 0; f < n_f; f++) scale[f] = PetscMax(scale[f], PetscAbsReal(value[f]));
-  }
+  PetscCall(PetscMalloc2(n_f, &scale, n_f, &size));
+  PetscCall(SizeFunctions(e, n_f, e->response.function, scale));
   for (PetscInt r = 0; r < e->n_rows; r++) {
     PetscReal most = 0;
 
@@ -887,7 +1021,7 @@ static PetscErrorCode KeepTerms(Export *e, const PetscInt place[], const PetscRe
     }
   }
   PetscCall(Transpose(n, &e->out));
-  PetscCall(PetscFree3(scale, value, size));
+  PetscCall(PetscFree2(scale, size));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -911,6 +1045,7 @@ static PetscErrorCode Fill(Export *e)
       "of outputs",
       (double)numbers, (double)MOST);
   PetscCall(PetscMalloc1(e->base.n + e->response.n + 1, &place));
+  PetscCall(DropRounding(e));
   PetscCall(Merge(e, &e->base, place));
   PetscCall(Merge(e, &e->response, place + e->base.n));
   PetscCall(PetscCalloc1((size_t)e->ny * (size_t)o->n_functions + 1, &o->offset));
@@ -929,13 +1064,13 @@ static PetscErrorCode Fill(Export *e)
   for (PetscInt i = 0; i < e->response.n; i++) o->stiffness[i] = (int)place[e->base.n + i];
   PetscCall(PetscCalloc1(f * triangle + 1, &o->W));
   PetscCall(PetscCalloc1(f * (size_t)e->p * k + 1, &o->A));
-  PetscCall(PetscCalloc5(f * (size_t)e->s->n_parameters + 1, &point, f * f + 1, &inverse, f * (size_t)e->n_rows * n + 1,
+  PetscCall(PetscCalloc5(f * (size_t)e->s->n_variables + 1, &point, f * f + 1, &inverse, f * (size_t)e->n_rows * n + 1,
                          &T, matrix + 1, &M, f + 1, &share));
   PetscCall(ChoosePoints(e, point, inverse));
   for (PetscInt i = 0; i < e->response.n; i++) {
     for (PetscInt j = 0; j < e->response.n; j++) share[j] = inverse[(size_t)j * f + (size_t)i];
-    PetscCall(AddMatrix(e, point + i * e->s->n_parameters, share, M));
-    PetscCall(AddValues(e, point + i * e->s->n_parameters, share, T));
+    PetscCall(AddMatrix(e, point + i * e->s->n_variables, share, M));
+    PetscCall(AddValues(e, point + i * e->s->n_variables, share, T));
   }
   PetscCall(KeepTerms(e, place + e->base.n, T));
   PetscCall(PetscFree5(point, inverse, T, M, share));
@@ -945,32 +1080,55 @@ static PetscErrorCode Fill(Export *e)
 
 /* -- comparison with the model -- */
 
-/* The program's results at a point as it has them: its functions in the library's arithmetic. */
-static PetscErrorCode RunHere(Export *e, const Model *model, Work *o, const PetscReal mu[], PetscReal out[],
+/* The program's functions in the library's arithmetic. */
+static int FunctionsHere(void *context, const double v[], double f[])
+{
+  Export *e = (Export *)context;
+
+  e->failed = HycoFunctionsEvaluate(e->s, e->atom, e->out.n_functions, e->out.function, v, f);
+  return e->failed != 0;
+}
+
+/* The program's results at a point, of a path at listed time j after those before it. */
+static PetscErrorCode RunHere(Export *e, const Model *model, Work *o, const PetscReal mu[], PetscInt j, PetscReal out[],
                               PetscBool *solved)
 {
   double kkt;
-  int its;
+  int its, status;
 
   PetscFunctionBegin;
-  PetscCall(HycoFunctionsEvaluate(e->s, e->atom, e->out.n_functions, e->out.function, mu, o->f));
-  if (e->travel) PetscCall(HycoTravelPositions(&e->out, e->s, mu, o->room.X));
-  *solved = (PetscBool)(predict(model, o, out, &kkt, &its) == OK);
+  if (e->s->n_times) {
+    if (!j) PetscCall(PetscArrayzero(e->state, state_size(model)));
+    status = advance(model, o, FunctionsHere, e, mu, e->s->times[j], e->state, out, &kkt, &its);
+  } else {
+    (void)FunctionsHere(e, mu, o->f);
+    if (e->travel) PetscCall(HycoTravelPositions(&e->out, e->s, mu, o->room.X));
+    status = predict(model, o, out, &kkt, &its);
+  }
+  PetscCall(e->failed);
+  *solved = (PetscBool)(status == OK);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The model's results in the order of the outputs. *solved: its problem is. */
-static PetscErrorCode RunModel(Export *e, const PetscReal mu[], PetscReal out[], PetscBool *solved)
+/* The model's results in the order of the outputs, as above. *solved: its problem is. */
+static PetscErrorCode RunModel(Export *e, const PetscReal mu[], PetscInt j, PetscReal out[], PetscBool *solved)
 {
   const HycoContactResult *result;
   HycoPrediction prediction;
+  HycoHistory history = {0};
+  const PetscReal *quantity = prediction.quantity;
   PetscInt at = 0, n;
 
   PetscFunctionBegin;
-  PetscCall(HycoROMPredict(e->m, e->s->n_parameters, mu));
+  if (!j) PetscCall(HycoROMPredict(e->m, e->s->n_parameters, mu));
   PetscCall(HycoROMGetPrediction(e->m, &prediction));
   *solved = (PetscBool)(prediction.reason > 0);
-  for (PetscInt k = 0; k < e->s->n_quantities; k++) out[at++] = prediction.quantity[k];
+  if (e->s->n_times) PetscCall(HycoROMGetHistory(e->m, &history));
+  if (e->s->n_times) *solved = (PetscBool)(*solved || j + 1 < history.n);
+  if (e->s->n_times && !*solved) PetscFunctionReturn(PETSC_SUCCESS);
+  if (e->s->n_times) PetscCall(HycoROMSetStep(e->m, j));
+  if (e->s->n_times) quantity = history.step[j].quantity;
+  for (PetscInt k = 0; k < e->s->n_quantities; k++) out[at++] = quantity[k];
   PetscCall(HycoROMGetContacts(e->m, &n, &result));
   for (PetscInt c = 0; c < n; c++) {
     for (PetscInt a = 0; a < e->m->model->mesh->dim; a++) out[at++] = result[c].force[a];
@@ -980,16 +1138,18 @@ static PetscErrorCode RunModel(Export *e, const PetscReal mu[], PetscReal out[],
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets e->out.seconds, the processor time of predictions one after the other, as a program makes them. */
-static PetscErrorCode Time(Export *e, const Model *model, Work *o, const PetscReal mu[], PetscReal out[])
+/* Sets e->out.seconds, the processor time of predictions or steps one after the other, as a program makes them. */
+static PetscErrorCode Time(Export *e, const Model *model, Work *o, PetscInt n, const PetscReal mu[], PetscReal out[])
 {
+  const PetscInt times = PetscMax(e->s->n_times, 1);
   const clock_t begin = clock();
   PetscBool solved;
 
   PetscFunctionBegin;
-  for (PetscInt i = 0; i < e->out.checked; i++)
-    PetscCall(RunHere(e, model, o, mu + i * e->s->n_parameters, out, &solved));
+  for (PetscInt i = 0; i < n * times; i++)
+    PetscCall(RunHere(e, model, o, mu + i / times * e->s->n_parameters, i % times, out, &solved));
   e->out.seconds = (PetscReal)(clock() - begin) / CLOCKS_PER_SEC;
+  e->out.checked = n * times;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -1006,27 +1166,31 @@ static PetscReal ScaleOf(PetscInt n, char *const name[], const PetscReal most[],
   return scale;
 }
 
-/* Sets e->out.difference: of an output relative to its largest value, at points over the ranges; fails if it is no
-   round-off. */
+/* Sets e->out.difference: of an output relative to its largest value, at points over the ranges, of paths at their listed
+   times; fails if it is no round-off. */
 static PetscErrorCode Compare(Export *e, const Model *model, void *memory)
 {
-  const PetscInt n = e->out.n_outputs;
+  const PetscInt n = e->out.n_outputs, times = PetscMax(e->s->n_times, 1);
   HycoSamples samples;
   const PetscReal *mu;
   PetscReal *mine, *theirs, *most, *worst;
-  PetscBool solved = PETSC_FALSE, theirs_solved = PETSC_FALSE;
+  PetscBool solved = PETSC_TRUE, theirs_solved = PETSC_TRUE;
+  PetscInt points;
   Work o;
 
   PetscFunctionBegin;
   /* Once for all points: the runtime needs no state between predictions. */
   place(model, memory, &o);
   PetscCall(HycoSamplesCreate(e->s, &samples));
-  PetscCall(HycoSamplesAddScattered(samples, CHECKED));
-  PetscCall(HycoSamplesGet(samples, &e->out.checked, NULL, &mu));
+  PetscCall(HycoSamplesAddScattered(samples, e->s->n_times ? PATHS_CHECKED : CHECKED));
+  PetscCall(HycoSamplesGet(samples, &points, NULL, &mu));
   PetscCall(PetscCalloc4(n + 1, &mine, n + 1, &theirs, n + 1, &most, n + 1, &worst));
-  for (PetscInt i = 0; i < e->out.checked; i++) {
-    PetscCall(RunModel(e, mu + i * e->s->n_parameters, theirs, &theirs_solved));
-    PetscCall(RunHere(e, model, &o, mu + i * e->s->n_parameters, mine, &solved));
+  for (PetscInt i = 0; i < points * times; i++) {
+    const PetscReal *at = mu + i / times * e->s->n_parameters;
+
+    if (i % times && !solved) continue; /* a path that has ended */
+    PetscCall(RunModel(e, at, i % times, theirs, &theirs_solved));
+    PetscCall(RunHere(e, model, &o, at, i % times, mine, &solved));
     HycoCheck(
         solved == theirs_solved,
         "export: at a point the program's problem has %s solution, unlike the model's; the forces may not be unique",
@@ -1036,7 +1200,7 @@ static PetscErrorCode Compare(Export *e, const Model *model, void *memory)
       worst[k] = PetscMax(worst[k], PetscAbsReal(mine[k] - theirs[k]));
     }
   }
-  PetscCall(Time(e, model, &o, mu, mine));
+  PetscCall(Time(e, model, &o, points, mu, mine));
   for (PetscInt k = 0; k < n; k++) {
     const PetscReal scale = ScaleOf(n, e->out.name, most, k);
 
@@ -1078,16 +1242,39 @@ static PetscErrorCode CompareHere(Export *e)
                        .term = o->term,
                        .output = (const Output *)(const void *)o->output, /* a struct of ints alone */
                        .contact = o->contact,
-                       .weight = o->weight};
+                       .weight = o->weight,
+                       .n_slip = (int)o->n_slip,
+                       .n_tables = (int)e->s->n_tables,
+                       .row = o->row,
+                       .coefficient = o->coefficient,
+                       .normal = o->normal,
+                       .table = e->s->table};
   char *memory;
 
   PetscFunctionBegin;
+  e->out.n_states = (PetscInt)state_size(&model);
+  PetscCall(PetscMalloc1(state_size(&model), &e->state));
   PetscCall(PetscMalloc1(work_size(&model) + 1, &memory));
   HycoFinally(Compare(e, &model, memory), PetscCall(PetscFree(memory)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* -- the exporter -- */
+
+/* The ranges of the variables that a path has beside its parameters: the time, and values of tables. */
+static void SetRanges(HycoScene s)
+{
+  for (PetscInt p = s->n_parameters; p < s->n_variables; p++) {
+    const HycoTimeTable *table = p > s->n_parameters ? &s->table[p - s->n_parameters - 1] : NULL;
+
+    s->lo[p] = table ? table->value[0] : s->times[0];
+    s->hi[p] = table ? table->value[0] : s->times[s->n_times - 1];
+    for (PetscInt k = 0; table && k < table->n; k++) {
+      s->lo[p] = PetscMin(s->lo[p], table->value[k]);
+      s->hi[p] = PetscMax(s->hi[p], table->value[k]);
+    }
+  }
+}
 
 /* A prediction in the middle of the ranges comes first: the operations need a model that is set up. */
 static PetscErrorCode Prepare(Export *e)
@@ -1097,19 +1284,29 @@ static PetscErrorCode Prepare(Export *e)
   PetscInt places; /* the group of the first body's places */
 
   PetscFunctionBegin;
-  HycoCheck(!e->s->n_times,
-            "hyco export: this model is one of paths in time (history_times); programs are written of models of "
-            "scenes without a history; hyco predict, C and Python predict its paths");
   HycoCheck(m->ops->unknowns && m->ops->residual && m->ops->jacobian && m->ops->expand,
             "a model of type %s cannot be exported; train one with -hyco_model_type bodies", m->model->type);
+  HycoCheck(!e->s->n_times || (!strcmp(m->model->type, "bodies") && !((HycoSubstructures)m->model->data)->inelastic->m),
+            "hyco export: programs of scenes with a history are written of models of type bodies whose bodies are "
+            "elastic; this one is of type %s%s; hyco predict, C and Python predict its paths",
+            m->model->type, strcmp(m->model->type, "bodies") ? "" : ", and bodies creep or yield");
+  SetRanges(e->s);
   for (PetscInt p = 0; p < e->s->n_parameters; p++) mu[p] = (e->s->lo[p] + e->s->hi[p]) / 2;
   PetscCall(HycoROMPredict(m, e->s->n_parameters, mu));
+  if (e->s->n_times) HycoSceneSetTime(e->s, mu, e->s->times[e->s->n_times - 1], mu);
   PetscCall(HycoTravelCreate(m, &e->out, &e->travel));
   PetscCall(FindProblem(e, mu));
-  e->out.tolerance = m->solver->rtol;
+  e->out.tolerance = e->s->n_times ? PATH_TOLERANCE : m->solver->rtol;
   PetscCall(HycoROMMeasureQuantities(m, &(HycoPrediction){0}));
   PetscCall(FindOutputs(e));
   e->travel_row = e->n_rows;
+  for (PetscInt b = 0; b < e->out.n_slip; b++) {
+    const PetscInt k = e->out.coefficient[b];
+
+    if (k < 0) continue;
+    e->out.coefficient[b] = (int)e->n_rows;
+    PetscCall(AddRow(e, (Row){.from = COEFFICIENT, .index = k, .group = e->out.n_outputs}));
+  }
   if (e->travel) HycoTravelStart(e->travel, e->n_rows, &e->out);
   for (PetscInt i = 0; e->travel && i < HycoTravelValues(e->travel); i++)
     PetscCall(AddRow(e, (Row){.from = TRAVEL, .index = i, .group = e->out.n_outputs + HycoTravelGroup(e->travel, i)}));
@@ -1122,7 +1319,7 @@ static PetscErrorCode Prepare(Export *e)
   e->out.atom = e->atom;
   e->ny = e->p + e->k + e->n_rows;
   places = 2 + e->out.n_outputs + (e->travel ? HycoTravelValues(e->travel) : 0);
-  e->n_groups = places + (e->travel ? HycoTravelBodies(e->travel) : 0);
+  e->n_groups = places + (e->travel ? HycoTravelBodies(e->travel) : 1); /* one of coefficients of friction */
   PetscCall(PetscMalloc1(2 * e->ny + 1, &e->group));
   for (PetscInt r = 0; r < 2 * e->ny; r++) {
     const PetscInt at = r % e->ny;
@@ -1173,7 +1370,7 @@ static PetscErrorCode ExportC(HycoROM m, const char path[], char **description)
   PetscCall(HycoTravelDestroy(&e.travel));
   if (e.z) PetscCall(PetscFree4(e.z, e.w, e.unit, e.contact));
   for (PetscInt i = 0; i < e.n_weights; i++) PetscCall(PetscFree(e.weight[i]));
-  HycoFreeAll(&e.weight, &e.group, &e.atom, &e.row, &e.area, &e.pressure);
+  HycoFreeAll(&e.first, &e.state, &e.weight, &e.group, &e.atom, &e.row, &e.area, &e.pressure);
   PetscCall(HycoExportModelFree(&e.out));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

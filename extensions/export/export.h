@@ -91,6 +91,8 @@ typedef struct {
   int *output;         /* 6 each: the members of the runtime's Output */
   char **name, **unit; /* of outputs */
   Block *block;
+  PetscInt n_slip, n_states;            /* of paths with friction: blocks of rows; doubles of a state */
+  int *row, *coefficient, *normal;      /* as in Model */
   Surfaces surfaces;                    /* n_nodes 0: none moves */
   PetscInt n_surfaces, n_border, *body; /* surfaces; edges of all borders; by node: its body */
   PetscReal *drawn;                     /* nodes as drawn, n_nodes x 3 */

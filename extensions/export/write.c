@@ -73,8 +73,9 @@ PetscErrorCode HycoExportModelFree(HycoExportModel *m)
   for (PetscInt k = 0; k < m->n_outputs; k++) HycoFreeAll(&m->name[k], &m->unit[k]);
   for (PetscInt k = 0; k < m->n_blocks; k++) HycoFreeAll(&m->block[k].C);
   HycoFreeAll(&m->function, &m->offset, &m->W, &m->A, &m->term, &m->weight, &m->stiffness, &m->value, &m->factor,
-              &m->contact, &m->output, &m->name, &m->unit, &m->block, &m->body, &m->drawn, &s->w, &s->N, &s->dN,
-              &s->surface, &s->search, &s->facet, &s->border, &s->node, &s->at_border, &s->place, &s->given, &s->pose);
+              &m->contact, &m->output, &m->row, &m->coefficient, &m->normal, &m->name, &m->unit, &m->block, &m->body,
+              &m->drawn, &s->w, &s->N, &s->dN, &s->surface, &s->search, &s->facet, &s->border, &s->node, &s->at_border,
+              &s->place, &s->given, &s->pose);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -86,12 +87,15 @@ const char *HycoExportUnit(HycoScene s, const HycoQuantity *q)
   static char text[HYCO_LINE];
   const char *length = s->unit[HYCO_UNIT_LENGTH], *force = s->unit[HYCO_UNIT_FORCE];
 
-  if (q->kind == HYCO_QUANTITY_REACTION || q->kind == HYCO_QUANTITY_FORCE) return force;
+  if (q->kind == HYCO_QUANTITY_REACTION || q->kind == HYCO_QUANTITY_FORCE ||
+      (q->kind == HYCO_QUANTITY_FRICTION && q->field != HYCO_FRICTION_WORK))
+    return force;
   if (q->kind == HYCO_QUANTITY_PRESSURE || q->kind == HYCO_QUANTITY_PRESSURE_MIN) return s->unit[HYCO_UNIT_STRESS];
   if (q->kind < HYCO_QUANTITY_REACTION)
     return HycoQuantityFields[q->field][0] == 'u' ? length : s->unit[HYCO_UNIT_STRESS];
   text[0] = '\0';
-  if (q->kind == HYCO_QUANTITY_MOMENT && force[0] && length[0]) HycoFormat(text, "%s %s", force, length);
+  if ((q->kind == HYCO_QUANTITY_MOMENT || q->kind == HYCO_QUANTITY_FRICTION) && force[0] && length[0])
+    HycoFormat(text, "%s %s", force, length);
   return text;
 }
 
@@ -153,26 +157,70 @@ static const char declarations[] =
     "} @_result;\n\n"
     "/* @_OK; @_OUTSIDE: parameters outside the ranges, results are those of the equations there, untested;\n"
     "   @_DIVERGED: no solution was found, results are of no use; @_NO_MEMORY: no results. */\n"
-    "enum { @_OK, @_OUTSIDE, @_DIVERGED, @_NO_MEMORY };\n\n"
+    "enum { @_OK, @_OUTSIDE, @_DIVERGED, @_NO_MEMORY };\n\n";
+
+static const char predicted[] =
     "/* Results at mu. work: @_work_size() bytes, aligned as malloc() does, for this call alone; NULL: allocated\n"
     "   for the call. Several threads may call it at the same time, each with its own work and result. */\n"
     "int @_predict(const double mu[@_N_PARAMETERS], @_result *result, void *work);\n"
     "size_t @_work_size(void);\n";
 
+static const char stepped[] =
+    "/* The listed times of the history. */\n"
+    "extern const double @_time[@_N_TIMES];\n\n"
+    "/* What a step leaves for the next: forces and slips of the contacts. A copy is a point to go back to. */\n"
+    "typedef struct {\n"
+    "  double value[@_N_STATES];\n"
+    "} @_state;\n\n"
+    "/* At rest, before the first step, in which all loads act at once. */\n"
+    "void @_start(@_state *state);\n"
+    "/* Advances the state to time t, after that of the step before, and gives the results there; tables are those of "
+    "the\n"
+    "   history. mu may differ from step to step: between them it is on a straight line. A step is halved where it has "
+    "no\n"
+    "   solution; if none is found the state stays. work: @_work_size() bytes, aligned as malloc() does, for this\n"
+    "   call alone; NULL: allocated for the call. Several threads may call it at the same time, each with its own "
+    "state,\n"
+    "   work and result. */\n"
+    "int @_step(const double mu[@_N_PARAMETERS], double t, @_state *state, @_result *result, void *work);\n"
+    "size_t @_work_size(void);\n";
+
 static const char functions[] =
     "size_t @_work_size(void)\n{\n  return work_size(&model);\n}\n\n"
+    "static int is_outside(const double mu[])\n{\n"
+    "  int outside = 0;\n\n"
+    "  for (int p = 0; p < @_N_PARAMETERS; p++) outside = outside || !(mu[p] >= @_lo[p] && mu[p] <= @_hi[p]);\n"
+    "  return outside;\n}\n\n";
+
+static const char predict_function[] =
     "int @_predict(const double mu[@_N_PARAMETERS], @_result *result, void *work)\n{\n"
     "  void *memory = work ? work : malloc(work_size(&model));\n"
-    "  int status, outside = 0;\n"
+    "  int status;\n"
     "  Work o;\n\n"
     "  if (!memory) return @_NO_MEMORY;\n"
-    "  for (int p = 0; p < @_N_PARAMETERS; p++) outside = outside || !(mu[p] >= @_lo[p] && mu[p] <= @_hi[p]);\n"
     "  place(&model, memory, &o);\n"
     "  functions(mu, o.f);\n"
     "  positions(mu, o.room.X);\n"
     "  status = predict(&model, &o, result->output, &result->kkt, &result->iterations);\n"
     "  if (!work) free(memory);\n"
-    "  return status == OK && outside ? OUTSIDE : status;\n}\n";
+    "  return status == OK && is_outside(mu) ? OUTSIDE : status;\n}\n";
+
+static const char step_functions[] =
+    "static int functions_at(void *context, const double v[], double f[])\n{\n"
+    "  (void)context;\n"
+    "  functions(v, f);\n"
+    "  return 0;\n}\n\n"
+    "void @_start(@_state *state)\n{\n  memset(state, 0, sizeof(*state));\n}\n\n"
+    "int @_step(const double mu[@_N_PARAMETERS], double t, @_state *state, @_result *result, void *work)\n{\n"
+    "  void *memory = work ? work : malloc(work_size(&model));\n"
+    "  int status;\n"
+    "  Work o;\n\n"
+    "  if (!memory) return @_NO_MEMORY;\n"
+    "  place(&model, memory, &o);\n"
+    "  status = advance(&model, &o, functions_at, NULL, mu, t, state->value, result->output, &result->kkt,\n"
+    "                   &result->iterations);\n"
+    "  if (!work) free(memory);\n"
+    "  return status == OK && is_outside(mu) ? OUTSIDE : status;\n}\n";
 
 /* A text with @ replaced by the prefix. */
 static PetscErrorCode AddNamed(HycoText *t, const char text[], const char prefix[])
@@ -200,9 +248,13 @@ static PetscErrorCode WriteHeader(const HycoExportModel *m, HycoScene s, const c
   for (PetscInt k = 0; k < m->n_outputs; k++) ADD(t, "     %d %s %s\n", (int)k, m->name[k], m->unit[k]);
   ADD(t, "*/\n#ifndef HYCO_%s_H\n#define HYCO_%s_H\n\n#include <stddef.h>\n\n", prefix, prefix);
   ADD(t, "#if defined(__cplusplus)\nextern \"C\" {\n#endif\n\n");
-  ADD(t, "enum { %s_N_PARAMETERS = %d, %s_N_OUTPUTS = %d };\n\n", prefix, (int)s->n_parameters, prefix,
+  ADD(t, "enum { %s_N_PARAMETERS = %d, %s_N_OUTPUTS = %d };\n", prefix, (int)s->n_parameters, prefix,
       (int)m->n_outputs);
+  if (s->n_times)
+    ADD(t, "enum { %s_N_TIMES = %d, %s_N_STATES = %d };\n", prefix, (int)s->n_times, prefix, (int)m->n_states);
+  ADD(t, "\n");
   PetscCall(AddNamed(t, declarations, prefix));
+  PetscCall(AddNamed(t, s->n_times ? stepped : predicted, prefix));
   ADD(t, "\n#if defined(__cplusplus)\n}\n#endif\n#endif\n");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -354,6 +406,32 @@ static PetscErrorCode WritePositions(const HycoExportModel *m, HycoScene s, Hyco
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Rows of contacts with friction, and the tables of a history. */
+static PetscErrorCode WritePath(const HycoExportModel *m, HycoScene s, const char prefix[], HycoText *t)
+{
+  char name[HYCO_LINE];
+
+  PetscFunctionBegin;
+  HycoFormat(name, "const double %s_time[%d]", prefix, (int)s->n_times);
+  PetscCall(WriteReals(t, name, (size_t)s->n_times, s->times));
+  if (m->n_slip) {
+    PetscCall(WriteInts(t, "static const int row[]", m->n_slip + 1, m->row));
+    PetscCall(WriteInts(t, "static const int coefficient[]", m->n_slip, m->coefficient));
+    PetscCall(WriteInts(t, "static const int normal[]", m->n_contacts, m->normal));
+  }
+  for (PetscInt k = 0; k < s->n_tables; k++) {
+    HycoFormat(name, "static const double table_t_%d[]", (int)k);
+    PetscCall(WriteReals(t, name, (size_t)s->table[k].n, s->table[k].t));
+    HycoFormat(name, "static const double table_value_%d[]", (int)k);
+    PetscCall(WriteReals(t, name, (size_t)s->table[k].n, s->table[k].value));
+  }
+  ADD(t, "static const HycoTimeTable tables[] = {");
+  for (PetscInt k = 0; k < s->n_tables; k++)
+    ADD(t, "%s{%d, table_t_%d, table_value_%d}", k ? ", " : "", (int)s->table[k].n, (int)k, (int)k);
+  ADD(t, "%s};\n", s->n_tables ? "" : "{0, NULL, NULL}");
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode WriteModel(const HycoExportModel *m, HycoScene s, const char prefix[], HycoText *t)
 {
   char name[HYCO_LINE];
@@ -367,6 +445,7 @@ static PetscErrorCode WriteModel(const HycoExportModel *m, HycoScene s, const ch
   PetscCall(WriteNames(t, NULL, prefix, "output", m->n_outputs, m->name, m->unit));
   PetscCall(WriteArrays(m, t));
   if (m->surfaces.n_nodes) PetscCall(WriteSurfaces(m, t));
+  if (s->n_times) PetscCall(WritePath(m, s, prefix, t));
   ADD(t,
       "\nstatic const Model model = {%d, %d, %d, %d, %d, %d, %d, %d, %d, %d, %.17g, %s_lo, %s_hi, offset, stiffness,\n",
       (int)s->n_parameters, (int)m->n_functions, (int)m->n_motions, (int)m->n_places, (int)m->n_stiffness,
@@ -374,8 +453,12 @@ static PetscErrorCode WriteModel(const HycoExportModel *m, HycoScene s, const ch
       prefix, prefix);
   ADD(t,
       "                            flexibility, work_on_motions, term_value, term_factor, term, outputs, contact,\n"
-      "                            weight, %s, %s};\n\n",
-      m->surfaces.n_nodes ? "blocks" : "NULL", m->surfaces.n_nodes ? "&surfaces" : "NULL");
+      "                            weight, %s, %s, %d, %d, %s};\n\n",
+      m->surfaces.n_nodes ? "blocks" : "NULL", m->surfaces.n_nodes ? "&surfaces" : "NULL", (int)m->n_slip,
+      (int)s->n_tables,
+      m->n_slip    ? "row, coefficient, normal, tables"
+      : s->n_times ? "NULL, NULL, NULL, tables"
+                   : "NULL, NULL, NULL, NULL");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -429,11 +512,13 @@ static PetscErrorCode WriteProgram(const HycoExportModel *m, HycoScene s, const 
   ADD(t,
       "/* Written by hyco export; %s declares what it offers. C99, with libc and libm alone. */\n#include \"%s\"\n\n",
       header, header);
+  if (s->n_times) ADD(t, "#define PATHS\n");
   ADD(t, "%s\n/* -- the model -- */\n\n", HycoExportRuntime);
   PetscCall(WriteModel(m, s, prefix, t));
   PetscCall(WriteFunctions(m, s, t));
-  PetscCall(WritePositions(m, s, t));
+  if (!s->n_times) PetscCall(WritePositions(m, s, t));
   PetscCall(AddNamed(t, functions, prefix));
+  PetscCall(AddNamed(t, s->n_times ? step_functions : predict_function, prefix));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -443,15 +528,17 @@ static PetscErrorCode Describe(const HycoExportModel *m, HycoScene s, const char
                                const char prefix[], size_t bytes, HycoText *t)
 {
   PetscFunctionBegin;
-  ADD(t, "%s, %s: %s_predict(), %.3g MB; %d contacts, %d motions that contact holds, %d functions of the parameters\n",
-      path, header, prefix, (double)bytes / 1e6, (int)m->n_contacts, (int)m->n_motions, (int)m->n_functions);
+  ADD(t, "%s, %s: %s_%s(), %.3g MB; %d %s, %d motions that contact holds, %d functions of the parameters\n", path,
+      header, prefix, s->n_times ? "step" : "predict", (double)bytes / 1e6, (int)m->n_contacts,
+      m->n_slip ? "rows of contacts" : "contacts", (int)m->n_motions, (int)m->n_functions);
   for (PetscInt p = 0; p < s->n_parameters; p++)
     ADD(t, "%s%s%s%s, %.6g to %.6g", p ? "; " : "parameters: ", s->parameter[p],
         UnitOf(s, s->parameter[p])[0] ? " " : "", UnitOf(s, s->parameter[p]), (double)s->lo[p], (double)s->hi[p]);
   for (PetscInt k = 0; k < m->n_outputs; k++)
     ADD(t, "%s%s%s%s", k ? ", " : "\noutputs: ", m->name[k], m->unit[k][0] ? " " : "", m->unit[k]);
-  ADD(t, "\nat %d points: largest difference from the model %.1e of an output's largest value; %.3g ms a prediction\n",
-      (int)m->checked, (double)m->difference, 1e3 * (double)m->seconds / (double)m->checked);
+  ADD(t, "\nat %d points: largest difference from the model %.1e of an output's largest value; %.3g ms a %s\n",
+      (int)m->checked, (double)m->difference, 1e3 * (double)m->seconds / (double)m->checked,
+      s->n_times ? "step" : "prediction");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -2,14 +2,14 @@
 #ifndef HYCO_EXPORTED_MODEL
 #define HYCO_EXPORTED_MODEL
 
-enum { OK, OUTSIDE, DIVERGED, NO_MEMORY };                                       /* status */
-enum { SUM, LARGEST, SMALLEST, CLOSED, PRESSURE, PRESSURE_SMALLEST, RESULTANT }; /* kinds of output */
+enum { OK, OUTSIDE, DIVERGED, NO_MEMORY };                                             /* status */
+enum { SUM, LARGEST, SMALLEST, CLOSED, PRESSURE, PRESSURE_SMALLEST, RESULTANT, WORK }; /* kinds of output */
 enum { COMPONENT, NORM, MISES, PRINCIPAL }; /* what counts of an item; PRINCIPAL + k */
 
 /* An output: a number for each of n items, combined as its kind says. The items are places with `width` values each, from
    value `first` on, or contacts, from `first` on in Model.contact. A RESULTANT: the value `width` (-1: 0) and the contacts'
    forces along axis `of`, from 3 on the moments around it, times the weights of the contacts minus those of the masters,
-   which follow them by node. */
+   which follow them by node. WORK: of friction, of blocks instead of contacts. */
 typedef struct Output {
   int kind, of, n, width, first, weight; /* weight: place of the first in Model.weight; -1: all are 1, or as found */
 } Output;
@@ -61,6 +61,18 @@ typedef struct {
   const double *weight;
   const Block *block;
   const Surfaces *surfaces; /* NULL: none moves */
+  /* of paths; with friction (n_slip > 0) contacts are rows, in blocks of a normal and its tangents */
+  int n_slip, n_tables;
+  const int *row, *coefficient; /* by block: its first row, with the end; the value that is its coefficient, -1: 0 */
+  const int *normal;            /* by row: it is one; NULL: all are */
+  const HycoTimeTable *table;
 } Model;
+
+/* What a step leaves for the next; of doubles alone, in the caller's memory. */
+typedef struct {
+  double *taken, *t, *t_before, *mu; /* steps so far; times of the last two; parameters of the last */
+  double *z, *before;                /* motions and forces of the last; forces of the one before */
+  double *place, *work;              /* by row: of tangents, how far they are from where they began; by block */
+} State;
 
 #endif
