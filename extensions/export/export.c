@@ -28,6 +28,7 @@
 #define PATHS_CHECKED  8 /* or so many paths */
 #define PATH_TOLERANCE 1e-8
 #define ROUNDING       1e-14 /* of a coefficient beside others */
+#define SAME           1e-10 /* of an area */
 #define SAMPLES        120   /* points for the functions, of which a third checks them; more with weights of samples: */
 #define SEVERAL        20    /* samples: with more, products are tried of known functions alone */
 #define EACH           8     /* for each */
@@ -36,10 +37,11 @@
 
 /* A value: of an output, of a contact's force along an axis, of a stress in a cell, of a displacement, of a travel. */
 typedef struct {
-  enum { QUANTITY, FORCE, CELL, NODE, TRAVEL, COEFFICIENT } from;
-  PetscInt index, axis, group; /* group: the output to which it belongs; from n_outputs on those of a travel */
-  PetscReal coefficient[6];    /* of a cell's stresses */
-  PetscInt turned;             /* 1 + the body whose axes the values of a cell or node are in; 0: those of space */
+  enum { QUANTITY, FORCE, CELL, NODE, TRAVEL, COEFFICIENT, AREA } from;
+  PetscInt index, axis,
+      group; /* group: the output to which it belongs; from n_outputs on those of a travel; -1: of contacts */
+  PetscReal coefficient[6]; /* of a cell's stresses */
+  PetscInt turned;          /* 1 + the body whose axes the values of a cell or node are in; 0: those of space */
 } Row;
 
 typedef struct {
@@ -54,6 +56,7 @@ typedef struct {
   HycoAtom *atom;
   Row *row;
   PetscReal *area, *pressure; /* by contact of the model */
+  PetscInt areas;             /* the first row of the areas of contacts, if they change; -1: they do not */
   PetscInt travel_row;        /* the first row of the travel's values */
   PetscInt n_weights;         /* of the samples of bodies: expressions */
   char **weight;
@@ -98,6 +101,17 @@ static PetscReal Stress(const Export *e, const Row *r, PetscInt n, const PetscRe
   return sum;
 }
 
+/* The areas of the contacts at the model's parameters. */
+static PetscErrorCode FindAreas(Export *e)
+{
+  HycoFE fe;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMBringContacts(e->m, &fe));
+  PetscCall(HycoContactAreas(fe, &e->m->pairs, e->area));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* y = (w, values) at mu for z: motions, then the contacts of e->contact in units of e->unit; NULL: 0. */
 static PetscErrorCode Probe(Export *e, const PetscReal mu[], const PetscReal z[], PetscReal y[])
 {
@@ -124,6 +138,7 @@ static PetscErrorCode Probe(Export *e, const PetscReal mu[], const PetscReal z[]
   PetscUseTypeMethod(m, expand);
   PetscCall(HycoROMMeasureQuantities(m, &prediction));
   PetscCall(HycoROMSumContacts(m, m->Lambda, &result));
+  if (e->areas >= 0) PetscCall(FindAreas(e));
   HycoROMGetOutputFields(m, &u, &sigma);
   n_sigma = HycoStrainSize(m->model->mesh->dim);
   for (PetscInt i = 0; i < e->p; i++) y[i] = e->w[i];
@@ -137,6 +152,7 @@ static PetscErrorCode Probe(Export *e, const PetscReal mu[], const PetscReal z[]
              : r->from == NODE   ? Component(e, r, u)
              : r->from == TRAVEL ? HycoTravelValue(e->travel, r->index)
                                  : 0;
+    if (r->from == AREA) *value = e->area[r->index];
     if (r->from == COEFFICIENT)
       PetscCall(HycoExprEval(e->s->contact[m->pairs.contact[r->index]]->friction, mu, 1,
                              m->fe->X + 3 * m->pairs.slave[r->index], value));
@@ -263,6 +279,7 @@ static PetscErrorCode AddContacts(Export *e, const HycoQuantity *q, const PetscR
     if (at == e->k && (o->kind != PRESSURE_SMALLEST || !e->k)) continue; /* it is always open */
     PetscCall(HycoExportAddContact(&e->out, at < e->k ? at : 0));
     PetscCall(HycoExportAddWeight(&e->out, at < e->k ? weight[k] : 0));
+    o->width = (int)e->areas + 1;
     o->n++;
   }
   PetscCall(PetscFree(of));
@@ -327,6 +344,35 @@ static PetscErrorCode MeasureContacts(Export *e)
     e->pressure[k] = result[pairs->contact[k]].pressure;
   }
   PetscCall(PetscFree(L));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether a map changes the areas, of contacts whose pressures are forces by area: they are values then. */
+static PetscErrorCode FollowAreas(Export *e)
+{
+  const PetscInt n = e->m->model->pairs.n;
+  PetscReal mu[HYCO_MAX_PARAMETERS], *before, size;
+  PetscBool vary = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  for (PetscInt p = 0; p < e->s->n_variables; p++) mu[p] = e->s->lo[p] + 0.3 * (e->s->hi[p] - e->s->lo[p]);
+  HycoDuplicate(n, e->area, &before);
+  PetscCall(PetscArrayzero(e->z, e->p + e->n));
+  PetscUseTypeMethod(e->m, residual, mu, e->z, e->w, &size);
+  PetscCall(FindAreas(e));
+  for (PetscInt k = 0; k < n; k++) vary = (PetscBool)(vary || PetscAbsReal(e->area[k] - before[k]) > SAME * before[k]);
+  for (PetscInt k = 0; k < n && vary; k++)
+    HycoCheck(PetscAbsReal(before[k] * e->pressure[k] - 1) <= SAME,
+              "export: contact %s: areas change with the parameters, and pressures are no forces by area; contacts of "
+              "type mortar on such surfaces cannot be exported",
+              e->s->contact[e->m->pairs.contact[k]]->name);
+  PetscCall(PetscArraycpy(e->area, before, n));
+  PetscCall(PetscFree(before));
+  if (vary) e->areas = e->n_rows;
+  for (PetscInt i = 0, k = 0; i < e->k && vary; i++) {
+    while ((e->first ? e->first[k] : k) < e->contact[i]) k++;
+    PetscCall(AddRow(e, (Row){.from = AREA, .index = k, .group = -1}));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -404,6 +450,7 @@ static PetscErrorCode FindOutputs(Export *e)
 
   PetscFunctionBegin;
   PetscCall(MeasureContacts(e));
+  if (!e->travel) PetscCall(FollowAreas(e));
   for (PetscInt k = 0; k < s->n_quantities; k++) PetscCall(AddQuantity(e, k));
   for (PetscInt c = 0; c < s->n_contacts; c++) {
     for (PetscInt a = 0; a < e->m->model->mesh->dim; a++) {
@@ -970,7 +1017,7 @@ static PetscErrorCode SizeFunctions(Export *e, PetscInt n, const HycoFunction f[
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Of paths: coefficients of gaps and of values without forces that are round-off beside the others of their group are 0, so
+/* Coefficients of gaps and of values without forces that are round-off beside the others of their group are 0, so
    that nothing presses where there are no loads. */
 static PetscErrorCode DropRounding(Export *e)
 {
@@ -978,7 +1025,6 @@ static PetscErrorCode DropRounding(Export *e)
   PetscReal *size, *most;
 
   PetscFunctionBegin;
-  if (!e->s->n_times) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(n + 1, &size));
   PetscCall(PetscCalloc1(e->n_groups, &most));
   PetscCall(SizeFunctions(e, n, e->base.function, size));
@@ -1305,7 +1351,7 @@ static PetscErrorCode Prepare(Export *e)
 
     if (k < 0) continue;
     e->out.coefficient[b] = (int)e->n_rows;
-    PetscCall(AddRow(e, (Row){.from = COEFFICIENT, .index = k, .group = e->out.n_outputs}));
+    PetscCall(AddRow(e, (Row){.from = COEFFICIENT, .index = k, .group = -1}));
   }
   if (e->travel) HycoTravelStart(e->travel, e->n_rows, &e->out);
   for (PetscInt i = 0; e->travel && i < HycoTravelValues(e->travel); i++)
@@ -1319,13 +1365,13 @@ static PetscErrorCode Prepare(Export *e)
   e->out.atom = e->atom;
   e->ny = e->p + e->k + e->n_rows;
   places = 2 + e->out.n_outputs + (e->travel ? HycoTravelValues(e->travel) : 0);
-  e->n_groups = places + (e->travel ? HycoTravelBodies(e->travel) : 1); /* one of coefficients of friction */
+  e->n_groups = places + (e->travel ? HycoTravelBodies(e->travel) : 1); /* of areas and coefficients of friction */
   PetscCall(PetscMalloc1(2 * e->ny + 1, &e->group));
   for (PetscInt r = 0; r < 2 * e->ny; r++) {
     const PetscInt at = r % e->ny;
 
     if (at >= e->p + e->k)
-      e->group[r] = 2 + e->row[at - e->p - e->k].group;
+      e->group[r] = e->row[at - e->p - e->k].group < 0 ? places : 2 + e->row[at - e->p - e->k].group;
     else if (at >= e->p && e->travel)
       e->group[r] = places + HycoTravelAt(e->travel, at - e->p);
     else
@@ -1352,7 +1398,7 @@ static PetscErrorCode Build(Export *e)
 /* The arrays are freed after an error, too; *description is the caller's. */
 static PetscErrorCode ExportC(HycoROM m, const char path[], char **description)
 {
-  Export e = {.m = m, .s = m->model->scene};
+  Export e = {.m = m, .s = m->model->scene, .areas = -1};
   const size_t n = strlen(path);
   PetscErrorCode ierr;
   void *point;

@@ -81,7 +81,7 @@ class FMU(Case):
         with open(cls.path('held.yaml'), 'w', encoding='ascii') as f:
             f.write(HELD)
         cls.hyco('train', '-scene', 'held.yaml', '-hyco_model_type', 'bodies', '-scatter', '2', '-hyco_validation', '0', '-hyco_snapshots', 'held', '-model', 'held.h5')
-        cls.point = {'m': 0.4, 'press': 1.3, 'push': 0.22, 'soft': 1.7}
+        cls.point = {'m': 0.4, 'press': 1.3, 'push': 0.22, 'soft': 1.7, 'size': 0.93}
         cls.history = cls.hyco('predict', '-model', 'held.h5', '-mu', ','.join(map(repr, cls.point.values())))['history']['outputs']
         for name in ('pad', 'held'):
             made = subprocess.run([sys.executable, os.path.join(SOURCE, 'scripts', 'fmu'), name + '.h5', name + '.fmu'], cwd=cls.folder, env={**os.environ, 'HYCO': HYCO},

@@ -7,7 +7,7 @@ enum { SUM, LARGEST, SMALLEST, CLOSED, PRESSURE, PRESSURE_SMALLEST, RESULTANT, W
 enum { COMPONENT, NORM, MISES, PRINCIPAL }; /* what counts of an item; PRINCIPAL + k */
 
 /* An output: a number for each of n items, combined as its kind says. The items are places with `width` values each, from
-   value `first` on, or contacts, from `first` on in Model.contact. A RESULTANT: the value `width` (-1: 0) and the contacts'
+   value `first` on, or contacts, from `first` on in Model.contact (width > 0: their areas are the values from width - 1 on). A RESULTANT: the value `width` (-1: 0) and the contacts'
    forces along axis `of`, from 3 on the moments around it, times the weights of the contacts minus those of the masters,
    which follow them by node. WORK: of friction, of blocks instead of contacts. */
 typedef struct Output {

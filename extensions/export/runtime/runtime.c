@@ -643,9 +643,10 @@ static double output(const Model *m, const Work *o, const Output *q, double leas
     } else if (q->kind >= CLOSED) {
       const int k = m->contact[q->first + i];
       const double force = o->z[m->n_motions + k];
+      const double area = o->met ? o->met[k].area : q->width > 0 ? o->value[q->width - 1 + k] : 0;
       double pressure;
 
-      if (o->met) weight = q->kind == CLOSED ? o->met[k].area : o->met[k].area > 0 ? 1 / o->met[k].area : 0;
+      if (o->met || q->width > 0) weight = q->kind == CLOSED ? area : area > 0 ? 1 / area : 0;
       pressure = force > least ? weight * force : 0;
       if (q->kind == CLOSED) sum += force > least ? weight : 0;
       if (q->kind == PRESSURE) sum = fmax(sum, pressure);
