@@ -376,15 +376,6 @@ static PetscErrorCode FollowAreas(Export *e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The six numbers are the members of the runtime's Output, in their order. */
-static PetscErrorCode AddOutput(Export *e, const Output *o, const char name[], const char unit[])
-{
-  PetscFunctionBegin;
-  PetscCall(
-      HycoExportAddOutput(&e->out, (const int[6]){o->kind, o->of, o->n, o->width, o->first, o->weight}, name, unit));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The work of friction: of the blocks of its contacts. */
 static PetscErrorCode AddWork(Export *e, const HycoQuantity *q, Output *o)
 {
@@ -395,8 +386,8 @@ static PetscErrorCode AddWork(Export *e, const HycoQuantity *q, Output *o)
   *o = (Output){.kind = WORK, .width = 1, .first = e->out.n_contact, .weight = -1};
   PetscCall(PetscMalloc1(pairs->n, &of));
   PetscCall(HycoPairsOfQuantity(e->s, e->m->model->mesh, pairs, q, of));
-  for (PetscInt b = 0, k = 0; b < e->out.n_slip; b++) {
-    while (e->first[k] != e->contact[e->out.row[b]]) k++;
+  for (PetscInt b = 0, k = 0; b < e->out.m.n_slip; b++) {
+    while (e->first[k] != e->contact[e->out.m.row[b]]) k++;
     if (!of[k]) continue;
     PetscCall(HycoExportAddContact(&e->out, b));
     o->n++;
@@ -422,7 +413,7 @@ static PetscErrorCode AddQuantity(Export *e, PetscInt k)
     o.kind = kind == HYCO_QUANTITY_MAX ? LARGEST : kind == HYCO_QUANTITY_MIN ? SMALLEST : SUM;
     if (o.kind == SUM) o.weight = e->out.n_weights;
     PetscCall(AddItems(e, k, &o));
-    for (PetscInt i = o.first; i < e->n_rows; i++) e->row[i].group = e->out.n_outputs;
+    for (PetscInt i = o.first; i < e->n_rows; i++) e->row[i].group = e->out.m.n_outputs;
   } else if (kind == HYCO_QUANTITY_FRICTION && q->field == HYCO_FRICTION_WORK) {
     PetscCall(AddWork(e, q, &o));
   } else if (kind >= HYCO_QUANTITY_AREA) {
@@ -434,10 +425,10 @@ static PetscErrorCode AddQuantity(Export *e, PetscInt k)
     const PetscBool *pushed = e->travel ? HycoROMGetPushed(e->m, k) : NULL;
 
     o.n = 1;
-    PetscCall(AddRow(e, (Row){.from = QUANTITY, .index = k, .group = e->out.n_outputs}));
+    PetscCall(AddRow(e, (Row){.from = QUANTITY, .index = k, .group = e->out.m.n_outputs}));
     if (pushed) PetscCall(AddPush(e, pushed, q->field, &o));
   }
-  PetscCall(AddOutput(e, &o, q->name, HycoExportUnit(e->s, q)));
+  PetscCall(HycoExportAddOutput(&e->out, &o, q->name, HycoExportUnit(e->s, q)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -461,9 +452,9 @@ static PetscErrorCode FindOutputs(Export *e)
       if (e->travel)
         PetscCall(AddForces(e, &q, &o));
       else
-        PetscCall(AddRow(e, (Row){.from = FORCE, .index = c, .axis = a, .group = e->out.n_outputs}));
+        PetscCall(AddRow(e, (Row){.from = FORCE, .index = c, .axis = a, .group = e->out.m.n_outputs}));
       HycoFormat(name, "%s.force_%c", s->contact[c]->name, "xyz"[a]);
-      PetscCall(AddOutput(e, &o, name, HycoExportUnit(s, &q)));
+      PetscCall(HycoExportAddOutput(&e->out, &o, name, HycoExportUnit(s, &q)));
     }
     for (PetscInt a = 0; a < 2; a++) {
       Output o = {.kind = a ? PRESSURE : CLOSED};
@@ -471,7 +462,7 @@ static PetscErrorCode FindOutputs(Export *e)
       q.kind = a ? HYCO_QUANTITY_PRESSURE : HYCO_QUANTITY_AREA;
       PetscCall(AddContacts(e, &q, a ? e->pressure : e->area, &o));
       HycoFormat(name, "%s.%s", s->contact[c]->name, a ? "pressure_max" : "area");
-      PetscCall(AddOutput(e, &o, name, HycoExportUnit(s, &q)));
+      PetscCall(HycoExportAddOutput(&e->out, &o, name, HycoExportUnit(s, &q)));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -488,20 +479,20 @@ static PetscErrorCode FindBlocks(Export *e, const PetscReal moves[])
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(pairs->n + 1, &e->first));
-  PetscCall(PetscCalloc1(pairs->n + 1, &o->row));
-  PetscCall(PetscMalloc1(pairs->n + 1, &o->coefficient));
-  PetscCall(PetscMalloc1(e->n + 1, &o->normal));
+  PetscCall(PetscCalloc1(pairs->n + 1, &o->m.row));
+  PetscCall(PetscMalloc1(pairs->n + 1, &o->m.coefficient));
+  PetscCall(PetscMalloc1(e->n + 1, &o->m.normal));
   for (PetscInt k = 0; k < pairs->n; k++) {
     const PetscBool rubs = (PetscBool)(e->s->contact[pairs->contact[k]]->friction != NULL);
     const PetscInt rows = rubs ? e->m->model->mesh->dim : 1;
 
     e->first[k] = at;
     for (PetscInt r = at; r < at + rows && moves[at] > 0; r++) {
-      o->normal[e->k] = r == at;
+      o->m.normal[e->k] = r == at;
       e->contact[e->k++] = r;
     }
-    if (moves[at] > 0) o->coefficient[o->n_slip++] = rubs ? (int)k : -1; /* a row's number once there are rows */
-    if (moves[at] > 0) o->row[o->n_slip] = (int)e->k;
+    if (moves[at] > 0) o->m.coefficient[o->m.n_slip++] = rubs ? (int)k : -1; /* a row's number once there are rows */
+    if (moves[at] > 0) o->m.row[o->m.n_slip] = (int)e->k;
     at += rows;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -867,10 +858,10 @@ static PetscErrorCode Merge(Export *e, const HycoExportFit *fit, PetscInt place[
     const HycoFunction *f = &fit->function[k];
     PetscInt at = 0;
 
-    while (at < o->n_functions && memcmp(&o->function[at], f, sizeof(*f)) != 0) at++;
-    if (at == o->n_functions) {
+    while (at < o->m.n_functions && memcmp(&o->function[at], f, sizeof(*f)) != 0) at++;
+    if (at == o->m.n_functions) {
       PetscCall(PetscRealloc((size_t)(at + 1) * sizeof(*o->function), &o->function));
-      o->function[o->n_functions++] = *f;
+      o->function[o->m.n_functions++] = *f;
     }
     place[k] = at;
   }
@@ -949,10 +940,11 @@ static PetscErrorCode AddMatrix(Export *e, const PetscReal mu[], const PetscReal
   }
   for (PetscInt f = 0; f < e->response.n; f++) {
     for (size_t i = 0; i < k; i++) {
-      for (size_t j = 0; j < p && e->travel; j++) o->A[((size_t)f * p + j) * k + i] += share[f] * M[i * p + j];
+      for (size_t j = 0; j < p && e->travel; j++) o->m.A[((size_t)f * p + j) * k + i] += share[f] * M[i * p + j];
       if (e->travel) continue;
-      for (size_t j = 0; j <= i; j++) o->W[(size_t)f * size + i * (i + 1) / 2 + j] += share[f] * M[(p + i) * n + p + j];
-      for (size_t j = 0; j < p; j++) o->A[((size_t)f * p + j) * k + i] += share[f] * M[(p + i) * n + j];
+      for (size_t j = 0; j <= i; j++)
+        o->m.W[(size_t)f * size + i * (i + 1) / 2 + j] += share[f] * M[(p + i) * n + p + j];
+      for (size_t j = 0; j < p; j++) o->m.A[((size_t)f * p + j) * k + i] += share[f] * M[(p + i) * n + j];
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -967,7 +959,7 @@ static PetscErrorCode AddValues(Export *e, const PetscReal mu[], const PetscReal
   PetscFunctionBegin;
   PetscCall(PetscCalloc3(n + 1, &z, e->ny, &y, e->ny, &y0));
   /* Results count friction where there is a normal force alone. */
-  for (PetscInt c = 0; e->first && c < e->k; c++) z[e->p + c] = e->out.normal[c];
+  for (PetscInt c = 0; e->first && c < e->k; c++) z[e->p + c] = e->out.m.normal[c];
   PetscCall(Probe(e, mu, z, y0));
   /* n probes at each point of the response: the values need no Jacobian of their own. */
   for (PetscInt c = 0; c < n && e->n_rows; c++) {
@@ -988,14 +980,14 @@ static PetscErrorCode AddValues(Export *e, const PetscReal mu[], const PetscReal
 /* The terms by unknown: most have no force, and are passed over. */
 static PetscErrorCode Transpose(size_t n, HycoExportModel *o)
 {
-  const size_t terms = (size_t)o->n_terms;
+  const size_t terms = (size_t)o->m.n_terms;
   PetscReal *by;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(n * terms + 1, &by));
-  for (size_t i = 0; i < n * terms; i++) by[i % n * terms + i / n] = o->term[i];
-  PetscCall(PetscFree(o->term));
-  o->term = by;
+  for (size_t i = 0; i < n * terms; i++) by[i % n * terms + i / n] = o->m.term[i];
+  PetscCall(PetscFree(o->m.term));
+  o->m.term = by;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -1094,22 +1086,26 @@ static PetscErrorCode Fill(Export *e)
   PetscCall(DropRounding(e));
   PetscCall(Merge(e, &e->base, place));
   PetscCall(Merge(e, &e->response, place + e->base.n));
-  PetscCall(PetscCalloc1((size_t)e->ny * (size_t)o->n_functions + 1, &o->offset));
+  PetscCall(PetscCalloc1((size_t)e->ny * (size_t)o->m.n_functions + 1, &o->m.offset));
   for (PetscInt r = 0; r < e->ny; r++) {
     for (PetscInt j = 0; j < e->base.n; j++)
-      o->offset[(size_t)r * (size_t)o->n_functions + (size_t)place[j]] =
+      o->m.offset[(size_t)r * (size_t)o->m.n_functions + (size_t)place[j]] =
           e->base.coefficient[(size_t)r * (size_t)e->base.n + (size_t)j];
   }
-  o->n_motions = e->p;
-  o->n_places = e->k;
-  o->n_contacts = e->travel ? e->m->model->pairs.n : e->k;
+  o->m.n_parameters = (int)e->s->n_parameters;
+  o->m.n_tables = (int)e->s->n_tables;
+  o->m.table = e->s->table;
+  o->m.surfaces = e->travel ? &o->surfaces : NULL;
+  o->m.n_motions = e->p;
+  o->m.n_places = e->k;
+  o->m.n_contacts = e->travel ? e->m->model->pairs.n : e->k;
   if (e->travel) PetscCall(HycoTravelBlocks(e->travel, e->travel_row, o));
-  o->n_values = e->n_rows;
-  o->n_stiffness = e->response.n;
-  PetscCall(PetscMalloc1(e->response.n + 1, &o->stiffness));
-  for (PetscInt i = 0; i < e->response.n; i++) o->stiffness[i] = (int)place[e->base.n + i];
-  PetscCall(PetscCalloc1(f * triangle + 1, &o->W));
-  PetscCall(PetscCalloc1(f * (size_t)e->p * k + 1, &o->A));
+  o->m.n_values = e->n_rows;
+  o->m.n_stiffness = e->response.n;
+  PetscCall(PetscMalloc1(e->response.n + 1, &o->m.stiffness));
+  for (PetscInt i = 0; i < e->response.n; i++) o->m.stiffness[i] = (int)place[e->base.n + i];
+  PetscCall(PetscCalloc1(f * triangle + 1, &o->m.W));
+  PetscCall(PetscCalloc1(f * (size_t)e->p * k + 1, &o->m.A));
   PetscCall(PetscCalloc5(f * (size_t)e->s->n_variables + 1, &point, f * f + 1, &inverse, f * (size_t)e->n_rows * n + 1,
                          &T, matrix + 1, &M, f + 1, &share));
   PetscCall(ChoosePoints(e, point, inverse));
@@ -1131,7 +1127,7 @@ static int FunctionsHere(void *context, const double v[], double f[])
 {
   Export *e = (Export *)context;
 
-  e->failed = HycoFunctionsEvaluate(e->s, e->atom, e->out.n_functions, e->out.function, v, f);
+  e->failed = HycoFunctionsEvaluate(e->s, e->atom, e->out.m.n_functions, e->out.function, v, f);
   return e->failed != 0;
 }
 
@@ -1216,7 +1212,7 @@ static PetscReal ScaleOf(PetscInt n, char *const name[], const PetscReal most[],
    times; fails if it is no round-off. */
 static PetscErrorCode Compare(Export *e, const Model *model, void *memory)
 {
-  const PetscInt n = e->out.n_outputs, times = PetscMax(e->s->n_times, 1);
+  const PetscInt n = e->out.m.n_outputs, times = PetscMax(e->s->n_times, 1);
   HycoSamples samples;
   const PetscReal *mu;
   PetscReal *mine, *theirs, *most, *worst;
@@ -1263,45 +1259,14 @@ static PetscErrorCode Compare(Export *e, const Model *model, void *memory)
 
 static PetscErrorCode CompareHere(Export *e)
 {
-  const HycoExportModel *o = &e->out;
-  const Model model = {.n_parameters = (int)e->s->n_parameters,
-                       .n_functions = (int)o->n_functions,
-                       .n_motions = (int)o->n_motions,
-                       .n_places = (int)o->n_places,
-                       .n_contacts = (int)o->n_contacts,
-                       .n_blocks = (int)o->n_blocks,
-                       .block = o->block,
-                       .surfaces = e->travel ? &o->surfaces : NULL,
-                       .n_stiffness = (int)o->n_stiffness,
-                       .n_values = (int)o->n_values,
-                       .n_terms = (int)o->n_terms,
-                       .n_outputs = (int)o->n_outputs,
-                       .tolerance = o->tolerance,
-                       .lo = e->s->lo,
-                       .hi = e->s->hi,
-                       .offset = o->offset,
-                       .stiffness = o->stiffness,
-                       .W = o->W,
-                       .A = o->A,
-                       .value = o->value,
-                       .factor = o->factor,
-                       .term = o->term,
-                       .output = (const Output *)(const void *)o->output, /* a struct of ints alone */
-                       .contact = o->contact,
-                       .weight = o->weight,
-                       .n_slip = (int)o->n_slip,
-                       .n_tables = (int)e->s->n_tables,
-                       .row = o->row,
-                       .coefficient = o->coefficient,
-                       .normal = o->normal,
-                       .table = e->s->table};
+  const Model *model = &e->out.m;
   char *memory;
 
   PetscFunctionBegin;
-  e->out.n_states = (PetscInt)state_size(&model);
-  PetscCall(PetscMalloc1(state_size(&model), &e->state));
-  PetscCall(PetscMalloc1(work_size(&model) + 1, &memory));
-  HycoFinally(Compare(e, &model, memory), PetscCall(PetscFree(memory)));
+  e->out.n_states = (PetscInt)state_size(model);
+  PetscCall(PetscMalloc1(state_size(model), &e->state));
+  PetscCall(PetscMalloc1(work_size(model) + 1, &memory));
+  HycoFinally(Compare(e, model, memory), PetscCall(PetscFree(memory)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -1342,20 +1307,21 @@ static PetscErrorCode Prepare(Export *e)
   if (e->s->n_times) HycoSceneSetTime(e->s, mu, e->s->times[e->s->n_times - 1], mu);
   PetscCall(HycoTravelCreate(m, &e->out, &e->travel));
   PetscCall(FindProblem(e, mu));
-  e->out.tolerance = e->s->n_times ? PATH_TOLERANCE : m->solver->rtol;
+  e->out.m.tolerance = e->s->n_times ? PATH_TOLERANCE : m->solver->rtol;
   PetscCall(HycoROMMeasureQuantities(m, &(HycoPrediction){0}));
   PetscCall(FindOutputs(e));
   e->travel_row = e->n_rows;
-  for (PetscInt b = 0; b < e->out.n_slip; b++) {
-    const PetscInt k = e->out.coefficient[b];
+  for (PetscInt b = 0; b < e->out.m.n_slip; b++) {
+    const PetscInt k = e->out.m.coefficient[b];
 
     if (k < 0) continue;
-    e->out.coefficient[b] = (int)e->n_rows;
+    e->out.m.coefficient[b] = (int)e->n_rows;
     PetscCall(AddRow(e, (Row){.from = COEFFICIENT, .index = k, .group = -1}));
   }
   if (e->travel) HycoTravelStart(e->travel, e->n_rows, &e->out);
   for (PetscInt i = 0; e->travel && i < HycoTravelValues(e->travel); i++)
-    PetscCall(AddRow(e, (Row){.from = TRAVEL, .index = i, .group = e->out.n_outputs + HycoTravelGroup(e->travel, i)}));
+    PetscCall(
+        AddRow(e, (Row){.from = TRAVEL, .index = i, .group = e->out.m.n_outputs + HycoTravelGroup(e->travel, i)}));
   for (PetscInt i = 0; i < PLACES; i++) /* nodes without regularity */
     PetscCall(PetscArraycpy(x + 3 * i, m->fe->X + 3 * ((i * 7919 + 13) % m->fe->mesh->n_nodes), 3));
   PetscCall(HycoAtomsFind(e->s, (PetscBool)(e->travel != NULL), PLACES, x, &e->n_atoms, &e->atom));
@@ -1364,7 +1330,7 @@ static PetscErrorCode Prepare(Export *e)
   e->out.n_atoms = e->n_atoms;
   e->out.atom = e->atom;
   e->ny = e->p + e->k + e->n_rows;
-  places = 2 + e->out.n_outputs + (e->travel ? HycoTravelValues(e->travel) : 0);
+  places = 2 + e->out.m.n_outputs + (e->travel ? HycoTravelValues(e->travel) : 0);
   e->n_groups = places + (e->travel ? HycoTravelBodies(e->travel) : 1); /* of areas and coefficients of friction */
   PetscCall(PetscMalloc1(2 * e->ny + 1, &e->group));
   for (PetscInt r = 0; r < 2 * e->ny; r++) {

@@ -21,31 +21,31 @@ static PetscErrorCode Grow(PetscInt n, size_t size, void *array)
 }
 
 /* Copies the names. */
-PetscErrorCode HycoExportAddOutput(HycoExportModel *m, const int output[6], const char name[], const char unit[])
+PetscErrorCode HycoExportAddOutput(HycoExportModel *m, const Output *output, const char name[], const char unit[])
 {
   PetscFunctionBegin;
-  PetscCall(Grow(m->n_outputs, 6 * sizeof(*m->output), &m->output));
-  PetscCall(Grow(m->n_outputs, sizeof(*m->name), &m->name));
-  PetscCall(Grow(m->n_outputs, sizeof(*m->unit), &m->unit));
-  PetscCall(PetscArraycpy(m->output + 6 * m->n_outputs, output, 6));
-  PetscCall(PetscStrallocpy(name, &m->name[m->n_outputs]));
-  PetscCall(PetscStrallocpy(unit, &m->unit[m->n_outputs++]));
+  PetscCall(Grow(m->m.n_outputs, sizeof(*m->m.output), &m->m.output));
+  PetscCall(Grow(m->m.n_outputs, sizeof(*m->name), &m->name));
+  PetscCall(Grow(m->m.n_outputs, sizeof(*m->unit), &m->unit));
+  m->m.output[m->m.n_outputs] = *output;
+  PetscCall(PetscStrallocpy(name, &m->name[m->m.n_outputs]));
+  PetscCall(PetscStrallocpy(unit, &m->unit[m->m.n_outputs++]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoExportAddContact(HycoExportModel *m, PetscInt contact)
 {
   PetscFunctionBegin;
-  PetscCall(Grow(m->n_contact, sizeof(*m->contact), &m->contact));
-  m->contact[m->n_contact++] = (int)contact;
+  PetscCall(Grow(m->n_contact, sizeof(*m->m.contact), &m->m.contact));
+  m->m.contact[m->n_contact++] = (int)contact;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 PetscErrorCode HycoExportAddWeight(HycoExportModel *m, PetscReal weight)
 {
   PetscFunctionBegin;
-  PetscCall(Grow(m->n_weights, sizeof(*m->weight), &m->weight));
-  m->weight[m->n_weights++] = weight;
+  PetscCall(Grow(m->n_weights, sizeof(*m->m.weight), &m->m.weight));
+  m->m.weight[m->n_weights++] = weight;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -54,13 +54,13 @@ PetscErrorCode HycoExportAddTerm(HycoExportModel *m, PetscInt value, PetscInt fu
                                  const PetscReal term[])
 {
   PetscFunctionBegin;
-  PetscCall(Grow(m->n_terms, sizeof(*m->value), &m->value));
-  PetscCall(Grow(m->n_terms, sizeof(*m->factor), &m->factor));
-  PetscCall(Grow(m->n_terms, (size_t)PetscMax(1, n) * sizeof(*m->term), &m->term));
-  m->value[m->n_terms] = (int)value;
-  m->factor[m->n_terms] = (int)function;
-  PetscCall(PetscArraycpy(m->term + (size_t)m->n_terms * (size_t)n, term, n));
-  m->n_terms++;
+  PetscCall(Grow(m->m.n_terms, sizeof(*m->m.value), &m->m.value));
+  PetscCall(Grow(m->m.n_terms, sizeof(*m->m.factor), &m->m.factor));
+  PetscCall(Grow(m->m.n_terms, (size_t)PetscMax(1, n) * sizeof(*m->m.term), &m->m.term));
+  m->m.value[m->m.n_terms] = (int)value;
+  m->m.factor[m->m.n_terms] = (int)function;
+  PetscCall(PetscArraycpy(m->m.term + (size_t)m->m.n_terms * (size_t)n, term, n));
+  m->m.n_terms++;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -70,12 +70,12 @@ PetscErrorCode HycoExportModelFree(HycoExportModel *m)
   Surfaces *s = &m->surfaces;
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < m->n_outputs; k++) HycoFreeAll(&m->name[k], &m->unit[k]);
-  for (PetscInt k = 0; k < m->n_blocks; k++) HycoFreeAll(&m->block[k].C);
-  HycoFreeAll(&m->function, &m->offset, &m->W, &m->A, &m->term, &m->weight, &m->stiffness, &m->value, &m->factor,
-              &m->contact, &m->output, &m->row, &m->coefficient, &m->normal, &m->name, &m->unit, &m->block, &m->body,
-              &m->drawn, &s->w, &s->N, &s->dN, &s->surface, &s->search, &s->facet, &s->border, &s->node, &s->at_border,
-              &s->place, &s->given, &s->pose);
+  for (PetscInt k = 0; k < m->m.n_outputs; k++) HycoFreeAll(&m->name[k], &m->unit[k]);
+  for (PetscInt k = 0; k < m->m.n_blocks; k++) HycoFreeAll(&m->m.block[k].C);
+  HycoFreeAll(&m->function, &m->m.offset, &m->m.W, &m->m.A, &m->m.term, &m->m.weight, &m->m.stiffness, &m->m.value,
+              &m->m.factor, &m->m.contact, &m->m.output, &m->m.row, &m->m.coefficient, &m->m.normal, &m->name, &m->unit,
+              &m->m.block, &m->body, &m->drawn, &s->w, &s->N, &s->dN, &s->surface, &s->search, &s->facet, &s->border,
+              &s->node, &s->at_border, &s->place, &s->given, &s->pose);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -245,11 +245,11 @@ static PetscErrorCode WriteHeader(const HycoExportModel *m, HycoScene s, const c
     ADD(t, "     %d %s %s, %.10g to %.10g\n", (int)p, s->parameter[p], UnitOf(s, s->parameter[p]), (double)s->lo[p],
         (double)s->hi[p]);
   ADD(t, "   Outputs:\n");
-  for (PetscInt k = 0; k < m->n_outputs; k++) ADD(t, "     %d %s %s\n", (int)k, m->name[k], m->unit[k]);
+  for (PetscInt k = 0; k < m->m.n_outputs; k++) ADD(t, "     %d %s %s\n", (int)k, m->name[k], m->unit[k]);
   ADD(t, "*/\n#ifndef HYCO_%s_H\n#define HYCO_%s_H\n\n#include <stddef.h>\n\n", prefix, prefix);
   ADD(t, "#if defined(__cplusplus)\nextern \"C\" {\n#endif\n\n");
   ADD(t, "enum { %s_N_PARAMETERS = %d, %s_N_OUTPUTS = %d };\n", prefix, (int)s->n_parameters, prefix,
-      (int)m->n_outputs);
+      (int)m->m.n_outputs);
   if (s->n_times)
     ADD(t, "enum { %s_N_TIMES = %d, %s_N_STATES = %d };\n", prefix, (int)s->n_times, prefix, (int)m->n_states);
   ADD(t, "\n");
@@ -261,23 +261,52 @@ static PetscErrorCode WriteHeader(const HycoExportModel *m, HycoScene s, const c
 
 /* -- the program -- */
 
-/* The numbers are exact when they are read again. */
-static PetscErrorCode WriteReals(HycoText *t, const char name[], size_t n, const PetscReal v[])
+/* An array of the program; width: of its items, structs of as many numbers; 0: they are numbers. */
+typedef struct {
+  const char *type, *name;
+  size_t n;
+  const void *data;
+  size_t width;
+} Array;
+
+/* Reals are exact when they are read again. Empty arrays are left out, as C99 has no initialiser of none. */
+static PetscErrorCode WriteArrays(HycoText *t, size_t n_arrays, const Array arrays[])
 {
   PetscFunctionBegin;
-  ADD(t, "%s = {", name);
-  for (size_t i = 0; i < n; i++) ADD(t, "%s%s%.17g", i ? "," : "", i % 6 ? " " : "\n  ", (double)v[i]);
-  /* C99 has no empty initialiser. */
-  ADD(t, "%s};\n", n ? "" : "0");
+  for (const Array *a = arrays; a < arrays + n_arrays; a++) {
+    const PetscBool real = (PetscBool)!strcmp(a->type, "double");
+    const PetscBool whole = (PetscBool)(!strcmp(a->type, "PetscInt") || !strcmp(a->type, "Surface"));
+    const size_t each = real ? 6 : 20, width = PetscMax(a->width, 1);
+
+    if (!a->n) continue;
+    ADD(t, "static const %s %s[] = {", a->type, a->name);
+    for (size_t i = 0; i < a->n * width; i++) {
+      ADD(t, "%s%s%s", i ? "," : "", i % each ? " " : "\n  ", a->width && i % width == 0 ? "{" : "");
+      if (real)
+        ADD(t, "%.17g", ((const double *)a->data)[i]);
+      else
+        ADD(t, "%d", whole ? (int)((const PetscInt *)a->data)[i] : ((const int *)a->data)[i]);
+      if (a->width && i % width == width - 1) ADD(t, "}");
+    }
+    ADD(t, "};\n");
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode WriteInts(HycoText *t, const char name[], PetscInt n, const int v[])
+#define WRITE(t, ...)                                                                                                  \
+  do {                                                                                                                 \
+    const Array arrays[] = {__VA_ARGS__};                                                                              \
+                                                                                                                       \
+    PetscCall(WriteArrays(t, sizeof(arrays) / sizeof(arrays[0]), arrays));                                             \
+  } while (0)
+
+/* Seen from outside. */
+static PetscErrorCode WriteReals(HycoText *t, const char prefix[], const char name[], PetscInt n, const PetscReal v[])
 {
   PetscFunctionBegin;
-  ADD(t, "%s = {", name);
-  for (PetscInt i = 0; i < n; i++) ADD(t, "%s%s%d", i ? "," : "", i % 20 ? " " : "\n  ", v[i]);
-  ADD(t, "%s};\n", n ? "" : "0");
+  ADD(t, "const double %s_%s[%d] = {", prefix, name, (int)n);
+  for (PetscInt i = 0; i < n; i++) ADD(t, "%s%.17g", i ? ", " : "", (double)v[i]);
+  ADD(t, "};\n");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -298,55 +327,23 @@ static PetscErrorCode WriteNames(HycoText *t, HycoScene parameter, const char pr
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode WriteArrays(const HycoExportModel *m, HycoText *t)
-{
-  const size_t p = (size_t)m->n_motions, n = (size_t)m->n_places, f = (size_t)m->n_stiffness;
-
-  PetscFunctionBegin;
-  PetscCall(
-      WriteReals(t, "static const double offset[]", (p + n + (size_t)m->n_values) * (size_t)m->n_functions, m->offset));
-  PetscCall(WriteInts(t, "static const int stiffness[]", m->n_stiffness, m->stiffness));
-  PetscCall(WriteReals(t, "static const double flexibility[]", m->n_blocks ? 0 : f * n * (n + 1) / 2, m->W));
-  PetscCall(WriteReals(t, "static const double work_on_motions[]", f * p * n, m->A));
-  PetscCall(WriteInts(t, "static const int term_value[]", m->n_terms, m->value));
-  PetscCall(WriteInts(t, "static const int term_factor[]", m->n_terms, m->factor));
-  PetscCall(WriteReals(t, "static const double term[]", (size_t)m->n_terms * (p + n), m->term));
-  PetscCall(WriteInts(t, "static const int contact[]", m->n_contact, m->contact));
-  PetscCall(WriteReals(t, "static const double weight[]", (size_t)m->n_weights, m->weight));
-  ADD(t, "static const Output outputs[] = {");
-  for (PetscInt k = 0; k < m->n_outputs; k++) {
-    const int *o = m->output + 6 * k;
-
-    ADD(t, "%s\n  {%d, %d, %d, %d, %d, %d}", k ? "," : "", o[0], o[1], o[2], o[3], o[4], o[5]);
-  }
-  ADD(t, "};\n");
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The blocks of the flexibility, and the surfaces on which masters are searched for. */
 static PetscErrorCode WriteSurfaces(const HycoExportModel *m, HycoText *t)
 {
   const Surfaces *s = &m->surfaces;
-  const PetscInt points = s->nq * s->nf, unknowns = s->n_nodes * s->dim;
-  PetscInt facets = 0;
+  const size_t points = (size_t)(s->nq * s->nf), nodes = (size_t)s->n_nodes, unknowns = nodes * (size_t)s->dim;
+  size_t facets = 0;
   char name[HYCO_LINE];
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < m->n_blocks; k++) {
-    HycoFormat(name, "static const double block_%d[]", (int)k);
-    PetscCall(WriteReals(t, name, (size_t)m->block[k].n * (size_t)m->block[k].n, m->block[k].C));
+  for (PetscInt k = 0; k < m->n_surfaces; k++) facets += (size_t)s->surface[k].n;
+  for (int k = 0; k < m->m.n_blocks; k++) {
+    HycoFormat(name, "block_%d", k);
+    WRITE(t, {"double", name, (size_t)m->m.block[k].n * (size_t)m->m.block[k].n, m->m.block[k].C, 0});
   }
   ADD(t, "static const Block blocks[] = {");
-  for (PetscInt k = 0; k < m->n_blocks; k++)
-    ADD(t, "%s{%d, %d, %d, block_%d}", k ? ", " : "", m->block[k].first, m->block[k].n, m->block[k].value, (int)k);
-  ADD(t, "};\nstatic const Surface surface[] = {");
-  for (PetscInt k = 0; k < m->n_surfaces; k++) {
-    const Surface *u = &s->surface[k];
-
-    facets += u->n;
-    ADD(t, "%s{%d, %d, %d, %d, %d, %d}", k ? ", " : "", (int)u->first, (int)u->n, (int)u->side, (int)u->n_border,
-        (int)u->border, (int)u->at_border);
-  }
+  for (int k = 0; k < m->m.n_blocks; k++)
+    ADD(t, "%s{%d, %d, %d, block_%d}", k ? ", " : "", m->m.block[k].first, m->m.block[k].n, m->m.block[k].value, k);
   ADD(t, "};\nstatic const Facing searches[] = {");
   for (PetscInt k = 0; k < s->n_searches; k++) {
     const Facing *h = &s->search[k];
@@ -355,25 +352,21 @@ static PetscErrorCode WriteSurfaces(const HycoExportModel *m, HycoText *t)
         h->reach);
   }
   ADD(t, "};\n");
-  PetscCall(WriteReals(t, "static const double point_weight[]", (size_t)s->nq, s->w));
-  PetscCall(WriteReals(t, "static const double point_function[]", (size_t)points, s->N));
-  PetscCall(WriteReals(t, "static const double point_slope[]", 2 * (size_t)points, s->dN));
-  PetscCall(WriteReals(t, "static const double drawn[]", 3 * (size_t)s->n_nodes, m->drawn));
-  PetscCall(WriteInts(t, "static const PetscInt facet[]", facets * s->nf, s->facet));
-  PetscCall(WriteInts(t, "static const PetscInt border[]", 2 * m->n_border, s->border));
-  PetscCall(WriteInts(t, "static const PetscInt slave[]", m->n_contacts, s->node));
-  PetscCall(WriteInts(t, "static const int place_of[]", unknowns, s->place));
-  PetscCall(WriteInts(t, "static const int given[]", unknowns, s->given));
-  PetscCall(WriteInts(t, "static const int pose[]", s->n_nodes, s->pose));
-  PetscCall(WriteInts(t, "static const int body[]", s->n_nodes, m->body));
-  ADD(t, "static const PetscBool at_border[] = {");
-  for (PetscInt k = 0; k < m->n_surfaces * s->n_nodes; k++)
-    ADD(t, "%s%s", k ? ", " : "", s->at_border[k] ? "PETSC_TRUE" : "PETSC_FALSE");
+  WRITE(t, {"Surface", "surface", (size_t)m->n_surfaces, s->surface, 6},
+        {"double", "point_weight", (size_t)s->nq, s->w, 0}, {"double", "point_function", points, s->N, 0},
+        {"double", "point_slope", 2 * points, s->dN, 0}, {"double", "drawn", 3 * nodes, m->drawn, 0},
+        {"PetscInt", "facet", facets * (size_t)s->nf, s->facet, 0},
+        {"PetscInt", "border", 2 * (size_t)m->n_border, s->border, 0},
+        {"PetscInt", "slave", (size_t)m->m.n_contacts, s->node, 0}, {"int", "place_of", unknowns, s->place, 0},
+        {"int", "given", unknowns, s->given, 0}, {"int", "pose", nodes, s->pose, 0},
+        {"PetscInt", "body", nodes, m->body, 0},
+        {"PetscBool", "at_border", (size_t)m->n_surfaces * nodes, s->at_border, 0});
   ADD(t,
-      "};\nstatic const Surfaces surfaces = {%d, %d, %d, %d, %d, %d, %.17g, point_weight, point_function, "
+      "static const Surfaces surfaces = {%d, %d, %d, %d, %d, %d, %.17g, point_weight, point_function, "
       "point_slope,\n"
-      "                                  surface, searches, facet, border, slave, at_border, place_of, given, pose};\n",
-      (int)s->dim, (int)s->n_nodes, (int)s->nf, (int)s->nq, (int)s->n_searches, (int)s->n_facets, s->around);
+      "                                  surface, searches, facet, %s, slave, at_border, place_of, given, pose};\n",
+      (int)s->dim, (int)s->n_nodes, (int)s->nf, (int)s->nq, (int)s->n_searches, (int)s->n_facets, s->around,
+      m->n_border ? "border" : "NULL");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -406,59 +399,74 @@ static PetscErrorCode WritePositions(const HycoExportModel *m, HycoScene s, Hyco
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Rows of contacts with friction, and the tables of a history. */
-static PetscErrorCode WritePath(const HycoExportModel *m, HycoScene s, const char prefix[], HycoText *t)
+/* The tables of a history. */
+static PetscErrorCode WriteTables(HycoScene s, HycoText *t)
 {
-  char name[HYCO_LINE];
+  char time[HYCO_LINE], value[HYCO_LINE];
 
   PetscFunctionBegin;
-  HycoFormat(name, "const double %s_time[%d]", prefix, (int)s->n_times);
-  PetscCall(WriteReals(t, name, (size_t)s->n_times, s->times));
-  if (m->n_slip) {
-    PetscCall(WriteInts(t, "static const int row[]", m->n_slip + 1, m->row));
-    PetscCall(WriteInts(t, "static const int coefficient[]", m->n_slip, m->coefficient));
-    PetscCall(WriteInts(t, "static const int normal[]", m->n_contacts, m->normal));
-  }
   for (PetscInt k = 0; k < s->n_tables; k++) {
-    HycoFormat(name, "static const double table_t_%d[]", (int)k);
-    PetscCall(WriteReals(t, name, (size_t)s->table[k].n, s->table[k].t));
-    HycoFormat(name, "static const double table_value_%d[]", (int)k);
-    PetscCall(WriteReals(t, name, (size_t)s->table[k].n, s->table[k].value));
+    const size_t n = (size_t)s->table[k].n;
+
+    HycoFormat(time, "table_t_%d", (int)k);
+    HycoFormat(value, "table_value_%d", (int)k);
+    WRITE(t, {"double", time, n, s->table[k].t, 0}, {"double", value, n, s->table[k].value, 0});
   }
-  ADD(t, "static const HycoTimeTable tables[] = {");
   for (PetscInt k = 0; k < s->n_tables; k++)
-    ADD(t, "%s{%d, table_t_%d, table_value_%d}", k ? ", " : "", (int)s->table[k].n, (int)k, (int)k);
-  ADD(t, "%s};\n", s->n_tables ? "" : "{0, NULL, NULL}");
+    ADD(t, "%s{%d, table_t_%d, table_value_%d}", k ? ", " : "static const HycoTimeTable tables[] = {",
+        (int)s->table[k].n, (int)k, (int)k);
+  ADD(t, "%s", s->n_tables ? "};\n" : "");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode WriteModel(const HycoExportModel *m, HycoScene s, const char prefix[], HycoText *t)
+/* ", .member = name", if the array has entries. */
+static PetscErrorCode AddMembers(HycoText *t, size_t n_arrays, const Array arrays[])
 {
-  char name[HYCO_LINE];
+  PetscFunctionBegin;
+  for (const Array *a = arrays; a < arrays + n_arrays; a++) {
+    if (a->n) ADD(t, ",\n  .%s = %s", a->name + strlen("model_"), a->name);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode WriteModel(const HycoExportModel *e, HycoScene s, const char prefix[], HycoText *t)
+{
+  const Model *m = &e->m;
+  const size_t p = (size_t)m->n_motions, n = (size_t)m->n_places, f = (size_t)m->n_stiffness,
+               blocks = (size_t)m->n_slip;
+  const size_t terms = (size_t)m->n_terms;
+  const Array arrays[] = {
+      {"double", "model_offset", (p + n + (size_t)m->n_values) * (size_t)m->n_functions, m->offset, 0},
+      {"int", "model_stiffness", f, m->stiffness, 0},
+      {"double", "model_W", m->n_blocks ? 0 : f * n * (n + 1) / 2, m->W, 0},
+      {"double", "model_A", f * p * n, m->A, 0},
+      {"int", "model_value", terms, m->value, 0},
+      {"int", "model_factor", terms, m->factor, 0},
+      {"double", "model_term", terms * (p + n), m->term, 0},
+      {"int", "model_contact", (size_t)e->n_contact, m->contact, 0},
+      {"double", "model_weight", (size_t)e->n_weights, m->weight, 0},
+      {"Output", "model_output", (size_t)m->n_outputs, m->output, 6},
+      {"int", "model_row", blocks ? blocks + 1 : 0, m->row, 0},
+      {"int", "model_coefficient", blocks, m->coefficient, 0},
+      {"int", "model_normal", blocks ? (size_t)m->n_contacts : 0, m->normal, 0}};
+  const size_t n_arrays = sizeof(arrays) / sizeof(arrays[0]);
 
   PetscFunctionBegin;
-  HycoFormat(name, "const double %s_lo[%d]", prefix, (int)s->n_parameters);
-  PetscCall(WriteReals(t, name, (size_t)s->n_parameters, s->lo));
-  HycoFormat(name, "const double %s_hi[%d]", prefix, (int)s->n_parameters);
-  PetscCall(WriteReals(t, name, (size_t)s->n_parameters, s->hi));
+  PetscCall(WriteReals(t, prefix, "lo", s->n_parameters, s->lo));
+  PetscCall(WriteReals(t, prefix, "hi", s->n_parameters, s->hi));
+  if (s->n_times) PetscCall(WriteReals(t, prefix, "time", s->n_times, s->times));
   PetscCall(WriteNames(t, s, prefix, "parameter", s->n_parameters, s->parameter, NULL));
-  PetscCall(WriteNames(t, NULL, prefix, "output", m->n_outputs, m->name, m->unit));
-  PetscCall(WriteArrays(m, t));
-  if (m->surfaces.n_nodes) PetscCall(WriteSurfaces(m, t));
-  if (s->n_times) PetscCall(WritePath(m, s, prefix, t));
-  ADD(t,
-      "\nstatic const Model model = {%d, %d, %d, %d, %d, %d, %d, %d, %d, %d, %.17g, %s_lo, %s_hi, offset, stiffness,\n",
-      (int)s->n_parameters, (int)m->n_functions, (int)m->n_motions, (int)m->n_places, (int)m->n_stiffness,
-      (int)m->n_values, (int)m->n_terms, (int)m->n_outputs, (int)m->n_contacts, (int)m->n_blocks, (double)m->tolerance,
-      prefix, prefix);
-  ADD(t,
-      "                            flexibility, work_on_motions, term_value, term_factor, term, outputs, contact,\n"
-      "                            weight, %s, %s, %d, %d, %s};\n\n",
-      m->surfaces.n_nodes ? "blocks" : "NULL", m->surfaces.n_nodes ? "&surfaces" : "NULL", (int)m->n_slip,
-      (int)s->n_tables,
-      m->n_slip    ? "row, coefficient, normal, tables"
-      : s->n_times ? "NULL, NULL, NULL, tables"
-                   : "NULL, NULL, NULL, NULL");
+  PetscCall(WriteNames(t, NULL, prefix, "output", m->n_outputs, e->name, e->unit));
+  PetscCall(WriteArrays(t, n_arrays, arrays));
+  if (m->surfaces) PetscCall(WriteSurfaces(e, t));
+  PetscCall(WriteTables(s, t));
+  ADD(t, "\nstatic const Model model = {%d, %d, %d, %d, %d, %d, %d, %d, %d, %d, %.17g", m->n_parameters, m->n_functions,
+      m->n_motions, m->n_places, m->n_stiffness, m->n_values, m->n_terms, m->n_outputs, m->n_contacts, m->n_blocks,
+      m->tolerance);
+  PetscCall(AddMembers(t, n_arrays, arrays));
+  ADD(t, "%s,\n  .n_slip = %d, .n_tables = %d%s};\n\n",
+      m->surfaces ? ",\n  .block = blocks, .surfaces = &surfaces" : "", m->n_slip, m->n_tables,
+      s->n_tables ? ", .table = tables" : "");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -470,7 +478,7 @@ static PetscErrorCode WriteFunctions(const HycoExportModel *m, HycoScene s, Hyco
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc1(m->n_atoms + 1, &used));
-  for (PetscInt k = 0; k < m->n_functions; k++) {
+  for (PetscInt k = 0; k < m->m.n_functions; k++) {
     const PetscInt of[4] = {m->function[k].a, m->function[k].b, m->function[k].c, m->function[k].d};
 
     for (PetscInt j = 0; j < 4; j++) {
@@ -489,7 +497,7 @@ static PetscErrorCode WriteFunctions(const HycoExportModel *m, HycoScene s, Hyco
   }
   /* A model whose functions are constant would be compiled with a warning otherwise. */
   ADD(t, "\n  (void)mu;\n");
-  for (PetscInt k = 0; k < m->n_functions; k++) {
+  for (PetscInt k = 0; k < m->m.n_functions; k++) {
     const HycoFunction *f = &m->function[k];
 
     ADD(t, "  f[%d] = ", (int)k);
@@ -529,12 +537,12 @@ static PetscErrorCode Describe(const HycoExportModel *m, HycoScene s, const char
 {
   PetscFunctionBegin;
   ADD(t, "%s, %s: %s_%s(), %.3g MB; %d %s, %d motions that contact holds, %d functions of the parameters\n", path,
-      header, prefix, s->n_times ? "step" : "predict", (double)bytes / 1e6, (int)m->n_contacts,
-      m->n_slip ? "rows of contacts" : "contacts", (int)m->n_motions, (int)m->n_functions);
+      header, prefix, s->n_times ? "step" : "predict", (double)bytes / 1e6, (int)m->m.n_contacts,
+      m->m.n_slip ? "rows of contacts" : "contacts", (int)m->m.n_motions, (int)m->m.n_functions);
   for (PetscInt p = 0; p < s->n_parameters; p++)
     ADD(t, "%s%s%s%s, %.6g to %.6g", p ? "; " : "parameters: ", s->parameter[p],
         UnitOf(s, s->parameter[p])[0] ? " " : "", UnitOf(s, s->parameter[p]), (double)s->lo[p], (double)s->hi[p]);
-  for (PetscInt k = 0; k < m->n_outputs; k++)
+  for (PetscInt k = 0; k < m->m.n_outputs; k++)
     ADD(t, "%s%s%s%s", k ? ", " : "\noutputs: ", m->name[k], m->unit[k][0] ? " " : "", m->unit[k]);
   ADD(t, "\nat %d points: largest difference from the model %.1e of an output's largest value; %.3g ms a %s\n",
       (int)m->checked, (double)m->difference, 1e3 * (double)m->seconds / (double)m->checked,

@@ -14,8 +14,7 @@ typedef struct {
   Model model;
 } Problem;
 
-static const int one = 0;
-static const double nothing[] = {0};
+static int one = 0;
 
 /* rank: of W, without motions; a rank below the number of forces makes forces that are not unique. */
 static void Make(int n, int p, int rank, unsigned long long *state, Problem *o)
@@ -45,8 +44,6 @@ static void Make(int n, int p, int rank, unsigned long long *state, Problem *o)
                      .n_contacts = n,
                      .n_stiffness = 1,
                      .tolerance = 1e-8,
-                     .lo = nothing,
-                     .hi = nothing,
                      .offset = o->offset,
                      .stiffness = &one,
                      .W = o->W,
