@@ -1180,21 +1180,6 @@ static PetscErrorCode RunModel(Export *e, const PetscReal mu[], PetscInt j, Pets
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets e->out.seconds, the processor time of predictions or steps one after the other, as a program makes them. */
-static PetscErrorCode Time(Export *e, const Model *model, Work *o, PetscInt n, const PetscReal mu[], PetscReal out[])
-{
-  const PetscInt times = PetscMax(e->s->n_times, 1);
-  const clock_t begin = clock();
-  PetscBool solved;
-
-  PetscFunctionBegin;
-  for (PetscInt i = 0; i < n * times; i++)
-    PetscCall(RunHere(e, model, o, mu + i / times * e->s->n_parameters, i % times, out, &solved));
-  e->out.seconds = (PetscReal)(clock() - begin) / CLOCKS_PER_SEC;
-  e->out.checked = n * times;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The size that errors of output k are relative to: its own, but a component of a contact's force has the largest of its
    components, as one that vanishes by symmetry is round-off. */
 static PetscReal ScaleOf(PetscInt n, char *const name[], const PetscReal most[], PetscInt k)
@@ -1209,7 +1194,7 @@ static PetscReal ScaleOf(PetscInt n, char *const name[], const PetscReal most[],
 }
 
 /* Sets e->out.difference: of an output relative to its largest value, at points over the ranges, of paths at their listed
-   times; fails if it is no round-off. */
+   times; fails if it is no round-off. And e->out.seconds, the processor time of the program. */
 static PetscErrorCode Compare(Export *e, const Model *model, void *memory)
 {
   const PetscInt n = e->out.m.n_outputs, times = PetscMax(e->s->n_times, 1);
@@ -1218,6 +1203,7 @@ static PetscErrorCode Compare(Export *e, const Model *model, void *memory)
   PetscReal *mine, *theirs, *most, *worst;
   PetscBool solved = PETSC_TRUE, theirs_solved = PETSC_TRUE;
   PetscInt points;
+  clock_t begin;
   Work o;
 
   PetscFunctionBegin;
@@ -1232,7 +1218,10 @@ static PetscErrorCode Compare(Export *e, const Model *model, void *memory)
 
     if (i % times && !solved) continue; /* a path that has ended */
     PetscCall(RunModel(e, at, i % times, theirs, &theirs_solved));
+    begin = clock();
     PetscCall(RunHere(e, model, &o, at, i % times, mine, &solved));
+    e->out.seconds += (PetscReal)(clock() - begin) / CLOCKS_PER_SEC;
+    e->out.checked++;
     HycoCheck(
         solved == theirs_solved,
         "export: at a point the program's problem has %s solution, unlike the model's; the forces may not be unique",
@@ -1242,7 +1231,6 @@ static PetscErrorCode Compare(Export *e, const Model *model, void *memory)
       worst[k] = PetscMax(worst[k], PetscAbsReal(mine[k] - theirs[k]));
     }
   }
-  PetscCall(Time(e, model, &o, points, mu, mine));
   for (PetscInt k = 0; k < n; k++) {
     const PetscReal scale = ScaleOf(n, e->out.name, most, k);
 

@@ -345,37 +345,6 @@ static void admit(const Model *m, Work *o)
   }
 }
 
-/* Sweeps of projected steps, block by block. */
-static void sweep(const Model *m, Work *o)
-{
-  const size_t n = (size_t)m->n_contacts;
-  double data[2], y[3], z_of[3];
-
-  slack(m, o, o->z, o->w);
-  for (int s = 0; s < 30; s++) {
-    for (int k = 0; k < m->n_slip; k++) {
-      const int first = m->row[k], rows = m->row[k + 1] - first;
-      double bound = 0;
-
-      for (int i = first; i < first + rows; i++) {
-        double sum = 0;
-
-        for (int j = first; j < first + rows; j++) sum += fabs(column(m, o, (size_t)j)[i]);
-        bound = fmax(bound, sum);
-      }
-      law(m, o, k, data);
-      for (int i = 0; i < rows; i++) y[i] = o->z[first + i] - o->w[first + i] / bound;
-      HycoCoulombProject(rows, data, y, z_of);
-      for (int j = 0; j < rows && bound > 0; j++) {
-        const double change = z_of[j] - o->z[first + j];
-
-        o->z[first + j] = z_of[j];
-        if (change != 0) add(n, change, column(m, o, (size_t)(first + j)), o->w);
-      }
-    }
-  }
-}
-
 /* The largest residual of the law, recomputed, relative. */
 static double law_residual(const Model *m, Work *o)
 {
@@ -449,8 +418,8 @@ static int from_forces(const Model *m, Work *o, int *iterations)
   return iterate(m, o, iterations);
 }
 
-/* A step with friction: from the forces of the last one; from the solution without friction; from sticking contacts, or after
-   sweeps. Returns the residual. */
+/* A step with friction: from the forces of the last one; from the solution without friction; from that in which all contacts
+   stick, and its admissible forces. Returns the residual. */
 static double solve_slip(const Model *m, Work *o, int *iterations)
 {
   const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts;
@@ -460,14 +429,9 @@ static double solve_slip(const Model *m, Work *o, int *iterations)
     for (int i = m->row[k] + 1; i < m->row[k + 1]; i++) o->q[p + (size_t)i] += o->s->place[i];
   }
   if (!from_forces(m, o, iterations) && !(solve(m, o, iterations) <= m->tolerance && iterate(m, o, iterations))) {
-    memcpy(o->z, o->s->z, (p + n) * sizeof(double));
-    if (p) {
-      memset(o->z, 0, (p + n) * sizeof(double));
-      aim(m, o, o->z, 1);
-      memcpy(o->z, o->aimed, (p + n) * sizeof(double));
-    } else {
-      sweep(m, o);
-    }
+    memset(o->z, 0, (p + n) * sizeof(double));
+    aim(m, o, o->z, 1);
+    memcpy(o->z, o->aimed, (p + n) * sizeof(double));
     if (!iterate(m, o, iterations)) {
       admit(m, o);
       if (p) close_gaps(m, o);
@@ -492,9 +456,7 @@ static void accept(const Model *m, Work *o)
   if (!m->n_slip) return;
   memcpy(s->before, s->z + p, n * sizeof(double));
   memcpy(s->z, o->z, (p + n) * sizeof(double));
-  for (int k = 0; k < m->n_slip; k++) {
-    for (int i = m->row[k] + 1; i < m->row[k + 1]; i++) most = fmax(most, fabs(s->place[i] - o->w[p + (size_t)i]));
-  }
+  for (size_t i = p; i < p + n; i++) most = fmax(most, fmax(fabs(o->q[i]), fabs(o->w[i] - o->q[i])));
   for (int k = 0; k < m->n_slip; k++) {
     const double *r = o->z + p + m->row[k];
     double work = 0;
