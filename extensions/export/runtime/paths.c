@@ -32,12 +32,12 @@ static size_t path_doubles(const Model *m)
 {
   const size_t n = m->n_slip ? (size_t)(m->n_motions + m->n_contacts) : 0;
 
-  return n * n + 8 * n + 2 * (size_t)m->n_parameters + 1 + (size_t)m->n_tables + state_size(m);
+  return n * n + 7 * n + 9 * (size_t)m->n_slip + 2 * (size_t)m->n_parameters + 1 + (size_t)m->n_tables + state_size(m);
 }
 
 static size_t path_ints(const Model *m)
 {
-  return m->n_slip ? 2 * (size_t)(m->n_motions + m->n_contacts) + (size_t)m->n_slip : 0;
+  return m->n_slip ? 2 * (size_t)(m->n_motions + m->n_contacts) : 0;
 }
 
 static void place_path(const Model *m, double *next, int *ints, Work *o)
@@ -53,12 +53,11 @@ static void place_path(const Model *m, double *next, int *ints, Work *o)
   o->trial = take(&next, n);
   o->trial_w = take(&next, n);
   o->rhs = take(&next, n);
-  o->follows = take(&next, n);
+  o->D = take(&next, 9 * (size_t)m->n_slip);
   o->v = take(&next, 2 * (size_t)m->n_parameters + 1 + (size_t)m->n_tables);
   o->saved = take(&next, state_size(m));
   o->unknown = ints;
   o->pivot = ints + n;
-  o->slips = ints + 2 * n;
 }
 
 /* w = q + M z. */
@@ -142,8 +141,8 @@ static int flexible(const Model *m, Work *o, int k, int i)
   return own > 1e-12 * most;
 }
 
-/* The unknowns on the pieces of P at y (stick: all contacts stick), and `next`, z with what these pieces fix: rows of open
-   contacts are 0, in 2D a slip follows its normal force by o->follows. Returns their number. */
+/* The unknowns on the pieces of P at y (stick: all contacts stick): rows of DP, o->D by block, that are not 0; `aimed` is z
+   with 0 in the others. Returns their number. */
 static int find_unknowns(const Model *m, Work *o, const double z[], int stick)
 {
   const int p = m->n_motions;
@@ -154,24 +153,23 @@ static int find_unknowns(const Model *m, Work *o, const double z[], int stick)
   for (int i = 0; i < p; i++) o->unknown[count++] = i;
   for (int k = 0; k < m->n_slip; k++) {
     const int first = m->row[k], rows = m->row[k + 1] - first;
-    const double *y = o->from + p + first;
-    double *next = o->aimed + p + first;
-    int slips;
+    double *D = o->D + 9 * k;
 
     law(m, o, k, data);
-    for (int i = first; i < first + rows; i++) o->follows[i] = 0;
-    o->slips[k] = slips = !stick && HycoTangential(rows, y) > data[0] * fmax(y[0], 0);
+    HycoCoulombDerivative(rows, data, o->from + p + first, D);
     for (int i = 0; i < rows; i++) {
-      const int held = !flexible(m, o, k, first + i);
+      const int held = i && !flexible(m, o, k, first + i);
+      double size = 0;
 
-      if ((stick || (y[0] > 0 && (i == 0 || data[0] > 0))) && !(i && held) && !(slips && i && rows == 2))
+      for (int j = 0; j < rows; j++) {
+        if (stick) D[rows * i + j] = i == j;
+        if (held) D[rows * i + j] = D[rows * j + i] = 0;
+      }
+      for (int j = 0; j < rows; j++) size += fabs(D[rows * i + j]);
+      if (size > 0)
         o->unknown[count++] = p + first + i;
       else
-        next[i] = 0;
-      if (i && slips && rows == 2 && y[0] > 0 && !held) {
-        o->follows[first] = y[1] > 0 ? data[0] : -data[0];
-        next[1] = o->follows[first] * next[0];
-      }
+        o->aimed[p + first + i] = 0;
     }
   }
   return count;
@@ -237,61 +235,33 @@ static void aim(const Model *m, Work *o, const double z[], int stick)
 
   slack(m, o, o->aimed, o->trial_w);
   for (size_t a = 0; a < count; a++) {
-    const int r = o->unknown[a] - p, k = r < 0 ? -1 : block_of(m, r), first = k < 0 ? 0 : m->row[k];
-    const double *rho = o->rho + p, *w = o->trial_w + p, *next = o->aimed + p, *y = o->from + p + first;
-    double *J = o->J + a * count, D[9], data[2];
+    const int r = o->unknown[a] - p, k = r < 0 ? 0 : block_of(m, r), rows = m->row[k + 1] - m->row[k];
+    double *J = o->J + a * count;
 
-    if (r < 0) {
-      const double *A = o->A + (size_t)(r + p) * n;
-
-      for (size_t b = 0; b < count; b++) {
-        const int s = o->unknown[b] - p;
-
-        J[b] = s < 0 ? 0 : o->rho[p + r] * (A[s] + (o->follows[s] != 0 ? o->follows[s] * A[s + 1] : 0));
-      }
+    if (r < 0) { /* a motion: w = 0 */
+      for (size_t b = 0; b < count; b++)
+        J[b] = o->unknown[b] < p ? 0 : o->rho[p + r] * o->A[(size_t)(p + r) * n + (size_t)(o->unknown[b] - p)];
       o->rhs[a] = -o->rho[p + r] * o->trial_w[p + r];
       continue;
     }
-    if (r == first || !o->slips[k]) { /* w = 0 */
-      const double *W = column(m, o, (size_t)r);
+    for (size_t b = 0; b < count; b++) J[b] = a == b;
+    o->rhs[a] = -o->aimed[p + r];
+    for (int j = 0; j < rows; j++) { /* z - DP (z - rho w) = 0 */
+      const int of = m->row[k] + j;
+      const double d = o->D[9 * k + rows * (r - m->row[k]) + j], rho = o->rho[p + of], *W = column(m, o, (size_t)of);
 
+      if (d == 0) continue;
+      o->rhs[a] += d * (o->aimed[p + of] - rho * o->trial_w[p + of]);
       for (size_t b = 0; b < count; b++) {
         const int s = o->unknown[b] - p;
 
-        J[b] = rho[r] * (s < 0 ? -o->A[(size_t)(s + p) * n + (size_t)r] : W[s]);
-        if (s >= 0 && o->follows[s] != 0) J[b] += rho[r] * o->follows[s] * W[s + 1];
-      }
-      o->rhs[a] = -rho[r] * w[r];
-      continue;
-    }
-    /* A slip in 3D: its row of z - DP (z - rho w), where w of the normal is 0. */
-    law(m, o, k, data);
-    HycoCoulombDerivative(3, data, y, D);
-    for (size_t b = 0; b < count; b++) {
-      const int s = o->unknown[b] - p;
-
-      J[b] = s == r;
-      for (int j = 0; j < 3; j++) {
-        const int row = first + j;
-        const double d = D[3 * (r - first) + j];
-
-        if (s == row) J[b] -= d;
-        if (j) J[b] += d * rho[row] * (s < 0 ? -o->A[(size_t)(s + p) * n + (size_t)row] : column(m, o, (size_t)row)[s]);
-        if (j && s >= 0 && o->follows[s] != 0) J[b] += d * rho[row] * o->follows[s] * column(m, o, (size_t)row)[s + 1];
+        J[b] += d * rho * (s < 0 ? -o->A[(size_t)(s + p) * n + (size_t)of] : W[s]) - (s == of ? d : 0);
       }
     }
-    o->rhs[a] = -next[r];
-    for (int j = 0; j < 3; j++)
-      o->rhs[a] += D[3 * (r - first) + j] * (next[first + j] - (j ? rho[first + j] * w[first + j] : 0));
   }
   factor_rows(count, o->J, o->pivot);
   solve_rows(count, o->J, o->pivot, o->rhs);
-  for (size_t a = 0; a < count; a++) {
-    const int i = o->unknown[a];
-
-    o->aimed[i] += o->rhs[a];
-    if (i >= p && o->follows[i - p] != 0) o->aimed[i + 1] += o->follows[i - p] * o->rhs[a];
-  }
+  for (size_t a = 0; a < count; a++) o->aimed[o->unknown[a]] += o->rhs[a];
 }
 
 /* Newton's method from o->z. Returns 0 if it does not converge. */

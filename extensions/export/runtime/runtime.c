@@ -27,12 +27,13 @@ typedef struct {
   Room room;
 #if defined(PATHS)
   /* p + n: scales; y = z - rho w at the step's begin, and where it is measured; where Newton's step ends; trials; the right
-     side; by row: the next one follows it by this factor */
-  double *rho, *from, *from_next, *aimed, *trial, *trial_w, *rhs, *follows;
-  double *J, *v, *saved, largest; /* of the unknowns; variables, then parameters on the way; the state; force before */
-  int *unknown, *pivot, *slips;   /* slips: by block */
-  double t;                       /* the step's end */
-  const State *s;                 /* its begin, and then its end */
+     side */
+  double *rho, *from, *from_next, *aimed, *trial, *trial_w, *rhs;
+  double *D, *J, *v, *saved,
+      largest; /* by block; of unknowns; variables, then parameters on the way; a state; a force */
+  int *unknown, *pivot;
+  double t;       /* the step's end */
+  const State *s; /* its begin, and then its end */
 #endif
 } Work;
 
