@@ -28,7 +28,6 @@
 #define PATHS_CHECKED  8 /* or so many paths */
 #define PATH_TOLERANCE 1e-8
 #define ROUNDING       1e-14 /* of a coefficient beside others */
-#define SAME           1e-10 /* of an area */
 #define SAMPLES        120   /* points for the functions, of which a third checks them; more with weights of samples: */
 #define SEVERAL        20    /* samples: with more, products are tried of known functions alone */
 #define EACH           8     /* for each */
@@ -55,10 +54,9 @@ typedef struct {
   PetscInt n_atoms, n_rows, room, ny, n_groups, *group;
   HycoAtom *atom;
   Row *row;
-  PetscReal *area, *pressure; /* by contact of the model */
-  PetscInt areas;             /* the first row of the areas of contacts, if they change; -1: they do not */
-  PetscInt travel_row;        /* the first row of the travel's values */
-  PetscInt n_weights;         /* of the samples of bodies: expressions */
+  PetscReal *area;     /* by contact of the model; where none travels, values: */
+  PetscInt travel_row; /* the first row of the travel's values */
+  PetscInt n_weights;  /* of the samples of bodies: expressions */
   char **weight;
   HycoExportFit base, response;
   HycoExportModel out;
@@ -138,7 +136,7 @@ static PetscErrorCode Probe(Export *e, const PetscReal mu[], const PetscReal z[]
   PetscUseTypeMethod(m, expand);
   PetscCall(HycoROMMeasureQuantities(m, &prediction));
   PetscCall(HycoROMSumContacts(m, m->Lambda, &result));
-  if (e->areas >= 0) PetscCall(FindAreas(e));
+  if (!e->travel) PetscCall(FindAreas(e));
   HycoROMGetOutputFields(m, &u, &sigma);
   n_sigma = HycoStrainSize(m->model->mesh->dim);
   for (PetscInt i = 0; i < e->p; i++) y[i] = e->w[i];
@@ -254,8 +252,8 @@ static PetscErrorCode AddItems(Export *e, PetscInt quantity, Output *o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The contacts of an output. */
-static PetscErrorCode AddContacts(Export *e, const HycoQuantity *q, const PetscReal weight[], Output *o)
+/* The contacts of an output; -1: one that is always open, which counts as a pressure of 0. */
+static PetscErrorCode AddContacts(Export *e, const HycoQuantity *q, Output *o)
 {
   const HycoPairs *pairs = &e->m->model->pairs;
   PetscBool *of;
@@ -264,22 +262,12 @@ static PetscErrorCode AddContacts(Export *e, const HycoQuantity *q, const PetscR
   PetscCall(PetscMalloc1(pairs->n, &of));
   PetscCall(HycoPairsOfQuantity(e->s, e->m->model->mesh, pairs, q, of));
   o->first = e->out.n_contact;
-  o->weight = e->out.n_weights;
   for (PetscInt k = 0; k < pairs->n; k++) {
-    PetscInt at = 0;
+    PetscInt at = e->travel ? k : 0;
 
-    if (!of[k]) continue;
-    if (e->travel) { /* areas are the program's */
-      PetscCall(HycoExportAddContact(&e->out, k));
-      o->weight = -1;
-      o->n++;
-      continue;
-    }
-    while (at < e->k && e->contact[at] != (e->first ? e->first[k] : k)) at++;
-    if (at == e->k && (o->kind != PRESSURE_SMALLEST || !e->k)) continue; /* it is always open */
-    PetscCall(HycoExportAddContact(&e->out, at < e->k ? at : 0));
-    PetscCall(HycoExportAddWeight(&e->out, at < e->k ? weight[k] : 0));
-    o->width = (int)e->areas + 1;
+    while (!e->travel && at < e->k && e->contact[at] != (e->first ? e->first[k] : k)) at++;
+    if (!of[k] || (at == e->k && o->kind != PRESSURE_SMALLEST)) continue;
+    PetscCall(HycoExportAddContact(&e->out, at < e->k ? at : -1));
     o->n++;
   }
   PetscCall(PetscFree(of));
@@ -289,19 +277,14 @@ static PetscErrorCode AddContacts(Export *e, const HycoQuantity *q, const PetscR
 /* Of moved surfaces: the sum of the contacts' forces on their slaves, q is of, or their moment. */
 static PetscErrorCode AddForces(Export *e, const HycoQuantity *q, Output *o)
 {
-  const HycoPairs *pairs = &e->m->model->pairs;
   const PetscBool none = (PetscBool)(e->m->fe->formulation == HYCO_AXISYMMETRIC && !q->field); /* the sum of a ring */
-  PetscReal *weight;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(pairs->n, &weight));
-  for (PetscInt k = 0; k < pairs->n; k++) weight[k] = 0;
   *o = (Output){.kind = RESULTANT, .of = (int)q->field + (q->kind == HYCO_QUANTITY_MOMENT ? 3 : 0), .width = -1};
-  PetscCall(AddContacts(e, q, weight, o));
+  PetscCall(AddContacts(e, q, o));
   o->weight = e->out.n_weights;
   for (PetscInt k = 0; k < o->n + e->out.surfaces.n_nodes; k++)
     PetscCall(HycoExportAddWeight(&e->out, k < o->n && !none ? -1 : 0));
-  PetscCall(PetscFree(weight));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -321,58 +304,6 @@ static PetscErrorCode AddPush(Export *e, const PetscBool of[], PetscInt axis, Ou
     PetscCall(HycoExportAddWeight(&e->out, of[body[pairs->slave[k]]]));
   }
   for (PetscInt i = 0; i < e->out.surfaces.n_nodes; i++) PetscCall(HycoExportAddWeight(&e->out, of[e->out.body[i]]));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Area and pressure per force of each contact, measured one by one. */
-static PetscErrorCode MeasureContacts(Export *e)
-{
-  const HycoPairs *pairs = &e->m->model->pairs;
-  const HycoContactResult *result;
-  PetscReal *L;
-
-  PetscFunctionBegin;
-  PetscCall(PetscCalloc1(pairs->n + 1, &L));
-  PetscCall(PetscCalloc1(pairs->n + 1, &e->area));
-  PetscCall(PetscCalloc1(pairs->n + 1, &e->pressure));
-  for (PetscInt k = 0; k < pairs->n; k++) {
-    /* A unit force on one contact: the results of its contact then are those of this row alone. */
-    L[k] = 1;
-    PetscCall(HycoROMSumContacts(e->m, L, &result));
-    L[k] = 0;
-    e->area[k] = result[pairs->contact[k]].area;
-    e->pressure[k] = result[pairs->contact[k]].pressure;
-  }
-  PetscCall(PetscFree(L));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Whether a map changes the areas, of contacts whose pressures are forces by area: they are values then. */
-static PetscErrorCode FollowAreas(Export *e)
-{
-  const PetscInt n = e->m->model->pairs.n;
-  PetscReal mu[HYCO_MAX_PARAMETERS], *before, size;
-  PetscBool vary = PETSC_FALSE;
-
-  PetscFunctionBegin;
-  for (PetscInt p = 0; p < e->s->n_variables; p++) mu[p] = e->s->lo[p] + 0.3 * (e->s->hi[p] - e->s->lo[p]);
-  HycoDuplicate(n, e->area, &before);
-  PetscCall(PetscArrayzero(e->z, e->p + e->n));
-  PetscUseTypeMethod(e->m, residual, mu, e->z, e->w, &size);
-  PetscCall(FindAreas(e));
-  for (PetscInt k = 0; k < n; k++) vary = (PetscBool)(vary || PetscAbsReal(e->area[k] - before[k]) > SAME * before[k]);
-  for (PetscInt k = 0; k < n && vary; k++)
-    HycoCheck(PetscAbsReal(before[k] * e->pressure[k] - 1) <= SAME,
-              "export: contact %s: areas change with the parameters, and pressures are no forces by area; contacts of "
-              "type mortar on such surfaces cannot be exported",
-              e->s->contact[e->m->pairs.contact[k]]->name);
-  PetscCall(PetscArraycpy(e->area, before, n));
-  PetscCall(PetscFree(before));
-  if (vary) e->areas = e->n_rows;
-  for (PetscInt i = 0, k = 0; i < e->k && vary; i++) {
-    while ((e->first ? e->first[k] : k) < e->contact[i]) k++;
-    PetscCall(AddRow(e, (Row){.from = AREA, .index = k, .group = -1}));
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -418,7 +349,7 @@ static PetscErrorCode AddQuantity(Export *e, PetscInt k)
     PetscCall(AddWork(e, q, &o));
   } else if (kind >= HYCO_QUANTITY_AREA) {
     o.kind = kind == HYCO_QUANTITY_AREA ? CLOSED : kind == HYCO_QUANTITY_PRESSURE ? PRESSURE : PRESSURE_SMALLEST;
-    PetscCall(AddContacts(e, q, kind == HYCO_QUANTITY_AREA ? e->area : e->pressure, &o));
+    PetscCall(AddContacts(e, q, &o));
   } else if (e->travel && (kind == HYCO_QUANTITY_FORCE || kind == HYCO_QUANTITY_MOMENT)) {
     PetscCall(AddForces(e, q, &o));
   } else {
@@ -440,8 +371,12 @@ static PetscErrorCode FindOutputs(Export *e)
   char name[HYCO_LINE];
 
   PetscFunctionBegin;
-  PetscCall(MeasureContacts(e));
-  if (!e->travel) PetscCall(FollowAreas(e));
+  PetscCall(PetscMalloc1(e->m->pairs.n + 1, &e->area));
+  e->out.m.areas = (int)e->n_rows;
+  for (PetscInt i = 0, k = 0; i < e->k && !e->travel; i++) {
+    while (k + 1 < e->m->pairs.n && (e->first ? e->first[k + 1] : k + 1) <= e->contact[i]) k++;
+    PetscCall(AddRow(e, (Row){.from = AREA, .index = k, .group = -1}));
+  }
   for (PetscInt k = 0; k < s->n_quantities; k++) PetscCall(AddQuantity(e, k));
   for (PetscInt c = 0; c < s->n_contacts; c++) {
     for (PetscInt a = 0; a < e->m->model->mesh->dim; a++) {
@@ -457,10 +392,10 @@ static PetscErrorCode FindOutputs(Export *e)
       PetscCall(HycoExportAddOutput(&e->out, &o, name, HycoExportUnit(s, &q)));
     }
     for (PetscInt a = 0; a < 2; a++) {
-      Output o = {.kind = a ? PRESSURE : CLOSED};
+      Output o = {.kind = a ? PRESSURE : CLOSED, .weight = -1};
 
       q.kind = a ? HYCO_QUANTITY_PRESSURE : HYCO_QUANTITY_AREA;
-      PetscCall(AddContacts(e, &q, a ? e->pressure : e->area, &o));
+      PetscCall(AddContacts(e, &q, &o));
       HycoFormat(name, "%s.%s", s->contact[c]->name, a ? "pressure_max" : "area");
       PetscCall(HycoExportAddOutput(&e->out, &o, name, HycoExportUnit(s, &q)));
     }
@@ -1352,7 +1287,7 @@ static PetscErrorCode Build(Export *e)
 /* The arrays are freed after an error, too; *description is the caller's. */
 static PetscErrorCode ExportC(HycoROM m, const char path[], char **description)
 {
-  Export e = {.m = m, .s = m->model->scene, .areas = -1};
+  Export e = {.m = m, .s = m->model->scene};
   const size_t n = strlen(path);
   PetscErrorCode ierr;
   void *point;
@@ -1370,7 +1305,7 @@ static PetscErrorCode ExportC(HycoROM m, const char path[], char **description)
   PetscCall(HycoTravelDestroy(&e.travel));
   if (e.z) PetscCall(PetscFree4(e.z, e.w, e.unit, e.contact));
   for (PetscInt i = 0; i < e.n_weights; i++) PetscCall(PetscFree(e.weight[i]));
-  HycoFreeAll(&e.first, &e.state, &e.weight, &e.group, &e.atom, &e.row, &e.area, &e.pressure);
+  HycoFreeAll(&e.first, &e.state, &e.weight, &e.group, &e.atom, &e.row, &e.area);
   PetscCall(HycoExportModelFree(&e.out));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -460,9 +460,9 @@ static PetscErrorCode WriteModel(const HycoExportModel *e, HycoScene s, const ch
   PetscCall(WriteArrays(t, n_arrays, arrays));
   if (m->surfaces) PetscCall(WriteSurfaces(e, t));
   PetscCall(WriteTables(s, t));
-  ADD(t, "\nstatic const Model model = {%d, %d, %d, %d, %d, %d, %d, %d, %d, %d, %.17g", m->n_parameters, m->n_functions,
-      m->n_motions, m->n_places, m->n_stiffness, m->n_values, m->n_terms, m->n_outputs, m->n_contacts, m->n_blocks,
-      m->tolerance);
+  ADD(t, "\nstatic const Model model = {%d, %d, %d, %d, %d, %d, %d, %d, %d, %d, %d, %.17g", m->n_parameters,
+      m->n_functions, m->n_motions, m->n_places, m->n_stiffness, m->n_values, m->n_terms, m->n_outputs, m->n_contacts,
+      m->n_blocks, m->areas, m->tolerance);
   PetscCall(AddMembers(t, n_arrays, arrays));
   ADD(t, "%s,\n  .n_slip = %d, .n_tables = %d%s};\n\n",
       m->surfaces ? ",\n  .block = blocks, .surfaces = &surfaces" : "", m->n_slip, m->n_tables,

@@ -13,7 +13,7 @@ enum { SUM, LARGEST, SMALLEST, CLOSED, PRESSURE, PRESSURE_SMALLEST, RESULTANT, W
 enum { COMPONENT, NORM, MISES, PRINCIPAL }; /* what counts of an item; PRINCIPAL + k */
 
 /* An output: a number for each of n items, combined as its kind says. The items are places with `width` values each, from
-   value `first` on, or contacts, from `first` on in Model.contact (width > 0: their areas are the values from width - 1 on). A RESULTANT: the value `width` (-1: 0) and the contacts'
+   value `first` on, or contacts, from `first` on in Model.contact; -1: always open. A RESULTANT: the value `width` (-1: 0) and the contacts'
    forces along axis `of`, from 3 on the moments around it, times the weights of the contacts minus those of the masters,
    which follow them by node. WORK: of friction, of blocks instead of contacts. */
 typedef struct Output {
@@ -55,6 +55,7 @@ typedef struct {
 typedef struct {
   int n_parameters, n_functions, n_motions, n_places, n_stiffness, n_values, n_terms, n_outputs;
   int n_contacts, n_blocks; /* n_places contacts, and no blocks, unless surfaces move */
+  int areas;                /* of contacts: the first of their values, unless surfaces move */
   double tolerance;         /* of the KKT residual */
   DATA double *offset;      /* n_motions + n_places + n_values rows of n_functions: w and the values for z = 0 */
   DATA int *stiffness;      /* functions by which the next two are multiplied, n_stiffness of each */

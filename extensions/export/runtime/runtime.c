@@ -631,7 +631,7 @@ static double output(const Model *m, const Work *o, const Output *q, double leas
 
   if (q->kind == RESULTANT && q->width >= 0) sum = o->value[q->width];
   for (int i = 0; i < q->n; i++) {
-    double weight = q->weight < 0 ? 1 : m->weight[q->weight + i];
+    const double weight = q->weight < 0 ? 1 : m->weight[q->weight + i];
 
 #if defined(PATHS)
     if (q->kind == WORK) {
@@ -643,13 +643,11 @@ static double output(const Model *m, const Work *o, const Output *q, double leas
       if (o->z[m->n_motions + m->contact[q->first + i]] > least) sum += resultant(m, o, q, i);
     } else if (q->kind >= CLOSED) {
       const int k = m->contact[q->first + i];
-      const double force = o->z[m->n_motions + k];
-      const double area = o->met ? o->met[k].area : q->width > 0 ? o->value[q->width - 1 + k] : 0;
-      double pressure;
+      const double force = k < 0 ? 0 : o->z[m->n_motions + k];
+      const double area = k < 0 ? 0 : o->met ? o->met[k].area : o->value[m->areas + k];
+      const double pressure = force > least && area > 0 ? force / area : 0;
 
-      if (o->met || q->width > 0) weight = q->kind == CLOSED ? area : area > 0 ? 1 / area : 0;
-      pressure = force > least ? weight * force : 0;
-      if (q->kind == CLOSED) sum += force > least ? weight : 0;
+      if (q->kind == CLOSED) sum += force > least ? area : 0;
       if (q->kind == PRESSURE) sum = fmax(sum, pressure);
       if (q->kind == PRESSURE_SMALLEST) sum = fmin(sum, pressure);
     } else {
