@@ -445,11 +445,11 @@ static void ScalePath(Export *e, const PetscReal flexibility[])
   e->unit[0] = flexible > 0 ? e->unit[1] * flexible : 1;
 }
 
-/* The contacts with a row of B, and the sizes of z; M must be [0 A; -A^T W]. */
+/* The contacts with a row of B, and the sizes of z. */
 static PetscErrorCode FindProblem(Export *e, const PetscReal mu[])
 {
   HycoROM m = e->m;
-  PetscReal *M, *flexibility, *moves, size, held = 0, most = 0;
+  PetscReal *M, *flexibility, *moves, size;
   PetscInt *all;
   size_t n;
 
@@ -472,16 +472,6 @@ static PetscErrorCode FindProblem(Export *e, const PetscReal mu[])
   PetscUseTypeMethod(m, residual, mu, e->z, e->w, &size);
   for (PetscInt i = 0; i < e->n; i++) all[i] = i;
   PetscUseTypeMethod(m, jacobian, e->n, all, M);
-  for (size_t j = 0; j < n; j++) {
-    for (size_t i = 0; i < n; i++) {
-      const PetscBool x = (PetscBool)(i < (size_t)e->p), y = (PetscBool)(j < (size_t)e->p);
-      const PetscReal other = x == y ? M[i * n + j] : -M[i * n + j];
-
-      most = PetscMax(most, PetscAbsReal(M[j * n + i]));
-      /* The block of the motions must be 0, W symmetric, and the two blocks of A opposite. */
-      held = PetscMax(held, x && y ? PetscAbsReal(M[j * n + i]) : PetscAbsReal(M[j * n + i] - other));
-    }
-  }
   for (PetscInt i = 0; i < e->n; i++) {
     flexibility[i] = moves[i] = M[(size_t)(e->p + i) * (n + 1)];
     /* Where a body is pinned it has no flexibility of its own, but moves. */
@@ -495,10 +485,6 @@ static PetscErrorCode FindProblem(Export *e, const PetscReal mu[])
   if (HycoSceneHasFriction(e->s)) PetscCall(FindBlocks(e, moves));
   if (e->s->n_times) ScalePath(e, flexibility);
   PetscCall(PetscFree4(M, all, flexibility, moves));
-  HycoCheck(held <= 1e-10 * most,
-            "a model of type %s cannot be exported, as its unknowns are not contact forces alone; train one with "
-            "-hyco_model_type bodies",
-            m->model->type);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -538,8 +524,7 @@ static PetscErrorCode Scatter(const Export *e, PetscInt n, PetscReal **mu)
 /* Samples for a fit: y at z = 0, and what two z add; fixed: a parameter that stays in the middle of its range; -1: none. */
 typedef struct {
   PetscInt n;
-  const PetscReal *mu;
-  PetscReal *own, *y, *added; /* n x ny; n x 2 ny */
+  PetscReal *mu, *y, *added; /* n x ny; n x 2 ny */
 } Samples;
 
 static PetscErrorCode Sample(Export *e, PetscInt n, PetscInt fixed, Samples *o)
@@ -550,9 +535,8 @@ static PetscErrorCode Sample(Export *e, PetscInt n, PetscInt fixed, Samples *o)
 
   PetscFunctionBegin;
   o->n = n;
-  PetscCall(Scatter(e, n, &o->own));
-  for (PetscInt i = 0; fixed >= 0 && i < n; i++) o->own[i * n_par + fixed] = (e->s->lo[fixed] + e->s->hi[fixed]) / 2;
-  o->mu = o->own;
+  PetscCall(Scatter(e, n, &o->mu));
+  for (PetscInt i = 0; fixed >= 0 && i < n; i++) o->mu[i * n_par + fixed] = (e->s->lo[fixed] + e->s->hi[fixed]) / 2;
   PetscCall(PetscMalloc1((size_t)n * (size_t)e->ny + 1, &o->y));
   PetscCall(PetscMalloc1(2 * (size_t)n * (size_t)e->ny + 1, &o->added));
   PetscCall(PetscMalloc1(e->p + e->k + 1, &z));
@@ -574,11 +558,10 @@ static PetscErrorCode Sample(Export *e, PetscInt n, PetscInt fixed, Samples *o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* mu is own[] and not freed again. */
 static PetscErrorCode FreeSamples(Samples *o)
 {
   PetscFunctionBegin;
-  HycoFreeAll(&o->y, &o->added, &o->own);
+  HycoFreeAll(&o->y, &o->added, &o->mu);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -1218,12 +1201,11 @@ static PetscErrorCode Prepare(Export *e)
   PetscInt places; /* the group of the first body's places */
 
   PetscFunctionBegin;
-  HycoCheck(m->ops->unknowns && m->ops->residual && m->ops->jacobian && m->ops->expand,
+  HycoCheck(!strcmp(m->model->type, "bodies"),
             "a model of type %s cannot be exported; train one with -hyco_model_type bodies", m->model->type);
-  HycoCheck(!e->s->n_times || (!strcmp(m->model->type, "bodies") && !((HycoSubstructures)m->model->data)->inelastic->m),
-            "hyco export: programs of scenes with a history are written of models of type bodies whose bodies are "
-            "elastic; this one is of type %s%s; hyco predict, C and Python predict its paths",
-            m->model->type, strcmp(m->model->type, "bodies") ? "" : ", and bodies creep or yield");
+  HycoCheck(!e->s->n_times || !((HycoSubstructures)m->model->data)->inelastic->m,
+            "hyco export: bodies of this model creep or yield; programs are written of elastic bodies; hyco predict, C "
+            "and Python predict its paths");
   SetRanges(e->s);
   for (PetscInt p = 0; p < e->s->n_parameters; p++) mu[p] = (e->s->lo[p] + e->s->hi[p]) / 2;
   PetscCall(HycoROMPredict(m, e->s->n_parameters, mu));

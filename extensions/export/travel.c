@@ -64,10 +64,6 @@ static PetscErrorCode Check(HycoROM m)
 
   PetscFunctionBegin;
   HycoCheck(
-      !strcmp(m->model->type, "bodies"),
-      "export: surfaces that a map moves past each other need a model of type bodies; train one with -hyco_model_type "
-      "bodies");
-  HycoCheck(
       !HycoMeshIsQuadratic(fe->mesh) && fe->dim > 1,
       "export: contacts that travel on cells of second order, or in 1D, cannot be exported; use cells of first order");
   HycoCheck(
@@ -116,12 +112,12 @@ static PetscErrorCode WriteWeight(HycoSubstructures b, PetscInt k, PetscInt j, H
 
 PetscErrorCode HycoExportWeights(HycoROM m, PetscInt *n, char ***text)
 {
-  const HycoSubstructures b = strcmp(m->model->type, "bodies") ? NULL : (HycoSubstructures)m->model->data;
+  const HycoSubstructures b = (HycoSubstructures)m->model->data;
 
   PetscFunctionBegin;
   *n = 0;
   *text = NULL;
-  for (PetscInt k = 0; b && k < b->n; k++) {
+  for (PetscInt k = 0; k < b->n; k++) {
     for (PetscInt j = 0; j < b->body[k].n_samples && b->body[k].n_samples > 1; j++) {
       HycoText t = {0};
       PetscBool known = PETSC_FALSE;
