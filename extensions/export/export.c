@@ -558,21 +558,6 @@ static PetscErrorCode Sample(Export *e, PetscInt n, PetscInt fixed, Samples *o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-static PetscErrorCode FreeSamples(Samples *o)
-{
-  PetscFunctionBegin;
-  HycoFreeAll(&o->y, &o->added, &o->mu);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Sets the arrays to NULL, so that a fit may be tried again. */
-static PetscErrorCode FreeFit(HycoExportFit *fit)
-{
-  PetscFunctionBegin;
-  HycoFreeAll(&fit->function, &fit->coefficient);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* The scale of each group: its largest value in the samples, without forces or by them. */
 static void Scale(const Export *e, const Samples *o, PetscReal scale[])
 {
@@ -677,7 +662,7 @@ static PetscErrorCode FitRows(Export *e, PetscInt last, const HycoFitData *all, 
   if (e->n_weights > SEVERAL) last = PetscMin(last, 1);
   if (e->travel && fit == &e->base) PetscCall(FindSeeds(e, row[0], from, &n_seeds, seed));
   for (PetscInt level = n_seeds ? -1 - e->n_atoms : 0; level <= last && part.worst > EXACT; level++) {
-    PetscCall(FreeFit(&part));
+    HycoFreeAll(&part.function, &part.coefficient);
     PetscCall(HycoFitFunctions(e->n_atoms, e->atom, level, n_seeds, seed, EXACT, &data, &part));
   }
   PetscCall(PetscFree(seed));
@@ -687,7 +672,7 @@ static PetscErrorCode FitRows(Export *e, PetscInt last, const HycoFitData *all, 
     fit->worst = part.worst;
     fit->worst_row = row[part.worst_row];
   }
-  PetscCall(FreeFit(&part));
+  HycoFreeAll(&part.function, &part.coefficient);
   HycoFreeAll(&y, &group);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -698,7 +683,7 @@ static PetscErrorCode Fit(Export *e, PetscInt last, const HycoFitData *data, Hyc
   PetscInt *row;
 
   PetscFunctionBegin;
-  PetscCall(FreeFit(fit));
+  HycoFreeAll(&fit->function, &fit->coefficient);
   *fit = (HycoExportFit){0};
   PetscCall(PetscMalloc1(data->n_rows + 1, &row));
   for (PetscInt g = 0; g < (e->travel ? e->n_groups : 1) && fit->worst <= EXACT; g++) {
@@ -730,8 +715,7 @@ static PetscErrorCode FitBoth(Export *e, PetscInt fixed, PetscInt times)
   /* If the response has no functions the export is refused anyway: the costly levels are left out. */
   PetscCall(Fit(e, e->response.worst > EXACT ? 0 : HYCO_FIT_LEVELS - 1,
                 &(HycoFitData){o.n, e->ny, value, o.y, e->group, scale}, &e->base));
-  PetscCall(FreeSamples(&o));
-  HycoFreeAll(&scale, &value);
+  HycoFreeAll(&o.y, &o.added, &o.mu, &scale, &value);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -1282,8 +1266,7 @@ static PetscErrorCode ExportC(HycoROM m, const char path[], char **description)
   ierr = Build(&e);
   if (!ierr) ierr = HycoExportWrite(&e.out, e.s, m->model->path, path, description);
   HycoPointEnd(point);
-  PetscCall(FreeFit(&e.base));
-  PetscCall(FreeFit(&e.response));
+  HycoFreeAll(&e.base.function, &e.base.coefficient, &e.response.function, &e.response.coefficient);
   PetscCall(HycoTravelDestroy(&e.travel));
   if (e.z) PetscCall(PetscFree4(e.z, e.w, e.unit, e.contact));
   for (PetscInt i = 0; i < e.n_weights; i++) PetscCall(PetscFree(e.weight[i]));
