@@ -64,7 +64,8 @@ typedef struct _HycoROMOps {
   PetscErrorCode (*features)(HycoROM, PetscReal misfit[2]); /* features that indicate its errors, >= 0 */
   PetscErrorCode (*estimate)(HycoROM, HycoPrediction *);    /* its errors, without held-out points */
   /* gradients; without `residual` the type has none. Its problem is w = q + M z, z = (x, L): w = 0 for the p unknowns x,
-     0 <= w complementary to the n forces L >= 0 */
+     0 <= w complementary to the n forces L >= 0. Of paths of elastic bodies: of a step from rest, mu with the time, with
+     friction L by row (tangents follow the normal of their contact) */
   PetscErrorCode (*unknowns)(HycoROM, PetscInt *p, PetscInt *n, PetscReal z[]); /* z (p + n) of the last solve; NULL:
                                                                                    only the sizes */
   PetscErrorCode (*residual)(HycoROM, const PetscReal mu[], const PetscReal z[], PetscReal w[],

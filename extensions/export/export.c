@@ -6,6 +6,7 @@
   places of the surfaces instead (travel.c): the search, which is no function of the parameters, is the program's own.
 */
 #include "travel.h"
+#include <hycobodies.h>
 #include <hycoextensions.h>
 #include <hycomaterialimpl.h>
 #include <hycoquantities.h>
@@ -13,44 +14,54 @@
 #include <string.h>
 #include <time.h>
 
+#define PATHS
 #include "runtime/runtime.c"
+#include <hycocoulomb.h>
+#include "runtime/paths.c"
 
-#define EXACT      2e-11 /* error of a function at points that were not fitted */
-#define CHECKED    64    /* points at which the runtime is compared with the model */
-#define AGREES     1e-9  /* difference there, of an output's largest value */
-#define PLACES     6     /* at which expressions in space are functions of the parameters */
-#define MOST       6000000
-#define MOST_ITEMS 3000
-#define SAMPLES    120 /* points for the functions, of which a third checks them; more with weights of samples: */
-#define SEVERAL    20  /* samples: with more, products are tried of known functions alone */
-#define EACH       8   /* for each */
-#define NEARLY     1e-3 /* an error that more functions may remove; they are chosen from all at once at as many points: */
-#define MORE       3    /* times */
+#define EXACT          2e-11 /* error of a function at points that were not fitted */
+#define CHECKED        64    /* points at which the runtime is compared with the model */
+#define AGREES         1e-9  /* difference there, of an output's largest value */
+#define PLACES         6     /* at which expressions in space are functions of the parameters */
+#define MOST           6000000
+#define MOST_ITEMS     3000
+#define PATHS_CHECKED  8 /* or so many paths */
+#define PATH_TOLERANCE 1e-8
+#define ROUNDING       1e-14 /* of a coefficient beside others */
+#define SAMPLES        120   /* points for the functions, of which a third checks them; more with weights of samples: */
+#define SEVERAL        20    /* samples: with more, products are tried of known functions alone */
+#define EACH           8     /* for each */
+#define NEARLY         1e-3 /* an error that more functions may remove; they are chosen from all at once at as many points: */
+#define MORE           3 /* times */
 
 /* A value: of an output, of a contact's force along an axis, of a stress in a cell, of a displacement, of a travel. */
 typedef struct {
-  enum { QUANTITY, FORCE, CELL, NODE, TRAVEL } from;
-  PetscInt index, axis, group; /* group: the output to which it belongs; from n_outputs on those of a travel */
-  PetscReal coefficient[6];    /* of a cell's stresses */
-  PetscInt turned;             /* 1 + the body whose axes the values of a cell or node are in; 0: those of space */
+  enum { QUANTITY, FORCE, CELL, NODE, TRAVEL, COEFFICIENT, AREA } from;
+  PetscInt index, axis,
+      group; /* group: the output to which it belongs; from n_outputs on those of a travel; -1: of contacts */
+  PetscReal coefficient[6]; /* of a cell's stresses */
+  PetscInt turned;          /* 1 + the body whose axes the values of a cell or node are in; 0: those of space */
 } Row;
 
 typedef struct {
   HycoROM m;
   HycoScene s;
   HycoTravel travel;          /* NULL: no surface moves */
-  PetscInt p, n, k, *contact; /* motions and contacts of the model's problem; the contacts with a row, or all places */
+  PetscInt p, n, k, *contact; /* motions and contacts of the model's problem; the contacts with a row, or all places; */
+  PetscInt *first;            /* with friction rows instead; by contact of the model: its first one; NULL: its number */
   PetscReal *z, *unit;        /* p + n; their sizes */
   PetscReal *w;
   PetscInt n_atoms, n_rows, room, ny, n_groups, *group;
   HycoAtom *atom;
   Row *row;
-  PetscReal *area, *pressure; /* by contact of the model */
-  PetscInt travel_row;        /* the first row of the travel's values */
-  PetscInt n_weights;         /* of the samples of bodies: expressions */
+  PetscReal *area;     /* by contact of the model; where none travels, values: */
+  PetscInt travel_row; /* the first row of the travel's values */
+  PetscInt n_weights;  /* of the samples of bodies: expressions */
   char **weight;
   HycoExportFit base, response;
   HycoExportModel out;
+  double *state; /* of a path of the program */
+  PetscErrorCode failed;
 } Export;
 
 /* -- probing -- */
@@ -88,6 +99,17 @@ static PetscReal Stress(const Export *e, const Row *r, PetscInt n, const PetscRe
   return sum;
 }
 
+/* The areas of the contacts at the model's parameters. */
+static PetscErrorCode FindAreas(Export *e)
+{
+  HycoFE fe;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMBringContacts(e->m, &fe));
+  PetscCall(HycoContactAreas(fe, &e->m->pairs, e->area));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* y = (w, values) at mu for z: motions, then the contacts of e->contact in units of e->unit; NULL: 0. */
 static PetscErrorCode Probe(Export *e, const PetscReal mu[], const PetscReal z[], PetscReal y[])
 {
@@ -114,6 +136,7 @@ static PetscErrorCode Probe(Export *e, const PetscReal mu[], const PetscReal z[]
   PetscUseTypeMethod(m, expand);
   PetscCall(HycoROMMeasureQuantities(m, &prediction));
   PetscCall(HycoROMSumContacts(m, m->Lambda, &result));
+  if (!e->travel) PetscCall(FindAreas(e));
   HycoROMGetOutputFields(m, &u, &sigma);
   n_sigma = HycoStrainSize(m->model->mesh->dim);
   for (PetscInt i = 0; i < e->p; i++) y[i] = e->w[i];
@@ -127,6 +150,10 @@ static PetscErrorCode Probe(Export *e, const PetscReal mu[], const PetscReal z[]
              : r->from == NODE   ? Component(e, r, u)
              : r->from == TRAVEL ? HycoTravelValue(e->travel, r->index)
                                  : 0;
+    if (r->from == AREA) *value = e->area[r->index];
+    if (r->from == COEFFICIENT)
+      PetscCall(HycoExprEval(e->s->contact[m->pairs.contact[r->index]]->friction, mu, 1,
+                             m->fe->X + 3 * m->pairs.slave[r->index], value));
     if (r->from == CELL) *value = Stress(e, r, n_sigma, sigma + r->index * n_sigma);
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -225,8 +252,8 @@ static PetscErrorCode AddItems(Export *e, PetscInt quantity, Output *o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The contacts of an output. */
-static PetscErrorCode AddContacts(Export *e, const HycoQuantity *q, const PetscReal weight[], Output *o)
+/* The contacts of an output; -1: one that is always open, which counts as a pressure of 0. */
+static PetscErrorCode AddContacts(Export *e, const HycoQuantity *q, Output *o)
 {
   const HycoPairs *pairs = &e->m->model->pairs;
   PetscBool *of;
@@ -235,21 +262,12 @@ static PetscErrorCode AddContacts(Export *e, const HycoQuantity *q, const PetscR
   PetscCall(PetscMalloc1(pairs->n, &of));
   PetscCall(HycoPairsOfQuantity(e->s, e->m->model->mesh, pairs, q, of));
   o->first = e->out.n_contact;
-  o->weight = e->out.n_weights;
   for (PetscInt k = 0; k < pairs->n; k++) {
-    PetscInt at = 0;
+    PetscInt at = e->travel ? k : 0;
 
-    if (!of[k]) continue;
-    if (e->travel) { /* areas are the program's */
-      PetscCall(HycoExportAddContact(&e->out, k));
-      o->weight = -1;
-      o->n++;
-      continue;
-    }
-    while (at < e->k && e->contact[at] != k) at++;
-    if (at == e->k && (o->kind != PRESSURE_SMALLEST || !e->k)) continue; /* it is always open */
-    PetscCall(HycoExportAddContact(&e->out, at < e->k ? at : 0));
-    PetscCall(HycoExportAddWeight(&e->out, at < e->k ? weight[k] : 0));
+    while (!e->travel && at < e->k && e->contact[at] != (e->first ? e->first[k] : k)) at++;
+    if (!of[k] || (at == e->k && o->kind != PRESSURE_SMALLEST)) continue;
+    PetscCall(HycoExportAddContact(&e->out, at < e->k ? at : -1));
     o->n++;
   }
   PetscCall(PetscFree(of));
@@ -259,19 +277,14 @@ static PetscErrorCode AddContacts(Export *e, const HycoQuantity *q, const PetscR
 /* Of moved surfaces: the sum of the contacts' forces on their slaves, q is of, or their moment. */
 static PetscErrorCode AddForces(Export *e, const HycoQuantity *q, Output *o)
 {
-  const HycoPairs *pairs = &e->m->model->pairs;
   const PetscBool none = (PetscBool)(e->m->fe->formulation == HYCO_AXISYMMETRIC && !q->field); /* the sum of a ring */
-  PetscReal *weight;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(pairs->n, &weight));
-  for (PetscInt k = 0; k < pairs->n; k++) weight[k] = 0;
   *o = (Output){.kind = RESULTANT, .of = (int)q->field + (q->kind == HYCO_QUANTITY_MOMENT ? 3 : 0), .width = -1};
-  PetscCall(AddContacts(e, q, weight, o));
+  PetscCall(AddContacts(e, q, o));
   o->weight = e->out.n_weights;
   for (PetscInt k = 0; k < o->n + e->out.surfaces.n_nodes; k++)
     PetscCall(HycoExportAddWeight(&e->out, k < o->n && !none ? -1 : 0));
-  PetscCall(PetscFree(weight));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -294,35 +307,23 @@ static PetscErrorCode AddPush(Export *e, const PetscBool of[], PetscInt axis, Ou
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Area and pressure per force of each contact, measured one by one. */
-static PetscErrorCode MeasureContacts(Export *e)
+/* The work of friction: of the blocks of its contacts. */
+static PetscErrorCode AddWork(Export *e, const HycoQuantity *q, Output *o)
 {
   const HycoPairs *pairs = &e->m->model->pairs;
-  const HycoContactResult *result;
-  PetscReal *L;
+  PetscBool *of;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc1(pairs->n + 1, &L));
-  PetscCall(PetscCalloc1(pairs->n + 1, &e->area));
-  PetscCall(PetscCalloc1(pairs->n + 1, &e->pressure));
-  for (PetscInt k = 0; k < pairs->n; k++) {
-    /* A unit force on one contact: the results of its contact then are those of this row alone. */
-    L[k] = 1;
-    PetscCall(HycoROMSumContacts(e->m, L, &result));
-    L[k] = 0;
-    e->area[k] = result[pairs->contact[k]].area;
-    e->pressure[k] = result[pairs->contact[k]].pressure;
+  *o = (Output){.kind = WORK, .width = 1, .first = e->out.n_contact, .weight = -1};
+  PetscCall(PetscMalloc1(pairs->n, &of));
+  PetscCall(HycoPairsOfQuantity(e->s, e->m->model->mesh, pairs, q, of));
+  for (PetscInt b = 0, k = 0; b < e->out.m.n_slip; b++) {
+    while (e->first[k] != e->contact[e->out.m.row[b]]) k++;
+    if (!of[k]) continue;
+    PetscCall(HycoExportAddContact(&e->out, b));
+    o->n++;
   }
-  PetscCall(PetscFree(L));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The six numbers are the members of the runtime's Output, in their order. */
-static PetscErrorCode AddOutput(Export *e, const Output *o, const char name[], const char unit[])
-{
-  PetscFunctionBegin;
-  PetscCall(
-      HycoExportAddOutput(&e->out, (const int[6]){o->kind, o->of, o->n, o->width, o->first, o->weight}, name, unit));
+  PetscCall(PetscFree(of));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -343,20 +344,22 @@ static PetscErrorCode AddQuantity(Export *e, PetscInt k)
     o.kind = kind == HYCO_QUANTITY_MAX ? LARGEST : kind == HYCO_QUANTITY_MIN ? SMALLEST : SUM;
     if (o.kind == SUM) o.weight = e->out.n_weights;
     PetscCall(AddItems(e, k, &o));
-    for (PetscInt i = o.first; i < e->n_rows; i++) e->row[i].group = e->out.n_outputs;
+    for (PetscInt i = o.first; i < e->n_rows; i++) e->row[i].group = e->out.m.n_outputs;
+  } else if (kind == HYCO_QUANTITY_FRICTION && q->field == HYCO_FRICTION_WORK) {
+    PetscCall(AddWork(e, q, &o));
   } else if (kind >= HYCO_QUANTITY_AREA) {
     o.kind = kind == HYCO_QUANTITY_AREA ? CLOSED : kind == HYCO_QUANTITY_PRESSURE ? PRESSURE : PRESSURE_SMALLEST;
-    PetscCall(AddContacts(e, q, kind == HYCO_QUANTITY_AREA ? e->area : e->pressure, &o));
+    PetscCall(AddContacts(e, q, &o));
   } else if (e->travel && (kind == HYCO_QUANTITY_FORCE || kind == HYCO_QUANTITY_MOMENT)) {
     PetscCall(AddForces(e, q, &o));
   } else {
     const PetscBool *pushed = e->travel ? HycoROMGetPushed(e->m, k) : NULL;
 
     o.n = 1;
-    PetscCall(AddRow(e, (Row){.from = QUANTITY, .index = k, .group = e->out.n_outputs}));
+    PetscCall(AddRow(e, (Row){.from = QUANTITY, .index = k, .group = e->out.m.n_outputs}));
     if (pushed) PetscCall(AddPush(e, pushed, q->field, &o));
   }
-  PetscCall(AddOutput(e, &o, q->name, HycoExportUnit(e->s, q)));
+  PetscCall(HycoExportAddOutput(&e->out, &o, q->name, HycoExportUnit(e->s, q)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -368,7 +371,12 @@ static PetscErrorCode FindOutputs(Export *e)
   char name[HYCO_LINE];
 
   PetscFunctionBegin;
-  PetscCall(MeasureContacts(e));
+  PetscCall(PetscMalloc1(e->m->pairs.n + 1, &e->area));
+  e->out.m.areas = (int)e->n_rows;
+  for (PetscInt i = 0, k = 0; i < e->k && !e->travel; i++) {
+    while (k + 1 < e->m->pairs.n && (e->first ? e->first[k + 1] : k + 1) <= e->contact[i]) k++;
+    PetscCall(AddRow(e, (Row){.from = AREA, .index = k, .group = -1}));
+  }
   for (PetscInt k = 0; k < s->n_quantities; k++) PetscCall(AddQuantity(e, k));
   for (PetscInt c = 0; c < s->n_contacts; c++) {
     for (PetscInt a = 0; a < e->m->model->mesh->dim; a++) {
@@ -379,17 +387,17 @@ static PetscErrorCode FindOutputs(Export *e)
       if (e->travel)
         PetscCall(AddForces(e, &q, &o));
       else
-        PetscCall(AddRow(e, (Row){.from = FORCE, .index = c, .axis = a, .group = e->out.n_outputs}));
+        PetscCall(AddRow(e, (Row){.from = FORCE, .index = c, .axis = a, .group = e->out.m.n_outputs}));
       HycoFormat(name, "%s.force_%c", s->contact[c]->name, "xyz"[a]);
-      PetscCall(AddOutput(e, &o, name, HycoExportUnit(s, &q)));
+      PetscCall(HycoExportAddOutput(&e->out, &o, name, HycoExportUnit(s, &q)));
     }
     for (PetscInt a = 0; a < 2; a++) {
-      Output o = {.kind = a ? PRESSURE : CLOSED};
+      Output o = {.kind = a ? PRESSURE : CLOSED, .weight = -1};
 
       q.kind = a ? HYCO_QUANTITY_PRESSURE : HYCO_QUANTITY_AREA;
-      PetscCall(AddContacts(e, &q, a ? e->pressure : e->area, &o));
+      PetscCall(AddContacts(e, &q, &o));
       HycoFormat(name, "%s.%s", s->contact[c]->name, a ? "pressure_max" : "area");
-      PetscCall(AddOutput(e, &o, name, HycoExportUnit(s, &q)));
+      PetscCall(HycoExportAddOutput(&e->out, &o, name, HycoExportUnit(s, &q)));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -397,11 +405,51 @@ static PetscErrorCode FindOutputs(Export *e)
 
 /* -- the problem -- */
 
-/* The contacts with a row of B, and the sizes of z; M must be [0 A; -A^T W]. */
+/* The rows of contacts with friction, and their blocks: those that a force along the normal moves, moves[] by row. */
+static PetscErrorCode FindBlocks(Export *e, const PetscReal moves[])
+{
+  const HycoPairs *pairs = &e->m->model->pairs;
+  HycoExportModel *o = &e->out;
+  PetscInt at = 0;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(pairs->n + 1, &e->first));
+  PetscCall(PetscCalloc1(pairs->n + 1, &o->m.row));
+  PetscCall(PetscMalloc1(pairs->n + 1, &o->m.coefficient));
+  PetscCall(PetscMalloc1(e->n + 1, &o->m.normal));
+  for (PetscInt k = 0; k < pairs->n; k++) {
+    const PetscBool rubs = (PetscBool)(e->s->contact[pairs->contact[k]]->friction != NULL);
+    const PetscInt rows = rubs ? e->m->model->mesh->dim : 1;
+
+    e->first[k] = at;
+    for (PetscInt r = at; r < at + rows && moves[at] > 0; r++) {
+      o->m.normal[e->k] = r == at;
+      e->contact[e->k++] = r;
+    }
+    if (moves[at] > 0) o->m.coefficient[o->m.n_slip++] = rubs ? (int)k : -1; /* a row's number once there are rows */
+    if (moves[at] > 0) o->m.row[o->m.n_slip] = (int)e->k;
+    at += rows;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of a path: the largest forces of the listed times, as the last one may be without loads; displacements of their size. */
+static void ScalePath(Export *e, const PetscReal flexibility[])
+{
+  PetscReal most = 0, flexible = 0;
+
+  for (PetscInt i = 0; i < e->m->trace.n_listed * e->m->model->pairs.n; i++)
+    most = PetscMax(most, e->m->trace.Lambda[i]);
+  for (PetscInt i = 0; i < e->n; i++) flexible = PetscMax(flexible, flexibility[i]);
+  e->unit[1] = most > 0 ? most : 1;
+  e->unit[0] = flexible > 0 ? e->unit[1] * flexible : 1;
+}
+
+/* The contacts with a row of B, and the sizes of z. */
 static PetscErrorCode FindProblem(Export *e, const PetscReal mu[])
 {
   HycoROM m = e->m;
-  PetscReal *M, size, held = 0, most = 0;
+  PetscReal *M, *flexibility, *moves, size;
   PetscInt *all;
   size_t n;
 
@@ -420,29 +468,23 @@ static PetscErrorCode FindProblem(Export *e, const PetscReal mu[])
   for (PetscInt i = 0; i < 2; i++) e->unit[i] = e->unit[i] > 0 ? e->unit[i] : 1;
   for (PetscInt i = 0; e->travel && i < e->n; i++) e->contact[e->k++] = i;
   if (e->travel) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscMalloc2(n * n + 1, &M, e->n + 1, &all));
+  PetscCall(PetscMalloc4(n * n + 1, &M, e->n + 1, &all, e->n + 1, &flexibility, e->n + 1, &moves));
   PetscUseTypeMethod(m, residual, mu, e->z, e->w, &size);
   for (PetscInt i = 0; i < e->n; i++) all[i] = i;
   PetscUseTypeMethod(m, jacobian, e->n, all, M);
-  for (size_t j = 0; j < n; j++) {
-    for (size_t i = 0; i < n; i++) {
-      const PetscBool x = (PetscBool)(i < (size_t)e->p), y = (PetscBool)(j < (size_t)e->p);
-      const PetscReal other = x == y ? M[i * n + j] : -M[i * n + j];
-
-      most = PetscMax(most, PetscAbsReal(M[j * n + i]));
-      /* The block of the motions must be 0, W symmetric, and the two blocks of A opposite. */
-      held = PetscMax(held, x && y ? PetscAbsReal(M[j * n + i]) : PetscAbsReal(M[j * n + i] - other));
-    }
-  }
   for (PetscInt i = 0; i < e->n; i++) {
-    /* A contact without flexibility never touches: its slave faces nothing. */
-    if (M[(size_t)(e->p + i) * (n + 1)] > 0) e->contact[e->k++] = i;
+    flexibility[i] = moves[i] = M[(size_t)(e->p + i) * (n + 1)];
+    /* Where a body is pinned it has no flexibility of its own, but moves. */
+    for (size_t j = 0; j < (size_t)e->p; j++)
+      moves[i] = PetscMax(moves[i], PetscAbsReal(M[j * n + (size_t)(e->p + i)]));
   }
-  PetscCall(PetscFree2(M, all));
-  HycoCheck(held <= 1e-10 * most,
-            "a model of type %s cannot be exported, as its unknowns are not contact forces alone; train one with "
-            "-hyco_model_type bodies",
-            m->model->type);
+  /* A contact that nothing moves never touches: its slave faces nothing. */
+  for (PetscInt i = 0; i < e->n && !HycoSceneHasFriction(e->s); i++) {
+    if (moves[i] > 0) e->contact[e->k++] = i;
+  }
+  if (HycoSceneHasFriction(e->s)) PetscCall(FindBlocks(e, moves));
+  if (e->s->n_times) ScalePath(e, flexibility);
+  PetscCall(PetscFree4(M, all, flexibility, moves));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -456,30 +498,45 @@ static void Irregular(PetscInt n, PetscInt which, PetscReal z[])
   for (PetscInt i = 0; i < n; i++) z[i] = 0.1 + (i + 1) * step - floor((i + 1) * step);
 }
 
+/* n points over the ranges, the last variables of a path (time, tables) each for itself. The caller frees mu. */
+static PetscErrorCode Scatter(const Export *e, PetscInt n, PetscReal **mu)
+{
+  const PetscInt n_par = e->s->n_parameters, n_var = e->s->n_variables;
+  HycoSamples samples;
+  const PetscReal *at;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesCreate(e->s, &samples));
+  PetscCall(HycoSamplesAddScattered(samples, n));
+  PetscCall(HycoSamplesGet(samples, NULL, NULL, &at));
+  PetscCall(PetscMalloc1(n * n_var, mu));
+  for (PetscInt k = 0; k < n * n_var; k++) {
+    const PetscInt i = k / n_var, p = k % n_var;
+    const PetscReal share = (PetscReal)(i + 1) * PetscSqrtReal((PetscReal)(2 + 3 * p));
+
+    (*mu)[k] =
+        p < n_par ? at[i * n_par + p] : e->s->lo[p] + (e->s->hi[p] - e->s->lo[p]) * (share - PetscFloorReal(share));
+  }
+  PetscCall(HycoSamplesDestroy(&samples));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Samples for a fit: y at z = 0, and what two z add; fixed: a parameter that stays in the middle of its range; -1: none. */
 typedef struct {
   PetscInt n;
-  const PetscReal *mu;
-  PetscReal *own, *y, *added; /* n x ny; n x 2 ny */
+  PetscReal *mu, *y, *added; /* n x ny; n x 2 ny */
 } Samples;
 
 static PetscErrorCode Sample(Export *e, PetscInt n, PetscInt fixed, Samples *o)
 {
-  HycoSamples samples;
-  const PetscReal *mu;
+  const PetscInt n_par = e->s->n_variables;
   PetscReal *z;
-  const PetscInt n_par = e->s->n_parameters;
   PetscErrorCode ierr = 0;
 
   PetscFunctionBegin;
   o->n = n;
-  PetscCall(HycoSamplesCreate(e->s, &samples));
-  PetscCall(HycoSamplesAddScattered(samples, n));
-  PetscCall(HycoSamplesGet(samples, NULL, NULL, &mu));
-  HycoDuplicate(n * n_par, mu, &o->own);
-  PetscCall(HycoSamplesDestroy(&samples));
-  for (PetscInt i = 0; fixed >= 0 && i < n; i++) o->own[i * n_par + fixed] = (e->s->lo[fixed] + e->s->hi[fixed]) / 2;
-  o->mu = o->own;
+  PetscCall(Scatter(e, n, &o->mu));
+  for (PetscInt i = 0; fixed >= 0 && i < n; i++) o->mu[i * n_par + fixed] = (e->s->lo[fixed] + e->s->hi[fixed]) / 2;
   PetscCall(PetscMalloc1((size_t)n * (size_t)e->ny + 1, &o->y));
   PetscCall(PetscMalloc1(2 * (size_t)n * (size_t)e->ny + 1, &o->added));
   PetscCall(PetscMalloc1(e->p + e->k + 1, &z));
@@ -498,22 +555,6 @@ static PetscErrorCode Sample(Export *e, PetscInt n, PetscInt fixed, Samples *o)
   }
   PetscCall(PetscFree(z));
   PetscCall(ierr);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* mu is own[] and not freed again. */
-static PetscErrorCode FreeSamples(Samples *o)
-{
-  PetscFunctionBegin;
-  HycoFreeAll(&o->y, &o->added, &o->own);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Sets the arrays to NULL, so that a fit may be tried again. */
-static PetscErrorCode FreeFit(HycoExportFit *fit)
-{
-  PetscFunctionBegin;
-  HycoFreeAll(&fit->function, &fit->coefficient);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -621,7 +662,7 @@ static PetscErrorCode FitRows(Export *e, PetscInt last, const HycoFitData *all, 
   if (e->n_weights > SEVERAL) last = PetscMin(last, 1);
   if (e->travel && fit == &e->base) PetscCall(FindSeeds(e, row[0], from, &n_seeds, seed));
   for (PetscInt level = n_seeds ? -1 - e->n_atoms : 0; level <= last && part.worst > EXACT; level++) {
-    PetscCall(FreeFit(&part));
+    HycoFreeAll(&part.function, &part.coefficient);
     PetscCall(HycoFitFunctions(e->n_atoms, e->atom, level, n_seeds, seed, EXACT, &data, &part));
   }
   PetscCall(PetscFree(seed));
@@ -631,7 +672,7 @@ static PetscErrorCode FitRows(Export *e, PetscInt last, const HycoFitData *all, 
     fit->worst = part.worst;
     fit->worst_row = row[part.worst_row];
   }
-  PetscCall(FreeFit(&part));
+  HycoFreeAll(&part.function, &part.coefficient);
   HycoFreeAll(&y, &group);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -642,7 +683,7 @@ static PetscErrorCode Fit(Export *e, PetscInt last, const HycoFitData *data, Hyc
   PetscInt *row;
 
   PetscFunctionBegin;
-  PetscCall(FreeFit(fit));
+  HycoFreeAll(&fit->function, &fit->coefficient);
   *fit = (HycoExportFit){0};
   PetscCall(PetscMalloc1(data->n_rows + 1, &row));
   for (PetscInt g = 0; g < (e->travel ? e->n_groups : 1) && fit->worst <= EXACT; g++) {
@@ -674,8 +715,7 @@ static PetscErrorCode FitBoth(Export *e, PetscInt fixed, PetscInt times)
   /* If the response has no functions the export is refused anyway: the costly levels are left out. */
   PetscCall(Fit(e, e->response.worst > EXACT ? 0 : HYCO_FIT_LEVELS - 1,
                 &(HycoFitData){o.n, e->ny, value, o.y, e->group, scale}, &e->base));
-  PetscCall(FreeSamples(&o));
-  HycoFreeAll(&scale, &value);
+  HycoFreeAll(&o.y, &o.added, &o.mu, &scale, &value);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -720,10 +760,10 @@ static PetscErrorCode Merge(Export *e, const HycoExportFit *fit, PetscInt place[
     const HycoFunction *f = &fit->function[k];
     PetscInt at = 0;
 
-    while (at < o->n_functions && memcmp(&o->function[at], f, sizeof(*f)) != 0) at++;
-    if (at == o->n_functions) {
+    while (at < o->m.n_functions && memcmp(&o->function[at], f, sizeof(*f)) != 0) at++;
+    if (at == o->m.n_functions) {
       PetscCall(PetscRealloc((size_t)(at + 1) * sizeof(*o->function), &o->function));
-      o->function[o->n_functions++] = *f;
+      o->function[o->m.n_functions++] = *f;
     }
     place[k] = at;
   }
@@ -756,16 +796,12 @@ static PetscErrorCode RefineInverse(size_t n, const PetscReal M[], PetscReal X[]
 /* Points at which the functions of the response are independent (n x n_par), and the inverse of their values there. */
 static PetscErrorCode ChoosePoints(Export *e, PetscReal point[], PetscReal inverse[])
 {
-  const PetscInt n = e->response.n, N = 4 * n + 16, n_par = e->s->n_parameters;
-  HycoSamples samples;
-  const PetscReal *mu;
-  PetscReal *value, *chosen, *scale;
+  const PetscInt n = e->response.n, N = 4 * n + 16, n_par = e->s->n_variables;
+  PetscReal *mu, *value, *chosen, *scale;
   PetscInt *pivot;
 
   PetscFunctionBegin;
-  PetscCall(HycoSamplesCreate(e->s, &samples));
-  PetscCall(HycoSamplesAddScattered(samples, N));
-  PetscCall(HycoSamplesGet(samples, NULL, NULL, &mu));
+  PetscCall(Scatter(e, N, &mu));
   PetscCall(PetscMalloc4(n * N, &value, n * n, &chosen, n, &scale, N, &pivot));
   PetscCall(PetscArrayzero(scale, n));
   for (PetscInt i = 0; i < N; i++) {
@@ -784,7 +820,7 @@ static PetscErrorCode ChoosePoints(Export *e, PetscReal point[], PetscReal inver
   PetscCall(RefineInverse((size_t)n, chosen, inverse));
   for (PetscInt k = 0; k < n * n; k++) inverse[k] /= scale[k / n];
   PetscCall(PetscFree4(value, chosen, scale, pivot));
-  PetscCall(HycoSamplesDestroy(&samples));
+  PetscCall(PetscFree(mu));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -806,10 +842,11 @@ static PetscErrorCode AddMatrix(Export *e, const PetscReal mu[], const PetscReal
   }
   for (PetscInt f = 0; f < e->response.n; f++) {
     for (size_t i = 0; i < k; i++) {
-      for (size_t j = 0; j < p && e->travel; j++) o->A[((size_t)f * p + j) * k + i] += share[f] * M[i * p + j];
+      for (size_t j = 0; j < p && e->travel; j++) o->m.A[((size_t)f * p + j) * k + i] += share[f] * M[i * p + j];
       if (e->travel) continue;
-      for (size_t j = 0; j <= i; j++) o->W[(size_t)f * size + i * (i + 1) / 2 + j] += share[f] * M[(p + i) * n + p + j];
-      for (size_t j = 0; j < p; j++) o->A[((size_t)f * p + j) * k + i] += share[f] * M[(p + i) * n + j];
+      for (size_t j = 0; j <= i; j++)
+        o->m.W[(size_t)f * size + i * (i + 1) / 2 + j] += share[f] * M[(p + i) * n + p + j];
+      for (size_t j = 0; j < p; j++) o->m.A[((size_t)f * p + j) * k + i] += share[f] * M[(p + i) * n + j];
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -823,12 +860,14 @@ static PetscErrorCode AddValues(Export *e, const PetscReal mu[], const PetscReal
 
   PetscFunctionBegin;
   PetscCall(PetscCalloc3(n + 1, &z, e->ny, &y, e->ny, &y0));
-  PetscCall(Probe(e, mu, NULL, y0));
+  /* Results count friction where there is a normal force alone. */
+  for (PetscInt c = 0; e->first && c < e->k; c++) z[e->p + c] = e->out.m.normal[c];
+  PetscCall(Probe(e, mu, z, y0));
   /* n probes at each point of the response: the values need no Jacobian of their own. */
   for (PetscInt c = 0; c < n && e->n_rows; c++) {
-    z[c] = 1;
+    z[c] += 1;
     PetscCall(Probe(e, mu, z, y));
-    z[c] = 0;
+    z[c] -= 1;
     for (PetscInt r = 0; r < e->n_rows; r++) {
       const PetscReal change = (y[n + r] - y0[n + r]) / e->unit[c >= e->p];
 
@@ -843,14 +882,55 @@ static PetscErrorCode AddValues(Export *e, const PetscReal mu[], const PetscReal
 /* The terms by unknown: most have no force, and are passed over. */
 static PetscErrorCode Transpose(size_t n, HycoExportModel *o)
 {
-  const size_t terms = (size_t)o->n_terms;
+  const size_t terms = (size_t)o->m.n_terms;
   PetscReal *by;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(n * terms + 1, &by));
-  for (size_t i = 0; i < n * terms; i++) by[i % n * terms + i / n] = o->term[i];
-  PetscCall(PetscFree(o->term));
-  o->term = by;
+  for (size_t i = 0; i < n * terms; i++) by[i % n * terms + i / n] = o->m.term[i];
+  PetscCall(PetscFree(o->m.term));
+  o->m.term = by;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* size[n]: of functions at the ends, the middle and between, where a weight of a sample is not 0 everywhere. */
+static PetscErrorCode SizeFunctions(Export *e, PetscInt n, const HycoFunction f[], PetscReal size[])
+{
+  PetscReal *value, mu[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n + 1, &value));
+  PetscCall(PetscArrayzero(size, n));
+  for (PetscInt k = 0; k < 7; k++) {
+    for (PetscInt p = 0; p < e->s->n_variables; p++)
+      mu[p] = e->s->lo[p] + (e->s->hi[p] - e->s->lo[p]) * (k < 3 ? (PetscReal)k / 2 : 0.07 + 0.23 * (PetscReal)(k - 3));
+    PetscCall(HycoFunctionsEvaluate(e->s, e->atom, n, f, mu, value));
+    for (PetscInt i = 0; i < n; i++) size[i] = PetscMax(size[i], PetscAbsReal(value[i]));
+  }
+  PetscCall(PetscFree(value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Coefficients of gaps and of values without forces that are round-off beside the others of their group are 0, so
+   that nothing presses where there are no loads. */
+static PetscErrorCode DropRounding(Export *e)
+{
+  const PetscInt n = e->base.n;
+  PetscReal *size, *most;
+
+  PetscFunctionBegin;
+  PetscCall(PetscMalloc1(n + 1, &size));
+  PetscCall(PetscCalloc1(e->n_groups, &most));
+  PetscCall(SizeFunctions(e, n, e->base.function, size));
+  for (PetscInt pass = 0; pass < 2; pass++) {
+    for (PetscInt i = 0; i < e->ny * n; i++) {
+      PetscReal *of = &most[e->group[i / n]], *c = &e->base.coefficient[i];
+
+      if (!pass) *of = PetscMax(*of, PetscAbsReal(*c) * size[i % n]);
+      if (pass && PetscAbsReal(*c) * size[i % n] <= ROUNDING * *of) *c = 0;
+    }
+  }
+  HycoFreeAll(&size, &most);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -859,17 +939,11 @@ static PetscErrorCode KeepTerms(Export *e, const PetscInt place[], const PetscRe
 {
   const size_t n = (size_t)(e->p + e->k);
   const PetscInt n_f = e->response.n;
-  PetscReal *scale, *value, *size, mu[HYCO_MAX_PARAMETERS];
+  PetscReal *scale, *size;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc3(n_f, &scale, n_f, &value, n_f, &size));
-  /* Sizes of the functions: at the ends, the middle and between, where a weight of a sample is not 0 everywhere. */
-  for (PetscInt k = 0; k < 7; k++) {
-    for (PetscInt p = 0; p < e->s->n_parameters; p++)
-      mu[p] = e->s->lo[p] + (e->s->hi[p] - e->s->lo[p]) * (k < 3 ? (PetscReal)k / 2 : 0.07 + 0.23 * (PetscReal)(k - 3));
-    PetscCall(HycoFunctionsEvaluate(e->s, e->atom, n_f, e->response.function, mu, value));
-    for (PetscInt f = 0; f < n_f; f++) scale[f] = PetscMax(scale[f], PetscAbsReal(value[f]));
-  }
+  PetscCall(PetscMalloc2(n_f, &scale, n_f, &size));
+  PetscCall(SizeFunctions(e, n_f, e->response.function, scale));
   for (PetscInt r = 0; r < e->n_rows; r++) {
     PetscReal most = 0;
 
@@ -887,7 +961,7 @@ static PetscErrorCode KeepTerms(Export *e, const PetscInt place[], const PetscRe
     }
   }
   PetscCall(Transpose(n, &e->out));
-  PetscCall(PetscFree3(scale, value, size));
+  PetscCall(PetscFree2(scale, size));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -911,31 +985,36 @@ static PetscErrorCode Fill(Export *e)
       "of outputs",
       (double)numbers, (double)MOST);
   PetscCall(PetscMalloc1(e->base.n + e->response.n + 1, &place));
+  PetscCall(DropRounding(e));
   PetscCall(Merge(e, &e->base, place));
   PetscCall(Merge(e, &e->response, place + e->base.n));
-  PetscCall(PetscCalloc1((size_t)e->ny * (size_t)o->n_functions + 1, &o->offset));
+  PetscCall(PetscCalloc1((size_t)e->ny * (size_t)o->m.n_functions + 1, &o->m.offset));
   for (PetscInt r = 0; r < e->ny; r++) {
     for (PetscInt j = 0; j < e->base.n; j++)
-      o->offset[(size_t)r * (size_t)o->n_functions + (size_t)place[j]] =
+      o->m.offset[(size_t)r * (size_t)o->m.n_functions + (size_t)place[j]] =
           e->base.coefficient[(size_t)r * (size_t)e->base.n + (size_t)j];
   }
-  o->n_motions = e->p;
-  o->n_places = e->k;
-  o->n_contacts = e->travel ? e->m->model->pairs.n : e->k;
+  o->m.n_parameters = (int)e->s->n_parameters;
+  o->m.n_tables = (int)e->s->n_tables;
+  o->m.table = e->s->table;
+  o->m.surfaces = e->travel ? &o->surfaces : NULL;
+  o->m.n_motions = e->p;
+  o->m.n_places = e->k;
+  o->m.n_contacts = e->travel ? e->m->model->pairs.n : e->k;
   if (e->travel) PetscCall(HycoTravelBlocks(e->travel, e->travel_row, o));
-  o->n_values = e->n_rows;
-  o->n_stiffness = e->response.n;
-  PetscCall(PetscMalloc1(e->response.n + 1, &o->stiffness));
-  for (PetscInt i = 0; i < e->response.n; i++) o->stiffness[i] = (int)place[e->base.n + i];
-  PetscCall(PetscCalloc1(f * triangle + 1, &o->W));
-  PetscCall(PetscCalloc1(f * (size_t)e->p * k + 1, &o->A));
-  PetscCall(PetscCalloc5(f * (size_t)e->s->n_parameters + 1, &point, f * f + 1, &inverse, f * (size_t)e->n_rows * n + 1,
+  o->m.n_values = e->n_rows;
+  o->m.n_stiffness = e->response.n;
+  PetscCall(PetscMalloc1(e->response.n + 1, &o->m.stiffness));
+  for (PetscInt i = 0; i < e->response.n; i++) o->m.stiffness[i] = (int)place[e->base.n + i];
+  PetscCall(PetscCalloc1(f * triangle + 1, &o->m.W));
+  PetscCall(PetscCalloc1(f * (size_t)e->p * k + 1, &o->m.A));
+  PetscCall(PetscCalloc5(f * (size_t)e->s->n_variables + 1, &point, f * f + 1, &inverse, f * (size_t)e->n_rows * n + 1,
                          &T, matrix + 1, &M, f + 1, &share));
   PetscCall(ChoosePoints(e, point, inverse));
   for (PetscInt i = 0; i < e->response.n; i++) {
     for (PetscInt j = 0; j < e->response.n; j++) share[j] = inverse[(size_t)j * f + (size_t)i];
-    PetscCall(AddMatrix(e, point + i * e->s->n_parameters, share, M));
-    PetscCall(AddValues(e, point + i * e->s->n_parameters, share, T));
+    PetscCall(AddMatrix(e, point + i * e->s->n_variables, share, M));
+    PetscCall(AddValues(e, point + i * e->s->n_variables, share, T));
   }
   PetscCall(KeepTerms(e, place + e->base.n, T));
   PetscCall(PetscFree5(point, inverse, T, M, share));
@@ -945,51 +1024,61 @@ static PetscErrorCode Fill(Export *e)
 
 /* -- comparison with the model -- */
 
-/* The program's results at a point as it has them: its functions in the library's arithmetic. */
-static PetscErrorCode RunHere(Export *e, const Model *model, Work *o, const PetscReal mu[], PetscReal out[],
+/* The program's functions in the library's arithmetic. */
+static int FunctionsHere(void *context, const double v[], double f[])
+{
+  Export *e = (Export *)context;
+
+  e->failed = HycoFunctionsEvaluate(e->s, e->atom, e->out.m.n_functions, e->out.function, v, f);
+  return e->failed != 0;
+}
+
+/* The program's results at a point, of a path at listed time j after those before it. */
+static PetscErrorCode RunHere(Export *e, const Model *model, Work *o, const PetscReal mu[], PetscInt j, PetscReal out[],
                               PetscBool *solved)
 {
   double kkt;
-  int its;
+  int its, status;
 
   PetscFunctionBegin;
-  PetscCall(HycoFunctionsEvaluate(e->s, e->atom, e->out.n_functions, e->out.function, mu, o->f));
-  if (e->travel) PetscCall(HycoTravelPositions(&e->out, e->s, mu, o->room.X));
-  *solved = (PetscBool)(predict(model, o, out, &kkt, &its) == OK);
+  if (e->s->n_times) {
+    if (!j) PetscCall(PetscArrayzero(e->state, state_size(model)));
+    status = advance(model, o, FunctionsHere, e, mu, e->s->times[j], e->state, out, &kkt, &its);
+  } else {
+    (void)FunctionsHere(e, mu, o->f);
+    if (e->travel) PetscCall(HycoTravelPositions(&e->out, e->s, mu, o->room.X));
+    status = predict(model, o, out, &kkt, &its);
+  }
+  PetscCall(e->failed);
+  *solved = (PetscBool)(status == OK);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The model's results in the order of the outputs. *solved: its problem is. */
-static PetscErrorCode RunModel(Export *e, const PetscReal mu[], PetscReal out[], PetscBool *solved)
+/* The model's results in the order of the outputs, as above. *solved: its problem is. */
+static PetscErrorCode RunModel(Export *e, const PetscReal mu[], PetscInt j, PetscReal out[], PetscBool *solved)
 {
   const HycoContactResult *result;
   HycoPrediction prediction;
+  HycoHistory history = {0};
+  const PetscReal *quantity = prediction.quantity;
   PetscInt at = 0, n;
 
   PetscFunctionBegin;
-  PetscCall(HycoROMPredict(e->m, e->s->n_parameters, mu));
+  if (!j) PetscCall(HycoROMPredict(e->m, e->s->n_parameters, mu));
   PetscCall(HycoROMGetPrediction(e->m, &prediction));
   *solved = (PetscBool)(prediction.reason > 0);
-  for (PetscInt k = 0; k < e->s->n_quantities; k++) out[at++] = prediction.quantity[k];
+  if (e->s->n_times) PetscCall(HycoROMGetHistory(e->m, &history));
+  if (e->s->n_times) *solved = (PetscBool)(*solved || j + 1 < history.n);
+  if (e->s->n_times && !*solved) PetscFunctionReturn(PETSC_SUCCESS);
+  if (e->s->n_times) PetscCall(HycoROMSetStep(e->m, j));
+  if (e->s->n_times) quantity = history.step[j].quantity;
+  for (PetscInt k = 0; k < e->s->n_quantities; k++) out[at++] = quantity[k];
   PetscCall(HycoROMGetContacts(e->m, &n, &result));
   for (PetscInt c = 0; c < n; c++) {
     for (PetscInt a = 0; a < e->m->model->mesh->dim; a++) out[at++] = result[c].force[a];
     out[at++] = result[c].area;
     out[at++] = result[c].pressure;
   }
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* Sets e->out.seconds, the processor time of predictions one after the other, as a program makes them. */
-static PetscErrorCode Time(Export *e, const Model *model, Work *o, const PetscReal mu[], PetscReal out[])
-{
-  const clock_t begin = clock();
-  PetscBool solved;
-
-  PetscFunctionBegin;
-  for (PetscInt i = 0; i < e->out.checked; i++)
-    PetscCall(RunHere(e, model, o, mu + i * e->s->n_parameters, out, &solved));
-  e->out.seconds = (PetscReal)(clock() - begin) / CLOCKS_PER_SEC;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -1006,27 +1095,35 @@ static PetscReal ScaleOf(PetscInt n, char *const name[], const PetscReal most[],
   return scale;
 }
 
-/* Sets e->out.difference: of an output relative to its largest value, at points over the ranges; fails if it is no
-   round-off. */
+/* Sets e->out.difference: of an output relative to its largest value, at points over the ranges, of paths at their listed
+   times; fails if it is no round-off. And e->out.seconds, the processor time of the program. */
 static PetscErrorCode Compare(Export *e, const Model *model, void *memory)
 {
-  const PetscInt n = e->out.n_outputs;
+  const PetscInt n = e->out.m.n_outputs, times = PetscMax(e->s->n_times, 1);
   HycoSamples samples;
   const PetscReal *mu;
   PetscReal *mine, *theirs, *most, *worst;
-  PetscBool solved = PETSC_FALSE, theirs_solved = PETSC_FALSE;
+  PetscBool solved = PETSC_TRUE, theirs_solved = PETSC_TRUE;
+  PetscInt points;
+  clock_t begin;
   Work o;
 
   PetscFunctionBegin;
   /* Once for all points: the runtime needs no state between predictions. */
   place(model, memory, &o);
   PetscCall(HycoSamplesCreate(e->s, &samples));
-  PetscCall(HycoSamplesAddScattered(samples, CHECKED));
-  PetscCall(HycoSamplesGet(samples, &e->out.checked, NULL, &mu));
+  PetscCall(HycoSamplesAddScattered(samples, e->s->n_times ? PATHS_CHECKED : CHECKED));
+  PetscCall(HycoSamplesGet(samples, &points, NULL, &mu));
   PetscCall(PetscCalloc4(n + 1, &mine, n + 1, &theirs, n + 1, &most, n + 1, &worst));
-  for (PetscInt i = 0; i < e->out.checked; i++) {
-    PetscCall(RunModel(e, mu + i * e->s->n_parameters, theirs, &theirs_solved));
-    PetscCall(RunHere(e, model, &o, mu + i * e->s->n_parameters, mine, &solved));
+  for (PetscInt i = 0; i < points * times; i++) {
+    const PetscReal *at = mu + i / times * e->s->n_parameters;
+
+    if (i % times && !solved) continue; /* a path that has ended */
+    PetscCall(RunModel(e, at, i % times, theirs, &theirs_solved));
+    begin = clock();
+    PetscCall(RunHere(e, model, &o, at, i % times, mine, &solved));
+    e->out.seconds += (PetscReal)(clock() - begin) / CLOCKS_PER_SEC;
+    e->out.checked++;
     HycoCheck(
         solved == theirs_solved,
         "export: at a point the program's problem has %s solution, unlike the model's; the forces may not be unique",
@@ -1036,7 +1133,6 @@ static PetscErrorCode Compare(Export *e, const Model *model, void *memory)
       worst[k] = PetscMax(worst[k], PetscAbsReal(mine[k] - theirs[k]));
     }
   }
-  PetscCall(Time(e, model, &o, mu, mine));
   for (PetscInt k = 0; k < n; k++) {
     const PetscReal scale = ScaleOf(n, e->out.name, most, k);
 
@@ -1053,41 +1149,33 @@ static PetscErrorCode Compare(Export *e, const Model *model, void *memory)
 
 static PetscErrorCode CompareHere(Export *e)
 {
-  const HycoExportModel *o = &e->out;
-  const Model model = {.n_parameters = (int)e->s->n_parameters,
-                       .n_functions = (int)o->n_functions,
-                       .n_motions = (int)o->n_motions,
-                       .n_places = (int)o->n_places,
-                       .n_contacts = (int)o->n_contacts,
-                       .n_blocks = (int)o->n_blocks,
-                       .block = o->block,
-                       .surfaces = e->travel ? &o->surfaces : NULL,
-                       .n_stiffness = (int)o->n_stiffness,
-                       .n_values = (int)o->n_values,
-                       .n_terms = (int)o->n_terms,
-                       .n_outputs = (int)o->n_outputs,
-                       .tolerance = o->tolerance,
-                       .lo = e->s->lo,
-                       .hi = e->s->hi,
-                       .offset = o->offset,
-                       .stiffness = o->stiffness,
-                       .W = o->W,
-                       .A = o->A,
-                       .value = o->value,
-                       .factor = o->factor,
-                       .term = o->term,
-                       .output = (const Output *)(const void *)o->output, /* a struct of ints alone */
-                       .contact = o->contact,
-                       .weight = o->weight};
+  const Model *model = &e->out.m;
   char *memory;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(work_size(&model) + 1, &memory));
-  HycoFinally(Compare(e, &model, memory), PetscCall(PetscFree(memory)));
+  e->out.n_states = (PetscInt)state_size(model);
+  PetscCall(PetscMalloc1(state_size(model), &e->state));
+  PetscCall(PetscMalloc1(work_size(model) + 1, &memory));
+  HycoFinally(Compare(e, model, memory), PetscCall(PetscFree(memory)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* -- the exporter -- */
+
+/* The ranges of the variables that a path has beside its parameters: the time, and values of tables. */
+static void SetRanges(HycoScene s)
+{
+  for (PetscInt p = s->n_parameters; p < s->n_variables; p++) {
+    const HycoTimeTable *table = p > s->n_parameters ? &s->table[p - s->n_parameters - 1] : NULL;
+
+    s->lo[p] = table ? table->value[0] : s->times[0];
+    s->hi[p] = table ? table->value[0] : s->times[s->n_times - 1];
+    for (PetscInt k = 0; table && k < table->n; k++) {
+      s->lo[p] = PetscMin(s->lo[p], table->value[k]);
+      s->hi[p] = PetscMax(s->hi[p], table->value[k]);
+    }
+  }
+}
 
 /* A prediction in the middle of the ranges comes first: the operations need a model that is set up. */
 static PetscErrorCode Prepare(Export *e)
@@ -1097,22 +1185,32 @@ static PetscErrorCode Prepare(Export *e)
   PetscInt places; /* the group of the first body's places */
 
   PetscFunctionBegin;
-  HycoCheck(!e->s->n_times,
-            "hyco export: this model is one of paths in time (history_times); programs are written of models of "
-            "scenes without a history; hyco predict, C and Python predict its paths");
-  HycoCheck(m->ops->unknowns && m->ops->residual && m->ops->jacobian && m->ops->expand,
+  HycoCheck(!strcmp(m->model->type, "bodies"),
             "a model of type %s cannot be exported; train one with -hyco_model_type bodies", m->model->type);
+  HycoCheck(!e->s->n_times || !((HycoSubstructures)m->model->data)->inelastic->m,
+            "hyco export: bodies of this model creep or yield; programs are written of elastic bodies; hyco predict, C "
+            "and Python predict its paths");
+  SetRanges(e->s);
   for (PetscInt p = 0; p < e->s->n_parameters; p++) mu[p] = (e->s->lo[p] + e->s->hi[p]) / 2;
   PetscCall(HycoROMPredict(m, e->s->n_parameters, mu));
+  if (e->s->n_times) HycoSceneSetTime(e->s, mu, e->s->times[e->s->n_times - 1], mu);
   PetscCall(HycoTravelCreate(m, &e->out, &e->travel));
   PetscCall(FindProblem(e, mu));
-  e->out.tolerance = m->solver->rtol;
+  e->out.m.tolerance = e->s->n_times ? PATH_TOLERANCE : m->solver->rtol;
   PetscCall(HycoROMMeasureQuantities(m, &(HycoPrediction){0}));
   PetscCall(FindOutputs(e));
   e->travel_row = e->n_rows;
+  for (PetscInt b = 0; b < e->out.m.n_slip; b++) {
+    const PetscInt k = e->out.m.coefficient[b];
+
+    if (k < 0) continue;
+    e->out.m.coefficient[b] = (int)e->n_rows;
+    PetscCall(AddRow(e, (Row){.from = COEFFICIENT, .index = k, .group = -1}));
+  }
   if (e->travel) HycoTravelStart(e->travel, e->n_rows, &e->out);
   for (PetscInt i = 0; e->travel && i < HycoTravelValues(e->travel); i++)
-    PetscCall(AddRow(e, (Row){.from = TRAVEL, .index = i, .group = e->out.n_outputs + HycoTravelGroup(e->travel, i)}));
+    PetscCall(
+        AddRow(e, (Row){.from = TRAVEL, .index = i, .group = e->out.m.n_outputs + HycoTravelGroup(e->travel, i)}));
   for (PetscInt i = 0; i < PLACES; i++) /* nodes without regularity */
     PetscCall(PetscArraycpy(x + 3 * i, m->fe->X + 3 * ((i * 7919 + 13) % m->fe->mesh->n_nodes), 3));
   PetscCall(HycoAtomsFind(e->s, (PetscBool)(e->travel != NULL), PLACES, x, &e->n_atoms, &e->atom));
@@ -1121,14 +1219,14 @@ static PetscErrorCode Prepare(Export *e)
   e->out.n_atoms = e->n_atoms;
   e->out.atom = e->atom;
   e->ny = e->p + e->k + e->n_rows;
-  places = 2 + e->out.n_outputs + (e->travel ? HycoTravelValues(e->travel) : 0);
-  e->n_groups = places + (e->travel ? HycoTravelBodies(e->travel) : 0);
+  places = 2 + e->out.m.n_outputs + (e->travel ? HycoTravelValues(e->travel) : 0);
+  e->n_groups = places + (e->travel ? HycoTravelBodies(e->travel) : 1); /* of areas and coefficients of friction */
   PetscCall(PetscMalloc1(2 * e->ny + 1, &e->group));
   for (PetscInt r = 0; r < 2 * e->ny; r++) {
     const PetscInt at = r % e->ny;
 
     if (at >= e->p + e->k)
-      e->group[r] = 2 + e->row[at - e->p - e->k].group;
+      e->group[r] = e->row[at - e->p - e->k].group < 0 ? places : 2 + e->row[at - e->p - e->k].group;
     else if (at >= e->p && e->travel)
       e->group[r] = places + HycoTravelAt(e->travel, at - e->p);
     else
@@ -1168,12 +1266,11 @@ static PetscErrorCode ExportC(HycoROM m, const char path[], char **description)
   ierr = Build(&e);
   if (!ierr) ierr = HycoExportWrite(&e.out, e.s, m->model->path, path, description);
   HycoPointEnd(point);
-  PetscCall(FreeFit(&e.base));
-  PetscCall(FreeFit(&e.response));
+  HycoFreeAll(&e.base.function, &e.base.coefficient, &e.response.function, &e.response.coefficient);
   PetscCall(HycoTravelDestroy(&e.travel));
   if (e.z) PetscCall(PetscFree4(e.z, e.w, e.unit, e.contact));
   for (PetscInt i = 0; i < e.n_weights; i++) PetscCall(PetscFree(e.weight[i]));
-  HycoFreeAll(&e.weight, &e.group, &e.atom, &e.row, &e.area, &e.pressure);
+  HycoFreeAll(&e.first, &e.state, &e.weight, &e.group, &e.atom, &e.row, &e.area);
   PetscCall(HycoExportModelFree(&e.out));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -77,25 +77,20 @@ PetscErrorCode HycoFitFunctions(PetscInt n_atoms, const HycoAtom atom[], PetscIn
 PetscErrorCode HycoFunctionsEvaluate(HycoScene scene, const HycoAtom atom[], PetscInt n, const HycoFunction f[],
                                      const PetscReal mu[], PetscReal value[]);
 
-/* The arrays of a program, as the runtime's Model has them, and its names. */
+/* A program: the runtime's model, whose arrays it owns but for the ranges and tables of the scene, and its names. */
 typedef struct {
-  PetscInt n_functions, n_motions, n_places, n_stiffness, n_values, n_terms, n_outputs, n_contact, n_weights;
-  PetscInt n_contacts, n_blocks;
-  PetscReal tolerance;
+  Model m;
+  PetscInt n_contact, n_weights, n_states; /* entries of m.contact, m.weight; doubles of a state */
   PetscReal difference, seconds; /* largest difference from the model at the points that were checked; their time */
   PetscInt n_atoms, checked;
   const HycoAtom *atom; /* borrowed */
   HycoFunction *function;
-  PetscReal *offset, *W, *A, *term, *weight;
-  int *stiffness, *value, *factor, *contact;
-  int *output;         /* 6 each: the members of the runtime's Output */
-  char **name, **unit; /* of outputs */
-  Block *block;
-  Surfaces surfaces;                    /* n_nodes 0: none moves */
+  char **name, **unit;                  /* of outputs */
+  Surfaces surfaces;                    /* n_nodes 0: none moves, and m has none */
   PetscInt n_surfaces, n_border, *body; /* surfaces; edges of all borders; by node: its body */
   PetscReal *drawn;                     /* nodes as drawn, n_nodes x 3 */
 } HycoExportModel;
-PetscErrorCode HycoExportAddOutput(HycoExportModel *model, const int output[6], const char name[], const char unit[]);
+PetscErrorCode HycoExportAddOutput(HycoExportModel *model, const Output *output, const char name[], const char unit[]);
 PetscErrorCode HycoExportAddContact(HycoExportModel *model, PetscInt contact);
 PetscErrorCode HycoExportAddWeight(HycoExportModel *model, PetscReal weight);
 PetscErrorCode HycoExportAddTerm(HycoExportModel *model, PetscInt value, PetscInt function, PetscInt n,

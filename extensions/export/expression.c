@@ -172,7 +172,7 @@ static PetscReal Name(Parser *p)
   while (isalnum((unsigned char)name[n]) || name[n] == '_') n++;
   p->at += n;
   if (Take(p, "(")) return Call(p, name, n);
-  for (PetscInt k = 0; k < s->n_parameters; k++) {
+  for (PetscInt k = 0; k < s->n_variables; k++) {
     if (strlen(s->parameter[k]) != n || strncmp(s->parameter[k], name, n)) continue;
     snprintf(text, sizeof(text), "mu[%d]", (int)k);
     Write(p, text);

@@ -1,17 +1,21 @@
 # The text from which each exported file begins, as an array: what the library's search and a program share, then the runtime. Of the library's files it is
 # what stands between two comments; their functions become static.
 set(text "")
+set(paths include/private/hycocoulomb.h extensions/export/runtime/paths.c) # in programs of paths alone
 foreach(file extensions/export/runtime/library.c include/private/hycomesh.h include/private/hycovector.h src/contact/nearest.h src/contact/master_search.h
-             src/contact/nearest.c src/contact/master_search.c extensions/export/runtime/model.h extensions/export/runtime/surfaces.c
-             extensions/export/runtime/runtime.c)
+             src/contact/nearest.c src/contact/master_search.c include/private/hycosceneimpl.h extensions/export/runtime/model.h
+             extensions/export/runtime/surfaces.c extensions/export/runtime/runtime.c include/private/hycocoulomb.h extensions/export/runtime/paths.c)
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${file})
   file(READ ${PROJECT_SOURCE_DIR}/${file} rest)
   set(begin "/* -- begin: in exported models too -- */")
   set(end "/* -- end: in exported models too -- */")
+  if(file IN_LIST paths)
+    string(APPEND text "#if defined(PATHS)\n")
+  endif()
   if(file MATCHES "^extensions")
     string(REGEX REPLACE "#include \"[^\n]*\n" "" rest "${rest}")
     string(APPEND text "${rest}\n")
-    continue()
+    set(rest "")
   endif()
   string(FIND "${rest}" "${begin}" at)
   while(NOT at EQUAL -1)
@@ -21,11 +25,13 @@ foreach(file extensions/export/runtime/library.c include/private/hycomesh.h incl
     string(FIND "${rest}" "${end}" at)
     string(SUBSTRING "${rest}" 0 ${at} part)
     string(REGEX REPLACE "\n(void|PetscBool|PetscInt|const PetscReal \\*)( ?Hyco)" "\nstatic \\1\\2" part "${part}")
-    string(REPLACE "\nstatic inline" "\nstatic" part "${part}")
     string(APPEND text "${part}")
     string(SUBSTRING "${rest}" ${at} -1 rest)
     string(FIND "${rest}" "${begin}" at)
   endwhile()
+  if(file IN_LIST paths)
+    string(APPEND text "#endif\n")
+  endif()
 endforeach()
 string(HEX "${text}" bytes)
 string(REGEX REPLACE "(..)" "0x\\1," bytes "${bytes}")

@@ -57,7 +57,7 @@ static PetscErrorCode Agrees(HycoScene s, const HycoAtom *atom, PetscBool *agree
   PetscCall(HycoSceneExpression(s, atom->key, atom->text, &e));
   *agrees = PETSC_TRUE;
   for (PetscInt k = 0; k < 3 && !ierr && *agrees; k++) {
-    for (PetscInt p = 0; p < s->n_parameters; p++) mu[p] = s->lo[p] + (s->hi[p] - s->lo[p]) * (PetscReal)k / 2;
+    for (PetscInt p = 0; p < s->n_variables; p++) mu[p] = s->lo[p] + (s->hi[p] - s->lo[p]) * (PetscReal)k / 2;
     PetscCall(HycoAtomTranslate(s, atom, mu, &mine, NULL));
     /* An atom that is not finite somewhere in the ranges is no candidate. */
     if (PetscIsInfOrNanReal(mine)) *agrees = PETSC_FALSE;
@@ -85,7 +85,7 @@ static PetscErrorCode IsNew(HycoScene s, const HycoAtom *one, PetscInt n, const 
 
     for (PetscInt i = 0; i < 4; i++) {
       /* Each parameter at its own place, so that no two of them look alike. */
-      for (PetscInt p = 0; p < s->n_parameters; p++)
+      for (PetscInt p = 0; p < s->n_variables; p++)
         mu[p] = s->lo[p] + (s->hi[p] - s->lo[p]) * at[(i + p) % 4] / (1 + 0.1 * (PetscReal)p);
       if (k < 0) PetscCall(HycoAtomTranslate(s, one, mu, &value[i], NULL));
       other = value[0];
@@ -112,7 +112,7 @@ static PetscErrorCode IsSum(HycoScene s, const HycoAtom *one, PetscInt n, const 
     PetscReal *v = q + kept * N, size, left;
 
     for (PetscInt i = 0; i < N; i++) {
-      for (PetscInt p = 0; p < s->n_parameters; p++) {
+      for (PetscInt p = 0; p < s->n_variables; p++) {
         const PetscReal at = (PetscReal)(i + 1) * 0.61803398874989485 * (1 + 0.75487766624669276 * (PetscReal)p);
 
         mu[p] = s->lo[p] + (s->hi[p] - s->lo[p]) * (at - PetscFloorReal(at));
@@ -182,7 +182,7 @@ PetscErrorCode HycoAtomsFind(HycoScene s, PetscBool travels, PetscInt n, const P
   PetscFunctionBegin;
   *n_atoms = 0;
   *atom = NULL;
-  for (PetscInt p = 0; p < s->n_parameters; p++)
+  for (PetscInt p = 0; p < s->n_variables; p++)
     PetscCall(Add(s, s->parameter[p], s->parameter[p], x, -1, PETSC_FALSE, n_atoms, atom));
   for (PetscInt k = 0; k < s->n_entries; k++) {
     /* Entries that cannot change K, F, B or D, and constants, which occur within other entries. */
@@ -311,8 +311,8 @@ PetscErrorCode HycoAtomsTabulate(HycoScene s, PetscInt n_atoms, const HycoAtom a
   PetscFunctionBegin;
   for (PetscInt i = 0; i < n; i++) {
     for (PetscInt a = 0; a < n_atoms; a++)
-      PetscCall(HycoAtomTranslate(s, &atom[a], mu + i * s->n_parameters,
-                                  &value[(size_t)i * (size_t)n_atoms + (size_t)a], NULL));
+      PetscCall(HycoAtomTranslate(s, &atom[a], mu + i * s->n_variables, &value[(size_t)i * (size_t)n_atoms + (size_t)a],
+                                  NULL));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

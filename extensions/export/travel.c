@@ -64,10 +64,6 @@ static PetscErrorCode Check(HycoROM m)
 
   PetscFunctionBegin;
   HycoCheck(
-      !strcmp(m->model->type, "bodies"),
-      "export: surfaces that a map moves past each other need a model of type bodies; train one with -hyco_model_type "
-      "bodies");
-  HycoCheck(
       !HycoMeshIsQuadratic(fe->mesh) && fe->dim > 1,
       "export: contacts that travel on cells of second order, or in 1D, cannot be exported; use cells of first order");
   HycoCheck(
@@ -116,12 +112,12 @@ static PetscErrorCode WriteWeight(HycoSubstructures b, PetscInt k, PetscInt j, H
 
 PetscErrorCode HycoExportWeights(HycoROM m, PetscInt *n, char ***text)
 {
-  const HycoSubstructures b = strcmp(m->model->type, "bodies") ? NULL : (HycoSubstructures)m->model->data;
+  const HycoSubstructures b = (HycoSubstructures)m->model->data;
 
   PetscFunctionBegin;
   *n = 0;
   *text = NULL;
-  for (PetscInt k = 0; b && k < b->n; k++) {
+  for (PetscInt k = 0; k < b->n; k++) {
     for (PetscInt j = 0; j < b->body[k].n_samples && b->body[k].n_samples > 1; j++) {
       HycoText t = {0};
       PetscBool known = PETSC_FALSE;
@@ -179,9 +175,9 @@ static PetscErrorCode AddSurface(HycoTravel t, PetscInt group, const PetscInt nu
 {
   const HycoFE fe = t->m->fe;
   Surfaces *u = &out->surfaces;
-  Surface *all = (Surface *)u->surface, *of;
-  PetscInt *facet = (PetscInt *)u->facet, *border = (PetscInt *)u->border;
-  PetscBool *at = (PetscBool *)u->at_border;
+  Surface *all = u->surface, *of;
+  PetscInt *facet = u->facet, *border = u->border;
+  PetscBool *at = u->at_border;
   HycoMasterSearch search;
 
   PetscFunctionBegin;
@@ -411,11 +407,7 @@ PetscErrorCode HycoTravelResidual(HycoTravel t, const PetscReal mu[], const Pets
   PetscCall(PetscArrayzero(t->m->Lambda, t->m->model->pairs.n));
   PetscCall(PetscArraycpy(o->x, z, b->p));
   PetscCall(HycoBodiesRespond(o, z + b->p));
-  for (PetscInt i = 0; i < b->p; i++) {
-    w[i] = 0;
-    for (PetscInt j = 0; j < b->r; j++) w[i] -= o->work[i * b->r + j] * o->c[j];
-    for (PetscInt k = 0; k < b->ns; k++) w[i] += o->Z[k * b->p + i] * o->f[k];
-  }
+  HycoBodiesWorkOnMotions(o, w);
   for (PetscInt k = 0; k < b->ns; k++) w[b->p + k] = -o->u[k];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -474,7 +466,7 @@ PetscInt HycoTravelGroup(HycoTravel t, PetscInt i)
 void HycoTravelStart(HycoTravel t, PetscInt first, HycoExportModel *out)
 {
   Surfaces *u = &out->surfaces;
-  int *given = (int *)u->given, *pose = (int *)u->pose;
+  int *given = u->given, *pose = u->pose;
 
   (void)t;
   for (PetscInt i = 0; i < u->n_nodes * u->dim; i++) given[i] += given[i] < 0 ? 0 : (int)first;
@@ -495,7 +487,7 @@ PetscErrorCode HycoTravelBlocks(HycoTravel t, PetscInt first, HycoExportModel *o
   const HycoSubstructures b = t->bodies->bodies;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc1(t->n_values, &out->block));
+  PetscCall(PetscCalloc1(t->n_values, &out->m.block));
   for (PetscInt i = 0; i < t->n_values && t->value[i].from == FLEXIBLE; i++) {
     const HycoFlexibility *f = &b->body[t->value[i].index].C;
     const size_t n = (size_t)f->n;
@@ -505,7 +497,7 @@ PetscErrorCode HycoTravelBlocks(HycoTravel t, PetscInt first, HycoExportModel *o
     PetscCall(PetscMalloc1(n * n, &C));
     for (size_t k = 0; k < n * n; k++)
       C[k] = HycoFlexibilityEntry(f, t->value[i].part, (PetscInt)(k / n), (PetscInt)(k % n));
-    out->block[out->n_blocks++] = (Block){(int)b->start[t->value[i].index], (int)n, (int)(first + i), C};
+    out->m.block[out->m.n_blocks++] = (Block){(int)b->start[t->value[i].index], (int)n, (int)(first + i), C};
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

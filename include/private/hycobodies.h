@@ -296,6 +296,9 @@ PetscErrorCode HycoBodiesFrictionAccept(HycoBodiesFriction friction, PetscReal t
 PetscErrorCode HycoBodiesFrictionTouch(HycoBodiesFriction friction, HycoBodiesWork work, PetscReal t,
                                        const PetscReal alpha[], PetscBool again, PetscInt *its, PetscBool *solved);
 PetscErrorCode HycoBodiesFrictionMove(HycoBodiesFriction friction, HycoBodiesWork work, HycoKKT *kkt);
+/* w (by row) of a step from rest to mu with the motions and forces z, which become those of the last step. */
+PetscErrorCode HycoBodiesFrictionProbe(HycoBodiesFriction friction, HycoBodiesWork work, const PetscReal mu[],
+                                       const PetscReal z[], PetscReal w[]);
 /* By row. Borrowed. */
 const PetscReal *HycoBodiesFrictionForces(HycoBodiesFriction friction);
 /* The derivative of the forces last found by alpha: Z (n_set x m row major), of the rows set[] of closed contacts, from BP =
@@ -320,6 +323,8 @@ PetscErrorCode HycoBodiesRows(HycoBodiesWork work, PetscInt k, PetscInt n, Petsc
 PetscErrorCode HycoBodiesAddRows(HycoBodiesWork work, PetscInt k, const PetscReal share_a[], const PetscReal share_H[],
                                  const PetscReal x[], const PetscReal f[], PetscReal row[]);
 PetscErrorCode HycoBodiesForgetBeside(HycoBodiesWork work);
+/* w[p] of the present loads and forces, on the motions that contact alone prevents. */
+void HycoBodiesWorkOnMotions(HycoBodiesWork work, PetscReal w[]);
 /* M of n contacts at the prepared parameters: p + n square by columns. */
 PetscErrorCode HycoBodiesMatrix(HycoBodiesWork work, PetscInt n, const PetscInt contact[], PetscReal M[]);
 /* Ops of gradients. */

@@ -146,11 +146,26 @@ typedef struct {
 extern const char *const HycoQuantityFields[]; /* NULL ends */
 #define HYCO_FRICTION_WORK 3
 
+/* -- begin: in exported models too -- */
 /* A time table: linear between its rows, constant before the first and after the last. */
 typedef struct {
   PetscInt n;
-  PetscReal *t, *value;
+  const PetscReal *t, *value;
 } HycoTimeTable;
+
+/* Linear between the rows; before the first and after the last row the value stays. */
+static inline PetscReal HycoTableValue(const HycoTimeTable *table, PetscReal t)
+{
+  PetscInt k = 0;
+
+  /* At a row's time its value exactly. */
+  while (k < table->n && table->t[k] <= t) k++;
+  if (k == 0) return table->value[0];
+  if (k == table->n) return table->value[k - 1];
+  return table->value[k - 1] +
+         (table->value[k] - table->value[k - 1]) * ((t - table->t[k - 1]) / (table->t[k] - table->t[k - 1]));
+}
+/* -- end: in exported models too -- */
 
 /* The kinds of unit of the fields. */
 enum { HYCO_UNIT_LENGTH, HYCO_UNIT_FORCE, HYCO_UNIT_STRESS, HYCO_N_UNITS };

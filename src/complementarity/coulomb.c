@@ -7,49 +7,19 @@
   an iteration in which the radius is that of the last one (freeze).
 */
 #include <hycoconeimpl.h>
+#include <hycocoulomb.h>
 
-/* |y_t|, 0 in a block of the normal component alone. */
-static PetscReal Tangential(PetscInt size, const PetscReal y[])
-{
-  PetscReal sum = 0;
-
-  for (PetscInt i = 1; i < size; i++) sum += y[i] * y[i];
-  return PetscSqrtReal(sum);
-}
-
-/* Not the projection onto a fixed convex set: the radius depends on y_n itself, so that J is not symmetric. */
 static PetscErrorCode Project(HycoCone cone, const PetscReal data[], const PetscReal y[], PetscReal z[])
 {
-  const PetscReal length = Tangential(cone->size, y);
-  PetscReal radius;
-
   PetscFunctionBegin;
-  z[0] = y[0] < 0 ? 0 : y[0]; /* keeps NaN */
-  radius = data[0] * z[0] + data[1];
-  for (PetscInt i = 1; i < cone->size; i++) z[i] = length <= radius ? y[i] : y[i] * (radius / length);
+  HycoCoulombProject(cone->size, data, y, z);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Stick needs a radius: at an open contact nothing is kept. */
 static PetscErrorCode Derivative(HycoCone cone, const PetscReal data[], const PetscReal y[], PetscReal J[])
 {
-  const PetscInt size = cone->size;
-  const PetscReal length = Tangential(size, y), radius = data[0] * PetscMax(y[0], 0) + data[1];
-
   PetscFunctionBegin;
-  PetscCall(PetscArrayzero(J, size * size));
-  J[0] = y[0] > 0;
-  for (PetscInt i = 1; i < size && radius > 0; i++) {
-    if (length <= radius) {
-      J[i * size + i] = 1;
-      continue;
-    }
-    /* Slip: dz_t/dy_n = mu y_t / |y_t|; along the direction of slip z_t does not change with y_t, so that in 2D this
-       is the row's only entry. */
-    J[i * size] = y[0] > 0 ? data[0] * (y[i] / length) : 0;
-    for (PetscInt j = 1; j < size && size > 2; j++)
-      J[i * size + j] = radius / length * ((i == j) - (y[i] / length) * (y[j] / length));
-  }
+  HycoCoulombDerivative(cone->size, data, y, J);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

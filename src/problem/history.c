@@ -92,7 +92,7 @@ static PetscErrorCode ReadTable(HycoScene s, const char key[], const char text[]
 {
   const char *name = key + strlen(TABLES);
   HycoTimeTable *table = &s->table[s->n_tables];
-  PetscReal *row = NULL;
+  PetscReal *row = NULL, *t, *value;
   PetscInt n;
 
   PetscFunctionBegin;
@@ -101,15 +101,15 @@ static PetscErrorCode ReadTable(HycoScene s, const char key[], const char text[]
   PetscCall(AddVariable(s, key, name));
   s->n_tables++;
   PetscCall(ReadRows(text, 2, &n, &row));
-  if (n > 0) {
-    PetscCall(PetscMalloc1(n, &table->t));
-    PetscCall(PetscMalloc1(n, &table->value));
-  }
+  PetscCall(PetscMalloc1(PetscMax(n, 1), &t));
+  PetscCall(PetscMalloc1(PetscMax(n, 1), &value));
   for (PetscInt k = 0; k < n; k++) {
     /* Two arrays, since the interpolation searches the times alone. */
-    table->t[k] = row[2 * k];
-    table->value[k] = row[2 * k + 1];
+    t[k] = row[2 * k];
+    value[k] = row[2 * k + 1];
   }
+  table->t = t;
+  table->value = value;
   table->n = n;
   PetscCall(PetscFree(row));
   /* After the rows are freed: a failed check returns at once. */
@@ -195,26 +195,13 @@ PetscErrorCode HycoSceneDestroyHistory(HycoScene s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Linear between the rows; before the first and after the last row the value stays. */
-static PetscReal ValueAt(const HycoTimeTable *table, PetscReal t)
-{
-  PetscInt k = 0;
-
-  /* At a row's time its value exactly. */
-  while (k < table->n && table->t[k] <= t) k++;
-  if (k == 0) return table->value[0];
-  if (k == table->n) return table->value[k - 1];
-  return table->value[k - 1] +
-         (table->value[k] - table->value[k - 1]) * ((t - table->t[k - 1]) / (table->t[k] - table->t[k - 1]));
-}
-
 /* out: parameters, then the time, then the tables' values; without a history only the parameters. */
 void HycoSceneSetTime(HycoScene s, const PetscReal mu[], PetscReal t, PetscReal out[])
 {
   for (PetscInt p = 0; p < s->n_parameters; p++) out[p] = mu[p];
   if (!s->n_times) return;
   out[s->n_parameters] = t;
-  for (PetscInt k = 0; k < s->n_tables; k++) out[s->n_parameters + 1 + k] = ValueAt(&s->table[k], t);
+  for (PetscInt k = 0; k < s->n_tables; k++) out[s->n_parameters + 1 + k] = HycoTableValue(&s->table[k], t);
 }
 
 /* A step ends at each listed time and at each row of a table, where a load's rate jumps. PETSC_MAX_REAL: there is

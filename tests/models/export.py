@@ -1,13 +1,17 @@
-"""hyco export: C99 programs of models of bodies in 2D, 3D and with an axis, with floating bodies, gaps, loads and moduli: they compile without a warning, have
-the model's results in two threads at once, say what is outside the ranges; what cannot be exported is named in one line."""
+"""hyco export: C99 programs of models of bodies in 2D, 3D and with an axis, with floating bodies, gaps, loads and moduli, and of their paths with friction: they
+compile without a warning, have the model's results in two threads at once, say what is outside the ranges; what cannot be exported is named in one line."""
 import os
 import subprocess
+import sys
 import unittest
 
 import h5py
 import numpy as np
 
 from common import PATIENCE, ROPE, SOURCE, Case
+
+sys.path.insert(0, os.path.join(SOURCE, 'tests', 'verify'))
+from grids import Grid  # noqa: E402
 
 FLOATING = f"""
 scene:
@@ -123,7 +127,42 @@ fixed: {{block_base: {{x: 0, y: lift}}, cylinder_top: {{x: "side + tilt*x", y: "
 contact: {{under: {{type: surface, slave: cylinder_round, master: block_top}}}}
 output: {{base: {{reaction: y, group: block_base}}}}
 """
-# Two threads predict all points, one with its own memory; a line for each point, from the first thread.
+# A block that friction alone holds on a plane, of any size, pressed and pushed to and fro until most of it slips, and unloaded; a table has a row between listed times
+HELD = """
+scene: {mesh: held.msh, parameters: [m, press, push, soft, size], unit: {length: mm, force: N/mm}}
+parameter: {m: {range: [0.3, 0.6]}, press: {range: [1, 2]}, push: {range: [0.1, 0.25]}, soft: {range: [1, 3]}, size: {range: [0.9, 1.1]}}
+body: {block: {young: 1000/soft, poisson: 0.3, map: {x: size*x, y: size*y}}}
+traction: {top: {x: "push*press*h", y: "-press*v"}}
+contact: {plane: {group: base, normal: {y: -1}, gap: "0.0001*(x - 1)^2", friction: "m*(1 + 0.2*x)"}}
+history: {times: [0, 1, 2, 3, 4, 5], tables: {v: [[0, 0], [1, 1], [3, 1], [4, 0.5], [5, 1]], h: [[1, 0], [2, 1], [2.6, -1], [4, 0]]}}
+output: {T: {friction: x, contact: plane}, W: {friction: work}, N: {force: y}, P: {max: contact_pressure}, peak: {max: mises, group: top}, turn: {moment: z, contact: plane}}
+"""
+# 3D: two blocks under a shear that turns; a gap that opens
+ROUND = """
+scene: {mesh: round.msh, parameters: [m, hard, lift]}
+parameter: {m: {range: [0.1, 0.3]}, hard: {range: [0, 3]}, lift: {range: [0, 0.002]}}
+body: {low: {young: 1000*(1 + hard), poisson: 0.3}, high: {young: 500, poisson: 0.2}}
+fixed: {base: {x: 0, y: 0, z: 0}, top: {x: "0.01*r*cos(3*t)", y: "0.01*r*sin(3*t)", z: "-0.01*min(t, 1)"}}
+contact: {joint: {type: KIND, slave: face, master: back, gap: "lift*x^2", friction: m}}
+history: {times: [0, 1, 1.5, 2, 3], tables: {r: [[0, 0], [1, 0], [2, 1]]}}
+output: {T: {friction: x, contact: joint}, U: {friction: y, contact: joint}, W: {friction: work}, R: {reaction: y, group: base}, A: {area: closed, contact: joint}}
+"""
+# The same body without friction, on its supports
+LIFTED = HELD.replace(', friction: "m*(1 + 0.2*x)"', '').replace('traction:', 'fixed: {side: {x: 0}}\ntraction:').replace('T: {friction: x, contact: plane}, W: {friction: work}, ', '')
+
+
+def grids(folder):
+    """The meshes of HELD, ROUND."""
+    grid = Grid()
+    grid.box('quad4', [np.linspace(0, 2, 9), np.linspace(0, 1, 5)], lambda x: x, 'block', {'y0': 'base', 'y1': 'top', 'x0': 'side'})
+    grid.write(os.path.join(folder, 'held.msh'))
+    grid, flat = Grid(), lambda n: [np.linspace(0, 1, n)] * 2
+    grid.box('hex8', [*flat(5), np.linspace(-0.5, 0, 3)], lambda x: x, 'low', {'z0': 'base', 'z1': 'back'})
+    grid.box('hex8', [*flat(4), np.linspace(0, 0.5, 3)], lambda x: x, 'high', {'z0': 'face', 'z1': 'top'})
+    grid.write(os.path.join(folder, 'round.msh'))
+
+
+# Two threads predict all points, one with its own memory; a line for each point, from the first thread. Of a path each listed time is a point.
 MAIN = """#include "NAME.h"
 #include <pthread.h>
 #include <stdio.h>
@@ -140,7 +179,8 @@ static void *all(void *which)
   const int k = *(const int *)which;
   void *work = k ? NULL : malloc(NAME_work_size());
 
-  for (int i = 0; i < n; i++) status[k][i] = NAME_predict(mu[i], &result[k][i], work);
+  STATE
+  for (int i = 0; i < n; i++) status[k][i] = CALL;
   free(work);
   return NULL;
 }
@@ -151,7 +191,7 @@ int main(void)
   pthread_t thread[2];
 
   while (scanf("%lf", &mu[at / NAME_N_PARAMETERS][at % NAME_N_PARAMETERS]) == 1) at++;
-  n = at / NAME_N_PARAMETERS;
+  n = at / NAME_N_PARAMETERS * TIMES;
   for (int k = 0; k < 2; k++) pthread_create(&thread[k], NULL, all, &which[k]);
   for (int k = 0; k < 2; k++) pthread_join(thread[k], NULL);
   if (memcmp(status[0], status[1], sizeof(int) * (size_t)n)) return 1;
@@ -166,16 +206,31 @@ int main(void)
   return 0;
 }
 """
-FLAGS = ['-std=c99', '-Wall', '-Wextra', '-Werror', '-pedantic', '-O2']
+# What MAIN has of predictions and of steps: a time before the last one is refused, and leaves the state.
+PREDICT = {'TIMES': '1', 'STATE': '', 'CALL': 'NAME_predict(mu[i], &result[k][i], work)'}
+STEP = {'TIMES': 'NAME_N_TIMES', 'STATE': 'NAME_state state, kept;', 'CALL': """0;
+  for (int i = 0; i < n; i++) {
+    const int j = i % NAME_N_TIMES;
+
+    if (!j) NAME_start(&state);
+    kept = state;
+    if (j && NAME_step(mu[i / NAME_N_TIMES], NAME_time[0], &state, &result[k][i], work) != NAME_DIVERGED) exit(3);
+    if (memcmp(&kept, &state, sizeof(kept))) exit(4);
+    status[k][i] = NAME_step(mu[i / NAME_N_TIMES], NAME_time[j], &state, &result[k][i], work);
+  }"""}
+FLAGS = ['-std=c99', '-Wall', '-Wextra', '-Werror', '-pedantic']
 
 
 class Export(Case):
-    def compiled(self, name):
+    def compiled(self, name, of=PREDICT, level='-O1'):
         """The program of NAME.c, compiled with the strictest usual flags; the main program needs POSIX for its threads alone."""
         with open(self.path('main.c'), 'w', encoding='ascii') as f:
-            f.write(MAIN.replace('NAME', name))
+            text = MAIN
+            for key, value in of.items():
+                text = text.replace(key, value)
+            f.write(text.replace('NAME', name))
         for words in (['-c', name + '.c'], ['-D_POSIX_C_SOURCE=200809L', 'main.c', name + '.o', '-o', name, '-lm', '-pthread']):
-            run = subprocess.run(['cc', *FLAGS, *words], cwd=self.folder, timeout=60 * PATIENCE, capture_output=True, text=True, check=False)
+            run = subprocess.run(['cc', *FLAGS, level, *words], cwd=self.folder, timeout=60 * PATIENCE, capture_output=True, text=True, check=False)
             self.assertEqual((run.returncode, run.stderr), (0, ''))
         return self.path(name)
 
@@ -211,6 +266,35 @@ class Export(Case):
         closed = table['n_active']
         self.assertLess(closed.min(), closed.max())  # the set of closed contacts changes over the points
         return points, names
+
+    def judge_path(self, name, scene, points, level='-O0'):
+        """The program of a model of paths against predict at each listed time, beside corners of the ranges; returns the outputs by name."""
+        with open(self.path(name + '.yaml'), 'w', encoding='ascii') as f:
+            f.write(scene)
+        self.hyco('train', '-scene', name + '.yaml', '-hyco_model_type', 'bodies', '-scatter', '2', '-hyco_validation', '0', '-model', name + '.h5')
+        said = self.run_raw('export', '-model', name + '.h5', '-c', name + '.c')
+        self.assertEqual((said.returncode, said.stderr), (0, ''))
+        self.compiled(name, STEP, level)
+        names, rows = self.ran(name, points)
+        self.assertFalse(rows[:, 0].any())
+        self.assertLess(rows[:, 1].max(), 1e-10)
+        history = [self.hyco('predict', '-model', name + '.h5', '-mu', ','.join(map(repr, p)))['history'] for p in points]
+        outputs = {of: np.concatenate([h['outputs'][of] for h in history]) for of in history[0]['outputs']}
+        for of, values in outputs.items():
+            self.assertGreater(abs(values).max(), 0, of)
+            self.assertLessEqual(abs(rows[:, 2 + names.index(of)] - values).max(), 1e-9 * abs(values).max(), of)
+        return {of: rows[:, 2 + k] for k, of in enumerate(names)}
+
+    def test_paths(self):
+        """Steps of paths: with friction in 2D, of a body that nothing else holds, in 3D, and without; the state alone goes from step to step."""
+        grids(self.folder)
+        held = self.judge_path('held', HELD, ((0.4, 1.3, 0.22, 1.7, 0.93), (0.31, 1.9, 0.25, 2.9, 1.08)), '-O1')
+        self.assertGreater(held['W'][5], 0)
+        self.assertLess(held['T'].min(), 0)
+        turned = self.judge_path('round', ROUND.replace('KIND', 'mortar'), ((0.22, 1.7, 0.0), (0.11, 0.4, 0.0017)))
+        self.assertGreater(turned['W'][4], 0)
+        lifted = self.judge_path('lifted', LIFTED, ((0.4, 1.3, 0.22, 1.7, 1.02),))
+        self.assertGreater(lifted['N'].max(), 0)
 
     def test_floating(self):
         """A block that contact alone holds, under a load that varies in space with the parameters, heated; each kind of output; a state outside the ranges is said."""
@@ -266,7 +350,11 @@ class Export(Case):
         roller = ('-scene', os.path.join(SOURCE, 'examples', 'roller'))
         self.hyco('train', *roller, '-contact_under_gap', '0.01', '-hyco_model_type', 'bodies', '-scatter', '2', '-model', 'given.h5')
         self.hyco('train', '-scene', ROPE, '-grid', '4,5', '-model', 'hybrid.h5')
-        for words, args in ((('under', 'gap', 'travel'), ('-model', 'given.h5', '-c', 'no.c')),
+        grids(self.folder)
+        with open(self.path('flows.yaml'), 'w', encoding='ascii') as f:
+            f.write(HELD.replace('young: 1000/soft', 'law: norton, young: 1000, rate: 1e-4*soft, exponent: 2').replace('times: [0, 1, 2, 3, 4, 5]', 'times: [0, 0.5, 1]'))
+        self.hyco('train', '-scene', 'flows.yaml', '-hyco_model_type', 'bodies', '-scatter', '2', '-hyco_validation', '0', '-model', 'flows.h5', '-hyco_snapshots', 'flows')
+        for words, args in ((('bodies', 'creep', 'elastic'), ('-model', 'flows.h5', '-c', 'no.c')), (('under', 'gap', 'travel'), ('-model', 'given.h5', '-c', 'no.c')),
                             (('hybrid', 'bodies'), ('-model', 'hybrid.h5', '-c', 'no.c')), (('-c', '.c'), ('-model', 'given.h5', '-c', 'no.txt')),
                             (('-c',), ('-model', 'given.h5'))):
             run = self.run_raw('export', *args)

@@ -1,10 +1,13 @@
 /* The runtime of exported models: problems with known solutions, with bodies that contact alone holds, dependent contacts,
-   sets from which the bodies get loose; principal stresses. */
+   sets from which the bodies get loose; principal stresses; paths with friction, and their halved steps. */
 #include "check.h"
 #include "../../src/contact/master_search.h"
 #include <math.h>
 
+#define PATHS
 #include "../../extensions/export/runtime/runtime.c"
+#include <hycocoulomb.h>
+#include "../../extensions/export/runtime/paths.c"
 
 enum { N = 24, P = 3 };
 
@@ -14,8 +17,7 @@ typedef struct {
   Model model;
 } Problem;
 
-static const int one = 0;
-static const double nothing[] = {0};
+static int one = 0;
 
 /* rank: of W, without motions; a rank below the number of forces makes forces that are not unique. */
 static void Make(int n, int p, int rank, unsigned long long *state, Problem *o)
@@ -45,8 +47,6 @@ static void Make(int n, int p, int rank, unsigned long long *state, Problem *o)
                      .n_contacts = n,
                      .n_stiffness = 1,
                      .tolerance = 1e-8,
-                     .lo = nothing,
-                     .hi = nothing,
                      .offset = o->offset,
                      .stiffness = &one,
                      .W = o->W,
@@ -151,6 +151,106 @@ static PetscErrorCode TestPrincipal(void)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* 1, the time, the parameter. A step longer than `most` has no solution; parameters are on a straight line, 2 to 3. */
+typedef struct {
+  double last, most;
+  int calls;
+} Steps;
+
+static int Functions3(void *context, const double v[], double f[])
+{
+  Steps *s = (Steps *)context;
+
+  s->calls++;
+  if (s->last >= 0 && v[1] > s->last + s->most) return 1;
+  if (s->last >= 0 && fabs(v[0] - (2 + v[1])) > 1e-12) s->calls = 1000;
+  s->last = v[1];
+  f[0] = 1;
+  f[1] = v[1];
+  f[2] = v[0];
+  return 0;
+}
+
+/* The law of the last step, of blocks of `rows` with the coefficient mu. */
+static PetscErrorCode CheckLaw(const Work *o, int rows, double mu)
+{
+  double most = 0;
+
+  PetscFunctionBegin;
+  for (int i = 0; i < N; i++) most = fmax(most, fabs(o->z[i]));
+  for (int k = 0; k < N; k += rows) {
+    const double *z = o->z + k, *w = o->w + k, force = HycoTangential(rows, z), slip = HycoTangential(rows, w);
+    double power = 0;
+
+    for (int i = 1; i < rows; i++) power -= z[i] * w[i];
+    CHECK(z[0] >= 0 && w[0] > -1e-9 && z[0] * fabs(w[0]) <= 1e-9 * most, "normal: force %g, gap %g", z[0], w[0]);
+    CHECK(force <= mu * z[0] + 1e-9 * most, "friction %g of %g", force, mu * z[0]);
+    if (z[0] > 0 && force < mu * z[0] - 1e-7 * most) CHECK(slip < 1e-8, "it sticks, and slips by %g", slip);
+    CHECK(fabs(power - force * slip) <= 1e-8 * most, "friction is against the slip: %g of %g", power, force * slip);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode TestPaths(void)
+{
+  unsigned long long random = 5;
+  double root[N][N], W[N * (N + 1) / 2], offset[(N + 1) * 3] = {0}, values[4 * N + 8], mu[1], kkt, before;
+  int row[N + 1], coefficient[N] = {0}, normal[N], its;
+  char *memory;
+  Work o;
+
+  PetscFunctionBegin;
+  for (int problem = 0; problem < 200; problem++) {
+    const int rows = 2 + problem % 2;
+    Steps steps = {-1, problem % 4 ? 1 : 0.1, 0};
+    Model m = {.n_parameters = 1,
+               .n_functions = 3,
+               .n_places = N,
+               .n_contacts = N,
+               .n_stiffness = 1,
+               .n_values = 1,
+               .tolerance = 1e-8,
+               .offset = offset,
+               .stiffness = &one,
+               .W = W,
+               .n_slip = N / rows,
+               .row = row,
+               .coefficient = coefficient,
+               .normal = normal};
+
+    for (int i = 0; i < N; i++) {
+      for (int j = 0; j < N; j++) root[i][j] = Draw(&random);
+      for (int j = 0; j <= i; j++) W[i * (i + 1) / 2 + j] = dot(N, root[i], root[j]) / N + (i == j ? 0.5 : 0);
+      normal[i] = i % rows == 0;
+      offset[3 * i] = normal[i] ? 0.3 * fabs(Draw(&random)) : 0;
+      offset[3 * i + 1] = Draw(&random) - normal[i];
+      offset[3 * i + 2] = normal[i] ? 0 : 0.3 * Draw(&random);
+      if (i % rows == 0) row[i / rows] = i;
+    }
+    row[N / rows] = N;
+    offset[3 * N] = 0.3;
+    PetscCall(PetscMalloc1(work_size(&m), &memory));
+    place(&m, memory, &o);
+    CHECK(state_size(&m) <= sizeof(values) / sizeof(values[0]), "%d doubles", (int)state_size(&m));
+    memset(values, 0, sizeof(values));
+    before = 0;
+    for (int k = 0; k < 5; k++) {
+      double work = 0;
+
+      mu[0] = 2 + k / 4.;
+      CHECK(advance(&m, &o, Functions3, &steps, mu, k / 4., values, NULL, &kkt, &its) == OK && kkt < 1e-10,
+            "problem %d, step %d: residual %g", problem, k, kkt);
+      PetscCall(CheckLaw(&o, rows, 0.3));
+      for (int b = 0; b < m.n_slip; b++) work += state_of(&m, values).work[b];
+      CHECK(work >= before && steps.last == k / 4., "work %g after %g, at %g", work, before, steps.last);
+      before = work;
+    }
+    CHECK(before > 0 && steps.calls == (problem % 4 ? 5 : 1 + 4 * 8), "%d calls", steps.calls);
+    PetscCall(PetscFree(memory));
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 static PetscErrorCode Test(void)
 {
   PetscFunctionBegin;
@@ -158,6 +258,7 @@ static PetscErrorCode Test(void)
   PetscCall(TestDependent());
   PetscCall(TestLoose());
   PetscCall(TestPrincipal());
+  PetscCall(TestPaths());
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

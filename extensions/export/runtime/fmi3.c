@@ -1,8 +1,8 @@
 /*
   An exported model as an FMU for co-simulation, FMI 3.0, declared here as its standard has it. Variables: time (0), the
   parameters as inputs (1, ...), the outputs, the KKT residual. model.h, written by scripts/fmu, names the model: MODEL(predict)
-  is its function. FMI gives more
-  than a model without a state uses: some parameters are unused.
+  is its function, or with MODEL_PATH MODEL(step): of a history, whose state a step of the FMU advances. FMI gives more than
+  that uses: some parameters are unused.
 */
 #include "model.h"
 #include <stdbool.h>
@@ -26,6 +26,10 @@ typedef struct {
   MODEL(result) result;
   bool current; /* the result is that of mu, with this status */
   Status status;
+#if defined(MODEL_PATH)
+  MODEL(state) begin, end; /* of the last step */
+  bool steps;              /* it has left the initialization, in which inputs change the first step */
+#endif
   void *work, *environment;
   Log log;
 } Instance;
@@ -43,7 +47,12 @@ static Status evaluate(Instance *o)
   int status;
 
   if (o->current) return o->status;
+#if defined(MODEL_PATH)
+  o->end = o->begin;
+  status = MODEL(step)(o->mu, o->time, &o->end, &o->result, o->work);
+#else
   status = MODEL(predict)(o->mu, &o->result, o->work);
+#endif
   o->current = true;
   o->status = FMI_OK;
   if (status == MODEL(OUTSIDE))
@@ -58,6 +67,10 @@ static void begin(Instance *o)
 {
   o->time = 0;
   o->current = false;
+#if defined(MODEL_PATH)
+  MODEL(start)(&o->begin);
+  o->steps = false;
+#endif
   for (int p = 0; p < MODEL(N_PARAMETERS); p++) o->mu[p] = (MODEL(lo)[p] + MODEL(hi)[p]) / 2;
 }
 
@@ -125,9 +138,54 @@ FUNCTION(SetFloat64, void *instance, const uint32_t at[], size_t n, const double
     if (at[i] < 1 || at[i] >= FIRST_OUTPUT) return report(o, FMI_ERROR, "the variable is no input");
   }
   for (size_t i = 0; i < n; i++) o->mu[at[i] - 1] = value[i];
+#if defined(MODEL_PATH)
+  o->current = o->current && o->steps; /* inputs belong to the next step */
+#else
   o->current = false;
+#endif
   return FMI_OK;
 }
+
+/* Changes of mode, which mean nothing here. */
+#define MODE(name)                                                                                                     \
+  FUNCTION(name, void *instance)                                                                                       \
+  {                                                                                                                    \
+    return FMI_OK;                                                                                                     \
+  }
+
+#if defined(MODEL_PATH)
+/* The first time, once inputs are set. */
+FUNCTION(ExitInitializationMode, void *instance)
+{
+  Instance *o = instance;
+
+  o->steps = true;
+  return evaluate(o);
+}
+
+/* A step without a solution leaves all as it was. */
+FUNCTION(DoStep, void *instance, double time, double step, bool past, bool *event, bool *terminate, bool *early,
+         double *last)
+{
+  Instance *o = instance;
+  const Instance before = *o;
+  Status status = FMI_ERROR;
+
+  *event = *terminate = *early = false;
+  if (step > 0) {
+    o->begin = o->end;
+    o->time = time + step;
+    o->current = false;
+    status = evaluate(o);
+  } else {
+    (void)report(o, status, "a step must be longer than 0");
+  }
+  if (status > FMI_WARNING) *o = before;
+  *last = o->time;
+  return status;
+}
+#else
+MODE(ExitInitializationMode)
 
 /* Outputs depend on the inputs alone, so that a step only moves the time. */
 FUNCTION(DoStep, void *instance, double time, double step, bool past, bool *event, bool *terminate, bool *early,
@@ -139,6 +197,7 @@ FUNCTION(DoStep, void *instance, double time, double step, bool past, bool *even
   *event = *terminate = *early = false;
   return evaluate(o);
 }
+#endif
 
 FUNCTION(EnterInitializationMode, void *instance, bool has_tolerance, double tolerance, double start, bool has_stop,
          double stop)
@@ -153,13 +212,6 @@ FUNCTION(Reset, void *instance)
   return FMI_OK;
 }
 
-/* Changes of mode, which mean nothing here. */
-#define MODE(name)                                                                                                     \
-  FUNCTION(name, void *instance)                                                                                       \
-  {                                                                                                                    \
-    return FMI_OK;                                                                                                     \
-  }
-MODE(ExitInitializationMode)
 MODE(EnterEventMode)
 MODE(EnterStepMode)
 MODE(EnterConfigurationMode)

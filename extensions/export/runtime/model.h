@@ -2,14 +2,20 @@
 #ifndef HYCO_EXPORTED_MODEL
 #define HYCO_EXPORTED_MODEL
 
-enum { OK, OUTSIDE, DIVERGED, NO_MEMORY };                                       /* status */
-enum { SUM, LARGEST, SMALLEST, CLOSED, PRESSURE, PRESSURE_SMALLEST, RESULTANT }; /* kinds of output */
+#if defined(HYCO_EXPORTED)
+#define DATA const
+#else
+#define DATA /* the exporter fills them */
+#endif
+
+enum { OK, OUTSIDE, DIVERGED, NO_MEMORY };                                             /* status */
+enum { SUM, LARGEST, SMALLEST, CLOSED, PRESSURE, PRESSURE_SMALLEST, RESULTANT, WORK }; /* kinds of output */
 enum { COMPONENT, NORM, MISES, PRINCIPAL }; /* what counts of an item; PRINCIPAL + k */
 
 /* An output: a number for each of n items, combined as its kind says. The items are places with `width` values each, from
-   value `first` on, or contacts, from `first` on in Model.contact. A RESULTANT: the value `width` (-1: 0) and the contacts'
+   value `first` on, or contacts, from `first` on in Model.contact; -1: always open. A RESULTANT: the value `width` (-1: 0) and the contacts'
    forces along axis `of`, from 3 on the moments around it, times the weights of the contacts minus those of the masters,
-   which follow them by node. */
+   which follow them by node. WORK: of friction, of blocks instead of contacts. */
 typedef struct Output {
   int kind, of, n, width, first, weight; /* weight: place of the first in Model.weight; -1: all are 1, or as found */
 } Output;
@@ -17,7 +23,7 @@ typedef struct Output {
 /* Places first .. first + n - 1, which have the flexibility C (n x n), times a value. */
 typedef struct {
   int first, n, value;
-  const double *C;
+  DATA double *C;
 } Block;
 
 enum { PRESCRIBED = -1, UNKNOWN = -2 };     /* instead of a place: moved by a support; not among the model's unknowns */
@@ -37,30 +43,42 @@ typedef struct {
 typedef struct {
   PetscInt dim, n_nodes, nf, nq, n_searches, n_facets; /* nodes and points of a facet; of the largest master */
   double around;                                       /* 2 pi in an axisymmetric scene; 0 */
-  const double *w, *N, *dN;                            /* nq; nq x nf; nq x nf x 2 */
-  const Surface *surface;
-  const Facing *search;
-  const PetscInt *facet, *border, *node; /* node: of each slave */
-  const PetscBool *at_border;
-  const int *place, *given; /* n_nodes x dim; given: the value that is a prescribed displacement; -1: it is 0 */
-  const int *pose;          /* by node: the first of nine values that turn its body; -1: none */
+  DATA double *w, *N, *dN;                             /* nq; nq x nf; nq x nf x 2 */
+  DATA Surface *surface;
+  DATA Facing *search;
+  DATA PetscInt *facet, *border, *node; /* node: of each slave */
+  DATA PetscBool *at_border;
+  DATA int *place, *given; /* n_nodes x dim; given: the value that is a prescribed displacement; -1: it is 0 */
+  DATA int *pose;          /* by node: the first of nine values that turn its body; -1: none */
 } Surfaces;
 
 typedef struct {
   int n_parameters, n_functions, n_motions, n_places, n_stiffness, n_values, n_terms, n_outputs;
-  int n_contacts, n_blocks;  /* n_places contacts, and no blocks, unless surfaces move */
-  double tolerance;          /* of the KKT residual */
-  const double *lo, *hi;     /* ranges of the parameters */
-  const double *offset;      /* n_motions + n_places + n_values rows of n_functions: w and the values for z = 0 */
-  const int *stiffness;      /* functions by which the next two are multiplied, n_stiffness of each */
-  const double *W, *A;       /* lower triangle of n_places rows, where there are no blocks; n_motions x n_places */
-  const int *value, *factor; /* of n_terms: the value to which it adds, and its function */
-  const double *term;        /* (n_motions + n_places) x n_terms */
-  const Output *output;
-  const int *contact;
-  const double *weight;
-  const Block *block;
+  int n_contacts, n_blocks; /* n_places contacts, and no blocks, unless surfaces move */
+  int areas;                /* of contacts: the first of their values, unless surfaces move */
+  double tolerance;         /* of the KKT residual */
+  DATA double *offset;      /* n_motions + n_places + n_values rows of n_functions: w and the values for z = 0 */
+  DATA int *stiffness;      /* functions by which the next two are multiplied, n_stiffness of each */
+  DATA double *W, *A;       /* lower triangle of n_places rows, where there are no blocks; n_motions x n_places */
+  DATA int *value, *factor; /* of n_terms: the value to which it adds, and its function */
+  DATA double *term;        /* (n_motions + n_places) x n_terms */
+  DATA Output *output;
+  DATA int *contact;
+  DATA double *weight;
+  DATA Block *block;
   const Surfaces *surfaces; /* NULL: none moves */
+  /* of paths; with friction (n_slip > 0) contacts are rows, in blocks of a normal and its tangents */
+  int n_slip, n_tables;
+  DATA int *row, *coefficient; /* by block: its first row, with the end; the value that is its coefficient, -1: 0 */
+  DATA int *normal;            /* by row: it is one; NULL: all are */
+  const HycoTimeTable *table;
 } Model;
+
+/* What a step leaves for the next; of doubles alone, in the caller's memory. */
+typedef struct {
+  double *taken, *t, *t_before, *mu; /* steps so far; times of the last two; parameters of the last */
+  double *z, *before;                /* motions and forces of the last; forces of the one before */
+  double *place, *work;              /* by row: of tangents, how far they are from where they began; by block */
+} State;
 
 #endif

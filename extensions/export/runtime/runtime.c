@@ -18,15 +18,34 @@ typedef struct {
   /* W: columns, as far as they are made. L: factor of W on the closed contacts, in rows of n_contacts; V = L^-1 A^T; S: of
      V^T V */
   double *W, *A, *L, *V, *S, *last, *y;
+  double pin; /* of A^T (q_x + A L), which is 0, in w_L: a body's pins have no flexibility of their own */
   double *at_places, *push, *sum; /* n_motions + n_places: w for z = 0, z; n_terms */
   int *closed, *at, *made,
       n_closed;          /* by contact: 0, open; 2, one of the next; the closed ones, rows of L; of W's columns */
   Met *met;              /* by contact; of moved surfaces, like */
   int *touched, *before; /* places of moved surfaces that rows have; by place: how many of these precede it */
   Room room;
+#if defined(PATHS)
+  /* p + n: scales; y = z - rho w at the step's begin, and where it is measured; where Newton's step ends; trials; the right
+     side */
+  double *rho, *from, *from_next, *aimed, *trial, *trial_w, *rhs;
+  double *D, *J, *v, *saved,
+      largest; /* by block; of unknowns; variables, then parameters on the way; a state; a force */
+  int *unknown, *pivot;
+  double t;       /* the step's end */
+  const State *s; /* its begin, and then its end */
+#endif
 } Work;
 
-/* The numbers of doubles and of ints in a Work. */
+#if defined(PATHS)
+static size_t path_doubles(const Model *m);
+static size_t path_ints(const Model *m);
+static void place_path(const Model *m, double *next, int *ints, Work *o);
+static double solve_slip(const Model *m, Work *o, int *iterations);
+static void accept(const Model *m, Work *o);
+#endif
+
+/* The number of doubles in a Work. */
 static size_t work_doubles(const Model *m)
 {
   const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts, places = (size_t)m->n_places;
@@ -34,7 +53,11 @@ static size_t work_doubles(const Model *m)
                facets = m->surfaces ? (size_t)m->surfaces->n_facets : 0;
 
   return (size_t)m->n_functions + (size_t)m->n_values + (size_t)m->n_terms + 4 * (p + n) + 2 * (p + places) +
-         2 * n * n + 2 * p * n + p * p + n + 7 * nodes + 3 * facets;
+         2 * n * n + 2 * p * n + p * p + n + 7 * nodes + 3 * facets
+#if defined(PATHS)
+         + path_doubles(m)
+#endif
+      ;
 }
 
 /* The largest members come first, so that all are aligned. */
@@ -45,8 +68,12 @@ static size_t work_size(const Model *m)
                                (size_t)HycoPatchesBoxes(s->n_facets) * sizeof(HycoBox)
                          : 0;
 
-  return work_doubles(m) * sizeof(double) + moved +
-         (3 * (size_t)m->n_contacts + (s ? 2 * (size_t)m->n_places + 1 : 0)) * sizeof(int);
+  size_t ints = 3 * (size_t)m->n_contacts + (s ? 2 * (size_t)m->n_places + 1 : 0);
+
+#if defined(PATHS)
+  ints += path_ints(m);
+#endif
+  return work_doubles(m) * sizeof(double) + moved + ints * sizeof(int);
 }
 
 static double *take(double **from, size_t n)
@@ -91,7 +118,12 @@ static void place(const Model *m, void *memory, Work *o)
     o->room.box = (HycoBox *)(void *)(o->room.item + s->n_facets);
     next = (double *)(void *)(o->room.box + HycoPatchesBoxes(s->n_facets));
   }
+#if defined(PATHS)
+  o->closed = (int *)(void *)(next + path_doubles(m));
+  place_path(m, next, o->closed + 3 * n, o);
+#else
   o->closed = (int *)(void *)next;
+#endif
   o->at = o->closed + n;
   o->made = o->at + n;
   o->touched = s ? o->made + n : NULL;
@@ -313,6 +345,21 @@ static size_t arrange(const Model *m, Work *o)
   return same;
 }
 
+/* A factor by which the two terms of w_L are of one size. */
+static double pin_of(const Model *m, Work *o)
+{
+  const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts;
+  double flexible = 0, moves = 0;
+
+  for (size_t i = 0; i < (size_t)o->n_closed && p; i++) {
+    const size_t a = (size_t)o->at[i];
+
+    flexible = fmax(flexible, column(m, o, a)[a]);
+    for (size_t c = 0; c < p; c++) moves = fmax(moves, o->A[c * n + a] * o->A[c * n + a]);
+  }
+  return flexible > 0 && moves > 0 ? flexible / moves : 1;
+}
+
 /* z with the closed contacts at gap 0 and the others without force; epsilon, delta: of epsilon (x - last) added to w_x, and
    delta (L - last) to w_L. Returns 0 if the closed contacts do not hold the bodies. */
 static int solve_set(const Model *m, Work *o, double epsilon, double delta)
@@ -323,14 +370,21 @@ static int solve_set(const Model *m, Work *o, double epsilon, double delta)
   int loose;
 
   for (size_t i = 0; i < n; i++) L[i] = 0;
+  if (same == 0) o->pin = pin_of(m, o);
   for (size_t i = 0; i < k; i++) {
     const size_t a = (size_t)o->at[i];
     const double *W = column(m, o, a);
 
     for (size_t j = 0; j <= i && i >= same; j++) o->L[i * n + j] = W[o->at[j]];
     if (i >= same) o->L[i * n + i] += delta;
-    for (size_t j = 0; j < p; j++) o->V[j * k + i] = o->A[j * n + a];
     o->y[i] = delta * o->last[p + a] - o->q[p + a];
+    for (size_t c = 0; c < p; c++) {
+      const double *A = o->A + c * n;
+
+      for (size_t j = 0; j <= i && i >= same; j++) o->L[i * n + j] += o->pin * A[a] * A[o->at[j]];
+      o->V[c * k + i] = A[a];
+      o->y[i] -= o->pin * A[a] * o->q[c];
+    }
   }
   factorise(k, n, same, o->L);
   forward(k, n, o->L, o->y);
@@ -370,6 +424,12 @@ static void residual(const Model *m, Work *o, double *gap, double *force)
   }
 }
 
+/* Rows of tangents have no force in a problem without friction. */
+static int is_normal(const Model *m, size_t i)
+{
+  return !m->normal || m->normal[i];
+}
+
 /* Closes contacts that penetrate, and opens those under tension; one: only the last of them. Returns their number. */
 static int change(const Model *m, Work *o, double gap, double force, int one)
 {
@@ -378,7 +438,7 @@ static int change(const Model *m, Work *o, double gap, double force, int one)
 
   for (size_t i = (size_t)m->n_contacts; i-- > 0;) {
     /* Beyond round-off of the largest force, of the largest gap. */
-    if (o->closed[i] ? o->z[p + i] >= -1e-14 * force : o->w[p + i] >= -1e-14 * gap) continue;
+    if (!is_normal(m, i) || (o->closed[i] ? o->z[p + i] >= -1e-14 * force : o->w[p + i] >= -1e-14 * gap)) continue;
     if (!one || !n) o->closed[i] = !o->closed[i];
     n++;
   }
@@ -406,34 +466,49 @@ static void start(const Model *m, Work *o)
 {
   double least = 0;
 
-  for (int i = 0; i < m->n_contacts; i++) least = fmin(least, o->q[m->n_motions + i]);
+  for (int i = 0; i < m->n_contacts; i++) least = is_normal(m, (size_t)i) ? fmin(least, o->q[m->n_motions + i]) : least;
   for (int i = 0; i < m->n_contacts; i++)
-    o->closed[i] = m->n_motions > 0 ? !o->met || o->met[i].n : o->q[i] < 0 && o->q[i] <= least / 2;
+    o->closed[i] =
+        is_normal(m, (size_t)i) && (m->n_motions > 0 ? !o->met || o->met[i].n : o->q[i] < 0 && o->q[i] <= least / 2);
   o->n_closed = 0;
   for (int i = 0; i < m->n_motions + m->n_contacts; i++) o->last[i] = 0;
 }
 
-/* The largest KKT residual of z, recomputed from q, A and W, relative as in the library. */
-static double kkt_residual(const Model *m, Work *o)
+/* What is left of the balance of motions, relative to its terms. */
+static double unbalanced(const Model *m, const Work *o)
 {
   const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts;
-  double gap, force, most = 0;
-  int dropped = 0;
+  double most = 0;
 
-  residual(m, o, &gap, &force);
-  for (size_t i = 0; i < n; i++) { /* forces that move no gap by more than round-off are 0, as without loads */
-    if (o->z[p + i] == 0 || (o->closed[i] && o->z[p + i] * column(m, o, i)[i] > 1e-15 * gap)) continue;
-    o->z[p + i] = 0;
-    dropped = 1;
-  }
-  if (dropped) residual(m, o, &gap, &force);
   for (size_t i = 0; i < p; i++) {
     double size = fabs(o->q[i]);
 
     for (size_t j = 0; j < n; j++) size += fabs(o->A[i * n + j] * o->z[p + j]);
     if (size > 0) most = fmax(most, fabs(o->w[i]) / size);
   }
+  return most;
+}
+
+/* The largest KKT residual of z, recomputed from q, A and W, relative as in the library. */
+static double kkt_residual(const Model *m, Work *o)
+{
+  const size_t p = (size_t)m->n_motions, n = (size_t)m->n_contacts;
+  double gap, force, most;
+  int dropped = 0;
+
+  residual(m, o, &gap, &force);
+  for (size_t i = 0; i < n; i++) { /* forces that move no gap by more than round-off are 0, as without loads */
+    double moves = o->z[p + i] == 0 ? 0 : column(m, o, i)[i];
+
+    for (size_t c = 0; c < p; c++) moves += o->pin * o->A[c * n + i] * o->A[c * n + i];
+    if (o->z[p + i] == 0 || (o->closed[i] && o->z[p + i] * moves > 1e-15 * gap)) continue;
+    o->z[p + i] = 0;
+    dropped = 1;
+  }
+  if (dropped) residual(m, o, &gap, &force);
+  most = unbalanced(m, o);
   for (size_t i = p; i < p + n && gap > 0; i++) {
+    if (!is_normal(m, i - p)) continue;
     most = fmax(most, -o->w[i] / gap);
     if (force > 0) most = fmax(most, fabs(o->w[i] / gap * (o->z[i] / force)));
   }
@@ -457,6 +532,16 @@ static double search_held(const Model *m, Work *o, int *iterations)
     memcpy(o->last, o->z, (p + n) * sizeof(double));
   }
   return kkt;
+}
+
+/* The contacts without friction. Returns the KKT residual. */
+static double solve(const Model *m, Work *o, int *iterations)
+{
+  double kkt;
+
+  start(m, o);
+  kkt = search(m, o, 0, 0, iterations) ? kkt_residual(m, o) : HUGE_VAL;
+  return kkt > m->tolerance ? search_held(m, o, iterations) : kkt;
 }
 
 /* -- outputs -- */
@@ -546,18 +631,23 @@ static double output(const Model *m, const Work *o, const Output *q, double leas
 
   if (q->kind == RESULTANT && q->width >= 0) sum = o->value[q->width];
   for (int i = 0; i < q->n; i++) {
-    double weight = q->weight < 0 ? 1 : m->weight[q->weight + i];
+    const double weight = q->weight < 0 ? 1 : m->weight[q->weight + i];
 
+#if defined(PATHS)
+    if (q->kind == WORK) {
+      sum += o->s->work[m->contact[q->first + i]];
+      continue;
+    }
+#endif
     if (q->kind == RESULTANT) {
       if (o->z[m->n_motions + m->contact[q->first + i]] > least) sum += resultant(m, o, q, i);
     } else if (q->kind >= CLOSED) {
       const int k = m->contact[q->first + i];
-      const double force = o->z[m->n_motions + k];
-      double pressure;
+      const double force = k < 0 ? 0 : o->z[m->n_motions + k];
+      const double area = k < 0 ? 0 : o->met ? o->met[k].area : o->value[m->areas + k];
+      const double pressure = force > least && area > 0 ? force / area : 0;
 
-      if (o->met) weight = q->kind == CLOSED ? o->met[k].area : o->met[k].area > 0 ? 1 / o->met[k].area : 0;
-      pressure = force > least ? weight * force : 0;
-      if (q->kind == CLOSED) sum += force > least ? weight : 0;
+      if (q->kind == CLOSED) sum += force > least ? area : 0;
       if (q->kind == PRESSURE) sum = fmax(sum, pressure);
       if (q->kind == PRESSURE_SMALLEST) sum = fmin(sum, pressure);
     } else {
@@ -583,11 +673,18 @@ static int predict(const Model *m, Work *o, double out[], double *kkt, int *iter
   for (int i = 0; i < m->n_motions + m->n_contacts; i++) {
     if (!isfinite(o->q[i])) return DIVERGED;
   }
-  start(m, o);
-  *kkt = search(m, o, 0, 0, iterations) ? kkt_residual(m, o) : HUGE_VAL;
-  if (*kkt > m->tolerance) *kkt = search_held(m, o, iterations);
+#if defined(PATHS)
+  if (m->n_slip)
+    *kkt = solve_slip(m, o, iterations);
+  else
+#endif
+    *kkt = solve(m, o, iterations);
+#if defined(PATHS)
+  if (o->s && *kkt <= m->tolerance) accept(m, o);
+#endif
   /* 1e-10 of the largest force. */
-  for (int i = 0; i < m->n_contacts; i++) least = fmax(least, 1e-10 * o->z[m->n_motions + i]);
+  for (int i = 0; i < m->n_contacts; i++)
+    least = is_normal(m, (size_t)i) ? fmax(least, 1e-10 * o->z[m->n_motions + i]) : least;
   evaluate(m, o);
   for (int i = 0; i < m->n_outputs; i++) {
     out[i] = output(m, o, &m->output[i], least);

@@ -267,6 +267,24 @@ PetscErrorCode HycoBodiesFrictionSolve(HycoBodiesFriction f, HycoBodiesWork o, P
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* w = D - B U of a step from rest, without slip before it, for any forces: what a program of the model is made of. */
+PetscErrorCode HycoBodiesFrictionProbe(HycoBodiesFriction f, HycoBodiesWork o, const PetscReal mu[],
+                                       const PetscReal z[], PetscReal w[])
+{
+  HycoKKT kkt;
+
+  PetscFunctionBegin;
+  PetscCall(HycoBodiesFrictionBegin(f));
+  PetscCall(HycoBodiesFrictionPrepare(f, o, mu));
+  PetscCall(PetscArraycpy(f->z, z, f->p + f->all.n));
+  PetscCall(PetscArraycpy(o->x, z, f->p));
+  PetscCall(HycoBodiesFrictionMove(f, o, &kkt));
+  PetscCall(PetscArraycpy(w, f->w, f->all.n));
+  /* The forces of the tangents, for the results of the contacts. */
+  HycoSlipAdd(&f->slip, f->z + f->p, f->w, f->most);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The forces by row. Borrowed. */
 const PetscReal *HycoBodiesFrictionForces(HycoBodiesFriction f)
 {

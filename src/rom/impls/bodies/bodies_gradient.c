@@ -33,6 +33,18 @@ static void Gaps(HycoROM m, PetscReal w[], PetscReal *size)
   }
 }
 
+/* The loads' work against that of the forces. */
+void HycoBodiesWorkOnMotions(HycoBodiesWork o, PetscReal w[])
+{
+  const HycoSubstructures b = o->bodies;
+
+  for (PetscInt i = 0; i < b->p; i++) {
+    w[i] = 0;
+    for (PetscInt j = 0; j < b->r; j++) w[i] -= o->work[i * b->r + j] * o->c[j];
+    for (PetscInt k = 0; k < b->ns; k++) w[i] += o->Z[k * b->p + i] * o->f[k];
+  }
+}
+
 /* Moves the model to mu and to the forces z, also where no solution is there: finite differences of w by mu. w
    NULL: only the state, for HycoROMOps.expand. */
 PetscErrorCode HycoBodiesResidual(HycoROM m, const PetscReal mu[], const PetscReal z[], PetscReal w[], PetscReal *size)
@@ -51,11 +63,7 @@ PetscErrorCode HycoBodiesResidual(HycoROM m, const PetscReal mu[], const PetscRe
   HycoBodiesGiven(o, &s, m->Lambda);
   if (!w) PetscFunctionReturn(PETSC_SUCCESS);
   /* First the motions, then the contacts: the order of the unknowns z. */
-  for (PetscInt i = 0; i < b->p; i++) {
-    w[i] = 0;
-    for (PetscInt j = 0; j < b->r; j++) w[i] -= o->work[i * b->r + j] * o->c[j];
-    for (PetscInt k = 0; k < b->ns; k++) w[i] += o->Z[k * b->p + i] * o->f[k];
-  }
+  HycoBodiesWorkOnMotions(o, w);
   Gaps(m, w + b->p, size);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -234,6 +234,56 @@ static PetscErrorCode Record(HycoPath p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* -- the problem of a step, for programs: elastic bodies alone, from rest -- */
+
+/* By row, with friction. */
+static PetscErrorCode Unknowns(HycoROM m, PetscInt *p, PetscInt *n, PetscReal z[])
+{
+  HycoBodiesPath w = (HycoBodiesPath)m->work;
+
+  PetscFunctionBegin;
+  PetscCall(HycoBodiesUnknowns(m, p, n, w->friction ? NULL : z));
+  if (!w->friction) PetscFunctionReturn(PETSC_SUCCESS);
+  *n = w->surface.n;
+  if (z) PetscCall(PetscArraycpy(z, w->bodies.x, *p));
+  if (z) PetscCall(PetscArraycpy(z + *p, HycoBodiesFrictionForces(w->friction), *n));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* mu: the variables, with the time. */
+static PetscErrorCode Residual(HycoROM m, const PetscReal mu[], const PetscReal z[], PetscReal w[], PetscReal *size)
+{
+  HycoBodiesPath o = (HycoBodiesPath)m->work;
+  const PetscInt p = o->bodies.bodies->p;
+
+  PetscFunctionBegin;
+  m->trace.n_listed = 0; /* the outputs are those of this state, and of no path */
+  if (!o->friction) {
+    PetscCall(HycoBodiesResidual(m, mu, z, w, size));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
+  PetscCall(HycoROMBringRows(m, mu));
+  PetscCall(HycoBodiesFrictionProbe(o->friction, &o->bodies, mu, z, w + p));
+  HycoBodiesWorkOnMotions(&o->bodies, w);
+  HycoBodiesFrictionNormal(o->friction, m->Lambda);
+  HycoTraceShowOther(m, &HycoBodiesFrictionSlip(o->friction)->shear);
+  *size = 0; /* it is for differences, which programs do not take */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of that state. */
+static PetscErrorCode Expand(HycoROM m)
+{
+  HycoBodiesPath w = (HycoBodiesPath)m->work;
+
+  PetscFunctionBegin;
+  PetscCall(HycoBodiesExpand(&w->bodies, m->gamma));
+  PetscCall(HycoROMExpandModal(m));
+  HycoBodiesMove(&w->bodies, &w->surface, m->U);
+  HycoFEComplete(m->fe, m->U);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* -- set-up -- */
 
 /* The unknowns of the cells in fe's mesh, and back. The laws are evaluated in few cells: their displacements are found
@@ -454,8 +504,8 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Without unknowns, residual and expand: derivatives of a path are differences of whole paths (path_gradient.c). No
-   estimate of its own either: those of held-out paths apply. */
+/* Derivatives of a path are differences of whole paths (path_gradient.c): unknowns, residual and expand serve programs
+   alone. No estimate of its own either: those of held-out paths apply. */
 PetscErrorCode HycoBodiesTakePath(HycoROM m)
 {
   static const HycoROMTraits traits = {.title = "condensed bodies",
@@ -471,6 +521,10 @@ PetscErrorCode HycoBodiesTakePath(HycoROM m)
   static const HycoROMOps ops = {.setup = SetUp,
                                  .reset = Reset,
                                  .solve = Solve,
+                                 .unknowns = Unknowns,
+                                 .residual = Residual,
+                                 .jacobian = HycoBodiesJacobian,
+                                 .expand = Expand,
                                  .features = Features,
                                  .view = View,
                                  .save = HycoBodiesFile,
