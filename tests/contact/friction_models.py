@@ -227,7 +227,8 @@ class FrictionModels(Case):
                 np.testing.assert_equal(batch[name][0], batch[name][2], name)
 
     def test_hybrid_kinds(self):
-        """The fewest full-order displacements for the rows with tangents; all of the mesh, which is full order; 3D; a body that friction alone holds; creep."""
+        """The fewest full-order displacements for the rows with tangents; all of the mesh, which is full order; 3D; a body that friction alone holds;
+        creep with a stiffness that changes in time, which the default search leaves to this type."""
         scene = self.pad(cells=3)
         store = ['-hyco_snapshots', self.path('hp')]
         self.hybrid(scene, 12, *store, '-hyco_hybrid', 'rank', '-hyco_pod_tol', '1e-10')
@@ -244,8 +245,11 @@ class FrictionModels(Case):
         report = self.hybrid(scene, 12, '-hyco_snapshots', self.path('hh'), '-hyco_pod_tol', '1e-10', '-hyco_rid_layers', '1')
         self.assertLess(report['rid_contacts'], 13)
         self.alike(scene, '0.4,1.3,0.22', 0.02)
-        scene = self.pad('flows.yaml', NORTON, ('[0.1, 0.5]', '[0.3, 0.4]'), ('[0.5, 2]', '[0.9, 1.1]'), ('[0, 1]}', '[0.4, 0.6]}'), cells=3)
-        self.hybrid(scene, 6, '-hyco_snapshots', self.path('hc'))
+        heats = NORTON.replace('young: 1000', 'young: 1000*(1 + 0.1*t)')
+        scene = self.pad('flows.yaml', heats, ('[0.1, 0.5]', '[0.3, 0.4]'), ('[0.5, 2]', '[0.9, 1.1]'), ('[0, 1]}', '[0.4, 0.6]}'), cells=3)
+        report = self.hyco('train', '-scene', scene, '-model', self.path('m.h5'), '-scatter', '6', '-hyco_snapshots', self.path('hc'),
+                           '-hyco_search', 'true', '-hyco_validation', '2')
+        self.assertEqual(report['model_type'], 'hybrid')
         self.alike(scene, '0.37,1.2,1,0.5', 0.02)
 
     def test_refused(self):
