@@ -539,8 +539,7 @@ static PetscErrorCode ChooseUnknowns(HycoReducer t, HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The forces of column k by row of the contacts at fe's parameters: friction is stored as a vector. Tangential ones are
-   divided by the coefficient of friction (reconstruct.c). */
+/* The forces of column k by row of the contacts at fe's parameters: friction is stored as a vector. */
 static PetscErrorCode ReadRows(HycoReducer t, const HycoSlip *slip, PetscInt k, PetscReal force[], PetscReal S[])
 {
   const PetscInt N = slip->n, steps = HycoSnapshotsSteps(t->scene);
@@ -558,9 +557,6 @@ static PetscErrorCode ReadRows(HycoReducer t, const HycoSlip *slip, PetscInt k, 
   }
   PetscCall(PetscFree(component));
   HycoSlipForces(slip, t->Lambda + (size_t)k * (size_t)N, force, S);
-  for (PetscInt i = 0; i < N; i++) {
-    for (PetscInt r = slip->row[i] + 1; r < slip->row[i + 1]; r++) S[r] = slip->mu[i] > 0 ? S[r] / slip->mu[i] : 0;
-  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -585,7 +581,6 @@ static PetscErrorCode FillRows(HycoReducer t, HycoROM m, HycoFE fe, HycoPairs *p
     if (!(size > 0)) continue;
     PetscCall(HycoReducerColumn(t, k, mu));
     PetscCall(HycoFESetParameters(fe, mu));
-    PetscCall(HycoSlipCoefficients(slip, fe, pairs));
     PetscCall(
         HycoContactTangentRows(fe, pairs, slip->row, u, slip->tangent, rows.start, rows.dof, rows.value, rows.gap));
     PetscCall(ReadRows(t, slip, k, force, h->S_lambda + (size_t)h->n_dual++ * (size_t)n));

@@ -4,9 +4,9 @@
   many snapshots (41) has many minimisers, among which round-off would choose: a small weight on the coefficients
   selects one close to the least norm.
 
-  With friction a snapshot has the normal and the tangential forces of all contacts, the latter divided by the
-  coefficient of friction mu, with one coefficient c. Their combinations, times mu of the prediction, stay in Coulomb's
-  cone, which is convex, and are on it where all snapshots slip in one direction.
+  With friction a snapshot has the normal and the tangential forces of all contacts, with one coefficient. Where mu is
+  that of the snapshots their combinations stay in Coulomb's cone, which is convex; elsewhere tangential forces are cut
+  to it.
 */
 #include <hycoalgorithms.h>
 #include <hycohybrid.h>
@@ -40,8 +40,7 @@ static PetscErrorCode Solve(PetscInt solver, PetscInt m, PetscInt n, const Petsc
 /* Data that are constant over predictions, without the contacts whose force is zero in every snapshot. */
 struct _n_HycoReconstruction {
   PetscInt n, *contact, *row; /* the rows of these contacts: indices in pairs, and of the rows in S_lambda */
-  PetscReal *S;               /* n x n_dual column major: these rows of S_lambda, and what the prediction multiplies */
-  PetscReal *factor;          /* them with: 1, of tangents mu */
+  PetscReal *S;               /* n x n_dual column major: these rows of S_lambda */
   PetscReal scale;            /* the largest snapshot force in the RID */
   PetscReal *open, *d, *h, *c;
   HycoWeighted weighted;
@@ -97,7 +96,7 @@ static PetscErrorCode SetUp(HycoROM m)
     for (PetscInt k = 0; k < r->n; k++)
       r->S[(size_t)j * (size_t)r->n + (size_t)k] = h->S_lambda[(size_t)j * (size_t)N + (size_t)r->row[k]];
   }
-  PetscCall(PetscMalloc5(r->n, &r->open, r->n, &r->d, r->n, &r->h, h->n_dual, &r->c, r->n, &r->factor));
+  PetscCall(PetscMalloc4(r->n, &r->open, r->n, &r->d, r->n, &r->h, h->n_dual, &r->c));
   PetscCall(HycoWeightedCreate(r->n, h->n_dual, r->S, SMALL * SMALL * r->scale * r->scale, &r->weighted));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -111,7 +110,7 @@ PetscErrorCode HycoReconstructionDestroy(HycoReconstruction *reconstruction)
   if (!r) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoWeightedDestroy(&r->weighted));
   HycoFreeAll(&r->contact, &r->row, &r->S);
-  PetscCall(PetscFree5(r->open, r->d, r->h, r->c, r->factor));
+  PetscCall(PetscFree4(r->open, r->d, r->h, r->c));
   PetscCall(PetscFree(*reconstruction));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -136,10 +135,10 @@ static PetscErrorCode SolveWrittenOut(HycoROM m, const PetscReal L[])
     for (PetscInt k = 0; k < r->n; k++) {
       if (m->model->in_rid[r->contact[k]]) {
         b[row] = L[r->row[k]];
-        a[row++] = r->factor[k] * s[k];
+        a[row++] = s[k];
       }
       /* [B U - D]- times the combined force: its right-hand side is 0. */
-      if (r->open[k] < 0) a[row++] = r->open[k] * r->factor[k] * s[k];
+      if (r->open[k] < 0) a[row++] = r->open[k] * s[k];
     }
     /* The small weight on each coefficient, a row each. */
     a[row + j] = SMALL * r->scale;
@@ -160,11 +159,26 @@ static PetscReal Remainder(HycoROM m, const PetscReal L[], const HycoReconstruct
 
     /* Outside the RID the combination is the only value there is. */
     if (!m->model->in_rid[r->contact[i]]) continue;
-    for (PetscInt j = 0; j < n_dual; j++) rest -= r->c[j] * r->factor[i] * r->S[(size_t)j * (size_t)r->n + (size_t)i];
+    for (PetscInt j = 0; j < n_dual; j++) rest -= r->c[j] * r->S[(size_t)j * (size_t)r->n + (size_t)i];
     lost += rest * rest;
     size += force * force;
   }
   return size > 0 ? PetscSqrtReal(lost / size) : 0;
+}
+
+/* Sets Lambda, and shortens reconstructed tangential forces that are beyond Coulomb's cone. */
+static void Cut(HycoROM m, const PetscInt first[], const PetscReal mu[], PetscReal L[])
+{
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) {
+    PetscReal *force = L + first[k], size = 0;
+    const PetscInt n = first[k + 1] - first[k];
+
+    m->Lambda[k] = force[0];
+    if (m->model->in_rid[k]) continue;
+    for (PetscInt j = 1; j < n; j++) size += PetscSqr(force[j]);
+    size = PetscSqrtReal(size);
+    for (PetscInt j = 1; j < n && size > mu[k] * force[0]; j++) force[j] *= mu[k] * force[0] / size;
+  }
 }
 
 /* (41): nonnegative least squares for the coefficients of the dual snapshots. The RID's forces shall be met, and
@@ -189,11 +203,9 @@ PetscErrorCode HycoHybridReconstruct(HycoROM m)
   for (PetscInt i = 0; i < r->n; i++) {
     const PetscInt k = r->contact[i];
 
-    r->factor[i] = first && r->row[i] > first[k] ? mu[k] : 1;
     r->open[i] = HycoROMAddRow(m, k, -m->rows.gap[k]);
     r->d[i] = (m->model->in_rid[k] ? 1 : 0) + (r->open[i] < 0 ? r->open[i] * r->open[i] : 0);
-    r->d[i] *= r->factor[i] * r->factor[i];
-    r->h[i] = m->model->in_rid[k] ? r->factor[i] * L[r->row[i]] : 0;
+    r->h[i] = m->model->in_rid[k] ? L[r->row[i]] : 0;
   }
   /* By the normal equations with changing weights: no matrix of all rows is formed. It may stop early, then the
      explicit problem decides. */
@@ -208,9 +220,9 @@ PetscErrorCode HycoHybridReconstruct(HycoROM m)
     m->spread = PETSC_TRUE;
     for (PetscInt i = 0; i < r->n; i++) {
       if (!m->model->in_rid[r->contact[i]] && !HycoPairsAlone(m->model->scene, &m->pairs, r->contact[i]))
-        L[r->row[i]] += r->c[j] * r->factor[i] * s[i];
+        L[r->row[i]] += r->c[j] * s[i];
     }
   }
-  for (PetscInt k = 0; first && k < N; k++) m->Lambda[k] = L[first[k]];
+  if (first) Cut(m, first, mu, L);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
