@@ -131,9 +131,9 @@ PetscErrorCode HycoGalerkinFrictionRecord(HycoROM model, HycoStep *step);
 /* The first row of contact k of A_lambda in own_rows, and the contact (number in A_lambda) of a row. */
 PetscInt HycoGalerkinFirstRow(HycoGalerkin galerkin, PetscInt k);
 PetscInt HycoGalerkinContactOf(HycoGalerkin galerkin, PetscInt row);
-/* Borrowed: the first row of each contact of the scene (n + 1), the forces by row at the last accepted time, which
-   the reconstruction completes, and the coefficients of friction by contact. */
-const PetscInt *HycoGalerkinFrictionForces(HycoGalerkinFriction friction, PetscReal **force, const PetscReal **mu);
+/* Borrowed: the first row of each contact of the scene (n + 1), and the forces by row at the last accepted time, which
+   the reconstruction completes. */
+const PetscInt *HycoGalerkinFrictionForces(HycoGalerkinFriction friction, PetscReal **force);
 
 /* Solutions without contact that loads share while the stiffness is constant (loads.c). HycoLoadsCreate() needs Fr
    and x; HycoLoadsForget(): the stiffness has changed (NULL-safe); HycoLoadsSetFree() passes to the solver the

@@ -76,10 +76,9 @@ PetscInt HycoGalerkinContactOf(HycoGalerkin g, PetscInt row)
 }
 
 /* NULL: none; rows are contacts then. */
-const PetscInt *HycoGalerkinFrictionForces(HycoGalerkinFriction f, PetscReal **force, const PetscReal **mu)
+const PetscInt *HycoGalerkinFrictionForces(HycoGalerkinFriction f, PetscReal **force)
 {
   *force = f->force;
-  *mu = f->all.mu;
   return f->all.row;
 }
 
@@ -196,9 +195,8 @@ static PetscErrorCode Balance(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* w = D - B U of all contacts at the accepted time. Where a reconstructed force would do work, force or slip are round-off
-   or errors of the modes, and the contact counts as sticking. */
-static PetscErrorCode ComputeSlips(HycoROM m, HycoFE fe)
+/* w = D - B U of all contacts at the accepted time; *most: the largest displacement. */
+static PetscErrorCode ComputeSlips(HycoROM m, HycoFE fe, PetscReal *most)
 {
   HycoGalerkinFriction f = ((HycoGalerkin)m->work)->friction;
   HycoRows *rows = &f->rows;
@@ -208,32 +206,40 @@ static PetscErrorCode ComputeSlips(HycoROM m, HycoFE fe)
     f->slack[r] = rows->gap[r];
     for (PetscInt e = rows->start[r]; e < rows->start[r + 1]; e++) f->slack[r] -= rows->value[e] * m->U[rows->dof[e]];
   }
-  for (PetscInt k = 0; k < f->all.n; k++) {
-    const PetscInt begin = f->all.row[k] + 1, end = f->all.row[k + 1];
-    PetscReal work = 0;
-
-    for (PetscInt r = begin; r < end && !m->model->in_rid[k]; r++) work += f->force[r] * f->slack[r];
-    for (PetscInt r = begin; r < end && work > 0; r++) f->slack[r] = 0;
-  }
   PetscCall(PetscArraycpy(f->U_old, m->U, fe->n_dof));
+  *most = 0;
+  for (PetscInt i = 0; i < fe->n_dof; i++) *most = PetscMax(*most, PetscAbsReal(m->U[i]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Reconstructed forces are hardly ever on the cone: whether their contacts slip is decided by the law itself, r - rho w
-   against P(r - rho w), with rho that makes the largest force and displacement equally large. */
-static void Decide(HycoROM m, PetscReal most)
+/* Coulomb's law for the tangential part of a reconstructed force, of n components: where r - rho w is outside the cone,
+   the contact slips, and the force is on the cone. Elsewhere it sticks, and a slip that would do negative work is an error of
+   the modes. */
+static void Slip(PetscReal mu, PetscReal rho, PetscInt n, PetscReal force[], PetscReal slack[])
+{
+  PetscReal size = 0, work = 0;
+
+  for (PetscInt j = 1; j < n; j++) size += PetscSqr(force[j] - rho * slack[j]);
+  size = PetscSqrtReal(size);
+  for (PetscInt j = 1; j < n; j++) {
+    if (size > mu * force[0]) force[j] = (force[j] - rho * slack[j]) * mu * force[0] / size;
+    work -= force[j] * slack[j];
+  }
+  for (PetscInt j = 1; j < n && work < 0; j++) slack[j] = 0;
+}
+
+/* The law outside the RID, with a rho that makes the largest force and displacement equally large. */
+static void Obey(HycoROM m, PetscReal most)
 {
   HycoGalerkinFriction f = ((HycoGalerkin)m->work)->friction;
   PetscReal force = 0;
 
   for (PetscInt k = 0; k < f->all.n; k++) force = PetscMax(force, f->force[f->all.row[k]]);
-  for (PetscInt k = 0; k < f->all.n; k++) {
+  for (PetscInt k = 0; k < f->all.n && most > 0; k++) {
     const PetscInt begin = f->all.row[k];
-    PetscReal size = 0;
 
-    if (m->model->in_rid[k] || !f->all.of[k] || !(f->force[begin] > 0)) continue;
-    for (PetscInt r = begin + 1; r < f->all.row[k + 1]; r++) size += PetscSqr(f->force[r] - force / most * f->slack[r]);
-    f->all.shear.state[k] = PetscSqrtReal(size) < f->all.mu[k] * f->force[begin] ? HYCO_STICK : HYCO_SLIP;
+    if (!m->model->in_rid[k])
+      Slip(f->all.mu[k], force / most, f->all.row[k + 1] - begin, f->force + begin, f->slack + begin);
   }
 }
 
@@ -241,7 +247,7 @@ static void Decide(HycoROM m, PetscReal most)
 PetscErrorCode HycoGalerkinFrictionAccept(HycoROM m, HycoPath p)
 {
   HycoGalerkinFriction f = ((HycoGalerkin)m->work)->friction;
-  PetscReal most = 0;
+  PetscReal most;
   HycoFE fe;
 
   PetscFunctionBegin;
@@ -252,11 +258,10 @@ PetscErrorCode HycoGalerkinFrictionAccept(HycoROM m, HycoPath p)
                                    f->rows.value, f->rows.gap));
   PetscCall(TakeMultipliers(m));
   if (m->ops->reconstruct && m->reconstruct) HycoLogged(HYCO_EVENT_RECONSTRUCT, (*m->ops->reconstruct)(m));
+  PetscCall(ComputeSlips(m, fe, &most));
+  Obey(m, most);
   PetscCall(Balance(m));
-  PetscCall(ComputeSlips(m, fe));
-  for (PetscInt i = 0; i < fe->n_dof; i++) most = PetscMax(most, PetscAbsReal(m->U[i]));
   HycoSlipAdd(&f->all, f->force, f->slack, most);
-  if (most > 0) Decide(m, most);
   HycoSlipTake(&f->own, p->t);
   p->now.disproven += m->n_L && m->solver->sign < 0;
   PetscFunctionReturn(PETSC_SUCCESS);

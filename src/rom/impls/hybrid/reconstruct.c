@@ -5,8 +5,7 @@
   selects one close to the least norm.
 
   With friction a snapshot has the normal and the tangential forces of all contacts, with one coefficient. Where mu is
-  that of the snapshots their combinations stay in Coulomb's cone, which is convex; elsewhere tangential forces are cut
-  to it.
+  that of the snapshots their combinations stay in Coulomb's cone, which is convex; the path makes them obey the law.
 */
 #include <hycoalgorithms.h>
 #include <hycohybrid.h>
@@ -46,14 +45,13 @@ struct _n_HycoReconstruction {
   HycoWeighted weighted;
 };
 
-/* The forces by row, and the first row of each contact (NULL: a row is a contact) with its coefficient of friction. */
-static PetscReal *Forces(HycoROM m, const PetscInt **first, const PetscReal **mu)
+/* The forces by row, and the first row of each contact (NULL: a row is a contact). */
+static PetscReal *Forces(HycoROM m, const PetscInt **first)
 {
   HycoGalerkinFriction friction = ((HycoHybridWork)m->work)->galerkin.friction;
   PetscReal *force = m->Lambda;
 
-  *mu = NULL;
-  *first = friction ? HycoGalerkinFrictionForces(friction, &force, mu) : NULL;
+  *first = friction ? HycoGalerkinFrictionForces(friction, &force) : NULL;
   return force;
 }
 
@@ -62,7 +60,6 @@ static PetscReal *Forces(HycoROM m, const PetscInt **first, const PetscReal **mu
 static PetscErrorCode SetUp(HycoROM m)
 {
   const HycoHybridModel h = (HycoHybridModel)m->model->data;
-  const PetscReal *mu;
   const PetscInt *first;
   PetscInt N = m->model->pairs.n;
   HycoReconstruction r;
@@ -70,7 +67,7 @@ static PetscErrorCode SetUp(HycoROM m)
   PetscFunctionBegin;
   PetscCall(PetscNew(&r));
   ((HycoHybridWork)m->work)->reconstruction = r;
-  (void)Forces(m, &first, &mu);
+  (void)Forces(m, &first);
   if (first) N = first[N];
   PetscCall(PetscMalloc1(N, &r->contact));
   PetscCall(PetscMalloc1(N, &r->row));
@@ -166,21 +163,6 @@ static PetscReal Remainder(HycoROM m, const PetscReal L[], const HycoReconstruct
   return size > 0 ? PetscSqrtReal(lost / size) : 0;
 }
 
-/* Sets Lambda, and shortens reconstructed tangential forces that are beyond Coulomb's cone. */
-static void Cut(HycoROM m, const PetscInt first[], const PetscReal mu[], PetscReal L[])
-{
-  for (PetscInt k = 0; k < m->model->pairs.n; k++) {
-    PetscReal *force = L + first[k], size = 0;
-    const PetscInt n = first[k + 1] - first[k];
-
-    m->Lambda[k] = force[0];
-    if (m->model->in_rid[k]) continue;
-    for (PetscInt j = 1; j < n; j++) size += PetscSqr(force[j]);
-    size = PetscSqrtReal(size);
-    for (PetscInt j = 1; j < n && size > mu[k] * force[0]; j++) force[j] *= mu[k] * force[0] / size;
-  }
-}
-
 /* (41): nonnegative least squares for the coefficients of the dual snapshots. The RID's forces shall be met, and
    contacts that the predicted displacements leave open shall have none, weighted by the gap. Forces of the RID
    itself are kept. */
@@ -188,8 +170,7 @@ PetscErrorCode HycoHybridReconstruct(HycoROM m)
 {
   const HycoHybridModel h = (HycoHybridModel)m->model->data;
   const PetscInt N = m->model->pairs.n, *first;
-  const PetscReal *mu;
-  PetscReal force = 0, *L = Forces(m, &first, &mu);
+  PetscReal force = 0, *L = Forces(m, &first);
   HycoReconstruction r;
   PetscBool solved = PETSC_FALSE;
 
@@ -223,6 +204,6 @@ PetscErrorCode HycoHybridReconstruct(HycoROM m)
         L[r->row[i]] += r->c[j] * s[i];
     }
   }
-  if (first) Cut(m, first, mu, L);
+  for (PetscInt k = 0; first && k < N; k++) m->Lambda[k] = L[first[k]];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
