@@ -46,7 +46,7 @@ static PetscErrorCode TakeOneEach(HycoReducer t, PetscBool take[])
   HycoRows rows;
 
   PetscFunctionBegin;
-  PetscCall(HycoRowsCreate(pairs, fe->dim, &rows));
+  PetscCall(HycoRowsCreate(pairs, fe->dim, pairs->n, &rows));
   PetscCall(HycoContactRows(fe, &t->fom->pairs, rows.start, rows.dof, rows.value, rows.gap));
   for (PetscInt k = 0; k < pairs->n; k++) {
     const PetscInt first = rows.start[k];

@@ -12,11 +12,13 @@ typedef struct _n_HycoReduced *HycoReduced;
 typedef struct _n_HycoLoads *HycoLoads;
 typedef struct _n_HycoTable *HycoTable;
 typedef struct _n_HycoGalerkinPath *HycoGalerkinPath;
+typedef struct _n_HycoGalerkinFriction *HycoGalerkinFriction;
 
 /* The sets of (21)-(22), (32)-(37): contacts, and unknowns of the model's own mesh that are not fixed, once fe is at
    parameters. */
 typedef struct {
   IS is_A_lambda;      /* contacts: indices in pairs */
+  IS is_rows;          /* the rows of B that they have: the same, or with friction all of B's */
   IS is_A, is_I;       /* unknowns inside the RID, on its interface */
   IS is_Ac, is_Ac_all; /* A_c: unknowns of A at the nodes of these contacts; A'_c: with those on the interface. From
                           HycoGalerkinContactMatrix() */
@@ -50,15 +52,17 @@ typedef struct _n_HycoGalerkin {
   HycoLoads loads;       /* solutions without contact shared by all loads; NULL: Kr is dense, or no parameter is of
                             this kind */
   HycoGalerkinPath path; /* of a scene with a history */
+  HycoGalerkinFriction friction; /* of its contacts; NULL: none, or each contact has one row */
   HycoWatch watch;
   HycoIndexSets sets;
   Mat K, Kr, Br, Btr;
   Vec F, Fr, Dr, x, L;
   HycoMesh own;        /* the cells and the first nodes of mesh: the part that the reduced problem uses */
   HycoPairs own_pairs; /* the m contacts of A_lambda */
-  HycoRows own_rows;   /* their rows, at fe's parameters */
+  HycoRows own_rows;   /* their rows, at fe's parameters; with friction a normal and its tangents */
   HycoSystem system;
-  Mat B;               /* all contacts' rows over the unknowns of fe's mesh, those outside A_lambda empty */
+  Mat B;               /* all contacts' rows over the unknowns of fe's mesh, those outside A_lambda empty; with friction
+                          own_rows */
   PetscBool current_B; /* it is at fe's parameters */
   Vec D;               /* their gaps, for the indicator */
 } * HycoGalerkin;
@@ -109,6 +113,27 @@ PetscErrorCode HycoGalerkinPathSolve(HycoROM model, const PetscReal mu[]);
 PetscErrorCode HycoGalerkinPathDestroy(HycoGalerkinPath *path);
 PetscErrorCode HycoGalerkinUnpack(HycoROM model);
 PetscErrorCode HycoGalerkinExpand(HycoROM model);
+
+/*
+  Friction on the path (galerkin_friction.c). Create in set-up, after own_pairs; Destroy is NULL-safe. Begin at the start of a path;
+  Rows sets own_rows, Pose the cones of the system, both at fe's parameters of a step; Accept when x and L are those of
+  an accepted step, with U and Lambda set; Show and Record at a listed time, before and after HycoTraceRecord().
+*/
+struct _n_HycoPath;
+PetscErrorCode HycoGalerkinFrictionCreate(HycoROM model);
+PetscErrorCode HycoGalerkinFrictionDestroy(HycoGalerkinFriction *friction);
+PetscErrorCode HycoGalerkinFrictionBegin(HycoROM model);
+PetscErrorCode HycoGalerkinFrictionRows(HycoROM model);
+PetscErrorCode HycoGalerkinFrictionPose(HycoROM model);
+PetscErrorCode HycoGalerkinFrictionAccept(HycoROM model, struct _n_HycoPath *path);
+PetscErrorCode HycoGalerkinFrictionShow(HycoROM model);
+PetscErrorCode HycoGalerkinFrictionRecord(HycoROM model, HycoStep *step);
+/* The first row of contact k of A_lambda in own_rows, and the contact (number in A_lambda) of a row. */
+PetscInt HycoGalerkinFirstRow(HycoGalerkin galerkin, PetscInt k);
+PetscInt HycoGalerkinContactOf(HycoGalerkin galerkin, PetscInt row);
+/* Borrowed: the first row of each contact of the scene (n + 1), and the forces by row at the last accepted time, which
+   the reconstruction completes. */
+const PetscInt *HycoGalerkinFrictionForces(HycoGalerkinFriction friction, PetscReal **force);
 
 /* Solutions without contact that loads share while the stiffness is constant (loads.c). HycoLoadsCreate() needs Fr
    and x; HycoLoadsForget(): the stiffness has changed (NULL-safe); HycoLoadsSetFree() passes to the solver the

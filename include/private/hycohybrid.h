@@ -9,7 +9,7 @@ typedef struct _n_HycoReconstruction *HycoReconstruction;
 typedef struct {
   struct _n_HycoGalerkinModel galerkin;
   PetscInt n_dual;             /* number of dual snapshots that are not zero */
-  PetscReal *S_lambda;         /* N_lambda x n_dual column major */
+  PetscReal *S_lambda;         /* N_lambda x n_dual column major; with friction a row for each normal and tangent */
   PetscInt reconstruct_solver; /* of (41), index in HycoReconstructSolvers */
 } * HycoHybridModel;
 

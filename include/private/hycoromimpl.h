@@ -245,8 +245,8 @@ PetscErrorCode HycoROMSetFE(HycoROM model, HycoHybrid hybrid, PetscInt n, const 
 /* The contacts of a handle: a copy where predictions search for masters, else the model's arrays. Drop frees the copy. */
 PetscErrorCode HycoROMTakePairs(const HycoPairs *of, HycoPairs *own);
 PetscErrorCode HycoROMDropPairs(HycoPairs *own);
-/* Allocates the rows of contacts. */
-PetscErrorCode HycoRowsCreate(const HycoPairs *pairs, PetscInt dim, HycoRows *rows);
+/* Allocates n rows of contacts: one for each of the pairs, or with tangents. */
+PetscErrorCode HycoRowsCreate(const HycoPairs *pairs, PetscInt dim, PetscInt n, HycoRows *rows);
 PetscErrorCode HycoRowsDestroy(HycoRows *rows);
 /* Whether supports of fe hold a displacement of a row of these contacts. */
 PetscBool HycoRowsAreHeld(HycoFE fe, const HycoPairs *pairs);

@@ -37,6 +37,10 @@ PetscBool HycoSlipExtrapolate(const HycoSlip *slip, PetscReal t, PetscInt n, con
                               const PetscReal before[], PetscReal r[]);
 /* L by row, from the normal forces and the vectors (3 n) of friction on the slaves, with the present tangents. */
 void HycoSlipForces(const HycoSlip *slip, const PetscReal normal[], const PetscReal force[], PetscReal L[]);
+/* The vectors of friction on the slaves (shear.force) from the forces L by row: the reverse. */
+void HycoSlipVectors(HycoSlip *slip, const PetscReal L[]);
+/* The number of rows of these contacts: one each, or one for each dimension with friction. */
+PetscInt HycoSlipCountRows(HycoScene scene, const HycoPairs *pairs, PetscInt dim);
 /* sum: the work since the start and the number of slipping contacts of this process. */
 void HycoSlipSum(const HycoSlip *slip, PetscReal sum[2]);
 

@@ -151,7 +151,7 @@ static PetscErrorCode PrintReduced(const HycoPrediction *p)
   PetscFunctionBegin;
   if (p->gives_forces)
     PetscCall(DriverPrint("%s: %d contacts, %d modes\n", p->title, (int)p->n_contacts, (int)p->n_modes));
-  else if (p->rid_fraction < 1 && p->n_multipliers != p->n_contacts)
+  else if (p->rid_fraction < 1 && p->n_multipliers != p->n_contacts && !p->n_fe_dofs)
     PetscCall(DriverPrint("%s: %d modes, %d force vectors for %d contacts; %d elements (%.1f %%)\n", p->title,
                           (int)p->n_modes, (int)p->n_multipliers, (int)p->n_contacts, (int)p->rid_elements,
                           100 * (double)p->rid_fraction));

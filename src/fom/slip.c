@@ -110,15 +110,11 @@ static void Add(HycoSlip *h, PetscInt k, const PetscReal r[], const PetscReal w[
   const PetscReal *t = h->tangent + 6 * k;
   PetscReal size = 0, work = 0;
 
-  for (PetscInt c = 0; c < 3; c++) s->force[3 * k + c] = 0;
   for (PetscInt j = 0; j + 1 < h->dim && h->of[k]; j++) {
     size += r[j + 1] * r[j + 1];
     /* -w_t is the slip and -r_t the force on the slave: the work is what friction dissipates, >= 0. */
     if (r[0] > 0) work -= r[j + 1] * w[j + 1];
-    for (PetscInt c = 0; c < 3; c++) {
-      s->force[3 * k + c] -= r[j + 1] * t[3 * j + c];
-      if (r[0] > 0) s->slip[3 * k + c] -= w[j + 1] * t[3 * j + c];
-    }
+    for (PetscInt c = 0; c < 3 && r[0] > 0; c++) s->slip[3 * k + c] -= w[j + 1] * t[3 * j + c];
   }
   s->state[k] = !(r[0] > 0) ? HYCO_OPEN : PetscSqrtReal(size) < SLIPS * h->mu[k] * r[0] ? HYCO_STICK : HYCO_SLIP;
   /* Sticking contacts have slips of round-off, whose work would add up over many steps. */
@@ -128,6 +124,7 @@ static void Add(HycoSlip *h, PetscInt k, const PetscReal r[], const PetscReal w[
 /* L, w: by row of this rank, w = D - B U. most: the largest displacement, the scale of round-off. */
 void HycoSlipAdd(HycoSlip *s, const PetscReal L[], const PetscReal w[], PetscReal most)
 {
+  HycoSlipVectors(s, L);
   for (PetscInt k = 0; k < s->n; k++) Add(s, k, L + s->row[k], w + s->row[k], most);
 }
 
@@ -163,6 +160,26 @@ void HycoSlipForces(const HycoSlip *s, const PetscReal normal[], const PetscReal
       L[j] = -(f[0] * t[0] + f[1] * t[1] + f[2] * t[2]);
     }
   }
+}
+
+void HycoSlipVectors(HycoSlip *s, const PetscReal L[])
+{
+  for (PetscInt k = 0; k < s->n; k++) {
+    for (PetscInt c = 0; c < 3; c++) s->shear.force[3 * k + c] = 0;
+    for (PetscInt j = s->row[k] + 1; j < s->row[k + 1]; j++) {
+      const PetscReal *t = s->tangent + 6 * k + 3 * (j - s->row[k] - 1);
+
+      for (PetscInt c = 0; c < 3; c++) s->shear.force[3 * k + c] -= L[j] * t[c];
+    }
+  }
+}
+
+PetscInt HycoSlipCountRows(HycoScene scene, const HycoPairs *pairs, PetscInt dim)
+{
+  PetscInt n = 0;
+
+  for (PetscInt k = 0; k < pairs->n; k++) n += scene->contact[pairs->contact[k]]->friction ? dim : 1;
+  return n;
 }
 
 /* sum: the work, and the number of slipping contacts as a real, so that one reduction serves both. Local. */

@@ -864,8 +864,8 @@ PetscErrorCode HycoReducerCheckContacts(HycoReducer t, const HycoROM type)
                    t->scene->contact[k]->name, ((PetscObject)t->scene->contact[k])->type_name, type->model->type);
   for (PetscInt k = 0; k < t->scene->n_contacts && !type->model->traits.friction; k++)
     HycoCheckModel(!t->scene->contact[k]->friction,
-                   "contact %s has friction, which a model of type %s does not represent: train one of type bodies, or "
-                   "use hyco solve",
+                   "contact %s has friction, which a model of type %s does not represent: train one of type bodies or "
+                   "hybrid, or use hyco solve",
                    t->scene->contact[k]->name, type->model->type);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -329,7 +329,12 @@ static PetscErrorCode ReadTraining(HycoReducer t)
                             &t->keep_singular, NULL));
   PetscOptionsEnd();
   PetscCall(EndTraining(t)); /* the type's options may have changed */
-  PetscCall(HycoReducerSetType(t, types[type]));
+  /* With friction the type without a search is bodies; a search begins with the settings of others, and may end with
+     hybrid. */
+  if (t->scene && HycoSceneHasFriction(t->scene) && t->search && t->n_validation && !t->pinned[HYCO_CHOICE_TYPE])
+    PetscCall(HycoReducerSetType(t, HYCO_ROM_HYBRID));
+  else
+    PetscCall(HycoReducerSetType(t, types[type]));
   t->greedy.indicator = (HycoIndicatorKind)indicator;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

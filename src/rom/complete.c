@@ -3,14 +3,14 @@
 #include <hycoromimpl.h>
 
 /* Room for the widest row: entries of B are rewritten at each mu without another allocation. */
-PetscErrorCode HycoRowsCreate(const HycoPairs *pairs, PetscInt dim, HycoRows *rows)
+PetscErrorCode HycoRowsCreate(const HycoPairs *pairs, PetscInt dim, PetscInt n, HycoRows *rows)
 {
   PetscFunctionBegin;
-  rows->room = HycoPairsWidth(pairs) * dim * pairs->n;
-  PetscCall(PetscMalloc1(pairs->n + 1, &rows->start));
+  rows->room = HycoPairsWidth(pairs) * dim * n;
+  PetscCall(PetscMalloc1(n + 1, &rows->start));
   PetscCall(PetscMalloc1(rows->room, &rows->dof));
   PetscCall(PetscMalloc1(rows->room, &rows->value));
-  PetscCall(PetscMalloc1(pairs->n, &rows->gap));
+  PetscCall(PetscMalloc1(n, &rows->gap));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -48,7 +48,7 @@ static PetscErrorCode CreateBeyond(HycoROM m)
 {
   PetscFunctionBegin;
   PetscCall(HycoFECreateSurface(m->model->scene, m->model->mesh->dm, &m->fe_beyond));
-  PetscCall(HycoRowsCreate(&m->pairs, m->model->mesh->dim, &m->rows));
+  PetscCall(HycoRowsCreate(&m->pairs, m->model->mesh->dim, m->pairs.n, &m->rows));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

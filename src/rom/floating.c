@@ -126,7 +126,26 @@ typedef struct {
   const PetscReal *force, *load;
 } Dual;
 
-/* The work of each pressing contact's row of B on the floating bodies' rigid motions, a column per contact. */
+/* The part of friction in the work of contact k on motion j, for a normal force of 1. */
+static PetscReal FrictionWork(HycoROM m, HycoFloating f, HycoFE fe, PetscInt j, PetscInt k)
+{
+  const PetscInt *master;
+  const PetscReal *weight;
+  PetscReal work = 0;
+  PetscInt n;
+
+  HycoPairsMasters(&m->pairs, k, &n, &master, &weight);
+  for (PetscInt c = 0; c < fe->dim; c++) {
+    const PetscReal force = m->pairs.shear->force[3 * k + c] / m->Lambda[k];
+
+    work -= force * At(f, fe, j, m->pairs.slave[k], c);
+    for (PetscInt i = 0; i < n; i++) work += force * weight[i] * At(f, fe, j, master[i], c);
+  }
+  return work;
+}
+
+/* The work of each pressing contact's row of B, or of its force with friction, on the floating bodies' rigid motions,
+   a column per contact. */
 static PetscErrorCode FillDual(HycoROM m, HycoFloating f, HycoFE fe, Dual *d)
 {
   PetscFunctionBegin;
@@ -140,6 +159,7 @@ static PetscErrorCode FillDual(HycoROM m, HycoFloating f, HycoFE fe, Dual *d)
       for (PetscInt j = 0; j < d->p; j++)
         work[j] += m->rows.value[e] * At(f, fe, j, m->rows.dof[e] / fe->dim, m->rows.dof[e] % fe->dim);
     }
+    for (PetscInt j = 0; m->pairs.shear && j < d->p; j++) work[j] += FrictionWork(m, f, fe, j, k);
     d->contact[d->n++] = k;
   }
   PetscFunctionReturn(PETSC_SUCCESS);

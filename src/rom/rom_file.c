@@ -9,9 +9,10 @@
 /* The file's format version, raised when a reader of older versions must not read the file. 2: contacts have
    weighted masters. 3: problem/type; a file without it is hybrid. 4: further types. 5: masters are
    searched on surfaces that a map moves, and a slave node may face none; models without such surfaces are written as
-   4. 6: models of scenes with a history. The kind is common to all types, so that an older reader can report the
+   4. 6: models of scenes with a history. 7: hybrid ones with friction. The kind is common to all types, so that an older reader can report the
    format. */
-#define HYCO_ROM_FORMAT 6
+#define HYCO_ROM_FORMAT 7
+#define HYCO_ROM_PATHS  6
 #define HYCO_ROM_MOVED  5
 #define HYCO_ROM_STILL  4
 #define HYCO_ROM_OLDEST 2
@@ -463,7 +464,8 @@ static PetscErrorCode SaveProblem(HycoH5 h, HycoROM m)
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
     if (HycoPairsAlone(m->model->scene, &m->model->pairs, k)) format = HYCO_ROM_MOVED;
   }
-  if (m->model->scene->n_times) format = HYCO_ROM_FORMAT;
+  if (m->model->scene->n_times) format = HYCO_ROM_PATHS;
+  if (HycoSceneHasFriction(m->model->scene) && m->ops->reconstruct) format = HYCO_ROM_FORMAT;
   PetscCall(HycoH5WriteText(h, "kind", HYCO_ROM_KIND));
   PetscCall(HycoH5WriteInt(h, "format", 1, 1, &format));
   PetscCall(MoveProblem(h, m));

@@ -84,7 +84,7 @@ class Files(Case):
         run = self.run_raw('predict', '-model', 'm.h5', '-mu', '0.07,0.17')
         self.assertNotEqual(run.returncode, 0)
         self.assertIn('m.h5 has model format 1, and this hyco', run.stderr)
-        self.assertIn('reads formats 2 to 6; train it again', run.stderr)
+        self.assertIn('reads formats 2 to 7; train it again', run.stderr)
 
     def test_more_samples(self):
         """A larger set in the same folder keeps the samples it has in common; another scene in it is refused."""

@@ -1,5 +1,5 @@
 """Models of bodies with friction: the path of full order where nothing is interpolated, to the interpolation's error elsewhere; fields, outputs,
-several ranks, batches, refusals; the lap joint of the examples."""
+several ranks, batches, refusals; the lap joint of the examples. Hybrid models with friction on the RID."""
 import json
 import os
 import sys
@@ -195,15 +195,70 @@ class FrictionModels(Case):
             self.train(scene, '-hyco_snapshots', self.path('held-' + law[:3]), *BODIES, grid='2,2,1')
             self.alike(scene, '0.4,1.3,0.22', limit)
 
+    def hybrid(self, scene, n, *args):
+        """A hybrid model from n scattered paths."""
+        report = self.hyco('train', '-scene', scene, '-model', self.path('m.h5'), '-scatter', str(n), '-hyco_validation', '0', '-hyco_model_type', 'hybrid', *args)
+        self.assertEqual(report['model_type'], 'hybrid')
+        return report
+
+    def test_hybrid(self):
+        """A hybrid model whose RID lacks contacts that press: an unseen path's forces, slip and work, with the state of each contact as at full order; reconstructed
+        forces stay in the cone; batches. Without friction the shear force is 0, which is a fifth of the normal force here."""
+        scene, point = self.pad(cells=8), '0.17,1.3,0.7,0.4'
+        few = [f'-hyco_rid_{name}_tol' for name in ('stress', 'force', 'dual')]
+        report = self.hybrid(scene, 16, '-hyco_snapshots', self.path('few'), '-hyco_hybrid', 'all', '-hyco_pod_tol', '1e-8', '-hyco_rid_contact_extension', '0', '-hyco_rid_layers', '0', *[word for name in few for word in (name, '0.3')])
+        self.assertLess(report['rid_contacts'], 17)
+        self.alike(scene, point, 0.015)
+        self.hyco('solve', '-scene', scene, '-mu', point, '-output', self.path('full.xdmf'))
+        self.hyco('predict', '-model', self.path('m.h5'), '-mu', point, '-output', self.path('found.xdmf'))
+        with h5py.File(self.path('full.h5')) as full, h5py.File(self.path('found.h5')) as found:
+            x = found['mesh/xyz'][:, 0]
+            most = abs(full['step-0005/nodes/contact_slip'][:]).max()
+            for k in range(1, 6):
+                state, traction, pressure, slip = (found[f'step-{k:04d}/nodes/contact_{name}'][:] for name in ('state', 'traction', 'pressure', 'slip'))
+                np.testing.assert_array_equal(state, full[f'step-{k:04d}/nodes/contact_state'][:])
+                self.assertLess((abs(traction[:, 0]) - 0.17 * (1 + 0.2 * x) * pressure.ravel()).max(), 1e-8 * pressure.max())
+                self.assertLess(abs(slip - full[f'step-{k:04d}/nodes/contact_slip'][:]).max(), 0.01 * most)
+        np.savetxt(self.path('points.csv'), [[0.17, 1.3, 0.7, 0.4], [0.44, 0.6, 1.9, 0.9], [0.17, 1.3, 0.7, 0.4]], delimiter=',', header='m,press,soft,tilt', comments='')
+        self.hyco('predict', '-model', self.path('m.h5'), '-points', self.path('points.csv'), '-table', self.path('batch.csv'), ranks=2)
+        batch = np.genfromtxt(self.path('batch.csv'), delimiter=',', names=True)
+        for name in batch.dtype.names:
+            if 'seconds' not in name:
+                np.testing.assert_equal(batch[name][0], batch[name][2], name)
+
+    def test_hybrid_kinds(self):
+        """The fewest full-order displacements for the rows with tangents; all of the mesh, which is full order; 3D; a body that friction alone holds;
+        creep with a stiffness that changes in time, which the default search leaves to this type."""
+        scene = self.pad(cells=3)
+        store = ['-hyco_snapshots', self.path('hp')]
+        self.hybrid(scene, 12, *store, '-hyco_hybrid', 'rank', '-hyco_pod_tol', '1e-10')
+        self.alike(scene, '0.17,1.3,0.7,0.4', 0.05)
+        self.hybrid(scene, 2, *store, '-hyco_hybrid', 'all', '-hyco_rid_whole', 'true')
+        self.alike(scene, '0.17,1.3,0.7,0.4', 1e-8)
+        scene = self.two(3, 'surface')
+        self.hybrid(scene, 6, '-hyco_snapshots', self.path('h3'))
+        self.alike(scene, '0.22,1.7', 0.01)
+        grid = Grid()
+        grid.box('quad4', [np.linspace(0, 2, 13), np.linspace(0, 1, 7)], lambda x: x, 'block', {'y0': 'base', 'y1': 'top'})
+        grid.write(self.path('mesh.msh'))
+        scene = self.changed('held.yaml', HELD.replace('LAW', 'young: 1000, poisson: 0.3'), ())
+        report = self.hybrid(scene, 12, '-hyco_snapshots', self.path('hh'), '-hyco_pod_tol', '1e-10', '-hyco_rid_layers', '1')
+        self.assertLess(report['rid_contacts'], 13)
+        self.alike(scene, '0.4,1.3,0.22', 0.02)
+        heats = NORTON.replace('young: 1000', 'young: 1000*(1 + 0.1*t)')
+        scene = self.pad('flows.yaml', heats, ('[0.1, 0.5]', '[0.3, 0.4]'), ('[0.5, 2]', '[0.9, 1.1]'), ('[0, 1]}', '[0.4, 0.6]}'), cells=3)
+        report = self.hyco('train', '-scene', scene, '-model', self.path('m.h5'), '-scatter', '6', '-hyco_snapshots', self.path('hc'),
+                           '-hyco_search', 'true', '-hyco_validation', '2')
+        self.assertEqual(report['model_type'], 'hybrid')
+        self.alike(scene, '0.37,1.2,1,0.5', 0.02)
+
     def test_refused(self):
         """Other types in one line that names the contact; no type drops the friction."""
-        for words, scene, args in ((('floor', 'friction', 'hybrid', 'bodies'), self.pad(), ['-hyco_model_type', 'hybrid']),
-                                   (('floor', 'friction', 'projection', 'bodies'), self.pad(), ['-hyco_model_type', 'projection']),
-                                   (('floor', 'friction', 'cubature', 'bodies'), self.pad(), ['-hyco_model_type', 'cubature'])):
-            run = self.run_raw('train', '-scene', scene, '-model', self.path('none.h5'), '-grid', '2,1,1,1', *args)
+        for kind in ('projection', 'cubature'):
+            run = self.run_raw('train', '-scene', self.pad(), '-model', self.path('none.h5'), '-grid', '2,1,1,1', '-hyco_model_type', kind)
             self.assertEqual(run.returncode, 1, run.stderr)
             self.assertEqual(len(run.stderr.strip().splitlines()), 1, run.stderr)
-            for word in words:
+            for word in ('floor', 'friction', kind, 'bodies or hybrid'):
                 self.assertIn(word, run.stderr)
             self.assertFalse(os.path.exists(self.path('none.h5')))
 

@@ -226,7 +226,7 @@ static PetscErrorCode SampleForces(HycoReducer t, HycoSnapshots store, HycoFOM f
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(HycoRowsCreate(&f->pairs, b->dim, &rows));
+  PetscCall(HycoRowsCreate(&f->pairs, b->dim, f->pairs.n, &rows));
   if (HycoSceneHasFriction(t->scene)) PetscCall(HycoBodiesFrictionCreate(t->scene, &s, b->p, &friction));
   ierr = HycoBodiesSetUp(&work, b, t->scene, friction ? HycoBodiesFrictionSurface(friction) : &s, NULL);
   if (!ierr) ierr = SolvePoints(t, &work, &s, friction, points, sampled);

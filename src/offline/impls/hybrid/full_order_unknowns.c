@@ -10,6 +10,7 @@
 #include <hycoalgorithms.h>
 #include <hycogalerkintraining.h>
 #include <hycohybrid.h>
+#include <hycoslip.h>
 #include <hycotrainers.h>
 
 #define WORST HYCO_JUDGED_WORST
@@ -44,8 +45,24 @@ static PetscErrorCode SetFromOptions(HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The unknown of each contact of A_lambda that may be full order: its largest entry in A not taken by another. */
-static PetscErrorCode Candidates(HycoROM m, PetscInt candidate[])
+/* The rows of A_lambda that need a displacement of their own: with friction without tangents that act on none. */
+static PetscErrorCode ListRows(HycoROM m, PetscInt *n, PetscInt **row)
+{
+  HycoGalerkin g = (HycoGalerkin)m->work;
+
+  PetscFunctionBegin;
+  *n = 0;
+  PetscCall(PetscMalloc1(m->n_L, row));
+  for (PetscInt r = 0; r < m->n_L; r++) {
+    const PetscBool normal = (PetscBool)(r == HycoGalerkinFirstRow(g, HycoGalerkinContactOf(g, r)));
+
+    if (normal || g->own_rows.start[r + 1] > g->own_rows.start[r]) (*row)[(*n)++] = r;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The unknown of each row of A_lambda that may be full order: its largest entry in A not taken by another. */
+static PetscErrorCode Candidates(HycoROM m, PetscInt n, const PetscInt row[], PetscInt candidate[])
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
   const PetscInt dim = m->model->mesh->dim;
@@ -55,14 +72,14 @@ static PetscErrorCode Candidates(HycoROM m, PetscInt candidate[])
   PetscFunctionBegin;
   PetscCall(PetscCalloc2(m->model->mesh->n_nodes * dim, &taken, m->model->mesh->n_nodes, &sets));
   PetscCall(HycoROMGetDomain(m, sets));
-  for (PetscInt k = 0; k < m->m; k++) candidate[k] = -1;
+  for (PetscInt k = 0; k < n; k++) candidate[k] = -1;
   for (PetscInt pass = 0; pass < 2; pass++) { /* first those with slave in A: the others have only shared masters */
-    for (PetscInt k = 0; k < m->m; k++) {
-      const PetscInt slave = HycoPairsSlave(&m->model->pairs, m->contact[k]);
+    for (PetscInt k = 0; k < n; k++) {
+      const PetscInt slave = HycoPairsSlave(&m->model->pairs, m->contact[HycoGalerkinContactOf(g, row[k])]);
       PetscReal best = 0;
 
       if ((sets[slave] == 2) != (pass == 0)) continue;
-      for (PetscInt t = g->own_rows.start[k]; t < g->own_rows.start[k + 1]; t++) {
+      for (PetscInt t = g->own_rows.start[row[k]]; t < g->own_rows.start[row[k] + 1]; t++) {
         const PetscInt dof = g->own_rows.dof[t];
 
         if (taken[dof] || sets[dof / dim] < 2) continue;
@@ -75,11 +92,11 @@ static PetscErrorCode Candidates(HycoROM m, PetscInt candidate[])
     }
   }
   PetscCall(PetscFree2(taken, sets));
-  for (PetscInt k = 0; k < m->m; k++)
+  for (PetscInt k = 0; k < n; k++)
     HycoCheckModel(candidate[k] >= 0,
                    "the contact of node %d has no displacement of its own in A that could stay full order; use "
                    "-hyco_hybrid contact",
-                   (int)m->slave_id[m->contact[k]]);
+                   (int)m->slave_id[m->contact[HycoGalerkinContactOf(g, row[k])]]);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -90,17 +107,22 @@ static PetscErrorCode RowRank(HycoROM m, PetscReal *ratio)
   Mat dense;
   PetscScalar *b;
   PetscReal smallest, largest;
+  PetscInt n, *row;
 
   PetscFunctionBegin;
   *ratio = 1;
   if (!m->m) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(ListRows(m, &n, &row));
   PetscCall(MatConvert(g->Br, MATSEQDENSE, MAT_INITIAL_MATRIX, &dense));
   PetscCall(MatDenseGetArray(dense, &b));
+  /* The listed rows, moved to the front. */
+  for (PetscInt k = 0; k < n * m->n; k++) b[k] = b[k / n * m->n_L + row[k % n]];
   /* More rows than columns cannot have full row rank, whatever the smallest singular value. */
-  PetscCall(HycoExtremeSingularValues(m->m, m->n, b, &smallest, &largest));
+  PetscCall(HycoExtremeSingularValues(n, m->n, b, &smallest, &largest));
   PetscCall(MatDenseRestoreArray(dense, &b));
   PetscCall(MatDestroy(&dense));
-  *ratio = m->m > m->n || largest == 0 ? 0 : smallest / largest;
+  PetscCall(PetscFree(row));
+  *ratio = n > m->n || largest == 0 ? 0 : smallest / largest;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -149,51 +171,54 @@ static PetscErrorCode TimesModes(HycoROM m, Mat A, IS rows, IS columns, PetscRea
 }
 
 /* B[A_lambda, A_c] V[A_c,:], and the candidates' rows of K V. */
-static PetscErrorCode ContactRows(HycoROM m, const PetscInt candidate[], PetscReal BV[], PetscReal KV[])
+static PetscErrorCode ContactRows(HycoROM m, PetscInt n, const PetscInt row[], const PetscInt candidate[],
+                                  PetscReal BV[], PetscReal KV[])
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
-  IS candidates, unknowns;
+  IS candidates, unknowns, listed, rows;
 
   PetscFunctionBegin;
   /* B at the training parameters that Assembled() has set. */
   PetscCall(HycoGalerkinContactMatrix(m));
   PetscCall(ISCreateStride(PETSC_COMM_SELF, m->fe->n_dof, 0, 1, &unknowns));
-  PetscCall(ISCreateGeneral(PETSC_COMM_SELF, m->m, candidate, PETSC_COPY_VALUES, &candidates));
-  PetscCall(TimesModes(m, g->B, g->sets.is_A_lambda, g->sets.is_Ac, BV));
+  PetscCall(ISCreateGeneral(PETSC_COMM_SELF, n, candidate, PETSC_COPY_VALUES, &candidates));
+  PetscCall(ISCreateGeneral(PETSC_COMM_SELF, n, row, PETSC_COPY_VALUES, &listed));
+  PetscCall(ISCreateSubIS(g->sets.is_rows, listed, &rows));
+  PetscCall(TimesModes(m, g->B, rows, g->sets.is_Ac, BV));
   PetscCall(TimesModes(m, g->K, candidates, unknowns, KV));
-  HycoDestroyAll(&candidates, &unknowns);
+  HycoDestroyAll(&rows, &listed, &candidates, &unknowns);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Numerical rank of B[A_lambda, A_c] V[A_c,:] and the contacts that the modes resolve best (first `rank` of pivot), by
+/* Numerical rank of B[A_lambda, A_c] V[A_c,:] and the n listed rows that the modes resolve best (first `rank` of pivot), by
    their balance rows K V or by their rows B V weighted with the singular values. */
-static PetscErrorCode ResolvedContacts(HycoROM m, const PetscInt candidate[], PetscBool balance, PetscInt *rank,
-                                       PetscInt pivot[])
+static PetscErrorCode ResolvedRows(HycoROM m, PetscInt n, const PetscInt row[], const PetscInt candidate[],
+                                   PetscBool balance, PetscInt *rank, PetscInt pivot[])
 {
   const PetscInt l = m->model->l;
   PetscReal *BV, *KV;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc2(l * m->m, &BV, l * m->m, &KV));
-  PetscCall(ContactRows(m, candidate, BV, KV));
+  PetscCall(PetscCalloc2(l * n, &BV, l * n, &KV));
+  PetscCall(ContactRows(m, n, row, candidate, BV, KV));
   *rank = 0;
   {
     PetscReal smallest = 0, largest = 1;
 
-    for (PetscInt r = PetscMin(l, m->m); r > 0 && !*rank;
+    for (PetscInt r = PetscMin(l, n); r > 0 && !*rank;
          r--) { /* the first r modes that are independent on the contacts */
       PetscReal *first;
 
-      PetscCall(PetscMalloc1(r * m->m, &first));
-      for (PetscInt k = 0; k < m->m; k++) PetscCall(PetscArraycpy(first + k * r, BV + k * l, r));
-      PetscCall(HycoExtremeSingularValues(r, m->m, first, &smallest, &largest));
+      PetscCall(PetscMalloc1(r * n, &first));
+      for (PetscInt k = 0; k < n; k++) PetscCall(PetscArraycpy(first + k * r, BV + k * l, r));
+      PetscCall(HycoExtremeSingularValues(r, n, first, &smallest, &largest));
       if (smallest > 1e-10 * largest) *rank = r;
       PetscCall(PetscFree(first));
     }
   }
   /* A contact that only weak modes resolve is not resolved by a truncated basis. */
-  for (PetscInt k = 0; k < m->m * l; k++) BV[k] *= m->model->sigma[k % l] / m->model->sigma[0];
-  PetscCall(HycoPivotColumns(l, m->m, balance ? KV : BV, *rank, pivot));
+  for (PetscInt k = 0; k < n * l; k++) BV[k] *= m->model->sigma[k % l] / m->model->sigma[0];
+  PetscCall(HycoPivotColumns(l, n, balance ? KV : BV, *rank, pivot));
   PetscCall(PetscFree2(BV, KV));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -225,12 +250,11 @@ static PetscBool Better(const Verdict *a, const Verdict *b)
   return (PetscBool)(a->u <= b->u * (1 + SAME) && a->rank > b->rank * (1 + SAME));
 }
 
-/* Exchanges one full-order unknown for one candidate while the error decreases. chosen[k]: candidate k is full
+/* Exchanges one of n full-order unknowns for one of N candidates while the error decreases. chosen[k]: candidate k is full
    order. */
-static PetscErrorCode Exchange(HycoReducer t, HycoROM m, PetscInt n, const PetscInt candidate[], PetscBool chosen[],
-                               Verdict *best)
+static PetscErrorCode Exchange(HycoReducer t, HycoROM m, PetscInt N, PetscInt n, const PetscInt candidate[],
+                               PetscBool chosen[], Verdict *best)
 {
-  const PetscInt N = m->m;
   /* a trial solves every snapshot: their number is limited by the work, so that a large model does not take hours */
   const PetscInt limit = ((Training)t->training)->trials ? ((Training)t->training)->trials
                                                          : 1 + (PetscInt)(1e6 / ((PetscReal)t->n_s * (PetscReal)m->n));
@@ -291,17 +315,18 @@ static PetscErrorCode Exchange(HycoReducer t, HycoROM m, PetscInt n, const Petsc
 static PetscErrorCode SearchFrom(HycoReducer t, HycoROM m, PetscInt start, PetscInt *n, PetscInt dof[],
                                  Verdict *verdict)
 {
-  PetscInt rank = 0, N, *candidate, *pivot;
+  PetscInt rank = 0, N, *row, *candidate, *pivot;
   PetscBool *chosen;
 
   PetscFunctionBegin;
   /* No full-order unknowns: the rank of (38) is that of the modes alone. */
   PetscCall(HycoROMSetFE(m, HYCO_HYBRID_RANK, 0, NULL));
   PetscCall(Assembled(t, m));
-  N = m->m;
+  PetscCall(ListRows(m, &N, &row));
   PetscCall(PetscMalloc3(N, &candidate, N, &pivot, N, &chosen));
-  PetscCall(Candidates(m, candidate));
-  PetscCall(ResolvedContacts(m, candidate, (PetscBool)(start == 0), &rank, pivot));
+  PetscCall(Candidates(m, N, row, candidate));
+  PetscCall(ResolvedRows(m, N, row, candidate, (PetscBool)(start == 0), &rank, pivot));
+  PetscCall(PetscFree(row));
   for (PetscInt k = 0; k < N; k++) chosen[k] = (PetscBool)(start < 2);
   /* A pivot is a contact that the modes resolve: it needs no displacement of its own. */
   for (PetscInt k = 0; k < rank && start < 2; k++) chosen[pivot[k]] = PETSC_FALSE;
@@ -314,7 +339,7 @@ static PetscErrorCode SearchFrom(HycoReducer t, HycoROM m, PetscInt start, Petsc
     }
     if (pass) break;
     PetscCall(JudgeSet(t, m, *n, dof, PETSC_INFINITY, verdict));
-    if (*n && *n < N) PetscCall(Exchange(t, m, *n, candidate, chosen, verdict));
+    if (*n && *n < N) PetscCall(Exchange(t, m, N, *n, candidate, chosen, verdict));
   }
   PetscCall(PetscFree3(candidate, pivot, chosen));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -324,7 +349,8 @@ static PetscErrorCode SearchFrom(HycoReducer t, HycoROM m, PetscInt start, Petsc
    where trials are cheap. */
 static PetscErrorCode ChooseRank(HycoReducer t, HycoROM m, Verdict *best)
 {
-  const PetscInt room = m->model->pairs.n, starts = (PetscReal)t->n_s * (PetscReal)m->model->l < 1e4 ? 5 : 1;
+  const PetscInt room = HycoSlipCountRows(t->scene, &m->model->pairs, m->model->mesh->dim),
+                 starts = (PetscReal)t->n_s * (PetscReal)m->model->l < 1e4 ? 5 : 1;
   PetscInt n = 0, other = 0, *dof, *trial;
   Verdict verdict;
 
@@ -501,9 +527,81 @@ static PetscErrorCode ChooseUnknowns(HycoReducer t, HycoROM m)
   if (kind == HYCO_HYBRID_RANK) PetscCall(ChooseRank(t, m, &v));
   if (kind == HYCO_HYBRID_ALL) PetscCall(ChooseAll(t, m, n_all, all));
   if (kind == HYCO_HYBRID_CONTACT) PetscCall(HycoROMSetFE(m, HYCO_HYBRID_CONTACT, n_contact, contact));
+  PetscCall(HycoROMSetUp(m));
+  HycoCheckModel(
+      !HycoSceneHasFriction(t->scene) || m->n_L <= m->n,
+      "the RID's contacts have %d normal and tangential forces, and the model only %d displacements to balance them; "
+      "use -hyco_hybrid contact, or a larger RID (-hyco_rid_layers)",
+      (int)m->n_L, (int)m->n);
   /* After the choice: training errors in the file are those of the final model. */
   PetscCall(HycoReducerJudge(t, m));
   PetscCall(PetscFree2(all, contact));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The forces of column k by row of the contacts at fe's parameters: friction is stored as a vector. */
+static PetscErrorCode ReadRows(HycoReducer t, const HycoSlip *slip, PetscInt k, PetscReal force[], PetscReal S[])
+{
+  const PetscInt N = slip->n, steps = HycoSnapshotsSteps(t->scene);
+  PetscReal *component;
+  const PetscReal *mu;
+  PetscInt n_par;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSamplesGet(t->columns, NULL, &n_par, &mu));
+  PetscCall(PetscMalloc1(N, &component));
+  for (PetscInt c = 0; c < 3; c++) {
+    PetscCall(
+        HycoSnapshotsReadRows(t->store, mu + k / steps * n_par, k % steps, HycoSnapshotFriction[c], 0, N, component));
+    for (PetscInt i = 0; i < N; i++) force[3 * i + c] = component[i];
+  }
+  PetscCall(PetscFree(component));
+  HycoSlipForces(slip, t->Lambda + (size_t)k * (size_t)N, force, S);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* HycoReducerDualSnapshots() with tangential forces. */
+static PetscErrorCode FillRows(HycoReducer t, HycoROM m, HycoFE fe, HycoPairs *pairs, HycoSlip *slip)
+{
+  HycoHybridModel h = (HycoHybridModel)m->model->data;
+  const PetscInt N = pairs->n, n = slip->row[N];
+  PetscReal mu[HYCO_MAX_PARAMETERS], *force, *u;
+  HycoRows rows = {0};
+
+  PetscFunctionBegin;
+  h->n_dual = 0;
+  PetscCall(PetscMalloc1((size_t)n * (size_t)t->n_s + 1, &h->S_lambda));
+  PetscCall(PetscMalloc1(3 * N, &force));
+  PetscCall(PetscCalloc1(fe->n_dof, &u));
+  PetscCall(HycoRowsCreate(pairs, fe->dim, n, &rows));
+  for (PetscInt k = 0; k < t->n_s; k++) {
+    PetscReal size = 0;
+
+    for (PetscInt i = 0; i < N; i++) size += t->Lambda[(size_t)k * (size_t)N + (size_t)i];
+    if (!(size > 0)) continue;
+    PetscCall(HycoReducerColumn(t, k, mu));
+    PetscCall(HycoFESetParameters(fe, mu));
+    PetscCall(
+        HycoContactTangentRows(fe, pairs, slip->row, u, slip->tangent, rows.start, rows.dof, rows.value, rows.gap));
+    PetscCall(ReadRows(t, slip, k, force, h->S_lambda + (size_t)h->n_dual++ * (size_t)n));
+  }
+  PetscCall(HycoRowsDestroy(&rows));
+  HycoFreeAll(&force, &u);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode FrictionSnapshots(HycoReducer t, HycoROM m)
+{
+  HycoPairs pairs;
+  HycoSlip slip;
+  HycoFE fe;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMTakePairs(&m->model->pairs, &pairs));
+  PetscCall(HycoFECreateSurface(t->scene, m->model->mesh->dm, &fe));
+  PetscCall(HycoSlipCreate(PETSC_COMM_SELF, t->scene, &pairs, fe->dim, &slip));
+  HycoFinally(FillRows(t, m, fe, &pairs, &slip), PetscCall(HycoSlipDestroy(&slip)); PetscCall(HycoFEDestroy(&fe));
+              PetscCall(HycoROMDropPairs(&pairs)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -513,7 +611,10 @@ static PetscErrorCode Build(HycoROM m, HycoReducer t)
   HycoHybridModel h = (HycoHybridModel)m->model->data;
 
   PetscFunctionBegin;
-  PetscCall(HycoReducerDualSnapshots(t, &h->n_dual, &h->S_lambda));
+  if (HycoSceneHasFriction(t->scene))
+    PetscCall(FrictionSnapshots(t, m));
+  else
+    PetscCall(HycoReducerDualSnapshots(t, &h->n_dual, &h->S_lambda));
   PetscCall(ChooseUnknowns(t, m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -73,7 +73,7 @@ static PetscErrorCode CountUnknowns(HycoROM m)
   g->n_free = m->model->hybrid == HYCO_HYBRID_ALL && !g->bordered ? 0 : l;
   /* The modes' coefficients first, then the full-order displacements, in the order of fe_dof. */
   m->n = g->n_free + m->model->n_fe;
-  if (!g->model->contact) m->n_L = m->m; /* otherwise set by the type */
+  if (!g->model->contact && !g->friction) m->n_L = m->m; /* otherwise set by the type, or the rows' number */
   HycoCheckModel(m->n > 0, "the model has no unknowns, because every training solution is zero; check the loads");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -128,6 +128,11 @@ PetscErrorCode HycoGalerkinSetUp(HycoROM m)
   PetscCall(HycoSolverSetForm(m->solver, HYCO_FORM_DUAL));
   PetscCall(HycoSolverSetWarmStart(m->solver, PETSC_FALSE));
   if (HycoSolverNeedsSymmetry(m->solver)) PetscCall(HycoSolverSetType(m->solver, HYCO_SOLVER_ACTIVE_SET));
+  /* The cone of Coulomb is no set of bounds. After the type the options again: another one is refused by name. */
+  if (g->friction) {
+    PetscCall(HycoSolverSetType(m->solver, HYCO_SOLVER_SEMISMOOTH));
+    PetscCall(HycoSolverSetFromOptions(m->solver));
+  }
   if (m->model->scene->n_times) PetscCall(HycoGalerkinPathCreate(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -250,7 +255,7 @@ PetscErrorCode HycoGalerkinUnpack(HycoROM m)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(VecGetArrayRead(g->L, &L));
-  for (PetscInt k = 0; k < m->m; k++) m->Lambda[m->contact[k]] = L[k];
+  for (PetscInt k = 0; k < m->m; k++) m->Lambda[m->contact[k]] = L[HycoGalerkinFirstRow(g, k)];
   PetscCall(VecRestoreArrayRead(g->L, &L));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

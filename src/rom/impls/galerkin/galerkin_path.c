@@ -70,11 +70,13 @@ static PetscErrorCode Assemble(HycoPath p, const PetscReal mu[], PetscBool elast
   PetscCall(HycoLinearForceSet(g->path->linear, fe->stiffness_changed));
   /* B is filled on demand: a step that only changes gaps keeps it. */
   if (fe->contact_changed) g->current_B = PETSC_FALSE;
-  if (fe->contact_changed || fe->gap_changed) HycoLogged(HYCO_EVENT_CONTACT, HycoGalerkinOwnRows(m));
+  /* With friction at each step: gaps of tangents are the slave's last places. */
+  if (fe->contact_changed || fe->gap_changed || g->friction) HycoLogged(HYCO_EVENT_CONTACT, HycoGalerkinOwnRows(m));
   if (m->n_L && fe->contact_changed) HycoLogged(HYCO_EVENT_REDUCE, HycoReducedFillContact(m));
   PetscCall(Loads(p));
   fe->ready = PETSC_TRUE;
   if (!g->system->K) PetscCall(HycoSystemSetMatrices(g->system, g->Kr, g->Btr, g->Br, g->model->symmetric));
+  if (g->friction) PetscCall(HycoGalerkinFrictionPose(m));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -146,11 +148,16 @@ static PetscErrorCode Moves(HycoPath p, Vec rhs)
 static PetscErrorCode Accept(HycoPath p, const HycoStepAttempt *a)
 {
   HycoROM m = (HycoROM)p->ctx;
+  HycoGalerkin g = (HycoGalerkin)m->work;
 
   PetscFunctionBegin;
-  PetscCall(PetscArraycpy(((HycoGalerkin)m->work)->path->held, m->fe->u0, m->fe->n_dof));
-  PetscCall(HycoGalerkinExpand(m));
+  PetscCall(PetscArraycpy(g->path->held, m->fe->u0, m->fe->n_dof));
+  if (g->friction)
+    PetscCall(HycoGalerkinUnpack(m));
+  else
+    PetscCall(HycoGalerkinExpand(m));
   PetscCall(HycoTraceAdd(m, p->t));
+  if (g->friction) PetscCall(HycoGalerkinFrictionAccept(m, p));
   p->now.stored = a->law.stored;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -200,16 +207,21 @@ static PetscErrorCode Watch(HycoROM m, PetscInt k)
 static PetscErrorCode Record(HycoPath p)
 {
   HycoROM m = (HycoROM)p->ctx;
+  HycoGalerkin g = (HycoGalerkin)m->work;
 
   PetscFunctionBegin;
   PetscCall(Watch(m, p->n_steps));
   PetscCall(HycoGalerkinUnpack(m));
+  if (g->friction) PetscCall(HycoGalerkinFrictionShow(m));
   PetscCall(HycoGalerkinCheckContactBasis(m));
   PetscCall(CompleteState(m, p));
-  /* After the state is complete: (41) reads the whole displacement at the contacts. */
-  if (m->ops->reconstruct && m->reconstruct) HycoLogged(HYCO_EVENT_RECONSTRUCT, (*m->ops->reconstruct)(m));
-  PetscCall(HycoFloatingBalance(m));
+  /* After the state is complete: (41) reads the whole displacement at the contacts. With friction it was done when
+     the step was accepted. */
+  if (m->ops->reconstruct && m->reconstruct && !g->friction)
+    HycoLogged(HYCO_EVENT_RECONSTRUCT, (*m->ops->reconstruct)(m));
+  if (!g->friction) PetscCall(HycoFloatingBalance(m));
   PetscCall(HycoTraceRecord(m, PETSC_FALSE, p->begin, &p->now));
+  if (g->friction) PetscCall(HycoGalerkinFrictionRecord(m, &p->now));
   p->steps[p->n_steps++] = p->now;
   PetscCall(PetscMemzero(&p->now, sizeof(p->now)));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -265,6 +277,7 @@ PetscErrorCode HycoGalerkinPathCreate(HycoROM m)
   p->D = g->Dr;
   p->n_contacts = m->n_L;
   p->n_free = m->n;
+  p->rubs = (PetscBool)(g->friction && m->n_L);
   PetscCall(HycoPathSetUp(p));
   /* Newton's next iteration corrects what a refinement would. */
   PetscCall(HycoSolverSetRefine(m->solver, PETSC_FALSE));
@@ -293,6 +306,7 @@ PetscErrorCode HycoGalerkinPathSolve(HycoROM m, const PetscReal mu[])
   PetscFunctionBegin;
   Expect(m, 0);
   PetscCall(PetscArrayzero(q->held, m->fe->n_dof));
+  if (((HycoGalerkin)m->work)->friction) PetscCall(HycoGalerkinFrictionBegin(m));
   PetscCall(HycoTraceFollow(m, q->path, mu));
   PetscCall(HycoSolverGetMethod(m->solver, &method));
   PetscCall(PetscStrncpy(m->prediction.method, method, sizeof(m->prediction.method)));

@@ -79,7 +79,14 @@ PetscErrorCode HycoGalerkinCreateOwn(HycoROM m)
   PetscCall(CountNodes(m, &n));
   PetscCall(HycoSubmeshFirst(m->model->scene, m->model->mesh, n, &g->own));
   PetscCall(SelectPairs(m));
-  PetscCall(HycoRowsCreate(&g->own_pairs, m->model->mesh->dim, &g->own_rows));
+  if (HycoSceneHasFriction(m->model->scene)) {
+    PetscCall(HycoGalerkinFrictionCreate(m));
+    PetscCall(ISCreateStride(PETSC_COMM_SELF, m->n_L, 0, 1, &g->sets.is_rows));
+  } else {
+    PetscCall(HycoRowsCreate(&g->own_pairs, m->model->mesh->dim, m->m, &g->own_rows));
+    PetscCall(PetscObjectReference((PetscObject)g->sets.is_A_lambda));
+    g->sets.is_rows = g->sets.is_A_lambda;
+  }
   m->of_fe = &g->own_pairs;
   m->spread = PETSC_FALSE;
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -150,16 +157,17 @@ static PetscErrorCode CreateContactSets(HycoROM m)
 }
 
 /* B on the RID's unknowns, with room for the masters that a slave may meet while surfaces move; rows of contacts outside
-   A_lambda are empty. */
-static PetscErrorCode CreateContactMatrix(HycoROM m, Mat *B)
+   A_lambda are empty. at: the row of B for each of own_rows. */
+static PetscErrorCode CreateContactMatrix(HycoROM m, PetscInt n_own, const PetscInt at[], Mat *B)
 {
-  const PetscInt width = HycoPairsWidth(&((HycoGalerkin)m->work)->own_pairs) * m->fe->dim;
+  HycoGalerkin g = (HycoGalerkin)m->work;
+  const PetscInt width = HycoPairsWidth(&g->own_pairs) * m->fe->dim, n = g->friction ? n_own : m->model->pairs.n;
   PetscInt *entries;
 
   PetscFunctionBegin;
-  PetscCall(PetscCalloc1(m->model->pairs.n, &entries));
-  for (PetscInt k = 0; k < m->m; k++) entries[m->contact[k]] = width;
-  PetscCall(MatCreateSeqAIJ(PETSC_COMM_SELF, m->model->pairs.n, m->fe->n_dof, 0, entries, B));
+  PetscCall(PetscCalloc1(n, &entries));
+  for (PetscInt k = 0; k < n_own; k++) entries[at[k]] = width;
+  PetscCall(MatCreateSeqAIJ(PETSC_COMM_SELF, n, m->fe->n_dof, 0, entries, B));
   /* Mortars may meet more masters than at first. */
   PetscCall(MatSetOption(*B, MAT_NEW_NONZERO_ALLOCATION_ERR, PETSC_FALSE));
   PetscCall(PetscFree(entries));
@@ -171,19 +179,24 @@ PetscErrorCode HycoGalerkinContactMatrix(HycoROM m)
 {
   HycoGalerkin g = (HycoGalerkin)m->work;
   const HycoRows *rows = &g->own_rows;
+  const PetscInt *at;
+  PetscInt n;
   PetscObjectState before, after;
 
   PetscFunctionBegin;
   if (g->current_B) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(ISGetLocalSize(g->sets.is_rows, &n));
+  PetscCall(ISGetIndices(g->sets.is_rows, &at));
   /* Not a new matrix: entries that were ever used stay in the pattern, and products with B keep their symbolic part. */
   if (g->B)
     PetscCall(MatZeroEntries(g->B));
   else
-    PetscCall(CreateContactMatrix(m, &g->B));
+    PetscCall(CreateContactMatrix(m, n, at, &g->B));
   PetscCall(MatGetNonzeroState(g->B, &before));
-  for (PetscInt k = 0; k < m->m; k++)
-    PetscCall(MatSetValues(g->B, 1, &m->contact[k], rows->start[k + 1] - rows->start[k], rows->dof + rows->start[k],
+  for (PetscInt k = 0; k < n; k++)
+    PetscCall(MatSetValues(g->B, 1, &at[k], rows->start[k + 1] - rows->start[k], rows->dof + rows->start[k],
                            rows->value + rows->start[k], ADD_VALUES));
+  PetscCall(ISRestoreIndices(g->sets.is_rows, &at));
   PetscCall(HycoMatAssemble(g->B));
   /* PETSc counts changes of the pattern, so that the sets are rebuilt only then. */
   PetscCall(MatGetNonzeroState(g->B, &after));
@@ -195,7 +208,9 @@ PetscErrorCode HycoGalerkinContactMatrix(HycoROM m)
 PetscErrorCode HycoGalerkinDestroyOwn(HycoGalerkin g)
 {
   PetscFunctionBegin;
-  HycoDestroyAll(&g->sets.is_A, &g->sets.is_I, &g->sets.is_Ac, &g->sets.is_Ac_all, &g->sets.is_A_lambda);
+  HycoDestroyAll(&g->sets.is_A, &g->sets.is_I, &g->sets.is_Ac, &g->sets.is_Ac_all, &g->sets.is_rows,
+                 &g->sets.is_A_lambda);
+  PetscCall(HycoGalerkinFrictionDestroy(&g->friction));
   PetscCall(HycoMeshDestroy(&g->own));
   PetscCall(HycoPairsDestroy(&g->own_pairs));
   PetscCall(HycoRowsDestroy(&g->own_rows));
@@ -211,6 +226,10 @@ PetscErrorCode HycoGalerkinOwnRows(HycoROM m)
   PetscInt n = 0, lo = 0, at;
 
   PetscFunctionBegin;
+  if (g->friction) {
+    PetscCall(HycoGalerkinFrictionRows(m));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   PetscCall(HycoContactRows(m->fe, &g->own_pairs, rows->start, rows->dof, rows->value, rows->gap));
   if (!g->own_pairs.room) PetscFunctionReturn(PETSC_SUCCESS);
   for (PetscInt k = 0; k < m->m; k++) {

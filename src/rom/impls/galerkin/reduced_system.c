@@ -542,7 +542,7 @@ static PetscErrorCode MultiplyContact(HycoROM m, IS set, PetscBool grown, Contac
     PetscCall(MatDestroy(&c->P));
     PetscCall(CreateP(m, set, g->reduced->all_full, &c->P));
   }
-  PetscCall(MatCreateSubMatrix(g->B, g->sets.is_A_lambda, set, grown ? MAT_INITIAL_MATRIX : MAT_REUSE_MATRIX, &c->B));
+  PetscCall(MatCreateSubMatrix(g->B, g->sets.is_rows, set, grown ? MAT_INITIAL_MATRIX : MAT_REUSE_MATRIX, &c->B));
   PetscCall(MatMatMult(c->B, c->P, grown ? MAT_INITIAL_MATRIX : MAT_REUSE_MATRIX, PETSC_DETERMINE, &c->BP));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -620,7 +620,7 @@ PetscErrorCode HycoReducedFillVectors(HycoROM m)
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(VecGetArray(g->Dr, &d));
-  for (PetscInt k = 0; k < m->m; k++) d[k] = g->own_rows.gap[k];
+  for (PetscInt k = 0; k < m->n_L; k++) d[k] = g->own_rows.gap[k];
   PetscCall(VecRestoreArray(g->Dr, &d));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -2,6 +2,7 @@
    contacts. */
 #include <hycohybrid.h>
 #include <hycoromtypes.h>
+#include <hycoslip.h>
 #include <petscviewer.h>
 
 /* Into the model's data: the solver of (41) is the user's choice, not a part of the file. */
@@ -71,7 +72,9 @@ static PetscErrorCode Move(HycoROM m, HycoH5 file)
   PetscFunctionBegin;
   PetscCall(HycoGalerkinMove(m, file));
   if (HycoH5Reads(file)) h->n_dual = -1;
-  PetscCall(HycoH5Real(file, "reconstruction/S_lambda", &h->n_dual, m->model->pairs.n, &h->S_lambda));
+  /* With friction a row for each normal and tangent. */
+  PetscCall(HycoH5Real(file, "reconstruction/S_lambda", &h->n_dual,
+                       HycoSlipCountRows(m->model->scene, &m->model->pairs, m->model->mesh->dim), &h->S_lambda));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -97,6 +100,7 @@ PetscErrorCode HycoROMCreate_Hybrid(HycoROM m)
                                        .constrains = PETSC_TRUE,
                                        .resultants = PETSC_TRUE,
                                        .history = PETSC_TRUE,
+                                       .friction = PETSC_TRUE,
                                        .integrals = PETSC_TRUE};
   static const HycoROMOps ops = {.options = SetFromOptions,
                                  .setup = HycoGalerkinSetUp,

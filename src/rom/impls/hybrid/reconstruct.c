@@ -3,6 +3,9 @@
   and vanishes where the predicted displacement leaves a gap. ([B D - D]_- in the printed paper is [B U - D]_-.) With
   many snapshots (41) has many minimisers, among which round-off would choose: a small weight on the coefficients
   selects one close to the least norm.
+
+  With friction a snapshot has the normal and the tangential forces of all contacts, with one coefficient. Where mu is
+  that of the snapshots their combinations stay in Coulomb's cone, which is convex; the path makes them obey the law.
 */
 #include <hycoalgorithms.h>
 #include <hycohybrid.h>
@@ -35,42 +38,60 @@ static PetscErrorCode Solve(PetscInt solver, PetscInt m, PetscInt n, const Petsc
 
 /* Data that are constant over predictions, without the contacts whose force is zero in every snapshot. */
 struct _n_HycoReconstruction {
-  PetscInt n, *contact; /* these contacts, indices in pairs */
-  PetscReal *S;         /* n x n_dual column major: their rows of S_lambda */
-  PetscReal scale;      /* the largest snapshot force in the RID */
+  PetscInt n, *contact, *row; /* the rows of these contacts: indices in pairs, and of the rows in S_lambda */
+  PetscReal *S;               /* n x n_dual column major: these rows of S_lambda */
+  PetscReal scale;            /* the largest snapshot force in the RID */
   PetscReal *open, *d, *h, *c;
   HycoWeighted weighted;
 };
+
+/* The forces by row, and the first row of each contact (NULL: a row is a contact). */
+static PetscReal *Forces(HycoROM m, const PetscInt **first)
+{
+  HycoGalerkinFriction friction = ((HycoHybridWork)m->work)->galerkin.friction;
+  PetscReal *force = m->Lambda;
+
+  *first = friction ? HycoGalerkinFrictionForces(friction, &force) : NULL;
+  return force;
+}
 
 /* Keeps the contacts that have a force in some dual snapshot: (41) can give no force to others. S is repacked by those rows.
    The shift, the square of a small force, keeps the normal equations definite where snapshots are dependent. */
 static PetscErrorCode SetUp(HycoROM m)
 {
   const HycoHybridModel h = (HycoHybridModel)m->model->data;
-  const PetscInt N = m->model->pairs.n;
+  const PetscInt *first;
+  PetscInt N = m->model->pairs.n;
   HycoReconstruction r;
 
   PetscFunctionBegin;
   PetscCall(PetscNew(&r));
   ((HycoHybridWork)m->work)->reconstruction = r;
+  (void)Forces(m, &first);
+  if (first) N = first[N];
   PetscCall(PetscMalloc1(N, &r->contact));
-  for (PetscInt k = 0; k < N; k++) {
+  PetscCall(PetscMalloc1(N, &r->row));
+  for (PetscInt k = 0; k < m->model->pairs.n; k++) {
+    const PetscInt begin = first ? first[k] : k, end = first ? first[k + 1] : k + 1;
     PetscBool any = PETSC_FALSE;
 
     for (PetscInt j = 0; j < h->n_dual; j++) {
-      const PetscReal force = h->S_lambda[(size_t)j * (size_t)N + (size_t)k];
+      const PetscReal force = h->S_lambda[(size_t)j * (size_t)N + (size_t)begin];
 
       any = (PetscBool)(any || force != 0);
       /* The scale of forces in the RID, where (41) fits them: the weight on c is relative to it. */
       if (m->model->in_rid[k]) r->scale = PetscMax(r->scale, force);
     }
-    if (any) r->contact[r->n++] = k;
+    for (PetscInt row = begin; any && row < end; row++) {
+      r->contact[r->n] = k;
+      r->row[r->n++] = row;
+    }
   }
   /* Few rows: many contacts of a surface never close in training. */
   PetscCall(PetscMalloc1((size_t)r->n * (size_t)h->n_dual, &r->S));
   for (PetscInt j = 0; j < h->n_dual; j++) {
     for (PetscInt k = 0; k < r->n; k++)
-      r->S[(size_t)j * (size_t)r->n + (size_t)k] = h->S_lambda[(size_t)j * (size_t)N + (size_t)r->contact[k]];
+      r->S[(size_t)j * (size_t)r->n + (size_t)k] = h->S_lambda[(size_t)j * (size_t)N + (size_t)r->row[k]];
   }
   PetscCall(PetscMalloc4(r->n, &r->open, r->n, &r->d, r->n, &r->h, h->n_dual, &r->c));
   PetscCall(HycoWeightedCreate(r->n, h->n_dual, r->S, SMALL * SMALL * r->scale * r->scale, &r->weighted));
@@ -85,14 +106,14 @@ PetscErrorCode HycoReconstructionDestroy(HycoReconstruction *reconstruction)
   PetscFunctionBegin;
   if (!r) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoWeightedDestroy(&r->weighted));
-  HycoFreeAll(&r->contact, &r->S);
+  HycoFreeAll(&r->contact, &r->row, &r->S);
   PetscCall(PetscFree4(r->open, r->d, r->h, r->c));
   PetscCall(PetscFree(*reconstruction));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* (41) as explicit least squares: A has a row for each contact of the RID, each open contact and each coefficient. */
-static PetscErrorCode SolveWrittenOut(HycoROM m)
+/* (41) as explicit least squares: A has a row for each force in the RID, each open contact and each coefficient. */
+static PetscErrorCode SolveWrittenOut(HycoROM m, const PetscReal L[])
 {
   const HycoHybridModel h = (HycoHybridModel)m->model->data;
   HycoReconstruction r = ((HycoHybridWork)m->work)->reconstruction;
@@ -110,7 +131,7 @@ static PetscErrorCode SolveWrittenOut(HycoROM m)
 
     for (PetscInt k = 0; k < r->n; k++) {
       if (m->model->in_rid[r->contact[k]]) {
-        b[row] = m->Lambda[r->contact[k]];
+        b[row] = L[r->row[k]];
         a[row++] = s[k];
       }
       /* [B U - D]- times the combined force: its right-hand side is 0. */
@@ -125,12 +146,12 @@ static PetscErrorCode SolveWrittenOut(HycoROM m)
 }
 
 /* The difference of the combination's forces in the RID from the multipliers there, relative to these. */
-static PetscReal Remainder(HycoROM m, const HycoReconstruction r, PetscInt n_dual)
+static PetscReal Remainder(HycoROM m, const PetscReal L[], const HycoReconstruction r, PetscInt n_dual)
 {
   PetscReal lost = 0, size = 0;
 
   for (PetscInt i = 0; i < r->n; i++) {
-    const PetscReal force = m->Lambda[r->contact[i]];
+    const PetscReal force = L[r->row[i]];
     PetscReal rest = force;
 
     /* Outside the RID the combination is the only value there is. */
@@ -148,9 +169,9 @@ static PetscReal Remainder(HycoROM m, const HycoReconstruction r, PetscInt n_dua
 PetscErrorCode HycoHybridReconstruct(HycoROM m)
 {
   const HycoHybridModel h = (HycoHybridModel)m->model->data;
-  const PetscInt N = m->model->pairs.n;
+  const PetscInt N = m->model->pairs.n, *first;
+  PetscReal force = 0, *L = Forces(m, &first);
   HycoReconstruction r;
-  PetscReal force = 0;
   PetscBool solved = PETSC_FALSE;
 
   PetscFunctionBegin;
@@ -165,14 +186,14 @@ PetscErrorCode HycoHybridReconstruct(HycoROM m)
 
     r->open[i] = HycoROMAddRow(m, k, -m->rows.gap[k]);
     r->d[i] = (m->model->in_rid[k] ? 1 : 0) + (r->open[i] < 0 ? r->open[i] * r->open[i] : 0);
-    r->h[i] = m->model->in_rid[k] ? m->Lambda[k] : 0;
+    r->h[i] = m->model->in_rid[k] ? L[r->row[i]] : 0;
   }
   /* By the normal equations with changing weights: no matrix of all rows is formed. It may stop early, then the
      explicit problem decides. */
   if (h->reconstruct_solver != SOLVER_TAO && r->scale > 0)
     PetscCall(HycoWeightedNNLS(r->weighted, r->d, r->h, RTOL, r->c, &solved));
-  if (!solved) PetscCall(SolveWrittenOut(m));
-  m->remainder = PetscMax(m->remainder, Remainder(m, r, h->n_dual));
+  if (!solved) PetscCall(SolveWrittenOut(m, L));
+  m->remainder = PetscMax(m->remainder, Remainder(m, L, r, h->n_dual));
   for (PetscInt j = 0; j < h->n_dual; j++) {
     const PetscReal *s = r->S + (size_t)j * (size_t)r->n;
 
@@ -180,8 +201,9 @@ PetscErrorCode HycoHybridReconstruct(HycoROM m)
     m->spread = PETSC_TRUE;
     for (PetscInt i = 0; i < r->n; i++) {
       if (!m->model->in_rid[r->contact[i]] && !HycoPairsAlone(m->model->scene, &m->pairs, r->contact[i]))
-        m->Lambda[r->contact[i]] += r->c[j] * s[i];
+        L[r->row[i]] += r->c[j] * s[i];
     }
   }
+  for (PetscInt k = 0; first && k < N; k++) m->Lambda[k] = L[first[k]];
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -1,0 +1,296 @@
+/*
+  Coulomb friction on the path of a hybrid model. In (38) each contact of A_lambda has its normal row and dim - 1
+  tangents, with finite-element multipliers for all, so that the contacts of the RID obey the law of full order
+  (fom/friction.c):
+
+    r = P(r - rho w),     w = D - B[A_lambda, A'_c] V[A'_c] x     (HYCO_CONE_COULOMB),
+
+  D of a tangent the displacement of the slave against the master along it at the last accepted time. Forces elsewhere
+  follow from (41), which combines whole force vectors (hybrid/reconstruct.c), at each accepted time; slips are those
+  of the displacements.
+*/
+#include <hycogalerkin.h>
+#include <hycopath.h>
+#include <hycoslip.h>
+
+struct _n_HycoGalerkinFriction {
+  HycoSlip own, all;        /* the contacts of A_lambda on fe; those of the scene on the model's mesh */
+  HycoRows rows;            /* of all contacts, with tangents */
+  PetscReal *force, *slack; /* by row of all contacts: of the last accepted time */
+  PetscReal *last, *before; /* n_L: multipliers of the last two accepted times */
+  PetscReal *U_old;         /* of the model's mesh, at the last accepted time */
+  Vec ahead;                /* n_L: another start of a step */
+};
+
+/* Once the contacts of A_lambda are known; sets their rows in own_rows, and n_L. */
+PetscErrorCode HycoGalerkinFrictionCreate(HycoROM m)
+{
+  HycoGalerkin g = (HycoGalerkin)m->work;
+  const PetscInt dim = m->model->mesh->dim;
+  HycoGalerkinFriction f;
+
+  PetscFunctionBegin;
+  PetscCall(PetscNew(&g->friction));
+  f = g->friction;
+  PetscCall(HycoSlipCreate(PETSC_COMM_SELF, m->model->scene, &g->own_pairs, dim, &f->own));
+  PetscCall(HycoSlipCreate(PETSC_COMM_SELF, m->model->scene, &m->pairs, dim, &f->all));
+  m->n_L = f->own.row[m->m];
+  PetscCall(HycoRowsCreate(&g->own_pairs, dim, m->n_L, &g->own_rows));
+  PetscCall(HycoRowsCreate(&m->pairs, dim, f->all.row[m->pairs.n], &f->rows));
+  PetscCall(PetscCalloc2(f->all.row[m->pairs.n], &f->force, f->all.row[m->pairs.n], &f->slack));
+  PetscCall(PetscCalloc2(m->n_L, &f->last, m->n_L, &f->before));
+  PetscCall(PetscCalloc1(m->model->mesh->n_nodes * dim, &f->U_old));
+  PetscCall(VecCreateSeq(PETSC_COMM_SELF, m->n_L, &f->ahead));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* NULL-safe. */
+PetscErrorCode HycoGalerkinFrictionDestroy(HycoGalerkinFriction *friction)
+{
+  HycoGalerkinFriction f = *friction;
+
+  PetscFunctionBegin;
+  if (!f) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoSlipDestroy(&f->own));
+  PetscCall(HycoSlipDestroy(&f->all));
+  PetscCall(HycoRowsDestroy(&f->rows));
+  PetscCall(PetscFree2(f->force, f->slack));
+  PetscCall(PetscFree2(f->last, f->before));
+  PetscCall(VecDestroy(&f->ahead));
+  HycoFreeAll(&f->U_old, friction);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* By number in A_lambda: a row is a contact without friction. */
+PetscInt HycoGalerkinFirstRow(HycoGalerkin g, PetscInt k)
+{
+  return g->friction ? g->friction->own.row[k] : k;
+}
+
+PetscInt HycoGalerkinContactOf(HycoGalerkin g, PetscInt row)
+{
+  PetscInt k = g->friction ? PetscMin(row, g->friction->own.n - 1) : row; /* a contact has a row at least */
+
+  while (HycoGalerkinFirstRow(g, k) > row) k--;
+  return k;
+}
+
+/* NULL: none; rows are contacts then. */
+const PetscInt *HycoGalerkinFrictionForces(HycoGalerkinFriction f, PetscReal **force)
+{
+  *force = f->force;
+  return f->all.row;
+}
+
+/* The path starts from bodies at rest. */
+PetscErrorCode HycoGalerkinFrictionBegin(HycoROM m)
+{
+  HycoGalerkinFriction f = ((HycoGalerkin)m->work)->friction;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSlipBegin(&f->own));
+  PetscCall(HycoSlipBegin(&f->all));
+  PetscCall(PetscArrayzero(f->force, f->all.row[f->all.n]));
+  PetscCall(PetscArrayzero(f->last, m->n_L));
+  PetscCall(PetscArrayzero(f->before, m->n_L));
+  PetscCall(PetscArrayzero(f->U_old, m->model->mesh->n_nodes * m->model->mesh->dim));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether an unknown of A is in row r, so that an equation of (38) has its force. */
+static PetscErrorCode IsTested(HycoGalerkin g, PetscInt begin, PetscInt end, PetscBool *tested)
+{
+  PetscInt at;
+
+  PetscFunctionBegin;
+  *tested = PETSC_FALSE;
+  for (PetscInt e = begin; e < end && !*tested; e++) {
+    PetscCall(ISLocate(g->sets.is_A, g->own_rows.dof[e], &at));
+    *tested = (PetscBool)(at >= 0);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The rows of A_lambda at fe's parameters: B is constant along a path, gaps of tangents change with each step. A tangent
+   that acts on no unknown of A (the slave held along it, its masters on the interface) is made empty, and carries no
+   friction. Rows are packed in place, from the front. */
+PetscErrorCode HycoGalerkinFrictionRows(HycoROM m)
+{
+  HycoGalerkin g = (HycoGalerkin)m->work;
+  HycoGalerkinFriction f = g->friction;
+  HycoRows *rows = &g->own_rows;
+  PetscInt n = 0, begin = 0;
+
+  PetscFunctionBegin;
+  PetscCall(HycoSlipCoefficients(&f->own, m->fe, &g->own_pairs));
+  PetscCall(HycoContactTangentRows(m->fe, &g->own_pairs, f->own.row, f->U_old, f->own.tangent, rows->start, rows->dof,
+                                   rows->value, rows->gap));
+  for (PetscInt r = 0; r < m->n_L; r++) {
+    const PetscInt end = rows->start[r + 1];
+    PetscBool tested = PETSC_TRUE;
+
+    if (r != f->own.row[HycoGalerkinContactOf(g, r)]) PetscCall(IsTested(g, begin, end, &tested));
+    for (PetscInt e = begin; e < end && tested; e++, n++) {
+      rows->dof[n] = rows->dof[e];
+      rows->value[n] = rows->value[e];
+    }
+    if (!tested) rows->gap[r] = 0;
+    rows->start[r + 1] = n;
+    begin = end;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The cones with the coefficients of the step, and its other start. */
+PetscErrorCode HycoGalerkinFrictionPose(HycoROM m)
+{
+  HycoGalerkin g = (HycoGalerkin)m->work;
+  HycoGalerkinFriction f = g->friction;
+  PetscScalar *ahead;
+  PetscBool has;
+
+  PetscFunctionBegin;
+  if (!m->n_L) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoSystemSetBlocks(g->system, 2, f->own.cone, m->m, f->own.of, f->own.data));
+  PetscCall(VecGetArrayWrite(f->ahead, &ahead));
+  /* The time stands after the parameters, among the variables of expressions. */
+  has = HycoSlipExtrapolate(&f->own, m->fe->mu[m->model->scene->n_parameters], m->n_L, f->last, f->before, ahead);
+  PetscCall(VecRestoreArrayWrite(f->ahead, &ahead));
+  PetscCall(HycoSolverSetOtherStart(m->solver, has ? f->ahead : NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Multipliers by row of all contacts; forces elsewhere are zero. */
+static PetscErrorCode TakeMultipliers(HycoROM m)
+{
+  HycoGalerkin g = (HycoGalerkin)m->work;
+  HycoGalerkinFriction f = g->friction;
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(f->force, f->all.row[f->all.n]));
+  PetscCall(PetscArraycpy(f->before, f->last, m->n_L));
+  if (m->n_L) PetscCall(HycoVecRead(g->L, m->n_L, f->last));
+  for (PetscInt k = 0; k < m->m; k++)
+    PetscCall(PetscArraycpy(f->force + f->all.row[m->contact[k]], f->last + f->own.row[k],
+                            f->own.row[k + 1] - f->own.row[k]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Bodies that contact alone holds: each contact's force is scaled as a whole, and stays in its cone. */
+static PetscErrorCode Balance(HycoROM m)
+{
+  HycoGalerkinFriction f = ((HycoGalerkin)m->work)->friction;
+
+  PetscFunctionBegin;
+  if (!m->model->floating) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoSlipVectors(&f->all, f->force);
+  HycoTraceShowOther(m, &f->all.shear);
+  PetscCall(HycoFloatingBalance(m));
+  for (PetscInt k = 0; k < f->all.n; k++) {
+    PetscReal *force = f->force + f->all.row[k];
+    const PetscReal share = force[0] > 0 ? m->Lambda[k] / force[0] : 1;
+
+    for (PetscInt r = 0; r < f->all.row[k + 1] - f->all.row[k]; r++) force[r] *= share;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* w = D - B U of all contacts at the accepted time; *most: the largest displacement. */
+static PetscErrorCode ComputeSlips(HycoROM m, HycoFE fe, PetscReal *most)
+{
+  HycoGalerkinFriction f = ((HycoGalerkin)m->work)->friction;
+  HycoRows *rows = &f->rows;
+
+  PetscFunctionBegin;
+  for (PetscInt r = 0; r < f->all.row[f->all.n]; r++) {
+    f->slack[r] = rows->gap[r];
+    for (PetscInt e = rows->start[r]; e < rows->start[r + 1]; e++) f->slack[r] -= rows->value[e] * m->U[rows->dof[e]];
+  }
+  PetscCall(PetscArraycpy(f->U_old, m->U, fe->n_dof));
+  *most = 0;
+  for (PetscInt i = 0; i < fe->n_dof; i++) *most = PetscMax(*most, PetscAbsReal(m->U[i]));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Coulomb's law for the tangential part of a reconstructed force, of n components: where r - rho w is outside the cone,
+   the contact slips, and the force is on the cone. Elsewhere it sticks, and a slip that would do negative work is an error of
+   the modes. */
+static void Slip(PetscReal mu, PetscReal rho, PetscInt n, PetscReal force[], PetscReal slack[])
+{
+  PetscReal size = 0, work = 0;
+
+  for (PetscInt j = 1; j < n; j++) size += PetscSqr(force[j] - rho * slack[j]);
+  size = PetscSqrtReal(size);
+  for (PetscInt j = 1; j < n; j++) {
+    if (size > mu * force[0]) force[j] = (force[j] - rho * slack[j]) * mu * force[0] / size;
+    work -= force[j] * slack[j];
+  }
+  for (PetscInt j = 1; j < n && work < 0; j++) slack[j] = 0;
+}
+
+/* The law outside the RID, with a rho that makes the largest force and displacement equally large. */
+static void Obey(HycoROM m, PetscReal most)
+{
+  HycoGalerkinFriction f = ((HycoGalerkin)m->work)->friction;
+  PetscReal force = 0;
+
+  for (PetscInt k = 0; k < f->all.n; k++) force = PetscMax(force, f->force[f->all.row[k]]);
+  for (PetscInt k = 0; k < f->all.n && most > 0; k++) {
+    const PetscInt begin = f->all.row[k];
+
+    if (!m->model->in_rid[k])
+      Slip(f->all.mu[k], force / most, f->all.row[k + 1] - begin, f->force + begin, f->slack + begin);
+  }
+}
+
+/* An accepted step, whose x and L are the path's: forces and slips of all contacts. */
+PetscErrorCode HycoGalerkinFrictionAccept(HycoROM m, HycoPath p)
+{
+  HycoGalerkinFriction f = ((HycoGalerkin)m->work)->friction;
+  PetscReal most;
+  HycoFE fe;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMComplete(m));
+  PetscCall(HycoROMBringContacts(m, &fe));
+  PetscCall(HycoSlipCoefficients(&f->all, fe, &m->pairs));
+  PetscCall(HycoContactTangentRows(fe, &m->pairs, f->all.row, f->U_old, f->all.tangent, f->rows.start, f->rows.dof,
+                                   f->rows.value, f->rows.gap));
+  PetscCall(TakeMultipliers(m));
+  if (m->ops->reconstruct && m->reconstruct) HycoLogged(HYCO_EVENT_RECONSTRUCT, (*m->ops->reconstruct)(m));
+  PetscCall(ComputeSlips(m, fe, &most));
+  Obey(m, most);
+  PetscCall(Balance(m));
+  HycoSlipAdd(&f->all, f->force, f->slack, most);
+  HycoSlipTake(&f->own, p->t);
+  p->now.disproven += m->n_L && m->solver->sign < 0;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The forces of the last accepted time, which is recorded with the displacements there: an attempt after it may have left others. */
+PetscErrorCode HycoGalerkinFrictionShow(HycoROM m)
+{
+  HycoGalerkinFriction f = ((HycoGalerkin)m->work)->friction;
+
+  PetscFunctionBegin;
+  m->beyond_current = PETSC_FALSE;
+  PetscCall(HycoROMComplete(m));
+  for (PetscInt k = 0; k < f->all.n; k++) m->Lambda[k] = f->force[f->all.row[k]];
+  m->spread = PETSC_TRUE;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The contacts' state at the listed time that HycoTraceRecord() has begun; sums since the begin of the path. */
+PetscErrorCode HycoGalerkinFrictionRecord(HycoROM m, HycoStep *s)
+{
+  HycoGalerkinFriction f = ((HycoGalerkin)m->work)->friction;
+  PetscReal sum[2];
+
+  PetscFunctionBegin;
+  HycoSlipSum(&f->all, sum);
+  s->friction_work = sum[0];
+  s->n_slipping = (PetscInt)sum[1];
+  PetscCall(HycoTraceListShear(m, &f->all.shear));
+  HycoTraceShow(m, m->trace.shown);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
