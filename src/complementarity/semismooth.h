@@ -33,6 +33,7 @@ typedef struct {
   PetscBool symmetric;          /* M is, as it is not with free unknowns */
   PetscReal *DP, *base;         /* HYCO_BLOCK for each block, row by row: now, and of the factor */
   PetscInt *rank;               /* of each block's DP */
+  PetscBool *stiff, has_stiff;  /* by row: without flexibility; once for an M */
   PetscInt m, *base_rank;       /* unknowns a of the base, of all blocks and of each */
   HycoConeTerms *left, *right;  /* m each: L^T rho, E */
   PetscReal *A, *rhs, *product; /* m x m column major; m; n */
