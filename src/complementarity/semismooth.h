@@ -68,8 +68,9 @@ PetscErrorCode HycoConeStepSolve(HycoConeStep *step, const PetscReal b[], PetscB
    where the cones are Coulomb's; else nothing. */
 PetscErrorCode HycoConeStepPoint(HycoConeStep *step, const PetscReal q[], const PetscReal y[], PetscReal z[],
                                  PetscBool *regular, PetscBool *served);
-/* dz = DP (dz - rho (dq + M dz)): the derivative of z by q, where DP is that of a solution. */
-PetscErrorCode HycoConeStepTangent(HycoConeStep *step, const PetscReal dq[], PetscReal dz[], PetscBool *regular);
+/* dz = DP (dz - rho (dq + M dz)) for k columns: the derivative of z by q, where DP is that of a solution. */
+PetscErrorCode HycoConeStepTangent(HycoConeStep *step, PetscInt k, const PetscReal dq[], PetscReal dz[],
+                                   PetscBool *regular);
 /* The present DP becomes the base, if it is not. */
 PetscErrorCode HycoConeStepRenew(HycoConeStep *step);
 /* Other blocks of the same rows, for the problems that follow. */

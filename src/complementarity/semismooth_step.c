@@ -6,7 +6,7 @@
 #define SINGULAR 1e-8  /* least pivot of A relative to the largest: below, least squares may give another step */
 #define LEAST_SHARE                                                                                                    \
   3 /* the base changes once a third of its unknowns would be updated: a solve with each costs a factor then */
-#define NEAR        0.1   /* largest change of an entry of DP at which the base may stand for it */
+#define NEAR        0.3   /* largest change of an entry of DP at which the base may stand for it */
 #define HOMOGENEOUS 1e-14 /* P(y) - DP y relative to y: round-off */
 #define ROUNDING    1e-13 /* rows of DP relative to the longest that count as 0 */
 #define INFLEXIBLE  1e-12 /* diagonal entry of M relative to its block's largest that counts as 0 */
@@ -620,29 +620,34 @@ static PetscErrorCode IsHomogeneous(const HycoConeStep *t, const PetscReal y[], 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* z = DP (z - rho (q + M z)) */
-static PetscErrorCode SolvePoint(HycoConeStep *t, const PetscReal q[], PetscReal z[], PetscBool *regular)
+/* z = DP (z - rho (q + M z)) for k columns q; one solve with the factor serves all. */
+static PetscErrorCode SolvePoints(HycoConeStep *t, PetscInt k, const PetscReal q[], PetscReal z[], PetscBool *regular)
 {
-  const PetscBLASInt one = 1;
+  const PetscBLASInt columns = (PetscBLASInt)k;
   PetscBLASInt m, info;
-  PetscReal size = 0;
+  PetscReal size = 0, *rhs;
 
   PetscFunctionBegin;
   if (t->lagged) PetscCall(TakeBase(t));
   PetscCall(Prepare(t));
   m = (PetscBLASInt)t->m;
   info = t->info;
-  for (PetscInt a = 0; a < t->m; a++) {
-    t->rhs[a] = 0;
+  PetscCall(PetscCalloc1((size_t)t->m * (size_t)k + 1, &rhs));
+  for (PetscInt a = 0; a < t->m * k; a++) {
+    const HycoConeTerms *left = &t->left[a % t->m];
+
     /* -L^T rho q: the fixed part of y on the present states. */
-    for (PetscInt i = 0; i < t->left[a].n; i++) t->rhs[a] -= t->left[a].value[i] * q[t->left[a].row[i]];
+    for (PetscInt i = 0; i < left->n; i++) rhs[a] -= left->value[i] * q[a / t->m * t->n + left->row[i]];
   }
-  if (m && !info) LAPACKgetrs_("N", &m, &one, t->A, &m, t->pivot, t->rhs, &m, &info);
-  PetscCall(PetscArrayzero(z, t->n));
-  if (!info) AddForces(t, t->rhs, z);
-  if (!info) PetscCall(Correct(t, q, NULL, z));
-  for (PetscInt i = 0; i < t->n; i++) size += PetscAbsReal(z[i]);
+  if (m && !info) LAPACKgetrs_("N", &m, &columns, t->A, &m, t->pivot, rhs, &m, &info);
+  PetscCall(PetscArrayzero(z, t->n * k));
+  for (PetscInt j = 0; j < k && !info; j++) {
+    AddForces(t, rhs + j * t->m, z + j * t->n);
+    PetscCall(Correct(t, q + j * t->n, NULL, z + j * t->n));
+  }
+  for (PetscInt i = 0; i < t->n * k; i++) size += PetscAbsReal(z[i]);
   *regular = (PetscBool)(info == 0 && !PetscIsInfOrNanReal(size));
+  PetscCall(PetscFree(rhs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -655,15 +660,16 @@ PetscErrorCode HycoConeStepPoint(HycoConeStep *t, const PetscReal q[], const Pet
   *served = PETSC_FALSE;
   /* Steps alone have the right limit with a factor of another J. */
   if (!t->lagged) PetscCall(IsHomogeneous(t, y, served));
-  if (*served) PetscCall(SolvePoint(t, q, z, regular));
+  if (*served) PetscCall(SolvePoints(t, 1, q, z, regular));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The derivative of the point: the same linear map, whatever P is between its pieces. */
-PetscErrorCode HycoConeStepTangent(HycoConeStep *t, const PetscReal dq[], PetscReal dz[], PetscBool *regular)
+PetscErrorCode HycoConeStepTangent(HycoConeStep *t, PetscInt k, const PetscReal dq[], PetscReal dz[],
+                                   PetscBool *regular)
 {
   PetscFunctionBegin;
-  PetscCall(SolvePoint(t, dq, dz, regular));
+  PetscCall(SolvePoints(t, k, dq, dz, regular));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -332,13 +332,11 @@ PetscErrorCode HycoBodiesFrictionDerive(HycoBodiesFriction f, PetscInt m, const 
   }
   PetscCall(PetscFree(*Z));
   PetscCall(PetscMalloc1(*n_set * m + 1, Z));
-  PetscCall(PetscCalloc2(p + n + 1, &dq, p + n + 1, &dz));
+  PetscCall(PetscCalloc2((p + n) * m + 1, &dq, (p + n) * m + 1, &dz));
+  for (PetscInt i = 0; i < n * m; i++) dq[i % m * (p + n) + p + i / m] = -BP[i];
   /* Without a force there is nothing to derive, and floating bodies have no place. */
-  for (PetscInt j = 0; j < m && *n_set && *regular; j++) {
-    for (PetscInt k = 0; k < n; k++) dq[p + k] = -BP[k * m + j];
-    PetscCall(HycoConeFactorTangent(f->factor, dq, dz, regular));
-    for (PetscInt k = 0; k < *n_set; k++) (*Z)[k * m + j] = dz[p + set[k]];
-  }
+  if (*n_set && m) PetscCall(HycoConeFactorTangent(f->factor, m, dq, dz, regular));
+  for (PetscInt i = 0; i < *n_set * m; i++) (*Z)[i] = dz[i % m * (p + n) + p + set[i / m]];
   PetscCall(PetscFree2(dq, dz));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
