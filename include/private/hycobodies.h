@@ -187,6 +187,7 @@ typedef struct _n_HycoSubstructures {
 /* Rows of B in the bodies' axes that the last prediction had too, and what follows from them (bodies_kept.c). */
 typedef struct {
   PetscBool same;          /* the rows are the last ones */
+  PetscInt count;          /* of the rows so far that were not the last ones */
   PetscInt m, *start, *at; /* the last rows, of m contacts */
   PetscReal *value;
   PetscReal **P, **W; /* by contact and body: C_b B_b^T, n x terms; B C_b B_b^T, m x terms; NULL: not yet, or 0 */

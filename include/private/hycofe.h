@@ -98,6 +98,8 @@ struct _n_HycoFE {
                            HycoFEKeepGradients(); or NULL */
   PetscReal *kept_mean; /* mean gradients of each cell, nv x 3; NULL: no body uses bbar */
   PetscInt kept_place;
+  PetscReal *lanes; /* the same for several cells at once, computed at lanes_place (linear_fields.c); or NULL */
+  PetscInt lanes_place;
   PetscReal **kept_stiffness; /* by cell: of the forces of prescribed displacements, made at kept_at, which `stiffened`
                                  counts: HycoFEKeepStiffness(); or NULL */
   PetscInt *kept_at, stiffened;

@@ -72,10 +72,11 @@ typedef struct _n_HycoConeFactor *HycoConeFactor;
 PetscErrorCode HycoConeFactorCreate(HycoConeFactor *factor);
 PetscErrorCode HycoConeFactorDestroy(HycoConeFactor *factor);
 void HycoConeFactorForget(HycoConeFactor factor);
-/* After a solve with this factor: the sign of the determinant of J at the solution, as HycoLCP's; dz (p + n), the derivative of the solution where q changes by dq, on the
+/* After a solve with this factor: the sign of the determinant of J at the solution, as HycoLCP's; dz (p + n, k columns), the derivative of the solution where q changes by dq, on the
    pieces of the laws at the solution. *regular: it has one. */
 PetscErrorCode HycoConeFactorSign(HycoConeFactor factor, PetscInt *sign);
-PetscErrorCode HycoConeFactorTangent(HycoConeFactor factor, const PetscReal dq[], PetscReal dz[], PetscBool *regular);
+PetscErrorCode HycoConeFactorTangent(HycoConeFactor factor, PetscInt k, const PetscReal dq[], PetscReal dz[],
+                                     PetscBool *regular);
 /* These pieces: n numbers, borrowed until the next solve. */
 void HycoConeFactorGetPieces(HycoConeFactor factor, PetscInt *n, const PetscReal *pieces[]);
 /*

@@ -692,6 +692,8 @@ PetscErrorCode CommandPredict(void)
   HycoOnEach(PETSC_COMM_WORLD, HycoROMLoad(path, &model));
   PetscCall(HycoROMSetExtrapolate(model, extrapolate));
   PetscCall(HycoROMGetScene(model, &scene));
+  /* Its steps factor dense matrices, as full order does. */
+  if (HycoSceneHasFriction(scene)) DriverChooseKernels(NULL);
   PetscCall(HycoSceneGetHistory(scene, &n_times, NULL));
   /* It loads the scene only if -hyco_fallback or the whole displacement asks for it. */
   PetscCall(DriverReadFallback(model, extrapolate, &fallback));

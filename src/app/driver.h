@@ -106,7 +106,7 @@ PetscBool DriverHasStack(char **argv);
 PetscErrorCode DriverCheckLaunch(void);
 /* If OpenBLAS does not know this processor because it is newer, and selects its oldest kernels: selects those that the
    processor supports (a factor takes half the time), unless OPENBLAS_CORETYPE is set. The library reads that variable
-   when it is loaded, before main(); if it cannot read it again, the program is started again. */
+   when it is loaded, before main(); if it cannot read it again, the program is started again, unless argv is NULL. */
 void DriverChooseKernels(char **argv);
 /* One BLAS thread per rank, unless its variables, or OpenMP's, are set. (A BLAS reads them when it is loaded, before
    main().) */

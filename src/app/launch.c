@@ -172,7 +172,7 @@ void DriverChooseKernels(char **argv)
     choose.act();
     if (!strcmp(call.name(), kernels)) return;
   }
-  execv("/proc/self/exe", argv); /* returns only after a failure: hyco then continues unchanged */
+  if (argv) execv("/proc/self/exe", argv); /* returns only after a failure: hyco then continues unchanged */
 }
 
 /* One thread for each rank unless the user asks for more: threads of all ranks together would exceed the cores. By

@@ -837,18 +837,19 @@ PetscErrorCode HycoConeFactorSign(HycoConeFactor f, PetscInt *sign)
 }
 
 /* With the DP of the last solution. */
-PetscErrorCode HycoConeFactorTangent(HycoConeFactor f, const PetscReal dq[], PetscReal dz[], PetscBool *regular)
+PetscErrorCode HycoConeFactorTangent(HycoConeFactor f, PetscInt k, const PetscReal dq[], PetscReal dz[],
+                                     PetscBool *regular)
 {
   const PetscInt p = f->step.p, n = f->step.n;
   PetscReal *scaled = NULL;
 
   PetscFunctionBegin;
   if (p) {
-    PetscCall(PetscMalloc1(n, &scaled));
-    for (PetscInt i = 0; i < n; i++) scaled[i] = dq[i] * (i < p ? f->flexibility : 1);
+    PetscCall(PetscMalloc1(n * k + 1, &scaled));
+    for (PetscInt i = 0; i < n * k; i++) scaled[i] = dq[i] * (i % n < p ? f->flexibility : 1);
   }
-  PetscCall(HycoConeStepTangent(&f->step, scaled ? scaled : dq, dz, regular));
-  for (PetscInt i = 0; i < p; i++) dz[i] *= f->flexibility;
+  PetscCall(HycoConeStepTangent(&f->step, k, scaled ? scaled : dq, dz, regular));
+  for (PetscInt i = 0; i < p * k; i++) dz[i / p * n + i % p] *= f->flexibility;
   PetscCall(PetscFree(scaled));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -33,6 +33,7 @@ typedef struct {
   PetscBool symmetric;          /* M is, as it is not with free unknowns */
   PetscReal *DP, *base;         /* HYCO_BLOCK for each block, row by row: now, and of the factor */
   PetscInt *rank;               /* of each block's DP */
+  PetscBool *stiff, has_stiff;  /* by row: without flexibility; once for an M */
   PetscInt m, *base_rank;       /* unknowns a of the base, of all blocks and of each */
   HycoConeTerms *left, *right;  /* m each: L^T rho, E */
   PetscReal *A, *rhs, *product; /* m x m column major; m; n */
@@ -67,8 +68,9 @@ PetscErrorCode HycoConeStepSolve(HycoConeStep *step, const PetscReal b[], PetscB
    where the cones are Coulomb's; else nothing. */
 PetscErrorCode HycoConeStepPoint(HycoConeStep *step, const PetscReal q[], const PetscReal y[], PetscReal z[],
                                  PetscBool *regular, PetscBool *served);
-/* dz = DP (dz - rho (dq + M dz)): the derivative of z by q, where DP is that of a solution. */
-PetscErrorCode HycoConeStepTangent(HycoConeStep *step, const PetscReal dq[], PetscReal dz[], PetscBool *regular);
+/* dz = DP (dz - rho (dq + M dz)) for k columns: the derivative of z by q, where DP is that of a solution. */
+PetscErrorCode HycoConeStepTangent(HycoConeStep *step, PetscInt k, const PetscReal dq[], PetscReal dz[],
+                                   PetscBool *regular);
 /* The present DP becomes the base, if it is not. */
 PetscErrorCode HycoConeStepRenew(HycoConeStep *step);
 /* Other blocks of the same rows, for the problems that follow. */

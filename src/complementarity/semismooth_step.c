@@ -6,7 +6,7 @@
 #define SINGULAR 1e-8  /* least pivot of A relative to the largest: below, least squares may give another step */
 #define LEAST_SHARE                                                                                                    \
   3 /* the base changes once a third of its unknowns would be updated: a solve with each costs a factor then */
-#define NEAR        0.1   /* largest change of an entry of DP at which the base may stand for it */
+#define NEAR        0.3   /* largest change of an entry of DP at which the base may stand for it */
 #define HOMOGENEOUS 1e-14 /* P(y) - DP y relative to y: round-off */
 #define ROUNDING    1e-13 /* rows of DP relative to the longest that count as 0 */
 #define INFLEXIBLE  1e-12 /* diagonal entry of M relative to its block's largest that counts as 0 */
@@ -26,7 +26,7 @@ PetscErrorCode HycoConeStepCreate(PetscInt p, const HycoBlocks *blocks, const Pe
      sticking ones all of their rows. The room is that of all contacts sticking. */
   PetscCall(
       PetscMalloc6(n, &t->left, n, &t->right, (size_t)n * (size_t)n, &t->A, n, &t->rhs, n, &t->product, n, &t->pivot));
-  PetscCall(PetscMalloc4(n + 1, &t->changed, n + 1, &t->block, n + 1, &t->column, n + 1, &t->known));
+  PetscCall(PetscMalloc5(n + 1, &t->changed, n + 1, &t->block, n + 1, &t->column, n + 1, &t->known, n + 1, &t->stiff));
   PetscCall(PetscMalloc5((size_t)n * most, &t->Z, (size_t)n * most, &t->Q, most * most, &t->S, most, &t->small, most,
                          &t->small_pivot));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -38,7 +38,7 @@ PetscErrorCode HycoConeStepDestroy(HycoConeStep *t)
   PetscFunctionBegin;
   PetscCall(PetscFree4(t->DP, t->base, t->rank, t->base_rank));
   PetscCall(PetscFree6(t->left, t->right, t->A, t->rhs, t->product, t->pivot));
-  PetscCall(PetscFree4(t->changed, t->block, t->column, t->known));
+  PetscCall(PetscFree5(t->changed, t->block, t->column, t->known, t->stiff));
   PetscCall(PetscFree5(t->Z, t->Q, t->S, t->small, t->small_pivot));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -47,7 +47,7 @@ PetscErrorCode HycoConeStepDestroy(HycoConeStep *t)
 void HycoConeStepSetMatrix(HycoConeStep *t, const PetscReal M[])
 {
   t->M = M;
-  t->factored = PETSC_FALSE;
+  t->factored = t->has_stiff = PETSC_FALSE;
 }
 
 /* Blocks are gathered anew for each solve, with other data; sizes and order stay, so that the factor does too. */
@@ -163,9 +163,19 @@ static PetscErrorCode TakeBase(HycoConeStep *t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Lists the rows of DP that differ from the base; returns how many columns of Z are missing for them. t->column: the
-   column of Z of each row, -1: none yet. */
-static PetscInt Compare(HycoConeStep *t)
+/* Whether block k has the state of the base, and its DP differs by little, as where a slip turns. */
+static PetscBool IsNear(const HycoConeStep *t, PetscInt k)
+{
+  if (t->rank[k] != t->base_rank[k]) return PETSC_FALSE;
+  for (PetscInt i = k * HYCO_BLOCK; i < (k + 1) * HYCO_BLOCK; i++) {
+    if (PetscAbsReal(t->DP[i] - t->base[i]) > NEAR) return PETSC_FALSE;
+  }
+  return PETSC_TRUE;
+}
+
+/* Lists the rows of DP that differ from the base, or those of blocks that are not near it; returns how many columns of Z
+   are missing for them. t->column: the column of Z of each row, -1: none yet. */
+static PetscInt Compare(HycoConeStep *t, PetscBool all)
 {
   PetscInt missing = 0;
 
@@ -174,6 +184,7 @@ static PetscInt Compare(HycoConeStep *t)
     const PetscInt first = t->p + t->blocks->row[k], size = t->blocks->row[k + 1] - t->blocks->row[k];
     const PetscReal *now = t->DP + (size_t)k * HYCO_BLOCK, *base = t->base + (size_t)k * HYCO_BLOCK;
 
+    if (!all && IsNear(t, k)) continue;
     for (PetscInt i = 0; i < size; i++) {
       PetscBool same = PETSC_TRUE;
 
@@ -208,22 +219,22 @@ static PetscBool Inflexible(const HycoConeStep *t, PetscInt k, PetscInt i)
   return (PetscBool) !(own > INFLEXIBLE * most);
 }
 
-/* Whether DP differs from the base by little, as where slips turn in many contacts, and no contact has another state. */
-static PetscBool IsNear(const HycoConeStep *t)
+/* Of all rows, once for an M. */
+static const PetscBool *Stiff(HycoConeStep *t)
 {
-  for (PetscInt k = 0; k < t->blocks->n; k++) {
-    if (t->rank[k] != t->base_rank[k]) return PETSC_FALSE;
-    for (PetscInt i = k * HYCO_BLOCK; i < (k + 1) * HYCO_BLOCK; i++) {
-      if (PetscAbsReal(t->DP[i] - t->base[i]) > NEAR) return PETSC_FALSE;
-    }
+  for (PetscInt k = 0; k < t->blocks->n && !t->has_stiff; k++) {
+    for (PetscInt i = 0; i < t->blocks->row[k + 1] - t->blocks->row[k]; i++)
+      t->stiff[t->p + t->blocks->row[k] + i] = Inflexible(t, k, i);
   }
-  return PETSC_TRUE;
+  t->has_stiff = PETSC_TRUE;
+  return t->stiff;
 }
 
 /* Entries of DP are compared exactly: a step between the same states of contacts without slip in 3D has the same DP,
    and keeps the factor. */
 PetscErrorCode HycoConeStepDerive(HycoConeStep *t, const HycoBlocks *blocks, const PetscReal y[], PetscInt *changes)
 {
+  const PetscBool *stiff = Stiff(t);
   PetscBool same = PETSC_TRUE;
 
   PetscFunctionBegin;
@@ -236,7 +247,7 @@ PetscErrorCode HycoConeStepDerive(HycoConeStep *t, const HycoBlocks *blocks, con
     PetscCall(HycoBlockDerivative(blocks, k, y + t->p + blocks->row[k], D));
     for (PetscInt i = 1; i < size; i++) {
       /* A direction in which nothing moves has no force: its derivative would make the matrix singular. */
-      if (!Inflexible(t, k, i)) continue;
+      if (!stiff[t->p + blocks->row[k] + i]) continue;
       for (PetscInt j = 0; j < size; j++) D[i * size + j] = D[j * size + i] = 0;
     }
     for (PetscInt i = 0; i < size * size; i++) {
@@ -251,15 +262,15 @@ PetscErrorCode HycoConeStepDerive(HycoConeStep *t, const HycoBlocks *blocks, con
   if (t->factored && same) PetscFunctionReturn(PETSC_SUCCESS);
   t->updated = t->lagged = PETSC_FALSE;
   if (t->factored && t->info == 0) {
-    const PetscInt missing = Compare(t), most = PetscMin(HYCO_CONE_CHANGES, t->m / LEAST_SHARE);
+    const PetscInt most = PetscMin(HYCO_CONE_CHANGES, t->m / LEAST_SHARE);
+    PetscInt missing = Compare(t, PETSC_TRUE);
 
     /* Few changes: a low-rank update of the factor instead of a new one. */
     if (t->c <= most && t->n_columns + missing <= most) PetscFunctionReturn(PETSC_SUCCESS);
-    t->lagged = (PetscBool)(!t->nearly_singular && IsNear(t));
-    if (t->lagged) {
-      t->c = 0;
-      PetscFunctionReturn(PETSC_SUCCESS);
-    }
+    /* Slips have turned in many contacts: an update for the others stands for J as long as it contracts. */
+    missing = Compare(t, PETSC_FALSE);
+    t->lagged = (PetscBool)(!t->nearly_singular && t->c <= most && t->n_columns + missing <= most);
+    if (t->lagged) PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(TakeBase(t));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -609,29 +620,34 @@ static PetscErrorCode IsHomogeneous(const HycoConeStep *t, const PetscReal y[], 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* z = DP (z - rho (q + M z)) */
-static PetscErrorCode SolvePoint(HycoConeStep *t, const PetscReal q[], PetscReal z[], PetscBool *regular)
+/* z = DP (z - rho (q + M z)) for k columns q; one solve with the factor serves all. */
+static PetscErrorCode SolvePoints(HycoConeStep *t, PetscInt k, const PetscReal q[], PetscReal z[], PetscBool *regular)
 {
-  const PetscBLASInt one = 1;
+  const PetscBLASInt columns = (PetscBLASInt)k;
   PetscBLASInt m, info;
-  PetscReal size = 0;
+  PetscReal size = 0, *rhs;
 
   PetscFunctionBegin;
   if (t->lagged) PetscCall(TakeBase(t));
   PetscCall(Prepare(t));
   m = (PetscBLASInt)t->m;
   info = t->info;
-  for (PetscInt a = 0; a < t->m; a++) {
-    t->rhs[a] = 0;
+  PetscCall(PetscCalloc1((size_t)t->m * (size_t)k + 1, &rhs));
+  for (PetscInt a = 0; a < t->m * k; a++) {
+    const HycoConeTerms *left = &t->left[a % t->m];
+
     /* -L^T rho q: the fixed part of y on the present states. */
-    for (PetscInt i = 0; i < t->left[a].n; i++) t->rhs[a] -= t->left[a].value[i] * q[t->left[a].row[i]];
+    for (PetscInt i = 0; i < left->n; i++) rhs[a] -= left->value[i] * q[a / t->m * t->n + left->row[i]];
   }
-  if (m && !info) LAPACKgetrs_("N", &m, &one, t->A, &m, t->pivot, t->rhs, &m, &info);
-  PetscCall(PetscArrayzero(z, t->n));
-  if (!info) AddForces(t, t->rhs, z);
-  if (!info) PetscCall(Correct(t, q, NULL, z));
-  for (PetscInt i = 0; i < t->n; i++) size += PetscAbsReal(z[i]);
+  if (m && !info) LAPACKgetrs_("N", &m, &columns, t->A, &m, t->pivot, rhs, &m, &info);
+  PetscCall(PetscArrayzero(z, t->n * k));
+  for (PetscInt j = 0; j < k && !info; j++) {
+    AddForces(t, rhs + j * t->m, z + j * t->n);
+    PetscCall(Correct(t, q + j * t->n, NULL, z + j * t->n));
+  }
+  for (PetscInt i = 0; i < t->n * k; i++) size += PetscAbsReal(z[i]);
   *regular = (PetscBool)(info == 0 && !PetscIsInfOrNanReal(size));
+  PetscCall(PetscFree(rhs));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -644,33 +660,45 @@ PetscErrorCode HycoConeStepPoint(HycoConeStep *t, const PetscReal q[], const Pet
   *served = PETSC_FALSE;
   /* Steps alone have the right limit with a factor of another J. */
   if (!t->lagged) PetscCall(IsHomogeneous(t, y, served));
-  if (*served) PetscCall(SolvePoint(t, q, z, regular));
+  if (*served) PetscCall(SolvePoints(t, 1, q, z, regular));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The derivative of the point: the same linear map, whatever P is between its pieces. */
-PetscErrorCode HycoConeStepTangent(HycoConeStep *t, const PetscReal dq[], PetscReal dz[], PetscBool *regular)
+PetscErrorCode HycoConeStepTangent(HycoConeStep *t, PetscInt k, const PetscReal dq[], PetscReal dz[],
+                                   PetscBool *regular)
 {
   PetscFunctionBegin;
-  PetscCall(SolvePoint(t, dq, dz, regular));
+  PetscCall(SolvePoints(t, k, dq, dz, regular));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Of det A times that of the update. */
+static PetscInt SignOfFactor(const HycoConeStep *t)
+{
+  PetscInt sign = t->info == 0;
+
+  /* det A is the product of U's diagonal, with a change of sign for each exchange of rows; det A = det J. */
+  for (PetscInt a = 0; a < t->m; a++) {
+    if (t->A[(size_t)a * (size_t)(t->m + 1)] < 0) sign = -sign;
+    if (t->pivot[a] != a + 1) sign = -sign;
+  }
+  for (PetscInt k = 0; k < t->c; k++) {
+    if (t->S[k * (t->c + 1)] < 0) sign = -sign;
+    if (t->small_pivot[k] != k + 1) sign = -sign;
+  }
+  return sign;
+}
+
+/* Of a factor of another J only a positive sign is taken, which proves nothing. */
 PetscErrorCode HycoConeStepSign(HycoConeStep *t, PetscInt *sign)
 {
   PetscFunctionBegin;
-  if (t->lagged) PetscCall(TakeBase(t));
   PetscCall(Prepare(t));
-  /* det A is the product of U's diagonal, with a change of sign for each exchange of rows; det A = det J. */
-  *sign = t->info == 0;
-  for (PetscInt a = 0; a < t->m; a++) {
-    if (t->A[(size_t)a * (size_t)(t->m + 1)] < 0) *sign = -*sign;
-    if (t->pivot[a] != a + 1) *sign = -*sign;
-  }
-  for (PetscInt k = 0; k < t->c; k++) {
-    if (t->S[k * (t->c + 1)] < 0) *sign = -*sign;
-    if (t->small_pivot[k] != k + 1) *sign = -*sign;
-  }
+  *sign = SignOfFactor(t);
+  if (!t->lagged || *sign > 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(TakeBase(t));
+  PetscCall(Prepare(t));
+  *sign = SignOfFactor(t);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -22,8 +22,9 @@ PetscErrorCode HycoFEDestroy(HycoFE *fe)
   }
   HycoFreeAll(&(*fe)->shares, &(*fe)->constant, &(*fe)->bbar, &(*fe)->temperature, &(*fe)->thermal, &(*fe)->pin,
               &(*fe)->released, &(*fe)->X, &(*fe)->room, &(*fe)->mirrored, &(*fe)->drawn_sign, &(*fe)->fixed,
-              &(*fe)->oblique, &(*fe)->oblique_at, &(*fe)->u0, &(*fe)->kept, &(*fe)->kept_mean, &(*fe)->weight,
-              &(*fe)->weighed_at, &(*fe)->moved_at, &(*fe)->tangent, &(*fe)->tangent_start, &(*fe)->tangent_size, fe);
+              &(*fe)->oblique, &(*fe)->oblique_at, &(*fe)->u0, &(*fe)->kept, &(*fe)->lanes, &(*fe)->kept_mean,
+              &(*fe)->weight, &(*fe)->weighed_at, &(*fe)->moved_at, &(*fe)->tangent, &(*fe)->tangent_start,
+              &(*fe)->tangent_size, fe);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

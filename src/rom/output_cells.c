@@ -267,6 +267,7 @@ static PetscErrorCode March(HycoOutputCells p, HycoReplay *r)
   PetscFunctionBegin;
   for (PetscInt k = 0, j = 0; k < trace->n; k++) {
     PetscCall(HycoReplayMove(r, k));
+    if (p->mesh->n_cells <= KEPT) PetscCall(HycoFEKeepGradients(p->fe));
     Displace(m, p, trace->gamma + (size_t)k * (size_t)m->model->l, trace->U_fe + (size_t)k * (size_t)m->model->n_fe);
     /* Every accepted step, because states depend on those before; outputs at the listed ones only. */
     PetscCall(HycoReplayStep(r, k, p->u));

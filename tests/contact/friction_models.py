@@ -130,7 +130,7 @@ class FrictionModels(Case):
 
     def test_unique(self):
         """Nodes of a slave that are moved by supports and more than their masters' unknowns can tell apart: at the times when they press, the nodal forces are
-        not unique, in full order and in the model, whose estimate of them is then none; resultants differ by less than 1 %."""
+        not unique, in full order and in the model, whose estimate of them is then none; resultants differ by less than 3 %."""
         grid = Grid()
         grid.box('quad4', [np.linspace(0, 1, 4), np.linspace(-0.5, 0, 3)], lambda x: x, 'low', {'y0': 'base', 'y1': 'back'})
         grid.box('quad4', [np.linspace(0.05, 0.95, 9), np.linspace(0, 0.5, 3)], lambda x: x, 'high', {'y0': 'face', 'y1': 'top'})
@@ -155,7 +155,7 @@ class FrictionModels(Case):
         self.assertIsNone(found['estimated_error_lambda'])
         for name in ('total_contact_force', 'friction_work'):
             most = max(solved['history'][name])
-            self.assertLess(max(abs(a - b) for a, b in zip(found['history'][name], solved['history'][name])), 0.01 * most, name)
+            self.assertLess(max(abs(a - b) for a, b in zip(found['history'][name], solved['history'][name])), 0.03 * most, name)
         self.hyco('predict', '-model', self.path('m.h5'), '-grid', '1,2', '-table', self.path('batch.csv'))
         batch = np.genfromtxt(self.path('batch.csv'), delimiter=',', names=True)
         self.assertEqual(batch['forces_unique'].tolist(), [0, 0])

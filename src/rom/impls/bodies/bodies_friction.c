@@ -23,14 +23,17 @@ struct _n_HycoBodiesFriction {
   HycoBlocks *blocks;
   HycoTao tao;
   HycoConeFactor factor;
-  PetscInt p;               /* rigid motions */
-  PetscReal *M;             /* p + rows square: [0 G^T; -G W]; NULL: not computed at these parameters yet */
-  PetscReal *q, *z, *ahead; /* p + rows: of the step; its motions and forces; a start of it */
-  PetscReal *pieces;        /* of the laws, when the derivative of the forces was taken */
-  PetscReal *before;        /* by row: forces of the accepted step before the last one */
-  PetscReal *U, *U_old;     /* n_dof: of the surface, at the step and at the last accepted time */
-  PetscReal *w, *forces;    /* by row: of the last accepted step */
-  PetscReal most;           /* largest displacement */
+  PetscInt p;                    /* rigid motions */
+  PetscReal *M;                  /* p + rows square: [0 G^T; -G W]; NULL: not computed yet */
+  PetscBool present;             /* M is known to be that of these parameters */
+  PetscInt rows_of, *weights_of; /* the rows and, by body, the weights */
+  PetscReal *kappa_of;           /* and stiffness that it belongs to */
+  PetscReal *q, *z, *ahead;      /* p + rows: of the step; its motions and forces; a start of it */
+  PetscReal *pieces;             /* of the laws, when the derivative of the forces was taken */
+  PetscReal *before;             /* by row: forces of the accepted step before the last one */
+  PetscReal *U, *U_old;          /* n_dof: of the surface, at the step and at the last accepted time */
+  PetscReal *w, *forces;         /* by row: of the last accepted step */
+  PetscReal most;                /* largest displacement */
 };
 
 /* Room for the rows with tangents. */
@@ -97,8 +100,8 @@ PetscErrorCode HycoBodiesFrictionDestroy(HycoBodiesFriction *friction)
   PetscCall(HycoBlocksDestroy(&f->blocks)); /* before the cones, which they refer to */
   PetscCall(HycoSlipDestroy(&f->slip));
   PetscCall(HycoRowsDestroy(&f->rows));
-  HycoFreeAll(&f->contact, &f->M, &f->pieces, &f->q, &f->z, &f->ahead, &f->U, &f->U_old, &f->w, &f->forces, &f->before,
-              friction);
+  HycoFreeAll(&f->contact, &f->M, &f->weights_of, &f->kappa_of, &f->pieces, &f->q, &f->z, &f->ahead, &f->U, &f->U_old,
+              &f->w, &f->forces, &f->before, friction);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -116,18 +119,44 @@ PetscErrorCode HycoBodiesFrictionBegin(HycoBodiesFriction f)
   PetscCall(HycoSlipBegin(&f->slip));
   PetscCall(PetscArrayzero(f->U_old, f->normal.fe->n_dof));
   PetscCall(PetscArrayzero(f->forces, f->all.n));
-  PetscCall(PetscFree(f->M)); /* of other parameters */
+  f->present = PETSC_FALSE;
+  HycoConeFactorForget(f->factor); /* a path does not depend on those before */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether M is that of the present rows and bodies, to which it belongs afterwards. */
+static PetscErrorCode Belongs(HycoBodiesFriction f, HycoBodiesWork o, PetscBool *belongs)
+{
+  const PetscInt n = o->bodies->n;
+
+  PetscFunctionBegin;
+  *belongs = (PetscBool)(f->M && o->kept.same && f->rows_of == o->kept.count && !o->bodies->p);
+  if (!f->kappa_of) {
+    PetscCall(PetscCalloc1(n, &f->kappa_of));
+    PetscCall(PetscCalloc1(n, &f->weights_of));
+  }
+  for (PetscInt k = 0; k < n; k++) {
+    *belongs = (PetscBool)(*belongs && f->kappa_of[k] == o->kappa[k] && f->weights_of[k] == o->kept.weights[k]);
+    f->kappa_of[k] = o->kappa[k];
+    f->weights_of[k] = o->kept.weights[k];
+  }
+  f->rows_of = o->kept.count;
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* W of all rows, also of open contacts, since the path keeps it for all of its steps; from the columns that are kept while
-   the rows are the same. */
+   the rows are the same. Loads and coefficients of friction do not enter, so that it often is that of the last path. */
 static PetscErrorCode Condense(HycoBodiesFriction f, HycoBodiesWork o)
 {
   const PetscInt n = f->all.n;
   PetscInt *row;
+  PetscBool belongs;
 
   PetscFunctionBegin;
+  PetscCall(Belongs(f, o, &belongs));
+  f->present = PETSC_TRUE;
+  if (belongs) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscFree(f->M));
   PetscCall(PetscMalloc1(n + 1, &row));
   for (PetscInt k = 0; k < n; k++) row[k] = k;
   /* Without this the first step of a path would find that its rows are new and keep nothing. */
@@ -221,7 +250,7 @@ PetscErrorCode HycoBodiesFrictionTouch(HycoBodiesFriction f, HycoBodiesWork o, P
                  .given = PETSC_TRUE};
 
   PetscFunctionBegin;
-  if (!f->M) PetscCall(Condense(f, o));
+  if (!f->present) PetscCall(Condense(f, o));
   lcp.M = f->M;
   if (alpha) PetscCall(HycoBodiesStrain(o, &f->all, alpha));
   for (PetscInt i = 0; i < p; i++) {
@@ -321,13 +350,11 @@ PetscErrorCode HycoBodiesFrictionDerive(HycoBodiesFriction f, PetscInt m, const 
   }
   PetscCall(PetscFree(*Z));
   PetscCall(PetscMalloc1(*n_set * m + 1, Z));
-  PetscCall(PetscCalloc2(p + n + 1, &dq, p + n + 1, &dz));
+  PetscCall(PetscCalloc2((p + n) * m + 1, &dq, (p + n) * m + 1, &dz));
+  for (PetscInt i = 0; i < n * m; i++) dq[i % m * (p + n) + p + i / m] = -BP[i];
   /* Without a force there is nothing to derive, and floating bodies have no place. */
-  for (PetscInt j = 0; j < m && *n_set && *regular; j++) {
-    for (PetscInt k = 0; k < n; k++) dq[p + k] = -BP[k * m + j];
-    PetscCall(HycoConeFactorTangent(f->factor, dq, dz, regular));
-    for (PetscInt k = 0; k < *n_set; k++) (*Z)[k * m + j] = dz[p + set[k]];
-  }
+  if (*n_set && m) PetscCall(HycoConeFactorTangent(f->factor, m, dq, dz, regular));
+  for (PetscInt i = 0; i < *n_set * m; i++) (*Z)[i] = dz[i % m * (p + n) + p + set[i / m]];
   PetscCall(PetscFree2(dq, dz));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

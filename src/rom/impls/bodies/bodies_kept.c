@@ -61,6 +61,7 @@ PetscErrorCode HycoBodiesKeepRows(HycoBodiesWork o, PetscInt m)
     PetscCall(PetscCalloc1(n + 1, &kept->at_weights));
   }
   if (kept->same) PetscFunctionReturn(PETSC_SUCCESS);
+  kept->count++;
   /* Columns are products with the old rows. */
   PetscCall(ForgetColumns(kept, n));
   HycoFreeAll(&kept->start, &kept->at, &kept->value);

@@ -1042,18 +1042,33 @@ PetscReal HycoBodiesBound(HycoBodiesWork o, PetscReal *norm)
 
 /* -- displacements -- */
 
+/* Most bodies stay in the axes of the scene. */
+static PetscBool Turns(const HycoPose *pose)
+{
+  for (PetscInt i = 0; i < 9; i++) {
+    if (pose->Q[i] != (i % 4 == 0)) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
 /* Turns vectors by node, not components: a node may have fixed components, whose displacement in the body's axes
    counts as 0 and which are not written. */
 void HycoBodiesMove(HycoBodiesWork o, const HycoBodiesSurface *s, PetscReal U[])
 {
   const PetscInt dim = o->bodies->dim;
+  PetscBool turns = PETSC_TRUE;
+  PetscInt body = -1;
 
   for (PetscInt k = 0; k < o->n_placed; k++) {
     const PetscInt i = o->placed[k] * dim, *loc = o->loc + i;
     PetscReal own[3] = {0, 0, 0}, turned[3];
 
     for (PetscInt c = 0; c < dim; c++) own[c] = loc[c] < 0 ? 0 : o->u[loc[c]];
-    HycoPoseTurn(o->pose[o->placed_in[k]].Q, dim, PETSC_FALSE, own, turned);
+    if (o->placed_in[k] != body) turns = Turns(&o->pose[body = o->placed_in[k]]);
+    if (turns)
+      HycoPoseTurn(o->pose[body].Q, dim, PETSC_FALSE, own, turned);
+    else
+      PetscCallVoid(PetscArraycpy(turned, own, 3));
     for (PetscInt c = 0; c < dim; c++) {
       /* u0 has the prescribed values; the place's value comes on top in the scene's axes. */
       if (loc[c] >= 0) U[i + c] = s->fe->u0[i + c] + turned[c];

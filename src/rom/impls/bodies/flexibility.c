@@ -214,16 +214,9 @@ void HycoFlexibilityAdd(const HycoFlexibility *f, PetscInt t, PetscInt unknown, 
 
 /* to[n] += the sum over `terms` terms of share times from, `stride` apart. Four at a time: `to` is read and written less
    often. For both precisions in one order, so that sums of kept products and of columns have the same bits. */
-#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GNUC__) && !defined(__clang__) &&                       \
-    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-/* Four numbers at once where the processor can; without fused operations, so that the bits are those of any other. */
-#define FOUR_AT_ONCE __attribute__((target_clones("avx2", "default")))
-#else
-#define FOUR_AT_ONCE
-#endif
 #define ADD_TERMS(name, type)                                                                                          \
-  FOUR_AT_ONCE static void name(PetscInt terms, const PetscReal share[], size_t n, size_t stride, const type from[],   \
-                                PetscReal to[])                                                                        \
+  HYCO_FOUR_AT_ONCE static void name(PetscInt terms, const PetscReal share[], size_t n, size_t stride,                 \
+                                     const type from[], PetscReal to[])                                                \
   {                                                                                                                    \
     PetscInt t = 0;                                                                                                    \
                                                                                                                        \
