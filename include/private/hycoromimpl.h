@@ -288,6 +288,8 @@ PetscErrorCode HycoROMMeasureAt(HycoROM model, const PetscReal mu[], PetscReal v
    and of U. */
 void HycoROMChangeMeans(HycoROM model, const PetscReal from[], PetscReal step, const PetscReal dgamma[],
                         const PetscReal dU[], PetscReal value[]);
+/* Marks the modes (l) and full-order displacements (dofs of mesh) on which they depend. */
+void HycoROMOutputsRead(HycoROM model, PetscBool modes[], PetscBool dofs[]);
 /* Whether no output needs displacements: results of contacts, and reactions that follow from balance. */
 PetscBool HycoROMOutputsAreForces(HycoROM model);
 /* Whether, with displacements and forces that do not change, the parameters p with changed[p] change the outputs of focused

@@ -32,6 +32,7 @@ typedef struct {
   /* the prediction */
   HycoPrediction prediction;
   PetscReal remainder, *gamma, *U, *Lambda;
+  PetscBool *modes, *dofs;     /* what outputs depend on of gamma and U */
   PetscReal *dgamma, *dU, *u0; /* along the parameter in hand; prescribed displacements at mu */
   PetscBool whole_current;
 } Work;
@@ -191,6 +192,9 @@ static PetscErrorCode Focus(Work *o)
   PetscFunctionBegin;
   HycoDuplicate(m->fe->n_dof, m->fe->u0, &o->u0);
   PetscCall(PetscCalloc1(m->model->l + 1, &o->dgamma));
+  PetscCall(PetscCalloc1(m->model->l + 1, &o->modes));
+  PetscCall(PetscCalloc1(m->model->mesh->n_nodes * m->model->mesh->dim + 1, &o->dofs));
+  HycoROMOutputsRead(m, o->modes, o->dofs);
   PetscCall(PetscCalloc1(m->fe->n_dof + 1, &o->dU));
   PetscCall(PetscMalloc1(o->n + 1, &o->list));
   for (PetscInt i = 0; i < o->n; i++) o->list[i] = i;
@@ -267,7 +271,7 @@ static PetscErrorCode Destroy(Work *o)
   PetscCall(PetscFree3(o->z, o->moved, o->dz));
   for (PetscInt j = 0; j < 5; j++) PetscCall(PetscFree(o->w[j]));
   PetscCall(PetscFree3(o->contact, o->q, o->v));
-  HycoFreeAll(&o->output, &o->gamma, &o->U, &o->Lambda, &o->list, &o->dgamma, &o->dU, &o->u0);
+  HycoFreeAll(&o->output, &o->gamma, &o->U, &o->Lambda, &o->list, &o->modes, &o->dofs, &o->dgamma, &o->dU, &o->u0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -368,7 +372,8 @@ static PetscErrorCode Differentiate(Work *o, HycoDifference *d, PetscBool *kink)
   for (PetscInt i = 0; i < o->p + o->k; i++) o->dz[i < o->p ? i : o->p + o->contact[i - o->p]] = o->v[i];
   /* Displacements, unless outputs need forces alone. */
   if (o->near && !o->forces)
-    PetscCall((*o->m->ops->slope)(o->m, o->n, o->list, d->weight + 1, o->at + 1, o->dz, o->dgamma, o->dU));
+    PetscCall(
+        (*o->m->ops->slope)(o->m, o->n, o->list, d->weight + 1, o->at + 1, o->dz, o->modes, o->dofs, o->dgamma, o->dU));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -527,6 +527,23 @@ void HycoROMParametersEnter(HycoROM m, const PetscBool changed[], PetscBool *mea
   *slopes = (PetscBool)(p && Enters(m, p, PETSC_TRUE, changed));
 }
 
+/* Other coefficients are 0 times what cells have of their modes. */
+void HycoROMOutputsRead(HycoROM m, PetscBool modes[], PetscBool dofs[])
+{
+  const PetscInt l = m->model->l, n = l + m->model->n_fe;
+  HycoOutputCells p = m->output_cells;
+
+  for (PetscInt k = 0; p && k < p->fe->n_dof * l; k++) modes[k % l] = (PetscBool)(modes[k % l] || p->V[k] != 0);
+  for (PetscInt i = 0; p && i < m->model->n_fe; i++) dofs[m->model->fe_dof[i]] = (PetscBool)(p->fe_at[i] >= 0);
+  for (PetscInt q = 0; p && q < m->model->scene->n_quantities; q++) {
+    for (PetscInt j = 0; p->without[q] && j < n; j++) {
+      PetscBool *of = j < l ? &modes[j] : &dofs[m->model->fe_dof[j - l]];
+
+      if (p->slope[q * n + j] != 0) *of = PETSC_TRUE;
+    }
+  }
+}
+
 /* Beside U and gamma no other displacement is in a mean: u is 0 + V gamma, or U. */
 void HycoROMChangeMeans(HycoROM m, const PetscReal from[], PetscReal step, const PetscReal dgamma[],
                         const PetscReal dU[], PetscReal value[])
