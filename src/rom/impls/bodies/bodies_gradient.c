@@ -300,27 +300,34 @@ static PetscErrorCode ExpandSlope(HycoBodiesWork o, PetscInt k, const Parts *cha
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* As HycoBodiesMove(): U' = Q u' + Q' u at the nodes with a place; prescribed displacements are the caller's. */
+/* As HycoBodiesMove(): U' = Q u' + Q' u at the nodes with a place, where dofs are wanted; prescribed displacements are the
+   caller's. */
 static void MoveSlope(HycoBodiesWork o, const Parts *change, const PetscReal du[], const PetscBool dofs[],
                       PetscReal dU[])
 {
   const PetscInt dim = o->bodies->dim;
+  PetscInt last = -1;
+  PetscBool turns = PETSC_FALSE;
 
   for (PetscInt k = 0; k < o->n_placed; k++) {
     const PetscInt i = o->placed[k] * dim, *loc = o->loc + i, body = o->placed_in[k];
-    PetscReal own[3] = {0, 0, 0}, slope[3] = {0, 0, 0}, turned[3], more[3];
+    const PetscReal *Q = o->pose[body].Q, *turn = change->turn + 9 * body;
     PetscBool any = PETSC_FALSE;
 
     for (PetscInt c = 0; c < dim; c++) any = (PetscBool)(any || dofs[i + c]);
-    for (PetscInt c = 0; c < dim && any; c++) {
-      own[c] = loc[c] < 0 ? 0 : o->u[loc[c]];
-      slope[c] = loc[c] < 0 ? 0 : du[loc[c]];
-    }
     if (!any) continue;
-    HycoPoseTurn(o->pose[body].Q, dim, PETSC_FALSE, slope, turned);
-    HycoPoseTurn(change->turn + 9 * body, dim, PETSC_FALSE, own, more);
+    /* Nodes of a body follow each other. */
+    if (body != last) turns = AnyOf(9, turn);
+    last = body;
     for (PetscInt c = 0; c < dim; c++) {
-      if (loc[c] >= 0) dU[i + c] = turned[c] + more[c];
+      PetscReal sum = 0;
+
+      for (PetscInt d = 0; d < dim && loc[c] >= 0; d++) {
+        if (loc[d] < 0) continue;
+        sum += Q[3 * c + d] * du[loc[d]];
+        if (turns) sum += turn[3 * c + d] * o->u[loc[d]];
+      }
+      if (loc[c] >= 0) dU[i + c] = sum;
     }
   }
 }
