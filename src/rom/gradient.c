@@ -170,10 +170,7 @@ static PetscErrorCode Close(Work *o)
   PetscCall(PetscFree(M));
   /* A singular matrix means forces that can be redistributed: a derivative of one of many distributions would be
      arbitrary. */
-  HycoCheck(
-      regular || most > 0,
-      "no load presses a body here that contact alone holds, so that its position has no derivative; take a point "
-      "at which it carries a load");
+  HycoCheck(regular || most > 0, HYCO_TANGENT_UNPRESSED);
   HycoCheck(regular,
             "the forces of the model's closed contacts are not unique here, or round-off, and have no derivative");
   PetscFunctionReturn(PETSC_SUCCESS);
