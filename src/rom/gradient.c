@@ -16,8 +16,9 @@ typedef struct {
   PetscInt *list;             /* n: the contacts of the problem, once the problem is that of some */
   PetscBool near, held;       /* held: supports hold nodes of the contacts */
   /* the parameter in hand: changes the contacts' rows or gaps; enters the outputs' cells beside displacements, and those of
-     means known by their slopes */
-  PetscBool rows, enters, means;
+     means known by their slopes; moves supports of these */
+  PetscBool rows, enters, means, moved_means;
+  PetscBool disturbed;  /* all cells of the outputs were moved to points beside mu */
   PetscReal *z, *moved; /* p + n */
   PetscReal *dz;        /* p + n: along the parameter in hand */
   PetscReal *w[5];      /* p + n: at the three points, and at closer ones */
@@ -86,7 +87,8 @@ static PetscErrorCode MeasureMoved(Work *o, const PetscReal mu[], const PetscRea
   if (o->means) PetscCall(HycoROMUnfocusOutputs(m));
   HycoFinally(HycoROMMeasureAt(m, o->enters || o->means ? mu : o->mu, output),
               PetscCall(o->means ? HycoROMUnfocusOutputs(m) : PETSC_SUCCESS));
-  if (o->focused && !o->means) HycoROMChangeMeans(m, o->output, step, o->dgamma, o->dU, output);
+  if (o->focused && !o->means)
+    PetscCall(HycoROMChangeMeans(m, o->moved_means ? mu : NULL, o->output, step, o->dgamma, o->dU, output));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -107,7 +109,7 @@ static PetscErrorCode MeasureNear(Work *o, const PetscReal mu[], PetscReal step,
   PetscInt side = 0;
 
   PetscFunctionBegin;
-  if (!o->rows && !o->enters && !o->means) {
+  if (!o->rows && !o->enters && !o->means && !o->moved_means) {
     PetscCall(MeasureMoved(o, o->mu, o->u0, step, output));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
@@ -385,8 +387,9 @@ static void TakeChanges(Work *o, PetscInt p, PetscBool *nodes)
   c = HycoSceneChanges(s, changed);
   *nodes = c.nodes;
   o->rows = (PetscBool)(c.rows || c.gaps || (o->held && HycoSceneSupportsChange(s, NULL, changed, c.nodes)));
-  o->enters = o->means = PETSC_FALSE;
-  if (o->focused && o->near) HycoROMParametersEnter(o->m, changed, &o->enters, &o->means);
+  o->enters = o->means = o->moved_means = PETSC_FALSE;
+  if (o->focused && o->near) HycoROMParametersEnter(o->m, changed, &o->enters, &o->means, &o->moved_means);
+  o->disturbed = (PetscBool)(o->disturbed || o->means || o->moved_means);
 }
 
 /* All columns. First those of parameters that the outputs' cells do not have; last those that move nodes: the way back from
@@ -427,6 +430,8 @@ static PetscErrorCode Restore(Work *o)
   PetscCall(HycoROMComplete(m));
   PetscCall(PetscArraycpy(m->U, o->U, m->model->mesh->n_nodes * m->model->mesh->dim));
   PetscCall(PetscArraycpy(m->Lambda, o->Lambda, m->model->pairs.n));
+  /* Also the fields of the outputs' cells, where all of them were measured beside mu. */
+  if (o->disturbed) PetscCall(HycoROMMeasureAt(m, o->mu, o->output));
   m->solved = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -23,9 +23,11 @@ struct _n_HycoOutputCells {
                                 has modes at others; NULL: not a type with exact displacements beside modes */
   PetscBool *without;       /* n_quantities: means that are not measured here, but known by their slopes; NULL: none */
   PetscReal *slope;         /* n_quantities x (l + n_fe): of these, by gamma and by full-order displacements */
-  PetscReal *reaction;      /* n_dof, of supports; NULL: no quantity needs them */
-  PetscInt *surface_node;   /* by node: its number on fe_surface; -1: in no contact. Allocated with reaction */
-  HycoFE fe_surface;        /* on the model's mesh without its cells; NULL until needed */
+  PetscReal *held,
+      *u0; /* by prescribed displacements of all cells, n_quantities x n_dof there; these at the prediction */
+  PetscReal *reaction;       /* n_dof, of supports; NULL: no quantity needs them */
+  PetscInt *surface_node;    /* by node: its number on fe_surface; -1: in no contact. Allocated with reaction */
+  HycoFE fe_surface;         /* on the model's mesh without its cells; NULL until needed */
   HycoResultants resultants; /* of the reactions that follow from balance; NULL: there are no reactions */
 };
 
@@ -38,8 +40,8 @@ PetscErrorCode HycoOutputCellsDestroy(HycoOutputCells *cells)
   PetscCall(HycoResultantsDestroy(&(*cells)->resultants));
   PetscCall(HycoMeshDestroy(&(*cells)->mesh));
   HycoFreeAll(&(*cells)->V, &(*cells)->u, &(*cells)->sigma, &(*cells)->means, &(*cells)->stressed, &(*cells)->fe_at,
-              &(*cells)->torn, &(*cells)->without, &(*cells)->slope, &(*cells)->reaction, &(*cells)->surface_node,
-              cells);
+              &(*cells)->torn, &(*cells)->without, &(*cells)->slope, &(*cells)->held, &(*cells)->u0,
+              &(*cells)->reaction, &(*cells)->surface_node, cells);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -496,7 +498,8 @@ static PetscBool Enters(HycoROM m, HycoOutputCells p, PetscBool slopes, const Pe
   }
   if (!any) return PETSC_FALSE;
   if (reaction && HycoSceneForcesChange(s, changed)) return PETSC_TRUE;
-  if (HycoSceneSupportsChange(s, cells->mesh, changed, c.nodes) || ((p->fe->joint || p->mesh->ties) && c.nodes))
+  if ((!slopes && HycoSceneSupportsChange(s, cells->mesh, changed, c.nodes)) ||
+      ((p->fe->joint || p->mesh->ties) && c.nodes))
     return PETSC_TRUE;
   for (PetscInt e = 0; e < cells->mesh->n_cells; e++) {
     const PetscInt b = cells->mesh->cell_body[e];
@@ -519,9 +522,16 @@ PetscBool HycoROMOutputsAreForces(HycoROM m)
   return (PetscBool)(!m->output_cells || HycoResultantsSuffice(m, m->output_cells->resultants));
 }
 
-void HycoROMParametersEnter(HycoROM m, const PetscBool changed[], PetscBool *measured, PetscBool *slopes)
+void HycoROMParametersEnter(HycoROM m, const PetscBool changed[], PetscBool *measured, PetscBool *slopes,
+                            PetscBool *held)
 {
+  const HycoScene s = m->model->scene;
   HycoOutputCells p = m->output_cells;
+
+  *held = PETSC_FALSE;
+  for (PetscInt q = 0; p && q < s->n_quantities; q++)
+    *held = (PetscBool)(*held || (p->without[q] && HycoSceneSupportsChange(s, m->few->mesh, changed,
+                                                                           HycoSceneChanges(s, changed).nodes)));
 
   *measured = (PetscBool)(p && Enters(m, p, PETSC_FALSE, changed));
   *slopes = (PetscBool)(p && Enters(m, p, PETSC_TRUE, changed));
@@ -545,41 +555,43 @@ void HycoROMOutputsRead(HycoROM m, PetscBool modes[], PetscBool dofs[])
 }
 
 /* Beside U and gamma no other displacement is in a mean: u is 0 + V gamma, or U. */
-void HycoROMChangeMeans(HycoROM m, const PetscReal from[], PetscReal step, const PetscReal dgamma[],
-                        const PetscReal dU[], PetscReal value[])
+PetscErrorCode HycoROMChangeMeans(HycoROM m, const PetscReal mu[], const PetscReal from[], PetscReal step,
+                                  const PetscReal dgamma[], const PetscReal dU[], PetscReal value[])
 {
   const PetscInt l = m->model->l, n = l + m->model->n_fe;
   HycoOutputCells p = m->output_cells;
+  HycoFE all = m->few->fe;
 
-  for (PetscInt q = 0; p && p->without && q < m->model->scene->n_quantities; q++) {
-    const PetscReal *of = p->slope + q * n;
+  PetscFunctionBegin;
+  if (mu) PetscCall(HycoFESetParameters(all, mu));
+  for (PetscInt q = 0; q < m->model->scene->n_quantities; q++) {
+    const PetscReal *of = p->slope + q * n, *held = p->held + q * all->n_dof;
 
     if (!p->without[q]) continue;
     value[q] = from[q];
     for (PetscInt j = 0; j < l; j++) value[q] += step * of[j] * dgamma[j];
     for (PetscInt i = 0; i < m->model->n_fe; i++) value[q] += step * of[l + i] * dU[m->model->fe_dof[i]];
+    for (PetscInt k = 0; k < all->n_dof && mu; k++) value[q] += held[k] * (all->u0[k] - p->u0[k]);
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* Of quantity q, in the cells of `all`. */
-static PetscErrorCode FindSlope(HycoROM m, HycoOutputCells all, PetscInt q, PetscReal slope[])
+static PetscErrorCode FindSlope(HycoROM m, HycoOutputCells all, PetscInt q, PetscReal slope[], PetscReal by[])
 {
   const PetscInt l = m->model->l;
-  PetscReal *by;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc1(all->fe->n_dof, &by));
   PetscCall(HycoQuantityMeanSlope(all->fe, q, all->u, all->sigma, by));
   PetscCall(PetscArrayzero(slope, l + m->model->n_fe));
   for (PetscInt i = 0; i < m->model->n_fe; i++) {
-    if (all->fe_at[i] < 0) continue;
+    if (all->fe_at[i] < 0 || all->fe->fixed[all->fe_at[i]]) continue;
     slope[l + i] = by[all->fe_at[i]];
     by[all->fe_at[i]] = 0;
   }
   for (PetscInt k = 0; k < all->fe->n_dof; k++) {
     for (PetscInt j = 0; j < l && by[k] != 0; j++) slope[j] += by[k] * all->V[k * l + j];
   }
-  PetscCall(PetscFree(by));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -646,10 +658,13 @@ PetscErrorCode HycoROMFocusOutputs(HycoROM m, const PetscReal value[], PetscBool
   if (!m->few->without) {
     PetscCall(PetscMalloc1(n, &m->few->without));
     PetscCall(PetscMalloc1(n * width + 1, &m->few->slope));
+    PetscCall(PetscMalloc1(n * p->fe->n_dof + 1, &m->few->held));
+    PetscCall(PetscMalloc1(p->fe->n_dof + 1, &m->few->u0));
   }
+  PetscCall(PetscArraycpy(m->few->u0, p->fe->u0, p->fe->n_dof));
   PetscCall(PetscArraycpy(m->few->without, without, n));
   for (PetscInt q = 0; q < n; q++) {
-    if (without[q]) PetscCall(FindSlope(m, p, q, m->few->slope + q * width));
+    if (without[q]) PetscCall(FindSlope(m, p, q, m->few->slope + q * width, m->few->held + q * p->fe->n_dof));
   }
   *focused = PETSC_TRUE;
   PetscCall(HycoROMUnfocusOutputs(m)); /* an exchange, its own inverse */
