@@ -79,10 +79,11 @@ typedef struct _HycoROMOps {
                                          order, of n contacts; rows: theirs change, and are those that the model has at
                                          the time. Keeps the change of the data as that of `point`, 1 to 4 */
   PetscErrorCode (*slope)(HycoROM, PetscInt n, const PetscInt contact[], const PetscReal weight[2],
-                          const PetscInt point[2], const PetscReal dz[], PetscReal dgamma[],
+                          const PetscInt point[2], const PetscReal dz[], const PetscBool modes[],
+                          const PetscBool dofs[], PetscReal dgamma[],
                           PetscReal dU[]); /* with `beside`: the derivatives of the modes' coefficients and of the
                                               full-order displacements, for those of the data (the weighted sum of the
-                                              changes at two points) and of z */
+                                              changes at two points) and of z; modes (l), dofs (of mesh): which of them are wanted */
   PetscErrorCode (*expand)(HycoROM);       /* sets what a solve sets (modes, displacements, forces) from that z */
   PetscErrorCode (*view)(HycoROM, PetscViewer);
   PetscErrorCode (*save)(HycoROM, HycoH5);

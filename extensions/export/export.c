@@ -187,7 +187,7 @@ static PetscErrorCode MeasureOne(HycoFE fe, HycoQuantity q, HycoQuantityKind kin
   q.field = field;
   s->quantity = &q;
   s->n_quantities = 1;
-  HycoFinally(HycoQuantitiesMeasure(PETSC_COMM_SELF, fe, u, sigma, NULL, NULL, value), s->quantity = all;
+  HycoFinally(HycoQuantitiesMeasure(PETSC_COMM_SELF, fe, NULL, u, sigma, NULL, NULL, value), s->quantity = all;
               s->n_quantities = n);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

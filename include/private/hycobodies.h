@@ -336,7 +336,8 @@ PetscErrorCode HycoBodiesJacobian(HycoROM model, PetscInt k, const PetscInt cont
 PetscErrorCode HycoBodiesNear(HycoROM model, const PetscReal mu[], PetscInt n, const PetscInt contact[], PetscBool rows,
                               const PetscReal z[], PetscInt point, PetscReal w[]);
 PetscErrorCode HycoBodiesSlope(HycoROM model, PetscInt n, const PetscInt contact[], const PetscReal weight[2],
-                               const PetscInt point[2], const PetscReal dz[], PetscReal dgamma[], PetscReal dU[]);
+                               const PetscInt point[2], const PetscReal dz[], const PetscBool modes[],
+                               const PetscBool dofs[], PetscReal dgamma[], PetscReal dU[]);
 /* Sets the displacements of the surfaces and, after HycoBodiesExpand(), of the unknowns inside in U (by unknown of the
    surface's mesh) without prescribed ones. */
 void HycoBodiesMove(HycoBodiesWork work, const HycoBodiesSurface *surface, PetscReal U[]);

@@ -168,6 +168,8 @@ HycoChanges HycoSceneChanges(HycoScene scene, const PetscBool changed[]);
 PetscBool HycoSceneLoadsChange(HycoScene scene, const PetscBool changed[]);
 /* Whether they change the map of a body. */
 PetscBool HycoBodyMoves(const HycoBody *body, const PetscBool changed[]);
+/* Whether they change the values or directions of supports with nodes in a mesh (NULL: of any); moved: they move nodes. */
+PetscBool HycoSceneSupportsChange(HycoScene scene, HycoMesh on, const PetscBool changed[], PetscBool moved);
 /* Whether they change F: loads, supports, heat, and what moves or stiffens. */
 PetscBool HycoSceneForcesChange(HycoScene scene, const PetscBool changed[]);
 /* Which parameters (room for n_parameters) affect the stiffness or the contacts' rows. */
@@ -256,6 +258,9 @@ PetscErrorCode HycoFEStress(HycoFE fe, const PetscReal u[], PetscReal sigma[]);
    mean gradients of the cells, 6 nv numbers each, so that those of cells whose nodes do not move are computed once. */
 PetscErrorCode HycoFEStressKept(HycoFE fe, const PetscBool in[], const PetscReal u[], PetscReal **kept,
                                 PetscReal sigma[]);
+/* slope (n_dof) += factor times the derivative of by . sigma of a cell with respect to the displacements. */
+PetscErrorCode HycoFEAddStressSlope(HycoFE fe, PetscInt cell, const PetscReal by[6], PetscReal factor,
+                                    PetscReal slope[]);
 /* The volumes of the cells, of the full circle in an axisymmetric scene. */
 PetscErrorCode HycoFEVolumes(HycoFE fe, PetscReal volume[]);
 /* Adds the nodal forces of body forces to a cell's unknowns (f: nv x dim). */

@@ -150,6 +150,10 @@ PetscErrorCode HycoTangentStates(PetscInt n, const PetscReal L[], const PetscRea
                                  const PetscReal flexibility[], PetscInt state[]);
 /* Whether a contact is closed or undecided, when its flexibility is not known. */
 PetscBool HycoTangentMayTouch(PetscReal L, PetscReal w, PetscReal size);
+/* Why there is no derivative where the matrix is singular and no contact has a force. */
+#define HYCO_TANGENT_UNPRESSED                                                                                         \
+  "no load presses a body here that contact alone holds, so that its position has no derivative; take a point at "     \
+  "which it carries a load"
 /* The derivative with p free unknowns x before the n contacts, M as in HycoLCP (read now). rigid: they are rigid motions,
    without stiffness. *regular: the closed
    contacts determine their forces; otherwise only HycoTangentDestroy() (NULL-safe) may be called. */

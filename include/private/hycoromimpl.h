@@ -281,6 +281,22 @@ PetscErrorCode HycoROMPathGradient(HycoROM model, HycoGradient *gradient);
    quantities are value[], just measured. *focused: they are on cells, not only of contacts. */
 PetscErrorCode HycoROMFocusOutputs(HycoROM model, const PetscReal value[], PetscBool *focused);
 PetscErrorCode HycoROMUnfocusOutputs(HycoROM model);
+/* value[n_quantities] without a history, on cells at mu. */
+PetscErrorCode HycoROMMeasureAt(HycoROM model, const PetscReal mu[], PetscReal value[]);
+/* Of focused outputs, of types with the op `beside`: means over cells, facets or nodes are not measured, but known by their
+   slopes at that prediction. The change of these in value[], from[] at the prediction, along `step` times changes of gamma (l)
+   and of U; mu: where prescribed displacements are, NULL: at the prediction. */
+PetscErrorCode HycoROMChangeMeans(HycoROM model, const PetscReal mu[], const PetscReal from[], PetscReal step,
+                                  const PetscReal dgamma[], const PetscReal dU[], PetscReal value[]);
+/* Marks the modes (l) and full-order displacements (dofs of mesh) on which they depend. */
+void HycoROMOutputsRead(HycoROM model, PetscBool modes[], PetscBool dofs[]);
+/* Whether no output needs displacements: results of contacts, and reactions that follow from balance. */
+PetscBool HycoROMOutputsAreForces(HycoROM model);
+/* Whether, with displacements and forces that do not change, the parameters p with changed[p] change the outputs of focused
+   cells: those that are measured, and those known by slopes; held: they
+   change displacements that supports prescribe to the latter. */
+void HycoROMParametersEnter(HycoROM model, const PetscBool changed[], PetscBool *measured, PetscBool *slopes,
+                            PetscBool *held);
 /* Makes near[] of these n contacts, with the forces of the last prediction. HycoROMExchange(): near[side] takes the place of
    the model's contacts, which it has until the next call: motions of fe do not move what the prediction left. */
 PetscErrorCode HycoROMMakeNear(HycoROM model, PetscInt n, const PetscInt contact[]);

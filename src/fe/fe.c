@@ -1,6 +1,7 @@
 /* HycoFE: the scene on a mesh at one parameter value: nodes moved, supports, materials. */
 #include <hycokinematics.h>
 #include <hycomaterialimpl.h>
+#include <string.h>
 #include "assembly_map.h"
 
 #define RUN 64 /* nodes at which a map is evaluated together */
@@ -28,11 +29,21 @@ PetscErrorCode HycoFEDestroy(HycoFE *fe)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether a mesh, which may be a part, has nodes of a group. */
+static PetscBool HasNodes(HycoMesh m, const char group[])
+{
+  for (PetscInt g = 0; g < m->n_groups; g++) {
+    if (strcmp(m->group_name[g], group) == 0) return (PetscBool)(m->group_start[g + 1] > m->group_start[g]);
+  }
+  return PETSC_TRUE;
+}
+
 /* Whether a change of some parameters changes the supports: a value, or, with moved nodes, one that depends on the
    position. */
-static PetscBool SupportsChange(HycoScene s, const PetscBool changed[], PetscBool moved)
+PetscBool HycoSceneSupportsChange(HycoScene s, HycoMesh on, const PetscBool changed[], PetscBool moved)
 {
   for (PetscInt k = 0; k < s->n_fixed; k++) {
+    if (on && !HasNodes(on, s->fixed[k].group)) continue;
     for (PetscInt c = 0; c < 7; c++) {
       HycoExpr value = c < 3 ? s->fixed[k].value[c] : c < 6 ? s->fixed[k].direction[c - 3] : s->fixed[k].normal;
 
@@ -74,7 +85,7 @@ static PetscErrorCode FindConstant(HycoFE fe)
   /* Before constant cells are counted. */
   HycoSpringsMarkVarying(fe, every);
   for (PetscInt e = 0; e < m->n_cells; e++) fe->n_constant += fe->constant[e];
-  fe->fixed_constant = (PetscBool)!SupportsChange(s, every, any);
+  fe->fixed_constant = (PetscBool)!HycoSceneSupportsChange(s, NULL, every, any);
   PetscCall(PetscFree(moves));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -456,7 +467,7 @@ PetscBool HycoSceneLoadsChange(HycoScene s, const PetscBool changed[])
 PetscBool HycoSceneForcesChange(HycoScene s, const PetscBool changed[])
 {
   const HycoChanges c = HycoSceneChanges(s, changed);
-  PetscBool any = (PetscBool)(c.nodes || c.stiffness || SupportsChange(s, changed, c.nodes));
+  PetscBool any = (PetscBool)(c.nodes || c.stiffness || HycoSceneSupportsChange(s, NULL, changed, c.nodes));
 
   for (PetscInt b = 0; b < s->n_bodies; b++)
     any = (PetscBool)(any || HycoExprChanges(s->body[b].temperature, changed) ||
@@ -495,7 +506,7 @@ PetscErrorCode HycoFESetParameters(HycoFE fe, const PetscReal mu[])
     fe->mu[p] = mu[p];
   }
   c = HycoSceneChanges(fe->scene, changed);
-  supports = (PetscBool)(first || (!fe->fixed_constant && SupportsChange(fe->scene, changed, c.nodes)));
+  supports = (PetscBool)(first || (!fe->fixed_constant && HycoSceneSupportsChange(fe->scene, NULL, changed, c.nodes)));
   fe->stiffness_changed = (PetscBool)(first || c.stiffness);
   fe->contact_changed = (PetscBool)(first || c.rows);
   /* Supports that change move D by B u0. */

@@ -7,8 +7,20 @@
 /* Where forces are added: a vector in the distributed numbering, without fixed unknowns; or all of fe's unknowns. */
 typedef struct {
   Vec vec;
+  PetscReal *own; /* the entries of a vector on one process */
   PetscReal *all; /* n_dof; NULL: the vector */
 } Into;
+
+/* A single entry is a call of several functions in a Vec. */
+static inline PetscErrorCode AddEntry(Into F, PetscInt i, PetscReal value)
+{
+  PetscFunctionBegin;
+  if (F.own)
+    F.own[i] += value;
+  else
+    PetscCall(VecSetValue(F.vec, i, value, ADD_VALUES));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
 
 /* Adds a component of a force at a node to F, in generalised unknowns: a tied node passes it to its masters by the
    weights, an oblique support passes the eliminated component to the free ones (T^T F). */
@@ -33,61 +45,88 @@ static PetscErrorCode AddNode(HycoFE fe, PetscInt node, PetscInt c, PetscReal va
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   /* The force on a fixed unknown goes to the support. */
-  if (!fe->fixed[node * fe->dim + c]) PetscCall(VecSetValue(F.vec, global * fe->dim + c, value, ADD_VALUES));
+  if (!fe->fixed[node * fe->dim + c]) PetscCall(AddEntry(F, global * fe->dim + c, value));
   oblique = HycoFEOblique(fe, node * fe->dim + c);
   for (PetscInt d = 0; oblique && d < fe->dim; d++) {
-    if (!fe->fixed[node * fe->dim + d])
-      PetscCall(VecSetValue(F.vec, global * fe->dim + d, oblique->a[d] * value, ADD_VALUES));
+    if (!fe->fixed[node * fe->dim + d]) PetscCall(AddEntry(F, global * fe->dim + d, oblique->a[d] * value));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Adds the body forces at point q of a cell, of weight w, to its unknowns. w N_a f, f: the body's force per volume plus gravity and
-   centrifugal force, at X(mu). Forces per volume act on the moved body, not per drawn volume. */
-static PetscErrorCode AddPointForce(HycoFE fe, PetscInt cell, PetscInt q, PetscReal w, const HycoAcceleration *motion,
-                                    PetscReal value[])
+/* The body forces of a body at fe's parameters. */
+typedef struct {
+  PetscInt body; /* -1: not set */
+  PetscBool any, uniform;
+  HycoAcceleration motion;
+  PetscReal f[3]; /* uniform: per volume */
+} BodyForce;
+
+/* Force per volume plus gravity and centrifugal force at x. Forces per volume act on the moved body, not per drawn volume. */
+static PetscErrorCode ForceAt(HycoFE fe, const BodyForce *b, const PetscReal x[3], PetscReal f[3])
+{
+  const HycoBody *body = &fe->scene->body[b->body];
+
+  PetscFunctionBegin;
+  PetscCall(HycoInertiaForce(fe, body, &b->motion, x, f));
+  for (PetscInt c = 0; c < fe->dim; c++) {
+    PetscReal own = 0;
+
+    if (body->force[c]) PetscCall(HycoExprEval(body->force[c], fe->mu, 1, x, &own));
+    f[c] += own;
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* That of the cell's body, unless it is there: cells of a body follow each other. */
+static PetscErrorCode SetBodyForce(HycoFE fe, PetscInt cell, BodyForce *b)
+{
+  HycoMesh m = fe->mesh;
+  const HycoBody *body = &fe->scene->body[m->cell_body[cell]];
+
+  PetscFunctionBegin;
+  if (b->body == m->cell_body[cell]) PetscFunctionReturn(PETSC_SUCCESS);
+  b->body = m->cell_body[cell];
+  b->any =
+      (PetscBool)(body->force[0] || body->force[1] || body->force[2] || HycoSceneHasInertia(fe->scene, body, NULL));
+  if (!b->any) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoAccelerationSet(fe, body, &b->motion));
+  b->uniform = (PetscBool)(b->motion.square == 0 && !HycoExprInSpace(body->density));
+  for (PetscInt c = 0; c < 3; c++) b->uniform = (PetscBool)(b->uniform && !HycoExprInSpace(body->force[c]));
+  if (b->uniform) PetscCall(ForceAt(fe, b, fe->X + 3 * m->cells[cell * m->nv], b->f));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Those of one cell (nv x dim, N), the integrals of N_a f at X(mu). */
+static PetscErrorCode IntegrateBodyForce(HycoFE fe, PetscInt cell, const BodyForce *b, PetscReal value[])
 {
   HycoMesh m = fe->mesh;
   const HycoElement *el = HycoElementGet(m->type);
-  const HycoBody *body = &fe->scene->body[m->cell_body[cell]];
-  PetscReal x[3], inertia[3];
+  const PetscReal *weight;
+  PetscReal f[3];
 
   PetscFunctionBegin;
-  HycoPointPlace(fe, el, cell, q, x);
-  PetscCall(HycoInertiaForce(fe, body, motion, x, inertia));
-  for (PetscInt c = 0; c < m->dim; c++) {
-    PetscReal f = 0;
+  PetscCall(HycoPointWeights(fe, el, cell, &weight));
+  PetscCall(PetscArraycpy(f, b->f, 3));
+  for (PetscInt q = 0; q < el->nq; q++) {
+    PetscReal x[3];
 
     /* Expressions cost more than the point's gradients. */
-    if (!body->force[c] && inertia[c] == 0) continue;
-    if (body->force[c]) PetscCall(HycoExprEval(body->force[c], fe->mu, 1, x, &f));
-    f += inertia[c];
-    for (PetscInt a = 0; a < m->nv; a++) value[a * m->dim + c] += w * f * el->N[q][a];
+    if (!b->uniform) HycoPointPlace(fe, el, cell, q, x);
+    if (!b->uniform) PetscCall(ForceAt(fe, b, x, f));
+    for (PetscInt c = 0; c < m->dim; c++) {
+      for (PetscInt a = 0; f[c] != 0 && a < m->nv; a++) value[a * m->dim + c] += weight[q] * f[c] * el->N[q][a];
+    }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether any force acts on the volume of a body. */
-static PetscBool HasBodyForce(HycoFE fe, PetscInt cell)
-{
-  const HycoBody *body = &fe->scene->body[fe->mesh->cell_body[cell]];
-
-  return (PetscBool)(body->force[0] || body->force[1] || body->force[2] || HycoSceneHasInertia(fe->scene, body, NULL));
-}
-
-/* Body forces of one cell (nv x dim, N) without elimination of unknowns, for the parts of a force that depend on
-   parameters. */
 PetscErrorCode HycoFEBodyForce(HycoFE fe, PetscInt cell, PetscReal value[])
 {
-  const PetscReal *weight;
-  HycoAcceleration motion;
+  BodyForce b = {.body = -1};
 
   PetscFunctionBegin;
-  if (!HasBodyForce(fe, cell)) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoAccelerationSet(fe, &fe->scene->body[fe->mesh->cell_body[cell]], &motion));
-  PetscCall(HycoPointWeights(fe, HycoElementGet(fe->mesh->type), cell, &weight));
-  for (PetscInt q = 0; q < HycoElementGet(fe->mesh->type)->nq; q++)
-    PetscCall(AddPointForce(fe, cell, q, weight[q], &motion, value));
+  PetscCall(SetBodyForce(fe, cell, &b));
+  if (b.any) PetscCall(IntegrateBodyForce(fe, cell, &b, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -254,13 +293,12 @@ static PetscErrorCode AddLifting(HycoFE fe, PetscInt cell, Into F)
     /* The row of a fixed unknown is its diagonal alone (K is reduced in the same way), so that the solution there is
        u0. */
     if (fe->fixed[i * m->dim + c]) {
-      PetscCall(VecSetValue(F.vec, global * m->dim + c, Ke[k * n + k] * u0[k], ADD_VALUES));
+      PetscCall(AddEntry(F, global * m->dim + c, Ke[k * n + k] * u0[k]));
     } else {
       PetscReal sum = 0;
 
       for (PetscInt j = 0; j < n; j++) sum += Ke[k * n + j] * u0[j];
-      PetscCall(VecSetValue(F.vec, global * m->dim + c, -sum, ADD_VALUES)); /* T^T K T also has contributions of
-                                                                               other cells */
+      PetscCall(AddEntry(F, global * m->dim + c, -sum)); /* T^T K T also has contributions of other cells */
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -292,22 +330,26 @@ PetscErrorCode HycoCellHeat(HycoFE fe, PetscInt cell, PetscReal push[])
 
 /* Adds body forces and forces of thermal strains of a cell. With a history, thermal strains enter through the laws'
    stresses, not as forces, unless fe->heat_is_load. */
-static PetscErrorCode AddVolume(HycoFE fe, PetscInt cell, Into F)
+static PetscErrorCode AddVolume(HycoFE fe, PetscInt cell, BodyForce *b, Into F)
 {
   const HycoBody *body = &fe->scene->body[fe->mesh->cell_body[cell]];
+  const PetscInt n = fe->mesh->nv * fe->mesh->dim;
   const PetscBool hot =
       (PetscBool)(fe->thermal && !fe->without_cells && (!fe->scene->n_times || fe->heat_is_load) && body->expansion);
-  PetscReal f[HYCO_MAX_CELL_DOFS] = {0}, push[HYCO_MAX_CELL_DOFS] = {0};
+  PetscReal f[HYCO_MAX_CELL_DOFS];
 
   PetscFunctionBegin;
-  if (HasBodyForce(fe, cell)) {
-    PetscCall(HycoFEBodyForce(fe, cell, f));
+  PetscCall(SetBodyForce(fe, cell, b));
+  if (b->any) {
+    PetscCall(PetscArrayzero(f, n));
+    PetscCall(IntegrateBodyForce(fe, cell, b, f));
     PetscCall(AddCell(fe, cell, f, F));
   }
   /* Thermal stress C eps_thermal as nodal forces, of linear scenes. */
   if (hot) {
-    PetscCall(HycoCellHeat(fe, cell, push));
-    PetscCall(AddCell(fe, cell, push, F));
+    PetscCall(PetscArrayzero(f, n));
+    PetscCall(HycoCellHeat(fe, cell, f));
+    PetscCall(AddCell(fe, cell, f, F));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -377,10 +419,11 @@ static PetscErrorCode AddPointLoad(HycoFE fe, const HycoPointLoad *load, Into F)
 static PetscErrorCode AddForces(HycoFE fe, Into F)
 {
   HycoMesh m = fe->mesh;
+  BodyForce b = {.body = -1};
 
   PetscFunctionBegin;
   for (PetscInt e = 0; e < m->n_cells; e++) {
-    PetscCall(AddVolume(fe, e, F));
+    PetscCall(AddVolume(fe, e, &b, F));
     if (fe->lifted && F.vec) PetscCall(AddLifting(fe, e, F));
   }
   for (PetscInt k = 0; k < fe->scene->n_loads; k++) {
@@ -404,13 +447,21 @@ static PetscErrorCode AddForces(HycoFE fe, Into F)
    (distributed, N). Entries of other ranks are dropped, because their owners have the same cells. Collective. */
 PetscErrorCode HycoFEAssembleForce(HycoFE fe, Vec F)
 {
+  Into into = {.vec = F};
+  PetscMPIInt size;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(VecSet(F, 0));
+  PetscCallMPI(MPI_Comm_size(PetscObjectComm((PetscObject)F), &size));
+  if (size == 1) {
+    PetscCall(VecGetArray(F, &into.own));
+    HycoFinally(AddForces(fe, into), PetscCall(VecRestoreArray(F, &into.own)));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   /* Without it ghost entries would be sent, and added to those of the owner. */
   PetscCall(VecSetOption(F, VEC_IGNORE_OFF_PROC_ENTRIES, PETSC_TRUE));
-  ierr = AddForces(fe, (Into){F, NULL});
+  ierr = AddForces(fe, into);
   PetscCall(HycoVecAssemble(F));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -421,7 +472,7 @@ PetscErrorCode HycoFELoads(HycoFE fe, PetscReal f[])
 {
   PetscFunctionBegin;
   PetscCall(PetscArrayzero(f, fe->n_dof));
-  PetscCall(AddForces(fe, (Into){NULL, f}));
+  PetscCall(AddForces(fe, (Into){.all = f}));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

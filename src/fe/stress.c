@@ -138,6 +138,30 @@ PetscErrorCode HycoFEStressKept(HycoFE fe, const PetscBool in[], const PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* B^T C by: the tangents are symmetric. */
+PetscErrorCode HycoFEAddStressSlope(HycoFE fe, PetscInt cell, const PetscReal by[6], PetscReal factor,
+                                    PetscReal slope[])
+{
+  const HycoElement *el = HycoElementGet(fe->mesh->type);
+  const PetscInt size = fe->tangent_size[fe->mesh->cell_body[cell]];
+  PetscReal push[HYCO_MAX_CELL_DOFS] = {0}, volume = 0;
+  Mean mean;
+
+  PetscFunctionBegin;
+  PetscCall(GetMean(fe, el, cell, &mean));
+  for (PetscInt q = 0; q < el->nq; q++) {
+    PetscReal g[HYCO_CELL_NODES][3], s[6] = {0}, w;
+
+    PetscCall(HycoGradients(fe, el, cell, q, g, &w));
+    HycoTangentApply(HycoFEIsIsotropic(fe, cell), fe->dim, fe->tangent + fe->tangent_start[cell] + q * size, by, s);
+    HycoPointForce(fe, el, g, mean.used ? mean.g : NULL, w, s, push);
+    volume += w;
+  }
+  for (PetscInt k = 0; k < el->nv * fe->dim; k++)
+    slope[fe->mesh->cells[cell * el->nv + k / fe->dim] * fe->dim + k % fe->dim] += factor / volume * push[k];
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Integration weights summed by cell (m^3; in 2D per unit thickness; axisymmetric: of the full ring). */
 PetscErrorCode HycoFEVolumes(HycoFE fe, PetscReal volume[])
 {

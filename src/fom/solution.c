@@ -147,7 +147,7 @@ PetscErrorCode HycoFOMMeasureQuantities(HycoFOM f, PetscReal value[])
     PetscCall(PetscMalloc1(f->fe->n_dof, &reaction));
     PetscCall(HycoFOMReactions(f, reaction));
   }
-  PetscCall(HycoQuantitiesMeasure(HycoComm(f), f->fe, f->u, f->sigma, reaction, f->contact_result, value));
+  PetscCall(HycoQuantitiesMeasure(HycoComm(f), f->fe, NULL, f->u, f->sigma, reaction, f->contact_result, value));
   PetscCall(PetscFree(reaction));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -128,7 +128,7 @@ static PetscErrorCode CheckOutputs(HycoFOM whole)
   PetscFunctionBegin;
   if (!fe->scene->n_quantities) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscCalloc3(fe->n_dof, &u, fe->mesh->n_cells * fe->n_sigma, &sigma, fe->n_dof, &reaction));
-  HycoFinally(HycoQuantitiesMeasure(HycoComm(whole), fe, u, sigma, reaction, NULL, value),
+  HycoFinally(HycoQuantitiesMeasure(HycoComm(whole), fe, NULL, u, sigma, reaction, NULL, value),
               PetscCall(PetscFree3(u, sigma, reaction)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

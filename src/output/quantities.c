@@ -15,6 +15,7 @@ enum { U, UX, UY, UZ, XX, YY, ZZ, XY, YZ, XZ, RR, TT, MISES, FIRST };
 
 typedef struct {
   PetscReal most, least, sum, weight;
+  PetscReal *slope; /* n_dof: of the sum with respect to the displacements; NULL: not wanted */
 } Sum;
 
 /* Where a quantity is evaluated: cells (all, or of group g), facets of group g, or its nodes. */
@@ -171,20 +172,18 @@ static PetscErrorCode AwayFromZ(HycoFE fe, PetscInt cell, PetscReal out[2])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Value in a cell; r and t: about z in 2D and 3D, in an axisymmetric scene about its axis. A cell around the z axis has
-   the mean over the directions. */
-static PetscErrorCode OfCell(HycoFE fe, PetscInt field, const PetscReal sigma[], PetscInt cell, PetscReal *value)
+/* The field of a stress s (6: xx, yy, zz, xy, yz, xz); n: the direction from the z axis, for r and t about it in 2D and 3D;
+   in an axisymmetric scene they are about its axis. A cell around the z axis has the mean over the directions. */
+static PetscErrorCode OfStress(HycoFE fe, PetscInt field, const PetscReal s[6], const PetscReal n[2], PetscReal *value)
 {
-  PetscReal s[6] = {0}, n[2], mises, principal[3];
+  PetscReal mises, principal[3];
 
   PetscFunctionBegin;
-  PetscCall(PetscArraycpy(s, sigma + cell * fe->n_sigma, fe->n_sigma)); /* xx, yy, zz, xy, yz, xz */
   if (field >= XX && field <= XZ) *value = s[field - XX];
   /* The axisymmetric components are radial, axial, hoop: nothing has to be turned. */
   if ((field == RR || field == TT) && fe->formulation == HYCO_AXISYMMETRIC) {
     *value = field == RR ? s[0] : s[2];
   } else if (field == RR || field == TT) {
-    PetscCall(AwayFromZ(fe, cell, n));
     /* The mean of both over all directions, since the shear's part cancels. */
     if (n[0] == 0 && n[1] == 0)
       *value = (s[0] + s[1]) / 2;
@@ -200,6 +199,66 @@ static PetscErrorCode OfCell(HycoFE fe, PetscInt field, const PetscReal sigma[],
     *value = principal[field - FIRST];
   }
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The stress of a cell, and what OfStress() needs of its place. */
+static PetscErrorCode TakeStress(HycoFE fe, PetscInt field, const PetscReal sigma[], PetscInt cell, PetscReal s[6],
+                                 PetscReal n[2])
+{
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(s, 6));
+  PetscCall(PetscArraycpy(s, sigma + cell * fe->n_sigma, fe->n_sigma));
+  if ((field == RR || field == TT) && fe->formulation != HYCO_AXISYMMETRIC) PetscCall(AwayFromZ(fe, cell, n));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Value in a cell. */
+static PetscErrorCode OfCell(HycoFE fe, PetscInt field, const PetscReal sigma[], PetscInt cell, PetscReal *value)
+{
+  PetscReal s[6], n[2];
+
+  PetscFunctionBegin;
+  PetscCall(TakeStress(fe, field, sigma, cell, s, n));
+  PetscCall(OfStress(fe, field, s, n, value));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+#define BESIDE 1e-5 /* step of differences by a stress, of its largest component */
+
+/* slope += factor times the derivative of the field in a cell. */
+static PetscErrorCode AddCellSlope(HycoFE fe, PetscInt field, const PetscReal sigma[], PetscInt cell, PetscReal factor,
+                                   PetscReal slope[])
+{
+  PetscReal s[6], n[2], by[6] = {0}, most = 0;
+
+  PetscFunctionBegin;
+  PetscCall(TakeStress(fe, field, sigma, cell, s, n));
+  for (PetscInt k = 0; k < fe->n_sigma; k++) most = PetscMax(most, PetscAbsReal(s[k]));
+  for (PetscInt k = 0; k < fe->n_sigma; k++) {
+    /* Exact of a component; without a stress any step is. */
+    const PetscReal at = s[k], step = most > 0 ? BESIDE * most : 1;
+    PetscReal value[2] = {0, 0};
+
+    for (PetscInt j = 0; j < 2; j++) {
+      s[k] = at + (j ? step : -step);
+      PetscCall(OfStress(fe, field, s, n, &value[j]));
+    }
+    s[k] = at;
+    by[k] = (value[1] - value[0]) / (2 * step);
+  }
+  PetscCall(HycoFEAddStressSlope(fe, cell, by, factor, slope));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The same of OfNode(). */
+static void AddNodeSlope(HycoFE fe, PetscInt field, const PetscReal u[], PetscInt node, PetscReal factor,
+                         PetscReal slope[])
+{
+  const PetscReal length = field == U ? OfNode(fe, U, u, node) : 0;
+
+  if (field != U) slope[node * fe->dim + field - UX] += factor;
+  for (PetscInt c = 0; c < fe->dim && length > 0; c++)
+    slope[node * fe->dim + c] += factor * u[node * fe->dim + c] / length;
 }
 
 #define CLOSE 0.01 /* share of an extreme, within which the field may become it by a small change */
@@ -258,8 +317,8 @@ static PetscErrorCode KeepSupported(HycoFE fe, const HycoQuantity *q, PetscBool 
 /* For derivatives: outputs are measured many times beside mu, and a maximum is decided by cells that are close to
    it. The others cannot become the largest within a small step, so that leaving them out changes nothing. */
 PetscErrorCode HycoQuantitiesMarkDecisive(HycoFE fe, const PetscReal u[], const PetscReal sigma[],
-                                          const PetscReal value[], PetscBool balanced, PetscBool needed[],
-                                          PetscBool stressed[])
+                                          const PetscReal value[], const PetscBool without[], PetscBool balanced,
+                                          PetscBool needed[], PetscBool stressed[])
 {
   const HycoScene scene = fe->scene;
   HycoMesh m = fe->mesh;
@@ -272,6 +331,7 @@ PetscErrorCode HycoQuantitiesMarkDecisive(HycoFE fe, const PetscReal u[], const 
   for (PetscInt k = 0; k < scene->n_quantities; k++) {
     const HycoQuantity *q = &scene->quantity[k];
 
+    if (without[k]) continue;
     PetscCall(HycoQuantityMarkCells(scene, m, k, in));
     /* Only extremes: a mean has no decisive cell, and needs all of its group. */
     if (q->kind < HYCO_QUANTITY_MEAN) PetscCall(KeepClose(fe, q, u, sigma, value[k], in));
@@ -295,14 +355,14 @@ static void Extend(Sum *s, PetscReal value)
 /* Adds a cell or facet with these nodes and the value of the cell (stress), or those of its nodes (NULL); the sums are
    integrals for a mean, which alone needs them, otherwise the weight counts. The owner of its first node adds it,
    so that each counts once over all processes. */
-static PetscErrorCode AddEntity(HycoFE fe, const HycoQuantity *quantity, const PetscReal u[], PetscInt cell,
-                                PetscInt facet, const PetscReal *value, Sum *s)
+static PetscErrorCode AddEntity(HycoFE fe, const HycoQuantity *quantity, const PetscReal u[], const PetscReal sigma[],
+                                PetscInt cell, PetscInt facet, const PetscReal *value, Sum *s)
 {
   HycoMesh m = fe->mesh;
   const HycoElement *el = facet < 0 ? HycoElementGet(m->type) : HycoElementGetFacet(m->type);
   const PetscInt *node = facet < 0 ? m->cells + cell * m->nv : m->facets + facet * m->nf, field = quantity->field;
   const PetscReal *weight = NULL;
-  PetscReal at[HYCO_CELL_NODES];
+  PetscReal at[HYCO_CELL_NODES], of[HYCO_CELL_NODES] = {0}, all = 0;
 
   PetscFunctionBegin;
   if (value) Extend(s, *value);
@@ -325,7 +385,11 @@ static PetscErrorCode AddEntity(HycoFE fe, const HycoQuantity *quantity, const P
     for (PetscInt a = 0; a < el->nv && !value; a++) here += el->N[q][a] * at[a];
     s->sum += w * here;
     s->weight += w;
+    all += w;
+    for (PetscInt a = 0; a < el->nv && s->slope; a++) of[a] += w * el->N[q][a];
   }
+  if (s->slope && value) PetscCall(AddCellSlope(fe, field, sigma, cell, all, s->slope));
+  for (PetscInt a = 0; a < el->nv && s->slope && !value; a++) AddNodeSlope(fe, field, u, node[a], of[a], s->slope);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -346,6 +410,7 @@ static PetscErrorCode AddNodes(HycoFE fe, const HycoQuantity *q, const PetscReal
     if (HycoMeshOwned(m, m->group_node[k]) < 0) continue;
     s->sum += value;
     s->weight += 1;
+    if (s->slope) AddNodeSlope(fe, field, u, m->group_node[k], 1, s->slope);
   }
   if (field < XX) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscCalloc1(m->n_cells, &in));
@@ -356,7 +421,7 @@ static PetscErrorCode AddNodes(HycoFE fe, const HycoQuantity *q, const PetscReal
     if (!in[e]) continue;
     PetscCall(OfCell(fe, field, sigma, e, &value));
     /* Stresses are constant in cells: those around the points stand for the value there. */
-    PetscCall(AddEntity(fe, q, u, e, -1, &value, s));
+    PetscCall(AddEntity(fe, q, u, sigma, e, -1, &value, s));
   }
   PetscCall(PetscFree(in));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -468,7 +533,7 @@ static PetscErrorCode Measure(HycoFE fe, const HycoQuantity *q, const PetscReal 
     /* cell < 0: another process has the facet's cell. */
     if (facet < 0 ? !in[k] : p.dim == m->dim || m->facet_group[facet] != p.group || cell < 0) continue;
     if (q->field >= XX) PetscCall(OfCell(fe, q->field, sigma, cell, &value));
-    PetscCall(AddEntity(fe, q, u, cell, facet, q->field >= XX ? &value : NULL, s));
+    PetscCall(AddEntity(fe, q, u, sigma, cell, facet, q->field >= XX ? &value : NULL, s));
   }
   PetscCall(PetscFree(in));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -480,7 +545,7 @@ static PetscErrorCode MeasureBodies(MPI_Comm comm, HycoFE fe, const HycoQuantity
                                     const PetscReal sigma[], const PetscReal reaction[], PetscReal *value)
 {
   const PetscBool is_reaction = (PetscBool)(q->kind == HYCO_QUANTITY_REACTION);
-  Sum s = {-PETSC_INFINITY, PETSC_INFINITY, 0, 0};
+  Sum s = {.most = -PETSC_INFINITY, .least = PETSC_INFINITY};
   const char *group = q->group ? q->group : "any group";
   PetscReal ends[2], sums[2];
 
@@ -503,14 +568,29 @@ static PetscErrorCode MeasureBodies(MPI_Comm comm, HycoFE fe, const HycoQuantity
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The same cells, facets or nodes as in the mean. */
+PetscErrorCode HycoQuantityMeanSlope(HycoFE fe, PetscInt k, const PetscReal u[], const PetscReal sigma[],
+                                     PetscReal slope[])
+{
+  Sum s = {.most = -PETSC_INFINITY, .least = PETSC_INFINITY, .slope = slope};
+
+  PetscFunctionBegin;
+  PetscCall(PetscArrayzero(slope, fe->n_dof));
+  PetscCall(Measure(fe, &fe->scene->quantity[k], u, sigma, &s));
+  for (PetscInt i = 0; i < fe->n_dof; i++) slope[i] /= s.weight;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* value[n_quantities] is the same on all ranks. */
-PetscErrorCode HycoQuantitiesMeasure(MPI_Comm comm, HycoFE fe, const PetscReal u[], const PetscReal sigma[],
-                                     const PetscReal reaction[], const HycoContactResult contact[], PetscReal value[])
+PetscErrorCode HycoQuantitiesMeasure(MPI_Comm comm, HycoFE fe, const PetscBool without[], const PetscReal u[],
+                                     const PetscReal sigma[], const PetscReal reaction[],
+                                     const HycoContactResult contact[], PetscReal value[])
 {
   const HycoScene scene = fe->scene;
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < scene->n_quantities; k++) {
+    if (without && without[k]) continue;
     /* Contacts' results are already summed over the ranks; those of bodies are summed here. */
     if (scene->quantity[k].kind >= HYCO_QUANTITY_FORCE)
       HycoOnEach(comm, AddContacts(fe, k, contact, &value[k]));

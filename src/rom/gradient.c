@@ -15,20 +15,25 @@ typedef struct {
   PetscInt p, n, k, *contact; /* unknowns x, contacts; those that are closed or undecided */
   PetscInt *list;             /* n: the contacts of the problem, once the problem is that of some */
   PetscBool near, held;       /* held: supports hold nodes of the contacts */
-  PetscBool rows;             /* the parameter in hand moves or changes them, or outputs read more than them */
-  PetscReal *z, *moved;       /* p + n */
-  PetscReal *dz;              /* p + n: along the parameter in hand */
-  PetscReal *w[5];            /* p + n: at the three points, and at closer ones */
-  PetscInt at[5];             /* the number of each among what the type keeps of points beside mu */
-  PetscReal *q, *v;           /* p + k */
+  /* the parameter in hand: changes the contacts' rows or gaps; enters the outputs' cells beside displacements, and those of
+     means known by their slopes; moves supports of these */
+  PetscBool rows, enters, means, moved_means;
+  PetscBool disturbed;  /* all cells of the outputs were moved to points beside mu */
+  PetscReal *z, *moved; /* p + n */
+  PetscReal *dz;        /* p + n: along the parameter in hand */
+  PetscReal *w[5];      /* p + n: at the three points, and at closer ones */
+  PetscInt at[5];       /* the number of each among what the type keeps of points beside mu */
+  PetscReal *q, *v;     /* p + k */
   PetscReal size;
   PetscBool focused;  /* the outputs' cells are few */
   PetscBool contacts; /* outputs read contacts alone, and the forces are those of z */
+  PetscBool forces;   /* of a type with `beside`: outputs need no displacements */
   HycoTangent tangent;
   PetscReal *output; /* 6 x n_outputs: at the three points, at closer ones */
   /* the prediction */
   HycoPrediction prediction;
   PetscReal remainder, *gamma, *U, *Lambda;
+  PetscBool *modes, *dofs;     /* what outputs depend on of gamma and U */
   PetscReal *dgamma, *dU, *u0; /* along the parameter in hand; prescribed displacements at mu */
   PetscBool whole_current;
 } Work;
@@ -64,41 +69,62 @@ static PetscErrorCode MoveAndMeasure(Work *o, const PetscReal mu[], const PetscR
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Sets what outputs read, moved along the derivatives, and measures them. */
-static PetscErrorCode MeasureMoved(Work *o, const PetscReal mu[], PetscReal step, PetscReal output[])
+/* Sets what outputs read, moved along the derivatives, and measures them; u0: the prescribed displacements at mu. */
+static PetscErrorCode MeasureMoved(Work *o, const PetscReal mu[], const PetscReal u0[], PetscReal step,
+                                   PetscReal output[])
 {
   HycoROM m = o->m;
-  HycoPrediction p = {0};
 
   PetscFunctionBegin;
-  if (o->rows) PetscCall(HycoROMBringRows(m, mu));
   for (PetscInt k = 0; k < o->n; k++) m->Lambda[o->rows ? k : o->list[k]] = o->z[o->p + k] + step * o->dz[o->p + k];
-  for (PetscInt j = 0; j < m->model->l && !o->contacts; j++) m->gamma[j] = o->gamma[j] + step * o->dgamma[j];
-  for (PetscInt j = 0; j < m->model->n_fe && !o->contacts; j++) {
+  for (PetscInt j = 0; j < m->model->l && !o->forces; j++) m->gamma[j] = o->gamma[j] + step * o->dgamma[j];
+  for (PetscInt j = 0; j < m->model->n_fe && !o->forces; j++) {
     const PetscInt i = m->model->fe_dof[j];
 
-    m->U[i] = o->U[i] + m->fe->u0[i] - o->u0[i] + step * o->dU[i];
+    m->U[i] = o->U[i] + u0[i] - o->u0[i] + step * o->dU[i];
   }
-  PetscCall(HycoROMMeasureQuantities(m, &p));
-  PetscCall(PetscArraycpy(output, p.quantity, m->model->scene->n_quantities));
+  /* All cells, where a parameter moves those of a mean, or changes their laws. */
+  if (o->means) PetscCall(HycoROMUnfocusOutputs(m));
+  HycoFinally(HycoROMMeasureAt(m, o->enters || o->means ? mu : o->mu, output),
+              PetscCall(o->means ? HycoROMUnfocusOutputs(m) : PETSC_SUCCESS));
+  if (o->focused && !o->means)
+    PetscCall(HycoROMChangeMeans(m, o->moved_means ? mu : NULL, o->output, step, o->dgamma, o->dU, output));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The same with the contacts to one side, which most often are at mu. */
+/* Where the model has the contacts beside. */
+static PetscErrorCode MeasureWithRows(Work *o, const PetscReal mu[], PetscReal step, PetscReal output[])
+{
+  PetscFunctionBegin;
+  PetscCall(HycoROMBringRows(o->m, mu));
+  PetscCall(MeasureMoved(o, mu, o->m->fe->u0, step, output));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The same with what of the contacts and prescribed displacements the parameter changes on one side, where most often it
+   is. */
 static PetscErrorCode MeasureNear(Work *o, const PetscReal mu[], PetscReal step, PetscReal output[])
 {
   PetscBool there;
   PetscInt side = 0;
 
   PetscFunctionBegin;
-  if (!o->rows) {
-    PetscCall(MeasureMoved(o, mu, step, output));
+  if (!o->rows && !o->enters && !o->means && !o->moved_means) {
+    PetscCall(MeasureMoved(o, o->mu, o->u0, step, output));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(PetscArraycmp(o->m->near[1].fe->mu, mu, o->m->model->scene->n_variables, &there));
   if (there) side = 1;
+  if (!o->rows) {
+    HycoNear *near = &o->m->near[side];
+
+    near->rows.filled = PETSC_FALSE; /* its fe moves without them */
+    PetscCall(HycoFESetParameters(near->fe, mu));
+    PetscCall(MeasureMoved(o, mu, near->fe->u0, step, output));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   HycoROMExchange(o->m, side);
-  HycoFinally(MeasureMoved(o, mu, step, output), HycoROMExchange(o->m, side));
+  HycoFinally(MeasureWithRows(o, mu, step, output), HycoROMExchange(o->m, side));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -146,10 +172,7 @@ static PetscErrorCode Close(Work *o)
   PetscCall(PetscFree(M));
   /* A singular matrix means forces that can be redistributed: a derivative of one of many distributions would be
      arbitrary. */
-  HycoCheck(
-      regular || most > 0,
-      "no load presses a body here that contact alone holds, so that its position has no derivative; take a point "
-      "at which it carries a load");
+  HycoCheck(regular || most > 0, HYCO_TANGENT_UNPRESSED);
   HycoCheck(regular,
             "the forces of the model's closed contacts are not unique here, or round-off, and have no derivative");
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -168,6 +191,9 @@ static PetscErrorCode Focus(Work *o)
   PetscFunctionBegin;
   HycoDuplicate(m->fe->n_dof, m->fe->u0, &o->u0);
   PetscCall(PetscCalloc1(m->model->l + 1, &o->dgamma));
+  PetscCall(PetscCalloc1(m->model->l + 1, &o->modes));
+  PetscCall(PetscCalloc1(m->model->mesh->n_nodes * m->model->mesh->dim + 1, &o->dofs));
+  HycoROMOutputsRead(m, o->modes, o->dofs);
   PetscCall(PetscCalloc1(m->fe->n_dof + 1, &o->dU));
   PetscCall(PetscMalloc1(o->n + 1, &o->list));
   for (PetscInt i = 0; i < o->n; i++) o->list[i] = i;
@@ -183,6 +209,7 @@ static PetscErrorCode Focus(Work *o)
   if (!all) o->n = o->k;
   PetscCall(HycoROMMakeNear(m, o->n, o->list));
   o->near = PETSC_TRUE;
+  o->forces = (PetscBool)(o->contacts || HycoROMOutputsAreForces(m));
   o->held = HycoRowsAreHeld(m->fe, &m->near[0].pairs);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -229,7 +256,8 @@ static PetscErrorCode Create(Work *o)
   /* Extremes are measured where they are now: a maximum's place does not move in a derivative, by the envelope
      theorem. */
   PetscCall(HycoROMFocusOutputs(m, o->output, &o->focused));
-  if (o->focused) PetscCall(MoveAndMeasure(o, NULL, o->z, o->output));
+  /* Of a type without `beside` the values of fewer terms, whose round-off is that of the differences. */
+  if (o->focused && !m->ops->beside) PetscCall(MoveAndMeasure(o, NULL, o->z, o->output));
   if (m->ops->beside) PetscCall(Focus(o));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -242,7 +270,7 @@ static PetscErrorCode Destroy(Work *o)
   PetscCall(PetscFree3(o->z, o->moved, o->dz));
   for (PetscInt j = 0; j < 5; j++) PetscCall(PetscFree(o->w[j]));
   PetscCall(PetscFree3(o->contact, o->q, o->v));
-  HycoFreeAll(&o->output, &o->gamma, &o->U, &o->Lambda, &o->list, &o->dgamma, &o->dU, &o->u0);
+  HycoFreeAll(&o->output, &o->gamma, &o->U, &o->Lambda, &o->list, &o->modes, &o->dofs, &o->dgamma, &o->dU, &o->u0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -342,35 +370,42 @@ static PetscErrorCode Differentiate(Work *o, HycoDifference *d, PetscBool *kink)
   *kink = (PetscBool)(*kink || turns);
   for (PetscInt i = 0; i < o->p + o->k; i++) o->dz[i < o->p ? i : o->p + o->contact[i - o->p]] = o->v[i];
   /* Displacements, unless outputs need forces alone. */
-  if (o->near && !o->contacts)
-    PetscCall((*o->m->ops->slope)(o->m, o->n, o->list, d->weight + 1, o->at + 1, o->dz, o->dgamma, o->dU));
+  if (o->near && !o->forces)
+    PetscCall(
+        (*o->m->ops->slope)(o->m, o->n, o->list, d->weight + 1, o->at + 1, o->dz, o->modes, o->dofs, o->dgamma, o->dU));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* What a parameter changes. */
-static HycoChanges Changes(HycoScene s, PetscInt p)
+/* What a parameter changes: sets rows, enters, means. *nodes: it moves nodes. */
+static void TakeChanges(Work *o, PetscInt p, PetscBool *nodes)
 {
+  const HycoScene s = o->m->model->scene;
   PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE};
+  HycoChanges c;
 
   changed[p] = PETSC_TRUE;
-  return HycoSceneChanges(s, changed);
+  c = HycoSceneChanges(s, changed);
+  *nodes = c.nodes;
+  o->rows = (PetscBool)(c.rows || c.gaps || (o->held && HycoSceneSupportsChange(s, NULL, changed, c.nodes)));
+  o->enters = o->means = o->moved_means = PETSC_FALSE;
+  if (o->focused && o->near) HycoROMParametersEnter(o->m, changed, &o->enters, &o->means, &o->moved_means);
+  o->disturbed = (PetscBool)(o->disturbed || o->means || o->moved_means);
 }
 
-/* All columns. Those of parameters that move nodes last: the way back from one's points is a part of the way to the next
-   one's. */
+/* All columns. First those of parameters that the outputs' cells do not have; last those that move nodes: the way back from
+   one's points is a part of the way to the next one's. */
 static PetscErrorCode Columns(Work *o, HycoGradient *gradient)
 {
   HycoROM m = o->m;
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < 2 * gradient->n_parameters; k++) {
+  for (PetscInt k = 0; k < 3 * gradient->n_parameters; k++) {
     const PetscInt p = k % gradient->n_parameters;
-    const HycoChanges c = Changes(m->model->scene, p);
     HycoDifference d;
-    PetscBool kink;
+    PetscBool kink, nodes;
 
-    if (c.nodes != (k >= gradient->n_parameters)) continue;
-    o->rows = (PetscBool)(!o->contacts || o->held || c.rows || c.gaps);
+    TakeChanges(o, p, &nodes);
+    if ((nodes ? 2 : o->enters || o->means) != k / gradient->n_parameters) continue;
     HycoDifferenceSet(m->model->scene, o->mu, p, HYCO_GRADIENT_STEP, &d);
     PetscCall(Differentiate(o, &d, &kink));
     PetscCall(HycoGradientColumn(gradient, &m->gradient, m->model->scene, o->mu, &d, kink, Measure, o, o->output));
@@ -395,6 +430,8 @@ static PetscErrorCode Restore(Work *o)
   PetscCall(HycoROMComplete(m));
   PetscCall(PetscArraycpy(m->U, o->U, m->model->mesh->n_nodes * m->model->mesh->dim));
   PetscCall(PetscArraycpy(m->Lambda, o->Lambda, m->model->pairs.n));
+  /* Also the fields of the outputs' cells, where all of them were measured beside mu. */
+  if (o->disturbed) PetscCall(HycoROMMeasureAt(m, o->mu, o->output));
   m->solved = PETSC_TRUE;
   PetscFunctionReturn(PETSC_SUCCESS);
 }

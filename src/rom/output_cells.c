@@ -4,6 +4,7 @@
 */
 #include <hycofields.h>
 #include <hycoinelastic.h>
+#include <hycomaterialimpl.h>
 #include <hycopath.h>
 #include <hycoquantities.h>
 #include <hycoromimpl.h>
@@ -20,9 +21,13 @@ struct _n_HycoOutputCells {
   PetscInt *fe_at;          /* by full-order displacement: its index in u; -1: none */
   PetscBool *torn;          /* by node of the model's mesh: its displacement is exact, and a cell whose stress is needed
                                 has modes at others; NULL: not a type with exact displacements beside modes */
-  PetscReal *reaction;      /* n_dof, of supports; NULL: no quantity needs them */
-  PetscInt *surface_node;   /* by node: its number on fe_surface; -1: in no contact. Allocated with reaction */
-  HycoFE fe_surface;        /* on the model's mesh without its cells; NULL until needed */
+  PetscBool *without;       /* n_quantities: means that are not measured here, but known by their slopes; NULL: none */
+  PetscReal *slope;         /* n_quantities x (l + n_fe): of these, by gamma and by full-order displacements */
+  PetscReal *held,
+      *u0; /* by prescribed displacements of all cells, n_quantities x n_dof there; these at the prediction */
+  PetscReal *reaction;       /* n_dof, of supports; NULL: no quantity needs them */
+  PetscInt *surface_node;    /* by node: its number on fe_surface; -1: in no contact. Allocated with reaction */
+  HycoFE fe_surface;         /* on the model's mesh without its cells; NULL until needed */
   HycoResultants resultants; /* of the reactions that follow from balance; NULL: there are no reactions */
 };
 
@@ -35,7 +40,8 @@ PetscErrorCode HycoOutputCellsDestroy(HycoOutputCells *cells)
   PetscCall(HycoResultantsDestroy(&(*cells)->resultants));
   PetscCall(HycoMeshDestroy(&(*cells)->mesh));
   HycoFreeAll(&(*cells)->V, &(*cells)->u, &(*cells)->sigma, &(*cells)->means, &(*cells)->stressed, &(*cells)->fe_at,
-              &(*cells)->torn, &(*cells)->reaction, &(*cells)->surface_node, cells);
+              &(*cells)->torn, &(*cells)->without, &(*cells)->slope, &(*cells)->held, &(*cells)->u0,
+              &(*cells)->reaction, &(*cells)->surface_node, cells);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -237,8 +243,8 @@ static PetscErrorCode Measure(HycoROM m, HycoOutputCells p, const PetscReal Lamb
 
   PetscFunctionBegin;
   if (HycoSceneHasContactOutputs(m->model->scene)) PetscCall(HycoROMSumContacts(m, Lambda, &contact));
-  PetscCall(HycoQuantitiesMeasure(PETSC_COMM_SELF, p ? p->fe : m->fe, p ? p->u : NULL, p ? p->sigma : NULL,
-                                  p ? p->reaction : NULL, contact, value));
+  PetscCall(HycoQuantitiesMeasure(PETSC_COMM_SELF, p ? p->fe : m->fe, p ? p->without : NULL, p ? p->u : NULL,
+                                  p ? p->sigma : NULL, p ? p->reaction : NULL, contact, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -289,15 +295,15 @@ static void CollectPath(HycoROM m, HycoPrediction *out)
   HycoPathExtremes(m->model->scene, trace->n_listed, trace->step, out->path_quantity);
 }
 
-/* Sets p->u and p->sigma for a prediction without a history. */
-static PetscErrorCode Follow(HycoROM m, HycoOutputCells p)
+/* Sets p->u and p->sigma for a prediction without a history, on the cells at mu. */
+static PetscErrorCode Follow(HycoROM m, HycoOutputCells p, const PetscReal mu[])
 {
   PetscReal *U_fe;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(m->model->n_fe, &U_fe));
   for (PetscInt k = 0; k < m->model->n_fe; k++) U_fe[k] = m->U[m->model->fe_dof[k]];
-  PetscCall(HycoFESetParameters(p->fe, m->fe->mu));
+  PetscCall(HycoFESetParameters(p->fe, mu));
   Displace(m, p, m->gamma, U_fe);
   PetscCall(PetscFree(U_fe));
   /* Gradients are kept while no parameter moves the nodes; where stresses vary within cells, of each point of few cells. */
@@ -393,9 +399,17 @@ PetscErrorCode HycoROMMeasureQuantities(HycoROM m, HycoPrediction *out)
     CollectPath(m, out);
     PetscFunctionReturn(PETSC_SUCCESS);
   }
+  PetscCall(HycoROMMeasureAt(m, m->fe->mu, out->quantity));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Contacts are where they are: a parameter that does not move them may enter the cells alone. */
+PetscErrorCode HycoROMMeasureAt(HycoROM m, const PetscReal mu[], PetscReal value[])
+{
+  PetscFunctionBegin;
   PetscCall(Make(m));
-  if (m->output_cells) PetscCall(Follow(m, m->output_cells));
-  PetscCall(MeasurePredicted(m, m->output_cells, m->Lambda, out->quantity));
+  if (m->output_cells) PetscCall(Follow(m, m->output_cells, mu));
+  PetscCall(MeasurePredicted(m, m->output_cells, m->Lambda, value));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -461,6 +475,127 @@ static PetscErrorCode MakeFew(HycoROM m, HycoOutputCells all, PetscInt n, const 
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Whether a law, an expansion or a temperature of a body changes. */
+static PetscBool StressChanges(const HycoBody *b, const PetscBool changed[])
+{
+  return (PetscBool)(HycoMaterialChanges(b->law, changed) || HycoExprChanges(b->temperature, changed) ||
+                     HycoExprChanges(b->reference, changed) || HycoExprChanges(b->expansion, changed));
+}
+
+/* Of the quantities that are measured in p (slopes: of the others). Reactions have loads, and the supports' springs. */
+static PetscBool Enters(HycoROM m, HycoOutputCells p, PetscBool slopes, const PetscBool changed[])
+{
+  const HycoScene s = m->model->scene;
+  const HycoOutputCells cells = slopes ? m->few : p;
+  const HycoChanges c = HycoSceneChanges(s, changed);
+  PetscBool any = PETSC_FALSE, stress = PETSC_FALSE, reaction = PETSC_FALSE;
+  PetscInt last = -1;
+
+  for (PetscInt q = 0; q < s->n_quantities; q++) {
+    if (p->without[q] != slopes || s->quantity[q].kind >= HYCO_QUANTITY_FORCE) continue;
+    any = PETSC_TRUE;
+    stress = (PetscBool)(stress || HycoQuantityOfStress(&s->quantity[q]));
+    reaction = (PetscBool)(reaction || s->quantity[q].kind == HYCO_QUANTITY_REACTION);
+  }
+  if (!any) return PETSC_FALSE;
+  if (reaction && HycoSceneForcesChange(s, changed)) return PETSC_TRUE;
+  if ((!slopes && HycoSceneSupportsChange(s, cells->mesh, changed, c.nodes)) ||
+      ((p->fe->joint || p->mesh->ties) && c.nodes))
+    return PETSC_TRUE;
+  for (PetscInt e = 0; e < cells->mesh->n_cells; e++) {
+    const PetscInt b = cells->mesh->cell_body[e];
+
+    /* Cells of a body follow each other. */
+    if (b == last) continue;
+    last = b;
+    if (HycoBodyMoves(&s->body[b], changed) || (stress && StressChanges(&s->body[b], changed))) return PETSC_TRUE;
+  }
+  return PETSC_FALSE;
+}
+
+PetscBool HycoROMOutputsAreForces(HycoROM m)
+{
+  const HycoScene s = m->model->scene;
+
+  for (PetscInt q = 0; q < s->n_quantities; q++) {
+    if (s->quantity[q].kind < HYCO_QUANTITY_REACTION) return PETSC_FALSE;
+  }
+  return (PetscBool)(!m->output_cells || HycoResultantsSuffice(m, m->output_cells->resultants));
+}
+
+void HycoROMParametersEnter(HycoROM m, const PetscBool changed[], PetscBool *measured, PetscBool *slopes,
+                            PetscBool *held)
+{
+  const HycoScene s = m->model->scene;
+  HycoOutputCells p = m->output_cells;
+
+  *held = PETSC_FALSE;
+  for (PetscInt q = 0; p && q < s->n_quantities; q++)
+    *held = (PetscBool)(*held || (p->without[q] && HycoSceneSupportsChange(s, m->few->mesh, changed,
+                                                                           HycoSceneChanges(s, changed).nodes)));
+
+  *measured = (PetscBool)(p && Enters(m, p, PETSC_FALSE, changed));
+  *slopes = (PetscBool)(p && Enters(m, p, PETSC_TRUE, changed));
+}
+
+/* Other coefficients are 0 times what cells have of their modes. */
+void HycoROMOutputsRead(HycoROM m, PetscBool modes[], PetscBool dofs[])
+{
+  const PetscInt l = m->model->l, n = l + m->model->n_fe;
+  HycoOutputCells p = m->output_cells;
+
+  for (PetscInt k = 0; p && k < p->fe->n_dof * l; k++) modes[k % l] = (PetscBool)(modes[k % l] || p->V[k] != 0);
+  for (PetscInt i = 0; p && i < m->model->n_fe; i++) dofs[m->model->fe_dof[i]] = (PetscBool)(p->fe_at[i] >= 0);
+  for (PetscInt q = 0; p && q < m->model->scene->n_quantities; q++) {
+    for (PetscInt j = 0; p->without[q] && j < n; j++) {
+      PetscBool *of = j < l ? &modes[j] : &dofs[m->model->fe_dof[j - l]];
+
+      if (p->slope[q * n + j] != 0) *of = PETSC_TRUE;
+    }
+  }
+}
+
+/* Beside U and gamma no other displacement is in a mean: u is 0 + V gamma, or U. */
+PetscErrorCode HycoROMChangeMeans(HycoROM m, const PetscReal mu[], const PetscReal from[], PetscReal step,
+                                  const PetscReal dgamma[], const PetscReal dU[], PetscReal value[])
+{
+  const PetscInt l = m->model->l, n = l + m->model->n_fe;
+  HycoOutputCells p = m->output_cells;
+  HycoFE all = m->few->fe;
+
+  PetscFunctionBegin;
+  if (mu) PetscCall(HycoFESetParameters(all, mu));
+  for (PetscInt q = 0; q < m->model->scene->n_quantities; q++) {
+    const PetscReal *of = p->slope + q * n, *held = p->held + q * all->n_dof;
+
+    if (!p->without[q]) continue;
+    value[q] = from[q];
+    for (PetscInt j = 0; j < l; j++) value[q] += step * of[j] * dgamma[j];
+    for (PetscInt i = 0; i < m->model->n_fe; i++) value[q] += step * of[l + i] * dU[m->model->fe_dof[i]];
+    for (PetscInt k = 0; k < all->n_dof && mu; k++) value[q] += held[k] * (all->u0[k] - p->u0[k]);
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Of quantity q, in the cells of `all`. */
+static PetscErrorCode FindSlope(HycoROM m, HycoOutputCells all, PetscInt q, PetscReal slope[], PetscReal by[])
+{
+  const PetscInt l = m->model->l;
+
+  PetscFunctionBegin;
+  PetscCall(HycoQuantityMeanSlope(all->fe, q, all->u, all->sigma, by));
+  PetscCall(PetscArrayzero(slope, l + m->model->n_fe));
+  for (PetscInt i = 0; i < m->model->n_fe; i++) {
+    if (all->fe_at[i] < 0 || all->fe->fixed[all->fe_at[i]]) continue;
+    slope[l + i] = by[all->fe_at[i]];
+    by[all->fe_at[i]] = 0;
+  }
+  for (PetscInt k = 0; k < all->fe->n_dof; k++) {
+    for (PetscInt j = 0; j < l && by[k] != 0; j++) slope[j] += by[k] * all->V[k * l + j];
+  }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Exchanges the two sets of cells; what balances the bodies belongs to neither, and moves along. */
 PetscErrorCode HycoROMUnfocusOutputs(HycoROM m)
 {
@@ -475,29 +610,65 @@ PetscErrorCode HycoROMUnfocusOutputs(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Makes the cells that decide the outputs at this prediction the ones that are measured, until
-   HycoROMUnfocusOutputs(): gradients measure twice for each parameter. */
-PetscErrorCode HycoROMFocusOutputs(HycoROM m, const PetscReal value[], PetscBool *focused)
+/* Which quantities are known by their slopes: means. Tied and oblique unknowns follow from others, to which the slopes of
+   their own would have to be added. */
+static void ChooseSlopes(HycoROM m, HycoOutputCells p, PetscBool without[])
 {
-  HycoOutputCells p = m->output_cells;
+  const HycoScene s = m->model->scene;
+  const PetscBool plain = (PetscBool)(!p->fe->n_oblique && !p->mesh->ties && !m->model->mesh->ties);
+
+  for (PetscInt q = 0; q < s->n_quantities; q++)
+    without[q] = (PetscBool)(plain && m->ops->beside && s->quantity[q].kind == HYCO_QUANTITY_MEAN);
+}
+
+/* The cells that decide the quantities in p, into m->few. */
+static PetscErrorCode FindFew(HycoROM m, HycoOutputCells p, const PetscReal value[], const PetscBool without[])
+{
   PetscInt *keep, n;
   PetscBool *needed, *stressed;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  *focused = PETSC_FALSE;
-  if (!p) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc3(p->mesh->n_cells, &needed, p->mesh->n_cells, &stressed, p->mesh->n_cells, &keep));
-  ierr = HycoQuantitiesMarkDecisive(p->fe, p->u, p->sigma, value, HycoResultantsSuffice(m, p->resultants), needed,
-                                    stressed);
+  ierr = HycoQuantitiesMarkDecisive(p->fe, p->u, p->sigma, value, without, HycoResultantsSuffice(m, p->resultants),
+                                    needed, stressed);
   if (!ierr) ierr = List(p->mesh->n_cells, needed, &n, keep);
+  /* A mesh has a cell. */
+  if (!ierr && !n) keep[n++] = 0;
   if (!ierr) ierr = MakeFew(m, p, n, keep, stressed);
-  *focused = (PetscBool)!ierr;
   if (ierr) PetscCall(HycoOutputCellsDestroy(&m->few));
   /* Before the error: MakeFew() may have failed after the marks. */
   PetscCall(PetscFree3(needed, stressed, keep));
   PetscCall(ierr);
-  if (*focused) PetscCall(HycoROMUnfocusOutputs(m)); /* an exchange, its own inverse */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Makes the cells that decide the outputs at this prediction the ones that are measured, until
+   HycoROMUnfocusOutputs(): gradients measure twice for each parameter. */
+PetscErrorCode HycoROMFocusOutputs(HycoROM m, const PetscReal value[], PetscBool *focused)
+{
+  const PetscInt n = m->model->scene->n_quantities, width = m->model->l + m->model->n_fe;
+  HycoOutputCells p = m->output_cells;
+  PetscBool without[HYCO_MAX_QUANTITIES];
+
+  PetscFunctionBegin;
+  *focused = PETSC_FALSE;
+  if (!p) PetscFunctionReturn(PETSC_SUCCESS);
+  ChooseSlopes(m, p, without);
+  PetscCall(FindFew(m, p, value, without));
+  if (!m->few->without) {
+    PetscCall(PetscMalloc1(n, &m->few->without));
+    PetscCall(PetscMalloc1(n * width + 1, &m->few->slope));
+    PetscCall(PetscMalloc1(n * p->fe->n_dof + 1, &m->few->held));
+    PetscCall(PetscMalloc1(p->fe->n_dof + 1, &m->few->u0));
+  }
+  PetscCall(PetscArraycpy(m->few->u0, p->fe->u0, p->fe->n_dof));
+  PetscCall(PetscArraycpy(m->few->without, without, n));
+  for (PetscInt q = 0; q < n; q++) {
+    if (without[q]) PetscCall(FindSlope(m, p, q, m->few->slope + q * width, m->few->held + q * p->fe->n_dof));
+  }
+  *focused = PETSC_TRUE;
+  PetscCall(HycoROMUnfocusOutputs(m)); /* an exchange, its own inverse */
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

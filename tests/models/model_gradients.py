@@ -8,7 +8,8 @@ import gradients
 from common import PELLET, SOURCE
 
 HERTZ = ('-scene', os.path.join(SOURCE, 'examples', 'hertz'), '-output_push_force', 'y', '-output_push_contact', 'line', '-output_peak_max', 'mises',
-         '-output_peak_group', 'lower', '-output_sink_mean', 'u_y')
+         '-output_peak_group', 'lower', '-output_sink_mean', 'u_y', '-output_hard_mean', 'mises', '-output_hard_group', 'lower', '-output_most_mean', 'principal_1',
+         '-output_away_mean', 'u', '-output_away_group', 'lower')
 RANGES = {'place': (-5, 5), 'press': (0.2, 1), 'modulus': (5, 20), 'load': (0, 1), 'entry': (0, 0.2)}
 
 
@@ -78,7 +79,7 @@ class ModelGradients(gradients.Gradients):
         self.agrees(predict, [2.1, 230.0, 0.2], {'soft': (1, 4), 'press': (50, 400), 'tip': (-0.5, 0.5)})
 
     def test_shape(self):
-        """A body whose shape and ratio of moduli change, between the samples of its flexibility."""
+        """A body whose shape and ratio of moduli change, between the samples of its flexibility; means of stresses and of lengths."""
         predict = self.model('bodies', HERTZ, '-scatter', '3')
         self.agrees(predict, [0.061, 0.9, 9.7], {'press': (0.02, 0.1), 'stiffness': (0.5, 2), 'radius': (8, 12.5)})
 

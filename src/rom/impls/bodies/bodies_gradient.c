@@ -309,30 +309,58 @@ static PetscErrorCode ExpandSlope(HycoBodiesWork o, PetscInt k, const Parts *cha
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* As HycoBodiesMove(): U' = Q u' + Q' u at the nodes with a place; prescribed displacements are the caller's. */
-static void MoveSlope(HycoBodiesWork o, const Parts *change, const PetscReal du[], PetscReal dU[])
+/* As HycoBodiesMove(): U' = Q u' + Q' u at the nodes with a place, where dofs are wanted; prescribed displacements are the
+   caller's. */
+static void MoveSlope(HycoBodiesWork o, const Parts *change, const PetscReal du[], const PetscBool dofs[],
+                      PetscReal dU[])
 {
   const PetscInt dim = o->bodies->dim;
+  PetscInt last = -1;
+  PetscBool turns = PETSC_FALSE;
 
   for (PetscInt k = 0; k < o->n_placed; k++) {
     const PetscInt i = o->placed[k] * dim, *loc = o->loc + i, body = o->placed_in[k];
-    PetscReal own[3] = {0, 0, 0}, slope[3] = {0, 0, 0}, turned[3], more[3];
+    const PetscReal *Q = o->pose[body].Q, *turn = change->turn + 9 * body;
+    PetscBool any = PETSC_FALSE;
 
+    for (PetscInt c = 0; c < dim; c++) any = (PetscBool)(any || dofs[i + c]);
+    if (!any) continue;
+    /* Nodes of a body follow each other. */
+    if (body != last) turns = AnyOf(9, turn);
+    last = body;
     for (PetscInt c = 0; c < dim; c++) {
-      own[c] = loc[c] < 0 ? 0 : o->u[loc[c]];
-      slope[c] = loc[c] < 0 ? 0 : du[loc[c]];
+      PetscReal sum = 0;
+
+      for (PetscInt d = 0; d < dim && loc[c] >= 0; d++) {
+        if (loc[d] < 0) continue;
+        sum += Q[3 * c + d] * du[loc[d]];
+        if (turns) sum += turn[3 * c + d] * o->u[loc[d]];
+      }
+      if (loc[c] >= 0) dU[i + c] = sum;
     }
-    HycoPoseTurn(o->pose[body].Q, dim, PETSC_FALSE, slope, turned);
-    HycoPoseTurn(change->turn + 9 * body, dim, PETSC_FALSE, own, more);
-    for (PetscInt c = 0; c < dim; c++) {
-      if (loc[c] >= 0) dU[i + c] = turned[c] + more[c];
+  }
+}
+
+/* wanted[]: by body, whether a mode is, or a displacement. */
+static void FindWanted(HycoBodiesWork o, const PetscBool modes[], const PetscBool dofs[], PetscBool wanted[])
+{
+  const HycoSubstructures b = o->bodies;
+
+  for (PetscInt k = 0; k < b->n; k++) {
+    wanted[k] = PETSC_FALSE;
+    for (PetscInt j = b->mode_start[k]; j < b->mode_start[k + 1]; j++) wanted[k] = (PetscBool)(wanted[k] || modes[j]);
+  }
+  for (PetscInt i = 0; i < o->n_placed; i++) {
+    for (PetscInt c = 0; c < b->dim; c++) {
+      if (dofs[o->placed[i] * b->dim + c]) wanted[o->placed_in[i]] = PETSC_TRUE;
     }
   }
 }
 
 /* The change of the data is that of the weighted points, that of the forces has their change too. */
 PetscErrorCode HycoBodiesSlope(HycoROM m, PetscInt n, const PetscInt contact[], const PetscReal weight[2],
-                               const PetscInt point[2], const PetscReal dz[], PetscReal dgamma[], PetscReal dU[])
+                               const PetscInt point[2], const PetscReal dz[], const PetscBool modes[],
+                               const PetscBool dofs[], PetscReal dgamma[], PetscReal dU[])
 {
   HycoBodiesWork o = (HycoBodiesWork)m->work;
   const HycoSubstructures b = o->bodies;
@@ -340,6 +368,7 @@ PetscErrorCode HycoBodiesSlope(HycoROM m, PetscInt n, const PetscInt contact[], 
   PetscReal *sum = s->change[0], *du = s->du, *f = sum + s->size - b->ns;
   const Parts change = PartsOf(o, sum);
   const PetscReal *of = change.weight;
+  PetscBool *wanted;
 
   PetscFunctionBegin;
   for (PetscInt i = 0; i < s->size; i++)
@@ -352,8 +381,12 @@ PetscErrorCode HycoBodiesSlope(HycoROM m, PetscInt n, const PetscInt contact[], 
   PetscCall(AddDisplacements(o, &change, du));
   AddRowProducts(b->ns, b->p, o->Z, dz, 1, du);
   PetscCall(PetscArrayzero(dgamma, b->l));
-  for (PetscInt k = 0; k < b->n; of += b->body[k++].n_samples)
-    PetscCall(ExpandSlope(o, k, &change, of, dz, dgamma, du + b->ns));
-  MoveSlope(o, &change, du, dU);
+  PetscCall(PetscMalloc1(b->n, &wanted));
+  FindWanted(o, modes, dofs, wanted);
+  for (PetscInt k = 0; k < b->n; of += b->body[k++].n_samples) {
+    if (wanted[k]) PetscCall(ExpandSlope(o, k, &change, of, dz, dgamma, du + b->ns));
+  }
+  PetscCall(PetscFree(wanted));
+  MoveSlope(o, &change, du, dofs, dU);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -52,10 +52,7 @@ static PetscErrorCode Close(HycoSolverTangent t, Vec x, Vec L)
   PetscCall(HycoTangentCreate(t->p, PETSC_TRUE, t->m, S, state, &t->tangent, &regular));
   PetscCall(PetscFree4(force, gap, flexibility, state));
   PetscCall(VecNorm(L, NORM_INFINITY, &most));
-  PetscCheck(
-      regular || most > 0, HycoComm(t->s), PETSC_ERR_USER,
-      "no load presses a body here that contact alone holds, so that its position has no derivative; take a point "
-      "at which it carries a load");
+  PetscCheck(regular || most > 0, HycoComm(t->s), PETSC_ERR_USER, HYCO_TANGENT_UNPRESSED);
   PetscCheck(
       regular, HycoComm(t->s), PETSC_ERR_USER,
       "the forces of the closed contacts are not unique here, or round-off, and have no derivative; remove contacts "
