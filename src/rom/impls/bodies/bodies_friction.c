@@ -202,7 +202,8 @@ PetscErrorCode HycoBodiesFrictionPrepare(HycoBodiesFriction f, HycoBodiesWork o,
 /* w = D - B U of the displacements found, and the residuals of the natural map at it. */
 static PetscErrorCode Measure(HycoBodiesFriction f, HycoBodiesWork o, const PetscReal L[], HycoKKT *kkt)
 {
-  PetscReal size = 0, force = 0;
+  /* Below it gaps are round-off of the coordinates. */
+  PetscReal size = 16 * PETSC_MACHINE_EPSILON / SOLVED * HycoMeshLength(f->normal.fe->mesh), force = 0;
   HycoNaturalMap map;
 
   PetscFunctionBegin;
