@@ -48,7 +48,8 @@ PetscErrorCode HycoSnapshotsChooseGroups(MPI_Comm comm, HycoScene scene, PetscIn
   HycoCheck(*groups <= size, "-hyco_groups is %d on %d ranks; it can be at most the number of ranks", (int)*groups,
             (int)size);
   if (*groups) PetscFunctionReturn(PETSC_SUCCESS);
-  *groups = PetscMax(1, PetscMin((PetscInt)size, n));
+  /* A DM of the program lives on all ranks. */
+  *groups = scene->dm ? 1 : PetscMax(1, PetscMin((PetscInt)size, n));
   if (stat(scene->mesh_path, &info) == 0) {
     /* An estimate from the mesh file's size, eightfold with each refinement: a group takes about 400 times the
        file. All groups may take half of the memory. */

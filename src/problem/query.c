@@ -137,6 +137,7 @@ static PetscErrorCode HashFile(HycoScene scene, unsigned long long *hash)
   size_t n;
 
   PetscFunctionBegin;
+  HycoCheck(scene->mesh_path[0], "the scene has no mesh; write scene: mesh: FILE.msh, or give -scene_mesh FILE.msh");
   HycoCheck(file, "the mesh %s cannot be opened", scene->mesh_path);
   while ((n = fread(buffer, 1, sizeof(buffer), file)) > 0) *hash = HycoHash(*hash, buffer, n);
   fclose(file);

@@ -142,21 +142,38 @@ static PetscErrorCode Take(HycoROM m, HycoReducer t)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* Mean error of the training displacements, in which a path that does not reach its end counts as wrong by its size: one of
+   them does not make the others useless. -1: not known. */
+static PetscErrorCode MeanError(HycoROM m, HycoReducer t, PetscReal *mean)
+{
+  PetscInt n;
+
+  PetscFunctionBegin;
+  *mean = m->model->numbers[1];
+  if (!t->judged || *mean < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoSamplesGet(t->columns, &n, NULL, NULL));
+  *mean = 0;
+  for (PetscInt k = 0; k < n; k++) *mean += (t->judged[k].solved ? t->judged[k].u : 1) / n;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Refuses a model of paths that is useless. */
 static PetscErrorCode CheckPath(HycoROM m, HycoReducer t)
 {
   char worst[HYCO_LINE] = "";
   const HycoBodiesInelastic in = ((HycoSubstructures)m->model->data)->inelastic;
+  PetscReal mean;
 
   PetscFunctionBegin;
+  PetscCall(MeanError(m, t, &mean));
   /* Negated, so that a NaN is refused too. */
-  if (!(m->model->numbers[1] < USELESS)) HycoReducerNameWorst(t, worst);
+  if (!(mean < USELESS)) HycoReducerNameWorst(t, worst);
   HycoCheckModel(
-      m->model->numbers[1] < USELESS,
+      mean < USELESS,
       "the model of bodies misses its own training displacements by %.0f %% on average (%d inelastic modes, "
       "%d points)%s: use more points (-hyco_bodies_cells), fewer modes (-hyco_bodies_inelastic_tol), or train "
       "a hybrid model",
-      100 * (double)m->model->numbers[1], (int)in->m, (int)in->n_points, worst);
+      100 * (double)mean, (int)in->m, (int)in->n_points, worst);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
