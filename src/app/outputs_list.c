@@ -395,7 +395,7 @@ static const Written written[] = {
     {"table", "path of solve", "energy_defect", "number", "-", "imbalance of these, relative to their sizes"},
     {"table", "path", "seconds", "number", "s", "since the last listed time"},
     {"table", "path of solve", "friction_work", "number", "energy",
-     "dissipated by friction, in contact_work (friction)"},
+     "dissipated by friction, with the forces at the ends of steps; in contact_work with their means (friction)"},
     {"table", "path of solve", "n_slipping", "count", "-", "closed contacts that slip (friction)"},
     {"table", "path of solve", "disproven", "count", "-", "steps that have further solutions (friction)"},
 
