@@ -180,12 +180,15 @@ static PetscErrorCode Describe(HycoInspection *in)
    not depend on time. Collective. */
 static PetscErrorCode DescribeBodies(HycoFOM f, const PetscReal mu[], PetscReal speed, HycoInspection *in)
 {
+  const HycoScene s = f->scene;
   HycoBodyParts parts;
+  PetscReal v[HYCO_MAX_PARAMETERS];
 
   PetscFunctionBegin;
-  if (!f->n_contacts || !f->scene->n_parameters) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(HycoBodyPartsFind(f, mu, &parts));
-  PetscCall(HycoBodyPartsDescribe(f->scene, &parts, in->bodies));
+  if (!f->n_contacts || !s->n_parameters) PetscFunctionReturn(PETSC_SUCCESS);
+  if (s->n_times) HycoSceneSetTime(s, mu, s->times[0], v); /* as in training */
+  PetscCall(HycoBodyPartsFind(f, s->n_times ? v : mu, &parts));
+  PetscCall(HycoBodyPartsDescribe(s, &parts, in->bodies));
   PetscCall(HycoInspectBodyCost(f, &parts, mu, speed, in));
   PetscCall(HycoBodyPartsDestroy(&parts));
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -57,6 +57,8 @@ class History(Case):
         found = self.hyco('check', '-scene', RING, '-body_core_young', '1e5*creep')
         self.assertIn('creep: scales the stiffness of body core', found['bodies_by_parameter'])
         self.assertIn('interference: leaves', found['bodies_by_parameter'])
+        self.hyco('check', '-scene', RING, '-body_core_temperature', '300-t', '-body_core_expansion', '1e-9', '-body_core_reference_temperature', '300',
+                  '-parameter_interference_range', '500,600')  # the time is that of the history, not a parameter's
 
     def ring(self, name, *args, **options):
         """The report and the series of the ring, on a coarse history."""
