@@ -86,6 +86,8 @@ PetscErrorCode HycoSlipCoefficients(HycoSlip *s, HycoFE fe, const HycoPairs *pai
       HycoFail("%s is %g at %s; a coefficient of friction must be 0 or more", HycoExprKey(friction), (double)s->mu[k],
                place);
     }
+    /* Its forces are round-off of the normal ones. */
+    if (s->mu[k] < PETSC_MACHINE_EPSILON) s->mu[k] = 0;
     s->data[n++] = s->mu[k];
     /* g = 0: friction without a threshold (coulomb.c). Only contacts with friction have data, in the order of the
        blocks. */
