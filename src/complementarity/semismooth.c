@@ -3,10 +3,9 @@
 
       F(z) = z - P(z - rho w) = 0,     J = I - DP (I - rho M)
 
-  rho is 1/M_nn of the block's normal force and 1/mean M_tt of its other components, without what motions on soft supports
-  add to them. Rows in which DP is 0 (open contacts, slip in 2D) are eliminated. The steps are halved until |F| is smaller
-  than the largest of the last few; down to small ones, because a component that hardly yields runs far past the border of
-  its cone in a full step. It has no global convergence, so that there is
+  rho is 1/M_nn of the block's normal force and 1/mean M_tt of its other components. Rows in which DP is 0 (open contacts,
+  slip in 2D) are eliminated. The steps are halved until |F| decreases, at last down to tiny ones: a component that hardly
+  yields runs far past the border of its cone in a full step. It has no global convergence, so that there is
   a chain of starts: the given forces; the solution with the normal forces alone; forces after block Gauss-Seidel sweeps;
   forces after steps in which the admissible forces are those of the last step (freeze); the proximal point method, whose
   problems M + alpha, q - alpha z_k are regular where M has no full rank (P. Alart, A. Curnier, Comput. Methods Appl.
@@ -34,13 +33,13 @@
 #define NEAR        1e-6  /* the same: near a solution, */
 #define ROUNDING    1e-12 /* and round-off, if a step does not halve it */
 #define CONTRACTS   0.2   /* of |F| in a step: more, and a factor of another J is made again */
-#define LEAST_STEP  (1. / 65536)
-#define MARGIN      1e-6 /* of tangential forces: nearer to the border of the cone a contact may slip */
-#define MEMORY      6    /* |F| may grow up to the largest of so many iterations */
-#define MOST_SOFT   12   /* motions on soft supports: of two bodies */
-#define SOFT        1e-2 /* of the largest flexibility: what is left without them */
-#define CLOSE       0.1  /* |F| relative to the forces: Newton's method is tried from a proximal step */
-#define MOST_ALL    200  /* iterations of all starts after which no proximal step begins */
+#define LEAST_STEP  (1. / 64)
+#define TINY_STEP   (1. / 65536) /* where no longer one decreases |F| */
+#define MARGIN      1e-6         /* of tangential forces: nearer to the border of the cone a contact may slip */
+#define MOST_SOFT   12           /* motions on soft supports: of two bodies */
+#define SOFT        1e-2         /* of the largest flexibility: what is left without them */
+#define CLOSE       0.1          /* |F| relative to the forces: Newton's method is tried from a proximal step */
+#define MOST_ALL    200          /* iterations of all starts after which no proximal step begins */
 
 typedef struct {
   const HycoLCP *lcp;
@@ -53,7 +52,6 @@ typedef struct {
   PetscReal *step, *trial;        /* n; 3 n: z, w and the change of w */
   PetscReal start;                /* the largest force at the start */
   HycoConeStep *linear;
-  PetscReal allowed; /* |F| that a step may reach */
   PetscInt its;
 } Newton;
 
@@ -66,9 +64,9 @@ static void Pose(Newton *h, const PetscReal M[], const PetscReal q[])
   h->q = q;
 }
 
-/* Takes from d, the diagonal of M, what motions on soft supports add to it: every contact would look as if it yielded. A
-   Cholesky factor with pivots: the columns of these motions come first, and leave little of M. Else d stays. */
-static PetscErrorCode TakeSoft(const Newton *h, PetscReal d[])
+/* Takes from d, the diagonal of M, what motions on soft supports add to it: every contact looks as if it yielded. A
+   Cholesky factor with pivots: the columns of these motions come first, and leave little of M; else *soft is false. */
+static PetscErrorCode TakeSoft(const Newton *h, PetscReal d[], PetscBool *soft)
 {
   const PetscInt n = h->n, room = PetscMin(MOST_SOFT, n / 4);
   PetscReal *L, *rest, most = 0, mean = 0;
@@ -79,55 +77,64 @@ static PetscErrorCode TakeSoft(const Newton *h, PetscReal d[])
   PetscCall(PetscArraycpy(rest, d, n));
   for (PetscInt i = 0; i < n; i++) most = PetscMax(most, d[i]);
   for (k = 0; k < room; k++) {
-    PetscReal *v = L + (size_t)k * (size_t)n;
+    PetscReal *v = L + (size_t)k * (size_t)n, root;
     PetscInt at = 0;
 
     for (PetscInt i = 0; i < n; i++) {
       if (rest[i] > rest[at]) at = i;
     }
     if (!(rest[at] > SOFT * most)) break;
+    root = PetscSqrtReal(rest[at]);
     PetscCall(PetscArraycpy(v, h->M + (size_t)at * (size_t)n, n));
     for (PetscInt j = 0; j < k; j++) {
       for (PetscInt i = 0; i < n; i++) v[i] -= L[j * n + i] * L[j * n + at];
     }
-    for (PetscInt i = 0, root = at; i < n; i++) {
-      v[i] /= PetscSqrtReal(rest[root]);
-      if (i != root) rest[i] = PetscMax(rest[i] - v[i] * v[i], 0);
+    for (PetscInt i = 0; i < n; i++) {
+      v[i] /= root;
+      rest[i] = PetscMax(rest[i] - v[i] * v[i], 0);
     }
     rest[at] = 0;
   }
+  *soft = (PetscBool)(k && k < room);
   for (PetscInt i = 0; i < n; i++) mean += rest[i] / (PetscReal)n;
   /* A tenth of the mean: a pivot has nothing left. */
-  for (PetscInt i = 0; i < n && k < room; i++) {
+  for (PetscInt i = 0; i < n && *soft; i++) {
     if (d[i] > 0) d[i] = PetscMax(rest[i], 0.1 * mean);
   }
   PetscCall(PetscFree2(L, rest));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The scales, by block; a row without flexibility has that of the stiffest one. */
-static PetscErrorCode SetScales(Newton *h)
+/* The scales, by block; a row without flexibility has that of the stiffest one. soft: NULL, or without motions on soft
+   supports, if there are any. */
+static PetscErrorCode SetScales(Newton *h, PetscBool *soft)
 {
   const HycoBlocks *b = h->blocks;
-  PetscReal most = 0;
+  PetscReal most = 0, *rho;
+  PetscBool same;
 
   PetscFunctionBegin;
+  PetscCall(PetscMalloc1(h->n + 1, &rho));
   for (PetscInt i = 0; i < h->n; i++) {
-    h->rho[i] = i < h->p ? h->flexibility : h->M[(size_t)i * (size_t)h->n + (size_t)i];
-    most = PetscMax(most, h->rho[i]);
+    rho[i] = i < h->p ? h->flexibility : h->M[(size_t)i * (size_t)h->n + (size_t)i];
+    most = PetscMax(most, rho[i]);
   }
-  /* Floating bodies have no such motions: they are unknowns. */
-  if (!h->p) PetscCall(TakeSoft(h, h->rho));
+  if (soft) PetscCall(TakeSoft(h, rho, soft));
   for (PetscInt k = 0; k < b->n; k++) {
     const PetscInt first = h->p + b->row[k], size = b->row[k + 1] - b->row[k];
     PetscReal mean = 0;
 
-    for (PetscInt i = 1; i < size; i++) mean += h->rho[first + i] / (PetscReal)(size - 1);
+    for (PetscInt i = 1; i < size; i++) mean += rho[first + i] / (PetscReal)(size - 1);
     /* One rho for both tangents: the disk of tangential forces is isotropic, and P would depend on the choice of the
        tangents otherwise. */
-    for (PetscInt i = 1; i < size; i++) h->rho[first + i] = mean;
+    for (PetscInt i = 1; i < size; i++) rho[first + i] = mean;
   }
-  for (PetscInt i = 0; i < h->n; i++) h->rho[i] = h->rho[i] > 0 ? 1 / h->rho[i] : most > 0 ? 1 / most : 1;
+  for (PetscInt i = 0; i < h->n; i++) rho[i] = rho[i] > 0 ? 1 / rho[i] : most > 0 ? 1 / most : 1;
+  /* A factor belongs to its scales. */
+  PetscCall(PetscArraycmp(rho, h->rho, h->n, &same));
+  if (!same) HycoConeStepSetMatrix(h->linear, h->M);
+  PetscCall(PetscArraycpy(h->rho, rho, h->n));
+  PetscCall(PetscFree(rho));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -188,13 +195,14 @@ static PetscErrorCode DeriveAt(Newton *h, const PetscReal z[])
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* z + t s with the first t = 1, 1/2, ..., LEAST_STEP that decreases |F| below `allowed`; *less: there is one. Else z is unchanged. w changes by
+/* z + t s with the first t = 1, 1/2, ..., `shortest` that decreases |F|; *less: there is one. Else z is unchanged. w changes by
    t M s; near the solution it is computed anew, without the round-off of former changes. Where |F| is round-off it is
    not searched for a lucky decrease. */
-static PetscErrorCode Search(Newton *h, PetscReal z[], PetscReal *norm, PetscReal *size, PetscBool *less)
+static PetscErrorCode Search(Newton *h, PetscReal shortest, PetscReal z[], PetscReal *norm, PetscReal *size,
+                             PetscBool *less)
 {
   /* Near round-off only the full step is tried, and half is enough. */
-  const PetscReal before = *norm, least = before <= ROUNDING * *size ? 1 : LEAST_STEP;
+  const PetscReal before = *norm, least = before <= ROUNDING * *size ? 1 : shortest;
   const PetscReal share = before <= ROUNDING * *size ? 0.5 : 1e-4;
   const PetscBool near = (PetscBool)(before <= NEAR * *size);
   PetscReal *trial = h->trial, *w = h->trial + h->n, *change = h->trial + 2 * h->n;
@@ -211,8 +219,8 @@ static PetscErrorCode Search(Newton *h, PetscReal z[], PetscReal *norm, PetscRea
     }
     if (near) PetscCall(Slack(h, trial));
     PetscCall(Evaluate(h, trial, norm, size));
-    /* Armijo's condition on |F|; near the solution on that of the last iteration. */
-    *less = (PetscBool)(*norm < (1 - share * t) * (near ? before : h->allowed));
+    /* Armijo's condition on |F|. */
+    *less = (PetscBool)(*norm < (1 - share * t) * before);
   }
   if (*less) {
     PetscCall(PetscArraycpy(z, trial, h->n));
@@ -273,19 +281,19 @@ static PetscErrorCode Improve(Newton *h, PetscReal z[], PetscReal *norm, PetscRe
   PetscFunctionBegin;
   *less = PETSC_FALSE;
   PetscCall(Step(h, z, (PetscBool)(*norm <= NEAR * *size), PETSC_FALSE, regular));
-  if (*regular) PetscCall(Search(h, z, norm, size, less));
+  if (*regular) PetscCall(Search(h, LEAST_STEP, z, norm, size, less));
   /* A new factor where the present one does not contract; the next step begins with it. */
   if (*less && lagged && *norm > CONTRACTS * before) PetscCall(HycoConeStepRenew(h->linear));
   if (!*less && *norm > ROUNDING * *size) { /* by the residual, with a factor of J itself */
     PetscCall(HycoConeStepRenew(h->linear));
     PetscCall(Step(h, z, PETSC_TRUE, PETSC_FALSE, regular));
-    if (*regular) PetscCall(Search(h, z, norm, size, less));
+    if (*regular) PetscCall(Search(h, TINY_STEP, z, norm, size, less));
   }
   /* Nothing to gain from least squares: the step was good, J is regular, or |F| is round-off already. */
   if (*less || !h->linear->nearly_singular || *norm <= ROUNDING * *size) PetscFunctionReturn(PETSC_SUCCESS);
   if (!h->linear->m || h->linear->m > MOST_LEAST) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(Step(h, z, PETSC_TRUE, PETSC_TRUE, regular));
-  if (*regular) PetscCall(Search(h, z, norm, size, less));
+  if (*regular) PetscCall(Search(h, LEAST_STEP, z, norm, size, less));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -293,7 +301,7 @@ static PetscErrorCode Improve(Newton *h, PetscReal z[], PetscReal *norm, PetscRe
 static PetscErrorCode Iterate(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
   const PetscInt most = h->lcp->max_its ? h->lcp->max_its : MOST_ITS;
-  PetscReal norm, size, last[MEMORY] = {0};
+  PetscReal norm, size;
   PetscBool regular = PETSC_TRUE, less = PETSC_TRUE;
 
   PetscFunctionBegin;
@@ -301,8 +309,6 @@ static PetscErrorCode Iterate(Newton *h, PetscReal z[], HycoLCPStatus *status)
   for (PetscInt k = 0; k < most && norm > TIGHT * size && regular && less; k++) {
     PetscInt changes;
 
-    last[k % MEMORY] = h->allowed = norm;
-    for (PetscInt i = 0; i < MEMORY; i++) h->allowed = PetscMax(h->allowed, last[i]);
     PetscCall(HycoConeStepDerive(h->linear, h->blocks, h->y, &changes));
     PetscCall(Improve(h, z, &norm, &size, &regular, &less));
     h->its++;
@@ -704,15 +710,42 @@ static PetscErrorCode Proximal(Newton *h, PetscReal z[], HycoLCPStatus *status)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Scales are those of the original M for all starts. */
-static PetscErrorCode Chain(Newton *h, PetscReal z[], HycoLCPStatus *status)
+/* From the forces of the last step, then from the solution without friction. */
+static PetscErrorCode FromBefore(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
   PetscFunctionBegin;
-  PetscCall(SetScales(h));
-  /* Friction: the forces of the last step first, then the solution without friction. */
+  PetscCall(FromForces(h, z, status));
+  if (*status != HYCO_LCP_SOLVED) PetscCall(FromNormal(h, z, status));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The same with the scales of bodies that hang on soft supports. These scales stay only with a solution. */
+static PetscErrorCode FromSoft(Newton *h, const PetscReal given[], PetscReal z[], HycoLCPStatus *status)
+{
+  PetscBool soft;
+
+  PetscFunctionBegin;
+  PetscCall(SetScales(h, &soft));
+  if (!soft) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscArraycpy(z, given, h->n));
+  PetscCall(FromBefore(h, z, status));
+  if (*status != HYCO_LCP_SOLVED) PetscCall(SetScales(h, NULL));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The starts, one after the other. Scales are those of the original M for all. */
+static PetscErrorCode Chain(Newton *h, PetscReal z[], HycoLCPStatus *status)
+{
+  PetscReal *given;
+
+  PetscFunctionBegin;
+  PetscCall(SetScales(h, NULL));
   if (h->lcp->blocks) {
-    PetscCall(FromForces(h, z, status));
-    if (*status != HYCO_LCP_SOLVED) PetscCall(FromNormal(h, z, status));
+    HycoDuplicate(h->n, z, &given);
+    PetscCall(FromBefore(h, z, status));
+    /* Floating bodies have no such motions: they are unknowns. */
+    if (*status != HYCO_LCP_SOLVED && !h->p) PetscCall(FromSoft(h, given, z, status));
+    PetscCall(PetscFree(given));
     if (*status == HYCO_LCP_SOLVED) PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(Starts(h, z, status));
@@ -873,7 +906,7 @@ static PetscErrorCode Adapt(HycoConeFactor f, PetscInt p, const HycoBlocks *bloc
     PetscCall(Release(f));
     f->n_blocks = blocks->n;
     HycoDuplicate(blocks->n + 1, blocks->row, &f->row);
-    PetscCall(PetscMalloc1(p + blocks->row[blocks->n] + 1, &f->rho));
+    PetscCall(PetscCalloc1(p + blocks->row[blocks->n] + 1, &f->rho));
     PetscCall(HycoConeStepCreate(p, blocks, f->rho, &f->step));
   }
   HycoConeStepSetBlocks(&f->step, blocks);

@@ -268,27 +268,24 @@ static void aim(const Model *m, Work *o, const double z[], int stick)
 static int iterate(const Model *m, Work *o, int *iterations)
 {
   const size_t n = (size_t)(m->n_motions + m->n_contacts);
-  double norm, size, last[6] = {0};
+  double norm, size;
 
   slack(m, o, o->z, o->w);
   norm = measure(m, o, o->z, o->w, &size);
   for (int i = 0; i < 100 && norm > 1e-14 * size; i++) {
-    const double least = norm <= 1e-12 * size ? 1 : 1. / 65536;
-    double allowed = norm; /* far from the solution the largest of the last six */
+    const double before = norm, least = norm <= 1e-12 * size ? 1 : 1. / 65536;
 
     ++*iterations;
-    last[i % 6] = norm;
-    for (int k = 0; k < 6 && norm > 1e-6 * size; k++) allowed = fmax(allowed, last[k]);
     memcpy(o->from, o->from_next, n * sizeof(double));
     aim(m, o, o->z, 0);
     for (double t = 1; t >= least; t /= 2) {
       for (size_t k = 0; k < n; k++) o->trial[k] = o->z[k] + t * (o->aimed[k] - o->z[k]);
       slack(m, o, o->trial, o->trial_w);
       norm = measure(m, o, o->trial, o->trial_w, &size);
-      if (norm < (1 - (least < 1 ? 1e-4 * t : 0.5)) * allowed) break;
+      if (norm < (1 - (least < 1 ? 1e-4 * t : 0.5)) * before) break;
       norm = HUGE_VAL;
     }
-    if (!(norm < allowed)) { /* z stays */
+    if (!(norm < before)) { /* z stays */
       norm = measure(m, o, o->z, o->w, &size);
       break;
     }
