@@ -710,42 +710,37 @@ static PetscErrorCode Proximal(Newton *h, PetscReal z[], HycoLCPStatus *status)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* From the forces of the last step, then from the solution without friction. */
+/* From the forces of the last step, also with the scales of bodies that hang on soft supports; then from the solution
+   without friction, which may be far from them: forces that friction has locked in are not there. Scales without soft
+   motions stay only with a solution. */
 static PetscErrorCode FromBefore(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
+  PetscReal *given;
+  PetscBool soft = PETSC_FALSE;
+
   PetscFunctionBegin;
+  HycoDuplicate(h->n, z, &given);
   PetscCall(FromForces(h, z, status));
+  /* Floating bodies have no soft motions: they are unknowns. */
+  if (*status != HYCO_LCP_SOLVED && !h->p) PetscCall(SetScales(h, &soft));
+  if (soft) {
+    PetscCall(PetscArraycpy(z, given, h->n));
+    PetscCall(FromForces(h, z, status));
+    if (*status != HYCO_LCP_SOLVED) PetscCall(FromNormal(h, z, status));
+    if (*status != HYCO_LCP_SOLVED) PetscCall(SetScales(h, NULL));
+  }
   if (*status != HYCO_LCP_SOLVED) PetscCall(FromNormal(h, z, status));
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
-/* The same with the scales of bodies that hang on soft supports. These scales stay only with a solution. */
-static PetscErrorCode FromSoft(Newton *h, const PetscReal given[], PetscReal z[], HycoLCPStatus *status)
-{
-  PetscBool soft;
-
-  PetscFunctionBegin;
-  PetscCall(SetScales(h, &soft));
-  if (!soft) PetscFunctionReturn(PETSC_SUCCESS);
-  PetscCall(PetscArraycpy(z, given, h->n));
-  PetscCall(FromBefore(h, z, status));
-  if (*status != HYCO_LCP_SOLVED) PetscCall(SetScales(h, NULL));
+  PetscCall(PetscFree(given));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
 /* The starts, one after the other. Scales are those of the original M for all. */
 static PetscErrorCode Chain(Newton *h, PetscReal z[], HycoLCPStatus *status)
 {
-  PetscReal *given;
-
   PetscFunctionBegin;
   PetscCall(SetScales(h, NULL));
   if (h->lcp->blocks) {
-    HycoDuplicate(h->n, z, &given);
     PetscCall(FromBefore(h, z, status));
-    /* Floating bodies have no such motions: they are unknowns. */
-    if (*status != HYCO_LCP_SOLVED && !h->p) PetscCall(FromSoft(h, given, z, status));
-    PetscCall(PetscFree(given));
     if (*status == HYCO_LCP_SOLVED) PetscFunctionReturn(PETSC_SUCCESS);
   }
   PetscCall(Starts(h, z, status));

@@ -655,7 +655,7 @@ const char *HycoReasonName(HycoReason reason)
     return "not converged: a body is held by contact only, and this load lifts it off";
   case HYCO_DIVERGED_HELD:
     return "not converged: a body is held by contact only, and its equilibrium was not found, although contact forces "
-           "can balance this load; use -hyco_linear direct, or add a support or a soft spring";
+           "can balance this load; use -hyco_linear direct, or add a support or a spring";
   case HYCO_DIVERGED_NO_CONTACT_BASIS:
     return "not converged: the model has no contact forces, and bodies penetrate here; train on solutions with contact";
   case HYCO_DIVERGED_STEP:
