@@ -287,7 +287,8 @@ static PetscErrorCode Improve(Newton *h, PetscReal z[], PetscReal *norm, PetscRe
   if (!*less && *norm > ROUNDING * *size) { /* by the residual, with a factor of J itself */
     PetscCall(HycoConeStepRenew(h->linear));
     PetscCall(Step(h, z, PETSC_TRUE, PETSC_FALSE, regular));
-    if (*regular) PetscCall(Search(h, TINY_STEP, z, norm, size, less));
+    /* Not where forces are not unique: proximal steps find those near the last ones. */
+    if (*regular) PetscCall(Search(h, h->linear->nearly_singular ? LEAST_STEP : TINY_STEP, z, norm, size, less));
   }
   /* Nothing to gain from least squares: the step was good, J is regular, or |F| is round-off already. */
   if (*less || !h->linear->nearly_singular || *norm <= ROUNDING * *size) PetscFunctionReturn(PETSC_SUCCESS);
@@ -662,12 +663,14 @@ static PetscErrorCode Starts(Newton *h, PetscReal z[], HycoLCPStatus *status)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Newton's method on the problem itself from a copy of z, which its solution replaces. */
+/* Newton's method on the problem itself from a copy of z, which its solution replaces; not one of many, where M has no full
+   rank: proximal steps end at the nearest. */
 static PetscErrorCode TryFrom(Newton *h, PetscReal z[], PetscReal copy[], HycoLCPStatus *status)
 {
   PetscFunctionBegin;
   PetscCall(PetscArraycpy(copy, z, h->n));
   PetscCall(Iterate(h, copy, status));
+  if (h->linear->nearly_singular) *status = HYCO_LCP_SINGULAR;
   if (*status == HYCO_LCP_SOLVED) PetscCall(PetscArraycpy(z, copy, h->n));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
