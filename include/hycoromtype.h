@@ -71,6 +71,10 @@ typedef struct _HycoROMOps {
   PetscErrorCode (*residual)(HycoROM, const PetscReal mu[], const PetscReal z[], PetscReal w[],
                              PetscReal *size); /* moves the data to mu (NULL: they are there) and takes z; w (p + n;
                                                   NULL: not needed); size: of gaps and displacements of the contacts */
+  PetscErrorCode (*stand)(HycoROM, PetscInt k,
+                          PetscBool *alone); /* NULL, or of paths; alone: no time depends on those before. Then the
+                                                problem becomes that of listed time k, whose parameters and forces
+                                                the model has; k < 0: only asks */
   PetscErrorCode (*jacobian)(HycoROM, PetscInt k, const PetscInt contact[],
                              PetscReal M[]); /* of x and these k forces, p + k square by columns, at the last mu */
   PetscErrorCode (*beside)(

@@ -106,10 +106,10 @@ typedef struct {
   unsigned long long key; /* the common part of the keys of finished pieces */
 } HycoBodiesFactor;
 
-/* Whether the model has modes of inelastic forces: with a history, and with friction where a law is not linear. */
+/* Whether the model has modes of inelastic forces: with a history, where a law is not linear. */
 static inline PetscBool HycoBodiesFlow(HycoReducer t)
 {
-  PetscBool flows = (PetscBool)!HycoSceneHasFriction(t->scene);
+  PetscBool flows = PETSC_FALSE;
 
   for (PetscInt k = 0; k < t->scene->n_bodies; k++) flows = (PetscBool)(flows || !t->scene->body[k].law->linear);
   return (PetscBool)(t->scene->n_times && flows);

@@ -1,5 +1,6 @@
 /* Derivatives of outputs with respect to the parameters: the data are differentiated by differences along one parameter,
-   the solution by the linear system of its closed contacts; a path by the paths beside it, in its own steps in time. */
+   the solution by the linear system of its closed contacts; a path by these at its listed times, where none depends on those
+   before, else by the paths beside it, in its own steps in time. */
 #ifndef HYCOGRADIENT_H
 #define HYCOGRADIENT_H
 
@@ -68,5 +69,9 @@ PetscErrorCode HycoPathCheckBeside(PetscBool ended, PetscInt cuts, const char wh
 PetscErrorCode HycoGradientOfPath(HycoScene scene, const PetscReal mu[], const HycoStep step[],
                                   HycoGradientStore *store, HycoGradient *gradient, HycoGradientFollow follow,
                                   void *context);
+
+/* Sets the derivatives of the extremes over the listed times from those at these, which are set. */
+void HycoGradientOfExtremes(HycoScene scene, const PetscReal mu[], const HycoStep step[], HycoGradientStore *store,
+                            const HycoGradient *gradient);
 
 #endif

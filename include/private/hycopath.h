@@ -158,6 +158,8 @@ PetscErrorCode HycoPathMoves(HycoPath path, const PetscScalar u[], Vec work, Pet
 PetscReal HycoPathFactorCost(HycoPath path);
 /* The method used for steps; not HYCO_NEWTON_AUTO. */
 HycoNewton HycoPathMethod(HycoPath path);
+/* Whether the value a of a quantity is beyond b, as an extreme over the times. */
+PetscBool HycoPathIsBeyond(const HycoQuantity *quantity, PetscReal a, PetscReal b);
 /* value[n_quantities]: the largest of each quantity over n >= 1 listed times; for `min` the smallest. */
 void HycoPathExtremes(HycoScene scene, PetscInt n, const HycoStep step[], PetscReal value[]);
 /* Fills the history with the path's results. */

@@ -20,10 +20,10 @@ PetscErrorCode HycoQuantityMarkCells(HycoScene scene, HycoMesh mesh, PetscInt k,
 PetscErrorCode HycoQuantitiesMarkCells(HycoScene scene, HycoMesh mesh, PetscBool needed[]);
 /* Marks the cells that decide the quantities near a solution with these values: those of an extreme, and where the field is
    close to it; of a mean all; of reactions all, or (balanced: they follow from balance) one with a support; none of those
-   `without`. stressed: those of them whose stresses are needed. */
+   `without`. */
 PetscErrorCode HycoQuantitiesMarkDecisive(HycoFE fe, const PetscReal u[], const PetscReal sigma[],
                                           const PetscReal value[], const PetscBool without[], PetscBool balanced,
-                                          PetscBool needed[], PetscBool stressed[]);
+                                          PetscBool needed[]);
 /* Whether it is the extreme or the mean of a stress in cells. */
 PetscBool HycoQuantityOfStress(const HycoQuantity *q);
 /* Marks the cells whose stresses the quantities need. */

@@ -275,6 +275,10 @@ PetscErrorCode HycoROMMeasurePath(HycoROM model);
    ownership of all. */
 PetscErrorCode HycoROMSetOutputCells(HycoROM model, HycoMesh mesh, PetscReal V[], PetscBool balanced[],
                                      HycoMesh loaded);
+/* The gradient at the state that the model and its type's problem have, into the arrays of `store` (n_outputs x n_parameters);
+   *regular: false, without a gradient: forces of closed contacts are not unique (fails without a history). */
+PetscErrorCode HycoROMStateGradient(HycoROM model, HycoGradientStore *store, HycoGradient *gradient,
+                                    PetscBool *regular);
 /* The gradient of a predicted path. */
 PetscErrorCode HycoROMPathGradient(HycoROM model, HycoGradient *gradient);
 /* Until HycoROMUnfocusOutputs() the quantities are measured on the cells that decide them near the last prediction, whose

@@ -183,7 +183,7 @@ PetscErrorCode HycoGradientColumn(HycoGradient *g, HycoGradientStore *store, Hyc
     jump[q] = 1;
   }
   /* Of a path each closer difference is two paths more. */
-  for (PetscInt k = scene->n_times ? HYCO_GRADIENT_CLOSER - 1 : 0; k < HYCO_GRADIENT_CLOSER; k++) {
+  for (PetscInt k = g->n_times ? HYCO_GRADIENT_CLOSER - 1 : 0; k < HYCO_GRADIENT_CLOSER; k++) {
     HycoDifference near = at;
     PetscBool any = PETSC_FALSE;
 
@@ -279,4 +279,57 @@ PetscErrorCode HycoGradientOfPath(HycoScene scene, const PetscReal mu[], const H
   PetscCall(PetscFree(value));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Whether v is an extreme as `most` is, but for round-off. */
+static PetscBool Ties(const HycoQuantity *of, PetscReal v, PetscReal most)
+{
+  const PetscReal room = HYCO_GRADIENT_FORCE * PetscAbsReal(most);
+
+  return (PetscBool)(!HycoPathIsBeyond(of, most, v + room) || !HycoPathIsBeyond(of, most, v - room));
+}
+
+/* Of output q along parameter p. Of the times that share the extreme that one decides which has it beside mu. */
+static void SetExtreme(HycoScene scene, const HycoStep step[], const HycoDifference *d, PetscInt q, PetscReal most,
+                       HycoGradientStore *store, const HycoGradient *g)
+{
+  const HycoQuantity *of = &scene->quantity[q];
+  const PetscInt n = g->n_outputs * g->n_parameters, at = q * g->n_parameters + d->parameter;
+  PetscReal beside = 0, slope = 0;
+  PetscInt chosen = -1;
+
+  for (PetscInt k = 0; k < g->n_times; k++) {
+    const PetscReal v = step[k].quantity[q], size = PetscAbsReal(most);
+    /* Equal values, so that slopes alone decide. */
+    const PetscReal moved = (v < 0 ? -size : size) + d->step[1] * store->value[k * n + at];
+
+    if (!Ties(of, v, most)) continue;
+    slope = PetscMax(slope, PetscAbsReal(store->value[k * n + at]));
+    if (chosen >= 0 && !HycoPathIsBeyond(of, moved, beside)) continue;
+    chosen = k;
+    beside = moved;
+  }
+  /* A number that is no number ties with none. */
+  chosen = PetscMax(chosen, 0);
+  store->value[g->n_times * n + at] = store->value[chosen * n + at];
+  store->kink[g->n_times * n + at] = store->kink[chosen * n + at];
+  for (PetscInt k = 0; k < g->n_times; k++) {
+    if (Ties(of, step[k].quantity[q], most) &&
+        PetscAbsReal(store->value[k * n + at] - store->value[chosen * n + at]) > KINK * slope)
+      store->kink[g->n_times * n + at] = PETSC_TRUE;
+  }
+}
+
+void HycoGradientOfExtremes(HycoScene scene, const PetscReal mu[], const HycoStep step[], HycoGradientStore *store,
+                            const HycoGradient *g)
+{
+  PetscReal most[HYCO_MAX_QUANTITIES];
+
+  HycoPathExtremes(scene, g->n_times, step, most);
+  for (PetscInt p = 0; p < g->n_parameters; p++) {
+    HycoDifference d;
+
+    HycoDifferenceSet(scene, mu, p, HYCO_GRADIENT_STEP, &d);
+    for (PetscInt q = 0; q < g->n_outputs; q++) SetExtreme(scene, step, &d, q, most[q], store, g);
+  }
 }

@@ -336,8 +336,8 @@ PetscErrorCode HycoPathRun(HycoPath p)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Whether a is beyond b. */
-static PetscBool IsBeyond(const HycoQuantity *q, PetscReal a, PetscReal b)
+/* The quantity's own extreme, unless the scene names another for the path. */
+PetscBool HycoPathIsBeyond(const HycoQuantity *q, PetscReal a, PetscReal b)
 {
   const PetscBool least = (PetscBool)(q->kind == HYCO_QUANTITY_MIN || q->kind == HYCO_QUANTITY_PRESSURE_MIN);
 
@@ -351,7 +351,7 @@ void HycoPathExtremes(HycoScene scene, PetscInt n, const HycoStep step[], PetscR
   for (PetscInt q = 0; q < scene->n_quantities; q++) {
     value[q] = step[0].quantity[q];
     for (PetscInt k = 1; k < n; k++) {
-      if (IsBeyond(&scene->quantity[q], step[k].quantity[q], value[q])) value[q] = step[k].quantity[q];
+      if (HycoPathIsBeyond(&scene->quantity[q], step[k].quantity[q], value[q])) value[q] = step[k].quantity[q];
     }
   }
 }

@@ -318,7 +318,7 @@ static PetscErrorCode KeepSupported(HycoFE fe, const HycoQuantity *q, PetscBool 
    it. The others cannot become the largest within a small step, so that leaving them out changes nothing. */
 PetscErrorCode HycoQuantitiesMarkDecisive(HycoFE fe, const PetscReal u[], const PetscReal sigma[],
                                           const PetscReal value[], const PetscBool without[], PetscBool balanced,
-                                          PetscBool needed[], PetscBool stressed[])
+                                          PetscBool needed[])
 {
   const HycoScene scene = fe->scene;
   HycoMesh m = fe->mesh;
@@ -327,7 +327,6 @@ PetscErrorCode HycoQuantitiesMarkDecisive(HycoFE fe, const PetscReal u[], const 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(m->n_cells, &in));
   PetscCall(PetscArrayzero(needed, m->n_cells));
-  PetscCall(PetscArrayzero(stressed, m->n_cells));
   for (PetscInt k = 0; k < scene->n_quantities; k++) {
     const HycoQuantity *q = &scene->quantity[k];
 
@@ -338,8 +337,6 @@ PetscErrorCode HycoQuantitiesMarkDecisive(HycoFE fe, const PetscReal u[], const 
     /* Rotated unknowns of oblique supports hold several axes at once, which one cell might not show. */
     if (q->kind == HYCO_QUANTITY_REACTION && balanced && !fe->n_oblique) PetscCall(KeepSupported(fe, q, in));
     for (PetscInt e = 0; e < m->n_cells; e++) needed[e] = (PetscBool)(needed[e] || in[e]);
-    for (PetscInt e = 0; e < m->n_cells && HycoQuantityOfStress(q); e++)
-      stressed[e] = (PetscBool)(stressed[e] || in[e]);
   }
   PetscCall(PetscFree(in));
   PetscFunctionReturn(PETSC_SUCCESS);

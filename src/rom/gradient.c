@@ -25,6 +25,7 @@ typedef struct {
   PetscInt at[5];       /* the number of each among what the type keeps of points beside mu */
   PetscReal *q, *v;     /* p + k */
   PetscReal size;
+  PetscBool regular;  /* the forces of the closed contacts are unique */
   PetscBool focused;  /* the outputs' cells are few */
   PetscBool contacts; /* outputs read contacts alone, and the forces are those of z */
   PetscBool forces;   /* of a type with `beside`: outputs need no displacements */
@@ -148,7 +149,6 @@ static PetscErrorCode Close(Work *o)
 {
   PetscReal *M, *L, *w, *flexibility, most = 0;
   PetscInt *state;
-  PetscBool regular;
   const size_t n = (size_t)(o->p + o->k);
 
   PetscFunctionBegin;
@@ -167,13 +167,14 @@ static PetscErrorCode Close(Work *o)
   }
   PetscCall(HycoTangentStates(o->k, L, w, o->size, flexibility, state));
   /* Of bodies, whose unknowns are rigid motions, M is 0 there. */
-  PetscCall(HycoTangentCreate(o->p, PETSC_FALSE, o->k, M, state, &o->tangent, &regular));
+  PetscCall(HycoTangentCreate(o->p, PETSC_FALSE, o->k, M, state, &o->tangent, &o->regular));
   PetscCall(PetscFree4(L, w, flexibility, state));
   PetscCall(PetscFree(M));
   /* A singular matrix means forces that can be redistributed: a derivative of one of many distributions would be
-     arbitrary. */
-  HycoCheck(regular || most > 0, HYCO_TANGENT_UNPRESSED);
-  HycoCheck(regular,
+     arbitrary. Of a path there are the differences. */
+  if (o->m->model->scene->n_times) PetscFunctionReturn(PETSC_SUCCESS);
+  HycoCheck(o->regular || most > 0, HYCO_TANGENT_UNPRESSED);
+  HycoCheck(o->regular,
             "the forces of the model's closed contacts are not unique here, or round-off, and have no derivative");
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -249,6 +250,7 @@ static PetscErrorCode Create(Work *o)
   }
   /* The tangent is factored once, for all parameters. */
   PetscCall(Close(o));
+  if (!o->regular) PetscFunctionReturn(PETSC_SUCCESS);
   if (m->measured)
     PetscCall(PetscArraycpy(o->output, m->prediction.quantity, m->model->scene->n_quantities));
   else
@@ -394,7 +396,7 @@ static void TakeChanges(Work *o, PetscInt p, PetscBool *nodes)
 
 /* All columns. First those of parameters that the outputs' cells do not have; last those that move nodes: the way back from
    one's points is a part of the way to the next one's. */
-static PetscErrorCode Columns(Work *o, HycoGradient *gradient)
+static PetscErrorCode Columns(Work *o, HycoGradientStore *store, HycoGradient *gradient)
 {
   HycoROM m = o->m;
 
@@ -408,7 +410,7 @@ static PetscErrorCode Columns(Work *o, HycoGradient *gradient)
     if ((nodes ? 2 : o->enters || o->means) != k / gradient->n_parameters) continue;
     HycoDifferenceSet(m->model->scene, o->mu, p, HYCO_GRADIENT_STEP, &d);
     PetscCall(Differentiate(o, &d, &kink));
-    PetscCall(HycoGradientColumn(gradient, &m->gradient, m->model->scene, o->mu, &d, kink, Measure, o, o->output));
+    PetscCall(HycoGradientColumn(gradient, store, m->model->scene, o->mu, &d, kink, Measure, o, o->output));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -449,11 +451,30 @@ static PetscErrorCode Check(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* After an error the model has no current solution: its state may be that of a difference. */
-PetscErrorCode HycoROMGetGradient(HycoROM m, HycoGradient *gradient)
+PetscErrorCode HycoROMStateGradient(HycoROM m, HycoGradientStore *store, HycoGradient *gradient, PetscBool *regular)
 {
   Work o = {.m = m};
   PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  PetscCall(HycoROMComplete(m));
+  ierr = Create(&o);
+  *regular = o.regular;
+  if (!ierr && o.regular) {
+    gradient->n_undecided = HycoTangentUndecided(o.tangent);
+    ierr = Columns(&o, store, gradient);
+    if (!ierr) ierr = Restore(&o);
+  }
+  /* Before the error is raised, so that a program that catches it leaks nothing. */
+  PetscCall(Destroy(&o));
+  PetscCall(ierr);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* After an error the model has no current solution: its state may be that of a difference. */
+PetscErrorCode HycoROMGetGradient(HycoROM m, HycoGradient *gradient)
+{
+  PetscBool regular;
 
   PetscFunctionBegin;
   HycoCheckHandle(m, HYCO_ROM_CLASSID);
@@ -462,15 +483,7 @@ PetscErrorCode HycoROMGetGradient(HycoROM m, HycoGradient *gradient)
     PetscCall(HycoROMPathGradient(m, gradient));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(HycoROMComplete(m));
   PetscCall(HycoGradientCreate(m->model->scene, &m->gradient, gradient));
-  ierr = Create(&o);
-  if (!ierr) gradient->n_undecided = HycoTangentUndecided(o.tangent);
-  if (!ierr) ierr = Columns(&o, gradient);
-  if (!ierr) ierr = Restore(&o);
-  if (ierr) m->solved = m->ready = PETSC_FALSE;
-  /* Before the error is raised, so that a program that catches it leaks nothing. */
-  PetscCall(Destroy(&o));
-  PetscCall(ierr);
+  HycoOnError(HycoROMStateGradient(m, &m->gradient, gradient, &regular), m->solved = m->ready = PETSC_FALSE);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -443,9 +443,9 @@ static PetscBool Find(HycoMesh mesh, PetscInt cell, PetscInt *at)
   return (PetscBool)(*at < mesh->n_cells && mesh->cell_whole[*at] == cell);
 }
 
-/* m->few with these cells of `all`; kept as long as it has the needed ones. Stresses are needed in those of `stressed`. */
-static PetscErrorCode MakeFew(HycoROM m, HycoOutputCells all, PetscInt n, const PetscInt keep[],
-                              const PetscBool stressed[])
+/* m->few with these cells of `all`; kept as long as it has the needed ones. A cell that is there for a displacement is one
+   of those of an extreme stress too: it has its own stress, and not 0. */
+static PetscErrorCode MakeFew(HycoROM m, HycoOutputCells all, PetscInt n, const PetscInt keep[])
 {
   const PetscInt width = m->model->mesh->dim * m->model->l;
   PetscBool has = (PetscBool)(m->few != NULL);
@@ -454,10 +454,7 @@ static PetscErrorCode MakeFew(HycoROM m, HycoOutputCells all, PetscInt n, const 
 
   PetscFunctionBegin;
   /* Nearby points decide by the same cells: the small mesh is made once for a whole gradient. */
-  for (PetscInt k = 0, at = 0; k < n && has; k++) {
-    has = Find(m->few->mesh, all->mesh->cell_whole[keep[k]], &at);
-    if (has && stressed[keep[k]]) m->few->stressed[at] = PETSC_TRUE;
-  }
+  for (PetscInt k = 0, at = 0; k < n && has; k++) has = Find(m->few->mesh, all->mesh->cell_whole[keep[k]], &at);
   if (has) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoOutputCellsDestroy(&m->few));
   PetscCall(PetscNew(&m->few));
@@ -471,7 +468,6 @@ static PetscErrorCode MakeFew(HycoROM m, HycoOutputCells all, PetscInt n, const 
     PetscCall(PetscArraycpy(p->V + i * width, all->V + node[i] * width, width));
   PetscCall(PetscFree(node));
   PetscCall(Fill(m, p));
-  for (PetscInt k = 0; k < n; k++) p->stressed[k] = stressed[keep[k]];
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -625,20 +621,20 @@ static void ChooseSlopes(HycoROM m, HycoOutputCells p, PetscBool without[])
 static PetscErrorCode FindFew(HycoROM m, HycoOutputCells p, const PetscReal value[], const PetscBool without[])
 {
   PetscInt *keep, n;
-  PetscBool *needed, *stressed;
+  PetscBool *needed;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
-  PetscCall(PetscMalloc3(p->mesh->n_cells, &needed, p->mesh->n_cells, &stressed, p->mesh->n_cells, &keep));
+  PetscCall(PetscMalloc2(p->mesh->n_cells, &needed, p->mesh->n_cells, &keep));
   ierr = HycoQuantitiesMarkDecisive(p->fe, p->u, p->sigma, value, without, HycoResultantsSuffice(m, p->resultants),
-                                    needed, stressed);
+                                    needed);
   if (!ierr) ierr = List(p->mesh->n_cells, needed, &n, keep);
   /* A mesh has a cell. */
   if (!ierr && !n) keep[n++] = 0;
-  if (!ierr) ierr = MakeFew(m, p, n, keep, stressed);
+  if (!ierr) ierr = MakeFew(m, p, n, keep);
   if (ierr) PetscCall(HycoOutputCellsDestroy(&m->few));
   /* Before the error: MakeFew() may have failed after the marks. */
-  PetscCall(PetscFree3(needed, stressed, keep));
+  PetscCall(PetscFree2(needed, keep));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }

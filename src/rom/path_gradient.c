@@ -1,4 +1,5 @@
-/* The gradient of a predicted path, by the paths beside it in its own steps. */
+/* The gradient of a predicted path: those of its listed times, where none depends on those before, else by the paths beside
+   it in its own steps. */
 #include <hycogradient.h>
 #include <hycoromimpl.h>
 
@@ -34,6 +35,51 @@ static PetscErrorCode Follow(void *context, const PetscReal mu[], const HycoStep
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* At the listed times one after the other, each as a prediction of its own; *done: false, where one has no derivative. */
+static PetscErrorCode AtTimes(HycoROM m, const HycoStep step[], HycoGradient *gradient, PetscBool *done)
+{
+  const PetscInt n = gradient->n_outputs * gradient->n_parameters, n_listed = m->trace.n_listed;
+  PetscErrorCode ierr;
+
+  PetscFunctionBegin;
+  *done = PETSC_TRUE;
+  for (PetscInt k = 0; k < n_listed && *done; k++) {
+    HycoGradientStore there = {m->gradient.value + k * n, m->gradient.kink + k * n};
+    HycoGradient at = {.n_outputs = gradient->n_outputs, .n_parameters = gradient->n_parameters};
+
+    PetscCall(HycoROMSetStep(m, k));
+    m->trace.n_listed = 0; /* the outputs are those of this state, and of no path */
+    ierr = (*m->ops->stand)(m, k, done);
+    if (!ierr) ierr = HycoROMMeasureQuantities(m, &m->prediction);
+    m->measured = PETSC_TRUE;
+    if (!ierr) ierr = HycoROMStateGradient(m, &there, &at, done);
+    m->trace.n_listed = n_listed;
+    PetscCall(ierr);
+  }
+  if (*done) HycoGradientOfExtremes(m->model->scene, m->fe->mu, step, &m->gradient, gradient);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The gradient of a path whose times do not depend on each other. */
+static PetscErrorCode ByTimes(HycoROM m, const HycoStep step[], HycoGradient *gradient, PetscBool *done)
+{
+  const HycoPrediction prediction = m->prediction;
+  const PetscBool measured = m->measured;
+  const PetscInt shown = m->trace.shown;
+  PetscBool alone = PETSC_FALSE;
+
+  PetscFunctionBegin;
+  *done = PETSC_FALSE;
+  PetscTryTypeMethod(m, stand, -1, &alone);
+  if (!alone) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(HycoGradientCreate(m->model->scene, &m->gradient, gradient));
+  HycoOnError(AtTimes(m, step, gradient, done), m->solved = m->ready = PETSC_FALSE);
+  m->prediction = prediction;
+  m->measured = measured;
+  PetscCall(HycoROMSetStep(m, shown));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The path is predicted again at the end: the caller may ask for any of its results, which do not depend on the order of
    predictions. */
 PetscErrorCode HycoROMPathGradient(HycoROM m, HycoGradient *gradient)
@@ -42,11 +88,14 @@ PetscErrorCode HycoROMPathGradient(HycoROM m, HycoGradient *gradient)
   Work o = {.m = m};
   HycoHistory history;
   PetscReal mu[HYCO_MAX_PARAMETERS];
+  PetscBool done;
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoROMGetHistory(m, &history));
   HycoCheck(history.ended, "there is no gradient: the path ends at t = %g, before its last time", (double)history.t);
+  PetscCall(ByTimes(m, history.step, gradient, &done));
+  if (done) PetscFunctionReturn(PETSC_SUCCESS);
   /* Copies: predictions beside mu overwrite both. */
   PetscCall(PetscArraycpy(mu, m->fe->mu, m->model->scene->n_variables));
   o.n = history.n_taken;

@@ -229,6 +229,7 @@ static PetscErrorCode Record(HycoPath p)
   if (w->friction) PetscCall(RecordFriction(m, &p->now));
   PetscCall(HycoRowsCountDependent(m->model->pairs.n, m->rows.start, m->rows.dof, m->rows.value, m->rows.gap,
                                    m->fe->n_dof, m->U, m->Lambda, &p->now.n_dependent));
+  PetscCall(PetscArraycpy(w->motions + p->n_steps * w->bodies.bodies->p, w->bodies.x, w->bodies.bodies->p));
   p->steps[p->n_steps++] = p->now;
   PetscCall(PetscMemzero(&p->now, sizeof(p->now)));
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -268,6 +269,24 @@ static PetscErrorCode Residual(HycoROM m, const PetscReal mu[], const PetscReal 
   HycoBodiesFrictionNormal(o->friction, m->Lambda);
   HycoTraceShowOther(m, &HycoBodiesFrictionSlip(o->friction)->shear);
   *size = 0; /* it is for differences, which programs do not take */
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The motions and the forces give the rest: elastic bodies without friction do not depend on the times before. */
+static PetscErrorCode Stand(HycoROM m, PetscInt k, PetscBool *alone)
+{
+  HycoBodiesPath w = (HycoBodiesPath)m->work;
+  const PetscInt p = w->bodies.bodies->p, n = m->model->pairs.n;
+  PetscReal *z, size;
+
+  PetscFunctionBegin;
+  /* Models of elastic bodies that have unknowns of cells are of older files. */
+  *alone = (PetscBool)(!w->friction && !w->path->flows && !w->bodies.bodies->inelastic->nd);
+  if (!*alone || k < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscMalloc1(p + n + 1, &z));
+  PetscCall(PetscArraycpy(z, w->motions + k * p, p));
+  PetscCall(PetscArraycpy(z + p, m->Lambda, n));
+  HycoFinally(HycoBodiesResidual(m, m->fe->mu, z, NULL, &size), PetscCall(PetscFree(z)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -354,6 +373,7 @@ static PetscErrorCode Allocate(HycoROM m)
   PetscCall(PetscCalloc1(rows * l + 1, &w->T));
   PetscCall(PetscCalloc1(rows * l + 1, &w->there));
   PetscCall(PetscCalloc1(in->n_points + 1, &w->weight));
+  PetscCall(PetscCalloc1((m->model->scene->n_times + 1) * w->bodies.bodies->p + 1, &w->motions));
   PetscCall(PetscMalloc1(pairs * l + 1, &w->BP));
   PetscCall(PetscMalloc1(pairs * w->bodies.bodies->p + 1, &w->G));
   PetscCall(PetscCalloc2(w->bodies.bodies->p * l + 1, &w->x, w->bodies.bodies->p + 1, &w->x0));
@@ -451,7 +471,7 @@ static PetscErrorCode Reset(HycoROM m)
   HycoFreeAll(&w->at, &w->cell_at, &w->point, &w->B, &w->T, &w->there, &w->weight, &w->BP, &w->response, &w->loads,
               &w->column, &w->set, &w->U, &w->Z, &w->S, &w->z, &w->e0, &w->gap, &w->last, &w->u, &w->e, &w->s, &w->size,
               &w->lost, &w->X, &w->r, &w->J, &w->pivot);
-  HycoFreeAll(&w->G, &w->Y, &w->H, &w->accepted);
+  HycoFreeAll(&w->G, &w->Y, &w->H, &w->accepted, &w->motions);
   PetscCall(PetscFree2(w->x, w->x0));
   HycoDestroyAll(&w->alpha, &w->L);
   PetscCall(HycoPathFree(&w->path));
@@ -504,8 +524,9 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Derivatives of a path are differences of whole paths (path_gradient.c): unknowns, residual and expand serve programs
-   alone. No estimate of its own either: those of held-out paths apply. */
+/* Derivatives of elastic paths without friction are those at their listed times, of others differences of whole paths
+   (path_gradient.c); unknowns, residual and expand serve programs too. No estimate of its own: those of held-out paths
+   apply. */
 PetscErrorCode HycoBodiesTakePath(HycoROM m)
 {
   static const HycoROMTraits traits = {.title = "condensed bodies",
@@ -523,7 +544,10 @@ PetscErrorCode HycoBodiesTakePath(HycoROM m)
                                  .solve = Solve,
                                  .unknowns = Unknowns,
                                  .residual = Residual,
+                                 .stand = Stand,
                                  .jacobian = HycoBodiesJacobian,
+                                 .beside = HycoBodiesNear,
+                                 .slope = HycoBodiesSlope,
                                  .expand = Expand,
                                  .features = Features,
                                  .view = View,

@@ -40,6 +40,7 @@ typedef struct _n_HycoBodiesPath {
   PetscInt place;           /* and the place of fe's nodes */
   PetscBool always;         /* a new tangent in each iteration */
   PetscReal norm, floor;    /* of alpha and T^T s; of r: round-off */
+  PetscReal *motions;       /* by listed time, and one more, x p: rigid motions x of the bodies there */
   PetscReal misfit;         /* of s in the span of the modes at the points, the largest of the listed times */
 } * HycoBodiesPath;
 
