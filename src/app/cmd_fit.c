@@ -250,7 +250,7 @@ static PetscErrorCode Report(const Fit *f, const PetscReal held[], const PetscRe
     cJSON_AddItemToArray(ends, cJSON_CreateString(names[p]));
     PetscCall(DriverPrint("%s is at the end of its range\n", names[p]));
   }
-  PetscCall(DriverPrint("%d predictions (%s)\n", (int)fit->evaluations, fit->method));
+  PetscCall(DriverPrint("%d predictions, with gradients (%s)\n", (int)fit->evaluations, fit->method));
   if (fit->n_starts > 1)
     PetscCall(DriverPrint("%d of %d starts ended at the least misfit\n", (int)fit->n_least, (int)fit->n_starts));
   if (fit->n_determined < fit->n_free)

@@ -127,14 +127,17 @@ static void Show(const char word[], PetscInt done, PetscInt n, PetscBool ends)
   if (done == n) begin = -1;
 }
 
-/* A HycoProgress of solutions: it also renews the last words. */
+/* A HycoProgress of solutions: it also renews the last words, which count those of former calls for other points too. */
 PetscErrorCode DriverProgress(PetscInt done, PetscInt n, void *ctx)
 {
-  char share[64];
+  static PetscInt before, last;
+  char stored[64];
 
   PetscFunctionBegin;
-  snprintf(share, sizeof(share), "%d of %d", (int)done, (int)n);
-  if (kept_in[0]) SetLastWords(share);
+  if (done < last) before += last;
+  last = done;
+  snprintf(stored, sizeof(stored), "%d", (int)(before + done));
+  if (kept_in[0]) SetLastWords(stored);
   Show((const char *)ctx, done, n, PETSC_TRUE);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
