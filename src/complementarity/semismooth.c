@@ -52,6 +52,7 @@ typedef struct {
   PetscReal *step, *trial;        /* n; 3 n: z, w and the change of w */
   PetscReal start;                /* the largest force at the start */
   HycoConeStep *linear;
+  PetscBool soft; /* the scales are those without motions on soft supports */
   PetscInt its;
 } Newton;
 
@@ -120,6 +121,7 @@ static PetscErrorCode SetScales(Newton *h, PetscBool *soft)
     most = PetscMax(most, rho[i]);
   }
   if (soft) PetscCall(TakeSoft(h, rho, soft));
+  h->soft = (PetscBool)(soft && *soft);
   for (PetscInt k = 0; k < b->n; k++) {
     const PetscInt first = h->p + b->row[k], size = b->row[k + 1] - b->row[k];
     PetscReal mean = 0;
@@ -288,7 +290,8 @@ static PetscErrorCode Improve(Newton *h, PetscReal z[], PetscReal *norm, PetscRe
     PetscCall(HycoConeStepRenew(h->linear));
     PetscCall(Step(h, z, PETSC_TRUE, PETSC_FALSE, regular));
     /* Not where forces are not unique: proximal steps find those near the last ones. */
-    if (*regular) PetscCall(Search(h, h->linear->nearly_singular ? LEAST_STEP : TINY_STEP, z, norm, size, less));
+    if (*regular)
+      PetscCall(Search(h, h->linear->nearly_singular && !h->soft ? LEAST_STEP : TINY_STEP, z, norm, size, less));
   }
   /* Nothing to gain from least squares: the step was good, J is regular, or |F| is round-off already. */
   if (*less || !h->linear->nearly_singular || *norm <= ROUNDING * *size) PetscFunctionReturn(PETSC_SUCCESS);
