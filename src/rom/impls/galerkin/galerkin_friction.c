@@ -9,6 +9,7 @@
   follow from (41), which combines whole force vectors (hybrid/reconstruct.c), at each accepted time; slips are those
   of the displacements.
 */
+#include <hycocoulomb.h>
 #include <hycogalerkin.h>
 #include <hycopath.h>
 #include <hycoslip.h>
@@ -125,18 +126,20 @@ PetscErrorCode HycoGalerkinFrictionRows(HycoROM m)
   PetscCall(HycoSlipCoefficients(&f->own, m->fe, &g->own_pairs));
   PetscCall(HycoContactTangentRows(m->fe, &g->own_pairs, f->own.row, f->U_old, f->own.tangent, rows->start, rows->dof,
                                    rows->value, rows->gap));
-  for (PetscInt r = 0; r < m->n_L; r++) {
-    const PetscInt end = rows->start[r + 1];
-    PetscBool tested = PETSC_TRUE;
+  for (PetscInt k = 0; k < m->m; k++) {
+    for (PetscInt r = f->own.row[k]; r < f->own.row[k + 1]; r++) {
+      const PetscInt end = rows->start[r + 1];
+      PetscBool tested = PETSC_TRUE;
 
-    if (r != f->own.row[HycoGalerkinContactOf(g, r)]) PetscCall(IsTested(g, begin, end, &tested));
-    for (PetscInt e = begin; e < end && tested; e++, n++) {
-      rows->dof[n] = rows->dof[e];
-      rows->value[n] = rows->value[e];
+      if (r > f->own.row[k]) PetscCall(IsTested(g, begin, end, &tested));
+      for (PetscInt e = begin; e < end && tested; e++, n++) {
+        rows->dof[n] = rows->dof[e];
+        rows->value[n] = rows->value[e];
+      }
+      if (!tested) rows->gap[r] = 0;
+      rows->start[r + 1] = n;
+      begin = end;
     }
-    if (!tested) rows->gap[r] = 0;
-    rows->start[r + 1] = n;
-    begin = end;
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -217,14 +220,12 @@ static PetscErrorCode ComputeSlips(HycoROM m, HycoFE fe, PetscReal *most)
    the modes. */
 static void Slip(PetscReal mu, PetscReal rho, PetscInt n, PetscReal force[], PetscReal slack[])
 {
-  PetscReal size = 0, work = 0;
+  const PetscReal data[2] = {mu, 0};
+  PetscReal y[3] = {force[0]}, work = 0;
 
-  for (PetscInt j = 1; j < n; j++) size += PetscSqr(force[j] - rho * slack[j]);
-  size = PetscSqrtReal(size);
-  for (PetscInt j = 1; j < n; j++) {
-    if (size > mu * force[0]) force[j] = (force[j] - rho * slack[j]) * mu * force[0] / size;
-    work -= force[j] * slack[j];
-  }
+  for (PetscInt j = 1; j < n; j++) y[j] = force[j] - rho * slack[j];
+  if (HycoTangential(n, y) > mu * force[0]) HycoCoulombProject(n, data, y, force);
+  for (PetscInt j = 1; j < n; j++) work -= force[j] * slack[j];
   for (PetscInt j = 1; j < n && work < 0; j++) slack[j] = 0;
 }
 
