@@ -34,6 +34,7 @@ history: {times: [%s], tables: {bolt: [[0, 0], [1, 1]], shear: [[1, 0], [2, 1], 
 output: {pull: {reaction: x, group: pulled}}
 """
 STROKE, PRESSURE, FRICTION, STICK = 0.0005, 1, 0.25, 1e6
+STEEL = (2.1e5, 0.3)
 MATERIAL = {'a': (100, 0.3), 'b': (40, 0.2)}
 
 
@@ -52,24 +53,31 @@ def nodes_of(grid, group):
     return sorted({v for nodes in elements_of(grid, group) for v in nodes})
 
 
-def deck(grid):
-    """CalculiX's input; the faces S1 and S2 of a hexahedron have its first and last four nodes."""
+FACES = ((0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))  # S1 to S6 of a hexahedron
+
+
+def model(grid, material, slave, master, friction=()):
+    """CalculiX's lines of nodes, bodies and their contact; and by the nodes of a face its element and number."""
     out, count, sides = ['*NODE, NSET=ALL'], 0, {}
     out += ['%d, %.12g, %.12g, %.12g' % (i + 1, *x) for i, x in enumerate(grid.nodes)]
-    for body, facets, face in (('a', 'a_top', 2), ('b', 'b_low', 1)):
-        known = [set(f) for f in elements_of(grid, facets)]
+    for body, values in material.items():
         out.append(f'*ELEMENT, TYPE=C3D8, ELSET=E{body}')
         for nodes in elements_of(grid, body):
             count += 1
             out.append(f'{count}, {", ".join(map(str, nodes))}')
-            if set(nodes[4:] if face == 2 else nodes[:4]) in known:
-                sides.setdefault(facets, []).append(f'{count}, S{face}')
-        out += [f'*MATERIAL, NAME=M{body}', '*ELASTIC', '%g, %g' % MATERIAL[body], f'*SOLID SECTION, ELSET=E{body}, MATERIAL=M{body}']
-    for name, facets in (('SLAVE', 'b_low'), ('MASTER', 'a_top')):
-        out += [f'*SURFACE, NAME={name}, TYPE=ELEMENT', *sides[facets]]
-    out += ['*SURFACE INTERACTION, NAME=SI', '*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=HARD',
-            '*CONTACT PAIR, INTERACTION=SI, TYPE=MORTAR', 'SLAVE, MASTER', '*BOUNDARY', *(f'{i}, 1, 3' for i in nodes_of(grid, 'base')),
-            '*STEP', '*STATIC', '1., 1.', '*BOUNDARY']
+            for k, face in enumerate(FACES):
+                sides[frozenset(nodes[v] for v in face)] = (count, k + 1)
+        out += [f'*MATERIAL, NAME=M{body}', '*ELASTIC', '%g, %g' % values, f'*SOLID SECTION, ELSET=E{body}, MATERIAL=M{body}']
+    for name, group in (('SLAVE', slave), ('MASTER', master)):
+        out += [f'*SURFACE, NAME={name}, TYPE=ELEMENT', *('%d, S%d' % sides[frozenset(f)] for f in elements_of(grid, group))]
+    return [*out, '*SURFACE INTERACTION, NAME=SI', '*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=HARD', *friction,
+            '*CONTACT PAIR, INTERACTION=SI, TYPE=MORTAR', 'SLAVE, MASTER'], sides
+
+
+def deck(grid):
+    """CalculiX's input of the blocks."""
+    out, _ = model(grid, MATERIAL, 'b_low', 'a_top')
+    out += ['*BOUNDARY', *(f'{i}, 1, 3' for i in nodes_of(grid, 'base')), '*STEP', '*STATIC', '1., 1.', '*BOUNDARY']
     for i in nodes_of(grid, 'top'):
         out += [f'{i}, 1, 2, 0.', '%d, 3, 3, %.12g' % (i, -0.003 * (1 + grid.nodes[i - 1][0]))]
     return '\n'.join([*out, '*CONTACT FILE', 'CDIS, CSTR', '*END STEP', ''])
@@ -95,23 +103,10 @@ def middle(grid, nodes):
 
 
 def lap_deck(grid):
-    """CalculiX's input: the bolt, then three strokes, in steps of time as the scene's. Faces of a hexahedron are S1 to S6."""
-    out, sides, count = ['*NODE, NSET=ALL'], {}, 0
-    out += ['%d, %.12g, %.12g, %.12g' % (i + 1, *x) for i, x in enumerate(grid.nodes)]
-    out += ['*MATERIAL, NAME=STEEL', '*ELASTIC', '2.1e5, 0.3']
-    for body in ('lower', 'upper'):
-        out.append(f'*ELEMENT, TYPE=C3D8, ELSET=E{body}')
-        for nodes in elements_of(grid, body):
-            count += 1
-            out.append(f'{count}, {", ".join(map(str, nodes))}')
-            for k, face in enumerate(((0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))):
-                sides[frozenset(nodes[v] for v in face)] = (count, k + 1)
-        out.append(f'*SOLID SECTION, ELSET=E{body}, MATERIAL=STEEL')
-    for name, group in (('SLAVE', 'upper_face'), ('MASTER', 'lower_face')):
-        out += [f'*SURFACE, NAME={name}, TYPE=ELEMENT', *('%d, S%d' % sides[frozenset(f)] for f in elements_of(grid, group))]
-    out += ['*SURFACE INTERACTION, NAME=SI', '*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=HARD', '*FRICTION', f'{FRICTION}, {STICK}',
-            '*CONTACT PAIR, INTERACTION=SI, TYPE=MORTAR', 'SLAVE, MASTER', '*NSET, NSET=PULLED', *(f'{i},' for i in nodes_of(grid, 'pulled')),
-            '*BOUNDARY', *(f'{i}, 1, 2' for i in nodes_of(grid, 'clamped')), 'PULLED, 2, 2', *(f'{i}, 3, 3' for i in nodes_of(grid, 'flat'))]
+    """CalculiX's input of the lap joint: the bolt, then three strokes, in steps of time as the scene's."""
+    out, sides = model(grid, {'lower': STEEL, 'upper': STEEL}, 'upper_face', 'lower_face', ('*FRICTION', f'{FRICTION}, {STICK}'))
+    out += ['*NSET, NSET=PULLED', *(f'{i},' for i in nodes_of(grid, 'pulled')), '*BOUNDARY', *(f'{i}, 1, 2' for i in nodes_of(grid, 'clamped')),
+            'PULLED, 2, 2', *(f'{i}, 3, 3' for i in nodes_of(grid, 'flat'))]
     washers = [f for back in ('lower_back', 'upper_back') for f in elements_of(grid, back) if abs(middle(grid, f)) < 8]
     for step, (end, increment) in enumerate(((0, 0.25), (1, 0.25), (-1, 0.125), (1, 0.125))):
         out += ['*STEP, INC=100', '*STATIC', f'{increment}, 1., 1e-6, {increment}']
