@@ -40,6 +40,9 @@ PetscErrorCode HycoSceneGetParameters(HycoScene scene, PetscInt *n, const char *
    collective. Borrowed. */
 #define HYCO_MAX_QUANTITIES 16
 PetscErrorCode HycoSceneGetQuantities(HycoScene scene, PetscInt *n, const char *names[HYCO_MAX_QUANTITIES]);
+/* Gets their units in the same order, products of those of `scene: unit`: "N mm" of a moment; "": not known, as of areas. Not
+   collective. Borrowed. */
+PetscErrorCode HycoSceneGetQuantityUnits(HycoScene scene, PetscInt *n, const char *units[HYCO_MAX_QUANTITIES]);
 /* at[k]: the number in `other` of the scene's output k, by name and definition; -1: `other` does not have it. Not
    collective. */
 void HycoSceneMatchQuantities(HycoScene scene, HycoScene other, PetscInt at[]);

@@ -359,7 +359,7 @@ static PetscErrorCode AddQuantity(Export *e, PetscInt k)
     PetscCall(AddRow(e, (Row){.from = QUANTITY, .index = k, .group = e->out.m.n_outputs}));
     if (pushed) PetscCall(AddPush(e, pushed, q->field, &o));
   }
-  PetscCall(HycoExportAddOutput(&e->out, &o, q->name, HycoExportUnit(e->s, q)));
+  PetscCall(HycoExportAddOutput(&e->out, &o, q->name, q->unit));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -368,7 +368,7 @@ static PetscErrorCode FindOutputs(Export *e)
 {
   const HycoScene s = e->s;
   HycoQuantity q = {0};
-  char name[HYCO_LINE];
+  char name[HYCO_LINE], unit[HYCO_LINE];
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(e->m->pairs.n + 1, &e->area));
@@ -389,7 +389,8 @@ static PetscErrorCode FindOutputs(Export *e)
       else
         PetscCall(AddRow(e, (Row){.from = FORCE, .index = c, .axis = a, .group = e->out.m.n_outputs}));
       HycoFormat(name, "%s.force_%c", s->contact[c]->name, "xyz"[a]);
-      PetscCall(HycoExportAddOutput(&e->out, &o, name, HycoExportUnit(s, &q)));
+      HycoQuantityUnit(s, &q, unit);
+      PetscCall(HycoExportAddOutput(&e->out, &o, name, unit));
     }
     for (PetscInt a = 0; a < 2; a++) {
       Output o = {.kind = a ? PRESSURE : CLOSED, .weight = -1};
@@ -397,7 +398,8 @@ static PetscErrorCode FindOutputs(Export *e)
       q.kind = a ? HYCO_QUANTITY_PRESSURE : HYCO_QUANTITY_AREA;
       PetscCall(AddContacts(e, &q, &o));
       HycoFormat(name, "%s.%s", s->contact[c]->name, a ? "pressure_max" : "area");
-      PetscCall(HycoExportAddOutput(&e->out, &o, name, HycoExportUnit(s, &q)));
+      HycoQuantityUnit(s, &q, unit);
+      PetscCall(HycoExportAddOutput(&e->out, &o, name, unit));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);

@@ -96,8 +96,6 @@ PetscErrorCode HycoExportAddWeight(HycoExportModel *model, PetscReal weight);
 PetscErrorCode HycoExportAddTerm(HycoExportModel *model, PetscInt value, PetscInt function, PetscInt n,
                                  const PetscReal term[]);
 PetscErrorCode HycoExportModelFree(HycoExportModel *model);
-/* The unit of an output of the scene, "" where the scene has none. Borrowed, until the next call. */
-const char *HycoExportUnit(HycoScene scene, const HycoQuantity *quantity);
 /* The text of an entry of the scene; "": there is none. */
 const char *HycoExportEntry(HycoScene scene, const char key[]);
 /* Fails if FILE.c or FILE.h exists and was not written by an export. */

@@ -81,24 +81,6 @@ PetscErrorCode HycoExportModelFree(HycoExportModel *m)
 
 /* -- names -- */
 
-/* A moment's unit is put together in static memory, valid until the next call. */
-const char *HycoExportUnit(HycoScene s, const HycoQuantity *q)
-{
-  static char text[HYCO_LINE];
-  const char *length = s->unit[HYCO_UNIT_LENGTH], *force = s->unit[HYCO_UNIT_FORCE];
-
-  if (q->kind == HYCO_QUANTITY_REACTION || q->kind == HYCO_QUANTITY_FORCE ||
-      (q->kind == HYCO_QUANTITY_FRICTION && q->field != HYCO_FRICTION_WORK))
-    return force;
-  if (q->kind == HYCO_QUANTITY_PRESSURE || q->kind == HYCO_QUANTITY_PRESSURE_MIN) return s->unit[HYCO_UNIT_STRESS];
-  if (q->kind < HYCO_QUANTITY_REACTION)
-    return HycoQuantityFields[q->field][0] == 'u' ? length : s->unit[HYCO_UNIT_STRESS];
-  text[0] = '\0';
-  if ((q->kind == HYCO_QUANTITY_MOMENT || q->kind == HYCO_QUANTITY_FRICTION) && force[0] && length[0])
-    HycoFormat(text, "%s %s", force, length);
-  return text;
-}
-
 /* The text of an entry, or "". Borrowed. */
 const char *HycoExportEntry(HycoScene s, const char key[])
 {

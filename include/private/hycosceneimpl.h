@@ -138,6 +138,7 @@ typedef enum { HYCO_EXTREME_OWN, HYCO_EXTREME_MAX, HYCO_EXTREME_MIN, HYCO_EXTREM
 typedef struct {
   char *name, *group; /* group NULL: all of the mesh */
   char *contact;      /* NULL: all contacts */
+  char *unit;         /* from the scene's units; "": not known */
   PetscBool given;    /* the kind and the field are given */
   HycoQuantityKind kind;
   PetscInt field; /* index in HycoQuantityFields; along or about an axis 0 to 2; HYCO_FRICTION_WORK */
@@ -145,6 +146,8 @@ typedef struct {
 } HycoQuantity;
 extern const char *const HycoQuantityFields[]; /* NULL ends */
 #define HYCO_FRICTION_WORK 3
+/* Its unit, from those of the scene; "": not known. */
+void HycoQuantityUnit(HycoScene scene, const HycoQuantity *quantity, char unit[HYCO_LINE]);
 
 /* -- begin: in exported models too -- */
 /* A time table: linear between its rows, constant before the first and after the last. */

@@ -240,6 +240,7 @@ class Scene(_Handle):
 
     parameters  {name: (lo, hi)} in the order of the points' components
     outputs     names of the outputs
+    units       {name: unit} of the outputs, of the scene's `unit:`; '' where it is not known
     contacts    names of the contacts
     times       the listed times of its history; empty without one
     """
@@ -258,6 +259,7 @@ class Scene(_Handle):
                 c.call('PetscOptionsClearValue', None, f'-{name}'.encode())
         self.parameters = _parameters(self._handle)
         self.outputs = _names('HycoSceneGetQuantities', self._handle)
+        self.units = dict(zip(self.outputs, _names('HycoSceneGetQuantityUnits', self._handle)))
         self.contacts = _names('HycoSceneGetContacts', self._handle)
         n, times = c.count(), ctypes.c_void_p()
         c.call('HycoSceneGetHistory', self._handle, ctypes.byref(n), ctypes.byref(times))
@@ -463,6 +465,7 @@ class Model(_Handle):
 
     parameters  {name: (lo, hi)} of its training
     outputs     names of the outputs
+    units       {name: unit} of the outputs, '' where it is not known
     contacts    names of the contacts
     type        'hybrid', 'bodies', ...
     n_contacts  number of contact forces
@@ -481,6 +484,7 @@ class Model(_Handle):
         self.type = kind.value.decode()
         self.parameters = _parameters(scene)
         self.outputs = _names('HycoSceneGetQuantities', scene)
+        self.units = dict(zip(self.outputs, _names('HycoSceneGetQuantityUnits', scene)))
         self.contacts = _names('HycoSceneGetContacts', scene)
         times = c.count()
         c.call('HycoSceneGetHistory', scene, ctypes.byref(times), None)

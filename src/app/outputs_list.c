@@ -136,6 +136,8 @@ static const Written written[] = {
     {"report", "solve", "contact.moment", "numbers", "moment", "as of supports"},
     {"report", "solve", "balance", "number", "-", "sum of all forces on the bodies, relative to the largest"},
     {"report", "solve predict", "outputs.OUTPUT", "number?", "output", "outputs of the scene"},
+    {"report", "solve predict", "output_units.OUTPUT", "text", "-",
+     "their units, of the scene's `unit`; empty: not known, as of areas"},
     {"report", "solve predict", "gradient.OUTPUT.PARAMETER", "number", "output / parameter",
      "-gradient: derivative of an output; at a kink one-sided"},
     {"report", "solve predict", "gradient_undecided", "count", "-", "contacts with neither force nor gap"},

@@ -83,17 +83,21 @@ PetscErrorCode ReportContacts(cJSON *json, PetscInt n_contacts, PetscInt n_facin
 /* NaN is written as null by cJSON: an output without a value, as a model without reconstruction has it. */
 PetscErrorCode ReportQuantities(cJSON *json, HycoScene scene, const PetscReal value[])
 {
-  const char *names[HYCO_MAX_QUANTITIES];
-  cJSON *object;
+  const char *names[HYCO_MAX_QUANTITIES], *units[HYCO_MAX_QUANTITIES];
+  cJSON *object, *given;
   PetscInt n;
 
   PetscFunctionBegin;
   PetscCall(HycoSceneGetQuantities(scene, &n, names));
+  PetscCall(HycoSceneGetQuantityUnits(scene, &n, units));
   if (!n) PetscFunctionReturn(PETSC_SUCCESS);
   object = cJSON_AddObjectToObject(json, "outputs");
+  given = cJSON_AddObjectToObject(json, "output_units");
   for (PetscInt k = 0; k < n; k++) {
     cJSON_AddNumberToObject(object, names[k], value[k]);
-    PetscCall(DriverPrint("%s %.6g%s", names[k], (double)value[k], k + 1 < n ? ", " : "\n"));
+    cJSON_AddStringToObject(given, names[k], units[k]);
+    PetscCall(DriverPrint("%s %.6g%s%s%s", names[k], (double)value[k], units[k][0] ? " " : "", units[k],
+                          k + 1 < n ? ", " : "\n"));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -307,11 +307,12 @@ static PetscErrorCode PrintLeftOut(const HycoTraining *t)
 /* A line for each output of the scene: its errors in its own unit, and its size. */
 static PetscErrorCode PrintOutputs(const Search *s, const HycoTraining *t)
 {
-  const char *names[HYCO_MAX_QUANTITIES];
+  const char *names[HYCO_MAX_QUANTITIES], *units[HYCO_MAX_QUANTITIES];
   PetscInt n;
 
   PetscFunctionBegin;
   PetscCall(HycoSceneGetQuantities(s->scene, &n, names));
+  PetscCall(HycoSceneGetQuantityUnits(s->scene, &n, units));
   for (PetscInt q = 0; q < n; q++) {
     const HycoOutputValidation *o = &t->output[q];
 
@@ -319,9 +320,9 @@ static PetscErrorCode PrintOutputs(const Search *s, const HycoTraining *t)
       PetscCall(DriverPrint("output %s: its error is not known%s, and not estimated\n", names[q],
                             IsPath(s) ? " (snapshots from before a reaction was named do not have it)" : ""));
     else
-      PetscCall(DriverPrint("output %s: errors median %.3g, largest %.3g; values up to %.4g%s\n", names[q],
-                            (double)o->median, (double)o->largest, (double)o->magnitude,
-                            o->magnitude > 0 ? "" : "; no estimate: it is zero at all held-out points"));
+      PetscCall(DriverPrint("output %s: errors median %.3g, largest %.3g; values up to %.4g%s%s%s\n", names[q],
+                            (double)o->median, (double)o->largest, (double)o->magnitude, units[q][0] ? " " : "",
+                            units[q], o->magnitude > 0 ? "" : "; no estimate: it is zero at all held-out points"));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
 }

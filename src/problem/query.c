@@ -28,6 +28,15 @@ PetscErrorCode HycoSceneGetQuantities(HycoScene scene, PetscInt *n, const char *
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+PetscErrorCode HycoSceneGetQuantityUnits(HycoScene scene, PetscInt *n, const char *units[HYCO_MAX_QUANTITIES])
+{
+  PetscFunctionBegin;
+  HycoCheckHandle(scene, HYCO_SCENE_CLASSID);
+  *n = scene->n_quantities;
+  for (PetscInt k = 0; k < *n && units; k++) units[k] = scene->quantity[k].unit;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The order is that of the numbers in pairs, results and fields: by the entries of the scene. Called with NULL
    first for the number, because scenes have no limit of contacts, unlike outputs. */
 PetscErrorCode HycoSceneGetContacts(HycoScene scene, PetscInt *n, const char *names[])

@@ -697,6 +697,26 @@ static PetscErrorCode ReadFormulation(HycoScene s)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* From the scene's units; "": not known, as of areas, whose dimension is that of the mesh. Products stand side by side,
+   "N mm". */
+void HycoQuantityUnit(HycoScene s, const HycoQuantity *q, char unit[HYCO_LINE])
+{
+  const char *length = s->unit[HYCO_UNIT_LENGTH], *force = s->unit[HYCO_UNIT_FORCE],
+             *stress = s->unit[HYCO_UNIT_STRESS];
+  const PetscBool work = (PetscBool)(q->kind == HYCO_QUANTITY_FRICTION && q->field == HYCO_FRICTION_WORK);
+
+  if (q->kind == HYCO_QUANTITY_AREA || ((work || q->kind == HYCO_QUANTITY_MOMENT) && (!force[0] || !length[0])))
+    unit[0] = '\0';
+  else if (work || q->kind == HYCO_QUANTITY_MOMENT)
+    HycoFormat(unit, "%s %s", force, length);
+  else if (q->kind >= HYCO_QUANTITY_PRESSURE)
+    HycoFormat(unit, "%s", stress);
+  else if (q->kind >= HYCO_QUANTITY_REACTION)
+    HycoFormat(unit, "%s", force);
+  else
+    HycoFormat(unit, "%s", HycoQuantityFields[q->field][0] == 'u' ? length : stress);
+}
+
 /* The mesh may be missing: a program may give a DM. */
 static PetscErrorCode FindMesh(HycoScene s, const char folder[])
 {
@@ -749,6 +769,12 @@ static PetscErrorCode Build(HycoScene s, const char folder[])
       PetscCall(ReadMember(s, k));
   }
   PetscCall(CheckScene(s));
+  for (PetscInt k = 0; k < s->n_quantities; k++) {
+    char unit[HYCO_LINE];
+
+    HycoQuantityUnit(s, &s->quantity[k], unit);
+    PetscCall(PetscStrallocpy(unit, &s->quantity[k].unit));
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -921,7 +947,7 @@ PetscErrorCode HycoSceneDestroy(HycoScene *scene)
     HycoFreeAll(&s->key[k], &s->value[k]);
   }
   for (PetscInt k = 0; k < s->n_quantities; k++) {
-    HycoFreeAll(&s->quantity[k].name, &s->quantity[k].group, &s->quantity[k].contact);
+    HycoFreeAll(&s->quantity[k].name, &s->quantity[k].group, &s->quantity[k].contact, &s->quantity[k].unit);
   }
   for (PetscInt p = 0; p < s->n_variables; p++) PetscCall(PetscFree(s->parameter[p]));
   PetscCall(HycoSceneDestroyHistory(s));

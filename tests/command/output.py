@@ -25,7 +25,8 @@ fixed: {top: {x: "0.01*s", y: "-0.002*min(t,1)"}}
 spring: {left: {x: 1}}
 contact: {floor: {type: obstacle, group: base, normal: {y: -1}, gap: 0, friction: mu}}
 history: {times: [0, 1, 2], tables: {s: [[0, 0], [1, 0], [2, 1]]}}
-output: {pull: {friction: x, contact: floor}, low: {min: u_y}}
+output:
+  {pull: {friction: x, contact: floor}, low: {min: u_y}, peak: {max: mises}, heat: {friction: work}, turn: {moment: z, contact: floor}, touch: {area: closed, contact: floor}}
 """
 RIGID = """
 scene: {title: punch, mesh: mesh.msh, parameters: [load]}
@@ -104,7 +105,7 @@ class Output(Case):
 
     def columns(self, of):
         """The columns of a kind of table, as expressions for the names in them."""
-        names = {'PARAMETER': 'mu|mu1|mu2|crown|press', 'OUTPUT': 'pull|low|most', 'CONTACT': 'floor|ground|under', 'ERROR': r'\w+'}
+        names = {'PARAMETER': 'mu|mu1|mu2|crown|press', 'OUTPUT': 'pull|low|peak|heat|turn|touch|most', 'CONTACT': 'floor|ground|under', 'ERROR': r'\w+'}
         return [''.join(f'({names[word]})' if word in names else re.escape(word) for word in re.split('(PARAMETER|OUTPUT|CONTACT|ERROR)', row[2]))
                 for row in self.list if row[0] == 'table' and (row[1] in ('all', *of) or set(of) & set(row[1].split()) and ' of ' not in row[1] and '-' not in row[1])]
 
@@ -124,6 +125,13 @@ class Output(Case):
                 continue
             parts = '.'.join('NAME' + p[len(p.rstrip('[]')):] if p.rstrip('[]').isupper() else p for p in name.split('.'))
             self.assertIn(parts, known, f'{name} of {of} is listed and not written')
+
+    def test_units(self):
+        """Units of outputs follow from those of the scene, in reports and beside the printed numbers."""
+        units = {'pull': 'N', 'low': 'mm', 'peak': 'MPa', 'heat': 'N mm', 'turn': 'N mm', 'touch': ''}
+        self.assertEqual(next(report['output_units'] for _, report in self.reports if 'pull' in report.get('outputs', ())), units)
+        run = self.run_raw('solve', '-scene', self.path('pad.yaml'), '-mu', '0.3')
+        self.assertRegex(run.stdout, ', '.join(f'{name} [^ ]+{" " * bool(unit)}{unit}' for name, unit in sorted(units.items())) + '\n')
 
     def test_tables(self):
         """Columns of tables, as .csv and as datasets of one dimension, are in the list."""
