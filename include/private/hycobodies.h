@@ -326,6 +326,8 @@ PetscErrorCode HycoBodiesAddRows(HycoBodiesWork work, PetscInt k, const PetscRea
 PetscErrorCode HycoBodiesForgetBeside(HycoBodiesWork work);
 /* w[p] of the present loads and forces, on the motions that contact alone prevents. */
 void HycoBodiesWorkOnMotions(HycoBodiesWork work, PetscReal w[]);
+/* The part of the loads, without round-off. */
+PetscReal HycoBodiesLoadWork(HycoBodiesWork work, PetscInt motion);
 /* M of n contacts at the prepared parameters: p + n square by columns. */
 PetscErrorCode HycoBodiesMatrix(HycoBodiesWork work, PetscInt n, const PetscInt contact[], PetscReal M[]);
 /* Ops of gradients. */

@@ -32,8 +32,9 @@ PetscErrorCode HycoDirectAnalyse(HycoDirect direct, Mat K, Mat Bt, Mat B, PetscB
 PetscReal HycoDirectOperations(HycoDirect direct);
 /* Factors, after HycoDirectAnalyse() with the same matrices: S = B K^-1 Bt, m x m, column major, on every rank. */
 PetscErrorCode HycoDirectFactor(HycoDirect direct, Mat K, Mat Bt, Mat B, PetscReal S[], PetscBool *singular);
-/* g = D - B K^-1 F on every rank; D (length m) is read on rank 0. */
-PetscErrorCode HycoDirectReduce(HycoDirect direct, Vec F, const PetscReal D[], PetscReal g[]);
+/* g = D - B K^-1 F on every rank; D (length m) is read on rank 0. K: that of the factor, to tell work on its null space from
+   round-off as HycoKernelClean() does; NULL: it is left. */
+PetscErrorCode HycoDirectReduce(HycoDirect direct, Mat K, PetscReal least, Vec F, const PetscReal D[], PetscReal g[]);
 /* x = K^-1 (F - Bt L) with the F of the last HycoDirectReduce(); L (length m) is read on rank 0. */
 PetscErrorCode HycoDirectExpand(HycoDirect direct, const PetscReal L[], Vec x);
 /* The same for k right-hand sides, D = 0: g and L are m x k column major. */
@@ -55,6 +56,10 @@ PetscErrorCode HycoKernelPins(MPI_Comm comm, Mat K, PetscInt n, PetscInt pinned[
   Collective.
 */
 PetscErrorCode HycoKernelWork(Mat K, Vec x, Vec F, Vec b, PetscReal *share);
+/* w[i], the same on every rank: the work of F on the motion in K's null space that moves the unknown pinned[i] by 1 and none of the
+   n others. It is set to 0 where it is round-off of its terms, or below `least` (of a force on the largest displacement of
+   the motion). Collective. */
+PetscErrorCode HycoKernelClean(Mat K, Vec F, PetscInt n, const PetscInt pinned[], PetscReal least, PetscReal w[]);
 
 /* place[i] on rank 0: position of unknown i (of n) in a fill-reducing order of K. Collective. */
 PetscErrorCode HycoDissection(MPI_Comm comm, Mat K, PetscInt place[]);

@@ -17,12 +17,15 @@ struct _p_HycoSystem {
   /* work vectors of the residuals, created by the first */
   Vec work_x[2], work_L; /* like F, like D */
   PetscReal size_B;      /* its largest row sum, valid while B is unchanged */
+  PetscReal rounding;    /* of an entry of F, where F is a difference; 0: not known */
   PetscReal residual;    /* 2-norm of F - K x - Bt L beyond round-off, when residuals were last computed */
   HycoOperatorState seen_B;
 };
 
 /* Fails on every rank if the blocks are not those of the rows. Collective. */
 PetscErrorCode HycoSystemCheckBlocks(HycoSystem system);
+/* The round-off of an entry of the F that is set: a smaller load on a floating body is none. */
+void HycoSystemSetRounding(HycoSystem system, PetscReal rounding);
 /* Creates the work vectors of a system whose vectors are set. */
 PetscErrorCode HycoSystemWork(HycoSystem system);
 

@@ -112,19 +112,19 @@ static PetscErrorCode Rounding(HycoPath p, PetscReal *least)
 /* rhs = K U + F - f_int: the right-hand side of the contact system. r is F - f_int - B^T L on entry, so that B^T L is
    added back. Where all loads vanish, their sum is round-off, and it is 0 then. The system's unknowns are U and L
    themselves and not their changes, since contact conditions are on the whole of both. first: of a step, which moves the
-   supports; later iterates have their new values. */
-static PetscErrorCode RightSide(HycoPath p, PetscBool first)
+   supports; later iterates have their new values. *least: as of Rounding(). */
+static PetscErrorCode RightSide(HycoPath p, PetscBool first, PetscReal *least)
 {
-  PetscReal least, size = 0;
+  PetscReal size = 0;
 
   PetscFunctionBegin;
   PetscCall(MatMult(p->K, p->U, p->rhs));
-  PetscCall(Rounding(p, &least));
+  PetscCall(Rounding(p, least));
   PetscCall(VecAXPY(p->rhs, 1, p->r));
   if (p->n_contacts) PetscCall(MatMultAdd(p->Bt, p->Lambda, p->rhs, p->rhs));
   if (first) PetscCall((*p->ops->moves)(p, p->rhs));
-  if (least >= 0) PetscCall(VecNorm(p->rhs, NORM_INFINITY, &size));
-  if (size <= least) PetscCall(VecSet(p->rhs, 0));
+  if (*least >= 0) PetscCall(VecNorm(p->rhs, NORM_INFINITY, &size));
+  if (size <= *least) PetscCall(VecSet(p->rhs, 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -154,12 +154,13 @@ static PetscReal Target(HycoPath p, const Progress *now)
 static PetscErrorCode SolveSystem(HycoPath p, PetscBool first, const Progress *now, HycoStepAttempt *a)
 {
   HycoReason reason;
-  PetscReal factor, solve;
+  PetscReal factor, solve, least;
   PetscInt its, linear, most;
 
   PetscFunctionBegin;
-  PetscCall(RightSide(p, first));
+  PetscCall(RightSide(p, first, &least));
   PetscCall(HycoSystemSetVectors(p->system, p->rhs, p->D));
+  HycoSystemSetRounding(p->system, PetscMax(least, 0));
   PetscCall(HycoSolverSetSystem(p->solver, p->system));
   PetscCall(VecCopy(p->U, p->G));
   if (p->n_contacts) PetscCall(VecCopy(p->Lambda, p->L_new));
@@ -368,9 +369,10 @@ static PetscErrorCode Judge(HycoPath p, const Progress *now, HycoStepAttempt *a,
 {
   HycoKKT *kkt = &p->kkt;
   const PetscReal size = now->size > 0 ? now->size : 1;
+  PetscReal least;
 
   PetscFunctionBegin;
-  PetscCall(RightSide(p, PETSC_FALSE));
+  PetscCall(RightSide(p, PETSC_FALSE, &least));
   PetscCall(HycoSystemSetVectors(p->system, p->rhs, p->D));
   HycoLogged(HYCO_EVENT_KKT, HycoSystemComputeKKT(p->system, p->U, p->Lambda, kkt));
   *worst = PetscMax(kkt->penetration, PetscMax(kkt->adhesion, kkt->complementarity));

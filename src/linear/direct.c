@@ -457,7 +457,7 @@ static PetscErrorCode Run(HycoDirect d, int part)
 }
 
 /* q of the Schur variables from F and D, by forward substitution. Collective. */
-PetscErrorCode HycoDirectReduce(HycoDirect d, Vec F, const PetscReal D[], PetscReal q[])
+PetscErrorCode HycoDirectReduce(HycoDirect d, Mat K, PetscReal least, Vec F, const PetscReal D[], PetscReal q[])
 {
   PetscFunctionBegin;
   PetscCall(Fetch(d, F));
@@ -465,6 +465,7 @@ PetscErrorCode HycoDirectReduce(HycoDirect d, Vec F, const PetscReal D[], PetscR
   PetscCall(Run(d, 1));
   for (PetscInt k = 0; k < d->n_schur && d->rank == 0; k++) q[k] = k < d->n_pinned ? -d->reduced[k] : d->reduced[k];
   HycoBcast(q, d->n_schur, MPIU_REAL, d->comm);
+  if (K) PetscCall(HycoKernelClean(K, F, d->n_pinned, d->pinned, least, q));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -3,6 +3,11 @@
   as its dimension, chosen so that K without them is well conditioned, become unknowns of the dense problem.
 */
 #include <hycolinear.h>
+#include <petscblaslapack.h>
+
+#define SMALL    1e-9  /* share of the loads below which their work on a motion may be round-off */
+#define BALANCED 1e-13 /* share of its terms below which it is round-off */
+#define APART    1e-14 /* share of a motion that another body has */
 
 /* Number of rigid modes attached to K: 0 if K is regular. */
 PetscErrorCode HycoKernelSize(Mat K, PetscInt *n)
@@ -145,5 +150,82 @@ PetscErrorCode HycoKernelWork(Mat K, Vec x, Vec F, Vec b, PetscReal *share)
     *share = PetscMax(*share, one);
   }
   HycoDestroyAll(&work, &Kx);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* A[n x n], by columns: the motions at the pinned unknowns, factored. On every rank. Collective. */
+static PetscErrorCode FactorPins(MPI_Comm comm, Mat K, PetscInt n, const PetscInt pinned[], PetscReal A[],
+                                 PetscBLASInt pivot[], PetscBool *regular)
+{
+  const Vec *z;
+  MatNullSpace kernel;
+  PetscBLASInt size, info;
+  PetscInt lo, hi;
+
+  PetscFunctionBegin;
+  PetscCall(PetscBLASIntCast(n, &size));
+  PetscCall(MatGetNullSpace(K, &kernel));
+  PetscCall(MatNullSpaceGetVecs(kernel, NULL, NULL, &z));
+  PetscCall(MatGetOwnershipRange(K, &lo, &hi));
+  PetscCall(PetscArrayzero(A, n * n));
+  for (PetscInt k = 0; k < n; k++) {
+    const PetscScalar *a;
+
+    PetscCall(VecGetArrayRead(z[k], &a));
+    for (PetscInt i = 0; i < n; i++) {
+      if (pinned[i] >= lo && pinned[i] < hi) A[k * n + i] = a[pinned[i] - lo];
+    }
+    PetscCall(VecRestoreArrayRead(z[k], &a));
+  }
+  HycoAllreduce(A, n * n, MPIU_REAL, MPI_SUM, comm);
+  LAPACKgetrf_(&size, &size, A, &size, pivot, &info);
+  *regular = (PetscBool)(info == 0);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The elimination that finds w leaves more round-off than the sum of its terms, and a body that loads in equilibrium with
+   themselves do not move would be pushed by it. Only where w is small: elsewhere it keeps its digits. */
+PetscErrorCode HycoKernelClean(Mat K, Vec F, PetscInt n, const PetscInt pinned[], PetscReal least, PetscReal w[])
+{
+  const MPI_Comm comm = PetscObjectComm((PetscObject)K);
+  PetscBool regular = PETSC_FALSE, any = PETSC_FALSE;
+  PetscBLASInt size, one = 1, info, *pivot;
+  PetscReal *A, *c, all;
+  MatNullSpace kernel;
+  const Vec *z;
+  Vec motion, work;
+
+  PetscFunctionBegin;
+  if (!n) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(VecNorm(F, NORM_1, &all));
+  for (PetscInt i = 0; i < n; i++) any = (PetscBool)(any || (w[i] != 0 && PetscAbsReal(w[i]) <= SMALL * all));
+  if (!any) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscCall(PetscBLASIntCast(n, &size));
+  PetscCall(MatGetNullSpace(K, &kernel));
+  PetscCall(MatNullSpaceGetVecs(kernel, NULL, NULL, &z));
+  PetscCall(PetscMalloc3(n * n, &A, n, &c, n, &pivot));
+  PetscCall(FactorPins(comm, K, n, pinned, A, pivot, &regular));
+  HycoVecDuplicate(F, &motion, &work);
+  for (PetscInt i = 0; i < n && regular; i++) {
+    PetscReal sum, terms, reach;
+
+    if (w[i] == 0 || PetscAbsReal(w[i]) > SMALL * all) continue;
+    /* The motion that moves this pin by 1 and no other one. */
+    PetscCall(PetscArrayzero(c, n));
+    c[i] = 1;
+    LAPACKgetrs_("N", &size, &one, A, &size, pivot, c, &size, &info);
+    PetscCall(VecZeroEntries(motion));
+    for (PetscInt k = 0; k < n; k++) {
+      /* Those of other bodies have round-off here. */
+      if (PetscAbsReal(c[k]) > APART) PetscCall(VecAXPY(motion, c[k], z[k]));
+    }
+    PetscCall(VecNorm(motion, NORM_INFINITY, &reach));
+    PetscCall(VecPointwiseMult(work, motion, F));
+    PetscCall(VecSum(work, &sum));
+    PetscCall(VecNorm(work, NORM_1, &terms));
+    if (PetscAbsReal(sum) <= PetscMax(BALANCED * terms, least * reach)) w[i] = 0;
+  }
+  HycoDestroyAll(&motion, &work);
+  PetscCall(PetscFree3(A, c, pivot));
   PetscFunctionReturn(PETSC_SUCCESS);
 }

@@ -109,7 +109,13 @@ PetscErrorCode HycoSystemSetVectors(HycoSystem s, Vec F, Vec D)
   HycoDestroyAll(&s->F, &s->D);
   s->F = F;
   s->D = D;
+  s->rounding = 0;
   PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+void HycoSystemSetRounding(HycoSystem s, PetscReal rounding)
+{
+  s->rounding = rounding;
 }
 
 /* Borrowed; F is NULL where the flexibility is given, and D is then the gap without forces. */

@@ -143,6 +143,56 @@ class Overhang(Case):
         fit = self.hyco('fit', '-model', 'm.h5', '-target_rise', repr(full['outputs']['rise']), '-hold_soft', 1, '-mu_load', 0)
         self.near(fit['mu']['load'], 0.01, 1e-4)
 
+    def test_balanced(self):
+        """Loads that are in equilibrium with themselves press no body, in all points of a set and in a model: no forces, no contact closed, the body stays. A ring
+        between two plates under pressure inside; a block in a corner, pushed along one side of it only: its forces and the load agree."""
+        grid = Grid()
+        for name, y0, y1 in (('low', -1, 0), ('ring', 0, 1), ('high', 1.05, 2)):
+            radius = np.linspace(2, 3, 6) if name == 'ring' else np.linspace(1.8, 3.3, 9)
+            grid.box('quad4', [radius, np.linspace(y0, y1, 5)], lambda x: x, name, {side: f'{name}_{side}' for side in ('x0', 'y0', 'y1')})
+        self.written("""
+scene: {mesh: mesh.msh, formulation: axisymmetric, parameters: [down, p, soft]}
+parameter: {down: {range: [0, 0.08]}, p: {range: [0, 3]}, soft: {range: [0, 4]}}
+body: {low: {young: 2e5}, high: {young: 2e5}, ring: {young: "10^(soft + 1)", poisson: "0.3 + 0.049*soft", element: bbar}}
+fixed: {low_y0: {x: 0, y: 0}, high_y1: {x: 0, y: -down}}
+pressure: {ring_x0: p}
+contact: {under: {type: mortar, slave: ring_y0, master: low_y1}, over: {type: surface, slave: ring_y1, master: high_y0, tolerance: 0.2}}
+output: {force: {force: y, contact: over}, height: {mean: u_y, group: ring}}
+""", grid)
+        points = ('-values_down', '0,0.021,0.03,0.06', '-values_p', '0,0.7,3', '-values_soft', '0,1.3,4', '-table', self.path('t.csv'))
+        self.hyco('train', '-scene', 'scene.yaml', '-grid', '3,2,4', '-model', self.path('m.h5'), '-hyco_model_type', 'bodies', status=None)
+        heights = []
+        for command in (('solve', '-scene', 'scene.yaml'), ('predict', '-model', 'm.h5')):
+            self.assertEqual(self.run_raw(*command, *points).returncode, 0)
+            rows = np.genfromtxt(self.path('t.csv'), delimiter=',', names=True)
+            free = rows['down'] < 0.05
+            self.assertEqual(rows['converged'].min(), 1)
+            self.assertEqual((np.abs(rows['force'][free]).max(), rows['n_active'][free].max()), (0, 0))
+            self.assertGreater(np.abs(rows['force'][~free & (rows['p'] == 0)]).min(), 1e-3)
+            heights.append(rows['height'][free])
+        np.testing.assert_allclose(*heights, rtol=0, atol=1e-6)
+
+        grid = Grid()
+        grid.box('quad4', [np.linspace(0, 3, 7), np.linspace(0, 2, 5)], lambda x: x, 'block', {'x0': 'left', 'y0': 'under', 'x1': 'right', 'y1': 'top'})
+        grid.box('quad4', [np.linspace(-1, 4, 9), np.linspace(-1, 0, 3)], lambda x: x, 'floor', {'y1': 'seat', 'y0': 'ground'})
+        grid.box('quad4', [np.linspace(-1, 0, 3), np.linspace(0, 2.5, 6)], lambda x: x, 'wall', {'x1': 'face', 'x0': 'back'})
+        self.written("""
+scene: {mesh: mesh.msh, parameters: [px, py, gap]}
+parameter: {px: {range: [0, 20]}, py: {range: [0, 20]}, gap: {range: [-0.01, 0.02]}}
+body: {block: {young: 1e5, map: {x: x + gap}}, floor: {young: 300}, wall: {young: 300}}
+fixed: {ground: {x: 0, y: 0}, back: {x: 0, y: 0}}
+pressure: {right: px, top: py}
+contact: {side: {type: mortar, slave: left, master: face}, floor: {type: surface, slave: under, master: seat}}
+output: {fx: {force: x, contact: side}, fy: {force: y, contact: floor}}
+""", grid)
+        self.hyco('train', '-scene', 'scene.yaml', '-grid', '3,3,3', '-model', self.path('m.h5'), '-hyco_model_type', 'bodies')
+        points = ('-values_px', '0,7', '-values_py', '1,20', '-values_gap', '0.003,0.02', '-table', self.path('t.csv'))
+        for command in (('solve', '-scene', 'scene.yaml'), ('predict', '-model', 'm.h5')):
+            self.assertEqual(self.run_raw(*command, *points).returncode, 0)
+            rows = np.genfromtxt(self.path('t.csv'), delimiter=',', names=True)
+            np.testing.assert_allclose(rows['fx'], 2 * rows['px'], rtol=0, atol=1e-6)
+            np.testing.assert_allclose(rows['fy'], 3 * rows['py'], rtol=0, atol=1e-6)
+
     def test_travels(self):
         """A block that contact alone holds at places far apart: as a set each is the single solution, and `check` accepts the range."""
         grid, axis = Grid(), np.linspace(0, 1, 5)

@@ -501,6 +501,10 @@ static PetscErrorCode Respond(HycoSubstructures b, HycoBodiesFactor *factor, Pet
   /* The basis of loads as vectors; a vector may load several bodies. */
   PetscCall(FindLoaded(b, factor, b->r, factor->basis, NULL, in));
   PetscCall(ReduceBody(b, factor, k, b->r, factor->basis, in + k * b->r, u, work));
+  /* The vectors have length 1, and round-off of it on bodies that they do not load. */
+  for (PetscInt d = 0; d < b->r; d++)
+    PetscCall(HycoKernelClean(factor->fom->K, factor->basis[d], b->p, factor->pins, 16 * PETSC_MACHINE_EPSILON,
+                              work + d * b->p));
   /* By unknown, as predictions read them: R c is then one product by rows. */
   for (PetscInt d = 0; d < b->r && !factor->fom->rank; d++) {
     for (PetscInt i = 0; i < n; i++) record->R[i * b->r + d] = u[d * b->ns + b->start[k] + i];

@@ -254,10 +254,7 @@ PetscErrorCode HycoBodiesFrictionTouch(HycoBodiesFriction f, HycoBodiesWork o, P
   if (!f->present) PetscCall(Condense(f, o));
   lcp.M = f->M;
   if (alpha) PetscCall(HycoBodiesStrain(o, &f->all, alpha));
-  for (PetscInt i = 0; i < p; i++) {
-    f->q[i] = 0;
-    for (PetscInt j = 0; j < o->bodies->r; j++) f->q[i] -= o->work[i * o->bodies->r + j] * o->c[j];
-  }
+  for (PetscInt i = 0; i < p; i++) f->q[i] = -HycoBodiesLoadWork(o, i);
   PetscCall(PetscArraycpy(f->q + p, o->gap, n));
   if (!again) {
     PetscCall(PetscArrayzero(f->z, p));

@@ -39,8 +39,7 @@ void HycoBodiesWorkOnMotions(HycoBodiesWork o, PetscReal w[])
   const HycoSubstructures b = o->bodies;
 
   for (PetscInt i = 0; i < b->p; i++) {
-    w[i] = 0;
-    for (PetscInt j = 0; j < b->r; j++) w[i] -= o->work[i * b->r + j] * o->c[j];
+    w[i] = -HycoBodiesLoadWork(o, i);
     for (PetscInt k = 0; k < b->ns; k++) w[i] += o->Z[k * b->p + i] * o->f[k];
   }
 }

@@ -475,7 +475,7 @@ static PetscErrorCode TakeLoads(HycoROM m)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   const HycoBodiesWork o = &w->bodies;
-  const PetscInt p = o->bodies->p, r = o->bodies->r;
+  const PetscInt p = o->bodies->p;
   PetscReal *work;
 
   PetscFunctionBegin;
@@ -486,7 +486,7 @@ static PetscErrorCode TakeLoads(HycoROM m)
   /* At alpha = 0 the set's forces close the gaps that the loads leave: W_aa z = -w. */
   for (PetscInt i = 0; i < w->n_set; i++) w->z[i] = -o->gap[w->set[i]];
   PetscCall(PetscCalloc1(p + 1, &work));
-  PetscCall(Multiply(PETSC_FALSE, p, r, o->work, o->c, 1, 0, work));
+  for (PetscInt i = 0; i < p; i++) work[i] = HycoBodiesLoadWork(o, i);
   PetscCall(Balance(w, p, 1, work, w->z, w->x0));
   PetscCall(PetscFree(work));
   PetscCall(TakeStrainsOfLoads(m));

@@ -348,6 +348,23 @@ static PetscErrorCode Load(HycoBodiesWork o)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+#define BALANCED 1e-13 /* share of its terms below which work is round-off */
+
+/* The work of the loads on motion i; 0 where vectors of the basis cancel, as it is of a load that does not act on it. */
+PetscReal HycoBodiesLoadWork(HycoBodiesWork o, PetscInt i)
+{
+  const PetscInt r = o->bodies->r;
+  PetscReal sum = 0, terms = 0;
+
+  for (PetscInt j = 0; j < r; j++) {
+    const PetscReal term = o->work[i * r + j] * o->c[j];
+
+    sum += term;
+    terms += PetscAbsReal(term);
+  }
+  return PetscAbsReal(sum) > BALANCED * terms ? sum : 0;
+}
+
 /* The rigid motions at mu, and the work of the loads on them. */
 static PetscErrorCode BlendMotions(HycoBodiesWork o)
 {
@@ -566,9 +583,7 @@ static PetscErrorCode Fill(HycoBodiesWork o, Problem *p)
   PetscCall(HycoBodiesKeep(o, p->n, p->contact));
   PetscCall(PetscCalloc1(n * n + 1, &p->M));
   PetscCall(PetscCalloc2(n + 1, &p->q, n + 1, &p->z));
-  for (PetscInt i = 0; i < b->p; i++) {
-    for (PetscInt j = 0; j < b->r; j++) p->q[i] -= o->work[i * b->r + j] * o->c[j];
-  }
+  for (PetscInt i = 0; i < b->p; i++) p->q[i] = -HycoBodiesLoadWork(o, i);
   for (PetscInt k = 0; k < p->n; k++) {
     const PetscInt contact = p->contact[k];
     const size_t column = (size_t)(b->p + k);

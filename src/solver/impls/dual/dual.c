@@ -106,7 +106,7 @@ static PetscErrorCode FreeGap(HycoSolver s, const Dual *d, Vec x)
      forces are known. */
   if (!s->stiffness.lu && !s->free) {
     PetscCall(HycoVecGather(y->D, d->L));
-    PetscCall(HycoDirectReduce(s->stiffness.direct, y->F, d->L, d->g));
+    PetscCall(HycoDirectReduce(s->stiffness.direct, y->K, y->rounding, y->F, d->L, d->g));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
   if (s->free)

@@ -114,7 +114,7 @@ PetscErrorCode HycoSolverTangentSolve(HycoSolverTangent t, Vec r, Vec g, int sig
   }
   PetscCheck(direct, HycoComm(t->s), PETSC_ERR_SUP, "the derivative of a solution is for a sparse K");
   PetscCall(HycoVecGather(g, t->z));
-  PetscCall(HycoDirectReduce(direct, r, t->z, t->q));
+  PetscCall(HycoDirectReduce(direct, NULL, 0, r, t->z, t->q));
   PetscCall(HycoTangentSolve(t->tangent, t->q, sign, t->z, kink));
   PetscCall(HycoDirectExpand(direct, t->z, dx));
   PetscCall(VecGetOwnershipRange(dL, &lo, &hi));
