@@ -177,6 +177,8 @@ void HycoPointEnd(void *before);
    process alone. */
 PetscErrorCode HycoReserveBLAS(void);
 
+#define HYCO_NOTHING (16 * PETSC_MACHINE_EPSILON) /* share of its terms up to which a difference may be round-off */
+
 /* lost / size; 0/0 counts as 0, x/0 is PETSC_INFINITY. */
 static inline PetscReal HycoRelative(PetscReal lost, PetscReal size)
 {

@@ -92,7 +92,7 @@ static PetscErrorCode JudgeEstimates(cJSON *json, const DriverColumns *c, PetscI
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(n, &ratio, n, &error));
   for (PetscInt e = 0; e < DRIVER_ESTIMATES; e++) {
-    PetscInt m = 0, bounded = 0;
+    PetscInt m = 0, bounded = 0, with = 0; /* points, those whose error is not 0 */
     PetscReal worst = 0;
 
     TrueErrors(c, e, n, value, error);
@@ -100,20 +100,24 @@ static PetscErrorCode JudgeEstimates(cJSON *json, const DriverColumns *c, PetscI
       const PetscReal estimate = value[k * c->n + c->estimates + e];
 
       /* No estimate, or no defined error: not a point of this statistic. */
-      if (isnan(estimate) || !isfinite(error[k])) continue;
+      if (isnan(estimate) || !(error[k] <= PETSC_MAX_REAL / 8)) continue;
       bounded += error[k] <= estimate;
       /* Both quotients may have 0 below. */
       worst = PetscMax(worst, error[k] / PetscMax(estimate, PETSC_MIN_REAL));
-      ratio[m++] = estimate / PetscMax(error[k], PETSC_MIN_REAL);
+      m++;
+      if (error[k] > 0) ratio[with++] = estimate / error[k];
     }
     if (!m) continue;
-    qsort(ratio, (size_t)m, sizeof(*ratio), CompareReal);
+    qsort(ratio, (size_t)with, sizeof(*ratio), CompareReal);
     ReportNumbers(cJSON_AddObjectToObject(all, keys[e]), {"bounded", (PetscReal)bounded / m},
-                  {"median_ratio", ratio[m / 2]}, {"worst_error_over_estimate", worst});
-    PetscCall(DriverPrint(
-        "estimates of %s: at least the error at %.1f %% of the points; estimate / error %.3g in the median, "
-        "error / estimate at most %.3g\n",
-        words[e], 100. * bounded / m, (double)ratio[m / 2], (double)worst));
+                  {"median_ratio", with ? ratio[with / 2] : NAN}, {"worst_error_over_estimate", worst});
+    PetscCall(
+        DriverPrint("estimates of %s: at least the error at %.1f %% of the points", words[e], 100. * bounded / m));
+    if (with)
+      PetscCall(DriverPrint("; estimate / error %.3g in the median, error / estimate at most %.3g\n",
+                            (double)ratio[with / 2], (double)worst));
+    else
+      PetscCall(DriverPrint(", where all errors are 0\n"));
   }
   for (PetscInt k = 0; k < n; k++) unseen += value[k * c->n + c->estimates + DRIVER_ESTIMATES] > HYCO_UNSEEN;
   cJSON_AddNumberToObject(all, "unseen", unseen);

@@ -304,7 +304,7 @@ static const Written written[] = {
     {"report", "compare", "ERROR.undefined", "count", "-", "points where it is x/0"},
     {"report", "compare", "estimates.KIND.bounded", "number", "-",
      "KIND: u, sigma, lambda; share of the points with an estimate of at least the error"},
-    {"report", "compare", "estimates.KIND.median_ratio", "number", "-", "estimate over error, median"},
+    {"report", "compare", "estimates.KIND.median_ratio", "number?", "-", "estimate over error, median"},
     {"report", "compare", "estimates.KIND.worst_error_over_estimate", "number", "-", "largest"},
     {"report", "compare", "estimates.unseen", "count", "-", "points in an unseen regime"},
     {"report", "compare", "speedup.mean", "number", "-",

@@ -4,6 +4,7 @@
 #include <hycofile.h>
 #include <hycoh5.h>
 #include <limits.h>
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -45,6 +46,12 @@ DriverRows DriverRowsOfRoot(PetscInt n, PetscInt width, PetscReal value[], Drive
   return (DriverRows){.n = n, .width = width, .n_pieces = 1, .piece = piece};
 }
 
+/* PETSc's infinity is a large number; in a table it is infinite. */
+static double Infinite(PetscReal value)
+{
+  return value > PETSC_MAX_REAL / 8 ? HUGE_VAL : (double)value;
+}
+
 /* Parameters with ten digits, because -points may read them back; results with eight. */
 static size_t FormatRow(const Table *t, PetscInt k, const PetscReal value[], char *text, size_t room)
 {
@@ -54,7 +61,7 @@ static size_t FormatRow(const Table *t, PetscInt k, const PetscReal value[], cha
   for (PetscInt p = 0; p < t->n_par; p++)
     at += (size_t)snprintf(text + at, room - at, "%.10g,", (double)t->mu[k * t->n_par + p]);
   for (PetscInt c = 0; c < width; c++)
-    at += (size_t)snprintf(text + at, room - at, "%.8g%c", (double)value[c], c < width - 1 ? ',' : '\n');
+    at += (size_t)snprintf(text + at, room - at, "%.8g%c", Infinite(value[c]), c < width - 1 ? ',' : '\n');
   return at;
 }
 
@@ -144,8 +151,8 @@ static PetscErrorCode WriteColumn(HycoH5 file, const Table *t, PetscInt rounds, 
 
     PetscCall(PetscMalloc1(p->n, &column));
     for (PetscInt k = 0; k < p->n; k++)
-      column[k] =
-          par < 0 ? p->value[(size_t)k * (size_t)rows->width + (size_t)c] : t->mu[(p->first + k) * t->n_par + par];
+      column[k] = par < 0 ? Infinite(p->value[(size_t)k * (size_t)rows->width + (size_t)c])
+                          : t->mu[(p->first + k) * t->n_par + par];
     PetscCall(HycoH5WriteRows(file, par < 0 ? t->names[c] : t->par[par], MPIU_REAL, rows->n, HYCO_H5_LINE, p->first,
                               p->n, column));
     PetscCall(PetscFree(column));

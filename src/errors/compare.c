@@ -16,6 +16,27 @@ static void Add(Norms *n, PetscReal value, PetscReal reference)
   n->size = PetscMax(n->size, PetscAbsReal(reference));
 }
 
+/* What round-off leaves of the stresses of cell e: that of the strains of its displacements, which a rigid motion may make
+   large, times the modulus. */
+static PetscReal Rounding(HycoROM m, PetscInt e, const PetscReal u[], PetscReal least)
+{
+  const HycoMesh mesh = m->model->mesh;
+  const PetscReal *tangent = m->fe->tangent + m->fe->tangent_start[e];
+  PetscReal most = least, size = 0, modulus = 0;
+  PetscInt of[HYCO_MAX_CELL_NODES];
+  const PetscInt n = HycoMeshCellNodes(mesh, e, of);
+
+  for (PetscInt v = 0; v < n; v++) {
+    for (PetscInt i = 0; i < mesh->dim; i++) {
+      most = PetscMax(most, PetscAbsReal(u[of[v] * mesh->dim + i]));
+      size = PetscMax(size, PetscAbsReal(m->fe->X[of[v] * 3 + i] - m->fe->X[of[0] * 3 + i]));
+    }
+  }
+  for (PetscInt k = 0; k < m->fe->tangent_size[mesh->cell_body[e]]; k++)
+    modulus = PetscMax(modulus, PetscAbsReal(tangent[k]));
+  return size > 0 ? HYCO_NOTHING * modulus * most / size : 0;
+}
+
 /* U, u: displacements of the RID's nodes; sigma: (cells of the RID) x (components); Lambda, lambda: forces of all
    contacts, also of those outside the RID, which are reconstructed. NULL sigma or inelastic: not compared. Differences
    and sizes, not quotients: a path divides them by its own largest sizes. */
@@ -26,6 +47,7 @@ PetscErrorCode HycoROMMeasureRID(HycoROM m, const PetscReal u[], const PetscReal
   const PetscInt dim = m->model->mesh->dim, ns = m->fe->n_sigma, *node;
   PetscInt n_nodes;
   Norms rid = {0}, s = {0}, s11 = {0}, lr = {0}, l = {0}, p = {0};
+  PetscReal length = HycoMeshLength(m->model->mesh), noise = 0;
 
   PetscFunctionBegin;
   PetscCall(ISGetLocalSize(m->model->rid, &n_nodes));
@@ -36,10 +58,16 @@ PetscErrorCode HycoROMMeasureRID(HycoROM m, const PetscReal u[], const PetscReal
     Add(&rid, m->U[i], u[i]);
   }
   PetscCall(ISRestoreIndices(m->model->rid, &node));
+  /* Against 0, of which no share tells round-off: by the size of the mesh. */
+  if (rid.size > 0)
+    length = 0;
+  else if (rid.lost <= HYCO_NOTHING * length)
+    rid.lost = 0;
   PetscCall(HycoROMGetRID(m, NULL, NULL, NULL, NULL, NULL, &stress));
   for (PetscInt k = 0; sigma && k < m->model->mesh->n_cells * ns; k++) {
     Add(&s, stress[k], sigma[k]);
     if (k % ns == 0) Add(&s11, stress[k], sigma[k]);
+    noise += PetscSqr(Rounding(m, k / ns, m->U, length));
   }
   for (PetscInt k = 0; k < m->model->pairs.n; k++) {
     Add(&l, m->Lambda[k], lambda[k]);
@@ -48,9 +76,10 @@ PetscErrorCode HycoROMMeasureRID(HycoROM m, const PetscReal u[], const PetscReal
   if (inelastic) PetscCall(HycoROMGetInelastic(m, NULL, &flow));
   for (PetscInt k = 0; inelastic && k < m->model->mesh->n_cells; k++) Add(&p, flow[k], inelastic[k]);
   lost[HYCO_ERROR_U_RID] = (HycoLost){rid.lost, rid.size};
-  lost[HYCO_ERROR_SIGMA] = (HycoLost){PetscSqrtReal(s.lost2), PetscSqrtReal(s.size2)};
+  noise = PetscSqrtReal(noise);
+  lost[HYCO_ERROR_SIGMA] = (HycoLost){PetscMax(PetscSqrtReal(s.lost2) - noise, 0), PetscSqrtReal(s.size2)};
   /* Where this component vanishes, its difference is the round-off of the others. */
-  lost[HYCO_ERROR_SIGMA_11] = (HycoLost){s11.lost <= 1e-12 * s.size ? 0 : s11.lost, s11.size};
+  lost[HYCO_ERROR_SIGMA_11] = (HycoLost){s11.lost <= 1e-12 * s.size ? 0 : PetscMax(s11.lost - noise, 0), s11.size};
   lost[HYCO_ERROR_LAMBDA] = (HycoLost){PetscSqrtReal(l.lost2), PetscSqrtReal(l.size2)};
   lost[HYCO_ERROR_LAMBDA_RID] = (HycoLost){PetscSqrtReal(lr.lost2), PetscSqrtReal(lr.size2)};
   lost[HYCO_ERROR_INELASTIC] = (HycoLost){PetscSqrtReal(p.lost2), PetscSqrtReal(p.size2)};
@@ -190,7 +219,8 @@ static PetscErrorCode CompareH1(HycoROM m, const PetscReal lambda[], HycoCompare
   PetscFunctionBegin;
   PetscCall(HycoNormH1(k->norms, k->rows.U, k->rows.value[0], &lost));
   PetscCall(HycoNormH1(k->norms, k->rows.value[0], NULL, &size));
-  e->u_h1 = HycoRelative(lost, size);
+  /* In any norm round-off against 0 is no error. */
+  e->u_h1 = size > 0 || e->u > 0 ? HycoRelative(lost, size) : 0;
   for (int rid = 0; rid < 2; rid++) {
     PetscCall(HycoNormDual(k->norms, m, (PetscBool)rid, m ? m->Lambda : NULL, lambda, &lost));
     PetscCall(HycoNormDual(k->norms, m, (PetscBool)rid, lambda, NULL, &size));

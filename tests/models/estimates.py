@@ -3,9 +3,15 @@ import csv
 import math
 import os
 import statistics
+import sys
 import unittest
 
+import numpy as np
+
 from common import PELLET, ROPE, SOURCE, Case
+
+sys.path.insert(0, os.path.join(SOURCE, 'tests', 'verify'))
+from grids import Grid  # noqa: E402
 
 BLOCKS = os.path.join(SOURCE, 'examples', 'blocks')
 SETTINGS = ('-hyco_model_type', 'hybrid', '-hyco_rid_contact_extension', 0)
@@ -114,6 +120,28 @@ class Estimates(Case):
         self.near(one['u_norm2'], true['u_norm2'], 1e-9, 'u')
         kept = self.hyco('predict', '-model', 'rough.h5', '-mu', '0.12,0.2', '-scene', ROPE, '-hyco_fallback', '-target_u', 1)
         self.assertFalse(kept['full_order'])
+
+    def test_nothing(self):
+        """A block that is moved and meets nothing, and one that is not moved: what round-off leaves of its stresses is no error, in training, in tables and
+        beside the estimates."""
+        grid = Grid()
+        grid.box('quad4', [np.linspace(0, 2, 9), np.linspace(0, 1, 5)], lambda x: x + 7, 'block', {'y0': 'base', 'y1': 'top'})
+        grid.write(self.path('mesh.msh'))
+        scene = self.changed('still.yaml', """
+scene: {mesh: mesh.msh, parameters: [down, across]}
+parameter: {down: {range: [0, 0.4]}, across: {range: [0, 1]}}
+body: {block: {young: 2e5, poisson: 0.3}}
+fixed: {top: {x: across, y: -down}}
+contact: {floor: {type: obstacle, group: base, normal: {y: -1}, gap: 0.45}}
+""", ())
+        held = self.hyco('train', '-scene', scene, '-grid', '3,2', '-model', 'still.h5')['held_out']
+        self.assertLess(held['sigma']['largest'], 1e-9)
+        r = self.hyco('compare', '-scene', scene, '-model', 'still.h5', '-values_down', '0,0.1,0.4', '-values_across', '0,0.7', '-table', 'c.csv')
+        self.assertLess(max(row['error_sigma'] for row in self.table('c.csv')), 1e-9)
+        self.assertEqual(r['estimates']['sigma']['bounded'], 1)
+        # outside the ranges it meets the floor, and stresses are compared again
+        r = self.hyco('compare', '-scene', scene, '-model', 'still.h5', '-values_down', '0,0.46', '-values_across', '0', '-extrapolate', '-table', 'c.csv')
+        self.assertLess(max(row[name] for row in self.table('c.csv') for name in ('error_u', 'error_u_h1', 'error_sigma')), 1e-6)
 
     def test_no_calibration(self):
         """Without held-out points, or with too few: no estimate, and this is reported; a target then means full order."""
