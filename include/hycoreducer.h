@@ -150,8 +150,9 @@ typedef struct {
   PetscInt n_fresh; /* of the held-out points those drawn after solutions were added near others; 0: none was added */
   HycoScan scan;    /* singularity inside the parameters' ranges */
   PetscReal seconds_snapshots, seconds_reduction;
-  PetscReal sliding;     /* the largest of all solutions, as in HycoSummary */
-  PetscReal rate_change; /* the largest of the paths that were solved now, as in HycoHistory */
+  PetscReal seconds_solution; /* a full-order solution with what is kept from others, mean; 0: none was solved now */
+  PetscReal sliding;          /* the largest of all solutions, as in HycoSummary */
+  PetscReal rate_change;      /* the largest of the paths that were solved now, as in HycoHistory */
 } HycoTraining;
 
 /* Gets solved[n_groups]: how many points each group of ranks has solved full order in the last run; those found in the

@@ -295,7 +295,8 @@ static const Written written[] = {
     {"report", "train", "search.not_tried.TYPE", "text", "-", "a type that was not tried, and why"},
     {"report", "train", "seconds.snapshots", "number", "s", "full-order solutions"},
     {"report", "train", "seconds.reduction", "number", "s", "all else"},
-    {"report", "train", "seconds.total", "number", "s", "both"},
+    {"report", "train", "seconds.solution", "number", "s", "a full-order solution, mean; 0: none was solved"},
+    {"report", "train", "seconds.total", "number", "s", "snapshots and reduction"},
 
     {"report", "compare", "n_points", "count", "-", "points, or paths"},
     {"report", "compare", "ERROR.mean", "number?", "-",

@@ -699,6 +699,7 @@ PetscErrorCode HycoReducerClose(HycoReducer t, HycoSnapshots *store)
   PetscCall(HycoSnapshotsGetSolved(*store, &t->n_solvers, &solved));
   PetscCall(HycoSnapshotsGetBalance(*store, &t->unsolved, &written));
   t->sliding = (*store)->sliding;
+  t->seconds_solution = (*store)->seconds;
   t->rate_change = (*store)->rate_change;
   HycoFreeAll(&t->solved, &t->written);
   HycoDuplicate(t->n_solvers, solved, &t->solved);
@@ -908,6 +909,7 @@ PetscErrorCode HycoReducerRun(HycoReducer t, HycoSamples samples, const char pat
   report.sliding = t->sliding;
   report.rate_change = t->rate_change;
   /* Late solves happen inside the reduction: their time is counted with the snapshots. */
+  report.seconds_solution = t->seconds_solution;
   report.seconds_snapshots = solved - begin + t->solving;
   report.seconds_reduction = HycoNow() - solved - t->solving;
   if (training) *training = report;

@@ -387,6 +387,19 @@ static PetscErrorCode WriteStep(HycoFOM fom, const HycoStep *step, void *ctx)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* A full-order solution, and its time. */
+static PetscErrorCode Solve(HycoSnapshots s, HycoFOM fom, const PetscReal mu[])
+{
+  const PetscReal begin = HycoNow();
+  const int later = fom->solved;
+
+  PetscFunctionBegin;
+  PetscCall(HycoFOMSolve(fom, s->scene->n_parameters, mu));
+  s->spent[later] += HycoNow() - begin;
+  s->timed[later]++;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* Solves the path and writes its file; a path that does not reach its end is an error. Fields are written while
    the path is solved, by the monitor: no listed time is held in memory. `taken` follows at the end, when the
    number of steps is known. */
@@ -398,7 +411,7 @@ static PetscErrorCode WritePath(PathWriter *w, HycoFOM fom, const PetscReal mu[]
   PetscFunctionBegin;
   PetscCall(HycoFOMSetStepMonitor(fom, WriteStep, w));
   fom->path->between = WriteBetween;
-  PetscCall(HycoFOMSolve(fom, w->s->scene->n_parameters, mu));
+  PetscCall(Solve(w->s, fom, mu));
   PetscCall(HycoFOMGetHistory(fom, &history));
   HycoSceneNamePoint(w->s->scene, mu, at);
   /* Half of a path would train a model that is wrong at the end and does not know it. */
@@ -443,7 +456,7 @@ static PetscErrorCode SolveSample(HycoSnapshots s, HycoFOM fom, const PetscReal 
     PetscCall(SolvePath(s, fom, mu, force));
     PetscFunctionReturn(PETSC_SUCCESS);
   }
-  PetscCall(HycoFOMSolve(fom, s->scene->n_parameters, mu));
+  PetscCall(Solve(s, fom, mu));
   PetscCall(HycoFOMGetSummary(fom, &summary));
   /* Full order has added a spring to a body that nothing holds; a reduced stiffness has no such term. */
   HycoCheck(!summary.regularised[0],
@@ -536,13 +549,17 @@ static PetscErrorCode SolveAndTell(HycoSnapshots s, HycoQueue queue, const Missi
 /* Adds the counts of a queue whose tasks are done. */
 static PetscErrorCode CountWork(HycoSnapshots s, HycoQueue queue)
 {
-  PetscInt groups, left;
+  PetscInt groups, left, timed[2];
+  PetscReal spent[2];
 
   PetscFunctionBegin;
   PetscCall(HycoQueueCount(queue, &groups, s->solved));
   PetscCall(HycoQueueLeft(queue, &left));
   s->n_groups = PetscMax(s->n_groups, groups);
   s->unsolved = PetscMax(s->unsolved, left);
+  PetscCallMPI(MPI_Allreduce(s->spent, spent, 2, MPIU_REAL, MPI_SUM, HycoComm(s)));
+  PetscCallMPI(MPI_Allreduce(s->timed, timed, 2, MPIU_INT, MPI_SUM, HycoComm(s)));
+  s->seconds = spent[timed[1] > 0] / PetscMax(timed[timed[1] > 0], 1);
   PetscCallMPI(MPI_Allgather(&s->bytes, 1, MPIU_REAL, s->written, 1, MPIU_REAL, HycoComm(s)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
