@@ -43,27 +43,6 @@ PetscErrorCode HycoBodiesDestroyModel(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The residual of equilibrium along the rigid motions that contact alone prevents, relative to the terms of each. */
-PetscReal HycoBodiesUnbalanced(HycoBodiesWork o)
-{
-  const HycoSubstructures b = o->bodies;
-  PetscReal most = 0;
-
-  for (PetscInt i = 0; i < b->p; i++) {
-    PetscReal sum = 0, size = 0;
-
-    for (PetscInt j = 0; j < b->r; j++) sum += o->work[i * b->r + j] * o->c[j];
-    size = PetscAbsReal(sum);
-    for (PetscInt k = 0; k < b->ns; k++) {
-      /* Work of the loads against that of the contact forces on motion i, Z^T (F - B^T L) = 0. */
-      sum -= o->Z[k * b->p + i] * o->f[k];
-      size += PetscAbsReal(o->Z[k * b->p + i] * o->f[k]);
-    }
-    if (size > 0) most = PetscMax(most, PetscAbsReal(sum) / size);
-  }
-  return most;
-}
-
 #define ROUNDED 1e-6 /* most of a residual that may be the effect of rounding */
 
 /* What is left of the gap of contact k, without the effect of rounding the terms whose sum the displacements are: a body

@@ -1016,6 +1016,27 @@ PetscErrorCode HycoBodiesSolve(HycoBodiesWork o, const HycoBodiesSurface *s, con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The residual of equilibrium along the rigid motions that contact alone prevents, relative to the terms of each. */
+PetscReal HycoBodiesUnbalanced(HycoBodiesWork o)
+{
+  const HycoSubstructures b = o->bodies;
+  PetscReal most = 0;
+
+  for (PetscInt i = 0; i < b->p; i++) {
+    PetscReal sum = 0, size = 0;
+
+    for (PetscInt j = 0; j < b->r; j++) sum += o->work[i * b->r + j] * o->c[j];
+    size = PetscAbsReal(sum);
+    for (PetscInt k = 0; k < b->ns; k++) {
+      /* Work of the loads against that of the contact forces on motion i, Z^T (F - B^T L) = 0. */
+      sum -= o->Z[k * b->p + i] * o->f[k];
+      size += PetscAbsReal(o->Z[k * b->p + i] * o->f[k]);
+    }
+    if (size > 0) most = PetscMax(most, PetscAbsReal(sum) / size);
+  }
+  return most;
+}
+
 /* |L~|_W^2 = sum of f.(C f / kappa), from the displacements by the forces. `gram` holds the errors of R in the
    norm of C^-1: that is the term |B (R~ - R) c|_{W^-1} of the bound, kappa scaling C and R alike. */
 PetscReal HycoBodiesBound(HycoBodiesWork o, PetscReal *norm)
