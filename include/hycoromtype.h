@@ -71,10 +71,10 @@ typedef struct _HycoROMOps {
   PetscErrorCode (*residual)(HycoROM, const PetscReal mu[], const PetscReal z[], PetscReal w[],
                              PetscReal *size); /* moves the data to mu (NULL: they are there) and takes z; w (p + n;
                                                   NULL: not needed); size: of gaps and displacements of the contacts */
-  PetscErrorCode (*stand)(HycoROM, PetscInt k,
-                          PetscBool *alone); /* NULL, or of paths; alone: no time depends on those before. Then the
-                                                problem becomes that of listed time k, whose parameters and forces
-                                                the model has; k < 0: only asks */
+  PetscErrorCode (*stand)(HycoROM, PetscInt k, PetscInt listed,
+                          PetscBool *able); /* NULL, or of paths; able: the problem becomes that of accepted step k, the
+                                               listed time `listed` (-1: none), whose parameters and forces the model has;
+                                               k < 0: only asks. With friction, for each step from the first one on */
   PetscErrorCode (*jacobian)(HycoROM, PetscInt k, const PetscInt contact[],
                              PetscReal M[]); /* of x and these k forces, p + k square by columns, at the last mu */
   PetscErrorCode (*beside)(
@@ -88,7 +88,16 @@ typedef struct _HycoROMOps {
                           PetscReal dU[]); /* with `beside`: the derivatives of the modes' coefficients and of the
                                               full-order displacements, for those of the data (the weighted sum of the
                                               changes at two points) and of z; modes (l), dofs (of mesh): which of them are wanted */
-  PetscErrorCode (*expand)(HycoROM);       /* sets what a solve sets (modes, displacements, forces) from that z */
+  /* with friction: of the step that `stand` took. Its row of the normal, by contact, w with no slip before (p + n), and
+     size as of `residual` */
+  PetscErrorCode (*rest)(HycoROM, const PetscInt **row, PetscReal w[], PetscReal *size);
+  PetscErrorCode (*along)(
+      HycoROM, PetscInt parameter, const PetscReal weight[3], const PetscInt point[3], const PetscReal q[],
+      PetscReal dz[], PetscBool *regular); /* the derivative of z from q of that w, and from those of the steps before;
+                                              regular: the states of the contacts determine it */
+  PetscErrorCode (*show)(HycoROM, PetscInt parameter, PetscBool rows, PetscReal step,
+                         const PetscReal dz[]); /* the friction of the model's contacts becomes that of z moved so */
+  PetscErrorCode (*expand)(HycoROM);            /* sets what a solve sets (modes, displacements, forces) from that z */
   PetscErrorCode (*view)(HycoROM, PetscViewer);
   PetscErrorCode (*save)(HycoROM, HycoH5);
   PetscErrorCode (*load)(HycoROM, HycoH5);

@@ -300,6 +300,21 @@ PetscErrorCode HycoBodiesFrictionMove(HycoBodiesFriction friction, HycoBodiesWor
 /* w (by row) of a step from rest to mu with the motions and forces z, which become those of the last step. */
 PetscErrorCode HycoBodiesFrictionProbe(HycoBodiesFriction friction, HycoBodiesWork work, const PetscReal mu[],
                                        const PetscReal z[], PetscReal w[]);
+/*
+  The derivatives of a path of elastic bodies (bodies_along.c), as the ops `stand`, `rest`, `beside`, `along` and `show`; Destroy before that of the
+  friction.
+*/
+PetscErrorCode HycoBodiesAlongDestroy(HycoBodiesFriction friction);
+PetscErrorCode HycoBodiesAlongStand(HycoROM model, HycoBodiesFriction friction, HycoBodiesWork work, PetscInt k,
+                                    PetscBool *able);
+void HycoBodiesAlongRest(HycoBodiesFriction friction, const PetscInt **row, PetscReal w[], PetscReal *size);
+PetscErrorCode HycoBodiesAlongNear(HycoROM model, HycoBodiesFriction friction, const PetscReal mu[],
+                                   const PetscInt row[], PetscBool rows, const PetscReal z[], PetscInt point,
+                                   PetscReal w[]);
+PetscErrorCode HycoBodiesAlongStep(HycoBodiesFriction friction, PetscInt parameter, const PetscReal weight[3],
+                                   const PetscInt point[3], const PetscReal q[], PetscReal dz[], PetscBool *regular);
+PetscErrorCode HycoBodiesAlongShow(HycoROM model, HycoBodiesFriction friction, PetscInt parameter, PetscBool rows,
+                                   PetscReal step, const PetscReal dz[]);
 /* By row. Borrowed. */
 const PetscReal *HycoBodiesFrictionForces(HycoBodiesFriction friction);
 /* The derivative of the forces last found by alpha: Z (n_set x m row major), of the rows set[] of closed contacts, from BP =
@@ -337,6 +352,10 @@ PetscErrorCode HycoBodiesResidual(HycoROM model, const PetscReal mu[], const Pet
 PetscErrorCode HycoBodiesJacobian(HycoROM model, PetscInt k, const PetscInt contact[], PetscReal M[]);
 PetscErrorCode HycoBodiesNear(HycoROM model, const PetscReal mu[], PetscInt n, const PetscInt contact[], PetscBool rows,
                               const PetscReal z[], PetscInt point, PetscReal w[]);
+/* The same with these rows, and (rows false) the gaps of the prediction's. */
+PetscErrorCode HycoBodiesNearSurface(HycoROM model, const HycoBodiesSurface *surface, const PetscReal gaps[],
+                                     const PetscReal mu[], PetscInt n, const PetscInt contact[], PetscBool rows,
+                                     const PetscReal z[], PetscInt point, PetscReal w[]);
 PetscErrorCode HycoBodiesSlope(HycoROM model, PetscInt n, const PetscInt contact[], const PetscReal weight[2],
                                const PetscInt point[2], const PetscReal dz[], const PetscBool modes[],
                                const PetscBool dofs[], PetscReal dgamma[], PetscReal dU[]);

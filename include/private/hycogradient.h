@@ -1,6 +1,6 @@
 /* Derivatives of outputs with respect to the parameters: the data are differentiated by differences along one parameter,
-   the solution by the linear system of its closed contacts; a path by these at its listed times, where none depends on those
-   before, else by the paths beside it, in its own steps in time. */
+   the solution by the linear system of its closed contacts; a path by that of each of its steps, where its type has it, else
+   by the paths beside it, in its own steps in time. */
 #ifndef HYCOGRADIENT_H
 #define HYCOGRADIENT_H
 

@@ -91,13 +91,14 @@ def _records(function, handle, name, *more):
 
 
 def _history(function, handle, outputs):
-    """The listed times of a path as a structured array: the members of HycoStep, then the outputs; None without a history."""
+    """The listed times of a path as a structured array: the members of HycoStep, but those with the name of an output, then the outputs;
+    None without a history."""
     head = np.zeros(1, c.struct('HycoHistory'))
     c.call(function, handle, c.address(head))
     if not head['n'][0]:
         return None
     steps = c.copied(ctypes.c_void_p(int(head['step'][0])), int(head['n'][0]), c.struct('HycoStep'))
-    kinds = [(name, steps.dtype[name]) for name in steps.dtype.names if name != 'quantity']
+    kinds = [(name, steps.dtype[name]) for name in steps.dtype.names if name != 'quantity' and name not in outputs]
     table = np.zeros(len(steps), kinds + [(name, float) for name in outputs])
     for name, _ in kinds:
         table[name] = steps[name]

@@ -12,10 +12,15 @@
 typedef struct {
   HycoROM m;
   PetscReal mu[HYCO_MAX_PARAMETERS];
-  PetscInt p, n, k, *contact; /* unknowns x, contacts; those that are closed or undecided */
-  PetscInt *list;             /* n: the contacts of the problem, once the problem is that of some */
-  PetscBool near, held;       /* held: supports hold nodes of the contacts */
-  /* the parameter in hand: changes the contacts' rows or gaps; enters the outputs' cells beside displacements, and those of
+  PetscInt p, n, k, *contact; /* unknowns x, forces; those that are closed or undecided */
+  PetscInt n_contacts;        /* of `near` */
+  const PetscInt *row;        /* with friction the row of a contact's normal among the forces; NULL: there is none */
+  PetscBool friction;
+  PetscBool passing;    /* a step whose outputs are not listed */
+  PetscInt *list;       /* n: the contacts of the problem, once the problem is that of some */
+  PetscBool near, held; /* held: supports hold nodes of the contacts */
+  PetscInt parameter;   /* in hand */
+  /* it changes the contacts' rows or gaps; enters the outputs' cells beside displacements, and those of
      means known by their slopes; moves supports of these */
   PetscBool rows, enters, means, moved_means;
   PetscBool disturbed;  /* all cells of the outputs were moved to points beside mu */
@@ -71,13 +76,17 @@ static PetscErrorCode MoveAndMeasure(Work *o, const PetscReal mu[], const PetscR
 }
 
 /* Sets what outputs read, moved along the derivatives, and measures them; u0: the prescribed displacements at mu. */
-static PetscErrorCode MeasureMoved(Work *o, const PetscReal mu[], const PetscReal u0[], PetscReal step,
+static PetscErrorCode MeasureState(Work *o, const PetscReal mu[], const PetscReal u0[], PetscReal step,
                                    PetscReal output[])
 {
   HycoROM m = o->m;
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < o->n; k++) m->Lambda[o->rows ? k : o->list[k]] = o->z[o->p + k] + step * o->dz[o->p + k];
+  for (PetscInt k = 0; k < o->n_contacts; k++) {
+    const PetscInt at = o->p + (o->row ? o->row[k] : k);
+
+    m->Lambda[o->rows || o->row ? k : o->list[k]] = o->z[at] + step * o->dz[at];
+  }
   for (PetscInt j = 0; j < m->model->l && !o->forces; j++) m->gamma[j] = o->gamma[j] + step * o->dgamma[j];
   for (PetscInt j = 0; j < m->model->n_fe && !o->forces; j++) {
     const PetscInt i = m->model->fe_dof[j];
@@ -90,6 +99,18 @@ static PetscErrorCode MeasureMoved(Work *o, const PetscReal mu[], const PetscRea
               PetscCall(o->means ? HycoROMUnfocusOutputs(m) : PETSC_SUCCESS));
   if (o->focused && !o->means)
     PetscCall(HycoROMChangeMeans(m, o->moved_means ? mu : NULL, o->output, step, o->dgamma, o->dU, output));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* With the friction there. */
+static PetscErrorCode MeasureMoved(Work *o, const PetscReal mu[], const PetscReal u0[], PetscReal step,
+                                   PetscReal output[])
+{
+  const HycoShear shear = o->m->trace.seen;
+
+  PetscFunctionBegin;
+  if (o->row) PetscCall((*o->m->ops->show)(o->m, o->parameter, o->rows, step, o->dz));
+  HycoFinally(MeasureState(o, mu, u0, step, output), o->row ? HycoTraceShowOther(o->m, &shear) : (void)0);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -186,7 +207,7 @@ static PetscErrorCode Focus(Work *o)
   HycoROM m = o->m;
   const HycoScene scene = m->model->scene;
   const PetscBool all =
-      (PetscBool)(HycoSceneHasOutputs(scene, HYCO_QUANTITY_PRESSURE_MIN, HYCO_QUANTITY_PRESSURE_MIN) ||
+      (PetscBool)(o->row || HycoSceneHasOutputs(scene, HYCO_QUANTITY_PRESSURE_MIN, HYCO_QUANTITY_PRESSURE_MIN) ||
                   (scene->formulation == HYCO_AXISYMMETRIC && HycoMeshIsQuadratic(m->model->mesh)));
 
   PetscFunctionBegin;
@@ -194,7 +215,7 @@ static PetscErrorCode Focus(Work *o)
   PetscCall(PetscCalloc1(m->model->l + 1, &o->dgamma));
   PetscCall(PetscCalloc1(m->model->l + 1, &o->modes));
   PetscCall(PetscCalloc1(m->model->mesh->n_nodes * m->model->mesh->dim + 1, &o->dofs));
-  HycoROMOutputsRead(m, o->modes, o->dofs);
+  if (!o->passing) HycoROMOutputsRead(m, o->modes, o->dofs);
   PetscCall(PetscCalloc1(m->fe->n_dof + 1, &o->dU));
   PetscCall(PetscMalloc1(o->n + 1, &o->list));
   for (PetscInt i = 0; i < o->n; i++) o->list[i] = i;
@@ -208,9 +229,10 @@ static PetscErrorCode Focus(Work *o)
     o->contact[i] = i;
   }
   if (!all) o->n = o->k;
-  PetscCall(HycoROMMakeNear(m, o->n, o->list));
+  if (!o->row) o->n_contacts = o->n;
+  PetscCall(HycoROMMakeNear(m, o->n_contacts, o->list));
   o->near = PETSC_TRUE;
-  o->forces = (PetscBool)(o->contacts || HycoROMOutputsAreForces(m));
+  o->forces = (PetscBool)(o->passing || o->contacts || HycoROMOutputsAreForces(m));
   o->held = HycoRowsAreHeld(m->fe, &m->near[0].pairs);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -232,6 +254,7 @@ static PetscErrorCode Create(Work *o)
   HycoDuplicate(n_dof, m->U, &o->U);
   HycoDuplicate(m->model->pairs.n, m->Lambda, &o->Lambda);
   PetscUseTypeMethod(m, unknowns, &o->p, &o->n, NULL);
+  o->n_contacts = m->model->pairs.n;
   o->contacts =
       (PetscBool)(m->model->traits.surfaces && !m->model->floating && !HycoSceneHasFieldOutputs(m->model->scene));
   PetscCall(PetscMalloc3(o->p + o->n + 1, &o->z, o->p + o->n + 1, &o->moved, o->p + o->n + 1, &o->dz));
@@ -242,15 +265,23 @@ static PetscErrorCode Create(Work *o)
   PetscCall(PetscMalloc3(o->n + 1, &o->contact, o->p + o->n + 1, &o->q, o->p + o->n + 1, &o->v));
   PetscCall(PetscCalloc1(6 * m->model->scene->n_quantities + 1, &o->output));
   PetscUseTypeMethod(m, unknowns, &o->p, &o->n, o->z);
-  PetscCall((*m->ops->residual)(m, NULL, o->z, o->w[0], &largest));
+  if (o->friction)
+    PetscUseTypeMethod(m, rest, &o->row, o->w[0], &largest);
+  else
+    PetscCall((*m->ops->residual)(m, NULL, o->z, o->w[0], &largest));
   o->size = largest;
   for (PetscInt i = 0; i < o->n; i++) {
     /* Closed or undecided contacts; open ones do not change at first order. */
-    if (HycoTangentMayTouch(o->z[o->p + i], o->w[0][o->p + i], o->size)) o->contact[o->k++] = i;
+    if (o->row || HycoTangentMayTouch(o->z[o->p + i], o->w[0][o->p + i], o->size)) o->contact[o->k++] = i;
   }
   /* The tangent is factored once, for all parameters. */
-  PetscCall(Close(o));
+  o->regular = PETSC_TRUE;
+  if (!o->row) PetscCall(Close(o));
   if (!o->regular) PetscFunctionReturn(PETSC_SUCCESS);
+  if (o->passing) {
+    PetscCall(Focus(o));
+    PetscFunctionReturn(PETSC_SUCCESS);
+  }
   if (m->measured)
     PetscCall(PetscArraycpy(o->output, m->prediction.quantity, m->model->scene->n_quantities));
   else
@@ -297,7 +328,7 @@ static PetscBool Turns(const Work *o, const HycoDifference *d, PetscBool closer)
     PetscReal jump;
 
     /* A contact without force has no part in the solution, whatever its gap does. */
-    if (o->z[at] <= HYCO_GRADIENT_FORCE * most) continue;
+    if (PetscAbsReal(o->z[at]) <= HYCO_GRADIENT_FORCE * most) continue;
     jump = HycoDifferenceJump(d, o->size, slope, v);
     if (closer ? HycoDifferenceKinks(d, jump, near) : jump > 0) return PETSC_TRUE;
   }
@@ -368,9 +399,17 @@ static PetscErrorCode Differentiate(Work *o, HycoDifference *d, PetscBool *kink)
     o->q[i] = 0;
     for (PetscInt j = 0; j < 3; j++) o->q[i] += d->weight[j] * o->w[j][row];
   }
-  PetscCall(HycoTangentSolve(o->tangent, o->q, d->sign, o->v, kink));
-  *kink = (PetscBool)(*kink || turns);
-  for (PetscInt i = 0; i < o->p + o->k; i++) o->dz[i < o->p ? i : o->p + o->contact[i - o->p]] = o->v[i];
+  if (o->row) {
+    /* Of other masters, or states on the border, there are the differences. */
+    PetscCall((*o->m->ops->along)(o->m, d->parameter, d->weight, o->at, o->q, o->dz, &o->regular));
+    *kink = turns;
+    o->regular = (PetscBool)(o->regular && !turns);
+    if (!o->regular) PetscFunctionReturn(PETSC_SUCCESS);
+  } else {
+    PetscCall(HycoTangentSolve(o->tangent, o->q, d->sign, o->v, kink));
+    *kink = (PetscBool)(*kink || turns);
+    for (PetscInt i = 0; i < o->p + o->k; i++) o->dz[i < o->p ? i : o->p + o->contact[i - o->p]] = o->v[i];
+  }
   /* Displacements, unless outputs need forces alone. */
   if (o->near && !o->forces)
     PetscCall(
@@ -385,6 +424,7 @@ static void TakeChanges(Work *o, PetscInt p, PetscBool *nodes)
   PetscBool changed[HYCO_MAX_PARAMETERS] = {PETSC_FALSE};
   HycoChanges c;
 
+  o->parameter = p;
   changed[p] = PETSC_TRUE;
   c = HycoSceneChanges(s, changed);
   *nodes = c.nodes;
@@ -401,7 +441,7 @@ static PetscErrorCode Columns(Work *o, HycoGradientStore *store, HycoGradient *g
   HycoROM m = o->m;
 
   PetscFunctionBegin;
-  for (PetscInt k = 0; k < 3 * gradient->n_parameters; k++) {
+  for (PetscInt k = 0; k < 3 * gradient->n_parameters && o->regular; k++) {
     const PetscInt p = k % gradient->n_parameters;
     HycoDifference d;
     PetscBool kink, nodes;
@@ -410,6 +450,7 @@ static PetscErrorCode Columns(Work *o, HycoGradientStore *store, HycoGradient *g
     if ((nodes ? 2 : o->enters || o->means) != k / gradient->n_parameters) continue;
     HycoDifferenceSet(m->model->scene, o->mu, p, HYCO_GRADIENT_STEP, &d);
     PetscCall(Differentiate(o, &d, &kink));
+    if (!o->regular || o->passing) continue;
     PetscCall(HycoGradientColumn(gradient, store, m->model->scene, o->mu, &d, kink, Measure, o, o->output));
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -453,18 +494,18 @@ static PetscErrorCode Check(HycoROM m)
 
 PetscErrorCode HycoROMStateGradient(HycoROM m, HycoGradientStore *store, HycoGradient *gradient, PetscBool *regular)
 {
-  Work o = {.m = m};
+  Work o = {.m = m, .passing = (PetscBool)!store, .friction = HycoSceneHasFriction(m->model->scene)};
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
   PetscCall(HycoROMComplete(m));
   ierr = Create(&o);
-  *regular = o.regular;
   if (!ierr && o.regular) {
-    gradient->n_undecided = HycoTangentUndecided(o.tangent);
+    if (o.tangent) gradient->n_undecided = HycoTangentUndecided(o.tangent);
     ierr = Columns(&o, store, gradient);
     if (!ierr) ierr = Restore(&o);
   }
+  *regular = o.regular;
   /* Before the error is raised, so that a program that catches it leaks nothing. */
   PetscCall(Destroy(&o));
   PetscCall(ierr);

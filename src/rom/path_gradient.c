@@ -1,5 +1,4 @@
-/* The gradient of a predicted path: those of its listed times, where none depends on those before, else by the paths beside
-   it in its own steps. */
+/* The gradient of a predicted path: step by step, else by the paths beside it in its own steps. */
 #include <hycogradient.h>
 #include <hycoromimpl.h>
 
@@ -35,43 +34,64 @@ static PetscErrorCode Follow(void *context, const PetscReal mu[], const HycoStep
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* At the listed times one after the other, each as a prediction of its own; *done: false, where one has no derivative. */
+/* The state of an accepted step; at a listed time with its results, and those of a prediction of its own. */
+static PetscErrorCode TakeStep(HycoROM m, PetscInt k, PetscInt listed, PetscBool *done)
+{
+  PetscReal mu[HYCO_MAX_PARAMETERS];
+
+  PetscFunctionBegin;
+  if (listed >= 0)
+    PetscCall(HycoROMSetStep(m, listed));
+  else {
+    HycoSceneSetTime(m->model->scene, m->fe->mu, m->trace.t[k], mu);
+    PetscCall(HycoROMBringRows(m, mu));
+  }
+  PetscCall((*m->ops->stand)(m, k, listed, done));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* At the steps one after the other; without friction these do not depend on each other, and those between the listed times
+   are left out. *done: false, where one has no derivative. */
 static PetscErrorCode AtTimes(HycoROM m, const HycoStep step[], HycoGradient *gradient, PetscBool *done)
 {
   const PetscInt n = gradient->n_outputs * gradient->n_parameters, n_listed = m->trace.n_listed;
+  const PetscBool all = HycoSceneHasFriction(m->model->scene);
   PetscErrorCode ierr;
 
   PetscFunctionBegin;
   *done = PETSC_TRUE;
-  for (PetscInt k = 0; k < n_listed && *done; k++) {
-    HycoGradientStore there = {m->gradient.value + k * n, m->gradient.kink + k * n};
+  for (PetscInt k = 0, listed = 0; k < m->trace.n && *done; k++) {
+    const PetscBool lists = (PetscBool)(listed < n_listed && m->trace.at[listed] == k);
+    HycoGradientStore there = {m->gradient.value + listed * n, m->gradient.kink + listed * n};
     HycoGradient at = {.n_outputs = gradient->n_outputs, .n_parameters = gradient->n_parameters};
 
-    PetscCall(HycoROMSetStep(m, k));
+    if (!lists && !all) continue;
+    PetscCall(TakeStep(m, k, lists ? listed : -1, done));
+    if (!*done) break;
     m->trace.n_listed = 0; /* the outputs are those of this state, and of no path */
-    ierr = (*m->ops->stand)(m, k, done);
-    if (!ierr) ierr = HycoROMMeasureQuantities(m, &m->prediction);
-    m->measured = PETSC_TRUE;
-    if (!ierr) ierr = HycoROMStateGradient(m, &there, &at, done);
+    ierr = lists ? HycoROMMeasureQuantities(m, &m->prediction) : PETSC_SUCCESS;
+    m->measured = lists;
+    if (!ierr) ierr = HycoROMStateGradient(m, lists ? &there : NULL, &at, done);
     m->trace.n_listed = n_listed;
     PetscCall(ierr);
+    listed += lists;
   }
   if (*done) HycoGradientOfExtremes(m->model->scene, m->fe->mu, step, &m->gradient, gradient);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The gradient of a path whose times do not depend on each other. */
+/* The gradient of a path step by step, where its type has that. */
 static PetscErrorCode ByTimes(HycoROM m, const HycoStep step[], HycoGradient *gradient, PetscBool *done)
 {
   const HycoPrediction prediction = m->prediction;
   const PetscBool measured = m->measured;
   const PetscInt shown = m->trace.shown;
-  PetscBool alone = PETSC_FALSE;
+  PetscBool able = PETSC_FALSE;
 
   PetscFunctionBegin;
   *done = PETSC_FALSE;
-  PetscTryTypeMethod(m, stand, -1, &alone);
-  if (!alone) PetscFunctionReturn(PETSC_SUCCESS);
+  PetscTryTypeMethod(m, stand, -1, -1, &able);
+  if (!able) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(HycoGradientCreate(m->model->scene, &m->gradient, gradient));
   HycoOnError(AtTimes(m, step, gradient, done), m->solved = m->ready = PETSC_FALSE);
   m->prediction = prediction;

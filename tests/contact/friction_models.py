@@ -86,13 +86,31 @@ class FrictionModels(Case):
         for name in full:
             self.assertLessEqual(abs(found[name] - full[name]).max(), limit * abs(full[name]).max(), name)
 
+    def slopes(self, ranges, point):
+        """The gradient of the outputs' ends and extremes at a point is that of central differences of predictions, where friction dissipates."""
+        width, model = 2e-5, self.path('m.h5')
+        report = self.hyco('predict', '-model', model, '-mu', ','.join(map(str, point)), '-gradient')
+        steps = [sign * width / 2 * (hi - lo) * np.eye(len(point))[k] for k, (lo, hi) in enumerate(ranges.values()) for sign in (-1, 1)]
+        np.savetxt(self.path('beside.csv'), np.array(point) + steps, fmt='%.17g', delimiter=',', header=','.join(ranges), comments='')
+        self.hyco('predict', '-model', model, '-points', self.path('beside.csv'), '-table', self.path('beside.h5'))
+        self.assertGreater(abs(report['outputs']['W']), 0)
+        with h5py.File(self.path('beside.h5')) as rows:
+            for output, values in report['history']['outputs'].items():
+                for key, column in (('gradient', output), ('gradient_path', 'path_' + output)):
+                    for k, (p, (lo, hi)) in enumerate(ranges.items()):
+                        low, high = rows[column][2 * k:2 * k + 2]
+                        found = report[key][output][p] * (hi - lo)
+                        self.assertLess(abs(found - (high - low) / width), 1e-6 * max(abs(found), 1e-2 * max(map(abs, values))), (column, p))
+
     def test_exact(self):
-        """Loads, coefficient, modulus and gap change: the path of full order at unseen points; the type is found by default; estimates, batches."""
+        """Loads, coefficient, modulus and gap change: the path of full order at unseen points, and its derivatives; the type is found by default;
+        estimates, batches."""
         scene = self.pad()
         report = self.train(scene)
         self.assertEqual(report['model_type'], 'bodies')
         for point in ('0.17,1.3,0.7,0.4', '0.44,0.6,1.9,0.9'):
             self.alike(scene, point, 1e-8)
+        self.slopes({'m': (0.1, 0.5), 'press': (0.5, 1.5), 'soft': (0.5, 2), 'tilt': (0, 1)}, (0.17, 1.3, 0.7, 0.4))
         self.alike(scene, '0.3,1,1,0.5', 1e-8, ranks=2)
         compared = self.hyco('compare', '-scene', scene, '-model', self.path('m.h5'), '-mu', '0.17,1.3,0.7,0.4')
         for kind in ('lambda', 'sigma'):
@@ -127,6 +145,23 @@ class FrictionModels(Case):
             scene = self.two(dim, kind)
             self.train(scene, '-hyco_snapshots', self.path(f'{kind}{dim}'), grid='2,2', ranks=2 if kind == 'mortar' else 0)
             self.alike(scene, '0.22,1.7', 1e-4)
+        self.slopes({'m': (0.1, 0.3), 'hard': (0, 3)}, (0.22, 1.7))
+
+    def test_border(self):
+        """With the least friction at which all of the pad sticks its derivatives are those towards more friction, and flagged."""
+        scene = self.pad('stick.yaml', ELASTIC, ('[0.1, 0.5]', '[0, 3]'), ('[0, 1, 1.5, 2, 2.4, 3]', '[0, 1]'), ('[1, 0]', '[1, 0.3]'), cells=3)
+        self.train(scene, *BODIES)
+        at = ['predict', '-model', self.path('m.h5'), '-mu']
+        stuck = self.hyco(*at, '2.7,1,1,0', '-output', self.path('stuck.xdmf'), '-gradient')
+        self.assertEqual((stuck['history']['n_slipping'], stuck['gradient']['T']['m'], stuck['gradient_kinks']), ([0, 0], 0, []))
+        with h5py.File(self.path('stuck.h5')) as f:
+            x, traction, pressure = (f[name][:] for name in ('mesh/xyz', 'step-0001/nodes/contact_traction', 'step-0001/nodes/contact_pressure'))
+        press = pressure.ravel() > 0
+        least = (abs(traction[press, 0]) / (1 + 0.2 * x[press, 0]) / pressure.ravel()[press]).max()
+        for share, side in ((1, False), (0.999, True)):
+            report = self.hyco(*at, f'{float(share * least)!r},1,1,0', '-gradient')
+            self.assertEqual(bool(report['gradient']['T']['m']), side)
+            self.assertEqual({'output': 'T', 'parameter': 'm'} in report['gradient_kinks'], not side)
 
     def test_unique(self):
         """Nodes of a slave that are moved by supports and more than their masters' unknowns can tell apart: at the times when they press, the nodal forces are
@@ -194,6 +229,8 @@ class FrictionModels(Case):
             scene = self.changed('held.yaml', HELD.replace('LAW', law), ())
             self.train(scene, '-hyco_snapshots', self.path('held-' + law[:3]), *BODIES, grid='2,2,1')
             self.alike(scene, '0.4,1.3,0.22', limit)
+            if limit < 1e-6:
+                self.slopes({'m': (0.3, 0.6), 'press': (1, 2), 'push': (0.1, 0.25)}, (0.4, 1.3, 0.22))
 
     def hybrid(self, scene, n, *args):
         """A hybrid model from n scattered paths."""

@@ -27,7 +27,7 @@ body: {block: {law: j2, young: 1000, poisson: 0.3, yield: 1, hardening: 10}}
 fixed: {left: {x: 0}, foot: {y: 0}}
 traction: {right: {x: 1.3*pull*t}}
 history: {times: [0, 0.5, 1]}
-output: {long: {mean: u_x, group: right}, thin: {mean: u_y, group: top, path: absolute}}
+output: {long: {mean: u_x, group: right}, work: {mean: u_y, group: top, path: absolute}}
 """
 RANKS = r"""
 import sys
@@ -226,8 +226,8 @@ class Python(Case):
             self.near(model.predict([[0.7], [0.9]]).outputs['long'][1], p.outputs['long'], 1e-9)
             g = model.gradient([[0.7], [0.9]])
             self.assertEqual((g.value.shape, g.times.shape, g.path.shape), ((2, 2, 1), (2, 3, 2, 1), (2, 2, 1)))
-            self.assertLess(h['thin'][-1], -1e-3)  # the largest size over the path, not the largest value
-            np.testing.assert_allclose(p.data['path_quantity'][:2], [h['long'][-1], h['thin'][-1]], rtol=1e-9)
+            self.assertLess(h['work'][-1], -1e-3)  # the output, not HycoStep's member; the largest size over the path, not the largest value
+            np.testing.assert_allclose(p.data['path_quantity'][:2], [h['long'][-1], h['work'][-1]], rtol=1e-9)
             np.testing.assert_array_equal(g.times[:, -1], g.value)
             np.testing.assert_allclose(g.path, g.value, rtol=1e-9)  # it is longest at the end
             report = self.hyco('predict', '-model', 'bar.h5', '-mu', '0.9', '-gradient')

@@ -43,32 +43,6 @@ PetscErrorCode HycoBodiesDestroyModel(HycoROM m)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The residual of equilibrium along the rigid motions that contact alone prevents, relative to the terms of each, without
-   the round-off of loads (of a basis of length 1) and forces that balance themselves: no other force has to. */
-PetscReal HycoBodiesUnbalanced(HycoBodiesWork o)
-{
-  const HycoSubstructures b = o->bodies;
-  PetscReal most = 0, all = 0;
-
-  for (PetscInt j = 0; j < b->r; j++) all += PetscAbsReal(o->c[j]);
-  for (PetscInt k = 0; k < b->ns; k++) all += PetscAbsReal(o->f[k]);
-  for (PetscInt i = 0; i < b->p; i++) {
-    PetscReal sum = HycoBodiesLoadWork(o, i), size = PetscAbsReal(sum), reach = 0;
-
-    for (PetscInt k = 0; k < b->ns; k++) {
-      const PetscReal z = o->Z[k * b->p + i];
-
-      /* Work of the loads against that of the contact forces on motion i, Z^T (F - B^T L) = 0. */
-      sum -= z * o->f[k];
-      size += PetscAbsReal(z * o->f[k]);
-      reach = PetscMax(reach, PetscAbsReal(z));
-    }
-    sum = PetscMax(PetscAbsReal(sum) - 16 * PETSC_MACHINE_EPSILON * reach * all, 0);
-    if (size > 0) most = PetscMax(most, sum / size);
-  }
-  return most;
-}
-
 #define ROUNDED 1e-6 /* most of a residual that may be the effect of rounding */
 
 /* What is left of the gap of contact k, without the effect of rounding the terms whose sum the displacements are: a body

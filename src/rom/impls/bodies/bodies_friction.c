@@ -9,32 +9,11 @@
   so that a step is a small dense problem. Elastic bodies have no alpha; for the others this is the contact problem at
   alpha, whose derivative dr / dalpha Newton's method on alpha needs (bodies_newton.c).
 */
-#include "bodies_path.h"
+#include "bodies_friction.h"
 
 #define SOLVED  1e-8 /* residual of the contacts */
 #define TURNED  0.02 /* change of a piece of the law up to which the derivative of the forces is kept */
 #define ROUNDED 1e-6 /* of a gap without forces, the least size of those that are left */
-
-struct _n_HycoBodiesFriction {
-  HycoSlip slip;
-  HycoBodiesSurface normal, all; /* without and with tangents */
-  HycoRows rows;
-  PetscInt *contact; /* by row: of the scene */
-  HycoBlocks *blocks;
-  HycoTao tao;
-  HycoConeFactor factor;
-  PetscInt p;                    /* rigid motions */
-  PetscReal *M;                  /* p + rows square: [0 G^T; -G W]; NULL: not computed yet */
-  PetscBool present;             /* M is known to be that of these parameters */
-  PetscInt rows_of, *weights_of; /* the rows and, by body, the weights */
-  PetscReal *kappa_of;           /* and stiffness that it belongs to */
-  PetscReal *q, *z, *ahead;      /* p + rows: of the step; its motions and forces; a start of it */
-  PetscReal *pieces;             /* of the laws, when the derivative of the forces was taken */
-  PetscReal *before;             /* by row: forces of the accepted step before the last one */
-  PetscReal *U, *U_old;          /* n_dof: of the surface, at the step and at the last accepted time */
-  PetscReal *w, *forces;         /* by row: of the last accepted step */
-  PetscReal most;                /* largest displacement */
-};
 
 /* Room for the rows with tangents. */
 static PetscErrorCode CreateRows(HycoBodiesFriction f)
@@ -101,7 +80,7 @@ PetscErrorCode HycoBodiesFrictionDestroy(HycoBodiesFriction *friction)
   PetscCall(HycoSlipDestroy(&f->slip));
   PetscCall(HycoRowsDestroy(&f->rows));
   HycoFreeAll(&f->contact, &f->M, &f->weights_of, &f->kappa_of, &f->pieces, &f->q, &f->z, &f->ahead, &f->U, &f->U_old,
-              &f->w, &f->forces, &f->before, friction);
+              &f->w, &f->forces, &f->before, &f->taken, friction);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -119,6 +98,7 @@ PetscErrorCode HycoBodiesFrictionBegin(HycoBodiesFriction f)
   PetscCall(HycoSlipBegin(&f->slip));
   PetscCall(PetscArrayzero(f->U_old, f->normal.fe->n_dof));
   PetscCall(PetscArrayzero(f->forces, f->all.n));
+  f->n_taken = 0;
   f->present = PETSC_FALSE;
   HycoConeFactorForget(f->factor); /* a path does not depend on those before */
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -361,8 +341,14 @@ PetscErrorCode HycoBodiesFrictionDerive(HycoBodiesFriction f, PetscInt m, const 
 PetscErrorCode HycoBodiesFrictionAccept(HycoBodiesFriction f, PetscReal t)
 {
   const PetscReal *L = f->z + f->p;
+  const size_t n = (size_t)(f->p + f->all.n);
 
   PetscFunctionBegin;
+  if (f->n_taken == f->room) {
+    f->room = 2 * f->room + 64;
+    PetscCall(PetscRealloc((size_t)f->room * n * sizeof(PetscReal) + 1, &f->taken));
+  }
+  PetscCall(PetscArraycpy(f->taken + (size_t)f->n_taken++ * n, f->z, n));
   HycoSlipAdd(&f->slip, L, f->w, f->most);
   /* The last two accepted forces, in this order: the next step extrapolates from them. */
   PetscCall(PetscArraycpy(f->before, f->forces, f->all.n));

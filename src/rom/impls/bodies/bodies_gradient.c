@@ -113,11 +113,10 @@ PetscErrorCode HycoBodiesForgetBeside(HycoBodiesWork o)
 }
 
 /* At the first gradient of a model. */
-static PetscErrorCode MakeBeside(HycoROM m)
+static PetscErrorCode MakeBeside(HycoROM m, HycoBodiesSurface s)
 {
   HycoBodiesWork o = (HycoBodiesWork)m->work;
   const HycoSubstructures b = o->bodies;
-  HycoBodiesSurface s = HycoBodiesSurfaceOf(m);
   HycoBodiesBeside made;
 
   PetscFunctionBegin;
@@ -130,7 +129,7 @@ static PetscErrorCode MakeBeside(HycoROM m)
   for (PetscInt k = 0; k < 5; k++) PetscCall(PetscCalloc1(made->size, &made->change[k]));
   PetscCall(PetscMalloc1(b->ns + b->ni + 1, &made->du));
   /* Room for any number of contacts: gradients differ in theirs. */
-  s.n = m->model->pairs.n;
+  s.n = PetscMax(s.n, m->model->pairs.n);
   PetscCall(HycoBodiesSetUp(made->at, b, m->model->scene, &s, m->solver));
   made->at->fe->keeps_sides = PETSC_TRUE; /* beside a prediction no body turns inside out */
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -226,22 +225,22 @@ static void TakeChange(HycoBodiesWork o, PetscInt n, const PetscInt contact[], P
   }
 }
 
-/* In place of HycoBodiesResidual() at mu: w of the change of the data, to the first order. */
-PetscErrorCode HycoBodiesNear(HycoROM m, const PetscReal mu[], PetscInt n, const PetscInt contact[], PetscBool rows,
-                              const PetscReal z[], PetscInt point, PetscReal w[])
+/* In place of HycoBodiesResidual() at mu: w of the change of the data, to the first order. s: at mu, if its rows change;
+   gap: by row of o, where they do not. */
+PetscErrorCode HycoBodiesNearSurface(HycoROM m, const HycoBodiesSurface *s, const PetscReal gaps[],
+                                     const PetscReal mu[], PetscInt n, const PetscInt contact[], PetscBool rows,
+                                     const PetscReal z[], PetscInt point, PetscReal w[])
 {
   HycoBodiesWork o = (HycoBodiesWork)m->work, at;
   const HycoSubstructures b = o->bodies;
-  const HycoBodiesSurface s = HycoBodiesSurfaceOf(m);
   PetscReal *du;
   Parts change;
 
   PetscFunctionBegin;
-  PetscCall(MakeBeside(m));
+  PetscCall(MakeBeside(m, *s));
   at = o->beside->at;
   du = o->beside->du;
-  if (rows) PetscCall(HycoROMBringRows(m, mu));
-  PetscCall(HycoBodiesBring(at, rows ? &s : NULL, mu));
+  PetscCall(HycoBodiesBring(at, rows ? s : NULL, mu));
   TakeChange(o, n, contact, rows, z + b->p, o->beside->change[point]);
   change = PartsOf(o, o->beside->change[point]);
   PetscCall(PetscArrayzero(du, b->ns));
@@ -253,12 +252,24 @@ PetscErrorCode HycoBodiesNear(HycoROM m, const PetscReal mu[], PetscInt n, const
   }
   for (PetscInt k = 0; k < n; k++) {
     const PetscInt lo = o->row_start[contact[k]], hi = o->row_start[contact[k] + 1];
-    PetscReal gap = rows ? at->gap[k] : m->rows.gap[contact[k]];
+    PetscReal gap = rows ? at->gap[k] : gaps[contact[k]];
 
     for (PetscInt e = at->row_start[k]; rows && e < at->row_start[k + 1]; e++) gap -= at->row[e] * o->u[at->row_at[e]];
     for (PetscInt e = lo; e < hi; e++) gap -= o->row[e] * (du[o->row_at[e]] + (rows ? 0 : o->u[o->row_at[e]]));
     w[b->p + k] = gap;
   }
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+PetscErrorCode HycoBodiesNear(HycoROM m, const PetscReal mu[], PetscInt n, const PetscInt contact[], PetscBool rows,
+                              const PetscReal z[], PetscInt point, PetscReal w[])
+{
+  HycoBodiesSurface s;
+
+  PetscFunctionBegin;
+  if (rows) PetscCall(HycoROMBringRows(m, mu));
+  s = HycoBodiesSurfaceOf(m);
+  PetscCall(HycoBodiesNearSurface(m, &s, m->rows.gap, mu, n, contact, rows, z, point, w));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 

@@ -273,7 +273,7 @@ static PetscErrorCode Residual(HycoROM m, const PetscReal mu[], const PetscReal 
 }
 
 /* The motions and the forces give the rest: elastic bodies without friction do not depend on the times before. */
-static PetscErrorCode Stand(HycoROM m, PetscInt k, PetscBool *alone)
+static PetscErrorCode Stand(HycoROM m, PetscInt k, PetscInt listed, PetscBool *able)
 {
   HycoBodiesPath w = (HycoBodiesPath)m->work;
   const PetscInt p = w->bodies.bodies->p, n = m->model->pairs.n;
@@ -281,12 +281,51 @@ static PetscErrorCode Stand(HycoROM m, PetscInt k, PetscBool *alone)
 
   PetscFunctionBegin;
   /* Models of elastic bodies that have unknowns of cells are of older files. */
-  *alone = (PetscBool)(!w->friction && !w->path->flows && !w->bodies.bodies->inelastic->nd);
-  if (!*alone || k < 0) PetscFunctionReturn(PETSC_SUCCESS);
+  *able = (PetscBool)(!w->path->flows && !w->bodies.bodies->inelastic->nd);
+  if (*able && w->friction) PetscCall(HycoBodiesAlongStand(m, w->friction, &w->bodies, k, able));
+  if (!*able || k < 0 || w->friction) PetscFunctionReturn(PETSC_SUCCESS);
   PetscCall(PetscMalloc1(p + n + 1, &z));
-  PetscCall(PetscArraycpy(z, w->motions + k * p, p));
+  PetscCall(PetscArraycpy(z, w->motions + listed * p, p));
   PetscCall(PetscArraycpy(z + p, m->Lambda, n));
   HycoFinally(HycoBodiesResidual(m, m->fe->mu, z, NULL, &size), PetscCall(PetscFree(z)));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Rest(HycoROM m, const PetscInt **row, PetscReal w[], PetscReal *size)
+{
+  HycoBodiesPath o = (HycoBodiesPath)m->work;
+
+  PetscFunctionBegin;
+  HycoBodiesWorkOnMotions(&o->bodies, w);
+  HycoBodiesAlongRest(o->friction, row, w + o->bodies.bodies->p, size);
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Near(HycoROM m, const PetscReal mu[], PetscInt n, const PetscInt contact[], PetscBool rows,
+                           const PetscReal z[], PetscInt point, PetscReal w[])
+{
+  HycoBodiesPath o = (HycoBodiesPath)m->work;
+
+  PetscFunctionBegin;
+  if (o->friction)
+    PetscCall(HycoBodiesAlongNear(m, o->friction, mu, contact, rows, z, point, w));
+  else
+    PetscCall(HycoBodiesNear(m, mu, n, contact, rows, z, point, w));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Along(HycoROM m, PetscInt parameter, const PetscReal weight[3], const PetscInt point[3],
+                            const PetscReal q[], PetscReal dz[], PetscBool *regular)
+{
+  PetscFunctionBegin;
+  PetscCall(HycoBodiesAlongStep(((HycoBodiesPath)m->work)->friction, parameter, weight, point, q, dz, regular));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode Show(HycoROM m, PetscInt parameter, PetscBool rows, PetscReal step, const PetscReal dz[])
+{
+  PetscFunctionBegin;
+  PetscCall(HycoBodiesAlongShow(m, ((HycoBodiesPath)m->work)->friction, parameter, rows, step, dz));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -476,6 +515,7 @@ static PetscErrorCode Reset(HycoROM m)
   HycoDestroyAll(&w->alpha, &w->L);
   PetscCall(HycoPathFree(&w->path));
   if (w->bodies.bodies) PetscCall(HycoBodiesReset(&w->bodies));
+  PetscCall(HycoBodiesAlongDestroy(w->friction));
   PetscCall(HycoBodiesFrictionDestroy(&w->friction));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
@@ -524,8 +564,7 @@ static PetscErrorCode View(HycoROM m, PetscViewer viewer)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* Derivatives of elastic paths without friction are those at their listed times, of others differences of whole paths
-   (path_gradient.c); unknowns, residual and expand serve programs too. No estimate of its own: those of held-out paths
+/* Derivatives of elastic paths are those of their steps, of others differences of whole paths (path_gradient.c); unknowns, residual and expand serve programs too. No estimate of its own: those of held-out paths
    apply. */
 PetscErrorCode HycoBodiesTakePath(HycoROM m)
 {
@@ -546,7 +585,10 @@ PetscErrorCode HycoBodiesTakePath(HycoROM m)
                                  .residual = Residual,
                                  .stand = Stand,
                                  .jacobian = HycoBodiesJacobian,
-                                 .beside = HycoBodiesNear,
+                                 .beside = Near,
+                                 .rest = Rest,
+                                 .along = Along,
+                                 .show = Show,
                                  .slope = HycoBodiesSlope,
                                  .expand = Expand,
                                  .features = Features,

@@ -1031,6 +1031,32 @@ PetscErrorCode HycoBodiesSolve(HycoBodiesWork o, const HycoBodiesSurface *s, con
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
+/* The residual of equilibrium along the rigid motions that contact alone prevents, relative to the terms of each, without
+   the round-off of loads (of a basis of length 1) and forces that balance themselves: no other force has to. */
+PetscReal HycoBodiesUnbalanced(HycoBodiesWork o)
+{
+  const HycoSubstructures b = o->bodies;
+  PetscReal most = 0, all = 0;
+
+  for (PetscInt j = 0; j < b->r; j++) all += PetscAbsReal(o->c[j]);
+  for (PetscInt k = 0; k < b->ns; k++) all += PetscAbsReal(o->f[k]);
+  for (PetscInt i = 0; i < b->p; i++) {
+    PetscReal sum = HycoBodiesLoadWork(o, i), size = PetscAbsReal(sum), reach = 0;
+
+    for (PetscInt k = 0; k < b->ns; k++) {
+      const PetscReal z = o->Z[k * b->p + i];
+
+      /* Work of the loads against that of the contact forces on motion i, Z^T (F - B^T L) = 0. */
+      sum -= z * o->f[k];
+      size += PetscAbsReal(z * o->f[k]);
+      reach = PetscMax(reach, PetscAbsReal(z));
+    }
+    sum = PetscMax(PetscAbsReal(sum) - 16 * PETSC_MACHINE_EPSILON * reach * all, 0);
+    if (size > 0) most = PetscMax(most, sum / size);
+  }
+  return most;
+}
+
 /* |L~|_W^2 = sum of f.(C f / kappa), from the displacements by the forces. `gram` holds the errors of R in the
    norm of C^-1: that is the term |B (R~ - R) c|_{W^-1} of the bound, kappa scaling C and R alike. */
 PetscReal HycoBodiesBound(HycoBodiesWork o, PetscReal *norm)

@@ -1,0 +1,32 @@
+/* Friction between the bodies of a model (bodies_friction.c), and the derivatives of its paths (bodies_along.c). */
+#ifndef BODIES_FRICTION_H
+#define BODIES_FRICTION_H
+
+#include "bodies_path.h"
+
+typedef struct _n_HycoBodiesAlong *HycoBodiesAlong;
+struct _n_HycoBodiesFriction {
+  HycoSlip slip;
+  HycoBodiesSurface normal, all; /* without and with tangents */
+  HycoRows rows;
+  PetscInt *contact; /* by row: of the scene */
+  HycoBlocks *blocks;
+  HycoTao tao;
+  HycoConeFactor factor;
+  PetscInt p;                    /* rigid motions */
+  PetscReal *M;                  /* p + rows square: [0 G^T; -G W]; NULL: not computed yet */
+  PetscBool present;             /* M is known to be that of these parameters */
+  PetscInt rows_of, *weights_of; /* the rows and, by body, the weights */
+  PetscReal *kappa_of;           /* and stiffness that it belongs to */
+  PetscReal *q, *z, *ahead;      /* p + rows: of the step; its motions and forces; a start of it */
+  PetscReal *pieces;             /* of the laws, when the derivative of the forces was taken */
+  PetscReal *before;             /* by row: forces of the accepted step before the last one */
+  PetscReal *U, *U_old;          /* n_dof: of the surface, at the step and at the last accepted time */
+  PetscReal *w, *forces;         /* by row: of the last accepted step */
+  PetscReal most;                /* largest displacement */
+  PetscInt n_taken, room;        /* accepted steps, and room for them */
+  PetscReal *taken;              /* by accepted step: p + rows, its motions and forces */
+  HycoBodiesAlong along;         /* NULL: no derivatives have been asked for; bodies_along.c frees it */
+};
+
+#endif
