@@ -14,7 +14,6 @@
 #include <string.h>
 #include <time.h>
 
-#define PATHS
 #include "runtime/runtime.c"
 #include <hycocoulomb.h>
 #include "runtime/paths.c"
@@ -51,8 +50,8 @@ typedef struct {
   PetscInt *first;            /* with friction rows instead; by contact of the model: its first one; NULL: its number */
   PetscReal *z, *unit;        /* p + n; their sizes */
   PetscReal *w;
-  PetscInt n_atoms, n_rows, room, ny, n_groups, *group;
-  HycoAtom *atom;
+  PetscInt n_rows, ny, n_groups, *group;
+  HycoAtoms atoms;
   Row *row;
   PetscReal *area;     /* by contact of the model; where none travels, values: */
   PetscInt travel_row; /* the first row of the travel's values */
@@ -61,7 +60,6 @@ typedef struct {
   HycoExportFit base, response;
   HycoExportModel out;
   double *state; /* of a path of the program */
-  PetscErrorCode failed;
 } Export;
 
 /* -- probing -- */
@@ -70,7 +68,7 @@ typedef struct {
 static PetscReal Component(const Export *e, const Row *r, const PetscReal u[])
 {
   const PetscInt dim = e->m->model->mesh->dim, node = r->index / dim;
-  const PetscReal *Q = r->turned ? HycoTravelTurn(e->travel, r->turned - 1) : NULL;
+  const PetscReal *Q = r->turned ? e->travel->bodies->pose[r->turned - 1].Q : NULL;
   PetscReal sum = 0;
 
   if (!Q) return u[r->index];
@@ -82,7 +80,7 @@ static PetscReal Component(const Export *e, const Row *r, const PetscReal u[])
 static PetscReal Stress(const Export *e, const Row *r, PetscInt n, const PetscReal sigma[])
 {
   static const PetscInt at[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {0, 2}};
-  const PetscReal *Q = r->turned ? HycoTravelTurn(e->travel, r->turned - 1) : NULL;
+  const PetscReal *Q = r->turned ? e->travel->bodies->pose[r->turned - 1].Q : NULL;
   PetscReal sum = 0;
 
   for (PetscInt k = 0; k < n; k++) {
@@ -164,12 +162,36 @@ static PetscErrorCode Probe(Export *e, const PetscReal mu[], const PetscReal z[]
 static PetscErrorCode AddRow(Export *e, Row row)
 {
   PetscFunctionBegin;
-  if (e->n_rows == e->room) {
-    /* Rows of one output are contiguous; they only grow. */
-    e->room = 2 * e->room + 64;
-    PetscCall(PetscRealloc((size_t)e->room * sizeof(*e->row), &e->row));
-  }
-  e->row[e->n_rows++] = row;
+  HYCO_ADD(e->n_rows, e->row, row);
+  e->n_rows++;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode AddContact(Export *e, PetscInt contact)
+{
+  PetscFunctionBegin;
+  HYCO_ADD(e->out.n_contact, e->out.m.contact, (int)contact);
+  e->out.n_contact++;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+static PetscErrorCode AddWeight(Export *e, PetscReal weight)
+{
+  PetscFunctionBegin;
+  HYCO_ADD(e->out.n_weights, e->out.m.weight, weight);
+  e->out.n_weights++;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* Copies the names. */
+static PetscErrorCode AddOutput(HycoExportModel *m, Output output, const char name[], const char unit[])
+{
+  PetscFunctionBegin;
+  HYCO_ADD(m->m.n_outputs, m->m.output, output);
+  HYCO_ADD(m->m.n_outputs, m->name, NULL);
+  HYCO_ADD(m->m.n_outputs, m->unit, NULL);
+  PetscCall(PetscStrallocpy(name, &m->name[m->m.n_outputs]));
+  PetscCall(PetscStrallocpy(unit, &m->unit[m->m.n_outputs++]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -233,7 +255,7 @@ static PetscErrorCode AddItems(Export *e, PetscInt quantity, Output *o)
         "smaller group",
         q->name, MOST_ITEMS);
     o->n++;
-    if (q->kind == HYCO_QUANTITY_MEAN) PetscCall(HycoExportAddWeight(&e->out, weight));
+    if (q->kind == HYCO_QUANTITY_MEAN) PetscCall(AddWeight(e, weight));
     o->width = o->of == COMPONENT ? 1 : each;
     for (PetscInt d = 0; d < (o->of == COMPONENT ? 1 : each); d++) {
       for (PetscInt j = 0; j < 6; j++) row.coefficient[j] = j == d;
@@ -267,7 +289,7 @@ static PetscErrorCode AddContacts(Export *e, const HycoQuantity *q, Output *o)
 
     while (!e->travel && at < e->k && e->contact[at] != (e->first ? e->first[k] : k)) at++;
     if (!of[k] || (at == e->k && o->kind != PRESSURE_SMALLEST)) continue;
-    PetscCall(HycoExportAddContact(&e->out, at < e->k ? at : -1));
+    PetscCall(AddContact(e, at < e->k ? at : -1));
     o->n++;
   }
   PetscCall(PetscFree(of));
@@ -283,8 +305,7 @@ static PetscErrorCode AddForces(Export *e, const HycoQuantity *q, Output *o)
   *o = (Output){.kind = RESULTANT, .of = (int)q->field + (q->kind == HYCO_QUANTITY_MOMENT ? 3 : 0), .width = -1};
   PetscCall(AddContacts(e, q, o));
   o->weight = e->out.n_weights;
-  for (PetscInt k = 0; k < o->n + e->out.surfaces.n_nodes; k++)
-    PetscCall(HycoExportAddWeight(&e->out, k < o->n && !none ? -1 : 0));
+  for (PetscInt k = 0; k < o->n + e->out.m.surfaces.n_nodes; k++) PetscCall(AddWeight(e, k < o->n && !none ? -1 : 0));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -300,10 +321,10 @@ static PetscErrorCode AddPush(Export *e, const PetscBool of[], PetscInt axis, Ou
       .kind = RESULTANT, .of = (int)axis, .width = o->first, .first = e->out.n_contact, .weight = e->out.n_weights};
   o->n = pairs->n;
   for (PetscInt k = 0; k < pairs->n; k++) {
-    PetscCall(HycoExportAddContact(&e->out, k));
-    PetscCall(HycoExportAddWeight(&e->out, of[body[pairs->slave[k]]]));
+    PetscCall(AddContact(e, k));
+    PetscCall(AddWeight(e, of[body[pairs->slave[k]]]));
   }
-  for (PetscInt i = 0; i < e->out.surfaces.n_nodes; i++) PetscCall(HycoExportAddWeight(&e->out, of[e->out.body[i]]));
+  for (PetscInt i = 0; i < e->out.m.surfaces.n_nodes; i++) PetscCall(AddWeight(e, of[e->out.m.surfaces.body[i]]));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -320,7 +341,7 @@ static PetscErrorCode AddWork(Export *e, const HycoQuantity *q, Output *o)
   for (PetscInt b = 0, k = 0; b < e->out.m.n_slip; b++) {
     while (e->first[k] != e->contact[e->out.m.row[b]]) k++;
     if (!of[k]) continue;
-    PetscCall(HycoExportAddContact(&e->out, b));
+    PetscCall(AddContact(e, b));
     o->n++;
   }
   PetscCall(PetscFree(of));
@@ -359,7 +380,7 @@ static PetscErrorCode AddQuantity(Export *e, PetscInt k)
     PetscCall(AddRow(e, (Row){.from = QUANTITY, .index = k, .group = e->out.m.n_outputs}));
     if (pushed) PetscCall(AddPush(e, pushed, q->field, &o));
   }
-  PetscCall(HycoExportAddOutput(&e->out, &o, q->name, HycoExportUnit(e->s, q)));
+  PetscCall(AddOutput(&e->out, o, q->name, HycoExportUnit(e->s, q)));
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -389,7 +410,7 @@ static PetscErrorCode FindOutputs(Export *e)
       else
         PetscCall(AddRow(e, (Row){.from = FORCE, .index = c, .axis = a, .group = e->out.m.n_outputs}));
       HycoFormat(name, "%s.force_%c", s->contact[c]->name, "xyz"[a]);
-      PetscCall(HycoExportAddOutput(&e->out, &o, name, HycoExportUnit(s, &q)));
+      PetscCall(AddOutput(&e->out, o, name, HycoExportUnit(s, &q)));
     }
     for (PetscInt a = 0; a < 2; a++) {
       Output o = {.kind = a ? PRESSURE : CLOSED, .weight = -1};
@@ -397,7 +418,7 @@ static PetscErrorCode FindOutputs(Export *e)
       q.kind = a ? HYCO_QUANTITY_PRESSURE : HYCO_QUANTITY_AREA;
       PetscCall(AddContacts(e, &q, &o));
       HycoFormat(name, "%s.%s", s->contact[c]->name, a ? "pressure_max" : "area");
-      PetscCall(HycoExportAddOutput(&e->out, &o, name, HycoExportUnit(s, &q)));
+      PetscCall(AddOutput(&e->out, o, name, HycoExportUnit(s, &q)));
     }
   }
   PetscFunctionReturn(PETSC_SUCCESS);
@@ -455,7 +476,7 @@ static PetscErrorCode FindProblem(Export *e, const PetscReal mu[])
 
   PetscFunctionBegin;
   PetscUseTypeMethod(m, unknowns, &e->p, &e->n, NULL);
-  if (e->travel) e->n = HycoTravelPlaces(e->travel);
+  if (e->travel) e->n = e->travel->bodies->bodies->ns;
   n = (size_t)(e->p + e->n);
   PetscCall(PetscMalloc4(n + 1, &e->z, n + 1, &e->w, 2, &e->unit, e->n + 1, &e->contact));
   if (e->travel)
@@ -622,7 +643,7 @@ static PetscErrorCode Join(const HycoExportFit *part, PetscInt n, const PetscInt
    they belong: the rows without forces have products of them. */
 static PetscErrorCode FindSeeds(Export *e, PetscInt first, const HycoExportFit *from, PetscInt *n, HycoFunction seed[])
 {
-  const PetscInt g = e->group[first], places = e->n_groups - (e->travel ? HycoTravelBodies(e->travel) : 0);
+  const PetscInt g = e->group[first], places = e->n_groups - (e->travel ? e->travel->bodies->bodies->n : 0);
 
   PetscFunctionBegin;
   *n = 0;
@@ -631,8 +652,9 @@ static PetscErrorCode FindSeeds(Export *e, PetscInt first, const HycoExportFit *
 
     for (PetscInt r = 0; r < e->ny && !has; r++) {
       const PetscInt at = r - e->p - e->k - e->travel_row;
-      const PetscBool of =
-          (PetscBool)(g < places ? e->group[r] == g : at >= 0 && HycoTravelIsFlexible(e->travel, at, g - places));
+      const PetscBool of = (PetscBool)(g < places ? e->group[r] == g
+                                                  : at >= 0 && e->travel->value[at].from == FLEXIBLE &&
+                                                        e->travel->value[at].index == g - places);
 
       has = (PetscBool)(of && from->coefficient[(size_t)r * (size_t)from->n + (size_t)k] != 0);
     }
@@ -646,7 +668,7 @@ static PetscErrorCode FitRows(Export *e, PetscInt last, const HycoFitData *all, 
                               HycoExportFit *fit)
 {
   const HycoExportFit *from =
-      e->group[row[0]] < e->n_groups - (e->travel ? HycoTravelBodies(e->travel) : 0) ? &e->response : fit;
+      e->group[row[0]] < e->n_groups - (e->travel ? e->travel->bodies->bodies->n : 0) ? &e->response : fit;
   HycoFunction *seed;
   PetscInt n_seeds = 0;
   HycoFitData data = {all->n_points, n, all->atom, NULL, NULL, all->scale};
@@ -661,9 +683,9 @@ static PetscErrorCode FitRows(Export *e, PetscInt last, const HycoFitData *all, 
   PetscCall(PetscMalloc1(PetscMax(from->n, 1), &seed));
   if (e->n_weights > SEVERAL) last = PetscMin(last, 1);
   if (e->travel && fit == &e->base) PetscCall(FindSeeds(e, row[0], from, &n_seeds, seed));
-  for (PetscInt level = n_seeds ? -1 - e->n_atoms : 0; level <= last && part.worst > EXACT; level++) {
+  for (PetscInt level = n_seeds ? -1 - e->atoms.n : 0; level <= last && part.worst > EXACT; level++) {
     HycoFreeAll(&part.function, &part.coefficient);
-    PetscCall(HycoFitFunctions(e->n_atoms, e->atom, level, n_seeds, seed, EXACT, &data, &part));
+    PetscCall(HycoFitFunctions(&e->atoms, level, n_seeds, seed, EXACT, &data, &part));
   }
   PetscCall(PetscFree(seed));
   if (!part.function) part.n = 0; /* too many were left */
@@ -707,8 +729,8 @@ static PetscErrorCode FitBoth(Export *e, PetscInt fixed, PetscInt times)
   PetscFunctionBegin;
   PetscCall(PetscMalloc1(e->n_groups, &scale));
   PetscCall(Sample(e, times * PetscMax(SAMPLES, EACH * e->n_weights), fixed, &o));
-  PetscCall(PetscMalloc1((size_t)o.n * (size_t)e->n_atoms + 1, &value));
-  PetscCall(HycoAtomsTabulate(e->s, e->n_atoms, e->atom, o.n, o.mu, value));
+  PetscCall(PetscMalloc1((size_t)o.n * (size_t)e->atoms.n + 1, &value));
+  PetscCall(HycoAtomsTabulate(e->s, &e->atoms, o.n, o.mu, value));
   Scale(e, &o, scale);
   PetscCall(Fit(e, e->travel ? HYCO_FIT_LEVELS - 2 : 1, &(HycoFitData){o.n, 2 * e->ny, value, o.added, e->group, scale},
                 &e->response));
@@ -750,20 +772,41 @@ static PetscErrorCode Refuse(Export *e)
 
 /* -- the arrays -- */
 
+/* An atom in the program, which has its expression then. */
+static PetscErrorCode Take(Export *e, HycoAtom *a, int *place)
+{
+  Model *o = &e->out.m;
+  HycoCode *code = &e->out.code;
+
+  PetscFunctionBegin;
+  if (!a->place) {
+    HYCO_ADD(o->n_atoms, o->atom, (int)code->n);
+    a->place = ++o->n_atoms;
+    PetscCall(PetscRealloc((size_t)(code->n + a->n) * sizeof(*code->text), &code->text));
+    PetscCall(PetscArraycpy(code->text + code->n, e->atoms.code.text + a->code, a->n));
+    code->n += a->n;
+  }
+  *place = (int)a->place - 1;
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
 /* The functions of both fits, each once; place[n]: where those of a fit are. */
 static PetscErrorCode Merge(Export *e, const HycoExportFit *fit, PetscInt place[])
 {
-  HycoExportModel *o = &e->out;
+  Model *o = &e->out.m;
 
   PetscFunctionBegin;
   for (PetscInt k = 0; k < fit->n; k++) {
-    const HycoFunction *f = &fit->function[k];
+    HycoFunction f = fit->function[k];
     PetscInt at = 0;
 
-    while (at < o->m.n_functions && memcmp(&o->function[at], f, sizeof(*f)) != 0) at++;
-    if (at == o->m.n_functions) {
-      PetscCall(PetscRealloc((size_t)(at + 1) * sizeof(*o->function), &o->function));
-      o->function[o->m.n_functions++] = *f;
+    for (PetscInt j = 0; j < 4; j++) {
+      if (f.of[j] >= 0) PetscCall(Take(e, &e->atoms.atom[f.of[j]], &f.of[j]));
+    }
+    while (at < o->n_functions && memcmp(o->function + 4 * at, f.of, sizeof(f.of)) != 0) at++;
+    if (at == o->n_functions) {
+      PetscCall(PetscRealloc(4 * (size_t)(at + 1) * sizeof(*o->function), &o->function));
+      memcpy(o->function + 4 * o->n_functions++, f.of, sizeof(f.of));
     }
     place[k] = at;
   }
@@ -805,7 +848,7 @@ static PetscErrorCode ChoosePoints(Export *e, PetscReal point[], PetscReal inver
   PetscCall(PetscMalloc4(n * N, &value, n * n, &chosen, n, &scale, N, &pivot));
   PetscCall(PetscArrayzero(scale, n));
   for (PetscInt i = 0; i < N; i++) {
-    PetscCall(HycoFunctionsEvaluate(e->s, e->atom, n, e->response.function, mu + i * n_par, value + i * n));
+    PetscCall(HycoFunctionsEvaluate(e->s, &e->atoms, n, e->response.function, mu + i * n_par, value + i * n));
     for (PetscInt k = 0; k < n; k++) scale[k] = PetscMax(scale[k], PetscAbsReal(value[i * n + k]));
   }
   for (PetscInt i = 0; i < N * n; i++) value[i] /= scale[i % n];
@@ -813,7 +856,7 @@ static PetscErrorCode ChoosePoints(Export *e, PetscReal point[], PetscReal inver
   PetscCall(HycoPivotColumns(n, N, value, n, pivot));
   for (PetscInt i = 0; i < n; i++) {
     PetscCall(PetscArraycpy(point + i * n_par, mu + pivot[i] * n_par, n_par));
-    PetscCall(HycoFunctionsEvaluate(e->s, e->atom, n, e->response.function, point + i * n_par, chosen + i * n));
+    PetscCall(HycoFunctionsEvaluate(e->s, &e->atoms, n, e->response.function, point + i * n_par, chosen + i * n));
     for (PetscInt k = 0; k < n; k++) chosen[i * n + k] /= scale[k];
   }
   PetscCall(HycoPseudoInverse(n, n, chosen, 1e-12, inverse)); /* inverse[k * n + i]: of function k at point i */
@@ -879,20 +922,6 @@ static PetscErrorCode AddValues(Export *e, const PetscReal mu[], const PetscReal
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The terms by unknown: most have no force, and are passed over. */
-static PetscErrorCode Transpose(size_t n, HycoExportModel *o)
-{
-  const size_t terms = (size_t)o->m.n_terms;
-  PetscReal *by;
-
-  PetscFunctionBegin;
-  PetscCall(PetscMalloc1(n * terms + 1, &by));
-  for (size_t i = 0; i < n * terms; i++) by[i % n * terms + i / n] = o->m.term[i];
-  PetscCall(PetscFree(o->m.term));
-  o->m.term = by;
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
-
 /* size[n]: of functions at the ends, the middle and between, where a weight of a sample is not 0 everywhere. */
 static PetscErrorCode SizeFunctions(Export *e, PetscInt n, const HycoFunction f[], PetscReal size[])
 {
@@ -904,7 +933,7 @@ static PetscErrorCode SizeFunctions(Export *e, PetscInt n, const HycoFunction f[
   for (PetscInt k = 0; k < 7; k++) {
     for (PetscInt p = 0; p < e->s->n_variables; p++)
       mu[p] = e->s->lo[p] + (e->s->hi[p] - e->s->lo[p]) * (k < 3 ? (PetscReal)k / 2 : 0.07 + 0.23 * (PetscReal)(k - 3));
-    PetscCall(HycoFunctionsEvaluate(e->s, e->atom, n, f, mu, value));
+    PetscCall(HycoFunctionsEvaluate(e->s, &e->atoms, n, f, mu, value));
     for (PetscInt i = 0; i < n; i++) size[i] = PetscMax(size[i], PetscAbsReal(value[i]));
   }
   PetscCall(PetscFree(value));
@@ -934,12 +963,15 @@ static PetscErrorCode DropRounding(Export *e)
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
-/* The rows of T that are more than round-off beside the others of their value, as terms. */
+/* The rows of T that are more than round-off beside the others of their value, as terms: T is sparse in (value, function). By
+   unknown, as most have no force and are passed over. */
 static PetscErrorCode KeepTerms(Export *e, const PetscInt place[], const PetscReal T[])
 {
+  Model *o = &e->out.m;
   const size_t n = (size_t)(e->p + e->k);
   const PetscInt n_f = e->response.n;
   PetscReal *scale, *size;
+  size_t *from = NULL;
 
   PetscFunctionBegin;
   PetscCall(PetscMalloc2(n_f, &scale, n_f, &size));
@@ -955,13 +987,37 @@ static PetscErrorCode KeepTerms(Export *e, const PetscInt place[], const PetscRe
       most = PetscMax(most, size[f]);
     }
     for (PetscInt f = 0; f < n_f; f++) {
-      if (size[f] > 1e-13 * most)
-        PetscCall(
-            HycoExportAddTerm(&e->out, r, place[f], (PetscInt)n, T + ((size_t)f * (size_t)e->n_rows + (size_t)r) * n));
+      if (size[f] <= 1e-13 * most) continue;
+      HYCO_ADD(o->n_terms, o->value, (int)r);
+      HYCO_ADD(o->n_terms, o->factor, (int)place[f]);
+      HYCO_ADD(o->n_terms, from, ((size_t)f * (size_t)e->n_rows + (size_t)r) * n);
+      o->n_terms++;
     }
   }
-  PetscCall(Transpose(n, &e->out));
+  PetscCall(PetscMalloc1((size_t)o->n_terms * n + 1, &o->term));
+  for (size_t i = 0; i < n * (size_t)o->n_terms; i++)
+    o->term[i] = T[from[i % (size_t)o->n_terms] + i / (size_t)o->n_terms];
+  PetscCall(PetscFree(from));
   PetscCall(PetscFree2(scale, size));
+  PetscFunctionReturn(PETSC_SUCCESS);
+}
+
+/* The tables of a history. */
+static PetscErrorCode TakeTables(const HycoScene s, Model *o)
+{
+  PetscInt n = 0;
+
+  PetscFunctionBegin;
+  o->n_tables = (int)s->n_tables;
+  PetscCall(PetscCalloc1(s->n_tables + 1, &o->table));
+  for (PetscInt k = 0; k < s->n_tables; k++) {
+    for (PetscInt i = 0; i < s->table[k].n; i++) {
+      HYCO_ADD(n, o->table_t, s->table[k].t[i]);
+      HYCO_ADD(n, o->table_value, s->table[k].value[i]);
+      n++;
+    }
+    o->table[k + 1] = (int)n;
+  }
   PetscFunctionReturn(PETSC_SUCCESS);
 }
 
@@ -995,9 +1051,8 @@ static PetscErrorCode Fill(Export *e)
           e->base.coefficient[(size_t)r * (size_t)e->base.n + (size_t)j];
   }
   o->m.n_parameters = (int)e->s->n_parameters;
-  o->m.n_tables = (int)e->s->n_tables;
-  o->m.table = e->s->table;
-  o->m.surfaces = e->travel ? &o->surfaces : NULL;
+  o->m.code = o->code.text;
+  PetscCall(TakeTables(e->s, &o->m));
   o->m.n_motions = e->p;
   o->m.n_places = e->k;
   o->m.n_contacts = e->travel ? e->m->model->pairs.n : e->k;
@@ -1023,36 +1078,6 @@ static PetscErrorCode Fill(Export *e)
 }
 
 /* -- comparison with the model -- */
-
-/* The program's functions in the library's arithmetic. */
-static int FunctionsHere(void *context, const double v[], double f[])
-{
-  Export *e = (Export *)context;
-
-  e->failed = HycoFunctionsEvaluate(e->s, e->atom, e->out.m.n_functions, e->out.function, v, f);
-  return e->failed != 0;
-}
-
-/* The program's results at a point, of a path at listed time j after those before it. */
-static PetscErrorCode RunHere(Export *e, const Model *model, Work *o, const PetscReal mu[], PetscInt j, PetscReal out[],
-                              PetscBool *solved)
-{
-  double kkt;
-  int its, status;
-
-  PetscFunctionBegin;
-  if (e->s->n_times) {
-    if (!j) PetscCall(PetscArrayzero(e->state, state_size(model)));
-    status = advance(model, o, FunctionsHere, e, mu, e->s->times[j], e->state, out, &kkt, &its);
-  } else {
-    (void)FunctionsHere(e, mu, o->f);
-    if (e->travel) PetscCall(HycoTravelPositions(&e->out, e->s, mu, o->room.X));
-    status = predict(model, o, out, &kkt, &its);
-  }
-  PetscCall(e->failed);
-  *solved = (PetscBool)(status == OK);
-  PetscFunctionReturn(PETSC_SUCCESS);
-}
 
 /* The model's results in the order of the outputs, as above. *solved: its problem is. */
 static PetscErrorCode RunModel(Export *e, const PetscReal mu[], PetscInt j, PetscReal out[], PetscBool *solved)
@@ -1100,6 +1125,8 @@ static PetscReal ScaleOf(PetscInt n, char *const name[], const PetscReal most[],
 static PetscErrorCode Compare(Export *e, const Model *model, void *memory)
 {
   const PetscInt n = e->out.m.n_outputs, times = PetscMax(e->s->n_times, 1);
+  double kkt;
+  int its;
   HycoSamples samples;
   const PetscReal *mu;
   PetscReal *mine, *theirs, *most, *worst;
@@ -1121,7 +1148,9 @@ static PetscErrorCode Compare(Export *e, const Model *model, void *memory)
     if (i % times && !solved) continue; /* a path that has ended */
     PetscCall(RunModel(e, at, i % times, theirs, &theirs_solved));
     begin = clock();
-    PetscCall(RunHere(e, model, &o, at, i % times, mine, &solved));
+    if (i % times == 0) PetscCall(PetscArrayzero(e->state, state_size(model)));
+    solved = (PetscBool)(advance(model, &o, at, e->s->n_times ? e->s->times[i % times] : 0, e->state, mine, &kkt,
+                                 &its) == OK);
     e->out.seconds += (PetscReal)(clock() - begin) / CLOCKS_PER_SEC;
     e->out.checked++;
     HycoCheck(
@@ -1207,20 +1236,21 @@ static PetscErrorCode Prepare(Export *e)
     e->out.m.coefficient[b] = (int)e->n_rows;
     PetscCall(AddRow(e, (Row){.from = COEFFICIENT, .index = k, .group = -1}));
   }
-  if (e->travel) HycoTravelStart(e->travel, e->n_rows, &e->out);
-  for (PetscInt i = 0; e->travel && i < HycoTravelValues(e->travel); i++)
-    PetscCall(
-        AddRow(e, (Row){.from = TRAVEL, .index = i, .group = e->out.m.n_outputs + HycoTravelGroup(e->travel, i)}));
+  for (PetscInt i = 0; e->travel && i < e->travel->n_values; i++) {
+    const TravelValue *v = &e->travel->value[i];
+
+    /* All entries of a turn are of one size. */
+    PetscCall(AddRow(
+        e, (Row){.from = TRAVEL, .index = i, .group = e->out.m.n_outputs + i - (v->from == TURN ? v->part : 0)}));
+  }
   for (PetscInt i = 0; i < PLACES; i++) /* nodes without regularity */
     PetscCall(PetscArraycpy(x + 3 * i, m->fe->X + 3 * ((i * 7919 + 13) % m->fe->mesh->n_nodes), 3));
-  PetscCall(HycoAtomsFind(e->s, (PetscBool)(e->travel != NULL), PLACES, x, &e->n_atoms, &e->atom));
+  PetscCall(HycoAtomsFind(e->s, (PetscBool)(e->travel != NULL), PLACES, x, &e->atoms));
   PetscCall(HycoExportWeights(m, &e->n_weights, &e->weight));
-  for (PetscInt i = 0; i < e->n_weights; i++) PetscCall(HycoAtomsAddWeight(e->s, e->weight[i], &e->n_atoms, &e->atom));
-  e->out.n_atoms = e->n_atoms;
-  e->out.atom = e->atom;
+  for (PetscInt i = 0; i < e->n_weights; i++) PetscCall(HycoAtomsAddWeight(e->s, e->weight[i], &e->atoms));
   e->ny = e->p + e->k + e->n_rows;
-  places = 2 + e->out.m.n_outputs + (e->travel ? HycoTravelValues(e->travel) : 0);
-  e->n_groups = places + (e->travel ? HycoTravelBodies(e->travel) : 1); /* of areas and coefficients of friction */
+  places = 2 + e->out.m.n_outputs + (e->travel ? e->travel->n_values : 0);
+  e->n_groups = places + (e->travel ? e->travel->bodies->bodies->n : 1); /* of areas and coefficients of friction */
   PetscCall(PetscMalloc1(2 * e->ny + 1, &e->group));
   for (PetscInt r = 0; r < 2 * e->ny; r++) {
     const PetscInt at = r % e->ny;
@@ -1228,7 +1258,7 @@ static PetscErrorCode Prepare(Export *e)
     if (at >= e->p + e->k)
       e->group[r] = e->row[at - e->p - e->k].group < 0 ? places : 2 + e->row[at - e->p - e->k].group;
     else if (at >= e->p && e->travel)
-      e->group[r] = places + HycoTravelAt(e->travel, at - e->p);
+      e->group[r] = places + HycoBodiesAt(e->travel->bodies->bodies, at - e->p);
     else
       e->group[r] = at >= e->p;
   }
@@ -1270,8 +1300,8 @@ static PetscErrorCode ExportC(HycoROM m, const char path[], char **description)
   PetscCall(HycoTravelDestroy(&e.travel));
   if (e.z) PetscCall(PetscFree4(e.z, e.w, e.unit, e.contact));
   for (PetscInt i = 0; i < e.n_weights; i++) PetscCall(PetscFree(e.weight[i]));
-  HycoFreeAll(&e.first, &e.state, &e.weight, &e.group, &e.atom, &e.row, &e.area);
-  PetscCall(HycoExportModelFree(&e.out));
+  HycoFreeAll(&e.first, &e.state, &e.weight, &e.group, &e.atoms.atom, &e.atoms.code.text, &e.row, &e.area);
+  PetscCall(HycoExportModelFree(&e.out, e.s));
   PetscCall(ierr);
   PetscFunctionReturn(PETSC_SUCCESS);
 }
